@@ -1,0 +1,133 @@
+//! Ray tracing: one interface, two implementations that check each other.
+//!
+//! [`embree`] is the fast one, [`bvh`] the pure-Rust reference. Rays come in structure-of-arrays batches;
+//! a batch's answers do not depend on how it is cut into packets.
+
+pub mod bvh;
+pub mod embree;
+
+use crate::geometry::GeometryId;
+use crate::math::{Ray, Vec3};
+
+/// Rays as a structure of arrays. All vectors have the same length.
+#[derive(Clone, Debug, Default)]
+pub struct RayBatch {
+    /// Origins, x.
+    pub ox: Vec<f32>,
+    /// Origins, y.
+    pub oy: Vec<f32>,
+    /// Origins, z.
+    pub oz: Vec<f32>,
+    /// Directions, x; directions need not be unit.
+    pub dx: Vec<f32>,
+    /// Directions, y.
+    pub dy: Vec<f32>,
+    /// Directions, z.
+    pub dz: Vec<f32>,
+    /// End of the open interval (0, t_max).
+    pub t_max: Vec<f32>,
+    /// Time in 0..1.
+    pub time: Vec<f32>,
+}
+
+impl RayBatch {
+    /// Number of rays.
+    #[inline]
+    pub fn len(&self) -> usize {
+        self.ox.len()
+    }
+
+    /// True if there is no ray.
+    #[inline]
+    pub fn is_empty(&self) -> bool {
+        self.ox.is_empty()
+    }
+
+    /// Removes all rays, keeps the memory.
+    pub fn clear(&mut self) {
+        for v in [&mut self.ox, &mut self.oy, &mut self.oz, &mut self.dx, &mut self.dy, &mut self.dz] {
+            v.clear();
+        }
+        self.t_max.clear();
+        self.time.clear();
+    }
+
+    /// Appends a ray.
+    #[inline]
+    pub fn push(&mut self, ray: &Ray) {
+        self.ox.push(ray.o.x);
+        self.oy.push(ray.o.y);
+        self.oz.push(ray.o.z);
+        self.dx.push(ray.d.x);
+        self.dy.push(ray.d.y);
+        self.dz.push(ray.d.z);
+        self.t_max.push(ray.t_max);
+        self.time.push(ray.time);
+    }
+
+    /// Ray `i`.
+    #[inline]
+    pub fn get(&self, i: usize) -> Ray {
+        Ray {
+            o: Vec3::new(self.ox[i], self.oy[i], self.oz[i]),
+            d: Vec3::new(self.dx[i], self.dy[i], self.dz[i]),
+            t_max: self.t_max[i],
+            time: self.time[i],
+        }
+    }
+}
+
+/// What a ray met first.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Hit {
+    /// Ray parameter.
+    pub t: f32,
+    /// Parametric position on the primitive: barycentric weights of vertices 1 and 2 of a triangle; (u, v) of a
+    /// bilinear patch; (φ/φ_max, v) of a quadric as its docs say.
+    pub uv: [f32; 2],
+    /// What was hit.
+    pub geometry: GeometryId,
+    /// Triangle or patch inside the geometry; 0 for a quadric.
+    pub primitive: u32,
+    /// Placement, or [`Hit::NO_INSTANCE`].
+    pub instance: u32,
+}
+
+impl Hit {
+    /// The value of `instance` of a hit in the root group.
+    pub const NO_INSTANCE: u32 = u32::MAX;
+}
+
+/// What a tracer may assume of the neighbours in a batch. It never changes an answer.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Coherence {
+    /// Neighbours have like origins and like directions (camera rays of a tile).
+    Coherent,
+    /// Neighbours share an origin or an end (shadow segments of a shading point): packets, no frustum culling.
+    Packets,
+    /// Nothing (bounces): single rays.
+    Incoherent,
+}
+
+/// Memory and time of a built structure.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct AccelStats {
+    /// Bytes held by the structure.
+    pub bytes: u64,
+    /// Peak bytes during the build.
+    pub peak_bytes: u64,
+    /// Wall-clock seconds of the build.
+    pub build_seconds: f64,
+}
+
+/// A built ray tracer. Queries may come from any number of threads.
+pub trait Accel: Send + Sync {
+    /// First hits: `hits[i]` becomes the answer of ray `i`; `hits` is resized. Sees geometries of `Visibility::PATH`.
+    fn intersect(&self, rays: &RayBatch, coherence: Coherence, hits: &mut Vec<Option<Hit>>);
+
+    /// `occluded[i]` becomes true if anything of `Visibility::SHADOW` lies inside (0, t_max) of ray `i`.
+    fn occluded(&self, rays: &RayBatch, coherence: Coherence, occluded: &mut Vec<bool>);
+
+    /// Memory and build time.
+    fn stats(&self) -> AccelStats;
+}

@@ -1,0 +1,34 @@
+//! Lumiris: an offline CPU renderer for lighting integrals that are hard to sample.
+//!
+//! The code is layered; a module imports only from layers above it in this list (`tests/it/layering.rs` holds it):
+//!
+//! | layer | modules |
+//! |---|---|
+//! | 0 | [`math`], [`estimators`] |
+//! | 1 | [`samplers`], [`imaging`] |
+//! | 2 | [`textures`], [`geometry`], [`bsdfs`], [`cameras`], [`film`] |
+//! | 3 | [`materials`], [`lights`], [`accel`] |
+//! | 4 | [`scene`] |
+//! | 5 | [`import`], [`direct`] |
+//! | 6 | [`integrators`] |
+//! | 7 | [`render`] |
+//! | 8 | [`cli`] |
+
+pub mod accel;
+pub mod bsdfs;
+pub mod cameras;
+pub mod cli;
+pub mod direct;
+pub mod estimators;
+pub mod film;
+pub mod geometry;
+pub mod imaging;
+pub mod import;
+pub mod integrators;
+pub mod lights;
+pub mod materials;
+pub mod math;
+pub mod render;
+pub mod samplers;
+pub mod scene;
+pub mod textures;

@@ -1,0 +1,69 @@
+//! Orthonormal frames; local +z is the normal.
+
+use glam::Vec3;
+
+/// Right-handed orthonormal frame.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Frame {
+    /// Tangent, local +x.
+    pub x: Vec3,
+    /// Bitangent, local +y.
+    pub y: Vec3,
+    /// Normal, local +z.
+    pub z: Vec3,
+}
+
+impl Frame {
+    /// Any frame about the unit vector `z` [Duff et al. 2017].
+    #[inline]
+    pub fn from_z(z: Vec3) -> Self {
+        let sign = 1.0_f32.copysign(z.z);
+        let a = -1.0 / (sign + z.z);
+        let b = z.x * z.y * a;
+        let x = Vec3::new(1.0 + sign * z.x * z.x * a, sign * b, -sign * z.x);
+        let y = Vec3::new(b, sign + z.y * z.y * a, -z.y);
+        Frame { x, y, z }
+    }
+
+    /// The frame about the unit vector `z` whose x is as near to `x` as can be;
+    /// any frame if `x` is zero or parallel to `z`.
+    #[inline]
+    pub fn from_xz(x: Vec3, z: Vec3) -> Self {
+        let tangent = x - z * z.dot(x);
+        let length_squared = tangent.length_squared();
+        if length_squared.is_nan() || length_squared <= 1e-12 * x.length_squared() {
+            return Frame::from_z(z);
+        }
+        let x = tangent / length_squared.sqrt();
+        Frame { x, y: z.cross(x), z }
+    }
+
+    /// World to local.
+    #[inline]
+    pub fn to_local(&self, v: Vec3) -> Vec3 {
+        Vec3::new(v.dot(self.x), v.dot(self.y), v.dot(self.z))
+    }
+
+    /// Local to world.
+    #[inline]
+    pub fn to_world(&self, v: Vec3) -> Vec3 {
+        self.x * v.x + self.y * v.y + self.z * v.z
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn frames_are_orthonormal_and_right_handed() {
+        for v in [Vec3::Z, -Vec3::Z, Vec3::X, Vec3::new(0.3, -0.8, 0.2), Vec3::new(-1.0, 1.0, -1e-4)] {
+            let z = v.normalize();
+            for f in [Frame::from_z(z), Frame::from_xz(Vec3::new(0.1, 2.0, 0.7), z), Frame::from_xz(z, z)] {
+                assert!((f.x.length() - 1.0).abs() < 1e-5 && (f.y.length() - 1.0).abs() < 1e-5);
+                assert!(f.x.dot(f.y).abs() < 1e-5 && f.x.dot(f.z).abs() < 1e-5);
+                assert!((f.x.cross(f.y) - f.z).length() < 1e-5);
+            }
+        }
+    }
+}

@@ -1,0 +1,71 @@
+//! Rays and the robust choice of their origins.
+
+use glam::Vec3;
+
+/// A ray `o + t·d`, `0 < t < t_max`.
+#[derive(Clone, Copy, Debug)]
+pub struct Ray {
+    /// Origin.
+    pub o: Vec3,
+    /// Direction; need not be unit.
+    pub d: Vec3,
+    /// End of the open interval, in units of |d|.
+    pub t_max: f32,
+    /// Time in the shutter interval, 0..1.
+    pub time: f32,
+}
+
+impl Ray {
+    /// The point at parameter `t`.
+    #[inline]
+    pub fn at(&self, t: f32) -> Vec3 {
+        self.o + self.d * t
+    }
+}
+
+/// The next representable f32 above `x`.
+#[inline]
+pub fn next_up(x: f32) -> f32 {
+    x.next_up()
+}
+
+/// The next representable f32 below `x`.
+#[inline]
+pub fn next_down(x: f32) -> f32 {
+    x.next_down()
+}
+
+/// Moves `p` off its surface along the geometric normal `n`, to the side that `w` points to, by at least the
+/// bound `p_error` of its rounding error; so that a ray from there cannot hit the surface that it leaves
+/// [Pharr et al. 2023, §6.8.6]. `n` is unit, `p_error` is per axis and non-negative.
+#[inline]
+pub fn offset_origin(p: Vec3, p_error: Vec3, n: Vec3, w: Vec3) -> Vec3 {
+    let distance = n.abs().dot(p_error);
+    let offset = if w.dot(n) < 0.0 { -n * distance } else { n * distance };
+    let moved = p + offset;
+    // Round away from the surface, so that the addition cannot fall back onto it.
+    let round = |moved: f32, offset: f32| {
+        if offset > 0.0 {
+            moved.next_up()
+        } else if offset < 0.0 {
+            moved.next_down()
+        } else {
+            moved
+        }
+    };
+    Vec3::new(round(moved.x, offset.x), round(moved.y, offset.y), round(moved.z, offset.z))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn offset_origin_leaves_the_plane_on_the_side_of_w() {
+        let p = Vec3::new(1e4, 2.0, -3.0);
+        let e = p.abs() * crate::math::gamma(7);
+        let n = Vec3::new(1.0, 1.0, 0.5).normalize();
+        assert!((offset_origin(p, e, n, n) - p).dot(n) > 0.0);
+        assert!((offset_origin(p, e, n, -n) - p).dot(n) < 0.0);
+    }
+}

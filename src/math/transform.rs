@@ -1,0 +1,42 @@
+//! Transforms that change in time, and the transforms of normals.
+
+use glam::{Affine3A, Mat3A, Vec3};
+
+/// Transforms a normal by the inverse transpose of `to_from`; the result is unit, or zero if the map is singular.
+#[inline]
+pub fn transform_normal(to_from: &Affine3A, n: Vec3) -> Vec3 {
+    // The cofactor matrix is det·(inverse transpose): no division, and right for singular maps of full rank 2.
+    let m = &to_from.matrix3;
+    let cofactor = Mat3A::from_cols(m.y_axis.cross(m.z_axis), m.z_axis.cross(m.x_axis), m.x_axis.cross(m.y_axis));
+    let sign = 1.0_f32.copysign(m.determinant());
+    (Vec3::from(cofactor * glam::Vec3A::from(n)) * sign).normalize_or_zero()
+}
+
+/// True if the map mirrors: it turns right-handed frames into left-handed ones.
+#[inline]
+pub fn swaps_handedness(to_from: &Affine3A) -> bool {
+    to_from.matrix3.determinant() < 0.0
+}
+
+/// The componentwise linear blend of two maps at `t` in 0..1, which is what both ray tracers use between the
+/// time samples of a moving instance.
+#[inline]
+pub fn lerp_affine(a: &Affine3A, b: &Affine3A, t: f32) -> Affine3A {
+    let s = 1.0 - t;
+    Affine3A { matrix3: a.matrix3 * s + b.matrix3 * t, translation: a.translation * s + b.translation * t }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn normals_stay_perpendicular_under_shear_and_mirror() {
+        let m = Affine3A::from_mat3(glam::Mat3::from_cols_array(&[-2.0, 0.3, 0.0, 0.5, 1.0, 0.2, 0.1, 0.0, 3.0]));
+        let (n, t) = (Vec3::Z, Vec3::new(0.4, -0.7, 0.0));
+        let n2 = transform_normal(&m, n);
+        assert!(n2.dot(m.transform_vector3(t)).abs() < 1e-6);
+        assert!(n2.dot(m.transform_vector3(n)) > 0.0);
+        assert!(swaps_handedness(&m));
+    }
+}
