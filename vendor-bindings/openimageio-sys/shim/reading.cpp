@@ -1,0 +1,238 @@
+// The library and the reading half of oiio_shim.h, over OpenImageIO 2.4 to 3.x: only calls that all
+// of them have.
+#include "common.h"
+
+#include <cstdio>
+#include <map>
+#include <memory>
+#include <vector>
+
+static_assert(sizeof(OiioSpec) == 14 * 4, "src/types.rs declares 14 words");
+static_assert(sizeof(void*) != 8 || sizeof(OiioAttribute) == 40, "src/types.rs declares five words");
+
+namespace {
+
+using OIIO::ImageInput;
+using OIIO::ImageSpec;
+using OIIO::TypeDesc;
+using shim::Failure;
+using shim::guard;
+using shim::or_else;
+using shim::require;
+
+// Subimages beyond this are not counted: each costs a seek, and no picture has as many.
+constexpr int kMaxSubimages = 4096;
+
+OiioFormat format_of(TypeDesc type) {
+  switch (type.basetype) {
+    case TypeDesc::UINT8: return OIIO_FORMAT_U8;
+    case TypeDesc::UINT16: return OIIO_FORMAT_U16;
+    case TypeDesc::UINT32: return OIIO_FORMAT_U32;
+    case TypeDesc::HALF: return OIIO_FORMAT_HALF;
+    case TypeDesc::FLOAT: return OIIO_FORMAT_FLOAT;
+    case TypeDesc::DOUBLE: return OIIO_FORMAT_DOUBLE;
+    case TypeDesc::INT8: return OIIO_FORMAT_I8;
+    case TypeDesc::INT16: return OIIO_FORMAT_I16;
+    case TypeDesc::INT32: return OIIO_FORMAT_I32;
+    default: return OIIO_FORMAT_UNKNOWN;
+  }
+}
+
+// Header of a subimage, with the strings that callers hold pointers to.
+struct Part {
+  ImageSpec spec;
+  std::vector<std::string> channels;
+  std::vector<std::string> types, values;
+};
+
+}  // namespace
+
+struct OiioInput {
+  ImageInput::unique_ptr input;
+  std::map<int, std::unique_ptr<Part>> parts;
+  int subimages = 0;  // 0: not counted yet
+
+  // OpenImageIO prints an error that nobody asked for when the reader is destroyed.
+  ~OiioInput() {
+    if (input) drain();
+  }
+
+  std::string drain() { return input->has_error() ? input->geterror() : std::string(); }
+
+  const Part& part(int32_t subimage) {
+    require(subimage >= 0, "negative subimage index");
+    auto found = parts.find(subimage);
+    if (found != parts.end()) return *found->second;
+    if (!input->seek_subimage(subimage, 0))
+      throw Failure{OIIO_CANNOT_READ, or_else(drain(), "the file has no such subimage")};
+
+    auto part = std::make_unique<Part>();
+    part->spec = input->spec();
+    for (int c = 0; c < part->spec.nchannels; ++c) part->channels.push_back(part->spec.channel_name(c));
+    for (const auto& entry : part->spec.extra_attribs) {
+      part->types.emplace_back(entry.type().c_str());
+      part->values.push_back(ImageSpec::metadata_val(entry, false));
+      // A lone string comes in quotes, with its quotes and control characters escaped.
+      if (entry.type() == OIIO::TypeString) part->values.back() = entry.get_string();
+    }
+    return *(parts[subimage] = std::move(part));
+  }
+
+  // Number of floats of a subimage, after the checks on its header.
+  uint64_t float_count(int32_t subimage, uint64_t max_bytes) {
+    const ImageSpec& spec = part(subimage).spec;
+    if (spec.deep) throw Failure{OIIO_UNSUPPORTED, "deep images are not supported"};
+    if (spec.depth > 1) throw Failure{OIIO_UNSUPPORTED, "volume images are not supported"};
+    const std::string size = std::to_string(spec.width) + " x " + std::to_string(spec.height) + " pixels of " +
+                             std::to_string(spec.nchannels) + " channels";
+    if (spec.width <= 0 || spec.height <= 0 || spec.nchannels <= 0)
+      throw Failure{OIIO_UNSUPPORTED, "the header says " + size};
+    // Each factor is below 2^31, so that the first product fits; the second is divided instead.
+    const uint64_t row = uint64_t(spec.width) * uint64_t(spec.nchannels);
+    if (row > max_bytes / sizeof(float) / uint64_t(spec.height))
+      throw Failure{OIIO_TOO_LARGE, "the header says " + size + ", more than the limit of " +
+                                        std::to_string(max_bytes >> 20) + " MiB (damaged file?)"};
+    return row * uint64_t(spec.height);
+  }
+};
+
+// ---- library ----
+
+int32_t oiio_shim_abi(void) { return OIIO_SHIM_ABI; }
+
+const char* oiio_shim_version(void) {
+  static char text[32] = "";
+  static const bool filled = [] {
+    const int version = OIIO::openimageio_version();
+    std::snprintf(text, sizeof text, "%d.%d.%d", version / 10000, version / 100 % 100, version % 100);
+    return true;
+  }();
+  (void)filled;
+  return text;
+}
+
+const char* oiio_shim_extensions(void) {
+  try {
+    static const std::string list(OIIO::get_string_attribute("extension_list"));
+    return list.c_str();
+  } catch (...) {
+    return "";
+  }
+}
+
+int32_t oiio_shim_set_int(const char* name, int32_t value, char* error, size_t error_size) {
+  return guard(error, error_size, [&] {
+    require(name != nullptr, "null name");
+    const int number = value;
+    if (!OIIO::attribute(name, OIIO::TypeInt, &number))
+      throw Failure{OIIO_INVALID_ARGUMENT, std::string("OpenImageIO has no global attribute ") + name};
+  });
+}
+
+// ---- reading ----
+
+int32_t oiio_shim_input_open(const char* path, int32_t unassociated_alpha, OiioInput** input, char* error,
+                             size_t error_size) {
+  return guard(error, error_size, [&] {
+    require(path != nullptr && input != nullptr, "null argument");
+    *input = nullptr;
+    ImageSpec config;
+    if (unassociated_alpha != 0) config.attribute("oiio:UnassociatedAlpha", 1);
+    auto opened = std::make_unique<OiioInput>();
+    opened->input = ImageInput::open(path, &config);
+    if (!opened->input)
+      throw Failure{OIIO_CANNOT_OPEN, or_else(OIIO::geterror(), "not a picture that OpenImageIO can read")};
+    *input = opened.release();
+  });
+}
+
+const char* oiio_shim_input_format_name(OiioInput* input) {
+  return input != nullptr && input->input ? input->input->format_name() : "";
+}
+
+int32_t oiio_shim_input_subimages(OiioInput* input, int32_t* count, char* error, size_t error_size) {
+  return guard(error, error_size, [&] {
+    require(input != nullptr && count != nullptr, "null argument");
+    if (input->subimages == 0) {
+      // Some formats say the number in the header; in others only seeking tells.
+      int number = input->part(0).spec.get_int_attribute("oiio:subimages", 0);
+      if (number <= 0)
+        for (number = 1; number < kMaxSubimages && input->input->seek_subimage(number, 0);) ++number;
+      input->drain();
+      input->subimages = number;
+    }
+    *count = input->subimages;
+  });
+}
+
+int32_t oiio_shim_input_spec(OiioInput* input, int32_t subimage, OiioSpec* out, char* error,
+                             size_t error_size) {
+  return guard(error, error_size, [&] {
+    require(input != nullptr && out != nullptr, "null argument");
+    const ImageSpec& spec = input->part(subimage).spec;
+    out->width = spec.width;
+    out->height = spec.height;
+    out->depth = spec.depth;
+    out->x = spec.x;
+    out->y = spec.y;
+    out->full_x = spec.full_x;
+    out->full_y = spec.full_y;
+    out->full_width = spec.full_width;
+    out->full_height = spec.full_height;
+    out->nchannels = spec.nchannels;
+    out->format = format_of(spec.format);
+    out->alpha_channel = spec.alpha_channel;
+    out->deep = spec.deep ? 1 : 0;
+    out->attributes = int32_t(spec.extra_attribs.size());
+  });
+}
+
+int32_t oiio_shim_input_channel(OiioInput* input, int32_t subimage, int32_t channel, const char** name,
+                                int32_t* format, char* error, size_t error_size) {
+  return guard(error, error_size, [&] {
+    require(input != nullptr && name != nullptr && format != nullptr, "null argument");
+    const Part& part = input->part(subimage);
+    require(channel >= 0 && size_t(channel) < part.channels.size(), "no such channel");
+    *name = part.channels[size_t(channel)].c_str();
+    *format = format_of(part.spec.channelformat(channel));
+  });
+}
+
+int32_t oiio_shim_input_attribute(OiioInput* input, int32_t subimage, int32_t index, OiioAttribute* out,
+                                  char* error, size_t error_size) {
+  return guard(error, error_size, [&] {
+    require(input != nullptr && out != nullptr, "null argument");
+    const Part& part = input->part(subimage);
+    require(index >= 0 && size_t(index) < part.values.size(), "no such attribute");
+    const auto& entry = part.spec.extra_attribs[size_t(index)];
+    const bool plain = entry.type().basetype != TypeDesc::STRING && entry.type().basetype != TypeDesc::PTR;
+    out->name = entry.name().c_str();
+    out->type = part.types[size_t(index)].c_str();
+    out->value = part.values[size_t(index)].c_str();
+    out->data = plain ? entry.data() : nullptr;
+    out->bytes = plain ? size_t(entry.datasize()) : 0;
+  });
+}
+
+int32_t oiio_shim_input_float_count(OiioInput* input, int32_t subimage, uint64_t max_bytes, uint64_t* count,
+                                    char* error, size_t error_size) {
+  return guard(error, error_size, [&] {
+    require(input != nullptr && count != nullptr, "null argument");
+    *count = input->float_count(subimage, max_bytes);
+  });
+}
+
+int32_t oiio_shim_input_read(OiioInput* input, int32_t subimage, float* pixels, uint64_t count, char* error,
+                             size_t error_size) {
+  return guard(error, error_size, [&] {
+    require(input != nullptr && pixels != nullptr, "null argument");
+    require(count == input->float_count(subimage, UINT64_MAX), "the number of floats is not float_count");
+    const int channels = input->part(subimage).spec.nchannels;
+    if (!input->input->read_image(subimage, 0, 0, channels, TypeDesc(TypeDesc::FLOAT), pixels))
+      throw Failure{OIIO_CANNOT_READ, or_else(input->drain(), "the pixels cannot be read")};
+  });
+}
+
+void oiio_shim_input_close(OiioInput* input) {
+  guard(nullptr, 0, [&] { delete input; });
+}

@@ -1,0 +1,210 @@
+//! Finding and opening the shim.
+
+use crate::types::{OIIO_SHIM_ABI, OiioAttribute, OiioInput, OiioOutput, OiioPart, OiioSpec};
+use libloading::Library;
+use std::env;
+use std::ffi::{OsStr, c_char};
+use std::fs;
+use std::io::{self, Write};
+use std::path::{Path, PathBuf};
+use std::process;
+use std::sync::OnceLock;
+
+/// The shim as the build script made it, for executables that were moved away from it.
+static SHIM_BYTES: &[u8] = include_bytes!(env!("LUMIRIS_OIIO_SHIM_BUILT"));
+/// Where the build script put it.
+const SHIM_BUILT: &str = env!("LUMIRIS_OIIO_SHIM_BUILT");
+
+/// Declares [`Api`] and how each function is looked up as `oiio_shim_<name>`.
+macro_rules! api {
+    ($($(#[doc = $doc:literal])* fn $name:ident($($arg:ident: $type:ty),* $(,)?) $(-> $result:ty)?;)*) => {
+        /// The functions of the shim; `shim/oiio_shim.h` documents them. All of them are unsafe to
+        /// call: pointers must be valid for what the header says, handles must be live.
+        #[derive(Clone, Copy, Debug)]
+        pub struct Api {
+            $($(#[doc = $doc])* pub $name: unsafe extern "C" fn($($arg: $type),*) $(-> $result)?,)*
+        }
+
+        impl Api {
+            /// Looks all functions up.
+            fn from_library(library: &Library) -> Result<Api, libloading::Error> {
+                $(
+                    let name = concat!("oiio_shim_", stringify!($name), "\0");
+                    // SAFETY: the type is that of oiio_shim.h, whose version the caller compares
+                    // before it calls anything else; the library is never closed.
+                    let $name = unsafe {
+                        *library.get::<unsafe extern "C" fn($($arg: $type),*) $(-> $result)?>(name.as_bytes())?
+                    };
+                )*
+                Ok(Api { $($name),* })
+            }
+        }
+    };
+}
+
+api! {
+    /// `OIIO_SHIM_ABI` of the shim loaded.
+    fn abi() -> i32;
+    /// Version of the OpenImageIO loaded, for instance `2.4.7`. Lives forever.
+    fn version() -> *const c_char;
+    /// `openexr:exr,sxr,mxr;png:png;…`. Lives forever.
+    fn extensions() -> *const c_char;
+    /// Sets a global attribute: `threads`, `exr_threads`, `limits:imagesize_MB`, `limits:channels`.
+    fn set_int(name: *const c_char, value: i32, error: *mut c_char, error_size: usize) -> i32;
+
+    /// Opens a file for reading. `unassociated_alpha` 1: colours as stored, not multiplied by alpha.
+    fn input_open(
+        path: *const c_char, unassociated_alpha: i32, input: *mut *mut OiioInput,
+        error: *mut c_char, error_size: usize,
+    ) -> i32;
+    /// Name of the file format: `openexr`, `png`, …
+    fn input_format_name(input: *mut OiioInput) -> *const c_char;
+    /// Number of subimages, at least 1.
+    fn input_subimages(
+        input: *mut OiioInput, count: *mut i32, error: *mut c_char, error_size: usize,
+    ) -> i32;
+    /// Header of a subimage.
+    fn input_spec(
+        input: *mut OiioInput, subimage: i32, spec: *mut OiioSpec,
+        error: *mut c_char, error_size: usize,
+    ) -> i32;
+    /// Name and `OIIO_FORMAT_…` of a channel, in the file's order.
+    fn input_channel(
+        input: *mut OiioInput, subimage: i32, channel: i32, name: *mut *const c_char,
+        format: *mut i32, error: *mut c_char, error_size: usize,
+    ) -> i32;
+    /// A metadata entry, `0 <= index < spec.attributes`.
+    fn input_attribute(
+        input: *mut OiioInput, subimage: i32, index: i32, attribute: *mut OiioAttribute,
+        error: *mut c_char, error_size: usize,
+    ) -> i32;
+    /// Number of floats `input_read` needs; an error if they take more than `max_bytes`, or if the
+    /// subimage is deep, a volume, or empty.
+    fn input_float_count(
+        input: *mut OiioInput, subimage: i32, max_bytes: u64, count: *mut u64,
+        error: *mut c_char, error_size: usize,
+    ) -> i32;
+    /// Reads all channels, interleaved, top row first. `count` is that of `input_float_count`.
+    fn input_read(
+        input: *mut OiioInput, subimage: i32, pixels: *mut f32, count: u64,
+        error: *mut c_char, error_size: usize,
+    ) -> i32;
+    /// Closes and frees; null is allowed.
+    fn input_close(input: *mut OiioInput);
+
+    /// Chooses the encoder by the extension of the path; no file is made yet.
+    fn output_create(
+        path: *const c_char, output: *mut *mut OiioOutput, error: *mut c_char, error_size: usize,
+    ) -> i32;
+    /// Adds a part; parts are numbered from 0. Only OpenEXR files hold more than one.
+    fn output_add_part(
+        output: *mut OiioOutput, part: *const OiioPart, error: *mut c_char, error_size: usize,
+    ) -> i32;
+    /// Sets metadata of a part to a string.
+    fn output_set_string(
+        output: *mut OiioOutput, part: i32, name: *const c_char, value: *const c_char,
+        error: *mut c_char, error_size: usize,
+    ) -> i32;
+    /// Sets metadata of a part to an integer.
+    fn output_set_int(
+        output: *mut OiioOutput, part: i32, name: *const c_char, value: i32,
+        error: *mut c_char, error_size: usize,
+    ) -> i32;
+    /// Sets metadata of a part to a float.
+    fn output_set_float(
+        output: *mut OiioOutput, part: i32, name: *const c_char, value: f32,
+        error: *mut c_char, error_size: usize,
+    ) -> i32;
+    /// Sets metadata of a part to a matrix of 16 floats, for row vectors.
+    fn output_set_matrix(
+        output: *mut OiioOutput, part: i32, name: *const c_char, value: *const f32,
+        error: *mut c_char, error_size: usize,
+    ) -> i32;
+    /// Makes the file and writes its header.
+    fn output_open(output: *mut OiioOutput, error: *mut c_char, error_size: usize) -> i32;
+    /// Writes `rows` rows from `row_begin` on, 0 being the top, in order and without gaps; after the
+    /// last row of a part the next call writes `part + 1`.
+    fn output_write(
+        output: *mut OiioOutput, part: i32, row_begin: i32, rows: i32, pixels: *const f32,
+        count: u64, error: *mut c_char, error_size: usize,
+    ) -> i32;
+    /// Ends the file, and reports whatever could not be stored, a full disk included.
+    fn output_close(output: *mut OiioOutput, error: *mut c_char, error_size: usize) -> i32;
+    /// Frees; without `output_close` before, the file is left incomplete. Null is allowed.
+    fn output_free(output: *mut OiioOutput);
+}
+
+/// The shim, opened by the first call. An error is final: later calls return it again.
+///
+/// Tried in this order: `$LUMIRIS_OIIO_SHIM` (then nothing else), a file named as the shim beside
+/// the executable, the place where it was built, and at last a copy held in the executable, which is
+/// written to the directory for temporary files while it is being opened.
+pub fn load() -> Result<&'static Api, String> {
+    static API: OnceLock<Result<Api, String>> = OnceLock::new();
+    API.get_or_init(find).as_ref().map_err(Clone::clone)
+}
+
+/// Tries the candidates of [`load`].
+fn find() -> Result<Api, String> {
+    if let Some(path) = env::var_os("LUMIRIS_OIIO_SHIM").filter(|path| !path.is_empty()) {
+        return open(Path::new(&path));
+    }
+    let name = Path::new(SHIM_BUILT).file_name().unwrap_or(OsStr::new("liblumiris_oiio.so"));
+    let beside = env::current_exe().ok().and_then(|exe| Some(exe.parent()?.join(name)));
+    let mut reasons = Vec::new();
+    for path in beside.into_iter().chain([PathBuf::from(SHIM_BUILT)]).filter(|path| path.is_file()) {
+        match open(&path) {
+            Ok(api) => return Ok(api),
+            Err(reason) => reasons.push(reason),
+        }
+    }
+    open_embedded().map_err(|reason| {
+        reasons.push(reason);
+        format!("cannot load OpenImageIO: {}", reasons.join("; "))
+    })
+}
+
+/// Opens one file and checks that it is of this version.
+fn open(path: &Path) -> Result<Api, String> {
+    let described = |error: libloading::Error| format!("{}: {error}", path.display());
+    // SAFETY: opening runs the initialisers of OpenImageIO and of what it depends on, which the
+    // user chose by installing or naming the library.
+    let library = unsafe { Library::new(path) }.map_err(described)?;
+    let api = Api::from_library(&library).map_err(described)?;
+    // SAFETY: `abi` has this type in all versions.
+    let abi = unsafe { (api.abi)() };
+    if abi != OIIO_SHIM_ABI {
+        return Err(format!("{}: interface version {abi}, not {OIIO_SHIM_ABI}", path.display()));
+    }
+    // Its functions live as long as the process.
+    std::mem::forget(library);
+    Ok(api)
+}
+
+/// Opens the copy in the executable, by way of a temporary file.
+fn open_embedded() -> Result<Api, String> {
+    let (path, mut file) = create_temporary().map_err(|e| format!("temporary file: {e}"))?;
+    let written = file.write_all(SHIM_BYTES);
+    drop(file);
+    let result = match written {
+        Ok(()) => open(&path),
+        Err(error) => Err(format!("{}: {error}", path.display())),
+    };
+    // Once open, the library needs its name no more; and a leftover does no harm.
+    let _ = fs::remove_file(&path);
+    result
+}
+
+/// A new file that nobody else has, in the directory for temporary files.
+fn create_temporary() -> io::Result<(PathBuf, fs::File)> {
+    let mut attempt = 0;
+    loop {
+        let name = format!("lumiris-oiio-{}-{attempt}.so", process::id());
+        let path = env::temp_dir().join(name);
+        match fs::File::create_new(&path) {
+            Ok(file) => return Ok((path, file)),
+            Err(error) if error.kind() == io::ErrorKind::AlreadyExists && attempt < 100 => attempt += 1,
+            Err(error) => return Err(error),
+        }
+    }
+}
