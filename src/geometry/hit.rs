@@ -1,8 +1,19 @@
-//! The differential geometry of a hit.
+//! What an intersection returns, and the differential geometry of a hit.
 
-use crate::math::{Vec2, Vec3};
+use crate::math::transform::transform_normal;
+use crate::math::{Affine3A, Frame, Vec2, Vec3, gamma};
+use glam::DVec3;
 
-/// A point on a surface as materials and lights see it. World space.
+/// Where a ray met one shape.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct LocalHit {
+    /// Ray parameter.
+    pub t: f32,
+    /// Parametric position, as the shape defines it.
+    pub uv: [f32; 2],
+}
+
+/// A point on a surface as materials and lights see it. World space, unless the shape that made it says otherwise.
 #[derive(Clone, Copy, Debug)]
 pub struct SurfaceHit {
     /// The point, refined onto the surface.
@@ -21,4 +32,58 @@ pub struct SurfaceHit {
     pub dpdus: Vec3,
     /// Texture coordinates.
     pub uv: Vec2,
+}
+
+impl SurfaceHit {
+    /// The hit of a placed shape. The error bound covers the rounding of the point and of the ray's own way into the
+    /// group's space and back.
+    #[must_use]
+    pub fn transformed(&self, world_from_group: &Affine3A) -> SurfaceHit {
+        let p = round(world_from_group.as_daffine3().transform_point3(self.p.as_dvec3()));
+        let group_from_world = world_from_group.inverse();
+        let inbound = abs_linear(&group_from_world, p.abs()) + Vec3::from(group_from_world.translation).abs();
+        let p_error =
+            abs_linear(world_from_group, self.p_error * (1.0 + gamma(3)) + inbound * gamma(10)) + p.abs() * gamma(2);
+        let n = transform_normal(world_from_group, self.n);
+        SurfaceHit {
+            p,
+            p_error,
+            n,
+            ns: face_forward(transform_normal(world_from_group, self.ns), n),
+            dpdu: world_from_group.transform_vector3(self.dpdu),
+            dpdv: world_from_group.transform_vector3(self.dpdv),
+            dpdus: world_from_group.transform_vector3(self.dpdus),
+            uv: self.uv,
+        }
+    }
+}
+
+/// `v`, reversed if it is not in the hemisphere of `n`.
+#[inline]
+pub(super) fn face_forward(v: Vec3, n: Vec3) -> Vec3 {
+    if v.dot(n) < 0.0 { -v } else { v }
+}
+
+/// To f32, to nearest.
+#[inline]
+pub(super) fn round(p: DVec3) -> Vec3 {
+    p.as_vec3()
+}
+
+/// `u` and `v` if they span a plane, else the tangents of any frame about `n`.
+#[inline]
+pub(super) fn spanning(u: Vec3, v: Vec3, n: Vec3) -> (Vec3, Vec3) {
+    let area_squared = u.as_dvec3().cross(v.as_dvec3()).length_squared();
+    if area_squared > 0.0 && u.is_finite() && v.is_finite() {
+        return (u, v);
+    }
+    let frame = Frame::from_z(n);
+    (frame.x, frame.y)
+}
+
+/// |M|·v with the absolute values of the linear part, for error bounds.
+#[inline]
+fn abs_linear(m: &Affine3A, v: Vec3) -> Vec3 {
+    let m = &m.matrix3;
+    Vec3::from(m.x_axis.abs() * v.x + m.y_axis.abs() * v.y + m.z_axis.abs() * v.z)
 }

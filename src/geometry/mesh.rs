@@ -1,6 +1,7 @@
 //! Indexed triangle meshes.
 
-use crate::math::{Bounds3, Vec2, Vec3};
+use super::hit::{SurfaceHit, face_forward, round, spanning};
+use crate::math::{Bounds3, Vec2, Vec3, gamma};
 
 /// Indexed triangles. Optional per-vertex arrays are empty if absent, else as long as the positions.
 #[derive(Clone, Debug, Default)]
@@ -64,5 +65,148 @@ impl TriangleMesh {
     /// Bounds of all vertices that triangles use.
     pub fn bounds(&self) -> Bounds3 {
         Bounds3::from_points(self.indices.iter().flatten().map(|&v| self.padded_positions[v as usize]))
+    }
+
+    /// The surface of triangle `i` at the barycentric weights `uv` of vertices 1 and 2, in the space of the group.
+    ///
+    /// n is the unit vector of (p1 − p0) × (p2 − p0), reversed if `flip_normal`; where the mesh has shading normals, n
+    /// is then turned to their side. Texture coordinates are (0,0), (1,0), (1,1) if the mesh has none.
+    pub fn surface_hit(&self, i: usize, uv: [f32; 2]) -> SurfaceHit {
+        let corners = self.triangle(i);
+        let b = [1.0 - uv[0] - uv[1], uv[0], uv[1]];
+        let [p0, p1, p2] = corners.map(Vec3::as_dvec3);
+        let (e1, e2) = (p1 - p0, p2 - p0);
+        let p = round(p0 + e1 * f64::from(uv[0]) + e2 * f64::from(uv[1]));
+        let p_error = gamma(7) * (0..3).fold(Vec3::ZERO, |sum, k| sum + (corners[k] * b[k]).abs());
+
+        // Geometric normal: f64 keeps it for slivers.
+        let n = round(e1.cross(e2).normalize_or_zero());
+        let n = if self.flip_normal { -n } else { n };
+        let (n, ns) = self.shading_normal(i, b).map_or((n, n), |ns| (face_forward(n, ns), ns));
+
+        // Partial derivatives from the texture coordinates.
+        let st = self.texture_coordinates(i);
+        let (dpdu, dpdv) = partial_derivatives(corners, st);
+        let (dpdu, dpdv) = spanning(dpdu, dpdv, ns);
+        let dpdus = self.blend(&self.tangents, i, b).filter(|s| s.length_squared() > 0.0).unwrap_or(dpdu);
+        let uv = st[0] * b[0] + st[1] * b[1] + st[2] * b[2];
+        SurfaceHit { p, p_error, n, ns, dpdu, dpdv, dpdus, uv }
+    }
+
+    /// The texture coordinates of triangle `i`'s corners.
+    #[inline]
+    pub fn texture_coordinates(&self, i: usize) -> [Vec2; 3] {
+        if self.uvs.is_empty() {
+            return [Vec2::ZERO, Vec2::X, Vec2::ONE];
+        }
+        self.indices[i].map(|v| self.uvs[v as usize])
+    }
+
+    fn shading_normal(&self, i: usize, b: [f32; 3]) -> Option<Vec3> {
+        self.blend(&self.normals, i, b).and_then(Vec3::try_normalize)
+    }
+
+    fn blend(&self, values: &[Vec3], i: usize, b: [f32; 3]) -> Option<Vec3> {
+        let [v0, v1, v2] = self.indices[i].map(|v| v as usize);
+        (!values.is_empty()).then(|| values[v0] * b[0] + values[v1] * b[1] + values[v2] * b[2])
+    }
+}
+
+/// ∂p/∂u and ∂p/∂v of a triangle; zero if the texture coordinates are degenerate.
+fn partial_derivatives([p0, p1, p2]: [Vec3; 3], [uv0, uv1, uv2]: [Vec2; 3]) -> (Vec3, Vec3) {
+    let (duv02, duv12) = ((uv0 - uv2).as_dvec2(), (uv1 - uv2).as_dvec2());
+    let (dp02, dp12) = ((p0 - p2).as_dvec3(), (p1 - p2).as_dvec3());
+    let det = duv02.x * duv12.y - duv02.y * duv12.x;
+    if det.is_nan() || det.abs() < 1e-9 {
+        return (Vec3::ZERO, Vec3::ZERO);
+    }
+    let dpdu = (duv12.y * dp02 - duv02.y * dp12) / det;
+    let dpdv = (duv02.x * dp12 - duv12.x * dp02) / det;
+    (round(dpdu), round(dpdv))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::geometry::triangle::{RayPrecomputed, intersect_triangle};
+    use crate::math::hash::HashStream;
+    use crate::math::ray::offset_origin;
+    use crate::math::{Affine3A, Ray};
+
+    fn triangle() -> TriangleMesh {
+        let positions = vec![Vec3::new(1.0, 0.0, 2.0), Vec3::new(3.0, 0.0, 2.0), Vec3::new(1.0, 2.0, 2.0)];
+        TriangleMesh::new(positions, vec![[0, 1, 2]]).unwrap()
+    }
+
+    #[test]
+    fn surface_hit_follows_the_orientation_rules() {
+        let mut mesh = triangle();
+        let hit = mesh.surface_hit(0, [0.25, 0.5]);
+        assert!((hit.p - Vec3::new(1.5, 1.0, 2.0)).length() < 1e-6);
+        assert_eq!((hit.n, hit.ns), (Vec3::Z, Vec3::Z));
+        assert!((hit.uv - Vec2::new(0.75, 0.5)).length() < 1e-6);
+
+        mesh.flip_normal = true;
+        assert_eq!(mesh.surface_hit(0, [0.2, 0.2]).n, -Vec3::Z);
+
+        // Shading normals are authoritative: n turns to their side, whatever flip_normal says.
+        let tilted = Vec3::new(0.6, 0.0, 0.8);
+        mesh.normals = vec![tilted; 3];
+        let hit = mesh.surface_hit(0, [0.2, 0.2]);
+        assert_eq!(hit.n, Vec3::Z);
+        assert!((hit.ns - tilted).length() < 1e-6);
+        mesh.normals = vec![-tilted; 3];
+        mesh.flip_normal = false;
+        assert_eq!(mesh.surface_hit(0, [0.2, 0.2]).n, -Vec3::Z);
+    }
+
+    #[test]
+    fn partial_derivatives_follow_the_texture_coordinates() {
+        let mut mesh = triangle();
+        mesh.uvs = vec![Vec2::new(0.1, 0.2), Vec2::new(0.5, 0.1), Vec2::new(0.3, 0.9)];
+        let at = |b: [f32; 2]| mesh.surface_hit(0, b);
+        let (a, b) = (at([0.2, 0.3]), at([0.3, 0.1]));
+        let duv = b.uv - a.uv;
+        let predicted = a.dpdu * duv.x + a.dpdv * duv.y;
+        assert!((predicted - (b.p - a.p)).length() < 1e-5);
+
+        mesh.uvs = vec![Vec2::ONE; 3];
+        let hit = mesh.surface_hit(0, [0.2, 0.3]);
+        assert!(hit.dpdu.cross(hit.dpdv).length() > 0.5 && hit.dpdu.dot(hit.n).abs() < 1e-6);
+
+        mesh.tangents = vec![Vec3::new(0.0, 2.0, 0.0); 3];
+        assert_eq!(mesh.surface_hit(0, [0.2, 0.3]).dpdus, Vec3::new(0.0, 2.0, 0.0));
+    }
+
+    #[test]
+    fn rays_that_leave_a_triangle_do_not_meet_it_again() {
+        let mut s = HashStream::new([12, 0, 0]);
+        let mut random = || Vec3::new(s.next_f32(), s.next_f32(), s.next_f32()) * 2.0 - 1.0;
+        for k in 0..200_000 {
+            let (center, scale) = (random() * 300.0, [0.01, 1.0, 50.0][k % 3]);
+            let mut corners = [random(), random(), random()].map(|p| center + p * scale);
+            if k % 5 == 0 {
+                corners.iter_mut().for_each(|p| p.y = center.y);
+            }
+            let mesh = TriangleMesh::new(corners.to_vec(), vec![[0, 1, 2]]).unwrap();
+            let placement = Affine3A::from_scale_rotation_translation(
+                Vec3::new(0.5, 2.0, 1.0),
+                glam::Quat::from_axis_angle(random().normalize(), 2.0),
+                random() * 20.0,
+            );
+            let u = random().abs();
+            let [b1, b2] = if u.x + u.y > 1.0 { [1.0 - u.x, 1.0 - u.y] } else { [u.x, u.y] };
+            let local = mesh.surface_hit(0, [b1, b2]);
+            let hit = if k % 2 == 0 { local } else { local.transformed(&placement) };
+            let w = random().normalize();
+            if hit.n.dot(w).abs() < 1e-4 {
+                continue;
+            }
+            let o = offset_origin(hit.p, hit.p_error, hit.n, w);
+            let back = placement.inverse();
+            let (o, d) = if k % 2 == 0 { (o, w) } else { (back.transform_point3(o), back.transform_vector3(w)) };
+            let ray = RayPrecomputed::new(&Ray { o, d, t_max: f32::INFINITY, time: 0.0 }).unwrap();
+            assert_eq!(intersect_triangle(&ray, mesh.triangle(0), f32::INFINITY), None, "{mesh:?} {ray:?}");
+        }
     }
 }

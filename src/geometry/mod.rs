@@ -1,18 +1,21 @@
 //! Shapes as data, their exact intersection on the CPU, and the differential geometry of a hit.
 //!
-//! Reading order: [`mesh`], [`quadric`], [`bilinear`], [`hit`], [`set`].
+//! Reading order: [`hit`], [`triangle`], [`mesh`], [`quadric`], [`bilinear`], [`loop_subdiv`], [`set`].
 
 pub mod bilinear;
 pub mod hit;
+pub mod loop_subdiv;
 pub mod mesh;
 pub mod quadric;
 pub mod set;
+pub mod triangle;
 
 pub use bilinear::BilinearMesh;
-pub use hit::SurfaceHit;
+pub use hit::{LocalHit, SurfaceHit};
+pub use loop_subdiv::loop_subdivide;
 pub use mesh::TriangleMesh;
 pub use quadric::{Quadric, QuadricKind};
-pub use set::{Geometry, GeometryId, GeometrySet, Group, GroupId, Instance, Visibility};
+pub use set::{Geometry, GeometryId, GeometrySet, Group, GroupId, Instance, NO_INSTANCE, Visibility};
 
 /// A shape in the space of its group (world space for the root group).
 #[derive(Clone, Debug)]
@@ -32,6 +35,15 @@ impl Shape {
             Shape::Mesh(mesh) => mesh.bounds(),
             Shape::Quadric(quadric) => quadric.bounds(),
             Shape::Bilinear(mesh) => mesh.bounds(),
+        }
+    }
+
+    /// The surface at the parametric position `uv` of `primitive`, in the space of the group.
+    pub fn surface_hit(&self, primitive: u32, uv: [f32; 2]) -> SurfaceHit {
+        match self {
+            Shape::Mesh(mesh) => mesh.surface_hit(primitive as usize, uv),
+            Shape::Quadric(quadric) => quadric.surface_hit(uv),
+            Shape::Bilinear(mesh) => mesh.surface_hit(primitive as usize, uv),
         }
     }
 }

@@ -1,6 +1,18 @@
 //! Spheres, disks and cylinders, possibly partial.
+//!
+//! Parameters (u, v) of a point, φ its azimuth about z in 0..2π:
+//! u = φ / φ_max, and v = (θ − θ(z_min)) / (θ(z_max) − θ(z_min)) on a sphere with cos θ = z / radius,
+//! (radius − r) / (radius − inner_radius) on a disk, (z − z_min) / (z_max − z_min) on a cylinder.
+//!
+//! Roots are found in f64 in local space. The point of a hit is placed so that the map that rays go through,
+//! `local_from_group`, takes it onto the local surface: the two maps are rounded separately, and the difference would
+//! otherwise be an error of the point.
 
-use crate::math::{Affine3A, Bounds3, Vec3};
+use super::hit::{LocalHit, SurfaceHit, round, spanning};
+use crate::math::transform::{swaps_handedness, transform_normal};
+use crate::math::{Affine3A, Bounds3, Ray, Vec2, Vec3, gamma};
+use glam::{DAffine3, DVec3};
+use std::f64::consts::TAU;
 
 /// Which quadric, in its local space (pbrt's parameters; angles in radians).
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -49,7 +61,9 @@ pub struct Quadric {
     pub group_from_local: Affine3A,
     /// Inverse of the placement.
     pub local_from_group: Affine3A,
-    /// True if the geometric normal is reversed (pbrt's `ReverseOrientation` xor mirroring).
+    /// True if the geometric normal is the reverse of ∂p/∂u × ∂p/∂v in the group's space: pbrt's
+    /// `ReverseOrientation` xor mirroring. So normals point outward (+z for a disk), mirrored or not, unless
+    /// `ReverseOrientation` is set.
     pub flip_normal: bool,
 }
 
@@ -65,5 +79,358 @@ impl Quadric {
             }
         };
         local.transformed(&self.group_from_local)
+    }
+
+    /// The first hit in (0, t_max); uv are the parameters (u, v).
+    ///
+    /// A ray that leaves from [`crate::math::ray::offset_origin`] does not meet the point again that it left.
+    pub fn intersect(&self, ray: &Ray) -> Option<LocalHit> {
+        let local_from_group = self.local_from_group.as_daffine3();
+        let o = local_from_group.transform_point3(ray.o.as_dvec3());
+        let d = local_from_group.transform_vector3(ray.d.as_dvec3());
+
+        // Below this parameter a hit is rounding noise: o is the sum of terms of this size.
+        let scale = o.abs().max_element() + local_from_group.translation.abs().max_element() + self.kind.radius();
+        let t_min = scale * 2.0_f64.powi(-44) / d.length();
+        for t in self.kind.roots(o, d)? {
+            let rounded = t as f32;
+            if t > t_min
+                && rounded > 0.0
+                && rounded < ray.t_max
+                && let Some(uv) = self.kind.parameters(o + d * t)
+            {
+                return Some(LocalHit { t: rounded, uv });
+            }
+        }
+        None
+    }
+
+    /// The surface at the parameters `uv`, in the space of the group.
+    pub fn surface_hit(&self, uv: [f32; 2]) -> SurfaceHit {
+        let local = self.kind.surface(uv.map(f64::from));
+        let group_from_local = self.group_from_local.as_daffine3();
+        let p = refined_point(&group_from_local, &self.local_from_group.as_daffine3(), local.p);
+        let extent = group_from_local.matrix3.abs() * local.p.abs();
+        let p_error = (p.abs() + extent.as_vec3()) * gamma(2);
+
+        let outward = transform_normal(&self.group_from_local, round(local.n));
+        let reversed = self.flip_normal != swaps_handedness(&self.group_from_local);
+        let n = if reversed { -outward } else { outward };
+        let [dpdu, dpdv] = local.derivatives.map(|v| round(group_from_local.transform_vector3(v)));
+        let (dpdu, dpdv) = spanning(dpdu, dpdv, n);
+        SurfaceHit { p, p_error, n, ns: n, dpdu, dpdv, dpdus: dpdu, uv: Vec2::from(uv) }
+    }
+}
+
+/// The group-space point that `local_from_group` takes to `p`, by one step of iterative refinement.
+fn refined_point(group_from_local: &DAffine3, local_from_group: &DAffine3, p: DVec3) -> Vec3 {
+    let first = group_from_local.transform_point3(p);
+    let residual = local_from_group.transform_point3(first) - p;
+    let refined = first - group_from_local.transform_vector3(residual);
+    round(if refined.is_finite() { refined } else { first })
+}
+
+/// A point of a quadric in local space.
+struct LocalSurface {
+    p: DVec3,
+    /// Unit; outward, +z for a disk.
+    n: DVec3,
+    /// ∂p/∂u, ∂p/∂v.
+    derivatives: [DVec3; 2],
+}
+
+impl QuadricKind {
+    fn radius(&self) -> f64 {
+        let (QuadricKind::Sphere { radius, .. }
+        | QuadricKind::Disk { radius, .. }
+        | QuadricKind::Cylinder { radius, .. }) = *self;
+        f64::from(radius)
+    }
+
+    /// Where the line o + t d meets the full quadric, in ascending order.
+    fn roots(&self, o: DVec3, d: DVec3) -> Option<[f64; 2]> {
+        match *self {
+            QuadricKind::Sphere { radius, .. } => sphere_roots(o, d, f64::from(radius)),
+            QuadricKind::Cylinder { radius, .. } => sphere_roots(o.with_z(0.0), d.with_z(0.0), f64::from(radius)),
+            QuadricKind::Disk { height, .. } => {
+                let t = (f64::from(height) - o.z) / d.z;
+                t.is_finite().then_some([t, f64::NAN])
+            }
+        }
+    }
+
+    /// Parameters of a point of the full quadric; `None` if it is cut off.
+    fn parameters(&self, p: DVec3) -> Option<[f32; 2]> {
+        let phi = p.y.atan2(p.x);
+        let phi = if phi < 0.0 { phi + TAU } else { phi };
+        let r = p.x.hypot(p.y);
+        let (v, phi_max) = match *self {
+            QuadricKind::Sphere { radius, z_min, z_max, phi_max } => {
+                if (z_min > -radius && p.z < f64::from(z_min)) || (z_max < radius && p.z > f64::from(z_max)) {
+                    return None;
+                }
+                let [from, to] = polar_range(radius, z_min, z_max);
+                // Exact near the poles, where arc cosines are not.
+                (ratio(r.atan2(p.z) - from, to - from), phi_max)
+            }
+            QuadricKind::Cylinder { z_min, z_max, phi_max, .. } => {
+                let (z_min, z_max) = (f64::from(z_min), f64::from(z_max));
+                if p.z < z_min || p.z > z_max {
+                    return None;
+                }
+                (ratio(p.z - z_min, z_max - z_min), phi_max)
+            }
+            QuadricKind::Disk { radius, inner_radius, phi_max, .. } => {
+                let (radius, inner_radius) = (f64::from(radius), f64::from(inner_radius));
+                if r > radius || r < inner_radius {
+                    return None;
+                }
+                (ratio(radius - r, radius - inner_radius), phi_max)
+            }
+        };
+        let phi_max = f64::from(phi_max);
+        (phi <= phi_max).then(|| [ratio(phi, phi_max) as f32, v as f32])
+    }
+
+    /// The surface at parameters (u, v).
+    fn surface(&self, [u, v]: [f64; 2]) -> LocalSurface {
+        let phi_max = f64::from(match *self {
+            QuadricKind::Sphere { phi_max, .. }
+            | QuadricKind::Disk { phi_max, .. }
+            | QuadricKind::Cylinder { phi_max, .. } => phi_max,
+        });
+        let (sin, cos) = (u * phi_max).sin_cos();
+        let (radial, around) = (DVec3::new(cos, sin, 0.0), DVec3::new(-sin, cos, 0.0));
+        match *self {
+            QuadricKind::Sphere { radius, z_min, z_max, .. } => {
+                let [from, to] = polar_range(radius, z_min, z_max);
+                let radius = f64::from(radius);
+                let (sin_theta, cos_theta) = (from + v * (to - from)).sin_cos();
+                let n = radial * sin_theta + DVec3::Z * cos_theta;
+                // ∂p/∂u vanishes at a pole; a small length keeps its direction.
+                let du = around * (phi_max * radius * sin_theta.max(1e-5));
+                let dv = (radial * cos_theta - DVec3::Z * sin_theta) * (radius * (to - from));
+                LocalSurface { p: n * radius, n, derivatives: [du, dv] }
+            }
+            QuadricKind::Cylinder { radius, z_min, z_max, .. } => {
+                let (radius, z_min, z_max) = (f64::from(radius), f64::from(z_min), f64::from(z_max));
+                let p = radial * radius + DVec3::Z * (z_min + v * (z_max - z_min));
+                let derivatives = [around * (phi_max * radius), DVec3::Z * (z_max - z_min)];
+                LocalSurface { p, n: radial, derivatives }
+            }
+            QuadricKind::Disk { height, radius, inner_radius, .. } => {
+                let (radius, inner_radius) = (f64::from(radius), f64::from(inner_radius));
+                let r = radius + v * (inner_radius - radius);
+                let p = radial * r + DVec3::Z * f64::from(height);
+                let derivatives = [around * (phi_max * r.max(1e-5 * radius)), radial * (inner_radius - radius)];
+                LocalSurface { p, n: DVec3::Z, derivatives }
+            }
+        }
+    }
+}
+
+/// x / y, and 0 if y is.
+#[inline]
+fn ratio(x: f64, y: f64) -> f64 {
+    if y == 0.0 { 0.0 } else { x / y }
+}
+
+/// Polar angles of z_min and z_max.
+fn polar_range(radius: f32, z_min: f32, z_max: f32) -> [f64; 2] {
+    [z_min, z_max].map(|z| (f64::from(z) / f64::from(radius)).clamp(-1.0, 1.0).acos())
+}
+
+/// The roots of |o + t d| = radius in ascending order. The discriminant comes from the point nearest the centre and the
+/// constant term from a product, so neither cancels [Haines et al. 2019].
+fn sphere_roots(o: DVec3, d: DVec3, radius: f64) -> Option<[f64; 2]> {
+    let a = d.length_squared();
+    let b = o.dot(d);
+    let nearest = (o - d * (b / a)).length();
+    let discriminant = a * (radius + nearest) * (radius - nearest);
+    if discriminant.is_nan() || discriminant < 0.0 {
+        return None;
+    }
+    let distance = o.length();
+    let c = (distance + radius) * (distance - radius);
+    let q = -(b + discriminant.sqrt().copysign(b));
+    if q == 0.0 {
+        return Some([0.0, 0.0]);
+    }
+    let (t0, t1) = (q / a, c / q);
+    Some(if t0 <= t1 { [t0, t1] } else { [t1, t0] })
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::math::hash::HashStream;
+    use crate::math::ray::offset_origin;
+    use std::f32::consts::TAU as TAU32;
+
+    fn kinds() -> [QuadricKind; 6] {
+        [
+            QuadricKind::Sphere { radius: 1.3, z_min: -1.3, z_max: 1.3, phi_max: TAU32 },
+            QuadricKind::Sphere { radius: 1.3, z_min: -0.4, z_max: 1.0, phi_max: 4.0 },
+            QuadricKind::Disk { height: 0.3, radius: 1.5, inner_radius: 0.0, phi_max: TAU32 },
+            QuadricKind::Disk { height: -0.3, radius: 1.5, inner_radius: 0.5, phi_max: 5.0 },
+            QuadricKind::Cylinder { radius: 0.8, z_min: -1.0, z_max: 2.0, phi_max: TAU32 },
+            QuadricKind::Cylinder { radius: 0.8, z_min: -1.0, z_max: 2.0, phi_max: 2.0 },
+        ]
+    }
+
+    fn placed(kind: QuadricKind, group_from_local: Affine3A) -> Quadric {
+        let local_from_group = group_from_local.inverse();
+        Quadric { kind, group_from_local, local_from_group, flip_normal: swaps_handedness(&group_from_local) }
+    }
+
+    fn random_point(s: &mut HashStream) -> Vec3 {
+        Vec3::new(s.next_f32(), s.next_f32(), s.next_f32()) * 2.0 - 1.0
+    }
+
+    fn random_placement(s: &mut HashStream) -> Affine3A {
+        let axis = random_point(s).normalize_or(Vec3::X);
+        let rotation = glam::Quat::from_axis_angle(axis, s.next_f32() * 6.0);
+        let mirror = if s.next_f32() < 0.5 { -1.0 } else { 1.0 };
+        let scale = Vec3::new(mirror, 0.5 + s.next_f32(), 1.0) * (0.1 + 3.0 * s.next_f32());
+        Affine3A::from_scale_rotation_translation(scale, rotation, random_point(s) * 50.0)
+    }
+
+    /// The first crossing found by marching along the ray in f64 and bisecting.
+    fn reference(quadric: &Quadric, ray: &Ray) -> Option<f64> {
+        let m = quadric.local_from_group.as_daffine3();
+        let (o, d) = (m.transform_point3(ray.o.as_dvec3()), m.transform_vector3(ray.d.as_dvec3()));
+        let implicit = |p: DVec3| match quadric.kind {
+            QuadricKind::Sphere { radius, .. } => p.length_squared() - f64::from(radius).powi(2),
+            QuadricKind::Cylinder { radius, .. } => p.truncate().length_squared() - f64::from(radius).powi(2),
+            QuadricKind::Disk { height, .. } => p.z - f64::from(height),
+        };
+        let inside = |p: DVec3| {
+            let phi = p.y.atan2(p.x).rem_euclid(TAU);
+            match quadric.kind {
+                QuadricKind::Sphere { z_min, z_max, phi_max, .. }
+                | QuadricKind::Cylinder { z_min, z_max, phi_max, .. } => {
+                    p.z >= f64::from(z_min) && p.z <= f64::from(z_max) && phi <= f64::from(phi_max)
+                }
+                QuadricKind::Disk { radius, inner_radius, phi_max, .. } => {
+                    let r = p.truncate().length();
+                    r <= f64::from(radius) && r >= f64::from(inner_radius) && phi <= f64::from(phi_max)
+                }
+            }
+        };
+        let step = 2e-3 / d.length();
+        for k in 0..6000 {
+            let (mut lo, mut hi) = (k as f64 * step, (k + 1) as f64 * step);
+            if (implicit(o + d * lo) < 0.0) == (implicit(o + d * hi) < 0.0) {
+                continue;
+            }
+            for _ in 0..60 {
+                let mid = 0.5 * (lo + hi);
+                if (implicit(o + d * mid) < 0.0) == (implicit(o + d * lo) < 0.0) { lo = mid } else { hi = mid }
+            }
+            if inside(o + d * lo) {
+                return Some(lo);
+            }
+        }
+        None
+    }
+
+    #[test]
+    fn hits_agree_with_a_march_along_the_ray() {
+        let mut s = HashStream::new([3, 0, 0]);
+        let (mut both, mut differ) = (0, 0);
+        for k in 0..600 {
+            let quadric = placed(kinds()[k % 6], random_placement(&mut s));
+            let to_group = |p: Vec3| quadric.group_from_local.transform_point3(p);
+            let (o, target) = (to_group(random_point(&mut s) * 3.0), to_group(random_point(&mut s) * 1.5));
+            let ray = Ray { o, d: target - o, t_max: f32::INFINITY, time: 0.0 };
+            match (quadric.intersect(&ray), reference(&quadric, &ray)) {
+                (Some(hit), Some(t)) => {
+                    both += 1;
+                    differ += usize::from((f64::from(hit.t) - t).abs() > 1e-5 * (1.0 + t));
+                    let p = quadric.surface_hit(hit.uv).p;
+                    assert!((p - ray.at(hit.t)).length() < 2e-4, "{quadric:?} {hit:?}");
+                }
+                (None, None) => {}
+                _ => differ += 1,
+            }
+        }
+        // Marching misses grazing pairs of roots.
+        assert!(both > 200 && differ <= 3, "{both} {differ}");
+    }
+
+    #[test]
+    fn normals_are_outward_and_perpendicular_to_the_derivatives() {
+        let mut s = HashStream::new([4, 0, 0]);
+        for k in 0..600 {
+            let mut quadric = placed(kinds()[k % 6], random_placement(&mut s));
+            let uv = s.next_2d();
+            let hit = quadric.surface_hit(uv);
+            let outside = quadric.local_from_group.transform_vector3(hit.n);
+            let local = quadric.local_from_group.transform_point3(hit.p);
+            let along = match quadric.kind {
+                QuadricKind::Sphere { .. } => local.dot(outside),
+                QuadricKind::Cylinder { .. } => local.truncate().dot(outside.truncate()),
+                QuadricKind::Disk { .. } => outside.z,
+            };
+            assert!(along > 0.0, "{quadric:?} {hit:?}");
+            let tolerance = 1e-4 * (hit.dpdu.length() + hit.dpdv.length());
+            assert!(hit.n.dot(hit.dpdu).abs() < tolerance && hit.n.dot(hit.dpdv).abs() < tolerance);
+            quadric.flip_normal = !quadric.flip_normal;
+            assert_eq!(quadric.surface_hit(uv).n, -hit.n);
+
+            // Finite differences, away from the poles and edges.
+            let h = 1e-2;
+            let at = |u: f32, v: f32| quadric.surface_hit([u, v]).p;
+            let uv = uv.map(|x| 0.1 + 0.8 * x);
+            let du = (at(uv[0] + h, uv[1]) - at(uv[0] - h, uv[1])) / (2.0 * h);
+            let dv = (at(uv[0], uv[1] + h) - at(uv[0], uv[1] - h)) / (2.0 * h);
+            let exact = quadric.surface_hit(uv);
+            let tolerance = 1e-2 * (exact.dpdu.length() + exact.dpdv.length());
+            assert!((du - exact.dpdu).length() < tolerance, "{du} {exact:?}");
+            assert!((dv - exact.dpdv).length() < tolerance, "{dv} {exact:?}");
+        }
+    }
+
+    #[test]
+    fn rays_that_leave_do_not_meet_their_origin_again() {
+        let mut s = HashStream::new([7, 0, 0]);
+        for k in 0..120_000 {
+            let quadric = placed(kinds()[k % 6], random_placement(&mut s));
+            let hit = quadric.surface_hit(s.next_2d());
+            let mut w = random_point(&mut s).normalize_or(Vec3::Y);
+            if k % 3 == 0 {
+                // Grazing rays are the hard ones.
+                w = (w - hit.n * (w.dot(hit.n) * (1.0 - 1e-4))).normalize_or(w);
+            }
+            let ray = Ray { o: offset_origin(hit.p, hit.p_error, hit.n, w), d: w, t_max: f32::INFINITY, time: 0.0 };
+            let again = quadric.intersect(&ray);
+            // Going inward, the far side is a true hit: its chord is 2 r cos θ or longer.
+            let inward = w.dot(hit.n) < 0.0 && !matches!(quadric.kind, QuadricKind::Disk { .. });
+            match again {
+                None => {}
+                Some(far) => {
+                    let cos = w.dot(hit.n).abs();
+                    assert!(inward && far.t > 0.01 * cos, "{quadric:?} {hit:?} {ray:?} {far:?}");
+                }
+            }
+        }
+    }
+
+    #[test]
+    fn odd_rays_and_shapes_do_not_panic() {
+        let nan = Ray { o: Vec3::NAN, d: Vec3::NAN, t_max: f32::INFINITY, time: 0.0 };
+        let still = Ray { o: Vec3::ZERO, d: Vec3::ZERO, t_max: f32::INFINITY, time: 0.0 };
+        for kind in kinds() {
+            let quadric = placed(kind, Affine3A::IDENTITY);
+            assert_eq!(quadric.intersect(&nan), None);
+            assert_eq!(quadric.intersect(&still), None);
+            let flat = placed(kind, Affine3A::from_scale(Vec3::new(1.0, 0.0, 1.0)));
+            let _ = flat.intersect(&Ray { d: Vec3::X, ..still });
+            let _ = flat.surface_hit([0.5, 0.5]);
+            for uv in [[0.0, 0.0], [1.0, 1.0]] {
+                let hit = quadric.surface_hit(uv);
+                assert!(hit.dpdu.cross(hit.dpdv).length_squared() > 0.0);
+            }
+        }
     }
 }

@@ -3,13 +3,16 @@
 //! A [`GeometrySet`] has a root group of geometries in world space, and instances of other groups.
 //! Instances do not nest.
 
-use super::Shape;
+use super::{Shape, SurfaceHit};
 use crate::math::{Affine3A, Bounds3};
 
 /// Index into [`GeometrySet::geometries`].
 pub type GeometryId = u32;
 /// Index into [`GeometrySet::groups`].
 pub type GroupId = u32;
+
+/// Stands in place of an instance's index for what is in the root group.
+pub const NO_INSTANCE: u32 = u32::MAX;
 
 /// Which rays a geometry stops; a bit set.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -94,6 +97,22 @@ impl GeometrySet {
         placed.fold(self.group_bounds(&self.root), Bounds3::union)
     }
 
+    /// The surface in world space at the parametric position `uv` of a hit; `instance` is [`NO_INSTANCE`] in the root.
+    pub fn surface_hit(
+        &self,
+        geometry: GeometryId,
+        primitive: u32,
+        instance: u32,
+        uv: [f32; 2],
+        time: f32,
+    ) -> SurfaceHit {
+        let hit = self.geometries[geometry as usize].shape.surface_hit(primitive, uv);
+        if instance == NO_INSTANCE {
+            return hit;
+        }
+        hit.transformed(&self.instances[instance as usize].world_from_group_at(time))
+    }
+
     /// Number of primitives as stored: (triangles, quadrics, bilinear patches).
     pub fn primitive_counts(&self) -> (usize, usize, usize) {
         self.geometries.iter().fold((0, 0, 0), |(t, q, b), g| match &g.shape {
@@ -101,5 +120,37 @@ impl GeometrySet {
             Shape::Quadric(_) => (t, q + 1, b),
             Shape::Bilinear(m) => (t, q, b + m.patch_count()),
         })
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::geometry::TriangleMesh;
+    use crate::math::Vec3;
+
+    #[test]
+    fn surface_hits_of_instances_follow_their_motion() {
+        let mesh = TriangleMesh::new(vec![Vec3::ZERO, Vec3::X, Vec3::Y], vec![[0, 1, 2]]).unwrap();
+        let shift = |x: f32| Affine3A::from_translation(Vec3::new(x, 0.0, 0.0));
+        let mirror = Affine3A::from_scale(Vec3::new(1.0, 1.0, -2.0));
+        let set = GeometrySet {
+            geometries: vec![Geometry { shape: Shape::Mesh(mesh), alpha: None, visibility: Visibility::ALL }],
+            groups: vec![Group { geometries: vec![0] }],
+            root: Group { geometries: vec![0] },
+            instances: vec![
+                Instance { group: 0, world_from_group: vec![shift(0.0), shift(1.0), shift(5.0)] },
+                Instance { group: 0, world_from_group: vec![mirror] },
+            ],
+        };
+        let at = |instance, time| set.surface_hit(0, 0, instance, [0.25, 0.25], time);
+        assert_eq!(at(NO_INSTANCE, 0.5).p, Vec3::new(0.25, 0.25, 0.0));
+        for (time, x) in [(0.0, 0.25), (0.5, 1.25), (0.75, 3.25), (1.0, 5.25)] {
+            let hit = at(0, time);
+            assert!((hit.p.x - x).abs() < 1e-6 && hit.n == Vec3::Z);
+            assert!(hit.p_error.x > 0.0);
+        }
+        // A mirrored instance turns the normal as it turns the shape.
+        assert_eq!(at(1, 0.0).n, -Vec3::Z);
     }
 }
