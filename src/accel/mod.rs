@@ -3,8 +3,12 @@
 //! [`embree`] is the fast one, [`bvh`] the pure-Rust reference. Rays come in structure-of-arrays batches;
 //! a batch's answers do not depend on how it is cut into packets.
 
+pub mod alpha;
 pub mod bvh;
 pub mod embree;
+
+pub use alpha::{AlphaSource, AlphaTest};
+pub use bvh::Bvh;
 
 use crate::geometry::GeometryId;
 use crate::math::{Ray, Vec3};
@@ -95,7 +99,7 @@ pub struct Hit {
 
 impl Hit {
     /// The value of `instance` of a hit in the root group.
-    pub const NO_INSTANCE: u32 = u32::MAX;
+    pub const NO_INSTANCE: u32 = crate::geometry::NO_INSTANCE;
 }
 
 /// What a tracer may assume of the neighbours in a batch. It never changes an answer.

@@ -89,7 +89,7 @@ impl TriangleMesh {
         let (dpdu, dpdv) = partial_derivatives(corners, st);
         let (dpdu, dpdv) = spanning(dpdu, dpdv, ns);
         let dpdus = self.blend(&self.tangents, i, b).filter(|s| s.length_squared() > 0.0).unwrap_or(dpdu);
-        let uv = st[0] * b[0] + st[1] * b[1] + st[2] * b[2];
+        let uv = self.texture_coordinates_at(i, uv);
         SurfaceHit { p, p_error, n, ns, dpdu, dpdv, dpdus, uv }
     }
 
@@ -100,6 +100,13 @@ impl TriangleMesh {
             return [Vec2::ZERO, Vec2::X, Vec2::ONE];
         }
         self.indices[i].map(|v| self.uvs[v as usize])
+    }
+
+    /// The texture coordinates of triangle `i` at the weights `uv` of vertices 1 and 2.
+    #[inline]
+    pub fn texture_coordinates_at(&self, i: usize, uv: [f32; 2]) -> Vec2 {
+        let [st0, st1, st2] = self.texture_coordinates(i);
+        st0 * (1.0 - uv[0] - uv[1]) + st1 * uv[0] + st2 * uv[1]
     }
 
     fn shading_normal(&self, i: usize, b: [f32; 3]) -> Option<Vec3> {

@@ -17,6 +17,8 @@ pub use mesh::TriangleMesh;
 pub use quadric::{Quadric, QuadricKind};
 pub use set::{Geometry, GeometryId, GeometrySet, Group, GroupId, Instance, NO_INSTANCE, Visibility};
 
+use crate::math::{Bounds3, Vec2};
+
 /// A shape in the space of its group (world space for the root group).
 #[derive(Clone, Debug)]
 pub enum Shape {
@@ -30,7 +32,7 @@ pub enum Shape {
 
 impl Shape {
     /// Bounds in the space of the group.
-    pub fn bounds(&self) -> crate::math::Bounds3 {
+    pub fn bounds(&self) -> Bounds3 {
         match self {
             Shape::Mesh(mesh) => mesh.bounds(),
             Shape::Quadric(quadric) => quadric.bounds(),
@@ -44,6 +46,15 @@ impl Shape {
             Shape::Mesh(mesh) => mesh.surface_hit(primitive as usize, uv),
             Shape::Quadric(quadric) => quadric.surface_hit(uv),
             Shape::Bilinear(mesh) => mesh.surface_hit(primitive as usize, uv),
+        }
+    }
+
+    /// Texture coordinates at the parametric position `uv` of `primitive`.
+    pub fn texture_coordinates(&self, primitive: u32, uv: [f32; 2]) -> Vec2 {
+        match self {
+            Shape::Mesh(mesh) => mesh.texture_coordinates_at(primitive as usize, uv),
+            Shape::Quadric(_) => Vec2::from(uv),
+            Shape::Bilinear(mesh) => mesh.texture_coordinates_at(primitive as usize, uv),
         }
     }
 }

@@ -1,0 +1,121 @@
+//! Rays per second of the ray tracers on one thread, on a displaced sphere made by code.
+//!
+//! `cargo bench --bench trace -- [triangles in thousands, default 1000] [rays in thousands, default 1000]`
+#![allow(clippy::print_stdout, missing_docs)]
+
+use lumiris::accel::{Accel, Bvh, Coherence, Hit, RayBatch};
+use lumiris::geometry::{Geometry, GeometrySet, Group, Shape, TriangleMesh, Visibility};
+use lumiris::math::hash::HashStream;
+use lumiris::math::ray::offset_origin;
+use lumiris::math::{Frame, Ray, Vec3, warp};
+use std::f32::consts::{PI, TAU};
+use std::sync::Arc;
+use std::time::Instant;
+
+/// A latitude–longitude sphere with ripples, about `triangles` triangles.
+fn displaced_sphere(triangles: usize) -> TriangleMesh {
+    let rows = ((triangles / 4) as f32).sqrt() as u32;
+    let columns = rows * 2;
+    let point = |i: u32, j: u32| {
+        let (theta, phi) = (PI * (j as f32 + 0.5) / (rows as f32 + 1.0), TAU * (i % columns) as f32 / columns as f32);
+        let n = Vec3::new(theta.sin() * phi.cos(), theta.sin() * phi.sin(), theta.cos());
+        let ripple = (n.x * 37.0).sin() * (n.y * 41.0).sin() * (n.z * 31.0).sin();
+        n * (1.0 + 0.05 * ripple + 0.01 * ((n.x * 250.0).sin() * (n.z * 230.0).cos()))
+    };
+    let positions = (0..=rows).flat_map(|j| (0..columns).map(move |i| point(i, j))).collect();
+    let quad = |i: u32, j: u32| {
+        let (i1, a) = ((i + 1) % columns, j * columns);
+        let b = a + columns;
+        [[a + i, b + i, b + i1], [a + i, b + i1, a + i1]]
+    };
+    let indices = (0..rows).flat_map(|j| (0..columns).flat_map(move |i| quad(i, j))).collect();
+    TriangleMesh::new(positions, indices).expect("indices are in range")
+}
+
+fn camera_rays(count: usize) -> RayBatch {
+    let width = (count as f32).sqrt() as usize;
+    let mut rays = RayBatch::default();
+    let frame = Frame::from_z(Vec3::new(-2.5, -1.0, -0.8).normalize());
+    for (x, y) in (0..width * width).map(|i| (i % width, i / width)) {
+        let at = |k: usize| (k as f32 + 0.5) / width as f32 - 0.5;
+        let d = frame.to_world(Vec3::new(at(x) * 0.8, at(y) * 0.8, 1.0).normalize());
+        rays.push(&Ray { o: Vec3::new(2.5, 1.0, 0.8), d, t_max: f32::INFINITY, time: 0.0 });
+    }
+    rays
+}
+
+/// Cosine-distributed rays from the hits: on the inside, so that all of them hit again.
+fn bounce_rays(set: &GeometrySet, rays: &RayBatch, hits: &[Option<Hit>]) -> RayBatch {
+    let mut stream = HashStream::new([1, 2, 3]);
+    let mut bounces = RayBatch::default();
+    for (i, hit) in hits.iter().enumerate() {
+        let Some(hit) = hit else { continue };
+        let surface = set.surface_hit(hit.geometry, hit.primitive, hit.instance, hit.uv, 0.0);
+        let side = if surface.n.dot(rays.get(i).d) > 0.0 { surface.n } else { -surface.n };
+        let side = if i % 2 == 0 { side } else { -side };
+        let d = Frame::from_z(side).to_world(warp::sample_cosine_hemisphere(stream.next_2d()));
+        let o = offset_origin(surface.p, surface.p_error, surface.n, d);
+        bounces.push(&Ray { o, d, t_max: f32::INFINITY, time: 0.0 });
+    }
+    bounces
+}
+
+fn measure(name: &str, rays: &RayBatch, mut trace: impl FnMut() -> usize) {
+    let (mut best, mut found) = (f64::INFINITY, 0);
+    for _ in 0..5 {
+        let start = Instant::now();
+        found = trace();
+        best = best.min(start.elapsed().as_secs_f64());
+    }
+    let rate = rays.len() as f64 / best * 1e-6;
+    println!("{name:28} {rate:7.3} Mrays/s, {:.1} % hit", 100.0 * found as f64 / rays.len() as f64);
+}
+
+fn main() {
+    let numbers: Vec<usize> = std::env::args().filter_map(|a| a.parse().ok()).collect();
+    let thousands = |i: usize| numbers.get(i).copied().unwrap_or(1000) * 1000;
+    let mesh = displaced_sphere(thousands(0));
+    let shape = Shape::Mesh(mesh);
+    let set = Arc::new(GeometrySet {
+        geometries: vec![Geometry { shape, alpha: None, visibility: Visibility::ALL }],
+        root: Group { geometries: vec![0] },
+        ..GeometrySet::default()
+    });
+    let bvh = Bvh::new(Arc::clone(&set), None);
+    let (triangles, stats) = (set.primitive_counts().0, bvh.stats());
+    let per_triangle = stats.bytes as f64 / triangles as f64;
+    println!("{triangles} triangles, build {:.3} s, {per_triangle:.1} B each", stats.build_seconds);
+
+    let camera = camera_rays(thousands(1));
+    let mut hits = Vec::new();
+    bvh.intersect(&camera, Coherence::Coherent, &mut hits);
+    let bounces = bounce_rays(&set, &camera, &hits);
+    for (name, rays) in [("camera", &camera), ("bounce", &bounces)] {
+        measure(&format!("bvh {name} closest"), rays, || {
+            bvh.intersect(rays, Coherence::Incoherent, &mut hits);
+            hits.iter().flatten().count()
+        });
+        let mut occluded = Vec::new();
+        measure(&format!("bvh {name} occluded"), rays, || {
+            bvh.occluded(rays, Coherence::Incoherent, &mut occluded);
+            occluded.iter().filter(|&&o| o).count()
+        });
+    }
+    // The same rays for another program: origin, direction, as little-endian f32.
+    if let Some(path) = std::env::var_os("DUMP_RAYS") {
+        let Shape::Mesh(mesh) = &set.geometries[0].shape else { return };
+        let mut bytes = Vec::new();
+        for n in [mesh.positions().len(), triangles, camera.len(), bounces.len()] {
+            bytes.extend((n as u32).to_le_bytes());
+        }
+        bytes.extend(mesh.positions().iter().flat_map(|p| p.to_array()).flat_map(f32::to_le_bytes));
+        bytes.extend(mesh.indices.iter().flatten().flat_map(|v| v.to_le_bytes()));
+        for rays in [&camera, &bounces] {
+            for i in 0..rays.len() {
+                let ray = rays.get(i);
+                bytes.extend([ray.o, ray.d].iter().flat_map(|v| v.to_array()).flat_map(f32::to_le_bytes));
+            }
+        }
+        std::fs::write(path, bytes).expect("the dump can be written");
+    }
+}

@@ -1,0 +1,48 @@
+//! Cut-outs: which hits on a geometry with an alpha texture stop a ray. Both ray tracers ask here.
+
+use super::Hit;
+use crate::geometry::GeometrySet;
+use crate::math::hash::{hash_floats, pcg4d, unit_f32};
+use crate::math::{Ray, Vec2, Vec3};
+use std::sync::Arc;
+
+/// Values of alpha textures.
+pub trait AlphaSource: Send + Sync {
+    /// Value of float texture `texture` at the texture coordinates `uv` of the world-space point `p`.
+    fn alpha(&self, texture: u32, uv: Vec2, p: Vec3) -> f32;
+}
+
+/// The test of a hit on a cut-out.
+#[derive(Clone)]
+pub struct AlphaTest {
+    geometry: Arc<GeometrySet>,
+    source: Arc<dyn AlphaSource>,
+}
+
+impl AlphaTest {
+    /// The test for the geometries of `geometry`, whose `alpha` are textures of `source`.
+    pub fn new(geometry: Arc<GeometrySet>, source: Arc<dyn AlphaSource>) -> Self {
+        AlphaTest { geometry, source }
+    }
+
+    /// True if the ray is stopped, which happens with probability alpha. `world_ray` is the ray as the caller gave it,
+    /// not one that was moved into an instance.
+    ///
+    /// The decision is a hash of the ray and of what was hit, so it is the same however often and in whatever order a
+    /// tracer asks, and independent between the surfaces along a ray.
+    pub fn stops(&self, hit: &Hit, world_ray: &Ray) -> bool {
+        let geometry = &self.geometry.geometries[hit.geometry as usize];
+        let Some(texture) = geometry.alpha else { return true };
+        let uv = geometry.shape.texture_coordinates(hit.primitive, hit.uv);
+        let alpha = self.source.alpha(texture, uv, world_ray.at(hit.t));
+        if alpha >= 1.0 {
+            return true;
+        }
+        if alpha.is_nan() || alpha <= 0.0 {
+            return false;
+        }
+        let (o, d) = (world_ray.o, world_ray.d);
+        let ray_hash = hash_floats(&[o.x, o.y, o.z, d.x, d.y, d.z]);
+        unit_f32(pcg4d([ray_hash, hit.geometry, hit.primitive, hit.instance])[0]) < alpha
+    }
+}

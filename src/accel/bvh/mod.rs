@@ -1,0 +1,157 @@
+//! The pure-Rust bounding volume hierarchy, the reference that the other tracer is checked against.
+//!
+//! Two levels: a tree per group, and one over the root's primitives and the instances. A tree is built as a binary one by
+//! the surface-area heuristic ([`build`]), then collapsed to nodes of eight boxes with leaves of four triangles
+//! ([`tree`]), and walked one ray at a time ([`walk`]). Triangles are watertight; quadrics and bilinear patches use the
+//! exact intersections of [`crate::geometry`].
+//!
+//! Answers do not depend on the order of the walk: of hits with equal t, the smallest (instance, geometry, primitive)
+//! wins. Primitives and placements with NaN or infinite coordinates are left out.
+
+mod build;
+#[cfg(test)]
+mod tests;
+mod tree;
+mod walk;
+
+use super::{Accel, AccelStats, AlphaSource, AlphaTest, Coherence, Hit, RayBatch};
+use crate::geometry::{Geometry, GeometrySet, Group, Shape, Visibility};
+use crate::math::{Affine3A, Bounds3, Vec3};
+use build::{PrimRef, build_binary};
+use rayon::prelude::*;
+use std::sync::Arc;
+use std::time::Instant;
+use tree::Tree;
+use walk::{Any, Closest, Walk};
+
+/// The two-level hierarchy over a scene's geometry.
+pub struct Bvh {
+    geometry: Arc<GeometrySet>,
+    alpha: Option<AlphaTest>,
+    /// Per geometry: its visibility bits, and [`TESTED`] if it is a cut-out.
+    flags: Vec<u32>,
+    root: Tree,
+    groups: Vec<Tree>,
+    /// Per instance that does not move.
+    group_from_world: Vec<Option<Affine3A>>,
+    stats: AccelStats,
+}
+
+/// Flag of a geometry whose hits the alpha test must confirm.
+const TESTED: u32 = 1 << 31;
+
+impl Bvh {
+    /// Builds the trees in parallel; the result is the same for any number of threads. Without `alpha`, cut-outs are
+    /// opaque.
+    pub fn new(geometry: Arc<GeometrySet>, alpha: Option<Arc<dyn AlphaSource>>) -> Bvh {
+        let start = Instant::now();
+        let flags = geometry.geometries.iter().map(|g| flags_of(g, alpha.is_some())).collect();
+        let built: Vec<(Tree, u64)> =
+            geometry.groups.par_iter().map(|group| build_tree(&geometry, group_prims(&geometry, group))).collect();
+        let group_bounds: Vec<Bounds3> = built.iter().map(|(tree, _)| tree.bounds).collect();
+
+        let mut prims = group_prims(&geometry, &geometry.root);
+        prims.extend(instance_prims(&geometry, &group_bounds));
+        let (root, root_peak) = build_tree(&geometry, prims);
+
+        let group_from_world: Vec<Option<Affine3A>> = geometry
+            .instances
+            .iter()
+            .map(|i| (i.world_from_group.len() == 1).then(|| i.world_from_group[0].inverse()))
+            .collect();
+        let group_bytes: u64 = built.iter().map(|(tree, _)| tree.bytes()).sum();
+        let group_peak: u64 = built.iter().map(|(_, peak)| peak).sum();
+        let bytes = group_bytes + root.bytes() + size_of_val(&group_from_world[..]) as u64;
+        let peak_bytes = bytes.max(group_peak).max(group_bytes + root_peak);
+        Bvh {
+            alpha: alpha.map(|source| AlphaTest::new(Arc::clone(&geometry), source)),
+            geometry,
+            flags,
+            root,
+            groups: built.into_iter().map(|(tree, _)| tree).collect(),
+            group_from_world,
+            stats: AccelStats { bytes, peak_bytes, build_seconds: start.elapsed().as_secs_f64() },
+        }
+    }
+}
+
+impl Accel for Bvh {
+    fn intersect(&self, rays: &RayBatch, _coherence: Coherence, hits: &mut Vec<Option<Hit>>) {
+        hits.clear();
+        let mut stack = Vec::with_capacity(128);
+        hits.extend((0..rays.len()).map(|i| {
+            let ray = rays.get(i);
+            Walk::new(self, &ray, Closest::new(ray.t_max), &mut stack).run().best
+        }));
+    }
+
+    fn occluded(&self, rays: &RayBatch, _coherence: Coherence, occluded: &mut Vec<bool>) {
+        occluded.clear();
+        let mut stack = Vec::with_capacity(128);
+        occluded.extend((0..rays.len()).map(|i| {
+            let ray = rays.get(i);
+            Walk::new(self, &ray, Any::new(ray.t_max), &mut stack).run().found
+        }));
+    }
+
+    fn stats(&self) -> AccelStats {
+        self.stats
+    }
+}
+
+fn flags_of(geometry: &Geometry, has_alpha_source: bool) -> u32 {
+    let tested = if geometry.alpha.is_some() && has_alpha_source { TESTED } else { 0 };
+    geometry.visibility.0 & Visibility::ALL.0 | tested
+}
+
+/// A tree and the peak of the bytes that its build held.
+fn build_tree(geometry: &GeometrySet, mut prims: Vec<PrimRef>) -> (Tree, u64) {
+    let is_triangle: Vec<bool> = geometry.geometries.iter().map(|g| matches!(g.shape, Shape::Mesh(_))).collect();
+    let binary = build_binary(&mut prims, &is_triangle);
+    let tree = Tree::new(geometry, &prims, binary.as_ref(), &is_triangle);
+    let binary_bytes = binary.map_or(0, |root| root.bytes());
+    let peak = tree.bytes() + size_of_val(&prims[..]) as u64 + binary_bytes;
+    (tree, peak)
+}
+
+/// The finite primitives of a group that some ray can see.
+fn group_prims(set: &GeometrySet, group: &Group) -> Vec<PrimRef> {
+    let mut prims = Vec::new();
+    for &id in &group.geometries {
+        let geometry = &set.geometries[id as usize];
+        if geometry.visibility.0 & Visibility::ALL.0 == 0 {
+            continue;
+        }
+        match &geometry.shape {
+            Shape::Mesh(mesh) => prims.par_extend(
+                (0..mesh.triangle_count()).into_par_iter().filter_map(|i| PrimRef::of_points(id, i, &mesh.triangle(i))),
+            ),
+            Shape::Bilinear(mesh) => {
+                prims.extend((0..mesh.patch_count()).filter_map(|i| PrimRef::of_points(id, i, &mesh.patch(i))));
+            }
+            Shape::Quadric(quadric) => prims.extend(PrimRef::of_bounds(id, 0, quadric.bounds())),
+        }
+    }
+    prims
+}
+
+/// Placements with their bounds over all times: points move on straight lines between the time samples, so the boxes at
+/// the samples suffice. Singular placements that do not move are left out.
+fn instance_prims(set: &GeometrySet, group_bounds: &[Bounds3]) -> Vec<PrimRef> {
+    let bounds_of = |i: usize| {
+        let instance = &set.instances[i];
+        let bounds = group_bounds[instance.group as usize];
+        let flat = instance.world_from_group.len() == 1 && !instance.world_from_group[0].inverse().is_finite();
+        if bounds.is_empty() || flat || !instance.world_from_group.iter().all(Affine3A::is_finite) {
+            return None;
+        }
+        let placed = instance.world_from_group.iter().map(|m| bounds.transformed(m));
+        let all = placed.fold(Bounds3::EMPTY, Bounds3::union);
+        // The ray's way into the group rounds too.
+        let pad = all.min.abs().max(all.max.abs()).max_element() * 2.0_f32.powi(-18);
+        Some(Bounds3 { min: all.min - Vec3::splat(pad), max: all.max + Vec3::splat(pad) })
+    };
+    (0..set.instances.len())
+        .filter_map(|i| bounds_of(i).and_then(|b| PrimRef::of_bounds(PrimRef::INSTANCE, i, b)))
+        .collect()
+}

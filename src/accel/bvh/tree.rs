@@ -1,0 +1,227 @@
+//! The tree that is walked: nodes of eight boxes, blocks of four triangles, structure of arrays.
+
+use super::build::{Binary, BinaryKind, LEAF_TRIANGLES, PrimRef};
+use crate::geometry::triangle::RayPrecomputed;
+use crate::geometry::{GeometrySet, Shape};
+use crate::math::{Bounds3, Vec3, Vec4};
+use rayon::prelude::*;
+
+/// Relative growth of every box, of its largest coordinate. With the like growth of the ray's origin this covers the
+/// rounding of the triangle test, which moves corners by up to 5·2⁻²⁴ of their distance from the origin.
+const BOX_GROWTH: f32 = 1.0 / (1 << 20) as f32;
+
+/// What a slot of a node refers to: two bits of kind, thirty of index.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(super) struct ChildRef(u32);
+
+/// A decoded [`ChildRef`].
+pub(super) enum Child {
+    Node(usize),
+    Block(usize),
+    Other(usize),
+}
+
+impl ChildRef {
+    const KIND_SHIFT: u32 = 30;
+    /// An unused slot; its box is empty, so no walk gets there.
+    pub const EMPTY: ChildRef = ChildRef(u32::MAX);
+
+    fn new(kind: u32, index: usize) -> Self {
+        debug_assert!(index < 1 << Self::KIND_SHIFT);
+        ChildRef(kind << Self::KIND_SHIFT | index as u32)
+    }
+
+    #[inline]
+    pub fn decode(self) -> Child {
+        let index = (self.0 & ((1 << Self::KIND_SHIFT) - 1)) as usize;
+        match self.0 >> Self::KIND_SHIFT {
+            0 => Child::Node(index),
+            1 => Child::Block(index),
+            _ => Child::Other(index),
+        }
+    }
+}
+
+/// Eight boxes and what they hold.
+#[derive(Clone, Debug, PartialEq)]
+#[repr(C, align(32))]
+pub(super) struct Node {
+    /// Rows of lower x, y, z, then upper x, y, z.
+    pub bounds: [[Vec4; 2]; 6],
+    pub children: [ChildRef; 8],
+}
+
+/// Four triangles; missing ones have NaN corners, which no ray hits.
+#[derive(Clone, Debug)]
+pub(super) struct Block {
+    /// By corner, then axis.
+    corners: [[Vec4; 3]; 3],
+    geometry: [u32; LEAF_TRIANGLES],
+    primitive: [u32; LEAF_TRIANGLES],
+}
+
+impl Block {
+    fn new(geometry: &GeometrySet, prims: &[PrimRef]) -> Self {
+        let mut lanes = [[[f32::NAN; LEAF_TRIANGLES]; 3]; 3];
+        let mut block = Block { corners: [[Vec4::NAN; 3]; 3], geometry: [0; 4], primitive: [0; 4] };
+        for (lane, prim) in prims.iter().enumerate() {
+            let Shape::Mesh(mesh) = &geometry.geometries[prim.geometry as usize].shape else { continue };
+            for (corner, p) in mesh.triangle(prim.primitive as usize).into_iter().enumerate() {
+                for axis in 0..3 {
+                    lanes[corner][axis][lane] = p[axis];
+                }
+            }
+            (block.geometry[lane], block.primitive[lane]) = (prim.geometry, prim.primitive);
+        }
+        block.corners = lanes.map(|corner| corner.map(Vec4::from));
+        block
+    }
+
+    /// (geometry, primitive) of a lane.
+    #[inline]
+    pub fn id(&self, lane: usize) -> (u32, u32) {
+        (self.geometry[lane], self.primitive[lane])
+    }
+
+    /// Corners of a lane.
+    #[inline]
+    pub fn triangle(&self, lane: usize) -> [Vec3; 3] {
+        self.corners.map(|axes| Vec3::from(axes.map(|x| x[lane])))
+    }
+
+    /// Lanes whose f32 edge functions do not exclude a hit: those of
+    /// [`crate::geometry::triangle::intersect_triangle`], four at a time.
+    #[inline]
+    pub fn candidates(&self, ray: &RayPrecomputed) -> u32 {
+        let [kx, ky, kz] = ray.axes;
+        let o = ray.ray.o;
+        let (ox, oy, oz) = (Vec4::splat(o[kx]), Vec4::splat(o[ky]), Vec4::splat(o[kz]));
+        let (sx, sy) = (Vec4::splat(ray.shear[0]), Vec4::splat(ray.shear[1]));
+        let sheared = |corner: &[Vec4; 3]| {
+            let z = corner[kz] - oz;
+            (corner[kx] - ox - sx * z, corner[ky] - oy - sy * z)
+        };
+        let [(ax, ay), (bx, by), (cx, cy)] =
+            [sheared(&self.corners[0]), sheared(&self.corners[1]), sheared(&self.corners[2])];
+        let u = cx * by - cy * bx;
+        let v = ax * cy - ay * cx;
+        let w = bx * ay - by * ax;
+        let front = u.min(v).min(w).cmpge(Vec4::ZERO);
+        let back = u.max(v).max(w).cmple(Vec4::ZERO);
+        (front | back).bitmask()
+    }
+}
+
+/// A primitive that is not a triangle, or an instance.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(super) enum Other {
+    /// Quadric or bilinear patch.
+    Exact {
+        geometry: u32,
+        primitive: u32,
+    },
+    Instance(u32),
+}
+
+/// One level of the hierarchy.
+#[derive(Debug)]
+pub(super) struct Tree {
+    pub bounds: Bounds3,
+    /// Where a walk starts; `None` if the tree is empty.
+    pub root: Option<ChildRef>,
+    pub nodes: Vec<Node>,
+    pub blocks: Vec<Block>,
+    pub others: Vec<Other>,
+}
+
+impl Tree {
+    /// Collapses a binary tree over the reordered primitives.
+    pub fn new(geometry: &GeometrySet, prims: &[PrimRef], binary: Option<&Binary>, is_triangle: &[bool]) -> Self {
+        let mut collapse = Collapse { prims, is_triangle, nodes: Vec::new(), leaves: Vec::new(), others: Vec::new() };
+        let root = binary.map(|binary| collapse.child(binary));
+        let Collapse { mut nodes, leaves, mut others, .. } = collapse;
+        nodes.shrink_to_fit();
+        others.shrink_to_fit();
+        let blocks =
+            leaves.par_iter().map(|&(start, count)| Block::new(geometry, &prims[start..start + count])).collect();
+        let bounds = binary.map_or(Bounds3::EMPTY, |b| Bounds3 { min: b.bounds.lo.into(), max: b.bounds.hi.into() });
+        Tree { bounds, root, nodes, blocks, others }
+    }
+
+    /// Bytes held.
+    pub fn bytes(&self) -> u64 {
+        (size_of_val(&self.nodes[..]) + size_of_val(&self.blocks[..]) + size_of_val(&self.others[..])) as u64
+    }
+}
+
+struct Collapse<'a> {
+    prims: &'a [PrimRef],
+    is_triangle: &'a [bool],
+    nodes: Vec<Node>,
+    /// Ranges of primitives of the blocks.
+    leaves: Vec<(usize, usize)>,
+    others: Vec<Other>,
+}
+
+impl Collapse<'_> {
+    fn child(&mut self, binary: &Binary) -> ChildRef {
+        match &binary.kind {
+            BinaryKind::Leaf { start, count } => self.leaf(*start, *count),
+            BinaryKind::Inner(children) => self.node(children),
+        }
+    }
+
+    fn leaf(&mut self, start: usize, count: usize) -> ChildRef {
+        let PrimRef { geometry, primitive, .. } = self.prims[start];
+        if self.is_triangle.get(geometry as usize).copied().unwrap_or(false) {
+            self.leaves.push((start, count));
+            return ChildRef::new(1, self.leaves.len() - 1);
+        }
+        self.others.push(if geometry == PrimRef::INSTANCE {
+            Other::Instance(primitive)
+        } else {
+            Other::Exact { geometry, primitive }
+        });
+        ChildRef::new(2, self.others.len() - 1)
+    }
+
+    /// Opens the largest inner node until there are eight.
+    fn node(&mut self, children: &[Binary; 2]) -> ChildRef {
+        let mut slots: Vec<&Binary> = children.iter().collect();
+        while slots.len() < 8 {
+            let mut largest: Option<(f32, usize, &[Binary; 2])> = None;
+            for (i, slot) in slots.iter().enumerate() {
+                if let BinaryKind::Inner(below) = &slot.kind {
+                    let area = slot.bounds.half_area();
+                    if largest.is_none_or(|(most, ..)| area > most) {
+                        largest = Some((area, i, below));
+                    }
+                }
+            }
+            let Some((_, i, below)) = largest else { break };
+            slots[i] = &below[0];
+            slots.push(&below[1]);
+        }
+
+        let index = self.nodes.len();
+        let mut lanes = [[f32::INFINITY; 8], [f32::NEG_INFINITY; 8]].map(|row| [row; 3]);
+        for (lane, slot) in slots.iter().enumerate() {
+            let (lo, hi) = (Vec3::from(slot.bounds.lo), Vec3::from(slot.bounds.hi));
+            let growth = lo.abs().max(hi.abs()).max_element() * BOX_GROWTH;
+            for axis in 0..3 {
+                lanes[0][axis][lane] = (lo[axis] - growth).next_down();
+                lanes[1][axis][lane] = (hi[axis] + growth).next_up();
+            }
+        }
+        let row = |r: usize| {
+            let lanes = &lanes[r / 3][r % 3];
+            [Vec4::from_slice(&lanes[..4]), Vec4::from_slice(&lanes[4..])]
+        };
+        self.nodes.push(Node { bounds: std::array::from_fn(row), children: [ChildRef::EMPTY; 8] });
+        for (lane, slot) in slots.iter().enumerate() {
+            let child = self.child(slot);
+            self.nodes[index].children[lane] = child;
+        }
+        ChildRef::new(0, index)
+    }
+}

@@ -1,0 +1,313 @@
+//! The walk of one ray through the two levels.
+
+use super::tree::{Block, Child, ChildRef, Node, Other, Tree};
+use super::{Bvh, TESTED};
+use crate::accel::Hit;
+use crate::geometry::triangle::{RayPrecomputed, intersect_triangle};
+use crate::geometry::{Shape, Visibility};
+use crate::math::{Ray, Vec4, gamma};
+
+/// What is looked for along the ray.
+pub(super) trait Query {
+    /// Whether near boxes come first.
+    const ORDERED: bool;
+    /// Which geometries count.
+    const MASK: u32;
+    /// Boxes and hits beyond this parameter are of no interest.
+    fn limit(&self) -> f32;
+    /// True if the hit, at a parameter of `limit` or less, changes the answer.
+    fn wants(&self, hit: &Hit) -> bool;
+    /// Takes a wanted hit; true if the answer is final.
+    fn take(&mut self, hit: Hit) -> bool;
+}
+
+/// The first hit.
+pub(super) struct Closest {
+    limit: f32,
+    /// The answer.
+    pub best: Option<Hit>,
+}
+
+impl Closest {
+    pub fn new(t_max: f32) -> Self {
+        Closest { limit: t_max, best: None }
+    }
+}
+
+impl Query for Closest {
+    const ORDERED: bool = true;
+    const MASK: u32 = Visibility::PATH.0;
+
+    #[inline]
+    fn limit(&self) -> f32 {
+        self.limit
+    }
+
+    #[inline]
+    fn wants(&self, hit: &Hit) -> bool {
+        let key = |h: &Hit| (h.instance, h.geometry, h.primitive);
+        // The end of the ray is open; at a known hit the smaller key wins.
+        hit.t < self.limit || self.best.as_ref().is_some_and(|best| hit.t == best.t && key(hit) < key(best))
+    }
+
+    #[inline]
+    fn take(&mut self, hit: Hit) -> bool {
+        self.limit = hit.t;
+        self.best = Some(hit);
+        false
+    }
+}
+
+/// Whether there is any hit.
+pub(super) struct Any {
+    limit: f32,
+    /// The answer.
+    pub found: bool,
+}
+
+impl Any {
+    pub fn new(t_max: f32) -> Self {
+        Any { limit: t_max, found: false }
+    }
+}
+
+impl Query for Any {
+    const ORDERED: bool = false;
+    const MASK: u32 = Visibility::SHADOW.0;
+
+    #[inline]
+    fn limit(&self) -> f32 {
+        self.limit
+    }
+
+    #[inline]
+    fn wants(&self, hit: &Hit) -> bool {
+        hit.t < self.limit
+    }
+
+    #[inline]
+    fn take(&mut self, _hit: Hit) -> bool {
+        self.found = true;
+        true
+    }
+}
+
+/// A ray prepared for slab tests.
+struct Slabs {
+    /// Origin for near and far planes, grown apart, by axis.
+    near_origin: [Vec4; 3],
+    far_origin: [Vec4; 3],
+    inv_d: [Vec4; 3],
+    /// Rows of near and far planes in [`Node::bounds`], by axis.
+    near_row: [usize; 3],
+    far_row: [usize; 3],
+}
+
+impl Slabs {
+    fn new(ray: &Ray) -> Self {
+        // See `BOX_GROWTH`.
+        let growth = ray.o.abs().max_element() * (1.0 / (1 << 20) as f32);
+        let smallest = ray.d.abs().max_element() * 1e-18;
+        let mut slabs = Slabs {
+            near_origin: [Vec4::ZERO; 3],
+            far_origin: [Vec4::ZERO; 3],
+            inv_d: [Vec4::ZERO; 3],
+            near_row: [0; 3],
+            far_row: [0; 3],
+        };
+        for axis in 0..3 {
+            // Finite inverses, so that no product is NaN.
+            let d = ray.d[axis];
+            let inv_d = 1.0 / d.abs().max(smallest).max(f32::MIN_POSITIVE).copysign(d);
+            let apart = growth.copysign(d);
+            slabs.near_origin[axis] = Vec4::splat(ray.o[axis] + apart);
+            slabs.far_origin[axis] = Vec4::splat(ray.o[axis] - apart);
+            slabs.inv_d[axis] = Vec4::splat(inv_d);
+            let backward = inv_d < 0.0;
+            slabs.near_row[axis] = if backward { axis + 3 } else { axis };
+            slabs.far_row[axis] = if backward { axis } else { axis + 3 };
+        }
+        slabs
+    }
+
+    /// Boxes that the ray meets in 0..=limit, as a bit mask, with their entries. The exit is moved out by its rounding
+    /// error [Ize 2013].
+    #[inline(always)]
+    fn test(&self, node: &Node, limit: Vec4) -> (u32, [Vec4; 2]) {
+        const WIDEN: f32 = 1.0 + 2.0 * gamma(3);
+        let half = |h: usize| {
+            let near = |axis: usize| (node.bounds[self.near_row[axis]][h] - self.near_origin[axis]) * self.inv_d[axis];
+            let far = |axis: usize| (node.bounds[self.far_row[axis]][h] - self.far_origin[axis]) * self.inv_d[axis];
+            let entry = near(0).max(near(1)).max(near(2).max(Vec4::ZERO));
+            let exit = (far(0).min(far(1)).min(far(2)) * WIDEN).min(limit);
+            (entry.cmple(exit).bitmask(), entry)
+        };
+        let ((low, entry_low), (high, entry_high)) = (half(0), half(1));
+        (low | high << 4, [entry_low, entry_high])
+    }
+}
+
+/// A subtree that is still to be walked.
+#[derive(Clone, Copy)]
+pub(super) struct Pending {
+    child: ChildRef,
+    /// Parameter at which the ray enters its box.
+    entry: f32,
+}
+
+/// A walk under way.
+pub(super) struct Walk<'a, Q> {
+    bvh: &'a Bvh,
+    world_ray: &'a Ray,
+    query: Q,
+    stack: &'a mut Vec<Pending>,
+}
+
+impl<'a, Q: Query> Walk<'a, Q> {
+    pub fn new(bvh: &'a Bvh, world_ray: &'a Ray, query: Q, stack: &'a mut Vec<Pending>) -> Self {
+        stack.clear();
+        Walk { bvh, world_ray, query, stack }
+    }
+
+    /// Walks to the end.
+    pub fn run(mut self) -> Q {
+        if self.world_ray.t_max > 0.0
+            && let Some(ray) = RayPrecomputed::new(self.world_ray)
+        {
+            self.tree(&self.bvh.root, &ray, Hit::NO_INSTANCE);
+        }
+        self.query
+    }
+
+    /// Walks a tree with the ray in its space; true if the answer is final.
+    fn tree(&mut self, tree: &'a Tree, ray: &RayPrecomputed, instance: u32) -> bool {
+        let Some(root) = tree.root else { return false };
+        let slabs = Slabs::new(&ray.ray);
+        let base = self.stack.len();
+        self.stack.push(Pending { child: root, entry: 0.0 });
+        while self.stack.len() > base {
+            let Some(Pending { mut child, entry }) = self.stack.pop() else { break };
+            if Q::ORDERED && entry > self.query.limit() {
+                continue;
+            }
+            // Down along the nearest boxes to a leaf.
+            let done = loop {
+                match child.decode() {
+                    Child::Node(index) => {
+                        let node = &tree.nodes[index];
+                        let (mask, entries) = slabs.test(node, Vec4::splat(self.query.limit()));
+                        match self.nearest(node, mask, entries) {
+                            Some(next) => child = next,
+                            None => break false,
+                        }
+                    }
+                    Child::Block(index) => break self.block(&tree.blocks[index], ray, instance),
+                    Child::Other(index) => break self.other(tree.others[index], ray, instance),
+                }
+            };
+            if done {
+                self.stack.truncate(base);
+                return true;
+            }
+        }
+        false
+    }
+
+    /// The box to enter next; the others go onto the stack, the nearest on top.
+    #[inline(always)]
+    fn nearest(&mut self, node: &Node, mask: u32, entries: [Vec4; 2]) -> Option<ChildRef> {
+        if mask == 0 {
+            return None;
+        }
+        let first = mask.trailing_zeros() as usize & 7;
+        let mut rest = mask & (mask - 1);
+        if rest == 0 {
+            return Some(node.children[first]);
+        }
+        let mut lanes = [0.0_f32; 8];
+        lanes[..4].copy_from_slice(&entries[0].to_array());
+        lanes[4..].copy_from_slice(&entries[1].to_array());
+        let mut next = Pending { child: node.children[first], entry: lanes[first] };
+        let sorted_from = self.stack.len();
+        while rest != 0 {
+            let lane = rest.trailing_zeros() as usize & 7;
+            rest &= rest - 1;
+            let mut pending = Pending { child: node.children[lane], entry: lanes[lane] };
+            if Q::ORDERED {
+                // Keep the nearest in hand and the stack descending.
+                if pending.entry < next.entry {
+                    std::mem::swap(&mut pending, &mut next);
+                }
+                self.stack.push(pending);
+                let mut i = self.stack.len() - 1;
+                while i > sorted_from && self.stack[i - 1].entry < pending.entry {
+                    self.stack[i] = self.stack[i - 1];
+                    i -= 1;
+                }
+                self.stack[i] = pending;
+            } else {
+                self.stack.push(pending);
+            }
+        }
+        Some(next.child)
+    }
+
+    #[inline]
+    fn block(&mut self, block: &Block, ray: &RayPrecomputed, instance: u32) -> bool {
+        let mut lanes = block.candidates(ray);
+        while lanes != 0 {
+            let lane = lanes.trailing_zeros() as usize & 3;
+            lanes &= lanes - 1;
+            let Some(hit) = intersect_triangle(ray, block.triangle(lane), self.query.limit()) else { continue };
+            let (geometry, primitive) = block.id(lane);
+            if self.offer(Hit { t: hit.t, uv: [hit.b1, hit.b2], geometry, primitive, instance }) {
+                return true;
+            }
+        }
+        false
+    }
+
+    fn other(&mut self, other: Other, ray: &RayPrecomputed, instance: u32) -> bool {
+        match other {
+            Other::Instance(index) => self.instance(index),
+            Other::Exact { geometry, primitive } => {
+                // An equal parameter may still win, so the exact test's open end is moved up by one step.
+                let ray = Ray { t_max: self.query.limit().next_up(), ..ray.ray };
+                let local = match &self.bvh.geometry.geometries[geometry as usize].shape {
+                    Shape::Quadric(quadric) => quadric.intersect(&ray),
+                    Shape::Bilinear(mesh) => mesh.intersect_patch(primitive as usize, &ray),
+                    Shape::Mesh(_) => None,
+                };
+                local.is_some_and(|l| self.offer(Hit { t: l.t, uv: l.uv, geometry, primitive, instance }))
+            }
+        }
+    }
+
+    /// Walks a placed group. Parameters are those of the world ray: its direction is transformed, not normalised.
+    fn instance(&mut self, index: u32) -> bool {
+        let placed = &self.bvh.geometry.instances[index as usize];
+        let world = self.world_ray;
+        let group_from_world = self.bvh.group_from_world[index as usize]
+            .unwrap_or_else(|| placed.world_from_group_at(world.time).inverse());
+        let ray = Ray {
+            o: group_from_world.transform_point3(world.o),
+            d: group_from_world.transform_vector3(world.d),
+            ..*world
+        };
+        let bvh = self.bvh;
+        RayPrecomputed::new(&ray).is_some_and(|ray| self.tree(&bvh.groups[placed.group as usize], &ray, index))
+    }
+
+    /// Offers a hit to the query; true if the answer is final.
+    #[inline]
+    fn offer(&mut self, hit: Hit) -> bool {
+        let flags = self.bvh.flags[hit.geometry as usize];
+        if flags & Q::MASK == 0 || !self.query.wants(&hit) {
+            return false;
+        }
+        if flags & TESTED != 0 && !self.bvh.alpha.as_ref().is_none_or(|test| test.stops(&hit, self.world_ray)) {
+            return false;
+        }
+        self.query.take(hit)
+    }
+}
