@@ -44,7 +44,7 @@ impl ChildRef {
 
 /// Eight boxes and what they hold.
 #[derive(Clone, Debug, PartialEq)]
-#[repr(C, align(32))]
+#[repr(C, align(64))]
 pub(super) struct Node {
     /// Rows of lower x, y, z, then upper x, y, z.
     pub bounds: [[Vec4; 2]; 6],
@@ -53,6 +53,7 @@ pub(super) struct Node {
 
 /// Four triangles; missing ones have NaN corners, which no ray hits.
 #[derive(Clone, Debug)]
+#[repr(C, align(64))]
 pub(super) struct Block {
     /// By corner, then axis.
     corners: [[Vec4; 3]; 3],
@@ -138,7 +139,11 @@ impl Tree {
     /// Collapses a binary tree over the reordered primitives.
     pub fn new(geometry: &GeometrySet, prims: &[PrimRef], binary: Option<&Binary>, is_triangle: &[bool]) -> Self {
         let mut collapse = Collapse { prims, is_triangle, nodes: Vec::new(), leaves: Vec::new(), others: Vec::new() };
-        let root = binary.map(|binary| collapse.child(binary));
+        let root = binary.map(|binary| {
+            let root = collapse.place(binary);
+            collapse.fill(root, binary);
+            root
+        });
         let Collapse { mut nodes, leaves, mut others, .. } = collapse;
         nodes.shrink_to_fit();
         others.shrink_to_fit();
@@ -164,13 +169,6 @@ struct Collapse<'a> {
 }
 
 impl Collapse<'_> {
-    fn child(&mut self, binary: &Binary) -> ChildRef {
-        match &binary.kind {
-            BinaryKind::Leaf { start, count } => self.leaf(*start, *count),
-            BinaryKind::Inner(children) => self.node(children),
-        }
-    }
-
     fn leaf(&mut self, start: usize, count: usize) -> ChildRef {
         let PrimRef { geometry, primitive, .. } = self.prims[start];
         if self.is_triangle.get(geometry as usize).copied().unwrap_or(false) {
@@ -185,43 +183,65 @@ impl Collapse<'_> {
         ChildRef::new(2, self.others.len() - 1)
     }
 
-    /// Opens the largest inner node until there are eight.
-    fn node(&mut self, children: &[Binary; 2]) -> ChildRef {
-        let mut slots: Vec<&Binary> = children.iter().collect();
-        while slots.len() < 8 {
-            let mut largest: Option<(f32, usize, &[Binary; 2])> = None;
-            for (i, slot) in slots.iter().enumerate() {
-                if let BinaryKind::Inner(below) = &slot.kind {
-                    let area = slot.bounds.half_area();
-                    if largest.is_none_or(|(most, ..)| area > most) {
-                        largest = Some((area, i, below));
-                    }
-                }
+    /// What stands for a binary subtree: its leaf, or a new node that is still to be filled.
+    fn place(&mut self, binary: &Binary) -> ChildRef {
+        match binary.kind {
+            BinaryKind::Leaf { start, count } => self.leaf(start, count),
+            BinaryKind::Inner(_) => {
+                self.nodes.push(Node { bounds: [[Vec4::ZERO; 2]; 6], children: [ChildRef::EMPTY; 8] });
+                ChildRef::new(0, self.nodes.len() - 1)
             }
-            let Some((_, i, below)) = largest else { break };
-            slots[i] = &below[0];
-            slots.push(&below[1]);
         }
+    }
 
-        let index = self.nodes.len();
-        let mut lanes = [[f32::INFINITY; 8], [f32::NEG_INFINITY; 8]].map(|row| [row; 3]);
+    /// Fills the node of a subtree and all below. Siblings lie side by side: a ray that meets one often meets another.
+    fn fill(&mut self, place: ChildRef, binary: &Binary) {
+        let (Child::Node(index), BinaryKind::Inner(children)) = (place.decode(), &binary.kind) else { return };
+        let slots = opened(children);
+        self.nodes[index].bounds = grown_bounds(&slots);
         for (lane, slot) in slots.iter().enumerate() {
-            let (lo, hi) = (Vec3::from(slot.bounds.lo), Vec3::from(slot.bounds.hi));
-            let growth = lo.abs().max(hi.abs()).max_element() * BOX_GROWTH;
-            for axis in 0..3 {
-                lanes[0][axis][lane] = (lo[axis] - growth).next_down();
-                lanes[1][axis][lane] = (hi[axis] + growth).next_up();
-            }
-        }
-        let row = |r: usize| {
-            let lanes = &lanes[r / 3][r % 3];
-            [Vec4::from_slice(&lanes[..4]), Vec4::from_slice(&lanes[4..])]
-        };
-        self.nodes.push(Node { bounds: std::array::from_fn(row), children: [ChildRef::EMPTY; 8] });
-        for (lane, slot) in slots.iter().enumerate() {
-            let child = self.child(slot);
+            let child = self.place(slot);
             self.nodes[index].children[lane] = child;
         }
-        ChildRef::new(0, index)
+        for (lane, slot) in slots.iter().enumerate() {
+            self.fill(self.nodes[index].children[lane], slot);
+        }
     }
+}
+
+/// The subtrees that become the children of one node: the largest inner one is opened until there are eight.
+fn opened(children: &[Binary; 2]) -> Vec<&Binary> {
+    let mut slots: Vec<&Binary> = children.iter().collect();
+    while slots.len() < 8 {
+        let mut largest: Option<(f32, usize, &[Binary; 2])> = None;
+        for (i, slot) in slots.iter().enumerate() {
+            if let BinaryKind::Inner(below) = &slot.kind {
+                let area = slot.bounds.half_area();
+                if largest.is_none_or(|(most, ..)| area > most) {
+                    largest = Some((area, i, below));
+                }
+            }
+        }
+        let Some((_, i, below)) = largest else { break };
+        slots[i] = &below[0];
+        slots.push(&below[1]);
+    }
+    slots
+}
+
+/// The rows of boxes of a node; those of unused lanes are empty.
+fn grown_bounds(slots: &[&Binary]) -> [[Vec4; 2]; 6] {
+    let mut lanes = [[f32::INFINITY; 8], [f32::NEG_INFINITY; 8]].map(|row| [row; 3]);
+    for (lane, slot) in slots.iter().enumerate() {
+        let (lo, hi) = (Vec3::from(slot.bounds.lo), Vec3::from(slot.bounds.hi));
+        let growth = lo.abs().max(hi.abs()).max_element() * BOX_GROWTH;
+        for axis in 0..3 {
+            lanes[0][axis][lane] = (lo[axis] - growth).next_down();
+            lanes[1][axis][lane] = (hi[axis] + growth).next_up();
+        }
+    }
+    std::array::from_fn(|r| {
+        let lanes = &lanes[r / 3][r % 3];
+        [Vec4::from_slice(&lanes[..4]), Vec4::from_slice(&lanes[4..])]
+    })
 }
