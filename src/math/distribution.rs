@@ -1,1 +1,277 @@
-//! (in progress)
+//! Piecewise-constant densities over [0, 1] and [0, 1]², sampled by inversion [Pharr et al. 2023, §A.4.7, §A.5.6].
+//!
+//! Sums are in f64; the tables are f32. A bin of value 0 is never sampled, a function that is 0 everywhere has no samples.
+
+use super::{ONE_MINUS_EPSILON, Vec2};
+
+/// A point sampled from a [`PiecewiseConstant1D`].
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Sample1D {
+    /// The point, in [0, 1).
+    pub x: f32,
+    /// Density at `x` per unit length.
+    pub pdf: f32,
+    /// The bin that holds `x`.
+    pub index: usize,
+}
+
+/// A point sampled from a [`PiecewiseConstant2D`].
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Sample2D {
+    /// The point, in [0, 1)².
+    pub p: Vec2,
+    /// Density at `p` per unit area of the square.
+    pub pdf: f32,
+}
+
+/// Index of the bin of `x` among `n`.
+#[inline]
+fn bin_of(x: f32, n: usize) -> usize {
+    ((x * n as f32) as usize).min(n - 1)
+}
+
+/// Writes the running integral of `values`, normalised to end at 1, into `cdf` (one longer); returns the integral.
+fn fill_cdf(values: &[f32], cdf: &mut [f32]) -> f64 {
+    let sum: f64 = values.iter().map(|&v| f64::from(v)).sum();
+    let mut running = 0.0_f64;
+    for (c, &v) in cdf.iter_mut().zip(values) {
+        *c = if sum > 0.0 { (running / sum) as f32 } else { 0.0 };
+        running += f64::from(v);
+    }
+    cdf[values.len()] = if sum > 0.0 { 1.0 } else { 0.0 };
+    sum / values.len() as f64
+}
+
+/// The bin i with cdf[i] <= u < cdf[i + 1] and the place of `u` in it; `cdf` ends at 1 and `u` is below 1.
+#[inline]
+fn invert_cdf(cdf: &[f32], u: f32) -> (f32, usize) {
+    let n = cdf.len() - 1;
+    let u = u.clamp(0.0, ONE_MINUS_EPSILON);
+    let i = cdf.partition_point(|&c| c <= u).clamp(1, n) - 1;
+    let mut x = (i as f32 + (u - cdf[i]) / (cdf[i + 1] - cdf[i])) / n as f32;
+    // Rounding must not carry the point into the next bin, whose value may be 0.
+    while bin_of(x, n) > i || x >= 1.0 {
+        x = x.next_down();
+    }
+    while bin_of(x, n) < i {
+        x = x.next_up();
+    }
+    (x, i)
+}
+
+/// The u that [`invert_cdf`] maps to `x`.
+#[inline]
+fn apply_cdf(cdf: &[f32], x: f32) -> f32 {
+    let n = cdf.len() - 1;
+    let i = bin_of(x, n);
+    let within = (x * n as f32 - i as f32).clamp(0.0, 1.0);
+    cdf[i] + within * (cdf[i + 1] - cdf[i])
+}
+
+/// Values that can be a density: negative and non-finite ones become 0.
+fn cleaned(values: &[f32]) -> Vec<f32> {
+    values.iter().map(|&v| if v.is_finite() { v.max(0.0) } else { 0.0 }).collect()
+}
+
+/// A density on [0, 1] that is constant in each of n equal bins.
+#[derive(Clone, Debug)]
+pub struct PiecewiseConstant1D {
+    values: Vec<f32>,
+    cdf: Vec<f32>,
+    integral: f32,
+}
+
+impl PiecewiseConstant1D {
+    /// The density proportional to `values` (at least one), which negative or non-finite ones enter as 0.
+    pub fn new(values: &[f32]) -> Self {
+        let values = if values.is_empty() { vec![0.0] } else { cleaned(values) };
+        let mut cdf = vec![0.0; values.len() + 1];
+        let integral = fill_cdf(&values, &mut cdf) as f32;
+        PiecewiseConstant1D { values, cdf, integral }
+    }
+
+    /// Integral of the unnormalised function over [0, 1], the mean of its values.
+    #[inline]
+    pub fn integral(&self) -> f32 {
+        self.integral
+    }
+
+    /// Number of bins.
+    #[inline]
+    pub fn len(&self) -> usize {
+        self.values.len()
+    }
+
+    /// False: there is always a bin.
+    #[inline]
+    pub fn is_empty(&self) -> bool {
+        false
+    }
+
+    /// The point of cumulative probability `u`; `None` if the function is 0.
+    #[inline]
+    pub fn sample(&self, u: f32) -> Option<Sample1D> {
+        if self.integral <= 0.0 {
+            return None;
+        }
+        let (x, index) = invert_cdf(&self.cdf, u);
+        Some(Sample1D { x, pdf: self.values[index] / self.integral, index })
+    }
+
+    /// Density at `x` in [0, 1].
+    #[inline]
+    pub fn pdf(&self, x: f32) -> f32 {
+        if self.integral <= 0.0 {
+            return 0.0;
+        }
+        self.values[bin_of(x, self.values.len())] / self.integral
+    }
+
+    /// Inverse of [`sample`](Self::sample); `None` if the function is 0.
+    #[inline]
+    pub fn invert(&self, x: f32) -> Option<f32> {
+        (self.integral > 0.0).then(|| apply_cdf(&self.cdf, x))
+    }
+}
+
+/// A density on [0, 1]² that is constant in each cell of a grid; x is chosen given y.
+#[derive(Clone, Debug)]
+pub struct PiecewiseConstant2D {
+    values: Vec<f32>,
+    conditional_cdf: Vec<f32>,
+    marginal: PiecewiseConstant1D,
+    width: usize,
+    height: usize,
+}
+
+impl PiecewiseConstant2D {
+    /// The density proportional to `values`, row-major from y = 0, of a grid `width` wide; rows that are not complete
+    /// are dropped. Negative or non-finite values enter as 0.
+    pub fn new(values: &[f32], width: usize) -> Self {
+        let width = width.max(1);
+        let height = (values.len() / width).max(1);
+        let mut values = cleaned(&values[..values.len() / width * width]);
+        values.resize(width * height, 0.0);
+        let mut conditional_cdf = vec![0.0; (width + 1) * height];
+        let row_integrals: Vec<f32> = values
+            .chunks_exact(width)
+            .zip(conditional_cdf.chunks_exact_mut(width + 1))
+            .map(|(row, cdf)| fill_cdf(row, cdf) as f32)
+            .collect();
+        let marginal = PiecewiseConstant1D::new(&row_integrals);
+        PiecewiseConstant2D { values, conditional_cdf, marginal, width, height }
+    }
+
+    /// Integral of the unnormalised function over the square, the mean of its values.
+    #[inline]
+    pub fn integral(&self) -> f32 {
+        self.marginal.integral
+    }
+
+    /// Cells in x and y.
+    #[inline]
+    pub fn resolution(&self) -> [usize; 2] {
+        [self.width, self.height]
+    }
+
+    #[inline]
+    fn row_cdf(&self, y: usize) -> &[f32] {
+        &self.conditional_cdf[y * (self.width + 1)..(y + 1) * (self.width + 1)]
+    }
+
+    /// The point of marginal cumulative probability `u[1]` in y and conditional `u[0]` in x; `None` if the function is 0.
+    #[inline]
+    pub fn sample(&self, u: [f32; 2]) -> Option<Sample2D> {
+        let row = self.marginal.sample(u[1])?;
+        let (x, column) = invert_cdf(self.row_cdf(row.index), u[0]);
+        let pdf = self.values[row.index * self.width + column] / self.marginal.integral;
+        (pdf > 0.0 && pdf.is_finite()).then_some(Sample2D { p: Vec2::new(x, row.x), pdf })
+    }
+
+    /// Density at `p` in [0, 1]² per unit area.
+    #[inline]
+    pub fn pdf(&self, p: Vec2) -> f32 {
+        if self.marginal.integral <= 0.0 {
+            return 0.0;
+        }
+        self.values[bin_of(p.y, self.height) * self.width + bin_of(p.x, self.width)] / self.marginal.integral
+    }
+
+    /// Inverse of [`sample`](Self::sample); `None` if the row of `p` cannot be sampled.
+    #[inline]
+    pub fn invert(&self, p: Vec2) -> Option<[f32; 2]> {
+        let row = bin_of(p.y, self.height);
+        if self.marginal.values[row] <= 0.0 {
+            return None;
+        }
+        Some([apply_cdf(self.row_cdf(row), p.x), self.marginal.invert(p.y)?])
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::math::hash::HashStream;
+    use crate::math::test_support::assert_chi_squared;
+
+    #[test]
+    fn samples_in_1d_follow_the_density_and_invert() {
+        let values = [0.0, 1.0, 0.5, 0.0, 0.0, 7.0, 0.0];
+        let d = PiecewiseConstant1D::new(&values);
+        assert!((d.integral() - 8.5 / 7.0).abs() < 1e-6);
+        let mut observed = vec![0.0; 70];
+        let mut stream = HashStream::new([1, 5, 0]);
+        for _ in 0..100_000 {
+            let u = stream.next_f32();
+            let s = d.sample(u).unwrap();
+            assert_eq!(s.pdf, d.pdf(s.x));
+            assert!(s.pdf > 0.0 && (d.invert(s.x).unwrap() - u).abs() < 2e-6);
+            observed[(s.x * 70.0) as usize] += 1.0;
+        }
+        let expected: Vec<f64> = (0..70).map(|i| f64::from(values[i / 10]) / 85.0 * 100_000.0).collect();
+        assert_chi_squared(&observed, &expected, 1e-4);
+    }
+
+    #[test]
+    fn samples_in_2d_follow_the_density_and_invert() {
+        let values = [0.0, 1.0, 2.0, 0.0, 0.0, 0.0, 4.0, 0.0, 0.5, 0.0, 0.0, 0.0];
+        let d = PiecewiseConstant2D::new(&values, 3);
+        let mut observed = vec![0.0; 12];
+        let mut stream = HashStream::new([2, 5, 0]);
+        for _ in 0..100_000 {
+            let u = stream.next_2d();
+            let s = d.sample(u).unwrap();
+            assert_eq!(s.pdf, d.pdf(s.p));
+            let v = d.invert(s.p).unwrap();
+            assert!((v[0] - u[0]).abs() < 2e-6 && (v[1] - u[1]).abs() < 2e-6);
+            observed[(s.p.y * 4.0) as usize * 3 + (s.p.x * 3.0) as usize] += 1.0;
+        }
+        let expected: Vec<f64> = values.iter().map(|&v| f64::from(v) / 7.5 * 100_000.0).collect();
+        assert_chi_squared(&observed, &expected, 1e-4);
+    }
+
+    #[test]
+    fn extreme_numbers_stay_in_bins_that_can_be_sampled() {
+        for n in [3, 7, 10, 49, 1000, 4097] {
+            for bright in [0, n / 2, n - 1] {
+                let mut values = vec![0.0; n];
+                values[bright] = 3.0;
+                let d = PiecewiseConstant1D::new(&values);
+                for u in [0.0, 1e-30, 1e-7, 0.5, 1.0 - 1e-7, ONE_MINUS_EPSILON, 1.0] {
+                    let s = d.sample(u).unwrap();
+                    assert!(d.pdf(s.x) > 0.0 && s.x < 1.0 && s.x >= 0.0, "{n} {bright} {u}");
+                }
+            }
+        }
+    }
+
+    #[test]
+    fn a_zero_function_has_no_samples() {
+        let d = PiecewiseConstant2D::new(&[0.0, f32::NAN, -1.0, 0.0], 2);
+        assert_eq!(d.sample([0.3, 0.4]), None);
+        assert_eq!(d.pdf(Vec2::splat(0.5)), 0.0);
+        assert_eq!(d.invert(Vec2::splat(0.5)), None);
+        assert_eq!(PiecewiseConstant1D::new(&[]).sample(0.1), None);
+        assert_eq!(PiecewiseConstant2D::new(&[], 0).sample([0.1, 0.1]), None);
+    }
+}

@@ -15,10 +15,14 @@ pub mod hash;
 pub mod ray;
 pub mod rgb;
 pub mod sphere_map;
+#[cfg(test)]
+pub(crate) mod test_support;
 pub mod transform;
 pub mod warp;
 
+pub use alias::{AliasTable, DiscreteSample};
 pub use bounds::Bounds3;
+pub use distribution::{PiecewiseConstant1D, PiecewiseConstant2D, Sample1D, Sample2D};
 pub use frame::Frame;
 pub use glam::{Affine3A, Mat3, Mat3A, Mat4, Quat, Vec2, Vec3, Vec3A, Vec4};
 pub use ray::Ray;
