@@ -1,1 +1,264 @@
-//! (in progress)
+//! Lights: what they emit, how directions to them are sampled, and how one of many is chosen.
+//!
+//! Reading order: [`point`], [`spot`], [`area`], [`environment`], [`bounds`], [`tree`], [`select`], [`set`].
+
+pub mod area;
+pub mod bounds;
+pub mod environment;
+pub mod point;
+pub mod select;
+pub mod set;
+pub mod spot;
+pub mod tree;
+
+#[cfg(test)]
+mod light_tests;
+
+pub use area::{AreaLight, AreaShape, Emission, EmissionImage, area_lights_of};
+pub use bounds::LightBounds;
+pub use environment::{EnvironmentFilter, EnvironmentMap, EnvironmentMapping};
+pub use select::{LightChoice, LightSampler, LightSamplerKind};
+pub use set::{LightSet, LightSetBuilder};
+pub use tree::LightTree;
+
+use crate::math::{Affine3A, Bounds3, Mat3, Rgb, Vec2, Vec3};
+use std::f32::consts::PI;
+use std::sync::Arc;
+
+/// Index into [`LightSet::lights`].
+pub type LightId = u32;
+
+/// The point that is lit.
+#[derive(Clone, Copy, Debug)]
+pub struct LightCtx {
+    /// Position.
+    pub p: Vec3,
+    /// Geometric normal, unit; zero if there is none.
+    pub n: Vec3,
+    /// Shading normal, unit; zero if there is none.
+    pub ns: Vec3,
+}
+
+impl LightCtx {
+    /// A point without a surface.
+    #[inline]
+    pub fn at(p: Vec3) -> Self {
+        LightCtx { p, n: Vec3::ZERO, ns: Vec3::ZERO }
+    }
+}
+
+/// A direction sampled towards a light.
+#[derive(Clone, Copy, Debug)]
+pub struct LightSample {
+    /// Radiance that arrives if nothing is between. It may be black where a light has dark parts.
+    /// For delta lights it is the weight of the delta, with `pdf` 1.
+    pub li: Rgb,
+    /// Unit direction to the light.
+    pub wi: Vec3,
+    /// Density per steradian; 1 for delta lights; positive and finite.
+    pub pdf: f32,
+    /// Distance along `wi` to the light; infinite for infinite lights.
+    pub t: f32,
+    /// The point on the light; unused for infinite lights.
+    pub p: Vec3,
+    /// Normal of the light at `p` on its emitting side; zero for lights without a surface.
+    pub n: Vec3,
+    /// Bound of the rounding error of `p` per axis; zero for infinite lights.
+    pub p_error: Vec3,
+    /// True if no other technique can find this direction.
+    pub is_delta: bool,
+}
+
+/// Where a ray in direction wi has hit a light.
+#[derive(Clone, Copy, Debug)]
+pub struct LightHit {
+    /// Distance.
+    pub t: f32,
+    /// The point on the light.
+    pub p: Vec3,
+    /// Geometric normal there, unit, as oriented by the shape.
+    pub n: Vec3,
+    /// Texture coordinates there.
+    pub uv: Vec2,
+}
+
+impl LightHit {
+    /// The "hit" of an infinite light.
+    pub const INFINITE: LightHit = LightHit { t: f32::INFINITY, p: Vec3::ZERO, n: Vec3::ZERO, uv: Vec2::ZERO };
+}
+
+/// A source of light.
+#[derive(Clone, Debug)]
+pub enum Light {
+    /// Emits from a point, the same in all directions.
+    Point {
+        /// Position.
+        p: Vec3,
+        /// Radiant intensity (radiance times area).
+        intensity: Rgb,
+    },
+    /// Emits from a point into a cone; see [`spot::spot_falloff`].
+    Spot {
+        /// Position.
+        p: Vec3,
+        /// Unit axis of the cone.
+        axis: Vec3,
+        /// Cosine of the half-angle beyond which it is dark.
+        cos_total: f32,
+        /// Cosine of the half-angle up to which it is brightest.
+        cos_falloff_start: f32,
+        /// Radiant intensity on the axis.
+        intensity: Rgb,
+    },
+    /// Parallel light from infinity.
+    Distant {
+        /// Unit direction to the light.
+        wi_world: Vec3,
+        /// Irradiance on a surface that faces it.
+        l: Rgb,
+    },
+    /// An emitting surface.
+    Area(AreaLight),
+    /// The same radiance from everywhere.
+    InfiniteConstant {
+        /// Radiance.
+        l: Rgb,
+    },
+    /// Radiance from everywhere by an image.
+    InfiniteImage {
+        /// The image.
+        map: Arc<EnvironmentMap>,
+        /// Orthogonal map of directions; see [`Light::infinite_image`].
+        world_from_light: Mat3,
+        /// Factor of the image's radiance.
+        scale: f32,
+    },
+}
+
+impl Light {
+    /// An environment light. Of `world_from_light` only the rotation (with a possible mirror) is used.
+    pub fn infinite_image(map: Arc<EnvironmentMap>, world_from_light: &Affine3A, scale: f32) -> Self {
+        let m = &world_from_light.matrix3;
+        let x = Vec3::from(m.x_axis).normalize_or(Vec3::X);
+        let (y0, z0) = (Vec3::from(m.y_axis), Vec3::from(m.z_axis));
+        let y = (y0 - x * x.dot(y0)).normalize_or(x.any_orthonormal_vector());
+        let z = x.cross(y);
+        let z = if z.dot(z0) < 0.0 { -z } else { z };
+        Light::InfiniteImage { map, world_from_light: Mat3::from_cols(x, y, z), scale }
+    }
+
+    /// Samples a direction towards the light; `None` if no direction is lit by it.
+    #[inline]
+    pub fn sample_li(&self, ctx: &LightCtx, u: [f32; 2]) -> Option<LightSample> {
+        match self {
+            Light::Point { p, intensity } => point::sample_li_from(*p, ctx, |_| *intensity),
+            Light::Spot { p, axis, cos_total, cos_falloff_start, intensity } => point::sample_li_from(*p, ctx, |w| {
+                *intensity * spot::spot_falloff(w.dot(*axis), *cos_total, *cos_falloff_start)
+            }),
+            Light::Distant { wi_world, l } => {
+                let s = environment::infinite_sample(*wi_world, *l, 1.0);
+                (!l.is_black()).then_some(LightSample { is_delta: true, ..s })
+            }
+            Light::Area(area) => area.sample_li(ctx, u),
+            Light::InfiniteConstant { l } => {
+                let wi = crate::math::warp::sample_uniform_sphere(u);
+                (!l.is_black()).then(|| environment::infinite_sample(wi, *l, crate::math::warp::pdf_uniform_sphere()))
+            }
+            Light::InfiniteImage { map, world_from_light, scale } => {
+                let s = map.sample(u)?;
+                Some(environment::infinite_sample(*world_from_light * s.w, s.le * *scale, s.pdf))
+            }
+        }
+    }
+
+    /// Density per steradian of [`sample_li`](Self::sample_li) in the direction `wi`, which hits this light at `hit`.
+    /// 0 for delta lights.
+    #[inline]
+    pub fn pdf_li(&self, ctx: &LightCtx, wi: Vec3, hit: &LightHit) -> f32 {
+        match self {
+            Light::Point { .. } | Light::Spot { .. } | Light::Distant { .. } => 0.0,
+            Light::Area(area) => area.pdf_li(ctx, wi, hit),
+            Light::InfiniteConstant { l } => {
+                if l.is_black() {
+                    0.0
+                } else {
+                    crate::math::warp::pdf_uniform_sphere()
+                }
+            }
+            Light::InfiniteImage { map, world_from_light, .. } => map.pdf(world_from_light.transpose() * wi),
+        }
+    }
+
+    /// Radiance that leaves the surface of an area light at `hit` in direction `w`; black for all others.
+    #[inline]
+    pub fn l(&self, hit: &LightHit, w: Vec3) -> Rgb {
+        match self {
+            Light::Area(area) => area.l(hit, w),
+            Light::Point { .. }
+            | Light::Spot { .. }
+            | Light::Distant { .. }
+            | Light::InfiniteConstant { .. }
+            | Light::InfiniteImage { .. } => Rgb::BLACK,
+        }
+    }
+
+    /// Radiance that an infinite light sends along a ray which leaves the scene in unit direction `w`; black for all
+    /// others.
+    #[inline]
+    pub fn le(&self, w: Vec3) -> Rgb {
+        match self {
+            Light::InfiniteConstant { l } => *l,
+            Light::InfiniteImage { map, world_from_light, scale } => map.le(world_from_light.transpose() * w) * *scale,
+            Light::Point { .. } | Light::Spot { .. } | Light::Distant { .. } | Light::Area(_) => Rgb::BLACK,
+        }
+    }
+
+    /// Luminance of the emitted power. Of an infinite light, the power that reaches a disk of the scene's radius from
+    /// all directions.
+    pub fn phi(&self, scene_radius: f32) -> f32 {
+        let disk = PI * scene_radius * scene_radius;
+        let phi = match self {
+            Light::Point { intensity, .. } => 4.0 * PI * intensity.luminance(),
+            Light::Spot { cos_total, cos_falloff_start, intensity, .. } => {
+                intensity.luminance() * spot::spot_solid_angle(*cos_total, *cos_falloff_start)
+            }
+            Light::Distant { l, .. } => l.luminance() * disk,
+            Light::Area(area) => area.phi(),
+            Light::InfiniteConstant { l } => 4.0 * PI * l.luminance() * disk,
+            Light::InfiniteImage { map, scale, .. } => map.luminance_integral() * *scale * disk,
+        };
+        if phi.is_finite() { phi.max(0.0) } else { 0.0 }
+    }
+
+    /// True for lights at infinity, which have no place in the light tree.
+    #[inline]
+    pub fn is_infinite(&self) -> bool {
+        match self {
+            Light::Distant { .. } | Light::InfiniteConstant { .. } | Light::InfiniteImage { .. } => true,
+            Light::Point { .. } | Light::Spot { .. } | Light::Area(_) => false,
+        }
+    }
+
+    /// Bounds for the light tree; `None` for lights at infinity and for lights that emit nothing.
+    pub fn bounds(&self) -> Option<LightBounds> {
+        let at = |p: Vec3, axis, cos_theta_o, cos_theta_e, intensity: Rgb| LightBounds {
+            bounds: Bounds3 { min: p, max: p },
+            axis,
+            cos_theta_o,
+            cos_theta_e,
+            two_sided: false,
+            intensity: intensity.luminance(),
+        };
+        let bounds = match self {
+            Light::Point { p, intensity } => at(*p, Vec3::Z, -1.0, 0.0, *intensity),
+            Light::Spot { p, axis, cos_total, cos_falloff_start, intensity } => {
+                // The falloff ends cos⁻¹(cos_total) − cos⁻¹(cos_falloff_start) beyond the inner cone.
+                let theta_e = (cos_total.acos() - cos_falloff_start.acos()).max(0.0);
+                at(*p, *axis, *cos_falloff_start, theta_e.cos(), *intensity)
+            }
+            Light::Area(area) => area.bounds(),
+            Light::Distant { .. } | Light::InfiniteConstant { .. } | Light::InfiniteImage { .. } => return None,
+        };
+        (bounds.intensity > 0.0 && bounds.intensity.is_finite()).then_some(bounds)
+    }
+}

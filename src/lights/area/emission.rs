@@ -1,0 +1,103 @@
+//! What the surface of an area light emits.
+
+use crate::math::{Rgb, Vec2, Vec3};
+use std::sync::Arc;
+
+/// Emission of a surface.
+#[derive(Clone, Debug)]
+pub struct Emission {
+    /// Radiance, scale included; a factor of the image if there is one.
+    pub l: Rgb,
+    /// True if both sides emit; else the side of the geometric normal.
+    pub two_sided: bool,
+    /// Radiance over the texture coordinates.
+    pub image: Option<Arc<EmissionImage>>,
+}
+
+impl Emission {
+    /// The same radiance everywhere, on the side of the normal.
+    pub fn constant(l: Rgb) -> Self {
+        Emission { l, two_sided: false, image: None }
+    }
+
+    /// Radiance at `uv` in direction `w`, where the normal is `n`.
+    #[inline]
+    pub fn l(&self, n: Vec3, uv: Vec2, w: Vec3) -> Rgb {
+        if !self.two_sided && n.dot(w) <= 0.0 {
+            return Rgb::BLACK;
+        }
+        match &self.image {
+            None => self.l,
+            Some(image) => self.l * image.lookup(uv),
+        }
+    }
+
+    /// Luminance of the radiance, averaged over the image.
+    pub fn mean_luminance(&self) -> f32 {
+        let mean = self.image.as_ref().map_or(self.l, |image| self.l * image.mean);
+        let luminance = mean.luminance();
+        if luminance.is_finite() { luminance.max(0.0) } else { 0.0 }
+    }
+}
+
+/// A linear RGB image that an area light emits; v = 0 is its last row, as in pbrt-v4.
+#[derive(Clone, Debug)]
+pub struct EmissionImage {
+    width: usize,
+    height: usize,
+    data: Vec<Rgb>,
+    mean: Rgb,
+}
+
+impl EmissionImage {
+    /// An image of rows from the top; `Err` with a message if the sizes do not fit. Negative and non-finite values
+    /// become 0.
+    pub fn new(width: usize, height: usize, data: Vec<Rgb>) -> Result<Self, String> {
+        if width == 0 || height == 0 || data.len() != width * height {
+            return Err(format!("an emission image of {width}×{height} has {} pixels", data.len()));
+        }
+        let data: Vec<Rgb> = data.into_iter().map(super::super::environment::cleaned).collect();
+        let mut sums = [0.0_f64; 3];
+        for c in &data {
+            for (sum, x) in sums.iter_mut().zip(c.to_array()) {
+                *sum += f64::from(x);
+            }
+        }
+        let mean = Rgb::from_array(sums.map(|s| (s / data.len() as f64) as f32));
+        Ok(EmissionImage { width, height, data, mean })
+    }
+
+    /// Bilinear lookup at `uv`, clamped at the edges.
+    pub fn lookup(&self, uv: Vec2) -> Rgb {
+        let x = (uv.x * self.width as f32 - 0.5).clamp(-1.0, self.width as f32);
+        let y = ((1.0 - uv.y) * self.height as f32 - 0.5).clamp(-1.0, self.height as f32);
+        let (x0, y0) = (x.floor(), y.floor());
+        let texel = |x: f32, y: f32| {
+            let column = (x.max(0.0) as usize).min(self.width - 1);
+            let row = (y.max(0.0) as usize).min(self.height - 1);
+            self.data[row * self.width + column]
+        };
+        let (dx, dy) = (x - x0, y - y0);
+        let top = texel(x0, y0).lerp(texel(x0 + 1.0, y0), dx);
+        let bottom = texel(x0, y0 + 1.0).lerp(texel(x0 + 1.0, y0 + 1.0), dx);
+        top.lerp(bottom, dy)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn images_are_looked_up_from_the_bottom_and_clamped() {
+        let data = [1.0, 2.0, 3.0, 4.0].map(Rgb::splat).to_vec();
+        let image = EmissionImage::new(2, 2, data).unwrap();
+        let at = |u, v| image.lookup(Vec2::new(u, v)).r;
+        assert_eq!((at(0.25, 0.75), at(0.75, 0.75), at(0.25, 0.25), at(0.75, 0.25)), (1.0, 2.0, 3.0, 4.0));
+        assert_eq!((at(-5.0, 9.0), at(7.0, -3.0), at(0.5, 0.5)), (1.0, 4.0, 2.5));
+        assert!(EmissionImage::new(2, 2, vec![Rgb::WHITE; 3]).is_err());
+        let emission = Emission { l: Rgb::splat(2.0), two_sided: false, image: Some(Arc::new(image)) };
+        assert!((emission.mean_luminance() - 5.0).abs() < 1e-5);
+        assert!(emission.l(Vec3::Z, Vec2::ZERO, -Vec3::Z).is_black());
+    }
+}

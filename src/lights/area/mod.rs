@@ -1,0 +1,190 @@
+//! Area lights: surfaces that emit the same radiance in all directions of one side, or of both.
+//!
+//! | shape | density of `sample_li` |
+//! |---|---|
+//! | [`triangle`] | uniform in area |
+//! | [`rectangle`] | uniform in solid angle; in area where that is small or ill-conditioned |
+//! | [`quadric`] sphere, full and uniformly scaled | uniform in its cone; in area from inside |
+//! | [`quadric`] others | uniform in the area of the local quadric |
+//! | [`patch`] | uniform in (u, v) |
+//!
+//! A light has its own copy of its geometry, in world space.
+
+pub mod build;
+pub mod emission;
+pub mod patch;
+pub mod quadric;
+pub mod rectangle;
+pub mod triangle;
+
+pub use build::{AreaLights, area_lights_of};
+pub use emission::{Emission, EmissionImage};
+pub use patch::PatchLight;
+pub use quadric::QuadricLight;
+pub use rectangle::RectangleLight;
+pub use triangle::TriangleLight;
+
+use super::{LightBounds, LightCtx, LightHit, LightSample};
+use crate::math::{Rgb, Vec2, Vec3};
+use std::f32::consts::PI;
+
+/// The surface of an area light.
+#[derive(Clone, Debug)]
+pub enum AreaShape {
+    /// One triangle.
+    Triangle(TriangleLight),
+    /// A rectangle: two triangles, or a bilinear patch.
+    Rectangle(RectangleLight),
+    /// Sphere, disk or cylinder.
+    Quadric(Box<QuadricLight>),
+    /// A bilinear patch.
+    Patch(Box<PatchLight>),
+}
+
+/// An emitting surface.
+#[derive(Clone, Debug)]
+pub struct AreaLight {
+    /// The surface.
+    pub shape: AreaShape,
+    /// What it emits.
+    pub emission: Emission,
+    /// First primitive of its geometry that belongs to it.
+    pub primitive: u32,
+}
+
+/// A point sampled on a shape, and the direction to it.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct ShapeSample {
+    p: Vec3,
+    n: Vec3,
+    p_error: Vec3,
+    wi: Vec3,
+    t: f32,
+    pdf: f32,
+}
+
+impl ShapeSample {
+    /// From a density per area at `p`: pdf = pdf_area·t²/|cos θ|.
+    #[inline]
+    fn by_area(from: Vec3, p: Vec3, n: Vec3, p_error: Vec3, pdf_area: f32) -> Option<Self> {
+        let d = p - from;
+        let t2 = d.length_squared();
+        let t = t2.sqrt();
+        let wi = d / t;
+        let pdf = pdf_area * t2 / n.dot(wi).abs();
+        (pdf > 0.0 && pdf.is_finite()).then_some(ShapeSample { p, n, p_error, wi, t, pdf })
+    }
+}
+
+/// Density per steradian of a density per area at `p`, seen from `from`; 0 where it is not defined.
+#[inline]
+fn pdf_by_area(from: Vec3, p: Vec3, n: Vec3, pdf_area: f32) -> f32 {
+    let d = p - from;
+    let t2 = d.length_squared();
+    let pdf = pdf_area * t2 * t2.sqrt() / n.dot(d).abs();
+    if pdf.is_finite() { pdf } else { 0.0 }
+}
+
+impl AreaLight {
+    /// Samples a direction to the surface. `None` if the point is behind a flat one-sided light or the geometry is
+    /// degenerate; a sample on the dark side of a curved light has black `li`.
+    #[inline]
+    pub fn sample_li(&self, ctx: &LightCtx, u: [f32; 2]) -> Option<LightSample> {
+        if self.is_dark_from(ctx.p) {
+            return None;
+        }
+        let s = match &self.shape {
+            AreaShape::Triangle(triangle) => triangle.sample(ctx.p, u),
+            AreaShape::Rectangle(rectangle) => rectangle.sample(ctx.p, u),
+            AreaShape::Quadric(quadric) => quadric.sample(ctx.p, u),
+            AreaShape::Patch(patch) => patch.sample(ctx.p, u),
+        }?;
+        let uv = if self.emission.image.is_some() { self.uv(s.p) } else { Vec2::ZERO };
+        let li = self.emission.l(s.n, uv, -s.wi);
+        let ShapeSample { p, n, p_error, wi, t, pdf } = s;
+        Some(LightSample { li, wi, pdf, t, p, n, p_error, is_delta: false })
+    }
+
+    /// Density per steradian of [`sample_li`](Self::sample_li) at the point `hit`. Of a surface that a ray can cross
+    /// more than once, this is the density of that point alone.
+    #[inline]
+    pub fn pdf_li(&self, ctx: &LightCtx, _wi: Vec3, hit: &LightHit) -> f32 {
+        if self.is_dark_from(ctx.p) {
+            return 0.0;
+        }
+        match &self.shape {
+            AreaShape::Triangle(triangle) => triangle.pdf(ctx.p, hit.p),
+            AreaShape::Rectangle(rectangle) => rectangle.pdf(ctx.p, hit.p),
+            AreaShape::Quadric(quadric) => quadric.pdf(ctx.p, hit.p),
+            AreaShape::Patch(patch) => patch.pdf(ctx.p, hit.p),
+        }
+    }
+
+    /// Radiance that leaves the point `hit` in direction `w`. Which side a flat light emits from is read from the
+    /// light itself, so that both techniques agree; curved ones use the normal of the hit.
+    #[inline]
+    pub fn l(&self, hit: &LightHit, w: Vec3) -> Rgb {
+        let n = match &self.shape {
+            AreaShape::Triangle(triangle) => triangle.n,
+            AreaShape::Rectangle(rectangle) => rectangle.n,
+            AreaShape::Quadric(_) | AreaShape::Patch(_) => hit.n,
+        };
+        self.emission.l(n, hit.uv, w)
+    }
+
+    /// Luminance of the emitted power, π·A·L, twice that of a two-sided light.
+    pub fn phi(&self) -> f32 {
+        let sides = if self.emission.two_sided { 2.0 } else { 1.0 };
+        PI * self.area() * self.emission.mean_luminance() * sides
+    }
+
+    /// Area of the surface.
+    pub fn area(&self) -> f32 {
+        match &self.shape {
+            AreaShape::Triangle(triangle) => triangle.area,
+            AreaShape::Rectangle(rectangle) => rectangle.area(),
+            AreaShape::Quadric(quadric) => quadric.area,
+            AreaShape::Patch(patch) => patch.area,
+        }
+    }
+
+    /// Bounds for the light tree.
+    pub fn bounds(&self) -> LightBounds {
+        let (bounds, axis, cos_theta_o, projected_area) = match &self.shape {
+            AreaShape::Triangle(t) => (t.bounds(), t.n, 1.0, t.area),
+            AreaShape::Rectangle(r) => (r.bounds(), r.n, 1.0, r.area()),
+            AreaShape::Quadric(q) => q.emission_bounds(),
+            AreaShape::Patch(p) => (p.bounds(), p.cone_axis, p.cos_cone, p.area),
+        };
+        LightBounds {
+            bounds,
+            axis,
+            cos_theta_o,
+            cos_theta_e: 0.0,
+            two_sided: self.emission.two_sided,
+            intensity: projected_area * self.emission.mean_luminance(),
+        }
+    }
+
+    /// True if the light is one-sided and nothing of its emitting side can be seen from `p`.
+    #[inline]
+    fn is_dark_from(&self, p: Vec3) -> bool {
+        !self.emission.two_sided
+            && match &self.shape {
+                AreaShape::Triangle(triangle) => triangle.n.dot(p - triangle.p[0]) <= 0.0,
+                AreaShape::Rectangle(rectangle) => rectangle.n.dot(p - rectangle.corner) <= 0.0,
+                AreaShape::Quadric(quadric) => quadric.is_behind(p),
+                AreaShape::Patch(_) => false,
+            }
+    }
+
+    /// Texture coordinates of the point `p` of the surface.
+    fn uv(&self, p: Vec3) -> Vec2 {
+        match &self.shape {
+            AreaShape::Triangle(triangle) => triangle.uv(p),
+            AreaShape::Rectangle(rectangle) => rectangle.uv(p),
+            AreaShape::Quadric(quadric) => quadric.uv(p),
+            AreaShape::Patch(patch) => patch.uv(p),
+        }
+    }
+}

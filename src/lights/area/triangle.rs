@@ -1,0 +1,55 @@
+//! Triangles, sampled uniformly in area.
+
+use super::{ShapeSample, pdf_by_area};
+use crate::math::warp::sample_uniform_triangle;
+use crate::math::{Bounds3, Vec2, Vec3, gamma};
+
+/// A triangle that emits.
+#[derive(Clone, Debug)]
+pub struct TriangleLight {
+    /// Corners.
+    pub p: [Vec3; 3],
+    /// Unit normal of the emitting side; zero if the triangle has no area.
+    pub n: Vec3,
+    /// Area.
+    pub area: f32,
+    /// Texture coordinates of the corners.
+    pub uvs: [Vec2; 3],
+}
+
+impl TriangleLight {
+    /// A triangle whose emitting side sees its corners counter-clockwise, or clockwise if `flip_normal`.
+    pub fn new(p: [Vec3; 3], flip_normal: bool, uvs: [Vec2; 3]) -> Self {
+        let [a, b, c] = p.map(|p| p.as_dvec3());
+        let cross = (b - a).cross(c - a);
+        let n = cross.normalize_or_zero().as_vec3();
+        TriangleLight { p, n: if flip_normal { -n } else { n }, area: (0.5 * cross.length()) as f32, uvs }
+    }
+
+    #[inline]
+    pub(super) fn sample(&self, from: Vec3, u: [f32; 2]) -> Option<ShapeSample> {
+        let [b0, b1] = sample_uniform_triangle(u);
+        let parts = [self.p[0] * b0, self.p[1] * b1, self.p[2] * (1.0 - b0 - b1)];
+        let p_error = (parts[0].abs() + parts[1].abs() + parts[2].abs()) * gamma(6);
+        ShapeSample::by_area(from, parts[0] + parts[1] + parts[2], self.n, p_error, 1.0 / self.area)
+    }
+
+    #[inline]
+    pub(super) fn pdf(&self, from: Vec3, p: Vec3) -> f32 {
+        pdf_by_area(from, p, self.n, 1.0 / self.area)
+    }
+
+    pub(super) fn bounds(&self) -> Bounds3 {
+        Bounds3::from_points(self.p)
+    }
+
+    pub(super) fn uv(&self, p: Vec3) -> Vec2 {
+        // Least squares for p − p0 = b1·e1 + b2·e2.
+        let (e1, e2, d) = (self.p[1] - self.p[0], self.p[2] - self.p[0], p - self.p[0]);
+        let (a, b, c) = (e1.dot(e1), e1.dot(e2), e2.dot(e2));
+        let determinant = a * c - b * b;
+        let (x, y) = (d.dot(e1), d.dot(e2));
+        let (b1, b2) = ((c * x - b * y) / determinant, (a * y - b * x) / determinant);
+        self.uvs[0] * (1.0 - b1 - b2) + self.uvs[1] * b1 + self.uvs[2] * b2
+    }
+}

@@ -1,0 +1,158 @@
+//! Bounds of emission: where lights are, where they point, how bright they are [Conty Estévez and Kulla 2018].
+//!
+//! A cone of half-angle θo about the axis holds all normals; emission leaves within θe of a normal.
+
+use crate::math::{Bounds3, Vec3, safe_sqrt};
+use std::f32::consts::{FRAC_PI_2, PI};
+
+/// Bounds of the emission of a set of lights.
+#[derive(Clone, Copy, Debug)]
+pub struct LightBounds {
+    /// Where they are.
+    pub bounds: Bounds3,
+    /// Unit axis of the cone of normals.
+    pub axis: Vec3,
+    /// Cosine of its half-angle θo.
+    pub cos_theta_o: f32,
+    /// Cosine of the angle θe from a normal up to which light is emitted.
+    pub cos_theta_e: f32,
+    /// True if they emit along the reversed normals too.
+    pub two_sided: bool,
+    /// Sum of the luminances of their greatest radiant intensities.
+    pub intensity: f32,
+}
+
+impl LightBounds {
+    /// The bounds of nothing.
+    pub const EMPTY: LightBounds = LightBounds {
+        bounds: Bounds3::EMPTY,
+        axis: Vec3::Z,
+        cos_theta_o: 1.0,
+        cos_theta_e: 1.0,
+        two_sided: false,
+        intensity: 0.0,
+    };
+
+    /// Bounds of both sets.
+    #[must_use]
+    pub fn union(&self, other: &LightBounds) -> LightBounds {
+        if self.intensity <= 0.0 {
+            return *other;
+        }
+        if other.intensity <= 0.0 {
+            return *self;
+        }
+        // The axis of a two-sided light has no sign.
+        let flip = self.two_sided && other.two_sided && self.axis.dot(other.axis) < 0.0;
+        let other_axis = if flip { -other.axis } else { other.axis };
+        let (axis, cos_theta_o) = union_cones((self.axis, self.cos_theta_o), (other_axis, other.cos_theta_o));
+        LightBounds {
+            bounds: self.bounds.union(other.bounds),
+            axis,
+            cos_theta_o,
+            cos_theta_e: self.cos_theta_e.min(other.cos_theta_e),
+            two_sided: self.two_sided || other.two_sided,
+            intensity: self.intensity + other.intensity,
+        }
+    }
+
+    /// M_Ω of the surface-area orientation heuristic: ∫ over directions of the cosine, outside the cone of normals,
+    /// up to θo + θe.
+    pub fn orientation_measure(&self) -> f32 {
+        let theta_o = self.cos_theta_o.clamp(-1.0, 1.0).acos();
+        let theta_w = (theta_o + self.cos_theta_e.clamp(-1.0, 1.0).acos()).min(PI);
+        let sin_o = safe_sqrt(1.0 - self.cos_theta_o * self.cos_theta_o);
+        let edge = 2.0 * theta_w * sin_o - (theta_o - 2.0 * theta_w).cos() - 2.0 * theta_o * sin_o + self.cos_theta_o;
+        2.0 * PI * (1.0 - self.cos_theta_o) + FRAC_PI_2 * edge
+    }
+
+    /// The heuristic's cost of a cluster. A little of the squared diagonal is added to the area, so that lights on a
+    /// line are told apart as well.
+    pub fn cost(&self) -> f32 {
+        if self.intensity <= 0.0 {
+            return 0.0;
+        }
+        let extent = self.bounds.half_area() + 0.01 * self.bounds.diagonal().length_squared();
+        self.intensity * self.orientation_measure() * extent
+    }
+}
+
+/// The angle between unit vectors, accurate for all angles.
+fn angle_between(a: Vec3, b: Vec3) -> f32 {
+    2.0 * (a - b).length().atan2((a + b).length())
+}
+
+/// A cone (axis, cosine of the half-angle) about two cones, a little wider than necessary against rounding.
+pub(super) fn union_cones(a: (Vec3, f32), b: (Vec3, f32)) -> (Vec3, f32) {
+    const SPHERE: (Vec3, f32) = (Vec3::Z, -1.0);
+    if a.1 <= -1.0 || b.1 <= -1.0 {
+        return SPHERE;
+    }
+    // One may hold the other.
+    let (theta_a, theta_b) = (a.1.clamp(-1.0, 1.0).acos(), b.1.clamp(-1.0, 1.0).acos());
+    let theta_d = angle_between(a.0, b.0);
+    if theta_d + theta_b <= theta_a {
+        return a;
+    }
+    if theta_d + theta_a <= theta_b {
+        return b;
+    }
+
+    // Turn the axis of `a` towards that of `b` until the cone touches the far side of both.
+    let theta_o = 0.5 * (theta_a + theta_d + theta_b) + 1e-5;
+    if theta_o >= PI {
+        return SPHERE;
+    }
+    let difference = b.0 - a.0 * a.0.dot(b.0);
+    if difference.length_squared() <= 1e-8 {
+        // Parallel axes: widen one cone. Opposite ones have no preferred turn.
+        let widened = theta_d + theta_a.max(theta_b) + 1e-5;
+        return if a.0.dot(b.0) > 0.0 && widened < PI { (a.0, widened.cos()) } else { SPHERE };
+    }
+    // Twice, as the first difference of nearly parallel axes is not perpendicular but for rounding.
+    let towards_b = difference.normalize();
+    let towards_b = (towards_b - a.0 * a.0.dot(towards_b)).normalize();
+    let (sin, cos) = (theta_o - theta_a).sin_cos();
+    let axis = (a.0 * cos + towards_b * sin).normalize_or_zero();
+    if axis == Vec3::ZERO || !axis.is_finite() { SPHERE } else { (axis, theta_o.cos()) }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::math::hash::HashStream;
+    use crate::math::warp::{sample_uniform_cone, sample_uniform_sphere};
+    use crate::math::{Frame, ONE_MINUS_EPSILON};
+
+    #[test]
+    fn the_union_of_cones_holds_both() {
+        let mut stream = HashStream::new([1, 1, 2]);
+        for i in 0..20_000 {
+            let mut cone = || (sample_uniform_sphere(stream.next_2d()), 1.0 - 2.0 * stream.next_f32().powi(3));
+            let a = cone();
+            let b = match i % 6 {
+                0 => (a.0, cone().1),
+                1 => (-a.0, cone().1),
+                2 => ((a.0 + cone().0 * 1e-4).normalize(), 1.0),
+                3 => ((cone().0 * 1e-4 - a.0).normalize(), a.1),
+                _ => cone(),
+            };
+            let (axis, cos) = union_cones(a, b);
+            assert!(axis.is_finite() && (axis.length() - 1.0).abs() < 1e-5 && cos.is_finite());
+            for c in [a, b] {
+                let edge = sample_uniform_cone([ONE_MINUS_EPSILON, stream.next_f32()], 1.0 - c.1);
+                let w = Frame::from_z(c.0).to_world(edge);
+                assert!(w.dot(axis) >= cos - 2e-6, "{a:?} {b:?} -> {axis} {cos}");
+            }
+        }
+    }
+
+    #[test]
+    fn orientation_measure_of_known_cones() {
+        let measure =
+            |o: f32, e: f32| LightBounds { cos_theta_o: o, cos_theta_e: e, ..LightBounds::EMPTY }.orientation_measure();
+        assert!((measure(-1.0, 0.0) - 4.0 * PI).abs() < 1e-4);
+        assert!((measure(1.0, 0.0) - PI).abs() < 1e-5);
+        assert!(measure(1.0, 1.0).abs() < 1e-5);
+    }
+}

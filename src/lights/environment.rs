@@ -1,0 +1,399 @@
+//! Environment maps: radiance from all directions by an image, sampled in proportion to it.
+//!
+//! The image covers the unit square, which [`EnvironmentMapping`] maps to directions. The density is constant per texel
+//! and proportional to the mean of the looked-up luminance over the texel (times the solid angle of its row for
+//! latitude-longitude images): for bilinear lookups that is the image smoothed by [1/8, 6/8, 1/8] in both axes, which is
+//! positive wherever a lookup is. Per steradian it is pdf(u, v)/4π for equal-area images, and pdf(u, v)/(2π² sin θ) for
+//! latitude-longitude images.
+
+use super::LightSample;
+use crate::math::sphere_map::{
+    equal_area_sphere_to_square, equal_area_square_to_sphere, lat_long_to_sphere, pdf_equal_area_square_to_sphere,
+    pdf_lat_long_to_sphere, sphere_to_lat_long, wrap_equal_area_texel,
+};
+use crate::math::{PiecewiseConstant2D, Rgb, Vec2, Vec3};
+use std::f64::consts::PI;
+
+/// How the unit square covers the sphere; z is up in the space of the light.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum EnvironmentMapping {
+    /// Equal-area octahedral map of a square image [Clarberg 2008], as in pbrt-v4.
+    EqualArea,
+    /// Longitude (x) and colatitude (y, 0 = +z), as in pbrt-v3.
+    LatLong,
+}
+
+/// How texels are looked up.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum EnvironmentFilter {
+    /// The texel that holds the point, as pbrt-v4 does.
+    Nearest,
+    /// Blend of the four nearest texels, continuous on the sphere.
+    Bilinear,
+}
+
+/// A direction sampled from an environment map, in the space of the light.
+#[derive(Clone, Copy, Debug)]
+pub struct EnvironmentSample {
+    /// Unit direction.
+    pub w: Vec3,
+    /// Radiance from it.
+    pub le: Rgb,
+    /// Density per steradian.
+    pub pdf: f32,
+}
+
+/// An image of the radiance that arrives from all directions.
+#[derive(Clone, Debug)]
+pub struct EnvironmentMap {
+    width: usize,
+    height: usize,
+    mapping: EnvironmentMapping,
+    filter: EnvironmentFilter,
+    texels: Vec<Rgb>,
+    distribution: PiecewiseConstant2D,
+    luminance_integral: f32,
+}
+
+/// The colour with components that are negative or not finite set to 0.
+pub(super) fn cleaned(c: Rgb) -> Rgb {
+    c.map(|x| if x.is_finite() { x.max(0.0) } else { 0.0 })
+}
+
+/// A sample of a light at infinity.
+#[inline]
+pub(super) fn infinite_sample(wi: Vec3, li: Rgb, pdf: f32) -> LightSample {
+    LightSample { li, wi, pdf, t: f32::INFINITY, p: Vec3::ZERO, n: Vec3::ZERO, p_error: Vec3::ZERO, is_delta: false }
+}
+
+impl EnvironmentMap {
+    /// A map of linear RGB texels, rows from y = 0; `Err` with a message if the sizes do not fit the mapping.
+    /// Components that are negative or not finite become 0.
+    pub fn new(
+        texels: Vec<Rgb>,
+        [width, height]: [usize; 2],
+        mapping: EnvironmentMapping,
+        filter: EnvironmentFilter,
+    ) -> Result<Self, String> {
+        if width == 0 || height == 0 || texels.len() != width * height {
+            return Err(format!("an environment map of {width}×{height} has {} texels", texels.len()));
+        }
+        if mapping == EnvironmentMapping::EqualArea && width != height {
+            return Err(format!("an equal-area environment map must be square, but it is {width}×{height}"));
+        }
+        let texels = texels.into_iter().map(cleaned).collect();
+        let distribution = PiecewiseConstant2D::new(&[], 1);
+        let mut map = EnvironmentMap { width, height, mapping, filter, texels, distribution, luminance_integral: 0.0 };
+        let weights = map.texel_weights();
+        map.distribution = PiecewiseConstant2D::new(&weights, width);
+        map.luminance_integral = map.distribution.integral() * map.weight_scale();
+        Ok(map)
+    }
+
+    /// The same map sampled in proportion to what exceeds the mean [Karlík et al. 2019], for use together with another
+    /// technique that covers the rest of the sphere. Without one the estimate is biased: dim directions are never
+    /// sampled.
+    #[must_use]
+    pub fn with_mis_compensation(mut self) -> Self {
+        let weights = self.texel_weights();
+        let row_scale = self.row_scales();
+        let scale_sum: f64 = row_scale.iter().map(|&s| f64::from(s)).sum::<f64>() * self.width as f64;
+        let mean = (weights.iter().map(|&w| f64::from(w)).sum::<f64>() / scale_sum) as f32;
+        let excess: Vec<f32> =
+            weights.iter().enumerate().map(|(i, &w)| (w - mean * row_scale[i / self.width]).max(0.0)).collect();
+        // A constant map has no excess; it keeps the plain density.
+        if excess.iter().any(|&e| e > 0.0) {
+            self.distribution = PiecewiseConstant2D::new(&excess, self.width);
+        }
+        self
+    }
+
+    /// Width and height in texels.
+    pub fn resolution(&self) -> [usize; 2] {
+        [self.width, self.height]
+    }
+
+    /// ∫ luminance dω over the sphere.
+    pub fn luminance_integral(&self) -> f32 {
+        self.luminance_integral
+    }
+
+    /// Radiance from the unit direction `w`.
+    #[inline]
+    pub fn le(&self, w: Vec3) -> Rgb {
+        self.lookup(self.to_square(w))
+    }
+
+    /// Samples a direction; `None` if the map is black.
+    #[inline]
+    pub fn sample(&self, u: [f32; 2]) -> Option<EnvironmentSample> {
+        let s = self.distribution.sample(u)?;
+        let (w, density) = match self.mapping {
+            EnvironmentMapping::EqualArea => (equal_area_square_to_sphere(s.p), pdf_equal_area_square_to_sphere()),
+            EnvironmentMapping::LatLong => {
+                let w = lat_long_to_sphere(s.p);
+                (w, pdf_lat_long_to_sphere(w))
+            }
+        };
+        let pdf = s.pdf * density;
+        (pdf > 0.0 && pdf.is_finite()).then(|| EnvironmentSample { w: w.normalize(), le: self.lookup(s.p), pdf })
+    }
+
+    /// Density of [`sample`](Self::sample) per steradian.
+    #[inline]
+    pub fn pdf(&self, w: Vec3) -> f32 {
+        let density = match self.mapping {
+            EnvironmentMapping::EqualArea => pdf_equal_area_square_to_sphere(),
+            EnvironmentMapping::LatLong => pdf_lat_long_to_sphere(w),
+        };
+        let pdf = self.distribution.pdf(self.to_square(w)) * density;
+        if pdf.is_finite() { pdf } else { 0.0 }
+    }
+
+    #[inline]
+    fn to_square(&self, w: Vec3) -> Vec2 {
+        match self.mapping {
+            EnvironmentMapping::EqualArea => equal_area_sphere_to_square(w),
+            EnvironmentMapping::LatLong => sphere_to_lat_long(w),
+        }
+    }
+
+    /// The texel at indices that may lie outside by one.
+    #[inline]
+    fn texel(&self, x: isize, y: isize) -> Rgb {
+        let (width, height) = (self.width as isize, self.height as isize);
+        let (x, y) = match self.mapping {
+            EnvironmentMapping::EqualArea => wrap_equal_area_texel(x, y, width),
+            // Over a pole lies the opposite meridian.
+            EnvironmentMapping::LatLong => {
+                let over_pole = y < 0 || y >= height;
+                let x = if over_pole { x + width / 2 } else { x };
+                (x.rem_euclid(width), y.clamp(0, height - 1))
+            }
+        };
+        self.texels[y as usize * self.width + x as usize]
+    }
+
+    /// Radiance at a point of the unit square.
+    #[inline]
+    fn lookup(&self, p: Vec2) -> Rgb {
+        let (x, y) = (p.x * self.width as f32, p.y * self.height as f32);
+        match self.filter {
+            EnvironmentFilter::Nearest => {
+                let (x, y) = ((x as usize).min(self.width - 1), (y as usize).min(self.height - 1));
+                self.texels[y * self.width + x]
+            }
+            EnvironmentFilter::Bilinear => {
+                let (x, y) = (x - 0.5, y - 0.5);
+                let (x0, y0) = (x.floor(), y.floor());
+                let (dx, dy) = (x - x0, y - y0);
+                let (x0, y0) = (x0 as isize, y0 as isize);
+                let top = self.texel(x0, y0).lerp(self.texel(x0 + 1, y0), dx);
+                let bottom = self.texel(x0, y0 + 1).lerp(self.texel(x0 + 1, y0 + 1), dx);
+                top.lerp(bottom, dy)
+            }
+        }
+    }
+
+    /// Relative solid angle of a texel per row: its mean sine, or 1.
+    fn row_scales(&self) -> Vec<f32> {
+        let cos = |y: usize| (PI * y as f64 / self.height as f64).cos();
+        (0..self.height)
+            .map(|y| match self.mapping {
+                EnvironmentMapping::EqualArea => 1.0,
+                EnvironmentMapping::LatLong => ((cos(y) - cos(y + 1)) * self.height as f64 / PI) as f32,
+            })
+            .collect()
+    }
+
+    /// Steradians of the unit square per unit of row scale.
+    fn weight_scale(&self) -> f32 {
+        match self.mapping {
+            EnvironmentMapping::EqualArea => (4.0 * PI) as f32,
+            EnvironmentMapping::LatLong => (2.0 * PI * PI) as f32,
+        }
+    }
+
+    /// Mean luminance of lookups in each texel, times the row scale.
+    fn texel_weights(&self) -> Vec<f32> {
+        let luminances: Vec<f32> = self.texels.iter().map(|t| t.luminance()).collect();
+        let mut weights = Vec::with_capacity(self.texels.len());
+        for (y, &row_scale) in self.row_scales().iter().enumerate() {
+            for x in 0..self.width {
+                let mean = match self.filter {
+                    EnvironmentFilter::Nearest => luminances[y * self.width + x],
+                    EnvironmentFilter::Bilinear => self.smoothed(&luminances, x, y),
+                };
+                weights.push(row_scale * mean);
+            }
+        }
+        weights
+    }
+
+    /// Mean of the bilinear interpolant over a texel.
+    fn smoothed(&self, luminances: &[f32], x: usize, y: usize) -> f32 {
+        const KERNEL: [f32; 3] = [0.125, 0.75, 0.125];
+        let inside = x > 0 && y > 0 && x + 1 < self.width && y + 1 < self.height;
+        let mut sum = 0.0;
+        for (j, ky) in KERNEL.into_iter().enumerate() {
+            for (i, kx) in KERNEL.into_iter().enumerate() {
+                let luminance = if inside {
+                    luminances[(y + j - 1) * self.width + x + i - 1]
+                } else {
+                    self.texel((x + i) as isize - 1, (y + j) as isize - 1).luminance()
+                };
+                sum += kx * ky * luminance;
+            }
+        }
+        sum
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::math::hash::HashStream;
+    use crate::math::test_support::{Moments, assert_chi_squared};
+    use crate::math::warp::sample_uniform_sphere;
+
+    fn one_bright(mapping: EnvironmentMapping, size: [usize; 2], at: usize) -> EnvironmentMap {
+        let mut texels = vec![Rgb::BLACK; size[0] * size[1]];
+        texels[at] = Rgb::new(3.0, 5.0, 1.0);
+        EnvironmentMap::new(texels, size, mapping, EnvironmentFilter::Bilinear).unwrap()
+    }
+
+    fn random_map(mapping: EnvironmentMapping, filter: EnvironmentFilter) -> EnvironmentMap {
+        let size = if mapping == EnvironmentMapping::EqualArea { [8, 8] } else { [10, 5] };
+        let mut stream = HashStream::new([11, 12, 13]);
+        let mut texel = || stream.next_f32().powi(8) * 20.0;
+        let texels = (0..size[0] * size[1]).map(|_| Rgb::new(texel(), texel(), texel())).collect();
+        EnvironmentMap::new(texels, size, mapping, filter).unwrap()
+    }
+
+    const MAPPINGS: [EnvironmentMapping; 2] = [EnvironmentMapping::EqualArea, EnvironmentMapping::LatLong];
+
+    #[test]
+    fn the_density_is_positive_wherever_the_radiance_is() {
+        for mapping in MAPPINGS {
+            let size = if mapping == EnvironmentMapping::EqualArea { [4, 4] } else { [6, 3] };
+            for at in 0..size[0] * size[1] {
+                let map = one_bright(mapping, size, at);
+                let mut stream = HashStream::new([at as u32, 1, 2]);
+                let mut integral = Moments::default();
+                for _ in 0..20_000 {
+                    let w = sample_uniform_sphere(stream.next_2d());
+                    let (le, pdf) = (map.le(w), map.pdf(w));
+                    assert!(le.is_black() || pdf > 0.0, "{mapping:?} {at} {w}");
+                    integral.add(f64::from(pdf) * 4.0 * PI);
+                }
+                integral.assert_mean(1.0, 1e-5, 1e-4);
+            }
+        }
+    }
+
+    #[test]
+    fn directions_follow_the_density_by_chi_squared() {
+        for mapping in MAPPINGS {
+            for filter in [EnvironmentFilter::Nearest, EnvironmentFilter::Bilinear] {
+                for map in [random_map(mapping, filter), random_map(mapping, filter).with_mis_compensation()] {
+                    check_chi_squared(&map);
+                }
+            }
+        }
+    }
+
+    /// Cells of equal height in cos θ and equal width in φ; the density is integrated by 48² points in each.
+    fn check_chi_squared(map: &EnvironmentMap) {
+        const ROWS: usize = 20;
+        const COLUMNS: usize = 40;
+        let count = 200_000;
+        let mut stream = HashStream::new([21, 22, 23]);
+        let mut observed = vec![0.0; ROWS * COLUMNS];
+        let mut disagreements = 0;
+        for _ in 0..count {
+            let s = map.sample(stream.next_2d()).unwrap();
+            // Rounding may carry a direction at an edge into the next texel.
+            disagreements += u32::from((map.pdf(s.w) - s.pdf).abs() > 1e-3 * s.pdf);
+            let row = ((s.w.z + 1.0) * 0.5 * ROWS as f32).clamp(0.0, ROWS as f32 - 1.0) as usize;
+            let phi = crate::math::warp::azimuth(s.w) / std::f32::consts::TAU;
+            observed[row * COLUMNS + ((phi * COLUMNS as f32) as usize).min(COLUMNS - 1)] += 1.0;
+        }
+        assert!(disagreements < 20, "{disagreements} directions have another density than their samples");
+        let sub = 48;
+        let expected: Vec<f64> = (0..ROWS * COLUMNS)
+            .map(|cell| {
+                let (row, column) = (cell / COLUMNS, cell % COLUMNS);
+                let mut sum = 0.0;
+                for i in 0..sub * sub {
+                    let y = (row as f32 + ((i / sub) as f32 + 0.5) / sub as f32) / ROWS as f32;
+                    let x = (column as f32 + ((i % sub) as f32 + 0.5) / sub as f32) / COLUMNS as f32;
+                    sum += f64::from(map.pdf(crate::math::warp::direction(2.0 * y - 1.0, std::f32::consts::TAU * x)));
+                }
+                sum / (sub * sub) as f64 * 4.0 * PI / (ROWS * COLUMNS) as f64 * f64::from(count)
+            })
+            .collect();
+        let total: f64 = expected.iter().sum::<f64>() / f64::from(count);
+        assert!((total - 1.0).abs() < 5e-3, "the density integrates to {total}");
+        // A cell whose corner alone is lit may be missed by all points.
+        let expected: Vec<f64> = expected.into_iter().map(|e| e.max(0.05)).collect();
+        assert_chi_squared(&observed, &expected, 1e-5);
+    }
+
+    #[test]
+    fn importance_sampling_estimates_the_flux() {
+        for mapping in MAPPINGS {
+            for filter in [EnvironmentFilter::Nearest, EnvironmentFilter::Bilinear] {
+                let map = random_map(mapping, filter);
+                let mut stream = HashStream::new([31, 32, 33]);
+                let (mut sampled, mut uniform) = (Moments::default(), Moments::default());
+                for _ in 0..100_000 {
+                    let s = map.sample(stream.next_2d()).unwrap();
+                    sampled.add(f64::from(s.le.luminance() / s.pdf));
+                    uniform.add(f64::from(map.le(sample_uniform_sphere(stream.next_2d())).luminance()) * 4.0 * PI);
+                }
+                // Smoothing does not commute with the solid angle of rows, so bilinear latitude-longitude maps are
+                // only near.
+                let exact = mapping == EnvironmentMapping::EqualArea || filter == EnvironmentFilter::Nearest;
+                let tolerance = if exact { 1e-4 } else { 0.1 };
+                sampled.assert_mean(f64::from(map.luminance_integral()), 1e-5, tolerance);
+                uniform.assert_mean(f64::from(map.luminance_integral()), 1e-5, tolerance);
+            }
+        }
+    }
+
+    #[test]
+    fn lookups_are_continuous_across_seams_and_constant_maps_are_uniform() {
+        for mapping in MAPPINGS {
+            let map = random_map(mapping, EnvironmentFilter::Bilinear);
+            let mut stream = HashStream::new([41, 42, 43]);
+            for _ in 0..20_000 {
+                let w = sample_uniform_sphere(stream.next_2d());
+                // Towards the seams: the equator's planes x = 0 and y = 0, and the lower pole.
+                // At its poles a latitude-longitude image has a value for each meridian.
+                if w.y.abs() > 0.9 || (mapping == EnvironmentMapping::LatLong && w.x.abs() < 0.1) {
+                    continue;
+                }
+                let w = (w * Vec3::new(1.0, 1e-4, 1.0)).normalize();
+                let mirrored = Vec3::new(w.x, -w.y, w.z);
+                let change = (map.le(w).luminance() - map.le(mirrored).luminance()).abs();
+                assert!(change < 0.1, "{mapping:?} {w} {change}");
+            }
+            let size = if mapping == EnvironmentMapping::EqualArea { [2, 2] } else { [3, 2] };
+            let texels = vec![Rgb::WHITE; size[0] * size[1]];
+            let map = EnvironmentMap::new(texels, size, mapping, EnvironmentFilter::Bilinear).unwrap();
+            assert!((f64::from(map.luminance_integral()) - 4.0 * PI).abs() < 1e-4);
+            assert!(map.clone().with_mis_compensation().sample([0.3, 0.6]).is_some());
+            assert!((map.le(Vec3::Z).r - 1.0).abs() < 1e-6);
+        }
+    }
+
+    #[test]
+    fn wrong_sizes_are_errors_and_black_maps_have_no_samples() {
+        let make = |n, size| {
+            EnvironmentMap::new(vec![Rgb::BLACK; n], size, EnvironmentMapping::EqualArea, EnvironmentFilter::Nearest)
+        };
+        assert!(make(3, [2, 2]).is_err() && make(2, [2, 1]).is_err() && make(0, [0, 0]).is_err());
+        let black = make(4, [2, 2]).unwrap();
+        assert!(black.sample([0.5, 0.5]).is_none() && black.pdf(Vec3::X) == 0.0);
+    }
+}

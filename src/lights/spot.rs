@@ -1,0 +1,52 @@
+//! The spot light's falloff between its inner and outer cone, as in pbrt-v4.
+
+/// Factor of the intensity at polar cosine `cos_theta` from the axis: 0 outside the outer cone (`cos_total`), 1 inside
+/// the inner one (`cos_falloff_start`), between them x²(3 − 2x) of the cosine's relative place x.
+#[inline]
+pub fn spot_falloff(cos_theta: f32, cos_total: f32, cos_falloff_start: f32) -> f32 {
+    if cos_total >= cos_falloff_start {
+        return if cos_theta < cos_falloff_start { 0.0 } else { 1.0 };
+    }
+    let x = ((cos_theta - cos_total) / (cos_falloff_start - cos_total)).clamp(0.0, 1.0);
+    x * x * (3.0 - 2.0 * x)
+}
+
+/// Integral of [`spot_falloff`] over the sphere, in steradians; exact, as the smooth step has mean 1/2.
+pub fn spot_solid_angle(cos_total: f32, cos_falloff_start: f32) -> f32 {
+    std::f32::consts::TAU * ((1.0 - cos_falloff_start) + (cos_falloff_start - cos_total).max(0.0) * 0.5)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::lights::{Light, LightCtx};
+    use crate::math::{Rgb, Vec3};
+
+    #[test]
+    fn solid_angle_is_the_integral_of_the_falloff() {
+        let (total, start) = (0.6_f32, 0.85_f32);
+        let n = 100_000;
+        let mean: f64 =
+            (0..n).map(|i| f64::from(spot_falloff(2.0 * (i as f32 + 0.5) / n as f32 - 1.0, total, start))).sum::<f64>()
+                / f64::from(n);
+        let integral = mean * 4.0 * std::f64::consts::PI;
+        assert!((integral - f64::from(spot_solid_angle(total, start))).abs() < 1e-4);
+    }
+
+    #[test]
+    fn spot_light_lights_its_cone_only() {
+        let light = Light::Spot {
+            p: Vec3::ZERO,
+            axis: Vec3::Z,
+            cos_total: 0.5,
+            cos_falloff_start: 0.8,
+            intensity: Rgb::splat(4.0),
+        };
+        let li = |p: Vec3| light.sample_li(&LightCtx::at(p), [0.5; 2]).map(|s| s.li.r);
+        assert_eq!(li(Vec3::new(0.0, 0.0, 2.0)), Some(1.0));
+        assert_eq!(li(Vec3::new(0.0, 0.0, -2.0)), None);
+        assert_eq!(li(Vec3::new(2.0, 0.0, 1.0)), None);
+        let half = li(Vec3::new((1.0_f32 - 0.65 * 0.65).sqrt(), 0.0, 0.65)).unwrap();
+        assert!((half - 2.0).abs() < 1e-4, "{half}");
+    }
+}

@@ -1,0 +1,282 @@
+//! A bounding-volume hierarchy over lights, descended at random in proportion to an upper bound of what each child
+//! can contribute [Conty Estévez and Kulla 2018; Pharr et al. 2023, §12.6.3].
+//!
+//! The importance of a node at p is I·cos θ′·cos θi′/max(d², r²): I the summed intensity, d the distance to the centre
+//! of its bounding sphere, r that sphere's radius, θ′ the least angle between an emitter's normal and the direction to p,
+//! θi′ the least angle between the surface normal and a direction to the node. Both compared quantities are squared
+//! lengths, so the choice does not depend on the unit of length.
+
+use super::{LightBounds, LightCtx, LightId};
+use crate::math::{Bounds3, ONE_MINUS_EPSILON, Vec3, safe_sqrt, sqr};
+
+/// Slack of the cosines, for rounding: a light that can contribute never has importance 0.
+const COSINE_SLACK: f32 = 1e-3;
+/// Beyond this depth lights are split in halves, so that the trail of any leaf fits 64 bits.
+const MAX_HEURISTIC_DEPTH: u32 = 30;
+/// Places where an axis is tried to be cut, plus one.
+const BUCKETS: usize = 12;
+/// Trail of lights that are not in the tree.
+const NO_TRAIL: u64 = u64::MAX;
+
+#[derive(Clone, Copy, Debug)]
+struct Node {
+    center: Vec3,
+    radius_squared: f32,
+    axis: Vec3,
+    cos_theta_o: f32,
+    sin_theta_o: f32,
+    cos_theta_e: f32,
+    intensity: f32,
+    two_sided: bool,
+    is_leaf: bool,
+    /// The light of a leaf, or the right child; the left child follows its parent.
+    index: u32,
+}
+
+/// cos(max(0, a − b)).
+#[inline]
+fn cos_of_difference(sin_a: f32, cos_a: f32, sin_b: f32, cos_b: f32) -> f32 {
+    if cos_a > cos_b { 1.0 } else { cos_a * cos_b + sin_a * sin_b }
+}
+
+/// sin(max(0, a − b)).
+#[inline]
+fn sin_of_difference(sin_a: f32, cos_a: f32, sin_b: f32, cos_b: f32) -> f32 {
+    if cos_a > cos_b { 0.0 } else { sin_a * cos_b - cos_a * sin_b }
+}
+
+impl Node {
+    fn new(b: &LightBounds, is_leaf: bool, index: u32) -> Self {
+        let center = b.bounds.center();
+        let radius = (b.bounds.max - center).length() + 4.0 * f32::EPSILON * center.abs().max_element();
+        Node {
+            center,
+            radius_squared: sqr(radius),
+            axis: b.axis,
+            cos_theta_o: b.cos_theta_o,
+            sin_theta_o: safe_sqrt(1.0 - sqr(b.cos_theta_o)),
+            cos_theta_e: b.cos_theta_e,
+            intensity: b.intensity,
+            two_sided: b.two_sided,
+            is_leaf,
+            index,
+        }
+    }
+
+    #[inline]
+    fn importance(&self, ctx: &LightCtx) -> f32 {
+        let d = self.center - ctx.p;
+        let d2 = d.length_squared();
+        if d2 <= self.radius_squared {
+            return if self.radius_squared > 0.0 { self.intensity / self.radius_squared } else { 0.0 };
+        }
+        let wi = d / d2.sqrt();
+        let sin2_b = self.radius_squared / d2;
+        let (sin_b, cos_b) = (sin2_b.sqrt(), safe_sqrt(1.0 - sin2_b));
+
+        // Angle between the axis and the direction to p, less the cone of normals, less the node's extent.
+        let cos_axis = -wi.dot(self.axis);
+        let cos_w = if self.two_sided { cos_axis.abs() } else { cos_axis };
+        let sin_w = safe_sqrt(1.0 - sqr(cos_w));
+        let cos_x = cos_of_difference(sin_w, cos_w, self.sin_theta_o, self.cos_theta_o);
+        let sin_x = sin_of_difference(sin_w, cos_w, self.sin_theta_o, self.cos_theta_o);
+        let cos_light = cos_of_difference(sin_x, cos_x, sin_b, cos_b);
+        if cos_light < self.cos_theta_e - COSINE_SLACK {
+            return 0.0;
+        }
+        let importance = self.intensity * cos_light.max(COSINE_SLACK) / d2;
+        if ctx.ns == Vec3::ZERO {
+            return importance;
+        }
+
+        // The surface may transmit, so light from its back counts too.
+        let cos_i = wi.dot(ctx.ns).abs().min(1.0);
+        let sin_i = safe_sqrt(1.0 - sqr(cos_i));
+        importance * cos_of_difference(sin_i, cos_i, sin_b, cos_b).max(COSINE_SLACK)
+    }
+}
+
+/// The hierarchy.
+#[derive(Clone, Debug, Default)]
+pub struct LightTree {
+    nodes: Vec<Node>,
+    /// Per light, the turns from the root to its leaf, first turn in the lowest bit; 1 is right.
+    trails: Vec<u64>,
+}
+
+struct Item {
+    id: LightId,
+    bounds: LightBounds,
+    center: Vec3,
+}
+
+impl LightTree {
+    /// The tree over the lights that have bounds; the index into `bounds` is the light's id.
+    pub fn new(bounds: &[Option<LightBounds>]) -> Self {
+        let mut items: Vec<Item> = bounds
+            .iter()
+            .enumerate()
+            .filter_map(|(id, b)| b.map(|b| Item { id: id as LightId, bounds: b, center: b.bounds.center() }))
+            .filter(|item| item.center.is_finite() && item.bounds.intensity > 0.0)
+            .collect();
+        let mut tree = LightTree { nodes: Vec::new(), trails: vec![NO_TRAIL; bounds.len()] };
+        if !items.is_empty() {
+            tree.nodes.reserve_exact(2 * items.len() - 1);
+            tree.build(&mut items, 0, 0);
+        }
+        tree
+    }
+
+    fn build(&mut self, items: &mut [Item], depth: u32, trail: u64) -> LightBounds {
+        if let [item] = items {
+            self.nodes.push(Node::new(&item.bounds, true, item.id));
+            self.trails[item.id as usize] = trail;
+            return item.bounds;
+        }
+        let place = self.nodes.len();
+        self.nodes.push(Node::new(&items[0].bounds, false, 0));
+        let middle = if depth < MAX_HEURISTIC_DEPTH { split(items) } else { items.len() / 2 };
+        let (left_items, right_items) = items.split_at_mut(middle);
+        let left = self.build(left_items, depth + 1, trail);
+        let right_index = self.nodes.len() as u32;
+        let right = self.build(right_items, depth + 1, trail | 1 << depth);
+        let bounds = left.union(&right);
+        self.nodes[place] = Node::new(&bounds, false, right_index);
+        bounds
+    }
+
+    /// True if it holds no light.
+    #[inline]
+    pub fn is_empty(&self) -> bool {
+        self.nodes.is_empty()
+    }
+
+    /// True if it holds the light.
+    #[inline]
+    pub fn contains(&self, light: LightId) -> bool {
+        self.trails.get(light as usize).is_some_and(|&trail| trail != NO_TRAIL)
+    }
+
+    /// Upper bound, up to a common factor, of what all lights together contribute at a point; 0 if none can.
+    #[inline]
+    pub fn importance(&self, ctx: &LightCtx) -> f32 {
+        self.nodes.first().map_or(0.0, |root| root.importance(ctx))
+    }
+
+    /// Probability to turn left at an inner node. If neither child can contribute, the intensities decide; so the
+    /// probabilities of all leaves add up to 1 everywhere.
+    #[inline]
+    fn left_probability(&self, ctx: &LightCtx, place: usize) -> f32 {
+        let (left, right) = (&self.nodes[place + 1], &self.nodes[self.nodes[place].index as usize]);
+        let (a, b) = (left.importance(ctx), right.importance(ctx));
+        let p = a / (a + b);
+        if p.is_finite() { p } else { left.intensity / (left.intensity + right.intensity) }
+    }
+
+    /// Chooses a light by `u` in [0, 1): its id, its probability, and `u` made uniform again.
+    #[inline]
+    pub fn sample(&self, ctx: &LightCtx, u: f32) -> Option<(LightId, f32, f32)> {
+        let (mut place, mut pmf, mut u) = (0, 1.0, u);
+        let mut node = self.nodes.first()?;
+        while !node.is_leaf {
+            let p = self.left_probability(ctx, place);
+            if u < p {
+                u /= p;
+                pmf *= p;
+                place += 1;
+            } else {
+                u = (u - p) / (1.0 - p);
+                pmf *= 1.0 - p;
+                place = node.index as usize;
+            }
+            u = u.min(ONE_MINUS_EPSILON);
+            node = &self.nodes[place];
+        }
+        (pmf > 0.0).then_some((node.index, pmf, u))
+    }
+
+    /// Probability that [`sample`](Self::sample) chooses `light`.
+    #[inline]
+    pub fn pmf(&self, ctx: &LightCtx, light: LightId) -> f32 {
+        if !self.contains(light) {
+            return 0.0;
+        }
+        let (mut place, mut pmf, mut trail) = (0, 1.0, self.trails[light as usize]);
+        while !self.nodes[place].is_leaf {
+            let p = self.left_probability(ctx, place);
+            if trail & 1 == 0 {
+                pmf *= p;
+                place += 1;
+            } else {
+                pmf *= 1.0 - p;
+                place = self.nodes[place].index as usize;
+            }
+            trail >>= 1;
+        }
+        pmf
+    }
+}
+
+#[inline]
+fn bucket(center: f32, min: f32, extent: f32) -> usize {
+    (((center - min) / extent * BUCKETS as f32) as usize).min(BUCKETS - 1)
+}
+
+/// Reorders at least two items and returns where to cut them; both parts have items.
+fn split(items: &mut [Item]) -> usize {
+    let centers = Bounds3::from_points(items.iter().map(|i| i.center));
+    let all = items.iter().fold(Bounds3::EMPTY, |b, i| b.union(i.bounds.bounds));
+    let (diagonal, longest) = (all.diagonal(), all.diagonal().max_element());
+    let mut best: Option<(f32, usize, usize)> = None;
+    for axis in 0..3 {
+        let (min, extent) = (centers.min[axis], centers.max[axis] - centers.min[axis]);
+        if extent <= 0.0 || !extent.is_finite() {
+            continue;
+        }
+        // Long thin parts are worse: regularise by the aspect.
+        let stretch = longest / diagonal[axis];
+        if let Some((cost, cut)) = best_cut(items, axis, min, extent) {
+            let cost = cost * stretch;
+            if best.is_none_or(|(c, ..)| cost < c) {
+                best = Some((cost, axis, cut));
+            }
+        }
+    }
+    let Some((_, axis, cut)) = best else { return items.len() / 2 };
+
+    let (min, extent) = (centers.min[axis], centers.max[axis] - centers.min[axis]);
+    let mut middle = 0;
+    for i in 0..items.len() {
+        if bucket(items[i].center[axis], min, extent) < cut {
+            items.swap(i, middle);
+            middle += 1;
+        }
+    }
+    middle
+}
+
+/// The least cost of a cut along an axis, and the first bucket right of it.
+fn best_cut(items: &[Item], axis: usize, min: f32, extent: f32) -> Option<(f32, usize)> {
+    let mut buckets = [LightBounds::EMPTY; BUCKETS];
+    for item in items {
+        let b = &mut buckets[bucket(item.center[axis], min, extent)];
+        *b = b.union(&item.bounds);
+    }
+    // Costs of what is right of each cut, from the end; then left ones from the start.
+    let mut right_costs = [0.0; BUCKETS];
+    let mut right = LightBounds::EMPTY;
+    for i in (1..BUCKETS).rev() {
+        right = right.union(&buckets[i]);
+        right_costs[i] = if right.intensity > 0.0 { right.cost() } else { f32::INFINITY };
+    }
+    let mut left = LightBounds::EMPTY;
+    let mut best: Option<(f32, usize)> = None;
+    for cut in 1..BUCKETS {
+        left = left.union(&buckets[cut - 1]);
+        let cost = left.cost() + right_costs[cut];
+        if left.intensity > 0.0 && right_costs[cut] < f32::INFINITY && best.is_none_or(|(c, _)| cost < c) {
+            best = Some((cost, cut));
+        }
+    }
+    best
+}
