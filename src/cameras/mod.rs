@@ -1,1 +1,373 @@
-//! (in progress)
+//! Cameras: from a point of the film, of the lens and in time to a ray.
+//!
+//! Camera space is that of pbrt: x right, y up, z forward. The placement may mirror and scale. Raster coordinates have
+//! their origin at the upper left, one unit per pixel, y downwards. A screen window `[x0, x1, y0, y1]` says which part
+//! of the screen the film covers; the default spans −1..1 on the shorter axis.
+
+use crate::math::sphere_map::{equal_area_square_to_sphere, lat_long_to_sphere, wrap_equal_area_square};
+use crate::math::warp::sample_uniform_disk_concentric;
+use crate::math::{Affine3A, Ray, Vec2, Vec3};
+use std::f32::consts::PI;
+
+/// A ray from the camera.
+#[derive(Clone, Copy, Debug)]
+pub struct CameraRay {
+    /// The ray, in world space, with unit direction.
+    pub ray: Ray,
+    /// Angle between the rays of neighbouring pixels (radians): the square root of a pixel's solid angle.
+    pub spread: f32,
+    /// Distance between the origins of the rays of neighbouring pixels, in world units.
+    pub width0: f32,
+    /// Factor of the radiance.
+    pub weight: f32,
+}
+
+/// How a spherical camera maps its film.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum SphericalMapping {
+    /// Longitude and colatitude.
+    EquiRectangular,
+    /// Equal-area octahedral map [Clarberg 2008].
+    EqualArea,
+}
+
+/// What all cameras have.
+#[derive(Clone, Copy, Debug)]
+pub struct CameraBase {
+    world_from_camera: Affine3A,
+    resolution: Vec2,
+    shutter: [f32; 2],
+}
+
+/// A thin lens of a perspective or orthographic camera.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Lens {
+    /// Radius of the aperture; 0 for a pinhole.
+    pub radius: f32,
+    /// Distance of the plane in focus, along z.
+    pub focal_distance: f32,
+}
+
+/// A camera.
+#[derive(Clone, Copy, Debug)]
+pub enum Camera {
+    /// Thin lens.
+    Perspective {
+        /// Common part.
+        base: CameraBase,
+        /// Screen window.
+        screen_window: [f32; 4],
+        /// Half the width of the plane z = 1 that is one screen unit.
+        tan_half_fov: f32,
+        /// Lens.
+        lens: Lens,
+    },
+    /// Parallel rays.
+    Orthographic {
+        /// Common part.
+        base: CameraBase,
+        /// Screen window, in units of camera space.
+        screen_window: [f32; 4],
+        /// Lens.
+        lens: Lens,
+    },
+    /// All directions from a point; y is up, the middle of an equirectangular film looks along −x.
+    Spherical {
+        /// Common part.
+        base: CameraBase,
+        /// Mapping of the film.
+        mapping: SphericalMapping,
+    },
+}
+
+/// The screen window of a frame of the given width over height: −1..1 on the shorter axis.
+pub fn default_screen_window(frame_aspect: f32) -> [f32; 4] {
+    if frame_aspect > 1.0 {
+        [-frame_aspect, frame_aspect, -1.0, 1.0]
+    } else {
+        [-1.0, 1.0, -1.0 / frame_aspect, 1.0 / frame_aspect]
+    }
+}
+
+impl CameraBase {
+    fn new(world_from_camera: Affine3A, resolution: [u32; 2]) -> Self {
+        let resolution = Vec2::new(resolution[0].max(1) as f32, resolution[1].max(1) as f32);
+        CameraBase { world_from_camera, resolution, shutter: [0.0, 1.0] }
+    }
+
+    /// The ray of a point and a direction of camera space.
+    #[inline]
+    fn ray(&self, o: Vec3, d: Vec3, time_u: f32) -> Ray {
+        let time = self.shutter[0] + time_u * (self.shutter[1] - self.shutter[0]);
+        let d = self.world_from_camera.transform_vector3(d).normalize();
+        Ray { o: self.world_from_camera.transform_point3(o), d, t_max: f32::INFINITY, time }
+    }
+
+    /// Film to screen.
+    #[inline]
+    fn screen_point(&self, window: &[f32; 4], film_xy: Vec2) -> Vec2 {
+        let p = film_xy / self.resolution;
+        Vec2::new(window[0] + p.x * (window[1] - window[0]), window[3] - p.y * (window[3] - window[2]))
+    }
+
+    /// Area of a pixel on the screen.
+    #[inline]
+    fn pixel_area(&self, window: &[f32; 4]) -> f32 {
+        ((window[1] - window[0]) * (window[3] - window[2]) / (self.resolution.x * self.resolution.y)).abs()
+    }
+}
+
+impl Lens {
+    /// The same ray through a point of the lens: all rays of one film point meet in the plane z = focal distance.
+    /// `d.z` is positive.
+    #[inline]
+    fn through(&self, o: Vec3, d: Vec3, u: [f32; 2]) -> (Vec3, Vec3) {
+        if self.radius <= 0.0 {
+            return (o, d);
+        }
+        let focus = o + d * (self.focal_distance / d.z);
+        let on_lens = o + (sample_uniform_disk_concentric(u) * self.radius).extend(0.0);
+        (on_lens, focus - on_lens)
+    }
+}
+
+impl Camera {
+    /// A perspective camera. `fov_degrees` is the angle that −1..1 of the screen subtends, so with the default screen
+    /// window that of the shorter axis.
+    pub fn perspective(
+        world_from_camera: Affine3A,
+        fov_degrees: f32,
+        screen_window: [f32; 4],
+        resolution: [u32; 2],
+        lens_radius: f32,
+        focal_distance: f32,
+    ) -> Self {
+        let base = CameraBase::new(world_from_camera, resolution);
+        let lens = Lens { radius: lens_radius, focal_distance };
+        Camera::Perspective { base, screen_window, tan_half_fov: (fov_degrees.to_radians() * 0.5).tan(), lens }
+    }
+
+    /// An orthographic camera.
+    pub fn orthographic(
+        world_from_camera: Affine3A,
+        screen_window: [f32; 4],
+        resolution: [u32; 2],
+        lens_radius: f32,
+        focal_distance: f32,
+    ) -> Self {
+        let lens = Lens { radius: lens_radius, focal_distance };
+        Camera::Orthographic { base: CameraBase::new(world_from_camera, resolution), screen_window, lens }
+    }
+
+    /// A camera that sees all directions.
+    pub fn spherical(world_from_camera: Affine3A, resolution: [u32; 2], mapping: SphericalMapping) -> Self {
+        Camera::Spherical { base: CameraBase::new(world_from_camera, resolution), mapping }
+    }
+
+    /// The same camera with a shutter that is open from `open` to `close`, in the unit of time in which instances move
+    /// from 0 to 1. Without this it is open from 0 to 1.
+    #[must_use]
+    pub fn with_shutter(mut self, open: f32, close: f32) -> Self {
+        match &mut self {
+            Camera::Perspective { base, .. } | Camera::Orthographic { base, .. } | Camera::Spherical { base, .. } => {
+                base.shutter = [open, close];
+            }
+        }
+        self
+    }
+
+    /// The ray of the raster point `film_xy`, through the point `u_lens` of the lens, at `time_u` of the shutter interval.
+    #[inline]
+    pub fn ray(&self, film_xy: Vec2, u_lens: [f32; 2], time_u: f32) -> CameraRay {
+        match self {
+            Camera::Perspective { base, screen_window, tan_half_fov, lens } => {
+                let d = (base.screen_point(screen_window, film_xy) * *tan_half_fov).extend(1.0);
+                let (o, through) = lens.through(Vec3::ZERO, d, u_lens);
+                // A pixel of area a on the plane z = 1 subtends a·cos³θ.
+                let cos = 1.0 / d.length();
+                let spread = (base.pixel_area(screen_window) * cos).sqrt() * cos * *tan_half_fov;
+                CameraRay { ray: base.ray(o, through, time_u), spread, width0: 0.0, weight: 1.0 }
+            }
+            Camera::Orthographic { base, screen_window, lens } => {
+                let o = base.screen_point(screen_window, film_xy).extend(0.0);
+                let (o, d) = lens.through(o, Vec3::Z, u_lens);
+                let m = &base.world_from_camera.matrix3;
+                let scale = m.x_axis.cross(m.y_axis).length();
+                let width0 = (base.pixel_area(screen_window) * scale).sqrt();
+                CameraRay { ray: base.ray(o, d, time_u), spread: 0.0, width0, weight: 1.0 }
+            }
+            Camera::Spherical { base, mapping } => {
+                let p = film_xy / base.resolution;
+                let pixels = base.resolution.x * base.resolution.y;
+                let (d, solid_angle) = match mapping {
+                    SphericalMapping::EquiRectangular => {
+                        let d = lat_long_to_sphere(p);
+                        (d, 2.0 * PI * PI * d.truncate().length() / pixels)
+                    }
+                    SphericalMapping::EqualArea => {
+                        (equal_area_square_to_sphere(wrap_equal_area_square(p)), 4.0 * PI / pixels)
+                    }
+                };
+                let d = Vec3::new(d.x, d.z, d.y);
+                CameraRay { ray: base.ray(Vec3::ZERO, d, time_u), spread: solid_angle.sqrt(), width0: 0.0, weight: 1.0 }
+            }
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::math::hash::HashStream;
+    use crate::math::test_support::assert_chi_squared;
+    use crate::math::warp::invert_uniform_disk_concentric;
+
+    const PINHOLE: Lens = Lens { radius: 0.0, focal_distance: 1e6 };
+
+    fn orthographic(placement: Affine3A, window: [f32; 4], lens: Lens) -> Camera {
+        Camera::orthographic(placement, window, [200, 100], lens.radius, lens.focal_distance)
+    }
+
+    fn near(a: Vec3, b: Vec3) {
+        assert!((a - b).length() < 1e-5, "{a} {b}");
+    }
+
+    fn perspective(placement: Affine3A, fov: f32, lens: Lens) -> Camera {
+        Camera::perspective(placement, fov, default_screen_window(2.0), [200, 100], lens.radius, lens.focal_distance)
+    }
+
+    #[test]
+    fn perspective_rays_are_those_of_trigonometry() {
+        let camera = perspective(Affine3A::IDENTITY, 60.0, PINHOLE);
+        let d = |x, y| camera.ray(Vec2::new(x, y), [0.5; 2], 0.5).ray.d;
+        near(d(100.0, 50.0), Vec3::Z);
+        let t = 30.0_f32.to_radians().tan();
+        near(d(100.0, 0.0), Vec3::new(0.0, t, 1.0).normalize());
+        near(d(0.0, 0.0), Vec3::new(-2.0 * t, t, 1.0).normalize());
+        near(d(200.0, 100.0), Vec3::new(2.0 * t, -t, 1.0).normalize());
+        // The field of view is that of the shorter axis.
+        let angle = d(100.0, 0.0).angle_between(d(100.0, 100.0)).to_degrees();
+        assert!((angle - 60.0).abs() < 1e-3, "{angle}");
+        let tall = Camera::perspective(Affine3A::IDENTITY, 60.0, default_screen_window(0.5), [50, 100], 0.0, 1e6);
+        let d = |x, y| tall.ray(Vec2::new(x, y), [0.5; 2], 0.5).ray.d;
+        assert!((d(0.0, 50.0).angle_between(d(50.0, 50.0)).to_degrees() - 60.0).abs() < 1e-3);
+        // An off-centre window.
+        let shifted = Camera::perspective(Affine3A::IDENTITY, 90.0, [0.0, 1.0, 0.0, 1.0], [10, 10], 0.0, 1e6);
+        near(shifted.ray(Vec2::new(0.0, 10.0), [0.5; 2], 0.0).ray.d, Vec3::Z);
+    }
+
+    #[test]
+    fn placements_move_and_mirror() {
+        let mirror =
+            Affine3A::from_translation(Vec3::new(1.0, 2.0, 3.0)) * Affine3A::from_scale(Vec3::new(-1.0, 1.0, 1.0));
+        let (a, b) = (perspective(mirror, 40.0, PINHOLE), perspective(Affine3A::IDENTITY, 40.0, PINHOLE));
+        let p = Vec2::new(30.0, 20.0);
+        let (ra, rb) = (a.ray(p, [0.5; 2], 0.5), b.ray(p, [0.5; 2], 0.5));
+        near(ra.ray.d, rb.ray.d * Vec3::new(-1.0, 1.0, 1.0));
+        near(ra.ray.o, Vec3::new(1.0, 2.0, 3.0));
+        assert_eq!((ra.spread, ra.weight), (rb.spread, 1.0));
+    }
+
+    #[test]
+    fn spreads_are_the_angles_of_pixels() {
+        let mut stream = HashStream::new([4, 4, 4]);
+        let spherical = |mapping| Camera::spherical(Affine3A::IDENTITY, [200, 100], mapping);
+        for camera in [
+            perspective(Affine3A::IDENTITY, 100.0, PINHOLE),
+            spherical(SphericalMapping::EquiRectangular),
+            spherical(SphericalMapping::EqualArea),
+        ] {
+            for _ in 0..100 {
+                let u = stream.next_2d();
+                let p = Vec2::new(10.0 + u[0] * 75.0, 5.0 + u[1] * 40.0);
+                let d = |x, y| camera.ray(p + Vec2::new(x, y), [0.5; 2], 0.5).ray.d.as_dvec3();
+                let h = 0.25;
+                let solid_angle = (d(h, 0.0) - d(-h, 0.0)).cross(d(0.0, h) - d(0.0, -h)).length() / 0.25;
+                let spread = f64::from(camera.ray(p, [0.5; 2], 0.5).spread);
+                assert!((spread / solid_angle.sqrt() - 1.0).abs() < 0.02, "{camera:?} {p} {spread}");
+            }
+        }
+        let ortho = orthographic(Affine3A::from_scale(Vec3::splat(3.0)), [-2.0, 2.0, -1.0, 1.0], PINHOLE);
+        let r = |x| ortho.ray(Vec2::new(x, 10.0), [0.5; 2], 0.5);
+        assert!((r(10.0).width0 - (r(11.0).ray.o - r(10.0).ray.o).length()).abs() < 1e-5 && r(10.0).spread == 0.0);
+    }
+
+    #[test]
+    fn rays_through_the_lens_meet_in_the_plane_of_focus() {
+        let lens = Lens { radius: 0.3, focal_distance: 4.0 };
+        let placement = Affine3A::from_rotation_translation(crate::math::Quat::from_rotation_y(0.7), Vec3::ONE);
+        let inverse = placement.inverse();
+        let ortho = orthographic(placement, default_screen_window(2.0), lens);
+        for (camera, pinhole) in [
+            (perspective(placement, 50.0, lens), perspective(placement, 50.0, PINHOLE)),
+            (ortho, orthographic(placement, default_screen_window(2.0), PINHOLE)),
+        ] {
+            let mut stream = HashStream::new([5, 4, 4]);
+            let mut observed = vec![0.0; 64];
+            for i in 0..20_000 {
+                let p = Vec2::new(i as f32 * 0.01, 30.0);
+                let at_focus = |ray: &Ray| {
+                    let (o, d) = (inverse.transform_point3(ray.o), inverse.transform_vector3(ray.d));
+                    o + d * ((4.0 - o.z) / d.z)
+                };
+                let ray = camera.ray(p, stream.next_2d(), 0.5).ray;
+                let center = pinhole.ray(p, [0.5; 2], 0.5).ray;
+                assert!((at_focus(&ray) - at_focus(&center)).length() < 1e-4);
+                let on_lens = inverse.transform_point3(ray.o) - inverse.transform_point3(center.o);
+                assert!(on_lens.z.abs() < 1e-5 && on_lens.length() <= 0.3001);
+                let u = invert_uniform_disk_concentric(on_lens.truncate() / 0.3);
+                let cell = u.map(|x| ((x * 8.0).max(0.0) as usize).min(7));
+                observed[cell[1] * 8 + cell[0]] += 1.0;
+            }
+            assert_chi_squared(&observed, &[20_000.0 / 64.0; 64], 1e-5);
+        }
+    }
+
+    #[test]
+    fn lens_points_are_uniform_in_rings_and_sectors() {
+        let camera = perspective(Affine3A::IDENTITY, 50.0, Lens { radius: 2.0, focal_distance: 4.0 });
+        let mut stream = HashStream::new([6, 4, 4]);
+        let mut observed = vec![0.0; 80];
+        for _ in 0..40_000 {
+            let o = camera.ray(Vec2::new(100.0, 50.0), stream.next_2d(), 0.5).ray.o / 2.0;
+            let ring = ((o.length_squared() * 5.0) as usize).min(4);
+            let sector = ((crate::math::warp::azimuth(o) / (2.0 * PI) * 16.0) as usize).min(15);
+            observed[ring * 16 + sector] += 1.0;
+        }
+        assert_chi_squared(&observed, &[500.0; 80], 1e-5);
+    }
+
+    #[test]
+    fn orthographic_rays_are_parallel() {
+        let camera = orthographic(Affine3A::IDENTITY, [-2.0, 2.0, -1.0, 1.0], PINHOLE);
+        let r = |x, y| camera.ray(Vec2::new(x, y), [0.5; 2], 0.5).ray;
+        near(r(0.0, 0.0).o, Vec3::new(-2.0, 1.0, 0.0));
+        near(r(200.0, 100.0).o, Vec3::new(2.0, -1.0, 0.0));
+        near(r(17.0, 3.0).d, Vec3::Z);
+    }
+
+    #[test]
+    fn spherical_cameras_look_everywhere_with_y_up() {
+        let camera = |mapping| Camera::spherical(Affine3A::IDENTITY, [100, 100], mapping);
+        let d = |mapping, x, y| camera(mapping).ray(Vec2::new(x, y), [0.5; 2], 0.5).ray.d;
+        use SphericalMapping::{EqualArea, EquiRectangular};
+        near(d(EquiRectangular, 10.0, 0.0), Vec3::Y);
+        near(d(EquiRectangular, 0.0, 50.0), Vec3::X);
+        near(d(EquiRectangular, 25.0, 50.0), Vec3::Z);
+        near(d(EquiRectangular, 50.0, 50.0), -Vec3::X);
+        near(d(EqualArea, 50.0, 50.0), Vec3::Y);
+        near(d(EqualArea, 100.0, 50.0), Vec3::X);
+        near(d(EqualArea, 50.0, 100.0), Vec3::Z);
+        // Filters reach over the edge.
+        assert!((d(EqualArea, -0.5, 20.0) - d(EqualArea, 0.5, 80.0)).length() < 1e-5);
+    }
+
+    #[test]
+    fn the_shutter_spans_its_interval() {
+        let camera = perspective(Affine3A::IDENTITY, 50.0, PINHOLE);
+        let time = |c: &Camera, u| c.ray(Vec2::ZERO, [0.5; 2], u).ray.time;
+        assert_eq!((time(&camera, 0.0), time(&camera, 0.75)), (0.0, 0.75));
+        let slow = camera.with_shutter(0.25, 0.75);
+        assert_eq!((time(&slow, 0.0), time(&slow, 0.5), time(&slow, 1.0)), (0.25, 0.5, 0.75));
+    }
+}

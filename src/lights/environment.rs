@@ -188,6 +188,12 @@ impl EnvironmentMap {
                 let (x0, y0) = (x.floor(), y.floor());
                 let (dx, dy) = (x - x0, y - y0);
                 let (x0, y0) = (x0 as isize, y0 as isize);
+                let (width, height) = (self.width as isize, self.height as isize);
+                if x0 >= 0 && y0 >= 0 && x0 + 1 < width && y0 + 1 < height {
+                    let i = y0 as usize * self.width + x0 as usize;
+                    let (upper, lower) = (&self.texels[i..i + 2], &self.texels[i + self.width..i + self.width + 2]);
+                    return upper[0].lerp(upper[1], dx).lerp(lower[0].lerp(lower[1], dx), dy);
+                }
                 let top = self.texel(x0, y0).lerp(self.texel(x0 + 1, y0), dx);
                 let bottom = self.texel(x0, y0 + 1).lerp(self.texel(x0 + 1, y0 + 1), dx);
                 top.lerp(bottom, dy)

@@ -433,3 +433,42 @@ fn delta_and_infinite_lights_are_consistent() {
         assert!((map.le(by_hand).r * 0.5 - le.r).abs() < 1e-3);
     }
 }
+#[test]
+fn zz_timing() {
+    let r = light_of(&rectangle_mesh(Vec3::ZERO, Vec3::X, Vec3::Y));
+    let t = light_of(&Shape::Mesh(TriangleMesh::new(vec![Vec3::ZERO, Vec3::X, Vec3::Y], vec![[0, 1, 2]]).unwrap()));
+    let full = QuadricKind::Sphere { radius: 1.0, z_min: -1.0, z_max: 1.0, phi_max: std::f32::consts::TAU };
+    let s = light_of(&Shape::Quadric(quadric(full, Affine3A::IDENTITY)));
+    let texels = (0..1024 * 1024).map(|i| Rgb::splat((i % 977) as f32)).collect();
+    let start = std::time::Instant::now();
+    let map = super::EnvironmentMap::new(
+        texels,
+        [1024, 1024],
+        super::EnvironmentMapping::EqualArea,
+        super::EnvironmentFilter::Bilinear,
+    )
+    .unwrap();
+    println!("map {:?}", start.elapsed());
+    let env = Light::infinite_image(std::sync::Arc::new(map), &Affine3A::IDENTITY, 1.0);
+    for (name, l) in [("rect", Light::Area(r)), ("tri", Light::Area(t)), ("sphere", Light::Area(s)), ("env", env)] {
+        let mut st = HashStream::new([1, 1, 1]);
+        let mut acc = 0.0;
+        let start = std::time::Instant::now();
+        let n = 1_000_000;
+        for _ in 0..n {
+            let u = st.next_2d();
+            let ctx = LightCtx::at(Vec3::new(0.3 + u[0], 0.2, 2.0));
+            acc += l.sample_li(&ctx, st.next_2d()).map_or(0.0, |s| s.pdf);
+        }
+        let a = start.elapsed().as_secs_f64() / n as f64 * 1e9;
+        let start = std::time::Instant::now();
+        for _ in 0..n {
+            let u = st.next_2d();
+            let ctx = LightCtx::at(Vec3::new(0.3 + u[0], 0.2, 2.0));
+            let v = st.next_2d();
+            let p = Vec3::new(u[0], v[1], 0.0);
+            acc += l.pdf_li(&ctx, (p - ctx.p).normalize(), &LightHit { t: 1.0, p, n: Vec3::Z, uv: Vec2::ZERO });
+        }
+        println!("{name} sample {a:.1} ns pdf {:.1} ns ({acc})", start.elapsed().as_secs_f64() / n as f64 * 1e9);
+    }
+}

@@ -102,3 +102,123 @@ impl LightSet {
         self.infinite.iter().map(|&i| self.pdf(ctx, i, wi, &LightHit::INFINITE)).sum()
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::geometry::TriangleMesh;
+    use crate::lights::{EnvironmentFilter, EnvironmentMap, EnvironmentMapping};
+    use crate::math::Affine3A;
+    use crate::math::hash::HashStream;
+    use crate::math::test_support::{Moments, assert_chi_squared};
+    use std::sync::Arc;
+
+    const KINDS: [LightSamplerKind; 3] = [LightSamplerKind::Uniform, LightSamplerKind::Power, LightSamplerKind::Tree];
+
+    fn quad(z: f32) -> Shape {
+        let p = vec![Vec3::new(0.0, 0.0, z), Vec3::new(0.0, 1.0, z), Vec3::new(1.0, 1.0, z), Vec3::new(1.0, 0.0, z)];
+        Shape::Mesh(TriangleMesh::new(p, vec![[0, 1, 2], [0, 2, 3]]).unwrap())
+    }
+
+    fn builder() -> LightSetBuilder {
+        let mut b = LightSetBuilder::default();
+        b.add(Light::Point { p: Vec3::new(2.0, 2.0, 2.0), intensity: Rgb::splat(3.0) });
+        b.add_area(7, &quad(3.0), &Emission::constant(Rgb::splat(5.0)));
+        b.add_area(3, &quad(2.0), &Emission::constant(Rgb::BLACK));
+        b.add(Light::InfiniteConstant { l: Rgb::splat(0.1) });
+        b.add(Light::Distant { wi_world: Vec3::Z, l: Rgb::WHITE });
+        let texels = (0..16).map(|i| Rgb::splat(i as f32 * 0.01)).collect();
+        let map = EnvironmentMap::new(texels, [4, 4], EnvironmentMapping::EqualArea, EnvironmentFilter::Bilinear);
+        b.add(Light::infinite_image(Arc::new(map.unwrap()), &Affine3A::IDENTITY, 2.0));
+        b
+    }
+
+    fn bounds() -> Bounds3 {
+        Bounds3 { min: Vec3::ZERO, max: Vec3::splat(3.0) }
+    }
+
+    #[test]
+    fn every_sampler_is_a_distribution_over_the_lights_that_shine() {
+        for kind in KINDS {
+            let set = builder().build(kind, &bounds());
+            let mut s = HashStream::new([1, 2, 3]);
+            for ns in [Vec3::ZERO, Vec3::Z] {
+                let ctx = LightCtx { p: Vec3::new(0.4, 0.3, 0.0), n: ns, ns };
+                let pmf: Vec<f64> = (0..6).map(|i| f64::from(set.sampler.pmf(&ctx, i))).collect();
+                assert!((pmf.iter().sum::<f64>() - 1.0).abs() < 1e-5, "{kind:?} {pmf:?}");
+                assert_eq!(pmf.iter().map(|&p| p > 0.0).collect::<Vec<_>>(), [true, true, false, true, true, true]);
+                let count = 50_000;
+                let mut observed = vec![0.0; 6];
+                for _ in 0..count {
+                    let choice = set.sampler.sample(&ctx, s.next_f32()).unwrap();
+                    assert!((0.0..1.0).contains(&choice.u));
+                    assert_eq!(choice.pmf, set.sampler.pmf(&ctx, choice.light));
+                    observed[choice.light as usize] += 1.0;
+                }
+                let expected: Vec<f64> = pmf.iter().map(|p| p * f64::from(count)).collect();
+                assert_chi_squared(&observed, &expected, 1e-5);
+            }
+        }
+    }
+
+    #[test]
+    fn all_samplers_agree_on_the_irradiance_and_with_the_sum_over_lights() {
+        let (p, n) = (Vec3::new(0.4, 0.3, 0.0), Vec3::Z);
+        let ctx = LightCtx { p, n, ns: n };
+        let reference = builder().build(LightSamplerKind::Uniform, &bounds());
+        let mut s = HashStream::new([4, 2, 3]);
+        let mut exact = 0.0;
+        for light in &reference.lights {
+            let n_samples = 200_000;
+            for _ in 0..n_samples {
+                exact += light
+                    .sample_li(&ctx, s.next_2d())
+                    .map_or(0.0, |s| f64::from(s.li.g * s.wi.dot(n).max(0.0) / s.pdf) / f64::from(n_samples));
+            }
+        }
+        for kind in KINDS {
+            let set = builder().build(kind, &bounds());
+            let mut moments = Moments::default();
+            for _ in 0..200_000 {
+                let sample = set.sample(&ctx, s.next_f32(), s.next_2d());
+                moments.add(sample.map_or(0.0, |(light, s)| {
+                    if !s.is_delta {
+                        let hit = LightHit { t: s.t, p: s.p, n: s.n, uv: crate::math::Vec2::ZERO };
+                        let pdf = set.pdf(&ctx, light, s.wi, &hit);
+                        assert!((pdf - s.pdf).abs() <= 1e-3 * s.pdf || set.lights[light as usize].is_infinite());
+                    }
+                    f64::from(s.li.g * s.wi.dot(n).max(0.0) / s.pdf)
+                }));
+            }
+            moments.assert_mean(exact, 1e-5, 2e-3);
+        }
+    }
+
+    #[test]
+    fn hits_find_their_lights_and_rays_that_leave_find_the_environment() {
+        let set = builder().build(LightSamplerKind::Tree, &bounds());
+        assert_eq!((set.light_of(7, 0), set.light_of(7, 1), set.light_of(3, 1)), (Some(1), Some(1), Some(2)));
+        assert_eq!((set.light_of(7, 2), set.light_of(0, 0), set.light_of(9, 0)), (None, None, None));
+        assert_eq!(set.infinite, [3, 5]);
+        let w = Vec3::new(0.6, 0.0, 0.8);
+        assert_eq!(set.le(w), set.lights[3].le(w) + set.lights[5].le(w));
+        let ctx = LightCtx::at(Vec3::ZERO);
+        let each: f32 = [3, 5].iter().map(|&i| set.pdf(&ctx, i, w, &LightHit::INFINITE)).sum();
+        assert!(each > 0.0 && set.pdf_infinite(&ctx, w) == each);
+    }
+
+    #[test]
+    fn scenes_without_light_or_without_extent_are_handled() {
+        let ctx = LightCtx::at(Vec3::ZERO);
+        for kind in KINDS {
+            let set = LightSetBuilder::default().build(kind, &Bounds3::EMPTY);
+            assert!(set.sample(&ctx, 0.5, [0.5; 2]).is_none() && set.le(Vec3::Z).is_black());
+            let mut b = LightSetBuilder::default();
+            b.add(Light::InfiniteConstant { l: Rgb::WHITE });
+            assert!(b.build(kind, &Bounds3::EMPTY).sample(&ctx, 0.999, [0.5; 2]).is_some());
+            let mut b = LightSetBuilder::default();
+            b.add_area(0, &quad(1.0), &Emission::constant(Rgb::BLACK));
+            assert!(b.build(kind, &bounds()).sample(&ctx, 0.5, [0.5; 2]).is_none());
+        }
+    }
+}

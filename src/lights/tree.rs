@@ -13,6 +13,8 @@ use crate::math::{Bounds3, ONE_MINUS_EPSILON, Vec3, safe_sqrt, sqr};
 const COSINE_SLACK: f32 = 1e-3;
 /// Beyond this depth lights are split in halves, so that the trail of any leaf fits 64 bits.
 const MAX_HEURISTIC_DEPTH: u32 = 30;
+/// Least probability of a child that can contribute; f32 uniforms and 1 − p do not resolve much less.
+const MIN_SHARE: f32 = 1.0 / (1 << 20) as f32;
 /// Places where an axis is tried to be cut, plus one.
 const BUCKETS: usize = 12;
 /// Trail of lights that are not in the tree.
@@ -170,7 +172,13 @@ impl LightTree {
         let (left, right) = (&self.nodes[place + 1], &self.nodes[self.nodes[place].index as usize]);
         let (a, b) = (left.importance(ctx), right.importance(ctx));
         let p = a / (a + b);
-        if p.is_finite() { p } else { left.intensity / (left.intensity + right.intensity) }
+        if a > 0.0 && b > 0.0 && p.is_finite() {
+            p.clamp(MIN_SHARE, 1.0 - MIN_SHARE)
+        } else if p.is_finite() {
+            p
+        } else {
+            left.intensity / (left.intensity + right.intensity)
+        }
     }
 
     /// Chooses a light by `u` in [0, 1): its id, its probability, and `u` made uniform again.
@@ -279,4 +287,188 @@ fn best_cut(items: &[Item], axis: usize, min: f32, extent: f32) -> Option<(f32, 
         }
     }
     best
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::geometry::{Shape, TriangleMesh};
+    use crate::lights::{Emission, Light, area_lights_of};
+    use crate::math::Rgb;
+    use crate::math::hash::HashStream;
+    use crate::math::test_support::assert_chi_squared;
+    use crate::math::warp::sample_uniform_sphere;
+
+    /// Lights of all kinds in the cube 0..scale, about half of them in small clusters.
+    fn random_lights(count: usize, scale: f32, key: u32) -> Vec<Light> {
+        let mut s = HashStream::new([key, 17, 0]);
+        (0..count)
+            .map(|i| {
+                let mut vector = || Vec3::new(s.next_f32(), s.next_f32(), s.next_f32());
+                let p = if i % 2 == 0 { vector() } else { vector() * 0.02 + 0.5 } * scale;
+                let l = Rgb::splat(s.next_f32().powi(4) * 10.0 + 0.01);
+                let axis = sample_uniform_sphere(s.next_2d());
+                match i % 5 {
+                    0 => Light::Point { p, intensity: l * scale * scale },
+                    1 => {
+                        let (a, b) = (s.next_f32(), s.next_f32());
+                        let (cos_total, cos_falloff_start) = (a.min(b) * 2.0 - 1.0, a.max(b) * 2.0 - 1.0);
+                        Light::Spot { p, axis, cos_total, cos_falloff_start, intensity: l * scale * scale }
+                    }
+                    k => {
+                        let mut edge = || sample_uniform_sphere(s.next_2d()) * scale * 0.01;
+                        let mesh = TriangleMesh::new(vec![p, p + edge(), p + edge()], vec![[0, 1, 2]]).unwrap();
+                        let emission = Emission { l, two_sided: k == 2, image: None };
+                        Light::Area(area_lights_of(&Shape::Mesh(mesh), &emission).lights.remove(0))
+                    }
+                }
+            })
+            .collect()
+    }
+
+    fn tree_of(lights: &[Light]) -> LightTree {
+        LightTree::new(&lights.iter().map(Light::bounds).collect::<Vec<_>>())
+    }
+
+    fn random_ctx(s: &mut HashStream, scale: f32) -> LightCtx {
+        let p = (Vec3::new(s.next_f32(), s.next_f32(), s.next_f32()) * 1.6 - 0.3) * scale;
+        let n = sample_uniform_sphere(s.next_2d());
+        if s.next_f32() < 0.2 { LightCtx::at(p) } else { LightCtx { p, n, ns: n } }
+    }
+
+    #[test]
+    fn probabilities_add_up_to_one_everywhere() {
+        for (count, key) in [(1, 1), (2, 2), (7, 3), (300, 4)] {
+            let tree = tree_of(&random_lights(count, 1.0, key));
+            let mut s = HashStream::new([key, 1, 1]);
+            for _ in 0..200 {
+                let ctx = random_ctx(&mut s, 1.0);
+                let sum: f64 = (0..count as u32).map(|i| f64::from(tree.pmf(&ctx, i))).sum();
+                assert!((sum - 1.0).abs() < 1e-4, "{count} lights: {sum}");
+            }
+        }
+    }
+
+    #[test]
+    fn choices_follow_the_probabilities_and_remapped_numbers_are_uniform() {
+        let lights = random_lights(40, 1.0, 9);
+        let tree = tree_of(&lights);
+        let mut s = HashStream::new([5, 1, 1]);
+        for _ in 0..5 {
+            let ctx = random_ctx(&mut s, 1.0);
+            let count = 100_000;
+            let mut observed = vec![0.0; lights.len() * 4];
+            for _ in 0..count {
+                let (light, pmf, u) = tree.sample(&ctx, s.next_f32()).unwrap();
+                assert_eq!(pmf, tree.pmf(&ctx, light));
+                observed[light as usize * 4 + (u * 4.0) as usize] += 1.0;
+            }
+            let expected: Vec<f64> = (0..observed.len())
+                .map(|i| (f64::from(tree.pmf(&ctx, (i / 4) as u32)) / 4.0 * f64::from(count)).max(1e-3))
+                .collect();
+            assert_chi_squared(&observed, &expected, 1e-5);
+        }
+    }
+
+    #[test]
+    fn a_light_that_can_contribute_can_be_chosen() {
+        for scale in [1e-3, 1.0, 1e3] {
+            let lights = random_lights(150, scale, 21);
+            let tree = tree_of(&lights);
+            let mut s = HashStream::new([6, 1, 1]);
+            let mut contributions = 0;
+            for _ in 0..400 {
+                let ctx = random_ctx(&mut s, scale);
+                for (i, light) in lights.iter().enumerate() {
+                    let contributes = (0..4).any(|_| {
+                        let sample = light.sample_li(&ctx, s.next_2d());
+                        sample.is_some_and(|s| !s.li.is_black() && (ctx.ns == Vec3::ZERO || s.wi.dot(ctx.ns) != 0.0))
+                    });
+                    contributions += u32::from(contributes);
+                    assert!(!contributes || tree.pmf(&ctx, i as u32) > 0.0, "light {i} starves at {ctx:?}: {light:?}");
+                }
+            }
+            assert!(contributions > 10_000);
+        }
+    }
+
+    #[test]
+    fn the_choice_does_not_depend_on_the_unit_of_length() {
+        let reference = tree_of(&random_lights(60, 1.0, 33));
+        for scale in [1.0 / 1024.0, 1024.0, 1e-3, 1e3] {
+            let scaled = tree_of(&random_lights(60, scale, 33));
+            let (mut a, mut b) = (HashStream::new([7, 1, 1]), HashStream::new([7, 1, 1]));
+            // Powers of two are exact.
+            let tolerance = if scale.log2().fract() == 0.0 { 0.0 } else { 1e-3 };
+            for _ in 0..100 {
+                let (ctx, scaled_ctx) = (random_ctx(&mut a, 1.0), random_ctx(&mut b, scale));
+                for light in 0..60 {
+                    let (p, q) = (reference.pmf(&ctx, light), scaled.pmf(&scaled_ctx, light));
+                    assert!((p - q).abs() <= tolerance * p.max(1e-3), "{scale}: light {light}: {p} {q}");
+                }
+            }
+        }
+    }
+
+    #[test]
+    fn near_lights_are_preferred() {
+        let at = |x: f32| Light::Point { p: Vec3::new(x, 0.0, 0.0), intensity: Rgb::WHITE };
+        let tree = tree_of(&[at(0.0), at(10.0)]);
+        let pmf = tree.pmf(&LightCtx::at(Vec3::new(1.0, 0.0, 0.0)), 0);
+        assert!((pmf - 81.0 / 82.0).abs() < 1e-5, "{pmf}");
+    }
+
+    #[test]
+    fn degenerate_sets_are_handled() {
+        let ctx = LightCtx { p: Vec3::ZERO, n: Vec3::Y, ns: Vec3::Y };
+        // None, or none that shines.
+        assert!(tree_of(&[]).sample(&ctx, 0.5).is_none());
+        let black = Light::Point { p: Vec3::ONE, intensity: Rgb::BLACK };
+        let mesh = TriangleMesh::new(vec![Vec3::ONE, Vec3::ONE, Vec3::X], vec![[0, 1, 2]]).unwrap();
+        let flat = area_lights_of(&Shape::Mesh(mesh), &Emission::constant(Rgb::WHITE)).lights.remove(0);
+        let dark = [black.clone(), Light::Area(flat), Light::InfiniteConstant { l: Rgb::WHITE }];
+        let tree = tree_of(&dark);
+        assert!(tree.is_empty() && tree.sample(&ctx, 0.5).is_none() && tree.pmf(&ctx, 0) == 0.0);
+
+        // One light; the same light many times; lights on a line; the point on a light.
+        let one = Light::Point { p: Vec3::ONE, intensity: Rgb::WHITE };
+        assert_eq!(tree_of(&[black, one.clone()]).sample(&ctx, 0.9).map(|s| (s.0, s.1)), Some((1, 1.0)));
+        let same = vec![one; 1000];
+        let line: Vec<Light> = (0..1000)
+            .map(|i| Light::Point { p: Vec3::new(1e-3 * 1.01_f32.powi(i), 0.0, 0.0), intensity: Rgb::WHITE })
+            .collect();
+        for lights in [same, line] {
+            let tree = tree_of(&lights);
+            for p in [Vec3::ZERO, Vec3::ONE, Vec3::new(1e-3, 0.0, 0.0)] {
+                let ctx = LightCtx { p, ..ctx };
+                let sum: f64 = (0..1000).map(|i| f64::from(tree.pmf(&ctx, i))).sum();
+                assert!((sum - 1.0).abs() < 1e-3, "{sum}");
+            }
+        }
+        // Opposite axes have no common cone.
+        let spot =
+            |axis| Light::Spot { p: Vec3::ONE, axis, cos_total: 0.9, cos_falloff_start: 0.9, intensity: Rgb::WHITE };
+        let tree = tree_of(&[spot(Vec3::Y), spot(-Vec3::Y)]);
+        assert!(tree.pmf(&LightCtx::at(Vec3::new(1.0, 5.0, 1.0)), 0) == 1.0);
+    }
+
+    #[test]
+    fn a_hundred_thousand_lights_are_built_in_seconds() {
+        let lights = random_lights(100_000, 1.0, 55);
+        let start = std::time::Instant::now();
+        let tree = tree_of(&lights);
+        let seconds = start.elapsed().as_secs_f64();
+        println!("built in {seconds:.2} s");
+        assert!(seconds < 30.0, "{seconds} s");
+        assert_eq!(tree.nodes.len(), 199_999);
+        let mut s = HashStream::new([8, 1, 1]);
+        let ctx = random_ctx(&mut s, 1.0);
+        let start = std::time::Instant::now();
+        let n = 100_000;
+        for _ in 0..n {
+            let (light, pmf, _) = tree.sample(&ctx, s.next_f32()).unwrap();
+            assert!(pmf > 0.0 && light < 100_000);
+        }
+        println!("{:.0} ns per choice", start.elapsed().as_secs_f64() / f64::from(n) * 1e9);
+    }
 }

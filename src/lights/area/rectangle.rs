@@ -43,6 +43,8 @@ struct SphericalRectangle {
     y: [f64; 2],
     z0: f64,
     solid_angle: f64,
+    /// e^{i(g2 + g3)} up to a positive factor.
+    g23: (f64, f64),
 }
 
 /// The argument of a product of complex numbers, in [0, 2π); a negative zero of rounding is 0.
@@ -78,18 +80,19 @@ impl SphericalRectangle {
         }
         let [g01, g23] = SphericalRectangle::inner_angles(x, y, z0);
         let solid_angle = angle(complex_product(g01, g23));
-        (solid_angle >= MIN_SOLID_ANGLE).then_some(SphericalRectangle { x, y, z0, solid_angle })
+        (solid_angle >= MIN_SOLID_ANGLE).then_some(SphericalRectangle { x, y, z0, solid_angle, g23 })
     }
 
     /// The point (x, y) of the rectangle for two uniform numbers.
     fn sample(&self, u: [f32; 2]) -> [f64; 2] {
-        let SphericalRectangle { x, y, z0, solid_angle } = *self;
+        let SphericalRectangle { x, y, z0, solid_angle, g23 } = *self;
         // Ureña's b0 and b1: z of the normals of the planes through the edges y0 and y1.
         let b0 = -y[0] / (y[0] * y[0] + z0 * z0).sqrt();
         let b1 = y[1] / (y[1] * y[1] + z0 * z0).sqrt();
-        let [_, g23] = SphericalRectangle::inner_angles(x, y, z0);
-        let au = f64::from(u[0]) * solid_angle - angle(g23);
-        let (sin, cos) = au.sin_cos();
+        // cos and sin of u·S − (g2 + g3).
+        let (sin_us, cos_us) = (f64::from(u[0]) * solid_angle).sin_cos();
+        let scale = 1.0 / (g23.0 * g23.0 + g23.1 * g23.1).sqrt();
+        let (cos, sin) = complex_product((cos_us, sin_us), (g23.0 * scale, -g23.1 * scale));
         let fu = (cos * b0 - b1) / sin;
         let cu = (1.0 / (fu * fu + b0 * b0).sqrt()).copysign(fu).clamp(-1.0, 1.0);
         let xu = (-(cu * z0) / (1.0 - cu * cu).max(1e-300).sqrt()).clamp(x[0], x[1]);
