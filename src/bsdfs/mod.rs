@@ -1,1 +1,241 @@
-//! (in progress)
+//! Scattering at surfaces. Local frame: n = +z; `wo` to the viewer, `wi` to the light, both unit and away from the
+//! surface. The models are those of pbrt-v4 [Pharr et al. 2023, ch. 9 and 14]; f of transmission is for radiance, that is
+//! scaled by 1/η².
+//!
+//! Reading order: [`fresnel`], [`microfacet`], [`diffuse`], [`diffuse_transmission`], [`conductor`], [`dielectric`],
+//! [`thin_dielectric`], [`coat_table`], [`coated_diffuse`], [`layered`].
+
+pub mod coat_table;
+pub mod coated_diffuse;
+pub mod conductor;
+pub mod dielectric;
+pub mod diffuse;
+pub mod diffuse_transmission;
+pub mod fresnel;
+pub mod layered;
+pub mod microfacet;
+#[cfg(test)]
+mod tests;
+pub mod thin_dielectric;
+
+pub use coat_table::CoatTable;
+pub use coated_diffuse::CoatedDiffuse;
+pub use conductor::Conductor;
+pub use dielectric::Dielectric;
+pub use diffuse::Diffuse;
+pub use diffuse_transmission::DiffuseTransmission;
+pub use layered::{Base, Layered};
+pub use microfacet::TrowbridgeReitz;
+pub use thin_dielectric::ThinDielectric;
+
+use crate::math::hash::{pcg4d, unit_f32};
+use crate::math::{Rgb, Vec3};
+use std::ops::BitOr;
+
+/// What kind of scattering a sample is: a set of flags.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Lobe(u8);
+
+impl Lobe {
+    /// To the side of `wo`.
+    pub const REFLECTION: Lobe = Lobe(1);
+    /// To the other side.
+    pub const TRANSMISSION: Lobe = Lobe(2);
+    /// Lambertian or as wide.
+    pub const DIFFUSE: Lobe = Lobe(4);
+    /// A rough peak.
+    pub const GLOSSY: Lobe = Lobe(8);
+    /// A delta: `pdf` is a probability, and f and pdf of the methods leave it out.
+    pub const SPECULAR: Lobe = Lobe(16);
+
+    /// True if all flags of `other` are set.
+    #[inline]
+    pub const fn contains(self, other: Lobe) -> bool {
+        self.0 & other.0 == other.0
+    }
+
+    /// True if the direction is a delta.
+    #[inline]
+    pub const fn is_specular(self) -> bool {
+        self.contains(Lobe::SPECULAR)
+    }
+
+    /// True if the direction is on the other side.
+    #[inline]
+    pub const fn is_transmission(self) -> bool {
+        self.contains(Lobe::TRANSMISSION)
+    }
+}
+
+impl BitOr for Lobe {
+    type Output = Lobe;
+    #[inline]
+    fn bitor(self, other: Lobe) -> Lobe {
+        Lobe(self.0 | other.0)
+    }
+}
+
+/// A sampled direction. The weight of the path is `f·|cos θi|/pdf` for all lobes.
+#[derive(Clone, Copy, Debug)]
+pub struct BsdfSample {
+    /// Value without cosine (1/sr); of a delta, its weight over |cos θi|, times `pdf`.
+    pub f: Rgb,
+    /// Direction to the light.
+    pub wi: Vec3,
+    /// Density per steradian; of a delta, its probability.
+    pub pdf: f32,
+    /// Kind of scattering.
+    pub lobe: Lobe,
+    /// Index of refraction of the side of `wi` relative to that of `wo`; 1 for reflection.
+    pub eta: f32,
+}
+
+/// The scattering of one surface point.
+#[derive(Clone, Copy, Debug)]
+pub enum Bsdf<'a> {
+    /// Lambertian reflection.
+    Diffuse(Diffuse),
+    /// Lambertian reflection and transmission.
+    DiffuseTransmission(DiffuseTransmission),
+    /// Metal.
+    Conductor(Conductor),
+    /// Glass.
+    Dielectric(Dielectric),
+    /// A sheet of glass.
+    ThinDielectric(ThinDielectric),
+    /// Lambertian under a clear coat.
+    CoatedDiffuse(CoatedDiffuse<'a>),
+    /// Any base under any coat, by random walks.
+    Layered(Layered),
+}
+
+/// Both directions in the upper hemisphere, the whole surface being symmetric; `None` if they are on different sides.
+#[inline]
+fn to_upper(wo: Vec3, wi: Vec3) -> Option<(Vec3, Vec3)> {
+    if wo.z * wi.z <= 0.0 {
+        None
+    } else if wo.z < 0.0 {
+        Some((-wo, -wi))
+    } else {
+        Some((wo, wi))
+    }
+}
+
+impl Bsdf<'_> {
+    /// Value without cosine (1/sr), without deltas. 0 at the horizon and never NaN or infinite.
+    #[inline]
+    pub fn f(&self, wo: Vec3, wi: Vec3) -> Rgb {
+        if wo.z == 0.0 || wi.z == 0.0 {
+            return Rgb::BLACK;
+        }
+        let f = match self {
+            Bsdf::Diffuse(b) => b.f(wo, wi),
+            Bsdf::DiffuseTransmission(b) => b.f(wo, wi),
+            Bsdf::Conductor(b) => b.f(wo, wi),
+            Bsdf::Dielectric(b) => b.f(wo, wi),
+            Bsdf::ThinDielectric(_) => Rgb::BLACK,
+            Bsdf::CoatedDiffuse(b) => b.f(wo, wi),
+            Bsdf::Layered(b) => b.f(wo, wi),
+        };
+        if f.is_finite() { f } else { Rgb::BLACK }
+    }
+
+    /// Density of the non-specular part of [`Self::sample`] per steradian.
+    #[inline]
+    pub fn pdf(&self, wo: Vec3, wi: Vec3) -> f32 {
+        if wo.z == 0.0 || wi.z == 0.0 {
+            return 0.0;
+        }
+        let pdf = match self {
+            Bsdf::Diffuse(b) => b.pdf(wo, wi),
+            Bsdf::DiffuseTransmission(b) => b.pdf(wo, wi),
+            Bsdf::Conductor(b) => b.pdf(wo, wi),
+            Bsdf::Dielectric(b) => b.pdf(wo, wi),
+            Bsdf::ThinDielectric(_) => 0.0,
+            Bsdf::CoatedDiffuse(b) => b.pdf(wo, wi),
+            Bsdf::Layered(b) => b.pdf(wo, wi),
+        };
+        if pdf.is_finite() { pdf } else { 0.0 }
+    }
+
+    /// A direction `wi`, by `uc` among the lobes and `u` within one. `None` if the sample carries no light.
+    #[inline]
+    pub fn sample(&self, wo: Vec3, uc: f32, u: [f32; 2]) -> Option<BsdfSample> {
+        if wo.z == 0.0 {
+            return None;
+        }
+        let sample = match self {
+            Bsdf::Diffuse(b) => b.sample(wo, u),
+            Bsdf::DiffuseTransmission(b) => b.sample(wo, uc, u),
+            Bsdf::Conductor(b) => b.sample(wo, u),
+            Bsdf::Dielectric(b) => b.sample(wo, uc, u),
+            Bsdf::ThinDielectric(b) => b.sample(wo, uc),
+            Bsdf::CoatedDiffuse(b) => b.sample(wo, uc, u),
+            Bsdf::Layered(b) => b.sample(wo, uc, u),
+        };
+        sample.filter(|s| s.pdf > 0.0 && s.pdf.is_finite() && s.wi.z != 0.0 && s.f.is_finite() && !s.f.is_black())
+    }
+
+    /// True if [`Self::f`] is not always 0: the point can be lit by sampling lights.
+    #[inline]
+    pub fn has_non_specular(&self) -> bool {
+        match self {
+            Bsdf::Diffuse(_) | Bsdf::DiffuseTransmission(_) | Bsdf::CoatedDiffuse(_) => true,
+            Bsdf::Conductor(b) => !b.distribution.is_smooth(),
+            Bsdf::Dielectric(b) => !b.is_specular(),
+            Bsdf::ThinDielectric(_) => false,
+            Bsdf::Layered(b) => b.has_non_specular(),
+        }
+    }
+
+    /// True if [`Self::sample`] can return deltas.
+    #[inline]
+    pub fn has_specular(&self) -> bool {
+        match self {
+            Bsdf::Diffuse(_) | Bsdf::DiffuseTransmission(_) => false,
+            Bsdf::Conductor(b) => b.distribution.is_smooth(),
+            Bsdf::Dielectric(b) => b.is_specular(),
+            Bsdf::ThinDielectric(_) => true,
+            Bsdf::CoatedDiffuse(b) => b.has_specular(),
+            Bsdf::Layered(b) => b.has_specular(),
+        }
+    }
+
+    /// True if all scattering is by deltas.
+    #[inline]
+    pub fn is_specular_only(&self) -> bool {
+        !self.has_non_specular()
+    }
+
+    /// True if light can pass to the other side.
+    #[inline]
+    pub fn is_transmissive(&self) -> bool {
+        match self {
+            Bsdf::Diffuse(_) | Bsdf::Conductor(_) | Bsdf::CoatedDiffuse(_) | Bsdf::Layered(_) => false,
+            Bsdf::DiffuseTransmission(b) => !b.transmittance.is_black(),
+            Bsdf::Dielectric(_) | Bsdf::ThinDielectric(_) => true,
+        }
+    }
+
+    /// Fraction of uniform light that reaches `wo`, for the albedo image: exact for the Lambertian and coated ones,
+    /// otherwise the mean of 16 fixed samples.
+    pub fn albedo_estimate(&self, wo: Vec3) -> Rgb {
+        const SAMPLES: u32 = 16;
+        match self {
+            Bsdf::Diffuse(b) => b.reflectance,
+            Bsdf::DiffuseTransmission(b) => b.reflectance + b.transmittance,
+            Bsdf::CoatedDiffuse(b) => b.albedo(wo),
+            Bsdf::Conductor(_) | Bsdf::Dielectric(_) | Bsdf::ThinDielectric(_) | Bsdf::Layered(_) => {
+                let mut sum = Rgb::BLACK;
+                for i in 0..SAMPLES {
+                    let stratum = (i as f32 + 0.5) / SAMPLES as f32;
+                    let u = pcg4d([i, 1, 2, 3]).map(unit_f32);
+                    if let Some(s) = self.sample(wo, stratum, [u[0], u[1]]) {
+                        sum += s.f * (s.wi.z.abs() / s.pdf);
+                    }
+                }
+                sum / SAMPLES as f32
+            }
+        }
+    }
+}

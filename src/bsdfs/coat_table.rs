@@ -1,0 +1,269 @@
+//! Directional integrals of a dielectric coat over a Lambertian base, tabulated for [`super::CoatedDiffuse`].
+//!
+//! For the interface of relative index η with a layer of thickness t and unit extinction below it:
+//!
+//! - T(w) = ∫ f_t(w, w') |cos θ'| exp(−t/|cos θ'|) dw', w outside and w' inside, f_t without the 1/η² of radiance;
+//! - R(w) = ∫ f_r(w, w') cos θ' dw', both outside;
+//! - R_in = (1/π) ∫∫ cos θ e(θ) f_r(w, w') cos θ' e(θ') dw dw', both inside, e(θ) = exp(−t/cos θ);
+//! - T̄ = (1/π) ∫ T(w) cos θ dw.
+//!
+//! With visible-normal sampling f cos/pdf = (F or 1 − F) G/G1, so that each integral is a mean over the unit square
+//! of a smooth function, taken by the midpoint rule. Tables are linear in √cos θ, in which T has bounded curvature
+//! down to the horizon.
+
+use super::dielectric::Dielectric;
+use super::fresnel::{fr_dielectric, reflect, refract};
+use super::microfacet::{SMOOTH_ALPHA, TrowbridgeReitz};
+use crate::math::{Vec3, sqr, warp};
+use std::f32::consts::FRAC_PI_2;
+
+/// Nodes over √cos θ.
+const COSINES: usize = 128;
+/// Rows of a table over the roughness.
+const ALPHAS: usize = 32;
+/// Rows of a table over the azimuth, 0..π/2.
+const AZIMUTHS: usize = 9;
+/// Quadrature nodes of the unit square of visible normals.
+const NORMALS: [usize; 2] = [32, 64];
+
+/// The meaning of a table's rows.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+enum Axis {
+    /// One isotropic roughness.
+    Fixed,
+    /// One anisotropic roughness, rows over the azimuth of the outside direction.
+    Azimuth,
+    /// Rows over the fourth root of alpha of an isotropic roughness.
+    Alpha,
+}
+
+/// Hemispherical integrals of an interface.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct Hemispherical {
+    /// R_in, the reflectance from below for diffuse light.
+    pub internal: f32,
+    /// T̄, the transmittance from above for diffuse light.
+    pub transmittance: f32,
+}
+
+impl Hemispherical {
+    fn lerp(self, other: Self, t: f32) -> Self {
+        Hemispherical {
+            internal: self.internal + (other.internal - self.internal) * t,
+            transmittance: self.transmittance + (other.transmittance - self.transmittance) * t,
+        }
+    }
+}
+
+#[derive(Clone, Debug)]
+struct Row {
+    /// (T, R) at √cos θ = i/(COSINES − 1).
+    directional: Vec<[f32; 2]>,
+    hemispherical: Hemispherical,
+}
+
+/// Tables of one η and thickness; see the module.
+#[derive(Clone, Debug)]
+pub struct CoatTable {
+    eta: f32,
+    thickness: f32,
+    axis: Axis,
+    rows: Vec<Row>,
+    smooth: Hemispherical,
+}
+
+impl CoatTable {
+    /// For one roughness, which is exact for anisotropic ones too.
+    pub fn for_roughness(eta: f32, thickness: f32, distribution: TrowbridgeReitz) -> Self {
+        let thickness = thickness.max(0.0);
+        let interface = Dielectric { eta, distribution };
+        let (axis, rows) = if interface.is_specular() {
+            (Axis::Fixed, Vec::new())
+        } else if distribution.alpha_x == distribution.alpha_y {
+            (Axis::Fixed, vec![Row::new(&interface, thickness, 0.0)])
+        } else {
+            let azimuth = |i| FRAC_PI_2 * i as f32 / (AZIMUTHS - 1) as f32;
+            (Axis::Azimuth, (0..AZIMUTHS).map(|i| Row::new(&interface, thickness, azimuth(i))).collect())
+        };
+        CoatTable { eta, thickness, axis, rows, smooth: smooth_integrals(eta, thickness) }
+    }
+
+    /// For all isotropic roughnesses, where the roughness is textured. Anisotropic ones are looked up by the geometric
+    /// mean of their alphas.
+    pub fn for_all_roughness(eta: f32, thickness: f32) -> Self {
+        let thickness = thickness.max(0.0);
+        let row = |i| {
+            let alpha = sqr(sqr(alpha_axis(i as f32 / (ALPHAS - 1) as f32)));
+            Row::new(&Dielectric { eta, distribution: TrowbridgeReitz::new(alpha, alpha) }, thickness, 0.0)
+        };
+        let rows = if eta == 1.0 { Vec::new() } else { (0..ALPHAS).map(row).collect() };
+        CoatTable { eta, thickness, axis: Axis::Alpha, rows, smooth: smooth_integrals(eta, thickness) }
+    }
+
+    /// Index of refraction of the layer relative to the outside.
+    pub fn eta(&self) -> f32 {
+        self.eta
+    }
+
+    /// Position of a roughness in the table, to pass to the other methods.
+    pub fn row(&self, distribution: TrowbridgeReitz) -> f32 {
+        match self.axis {
+            Axis::Fixed | Axis::Azimuth => 0.0,
+            Axis::Alpha => {
+                let fourth_root = (distribution.alpha_x * distribution.alpha_y).sqrt().sqrt().sqrt();
+                let x = (fourth_root - alpha_axis(0.0)) / (alpha_axis(1.0) - alpha_axis(0.0));
+                x.clamp(0.0, 1.0) * (ALPHAS - 1) as f32
+            }
+        }
+    }
+
+    /// T and R of the outside direction `w`, in the upper hemisphere, for a rough interface.
+    pub fn directional(&self, w: Vec3, row: f32) -> [f32; 2] {
+        let row = match self.axis {
+            Axis::Fixed | Axis::Alpha => row,
+            Axis::Azimuth => w.y.abs().atan2(w.x.abs()) * ((AZIMUTHS - 1) as f32 / FRAC_PI_2),
+        };
+        let x = w.z.clamp(0.0, 1.0).sqrt() * (COSINES - 1) as f32;
+        let (i, row_i) = ((x as usize).min(COSINES - 2), row as usize);
+        let (t, row_t) = (x - i as f32, row - row_i as f32);
+        let of_row = |row: &Row| {
+            let (a, b) = (row.directional[i], row.directional[i + 1]);
+            [a[0] + (b[0] - a[0]) * t, a[1] + (b[1] - a[1]) * t]
+        };
+        let below = of_row(&self.rows[row_i.min(self.rows.len() - 1)]);
+        if row_t == 0.0 || row_i + 1 >= self.rows.len() {
+            return below;
+        }
+        let above = of_row(&self.rows[row_i + 1]);
+        [below[0] + (above[0] - below[0]) * row_t, below[1] + (above[1] - below[1]) * row_t]
+    }
+
+    /// R_in and T̄ of a rough interface.
+    pub fn hemispherical(&self, row: f32) -> Hemispherical {
+        match self.axis {
+            Axis::Fixed => self.rows[0].hemispherical,
+            // The trapezoidal mean over the quarter turn.
+            Axis::Azimuth => {
+                let mut mean = Hemispherical::default();
+                for pair in self.rows.windows(2) {
+                    let middle = pair[0].hemispherical.lerp(pair[1].hemispherical, 0.5);
+                    mean.internal += middle.internal / (AZIMUTHS - 1) as f32;
+                    mean.transmittance += middle.transmittance / (AZIMUTHS - 1) as f32;
+                }
+                mean
+            }
+            Axis::Alpha => {
+                let i = (row as usize).min(self.rows.len() - 2);
+                self.rows[i].hemispherical.lerp(self.rows[i + 1].hemispherical, row - i as f32)
+            }
+        }
+    }
+
+    /// T and R of an outside direction of cosine `cos` for a smooth interface.
+    #[inline]
+    pub fn smooth_directional(&self, cos: f32) -> [f32; 2] {
+        let fresnel = fr_dielectric(cos, self.eta);
+        let cos_t = (1.0 - (1.0 - sqr(cos)).max(0.0) / sqr(self.eta)).max(0.0).sqrt();
+        if fresnel >= 1.0 || cos_t == 0.0 {
+            return [0.0, fresnel];
+        }
+        [(1.0 - fresnel) * (-self.thickness / cos_t).exp(), fresnel]
+    }
+
+    /// R_in and T̄ of a smooth interface.
+    #[inline]
+    pub fn smooth_hemispherical(&self) -> Hemispherical {
+        self.smooth
+    }
+}
+
+impl Row {
+    fn new(interface: &Dielectric, thickness: f32, phi: f32) -> Self {
+        let outside = |cos: f32| scatter(interface, warp::direction(cos, phi), thickness);
+        let directional = (0..COSINES)
+            .map(|i| {
+                let s = outside(sqr(i as f32 / (COSINES - 1) as f32).max(1e-6));
+                [s.transmitted, s.reflected]
+            })
+            .collect();
+
+        // ∫ 2μ g(μ) dμ by the midpoint rule.
+        let inside = Dielectric { eta: 1.0 / interface.eta, ..*interface };
+        let mut sum = (0.0_f64, 0.0_f64);
+        let n = COSINES;
+        for i in 0..n {
+            let cos = (i as f32 + 0.5) / n as f32;
+            let below = scatter(&inside, warp::direction(cos, phi), thickness);
+            let weight = 2.0 * f64::from(cos) / n as f64;
+            sum.0 += weight * f64::from(below.reflected_attenuated * (-thickness / cos).exp());
+            sum.1 += weight * f64::from(outside(cos).transmitted);
+        }
+        Row { directional, hemispherical: Hemispherical { internal: sum.0 as f32, transmittance: sum.1 as f32 } }
+    }
+}
+
+/// Fourth root of alpha at position `t` in 0..1 of the rows over the roughness: at grazing angles T changes where alpha
+/// is as small as the cosine.
+fn alpha_axis(t: f32) -> f32 {
+    let lo = SMOOTH_ALPHA.sqrt().sqrt();
+    lo + (1.0 - lo) * t
+}
+
+struct Scatter {
+    /// (1 − F) G/G1 exp(−t/cos θ'), mean over the visible normals.
+    transmitted: f32,
+    /// F G/G1.
+    reflected: f32,
+    /// F G/G1 exp(−t/cos θ').
+    reflected_attenuated: f32,
+}
+
+/// The fractions of light from `w`, in the upper hemisphere, that `interface` scatters once.
+fn scatter(interface: &Dielectric, w: Vec3, thickness: f32) -> Scatter {
+    let distribution = &interface.distribution;
+    let g1 = distribution.g1(w);
+    let mut sum = [0.0_f64; 3];
+    for i in 0..NORMALS[0] {
+        for j in 0..NORMALS[1] {
+            let u = [(i as f32 + 0.5) / NORMALS[0] as f32, (j as f32 + 0.5) / NORMALS[1] as f32];
+            let m = distribution.sample_m(w, u);
+            let cos_m = w.dot(m);
+            if cos_m <= 0.0 {
+                continue;
+            }
+            let fresnel = fr_dielectric(cos_m, interface.eta);
+            let r = reflect(w, m);
+            if r.z > 0.0 {
+                let value = f64::from(fresnel * distribution.g(w, r) / g1);
+                sum[1] += value;
+                sum[2] += value * f64::from((-thickness / r.z).exp());
+            }
+            if let Some((t, _)) = refract(w, m, interface.eta)
+                && t.z < 0.0
+            {
+                let value = (1.0 - fresnel) * distribution.g(w, t) / g1;
+                sum[0] += f64::from(value * (thickness / t.z).exp());
+            }
+        }
+    }
+    let [transmitted, reflected, reflected_attenuated] = sum.map(|s| (s / (NORMALS[0] * NORMALS[1]) as f64) as f32);
+    Scatter { transmitted, reflected, reflected_attenuated }
+}
+
+/// R_in and T̄ of a smooth interface by a fine midpoint rule.
+fn smooth_integrals(eta: f32, thickness: f32) -> Hemispherical {
+    let n = 20_000;
+    let mut sum = (0.0_f64, 0.0_f64);
+    for i in 0..n {
+        let cos = (f64::from(i) + 0.5) / f64::from(n);
+        let weight = 2.0 * cos / f64::from(n);
+        let f_in = f64::from(fr_dielectric(-(cos as f32), eta));
+        sum.0 += weight * f_in * (-2.0 * f64::from(thickness) / cos).exp();
+        let sin2_t = (1.0 - cos * cos) / f64::from(eta * eta);
+        if sin2_t < 1.0 {
+            let f_out = f64::from(fr_dielectric(cos as f32, eta));
+            sum.1 += weight * (1.0 - f_out) * (-f64::from(thickness) / (1.0 - sin2_t).sqrt()).exp();
+        }
+    }
+    Hemispherical { internal: sum.0 as f32, transmittance: sum.1 as f32 }
+}

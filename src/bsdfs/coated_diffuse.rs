@@ -1,0 +1,115 @@
+//! A Lambertian base under a dielectric coat, in closed form.
+//!
+//! The base forgets directions, so the random walk between interface and base is a geometric series:
+//!
+//! f(wo, wi) = f_r(wo, wi) + T(wo) T(wi) / (π η²) · Σ_{k<N} ρ (ρ R_in)^k
+//!
+//! with the integrals T and R_in of [`super::coat_table`]; 1/η² is the reciprocity factor between the outside and
+//! the layer. It is the expectation of the position-free walk [Guo et al. 2018] that pbrt-v4 runs, whose depth counts
+//! the events at both interfaces after entry, alternating and beginning with the base: a walk of `max_depth` events
+//! scatters at the base N = ⌈max_depth/2⌉ times. The layer absorbs with unit extinction, hence the thickness in T
+//! and R_in. Both sides of the surface are coated.
+
+use super::coat_table::{CoatTable, Hemispherical};
+use super::dielectric::{Dielectric, Select};
+use super::fresnel::reflect;
+use super::{BsdfSample, Lobe, TrowbridgeReitz};
+use crate::math::{Rgb, Vec3, sqr, warp};
+use std::f32::consts::{FRAC_1_PI, PI};
+
+/// Coated Lambertian reflection without scattering in the coat.
+#[derive(Clone, Copy, Debug)]
+pub struct CoatedDiffuse<'a> {
+    interface: Dielectric,
+    table: &'a CoatTable,
+    row: f32,
+    /// Σ ρ (ρ R_in)^k / (π η²).
+    base: Rgb,
+    /// T̄ for the albedo of the base.
+    mean_transmittance: f32,
+}
+
+impl<'a> CoatedDiffuse<'a> {
+    /// A coat of the given roughness, tabulated in `table`, over a base of albedo `reflectance`.
+    pub fn new(table: &'a CoatTable, distribution: TrowbridgeReitz, reflectance: Rgb, max_depth: u32) -> Self {
+        let interface = Dielectric { eta: table.eta(), distribution };
+        let row = table.row(distribution);
+        let Hemispherical { internal, transmittance } =
+            if interface.is_specular() { table.smooth_hemispherical() } else { table.hemispherical(row) };
+        let bounces = max_depth.div_ceil(2);
+        let base = reflectance.map(|rho| {
+            let ratio = rho * internal;
+            rho * (1.0 - ratio.powi(bounces.min(1 << 16) as i32)) / (1.0 - ratio)
+        }) * (FRAC_1_PI / sqr(interface.eta));
+        CoatedDiffuse { interface, table, row, base, mean_transmittance: transmittance }
+    }
+
+    /// T and R of `w`.
+    #[inline]
+    fn directional(&self, w: Vec3) -> [f32; 2] {
+        if self.interface.is_specular() {
+            self.table.smooth_directional(w.z)
+        } else {
+            self.table.directional(w, self.row)
+        }
+    }
+
+    /// Albedo for light to `wo`: interface and base.
+    pub fn albedo(&self, wo: Vec3) -> Rgb {
+        let [t, r] = self.directional(if wo.z < 0.0 { -wo } else { wo });
+        Rgb::splat(r) + self.base * (PI * self.mean_transmittance * t)
+    }
+
+    /// Probability of sampling the interface; `wo` is in the upper hemisphere.
+    #[inline]
+    fn p_interface(&self, wo: Vec3) -> f32 {
+        let [t, r] = self.directional(wo);
+        let base = self.base.average() * (PI * self.mean_transmittance * t);
+        if r + base > 0.0 { r / (r + base) } else { 0.0 }
+    }
+
+    /// True if the interface reflects like a mirror.
+    #[inline]
+    pub fn has_specular(&self) -> bool {
+        self.interface.is_specular()
+    }
+
+    /// Value without cosine (1/sr), without the mirror of a smooth interface.
+    pub fn f(&self, wo: Vec3, wi: Vec3) -> Rgb {
+        let Some((wo, wi)) = super::to_upper(wo, wi) else { return Rgb::BLACK };
+        let base = self.base * (self.directional(wo)[0] * self.directional(wi)[0]);
+        self.interface.f(wo, wi) + base
+    }
+
+    /// Density of the non-specular part of [`Self::sample`] per steradian.
+    pub fn pdf(&self, wo: Vec3, wi: Vec3) -> f32 {
+        let Some((wo, wi)) = super::to_upper(wo, wi) else { return 0.0 };
+        self.pdf_upper(wo, wi, self.p_interface(wo))
+    }
+
+    fn pdf_upper(&self, wo: Vec3, wi: Vec3, p: f32) -> f32 {
+        p * self.interface.pdf_select(wo, wi, Select::Reflection) + (1.0 - p) * warp::pdf_cosine_hemisphere(wi)
+    }
+
+    /// The interface or the cosine, in proportion to the albedos.
+    pub fn sample(&self, wo: Vec3, uc: f32, u: [f32; 2]) -> Option<BsdfSample> {
+        let flip = if wo.z < 0.0 { -1.0 } else { 1.0 };
+        let wo = wo * flip;
+        let p = self.p_interface(wo);
+        let (wi, lobe) = if uc >= p {
+            (warp::sample_cosine_hemisphere(u), Lobe::DIFFUSE)
+        } else if self.interface.is_specular() {
+            let wi = Vec3::new(-wo.x, -wo.y, wo.z);
+            let f = Rgb::splat(self.directional(wo)[1] / wi.z);
+            let lobe = Lobe::SPECULAR | Lobe::REFLECTION;
+            return Some(BsdfSample { f, wi: wi * flip, pdf: p, lobe, eta: 1.0 });
+        } else {
+            (reflect(wo, self.interface.distribution.sample_m(wo, u)), Lobe::GLOSSY)
+        };
+        if wi.z <= 0.0 {
+            return None;
+        }
+        let (f, pdf) = (self.f(wo, wi), self.pdf_upper(wo, wi, p));
+        Some(BsdfSample { f, wi: wi * flip, pdf, lobe: lobe | Lobe::REFLECTION, eta: 1.0 })
+    }
+}

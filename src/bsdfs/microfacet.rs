@@ -1,0 +1,152 @@
+//! The GGX (Trowbridge-Reitz) distribution of microfacet normals with Smith's height-correlated shadowing.
+//!
+//! D(m) = 1 / (π αx αy (x²/αx² + y²/αy² + z²)²), Λ(w) = (√(1 + α²tan²θ) − 1)/2, G1 = 1/(1 + Λ),
+//! G = 1/(1 + Λ(wo) + Λ(wi)) [Walter et al. 2007; Heitz 2014]. Normals are sampled by the density of the normals
+//! visible from w, D_w(m) = G1(w) D(m) max(0, w·m)/cos θ, by spherical caps [Dupuy and Benyoub 2023].
+
+use crate::math::{Vec3, sqr};
+use std::f32::consts::{PI, TAU};
+
+/// Alpha below which an interface counts as perfectly smooth.
+pub const SMOOTH_ALPHA: f32 = 1e-3;
+
+/// GGX distribution over the normals m with m.z > 0.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct TrowbridgeReitz {
+    /// Roughness along x; 0 is smooth.
+    pub alpha_x: f32,
+    /// Roughness along y; 0 is smooth.
+    pub alpha_y: f32,
+}
+
+impl TrowbridgeReitz {
+    /// From the alphas; unless the surface is smooth, both are raised to at least 1e-4. Negative alphas and NaN are 0.
+    pub fn new(alpha_x: f32, alpha_y: f32) -> Self {
+        let raw = TrowbridgeReitz { alpha_x: alpha_x.max(0.0), alpha_y: alpha_y.max(0.0) };
+        if raw.is_smooth() {
+            return raw;
+        }
+        TrowbridgeReitz { alpha_x: raw.alpha_x.max(1e-4), alpha_y: raw.alpha_y.max(1e-4) }
+    }
+
+    /// The alpha of pbrt-v4's roughness parameter: √roughness.
+    #[inline]
+    pub fn roughness_to_alpha(roughness: f32) -> f32 {
+        roughness.max(0.0).sqrt()
+    }
+
+    /// True if the surface is treated as a perfect mirror.
+    #[inline]
+    pub fn is_smooth(&self) -> bool {
+        self.alpha_x.max(self.alpha_y) < SMOOTH_ALPHA
+    }
+
+    /// Density of microfacet area per steradian of `m`, per unit area of the macrosurface (1/sr).
+    #[inline]
+    pub fn d(&self, m: Vec3) -> f32 {
+        let s = sqr(m.x / self.alpha_x) + sqr(m.y / self.alpha_y) + sqr(m.z);
+        1.0 / (PI * self.alpha_x * self.alpha_y * sqr(s))
+    }
+
+    /// Smith's Λ: masked per visible microfacet area seen from `w`. Infinite at grazing.
+    #[inline]
+    pub fn lambda(&self, w: Vec3) -> f32 {
+        let z2 = sqr(w.z);
+        if z2 <= 0.0 {
+            return f32::INFINITY;
+        }
+        let a2_tan2 = (sqr(self.alpha_x * w.x) + sqr(self.alpha_y * w.y)) / z2;
+        0.5 * ((1.0 + a2_tan2).sqrt() - 1.0)
+    }
+
+    /// Fraction of the microfacets that face `w` and that `w` sees.
+    #[inline]
+    pub fn g1(&self, w: Vec3) -> f32 {
+        1.0 / (1.0 + self.lambda(w))
+    }
+
+    /// Fraction that both `wo` and `wi` see.
+    #[inline]
+    pub fn g(&self, wo: Vec3, wi: Vec3) -> f32 {
+        1.0 / (1.0 + self.lambda(wo) + self.lambda(wi))
+    }
+
+    /// Density of [`Self::sample_m`] per steradian of `m`; `m` is in the upper hemisphere.
+    #[inline]
+    pub fn pdf_m(&self, w: Vec3, m: Vec3) -> f32 {
+        if w.z == 0.0 {
+            return 0.0;
+        }
+        self.g1(w) / w.z.abs() * self.d(m) * w.dot(m).abs()
+    }
+
+    /// A normal visible from `w` (or from `-w` if `w` is below the horizon), in the upper hemisphere.
+    #[inline]
+    pub fn sample_m(&self, w: Vec3, u: [f32; 2]) -> Vec3 {
+        // Stretch so that the distribution is a hemisphere.
+        let stretched = Vec3::new(w.x * self.alpha_x, w.y * self.alpha_y, w.z).normalize_or(Vec3::Z);
+        let h = if stretched.z < 0.0 { -stretched } else { stretched };
+        // A uniform point of the cap of directions that reflect `h` to the upper hemisphere.
+        let z = (1.0 - u[1]) * (1.0 + h.z) - h.z;
+        let sin_theta = (1.0 - z * z).clamp(0.0, 1.0).sqrt();
+        let (sin_phi, cos_phi) = (TAU * u[0]).sin_cos();
+        let m = Vec3::new(sin_theta * cos_phi, sin_theta * sin_phi, z) + h;
+        Vec3::new(m.x * self.alpha_x, m.y * self.alpha_y, m.z.max(1e-6)).normalize()
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::math::warp;
+
+    #[test]
+    fn projected_microfacet_area_is_the_macro_area() {
+        // ∫ D(m) m.z dm = 1.
+        for (ax, ay) in [(0.1, 0.1), (0.5, 0.2), (1.0, 0.7)] {
+            let t = TrowbridgeReitz::new(ax, ay);
+            let (n, mut sum) = (1000, 0.0_f64);
+            for i in 0..n {
+                for j in 0..200 {
+                    let theta = (i as f32 + 0.5) / n as f32 * PI * 0.5;
+                    let m = warp::direction(theta.cos(), TAU * (j as f32 + 0.5) / 200.0);
+                    let area = PI * 0.5 / n as f32 * TAU / 200.0 * theta.sin();
+                    sum += f64::from(t.d(m) * m.z * area);
+                }
+            }
+            assert!((sum - 1.0).abs() < 2e-3, "{ax} {ay} {sum}");
+        }
+    }
+
+    #[test]
+    fn visible_normals_project_to_the_cosine() {
+        // ∫ G1(w) D(m) max(0, w·m) dm = cos θ_w, that is ∫ pdf_m = 1, by sampling m by its own cosine.
+        let t = TrowbridgeReitz::new(0.4, 0.25);
+        for cos in [0.05, 0.3, 0.8, 1.0] {
+            let w = warp::direction(cos, 0.7);
+            let n = 400;
+            let mut sum = 0.0_f64;
+            for i in 0..n * n {
+                let u = [((i % n) as f32 + 0.5) / n as f32, ((i / n) as f32 + 0.5) / n as f32];
+                let m = warp::sample_uniform_hemisphere(u);
+                if m.dot(w) > 0.0 {
+                    sum += f64::from(t.pdf_m(w, m) * TAU);
+                }
+            }
+            assert!((sum / f64::from(n * n) - 1.0).abs() < 5e-3, "{cos} {sum}");
+        }
+    }
+
+    #[test]
+    fn samples_are_unit_upper_and_visible() {
+        let t = TrowbridgeReitz::new(0.3, 0.01);
+        for i in 0..10_000 {
+            let r = crate::math::hash::pcg4d([i, 1, 2, 3]).map(crate::math::hash::unit_f32);
+            let w = warp::direction(r[2] * 1e-3 + 1e-7, r[3] * TAU);
+            let m = t.sample_m(w, [r[0], r[1]]);
+            assert!((m.length() - 1.0).abs() < 1e-5 && m.z > 0.0);
+            assert!(m.dot(w) > -1e-5, "{m} {w}");
+        }
+        assert!(t.sample_m(Vec3::X, [0.0, 1.0]).is_finite());
+    }
+}

@@ -1,0 +1,212 @@
+//! Properties that every BSDF must have, and the agreement of the closed form with the random walk.
+
+mod coats;
+mod densities;
+
+use super::*;
+use crate::math::hash::HashStream;
+use crate::math::{safe_sqrt, sqr, warp};
+use std::f32::consts::{PI, TAU};
+
+pub(super) fn ggx(alpha_x: f32, alpha_y: f32) -> TrowbridgeReitz {
+    TrowbridgeReitz::new(alpha_x, alpha_y)
+}
+
+pub(super) fn glass(eta: f32, alpha: f32) -> Dielectric {
+    Dielectric { eta, distribution: ggx(alpha, alpha) }
+}
+
+pub(super) fn gold(alpha_x: f32, alpha_y: f32) -> Conductor {
+    let (eta, k) = (Rgb::new(0.143, 0.375, 1.44), Rgb::new(3.98, 2.39, 1.6));
+    Conductor { distribution: ggx(alpha_x, alpha_y), eta, k }
+}
+
+pub(super) fn layered(top: Dielectric, base: Base, albedo: f32, g: f32) -> Layered {
+    let albedo = Rgb::new(albedo, albedo * 0.8, albedo * 0.5);
+    Layered { top, base, thickness: if albedo.is_black() { 0.01 } else { 0.5 }, albedo, g, max_depth: 10, samples: 1 }
+}
+
+pub(super) const RED: Rgb = Rgb::new(0.9, 0.5, 0.2);
+
+/// The BSDFs under test, with names.
+pub(super) fn zoo<'a>(tables: &'a [CoatTable]) -> Vec<(String, Bsdf<'a>)> {
+    let mut zoo: Vec<(String, Bsdf<'a>)> = vec![
+        ("diffuse".into(), Bsdf::Diffuse(Diffuse { reflectance: RED })),
+        (
+            "diffuse transmission".into(),
+            Bsdf::DiffuseTransmission(DiffuseTransmission { reflectance: RED * 0.4, transmittance: RED * 0.6 }),
+        ),
+        ("mirror".into(), Bsdf::Conductor(gold(0.0, 0.0))),
+        ("gold 0.05".into(), Bsdf::Conductor(gold(0.05, 0.05))),
+        ("gold 0.4 0.1".into(), Bsdf::Conductor(gold(0.4, 0.1))),
+        ("smooth glass".into(), Bsdf::Dielectric(glass(1.5, 0.0))),
+        ("glass 0.05".into(), Bsdf::Dielectric(glass(1.5, 0.05))),
+        ("glass 0.3".into(), Bsdf::Dielectric(glass(1.5, 0.3))),
+        ("air in glass 0.5".into(), Bsdf::Dielectric(glass(1.0 / 1.4, 0.5))),
+        ("glass 0.6 0.2".into(), Bsdf::Dielectric(Dielectric { eta: 1.8, distribution: ggx(0.6, 0.2) })),
+        ("no interface".into(), Bsdf::Dielectric(glass(1.0, 0.3))),
+        ("thin".into(), Bsdf::ThinDielectric(ThinDielectric { eta: 1.5 })),
+    ];
+    for (i, table) in tables.iter().enumerate() {
+        let coated = CoatedDiffuse::new(table, distributions()[i], RED, 10);
+        zoo.push((format!("coated {:?}", distributions()[i]), Bsdf::CoatedDiffuse(coated)));
+    }
+    let lambert = Base::Diffuse(Diffuse { reflectance: RED });
+    let layers = [
+        layered(glass(1.5, 0.0), Base::Conductor(gold(0.0, 0.0)), 0.0, 0.0),
+        layered(glass(1.5, 0.0), Base::Conductor(gold(0.0, 0.0)), 0.9, 0.3),
+        layered(glass(1.5, 0.0), Base::Conductor(gold(0.1, 0.2)), 0.0, 0.0),
+        layered(glass(1.5, 0.2), Base::Conductor(gold(0.0, 0.0)), 0.0, 0.0),
+        layered(glass(1.5, 0.1), Base::Conductor(gold(0.3, 0.3)), 0.0, 0.0),
+        layered(glass(1.5, 0.3), lambert, 0.9, -0.4),
+        layered(glass(1.5, 0.0), lambert, 0.9, 0.7),
+    ];
+    zoo.extend(layers.iter().enumerate().map(|(i, &l)| (format!("layered {i}"), Bsdf::Layered(l))));
+    zoo
+}
+
+/// Roughness of the coats of [`tables`].
+pub(super) fn distributions() -> [TrowbridgeReitz; 4] {
+    [ggx(0.0, 0.0), ggx(0.1, 0.1), ggx(0.5, 0.5), ggx(0.3, 0.08)]
+}
+
+pub(super) fn tables() -> Vec<CoatTable> {
+    distributions().iter().map(|&d| CoatTable::for_roughness(1.5, 0.01, d)).collect()
+}
+
+#[test]
+fn a_bsdf_is_small_enough_for_batches() {
+    assert!(size_of::<Bsdf<'_>>() <= 128, "{}", size_of::<Bsdf<'_>>());
+}
+
+#[test]
+fn nothing_is_ever_nan_negative_or_infinite() {
+    let tables = tables();
+    let mut s = HashStream::new([7, 7, 7]);
+    for (name, b) in zoo(&tables) {
+        for i in 0..20_000 {
+            let mut direction = || {
+                let w = warp::sample_uniform_sphere(s.next_2d());
+                // Every third direction grazes, down to denormal cosines, and some lie on an axis or in the plane.
+                let z = match i % 6 {
+                    0 => w.z * 10.0_f32.powi(-(1 + (i / 6) % 44)),
+                    1 if i % 5 == 0 => return [Vec3::X, Vec3::Z, -Vec3::Z, Vec3::Y][i as usize / 30 % 4],
+                    _ => w.z,
+                };
+                let scale = safe_sqrt(1.0 - z * z) / w.truncate().length().max(1e-20);
+                Vec3::new(w.x * scale, w.y * scale, z)
+            };
+            let (wo, wi) = (direction(), if i % 7 == 0 { -direction() } else { direction() });
+            let (f, pdf) = (b.f(wo, wi), b.pdf(wo, wi));
+            assert!(f.is_finite() && f.to_array().iter().all(|&c| c >= 0.0), "{name} {wo} {wi} {f:?}");
+            assert!(pdf.is_finite() && pdf >= 0.0, "{name} {wo} {wi} {pdf}");
+            let sample = b.sample(wo, s.next_f32(), if i % 3 == 0 { [0.0, 1.0 - 6e-8] } else { s.next_2d() });
+            if let Some(x) = sample {
+                assert!(x.pdf > 0.0 && x.pdf.is_finite() && x.f.is_finite(), "{name} {wo} {x:?}");
+                assert!((x.wi.length() - 1.0).abs() < 1e-4 && x.wi.z != 0.0, "{name} {wo} {x:?}");
+                assert_eq!(x.lobe.is_transmission(), x.wi.z * wo.z < 0.0, "{name} {wo} {x:?}");
+            }
+            assert!(b.albedo_estimate(wo).is_finite());
+        }
+    }
+}
+
+#[test]
+fn scattering_is_reciprocal() {
+    let tables = tables();
+    let mut s = HashStream::new([1, 7, 9]);
+    for (name, b) in zoo(&tables) {
+        if matches!(b, Bsdf::Layered(_)) {
+            continue; // Noisy; its mean is compared with analog walks instead.
+        }
+        for _ in 0..2000 {
+            let (wo, wi) = (warp::sample_uniform_sphere(s.next_2d()), warp::sample_uniform_sphere(s.next_2d()));
+            if wo.z.abs().min(wi.z.abs()) < 0.05 {
+                continue;
+            }
+            let (mut a, mut c) = (b.f(wo, wi).g, b.f(wi, wo).g);
+            if let (Bsdf::Dielectric(d), true) = (&b, wo.z * wi.z < 0.0) {
+                // f(wo → wi)·η_i² is symmetric, η being absolute.
+                let eta2 = |w: Vec3| if w.z < 0.0 { sqr(d.eta) } else { 1.0 };
+                (a, c) = (a * eta2(wi), c * eta2(wo));
+            }
+            assert!((a - c).abs() <= 2e-3 * a.max(c) + 1e-6, "{name} {wo} {wi} {a} {c}");
+        }
+    }
+}
+
+#[test]
+fn no_bsdf_creates_energy() {
+    let tables = tables();
+    for (name, b) in zoo(&tables) {
+        for cos in [0.02, 0.3, 0.7, 1.0, -0.1, -0.9] {
+            let wo = warp::direction(cos, 0.4);
+            let (mut s, mut sum) = (HashStream::new([3, 2, 1]), 0.0_f64);
+            let n = 40_000;
+            for _ in 0..n {
+                if let Some(x) = b.sample(wo, s.next_f32(), s.next_2d()) {
+                    // Radiance that is transmitted is scaled by the square of the index.
+                    sum += f64::from(x.f.max_component() * x.wi.z.abs() / x.pdf * sqr(x.eta));
+                }
+            }
+            assert!(sum / f64::from(n) < 1.01, "{name} {cos} {}", sum / f64::from(n));
+        }
+    }
+}
+
+#[test]
+fn samples_agree_with_f_and_pdf() {
+    let tables = tables();
+    for (name, b) in zoo(&tables) {
+        let mut s = HashStream::new([3, 2, 5]);
+        for _ in 0..20_000 {
+            let wo = warp::direction(s.next_f32() * 1.9 - 0.95, TAU * s.next_f32());
+            let Some(x) = b.sample(wo, s.next_f32(), s.next_2d()) else { continue };
+            if x.lobe.is_specular() {
+                assert!(b.has_specular(), "{name}");
+                continue;
+            }
+            assert!(b.has_non_specular(), "{name}");
+            let (f, pdf) = (b.f(wo, x.wi), b.pdf(wo, x.wi));
+            let tolerance = if wo.z.abs().min(x.wi.z.abs()) < 0.05 { 0.2 } else { 0.02 };
+            assert!((f.g - x.f.g).abs() <= tolerance * f.g.max(x.f.g), "{name} {wo} {x:?} {f:?}");
+            assert!((pdf - x.pdf).abs() <= tolerance * pdf.max(x.pdf), "{name} {wo} {x:?} {pdf}");
+        }
+    }
+}
+
+#[test]
+fn furnaces_have_their_known_albedo() {
+    let up = warp::direction(0.6, 1.0);
+    let mean = |b: &Bsdf<'_>, wo: Vec3| {
+        let (mut s, mut sum) = (HashStream::new([5, 5, 5]), 0.0_f64);
+        for _ in 0..200_000 {
+            if let Some(x) = b.sample(wo, s.next_f32(), s.next_2d()) {
+                sum += f64::from(x.f.g * x.wi.z.abs() / x.pdf * sqr(x.eta));
+            }
+        }
+        sum / 200_000.0
+    };
+    // Smooth glass, thin glass and the absence of an interface lose nothing; a white Lambertian neither.
+    for b in [
+        Bsdf::Dielectric(glass(1.5, 0.0)),
+        Bsdf::Dielectric(glass(1.0, 0.5)),
+        Bsdf::ThinDielectric(ThinDielectric { eta: 1.5 }),
+        Bsdf::Diffuse(Diffuse { reflectance: Rgb::WHITE }),
+        Bsdf::DiffuseTransmission(DiffuseTransmission { reflectance: Rgb::splat(0.3), transmittance: Rgb::splat(0.7) }),
+    ] {
+        assert!((mean(&b, up) - 1.0).abs() < 1e-4, "{b:?}");
+        assert!((mean(&b, -up) - 1.0).abs() < 1e-4, "{b:?}");
+    }
+    // Rough glass loses what a second scattering would recover: little at low roughness.
+    let rough = mean(&Bsdf::Dielectric(glass(1.5, 0.1)), up);
+    assert!((0.99..1.0005).contains(&rough), "{rough}");
+    // Thin sheet at normal incidence: R' = 2R/(1 + R).
+    let r = ThinDielectric { eta: 1.5 }.reflectance(1.0);
+    assert!((r - 2.0 * 0.04 / 1.04).abs() < 1e-6);
+    // A perfect mirror coated with nothing is a perfect mirror.
+    let (eta, k) = Conductor::eta_k_of_reflectance(Rgb::splat(0.8));
+    let mirror = Conductor { distribution: ggx(0.0, 0.0), eta, k };
+    assert!((mean(&Bsdf::Conductor(mirror), Vec3::Z) - 0.8).abs() < 1e-3);
+    assert!((PI * Diffuse { reflectance: RED }.f(Vec3::Z, Vec3::Z).r - RED.r).abs() < 1e-6);
+}

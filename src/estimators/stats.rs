@@ -1,0 +1,223 @@
+//! Running moments and tests of hypotheses, in f64.
+//!
+//! - χ²: Σ (observed − expected)² / expected against the χ² distribution [Pearson 1900]; bins with few expected counts
+//!   are pooled, since the approximation needs about five of them [Cochran 1954].
+//! - z and t: (mean − expected) / standard error against the normal and Student distributions.
+//! - Running mean and variance: [Welford 1962], merged by [Chan et al. 1979].
+
+use statrs::function::beta::beta_reg;
+use statrs::function::erf::erfc;
+use statrs::function::gamma::gamma_ur;
+
+/// Expected count below which [`chi_squared_test`] pools a bin.
+pub const MIN_EXPECTED: f64 = 5.0;
+
+/// Outcome of [`chi_squared_test`].
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct ChiSquared {
+    /// Σ (observed − expected)² / expected over the pooled bins.
+    pub statistic: f64,
+    /// Degrees of freedom: pooled bins minus one.
+    pub dof: usize,
+    /// Probability of a statistic at least as large if the model is true.
+    pub p_value: f64,
+    /// `p_value` is below the significance asked for, or counts fell where none can fall.
+    pub rejected: bool,
+}
+
+/// Pearson's χ² test of `observed` counts against `expected` counts. Bins are taken in the order of their expected
+/// count and those below [`MIN_EXPECTED`] are added up until they reach it. A count in a bin whose expectation is 0
+/// rejects the model outright. Panics if the slices differ in length.
+pub fn chi_squared_test(observed: &[f64], expected: &[f64], significance: f64) -> ChiSquared {
+    assert_eq!(observed.len(), expected.len(), "one expectation per bin");
+    let mut order: Vec<usize> = (0..expected.len()).collect();
+    order.sort_by(|&a, &b| expected[a].total_cmp(&expected[b]));
+
+    // Pool bins until each pool expects enough.
+    let mut pools: Vec<(f64, f64)> = Vec::new();
+    let mut open = (0.0, 0.0);
+    let mut impossible = false;
+    for i in order {
+        impossible |= expected[i] <= 0.0 && observed[i] > 0.0;
+        open = (open.0 + observed[i], open.1 + expected[i]);
+        if open.1 >= MIN_EXPECTED {
+            pools.push(open);
+            open = (0.0, 0.0);
+        }
+    }
+    // Bins come in rising order, so what stays open at the end is all there is: give it to the last pool.
+    match pools.last_mut() {
+        Some(last) => *last = (last.0 + open.0, last.1 + open.1),
+        None => pools.push(open),
+    }
+
+    let statistic = pools.iter().map(|&(o, e)| if e > 0.0 { (o - e) * (o - e) / e } else { 0.0 }).sum::<f64>();
+    let dof = pools.len() - 1;
+    let p_value = if impossible {
+        0.0
+    } else if dof == 0 || statistic <= 0.0 {
+        1.0
+    } else {
+        gamma_ur(0.5 * dof as f64, 0.5 * statistic)
+    };
+    ChiSquared { statistic, dof, p_value, rejected: p_value < significance }
+}
+
+/// Significance of each of `tests` independent tests so that all of them together reject a true model with
+/// probability `familywise` [Šidák 1967].
+pub fn sidak(familywise: f64, tests: usize) -> f64 {
+    -((-familywise).ln_1p() / tests as f64).exp_m1()
+}
+
+/// Outcome of [`z_test`] and [`t_test`].
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct MeanTest {
+    /// (mean − expected) / standard error.
+    pub statistic: f64,
+    /// Two-sided probability of a deviation at least as large if the model is true.
+    pub p_value: f64,
+}
+
+/// Two-sided test of a mean against `expected`, whose `standard_error` is known (or estimated from many samples).
+pub fn z_test(mean: f64, expected: f64, standard_error: f64) -> MeanTest {
+    let statistic = standardised(mean - expected, standard_error);
+    MeanTest { statistic, p_value: erfc(statistic.abs() * std::f64::consts::FRAC_1_SQRT_2) }
+}
+
+/// Two-sided Student test of the mean of `samples` against `expected`. With fewer than two samples nothing can be
+/// rejected and the p-value is 1.
+pub fn t_test(samples: &Welford, expected: f64) -> MeanTest {
+    if samples.count() < 2 {
+        return MeanTest { statistic: 0.0, p_value: 1.0 };
+    }
+    let statistic = standardised(samples.mean() - expected, samples.standard_error());
+    let dof = (samples.count() - 1) as f64;
+    let p_value =
+        if statistic.is_infinite() { 0.0 } else { beta_reg(0.5 * dof, 0.5, dof / (dof + statistic * statistic)) };
+    MeanTest { statistic, p_value }
+}
+
+/// Two-sided test of the equality of two means by their pooled standard errors.
+pub fn two_sample_z_test(a: &Welford, b: &Welford) -> MeanTest {
+    z_test(a.mean(), b.mean(), a.standard_error().hypot(b.standard_error()))
+}
+
+/// `difference / standard_error`, where an exact match of constants is 0 and not NaN.
+fn standardised(difference: f64, standard_error: f64) -> f64 {
+    if difference == 0.0 { 0.0 } else { difference / standard_error }
+}
+
+/// Running mean and variance.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct Welford {
+    count: u64,
+    mean: f64,
+    /// Sum of squared deviations from the mean.
+    m2: f64,
+}
+
+impl Welford {
+    /// No samples yet.
+    pub const fn new() -> Self {
+        Welford { count: 0, mean: 0.0, m2: 0.0 }
+    }
+
+    /// Adds a sample.
+    #[inline]
+    pub fn add(&mut self, x: f64) {
+        self.count += 1;
+        let delta = x - self.mean;
+        self.mean += delta / self.count as f64;
+        self.m2 += delta * (x - self.mean);
+    }
+
+    /// Adds the samples of `other`.
+    pub fn merge(&mut self, other: &Welford) {
+        if other.count == 0 {
+            return;
+        }
+        let (a, b) = (self.count as f64, other.count as f64);
+        let delta = other.mean - self.mean;
+        self.count += other.count;
+        self.mean += delta * b / (a + b);
+        self.m2 += other.m2 + delta * delta * a * b / (a + b);
+    }
+
+    /// Number of samples.
+    pub fn count(&self) -> u64 {
+        self.count
+    }
+
+    /// Mean of the samples; 0 if there are none.
+    pub fn mean(&self) -> f64 {
+        self.mean
+    }
+
+    /// Unbiased variance of a sample; 0 with fewer than two.
+    pub fn variance(&self) -> f64 {
+        if self.count < 2 { 0.0 } else { self.m2 / (self.count - 1) as f64 }
+    }
+
+    /// Standard error of the mean; 0 with fewer than two samples.
+    pub fn standard_error(&self) -> f64 {
+        if self.count < 2 { 0.0 } else { (self.variance() / self.count as f64).sqrt() }
+    }
+}
+
+impl FromIterator<f64> for Welford {
+    fn from_iter<I: IntoIterator<Item = f64>>(iter: I) -> Self {
+        let mut w = Welford::new();
+        iter.into_iter().for_each(|x| w.add(x));
+        w
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn p_values_match_printed_tables() {
+        // χ² upper 5 % point of 10 degrees of freedom is 18.307, of the normal 1.95996, of t with 4 degrees 2.7764.
+        let expected = [100.0; 11];
+        let mut observed = expected;
+        let d = (18.307_f64 * 100.0 / 2.0).sqrt();
+        observed[0] += d;
+        observed[1] -= d;
+        let chi = chi_squared_test(&observed, &expected, 0.05);
+        assert_eq!(chi.dof, 10);
+        assert!((chi.p_value - 0.05).abs() < 1e-4, "{chi:?}");
+        assert!((z_test(1.959_964, 0.0, 1.0).p_value - 0.05).abs() < 1e-6);
+        let w: Welford = [-1.0, 0.0, 1.0, 2.0, 3.0].into_iter().collect();
+        let t = t_test(&w, w.mean() - 2.776_445 * w.standard_error());
+        assert!((t.p_value - 0.05).abs() < 1e-6, "{t:?}");
+    }
+
+    #[test]
+    fn small_bins_are_pooled_and_impossible_counts_reject() {
+        let expected = [0.5, 1.0, 2.0, 2.5, 50.0, 60.0];
+        let chi = chi_squared_test(&expected, &expected, 0.01);
+        assert_eq!((chi.dof, chi.p_value, chi.rejected), (2, 1.0, false));
+        assert!(chi_squared_test(&[1.0, 100.0], &[0.0, 100.0], 0.01).rejected);
+        assert!(!chi_squared_test(&[0.0, 100.0], &[0.0, 100.0], 0.01).rejected);
+    }
+
+    #[test]
+    fn welford_merge_equals_one_pass() {
+        let values: Vec<f64> = (0..1000).map(|i| 1e6 + f64::from(i % 17) * 0.25).collect();
+        let whole: Welford = values.iter().copied().collect();
+        let mut parts = Welford::new();
+        for chunk in values.chunks(77) {
+            parts.merge(&chunk.iter().copied().collect());
+        }
+        assert_eq!(whole.count(), parts.count());
+        assert!((whole.mean() - parts.mean()).abs() < 1e-7);
+        assert!((whole.variance() / parts.variance() - 1.0).abs() < 1e-9);
+    }
+
+    #[test]
+    fn sidak_of_one_test_is_the_level_itself() {
+        assert!((sidak(0.01, 1) - 0.01).abs() < 1e-15);
+        assert!((1.0 - (1.0 - sidak(0.01, 40)).powi(40) - 0.01).abs() < 1e-12);
+    }
+}
