@@ -88,8 +88,7 @@ impl CoatTable {
         CoatTable { eta, thickness, axis, rows, smooth: smooth_integrals(eta, thickness) }
     }
 
-    /// For all isotropic roughnesses, where the roughness is textured. Anisotropic ones are looked up by the geometric
-    /// mean of their alphas.
+    /// For all isotropic roughnesses up to alpha 1, where the roughness is textured.
     pub fn for_all_roughness(eta: f32, thickness: f32) -> Self {
         let thickness = thickness.max(0.0);
         let row = |i| {
@@ -110,7 +109,7 @@ impl CoatTable {
         match self.axis {
             Axis::Fixed | Axis::Azimuth => 0.0,
             Axis::Alpha => {
-                let fourth_root = (distribution.alpha_x * distribution.alpha_y).sqrt().sqrt().sqrt();
+                let fourth_root = distribution.alpha_x.sqrt().sqrt();
                 let x = (fourth_root - alpha_axis(0.0)) / (alpha_axis(1.0) - alpha_axis(0.0));
                 x.clamp(0.0, 1.0) * (ALPHAS - 1) as f32
             }

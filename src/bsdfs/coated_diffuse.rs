@@ -22,6 +22,7 @@ use std::f32::consts::{FRAC_1_PI, PI};
 pub struct CoatedDiffuse<'a> {
     interface: Dielectric,
     table: &'a CoatTable,
+    /// Position of the roughness in the table.
     row: f32,
     /// Σ ρ (ρ R_in)^k / (π η²).
     base: Rgb,
