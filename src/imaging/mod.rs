@@ -1,1 +1,97 @@
-//! (in progress)
+//! Pictures: pixels with named channels, their encodings, and pyramids for filtered lookups.
+//!
+//! Reading order: [`color`], [`mipmap`].
+
+pub mod color;
+pub mod mipmap;
+
+pub use color::ColorEncoding;
+pub use mipmap::{Filter, MipMap, Wrap};
+
+/// Pixels with named channels.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub struct Image {
+    /// Columns.
+    pub width: usize,
+    /// Rows.
+    pub height: usize,
+    /// Names of the channels, in the order of `data`.
+    pub channels: Vec<String>,
+    /// Values, row-major from the top left, channels interleaved.
+    pub data: Vec<f32>,
+}
+
+impl Image {
+    /// An image of zeros.
+    pub fn new(width: usize, height: usize, channels: &[&str]) -> Self {
+        let channels: Vec<String> = channels.iter().map(|&c| c.to_owned()).collect();
+        Image { width, height, data: vec![0.0; width * height * channels.len()], channels }
+    }
+
+    /// Position of the channel called `name`.
+    pub fn channel(&self, name: &str) -> Option<usize> {
+        self.channels.iter().position(|c| c == name)
+    }
+
+    /// Value of channel `c` at column `x` and row `y` from the top. Panics outside the image.
+    #[inline]
+    pub fn get(&self, x: usize, y: usize, c: usize) -> f32 {
+        self.data[(y * self.width + x) * self.channels.len() + c]
+    }
+
+    /// Sets a value. Panics outside the image.
+    #[inline]
+    pub fn set(&mut self, x: usize, y: usize, c: usize, value: f32) {
+        let i = (y * self.width + x) * self.channels.len() + c;
+        self.data[i] = value;
+    }
+
+    /// The channels to read as colour: R, G and B (in any case of letters) if all are there, otherwise Y or the first
+    /// channel alone. `None` if there are no channels.
+    pub fn color_channels(&self) -> Option<ColorChannels> {
+        let find = |name: &str| self.channels.iter().position(|c| c.eq_ignore_ascii_case(name));
+        match (find("R"), find("G"), find("B")) {
+            (Some(r), Some(g), Some(b)) => Some(ColorChannels::Rgb([r, g, b])),
+            _ if self.channels.is_empty() => None,
+            _ => Some(ColorChannels::Grey(find("Y").unwrap_or(0))),
+        }
+    }
+}
+
+/// Positions of the colour channels of an [`Image`].
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum ColorChannels {
+    /// One channel.
+    Grey(usize),
+    /// Three channels.
+    Rgb([usize; 3]),
+}
+
+impl ColorChannels {
+    /// The positions as a slice of one or three.
+    pub fn as_slice(&self) -> &[usize] {
+        match self {
+            ColorChannels::Grey(y) => std::slice::from_ref(y),
+            ColorChannels::Rgb(rgb) => rgb,
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn channels_are_found_by_name_whatever_their_order() {
+        let mut image = Image::new(2, 1, &["A", "b", "G", "R"]);
+        image.set(1, 0, 3, 0.5);
+        assert_eq!(image.color_channels(), Some(ColorChannels::Rgb([3, 2, 1])));
+        assert_eq!(image.channel("A"), Some(0));
+        assert_eq!(image.channel("Z"), None);
+        assert_eq!(image.get(1, 0, 3), 0.5);
+        assert_eq!(image.get(0, 0, 3), 0.0);
+        assert_eq!(Image::new(1, 1, &["A", "Y"]).color_channels(), Some(ColorChannels::Grey(1)));
+        assert_eq!(Image::new(1, 1, &["Z"]).color_channels(), Some(ColorChannels::Grey(0)));
+        assert_eq!(Image::new(1, 1, &[]).color_channels(), None);
+    }
+}

@@ -1,0 +1,370 @@
+//! Image pyramids for filtered lookups.
+//!
+//! Level 0 is the image; each next level halves both sides, rounding down, by the exact area mean (a box filter over
+//! what may be fractions of pixels), down to one pixel. Texture coordinates (s, t) run over 0..1 from the **top left**;
+//! who has t upwards flips it. A filter of width w in (s, t) reads the level ℓ = levels − 1 + log₂ w, as pbrt-v4.
+
+use super::{ColorEncoding, Image};
+use crate::math::{Rgb, Vec2};
+
+/// What lies outside the image.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub enum Wrap {
+    /// The image again.
+    #[default]
+    Repeat,
+    /// Zero.
+    Black,
+    /// The nearest pixel.
+    Clamp,
+    /// The unfolded octahedron: an edge is joined to itself, mirrored about its middle.
+    OctahedralSphere,
+}
+
+/// How a lookup reads the pyramid.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub enum Filter {
+    /// The nearest pixel of the level below the filter's width.
+    Point,
+    /// Bilinear in the level below the filter's width.
+    #[default]
+    Bilinear,
+    /// Bilinear in two levels, linear between them.
+    Trilinear,
+    /// Read as [`Filter::Trilinear`] with the mean width of the footprint's axes: no anisotropic kernel, since the pixel
+    /// integrates over the footprint.
+    Ewa,
+}
+
+/// Values of one level, row-major from the top left, channels interleaved.
+#[derive(Clone, Debug)]
+enum Texels {
+    /// As stored; linear values by the byte table.
+    Bytes(Vec<u8>),
+    /// Linear.
+    Floats(Vec<f32>),
+}
+
+#[derive(Clone, Debug)]
+struct Level {
+    width: usize,
+    height: usize,
+    texels: Texels,
+}
+
+/// A pyramid of an image of one or three channels.
+#[derive(Clone, Debug)]
+pub struct MipMap {
+    levels: Vec<Level>,
+    channels: usize,
+    wrap: Wrap,
+    filter: Filter,
+    /// Linear values of the bytes.
+    table: Box<[f32; 256]>,
+}
+
+impl MipMap {
+    /// The pyramid of an image's colour channels (see [`Image::color_channels`]), whose values `encoding` makes linear.
+    /// An image whose values are all multiples of 1/255 in 0..1, as read from 8 bits, is kept in bytes. An image
+    /// without pixels or channels is one black pixel.
+    pub fn new(image: &Image, wrap: Wrap, filter: Filter, encoding: ColorEncoding) -> Self {
+        let channels = image.color_channels();
+        let (width, height) = (image.width, image.height);
+        let (Some(channels), true) = (channels, width > 0 && height > 0) else {
+            return Self::constant(0.0, wrap, filter);
+        };
+        let positions = channels.as_slice();
+        let stride = image.channels.len();
+        let values = || image.data.chunks_exact(stride).flat_map(|pixel| positions.iter().map(|&c| pixel[c]));
+        let table = Box::new(encoding.byte_table());
+
+        let byte = |v: f32| (0.0..=1.0).contains(&v).then(|| (v * 255.0).round() as u8);
+        let exact = |v: f32| byte(v).is_some_and(|b| (f32::from(b) / 255.0 - v).abs() < 1e-6);
+        let texels = if values().all(exact) {
+            Texels::Bytes(values().map(|v| byte(v).unwrap_or(0)).collect())
+        } else {
+            Texels::Floats(values().map(|v| encoding.to_linear(v)).collect())
+        };
+        let level = Level { width, height, texels };
+        Self::with_base(level, positions.len(), wrap, filter, table)
+    }
+
+    /// One pixel of one channel.
+    pub fn constant(value: f32, wrap: Wrap, filter: Filter) -> Self {
+        let level = Level { width: 1, height: 1, texels: Texels::Floats(vec![value]) };
+        Self::with_base(level, 1, wrap, filter, Box::new(ColorEncoding::Linear.byte_table()))
+    }
+
+    fn with_base(base: Level, channels: usize, wrap: Wrap, filter: Filter, table: Box<[f32; 256]>) -> Self {
+        let mut map = MipMap { levels: vec![base], channels, wrap, filter, table };
+        while let Some(next) = map.halve() {
+            map.levels.push(next);
+        }
+        map
+    }
+
+    /// The level above the topmost; `None` at one pixel. Levels of bytes stay bytes, through the inverse of the table.
+    fn halve(&self) -> Option<Level> {
+        let source = self.levels.last()?;
+        if source.width == 1 && source.height == 1 {
+            return None;
+        }
+        let (width, height) = ((source.width / 2).max(1), (source.height / 2).max(1));
+        let columns: Vec<_> = (0..width).map(|x| overlaps(x, width, source.width)).collect();
+        let mut values = Vec::with_capacity(width * height * self.channels);
+        for y in 0..height {
+            let rows = overlaps(y, height, source.height);
+            for columns in &columns {
+                for c in 0..self.channels {
+                    let mut sum = 0.0_f64;
+                    for &(row, row_weight) in &rows {
+                        for &(column, weight) in columns {
+                            sum += f64::from(row_weight * weight * self.texel_in(source, column, row, c));
+                        }
+                    }
+                    values.push(sum as f32);
+                }
+            }
+        }
+        let texels = match source.texels {
+            Texels::Floats(_) => Texels::Floats(values),
+            Texels::Bytes(_) => Texels::Bytes(values.into_iter().map(|v| self.nearest_byte(v)).collect()),
+        };
+        Some(Level { width, height, texels })
+    }
+
+    /// Byte whose linear value is nearest to `v`.
+    fn nearest_byte(&self, v: f32) -> u8 {
+        let above = self.table.partition_point(|&t| t < v).min(255);
+        let below = above.saturating_sub(1);
+        if v - self.table[below] < self.table[above] - v { below as u8 } else { above as u8 }
+    }
+
+    /// Columns and rows of level 0.
+    pub fn resolution(&self) -> [usize; 2] {
+        [self.levels[0].width, self.levels[0].height]
+    }
+
+    /// One or three.
+    pub fn channels(&self) -> usize {
+        self.channels
+    }
+
+    /// Number of levels.
+    pub fn levels(&self) -> usize {
+        self.levels.len()
+    }
+
+    /// Memory of the pixels (bytes).
+    pub fn bytes(&self) -> usize {
+        let of_level = |level: &Level| match &level.texels {
+            Texels::Bytes(v) => v.len(),
+            Texels::Floats(v) => v.len() * size_of::<f32>(),
+        };
+        self.levels.iter().map(of_level).sum()
+    }
+
+    #[inline]
+    fn texel_in(&self, level: &Level, x: usize, y: usize, c: usize) -> f32 {
+        let i = (y * level.width + x) * self.channels + c;
+        match &level.texels {
+            Texels::Bytes(v) => self.table[usize::from(v[i])],
+            Texels::Floats(v) => v[i],
+        }
+    }
+
+    /// Linear colour of a pixel of a level, wrapped; grey if the map has one channel. Panics if there is no such level.
+    pub fn texel(&self, level: usize, x: i64, y: i64) -> Rgb {
+        let level = &self.levels[level];
+        let Some((x, y)) = self.wrap_pixel(level, x, y) else { return Rgb::BLACK };
+        if self.channels == 1 {
+            return Rgb::splat(self.texel_in(level, x, y, 0));
+        }
+        Rgb::new(self.texel_in(level, x, y, 0), self.texel_in(level, x, y, 1), self.texel_in(level, x, y, 2))
+    }
+
+    /// The pixel inside the image that stands at (x, y).
+    fn wrap_pixel(&self, level: &Level, x: i64, y: i64) -> Option<(usize, usize)> {
+        let (w, h) = (level.width as i64, level.height as i64);
+        if (0..w).contains(&x) && (0..h).contains(&y) {
+            return Some((x as usize, y as usize));
+        }
+        let (x, y) = match self.wrap {
+            Wrap::Repeat => (x.rem_euclid(w), y.rem_euclid(h)),
+            Wrap::Black => return None,
+            Wrap::Clamp => (x.clamp(0, w - 1), y.clamp(0, h - 1)),
+            Wrap::OctahedralSphere => {
+                // Each step over an edge mirrors the other axis; lookups go at most one image beyond.
+                let (mut x, mut y) = (x, y);
+                if x < 0 || x >= w {
+                    x = if x < 0 { -1 - x } else { 2 * w - 1 - x };
+                    y = h - 1 - y;
+                }
+                if y < 0 || y >= h {
+                    x = w - 1 - x;
+                    y = if y < 0 { -1 - y } else { 2 * h - 1 - y };
+                }
+                (x.clamp(0, w - 1), y.clamp(0, h - 1))
+            }
+        };
+        Some((x as usize, y as usize))
+    }
+
+    /// Bilinear interpolation between the pixel centres of a level.
+    pub fn bilinear(&self, level: usize, st: Vec2) -> Rgb {
+        let Level { width, height, .. } = self.levels[level];
+        let (x, y) = (st.x * width as f32 - 0.5, st.y * height as f32 - 0.5);
+        let (x0, y0) = (x.floor(), y.floor());
+        let (dx, dy) = (x - x0, y - y0);
+        // A cast saturates, so that absurd or non-finite coordinates wrap somewhere instead of overflowing.
+        let limit = |v: f32| (v as i64).clamp(-(1 << 40), 1 << 40);
+        let (x0, y0) = (limit(x0), limit(y0));
+        let top = self.texel(level, x0, y0).lerp(self.texel(level, x0 + 1, y0), dx);
+        let bottom = self.texel(level, x0, y0 + 1).lerp(self.texel(level, x0 + 1, y0 + 1), dx);
+        top.lerp(bottom, dy)
+    }
+
+    fn nearest(&self, level: usize, st: Vec2) -> Rgb {
+        let Level { width, height, .. } = self.levels[level];
+        let limit = |v: f32| (v.floor() as i64).clamp(-(1 << 40), 1 << 40);
+        self.texel(level, limit(st.x * width as f32), limit(st.y * height as f32))
+    }
+
+    /// Linear colour about `st`, filtered over `width` per axis, in units of the image. A width of 0 reads level 0.
+    pub fn lookup(&self, st: Vec2, width: Vec2) -> Rgb {
+        if !st.is_finite() {
+            return Rgb::BLACK;
+        }
+        let width = width.abs();
+        let extent = match self.filter {
+            Filter::Point | Filter::Bilinear | Filter::Trilinear => width.max_element(),
+            Filter::Ewa => 0.5 * (width.x + width.y),
+        };
+        // pbrt-v4 takes twice the derivative as the width of the filter.
+        let top = (self.levels.len() - 1) as f32;
+        let level = top + (2.0 * extent).max(1e-8).log2();
+        if level >= top {
+            return self.texel(self.levels.len() - 1, 0, 0);
+        }
+        let level = level.max(0.0);
+        let below = level as usize;
+        match self.filter {
+            Filter::Point => self.nearest(below, st),
+            Filter::Bilinear => self.bilinear(below, st),
+            Filter::Trilinear | Filter::Ewa => {
+                let fine = self.bilinear(below, st);
+                let delta = level - below as f32;
+                if delta == 0.0 { fine } else { fine.lerp(self.bilinear(below + 1, st), delta) }
+            }
+        }
+    }
+}
+
+/// Source pixels under pixel `i` of `n` over a source of `m` pixels, with their shares of its area.
+fn overlaps(i: usize, n: usize, m: usize) -> Vec<(usize, f32)> {
+    // In units of 1/n source pixels all edges are integers.
+    let (start, end) = (i * m, (i + 1) * m);
+    (start / n..end.div_ceil(n))
+        .map(|j| {
+            let overlap = end.min((j + 1) * n) - start.max(j * n);
+            (j, overlap as f32 / m as f32)
+        })
+        .collect()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn image(width: usize, height: usize, value: impl Fn(usize, usize) -> [f32; 3]) -> Image {
+        let mut image = Image::new(width, height, &["R", "G", "B"]);
+        for y in 0..height {
+            for x in 0..width {
+                for (c, v) in value(x, y).into_iter().enumerate() {
+                    image.set(x, y, c, v);
+                }
+            }
+        }
+        image
+    }
+
+    fn map(image: &Image, wrap: Wrap, filter: Filter) -> MipMap {
+        MipMap::new(image, wrap, filter, ColorEncoding::Linear)
+    }
+
+    #[test]
+    fn every_level_keeps_the_mean_of_any_size() {
+        for (w, h) in [(8, 8), (7, 5), (1, 9), (13, 1), (640, 3)] {
+            let image = image(w, h, |x, y| [(x * 31 + y * 17) as f32 * 0.013, x as f32, y as f32]);
+            let map = map(&image, Wrap::Repeat, Filter::Trilinear);
+            assert_eq!(map.levels(), w.max(h).ilog2() as usize + 1);
+            for (c, total) in [0, 1, 2].map(|c| (c, image.data.iter().skip(c).step_by(3).sum::<f32>())) {
+                let mean = total / (w * h) as f32;
+                let top = map.lookup(Vec2::splat(0.3), Vec2::splat(1.0));
+                assert!((top[c] - mean).abs() < 1e-4 * mean.max(1.0), "{w}x{h} {c}: {} {mean}", top[c]);
+            }
+        }
+    }
+
+    #[test]
+    fn eight_bit_images_stay_bytes_and_decode_by_their_encoding() {
+        let bytes = image(4, 4, |x, y| [x as f32 * 60.0 / 255.0, y as f32 * 80.0 / 255.0, 128.0 / 255.0]);
+        let map = MipMap::new(&bytes, Wrap::Clamp, Filter::Point, ColorEncoding::Srgb);
+        assert_eq!(map.bytes(), 3 * (16 + 4 + 1));
+        let c = map.lookup(Vec2::new(0.3, 0.8), Vec2::ZERO);
+        let expected = [60.0, 240.0, 128.0].map(|b| crate::imaging::color::srgb_to_linear(b / 255.0));
+        assert!((c - Rgb::from_array(expected)).to_array().iter().all(|e| e.abs() < 1e-6), "{c:?}");
+        let half_float = image(4, 4, |x, _| [x as f32 * 0.3, 0.0, 0.0]);
+        assert_eq!(
+            MipMap::new(&half_float, Wrap::Clamp, Filter::Point, ColorEncoding::Srgb).bytes(),
+            12 * (16 + 4 + 1)
+        );
+    }
+
+    #[test]
+    fn lookups_interpolate_between_pixel_centres_and_wrap() {
+        let image = image(4, 2, |x, y| [x as f32, y as f32, 7.0]);
+        let at = |wrap, s, t| map(&image, wrap, Filter::Bilinear).lookup(Vec2::new(s, t), Vec2::ZERO);
+        assert_eq!(at(Wrap::Clamp, 0.125, 0.25), Rgb::new(0.0, 0.0, 7.0));
+        assert_eq!(at(Wrap::Clamp, 0.25, 0.5), Rgb::new(0.5, 0.5, 7.0));
+        assert_eq!(at(Wrap::Clamp, -3.0, 9.0), Rgb::new(0.0, 1.0, 7.0));
+        assert_eq!(at(Wrap::Repeat, 0.0, 0.25), Rgb::new(1.5, 0.0, 7.0));
+        assert_eq!(at(Wrap::Repeat, 5.125, -0.75), Rgb::new(0.0, 0.0, 7.0));
+        assert_eq!(at(Wrap::Black, 0.0, 0.25).b, 3.5);
+        assert_eq!(at(Wrap::Black, 1.5, 0.25), Rgb::BLACK);
+        assert_eq!(at(Wrap::Repeat, f32::NAN, 0.2), Rgb::BLACK);
+        assert!(at(Wrap::Repeat, 1e30, -1e30).is_finite());
+    }
+
+    #[test]
+    fn octahedral_edges_join_their_mirror_image() {
+        let image = image(4, 4, |x, y| [x as f32, y as f32, 0.0]);
+        let map = map(&image, Wrap::OctahedralSphere, Filter::Bilinear);
+        assert_eq!(map.texel(0, -1, 0), map.texel(0, 0, 3));
+        assert_eq!(map.texel(0, 4, 1), map.texel(0, 3, 2));
+        assert_eq!(map.texel(0, 1, -1), map.texel(0, 2, 0));
+        assert_eq!(map.texel(0, 2, 4), map.texel(0, 1, 3));
+        // Across a corner lies the opposite one.
+        assert_eq!(map.texel(0, -1, -1), map.texel(0, 3, 3));
+    }
+
+    #[test]
+    fn trilinear_is_continuous_in_the_width_and_ends_at_the_mean() {
+        let image = image(16, 16, |x, y| [((x * 7 + y * 3) % 5) as f32, 0.0, 1.0]);
+        let map = map(&image, Wrap::Repeat, Filter::Trilinear);
+        let at = |w: f32| map.lookup(Vec2::new(0.41, 0.77), Vec2::splat(w)).r;
+        for i in 1..2000 {
+            let w = i as f32 * 2.5e-4;
+            assert!((at(w) - at(w + 1e-6)).abs() < 1e-3, "{w}");
+        }
+        assert_eq!(at(0.0), at(1.0 / 64.0));
+        let mean = image.data.iter().step_by(3).sum::<f32>() / 256.0;
+        assert!((at(0.5) - mean).abs() < 1e-5);
+    }
+
+    #[test]
+    fn an_empty_image_is_black() {
+        let map = MipMap::new(&Image::default(), Wrap::Repeat, Filter::Ewa, ColorEncoding::Linear);
+        assert_eq!(map.lookup(Vec2::ZERO, Vec2::ONE), Rgb::BLACK);
+    }
+}
