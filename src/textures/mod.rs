@@ -1,11 +1,22 @@
 //! Textures: float and RGB functions of a surface point. All textures of a scene live in one [`TextureSet`].
+//!
+//! Textures are trees whose nodes refer to earlier ones by number, so that no tree can hold itself. Semantics are
+//! pbrt-v4's. Checkerboards are looked up at points: the pixel integrates over their edges.
 
-use crate::math::{Vec2, Vec3};
+pub mod mapping;
+
+pub use crate::imaging::{Filter, Wrap};
+pub use mapping::{CheckerboardMapping, Mapping2d};
+
+use crate::imaging::MipMap;
+use crate::math::{Rgb, Vec2, Vec3};
 
 /// Index into [`TextureSet::floats`].
 pub type FloatTextureId = u32;
 /// Index into [`TextureSet::rgbs`].
 pub type RgbTextureId = u32;
+/// Index into [`TextureSet::images`].
+pub type ImageId = u32;
 
 /// Where a texture is looked up.
 #[derive(Clone, Copy, Debug)]
@@ -18,4 +29,335 @@ pub struct TextureContext {
     pub p: Vec3,
     /// World-space geometric normal.
     pub n: Vec3,
+}
+
+/// Lookup of an image.
+#[derive(Clone, Copy, Debug)]
+pub struct ImageTexture {
+    /// The image.
+    pub image: ImageId,
+    /// Point to image coordinates; (0, 0) is the lower left.
+    pub mapping: Mapping2d,
+    /// Factor of the values.
+    pub scale: f32,
+    /// True for max(0, 1 − scaled value).
+    pub invert: bool,
+}
+
+/// A float on surfaces.
+#[derive(Clone, Copy, Debug)]
+pub enum FloatTexture {
+    /// The same everywhere.
+    Constant(f32),
+    /// An image; the mean of its channels.
+    Image(ImageTexture),
+    /// tex·scale.
+    Scale {
+        /// Value.
+        tex: FloatTextureId,
+        /// Factor.
+        scale: FloatTextureId,
+    },
+    /// tex1·(1 − amount) + tex2·amount.
+    Mix {
+        /// Value at amount 0.
+        tex1: FloatTextureId,
+        /// Value at amount 1.
+        tex2: FloatTextureId,
+        /// Amount.
+        amount: FloatTextureId,
+    },
+    /// tex1·|n·direction| + tex2·(1 − |n·direction|).
+    DirectionMix {
+        /// Value where the normal is along the direction.
+        tex1: FloatTextureId,
+        /// Value where it is across.
+        tex2: FloatTextureId,
+        /// Unit direction in world space.
+        direction: Vec3,
+    },
+    /// tex1 in even cells, tex2 in odd ones.
+    Checkerboard {
+        /// Cells.
+        mapping: CheckerboardMapping,
+        /// Value of even cells.
+        tex1: FloatTextureId,
+        /// Value of odd cells.
+        tex2: FloatTextureId,
+    },
+}
+
+/// A colour on surfaces.
+#[derive(Clone, Copy, Debug)]
+pub enum RgbTexture {
+    /// The same everywhere.
+    Constant(Rgb),
+    /// An image; one of one channel is grey.
+    Image(ImageTexture),
+    /// tex·scale.
+    Scale {
+        /// Value.
+        tex: RgbTextureId,
+        /// Factor.
+        scale: FloatTextureId,
+    },
+    /// tex1·(1 − amount) + tex2·amount.
+    Mix {
+        /// Value at amount 0.
+        tex1: RgbTextureId,
+        /// Value at amount 1.
+        tex2: RgbTextureId,
+        /// Amount.
+        amount: FloatTextureId,
+    },
+    /// tex1·|n·direction| + tex2·(1 − |n·direction|).
+    DirectionMix {
+        /// Value where the normal is along the direction.
+        tex1: RgbTextureId,
+        /// Value where it is across.
+        tex2: RgbTextureId,
+        /// Unit direction in world space.
+        direction: Vec3,
+    },
+    /// tex1 in even cells, tex2 in odd ones.
+    Checkerboard {
+        /// Cells.
+        mapping: CheckerboardMapping,
+        /// Value of even cells.
+        tex1: RgbTextureId,
+        /// Value of odd cells.
+        tex2: RgbTextureId,
+    },
+}
+
+/// All textures of a scene.
+#[derive(Clone, Debug, Default)]
+pub struct TextureSet {
+    /// Float textures; add with [`Self::add_float`].
+    pub floats: Vec<FloatTexture>,
+    /// RGB textures; add with [`Self::add_rgb`].
+    pub rgbs: Vec<RgbTexture>,
+    /// Images.
+    pub images: Vec<MipMap>,
+}
+
+impl TextureSet {
+    /// Adds a float texture. Panics if it refers to a texture or image that is not in the set yet.
+    pub fn add_float(&mut self, texture: FloatTexture) -> FloatTextureId {
+        let children: &[FloatTextureId] = match &texture {
+            FloatTexture::Constant(_) => &[],
+            FloatTexture::Image(image) => {
+                self.check_image(image);
+                &[]
+            }
+            FloatTexture::Scale { tex, scale } => &[*tex, *scale],
+            FloatTexture::Mix { tex1, tex2, amount } => &[*tex1, *tex2, *amount],
+            FloatTexture::DirectionMix { tex1, tex2, .. } | FloatTexture::Checkerboard { tex1, tex2, .. } => {
+                &[*tex1, *tex2]
+            }
+        };
+        let id = self.floats.len() as FloatTextureId;
+        assert!(children.iter().all(|&c| c < id), "a texture refers to earlier ones only");
+        self.floats.push(texture);
+        id
+    }
+
+    /// Adds an RGB texture. Panics if it refers to a texture or image that is not in the set yet.
+    pub fn add_rgb(&mut self, texture: RgbTexture) -> RgbTextureId {
+        let (children, weight): (&[RgbTextureId], Option<FloatTextureId>) = match &texture {
+            RgbTexture::Constant(_) => (&[], None),
+            RgbTexture::Image(image) => {
+                self.check_image(image);
+                (&[], None)
+            }
+            RgbTexture::Scale { tex, scale } => (&[*tex], Some(*scale)),
+            RgbTexture::Mix { tex1, tex2, amount } => (&[*tex1, *tex2], Some(*amount)),
+            RgbTexture::DirectionMix { tex1, tex2, .. } | RgbTexture::Checkerboard { tex1, tex2, .. } => {
+                (&[*tex1, *tex2], None)
+            }
+        };
+        let id = self.rgbs.len() as RgbTextureId;
+        let known = children.iter().all(|&c| c < id) && weight.is_none_or(|w| (w as usize) < self.floats.len());
+        assert!(known, "a texture refers to earlier ones only");
+        self.rgbs.push(texture);
+        id
+    }
+
+    /// Adds an image.
+    pub fn add_image(&mut self, image: MipMap) -> ImageId {
+        self.images.push(image);
+        (self.images.len() - 1) as ImageId
+    }
+
+    fn check_image(&self, texture: &ImageTexture) {
+        assert!((texture.image as usize) < self.images.len(), "an image is added before its textures");
+    }
+
+    /// The value of a float texture that is a constant.
+    pub fn constant_float(&self, id: FloatTextureId) -> Option<f32> {
+        match self.floats[id as usize] {
+            FloatTexture::Constant(v) => Some(v),
+            FloatTexture::Image(_)
+            | FloatTexture::Scale { .. }
+            | FloatTexture::Mix { .. }
+            | FloatTexture::DirectionMix { .. }
+            | FloatTexture::Checkerboard { .. } => None,
+        }
+    }
+
+    /// The value of an RGB texture that is a constant.
+    pub fn constant_rgb(&self, id: RgbTextureId) -> Option<Rgb> {
+        match self.rgbs[id as usize] {
+            RgbTexture::Constant(v) => Some(v),
+            RgbTexture::Image(_)
+            | RgbTexture::Scale { .. }
+            | RgbTexture::Mix { .. }
+            | RgbTexture::DirectionMix { .. }
+            | RgbTexture::Checkerboard { .. } => None,
+        }
+    }
+
+    /// Value of a float texture.
+    pub fn float(&self, id: FloatTextureId, ctx: &TextureContext) -> f32 {
+        match &self.floats[id as usize] {
+            FloatTexture::Constant(v) => *v,
+            FloatTexture::Image(image) => {
+                let v = self.image_value(image, ctx).average() * image.scale;
+                if image.invert { (1.0 - v).max(0.0) } else { v }
+            }
+            FloatTexture::Scale { tex, scale } => {
+                let scale = self.float(*scale, ctx);
+                if scale == 0.0 { 0.0 } else { self.float(*tex, ctx) * scale }
+            }
+            FloatTexture::Mix { tex1, tex2, amount } => {
+                let amount = self.float(*amount, ctx);
+                blend(amount, 0.0, || self.float(*tex1, ctx), || self.float(*tex2, ctx))
+            }
+            FloatTexture::DirectionMix { tex1, tex2, direction } => {
+                let across = 1.0 - ctx.n.dot(*direction).abs();
+                blend(across, 0.0, || self.float(*tex1, ctx), || self.float(*tex2, ctx))
+            }
+            FloatTexture::Checkerboard { mapping, tex1, tex2 } => {
+                self.float(if mapping.is_even(ctx) { *tex1 } else { *tex2 }, ctx)
+            }
+        }
+    }
+
+    /// Value of an RGB texture.
+    pub fn rgb(&self, id: RgbTextureId, ctx: &TextureContext) -> Rgb {
+        match &self.rgbs[id as usize] {
+            RgbTexture::Constant(v) => *v,
+            RgbTexture::Image(image) => {
+                let v = self.image_value(image, ctx) * image.scale;
+                (if image.invert { Rgb::WHITE - v } else { v }).map(|c| c.max(0.0))
+            }
+            RgbTexture::Scale { tex, scale } => {
+                let scale = self.float(*scale, ctx);
+                if scale == 0.0 { Rgb::BLACK } else { self.rgb(*tex, ctx) * scale }
+            }
+            RgbTexture::Mix { tex1, tex2, amount } => {
+                let amount = self.float(*amount, ctx);
+                blend(amount, Rgb::BLACK, || self.rgb(*tex1, ctx), || self.rgb(*tex2, ctx))
+            }
+            RgbTexture::DirectionMix { tex1, tex2, direction } => {
+                let across = 1.0 - ctx.n.dot(*direction).abs();
+                blend(across, Rgb::BLACK, || self.rgb(*tex1, ctx), || self.rgb(*tex2, ctx))
+            }
+            RgbTexture::Checkerboard { mapping, tex1, tex2 } => {
+                self.rgb(if mapping.is_even(ctx) { *tex1 } else { *tex2 }, ctx)
+            }
+        }
+    }
+
+    fn image_value(&self, texture: &ImageTexture, ctx: &TextureContext) -> Rgb {
+        let (st, width) = texture.mapping.map(ctx);
+        // Images have t downwards.
+        self.images[texture.image as usize].lookup(Vec2::new(st.x, 1.0 - st.y), width)
+    }
+}
+
+/// `a·(1 − amount) + b·amount`, where what has no weight is not evaluated.
+fn blend<T>(amount: f32, zero: T, a: impl Fn() -> T, b: impl Fn() -> T) -> T
+where
+    T: Copy + std::ops::Add<Output = T> + std::ops::Mul<f32, Output = T>,
+{
+    let a = if amount == 1.0 { zero } else { a() * (1.0 - amount) };
+    let b = if amount == 0.0 { zero } else { b() * amount };
+    a + b
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::imaging::{ColorEncoding, Image};
+
+    fn at(u: f32, v: f32) -> TextureContext {
+        TextureContext { uv: Vec2::new(u, v), uv_width: Vec2::ZERO, p: Vec3::ZERO, n: Vec3::new(0.6, 0.0, 0.8) }
+    }
+
+    /// A 2×2 image, red below, green above, blue on the right.
+    fn set() -> (TextureSet, ImageTexture) {
+        let mut image = Image::new(2, 2, &["R", "G", "B"]);
+        for x in 0..2 {
+            image.set(x, 1, 0, 0.75);
+            image.set(x, 0, 1, 0.5);
+            image.set(1, x, 2, 1.5);
+        }
+        let mut set = TextureSet::default();
+        let image = set.add_image(MipMap::new(&image, Wrap::Repeat, Filter::Bilinear, ColorEncoding::Linear));
+        (set, ImageTexture { image, mapping: Mapping2d::default(), scale: 1.0, invert: false })
+    }
+
+    #[test]
+    fn images_have_their_origin_at_the_lower_left() {
+        let (mut set, image) = set();
+        let (rgb, float) = (set.add_rgb(RgbTexture::Image(image)), set.add_float(FloatTexture::Image(image)));
+        assert_eq!(set.rgb(rgb, &at(0.25, 0.25)), Rgb::new(0.75, 0.0, 0.0));
+        assert_eq!(set.rgb(rgb, &at(0.75, 0.75)), Rgb::new(0.0, 0.5, 1.5));
+        assert!((set.float(float, &at(0.25, 0.25)) - 0.25).abs() < 1e-6);
+    }
+
+    #[test]
+    fn scale_comes_before_invert_and_colours_stay_positive() {
+        let (mut set, image) = set();
+        let texture = ImageTexture { scale: 2.0, invert: true, ..image };
+        let (rgb, float) = (set.add_rgb(RgbTexture::Image(texture)), set.add_float(FloatTexture::Image(texture)));
+        assert_eq!(set.rgb(rgb, &at(0.75, 0.75)), Rgb::new(1.0, 0.0, 0.0));
+        assert!((set.float(float, &at(0.25, 0.25)) - 0.5).abs() < 1e-6);
+        assert_eq!(set.float(float, &at(0.75, 0.75)), 0.0);
+    }
+
+    #[test]
+    fn trees_combine_their_leaves() {
+        let (mut set, _) = set();
+        let [a, b, quarter] = [2.0, 6.0, 0.25].map(|v| set.add_float(FloatTexture::Constant(v)));
+        let [red, blue] =
+            [Rgb::new(1.0, 0.0, 0.0), Rgb::new(0.0, 0.0, 1.0)].map(|c| set.add_rgb(RgbTexture::Constant(c)));
+        let mix = set.add_float(FloatTexture::Mix { tex1: a, tex2: b, amount: quarter });
+        let scale = set.add_float(FloatTexture::Scale { tex: mix, scale: quarter });
+        let along = set.add_float(FloatTexture::DirectionMix { tex1: a, tex2: b, direction: Vec3::Z });
+        assert_eq!(set.float(mix, &at(0.0, 0.0)), 3.0);
+        assert_eq!(set.float(scale, &at(0.0, 0.0)), 0.75);
+        assert!((set.float(along, &at(0.0, 0.0)) - (0.8 * 2.0 + 0.2 * 6.0)).abs() < 1e-5);
+
+        let mapping = CheckerboardMapping::Squares(Mapping2d::default());
+        let board = set.add_rgb(RgbTexture::Checkerboard { mapping, tex1: red, tex2: blue });
+        let float_board = set.add_float(FloatTexture::Checkerboard { mapping, tex1: a, tex2: b });
+        assert_eq!((set.rgb(board, &at(0.5, 0.5)).r, set.rgb(board, &at(1.5, 0.5)).b), (1.0, 1.0));
+        assert_eq!((set.float(float_board, &at(0.5, 0.5)), set.float(float_board, &at(0.5, 1.5))), (2.0, 6.0));
+
+        let rgb_mix = set.add_rgb(RgbTexture::Mix { tex1: red, tex2: board, amount: quarter });
+        let rgb_scale = set.add_rgb(RgbTexture::Scale { tex: rgb_mix, scale: a });
+        assert_eq!(set.rgb(rgb_scale, &at(1.5, 0.5)), Rgb::new(1.5, 0.0, 0.5));
+        let rgb_along = set.add_rgb(RgbTexture::DirectionMix { tex1: red, tex2: blue, direction: Vec3::Z });
+        assert!((set.rgb(rgb_along, &at(0.0, 0.0)).b - 0.2).abs() < 1e-5);
+        assert_eq!((set.constant_float(a), set.constant_float(mix)), (Some(2.0), None));
+        assert_eq!((set.constant_rgb(red), set.constant_rgb(board)), (Some(Rgb::new(1.0, 0.0, 0.0)), None));
+    }
+
+    #[test]
+    #[should_panic(expected = "earlier ones only")]
+    fn a_texture_cannot_refer_to_itself() {
+        TextureSet::default().add_float(FloatTexture::Scale { tex: 0, scale: 0 });
+    }
 }
