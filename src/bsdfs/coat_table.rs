@@ -15,6 +15,7 @@ use super::dielectric::Dielectric;
 use super::fresnel::{fr_dielectric, reflect, refract};
 use super::microfacet::{SMOOTH_ALPHA, TrowbridgeReitz};
 use crate::math::{Vec3, sqr, warp};
+use rayon::prelude::*;
 use std::f32::consts::FRAC_PI_2;
 
 /// Nodes over √cos θ.
@@ -95,7 +96,7 @@ impl CoatTable {
             let alpha = sqr(sqr(alpha_axis(i as f32 / (ALPHAS - 1) as f32)));
             Row::new(&Dielectric { eta, distribution: TrowbridgeReitz::new(alpha, alpha) }, thickness, 0.0)
         };
-        let rows = if eta == 1.0 { Vec::new() } else { (0..ALPHAS).map(row).collect() };
+        let rows = if eta == 1.0 { Vec::new() } else { (0..ALPHAS).into_par_iter().map(row).collect() };
         CoatTable { eta, thickness, axis: Axis::Alpha, rows, smooth: smooth_integrals(eta, thickness) }
     }
 

@@ -1,1 +1,350 @@
-//! (in progress)
+//! Materials: textures at a hit become a BSDF in its shading frame. Semantics are pbrt-v4's.
+//!
+//! Reading order: this file, [`bump`], [`surface`].
+
+pub mod bump;
+pub mod surface;
+#[cfg(test)]
+mod tests;
+
+pub use surface::SurfaceBsdf;
+
+use crate::bsdfs::{
+    Base, Bsdf, CoatTable, CoatedDiffuse, Conductor, Dielectric, Diffuse, DiffuseTransmission, Layered, ThinDielectric,
+    TrowbridgeReitz,
+};
+use crate::geometry::SurfaceHit;
+use crate::math::hash::{hash_floats, unit_f32};
+use crate::math::{Rgb, Vec3};
+use crate::textures::{FloatTextureId, ImageId, RgbTextureId, TextureContext, TextureSet};
+use rayon::prelude::*;
+
+/// Index into a [`MaterialSet`].
+pub type MaterialId = u32;
+
+/// Roughness of a microfacet surface.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Roughness {
+    /// Along ∂p/∂u.
+    pub u: FloatTextureId,
+    /// Across.
+    pub v: FloatTextureId,
+    /// True for alpha = √roughness, false for alpha = roughness.
+    pub remap: bool,
+}
+
+/// Optical constants of a metal.
+#[derive(Clone, Copy, Debug)]
+pub enum ConductorSpectrum {
+    /// Index of refraction and extinction.
+    EtaK {
+        /// Real part of the index.
+        eta: RgbTextureId,
+        /// Imaginary part.
+        k: RgbTextureId,
+    },
+    /// Reflectance at normal incidence: η = 1, k = 2√r/√(1 − r).
+    Reflectance(RgbTextureId),
+}
+
+/// A surface material.
+#[derive(Clone, Copy, Debug)]
+pub enum Material {
+    /// Lambertian.
+    Diffuse {
+        /// Albedo, clamped to 0..1.
+        reflectance: RgbTextureId,
+    },
+    /// Metal.
+    Conductor {
+        /// Optical constants.
+        spectrum: ConductorSpectrum,
+        /// Roughness.
+        roughness: Roughness,
+    },
+    /// Glass.
+    Dielectric {
+        /// Index of refraction of the side behind the normal.
+        eta: f32,
+        /// Roughness.
+        roughness: Roughness,
+    },
+    /// A sheet of glass.
+    ThinDielectric {
+        /// Index of refraction.
+        eta: f32,
+    },
+    /// Lambertian on both sides.
+    DiffuseTransmission {
+        /// Reflectance before scale.
+        reflectance: RgbTextureId,
+        /// Transmittance before scale.
+        transmittance: RgbTextureId,
+        /// Factor of both; the products are clamped to 0..1.
+        scale: f32,
+    },
+    /// Lambertian under a dielectric coat.
+    CoatedDiffuse {
+        /// Albedo of the base, clamped to 0..1.
+        reflectance: RgbTextureId,
+        /// Roughness of the interface.
+        roughness: Roughness,
+        /// Thickness in mean free paths.
+        thickness: FloatTextureId,
+        /// Index of refraction of the coat.
+        eta: f32,
+        /// Asymmetry of the medium.
+        g: FloatTextureId,
+        /// Single-scattering albedo of the medium, clamped to 0..1.
+        albedo: RgbTextureId,
+        /// Greatest number of events in the coat.
+        max_depth: u32,
+        /// Walks per evaluation, where walks are needed.
+        samples: u32,
+    },
+    /// Metal under a dielectric coat.
+    CoatedConductor {
+        /// Roughness of the interface.
+        interface_roughness: Roughness,
+        /// Thickness in mean free paths.
+        thickness: FloatTextureId,
+        /// Index of refraction of the coat.
+        interface_eta: f32,
+        /// Optical constants of the metal, relative to vacuum.
+        conductor: ConductorSpectrum,
+        /// Roughness of the metal.
+        conductor_roughness: Roughness,
+        /// Asymmetry of the medium.
+        g: FloatTextureId,
+        /// Single-scattering albedo of the medium, clamped to 0..1.
+        albedo: RgbTextureId,
+        /// Greatest number of events in the coat.
+        max_depth: u32,
+        /// Walks per evaluation.
+        samples: u32,
+    },
+    /// One of two materials at each point, the second with probability `amount`.
+    Mix {
+        /// The materials.
+        materials: [MaterialId; 2],
+        /// Probability of the second.
+        amount: FloatTextureId,
+    },
+    /// No surface: rays pass.
+    Interface,
+}
+
+/// A material with its name and its maps.
+#[derive(Clone, Debug)]
+pub struct MaterialEntry {
+    /// Name, for messages.
+    pub name: String,
+    /// The material.
+    pub material: Material,
+    /// Tangent-space normal map, stored linear; it goes before displacement.
+    pub normal_map: Option<ImageId>,
+    /// Displacement along the normal, which bends the normal only (scene units).
+    pub displacement: Option<FloatTextureId>,
+}
+
+/// All materials of a scene, with the tables of their coats.
+#[derive(Clone, Debug, Default)]
+pub struct MaterialSet {
+    entries: Vec<MaterialEntry>,
+    coats: Vec<CoatTable>,
+    /// Per material, its table.
+    coat_of: Vec<Option<u32>>,
+}
+
+/// What a coat's table depends on, by bits: η, thickness, and the alphas unless they are textured.
+#[derive(Clone, Copy, PartialEq)]
+struct CoatKey {
+    eta: f32,
+    thickness: f32,
+    distribution: Option<TrowbridgeReitz>,
+}
+
+impl MaterialSet {
+    /// Takes the materials and tabulates their coats, some 30 ms for each (η, thickness, roughness), and one second
+    /// where the roughness is textured. `textures` is the set that the materials refer to.
+    pub fn new(entries: Vec<MaterialEntry>, textures: &TextureSet) -> Self {
+        let mut keys: Vec<CoatKey> = Vec::new();
+        let mut intern = |key: CoatKey| {
+            let found = keys.iter().position(|k| *k == key);
+            found.unwrap_or_else(|| {
+                keys.push(key);
+                keys.len() - 1
+            }) as u32
+        };
+        let coat_of = entries.iter().map(|entry| coat_key(&entry.material, textures).map(&mut intern)).collect();
+        let tabulate = |key: &CoatKey| match key.distribution {
+            Some(distribution) => CoatTable::for_roughness(key.eta, key.thickness, distribution),
+            None => CoatTable::for_all_roughness(key.eta, key.thickness),
+        };
+        let coats = keys.par_iter().map(tabulate).collect();
+        MaterialSet { entries, coats, coat_of }
+    }
+
+    /// The materials.
+    pub fn entries(&self) -> &[MaterialEntry] {
+        &self.entries
+    }
+
+    /// The material that stands for `id` at a hit: mixtures are resolved by a hash of the point, the direction and the
+    /// mixed materials. A mixture that holds itself resolves to `None`.
+    pub fn resolve(&self, id: MaterialId, textures: &TextureSet, ctx: &TextureContext, wo: Vec3) -> Option<MaterialId> {
+        let mut id = id;
+        for _ in 0..=self.entries.len() {
+            let Material::Mix { materials: [a, b], amount } = self.entries[id as usize].material else {
+                return Some(id);
+            };
+            let amount = textures.float(amount, ctx);
+            let (p, ids) = (ctx.p, [f32::from_bits(a), f32::from_bits(b)]);
+            let hash = hash_floats(&[p.x, p.y, p.z, wo.x, wo.y, wo.z, ids[0], ids[1]]);
+            id = if amount <= 0.0 || (amount < 1.0 && amount < unit_f32(hash)) { a } else { b };
+        }
+        None
+    }
+
+    /// The scattering at a hit seen from the world-space direction `wo`; `None` where rays pass. `id` and its textures
+    /// are of the sets that the materials were made with.
+    pub fn bsdf(
+        &self,
+        id: MaterialId,
+        textures: &TextureSet,
+        hit: &SurfaceHit,
+        ctx: &TextureContext,
+        wo: Vec3,
+    ) -> Option<SurfaceBsdf<'_>> {
+        let id = self.resolve(id, textures, ctx, wo)?;
+        let entry = &self.entries[id as usize];
+        let bsdf = self.local_bsdf(id, &Textures { set: textures, ctx })?;
+        Some(SurfaceBsdf { bsdf, frame: bump::shading_frame(entry, textures, hit, ctx), n: hit.n })
+    }
+
+    fn local_bsdf(&self, id: MaterialId, t: &Textures<'_>) -> Option<Bsdf<'_>> {
+        Some(match self.entries[id as usize].material {
+            Material::Diffuse { reflectance } => Bsdf::Diffuse(Diffuse { reflectance: t.albedo(reflectance) }),
+            Material::Conductor { spectrum, roughness } => Bsdf::Conductor(t.conductor(spectrum, roughness, 1.0)),
+            Material::Dielectric { eta, roughness } => {
+                Bsdf::Dielectric(Dielectric { eta: valid_eta(eta), distribution: t.distribution(roughness) })
+            }
+            Material::ThinDielectric { eta } => Bsdf::ThinDielectric(ThinDielectric { eta: valid_eta(eta) }),
+            Material::DiffuseTransmission { reflectance, transmittance, scale } => {
+                Bsdf::DiffuseTransmission(DiffuseTransmission {
+                    reflectance: (t.rgb(reflectance) * scale).clamp(0.0, 1.0),
+                    transmittance: (t.rgb(transmittance) * scale).clamp(0.0, 1.0),
+                })
+            }
+            Material::CoatedDiffuse { reflectance, roughness, thickness, eta, g, albedo, max_depth, samples } => {
+                let (base, albedo) = (t.albedo(reflectance), t.albedo(albedo));
+                let distribution = t.distribution(roughness);
+                if let (Some(coat), true) = (self.coat_of[id as usize], albedo.is_black()) {
+                    let table = &self.coats[coat as usize];
+                    return Some(Bsdf::CoatedDiffuse(CoatedDiffuse::new(table, distribution, base, max_depth)));
+                }
+                Bsdf::Layered(Layered {
+                    top: Dielectric { eta: valid_eta(eta), distribution },
+                    base: Base::Diffuse(Diffuse { reflectance: base }),
+                    thickness: t.thickness(thickness),
+                    albedo,
+                    g: t.asymmetry(g),
+                    max_depth,
+                    samples: samples.max(1),
+                })
+            }
+            Material::CoatedConductor {
+                interface_roughness,
+                thickness,
+                interface_eta,
+                conductor,
+                conductor_roughness,
+                g,
+                albedo,
+                max_depth,
+                samples,
+            } => {
+                let eta = valid_eta(interface_eta);
+                Bsdf::Layered(Layered {
+                    top: Dielectric { eta, distribution: t.distribution(interface_roughness) },
+                    base: Base::Conductor(t.conductor(conductor, conductor_roughness, eta)),
+                    thickness: t.thickness(thickness),
+                    albedo: t.albedo(albedo),
+                    g: t.asymmetry(g),
+                    max_depth,
+                    samples: samples.max(1),
+                })
+            }
+            Material::Mix { .. } | Material::Interface => return None,
+        })
+    }
+}
+
+/// The table that a material needs: none unless a closed form can serve it.
+fn coat_key(material: &Material, textures: &TextureSet) -> Option<CoatKey> {
+    let Material::CoatedDiffuse { roughness, thickness, eta, albedo, .. } = material else { return None };
+    if textures.constant_rgb(*albedo).is_some_and(|a| !a.clamp(0.0, 1.0).is_black()) {
+        return None;
+    }
+    let thickness = textures.constant_float(*thickness)?.max(f32::MIN_POSITIVE);
+    let alphas = (textures.constant_float(roughness.u), textures.constant_float(roughness.v));
+    let distribution = match alphas {
+        (Some(u), Some(v)) => Some(distribution_of(u, v, roughness.remap)),
+        // Tables over the roughness are isotropic; other textures are left to walks.
+        _ if roughness.u == roughness.v => None,
+        _ => return None,
+    };
+    Some(CoatKey { eta: valid_eta(*eta), thickness, distribution })
+}
+
+/// pbrt-v4 reads an index of 0 as no interface; a negative one or NaN means as little.
+fn valid_eta(eta: f32) -> f32 {
+    if eta > 0.0 { eta } else { 1.0 }
+}
+
+fn distribution_of(u: f32, v: f32, remap: bool) -> TrowbridgeReitz {
+    let alpha = |r| if remap { TrowbridgeReitz::roughness_to_alpha(r) } else { r };
+    TrowbridgeReitz::new(alpha(u), alpha(v))
+}
+
+/// The textures at a point.
+struct Textures<'a> {
+    set: &'a TextureSet,
+    ctx: &'a TextureContext,
+}
+
+impl Textures<'_> {
+    fn float(&self, id: FloatTextureId) -> f32 {
+        self.set.float(id, self.ctx)
+    }
+
+    fn rgb(&self, id: RgbTextureId) -> Rgb {
+        self.set.rgb(id, self.ctx)
+    }
+
+    fn albedo(&self, id: RgbTextureId) -> Rgb {
+        self.rgb(id).clamp(0.0, 1.0)
+    }
+
+    fn distribution(&self, roughness: Roughness) -> TrowbridgeReitz {
+        distribution_of(self.float(roughness.u), self.float(roughness.v), roughness.remap)
+    }
+
+    fn thickness(&self, id: FloatTextureId) -> f32 {
+        self.float(id).max(f32::MIN_POSITIVE)
+    }
+
+    fn asymmetry(&self, id: FloatTextureId) -> f32 {
+        // At ±1 the phase function is a delta, which walks cannot connect.
+        self.float(id).clamp(-0.99, 0.99)
+    }
+
+    /// The metal under a medium of index `outside`.
+    fn conductor(&self, spectrum: ConductorSpectrum, roughness: Roughness, outside: f32) -> Conductor {
+        let (eta, k) = match spectrum {
+            ConductorSpectrum::EtaK { eta, k } => (self.rgb(eta), self.rgb(k)),
+            ConductorSpectrum::Reflectance(r) => Conductor::eta_k_of_reflectance(self.rgb(r)),
+        };
+        Conductor { distribution: self.distribution(roughness), eta: eta / outside, k: k / outside }
+    }
+}

@@ -1,0 +1,50 @@
+//! Shading frames, plain or changed by a normal map or a displacement texture [Blinn 1978].
+
+use super::MaterialEntry;
+use crate::geometry::SurfaceHit;
+use crate::math::{Frame, Vec2, Vec3};
+use crate::textures::{FloatTextureId, ImageId, TextureContext, TextureSet};
+
+/// Step in u and v of the finite differences where the footprint is unknown.
+const DEFAULT_STEP: f32 = 5e-4;
+
+/// Shading frame at a hit: z is the shading normal after normal map or displacement, x is nearest to ∂p/∂u.
+pub fn shading_frame(entry: &MaterialEntry, textures: &TextureSet, hit: &SurfaceHit, ctx: &TextureContext) -> Frame {
+    match (entry.normal_map, entry.displacement) {
+        (Some(map), _) => normal_mapped(map, textures, hit, ctx),
+        (None, Some(displacement)) => displaced(displacement, textures, hit, ctx),
+        (None, None) => Frame::from_xz(hit.dpdus, hit.ns),
+    }
+}
+
+/// The tangent-space normal 2c − 1 of the map, in the frame of the hit.
+fn normal_mapped(map: ImageId, textures: &TextureSet, hit: &SurfaceHit, ctx: &TextureContext) -> Frame {
+    let c = textures.images[map as usize].bilinear(0, Vec2::new(ctx.uv.x, 1.0 - ctx.uv.y));
+    let local = Vec3::from_array((c * 2.0).to_array()) - Vec3::ONE;
+    let frame = Frame::from_xz(hit.dpdus, hit.ns);
+    let ns = frame.to_world(local).normalize_or(hit.ns);
+    Frame::from_xz(hit.dpdus, facing(ns, hit.n))
+}
+
+/// The normal of the surface p + d·n for the displacement d: ∂p'/∂u = ∂p/∂u + ∂d/∂u n, by forward differences. The
+/// term d ∂n/∂u is left out: it matters only for displacements near the radius of curvature.
+fn displaced(displacement: FloatTextureId, textures: &TextureSet, hit: &SurfaceHit, ctx: &TextureContext) -> Frame {
+    // As pbrt-v4: with interpolated normals the second tangent is perpendicular to the first, and as long.
+    let dpdvs = if hit.ns == hit.n { hit.dpdv } else { hit.ns.cross(hit.dpdus) };
+    let step = |width: f32| if width > 0.0 { 0.5 * width } else { DEFAULT_STEP };
+    let (du, dv) = (step(ctx.uv_width.x), step(ctx.uv_width.y));
+    let at =
+        |duv: Vec2, dp: Vec3| textures.float(displacement, &TextureContext { uv: ctx.uv + duv, p: ctx.p + dp, ..*ctx });
+    let d = textures.float(displacement, ctx);
+    let d_u = (at(Vec2::new(du, 0.0), hit.dpdus * du) - d) / du;
+    let d_v = (at(Vec2::new(0.0, dv), dpdvs * dv) - d) / dv;
+
+    let (dpdu, dpdv) = (hit.dpdus + hit.ns * d_u, dpdvs + hit.ns * d_v);
+    let ns = dpdu.cross(dpdv).normalize_or(hit.ns);
+    Frame::from_xz(dpdu, facing(ns, hit.n))
+}
+
+/// `ns` turned to the side of `n`.
+fn facing(ns: Vec3, n: Vec3) -> Vec3 {
+    if ns.dot(n) < 0.0 { -ns } else { ns }
+}
