@@ -11,10 +11,9 @@ fn over_lambert(top: Dielectric, rho: f32, max_depth: u32) -> Layered {
 
 /// Moments of f(wo, wi) over `n` directions that differ by rounding only, so that each seeds another walk.
 fn walk_moments(layered: &Layered, wo: Vec3, wi: Vec3, n: u32) -> Welford {
-    let many = Layered { samples: n, ..*layered };
+    // Means of 64 walks are nearly normal and cost one evaluation each.
+    let batch = Layered { samples: 64, ..*layered };
     let mut w = Welford::new();
-    // Batches of 64 walks are nearly normal and cost one evaluation each.
-    let batch = Layered { samples: 64, ..many };
     let mut s = HashStream::new([4, 4, 4]);
     for _ in 0..n / 64 {
         let jitter = Vec3::new(s.next_f32() - 0.5, s.next_f32() - 0.5, s.next_f32() - 0.5) * 2e-6;

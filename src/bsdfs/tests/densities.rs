@@ -20,7 +20,7 @@ fn gauss(f: &dyn Fn(f64, f64) -> f64, a: [f64; 2], b: [f64; 2]) -> f64 {
     sum * ha * hb
 }
 
-/// Adaptive quadrature by halving both axes, at least `depth_min` times.
+/// Adaptive quadrature by halving both axes, at least three times.
 fn integrate(f: &dyn Fn(f64, f64) -> f64, a: [f64; 2], b: [f64; 2], whole: f64, depth: u32) -> f64 {
     let (ma, mb) = (0.5 * (a[0] + a[1]), 0.5 * (b[0] + b[1]));
     let cells =
