@@ -1,0 +1,477 @@
+//! What an importer has to say: errors and warnings that point into the files they come from.
+//!
+//! A run collects many [`Diagnostic`]s in [`Diagnostics`]; at its end they become a [`Report`], which holds the
+//! finished text and needs the sources no more. Files that cannot be opened are gathered into one error.
+
+use super::source::{SourceMap, Span};
+use codespan_reporting::diagnostic as codespan;
+use codespan_reporting::files::{Error as FilesError, Files};
+use codespan_reporting::term;
+use std::collections::{BTreeMap, BTreeSet};
+use std::fmt;
+use std::ops::Range;
+use std::path::PathBuf;
+
+/// Diagnostics of one severity that a report spells out; the rest is counted.
+const REPORT_LIMIT: usize = 100;
+/// Warnings of one kind that a report spells out.
+const KIND_LIMIT: usize = 5;
+/// Diagnostics that are kept at all.
+const KEEP_LIMIT: usize = 2000;
+
+/// How bad it is.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
+pub enum Severity {
+    /// The scene cannot be used.
+    Error,
+    /// The scene is used, but not as its author may expect.
+    Warning,
+}
+
+/// A remark on a place.
+#[derive(Clone, Debug)]
+pub struct Label {
+    /// The place.
+    pub span: Span,
+    /// The remark; may be empty.
+    pub message: String,
+}
+
+/// One error or warning.
+#[derive(Clone, Debug)]
+pub struct Diagnostic {
+    /// How bad it is.
+    pub severity: Severity,
+    /// One sentence without a full stop.
+    pub message: String,
+    /// Places; the first is the primary one.
+    pub labels: Vec<Label>,
+    /// What the author may do about it.
+    pub help: Option<String>,
+}
+
+impl Diagnostic {
+    fn new(severity: Severity, span: Option<Span>, message: String) -> Self {
+        let labels = span.map(|span| Label { span, message: String::new() }).into_iter().collect();
+        Diagnostic { severity, message, labels, help: None }
+    }
+
+    /// Sets the remark at the primary place.
+    pub fn remark(&mut self, message: impl Into<String>) -> &mut Self {
+        if let Some(label) = self.labels.first_mut() {
+            label.message = message.into();
+        }
+        self
+    }
+
+    /// Adds a second place.
+    pub fn label(&mut self, span: Span, message: impl Into<String>) -> &mut Self {
+        self.labels.push(Label { span, message: message.into() });
+        self
+    }
+
+    /// Sets the help text.
+    pub fn help(&mut self, help: impl Into<String>) -> &mut Self {
+        self.help = Some(help.into());
+        self
+    }
+}
+
+/// A file that could not be opened, and where it was asked for.
+#[derive(Clone, Debug)]
+struct MissingFile {
+    path: PathBuf,
+    reason: String,
+    span: Option<Span>,
+}
+
+/// Collects what a run has to say, in the order of its discovery.
+#[derive(Debug, Default)]
+pub struct Diagnostics {
+    list: Vec<Diagnostic>,
+    missing: Vec<MissingFile>,
+    /// Places where a kind of warning was given, and how often it was not spelled out.
+    kinds: BTreeMap<String, (BTreeSet<(u32, u32)>, usize)>,
+    errors: usize,
+    dropped: usize,
+    overflow: Option<Box<Diagnostic>>,
+}
+
+impl Diagnostics {
+    /// No diagnostics.
+    pub fn new() -> Self {
+        Diagnostics::default()
+    }
+
+    /// Adds an error at `span`.
+    pub fn error(&mut self, span: Span, message: impl Into<String>) -> &mut Diagnostic {
+        self.push(Severity::Error, Some(span), message.into())
+    }
+
+    /// Adds an error without a place.
+    pub fn error_anywhere(&mut self, message: impl Into<String>) -> &mut Diagnostic {
+        self.push(Severity::Error, None, message.into())
+    }
+
+    /// Adds a warning at `span`.
+    pub fn warning(&mut self, span: Span, message: impl Into<String>) -> &mut Diagnostic {
+        self.push(Severity::Warning, Some(span), message.into())
+    }
+
+    /// Adds a warning unless the same message was given for the same place; a message that comes up at many
+    /// places is spelled out for the first few only. Returns the warning if it is spelled out.
+    pub fn warning_once(&mut self, span: Span, message: impl Into<String>) -> Option<&mut Diagnostic> {
+        let message = message.into();
+        let (places, more) = self.kinds.entry(message.clone()).or_default();
+        if !places.insert((span.file, span.start)) {
+            return None;
+        }
+        if places.len() > KIND_LIMIT {
+            *more += 1;
+            return None;
+        }
+        Some(self.push(Severity::Warning, Some(span), message))
+    }
+
+    /// Adds a warning the first time that its message comes up anywhere.
+    pub fn warning_first(&mut self, span: Span, message: impl Into<String>) -> Option<&mut Diagnostic> {
+        let message = message.into();
+        if self.kinds.contains_key(&message) {
+            return None;
+        }
+        self.kinds.insert(message.clone(), (BTreeSet::from([(span.file, span.start)]), 0));
+        Some(self.push(Severity::Warning, Some(span), message))
+    }
+
+    /// Notes a file that could not be opened; all of them become one error.
+    pub fn missing_file(&mut self, path: impl Into<PathBuf>, reason: impl fmt::Display, span: Option<Span>) {
+        self.missing.push(MissingFile { path: path.into(), reason: reason.to_string(), span });
+    }
+
+    /// True if there is an error.
+    pub fn has_errors(&self) -> bool {
+        self.errors > 0 || !self.missing.is_empty()
+    }
+
+    /// Number of errors and warnings so far.
+    pub fn len(&self) -> usize {
+        self.list.len() + self.dropped + usize::from(!self.missing.is_empty())
+    }
+
+    /// True if nothing was said.
+    pub fn is_empty(&self) -> bool {
+        self.len() == 0
+    }
+
+    /// The finished texts: errors first, each severity in order of discovery.
+    pub fn finish(mut self, sources: &SourceMap) -> Report {
+        self.conclude_missing_files(sources);
+        let mut report = Report { dropped: self.dropped, ..Report::default() };
+        for severity in [Severity::Error, Severity::Warning] {
+            let all = self.list.iter().filter(|d| d.severity == severity);
+            let count = all.clone().count();
+            report.entries.extend(all.take(REPORT_LIMIT).map(|d| entry(d, sources)));
+            report.dropped += count.saturating_sub(REPORT_LIMIT);
+        }
+        report.errors = self.errors;
+        for (message, (_, more)) in self.kinds.iter().filter(|(_, (_, more))| *more > 0) {
+            report.repeated.push((message.clone(), *more));
+        }
+        report
+    }
+
+    fn push(&mut self, severity: Severity, span: Option<Span>, message: String) -> &mut Diagnostic {
+        self.errors += usize::from(severity == Severity::Error);
+        let diagnostic = Diagnostic::new(severity, span, message);
+        if self.list.len() >= KEEP_LIMIT {
+            self.dropped += 1;
+            return self.overflow.insert(Box::new(diagnostic));
+        }
+        self.list.push(diagnostic);
+        self.list.last_mut().expect("one was pushed")
+    }
+
+    fn conclude_missing_files(&mut self, sources: &SourceMap) {
+        if self.missing.is_empty() {
+            return;
+        }
+        let mut by_path: BTreeMap<PathBuf, (String, Vec<Span>)> = BTreeMap::new();
+        for m in std::mem::take(&mut self.missing) {
+            by_path.entry(m.path).or_insert_with(|| (m.reason, Vec::new())).1.extend(m.span);
+        }
+        let lines: Vec<String> = by_path
+            .iter()
+            .map(|(path, (reason, spans))| {
+                let place = spans.first().map_or(String::new(), |&s| format!(", asked for at {}", sources.locate(s)));
+                let more = if spans.len() > 1 { format!(" and {} more places", spans.len() - 1) } else { String::new() };
+                format!("{}: {reason}{place}{more}", path.display())
+            })
+            .collect();
+        let first = by_path.values().find_map(|(_, spans)| spans.first().copied());
+        let what = if lines.len() == 1 { "1 file".to_owned() } else { format!("{} files", lines.len()) };
+        let diagnostic = self.push(Severity::Error, first, format!("{what} cannot be read"));
+        diagnostic.help = Some(lines.join("\n"));
+    }
+}
+
+/// A finished diagnostic.
+#[derive(Clone, Debug)]
+pub struct Entry {
+    /// How bad it is.
+    pub severity: Severity,
+    /// One sentence without a full stop.
+    pub message: String,
+    /// `file:line:column` of the primary place, or empty.
+    pub location: String,
+    /// The whole text with source lines and help, ending in a newline.
+    pub rendered: String,
+}
+
+/// All that a run had to say, as text.
+#[derive(Clone, Debug, Default)]
+pub struct Report {
+    /// Errors, then warnings.
+    pub entries: Vec<Entry>,
+    /// Number of errors, with those not spelled out.
+    pub errors: usize,
+    /// Diagnostics that are not spelled out.
+    pub dropped: usize,
+    /// Warnings that came up at more places than are spelled out: (message, number of further places).
+    pub repeated: Vec<(String, usize)>,
+}
+
+impl Report {
+    /// The errors that are spelled out.
+    pub fn errors(&self) -> impl Iterator<Item = &Entry> {
+        self.entries.iter().filter(|e| e.severity == Severity::Error)
+    }
+
+    /// The warnings that are spelled out.
+    pub fn warnings(&self) -> impl Iterator<Item = &Entry> {
+        self.entries.iter().filter(|e| e.severity == Severity::Warning)
+    }
+
+    /// True if nothing was said.
+    pub fn is_empty(&self) -> bool {
+        self.entries.is_empty()
+    }
+}
+
+impl fmt::Display for Report {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        for e in &self.entries {
+            f.write_str(&e.rendered)?;
+        }
+        for (message, more) in &self.repeated {
+            writeln!(f, "warning: {message} (at {more} more places)")?;
+        }
+        if self.dropped > 0 {
+            writeln!(f, "and {} more", self.dropped)?;
+        }
+        Ok(())
+    }
+}
+
+impl std::error::Error for Report {}
+
+fn entry(diagnostic: &Diagnostic, sources: &SourceMap) -> Entry {
+    let mut excerpts = Excerpts::default();
+    let labels = diagnostic.labels.iter().enumerate().map(|(i, label)| {
+        let style = if i == 0 { codespan::LabelStyle::Primary } else { codespan::LabelStyle::Secondary };
+        let (id, range) = excerpts.add(sources, label.span);
+        codespan::Label::new(style, id, range).with_message(&label.message)
+    });
+    let labels: Vec<_> = labels.collect();
+    let severity = match diagnostic.severity {
+        Severity::Error => codespan::Severity::Error,
+        Severity::Warning => codespan::Severity::Warning,
+    };
+    let mut text = codespan::Diagnostic::new(severity).with_message(&diagnostic.message).with_labels(labels);
+    if let Some(help) = &diagnostic.help {
+        text = text.with_notes(vec![format!("help: {}", help.replace('\n', "\n      "))]);
+    }
+    let config = term::Config { chars: term::Chars::ascii(), ..term::Config::default() };
+    let rendered = term::emit_into_string(&config, &excerpts, &text)
+        .unwrap_or_else(|error| format!("{}: cannot be shown: {error}\n", diagnostic.message));
+    // Lines of source end in blanks where nothing is marked.
+    let mut rendered: String = rendered.trim_end().lines().flat_map(|line| [line.trim_end(), "\n"]).collect();
+    rendered.push('\n');
+    let location = diagnostic.labels.first().map_or(String::new(), |l| sources.locate(l.span).to_string());
+    Entry { severity: diagnostic.severity, message: diagnostic.message.clone(), location, rendered }
+}
+
+/// Characters of a source line that are shown on each side of the marked place.
+const CONTEXT: usize = 100;
+
+/// The piece of a source line about a label, so that a line of megabytes is not printed.
+struct Excerpt {
+    name: String,
+    text: String,
+    line: usize,
+    first_column: usize,
+    /// Identity: file and start of the shown bytes.
+    key: (u32, usize),
+}
+
+#[derive(Default)]
+struct Excerpts(Vec<Excerpt>);
+
+impl Excerpts {
+    /// Makes the excerpt of `span` and returns its id and the marked range in it.
+    fn add(&mut self, sources: &SourceMap, span: Span) -> (usize, Range<usize>) {
+        let bytes = sources.bytes(span.file);
+        let start = (span.start as usize).min(bytes.len());
+        let line_start = bytes[..start].iter().rposition(|&b| b == b'\n').map_or(0, |i| i + 1);
+        let line_end = bytes[start..].iter().position(|&b| b == b'\n').map_or(bytes.len(), |i| start + i);
+        let end = (span.end as usize).clamp(start, line_end.max(start));
+        let from = if start - line_start > CONTEXT { start - CONTEXT } else { line_start };
+        let to = if line_end.saturating_sub(end) > CONTEXT { end.min(start + CONTEXT) + CONTEXT } else { line_end };
+        let to = to.min(line_end);
+        let before = clean(&bytes[from..start]);
+        let marked = clean(&bytes[start..end.min(to)]);
+        let range = before.len()..before.len() + marked.len();
+        let key = (span.file, from);
+        if let Some(id) = self.0.iter().position(|e| e.key == key && e.text.len() >= range.end) {
+            return (id, range);
+        }
+        let location = sources.locate(Span { start: from as u32, ..span });
+        let text = before + &marked + &clean(&bytes[end.min(to)..to]);
+        let (line, first_column) = (location.line, location.column);
+        self.0.push(Excerpt { name: location.name, text, line, first_column, key });
+        (self.0.len() - 1, range)
+    }
+}
+
+/// Text that prints on one line: control characters and broken UTF-8 become visible substitutes.
+fn clean(bytes: &[u8]) -> String {
+    String::from_utf8_lossy(bytes).chars().map(|c| if c == '\t' { ' ' } else { c }).filter(|c| !c.is_control()).collect()
+}
+
+impl<'a> Files<'a> for Excerpts {
+    type FileId = usize;
+    type Name = &'a str;
+    type Source = &'a str;
+
+    fn name(&'a self, id: usize) -> Result<&'a str, FilesError> {
+        self.0.get(id).map(|e| e.name.as_str()).ok_or(FilesError::FileMissing)
+    }
+
+    fn source(&'a self, id: usize) -> Result<&'a str, FilesError> {
+        self.0.get(id).map(|e| e.text.as_str()).ok_or(FilesError::FileMissing)
+    }
+
+    fn line_index(&'a self, _: usize, _: usize) -> Result<usize, FilesError> {
+        Ok(0)
+    }
+
+    fn line_number(&'a self, id: usize, _: usize) -> Result<usize, FilesError> {
+        self.0.get(id).map(|e| e.line).ok_or(FilesError::FileMissing)
+    }
+
+    fn column_number(&'a self, id: usize, _: usize, byte: usize) -> Result<usize, FilesError> {
+        let e = self.0.get(id).ok_or(FilesError::FileMissing)?;
+        let before = e.text.get(..byte).unwrap_or(&e.text);
+        Ok(e.first_column + before.chars().count())
+    }
+
+    fn line_range(&'a self, id: usize, line: usize) -> Result<Range<usize>, FilesError> {
+        let e = self.0.get(id).ok_or(FilesError::FileMissing)?;
+        if line > 0 {
+            return Err(FilesError::LineTooLarge { given: line, max: 0 });
+        }
+        Ok(0..e.text.len())
+    }
+}
+
+/// The known word nearest to `word` if it is near enough to be what was meant.
+pub fn did_you_mean<'a>(word: &str, known: impl IntoIterator<Item = &'a str>) -> Option<&'a str> {
+    let near = |candidate: &&str| edit_distance(&word.to_lowercase(), &candidate.to_lowercase());
+    let best = known.into_iter().min_by_key(near)?;
+    (near(&best) <= 1 + word.chars().count().min(best.chars().count()) / 4).then_some(best)
+}
+
+/// Insertions, deletions, replacements and swaps of neighbours from `a` to `b` [Damerau 1964].
+fn edit_distance(a: &str, b: &str) -> usize {
+    let (a, b): (Vec<char>, Vec<char>) = (a.chars().take(64).collect(), b.chars().take(64).collect());
+    let mut rows: Vec<Vec<usize>> = vec![(0..=b.len()).collect()];
+    for i in 1..=a.len() {
+        let mut row = vec![i];
+        for j in 1..=b.len() {
+            let replace = rows[i - 1][j - 1] + usize::from(a[i - 1] != b[j - 1]);
+            let mut best = replace.min(rows[i - 1][j] + 1).min(row[j - 1] + 1);
+            if i > 1 && j > 1 && a[i - 1] == b[j - 2] && a[i - 2] == b[j - 1] {
+                best = best.min(rows[i - 2][j - 2] + 1);
+            }
+            row.push(best);
+        }
+        rows.push(row);
+    }
+    rows[a.len()][b.len()]
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_report_shows_place_line_and_help() {
+        let mut sources = SourceMap::new();
+        let file = sources.add_text("a.pbrt", b"Film \"rgb\"\n  \"integer xresolutoin\" 5\n".to_vec());
+        let mut diagnostics = Diagnostics::new();
+        diagnostics.error(Span { file, start: 13, end: 34 }, "unknown parameter").remark("not used").help("did you mean");
+        let report = diagnostics.finish(&sources);
+        assert_eq!(report.entries[0].location, "a.pbrt:2:3");
+        let text = report.to_string();
+        assert!(text.contains("a.pbrt:2:3"), "{text}");
+        assert!(text.contains("\"integer xresolutoin\" 5"), "{text}");
+        assert!(text.contains("help: did you mean"), "{text}");
+    }
+
+    #[test]
+    fn long_lines_and_broken_text_are_shown_in_part() {
+        let mut sources = SourceMap::new();
+        let mut text = vec![b'1'; 1_000_000];
+        text[500_000] = 0xff;
+        text[500_001] = 0x07;
+        let file = sources.add_text("long.pbrt", text);
+        let mut diagnostics = Diagnostics::new();
+        diagnostics.error(Span { file, start: 500_000, end: 500_002 }, "odd bytes");
+        let text = diagnostics.finish(&sources).to_string();
+        assert!(text.len() < 2000 && text.contains("long.pbrt:1:500001"), "{text}");
+    }
+
+    #[test]
+    fn repeated_warnings_are_counted_and_missing_files_are_one_error() {
+        let mut sources = SourceMap::new();
+        let file = sources.add_text("a", vec![b' '; 100]);
+        let mut diagnostics = Diagnostics::new();
+        for start in 0..20 {
+            diagnostics.warning_once(Span { file, start, end: start + 1 }, "curves are not rendered yet");
+            diagnostics.warning_once(Span { file, start, end: start + 1 }, "curves are not rendered yet");
+            diagnostics.missing_file(format!("mesh{}.ply", start % 2), "not found", Some(Span { file, start, end: start }));
+        }
+        let report = diagnostics.finish(&sources);
+        assert_eq!((report.entries.len(), report.errors, report.repeated[0].1), (6, 1, 15));
+        let text = report.to_string();
+        assert!(text.contains("mesh0.ply: not found, asked for at a:1:1 and 9 more places"), "{text}");
+    }
+
+    #[test]
+    fn many_errors_are_capped() {
+        let mut sources = SourceMap::new();
+        let file = sources.add_text("a", vec![b' '; 10]);
+        let mut diagnostics = Diagnostics::new();
+        for _ in 0..5000 {
+            diagnostics.error(Span { file, start: 0, end: 1 }, "bad").help("none");
+        }
+        let report = diagnostics.finish(&sources);
+        assert_eq!((report.errors, report.entries.len(), report.dropped), (5000, 100, 4900));
+    }
+
+    #[test]
+    fn suggestions_are_near() {
+        assert_eq!(did_you_mean("xresolutoin", ["yresolution", "xresolution"]), Some("xresolution"));
+        assert_eq!(did_you_mean("rufness", ["radius", "eta"]), None);
+        assert_eq!(did_you_mean("Fov", ["fov"]), Some("fov"));
+    }
+}

@@ -1,0 +1,183 @@
+//! Decimal numbers from bytes, fast.
+//!
+//! A number with at most 19 digits and a power of ten up to 22 is exact in one f64 operation [Clinger 1990]; it is then
+//! rounded to f32, unless it is the middle of two f32, where the second rounding could go wrong. All other
+//! numbers take the slow and exact way of the standard library. So every result is the nearest f32.
+
+/// Why bytes are no number.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum NumberError {
+    /// Not the spelling of a number.
+    Malformed,
+    /// Too large to be represented.
+    Overflow,
+}
+
+const POWERS: [f64; 23] = [
+    1e0, 1e1, 1e2, 1e3, 1e4, 1e5, 1e6, 1e7, 1e8, 1e9, 1e10, 1e11, 1e12, 1e13, 1e14, 1e15, 1e16, 1e17, 1e18, 1e19, 1e20,
+    1e21, 1e22,
+];
+
+/// True for bytes that end a number or a word.
+#[inline]
+pub fn is_delimiter(byte: u8) -> bool {
+    matches!(byte, b' ' | b'\n' | b'\r' | b'\t' | b'[' | b']' | b'"' | b'#')
+}
+
+/// Reads the number at the start of `bytes`; returns it and its length. The number ends at a delimiter.
+#[inline]
+pub fn parse_f32(bytes: &[u8]) -> Result<(f32, usize), NumberError> {
+    let mut i = 0;
+    let negative = bytes.first() == Some(&b'-');
+    if negative || bytes.first() == Some(&b'+') {
+        i = 1;
+    }
+    let mut mantissa = 0_u64;
+    let first_digit = i;
+    while let Some(digit) = digit_at(bytes, i) {
+        mantissa = mantissa.wrapping_mul(10).wrapping_add(digit);
+        i += 1;
+    }
+    let mut digits = i - first_digit;
+    let mut exponent = 0_i32;
+    if bytes.get(i) == Some(&b'.') {
+        i += 1;
+        let fraction = i;
+        while let Some(digit) = digit_at(bytes, i) {
+            mantissa = mantissa.wrapping_mul(10).wrapping_add(digit);
+            i += 1;
+        }
+        digits += i - fraction;
+        exponent = -((i - fraction).min(100_000) as i32);
+    }
+    if digits == 0 {
+        return Err(NumberError::Malformed);
+    }
+    if let Some(b'e' | b'E') = bytes.get(i) {
+        let (power, length) = parse_exponent(&bytes[i + 1..])?;
+        exponent = exponent.saturating_add(power);
+        i += 1 + length;
+    }
+    if bytes.get(i).is_some_and(|&b| !is_delimiter(b)) {
+        return Err(NumberError::Malformed);
+    }
+    if digits <= 19 && mantissa < 1 << 53 && exponent.unsigned_abs() <= 22 {
+        let power = POWERS[exponent.unsigned_abs() as usize];
+        let value = if exponent < 0 { mantissa as f64 / power } else { mantissa as f64 * power };
+        // The middle between two f32 has exactly this tail; so do f32 subnormals' middles at other places.
+        let is_middle = value.to_bits() & 0x1fff_ffff == 0x1000_0000;
+        if !is_middle && (mantissa == 0 || (1e-37..1e38).contains(&value)) {
+            return Ok((if negative { -value as f32 } else { value as f32 }, i));
+        }
+    }
+    slow_f32(&bytes[..i]).map(|value| (value, i))
+}
+
+#[inline]
+fn digit_at(bytes: &[u8], i: usize) -> Option<u64> {
+    let digit = bytes.get(i)?.wrapping_sub(b'0');
+    (digit <= 9).then_some(u64::from(digit))
+}
+
+fn parse_exponent(bytes: &[u8]) -> Result<(i32, usize), NumberError> {
+    let negative = bytes.first() == Some(&b'-');
+    let start = usize::from(negative || bytes.first() == Some(&b'+'));
+    let mut i = start;
+    let mut power = 0_i32;
+    while let Some(digit) = digit_at(bytes, i) {
+        power = (power * 10 + digit as i32).min(100_000);
+        i += 1;
+    }
+    if i == start { Err(NumberError::Malformed) } else { Ok((if negative { -power } else { power }, i)) }
+}
+
+#[cold]
+fn slow_f32(text: &[u8]) -> Result<f32, NumberError> {
+    let value: f32 = std::str::from_utf8(text).ok().and_then(|t| t.parse().ok()).ok_or(NumberError::Malformed)?;
+    if value.is_finite() { Ok(value) } else { Err(NumberError::Overflow) }
+}
+
+/// Reads the whole number at the start of `bytes`; returns it and its length. It ends at a delimiter.
+#[inline]
+pub fn parse_i32(bytes: &[u8]) -> Result<(i32, usize), NumberError> {
+    let negative = bytes.first() == Some(&b'-');
+    let start = usize::from(negative || bytes.first() == Some(&b'+'));
+    let mut i = start;
+    let mut value = 0_i64;
+    while let Some(digit) = digit_at(bytes, i) {
+        value = (value * 10 + digit as i64).min(1 << 40);
+        i += 1;
+    }
+    if i == start || bytes.get(i).is_some_and(|&b| !is_delimiter(b)) {
+        return Err(NumberError::Malformed);
+    }
+    let value = if negative { -value } else { value };
+    i32::try_from(value).map(|v| (v, i)).map_err(|_| NumberError::Overflow)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use proptest::prelude::*;
+
+    #[test]
+    fn odd_spellings_have_their_values() {
+        for text in ["0", "-0", "+1", ".5", "5.", "1e3", "1E-3", "-1.5e+2", "16777217", "1e-45", "3.4028235e38", "0.1",
+            "00012", "1.00000000000000000000000000001", "123456789012345678901234567890", "8388609.5", "1e-400"]
+        {
+            let expected: f32 = text.parse().unwrap();
+            let (value, length) = parse_f32(text.as_bytes()).unwrap();
+            assert_eq!(value.to_bits(), expected.to_bits(), "{text}");
+            assert_eq!(length, text.len());
+        }
+        for text in ["", "-", ".", "e5", "1e", "1e+", "1x", "1.2.3", "nan", "inf", "--1", "0x10", "1,2"] {
+            assert_eq!(parse_f32(text.as_bytes()), Err(NumberError::Malformed), "{text}");
+        }
+        assert_eq!(parse_f32(b"1e39"), Err(NumberError::Overflow));
+        assert_eq!(parse_f32(b"1e999999999999"), Err(NumberError::Overflow));
+    }
+
+    #[test]
+    fn whole_numbers_are_range_checked() {
+        assert_eq!(parse_i32(b"-2147483648]"), Ok((i32::MIN, 11)));
+        assert_eq!(parse_i32(b"2147483648"), Err(NumberError::Overflow));
+        assert_eq!(parse_i32(b"99999999999999999999999999"), Err(NumberError::Overflow));
+        assert_eq!(parse_i32(b"1.5"), Err(NumberError::Malformed));
+        assert_eq!(parse_i32(b"-"), Err(NumberError::Malformed));
+    }
+
+    proptest! {
+        #[test]
+        fn every_f32_survives_its_shortest_spelling(bits: u32) {
+            let value = f32::from_bits(bits);
+            prop_assume!(value.is_finite());
+            for text in [format!("{value}"), format!("{value:e}"), format!("{:.9e}", f64::from(value))] {
+                let (parsed, _) = parse_f32(text.as_bytes()).unwrap();
+                prop_assert_eq!(parsed.to_bits(), value.to_bits(), "{}", text);
+            }
+        }
+
+        #[test]
+        fn decimals_agree_with_the_standard_library(mantissa: u64, exponent in -60_i32..45) {
+            let text = format!("{mantissa}e{exponent}");
+            let expected: f32 = text.parse().unwrap();
+            match parse_f32(text.as_bytes()) {
+                Ok((value, _)) => prop_assert_eq!(value.to_bits(), expected.to_bits()),
+                Err(error) => prop_assert!(error == NumberError::Overflow && expected.is_infinite()),
+            }
+        }
+
+        #[test]
+        fn short_decimals_agree_with_the_standard_library(digits in 0_u32..100_000_000, point in 0_usize..9) {
+            let mut text = format!("{digits:08}");
+            text.insert(point.min(text.len()), '.');
+            let expected: f32 = text.parse().unwrap();
+            prop_assert_eq!(parse_f32(text.as_bytes()).unwrap().0.to_bits(), expected.to_bits());
+        }
+
+        #[test]
+        fn random_bytes_do_not_panic(bytes in proptest::collection::vec(any::<u8>(), 0..40)) {
+            let _ = (parse_f32(&bytes), parse_i32(&bytes));
+        }
+    }
+}

@@ -1,0 +1,147 @@
+//! The texts that an importer reads, and places in them.
+
+use flate2::read::GzDecoder;
+use std::fmt;
+use std::fs::File;
+use std::io::{self, Read};
+use std::path::Path;
+use std::sync::Arc;
+
+/// Index of a file in a [`SourceMap`].
+pub type FileId = u32;
+
+/// A range of bytes in a file.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, PartialOrd, Ord)]
+pub struct Span {
+    /// The file.
+    pub file: FileId,
+    /// First byte.
+    pub start: u32,
+    /// One past the last byte.
+    pub end: u32,
+}
+
+impl Span {
+    /// From the start of `self` to the end of `other`, if they are in one file; else `self`.
+    #[must_use]
+    pub fn to(self, other: Span) -> Span {
+        if self.file == other.file { Span { end: other.end.max(self.end), ..self } } else { self }
+    }
+}
+
+/// A place as people read it; lines and columns count from 1.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct Location {
+    /// Name of the file.
+    pub name: String,
+    /// Line.
+    pub line: usize,
+    /// Column, in characters.
+    pub column: usize,
+}
+
+impl fmt::Display for Location {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        write!(f, "{}:{}:{}", self.name, self.line, self.column)
+    }
+}
+
+#[derive(Debug)]
+struct SourceFile {
+    name: String,
+    bytes: Arc<Vec<u8>>,
+}
+
+/// All texts of a run.
+#[derive(Debug, Default)]
+pub struct SourceMap {
+    files: Vec<SourceFile>,
+}
+
+/// Largest text that is read (bytes, after decompression): spans count in 32 bits.
+const MAX_BYTES: u64 = u32::MAX as u64 - 1;
+
+impl SourceMap {
+    /// No files.
+    pub fn new() -> Self {
+        SourceMap::default()
+    }
+
+    /// Adds a text under a name.
+    pub fn add_text(&mut self, name: impl Into<String>, bytes: Vec<u8>) -> FileId {
+        self.files.push(SourceFile { name: name.into(), bytes: Arc::new(bytes) });
+        (self.files.len() - 1) as FileId
+    }
+
+    /// Reads a file, decompressing it if it is a gzip file.
+    pub fn read(&mut self, path: &Path) -> io::Result<FileId> {
+        let bytes = read_maybe_gzip(path)?;
+        Ok(self.add_text(path.display().to_string(), bytes))
+    }
+
+    /// The bytes of a file.
+    pub fn bytes(&self, file: FileId) -> &[u8] {
+        self.files.get(file as usize).map_or(&[], |f| &f.bytes)
+    }
+
+    /// The bytes of a file, shared.
+    pub fn shared_bytes(&self, file: FileId) -> Arc<Vec<u8>> {
+        self.files.get(file as usize).map_or_else(Default::default, |f| Arc::clone(&f.bytes))
+    }
+
+    /// The name of a file.
+    pub fn name(&self, file: FileId) -> &str {
+        self.files.get(file as usize).map_or("?", |f| &f.name)
+    }
+
+    /// Where a span starts.
+    pub fn locate(&self, span: Span) -> Location {
+        let bytes = self.bytes(span.file);
+        let before = &bytes[..(span.start as usize).min(bytes.len())];
+        let line_start = before.iter().rposition(|&b| b == b'\n').map_or(0, |i| i + 1);
+        let line = 1 + before.iter().filter(|&&b| b == b'\n').count();
+        let column = 1 + String::from_utf8_lossy(&before[line_start..]).chars().count();
+        Location { name: self.name(span.file).to_owned(), line, column }
+    }
+}
+
+/// Reads a whole file of at most [`MAX_BYTES`], decompressing gzip.
+fn read_maybe_gzip(path: &Path) -> io::Result<Vec<u8>> {
+    let too_large = || io::Error::new(io::ErrorKind::InvalidData, "larger than 4 GiB");
+    let file = File::open(path)?;
+    let metadata = file.metadata()?;
+    if metadata.is_dir() {
+        return Err(io::Error::new(io::ErrorKind::InvalidInput, "is a folder"));
+    }
+    let length = metadata.len();
+    let mut bytes = Vec::with_capacity(length.min(MAX_BYTES) as usize);
+    file.take(MAX_BYTES + 1).read_to_end(&mut bytes)?;
+    if bytes.starts_with(&[0x1f, 0x8b]) {
+        let mut text = Vec::new();
+        GzDecoder::new(bytes.as_slice()).take(MAX_BYTES + 1).read_to_end(&mut text)?;
+        bytes = text;
+    }
+    if bytes.len() as u64 > MAX_BYTES { Err(too_large()) } else { Ok(bytes) }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use std::io::Write;
+
+    #[test]
+    fn gzip_files_are_read_as_their_content() {
+        let folder = tempfile::tempdir().unwrap();
+        let path = folder.path().join("a.pbrt.gz");
+        let mut encoder = flate2::write::GzEncoder::new(File::create(&path).unwrap(), flate2::Compression::fast());
+        encoder.write_all(b"WorldBegin\n# \xc3\xa4 b").unwrap();
+        encoder.finish().unwrap();
+        let mut sources = SourceMap::new();
+        let file = sources.read(&path).unwrap();
+        assert_eq!(sources.bytes(file), b"WorldBegin\n# \xc3\xa4 b");
+        let place = sources.locate(Span { file, start: 16, end: 17 });
+        assert_eq!((place.line, place.column), (2, 5));
+        std::fs::write(&path, [0x1f, 0x8b, 8, 0, 1, 2]).unwrap();
+        assert!(sources.read(&path).is_err());
+    }
+}
