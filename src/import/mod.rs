@@ -7,4 +7,5 @@
 pub mod diagnostic;
 pub mod number;
 pub mod pbrt;
+pub mod ply;
 pub mod source;
