@@ -203,7 +203,8 @@ impl Diagnostics {
             .iter()
             .map(|(path, (reason, spans))| {
                 let place = spans.first().map_or(String::new(), |&s| format!(", asked for at {}", sources.locate(s)));
-                let more = if spans.len() > 1 { format!(" and {} more places", spans.len() - 1) } else { String::new() };
+                let more =
+                    if spans.len() > 1 { format!(" and {} more places", spans.len() - 1) } else { String::new() };
                 format!("{}: {reason}{place}{more}", path.display())
             })
             .collect();
@@ -344,7 +345,11 @@ impl Excerpts {
 
 /// Text that prints on one line: control characters and broken UTF-8 become visible substitutes.
 fn clean(bytes: &[u8]) -> String {
-    String::from_utf8_lossy(bytes).chars().map(|c| if c == '\t' { ' ' } else { c }).filter(|c| !c.is_control()).collect()
+    String::from_utf8_lossy(bytes)
+        .chars()
+        .map(|c| if c == '\t' { ' ' } else { c })
+        .filter(|c| !c.is_control())
+        .collect()
 }
 
 impl<'a> Files<'a> for Excerpts {
@@ -418,7 +423,10 @@ mod tests {
         let mut sources = SourceMap::new();
         let file = sources.add_text("a.pbrt", b"Film \"rgb\"\n  \"integer xresolutoin\" 5\n".to_vec());
         let mut diagnostics = Diagnostics::new();
-        diagnostics.error(Span { file, start: 13, end: 34 }, "unknown parameter").remark("not used").help("did you mean");
+        diagnostics
+            .error(Span { file, start: 13, end: 34 }, "unknown parameter")
+            .remark("not used")
+            .help("did you mean");
         let report = diagnostics.finish(&sources);
         assert_eq!(report.entries[0].location, "a.pbrt:2:3");
         let text = report.to_string();
@@ -448,7 +456,11 @@ mod tests {
         for start in 0..20 {
             diagnostics.warning_once(Span { file, start, end: start + 1 }, "curves are not rendered yet");
             diagnostics.warning_once(Span { file, start, end: start + 1 }, "curves are not rendered yet");
-            diagnostics.missing_file(format!("mesh{}.ply", start % 2), "not found", Some(Span { file, start, end: start }));
+            diagnostics.missing_file(
+                format!("mesh{}.ply", start % 2),
+                "not found",
+                Some(Span { file, start, end: start }),
+            );
         }
         let report = diagnostics.finish(&sources);
         assert_eq!((report.entries.len(), report.errors, report.repeated[0].1), (6, 1, 15));

@@ -9,3 +9,5 @@ pub mod number;
 pub mod pbrt;
 pub mod ply;
 pub mod source;
+pub mod spectra;
+pub mod spectra_data;

@@ -280,7 +280,15 @@ mod tests {
     fn tokens_need_no_blanks_between_them() {
         use TokenKind::{Close, Open, Quoted, Word};
         let found = tokens(b"\xef\xbb\xbfShape\"a \\\" b\"[1 2]# end ]\r\nX");
-        let expected = [(Word, "Shape"), (Quoted, "\"a \\\" b\""), (Open, "["), (Word, "1"), (Word, "2"), (Close, "]"), (Word, "X")];
+        let expected = [
+            (Word, "Shape"),
+            (Quoted, "\"a \\\" b\""),
+            (Open, "["),
+            (Word, "1"),
+            (Word, "2"),
+            (Close, "]"),
+            (Word, "X"),
+        ];
         assert_eq!(found, expected.map(|(kind, text)| (kind, text.to_owned())));
     }
 

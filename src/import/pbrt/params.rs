@@ -89,8 +89,19 @@ impl ParamType {
 
     /// All spellings of pbrt-v4, for suggestions.
     pub const NAMES: &[&str] = &[
-        "integer", "float", "point2", "vector2", "point3", "vector3", "normal", "spectrum", "rgb", "blackbody", "texture",
-        "string", "bool",
+        "integer",
+        "float",
+        "point2",
+        "vector2",
+        "point3",
+        "vector3",
+        "normal",
+        "spectrum",
+        "rgb",
+        "blackbody",
+        "texture",
+        "string",
+        "bool",
     ];
 }
 
@@ -309,7 +320,12 @@ impl ParamSet {
     }
 
     /// Takes the numbers of an array out of the set.
-    pub fn take_floats(&mut self, name: &'static str, types: &[ParamType], diagnostics: &mut Diagnostics) -> Option<Vec<f32>> {
+    pub fn take_floats(
+        &mut self,
+        name: &'static str,
+        types: &[ParamType],
+        diagnostics: &mut Diagnostics,
+    ) -> Option<Vec<f32>> {
         self.get(name, types, diagnostics)?;
         match &mut self.params.iter_mut().find(|p| p.name == name)?.values {
             Values::Floats(v) => Some(std::mem::take(v)),
@@ -343,7 +359,11 @@ impl ParamSet {
     }
 
     /// A spectrum or a texture of spectra.
-    pub fn spectrum_input(&self, name: &'static str, diagnostics: &mut Diagnostics) -> Option<Input<'_, SpectrumValue<'_>>> {
+    pub fn spectrum_input(
+        &self,
+        name: &'static str,
+        diagnostics: &mut Diagnostics,
+    ) -> Option<Input<'_, SpectrumValue<'_>>> {
         let param = self.get(name, SPECTRUM_OR_TEXTURE, diagnostics)?;
         if param.ty == ParamType::Texture {
             return self.get_one(name, &[ParamType::Texture], diagnostics)?.first_string().map(Input::Texture);

@@ -46,7 +46,8 @@ pub fn parse_source(
 ) {
     let folder = path.parent().map_or_else(PathBuf::new, Path::to_path_buf);
     let open = vec![identity(path)];
-    let mut parser = Parser { sources, diagnostics, visitor, folder, open, blocks: Vec::new(), world: None, early: false };
+    let mut parser =
+        Parser { sources, diagnostics, visitor, folder, open, blocks: Vec::new(), world: None, early: false };
     parser.file(file);
     parser.finish(file);
 }
@@ -123,7 +124,8 @@ impl Parser<'_> {
         }
         if self.world.is_none() && !self.diagnostics.has_errors() {
             let end = self.sources.bytes(file).len() as u32;
-            let help = "a scene has WorldBegin after its camera, film and other options, and before its shapes and lights";
+            let help =
+                "a scene has WorldBegin after its camera, film and other options, and before its shapes and lights";
             self.diagnostics.error(Span { file, start: end, end }, "scene has no WorldBegin").help(help);
         }
     }
@@ -209,7 +211,8 @@ impl Parser<'_> {
             "Sampler" => D::Sampler,
             "Shape" => D::Shape,
             "Texture" => {
-                let (name, value, class) = (self.name(lexer, keyword)?, self.name(lexer, keyword)?, self.name(lexer, keyword)?);
+                let (name, value, class) =
+                    (self.name(lexer, keyword)?, self.name(lexer, keyword)?, self.name(lexer, keyword)?);
                 let params = self.params(lexer, format!("Texture \"{}\"", class.text), span);
                 self.emit(D::Texture { name, value, class }, span, params);
                 return Ok(());
@@ -254,8 +257,17 @@ impl Parser<'_> {
         );
         let is_world = matches!(
             keyword,
-            "Shape" | "LightSource" | "AreaLightSource" | "ObjectBegin" | "ObjectEnd" | "ObjectInstance" | "Material"
-                | "MakeNamedMaterial" | "NamedMaterial" | "Texture" | "ReverseOrientation"
+            "Shape"
+                | "LightSource"
+                | "AreaLightSource"
+                | "ObjectBegin"
+                | "ObjectEnd"
+                | "ObjectInstance"
+                | "Material"
+                | "MakeNamedMaterial"
+                | "NamedMaterial"
+                | "Texture"
+                | "ReverseOrientation"
         );
         match self.world {
             Some(world) if is_option => {
@@ -329,15 +341,16 @@ impl Parser<'_> {
         let depth = self.blocks.len();
         // What an imported file sets stays inside it, as if it stood in a block of its own.
         let scoped = keyword == "Import";
-        if scoped {
-            self.open_block(Block::Attribute, DirectiveKind::AttributeBegin, span)?;
+        let opened =
+            if scoped { self.open_block(Block::Attribute, DirectiveKind::AttributeBegin, span) } else { Ok(()) };
+        if opened.is_ok() {
+            self.file(file);
         }
-        self.file(file);
         if scoped {
             self.close_import(depth, span);
         }
         self.open.pop();
-        Ok(())
+        opened
     }
 
     /// Closes the block of an import and those that the imported file left open.
@@ -393,7 +406,8 @@ impl Parser<'_> {
             "material" => Ok(AttributeTarget::Material),
             "medium" => Ok(AttributeTarget::Medium),
             "texture" => Ok(AttributeTarget::Texture),
-            other => self.fail(name.span, format!("Attribute knows shape, light, material, medium and texture, not `{other}`")),
+            other => self
+                .fail(name.span, format!("Attribute knows shape, light, material, medium and texture, not `{other}`")),
         }
     }
 
@@ -498,7 +512,13 @@ impl Parser<'_> {
         Ok(Some(Param::new(ty, name.to_owned(), span, value_span, values)))
     }
 
-    fn values(&mut self, lexer: &mut Lexer<'_>, ty: ParamType, name: &str, bracketed: bool) -> Result<Values, Reported> {
+    fn values(
+        &mut self,
+        lexer: &mut Lexer<'_>,
+        ty: ParamType,
+        name: &str,
+        bracketed: bool,
+    ) -> Result<Values, Reported> {
         let by_name = ty == ParamType::Spectrum && self.peek(lexer)?.is_some_and(|t| t.kind == TokenKind::Quoted);
         match ty {
             ParamType::String | ParamType::Texture => self.strings(lexer, name, bracketed).map(Values::Strings),
@@ -583,7 +603,7 @@ impl Parser<'_> {
 
 /// Goes on to the next keyword.
 fn skip_to_directive(lexer: &mut Lexer<'_>) {
-    skip_until(lexer, |lexer, token| is_keyword(lexer, token));
+    skip_until(lexer, is_keyword);
 }
 
 /// Goes on to the next keyword, or to the next string that declares a parameter.

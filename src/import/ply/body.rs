@@ -100,11 +100,7 @@ struct Ascii<'a, R>(&'a mut Stream<R>);
 impl<R: Read> Ascii<'_, R> {
     /// Hands the next word to `parse`, which returns a value and the length of the word.
     #[inline]
-    fn word<T>(
-        &mut self,
-        what: &str,
-        parse: impl Fn(&[u8]) -> Result<(T, usize), NumberError>,
-    ) -> Result<T, PlyError> {
+    fn word<T>(&mut self, what: &str, parse: impl Fn(&[u8]) -> Result<(T, usize), NumberError>) -> Result<T, PlyError> {
         loop {
             let bytes = self.0.fill(MAX_WORD)?;
             let blanks = bytes.iter().take_while(|b| b.is_ascii_whitespace()).count();
@@ -139,11 +135,12 @@ fn parse_any_f32(bytes: &[u8]) -> Result<(f32, usize), NumberError> {
     parse_f32(bytes).or_else(|error| {
         let length = bytes.iter().take(MAX_WORD).position(|&b| is_delimiter(b)).unwrap_or(bytes.len().min(MAX_WORD));
         let word = std::str::from_utf8(&bytes[..length]).map_err(|_| error)?;
-        word.trim_start_matches(['-', '+'])
-            .to_ascii_lowercase()
-            .starts_with(['n', 'i'])
-            .then(|| word.parse().map(|value| (value, length)).map_err(|_| error))
-            .unwrap_or(if error == NumberError::Overflow { Ok((f32::INFINITY, length)) } else { Err(error) })
+        let is_name = word.trim_start_matches(['-', '+']).to_ascii_lowercase().starts_with(['n', 'i']);
+        match error {
+            NumberError::Malformed if is_name => word.parse().map(|value| (value, length)).map_err(|_| error),
+            NumberError::Malformed => Err(error),
+            NumberError::Overflow => Ok((f32::INFINITY, length)),
+        }
     })
 }
 
@@ -185,7 +182,8 @@ fn skip_property(property: &Property, what: &str, numbers: &mut impl Numbers) ->
         None => numbers.skip(property.ty, 1, what),
         Some(count_type) => {
             let count = numbers.integer(count_type, what)?;
-            let count = u64::try_from(count).map_err(|_| PlyError::format(format!("negative list length in {what}")))?;
+            let count =
+                u64::try_from(count).map_err(|_| PlyError::format(format!("negative list length in {what}")))?;
             numbers.skip(property.ty, count, what)
         }
     }
@@ -406,7 +404,9 @@ fn fast_faces<R: Read, const BIG: bool>(
     faces: &mut Faces,
 ) -> Result<(), PlyError> {
     let common = match element.properties.as_slice() {
-        [p] => p.list == Some(Scalar::U8) && matches!(p.ty, Scalar::I32 | Scalar::U32) && p.name.starts_with("vertex_ind"),
+        [p] => {
+            p.list == Some(Scalar::U8) && matches!(p.ty, Scalar::I32 | Scalar::U32) && p.name.starts_with("vertex_ind")
+        }
         _ => false,
     };
     if !common {

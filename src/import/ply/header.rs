@@ -131,7 +131,9 @@ impl Header {
             needed = needed.saturating_add(element.count.saturating_mul(row));
             if needed > limit.saturating_add(1) {
                 let (name, count) = (&element.name, element.count);
-                return Err(PlyError::format(format!("{count} of `{name}` are announced, more than the file can hold")));
+                return Err(PlyError::format(format!(
+                    "{count} of `{name}` are announced, more than the file can hold"
+                )));
             }
             if element.count > u64::from(u32::MAX) {
                 return Err(PlyError::format(format!("more than 2^32 of `{}`", element.name)));
@@ -197,7 +199,8 @@ fn property(words: &[&str]) -> Option<Property> {
 fn read_line<R: Read>(stream: &mut Stream<R>) -> Result<String, PlyError> {
     let available = stream.fill(MAX_LINE)?;
     let Some(end) = available.iter().take(MAX_LINE).position(|&b| b == b'\n' || b == b'\r') else {
-        let message = if available.len() < MAX_LINE { "file ends inside the header" } else { "header has an endless line" };
+        let message =
+            if available.len() < MAX_LINE { "file ends inside the header" } else { "header has an endless line" };
         return Err(PlyError::format(if available.is_empty() { "is empty" } else { message }));
     };
     let line = String::from_utf8_lossy(&available[..end]).into_owned();

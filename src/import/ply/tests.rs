@@ -14,7 +14,9 @@ fn message(bytes: &[u8]) -> String {
 const CUBE_HEAD: &str = "element vertex 4\nproperty float x\nproperty float y\nproperty float z\nproperty float u\nproperty float v\nelement face 2\nproperty list uchar int vertex_indices\nproperty int face_indices\nend_header\n";
 
 fn ascii() -> String {
-    format!("ply\nformat ascii 1.0\ncomment hello\n{CUBE_HEAD}0 0 0 0 0\n1 0 0 1 0\n1 1 0 1 1\n0 1 0 0 1\n4 0 1 2 3 7\n3 0 2 3 8\n")
+    format!(
+        "ply\nformat ascii 1.0\ncomment hello\n{CUBE_HEAD}0 0 0 0 0\n1 0 0 1 0\n1 1 0 1 1\n0 1 0 0 1\n4 0 1 2 3 7\n3 0 2 3 8\n"
+    )
 }
 
 fn binary(big: bool) -> Vec<u8> {
