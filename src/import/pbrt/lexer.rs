@@ -197,7 +197,7 @@ impl<'a> Lexer<'a> {
         Ok(())
     }
 
-    /// Takes the word even if it is no number.
+    /// Leaves what is no number in place: it may be the start of the next directive.
     fn number<T>(
         &mut self,
         parse: impl Fn(&[u8]) -> Result<(T, usize), NumberError>,
@@ -219,7 +219,9 @@ impl<'a> Lexer<'a> {
                     Some(Err(NumberError::Overflow)) => format!("{found} is too large"),
                     _ => format!("{what} is expected, not {found}"),
                 };
-                Err(LexError { message, span: self.span(start, self.position) })
+                let span = self.span(start, self.position);
+                self.position = start;
+                Err(LexError { message, span })
             }
         }
     }

@@ -1,8 +1,12 @@
 //! The pbrt-v4 scene format.
 //!
-//! Reading order: [`lexer`] (tokens), [`params`] (typed parameters), [`directive`], [`parser`] (text to directives).
+//! Reading order: [`lexer`] (tokens), [`params`] (typed parameters), [`directive`], [`arguments`], [`parser`] (text to directives).
 
+pub mod arguments;
 pub mod directive;
 pub mod lexer;
 pub mod params;
 pub mod parser;
+
+#[cfg(test)]
+mod tests;
