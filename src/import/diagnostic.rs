@@ -203,8 +203,11 @@ impl Diagnostics {
             .iter()
             .map(|(path, (reason, spans))| {
                 let place = spans.first().map_or(String::new(), |&s| format!(", asked for at {}", sources.locate(s)));
-                let more =
-                    if spans.len() > 1 { format!(" and {} more places", spans.len() - 1) } else { String::new() };
+                let more = match spans.len() {
+                    0 | 1 => String::new(),
+                    2 => " and one more place".to_owned(),
+                    n => format!(" and {} more places", n - 1),
+                };
                 format!("{}: {reason}{place}{more}", path.display())
             })
             .collect();
