@@ -1,1 +1,54 @@
-//! (in progress)
+//! The command line: one file per subcommand.
+//!
+//! Exit codes: 0 success, 130 a rendering that Ctrl-C ended and that was written, 1 the command ran and says no (`crosscheck` found a disagreement), 2 bad usage, 3 bad input
+//! or failed output.
+
+mod args;
+mod bench;
+mod crosscheck;
+mod info;
+mod progress;
+mod render;
+mod settings;
+
+use clap::{Parser, Subcommand};
+use std::process::ExitCode;
+
+/// Offline CPU renderer for lighting integrals that are hard to sample.
+#[derive(Debug, Parser)]
+#[command(name = "lumiris", version, about, max_term_width = 110)]
+struct Cli {
+    #[command(subcommand)]
+    command: Command,
+}
+
+#[derive(Debug, Subcommand)]
+enum Command {
+    /// Render a scene to pictures
+    Render(args::RenderArgs),
+    /// Compare Embree with the pure-Rust BVH, ray by ray and image by image
+    Crosscheck(crosscheck::CrosscheckArgs),
+    /// Measure the stages of the renderer
+    #[command(allow_missing_positional = true)]
+    Bench(bench::BenchArgs),
+    /// Say what a scene holds, what it costs, and what of it was not understood
+    Info(info::InfoArgs),
+}
+
+/// Parses the command line, runs, and says how it went.
+pub fn run() -> ExitCode {
+    let cli = Cli::parse();
+    let result = match &cli.command {
+        Command::Render(args) => render::run(args),
+        Command::Crosscheck(args) => crosscheck::run(args),
+        Command::Bench(args) => bench::run(args),
+        Command::Info(args) => info::run(args),
+    };
+    match result {
+        Ok(code) => code,
+        Err(error) => {
+            progress::say(&format!("lumiris: {error:#}"));
+            ExitCode::from(3)
+        }
+    }
+}

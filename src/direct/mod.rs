@@ -1,1 +1,139 @@
-//! (in progress)
+//! Direct lighting of a batch of shading points, in four explicit stages.
+//!
+//! ```text
+//! points ─T1 propose─▶ candidates ─select─▶ contributions + segments ─T2 trace─▶ bits ─resolve─▶ radiance
+//! ```
+//!
+//! * **T1** ([`propose`]): light and BSDF samples with their unshadowed integrand f = f_s·|cos θ|·L and the densities
+//!   of every technique. It traces nothing but rays among emitters, and knows nothing of visibility.
+//! * **select** ([`select`]): an estimator turns f and densities into contributions, and drops those that are zero.
+//! * **T2** ([`visibility`]): shadow segments in packets.
+//! * **resolve**: the sum of the contributions whose segment is free.
+
+pub mod propose;
+pub mod select;
+pub mod visibility;
+
+use crate::accel::RayBatch;
+use crate::materials::SurfaceBsdf;
+use crate::math::ray::offset_origin;
+use crate::math::{Rgb, Vec3};
+use crate::samplers::SampleStream;
+use crate::scene::{IntegratorSettings, World};
+use propose::Candidates;
+use std::time::{Duration, Instant};
+use visibility::Segments;
+
+/// A point whose direct light is wanted.
+#[derive(Clone, Copy, Debug)]
+pub struct ShadePoint<'a> {
+    /// The point.
+    pub p: Vec3,
+    /// Bound of the rounding error of `p`.
+    pub p_error: Vec3,
+    /// Direction to the viewer, unit.
+    pub wo: Vec3,
+    /// Scattering at the point, with the frame and the geometric normal.
+    pub bsdf: SurfaceBsdf<'a>,
+    /// Time in 0..1.
+    pub time: f32,
+    /// Random numbers of this point; each technique takes a domain of it.
+    pub stream: SampleStream,
+}
+
+impl ShadePoint<'_> {
+    /// The origin of a ray that leaves the point towards `w`.
+    #[inline]
+    pub fn origin(&self, w: Vec3) -> Vec3 {
+        offset_origin(self.p, self.p_error, self.bsdf.n, w)
+    }
+}
+
+/// How often and how long each stage ran.
+#[derive(Clone, Copy, Debug, Default)]
+pub struct DirectStats {
+    /// Candidates drawn by T1.
+    pub proposals: u64,
+    /// Those of them that are light samples.
+    pub light_proposals: u64,
+    /// Rays traced among emitters.
+    pub emitter_rays: u64,
+    /// Shadow segments traced by T2.
+    pub segments: u64,
+    /// Time in T1.
+    pub t1: Duration,
+    /// The part of it in light samples.
+    pub t1_light: Duration,
+    /// Time in select and resolve.
+    pub select: Duration,
+    /// Time in T2.
+    pub t2: Duration,
+}
+
+impl DirectStats {
+    /// Adds the counts of another worker.
+    pub fn merge(&mut self, other: &DirectStats) {
+        self.proposals += other.proposals;
+        self.light_proposals += other.light_proposals;
+        self.emitter_rays += other.emitter_rays;
+        self.segments += other.segments;
+        self.t1 += other.t1;
+        self.t1_light += other.t1_light;
+        self.select += other.select;
+        self.t2 += other.t2;
+    }
+}
+
+/// The buffers of the stage; reused from batch to batch.
+#[derive(Debug, Default)]
+pub struct DirectStage {
+    candidates: Candidates,
+    contributions: Vec<Rgb>,
+    segments: Segments,
+    /// Counts and times so far.
+    pub stats: DirectStats,
+}
+
+impl DirectStage {
+    /// The shadow segments of the last batch of points, in the order in which they were traced.
+    pub fn segments(&self) -> &RayBatch {
+        self.segments.rays()
+    }
+
+    /// Estimates ∫ f_s L_direct |cos θ| dω for each point; `out[i]` belongs to `points[i]`.
+    pub fn estimate(
+        &mut self,
+        world: &World,
+        settings: &IntegratorSettings,
+        points: &[ShadePoint<'_>],
+        out: &mut Vec<Rgb>,
+    ) {
+        // T1: propose candidates
+        let start = Instant::now();
+        self.candidates.propose(world, settings, points);
+        let proposed = Instant::now();
+
+        // Select: contributions of the estimator, and the segments that decide them
+        select::contributions(settings, &self.candidates, &mut self.contributions);
+        self.segments.gather(&self.candidates, &self.contributions);
+        let selected = Instant::now();
+
+        // T2: trace
+        self.segments.trace(&*world.accel);
+        let traced = Instant::now();
+
+        // Resolve
+        out.clear();
+        out.resize(points.len(), Rgb::BLACK);
+        self.segments.resolve(out);
+
+        self.stats.proposals += self.candidates.proposals;
+        self.stats.light_proposals += self.candidates.light_proposals;
+        self.stats.emitter_rays += self.candidates.emitter_rays;
+        self.stats.segments += self.segments.len() as u64;
+        self.stats.t1 += proposed - start;
+        self.stats.t1_light += self.candidates.light_time;
+        self.stats.select += (selected - proposed) + traced.elapsed();
+        self.stats.t2 += traced - selected;
+    }
+}

@@ -1,3 +1,12 @@
-//! Estimators and statistics over numbers: slices in, numbers out; no scene, ray or sampler.
+//! Estimators of ∫ f: slices and numbers in, numbers out. Nothing here knows of rays, lights or scenes.
+//!
+//! | module | estimate | bias |
+//! |---|---|---|
+//! | [`mc`] | (1/N) Σ f/p | none |
+//! | [`mis`] | Σᵢ (1/nᵢ) Σⱼ wᵢ f/pᵢ, weights that sum to one | none |
+//!
+//! [`stats`] has running moments and the tests (t, z, χ²) that hold estimators to these claims.
 
+pub mod mc;
+pub mod mis;
 pub mod stats;

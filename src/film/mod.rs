@@ -1,3 +1,249 @@
-//! (in progress)
+//! The film: f64 sums per pixel, from which means, variances and AOVs are read.
+//!
+//! Pixel filters work by importance sampling: a sample belongs to one pixel, and its weight is the sign of the
+//! filter ([`filter`]). So films of disjoint sample ranges add up.
 
 pub mod filter;
+
+use crate::math::{Rgb, Vec3};
+
+/// What one camera sample says of its pixel.
+#[derive(Clone, Copy, Debug, Default)]
+pub struct PixelSample {
+    /// Radiance times the filter weight.
+    pub radiance: Rgb,
+    /// Features of the first surface; `None` if the ray met nothing.
+    pub features: Option<Features>,
+}
+
+/// Features of the first surface that a camera ray meets.
+#[derive(Clone, Copy, Debug, Default)]
+pub struct Features {
+    /// Albedo estimate.
+    pub albedo: Rgb,
+    /// Shading normal, world space, towards the viewer.
+    pub normal: Vec3,
+    /// Distance from the camera along the ray.
+    pub depth: f32,
+    /// Material index.
+    pub material: u32,
+    /// Geometry index.
+    pub object: u32,
+}
+
+/// Sums over the samples of a pixel.
+#[derive(Clone, Copy, Debug, Default)]
+pub struct PixelSums {
+    /// Number of samples.
+    pub count: u64,
+    /// Σ radiance.
+    pub radiance: [f64; 3],
+    /// Σ radiance², per channel.
+    pub radiance_squared: [f64; 3],
+    /// Number of samples that met a surface.
+    pub hits: u64,
+    /// Σ albedo.
+    pub albedo: [f64; 3],
+    /// Σ normal.
+    pub normal: [f64; 3],
+    /// Σ depth of the samples that met a surface.
+    pub depth: f64,
+    /// Material of the first sample that met a surface, plus one; 0 if none did.
+    pub material: u32,
+    /// Geometry of that sample, plus one; 0 if none did.
+    pub object: u32,
+    /// Samples whose radiance was NaN or infinite; they count as black.
+    pub invalid: u64,
+}
+
+impl PixelSums {
+    /// Adds a sample. The order of additions is part of the result: a pixel's samples are added by index.
+    pub fn add(&mut self, sample: &PixelSample) {
+        self.count += 1;
+        if sample.radiance.is_finite() {
+            for (c, value) in sample.radiance.to_array().into_iter().map(f64::from).enumerate() {
+                self.radiance[c] += value;
+                self.radiance_squared[c] += value * value;
+            }
+        } else {
+            self.invalid += 1;
+        }
+        let Some(features) = &sample.features else { return };
+        for c in 0..3 {
+            self.albedo[c] += f64::from(features.albedo[c]);
+            self.normal[c] += f64::from(features.normal[c]);
+        }
+        self.depth += f64::from(features.depth);
+        if self.hits == 0 {
+            self.material = features.material + 1;
+            self.object = features.object + 1;
+        }
+        self.hits += 1;
+    }
+
+    /// Mean radiance; black without samples.
+    pub fn mean(&self) -> [f64; 3] {
+        self.radiance.map(|s| s / self.count.max(1) as f64)
+    }
+
+    /// Estimated variance of the mean per channel, from the spread of the samples as if they were independent:
+    /// an upper estimate for stratified samples. 0 with fewer than two samples.
+    pub fn variance_of_mean(&self) -> [f64; 3] {
+        if self.count < 2 {
+            return [0.0; 3];
+        }
+        let n = self.count as f64;
+        std::array::from_fn(|c| {
+            let mean = self.radiance[c] / n;
+            ((self.radiance_squared[c] / n - mean * mean).max(0.0)) / (n - 1.0)
+        })
+    }
+}
+
+/// A rectangle of pixels `x0 ≤ x < x1`, `y0 ≤ y < y1` in raster coordinates, y downwards.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct PixelBounds {
+    /// Left.
+    pub x0: u32,
+    /// Right, exclusive.
+    pub x1: u32,
+    /// Top.
+    pub y0: u32,
+    /// Bottom, exclusive.
+    pub y1: u32,
+}
+
+impl PixelBounds {
+    /// Width in pixels.
+    pub fn width(&self) -> u32 {
+        self.x1.saturating_sub(self.x0)
+    }
+
+    /// Height in pixels.
+    pub fn height(&self) -> u32 {
+        self.y1.saturating_sub(self.y0)
+    }
+
+    /// Number of pixels.
+    pub fn area(&self) -> usize {
+        self.width() as usize * self.height() as usize
+    }
+
+    /// Rectangles of at most `size` × `size` that cover this one, row by row.
+    pub fn tiles(&self, size: u32) -> Vec<PixelBounds> {
+        let size = size.max(1);
+        let mut tiles = Vec::new();
+        for y0 in (self.y0..self.y1).step_by(size as usize) {
+            for x0 in (self.x0..self.x1).step_by(size as usize) {
+                tiles.push(PixelBounds { x0, y0, x1: (x0 + size).min(self.x1), y1: (y0 + size).min(self.y1) });
+            }
+        }
+        tiles
+    }
+}
+
+/// The sums of all pixels inside the crop window.
+#[derive(Clone, Debug)]
+pub struct Film {
+    /// Size of the full image (width, height).
+    pub resolution: [u32; 2],
+    /// The part that is rendered.
+    pub bounds: PixelBounds,
+    /// Sums, row-major inside `bounds`.
+    pub pixels: Vec<PixelSums>,
+}
+
+impl Film {
+    /// An empty film.
+    pub fn new(resolution: [u32; 2], bounds: PixelBounds) -> Self {
+        Film { resolution, bounds, pixels: vec![PixelSums::default(); bounds.area()] }
+    }
+
+    /// Index of a pixel inside `pixels`.
+    pub fn index(&self, x: u32, y: u32) -> usize {
+        (y - self.bounds.y0) as usize * self.bounds.width() as usize + (x - self.bounds.x0) as usize
+    }
+
+    /// The part of the film that `tile` covers, row-major.
+    pub fn copy_tile(&self, tile: &PixelBounds) -> Vec<PixelSums> {
+        let mut out = Vec::with_capacity(tile.area());
+        for y in tile.y0..tile.y1 {
+            let start = self.index(tile.x0, y);
+            out.extend_from_slice(&self.pixels[start..start + tile.width() as usize]);
+        }
+        out
+    }
+
+    /// Replaces the part of the film that `tile` covers.
+    pub fn replace_tile(&mut self, tile: &PixelBounds, sums: &[PixelSums]) {
+        for (row, y) in (tile.y0..tile.y1).enumerate() {
+            let (start, width) = (self.index(tile.x0, y), tile.width() as usize);
+            self.pixels[start..start + width].copy_from_slice(&sums[row * width..(row + 1) * width]);
+        }
+    }
+
+    /// Mean over pixels of the relative standard error of the luminance of the mean: the noise that a progress bar
+    /// shows. Pixels without light do not count.
+    pub fn relative_noise(&self) -> f64 {
+        let luminance = |v: [f64; 3]| 0.212_671 * v[0] + 0.715_160 * v[1] + 0.072_169 * v[2];
+        let (mut sum, mut count) = (0.0, 0_u64);
+        for pixel in &self.pixels {
+            let mean = luminance(pixel.mean());
+            if mean > 0.0 && pixel.count > 1 {
+                sum += luminance(pixel.variance_of_mean()).sqrt() / mean;
+                count += 1;
+            }
+        }
+        if count == 0 { f64::INFINITY } else { sum / count as f64 }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn tiles_cover_each_pixel_once() {
+        let bounds = PixelBounds { x0: 3, x1: 40, y0: 5, y1: 23 };
+        for size in [1, 7, 8, 64] {
+            let mut counts = vec![0; 40 * 23];
+            for t in bounds.tiles(size) {
+                for y in t.y0..t.y1 {
+                    for x in t.x0..t.x1 {
+                        counts[(y * 40 + x) as usize] += 1;
+                    }
+                }
+            }
+            assert_eq!(counts.iter().sum::<i32>() as usize, bounds.area());
+            assert!(counts.iter().all(|&c| c <= 1));
+        }
+    }
+
+    #[test]
+    fn sums_do_not_drift_at_high_sample_counts() {
+        // 0.1 as f32, 10⁷ times: an f32 sum would be off by percents.
+        let sample = PixelSample { radiance: Rgb::splat(0.1), features: None };
+        let mut sums = PixelSums::default();
+        for _ in 0..10_000_000 {
+            sums.add(&sample);
+        }
+        assert!((sums.mean()[0] - f64::from(0.1_f32)).abs() < 1e-9);
+    }
+
+    #[test]
+    fn variance_of_mean_is_that_of_the_samples_over_n() {
+        let mut sums = PixelSums::default();
+        for v in [1.0, 2.0, 3.0, 6.0] {
+            sums.add(&PixelSample { radiance: Rgb::splat(v), features: None });
+        }
+        // Sample variance 14/3, divided by 4.
+        assert!((sums.variance_of_mean()[1] - 14.0 / 12.0).abs() < 1e-12);
+    }
+
+    #[test]
+    fn a_sample_that_is_not_finite_is_counted_and_not_added() {
+        let mut sums = PixelSums::default();
+        sums.add(&PixelSample { radiance: Rgb::new(f32::NAN, 1.0, 1.0), features: None });
+        assert_eq!((sums.count, sums.invalid, sums.mean()), (1, 1, [0.0; 3]));
+    }
+}

@@ -5,6 +5,7 @@
 
 use super::{Shape, SurfaceHit};
 use crate::math::{Affine3A, Bounds3};
+use rayon::prelude::*;
 
 /// Index into [`GeometrySet::geometries`].
 pub type GeometryId = u32;
@@ -84,7 +85,8 @@ pub struct GeometrySet {
 impl GeometrySet {
     /// Bounds of a group in its own space.
     pub fn group_bounds(&self, group: &Group) -> Bounds3 {
-        group.geometries.iter().fold(Bounds3::EMPTY, |b, &id| b.union(self.geometries[id as usize].shape.bounds()))
+        let bounds = group.geometries.par_iter().map(|&id| self.geometries[id as usize].shape.bounds());
+        bounds.reduce(|| Bounds3::EMPTY, Bounds3::union)
     }
 
     /// Bounds of everything in world space, over all times.

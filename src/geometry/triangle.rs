@@ -15,7 +15,7 @@ pub struct RayPrecomputed {
     pub ray: Ray,
     /// Axes in the order x, y, z of the sheared space.
     pub axes: [usize; 3],
-    /// d[kx]/d[kz], d[ky]/d[kz], 1/d[kz].
+    /// `d[kx]/d[kz]`, `d[ky]/d[kz]`, `1/d[kz]`.
     pub shear: [f32; 3],
 }
 

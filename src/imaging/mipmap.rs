@@ -63,6 +63,54 @@ pub struct MipMap {
     table: Box<[f32; 256]>,
 }
 
+/// Channels `positions` of all pixels as bytes; `None` unless all values are multiples of 1/255 in 0..1.
+fn exact_bytes(image: &Image, positions: &[usize]) -> Option<Vec<u8>> {
+    let mut bytes = Vec::with_capacity(image.width * image.height * positions.len());
+    for pixel in image.data.chunks_exact(image.channels.len()) {
+        for &c in positions {
+            let v = pixel[c];
+            let byte = (v * 255.0 + 0.5) as u8;
+            // False for NaN as well.
+            let exact = (0.0..=1.0).contains(&v) && (f32::from(byte) / 255.0 - v).abs() < 1e-6;
+            if !exact {
+                return None;
+            }
+            bytes.push(byte);
+        }
+    }
+    Some(bytes)
+}
+
+/// The inverse of a table of linear values of bytes.
+struct NearestByte {
+    table: [f32; 256],
+    /// For each part of 0..1, how many values of the table lie below its beginning.
+    below: [u8; NearestByte::PARTS],
+}
+
+impl NearestByte {
+    const PARTS: usize = 1024;
+
+    fn new(table: &[f32; 256]) -> Self {
+        let begin = |part: usize| part as f32 / Self::PARTS as f32;
+        let below = std::array::from_fn(|part| table.partition_point(|&t| t < begin(part)).min(255) as u8);
+        NearestByte { table: *table, below }
+    }
+
+    /// Byte whose linear value is nearest to `v`.
+    fn of(&self, v: f32) -> u8 {
+        // The first value that is not below v
+        let part = ((v * Self::PARTS as f32) as usize).min(Self::PARTS - 1);
+        let mut above = self.below[part];
+        while above < 255 && self.table[usize::from(above)] < v {
+            above += 1;
+        }
+        let under = above.saturating_sub(1);
+        let distance = |byte: u8| (v - self.table[usize::from(byte)]).abs();
+        if distance(under) < distance(above) { under } else { above }
+    }
+}
+
 impl MipMap {
     /// The pyramid of an image's colour channels (see [`Image::color_channels`]), whose values `encoding` makes linear.
     /// An image whose values are all multiples of 1/255 in 0..1, as read from 8 bits, is kept in bytes. An image
@@ -75,15 +123,13 @@ impl MipMap {
         };
         let positions = channels.as_slice();
         let stride = image.channels.len();
-        let values = || image.data.chunks_exact(stride).flat_map(|pixel| positions.iter().map(|&c| pixel[c]));
         let table = Box::new(encoding.byte_table());
-
-        let byte = |v: f32| (0.0..=1.0).contains(&v).then(|| (v * 255.0).round() as u8);
-        let exact = |v: f32| byte(v).is_some_and(|b| (f32::from(b) / 255.0 - v).abs() < 1e-6);
-        let texels = if values().all(exact) {
-            Texels::Bytes(values().map(|v| byte(v).unwrap_or(0)).collect())
-        } else {
-            Texels::Floats(values().map(|v| encoding.to_linear(v)).collect())
+        let texels = match exact_bytes(image, positions) {
+            Some(bytes) => Texels::Bytes(bytes),
+            None => {
+                let values = image.data.chunks_exact(stride).flat_map(|pixel| positions.iter().map(|&c| pixel[c]));
+                Texels::Floats(values.map(|v| encoding.to_linear(v)).collect())
+            }
         };
         let level = Level { width, height, texels };
         Self::with_base(level, positions.len(), wrap, filter, table)
@@ -97,14 +143,15 @@ impl MipMap {
 
     fn with_base(base: Level, channels: usize, wrap: Wrap, filter: Filter, table: Box<[f32; 256]>) -> Self {
         let mut map = MipMap { levels: vec![base], channels, wrap, filter, table };
-        while let Some(next) = map.halve() {
+        let nearest = NearestByte::new(&map.table);
+        while let Some(next) = map.halve(&nearest) {
             map.levels.push(next);
         }
         map
     }
 
     /// The level above the topmost; `None` at one pixel. Levels of bytes stay bytes, through the inverse of the table.
-    fn halve(&self) -> Option<Level> {
+    fn halve(&self, nearest: &NearestByte) -> Option<Level> {
         let source = self.levels.last()?;
         if source.width == 1 && source.height == 1 {
             return None;
@@ -128,16 +175,9 @@ impl MipMap {
         }
         let texels = match source.texels {
             Texels::Floats(_) => Texels::Floats(values),
-            Texels::Bytes(_) => Texels::Bytes(values.into_iter().map(|v| self.nearest_byte(v)).collect()),
+            Texels::Bytes(_) => Texels::Bytes(values.iter().map(|&v| nearest.of(v)).collect()),
         };
         Some(Level { width, height, texels })
-    }
-
-    /// Byte whose linear value is nearest to `v`.
-    fn nearest_byte(&self, v: f32) -> u8 {
-        let above = self.table.partition_point(|&t| t < v).min(255);
-        let below = above.saturating_sub(1);
-        if v - self.table[below] < self.table[above] - v { below as u8 } else { above as u8 }
     }
 
     /// Columns and rows of level 0.
@@ -290,6 +330,22 @@ mod tests {
 
     fn map(image: &Image, wrap: Wrap, filter: Filter) -> MipMap {
         MipMap::new(image, wrap, filter, ColorEncoding::Linear)
+    }
+
+    #[test]
+    fn the_inverse_of_a_byte_table_finds_the_nearest_byte() {
+        for encoding in
+            [ColorEncoding::Linear, ColorEncoding::Srgb, ColorEncoding::Gamma(2.2), ColorEncoding::Gamma(0.5)]
+        {
+            let table = encoding.byte_table();
+            let nearest = NearestByte::new(&table);
+            for i in -10..=10_010 {
+                let v = i as f32 / 10_000.0;
+                let distance = |byte: u8| (table[usize::from(byte)] - v).abs();
+                let least = (0..=255).map(distance).fold(f32::INFINITY, f32::min);
+                assert_eq!(distance(nearest.of(v)), least, "{encoding:?} {v}");
+            }
+        }
     }
 
     #[test]

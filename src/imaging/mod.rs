@@ -1,9 +1,10 @@
 //! Pictures: pixels with named channels, their encodings, and pyramids for filtered lookups.
 //!
-//! Reading order: [`color`], [`mipmap`].
+//! Reading order: [`color`], [`mipmap`], [`oiio`].
 
 pub mod color;
 pub mod mipmap;
+pub mod oiio;
 
 pub use color::ColorEncoding;
 pub use mipmap::{Filter, MipMap, Wrap};

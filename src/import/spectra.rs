@@ -15,9 +15,9 @@ use std::path::Path;
 use std::sync::OnceLock;
 
 /// First wavelength of the integrals (nm).
-const LAMBDA_MIN: u32 = 360;
+pub(super) const LAMBDA_MIN: u32 = 360;
 /// Last wavelength of the integrals (nm).
-const LAMBDA_MAX: u32 = 785;
+pub(super) const LAMBDA_MAX: u32 = 785;
 
 /// A spectrum by linear interpolation between samples, and 0 outside of them.
 #[derive(Clone, Debug, PartialEq)]
@@ -35,6 +35,12 @@ impl Spectrum {
     /// The same value everywhere.
     pub fn constant(value: f32) -> Self {
         Spectrum { lambda: vec![1.0, 1e5], value: vec![value; 2] }
+    }
+
+    /// From the value at each nm of the range of the integrals.
+    pub(super) fn per_nm(value: impl Fn(u32) -> f32) -> Self {
+        let range = LAMBDA_MIN..=LAMBDA_MAX;
+        Spectrum { lambda: range.clone().map(|l| l as f32).collect(), value: range.map(value).collect() }
     }
 
     /// From pairs of wavelength (nm) and value.
@@ -128,6 +134,14 @@ impl Spectrum {
         }
     }
 
+    /// The value at a wavelength (nm), continued beyond the ends of the table: optical constants do not end there.
+    pub fn at_clamped(&self, lambda: f32) -> f32 {
+        match (self.lambda.first(), self.lambda.last()) {
+            (Some(&first), Some(&last)) => self.at(lambda.clamp(first, last)),
+            _ => 0.0,
+        }
+    }
+
     /// The value at the helium d line: the refractive index of a dielectric in a renderer without dispersion.
     pub fn at_d_line(&self) -> f32 {
         self.at(587.6)
@@ -184,7 +198,18 @@ fn invert_columns([a, b, c]: [[f64; 3]; 3]) -> [[f64; 3]; 3] {
     [bc, cross(c, a), cross(a, b)].map(|row| row.map(|v| v / determinant))
 }
 
-fn to_rgb(xyz: [f64; 3]) -> [f64; 3] {
+/// The matrix from CIE XYZ to linear Rec.709, by rows.
+pub(super) fn rec709_matrix() -> [[f64; 3]; 3] {
+    observer().rgb_from_xyz
+}
+
+/// (x̄, ȳ, z̄)·D65 at each nm of the range of the integrals, with ∫ȳ·D65 = 1.
+pub(super) fn d65_observer() -> impl Iterator<Item = [f64; 3]> {
+    let o = observer();
+    o.bars.iter().zip(&o.d65).map(|(bar, d)| bar.map(|b| b * d))
+}
+
+pub(super) fn to_rgb(xyz: [f64; 3]) -> [f64; 3] {
     observer().rgb_from_xyz.map(|row| row[0] * xyz[0] + row[1] * xyz[1] + row[2] * xyz[2])
 }
 
@@ -230,7 +255,7 @@ fn emission_of(f: impl Fn(f32) -> f64) -> Rgb {
     if xyz[1] > 0.0 { rgb(to_rgb(xyz.map(|c| c / xyz[1]))).map(|c| c.max(0.0)) } else { Rgb::BLACK }
 }
 
-/// The colour of a black body of a temperature (K) scaled to Y = 1 [Planck]; black for temperatures that are not positive.
+/// The colour of a black body of a temperature (K) scaled to Y = 1 by Planck's law; black for temperatures that are not positive.
 pub fn blackbody_rgb(kelvin: f32) -> Rgb {
     if kelvin.is_nan() || kelvin <= 0.0 {
         return Rgb::BLACK;
@@ -269,19 +294,48 @@ pub fn fresnel_conductor(cos: f64, eta: f64, k: f64) -> f64 {
 
 /// Cosine of the second angle that [`conductor_rgb`] matches: 75°.
 const COS_75: f64 = 0.258_819_045_102_520_76;
+/// Cosines of 0°, 45°, 60°, 70°, 75° and 85°, where [`nearest_conductor`] compares.
+const COSINES: [f64; 6] =
+    [1.0, std::f64::consts::FRAC_1_SQRT_2, 0.5, 0.342_020_143_325_668_7, COS_75, 0.087_155_742_747_658_17];
 
 /// Optical constants per channel that make an RGB renderer show the reflectance of the measured spectra.
 ///
 /// The reflectance spectrum is integrated to RGB under D65 at 0° and at 75°; for each channel that pair is matched
-/// exactly if a pair (η, k) can do so, else 0° is matched exactly and 75° as well as can be. Saturated metals leave
+/// exactly if a pair (η, k) can do so. The red of copper falls more steeply towards grazing angles than that of any
+/// (η, k): there the largest relative difference between 0° and 85° is made as small as can be. Saturated metals leave
 /// the gamut (the red of gold is 1.02); what is above 1 is clipped.
 pub fn conductor_rgb(eta: &Spectrum, k: &Spectrum) -> (Rgb, Rgb) {
-    let reflectance =
-        |cos: f64| under_d65(|l| fresnel_conductor(cos, f64::from(eta.at(l)), f64::from(k.at(l)).max(0.0)));
-    let (normal, grazing) = (reflectance(1.0), reflectance(COS_75));
-    let typical = under_d65(|l| f64::from(eta.at(l)));
-    let pairs = [0, 1, 2].map(|c| fit_conductor(normal[c], grazing[c], typical[c]));
+    let reflectance = |cos: f64| {
+        under_d65(|l| fresnel_conductor(cos, f64::from(eta.at_clamped(l)), f64::from(k.at_clamped(l)).max(0.0)))
+    };
+    let (reflectances, grazing) = (COSINES.map(reflectance), reflectance(COS_75));
+    let typical = under_d65(|l| f64::from(eta.at_clamped(l)));
+    let pairs = [0, 1, 2].map(|c| {
+        let channel = reflectances.map(|r| r[c].clamp(1e-5, 0.9999));
+        fit_conductor(channel[0], grazing[c], typical[c]).unwrap_or_else(|| nearest_conductor(channel))
+    });
     (rgb(pairs.map(|p| p.0)), rgb(pairs.map(|p| p.1)))
+}
+
+/// The (η, k) whose reflectances at [`COSINES`] have the least largest relative difference to those given.
+fn nearest_conductor(reflectances: [f64; 6]) -> (f64, f64) {
+    const ETAS: i32 = 120;
+    const NORMALS: i32 = 80;
+    let (mut best, mut least) = ((1.0, 0.0), f64::INFINITY);
+    for i in 0..=ETAS {
+        // η from 0.02 to 20, and the reflectance at 0° from 4 % below to 4 % above the one given.
+        let eta = 0.02 * 1000f64.powf(f64::from(i) / f64::from(ETAS));
+        for j in 0..=NORMALS {
+            let normal = reflectances[0] * (1.0 + 0.04 * (2.0 * f64::from(j) / f64::from(NORMALS) - 1.0));
+            let k = k_of(normal.min(0.9999), eta);
+            let error = |(cos, r): (f64, f64)| (fresnel_conductor(cos, eta, k) / r - 1.0).abs();
+            let largest = COSINES.into_iter().zip(reflectances).map(error).fold(0.0, f64::max);
+            if largest < least {
+                (best, least) = ((eta, k), largest);
+            }
+        }
+    }
+    best
 }
 
 /// k that gives the reflectance `normal` at 0° together with `eta`.
@@ -290,9 +344,9 @@ fn k_of(normal: f64, eta: f64) -> f64 {
     ((normal * up * up - down * down) / (1.0 - normal)).max(0.0).sqrt()
 }
 
-fn fit_conductor(normal: f64, grazing: f64, typical: f64) -> (f64, f64) {
+/// The (η, k) nearest to the index `typical` with the reflectances `normal` at 0° and `grazing` at 75°, if there is one.
+fn fit_conductor(normal: f64, grazing: f64, typical: f64) -> Option<(f64, f64)> {
     const STEPS: i32 = 400;
-    let normal = normal.clamp(1e-5, 0.9999);
     let root = normal.sqrt();
     // k is real between these two.
     let (low, high) = ((1.0 - root) / (1.0 + root), (1.0 + root) / (1.0 - root));
@@ -315,9 +369,7 @@ fn fit_conductor(normal: f64, grazing: f64, typical: f64) -> (f64, f64) {
             best = Some(a);
         }
     }
-    let nearest = || (0..=STEPS).map(eta_at).min_by(|&a, &b| error(a).abs().total_cmp(&error(b).abs()));
-    let eta = best.or_else(nearest).unwrap_or(1.0);
-    (eta, k_of(normal, eta))
+    best.map(|eta| (eta, k_of(normal, eta)))
 }
 
 #[cfg(test)]
@@ -327,6 +379,20 @@ mod tests {
     fn near(a: Rgb, b: [f32; 3], tolerance: f32) {
         let worst = (0..3).map(|c| (a[c] - b[c]).abs()).fold(0.0, f32::max);
         assert!(worst <= tolerance, "{a:?} is not {b:?}");
+    }
+
+    #[test]
+    fn conductors_whose_tables_end_inside_the_visible_range_stay_finite() {
+        for metal in ["MgO", "TiO2", "CuZn", "Ag"] {
+            let curve = |what: &str| Spectrum::named(&format!("metal-{metal}-{what}")).unwrap();
+            let (eta, k) = conductor_rgb(&curve("eta"), &curve("k"));
+            assert!(eta.is_finite() && k.is_finite() && eta.r > 0.0, "{metal}: {eta:?} {k:?}");
+        }
+        // Magnesium oxide is a clear crystal of index 1.74, in whatever shape its table comes.
+        let (eta, k) =
+            conductor_rgb(&Spectrum::named("metal-MgO-eta").unwrap(), &Spectrum::named("metal-MgO-k").unwrap());
+        let f0 = fresnel_conductor(1.0, f64::from(eta.g), f64::from(k.g));
+        assert!((f0 - (0.74_f64 / 2.74).powi(2)).abs() < 0.01, "{f0}");
     }
 
     #[test]
@@ -368,12 +434,20 @@ mod tests {
             let table = |q: &str| Spectrum::named(&format!("metal-{metal}-{q}")).unwrap();
             let (eta_table, k_table) = (table("eta"), table("k"));
             let (eta, k) = conductor_rgb(&eta_table, &k_table);
-            for cos in [1.0, COS_75] {
-                let expected =
-                    under_d65(|l| fresnel_conductor(cos, f64::from(eta_table.at(l)), f64::from(k_table.at(l))));
-                let shown = [0, 1, 2].map(|c| fresnel_conductor(cos, f64::from(eta[c]), f64::from(k[c])) as f32);
-                let reachable = expected.map(|c| c.min(1.0) as f32);
-                near(Rgb::from_array(shown), reachable, if cos == 1.0 { 2e-4 } else { 0.015 });
+            let reflectance =
+                |cos: f64| under_d65(|l| fresnel_conductor(cos, f64::from(eta_table.at(l)), f64::from(k_table.at(l))));
+            let (normal, grazing) = (reflectance(1.0), reflectance(COS_75));
+            for c in 0..3 {
+                let exact = fit_conductor(normal[c].clamp(1e-5, 0.9999), grazing[c], 1.0).is_some();
+                let error = |cos: f64| {
+                    let shown = fresnel_conductor(cos, f64::from(eta[c]), f64::from(k[c]));
+                    (shown - reflectance(cos)[c].min(1.0)).abs()
+                };
+                // All channels have their pair but the red of gold, which is brighter than white.
+                assert_eq!(exact, !(metal == "Au" && c == 0), "{metal} {c}");
+                let (at_normal, at_grazing) = (error(1.0), error(COS_75));
+                let tolerance = if exact { 2e-4 } else { 0.006 };
+                assert!(at_normal < tolerance && at_grazing < tolerance, "{metal} {c}: {at_normal} {at_grazing}");
             }
         }
         let (eta, k) =

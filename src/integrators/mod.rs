@@ -1,1 +1,5 @@
-//! (in progress)
+//! Light transport: from camera rays to radiance.
+
+pub mod path;
+
+pub use path::{PathIntegrator, PathStats};

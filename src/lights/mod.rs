@@ -136,6 +136,23 @@ pub enum Light {
 }
 
 impl Light {
+    /// What kind of light it is, for people.
+    pub fn kind_name(&self) -> &'static str {
+        match self {
+            Light::Point { .. } => "point",
+            Light::Spot { .. } => "spot",
+            Light::Distant { .. } => "distant",
+            Light::Area(area) => match area.shape {
+                AreaShape::Triangle(_) => "triangle",
+                AreaShape::Rectangle(_) => "rectangle",
+                AreaShape::Quadric(_) => "quadric",
+                AreaShape::Patch(_) => "patch",
+            },
+            Light::InfiniteConstant { .. } => "infinite, constant",
+            Light::InfiniteImage { .. } => "infinite, image",
+        }
+    }
+
     /// An environment light. Of `world_from_light` only the rotation (with a possible mirror) is used.
     pub fn infinite_image(map: Arc<EnvironmentMap>, world_from_light: &Affine3A, scale: f32) -> Self {
         let m = &world_from_light.matrix3;

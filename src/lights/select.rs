@@ -25,6 +25,17 @@ pub enum LightSamplerKind {
     Tree,
 }
 
+impl LightSamplerKind {
+    /// The name on the command line and in metadata.
+    pub fn name(self) -> &'static str {
+        match self {
+            LightSamplerKind::Uniform => "uniform",
+            LightSamplerKind::Power => "power",
+            LightSamplerKind::Tree => "tree",
+        }
+    }
+}
+
 /// A chosen light.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct LightChoice {

@@ -64,6 +64,16 @@ pub struct LightSet {
 }
 
 impl LightSet {
+    /// Chooses lights in another way from now on.
+    pub fn set_kind(&mut self, kind: LightSamplerKind) {
+        self.sampler = LightSampler::new(kind, &self.lights, self.scene_radius);
+    }
+
+    /// True if any primitive of the geometry emits.
+    pub fn emits(&self, geometry: GeometryId) -> bool {
+        self.emitting.binary_search_by_key(&geometry, |e| e.geometry).is_ok()
+    }
+
     /// The light that a primitive of a geometry belongs to, if it emits.
     #[inline]
     pub fn light_of(&self, geometry: GeometryId, primitive: u32) -> Option<LightId> {

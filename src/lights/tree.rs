@@ -453,22 +453,14 @@ mod tests {
     }
 
     #[test]
-    fn a_hundred_thousand_lights_are_built_in_seconds() {
-        let lights = random_lights(100_000, 1.0, 55);
-        let start = std::time::Instant::now();
-        let tree = tree_of(&lights);
-        let seconds = start.elapsed().as_secs_f64();
-        println!("built in {seconds:.2} s");
-        assert!(seconds < 30.0, "{seconds} s");
+    fn a_hundred_thousand_lights_make_a_full_tree() {
+        let tree = tree_of(&random_lights(100_000, 1.0, 55));
         assert_eq!(tree.nodes.len(), 199_999);
         let mut s = HashStream::new([8, 1, 1]);
         let ctx = random_ctx(&mut s, 1.0);
-        let start = std::time::Instant::now();
-        let n = 100_000;
-        for _ in 0..n {
+        for _ in 0..100_000 {
             let (light, pmf, _) = tree.sample(&ctx, s.next_f32()).unwrap();
             assert!(pmf > 0.0 && light < 100_000);
         }
-        println!("{:.0} ns per choice", start.elapsed().as_secs_f64() / f64::from(n) * 1e9);
     }
 }

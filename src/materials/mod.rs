@@ -134,6 +134,23 @@ pub enum Material {
     Interface,
 }
 
+impl Material {
+    /// What kind of material it is, for people.
+    pub fn kind_name(&self) -> &'static str {
+        match self {
+            Material::Diffuse { .. } => "diffuse",
+            Material::Conductor { .. } => "conductor",
+            Material::Dielectric { .. } => "dielectric",
+            Material::ThinDielectric { .. } => "thindielectric",
+            Material::DiffuseTransmission { .. } => "diffusetransmission",
+            Material::CoatedDiffuse { .. } => "coateddiffuse",
+            Material::CoatedConductor { .. } => "coatedconductor",
+            Material::Mix { .. } => "mix",
+            Material::Interface => "interface",
+        }
+    }
+}
+
 /// A material with its name and its maps.
 #[derive(Clone, Debug)]
 pub struct MaterialEntry {
@@ -166,7 +183,7 @@ struct CoatKey {
 
 impl MaterialSet {
     /// Takes the materials and tabulates their coats, some 30 ms for each (η, thickness, roughness), and one second
-    /// where the roughness is textured. `textures` is the set that the materials refer to.
+    /// where the roughness is textured. `textures` is the set that the materials refer to; its images need not be there yet.
     pub fn new(entries: Vec<MaterialEntry>, textures: &TextureSet) -> Self {
         let mut keys: Vec<CoatKey> = Vec::new();
         let mut intern = |key: CoatKey| {

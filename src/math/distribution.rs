@@ -42,7 +42,7 @@ fn fill_cdf(values: &[f32], cdf: &mut [f32]) -> f64 {
     sum / values.len() as f64
 }
 
-/// The bin i with cdf[i] <= u < cdf[i + 1] and the place of `u` in it; `cdf` ends at 1 and `u` is below 1.
+/// The bin i with `cdf[i] <= u < cdf[i + 1]` and the place of `u` in it; `cdf` ends at 1 and `u` is below 1.
 #[inline]
 fn invert_cdf(cdf: &[f32], u: f32) -> (f32, usize) {
     let n = cdf.len() - 1;

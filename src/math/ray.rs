@@ -35,6 +35,10 @@ pub fn next_down(x: f32) -> f32 {
     x.next_down()
 }
 
+/// The part of a segment `o + t·(end − o)` that is tested for occlusion: its end is offset off its surface already, and
+/// what remains is the rounding of `o + t·d` at t = 1.
+pub const SEGMENT_END: f32 = 1.0 - 8.0 * f32::EPSILON;
+
 /// Moves `p` off its surface along the geometric normal `n`, to the side that `w` points to, by at least the
 /// bound `p_error` of its rounding error; so that a ray from there cannot hit the surface that it leaves
 /// [Pharr et al. 2023, §6.8.6]. `n` is unit, `p_error` is per axis and non-negative.

@@ -43,7 +43,7 @@ pub fn invert_uniform_disk_concentric(p: Vec2) -> [f32; 2] {
     [(a + 1.0) * 0.5, (b + 1.0) * 0.5]
 }
 
-/// Cosine-weighted about +z on the upper hemisphere [Malley].
+/// Cosine-weighted about +z on the upper hemisphere, by Malley's method.
 #[inline]
 pub fn sample_cosine_hemisphere(u: [f32; 2]) -> Vec3 {
     let d = sample_uniform_disk_concentric(u);
@@ -200,5 +200,77 @@ mod tests {
             assert_inverts("cone", |u| invert_uniform_cone(sample_uniform_cone(u, c), c));
         }
         assert_inverts("tent", |u| [invert_tent(sample_tent(u[0], 1.5), 1.5), u[1]]);
+    }
+
+    const SAMPLES: usize = 400_000;
+    const CELLS: usize = 24;
+
+    /// Uniform numbers, two at a time.
+    fn numbers() -> impl Iterator<Item = [f32; 2]> {
+        let mut stream = crate::math::hash::HashStream::new([17, 4, 99]);
+        (0..SAMPLES).map(move |_| stream.next_2d())
+    }
+
+    /// χ² over the cells of a square of parameters, with the density integrated over each cell. Five such tests at 10⁻⁴.
+    fn assert_density(place: impl Fn([f32; 2]) -> [f64; 2], density: impl Fn(f64, f64) -> f64) {
+        let mut observed = vec![0.0; CELLS * CELLS];
+        for u in numbers() {
+            let [x, y] = place(u).map(|v| ((v * CELLS as f64) as usize).min(CELLS - 1));
+            observed[y * CELLS + x] += 1.0;
+        }
+        const FINE: usize = 16;
+        let step = 1.0 / (CELLS * FINE) as f64;
+        let expected: Vec<f64> = (0..CELLS * CELLS)
+            .map(|cell| {
+                let (x0, y0) = ((cell % CELLS * FINE) as f64, (cell / CELLS * FINE) as f64);
+                let fine = (0..FINE * FINE)
+                    .map(|i| density((x0 + (i % FINE) as f64 + 0.5) * step, (y0 + (i / FINE) as f64 + 0.5) * step));
+                fine.sum::<f64>() * step * step * SAMPLES as f64
+            })
+            .collect();
+        crate::math::test_support::assert_chi_squared(&observed, &expected, 1e-4);
+    }
+
+    /// A direction as ((cos θ + 1)/2, φ/2π): a steradian is 1/4π of the square.
+    fn assert_direction_density(sample: impl Fn([f32; 2]) -> Vec3, pdf: impl Fn(Vec3) -> f32) {
+        let place = |u| {
+            let w = sample(u);
+            [f64::from(w.z + 1.0) * 0.5, f64::from(azimuth(w) / TAU)]
+        };
+        let density = |x: f64, y: f64| {
+            let w = direction((2.0 * x - 1.0) as f32, TAU * y as f32);
+            f64::from(pdf(w)) * 4.0 * std::f64::consts::PI
+        };
+        assert_density(place, density);
+    }
+
+    #[test]
+    fn directions_have_their_densities() {
+        assert_direction_density(sample_cosine_hemisphere, pdf_cosine_hemisphere);
+        assert_direction_density(sample_uniform_hemisphere, pdf_uniform_hemisphere);
+        assert_direction_density(sample_uniform_sphere, |_| pdf_uniform_sphere());
+        // A cone that ends on a border of cells: cos θ = 0.5.
+        let in_cone = |w: Vec3| if w.z >= 0.5 { pdf_uniform_cone(0.5) } else { 0.0 };
+        assert_direction_density(|u| sample_uniform_cone(u, 0.5), in_cone);
+    }
+
+    #[test]
+    fn disk_triangle_and_tent_have_their_densities() {
+        // The disk as (r², φ/2π): a unit of area is 1/π of the square.
+        let disk = |u| {
+            let p = sample_uniform_disk_concentric(u);
+            [f64::from(p.length_squared()), f64::from(azimuth(p.extend(0.0)) / TAU)]
+        };
+        assert_density(disk, |_, _| f64::from(pdf_uniform_disk_concentric()) * std::f64::consts::PI);
+
+        // The triangle as (b0/(1 − b1), b1), whose Jacobian is 1 − b1; uniform has density 2 in (b0, b1).
+        let triangle = |u| {
+            let [b0, b1] = sample_uniform_triangle(u).map(f64::from);
+            [b0 / (1.0 - b1), b1]
+        };
+        assert_density(triangle, |_, y| 2.0 * (1.0 - y));
+
+        let tent = |u: [f32; 2]| [f64::from(sample_tent(u[0], 1.5) / 3.0 + 0.5), f64::from(u[1])];
+        assert_density(tent, |x, _| 3.0 * f64::from(pdf_tent((x as f32 - 0.5) * 3.0, 1.5)));
     }
 }

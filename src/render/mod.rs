@@ -1,1 +1,269 @@
-//! (in progress)
+//! Rendering: tiles × sample ranges on all cores, and the film that comes out.
+//!
+//! The picture is a function of the scene, its settings, the seed and the sample range. A pixel's samples are drawn
+//! by its coordinates and their index, traced independently of what else is in their batch, and added in the order
+//! of their index; so neither threads, nor tiles, nor passes change a bit.
+
+pub mod bench;
+pub mod crosscheck;
+pub mod output;
+
+use crate::film::filter::FilterSampler;
+use crate::film::{Film, PixelBounds, PixelSample, PixelSums};
+use crate::integrators::path::CameraSample;
+use crate::integrators::{PathIntegrator, PathStats};
+use crate::math::Vec2;
+use crate::samplers::SampleStream;
+use crate::scene::World;
+use rayon::prelude::*;
+use std::sync::atomic::{AtomicBool, AtomicU64, Ordering};
+use std::time::{Duration, Instant};
+
+/// Domains of a camera sample.
+mod domain {
+    pub const FILM_AND_LENS: u32 = 0;
+    pub const TIME: u32 = 1;
+}
+
+/// Paths that are traced together: enough that stages run long, few enough that their data stays in the cache.
+const BATCH_PATHS: usize = 4096;
+
+/// How to render; none of it changes the picture but the sample range.
+#[derive(Clone, Copy, Debug)]
+pub struct RenderSettings {
+    /// Threads; all cores if `None`.
+    pub threads: Option<usize>,
+    /// Edge of a tile in pixels.
+    pub tile_size: u32,
+    /// First sample index.
+    pub first_sample: u32,
+    /// Samples per pixel from there on.
+    pub spp: u32,
+    /// Stops after the pass in which this runs out.
+    pub time_limit: Option<Duration>,
+}
+
+impl Default for RenderSettings {
+    fn default() -> Self {
+        RenderSettings { threads: None, tile_size: 16, first_sample: 0, spp: 1, time_limit: None }
+    }
+}
+
+/// What an observer learns after every tile.
+#[derive(Clone, Copy, Debug)]
+pub struct Progress {
+    /// Camera samples done.
+    pub samples_done: u64,
+    /// Camera samples asked for.
+    pub samples_total: u64,
+    /// Rays of all kinds traced so far.
+    pub rays: u64,
+    /// Time since the start.
+    pub elapsed: Duration,
+    /// Mean relative standard error of the pixels after the last whole pass, if there was one.
+    pub noise: Option<f64>,
+}
+
+/// A finished or stopped rendering.
+#[derive(Debug)]
+pub struct Rendering {
+    /// The film.
+    pub film: Film,
+    /// Counts and times, summed over threads.
+    pub stats: PathStats,
+    /// Wall-clock time.
+    pub elapsed: Duration,
+    /// True if every pixel has all its samples.
+    pub complete: bool,
+    /// Threads used.
+    pub threads: usize,
+}
+
+/// Why a rendering could not start.
+#[derive(Debug, thiserror::Error)]
+#[error("cannot start {threads} threads: {source}")]
+pub struct ThreadError {
+    threads: usize,
+    source: rayon::ThreadPoolBuildError,
+}
+
+/// Renders. `stop` ends it after the tiles under way; `observe` is called from worker threads.
+pub fn render(
+    world: &World,
+    settings: &RenderSettings,
+    stop: &AtomicBool,
+    observe: &(dyn Fn(&Progress) + Sync),
+) -> Result<Rendering, ThreadError> {
+    let threads = settings.threads.unwrap_or_else(|| std::thread::available_parallelism().map_or(1, usize::from));
+    let pool = rayon::ThreadPoolBuilder::new()
+        .num_threads(threads)
+        .build()
+        .map_err(|source| ThreadError { threads, source })?;
+    Ok(pool.install(|| Run::new(world, settings, stop, observe).run(threads)))
+}
+
+/// A tile with the sums of its pixels.
+struct Tile {
+    bounds: PixelBounds,
+    sums: Vec<PixelSums>,
+}
+
+struct Run<'a> {
+    world: &'a World,
+    settings: &'a RenderSettings,
+    stop: &'a AtomicBool,
+    observe: &'a (dyn Fn(&Progress) + Sync),
+    filter: FilterSampler,
+    start: Instant,
+    samples_done: AtomicU64,
+    rays: AtomicU64,
+}
+
+impl<'a> Run<'a> {
+    fn new(
+        world: &'a World,
+        settings: &'a RenderSettings,
+        stop: &'a AtomicBool,
+        observe: &'a (dyn Fn(&Progress) + Sync),
+    ) -> Self {
+        Run {
+            world,
+            settings,
+            stop,
+            observe,
+            filter: world.scene.film.filter.sampler(),
+            start: Instant::now(),
+            samples_done: AtomicU64::new(0),
+            rays: AtomicU64::new(0),
+        }
+    }
+
+    fn run(&self, threads: usize) -> Rendering {
+        let bounds = self.world.scene.film.bounds;
+        let mut tiles: Vec<Tile> = bounds
+            .tiles(self.settings.tile_size)
+            .into_iter()
+            .map(|bounds| Tile { bounds, sums: vec![PixelSums::default(); bounds.area()] })
+            .collect();
+
+        // Passes over all tiles: 1, 1, 2, 4, … samples, so that there is a whole picture soon
+        let longest = self.pass_length();
+        let end = self.settings.first_sample + self.settings.spp;
+        let mut stats = PathStats::default();
+        let mut noise = None;
+        let mut first = self.settings.first_sample;
+        while first < end && !self.stopped() {
+            let done = first - self.settings.first_sample;
+            let length = self.samples_in_time(done).min(done.clamp(1, longest));
+            let samples = first..(first + length).min(end);
+            stats.merge(&self.pass(&mut tiles, samples.clone(), noise));
+            first = samples.end;
+            let mut film = Film::new(self.world.scene.film.resolution, bounds);
+            tiles.iter().for_each(|t| film.replace_tile(&t.bounds, &t.sums));
+            noise = Some(film.relative_noise());
+        }
+
+        let mut film = Film::new(self.world.scene.film.resolution, bounds);
+        tiles.iter().for_each(|t| film.replace_tile(&t.bounds, &t.sums));
+        let complete = film.pixels.iter().all(|p| p.count == u64::from(self.settings.spp));
+        Rendering { film, stats, elapsed: self.start.elapsed(), complete, threads }
+    }
+
+    /// Samples per pixel of the longest pass.
+    fn pass_length(&self) -> u32 {
+        (BATCH_PATHS as u32 / self.settings.tile_size.max(1).pow(2)).clamp(1, 64)
+    }
+
+    /// Samples per pixel that fit into the time that is left, at the speed so far; at least one.
+    fn samples_in_time(&self, done: u32) -> u32 {
+        let Some(limit) = self.settings.time_limit.filter(|_| done > 0) else { return u32::MAX };
+        let elapsed = self.start.elapsed();
+        let left = limit.saturating_sub(elapsed).as_secs_f64();
+        ((left * f64::from(done) / elapsed.as_secs_f64().max(1e-9)) as u32).max(1)
+    }
+
+    fn stopped(&self) -> bool {
+        let late = self.settings.time_limit.is_some_and(|limit| self.start.elapsed() >= limit);
+        late || self.stop.load(Ordering::Relaxed)
+    }
+
+    /// Adds the samples of a range to every tile.
+    fn pass(&self, tiles: &mut [Tile], samples: std::ops::Range<u32>, noise: Option<f64>) -> PathStats {
+        tiles
+            .par_iter_mut()
+            .with_max_len(1)
+            .map_init(Worker::default, |worker, tile| {
+                if self.stop.load(Ordering::Relaxed) {
+                    return PathStats::default();
+                }
+                let stats = self.render_tile(worker, tile, samples.clone());
+                let direct = stats.direct;
+                let rays = stats.camera_rays + stats.bounce_rays + direct.emitter_rays + direct.segments;
+                let done = tile.bounds.area() as u64 * u64::from(samples.end - samples.start);
+                (self.observe)(&Progress {
+                    samples_done: self.samples_done.fetch_add(done, Ordering::Relaxed) + done,
+                    samples_total: self.world.scene.film.bounds.area() as u64 * u64::from(self.settings.spp),
+                    rays: self.rays.fetch_add(rays, Ordering::Relaxed) + rays,
+                    elapsed: self.start.elapsed(),
+                    noise,
+                });
+                stats
+            })
+            .reduce(PathStats::default, |mut a, b| {
+                a.merge(&b);
+                a
+            })
+    }
+
+    /// Adds the samples of a range to one tile, in batches of whole pixels.
+    fn render_tile(&self, worker: &mut Worker, tile: &mut Tile, samples: std::ops::Range<u32>) -> PathStats {
+        let per_pixel = samples.len().max(1);
+        let pixels_per_batch = (BATCH_PATHS / per_pixel).max(1);
+        let bounds = tile.bounds;
+        let integrator = &mut worker.integrator;
+        for (batch, sums) in tile.sums.chunks_mut(pixels_per_batch).enumerate() {
+            let first = batch * pixels_per_batch;
+            self.camera_samples(&bounds, first..first + sums.len(), samples.clone(), &mut worker.samples);
+            integrator.trace(self.world, &self.world.scene.integrator, &worker.samples, &mut worker.results);
+            for (pixel, results) in sums.iter_mut().zip(worker.results.chunks(per_pixel)) {
+                results.iter().for_each(|r| pixel.add(r));
+            }
+        }
+        integrator.take_stats()
+    }
+
+    /// The camera samples of some pixels of a tile, which are counted row by row.
+    fn camera_samples(
+        &self,
+        tile: &PixelBounds,
+        pixels: std::ops::Range<usize>,
+        samples: std::ops::Range<u32>,
+        out: &mut Vec<CameraSample>,
+    ) {
+        out.clear();
+        for index in pixels {
+            let index = index as u32;
+            let pixel = [tile.x0 + index % tile.width(), tile.y0 + index / tile.width()];
+            out.extend(samples.clone().map(|s| self.camera_sample(pixel, s)));
+        }
+    }
+
+    fn camera_sample(&self, pixel: [u32; 2], sample: u32) -> CameraSample {
+        let scene = &self.world.scene;
+        let stream = SampleStream::new(scene.sampling.sampler, pixel, sample, scene.sampling.seed);
+        let [fx, fy, lx, ly] = stream.domain(domain::FILM_AND_LENS).draw::<4>();
+        let [u_time] = stream.domain(domain::TIME).draw::<1>();
+        let filter = self.filter.sample([fx, fy]);
+        let film = Vec2::new(pixel[0] as f32 + 0.5, pixel[1] as f32 + 0.5) + filter.offset;
+        let ray = scene.camera.ray(film, [lx, ly], u_time);
+        CameraSample { ray, weight: filter.weight * ray.weight * scene.film.scale, stream }
+    }
+}
+
+/// Buffers of one thread.
+#[derive(Default)]
+struct Worker {
+    integrator: PathIntegrator,
+    samples: Vec<CameraSample>,
+    results: Vec<PixelSample>,
+}

@@ -1,1 +1,165 @@
-//! (in progress)
+//! Stateless random numbers: `u(pixel, sample, domain)`, the same whoever asks and in whatever order.
+//!
+//! A [`SampleStream`] is a small value. The root stream of a (pixel, sample) pair is split into *domains*, one for
+//! each decision (lens, light choice, BSDF, …); each domain gives up to four numbers that are well distributed
+//! over the samples of the pixel. [`SampleStream::split`] gives several points to one decision, and these are
+//! well distributed over both the points and the samples. The sequences are those of the `openqmc` crate:
+//! Owen-scrambled Sobol' [Burley 2020], and the same with its error made blue noise over the image
+//! [Belcour and Heitz 2021].
+
+use crate::math::ONE_MINUS_EPSILON;
+use crate::math::hash::{pcg4d, unit_f32};
+use openqmc::{SobolBnSampler, SobolSampler};
+
+/// Which sequence.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub enum SamplerKind {
+    /// Independent uniform numbers.
+    Independent,
+    /// Owen-scrambled Sobol', pixels independent of each other.
+    Sobol,
+    /// Owen-scrambled Sobol' whose error is blue noise over the image.
+    #[default]
+    SobolBlueNoise,
+}
+
+impl SamplerKind {
+    /// All kinds, for tests and lists of options.
+    pub const ALL: [SamplerKind; 3] = [SamplerKind::Independent, SamplerKind::Sobol, SamplerKind::SobolBlueNoise];
+
+    /// The name on the command line and in metadata.
+    pub fn name(self) -> &'static str {
+        match self {
+            SamplerKind::Independent => "independent",
+            SamplerKind::Sobol => "sobol",
+            SamplerKind::SobolBlueNoise => "zsobol",
+        }
+    }
+}
+
+/// A place in the tree of domains of one sample.
+#[derive(Clone, Copy, Debug)]
+pub struct SampleStream(Kind);
+
+#[derive(Clone, Copy, Debug)]
+enum Kind {
+    Independent { key: [u32; 3] },
+    Sobol(SobolSampler),
+    SobolBlueNoise(SobolBnSampler),
+}
+
+impl SampleStream {
+    /// The root stream of sample `sample` (< 2³¹) of a pixel. Streams of different seeds are independent.
+    pub fn new(kind: SamplerKind, pixel: [u32; 2], sample: u32, seed: u32) -> Self {
+        let (x, y) = (pixel[0] as i32, pixel[1] as i32);
+        // openqmc takes the index as i32 and the seed as its frame number.
+        let index = (sample & 0x7fff_ffff) as i32;
+        SampleStream(match kind {
+            SamplerKind::Independent => {
+                let h = pcg4d([pixel[0], pixel[1], sample, seed]);
+                Kind::Independent { key: [h[0], h[1], h[2]] }
+            }
+            SamplerKind::Sobol => Kind::Sobol(SobolSampler::new(x, y, seed as i32, index)),
+            SamplerKind::SobolBlueNoise => Kind::SobolBlueNoise(SobolBnSampler::new(x, y, seed as i32, index)),
+        })
+    }
+
+    /// The domain `key` below this place.
+    #[inline]
+    pub fn domain(&self, key: u32) -> Self {
+        SampleStream(match &self.0 {
+            Kind::Independent { key: k } => {
+                let h = pcg4d([k[0], k[1], k[2], key]);
+                Kind::Independent { key: [h[0], h[1], h[2]] }
+            }
+            Kind::Sobol(s) => Kind::Sobol(s.new_domain(key as i32)),
+            Kind::SobolBlueNoise(s) => Kind::SobolBlueNoise(s.new_domain(key as i32)),
+        })
+    }
+
+    /// Point `index` of `count` points that the domain `key` gives to this one sample.
+    #[inline]
+    pub fn split(&self, key: u32, count: u32, index: u32) -> Self {
+        SampleStream(match &self.0 {
+            Kind::Independent { .. } => return self.domain(key).domain(index),
+            Kind::Sobol(s) => Kind::Sobol(s.new_domain_split(key as i32, count as i32, index as i32)),
+            Kind::SobolBlueNoise(s) => Kind::SobolBlueNoise(s.new_domain_split(key as i32, count as i32, index as i32)),
+        })
+    }
+
+    /// Up to four numbers in [0, 1) of this domain.
+    #[inline]
+    pub fn draw<const N: usize>(&self) -> [f32; N] {
+        let mut u: [f32; N] = match &self.0 {
+            Kind::Independent { key } => {
+                let h = pcg4d([key[0], key[1], key[2], 0x5bd1_e995]);
+                std::array::from_fn(|i| unit_f32(h[i]))
+            }
+            Kind::Sobol(s) => s.draw_sample_f32::<N>(),
+            Kind::SobolBlueNoise(s) => s.draw_sample_f32::<N>(),
+        };
+        for x in &mut u {
+            *x = x.min(ONE_MINUS_EPSILON);
+        }
+        u
+    }
+
+    /// One number in [0, 1) of a sub-domain where stratification gains nothing (roulette).
+    #[inline]
+    pub fn draw_random(&self, key: u32) -> f32 {
+        let domain = self.domain(key);
+        let u: [f32; 1] = match &domain.0 {
+            Kind::Independent { .. } => domain.draw(),
+            Kind::Sobol(s) => s.draw_rnd_f32::<1>(),
+            Kind::SobolBlueNoise(s) => s.draw_rnd_f32::<1>(),
+        };
+        u[0].min(ONE_MINUS_EPSILON)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn streams_are_functions_of_their_arguments() {
+        for kind in SamplerKind::ALL {
+            let draw = |seed| SampleStream::new(kind, [3, 9], 17, seed).domain(4).split(2, 8, 5).draw::<4>();
+            assert_eq!(draw(1), draw(1));
+            assert_ne!(draw(1), draw(2));
+        }
+    }
+
+    #[test]
+    fn every_dimension_has_mean_one_half_over_pixels_and_samples() {
+        for kind in SamplerKind::ALL {
+            let mut sums = [0.0_f64; 4];
+            let n = 64 * 64 * 4;
+            for i in 0..n {
+                let stream = SampleStream::new(kind, [i % 64, i / 64 % 64], i / 4096, 7).domain(11);
+                for (sum, u) in sums.iter_mut().zip(stream.draw::<4>()) {
+                    assert!((0.0..1.0).contains(&u));
+                    *sum += f64::from(u);
+                }
+            }
+            for sum in sums {
+                // Independent numbers: σ of the mean is 0.289/√n = 0.00226; four of them.
+                assert!((sum / f64::from(n) - 0.5).abs() < 0.009, "{kind:?} {}", sum / f64::from(n));
+            }
+        }
+    }
+
+    #[test]
+    fn sobol_splits_are_stratified_over_samples_and_points() {
+        for kind in [SamplerKind::Sobol, SamplerKind::SobolBlueNoise] {
+            let mut counts = [0; 64];
+            for sample in 0..8 {
+                for i in 0..8 {
+                    let [u] = SampleStream::new(kind, [5, 6], sample, 0).split(3, 8, i).draw::<1>();
+                    counts[(u * 64.0) as usize] += 1;
+                }
+            }
+            assert!(counts.iter().all(|&c| c == 1), "{kind:?}: each of the 64 intervals holds one of 64 points");
+        }
+    }
+}

@@ -142,14 +142,13 @@ pub struct TextureSet {
 }
 
 impl TextureSet {
-    /// Adds a float texture. Panics if it refers to a texture or image that is not in the set yet.
+    /// Adds a float texture. Panics if it refers to a texture that is not in the set yet; its image may come later, before the
+    /// first look-up.
     pub fn add_float(&mut self, texture: FloatTexture) -> FloatTextureId {
         let children: &[FloatTextureId] = match &texture {
             FloatTexture::Constant(_) => &[],
-            FloatTexture::Image(image) => {
-                self.check_image(image);
-                &[]
-            }
+            // Images may come later: an importer reads all of them at once.
+            FloatTexture::Image(_) => &[],
             FloatTexture::Scale { tex, scale } => &[*tex, *scale],
             FloatTexture::Mix { tex1, tex2, amount } => &[*tex1, *tex2, *amount],
             FloatTexture::DirectionMix { tex1, tex2, .. } | FloatTexture::Checkerboard { tex1, tex2, .. } => {
@@ -162,14 +161,12 @@ impl TextureSet {
         id
     }
 
-    /// Adds an RGB texture. Panics if it refers to a texture or image that is not in the set yet.
+    /// Adds an RGB texture. Panics if it refers to a texture that is not in the set yet; its image may come later, before the
+    /// first look-up.
     pub fn add_rgb(&mut self, texture: RgbTexture) -> RgbTextureId {
         let (children, weight): (&[RgbTextureId], Option<FloatTextureId>) = match &texture {
             RgbTexture::Constant(_) => (&[], None),
-            RgbTexture::Image(image) => {
-                self.check_image(image);
-                (&[], None)
-            }
+            RgbTexture::Image(_) => (&[], None),
             RgbTexture::Scale { tex, scale } => (&[*tex], Some(*scale)),
             RgbTexture::Mix { tex1, tex2, amount } => (&[*tex1, *tex2], Some(*amount)),
             RgbTexture::DirectionMix { tex1, tex2, .. } | RgbTexture::Checkerboard { tex1, tex2, .. } => {
@@ -187,10 +184,6 @@ impl TextureSet {
     pub fn add_image(&mut self, image: MipMap) -> ImageId {
         self.images.push(image);
         (self.images.len() - 1) as ImageId
-    }
-
-    fn check_image(&self, texture: &ImageTexture) {
-        assert!((texture.image as usize) < self.images.len(), "an image is added before its textures");
     }
 
     /// The value of a float texture that is a constant.

@@ -1,3 +1,9 @@
 //! Whole-program tests; one binary, a module per subject.
+#![allow(clippy::unwrap_used)]
 
+mod analytic_scenes;
+mod bit_exact;
+mod cli;
+mod crosscheck;
 mod layering;
+mod mutations;

@@ -247,6 +247,11 @@ impl ParamSet {
         found.inspect(|p| p.used.set(true)).is_some()
     }
 
+    /// Counts all parameters as asked for.
+    pub fn ignore_all(&self) {
+        self.params.iter().for_each(|p| p.used.set(true));
+    }
+
     /// The parameter if it is there and has one of the types; a wrong type is an error.
     pub fn get(&self, name: &'static str, types: &[ParamType], diagnostics: &mut Diagnostics) -> Option<&Param> {
         self.note(name);

@@ -1,13 +1,12 @@
 //! The header of a PLY file: its encoding, and the layout of its elements.
 
 use super::PlyError;
-use super::stream::Stream;
-use std::io::Read;
+use super::stream::{MAX_FILL, Stream};
 
-/// Longest header line (bytes).
-const MAX_LINE: usize = 4096;
-/// Most header lines, elements and properties.
-const MAX_LINES: usize = 10_000;
+/// Most header lines, and so elements and properties.
+const MAX_LINES: u64 = 10_000;
+/// Elements that have a meaning, and so can be there once only.
+const KNOWN: [&str; 3] = ["vertex", "face", "tristrips"];
 
 /// How numbers are written.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -83,6 +82,8 @@ pub struct Element {
     pub name: String,
     /// Number of rows.
     pub count: u64,
+    /// The line of the header that announces it.
+    pub line: u64,
     /// Its columns.
     pub properties: Vec<Property>,
 }
@@ -98,9 +99,15 @@ impl Element {
         self.properties.iter().any(|p| p.list.is_some())
     }
 
-    /// Index of the column called by one of the names, if it is no list.
-    pub fn scalar(&self, names: &[&str]) -> Option<usize> {
-        self.properties.iter().position(|p| p.list.is_none() && names.contains(&p.name.as_str()))
+    /// Index of the column of vertex indices.
+    pub fn indices(&self) -> Option<usize> {
+        let names = ["vertex_indices", "vertex_index"];
+        self.properties.iter().position(|p| p.list.is_some() && names.contains(&p.name.as_str()))
+    }
+
+    /// Index of the column of a name, if it is no list.
+    pub fn scalar(&self, name: &str) -> Option<usize> {
+        self.properties.iter().position(|p| p.list.is_none() && p.name == name)
     }
 }
 
@@ -111,6 +118,8 @@ pub struct Header {
     pub encoding: Encoding,
     /// The tables in the order of the file.
     pub elements: Vec<Element>,
+    /// Its number of lines.
+    pub lines: u64,
 }
 
 impl Header {
@@ -119,8 +128,8 @@ impl Header {
         self.elements.iter().find(|e| e.name == name)
     }
 
-    /// Fails if the rows cannot fit into `limit` bytes, so that nothing is allocated for counts that lie.
-    pub fn check_counts(&self, limit: u64) -> Result<(), PlyError> {
+    /// Fails if the rows cannot fit into `available` bytes, so that nothing is allocated for counts that lie.
+    pub fn check_counts(&self, available: u64) -> Result<(), PlyError> {
         let mut needed = 0_u64;
         for element in &self.elements {
             let row = match self.encoding {
@@ -129,14 +138,13 @@ impl Header {
                 Encoding::LittleEndian | Encoding::BigEndian => element.min_stride() as u64,
             };
             needed = needed.saturating_add(element.count.saturating_mul(row));
-            if needed > limit.saturating_add(1) {
-                let (name, count) = (&element.name, element.count);
-                return Err(PlyError::format(format!(
-                    "{count} of `{name}` are announced, more than the file can hold"
-                )));
+            if needed > available.saturating_add(u64::from(self.encoding == Encoding::Ascii)) {
+                let (element, count) = (element.name.clone(), element.count);
+                return Err(PlyError::Counts { element, count, needed, available });
             }
             if element.count > u64::from(u32::MAX) {
-                return Err(PlyError::format(format!("more than 2^32 of `{}`", element.name)));
+                let message = format!("{} of `{}`; at most 2^32 - 1 are read", element.count, element.name);
+                return Err(PlyError::header(self.lines, message));
             }
         }
         Ok(())
@@ -144,35 +152,46 @@ impl Header {
 }
 
 /// Reads the header; the stream then stands at the first row.
-pub fn read_header<R: Read>(stream: &mut Stream<R>) -> Result<Header, PlyError> {
+pub fn read_header(stream: &mut Stream<'_>) -> Result<Header, PlyError> {
     if read_line(stream)?.trim_end() != "ply" {
-        return Err(PlyError::format("is not a PLY file: it does not start with `ply`"));
+        return Err(PlyError::header(1, "is not a PLY file: it does not start with `ply`"));
     }
     let mut encoding = None;
     let mut elements: Vec<Element> = Vec::new();
     for number in 2..MAX_LINES {
         let line = read_line(stream)?;
         let words: Vec<&str> = line.split_ascii_whitespace().collect();
-        let bad = || PlyError::format(format!("line {number} of the header is not understood: `{}`", line.trim()));
+        let bad = |expected: &str| {
+            let shown: String = line.trim().chars().take(80).collect();
+            PlyError::header(number, format!("`{shown}`, where {expected} is expected"))
+        };
         match words.as_slice() {
             [] | ["comment" | "obj_info", ..] => {}
-            ["format", name, _version] => encoding = Some(encoding_of(name).ok_or_else(bad)?),
+            ["format", rest @ ..] => {
+                let known = rest.first().and_then(|name| encoding_of(name));
+                let expected = "`format` with ascii, binary_little_endian or binary_big_endian, and 1.0,";
+                encoding = Some(known.filter(|_| rest.len() == 2).ok_or_else(|| bad(expected))?);
+            }
             ["element", name, count] => {
-                let count = count.parse().map_err(|_| bad())?;
-                elements.push(Element { name: (*name).to_owned(), count, properties: Vec::new() });
+                let count = count.parse().map_err(|_| bad("`element`, a name and a count"))?;
+                if KNOWN.contains(name) && elements.iter().any(|e| e.name == *name) {
+                    return Err(PlyError::header(number, format!("`{name}` is announced twice")));
+                }
+                elements.push(Element { name: (*name).to_owned(), count, line: number, properties: Vec::new() });
             }
             ["property", rest @ ..] => {
-                let property = property(rest).ok_or_else(bad)?;
-                elements.last_mut().ok_or_else(bad)?.properties.push(property);
+                let property = property(rest).ok_or_else(|| bad("`property`, a type (or list and two) and a name"))?;
+                let element = elements.last_mut().ok_or_else(|| bad("an `element` before the properties"))?;
+                element.properties.push(property);
             }
             ["end_header"] => {
-                let encoding = encoding.ok_or_else(|| PlyError::format("header has no `format` line"))?;
-                return Ok(Header { encoding, elements });
+                let encoding = encoding.ok_or_else(|| bad("a `format` line before the end"))?;
+                return Ok(Header { encoding, elements, lines: number });
             }
-            _ => return Err(bad()),
+            _ => return Err(bad("element, property, comment, obj_info or end_header")),
         }
     }
-    Err(PlyError::format("header has no end"))
+    Err(PlyError::header(MAX_LINES, "the header has no end"))
 }
 
 fn encoding_of(name: &str) -> Option<Encoding> {
@@ -195,16 +214,33 @@ fn property(words: &[&str]) -> Option<Property> {
     }
 }
 
-/// Reads a line that ends in LF, CR LF or CR.
-fn read_line<R: Read>(stream: &mut Stream<R>) -> Result<String, PlyError> {
-    let available = stream.fill(MAX_LINE)?;
-    let Some(end) = available.iter().take(MAX_LINE).position(|&b| b == b'\n' || b == b'\r') else {
-        let message =
-            if available.len() < MAX_LINE { "file ends inside the header" } else { "header has an endless line" };
-        return Err(PlyError::format(if available.is_empty() { "is empty" } else { message }));
+/// Reads a line that ends in LF, CR LF, or, if the first line does, in CR.
+fn read_line(stream: &mut Stream<'_>) -> Result<String, PlyError> {
+    let number = stream.line;
+    let newline = stream.newline;
+    let available = stream.fill(MAX_FILL)?;
+    let window = &available[..available.len().min(MAX_FILL)];
+    let found = window.iter().position(|&b| b == newline);
+
+    // The first line tells whether lines end in CR alone; then an LF behind a CR is data.
+    let carriage = window.iter().position(|&b| b == b'\r').filter(|_| number == 1);
+    let is_old = |&at: &usize| found.is_none_or(|lf| at + 1 < lf) && at + 1 < window.len();
+    let (end, newline) = match carriage.filter(is_old) {
+        Some(at) => (Some(at), b'\r'),
+        None => (found, newline),
     };
-    let line = String::from_utf8_lossy(&available[..end]).into_owned();
-    let length = if available[end..].starts_with(b"\r\n") { end + 2 } else { end + 1 };
-    stream.consume(length);
+
+    let Some(end) = end else {
+        let message = match window.len() {
+            0 if number == 1 => "the file is empty",
+            MAX_FILL => "the line has no end",
+            _ => "the file ends inside the header",
+        };
+        return Err(PlyError::header(number, message));
+    };
+    let line = String::from_utf8_lossy(&window[..end]).trim_end_matches('\r').to_owned();
+    stream.consume(end + 1);
+    stream.newline = newline;
+    stream.line += 1;
     Ok(line)
 }

@@ -1,26 +1,49 @@
 //! Bytes of a reader, seen through a buffer of fixed size.
 
-use super::PlyError;
+use super::{Place, PlyError};
 use std::io::{self, Read};
 
 /// Size of the buffer (bytes): fits the second-level cache.
 const BUFFER: usize = 1 << 18;
+/// Most bytes that can be asked for at once.
+pub const MAX_FILL: usize = 4096;
+/// Largest factor by which deflate expands; bounds what a gzip file can hold.
+const MAX_INFLATION: u64 = 1032;
+/// Factor by which a mesh may expand before it is suspected to be a trick: memory for more is not taken in advance.
+const USUAL_INFLATION: u64 = 16;
+/// Bytes behind the mesh that are decompressed to come to the checksum.
+const MAX_TAIL: usize = 1 << 24;
 
 /// A buffered reader that knows a bound of what is still to come.
-pub struct Stream<R> {
-    reader: R,
+pub struct Stream<'a> {
+    reader: &'a mut dyn Read,
     buffer: Vec<u8>,
     start: usize,
     end: usize,
     /// Upper bound of the bytes that the reader still has.
     unread: u64,
+    /// Offset of the buffer in the file.
+    origin: u64,
+    /// Bytes for which memory may be taken before they are seen.
+    trusted: u64,
+    /// Line of the next byte, if the file is a text.
+    pub line: u64,
+    /// What ends a line: LF, or CR if the file has CR alone.
+    pub newline: u8,
 }
 
-impl<R: Read> Stream<R> {
+impl<'a> Stream<'a> {
     /// Reads from `reader`, which yields at most `limit` bytes; what it yields beyond is not seen.
-    pub fn new(reader: R, limit: u64) -> Self {
-        let size = (limit.min(BUFFER as u64) as usize).max(4096);
-        Stream { reader, buffer: vec![0; size], start: 0, end: 0, unread: limit }
+    pub fn new(reader: &'a mut dyn Read, limit: u64) -> Self {
+        let size = (limit.min(BUFFER as u64) as usize).max(MAX_FILL);
+        let buffer = vec![0; size];
+        Stream { reader, buffer, start: 0, end: 0, unread: limit, origin: 0, trusted: limit, line: 1, newline: b'\n' }
+    }
+
+    /// Reads from a decoder of `size` bytes of deflated data.
+    pub fn inflated(reader: &'a mut dyn Read, size: u64) -> Self {
+        let trusted = size.saturating_mul(USUAL_INFLATION);
+        Stream { trusted, ..Stream::new(reader, size.saturating_mul(MAX_INFLATION)) }
     }
 
     /// Upper bound of the bytes that are still to come.
@@ -28,8 +51,20 @@ impl<R: Read> Stream<R> {
         self.unread + (self.end - self.start) as u64
     }
 
+    /// For how many of `count` items, each of at least `size` bytes, memory may be taken in advance.
+    pub fn trusted_items(&self, count: u64, size: u64) -> usize {
+        let bytes = self.trusted.min(self.remaining_limit());
+        // A text may lack the blank after its last number.
+        usize::try_from(count.min((bytes + 1) / size.max(1))).unwrap_or(usize::MAX)
+    }
+
+    /// Offset of the next byte.
+    pub fn offset(&self) -> u64 {
+        self.origin + self.start as u64
+    }
+
     /// Makes at least `wanted` bytes available if there are so many, and returns all that are available.
-    /// `wanted` must not exceed 4096.
+    /// `wanted` must not exceed [`MAX_FILL`].
     #[inline]
     pub fn fill(&mut self, wanted: usize) -> Result<&[u8], PlyError> {
         if self.end - self.start < wanted {
@@ -38,14 +73,17 @@ impl<R: Read> Stream<R> {
         Ok(&self.buffer[self.start..self.end])
     }
 
-    /// Makes `count` bytes available, or fails with a message that names the missing thing.
+    /// Makes `count` bytes available, or fails with the name of the element that lacks them.
     #[inline]
-    pub fn require(&mut self, count: usize, what: &str) -> Result<&[u8], PlyError> {
-        let available = self.fill(count)?;
-        if available.len() < count {
-            return Err(PlyError::format(format!("file ends inside {what}")));
+    pub fn require(&mut self, count: usize, element: &str) -> Result<&[u8], PlyError> {
+        if self.end - self.start < count {
+            self.refill(count)?;
+            if self.end - self.start < count {
+                let place = Place::Byte(self.origin + self.end as u64);
+                return Err(PlyError::Truncated { place, element: element.to_owned() });
+            }
         }
-        Ok(available)
+        Ok(&self.buffer[self.start..self.end])
     }
 
     /// Drops the first `count` available bytes.
@@ -55,9 +93,9 @@ impl<R: Read> Stream<R> {
     }
 
     /// Drops `count` bytes.
-    pub fn skip(&mut self, mut count: u64, what: &str) -> Result<(), PlyError> {
+    pub fn skip(&mut self, mut count: u64, element: &str) -> Result<(), PlyError> {
         while count > 0 {
-            let available = self.require(1, what)?.len() as u64;
+            let available = self.require(1, element)?.len() as u64;
             let step = available.min(count);
             self.consume(step as usize);
             count -= step;
@@ -65,9 +103,24 @@ impl<R: Read> Stream<R> {
         Ok(())
     }
 
+    /// Reads to the end, so that a decoder compares its checksum.
+    pub fn drain(&mut self) -> Result<(), PlyError> {
+        let mut drained = 0;
+        while drained < MAX_TAIL {
+            let available = self.fill(1)?.len();
+            if available == 0 {
+                break;
+            }
+            self.consume(available);
+            drained += available;
+        }
+        Ok(())
+    }
+
     #[cold]
     fn refill(&mut self, wanted: usize) -> Result<(), PlyError> {
         self.buffer.copy_within(self.start..self.end, 0);
+        self.origin += self.start as u64;
         self.end -= self.start;
         self.start = 0;
         while self.end < wanted.min(self.buffer.len()) && self.unread > 0 {

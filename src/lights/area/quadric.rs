@@ -52,6 +52,9 @@ fn sphere_radius(kind: &QuadricKind, m: &Mat3) -> Option<f32> {
     (is_full && keeps_angles && mean > 0.0).then(|| radius * mean.sqrt())
 }
 
+/// Relative distance from a sphere within which a point counts as on it.
+const ON_SURFACE: f32 = 1e-5;
+
 impl QuadricLight {
     /// A quadric in world space.
     pub fn new(quadric: &Quadric) -> Self {
@@ -122,7 +125,7 @@ impl QuadricLight {
         let (center, radius) = self.sphere?;
         let d = center - from;
         let distance = d.length();
-        if distance <= radius * (1.0 + 1e-5) {
+        if distance <= radius * (1.0 + ON_SURFACE) {
             return None;
         }
         let sin2 = sqr(radius / distance);
@@ -189,12 +192,16 @@ impl QuadricLight {
     }
 
     /// True if no point of the side of the normal can be seen from `p`: behind a disk, outside a sphere whose normal
-    /// points reverseds, inside one whose normal points outwards.
+    /// points inwards, inside one whose normal points outwards.
     #[inline]
     pub(super) fn is_behind(&self, p: Vec3) -> bool {
         match (self.quadric.kind, self.sphere) {
             (QuadricKind::Sphere { .. }, Some((center, radius))) => {
-                (p.distance_squared(center) < sqr(radius)) != self.reversed
+                // A point on the sphere itself, which rounding may put on either side, sees the inside.
+                let distance = p.distance(center);
+                let is_inside = distance < radius * (1.0 - ON_SURFACE);
+                let is_outside = distance > radius * (1.0 + ON_SURFACE);
+                if self.reversed { is_outside } else { is_inside }
             }
             (QuadricKind::Disk { height, .. }, _) => {
                 let height_above = self.quadric.local_from_group.transform_point3(p).z - height;

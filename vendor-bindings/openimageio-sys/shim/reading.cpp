@@ -2,6 +2,7 @@
 // of them have.
 #include "common.h"
 
+#include <algorithm>
 #include <cstdio>
 #include <map>
 #include <memory>
@@ -89,6 +90,12 @@ struct OiioInput {
       throw Failure{OIIO_UNSUPPORTED, "the header says " + size};
     // Each factor is below 2^31, so that the first product fits; the second is divided instead.
     const uint64_t row = uint64_t(spec.width) * uint64_t(spec.nchannels);
+    // A damaged header may ask for tiles that are larger than the picture; OpenImageIO would allocate them.
+    const uint64_t tile = uint64_t(std::max(spec.tile_width, 0)) * uint64_t(std::max(spec.tile_height, 0));
+    if (tile > max_bytes / sizeof(float) / uint64_t(spec.nchannels))
+      throw Failure{OIIO_TOO_LARGE, "the header asks for tiles of " + std::to_string(spec.tile_width) + " x " +
+                                        std::to_string(spec.tile_height) + ", the limit is " +
+                                        std::to_string(max_bytes >> 20) + " MiB (damaged file?)"};
     if (row > max_bytes / sizeof(float) / uint64_t(spec.height))
       throw Failure{OIIO_TOO_LARGE, "the header says " + size + ", more than the limit of " +
                                         std::to_string(max_bytes >> 20) + " MiB (damaged file?)"};

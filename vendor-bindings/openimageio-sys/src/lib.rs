@@ -2,7 +2,7 @@
 //!
 //! OpenImageIO's interface is C++, so a shim with a C interface (`shim/oiio_shim.h`, which documents
 //! each function) stands between. Linking OpenImageIO would load some 260 shared objects at every
-//! start of the process; the shim is therefore a shared object of its own, which [`load`] opens when
+//! start of the process; the shim is therefore a shared object of its own, which [`load()`] opens when
 //! the first picture is read or written.
 //!
 //! Every function that can fail returns an `OIIO_…` code and takes a buffer for the message, as

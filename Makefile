@@ -1,0 +1,36 @@
+# `make run` sets up a fresh Debian machine and renders a picture; `make test` sets it up and runs every test.
+
+CARGO ?= $(shell command -v cargo || echo $(HOME)/.cargo/bin/cargo)
+PACKAGES = build-essential pkg-config libembree-dev libopenimageio-dev
+SCENE = scenes/demo/gallery.pbrt
+
+.PHONY: run test setup lint doc bindings clean
+
+run: setup
+	$(CARGO) build --release
+	target/release/lumiris render $(SCENE) -o gallery.png -o gallery.exr
+	@echo "The picture is in gallery.png and gallery.exr."
+
+test: setup
+	$(CARGO) test --workspace --doc
+	$(CARGO) test --workspace --lib --bins --tests
+
+# Installs what is missing; does nothing, and needs no rights, where everything is there.
+setup:
+	@.ci/setup.sh $(PACKAGES)
+
+lint: setup
+	$(CARGO) fmt --all --check
+	$(CARGO) clippy --workspace --all-targets -- -D warnings
+
+doc: setup
+	RUSTDOCFLAGS="-D warnings -A rustdoc::private-intra-doc-links" $(CARGO) doc --workspace --no-deps --document-private-items
+
+# The committed Embree bindings are what the installed header gives. 2: the installed bindgen or Embree is another
+# version than the one that made them, and nothing can be said.
+bindings: setup
+	@.ci/setup.sh bindgen libclang-dev
+	@vendor-bindings/embree4-sys/regenerate.sh --check || [ $$? -eq 2 ]
+
+clean:
+	$(CARGO) clean

@@ -1,0 +1,38 @@
+//! The library in one page: load a scene, build its ray tracers, render, write.
+//!
+//! `cargo run --release --example render_scene -- scenes/analytic/rectangle.pbrt rectangle.exr`
+#![allow(clippy::print_stdout)]
+
+use lumiris::imaging::oiio::{Part, write_image};
+use lumiris::import::{LoadOptions, load};
+use lumiris::render::output::{self, Aov};
+use lumiris::render::{RenderSettings, render};
+use lumiris::scene::{AccelKind, World};
+use std::error::Error;
+use std::path::Path;
+use std::sync::atomic::AtomicBool;
+
+fn main() -> Result<(), Box<dyn Error>> {
+    let arguments: Vec<String> = std::env::args().collect();
+    let [_, scene, picture] = arguments.as_slice() else {
+        return Err("usage: render_scene SCENE.pbrt PICTURE.exr".into());
+    };
+
+    // What is wrong with the file comes back as a report; warnings come with the scene.
+    let loaded = load(Path::new(scene), &LoadOptions::default())?;
+    println!("{}", loaded.warnings);
+
+    // A world is a scene with its ray tracers: one over everything, one over emitters only.
+    let world = World::new(loaded.scene, AccelKind::Embree, None)?;
+
+    let settings = RenderSettings { spp: world.scene.sampling.spp, ..RenderSettings::default() };
+    let rendering = render(&world, &settings, &AtomicBool::new(false), &|_progress| ())?;
+
+    let film = &rendering.film;
+    let channels = output::channels(film, &[Aov::Variance]);
+    let (width, height) = (film.bounds.width() as usize, film.bounds.height() as usize);
+    let part = Part::linear(width, height, channels.names, channels.data);
+    write_image(Path::new(picture), &[part])?;
+    println!("{} camera rays in {:.2} s", rendering.stats.camera_rays, rendering.elapsed.as_secs_f64());
+    Ok(())
+}

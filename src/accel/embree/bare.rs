@@ -1,0 +1,192 @@
+//! Embree by itself: loops over packets that were filled before, and nothing of what the renderer adds. They say how
+//! fast a query can be at best, and what conversion and exact hits cost.
+//!
+//! The scene is built as the renderer's, but without the flag by which queries bring a filter. Quadrics, patches and
+//! cut-outs call back as they do in the renderer.
+#![allow(unsafe_code)]
+
+use super::callbacks::QueryContext;
+use super::device::Device;
+use super::kernels::{self, Ask, Mode, RayHitPacket, RayPacket, Valid};
+use super::query::{ANY_SINGLE, can_trace, load, single_ray};
+use super::scene::{self, EmbreeScene};
+use super::world::World;
+use super::{Builder, EmbreeError, checked_width};
+use crate::accel::{AlphaSource, RayBatch};
+use crate::geometry::{GeometrySet, Shape, Visibility};
+use embree4_sys as sys;
+use std::sync::Arc;
+use std::time::{Duration, Instant};
+
+/// Embree's structures over a scene.
+pub struct Bare {
+    root: EmbreeScene,
+    world: Arc<World>,
+    /// Whether callbacks report hits, for which the context must be made ready.
+    calls_back: bool,
+    build_time: Duration,
+}
+
+/// Packed rays of one batch.
+pub struct Packed<'a> {
+    rays: &'a RayBatch,
+    packets: Packets,
+}
+
+enum Packets {
+    First1(Vec<sys::RTCRayHit>),
+    First4(Vec<(Valid<4>, RayHitPacket<4>)>),
+    First8(Vec<(Valid<8>, RayHitPacket<8>)>),
+    Any1(Vec<sys::RTCRay>),
+    Any4(Vec<(Valid<4>, RayPacket<4>)>),
+    Any8(Vec<(Valid<8>, RayPacket<8>)>),
+}
+
+impl Bare {
+    /// Builds on all cores. Without `alpha`, cut-outs are opaque.
+    pub fn new(set: Arc<GeometrySet>, alpha: Option<Arc<dyn AlphaSource>>) -> Result<Bare, EmbreeError> {
+        let start = Instant::now();
+        let device = Arc::new(Device::new(c"", None)?);
+        let calls_back = set.geometries.iter().any(|g| !matches!(g.shape, Shape::Mesh(_)));
+        let of_world = Arc::clone(&set);
+        let world = Arc::new(World::new(set, |i| scene::can_place(&of_world.instances[i as usize])));
+        let root = Builder { device: &device, world: &world, alpha, query_filter: false }.root()?;
+        Ok(Bare { root, world, calls_back, build_time: start.elapsed() })
+    }
+
+    /// Wall-clock time of the build.
+    pub fn build_time(&self) -> Duration {
+        self.build_time
+    }
+
+    /// Traces packed rays. `coherent` lets packets be traversed by their common frustum.
+    pub fn trace(&self, packed: &mut Packed<'_>, coherent: bool) {
+        let rays = packed.rays;
+        match &mut packed.packets {
+            Packets::First1(singles) => self.nearest_singly(rays, singles),
+            Packets::First4(packets) => self.nearest(rays, packets, coherent),
+            Packets::First8(packets) => self.nearest(rays, packets, coherent),
+            Packets::Any1(singles) => self.any_singly(rays, singles),
+            Packets::Any4(packets) => self.any(rays, packets, coherent),
+            Packets::Any8(packets) => self.any(rays, packets, coherent),
+        }
+    }
+
+    fn nearest_singly(&self, rays: &RayBatch, singles: &mut [sys::RTCRayHit]) {
+        let mode = Mode { ask: Ask::Nearest, coherent: false };
+        let mut context = QueryContext::new(&self.world, rays, mode);
+        for single in singles {
+            if self.calls_back {
+                context.begin(single.ray.id as usize);
+            }
+            // SAFETY: the scene is committed, the ray is finite and its id an index of the batch.
+            unsafe { kernels::intersect1(self.root.raw(), &mut context, mode, single) };
+        }
+        context.finish();
+    }
+
+    fn nearest<const N: usize>(&self, rays: &RayBatch, packets: &mut [(Valid<N>, RayHitPacket<N>)], coherent: bool) {
+        let mode = Mode { ask: Ask::Nearest, coherent };
+        let mut context = QueryContext::new(&self.world, rays, mode);
+        for (valid, packet) in packets {
+            if self.calls_back {
+                context.begin(packet.rays.id[0] as usize);
+            }
+            // SAFETY: the scene is committed, the lanes in `valid` are finite, ids are indices of the batch.
+            unsafe { kernels::intersect_packet(self.root.raw(), &mut context, mode, valid, packet) };
+        }
+        context.finish();
+    }
+
+    fn any_singly(&self, rays: &RayBatch, singles: &mut [sys::RTCRay]) {
+        let mut context = QueryContext::new(&self.world, rays, ANY_SINGLE);
+        for single in singles {
+            // SAFETY: the scene is committed, the ray is finite and its id an index of the batch.
+            unsafe { kernels::occluded1(self.root.raw(), &mut context, single) };
+        }
+        context.finish();
+    }
+
+    fn any<const N: usize>(&self, rays: &RayBatch, packets: &mut [(Valid<N>, RayPacket<N>)], coherent: bool) {
+        let mode = Mode { ask: Ask::Any, coherent };
+        let mut context = QueryContext::new(&self.world, rays, mode);
+        for (valid, packet) in packets {
+            // SAFETY: the scene is committed, the lanes in `valid` are finite, ids are indices of the batch.
+            unsafe { kernels::occluded_packet(self.root.raw(), &mut context, mode, valid, packet) };
+        }
+        context.finish();
+    }
+}
+
+impl<'a> Packed<'a> {
+    /// Rays whose first hits are asked for, in packets of `width`: 1, 4 or 8.
+    pub fn first(rays: &'a RayBatch, width: u32) -> Result<Packed<'a>, EmbreeError> {
+        let packets = match checked_width(width)? {
+            4 => Packets::First4(pack_first(rays)),
+            8 => Packets::First8(pack_first(rays)),
+            _ => {
+                let hit = sys::RTCHit {
+                    geomID: sys::RTC_INVALID_GEOMETRY_ID,
+                    instID: [sys::RTC_INVALID_GEOMETRY_ID],
+                    ..Default::default()
+                };
+                let rays = traceable(rays, Visibility::PATH).map(|ray| sys::RTCRayHit { ray, hit });
+                Packets::First1(rays.collect())
+            }
+        };
+        Ok(Packed { rays, packets })
+    }
+
+    /// Segments that may be occluded, in packets of `width`: 1, 4 or 8.
+    pub fn any(rays: &'a RayBatch, width: u32) -> Result<Packed<'a>, EmbreeError> {
+        let packets = match checked_width(width)? {
+            4 => Packets::Any4(pack_any(rays)),
+            8 => Packets::Any8(pack_any(rays)),
+            _ => Packets::Any1(traceable(rays, Visibility::SHADOW).collect()),
+        };
+        Ok(Packed { rays, packets })
+    }
+
+    /// How many of the traced rays hit something.
+    pub fn hits(&self) -> usize {
+        fn first<const N: usize>(packets: &[(Valid<N>, RayHitPacket<N>)]) -> usize {
+            let geometries = packets.iter().flat_map(|(_, packet)| packet.geometry);
+            geometries.filter(|&g| g != sys::RTC_INVALID_GEOMETRY_ID).count()
+        }
+        fn any<const N: usize>(packets: &[(Valid<N>, RayPacket<N>)]) -> usize {
+            let stopped = |(valid, packet): &(Valid<N>, RayPacket<N>)| {
+                (0..N).filter(|&lane| valid.0[lane] != 0 && packet.tfar[lane] < 0.0).count()
+            };
+            packets.iter().map(stopped).sum()
+        }
+        match &self.packets {
+            Packets::First1(rays) => rays.iter().filter(|r| r.hit.geomID != sys::RTC_INVALID_GEOMETRY_ID).count(),
+            Packets::First4(packets) => first(packets),
+            Packets::First8(packets) => first(packets),
+            Packets::Any1(rays) => rays.iter().filter(|r| r.tfar < 0.0).count(),
+            Packets::Any4(packets) => any(packets),
+            Packets::Any8(packets) => any(packets),
+        }
+    }
+}
+
+fn traceable(rays: &RayBatch, visibility: Visibility) -> impl Iterator<Item = sys::RTCRay> {
+    let all = (0..rays.len()).map(move |i| single_ray(rays, i, visibility));
+    all.filter(|r| can_trace([r.org_x, r.org_y, r.org_z], [r.dir_x, r.dir_y, r.dir_z], r.tfar))
+}
+
+fn pack_first<const N: usize>(rays: &RayBatch) -> Vec<(Valid<N>, RayHitPacket<N>)> {
+    let pack = |base| {
+        let mut packet = RayHitPacket::new(Visibility::PATH.0);
+        (load(&mut packet.rays, rays, base), packet)
+    };
+    (0..rays.len()).step_by(N).map(pack).collect()
+}
+
+fn pack_any<const N: usize>(rays: &RayBatch) -> Vec<(Valid<N>, RayPacket<N>)> {
+    let pack = |base| {
+        let mut packet = RayPacket::new(Visibility::SHADOW.0);
+        (load(&mut packet, rays, base), packet)
+    };
+    (0..rays.len()).step_by(N).map(pack).collect()
+}

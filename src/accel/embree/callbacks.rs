@@ -1,0 +1,337 @@
+//! What Embree calls while it traces: first hits, cut-outs, quadrics and bilinear patches.
+//!
+//! Embree hands over N rays at once as a structure of arrays with N elements per field; lanes whose `valid` is not −1 are
+//! left alone. Fields are reached by their index in the header's order, which holds for any N, 1 included.
+#![allow(unsafe_code)]
+
+use super::kernels::RtcContext;
+use super::world::{Refined, Reported, World};
+use crate::accel::{AlphaTest, Hit, RayBatch};
+use crate::geometry::hit::LocalHit;
+use crate::geometry::{GeometryId, Shape};
+use crate::math::{Bounds3, Ray};
+use embree4_sys as sys;
+use std::any::Any;
+use std::panic::{AssertUnwindSafe, catch_unwind};
+use std::sync::Arc;
+
+/// The largest packet.
+pub(super) const MAX_WIDTH: usize = 8;
+
+/// Hits whose parameters differ by less than this fraction are compared exactly: much more than what Embree's
+/// parameter is off, but for rays at less than some 0.1° to a triangle.
+const TIE: f32 = 1.0 / (1 << 12) as f32;
+
+/// Relative growth of the boxes of quadrics and patches, for the rounding of rays on their way into a group.
+const BOX_GROWTH: f32 = 1.0 / (1 << 20) as f32;
+
+/// What the callbacks of one geometry read.
+#[derive(Clone)]
+pub(super) struct GeometryContext {
+    pub world: Arc<World>,
+    pub id: GeometryId,
+    /// The test of a cut-out.
+    pub alpha: Option<AlphaTest>,
+}
+
+impl GeometryContext {
+    pub fn has_alpha(&self) -> bool {
+        self.alpha.is_some()
+    }
+
+    /// True if the hit stops the ray.
+    fn stops(&self, hit: &Hit, world_ray: &Ray) -> bool {
+        self.alpha.as_ref().is_none_or(|alpha| alpha.stops(hit, world_ray))
+    }
+
+    /// The exact hit of a quadric or patch with 0 < t < `t_limit`.
+    fn intersect(&self, world_ray: &Ray, primitive: u32, instance: u32, t_limit: f32) -> Option<LocalHit> {
+        let ray = Ray { t_max: t_limit, ..self.world.group_ray(world_ray, instance) };
+        let hit = match &self.world.set.geometries[self.id as usize].shape {
+            Shape::Quadric(quadric) => quadric.intersect(&ray),
+            Shape::Bilinear(mesh) => mesh.intersect_patch(primitive as usize, &ray),
+            Shape::Mesh(_) => None,
+        }?;
+        let found = Hit { t: hit.t, uv: hit.uv, geometry: self.id, primitive, instance };
+        self.stops(&found, world_ray).then_some(hit)
+    }
+}
+
+/// What a query brings along; Embree passes the address of its first member to the callbacks.
+#[repr(C)]
+pub(super) struct QueryContext<'a> {
+    pub rtc: RtcContext,
+    pub world: &'a World,
+    /// The batch; a ray's `id` is its index in it.
+    pub rays: &'a RayBatch,
+    /// Index of the packet's first ray.
+    pub base: u32,
+    /// The smallest parameter reported for each lane.
+    pub best_t: [f32; MAX_WIDTH],
+    /// The hit of each lane.
+    pub first: [Reported; MAX_WIDTH],
+    /// What a callback panicked with: it goes on when Embree has returned.
+    pub panic: Option<Box<dyn Any + Send>>,
+}
+
+impl QueryContext<'_> {
+    /// Forgets the last packet.
+    #[inline]
+    pub fn begin(&mut self, base: usize) {
+        self.base = base as u32;
+        self.best_t = [f32::INFINITY; MAX_WIDTH];
+        for first in &mut self.first {
+            first.geometry = u32::MAX;
+        }
+    }
+
+    /// Offers a hit of the ray `id`; the new end of the ray, or `None` if another hit stays the first. The end lies a
+    /// little beyond the hit, so that a tie is seen whichever of the hits comes first.
+    #[inline]
+    fn offer(&mut self, id: u32, hit: Reported) -> Option<f32> {
+        let lane = (id - self.base) as usize % MAX_WIDTH;
+        let best = self.best_t[lane];
+        if hit.t < best * (1.0 - TIE) {
+            self.best_t[lane] = hit.t;
+        } else {
+            self.best_t[lane] = best.min(hit.t);
+            if !self.wins_tie(id, lane, &hit) {
+                return None;
+            }
+        }
+        self.first[lane] = hit;
+        Some(self.best_t[lane] * (1.0 + TIE))
+    }
+
+    /// Whether the exact hits put `hit` before the lane's first.
+    #[cold]
+    fn wins_tie(&mut self, id: u32, lane: usize, hit: &Reported) -> bool {
+        let mut wins = self.first[lane].geometry == u32::MAX;
+        self.guard(|query| {
+            if !wins {
+                let (ray, first) = (query.rays.get(id as usize), &query.first[lane]);
+                wins = query.world.refine(&ray, hit).precedes(&query.world.refine(&ray, first));
+            }
+        });
+        wins
+    }
+
+    /// Runs the body of a callback; a panic is kept for later.
+    #[inline]
+    fn guard(&mut self, body: impl FnOnce(&mut Self)) {
+        let result = catch_unwind(AssertUnwindSafe(|| body(self)));
+        if let Err(panic) = result {
+            self.panic = Some(panic);
+        }
+    }
+}
+
+/// N rays, and after them N hits where the callback gets both in one.
+#[derive(Clone, Copy)]
+struct Lanes {
+    words: *mut f32,
+    n: usize,
+}
+
+const TNEAR: usize = 3;
+const TFAR: usize = 8;
+const ID: usize = 10;
+/// Words of a ray.
+const RAY_WORDS: usize = 12;
+
+const HIT_U: usize = 3;
+const HIT_V: usize = 4;
+const HIT_PRIM: usize = 5;
+const HIT_GEOM: usize = 6;
+const HIT_INST: usize = 7;
+
+impl Lanes {
+    /// # Safety
+    /// `words` has fields beyond `field`, and `lane` is below n.
+    #[inline]
+    unsafe fn get(self, field: usize, lane: usize) -> f32 {
+        // SAFETY: by the caller.
+        unsafe { *self.words.add(field * self.n + lane) }
+    }
+
+    /// # Safety
+    /// As [`Self::get`].
+    #[inline]
+    unsafe fn set(self, field: usize, lane: usize, value: f32) {
+        // SAFETY: by the caller.
+        unsafe { *self.words.add(field * self.n + lane) = value }
+    }
+
+    /// # Safety
+    /// As [`Self::get`].
+    #[inline]
+    unsafe fn get_u32(self, field: usize, lane: usize) -> u32 {
+        // SAFETY: by the caller.
+        unsafe { self.get(field, lane) }.to_bits()
+    }
+}
+
+/// Lanes of a callback that take part.
+///
+/// # Safety
+/// `valid` has `n` elements.
+unsafe fn active(valid: *const i32, n: usize) -> impl Iterator<Item = usize> {
+    // SAFETY: by the caller.
+    (0..n).filter(move |&lane| unsafe { *valid.add(lane) == -1 })
+}
+
+/// Refuses the hits of triangles that a cut-out lets through.
+pub(super) unsafe extern "C" fn alpha_filter(arguments: *const sys::RTCFilterFunctionNArguments) {
+    // SAFETY: Embree passes valid arguments: the user data that was set, the context of this query, N lanes each.
+    unsafe {
+        let arguments = &*arguments;
+        let geometry = &*arguments.geometryUserPtr.cast::<GeometryContext>();
+        let query = &mut *arguments.context.cast::<QueryContext<'_>>();
+        let n = arguments.N as usize;
+        let (rays, hits) = (Lanes { words: arguments.ray.cast(), n }, Lanes { words: arguments.hit.cast(), n });
+        for lane in active(arguments.valid, n) {
+            let (id, reported) = (rays.get_u32(ID, lane), reported(rays, hits, lane));
+            let mut stops = false;
+            query.guard(|query| {
+                let ray = query.rays.get(id as usize);
+                let instance = geometry.world.instance(reported.instance);
+                stops = match geometry.world.refine_primitive(&ray, geometry.id, instance, &reported) {
+                    Refined::Hit(hit) => geometry.stops(&hit, &ray),
+                    Refined::Behind | Refined::Beyond => false,
+                };
+            });
+            if !stops {
+                *arguments.valid.add(lane) = 0;
+            }
+        }
+    }
+}
+
+/// Offers the hits of triangles.
+pub(super) unsafe extern "C" fn first_filter(arguments: *const sys::RTCFilterFunctionNArguments) {
+    // SAFETY: Embree passes valid arguments: the context of this query, N lanes each.
+    unsafe {
+        let arguments = &*arguments;
+        let query = &mut *arguments.context.cast::<QueryContext<'_>>();
+        let n = arguments.N as usize;
+        let (rays, hits) = (Lanes { words: arguments.ray.cast(), n }, Lanes { words: arguments.hit.cast(), n });
+        for lane in active(arguments.valid, n) {
+            match query.offer(rays.get_u32(ID, lane), reported(rays, hits, lane)) {
+                Some(end) => rays.set(TFAR, lane, end),
+                None => *arguments.valid.add(lane) = 0,
+            }
+        }
+    }
+}
+
+/// The hit of a triangle in a lane of a filter. Where on the triangle is left to the exact hit.
+///
+/// # Safety
+/// `rays` and `hits` have n lanes of rays and of hits, and `lane` is below n.
+#[inline]
+unsafe fn reported(rays: Lanes, hits: Lanes, lane: usize) -> Reported {
+    // SAFETY: by the caller.
+    unsafe {
+        Reported {
+            geometry: hits.get_u32(HIT_GEOM, lane),
+            primitive: hits.get_u32(HIT_PRIM, lane),
+            instance: hits.get_u32(HIT_INST, lane),
+            t: rays.get(TFAR, lane),
+            uv: [0.0; 2],
+        }
+    }
+}
+
+/// The box of a quadric or patch.
+pub(super) unsafe extern "C" fn bounds(arguments: *const sys::RTCBoundsFunctionArguments) {
+    // SAFETY: Embree passes valid arguments, among them the user data that was set.
+    unsafe {
+        let arguments = &*arguments;
+        let geometry = &*arguments.geometryUserPtr.cast::<GeometryContext>();
+        let box_of = || match &geometry.world.set.geometries[geometry.id as usize].shape {
+            Shape::Bilinear(mesh) => Bounds3::from_points(mesh.patch(arguments.primID as usize)),
+            Shape::Quadric(quadric) => quadric.bounds(),
+            Shape::Mesh(_) => Bounds3::EMPTY,
+        };
+        // An empty box leaves the primitive out.
+        let found = catch_unwind(AssertUnwindSafe(box_of)).unwrap_or(Bounds3::EMPTY);
+        let growth = found.min.abs().max(found.max.abs()).max_element() * BOX_GROWTH;
+        let (lower, upper) = (found.min - growth, found.max + growth);
+        let out = &mut *arguments.bounds_o;
+        (out.lower_x, out.lower_y, out.lower_z) = lower.into();
+        (out.upper_x, out.upper_y, out.upper_z) = upper.into();
+    }
+}
+
+/// First hits of quadrics and patches.
+pub(super) unsafe extern "C" fn intersect(arguments: *const sys::RTCIntersectFunctionNArguments) {
+    // SAFETY: Embree passes valid arguments: the user data that was set, the context of this query, and N lanes of rays
+    // followed by N lanes of hits.
+    unsafe {
+        let arguments = &*arguments;
+        let geometry = &*arguments.geometryUserPtr.cast::<GeometryContext>();
+        let query = &mut *arguments.context.cast::<QueryContext<'_>>();
+        let n = arguments.N as usize;
+        let rays = Lanes { words: arguments.rayhit.cast(), n };
+        let hits = Lanes { words: rays.words.add(RAY_WORDS * n), n };
+        let inst_id = query.rtc.instID[0];
+        for lane in active(arguments.valid, n) {
+            let found = lane_hit(geometry, query, rays, lane, (arguments.primID, inst_id));
+            let end = found.and_then(|hit| {
+                let (geometry, primitive, instance) = (arguments.geomID, arguments.primID, inst_id);
+                let hit = Reported { geometry, primitive, instance, t: hit.t, uv: hit.uv };
+                query.offer(rays.get_u32(ID, lane), hit)
+            });
+            *arguments.valid.add(lane) = if end.is_some() { -1 } else { 0 };
+            let (Some(hit), Some(end)) = (found, end) else { continue };
+            rays.set(TFAR, lane, end);
+            hits.set(HIT_U, lane, hit.uv[0]);
+            hits.set(HIT_V, lane, hit.uv[1]);
+            hits.set(HIT_PRIM, lane, f32::from_bits(arguments.primID));
+            hits.set(HIT_GEOM, lane, f32::from_bits(arguments.geomID));
+            hits.set(HIT_INST, lane, f32::from_bits(inst_id));
+        }
+    }
+}
+
+/// Whether quadrics and patches stop rays.
+pub(super) unsafe extern "C" fn occluded(arguments: *const sys::RTCOccludedFunctionNArguments) {
+    // SAFETY: Embree passes valid arguments: the user data that was set, the context of this query, N lanes of rays.
+    unsafe {
+        let arguments = &*arguments;
+        let geometry = &*arguments.geometryUserPtr.cast::<GeometryContext>();
+        let query = &mut *arguments.context.cast::<QueryContext<'_>>();
+        let n = arguments.N as usize;
+        let rays = Lanes { words: arguments.ray.cast(), n };
+        let inst_id = query.rtc.instID[0];
+        for lane in active(arguments.valid, n) {
+            let found = lane_hit(geometry, query, rays, lane, (arguments.primID, inst_id)).is_some();
+            *arguments.valid.add(lane) = if found { -1 } else { 0 };
+            if found {
+                rays.set(TFAR, lane, f32::NEG_INFINITY);
+            }
+        }
+    }
+}
+
+/// The hit of one lane with primitive `at.0` in the instance of `at.1`.
+///
+/// # Safety
+/// `rays` has n lanes of rays, and `lane` is below n.
+unsafe fn lane_hit(
+    geometry: &GeometryContext,
+    query: &mut QueryContext<'_>,
+    rays: Lanes,
+    lane: usize,
+    at: (u32, u32),
+) -> Option<LocalHit> {
+    // SAFETY: by the caller.
+    let (id, start, end) = unsafe { (rays.get_u32(ID, lane), rays.get(TNEAR, lane), rays.get(TFAR, lane)) };
+    let mut found = None;
+    query.guard(|query| {
+        let ray = query.rays.get(id as usize);
+        let instance = geometry.world.instance(at.1);
+        found = geometry.intersect(&ray, at.0, instance, end).filter(|hit| hit.t > start);
+    });
+    found
+}

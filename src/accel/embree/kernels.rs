@@ -1,0 +1,260 @@
+//! Embree's query functions, alike for both families.
+#![allow(unsafe_code)]
+
+use super::callbacks::{MAX_WIDTH, QueryContext, first_filter};
+use super::world::{Reported, World};
+use crate::accel::RayBatch;
+use embree4_sys as sys;
+
+/// Words per hit beyond the eight that every version has: `instPrimID`, where it exists.
+const EXTRA_HIT_WORDS: usize = if size_of::<sys::RTCRayHit8>() == 640 { 0 } else { 1 };
+
+/// What is asked.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(super) enum Ask {
+    /// First hits, which the filter of the query collects.
+    First,
+    /// First hits as Embree itself keeps them.
+    Nearest,
+    /// Whether anything is hit.
+    Any,
+}
+
+/// How to trace.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(super) struct Mode {
+    /// What is asked.
+    pub ask: Ask,
+    /// Traverse packets by their common frustum.
+    pub coherent: bool,
+}
+
+/// N rays.
+#[repr(C, align(32))]
+#[derive(Clone, Copy, Debug)]
+pub(super) struct RayPacket<const N: usize> {
+    pub o: [[f32; N]; 3],
+    pub tnear: [f32; N],
+    pub d: [[f32; N]; 3],
+    pub time: [f32; N],
+    pub tfar: [f32; N],
+    pub mask: [u32; N],
+    pub id: [u32; N],
+    pub flags: [u32; N],
+}
+
+/// N rays and their hits.
+#[repr(C, align(32))]
+#[derive(Clone, Copy, Debug)]
+pub(super) struct RayHitPacket<const N: usize> {
+    pub rays: RayPacket<N>,
+    pub ng: [[f32; N]; 3],
+    pub u: [f32; N],
+    pub v: [f32; N],
+    pub primitive: [u32; N],
+    pub geometry: [u32; N],
+    pub instance: [u32; N],
+    pub extra: [[u32; N]; EXTRA_HIT_WORDS],
+}
+
+/// −1 where a lane holds a ray.
+#[repr(C, align(32))]
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Valid<const N: usize>(pub [i32; N]);
+
+const _: () = {
+    assert!(size_of::<RayPacket<4>>() == size_of::<sys::RTCRay4>());
+    assert!(size_of::<RayPacket<8>>() == size_of::<sys::RTCRay8>());
+    assert!(size_of::<RayHitPacket<4>>() >= size_of::<sys::RTCRayHit4>());
+    assert!(size_of::<RayHitPacket<8>>() == size_of::<sys::RTCRayHit8>());
+    assert!(align_of::<RayPacket<8>>() >= align_of::<sys::RTCRayHit8>());
+    assert!(std::mem::offset_of!(RayHitPacket<4>, ng) == std::mem::offset_of!(sys::RTCRayHit4, hit));
+    assert!(std::mem::offset_of!(RayHitPacket<8>, ng) == std::mem::offset_of!(sys::RTCRayHit8, hit));
+    assert!(std::mem::offset_of!(RayPacket<8>, tfar) == std::mem::offset_of!(sys::RTCRay8, tfar));
+};
+
+/// Start of the interval that Embree tests: it takes a hit at t = 0 for a hit, and rays that leave a plane through a
+/// coordinate origin start exactly on it. Far below any distance, and far above what underflows when it is multiplied.
+pub const T_NEAR: f32 = 1e-20;
+
+impl<const N: usize> RayPacket<N> {
+    pub fn new(mask: u32) -> Self {
+        let zero = [0.0; N];
+        let (o, d) = ([zero; 3], [zero; 3]);
+        RayPacket { o, tnear: [T_NEAR; N], d, time: zero, tfar: zero, mask: [mask; N], id: [0; N], flags: [0; N] }
+    }
+}
+
+impl<const N: usize> RayHitPacket<N> {
+    pub fn new(mask: u32) -> Self {
+        let (zero, none) = ([0.0; N], [u32::MAX; N]);
+        RayHitPacket {
+            rays: RayPacket::new(mask),
+            ng: [zero; 3],
+            u: zero,
+            v: zero,
+            primitive: none,
+            geometry: none,
+            instance: none,
+            extra: [none; EXTRA_HIT_WORDS],
+        }
+    }
+}
+
+/// The part of a query that Embree knows.
+#[cfg(embree3)]
+pub(super) type RtcContext = sys::RTCIntersectContext;
+/// The part of a query that Embree knows.
+#[cfg(embree4)]
+pub(super) type RtcContext = sys::RTCRayQueryContext;
+
+impl<'a> QueryContext<'a> {
+    pub fn new(world: &'a World, rays: &'a RayBatch, mode: Mode) -> Self {
+        let (best_t, first) = ([f32::INFINITY; MAX_WIDTH], [Reported::NONE; MAX_WIDTH]);
+        QueryContext { rtc: rtc_context(mode), world, rays, base: 0, best_t, first, panic: None }
+    }
+
+    /// Goes on with the panic of a callback.
+    #[inline]
+    pub fn finish(self) {
+        if let Some(panic) = self.panic {
+            std::panic::resume_unwind(panic);
+        }
+    }
+}
+
+#[cfg(embree3)]
+fn rtc_context(mode: Mode) -> RtcContext {
+    let mut context = sys::rtcInitIntersectContext();
+    if mode.coherent {
+        context.flags = sys::RTCIntersectContextFlags::RTC_INTERSECT_CONTEXT_FLAG_COHERENT;
+    }
+    if mode.ask == Ask::First {
+        context.filter = Some(first_filter);
+    }
+    context
+}
+
+#[cfg(embree4)]
+fn rtc_context(_mode: Mode) -> RtcContext {
+    let mut context = RtcContext::default();
+    // SAFETY: it consists of ids, and the invalid id has all bits set.
+    unsafe { std::ptr::write_bytes(&raw mut context, 0xFF, 1) };
+    context
+}
+
+#[cfg(embree4)]
+fn query_flags(mode: Mode) -> sys::RTCRayQueryFlags {
+    use sys::RTCRayQueryFlags as Flags;
+    let coherent = if mode.coherent { Flags::RTC_RAY_QUERY_FLAG_COHERENT.0 } else { 0 };
+    let filter = if mode.ask == Ask::First { Flags::RTC_RAY_QUERY_FLAG_INVOKE_ARGUMENT_FILTER.0 } else { 0 };
+    Flags(coherent | filter)
+}
+
+#[cfg(embree4)]
+fn intersect_arguments(context: *mut QueryContext<'_>, mode: Mode) -> sys::RTCIntersectArguments {
+    sys::RTCIntersectArguments {
+        flags: query_flags(mode),
+        context: context.cast(),
+        filter: Some(first_filter),
+        ..sys::rtcInitIntersectArguments()
+    }
+}
+
+#[cfg(embree4)]
+fn occluded_arguments(context: *mut QueryContext<'_>, mode: Mode) -> sys::RTCOccludedArguments {
+    sys::RTCOccludedArguments { flags: query_flags(mode), context: context.cast(), ..sys::rtcInitOccludedArguments() }
+}
+
+/// # Safety
+/// The scene is committed; the pointers are to live values that nothing else refers to; rays are finite and have a
+/// direction; ids are indices of the context's batch; the context was made with `mode`. So for all four.
+#[inline]
+#[cfg_attr(embree3, expect(unused_variables, reason = "the context holds the mode"))]
+pub(super) unsafe fn intersect1(
+    scene: sys::RTCScene,
+    context: *mut QueryContext<'_>,
+    mode: Mode,
+    ray: *mut sys::RTCRayHit,
+) {
+    // SAFETY: by the caller.
+    unsafe {
+        #[cfg(embree3)]
+        sys::rtcIntersect1(scene, context.cast(), ray);
+        #[cfg(embree4)]
+        sys::rtcIntersect1(scene, ray, &mut intersect_arguments(context, mode));
+    }
+}
+
+/// # Safety
+/// As [`intersect1`].
+#[inline]
+pub(super) unsafe fn occluded1(scene: sys::RTCScene, context: *mut QueryContext<'_>, ray: *mut sys::RTCRay) {
+    // SAFETY: by the caller.
+    unsafe {
+        #[cfg(embree3)]
+        sys::rtcOccluded1(scene, context.cast(), ray);
+        #[cfg(embree4)]
+        sys::rtcOccluded1(scene, ray, &mut occluded_arguments(context, Mode { ask: Ask::Any, coherent: false }));
+    }
+}
+
+/// N is 4 or 8; the context was made with `mode`.
+///
+/// # Safety
+/// As [`intersect1`], for the lanes that `valid` names.
+#[inline]
+#[cfg_attr(embree3, expect(unused_variables, reason = "the context holds the mode"))]
+pub(super) unsafe fn intersect_packet<const N: usize>(
+    scene: sys::RTCScene,
+    context: *mut QueryContext<'_>,
+    mode: Mode,
+    valid: &Valid<N>,
+    rays: &mut RayHitPacket<N>,
+) {
+    const { assert!(N == 4 || N == 8) };
+    let (valid, rays): (*const i32, *mut RayHitPacket<N>) = (valid.0.as_ptr(), rays);
+    // SAFETY: by the caller; the layouts are those of the header by the assertions above.
+    unsafe {
+        #[cfg(embree3)]
+        match N {
+            4 => sys::rtcIntersect4(valid, scene, context.cast(), rays.cast()),
+            _ => sys::rtcIntersect8(valid, scene, context.cast(), rays.cast()),
+        }
+        #[cfg(embree4)]
+        match N {
+            4 => sys::rtcIntersect4(valid, scene, rays.cast(), &mut intersect_arguments(context, mode)),
+            _ => sys::rtcIntersect8(valid, scene, rays.cast(), &mut intersect_arguments(context, mode)),
+        }
+    }
+}
+
+/// N is 4 or 8; the context was made with `mode`.
+///
+/// # Safety
+/// As [`intersect1`], for the lanes that `valid` names.
+#[inline]
+#[cfg_attr(embree3, expect(unused_variables, reason = "the context holds the mode"))]
+pub(super) unsafe fn occluded_packet<const N: usize>(
+    scene: sys::RTCScene,
+    context: *mut QueryContext<'_>,
+    mode: Mode,
+    valid: &Valid<N>,
+    rays: &mut RayPacket<N>,
+) {
+    const { assert!(N == 4 || N == 8) };
+    let (valid, rays): (*const i32, *mut RayPacket<N>) = (valid.0.as_ptr(), rays);
+    // SAFETY: by the caller; the layouts are those of the header by the assertions above.
+    unsafe {
+        #[cfg(embree3)]
+        match N {
+            4 => sys::rtcOccluded4(valid, scene, context.cast(), rays.cast()),
+            _ => sys::rtcOccluded8(valid, scene, context.cast(), rays.cast()),
+        }
+        #[cfg(embree4)]
+        match N {
+            4 => sys::rtcOccluded4(valid, scene, rays.cast(), &mut occluded_arguments(context, mode)),
+            _ => sys::rtcOccluded8(valid, scene, rays.cast(), &mut occluded_arguments(context, mode)),
+        }
+    }
+}

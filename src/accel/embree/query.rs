@@ -1,0 +1,231 @@
+//! Batches of rays to Embree's single rays and packets, and back.
+#![allow(unsafe_code)]
+
+use super::EmbreeAccel;
+use super::callbacks::{MAX_WIDTH, QueryContext};
+use super::kernels::{self, Ask, Mode, RayHitPacket, RayPacket, Valid};
+use super::world::{Refined, Reported};
+use crate::accel::{Coherence, Hit, RayBatch};
+use crate::geometry::Visibility;
+use embree4_sys as sys;
+
+/// Trials to leave the surface that a ray starts on.
+const MAX_RETRIES: u32 = 64;
+
+const FIRST_SINGLE: Mode = Mode { ask: Ask::First, coherent: false };
+pub(super) const ANY_SINGLE: Mode = Mode { ask: Ask::Any, coherent: false };
+
+impl EmbreeAccel {
+    pub(super) fn intersect_batch(&self, rays: &RayBatch, coherence: Coherence, hits: &mut Vec<Option<Hit>>) {
+        hits.clear();
+        hits.resize(rays.len(), None);
+        let mode = Mode { ask: Ask::First, coherent: coherence == Coherence::Coherent };
+        // Without a common frustum Embree traces the rays of a packet one by one for first hits, only slower.
+        match if mode.coherent { self.width_for(coherence) } else { 1 } {
+            4 => self.intersect_packets::<4>(rays, mode, hits),
+            8 => self.intersect_packets::<8>(rays, mode, hits),
+            _ => self.intersect_singly(rays, hits),
+        }
+    }
+
+    pub(super) fn occluded_batch(&self, rays: &RayBatch, coherence: Coherence, occluded: &mut Vec<bool>) {
+        occluded.clear();
+        occluded.reserve(rays.len());
+        let mode = Mode { ask: Ask::Any, coherent: coherence == Coherence::Coherent };
+        match self.width_for(coherence) {
+            4 => self.occluded_packets::<4>(rays, mode, occluded),
+            8 => self.occluded_packets::<8>(rays, mode, occluded),
+            _ => self.occluded_singly(rays, occluded),
+        }
+    }
+
+    fn width_for(&self, coherence: Coherence) -> usize {
+        if coherence == Coherence::Incoherent || self.has_motion { 1 } else { self.width }
+    }
+
+    fn intersect_singly(&self, rays: &RayBatch, hits: &mut [Option<Hit>]) {
+        let mut context = QueryContext::new(&self.world, rays, FIRST_SINGLE);
+        for base in (0..rays.len()).step_by(MAX_WIDTH) {
+            // Each ray is a lane of its own, so that the exact hits are computed side by side.
+            context.begin(base);
+            for i in base..rays.len().min(base + MAX_WIDTH) {
+                self.trace_one(&mut context, i, kernels::T_NEAR);
+            }
+            self.finish::<MAX_WIDTH>(&mut context, base, hits);
+        }
+        context.finish();
+    }
+
+    fn intersect_packets<const N: usize>(&self, rays: &RayBatch, mode: Mode, hits: &mut [Option<Hit>]) {
+        let mut packet = RayHitPacket::<N>::new(Visibility::PATH.0);
+        let mut context = QueryContext::new(&self.world, rays, mode);
+        for base in (0..rays.len()).step_by(N) {
+            let valid = load(&mut packet.rays, rays, base);
+            packet.geometry = [sys::RTC_INVALID_GEOMETRY_ID; N];
+            packet.instance = [sys::RTC_INVALID_GEOMETRY_ID; N];
+            context.begin(base);
+            // SAFETY: the scene is committed, the lanes in `valid` are finite, ids are indices of the batch.
+            unsafe { kernels::intersect_packet(self.root.raw(), &mut context, mode, &valid, &mut packet) };
+            self.finish::<N>(&mut context, base, hits);
+        }
+        context.finish();
+    }
+
+    /// Traces ray `i` beyond `tnear`; the hit is left in the lane of the context that belongs to `i`.
+    #[inline]
+    fn trace_one(&self, context: &mut QueryContext<'_>, i: usize, tnear: f32) {
+        let rays = context.rays;
+        let (o, d) = ([rays.ox[i], rays.oy[i], rays.oz[i]], [rays.dx[i], rays.dy[i], rays.dz[i]]);
+        if !can_trace(o, d, rays.t_max[i]) {
+            return;
+        }
+        let mut query = sys::RTCRayHit { ray: single_ray(rays, i, Visibility::PATH), ..Default::default() };
+        query.ray.tnear = tnear;
+        query.hit.geomID = sys::RTC_INVALID_GEOMETRY_ID;
+        query.hit.instID = [sys::RTC_INVALID_GEOMETRY_ID];
+        // SAFETY: the scene is committed, the ray is finite and its id is `i`.
+        unsafe { kernels::intersect1(self.root.raw(), context, FIRST_SINGLE, &mut query) };
+    }
+
+    /// Turns what the context collected of N rays into exact hits.
+    #[inline]
+    fn finish<const N: usize>(&self, context: &mut QueryContext<'_>, base: usize, hits: &mut [Option<Hit>]) {
+        let count = N.min(context.rays.len() - base);
+        let exact = self.world.refine_lanes::<N>(context.rays, base, &context.first);
+        for (lane, first) in context.first.iter().enumerate().take(count) {
+            let slot = &mut hits[base + lane];
+            if let Some(hit) = exact.hit(lane, first.primitive) {
+                *slot = Some(hit);
+            } else if first.geometry != u32::MAX {
+                *slot = self.refine_one(context.rays, base + lane, *first);
+            }
+        }
+    }
+
+    /// The exact hit of ray `i`, for which Embree reported `first`. If that is the surface that the ray left, the ray goes
+    /// on behind it.
+    #[cold]
+    fn refine_one(&self, rays: &RayBatch, i: usize, mut first: Reported) -> Option<Hit> {
+        let ray = rays.get(i);
+        let mut context = QueryContext::new(&self.world, rays, FIRST_SINGLE);
+        let mut exact = self.world.refine(&ray, &first);
+        for _ in 0..MAX_RETRIES {
+            if exact != Refined::Behind {
+                break;
+            }
+            context.begin(i);
+            self.trace_one(&mut context, i, first.t.next_up().max(kernels::T_NEAR));
+            first = context.first[0];
+            if first.geometry == u32::MAX {
+                break;
+            }
+            exact = self.world.refine(&ray, &first);
+        }
+        context.finish();
+        match exact {
+            Refined::Hit(hit) => Some(hit),
+            Refined::Behind | Refined::Beyond => None,
+        }
+    }
+
+    fn occluded_singly(&self, rays: &RayBatch, occluded: &mut Vec<bool>) {
+        let mut context = QueryContext::new(&self.world, rays, ANY_SINGLE);
+        occluded.extend((0..rays.len()).map(|i| {
+            let o = [rays.ox[i], rays.oy[i], rays.oz[i]];
+            if !can_trace(o, [rays.dx[i], rays.dy[i], rays.dz[i]], rays.t_max[i]) {
+                return false;
+            }
+            let mut query = single_ray(rays, i, Visibility::SHADOW);
+            // SAFETY: the scene is committed, the ray is finite and its id is `i`.
+            unsafe { kernels::occluded1(self.root.raw(), &mut context, &mut query) };
+            query.tfar < 0.0
+        }));
+        context.finish();
+    }
+
+    fn occluded_packets<const N: usize>(&self, rays: &RayBatch, mode: Mode, occluded: &mut Vec<bool>) {
+        let mut packet = RayPacket::<N>::new(Visibility::SHADOW.0);
+        let mut context = QueryContext::new(&self.world, rays, mode);
+        for base in (0..rays.len()).step_by(N) {
+            let valid = load(&mut packet, rays, base);
+            // SAFETY: the scene is committed, the lanes in `valid` are finite, ids are indices of the batch.
+            unsafe { kernels::occluded_packet(self.root.raw(), &mut context, mode, &valid, &mut packet) };
+            let count = N.min(rays.len() - base);
+            occluded.extend((0..count).map(|lane| valid.0[lane] != 0 && packet.tfar[lane] < 0.0));
+        }
+        context.finish();
+    }
+}
+
+/// Ray `i` as Embree wants it.
+#[inline]
+pub(super) fn single_ray(rays: &RayBatch, i: usize, visibility: Visibility) -> sys::RTCRay {
+    sys::RTCRay {
+        org_x: rays.ox[i],
+        org_y: rays.oy[i],
+        org_z: rays.oz[i],
+        tnear: kernels::T_NEAR,
+        dir_x: rays.dx[i],
+        dir_y: rays.dy[i],
+        dir_z: rays.dz[i],
+        time: unit_time(rays.time[i]),
+        tfar: rays.t_max[i],
+        mask: visibility.0,
+        id: i as u32,
+        flags: 0,
+    }
+}
+
+/// Fills a packet from ray `base` on; what is −1 in the result holds a ray that can be traced.
+#[inline]
+pub(super) fn load<const N: usize>(packet: &mut RayPacket<N>, rays: &RayBatch, base: usize) -> Valid<N> {
+    let count = N.min(rays.len() - base);
+    let ([ox, oy, oz], [dx, dy, dz]) = (&mut packet.o, &mut packet.d);
+    let fields = [
+        (ox, &rays.ox),
+        (oy, &rays.oy),
+        (oz, &rays.oz),
+        (dx, &rays.dx),
+        (dy, &rays.dy),
+        (dz, &rays.dz),
+        (&mut packet.tfar, &rays.t_max),
+        (&mut packet.time, &rays.time),
+    ];
+    for (lanes, values) in fields {
+        if count == N {
+            lanes.copy_from_slice(&values[base..base + N]);
+        } else {
+            lanes[..count].copy_from_slice(&values[base..base + count]);
+        }
+    }
+    let mut valid = Valid([0; N]);
+    for lane in 0..N {
+        packet.time[lane] = unit_time(packet.time[lane]);
+        packet.id[lane] = (base + lane) as u32;
+        let (o, d) = (packet.o.map(|row| row[lane]), packet.d.map(|row| row[lane]));
+        valid.0[lane] = -i32::from(can_trace(o, d, packet.tfar[lane]) & (lane < count));
+    }
+    if valid.0 != [-1; N] {
+        // Where the processor has no packets of this width, Embree 3.13 traces all lanes, `valid` or not.
+        for lane in (0..N).filter(|&lane| valid.0[lane] == 0) {
+            (packet.o[0][lane], packet.o[1][lane], packet.o[2][lane]) = (0.0, 0.0, 0.0);
+            (packet.d[0][lane], packet.d[1][lane], packet.d[2][lane]) = (0.0, 0.0, 1.0);
+            packet.tfar[lane] = f32::NEG_INFINITY;
+        }
+    }
+    valid
+}
+
+/// True if the ray is finite, has a direction and is not empty. Anything else may confuse the traversal.
+#[inline]
+pub(super) fn can_trace(o: [f32; 3], d: [f32; 3], t_max: f32) -> bool {
+    // x·0 is NaN if x is not finite, which no sum repairs.
+    let zero = o[0] * 0.0 + o[1] * 0.0 + o[2] * 0.0 + d[0] * 0.0 + d[1] * 0.0 + d[2] * 0.0;
+    (zero == 0.0) & (t_max > 0.0) & ((d[0] != 0.0) | (d[1] != 0.0) | (d[2] != 0.0))
+}
+
+/// `time` in 0..=1; 0 if it is not a number.
+#[inline]
+fn unit_time(time: f32) -> f32 {
+    if time > 0.0 { time.min(1.0) } else { 0.0 }
+}

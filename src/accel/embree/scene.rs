@@ -1,0 +1,230 @@
+//! Geometries and scenes.
+#![allow(unsafe_code)]
+
+use super::EmbreeError;
+use super::callbacks::{self, GeometryContext};
+use super::device::Device;
+use crate::geometry::{GeometryId, GeometrySet, Instance, Shape};
+use crate::math::Affine3A;
+use embree4_sys as sys;
+use embree4_sys::{RTCBufferType, RTCFormat, RTCGeometryType, RTCSceneFlags};
+use std::ffi::c_void;
+use std::sync::Arc;
+
+/// Rays of any kind may enter an instance; its members have masks of their own.
+const INSTANCE_MASK: u32 = u32::MAX;
+
+/// The scene flag that lets a query bring a filter.
+#[cfg(embree3)]
+const QUERY_FILTER: RTCSceneFlags = RTCSceneFlags::RTC_SCENE_FLAG_CONTEXT_FILTER_FUNCTION;
+#[cfg(embree4)]
+const QUERY_FILTER: RTCSceneFlags = RTCSceneFlags::RTC_SCENE_FLAG_FILTER_FUNCTION_IN_ARGUMENTS;
+
+/// A geometry that is being described.
+pub(super) struct EmbreeGeometry {
+    raw: sys::RTCGeometry,
+    device: Arc<Device>,
+    /// What the geometry's callbacks read; moves into the scene.
+    context: Option<Arc<GeometryContext>>,
+}
+
+impl EmbreeGeometry {
+    pub(super) fn new(device: &Arc<Device>, kind: RTCGeometryType) -> Result<Self, EmbreeError> {
+        // SAFETY: the device is live.
+        let raw = unsafe { sys::rtcNewGeometry(device.raw(), kind) };
+        let geometry = EmbreeGeometry { raw, device: Arc::clone(device), context: None };
+        device.check("create a geometry")?;
+        Ok(geometry)
+    }
+
+    /// The geometry of a shape, whose buffers it shares. The scene that it is attached to must hold `set`.
+    fn of_shape(
+        device: &Arc<Device>,
+        set: &GeometrySet,
+        id: GeometryId,
+        context: Arc<GeometryContext>,
+    ) -> Result<Self, EmbreeError> {
+        let geometry = &set.geometries[id as usize];
+        let mut result = match &geometry.shape {
+            Shape::Mesh(mesh) => {
+                let result = Self::new(device, RTCGeometryType::RTC_GEOMETRY_TYPE_TRIANGLE)?;
+                let (positions, indices) = (mesh.padded_positions(), &mesh.indices);
+                result.share(RTCBufferType::RTC_BUFFER_TYPE_VERTEX, positions.as_ptr(), mesh.positions().len())?;
+                result.share(RTCBufferType::RTC_BUFFER_TYPE_INDEX, indices.as_ptr(), indices.len())?;
+                result
+            }
+            Shape::Quadric(_) => Self::user(device, 1)?,
+            Shape::Bilinear(mesh) => Self::user(device, mesh.patch_count())?,
+        };
+        let user: *mut c_void = Arc::as_ptr(&context).cast_mut().cast();
+        // SAFETY: the geometry, then the scene keeps the context, so it outlives the callbacks, which only read it. Filters
+        // serve triangles only: the callbacks of other shapes ask the alpha test themselves.
+        unsafe {
+            sys::rtcSetGeometryUserData(result.raw, user);
+            if context.has_alpha() && matches!(geometry.shape, Shape::Mesh(_)) {
+                sys::rtcSetGeometryIntersectFilterFunction(result.raw, Some(callbacks::alpha_filter));
+                sys::rtcSetGeometryOccludedFilterFunction(result.raw, Some(callbacks::alpha_filter));
+            }
+            sys::rtcSetGeometryMask(result.raw, geometry.visibility.0);
+            sys::rtcSetGeometryBuildQuality(result.raw, sys::RTCBuildQuality::RTC_BUILD_QUALITY_MEDIUM);
+        }
+        result.context = Some(context);
+        result.commit()?;
+        Ok(result)
+    }
+
+    /// Shares a buffer of `count` elements of three words each.
+    pub(super) fn share<T>(&self, kind: RTCBufferType, data: *const T, count: usize) -> Result<(), EmbreeError> {
+        const { assert!(size_of::<T>() == 12) };
+        let vertex = kind == RTCBufferType::RTC_BUFFER_TYPE_VERTEX;
+        let format = if vertex { RTCFormat::RTC_FORMAT_FLOAT3 } else { RTCFormat::RTC_FORMAT_UINT3 };
+        // SAFETY: Embree stores the pointer. The scene keeps the mesh, vertices are followed by an element of padding,
+        // and indices are in range by the mesh's construction.
+        unsafe { sys::rtcSetSharedGeometryBuffer(self.raw, kind, 0, format, data.cast(), 0, 12, count) };
+        self.device.check("share a buffer of a mesh")
+    }
+
+    /// A geometry of `count` primitives that callbacks intersect.
+    fn user(device: &Arc<Device>, count: usize) -> Result<Self, EmbreeError> {
+        let count = u32::try_from(count).map_err(|_| EmbreeError::TooManyPrimitives)?;
+        let result = Self::new(device, RTCGeometryType::RTC_GEOMETRY_TYPE_USER)?;
+        // SAFETY: the geometry is live; the callbacks get the user data, which is set before the commit.
+        unsafe {
+            sys::rtcSetGeometryUserPrimitiveCount(result.raw, count);
+            sys::rtcSetGeometryBoundsFunction(result.raw, Some(callbacks::bounds), std::ptr::null_mut());
+            sys::rtcSetGeometryIntersectFunction(result.raw, Some(callbacks::intersect));
+            sys::rtcSetGeometryOccludedFunction(result.raw, Some(callbacks::occluded));
+        }
+        device.check("describe a quadric or patches")?;
+        Ok(result)
+    }
+
+    /// A placement of a group's scene.
+    fn placing(device: &Arc<Device>, group: &EmbreeScene, instance: &Instance) -> Result<Self, EmbreeError> {
+        let result = Self::new(device, RTCGeometryType::RTC_GEOMETRY_TYPE_INSTANCE)?;
+        let samples = &instance.world_from_group;
+        // SAFETY: both handles are live; each matrix is read during its call: 12 floats, column by column.
+        unsafe {
+            sys::rtcSetGeometryInstancedScene(result.raw, group.raw);
+            if samples.len() > 1 {
+                let count = u32::try_from(samples.len()).unwrap_or(u32::MAX);
+                sys::rtcSetGeometryTimeStepCount(result.raw, count);
+            }
+            for (step, world_from_group) in (0_u32..).zip(samples) {
+                let columns = world_from_group.to_cols_array();
+                let format = RTCFormat::RTC_FORMAT_FLOAT3X4_COLUMN_MAJOR;
+                sys::rtcSetGeometryTransform(result.raw, step, format, columns.as_ptr().cast());
+            }
+            sys::rtcSetGeometryMask(result.raw, INSTANCE_MASK);
+        }
+        result.commit()?;
+        Ok(result)
+    }
+
+    fn commit(&self) -> Result<(), EmbreeError> {
+        // SAFETY: the geometry is live.
+        unsafe { sys::rtcCommitGeometry(self.raw) };
+        self.device.check("commit a geometry")
+    }
+}
+
+impl Drop for EmbreeGeometry {
+    fn drop(&mut self) {
+        if !self.raw.is_null() {
+            // SAFETY: released once; a scene that it was attached to holds a reference of its own.
+            unsafe { sys::rtcReleaseGeometry(self.raw) };
+        }
+    }
+}
+
+/// A scene, with all that Embree holds pointers to.
+pub(super) struct EmbreeScene {
+    raw: sys::RTCScene,
+    device: Arc<Device>,
+    /// User data of the geometries.
+    contexts: Vec<Arc<GeometryContext>>,
+    /// Placed scenes.
+    groups: Vec<Arc<EmbreeScene>>,
+    /// Owner of the shared buffers.
+    _set: Arc<GeometrySet>,
+}
+
+// SAFETY: after the commit, queries may run on any number of threads at once; before it, only the builder has the scene.
+unsafe impl Send for EmbreeScene {}
+// SAFETY: as above. The contexts are read only.
+unsafe impl Sync for EmbreeScene {}
+
+impl EmbreeScene {
+    /// An empty scene; `query_filter` tells whether queries bring a filter.
+    pub fn new(device: &Arc<Device>, set: &Arc<GeometrySet>, query_filter: bool) -> Result<Self, EmbreeError> {
+        // SAFETY: the device is live.
+        let raw = unsafe { sys::rtcNewScene(device.raw()) };
+        let scene = EmbreeScene {
+            raw,
+            device: Arc::clone(device),
+            contexts: Vec::new(),
+            groups: Vec::new(),
+            _set: Arc::clone(set),
+        };
+        device.check("create a scene")?;
+        let query_filter = if query_filter { QUERY_FILTER.0 } else { 0 };
+        let flags = RTCSceneFlags(RTCSceneFlags::RTC_SCENE_FLAG_ROBUST.0 | query_filter);
+        // SAFETY: the scene is live.
+        unsafe {
+            sys::rtcSetSceneFlags(raw, flags);
+            sys::rtcSetSceneBuildQuality(raw, sys::RTCBuildQuality::RTC_BUILD_QUALITY_MEDIUM);
+        }
+        Ok(scene)
+    }
+
+    /// Adds a shape; ids count from 0 in the order of the calls.
+    pub fn add_shape(&mut self, id: GeometryId, context: GeometryContext) -> Result<(), EmbreeError> {
+        let set = Arc::clone(&self._set);
+        let geometry = EmbreeGeometry::of_shape(&self.device, &set, id, Arc::new(context))?;
+        self.attach(geometry)
+    }
+
+    /// Adds a placement of a committed scene.
+    pub fn add_instance(&mut self, group: &Arc<EmbreeScene>, instance: &Instance) -> Result<(), EmbreeError> {
+        let geometry = EmbreeGeometry::placing(&self.device, group, instance)?;
+        if self.groups.last().is_none_or(|last| !Arc::ptr_eq(last, group)) {
+            self.groups.push(Arc::clone(group));
+        }
+        self.attach(geometry)
+    }
+
+    fn attach(&mut self, mut geometry: EmbreeGeometry) -> Result<(), EmbreeError> {
+        self.contexts.extend(geometry.context.take());
+        // SAFETY: both are live; the scene takes a reference.
+        unsafe { sys::rtcAttachGeometry(self.raw, geometry.raw) };
+        self.device.check("attach a geometry")
+    }
+
+    /// Builds the hierarchy, on all cores.
+    pub fn commit(&self) -> Result<(), EmbreeError> {
+        // SAFETY: the scene is live and nobody queries it yet.
+        unsafe { sys::rtcCommitScene(self.raw) };
+        self.device.check("build a scene")
+    }
+
+    pub fn raw(&self) -> sys::RTCScene {
+        self.raw
+    }
+}
+
+impl Drop for EmbreeScene {
+    fn drop(&mut self) {
+        if !self.raw.is_null() {
+            // SAFETY: released once. Fields are dropped after this, so what the scene points to outlives it; a scene
+            // that places this one holds it by `Arc`.
+            unsafe { sys::rtcReleaseScene(self.raw) };
+        }
+    }
+}
+
+/// True if Embree can place a group so: finite, and with an inverse if it stands still.
+pub(super) fn can_place(instance: &Instance) -> bool {
+    let samples = &instance.world_from_group;
+    let flat = samples.len() == 1 && !samples[0].inverse().is_finite();
+    !samples.is_empty() && !flat && samples.iter().all(Affine3A::is_finite)
+}

@@ -1,0 +1,507 @@
+//! Against the pure-Rust tracer, and packets against single rays.
+
+use super::*;
+use crate::accel::Bvh;
+use crate::geometry::{BilinearMesh, Geometry, Group, Instance, Quadric, QuadricKind, Shape, TriangleMesh, Visibility};
+use crate::math::hash::HashStream;
+use crate::math::ray::offset_origin;
+use crate::math::{Affine3A, Frame, Quat, Ray, Vec2, Vec3, warp};
+
+use std::ffi::CStr;
+
+const WIDTHS: [u32; 3] = [1, 4, 8];
+const COHERENCES: [Coherence; 3] = [Coherence::Coherent, Coherence::Packets, Coherence::Incoherent];
+
+struct Stripes;
+
+impl AlphaSource for Stripes {
+    fn alpha(&self, texture: u32, uv: Vec2, p: Vec3) -> f32 {
+        match texture {
+            0 => 0.0,
+            1 => 0.4,
+            2 => ((uv.x * 8.0) as i32 % 2) as f32,
+            _ => (p.x * 4.0).sin() * 0.5 + 0.5,
+        }
+    }
+}
+
+fn random_point(s: &mut HashStream) -> Vec3 {
+    Vec3::new(s.next_f32(), s.next_f32(), s.next_f32()) * 2.0 - 1.0
+}
+
+fn opaque(shape: Shape) -> Geometry {
+    Geometry { shape, alpha: None, visibility: Visibility::ALL }
+}
+
+fn only_root(shapes: Vec<Shape>) -> Arc<GeometrySet> {
+    let root = Group { geometries: (0..shapes.len() as u32).collect() };
+    Arc::new(GeometrySet { geometries: shapes.into_iter().map(opaque).collect(), root, ..GeometrySet::default() })
+}
+
+fn separate_triangles(corners: Vec<Vec3>) -> TriangleMesh {
+    let count = corners.len() as u32 / 3;
+    TriangleMesh::new(corners, (0..count).map(|i| [3 * i, 3 * i + 1, 3 * i + 2]).collect()).unwrap()
+}
+
+fn soup(s: &mut HashStream, triangles: u32, size: f32) -> TriangleMesh {
+    let mut corners = Vec::new();
+    for _ in 0..triangles {
+        let center = random_point(s);
+        corners.extend((0..3).map(|_| center + random_point(s) * size));
+    }
+    separate_triangles(corners)
+}
+
+/// Triangles that lie on each other in a few planes, some of them along the axes.
+fn coplanar(s: &mut HashStream, triangles: u32) -> TriangleMesh {
+    let mut corners = Vec::new();
+    for k in 0..triangles {
+        let plane = (k % 8) as f32;
+        for _ in 0..3 {
+            let p = random_point(s);
+            let z =
+                if plane < 4.0 { plane * 0.2 - 0.3 } else { p.x * 0.037 * plane + p.y * 0.05 * plane - 0.2 * plane };
+            corners.push(Vec3::new(p.x, p.y, z));
+        }
+    }
+    separate_triangles(corners)
+}
+
+/// A closed surface of about 2·n² triangles with shared vertices.
+fn rippled_sphere(n: u32) -> TriangleMesh {
+    use std::f32::consts::{PI, TAU};
+    let point = |i: u32, j: u32| {
+        let (theta, phi) = (PI * j as f32 / n as f32, TAU * (i % n) as f32 / n as f32);
+        let d = Vec3::new(theta.sin() * phi.cos(), theta.sin() * phi.sin(), theta.cos());
+        d * (1.0 + 0.05 * (d.x * 17.0).sin() * (d.y * 13.0).cos())
+    };
+    let positions = (0..=n).flat_map(|j| (0..n).map(move |i| point(i, j))).collect();
+    let quad = |i: u32, j: u32| {
+        let (a, b) = (j * n + i, j * n + (i + 1) % n);
+        [[a, a + n, b + n], [a, b + n, b]]
+    };
+    TriangleMesh::new(positions, (0..n).flat_map(|j| (0..n).flat_map(move |i| quad(i, j))).collect()).unwrap()
+}
+
+fn random_placement(s: &mut HashStream) -> Affine3A {
+    let rotation = Quat::from_axis_angle(random_point(s).normalize_or(Vec3::X), s.next_f32() * 6.0);
+    let scale = Vec3::splat(0.3) + random_point(s).abs() * 0.5;
+    Affine3A::from_scale_rotation_translation(scale, rotation, random_point(s) * 2.0)
+}
+
+fn random_quadric(s: &mut HashStream, kind: u32) -> Shape {
+    let (radius, phi_max) = (0.3, 1.0 + 5.0 * s.next_f32());
+    let kind = match kind % 3 {
+        0 => QuadricKind::Sphere { radius, z_min: -0.3, z_max: 0.2, phi_max },
+        1 => QuadricKind::Disk { height: 0.1, radius, inner_radius: 0.05, phi_max },
+        _ => QuadricKind::Cylinder { radius, z_min: -0.5, z_max: 0.5, phi_max },
+    };
+    let group_from_local = random_placement(s);
+    let local_from_group = group_from_local.inverse();
+    Shape::Quadric(Quadric { kind, group_from_local, local_from_group, flip_normal: false })
+}
+
+fn random_patches(s: &mut HashStream, count: u32) -> Shape {
+    let mut positions = Vec::new();
+    for _ in 0..count {
+        let center = random_point(s);
+        positions.extend((0..4).map(|_| center + random_point(s) * 0.4));
+    }
+    let indices = (0..count).map(|i| [4 * i, 4 * i + 1, 4 * i + 2, 4 * i + 3]).collect();
+    Shape::Bilinear(BilinearMesh { positions, indices, ..BilinearMesh::default() })
+}
+
+/// All kinds of shapes, some cut out or hidden from some rays, in the root and in instances with up to `samples` times.
+fn mixed_scene(seed: u32, samples: usize) -> Arc<GeometrySet> {
+    let mut s = HashStream::new([seed, 77, 0]);
+    let mut geometries = Vec::new();
+    for k in 0..24_u32 {
+        let shape = match k % 4 {
+            0 => Shape::Mesh(soup(&mut s, 1 + 40 * (k % 5), 0.2)),
+            1 => Shape::Mesh(rippled_sphere(8 + k)),
+            2 => random_quadric(&mut s, k / 4),
+            _ => random_patches(&mut s, 1 + k % 5),
+        };
+        let visibility = Visibility([3, 3, 1, 2, 0][k as usize * 7 % 5]);
+        let alpha = [None, None, Some(0), Some(1), Some(2), Some(3)][k as usize * 5 % 6];
+        geometries.push(Geometry { shape, alpha, visibility });
+    }
+    let groups =
+        vec![Group { geometries: (8..16).collect() }, Group { geometries: (16..24).collect() }, Group::default()];
+    let instances = (0..9_u32)
+        .map(|k| {
+            let first = random_placement(&mut s);
+            let moved = |i: usize| Affine3A::from_translation(Vec3::X * i as f32 * 0.4) * first;
+            Instance { group: k % 3, world_from_group: (0..1 + k as usize % samples).map(moved).collect() }
+        })
+        .collect();
+    Arc::new(GeometrySet { geometries, groups, root: Group { geometries: (0..8).collect() }, instances })
+}
+
+fn random_rays(count: usize, seed: u32) -> RayBatch {
+    let mut s = HashStream::new([seed, 5, 5]);
+    let mut rays = RayBatch::default();
+    for k in 0..count {
+        let o = random_point(&mut s) * 3.0;
+        let mut d = random_point(&mut s) * 2.0 - o;
+        if k % 10 == 0 {
+            d = Vec3::ZERO.with_x(if k % 20 == 0 { 1.0 } else { -1.0 });
+        }
+        let t_max = if k % 3 == 0 { s.next_f32() * 1.5 } else { f32::INFINITY };
+        rays.push(&Ray { o, d, t_max, time: s.next_f32() });
+    }
+    rays
+}
+
+/// Rays of a camera at (0.05, 0.02, 2.3), in tiles of 4 by 4 pixels.
+fn camera_rays(side: usize) -> RayBatch {
+    let mut rays = RayBatch::default();
+    for (tile_y, tile_x) in (0..side / 4).flat_map(|y| (0..side / 4).map(move |x| (y, x))) {
+        for k in 0..16 {
+            let at = |tile: usize, k: usize| ((tile * 4 + k) as f32 + 0.5) / side as f32 * 1.4 - 0.7;
+            let d = Vec3::new(at(tile_x, k % 4), at(tile_y, k / 4), -1.0).normalize();
+            rays.push(&Ray { o: Vec3::new(0.05, 0.02, 2.3), d, t_max: f32::INFINITY, time: 0.25 });
+        }
+    }
+    rays
+}
+
+/// Rays at edges (or vertices) of the mesh from a few points; 16 in a row start at one point.
+fn aimed_rays(mesh: &TriangleMesh, count: usize, seed: u32, vertices: bool) -> RayBatch {
+    let mut s = HashStream::new([seed, 6, 6]);
+    let (mut rays, mut o) = (RayBatch::default(), Vec3::ZERO);
+    for k in 0..count {
+        if k % 16 == 0 {
+            o = random_point(&mut s) * 2.0 + Vec3::Z * 1.5;
+        }
+        let triangle = (s.next_f32() * mesh.triangle_count() as f32) as usize % mesh.triangle_count();
+        let [a, b, _] = mesh.triangle(triangle);
+        let w = if vertices { 0.0 } else { s.next_f32() };
+        let d = (a + (b - a) * w - o).normalize();
+        rays.push(&Ray { o, d, t_max: f32::INFINITY, time: 0.5 });
+    }
+    rays
+}
+
+/// Rays almost along the planes z = const.
+fn grazing_rays(count: usize, seed: u32) -> RayBatch {
+    let mut s = HashStream::new([seed, 7, 7]);
+    let mut rays = RayBatch::default();
+    for _ in 0..count {
+        let (sin, cos) = (s.next_f32() * std::f32::consts::TAU).sin_cos();
+        let o = random_point(&mut s) * Vec3::new(1.0, 1.0, 0.3);
+        rays.push(&Ray { o, d: Vec3::new(cos, sin, (s.next_f32() - 0.5) * 0.02), t_max: f32::INFINITY, time: 0.1 });
+    }
+    rays
+}
+
+fn embree(set: &Arc<GeometrySet>, width: u32) -> EmbreeAccel {
+    configured(set, width, c"")
+}
+
+fn configured(set: &Arc<GeometrySet>, width: u32, config: &CStr) -> EmbreeAccel {
+    let options = EmbreeOptions { packet_width: Some(width), config: config.to_owned(), ..EmbreeOptions::default() };
+    EmbreeAccel::with_options(Arc::clone(set), Some(Arc::new(Stripes)), options).unwrap()
+}
+
+fn intersect(accel: &dyn Accel, rays: &RayBatch, coherence: Coherence) -> Vec<Option<Hit>> {
+    let mut hits = Vec::new();
+    accel.intersect(rays, coherence, &mut hits);
+    hits
+}
+
+fn occluded(accel: &dyn Accel, rays: &RayBatch, coherence: Coherence) -> Vec<bool> {
+    let mut bits = Vec::new();
+    accel.occluded(rays, coherence, &mut bits);
+    bits
+}
+
+/// A hit to the bit.
+fn bits(hit: &Option<Hit>) -> Option<[u32; 6]> {
+    hit.map(|h| [h.t.to_bits(), h.uv[0].to_bits(), h.uv[1].to_bits(), h.geometry, h.primitive, h.instance])
+}
+
+/// Asserts that all widths and hints give the same bits.
+fn assert_widths_agree(name: &str, set: &Arc<GeometrySet>, batches: &[RayBatch], config: &CStr) {
+    let accels = WIDTHS.map(|width| configured(set, width, config));
+    for (b, rays) in batches.iter().enumerate() {
+        let first = intersect(&accels[0], rays, Coherence::Incoherent);
+        let first_occluded = occluded(&accels[0], rays, Coherence::Incoherent);
+        assert!(first.iter().any(Option::is_some), "{name} {b}: nothing is hit");
+        for (accel, coherence) in accels.iter().flat_map(|a| COHERENCES.map(|c| (a, c))) {
+            let other = intersect(accel, rays, coherence);
+            let differing = (0..rays.len()).find(|&i| bits(&first[i]) != bits(&other[i]));
+            let what = differing.map(|i| format!("{:?} {:?} {:?}", rays.get(i), first[i], other[i]));
+            assert_eq!(what, None, "{name}, batch {b}, width {}, {coherence:?}", accel.width);
+            let other = occluded(accel, rays, coherence);
+            let differ = first_occluded.iter().zip(&other).filter(|(a, b)| a != b).count();
+            assert_eq!(differ, 0, "{name}, batch {b}, occlusion, width {}, {coherence:?}", accel.width);
+        }
+    }
+}
+
+fn ray_kinds(mesh: &TriangleMesh, count: usize) -> Vec<RayBatch> {
+    let side = (count as f32).sqrt() as usize / 4 * 4 + 5;
+    vec![
+        camera_rays(side),
+        random_rays(count, 1),
+        aimed_rays(mesh, count, 2, false),
+        aimed_rays(mesh, count, 3, true),
+        grazing_rays(count, 4),
+    ]
+}
+
+/// Asserts the same of many scenes, with `count` rays of each kind.
+fn assert_widths_agree_everywhere(count: usize, config: &CStr) {
+    let mut s = HashStream::new([1, 2, 3]);
+    let meshes = [
+        ("soup", soup(&mut s, 20_000, 0.1)),
+        ("crossing triangles", soup(&mut s, 300, 1.5)),
+        ("coplanar triangles", coplanar(&mut s, 400)),
+        ("closed surface", rippled_sphere(300)),
+    ];
+    for (name, mesh) in meshes {
+        let batches = ray_kinds(&mesh, count);
+        assert_widths_agree(name, &only_root(vec![Shape::Mesh(mesh)]), &batches, config);
+    }
+    for samples in [1, 3] {
+        let batches = ray_kinds(&rippled_sphere(12), count);
+        assert_widths_agree("shapes and instances", &mixed_scene(9, samples), &batches, config);
+    }
+}
+
+#[test]
+fn packets_of_any_width_answer_as_single_rays_do() {
+    assert_widths_agree_everywhere(20_003, c"");
+}
+
+#[test]
+fn packets_answer_as_single_rays_do_in_the_kernels_of_older_processors() {
+    for config in [c"isa=avx2", c"isa=avx", c"isa=sse4.2"] {
+        assert_widths_agree_everywhere(5_003, config);
+    }
+}
+
+#[test]
+fn answers_agree_with_the_rust_tracer() {
+    for (seed, samples) in [(1, 1), (2, 3), (3, 4)] {
+        let set = mixed_scene(seed, samples);
+        let reference = Bvh::new(Arc::clone(&set), Some(Arc::new(Stripes)));
+        let accel = embree(&set, 8);
+        let rays = random_rays(60_000, seed);
+        let (expected, found) =
+            (intersect(&reference, &rays, Coherence::Packets), intersect(&accel, &rays, Coherence::Packets));
+        let hits = expected.iter().flatten().count();
+        assert!(hits > 10_000, "{hits}");
+        // Rays by an edge may differ, and hits of the same t.
+        let differ = expected.iter().zip(&found).filter(|(a, b)| bits(a) != bits(b)).count();
+        assert!(differ <= 3, "{differ} of {hits}");
+        let (expected, found) =
+            (occluded(&reference, &rays, Coherence::Packets), occluded(&accel, &rays, Coherence::Packets));
+        assert!(expected.iter().filter(|&&o| o).count() > 5_000);
+        let differ = expected.iter().zip(&found).filter(|(a, b)| a != b).count();
+        assert!(differ <= 3, "{differ}");
+    }
+}
+
+/// Möller–Trumbore in f64.
+fn reference_hit(ray: &Ray, [p0, p1, p2]: [Vec3; 3]) -> Option<[f64; 3]> {
+    let [p0, p1, p2] = [p0, p1, p2].map(Vec3::as_dvec3);
+    let (o, d) = (ray.o.as_dvec3(), ray.d.as_dvec3());
+    let (e1, e2) = (p1 - p0, p2 - p0);
+    let q = d.cross(e2);
+    let det = e1.dot(q);
+    let s = o - p0;
+    let (b1, b2, t) = (s.dot(q) / det, d.dot(s.cross(e1)) / det, e2.dot(s.cross(e1)) / det);
+    (b1 >= 0.0 && b2 >= 0.0 && b1 + b2 <= 1.0 && t > 0.0 && t < f64::from(ray.t_max)).then_some([t, b1, b2])
+}
+
+#[test]
+fn answers_agree_with_brute_force_in_f64() {
+    let mut s = HashStream::new([4, 0, 1]);
+    let mesh = soup(&mut s, 300, 0.4);
+    let set = only_root(vec![Shape::Mesh(mesh.clone())]);
+    let accel = embree(&set, 8);
+    let rays = random_rays(20_000, 8);
+    let (hits, shadows) = (intersect(&accel, &rays, Coherence::Packets), occluded(&accel, &rays, Coherence::Packets));
+    let (mut hit_count, mut unclear) = (0, 0);
+    for (i, (hit, &shadow)) in hits.iter().zip(&shadows).enumerate() {
+        let ray = rays.get(i);
+        let all = (0..mesh.triangle_count()).filter_map(|k| reference_hit(&ray, mesh.triangle(k)).map(|h| (k, h)));
+        let first = all.min_by(|a, b| a.1[0].total_cmp(&b.1[0]));
+        assert_eq!(hit.is_some(), shadow);
+        match (hit, first) {
+            (None, None) => {}
+            (Some(hit), Some((k, [t, b1, b2]))) if hit.primitive == k as u32 => {
+                hit_count += 1;
+                let scale = f64::from(ray.o.length() / ray.d.length()) + t;
+                assert!((f64::from(hit.t) - t).abs() < 2e-4 * scale, "{hit:?} {t}");
+                let error = (f64::from(hit.uv[0]) - b1).abs().max((f64::from(hit.uv[1]) - b2).abs());
+                assert!(error < 2e-2, "{hit:?} {b1} {b2}");
+            }
+            _ => unclear += 1,
+        }
+    }
+    assert!(hit_count > 5000 && unclear <= 2, "{hit_count} {unclear}");
+}
+
+#[test]
+fn rays_that_leave_a_surface_do_not_meet_it_again() {
+    let mut s = HashStream::new([12, 0, 0]);
+    let mut tested = 0;
+    for k in 0..60 {
+        let (center, scale) = (random_point(&mut s) * 300.0, [0.01, 1.0, 50.0, 2000.0][k % 4]);
+        let corners = (0..3).map(|_| center + random_point(&mut s) * scale).collect();
+        let set = only_root(vec![Shape::Mesh(separate_triangles(corners))]);
+        let accel = embree(&set, 8);
+        let mut rays = RayBatch::default();
+        for _ in 0..20_000 {
+            let u = s.next_2d();
+            let uv = if u[0] + u[1] > 1.0 { [1.0 - u[0], 1.0 - u[1]] } else { u };
+            let hit = set.surface_hit(0, 0, Hit::NO_INSTANCE, uv, 0.0);
+            let side = if s.next_f32() < 0.5 { hit.n } else { -hit.n };
+            let d = Frame::from_z(side).to_world(warp::sample_cosine_hemisphere(s.next_2d()));
+            if hit.n.dot(d).abs() > 1e-4 {
+                rays.push(&Ray { o: offset_origin(hit.p, hit.p_error, hit.n, d), d, t_max: f32::INFINITY, time: 0.0 });
+            }
+        }
+        tested += rays.len();
+        for coherence in [Coherence::Packets, Coherence::Incoherent] {
+            let again = intersect(&accel, &rays, coherence).iter().flatten().count();
+            let shadowed = occluded(&accel, &rays, coherence).iter().filter(|&&o| o).count();
+            assert_eq!((again, shadowed), (0, 0), "triangle {k} of size {scale}");
+        }
+    }
+    assert!(tested > 1_000_000);
+}
+
+#[test]
+fn an_empty_scene_stops_nothing() {
+    let set = Arc::new(GeometrySet {
+        groups: vec![Group::default()],
+        instances: vec![Instance { group: 0, world_from_group: vec![Affine3A::IDENTITY] }],
+        ..GeometrySet::default()
+    });
+    let accel = EmbreeAccel::new(set, None, None).unwrap();
+    let rays = random_rays(100, 3);
+    for coherence in COHERENCES {
+        assert_eq!(intersect(&accel, &rays, coherence), vec![None; 100]);
+        assert_eq!(occluded(&accel, &rays, coherence), vec![false; 100]);
+    }
+    assert_eq!(intersect(&accel, &RayBatch::default(), Coherence::Coherent), vec![]);
+}
+
+#[test]
+fn rays_that_are_not_finite_or_empty_hit_nothing() {
+    let set = only_root(vec![Shape::Mesh(rippled_sphere(20))]);
+    let accel = embree(&set, 8);
+    let good = Ray { o: Vec3::Z * 3.0, d: -Vec3::Z + Vec3::X * 0.01, t_max: f32::INFINITY, time: f32::NAN };
+    let mut rays = RayBatch::default();
+    rays.push(&good);
+    rays.push(&Ray { o: Vec3::NAN, ..good });
+    rays.push(&Ray { o: Vec3::INFINITY, ..good });
+    rays.push(&Ray { d: Vec3::ZERO, ..good });
+    rays.push(&Ray { d: Vec3::new(0.0, f32::NEG_INFINITY, 0.0), ..good });
+    rays.push(&Ray { t_max: 0.0, ..good });
+    rays.push(&Ray { t_max: f32::NAN, ..good });
+    rays.push(&Ray { t_max: -1.0, ..good });
+    for coherence in COHERENCES {
+        let hits: Vec<bool> = intersect(&accel, &rays, coherence).iter().map(Option::is_some).collect();
+        assert_eq!(hits, [true, false, false, false, false, false, false, false], "{coherence:?}");
+        assert_eq!(occluded(&accel, &rays, coherence), hits);
+    }
+}
+
+#[test]
+fn flat_and_infinite_placements_are_left_out() {
+    let placed = |m| Instance { group: 0, world_from_group: vec![m] };
+    let set = GeometrySet {
+        geometries: vec![opaque(Shape::Mesh(rippled_sphere(20)))],
+        groups: vec![Group { geometries: vec![0] }],
+        root: Group::default(),
+        instances: vec![
+            placed(Affine3A::from_scale(Vec3::new(1.0, 0.0, 1.0))),
+            placed(Affine3A::from_translation(Vec3::INFINITY)),
+            placed(Affine3A::from_translation(Vec3::X * 4.0)),
+        ],
+    };
+    let accel = EmbreeAccel::new(Arc::new(set), None, None).unwrap();
+    let mut rays = RayBatch::default();
+    for x in [0.0, 4.0] {
+        rays.push(&Ray { o: Vec3::new(x, 0.1, 3.0), d: -Vec3::Z, t_max: f32::INFINITY, time: 0.0 });
+    }
+    let hits = intersect(&accel, &rays, Coherence::Packets);
+    assert_eq!(hits.iter().map(|h| h.map(|h| h.instance)).collect::<Vec<_>>(), [None, Some(2)]);
+}
+
+#[test]
+fn a_memory_limit_is_an_error_that_says_so() {
+    let set = only_root(vec![Shape::Mesh(rippled_sphere(200))]);
+    let options = EmbreeOptions { memory_limit: Some(100_000), ..EmbreeOptions::default() };
+    let error = EmbreeAccel::with_options(Arc::clone(&set), None, options).err().unwrap();
+    assert!(matches!(error, EmbreeError::Call { code: ErrorCode::OutOfMemory, .. }), "{error:?}");
+    let message = error.to_string();
+    assert!(message.contains("cannot build a scene") && message.contains("memory"), "{message}");
+
+    let stats = EmbreeAccel::new(set, None, None).unwrap().stats();
+    assert!(stats.bytes > 1_000_000 && stats.peak_bytes >= stats.bytes && stats.build_seconds > 0.0, "{stats:?}");
+}
+
+#[test]
+fn a_misaligned_buffer_is_an_error_that_says_so() {
+    let device = Arc::new(Device::new(c"", None).unwrap());
+    let kind = embree4_sys::RTCGeometryType::RTC_GEOMETRY_TYPE_TRIANGLE;
+    let geometry = scene::EmbreeGeometry::new(&device, kind).unwrap();
+    let positions = [[0.0_f32; 3]; 4];
+    let askew = positions.as_ptr().wrapping_byte_add(1);
+    let vertices = embree4_sys::RTCBufferType::RTC_BUFFER_TYPE_VERTEX;
+    let error = geometry.share(vertices, askew, 3).unwrap_err();
+    assert!(error.to_string().contains("cannot share a buffer of a mesh: invalid"), "{error}");
+    // It is reported once.
+    assert_eq!(device.check("do nothing"), Ok(()));
+}
+
+#[test]
+fn unknown_packet_widths_are_refused() {
+    for width in [0, 2, 16] {
+        let error = EmbreeAccel::new(Arc::default(), None, Some(width)).err().unwrap();
+        assert_eq!(error, EmbreeError::PacketWidth(width));
+    }
+}
+
+#[test]
+fn a_panic_in_an_alpha_source_comes_out_of_the_query() {
+    struct Broken;
+    impl AlphaSource for Broken {
+        fn alpha(&self, _: u32, _: Vec2, _: Vec3) -> f32 {
+            panic!("broken texture")
+        }
+    }
+    let cut_out = Geometry { alpha: Some(0), ..opaque(Shape::Mesh(rippled_sphere(20))) };
+    let set = GeometrySet { geometries: vec![cut_out], root: Group { geometries: vec![0] }, ..GeometrySet::default() };
+    let accel = EmbreeAccel::new(Arc::new(set), Some(Arc::new(Broken)), None).unwrap();
+    let rays = camera_rays(8);
+    for coherence in COHERENCES {
+        let query = std::panic::AssertUnwindSafe(|| intersect(&accel, &rays, coherence));
+        let result = std::panic::catch_unwind(query);
+        assert_eq!(result.unwrap_err().downcast_ref::<&str>(), Some(&"broken texture"));
+    }
+}
+
+#[test]
+fn many_instances_build_fast_and_small() {
+    let mut s = HashStream::new([3, 3, 3]);
+    let instances = (0..25_250).map(|_| Instance { group: 0, world_from_group: vec![random_placement(&mut s)] });
+    let set = GeometrySet {
+        geometries: vec![opaque(Shape::Mesh(rippled_sphere(122)))],
+        groups: vec![Group { geometries: vec![0] }],
+        root: Group::default(),
+        instances: instances.collect(),
+    };
+    let accel = EmbreeAccel::new(Arc::new(set), None, None).unwrap();
+    let stats = accel.stats();
+    // 30 k triangles take some 3 MB, an instance some hundred bytes of hierarchy.
+    assert!(stats.bytes < 40_000_000 && stats.peak_bytes < 80_000_000, "{stats:?}");
+    let hits = intersect(&accel, &random_rays(1000, 1), Coherence::Packets);
+    assert!(hits.iter().flatten().count() > 300);
+}

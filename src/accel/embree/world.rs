@@ -1,0 +1,252 @@
+//! From Embree's ids to the scene's, and from Embree's hits to exact ones.
+
+use super::lanes::{LaneHits, Lanes, RayRows};
+use crate::accel::{Hit, RayBatch};
+use crate::geometry::triangle::{RayPrecomputed, intersect_triangle};
+use crate::geometry::{GeometryId, GeometrySet, Group, Shape};
+use crate::math::{Affine3A, Ray, Vec3};
+use std::sync::Arc;
+
+/// What Embree reports of a hit.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Reported {
+    /// `geomID`, of the scene that holds the geometry.
+    pub geometry: u32,
+    /// `primID`.
+    pub primitive: u32,
+    /// `instID[0]`, `u32::MAX` in the root.
+    pub instance: u32,
+    /// Ray parameter.
+    pub t: f32,
+    /// Parametric position.
+    pub uv: [f32; 2],
+}
+
+/// What a reported hit turns out to be.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub(super) enum Refined {
+    /// A hit.
+    Hit(Hit),
+    /// Its exact parameter is not positive: the surface that the ray left.
+    Behind,
+    /// Its exact parameter is not below `t_max`.
+    Beyond,
+}
+
+/// The numbering of a scene in Embree.
+#[derive(Debug)]
+pub(super) struct World {
+    /// The scene.
+    pub set: Arc<GeometrySet>,
+    /// Geometry of each id in Embree's root scene; instances follow.
+    pub root: Vec<GeometryId>,
+    /// Geometry of each id in the scene of a group.
+    pub groups: Vec<Vec<GeometryId>>,
+    /// Instances in Embree's root scene.
+    pub instances: Vec<u32>,
+    /// Per instance that does not move.
+    group_from_world: Vec<Option<Affine3A>>,
+}
+
+/// Exact hits side by side.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Exact<const N: usize> {
+    hits: LaneHits<N>,
+    geometries: [GeometryId; N],
+    instances: [u32; N],
+}
+
+impl<const N: usize> Exact<N> {
+    #[inline]
+    fn new(mut hits: LaneHits<N>, t_max: [f32; N], geometries: [GeometryId; N], instances: [u32; N]) -> Self {
+        for ((plain, t), t_max) in hits.plain.iter_mut().zip(&hits.t).zip(&t_max) {
+            *plain &= t < t_max;
+        }
+        Exact { hits, geometries, instances }
+    }
+
+    /// The hit of a lane, on the primitive that was reported; `None` where [`World::refine`] must decide.
+    #[inline]
+    pub fn hit(&self, lane: usize, primitive: u32) -> Option<Hit> {
+        let LaneHits { t, b1, b2, plain } = &self.hits;
+        let (geometry, instance) = (self.geometries[lane], self.instances[lane]);
+        plain[lane].then(|| Hit { t: t[lane], uv: [b1[lane], b2[lane]], geometry, primitive, instance })
+    }
+}
+
+impl Reported {
+    /// Nothing.
+    pub const NONE: Reported =
+        Reported { geometry: u32::MAX, primitive: u32::MAX, instance: u32::MAX, t: f32::INFINITY, uv: [0.0; 2] };
+}
+
+impl Refined {
+    /// True if this is to be taken rather than `other`: it is a hit, and first, or of hits at the same place the one with
+    /// the smallest (instance, geometry, primitive), as in the Rust tracer.
+    pub fn precedes(&self, other: &Refined) -> bool {
+        let key = |h: &Hit| (h.instance, h.geometry, h.primitive);
+        match (self, other) {
+            (Refined::Hit(a), Refined::Hit(b)) => a.t < b.t || (a.t == b.t && key(a) < key(b)),
+            (Refined::Hit(_), Refined::Behind | Refined::Beyond) => true,
+            (Refined::Behind | Refined::Beyond, _) => false,
+        }
+    }
+}
+
+impl World {
+    /// Numbers what rays can meet. `can_place` tells usable instances.
+    pub fn new(set: Arc<GeometrySet>, can_place: impl Fn(u32) -> bool) -> World {
+        let members = |group: &Group| group.geometries.iter().copied().filter(|&id| can_be_met(&set, id)).collect();
+        let groups: Vec<Vec<GeometryId>> = set.groups.iter().map(members).collect();
+        let root = members(&set.root);
+        let filled = |i: u32| !groups[set.instances[i as usize].group as usize].is_empty();
+        let instances = (0..set.instances.len() as u32).filter(|&i| filled(i) && can_place(i)).collect();
+        let group_from_world = set
+            .instances
+            .iter()
+            .map(|i| (i.world_from_group.len() == 1).then(|| i.world_from_group[0].inverse()))
+            .collect();
+        World { root, groups, instances, group_from_world, set }
+    }
+
+    /// The instance of an `instID`.
+    #[inline]
+    pub fn instance(&self, inst_id: u32) -> u32 {
+        if inst_id == u32::MAX { Hit::NO_INSTANCE } else { self.instances[inst_id as usize - self.root.len()] }
+    }
+
+    /// The geometry of a `geomID` in `instance`.
+    #[inline]
+    fn geometry(&self, geom_id: u32, instance: u32) -> GeometryId {
+        if instance == Hit::NO_INSTANCE {
+            return self.root[geom_id as usize];
+        }
+        self.groups[self.set.instances[instance as usize].group as usize][geom_id as usize]
+    }
+
+    /// The ray in the space of the group that `instance` places.
+    #[inline]
+    pub fn group_ray(&self, world: &Ray, instance: u32) -> Ray {
+        if instance == Hit::NO_INSTANCE {
+            return *world;
+        }
+        let instance = instance as usize;
+        let group_from_world = self.group_from_world[instance]
+            .unwrap_or_else(|| self.set.instances[instance].world_from_group_at(world.time).inverse());
+        Ray { o: group_from_world.transform_point3(world.o), d: group_from_world.transform_vector3(world.d), ..*world }
+    }
+
+    /// The exact hits of the N rays from `base` on, whose reported hits are in `first`; not `plain` where there is none or
+    /// [`Self::refine`] must decide.
+    #[inline]
+    pub fn refine_lanes<const N: usize>(&self, rays: &RayBatch, base: usize, first: &[Reported]) -> Exact<N> {
+        let rows = RayRows::<N>::load(rays, base);
+        if let Some(exact) = self.refine_same(rays, &rows, base, first) {
+            return exact;
+        }
+        let mut lanes = Lanes::<N>::EMPTY;
+        let (mut geometries, mut instances, mut t_max) = ([0; N], [Hit::NO_INSTANCE; N], [f32::NEG_INFINITY; N]);
+        for (lane, reported) in first.iter().enumerate().take(N) {
+            if reported.geometry == u32::MAX {
+                continue;
+            }
+            let instance = self.instance(reported.instance);
+            let geometry = self.geometry(reported.geometry, instance);
+            if let Shape::Mesh(mesh) = &self.set.geometries[geometry as usize].shape {
+                let ray = if instance == Hit::NO_INSTANCE {
+                    rows.get(lane)
+                } else {
+                    let ray = self.group_ray(&rays.get(base + lane), instance);
+                    (ray.o, ray.d)
+                };
+                lanes.set(lane, ray, mesh.triangle(reported.primitive as usize));
+                (geometries[lane], instances[lane], t_max[lane]) = (geometry, instance, rays.t_max[base + lane]);
+            }
+        }
+        Exact::new(lanes.intersect(), t_max, geometries, instances)
+    }
+
+    /// As [`Self::refine_lanes`] where all rays hit one triangle that is not placed, as camera rays of a pixel often do.
+    /// `None` where this does not hold.
+    #[inline]
+    fn refine_same<const N: usize>(
+        &self,
+        rays: &RayBatch,
+        rows: &RayRows<N>,
+        base: usize,
+        first: &[Reported],
+    ) -> Option<Exact<N>> {
+        let first = first.first_chunk::<N>()?;
+        let Reported { geometry: geom_id, primitive, instance, .. } = first[0];
+        let same = |r: &Reported| (r.geometry == geom_id) & (r.primitive == primitive) & (r.instance == instance);
+        if geom_id == u32::MAX || instance != u32::MAX || !first.iter().all(same) {
+            return None;
+        }
+        let t_max = *rays.t_max[base..].first_chunk::<N>()?;
+        let geometry = self.root[geom_id as usize];
+        let Shape::Mesh(mesh) = &self.set.geometries[geometry as usize].shape else { return None };
+        let lanes = Lanes::of_one_triangle(rows, mesh.triangle(primitive as usize))?;
+        Some(Exact::new(lanes.intersect(), t_max, [geometry; N], [Hit::NO_INSTANCE; N]))
+    }
+
+    /// The exact hit of `world_ray`: the same arithmetic for any kernel, packet width and processor.
+    #[inline]
+    pub fn refine(&self, world_ray: &Ray, reported: &Reported) -> Refined {
+        let instance = self.instance(reported.instance);
+        let geometry = self.geometry(reported.geometry, instance);
+        self.refine_primitive(world_ray, geometry, instance, reported)
+    }
+
+    /// As [`Self::refine`], with Embree's `geomID` and `instID` translated.
+    #[inline]
+    pub fn refine_primitive(&self, ray: &Ray, geometry: GeometryId, instance: u32, reported: &Reported) -> Refined {
+        let primitive = reported.primitive;
+        let hit_at = |t: f32, uv| {
+            let hit = Hit { t, uv, geometry, primitive, instance };
+            if t < ray.t_max { Refined::Hit(hit) } else { Refined::Beyond }
+        };
+        // Other shapes come from callbacks that are exact.
+        let Shape::Mesh(mesh) = &self.set.geometries[geometry as usize].shape else {
+            return hit_at(reported.t, reported.uv);
+        };
+        let group_ray = self.group_ray(ray, instance);
+        let triangle = mesh.triangle(primitive as usize);
+        let exact = RayPrecomputed::new(&group_ray).and_then(|r| intersect_triangle(&r, triangle, f32::INFINITY));
+        match exact {
+            Some(hit) => hit_at(hit.t, [hit.b1, hit.b2]),
+            None => match beside(&group_ray, triangle) {
+                None => hit_at(reported.t, reported.uv),
+                Some((t, _)) if t <= 0.0 => Refined::Behind,
+                Some((t, uv)) => hit_at(t, uv),
+            },
+        }
+    }
+}
+
+/// Where a ray that Embree lets hit a triangle, but that exactly runs by its edge, meets the triangle's plane, and the
+/// weights of vertices 1 and 2 of a point of the triangle near by. `None` if the triangle has no plane.
+#[cold]
+fn beside(ray: &Ray, triangle: [Vec3; 3]) -> Option<(f32, [f32; 2])> {
+    let [p0, p1, p2] = triangle.map(Vec3::as_dvec3);
+    let (o, d) = (ray.o.as_dvec3(), ray.d.as_dvec3());
+    let (e1, e2) = (p1 - p0, p2 - p0);
+    let n = e1.cross(e2);
+    let t = n.dot(p0 - o) / n.dot(d);
+    let q = o + d * t - p0;
+    let (b1, b2) = (n.dot(q.cross(e2)) / n.length_squared(), n.dot(e1.cross(q)) / n.length_squared());
+    let (b1, b2) = (b1.max(0.0), b2.max(0.0));
+    let sum = (b1 + b2).max(1.0);
+    let found = (t as f32, [(b1 / sum) as f32, (b2 / sum) as f32]);
+    (found.0.is_finite() && sum.is_finite()).then_some(found)
+}
+
+/// True if some ray can see the geometry and it has primitives.
+fn can_be_met(set: &GeometrySet, id: GeometryId) -> bool {
+    let geometry = &set.geometries[id as usize];
+    let count = match &geometry.shape {
+        Shape::Mesh(mesh) => mesh.triangle_count(),
+        Shape::Quadric(_) => 1,
+        Shape::Bilinear(mesh) => mesh.patch_count(),
+    };
+    count > 0 && geometry.visibility.0 & crate::geometry::Visibility::ALL.0 != 0
+}

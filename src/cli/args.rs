@@ -1,0 +1,196 @@
+//! Options that several subcommands share, as typed.
+
+use crate::estimators::mis::Heuristic;
+use crate::lights::LightSamplerKind;
+use crate::render::output::Aov;
+use crate::samplers::SamplerKind;
+use crate::scene::{AccelKind, EstimatorKind, IntegratorKind};
+use clap::{Args, ValueEnum};
+use std::path::PathBuf;
+
+/// Declares a `ValueEnum` of the names that a type's `name()` gives.
+macro_rules! choices {
+    ($(#[$doc:meta])* $choice:ident => $target:ty { $($variant:ident => $value:expr),+ $(,)? }) => {
+        $(#[$doc])*
+        #[derive(Clone, Copy, Debug)]
+        pub enum $choice { $(#[doc = stringify!($variant)] $variant),+ }
+
+        impl $choice {
+            /// The value that the rest of the program uses.
+            pub fn value(self) -> $target {
+                match self { $($choice::$variant => $value),+ }
+            }
+        }
+
+        impl ValueEnum for $choice {
+            fn value_variants<'a>() -> &'a [Self] {
+                &[$($choice::$variant),+]
+            }
+
+            fn to_possible_value(&self) -> Option<clap::builder::PossibleValue> {
+                Some(clap::builder::PossibleValue::new(self.value().name()))
+            }
+        }
+    };
+}
+
+choices!(
+    /// `--integrator`
+    IntegratorArg => IntegratorKind { Direct => IntegratorKind::Direct, Path => IntegratorKind::Path }
+);
+choices!(
+    /// `--estimator`
+    EstimatorArg => EstimatorKind { Mc => EstimatorKind::Mc, Mis => EstimatorKind::Mis }
+);
+choices!(
+    /// `--heuristic`
+    HeuristicArg => Heuristic { Balance => Heuristic::Balance, Power => Heuristic::Power, Maximum => Heuristic::Maximum }
+);
+choices!(
+    /// `--light-choice`
+    LightChoiceArg => LightSamplerKind { Uniform => LightSamplerKind::Uniform, Power => LightSamplerKind::Power, Tree => LightSamplerKind::Tree }
+);
+choices!(
+    /// `--sampler`
+    SamplerArg => SamplerKind {
+        Independent => SamplerKind::Independent,
+        Sobol => SamplerKind::Sobol,
+        Zsobol => SamplerKind::SobolBlueNoise,
+    }
+);
+choices!(
+    /// `--accel`
+    AccelArg => AccelKind { Embree => AccelKind::Embree, Bvh => AccelKind::Bvh }
+);
+choices!(
+    /// `--aov`
+    AovArg => Aov {
+        Variance => Aov::Variance,
+        Samples => Aov::Samples,
+        Albedo => Aov::Albedo,
+        Normal => Aov::Normal,
+        Depth => Aov::Depth,
+        Material => Aov::Material,
+        Object => Aov::Object,
+    }
+);
+
+/// What a scene file says and the command line overrides.
+#[derive(Args, Clone, Debug)]
+pub struct SceneArgs {
+    /// Scene file (.pbrt or .pbrt.gz)
+    pub scene: PathBuf,
+    /// What is computed [default: the file's]
+    #[arg(long)]
+    pub integrator: Option<IntegratorArg>,
+    /// Direct-light estimator [default: the file's, or mis]
+    #[arg(long)]
+    pub estimator: Option<EstimatorArg>,
+    /// Samples per estimate: shadow segments per shading point [default: the file's, or 2]
+    #[arg(long, value_name = "N", value_parser = clap::value_parser!(u32).range(1..=4096))]
+    pub samples: Option<u32>,
+    /// Weights of the mis estimator [default: the file's, or power]
+    #[arg(long)]
+    pub heuristic: Option<HeuristicArg>,
+    /// How a light is chosen [default: the file's lightsampler, or tree]
+    #[arg(long)]
+    pub light_choice: Option<LightChoiceArg>,
+    /// Bounces of `path` [default: the file's, or 5]
+    #[arg(long, value_name = "D", value_parser = clap::value_parser!(u32).range(0..=10_000))]
+    pub max_depth: Option<u32>,
+    /// Camera samples per pixel [default: the file's, or 16]
+    #[arg(long, value_name = "K", value_parser = clap::value_parser!(u32).range(1..=1_000_000_000))]
+    pub spp: Option<u32>,
+    /// Random sequence [default: the file's sampler, or zsobol]
+    #[arg(long)]
+    pub sampler: Option<SamplerArg>,
+    /// Pictures of different seeds are independent [default: the file's, or 0]
+    #[arg(long, value_name = "S")]
+    pub seed: Option<u32>,
+    /// Size of the picture, such as 640x480 [default: the file's]
+    #[arg(long, value_name = "WxH", value_parser = parse_resolution)]
+    pub resolution: Option<[u32; 2]>,
+    /// The part that is rendered, in fractions of the picture [default: the file's]
+    #[arg(long, value_name = "X0,X1,Y0,Y1", value_parser = parse_crop)]
+    pub crop: Option<[f32; 4]>,
+    /// Replace the file's pixel filter by a box of one pixel
+    #[arg(long)]
+    pub box_filter: bool,
+    /// Ray tracer
+    #[arg(long, default_value = "embree")]
+    pub accel: AccelArg,
+    /// Rays per Embree packet; changes speed, not the picture [default: the processor's native width]
+    #[arg(long, value_name = "W", value_parser = parse_packet_width)]
+    pub packet_width: Option<u32>,
+    /// Threads [default: all cores]
+    #[arg(long, value_name = "T", value_parser = clap::value_parser!(u32).range(1..=4096))]
+    pub threads: Option<u32>,
+    /// Edge of a tile in pixels; changes speed, not the picture
+    #[arg(long, value_name = "PIXELS", default_value_t = 16, value_parser = clap::value_parser!(u32).range(1..=4096))]
+    pub tile_size: u32,
+}
+
+/// `lumiris render`
+#[derive(Args, Clone, Debug)]
+pub struct RenderArgs {
+    #[command(flatten)]
+    pub scene: SceneArgs,
+    /// Where to write; may be given several times. EXR holds everything; PNG, JPEG, TIFF and TGA what a display shows
+    /// [default: the name in the file, or SCENE.exr]
+    #[arg(short, long, value_name = "FILE")]
+    pub output: Vec<PathBuf>,
+    /// Stop after the pass in which this many seconds run out
+    #[arg(long, value_name = "SECONDS", value_parser = parse_seconds)]
+    pub time: Option<f64>,
+    /// Channels beside the picture, in EXR [default: all]
+    #[arg(long, value_name = "LIST", value_delimiter = ',')]
+    pub aov: Option<Vec<AovArg>>,
+    /// Exposure of what a display shows (PNG and its like), in stops
+    #[arg(long, value_name = "STOPS", default_value_t = 0.0, allow_negative_numbers = true)]
+    pub exposure: f32,
+    /// Write seconds and counts of every stage
+    #[arg(long, value_name = "FILE.json")]
+    pub stats: Option<PathBuf>,
+    /// No progress, only warnings and errors
+    #[arg(short, long)]
+    pub quiet: bool,
+}
+
+fn parse_resolution(text: &str) -> Result<[u32; 2], String> {
+    let (w, h) = text.split_once(['x', 'X']).ok_or("expected WIDTHxHEIGHT, such as 640x480")?;
+    let parse = |s: &str| match s.trim().parse::<u32>() {
+        Ok(n @ 1..=65_536) => Ok(n),
+        _ => Err(format!("`{s}` is not a whole number from 1 to 65536")),
+    };
+    Ok([parse(w)?, parse(h)?])
+}
+
+fn parse_crop(text: &str) -> Result<[f32; 4], String> {
+    let values: Vec<f32> = text
+        .split(',')
+        .map(|s| s.trim().parse().map_err(|_| format!("`{s}` is not a number")))
+        .collect::<Result<_, _>>()?;
+    match values[..] {
+        [x0, x1, y0, y1] if 0.0 <= x0 && x0 < x1 && x1 <= 1.0 && 0.0 <= y0 && y0 < y1 && y1 <= 1.0 => {
+            Ok([x0, x1, y0, y1])
+        }
+        [_, _, _, _] => Err("expected 0 <= X0 < X1 <= 1 and 0 <= Y0 < Y1 <= 1".to_owned()),
+        _ => Err("expected four numbers X0,X1,Y0,Y1".to_owned()),
+    }
+}
+
+fn parse_packet_width(text: &str) -> Result<u32, String> {
+    match text {
+        "1" => Ok(1),
+        "4" => Ok(4),
+        "8" => Ok(8),
+        _ => Err("expected 1, 4 or 8".to_owned()),
+    }
+}
+
+fn parse_seconds(text: &str) -> Result<f64, String> {
+    match text.parse::<f64>() {
+        Ok(s) if s > 0.0 && s.is_finite() => Ok(s),
+        _ => Err("expected a positive number of seconds".to_owned()),
+    }
+}

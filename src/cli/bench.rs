@@ -1,0 +1,104 @@
+//! `lumiris bench`
+
+use super::args::{AccelArg, SceneArgs};
+use super::progress;
+use super::settings::load_world;
+use crate::render::bench::{BenchSettings, RayCase, Report, measure};
+use anyhow::{Context, bail};
+use clap::{Args, ValueEnum};
+use serde_json::json;
+use std::path::PathBuf;
+use std::process::ExitCode;
+
+/// What to measure.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
+enum Subject {
+    /// Proposals, and the time of every stage
+    T1,
+    /// Shadow segments against a bare Embree loop
+    T2,
+    /// First hits against a bare Embree loop
+    Intersect,
+    /// Everything
+    All,
+}
+
+/// `lumiris bench`
+#[derive(Args, Clone, Debug)]
+pub struct BenchArgs {
+    /// What is measured
+    #[arg(default_value = "all")]
+    subject: Subject,
+    #[command(flatten)]
+    scene: SceneArgs,
+    /// Turns of the renderer and of the bare loop; medians are reported
+    #[arg(long, value_name = "N", default_value_t = 5, value_parser = clap::value_parser!(u32).range(1..=10_000))]
+    runs: u32,
+    /// Camera rays at most: batches of them are spread over the picture
+    #[arg(long, value_name = "K", default_value_t = 1 << 20, value_parser = clap::value_parser!(u32).range(1..))]
+    rays: u32,
+    /// Write the report
+    #[arg(long, value_name = "FILE.json")]
+    json: Option<PathBuf>,
+}
+
+pub fn run(args: &BenchArgs) -> anyhow::Result<ExitCode> {
+    if !matches!(args.scene.accel, AccelArg::Embree) {
+        bail!("bench measures Embree; leave out --accel");
+    }
+    let (world, times) = load_world(&args.scene)?;
+    let asked = |subject| args.subject == subject || args.subject == Subject::All;
+    let settings = BenchSettings {
+        intersect: asked(Subject::Intersect),
+        t1: asked(Subject::T1),
+        t2: asked(Subject::T2),
+        runs: args.runs,
+        rays: args.rays as usize,
+        packet_width: args.scene.packet_width,
+        tile_size: args.scene.tile_size,
+    };
+    let report = measure(world, &settings)?;
+    progress::print(&table(&report));
+    if let Some(path) = &args.json {
+        let mut value = serde_json::to_value(&report)?;
+        let name = args.scene.scene.display().to_string();
+        value["scene"] = json!(name);
+        value["seconds"] = json!({ "load": times.load, "build": times.build });
+        value["embree"] = json!(env!("LUMIRIS_EMBREE_VERSION"));
+        std::fs::write(path, serde_json::to_string_pretty(&value)?)
+            .with_context(|| format!("cannot write {}", path.display()))?;
+    }
+    Ok(ExitCode::SUCCESS)
+}
+
+fn table(report: &Report) -> String {
+    let mut text = format!("{} camera rays, one thread\n", report.camera_rays);
+    if !report.stages.is_empty() {
+        text += &format!("\n{:<22}{:>10}{:>12}{:>10}\n", "stage", "seconds", "items", "ns/item");
+    }
+    for stage in &report.stages {
+        let each = stage.seconds * 1e9 / stage.items.max(1) as f64;
+        text += &format!("{:<22}{:>10.4}{:>12}{each:>10.1}\n", stage.name, stage.seconds, stage.items);
+    }
+    if let Some([ours, bare]) = report.build_seconds {
+        text += &format!("\nbuild on all cores: renderer {ours:.3} s, bare {bare:.3} s\n");
+        text += "ratio: speed of the renderer by that of the bare loop, from medians of batches; of turns: median of whole runs (range)\n";
+        text += &format!(
+            "{:<22}{:>6}{:>10}{:>13}{:>13}{:>11}{:>20}\n",
+            "rays", "width", "rays", "Mrays/s", "bare Mrays/s", "ratio", "of turns"
+        );
+    }
+    for case in report.intersect.iter().chain(&report.t2) {
+        text += &line(case);
+    }
+    text.trim_end().to_owned()
+}
+
+fn line(case: &RayCase) -> String {
+    let [least, most] = case.turn_ratio_range;
+    let range = format!("{:.3} ({least:.2}-{most:.2})", case.turn_ratio);
+    format!(
+        "{:<22}{:>6}{:>10}{:>13.2}{:>13.2}{:>11.3}{range:>20}\n",
+        case.name, case.width, case.rays, case.mrays, case.bare_mrays, case.ratio
+    )
+}

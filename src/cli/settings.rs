@@ -1,0 +1,96 @@
+//! From typed options to a world that is ready to render.
+
+use super::args::SceneArgs;
+use super::progress;
+use crate::film::filter::PixelFilter;
+use crate::import::{LoadOptions, load};
+use crate::render::RenderSettings;
+use crate::scene::{IntegratorKind, Scene, World};
+use anyhow::{Context, bail};
+use std::time::Instant;
+
+/// Seconds of what happens before the first ray.
+#[derive(Clone, Copy, Debug)]
+pub struct SetupTimes {
+    /// Reading files.
+    pub load: f64,
+    /// Building ray tracers.
+    pub build: f64,
+}
+
+/// Loads the scene and applies the options; warnings are printed unless `quiet`.
+pub fn load_scene(args: &SceneArgs) -> anyhow::Result<Scene> {
+    let options = LoadOptions { resolution: args.resolution, crop: args.crop };
+    let loaded = match load(&args.scene, &options) {
+        Ok(loaded) => loaded,
+        Err(diagnostics) => {
+            progress::say(diagnostics.to_string().trim_end());
+            bail!("{} could not be loaded", args.scene.display());
+        }
+    };
+    let warnings = loaded.warnings.to_string();
+    if !warnings.is_empty() {
+        progress::say(warnings.trim_end());
+    }
+    let mut scene = loaded.scene;
+    apply(args, &mut scene);
+    Ok(scene)
+}
+
+fn apply(args: &SceneArgs, scene: &mut Scene) {
+    let i = &mut scene.integrator;
+    if let Some(kind) = args.integrator {
+        i.kind = kind.value();
+    }
+    if let Some(depth) = args.max_depth {
+        i.max_depth = depth;
+    } else if i.kind == IntegratorKind::Direct {
+        i.max_depth = 1;
+    }
+    if let Some(estimator) = args.estimator {
+        i.estimator = estimator.value();
+    }
+    if let Some(samples) = args.samples {
+        i.samples = samples;
+    }
+    if let Some(heuristic) = args.heuristic {
+        i.heuristic = heuristic.value();
+    }
+    if let Some(choice) = args.light_choice {
+        i.light_choice = choice.value();
+        scene.lights.set_kind(i.light_choice);
+    }
+    if let Some(spp) = args.spp {
+        scene.sampling.spp = spp;
+    }
+    if let Some(sampler) = args.sampler {
+        scene.sampling.sampler = sampler.value();
+    }
+    if let Some(seed) = args.seed {
+        scene.sampling.seed = seed;
+    }
+    if args.box_filter {
+        scene.film.filter = PixelFilter::Box { rx: 0.5, ry: 0.5 };
+    }
+}
+
+/// Loads the scene and builds its ray tracers.
+pub fn load_world(args: &SceneArgs) -> anyhow::Result<(World, SetupTimes)> {
+    let start = Instant::now();
+    let scene = load_scene(args)?;
+    let load = start.elapsed().as_secs_f64();
+    let start = Instant::now();
+    let world = World::new(scene, args.accel.value(), args.packet_width)
+        .with_context(|| format!("cannot build the ray tracer of {}", args.scene.display()))?;
+    Ok((world, SetupTimes { load, build: start.elapsed().as_secs_f64() }))
+}
+
+/// How the options say to render.
+pub fn render_settings(args: &SceneArgs, world: &World) -> RenderSettings {
+    RenderSettings {
+        threads: args.threads.map(|t| t as usize),
+        tile_size: args.tile_size,
+        spp: world.scene.sampling.spp,
+        ..RenderSettings::default()
+    }
+}

@@ -1,0 +1,61 @@
+//! T2: shadow segments, packed in the order of their shading points, and the bits that come back.
+
+use super::propose::Candidates;
+use crate::accel::{Accel, Coherence, RayBatch};
+use crate::math::Rgb;
+
+/// Segments of the candidates that matter, with what each is worth.
+#[derive(Debug, Default)]
+pub struct Segments {
+    rays: RayBatch,
+    contributions: Vec<Rgb>,
+    points: Vec<u32>,
+    occluded: Vec<bool>,
+}
+
+impl Segments {
+    /// Number of segments.
+    pub fn len(&self) -> usize {
+        self.rays.len()
+    }
+
+    /// True if there is nothing to trace.
+    pub fn is_empty(&self) -> bool {
+        self.rays.is_empty()
+    }
+
+    /// Takes the segments of all candidates whose contribution is finite and not zero, in candidate order:
+    /// those of one shading point, which share their origin, stay together.
+    pub fn gather(&mut self, candidates: &Candidates, contributions: &[Rgb]) {
+        self.rays.clear();
+        self.contributions.clear();
+        self.points.clear();
+        for (candidate, &contribution) in candidates.records.iter().zip(contributions) {
+            if contribution.is_black() || !contribution.is_finite() {
+                continue;
+            }
+            self.rays.push(&candidate.segment);
+            self.contributions.push(contribution);
+            self.points.push(candidate.point);
+        }
+    }
+
+    /// The segments.
+    pub fn rays(&self) -> &RayBatch {
+        &self.rays
+    }
+
+    /// Traces all segments.
+    pub fn trace(&mut self, accel: &dyn Accel) {
+        accel.occluded(&self.rays, Coherence::Packets, &mut self.occluded);
+    }
+
+    /// Adds the contributions of the free segments to their points, in order.
+    pub fn resolve(&self, out: &mut [Rgb]) {
+        for ((&point, &contribution), &occluded) in self.points.iter().zip(&self.contributions).zip(&self.occluded) {
+            if !occluded {
+                out[point as usize] += contribution;
+            }
+        }
+    }
+}

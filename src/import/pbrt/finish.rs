@@ -1,0 +1,232 @@
+//! The end of an import: all files are read in parallel, and the scene is put together in the order of its text.
+
+use super::lights::power_factor;
+use super::shapes::{Made, ShapeDesc, ShapeError};
+use super::state::Builder;
+use crate::geometry::{Geometry, GeometryId, GeometrySet, Group, Instance, Shape, Visibility};
+use crate::imaging::oiio::ImageError;
+use crate::import::diagnostic::Diagnostics;
+use crate::import::resources::{load_rgb, report};
+use crate::lights::{Emission, EmissionImage, LightSetBuilder, area_lights_of};
+use crate::materials::{Material, MaterialId, MaterialSet};
+use crate::math::Rgb;
+use crate::scene::{Scene, Surface};
+use rayon::prelude::*;
+use std::collections::HashMap;
+use std::path::PathBuf;
+use std::sync::Arc;
+
+/// Geometry while it is put together.
+#[derive(Default)]
+struct Assembly {
+    set: GeometrySet,
+    surfaces: Vec<Surface>,
+    /// What emits, with its light's description.
+    emitters: Vec<(GeometryId, Emission)>,
+    /// Opening and closing of the shutter as fractions of the motion.
+    shutter: [f32; 2],
+    /// Images that area lights emit.
+    images: HashMap<PathBuf, Arc<EmissionImage>>,
+}
+
+impl Builder<'_> {
+    /// Reads what the text asks for and makes the scene; `None` after an error.
+    pub fn finish(mut self, d: &mut Diagnostics) -> Option<Scene> {
+        let settings = self.options.finish(self.load_options, d);
+
+        // Read all files, whatever went wrong before: all missing ones are named in one run
+        let mut shapes = std::mem::take(&mut self.shapes);
+        let environment_paths: Vec<PathBuf> = self.environments.iter().map(|e| e.path.clone()).collect();
+        let emission_paths = self.emission_image_paths();
+        // Images first: while one thread loads the library that reads them, the others have meshes and coats to work on
+        let ((images, emission_images, texture_images), (made, materials)) = rayon::join(
+            || (load_images(&environment_paths), load_emission_images(&emission_paths), self.resources.load(d)),
+            || {
+                rayon::join(
+                    || shapes.par_iter_mut().map(ShapeDesc::make).collect::<Vec<_>>(),
+                    || MaterialSet::new(self.materials.clone(), &self.textures),
+                )
+            },
+        );
+        self.textures.images = texture_images;
+        self.add_environments(images, d);
+        let images = self.check_emission_images(emission_images, &shapes, d);
+
+        // Put the geometry together
+        let shutter = settings.as_ref().map_or([0.0, 1.0], |s| s.shutter);
+        let mut assembly = Assembly { shutter, images, ..Assembly::default() };
+        assembly.set.groups.resize_with(self.objects.len(), Group::default);
+        for (desc, made) in shapes.iter().zip(made) {
+            let material = self.material_of(&desc.material, d);
+            match (made, material) {
+                (Ok(made), Some(material)) => {
+                    made.warnings.iter().for_each(|w| {
+                        d.warning_once(desc.span, w.clone());
+                    });
+                    self.place(&mut assembly, desc, made, material, d);
+                }
+                (Err(ShapeError::Missing(path, reason)), _) => d.missing_file(path, reason, Some(desc.span)),
+                (Err(ShapeError::Wrong(reason)), _) => {
+                    d.error(desc.span, reason);
+                }
+                (Ok(_), None) => {}
+            }
+        }
+        for instance in &self.instances {
+            assembly
+                .set
+                .instances
+                .push(Instance { group: instance.object as u32, world_from_group: instance.ctm.samples(shutter) });
+        }
+        if d.has_errors() {
+            return None;
+        }
+        let settings = settings?;
+
+        // Lights
+        let mut lights = LightSetBuilder::default();
+        self.lights.into_iter().for_each(|light| {
+            lights.add(light);
+        });
+        for (geometry, emission) in &assembly.emitters {
+            lights.add_area(*geometry, &assembly.set.geometries[*geometry as usize].shape, emission);
+        }
+        let lights = lights.build(settings.integrator.light_choice, &assembly.set.world_bounds());
+        Some(Scene {
+            camera: settings.camera,
+            film: settings.film,
+            sampling: settings.sampling,
+            integrator: settings.integrator,
+            materials,
+            textures: Arc::new(self.textures),
+            geometry: Arc::new(assembly.set),
+            surfaces: assembly.surfaces,
+            lights,
+        })
+    }
+
+    /// Adds the shapes of one description to their group, or to the root, or to an instance of their own if they move.
+    fn place(&self, assembly: &mut Assembly, desc: &ShapeDesc, made: Made, material: MaterialId, d: &mut Diagnostics) {
+        let moving = desc.ctm.is_moving();
+        let passes = matches!(self.materials[material as usize].material, Material::Interface);
+        let mut ids = Vec::new();
+        for shape in made.shapes {
+            let id = assembly.set.geometries.len() as GeometryId;
+            let emission = desc.area_light.as_ref().and_then(|light| match (desc.object, moving) {
+                (Some(_), _) => {
+                    d.warning_once(
+                        light.span,
+                        "area lights in objects are not rendered, as in pbrt-v4: the shape is dark",
+                    );
+                    None
+                }
+                (None, true) => {
+                    d.warning_once(light.span, "moving area lights are not rendered yet: the shape is dark");
+                    None
+                }
+                (None, false) => Some(emission_of(light, &shape, &assembly.images)),
+            });
+            if passes && emission.is_none() {
+                // Nothing scatters here, and media are not rendered: rays need not stop.
+                continue;
+            }
+            assembly.emitters.extend(emission.map(|e| (id, e)));
+            assembly.set.geometries.push(Geometry { shape, alpha: desc.alpha, visibility: Visibility::ALL });
+            assembly.surfaces.push(Surface { material, name: desc.name.clone() });
+            ids.push(id);
+        }
+        match (desc.object, moving) {
+            (Some(object), false) => assembly.set.groups[object].geometries.extend(ids),
+            (Some(object), true) => {
+                d.warning_once(desc.span, "motion inside an object is not rendered yet: it stays where it starts");
+                assembly.set.groups[object].geometries.extend(ids);
+            }
+            (None, false) => assembly.set.root.geometries.extend(ids),
+            (None, true) => {
+                let group = assembly.set.groups.len() as u32;
+                assembly.set.groups.push(Group { geometries: ids });
+                assembly.set.instances.push(Instance { group, world_from_group: desc.ctm.samples(assembly.shutter) });
+            }
+        }
+    }
+
+    fn add_environments(&mut self, images: Vec<LoadedImage>, d: &mut Diagnostics) {
+        for (desc, image) in self.environments.iter().zip(images) {
+            match image {
+                Ok((texels, size)) => {
+                    if let Some(light) = desc.light(texels, size, d) {
+                        self.lights[desc.index] = light;
+                    }
+                }
+                Err(error) => report(&error, &desc.path, desc.span, d),
+            }
+        }
+    }
+
+    fn emission_image_paths(&self) -> Vec<PathBuf> {
+        let mut paths: Vec<PathBuf> = self.emission_images.clone();
+        paths.sort();
+        paths.dedup();
+        paths
+    }
+
+    fn check_emission_images(
+        &self,
+        images: Vec<(PathBuf, Result<EmissionImage, EmissionError>)>,
+        shapes: &[ShapeDesc],
+        d: &mut Diagnostics,
+    ) -> HashMap<PathBuf, Arc<EmissionImage>> {
+        let mut found = HashMap::new();
+        for (path, image) in images {
+            let users = shapes.iter().filter_map(|s| s.area_light.as_ref()?.image.as_ref());
+            let span = users.filter(|(p, _)| *p == path).map(|(_, span)| *span).next().unwrap_or_default();
+            match image {
+                Ok(image) => {
+                    found.insert(path, Arc::new(image));
+                }
+                Err(EmissionError::Image(error)) => report(&error, &path, span, d),
+                Err(EmissionError::Size(reason)) => {
+                    d.error(span, reason);
+                }
+            }
+        }
+        found
+    }
+}
+
+/// Linear texels, rows from the top, and the size.
+type LoadedImage = Result<(Vec<Rgb>, [usize; 2]), ImageError>;
+
+fn load_images(paths: &[PathBuf]) -> Vec<LoadedImage> {
+    paths.par_iter().map(|path| load_rgb(path)).collect()
+}
+
+enum EmissionError {
+    Image(ImageError),
+    Size(String),
+}
+
+fn load_emission_images(paths: &[PathBuf]) -> Vec<(PathBuf, Result<EmissionImage, EmissionError>)> {
+    let load = |path: &PathBuf| {
+        let (texels, size) = load_rgb(path).map_err(EmissionError::Image)?;
+        EmissionImage::new(size[0], size[1], texels).map_err(EmissionError::Size)
+    };
+    paths.par_iter().map(|path| (path.clone(), load(path))).collect()
+}
+
+/// The emission of a shape in world space.
+fn emission_of(
+    light: &super::lights::AreaLightDesc,
+    shape: &Shape,
+    images: &HashMap<PathBuf, Arc<EmissionImage>>,
+) -> Emission {
+    let image = light.image.as_ref().and_then(|(path, _)| images.get(path).cloned());
+    let mut emission = Emission { l: light.l, two_sided: light.two_sided, image };
+    if light.power > 0.0 {
+        let area = area_lights_of(shape, &emission).lights.iter().map(|l| l.area()).sum();
+        // The image counts, and the colour does not: pbrt-v4 takes the colour for white here.
+        let white = Emission { l: Rgb::WHITE, ..emission.clone() };
+        emission.l *= power_factor(light, area, white.mean_luminance());
+    }
+    emission
+}

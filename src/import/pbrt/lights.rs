@@ -1,0 +1,249 @@
+//! `LightSource`, `AreaLightSource`
+
+use super::directive::Name;
+use super::options::unknown;
+use super::params::{ParamSet, ParamType};
+use super::spectrum::SpectrumUse;
+use super::state::Builder;
+use crate::import::diagnostic::Diagnostics;
+use crate::import::source::Span;
+use crate::lights::spot::spot_solid_angle;
+use crate::lights::{EnvironmentFilter, EnvironmentMap, EnvironmentMapping, Light};
+use crate::math::{Affine3A, Rgb, Vec3, warp};
+use std::f32::consts::PI;
+use std::path::PathBuf;
+use std::sync::Arc;
+
+/// An area light as written; shapes that follow emit it.
+#[derive(Clone, Debug)]
+pub struct AreaLightDesc {
+    /// Radiance with the scale.
+    pub l: Rgb,
+    /// Both sides.
+    pub two_sided: bool,
+    /// Image of the radiance.
+    pub image: Option<(PathBuf, Span)>,
+    /// Total power (W) that replaces the scale, if positive.
+    pub power: f32,
+    /// The directive.
+    pub span: Span,
+}
+
+/// An environment map that waits for its image.
+#[derive(Clone, Debug)]
+pub struct EnvironmentDesc {
+    /// Image.
+    pub path: PathBuf,
+    /// Where it is named.
+    pub span: Span,
+    /// Orientation.
+    pub world_from_light: Affine3A,
+    /// Factor of the radiance.
+    pub scale: f32,
+    /// Illuminance that replaces the brightness, if positive.
+    pub illuminance: f32,
+    /// Place among the lights.
+    pub index: usize,
+}
+
+impl Builder<'_> {
+    /// `LightSource "kind"`
+    pub fn light(&mut self, kind: &Name, p: &ParamSet, d: &mut Diagnostics) {
+        let world_from_light = self.still_transform("lights", p.span, d);
+        let scale = light_scale(p, d);
+        let light = match kind.text.as_str() {
+            "point" => self.point(p, &world_from_light, scale, d),
+            "spot" => self.spot(p, &world_from_light, scale, d),
+            "distant" => self.distant(p, &world_from_light, scale, d),
+            "infinite" | "exinfinite" => self.infinite(p, &world_from_light, scale, d),
+            "goniometric" | "projection" => {
+                d.warning_once(kind.span, format!("light `{}` is not rendered yet: it is dark", kind.text));
+                for key in ["I", "power", "filename", "fov", "from", "to", "mapname"] {
+                    p.ignore(key);
+                }
+                None
+            }
+            other => {
+                unknown(other, kind.span, "light", &["point", "spot", "distant", "infinite"], d);
+                return;
+            }
+        };
+        p.ignore("nsamples");
+        p.ignore("samples");
+        p.report_unused(d);
+        self.lights.extend(light);
+    }
+
+    fn emitted(&self, p: &ParamSet, name: &'static str, d: &mut Diagnostics) -> Rgb {
+        self.color_param(p, name, SpectrumUse::Illuminant, d).unwrap_or(Rgb::WHITE)
+    }
+
+    fn point(&self, p: &ParamSet, world_from_light: &Affine3A, scale: f32, d: &mut Diagnostics) -> Option<Light> {
+        let intensity = self.emitted(p, "I", d) * scale;
+        let from = p.triple("from", ParamType::Point3, d).map_or(Vec3::ZERO, Vec3::from_array);
+        let power = p.float("power", d).unwrap_or(0.0);
+        let factor = if power > 0.0 { power / (4.0 * PI) } else { 1.0 };
+        Some(Light::Point { p: world_from_light.transform_point3(from), intensity: intensity * factor })
+    }
+
+    fn spot(&self, p: &ParamSet, world_from_light: &Affine3A, scale: f32, d: &mut Diagnostics) -> Option<Light> {
+        let intensity = self.emitted(p, "I", d) * scale;
+        let from = p.triple("from", ParamType::Point3, d).map_or(Vec3::ZERO, Vec3::from_array);
+        let to = p.triple("to", ParamType::Point3, d).map_or(Vec3::Z, Vec3::from_array);
+        let cone = p.float("coneangle", d).unwrap_or(30.0);
+        let delta = p.float("conedeltaangle", d).or_else(|| p.float("conedelta", d)).unwrap_or(5.0);
+        let power = p.float("power", d).unwrap_or(0.0);
+        let (p0, p1) = (world_from_light.transform_point3(from), world_from_light.transform_point3(to));
+        let Some(axis) = (p1 - p0).try_normalize() else {
+            d.error(p.span_of("to"), "the light and what it points at are the same point");
+            return None;
+        };
+        if !(cone > 0.0 && cone <= 180.0) {
+            d.error(p.span_of("coneangle"), format!("coneangle must be above 0 and at most 180 degrees, not {cone}"));
+            return None;
+        }
+        let cos_total = cone.to_radians().cos();
+        let cos_falloff_start = (cone - delta).clamp(0.0, cone).to_radians().cos();
+        let factor = if power > 0.0 { power / spot_solid_angle(cos_total, cos_falloff_start) } else { 1.0 };
+        Some(Light::Spot { p: p0, axis, cos_total, cos_falloff_start, intensity: intensity * factor })
+    }
+
+    fn distant(&self, p: &ParamSet, world_from_light: &Affine3A, scale: f32, d: &mut Diagnostics) -> Option<Light> {
+        let l = self.emitted(p, "L", d) * scale;
+        let from = p.triple("from", ParamType::Point3, d).map_or(Vec3::ZERO, Vec3::from_array);
+        let to = p.triple("to", ParamType::Point3, d).map_or(Vec3::Z, Vec3::from_array);
+        let illuminance = p.float("illuminance", d).unwrap_or(0.0);
+        let Some(wi_world) = world_from_light.transform_vector3(from - to).try_normalize() else {
+            d.error(p.span_of("to"), "`from` and `to` are the same point");
+            return None;
+        };
+        // pbrt-v4 replaces the scale, with what the colour's white is, and so the colour's luminance stays in.
+        let l = if illuminance > 0.0 { l * illuminance } else { l };
+        Some(Light::Distant { wi_world, l })
+    }
+
+    fn infinite(
+        &mut self,
+        p: &ParamSet,
+        world_from_light: &Affine3A,
+        scale: f32,
+        d: &mut Diagnostics,
+    ) -> Option<Light> {
+        if p.ignore("portal") {
+            d.warning_once(p.span_of("portal"), "portals are not used yet: the light is the same, with more noise");
+        }
+        let illuminance = p.float("illuminance", d).unwrap_or(0.0);
+        let color = self.color_param(p, "L", SpectrumUse::Illuminant, d);
+        if p.type_of("mapname").is_some() {
+            d.warning_once(p.span_of("mapname"), "`mapname` is pbrt-v3; pbrt-v4 writes `filename`");
+        }
+        let file = p.string("filename", d).map(|f| (f.to_owned(), p.span_of("filename")));
+        let file = file.or_else(|| p.string("mapname", d).map(|f| (f.to_owned(), p.span_of("mapname"))));
+        let Some((name, span)) = file else {
+            let l = color.unwrap_or(Rgb::WHITE) * scale;
+            let factor = if illuminance > 0.0 { illuminance / PI } else { 1.0 };
+            return Some(Light::InfiniteConstant { l: l * factor });
+        };
+        if color.is_some() {
+            d.error(p.span_of("L"), "an infinite light has `L` or `filename`, not both");
+        }
+        self.environments.push(EnvironmentDesc {
+            path: self.folder.join(name),
+            span,
+            world_from_light: *world_from_light,
+            scale,
+            illuminance,
+            index: self.lights.len(),
+        });
+        // Its place is kept by a dark light until the image is there.
+        Some(Light::InfiniteConstant { l: Rgb::BLACK })
+    }
+
+    /// `AreaLightSource "diffuse"`
+    pub fn area_light(&mut self, kind: &Name, p: &ParamSet, d: &mut Diagnostics) -> Option<AreaLightDesc> {
+        if kind.text == "area" {
+            d.warning_once(kind.span, "area light `area` is pbrt-v3; pbrt-v4 writes `diffuse`");
+        } else if kind.text != "diffuse" {
+            unknown(&kind.text, kind.span, "area light", &["diffuse"], d);
+            return None;
+        }
+        let scale = light_scale(p, d);
+        let color = self.color_param(p, "L", SpectrumUse::Illuminant, d);
+        let two_sided = p.boolean("twosided", d).unwrap_or(false);
+        let power = p.float("power", d).unwrap_or(0.0);
+        let image = p.string("filename", d).map(|f| (self.folder.join(f), p.span_of("filename")));
+        if color.is_some() && image.is_some() {
+            d.error(p.span_of("L"), "an area light has `L` or `filename`, not both");
+        }
+        p.ignore("nsamples");
+        p.ignore("samples");
+        p.report_unused(d);
+        self.emission_images.extend(image.as_ref().map(|(path, _)| path.clone()));
+        Some(AreaLightDesc { l: color.unwrap_or(Rgb::WHITE) * scale, two_sided, image, power, span: p.span })
+    }
+}
+
+/// `scale`: a factor of all lights; in pbrt-v3 a colour.
+fn light_scale(p: &ParamSet, d: &mut Diagnostics) -> f32 {
+    let scale = match p.type_of("scale") {
+        Some(ParamType::Rgb | ParamType::Spectrum) => {
+            d.warning_once(p.span_of("scale"), "a colour `scale` is pbrt-v3; pbrt-v4 takes a float: its mean is used");
+            match p.get("scale", &[ParamType::Rgb, ParamType::Spectrum], d).and_then(|q| q.floats()) {
+                Some(&[r, g, b]) => (r + g + b) / 3.0,
+                _ => 1.0,
+            }
+        }
+        _ => p.float("scale", d).unwrap_or(1.0),
+    };
+    if scale.is_finite() && scale >= 0.0 {
+        return scale;
+    }
+    d.error(p.span_of("scale"), format!("scale must be finite and not negative, not {scale}"));
+    0.0
+}
+
+impl EnvironmentDesc {
+    /// The light, when its image (rows from the top) is there.
+    pub fn light(&self, texels: Vec<Rgb>, size: [usize; 2], d: &mut Diagnostics) -> Option<Light> {
+        let mapping = if size[0] == size[1] {
+            EnvironmentMapping::EqualArea
+        } else if size[0] == 2 * size[1] {
+            d.warning_once(self.span, "a latitude-longitude map is pbrt-v3; pbrt-v4 takes equal-area maps");
+            EnvironmentMapping::LatLong
+        } else {
+            let message = format!("an environment map is square or twice as wide as high, not {}×{}", size[0], size[1]);
+            d.error(self.span, message);
+            return None;
+        };
+        match EnvironmentMap::new(texels, size, mapping, EnvironmentFilter::Nearest) {
+            Ok(map) => {
+                let factor = if self.illuminance > 0.0 { self.illuminance / map_illuminance(&map) } else { 1.0 };
+                Some(Light::infinite_image(Arc::new(map), &self.world_from_light, self.scale * factor))
+            }
+            Err(reason) => {
+                d.error(self.span, reason);
+                None
+            }
+        }
+    }
+}
+
+/// Illuminance of the light's own z = 0 plane by the upper half of the map, by stratified cosine sampling.
+fn map_illuminance(map: &EnvironmentMap) -> f32 {
+    const N: usize = 512;
+    let mut sum = 0.0_f64;
+    for y in 0..N {
+        for x in 0..N {
+            let u = [(x as f32 + 0.5) / N as f32, (y as f32 + 0.5) / N as f32];
+            sum += f64::from(map.le(warp::sample_cosine_hemisphere(u)).luminance());
+        }
+    }
+    (sum / (N * N) as f64) as f32 * PI
+}
+
+/// The factor that gives a surface of `area` (m²) the power that is asked for; `mean` is the mean of its image.
+pub fn power_factor(desc: &AreaLightDesc, area: f32, mean: f32) -> f32 {
+    let sides = if desc.two_sided { 2.0 } else { 1.0 };
+    let emitted = mean * sides * area * PI;
+    if desc.power > 0.0 && emitted > 0.0 { desc.power / emitted } else { 1.0 }
+}

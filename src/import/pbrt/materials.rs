@@ -1,0 +1,342 @@
+//! `Material`, `MakeNamedMaterial`
+
+use super::directive::Name;
+use super::options::unknown;
+use super::params::{Input, ParamSet, ParamType};
+use super::spectrum::{Resolved, SpectrumUse};
+use super::state::Builder;
+use crate::import::diagnostic::{Diagnostics, did_you_mean};
+use crate::import::resources::{ImageEncoding, ImageRequest};
+use crate::import::spectra;
+use crate::materials::{ConductorSpectrum, Material, MaterialEntry, MaterialId, Roughness};
+use crate::math::Rgb;
+use crate::textures::{Filter, FloatTexture, ImageId, RgbTexture, RgbTextureId, TextureSet, Wrap};
+
+/// The material of a shape: known, or by a name that may be defined later.
+#[derive(Clone, Debug)]
+pub enum MaterialUse {
+    /// Known.
+    Id(MaterialId),
+    /// By name.
+    Named(Name),
+}
+
+/// Kinds of pbrt-v4 that are rendered.
+const KINDS: &[&str] = &[
+    "diffuse",
+    "conductor",
+    "dielectric",
+    "thindielectric",
+    "diffusetransmission",
+    "coateddiffuse",
+    "coatedconductor",
+    "mix",
+    "interface",
+];
+
+/// What shapes are made of where no material is given: pbrt's diffuse of reflectance 0.5.
+pub fn default_material(materials: &mut Vec<MaterialEntry>, textures: &mut TextureSet) -> MaterialId {
+    let reflectance = textures.add_rgb(RgbTexture::Constant(Rgb::splat(0.5)));
+    let material = Material::Diffuse { reflectance };
+    materials.push(MaterialEntry { name: "default".to_owned(), material, normal_map: None, displacement: None });
+    (materials.len() - 1) as MaterialId
+}
+
+impl Builder<'_> {
+    /// `Material "kind"`
+    pub fn material(&mut self, kind: &Name, p: &ParamSet, d: &mut Diagnostics) {
+        let entry = self.material_entry(kind.text.clone(), &kind.text, kind, p, d);
+        p.report_unused(d);
+        self.state.material = MaterialUse::Id(self.add_material(entry));
+    }
+
+    /// `MakeNamedMaterial "name" "string type" "kind"`
+    pub fn make_named_material(&mut self, name: Name, p: &ParamSet, d: &mut Diagnostics) {
+        let Some(kind) = p.string("type", d).map(str::to_owned) else {
+            d.error(p.span, format!("material `{}` needs a `string type`", name.text));
+            return;
+        };
+        let place = Name { text: kind.clone(), span: p.span_of("type") };
+        let entry = self.material_entry(name.text.clone(), &kind, &place, p, d);
+        p.report_unused(d);
+        if self.named_materials.contains_key(&name.text) {
+            d.error(name.span, format!("material `{}` is defined twice", name.text));
+            return;
+        }
+        let id = self.add_material(entry);
+        self.named_materials.insert(name.text, id);
+    }
+
+    fn add_material(&mut self, entry: MaterialEntry) -> MaterialId {
+        self.materials.push(entry);
+        (self.materials.len() - 1) as MaterialId
+    }
+
+    fn material_entry(
+        &mut self,
+        name: String,
+        kind: &str,
+        place: &Name,
+        p: &ParamSet,
+        d: &mut Diagnostics,
+    ) -> MaterialEntry {
+        let material = match kind {
+            "" | "none" | "interface" => Material::Interface,
+            "mix" => self.mix(p, d),
+            _ => self.scattering_material(kind, place, p, d),
+        };
+        let displacement = match p.float_input("displacement", d) {
+            Some(Input::Texture(texture)) => self.float_texture_named(texture, p.span_of("displacement"), d),
+            Some(Input::Value(_)) | None => None,
+        };
+        MaterialEntry { name, material, normal_map: self.normal_map(p, d), displacement }
+    }
+
+    fn normal_map(&mut self, p: &ParamSet, d: &mut Diagnostics) -> Option<ImageId> {
+        let name = p.string("normalmap", d)?;
+        let request = ImageRequest {
+            path: self.folder.join(name),
+            encoding: ImageEncoding::Linear,
+            wrap: Wrap::Repeat,
+            filter: Filter::Bilinear,
+        };
+        Some(self.resources.image(request, p.span_of("normalmap")))
+    }
+
+    fn scattering_material(&mut self, kind: &str, place: &Name, p: &ParamSet, d: &mut Diagnostics) -> Material {
+        let grey = Rgb::splat(0.5);
+        match kind {
+            "diffuse" => Material::Diffuse { reflectance: self.albedo(p, "reflectance", grey, d) },
+            "conductor" => Material::Conductor {
+                spectrum: self.conductor(p, ["eta", "k", "reflectance"], d),
+                roughness: self.roughness(p, ["roughness", "uroughness", "vroughness"], 0.0, d),
+            },
+            "dielectric" => Material::Dielectric {
+                eta: self.ior(p, "eta", d),
+                roughness: self.roughness(p, ["roughness", "uroughness", "vroughness"], 0.0, d),
+            },
+            "thindielectric" => Material::ThinDielectric { eta: self.ior(p, "eta", d) },
+            "diffusetransmission" => Material::DiffuseTransmission {
+                reflectance: self.albedo(p, "reflectance", Rgb::splat(0.25), d),
+                transmittance: self.albedo(p, "transmittance", Rgb::splat(0.25), d),
+                scale: p.float("scale", d).unwrap_or(1.0),
+            },
+            "coateddiffuse" => Material::CoatedDiffuse {
+                reflectance: self.albedo(p, "reflectance", grey, d),
+                roughness: self.roughness(p, ["roughness", "uroughness", "vroughness"], 0.0, d),
+                thickness: self.float_param(p, "thickness", 0.01, d),
+                eta: self.ior(p, "eta", d),
+                g: self.float_param(p, "g", 0.0, d),
+                albedo: self.albedo(p, "albedo", Rgb::BLACK, d),
+                max_depth: count(p, "maxdepth", 10, d),
+                samples: count(p, "nsamples", 1, d),
+            },
+            "coatedconductor" => Material::CoatedConductor {
+                interface_roughness: self.roughness(
+                    p,
+                    ["interface.roughness", "interface.uroughness", "interface.vroughness"],
+                    0.0,
+                    d,
+                ),
+                thickness: self.float_param(p, "thickness", 0.01, d),
+                interface_eta: self.ior(p, "interface.eta", d),
+                conductor: self.conductor(p, ["conductor.eta", "conductor.k", "reflectance"], d),
+                conductor_roughness: self.roughness(
+                    p,
+                    ["conductor.roughness", "conductor.uroughness", "conductor.vroughness"],
+                    0.0,
+                    d,
+                ),
+                g: self.float_param(p, "g", 0.0, d),
+                albedo: self.albedo(p, "albedo", Rgb::BLACK, d),
+                max_depth: count(p, "maxdepth", 10, d),
+                samples: count(p, "nsamples", 1, d),
+            },
+            _ => self.other_material(kind, place, p, d),
+        }
+    }
+
+    /// Materials of pbrt-v3, and those that are not rendered yet.
+    fn other_material(&mut self, kind: &str, place: &Name, p: &ParamSet, d: &mut Diagnostics) -> Material {
+        let used = match kind {
+            "matte" => "diffuse",
+            "plastic" | "substrate" | "uber" => "coateddiffuse",
+            "metal" | "mirror" => "conductor",
+            "glass" => "dielectric",
+            "translucent" => "diffusetransmission",
+            "hair" | "measured" | "subsurface" | "kdsubsurface" | "disney" | "fourier" => {
+                d.warning_once(place.span, format!("material `{kind}` is not rendered yet: it is diffuse"));
+                p.ignore_all();
+                return Material::Diffuse { reflectance: self.textures.add_rgb(RgbTexture::Constant(Rgb::splat(0.5))) };
+            }
+            _ => {
+                unknown(kind, place.span, "material", KINDS, d);
+                p.ignore_all();
+                return Material::Interface;
+            }
+        };
+        d.warning_once(place.span, format!("material `{kind}` is pbrt-v3: `{used}` takes its place"));
+        let roughness_names = ["roughness", "uroughness", "vroughness"];
+        let material = match kind {
+            "matte" => Material::Diffuse { reflectance: self.albedo(p, "Kd", Rgb::splat(0.5), d) },
+            "plastic" | "substrate" | "uber" => Material::CoatedDiffuse {
+                reflectance: self.albedo(p, "Kd", Rgb::splat(if kind == "substrate" { 0.5 } else { 0.25 }), d),
+                roughness: self.roughness(p, roughness_names, 0.1, d),
+                thickness: self.textures.add_float(FloatTexture::Constant(0.01)),
+                eta: self.ior(p, "eta", d),
+                g: self.textures.add_float(FloatTexture::Constant(0.0)),
+                albedo: self.textures.add_rgb(RgbTexture::Constant(Rgb::BLACK)),
+                max_depth: 10,
+                samples: 1,
+            },
+            "metal" => Material::Conductor {
+                spectrum: self.conductor(p, ["eta", "k", "reflectance"], d),
+                roughness: self.roughness(p, roughness_names, 0.01, d),
+            },
+            "mirror" => Material::Conductor {
+                spectrum: ConductorSpectrum::Reflectance(self.albedo(p, "Kr", Rgb::splat(0.9), d)),
+                roughness: self.roughness(p, roughness_names, 0.0, d),
+            },
+            "glass" => Material::Dielectric {
+                eta: self.ior(p, "eta", d),
+                roughness: self.roughness(p, roughness_names, 0.0, d),
+            },
+            _ => Material::DiffuseTransmission {
+                reflectance: self.albedo(p, "Kd", Rgb::splat(0.25), d),
+                transmittance: self.albedo(p, "transmit", Rgb::splat(0.5), d),
+                scale: 1.0,
+            },
+        };
+        for key in ["sigma", "bumpmap", "Ks", "Kr", "Kt", "opacity", "index", "reflect", "remaproughness"] {
+            if p.ignore(key) && key != "remaproughness" {
+                d.warning_once(p.span_of(key), format!("`{key}` of material `{kind}` is ignored"));
+            }
+        }
+        material
+    }
+
+    fn albedo(&mut self, p: &ParamSet, name: &'static str, default: Rgb, d: &mut Diagnostics) -> RgbTextureId {
+        self.rgb_param(p, name, default, SpectrumUse::Albedo, d)
+    }
+
+    fn roughness(&mut self, p: &ParamSet, names: [&'static str; 3], default: f32, d: &mut Diagnostics) -> Roughness {
+        let both = self.float_param(p, names[0], default, d);
+        let mut axis = |name: &'static str| match p.float_input(name, d) {
+            Some(_) => self.float_param(p, name, default, d),
+            None => both,
+        };
+        let (u, v) = (axis(names[1]), axis(names[2]));
+        Roughness { u, v, remap: p.boolean("remaproughness", d).unwrap_or(true) }
+    }
+
+    /// An index of refraction: a number, or a spectrum of which the sodium line counts.
+    fn ior(&mut self, p: &ParamSet, name: &'static str, d: &mut Diagnostics) -> f32 {
+        let eta = match p.type_of(name) {
+            None => {
+                p.ignore(name);
+                return 1.5;
+            }
+            Some(ParamType::Float) => p.float(name, d),
+            Some(_) => {
+                let span = p.span_of(name);
+                let resolved = p.spectrum(name, d).and_then(|v| self.resolve_spectrum(v, span, d));
+                if matches!(resolved, Some(Resolved::Curve(_))) {
+                    d.warning_once(span, "dispersion is not rendered: the index at 587.6 nm is used");
+                }
+                resolved.map(|r| match r {
+                    Resolved::Rgb(rgb) => rgb.average(),
+                    Resolved::Curve(curve) => curve.at_d_line(),
+                })
+            }
+        };
+        match eta {
+            Some(eta) if eta > 0.0 && eta.is_finite() => eta,
+            Some(eta) => {
+                d.error(p.span_of(name), format!("an index of refraction must be positive, not {eta}"));
+                1.5
+            }
+            None => 1.5,
+        }
+    }
+
+    /// η and k, or a reflectance; copper if nothing is given.
+    fn conductor(&mut self, p: &ParamSet, names: [&'static str; 3], d: &mut Diagnostics) -> ConductorSpectrum {
+        let [eta_name, k_name, reflectance] = names;
+        if p.type_of(reflectance).is_some() {
+            for name in [eta_name, k_name] {
+                if p.type_of(name).is_some() {
+                    let message = format!("a conductor has `{reflectance}` or `{eta_name}` and `{k_name}`, not both");
+                    d.error(p.span_of(name), message);
+                    p.ignore(name);
+                }
+            }
+            return ConductorSpectrum::Reflectance(self.albedo(p, reflectance, Rgb::splat(0.5), d));
+        }
+        p.ignore(reflectance);
+        let mut input = |builder: &Self, name: &'static str, default: &str| match p.spectrum_input(name, d) {
+            Some(Input::Texture(_)) => None,
+            Some(Input::Value(value)) => builder.resolve_spectrum(value, p.span_of(name), d),
+            None => builder.resolve_spectrum(super::params::SpectrumValue::Named(default), p.span, d),
+        };
+        let eta = input(self, eta_name, "metal-Cu-eta");
+        let k = input(self, k_name, "metal-Cu-k");
+        if let (Some(eta), Some(k)) = (eta, k) {
+            // Both curves together make the colour that a spectral renderer shows; the Fresnel equations per channel of a
+            // colour do not.
+            let (eta, k) = spectra::conductor_rgb(&eta.unbounded_curve(), &k.unbounded_curve());
+            let (eta, k) =
+                (self.textures.add_rgb(RgbTexture::Constant(eta)), self.textures.add_rgb(RgbTexture::Constant(k)));
+            return ConductorSpectrum::EtaK { eta, k };
+        }
+        ConductorSpectrum::EtaK {
+            eta: self.rgb_param(p, eta_name, Rgb::splat(0.2), SpectrumUse::Unbounded, d),
+            k: self.rgb_param(p, k_name, Rgb::splat(3.9), SpectrumUse::Unbounded, d),
+        }
+    }
+
+    fn mix(&mut self, p: &ParamSet, d: &mut Diagnostics) -> Material {
+        let amount = self.float_param(p, "amount", 0.5, d);
+        let names = p.strings("materials", d).map(<[String]>::to_vec).unwrap_or_default();
+        let [first, second] = names.as_slice() else {
+            d.error(p.span_of("materials"), format!("a mix takes two materials, not {}", names.len()));
+            return Material::Interface;
+        };
+        let ids = [first, second].map(|name| self.named_material(name, p.span_of("materials"), d));
+        match ids {
+            [Some(a), Some(b)] => Material::Mix { materials: [a, b], amount },
+            _ => Material::Interface,
+        }
+    }
+
+    /// The material of a name that must be known by now.
+    fn named_material(&self, name: &str, span: crate::import::source::Span, d: &mut Diagnostics) -> Option<MaterialId> {
+        let found = self.named_materials.get(name).copied();
+        if found.is_none() {
+            let near = did_you_mean(name, self.named_materials.keys().map(String::as_str)).map(str::to_owned);
+            let diagnostic = d.error(span, format!("unknown material `{name}`"));
+            if let Some(near) = near {
+                diagnostic.help(format!("did you mean `{near}`?"));
+            }
+        }
+        found
+    }
+
+    /// The material of a shape, when all names are known.
+    pub fn material_of(&self, material: &MaterialUse, d: &mut Diagnostics) -> Option<MaterialId> {
+        match material {
+            MaterialUse::Id(id) => Some(*id),
+            MaterialUse::Named(name) => self.named_material(&name.text, name.span, d),
+        }
+    }
+}
+
+fn count(p: &ParamSet, name: &'static str, default: u32, d: &mut Diagnostics) -> u32 {
+    match p.integer(name, d) {
+        Some(n @ 1..=1_000) => n as u32,
+        Some(n) => {
+            d.error(p.span_of(name), format!("{name} must be from 1 to 1000, not {n}"));
+            default
+        }
+        None => default,
+    }
+}

@@ -1,0 +1,416 @@
+//! What stands before `WorldBegin`: camera, sampler, integrator; film and filter are in [`super::film`].
+
+use super::directive::Name;
+use super::params::ParamSet;
+use super::transform::{Ctm, affine};
+use crate::cameras::{Camera, SphericalMapping, default_screen_window};
+use crate::estimators::mis::Heuristic;
+use crate::import::LoadOptions;
+use crate::import::diagnostic::{Diagnostics, did_you_mean};
+use crate::import::source::Span;
+use crate::lights::LightSamplerKind;
+use crate::samplers::SamplerKind;
+use crate::scene::{EstimatorKind, FilmSettings, IntegratorKind, IntegratorSettings, SamplingSettings};
+
+/// A directive that is understood when all of them are known: the camera needs the film's size.
+pub(super) struct Pending {
+    pub name: Name,
+    pub params: ParamSet,
+}
+
+/// The options as far as they were read.
+#[derive(Default)]
+pub struct Options {
+    camera: Option<(Pending, Ctm)>,
+    pub(super) film: Option<Pending>,
+    pub(super) filter: Option<Pending>,
+    sampler: Option<Pending>,
+    integrator: Option<Pending>,
+    times: Option<[f32; 2]>,
+    seed: Option<u32>,
+}
+
+/// The options as the scene holds them.
+pub struct Settings {
+    /// Camera.
+    pub camera: Camera,
+    /// Film.
+    pub film: FilmSettings,
+    /// Sampler.
+    pub sampling: SamplingSettings,
+    /// Integrator.
+    pub integrator: IntegratorSettings,
+    /// Opening and closing of the shutter as fractions of the motion.
+    pub shutter: [f32; 2],
+}
+
+/// The camera, the film and the rest of a picture's size.
+struct CameraFrame {
+    resolution: [u32; 2],
+    shutter: [f32; 2],
+}
+
+impl Options {
+    /// `TransformTimes`
+    pub fn transform_times(&mut self, times: [f32; 2], span: Span, diagnostics: &mut Diagnostics) {
+        if times[0] < times[1] {
+            self.times = Some(times);
+        } else {
+            diagnostics.error(span, "the end of the motion must be after its start");
+        }
+    }
+
+    /// `Camera`; a second one replaces the first, as do the others.
+    pub fn camera(&mut self, name: Name, params: ParamSet, ctm: Ctm) {
+        self.camera = Some((Pending { name, params }, ctm));
+    }
+
+    /// `Film`
+    pub fn film(&mut self, name: Name, params: ParamSet) {
+        self.film = Some(Pending { name, params });
+    }
+
+    /// `Sampler`
+    pub fn sampler(&mut self, name: Name, params: ParamSet) {
+        self.sampler = Some(Pending { name, params });
+    }
+
+    /// `Integrator`
+    pub fn integrator(&mut self, name: Name, params: ParamSet) {
+        self.integrator = Some(Pending { name, params });
+    }
+
+    /// `PixelFilter`
+    pub fn pixel_filter(&mut self, name: Name, params: ParamSet) {
+        self.filter = Some(Pending { name, params });
+    }
+
+    /// `Option`
+    pub fn option(&mut self, params: &ParamSet, d: &mut Diagnostics) {
+        if let Some(seed) = params.integer("seed", d) {
+            self.seed = Some(seed as u32);
+        }
+        // Options of pbrt's own workings, and of its display.
+        for name in [
+            "disablepixeljitter",
+            "disabletexturefiltering",
+            "disablewavelengthjitter",
+            "forcediffuse",
+            "pixelstats",
+            "wavefront",
+            "displacementedgescale",
+            "msereferenceimage",
+            "msereferenceout",
+            "rendercoordsys",
+        ] {
+            if params.ignore(name) {
+                d.warning_once(params.span_of(name), format!("option `{name}` has no effect here"));
+            }
+        }
+        params.report_unused(d);
+    }
+
+    /// Understands all options.
+    pub fn finish(&self, load: &LoadOptions, d: &mut Diagnostics) -> Option<Settings> {
+        let (film, exposure_scale) = self.finish_film(load, d);
+        let sampling = self.finish_sampler(d);
+        let integrator = self.finish_integrator(d);
+        let (camera, shutter, seconds) = self.finish_camera(film.resolution, d)?;
+        let film = FilmSettings { scale: exposure_scale * seconds, ..film };
+        Some(Settings { camera, film, sampling, integrator, shutter })
+    }
+
+    fn finish_camera(&self, resolution: [u32; 2], d: &mut Diagnostics) -> Option<(Camera, [f32; 2], f32)> {
+        let Some((Pending { name, params }, ctm)) = &self.camera else {
+            let aspect = resolution[0] as f32 / resolution[1] as f32;
+            let window = default_screen_window(aspect);
+            let camera = Camera::perspective(affine(&Ctm::IDENTITY.start), 90.0, window, resolution, 0.0, 1e6);
+            return Some((camera, [0.0, 1.0], 1.0));
+        };
+        if ctm.is_moving() {
+            d.warning_once(name.span, "moving cameras are not rendered yet: it stays where it starts");
+        }
+        let world_from_camera = affine(&ctm.start.inverse());
+        let open = params.float("shutteropen", d).unwrap_or(0.0);
+        let close = params.float("shutterclose", d).unwrap_or(1.0);
+        if !(open < close) {
+            d.error(params.span_of("shutterclose"), "the shutter must close after it opens");
+            return None;
+        }
+        let [start, end] = self.times.unwrap_or([0.0, 1.0]);
+        let frame =
+            CameraFrame { resolution, shutter: [(open - start) / (end - start), (close - start) / (end - start)] };
+        let camera = match name.text.as_str() {
+            "perspective" => perspective(params, &world_from_camera, &frame, d),
+            "orthographic" => {
+                let window = screen_window(params, resolution, d)?;
+                let (lens, focus) = lens(params, d)?;
+                Some(Camera::orthographic(world_from_camera, window, resolution, lens, focus))
+            }
+            "spherical" | "environment" => {
+                if name.text == "environment" {
+                    d.warning_once(name.span, "camera `environment` is pbrt-v3; pbrt-v4 writes `spherical`");
+                }
+                let mapping = match params.string("mapping", d).unwrap_or(if name.text == "environment" {
+                    "equirectangular"
+                } else {
+                    "equalarea"
+                }) {
+                    "equalarea" => SphericalMapping::EqualArea,
+                    "equirectangular" => SphericalMapping::EquiRectangular,
+                    other => {
+                        let message = format!("unknown mapping `{other}`");
+                        d.error(params.span_of("mapping"), message).help("one of equalarea, equirectangular");
+                        return None;
+                    }
+                };
+                Some(Camera::spherical(world_from_camera, resolution, mapping))
+            }
+            "realistic" => {
+                d.error(name.span, "camera `realistic` is not rendered yet")
+                    .help("use perspective with lensradius and focaldistance");
+                return None;
+            }
+            other => {
+                unknown(other, name.span, "camera", &["perspective", "orthographic", "spherical"], d);
+                return None;
+            }
+        };
+        params.report_unused(d);
+        Some((camera?, frame.shutter, close - open))
+    }
+
+    fn finish_sampler(&self, d: &mut Diagnostics) -> SamplingSettings {
+        let mut s = SamplingSettings { sampler: SamplerKind::SobolBlueNoise, spp: 16, seed: self.seed.unwrap_or(0) };
+        let Some(Pending { name, params: p }) = &self.sampler else { return s };
+        match name.text.as_str() {
+            "independent" | "random" => s.sampler = SamplerKind::Independent,
+            "sobol" | "paddedsobol" | "halton" | "pmj02bn" | "stratified" | "lowdiscrepancy" | "02sequence"
+            | "maxmindist" => {
+                s.sampler = SamplerKind::Sobol;
+            }
+            "zsobol" => s.sampler = SamplerKind::SobolBlueNoise,
+            other => {
+                unknown(other, name.span, "sampler", &["independent", "sobol", "zsobol", "halton", "stratified"], d)
+            }
+        }
+        let count = |key: &'static str, d: &mut Diagnostics| match p.integer(key, d) {
+            Some(n @ 1..) => Some(n as u32),
+            Some(n) => {
+                d.error(p.span_of(key), format!("{key} must be at least 1, not {n}"));
+                None
+            }
+            None => None,
+        };
+        if name.text == "stratified" {
+            let (x, y) = (count("xsamples", d).unwrap_or(4), count("ysamples", d).unwrap_or(4));
+            s.spp = x.saturating_mul(y);
+            p.ignore("jitter");
+            p.ignore("dimensions");
+        }
+        if let Some(spp) = count("pixelsamples", d) {
+            s.spp = spp;
+        }
+        if let Some(seed) = p.integer("seed", d) {
+            s.seed = seed as u32;
+        }
+        // How the numbers are randomised is the sampler's own business here.
+        p.ignore("randomization");
+        p.report_unused(d);
+        s
+    }
+
+    fn finish_integrator(&self, d: &mut Diagnostics) -> IntegratorSettings {
+        let mut s = IntegratorSettings::default();
+        let Some(Pending { name, params: p }) = &self.integrator else { return s };
+        match name.text.as_str() {
+            "path" | "volpath" => {}
+            "direct" => s.kind = IntegratorKind::Direct,
+            "directlighting" => {
+                s.kind = IntegratorKind::Direct;
+                d.warning_once(name.span, "integrator `directlighting` is pbrt-v3: `direct` is used");
+            }
+            "simplepath" | "simplevolpath" | "bdpt" | "mlt" | "sppm" | "lightpath" | "ao" | "randomwalk"
+            | "whitted" => {
+                d.warning_once(name.span, format!("integrator `{}` is not rendered here: `path` is used", name.text));
+            }
+            other => unknown(other, name.span, "integrator", &["path", "direct", "volpath"], d),
+        }
+        match p.integer("maxdepth", d) {
+            Some(n @ 0..=10_000) => s.max_depth = n as u32,
+            Some(n) => {
+                d.error(p.span_of("maxdepth"), format!("maxdepth must be from 0 to 10000, not {n}"));
+            }
+            None if s.kind == IntegratorKind::Direct => s.max_depth = 1,
+            None => {}
+        }
+        lumiris_parameters(&mut s, p, d);
+        if p.ignore("regularize") {
+            d.warning_once(p.span_of("regularize"), "regularize is ignored: it would bias the picture");
+        }
+        for key in [
+            "radius",
+            "photonsperiteration",
+            "iterations",
+            "imagewritefrequency",
+            "rrthreshold",
+            "samplelights",
+            "samplebsdf",
+            "visualizestrategies",
+            "visualizeweights",
+            "bootstrapsamples",
+            "chains",
+            "mutationsperpixel",
+            "largestepprobability",
+            "sigma",
+            "cossample",
+            "maxdistance",
+            "strategy",
+            "seed",
+        ] {
+            p.ignore(key);
+        }
+        p.report_unused(d);
+        s
+    }
+}
+
+/// Parameters that are Lumiris's own, and pbrt's `lightsampler`.
+fn lumiris_parameters(s: &mut IntegratorSettings, p: &ParamSet, d: &mut Diagnostics) {
+    let mut choice = |key: &'static str, known: &[&str]| -> Option<usize> {
+        let value = p.string(key, d)?.to_owned();
+        let found = known.iter().position(|k| *k == value);
+        if found.is_none() {
+            d.error(p.span_of(key), format!("unknown {key} `{value}`")).help(format!("one of {}", known.join(", ")));
+        }
+        found
+    };
+    if let Some(i) = choice("estimator", &["mc", "mis"]) {
+        s.estimator = [EstimatorKind::Mc, EstimatorKind::Mis][i];
+    }
+    if let Some(i) = choice("heuristic", &["balance", "power", "maximum"]) {
+        s.heuristic = [Heuristic::Balance, Heuristic::Power, Heuristic::Maximum][i];
+    }
+    if let Some(i) = choice("lightsampler", &["uniform", "power", "bvh", "tree", "exhaustive", "spatial"]) {
+        s.light_choice = match i {
+            0 => LightSamplerKind::Uniform,
+            1 => LightSamplerKind::Power,
+            _ => LightSamplerKind::Tree,
+        };
+    }
+    match p.integer("samples", d) {
+        Some(n @ 1..=4096) => s.samples = n as u32,
+        Some(n) => {
+            d.error(p.span_of("samples"), format!("samples must be from 1 to 4096, not {n}"));
+        }
+        None => {}
+    }
+}
+
+/// A positive number, or the default after an error.
+pub(super) fn positive(p: &ParamSet, key: &'static str, default: f32, d: &mut Diagnostics) -> f32 {
+    match p.float(key, d) {
+        Some(x) if x > 0.0 && x.is_finite() => x,
+        Some(x) => {
+            d.error(p.span_of(key), format!("{key} must be positive, not {x}"));
+            default
+        }
+        None => default,
+    }
+}
+
+fn perspective(
+    p: &ParamSet,
+    world_from_camera: &crate::math::Affine3A,
+    frame: &CameraFrame,
+    d: &mut Diagnostics,
+) -> Option<Camera> {
+    let mut fov = p.float("fov", d).unwrap_or(90.0);
+    if let Some(half) = p.float("halffov", d) {
+        d.warning_once(p.span_of("halffov"), "halffov is pbrt-v3; pbrt-v4 writes fov");
+        fov = 2.0 * half;
+    }
+    if !(fov > 0.0 && fov < 180.0) {
+        d.error(p.span_of("fov"), format!("fov must be between 0 and 180 degrees, not {fov}"));
+        return None;
+    }
+    let window = screen_window(p, frame.resolution, d)?;
+    let (radius, focus) = lens(p, d)?;
+    Some(Camera::perspective(*world_from_camera, fov, window, frame.resolution, radius, focus))
+}
+
+fn lens(p: &ParamSet, d: &mut Diagnostics) -> Option<(f32, f32)> {
+    let radius = p.float("lensradius", d).unwrap_or(0.0);
+    if !(radius >= 0.0 && radius.is_finite()) {
+        d.error(p.span_of("lensradius"), "lensradius must not be negative");
+        return None;
+    }
+    Some((radius, positive(p, "focaldistance", 1e6, d)))
+}
+
+/// The part of the image plane that the film sees, x0 x1 y0 y1; the shorter axis spans −1..1 by default.
+fn screen_window(p: &ParamSet, [w, h]: [u32; 2], d: &mut Diagnostics) -> Option<[f32; 4]> {
+    let aspect = p.float("frameaspectratio", d).unwrap_or(w as f32 / h as f32);
+    if !(aspect > 0.0 && aspect.is_finite()) {
+        d.error(p.span_of("frameaspectratio"), "frameaspectratio must be positive");
+        return None;
+    }
+    let mut window = default_screen_window(aspect);
+    if let Some(v) = p.floats("screenwindow", d) {
+        match *v {
+            [x0, x1, y0, y1] if x0 < x1 && y0 < y1 => window = [x0, x1, y0, y1],
+            _ => {
+                d.error(p.span_of("screenwindow"), "screenwindow takes x0 x1 y0 y1 with x0 < x1 and y0 < y1");
+                return None;
+            }
+        }
+    }
+    Some(window)
+}
+
+/// An unknown name of something, with what is near.
+pub fn unknown(name: &str, span: Span, what: &str, known: &[&str], d: &mut Diagnostics) {
+    let help = match did_you_mean(name, known.iter().copied()) {
+        Some(near) => format!("did you mean `{near}`?"),
+        None => format!("one of {}", known.join(", ")),
+    };
+    d.error(span, format!("unknown {what} `{name}`")).help(help);
+}
+
+/// `MakeNamedMedium`: its form is checked; media are not rendered yet.
+pub fn medium(name: &Name, p: &ParamSet, d: &mut Diagnostics) {
+    let kind = p.string("type", d).unwrap_or("homogeneous").to_owned();
+    let known = ["homogeneous", "uniformgrid", "rgbgrid", "cloud", "nanovdb"];
+    if !known.contains(&kind.as_str()) {
+        unknown(&kind, p.span_of("type"), "medium", &known, d);
+    }
+    for key in [
+        "preset",
+        "sigma_a",
+        "sigma_s",
+        "scale",
+        "g",
+        "Le",
+        "Lescale",
+        "p0",
+        "p1",
+        "density",
+        "nx",
+        "ny",
+        "nz",
+        "temperature",
+        "temperatureoffset",
+        "temperaturescale",
+        "temperaturecutoff",
+        "wispiness",
+        "frequency",
+        "filename",
+        "LeScale",
+    ] {
+        p.ignore(key);
+    }
+    p.report_unused(d);
+    if name.text.is_empty() {
+        d.error(name.span, "a medium needs a name");
+    }
+}

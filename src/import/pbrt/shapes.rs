@@ -1,0 +1,472 @@
+//! `Shape`: checked when it is read, made when all files are asked for.
+
+use super::directive::Name;
+use super::lights::AreaLightDesc;
+use super::materials::MaterialUse;
+use super::options::unknown;
+use super::params::{Input, ParamSet, ParamType};
+use super::state::Builder;
+use super::transform::{Ctm, affine};
+use crate::geometry::loop_subdiv::loop_subdivide;
+use crate::geometry::{BilinearMesh, Quadric, QuadricKind, Shape, TriangleMesh};
+use crate::import::diagnostic::Diagnostics;
+use crate::import::ply::{PlyError, read_ply};
+use crate::import::source::Span;
+use crate::math::transform::{swaps_handedness, transform_normal};
+use crate::math::{Affine3A, Vec2, Vec3};
+use crate::textures::FloatTexture;
+use std::path::PathBuf;
+
+/// An object: what `ObjectBegin` … `ObjectEnd` define.
+#[derive(Clone, Debug)]
+pub struct ObjectDesc {
+    /// Name.
+    pub name: String,
+    /// Where it is named.
+    pub span: Span,
+}
+
+/// A placement of an object.
+#[derive(Clone, Debug)]
+pub struct InstanceDesc {
+    /// Index of the object.
+    pub object: usize,
+    /// Its transformation.
+    pub ctm: Ctm,
+}
+
+/// Where the numbers of a shape come from.
+#[derive(Clone, Debug)]
+pub enum ShapeSource {
+    /// Triangles in the file itself.
+    Mesh(MeshData),
+    /// Triangles and patches in a PLY file.
+    Ply(PathBuf),
+    /// A control mesh that is subdivided `levels` times.
+    Loop(MeshData, u32),
+    /// A sphere, disk or cylinder.
+    Quadric(QuadricKind),
+    /// Bilinear patches.
+    Bilinear(PatchData),
+}
+
+/// Arrays of a triangle mesh in object space.
+#[derive(Clone, Debug, Default)]
+pub struct MeshData {
+    positions: Vec<Vec3>,
+    indices: Vec<[u32; 3]>,
+    normals: Vec<Vec3>,
+    tangents: Vec<Vec3>,
+    uvs: Vec<Vec2>,
+}
+
+/// Arrays of a bilinear mesh in object space.
+#[derive(Clone, Debug, Default)]
+pub struct PatchData {
+    positions: Vec<Vec3>,
+    indices: Vec<[u32; 4]>,
+    normals: Vec<Vec3>,
+    uvs: Vec<Vec2>,
+}
+
+/// A shape with all that the graphics state gives it.
+#[derive(Clone, Debug)]
+pub struct ShapeDesc {
+    /// Its numbers.
+    pub source: ShapeSource,
+    /// A name for people.
+    pub name: String,
+    /// Where it stands.
+    pub span: Span,
+    /// Transformation from its own space.
+    pub ctm: Ctm,
+    /// `ReverseOrientation`.
+    pub reverse_orientation: bool,
+    /// Material.
+    pub material: MaterialUse,
+    /// Emission.
+    pub area_light: Option<AreaLightDesc>,
+    /// Cut-outs.
+    pub alpha: Option<u32>,
+    /// The object that it belongs to.
+    pub object: Option<usize>,
+}
+
+/// What making a shape has to say.
+#[derive(Debug, Default)]
+pub struct Made {
+    /// The shapes: a PLY file may hold triangles and patches.
+    pub shapes: Vec<Shape>,
+    /// Warnings.
+    pub warnings: Vec<String>,
+}
+
+/// Why a shape cannot be made.
+#[derive(Debug)]
+pub enum ShapeError {
+    /// Its file is missing.
+    Missing(PathBuf, String),
+    /// It is wrong.
+    Wrong(String),
+}
+
+impl Builder<'_> {
+    /// `Shape "kind"`
+    pub fn shape(&mut self, kind: &Name, mut p: ParamSet, d: &mut Diagnostics) {
+        let mut name = kind.text.clone();
+        let source = match kind.text.as_str() {
+            "sphere" | "disk" | "cylinder" => quadric(&kind.text, &p, d).map(ShapeSource::Quadric),
+            "trianglemesh" => mesh_data(&mut p, d).map(ShapeSource::Mesh),
+            "loopsubdiv" => {
+                let levels = p.integer("levels", d).or_else(|| p.integer("nlevels", d)).unwrap_or(3);
+                p.ignore("scheme");
+                match levels {
+                    0..=10 => mesh_data(&mut p, d).map(|m| ShapeSource::Loop(m, levels as u32)),
+                    _ => {
+                        d.error(p.span_of("levels"), format!("levels must be from 0 to 10, not {levels}"));
+                        None
+                    }
+                }
+            }
+            "plymesh" => match p.string("filename", d) {
+                Some(file) => {
+                    name = file.to_owned();
+                    let path = self.folder.join(file);
+                    if p.ignore("displacement") {
+                        d.warning_once(
+                            p.span_of("displacement"),
+                            "displaced meshes are not rendered yet: it stays smooth",
+                        );
+                    }
+                    p.ignore("edgelength");
+                    Some(ShapeSource::Ply(path))
+                }
+                None => {
+                    d.error(p.span, "a plymesh needs a `string filename`");
+                    None
+                }
+            },
+            "bilinearmesh" => {
+                if p.ignore("emissionfilename") {
+                    d.warning_once(
+                        p.span_of("emissionfilename"),
+                        "`emissionfilename` is not used yet: sampling is uniform",
+                    );
+                }
+                patch_data(&mut p, d).map(ShapeSource::Bilinear)
+            }
+            "curve" | "hyperboloid" | "cone" | "paraboloid" | "heightfield" | "nurbs" => {
+                d.warning_once(kind.span, format!("shape `{}` is not rendered yet: it is left out", kind.text));
+                return;
+            }
+            other => {
+                let known = ["trianglemesh", "plymesh", "sphere", "disk", "cylinder", "bilinearmesh", "loopsubdiv"];
+                unknown(other, kind.span, "shape", &known, d);
+                return;
+            }
+        };
+        let alpha = self.alpha(&p, d);
+        p.report_unused(d);
+        if let Some(source) = source {
+            self.shapes.push(ShapeDesc {
+                source,
+                name,
+                span: p.span,
+                ctm: self.state.ctm,
+                reverse_orientation: self.state.reverse_orientation,
+                material: self.state.material.clone(),
+                area_light: self.state.area_light.clone(),
+                alpha,
+                object: self.current_object,
+            });
+        }
+    }
+
+    /// Cut-outs; fully opaque ones are left out.
+    fn alpha(&mut self, p: &ParamSet, d: &mut Diagnostics) -> Option<u32> {
+        if p.ignore("shadowalpha") {
+            d.warning_once(p.span_of("shadowalpha"), "`shadowalpha` is pbrt-v3: `alpha` holds for shadows as well");
+        }
+        match p.float_input("alpha", d)? {
+            Input::Value(alpha) if alpha >= 1.0 => None,
+            Input::Value(alpha) => Some(self.textures.add_float(FloatTexture::Constant(alpha))),
+            Input::Texture(texture) => self.float_texture_named(texture, p.span_of("alpha"), d),
+        }
+    }
+}
+
+fn quadric(kind: &str, p: &ParamSet, d: &mut Diagnostics) -> Option<QuadricKind> {
+    let radius = p.float("radius", d).unwrap_or(1.0);
+    let phi = p.float("phimax", d).unwrap_or(360.0);
+    if !(radius > 0.0 && radius.is_finite()) {
+        d.error(p.span_of("radius"), format!("radius must be positive, not {radius}"));
+        return None;
+    }
+    if !(phi > 0.0 && phi <= 360.0) {
+        d.error(p.span_of("phimax"), format!("phimax must be above 0 and at most 360 degrees, not {phi}"));
+        return None;
+    }
+    let phi_max = phi.to_radians();
+    match kind {
+        "disk" => {
+            let height = p.float("height", d).unwrap_or(0.0);
+            let inner_radius = p.float("innerradius", d).unwrap_or(0.0);
+            if !(inner_radius >= 0.0 && inner_radius < radius && height.is_finite()) {
+                d.error(p.span_of("innerradius"), "innerradius must be at least 0 and below radius");
+                return None;
+            }
+            Some(QuadricKind::Disk { height, radius, inner_radius, phi_max })
+        }
+        "sphere" => {
+            let ends = [p.float("zmin", d).unwrap_or(-radius), p.float("zmax", d).unwrap_or(radius)];
+            let [z_min, z_max] = ends.map(|z| z.clamp(-radius, radius));
+            (z_min < z_max).then_some(QuadricKind::Sphere { radius, z_min, z_max, phi_max }).or_else(|| {
+                d.error(p.span_of("zmin"), "zmin must be below zmax");
+                None
+            })
+        }
+        _ => {
+            let (z_min, z_max) = (p.float("zmin", d).unwrap_or(-1.0), p.float("zmax", d).unwrap_or(1.0));
+            let (z_min, z_max) = (z_min.min(z_max), z_min.max(z_max));
+            if !(z_min < z_max && z_min.is_finite() && z_max.is_finite()) {
+                d.error(p.span_of("zmin"), "a cylinder needs two different finite ends");
+                return None;
+            }
+            Some(QuadricKind::Cylinder { radius, z_min, z_max, phi_max })
+        }
+    }
+}
+
+const POINTS: &[ParamType] = &[ParamType::Point3];
+const VECTORS: &[ParamType] = &[ParamType::Vector3];
+const NORMALS: &[ParamType] = &[ParamType::Normal];
+const UVS: &[ParamType] = &[ParamType::Point2, ParamType::Float];
+
+fn vec3s(p: &mut ParamSet, name: &'static str, types: &[ParamType], d: &mut Diagnostics) -> Option<Vec<Vec3>> {
+    let floats = p.take_floats(name, types, d)?;
+    // Room for the element that a mesh adds.
+    let mut out = Vec::with_capacity(floats.len() / 3 + 1);
+    out.extend(floats.chunks_exact(3).map(Vec3::from_slice));
+    Some(out)
+}
+
+/// Texture coordinates under any of their names.
+fn uvs(p: &mut ParamSet, d: &mut Diagnostics) -> Vec<Vec2> {
+    let floats = p.take_floats("uv", UVS, d).or_else(|| p.take_floats("st", UVS, d)).unwrap_or_default();
+    floats.chunks_exact(2).map(Vec2::from_slice).collect()
+}
+
+/// An array that must be as long as the positions, or absent.
+fn per_vertex<T>(values: Vec<T>, count: usize, name: &'static str, p: &ParamSet, d: &mut Diagnostics) -> Vec<T> {
+    if values.is_empty() || values.len() == count {
+        return values;
+    }
+    let message = format!("`{name}` has {} entries, but there are {count} vertices", values.len());
+    d.error(p.span_of(name), message);
+    Vec::new()
+}
+
+fn indices<const N: usize>(p: &mut ParamSet, count: usize, d: &mut Diagnostics) -> Option<Vec<[u32; N]>> {
+    let Some(values) = p.take_integers("indices", d) else {
+        if count == N {
+            return Some(vec![std::array::from_fn(|i| i as u32)]);
+        }
+        d.error(p.span, format!("{} needs `integer indices`: it has {count} vertices", p.owner));
+        return None;
+    };
+    if values.len() % N != 0 {
+        d.error(p.span_of("indices"), format!("the number of indices must be a multiple of {N}, not {}", values.len()));
+        return None;
+    }
+    if let Some(bad) = values.iter().find(|&&i| i < 0 || i as usize >= count) {
+        d.error(p.span_of("indices"), format!("index {bad} is out of range: there are {count} vertices"));
+        return None;
+    }
+    Some(values.chunks_exact(N).map(|c| std::array::from_fn(|i| c[i] as u32)).collect())
+}
+
+fn mesh_data(p: &mut ParamSet, d: &mut Diagnostics) -> Option<MeshData> {
+    let Some(positions) = vec3s(p, "P", POINTS, d) else {
+        d.error(p.span, format!("{} needs `point3 P`", p.owner));
+        return None;
+    };
+    let count = positions.len();
+    let normals = vec3s(p, "N", NORMALS, d).unwrap_or_default();
+    let tangents = vec3s(p, "S", VECTORS, d).unwrap_or_default();
+    let uvs = uvs(p, d);
+    let indices = indices::<3>(p, count, d)?;
+    p.ignore("faceIndices");
+    Some(MeshData {
+        indices,
+        normals: per_vertex(normals, count, "N", p, d),
+        tangents: per_vertex(tangents, count, "S", p, d),
+        uvs: per_vertex(uvs, count, "uv", p, d),
+        positions,
+    })
+}
+
+fn patch_data(p: &mut ParamSet, d: &mut Diagnostics) -> Option<PatchData> {
+    let Some(positions) = vec3s(p, "P", POINTS, d) else {
+        d.error(p.span, format!("{} needs `point3 P`", p.owner));
+        return None;
+    };
+    let count = positions.len();
+    let normals = vec3s(p, "N", NORMALS, d).unwrap_or_default();
+    let uvs = uvs(p, d);
+    let indices = indices::<4>(p, count, d)?;
+    p.ignore("faceIndices");
+    Some(PatchData {
+        indices,
+        normals: per_vertex(normals, count, "N", p, d),
+        uvs: per_vertex(uvs, count, "uv", p, d),
+        positions,
+    })
+}
+
+impl ShapeDesc {
+    /// The placement of the shape in its group: the transformation, or nothing if an instance moves it.
+    fn group_from_object(&self) -> Affine3A {
+        if self.ctm.is_moving() { Affine3A::IDENTITY } else { affine(&self.ctm.start) }
+    }
+
+    /// Makes the shapes in the space of their group. Takes the arrays out of `self`.
+    pub fn make(&mut self) -> Result<Made, ShapeError> {
+        let m = self.group_from_object();
+        // pbrt flips where the transformation of the shape mirrors, moving or not.
+        let reverse = self.reverse_orientation;
+        let flip = reverse ^ swaps_handedness(&affine(&self.ctm.start));
+        let placement = Placement { group_from_object: m, flip, reverse };
+        let source = std::mem::replace(&mut self.source, ShapeSource::Mesh(MeshData::default()));
+        let wrong = |reason: String| ShapeError::Wrong(reason);
+        let mut made = Made::default();
+        match source {
+            ShapeSource::Quadric(kind) => made.shapes.push(Shape::Quadric(Quadric {
+                kind,
+                group_from_local: m,
+                local_from_group: m.inverse(),
+                flip_normal: flip,
+            })),
+            ShapeSource::Mesh(data) => made.shapes.push(Shape::Mesh(triangles(data, &placement).map_err(wrong)?)),
+            ShapeSource::Loop(data, levels) => {
+                let faces = data.indices.len() as u64 * 4_u64.saturating_pow(levels);
+                if faces > 200_000_000 {
+                    return Err(ShapeError::Wrong(format!(
+                        "{levels} levels make {faces} triangles; at most 200 million are"
+                    )));
+                }
+                let mesh = loop_subdivide(levels, data.positions, data.indices).map_err(wrong)?;
+                let fine = MeshData {
+                    positions: mesh.positions().to_vec(),
+                    normals: mesh.normals.clone(),
+                    indices: mesh.indices,
+                    ..MeshData::default()
+                };
+                made.shapes.push(Shape::Mesh(triangles(fine, &placement).map_err(wrong)?));
+            }
+            ShapeSource::Bilinear(data) => made.shapes.push(patches(data, &placement).map_err(wrong)?),
+            ShapeSource::Ply(path) => {
+                let ply = read_ply(&path).map_err(|error| match error {
+                    PlyError::Io { source, .. } => ShapeError::Missing(path.clone(), source.to_string()),
+                    other => ShapeError::Wrong(format!("{}: {other}", path.display())),
+                })?;
+                made.warnings = ply.warnings.iter().map(|w| format!("{}: {w}", path.display())).collect();
+                if !ply.quads.is_empty() {
+                    let data = PatchData {
+                        positions: ply.positions.clone(),
+                        // A patch has its corners row by row, a face around.
+                        indices: ply.quads.iter().map(|&[a, b, c, d]| [a, b, d, c]).collect(),
+                        normals: ply.normals.clone(),
+                        uvs: ply.uvs.clone(),
+                    };
+                    made.shapes.push(patches(data, &placement).map_err(wrong)?);
+                }
+                if !ply.triangles.is_empty() {
+                    let data = MeshData {
+                        positions: ply.positions,
+                        indices: ply.triangles,
+                        normals: ply.normals,
+                        tangents: Vec::new(),
+                        uvs: ply.uvs,
+                    };
+                    made.shapes.push(Shape::Mesh(triangles(data, &placement).map_err(wrong)?));
+                }
+            }
+        }
+        Ok(made)
+    }
+}
+
+fn place(points: &mut [Vec3], m: &Affine3A) {
+    if *m != Affine3A::IDENTITY {
+        points.iter_mut().for_each(|p| *p = m.transform_point3(*p));
+    }
+}
+
+/// Normals in group space; pbrt turns them where it turns the orientation by `ReverseOrientation`.
+fn place_normals(normals: &mut [Vec3], m: &Affine3A, reverse: bool) {
+    let sign = if reverse { -1.0 } else { 1.0 };
+    normals.iter_mut().for_each(|n| *n = transform_normal(m, *n) * sign);
+}
+
+/// How a shape comes into its group.
+struct Placement {
+    group_from_object: Affine3A,
+    /// The geometric normal is reversed.
+    flip: bool,
+    /// `ReverseOrientation`, which reverses given normals as well.
+    reverse: bool,
+}
+
+fn triangles(mut data: MeshData, placement: &Placement) -> Result<TriangleMesh, String> {
+    let m = &placement.group_from_object;
+    place(&mut data.positions, m);
+    place_normals(&mut data.normals, m, placement.reverse);
+    data.tangents.iter_mut().for_each(|t| *t = m.transform_vector3(*t));
+    let mut mesh = TriangleMesh::new(data.positions, data.indices)?;
+    (mesh.normals, mesh.tangents, mesh.uvs) = (data.normals, data.tangents, data.uvs);
+    mesh.flip_normal = placement.flip;
+    Ok(mesh)
+}
+
+/// Largest distance of a corner of a parallelogram from where the other three put it, relative to its edges.
+const PARALLELOGRAM: f32 = 1e-6;
+
+/// Two triangles for each patch, if all patches are parallelograms without normals: the same surface and the same texture
+/// coordinates, which ray tracers meet much faster.
+fn parallelograms(data: &PatchData) -> Option<MeshData> {
+    let corners = |c: &[u32; 4]| c.map(|i| data.positions[i as usize]);
+    let is_flat = |c: &[u32; 4]| {
+        let [a, b, c, d] = corners(c);
+        (a + d - b - c).length() <= PARALLELOGRAM * ((b - a).length() + (c - a).length())
+    };
+    if !data.normals.is_empty() || !data.indices.iter().all(is_flat) {
+        return None;
+    }
+    let mut mesh = MeshData::default();
+    for patch in &data.indices {
+        let first = mesh.positions.len() as u32;
+        mesh.positions.extend(corners(patch));
+        mesh.uvs.extend((0..4).map(|i| match data.uvs.get(patch[i] as usize) {
+            Some(&uv) => uv,
+            None => Vec2::new((i % 2) as f32, (i / 2) as f32),
+        }));
+        mesh.indices.extend([[first, first + 1, first + 3], [first, first + 3, first + 2]]);
+    }
+    Some(mesh)
+}
+
+fn patches(mut data: PatchData, placement: &Placement) -> Result<Shape, String> {
+    if let Some(mesh) = parallelograms(&data) {
+        return triangles(mesh, placement).map(Shape::Mesh);
+    }
+    let m = &placement.group_from_object;
+    place(&mut data.positions, m);
+    place_normals(&mut data.normals, m, placement.reverse);
+    Ok(Shape::Bilinear(BilinearMesh {
+        positions: data.positions,
+        indices: data.indices,
+        normals: data.normals,
+        uvs: data.uvs,
+        flip_normal: placement.flip,
+    }))
+}

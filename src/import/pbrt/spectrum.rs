@@ -1,0 +1,102 @@
+//! Spectrum parameters to linear Rec.709.
+
+use super::params::SpectrumValue;
+use super::state::Builder;
+use crate::import::diagnostic::Diagnostics;
+use crate::import::source::Span;
+use crate::import::spectra::{self, Spectrum};
+use crate::import::upsampling::unbounded_spectrum;
+use crate::math::Rgb;
+
+/// What a spectrum is of; the same samples mean different colours.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum SpectrumUse {
+    /// A factor between 0 and 1, seen under white light.
+    Albedo,
+    /// Any non-negative quantity, such as an index of refraction.
+    Unbounded,
+    /// Emitted light; spectra and blackbodies are scaled to unit luminance, as pbrt-v4 does.
+    Illuminant,
+}
+
+/// A spectrum parameter that is a colour or a curve.
+#[derive(Clone, Debug, PartialEq)]
+pub enum Resolved {
+    /// A colour already.
+    Rgb(Rgb),
+    /// A curve over wavelength.
+    Curve(Spectrum),
+}
+
+impl Resolved {
+    /// A non-negative quantity over wavelength: the curve, or the smooth one that shows the colour.
+    pub fn unbounded_curve(self) -> Spectrum {
+        match self {
+            Resolved::Rgb(rgb) => unbounded_spectrum(rgb),
+            Resolved::Curve(curve) => curve,
+        }
+    }
+}
+
+impl Builder<'_> {
+    /// Finds out what a spectrum parameter is; `None` after an error.
+    pub fn resolve_spectrum(&self, value: SpectrumValue<'_>, span: Span, d: &mut Diagnostics) -> Option<Resolved> {
+        let space = self.state.color_space;
+        match value {
+            SpectrumValue::Rgb(rgb) => finite(space.to_rec709(rgb), span, d).map(Resolved::Rgb),
+            SpectrumValue::Xyz(xyz) => finite(spectra::xyz_to_rgb(xyz), span, d).map(Resolved::Rgb),
+            SpectrumValue::Blackbody(kelvin, factor) if kelvin > 0.0 && kelvin.is_finite() => {
+                Some(Resolved::Rgb(spectra::blackbody_rgb(kelvin) * factor))
+            }
+            SpectrumValue::Blackbody(..) => {
+                d.error(span, "a temperature must be positive");
+                None
+            }
+            SpectrumValue::Samples(samples) => match Spectrum::from_pairs(samples) {
+                Ok(spectrum) => Some(Resolved::Curve(spectrum)),
+                Err(reason) => {
+                    d.error(span, reason);
+                    None
+                }
+            },
+            SpectrumValue::Named(name) => self.named_spectrum(name, span, d),
+        }
+    }
+
+    fn named_spectrum(&self, name: &str, span: Span, d: &mut Diagnostics) -> Option<Resolved> {
+        if let Some(curve) = Spectrum::named(name) {
+            return Some(Resolved::Curve(curve));
+        }
+        if let Some(rgb) = spectra::illuminant_rgb(name) {
+            return Some(Resolved::Rgb(rgb));
+        }
+        let path = self.folder.join(name);
+        match Spectrum::read(&path) {
+            Ok(Ok(curve)) => return Some(Resolved::Curve(curve)),
+            Ok(Err(error)) if name.contains('.') => d.missing_file(path, error, Some(span)),
+            Ok(Err(_)) => super::options::unknown(name, span, "spectrum", &Spectrum::names().collect::<Vec<_>>(), d),
+            Err(reason) => {
+                d.error(span, format!("{}: {reason}", path.display()));
+            }
+        }
+        None
+    }
+
+    /// The colour of a spectrum parameter; `None` after an error.
+    pub fn color(&self, value: SpectrumValue<'_>, usage: SpectrumUse, span: Span, d: &mut Diagnostics) -> Option<Rgb> {
+        Some(match (self.resolve_spectrum(value, span, d)?, usage) {
+            (Resolved::Rgb(rgb), _) => rgb,
+            (Resolved::Curve(curve), SpectrumUse::Illuminant) => spectra::emission_rgb(&curve),
+            (Resolved::Curve(curve), SpectrumUse::Albedo) => spectra::reflectance_rgb(&curve),
+            (Resolved::Curve(curve), SpectrumUse::Unbounded) => spectra::unbounded_rgb(&curve),
+        })
+    }
+}
+
+fn finite(rgb: Rgb, span: Span, d: &mut Diagnostics) -> Option<Rgb> {
+    if rgb.is_finite() {
+        return Some(rgb);
+    }
+    d.error(span, "a colour must be finite");
+    None
+}

@@ -1,0 +1,341 @@
+//! `Texture`
+
+use super::directive::Name;
+use super::options::unknown;
+use super::params::{Input, ParamSet, ParamType, SpectrumValue};
+use super::spectrum::SpectrumUse;
+use super::state::Builder;
+use super::transform::affine;
+use crate::import::diagnostic::{Diagnostics, did_you_mean};
+use crate::import::resources::{ImageEncoding, ImageRequest};
+use crate::math::{Affine3A, Rgb, Vec2, Vec3};
+use crate::textures::{
+    CheckerboardMapping, Filter, FloatTexture, FloatTextureId, ImageTexture, Mapping2d, RgbTexture, RgbTextureId, Wrap,
+};
+use std::collections::HashMap;
+
+/// Textures by name; floats and spectra have names of their own.
+#[derive(Debug, Default)]
+pub struct TextureNames {
+    floats: HashMap<String, FloatTextureId>,
+    rgbs: HashMap<String, RgbTextureId>,
+}
+
+impl Builder<'_> {
+    /// `Texture "name" "float|spectrum" "class"`
+    pub fn texture(&mut self, name: Name, value: &Name, class: &Name, p: &ParamSet, d: &mut Diagnostics) {
+        let is_float = match value.text.as_str() {
+            "float" => true,
+            "spectrum" => false,
+            "color" => {
+                d.warning_once(value.span, "texture type `color` is pbrt-v3; pbrt-v4 writes `spectrum`");
+                false
+            }
+            other => return unknown(other, value.span, "texture type", &["float", "spectrum"], d),
+        };
+        // A name of another colour use shares the map of spectra; a second definition replaces the first, as in pbrt.
+        if is_float {
+            let texture = self.float_texture(class, p, d);
+            let id = self.textures.add_float(texture);
+            self.texture_names.floats.insert(name.text, id);
+        } else {
+            let texture = self.rgb_texture(class, p, d);
+            let id = self.textures.add_rgb(texture);
+            self.texture_names.rgbs.insert(name.text, id);
+        }
+        p.report_unused(d);
+    }
+
+    fn float_texture(&mut self, class: &Name, p: &ParamSet, d: &mut Diagnostics) -> FloatTexture {
+        match class.text.as_str() {
+            "constant" => FloatTexture::Constant(p.float("value", d).unwrap_or(1.0)),
+            "scale" => {
+                let tex = self.float_param(p, "tex", 1.0, d);
+                FloatTexture::Scale { tex, scale: self.float_param(p, "scale", 1.0, d) }
+            }
+            "mix" => FloatTexture::Mix {
+                tex1: self.float_param(p, "tex1", 0.0, d),
+                tex2: self.float_param(p, "tex2", 1.0, d),
+                amount: self.float_param(p, "amount", 0.5, d),
+            },
+            "directionmix" => FloatTexture::DirectionMix {
+                tex1: self.float_param(p, "tex1", 0.0, d),
+                tex2: self.float_param(p, "tex2", 1.0, d),
+                direction: self.direction(p, d),
+            },
+            "checkerboard" => FloatTexture::Checkerboard {
+                mapping: self.checker_mapping(p, d),
+                tex1: self.float_param(p, "tex1", 1.0, d),
+                tex2: self.float_param(p, "tex2", 0.0, d),
+            },
+            "imagemap" => match self.image_texture(p, d) {
+                Some(image) => FloatTexture::Image(image),
+                None => FloatTexture::Constant(1.0),
+            },
+            other => {
+                later(other, class, p, d);
+                FloatTexture::Constant(0.5)
+            }
+        }
+    }
+
+    fn rgb_texture(&mut self, class: &Name, p: &ParamSet, d: &mut Diagnostics) -> RgbTexture {
+        match class.text.as_str() {
+            "constant" => {
+                let value = p.spectrum("value", d);
+                let color = value.and_then(|v| self.color(v, SpectrumUse::Albedo, p.span_of("value"), d));
+                RgbTexture::Constant(color.unwrap_or(Rgb::WHITE))
+            }
+            "scale" => {
+                let tex = self.rgb_param(p, "tex", Rgb::WHITE, SpectrumUse::Albedo, d);
+                RgbTexture::Scale { tex, scale: self.float_param(p, "scale", 1.0, d) }
+            }
+            "mix" => RgbTexture::Mix {
+                tex1: self.rgb_param(p, "tex1", Rgb::BLACK, SpectrumUse::Albedo, d),
+                tex2: self.rgb_param(p, "tex2", Rgb::WHITE, SpectrumUse::Albedo, d),
+                amount: self.float_param(p, "amount", 0.5, d),
+            },
+            "directionmix" => RgbTexture::DirectionMix {
+                tex1: self.rgb_param(p, "tex1", Rgb::BLACK, SpectrumUse::Albedo, d),
+                tex2: self.rgb_param(p, "tex2", Rgb::WHITE, SpectrumUse::Albedo, d),
+                direction: self.direction(p, d),
+            },
+            "checkerboard" => RgbTexture::Checkerboard {
+                mapping: self.checker_mapping(p, d),
+                tex1: self.rgb_param(p, "tex1", Rgb::WHITE, SpectrumUse::Albedo, d),
+                tex2: self.rgb_param(p, "tex2", Rgb::BLACK, SpectrumUse::Albedo, d),
+            },
+            "imagemap" => match self.image_texture(p, d) {
+                Some(image) => RgbTexture::Image(image),
+                None => RgbTexture::Constant(Rgb::WHITE),
+            },
+            other => {
+                later(other, class, p, d);
+                RgbTexture::Constant(Rgb::splat(0.5))
+            }
+        }
+    }
+
+    fn direction(&self, p: &ParamSet, d: &mut Diagnostics) -> Vec3 {
+        let dir = p.triple("dir", ParamType::Vector3, d).map_or(Vec3::Y, Vec3::from_array);
+        affine(&self.state.ctm.start).transform_vector3(dir).normalize_or(Vec3::Y)
+    }
+
+    fn checker_mapping(&self, p: &ParamSet, d: &mut Diagnostics) -> CheckerboardMapping {
+        match p.integer("dimension", d).unwrap_or(2) {
+            2 => CheckerboardMapping::Squares(self.mapping(p, d)),
+            3 => CheckerboardMapping::Cubes { texture_from_world: self.texture_from_world() },
+            other => {
+                d.error(p.span_of("dimension"), format!("a checkerboard has 2 or 3 dimensions, not {other}"));
+                CheckerboardMapping::Squares(self.mapping(p, d))
+            }
+        }
+    }
+
+    fn texture_from_world(&self) -> Affine3A {
+        affine(&self.state.ctm.start.inverse())
+    }
+
+    fn mapping(&self, p: &ParamSet, d: &mut Diagnostics) -> Mapping2d {
+        let texture_from_world = self.texture_from_world();
+        match p.string("mapping", d).unwrap_or("uv") {
+            "spherical" => Mapping2d::Spherical { texture_from_world },
+            "cylindrical" => Mapping2d::Cylindrical { texture_from_world },
+            "planar" => Mapping2d::Planar {
+                vs: p.triple("v1", ParamType::Vector3, d).map_or(Vec3::X, Vec3::from_array),
+                vt: p.triple("v2", ParamType::Vector3, d).map_or(Vec3::Y, Vec3::from_array),
+                delta: Vec2::new(p.float("udelta", d).unwrap_or(0.0), p.float("vdelta", d).unwrap_or(0.0)),
+                texture_from_world,
+            },
+            other => {
+                if other != "uv" {
+                    let known = ["uv", "spherical", "cylindrical", "planar"];
+                    unknown(other, p.span_of("mapping"), "mapping", &known, d);
+                }
+                Mapping2d::Uv {
+                    scale: Vec2::new(p.float("uscale", d).unwrap_or(1.0), p.float("vscale", d).unwrap_or(1.0)),
+                    delta: Vec2::new(p.float("udelta", d).unwrap_or(0.0), p.float("vdelta", d).unwrap_or(0.0)),
+                }
+            }
+        }
+    }
+
+    fn image_texture(&mut self, p: &ParamSet, d: &mut Diagnostics) -> Option<ImageTexture> {
+        let mapping = self.mapping(p, d);
+        let wrap = match p.string("wrap", d).unwrap_or("repeat") {
+            "repeat" => Wrap::Repeat,
+            "black" => Wrap::Black,
+            "clamp" => Wrap::Clamp,
+            "octahedralsphere" => Wrap::OctahedralSphere,
+            other => {
+                unknown(other, p.span_of("wrap"), "wrap mode", &["repeat", "black", "clamp", "octahedralsphere"], d);
+                Wrap::Repeat
+            }
+        };
+        let filter = match p.string("filter", d).unwrap_or("bilinear") {
+            "point" => Filter::Point,
+            "bilinear" => Filter::Bilinear,
+            "trilinear" => Filter::Trilinear,
+            "ewa" | "EWA" => Filter::Ewa,
+            other => {
+                unknown(other, p.span_of("filter"), "filter", &["point", "bilinear", "trilinear", "ewa"], d);
+                Filter::Bilinear
+            }
+        };
+        let mut encoding = self.encoding(p, d)?;
+        if p.boolean("trilinear", d).is_some() || p.float("maxanisotropy", d).is_some() {
+            d.warning_once(p.span, "`trilinear` and `maxanisotropy` are pbrt-v3; pbrt-v4 writes `filter`");
+        }
+        if let Some(gamma) = p.boolean("gamma", d) {
+            d.warning_once(p.span_of("gamma"), "`gamma` is pbrt-v3; pbrt-v4 writes `encoding`");
+            encoding = if gamma { ImageEncoding::Srgb } else { ImageEncoding::Linear };
+        }
+        let (scale, invert) = (p.float("scale", d).unwrap_or(1.0), p.boolean("invert", d).unwrap_or(false));
+        let Some(name) = p.string("filename", d) else {
+            d.error(p.span, "an image texture needs a `string filename`");
+            return None;
+        };
+        let request = ImageRequest { path: self.folder.join(name), encoding, wrap, filter };
+        let image = self.resources.image(request, p.span_of("filename"));
+        Some(ImageTexture { image, mapping, scale, invert })
+    }
+
+    fn encoding(&self, p: &ParamSet, d: &mut Diagnostics) -> Option<ImageEncoding> {
+        let Some(text) = p.string("encoding", d) else { return Some(ImageEncoding::Auto) };
+        let gamma = text.strip_prefix("gamma ").and_then(|g| g.trim().parse::<f32>().ok()).filter(|g| *g > 0.0);
+        match (text, gamma) {
+            ("sRGB", _) => Some(ImageEncoding::Srgb),
+            ("linear", _) => Some(ImageEncoding::Linear),
+            (_, Some(gamma)) => Some(ImageEncoding::Gamma(gamma)),
+            _ => {
+                let message = format!("unknown encoding `{text}`");
+                d.error(p.span_of("encoding"), message).help("one of sRGB, linear, gamma N");
+                None
+            }
+        }
+    }
+
+    /// A float parameter or the texture that it names.
+    pub fn float_param(
+        &mut self,
+        p: &ParamSet,
+        name: &'static str,
+        default: f32,
+        d: &mut Diagnostics,
+    ) -> FloatTextureId {
+        let value = match p.float_input(name, d) {
+            Some(Input::Texture(texture)) => match self.float_texture_named(texture, p.span_of(name), d) {
+                Some(id) => return id,
+                None => default,
+            },
+            Some(Input::Value(value)) => value,
+            None => default,
+        };
+        self.textures.add_float(FloatTexture::Constant(value))
+    }
+
+    /// The float texture of a name; an error if there is none.
+    pub fn float_texture_named(
+        &self,
+        name: &str,
+        span: crate::import::source::Span,
+        d: &mut Diagnostics,
+    ) -> Option<FloatTextureId> {
+        let found = self.texture_names.floats.get(name).copied();
+        if found.is_none() {
+            let is_rgb = self.texture_names.rgbs.contains_key(name);
+            let near = did_you_mean(name, self.texture_names.floats.keys().map(String::as_str)).map(str::to_owned);
+            let diagnostic = d.error(span, format!("unknown float texture `{name}`"));
+            if is_rgb {
+                diagnostic.help("a spectrum texture of this name exists");
+            } else if let Some(near) = near {
+                diagnostic.help(format!("did you mean `{near}`?"));
+            }
+        }
+        found
+    }
+
+    /// A spectrum parameter or the texture that it names.
+    pub fn rgb_param(
+        &mut self,
+        p: &ParamSet,
+        name: &'static str,
+        default: Rgb,
+        usage: SpectrumUse,
+        d: &mut Diagnostics,
+    ) -> RgbTextureId {
+        let color = match p.spectrum_input(name, d) {
+            Some(Input::Texture(texture)) => match self.rgb_texture_named(texture, p, name, d) {
+                Some(id) => return id,
+                None => default,
+            },
+            Some(Input::Value(value)) => self.color(value, usage, p.span_of(name), d).unwrap_or(default),
+            None => default,
+        };
+        self.textures.add_rgb(RgbTexture::Constant(color))
+    }
+
+    fn rgb_texture_named(
+        &self,
+        texture: &str,
+        p: &ParamSet,
+        name: &'static str,
+        d: &mut Diagnostics,
+    ) -> Option<RgbTextureId> {
+        let found = self.texture_names.rgbs.get(texture).copied();
+        if found.is_none() {
+            let near = did_you_mean(texture, self.texture_names.rgbs.keys().map(String::as_str)).map(str::to_owned);
+            let diagnostic = d.error(p.span_of(name), format!("unknown spectrum texture `{texture}`"));
+            if let Some(near) = near {
+                diagnostic.help(format!("did you mean `{near}`?"));
+            }
+        }
+        found
+    }
+
+    /// A spectrum parameter that cannot be a texture.
+    pub fn color_param(
+        &self,
+        p: &ParamSet,
+        name: &'static str,
+        usage: SpectrumUse,
+        d: &mut Diagnostics,
+    ) -> Option<Rgb> {
+        let value: SpectrumValue<'_> = p.spectrum(name, d)?;
+        self.color(value, usage, p.span_of(name), d)
+    }
+}
+
+/// Textures that pbrt has and that are not rendered yet.
+fn later(class: &str, name: &Name, p: &ParamSet, d: &mut Diagnostics) {
+    let known = ["bilerp", "dots", "fbm", "marble", "ptex", "windy", "wrinkled"];
+    if !known.contains(&class) {
+        let all = ["constant", "scale", "mix", "directionmix", "checkerboard", "imagemap"];
+        unknown(class, name.span, "texture class", &all, d);
+        return;
+    }
+    d.warning_once(name.span, format!("texture `{class}` is not rendered yet: it is constant 0.5"));
+    for key in [
+        "v00",
+        "v01",
+        "v10",
+        "v11",
+        "inside",
+        "outside",
+        "octaves",
+        "roughness",
+        "scale",
+        "variation",
+        "filename",
+        "encoding",
+        "mapping",
+        "uscale",
+        "vscale",
+        "udelta",
+        "vdelta",
+        "v1",
+        "v2",
+    ] {
+        p.ignore(key);
+    }
+}

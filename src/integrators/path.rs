@@ -1,0 +1,381 @@
+//! Path tracing with next-event estimation, a batch of paths at a time; `direct` is the case of one bounce.
+//!
+//! The radiance along a camera ray is L_e(x₁) + Σ_k β_k L_direct(x_k), where β_k = Π f_s |cos θ|/p is the throughput up
+//! to the k-th vertex and L_direct is what [`DirectStage`] estimates there, from all light that reaches
+//! the vertex straight from an emitter. So emission is added at the camera ray's hit only, and never twice.
+
+use crate::accel::{Coherence, Hit, RayBatch};
+use crate::cameras::CameraRay;
+use crate::direct::{DirectStage, DirectStats, ShadePoint};
+use crate::film::{Features, PixelSample};
+use crate::geometry::SurfaceHit;
+use crate::lights::LightHit;
+use crate::materials::SurfaceBsdf;
+use crate::math::{Ray, Rgb, Vec2, Vec3};
+use crate::samplers::SampleStream;
+use crate::scene::{IntegratorSettings, World};
+use crate::textures::TextureContext;
+use std::time::{Duration, Instant};
+
+/// Domains below the stream of a path vertex.
+mod domain {
+    pub const DIRECT: u32 = 0;
+    pub const BSDF: u32 = 1;
+    pub const ROULETTE: u32 = 2;
+    /// Vertex k uses the domain `VERTEX + k` of the camera sample.
+    pub const VERTEX: u32 = 16;
+}
+
+/// Surfaces without scattering that a path may pass between two vertices.
+const MAX_PASSED: u32 = 64;
+
+/// How often and how long.
+#[derive(Clone, Copy, Debug, Default)]
+pub struct PathStats {
+    /// Camera rays.
+    pub camera_rays: u64,
+    /// Rays of later path segments.
+    pub bounce_rays: u64,
+    /// Time in tracing camera rays.
+    pub camera_time: Duration,
+    /// Time in tracing later segments.
+    pub bounce_time: Duration,
+    /// Time in hits, textures and materials.
+    pub shade_time: Duration,
+    /// Direct lighting.
+    pub direct: DirectStats,
+}
+
+impl PathStats {
+    /// Adds the counts of another worker.
+    pub fn merge(&mut self, other: &PathStats) {
+        self.camera_rays += other.camera_rays;
+        self.bounce_rays += other.bounce_rays;
+        self.camera_time += other.camera_time;
+        self.bounce_time += other.bounce_time;
+        self.shade_time += other.shade_time;
+        self.direct.merge(&other.direct);
+    }
+}
+
+/// Copies of what was traced, batch by batch, for measurements.
+#[derive(Clone, Debug, Default)]
+pub struct Recording {
+    /// Camera rays up to their first surface.
+    pub camera: Vec<RayBatch>,
+    /// All other path segments.
+    pub bounces: Vec<RayBatch>,
+    /// Shadow segments of first vertices.
+    pub segments: Vec<RayBatch>,
+    /// Shadow segments of later vertices.
+    pub bounce_segments: Vec<RayBatch>,
+}
+
+/// A camera sample to be traced.
+#[derive(Clone, Copy, Debug)]
+pub struct CameraSample {
+    /// Its ray.
+    pub ray: CameraRay,
+    /// Weight of the pixel filter times that of the camera.
+    pub weight: f32,
+    /// Its random numbers.
+    pub stream: SampleStream,
+}
+
+/// A path on its way.
+#[derive(Clone, Copy, Debug)]
+struct PathState {
+    /// Index of the camera sample.
+    sample: u32,
+    ray: Ray,
+    beta: Rgb,
+    /// Squared relative index of refraction along the path, which roulette takes out of β.
+    eta_scale: f32,
+    /// Width of the texture footprint at the ray's origin, and its growth per unit length.
+    width: f32,
+    spread: f32,
+    /// Surfaces without scattering passed since the last vertex.
+    passed: u32,
+    /// Distance travelled through such surfaces.
+    travelled: f32,
+}
+
+/// Traces paths; holds the buffers of one worker.
+#[derive(Debug, Default)]
+pub struct PathIntegrator {
+    active: Vec<PathState>,
+    next: Vec<PathState>,
+    rays: RayBatch,
+    hits: Vec<Option<Hit>>,
+    radiance: Vec<Rgb>,
+    direct: DirectStage,
+    stats: PathStats,
+    /// Where copies of what is traced go, if they are wanted.
+    pub recording: Option<Recording>,
+}
+
+impl PathIntegrator {
+    /// The counts and times since the last call.
+    pub fn take_stats(&mut self) -> PathStats {
+        let direct = std::mem::take(&mut self.direct.stats);
+        PathStats { direct, ..std::mem::take(&mut self.stats) }
+    }
+
+    /// Estimates the radiance of each camera sample; `out[i]` belongs to `samples[i]`.
+    pub fn trace(
+        &mut self,
+        world: &World,
+        settings: &IntegratorSettings,
+        samples: &[CameraSample],
+        out: &mut Vec<PixelSample>,
+    ) {
+        out.clear();
+        out.resize(samples.len(), PixelSample::default());
+        self.active.clear();
+        self.active.extend(samples.iter().enumerate().map(|(i, s)| PathState {
+            sample: i as u32,
+            ray: s.ray.ray,
+            beta: Rgb::splat(s.weight),
+            eta_scale: 1.0,
+            width: s.ray.width0,
+            spread: s.ray.spread,
+            passed: 0,
+            travelled: 0.0,
+        }));
+
+        let depth = settings.depth();
+        for vertex in 0..=depth {
+            if self.active.is_empty() {
+                break;
+            }
+            let points = self.find_vertices(world, vertex, depth, samples, out);
+            self.light_vertices(world, settings, vertex, depth, &points, out);
+            std::mem::swap(&mut self.active, &mut self.next);
+        }
+    }
+
+    /// Traces the active paths to their next vertex, adds what they see at the first one, and keeps those that hit
+    /// something that scatters. The answer's items belong to the paths that `self.active` then holds.
+    fn find_vertices<'w>(
+        &mut self,
+        world: &'w World,
+        vertex: u32,
+        depth: u32,
+        samples: &[CameraSample],
+        out: &mut [PixelSample],
+    ) -> Vec<Vertex<'w>> {
+        let mut vertices = Vec::with_capacity(self.active.len());
+        let mut kept = Vec::with_capacity(self.active.len());
+        let mut coherence = if vertex == 0 { Coherence::Coherent } else { Coherence::Incoherent };
+        while !self.active.is_empty() {
+            self.trace_active(world, vertex, coherence);
+            coherence = Coherence::Incoherent;
+            let start = Instant::now();
+            let mut passing = Vec::new();
+            for (path, hit) in self.active.iter().zip(&self.hits) {
+                let found = match hit {
+                    None => {
+                        if vertex == 0 {
+                            out[path.sample as usize].radiance += path.beta * world.scene.lights.le(path.ray.d);
+                        }
+                        continue;
+                    }
+                    Some(hit) => Found::new(world, path, hit),
+                };
+                if vertex == 0 {
+                    found.add_emission(world, path, &mut out[path.sample as usize].radiance);
+                }
+                match found.scatter(world) {
+                    Some(bsdf) => {
+                        if vertex == 0 {
+                            out[path.sample as usize]
+                                .features
+                                .get_or_insert_with(|| found.features(world, path, &bsdf));
+                        }
+                        if vertex < depth {
+                            let stream = samples[path.sample as usize].stream.domain(domain::VERTEX + vertex);
+                            vertices.push(Vertex { surface: found.surface, bsdf, wo: found.wo, stream });
+                            kept.push(PathState { width: found.width, passed: 0, travelled: 0.0, ..*path });
+                        }
+                    }
+                    None if path.passed < MAX_PASSED => passing.push(found.pass(path)),
+                    None => {}
+                }
+            }
+            self.active = passing;
+            self.stats.shade_time += start.elapsed();
+        }
+        self.active = kept;
+        vertices
+    }
+
+    /// First hits of the active paths.
+    fn trace_active(&mut self, world: &World, vertex: u32, coherence: Coherence) {
+        self.rays.clear();
+        for path in &self.active {
+            self.rays.push(&path.ray);
+        }
+        if let Some(r) = &mut self.recording {
+            let batches = if coherence == Coherence::Coherent { &mut r.camera } else { &mut r.bounces };
+            batches.push(self.rays.clone());
+        }
+        let start = Instant::now();
+        world.accel.intersect(&self.rays, coherence, &mut self.hits);
+        let (count, time) = (self.rays.len() as u64, start.elapsed());
+        if vertex == 0 {
+            self.stats.camera_rays += count;
+            self.stats.camera_time += time;
+        } else {
+            self.stats.bounce_rays += count;
+            self.stats.bounce_time += time;
+        }
+    }
+
+    /// Adds the direct light of the vertices, and fills `self.next` with the paths that go on.
+    fn light_vertices(
+        &mut self,
+        world: &World,
+        settings: &IntegratorSettings,
+        vertex: u32,
+        depth: u32,
+        vertices: &[Vertex<'_>],
+        out: &mut [PixelSample],
+    ) {
+        // Direct light
+        let points: Vec<ShadePoint<'_>> =
+            vertices.iter().zip(&self.active).map(|(v, path)| v.shade_point(path.ray.time)).collect();
+        self.direct.estimate(world, settings, &points, &mut self.radiance);
+        if let Some(r) = &mut self.recording {
+            let batches = if vertex == 0 { &mut r.segments } else { &mut r.bounce_segments };
+            batches.push(self.direct.segments().clone());
+        }
+        for (path, &radiance) in self.active.iter().zip(&self.radiance) {
+            out[path.sample as usize].radiance += path.beta * radiance;
+        }
+
+        // Continuation
+        let start = Instant::now();
+        self.next.clear();
+        if vertex + 1 < depth {
+            let paths = self.active.iter().zip(vertices).zip(&points);
+            self.next.extend(paths.filter_map(|((path, v), point)| extend(path, v, point, vertex)));
+        }
+        self.stats.shade_time += start.elapsed();
+    }
+}
+
+/// A vertex that scatters.
+#[derive(Debug)]
+struct Vertex<'w> {
+    surface: SurfaceHit,
+    bsdf: SurfaceBsdf<'w>,
+    wo: Vec3,
+    stream: SampleStream,
+}
+
+impl<'w> Vertex<'w> {
+    fn shade_point(&self, time: f32) -> ShadePoint<'w> {
+        ShadePoint {
+            p: self.surface.p,
+            p_error: self.surface.p_error,
+            wo: self.wo,
+            bsdf: self.bsdf,
+            time,
+            stream: self.stream.domain(domain::DIRECT),
+        }
+    }
+}
+
+/// The next path segment by BSDF sampling and Russian roulette; `None` if the path ends.
+fn extend(path: &PathState, v: &Vertex<'_>, point: &ShadePoint<'_>, vertex: u32) -> Option<PathState> {
+    // Sample the BSDF
+    let [uc, u0, u1] = v.stream.domain(domain::BSDF).draw::<3>();
+    let sample = v.bsdf.sample(v.wo, uc, [u0, u1])?;
+    let mut beta = path.beta * sample.f * (sample.wi.dot(v.bsdf.frame.z).abs() / sample.pdf);
+    let eta_scale = path.eta_scale * sample.eta * sample.eta;
+    if beta.is_black() || !beta.is_finite() {
+        return None;
+    }
+
+    // Russian roulette, from the second bounce on, on what the path carries without the scaling of refraction
+    let survival = (beta * eta_scale).map(f32::abs).max_component();
+    if survival < 1.0 && vertex >= 1 {
+        if v.stream.draw_random(domain::ROULETTE) >= survival {
+            return None;
+        }
+        beta = beta / survival;
+    }
+
+    let ray = Ray { o: point.origin(sample.wi), d: sample.wi, t_max: f32::INFINITY, time: path.ray.time };
+    Some(PathState { ray, beta, eta_scale, ..*path })
+}
+
+/// A hit with what shading needs of it.
+struct Found {
+    hit: Hit,
+    surface: SurfaceHit,
+    wo: Vec3,
+    /// Width of the footprint at the hit.
+    width: f32,
+    distance: f32,
+    context: TextureContext,
+}
+
+impl Found {
+    fn new(world: &World, path: &PathState, hit: &Hit) -> Self {
+        let surface =
+            world.scene.geometry.surface_hit(hit.geometry, hit.primitive, hit.instance, hit.uv, path.ray.time);
+        let distance = hit.t * path.ray.d.length();
+        let width = path.width + path.spread * distance;
+        let extent = |d: Vec3| {
+            let length = d.length();
+            if length > 0.0 { width / length } else { 0.0 }
+        };
+        let uv_width = Vec2::new(extent(surface.dpdu), extent(surface.dpdv));
+        let context = TextureContext { uv: surface.uv, uv_width, p: surface.p, n: surface.n };
+        Found { hit: *hit, surface, wo: -path.ray.d.normalize(), width, distance, context }
+    }
+
+    /// Adds what the surface emits towards the camera.
+    fn add_emission(&self, world: &World, path: &PathState, radiance: &mut Rgb) {
+        let lights = &world.scene.lights;
+        if self.hit.instance != Hit::NO_INSTANCE {
+            return;
+        }
+        if let Some(light) = lights.light_of(self.hit.geometry, self.hit.primitive) {
+            let s = &self.surface;
+            let hit = LightHit { t: self.hit.t, p: s.p, n: s.n, uv: s.uv };
+            *radiance += path.beta * lights.lights[light as usize].l(&hit, self.wo);
+        }
+    }
+
+    /// The scattering at the hit; `None` where rays pass.
+    fn scatter<'w>(&self, world: &'w World) -> Option<SurfaceBsdf<'w>> {
+        let scene = &world.scene;
+        let material = scene.surfaces[self.hit.geometry as usize].material;
+        scene.materials.bsdf(material, &scene.textures, &self.surface, &self.context, self.wo)
+    }
+
+    fn features(&self, world: &World, path: &PathState, bsdf: &SurfaceBsdf<'_>) -> Features {
+        let z = bsdf.frame.z;
+        Features {
+            albedo: bsdf.albedo_estimate(self.wo),
+            normal: if z.dot(self.wo) < 0.0 { -z } else { z },
+            depth: path.travelled + self.distance,
+            material: world.scene.surfaces[self.hit.geometry as usize].material,
+            object: self.hit.geometry,
+        }
+    }
+
+    /// The path beyond a surface that does not scatter.
+    fn pass(&self, path: &PathState) -> PathState {
+        let o = crate::math::ray::offset_origin(self.surface.p, self.surface.p_error, self.surface.n, path.ray.d);
+        PathState {
+            ray: Ray { o, ..path.ray },
+            width: self.width,
+            passed: path.passed + 1,
+            travelled: path.travelled + self.distance,
+            ..*path
+        }
+    }
+}

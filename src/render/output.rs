@@ -1,0 +1,145 @@
+//! From the film to pictures: channels with names, metadata, and the display transform.
+
+use crate::film::Film;
+use crate::imaging::color::linear_to_srgb;
+use crate::scene::Scene;
+
+/// A group of channels beside the picture itself.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Aov {
+    /// Variance of the pixel's mean, `variance.R/G/B`.
+    Variance,
+    /// Number of samples, `samples`.
+    Samples,
+    /// Albedo estimate of the first surface, `albedo.R/G/B`.
+    Albedo,
+    /// Shading normal of the first surface, world space, `normal.X/Y/Z`.
+    Normal,
+    /// Mean distance to the first surface, `depth.Z`; infinity where there is none.
+    Depth,
+    /// Material of the first sample's surface plus one, `material`; 0 where there is none.
+    Material,
+    /// Geometry of the first sample's surface plus one, `object`; 0 where there is none.
+    Object,
+}
+
+impl Aov {
+    /// All, in the order of the file.
+    pub const ALL: [Aov; 7] =
+        [Aov::Variance, Aov::Samples, Aov::Albedo, Aov::Normal, Aov::Depth, Aov::Material, Aov::Object];
+
+    /// The name on the command line.
+    pub fn name(self) -> &'static str {
+        match self {
+            Aov::Variance => "variance",
+            Aov::Samples => "samples",
+            Aov::Albedo => "albedo",
+            Aov::Normal => "normal",
+            Aov::Depth => "depth",
+            Aov::Material => "material",
+            Aov::Object => "object",
+        }
+    }
+
+    fn channels(self) -> &'static [&'static str] {
+        match self {
+            Aov::Variance => &["variance.R", "variance.G", "variance.B"],
+            Aov::Samples => &["samples"],
+            Aov::Albedo => &["albedo.R", "albedo.G", "albedo.B"],
+            Aov::Normal => &["normal.X", "normal.Y", "normal.Z"],
+            Aov::Depth => &["depth.Z"],
+            Aov::Material => &["material"],
+            Aov::Object => &["object"],
+        }
+    }
+}
+
+/// Named channels, interleaved, row-major from the top left of the crop window.
+#[derive(Clone, Debug)]
+pub struct Channels {
+    /// Names in the order of the data.
+    pub names: Vec<String>,
+    /// Values.
+    pub data: Vec<f32>,
+}
+
+/// The picture `R G B` and the chosen AOVs, linear.
+pub fn channels(film: &Film, aovs: &[Aov]) -> Channels {
+    let aov_names = aovs.iter().flat_map(|a| a.channels().iter().copied());
+    let names: Vec<String> = ["R", "G", "B"].into_iter().chain(aov_names).map(str::to_owned).collect();
+    let mut data = Vec::with_capacity(names.len() * film.pixels.len());
+    for pixel in &film.pixels {
+        data.extend(pixel.mean().map(|v| v as f32));
+        let count = pixel.count.max(1) as f64;
+        for aov in aovs {
+            match aov {
+                Aov::Variance => data.extend(pixel.variance_of_mean().map(|v| v as f32)),
+                Aov::Samples => data.push(pixel.count as f32),
+                Aov::Albedo => data.extend(pixel.albedo.map(|v| (v / count) as f32)),
+                Aov::Normal => data.extend(pixel.normal.map(|v| (v / count) as f32)),
+                Aov::Depth if pixel.hits == 0 => data.push(f32::INFINITY),
+                Aov::Depth => data.push((pixel.depth / pixel.hits as f64) as f32),
+                Aov::Material => data.push(pixel.material as f32),
+                Aov::Object => data.push(pixel.object as f32),
+            }
+        }
+    }
+    Channels { names, data }
+}
+
+/// The picture for a display: `2^exposure`, then the sRGB curve, clipped to 0..1. RGB interleaved.
+pub fn display(film: &Film, exposure: f32) -> Vec<f32> {
+    let gain = exposure.exp2();
+    film.pixels.iter().flat_map(|p| p.mean().map(|v| linear_to_srgb((v as f32 * gain).clamp(0.0, 1.0)))).collect()
+}
+
+/// Every setting that the picture depends on, as metadata entries `lumiris:…`.
+pub fn settings_metadata(scene: &Scene) -> Vec<(String, String)> {
+    let i = &scene.integrator;
+    let b = &scene.film.bounds;
+    [
+        ("version", env!("CARGO_PKG_VERSION").to_owned()),
+        ("integrator", i.kind.name().to_owned()),
+        ("max_depth", i.max_depth.to_string()),
+        ("estimator", i.estimator.name().to_owned()),
+        ("samples", i.samples.to_string()),
+        ("heuristic", i.heuristic.name().to_owned()),
+        ("light_choice", i.light_choice.name().to_owned()),
+        ("sampler", scene.sampling.sampler.name().to_owned()),
+        ("spp", scene.sampling.spp.to_string()),
+        ("seed", scene.sampling.seed.to_string()),
+        ("filter", format!("{:?}", scene.film.filter)),
+        ("resolution", format!("{}x{}", scene.film.resolution[0], scene.film.resolution[1])),
+        ("crop", format!("{},{},{},{}", b.x0, b.x1, b.y0, b.y1)),
+    ]
+    .into_iter()
+    .map(|(key, value)| (format!("lumiris:{key}"), value))
+    .collect()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::film::{PixelBounds, PixelSample};
+    use crate::math::Rgb;
+
+    #[test]
+    fn channel_count_matches_names_for_every_aov() {
+        let bounds = PixelBounds { x0: 0, x1: 2, y0: 0, y1: 1 };
+        let mut film = Film::new([2, 1], bounds);
+        film.pixels[0].add(&PixelSample { radiance: Rgb::new(1.0, 2.0, 4.0), features: None });
+        let c = channels(&film, &Aov::ALL);
+        assert_eq!(c.data.len(), c.names.len() * 2);
+        let depth = c.names.iter().position(|n| n == "depth.Z").unwrap();
+        assert_eq!(c.data[depth], f32::INFINITY);
+        assert_eq!(&c.data[..3], &[1.0, 2.0, 4.0]);
+    }
+
+    #[test]
+    fn display_clips_and_brightens() {
+        let mut film = Film::new([1, 1], PixelBounds { x0: 0, x1: 1, y0: 0, y1: 1 });
+        film.pixels[0].add(&PixelSample { radiance: Rgb::new(0.25, 0.5, 4.0), features: None });
+        let d = display(&film, 1.0);
+        assert!((d[0] - linear_to_srgb(0.5)).abs() < 1e-6 && (d[1] - 1.0).abs() < 1e-6 && (d[2] - 1.0).abs() < 1e-6);
+    }
+}

@@ -1,0 +1,146 @@
+//! Scenes whose answer is known: every one with every integrator, estimator, light choice, sampler and ray tracer.
+//!
+//! The answer stands in the scene file beside its derivation. A configuration renders the 16 pixels with `RUNS`
+//! different seeds; the means of the pictures are independent, and Student's t-test compares them with the answer.
+//! The significance is `SIGNIFICANCE` for the whole set of tests (Šidák-corrected); seeds are fixed.
+
+use lumiris::estimators::mis::Heuristic;
+use lumiris::estimators::stats::{Welford, sidak, t_test};
+use lumiris::film::PixelSums;
+use lumiris::import::{LoadOptions, load};
+use lumiris::lights::LightSamplerKind;
+use lumiris::render::{RenderSettings, render};
+use lumiris::samplers::SamplerKind;
+use lumiris::scene::{AccelKind, EstimatorKind, IntegratorKind, World};
+use std::path::{Path, PathBuf};
+use std::sync::atomic::AtomicBool;
+
+const RUNS: u32 = 12;
+/// Probability that any test of the whole set fails by chance.
+const SIGNIFICANCE: f64 = 1e-3;
+/// What f32 arithmetic may be off where there is no noise, relative.
+const ROUNDING: f64 = 3e-5;
+
+fn scene_files() -> Vec<PathBuf> {
+    let folder = Path::new(env!("CARGO_MANIFEST_DIR")).join("scenes/analytic");
+    let mut files: Vec<PathBuf> = std::fs::read_dir(folder).unwrap().map(|e| e.unwrap().path()).collect();
+    files.retain(|p| p.extension().is_some_and(|e| e == "pbrt"));
+    files.sort();
+    assert!(files.len() >= 19, "the analytic scenes are there");
+    files
+}
+
+fn answer(path: &Path) -> [f64; 3] {
+    let text = std::fs::read_to_string(path).unwrap();
+    let line = text.lines().find_map(|l| l.strip_prefix("# answer:")).unwrap();
+    let values: Vec<f64> = line.split_whitespace().map(|v| v.parse().unwrap()).collect();
+    values.try_into().unwrap()
+}
+
+#[derive(Clone, Copy, Debug)]
+struct Configuration {
+    estimator: EstimatorKind,
+    heuristic: Heuristic,
+    samples: u32,
+    light_choice: LightSamplerKind,
+    sampler: SamplerKind,
+    accel: AccelKind,
+}
+
+fn configurations() -> Vec<Configuration> {
+    let base = Configuration {
+        estimator: EstimatorKind::Mis,
+        heuristic: Heuristic::Power,
+        samples: 2,
+        light_choice: LightSamplerKind::Tree,
+        sampler: SamplerKind::SobolBlueNoise,
+        accel: AccelKind::Embree,
+    };
+    let mut all = vec![base];
+    all.extend([1, 3, 16].map(|samples| Configuration { samples, ..base }));
+    all.extend([Heuristic::Balance, Heuristic::Maximum].map(|heuristic| Configuration { heuristic, ..base }));
+    all.extend([1, 4].map(|samples| Configuration { estimator: EstimatorKind::Mc, samples, ..base }));
+    all.extend(
+        [LightSamplerKind::Uniform, LightSamplerKind::Power].map(|light_choice| Configuration { light_choice, ..base }),
+    );
+    all.extend([SamplerKind::Independent, SamplerKind::Sobol].map(|sampler| Configuration { sampler, ..base }));
+    all.push(Configuration { accel: AccelKind::Bvh, ..base });
+    all.push(Configuration { accel: AccelKind::Bvh, estimator: EstimatorKind::Mc, ..base });
+    all
+}
+
+fn world(path: &Path, c: &Configuration) -> World {
+    let mut scene = load(path, &LoadOptions::default()).map_err(|d| d.to_string()).unwrap().scene;
+    scene.integrator.estimator = c.estimator;
+    scene.integrator.heuristic = c.heuristic;
+    scene.integrator.samples = c.samples;
+    scene.integrator.light_choice = c.light_choice;
+    scene.lights.set_kind(c.light_choice);
+    scene.sampling.sampler = c.sampler;
+    World::new(scene, c.accel, None).unwrap()
+}
+
+/// Means of the pictures of `RUNS` seeds, per channel.
+fn picture_means(world: &mut World) -> [Welford; 3] {
+    let mut means = [Welford::default(); 3];
+    for seed in 0..RUNS {
+        world.scene.sampling.seed = seed;
+        let settings = RenderSettings { threads: Some(1), spp: world.scene.sampling.spp, ..RenderSettings::default() };
+        let film = render(world, &settings, &AtomicBool::new(false), &|_| ()).unwrap().film;
+        for (channel, mean) in means.iter_mut().enumerate() {
+            let sum: f64 = film.pixels.iter().map(|p: &PixelSums| p.mean()[channel]).sum();
+            mean.add(sum / film.pixels.len() as f64);
+        }
+    }
+    means
+}
+
+#[test]
+fn every_configuration_gives_the_known_answer() {
+    let files = scene_files();
+    let tests = files.len() * configurations().len() * 3;
+    let significance = sidak(SIGNIFICANCE, tests);
+    let mut failures = Vec::new();
+    for path in &files {
+        let answer = answer(path);
+        for c in configurations() {
+            let means = picture_means(&mut world(path, &c));
+            for (channel, mean) in means.iter().enumerate() {
+                let exact = (mean.mean() - answer[channel]).abs() <= ROUNDING * answer[channel].abs();
+                if !exact && t_test(mean, answer[channel]).p_value < significance {
+                    failures.push(format!(
+                        "{} {c:?}: channel {channel} {mean:?}, not {}",
+                        path.display(),
+                        answer[channel]
+                    ));
+                }
+            }
+        }
+    }
+    assert!(failures.is_empty(), "{} of {tests}:\n{}", failures.len(), failures.join("\n"));
+}
+
+#[test]
+fn the_test_notices_a_bias_of_one_percent() {
+    // The oracle itself: with the answer moved by 1 %, scenes with noise and without it must fail.
+    for name in ["rectangle", "point", "furnace-closed-4"] {
+        let path = Path::new(env!("CARGO_MANIFEST_DIR")).join("scenes/analytic").join(name).with_extension("pbrt");
+        let means = picture_means(&mut world(&path, &configurations()[3]));
+        let wrong = answer(&path)[0] * 1.01;
+        assert!(t_test(&means[0], wrong).p_value < 1e-4, "{name}: {:?} passes for {wrong}", means[0]);
+    }
+}
+
+#[test]
+fn direct_is_path_of_one_bounce() {
+    let path = Path::new(env!("CARGO_MANIFEST_DIR")).join("scenes/analytic/furnace-closed-4.pbrt");
+    let mut world = world(&path, &configurations()[0]);
+    world.scene.integrator.kind = IntegratorKind::Direct;
+    let settings = RenderSettings { spp: 4, ..RenderSettings::default() };
+    let direct = render(&world, &settings, &AtomicBool::new(false), &|_| ()).unwrap().film;
+    world.scene.integrator.kind = IntegratorKind::Path;
+    world.scene.integrator.max_depth = 1;
+    let path = render(&world, &settings, &AtomicBool::new(false), &|_| ()).unwrap().film;
+    let means = |film: &lumiris::film::Film| film.pixels.iter().map(PixelSums::mean).collect::<Vec<_>>();
+    assert_eq!(means(&direct), means(&path));
+}

@@ -1,0 +1,97 @@
+//! Truncated and bit-flipped versions of the project's own scenes: an answer or a message, never a panic.
+
+use lumiris::import::{LoadOptions, load};
+use std::panic::{AssertUnwindSafe, catch_unwind};
+use std::path::{Path, PathBuf};
+
+/// Mutated inputs altogether.
+const MUTATIONS: usize = 10_000;
+
+fn scene_files(folder: &Path, out: &mut Vec<PathBuf>) {
+    for entry in std::fs::read_dir(folder).unwrap() {
+        let path = entry.unwrap().path();
+        if path.is_dir() {
+            scene_files(&path, out);
+        } else if path.extension().is_some_and(|e| e == "pbrt" || e == "ply" || e == "gz") {
+            out.push(path);
+        }
+    }
+    out.sort();
+}
+
+/// A small generator of reproducible numbers.
+struct Random(u64);
+
+impl Random {
+    fn below(&mut self, n: usize) -> usize {
+        self.0 = self.0.wrapping_mul(6_364_136_223_846_793_005).wrapping_add(1_442_695_040_888_963_407);
+        (self.0 >> 33) as usize % n.max(1)
+    }
+}
+
+/// Truncates, flips bits, removes, repeats or swaps pieces.
+fn mutate(bytes: &mut Vec<u8>, random: &mut Random) {
+    match random.below(5) {
+        0 => bytes.truncate(random.below(bytes.len())),
+        1 => {
+            for _ in 0..=random.below(8) {
+                let i = random.below(bytes.len());
+                if let Some(b) = bytes.get_mut(i) {
+                    *b ^= 1 << random.below(8);
+                }
+            }
+        }
+        2 => {
+            let (a, n) = (random.below(bytes.len()), random.below(40));
+            let end = (a + n).min(bytes.len());
+            bytes.drain(a..end);
+        }
+        3 => {
+            let (a, n, at) = (random.below(bytes.len()), random.below(40), random.below(bytes.len()));
+            let piece = bytes[a..(a + n).min(bytes.len())].to_vec();
+            bytes.splice(at..at, piece);
+        }
+        _ => {
+            // A digit becomes another number: sizes, counts and indices.
+            let digits: Vec<usize> = (0..bytes.len()).filter(|&i| bytes[i].is_ascii_digit()).collect();
+            if !digits.is_empty() {
+                let texts: [&[u8]; 6] = [b"-1", b"99999999999", b"1e38", b"nan", b"0", b"2147483647"];
+                let at = digits[random.below(digits.len())];
+                bytes.splice(at..=at, texts[random.below(texts.len())].iter().copied());
+            }
+        }
+    }
+}
+
+#[test]
+fn mutated_scenes_never_panic_and_always_say_what_is_wrong() {
+    let mut files = Vec::new();
+    scene_files(&Path::new(env!("CARGO_MANIFEST_DIR")).join("scenes"), &mut files);
+    scene_files(&Path::new(env!("CARGO_MANIFEST_DIR")).join("tests/pbrt"), &mut files);
+    assert!(files.len() >= 20);
+    let folder = tempfile::tempdir().unwrap();
+    let mut random = Random(1);
+    let (mut accepted, mut refused) = (0, 0);
+    for i in 0..MUTATIONS {
+        let source = &files[i % files.len()];
+        let mut bytes = std::fs::read(source).unwrap();
+        mutate(&mut bytes, &mut random);
+        let path = folder.path().join(source.file_name().unwrap());
+        std::fs::write(&path, &bytes).unwrap();
+        let outcome = catch_unwind(AssertUnwindSafe(|| load(&path, &LoadOptions::default())));
+        match outcome {
+            Ok(Ok(_)) => accepted += 1,
+            Ok(Err(diagnostics)) => {
+                refused += 1;
+                assert!(diagnostics.to_string().contains("error"), "{}: a refusal without a message", source.display());
+            }
+            Err(_) => {
+                let kept = std::env::temp_dir().join(format!("lumiris-mutation-{i}.pbrt"));
+                std::fs::write(&kept, &bytes).unwrap();
+                panic!("mutation {i} of {} panicked; kept as {}", source.display(), kept.display());
+            }
+        }
+    }
+    // Both happen often: the mutations are neither harmless nor all fatal.
+    assert!(accepted > MUTATIONS / 20 && refused > MUTATIONS / 20, "{accepted} accepted, {refused} refused");
+}
