@@ -201,22 +201,6 @@ impl Bsdf<'_> {
         }
     }
 
-    /// True if all scattering is by deltas.
-    #[inline]
-    pub fn is_specular_only(&self) -> bool {
-        !self.has_non_specular()
-    }
-
-    /// True if light can pass to the other side.
-    #[inline]
-    pub fn is_transmissive(&self) -> bool {
-        match self {
-            Bsdf::Diffuse(_) | Bsdf::Conductor(_) | Bsdf::CoatedDiffuse(_) | Bsdf::Layered(_) => false,
-            Bsdf::DiffuseTransmission(b) => !b.transmittance.is_black(),
-            Bsdf::Dielectric(_) | Bsdf::ThinDielectric(_) => true,
-        }
-    }
-
     /// Fraction of uniform light that reaches `wo`, for the albedo image: exact for the Lambertian and coated ones,
     /// otherwise the mean of 16 fixed samples.
     pub fn albedo_estimate(&self, wo: Vec3) -> Rgb {

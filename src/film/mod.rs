@@ -164,16 +164,6 @@ impl Film {
         (y - self.bounds.y0) as usize * self.bounds.width() as usize + (x - self.bounds.x0) as usize
     }
 
-    /// The part of the film that `tile` covers, row-major.
-    pub fn copy_tile(&self, tile: &PixelBounds) -> Vec<PixelSums> {
-        let mut out = Vec::with_capacity(tile.area());
-        for y in tile.y0..tile.y1 {
-            let start = self.index(tile.x0, y);
-            out.extend_from_slice(&self.pixels[start..start + tile.width() as usize]);
-        }
-        out
-    }
-
     /// Replaces the part of the film that `tile` covers.
     pub fn replace_tile(&mut self, tile: &PixelBounds, sums: &[PixelSums]) {
         for (row, y) in (tile.y0..tile.y1).enumerate() {

@@ -108,11 +108,6 @@ impl Diagnostics {
         self.push(Severity::Error, Some(span), message.into())
     }
 
-    /// Adds an error without a place.
-    pub fn error_anywhere(&mut self, message: impl Into<String>) -> &mut Diagnostic {
-        self.push(Severity::Error, None, message.into())
-    }
-
     /// Adds a warning at `span`.
     pub fn warning(&mut self, span: Span, message: impl Into<String>) -> &mut Diagnostic {
         self.push(Severity::Warning, Some(span), message.into())

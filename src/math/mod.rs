@@ -50,9 +50,3 @@ pub const fn gamma(n: u32) -> f32 {
     let n_eps = n as f32 * (f32::EPSILON * 0.5);
     n_eps / (1.0 - n_eps)
 }
-
-/// `a·b − c·d` without catastrophic cancellation: the products are exact in f64.
-#[inline]
-pub fn difference_of_products(a: f32, b: f32, c: f32, d: f32) -> f32 {
-    (f64::from(a) * f64::from(b) - f64::from(c) * f64::from(d)) as f32
-}

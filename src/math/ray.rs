@@ -23,18 +23,6 @@ impl Ray {
     }
 }
 
-/// The next representable f32 above `x`.
-#[inline]
-pub fn next_up(x: f32) -> f32 {
-    x.next_up()
-}
-
-/// The next representable f32 below `x`.
-#[inline]
-pub fn next_down(x: f32) -> f32 {
-    x.next_down()
-}
-
 /// The part of a segment `o + t·(end − o)` that is tested for occlusion: its end is offset off its surface already, and
 /// what remains is the rounding of `o + t·d` at t = 1.
 pub const SEGMENT_END: f32 = 1.0 - 8.0 * f32::EPSILON;

@@ -6,7 +6,7 @@ use crate::accel::embree::{EmbreeAccel, EmbreeError};
 use crate::accel::{Accel, AlphaSource, Coherence, Hit, RayBatch};
 use crate::geometry::{GeometryId, GeometrySet, Group};
 use crate::lights::LightId;
-use crate::math::{Bounds3, Vec2, Vec3};
+use crate::math::{Vec2, Vec3};
 use crate::textures::{TextureContext, TextureSet};
 use std::sync::Arc;
 
@@ -118,10 +118,5 @@ impl World {
                 EmitterHit { geometry, primitive: h.primitive, uv: h.uv, t: h.t, light }
             })
         }));
-    }
-
-    /// Bounds of the scene.
-    pub fn bounds(&self) -> Bounds3 {
-        self.scene.geometry.world_bounds()
     }
 }
