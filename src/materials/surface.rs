@@ -35,6 +35,20 @@ impl SurfaceBsdf<'_> {
         self.bsdf.pdf(self.frame.to_local(wo), self.frame.to_local(wi))
     }
 
+    /// [`f_cos`](Self::f_cos) and [`pdf`](Self::pdf) for many directions `wi` in world space, by component and channel;
+    /// those of single calls up to rounding. All slices have the same length.
+    pub fn eval_lanes(&self, wo: Vec3, wi: [&[f32]; 3], f_cos: [&mut [f32]; 3], pdf: &mut [f32]) {
+        let wo = self.frame.to_local(wo);
+        for i in 0..pdf.len() {
+            let wi = self.frame.to_local(Vec3::new(wi[0][i], wi[1][i], wi[2][i]));
+            let value = self.bsdf.f(wo, wi) * wi.z.abs();
+            for c in 0..3 {
+                f_cos[c][i] = value[c];
+            }
+            pdf[i] = self.bsdf.pdf(wo, wi);
+        }
+    }
+
     /// A direction to the light, in world space.
     #[inline]
     pub fn sample(&self, wo: Vec3, uc: f32, u: [f32; 2]) -> Option<BsdfSample> {
