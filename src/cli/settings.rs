@@ -1,6 +1,6 @@
 //! From typed options to a world that is ready to render.
 
-use super::args::SceneArgs;
+use super::args::{SamplesArg, SceneArgs};
 use super::progress;
 use crate::film::filter::PixelFilter;
 use crate::import::{LoadOptions, load};
@@ -51,10 +51,28 @@ fn apply(args: &SceneArgs, scene: &mut Scene) {
         i.estimator = estimator.value();
     }
     if let Some(samples) = args.samples {
-        i.samples = samples;
+        i.samples = match samples {
+            SamplesArg::Fixed(n) => Some(n),
+            SamplesArg::Auto => None,
+        };
+    }
+    if let Some(proposals) = args.proposals {
+        i.ris.proposals = proposals;
+    }
+    if let Some(strata) = args.strata {
+        i.ris.strata = strata.value();
+    }
+    if let Some(points) = args.proposal_points {
+        i.ris.points = points.value();
+    }
+    if let Some(target) = args.target {
+        i.ris.target = target.value();
+    }
+    if let Some(times) = args.stage_times {
+        i.ris.stage_times = Some(times);
     }
     if let Some(heuristic) = args.heuristic {
-        i.heuristic = heuristic.value();
+        i.heuristic = Some(heuristic.value());
     }
     if let Some(choice) = args.light_choice {
         i.light_choice = choice.value();

@@ -19,7 +19,7 @@ use crate::materials::SurfaceBsdf;
 use crate::math::ray::offset_origin;
 use crate::math::{Rgb, Vec3};
 use crate::samplers::SampleStream;
-use crate::scene::{IntegratorSettings, World};
+use crate::scene::{IntegratorSettings, Split, World};
 use propose::Candidates;
 use std::time::{Duration, Instant};
 use visibility::Segments;
@@ -39,6 +39,8 @@ pub struct ShadePoint<'a> {
     pub time: f32,
     /// Random numbers of this point; each technique takes a domain of it.
     pub stream: SampleStream,
+    /// Numbers of samples and proposals.
+    pub split: Split,
 }
 
 impl ShadePoint<'_> {

@@ -92,7 +92,7 @@ struct Share {
 /// Splits N samples between the techniques. A single sample of `mis` chooses its technique at random, so that
 /// the expected numbers are one half each.
 fn share(settings: &IntegratorSettings, point: &ShadePoint<'_>) -> Share {
-    let n = settings.samples.max(1);
+    let n = point.split.samples;
     let fixed = |light: u32, bsdf: u32| Share {
         light_draws: light,
         bsdf_draws: bsdf,
@@ -105,11 +105,11 @@ fn share(settings: &IntegratorSettings, point: &ShadePoint<'_>) -> Share {
     match settings.estimator {
         EstimatorKind::Mc if point.bsdf.bsdf.has_specular() => fixed(n, 1),
         EstimatorKind::Mc => fixed(n, 0),
-        EstimatorKind::Mis if n == 1 => {
+        EstimatorKind::Mis | EstimatorKind::Ris if n == 1 => {
             let light = point.stream.domain(domain::TECHNIQUE).draw::<1>()[0] < 0.5;
             Share { light_draws: u32::from(light), bsdf_draws: u32::from(!light), n_light: 0.5, n_bsdf: 0.5 }
         }
-        EstimatorKind::Mis => fixed(n.div_ceil(2), n / 2),
+        EstimatorKind::Mis | EstimatorKind::Ris => fixed(n.div_ceil(2), n / 2),
     }
 }
 

@@ -12,7 +12,7 @@ pub fn contributions(settings: &IntegratorSettings, candidates: &Candidates, out
     out.extend(candidates.records.iter().map(|c| {
         let light = Technique { n: c.n_light, p: c.p_light };
         let bsdf = Technique { n: c.n_bsdf, p: c.p_bsdf };
-        c.f * weight(settings.estimator, settings.heuristic, c.drawn, light, bsdf)
+        c.f * weight(settings.estimator, settings.heuristic(), c.drawn, light, bsdf)
     }));
 }
 
@@ -24,7 +24,11 @@ fn weight(kind: EstimatorKind, heuristic: Heuristic, drawn: Drawn, light: Techni
         (Drawn::DeltaBsdf, _) => mc::weight(bsdf.n, bsdf.p),
         (Drawn::Light, EstimatorKind::Mc) => mc::weight(light.n, light.p),
         (Drawn::Bsdf, EstimatorKind::Mc) => 0.0,
-        (Drawn::Light, EstimatorKind::Mis) => heuristic.weight(light, bsdf) * mc::weight(light.n, light.p),
-        (Drawn::Bsdf, EstimatorKind::Mis) => heuristic.weight(bsdf, light) * mc::weight(bsdf.n, bsdf.p),
+        (Drawn::Light, EstimatorKind::Mis | EstimatorKind::Ris) => {
+            heuristic.weight(light, bsdf) * mc::weight(light.n, light.p)
+        }
+        (Drawn::Bsdf, EstimatorKind::Mis | EstimatorKind::Ris) => {
+            heuristic.weight(bsdf, light) * mc::weight(bsdf.n, bsdf.p)
+        }
     }
 }

@@ -13,7 +13,7 @@ use crate::lights::LightHit;
 use crate::materials::SurfaceBsdf;
 use crate::math::{Ray, Rgb, Vec2, Vec3};
 use crate::samplers::SampleStream;
-use crate::scene::{IntegratorSettings, World};
+use crate::scene::{IntegratorSettings, Split, World};
 use crate::textures::TextureContext;
 use std::time::{Duration, Instant};
 
@@ -80,6 +80,8 @@ pub struct CameraSample {
     pub weight: f32,
     /// Its random numbers.
     pub stream: SampleStream,
+    /// Samples and proposals of its first vertex.
+    pub split: Split,
 }
 
 /// A path on its way.
@@ -148,8 +150,18 @@ impl PathIntegrator {
             if self.active.is_empty() {
                 break;
             }
-            let points = self.find_vertices(world, vertex, depth, samples, out);
-            self.light_vertices(world, settings, vertex, depth, &points, out);
+            let vertices = self.find_vertices(world, vertex, depth, samples, out);
+            let split = settings.split();
+            let points: Vec<ShadePoint<'_>> = vertices
+                .iter()
+                .zip(&self.active)
+                .map(|(v, path)| {
+                    let split = if vertex == 0 { samples[path.sample as usize].split } else { split };
+                    v.shade_point(path.ray.time, split)
+                })
+                .collect();
+            self.light_points(world, settings, vertex, &points, out);
+            self.extend_paths(vertex, depth, &vertices, &points);
             std::mem::swap(&mut self.active, &mut self.next);
         }
     }
@@ -231,20 +243,16 @@ impl PathIntegrator {
         }
     }
 
-    /// Adds the direct light of the vertices, and fills `self.next` with the paths that go on.
-    fn light_vertices(
+    /// Adds the direct light of the vertices of the active paths.
+    fn light_points(
         &mut self,
         world: &World,
         settings: &IntegratorSettings,
         vertex: u32,
-        depth: u32,
-        vertices: &[Vertex<'_>],
+        points: &[ShadePoint<'_>],
         out: &mut [PixelSample],
     ) {
-        // Direct light
-        let points: Vec<ShadePoint<'_>> =
-            vertices.iter().zip(&self.active).map(|(v, path)| v.shade_point(path.ray.time)).collect();
-        self.direct.estimate(world, settings, &points, &mut self.radiance);
+        self.direct.estimate(world, settings, points, &mut self.radiance);
         if let Some(r) = &mut self.recording {
             let batches = if vertex == 0 { &mut r.segments } else { &mut r.bounce_segments };
             batches.push(self.direct.segments().clone());
@@ -252,12 +260,14 @@ impl PathIntegrator {
         for (path, &radiance) in self.active.iter().zip(&self.radiance) {
             out[path.sample as usize].radiance += path.beta * radiance;
         }
+    }
 
-        // Continuation
+    /// Fills `self.next` with the paths that go on.
+    fn extend_paths(&mut self, vertex: u32, depth: u32, vertices: &[Vertex<'_>], points: &[ShadePoint<'_>]) {
         let start = Instant::now();
         self.next.clear();
         if vertex + 1 < depth {
-            let paths = self.active.iter().zip(vertices).zip(&points);
+            let paths = self.active.iter().zip(vertices).zip(points);
             self.next.extend(paths.filter_map(|((path, v), point)| extend(path, v, point, vertex)));
         }
         self.stats.shade_time += start.elapsed();
@@ -274,7 +284,7 @@ struct Vertex<'w> {
 }
 
 impl<'w> Vertex<'w> {
-    fn shade_point(&self, time: f32) -> ShadePoint<'w> {
+    fn shade_point(&self, time: f32, split: Split) -> ShadePoint<'w> {
         ShadePoint {
             p: self.surface.p,
             p_error: self.surface.p_error,
@@ -282,6 +292,7 @@ impl<'w> Vertex<'w> {
             bsdf: self.bsdf,
             time,
             stream: self.stream.domain(domain::DIRECT),
+            split,
         }
     }
 }

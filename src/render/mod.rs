@@ -256,7 +256,8 @@ impl<'a> Run<'a> {
         let filter = self.filter.sample([fx, fy]);
         let film = Vec2::new(pixel[0] as f32 + 0.5, pixel[1] as f32 + 0.5) + filter.offset;
         let ray = scene.camera.ray(film, [lx, ly], u_time);
-        CameraSample { ray, weight: filter.weight * ray.weight * scene.film.scale, stream }
+        let split = scene.integrator.split();
+        CameraSample { ray, weight: filter.weight * ray.weight * scene.film.scale, stream, split }
     }
 }
 

@@ -2,7 +2,7 @@
 
 use crate::film::Film;
 use crate::imaging::color::linear_to_srgb;
-use crate::scene::Scene;
+use crate::scene::{EstimatorKind, Proposals, Scene};
 
 /// A group of channels beside the picture itself.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -97,13 +97,14 @@ pub fn display(film: &Film, exposure: f32) -> Vec<f32> {
 pub fn settings_metadata(scene: &Scene) -> Vec<(String, String)> {
     let i = &scene.integrator;
     let b = &scene.film.bounds;
-    [
+    let split = i.split();
+    let mut entries = vec![
         ("version", env!("CARGO_PKG_VERSION").to_owned()),
         ("integrator", i.kind.name().to_owned()),
         ("max_depth", i.max_depth.to_string()),
         ("estimator", i.estimator.name().to_owned()),
-        ("samples", i.samples.to_string()),
-        ("heuristic", i.heuristic.name().to_owned()),
+        ("samples", split.samples.to_string()),
+        ("heuristic", i.heuristic().name().to_owned()),
         ("light_choice", i.light_choice.name().to_owned()),
         ("sampler", scene.sampling.sampler.name().to_owned()),
         ("spp", scene.sampling.spp.to_string()),
@@ -111,10 +112,20 @@ pub fn settings_metadata(scene: &Scene) -> Vec<(String, String)> {
         ("filter", format!("{:?}", scene.film.filter)),
         ("resolution", format!("{}x{}", scene.film.resolution[0], scene.film.resolution[1])),
         ("crop", format!("{},{},{},{}", b.x0, b.x1, b.y0, b.y1)),
-    ]
-    .into_iter()
-    .map(|(key, value)| (format!("lumiris:{key}"), value))
-    .collect()
+    ];
+    if i.estimator == EstimatorKind::Ris {
+        entries.extend([
+            (
+                "proposals",
+                if i.ris.proposals == Proposals::Optimal { "optimal".to_owned() } else { split.proposals.to_string() },
+            ),
+            ("strata", i.ris.strata.name().to_owned()),
+            ("proposal_points", i.ris.points.name().to_owned()),
+            ("target", i.ris.target.name().to_owned()),
+        ]);
+        entries.extend(i.ris.stage_times.map(|t| ("stage_times", format!("{},{}", t.t1, t.t2))));
+    }
+    entries.into_iter().map(|(key, value)| (format!("lumiris:{key}"), value)).collect()
 }
 
 #[cfg(test)]

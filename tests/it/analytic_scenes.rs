@@ -72,8 +72,8 @@ fn configurations() -> Vec<Configuration> {
 fn world(path: &Path, c: &Configuration) -> World {
     let mut scene = load(path, &LoadOptions::default()).map_err(|d| d.to_string()).unwrap().scene;
     scene.integrator.estimator = c.estimator;
-    scene.integrator.heuristic = c.heuristic;
-    scene.integrator.samples = c.samples;
+    scene.integrator.heuristic = Some(c.heuristic);
+    scene.integrator.samples = Some(c.samples);
     scene.integrator.light_choice = c.light_choice;
     scene.lights.set_kind(c.light_choice);
     scene.sampling.sampler = c.sampler;
