@@ -12,7 +12,7 @@
 //! | 5 | [`import`], [`direct`] |
 //! | 6 | [`integrators`] |
 //! | 7 | [`render`] |
-//! | 8 | [`cli`] |
+//! | 8 | [`cli`], [`reproduce`] |
 
 pub mod accel;
 pub mod bsdfs;
@@ -29,6 +29,7 @@ pub mod lights;
 pub mod materials;
 pub mod math;
 pub mod render;
+pub mod reproduce;
 pub mod samplers;
 pub mod scene;
 pub mod textures;

@@ -9,6 +9,7 @@ mod crosscheck;
 mod info;
 mod progress;
 mod render;
+mod reproduce;
 mod settings;
 
 use clap::{Parser, Subcommand};
@@ -33,6 +34,8 @@ enum Command {
     Bench(bench::BenchArgs),
     /// Say what a scene holds, what it costs, and what of it was not understood
     Info(info::InfoArgs),
+    /// Render and measure the figures of a paper again, as a page with pictures
+    Reproduce(reproduce::ReproduceArgs),
 }
 
 /// Parses the command line, runs, and says how it went.
@@ -43,6 +46,7 @@ pub fn run() -> ExitCode {
         Command::Crosscheck(args) => crosscheck::run(args),
         Command::Bench(args) => bench::run(args),
         Command::Info(args) => info::run(args),
+        Command::Reproduce(args) => reproduce::run(args),
     };
     match result {
         Ok(code) => code,

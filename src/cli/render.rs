@@ -18,7 +18,7 @@ use std::time::Duration;
 /// File types that hold what a display shows.
 const DISPLAY_TYPES: [&str; 6] = ["png", "jpg", "jpeg", "tif", "tiff", "tga"];
 /// Exit code of a rendering that Ctrl-C ended, as shells have it.
-const INTERRUPTED: u8 = 130;
+pub const INTERRUPTED: u8 = 130;
 
 pub fn run(args: &RenderArgs) -> anyhow::Result<ExitCode> {
     check_outputs(&args.output)?;
@@ -26,15 +26,8 @@ pub fn run(args: &RenderArgs) -> anyhow::Result<ExitCode> {
     let outputs = outputs(args, &world);
     check_outputs(&outputs)?;
 
-    // Ctrl-C ends the rendering and writes what there is; a second one ends the program.
     let stop = Arc::new(AtomicBool::new(false));
-    let handler = Arc::clone(&stop);
-    ctrlc::set_handler(move || {
-        if handler.swap(true, Ordering::Relaxed) {
-            std::process::abort();
-        }
-    })
-    .context("cannot watch for Ctrl-C")?;
+    stop_at_ctrl_c(&stop)?;
 
     let bar = Bar::new(args.quiet);
     let time_limit = args.time.map(Duration::from_secs_f64);
@@ -52,6 +45,17 @@ pub fn run(args: &RenderArgs) -> anyhow::Result<ExitCode> {
     report(args, &rendering, &outputs);
     let interrupted = stop.load(Ordering::Relaxed);
     Ok(if interrupted { ExitCode::from(INTERRUPTED) } else { ExitCode::SUCCESS })
+}
+
+/// Ctrl-C sets `stop`, which ends a rendering in good order; a second one ends the program.
+pub fn stop_at_ctrl_c(stop: &Arc<AtomicBool>) -> anyhow::Result<()> {
+    let handler = Arc::clone(stop);
+    ctrlc::set_handler(move || {
+        if handler.swap(true, Ordering::Relaxed) {
+            std::process::abort();
+        }
+    })
+    .context("cannot watch for Ctrl-C")
 }
 
 fn outputs(args: &RenderArgs, world: &World) -> Vec<PathBuf> {

@@ -6,7 +6,7 @@
 
 use super::measure::{Measured, Method, Stage, View, median, turns};
 use super::{Observer, ReproduceError};
-use crate::scene::{EstimatorKind, Split, StageTimes};
+use crate::scene::{Split, StageTimes};
 
 /// Turns of a measurement of times.
 const TURNS: u32 = 3;
@@ -90,7 +90,6 @@ fn correct(
         let corrected = (f64::from(proposals) - surplus).round().clamp(f64::from(samples), f64::from(MAX_PROPOSALS));
         found.split.proposals = corrected as u32;
     }
-    debug_assert!(base.estimator != EstimatorKind::Ris);
     Ok(found)
 }
 

@@ -96,10 +96,7 @@ impl Chart {
         let (x, y) = (escape(&self.x), escape(&self.y));
         let _ = write!(out, "<text x=\"{middle}\" y=\"{}\" text-anchor=\"middle\">{x}</text>", HEIGHT - 8.0);
         let middle = (TOP + y1) / 2.0;
-        let _ = write!(
-            out,
-            "<text transform=\"translate(14 {middle}) rotate(-90)\" text-anchor=\"middle\">{y}</text>"
-        );
+        let _ = write!(out, "<text transform=\"translate(14 {middle}) rotate(-90)\" text-anchor=\"middle\">{y}</text>");
 
         // Curves and their names
         for (i, (curve, color)) in self.curves.iter().zip(COLORS.iter().cycle()).enumerate() {
@@ -110,7 +107,8 @@ impl Chart {
                 line.join(" ")
             );
             for p in &curve.points {
-                let _ = write!(out, "<circle cx=\"{:.1}\" cy=\"{:.1}\" r=\"2.6\" fill=\"{color}\"/>", px(p[0]), py(p[1]));
+                let _ =
+                    write!(out, "<circle cx=\"{:.1}\" cy=\"{:.1}\" r=\"2.6\" fill=\"{color}\"/>", px(p[0]), py(p[1]));
             }
             let (x, y) = (x1 + 12.0, TOP + 14.0 + 17.0 * i as f64);
             let _ = write!(out, "<circle cx=\"{x}\" cy=\"{}\" r=\"4\" fill=\"{color}\"/>", y - 4.0);

@@ -90,6 +90,11 @@ impl Picture {
         }
     }
 
+    /// Values as they are shown, RGB interleaved.
+    pub fn from_display(size: [u32; 2], data: Vec<f32>) -> Self {
+        Picture { width: size[0] as usize, height: size[1] as usize, data }
+    }
+
     /// Values as colours of a scale.
     pub fn colored(size: [u32; 2], values: &[f64], scale: &Scale) -> Self {
         let data = values.iter().flat_map(|&v| scale.color(v).map(|c| (c / 255.0) as f32)).collect();

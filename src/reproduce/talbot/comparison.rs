@@ -107,7 +107,8 @@ fn methods(case: &Case, split: Split) -> (Vec<Named>, Roles) {
     let ris = Method::ris(m, n);
     let plain = named("ris, no stratification", ris);
     let points = named("ris + stratified proposals", ris.stratified());
-    let systematic = named("ris + stratified proposals + systematic samples", ris.stratified().strata(Strata::Systematic));
+    let systematic =
+        named("ris + stratified proposals + systematic samples", ris.stratified().strata(Strata::Systematic));
     let visibility = named("ris, one sample of many proposals", Method::ris(MANY, 1));
     match case.kind {
         Kind::Reduction { .. } => {
@@ -122,7 +123,10 @@ fn methods(case: &Case, split: Split) -> (Vec<Named>, Roles) {
                 visibility,
             ];
             if let Some(s) = case.printed {
-                list.push(named("ris with the paper's M and N, no stratification", Method::ris(s.proposals, s.samples)));
+                list.push(named(
+                    "ris with the paper's M and N, no stratification",
+                    Method::ris(s.proposals, s.samples),
+                ));
             }
             (list, Roles { base: 0, best: 6, plain: 4, base_stratified: Some(1), visibility: 7 })
         }

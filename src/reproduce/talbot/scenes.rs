@@ -68,7 +68,8 @@ fn write_scenes(folder: &std::path::Path) -> Result<(), ReproduceError> {
             "AttributeBegin Translate {x:.4} {height:.4} {z:.4} Shape \"sphere\" \"float radius\" [ 0.14 ] AttributeEnd\n"
         );
     }
-    for (name, lights) in [("env", ENVIRONMENT), ("lights", LIGHTS), ("env-lights", &format!("{ENVIRONMENT}{LIGHTS}"))] {
+    for (name, lights) in [("env", ENVIRONMENT), ("lights", LIGHTS), ("env-lights", &format!("{ENVIRONMENT}{LIGHTS}"))]
+    {
         write_file(folder.join(format!("statue-{name}.pbrt")), &format!("{HEAD}{lights}{balls}"))?;
     }
 
