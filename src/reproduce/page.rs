@@ -258,7 +258,7 @@ mod tests {
         ]);
         let html = page.html();
         assert!(!html.contains("<script") && !html.contains("'b'"));
-        assert_eq!(html.matches("&lt;script&gt;&quot;a&quot; &amp; &#39;b&#39;&lt;/script&gt;").count(), 17);
+        assert_eq!(html.matches("&lt;script&gt;&quot;a&quot; &amp; &#39;b&#39;&lt;/script&gt;").count(), 18);
     }
 
     #[test]
