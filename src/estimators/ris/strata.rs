@@ -31,13 +31,13 @@ pub fn equal_weights(weights: &[f32], n: usize, u: &[f32], ends: &mut Vec<u32>) 
     if weights.is_empty() || n == 0 {
         return;
     }
-    let mut weight_left: f64 = weights.iter().map(|&w| clean(w)).sum();
+    let mut weight_left: f64 = weights.iter().map(|&w| f64::from(clean(w))).sum();
     let mut proposals_left = weights.iter().filter(|&&w| clean(w) > 0.0).count();
     let mut strata_left = n;
     let (mut weight, mut target) = (0.0, weight_left / n as f64);
 
     for (j, &w) in weights.iter().enumerate() {
-        let w = clean(w);
+        let w = f64::from(clean(w));
         if w == 0.0 {
             continue;
         }
