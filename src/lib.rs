@@ -4,7 +4,7 @@
 //!
 //! | layer | modules |
 //! |---|---|
-//! | 0 | [`math`], [`estimators`] |
+//! | 0 | [`math`], [`estimators`], [`simd`] |
 //! | 1 | [`samplers`], [`imaging`] |
 //! | 2 | [`textures`], [`geometry`], [`bsdfs`], [`cameras`], [`film`] |
 //! | 3 | [`materials`], [`lights`], [`accel`] |
@@ -32,4 +32,5 @@ pub mod render;
 pub mod reproduce;
 pub mod samplers;
 pub mod scene;
+pub mod simd;
 pub mod textures;
