@@ -99,7 +99,8 @@ impl Proposals {
     }
 
     fn arrays(&mut self) -> impl Iterator<Item = &mut Vec<f32>> {
-        let scalars = [&mut self.pmf, &mut self.p_light, &mut self.p_bsdf, &mut self.p_hat, &mut self.r, &mut self.weight];
+        let scalars =
+            [&mut self.pmf, &mut self.p_light, &mut self.p_bsdf, &mut self.p_hat, &mut self.r, &mut self.weight];
         let vectors = self.u.iter_mut().chain(&mut self.wi).chain(&mut self.li).chain(&mut self.f_cos);
         scalars.into_iter().chain(vectors)
     }

@@ -1,17 +1,17 @@
 //! Numbers of samples and proposals for equal time.
 //!
-//! A rendering costs c + P·(M·T1 + N·T2), where P counts shading points. T1 is what a proposal costs with its share of
-//! the draw, T2 a sample: the time to trace it. Both are measured on the renderings themselves, with the baseline in
+//! A rendering costs c + P·(M·T1 + N·T2), where P counts shading points. T1 is what a proposal and its weight cost, T2 a
+//! sample: to draw it, to evaluate it, to trace it. Both are measured on the renderings themselves, with the baseline in
 //! turns. The split is N = B/(2·T2), M = B/(2·T1) for a time of B per point: M/N = T2/T1 [Talbot 2005, Eq. 4.4].
 
-use super::measure::{Measured, Method, Stage, View, median, turns};
+use super::measure::{Measured, Method, Seconds, Stage, View, turns};
 use super::{Observer, ReproduceError};
 use crate::scene::{Split, StageTimes};
 
 /// Turns of a measurement of times.
 const TURNS: u32 = 3;
 /// Most corrections of the number of proposals.
-const CORRECTIONS: usize = 3;
+const CORRECTIONS: u32 = 4;
 /// Good enough a match of times.
 const MATCH: f64 = 0.01;
 /// Most proposals: the buffers of a batch grow with them.
@@ -26,18 +26,23 @@ pub struct Calibration {
     pub budget: f64,
     /// M and N.
     pub split: Split,
-    /// Thread seconds of one camera ray per pixel by the baseline.
+    /// Wall-clock seconds of one camera ray per pixel by the baseline.
     pub seconds: f64,
 }
 
-/// Times of one proposal and of one sample (ns) of what was rendered by `ris`.
+/// Times of one proposal and of one sample (ns) of what was rendered by `ris`. Stages are timed by the clock on the wall;
+/// what the machine did meanwhile is taken out of both alike.
 pub fn stage_times(m: &Measured) -> StageTimes {
-    let points = (m.proposals as f64 / f64::from(m.method.proposals)).max(1.0);
-    let seconds = |f: fn(&super::measure::StageSeconds) -> f64| median(m.seconds.iter().map(f).collect());
-    let per_turn = points / m.turns().max(1) as f64;
-    let t1 = seconds(|s| s.t1 + s.select) * 1e9 / (per_turn * f64::from(m.method.proposals));
-    let t2 = seconds(|s| s.t2) * 1e9 / (per_turn * f64::from(m.method.samples));
+    let points = points(m);
+    let busy = m.median_seconds(|s| s.processor / s.stages().max(1e-12)).min(1.0);
+    let t1 = m.median_seconds(|s| s.t1) * busy * 1e9 / (points * f64::from(m.method.proposals));
+    let t2 = m.median_seconds(|s| s.select + s.t2) * busy * 1e9 / (points * f64::from(m.method.samples));
     StageTimes { t1: t1.max(1e-3), t2: t2.max(1e-3) }
+}
+
+/// Shading points of a turn of `ris`.
+fn points(m: &Measured) -> f64 {
+    (m.proposals as f64 / f64::from(m.method.proposals) / m.turns().max(1) as f64).max(1.0)
 }
 
 /// N and M for a time per point, of which half goes to samples; at least one sample, and no fewer proposals than samples.
@@ -59,22 +64,13 @@ pub fn calibrate(stage: &mut Stage, base: &Method, observer: Observer<'_>) -> Re
     let guess = Method::ris(4 * base.samples, base.samples.div_ceil(2)).stratified();
     let pilot = turns(stage, &[*base, guess], View::Centres, 1, 0..TURNS, observer)?;
     let times = stage_times(&pilot[1]);
-    let points = (pilot[1].proposals as f64 / f64::from(guess.proposals) / f64::from(TURNS)).max(1.0);
-    let direct = |m: &Measured| median(m.seconds.iter().map(|s| s.t1 + s.select + s.t2).collect());
-    let budget = direct(&pilot[0]) * 1e9 / points;
-    let split = equal_halves(budget, times);
-    let found = Calibration { times, budget, split, seconds: pilot[0].mean_seconds() };
-    correct(stage, base, found, observer)
-}
+    let busy = pilot[0].median_seconds(|s| s.processor / s.stages().max(1e-12)).min(1.0);
+    let budget = pilot[0].median_seconds(Seconds::direct) * busy * 1e9 / points(&pilot[1]);
+    let seconds = pilot[0].median_seconds(|s| s.wall);
+    let mut found = Calibration { times, budget, split: equal_halves(budget, times), seconds };
 
-/// Renders the split in turns with the baseline, and changes the number of proposals until times match.
-fn correct(
-    stage: &mut Stage,
-    base: &Method,
-    mut found: Calibration,
-    observer: Observer<'_>,
-) -> Result<Calibration, ReproduceError> {
-    for step in 0..CORRECTIONS as u32 {
+    // The split in turns with the baseline; the number of proposals changes until times match
+    for step in 0..CORRECTIONS {
         let Split { samples, proposals } = found.split;
         let method = Method::ris(proposals, samples).stratified();
         let range = (step + 1) * TURNS..(step + 2) * TURNS;
@@ -85,8 +81,7 @@ fn correct(
             break;
         }
         // The excess is a part of the whole time of the baseline; a proposal takes T1 of it at every point.
-        let points = pair[1].proposals as f64 / f64::from(proposals) / f64::from(TURNS);
-        let surplus = excess * pair[0].mean_seconds() * 1e9 / (points.max(1.0) * found.times.t1);
+        let surplus = excess * pair[0].median_seconds(|s| s.processor) * 1e9 / (points(&pair[1]) * found.times.t1);
         let corrected = (f64::from(proposals) - surplus).round().clamp(f64::from(samples), f64::from(MAX_PROPOSALS));
         found.split.proposals = corrected as u32;
     }

@@ -3,8 +3,8 @@
 //! A *turn* renders the picture once with each method, each with its own seed; the order of the methods moves on by one
 //! from turn to turn, so that a machine that slows down slows all of them. The variance of a method is that of its
 //! pixel estimates over the turns (luminance; unbiased; no reference picture is needed), averaged over pixels. Its time is
-//! the time of the stages summed over threads, and times of two methods are compared turn by turn: the median of the
-//! ratios. Camera rays pass through pixel centres, so that the variance is that of lighting and not of antialiasing.
+//! the processor time of the rendering over all threads, which does not count what else the machine does meanwhile; times of
+//! two methods are compared turn by turn: the median of the ratios. Camera rays pass through pixel centres, so that the variance is that of lighting and not of antialiasing.
 
 use super::{Observer, ReproduceError};
 use crate::accel::{Accel, AccelStats, Bvh, Coherence, Hit, RayBatch};
@@ -12,16 +12,17 @@ use crate::estimators::stats::{Welford, z_test};
 use crate::film::Film;
 use crate::film::filter::PixelFilter;
 use crate::import::{LoadOptions, load};
-use crate::integrators::PathStats;
 use crate::render::{RenderSettings, Rendering, render};
 use crate::samplers::SamplerKind;
 use crate::scene::{
     AccelKind, EstimatorKind, IntegratorKind, IntegratorSettings, ProposalPoints, Proposals, Strata, World,
 };
+use rustix::time::{ClockId, clock_gettime};
 use serde::Serialize;
 use std::path::Path;
 use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
+use std::time::Duration;
 
 /// A way to estimate direct light.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -177,9 +178,13 @@ impl Stage {
     }
 }
 
-/// Seconds of the stages of a rendering, summed over threads.
+/// Seconds of a rendering. Those of the stages are by the clock on the wall, summed over threads.
 #[derive(Clone, Copy, Debug, Default, Serialize)]
-pub struct StageSeconds {
+pub struct Seconds {
+    /// Processor time of all threads.
+    pub processor: f64,
+    /// From start to end.
+    pub wall: f64,
     /// Tracing camera rays.
     pub camera: f64,
     /// Hits, textures, materials.
@@ -192,23 +197,35 @@ pub struct StageSeconds {
     pub t2: f64,
 }
 
-impl StageSeconds {
-    /// Times of a rendering.
-    pub fn new(s: &PathStats) -> Self {
-        let d = &s.direct;
-        StageSeconds {
+impl Seconds {
+    fn new(rendering: &Rendering, processor: Duration) -> Self {
+        let s = &rendering.stats;
+        Seconds {
+            processor: processor.as_secs_f64(),
+            wall: rendering.elapsed.as_secs_f64(),
             camera: (s.camera_time + s.bounce_time).as_secs_f64(),
             shade: s.shade_time.as_secs_f64(),
-            t1: d.t1.as_secs_f64(),
-            select: d.select.as_secs_f64(),
-            t2: d.t2.as_secs_f64(),
+            t1: s.direct.t1.as_secs_f64(),
+            select: s.direct.select.as_secs_f64(),
+            t2: s.direct.t2.as_secs_f64(),
         }
     }
 
-    /// All of it.
-    pub fn total(&self) -> f64 {
-        self.camera + self.shade + self.t1 + self.select + self.t2
+    /// Direct lighting.
+    pub fn direct(&self) -> f64 {
+        self.t1 + self.select + self.t2
     }
+
+    /// All stages.
+    pub fn stages(&self) -> f64 {
+        self.camera + self.shade + self.direct()
+    }
+}
+
+/// Processor time of this process so far, of threads that have ended too.
+fn processor_time() -> Duration {
+    let t = clock_gettime(ClockId::ProcessCPUTime);
+    Duration::new(u64::try_from(t.tv_sec).unwrap_or(0), u32::try_from(t.tv_nsec).unwrap_or(0))
 }
 
 /// A number and its standard error.
@@ -232,7 +249,7 @@ pub struct Measured {
     /// The picture of the first turn.
     pub first: Vec<[f32; 3]>,
     /// Times, turn by turn.
-    pub seconds: Vec<StageSeconds>,
+    pub seconds: Vec<Seconds>,
     /// Shadow segments of all turns.
     pub segments: u64,
     /// Proposals of all turns.
@@ -260,7 +277,7 @@ impl Measured {
         }
     }
 
-    fn add(&mut self, rendering: &Rendering) {
+    fn add(&mut self, rendering: &Rendering, processor: Duration) {
         let means = radiance(&rendering.film);
         if self.first.is_empty() {
             self.first = means.iter().map(|p| p.map(|v| v as f32)).collect();
@@ -270,7 +287,7 @@ impl Measured {
             (0..3).for_each(|c| sum[c] += mean[c]);
         }
         self.luminance.push(means.iter().map(|&p| luminance(p) as f32).collect());
-        self.seconds.push(StageSeconds::new(&rendering.stats));
+        self.seconds.push(Seconds::new(rendering, processor));
         self.segments += rendering.stats.direct.segments;
         self.proposals += rendering.stats.direct.proposals;
         self.invalid += rendering.film.pixels.iter().map(|p| p.invalid).sum::<u64>();
@@ -313,14 +330,14 @@ impl Measured {
         Estimate { value, error: (self.variance(None).value / (turns * pixels)).sqrt() }
     }
 
-    /// Mean time of a turn (thread seconds).
-    pub fn mean_seconds(&self) -> f64 {
-        self.seconds.iter().map(StageSeconds::total).sum::<f64>() / self.seconds.len().max(1) as f64
+    /// Median over the turns of some time.
+    pub fn median_seconds(&self, of: impl Fn(&Seconds) -> f64) -> f64 {
+        median(self.seconds.iter().map(of).collect())
     }
 
     /// Time relative to another method: the median over the turns.
     pub fn time_ratio(&self, base: &Measured) -> f64 {
-        median(self.seconds.iter().zip(&base.seconds).map(|(a, b)| a.total() / b.total().max(1e-12)).collect())
+        median(self.seconds.iter().zip(&base.seconds).map(|(a, b)| a.processor / b.processor.max(1e-12)).collect())
     }
 
     /// Variance at equal time, relative to another method, over the pixels of `mask`.
@@ -371,8 +388,9 @@ pub fn turns(
             let i = (k + turn) % count;
             let seed = 1 + turn * count + i;
             let m = &mut measured[i as usize];
+            let start = processor_time();
             let rendering = stage.render(&m.method, view, spp, seed, observer)?;
-            m.add(&rendering);
+            m.add(&rendering, processor_time().saturating_sub(start));
         }
     }
     Ok(measured)
@@ -400,7 +418,7 @@ mod tests {
         for turn in turns {
             m.luminance.push(turn.to_vec());
             (0..2).for_each(|i| (0..3).for_each(|c| m.sum[i][c] += f64::from(turn[i])));
-            m.seconds.push(StageSeconds { t1: seconds, ..StageSeconds::default() });
+            m.seconds.push(Seconds { processor: seconds, ..Seconds::default() });
         }
         m
     }

@@ -162,6 +162,9 @@ pub struct Outcome<'a> {
 
 /// Turns of the antialiased pair, for its variance.
 const PAIR_TURNS: u32 = 2;
+/// Edge of the picture on which times are found out, and the least edge.
+const PILOT_SIZE: u32 = 96;
+const LEAST_SIZE: u32 = 32;
 /// Fewest and most turns.
 const TURNS: [u32; 2] = [4, 48];
 /// Turns that the size of the picture is chosen for.
@@ -176,15 +179,16 @@ pub fn run(setup: &Setup<'_>, case: &Case, time: Duration) -> Result<Figure, Rep
     let path = setup.scenes.path(case.scene);
 
     // As many pixels as fit
-    let mut stage = Stage::load(&path, setup.size, setup.options.threads)?;
+    let pilot_size = setup.size.min(PILOT_SIZE);
+    let mut stage = Stage::load(&path, pilot_size, setup.options.threads)?;
     let mut calibration = calibrate(&mut stage, &base, setup.observer)?;
     let count = methods(case, calibration.split).0.len() as f64;
-    let cost = |c: &Calibration| c.seconds * f64::from(case.primary) / setup.threads as f64 * 1.1;
+    let cost = |c: &Calibration| c.seconds * f64::from(case.primary) * 1.1;
     let pair = 2.0 * f64::from(PAIR_TURNS);
     let wanted = cost(&calibration) * (WANTED_TURNS * count + pair);
     let fits = (time.saturating_sub(start.elapsed()).as_secs_f64() / wanted).sqrt();
-    let size = ((f64::from(setup.size) * fits) as u32 / 8 * 8).max(32).min(setup.size);
-    if size < setup.size {
+    let size = ((f64::from(pilot_size) * fits) as u32 / 8 * 8).max(LEAST_SIZE).min(setup.size);
+    if size != pilot_size {
         stage = Stage::load(&path, size, setup.options.threads)?;
         calibration = calibrate(&mut stage, &base, setup.observer)?;
     }

@@ -12,6 +12,7 @@ use super::classes::{Classes, NAMES};
 use super::report::{estimate_json, method_json, plus_minus};
 use super::scenes::Which;
 use super::{Figure, Setup, Summary};
+use crate::estimators::ris::{Costs, Variances, clamp_ratio, optimal_ratio};
 use crate::scene::{Split, StageTimes};
 use serde_json::json;
 use std::time::{Duration, Instant};
@@ -28,10 +29,7 @@ const TURNS: [u32; 2] = [6, 40];
 const TARGET: f64 = 2.0;
 
 /// V(f/p) and V(f/q) of every pixel.
-struct Terms {
-    p: Vec<f64>,
-    q: Vec<f64>,
-}
+struct Terms(Vec<Variances>);
 
 impl Terms {
     /// From the variances with M = N = 1, and with N = 1 of [`MANY`] proposals: V = V(f/p)/M + (1 − 1/M)·V(f/q). Averaged over
@@ -40,8 +38,25 @@ impl Terms {
         let scaled = |m: &Measured| -> Vec<f64> { m.variance_map().iter().map(|v| v * f64::from(spp)).collect() };
         let (p, many) = (smooth(&scaled(one), size), smooth(&scaled(many), size));
         let share = 1.0 / f64::from(MANY);
-        let q = p.iter().zip(&many).map(|(p, v)| ((v - p * share) / (1.0 - share)).max(0.0)).collect();
-        Terms { p, q }
+        let samples = |p: f64, v: f64| ((v - p * share) / (1.0 - share)).max(0.0);
+        let pixels = p.iter().zip(&many);
+        Terms(pixels.map(|(&p, &v)| Variances { proposals: p, samples: samples(p, v) }).collect())
+    }
+
+    /// The best M/N of every pixel; `None` where there is no variance.
+    fn ratios(&self, costs: Costs, time: f64) -> Vec<Option<f64>> {
+        let best = |v: &Variances| (v.proposals > 0.0).then(|| optimal_ratio(costs, *v, time));
+        self.0.iter().map(best).collect()
+    }
+
+    /// Mean variance of an estimate that takes `time` with the ratio that `ratio` chooses for each pixel.
+    fn predicted(&self, costs: Costs, time: f64, ratio: impl Fn(usize) -> f64) -> f64 {
+        let of_pixel = |(i, v): (usize, &Variances)| {
+            let k = clamp_ratio(ratio(i), costs, time);
+            let n = (time / (k * costs.t1 + costs.t2)).max(1.0);
+            v.of_estimate(k * n, n)
+        };
+        self.0.iter().enumerate().map(of_pixel).sum::<f64>() / self.0.len().max(1) as f64
     }
 }
 
@@ -55,26 +70,6 @@ fn smooth(values: &[f64], size: [u32; 2]) -> Vec<f64> {
         sum / count
     };
     (0..w * h).map(|i| at(i % w, i / w)).collect()
-}
-
-/// The best M/N of a pixel for a time of `t` per point, from 1 to what one sample leaves; `None` without variance.
-fn best_ratio(p: f64, q: f64, t: f64, times: StageTimes) -> Option<f64> {
-    let StageTimes { t1, t2 } = times;
-    let highest = ((t - t2) / t1).max(1.0);
-    if p <= 0.0 {
-        return None;
-    }
-    let above = t / t2 * p - q;
-    let below = (t / t1 - 1.0) * q;
-    let k = if below > 0.0 { t2 / t1 * (above.max(0.0) / below).sqrt() } else { highest };
-    Some(k.clamp(1.0, highest))
-}
-
-/// Variance of one estimate that takes the time `t` at the ratio `k` [Talbot 2005, Eq. 4.2].
-fn predicted(p: f64, q: f64, k: f64, t: f64, times: StageTimes) -> f64 {
-    let n = (t / (k * times.t1 + times.t2)).max(1.0);
-    let m = (k * n).max(1.0);
-    p / m + (1.0 - 1.0 / m) * q / n
 }
 
 /// Everything that was measured.
@@ -92,6 +87,12 @@ struct Outcome {
 impl Outcome {
     fn sweep(&self) -> &[Measured] {
         &self.measured[..self.splits.len()]
+    }
+
+    /// Times, and the time to spend on a point (ns).
+    fn costs(&self) -> (Costs, f64) {
+        let StageTimes { t1, t2 } = self.calibration.times;
+        (Costs { t1, t2 }, self.calibration.budget)
     }
 
     fn auto(&self) -> &Measured {
@@ -127,7 +128,7 @@ pub fn run(setup: &Setup<'_>, time: Duration) -> Result<Figure, ReproduceError> 
     methods.extend([of(&calibration.split), Method::ris(1, 1), Method::ris(MANY, 1)]);
 
     // Turns, and camera rays per turn, that fit
-    let turn = calibration.seconds / setup.threads as f64 * 1.1 * methods.len() as f64;
+    let turn = calibration.seconds * 1.1 * methods.len() as f64;
     let left = time.saturating_sub(start.elapsed()).as_secs_f64() * 0.95;
     let spp = ((left / turn / f64::from(TURNS[1])) as u32).clamp(1, 16);
     let count = ((left / (turn * f64::from(spp))) as u32).clamp(TURNS[0], TURNS[1]);
@@ -166,11 +167,9 @@ fn pictures(setup: &Setup<'_>, stage: &mut Stage, o: &Outcome) -> Result<Vec<Blo
         shown.push(Shown { file, title, caption });
     }
 
-    let (t, times) = (o.calibration.budget, o.calibration.times);
-    let ratios: Vec<Option<f64>> =
-        o.terms.p.iter().zip(&o.terms.q).map(|(&p, &q)| best_ratio(p, q, t, times)).collect();
-    let highest = ((t - times.t2) / times.t1).max(2.0);
-    let scale = Scale::new(RED_GREEN, 1.0, highest);
+    let (costs, time) = o.costs();
+    let ratios = o.terms.ratios(costs, time);
+    let scale = Scale::new(RED_GREEN, 1.0, clamp_ratio(f64::INFINITY, costs, time).max(2.0));
     let colors: Vec<f32> =
         ratios.iter().flat_map(|k| k.map_or([0.0; 3], |k| scale.color(k)).map(|c| (c / 255.0) as f32)).collect();
     let file = Picture::from_display(size, colors).write(&setup.options.out, "figure-3-map")?;
@@ -179,11 +178,12 @@ fn pictures(setup: &Setup<'_>, stage: &mut Stage, o: &Outcome) -> Result<Vec<Blo
         title: "best M/N of every pixel".to_owned(),
         caption: "green: more proposals; red: more samples; black: no variance".to_owned(),
     });
-    let heat = Scale::of_values(HEAT, o.terms.p.iter());
-    for (name, title, values) in [
-        ("p", "V(f/p): variance of a proposal", &o.terms.p),
-        ("q", "V(f/q): variance that visibility alone leaves", &o.terms.q),
-    ] {
+    let [p, q]: [Vec<f64>; 2] =
+        [|v: &Variances| v.proposals, |v: &Variances| v.samples].map(|f| o.terms.0.iter().map(f).collect());
+    let heat = Scale::of_values(HEAT, &p);
+    for (name, title, values) in
+        [("p", "V(f/p): variance of a proposal", &p), ("q", "V(f/q): variance that visibility alone leaves", &q)]
+    {
         let file =
             Picture::colored(size, values, &heat).write(&setup.options.out, &format!("figure-3-variance-{name}"))?;
         shown.push(Shown { file, title: title.to_owned(), caption: String::new() });
@@ -238,12 +238,11 @@ fn figure(o: &Outcome, size: [u32; 2], blocks: Vec<Block>) -> Figure {
     let least = o.measured[best].at_equal_time(base, None);
     let auto = o.auto().at_equal_time(base, None);
     let excess = auto.value / least.value.max(1e-300);
-    let (t, times) = (o.calibration.budget, o.calibration.times);
+    let (costs, time) = o.costs();
     let k = ratio_of(&o.calibration.split);
-    let pixels = || o.terms.p.iter().zip(&o.terms.q);
-    let of_auto: f64 = pixels().map(|(&p, &q)| predicted(p, q, k, t, times)).sum();
-    let of_best: f64 =
-        pixels().map(|(&p, &q)| best_ratio(p, q, t, times).map_or(0.0, |k| predicted(p, q, k, t, times))).sum();
+    let ratios = o.terms.ratios(costs, time);
+    let of_auto = o.terms.predicted(costs, time, |_| k);
+    let of_best = o.terms.predicted(costs, time, |i| ratios[i].unwrap_or(k));
     let split = |i: usize| o.splits.get(i).copied().unwrap_or(o.calibration.split);
     let best_of: Vec<String> = NAMES
         .iter()
@@ -269,7 +268,7 @@ fn figure(o: &Outcome, size: [u32; 2], blocks: Vec<Block>) -> Figure {
     let rows: Vec<_> = o.measured.iter().zip(&names).map(|(m, n)| method_json(n, m, base, &o.classes)).collect();
     let numbers = json!({
         "size": size, "camera_rays_per_turn": o.spp, "turns": base.turns(),
-        "t1_ns": times.t1, "t2_ns": times.t2, "budget_ns": t,
+        "t1_ns": costs.t1, "t2_ns": costs.t2, "budget_ns": time,
         "auto_over_best": excess, "auto": estimate_json(auto), "best": estimate_json(least),
         "best_per_pixel_over_auto_predicted": of_best / of_auto.max(1e-300),
         "methods": rows,
@@ -295,24 +294,6 @@ impl Outcome {
 #[cfg(test)]
 mod tests {
     use super::*;
-
-    #[test]
-    fn the_best_ratio_is_where_the_predicted_variance_is_least() {
-        let times = StageTimes { t1: 10.0, t2: 150.0 };
-        let t = 3200.0;
-        for (p, q) in [(1.0, 0.1), (5.0, 0.02), (1.0, 0.9), (0.3, 0.05)] {
-            let k = best_ratio(p, q, t, times).unwrap();
-            let least = predicted(p, q, k, t, times);
-            for factor in [0.7, 0.9, 0.97, 1.03, 1.1, 1.4] {
-                let other = (k * factor).clamp(1.0, (t - times.t2) / times.t1);
-                assert!(predicted(p, q, other, t, times) >= least * (1.0 - 1e-9), "{p} {q} {k} {other}");
-            }
-            // T2/T1 is at most twice as bad.
-            assert!(predicted(p, q, times.t2 / times.t1, t, times) <= 2.0 * least);
-        }
-        assert_eq!(best_ratio(0.0, 0.0, t, times), None);
-        assert_eq!(best_ratio(1.0, 0.0, t, times), Some(305.0));
-    }
 
     #[test]
     fn smoothing_keeps_constants_and_stays_inside() {

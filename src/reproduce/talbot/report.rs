@@ -1,6 +1,6 @@
 //! From measurements to sections of the page and to numbers.
 
-use super::super::measure::{Estimate, Measured, StageSeconds};
+use super::super::measure::{Estimate, Measured, Seconds};
 use super::super::page::{Block, Cell, Page, Shown, Table};
 use super::super::pictures::{HEAT, Picture, Scale, gain, significant};
 use super::super::{ReproduceError, write_file};
@@ -44,7 +44,7 @@ pub fn method_json(name: &str, m: &Measured, base: &Measured, classes: &Classes)
         "turns": m.turns(), "variance": estimate_json(m.variance(None)),
         "time_ratio": m.time_ratio(base), "at_equal_time": estimate_json(m.at_equal_time(base, None)),
         "mean": estimate_json(m.mean()), "same_mean_p": m.same_mean(base),
-        "classes": by_class, "thread_seconds": m.seconds,
+        "classes": by_class, "seconds": m.seconds,
         "segments": m.segments, "proposals_drawn": m.proposals, "invalid_samples": m.invalid,
     })
 }
@@ -171,15 +171,15 @@ fn pictures(setup: &Setup<'_>, o: &Outcome<'_>) -> Result<Vec<Block>, ReproduceE
     let reference: Vec<[f32; 3]> = o.reference.iter().map(|p| p.map(|v| v as f32)).collect();
     let exposure = gain(&reference);
     let chosen = [o.roles.base, o.roles.best];
-    let base_seconds = o.pair[0].seconds[0].total();
+    let base_seconds = o.pair[0].seconds[0].processor;
     let mut shown = Vec::new();
     for (k, &i) in chosen.iter().enumerate() {
         let m = &o.pair[k];
         let Split { samples, proposals } = Split { samples: m.method.samples, proposals: m.method.proposals };
         let file = Picture::tone_mapped(o.size, &m.first, exposure).write(out, &format!("{id}-{k}"))?;
-        let seconds = m.seconds[0].total();
+        let seconds = m.seconds[0].processor;
         let caption = format!(
-            "M = {proposals}, N = {samples}; {} thread seconds ({:+.1} %); variance with antialiasing {}",
+            "M = {proposals}, N = {samples}; {} processor seconds ({:+.1} %); variance with antialiasing {}",
             significant(seconds),
             (seconds / base_seconds - 1.0) * 100.0,
             significant(m.variance(None).value)
@@ -224,11 +224,11 @@ fn tables(o: &Outcome<'_>) -> Vec<Block> {
         table.row(cells);
     }
     let mut times =
-        Table::new(&["method", "camera rays", "materials", "T1", "select", "T2", "total (thread seconds of a turn)"]);
+        Table::new(&["method", "camera rays", "materials", "T1", "select", "T2", "processor seconds of a turn"]);
     for (named, m) in o.methods.iter().zip(&o.measured) {
-        let mean = |f: fn(&StageSeconds) -> f64| m.seconds.iter().map(f).sum::<f64>() / m.turns().max(1) as f64;
+        let mean = |f: fn(&Seconds) -> f64| m.median_seconds(f);
         let values = [mean(|s| s.camera), mean(|s| s.shade), mean(|s| s.t1), mean(|s| s.select), mean(|s| s.t2)];
-        let total = Cell::number(significant(m.mean_seconds()));
+        let total = Cell::number(significant(m.median_seconds(|s| s.processor)));
         let cells = values.iter().map(|&v| Cell::number(significant(v)));
         times.row(std::iter::once(Cell::text(&named.name)).chain(cells).chain([total]));
     }
@@ -301,7 +301,7 @@ const METHOD: [&str; 3] = [
     "Variance: of the pixel's luminance over independent renderings with the camera rays of one turn each, unbiased, averaged \
      over all pixels; no reference picture takes part. Camera rays pass through pixel centres, so that it is the variance of \
      lighting; the pictures, and the variance below them, are with antialiasing. ± is one standard error, from how the turns differ.",
-    "Time: that of tracing camera rays, materials, proposals, selection and shadow rays, summed over threads. All methods take \
+    "Time: processor time of the whole rendering, all threads together. All methods take \
      turns in one run, in an order that moves on from turn to turn; the ratio of times is the median over the turns. At equal time \
      means variance × time, relative to the baseline. M and N of ris are chosen so that times agree within about one percent.",
     "“Same mean, p” is the probability of a difference of the mean luminances at least as large as the one found if both methods \
