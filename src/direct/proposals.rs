@@ -99,7 +99,8 @@ impl Proposals {
     }
 
     fn arrays(&mut self) -> impl Iterator<Item = &mut Vec<f32>> {
-        let scalars = [&mut self.pmf, &mut self.p_light, &mut self.p_bsdf, &mut self.p_hat, &mut self.r, &mut self.weight];
+        let scalars =
+            [&mut self.pmf, &mut self.p_light, &mut self.p_bsdf, &mut self.p_hat, &mut self.r, &mut self.weight];
         let vectors = self.u.iter_mut().chain(&mut self.wi).chain(&mut self.li).chain(&mut self.f_cos);
         scalars.into_iter().chain(vectors)
     }
@@ -188,7 +189,10 @@ impl Proposals {
 
             // Lights at infinity overlap: a direction belongs to all of them together
             if lights.infinite.len() > 1 && lights.infinite.contains(&run.light) {
-                for i in (from..to).filter(|&i| self.p_light[i] > 0.0) {
+                for i in from..to {
+                    if !(self.p_light[i] > 0.0) {
+                        continue;
+                    }
                     let wi = self.wi.each_ref().map(|a| a[i]).into();
                     let li = lights.le(wi);
                     self.li.iter_mut().enumerate().for_each(|(c, a)| a[i] = li[c]);

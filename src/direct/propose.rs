@@ -169,9 +169,10 @@ impl Candidates {
                 let stream = point.stream.split(domain::LIGHT, shares.light_draws, i);
                 let [u_choice, u0, u1] = stream.draw::<3>();
                 let ctx = point.light_ctx();
-                let candidate = world.scene.lights.sample(&ctx, u_choice, [u0, u1]).and_then(|(light, sample)| {
-                    light_candidate(world, index as u32, point, &shares, (light, sample))
-                });
+                let candidate =
+                    world.scene.lights.sample(&ctx, u_choice, [u0, u1]).and_then(|(light, sample)| {
+                        light_candidate(world, index as u32, point, &shares, (light, sample))
+                    });
                 self.records.extend(candidate);
             }
         }

@@ -180,10 +180,12 @@ impl LightSampler {
                 let mut first = 0;
                 for (i, &light) in infinite.iter().enumerate().filter(|_| p_infinite > 0.0) {
                     let interval = [share * i as f64, share * (i + 1) as f64];
-                    let is_in = |&p: &u32| f64::from(p) * UNIT < interval[1] || p_infinite == 1.0 && i + 1 == infinite.len();
+                    let is_in =
+                        |&p: &u32| f64::from(p) * UNIT < interval[1] || p_infinite == 1.0 && i + 1 == infinite.len();
                     let count = positions[first..].partition_point(is_in);
                     if count > 0 {
-                        let (pmf, places) = (p_infinite / infinite.len() as f32, [first as u32, (first + count) as u32]);
+                        let (pmf, places) =
+                            (p_infinite / infinite.len() as f32, [first as u32, (first + count) as u32]);
                         out.push(LightRun { light, pmf, places, interval });
                     }
                     first += count;

@@ -246,8 +246,12 @@ impl LightTree {
             let middle = interval[0] + (interval[1] - interval[0]) * f64::from(p);
             let is_left = |&x: &u32| f64::from(x) * (1.0 / 4_294_967_296.0) < middle;
             let split = first + positions[first as usize..end as usize].partition_point(is_left) as u32;
-            stack[size] =
-                Descent { place: node.index, pmf: pmf * (1.0 - p), places: [split, end], interval: [middle, interval[1]] };
+            stack[size] = Descent {
+                place: node.index,
+                pmf: pmf * (1.0 - p),
+                places: [split, end],
+                interval: [middle, interval[1]],
+            };
             stack[size + 1] =
                 Descent { place: place + 1, pmf: pmf * p, places: [first, split], interval: [interval[0], middle] };
             size += 2;

@@ -8,4 +8,3 @@
 //! Reading order: [`curve`].
 
 pub mod curve;
-
