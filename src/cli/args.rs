@@ -92,6 +92,7 @@ choices!(
         Depth => Aov::Depth,
         Material => Aov::Material,
         Object => Aov::Object,
+        Ratio => Aov::Ratio,
     }
 );
 
@@ -180,7 +181,7 @@ pub struct RenderArgs {
     /// Stop after the pass in which this many seconds run out
     #[arg(long, value_name = "SECONDS", value_parser = parse_seconds)]
     pub time: Option<f64>,
-    /// Channels beside the picture, in EXR [default: all]
+    /// Channels beside the picture, in EXR [default: all, and ratio with --proposals optimal]
     #[arg(long, value_name = "LIST", value_delimiter = ',')]
     pub aov: Option<Vec<AovArg>>,
     /// Exposure of what a display shows (PNG and its like), in stops

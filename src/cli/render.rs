@@ -1,8 +1,8 @@
 //! `lumiris render`
 
-use super::args::RenderArgs;
+use super::args::{AovArg, RenderArgs};
 use super::progress::{self, Bar};
-use super::settings::{SetupTimes, load_world, render_settings};
+use super::settings::{SetupTimes, load_world, plan, render_settings};
 use crate::imaging::oiio::{self, Part};
 use crate::render::output::{self, Aov};
 use crate::render::{RenderSettings, Rendering, render};
@@ -22,7 +22,9 @@ pub const INTERRUPTED: u8 = 130;
 
 pub fn run(args: &RenderArgs) -> anyhow::Result<ExitCode> {
     check_outputs(&args.output)?;
-    let (world, setup) = load_world(&args.scene)?;
+    let (mut world, setup) = load_world(&args.scene)?;
+    let asks_for_ratio = args.aov.iter().flatten().any(|a| matches!(a, AovArg::Ratio));
+    plan(&args.scene, &mut world, asks_for_ratio, args.quiet)?;
     let outputs = outputs(args, &world);
     check_outputs(&outputs)?;
 
@@ -103,9 +105,9 @@ fn write(args: &RenderArgs, world: &World, rendering: &Rendering, path: &Path) -
     let part = if extension(path) == "exr" {
         let aovs: Vec<Aov> = match &args.aov {
             Some(list) => list.iter().map(|a| a.value()).collect(),
-            None => Aov::ALL.to_vec(),
+            None => Aov::ALL.into_iter().chain(world.splits.as_ref().map(|_| Aov::Ratio)).collect(),
         };
-        let channels = output::channels(film, &aovs);
+        let channels = output::channels(film, &aovs, world.splits.as_ref());
         Part::linear(width, height, channels.names, channels.data)
     } else {
         let names = ["R", "G", "B"].map(str::to_owned).to_vec();

@@ -5,7 +5,8 @@ use super::progress;
 use crate::film::filter::PixelFilter;
 use crate::import::{LoadOptions, load};
 use crate::render::RenderSettings;
-use crate::scene::{IntegratorKind, Scene, World};
+use crate::render::plan::prepare;
+use crate::scene::{IntegratorKind, Proposals, Scene, Split, StageTimes, World};
 use anyhow::{Context, bail};
 use std::time::Instant;
 
@@ -101,6 +102,21 @@ pub fn load_world(args: &SceneArgs) -> anyhow::Result<(World, SetupTimes)> {
     let world = World::new(scene, args.accel.value(), args.packet_width)
         .with_context(|| format!("cannot build the ray tracer of {}", args.scene.display()))?;
     Ok((world, SetupTimes { load, build: start.elapsed().as_secs_f64() }))
+}
+
+/// Chooses the numbers of samples and proposals that are still open, and says what it chose unless `quiet`.
+pub fn plan(args: &SceneArgs, world: &mut World, ratio_map: bool, quiet: bool) -> anyhow::Result<()> {
+    let threads = args.threads.map(|t| t as usize);
+    if let (Some(plan), false) = (prepare(world, threads, ratio_map)?, quiet) {
+        let Split { samples, proposals } = plan.split;
+        let StageTimes { t1, t2 } = plan.times;
+        let by_pixel =
+            if world.scene.integrator.ris.proposals == Proposals::Optimal { ", split anew in each pixel" } else { "" };
+        progress::say(&format!(
+            "ris: {samples} of {proposals} proposals are traced{by_pixel} (a proposal takes {t1} ns, a sample {t2} ns)"
+        ));
+    }
+    Ok(())
 }
 
 /// How the options say to render.

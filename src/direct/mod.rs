@@ -113,6 +113,11 @@ impl DirectStage {
         self.segments.rays()
     }
 
+    /// The samples of the last batch, in the order of their points: point, what it adds if visible, whether it is.
+    pub fn outcomes(&self) -> impl Iterator<Item = (u32, Rgb, bool)> {
+        self.segments.outcomes()
+    }
+
     /// Estimates ∫ f_s L_direct |cos θ| dω for each point; `out[i]` belongs to `points[i]`.
     pub fn estimate(
         &mut self,

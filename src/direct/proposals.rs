@@ -189,7 +189,10 @@ impl Proposals {
 
             // Lights at infinity overlap: a direction belongs to all of them together
             if lights.infinite.len() > 1 && lights.infinite.contains(&run.light) {
-                for i in (from..to).filter(|&i| self.p_light[i] > 0.0) {
+                for i in from..to {
+                    if !(self.p_light[i] > 0.0) {
+                        continue;
+                    }
                     let wi = self.wi.each_ref().map(|a| a[i]).into();
                     let li = lights.le(wi);
                     self.li.iter_mut().enumerate().for_each(|(c, a)| a[i] = li[c]);

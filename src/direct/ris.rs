@@ -198,13 +198,7 @@ impl Resampler {
     }
 
     /// A light sample, drawn again with all that a proposal leaves out.
-    fn light_candidate(
-        &self,
-        world: &World,
-        index: u32,
-        point: &ShadePoint<'_>,
-        place: usize,
-    ) -> Option<Candidate> {
+    fn light_candidate(&self, world: &World, index: u32, point: &ShadePoint<'_>, place: usize) -> Option<Candidate> {
         let (light, pmf, u) = self.proposals.light_sample(place);
         let sample = world.scene.lights.lights[light as usize].sample_li(&point.light_ctx(), u)?;
         let sample = LightSample { pdf: sample.pdf * pmf, ..sample };

@@ -70,10 +70,16 @@ impl Segments {
         &self.occluded
     }
 
+    /// Point, contribution if free, and whether it is free, of each segment.
+    pub fn outcomes(&self) -> impl Iterator<Item = (u32, Rgb, bool)> {
+        let segments = self.points.iter().zip(&self.contributions).zip(&self.occluded);
+        segments.map(|((&point, &contribution), &occluded)| (point, contribution, !occluded))
+    }
+
     /// Adds the contributions of the free segments to their points, in order.
     pub fn resolve(&self, out: &mut [Rgb]) {
-        for ((&point, &contribution), &occluded) in self.points.iter().zip(&self.contributions).zip(&self.occluded) {
-            if !occluded {
+        for (point, contribution, is_free) in self.outcomes() {
+            if is_free {
                 out[point as usize] += contribution;
             }
         }

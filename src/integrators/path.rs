@@ -71,6 +71,17 @@ pub struct Recording {
     pub bounce_segments: Vec<RayBatch>,
 }
 
+/// What a sample of direct light at a first vertex came to.
+#[derive(Clone, Copy, Debug)]
+pub struct Outcome {
+    /// Index of the camera sample.
+    pub sample: u32,
+    /// What it adds if it is visible.
+    pub unshadowed: Rgb,
+    /// What it adds.
+    pub contribution: Rgb,
+}
+
 /// A camera sample to be traced.
 #[derive(Clone, Copy, Debug)]
 pub struct CameraSample {
@@ -114,6 +125,8 @@ pub struct PathIntegrator {
     stats: PathStats,
     /// Where copies of what is traced go, if they are wanted.
     pub recording: Option<Recording>,
+    /// Where the samples of direct light at first vertices go, if they are wanted.
+    pub outcomes: Option<Vec<Outcome>>,
 }
 
 impl PathIntegrator {
@@ -256,6 +269,12 @@ impl PathIntegrator {
         if let Some(r) = &mut self.recording {
             let batches = if vertex == 0 { &mut r.segments } else { &mut r.bounce_segments };
             batches.push(self.direct.segments().clone());
+        }
+        if let Some(outcomes) = self.outcomes.as_mut().filter(|_| vertex == 0) {
+            outcomes.extend(self.direct.outcomes().map(|(point, unshadowed, is_free)| {
+                let contribution = if is_free { unshadowed } else { Rgb::BLACK };
+                Outcome { sample: self.active[point as usize].sample, unshadowed, contribution }
+            }));
         }
         for (path, &radiance) in self.active.iter().zip(&self.radiance) {
             out[path.sample as usize].radiance += path.beta * radiance;

@@ -3,12 +3,14 @@
 //! [`Scene`] is data, as an importer makes it; [`World`] is a scene with its ray tracers, ready to render.
 
 mod settings;
+mod split_map;
 mod world;
 
 pub use settings::{
     EstimatorKind, IntegratorKind, IntegratorSettings, ProposalPoints, Proposals, RisSettings, Split, StageTimes,
     Strata, Target,
 };
+pub use split_map::SplitMap;
 pub use world::{AccelKind, EmitterHit, World};
 
 use crate::cameras::Camera;

@@ -1,6 +1,7 @@
 //! Light transport: what is computed, and how direct light is estimated.
 
 use crate::estimators::mis::Heuristic;
+use crate::estimators::ris::choice::Costs;
 use crate::lights::LightSamplerKind;
 
 /// Light transport.
@@ -58,8 +59,8 @@ impl IntegratorSettings {
         })
     }
 
-    /// Samples and proposals of every estimate where neither is chosen per pixel. What is not known yet counts as
-    /// [`DEFAULT_SAMPLES`] and as [`DEFAULT_RATIO`] proposals for each sample.
+    /// Samples and proposals of every estimate where they are not chosen per pixel. Open samples count as
+    /// [`DEFAULT_SAMPLES`].
     pub fn split(&self) -> Split {
         let samples = self.samples.unwrap_or(DEFAULT_SAMPLES).max(1);
         match self.estimator {
@@ -67,7 +68,7 @@ impl IntegratorSettings {
             EstimatorKind::Ris => {
                 let proposals = match self.ris.proposals {
                     Proposals::Fixed(m) => m,
-                    Proposals::Auto | Proposals::Optimal => samples.saturating_mul(DEFAULT_RATIO),
+                    Proposals::Auto | Proposals::Optimal => (f64::from(samples) * self.ris.ratio()).round() as u32,
                 };
                 Split { samples, proposals: proposals.max(samples) }
             }
@@ -126,7 +127,9 @@ pub struct Split {
 }
 
 /// Proposals for each sample where no times were measured.
-pub const DEFAULT_RATIO: u32 = 8;
+pub const DEFAULT_RATIO: f64 = 8.0;
+/// Most proposals for each sample that times alone ask for.
+pub const MOST_RATIO: f64 = 64.0;
 
 /// Resampled importance sampling [Talbot et al. 2005; Talbot 2005].
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -152,6 +155,15 @@ impl Default for RisSettings {
             target: Target::Fgl,
             stage_times: None,
         }
+    }
+}
+
+impl RisSettings {
+    /// Proposals for each sample by the times of the stages, M/N = T2/T1 [Talbot 2005, Eq. 4.4], from 1 to [`MOST_RATIO`];
+    /// [`DEFAULT_RATIO`] without times.
+    pub fn ratio(&self) -> f64 {
+        let by_times = |t: StageTimes| Costs { t1: t.t1, t2: t.t2 }.robust_ratio();
+        self.stage_times.map_or(DEFAULT_RATIO, by_times).clamp(1.0, MOST_RATIO)
     }
 }
 
