@@ -57,7 +57,9 @@ pub(super) fn shares(point: &ShadePoint<'_>) -> Shares {
     let share = match bsdf {
         Bsdf::Diffuse(_) | Bsdf::DiffuseTransmission(_) => 0.125,
         Bsdf::CoatedDiffuse(_) => 0.25,
-        Bsdf::Conductor(_) | Bsdf::Dielectric(_) | Bsdf::ThinDielectric(_) | Bsdf::Layered(_) => 0.5,
+        Bsdf::Conductor(_) | Bsdf::Dielectric(_) | Bsdf::ThinDielectric(_) | Bsdf::Layered(_) | Bsdf::Evaluated(_) => {
+            0.5
+        }
     };
     let by_bsdf = ((m as f32 * share).round() as u32).clamp(1, m.saturating_sub(1).max(1));
     if m == 1 { Shares::one_of_both(point) } else { Shares::fixed(m - by_bsdf, by_bsdf) }

@@ -12,7 +12,7 @@ use super::classes::{Classes, NAMES};
 use super::report::{estimate_json, method_json, plus_minus};
 use super::scenes::Which;
 use super::{Figure, Setup, Summary};
-use crate::estimators::ris::{Costs, Variances, clamp_ratio, optimal_ratio};
+use crate::estimators::ris::choice::{Costs, Variances, clamp_ratio, optimal_ratio};
 use crate::scene::{Split, StageTimes};
 use serde_json::json;
 use std::time::{Duration, Instant};
