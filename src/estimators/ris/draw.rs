@@ -80,7 +80,9 @@ fn search_block<const LARGE: bool>(w: &Block, threshold: f32) -> usize {
 
     let below = |bounds: &[f32]| bounds.iter().map(|&b| u32::from(b <= threshold)).sum::<u32>();
     let i = (below(&low) + below(&high[..3])) as usize % BLOCK;
-    if clean(w[i]) > 0.0 { i } else { last(w).unwrap_or(i) }
+    // A finite sum holds no infinite weight.
+    let has_weight = if LARGE { clean(w[i]) > 0.0 } else { w[i] > 0.0 };
+    if has_weight { i } else { last(w).unwrap_or(i) }
 }
 
 /// Index of the last proposal that has weight: where a threshold falls that rounding put at the end.
@@ -268,21 +270,16 @@ fn step_through<const LARGE: bool>(blocks: &Blocks<'_>, sum: f64, [n, offset]: [
 
     // Go through the blocks and, where thresholds fall, into them.
     let (mut k, mut threshold, mut below) = (0, u * step, 0.0);
-    let mut visit = |begin: usize, block: &Block| {
+    for i in 0..=blocks.whole.len() {
+        let Some(block) = blocks.whole.get(i).or(blocks.rest.as_ref()) else { break };
         let end = below + block_sum::<LARGE>(block);
         while threshold < end && k < n {
-            let i = search_block::<LARGE>(block, (threshold - below) as f32);
-            out.push(draw(offset as usize + begin + i, block[i], sum_per_draw));
+            let j = search_block::<LARGE>(block, (threshold - below) as f32);
+            out.push(draw(offset as usize + i * BLOCK + j, block[j], sum_per_draw));
             k += 1;
             threshold = (f64::from(k) + u) * step;
         }
         below = end;
-    };
-    for (i, block) in blocks.whole.iter().enumerate() {
-        visit(i * BLOCK, block);
-    }
-    if let Some(block) = &blocks.rest {
-        visit(blocks.whole.len() * BLOCK, block);
     }
 
     // With so many draws that f64 does not tell thresholds apart, the last can round up to the sum.
