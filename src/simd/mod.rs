@@ -5,13 +5,17 @@
 //! results are the same bits at every level. The scalar twin of a kernel is the kernel itself at the level without
 //! vectors, `Level::fallback()`. Slices may have any length: what is no full vector at the end is padded.
 //!
-//! Reading order: [`lane`], [`curve`], [`combine`].
+//! Reading order: [`lane`], [`curve`], [`light`], [`environment`], [`combine`].
 
 pub mod combine;
 pub mod curve;
+pub mod environment;
 pub mod lane;
+pub mod light;
 
+pub use environment::Environment;
 pub use fearless_simd::Level;
+pub use light::LightLanes;
 
 /// The best instruction set of this machine.
 #[inline]
