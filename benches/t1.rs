@@ -1,10 +1,12 @@
 //! Nanoseconds per proposal of direct lighting: directions to one light, values of one BSDF, weights; in lanes, and how
 //! many times as long single calls take.
 //!
-//! `cargo bench --bench t1 -- [part of a name]`
+//! `cargo bench --bench t1 -- [part of a name] [runs]`
 #![allow(clippy::print_stdout, missing_docs)]
 
-use lumiris::lights::{EnvironmentFilter, EnvironmentMap, EnvironmentMapping, Light, LightCtx, LightLanes};
+use lumiris::geometry::{Quadric, QuadricKind, Shape, TriangleMesh};
+use lumiris::lights::{Emission, EnvironmentFilter, EnvironmentMap, EnvironmentMapping, area_lights_of};
+use lumiris::lights::{Light, LightCtx, LightLanes};
 use lumiris::math::hash::{HashStream, pcg4d};
 use lumiris::math::{Affine3A, Rgb, Vec3};
 use lumiris::simd::combine::{Proposals, Weighting, Weights, combine};
@@ -22,7 +24,7 @@ const POINTS: u32 = 4096;
 fn time(m: usize, mut run: impl FnMut(u32)) -> f64 {
     let points = POINTS / (m as u32 / 8);
     let mut best = f64::INFINITY;
-    for _ in 0..7 {
+    for _ in 0..runs() {
         let start = Instant::now();
         for point in 0..points {
             run(point);
@@ -36,8 +38,16 @@ fn report(name: &str, m: usize, lanes: f64, single: f64) {
     println!("{name:32} M = {m:3}: {lanes:7.2} ns, single {single:7.2} ns, ratio {:5.1}", single / lanes);
 }
 
+fn arguments() -> impl Iterator<Item = String> {
+    std::env::args().skip(1).filter(|a| !a.starts_with('-'))
+}
+
+fn runs() -> u32 {
+    arguments().nth(1).and_then(|a| a.parse().ok()).unwrap_or(7)
+}
+
 fn is_wanted(name: &str) -> bool {
-    std::env::args().skip(1).find(|a| !a.starts_with('-')).is_none_or(|part| name.contains(&part))
+    arguments().next().is_none_or(|part| name.contains(&part))
 }
 
 /// Numbers of all points: sorted along the curve for each.
@@ -69,25 +79,52 @@ fn sky(size: [usize; 2], mapping: EnvironmentMapping, filter: EnvironmentFilter)
     Light::infinite_image(Arc::new(map), &Affine3A::from_rotation_x(0.5), 1.0)
 }
 
-fn lights() -> Vec<(&'static str, Light)> {
+fn quad(triangles: &[[u32; 3]]) -> Shape {
+    let p = [Vec3::new(-1.0, 2.0, -1.0), Vec3::new(2.0, 2.0, -1.0), Vec3::new(2.0, 2.0, 1.0), Vec3::new(-1.0, 2.0, 1.0)];
+    Shape::Mesh(TriangleMesh::new(p.to_vec(), triangles.to_vec()).expect("indices are in range"))
+}
+
+fn far_quad() -> Shape {
+    let p = [Vec3::ZERO, Vec3::X, Vec3::new(1.0, 0.0, 1.0), Vec3::Z].map(|p| p + Vec3::Y * 300.0);
+    Shape::Mesh(TriangleMesh::new(p.to_vec(), vec![[0, 1, 2], [0, 2, 3]]).expect("indices are in range"))
+}
+
+fn sphere() -> Shape {
+    let placement = Affine3A::from_translation(Vec3::Y * 4.0);
+    let kind = QuadricKind::Sphere { radius: 0.5, z_min: -0.5, z_max: 0.5, phi_max: std::f32::consts::TAU };
+    let local_from_group = placement.inverse();
+    Shape::Quadric(Quadric { kind, group_from_local: placement, local_from_group, flip_normal: false })
+}
+
+fn area(shape: &Shape) -> Light {
+    let emission = Emission { two_sided: true, ..Emission::constant(Rgb::new(1.0, 2.0, 3.0)) };
+    Light::Area(area_lights_of(shape, &emission).lights.remove(0))
+}
+
+fn lights() -> Vec<(&'static str, Box<dyn Fn() -> Light>)> {
     let l = Rgb::new(1.0, 2.0, 3.0);
     let (nearest, bilinear) = (EnvironmentFilter::Nearest, EnvironmentFilter::Bilinear);
     vec![
-        ("environment 256² nearest", sky([256, 256], EnvironmentMapping::EqualArea, nearest)),
-        ("environment 1024² nearest", sky([1024, 1024], EnvironmentMapping::EqualArea, nearest)),
-        ("environment 1024² bilinear", sky([1024, 1024], EnvironmentMapping::EqualArea, bilinear)),
-        ("environment 2048×1024 bilinear", sky([2048, 1024], EnvironmentMapping::LatLong, bilinear)),
-        ("environment 4096×2048 bilinear", sky([4096, 2048], EnvironmentMapping::LatLong, bilinear)),
-        ("constant environment", Light::InfiniteConstant { l }),
-        ("point light", Light::Point { p: Vec3::Y * 3.0, intensity: l }),
+        ("environment 256² nearest", Box::new(move || sky([256, 256], EnvironmentMapping::EqualArea, nearest))),
+        ("environment 1024² nearest", Box::new(move || sky([1024, 1024], EnvironmentMapping::EqualArea, nearest))),
+        ("environment 1024² bilinear", Box::new(move || sky([1024, 1024], EnvironmentMapping::EqualArea, bilinear))),
+        ("environment 2048×1024 bilinear", Box::new(move || sky([2048, 1024], EnvironmentMapping::LatLong, bilinear))),
+        ("environment 4096×2048 bilinear", Box::new(move || sky([4096, 2048], EnvironmentMapping::LatLong, bilinear))),
+        ("rectangle", Box::new(|| area(&quad(&[[0, 2, 1], [0, 3, 2]])))),
+        ("rectangle by area", Box::new(|| area(&far_quad()))),
+        ("triangle", Box::new(|| area(&quad(&[[0, 2, 1]])))),
+        ("sphere", Box::new(|| area(&sphere()))),
+        ("constant environment", Box::new(move || Light::InfiniteConstant { l })),
+        ("point light", Box::new(move || Light::Point { p: Vec3::Y * 3.0, intensity: l })),
     ]
 }
 
 fn main() {
-    for (name, light) in lights() {
+    for (name, make) in lights() {
         if !is_wanted(name) {
             continue;
         }
+        let light = make();
         for m in SIZES {
             let numbers = numbers(m);
             let mut v = vec![vec![0.0; m]; 7];

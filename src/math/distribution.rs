@@ -34,7 +34,7 @@ fn bin_of(x: f32, n: usize) -> usize {
 }
 
 /// Bins that are passed at a time.
-const STEP: usize = 8;
+pub(crate) const STEP: usize = 8;
 
 /// Length of the table of a running integral over `n` bins: n + 1 values, and as many as may be read behind them.
 const fn cdf_len(n: usize) -> usize {
@@ -80,27 +80,41 @@ pub(crate) struct Bin {
     pub end: f32,
 }
 
-/// The last of `n` bins with `cdf[i] <= u`, for u in [0, 1).
-#[inline(always)]
-fn find_bin(cdf: &[f32], guide: &[u16], n: usize, u: f32) -> Bin {
-    let mut i = usize::from(guide[((u * guide.len() as f32) as usize).min(guide.len() - 1)]);
-    loop {
-        let next = &cdf[i + 1..i + 1 + STEP];
-        let mut passed = 0;
-        for c in next {
-            passed += usize::from(*c <= u);
+/// A running integral and its guide.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct Running<'a> {
+    /// The integral at the bounds of the bins, and behind them infinity, [`STEP`] times.
+    pub cdf: &'a [f32],
+    /// For each equal part of [0, 1), a power of two, at most the bin of its beginning.
+    pub guide: &'a [u16],
+}
+
+impl Running<'_> {
+    /// The last bin with `cdf[i] <= u`, for u in [0, 1).
+    #[inline]
+    fn bin(&self, u: f32) -> Bin {
+        let mut i = usize::from(self.guide[((u * self.guide.len() as f32) as usize).min(self.guide.len() - 1)]);
+        loop {
+            let next = &self.cdf[i + 1..i + 1 + STEP];
+            let passed = next.iter().fold(0, |sum, &c| sum + u32::from(c <= u)) as usize;
+            i += passed;
+            if passed < STEP {
+                return self.found(i);
+            }
         }
-        i += passed;
-        if passed < STEP {
-            let index = i.min(n - 1);
-            return Bin { index, begin: cdf[index], end: cdf[index + 1] };
-        }
+    }
+
+    /// The bin that begins at bound `i`, or the last one.
+    #[inline(always)]
+    pub(crate) fn found(&self, i: usize) -> Bin {
+        let index = i.min(self.cdf.len() - cdf_len(0) - 1);
+        Bin { index, begin: self.cdf[index], end: self.cdf[index + 1] }
     }
 }
 
 /// The number clamped to those that have a bin.
 #[inline(always)]
-fn clamped(u: f32) -> f32 {
+pub(crate) fn clamped(u: f32) -> f32 {
     u.clamp(0.0, ONE_MINUS_EPSILON)
 }
 
@@ -176,15 +190,14 @@ impl PiecewiseConstant1D {
             return None;
         }
         let u = clamped(u);
-        let bin = self.bin(u);
+        let bin = self.running().bin(u);
         let (x, index) = (place_in_bin(bin, u, self.values.len()), bin.index);
         Some(Sample1D { x, pdf: self.values[index] / self.integral, index })
     }
 
-    /// The bin of cumulative probability `u` in [0, 1).
     #[inline(always)]
-    fn bin(&self, u: f32) -> Bin {
-        find_bin(&self.cdf, &self.guide, self.values.len(), u)
+    fn running(&self) -> Running<'_> {
+        Running { cdf: &self.cdf, guide: &self.guide }
     }
 
     /// Density at `x` in [0, 1].
@@ -212,6 +225,8 @@ pub struct PiecewiseConstant2D {
     marginal: PiecewiseConstant1D,
     width: usize,
     height: usize,
+    /// Length of the guide of a row.
+    guide_len: usize,
 }
 
 impl PiecewiseConstant2D {
@@ -223,17 +238,18 @@ impl PiecewiseConstant2D {
         let mut values = cleaned(&values[..values.len() / width * width]);
         values.resize(width * height, 0.0);
         let mut conditional_cdf = vec![0.0; cdf_len(width) * height];
-        let mut conditional_guide = vec![0; guide_len(width) * height];
+        let guide_len = guide_len(width);
+        let mut conditional_guide = vec![0; guide_len * height];
         let tables = conditional_cdf
             .chunks_exact_mut(cdf_len(width))
-            .zip(conditional_guide.chunks_exact_mut(guide_len(width)));
+            .zip(conditional_guide.chunks_exact_mut(guide_len));
         let row_integrals: Vec<f32> = values
             .chunks_exact(width)
             .zip(tables)
             .map(|(row, (cdf, guide))| fill_cdf(row, cdf, guide) as f32)
             .collect();
         let marginal = PiecewiseConstant1D::new(&row_integrals);
-        PiecewiseConstant2D { values, conditional_cdf, conditional_guide, marginal, width, height }
+        PiecewiseConstant2D { values, conditional_cdf, conditional_guide, marginal, width, height, guide_len }
     }
 
     /// Integral of the unnormalised function over the square, the mean of its values.
@@ -253,15 +269,25 @@ impl PiecewiseConstant2D {
         &self.conditional_cdf[y * cdf_len(self.width)..(y + 1) * cdf_len(self.width)]
     }
 
-    /// The bins in x and y of `u`, which is clamped to [0, 1), and the clamped u; of the last row if the function is 0.
+    /// The running integral over the rows.
     #[inline(always)]
+    pub(crate) fn rows(&self) -> Running<'_> {
+        self.marginal.running()
+    }
+
+    /// The running integral along a row.
+    #[inline(always)]
+    pub(crate) fn row(&self, y: usize) -> Running<'_> {
+        let guide = &self.conditional_guide[y * self.guide_len..(y + 1) * self.guide_len];
+        Running { cdf: self.row_cdf(y), guide }
+    }
+
+    /// The bins in x and y of `u`, which is clamped to [0, 1), and the clamped u; of the last row if the function is 0.
+    #[inline]
     pub(crate) fn bins(&self, u: [f32; 2]) -> ([Bin; 2], [f32; 2]) {
         let u = u.map(clamped);
-        let row = self.marginal.bin(u[1]);
-        let guide_len = guide_len(self.width);
-        let guide = &self.conditional_guide[row.index * guide_len..(row.index + 1) * guide_len];
-        let column = find_bin(self.row_cdf(row.index), guide, self.width, u[0]);
-        ([column, row], u)
+        let row = self.rows().bin(u[1]);
+        ([self.row(row.index).bin(u[0]), row], u)
     }
 
     /// The point of `u` in the cell that [`bins`](Self::bins) has found; `None` if the function is 0.

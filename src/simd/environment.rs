@@ -6,8 +6,9 @@
 use super::lane::{F, I, LANES, Vec3s, load, or_zero, safe_sqrt, sin_cos_quadrant, sin_cos_turns, store};
 use super::light::LightLanes;
 use crate::math::sphere_map::pdf_equal_area_square_to_sphere;
+use crate::math::distribution::{Running, STEP, clamped};
 use crate::math::{Mat3, PiecewiseConstant2D};
-use fearless_simd::{Level, Simd, dispatch, f32x4, prelude::*};
+use fearless_simd::{Level, Simd, dispatch, f32x4, f32x8, prelude::*};
 use std::f32::consts::{PI, TAU};
 
 /// An image of the radiance from all directions, and how it is sampled.
@@ -36,7 +37,7 @@ type Column = [f32; CHUNK];
 
 /// Where the numbers of a chunk fall in one dimension.
 struct Places {
-    index: Column,
+    bin: [i32; CHUNK],
     /// The number, less the running integral at the beginning of its bin.
     above: Column,
     /// Probability of the bin.
@@ -45,14 +46,34 @@ struct Places {
 
 impl Places {
     fn new() -> Self {
-        Places { index: [0.0; CHUNK], above: [0.0; CHUNK], width: [1.0; CHUNK] }
+        Places { bin: [0; CHUNK], above: [0.0; CHUNK], width: [1.0; CHUNK] }
+    }
+
+    /// Inverts the running integral at `u`: the last bin with `cdf[i] <= u`.
+    #[inline(always)]
+    fn set<S: Simd>(&mut self, i: usize, simd: S, running: &Running<'_>, u: f32) {
+        let Running { cdf, guide } = *running;
+        let u = clamped(u);
+        let mut bin = usize::from(guide[((u * guide.len() as f32) as usize).min(guide.len() - 1)]);
+        let at = f32x8::splat(simd, u);
+        let bin = loop {
+            let next = f32x8::from_slice(simd, &cdf[bin + 1..bin + 1 + STEP]);
+            let passed = next.simd_le(at).to_bitmask().count_ones() as usize;
+            bin += passed;
+            if passed < STEP {
+                break running.found(bin);
+            }
+        };
+        self.bin[i] = bin.index as i32;
+        self.above[i] = u - bin.begin;
+        self.width[i] = bin.end - bin.begin;
     }
 
     /// The place in units of bins, and the index of the bin.
     #[inline(always)]
-    fn lanes<S: Simd>(&self, simd: S, i: usize) -> (F<S>, F<S>) {
-        let index = load(simd, &self.index, i);
-        (index + load(simd, &self.above, i) / load(simd, &self.width, i), index)
+    fn lanes<S: Simd>(&self, simd: S, i: usize) -> (F<S>, I<S>) {
+        let bin = I::from_slice(simd, &self.bin[i..i + LANES]);
+        (bin.to_float::<F<S>>() + load(simd, &self.above, i) / load(simd, &self.width, i), bin)
     }
 }
 
@@ -108,7 +129,7 @@ impl Environment<'_> {
         let n = out.pdf.len();
         for start in (0..n).step_by(CHUNK) {
             let count = CHUNK.min(n - start);
-            let places = self.places(start, count, u);
+            let places = self.places(simd, start, count, u);
             let mut lookups =
                 Lookups { cell: [0; CHUNK], first: [0; CHUNK], dx: [0.0; CHUNK], dy: [0.0; CHUNK], density: [0.0; CHUNK] };
             for i in (0..count).step_by(LANES) {
@@ -125,17 +146,15 @@ impl Environment<'_> {
 
     /// Inverts the running integrals.
     #[inline(always)]
-    fn places(&self, start: usize, count: usize, u: [&[f32]; 2]) -> [Places; 2] {
+    fn places<S: Simd>(&self, simd: S, start: usize, count: usize, u: [&[f32]; 2]) -> [Places; 2] {
         let [mut x, mut y] = [Places::new(), Places::new()];
         let (u0, u1) = (&u[0][start..start + count], &u[1][start..start + count]);
+        let rows = self.distribution.rows();
         for i in 0..count {
-            let (bins, u) = self.distribution.bins([u0[i], u1[i]]);
-            x.index[i] = bins[0].index as i32 as f32;
-            x.above[i] = u[0] - bins[0].begin;
-            x.width[i] = bins[0].end - bins[0].begin;
-            y.index[i] = bins[1].index as i32 as f32;
-            y.above[i] = u[1] - bins[1].begin;
-            y.width[i] = bins[1].end - bins[1].begin;
+            y.set(i, simd, &rows, u1[i]);
+        }
+        for i in 0..count {
+            x.set(i, simd, &self.distribution.row(y.bin[i] as usize), u0[i]);
         }
         [x, y]
     }
@@ -159,12 +178,11 @@ impl Environment<'_> {
 
         // With the border, texel centres are at 1.5, 2.5, …
         let stride = I::splat(simd, width as i32 + 2);
-        let texel = |x: F<S>, y: F<S>| -> I<S> { y.to_int::<I<S>>() * stride + x.to_int::<I<S>>() };
-        texel(column + 1.0, row + 1.0).store_slice(&mut lookups.cell[i..i + LANES]);
+        ((row + 1) * stride + column + 1).store_slice(&mut lookups.cell[i..i + LANES]);
         let (x, y) = (x + 0.5, y + 0.5);
         // Rounding may place a sample of the last texel at its end.
         let (x0, y0) = (x.floor().min(width as f32), y.floor().min(height as f32));
-        texel(x0, y0).store_slice(&mut lookups.first[i..i + LANES]);
+        (y0.to_int::<I<S>>() * stride + x0.to_int::<I<S>>()).store_slice(&mut lookups.first[i..i + LANES]);
         store(x - x0, &mut lookups.dx, i);
         store(y - y0, &mut lookups.dy, i);
     }
