@@ -43,3 +43,33 @@ pub fn bidirectional(unshadowed: [f32; 3], visibilities: &[f32]) -> [f32; 3] {
     let visible = visibilities.iter().map(|&v| f64::from(v)).sum::<f64>() / visibilities.len().max(1) as f64;
     unshadowed.map(|c| (f64::from(c) * visible) as f32)
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::math::ONE_MINUS_EPSILON;
+
+    #[test]
+    fn no_proposals_and_no_samples_are_zero() {
+        assert_eq!(weighted(&[], &[], 2.0), 0.0);
+        assert_eq!(weighted(&[1.0], &[0.0], 2.0), 0.0);
+        assert_eq!(bidirectional([1.0, 2.0, 3.0], &[]), [0.0; 3]);
+    }
+
+    #[test]
+    fn weighted_is_exact_if_g_is_proportional_to_f() {
+        assert!((weighted(&[0.2, 0.6, 4.0], &[0.1, 0.3, 2.0], 1.5) - 3.0).abs() < 1e-6);
+    }
+
+    #[test]
+    fn defensive_choice_keeps_numbers_uniform_for_any_alpha() {
+        for alpha in [0.0, 0.3, 1.0] {
+            for u in [0.0, 0.29, 0.31, ONE_MINUS_EPSILON] {
+                let (safe, v) = defensive_choice(alpha, u);
+                assert_eq!(safe, u < alpha);
+                assert!((0.0..1.0).contains(&v), "{alpha} {u} {v}");
+            }
+        }
+        assert_eq!(defensive_pdf(0.25, 2.0, 4.0), 3.5);
+    }
+}

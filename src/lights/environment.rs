@@ -11,7 +11,8 @@ use crate::math::sphere_map::{
     equal_area_sphere_to_square, equal_area_square_to_sphere, lat_long_to_sphere, pdf_equal_area_square_to_sphere,
     pdf_lat_long_to_sphere, sphere_to_lat_long, wrap_equal_area_texel,
 };
-use crate::math::{PiecewiseConstant2D, Rgb, Vec2, Vec3};
+use crate::math::{Mat3, PiecewiseConstant2D, Rgb, Vec2, Vec3};
+use crate::simd::Environment;
 use std::f64::consts::PI;
 
 /// How the unit square covers the sphere; z is up in the space of the light.
@@ -50,7 +51,8 @@ pub struct EnvironmentMap {
     height: usize,
     mapping: EnvironmentMapping,
     filter: EnvironmentFilter,
-    texels: Vec<Rgb>,
+    /// Red, green, blue and the density per unit area of the square, with a border that continues the image.
+    texels: Vec<[f32; 4]>,
     distribution: PiecewiseConstant2D,
     luminance_integral: f32,
 }
@@ -58,6 +60,34 @@ pub struct EnvironmentMap {
 /// The colour with components that are negative or not finite set to 0.
 pub(super) fn cleaned(c: Rgb) -> Rgb {
     c.map(|x| if x.is_finite() { x.max(0.0) } else { 0.0 })
+}
+
+/// The colour of a texel.
+#[inline]
+fn color([r, g, b, _]: [f32; 4]) -> Rgb {
+    Rgb::new(r, g, b)
+}
+
+/// The cleaned texels with a border of one that continues the image around the sphere.
+fn with_border(texels: &[Rgb], [width, height]: [usize; 2], mapping: EnvironmentMapping) -> Vec<[f32; 4]> {
+    let (w, h) = (width as isize, height as isize);
+    let mut bordered = Vec::with_capacity((width + 2) * (height + 2));
+    for y in -1..=h {
+        for x in -1..=w {
+            let (x, y) = match mapping {
+                EnvironmentMapping::EqualArea => wrap_equal_area_texel(x, y, w),
+                // Over a pole lies the opposite meridian.
+                EnvironmentMapping::LatLong => {
+                    let over_pole = y < 0 || y >= h;
+                    let x = if over_pole { x + w / 2 } else { x };
+                    (x.rem_euclid(w), y.clamp(0, h - 1))
+                }
+            };
+            let [r, g, b] = cleaned(texels[y as usize * width + x as usize]).to_array();
+            bordered.push([r, g, b, 0.0]);
+        }
+    }
+    bordered
 }
 
 /// A sample of a light at infinity.
@@ -81,13 +111,24 @@ impl EnvironmentMap {
         if mapping == EnvironmentMapping::EqualArea && width != height {
             return Err(format!("an equal-area environment map must be square, but it is {width}×{height}"));
         }
-        let texels = texels.into_iter().map(cleaned).collect();
+        let texels = with_border(&texels, [width, height], mapping);
         let distribution = PiecewiseConstant2D::new(&[], 1);
         let mut map = EnvironmentMap { width, height, mapping, filter, texels, distribution, luminance_integral: 0.0 };
         let weights = map.texel_weights();
-        map.distribution = PiecewiseConstant2D::new(&weights, width);
+        map.set_distribution(&weights);
         map.luminance_integral = map.distribution.integral() * map.weight_scale();
         Ok(map)
+    }
+
+    /// Samples in proportion to `weights`.
+    fn set_distribution(&mut self, weights: &[f32]) {
+        self.distribution = PiecewiseConstant2D::new(weights, self.width);
+        for y in 0..self.height {
+            for x in 0..self.width {
+                let index = self.texel_index(x as isize, y as isize);
+                self.texels[index][3] = self.distribution.pdf_of_cell([x, y]);
+            }
+        }
     }
 
     /// The same map sampled in proportion to what exceeds the mean [Karlík et al. 2019], for use together with another
@@ -103,7 +144,7 @@ impl EnvironmentMap {
             weights.iter().enumerate().map(|(i, &w)| (w - mean * row_scale[i / self.width]).max(0.0)).collect();
         // A constant map has no excess; it keeps the plain density.
         if excess.iter().any(|&e| e > 0.0) {
-            self.distribution = PiecewiseConstant2D::new(&excess, self.width);
+            self.set_distribution(&excess);
         }
         self
     }
@@ -127,16 +168,30 @@ impl EnvironmentMap {
     /// Samples a direction; `None` if the map is black.
     #[inline]
     pub fn sample(&self, u: [f32; 2]) -> Option<EnvironmentSample> {
-        let s = self.distribution.sample(u)?;
+        let (bins, u) = self.distribution.bins(u);
+        let texel = &self.texels[self.texel_index(bins[0].index as isize, bins[1].index as isize)];
+        let p = self.distribution.place(bins, u)?;
         let (w, density) = match self.mapping {
-            EnvironmentMapping::EqualArea => (equal_area_square_to_sphere(s.p), pdf_equal_area_square_to_sphere()),
+            EnvironmentMapping::EqualArea => (equal_area_square_to_sphere(p), pdf_equal_area_square_to_sphere()),
             EnvironmentMapping::LatLong => {
-                let w = lat_long_to_sphere(s.p);
+                let w = lat_long_to_sphere(p);
                 (w, pdf_lat_long_to_sphere(w))
             }
         };
-        let pdf = s.pdf * density;
-        (pdf > 0.0 && pdf.is_finite()).then(|| EnvironmentSample { w: w.normalize(), le: self.lookup(s.p), pdf })
+        let pdf = texel[3] * density;
+        (pdf > 0.0 && pdf.is_finite()).then(|| EnvironmentSample { w: w.normalize(), le: self.lookup(p), pdf })
+    }
+
+    /// What many samples at once need.
+    pub(super) fn lanes(&self, world_from_light: Mat3, scale: f32) -> Environment<'_> {
+        Environment {
+            distribution: &self.distribution,
+            texels: &self.texels,
+            is_equal_area: self.mapping == EnvironmentMapping::EqualArea,
+            is_bilinear: self.filter == EnvironmentFilter::Bilinear,
+            world_from_light,
+            scale,
+        }
     }
 
     /// Density of [`sample`](Self::sample) per steradian.
@@ -146,7 +201,7 @@ impl EnvironmentMap {
             EnvironmentMapping::EqualArea => pdf_equal_area_square_to_sphere(),
             EnvironmentMapping::LatLong => pdf_lat_long_to_sphere(w),
         };
-        let pdf = self.distribution.pdf(self.to_square(w)) * density;
+        let pdf = self.texels[self.nearest(self.to_square(w))][3] * density;
         if pdf.is_finite() { pdf } else { 0.0 }
     }
 
@@ -158,45 +213,31 @@ impl EnvironmentMap {
         }
     }
 
-    /// The texel at indices that may lie outside by one.
+    /// Where the texel is whose indices may lie outside by one.
     #[inline]
-    fn texel(&self, x: isize, y: isize) -> Rgb {
-        let (width, height) = (self.width as isize, self.height as isize);
-        let (x, y) = match self.mapping {
-            EnvironmentMapping::EqualArea => wrap_equal_area_texel(x, y, width),
-            // Over a pole lies the opposite meridian.
-            EnvironmentMapping::LatLong => {
-                let over_pole = y < 0 || y >= height;
-                let x = if over_pole { x + width / 2 } else { x };
-                (x.rem_euclid(width), y.clamp(0, height - 1))
-            }
-        };
-        self.texels[y as usize * self.width + x as usize]
+    fn texel_index(&self, x: isize, y: isize) -> usize {
+        (y + 1) as usize * (self.width + 2) + (x + 1) as usize
+    }
+
+    /// Where the texel is that holds a point of the unit square.
+    #[inline]
+    fn nearest(&self, p: Vec2) -> usize {
+        let bin = |x: f32, n: usize| ((x * n as f32) as usize).min(n - 1) as isize;
+        self.texel_index(bin(p.x, self.width), bin(p.y, self.height))
     }
 
     /// Radiance at a point of the unit square.
     #[inline]
     fn lookup(&self, p: Vec2) -> Rgb {
-        let (x, y) = (p.x * self.width as f32, p.y * self.height as f32);
         match self.filter {
-            EnvironmentFilter::Nearest => {
-                let (x, y) = ((x as usize).min(self.width - 1), (y as usize).min(self.height - 1));
-                self.texels[y * self.width + x]
-            }
+            EnvironmentFilter::Nearest => color(self.texels[self.nearest(p)]),
             EnvironmentFilter::Bilinear => {
-                let (x, y) = (x - 0.5, y - 0.5);
-                let (x0, y0) = (x.floor(), y.floor());
+                let (x, y) = (p.x * self.width as f32 - 0.5, p.y * self.height as f32 - 0.5);
+                let (x0, y0) = (x.floor().min(self.width as f32 - 1.0), y.floor().min(self.height as f32 - 1.0));
                 let (dx, dy) = (x - x0, y - y0);
-                let (x0, y0) = (x0 as isize, y0 as isize);
-                let (width, height) = (self.width as isize, self.height as isize);
-                if x0 >= 0 && y0 >= 0 && x0 + 1 < width && y0 + 1 < height {
-                    let i = y0 as usize * self.width + x0 as usize;
-                    let (upper, lower) = (&self.texels[i..i + 2], &self.texels[i + self.width..i + self.width + 2]);
-                    return upper[0].lerp(upper[1], dx).lerp(lower[0].lerp(lower[1], dx), dy);
-                }
-                let top = self.texel(x0, y0).lerp(self.texel(x0 + 1, y0), dx);
-                let bottom = self.texel(x0, y0 + 1).lerp(self.texel(x0 + 1, y0 + 1), dx);
-                top.lerp(bottom, dy)
+                let first = self.texel_index(x0 as isize, y0 as isize);
+                let pair = |i: usize| color(self.texels[i]).lerp(color(self.texels[i + 1]), dx);
+                pair(first).lerp(pair(first + self.width + 2), dy)
             }
         }
     }
@@ -222,12 +263,12 @@ impl EnvironmentMap {
 
     /// Mean luminance of lookups in each texel, times the row scale.
     fn texel_weights(&self) -> Vec<f32> {
-        let luminances: Vec<f32> = self.texels.iter().map(|t| t.luminance()).collect();
+        let luminances: Vec<f32> = self.texels.iter().map(|&t| color(t).luminance()).collect();
         let mut weights = Vec::with_capacity(self.texels.len());
         for (y, &row_scale) in self.row_scales().iter().enumerate() {
             for x in 0..self.width {
                 let mean = match self.filter {
-                    EnvironmentFilter::Nearest => luminances[y * self.width + x],
+                    EnvironmentFilter::Nearest => luminances[self.texel_index(x as isize, y as isize)],
                     EnvironmentFilter::Bilinear => self.smoothed(&luminances, x, y),
                 };
                 weights.push(row_scale * mean);
@@ -239,16 +280,10 @@ impl EnvironmentMap {
     /// Mean of the bilinear interpolant over a texel.
     fn smoothed(&self, luminances: &[f32], x: usize, y: usize) -> f32 {
         const KERNEL: [f32; 3] = [0.125, 0.75, 0.125];
-        let inside = x > 0 && y > 0 && x + 1 < self.width && y + 1 < self.height;
         let mut sum = 0.0;
         for (j, ky) in KERNEL.into_iter().enumerate() {
             for (i, kx) in KERNEL.into_iter().enumerate() {
-                let luminance = if inside {
-                    luminances[(y + j - 1) * self.width + x + i - 1]
-                } else {
-                    self.texel((x + i) as isize - 1, (y + j) as isize - 1).luminance()
-                };
-                sum += kx * ky * luminance;
+                sum += kx * ky * luminances[self.texel_index((x + i) as isize - 1, (y + j) as isize - 1)];
             }
         }
         sum

@@ -77,7 +77,7 @@ const UNIT: f64 = 1.0 / 4_294_967_296.0;
 #[derive(Clone, Debug)]
 pub struct FixedChoice {
     table: AliasTable,
-    /// Sums of the probabilities up to and with each light.
+    /// Sums of the probabilities up to and with each light; none if nothing can be chosen.
     cumulative: Vec<f64>,
 }
 
@@ -90,7 +90,7 @@ impl FixedChoice {
             sum += f64::from(table.pmf(i));
             sum / total
         };
-        let cumulative = (0..table.len()).map(&mut add).collect();
+        let cumulative = if total > 0.0 { (0..table.len()).map(&mut add).collect() } else { Vec::new() };
         FixedChoice { table, cumulative }
     }
 

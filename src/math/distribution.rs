@@ -1,6 +1,9 @@
 //! Piecewise-constant densities over [0, 1] and [0, 1]², sampled by inversion [Pharr et al. 2023, §A.4.7, §A.5.6].
 //!
 //! Sums are in f64; the tables are f32. A bin of value 0 is never sampled, a function that is 0 everywhere has no samples.
+//!
+//! Where to look in a running integral is told by a guide [Chen and Asau 1974]: for each of G equal parts of [0, 1), the bin
+//! of its beginning. From there bins are passed eight at a time, on average ⌈n/8G⌉ times whatever the values are.
 
 use super::{ONE_MINUS_EPSILON, Vec2};
 
@@ -30,25 +33,96 @@ fn bin_of(x: f32, n: usize) -> usize {
     ((x * n as f32) as usize).min(n - 1)
 }
 
-/// Writes the running integral of `values`, normalised to end at 1, into `cdf` (one longer); returns the integral.
-fn fill_cdf(values: &[f32], cdf: &mut [f32]) -> f64 {
+/// Bins that are passed at a time.
+pub(crate) const STEP: usize = 8;
+
+/// Length of the table of a running integral over `n` bins: n + 1 values, and as many as may be read behind them.
+const fn cdf_len(n: usize) -> usize {
+    n + 1 + STEP
+}
+
+/// Length of the guide over `n` bins: a power of two, by which u is multiplied without rounding.
+const fn guide_len(n: usize) -> usize {
+    n.div_ceil(4).next_power_of_two()
+}
+
+/// Writes the running integral of `values`, normalised to end at 1, into `cdf`, and its guide; returns the integral.
+fn fill_cdf(values: &[f32], cdf: &mut [f32], guide: &mut [u16]) -> f64 {
     let sum: f64 = values.iter().map(|&v| f64::from(v)).sum();
     let mut running = 0.0_f64;
     for (c, &v) in cdf.iter_mut().zip(values) {
         *c = if sum > 0.0 { (running / sum) as f32 } else { 0.0 };
         running += f64::from(v);
     }
-    cdf[values.len()] = if sum > 0.0 { 1.0 } else { 0.0 };
-    sum / values.len() as f64
+    let n = values.len();
+    cdf[n] = if sum > 0.0 { 1.0 } else { 0.0 };
+    cdf[n + 1..].fill(f32::INFINITY);
+    let parts = guide.len() as f32;
+    let mut bin = 0;
+    for (part, first) in guide.iter_mut().enumerate() {
+        while bin + 1 < n && cdf[bin + 1] <= part as f32 / parts {
+            bin += 1;
+        }
+        // A bin too low costs steps and is no error.
+        *first = bin.min(usize::from(u16::MAX)) as u16;
+    }
+    sum / n as f64
 }
 
-/// The bin i with `cdf[i] <= u < cdf[i + 1]` and the place of `u` in it; `cdf` ends at 1 and `u` is below 1.
+/// A bin of a running integral that was found for a number.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct Bin {
+    /// Index.
+    pub index: usize,
+    /// The running integral at its beginning, at most the number.
+    pub begin: f32,
+    /// The running integral at its end, more than the number.
+    pub end: f32,
+}
+
+/// A running integral and its guide.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct Running<'a> {
+    /// The integral at the bounds of the bins, and behind them infinity, [`STEP`] times.
+    pub cdf: &'a [f32],
+    /// For each equal part of [0, 1), a power of two, at most the bin of its beginning.
+    pub guide: &'a [u16],
+}
+
+impl Running<'_> {
+    /// The last bin with `cdf[i] <= u`, for u in [0, 1).
+    #[inline]
+    fn bin(&self, u: f32) -> Bin {
+        let mut i = usize::from(self.guide[((u * self.guide.len() as f32) as usize).min(self.guide.len() - 1)]);
+        loop {
+            let next = &self.cdf[i + 1..i + 1 + STEP];
+            let passed = next.iter().fold(0, |sum, &c| sum + u32::from(c <= u)) as usize;
+            i += passed;
+            if passed < STEP {
+                return self.found(i);
+            }
+        }
+    }
+
+    /// The bin that begins at bound `i`, or the last one.
+    #[inline(always)]
+    pub(crate) fn found(&self, i: usize) -> Bin {
+        let index = i.min(self.cdf.len() - cdf_len(0) - 1);
+        Bin { index, begin: self.cdf[index], end: self.cdf[index + 1] }
+    }
+}
+
+/// The number clamped to those that have a bin.
+#[inline(always)]
+pub(crate) fn clamped(u: f32) -> f32 {
+    u.clamp(0.0, ONE_MINUS_EPSILON)
+}
+
+/// The point of `u` in its bin, one of `n`.
 #[inline]
-fn invert_cdf(cdf: &[f32], u: f32) -> (f32, usize) {
-    let n = cdf.len() - 1;
-    let u = u.clamp(0.0, ONE_MINUS_EPSILON);
-    let i = cdf.partition_point(|&c| c <= u).clamp(1, n) - 1;
-    let mut x = (i as f32 + (u - cdf[i]) / (cdf[i + 1] - cdf[i])) / n as f32;
+fn place_in_bin(bin: Bin, u: f32, n: usize) -> f32 {
+    let i = bin.index;
+    let mut x = (i as f32 + (u - bin.begin) / (bin.end - bin.begin)) / n as f32;
     // Rounding must not carry the point into the next bin, whose value may be 0.
     while bin_of(x, n) > i || x >= 1.0 {
         x = x.next_down();
@@ -56,13 +130,12 @@ fn invert_cdf(cdf: &[f32], u: f32) -> (f32, usize) {
     while bin_of(x, n) < i {
         x = x.next_up();
     }
-    (x, i)
+    x
 }
 
-/// The u that [`invert_cdf`] maps to `x`.
+/// The u whose place is `x`.
 #[inline]
-fn apply_cdf(cdf: &[f32], x: f32) -> f32 {
-    let n = cdf.len() - 1;
+fn apply_cdf(cdf: &[f32], x: f32, n: usize) -> f32 {
     let i = bin_of(x, n);
     let within = (x * n as f32 - i as f32).clamp(0.0, 1.0);
     cdf[i] + within * (cdf[i + 1] - cdf[i])
@@ -78,6 +151,7 @@ fn cleaned(values: &[f32]) -> Vec<f32> {
 pub struct PiecewiseConstant1D {
     values: Vec<f32>,
     cdf: Vec<f32>,
+    guide: Vec<u16>,
     integral: f32,
 }
 
@@ -85,9 +159,10 @@ impl PiecewiseConstant1D {
     /// The density proportional to `values` (at least one), which negative or non-finite ones enter as 0.
     pub fn new(values: &[f32]) -> Self {
         let values = if values.is_empty() { vec![0.0] } else { cleaned(values) };
-        let mut cdf = vec![0.0; values.len() + 1];
-        let integral = fill_cdf(&values, &mut cdf) as f32;
-        PiecewiseConstant1D { values, cdf, integral }
+        let mut cdf = vec![0.0; cdf_len(values.len())];
+        let mut guide = vec![0; guide_len(values.len())];
+        let integral = fill_cdf(&values, &mut cdf, &mut guide) as f32;
+        PiecewiseConstant1D { values, cdf, guide, integral }
     }
 
     /// Integral of the unnormalised function over [0, 1], the mean of its values.
@@ -114,8 +189,15 @@ impl PiecewiseConstant1D {
         if self.integral <= 0.0 {
             return None;
         }
-        let (x, index) = invert_cdf(&self.cdf, u);
+        let u = clamped(u);
+        let bin = self.running().bin(u);
+        let (x, index) = (place_in_bin(bin, u, self.values.len()), bin.index);
         Some(Sample1D { x, pdf: self.values[index] / self.integral, index })
+    }
+
+    #[inline(always)]
+    fn running(&self) -> Running<'_> {
+        Running { cdf: &self.cdf, guide: &self.guide }
     }
 
     /// Density at `x` in [0, 1].
@@ -130,7 +212,7 @@ impl PiecewiseConstant1D {
     /// Inverse of [`sample`](Self::sample); `None` if the function is 0.
     #[inline]
     pub fn invert(&self, x: f32) -> Option<f32> {
-        (self.integral > 0.0).then(|| apply_cdf(&self.cdf, x))
+        (self.integral > 0.0).then(|| apply_cdf(&self.cdf, x, self.values.len()))
     }
 }
 
@@ -139,9 +221,12 @@ impl PiecewiseConstant1D {
 pub struct PiecewiseConstant2D {
     values: Vec<f32>,
     conditional_cdf: Vec<f32>,
+    conditional_guide: Vec<u16>,
     marginal: PiecewiseConstant1D,
     width: usize,
     height: usize,
+    /// Length of the guide of a row.
+    guide_len: usize,
 }
 
 impl PiecewiseConstant2D {
@@ -152,14 +237,19 @@ impl PiecewiseConstant2D {
         let height = (values.len() / width).max(1);
         let mut values = cleaned(&values[..values.len() / width * width]);
         values.resize(width * height, 0.0);
-        let mut conditional_cdf = vec![0.0; (width + 1) * height];
+        let mut conditional_cdf = vec![0.0; cdf_len(width) * height];
+        let guide_len = guide_len(width);
+        let mut conditional_guide = vec![0; guide_len * height];
+        let tables = conditional_cdf
+            .chunks_exact_mut(cdf_len(width))
+            .zip(conditional_guide.chunks_exact_mut(guide_len));
         let row_integrals: Vec<f32> = values
             .chunks_exact(width)
-            .zip(conditional_cdf.chunks_exact_mut(width + 1))
-            .map(|(row, cdf)| fill_cdf(row, cdf) as f32)
+            .zip(tables)
+            .map(|(row, (cdf, guide))| fill_cdf(row, cdf, guide) as f32)
             .collect();
         let marginal = PiecewiseConstant1D::new(&row_integrals);
-        PiecewiseConstant2D { values, conditional_cdf, marginal, width, height }
+        PiecewiseConstant2D { values, conditional_cdf, conditional_guide, marginal, width, height, guide_len }
     }
 
     /// Integral of the unnormalised function over the square, the mean of its values.
@@ -174,27 +264,61 @@ impl PiecewiseConstant2D {
         [self.width, self.height]
     }
 
-    #[inline]
+    #[inline(always)]
     fn row_cdf(&self, y: usize) -> &[f32] {
-        &self.conditional_cdf[y * (self.width + 1)..(y + 1) * (self.width + 1)]
+        &self.conditional_cdf[y * cdf_len(self.width)..(y + 1) * cdf_len(self.width)]
+    }
+
+    /// The running integral over the rows.
+    #[inline(always)]
+    pub(crate) fn rows(&self) -> Running<'_> {
+        self.marginal.running()
+    }
+
+    /// The running integral along a row.
+    #[inline(always)]
+    pub(crate) fn row(&self, y: usize) -> Running<'_> {
+        let guide = &self.conditional_guide[y * self.guide_len..(y + 1) * self.guide_len];
+        Running { cdf: self.row_cdf(y), guide }
+    }
+
+    /// The bins in x and y of `u`, which is clamped to [0, 1), and the clamped u; of the last row if the function is 0.
+    #[inline]
+    pub(crate) fn bins(&self, u: [f32; 2]) -> ([Bin; 2], [f32; 2]) {
+        let u = u.map(clamped);
+        let row = self.rows().bin(u[1]);
+        ([self.row(row.index).bin(u[0]), row], u)
+    }
+
+    /// The point of `u` in the cell that [`bins`](Self::bins) has found; `None` if the function is 0.
+    #[inline]
+    pub(crate) fn place(&self, bins: [Bin; 2], u: [f32; 2]) -> Option<Vec2> {
+        (self.marginal.integral > 0.0)
+            .then(|| Vec2::new(place_in_bin(bins[0], u[0], self.width), place_in_bin(bins[1], u[1], self.height)))
     }
 
     /// The point of marginal cumulative probability `u[1]` in y and conditional `u[0]` in x; `None` if the function is 0.
     #[inline]
     pub fn sample(&self, u: [f32; 2]) -> Option<Sample2D> {
-        let row = self.marginal.sample(u[1])?;
-        let (x, column) = invert_cdf(self.row_cdf(row.index), u[0]);
-        let pdf = self.values[row.index * self.width + column] / self.marginal.integral;
-        (pdf > 0.0 && pdf.is_finite()).then_some(Sample2D { p: Vec2::new(x, row.x), pdf })
+        let (bins, u) = self.bins(u);
+        let p = self.place(bins, u)?;
+        let pdf = self.pdf_of_cell(bins.map(|b| b.index));
+        (pdf > 0.0 && pdf.is_finite()).then_some(Sample2D { p, pdf })
     }
 
     /// Density at `p` in [0, 1]² per unit area.
     #[inline]
     pub fn pdf(&self, p: Vec2) -> f32 {
+        self.pdf_of_cell([bin_of(p.x, self.width), bin_of(p.y, self.height)])
+    }
+
+    /// Density in the cell of column and row, per unit area.
+    #[inline]
+    pub(crate) fn pdf_of_cell(&self, [x, y]: [usize; 2]) -> f32 {
         if self.marginal.integral <= 0.0 {
             return 0.0;
         }
-        self.values[bin_of(p.y, self.height) * self.width + bin_of(p.x, self.width)] / self.marginal.integral
+        self.values[y * self.width + x] / self.marginal.integral
     }
 
     /// Inverse of [`sample`](Self::sample); `None` if the row of `p` cannot be sampled.
@@ -204,7 +328,7 @@ impl PiecewiseConstant2D {
         if self.marginal.values[row] <= 0.0 {
             return None;
         }
-        Some([apply_cdf(self.row_cdf(row), p.x), self.marginal.invert(p.y)?])
+        Some([apply_cdf(self.row_cdf(row), p.x, self.width), self.marginal.invert(p.y)?])
     }
 }
 

@@ -80,7 +80,9 @@ fn search_block<const LARGE: bool>(w: &Block, threshold: f32) -> usize {
 
     let below = |bounds: &[f32]| bounds.iter().map(|&b| u32::from(b <= threshold)).sum::<u32>();
     let i = (below(&low) + below(&high[..3])) as usize % BLOCK;
-    if clean(w[i]) > 0.0 { i } else { last(w).unwrap_or(i) }
+    // A finite sum holds no infinite weight.
+    let has_weight = if LARGE { clean(w[i]) > 0.0 } else { w[i] > 0.0 };
+    if has_weight { i } else { last(w).unwrap_or(i) }
 }
 
 /// Index of the last proposal that has weight: where a threshold falls that rounding put at the end.
@@ -268,21 +270,16 @@ fn step_through<const LARGE: bool>(blocks: &Blocks<'_>, sum: f64, [n, offset]: [
 
     // Go through the blocks and, where thresholds fall, into them.
     let (mut k, mut threshold, mut below) = (0, u * step, 0.0);
-    let mut visit = |begin: usize, block: &Block| {
+    for i in 0..=blocks.whole.len() {
+        let Some(block) = blocks.whole.get(i).or(blocks.rest.as_ref()) else { break };
         let end = below + block_sum::<LARGE>(block);
         while threshold < end && k < n {
-            let i = search_block::<LARGE>(block, (threshold - below) as f32);
-            out.push(draw(offset as usize + begin + i, block[i], sum_per_draw));
+            let j = search_block::<LARGE>(block, (threshold - below) as f32);
+            out.push(draw(offset as usize + i * BLOCK + j, block[j], sum_per_draw));
             k += 1;
             threshold = (f64::from(k) + u) * step;
         }
         below = end;
-    };
-    for (i, block) in blocks.whole.iter().enumerate() {
-        visit(i * BLOCK, block);
-    }
-    if let Some(block) = &blocks.rest {
-        visit(blocks.whole.len() * BLOCK, block);
     }
 
     // With so many draws that f64 does not tell thresholds apart, the last can round up to the sum.
@@ -293,5 +290,183 @@ fn step_through<const LARGE: bool>(blocks: &Blocks<'_>, sum: f64, [n, offset]: [
     {
         let weight = if i < of.len() { of[i] } else { rest[i - of.len()] };
         out.extend((k..n).map(|_| draw(offset as usize + i, weight, sum_per_draw)));
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use proptest::prelude::*;
+
+    const EDGES: [f32; 4] = [0.0, 0.5, ONE_MINUS_EPSILON, f32::NAN];
+
+    /// The draws of every function with the same number u everywhere and n samples (or strata).
+    fn all_ways(weights: &[f32], n: usize, u: f32) -> [Vec<Draw>; 4] {
+        let mut draws = [Vec::new(), Vec::new(), Vec::new(), Vec::new()];
+        let us = vec![u; n];
+        let ends: Vec<u32> = (1..=n).map(|k| (k * weights.len() / n.max(1)) as u32).collect();
+        with_replacement(weights, &us, &mut draws[0]);
+        systematic(weights, n as u32, u, &mut draws[1]);
+        stratified(weights, &ends, &us, &mut draws[2]);
+        independent_sets(weights, n as u32, &us, &mut draws[3]);
+        draws
+    }
+
+    fn assert_valid(weights: &[f32], draws: &[Draw]) {
+        for d in draws {
+            let w = weights[d.index as usize];
+            assert!(w > 0.0 && w.is_finite(), "drew weight {w} of {weights:?}");
+            assert!(d.scale > 0.0 && d.scale.is_finite(), "{d:?}");
+        }
+    }
+
+    #[test]
+    fn nothing_is_drawn_where_there_is_no_weight_and_old_draws_are_gone() {
+        let none: [&[f32]; 4] =
+            [&[], &[0.0], &[0.0, -1.0, f32::NAN, f32::INFINITY, f32::NEG_INFINITY, -0.0], &[0.0; 700]];
+        for weights in none {
+            for u in EDGES {
+                for n in [0, 1, 5] {
+                    assert!(all_ways(weights, n, u).iter().all(Vec::is_empty), "{weights:?}");
+                }
+            }
+        }
+        let mut draws = vec![Draw { index: 7, scale: 1.0 }];
+        systematic(&[], 1, 0.5, &mut draws);
+        assert!(draws.is_empty());
+    }
+
+    #[test]
+    fn one_proposal_of_weight_among_any_number_is_always_drawn() {
+        for m in [1, 2, 7, 8, 9, 16, 511, 512, 513, 5000] {
+            for at in [0, m / 2, m - 1] {
+                for u in EDGES {
+                    let mut weights = vec![0.0; m];
+                    weights[at] = 3e-7;
+                    let [a, b, ..] = all_ways(&weights, 3, u);
+                    let draw = Draw { index: at as u32, scale: (1.0_f64 / 3.0) as f32 };
+                    assert_eq!((a, b), (vec![draw; 3], vec![draw; 3]), "{m} {at} {u}");
+                    let mut one = Vec::new();
+                    stratified(&weights, &[m as u32], &[u], &mut one);
+                    assert_eq!(one, [Draw { index: at as u32, scale: 1.0 }]);
+                }
+            }
+        }
+    }
+
+    #[test]
+    fn more_samples_than_proposals_repeat_them_evenly() {
+        let mut draws = Vec::new();
+        systematic(&[1.0, 2.0, 0.0, 1.0], 8, 0.5, &mut draws);
+        let indices: Vec<u32> = draws.iter().map(|d| d.index).collect();
+        assert_eq!(indices, [0, 0, 1, 1, 1, 1, 3, 3]);
+        assert_eq!((draws[0].scale, draws[2].scale), (0.5, 0.25));
+        independent_sets(&[1.0, 2.0], 5, &[0.5; 5], &mut draws);
+        assert_eq!(draws, [Draw { index: 0, scale: 1.0 }, Draw { index: 1, scale: 1.0 }]);
+    }
+
+    #[test]
+    fn weights_of_any_size_keep_finite_scales_and_large_ones_win() {
+        let weights =
+            [1e-30, 1e30, f32::MAX, f32::MAX, 1e-30, f32::from_bits(1), f32::MAX, 1e30, f32::MAX, f32::MAX, 1.0];
+        for n in [1, 2, 3, 11, 40] {
+            for u in EDGES {
+                all_ways(&weights, n, u).iter().for_each(|draws| assert_valid(&weights, draws));
+            }
+        }
+        let mut draws = Vec::new();
+        systematic(&weights, 5, 0.5, &mut draws);
+        let indices: Vec<u32> = draws.iter().map(|d| d.index).collect();
+        assert_eq!(indices, [2, 3, 6, 8, 9]);
+        assert!(draws.iter().all(|d| (d.scale - 1.0).abs() < 1e-6), "{draws:?}");
+        // A number of 0 falls on the first proposal, however small: its scale is held finite.
+        with_replacement(&[1e-30, 1e30], &[0.0], &mut draws);
+        assert_eq!(draws, [Draw { index: 0, scale: f32::MAX }]);
+    }
+
+    #[test]
+    fn strata_that_end_out_of_order_or_outside_draw_what_is_left() {
+        let mut draws = Vec::new();
+        stratified(&[1.0; 4], &[3, 2, 99], &[0.9; 3], &mut draws);
+        assert_eq!(draws, [Draw { index: 2, scale: 3.0 }, Draw { index: 3, scale: 1.0 }]);
+    }
+
+    fn weights() -> impl Strategy<Value = Vec<f32>> {
+        let weight = prop_oneof![3 => 0.0_f32..1.0, 1 => Just(0.0), 1 => 0.0_f32..30.0, 1 => (-30.0_f32..3.0).prop_map(f32::exp)];
+        prop::collection::vec(weight, 1..60)
+    }
+
+    proptest! {
+        /// Over a grid of u, each proposal comes N w/S times in the mean and ⌊⌋ or ⌈⌉ of that each time, and the scale is
+        /// one over it.
+        #[test]
+        fn systematic_draws_each_proposal_as_often_as_its_weight_says(weights in weights(), n in 1_u32..20) {
+            const GRID: u32 = 2048;
+            let sum: f64 = weights.iter().map(|&w| f64::from(w)).sum();
+            prop_assume!(sum > 0.0);
+            let (mut counts, mut draws) = (vec![0.0; weights.len()], Vec::new());
+            for k in 0..GRID {
+                systematic(&weights, n, (k as f32 + 0.5) / GRID as f32, &mut draws);
+                prop_assert_eq!(draws.len(), n as usize);
+                prop_assert!(draws.is_sorted_by_key(|d| d.index));
+                let mut of_this = vec![0.0_f64; weights.len()];
+                for d in &draws {
+                    of_this[d.index as usize] += 1.0;
+                    let expected = f64::from(n) * f64::from(weights[d.index as usize]) / sum;
+                    prop_assert!((f64::from(d.scale) * expected - 1.0).abs() < 1e-5);
+                }
+                for (j, count) in of_this.iter().enumerate() {
+                    let expected = f64::from(n) * f64::from(weights[j]) / sum;
+                    prop_assert!((count - expected).abs() < 1.0 + 1e-5 * f64::from(n), "{} {}", count, expected);
+                    counts[j] += count / f64::from(GRID);
+                }
+            }
+            for (j, count) in counts.iter().enumerate() {
+                let expected = f64::from(n) * f64::from(weights[j]) / sum;
+                prop_assert!((count - expected).abs() < 2.5 / f64::from(GRID) + 1e-5 * f64::from(n), "{} {}", count, expected);
+            }
+        }
+
+        /// Inversion: a grid of u draws each proposal in proportion to its weight, also with more than one block per cell.
+        #[test]
+        fn inversion_draws_each_proposal_in_proportion(weights in weights(), repeat in 1_usize..30) {
+            const GRID: usize = 8192;
+            let weights = weights.repeat(repeat);
+            let sum: f64 = weights.iter().map(|&w| f64::from(w)).sum();
+            prop_assume!(sum > 0.0);
+            let u: Vec<f32> = (0..GRID).map(|k| (k as f32 + 0.5) / GRID as f32).collect();
+            let (mut counts, mut draws) = (vec![0.0; weights.len()], Vec::new());
+            with_replacement(&weights, &u, &mut draws);
+            prop_assert_eq!(draws.len(), GRID);
+            for d in &draws {
+                counts[d.index as usize] += 1.0 / GRID as f64;
+            }
+            for (count, &w) in counts.iter().zip(&weights) {
+                prop_assert!((count - f64::from(w) / sum).abs() < 1.5 / GRID as f64 + 1e-5, "{} {}", count, w);
+            }
+        }
+
+        /// Whatever the weights are, only valid proposals are drawn, and all strata with weight draw.
+        #[test]
+        fn invalid_weights_are_never_drawn(
+            bits in prop::collection::vec(any::<u32>(), 0..80), n in 0_usize..20, u in 0.0_f32..1.0,
+        ) {
+            let weights: Vec<f32> = bits.into_iter().map(f32::from_bits).collect();
+            let valid = weights.iter().any(|&w| w > 0.0 && w.is_finite());
+            for u in [u, 0.0, ONE_MINUS_EPSILON] {
+                let draws = all_ways(&weights, n, u);
+                draws.iter().for_each(|draws| assert_valid(&weights, draws));
+                let expected = if valid { n } else { 0 };
+                prop_assert_eq!((draws[0].len(), draws[1].len()), (expected, expected));
+            }
+        }
+
+        /// One set with one draw is the same proposal in all ways of drawing.
+        #[test]
+        fn one_draw_is_the_same_in_all_ways(weights in weights(), u in 0.0_f32..1.0) {
+            let [a, b, c, d] = all_ways(&weights, 1, u);
+            let same = |x: &[Draw], y: &[Draw]| x.len() == y.len() && x.iter().zip(y).all(|(x, y)| x.index.abs_diff(y.index) <= 1);
+            prop_assert!(same(&a, &b) && b == c && c == d);
+        }
     }
 }

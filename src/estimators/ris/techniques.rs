@@ -28,3 +28,22 @@ pub fn proposal_factor(heuristic: Heuristic, i: usize, techniques: &[Technique])
 pub fn sample_weight(heuristic: Heuristic, i: usize, targets: &[Technique]) -> f32 {
     heuristic.weight_of(i, targets)
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn factor_of_the_balance_heuristic_is_one_over_the_mixture_and_deltas_take_no_part() {
+        let t = [Technique { n: 3.0, p: 0.5 }, Technique { n: 2.0, p: 2.0 }, Technique { n: 7.0, p: 0.0 }];
+        for i in 0..2 {
+            assert!((proposal_factor(Heuristic::Balance, i, &t) - 1.0 / 5.5).abs() < 1e-7);
+        }
+        for h in [Heuristic::Balance, Heuristic::Power, Heuristic::Maximum] {
+            assert_eq!(proposal_factor(h, 2, &t), 0.0);
+            assert_eq!(proposal_factor(h, 0, &[Technique { n: 1.0, p: f32::INFINITY }]), 0.0);
+            assert_eq!(proposal_factor(h, 0, &[Technique { n: 1.0, p: f32::NAN }]), 0.0);
+        }
+        assert!((sample_weight(Heuristic::Power, 0, &t) - Heuristic::Power.weight(t[0], t[1])).abs() < 1e-7);
+    }
+}

@@ -26,6 +26,7 @@ pub use triangle::TriangleLight;
 
 use super::{LightBounds, LightCtx, LightHit, LightSample};
 use crate::math::{Rgb, Vec2, Vec3};
+use crate::simd::area::{AreaSampler, Surface};
 use std::f32::consts::PI;
 
 /// The surface of an area light.
@@ -105,6 +106,22 @@ impl AreaLight {
         Some(LightSample { li, wi, pdf, t, p, n, p_error, is_delta: false })
     }
 
+    /// What samples many directions at once from `ctx`; `None` where they are sampled one by one: patches, quadrics but
+    /// spheres from outside, and images. The light is not dark from there.
+    pub(super) fn lanes(&self, ctx: &LightCtx) -> Option<AreaSampler> {
+        if self.emission.image.is_some() {
+            return None;
+        }
+        let surface = match &self.shape {
+            AreaShape::Triangle(t) => Surface::Triangle(t.p, t.n, t.area),
+            AreaShape::Rectangle(rectangle) => rectangle.lanes(ctx.p),
+            AreaShape::Quadric(quadric) => quadric.lanes(ctx.p)?,
+            AreaShape::Patch(_) => return None,
+        };
+        let (l, two_sided) = (self.emission.l.to_array(), self.emission.two_sided);
+        Some(AreaSampler { from: ctx.p, surface, l, two_sided })
+    }
+
     /// Density per steradian of [`sample_li`](Self::sample_li) at the point `hit`. Of a surface that a ray can cross
     /// more than once, this is the density of that point alone.
     #[inline]
@@ -168,7 +185,7 @@ impl AreaLight {
 
     /// True if the light is one-sided and nothing of its emitting side can be seen from `p`.
     #[inline]
-    fn is_dark_from(&self, p: Vec3) -> bool {
+    pub(super) fn is_dark_from(&self, p: Vec3) -> bool {
         !self.emission.two_sided
             && match &self.shape {
                 AreaShape::Triangle(triangle) => triangle.n.dot(p - triangle.p[0]) <= 0.0,

@@ -9,6 +9,7 @@ use super::{ShapeSample, pdf_by_area};
 use crate::geometry::{Quadric, QuadricKind};
 use crate::math::warp::{azimuth, direction, pdf_uniform_cone, sample_uniform_cone, sample_uniform_disk_concentric};
 use crate::math::{Bounds3, Frame, Mat3, Vec2, Vec3, gamma, safe_sqrt, sqr};
+use crate::simd::area::Surface;
 use std::f32::consts::TAU;
 
 /// A quadric that emits.
@@ -138,6 +139,14 @@ impl QuadricLight {
             (Some(cone), Some(sphere)) => self.sample_cone(from, u, sphere, cone),
             _ => self.sample_area(from, u),
         }
+    }
+
+    /// How many samples at once are taken from `from`; `None` if one by one.
+    pub(super) fn lanes(&self, from: Vec3) -> Option<Surface> {
+        let (one_minus_cos, axis, sin2_max) = self.cone(from)?;
+        let (center, radius) = self.sphere?;
+        let is_sampled = pdf_uniform_cone(one_minus_cos).is_finite();
+        is_sampled.then_some(Surface::Cone { center, radius, axis, one_minus_cos, sin2_max, reversed: self.reversed })
     }
 
     fn sample_cone(

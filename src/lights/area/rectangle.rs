@@ -11,6 +11,7 @@
 
 use super::{ShapeSample, pdf_by_area};
 use crate::math::{Bounds3, Vec2, Vec3, gamma};
+use crate::simd::area::{self, SphericalRectangle, Surface};
 use std::f64::consts::TAU;
 
 /// Smallest solid angle that is sampled by solid angle, in steradians.
@@ -37,16 +38,6 @@ pub struct RectangleLight {
     pub uvs: [Vec2; 3],
 }
 
-/// The spherical rectangle under which a rectangle is seen.
-struct SphericalRectangle {
-    x: [f64; 2],
-    y: [f64; 2],
-    z0: f64,
-    solid_angle: f64,
-    /// e^{i(g2 + g3)} up to a positive factor.
-    g23: (f64, f64),
-}
-
 /// The argument of a product of complex numbers, in [0, 2π); a negative zero of rounding is 0.
 #[inline]
 fn angle(z: (f64, f64)) -> f64 {
@@ -59,50 +50,49 @@ fn complex_product(a: (f64, f64), b: (f64, f64)) -> (f64, f64) {
     (a.0 * b.0 - a.1 * b.1, a.0 * b.1 + a.1 * b.0)
 }
 
-impl SphericalRectangle {
-    /// e^{i·g} up to a positive factor, for the inner angles of the arcs that meet at (x1, y0) and (x1, y1), and of
-    /// those at (x0, y1) and (x0, y0): pairwise products.
-    #[inline]
-    fn inner_angles(x: [f64; 2], y: [f64; 2], z0: f64) -> [(f64, f64); 2] {
-        let (xx, yy, zz) = ([x[0] * x[0], x[1] * x[1]], [y[0] * y[0], y[1] * y[1]], z0 * z0);
-        let corner = |i: usize, j: usize, sign: f64| (sign * x[i] * y[j], -z0 * (xx[i] + yy[j] + zz).sqrt());
-        [complex_product(corner(1, 0, 1.0), corner(1, 1, -1.0)), complex_product(corner(0, 1, 1.0), corner(0, 0, -1.0))]
-    }
+/// e^{i·g} up to a positive factor, for the inner angles of the arcs that meet at (x1, y0) and (x1, y1), and of
+/// those at (x0, y1) and (x0, y0): pairwise products.
+#[inline]
+fn inner_angles(x: [f64; 2], y: [f64; 2], z0: f64) -> [(f64, f64); 2] {
+    let (xx, yy, zz) = ([x[0] * x[0], x[1] * x[1]], [y[0] * y[0], y[1] * y[1]], z0 * z0);
+    let corner = |i: usize, j: usize, sign: f64| (sign * x[i] * y[j], -z0 * (xx[i] + yy[j] + zz).sqrt());
+    [complex_product(corner(1, 0, 1.0), corner(1, 1, -1.0)), complex_product(corner(0, 1, 1.0), corner(0, 0, -1.0))]
+}
 
-    fn new(rectangle: &RectangleLight, from: Vec3) -> Option<Self> {
-        let d = rectangle.corner.as_dvec3() - from.as_dvec3();
-        let (ex, ey) = (rectangle.ex.as_dvec3(), rectangle.ey.as_dvec3());
-        let (width, height) = (f64::from(rectangle.size.x), f64::from(rectangle.size.y));
-        let (x0, y0, z0) = (d.dot(ex), d.dot(ey), -d.dot(ex.cross(ey)).abs());
-        let (x, y) = ([x0, x0 + width], [y0, y0 + height]);
-        if z0 * z0 <= MIN_HEIGHT * MIN_HEIGHT * (width * width + height * height) {
-            return None;
-        }
-        let [g01, g23] = SphericalRectangle::inner_angles(x, y, z0);
-        let solid_angle = angle(complex_product(g01, g23));
-        (solid_angle >= MIN_SOLID_ANGLE).then_some(SphericalRectangle { x, y, z0, solid_angle, g23 })
+/// The spherical rectangle under which a rectangle is seen, if it is large enough to be sampled by.
+fn spherical_rectangle(rectangle: &RectangleLight, from: Vec3) -> Option<SphericalRectangle> {
+    let d = rectangle.corner.as_dvec3() - from.as_dvec3();
+    let (ex, ey) = (rectangle.ex.as_dvec3(), rectangle.ey.as_dvec3());
+    let (width, height) = (f64::from(rectangle.size.x), f64::from(rectangle.size.y));
+    let (x0, y0, z0) = (d.dot(ex), d.dot(ey), -d.dot(ex.cross(ey)).abs());
+    let (x, y) = ([x0, x0 + width], [y0, y0 + height]);
+    if z0 * z0 <= MIN_HEIGHT * MIN_HEIGHT * (width * width + height * height) {
+        return None;
     }
+    let [g01, g23] = inner_angles(x, y, z0);
+    let solid_angle = angle(complex_product(g01, g23));
+    (solid_angle >= MIN_SOLID_ANGLE).then_some(SphericalRectangle { x, y, z0, solid_angle, g23 })
+}
 
-    /// The point (x, y) of the rectangle for two uniform numbers.
-    fn sample(&self, u: [f32; 2]) -> [f64; 2] {
-        let SphericalRectangle { x, y, z0, solid_angle, g23 } = *self;
-        // Ureña's b0 and b1: z of the normals of the planes through the edges y0 and y1.
-        let b0 = -y[0] / (y[0] * y[0] + z0 * z0).sqrt();
-        let b1 = y[1] / (y[1] * y[1] + z0 * z0).sqrt();
-        // cos and sin of u·S − (g2 + g3).
-        let (sin_us, cos_us) = (f64::from(u[0]) * solid_angle).sin_cos();
-        let scale = 1.0 / (g23.0 * g23.0 + g23.1 * g23.1).sqrt();
-        let (cos, sin) = complex_product((cos_us, sin_us), (g23.0 * scale, -g23.1 * scale));
-        let fu = (cos * b0 - b1) / sin;
-        let cu = (1.0 / (fu * fu + b0 * b0).sqrt()).copysign(fu).clamp(-1.0, 1.0);
-        let xu = (-(cu * z0) / (1.0 - cu * cu).max(1e-300).sqrt()).clamp(x[0], x[1]);
+/// The point (x, y) of the rectangle for two uniform numbers.
+fn sample_spherical(spherical: &SphericalRectangle, u: [f32; 2]) -> [f64; 2] {
+    let SphericalRectangle { x, y, z0, solid_angle, g23 } = *spherical;
+    // Ureña's b0 and b1: z of the normals of the planes through the edges y0 and y1.
+    let b0 = -y[0] / (y[0] * y[0] + z0 * z0).sqrt();
+    let b1 = y[1] / (y[1] * y[1] + z0 * z0).sqrt();
+    // cos and sin of u·S − (g2 + g3).
+    let (sin_us, cos_us) = (f64::from(u[0]) * solid_angle).sin_cos();
+    let scale = 1.0 / (g23.0 * g23.0 + g23.1 * g23.1).sqrt();
+    let (cos, sin) = complex_product((cos_us, sin_us), (g23.0 * scale, -g23.1 * scale));
+    let fu = (cos * b0 - b1) / sin;
+    let cu = (1.0 / (fu * fu + b0 * b0).sqrt()).copysign(fu).clamp(-1.0, 1.0);
+    let xu = (-(cu * z0) / (1.0 - cu * cu).max(1e-300).sqrt()).clamp(x[0], x[1]);
 
-        let d2 = xu * xu + z0 * z0;
-        let h = y.map(|y| y / (d2 + y * y).sqrt());
-        let hv = h[0] + f64::from(u[1]) * (h[1] - h[0]);
-        let yv = (hv * (d2 / (1.0 - hv * hv).max(1e-300)).sqrt()).clamp(y[0], y[1]);
-        [xu, yv]
-    }
+    let d2 = xu * xu + z0 * z0;
+    let h = y.map(|y| y / (d2 + y * y).sqrt());
+    let hv = h[0] + f64::from(u[1]) * (h[1] - h[0]);
+    let yv = (hv * (d2 / (1.0 - hv * hv).max(1e-300)).sqrt()).clamp(y[0], y[1]);
+    [xu, yv]
 }
 
 impl RectangleLight {
@@ -114,16 +104,16 @@ impl RectangleLight {
 
     /// The solid angle under which it is seen, if that is large enough to be sampled by.
     pub fn solid_angle(&self, from: Vec3) -> Option<f32> {
-        SphericalRectangle::new(self, from).map(|s| s.solid_angle as f32)
+        spherical_rectangle(self, from).map(|s| s.solid_angle as f32)
     }
 
     #[inline]
     pub(super) fn sample(&self, from: Vec3, u: [f32; 2]) -> Option<ShapeSample> {
-        let Some(spherical) = SphericalRectangle::new(self, from) else {
+        let Some(spherical) = spherical_rectangle(self, from) else {
             let (p, p_error) = self.point(u[0] * self.size.x, u[1] * self.size.y);
             return ShapeSample::by_area(from, p, self.n, p_error, 1.0 / self.area());
         };
-        let [x, y] = spherical.sample(u);
+        let [x, y] = sample_spherical(&spherical, u);
         let (p, p_error) = self.point((x - spherical.x[0]) as f32, (y - spherical.y[0]) as f32);
         let d = p - from;
         let t = d.length();
@@ -135,9 +125,19 @@ impl RectangleLight {
 
     #[inline]
     pub(super) fn pdf(&self, from: Vec3, p: Vec3) -> f32 {
-        match SphericalRectangle::new(self, from) {
+        match spherical_rectangle(self, from) {
             Some(spherical) => (1.0 / spherical.solid_angle) as f32,
             None => pdf_by_area(from, p, self.n, 1.0 / self.area()),
+        }
+    }
+
+    /// How many samples at once are taken from `from`.
+    pub(super) fn lanes(&self, from: Vec3) -> Surface {
+        let RectangleLight { corner, ex, ey, size, n, .. } = *self;
+        let rectangle = area::Rectangle { corner, ex, ey, size, n };
+        match spherical_rectangle(self, from) {
+            Some(spherical) => Surface::SphericalRectangle(rectangle, spherical),
+            None => Surface::Rectangle(rectangle),
         }
     }
 

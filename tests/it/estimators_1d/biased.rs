@@ -71,7 +71,6 @@ fn weighted_importance_sampling_has_the_predicted_bias() {
     });
     let channels = weighted_runs(M, 400_000, true);
     for (w, expected) in channels.iter().zip(first_order) {
-        eprintln!("weighted, M = {M}: bias {:.5}, first order {expected:.5}", w.mean());
         let tolerance = 5.0 * w.standard_error() + 4.0 / M as f64 * expected.abs();
         assert!((w.mean() - expected).abs() < tolerance, "{} {expected}", w.mean());
     }
@@ -107,7 +106,6 @@ fn bidirectional_importance_sampling_is_biased_in_colour_as_predicted_and_unbias
         } else {
             for (w, value) in channels.iter().zip(value) {
                 let z = z_test(w.mean(), value, w.standard_error());
-                eprintln!("bidirectional: {:.4} for {value:.4}", w.mean());
                 assert!(z.p_value < level(), "no bias: {} {value}", w.mean());
             }
         }

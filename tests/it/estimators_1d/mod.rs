@@ -42,6 +42,5 @@ fn assert_variances(name: &str, channels: &[Welford; 3], expected: [f64; 3]) {
     for (i, (w, expected)) in channels.iter().zip(expected).enumerate() {
         let ratio = w.variance() / expected;
         assert!((ratio - 1.0).abs() < 0.02, "{name}, channel {i}: variance {} / {expected} = {ratio}", w.variance());
-        eprintln!("{name}, channel {i}: variance / formula = {ratio:.4}");
     }
 }

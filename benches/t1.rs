@@ -1,0 +1,179 @@
+//! Nanoseconds per proposal of direct lighting: directions to one light, values of one BSDF, weights; in lanes, and how
+//! many times as long single calls take.
+//!
+//! `cargo bench --bench t1 -- [part of a name] [runs]`
+#![allow(clippy::print_stdout, missing_docs)]
+
+use lumiris::geometry::{Quadric, QuadricKind, Shape, TriangleMesh};
+use lumiris::lights::{Emission, EnvironmentFilter, EnvironmentMap, EnvironmentMapping, area_lights_of};
+use lumiris::lights::{Light, LightCtx, LightLanes};
+use lumiris::math::hash::{HashStream, pcg4d};
+use lumiris::math::{Affine3A, Rgb, Vec3};
+use lumiris::simd::combine::{Proposals, Weighting, Weights, combine};
+use lumiris::simd::curve::{hilbert_points, hilbert_points_scalar, strata, strata_scalar};
+use std::hint::black_box;
+use std::sync::Arc;
+use std::time::Instant;
+
+const SIZES: [usize; 3] = [8, 32, 128];
+
+/// Shading points, each with numbers of its own, as many as leave no cache warm by chance.
+const POINTS: u32 = 4096;
+
+/// Best of several runs over all points, in nanoseconds per sample.
+fn time(m: usize, mut run: impl FnMut(u32)) -> f64 {
+    let points = POINTS / (m as u32 / 8);
+    let mut best = f64::INFINITY;
+    for _ in 0..runs() {
+        let start = Instant::now();
+        for point in 0..points {
+            run(point);
+        }
+        best = best.min(start.elapsed().as_secs_f64());
+    }
+    best * 1e9 / (f64::from(points) * m as f64)
+}
+
+fn report(name: &str, m: usize, lanes: f64, single: f64) {
+    println!("{name:32} M = {m:3}: {lanes:7.2} ns, single {single:7.2} ns, ratio {:5.1}", single / lanes);
+}
+
+fn arguments() -> impl Iterator<Item = String> {
+    std::env::args().skip(1).filter(|a| !a.starts_with('-'))
+}
+
+fn runs() -> u32 {
+    arguments().nth(1).and_then(|a| a.parse().ok()).unwrap_or(7)
+}
+
+fn is_wanted(name: &str) -> bool {
+    arguments().next().is_none_or(|part| name.contains(&part))
+}
+
+/// Numbers of all points: sorted along the curve for each.
+fn numbers(m: usize) -> Vec<[Vec<f32>; 2]> {
+    (0..POINTS / (m as u32 / 8))
+        .map(|point| {
+            let (mut t, mut jitter) = (vec![0; m], vec![0; m]);
+            let mut u = [vec![0.0; m], vec![0.0; m]];
+            strata(pcg4d([point, 1, 2, 3])[0], point, m as u32, &mut t, &mut jitter);
+            let [u0, u1] = &mut u;
+            hilbert_points(&t, &jitter, u0, u1);
+            u
+        })
+        .collect()
+}
+
+/// A map with a sky of soft gradients, some noise and a small sun.
+fn sky(size: [usize; 2], mapping: EnvironmentMapping, filter: EnvironmentFilter) -> Light {
+    let mut stream = HashStream::new([1, 2, 3]);
+    let texels = (0..size[0] * size[1])
+        .map(|i| {
+            let (x, y) = ((i % size[0]) as f32 / size[0] as f32, (i / size[0]) as f32 / size[1] as f32);
+            let sun = ((x - 0.3).powi(2) + (y - 0.4).powi(2)) < 1e-4;
+            let l = (1.5 + (x * 9.0).sin() * (y * 7.0).cos()) * (0.5 + stream.next_f32());
+            Rgb::splat(if sun { 2000.0 } else { l })
+        })
+        .collect();
+    let map = EnvironmentMap::new(texels, size, mapping, filter).expect("the sizes fit");
+    Light::infinite_image(Arc::new(map), &Affine3A::from_rotation_x(0.5), 1.0)
+}
+
+fn quad(triangles: &[[u32; 3]]) -> Shape {
+    let p = [Vec3::new(-1.0, 2.0, -1.0), Vec3::new(2.0, 2.0, -1.0), Vec3::new(2.0, 2.0, 1.0), Vec3::new(-1.0, 2.0, 1.0)];
+    Shape::Mesh(TriangleMesh::new(p.to_vec(), triangles.to_vec()).expect("indices are in range"))
+}
+
+fn far_quad() -> Shape {
+    let p = [Vec3::ZERO, Vec3::X, Vec3::new(1.0, 0.0, 1.0), Vec3::Z].map(|p| p + Vec3::Y * 300.0);
+    Shape::Mesh(TriangleMesh::new(p.to_vec(), vec![[0, 1, 2], [0, 2, 3]]).expect("indices are in range"))
+}
+
+fn sphere() -> Shape {
+    let placement = Affine3A::from_translation(Vec3::Y * 4.0);
+    let kind = QuadricKind::Sphere { radius: 0.5, z_min: -0.5, z_max: 0.5, phi_max: std::f32::consts::TAU };
+    let local_from_group = placement.inverse();
+    Shape::Quadric(Quadric { kind, group_from_local: placement, local_from_group, flip_normal: false })
+}
+
+fn area(shape: &Shape) -> Light {
+    let emission = Emission { two_sided: true, ..Emission::constant(Rgb::new(1.0, 2.0, 3.0)) };
+    Light::Area(area_lights_of(shape, &emission).lights.remove(0))
+}
+
+fn lights() -> Vec<(&'static str, Box<dyn Fn() -> Light>)> {
+    let l = Rgb::new(1.0, 2.0, 3.0);
+    let (nearest, bilinear) = (EnvironmentFilter::Nearest, EnvironmentFilter::Bilinear);
+    vec![
+        ("environment 256² nearest", Box::new(move || sky([256, 256], EnvironmentMapping::EqualArea, nearest))),
+        ("environment 1024² nearest", Box::new(move || sky([1024, 1024], EnvironmentMapping::EqualArea, nearest))),
+        ("environment 1024² bilinear", Box::new(move || sky([1024, 1024], EnvironmentMapping::EqualArea, bilinear))),
+        ("environment 2048×1024 bilinear", Box::new(move || sky([2048, 1024], EnvironmentMapping::LatLong, bilinear))),
+        ("environment 4096×2048 bilinear", Box::new(move || sky([4096, 2048], EnvironmentMapping::LatLong, bilinear))),
+        ("rectangle", Box::new(|| area(&quad(&[[0, 2, 1], [0, 3, 2]])))),
+        ("rectangle by area", Box::new(|| area(&far_quad()))),
+        ("triangle", Box::new(|| area(&quad(&[[0, 2, 1]])))),
+        ("sphere", Box::new(|| area(&sphere()))),
+        ("constant environment", Box::new(move || Light::InfiniteConstant { l })),
+        ("point light", Box::new(move || Light::Point { p: Vec3::Y * 3.0, intensity: l })),
+    ]
+}
+
+fn main() {
+    for (name, make) in lights() {
+        if !is_wanted(name) {
+            continue;
+        }
+        let light = make();
+        for m in SIZES {
+            let numbers = numbers(m);
+            let mut v = vec![vec![0.0; m]; 7];
+            let mut measure = |is_single: bool| {
+                let [x, y, z, r, g, b, pdf] = &mut v[..] else { unreachable!("there are seven") };
+                let mut out = LightLanes { wi: [x, y, z], li: [r, g, b], pdf };
+                time(m, |point| {
+                    let [jx, jy, ..] = pcg4d([point, 7, 7, 7]).map(|h| h as f32 * 1e-10);
+                    let ctx = LightCtx { p: Vec3::new(jx, 0.0, jy), n: Vec3::Y, ns: Vec3::Y };
+                    let u = numbers[point as usize].each_ref().map(|u| &u[..]);
+                    if is_single {
+                        light.sample_li_each(&ctx, u, &mut out);
+                    } else {
+                        light.sample_li_lanes(&ctx, u, &mut out);
+                    }
+                    black_box(&mut out);
+                })
+            };
+            let (lanes, single) = (measure(false), measure(true));
+            report(name, m, lanes, single);
+        }
+    }
+    for m in SIZES {
+        kernels(m);
+    }
+}
+
+fn kernels(m: usize) {
+    let (mut t, mut jitter) = (vec![0; m], vec![0; m]);
+    let mut v: Vec<Vec<f32>> = (0..11).map(|k| (0..m).map(|i| (i + k) as f32 * 0.1).collect()).collect();
+    if is_wanted("strata") {
+        let lanes = time(m, |p| strata(black_box(p), p, m as u32, &mut t, &mut jitter));
+        let single = time(m, |p| strata_scalar(black_box(p), p, m as u32, &mut t, &mut jitter));
+        report("strata", m, lanes, single);
+    }
+    let [u0, u1, rest @ ..] = &mut v[..] else { unreachable!("there are eleven") };
+    if is_wanted("curve") {
+        let lanes = time(m, |_| hilbert_points(black_box(&t), &jitter, u0, u1));
+        let single = time(m, |_| hilbert_points_scalar(black_box(&t), &jitter, u0, u1));
+        report("curve", m, lanes, single);
+    }
+    if is_wanted("combine") {
+        let [a, b, c, d, e, f, q_hat, r, w] = rest else { unreachable!("there are nine") };
+        let (f_cos, li) = ([&a[..], b, c], [&d[..], e, f]);
+        let proposals =
+            Proposals { f_cos, li, p: u0, p_other: u1, m: m as f32, m_other: 1.0, weighting: Weighting::Power };
+        let mut out = Weights { q_hat, r, w };
+        let lanes = time(m, |_| combine(lumiris::simd::level(), black_box(&proposals), &mut out));
+        let single = time(m, |_| combine(lumiris::simd::Level::baseline(), black_box(&proposals), &mut out));
+        report("combine (single: baseline)", m, lanes, single);
+    }
+}

@@ -1,0 +1,346 @@
+//! Directions to a surface of constant emission from one point, many at once. The formulas are those of the modules of
+//! `lights::area`; what depends on the point alone is computed once.
+
+use super::lane::{F, LANES, Vec3s, load, or_zero, safe_sqrt, sin_cos_turns, store};
+use super::light::LightLanes;
+use crate::math::{Frame, Vec2, Vec3, warp};
+use fearless_simd::{Level, Simd, dispatch, f64x4, mask64x4, prelude::*};
+use std::f64::consts::TAU;
+
+/// A rectangle.
+#[derive(Clone, Copy, Debug)]
+pub struct Rectangle {
+    /// A corner.
+    pub corner: Vec3,
+    /// Unit vector along an edge from the corner.
+    pub ex: Vec3,
+    /// Unit vector along the other edge.
+    pub ey: Vec3,
+    /// Lengths of the two edges.
+    pub size: Vec2,
+    /// Unit normal.
+    pub n: Vec3,
+}
+
+/// A rectangle as seen from the point: [x0, x1] × [y0, y1] × {z0} in the frame of its edges, z0 < 0.
+#[derive(Clone, Copy, Debug)]
+pub struct SphericalRectangle {
+    /// Extent along the first edge.
+    pub x: [f64; 2],
+    /// Extent along the second edge.
+    pub y: [f64; 2],
+    /// Minus the distance of the plane.
+    pub z0: f64,
+    /// Solid angle.
+    pub solid_angle: f64,
+    /// e^{i(g2 + g3)} of the inner angles.
+    pub g23: (f64, f64),
+}
+
+/// How a surface is sampled.
+#[derive(Clone, Copy, Debug)]
+pub enum Surface {
+    /// Uniformly in solid angle.
+    SphericalRectangle(Rectangle, SphericalRectangle),
+    /// Uniformly in area.
+    Rectangle(Rectangle),
+    /// A triangle of corners, unit normal and area, uniformly in area.
+    Triangle([Vec3; 3], Vec3, f32),
+    /// A sphere from outside, uniformly in its cone.
+    Cone {
+        /// Centre.
+        center: Vec3,
+        /// Radius.
+        radius: f32,
+        /// Unit direction to the centre.
+        axis: Vec3,
+        /// 1 − cos θ of the cone.
+        one_minus_cos: f32,
+        /// sin² θ of the cone.
+        sin2_max: f32,
+        /// True if the normal points inwards.
+        reversed: bool,
+    },
+}
+
+/// A surface and a point from which it is sampled.
+#[derive(Clone, Copy, Debug)]
+pub struct AreaSampler {
+    /// The point.
+    pub from: Vec3,
+    /// The surface.
+    pub surface: Surface,
+    /// Emitted radiance.
+    pub l: [f32; 3],
+    /// True if both sides emit; else the side of the normal.
+    pub two_sided: bool,
+}
+
+impl AreaSampler {
+    /// Samples directions.
+    pub fn sample(&self, level: Level, u: [&[f32]; 2], out: &mut LightLanes<'_>) {
+        dispatch!(level, simd => match &self.surface {
+            Surface::SphericalRectangle(rectangle, spherical) => {
+                self.spherical_rectangle(simd, rectangle, &SphericalSetup::new(spherical), u, out);
+            }
+            Surface::Rectangle(rectangle) => self.rectangle(simd, rectangle, u, out),
+            Surface::Triangle(p, n, area) => self.triangle(simd, p, (*n, *area), u, out),
+            Surface::Cone { .. } => self.cone(simd, u, out),
+        });
+    }
+
+    /// Directions to the points `p` of normal `n`, with densities per steradian `pdf`, or per area if `by_area`.
+    #[inline(always)]
+    fn finish<S: Simd>(&self, p: Vec3s<S>, n: Vec3s<S>, pdf: f32, by_area: bool, (i, out): (usize, &mut LightLanes<'_>)) {
+        let simd = p.x.token();
+        let zero = F::splat(simd, 0.0);
+        let d = p.minus(Vec3s::splat(simd, self.from));
+        let t2 = d.dot(d);
+        let t = t2.sqrt();
+        let wi = Vec3s { x: d.x / t, y: d.y / t, z: d.z / t };
+        let cos = n.dot(wi);
+        let pdf = F::splat(simd, pdf);
+        let pdf = if by_area { pdf * t2 / cos.abs() } else { pdf };
+        let is_sample = pdf.simd_gt(zero) & pdf.is_finite() & t.simd_gt(zero);
+        store(or_zero(is_sample, pdf), out.pdf, i);
+        wi.store(&mut out.wi, i);
+        let is_dark = !cos.simd_lt(zero);
+        for c in 0..3 {
+            let l = F::splat(simd, self.l[c]);
+            store(if self.two_sided { l } else { is_dark.select(zero, l) }, out.li[c], i);
+        }
+    }
+
+    #[inline(always)]
+    fn spherical_rectangle<S: Simd>(
+        &self,
+        simd: S,
+        rectangle: &Rectangle,
+        setup: &SphericalSetup,
+        u: [&[f32]; 2],
+        out: &mut LightLanes<'_>,
+    ) {
+        let (n, pdf) = (Vec3s::splat(simd, rectangle.n), (1.0 / setup.solid_angle) as f32);
+        for i in (0..out.pdf.len()).step_by(LANES) {
+            let (u0, u1) = (load(simd, u[0], i).widen(), load(simd, u[1], i).widen());
+            let (low, high) = (setup.place(u0.0, u1.0), setup.place(u0.1, u1.1));
+            let p = rectangle.point(low.0.narrow(high.0), low.1.narrow(high.1));
+            self.finish(p, n, pdf, false, (i, out));
+        }
+    }
+
+    #[inline(always)]
+    fn rectangle<S: Simd>(&self, simd: S, rectangle: &Rectangle, u: [&[f32]; 2], out: &mut LightLanes<'_>) {
+        let (n, pdf_area) = (Vec3s::splat(simd, rectangle.n), 1.0 / (rectangle.size.x * rectangle.size.y));
+        for i in (0..out.pdf.len()).step_by(LANES) {
+            let p = rectangle.point(load(simd, u[0], i) * rectangle.size.x, load(simd, u[1], i) * rectangle.size.y);
+            self.finish(p, n, pdf_area, true, (i, out));
+        }
+    }
+
+    #[inline(always)]
+    fn triangle<S: Simd>(
+        &self,
+        simd: S,
+        corners: &[Vec3; 3],
+        (n, area): (Vec3, f32),
+        u: [&[f32]; 2],
+        out: &mut LightLanes<'_>,
+    ) {
+        let n = Vec3s::splat(simd, n);
+        for i in (0..out.pdf.len()).step_by(LANES) {
+            let (u0, u1) = (load(simd, u[0], i), load(simd, u[1], i));
+            let is_left = u0.simd_lt(u1);
+            let half = is_left.select(u0, u1) * 0.5;
+            let (b0, b1) = (is_left.select(half, u0 - half), is_left.select(u1 - half, half));
+            let b = Vec3s { x: b0, y: b1, z: F::splat(simd, 1.0) - b0 - b1 };
+            self.finish(b.combine(corners[0], corners[1], corners[2]), n, 1.0 / area, true, (i, out));
+        }
+    }
+
+    #[inline(always)]
+    fn cone<S: Simd>(&self, simd: S, u: [&[f32]; 2], out: &mut LightLanes<'_>) {
+        let Surface::Cone { center, radius, axis, one_minus_cos, sin2_max, reversed } = self.surface else { return };
+        let (frame, sin_max, pdf) = (Frame::from_z(axis), sin2_max.sqrt(), warp::pdf_uniform_cone(one_minus_cos));
+        let (one, center) = (F::splat(simd, 1.0), Vec3s::splat(simd, center));
+        for i in (0..out.pdf.len()).step_by(LANES) {
+            let x = load(simd, u[0], i) * one_minus_cos;
+            let sin2 = (x * (F::splat(simd, 2.0) - x)).max(0.0);
+            let (sin_phi, cos_phi) = sin_cos_turns(load(simd, u[1], i));
+            // The angle at the centre
+            let cos_alpha = sin2 / sin_max + (one - x) * safe_sqrt(one - sin2 / sin2_max);
+            let sin_alpha = safe_sqrt(one - cos_alpha * cos_alpha);
+            let local = Vec3s { x: cos_phi * sin_alpha, y: sin_phi * sin_alpha, z: -cos_alpha };
+            let outward = local.combine(frame.x, frame.y, frame.z);
+            let outward = outward.times(one / outward.dot(outward).sqrt());
+            let p = center.plus(outward.times(F::splat(simd, radius)));
+            let n = if reversed { outward.times(-one) } else { outward };
+            self.finish(p, n, pdf, false, (i, out));
+        }
+    }
+}
+
+impl Rectangle {
+    /// The points at `s` along one edge and `t` along the other.
+    #[inline(always)]
+    fn point<S: Simd>(&self, s: F<S>, t: F<S>) -> Vec3s<S> {
+        let at = |corner: f32, ex: f32, ey: f32| F::splat(s.token(), corner) + s * ex + t * ey;
+        Vec3s {
+            x: at(self.corner.x, self.ex.x, self.ey.x),
+            y: at(self.corner.y, self.ex.y, self.ey.y),
+            z: at(self.corner.z, self.ex.z, self.ey.z),
+        }
+    }
+}
+
+/// What the samples of a spherical rectangle have in common.
+struct SphericalSetup {
+    x: [f64; 2],
+    y: [f64; 2],
+    z0: f64,
+    solid_angle: f64,
+    /// S/2π.
+    turns: f64,
+    /// cos and −sin of g2 + g3.
+    rotation: (f64, f64),
+    /// z of the normals of the planes through the edges y0 and y1.
+    b: [f64; 2],
+    /// 1 − b0².
+    k: f64,
+}
+
+impl SphericalSetup {
+    fn new(s: &SphericalRectangle) -> Self {
+        let (z2, y) = (s.z0 * s.z0, s.y);
+        let scale = 1.0 / (s.g23.0 * s.g23.0 + s.g23.1 * s.g23.1).sqrt();
+        SphericalSetup {
+            x: s.x,
+            y,
+            z0: s.z0,
+            solid_angle: s.solid_angle,
+            turns: s.solid_angle / TAU,
+            rotation: (s.g23.0 * scale, -s.g23.1 * scale),
+            b: [-y[0] / (y[0] * y[0] + z2).sqrt(), y[1] / (y[1] * y[1] + z2).sqrt()],
+            k: z2 / (y[0] * y[0] + z2),
+        }
+    }
+
+    /// The distances from the corner along the edges.
+    #[inline(always)]
+    fn place<S: Simd>(&self, u0: f64x4<S>, u1: f64x4<S>) -> (f64x4<S>, f64x4<S>) {
+        let simd = u0.token();
+        let one = f64x4::splat(simd, 1.0);
+        // cos and sin of u·S − (g2 + g3).
+        let (sin_us, cos_us) = sin_cos_turns_f64(u0 * self.turns);
+        let cos = cos_us * self.rotation.0 - sin_us * self.rotation.1;
+        let sin = cos_us * self.rotation.1 + sin_us * self.rotation.0;
+        // With fu = f/sin, x = −z0·sgn(fu)/√(fu² + b0² − 1).
+        let f = cos * self.b[0] - self.b[1];
+        let under_root = (f * f - sin * sin * self.k).max(1e-300);
+        let x = sin * f64x4::splat(simd, -self.z0).copysign(f) / under_root.sqrt();
+        let x = x.max(self.x[0]).min(self.x[1]);
+
+        let d2 = x * x + self.z0 * self.z0;
+        let (r0, r1) = ((d2 + self.y[0] * self.y[0]).sqrt(), (d2 + self.y[1] * self.y[1]).sqrt());
+        let scale = one / (r0 * r1);
+        let (h0, h1) = (r1 * scale * self.y[0], r0 * scale * self.y[1]);
+        let h = h0 + u1 * (h1 - h0);
+        let y = h * (d2 / (one - h * h).max(1e-300)).sqrt();
+        let y = y.max(self.y[0]).min(self.y[1]);
+        (x - self.x[0], y - self.y[0])
+    }
+}
+
+/// sin 2πt and cos 2πt for |t| < 2²⁰, by the series about the nearest quarter turn; errors below 2⁻⁴⁵.
+#[inline(always)]
+fn sin_cos_turns_f64<S: Simd>(t: f64x4<S>) -> (f64x4<S>, f64x4<S>) {
+    let simd = t.token();
+    let quarters = (t * 4.0).round_ties_even();
+    let x = (t - quarters * 0.25) * TAU;
+    let x2 = x * x;
+    let sin = (((((x2 * (1.0 / 6_227_020_800.0) - 1.0 / 39_916_800.0) * x2 + 1.0 / 362_880.0) * x2 - 1.0 / 5040.0) * x2
+        + 1.0 / 120.0)
+        * x2
+        - 1.0 / 6.0)
+        * x2
+        * x
+        + x;
+    let cos = ((((((x2 * (-1.0 / 87_178_291_200.0) + 1.0 / 479_001_600.0) * x2 - 1.0 / 3_628_800.0) * x2
+        + 1.0 / 40_320.0)
+        * x2
+        - 1.0 / 720.0)
+        * x2
+        + 1.0 / 24.0)
+        * x2
+        - 0.5)
+        * x2
+        + 1.0;
+    // Of the quarters modulo 4, which are exact.
+    let k = quarters - (quarters * 0.25).floor() * 4.0;
+    let is = |q: f64| -> mask64x4<S> { k.simd_eq(f64x4::splat(simd, q)) };
+    let is_odd = is(1.0) | is(3.0);
+    let (s, c) = (is_odd.select(cos, sin), is_odd.select(sin, cos));
+    ((is(2.0) | is(3.0)).select(-s, s), (is(1.0) | is(2.0)).select(-c, c))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::math::hash::HashStream;
+    use crate::simd::test_support::{LENGTHS, assert_same_bits};
+
+    #[test]
+    fn lanes_are_the_same_at_all_levels() {
+        let rectangle = Rectangle {
+            corner: Vec3::new(-1.0, 2.0, -1.0),
+            ex: Vec3::X,
+            ey: Vec3::Z,
+            size: Vec2::new(2.0, 3.0),
+            n: Vec3::NEG_Y,
+        };
+        let spherical =
+            SphericalRectangle { x: [-1.0, 1.0], y: [-1.0, 2.0], z0: -2.0, solid_angle: 1.1, g23: (-0.3, 0.9) };
+        let corners = [Vec3::new(0.0, 3.0, 1.0), Vec3::new(2.0, 3.0, 0.0), Vec3::new(1.0, 2.0, 2.0)];
+        let axis = Vec3::new(0.6, 0.0, 0.8);
+        let cone = |one_minus_cos: f32| {
+            let sin2_max = one_minus_cos * (2.0 - one_minus_cos);
+            Surface::Cone { center: axis * 2.0, radius: 0.5, axis, one_minus_cos, sin2_max, reversed: false }
+        };
+        let mut stream = HashStream::new([4, 4, 4]);
+        for surface in [
+            Surface::SphericalRectangle(rectangle, spherical),
+            Surface::Rectangle(rectangle),
+            Surface::Triangle(corners, Vec3::Y, 1.5),
+            cone(0.03),
+            cone(1e-6),
+        ] {
+            let sampler = AreaSampler { from: Vec3::ZERO, surface, l: [1.0, 2.0, 3.0], two_sided: false };
+            for n in LENGTHS {
+                let (u0, u1): (Vec<f32>, Vec<f32>) = (0..n).map(|_| (stream.next_f32(), stream.next_f32())).unzip();
+                assert_same_bits::<7>(n, |level, [x, y, z, r, g, b, pdf]| {
+                    sampler.sample(level, [&u0, &u1], &mut LightLanes { wi: [x, y, z], li: [r, g, b], pdf });
+                    assert!(pdf.iter().all(|&p| p >= 0.0 && p.is_finite()));
+                });
+            }
+        }
+    }
+
+    #[test]
+    fn sines_of_f64_are_accurate() {
+        #[inline(always)]
+        fn run<S: Simd>(simd: S, t: &[f64; 4]) -> [[f64; 4]; 2] {
+            let (s, c) = sin_cos_turns_f64(f64x4::load_array(simd, *t));
+            [s.to_array(), c.to_array()]
+        }
+        for i in -300..1000 {
+            let t = [0.0, 0.1, 0.2, 0.3].map(|x| x * 0.01 + f64::from(i) / 777.0);
+            for level in crate::simd::test_support::levels() {
+                let [s, c] = dispatch!(level, simd => run(simd, &t));
+                for k in 0..4 {
+                    let (sin, cos) = (t[k] * TAU).sin_cos();
+                    assert!((s[k] - sin).abs() < 1e-13 && (c[k] - cos).abs() < 1e-13, "{}", t[k]);
+                }
+            }
+        }
+    }
+}

@@ -1,0 +1,143 @@
+//! The weights of proposals: q̂ = Y(f·cos θ · L), r = w/(m p), w·q̂ of resampling.
+
+use super::lane::{F, LANES, Vec3s, load, or_zero, store};
+use fearless_simd::{Level, Simd, dispatch, prelude::*};
+
+/// How the weights of two techniques are chosen; see the heuristics of the same names in `estimators::mis`.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Weighting {
+    /// x/(x + y).
+    Balance,
+    /// x²/(x² + y²).
+    Power,
+    /// 1 where x is larger, 0 where y is, 1/2 where they differ by less than one part in a thousand.
+    Maximum,
+}
+
+/// Samples of one technique, and the density of another one at them. All slices have the same length.
+#[derive(Clone, Copy, Debug)]
+pub struct Proposals<'a> {
+    /// f·|cos θi| by channel.
+    pub f_cos: [&'a [f32]; 3],
+    /// Radiance by channel.
+    pub li: [&'a [f32]; 3],
+    /// Density of the technique of the samples; not positive where there is none.
+    pub p: &'a [f32],
+    /// Density of the other technique.
+    pub p_other: &'a [f32],
+    /// Number of samples of the technique.
+    pub m: f32,
+    /// Number of samples of the other technique; 0 if it is not used.
+    pub m_other: f32,
+    /// How both are weighted.
+    pub weighting: Weighting,
+}
+
+/// What [`combine`] computes.
+#[derive(Debug)]
+pub struct Weights<'a> {
+    /// q̂, the luminance of f·cos θ·li; 0 where p is not positive.
+    pub q_hat: &'a mut [f32],
+    /// r = w/(m·p), w the weight of multiple importance sampling; 0 where p is not positive.
+    pub r: &'a mut [f32],
+    /// q̂·r; 0 where that is not finite.
+    pub w: &'a mut [f32],
+}
+
+/// Computes the weights of proposals; see [`Weights`].
+pub fn combine(level: Level, proposals: &Proposals<'_>, out: &mut Weights<'_>) {
+    dispatch!(level, simd => combine_lanes(simd, proposals, out));
+}
+
+#[inline(always)]
+fn combine_lanes<S: Simd>(simd: S, proposals: &Proposals<'_>, out: &mut Weights<'_>) {
+    let (zero, one) = (F::splat(simd, 0.0), F::splat(simd, 1.0));
+    for i in (0..proposals.p.len()).step_by(LANES) {
+        let f = Vec3s::load(simd, proposals.f_cos, i);
+        let l = Vec3s::load(simd, proposals.li, i);
+        let (x, y) = (load(simd, proposals.p, i) * proposals.m, load(simd, proposals.p_other, i) * proposals.m_other);
+
+        // The ratio y/x, and not the products, so that neither squares overflow nor inf/inf appears.
+        let (is_sample, has_other) = (x.simd_gt(zero), y.simd_gt(zero));
+        let ratio = y / x;
+        let both_infinite = x.is_infinite() & y.is_infinite();
+        let weight = match proposals.weighting {
+            Weighting::Balance => one / (ratio + one),
+            Weighting::Power => one / (ratio * ratio + one),
+            Weighting::Maximum => {
+                let is_tie = (ratio - one).abs().simd_le(F::splat(simd, 1e-3));
+                is_tie.select(F::splat(simd, 0.5), ratio.simd_lt(one).select(one, zero))
+            }
+        };
+        let weight = both_infinite.select(F::splat(simd, 0.5), has_other.select(weight, one));
+
+        let luminance = f.x * l.x * 0.212_671 + f.y * l.y * 0.715_160 + f.z * l.z * 0.072_169;
+        let q_hat = or_zero(is_sample, luminance);
+        let r = or_zero(is_sample, weight / x);
+        let w = q_hat * r;
+        store(q_hat, out.q_hat, i);
+        store(r, out.r, i);
+        store(or_zero(w.is_finite(), w), out.w, i);
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::math::Rgb;
+    use crate::math::hash::HashStream;
+    use crate::simd::test_support::{LENGTHS, assert_same_bits};
+
+    fn numbers(stream: &mut HashStream, n: usize) -> Vec<f32> {
+        let special = [0.0, f32::INFINITY, f32::NAN, -1.0, 1e-38, 3e38];
+        (0..n)
+            .map(|_| {
+                let [a, b] = stream.next_2d();
+                if a < 0.2 { special[(b * 6.0) as usize] } else { b * 10.0 }
+            })
+            .collect()
+    }
+
+    /// As `estimators::mis` has it.
+    fn weight(weighting: Weighting, x: f32, y: f32) -> f32 {
+        if !(x > 0.0) {
+            return 0.0;
+        }
+        if !(y > 0.0) || x.is_infinite() {
+            return if x.is_infinite() && y.is_infinite() { 0.5 } else { 1.0 };
+        }
+        let ratio = y / x;
+        match weighting {
+            Weighting::Balance => 1.0 / (1.0 + ratio),
+            Weighting::Power => 1.0 / (1.0 + ratio * ratio),
+            Weighting::Maximum if (ratio - 1.0).abs() <= 1e-3 => 0.5,
+            Weighting::Maximum => f32::from(u8::from(ratio < 1.0)),
+        }
+    }
+
+    #[test]
+    fn weights_are_those_of_single_samples_to_the_bit_at_all_levels() {
+        let mut stream = HashStream::new([5, 6, 7]);
+        for weighting in [Weighting::Balance, Weighting::Power, Weighting::Maximum] {
+            for n in LENGTHS {
+                let v: [Vec<f32>; 8] = std::array::from_fn(|_| numbers(&mut stream, n));
+                let (f_cos, li) = ([&v[0][..], &v[1], &v[2]], [&v[3][..], &v[4], &v[5]]);
+                let (m, m_other) = (8.0, 3.0);
+                let proposals = Proposals { f_cos, li, p: &v[6], p_other: &v[7], m, m_other, weighting };
+                assert_same_bits::<3>(n, |level, [q_hat, r, w]| {
+                    combine(level, &proposals, &mut Weights { q_hat, r, w });
+                    for i in 0..n {
+                        let x = proposals.p[i] * m;
+                        let product = Rgb::new(v[0][i] * v[3][i], v[1][i] * v[4][i], v[2][i] * v[5][i]);
+                        let expected_q = if x > 0.0 { product.luminance() } else { 0.0 };
+                        let mis = weight(weighting, x, proposals.p_other[i] * m_other);
+                        let expected_r = if x > 0.0 { mis / x } else { 0.0 };
+                        let same = |a: f32, b: f32| a.to_bits() == b.to_bits() || a.is_nan() && b.is_nan();
+                        assert!(same(q_hat[i], expected_q) && same(r[i], expected_r), "{} {expected_r}", r[i]);
+                        assert!(w[i].is_finite() && (w[i] == q_hat[i] * r[i] || w[i] == 0.0));
+                    }
+                });
+            }
+        }
+    }
+}

@@ -1,0 +1,214 @@
+//! Directions sampled in proportion to an image of radiance over the sphere.
+//!
+//! The running integrals are inverted lane by lane, since that is a matter of cache lines; directions and densities are in
+//! lanes; a texel is one load of four floats. The maps of the square to the sphere are those of [`crate::math::sphere_map`].
+
+use super::lane::{F, I, LANES, Vec3s, load, or_zero, safe_sqrt, sin_cos_quadrant, sin_cos_turns, store};
+use super::light::LightLanes;
+use crate::math::sphere_map::pdf_equal_area_square_to_sphere;
+use crate::math::distribution::{Running, STEP, clamped};
+use crate::math::{Mat3, PiecewiseConstant2D};
+use fearless_simd::{Level, Simd, dispatch, f32x4, f32x8, prelude::*};
+use std::f32::consts::{PI, TAU};
+
+/// An image of the radiance from all directions, and how it is sampled.
+#[derive(Clone, Copy, Debug)]
+pub struct Environment<'a> {
+    /// Density over the unit square.
+    pub distribution: &'a PiecewiseConstant2D,
+    /// Red, green, blue and the density per unit area of the square, row by row, with a border of one texel that continues
+    /// the image around the sphere.
+    pub texels: &'a [[f32; 4]],
+    /// True for the equal-area octahedral map, false for latitude and longitude.
+    pub is_equal_area: bool,
+    /// True for a blend of four texels, false for the nearest.
+    pub is_bilinear: bool,
+    /// Orthogonal map of directions.
+    pub world_from_light: Mat3,
+    /// Factor of the radiance.
+    pub scale: f32,
+}
+
+/// Samples that are worked on together.
+const CHUNK: usize = 32;
+
+/// One number for each sample of a chunk.
+type Column = [f32; CHUNK];
+
+/// Where the numbers of a chunk fall in one dimension.
+struct Places {
+    bin: [i32; CHUNK],
+    /// The number, less the running integral at the beginning of its bin.
+    above: Column,
+    /// Probability of the bin.
+    width: Column,
+}
+
+impl Places {
+    fn new() -> Self {
+        Places { bin: [0; CHUNK], above: [0.0; CHUNK], width: [1.0; CHUNK] }
+    }
+
+    /// Inverts the running integral at `u`: the last bin with `cdf[i] <= u`.
+    #[inline(always)]
+    fn set<S: Simd>(&mut self, i: usize, simd: S, running: &Running<'_>, u: f32) {
+        let Running { cdf, guide } = *running;
+        let u = clamped(u);
+        let mut bin = usize::from(guide[((u * guide.len() as f32) as usize).min(guide.len() - 1)]);
+        let at = f32x8::splat(simd, u);
+        let bin = loop {
+            let next = f32x8::from_slice(simd, &cdf[bin + 1..bin + 1 + STEP]);
+            let passed = next.simd_le(at).to_bitmask().count_ones() as usize;
+            bin += passed;
+            if passed < STEP {
+                break running.found(bin);
+            }
+        };
+        self.bin[i] = bin.index as i32;
+        self.above[i] = u - bin.begin;
+        self.width[i] = bin.end - bin.begin;
+    }
+
+    /// The place in units of bins, and the index of the bin.
+    #[inline(always)]
+    fn lanes<S: Simd>(&self, simd: S, i: usize) -> (F<S>, I<S>) {
+        let bin = I::from_slice(simd, &self.bin[i..i + LANES]);
+        (bin.to_float::<F<S>>() + load(simd, &self.above, i) / load(simd, &self.width, i), bin)
+    }
+}
+
+/// Texels of the lookups of a chunk.
+struct Lookups {
+    /// The sampled texel, in whose fourth component the density is.
+    cell: [i32; CHUNK],
+    /// The first of the four texels of a blend.
+    first: [i32; CHUNK],
+    dx: Column,
+    dy: Column,
+    /// Density per steradian over density per unit area.
+    density: Column,
+}
+
+/// A direction on the sphere before the rotation, and the density per steradian of a uniform point of the square.
+#[inline(always)]
+fn equal_area<S: Simd>(x: F<S>, y: F<S>) -> (Vec3s<S>, F<S>) {
+    let simd = x.token();
+    let one = F::splat(simd, 1.0);
+    let (u, v) = (x * 2.0 - one, y * 2.0 - one);
+    let signed_distance = one - (u.abs() + v.abs());
+    let r = one - signed_distance.abs();
+    let a = or_zero(r.simd_gt(F::splat(simd, 0.0)), (v.abs() - u.abs()) / r);
+    let (sin_phi, cos_phi) = sin_cos_quadrant(a.max(-1.0).min(1.0));
+    let r2 = r * r;
+    let sin_theta = r * safe_sqrt(F::splat(simd, 2.0) - r2);
+    let w = Vec3s {
+        x: (cos_phi * sin_theta).copysign(u),
+        y: (sin_phi * sin_theta).copysign(v),
+        z: (one - r2).copysign(signed_distance),
+    };
+    (w, F::splat(simd, pdf_equal_area_square_to_sphere()))
+}
+
+/// As [`equal_area`], for latitude and longitude.
+#[inline(always)]
+fn lat_long<S: Simd>(x: F<S>, y: F<S>) -> (Vec3s<S>, F<S>) {
+    let (sin_theta, cos_theta) = sin_cos_turns(y * 0.5);
+    let (sin_phi, cos_phi) = sin_cos_turns(x);
+    let w = Vec3s { x: sin_theta * cos_phi, y: sin_theta * sin_phi, z: cos_theta };
+    (w, F::splat(x.token(), 1.0) / (sin_theta * (TAU * PI)))
+}
+
+impl Environment<'_> {
+    /// Samples directions; densities are 0 where the image is black.
+    pub fn sample(&self, level: Level, u: [&[f32]; 2], out: &mut LightLanes<'_>) {
+        dispatch!(level, simd => self.sample_lanes(simd, u, out));
+    }
+
+    #[inline(always)]
+    fn sample_lanes<S: Simd>(&self, simd: S, u: [&[f32]; 2], out: &mut LightLanes<'_>) {
+        let n = out.pdf.len();
+        for start in (0..n).step_by(CHUNK) {
+            let count = CHUNK.min(n - start);
+            let places = self.places(simd, start, count, u);
+            let mut lookups =
+                Lookups { cell: [0; CHUNK], first: [0; CHUNK], dx: [0.0; CHUNK], dy: [0.0; CHUNK], density: [0.0; CHUNK] };
+            for i in (0..count).step_by(LANES) {
+                self.directions(simd, &places, i, &mut lookups, (&mut out.wi, start + i));
+            }
+            self.radiances(simd, &lookups, start, count, out);
+            for i in (0..count).step_by(LANES) {
+                let pdf = load(simd, &out.pdf[start..start + count], i) * load(simd, &lookups.density, i);
+                let is_sample = pdf.simd_gt(F::splat(simd, 0.0)) & pdf.is_finite();
+                store(or_zero(is_sample, pdf), &mut out.pdf[start..start + count], i);
+            }
+        }
+    }
+
+    /// Inverts the running integrals.
+    #[inline(always)]
+    fn places<S: Simd>(&self, simd: S, start: usize, count: usize, u: [&[f32]; 2]) -> [Places; 2] {
+        let [mut x, mut y] = [Places::new(), Places::new()];
+        let (u0, u1) = (&u[0][start..start + count], &u[1][start..start + count]);
+        let rows = self.distribution.rows();
+        for i in 0..count {
+            y.set(i, simd, &rows, u1[i]);
+        }
+        for i in 0..count {
+            x.set(i, simd, &self.distribution.row(y.bin[i] as usize), u0[i]);
+        }
+        [x, y]
+    }
+
+    /// Directions, and where their texels are.
+    #[inline(always)]
+    fn directions<S: Simd>(
+        &self,
+        simd: S,
+        places: &[Places; 2],
+        i: usize,
+        lookups: &mut Lookups,
+        (wi, at): (&mut [&mut [f32]; 3], usize),
+    ) {
+        let [width, height] = self.distribution.resolution();
+        let ((x, column), (y, row)) = (places[0].lanes(simd, i), places[1].lanes(simd, i));
+        let (px, py) = (x * (1.0 / width as f32), y * (1.0 / height as f32));
+        let (w, density) = if self.is_equal_area { equal_area(px, py) } else { lat_long(px, py) };
+        w.transformed(&self.world_from_light).store(wi, at);
+        store(density, &mut lookups.density, i);
+
+        // With the border, texel centres are at 1.5, 2.5, …
+        let stride = I::splat(simd, width as i32 + 2);
+        ((row + 1) * stride + column + 1).store_slice(&mut lookups.cell[i..i + LANES]);
+        let (x, y) = (x + 0.5, y + 0.5);
+        // Rounding may place a sample of the last texel at its end.
+        let (x0, y0) = (x.floor().min(width as f32), y.floor().min(height as f32));
+        (y0.to_int::<I<S>>() * stride + x0.to_int::<I<S>>()).store_slice(&mut lookups.first[i..i + LANES]);
+        store(x - x0, &mut lookups.dx, i);
+        store(y - y0, &mut lookups.dy, i);
+    }
+
+    /// Radiances, and the densities per unit area of the square.
+    #[inline(always)]
+    fn radiances<S: Simd>(&self, simd: S, lookups: &Lookups, start: usize, count: usize, out: &mut LightLanes<'_>) {
+        let stride = self.distribution.resolution()[0] + 2;
+        let [red, green, blue] = &mut out.li;
+        let (red, green) = (&mut red[start..start + count], &mut green[start..start + count]);
+        let (blue, pdf) = (&mut blue[start..start + count], &mut out.pdf[start..start + count]);
+        let texel = |i: usize| -> f32x4<S> { f32x4::from_slice(simd, &self.texels[i]) };
+        for i in 0..count {
+            let cell = texel(lookups.cell[i] as usize);
+            pdf[i] = cell[3];
+            let l = if self.is_bilinear {
+                let (first, dx, dy) = (lookups.first[i] as usize, lookups.dx[i], lookups.dy[i]);
+                let upper = texel(first) * (1.0 - dx) + texel(first + 1) * dx;
+                let lower = texel(first + stride) * (1.0 - dx) + texel(first + stride + 1) * dx;
+                (upper * (1.0 - dy) + lower * dy) * self.scale
+            } else {
+                cell * self.scale
+            };
+            red[i] = l[0];
+            green[i] = l[1];
+            blue[i] = l[2];
+        }
+    }
+}

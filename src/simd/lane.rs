@@ -1,0 +1,208 @@
+//! Vectors of lanes: loads and stores with padding, directions by component, and elementary functions.
+
+use crate::math::{Frame, Mat3, Vec3};
+use fearless_simd::{Simd, prelude::*};
+use std::f32::consts::{FRAC_PI_2, TAU};
+
+/// The vector of f32 lanes.
+pub type F<S> = fearless_simd::f32x8<S>;
+/// The vector of i32 lanes.
+pub type I<S> = fearless_simd::i32x8<S>;
+/// One truth per lane.
+pub type M<S> = fearless_simd::mask32x8<S>;
+
+/// Number of lanes.
+pub const LANES: usize = 8;
+
+/// The lanes from index `i` on; past the end they repeat its last value.
+#[inline(always)]
+pub fn load<S: Simd>(simd: S, from: &[f32], i: usize) -> F<S> {
+    let rest = &from[i..];
+    if rest.len() >= LANES {
+        return F::from_slice(simd, &rest[..LANES]);
+    }
+    let mut v = F::splat(simd, rest[rest.len() - 1]);
+    v.as_mut_slice()[..rest.len()].copy_from_slice(rest);
+    v
+}
+
+/// Stores the lanes from index `i` on, as far as there is room.
+#[inline(always)]
+pub fn store<S: Simd>(v: F<S>, to: &mut [f32], i: usize) {
+    let rest = &mut to[i..];
+    if rest.len() >= LANES {
+        v.store_slice(&mut rest[..LANES]);
+    } else {
+        rest.copy_from_slice(&v.as_slice()[..rest.len()]);
+    }
+}
+
+/// Directions or points by component.
+#[derive(Clone, Copy, Debug)]
+pub struct Vec3s<S: Simd> {
+    /// x.
+    pub x: F<S>,
+    /// y.
+    pub y: F<S>,
+    /// z.
+    pub z: F<S>,
+}
+
+impl<S: Simd> Vec3s<S> {
+    /// The same vector in all lanes.
+    #[inline(always)]
+    pub fn splat(simd: S, v: Vec3) -> Self {
+        Vec3s { x: F::splat(simd, v.x), y: F::splat(simd, v.y), z: F::splat(simd, v.z) }
+    }
+
+    /// The lanes from index `i` on.
+    #[inline(always)]
+    pub fn load(simd: S, from: [&[f32]; 3], i: usize) -> Self {
+        Vec3s { x: load(simd, from[0], i), y: load(simd, from[1], i), z: load(simd, from[2], i) }
+    }
+
+    /// Stores the lanes from index `i` on.
+    #[inline(always)]
+    pub fn store(self, to: &mut [&mut [f32]; 3], i: usize) {
+        store(self.x, to[0], i);
+        store(self.y, to[1], i);
+        store(self.z, to[2], i);
+    }
+
+    /// Dot product.
+    #[inline(always)]
+    pub fn dot(self, o: Self) -> F<S> {
+        self.x * o.x + self.y * o.y + self.z * o.z
+    }
+
+    /// Dot product with one vector.
+    #[inline(always)]
+    pub fn dot_splat(self, o: Vec3) -> F<S> {
+        self.x * o.x + self.y * o.y + self.z * o.z
+    }
+
+    /// Sum.
+    #[inline(always)]
+    pub fn plus(self, o: Self) -> Self {
+        Vec3s { x: self.x + o.x, y: self.y + o.y, z: self.z + o.z }
+    }
+
+    /// Difference.
+    #[inline(always)]
+    pub fn minus(self, o: Self) -> Self {
+        Vec3s { x: self.x - o.x, y: self.y - o.y, z: self.z - o.z }
+    }
+
+    /// Multiple.
+    #[inline(always)]
+    pub fn times(self, s: F<S>) -> Self {
+        Vec3s { x: self.x * s, y: self.y * s, z: self.z * s }
+    }
+
+    /// `x·self.x + y·self.y + z·self.z`.
+    #[inline(always)]
+    pub fn combine(self, x: Vec3, y: Vec3, z: Vec3) -> Self {
+        Vec3s {
+            x: self.x * x.x + self.y * y.x + self.z * z.x,
+            y: self.x * x.y + self.y * y.y + self.z * z.y,
+            z: self.x * x.z + self.y * y.z + self.z * z.z,
+        }
+    }
+
+    /// Multiplied by a matrix.
+    #[inline(always)]
+    pub fn transformed(self, m: &Mat3) -> Self {
+        self.combine(m.x_axis, m.y_axis, m.z_axis)
+    }
+
+    /// World to local.
+    #[inline(always)]
+    pub fn to_local(self, frame: &Frame) -> Self {
+        Vec3s { x: self.dot_splat(frame.x), y: self.dot_splat(frame.y), z: self.dot_splat(frame.z) }
+    }
+}
+
+/// `√max(x, 0)`.
+#[inline(always)]
+pub fn safe_sqrt<S: Simd>(x: F<S>) -> F<S> {
+    x.max(0.0).sqrt()
+}
+
+/// `v` where `keep`, else 0.
+#[inline(always)]
+pub fn or_zero<S: Simd>(keep: M<S>, v: F<S>) -> F<S> {
+    keep.select(v, F::splat(v.token(), 0.0))
+}
+
+/// sin x and cos x for |x| ≤ π/4, by Chebyshev interpolation; errors below 2⁻²⁴.
+#[inline(always)]
+pub fn sin_cos_eighth<S: Simd>(x: F<S>) -> (F<S>, F<S>) {
+    let x2 = x * x;
+    let sin = ((x2 * -1.951_528_96e-4 + 8.332_161_3e-3) * x2 - 1.666_665_46e-1) * x2 * x + x;
+    let cos = ((x2 * 2.443_315_71e-5 - 1.388_731_63e-3) * x2 + 4.166_664_57e-2) * x2 * x2 - x2 * 0.5 + 1.0;
+    (sin, cos)
+}
+
+/// sin 2πt and cos 2πt for |t| < 2²⁰; errors below 2⁻²³.
+#[inline(always)]
+pub fn sin_cos_turns<S: Simd>(t: F<S>) -> (F<S>, F<S>) {
+    // The nearest quarter turn, and what remains, which is exact.
+    let quarters = (t * 4.0).round_ties_even();
+    let (sin, cos) = sin_cos_eighth((t - quarters * 0.25) * TAU);
+    let k: I<S> = quarters.to_int();
+    let one = I::splat(t.token(), 1);
+    let is_odd = (k & one).simd_eq(one);
+    let (s, c) = (is_odd.select(cos, sin), is_odd.select(sin, cos));
+    let is_set = |k: I<S>| (k & 2).simd_eq(I::splat(t.token(), 2));
+    (is_set(k).select(-s, s), is_set(k + one).select(-c, c))
+}
+
+/// sin θ and cos θ for θ = (a + 1)π/4, |a| ≤ 1.
+#[inline(always)]
+pub fn sin_cos_quadrant<S: Simd>(a: F<S>) -> (F<S>, F<S>) {
+    let (s, c) = sin_cos_eighth(a * (FRAC_PI_2 * 0.5));
+    let scale = std::f32::consts::FRAC_1_SQRT_2;
+    ((c + s) * scale, (c - s) * scale)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::simd::test_support::{LENGTHS, assert_same_bits};
+    use fearless_simd::dispatch;
+
+    #[inline(always)]
+    fn run<S: Simd>(simd: S, t: &[f32], [s, c, qs, qc]: [&mut [f32]; 4]) {
+        for i in (0..t.len()).step_by(LANES) {
+            let v = load(simd, t, i);
+            let (sin, cos) = sin_cos_turns(v);
+            store(sin, s, i);
+            store(cos, c, i);
+            let (sin, cos) = sin_cos_quadrant(v.min(1.0).max(-1.0));
+            store(sin, qs, i);
+            store(cos, qc, i);
+        }
+    }
+
+    #[test]
+    fn sines_and_cosines_are_accurate_and_the_same_at_all_levels() {
+        for n in LENGTHS.into_iter().chain([4000]) {
+            let t: Vec<f32> = (0..n).map(|i| i as f32 / 1000.0 - 1.5).collect();
+            assert_same_bits::<4>(n, |level, out| {
+                let [s, c, qs, qc] = out;
+                dispatch!(level, simd => run(simd, &t, [&mut *s, &mut *c, &mut *qs, &mut *qc]));
+                for i in 0..n {
+                    let (sin, cos) = (f64::from(t[i]) * std::f64::consts::TAU).sin_cos();
+                    assert!(
+                        (f64::from(s[i]) - sin).abs() < 1.3e-7 && (f64::from(c[i]) - cos).abs() < 1.3e-7,
+                        "{}",
+                        t[i]
+                    );
+                    let a = f64::from(t[i].clamp(-1.0, 1.0));
+                    let (sin, cos) = ((a + 1.0) * std::f64::consts::FRAC_PI_4).sin_cos();
+                    assert!((f64::from(qs[i]) - sin).abs() < 2e-7 && (f64::from(qc[i]) - cos).abs() < 2e-7, "{}", t[i]);
+                }
+            });
+        }
+    }
+}
