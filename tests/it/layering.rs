@@ -10,7 +10,7 @@ const LAYERS: &[&[&str]] = &[
     &["textures", "geometry", "bsdfs", "cameras", "film"],
     &["materials", "lights", "accel"],
     &["scene"],
-    &["import", "direct", "photons"],
+    &["import", "direct", "photons", "procedural"],
     &["integrators"],
     &["render"],
     &["cli", "distributed", "reproduce"],
