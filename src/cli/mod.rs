@@ -6,6 +6,7 @@
 mod args;
 mod bench;
 mod crosscheck;
+mod generate;
 mod info;
 mod progress;
 mod render;
@@ -33,6 +34,8 @@ enum Command {
     Bench(bench::BenchArgs),
     /// Say what a scene holds, what it costs, and what of it was not understood
     Info(info::InfoArgs),
+    /// Make a statue or a sky to render
+    Generate(generate::GenerateArgs),
 }
 
 /// Parses the command line, runs, and says how it went.
@@ -43,6 +46,7 @@ pub fn run() -> ExitCode {
         Command::Crosscheck(args) => crosscheck::run(args),
         Command::Bench(args) => bench::run(args),
         Command::Info(args) => info::run(args),
+        Command::Generate(args) => generate::run(args),
     };
     match result {
         Ok(code) => code,
