@@ -54,7 +54,7 @@ pub fn parts() -> Vec<Part> {
         turned(&COLUMN, Relief::Shaft),
         turned(&CAPITAL, Relief::Strands { around: 16.0, height: 0.006 }),
         part(rocks(), Relief::Rock { height: 0.035 }, 0.02),
-        part(strokes(&body).collect(), Relief::Scales { around: 20.0, height: 0.1 }, 0.008),
+        part(strokes(&body).collect(), Relief::Scales { around: 20.0, height: 0.13 }, 0.008),
         part(spines(&body), Relief::Strands { around: 4.0, height: 0.002 }, 0.01),
         part(tail_tuft(&body), Relief::Strands { around: 5.0, height: 0.004 }, 0.012),
         part(mane(&body), Relief::Strands { around: 5.0, height: 0.004 }, 0.012),
@@ -167,11 +167,15 @@ fn spines(body: &[Knot]) -> Vec<Stroke> {
         if k.along < next || k.radius < 0.035 {
             continue;
         }
-        next = k.along + 0.46;
+        next = k.along + 0.5;
         let tangent = (k.center - body[i - 1].center).normalize();
         let at = |height: f32, back: f32| k.center + (k.dorsal * height - tangent * back) * k.radius;
-        let points =
-            [(at(0.8, -0.05), 0.26 * k.radius), (at(1.25, 0.1), 0.16 * k.radius), (at(1.55, 0.5), 0.035 * k.radius)];
+        let points = [
+            (at(0.8, -0.1), 0.28 * k.radius),
+            (at(1.3, 0.0), 0.19 * k.radius),
+            (at(1.65, 0.2), 0.11 * k.radius),
+            (at(1.85, 0.6), 0.025 * k.radius),
+        ];
         out.extend(limb(&points, tangent, 3));
     }
     out

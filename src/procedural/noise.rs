@@ -29,9 +29,10 @@ fn gradient(hash: u32, v: Vec3) -> f32 {
 
 /// Gradient noise: continuous to the second derivative, 0 at lattice points.
 pub fn noise(p: Vec3, seed: u32) -> f32 {
-    let cell = p.floor();
-    let f = p - cell;
-    let (x, y, z) = (cell.x as i32, cell.y as i32, cell.z as i32);
+    // `floor` is a call of a library where there is no SSE 4.1.
+    let floor = |x: f32| x as i32 - i32::from(x < 0.0);
+    let (x, y, z) = (floor(p.x), floor(p.y), floor(p.z));
+    let f = p - Vec3::new(x as f32, y as f32, z as f32);
     let w = f * f * f * (f * (f * 6.0 - 15.0) + 10.0);
     let corner = |i: i32, j: i32, k: i32| {
         let offset = Vec3::new(i as f32, j as f32, k as f32);

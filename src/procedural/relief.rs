@@ -1,6 +1,6 @@
 //! Carvings: heights above the surface of a solid, as functions of where on it one is.
 
-use super::noise::{fractal, ridged, smoothstep};
+use super::noise::{fractal, noise, ridged, smoothstep};
 use crate::math::Vec3;
 use std::f32::consts::{PI, TAU};
 
@@ -58,7 +58,7 @@ pub enum Relief {
 }
 
 /// Largest height of scales (units of space).
-const SCALE_LIMIT: f32 = 0.014;
+const SCALE_LIMIT: f32 = 0.019;
 /// Height of the weathering of all stone (units of space).
 const WEATHER: f32 = 0.0022;
 
@@ -96,8 +96,8 @@ impl Relief {
 
 /// Pits, and the unevenness of worked stone.
 fn weathering(p: Vec3) -> f32 {
-    let uneven = fractal(p * 26.0, 3, 77);
-    let pits = smoothstep(0.38, 0.62, fractal(p * 55.0 + 9.0, 2, 99));
+    let uneven = fractal(p * 26.0, 2, 77);
+    let pits = smoothstep(0.4, 0.65, noise(p * 60.0, 99));
     WEATHER * (0.6 * uneven - 0.4 * pits)
 }
 
@@ -138,7 +138,7 @@ fn scale(y: f32, x: f32) -> f32 {
     }
     let keel = 0.22 * (1.0 - x.abs()).max(0.0);
     let rim = 0.12 * smoothstep(0.22, 0.12, to_tip);
-    (0.18 + 0.5 * y / 2.1 + keel + rim) * smoothstep(0.0, 0.09, to_tip)
+    (0.1 + 0.62 * y / 2.1 + keel + rim) * smoothstep(0.0, 0.09, to_tip)
 }
 
 /// Relative place in `low..high`, if inside.
@@ -226,7 +226,7 @@ fn pedestal(spot: &Spot) -> f32 {
 
 /// A net of lozenges with a flower in each.
 fn shaft(spot: &Spot) -> f32 {
-    let (u, v) = (spot.angle * 9.0 / TAU, spot.along * 4.4);
+    let (u, v) = (spot.angle * 12.0 / TAU, spot.along * 5.6);
     let (p, q) = (u + v, u - v);
     let (fp, fq) = (p - p.round(), q - q.round());
     let to_edge = 0.5 - fp.abs().max(fq.abs());
@@ -258,7 +258,7 @@ mod tests {
         let mut stream = HashStream::new([1, 2, 3]);
         for relief in all {
             let (mut low, mut high) = (f32::INFINITY, f32::NEG_INFINITY);
-            for _ in 0..4000 {
+            for _ in 0..1500 {
                 let [z, u] = stream.next_2d();
                 let p = Vec3::new(stream.next_f32(), stream.next_f32(), z);
                 let spot = Spot { p, angle: TAU * u - PI, along: z, radius: 0.7 };

@@ -39,10 +39,10 @@ pub struct Ball {
 pub trait Field: Sync {
     /// What matters of the field in a ball.
     type Near;
-    /// Prepares for a ball.
-    fn near(&self, ball: Ball) -> Self::Near;
-    /// True or false if all of the ball, which is part of that of `near`, is certainly inside or outside.
-    fn is_inside(&self, near: &Self::Near, ball: Ball) -> Option<bool>;
+    /// Prepares for a ball, which lies in that of `wider`.
+    fn near(&self, wider: Option<&Self::Near>, ball: Ball) -> Self::Near;
+    /// True or false if all of the ball is certainly inside or outside.
+    fn is_inside(&self, near: &Self::Near) -> Option<bool>;
     /// The value at a point of the ball of `near`; a function of the point alone.
     fn value(&self, near: &Self::Near, p: Vec3) -> f32;
 }
@@ -149,9 +149,8 @@ pub fn mesh_field<F: Field>(field: &F, grid: &Grid) -> Result<TriangleMesh, Stri
 
 fn mesh_block<F: Field>(field: &F, grid: &Grid, cases: &[Case; 256], index: usize) -> Option<Block> {
     let first = grid.first_cell(index);
-    let ball = grid.ball(first, BLOCK);
-    let near = field.near(ball);
-    if field.is_inside(&near, ball).is_some() {
+    let wider = field.near(None, grid.ball(first, BLOCK));
+    if field.is_inside(&wider).is_some() {
         return None;
     }
 
@@ -163,7 +162,8 @@ fn mesh_block<F: Field>(field: &F, grid: &Grid, cases: &[Case; 256], index: usiz
     for leaf in 0..per_axis * per_axis * per_axis {
         let low = [leaf % per_axis, leaf / per_axis % per_axis, leaf / per_axis / per_axis].map(|l| l * LEAF);
         let origin = std::array::from_fn(|a| first[a] + low[a]);
-        if field.is_inside(&near, grid.ball(origin, LEAF)).is_some() {
+        let near = field.near(Some(&wider), grid.ball(origin, LEAF));
+        if field.is_inside(&near).is_some() {
             continue;
         }
         open.push(low);
@@ -406,18 +406,15 @@ pub(super) mod tests {
     }
 
     impl Field for Solid {
-        type Near = ();
-        fn near(&self, _: Ball) {}
-        fn is_inside(&self, (): &(), ball: Ball) -> Option<bool> {
-            match self {
-                Solid::Torus => {
-                    let d = self.value(&(), ball.center);
-                    (d.abs() > ball.radius).then_some(d < 0.0)
-                }
-                Solid::Noise => None,
-            }
+        type Near = Option<bool>;
+        fn near(&self, _: Option<&Option<bool>>, ball: Ball) -> Option<bool> {
+            let d = self.value(&None, ball.center);
+            (matches!(self, Solid::Torus) && d.abs() > ball.radius).then_some(d < 0.0)
         }
-        fn value(&self, (): &(), p: Vec3) -> f32 {
+        fn is_inside(&self, near: &Option<bool>) -> Option<bool> {
+            *near
+        }
+        fn value(&self, _: &Option<bool>, p: Vec3) -> f32 {
             match self {
                 Solid::Torus => (p.truncate().length() - 0.7).hypot(p.z) - 0.25,
                 Solid::Noise => (p.length() - 0.9).max(noise(p * 11.3, 1)),
@@ -463,7 +460,7 @@ pub(super) mod tests {
             let n = (b - a).cross(c - a).normalize();
             assert!(t.iter().all(|&v| mesh.normals[v as usize].dot(n) > 0.5));
         }
-        let off = mesh.positions().iter().map(|&p| Solid::Torus.value(&(), p).abs()).fold(0.0, f32::max);
+        let off = mesh.positions().iter().map(|&p| Solid::Torus.value(&None, p).abs()).fold(0.0, f32::max);
         assert!(off < 0.005, "{off}");
     }
 
