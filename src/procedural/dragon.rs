@@ -52,7 +52,7 @@ pub fn parts() -> Vec<Part> {
     let mut parts = vec![
         turned(&PEDESTAL, Relief::Pedestal),
         turned(&COLUMN, Relief::Shaft),
-        turned(&CAPITAL, Relief::Strands { around: 16.0, height: 0.006 }),
+        turned(&CAPITAL, Relief::Shaft),
         part(rocks(), Relief::Rock { height: 0.035 }, 0.02),
         part(strokes(&body).collect(), Relief::Scales { around: 20.0, height: 0.13 }, 0.008),
         part(spines(&body), Relief::Strands { around: 4.0, height: 0.002 }, 0.01),

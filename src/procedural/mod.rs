@@ -12,3 +12,4 @@ pub mod relief;
 pub mod sky;
 pub mod solids;
 pub mod statue;
+pub mod talbot;

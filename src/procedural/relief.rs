@@ -48,7 +48,7 @@ pub enum Relief {
     },
     /// The bands of the pedestal.
     Pedestal,
-    /// The shaft between the coils.
+    /// The shaft between the coils, and its capital.
     Shaft,
     /// Rock.
     Rock {
@@ -174,18 +174,18 @@ fn beads(angle: f32, count: f32, t: f32, aspect: f32) -> f32 {
 
 /// A key pattern, one bit for each square of a period.
 const KEY: [u16; 9] = [
-    0b1_1111_1111_111,
-    0b0_0000_0000_001,
-    0b0_1111_1111_101,
-    0b0_1000_0000_101,
-    0b0_1011_1110_101,
-    0b0_1010_0010_101,
-    0b0_1011_1010_101,
-    0b0_1000_0010_101,
-    0b1_1111_1110_111,
+    0b1111_1111_1111,
+    0b0000_0000_0001,
+    0b0111_1111_1101,
+    0b0100_0000_0101,
+    0b0101_1111_0101,
+    0b0101_0001_0101,
+    0b0101_1101_0101,
+    0b0100_0001_0101,
+    0b1111_1111_0111,
 ];
 /// Squares of the key pattern across its period.
-const KEY_WIDTH: f32 = 13.0;
+const KEY_WIDTH: f32 = 12.0;
 
 /// The key pattern, softened at the borders of squares: 0..1.
 fn key(x: f32, t: f32) -> f32 {
@@ -206,6 +206,9 @@ fn key(x: f32, t: f32) -> f32 {
 /// The bands of the pedestal by height; [`super::dragon`] turns its profile.
 fn pedestal(spot: &Spot) -> f32 {
     let (a, z) = (spot.angle, spot.along);
+    if z > 0.445 {
+        return within(spot.radius, 0.6, 0.9).map_or(0.0, |t| 0.02 * petals(a, 36.0, t));
+    }
     if spot.radius < 0.5 {
         return 0.0;
     }
@@ -224,8 +227,14 @@ fn pedestal(spot: &Spot) -> f32 {
     0.0
 }
 
-/// A net of lozenges with a flower in each.
+/// A net of lozenges with a flower in each, between plain mouldings; petals on the capital.
 fn shaft(spot: &Spot) -> f32 {
+    if let Some(t) = within(spot.along, 2.125, 2.262) {
+        return 0.016 * petals(spot.angle, 18.0, t);
+    }
+    if !(0.6..2.01).contains(&spot.along) {
+        return 0.0;
+    }
     let (u, v) = (spot.angle * 12.0 / TAU, spot.along * 5.6);
     let (p, q) = (u + v, u - v);
     let (fp, fq) = (p - p.round(), q - q.round());

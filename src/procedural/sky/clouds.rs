@@ -51,7 +51,7 @@ impl Clouds {
     /// The clouds in the direction `w` (up) before `behind`; `air` is what distance turns them into.
     pub fn over(&self, w: Vec3, behind: Rgb, air: Rgb) -> Rgb {
         let p = w.truncate() / w.z.max(0.02);
-        let depth = self.depth(p);
+        let depth = self.depth(p) * smoothstep(0.03, 0.2, w.z);
         if depth <= 0.0 {
             return behind;
         }
@@ -62,7 +62,7 @@ impl Clouds {
             + self.sky * 0.8;
         let through = (-depth).exp();
         let cloud = behind * through + light * (1.0 - through);
-        let near = smoothstep(0.0, 0.22, w.z);
+        let near = smoothstep(0.0, 0.3, w.z);
         // Far clouds take the colour of the air but still hide the sun.
         (air * (1.0 - through) + behind * through).lerp(cloud, near)
     }

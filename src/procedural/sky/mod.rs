@@ -163,7 +163,7 @@ impl Sky {
             let z = (((i / columns) as f32 + 0.5) / rows as f32).sqrt();
             let (sin, cos) = (TAU * ((i % columns) as f32 + 0.5) / columns as f32).sin_cos();
             let r = (1.0 - z * z).sqrt();
-            sum = sum + self.clear(Vec3::new(r * cos, r * sin, z)) * (PI / (rows * columns) as f32);
+            sum += self.clear(Vec3::new(r * cos, r * sin, z)) * (PI / (rows * columns) as f32);
         }
         sum
     }
@@ -333,7 +333,7 @@ mod tests {
                 Image::new(resolution, resolution, &["R", "G", "B"]),
             );
             for (image, radius) in [(&mut with, 1.0), (&mut without, 0.0)] {
-                sky.sun_disc.profile.iter_mut().for_each(|c| *c = *c * radius);
+                sky.sun_disc.profile.iter_mut().for_each(|c| *c *= radius);
                 for y in 0..resolution {
                     for x in 0..resolution {
                         if direction(x as f32 + 0.5, y as f32 + 0.5, resolution).dot(sky.to_sun) > 0.9 {
