@@ -80,7 +80,8 @@ fn sky(size: [usize; 2], mapping: EnvironmentMapping, filter: EnvironmentFilter)
 }
 
 fn quad(triangles: &[[u32; 3]]) -> Shape {
-    let p = [Vec3::new(-1.0, 2.0, -1.0), Vec3::new(2.0, 2.0, -1.0), Vec3::new(2.0, 2.0, 1.0), Vec3::new(-1.0, 2.0, 1.0)];
+    let p =
+        [Vec3::new(-1.0, 2.0, -1.0), Vec3::new(2.0, 2.0, -1.0), Vec3::new(2.0, 2.0, 1.0), Vec3::new(-1.0, 2.0, 1.0)];
     Shape::Mesh(TriangleMesh::new(p.to_vec(), triangles.to_vec()).expect("indices are in range"))
 }
 

@@ -6,6 +6,7 @@
 mod args;
 mod bench;
 mod crosscheck;
+mod generate;
 mod info;
 mod progress;
 mod render;
@@ -36,6 +37,8 @@ enum Command {
     Info(info::InfoArgs),
     /// Render and measure the figures of a paper again, as a page with pictures
     Reproduce(reproduce::ReproduceArgs),
+    /// Make a statue or a sky to render
+    Generate(generate::GenerateArgs),
 }
 
 /// Parses the command line, runs, and says how it went.
@@ -47,6 +50,7 @@ pub fn run() -> ExitCode {
         Command::Bench(args) => bench::run(args),
         Command::Info(args) => info::run(args),
         Command::Reproduce(args) => reproduce::run(args),
+        Command::Generate(args) => generate::run(args),
     };
     match result {
         Ok(code) => code,

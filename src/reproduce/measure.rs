@@ -12,10 +12,11 @@ use crate::estimators::stats::{Welford, z_test};
 use crate::film::Film;
 use crate::film::filter::PixelFilter;
 use crate::import::{LoadOptions, load};
+use crate::render::plan::prepare;
 use crate::render::{RenderSettings, Rendering, render};
 use crate::samplers::SamplerKind;
 use crate::scene::{
-    AccelKind, EstimatorKind, IntegratorKind, IntegratorSettings, ProposalPoints, Proposals, Strata, World,
+    AccelKind, EstimatorKind, IntegratorKind, IntegratorSettings, ProposalPoints, Proposals, StageTimes, Strata, World,
 };
 use rustix::time::{ClockId, clock_gettime};
 use serde::Serialize;
@@ -35,6 +36,8 @@ pub struct Method {
     pub proposals: u32,
     /// Samples over proposals, for `ris`.
     pub strata: Strata,
+    /// True if `ris` shares the time of an estimate out between M and N in each pixel as [`Stage::plan_per_pixel`] found out.
+    pub per_pixel: bool,
     /// True if samples, or the proposals of `ris`, are well distributed over the lights and over the camera rays of a pixel;
     /// otherwise all random numbers are independent.
     pub stratified: bool,
@@ -44,7 +47,7 @@ impl Method {
     /// Light sampling with independent random numbers.
     pub fn mc(samples: u32) -> Self {
         let estimator = EstimatorKind::Mc;
-        Method { estimator, samples, proposals: samples, strata: Strata::None, stratified: false }
+        Method { estimator, samples, proposals: samples, strata: Strata::None, per_pixel: false, stratified: false }
     }
 
     /// Light and BSDF sampling with independent random numbers.
@@ -79,7 +82,8 @@ impl Method {
             heuristic: None,
             ..old
         };
-        scene.integrator.ris.proposals = Proposals::Fixed(self.proposals);
+        scene.integrator.ris.proposals =
+            if self.per_pixel { Proposals::Optimal } else { Proposals::Fixed(self.proposals) };
         scene.integrator.ris.strata = self.strata;
         scene.integrator.ris.points =
             if self.stratified { ProposalPoints::Stratified } else { ProposalPoints::Independent };
@@ -134,9 +138,9 @@ pub enum View {
 }
 
 impl Stage {
-    /// Loads a scene for a picture of `size` × `size` pixels.
-    pub fn load(path: &Path, size: u32, threads: Option<usize>) -> Result<Self, ReproduceError> {
-        let options = LoadOptions { resolution: Some([size, size]), crop: None };
+    /// Loads a scene for a picture of `size` (width, height) pixels.
+    pub fn load(path: &Path, size: [u32; 2], threads: Option<usize>) -> Result<Self, ReproduceError> {
+        let options = LoadOptions { resolution: Some(size), crop: None };
         let loaded = load(path, &options).map_err(|report| ReproduceError::Scene { path: path.to_owned(), report })?;
         let mut world = World::new(loaded.scene, AccelKind::Embree, None)?;
         let cast = Arc::new(AtomicBool::new(true));
@@ -155,6 +159,23 @@ impl Stage {
     pub fn facts(&self) -> (usize, usize) {
         let scene = &self.world.scene;
         (scene.geometry.primitive_counts().0, scene.lights.lights.len())
+    }
+
+    /// Finds out how each pixel best shares the time of an estimate out between proposals and samples, by the renderer's own
+    /// pilot. The answer is M/N of every pixel, and the processor time that it took (s).
+    pub fn plan_per_pixel(&mut self, times: StageTimes, budget: f64) -> Result<(Vec<f32>, f64), ReproduceError> {
+        let start = processor_time();
+        // The pilot asks for a number of samples; half of the time is for proposals
+        let samples = (0.5 * budget / times.t2).round().max(1.0) as u32;
+        Method { per_pixel: true, ..Method::ris(samples, samples) }.apply(&mut self.world);
+        self.world.scene.film.filter = PixelFilter::Box { rx: CENTRE, ry: CENTRE };
+        self.world.scene.integrator.ris.stage_times = Some(times);
+        self.shadows.store(true, Ordering::Relaxed);
+        prepare(&mut self.world, self.threads, false)?;
+        let seconds = processor_time().saturating_sub(start).as_secs_f64();
+        let Some(map) = &mut self.world.splits else { return Ok((Vec::new(), seconds)) };
+        map.time = budget;
+        Ok((map.ratios.clone(), seconds))
     }
 
     /// Renders `spp` camera rays per pixel.

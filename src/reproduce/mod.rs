@@ -52,6 +52,9 @@ pub enum ReproduceError {
         /// Errors and warnings.
         report: Box<crate::import::diagnostic::Report>,
     },
+    /// A scene could not be made.
+    #[error(transparent)]
+    Procedural(#[from] crate::procedural::talbot::ProceduralError),
     /// A ray tracer could not be built.
     #[error("cannot build a ray tracer: {0}")]
     Accel(#[from] crate::accel::embree::EmbreeError),

@@ -91,7 +91,14 @@ impl AreaSampler {
 
     /// Directions to the points `p` of normal `n`, with densities per steradian `pdf`, or per area if `by_area`.
     #[inline(always)]
-    fn finish<S: Simd>(&self, p: Vec3s<S>, n: Vec3s<S>, pdf: f32, by_area: bool, (i, out): (usize, &mut LightLanes<'_>)) {
+    fn finish<S: Simd>(
+        &self,
+        p: Vec3s<S>,
+        n: Vec3s<S>,
+        pdf: f32,
+        by_area: bool,
+        (i, out): (usize, &mut LightLanes<'_>),
+    ) {
         let simd = p.x.token();
         let zero = F::splat(simd, 0.0);
         let d = p.minus(Vec3s::splat(simd, self.from));
@@ -258,7 +265,8 @@ fn sin_cos_turns_f64<S: Simd>(t: f64x4<S>) -> (f64x4<S>, f64x4<S>) {
     let quarters = (t * 4.0).round_ties_even();
     let x = (t - quarters * 0.25) * TAU;
     let x2 = x * x;
-    let sin = (((((x2 * (1.0 / 6_227_020_800.0) - 1.0 / 39_916_800.0) * x2 + 1.0 / 362_880.0) * x2 - 1.0 / 5040.0) * x2
+    let sin = (((((x2 * (1.0 / 6_227_020_800.0) - 1.0 / 39_916_800.0) * x2 + 1.0 / 362_880.0) * x2 - 1.0 / 5040.0)
+        * x2
         + 1.0 / 120.0)
         * x2
         - 1.0 / 6.0)

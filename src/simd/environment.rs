@@ -5,8 +5,8 @@
 
 use super::lane::{F, I, LANES, Vec3s, load, or_zero, safe_sqrt, sin_cos_quadrant, sin_cos_turns, store};
 use super::light::LightLanes;
-use crate::math::sphere_map::pdf_equal_area_square_to_sphere;
 use crate::math::distribution::{Running, STEP, clamped};
+use crate::math::sphere_map::pdf_equal_area_square_to_sphere;
 use crate::math::{Mat3, PiecewiseConstant2D};
 use fearless_simd::{Level, Simd, dispatch, f32x4, f32x8, prelude::*};
 use std::f32::consts::{PI, TAU};
@@ -130,8 +130,13 @@ impl Environment<'_> {
         for start in (0..n).step_by(CHUNK) {
             let count = CHUNK.min(n - start);
             let places = self.places(simd, start, count, u);
-            let mut lookups =
-                Lookups { cell: [0; CHUNK], first: [0; CHUNK], dx: [0.0; CHUNK], dy: [0.0; CHUNK], density: [0.0; CHUNK] };
+            let mut lookups = Lookups {
+                cell: [0; CHUNK],
+                first: [0; CHUNK],
+                dx: [0.0; CHUNK],
+                dy: [0.0; CHUNK],
+                density: [0.0; CHUNK],
+            };
             for i in (0..count).step_by(LANES) {
                 self.directions(simd, &places, i, &mut lookups, (&mut out.wi, start + i));
             }

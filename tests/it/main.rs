@@ -8,3 +8,4 @@ mod crosscheck;
 mod estimators_1d;
 mod layering;
 mod mutations;
+mod reproduce;

@@ -6,7 +6,7 @@ use super::super::{Observer, ReproduceError};
 use super::classes::Classes;
 use super::report;
 use super::scenes::Which;
-use super::{Figure, Setup};
+use super::{Figure, Setup, portrait};
 use crate::scene::{Split, Strata};
 use std::time::{Duration, Instant};
 
@@ -156,11 +156,12 @@ pub struct Outcome<'a> {
     pub measured: Vec<Measured>,
     pub reference: Vec<[f64; 3]>,
     pub classes: Classes,
-    /// The baseline and the best method with rays all over the pixels.
-    pub pair: Vec<Measured>,
+    /// The baseline, the best method, and the baseline with stratified samples where there is one, with rays all over the
+    /// pixels.
+    pub antialiased: Vec<Measured>,
 }
 
-/// Turns of the antialiased pair, for its variance.
+/// Turns of the antialiased pictures, for their variance.
 const PAIR_TURNS: u32 = 2;
 /// Edge of the picture on which times are found out, and the least edge.
 const PILOT_SIZE: u32 = 96;
@@ -180,33 +181,37 @@ pub fn run(setup: &Setup<'_>, case: &Case, time: Duration) -> Result<Figure, Rep
 
     // As many pixels as fit
     let pilot_size = setup.size.min(PILOT_SIZE);
-    let mut stage = Stage::load(&path, pilot_size, setup.options.threads)?;
+    let mut stage = Stage::load(&path, portrait(pilot_size), setup.options.threads)?;
     let mut calibration = calibrate(&mut stage, &base, setup.observer)?;
     let count = methods(case, calibration.split).0.len() as f64;
     let cost = |c: &Calibration| c.seconds * f64::from(case.primary) * 1.1;
-    let pair = 2.0 * f64::from(PAIR_TURNS);
-    let wanted = cost(&calibration) * (WANTED_TURNS * count + pair);
+    let antialiased = 3.0 * f64::from(PAIR_TURNS);
+    let wanted = cost(&calibration) * (WANTED_TURNS * count + antialiased);
     let fits = (time.saturating_sub(start.elapsed()).as_secs_f64() / wanted).sqrt();
     let size = ((f64::from(pilot_size) * fits) as u32 / 8 * 8).max(LEAST_SIZE).min(setup.size);
     if size != pilot_size {
-        stage = Stage::load(&path, size, setup.options.threads)?;
+        stage = Stage::load(&path, portrait(size), setup.options.threads)?;
         calibration = calibrate(&mut stage, &base, setup.observer)?;
     }
 
     // As many turns as fit
     let (named, roles) = methods(case, calibration.split);
     let list: Vec<Method> = named.iter().map(|n| n.method).collect();
-    let left = time.saturating_sub(start.elapsed()).as_secs_f64() / cost(&calibration) - pair;
+    let left = time.saturating_sub(start.elapsed()).as_secs_f64() / cost(&calibration) - antialiased;
     let count_turns = ((left / count) as u32).clamp(TURNS[0], TURNS[1]);
     let Split { samples, proposals } = calibration.split;
-    say(&format!("  {size} × {size} pixels, {count_turns} turns of {count} methods, M = {proposals}, N = {samples}"));
+    let [width, height] = stage.size();
+    say(&format!(
+        "  {width} × {height} pixels, {count_turns} turns of {count} methods, M = {proposals}, N = {samples}"
+    ));
     let measured = turns(&mut stage, &list, View::Centres, case.primary, 0..count_turns, setup.observer)?;
 
     let reference = reference(&measured);
     let classes = Classes::new(&mut stage, &reference, setup.observer)?;
-    let two = [list[roles.base], list[roles.best]];
+    let chosen: Vec<Method> =
+        [roles.base, roles.best].into_iter().chain(roles.base_stratified).map(|i| list[i]).collect();
     let range = TURNS[1]..TURNS[1] + PAIR_TURNS;
-    let pair = turns(&mut stage, &two, View::Antialiased, case.primary, range, setup.observer)?;
+    let antialiased = turns(&mut stage, &chosen, View::Antialiased, case.primary, range, setup.observer)?;
     let outcome = Outcome {
         case,
         stage_facts: stage.facts(),
@@ -217,7 +222,7 @@ pub fn run(setup: &Setup<'_>, case: &Case, time: Duration) -> Result<Figure, Rep
         measured,
         reference,
         classes,
-        pair,
+        antialiased,
     };
     report::comparison(setup, &outcome)
 }

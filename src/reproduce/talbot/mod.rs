@@ -58,6 +58,11 @@ struct Setup<'a> {
     size: u32,
 }
 
+/// Width and height of a picture of the statue whose longer edge has `size` pixels.
+fn portrait(size: u32) -> [u32; 2] {
+    [(size * 3 / 4).max(1), size]
+}
+
 /// Renders all figures and writes `index.html` and `talbot.json`; the answer is the page.
 pub fn run(options: &Options, observer: Observer<'_>) -> Result<PathBuf, ReproduceError> {
     let quick = usize::from(options.quick);

@@ -11,7 +11,7 @@ use super::super::{Observer, ReproduceError};
 use super::classes::{Classes, NAMES};
 use super::report::{estimate_json, method_json, plus_minus};
 use super::scenes::Which;
-use super::{Figure, Setup, Summary};
+use super::{Figure, Setup, Summary, portrait};
 use crate::estimators::ris::choice::{Costs, Variances, clamp_ratio, optimal_ratio};
 use crate::scene::{Split, StageTimes};
 use serde_json::json;
@@ -78,8 +78,11 @@ struct Outcome {
     splits: Vec<Split>,
     /// Camera rays per pixel of a turn.
     spp: u32,
-    /// The sweep, `auto`, one proposal, one sample of many.
+    /// The sweep, `auto`, the best of each pixel by the renderer's pilot, one proposal, one sample of many.
     measured: Vec<Measured>,
+    /// M/N of each pixel by the renderer's pilot, and the processor time of the pilot (s).
+    pilot: Vec<f32>,
+    pilot_seconds: f64,
     classes: Classes,
     terms: Terms,
 }
@@ -99,6 +102,10 @@ impl Outcome {
         &self.measured[self.splits.len()]
     }
 
+    fn per_pixel(&self) -> &Measured {
+        &self.measured[self.splits.len() + 1]
+    }
+
     /// Position in the sweep of the least variance at equal time; after the last for `auto`.
     fn best(&self, mask: Option<&[bool]>) -> usize {
         let value = |m: &Measured| m.at_equal_time(&self.measured[0], mask).value;
@@ -114,7 +121,7 @@ pub fn run(setup: &Setup<'_>, time: Duration) -> Result<Figure, ReproduceError> 
     say("Paper, figure 3: proposals per sample …");
     let path = setup.scenes.path(Which::Both);
     let base = Method::ris(BASE, BASE);
-    let mut stage = Stage::load(&path, setup.size, setup.options.threads)?;
+    let mut stage = Stage::load(&path, portrait(setup.size), setup.options.threads)?;
     let calibration = calibrate(&mut stage, &base, setup.observer)?;
     let mut splits: Vec<Split> = vec![Split { samples: BASE, proposals: BASE }];
     for n in SAMPLES {
@@ -125,7 +132,9 @@ pub fn run(setup: &Setup<'_>, time: Duration) -> Result<Figure, ReproduceError> 
     }
     let of = |s: &Split| Method::ris(s.proposals, s.samples);
     let mut methods: Vec<Method> = splits.iter().map(of).collect();
-    methods.extend([of(&calibration.split), Method::ris(1, 1), Method::ris(MANY, 1)]);
+    let per_pixel = Method { per_pixel: true, ..of(&calibration.split) };
+    methods.extend([of(&calibration.split), per_pixel, Method::ris(1, 1), Method::ris(MANY, 1)]);
+    let (pilot, pilot_seconds) = stage.plan_per_pixel(calibration.times, calibration.budget)?;
 
     // Turns, and camera rays per turn, that fit
     let turn = calibration.seconds * 1.1 * methods.len() as f64;
@@ -137,7 +146,7 @@ pub fn run(setup: &Setup<'_>, time: Duration) -> Result<Figure, ReproduceError> 
     let classes = Classes::new(&mut stage, &reference(&measured), setup.observer)?;
     let [one, many] = [2, 1].map(|k| &measured[measured.len() - k]);
     let terms = Terms::new(one, many, spp, stage.size());
-    let outcome = Outcome { calibration, splits, spp, measured, classes, terms };
+    let outcome = Outcome { calibration, splits, spp, measured, pilot, pilot_seconds, classes, terms };
 
     let mut blocks = vec![Block::Text(format!(
         "Resampling without stratification at the time of M = N = {BASE}, for different M/N. More proposals help where the \
@@ -170,14 +179,18 @@ fn pictures(setup: &Setup<'_>, stage: &mut Stage, o: &Outcome) -> Result<Vec<Blo
     let (costs, time) = o.costs();
     let ratios = o.terms.ratios(costs, time);
     let scale = Scale::new(RED_GREEN, 1.0, clamp_ratio(f64::INFINITY, costs, time).max(2.0));
-    let colors: Vec<f32> =
-        ratios.iter().flat_map(|k| k.map_or([0.0; 3], |k| scale.color(k)).map(|c| (c / 255.0) as f32)).collect();
-    let file = Picture::from_display(size, colors).write(&setup.options.out, "figure-3-map")?;
-    shown.push(Shown {
-        file,
-        title: "best M/N of every pixel".to_owned(),
-        caption: "green: more proposals; red: more samples; black: no variance".to_owned(),
-    });
+    let of_pilot: Vec<Option<f64>> =
+        ratios.iter().zip(&o.pilot).map(|(measured, &k)| measured.map(|_| f64::from(k))).collect();
+    for (name, title, map) in [
+        ("map", "best M/N of every pixel, from the variances measured here", &ratios),
+        ("pilot", "best M/N of every pixel, by the renderer's pilot", &of_pilot),
+    ] {
+        let color = |k: &Option<f64>| k.map_or([0.0; 3], |k| scale.color(k)).map(|c| (c / 255.0) as f32);
+        let colors = map.iter().flat_map(color).collect();
+        let file = Picture::from_display(size, colors).write(&setup.options.out, &format!("figure-3-{name}"))?;
+        let caption = "green: more proposals; red: more samples; black: no variance".to_owned();
+        shown.push(Shown { file, title: title.to_owned(), caption });
+    }
     let [p, q]: [Vec<f64>; 2] =
         [|v: &Variances| v.proposals, |v: &Variances| v.samples].map(|f| o.terms.0.iter().map(f).collect());
     let heat = Scale::of_values(HEAT, &p);
@@ -206,13 +219,18 @@ fn tables(o: &Outcome) -> Vec<Block> {
     let mut table = Table::new(&header);
     let base = &o.measured[0];
     let auto = (o.calibration.split, o.auto());
-    let rows = o.splits.iter().copied().zip(o.sweep()).chain([auto]).enumerate();
-    for (i, (split, m)) in rows {
+    let rows = o.splits.iter().copied().zip(o.sweep()).chain([auto, (o.calibration.split, o.per_pixel())]);
+    for (i, (split, m)) in rows.enumerate() {
         let name = if i == o.splits.len() { " (auto)" } else { "" };
+        let numbers = match m.method.per_pixel {
+            true => ["per pixel".to_owned(), String::new(), String::new()],
+            false => [format!("{}{name}", split.proposals), split.samples.to_string(), significant(ratio_of(&split))],
+        };
+        let [proposals, samples, ratio] = numbers;
         let mut cells = vec![
-            Cell::text(format!("{}{name}", split.proposals)),
-            Cell::number(split.samples.to_string()),
-            Cell::number(significant(ratio_of(&split))),
+            Cell::text(proposals),
+            Cell::number(samples),
+            Cell::number(ratio),
             Cell::number(format!("{:.3}", m.time_ratio(base))),
             Cell::number(plus_minus(m.at_equal_time(base, None))),
         ];
@@ -229,7 +247,12 @@ fn tables(o: &Outcome) -> Vec<Block> {
     }
     let point = [ratio_of(&o.calibration.split), o.auto().at_equal_time(base, None).value];
     let chart = chart.with("auto, all pixels", vec![point]);
-    vec![Block::Table(table), Block::Chart(chart)]
+    let note = format!(
+        "Per pixel: M and N by the variances that the renderer's pilot found, which took {} processor seconds once, not \
+         counted above.",
+        significant(o.pilot_seconds)
+    );
+    vec![Block::Table(table), Block::Note(note), Block::Chart(chart)]
 }
 
 fn figure(o: &Outcome, size: [u32; 2], blocks: Vec<Block>) -> Figure {
@@ -259,9 +282,11 @@ fn figure(o: &Outcome, size: [u32; 2], blocks: Vec<Block>) -> Figure {
         ),
         reached: excess <= TARGET,
         reason: format!(
-            "best M/N of the sweep by class: {}; the best M/N of every pixel would have {:.2} × the variance of auto",
+            "best M/N of the sweep by class: {}; the best M/N of every pixel would have {:.2} × the variance of auto, the \
+             pilot's has {:.2} ×",
             best_of.join(", "),
-            of_best / of_auto.max(1e-300)
+            of_best / of_auto.max(1e-300),
+            o.per_pixel().at_equal_time(o.auto(), None).value
         ),
     };
     let names: Vec<String> = (0..o.measured.len()).map(|i| o.name(i)).collect();
@@ -270,7 +295,7 @@ fn figure(o: &Outcome, size: [u32; 2], blocks: Vec<Block>) -> Figure {
         "size": size, "camera_rays_per_turn": o.spp, "turns": base.turns(),
         "t1_ns": costs.t1, "t2_ns": costs.t2, "budget_ns": time,
         "auto_over_best": excess, "auto": estimate_json(auto), "best": estimate_json(least),
-        "best_per_pixel_over_auto_predicted": of_best / of_auto.max(1e-300),
+        "pilot_seconds": o.pilot_seconds, "best_per_pixel_over_auto_predicted": of_best / of_auto.max(1e-300),
         "methods": rows,
     });
     Figure {
@@ -285,8 +310,11 @@ fn figure(o: &Outcome, size: [u32; 2], blocks: Vec<Block>) -> Figure {
 impl Outcome {
     fn name(&self, i: usize) -> String {
         let n = self.splits.len();
-        let role = if i == n { "auto: " } else { "" };
         let m = self.measured[i].method;
+        if m.per_pixel {
+            return "per pixel".to_owned();
+        }
+        let role = if i == n { "auto: " } else { "" };
         format!("{role}M = {}, N = {}", m.proposals, m.samples)
     }
 }

@@ -79,13 +79,14 @@ pub fn comparison(setup: &Setup<'_>, o: &Outcome<'_>) -> Result<Figure, Reproduc
     };
     let rows: Vec<Value> =
         o.methods.iter().zip(&o.measured).map(|(n, m)| method_json(&n.name, m, base, &o.classes)).collect();
-    let pair: Vec<Value> = o.pair.iter().map(|m| method_json("antialiased", m, &o.pair[0], &o.classes)).collect();
+    let antialiased: Vec<Value> =
+        o.antialiased.iter().map(|m| method_json("antialiased", m, &o.antialiased[0], &o.classes)).collect();
     let numbers = json!({
         "size": o.size, "camera_rays": o.case.primary, "turns": base.turns(),
         "t1_ns": o.calibration.times.t1, "t2_ns": o.calibration.times.t2, "budget_ns": o.calibration.budget,
         "proposals": proposals, "samples": samples,
         "visibility_share_of_ris": visibility(o).1, "visibility_bound": visibility(o).0,
-        "methods": rows, "antialiased_pair": pair,
+        "methods": rows, "antialiased": antialiased,
     });
     Ok(Figure { id: o.case.id, title: o.case.title, summary, blocks, numbers })
 }
@@ -120,6 +121,12 @@ fn reduction(o: &Outcome<'_>, paper: f64, target: f64) -> Summary {
             "; stratified samples alone give mc {}, and against that it is {}",
             percent(at(stratified)),
             percent(over)
+        );
+        let [base, best, stratified] = [0, 1, 2].map(|k| &o.antialiased[k]);
+        reason += &format!(
+            "; with antialiasing it is {} against mc, {} against mc with stratified samples",
+            percent(best.at_equal_time(base, None)),
+            percent(best.at_equal_time(stratified, None))
         );
     }
     reason += &format!("; visibility is {:.0} % of the variance of unstratified ris", share * 100.0);
@@ -171,10 +178,10 @@ fn pictures(setup: &Setup<'_>, o: &Outcome<'_>) -> Result<Vec<Block>, ReproduceE
     let reference: Vec<[f32; 3]> = o.reference.iter().map(|p| p.map(|v| v as f32)).collect();
     let exposure = gain(&reference);
     let chosen = [o.roles.base, o.roles.best];
-    let base_seconds = o.pair[0].seconds[0].processor;
+    let base_seconds = o.antialiased[0].seconds[0].processor;
     let mut shown = Vec::new();
     for (k, &i) in chosen.iter().enumerate() {
-        let m = &o.pair[k];
+        let m = &o.antialiased[k];
         let Split { samples, proposals } = Split { samples: m.method.samples, proposals: m.method.proposals };
         let file = Picture::tone_mapped(o.size, &m.first, exposure).write(out, &format!("{id}-{k}"))?;
         let seconds = m.seconds[0].processor;
