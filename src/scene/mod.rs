@@ -6,6 +6,7 @@ mod world;
 
 pub use world::{AccelKind, EmitterHit, World};
 
+use crate::bsdfs::ProposalDensity;
 use crate::cameras::Camera;
 use crate::estimators::mis::Heuristic;
 use crate::film::PixelBounds;
@@ -90,6 +91,11 @@ pub struct IntegratorSettings {
     pub heuristic: Heuristic,
     /// How a light is chosen.
     pub light_choice: LightSamplerKind,
+    /// Directions proposed for each that continues a path (M), where the BSDF is one that can only be evaluated; 1 is
+    /// plain importance sampling.
+    pub bsdf_proposals: u32,
+    /// Density that proposes them.
+    pub bsdf_density: ProposalDensity,
 }
 
 impl Default for IntegratorSettings {
@@ -101,6 +107,8 @@ impl Default for IntegratorSettings {
             samples: 2,
             heuristic: Heuristic::Power,
             light_choice: LightSamplerKind::Tree,
+            bsdf_proposals: 4,
+            bsdf_density: ProposalDensity::Lobes,
         }
     }
 }

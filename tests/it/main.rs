@@ -5,5 +5,6 @@ mod analytic_scenes;
 mod bit_exact;
 mod cli;
 mod crosscheck;
+mod evaluated;
 mod layering;
 mod mutations;

@@ -3,6 +3,7 @@
 use super::directive::Name;
 use super::params::ParamSet;
 use super::transform::{Ctm, affine};
+use crate::bsdfs::ProposalDensity;
 use crate::cameras::{Camera, SphericalMapping, default_screen_window};
 use crate::estimators::mis::Heuristic;
 use crate::import::LoadOptions;
@@ -298,13 +299,18 @@ fn lumiris_parameters(s: &mut IntegratorSettings, p: &ParamSet, d: &mut Diagnost
             _ => LightSamplerKind::Tree,
         };
     }
-    match p.integer("samples", d) {
-        Some(n @ 1..=4096) => s.samples = n as u32,
+    if let Some(i) = choice("bsdfdensity", &ProposalDensity::ALL.map(ProposalDensity::name)) {
+        s.bsdf_density = ProposalDensity::ALL[i];
+    }
+    let mut count = |key: &'static str, value: &mut u32| match p.integer(key, d) {
+        Some(n @ 1..=4096) => *value = n as u32,
         Some(n) => {
-            d.error(p.span_of("samples"), format!("samples must be from 1 to 4096, not {n}"));
+            d.error(p.span_of(key), format!("{key} must be from 1 to 4096, not {n}"));
         }
         None => {}
-    }
+    };
+    count("samples", &mut s.samples);
+    count("bsdfproposals", &mut s.bsdf_proposals);
 }
 
 /// A positive number, or the default after an error.
