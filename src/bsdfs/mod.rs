@@ -4,7 +4,7 @@
 //!
 //! Reading order: [`fresnel`], [`microfacet`], [`diffuse`], [`diffuse_transmission`], [`conductor`], [`dielectric`],
 //! [`thin_dielectric`], [`coat_table`], [`coated_diffuse`], [`layered`]; then what can only be evaluated: [`models`],
-//! [`default_lobes`], [`evaluated`], [`resample`], [`sphere_study`].
+//! [`default_lobes`], [`evaluated`], [`mod@resample`], [`sphere_study`].
 
 pub mod coat_table;
 pub mod coated_diffuse;

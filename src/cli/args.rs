@@ -1,5 +1,6 @@
 //! Options that several subcommands share, as typed.
 
+use crate::bsdfs::ProposalDensity;
 use crate::estimators::mis::Heuristic;
 use crate::lights::LightSamplerKind;
 use crate::render::output::Aov;
@@ -71,6 +72,10 @@ choices!(
     LightChoiceArg => LightSamplerKind { Uniform => LightSamplerKind::Uniform, Power => LightSamplerKind::Power, Tree => LightSamplerKind::Tree }
 );
 choices!(
+    /// `--bsdf-density`
+    BsdfDensityArg => ProposalDensity { Lobes => ProposalDensity::Lobes, Uniform => ProposalDensity::Uniform }
+);
+choices!(
     /// `--sampler`
     SamplerArg => SamplerKind {
         Independent => SamplerKind::Independent,
@@ -134,6 +139,12 @@ pub struct SceneArgs {
     /// How a light is chosen [default: the file's lightsampler, or tree]
     #[arg(long)]
     pub light_choice: Option<LightChoiceArg>,
+    /// Directions proposed per bounce off materials that can only be evaluated [default: the file's, or 4]
+    #[arg(long, value_name = "M", value_parser = clap::value_parser!(u32).range(1..=4096))]
+    pub bsdf_proposals: Option<u32>,
+    /// What proposes directions for such materials [default: the file's, or lobes]
+    #[arg(long)]
+    pub bsdf_density: Option<BsdfDensityArg>,
     /// Bounces of `path` [default: the file's, or 5]
     #[arg(long, value_name = "D", value_parser = clap::value_parser!(u32).range(0..=10_000))]
     pub max_depth: Option<u32>,

@@ -79,6 +79,13 @@ fn apply(args: &SceneArgs, scene: &mut Scene) {
         i.light_choice = choice.value();
         scene.lights.set_kind(i.light_choice);
     }
+    if let Some(proposals) = args.bsdf_proposals {
+        i.bsdf_proposals = proposals;
+    }
+    if let Some(density) = args.bsdf_density {
+        i.bsdf_density = density.value();
+        scene.materials.set_proposal_density(i.bsdf_density);
+    }
     if let Some(spp) = args.spp {
         scene.sampling.spp = spp;
     }

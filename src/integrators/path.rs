@@ -22,6 +22,7 @@ mod domain {
     pub const DIRECT: u32 = 0;
     pub const BSDF: u32 = 1;
     pub const ROULETTE: u32 = 2;
+    pub const RESAMPLE: u32 = 3;
     /// Vertex k uses the domain `VERTEX + k` of the camera sample.
     pub const VERTEX: u32 = 16;
 }
@@ -174,7 +175,7 @@ impl PathIntegrator {
                 })
                 .collect();
             self.light_points(world, settings, vertex, &points, out);
-            self.extend_paths(vertex, depth, &vertices, &points);
+            self.extend_paths(settings, vertex, &vertices, &points);
             std::mem::swap(&mut self.active, &mut self.next);
         }
     }
@@ -282,12 +283,19 @@ impl PathIntegrator {
     }
 
     /// Fills `self.next` with the paths that go on.
-    fn extend_paths(&mut self, vertex: u32, depth: u32, vertices: &[Vertex<'_>], points: &[ShadePoint<'_>]) {
+    fn extend_paths(
+        &mut self,
+        settings: &IntegratorSettings,
+        vertex: u32,
+        vertices: &[Vertex<'_>],
+        points: &[ShadePoint<'_>],
+    ) {
+        let depth = settings.depth();
         let start = Instant::now();
         self.next.clear();
         if vertex + 1 < depth {
             let paths = self.active.iter().zip(vertices).zip(points);
-            self.next.extend(paths.filter_map(|((path, v), point)| extend(path, v, point, vertex)));
+            self.next.extend(paths.filter_map(|((path, v), point)| extend(path, v, point, vertex, settings)));
         }
         self.stats.shade_time += start.elapsed();
     }
@@ -317,12 +325,16 @@ impl<'w> Vertex<'w> {
 }
 
 /// The next path segment by BSDF sampling and Russian roulette; `None` if the path ends.
-fn extend(path: &PathState, v: &Vertex<'_>, point: &ShadePoint<'_>, vertex: u32) -> Option<PathState> {
-    // Sample the BSDF
-    let [uc, u0, u1] = v.stream.domain(domain::BSDF).draw::<3>();
-    let sample = v.bsdf.sample(v.wo, uc, [u0, u1])?;
-    let mut beta = path.beta * sample.f * (sample.wi.dot(v.bsdf.frame.z).abs() / sample.pdf);
-    let eta_scale = path.eta_scale * sample.eta * sample.eta;
+fn extend(
+    path: &PathState,
+    v: &Vertex<'_>,
+    point: &ShadePoint<'_>,
+    vertex: u32,
+    settings: &IntegratorSettings,
+) -> Option<PathState> {
+    let Direction { wi, weight, eta } = next_direction(v, settings)?;
+    let mut beta = path.beta * weight;
+    let eta_scale = path.eta_scale * eta * eta;
     if beta.is_black() || !beta.is_finite() {
         return None;
     }
@@ -336,8 +348,32 @@ fn extend(path: &PathState, v: &Vertex<'_>, point: &ShadePoint<'_>, vertex: u32)
         beta = beta / survival;
     }
 
-    let ray = Ray { o: point.origin(sample.wi), d: sample.wi, t_max: f32::INFINITY, time: path.ray.time };
+    let ray = Ray { o: point.origin(wi), d: wi, t_max: f32::INFINITY, time: path.ray.time };
     Some(PathState { ray, beta, eta_scale, ..*path })
+}
+
+/// Where a path goes on.
+struct Direction {
+    wi: Vec3,
+    /// Factor of the throughput.
+    weight: Rgb,
+    /// Relative index of refraction.
+    eta: f32,
+}
+
+/// A direction by BSDF sampling; of a BSDF that can only be evaluated, by resampling M proposals.
+fn next_direction(v: &Vertex<'_>, settings: &IntegratorSettings) -> Option<Direction> {
+    if v.bsdf.bsdf.is_only_evaluated() {
+        let count = settings.bsdf_proposals.max(1);
+        let proposal = |i| v.stream.split(domain::BSDF, count, i).draw::<3>();
+        let [u_choice] = v.stream.domain(domain::RESAMPLE).draw::<1>();
+        let r = v.bsdf.resample(v.wo, count, proposal, u_choice)?;
+        return Some(Direction { wi: r.wi, weight: r.f * (v.bsdf.cos(r.wi) * r.weight), eta: r.eta });
+    }
+    let [uc, u0, u1] = v.stream.domain(domain::BSDF).draw::<3>();
+    let sample = v.bsdf.sample(v.wo, uc, [u0, u1])?;
+    let weight = sample.f * (sample.wi.dot(v.bsdf.frame.z).abs() / sample.pdf);
+    Some(Direction { wi: sample.wi, weight, eta: sample.eta })
 }
 
 /// A hit with what shading needs of it.

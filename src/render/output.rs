@@ -122,6 +122,8 @@ pub fn settings_metadata(scene: &Scene) -> Vec<(String, String)> {
         ("samples", split.samples.to_string()),
         ("heuristic", i.heuristic().name().to_owned()),
         ("light_choice", i.light_choice.name().to_owned()),
+        ("bsdf_proposals", i.bsdf_proposals.to_string()),
+        ("bsdf_density", i.bsdf_density.name().to_owned()),
         ("sampler", scene.sampling.sampler.name().to_owned()),
         ("spp", scene.sampling.spp.to_string()),
         ("seed", scene.sampling.seed.to_string()),

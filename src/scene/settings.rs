@@ -1,5 +1,6 @@
 //! Light transport: what is computed, and how direct light is estimated.
 
+use crate::bsdfs::ProposalDensity;
 use crate::estimators::mis::Heuristic;
 use crate::estimators::ris::choice::Costs;
 use crate::lights::LightSamplerKind;
@@ -22,6 +23,11 @@ pub struct IntegratorSettings {
     pub light_choice: LightSamplerKind,
     /// What is particular to `ris`.
     pub ris: RisSettings,
+    /// Directions proposed for each that continues a path (M), where the BSDF is one that can only be evaluated; 1 is
+    /// plain importance sampling.
+    pub bsdf_proposals: u32,
+    /// Density that proposes them.
+    pub bsdf_density: ProposalDensity,
 }
 
 /// Samples per estimate of `mc` and `mis` where none are asked for.
@@ -37,6 +43,8 @@ impl Default for IntegratorSettings {
             heuristic: None,
             light_choice: LightSamplerKind::Tree,
             ris: RisSettings::default(),
+            bsdf_proposals: 4,
+            bsdf_density: ProposalDensity::Lobes,
         }
     }
 }

@@ -6,6 +6,7 @@ mod bit_exact;
 mod cli;
 mod crosscheck;
 mod estimators_1d;
+mod evaluated;
 mod layering;
 mod mutations;
 mod reproduce;

@@ -2,6 +2,7 @@
 
 use super::options::{Pending, unknown};
 use super::params::{ParamSet, ParamType};
+use crate::bsdfs::ProposalDensity;
 use crate::estimators::mis::Heuristic;
 use crate::import::diagnostic::Diagnostics;
 use crate::lights::LightSamplerKind;
@@ -89,6 +90,12 @@ fn lumiris_parameters(s: &mut IntegratorSettings, p: &ParamSet, d: &mut Diagnost
             "power" => LightSamplerKind::Power,
             _ => LightSamplerKind::Tree,
         };
+    }
+    if let Some(density) = choice(p, "bsdfdensity", &ProposalDensity::ALL, ProposalDensity::name, d) {
+        s.bsdf_density = density;
+    }
+    if let Some(n) = count(p, "bsdfproposals", d) {
+        s.bsdf_proposals = n;
     }
     s.samples = count(p, "samples", d);
     if p.type_of("proposals") == Some(ParamType::String) {
