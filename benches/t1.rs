@@ -4,11 +4,16 @@
 //! `cargo bench --bench t1 -- [part of a name] [runs]`
 #![allow(clippy::print_stdout, missing_docs)]
 
+use lumiris::bsdfs::{
+    Bsdf, CoatTable, CoatedDiffuse, Conductor, Dielectric, Diffuse, DiffuseTransmission, TrowbridgeReitz,
+};
 use lumiris::geometry::{Quadric, QuadricKind, Shape, TriangleMesh};
 use lumiris::lights::{Emission, EnvironmentFilter, EnvironmentMap, EnvironmentMapping, area_lights_of};
 use lumiris::lights::{Light, LightCtx, LightLanes};
 use lumiris::math::hash::{HashStream, pcg4d};
-use lumiris::math::{Affine3A, Rgb, Vec3};
+use lumiris::materials::surface::SurfaceBsdf;
+use lumiris::math::warp::sample_uniform_sphere;
+use lumiris::math::{Affine3A, Frame, Rgb, Vec3};
 use lumiris::simd::combine::{Proposals, Weighting, Weights, combine};
 use lumiris::simd::curve::{hilbert_points, hilbert_points_scalar, strata, strata_scalar};
 use std::hint::black_box;
@@ -148,8 +153,51 @@ fn main() {
             report(name, m, lanes, single);
         }
     }
+    bsdfs();
     for m in SIZES {
         kernels(m);
+    }
+}
+
+fn bsdfs() {
+    let rgb = Rgb::new(0.2, 0.5, 0.8);
+    let distribution = TrowbridgeReitz::new(0.3, 0.3);
+    let (rough, smooth) = (distribution, TrowbridgeReitz::new(0.0, 0.0));
+    let rough_coat = CoatTable::for_roughness(1.5, 0.01, rough);
+    let smooth_coat = CoatTable::for_roughness(1.5, 0.01, smooth);
+    let (eta, k) = (Rgb::new(0.2, 0.9, 1.1), Rgb::new(3.9, 2.4, 2.2));
+    let all = [
+        ("diffuse", Bsdf::Diffuse(Diffuse { reflectance: rgb })),
+        ("translucent", Bsdf::DiffuseTransmission(DiffuseTransmission { reflectance: rgb, transmittance: rgb })),
+        ("conductor", Bsdf::Conductor(Conductor { distribution, eta, k })),
+        ("dielectric", Bsdf::Dielectric(Dielectric { eta: 1.5, distribution })),
+        ("coated, rough", Bsdf::CoatedDiffuse(CoatedDiffuse::new(&rough_coat, rough, rgb, 10))),
+        ("coated, smooth", Bsdf::CoatedDiffuse(CoatedDiffuse::new(&smooth_coat, smooth, rgb, 10))),
+    ];
+    for (name, bsdf) in all {
+        if !is_wanted(name) {
+            continue;
+        }
+        let frame = Frame::from_z(Vec3::new(0.48, 0.6, 0.64));
+        let surface = SurfaceBsdf { bsdf, frame, n: frame.z };
+        let wo = frame.to_world(Vec3::new(0.6, 0.0, 0.8));
+        for m in SIZES {
+            let mut stream = HashStream::new([3, 1, 4]);
+            let w: Vec<Vec3> = (0..m).map(|_| sample_uniform_sphere(stream.next_2d())).collect();
+            let wi: Vec<Vec<f32>> = (0..3).map(|c| w.iter().map(|w| w[c]).collect()).collect();
+            let wi = [&wi[0][..], &wi[1], &wi[2]];
+            let mut v = vec![vec![0.0; m]; 4];
+            let [r, g, b, pdf] = &mut v[..] else { unreachable!("there are four") };
+            let lanes = time(m, |_| {
+                surface.eval_lanes(black_box(wo), wi, [&mut r[..], &mut g[..], &mut b[..]], pdf);
+                black_box(&mut *pdf);
+            });
+            let single = time(m, |_| {
+                surface.eval_each(black_box(wo), wi, [&mut r[..], &mut g[..], &mut b[..]], pdf);
+                black_box(&mut *pdf);
+            });
+            report(name, m, lanes, single);
+        }
     }
 }
 

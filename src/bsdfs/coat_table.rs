@@ -138,6 +138,25 @@ impl CoatTable {
         [below[0] + (above[0] - below[0]) * row_t, below[1] + (above[1] - below[1]) * row_t]
     }
 
+    /// T and R at equal steps of √cos θ from 0 to 1, of the rows about `row`, and the place between them; `None` if they
+    /// depend on the azimuth.
+    pub(super) fn directional_rows(&self, row: f32) -> Option<([&[[f32; 2]]; 2], f32)> {
+        match self.axis {
+            Axis::Azimuth => None,
+            Axis::Fixed | Axis::Alpha => {
+                let i = (row as usize).min(self.rows.len() - 1);
+                let above = (i + 1).min(self.rows.len() - 1);
+                let t = if above == i { 0.0 } else { row - i as f32 };
+                Some(([&self.rows[i].directional, &self.rows[above].directional], t))
+            }
+        }
+    }
+
+    /// Thickness of the layer.
+    pub(super) fn thickness(&self) -> f32 {
+        self.thickness
+    }
+
     /// R_in and T̄ of a rough interface.
     pub fn hemispherical(&self, row: f32) -> Hemispherical {
         match self.axis {

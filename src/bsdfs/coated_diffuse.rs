@@ -15,6 +15,7 @@ use super::dielectric::{Dielectric, Select};
 use super::fresnel::reflect;
 use super::{BsdfSample, Lobe, TrowbridgeReitz};
 use crate::math::{Rgb, Vec3, sqr, warp};
+use crate::simd::{self, bsdf::Transmittance};
 use std::f32::consts::{FRAC_1_PI, PI};
 
 /// Coated Lambertian reflection without scattering in the coat.
@@ -73,6 +74,19 @@ impl<'a> CoatedDiffuse<'a> {
     #[inline]
     pub fn has_specular(&self) -> bool {
         self.interface.is_specular()
+    }
+
+    /// How many directions are evaluated at once; `None` if one by one, where the roughness is anisotropic.
+    pub(super) fn lanes(&self, wo: Vec3) -> Option<simd::bsdf::Model<'_>> {
+        let wo = if wo.z < 0.0 { -wo } else { wo };
+        let (transmittance, interface) = if self.interface.is_specular() {
+            (Transmittance::Smooth(self.table.eta(), self.table.thickness()), None)
+        } else {
+            let (rows, t) = self.table.directional_rows(self.row)?;
+            (Transmittance::Table(rows, t), Some(self.interface.lanes()))
+        };
+        let base = (self.base * self.directional(wo)[0]).to_array();
+        Some(simd::bsdf::Model::Coated { interface, base, p_interface: self.p_interface(wo), transmittance })
     }
 
     /// Value without cosine (1/sr), without the mirror of a smooth interface.

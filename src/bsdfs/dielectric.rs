@@ -7,6 +7,7 @@
 use super::fresnel::{fr_dielectric, reflect, refract};
 use super::{BsdfSample, Lobe, TrowbridgeReitz};
 use crate::math::{Rgb, Vec3, sqr};
+use crate::simd;
 
 /// What is transported along the path, which decides whether transmission scales by 1/η².
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -42,6 +43,12 @@ impl Dielectric {
     #[inline]
     pub fn is_specular(&self) -> bool {
         self.eta == 1.0 || self.distribution.is_smooth()
+    }
+
+    /// For many directions at once.
+    pub(super) fn lanes(&self) -> simd::bsdf::Interface {
+        let TrowbridgeReitz { alpha_x, alpha_y } = self.distribution;
+        simd::bsdf::Interface { alpha: [alpha_x, alpha_y], eta: self.eta }
     }
 
     /// Probability of reflection among the selected lobes; `None` if they carry no light.

@@ -16,7 +16,7 @@ pub struct DiffuseTransmission {
 impl DiffuseTransmission {
     /// Probability of sampling reflection; `None` if the surface is black.
     #[inline]
-    fn p_reflect(&self) -> Option<f32> {
+    pub(super) fn p_reflect(&self) -> Option<f32> {
         let (r, t) = (self.reflectance.max_component(), self.transmittance.max_component());
         (r + t > 0.0).then(|| r / (r + t))
     }

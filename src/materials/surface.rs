@@ -2,6 +2,7 @@
 
 use crate::bsdfs::{Bsdf, BsdfSample, Resampled, resample};
 use crate::math::{Frame, Rgb, Vec3};
+use crate::simd::{self, bsdf::Values};
 
 /// The scattering at a hit. Sides are told by the shading normal alone, as in pbrt-v4: where it disagrees with the
 /// geometric normal, light may leak through or fail to arrive, and the integrator finds the former blocked.
@@ -38,6 +39,18 @@ impl SurfaceBsdf<'_> {
     /// [`f_cos`](Self::f_cos) and [`pdf`](Self::pdf) for many directions `wi` in world space, by component and channel;
     /// those of single calls up to rounding. All slices have the same length.
     pub fn eval_lanes(&self, wo: Vec3, wi: [&[f32]; 3], f_cos: [&mut [f32]; 3], pdf: &mut [f32]) {
+        let local = self.frame.to_local(wo);
+        match self.bsdf.lanes(local) {
+            Some(model) => {
+                let lanes = simd::bsdf::Bsdf { frame: self.frame, wo: local, model };
+                lanes.eval(simd::level(), wi, &mut Values { f_cos, pdf });
+            }
+            None => self.eval_each(wo, wi, f_cos, pdf),
+        }
+    }
+
+    /// [`eval_lanes`](Self::eval_lanes) by single calls.
+    pub fn eval_each(&self, wo: Vec3, wi: [&[f32]; 3], f_cos: [&mut [f32]; 3], pdf: &mut [f32]) {
         let wo = self.frame.to_local(wo);
         for i in 0..pdf.len() {
             let wi = self.frame.to_local(Vec3::new(wi[0][i], wi[1][i], wi[2][i]));
@@ -81,5 +94,76 @@ impl SurfaceBsdf<'_> {
     #[inline]
     pub fn albedo_estimate(&self, wo: Vec3) -> Rgb {
         self.bsdf.albedo_estimate(self.frame.to_local(wo))
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::bsdfs::{
+        CoatTable, CoatedDiffuse, Conductor, Dielectric, Diffuse, DiffuseTransmission, ThinDielectric, TrowbridgeReitz,
+    };
+    use crate::math::hash::HashStream;
+    use crate::math::warp::sample_uniform_sphere;
+
+    /// Near equal, relative to the value and to 1e-3.
+    fn assert_near(a: f32, b: f32, what: &dyn std::fmt::Debug) {
+        assert!((a - b).abs() <= 2e-4 * (b.abs() + 1e-3), "{a} {b} {what:?}");
+    }
+
+    #[test]
+    fn lanes_are_single_calls() {
+        let rgb = Rgb::new(0.2, 0.5, 0.8);
+        let rough = TrowbridgeReitz::new(0.3, 0.15);
+        let isotropic = TrowbridgeReitz::new(0.2, 0.2);
+        let smooth = TrowbridgeReitz::new(0.0, 0.0);
+        let tables = [
+            (CoatTable::for_roughness(1.5, 0.01, isotropic), isotropic),
+            (CoatTable::for_roughness(1.5, 0.01, smooth), smooth),
+            (CoatTable::for_roughness(1.5, 0.0, smooth), smooth),
+            (CoatTable::for_roughness(1.5, 0.01, rough), rough),
+            (CoatTable::for_all_roughness(1.5, 0.01), isotropic),
+        ];
+        let conductor = |distribution| Conductor { distribution, eta: Rgb::new(0.2, 0.9, 1.1), k: Rgb::new(3.9, 2.4, 0.0) };
+        let mut bsdfs = vec![
+            Bsdf::Diffuse(Diffuse { reflectance: rgb }),
+            Bsdf::DiffuseTransmission(DiffuseTransmission { reflectance: rgb, transmittance: Rgb::new(0.1, 0.3, 0.0) }),
+            Bsdf::DiffuseTransmission(DiffuseTransmission { reflectance: Rgb::BLACK, transmittance: Rgb::BLACK }),
+            Bsdf::Conductor(conductor(rough)),
+            Bsdf::Conductor(conductor(smooth)),
+            Bsdf::Dielectric(Dielectric { eta: 1.5, distribution: rough }),
+            Bsdf::Dielectric(Dielectric { eta: 0.7, distribution: isotropic }),
+            Bsdf::Dielectric(Dielectric { eta: 1.5, distribution: smooth }),
+            Bsdf::ThinDielectric(ThinDielectric { eta: 1.5 }),
+        ];
+        bsdfs.extend(tables.iter().map(|(t, d)| Bsdf::CoatedDiffuse(CoatedDiffuse::new(t, *d, rgb, 10))));
+
+        let mut stream = HashStream::new([5, 1, 5]);
+        for bsdf in bsdfs {
+            for n in [1, 8, 13, 32, 100] {
+                for _ in 0..8 {
+                    let frame = Frame::from_z(sample_uniform_sphere(stream.next_2d()));
+                    let surface = SurfaceBsdf { bsdf, frame, n: frame.z };
+                    let wo = sample_uniform_sphere(stream.next_2d());
+                    let w: Vec<Vec3> = (0..n).map(|_| sample_uniform_sphere(stream.next_2d())).collect();
+                    let wi: [Vec<f32>; 3] = std::array::from_fn(|c| w.iter().map(|w| w[c]).collect());
+                    let run = |each: bool| {
+                        let mut v: [Vec<f32>; 4] = std::array::from_fn(|_| vec![-1.0; n]);
+                        let [r, g, b, pdf] = &mut v;
+                        let wi = wi.each_ref().map(|v| &v[..]);
+                        if each {
+                            surface.eval_each(wo, wi, [r, g, b], pdf);
+                        } else {
+                            surface.eval_lanes(wo, wi, [r, g, b], pdf);
+                        }
+                        v
+                    };
+                    let (lanes, single) = (run(false), run(true));
+                    for (a, b) in lanes.iter().flatten().zip(single.iter().flatten()) {
+                        assert_near(*a, *b, &(bsdf, wo));
+                    }
+                }
+            }
+        }
     }
 }

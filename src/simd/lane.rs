@@ -165,6 +165,18 @@ pub fn sin_cos_quadrant<S: Simd>(a: F<S>) -> (F<S>, F<S>) {
     ((c + s) * scale, (c - s) * scale)
 }
 
+/// e^x for x ≤ 0, by the series about the nearest power of two; relative errors below 2⁻²², 0 below e⁻⁸⁶.
+#[inline(always)]
+pub fn exp<S: Simd>(x: F<S>) -> F<S> {
+    let simd = x.token();
+    let powers = (x.max(-87.0).min(0.0) * std::f32::consts::LOG2_E).round_ties_even();
+    // ln 2 in two parts, of which the first has few digits.
+    let r = x.max(-87.0).min(0.0) - powers * 0.693_359_375 + powers * 2.121_944_4e-4;
+    let series = (((((r * (1.0 / 720.0) + 1.0 / 120.0) * r + 1.0 / 24.0) * r + 1.0 / 6.0) * r + 0.5) * r + 1.0) * r + 1.0;
+    let exponent: I<S> = (powers.to_int::<I<S>>() + 127) << 23;
+    or_zero(x.simd_gt(F::splat(simd, -86.0)), series * exponent.bitcast::<F<S>>())
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -204,5 +216,25 @@ mod tests {
                 }
             });
         }
+    }
+
+    #[inline(always)]
+    fn run_exp<S: Simd>(simd: S, x: &[f32], out: &mut [f32]) {
+        for i in (0..x.len()).step_by(LANES) {
+            store(exp(load(simd, x, i)), out, i);
+        }
+    }
+
+    #[test]
+    fn exponentials_are_accurate_and_the_same_at_all_levels() {
+        let x: Vec<f32> = (0..4000).map(|i| i as f32 * -0.0231).chain([f32::NEG_INFINITY, f32::NAN]).collect();
+        assert_same_bits::<1>(x.len(), |level, [out]| {
+            dispatch!(level, simd => run_exp(simd, &x, &mut *out));
+            for i in 0..4000 {
+                let expected = f64::from(x[i]).exp();
+                assert!((f64::from(out[i]) - expected).abs() <= 2.4e-7 * expected || x[i] < -85.9 && out[i] == 0.0);
+            }
+            assert!(out[4000] == 0.0 && out[4001] == 0.0);
+        });
     }
 }

@@ -5,9 +5,10 @@
 //! results are the same bits at every level. The scalar twin of a kernel is the kernel itself at the level without
 //! vectors, `Level::fallback()`. Slices may have any length: what is no full vector at the end is padded.
 //!
-//! Reading order: [`lane`], [`curve`], [`light`], [`area`], [`environment`], [`combine`].
+//! Reading order: [`lane`], [`curve`], [`light`], [`area`], [`environment`], [`bsdf`], [`combine`].
 
 pub mod area;
+pub mod bsdf;
 pub mod combine;
 pub mod curve;
 pub mod environment;
