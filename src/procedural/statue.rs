@@ -1,4 +1,4 @@
-//! A statue of fine detail: a dragon on a carved column ([`dragon`](super::dragon)), meshed at a resolution of choice.
+//! A statue of fine detail: a dragon on a carved column ([`dragon`]), meshed at a resolution of choice.
 //!
 //! The distance of the statue is the smooth minimum over its carved parts. In a ball of radius R, with L the bound of
 //! [`solids`](super::solids), only those strokes of a part can be the nearest whose distance from the centre is within
