@@ -58,6 +58,7 @@ fn sky_of_the_scenes() -> SkyOptions {
         haze: 2.0,
         sun_size: 4.0,
         cloud_cover: 0.45,
+        irradiance: 2.2,
         seed: 7,
         ..SkyOptions::default()
     }

@@ -9,12 +9,16 @@
 //!
 //! Cubes of 16³ cells are made in parallel and joined in order, so the mesh does not depend on the number of threads.
 //! Leaves of 4³ cells are left out where the field bounds its own sign.
+//!
+//! Reading order: `cases`, this file, `piece`.
 
 mod cases;
+mod piece;
 
 use crate::geometry::TriangleMesh;
 use crate::math::Vec3;
 use cases::{Case, edge_between, edge_corners, face_corners, is_ambiguous};
+pub use piece::largest_piece;
 use rayon::prelude::*;
 
 /// Cells of a block along an axis.
