@@ -40,7 +40,7 @@ pub use thin_dielectric::ThinDielectric;
 
 use crate::math::hash::{pcg4d, unit_f32};
 use crate::math::{Rgb, Vec3};
-use crate::simd::bsdf::Model;
+use crate::simd::bsdf::Model as LaneModel;
 use std::f32::consts::FRAC_1_PI;
 use std::ops::BitOr;
 
@@ -174,14 +174,14 @@ impl Bsdf<'_> {
         if pdf.is_finite() { pdf } else { 0.0 }
     }
 
-    /// How f and pdf are evaluated for many directions at once, seen from `wo`; `None` if one by one: random walks, and
-    /// coats of anisotropic roughness.
-    pub fn lanes(&self, wo: Vec3) -> Option<Model<'_>> {
+    /// How f and pdf are evaluated for many directions at once, seen from `wo`; `None` if one by one: random walks,
+    /// coats of anisotropic roughness, and models that are only evaluated.
+    pub fn lanes(&self, wo: Vec3) -> Option<LaneModel<'_>> {
         let black = [0.0; 3];
         let lambertian = |reflection: Rgb, transmission: Rgb, p: [f32; 2]| {
             // A value that is not finite is black as a whole.
             let f = |rho: Rgb| if rho.is_finite() { (rho * FRAC_1_PI).to_array() } else { black };
-            Model::Lambertian { reflection: f(reflection), transmission: f(transmission), p }
+            LaneModel::Lambertian { reflection: f(reflection), transmission: f(transmission), p }
         };
         let none = lambertian(Rgb::BLACK, Rgb::BLACK, [0.0; 2]);
         match self {
@@ -193,13 +193,13 @@ impl Bsdf<'_> {
             Bsdf::Conductor(b) if b.distribution.is_smooth() => Some(none),
             Bsdf::Conductor(b) => {
                 let TrowbridgeReitz { alpha_x, alpha_y } = b.distribution;
-                Some(Model::Conductor { alpha: [alpha_x, alpha_y], eta: b.eta.to_array(), k: b.k.to_array() })
+                Some(LaneModel::Conductor { alpha: [alpha_x, alpha_y], eta: b.eta.to_array(), k: b.k.to_array() })
             }
             Bsdf::Dielectric(b) if b.is_specular() => Some(none),
-            Bsdf::Dielectric(b) => Some(Model::Dielectric(b.lanes())),
+            Bsdf::Dielectric(b) => Some(LaneModel::Dielectric(b.lanes())),
             Bsdf::ThinDielectric(_) => Some(none),
             Bsdf::CoatedDiffuse(b) => b.lanes(wo),
-            Bsdf::Layered(_) => None,
+            Bsdf::Layered(_) | Bsdf::Evaluated(_) => None,
         }
     }
 

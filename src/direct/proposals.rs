@@ -10,13 +10,12 @@
 
 use super::ShadePoint;
 use super::propose::Candidate;
-use crate::estimators::mc;
-use crate::estimators::mis::{Heuristic, Technique};
+use crate::estimators::mis::Heuristic;
 use crate::lights::{LightId, LightLanes, LightRun};
-use crate::math::Rgb;
 use crate::math::hash::pcg4d;
 use crate::scene::{ProposalPoints, Target, World};
-use crate::simd::curve;
+use crate::simd::combine::{self, Weighting};
+use crate::simd::{self, curve};
 
 /// Seed of the positions.
 const POSITIONS: u32 = 0x517c_c1b7;
@@ -227,16 +226,30 @@ impl Proposals {
         for run in self.runs.iter().filter(|run| world.scene.lights.lights[run.light as usize].is_delta()) {
             self.p_bsdf[start + run.places[0] as usize..start + run.places[1] as usize].fill(0.0);
         }
-        for i in start..end {
-            let light = Technique { n: techniques.n_light, p: self.p_light[i] };
-            let bsdf = Technique { n: techniques.n_bsdf, p: self.p_bsdf[i] };
-            let [f, li] = [&self.f_cos, &self.li].map(|rgb| Rgb::new(rgb[0][i], rgb[1][i], rgb[2][i]));
-            self.p_hat[i] = match techniques.target {
-                Target::Fgl | Target::Gvl => (f * li).luminance(),
-                Target::Gv => f.r,
-            };
-            self.r[i] = techniques.heuristic.weight(light, bsdf) * mc::weight(light.n, light.p);
-            self.weight[i] = weight(self.p_hat[i], self.r[i]);
+        let proposals = combine::Proposals {
+            f_cos: self.f_cos.each_ref().map(|a| &a[start..end]),
+            li: self.li.each_ref().map(|a| &a[start..end]),
+            p: &self.p_light[start..end],
+            p_other: &self.p_bsdf[start..end],
+            m: techniques.n_light,
+            m_other: techniques.n_bsdf,
+            weighting: match techniques.heuristic {
+                Heuristic::Balance => Weighting::Balance,
+                Heuristic::Power => Weighting::Power,
+                Heuristic::Maximum => Weighting::Maximum,
+            },
+        };
+        let mut weights = combine::Weights {
+            q_hat: &mut self.p_hat[start..end],
+            r: &mut self.r[start..end],
+            w: &mut self.weight[start..end],
+        };
+        combine::combine(simd::level(), &proposals, &mut weights);
+        if techniques.target == Target::Gv {
+            for i in start..end {
+                self.p_hat[i] = self.f_cos[0][i];
+                self.weight[i] = weight(self.p_hat[i], self.r[i]);
+            }
         }
     }
 }

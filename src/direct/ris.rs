@@ -55,12 +55,15 @@ pub(super) fn shares(point: &ShadePoint<'_>) -> Shares {
         return Shares::fixed(0, n);
     }
     let share = match bsdf {
-        Bsdf::Diffuse(_) | Bsdf::DiffuseTransmission(_) => 0.125,
+        Bsdf::Diffuse(_) | Bsdf::DiffuseTransmission(_) | Bsdf::Evaluated(_) => 0.125,
         Bsdf::CoatedDiffuse(_) => 0.25,
         Bsdf::Conductor(_) | Bsdf::Dielectric(_) | Bsdf::ThinDielectric(_) | Bsdf::Layered(_) | Bsdf::Evaluated(_) => {
             0.5
         }
     };
+    static SH: std::sync::OnceLock<Vec<f32>> = std::sync::OnceLock::new();
+    let sh = SH.get_or_init(|| std::env::var("SH").unwrap_or_default().split(',').filter_map(|x| x.parse().ok()).collect());
+    let share = if sh.len() == 3 { if share == 0.125 { sh[0] } else if share == 0.25 { sh[1] } else { sh[2] } } else { share };
     let by_bsdf = ((m as f32 * share).round() as u32).clamp(1, m.saturating_sub(1).max(1));
     if m == 1 { Shares::one_of_both(point) } else { Shares::fixed(m - by_bsdf, by_bsdf) }
 }
