@@ -57,7 +57,7 @@ pub(super) fn shares(point: &ShadePoint<'_>) -> Shares {
     let share = match bsdf {
         Bsdf::Diffuse(_) | Bsdf::DiffuseTransmission(_) | Bsdf::Evaluated(_) => 0.125,
         Bsdf::CoatedDiffuse(_) => 0.25,
-        Bsdf::Conductor(_) | Bsdf::Dielectric(_) | Bsdf::ThinDielectric(_) | Bsdf::Layered(_) | Bsdf::Evaluated(_) => {
+        Bsdf::Conductor(_) | Bsdf::Dielectric(_) | Bsdf::ThinDielectric(_) | Bsdf::Layered(_) => {
             0.5
         }
     };
