@@ -10,8 +10,8 @@ use lumiris::bsdfs::{
 use lumiris::geometry::{Quadric, QuadricKind, Shape, TriangleMesh};
 use lumiris::lights::{Emission, EnvironmentFilter, EnvironmentMap, EnvironmentMapping, area_lights_of};
 use lumiris::lights::{Light, LightCtx, LightLanes};
-use lumiris::math::hash::{HashStream, pcg4d};
 use lumiris::materials::surface::SurfaceBsdf;
+use lumiris::math::hash::{HashStream, pcg4d};
 use lumiris::math::warp::sample_uniform_sphere;
 use lumiris::math::{Affine3A, Frame, Rgb, Vec3};
 use lumiris::simd::combine::{Proposals, Weighting, Weights, combine};
@@ -85,7 +85,8 @@ fn sky(size: [usize; 2], mapping: EnvironmentMapping, filter: EnvironmentFilter)
 }
 
 fn quad(triangles: &[[u32; 3]]) -> Shape {
-    let p = [Vec3::new(-1.0, 2.0, -1.0), Vec3::new(2.0, 2.0, -1.0), Vec3::new(2.0, 2.0, 1.0), Vec3::new(-1.0, 2.0, 1.0)];
+    let p =
+        [Vec3::new(-1.0, 2.0, -1.0), Vec3::new(2.0, 2.0, -1.0), Vec3::new(2.0, 2.0, 1.0), Vec3::new(-1.0, 2.0, 1.0)];
     Shape::Mesh(TriangleMesh::new(p.to_vec(), triangles.to_vec()).expect("indices are in range"))
 }
 

@@ -90,8 +90,18 @@ mod tests {
                 }
                 assert!((pdf[i] - pdf1[i]).abs() <= tolerance * pdf1[i], "{what} pdf {} {}", pdf[i], pdf1[i]);
                 for c in 0..3 {
-                    assert!((w[c][i] - w1[c][i]).abs() < 1e-6_f32.max(0.1 * tolerance), "{what} {} {}", w[c][i], w1[c][i]);
-                    assert!((l[c][i] - l1[c][i]).abs() <= tolerance * (1.0 + l1[c][i]), "{what} {} {}", l[c][i], l1[c][i]);
+                    assert!(
+                        (w[c][i] - w1[c][i]).abs() < 1e-6_f32.max(0.1 * tolerance),
+                        "{what} {} {}",
+                        w[c][i],
+                        w1[c][i]
+                    );
+                    assert!(
+                        (l[c][i] - l1[c][i]).abs() <= tolerance * (1.0 + l1[c][i]),
+                        "{what} {} {}",
+                        l[c][i],
+                        l1[c][i]
+                    );
                 }
             }
         }

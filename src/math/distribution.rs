@@ -240,9 +240,8 @@ impl PiecewiseConstant2D {
         let mut conditional_cdf = vec![0.0; cdf_len(width) * height];
         let guide_len = guide_len(width);
         let mut conditional_guide = vec![0; guide_len * height];
-        let tables = conditional_cdf
-            .chunks_exact_mut(cdf_len(width))
-            .zip(conditional_guide.chunks_exact_mut(guide_len));
+        let tables =
+            conditional_cdf.chunks_exact_mut(cdf_len(width)).zip(conditional_guide.chunks_exact_mut(guide_len));
         let row_integrals: Vec<f32> = values
             .chunks_exact(width)
             .zip(tables)
