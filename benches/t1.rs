@@ -10,8 +10,8 @@ use lumiris::bsdfs::{
 use lumiris::geometry::{Quadric, QuadricKind, Shape, TriangleMesh};
 use lumiris::lights::{Emission, EnvironmentFilter, EnvironmentMap, EnvironmentMapping, area_lights_of};
 use lumiris::lights::{Light, LightCtx, LightLanes};
-use lumiris::math::hash::{HashStream, pcg4d};
 use lumiris::materials::surface::SurfaceBsdf;
+use lumiris::math::hash::{HashStream, pcg4d};
 use lumiris::math::warp::sample_uniform_sphere;
 use lumiris::math::{Affine3A, Frame, Rgb, Vec3};
 use lumiris::simd::combine::{Proposals, Weighting, Weights, combine};

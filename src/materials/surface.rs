@@ -124,7 +124,8 @@ mod tests {
             (CoatTable::for_roughness(1.5, 0.01, rough), rough),
             (CoatTable::for_all_roughness(1.5, 0.01), isotropic),
         ];
-        let conductor = |distribution| Conductor { distribution, eta: Rgb::new(0.2, 0.9, 1.1), k: Rgb::new(3.9, 2.4, 0.0) };
+        let conductor =
+            |distribution| Conductor { distribution, eta: Rgb::new(0.2, 0.9, 1.1), k: Rgb::new(3.9, 2.4, 0.0) };
         let mut bsdfs = vec![
             Bsdf::Diffuse(Diffuse { reflectance: rgb }),
             Bsdf::DiffuseTransmission(DiffuseTransmission { reflectance: rgb, transmittance: Rgb::new(0.1, 0.3, 0.0) }),

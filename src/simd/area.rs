@@ -1,7 +1,7 @@
 //! Directions to a surface of constant emission from one point, many at once. The formulas are those of the modules of
 //! `lights::area`; what depends on the point alone is computed once.
 
-use super::lane::{F, LANES, Vec3s, load, or_zero, safe_sqrt, sin_cos_turns, store};
+use super::lane::{F, LANES, Vec3s, begin, load, or_zero, safe_sqrt, sin_cos_turns, store};
 use super::light::LightLanes;
 use crate::math::{Frame, Vec2, Vec3, warp};
 use fearless_simd::{Level, Simd, dispatch, f64x4, mask64x4, prelude::*};
@@ -79,14 +79,19 @@ pub struct AreaSampler {
 impl AreaSampler {
     /// Samples directions.
     pub fn sample(&self, level: Level, u: [&[f32]; 2], out: &mut LightLanes<'_>) {
-        dispatch!(level, simd => match &self.surface {
+        out.with_padding(u, |u, out| dispatch!(level, simd => self.sample_lanes(simd, u, out)));
+    }
+
+    #[inline(always)]
+    fn sample_lanes<S: Simd>(&self, simd: S, u: [&[f32]; 2], out: &mut LightLanes<'_>) {
+        match &self.surface {
             Surface::SphericalRectangle(rectangle, spherical) => {
                 self.spherical_rectangle(simd, rectangle, &SphericalSetup::new(spherical), u, out);
             }
             Surface::Rectangle(rectangle) => self.rectangle(simd, rectangle, u, out),
             Surface::Triangle(p, n, area) => self.triangle(simd, p, (*n, *area), u, out),
             Surface::Cone { .. } => self.cone(simd, u, out),
-        });
+        }
     }
 
     /// Directions to the points `p` of normal `n`, with densities per steradian `pdf`, or per area if `by_area`.
@@ -111,11 +116,11 @@ impl AreaSampler {
         let is_sample = pdf.simd_gt(zero) & pdf.is_finite() & t.simd_gt(zero);
         store(or_zero(is_sample, pdf), out.pdf, i);
         wi.store(&mut out.wi, i);
-        let is_dark = !cos.simd_lt(zero);
-        for c in 0..3 {
-            let l = F::splat(simd, self.l[c]);
-            store(if self.two_sided { l } else { is_dark.select(zero, l) }, out.li[c], i);
-        }
+        let is_lit = if self.two_sided { pdf.simd_eq(pdf) } else { cos.simd_lt(zero) };
+        let [red, green, blue] = &mut out.li;
+        store(or_zero(is_lit, F::splat(simd, self.l[0])), red, i);
+        store(or_zero(is_lit, F::splat(simd, self.l[1])), green, i);
+        store(or_zero(is_lit, F::splat(simd, self.l[2])), blue, i);
     }
 
     #[inline(always)]
@@ -129,6 +134,7 @@ impl AreaSampler {
     ) {
         let (n, pdf) = (Vec3s::splat(simd, rectangle.n), (1.0 / setup.solid_angle) as f32);
         for i in (0..out.pdf.len()).step_by(LANES) {
+            let i = begin(i, out.pdf.len());
             let (u0, u1) = (load(simd, u[0], i).widen(), load(simd, u[1], i).widen());
             let (low, high) = (setup.place(u0.0, u1.0), setup.place(u0.1, u1.1));
             let p = rectangle.point(low.0.narrow(high.0), low.1.narrow(high.1));
@@ -140,6 +146,7 @@ impl AreaSampler {
     fn rectangle<S: Simd>(&self, simd: S, rectangle: &Rectangle, u: [&[f32]; 2], out: &mut LightLanes<'_>) {
         let (n, pdf_area) = (Vec3s::splat(simd, rectangle.n), 1.0 / (rectangle.size.x * rectangle.size.y));
         for i in (0..out.pdf.len()).step_by(LANES) {
+            let i = begin(i, out.pdf.len());
             let p = rectangle.point(load(simd, u[0], i) * rectangle.size.x, load(simd, u[1], i) * rectangle.size.y);
             self.finish(p, n, pdf_area, true, (i, out));
         }
@@ -156,6 +163,7 @@ impl AreaSampler {
     ) {
         let n = Vec3s::splat(simd, n);
         for i in (0..out.pdf.len()).step_by(LANES) {
+            let i = begin(i, out.pdf.len());
             let (u0, u1) = (load(simd, u[0], i), load(simd, u[1], i));
             let is_left = u0.simd_lt(u1);
             let half = is_left.select(u0, u1) * 0.5;
@@ -171,6 +179,7 @@ impl AreaSampler {
         let (frame, sin_max, pdf) = (Frame::from_z(axis), sin2_max.sqrt(), warp::pdf_uniform_cone(one_minus_cos));
         let (one, center) = (F::splat(simd, 1.0), Vec3s::splat(simd, center));
         for i in (0..out.pdf.len()).step_by(LANES) {
+            let i = begin(i, out.pdf.len());
             let x = load(simd, u[0], i) * one_minus_cos;
             let sin2 = (x * (F::splat(simd, 2.0) - x)).max(0.0);
             let (sin_phi, cos_phi) = sin_cos_turns(load(simd, u[1], i));
@@ -191,11 +200,11 @@ impl Rectangle {
     /// The points at `s` along one edge and `t` along the other.
     #[inline(always)]
     fn point<S: Simd>(&self, s: F<S>, t: F<S>) -> Vec3s<S> {
-        let at = |corner: f32, ex: f32, ey: f32| F::splat(s.token(), corner) + s * ex + t * ey;
+        let simd = s.token();
         Vec3s {
-            x: at(self.corner.x, self.ex.x, self.ey.x),
-            y: at(self.corner.y, self.ex.y, self.ey.y),
-            z: at(self.corner.z, self.ex.z, self.ey.z),
+            x: F::splat(simd, self.corner.x) + s * self.ex.x + t * self.ey.x,
+            y: F::splat(simd, self.corner.y) + s * self.ex.y + t * self.ey.y,
+            z: F::splat(simd, self.corner.z) + s * self.ex.z + t * self.ey.z,
         }
     }
 }
@@ -285,10 +294,12 @@ fn sin_cos_turns_f64<S: Simd>(t: f64x4<S>) -> (f64x4<S>, f64x4<S>) {
         + 1.0;
     // Of the quarters modulo 4, which are exact.
     let k = quarters - (quarters * 0.25).floor() * 4.0;
-    let is = |q: f64| -> mask64x4<S> { k.simd_eq(f64x4::splat(simd, q)) };
-    let is_odd = is(1.0) | is(3.0);
+    let (one, two, three) = (f64x4::splat(simd, 1.0), f64x4::splat(simd, 2.0), f64x4::splat(simd, 3.0));
+    let (is_1, is_2, is_3): (mask64x4<S>, mask64x4<S>, mask64x4<S>) =
+        (k.simd_eq(one), k.simd_eq(two), k.simd_eq(three));
+    let is_odd = is_1 | is_3;
     let (s, c) = (is_odd.select(cos, sin), is_odd.select(sin, cos));
-    ((is(2.0) | is(3.0)).select(-s, s), (is(1.0) | is(2.0)).select(-c, c))
+    ((is_2 | is_3).select(-s, s), (is_1 | is_2).select(-c, c))
 }
 
 #[cfg(test)]

@@ -4,7 +4,7 @@
 //! With h = wo + η'wi not normalised, D(m) = (h²/q)²/(π αx αy), q = hx²/αx² + hy²/αy² + hz²; and with
 //! A = (αx wix)² + (αy wiy)², G(wo, wi) = |cos θi| / ((1/2 + Λ(wo)) |cos θi| + √(cos²θi + A)/2).
 
-use super::lane::{F, I, LANES, M, Vec3s, exp, or_zero, safe_sqrt, store};
+use super::lane::{F, I, LANES, M, Vec3s, begin, exp, or_zero, padded, safe_sqrt, store};
 use crate::math::{Frame, Vec3, sqr};
 use fearless_simd::{Level, Simd, dispatch, prelude::*};
 use std::f32::consts::{FRAC_1_PI, PI};
@@ -90,7 +90,18 @@ impl Bsdf<'_> {
             out.f_cos.iter_mut().for_each(|f| f.fill(0.0));
             return out.pdf.fill(0.0);
         }
-        dispatch!(level, simd => self.eval_lanes(simd, wi, out));
+        let n = out.pdf.len();
+        if n >= LANES {
+            return dispatch!(level, simd => self.eval_lanes(simd, wi, out));
+        }
+        let wi = wi.map(padded);
+        let [mut r, mut g, mut b, mut pdf] = [[0.0; LANES]; 4];
+        let mut few = Values { f_cos: [&mut r, &mut g, &mut b], pdf: &mut pdf };
+        dispatch!(level, simd => self.eval_lanes(simd, [&wi[0], &wi[1], &wi[2]], &mut few));
+        for (to, from) in out.f_cos.iter_mut().zip([r, g, b]) {
+            to.copy_from_slice(&from[..n]);
+        }
+        out.pdf.copy_from_slice(&pdf[..n]);
     }
 
     #[inline(always)]
@@ -98,6 +109,7 @@ impl Bsdf<'_> {
         match &self.model {
             Model::Lambertian { reflection, transmission, p } => {
                 for i in (0..out.pdf.len()).step_by(LANES) {
+                    let i = begin(i, out.pdf.len());
                     let cos = self.cosines(simd, wi, i);
                     self.lambertian([*reflection, *transmission], *p, cos, (i, out));
                 }
@@ -106,6 +118,7 @@ impl Bsdf<'_> {
                 let facets = Facets::new(*alpha, self.wo);
                 let metal = [0, 1, 2].map(|c| Metal::new(eta[c], k[c]));
                 for i in (0..out.pdf.len()).step_by(LANES) {
+                    let i = begin(i, out.pdf.len());
                     self.conductor(&facets, &metal, self.local(simd, wi, i), (i, out));
                 }
             }
@@ -113,12 +126,14 @@ impl Bsdf<'_> {
                 let (facets, eta) = (Facets::new(interface.alpha, self.wo), interface.eta);
                 let eta_p = if self.wo.z > 0.0 { eta } else { 1.0 / eta };
                 for i in (0..out.pdf.len()).step_by(LANES) {
+                    let i = begin(i, out.pdf.len());
                     self.dielectric(&facets, eta_p, self.local(simd, wi, i), (i, out));
                 }
             }
             Model::Coated { interface, base, p_interface, transmittance } => {
                 let coat = interface.map(|c| (Facets::new(c.alpha, self.wo), c.eta));
                 for i in (0..out.pdf.len()).step_by(LANES) {
+                    let i = begin(i, out.pdf.len());
                     let wi = self.local(simd, wi, i);
                     let cos = wi.z.abs();
                     let specular = match &coat {
@@ -127,7 +142,7 @@ impl Bsdf<'_> {
                     };
                     let t = transmittance.along(cos) * cos;
                     let is_same_side = (wi.z * self.wo.z).simd_gt(F::splat(simd, 0.0));
-                    let f = base.map(|b| specular.0 + t * b);
+                    let f = [specular.0 + t * base[0], specular.0 + t * base[1], specular.0 + t * base[2]];
                     let pdf = specular.1 * *p_interface + cos * (FRAC_1_PI * (1.0 - *p_interface));
                     write(is_same_side, f, pdf, (i, out));
                 }
@@ -153,9 +168,10 @@ impl Bsdf<'_> {
         let zero = F::splat(simd, 0.0);
         let is_same_side = (cos * self.wo.z).simd_gt(zero);
         let cos = cos.abs();
-        let side = |a: f32, b: f32| is_same_side.select(F::splat(simd, a), F::splat(simd, b));
-        let values = [0, 1, 2].map(|c| side(f[0][c], f[1][c]) * cos);
-        write(cos.simd_gt(zero), values, side(p[0], p[1]) * cos * FRAC_1_PI, at);
+        let red = either(is_same_side, f[0][0], f[1][0]) * cos;
+        let green = either(is_same_side, f[0][1], f[1][1]) * cos;
+        let blue = either(is_same_side, f[0][2], f[1][2]) * cos;
+        write(cos.simd_gt(zero), [red, green, blue], either(is_same_side, p[0], p[1]) * cos * FRAC_1_PI, at);
     }
 
     #[inline(always)]
@@ -206,20 +222,24 @@ impl Bsdf<'_> {
         let faces = o_h.simd_gt(zero) & h.dot(wi).simd_gt(zero);
         let fresnel = fr_dielectric(o_h / h2.sqrt(), eta);
         let d = facets.d(h, h2);
-        (
-            or_zero(faces, d * facets.g_cos(wi) * fresnel),
-            or_zero(faces & fresnel.simd_gt(zero), d * facets.pdf_per_d),
-        )
+        (or_zero(faces, d * facets.g_cos(wi) * fresnel), or_zero(faces & fresnel.simd_gt(zero), d * facets.pdf_per_d))
     }
+}
+
+/// `a` where `first`, else `b`.
+#[inline(always)]
+fn either<S: Simd>(first: M<S>, a: f32, b: f32) -> F<S> {
+    first.select(F::splat(first.token(), a), F::splat(first.token(), b))
 }
 
 /// Writes values where `keep`, and 0 elsewhere and where they are not finite.
 #[inline(always)]
 fn write<S: Simd>(keep: M<S>, f_cos: [F<S>; 3], pdf: F<S>, (i, out): (usize, &mut Values<'_>)) {
     let is_value = keep & f_cos[0].is_finite() & f_cos[1].is_finite() & f_cos[2].is_finite();
-    for (column, f) in out.f_cos.iter_mut().zip(f_cos) {
-        store(or_zero(is_value, f), column, i);
-    }
+    let [red, green, blue] = &mut out.f_cos;
+    store(or_zero(is_value, f_cos[0]), red, i);
+    store(or_zero(is_value, f_cos[1]), green, i);
+    store(or_zero(is_value, f_cos[2]), blue, i);
     store(or_zero(keep & pdf.is_finite(), pdf), out.pdf, i);
 }
 
@@ -389,11 +409,8 @@ mod tests {
                 let frame = Frame::from_z(warp::sample_uniform_sphere(stream.next_2d()));
                 let mut wi = [vec![0.0; n], vec![0.0; n], vec![0.0; n]];
                 for i in 0..n {
-                    let w = if i % 50 == 7 {
-                        Vec3::splat(f32::NAN)
-                    } else {
-                        warp::sample_uniform_sphere(stream.next_2d())
-                    };
+                    let w =
+                        if i % 50 == 7 { Vec3::splat(f32::NAN) } else { warp::sample_uniform_sphere(stream.next_2d()) };
                     (0..3).for_each(|c| wi[c][i] = w[c]);
                 }
                 assert_same_bits::<4>(n, |level, [r, g, b, pdf]| {

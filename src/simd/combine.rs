@@ -1,6 +1,6 @@
 //! The weights of proposals: q̂ = Y(f·cos θ · L), r = w/(m p), w·q̂ of resampling.
 
-use super::lane::{F, LANES, Vec3s, load, or_zero, store};
+use super::lane::{F, LANES, Vec3s, begin, load, or_zero, padded, store};
 use fearless_simd::{Level, Simd, dispatch, prelude::*};
 
 /// How the weights of two techniques are chosen; see the heuristics of the same names in `estimators::mis`.
@@ -46,13 +46,26 @@ pub struct Weights<'a> {
 
 /// Computes the weights of proposals; see [`Weights`].
 pub fn combine(level: Level, proposals: &Proposals<'_>, out: &mut Weights<'_>) {
-    dispatch!(level, simd => combine_lanes(simd, proposals, out));
+    let n = proposals.p.len();
+    if n >= LANES {
+        return dispatch!(level, simd => combine_lanes(simd, proposals, out));
+    }
+    let (f_cos, li) = (proposals.f_cos.map(padded), proposals.li.map(padded));
+    let (p, p_other) = (padded(proposals.p), padded(proposals.p_other));
+    let (f_cos, li) = (f_cos.each_ref().map(|v| &v[..]), li.each_ref().map(|v| &v[..]));
+    let [mut q_hat, mut r, mut w] = [[0.0; LANES]; 3];
+    let few = Proposals { f_cos, li, p: &p, p_other: &p_other, ..*proposals };
+    combine(level, &few, &mut Weights { q_hat: &mut q_hat, r: &mut r, w: &mut w });
+    out.q_hat.copy_from_slice(&q_hat[..n]);
+    out.r.copy_from_slice(&r[..n]);
+    out.w.copy_from_slice(&w[..n]);
 }
 
 #[inline(always)]
 fn combine_lanes<S: Simd>(simd: S, proposals: &Proposals<'_>, out: &mut Weights<'_>) {
     let (zero, one) = (F::splat(simd, 0.0), F::splat(simd, 1.0));
     for i in (0..proposals.p.len()).step_by(LANES) {
+        let i = begin(i, proposals.p.len());
         let f = Vec3s::load(simd, proposals.f_cos, i);
         let l = Vec3s::load(simd, proposals.li, i);
         let (x, y) = (load(simd, proposals.p, i) * proposals.m, load(simd, proposals.p_other, i) * proposals.m_other);

@@ -94,22 +94,45 @@ const fn stratum_seed(seed: u32, i: u32) -> u32 {
     mix(mix(seed).wrapping_add(i.wrapping_mul(0x9e37_79b9)))
 }
 
+/// ξ of stratum `i`, and its jitter.
+#[inline(always)]
+const fn stratum(reversed: u32, hash_phi: u32, seed: u32, i: u32) -> (u32, u32) {
+    let key = stratum_seed(seed, i);
+    (owen_scramble_reversed(reversed, key), mix(key ^ hash_phi))
+}
+
+/// Hash of `phi` for the jitter.
+#[inline(always)]
+const fn phi_hash(phi: u32) -> u32 {
+    mix(phi ^ 0x68bc_21eb)
+}
+
 #[inline(always)]
 fn strata_lanes(phi: u32, seed: u32, m: u32, out: &mut [u32], jitter: &mut [u32]) {
     let n = out.len().min(jitter.len());
     let (out, jitter) = (&mut out[..n], &mut jitter[..n]);
-    let (reversed, hash_phi, count) = (phi.reverse_bits(), mix(phi ^ 0x68bc_21eb), f64::from(m));
+    let (reversed, hash_phi) = (phi.reverse_bits(), phi_hash(phi));
+    if m.is_power_of_two() {
+        let bits = m.trailing_zeros();
+        for i in 0..n {
+            let (xi, j) = stratum(reversed, hash_phi, seed, i as u32);
+            out[i] = (i as u32).wrapping_shl(32 - bits) | xi >> bits;
+            jitter[i] = j;
+        }
+        return;
+    }
+    // The dividend is an integer below 2⁴⁸, so the fraction of the quotient is within 2⁻²⁰ of a multiple of 1/m. Less
+    // (1 − 1/m)/2 it rounds to its floor, in the low bits of a number whose last digit is 1.
+    let (count, bias) = (f64::from(m), 0.5 / f64::from(m) - 0.5);
     for i in 0..n {
-        let key = stratum_seed(seed, i as u32);
-        let xi = owen_scramble_reversed(reversed, key);
-        // Both numbers are integers below 2⁵³, whose quotient in f64 rounds to no integer that it does not reach.
-        let at = i as u32 as f64 * 4_294_967_296.0 + f64::from(xi);
-        out[i] = (at / count) as u32;
-        jitter[i] = mix(key ^ hash_phi);
+        let (xi, j) = stratum(reversed, hash_phi, seed, i as u32);
+        let quotient = (i as u32 as f64 * 4_294_967_296.0 + f64::from(xi)) / count;
+        out[i] = ((quotient + bias) + 4_503_599_627_370_496.0).to_bits() as u32;
+        jitter[i] = j;
     }
 }
 
-/// One position in each of `m` ≤ 2²⁰ equal strata of [0, 1), in units of 2⁻³²: `out[i]` = ⌊(i·2³² + ξᵢ)/m⌋, where ξᵢ is
+/// One position in each of `m` ≤ 2¹⁶ equal strata of [0, 1), in units of 2⁻³²: `out[i]` = ⌊(i·2³² + ξᵢ)/m⌋, where ξᵢ is
 /// the fraction `phi`/2³² in a nested (Owen) scramble of its own, seeded by `seed` and i. Each ξᵢ is stratified over the
 /// samples of a pixel if `phi` is. `jitter[i]` is a hash of `phi`, `seed` and i. Both slices have the length `m`.
 pub fn strata(phi: u32, seed: u32, m: u32, out: &mut [u32], jitter: &mut [u32]) {
@@ -119,10 +142,9 @@ pub fn strata(phi: u32, seed: u32, m: u32, out: &mut [u32], jitter: &mut [u32]) 
 /// The scalar twin of [`strata`], in integers.
 pub fn strata_scalar(phi: u32, seed: u32, m: u32, out: &mut [u32], jitter: &mut [u32]) {
     for i in 0..out.len() {
-        let key = stratum_seed(seed, i as u32);
-        let xi = owen_scramble_reversed(phi.reverse_bits(), key);
+        let (xi, j) = stratum(phi.reverse_bits(), phi_hash(phi), seed, i as u32);
         out[i] = (((i as u64) << 32 | u64::from(xi)) / u64::from(m)) as u32;
-        jitter[i] = mix(key ^ mix(phi ^ 0x68bc_21eb));
+        jitter[i] = j;
     }
 }
 
@@ -134,7 +156,7 @@ mod tests {
 
     #[test]
     fn lanes_give_the_bits_of_the_scalar_twins() {
-        for (case, m) in [1, 2, 3, 7, 8, 15, 16, 17, 100, 128, 255, 256, 1000].into_iter().enumerate() {
+        for (case, m) in [1, 2, 3, 7, 8, 15, 16, 17, 100, 128, 255, 256, 1000, 65535, 65536].into_iter().enumerate() {
             let [phi, seed, ..] = pcg4d([case as u32, 1, 2, 3]);
             let mut a = [vec![0; m], vec![0; m]];
             let mut b = a.clone();

@@ -3,7 +3,7 @@
 //! The running integrals are inverted lane by lane, since that is a matter of cache lines; directions and densities are in
 //! lanes; a texel is one load of four floats. The maps of the square to the sphere are those of [`crate::math::sphere_map`].
 
-use super::lane::{F, I, LANES, Vec3s, load, or_zero, safe_sqrt, sin_cos_quadrant, sin_cos_turns, store};
+use super::lane::{F, I, LANES, Vec3s, begin, load, or_zero, safe_sqrt, sin_cos_quadrant, sin_cos_turns, store};
 use super::light::LightLanes;
 use crate::math::distribution::{Running, STEP, clamped};
 use crate::math::sphere_map::pdf_equal_area_square_to_sphere;
@@ -85,8 +85,17 @@ struct Lookups {
     first: [i32; CHUNK],
     dx: Column,
     dy: Column,
-    /// Density per steradian over density per unit area.
+    /// Density per unit area of the square.
+    pdf_area: Column,
+    /// What makes it a density per steradian.
     density: Column,
+}
+
+impl Lookups {
+    fn new() -> Self {
+        let zero = [0.0; CHUNK];
+        Lookups { cell: [0; CHUNK], first: [0; CHUNK], dx: zero, dy: zero, pdf_area: zero, density: zero }
+    }
 }
 
 /// A direction on the sphere before the rotation, and the density per steradian of a uniform point of the square.
@@ -121,30 +130,27 @@ fn lat_long<S: Simd>(x: F<S>, y: F<S>) -> (Vec3s<S>, F<S>) {
 impl Environment<'_> {
     /// Samples directions; densities are 0 where the image is black.
     pub fn sample(&self, level: Level, u: [&[f32]; 2], out: &mut LightLanes<'_>) {
-        dispatch!(level, simd => self.sample_lanes(simd, u, out));
+        out.with_padding(u, |u, out| dispatch!(level, simd => self.sample_lanes(simd, u, out)));
     }
 
     #[inline(always)]
     fn sample_lanes<S: Simd>(&self, simd: S, u: [&[f32]; 2], out: &mut LightLanes<'_>) {
         let n = out.pdf.len();
         for start in (0..n).step_by(CHUNK) {
+            let start = begin(start, n);
             let count = CHUNK.min(n - start);
             let places = self.places(simd, start, count, u);
-            let mut lookups = Lookups {
-                cell: [0; CHUNK],
-                first: [0; CHUNK],
-                dx: [0.0; CHUNK],
-                dy: [0.0; CHUNK],
-                density: [0.0; CHUNK],
-            };
+            let mut lookups = Lookups::new();
             for i in (0..count).step_by(LANES) {
+                let i = begin(i, count);
                 self.directions(simd, &places, i, &mut lookups, (&mut out.wi, start + i));
             }
-            self.radiances(simd, &lookups, start, count, out);
+            self.radiances(simd, &mut lookups, start, count, out);
             for i in (0..count).step_by(LANES) {
-                let pdf = load(simd, &out.pdf[start..start + count], i) * load(simd, &lookups.density, i);
+                let i = begin(i, count);
+                let pdf = load(simd, &lookups.pdf_area, i) * load(simd, &lookups.density, i);
                 let is_sample = pdf.simd_gt(F::splat(simd, 0.0)) & pdf.is_finite();
-                store(or_zero(is_sample, pdf), &mut out.pdf[start..start + count], i);
+                store(or_zero(is_sample, pdf), out.pdf, start + i);
             }
         }
     }
@@ -192,21 +198,25 @@ impl Environment<'_> {
         store(y - y0, &mut lookups.dy, i);
     }
 
+    #[inline(always)]
+    fn texel<S: Simd>(&self, simd: S, i: usize) -> f32x4<S> {
+        f32x4::from_slice(simd, &self.texels[i])
+    }
+
     /// Radiances, and the densities per unit area of the square.
     #[inline(always)]
-    fn radiances<S: Simd>(&self, simd: S, lookups: &Lookups, start: usize, count: usize, out: &mut LightLanes<'_>) {
+    fn radiances<S: Simd>(&self, simd: S, lookups: &mut Lookups, start: usize, count: usize, out: &mut LightLanes<'_>) {
         let stride = self.distribution.resolution()[0] + 2;
         let [red, green, blue] = &mut out.li;
         let (red, green) = (&mut red[start..start + count], &mut green[start..start + count]);
-        let (blue, pdf) = (&mut blue[start..start + count], &mut out.pdf[start..start + count]);
-        let texel = |i: usize| -> f32x4<S> { f32x4::from_slice(simd, &self.texels[i]) };
+        let blue = &mut blue[start..start + count];
         for i in 0..count {
-            let cell = texel(lookups.cell[i] as usize);
-            pdf[i] = cell[3];
+            let cell = self.texel(simd, lookups.cell[i] as usize);
+            lookups.pdf_area[i] = cell[3];
             let l = if self.is_bilinear {
                 let (first, dx, dy) = (lookups.first[i] as usize, lookups.dx[i], lookups.dy[i]);
-                let upper = texel(first) * (1.0 - dx) + texel(first + 1) * dx;
-                let lower = texel(first + stride) * (1.0 - dx) + texel(first + stride + 1) * dx;
+                let upper = self.texel(simd, first) * (1.0 - dx) + self.texel(simd, first + 1) * dx;
+                let lower = self.texel(simd, first + stride) * (1.0 - dx) + self.texel(simd, first + stride + 1) * dx;
                 (upper * (1.0 - dy) + lower * dy) * self.scale
             } else {
                 cell * self.scale
@@ -214,6 +224,44 @@ impl Environment<'_> {
             red[i] = l[0];
             green[i] = l[1];
             blue[i] = l[2];
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::math::hash::HashStream;
+    use crate::simd::test_support::{LENGTHS, assert_same_bits};
+
+    #[test]
+    fn lanes_are_the_same_at_all_levels() {
+        let mut stream = HashStream::new([6, 6, 6]);
+        let [width, height] = [37, 20];
+        // Some rows and many texels are black.
+        let values: Vec<f32> = (0..width * height)
+            .map(|i| if i / width % 7 == 3 { 0.0 } else { (stream.next_f32() - 0.3).max(0.0).powi(6) })
+            .collect();
+        let distribution = PiecewiseConstant2D::new(&values, width);
+        let texels: Vec<[f32; 4]> = (0..(width + 2) * (height + 2))
+            .map(|_| [stream.next_f32(), stream.next_f32(), stream.next_f32(), stream.next_f32()])
+            .collect();
+        let world_from_light = Mat3::from_rotation_x(0.3) * Mat3::from_rotation_y(1.0);
+        for (is_equal_area, is_bilinear) in [(false, false), (false, true), (true, false), (true, true)] {
+            let texels = &texels;
+            let distribution = &distribution;
+            let map = Environment { distribution, texels, is_equal_area, is_bilinear, world_from_light, scale: 2.0 };
+            for n in LENGTHS {
+                let (u0, u1): (Vec<f32>, Vec<f32>) =
+                    (0..n).map(|i| if i == 5 { (0.0, 1.0) } else { (stream.next_f32(), stream.next_f32()) }).unzip();
+                assert_same_bits::<7>(n, |level, [x, y, z, r, g, b, pdf]| {
+                    map.sample(level, [&u0, &u1], &mut LightLanes { wi: [x, y, z], li: [r, g, b], pdf });
+                    for i in 0..n {
+                        let length2 = x[i] * x[i] + y[i] * y[i] + z[i] * z[i];
+                        assert!((length2 - 1.0).abs() < 1e-6 && pdf[i] >= 0.0);
+                    }
+                });
+            }
         }
     }
 }

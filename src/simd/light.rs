@@ -1,6 +1,6 @@
 //! Directions to one light from one point, many at once.
 
-use super::lane::{F, LANES, Vec3s, safe_sqrt, sin_cos_turns};
+use super::lane::{F, LANES, Vec3s, begin, load, padded, safe_sqrt, sin_cos_turns};
 use crate::math::warp;
 use fearless_simd::{Level, Simd, dispatch, prelude::*};
 
@@ -23,20 +23,56 @@ impl LightLanes<'_> {
         }
         self.pdf.fill(pdf);
     }
+
+    /// Calls `sample` with at least [`LANES`] numbers, the first of which are `u`.
+    pub(super) fn with_padding(&mut self, u: [&[f32]; 2], sample: impl FnOnce([&[f32]; 2], &mut LightLanes<'_>)) {
+        let n = self.pdf.len();
+        if n >= LANES {
+            return sample(u, self);
+        }
+        let u = u.map(padded);
+        let [mut x, mut y, mut z, mut r, mut g, mut b, mut pdf] = [[0.0; LANES]; 7];
+        let mut out = LightLanes { wi: [&mut x, &mut y, &mut z], li: [&mut r, &mut g, &mut b], pdf: &mut pdf };
+        sample([&u[0], &u[1]], &mut out);
+        for (to, from) in self.wi.iter_mut().chain(&mut self.li).zip([x, y, z, r, g, b]) {
+            to.copy_from_slice(&from[..n]);
+        }
+        self.pdf.copy_from_slice(&pdf[..n]);
+    }
 }
 
 /// Directions uniform on the sphere; see [`warp::sample_uniform_sphere`].
 pub fn sample_uniform_sphere(level: Level, u: [&[f32]; 2], li: [f32; 3], out: &mut LightLanes<'_>) {
+    out.with_padding(u, |u, out| dispatch!(level, simd => sample_uniform_sphere_lanes(simd, u, out)));
     out.fill(li, warp::pdf_uniform_sphere());
-    dispatch!(level, simd => sample_uniform_sphere_lanes(simd, u, out));
 }
 
 #[inline(always)]
 fn sample_uniform_sphere_lanes<S: Simd>(simd: S, u: [&[f32]; 2], out: &mut LightLanes<'_>) {
     for i in (0..out.pdf.len()).step_by(LANES) {
-        let z = F::splat(simd, 1.0) - super::lane::load(simd, u[0], i) * 2.0;
+        let i = begin(i, out.pdf.len());
+        let z = F::splat(simd, 1.0) - load(simd, u[0], i) * 2.0;
         let sin_theta = safe_sqrt(F::splat(simd, 1.0) - z * z);
-        let (sin_phi, cos_phi) = sin_cos_turns(super::lane::load(simd, u[1], i));
+        let (sin_phi, cos_phi) = sin_cos_turns(load(simd, u[1], i));
         Vec3s { x: sin_theta * cos_phi, y: sin_theta * sin_phi, z }.store(&mut out.wi, i);
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::simd::test_support::{LENGTHS, assert_same_bits};
+
+    #[test]
+    fn lanes_are_the_same_at_all_levels() {
+        for n in LENGTHS {
+            let u: Vec<f32> = (0..n).map(|i| (i as f32 * 0.618) % 1.0).collect();
+            let v: Vec<f32> = (0..n).map(|i| (i as f32 + 0.5) / n as f32).collect();
+            assert_same_bits::<7>(n, |level, [x, y, z, r, g, b, pdf]| {
+                let mut out = LightLanes { wi: [x, y, z], li: [r, g, b], pdf };
+                sample_uniform_sphere(level, [&u, &v], [1.0, 2.0, 3.0], &mut out);
+                assert!(out.pdf.iter().all(|&p| p == warp::pdf_uniform_sphere()));
+            });
+        }
     }
 }
