@@ -47,7 +47,8 @@ pub struct Resampler {
 
 /// The proposals of a point by light and by BSDF sampling: M together, unless the BSDF is all specular.
 ///
-/// A wide BSDF says little of where the light is, so that light sampling has most of them; one with a peak has half.
+/// A BSDF sample costs as much as ten light samples, which are made many at a time, and a wide BSDF says little of where the
+/// light is: it gets one in sixteen, one with a peak up to four.
 pub(super) fn shares(point: &ShadePoint<'_>) -> Shares {
     let (m, n) = (point.split.proposals, point.split.samples);
     let bsdf = &point.bsdf.bsdf;
@@ -55,15 +56,10 @@ pub(super) fn shares(point: &ShadePoint<'_>) -> Shares {
         return Shares::fixed(0, n);
     }
     let share = match bsdf {
-        Bsdf::Diffuse(_) | Bsdf::DiffuseTransmission(_) | Bsdf::Evaluated(_) => 0.125,
-        Bsdf::CoatedDiffuse(_) => 0.25,
-        Bsdf::Conductor(_) | Bsdf::Dielectric(_) | Bsdf::ThinDielectric(_) | Bsdf::Layered(_) => {
-            0.5
-        }
+        Bsdf::Diffuse(_) | Bsdf::DiffuseTransmission(_) | Bsdf::Evaluated(_) => 0.0625,
+        Bsdf::CoatedDiffuse(_) => 0.125,
+        Bsdf::Conductor(_) | Bsdf::Dielectric(_) | Bsdf::ThinDielectric(_) | Bsdf::Layered(_) => 0.25,
     };
-    static SH: std::sync::OnceLock<Vec<f32>> = std::sync::OnceLock::new();
-    let sh = SH.get_or_init(|| std::env::var("SH").unwrap_or_default().split(',').filter_map(|x| x.parse().ok()).collect());
-    let share = if sh.len() == 3 { if share == 0.125 { sh[0] } else if share == 0.25 { sh[1] } else { sh[2] } } else { share };
     let by_bsdf = ((m as f32 * share).round() as u32).clamp(1, m.saturating_sub(1).max(1));
     if m == 1 { Shares::one_of_both(point) } else { Shares::fixed(m - by_bsdf, by_bsdf) }
 }

@@ -5,6 +5,9 @@ use crate::simd;
 
 pub use crate::simd::LightLanes;
 
+/// So many samples of an area light are cheaper in vectors than one by one, if a single one is cheap.
+const FEW: usize = 3;
+
 impl Light {
     /// [`sample_li`](Self::sample_li) for each pair of numbers `u[0][i]`, `u[1][i]`. The results are those of single
     /// samples up to rounding.
@@ -26,8 +29,8 @@ impl Light {
             }
             Light::Area(area) if area.is_dark_from(ctx.p) => out.pdf.fill(0.0),
             Light::Area(area) => match area.lanes(ctx) {
-                Some(sampler) => sampler.sample(simd::level(), u, out),
-                None => self.sample_li_each(ctx, u, out),
+                Some(sampler) if out.pdf.len() >= FEW || sampler.has_setup() => sampler.sample(simd::level(), u, out),
+                _ => self.sample_li_each(ctx, u, out),
             },
         }
     }

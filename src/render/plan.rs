@@ -2,8 +2,8 @@
 //!
 //! T1, the time of a proposal, and T2, that of a sample, are measured on a few thousand camera rays. Then
 //!
-//! * `auto`: M/N = T2/T1, so that both stages take the same time [Talbot 2005, Eq. 4.4]; and N, if it is open, so that direct
-//!   light takes as long as everything else of a vertex does: N = T0/(2·T2), at least 1.
+//! * `auto`: M/N = T2/T1, so that both stages take the same time [Talbot 2005, Eq. 4.4]; and N, if it is open, by the same
+//!   rule: both stages together take as long as all that a vertex costs besides (T0), N = T0/(2·T2), at least 1.
 //! * `optimal`: the same time per estimate, split in each pixel by the variances of its own light
 //!   [Talbot 2005, Eq. 4.3], which a pilot estimates from proposals that are all traced.
 //!
@@ -24,8 +24,8 @@ use std::time::Duration;
 
 /// Camera rays on which times are measured.
 const TIMING_RAYS: usize = 8192;
-/// Proposals and samples of the estimates that are timed.
-const TIMING: Split = Split { samples: 4, proposals: 32 };
+/// Proposals and samples of the estimates that are timed: few and many.
+const TIMING: [Split; 2] = [Split { samples: 1, proposals: 8 }, Split { samples: 5, proposals: 40 }];
 /// Most samples of an estimate that times alone ask for.
 const MOST: f64 = 64.0;
 /// Camera samples per pixel of the pilot, and its proposals, all of which are traced.
@@ -84,43 +84,68 @@ pub fn prepare(world: &mut World, threads: Option<usize>, ratio_map: bool) -> Re
 struct Measured {
     /// T1 and T2; `None` if there was nothing to light.
     times: Option<StageTimes>,
-    /// All but direct light, per vertex (ns).
+    /// All that does not grow with M and N (ns).
     other: f64,
 }
 
-/// Times of some batches of camera rays on this thread, medians over the batches.
+/// Times per vertex of some batches of camera rays on this thread, medians over the batches (ns).
+#[derive(Clone, Copy, Debug, Default)]
+struct VertexTimes {
+    t1: f64,
+    t2: f64,
+    other: f64,
+}
+
+/// Fits a + M·T1 and b + N·T2 to the times of few and of many proposals and samples.
 fn measure(world: &World) -> Measured {
-    let mut settings = world.scene.integrator;
-    settings.samples = Some(TIMING.samples);
-    settings.ris.proposals = Proposals::Fixed(TIMING.proposals);
-    let mut batches = camera_batches(world, RenderSettings::default().tile_size, TIMING_RAYS);
-    for sample in batches.iter_mut().flatten() {
-        sample.split = TIMING;
-    }
+    let Some([few, many]) = vertex_times(world) else { return Measured { times: None, other: 0.0 } };
+    let [m0, m1] = TIMING.map(|split| f64::from(split.proposals));
+    let [n0, n1] = TIMING.map(|split| f64::from(split.samples));
+    let times = StageTimes {
+        t1: rounded((many.t1 - few.t1) / (m1 - m0)),
+        t2: rounded((many.t2 - few.t2) / (n1 - n0)),
+    };
+    let fixed = (few.t1 - times.t1 * m0) + (few.t2 - times.t2 * n0);
+    Measured { times: Some(times), other: 0.5 * (few.other + many.other) + fixed.max(0.0) }
+}
+
+/// Times for each split of [`TIMING`], which take turns; `None` if nothing was lit.
+fn vertex_times(world: &World) -> Option<[VertexTimes; 2]> {
+    let batches = camera_batches(world, RenderSettings::default().tile_size, TIMING_RAYS);
     let mut integrator = PathIntegrator::default();
-    let mut out = Vec::new();
-    let (mut t1, mut t2, mut other) = (Vec::new(), Vec::new(), Vec::new());
+    let (mut samples, mut out) = (Vec::new(), Vec::new());
+    let mut measured: [[Vec<f64>; 3]; 2] = Default::default();
     // The first turn fills caches
-    for turn in 0..3 {
+    for turn in 0..4 {
         for batch in batches.iter().flat_map(|b| b.chunks(1024)) {
-            integrator.trace(world, &settings, batch, &mut out);
-            let stats = integrator.take_stats();
-            let d = stats.direct;
-            if turn == 0 || d.proposals == 0 || d.segments == 0 {
-                continue;
+            for (split, [t1, t2, other]) in TIMING.into_iter().zip(&mut measured) {
+                let mut settings = world.scene.integrator;
+                settings.samples = Some(split.samples);
+                settings.ris.proposals = Proposals::Fixed(split.proposals);
+                samples.clear();
+                samples.extend(batch.iter().map(|s| CameraSample { split, ..*s }));
+                integrator.trace(world, &settings, &samples, &mut out);
+                let stats = integrator.take_stats();
+                let d = stats.direct;
+                let vertices = d.proposals / u64::from(split.proposals);
+                if turn == 0 || vertices == 0 || d.segments == 0 {
+                    continue;
+                }
+                let per_vertex = |time: Duration| time.as_nanos() as f64 / vertices as f64;
+                t1.push(per_vertex(d.t1));
+                t2.push(per_vertex(d.select + d.t2));
+                other.push(per_vertex(stats.camera_time + stats.bounce_time + stats.shade_time));
             }
-            let per = |time: Duration, count: u64| time.as_nanos() as f64 / count as f64;
-            let samples = d.proposals / u64::from(TIMING.proposals / TIMING.samples);
-            t1.push(per(d.t1, d.proposals));
-            t2.push(per(d.select + d.t2, samples.max(1)));
-            other.push(per(
-                stats.camera_time + stats.bounce_time + stats.shade_time,
-                stats.camera_rays + stats.bounce_rays,
-            ));
         }
     }
-    let times = (!t1.is_empty()).then(|| StageTimes { t1: rounded(median(&mut t1)), t2: rounded(median(&mut t2)) });
-    Measured { times, other: median(&mut other) }
+    let is_lit = measured.iter().all(|m| !m[0].is_empty());
+    is_lit.then(|| {
+        measured.map(|[mut t1, mut t2, mut other]| VertexTimes {
+            t1: median(&mut t1),
+            t2: median(&mut t2),
+            other: median(&mut other),
+        })
+    })
 }
 
 /// A time in tenths of nanoseconds, at least one: what is printed is what was used.

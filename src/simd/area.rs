@@ -77,6 +77,14 @@ pub struct AreaSampler {
 }
 
 impl AreaSampler {
+    /// True if samples have work in common that each of them would do by itself.
+    pub fn has_setup(&self) -> bool {
+        match self.surface {
+            Surface::SphericalRectangle(..) | Surface::Cone { .. } => true,
+            Surface::Rectangle(_) | Surface::Triangle(..) => false,
+        }
+    }
+
     /// Samples directions.
     pub fn sample(&self, level: Level, u: [&[f32]; 2], out: &mut LightLanes<'_>) {
         out.with_padding(u, |u, out| dispatch!(level, simd => self.sample_lanes(simd, u, out)));
