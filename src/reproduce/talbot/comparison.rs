@@ -168,7 +168,7 @@ const PILOT_SIZE: u32 = 96;
 const LEAST_SIZE: u32 = 32;
 /// Fewest and most turns.
 const TURNS: [u32; 2] = [4, 48];
-const QUICK_TURNS: u32 = 12;
+const QUICK_TURNS: u32 = 8;
 /// Turns that the size of the picture is chosen for.
 const WANTED_TURNS: f64 = 8.0;
 

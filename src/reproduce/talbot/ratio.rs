@@ -23,6 +23,8 @@ const BASE: u32 = 20;
 const SAMPLES: [u32; 9] = [20, 17, 14, 10, 7, 5, 3, 2, 1];
 /// Proposals of the rendering from which the variance of visibility follows.
 const MANY: u32 = 96;
+/// Most camera rays per turn: usual and quick.
+const MOST_CAMERA_RAYS: [u32; 2] = [16, 4];
 /// Fewest and most turns.
 const TURNS: [u32; 2] = [6, 40];
 /// `auto` may have this many times the variance of the best ratio.
@@ -137,9 +139,10 @@ pub fn run(setup: &Setup<'_>, time: Duration) -> Result<Figure, ReproduceError> 
     let (pilot, pilot_seconds) = stage.plan_per_pixel(calibration.times, calibration.budget)?;
 
     // Turns, and camera rays per turn, that fit
+    let quick = usize::from(setup.options.quick);
     let turn = calibration.seconds * 1.1 * methods.len() as f64;
     let left = time.saturating_sub(start.elapsed()).as_secs_f64() * 0.95;
-    let spp = ((left / turn / f64::from(TURNS[1])) as u32).clamp(1, 16);
+    let spp = ((left / turn / f64::from(TURNS[1])) as u32).clamp(1, MOST_CAMERA_RAYS[quick]);
     let count = ((left / (turn * f64::from(spp))) as u32).clamp(TURNS[0], TURNS[1]);
     say(&format!("  {count} turns of {} methods, {spp} camera rays each", methods.len()));
     let measured = turns(&mut stage, &methods, View::Centres, spp, 0..count, setup.observer)?;
