@@ -161,6 +161,15 @@ impl Stage {
         (scene.geometry.primitive_counts().0, scene.lights.lights.len())
     }
 
+    /// T1 and T2 as the renderer measures them for its own choice; `None` if nothing in the picture is lit.
+    pub fn stage_times(&mut self) -> Result<Option<StageTimes>, ReproduceError> {
+        Method::ris(1, 1).stratified().strata(Strata::Systematic).apply(&mut self.world);
+        self.world.scene.integrator.ris.proposals = Proposals::Auto;
+        self.world.scene.integrator.ris.stage_times = None;
+        self.shadows.store(true, Ordering::Relaxed);
+        Ok(prepare(&mut self.world, self.threads, false)?.map(|plan| plan.times))
+    }
+
     /// Finds out how each pixel best shares the time of an estimate out between proposals and samples, by the renderer's own
     /// pilot. The answer is M/N of every pixel, and the processor time that it took (s).
     pub fn plan_per_pixel(&mut self, times: StageTimes, budget: f64) -> Result<(Vec<f32>, f64), ReproduceError> {
