@@ -1,8 +1,9 @@
 //! Numbers of samples and proposals for equal time.
 //!
 //! A rendering costs c + P·(M·T1 + N·T2), where P counts shading points. T1 is what a proposal and its weight cost, T2 a
-//! sample: to draw it, to evaluate it, to trace it. Both are measured on the renderings themselves, with the baseline in
-//! turns. The split is N = B/(2·T2), M = B/(2·T1) for a time of B per point: M/N = T2/T1 [Talbot 2005, Eq. 4.4].
+//! sample: to draw it, to evaluate it, to trace it; the renderer measures both for its own choice. The split is
+//! N = B/(2·T2), M = B/(2·T1) for a time of B per point: M/N = T2/T1 [Talbot 2005, Eq. 4.4]. Then M is corrected until
+//! renderings take as long as those of the baseline.
 
 use super::measure::{Measured, Method, Seconds, Stage, View, turns};
 use super::{Observer, ReproduceError};
@@ -20,7 +21,7 @@ const MAX_PROPOSALS: u32 = 1024;
 /// Times of the stages, and a split that costs as much as the baseline.
 #[derive(Clone, Copy, Debug)]
 pub struct Calibration {
-    /// T1 and T2 (ns).
+    /// T1 and T2 (ns), by the renderer's own measurement.
     pub times: StageTimes,
     /// Direct lighting of one point by the baseline (ns).
     pub budget: f64,
@@ -28,16 +29,6 @@ pub struct Calibration {
     pub split: Split,
     /// Wall-clock seconds of one camera ray per pixel by the baseline.
     pub seconds: f64,
-}
-
-/// Times of one proposal and of one sample (ns) of what was rendered by `ris`. Stages are timed by the clock on the wall;
-/// what the machine did meanwhile is taken out of both alike.
-pub fn stage_times(m: &Measured) -> StageTimes {
-    let points = points(m);
-    let busy = m.median_seconds(|s| s.processor / s.stages().max(1e-12)).min(1.0);
-    let t1 = m.median_seconds(|s| s.t1) * busy * 1e9 / (points * f64::from(m.method.proposals));
-    let t2 = m.median_seconds(|s| s.select + s.t2) * busy * 1e9 / (points * f64::from(m.method.samples));
-    StageTimes { t1: t1.max(1e-3), t2: t2.max(1e-3) }
 }
 
 /// Shading points of a turn of `ris`.
@@ -60,10 +51,11 @@ pub fn spend_rest(budget: f64, times: StageTimes, samples: u32) -> Split {
 
 /// Measures times, and finds a split that costs what the baseline costs, within about a percent.
 pub fn calibrate(stage: &mut Stage, base: &Method, observer: Observer<'_>) -> Result<Calibration, ReproduceError> {
-    // Times, with a first guess
+    // Times, and that of the baseline
+    let default = StageTimes { t1: 100.0, t2: 100.0 };
+    let times = stage.stage_times()?.unwrap_or(default);
     let guess = Method::ris(4 * base.samples, base.samples.div_ceil(2)).stratified();
     let pilot = turns(stage, &[*base, guess], View::Centres, 1, 0..TURNS, observer)?;
-    let times = stage_times(&pilot[1]);
     let busy = pilot[0].median_seconds(|s| s.processor / s.stages().max(1e-12)).min(1.0);
     let budget = pilot[0].median_seconds(Seconds::direct) * busy * 1e9 / points(&pilot[1]);
     let seconds = pilot[0].median_seconds(|s| s.wall);
@@ -76,7 +68,6 @@ pub fn calibrate(stage: &mut Stage, base: &Method, observer: Observer<'_>) -> Re
         let range = (step + 1) * TURNS..(step + 2) * TURNS;
         let pair = turns(stage, &[*base, method], View::Centres, 1, range, observer)?;
         let excess = pair[1].time_ratio(&pair[0]) - 1.0;
-        found.times = stage_times(&pair[1]);
         if excess.abs() < MATCH {
             break;
         }

@@ -161,6 +161,15 @@ impl Stage {
         (scene.geometry.primitive_counts().0, scene.lights.lights.len())
     }
 
+    /// T1 and T2 as the renderer measures them for its own choice; `None` if nothing in the picture is lit.
+    pub fn stage_times(&mut self) -> Result<Option<StageTimes>, ReproduceError> {
+        Method::ris(1, 1).stratified().strata(Strata::Systematic).apply(&mut self.world);
+        self.world.scene.integrator.ris.proposals = Proposals::Auto;
+        self.world.scene.integrator.ris.stage_times = None;
+        self.shadows.store(true, Ordering::Relaxed);
+        Ok(prepare(&mut self.world, self.threads, false)?.map(|plan| plan.times))
+    }
+
     /// Finds out how each pixel best shares the time of an estimate out between proposals and samples, by the renderer's own
     /// pilot. The answer is M/N of every pixel, and the processor time that it took (s).
     pub fn plan_per_pixel(&mut self, times: StageTimes, budget: f64) -> Result<(Vec<f32>, f64), ReproduceError> {
@@ -370,12 +379,20 @@ impl Measured {
         let value = a.value / b.value * self.time_ratio(base);
         Estimate { value, error: value * (a.error / a.value).hypot(b.error / b.value) }
     }
+}
 
-    /// Probability of a difference of the means at least as large if both methods have the same expectation.
-    pub fn same_mean(&self, other: &Measured) -> f64 {
-        let (a, b) = (self.mean(), other.mean());
-        z_test(a.value, b.value, a.error.hypot(b.error)).p_value
+/// Probability that the mean of a method differs from that of all others (weighted by their errors) at least as much as
+/// it does, if all have the same expectation.
+pub fn same_mean(all: &[Measured], method: usize) -> f64 {
+    let (mut weights, mut sum) = (0.0, 0.0);
+    for (_, m) in all.iter().enumerate().filter(|(i, _)| *i != method) {
+        let mean = m.mean();
+        let weight = 1.0 / mean.error.powi(2).max(1e-300);
+        weights += weight;
+        sum += weight * mean.value;
     }
+    let own = all[method].mean();
+    if weights == 0.0 { 1.0 } else { z_test(own.value, sum / weights, own.error.hypot(weights.sqrt().recip())).p_value }
 }
 
 /// The median; 0 of nothing.
@@ -461,6 +478,6 @@ mod tests {
         let b = measured(&[[2.0 - r, 2.0 - r], [2.0 + r, 2.0 + r]], 0.5);
         assert!((b.at_equal_time(&a, None).value - 0.25).abs() < 1e-6);
         assert_eq!(median(vec![3.0, 1.0, 2.0, 10.0]), 2.5);
-        assert!(a.same_mean(&b) > 0.9);
+        assert!(same_mean(&[a, b], 0) > 0.9);
     }
 }

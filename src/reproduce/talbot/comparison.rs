@@ -162,12 +162,13 @@ pub struct Outcome<'a> {
 }
 
 /// Turns of the antialiased pictures, for their variance.
-const PAIR_TURNS: u32 = 2;
+const PAIR_TURNS: u32 = 4;
 /// Edge of the picture on which times are found out, and the least edge.
 const PILOT_SIZE: u32 = 96;
 const LEAST_SIZE: u32 = 32;
 /// Fewest and most turns.
 const TURNS: [u32; 2] = [4, 48];
+const QUICK_TURNS: u32 = 8;
 /// Turns that the size of the picture is chosen for.
 const WANTED_TURNS: f64 = 8.0;
 
@@ -198,7 +199,7 @@ pub fn run(setup: &Setup<'_>, case: &Case, time: Duration) -> Result<Figure, Rep
     let (named, roles) = methods(case, calibration.split);
     let list: Vec<Method> = named.iter().map(|n| n.method).collect();
     let left = time.saturating_sub(start.elapsed()).as_secs_f64() / cost(&calibration) - antialiased;
-    let count_turns = ((left / count) as u32).clamp(TURNS[0], TURNS[1]);
+    let count_turns = ((left / count) as u32).clamp(TURNS[0], if setup.options.quick { QUICK_TURNS } else { TURNS[1] });
     let Split { samples, proposals } = calibration.split;
     let [width, height] = stage.size();
     say(&format!(

@@ -23,6 +23,8 @@ const BASE: u32 = 20;
 const SAMPLES: [u32; 9] = [20, 17, 14, 10, 7, 5, 3, 2, 1];
 /// Proposals of the rendering from which the variance of visibility follows.
 const MANY: u32 = 96;
+/// Most camera rays per turn: usual and quick.
+const MOST_CAMERA_RAYS: [u32; 2] = [16, 4];
 /// Fewest and most turns.
 const TURNS: [u32; 2] = [6, 40];
 /// `auto` may have this many times the variance of the best ratio.
@@ -137,9 +139,10 @@ pub fn run(setup: &Setup<'_>, time: Duration) -> Result<Figure, ReproduceError> 
     let (pilot, pilot_seconds) = stage.plan_per_pixel(calibration.times, calibration.budget)?;
 
     // Turns, and camera rays per turn, that fit
+    let quick = usize::from(setup.options.quick);
     let turn = calibration.seconds * 1.1 * methods.len() as f64;
     let left = time.saturating_sub(start.elapsed()).as_secs_f64() * 0.95;
-    let spp = ((left / turn / f64::from(TURNS[1])) as u32).clamp(1, 16);
+    let spp = ((left / turn / f64::from(TURNS[1])) as u32).clamp(1, MOST_CAMERA_RAYS[quick]);
     let count = ((left / (turn * f64::from(spp))) as u32).clamp(TURNS[0], TURNS[1]);
     say(&format!("  {count} turns of {} methods, {spp} camera rays each", methods.len()));
     let measured = turns(&mut stage, &methods, View::Centres, spp, 0..count, setup.observer)?;
@@ -177,7 +180,9 @@ fn pictures(setup: &Setup<'_>, stage: &mut Stage, o: &Outcome) -> Result<Vec<Blo
     }
 
     let (costs, time) = o.costs();
-    let ratios = o.terms.ratios(costs, time);
+    let is_surface = o.classes.visibility.iter().map(|v| !v.is_nan());
+    let ratios: Vec<Option<f64>> =
+        o.terms.ratios(costs, time).into_iter().zip(is_surface).map(|(k, is)| k.filter(|_| is)).collect();
     let scale = Scale::new(RED_GREEN, 1.0, clamp_ratio(f64::INFINITY, costs, time).max(2.0));
     let of_pilot: Vec<Option<f64>> =
         ratios.iter().zip(&o.pilot).map(|(measured, &k)| measured.map(|_| f64::from(k))).collect();
@@ -188,7 +193,7 @@ fn pictures(setup: &Setup<'_>, stage: &mut Stage, o: &Outcome) -> Result<Vec<Blo
         let color = |k: &Option<f64>| k.map_or([0.0; 3], |k| scale.color(k)).map(|c| (c / 255.0) as f32);
         let colors = map.iter().flat_map(color).collect();
         let file = Picture::from_display(size, colors).write(&setup.options.out, &format!("figure-3-{name}"))?;
-        let caption = "green: more proposals; red: more samples; black: no variance".to_owned();
+        let caption = "green: more proposals; red: more samples; black: nothing lit".to_owned();
         shown.push(Shown { file, title: title.to_owned(), caption });
     }
     let [p, q]: [Vec<f64>; 2] =
@@ -263,7 +268,9 @@ fn figure(o: &Outcome, size: [u32; 2], blocks: Vec<Block>) -> Figure {
     let excess = auto.value / least.value.max(1e-300);
     let (costs, time) = o.costs();
     let k = ratio_of(&o.calibration.split);
-    let ratios = o.terms.ratios(costs, time);
+    let is_surface = o.classes.visibility.iter().map(|v| !v.is_nan());
+    let ratios: Vec<Option<f64>> =
+        o.terms.ratios(costs, time).into_iter().zip(is_surface).map(|(k, is)| k.filter(|_| is)).collect();
     let of_auto = o.terms.predicted(costs, time, |_| k);
     let of_best = o.terms.predicted(costs, time, |i| ratios[i].unwrap_or(k));
     let split = |i: usize| o.splits.get(i).copied().unwrap_or(o.calibration.split);
@@ -290,7 +297,7 @@ fn figure(o: &Outcome, size: [u32; 2], blocks: Vec<Block>) -> Figure {
         ),
     };
     let names: Vec<String> = (0..o.measured.len()).map(|i| o.name(i)).collect();
-    let rows: Vec<_> = o.measured.iter().zip(&names).map(|(m, n)| method_json(n, m, base, &o.classes)).collect();
+    let rows: Vec<_> = (0..names.len()).map(|i| method_json(&names[i], &o.measured, i, &o.classes)).collect();
     let numbers = json!({
         "size": size, "camera_rays_per_turn": o.spp, "turns": base.turns(),
         "t1_ns": costs.t1, "t2_ns": costs.t2, "budget_ns": time,

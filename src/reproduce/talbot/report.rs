@@ -1,6 +1,6 @@
 //! From measurements to sections of the page and to numbers.
 
-use super::super::measure::{Estimate, Measured, Seconds};
+use super::super::measure::{Estimate, Measured, Seconds, same_mean};
 use super::super::page::{Block, Cell, Page, Shown, Table};
 use super::super::pictures::{HEAT, Picture, Scale, gain, significant};
 use super::super::{ReproduceError, write_file};
@@ -26,8 +26,9 @@ pub fn estimate_json(e: Estimate) -> Value {
     json!({ "value": e.value, "standard_error": e.error })
 }
 
-/// All numbers of a method.
-pub fn method_json(name: &str, m: &Measured, base: &Measured, classes: &Classes) -> Value {
+/// All numbers of a method among those it was in turns with, the first of which is the baseline.
+pub fn method_json(name: &str, all: &[Measured], method: usize, classes: &Classes) -> Value {
+    let (m, base) = (&all[method], &all[0]);
     let class = |k: usize| {
         let mask = Some(&classes.masks[k][..]);
         json!({
@@ -43,7 +44,7 @@ pub fn method_json(name: &str, m: &Measured, base: &Measured, classes: &Classes)
         "strata": m.method.strata.name(), "stratified_points": m.method.stratified,
         "turns": m.turns(), "variance": estimate_json(m.variance(None)),
         "time_ratio": m.time_ratio(base), "at_equal_time": estimate_json(m.at_equal_time(base, None)),
-        "mean": estimate_json(m.mean()), "same_mean_p": m.same_mean(base),
+        "mean": estimate_json(m.mean()), "same_mean_p": same_mean(all, method),
         "classes": by_class, "seconds": m.seconds,
         "segments": m.segments, "proposals_drawn": m.proposals, "invalid_samples": m.invalid,
     })
@@ -78,9 +79,9 @@ pub fn comparison(setup: &Setup<'_>, o: &Outcome<'_>) -> Result<Figure, Reproduc
         Kind::Stratification => stratification(o),
     };
     let rows: Vec<Value> =
-        o.methods.iter().zip(&o.measured).map(|(n, m)| method_json(&n.name, m, base, &o.classes)).collect();
+        (0..o.methods.len()).map(|i| method_json(&o.methods[i].name, &o.measured, i, &o.classes)).collect();
     let antialiased: Vec<Value> =
-        o.antialiased.iter().map(|m| method_json("antialiased", m, &o.antialiased[0], &o.classes)).collect();
+        (0..o.antialiased.len()).map(|i| method_json("antialiased", &o.antialiased, i, &o.classes)).collect();
     let numbers = json!({
         "size": o.size, "camera_rays": o.case.primary, "turns": base.turns(),
         "t1_ns": o.calibration.times.t1, "t2_ns": o.calibration.times.t2, "budget_ns": o.calibration.budget,
@@ -217,7 +218,7 @@ fn tables(o: &Outcome<'_>) -> Vec<Block> {
     header.extend(NAMES);
     header.push("same mean, p");
     let mut table = Table::new(&header);
-    for (named, m) in o.methods.iter().zip(&o.measured) {
+    for (i, (named, m)) in o.methods.iter().zip(&o.measured).enumerate() {
         let mut cells = vec![
             Cell::text(&named.name),
             Cell::number(m.method.proposals.to_string()),
@@ -227,7 +228,7 @@ fn tables(o: &Outcome<'_>) -> Vec<Block> {
             Cell::number(percent(m.at_equal_time(base, None))),
         ];
         cells.extend(o.classes.masks.iter().map(|mask| Cell::number(percent(m.at_equal_time(base, Some(mask))))));
-        cells.push(Cell::number(significant(m.same_mean(base))));
+        cells.push(Cell::number(significant(same_mean(&o.measured, i))));
         table.row(cells);
     }
     let mut times =
@@ -311,8 +312,8 @@ const METHOD: [&str; 3] = [
     "Time: processor time of the whole rendering, all threads together. All methods take \
      turns in one run, in an order that moves on from turn to turn; the ratio of times is the median over the turns. At equal time \
      means variance × time, relative to the baseline. M and N of ris are chosen so that times agree within about one percent.",
-    "“Same mean, p” is the probability of a difference of the mean luminances at least as large as the one found if both methods \
-     have the same expectation; all are unbiased, so about one in a hundred should be below 0.01. “No stratification” means independent \
+    "“Same mean, p” is the probability that the mean luminance differs from that of all other methods at least as much as it does if \
+     all have the same expectation; all are unbiased, so about one in a hundred should be below 0.01. “No stratification” means independent \
      random numbers throughout.",
 ];
 
