@@ -29,7 +29,7 @@ fn main() -> Result<(), Box<dyn Error>> {
     let rendering = render(&world, &settings, &AtomicBool::new(false), &|_progress| ())?;
 
     let film = &rendering.film;
-    let channels = output::channels(film, &[Aov::Variance]);
+    let channels = output::channels(film, &[Aov::Variance], None);
     let (width, height) = (film.bounds.width() as usize, film.bounds.height() as usize);
     let part = Part::linear(width, height, channels.names, channels.data);
     write_image(Path::new(picture), &[part])?;

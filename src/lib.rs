@@ -9,10 +9,10 @@
 //! | 2 | [`textures`], [`geometry`], [`bsdfs`], [`cameras`], [`film`] |
 //! | 3 | [`materials`], [`lights`], [`accel`] |
 //! | 4 | [`scene`] |
-//! | 5 | [`import`], [`direct`] |
+//! | 5 | [`import`], [`direct`], [`procedural`] |
 //! | 6 | [`integrators`] |
 //! | 7 | [`render`] |
-//! | 8 | [`cli`] |
+//! | 8 | [`cli`], [`reproduce`] |
 
 pub mod accel;
 pub mod bsdfs;
@@ -28,7 +28,9 @@ pub mod integrators;
 pub mod lights;
 pub mod materials;
 pub mod math;
+pub mod procedural;
 pub mod render;
+pub mod reproduce;
 pub mod samplers;
 pub mod scene;
 pub mod simd;

@@ -3,17 +3,23 @@
 //! scaled by 1/η².
 //!
 //! Reading order: [`fresnel`], [`microfacet`], [`diffuse`], [`diffuse_transmission`], [`conductor`], [`dielectric`],
-//! [`thin_dielectric`], [`coat_table`], [`coated_diffuse`], [`layered`].
+//! [`thin_dielectric`], [`coat_table`], [`coated_diffuse`], [`layered`]; then what can only be evaluated: [`models`],
+//! [`default_lobes`], [`evaluated`], [`mod@resample`], [`sphere_study`].
 
 pub mod coat_table;
 pub mod coated_diffuse;
 pub mod conductor;
+pub mod default_lobes;
 pub mod dielectric;
 pub mod diffuse;
 pub mod diffuse_transmission;
+pub mod evaluated;
 pub mod fresnel;
 pub mod layered;
 pub mod microfacet;
+pub mod models;
+pub mod resample;
+pub mod sphere_study;
 #[cfg(test)]
 mod tests;
 pub mod thin_dielectric;
@@ -21,16 +27,20 @@ pub mod thin_dielectric;
 pub use coat_table::CoatTable;
 pub use coated_diffuse::CoatedDiffuse;
 pub use conductor::Conductor;
+pub use default_lobes::ProposalDensity;
 pub use dielectric::Dielectric;
 pub use diffuse::Diffuse;
 pub use diffuse_transmission::DiffuseTransmission;
+pub use evaluated::Evaluated;
 pub use layered::{Base, Layered};
 pub use microfacet::TrowbridgeReitz;
+pub use models::Model;
+pub use resample::{Resampled, resample};
 pub use thin_dielectric::ThinDielectric;
 
 use crate::math::hash::{pcg4d, unit_f32};
 use crate::math::{Rgb, Vec3};
-use crate::simd::bsdf::Model;
+use crate::simd::bsdf::Model as LaneModel;
 use std::f32::consts::FRAC_1_PI;
 use std::ops::BitOr;
 
@@ -109,6 +119,8 @@ pub enum Bsdf<'a> {
     CoatedDiffuse(CoatedDiffuse<'a>),
     /// Any base under any coat, by random walks.
     Layered(Layered),
+    /// Reflection that can only be evaluated.
+    Evaluated(Evaluated),
 }
 
 /// Both directions in the upper hemisphere, the whole surface being symmetric; `None` if they are on different sides.
@@ -138,6 +150,7 @@ impl Bsdf<'_> {
             Bsdf::ThinDielectric(_) => Rgb::BLACK,
             Bsdf::CoatedDiffuse(b) => b.f(wo, wi),
             Bsdf::Layered(b) => b.f(wo, wi),
+            Bsdf::Evaluated(b) => b.f(wo, wi),
         };
         if f.is_finite() { f } else { Rgb::BLACK }
     }
@@ -156,18 +169,19 @@ impl Bsdf<'_> {
             Bsdf::ThinDielectric(_) => 0.0,
             Bsdf::CoatedDiffuse(b) => b.pdf(wo, wi),
             Bsdf::Layered(b) => b.pdf(wo, wi),
+            Bsdf::Evaluated(b) => b.pdf(wo, wi),
         };
         if pdf.is_finite() { pdf } else { 0.0 }
     }
 
-    /// How f and pdf are evaluated for many directions at once, seen from `wo`; `None` if one by one: random walks, and
-    /// coats of anisotropic roughness.
-    pub fn lanes(&self, wo: Vec3) -> Option<Model<'_>> {
+    /// How f and pdf are evaluated for many directions at once, seen from `wo`; `None` if one by one: random walks,
+    /// coats of anisotropic roughness, and models that are only evaluated.
+    pub fn lanes(&self, wo: Vec3) -> Option<LaneModel<'_>> {
         let black = [0.0; 3];
         let lambertian = |reflection: Rgb, transmission: Rgb, p: [f32; 2]| {
             // A value that is not finite is black as a whole.
             let f = |rho: Rgb| if rho.is_finite() { (rho * FRAC_1_PI).to_array() } else { black };
-            Model::Lambertian { reflection: f(reflection), transmission: f(transmission), p }
+            LaneModel::Lambertian { reflection: f(reflection), transmission: f(transmission), p }
         };
         let none = lambertian(Rgb::BLACK, Rgb::BLACK, [0.0; 2]);
         match self {
@@ -179,13 +193,13 @@ impl Bsdf<'_> {
             Bsdf::Conductor(b) if b.distribution.is_smooth() => Some(none),
             Bsdf::Conductor(b) => {
                 let TrowbridgeReitz { alpha_x, alpha_y } = b.distribution;
-                Some(Model::Conductor { alpha: [alpha_x, alpha_y], eta: b.eta.to_array(), k: b.k.to_array() })
+                Some(LaneModel::Conductor { alpha: [alpha_x, alpha_y], eta: b.eta.to_array(), k: b.k.to_array() })
             }
             Bsdf::Dielectric(b) if b.is_specular() => Some(none),
-            Bsdf::Dielectric(b) => Some(Model::Dielectric(b.lanes())),
+            Bsdf::Dielectric(b) => Some(LaneModel::Dielectric(b.lanes())),
             Bsdf::ThinDielectric(_) => Some(none),
             Bsdf::CoatedDiffuse(b) => b.lanes(wo),
-            Bsdf::Layered(_) => None,
+            Bsdf::Layered(_) | Bsdf::Evaluated(_) => None,
         }
     }
 
@@ -203,6 +217,7 @@ impl Bsdf<'_> {
             Bsdf::ThinDielectric(b) => b.sample(wo, uc),
             Bsdf::CoatedDiffuse(b) => b.sample(wo, uc, u),
             Bsdf::Layered(b) => b.sample(wo, uc, u),
+            Bsdf::Evaluated(b) => b.sample(wo, uc, u),
         };
         sample.filter(|s| s.pdf > 0.0 && s.pdf.is_finite() && s.wi.z != 0.0 && s.f.is_finite() && !s.f.is_black())
     }
@@ -211,7 +226,7 @@ impl Bsdf<'_> {
     #[inline]
     pub fn has_non_specular(&self) -> bool {
         match self {
-            Bsdf::Diffuse(_) | Bsdf::DiffuseTransmission(_) | Bsdf::CoatedDiffuse(_) => true,
+            Bsdf::Diffuse(_) | Bsdf::DiffuseTransmission(_) | Bsdf::CoatedDiffuse(_) | Bsdf::Evaluated(_) => true,
             Bsdf::Conductor(b) => !b.distribution.is_smooth(),
             Bsdf::Dielectric(b) => !b.is_specular(),
             Bsdf::ThinDielectric(_) => false,
@@ -223,12 +238,27 @@ impl Bsdf<'_> {
     #[inline]
     pub fn has_specular(&self) -> bool {
         match self {
-            Bsdf::Diffuse(_) | Bsdf::DiffuseTransmission(_) => false,
+            Bsdf::Diffuse(_) | Bsdf::DiffuseTransmission(_) | Bsdf::Evaluated(_) => false,
             Bsdf::Conductor(b) => b.distribution.is_smooth(),
             Bsdf::Dielectric(b) => b.is_specular(),
             Bsdf::ThinDielectric(_) => true,
             Bsdf::CoatedDiffuse(b) => b.has_specular(),
             Bsdf::Layered(b) => b.has_specular(),
+        }
+    }
+
+    /// True if [`Self::sample`] follows a density that knows nothing of [`Self::f`], so that [`resample()`] pays.
+    #[inline]
+    pub fn is_only_evaluated(&self) -> bool {
+        match self {
+            Bsdf::Evaluated(_) => true,
+            Bsdf::Diffuse(_)
+            | Bsdf::DiffuseTransmission(_)
+            | Bsdf::Conductor(_)
+            | Bsdf::Dielectric(_)
+            | Bsdf::ThinDielectric(_)
+            | Bsdf::CoatedDiffuse(_)
+            | Bsdf::Layered(_) => false,
         }
     }
 
@@ -240,7 +270,12 @@ impl Bsdf<'_> {
             Bsdf::Diffuse(b) => b.reflectance,
             Bsdf::DiffuseTransmission(b) => b.reflectance + b.transmittance,
             Bsdf::CoatedDiffuse(b) => b.albedo(wo),
-            Bsdf::Conductor(_) | Bsdf::Dielectric(_) | Bsdf::ThinDielectric(_) | Bsdf::Layered(_) => {
+            Bsdf::Evaluated(Evaluated { model: Model::Diffuse(reflectance), .. }) => *reflectance,
+            Bsdf::Conductor(_)
+            | Bsdf::Dielectric(_)
+            | Bsdf::ThinDielectric(_)
+            | Bsdf::Layered(_)
+            | Bsdf::Evaluated(_) => {
                 let mut sum = Rgb::BLACK;
                 for i in 0..SAMPLES {
                     let stratum = (i as f32 + 0.5) / SAMPLES as f32;

@@ -1,10 +1,11 @@
 //! Options that several subcommands share, as typed.
 
+use crate::bsdfs::ProposalDensity;
 use crate::estimators::mis::Heuristic;
 use crate::lights::LightSamplerKind;
 use crate::render::output::Aov;
 use crate::samplers::SamplerKind;
-use crate::scene::{AccelKind, EstimatorKind, IntegratorKind};
+use crate::scene::{AccelKind, EstimatorKind, IntegratorKind, ProposalPoints, Proposals, StageTimes, Strata, Target};
 use clap::{Args, ValueEnum};
 use std::path::PathBuf;
 
@@ -40,15 +41,39 @@ choices!(
 );
 choices!(
     /// `--estimator`
-    EstimatorArg => EstimatorKind { Mc => EstimatorKind::Mc, Mis => EstimatorKind::Mis }
+    EstimatorArg => EstimatorKind { Mc => EstimatorKind::Mc, Mis => EstimatorKind::Mis, Ris => EstimatorKind::Ris }
 );
 choices!(
     /// `--heuristic`
     HeuristicArg => Heuristic { Balance => Heuristic::Balance, Power => Heuristic::Power, Maximum => Heuristic::Maximum }
 );
 choices!(
+    /// `--strata`
+    StrataArg => Strata {
+        None => Strata::None,
+        Proposals => Strata::Proposals,
+        Weights => Strata::Weights,
+        Systematic => Strata::Systematic,
+    }
+);
+choices!(
+    /// `--proposal-points`
+    ProposalPointsArg => ProposalPoints {
+        Independent => ProposalPoints::Independent,
+        Stratified => ProposalPoints::Stratified,
+    }
+);
+choices!(
+    /// `--target`
+    TargetArg => Target { Fgl => Target::Fgl, Gv => Target::Gv, Gvl => Target::Gvl }
+);
+choices!(
     /// `--light-choice`
     LightChoiceArg => LightSamplerKind { Uniform => LightSamplerKind::Uniform, Power => LightSamplerKind::Power, Tree => LightSamplerKind::Tree }
+);
+choices!(
+    /// `--bsdf-density`
+    BsdfDensityArg => ProposalDensity { Lobes => ProposalDensity::Lobes, Uniform => ProposalDensity::Uniform }
 );
 choices!(
     /// `--sampler`
@@ -72,6 +97,7 @@ choices!(
         Depth => Aov::Depth,
         Material => Aov::Material,
         Object => Aov::Object,
+        Ratio => Aov::Ratio,
     }
 );
 
@@ -86,15 +112,39 @@ pub struct SceneArgs {
     /// Direct-light estimator [default: the file's, or mis]
     #[arg(long)]
     pub estimator: Option<EstimatorArg>,
-    /// Samples per estimate: shadow segments per shading point [default: the file's, or 2]
-    #[arg(long, value_name = "N", value_parser = clap::value_parser!(u32).range(1..=4096))]
-    pub samples: Option<u32>,
-    /// Weights of the mis estimator [default: the file's, or power]
+    /// Samples per estimate: shadow segments per shading point, or `auto`
+    /// [default: the file's, or 2; auto for ris]
+    #[arg(long, value_name = "N", value_parser = parse_samples)]
+    pub samples: Option<SamplesArg>,
+    /// Proposals per estimate of ris: a number, `auto` (by the measured times of stages) or `optimal` (per pixel, by times
+    /// and variances) [default: the file's, or auto]
+    #[arg(long, value_name = "M", value_parser = parse_proposals)]
+    pub proposals: Option<Proposals>,
+    /// How ris draws its samples from the proposals [default: the file's, or systematic]
+    #[arg(long)]
+    pub strata: Option<StrataArg>,
+    /// How the proposals of ris lie on the lights [default: the file's, or stratified]
+    #[arg(long)]
+    pub proposal_points: Option<ProposalPointsArg>,
+    /// What ris draws samples in proportion to: f*G*L, or with visibility V where shading is dearer than rays
+    /// [default: the file's, or fgl]
+    #[arg(long)]
+    pub target: Option<TargetArg>,
+    /// Nanoseconds of a proposal and of a sample, from which `auto` and `optimal` choose [default: measured on this scene]
+    #[arg(long, value_name = "T1,T2", value_parser = parse_stage_times)]
+    pub stage_times: Option<StageTimes>,
+    /// Weights of the techniques [default: the file's, or power; balance for ris]
     #[arg(long)]
     pub heuristic: Option<HeuristicArg>,
     /// How a light is chosen [default: the file's lightsampler, or tree]
     #[arg(long)]
     pub light_choice: Option<LightChoiceArg>,
+    /// Directions proposed per bounce off materials that can only be evaluated [default: the file's, or 4]
+    #[arg(long, value_name = "M", value_parser = clap::value_parser!(u32).range(1..=4096))]
+    pub bsdf_proposals: Option<u32>,
+    /// What proposes directions for such materials [default: the file's, or lobes]
+    #[arg(long)]
+    pub bsdf_density: Option<BsdfDensityArg>,
     /// Bounces of `path` [default: the file's, or 5]
     #[arg(long, value_name = "D", value_parser = clap::value_parser!(u32).range(0..=10_000))]
     pub max_depth: Option<u32>,
@@ -142,7 +192,7 @@ pub struct RenderArgs {
     /// Stop after the pass in which this many seconds run out
     #[arg(long, value_name = "SECONDS", value_parser = parse_seconds)]
     pub time: Option<f64>,
-    /// Channels beside the picture, in EXR [default: all]
+    /// Channels beside the picture, in EXR [default: all, and ratio with --proposals optimal]
     #[arg(long, value_name = "LIST", value_delimiter = ',')]
     pub aov: Option<Vec<AovArg>>,
     /// Exposure of what a display shows (PNG and its like), in stops
@@ -154,6 +204,48 @@ pub struct RenderArgs {
     /// No progress, only warnings and errors
     #[arg(short, long)]
     pub quiet: bool,
+}
+
+/// `--samples`
+#[derive(Clone, Copy, Debug)]
+pub enum SamplesArg {
+    /// This many.
+    Fixed(u32),
+    /// The estimator's choice.
+    Auto,
+}
+
+/// Most samples and proposals of an estimate.
+const MAX_SAMPLES: u32 = 4096;
+
+fn parse_count(text: &str, words: &str) -> Result<u32, String> {
+    match text.parse::<u32>() {
+        Ok(n @ 1..=MAX_SAMPLES) => Ok(n),
+        _ => Err(format!("expected a whole number from 1 to {MAX_SAMPLES}, or {words}")),
+    }
+}
+
+fn parse_samples(text: &str) -> Result<SamplesArg, String> {
+    match text {
+        "auto" => Ok(SamplesArg::Auto),
+        _ => parse_count(text, "auto").map(SamplesArg::Fixed),
+    }
+}
+
+fn parse_proposals(text: &str) -> Result<Proposals, String> {
+    match text {
+        "auto" => Ok(Proposals::Auto),
+        "optimal" => Ok(Proposals::Optimal),
+        _ => parse_count(text, "auto, or optimal").map(Proposals::Fixed),
+    }
+}
+
+fn parse_stage_times(text: &str) -> Result<StageTimes, String> {
+    let times: Vec<f64> = text.split(',').filter_map(|t| t.trim().parse().ok()).collect();
+    match times[..] {
+        [t1, t2] if t1 > 0.0 && t2 > 0.0 && t1.is_finite() && t2.is_finite() => Ok(StageTimes { t1, t2 }),
+        _ => Err("expected two positive numbers of nanoseconds T1,T2".to_owned()),
+    }
 }
 
 fn parse_resolution(text: &str) -> Result<[u32; 2], String> {

@@ -2,7 +2,7 @@
 
 use super::args::{AccelArg, SceneArgs};
 use super::progress;
-use super::settings::load_world;
+use super::settings::{load_world, plan};
 use crate::render::bench::{BenchSettings, RayCase, Report, measure};
 use anyhow::{Context, bail};
 use clap::{Args, ValueEnum};
@@ -46,7 +46,8 @@ pub fn run(args: &BenchArgs) -> anyhow::Result<ExitCode> {
     if !matches!(args.scene.accel, AccelArg::Embree) {
         bail!("bench measures Embree; leave out --accel");
     }
-    let (world, times) = load_world(&args.scene)?;
+    let (mut world, times) = load_world(&args.scene)?;
+    plan(&args.scene, &mut world, false, false)?;
     let asked = |subject| args.subject == subject || args.subject == Subject::All;
     let settings = BenchSettings {
         intersect: asked(Subject::Intersect),

@@ -2,7 +2,7 @@
 
 use super::args::{AccelArg, SceneArgs};
 use super::progress;
-use super::settings::{load_world, render_settings};
+use super::settings::{load_world, plan, render_settings};
 use crate::accel::Accel;
 use crate::accel::bvh::Bvh;
 use crate::imaging::oiio::{self, Part};
@@ -63,6 +63,7 @@ pub fn run(args: &CrosscheckArgs) -> anyhow::Result<ExitCode> {
 
     // Rays
     let (mut world, _) = load_world(&args.scene)?;
+    plan(&args.scene, &mut world, false, true)?;
     let bvh: Box<dyn Accel> =
         Box::new(Bvh::new(Arc::clone(&world.scene.geometry), Some(Arc::clone(&world.scene.textures) as _)));
     let report = crosscheck(&world, &*bvh, args.rays);
@@ -117,7 +118,7 @@ fn table(report: &Report) -> String {
 fn picture(args: &CrosscheckArgs, world: &World) -> anyhow::Result<Vec<f32>> {
     let settings = render_settings(&args.scene, world);
     let rendering = render(world, &settings, &AtomicBool::new(false), &|_| ())?;
-    Ok(output::channels(&rendering.film, &[]).data)
+    Ok(output::channels(&rendering.film, &[], None).data)
 }
 
 fn compare(a: &[f32], b: &[f32]) -> ImageReport {

@@ -6,9 +6,11 @@
 mod args;
 mod bench;
 mod crosscheck;
+mod generate;
 mod info;
 mod progress;
 mod render;
+mod reproduce;
 mod settings;
 
 use clap::{Parser, Subcommand};
@@ -33,6 +35,10 @@ enum Command {
     Bench(bench::BenchArgs),
     /// Say what a scene holds, what it costs, and what of it was not understood
     Info(info::InfoArgs),
+    /// Render and measure the figures of a paper again, as a page with pictures
+    Reproduce(reproduce::ReproduceArgs),
+    /// Make a statue or a sky to render
+    Generate(generate::GenerateArgs),
 }
 
 /// Parses the command line, runs, and says how it went.
@@ -43,6 +49,8 @@ pub fn run() -> ExitCode {
         Command::Crosscheck(args) => crosscheck::run(args),
         Command::Bench(args) => bench::run(args),
         Command::Info(args) => info::run(args),
+        Command::Reproduce(args) => reproduce::run(args),
+        Command::Generate(args) => generate::run(args),
     };
     match result {
         Ok(code) => code,

@@ -1,8 +1,8 @@
 //! `lumiris render`
 
-use super::args::RenderArgs;
+use super::args::{AovArg, RenderArgs};
 use super::progress::{self, Bar};
-use super::settings::{SetupTimes, load_world, render_settings};
+use super::settings::{SetupTimes, load_world, plan, render_settings};
 use crate::imaging::oiio::{self, Part};
 use crate::render::output::{self, Aov};
 use crate::render::{RenderSettings, Rendering, render};
@@ -18,23 +18,18 @@ use std::time::Duration;
 /// File types that hold what a display shows.
 const DISPLAY_TYPES: [&str; 6] = ["png", "jpg", "jpeg", "tif", "tiff", "tga"];
 /// Exit code of a rendering that Ctrl-C ended, as shells have it.
-const INTERRUPTED: u8 = 130;
+pub const INTERRUPTED: u8 = 130;
 
 pub fn run(args: &RenderArgs) -> anyhow::Result<ExitCode> {
     check_outputs(&args.output)?;
-    let (world, setup) = load_world(&args.scene)?;
+    let (mut world, setup) = load_world(&args.scene)?;
+    let asks_for_ratio = args.aov.iter().flatten().any(|a| matches!(a, AovArg::Ratio));
+    plan(&args.scene, &mut world, asks_for_ratio, args.quiet)?;
     let outputs = outputs(args, &world);
     check_outputs(&outputs)?;
 
-    // Ctrl-C ends the rendering and writes what there is; a second one ends the program.
     let stop = Arc::new(AtomicBool::new(false));
-    let handler = Arc::clone(&stop);
-    ctrlc::set_handler(move || {
-        if handler.swap(true, Ordering::Relaxed) {
-            std::process::abort();
-        }
-    })
-    .context("cannot watch for Ctrl-C")?;
+    stop_at_ctrl_c(&stop)?;
 
     let bar = Bar::new(args.quiet);
     let time_limit = args.time.map(Duration::from_secs_f64);
@@ -52,6 +47,17 @@ pub fn run(args: &RenderArgs) -> anyhow::Result<ExitCode> {
     report(args, &rendering, &outputs);
     let interrupted = stop.load(Ordering::Relaxed);
     Ok(if interrupted { ExitCode::from(INTERRUPTED) } else { ExitCode::SUCCESS })
+}
+
+/// Ctrl-C sets `stop`, which ends a rendering in good order; a second one ends the program.
+pub fn stop_at_ctrl_c(stop: &Arc<AtomicBool>) -> anyhow::Result<()> {
+    let handler = Arc::clone(stop);
+    ctrlc::set_handler(move || {
+        if handler.swap(true, Ordering::Relaxed) {
+            std::process::abort();
+        }
+    })
+    .context("cannot watch for Ctrl-C")
 }
 
 fn outputs(args: &RenderArgs, world: &World) -> Vec<PathBuf> {
@@ -99,9 +105,9 @@ fn write(args: &RenderArgs, world: &World, rendering: &Rendering, path: &Path) -
     let part = if extension(path) == "exr" {
         let aovs: Vec<Aov> = match &args.aov {
             Some(list) => list.iter().map(|a| a.value()).collect(),
-            None => Aov::ALL.to_vec(),
+            None => Aov::ALL.into_iter().chain(world.splits.as_ref().map(|_| Aov::Ratio)).collect(),
         };
-        let channels = output::channels(film, &aovs);
+        let channels = output::channels(film, &aovs, world.splits.as_ref());
         Part::linear(width, height, channels.names, channels.data)
     } else {
         let names = ["R", "G", "B"].map(str::to_owned).to_vec();

@@ -1,11 +1,12 @@
 //! From typed options to a world that is ready to render.
 
-use super::args::SceneArgs;
+use super::args::{SamplesArg, SceneArgs};
 use super::progress;
 use crate::film::filter::PixelFilter;
 use crate::import::{LoadOptions, load};
 use crate::render::RenderSettings;
-use crate::scene::{IntegratorKind, Scene, World};
+use crate::render::plan::prepare;
+use crate::scene::{IntegratorKind, Proposals, Scene, Split, StageTimes, World};
 use anyhow::{Context, bail};
 use std::time::Instant;
 
@@ -51,14 +52,39 @@ fn apply(args: &SceneArgs, scene: &mut Scene) {
         i.estimator = estimator.value();
     }
     if let Some(samples) = args.samples {
-        i.samples = samples;
+        i.samples = match samples {
+            SamplesArg::Fixed(n) => Some(n),
+            SamplesArg::Auto => None,
+        };
+    }
+    if let Some(proposals) = args.proposals {
+        i.ris.proposals = proposals;
+    }
+    if let Some(strata) = args.strata {
+        i.ris.strata = strata.value();
+    }
+    if let Some(points) = args.proposal_points {
+        i.ris.points = points.value();
+    }
+    if let Some(target) = args.target {
+        i.ris.target = target.value();
+    }
+    if let Some(times) = args.stage_times {
+        i.ris.stage_times = Some(times);
     }
     if let Some(heuristic) = args.heuristic {
-        i.heuristic = heuristic.value();
+        i.heuristic = Some(heuristic.value());
     }
     if let Some(choice) = args.light_choice {
         i.light_choice = choice.value();
         scene.lights.set_kind(i.light_choice);
+    }
+    if let Some(proposals) = args.bsdf_proposals {
+        i.bsdf_proposals = proposals;
+    }
+    if let Some(density) = args.bsdf_density {
+        i.bsdf_density = density.value();
+        scene.materials.set_proposal_density(i.bsdf_density);
     }
     if let Some(spp) = args.spp {
         scene.sampling.spp = spp;
@@ -83,6 +109,21 @@ pub fn load_world(args: &SceneArgs) -> anyhow::Result<(World, SetupTimes)> {
     let world = World::new(scene, args.accel.value(), args.packet_width)
         .with_context(|| format!("cannot build the ray tracer of {}", args.scene.display()))?;
     Ok((world, SetupTimes { load, build: start.elapsed().as_secs_f64() }))
+}
+
+/// Chooses the numbers of samples and proposals that are still open, and says what it chose unless `quiet`.
+pub fn plan(args: &SceneArgs, world: &mut World, ratio_map: bool, quiet: bool) -> anyhow::Result<()> {
+    let threads = args.threads.map(|t| t as usize);
+    if let (Some(plan), false) = (prepare(world, threads, ratio_map)?, quiet) {
+        let Split { samples, proposals } = plan.split;
+        let StageTimes { t1, t2 } = plan.times;
+        let by_pixel =
+            if world.scene.integrator.ris.proposals == Proposals::Optimal { ", split anew in each pixel" } else { "" };
+        progress::say(&format!(
+            "ris: {samples} of {proposals} proposals are traced{by_pixel} (a proposal takes {t1} ns, a sample {t2} ns)"
+        ));
+    }
+    Ok(())
 }
 
 /// How the options say to render.

@@ -10,17 +10,21 @@
 //! * **T2** ([`visibility`]): shadow segments in packets.
 //! * **resolve**: the sum of the contributions whose segment is free.
 
+pub mod proposals;
 pub mod propose;
+pub mod ris;
 pub mod select;
 pub mod visibility;
 
 use crate::accel::RayBatch;
+use crate::lights::LightCtx;
 use crate::materials::SurfaceBsdf;
 use crate::math::ray::offset_origin;
 use crate::math::{Rgb, Vec3};
 use crate::samplers::SampleStream;
-use crate::scene::{IntegratorSettings, World};
+use crate::scene::{EstimatorKind, IntegratorSettings, Split, World};
 use propose::Candidates;
+use ris::Resampler;
 use std::time::{Duration, Instant};
 use visibility::Segments;
 
@@ -39,6 +43,8 @@ pub struct ShadePoint<'a> {
     pub time: f32,
     /// Random numbers of this point; each technique takes a domain of it.
     pub stream: SampleStream,
+    /// Numbers of samples and proposals.
+    pub split: Split,
 }
 
 impl ShadePoint<'_> {
@@ -46,6 +52,12 @@ impl ShadePoint<'_> {
     #[inline]
     pub fn origin(&self, w: Vec3) -> Vec3 {
         offset_origin(self.p, self.p_error, self.bsdf.n, w)
+    }
+
+    /// The point as lights see it.
+    #[inline]
+    pub fn light_ctx(&self) -> LightCtx {
+        LightCtx { p: self.p, n: self.bsdf.n, ns: self.bsdf.frame.z }
     }
 }
 
@@ -88,6 +100,7 @@ impl DirectStats {
 #[derive(Debug, Default)]
 pub struct DirectStage {
     candidates: Candidates,
+    resampler: Resampler,
     contributions: Vec<Rgb>,
     segments: Segments,
     /// Counts and times so far.
@@ -98,6 +111,11 @@ impl DirectStage {
     /// The shadow segments of the last batch of points, in the order in which they were traced.
     pub fn segments(&self) -> &RayBatch {
         self.segments.rays()
+    }
+
+    /// The samples of the last batch, in the order of their points: point, what it adds if visible, whether it is.
+    pub fn outcomes(&self) -> impl Iterator<Item = (u32, Rgb, bool)> {
+        self.segments.outcomes()
     }
 
     /// Estimates ∫ f_s L_direct |cos θ| dω for each point; `out[i]` belongs to `points[i]`.
@@ -111,15 +129,34 @@ impl DirectStage {
         // T1: propose candidates
         let start = Instant::now();
         self.candidates.propose(world, settings, points);
-        let proposed = Instant::now();
+        let mut t1 = start.elapsed();
+        let mut t1_light = self.candidates.light_time;
 
         // Select: contributions of the estimator, and the segments that decide them
-        select::contributions(settings, &self.candidates, &mut self.contributions);
+        let proposed = Instant::now();
+        let mut is_visible = false;
+        match settings.estimator {
+            EstimatorKind::Mc | EstimatorKind::Mis => {
+                select::contributions(settings, &self.candidates, &mut self.contributions);
+            }
+            EstimatorKind::Ris => {
+                self.resampler.run(world, settings, points, &mut self.candidates, &mut self.contributions);
+                t1 += self.resampler.t1;
+                t1_light += self.resampler.t1;
+                is_visible = settings.ris.target.has_visibility();
+            }
+        }
         self.segments.gather(&self.candidates, &self.contributions);
-        let selected = Instant::now();
+        let select = proposed.elapsed() - (t1_light - self.candidates.light_time);
 
         // T2: trace
-        self.segments.trace(&*world.accel);
+        let selected = Instant::now();
+        if is_visible {
+            self.segments.set_free();
+        } else {
+            self.segments.trace(&*world.accel);
+            self.stats.segments += self.segments.len() as u64;
+        }
         let traced = Instant::now();
 
         // Resolve
@@ -130,10 +167,10 @@ impl DirectStage {
         self.stats.proposals += self.candidates.proposals;
         self.stats.light_proposals += self.candidates.light_proposals;
         self.stats.emitter_rays += self.candidates.emitter_rays;
-        self.stats.segments += self.segments.len() as u64;
-        self.stats.t1 += proposed - start;
-        self.stats.t1_light += self.candidates.light_time;
-        self.stats.select += (selected - proposed) + traced.elapsed();
+        self.stats.segments += self.resampler.probed;
+        self.stats.t1 += t1;
+        self.stats.t1_light += t1_light;
+        self.stats.select += select + traced.elapsed();
         self.stats.t2 += traced - selected;
     }
 }

@@ -1,8 +1,10 @@
-//! T1: candidates with their unshadowed integrand and the densities of every technique. Scalar.
+//! T1: candidates with their unshadowed integrand and the densities of every technique, one at a time.
 
 use super::ShadePoint;
 use crate::accel::{Hit, RayBatch};
-use crate::lights::{LightCtx, LightHit};
+use crate::estimators::mc;
+use crate::estimators::mis::{Heuristic, Technique};
+use crate::lights::{LightHit, LightId, LightSample};
 use crate::math::ray::{SEGMENT_END, offset_origin};
 use crate::math::{Ray, Rgb, Vec3};
 use crate::samplers::SampleStream;
@@ -29,6 +31,16 @@ pub enum Drawn {
     DeltaBsdf,
 }
 
+impl Drawn {
+    /// True if no other technique can draw the direction.
+    pub fn is_delta(self) -> bool {
+        match self {
+            Drawn::DeltaLight | Drawn::DeltaBsdf => true,
+            Drawn::Light | Drawn::Bsdf => false,
+        }
+    }
+}
+
 /// A candidate: one direction of light at one point.
 #[derive(Clone, Copy, Debug)]
 pub struct Candidate {
@@ -38,6 +50,8 @@ pub struct Candidate {
     pub drawn: Drawn,
     /// Unshadowed integrand f_s·|cos θ|·L.
     pub f: Rgb,
+    /// The radiance L in it.
+    pub li: Rgb,
     /// Density of light sampling at the direction (per steradian, light choice included; a probability for deltas).
     pub p_light: f32,
     /// Density of BSDF sampling (per steradian; as the BSDF gives it for specular lobes).
@@ -48,6 +62,21 @@ pub struct Candidate {
     pub n_bsdf: f32,
     /// What must be free for the candidate to count.
     pub segment: Ray,
+}
+
+impl Candidate {
+    /// The factor w/(n·p) of f in the estimate over all candidates of a point, if both techniques are used.
+    #[inline]
+    pub fn factor(&self, heuristic: Heuristic) -> f32 {
+        let light = Technique { n: self.n_light, p: self.p_light };
+        let bsdf = Technique { n: self.n_bsdf, p: self.p_bsdf };
+        match self.drawn {
+            Drawn::DeltaLight => mc::weight(light.n, light.p),
+            Drawn::DeltaBsdf => mc::weight(bsdf.n, bsdf.p),
+            Drawn::Light => heuristic.weight(light, bsdf) * mc::weight(light.n, light.p),
+            Drawn::Bsdf => heuristic.weight(bsdf, light) * mc::weight(bsdf.n, bsdf.p),
+        }
+    }
 }
 
 /// All candidates of a batch, in the order of their shading points.
@@ -63,6 +92,7 @@ pub struct Candidates {
     pub emitter_rays: u64,
     /// Time in light samples.
     pub light_time: Duration,
+    pub(super) spare: Vec<Candidate>,
     pending: Vec<PendingBsdf>,
     rays: RayBatch,
     hits: Vec<Option<Hit>>,
@@ -77,44 +107,49 @@ struct PendingBsdf {
     f_cos: Rgb,
     pdf: f32,
     specular: bool,
-    share: Share,
+    shares: Shares,
 }
 
 /// How many samples each technique has at a point.
 #[derive(Clone, Copy, Debug)]
-struct Share {
-    light_draws: u32,
-    bsdf_draws: u32,
-    n_light: f32,
-    n_bsdf: f32,
+pub(super) struct Shares {
+    pub light_draws: u32,
+    pub bsdf_draws: u32,
+    /// Expected numbers.
+    pub n_light: f32,
+    pub n_bsdf: f32,
 }
 
-/// Splits N samples between the techniques. A single sample of `mis` chooses its technique at random, so that
-/// the expected numbers are one half each.
-fn share(settings: &IntegratorSettings, point: &ShadePoint<'_>) -> Share {
-    let n = settings.samples.max(1);
-    let fixed = |light: u32, bsdf: u32| Share {
-        light_draws: light,
-        bsdf_draws: bsdf,
-        n_light: light as f32,
-        n_bsdf: bsdf as f32,
-    };
-    if !point.bsdf.bsdf.has_non_specular() {
-        return fixed(0, n);
+impl Shares {
+    /// So many of each.
+    pub fn fixed(light: u32, bsdf: u32) -> Self {
+        Shares { light_draws: light, bsdf_draws: bsdf, n_light: light as f32, n_bsdf: bsdf as f32 }
     }
-    match settings.estimator {
-        EstimatorKind::Mc if point.bsdf.bsdf.has_specular() => fixed(n, 1),
-        EstimatorKind::Mc => fixed(n, 0),
-        EstimatorKind::Mis if n == 1 => {
-            let light = point.stream.domain(domain::TECHNIQUE).draw::<1>()[0] < 0.5;
-            Share { light_draws: u32::from(light), bsdf_draws: u32::from(!light), n_light: 0.5, n_bsdf: 0.5 }
+
+    /// A single sample that chooses its technique at random, so that the expected numbers are one half each.
+    pub fn one_of_both(point: &ShadePoint<'_>) -> Self {
+        let light = point.stream.domain(domain::TECHNIQUE).draw::<1>()[0] < 0.5;
+        Shares { light_draws: u32::from(light), bsdf_draws: u32::from(!light), n_light: 0.5, n_bsdf: 0.5 }
+    }
+
+    /// Splits the samples, or the proposals, between the techniques.
+    fn new(settings: &IntegratorSettings, point: &ShadePoint<'_>) -> Self {
+        let n = point.split.samples;
+        if !point.bsdf.bsdf.has_non_specular() {
+            return Shares::fixed(0, n);
         }
-        EstimatorKind::Mis => fixed(n.div_ceil(2), n / 2),
+        match settings.estimator {
+            EstimatorKind::Mc => Shares::fixed(n, u32::from(point.bsdf.bsdf.has_specular())),
+            EstimatorKind::Mis if n == 1 => Shares::one_of_both(point),
+            EstimatorKind::Mis => Shares::fixed(n.div_ceil(2), n / 2),
+            EstimatorKind::Ris => super::ris::shares(point),
+        }
     }
 }
 
 impl Candidates {
-    /// Draws the candidates of all points.
+    /// Draws the candidates of all points; for `ris` only those by BSDF sampling, since light samples are many and stay
+    /// with [`super::ris`].
     pub fn propose(&mut self, world: &World, settings: &IntegratorSettings, points: &[ShadePoint<'_>]) {
         self.records.clear();
         self.pending.clear();
@@ -124,22 +159,31 @@ impl Candidates {
         // Light samples
         let start = Instant::now();
         for (index, point) in points.iter().enumerate() {
-            let share = share(settings, point);
-            self.proposals += u64::from(share.light_draws + share.bsdf_draws);
-            self.light_proposals += u64::from(share.light_draws);
-            for i in 0..share.light_draws {
-                let stream = point.stream.split(domain::LIGHT, share.light_draws, i);
-                self.records.extend(light_candidate(world, index as u32, point, share, stream));
+            let shares = Shares::new(settings, point);
+            self.proposals += u64::from(shares.light_draws + shares.bsdf_draws);
+            self.light_proposals += u64::from(shares.light_draws);
+            if settings.estimator == EstimatorKind::Ris {
+                continue;
+            }
+            for i in 0..shares.light_draws {
+                let stream = point.stream.split(domain::LIGHT, shares.light_draws, i);
+                let [u_choice, u0, u1] = stream.draw::<3>();
+                let ctx = point.light_ctx();
+                let candidate =
+                    world.scene.lights.sample(&ctx, u_choice, [u0, u1]).and_then(|(light, sample)| {
+                        light_candidate(world, index as u32, point, &shares, (light, sample))
+                    });
+                self.records.extend(candidate);
             }
         }
         self.light_time = start.elapsed();
 
         // BSDF samples up to the question which emitter they point at
         for (index, point) in points.iter().enumerate() {
-            let share = share(settings, point);
-            for i in 0..share.bsdf_draws {
-                let stream = point.stream.split(domain::BSDF, share.bsdf_draws, i);
-                self.draw_bsdf(index as u32, point, share, stream);
+            let shares = Shares::new(settings, point);
+            for i in 0..shares.bsdf_draws {
+                let stream = point.stream.split(domain::BSDF, shares.bsdf_draws, i);
+                self.draw_bsdf(index as u32, point, shares, stream);
             }
         }
 
@@ -151,7 +195,7 @@ impl Candidates {
         }
     }
 
-    fn draw_bsdf(&mut self, index: u32, point: &ShadePoint<'_>, share: Share, stream: SampleStream) {
+    fn draw_bsdf(&mut self, index: u32, point: &ShadePoint<'_>, shares: Shares, stream: SampleStream) {
         let [uc, u0, u1] = stream.draw::<3>();
         let Some(sample) = point.bsdf.sample(point.wo, uc, [u0, u1]) else { return };
         let f_cos = sample.f * sample.wi.dot(point.bsdf.frame.z).abs();
@@ -166,28 +210,23 @@ impl Candidates {
             f_cos,
             pdf: sample.pdf,
             specular: sample.lobe.is_specular(),
-            share,
+            shares,
         });
     }
 }
 
-/// One light sample; `None` if its integrand is zero.
-fn light_candidate(
+/// A sample of a light, whose density includes the choice; `None` if its integrand is zero.
+pub(super) fn light_candidate(
     world: &World,
     index: u32,
     point: &ShadePoint<'_>,
-    share: Share,
-    stream: SampleStream,
+    shares: &Shares,
+    (light, mut sample): (LightId, LightSample),
 ) -> Option<Candidate> {
-    // Choose a light and a point on it
-    let lights = &world.scene.lights;
-    let [u_choice, u0, u1] = stream.draw::<3>();
-    let ctx = LightCtx { p: point.p, n: point.bsdf.n, ns: point.bsdf.frame.z };
-    let (light, mut sample) = lights.sample(&ctx, u_choice, [u0, u1])?;
-
     // Lights at infinity overlap: a direction belongs to all of them together
+    let lights = &world.scene.lights;
     if lights.infinite.contains(&light) {
-        (sample.li, sample.pdf) = (lights.le(sample.wi), lights.pdf_infinite(&ctx, sample.wi));
+        (sample.li, sample.pdf) = (lights.le(sample.wi), lights.pdf_infinite(&point.light_ctx(), sample.wi));
     }
 
     // Unshadowed integrand
@@ -204,10 +243,11 @@ fn light_candidate(
         point: index,
         drawn,
         f,
+        li: sample.li,
         p_light: sample.pdf,
         p_bsdf,
-        n_light: share.n_light,
-        n_bsdf: share.n_bsdf,
+        n_light: shares.n_light,
+        n_bsdf: shares.n_bsdf,
         segment: segment(point, sample.wi, end),
     })
 }
@@ -220,7 +260,7 @@ fn bsdf_candidate(
     hit: Option<&EmitterHit>,
 ) -> Option<Candidate> {
     let lights = &world.scene.lights;
-    let ctx = LightCtx { p: point.p, n: point.bsdf.n, ns: point.bsdf.frame.z };
+    let ctx = point.light_ctx();
     let (li, p_light, segment) = match hit {
         Some(hit) => {
             let light = hit.light?;
@@ -244,10 +284,11 @@ fn bsdf_candidate(
         point: pending.point,
         drawn: if pending.specular { Drawn::DeltaBsdf } else { Drawn::Bsdf },
         f,
+        li,
         p_light,
         p_bsdf: pending.pdf,
-        n_light: pending.share.n_light,
-        n_bsdf: pending.share.n_bsdf,
+        n_light: pending.shares.n_light,
+        n_bsdf: pending.shares.n_bsdf,
         segment,
     })
 }

@@ -1,6 +1,6 @@
 //! T2: shadow segments, packed in the order of their shading points, and the bits that come back.
 
-use super::propose::Candidates;
+use super::propose::{Candidate, Candidates};
 use crate::accel::{Accel, Coherence, RayBatch};
 use crate::math::Rgb;
 
@@ -24,19 +24,28 @@ impl Segments {
         self.rays.is_empty()
     }
 
-    /// Takes the segments of all candidates whose contribution is finite and not zero, in candidate order:
-    /// those of one shading point, which share their origin, stay together.
-    pub fn gather(&mut self, candidates: &Candidates, contributions: &[Rgb]) {
+    /// Removes all.
+    pub fn clear(&mut self) {
         self.rays.clear();
         self.contributions.clear();
         self.points.clear();
+    }
+
+    /// Adds the segment of a candidate.
+    pub fn push(&mut self, candidate: &Candidate, contribution: Rgb) {
+        self.rays.push(&candidate.segment);
+        self.contributions.push(contribution);
+        self.points.push(candidate.point);
+    }
+
+    /// Takes the segments of all candidates whose contribution is finite and not zero, in candidate order:
+    /// those of one shading point, which share their origin, stay together.
+    pub fn gather(&mut self, candidates: &Candidates, contributions: &[Rgb]) {
+        self.clear();
         for (candidate, &contribution) in candidates.records.iter().zip(contributions) {
-            if contribution.is_black() || !contribution.is_finite() {
-                continue;
+            if !contribution.is_black() && contribution.is_finite() {
+                self.push(candidate, contribution);
             }
-            self.rays.push(&candidate.segment);
-            self.contributions.push(contribution);
-            self.points.push(candidate.point);
         }
     }
 
@@ -50,10 +59,27 @@ impl Segments {
         accel.occluded(&self.rays, Coherence::Packets, &mut self.occluded);
     }
 
+    /// Takes all segments for free without tracing them.
+    pub fn set_free(&mut self) {
+        self.occluded.clear();
+        self.occluded.resize(self.rays.len(), false);
+    }
+
+    /// For each segment, whether something was in the way.
+    pub fn occluded(&self) -> &[bool] {
+        &self.occluded
+    }
+
+    /// Point, contribution if free, and whether it is free, of each segment.
+    pub fn outcomes(&self) -> impl Iterator<Item = (u32, Rgb, bool)> {
+        let segments = self.points.iter().zip(&self.contributions).zip(&self.occluded);
+        segments.map(|((&point, &contribution), &occluded)| (point, contribution, !occluded))
+    }
+
     /// Adds the contributions of the free segments to their points, in order.
     pub fn resolve(&self, out: &mut [Rgb]) {
-        for ((&point, &contribution), &occluded) in self.points.iter().zip(&self.contributions).zip(&self.occluded) {
-            if !occluded {
+        for (point, contribution, is_free) in self.outcomes() {
+            if is_free {
                 out[point as usize] += contribution;
             }
         }

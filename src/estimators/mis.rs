@@ -58,6 +58,29 @@ impl Heuristic {
             Heuristic::Maximum => f32::from(u8::from(ratio < 1.0)),
         }
     }
+
+    /// Weight of technique `i` among any number of `techniques` at a sample that it drew. In 0..=1; finite for any
+    /// densities. Infinite densities share.
+    pub fn weight_of(self, i: usize, techniques: &[Technique]) -> f32 {
+        let expected = |t: &Technique| if t.n * t.p > 0.0 { t.n * t.p } else { 0.0 };
+        let x = expected(&techniques[i]);
+        let most = techniques.iter().map(expected).fold(0.0, f32::max);
+        if x == 0.0 {
+            return 0.0;
+        }
+        if most.is_infinite() {
+            let infinite = techniques.iter().filter(|t| expected(t).is_infinite()).count();
+            return if x.is_infinite() { 1.0 / infinite as f32 } else { 0.0 };
+        }
+
+        // Relative to the largest, so that neither squares overflow nor inf/inf appears.
+        let relative = |y: f32| match self {
+            Heuristic::Balance => y / most,
+            Heuristic::Power => (y / most) * (y / most),
+            Heuristic::Maximum => f32::from(u8::from(y / most >= 1.0 - TIE)),
+        };
+        relative(x) / techniques.iter().map(|t| relative(expected(t))).sum::<f32>()
+    }
 }
 
 #[cfg(test)]
@@ -77,6 +100,24 @@ mod tests {
                 }
             }
         }
+    }
+
+    #[test]
+    fn weight_of_two_techniques_is_the_weight_and_any_number_sum_to_one() {
+        let values = [0.0, 1e-30, 0.3, 0.7, 5.0, 1e30, f32::INFINITY];
+        for h in ALL {
+            for p in values {
+                for q in values {
+                    let two = [Technique { n: 1.0, p }, Technique { n: 2.0, p: q }];
+                    assert!((h.weight_of(0, &two) - h.weight(two[0], two[1])).abs() < 1e-6, "{h:?} {p} {q}");
+                    let three = [two[0], two[1], Technique { n: 3.0, p: 0.2 }];
+                    let sum: f32 = (0..3).map(|i| h.weight_of(i, &three)).sum();
+                    assert!((sum - 1.0).abs() < 1e-6, "{h:?} {p} {q}: {sum}");
+                }
+            }
+        }
+        let none = [Technique { n: 1.0, p: f32::NAN }, Technique { n: 0.0, p: f32::INFINITY }];
+        assert!(ALL.iter().all(|h| h.weight_of(0, &none) == 0.0 && h.weight_of(1, &none) == 0.0));
     }
 
     #[test]

@@ -4,9 +4,13 @@
 //! |---|---|---|
 //! | [`mc`] | (1/N) Σ f/p | none |
 //! | [`mis`] | Σᵢ (1/nᵢ) Σⱼ wᵢ f/pᵢ, weights that sum to one | none |
+//! | [`ris`] | Σ scale·f r over N proposals drawn from M | none |
+//! | [`baselines`] | weighted importance sampling, defensive mixture, bidirectional | stated with each |
 //!
 //! [`stats`] has running moments and the tests (t, z, χ²) that hold estimators to these claims.
 
+pub mod baselines;
 pub mod mc;
 pub mod mis;
+pub mod ris;
 pub mod stats;

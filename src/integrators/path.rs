@@ -13,7 +13,7 @@ use crate::lights::LightHit;
 use crate::materials::SurfaceBsdf;
 use crate::math::{Ray, Rgb, Vec2, Vec3};
 use crate::samplers::SampleStream;
-use crate::scene::{IntegratorSettings, World};
+use crate::scene::{IntegratorSettings, Split, World};
 use crate::textures::TextureContext;
 use std::time::{Duration, Instant};
 
@@ -22,6 +22,7 @@ mod domain {
     pub const DIRECT: u32 = 0;
     pub const BSDF: u32 = 1;
     pub const ROULETTE: u32 = 2;
+    pub const RESAMPLE: u32 = 3;
     /// Vertex k uses the domain `VERTEX + k` of the camera sample.
     pub const VERTEX: u32 = 16;
 }
@@ -71,6 +72,17 @@ pub struct Recording {
     pub bounce_segments: Vec<RayBatch>,
 }
 
+/// What a sample of direct light at a first vertex came to.
+#[derive(Clone, Copy, Debug)]
+pub struct Outcome {
+    /// Index of the camera sample.
+    pub sample: u32,
+    /// What it adds if it is visible.
+    pub unshadowed: Rgb,
+    /// What it adds.
+    pub contribution: Rgb,
+}
+
 /// A camera sample to be traced.
 #[derive(Clone, Copy, Debug)]
 pub struct CameraSample {
@@ -80,6 +92,8 @@ pub struct CameraSample {
     pub weight: f32,
     /// Its random numbers.
     pub stream: SampleStream,
+    /// Samples and proposals of its first vertex.
+    pub split: Split,
 }
 
 /// A path on its way.
@@ -112,6 +126,8 @@ pub struct PathIntegrator {
     stats: PathStats,
     /// Where copies of what is traced go, if they are wanted.
     pub recording: Option<Recording>,
+    /// Where the samples of direct light at first vertices go, if they are wanted.
+    pub outcomes: Option<Vec<Outcome>>,
 }
 
 impl PathIntegrator {
@@ -148,8 +164,18 @@ impl PathIntegrator {
             if self.active.is_empty() {
                 break;
             }
-            let points = self.find_vertices(world, vertex, depth, samples, out);
-            self.light_vertices(world, settings, vertex, depth, &points, out);
+            let vertices = self.find_vertices(world, vertex, depth, samples, out);
+            let split = settings.split();
+            let points: Vec<ShadePoint<'_>> = vertices
+                .iter()
+                .zip(&self.active)
+                .map(|(v, path)| {
+                    let split = if vertex == 0 { samples[path.sample as usize].split } else { split };
+                    v.shade_point(path.ray.time, split)
+                })
+                .collect();
+            self.light_points(world, settings, vertex, &points, out);
+            self.extend_paths(settings, vertex, &vertices, &points);
             std::mem::swap(&mut self.active, &mut self.next);
         }
     }
@@ -231,34 +257,45 @@ impl PathIntegrator {
         }
     }
 
-    /// Adds the direct light of the vertices, and fills `self.next` with the paths that go on.
-    fn light_vertices(
+    /// Adds the direct light of the vertices of the active paths.
+    fn light_points(
         &mut self,
         world: &World,
         settings: &IntegratorSettings,
         vertex: u32,
-        depth: u32,
-        vertices: &[Vertex<'_>],
+        points: &[ShadePoint<'_>],
         out: &mut [PixelSample],
     ) {
-        // Direct light
-        let points: Vec<ShadePoint<'_>> =
-            vertices.iter().zip(&self.active).map(|(v, path)| v.shade_point(path.ray.time)).collect();
-        self.direct.estimate(world, settings, &points, &mut self.radiance);
+        self.direct.estimate(world, settings, points, &mut self.radiance);
         if let Some(r) = &mut self.recording {
             let batches = if vertex == 0 { &mut r.segments } else { &mut r.bounce_segments };
             batches.push(self.direct.segments().clone());
         }
+        if let Some(outcomes) = self.outcomes.as_mut().filter(|_| vertex == 0) {
+            outcomes.extend(self.direct.outcomes().map(|(point, unshadowed, is_free)| {
+                let contribution = if is_free { unshadowed } else { Rgb::BLACK };
+                Outcome { sample: self.active[point as usize].sample, unshadowed, contribution }
+            }));
+        }
         for (path, &radiance) in self.active.iter().zip(&self.radiance) {
             out[path.sample as usize].radiance += path.beta * radiance;
         }
+    }
 
-        // Continuation
+    /// Fills `self.next` with the paths that go on.
+    fn extend_paths(
+        &mut self,
+        settings: &IntegratorSettings,
+        vertex: u32,
+        vertices: &[Vertex<'_>],
+        points: &[ShadePoint<'_>],
+    ) {
+        let depth = settings.depth();
         let start = Instant::now();
         self.next.clear();
         if vertex + 1 < depth {
-            let paths = self.active.iter().zip(vertices).zip(&points);
-            self.next.extend(paths.filter_map(|((path, v), point)| extend(path, v, point, vertex)));
+            let paths = self.active.iter().zip(vertices).zip(points);
+            self.next.extend(paths.filter_map(|((path, v), point)| extend(path, v, point, vertex, settings)));
         }
         self.stats.shade_time += start.elapsed();
     }
@@ -274,7 +311,7 @@ struct Vertex<'w> {
 }
 
 impl<'w> Vertex<'w> {
-    fn shade_point(&self, time: f32) -> ShadePoint<'w> {
+    fn shade_point(&self, time: f32, split: Split) -> ShadePoint<'w> {
         ShadePoint {
             p: self.surface.p,
             p_error: self.surface.p_error,
@@ -282,17 +319,22 @@ impl<'w> Vertex<'w> {
             bsdf: self.bsdf,
             time,
             stream: self.stream.domain(domain::DIRECT),
+            split,
         }
     }
 }
 
 /// The next path segment by BSDF sampling and Russian roulette; `None` if the path ends.
-fn extend(path: &PathState, v: &Vertex<'_>, point: &ShadePoint<'_>, vertex: u32) -> Option<PathState> {
-    // Sample the BSDF
-    let [uc, u0, u1] = v.stream.domain(domain::BSDF).draw::<3>();
-    let sample = v.bsdf.sample(v.wo, uc, [u0, u1])?;
-    let mut beta = path.beta * sample.f * (sample.wi.dot(v.bsdf.frame.z).abs() / sample.pdf);
-    let eta_scale = path.eta_scale * sample.eta * sample.eta;
+fn extend(
+    path: &PathState,
+    v: &Vertex<'_>,
+    point: &ShadePoint<'_>,
+    vertex: u32,
+    settings: &IntegratorSettings,
+) -> Option<PathState> {
+    let Direction { wi, weight, eta } = next_direction(v, settings)?;
+    let mut beta = path.beta * weight;
+    let eta_scale = path.eta_scale * eta * eta;
     if beta.is_black() || !beta.is_finite() {
         return None;
     }
@@ -306,8 +348,32 @@ fn extend(path: &PathState, v: &Vertex<'_>, point: &ShadePoint<'_>, vertex: u32)
         beta = beta / survival;
     }
 
-    let ray = Ray { o: point.origin(sample.wi), d: sample.wi, t_max: f32::INFINITY, time: path.ray.time };
+    let ray = Ray { o: point.origin(wi), d: wi, t_max: f32::INFINITY, time: path.ray.time };
     Some(PathState { ray, beta, eta_scale, ..*path })
+}
+
+/// Where a path goes on.
+struct Direction {
+    wi: Vec3,
+    /// Factor of the throughput.
+    weight: Rgb,
+    /// Relative index of refraction.
+    eta: f32,
+}
+
+/// A direction by BSDF sampling; of a BSDF that can only be evaluated, by resampling M proposals.
+fn next_direction(v: &Vertex<'_>, settings: &IntegratorSettings) -> Option<Direction> {
+    if v.bsdf.bsdf.is_only_evaluated() {
+        let count = settings.bsdf_proposals.max(1);
+        let proposal = |i| v.stream.split(domain::BSDF, count, i).draw::<3>();
+        let [u_choice] = v.stream.domain(domain::RESAMPLE).draw::<1>();
+        let r = v.bsdf.resample(v.wo, count, proposal, u_choice)?;
+        return Some(Direction { wi: r.wi, weight: r.f * (v.bsdf.cos(r.wi) * r.weight), eta: r.eta });
+    }
+    let [uc, u0, u1] = v.stream.domain(domain::BSDF).draw::<3>();
+    let sample = v.bsdf.sample(v.wo, uc, [u0, u1])?;
+    let weight = sample.f * (sample.wi.dot(v.bsdf.frame.z).abs() / sample.pdf);
+    Some(Direction { wi: sample.wi, weight, eta: sample.eta })
 }
 
 /// A hit with what shading needs of it.

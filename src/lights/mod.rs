@@ -19,7 +19,7 @@ pub use area::{AreaLight, AreaShape, Emission, EmissionImage, area_lights_of};
 pub use bounds::LightBounds;
 pub use environment::{EnvironmentFilter, EnvironmentMap, EnvironmentMapping};
 pub use lanes::LightLanes;
-pub use select::{LightChoice, LightSampler, LightSamplerKind};
+pub use select::{LightChoice, LightRun, LightSampler, LightSamplerKind};
 pub use set::{LightSet, LightSetBuilder};
 pub use tree::LightTree;
 
@@ -255,6 +255,15 @@ impl Light {
         match self {
             Light::Distant { .. } | Light::InfiniteConstant { .. } | Light::InfiniteImage { .. } => true,
             Light::Point { .. } | Light::Spot { .. } | Light::Area(_) => false,
+        }
+    }
+
+    /// True if no ray can hit it: only light sampling finds it.
+    #[inline]
+    pub fn is_delta(&self) -> bool {
+        match self {
+            Light::Point { .. } | Light::Spot { .. } | Light::Distant { .. } => true,
+            Light::Area(_) | Light::InfiniteConstant { .. } | Light::InfiniteImage { .. } => false,
         }
     }
 

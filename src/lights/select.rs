@@ -47,13 +47,75 @@ pub struct LightChoice {
     pub u: f32,
 }
 
+/// Consecutive positions, of a sorted list in [0, 1), that choose the same light.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct LightRun {
+    /// The light.
+    pub light: LightId,
+    /// Probability of the choice.
+    pub pmf: f32,
+    /// Places in the list, end exclusive.
+    pub places: [u32; 2],
+    /// The part of [0, 1) that chooses the light.
+    pub interval: [f64; 2],
+}
+
+impl LightRun {
+    /// A position of the run, made uniform in [0, 1) again. Both are in units of 2⁻³².
+    #[inline]
+    pub fn within(&self, position: u32) -> u32 {
+        let [start, end] = self.interval;
+        // A cast of what lies outside saturates.
+        ((f64::from(position) * UNIT - start) / (end - start) / UNIT) as u32
+    }
+}
+
+/// 2⁻³².
+const UNIT: f64 = 1.0 / 4_294_967_296.0;
+
+/// A fixed distribution over lights: for single choices, and in order.
+#[derive(Clone, Debug)]
+pub struct FixedChoice {
+    table: AliasTable,
+    /// Sums of the probabilities up to and with each light; none if nothing can be chosen.
+    cumulative: Vec<f64>,
+}
+
+impl FixedChoice {
+    fn new(weights: &[f32]) -> Self {
+        let table = AliasTable::new(weights);
+        let total: f64 = (0..table.len()).map(|i| f64::from(table.pmf(i))).sum();
+        let mut sum = 0.0;
+        let mut add = |i| {
+            sum += f64::from(table.pmf(i));
+            sum / total
+        };
+        let cumulative = if total > 0.0 { (0..table.len()).map(&mut add).collect() } else { Vec::new() };
+        FixedChoice { table, cumulative }
+    }
+
+    fn runs(&self, positions: &[u32], out: &mut Vec<LightRun>) {
+        let mut first = 0;
+        while let Some(&position) = positions.get(first) {
+            let x = f64::from(position) * UNIT;
+            let light = self.cumulative.partition_point(|&c| c <= x);
+            let Some(&end) = self.cumulative.get(light) else { return };
+            let start = if light > 0 { self.cumulative[light - 1] } else { 0.0 };
+            let count = positions[first..].partition_point(|&p| f64::from(p) * UNIT < end);
+            let (pmf, places) = (self.table.pmf(light), [first as u32, (first + count) as u32]);
+            out.push(LightRun { light: light as LightId, pmf, places, interval: [start, end] });
+            first += count;
+        }
+    }
+}
+
 /// Chooses lights of a fixed set.
 #[derive(Clone, Debug)]
 pub enum LightSampler {
     /// All lights with power alike.
-    Uniform(AliasTable),
+    Uniform(FixedChoice),
     /// By power.
-    Power(AliasTable),
+    Power(FixedChoice),
     /// By the tree; infinite lights beside it.
     Tree {
         /// Lights with a place.
@@ -70,9 +132,9 @@ impl LightSampler {
         match kind {
             LightSamplerKind::Uniform => {
                 let weights: Vec<f32> = powers.iter().map(|&p| if p > 0.0 { 1.0 } else { 0.0 }).collect();
-                LightSampler::Uniform(AliasTable::new(&weights))
+                LightSampler::Uniform(FixedChoice::new(&weights))
             }
-            LightSamplerKind::Power => LightSampler::Power(AliasTable::new(&power_weights(&powers))),
+            LightSamplerKind::Power => LightSampler::Power(FixedChoice::new(&power_weights(&powers))),
             LightSamplerKind::Tree => {
                 let bounds: Vec<_> = lights.iter().map(Light::bounds).collect();
                 let is_chosen = |&i: &usize| lights[i].is_infinite() && powers[i] > 0.0;
@@ -86,8 +148,8 @@ impl LightSampler {
     #[inline]
     pub fn sample(&self, ctx: &LightCtx, u: f32) -> Option<LightChoice> {
         match self {
-            LightSampler::Uniform(table) | LightSampler::Power(table) => {
-                let s = table.sample(u)?;
+            LightSampler::Uniform(choice) | LightSampler::Power(choice) => {
+                let s = choice.table.sample(u)?;
                 Some(LightChoice { light: s.index as LightId, pmf: s.pmf, u: s.u })
             }
             LightSampler::Tree { tree, infinite } => {
@@ -105,11 +167,42 @@ impl LightSampler {
         }
     }
 
+    /// Chooses a light for each position of an ascending list in units of 2⁻³², by inversion: neighbours in the list choose
+    /// the same light or neighbours. Each light is chosen with the probability [`pmf`](Self::pmf). A list without a
+    /// light to choose has no runs.
+    pub fn runs(&self, ctx: &LightCtx, positions: &[u32], out: &mut Vec<LightRun>) {
+        out.clear();
+        match self {
+            LightSampler::Uniform(choice) | LightSampler::Power(choice) => choice.runs(positions, out),
+            LightSampler::Tree { tree, infinite } => {
+                let p_infinite = infinite_probability(tree, infinite, ctx);
+                let share = f64::from(p_infinite) / infinite.len() as f64;
+                let mut first = 0;
+                for (i, &light) in infinite.iter().enumerate().filter(|_| p_infinite > 0.0) {
+                    let interval = [share * i as f64, share * (i + 1) as f64];
+                    let is_in =
+                        |&p: &u32| f64::from(p) * UNIT < interval[1] || p_infinite == 1.0 && i + 1 == infinite.len();
+                    let count = positions[first..].partition_point(is_in);
+                    if count > 0 {
+                        let (pmf, places) =
+                            (p_infinite / infinite.len() as f32, [first as u32, (first + count) as u32]);
+                        out.push(LightRun { light, pmf, places, interval });
+                    }
+                    first += count;
+                }
+                let places = [first as u32, positions.len() as u32];
+                if !tree.is_empty() && p_infinite < 1.0 {
+                    tree.runs(ctx, positions, places, (f64::from(p_infinite), 1.0 - p_infinite), out);
+                }
+            }
+        }
+    }
+
     /// Probability that [`sample`](Self::sample) chooses `light`.
     #[inline]
     pub fn pmf(&self, ctx: &LightCtx, light: LightId) -> f32 {
         match self {
-            LightSampler::Uniform(table) | LightSampler::Power(table) => table.pmf(light as usize),
+            LightSampler::Uniform(choice) | LightSampler::Power(choice) => choice.table.pmf(light as usize),
             LightSampler::Tree { tree, infinite } => {
                 let p_infinite = infinite_probability(tree, infinite, ctx);
                 if tree.contains(light) {

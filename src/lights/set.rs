@@ -172,6 +172,46 @@ mod tests {
     }
 
     #[test]
+    fn runs_choose_each_light_by_its_probability_and_leave_a_uniform_number() {
+        let mut builder = builder();
+        for i in 0..40 {
+            let p = Vec3::new(i as f32 * 0.3 - 6.0, 1.5, 2.0 + (i % 3) as f32);
+            builder.add(Light::Point { p, intensity: Rgb::splat(0.1 + i as f32) });
+        }
+        for kind in KINDS {
+            let set = builder.clone().build(kind, &bounds());
+            for ns in [Vec3::ZERO, Vec3::Z] {
+                let ctx = LightCtx { p: Vec3::new(0.4, 0.3, 0.0), n: ns, ns };
+                // A regular list: counts are exact up to one at each end of a run
+                let count = 1_u32 << 16;
+                let positions: Vec<u32> = (0..count).map(|i| (i << 16) + 0x8000).collect();
+                let mut runs = Vec::new();
+                set.sampler.runs(&ctx, &positions, &mut runs);
+                let (mut place, mut total) = (0, 0.0);
+                for run in &runs {
+                    assert_eq!(run.places[0], place, "{kind:?}: runs follow each other");
+                    place = run.places[1];
+                    let number = run.places[1] - run.places[0];
+                    assert_eq!(run.pmf, set.sampler.pmf(&ctx, run.light), "{kind:?} {run:?}");
+                    let expected = f64::from(run.pmf) * f64::from(count);
+                    assert!((f64::from(number) - expected).abs() <= 1.5, "{kind:?} {run:?} {expected}");
+                    total += f64::from(run.pmf);
+
+                    // What remains of the positions fills [0, 1) evenly
+                    let of = |place: u32| f64::from(run.within(positions[place as usize])) / 4_294_967_296.0;
+                    let step = 1.0 / expected;
+                    for place in run.places[0]..run.places[1] {
+                        let expected = (f64::from(place - run.places[0]) + 0.5) * step;
+                        assert!((of(place) - expected).abs() <= 1.01 * step, "{kind:?} {run:?} {place}");
+                    }
+                }
+                assert_eq!(place, count, "{kind:?}: every position chooses a light");
+                assert!((total - 1.0).abs() < 1e-5, "{kind:?} {total}");
+            }
+        }
+    }
+
+    #[test]
     fn all_samplers_agree_on_the_irradiance_and_with_the_sum_over_lights() {
         let (p, n) = (Vec3::new(0.4, 0.3, 0.0), Vec3::Z);
         let ctx = LightCtx { p, n, ns: n };
@@ -228,7 +268,11 @@ mod tests {
             assert!(b.build(kind, &Bounds3::EMPTY).sample(&ctx, 0.999, [0.5; 2]).is_some());
             let mut b = LightSetBuilder::default();
             b.add_area(0, &quad(1.0), &Emission::constant(Rgb::BLACK));
-            assert!(b.build(kind, &bounds()).sample(&ctx, 0.5, [0.5; 2]).is_none());
+            let set = b.build(kind, &bounds());
+            assert!(set.sample(&ctx, 0.5, [0.5; 2]).is_none());
+            let mut runs = Vec::new();
+            set.sampler.runs(&ctx, &[0, 1 << 31, u32::MAX], &mut runs);
+            assert!(runs.is_empty(), "{kind:?} {runs:?}");
         }
     }
 }

@@ -6,6 +6,7 @@
 //! θi′ the least angle between the surface normal and a direction to the node. Both compared quantities are squared
 //! lengths, so the choice does not depend on the unit of length.
 
+use super::select::LightRun;
 use super::{LightBounds, LightCtx, LightId};
 use crate::math::{Bounds3, ONE_MINUS_EPSILON, Vec3, safe_sqrt, sqr};
 
@@ -13,6 +14,8 @@ use crate::math::{Bounds3, ONE_MINUS_EPSILON, Vec3, safe_sqrt, sqr};
 const COSINE_SLACK: f32 = 1e-3;
 /// Beyond this depth lights are split in halves, so that the trail of any leaf fits 64 bits.
 const MAX_HEURISTIC_DEPTH: u32 = 30;
+/// Subtrees that wait while positions go down together: one for each level.
+const MAX_DEPTH: usize = 66;
 /// Least probability of a child that can contribute; f32 uniforms and 1 − p do not resolve much less.
 const MIN_SHARE: f32 = 1.0 / (1 << 20) as f32;
 /// Places where an axis is tried to be cut, plus one.
@@ -104,6 +107,15 @@ pub struct LightTree {
     nodes: Vec<Node>,
     /// Per light, the turns from the root to its leaf, first turn in the lowest bit; 1 is right.
     trails: Vec<u64>,
+}
+
+/// Positions on their way down the tree.
+#[derive(Clone, Copy, Default)]
+struct Descent {
+    place: u32,
+    pmf: f32,
+    places: [u32; 2],
+    interval: [f64; 2],
 }
 
 struct Item {
@@ -201,6 +213,49 @@ impl LightTree {
             node = &self.nodes[place];
         }
         (pmf > 0.0).then_some((node.index, pmf, u))
+    }
+
+    /// Chooses a light for each of the ascending `positions[places[0]..places[1]]` in units of 2⁻³², which the tree has
+    /// from `start` on with a share `share` of the probability. They go down the tree together, so that a node is looked at
+    /// once for all that pass it.
+    pub fn runs(
+        &self,
+        ctx: &LightCtx,
+        positions: &[u32],
+        places: [u32; 2],
+        (start, share): (f64, f32),
+        out: &mut Vec<LightRun>,
+    ) {
+        let mut stack = [Descent::default(); MAX_DEPTH];
+        stack[0] = Descent { place: 0, pmf: 1.0, places, interval: [start, 1.0] };
+        let mut size = 1;
+        while size > 0 {
+            size -= 1;
+            let Descent { place, pmf, places: [first, end], interval } = stack[size];
+            if first == end {
+                continue;
+            }
+            let node = &self.nodes[place as usize];
+            if node.is_leaf {
+                if pmf > 0.0 {
+                    out.push(LightRun { light: node.index, pmf: pmf * share, places: [first, end], interval });
+                }
+                continue;
+            }
+            let p = self.left_probability(ctx, place as usize);
+            let middle = interval[0] + (interval[1] - interval[0]) * f64::from(p);
+            let is_left = |&x: &u32| f64::from(x) * (1.0 / 4_294_967_296.0) < middle;
+            let split = first + positions[first as usize..end as usize].partition_point(is_left) as u32;
+            stack[size] = Descent {
+                place: node.index,
+                pmf: pmf * (1.0 - p),
+                places: [split, end],
+                interval: [middle, interval[1]],
+            };
+            stack[size + 1] =
+                Descent { place: place + 1, pmf: pmf * p, places: [first, split], interval: [interval[0], middle] };
+            size += 2;
+        }
     }
 
     /// Probability that [`sample`](Self::sample) chooses `light`.

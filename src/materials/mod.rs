@@ -1,17 +1,19 @@
 //! Materials: textures at a hit become a BSDF in its shading frame. Semantics are pbrt-v4's.
 //!
-//! Reading order: this file, [`bump`], [`surface`].
+//! Reading order: this file, [`evaluated`], [`bump`], [`surface`].
 
 pub mod bump;
+pub mod evaluated;
 pub mod surface;
 #[cfg(test)]
 mod tests;
 
+pub use evaluated::EvaluatedMaterial;
 pub use surface::SurfaceBsdf;
 
 use crate::bsdfs::{
-    Base, Bsdf, CoatTable, CoatedDiffuse, Conductor, Dielectric, Diffuse, DiffuseTransmission, Layered, ThinDielectric,
-    TrowbridgeReitz,
+    Base, Bsdf, CoatTable, CoatedDiffuse, Conductor, Dielectric, Diffuse, DiffuseTransmission, Evaluated, Layered,
+    ProposalDensity, ThinDielectric, TrowbridgeReitz,
 };
 use crate::geometry::SurfaceHit;
 use crate::math::hash::{hash_floats, unit_f32};
@@ -123,6 +125,8 @@ pub enum Material {
         /// Walks per evaluation.
         samples: u32,
     },
+    /// Reflection that can only be evaluated.
+    Evaluated(EvaluatedMaterial),
     /// One of two materials at each point, the second with probability `amount`.
     Mix {
         /// The materials.
@@ -145,6 +149,7 @@ impl Material {
             Material::DiffuseTransmission { .. } => "diffusetransmission",
             Material::CoatedDiffuse { .. } => "coateddiffuse",
             Material::CoatedConductor { .. } => "coatedconductor",
+            Material::Evaluated(_) => "evaluated",
             Material::Mix { .. } => "mix",
             Material::Interface => "interface",
         }
@@ -171,6 +176,7 @@ pub struct MaterialSet {
     coats: Vec<CoatTable>,
     /// Per material, its table.
     coat_of: Vec<Option<u32>>,
+    density: ProposalDensity,
 }
 
 /// What a coat's table depends on, by bits: η, thickness, and the alphas unless they are textured.
@@ -199,7 +205,12 @@ impl MaterialSet {
             None => CoatTable::for_all_roughness(key.eta, key.thickness),
         };
         let coats = keys.par_iter().map(tabulate).collect();
-        MaterialSet { entries, coats, coat_of }
+        MaterialSet { entries, coats, coat_of, density: ProposalDensity::default() }
+    }
+
+    /// Chooses what proposes directions for materials that can only be evaluated.
+    pub fn set_proposal_density(&mut self, density: ProposalDensity) {
+        self.density = density;
     }
 
     /// The materials.
@@ -291,6 +302,9 @@ impl MaterialSet {
                     max_depth,
                     samples: samples.max(1),
                 })
+            }
+            Material::Evaluated(material) => {
+                Bsdf::Evaluated(Evaluated { model: material.model(t), density: self.density })
             }
             Material::Mix { .. } | Material::Interface => return None,
         })

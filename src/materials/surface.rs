@@ -1,6 +1,6 @@
 //! A BSDF in the shading frame of a hit, for directions in world space.
 
-use crate::bsdfs::{Bsdf, BsdfSample};
+use crate::bsdfs::{Bsdf, BsdfSample, Resampled, resample};
 use crate::math::{Frame, Rgb, Vec3};
 use crate::simd::{self, bsdf::Values};
 
@@ -68,6 +68,20 @@ impl SurfaceBsdf<'_> {
         let mut sample = self.bsdf.sample(self.frame.to_local(wo), uc, u)?;
         sample.wi = self.frame.to_world(sample.wi);
         Some(sample)
+    }
+
+    /// One of `proposals` directions to the light, in world space, see [`resample()`].
+    #[inline]
+    pub fn resample(
+        &self,
+        wo: Vec3,
+        proposals: u32,
+        u_proposal: impl Fn(u32) -> [f32; 3],
+        u_choice: f32,
+    ) -> Option<Resampled> {
+        let mut drawn = resample(&self.bsdf, self.frame.to_local(wo), proposals, u_proposal, u_choice)?;
+        drawn.wi = self.frame.to_world(drawn.wi);
+        Some(drawn)
     }
 
     /// |cos θ| of a world-space direction about the shading normal.

@@ -4,7 +4,7 @@
 //! The rays are those of a rendering: whole batches, spread evenly over the picture. The renderer and the bare loop take
 //! turns, and the time of a batch is the median over the turns; so what else the machine does meanwhile matters little.
 
-use super::{BATCH_PATHS, RenderSettings, Run};
+use super::{BATCH_PATHS, camera_batches};
 use crate::accel::embree::bare::{Bare, Packed};
 use crate::accel::embree::{EmbreeAccel, EmbreeError};
 use crate::accel::{Accel, AlphaSource, Coherence, RayBatch};
@@ -15,7 +15,6 @@ use crate::scene::{IntegratorKind, World};
 use serde::Serialize;
 use std::hint::black_box;
 use std::sync::Arc;
-use std::sync::atomic::AtomicBool;
 use std::time::{Duration, Instant};
 
 /// Seed of the shuffled order.
@@ -110,7 +109,7 @@ pub struct Stage {
 
 /// Measures. The ray tracer of `world` is dropped before bare loops run, so that a large scene is not held three times.
 pub fn measure(mut world: World, settings: &BenchSettings) -> Result<Report, EmbreeError> {
-    let batches = camera_batches(&world, settings);
+    let batches = camera_batches(&world, settings.tile_size, settings.rays);
     let camera_rays = batches.iter().map(Vec::len).sum();
     let mut report = Report {
         camera_rays,
@@ -146,34 +145,6 @@ pub fn measure(mut world: World, settings: &BenchSettings) -> Result<Report, Emb
         report.t2 = pair.segments(&recording)?;
     }
     Ok(report)
-}
-
-/// Batches of camera samples as the renderer makes them in its first pass, spread over the picture.
-fn camera_batches(world: &World, settings: &BenchSettings) -> Vec<Vec<CameraSample>> {
-    let stop = AtomicBool::new(false);
-    let spp = world.scene.sampling.spp;
-    let render = RenderSettings { tile_size: settings.tile_size, spp, ..RenderSettings::default() };
-    let run = Run::new(world, &render, &stop, &|_| ());
-    let per_pixel = spp.min(run.pass_length()).max(1);
-    let pixels_per_batch = (BATCH_PATHS / per_pixel as usize).max(1);
-    let tiles = world.scene.film.bounds.tiles(settings.tile_size);
-    let parts: Vec<_> = tiles
-        .iter()
-        .flat_map(|tile| {
-            let area = tile.area();
-            (0..area).step_by(pixels_per_batch).map(move |p| (tile, p..area.min(p + pixels_per_batch)))
-        })
-        .collect();
-
-    // Every k-th batch
-    let rays: usize = parts.iter().map(|(_, pixels)| pixels.len() * per_pixel as usize).sum();
-    let stride = rays.div_ceil(settings.rays.max(1)).max(1);
-    let chosen = parts.iter().step_by(stride).map(|(tile, pixels)| {
-        let mut samples = Vec::new();
-        run.camera_samples(tile, pixels.clone(), 0..per_pixel, &mut samples);
-        samples
-    });
-    chosen.collect()
 }
 
 fn record(world: &World, batches: &[Vec<CameraSample>]) -> Recording {

@@ -7,6 +7,7 @@
 pub mod bench;
 pub mod crosscheck;
 pub mod output;
+pub mod plan;
 
 use crate::film::filter::FilterSampler;
 use crate::film::{Film, PixelBounds, PixelSample, PixelSums};
@@ -14,7 +15,7 @@ use crate::integrators::path::CameraSample;
 use crate::integrators::{PathIntegrator, PathStats};
 use crate::math::Vec2;
 use crate::samplers::SampleStream;
-use crate::scene::World;
+use crate::scene::{Proposals, World};
 use rayon::prelude::*;
 use std::sync::atomic::{AtomicBool, AtomicU64, Ordering};
 use std::time::{Duration, Instant};
@@ -23,6 +24,7 @@ use std::time::{Duration, Instant};
 mod domain {
     pub const FILM_AND_LENS: u32 = 0;
     pub const TIME: u32 = 1;
+    pub const SPLIT: u32 = 2;
 }
 
 /// Paths that are traced together: enough that stages run long, few enough that their data stays in the cache.
@@ -94,12 +96,44 @@ pub fn render(
     stop: &AtomicBool,
     observe: &(dyn Fn(&Progress) + Sync),
 ) -> Result<Rendering, ThreadError> {
-    let threads = settings.threads.unwrap_or_else(|| std::thread::available_parallelism().map_or(1, usize::from));
-    let pool = rayon::ThreadPoolBuilder::new()
-        .num_threads(threads)
-        .build()
-        .map_err(|source| ThreadError { threads, source })?;
+    let pool = thread_pool(settings.threads)?;
+    let threads = pool.current_num_threads();
     Ok(pool.install(|| Run::new(world, settings, stop, observe).run(threads)))
+}
+
+/// Threads, all cores if their number is not given.
+fn thread_pool(threads: Option<usize>) -> Result<rayon::ThreadPool, ThreadError> {
+    let threads = threads.unwrap_or_else(|| std::thread::available_parallelism().map_or(1, usize::from));
+    let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build();
+    pool.map_err(|source| ThreadError { threads, source })
+}
+
+/// Batches of camera samples as the renderer makes them in its first pass, spread over the picture; about `rays` together.
+fn camera_batches(world: &World, tile_size: u32, rays: usize) -> Vec<Vec<CameraSample>> {
+    let stop = AtomicBool::new(false);
+    let spp = world.scene.sampling.spp;
+    let settings = RenderSettings { tile_size, spp, ..RenderSettings::default() };
+    let run = Run::new(world, &settings, &stop, &|_| ());
+    let per_pixel = spp.min(run.pass_length()).max(1);
+    let pixels_per_batch = (BATCH_PATHS / per_pixel as usize).max(1);
+    let tiles = world.scene.film.bounds.tiles(tile_size);
+    let parts: Vec<_> = tiles
+        .iter()
+        .flat_map(|tile| {
+            let area = tile.area();
+            (0..area).step_by(pixels_per_batch).map(move |p| (tile, p..area.min(p + pixels_per_batch)))
+        })
+        .collect();
+
+    // Every k-th batch
+    let all: usize = parts.iter().map(|(_, pixels)| pixels.len() * per_pixel as usize).sum();
+    let stride = all.div_ceil(rays.max(1)).max(1);
+    let chosen = parts.iter().step_by(stride).map(|(tile, pixels)| {
+        let mut samples = Vec::new();
+        run.camera_samples(tile, pixels.clone(), 0..per_pixel, &mut samples);
+        samples
+    });
+    chosen.collect()
 }
 
 /// A tile with the sums of its pixels.
@@ -249,14 +283,23 @@ impl<'a> Run<'a> {
     }
 
     fn camera_sample(&self, pixel: [u32; 2], sample: u32) -> CameraSample {
+        self.camera_sample_of_seed(pixel, sample, self.world.scene.sampling.seed)
+    }
+
+    fn camera_sample_of_seed(&self, pixel: [u32; 2], sample: u32, seed: u32) -> CameraSample {
         let scene = &self.world.scene;
-        let stream = SampleStream::new(scene.sampling.sampler, pixel, sample, scene.sampling.seed);
+        let stream = SampleStream::new(scene.sampling.sampler, pixel, sample, seed);
         let [fx, fy, lx, ly] = stream.domain(domain::FILM_AND_LENS).draw::<4>();
         let [u_time] = stream.domain(domain::TIME).draw::<1>();
         let filter = self.filter.sample([fx, fy]);
         let film = Vec2::new(pixel[0] as f32 + 0.5, pixel[1] as f32 + 0.5) + filter.offset;
         let ray = scene.camera.ray(film, [lx, ly], u_time);
-        CameraSample { ray, weight: filter.weight * ray.weight * scene.film.scale, stream }
+        let chosen = self.world.splits.as_ref().filter(|_| scene.integrator.ris.proposals == Proposals::Optimal);
+        let split = match chosen {
+            Some(map) => map.split(pixel, stream.domain(domain::SPLIT).draw::<2>()),
+            None => scene.integrator.split(),
+        };
+        CameraSample { ray, weight: filter.weight * ray.weight * scene.film.scale, stream, split }
     }
 }
 

@@ -2,7 +2,7 @@
 
 use crate::film::Film;
 use crate::imaging::color::linear_to_srgb;
-use crate::scene::Scene;
+use crate::scene::{EstimatorKind, Proposals, Scene, SplitMap};
 
 /// A group of channels beside the picture itself.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -21,10 +21,13 @@ pub enum Aov {
     Material,
     /// Geometry of the first sample's surface plus one, `object`; 0 where there is none.
     Object,
+    /// The best M/N of `ris`: as a colour `ratio.R/G/B`, green where more proposals and red where more samples are best
+    /// [Talbot et al. 2005, Fig. 3], and as numbers `ratio.proposals` and `ratio.samples`.
+    Ratio,
 }
 
 impl Aov {
-    /// All, in the order of the file.
+    /// All that every picture has, in the order of the file.
     pub const ALL: [Aov; 7] =
         [Aov::Variance, Aov::Samples, Aov::Albedo, Aov::Normal, Aov::Depth, Aov::Material, Aov::Object];
 
@@ -38,6 +41,7 @@ impl Aov {
             Aov::Depth => "depth",
             Aov::Material => "material",
             Aov::Object => "object",
+            Aov::Ratio => "ratio",
         }
     }
 
@@ -50,6 +54,7 @@ impl Aov {
             Aov::Depth => &["depth.Z"],
             Aov::Material => &["material"],
             Aov::Object => &["object"],
+            Aov::Ratio => &["ratio.R", "ratio.G", "ratio.B", "ratio.proposals", "ratio.samples"],
         }
     }
 }
@@ -63,12 +68,12 @@ pub struct Channels {
     pub data: Vec<f32>,
 }
 
-/// The picture `R G B` and the chosen AOVs, linear.
-pub fn channels(film: &Film, aovs: &[Aov]) -> Channels {
+/// The picture `R G B` and the chosen AOVs, linear. `splits` is the map that [`Aov::Ratio`] shows; without one it is black.
+pub fn channels(film: &Film, aovs: &[Aov], splits: Option<&SplitMap>) -> Channels {
     let aov_names = aovs.iter().flat_map(|a| a.channels().iter().copied());
     let names: Vec<String> = ["R", "G", "B"].into_iter().chain(aov_names).map(str::to_owned).collect();
     let mut data = Vec::with_capacity(names.len() * film.pixels.len());
-    for pixel in &film.pixels {
+    for (i, pixel) in film.pixels.iter().enumerate() {
         data.extend(pixel.mean().map(|v| v as f32));
         let count = pixel.count.max(1) as f64;
         for aov in aovs {
@@ -81,10 +86,21 @@ pub fn channels(film: &Film, aovs: &[Aov]) -> Channels {
                 Aov::Depth => data.push((pixel.depth / pixel.hits as f64) as f32),
                 Aov::Material => data.push(pixel.material as f32),
                 Aov::Object => data.push(pixel.object as f32),
+                Aov::Ratio => data.extend(splits.map_or([0.0; 5], |map| ratio_values(map, i))),
             }
         }
     }
     Channels { names, data }
+}
+
+/// Colour and numbers of a pixel of the map: from red at the least ratio (1) to green at the greatest of the map,
+/// by its logarithm.
+fn ratio_values(map: &SplitMap, pixel: usize) -> [f32; 5] {
+    let ratio = map.ratios[pixel];
+    let most = map.ratios.iter().copied().fold(1.0, f32::max).max(1.0 + f32::EPSILON);
+    let green = (ratio.ln() / most.ln()).clamp(0.0, 1.0);
+    let samples = (map.time / (f64::from(ratio) * map.t1 + map.t2)) as f32;
+    [1.0 - green, green, 0.0, ratio * samples, samples]
 }
 
 /// The picture for a display: `2^exposure`, then the sRGB curve, clipped to 0..1. RGB interleaved.
@@ -97,24 +113,37 @@ pub fn display(film: &Film, exposure: f32) -> Vec<f32> {
 pub fn settings_metadata(scene: &Scene) -> Vec<(String, String)> {
     let i = &scene.integrator;
     let b = &scene.film.bounds;
-    [
+    let split = i.split();
+    let mut entries = vec![
         ("version", env!("CARGO_PKG_VERSION").to_owned()),
         ("integrator", i.kind.name().to_owned()),
         ("max_depth", i.max_depth.to_string()),
         ("estimator", i.estimator.name().to_owned()),
-        ("samples", i.samples.to_string()),
-        ("heuristic", i.heuristic.name().to_owned()),
+        ("samples", split.samples.to_string()),
+        ("heuristic", i.heuristic().name().to_owned()),
         ("light_choice", i.light_choice.name().to_owned()),
+        ("bsdf_proposals", i.bsdf_proposals.to_string()),
+        ("bsdf_density", i.bsdf_density.name().to_owned()),
         ("sampler", scene.sampling.sampler.name().to_owned()),
         ("spp", scene.sampling.spp.to_string()),
         ("seed", scene.sampling.seed.to_string()),
         ("filter", format!("{:?}", scene.film.filter)),
         ("resolution", format!("{}x{}", scene.film.resolution[0], scene.film.resolution[1])),
         ("crop", format!("{},{},{},{}", b.x0, b.x1, b.y0, b.y1)),
-    ]
-    .into_iter()
-    .map(|(key, value)| (format!("lumiris:{key}"), value))
-    .collect()
+    ];
+    if i.estimator == EstimatorKind::Ris {
+        entries.extend([
+            (
+                "proposals",
+                if i.ris.proposals == Proposals::Optimal { "optimal".to_owned() } else { split.proposals.to_string() },
+            ),
+            ("strata", i.ris.strata.name().to_owned()),
+            ("proposal_points", i.ris.points.name().to_owned()),
+            ("target", i.ris.target.name().to_owned()),
+        ]);
+        entries.extend(i.ris.stage_times.map(|t| ("stage_times", format!("{},{}", t.t1, t.t2))));
+    }
+    entries.into_iter().map(|(key, value)| (format!("lumiris:{key}"), value)).collect()
 }
 
 #[cfg(test)]
@@ -128,7 +157,7 @@ mod tests {
         let bounds = PixelBounds { x0: 0, x1: 2, y0: 0, y1: 1 };
         let mut film = Film::new([2, 1], bounds);
         film.pixels[0].add(&PixelSample { radiance: Rgb::new(1.0, 2.0, 4.0), features: None });
-        let c = channels(&film, &Aov::ALL);
+        let c = channels(&film, &Aov::ALL, None);
         assert_eq!(c.data.len(), c.names.len() * 2);
         let depth = c.names.iter().position(|n| n == "depth.Z").unwrap();
         assert_eq!(c.data[depth], f32::INFINITY);

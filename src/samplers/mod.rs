@@ -52,15 +52,17 @@ impl SampleStream {
     /// The root stream of sample `sample` (< 2³¹) of a pixel. Streams of different seeds are independent.
     pub fn new(kind: SamplerKind, pixel: [u32; 2], sample: u32, seed: u32) -> Self {
         let (x, y) = (pixel[0] as i32, pixel[1] as i32);
-        // openqmc takes the index as i32 and the seed as its frame number.
+        // openqmc takes the index as i32, and a frame number which it adds to the number of the pixel (16 bits): seeds that
+        // were frames as they are would give shifted copies of one picture. Multiples of the golden ratio stay apart.
         let index = (sample & 0x7fff_ffff) as i32;
+        let frame = (seed.wrapping_mul(0x9e37_79b1) >> 2) as i32;
         SampleStream(match kind {
             SamplerKind::Independent => {
                 let h = pcg4d([pixel[0], pixel[1], sample, seed]);
                 Kind::Independent { key: [h[0], h[1], h[2]] }
             }
-            SamplerKind::Sobol => Kind::Sobol(SobolSampler::new(x, y, seed as i32, index)),
-            SamplerKind::SobolBlueNoise => Kind::SobolBlueNoise(SobolBnSampler::new(x, y, seed as i32, index)),
+            SamplerKind::Sobol => Kind::Sobol(SobolSampler::new(x, y, frame, index)),
+            SamplerKind::SobolBlueNoise => Kind::SobolBlueNoise(SobolBnSampler::new(x, y, frame, index)),
         })
     }
 
@@ -127,6 +129,19 @@ mod tests {
             let draw = |seed| SampleStream::new(kind, [3, 9], 17, seed).domain(4).split(2, 8, 5).draw::<4>();
             assert_eq!(draw(1), draw(1));
             assert_ne!(draw(1), draw(2));
+        }
+    }
+
+    #[test]
+    fn a_seed_does_not_shift_the_picture_of_another() {
+        for kind in SamplerKind::ALL {
+            let draw = |x, y, seed| SampleStream::new(kind, [x, y], 0, seed).domain(4).draw::<2>();
+            for seed in 1..200 {
+                for shift in 0..64 {
+                    assert_ne!(draw(70 + shift, 9, 0), draw(70, 9, seed), "{kind:?} {seed} {shift}");
+                    assert_ne!(draw(70, 9 + shift, 0), draw(70, 9, seed), "{kind:?} {seed} {shift}");
+                }
+            }
         }
     }
 

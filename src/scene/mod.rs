@@ -2,16 +2,22 @@
 //!
 //! [`Scene`] is data, as an importer makes it; [`World`] is a scene with its ray tracers, ready to render.
 
+mod settings;
+mod split_map;
 mod world;
 
+pub use settings::{
+    EstimatorKind, IntegratorKind, IntegratorSettings, ProposalPoints, Proposals, RisSettings, Split, StageTimes,
+    Strata, Target,
+};
+pub use split_map::SplitMap;
 pub use world::{AccelKind, EmitterHit, World};
 
 use crate::cameras::Camera;
-use crate::estimators::mis::Heuristic;
 use crate::film::PixelBounds;
 use crate::film::filter::PixelFilter;
 use crate::geometry::GeometrySet;
-use crate::lights::{LightSamplerKind, LightSet};
+use crate::lights::LightSet;
 use crate::materials::{MaterialId, MaterialSet};
 use crate::samplers::SamplerKind;
 use crate::textures::TextureSet;
@@ -73,82 +79,4 @@ pub struct SamplingSettings {
     pub spp: u32,
     /// Images of different seeds are independent estimates of the same picture.
     pub seed: u32,
-}
-
-/// Light transport.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub struct IntegratorSettings {
-    /// What is computed.
-    pub kind: IntegratorKind,
-    /// Number of bounces for `path`; 1 is direct light.
-    pub max_depth: u32,
-    /// Direct-light estimator at each path vertex.
-    pub estimator: EstimatorKind,
-    /// Samples per estimate (N): shadow segments per shading point.
-    pub samples: u32,
-    /// MIS weights of `mis`.
-    pub heuristic: Heuristic,
-    /// How a light is chosen.
-    pub light_choice: LightSamplerKind,
-}
-
-impl Default for IntegratorSettings {
-    fn default() -> Self {
-        IntegratorSettings {
-            kind: IntegratorKind::Path,
-            max_depth: 5,
-            estimator: EstimatorKind::Mis,
-            samples: 2,
-            heuristic: Heuristic::Power,
-            light_choice: LightSamplerKind::Tree,
-        }
-    }
-}
-
-impl IntegratorSettings {
-    /// The number of bounces that is really computed.
-    pub fn depth(&self) -> u32 {
-        match self.kind {
-            IntegratorKind::Direct => self.max_depth.min(1),
-            IntegratorKind::Path => self.max_depth,
-        }
-    }
-}
-
-/// What is computed.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum IntegratorKind {
-    /// Emitted light and one bounce.
-    Direct,
-    /// Paths of up to `max_depth` bounces.
-    Path,
-}
-
-impl IntegratorKind {
-    /// The name on the command line and in metadata.
-    pub fn name(self) -> &'static str {
-        match self {
-            IntegratorKind::Direct => "direct",
-            IntegratorKind::Path => "path",
-        }
-    }
-}
-
-/// How direct light is estimated.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum EstimatorKind {
-    /// Light sampling only (and the specular lobes of BSDFs).
-    Mc,
-    /// Light and BSDF sampling, weighted.
-    Mis,
-}
-
-impl EstimatorKind {
-    /// The name on the command line and in metadata.
-    pub fn name(self) -> &'static str {
-        match self {
-            EstimatorKind::Mc => "mc",
-            EstimatorKind::Mis => "mis",
-        }
-    }
 }

@@ -1,6 +1,6 @@
 //! A scene with its ray tracers.
 
-use super::Scene;
+use super::{Scene, SplitMap};
 use crate::accel::bvh::Bvh;
 use crate::accel::embree::{EmbreeAccel, EmbreeError};
 use crate::accel::{Accel, AlphaSource, Coherence, Hit, RayBatch};
@@ -39,6 +39,8 @@ pub struct World {
     pub scene: Scene,
     /// Everything.
     pub accel: Box<dyn Accel>,
+    /// Samples and proposals of each pixel, if they were chosen for each by itself.
+    pub splits: Option<SplitMap>,
     /// Emitters only; geometry ids are indices into `emitter_geometry`.
     emitters: Option<Box<dyn Accel>>,
     emitter_geometry: Vec<GeometryId>,
@@ -95,7 +97,7 @@ impl World {
             };
             Some(build(kind, &Arc::new(set), &scene.textures, packet_width)?)
         };
-        Ok(World { scene, accel, emitters, emitter_geometry })
+        Ok(World { scene, accel, splits: None, emitters, emitter_geometry })
     }
 
     /// What each ray would meet first if only emitters were there.

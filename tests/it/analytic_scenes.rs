@@ -11,7 +11,7 @@ use lumiris::import::{LoadOptions, load};
 use lumiris::lights::LightSamplerKind;
 use lumiris::render::{RenderSettings, render};
 use lumiris::samplers::SamplerKind;
-use lumiris::scene::{AccelKind, EstimatorKind, IntegratorKind, World};
+use lumiris::scene::{AccelKind, EstimatorKind, IntegratorKind, ProposalPoints, Proposals, Strata, Target, World};
 use std::path::{Path, PathBuf};
 use std::sync::atomic::AtomicBool;
 
@@ -42,6 +42,11 @@ struct Configuration {
     estimator: EstimatorKind,
     heuristic: Heuristic,
     samples: u32,
+    /// Of `ris`.
+    proposals: u32,
+    strata: Strata,
+    points: ProposalPoints,
+    target: Target,
     light_choice: LightSamplerKind,
     sampler: SamplerKind,
     accel: AccelKind,
@@ -52,6 +57,10 @@ fn configurations() -> Vec<Configuration> {
         estimator: EstimatorKind::Mis,
         heuristic: Heuristic::Power,
         samples: 2,
+        proposals: 16,
+        strata: Strata::Systematic,
+        points: ProposalPoints::Stratified,
+        target: Target::Fgl,
         light_choice: LightSamplerKind::Tree,
         sampler: SamplerKind::SobolBlueNoise,
         accel: AccelKind::Embree,
@@ -66,14 +75,39 @@ fn configurations() -> Vec<Configuration> {
     all.extend([SamplerKind::Independent, SamplerKind::Sobol].map(|sampler| Configuration { sampler, ..base }));
     all.push(Configuration { accel: AccelKind::Bvh, ..base });
     all.push(Configuration { accel: AccelKind::Bvh, estimator: EstimatorKind::Mc, ..base });
+    all.extend(ris_configurations(&Configuration {
+        estimator: EstimatorKind::Ris,
+        heuristic: Heuristic::Balance,
+        ..base
+    }));
+    all
+}
+
+fn ris_configurations(base: &Configuration) -> Vec<Configuration> {
+    let base = *base;
+    let counts = [(1, 1), (1, 2), (1, 8), (3, 7), (8, 8), (4, 64)];
+    let mut all: Vec<_> = counts.map(|(samples, proposals)| Configuration { samples, proposals, ..base }).to_vec();
+    all.extend([Strata::None, Strata::Proposals, Strata::Weights].map(|strata| Configuration { strata, ..base }));
+    all.extend([Target::Gv, Target::Gvl].map(|target| Configuration { target, ..base }));
+    all.extend(
+        [LightSamplerKind::Uniform, LightSamplerKind::Power].map(|light_choice| Configuration { light_choice, ..base }),
+    );
+    all.push(Configuration { points: ProposalPoints::Independent, ..base });
+    all.push(Configuration { heuristic: Heuristic::Power, ..base });
+    all.push(Configuration { sampler: SamplerKind::Independent, ..base });
+    all.push(Configuration { accel: AccelKind::Bvh, ..base });
     all
 }
 
 fn world(path: &Path, c: &Configuration) -> World {
     let mut scene = load(path, &LoadOptions::default()).map_err(|d| d.to_string()).unwrap().scene;
     scene.integrator.estimator = c.estimator;
-    scene.integrator.heuristic = c.heuristic;
-    scene.integrator.samples = c.samples;
+    scene.integrator.heuristic = Some(c.heuristic);
+    scene.integrator.samples = Some(c.samples);
+    scene.integrator.ris.proposals = Proposals::Fixed(c.proposals);
+    scene.integrator.ris.strata = c.strata;
+    scene.integrator.ris.points = c.points;
+    scene.integrator.ris.target = c.target;
     scene.integrator.light_choice = c.light_choice;
     scene.lights.set_kind(c.light_choice);
     scene.sampling.sampler = c.sampler;

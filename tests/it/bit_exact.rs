@@ -3,15 +3,19 @@
 use lumiris::film::Film;
 use lumiris::import::{LoadOptions, load};
 use lumiris::render::output::{Aov, channels};
+use lumiris::render::plan::prepare;
 use lumiris::render::{RenderSettings, render};
-use lumiris::scene::{AccelKind, World};
+use lumiris::scene::{AccelKind, EstimatorKind, Proposals, World};
 use std::path::Path;
 use std::sync::atomic::AtomicBool;
 
-fn gallery(packet_width: Option<u32>) -> World {
+const ESTIMATORS: [EstimatorKind; 2] = [EstimatorKind::Mis, EstimatorKind::Ris];
+
+fn gallery(estimator: EstimatorKind, packet_width: Option<u32>) -> World {
     let path = Path::new(env!("CARGO_MANIFEST_DIR")).join("scenes/demo/gallery.pbrt");
     let options = LoadOptions { resolution: Some([96, 54]), ..LoadOptions::default() };
-    let scene = load(&path, &options).map_err(|d| d.to_string()).unwrap().scene;
+    let mut scene = load(&path, &options).map_err(|d| d.to_string()).unwrap().scene;
+    scene.integrator.estimator = estimator;
     World::new(scene, AccelKind::Embree, packet_width).unwrap()
 }
 
@@ -20,7 +24,7 @@ fn film(world: &World, settings: RenderSettings) -> Film {
 }
 
 fn assert_same_bits(a: &Film, b: &Film, what: &str) {
-    let bits = |f: &Film| channels(f, &Aov::ALL).data.iter().map(|v| v.to_bits()).collect::<Vec<_>>();
+    let bits = |f: &Film| channels(f, &Aov::ALL, None).data.iter().map(|v| v.to_bits()).collect::<Vec<_>>();
     let (a, b) = (bits(a), bits(b));
     assert!(a.iter().any(|&v| v != 0));
     let different = a.iter().zip(&b).filter(|(x, y)| x != y).count();
@@ -29,30 +33,60 @@ fn assert_same_bits(a: &Film, b: &Film, what: &str) {
 
 #[test]
 fn threads_and_tiles_do_not_change_a_bit() {
-    let world = gallery(None);
-    let reference = film(&world, RenderSettings { threads: Some(1), ..RenderSettings::default() });
-    for threads in [1, 2, 3] {
-        for tile_size in [1, 8, 13, 64] {
-            let other = film(&world, RenderSettings { threads: Some(threads), tile_size, ..RenderSettings::default() });
-            assert_same_bits(&reference, &other, &format!("{threads} threads, tiles of {tile_size}"));
+    for estimator in ESTIMATORS {
+        let world = gallery(estimator, None);
+        let reference = film(&world, RenderSettings { threads: Some(1), ..RenderSettings::default() });
+        for threads in [1, 2, 3] {
+            for tile_size in [1, 8, 13, 64] {
+                let settings = RenderSettings { threads: Some(threads), tile_size, ..RenderSettings::default() };
+                let what = format!("{estimator:?}, {threads} threads, tiles of {tile_size}");
+                assert_same_bits(&reference, &film(&world, settings), &what);
+            }
         }
     }
 }
 
 #[test]
 fn packet_width_does_not_change_a_bit() {
-    let reference = film(&gallery(Some(1)), RenderSettings::default());
-    for width in [4, 8] {
-        let other = film(&gallery(Some(width)), RenderSettings::default());
-        assert_same_bits(&reference, &other, &format!("packets of {width}"));
+    for estimator in ESTIMATORS {
+        let reference = film(&gallery(estimator, Some(1)), RenderSettings::default());
+        for width in [4, 8] {
+            let other = film(&gallery(estimator, Some(width)), RenderSettings::default());
+            assert_same_bits(&reference, &other, &format!("{estimator:?}, packets of {width}"));
+        }
+    }
+}
+
+#[test]
+fn what_a_plan_chose_gives_the_same_picture_when_it_is_given() {
+    for proposals in [Proposals::Auto, Proposals::Optimal] {
+        // Chosen from times of this run
+        let mut planned = gallery(EstimatorKind::Ris, None);
+        planned.scene.integrator.ris.proposals = proposals;
+        let plan = prepare(&mut planned, Some(2), false).unwrap().unwrap();
+        assert!(plan.split.proposals >= plan.split.samples && plan.times.t1 > 0.0 && plan.times.t2 > 0.0);
+        let reference = film(&planned, RenderSettings::default());
+
+        // Given
+        let mut given = gallery(EstimatorKind::Ris, None);
+        let integrator = &mut given.scene.integrator;
+        integrator.samples = Some(plan.split.samples);
+        if proposals == Proposals::Optimal {
+            integrator.ris.proposals = Proposals::Optimal;
+            integrator.ris.stage_times = Some(plan.times);
+            prepare(&mut given, Some(1), false).unwrap();
+        } else {
+            integrator.ris.proposals = Proposals::Fixed(plan.split.proposals);
+        }
+        assert_same_bits(&reference, &film(&given, RenderSettings::default()), &format!("{proposals:?}"));
     }
 }
 
 #[test]
 fn seeds_give_different_pictures() {
-    let mut world = gallery(None);
+    let mut world = gallery(EstimatorKind::Mis, None);
     let a = film(&world, RenderSettings::default());
     world.scene.sampling.seed = 1;
     let b = film(&world, RenderSettings::default());
-    assert_ne!(channels(&a, &[]).data, channels(&b, &[]).data);
+    assert_ne!(channels(&a, &[], None).data, channels(&b, &[], None).data);
 }

@@ -181,3 +181,64 @@ fn ctrl_c_writes_what_there_is() {
     let channels = picture.image.channels.len();
     assert!(picture.image.data.iter().skip(samples).step_by(channels).all(|&n| n >= 1.0));
 }
+
+#[test]
+fn generated_scenes_render_and_say_what_is_missing_before_they_are_generated() {
+    let folder = tempfile::tempdir().unwrap();
+    let output = lumiris(&["generate", "talbot", "-o", "t", "--detail", "40", "--resolution", "32"], folder.path());
+    assert!(output.status.success(), "{}", stderr(&output));
+    for name in ["statue-env", "statue-lights", "statue-env-lights"] {
+        let scene = format!("t/{name}.pbrt");
+        let args = ["render", &scene, "--spp", "1", "--resolution", "24x32", "-o", "a.exr", "-q"];
+        let output = lumiris(&args, folder.path());
+        assert!(output.status.success() && stderr(&output).is_empty(), "{}", stderr(&output));
+        let image = read_image(&folder.path().join("a.exr"), &ReadLimits::default()).unwrap().image;
+        let green = image.channel("G").unwrap();
+        let sum: f32 = (0..24 * 32).map(|i| image.get(i % 24, i / 24, green)).sum();
+        assert!(sum > 10.0, "{name} is dark: {sum}");
+        // The folder holds what the project holds.
+        let original = std::fs::read(self::scene(&format!("talbot/{name}.pbrt"))).unwrap();
+        assert!(original == std::fs::read(folder.path().join(&scene)).unwrap());
+    }
+
+    std::fs::remove_file(folder.path().join("t/statue.ply")).unwrap();
+    std::fs::remove_file(folder.path().join("t/sky.exr")).unwrap();
+    let output = lumiris(&["render", "t/statue-env.pbrt"], folder.path());
+    assert_eq!(output.status.code(), Some(3));
+    let text = stderr(&output);
+    assert!(text.contains("statue.ply") && text.contains("sky.exr"), "{text}");
+}
+
+#[test]
+fn a_generated_statue_and_sky_are_read_back() {
+    let folder = tempfile::tempdir().unwrap();
+    let output = lumiris(&["generate", "statue", "-o", "s.ply", "--detail", "32"], folder.path());
+    assert!(output.status.success(), "{}", stderr(&output));
+    let mesh = lumiris::import::ply::read_ply(&folder.path().join("s.ply")).unwrap();
+    assert!(mesh.warnings.is_empty() && mesh.triangles.len() > 3000 && mesh.normals.len() == mesh.positions.len());
+    let count = stderr(&output);
+    assert!(count.contains(&format!("{} triangles", mesh.triangles.len())), "{count}");
+
+    let args = ["generate", "sky", "-o", "s.exr", "--resolution", "48", "--clouds", "0.3", "--azimuth", "-30"];
+    let output = lumiris(&args, folder.path());
+    assert!(output.status.success(), "{}", stderr(&output));
+    let sky = read_image(&folder.path().join("s.exr"), &ReadLimits::default()).unwrap();
+    assert_eq!((sky.image.width, sky.image.height, sky.image.channels.len()), (48, 48, 3));
+}
+
+#[test]
+fn what_cannot_be_generated_is_an_error_that_says_why() {
+    let folder = tempfile::tempdir().unwrap();
+    for (args, words) in [
+        (vec!["statue", "--detail", "3"], "8 to 4096"),
+        (vec!["statue", "-o", "s.obj"], ".ply"),
+        (vec!["statue", "-o", "no/s.ply", "--detail", "8"], "no/s.ply"),
+        (vec!["sky", "--elevation", "-5"], "elevation"),
+        (vec!["sky", "-o", "no/s.exr", "--resolution", "8"], "s.exr"),
+    ] {
+        let output = lumiris(&[&["generate"], &args[..]].concat(), folder.path());
+        assert_eq!(output.status.code(), Some(3), "{args:?}");
+        assert!(stderr(&output).contains(words), "{}", stderr(&output));
+    }
+    assert_eq!(std::fs::read_dir(folder.path()).unwrap().count(), 0);
+}

@@ -5,5 +5,8 @@ mod analytic_scenes;
 mod bit_exact;
 mod cli;
 mod crosscheck;
+mod estimators_1d;
+mod evaluated;
 mod layering;
 mod mutations;
+mod reproduce;

@@ -79,7 +79,8 @@ fn raw_sample(b: &Bsdf<'_>, wo: Vec3, uc: f32, u: [f32; 2]) -> Option<BsdfSample
         | Bsdf::Conductor(_)
         | Bsdf::Dielectric(_)
         | Bsdf::ThinDielectric(_)
-        | Bsdf::CoatedDiffuse(_) => b.sample(wo, uc, u),
+        | Bsdf::CoatedDiffuse(_)
+        | Bsdf::Evaluated(_) => b.sample(wo, uc, u),
     }
 }
 

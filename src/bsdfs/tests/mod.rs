@@ -2,6 +2,7 @@
 
 mod coats;
 mod densities;
+mod evaluated;
 
 use super::*;
 use crate::math::hash::HashStream;
@@ -62,6 +63,10 @@ pub(super) fn zoo<'a>(tables: &'a [CoatTable]) -> Vec<(String, Bsdf<'a>)> {
         layered(glass(1.5, 0.0), lambert, 0.9, 0.7),
     ];
     zoo.extend(layers.iter().enumerate().map(|(i, &l)| (format!("layered {i}"), Bsdf::Layered(l))));
+    for density in ProposalDensity::ALL {
+        let model = Model::CookTorrance(models::CookTorrance::new(RED, RED, 0.4, 0.5));
+        zoo.push((format!("evaluated {density:?}"), Bsdf::Evaluated(Evaluated { model, density })));
+    }
     zoo
 }
 

@@ -39,7 +39,7 @@ impl Builder<'_> {
         let environment_paths: Vec<PathBuf> = self.environments.iter().map(|e| e.path.clone()).collect();
         let emission_paths = self.emission_image_paths();
         // Images first: while one thread loads the library that reads them, the others have meshes and coats to work on
-        let ((images, emission_images, texture_images), (made, materials)) = rayon::join(
+        let ((images, emission_images, texture_images), (made, mut materials)) = rayon::join(
             || (load_images(&environment_paths), load_emission_images(&emission_paths), self.resources.load(d)),
             || {
                 rayon::join(
@@ -82,6 +82,7 @@ impl Builder<'_> {
             return None;
         }
         let settings = settings?;
+        materials.set_proposal_density(settings.integrator.bsdf_density);
 
         // Lights
         let mut lights = LightSetBuilder::default();

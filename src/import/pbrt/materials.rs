@@ -5,10 +5,11 @@ use super::options::unknown;
 use super::params::{Input, ParamSet, ParamType};
 use super::spectrum::{Resolved, SpectrumUse};
 use super::state::Builder;
+use crate::bsdfs::models::LobeAxis;
 use crate::import::diagnostic::{Diagnostics, did_you_mean};
 use crate::import::resources::{ImageEncoding, ImageRequest};
 use crate::import::spectra;
-use crate::materials::{ConductorSpectrum, Material, MaterialEntry, MaterialId, Roughness};
+use crate::materials::{ConductorSpectrum, EvaluatedMaterial, Material, MaterialEntry, MaterialId, Roughness};
 use crate::math::Rgb;
 use crate::textures::{Filter, FloatTexture, ImageId, RgbTexture, RgbTextureId, TextureSet, Wrap};
 
@@ -21,7 +22,7 @@ pub enum MaterialUse {
     Named(Name),
 }
 
-/// Kinds of pbrt-v4 that are rendered.
+/// Kinds of pbrt-v4 that are rendered, and `evaluated`.
 const KINDS: &[&str] = &[
     "diffuse",
     "conductor",
@@ -32,7 +33,11 @@ const KINDS: &[&str] = &[
     "coatedconductor",
     "mix",
     "interface",
+    "evaluated",
 ];
+
+/// Models of the material `evaluated`.
+const MODELS: &[&str] = &["diffuse", "orennayar", "cooktorrance", "phong", "retroreflective", "ashikhminshirley"];
 
 /// What shapes are made of where no material is given: pbrt's diffuse of reflectance 0.5.
 pub fn default_material(materials: &mut Vec<MaterialEntry>, textures: &mut TextureSet) -> MaterialId {
@@ -152,18 +157,74 @@ impl Builder<'_> {
                 max_depth: count(p, "maxdepth", 10, d),
                 samples: count(p, "nsamples", 1, d),
             },
+            "evaluated" => self.evaluated(place, p, d),
             _ => self.other_material(kind, place, p, d),
+        }
+    }
+
+    /// `Material "evaluated" "string model" "…"`, whose value alone is used: directions are proposed by a density that is
+    /// the same for all, and resampled. Parameters of the models, all of them textures too:
+    ///
+    /// | model | parameters |
+    /// |---|---|
+    /// | `diffuse` | `spectrum reflectance` (0.5) |
+    /// | `orennayar` | `spectrum reflectance` (0.5), `float sigma` (20 degrees) |
+    /// | `cooktorrance` | `spectrum reflectance` (0.5), `spectrum specular` (0.5), `float slope` (0.2), `float amount` (0.5) |
+    /// | `phong`, `retroreflective` | `spectrum reflectance` (0.25), `spectrum specular` (0.5), `float exponent` (50) |
+    /// | `ashikhminshirley` | `spectrum reflectance` (0.5), `spectrum specular` (0.1), `float uexponent`, `vexponent` (100) |
+    fn evaluated(&mut self, place: &Name, p: &ParamSet, d: &mut Diagnostics) -> Material {
+        let Some(model) = p.string("model", d).map(str::to_owned) else {
+            d.error(place.span, "material `evaluated` needs a `string model`")
+                .help(format!("one of {}", MODELS.join(", ")));
+            p.ignore_all();
+            return Material::Interface;
+        };
+        let (half, quarter) = (Rgb::splat(0.5), Rgb::splat(0.25));
+        Material::Evaluated(match model.as_str() {
+            "diffuse" => EvaluatedMaterial::Diffuse { reflectance: self.albedo(p, "reflectance", half, d) },
+            "orennayar" => EvaluatedMaterial::OrenNayar {
+                reflectance: self.albedo(p, "reflectance", half, d),
+                sigma: self.float_param(p, "sigma", 20.0, d),
+            },
+            "cooktorrance" => EvaluatedMaterial::CookTorrance {
+                reflectance: self.albedo(p, "reflectance", half, d),
+                specular: self.albedo(p, "specular", half, d),
+                slope: self.float_param(p, "slope", 0.2, d),
+                amount: self.float_param(p, "amount", 0.5, d),
+            },
+            "phong" | "retroreflective" => EvaluatedMaterial::CosineLobe {
+                reflectance: self.albedo(p, "reflectance", quarter, d),
+                specular: self.albedo(p, "specular", half, d),
+                exponent: self.float_param(p, "exponent", 50.0, d),
+                axis: if model == "phong" { LobeAxis::Mirror } else { LobeAxis::Retro },
+            },
+            "ashikhminshirley" => EvaluatedMaterial::AshikhminShirley {
+                reflectance: self.albedo(p, "reflectance", half, d),
+                specular: self.albedo(p, "specular", Rgb::splat(0.1), d),
+                exponents: ["uexponent", "vexponent"].map(|name| self.float_param(p, name, 100.0, d)),
+            },
+            other => {
+                unknown(other, p.span_of("model"), "model", MODELS, d);
+                p.ignore_all();
+                return Material::Interface;
+            }
+        })
+    }
+
+    /// v3's `matte`: Lambertian, or Oren-Nayar where `sigma` may be other than 0.
+    fn matte(&mut self, p: &ParamSet, d: &mut Diagnostics) -> Material {
+        let reflectance = self.albedo(p, "Kd", Rgb::splat(0.5), d);
+        let sigma = self.float_param(p, "sigma", 0.0, d);
+        match self.textures.constant_float(sigma) {
+            Some(sigma) if !(sigma > 0.0) => Material::Diffuse { reflectance },
+            Some(_) | None => Material::Evaluated(EvaluatedMaterial::OrenNayar { reflectance, sigma }),
         }
     }
 
     /// Materials of pbrt-v3, and those that are not rendered yet.
     fn other_material(&mut self, kind: &str, place: &Name, p: &ParamSet, d: &mut Diagnostics) -> Material {
-        let used = match kind {
-            "matte" => "diffuse",
-            "plastic" | "substrate" | "uber" => "coateddiffuse",
-            "metal" | "mirror" => "conductor",
-            "glass" => "dielectric",
-            "translucent" => "diffusetransmission",
+        match kind {
+            "matte" | "plastic" | "substrate" | "uber" | "metal" | "mirror" | "glass" | "translucent" => {}
             "hair" | "measured" | "subsurface" | "kdsubsurface" | "disney" | "fourier" => {
                 d.warning_once(place.span, format!("material `{kind}` is not rendered yet: it is diffuse"));
                 p.ignore_all();
@@ -174,11 +235,10 @@ impl Builder<'_> {
                 p.ignore_all();
                 return Material::Interface;
             }
-        };
-        d.warning_once(place.span, format!("material `{kind}` is pbrt-v3: `{used}` takes its place"));
+        }
         let roughness_names = ["roughness", "uroughness", "vroughness"];
         let material = match kind {
-            "matte" => Material::Diffuse { reflectance: self.albedo(p, "Kd", Rgb::splat(0.5), d) },
+            "matte" => self.matte(p, d),
             "plastic" | "substrate" | "uber" => Material::CoatedDiffuse {
                 reflectance: self.albedo(p, "Kd", Rgb::splat(if kind == "substrate" { 0.5 } else { 0.25 }), d),
                 roughness: self.roughness(p, roughness_names, 0.1, d),
@@ -207,7 +267,9 @@ impl Builder<'_> {
                 scale: 1.0,
             },
         };
-        for key in ["sigma", "bumpmap", "Ks", "Kr", "Kt", "opacity", "index", "reflect", "remaproughness"] {
+        let used = material.kind_name();
+        d.warning_once(place.span, format!("material `{kind}` is pbrt-v3: `{used}` takes its place"));
+        for key in ["bumpmap", "Ks", "Kr", "Kt", "opacity", "index", "reflect", "remaproughness"] {
             if p.ignore(key) && key != "remaproughness" {
                 d.warning_once(p.span_of(key), format!("`{key}` of material `{kind}` is ignored"));
             }

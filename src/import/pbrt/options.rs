@@ -1,16 +1,16 @@
-//! What stands before `WorldBegin`: camera, sampler, integrator; film and filter are in [`super::film`].
+//! What stands before `WorldBegin`: camera and sampler; the integrator is in [`super::integrator`], film and filter are in
+//! [`super::film`].
 
 use super::directive::Name;
+use super::integrator::finish_integrator;
 use super::params::ParamSet;
 use super::transform::{Ctm, affine};
 use crate::cameras::{Camera, SphericalMapping, default_screen_window};
-use crate::estimators::mis::Heuristic;
 use crate::import::LoadOptions;
 use crate::import::diagnostic::{Diagnostics, did_you_mean};
 use crate::import::source::Span;
-use crate::lights::LightSamplerKind;
 use crate::samplers::SamplerKind;
-use crate::scene::{EstimatorKind, FilmSettings, IntegratorKind, IntegratorSettings, SamplingSettings};
+use crate::scene::{FilmSettings, IntegratorSettings, SamplingSettings};
 
 /// A directive that is understood when all of them are known: the camera needs the film's size.
 pub(super) struct Pending {
@@ -114,7 +114,7 @@ impl Options {
     pub fn finish(&self, load: &LoadOptions, d: &mut Diagnostics) -> Option<Settings> {
         let (film, exposure_scale) = self.finish_film(load, d);
         let sampling = self.finish_sampler(d);
-        let integrator = self.finish_integrator(d);
+        let integrator = finish_integrator(self.integrator.as_ref(), d);
         let (camera, shutter, seconds) = self.finish_camera(film.resolution, d)?;
         let film = FilmSettings { scale: exposure_scale * seconds, ..film };
         Some(Settings { camera, film, sampling, integrator, shutter })
@@ -218,92 +218,6 @@ impl Options {
         p.ignore("randomization");
         p.report_unused(d);
         s
-    }
-
-    fn finish_integrator(&self, d: &mut Diagnostics) -> IntegratorSettings {
-        let mut s = IntegratorSettings::default();
-        let Some(Pending { name, params: p }) = &self.integrator else { return s };
-        match name.text.as_str() {
-            "path" | "volpath" => {}
-            "direct" => s.kind = IntegratorKind::Direct,
-            "directlighting" => {
-                s.kind = IntegratorKind::Direct;
-                d.warning_once(name.span, "integrator `directlighting` is pbrt-v3: `direct` is used");
-            }
-            "simplepath" | "simplevolpath" | "bdpt" | "mlt" | "sppm" | "lightpath" | "ao" | "randomwalk"
-            | "whitted" => {
-                d.warning_once(name.span, format!("integrator `{}` is not rendered here: `path` is used", name.text));
-            }
-            other => unknown(other, name.span, "integrator", &["path", "direct", "volpath"], d),
-        }
-        match p.integer("maxdepth", d) {
-            Some(n @ 0..=10_000) => s.max_depth = n as u32,
-            Some(n) => {
-                d.error(p.span_of("maxdepth"), format!("maxdepth must be from 0 to 10000, not {n}"));
-            }
-            None if s.kind == IntegratorKind::Direct => s.max_depth = 1,
-            None => {}
-        }
-        lumiris_parameters(&mut s, p, d);
-        if p.ignore("regularize") {
-            d.warning_once(p.span_of("regularize"), "regularize is ignored: it would bias the picture");
-        }
-        for key in [
-            "radius",
-            "photonsperiteration",
-            "iterations",
-            "imagewritefrequency",
-            "rrthreshold",
-            "samplelights",
-            "samplebsdf",
-            "visualizestrategies",
-            "visualizeweights",
-            "bootstrapsamples",
-            "chains",
-            "mutationsperpixel",
-            "largestepprobability",
-            "sigma",
-            "cossample",
-            "maxdistance",
-            "strategy",
-            "seed",
-        ] {
-            p.ignore(key);
-        }
-        p.report_unused(d);
-        s
-    }
-}
-
-/// Parameters that are Lumiris's own, and pbrt's `lightsampler`.
-fn lumiris_parameters(s: &mut IntegratorSettings, p: &ParamSet, d: &mut Diagnostics) {
-    let mut choice = |key: &'static str, known: &[&str]| -> Option<usize> {
-        let value = p.string(key, d)?.to_owned();
-        let found = known.iter().position(|k| *k == value);
-        if found.is_none() {
-            d.error(p.span_of(key), format!("unknown {key} `{value}`")).help(format!("one of {}", known.join(", ")));
-        }
-        found
-    };
-    if let Some(i) = choice("estimator", &["mc", "mis"]) {
-        s.estimator = [EstimatorKind::Mc, EstimatorKind::Mis][i];
-    }
-    if let Some(i) = choice("heuristic", &["balance", "power", "maximum"]) {
-        s.heuristic = [Heuristic::Balance, Heuristic::Power, Heuristic::Maximum][i];
-    }
-    if let Some(i) = choice("lightsampler", &["uniform", "power", "bvh", "tree", "exhaustive", "spatial"]) {
-        s.light_choice = match i {
-            0 => LightSamplerKind::Uniform,
-            1 => LightSamplerKind::Power,
-            _ => LightSamplerKind::Tree,
-        };
-    }
-    match p.integer("samples", d) {
-        Some(n @ 1..=4096) => s.samples = n as u32,
-        Some(n) => {
-            d.error(p.span_of("samples"), format!("samples must be from 1 to 4096, not {n}"));
-        }
-        None => {}
     }
 }
 

@@ -1,0 +1,114 @@
+//! Proposal densities for reflection of which nothing is known but its value.
+//!
+//! [`ProposalDensity::Lobes`] is what [Talbot et al. 2005, §5.2] recommend: a cosine-weighted hemisphere with lobes about
+//! the mirror direction of `wo` and about `wo` itself,
+//!
+//! p(wi) = w_c |cos θi|/π + w_m p_α(wi; α_m) + w_r p_α(R wi; α_r),   R (x, y, z) = (−x, −y, z)
+//!
+//! where p_α(wi) = D_wo(m)/(4 wo·m) is the density of reflection by the visible normals of a GGX surface, m being the
+//! half vector. GGX has long tails, so that one width serves lobes of many widths, and its lobes have the shape that
+//! reflection has at grazing angles. What falls below the horizon of `wo` is no sample, so p integrates to a little
+//! less than 1 and stays exact.
+//!
+//! The weights and widths were chosen by the relative variance (∫ g²/p)/(∫ g)² − 1 of g = f |cos θi| over four angles of
+//! 18 reflectances (Lambert, Oren-Nayar, Beckmann of slope 0.1 to 0.5, cosine lobes of exponent 10 to 150 of both kinds,
+//! Ashikhmin-Shirley, and mixtures). The mean logarithm of 1 + that is
+//!
+//! | density | mean log second moment | worst relative variance |
+//! |---|---|---|
+//! | uniform hemisphere | 2.30 | 748 |
+//! | cosine hemisphere | 2.30 | 2620 |
+//! | 0.5, 0.3, 0.2 with α = 0.3, 0.3 | 1.51 | 106 |
+//! | 0.5, 0.3, 0.2 with powers of a cosine of exponent 40, 40 about the two directions | 1.19 | 61 |
+//! | 0.5, 0.3, 0.2 with α = 0.1, 0.15 (used) | 1.16 | 22 |
+//! | 0.4, 0.2, 0.2, 0.2 with two mirror lobes, α = 0.1, 0.3, and 0.15 | 1.15 | 22 |
+//!
+//! and a Lambertian, which the cosine alone would match, pays a relative variance of 0.34 to 0.69.
+
+use super::fresnel::reflect;
+use super::{Lobe, TrowbridgeReitz};
+use crate::math::{Vec3, warp};
+
+/// Weight of the cosine lobe.
+const COSINE_WEIGHT: f32 = 0.5;
+/// Weight of the mirror lobe.
+const MIRROR_WEIGHT: f32 = 0.3;
+/// Weight of the retroreflective lobe.
+const RETRO_WEIGHT: f32 = 1.0 - COSINE_WEIGHT - MIRROR_WEIGHT;
+/// Width of the mirror lobe.
+const MIRROR: TrowbridgeReitz = TrowbridgeReitz { alpha_x: 0.1, alpha_y: 0.1 };
+/// Width of the retroreflective lobe.
+const RETRO: TrowbridgeReitz = TrowbridgeReitz { alpha_x: 0.15, alpha_y: 0.15 };
+
+/// A density of directions on the side of `wo`, whatever the reflection.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub enum ProposalDensity {
+    /// Cosine-weighted hemisphere with a mirror lobe and a retroreflective one.
+    #[default]
+    Lobes,
+    /// Uniform hemisphere, for comparison.
+    Uniform,
+}
+
+impl ProposalDensity {
+    /// All, for tests and lists of options.
+    pub const ALL: [ProposalDensity; 2] = [ProposalDensity::Lobes, ProposalDensity::Uniform];
+
+    /// The name on the command line and in metadata.
+    pub fn name(self) -> &'static str {
+        match self {
+            ProposalDensity::Lobes => "lobes",
+            ProposalDensity::Uniform => "uniform",
+        }
+    }
+
+    /// A direction on the side of `wo`, by `uc` among the lobes and `u` within one; `None` if it falls below the horizon.
+    #[inline]
+    pub fn sample(self, wo: Vec3, uc: f32, u: [f32; 2]) -> Option<(Vec3, Lobe)> {
+        let flip = if wo.z < 0.0 { -1.0 } else { 1.0 };
+        let (wi, lobe) = match self {
+            ProposalDensity::Lobes => sample_lobes(wo * flip, uc, u),
+            ProposalDensity::Uniform => (warp::sample_uniform_hemisphere(u), Lobe::DIFFUSE),
+        };
+        (wi.z > 0.0).then_some((wi * flip, lobe | Lobe::REFLECTION))
+    }
+
+    /// Density of [`Self::sample`] per steradian.
+    #[inline]
+    pub fn pdf(self, wo: Vec3, wi: Vec3) -> f32 {
+        let Some((wo, wi)) = super::to_upper(wo, wi) else { return 0.0 };
+        match self {
+            ProposalDensity::Lobes => pdf_lobes(wo, wi),
+            ProposalDensity::Uniform => warp::pdf_uniform_hemisphere(wi),
+        }
+    }
+}
+
+fn sample_lobes(wo: Vec3, uc: f32, u: [f32; 2]) -> (Vec3, Lobe) {
+    if uc < COSINE_WEIGHT {
+        (warp::sample_cosine_hemisphere(u), Lobe::DIFFUSE)
+    } else if uc < COSINE_WEIGHT + MIRROR_WEIGHT {
+        (reflect(wo, MIRROR.sample_m(wo, u)), Lobe::GLOSSY)
+    } else {
+        (turn(reflect(wo, RETRO.sample_m(wo, u))), Lobe::GLOSSY)
+    }
+}
+
+fn pdf_lobes(wo: Vec3, wi: Vec3) -> f32 {
+    COSINE_WEIGHT * warp::pdf_cosine_hemisphere(wi)
+        + MIRROR_WEIGHT * pdf_reflect(&MIRROR, wo, wi)
+        + RETRO_WEIGHT * pdf_reflect(&RETRO, wo, turn(wi))
+}
+
+/// Density of reflection by the normals visible from `wo` (per steradian of `wi`); both are in the upper hemisphere.
+fn pdf_reflect(distribution: &TrowbridgeReitz, wo: Vec3, wi: Vec3) -> f32 {
+    match (wo + wi).try_normalize() {
+        Some(m) => distribution.pdf_m(wo, m) / (4.0 * wo.dot(m).abs()),
+        None => 0.0,
+    }
+}
+
+/// Half a turn about the normal.
+fn turn(w: Vec3) -> Vec3 {
+    Vec3::new(-w.x, -w.y, w.z)
+}

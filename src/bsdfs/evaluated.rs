@@ -1,0 +1,37 @@
+//! Reflection of which only the value f(wo, wi) is known, sampled by a density that knows nothing of it.
+//!
+//! Sample and density are those of [`ProposalDensity`] and are exact, so a light sampler may weigh against them. They fit
+//! badly; [`super::resample()`] draws from f |cos θi| itself, in the limit of many proposals.
+
+use super::{BsdfSample, Model, ProposalDensity};
+use crate::math::{Rgb, Vec3};
+
+/// A reflectance model with the density that proposes directions for it.
+#[derive(Clone, Copy, Debug)]
+pub struct Evaluated {
+    /// The value.
+    pub model: Model,
+    /// The density.
+    pub density: ProposalDensity,
+}
+
+impl Evaluated {
+    /// Value without cosine (1/sr).
+    #[inline]
+    pub fn f(&self, wo: Vec3, wi: Vec3) -> Rgb {
+        self.model.f(wo, wi)
+    }
+
+    /// Density of [`Self::sample`] per steradian.
+    #[inline]
+    pub fn pdf(&self, wo: Vec3, wi: Vec3) -> f32 {
+        self.density.pdf(wo, wi)
+    }
+
+    /// A direction of the proposal density.
+    #[inline]
+    pub fn sample(&self, wo: Vec3, uc: f32, u: [f32; 2]) -> Option<BsdfSample> {
+        let (wi, lobe) = self.density.sample(wo, uc, u)?;
+        Some(BsdfSample { f: self.f(wo, wi), wi, pdf: self.pdf(wo, wi), lobe, eta: 1.0 })
+    }
+}

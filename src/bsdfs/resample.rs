@@ -1,0 +1,65 @@
+//! Sampling any BSDF by resampled importance sampling [Talbot et al. 2005, §5.2].
+//!
+//! M proposals x_j of density p come from [`Bsdf::sample`]; one of them, y, is drawn in proportion to q̂/p with the
+//! target q̂ = luminance(f) |cos θ|. Its contribution weight
+//!
+//! W = 1/q̂(y) · (1/M) Σ_j q̂(x_j)/p(x_j)
+//!
+//! makes f |cos θ| L W an unbiased estimate of ∫ f |cos θ| L dω for every M, since luminance is 0 only where f is. With
+//! M = 1, W = 1/p. In the limit y has the density q̂/∫q̂, which is f |cos θ| itself for a grey surface.
+//!
+//! Nothing depends on the model. Deltas take part with their probabilities for p, for f is then a probability's too;
+//! values that are themselves random (layers) do as well, f being what came with the sample.
+
+use super::{Bsdf, Lobe};
+use crate::math::{Rgb, Vec3};
+
+/// A resampled direction. The weight of the path is `f·|cos θi|·weight` for all lobes.
+#[derive(Clone, Copy, Debug)]
+pub struct Resampled {
+    /// Value without cosine (1/sr); as the sampler gives it for deltas.
+    pub f: Rgb,
+    /// Direction to the light.
+    pub wi: Vec3,
+    /// W: what takes the place of 1/pdf (sr).
+    pub weight: f32,
+    /// Kind of scattering.
+    pub lobe: Lobe,
+    /// Index of refraction of the side of `wi` relative to that of `wo`; 1 for reflection.
+    pub eta: f32,
+}
+
+/// Draws one of `proposals` (M, at least 1) samples of `bsdf`. `u_proposal(j)` are the numbers of proposal j, the first of
+/// them chooses the lobe; `u_choice` chooses among the proposals. `None` if no proposal carries light.
+pub fn resample(
+    bsdf: &Bsdf<'_>,
+    wo: Vec3,
+    proposals: u32,
+    u_proposal: impl Fn(u32) -> [f32; 3],
+    u_choice: f32,
+) -> Option<Resampled> {
+    let proposals = proposals.max(1);
+    let (mut chosen, mut sum) = (None, 0.0_f64);
+    // One number serves for all choices: what is left of it after each is uniform again.
+    let mut u = f64::from(u_choice);
+    for j in 0..proposals {
+        let [uc, u0, u1] = u_proposal(j);
+        let Some(s) = bsdf.sample(wo, uc, [u0, u1]) else { continue };
+        let p_hat = s.f.luminance() * s.wi.z.abs();
+        let w = f64::from(p_hat / s.pdf);
+        if !(w > 0.0 && w.is_finite()) {
+            continue;
+        }
+        sum += w;
+        let p_take = w / sum;
+        if u < p_take {
+            chosen = Some((s, p_hat));
+            u /= p_take;
+        } else {
+            u = (u - p_take) / (1.0 - p_take);
+        }
+    }
+    let (s, p_hat) = chosen?;
+    let weight = (sum / (f64::from(proposals) * f64::from(p_hat))) as f32;
+    weight.is_finite().then_some(Resampled { f: s.f, wi: s.wi, weight, lobe: s.lobe, eta: s.eta })
+}

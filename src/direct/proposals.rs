@@ -1,0 +1,262 @@
+//! T1 of resampling: many light samples of a shading point at once, as structure of arrays, with the target and the weight
+//! of each.
+//!
+//! Proposals lie along one curve that passes all lights one after the other and fills each of them: positions in [0, 1)
+//! choose a light by inversion, and what remains of them is a place on a Hilbert curve over the light's sample space.
+//! So stratified positions are stratified over the lights and over each light [He and Owen 2016], and proposals
+//! that follow each other are neighbours on a light, as strata of samples want them [Talbot 2005, §4.5.2, heuristic 2].
+//!
+//! A proposal keeps q̂, r = w/(m·p) and q̂·r only. Those few that are drawn are sampled again, one at a time.
+
+use super::ShadePoint;
+use super::propose::Candidate;
+use crate::estimators::mis::Heuristic;
+use crate::lights::{LightId, LightLanes, LightRun};
+use crate::math::hash::pcg4d;
+use crate::scene::{ProposalPoints, Target, World};
+use crate::simd::combine::{self, Weighting};
+use crate::simd::{self, curve};
+
+/// Seed of the positions.
+const POSITIONS: u32 = 0x517c_c1b7;
+
+/// Proposals of several shading points.
+#[derive(Debug, Default)]
+pub struct Proposals {
+    points: Vec<PointProposals>,
+    light: Vec<LightId>,
+    pmf: Vec<f32>,
+    u: [Vec<f32>; 2],
+    wi: [Vec<f32>; 3],
+    li: [Vec<f32>; 3],
+    f_cos: [Vec<f32>; 3],
+    p_light: Vec<f32>,
+    p_bsdf: Vec<f32>,
+    /// The target of each.
+    pub p_hat: Vec<f32>,
+    /// Of each, the factor r of its f in the estimate over all proposals; 1/(M·p) for a single technique.
+    pub r: Vec<f32>,
+    /// The weight p_hat·r of each.
+    pub weight: Vec<f32>,
+    positions: Vec<u32>,
+    jitter: Vec<u32>,
+    runs: Vec<LightRun>,
+}
+
+/// Where the proposals of a point are: light samples, then BSDF samples.
+#[derive(Clone, Copy, Debug)]
+pub struct PointProposals {
+    /// First proposal.
+    pub start: usize,
+    /// First BSDF sample.
+    pub bsdf_start: usize,
+    /// End.
+    pub end: usize,
+}
+
+/// How many proposals of each technique a point has, and by what they are weighted.
+#[derive(Clone, Copy, Debug)]
+pub struct Techniques {
+    /// Expected number of light samples.
+    pub n_light: f32,
+    /// Expected number of BSDF samples.
+    pub n_bsdf: f32,
+    /// Weights.
+    pub heuristic: Heuristic,
+    /// Target.
+    pub target: Target,
+}
+
+impl Proposals {
+    /// Removes all.
+    pub fn clear(&mut self) {
+        self.points.clear();
+    }
+
+    /// Number of proposals.
+    pub fn len(&self) -> usize {
+        self.points.last().map_or(0, |p| p.end)
+    }
+
+    /// The points whose proposals these are.
+    pub fn points(&self) -> &[PointProposals] {
+        &self.points
+    }
+
+    /// Light and place on it, as it was sampled: id, probability of the choice, random numbers.
+    pub fn light_sample(&self, proposal: usize) -> (LightId, f32, [f32; 2]) {
+        (self.light[proposal], self.pmf[proposal], [self.u[0][proposal], self.u[1][proposal]])
+    }
+
+    /// Makes room for `len` proposals; what was there before stays.
+    fn grow(&mut self, len: usize) {
+        if self.light.len() < len {
+            let len = len.next_power_of_two();
+            self.light.resize(len, 0);
+            self.arrays().for_each(|array| array.resize(len, 0.0));
+        }
+    }
+
+    fn arrays(&mut self) -> impl Iterator<Item = &mut Vec<f32>> {
+        let scalars =
+            [&mut self.pmf, &mut self.p_light, &mut self.p_bsdf, &mut self.p_hat, &mut self.r, &mut self.weight];
+        let vectors = self.u.iter_mut().chain(&mut self.wi).chain(&mut self.li).chain(&mut self.f_cos);
+        scalars.into_iter().chain(vectors)
+    }
+
+    /// Adds a point with `light_draws` light samples and the given BSDF samples. `phi` is a uniform number, well
+    /// distributed over the samples of a pixel.
+    pub fn add(
+        &mut self,
+        world: &World,
+        point: &ShadePoint<'_>,
+        techniques: &Techniques,
+        (light_draws, positions, phi): (u32, ProposalPoints, f32),
+        bsdf_samples: &[Candidate],
+    ) {
+        let start = self.len();
+        let bsdf_start = start + light_draws as usize;
+        let end = bsdf_start + bsdf_samples.len();
+        self.grow(end);
+        self.points.push(PointProposals { start, bsdf_start, end });
+        if light_draws > 0 {
+            self.place(positions, phi, light_draws);
+            self.sample_lights(world, point, start, bsdf_start);
+            self.weigh_lights(world, point, techniques, start, bsdf_start);
+        }
+        for (i, c) in (bsdf_start..end).zip(bsdf_samples) {
+            let cos = point.bsdf.cos(c.segment.d.normalize());
+            self.p_hat[i] = match techniques.target {
+                Target::Fgl => c.f.luminance(),
+                Target::Gv | Target::Gvl if c.drawn.is_delta() => c.f.luminance(),
+                Target::Gv => cos,
+                Target::Gvl => cos * c.li.luminance(),
+            };
+            self.r[i] = c.factor(techniques.heuristic);
+            self.weight[i] = weight(self.p_hat[i], self.r[i]);
+        }
+    }
+
+    /// Positions along the curve, ascending.
+    fn place(&mut self, points: ProposalPoints, phi: f32, count: u32) {
+        let phi = (f64::from(phi) * 4_294_967_296.0) as u32;
+        self.positions.resize(count as usize, 0);
+        self.jitter.resize(count as usize, 0);
+        match points {
+            ProposalPoints::Stratified => {
+                curve::strata(phi, POSITIONS, count, &mut self.positions, &mut self.jitter);
+            }
+            ProposalPoints::Independent => {
+                for (i, (position, jitter)) in self.positions.iter_mut().zip(&mut self.jitter).enumerate() {
+                    [*position, *jitter, _, _] = pcg4d([phi, i as u32, POSITIONS, 0]);
+                }
+                self.positions.sort_unstable();
+            }
+        }
+    }
+
+    /// Lights at the positions, and directions to them.
+    fn sample_lights(&mut self, world: &World, point: &ShadePoint<'_>, start: usize, end: usize) {
+        let lights = &world.scene.lights;
+        let ctx = point.light_ctx();
+        lights.sampler.runs(&ctx, &self.positions, &mut self.runs);
+        self.p_light[start..end].fill(0.0);
+
+        for run in &self.runs {
+            let [first, last] = run.places.map(|p| p as usize);
+            let (from, to) = (start + first, start + last);
+            for position in &mut self.positions[first..last] {
+                *position = run.within(*position);
+            }
+            let [u0, u1] = &mut self.u;
+            curve::hilbert_points(
+                &self.positions[first..last],
+                &self.jitter[first..last],
+                &mut u0[from..to],
+                &mut u1[from..to],
+            );
+            let mut lanes = LightLanes {
+                wi: self.wi.each_mut().map(|a| &mut a[from..to]),
+                li: self.li.each_mut().map(|a| &mut a[from..to]),
+                pdf: &mut self.p_light[from..to],
+            };
+            let light = &lights.lights[run.light as usize];
+            light.sample_li_lanes(&ctx, [&u0[from..to], &u1[from..to]], &mut lanes);
+            lanes.pdf.iter_mut().for_each(|pdf| *pdf *= run.pmf);
+            self.light[from..to].fill(run.light);
+            self.pmf[from..to].fill(run.pmf);
+
+            // Lights at infinity overlap: a direction belongs to all of them together
+            if lights.infinite.len() > 1 && lights.infinite.contains(&run.light) {
+                for i in from..to {
+                    if !(self.p_light[i] > 0.0) {
+                        continue;
+                    }
+                    let wi = self.wi.each_ref().map(|a| a[i]).into();
+                    let li = lights.le(wi);
+                    self.li.iter_mut().enumerate().for_each(|(c, a)| a[i] = li[c]);
+                    self.p_light[i] = lights.pdf_infinite(&ctx, wi);
+                }
+            }
+        }
+    }
+
+    /// Targets and weights of light samples.
+    fn weigh_lights(
+        &mut self,
+        world: &World,
+        point: &ShadePoint<'_>,
+        techniques: &Techniques,
+        start: usize,
+        end: usize,
+    ) {
+        // What has no sample keeps a direction that can be evaluated
+        let wi = self.wi.each_ref().map(|a| &a[start..end]);
+        let f_cos = self.f_cos.each_mut().map(|a| &mut a[start..end]);
+        match techniques.target {
+            Target::Fgl => point.bsdf.eval_lanes(point.wo, wi, f_cos, &mut self.p_bsdf[start..end]),
+            Target::Gv | Target::Gvl => {
+                for i in start..end {
+                    let wi = self.wi.each_ref().map(|a| a[i]).into();
+                    self.p_bsdf[i] = point.bsdf.pdf(point.wo, wi);
+                    self.f_cos.iter_mut().for_each(|a| a[i] = point.bsdf.cos(wi));
+                }
+            }
+        }
+        for run in self.runs.iter().filter(|run| world.scene.lights.lights[run.light as usize].is_delta()) {
+            self.p_bsdf[start + run.places[0] as usize..start + run.places[1] as usize].fill(0.0);
+        }
+        let proposals = combine::Proposals {
+            f_cos: self.f_cos.each_ref().map(|a| &a[start..end]),
+            li: self.li.each_ref().map(|a| &a[start..end]),
+            p: &self.p_light[start..end],
+            p_other: &self.p_bsdf[start..end],
+            m: techniques.n_light,
+            m_other: techniques.n_bsdf,
+            weighting: match techniques.heuristic {
+                Heuristic::Balance => Weighting::Balance,
+                Heuristic::Power => Weighting::Power,
+                Heuristic::Maximum => Weighting::Maximum,
+            },
+        };
+        let mut weights = combine::Weights {
+            q_hat: &mut self.p_hat[start..end],
+            r: &mut self.r[start..end],
+            w: &mut self.weight[start..end],
+        };
+        combine::combine(simd::level(), &proposals, &mut weights);
+        if techniques.target == Target::Gv {
+            for i in start..end {
+                self.p_hat[i] = self.f_cos[0][i];
+                self.weight[i] = weight(self.p_hat[i], self.r[i]);
+            }
+        }
+    }
+}
+
+/// q̂·r; 0 if it is no finite number.
+#[inline]
+fn weight(p_hat: f32, r: f32) -> f32 {
+    let weight = p_hat * r;
+    if weight.is_finite() { weight } else { 0.0 }
+}

@@ -1,0 +1,219 @@
+//! Resampled importance sampling of direct light [Talbot et al. 2005; Talbot 2005].
+//!
+//! T1 makes M proposals of every point by light and BSDF sampling, weighted by multiple importance sampling into one
+//! set [Talbot 2005, §4.6.1] whose target q̂ is the luminance of f·G·L. N of them are drawn in proportion to q̂·r, and only
+//! these are evaluated in colour and traced. Unbiased for any M ≥ N ≥ 1: given the proposals, the expectation over
+//! the draws is the estimate that would trace them all.
+//!
+//! Targets with visibility turn the order round: proposals are traced, and N of the visible ones are shaded.
+
+use super::ShadePoint;
+use super::proposals::{PointProposals, Proposals, Techniques};
+use super::propose::{self, Candidate, Candidates, Shares};
+use super::visibility::Segments;
+use crate::bsdfs::Bsdf;
+use crate::estimators::ris::{Draw, strata, stratified, systematic, with_replacement};
+use crate::lights::LightSample;
+use crate::math::Rgb;
+use crate::math::hash::{pcg4d, unit_f32};
+use crate::scene::{IntegratorSettings, Strata, World};
+use std::time::{Duration, Instant};
+
+/// Domains below the stream of a shading point, beside those of [`super::propose`].
+mod domain {
+    pub const RESAMPLE: u32 = 8;
+    pub const STRATA: u32 = 9;
+}
+
+/// Proposals that are made before samples are drawn from them: few enough to stay in the cache.
+const CHUNK: usize = 2048;
+
+/// The stage's buffers.
+#[derive(Debug, Default)]
+pub struct Resampler {
+    proposals: Proposals,
+    draws: Vec<Draw>,
+    ends: Vec<u32>,
+    u: Vec<f32>,
+    probes: Segments,
+    /// Per point of the chunk, the numbers for the places of proposals and for the draws: well distributed over the samples
+    /// of a pixel.
+    numbers: Vec<[f32; 2]>,
+    /// Time in making proposals and their targets.
+    pub t1: Duration,
+    /// Segments traced for targets with visibility.
+    pub probed: u64,
+}
+
+/// The proposals of a point by light and by BSDF sampling: M together, unless the BSDF is all specular.
+///
+/// A wide BSDF says little of where the light is, so that light sampling has most of them; one with a peak has half.
+pub(super) fn shares(point: &ShadePoint<'_>) -> Shares {
+    let (m, n) = (point.split.proposals, point.split.samples);
+    let bsdf = &point.bsdf.bsdf;
+    if !bsdf.has_non_specular() {
+        return Shares::fixed(0, n);
+    }
+    let share = match bsdf {
+        Bsdf::Diffuse(_) | Bsdf::DiffuseTransmission(_) | Bsdf::Evaluated(_) => 0.125,
+        Bsdf::CoatedDiffuse(_) => 0.25,
+        Bsdf::Conductor(_) | Bsdf::Dielectric(_) | Bsdf::ThinDielectric(_) | Bsdf::Layered(_) => {
+            0.5
+        }
+    };
+    static SH: std::sync::OnceLock<Vec<f32>> = std::sync::OnceLock::new();
+    let sh = SH.get_or_init(|| std::env::var("SH").unwrap_or_default().split(',').filter_map(|x| x.parse().ok()).collect());
+    let share = if sh.len() == 3 { if share == 0.125 { sh[0] } else if share == 0.25 { sh[1] } else { sh[2] } } else { share };
+    let by_bsdf = ((m as f32 * share).round() as u32).clamp(1, m.saturating_sub(1).max(1));
+    if m == 1 { Shares::one_of_both(point) } else { Shares::fixed(m - by_bsdf, by_bsdf) }
+}
+
+impl Resampler {
+    /// Draws the samples of all points: `out` gets one candidate for each, `contributions` what it adds if its segment is
+    /// free. `bsdf_samples` are sorted by point.
+    pub(super) fn run(
+        &mut self,
+        world: &World,
+        settings: &IntegratorSettings,
+        points: &[ShadePoint<'_>],
+        candidates: &mut Candidates,
+        contributions: &mut Vec<Rgb>,
+    ) {
+        let bsdf_samples = std::mem::take(&mut candidates.records);
+        candidates.records = std::mem::take(&mut candidates.spare);
+        candidates.records.clear();
+        contributions.clear();
+        (self.t1, self.probed) = (Duration::ZERO, 0);
+
+        let mut next = 0;
+        let mut first = 0;
+        while first < points.len() {
+            // T1: proposals of some points
+            let start = Instant::now();
+            self.proposals.clear();
+            self.numbers.clear();
+            let (first_point, first_sample) = (first, next);
+            while first < points.len() && (self.proposals.len() < CHUNK || first == first_point) {
+                let point = &points[first];
+                let begin = next;
+                while next < bsdf_samples.len() && bsdf_samples[next].point == first as u32 {
+                    next += 1;
+                }
+                self.propose(world, settings, point, &bsdf_samples[begin..next]);
+                first += 1;
+            }
+            let chunk = &points[first_point..first];
+            let bsdf_of_chunk = &bsdf_samples[first_sample..next];
+            if settings.ris.target.has_visibility() {
+                self.probe(world, chunk, bsdf_of_chunk);
+            }
+            self.t1 += start.elapsed();
+
+            // Select
+            let mut bsdf = bsdf_of_chunk;
+            for (i, point) in chunk.iter().enumerate() {
+                let range = self.proposals.points()[i];
+                self.draw(settings, point, range, self.numbers[i][1]);
+                let (own, rest) = bsdf.split_at(range.end - range.bsdf_start);
+                bsdf = rest;
+                for draw in &self.draws {
+                    let place = range.start + draw.index as usize;
+                    let evaluated = if place < range.bsdf_start {
+                        self.light_candidate(world, (first_point + i) as u32, point, place)
+                    } else {
+                        Some(own[place - range.bsdf_start])
+                    };
+                    if let Some(candidate) = evaluated {
+                        contributions.push(candidate.f * (self.proposals.r[place] * draw.scale));
+                        candidates.records.push(candidate);
+                    }
+                }
+            }
+        }
+        candidates.spare = bsdf_samples;
+    }
+
+    fn propose(&mut self, world: &World, settings: &IntegratorSettings, point: &ShadePoint<'_>, bsdf: &[Candidate]) {
+        let shares = shares(point);
+        let techniques = Techniques {
+            n_light: shares.n_light,
+            n_bsdf: shares.n_bsdf,
+            heuristic: settings.heuristic(),
+            target: settings.ris.target,
+        };
+        let numbers = point.stream.domain(domain::RESAMPLE).draw::<2>();
+        self.numbers.push(numbers);
+        let positions = (shares.light_draws, settings.ris.points, numbers[0]);
+        self.proposals.add(world, point, &techniques, positions, bsdf);
+    }
+
+    /// Traces all proposals and sets the weights of those that are not visible to 0.
+    fn probe(&mut self, world: &World, points: &[ShadePoint<'_>], bsdf_samples: &[Candidate]) {
+        self.probes.clear();
+        let mut bsdf = bsdf_samples.iter();
+        let mut probed = Vec::new();
+        for (i, point) in points.iter().enumerate() {
+            let range = self.proposals.points()[i];
+            for place in range.start..range.end {
+                let by_bsdf = if place >= range.bsdf_start { bsdf.next().copied() } else { None };
+                if self.proposals.weight[place] > 0.0 {
+                    let candidate = by_bsdf.or_else(|| self.light_candidate(world, 0, point, place));
+                    match candidate {
+                        Some(candidate) => {
+                            self.probes.push(&candidate, Rgb::BLACK);
+                            probed.push(place);
+                        }
+                        None => self.proposals.weight[place] = 0.0,
+                    }
+                }
+            }
+        }
+        self.probes.trace(&*world.accel);
+        self.probed += probed.len() as u64;
+        for (&place, &occluded) in probed.iter().zip(self.probes.occluded()) {
+            if occluded {
+                self.proposals.weight[place] = 0.0;
+            }
+        }
+    }
+
+    /// Draws N proposals of a point.
+    fn draw(&mut self, settings: &IntegratorSettings, point: &ShadePoint<'_>, range: PointProposals, u: f32) {
+        let weights = &self.proposals.weight[range.start..range.end];
+        let n = point.split.samples as usize;
+        match settings.ris.strata {
+            Strata::Systematic => systematic(weights, n as u32, u, &mut self.draws),
+            Strata::None => {
+                independent_numbers(u, n, &mut self.u);
+                with_replacement(weights, &self.u, &mut self.draws);
+            }
+            Strata::Proposals => {
+                strata::equal_proposals(weights.len(), n, &mut self.ends);
+                independent_numbers(u, self.ends.len(), &mut self.u);
+                stratified(weights, &self.ends, &self.u, &mut self.draws);
+            }
+            Strata::Weights => {
+                let [bounds] = point.stream.domain(domain::STRATA).draw::<1>();
+                independent_numbers(bounds, n, &mut self.u);
+                strata::equal_weights(weights, n, &self.u, &mut self.ends);
+                independent_numbers(u, self.ends.len(), &mut self.u);
+                stratified(weights, &self.ends, &self.u, &mut self.draws);
+            }
+        }
+    }
+
+    /// A light sample, drawn again with all that a proposal leaves out.
+    fn light_candidate(&self, world: &World, index: u32, point: &ShadePoint<'_>, place: usize) -> Option<Candidate> {
+        let (light, pmf, u) = self.proposals.light_sample(place);
+        let sample = world.scene.lights.lights[light as usize].sample_li(&point.light_ctx(), u)?;
+        let sample = LightSample { pdf: sample.pdf * pmf, ..sample };
+        propose::light_candidate(world, index, point, &Shares::fixed(0, 0), (light, sample))
+    }
+}
+
+/// `count` independent numbers, the first of which is `u` itself.
+fn independent_numbers(u: f32, count: usize, out: &mut Vec<f32>) {
+    out.clear();
+    let other = |i: usize| unit_f32(pcg4d([u.to_bits(), i as u32, 0x9e37_79b9, 1])[0]);
+    out.extend((0..count).map(|i| if i == 0 { u } else { other(i) }));
+}

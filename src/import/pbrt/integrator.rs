@@ -1,0 +1,138 @@
+//! `Integrator`: light transport and the estimator of direct light.
+
+use super::options::{Pending, unknown};
+use super::params::{ParamSet, ParamType};
+use crate::bsdfs::ProposalDensity;
+use crate::estimators::mis::Heuristic;
+use crate::import::diagnostic::Diagnostics;
+use crate::lights::LightSamplerKind;
+use crate::scene::{EstimatorKind, IntegratorKind, IntegratorSettings, ProposalPoints, Proposals, Strata, Target};
+
+/// Understands `Integrator`.
+pub(super) fn finish_integrator(pending: Option<&Pending>, d: &mut Diagnostics) -> IntegratorSettings {
+    let mut s = IntegratorSettings::default();
+    let Some(Pending { name, params: p }) = pending else { return s };
+    match name.text.as_str() {
+        "path" | "volpath" => {}
+        "direct" => s.kind = IntegratorKind::Direct,
+        "directlighting" => {
+            s.kind = IntegratorKind::Direct;
+            d.warning_once(name.span, "integrator `directlighting` is pbrt-v3: `direct` is used");
+        }
+        "simplepath" | "simplevolpath" | "bdpt" | "mlt" | "sppm" | "lightpath" | "ao" | "randomwalk" | "whitted" => {
+            d.warning_once(name.span, format!("integrator `{}` is not rendered here: `path` is used", name.text));
+        }
+        other => unknown(other, name.span, "integrator", &["path", "direct", "volpath"], d),
+    }
+    match p.integer("maxdepth", d) {
+        Some(n @ 0..=10_000) => s.max_depth = n as u32,
+        Some(n) => {
+            d.error(p.span_of("maxdepth"), format!("maxdepth must be from 0 to 10000, not {n}"));
+        }
+        None if s.kind == IntegratorKind::Direct => s.max_depth = 1,
+        None => {}
+    }
+    lumiris_parameters(&mut s, p, d);
+    if p.ignore("regularize") {
+        d.warning_once(p.span_of("regularize"), "regularize is ignored: it would bias the picture");
+    }
+    for key in [
+        "radius",
+        "photonsperiteration",
+        "iterations",
+        "imagewritefrequency",
+        "rrthreshold",
+        "samplelights",
+        "samplebsdf",
+        "visualizestrategies",
+        "visualizeweights",
+        "bootstrapsamples",
+        "chains",
+        "mutationsperpixel",
+        "largestepprobability",
+        "sigma",
+        "cossample",
+        "maxdistance",
+        "strategy",
+        "seed",
+    ] {
+        p.ignore(key);
+    }
+    p.report_unused(d);
+    s
+}
+
+/// Parameters that are Lumiris's own, and pbrt's `lightsampler`.
+fn lumiris_parameters(s: &mut IntegratorSettings, p: &ParamSet, d: &mut Diagnostics) {
+    use EstimatorKind::{Mc, Mis, Ris};
+    if let Some(e) = choice(p, "estimator", &[Mc, Mis, Ris], EstimatorKind::name, d) {
+        s.estimator = e;
+    }
+    let heuristics = [Heuristic::Balance, Heuristic::Power, Heuristic::Maximum];
+    if let Some(h) = choice(p, "heuristic", &heuristics, Heuristic::name, d) {
+        s.heuristic = Some(h);
+    }
+    let kinds = [Strata::None, Strata::Proposals, Strata::Weights, Strata::Systematic];
+    if let Some(strata) = choice(p, "strata", &kinds, Strata::name, d) {
+        s.ris.strata = strata;
+    }
+    let kinds = [ProposalPoints::Independent, ProposalPoints::Stratified];
+    if let Some(points) = choice(p, "proposalpoints", &kinds, ProposalPoints::name, d) {
+        s.ris.points = points;
+    }
+    if let Some(target) = choice(p, "target", &[Target::Fgl, Target::Gv, Target::Gvl], Target::name, d) {
+        s.ris.target = target;
+    }
+    let samplers = ["uniform", "power", "bvh", "tree", "exhaustive", "spatial"];
+    if let Some(name) = choice(p, "lightsampler", &samplers, |name| name, d) {
+        s.light_choice = match name {
+            "uniform" => LightSamplerKind::Uniform,
+            "power" => LightSamplerKind::Power,
+            _ => LightSamplerKind::Tree,
+        };
+    }
+    if let Some(density) = choice(p, "bsdfdensity", &ProposalDensity::ALL, ProposalDensity::name, d) {
+        s.bsdf_density = density;
+    }
+    if let Some(n) = count(p, "bsdfproposals", d) {
+        s.bsdf_proposals = n;
+    }
+    s.samples = count(p, "samples", d);
+    if p.type_of("proposals") == Some(ParamType::String) {
+        let kinds = [Proposals::Auto, Proposals::Optimal];
+        let name = |p: Proposals| if p == Proposals::Auto { "auto" } else { "optimal" };
+        if let Some(proposals) = choice(p, "proposals", &kinds, name, d) {
+            s.ris.proposals = proposals;
+        }
+    } else if let Some(n) = count(p, "proposals", d) {
+        s.ris.proposals = Proposals::Fixed(n);
+    }
+}
+
+/// One of `known`, by its name.
+fn choice<T: Copy>(
+    p: &ParamSet,
+    key: &'static str,
+    known: &[T],
+    name: impl Fn(T) -> &'static str,
+    d: &mut Diagnostics,
+) -> Option<T> {
+    let value = p.string(key, d)?.to_owned();
+    let found = known.iter().copied().find(|&k| name(k) == value);
+    if found.is_none() {
+        let names: Vec<&str> = known.iter().map(|&k| name(k)).collect();
+        d.error(p.span_of(key), format!("unknown {key} `{value}`")).help(format!("one of {}", names.join(", ")));
+    }
+    found
+}
+
+/// A number of samples or proposals.
+fn count(p: &ParamSet, key: &'static str, d: &mut Diagnostics) -> Option<u32> {
+    match p.integer(key, d)? {
+        n @ 1..=4096 => Some(n as u32),
+        n => {
+            d.error(p.span_of(key), format!("{key} must be from 1 to 4096, not {n}"));
+            None
+        }
+    }
+}

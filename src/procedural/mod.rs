@@ -1,0 +1,15 @@
+//! Content that the program makes itself: a statue, a sky, and the scenes that show them.
+//!
+//! Reading order: [`noise`], [`nets`], [`solids`], [`relief`], [`dragon`] (with `head`), [`statue`], [`ply`], [`sky`],
+//! [`talbot`].
+
+pub mod dragon;
+mod head;
+pub mod nets;
+pub mod noise;
+pub mod ply;
+pub mod relief;
+pub mod sky;
+pub mod solids;
+pub mod statue;
+pub mod talbot;

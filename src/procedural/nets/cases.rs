@@ -1,0 +1,115 @@
+//! The 256 ways in which a surface can pass a cell: which of the twelve edges belong to the same sheet.
+//!
+//! Corner i lies at the bits (x, y, z) = (i & 1, i >> 1 & 1, i >> 2 & 1). Edge 4a + j runs along axis a; bit 0 of j is
+//! its place on the axis a + 1, bit 1 on the axis a + 2 (mod 3). On a face whose inside corners are diagonal the inside
+//! is taken as two pieces. Both cells at a face see the same four corners, so they agree.
+
+/// The sheets of one case.
+#[derive(Clone, Copy)]
+pub struct Case {
+    /// Sheet of each edge; meaningless where the edge is not crossed.
+    pub sheet: [u8; 12],
+    /// Number of sheets, at most 4.
+    pub sheets: u8,
+}
+
+/// The two corners of an edge, lower first.
+pub fn edge_corners(edge: usize) -> [usize; 2] {
+    let (axis, j) = (edge / 4, edge % 4);
+    let first = ((j & 1) << ((axis + 1) % 3)) | ((j >> 1) << ((axis + 2) % 3));
+    [first, first | (1 << axis)]
+}
+
+/// The four corners of the face across `axis` on `side`: bit 0 of the place in the array is the axis a + 1, bit 1 the
+/// axis a + 2.
+pub fn face_corners(axis: usize, side: usize) -> [usize; 4] {
+    std::array::from_fn(|j| (side << axis) | ((j & 1) << ((axis + 1) % 3)) | ((j >> 1) << ((axis + 2) % 3)))
+}
+
+/// True if the inside corners of a face are two that are diagonal.
+pub fn is_ambiguous(config: u8, corners: [usize; 4]) -> bool {
+    let inside = corners.map(|c| config >> c & 1 == 1);
+    inside[0] == inside[3] && inside[1] == inside[2] && inside[0] != inside[1]
+}
+
+/// The edge between two corners that differ in one coordinate.
+pub fn edge_between(a: usize, b: usize) -> usize {
+    let axis = (a ^ b).trailing_zeros() as usize;
+    4 * axis + ((a >> ((axis + 1) % 3) & 1) | (a >> ((axis + 2) % 3) & 1) << 1)
+}
+
+/// The cases of all configurations of inside corners.
+pub fn all() -> Box<[Case; 256]> {
+    Box::new(std::array::from_fn(|config| case(config as u8)))
+}
+
+fn case(config: u8) -> Case {
+    let inside = |corner: usize| config >> corner & 1 == 1;
+    let crossed = |edge: usize| {
+        edge_corners(edge).map(inside) == [true, false] || edge_corners(edge).map(inside) == [false, true]
+    };
+    let mut label: [usize; 12] = std::array::from_fn(|e| e);
+    let mut join = |a: usize, b: usize| {
+        let (from, to) = (label[a].max(label[b]), label[a].min(label[b]));
+        for l in &mut label {
+            if *l == from {
+                *l = to;
+            }
+        }
+    };
+
+    // Each face joins two edges, or two pairs of edges
+    for (axis, side) in [(0, 0), (0, 1), (1, 0), (1, 1), (2, 0), (2, 1)] {
+        let corners = face_corners(axis, side);
+        let around = [[0, 1], [1, 3], [3, 2], [2, 0]].map(|[a, b]| edge_between(corners[a], corners[b]));
+        if is_ambiguous(config, corners) {
+            for j in 0..4 {
+                if inside(corners[j]) {
+                    join(edge_between(corners[j], corners[j ^ 1]), edge_between(corners[j], corners[j ^ 2]));
+                }
+            }
+        } else {
+            let mut ends = around.into_iter().filter(|&e| crossed(e));
+            if let (Some(a), Some(b)) = (ends.next(), ends.next()) {
+                join(a, b);
+            }
+        }
+    }
+
+    // Number the sheets
+    let mut case = Case { sheet: [0; 12], sheets: 0 };
+    let mut number = [None; 12];
+    for edge in (0..12).filter(|&e| crossed(e)) {
+        case.sheet[edge] = *number[label[edge]].get_or_insert_with(|| {
+            case.sheets += 1;
+            case.sheets - 1
+        });
+    }
+    case
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn simple_cases_have_the_sheets_that_one_expects() {
+        let cases = all();
+        assert_eq!((cases[0].sheets, cases[255].sheets), (0, 0));
+        assert!((0..8).all(|c| cases[1 << c].sheets == 1 && cases[255 ^ (1 << c)].sheets == 1));
+        // Diagonal corners of a face, opposite corners of the cell, and every second corner.
+        assert_eq!((cases[0b1001].sheets, cases[0b1000_0001].sheets, cases[0b0110_1001].sheets), (2, 2, 4));
+        // A half.
+        assert_eq!(cases[0b0000_1111].sheets, 1);
+        // A sheet has three edges or more.
+        for (config, case) in cases.iter().enumerate() {
+            for sheet in 0..case.sheets {
+                let count = (0..12).filter(|&e| {
+                    let [a, b] = edge_corners(e);
+                    (config >> a & 1) != (config >> b & 1) && case.sheet[e] == sheet
+                });
+                assert!(count.count() >= 3, "{config}");
+            }
+        }
+    }
+}

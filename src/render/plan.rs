@@ -1,0 +1,220 @@
+//! What `ris` leaves open until the scene is there: the numbers of proposals M and of samples N.
+//!
+//! T1, the time of a proposal, and T2, that of a sample, are measured on a few thousand camera rays. Then
+//!
+//! * `auto`: M/N = T2/T1, so that both stages take the same time [Talbot 2005, Eq. 4.4]; and N, if it is open, so that direct
+//!   light takes as long as everything else of a vertex does: N = T0/(2·T2), at least 1.
+//! * `optimal`: the same time per estimate, split in each pixel by the variances of its own light
+//!   [Talbot 2005, Eq. 4.3], which a pilot estimates from proposals that are all traced.
+//!
+//! Times differ from run to run; so the numbers chosen are part of the picture's metadata, and giving them back gives the same
+//! picture to the bit.
+
+use super::{RenderSettings, Run, ThreadError, camera_batches};
+use crate::estimators::ris::choice::{Costs, MomentsEstimate, Variances, clamp_ratio, optimal_ratio};
+use crate::film::PixelBounds;
+use crate::integrators::PathIntegrator;
+use crate::integrators::path::CameraSample;
+use crate::scene::{
+    EstimatorKind, IntegratorKind, IntegratorSettings, Proposals, Split, SplitMap, StageTimes, Strata, Target, World,
+};
+use rayon::prelude::*;
+use std::sync::atomic::AtomicBool;
+use std::time::Duration;
+
+/// Camera rays on which times are measured.
+const TIMING_RAYS: usize = 8192;
+/// Proposals and samples of the estimates that are timed.
+const TIMING: Split = Split { samples: 4, proposals: 32 };
+/// Most samples of an estimate that times alone ask for.
+const MOST: f64 = 64.0;
+/// Camera samples per pixel of the pilot, and its proposals, all of which are traced.
+const PILOT_SPP: u32 = 2;
+const PILOT_PROPOSALS: u32 = 32;
+/// Variances are averaged over this many pixels to each side.
+const PILOT_RADIUS: u32 = 2;
+/// Seed of the pilot, for which the picture's own random numbers must not be used: they would be chosen by their outcome.
+const PILOT_SEED: u32 = 0x70_69_6c_6f;
+
+/// What was found out and chosen.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Plan {
+    /// Times of the stages.
+    pub times: StageTimes,
+    /// Samples and proposals; with `optimal` those whose time each pixel spends in its own way.
+    pub split: Split,
+}
+
+/// Chooses what the settings of `world` leave open, and sets it. `None` if they leave nothing open. `ratio_map` asks for the
+/// map of the best M/N even if it is not used.
+pub fn prepare(world: &mut World, threads: Option<usize>, ratio_map: bool) -> Result<Option<Plan>, ThreadError> {
+    let settings = world.scene.integrator;
+    let is_open = settings.samples.is_none() || !matches!(settings.ris.proposals, Proposals::Fixed(_));
+    if settings.estimator != EstimatorKind::Ris || !is_open && !ratio_map {
+        return Ok(None);
+    }
+
+    // Times
+    let measured = if settings.ris.stage_times.is_none() || settings.samples.is_none() {
+        measure(world)
+    } else {
+        Measured { times: None, other: 0.0 }
+    };
+    let default = StageTimes { t1: 1.0, t2: 1.0 };
+    let times = settings.ris.stage_times.or(measured.times).unwrap_or(default);
+
+    // Numbers
+    let samples = settings.samples.unwrap_or((measured.other / (2.0 * times.t2)).round().clamp(1.0, MOST) as u32);
+    let integrator = &mut world.scene.integrator;
+    integrator.ris.stage_times = Some(times);
+    integrator.samples = Some(samples);
+    let split = integrator.split();
+    let is_optimal = settings.ris.proposals == Proposals::Optimal;
+    if !is_optimal {
+        integrator.ris.proposals = Proposals::Fixed(split.proposals);
+    }
+    world.splits = None;
+    if is_optimal || ratio_map {
+        world.splits = Some(split_map(world, threads, times, split)?);
+    }
+    Ok(Some(Plan { times, split }))
+}
+
+/// What a vertex costs.
+struct Measured {
+    /// T1 and T2; `None` if there was nothing to light.
+    times: Option<StageTimes>,
+    /// All but direct light, per vertex (ns).
+    other: f64,
+}
+
+/// Times of some batches of camera rays on this thread, medians over the batches.
+fn measure(world: &World) -> Measured {
+    let mut settings = world.scene.integrator;
+    settings.samples = Some(TIMING.samples);
+    settings.ris.proposals = Proposals::Fixed(TIMING.proposals);
+    let mut batches = camera_batches(world, RenderSettings::default().tile_size, TIMING_RAYS);
+    for sample in batches.iter_mut().flatten() {
+        sample.split = TIMING;
+    }
+    let mut integrator = PathIntegrator::default();
+    let mut out = Vec::new();
+    let (mut t1, mut t2, mut other) = (Vec::new(), Vec::new(), Vec::new());
+    // The first turn fills caches
+    for turn in 0..3 {
+        for batch in batches.iter().flat_map(|b| b.chunks(1024)) {
+            integrator.trace(world, &settings, batch, &mut out);
+            let stats = integrator.take_stats();
+            let d = stats.direct;
+            if turn == 0 || d.proposals == 0 || d.segments == 0 {
+                continue;
+            }
+            let per = |time: Duration, count: u64| time.as_nanos() as f64 / count as f64;
+            let samples = d.proposals / u64::from(TIMING.proposals / TIMING.samples);
+            t1.push(per(d.t1, d.proposals));
+            t2.push(per(d.select + d.t2, samples.max(1)));
+            other.push(per(
+                stats.camera_time + stats.bounce_time + stats.shade_time,
+                stats.camera_rays + stats.bounce_rays,
+            ));
+        }
+    }
+    let times = (!t1.is_empty()).then(|| StageTimes { t1: rounded(median(&mut t1)), t2: rounded(median(&mut t2)) });
+    Measured { times, other: median(&mut other) }
+}
+
+/// A time in tenths of nanoseconds, at least one: what is printed is what was used.
+fn rounded(nanoseconds: f64) -> f64 {
+    (nanoseconds * 10.0).round().max(1.0) / 10.0
+}
+
+fn median(values: &mut [f64]) -> f64 {
+    values.sort_by(f64::total_cmp);
+    values.get(values.len() / 2).copied().unwrap_or(0.0)
+}
+
+/// The best M/N of each pixel for the time that `split` takes.
+fn split_map(world: &World, threads: Option<usize>, times: StageTimes, split: Split) -> Result<SplitMap, ThreadError> {
+    let pool = super::thread_pool(threads)?;
+    let costs = Costs { t1: times.t1, t2: times.t2 };
+    let time = f64::from(split.samples) * costs.t2 + f64::from(split.proposals) * costs.t1;
+    let variances = pool.install(|| pilot(world));
+    let bounds = world.scene.film.bounds;
+    let ratio = |v: &Option<Variances>| {
+        let ratio = v.map_or(costs.robust_ratio(), |v| optimal_ratio(costs, v, time));
+        clamp_ratio(ratio, costs, time)
+    };
+    Ok(SplitMap {
+        bounds,
+        ratios: variances.iter().map(|v| ratio(v) as f32).collect(),
+        t1: costs.t1,
+        t2: costs.t2,
+        time,
+    })
+}
+
+/// V(f/p) and V(f/q) around each pixel, row by row; `None` where nothing is lit.
+fn pilot(world: &World) -> Vec<Option<Variances>> {
+    // Moments of each pixel
+    let bounds = world.scene.film.bounds;
+    let rows: Vec<Vec<MomentsEstimate>> = (bounds.y0..bounds.y1)
+        .into_par_iter()
+        .map(|y| pilot_row(world, &PixelBounds { y0: y, y1: y + 1, ..bounds }))
+        .collect();
+
+    // Sums over neighbours
+    let radius = PILOT_RADIUS as usize;
+    let (width, height) = (bounds.width() as usize, bounds.height() as usize);
+    let window = |i: usize, len: usize| i.saturating_sub(radius)..(i + radius + 1).min(len);
+    (0..height)
+        .into_par_iter()
+        .flat_map_iter(|y| {
+            let rows = &rows;
+            (0..width).map(move |x| {
+                let mut sum = MomentsEstimate::new();
+                for row in &rows[window(y, height)] {
+                    row[window(x, width)].iter().for_each(|m| sum.merge(m));
+                }
+                let v = sum.moments()?.variances();
+                let is_useful = v.proposals.is_finite() && v.samples.is_finite() && v.proposals > 0.0;
+                is_useful.then_some(v)
+            })
+        })
+        .collect()
+}
+
+fn pilot_row(world: &World, row: &PixelBounds) -> Vec<MomentsEstimate> {
+    let all = Split { samples: PILOT_PROPOSALS, proposals: PILOT_PROPOSALS };
+    let mut settings = IntegratorSettings {
+        kind: IntegratorKind::Direct,
+        max_depth: 1,
+        samples: Some(all.samples),
+        ..world.scene.integrator
+    };
+    settings.ris.proposals = Proposals::Fixed(all.proposals);
+    settings.ris.strata = Strata::Proposals;
+    settings.ris.target = Target::Fgl;
+
+    let (stop, render) = (AtomicBool::new(false), RenderSettings::default());
+    let run = Run::new(world, &render, &stop, &|_| ());
+    let mut integrator = PathIntegrator::default();
+    let (mut samples, mut out) = (Vec::<CameraSample>::new(), Vec::new());
+    let mut sums = vec![MomentsEstimate::new(); row.area()];
+    for (pixel, sum) in sums.iter_mut().enumerate() {
+        samples.clear();
+        let at = [row.x0 + pixel as u32, row.y0];
+        samples.extend((0..PILOT_SPP).map(|s| run.camera_sample_of_seed(at, s, PILOT_SEED)));
+        samples.iter_mut().for_each(|s| s.split = all);
+        integrator.outcomes = Some(Vec::new());
+        integrator.trace(world, &settings, &samples, &mut out);
+        let outcomes = integrator.outcomes.take().unwrap_or_default();
+        let m = f64::from(PILOT_PROPOSALS);
+        for o in &outcomes {
+            sum.add(o.contribution.to_array().map(|c| f64::from(c) * m), f64::from(o.unshadowed.luminance()) * m);
+        }
+        // Proposals without light are proposals too
+        let lit = out.iter().filter(|r| r.features.is_some()).count() * PILOT_PROPOSALS as usize;
+        (outcomes.len()..lit).for_each(|_| sum.add([0.0; 3], 0.0));
+    }
+    sums
+}

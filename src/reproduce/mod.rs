@@ -1,0 +1,112 @@
+//! Figures of papers, rendered and measured again, as a page with pictures and a file with all numbers.
+//!
+//! Reading order: [`measure`] (methods in turns on one scene, variances and times), [`calibrate`] (numbers of samples and
+//! proposals for equal time), [`talbot`] (resampled importance sampling), then what a page is made of: [`page`],
+//! [`pictures`], [`chart`].
+
+pub mod calibrate;
+pub mod chart;
+pub mod measure;
+pub mod page;
+pub mod pictures;
+pub mod talbot;
+
+use std::path::PathBuf;
+use std::sync::atomic::AtomicBool;
+use std::time::{Duration, Instant};
+
+/// What to reproduce, and how long it may take.
+#[derive(Clone, Debug)]
+pub struct Options {
+    /// Folder that takes the page.
+    pub out: PathBuf,
+    /// Folder with scenes in place of those that are made for the purpose.
+    pub scenes: Option<PathBuf>,
+    /// A tenth of the time.
+    pub quick: bool,
+    /// Threads; all cores if `None`.
+    pub threads: Option<usize>,
+    /// Most pixels along an edge of a picture.
+    pub size: Option<u32>,
+    /// The command as it was typed, for the page.
+    pub command: String,
+}
+
+/// Who is told how far it is, and may end it.
+#[derive(Clone, Copy)]
+pub struct Observer<'a> {
+    /// Takes a line for a person.
+    pub say: &'a (dyn Fn(&str) + Sync),
+    /// Ends everything once it is true.
+    pub stop: &'a AtomicBool,
+}
+
+/// Why there is no page.
+#[derive(Debug, thiserror::Error)]
+pub enum ReproduceError {
+    /// A scene could not be read.
+    #[error("{path} could not be loaded:\n{report}")]
+    Scene {
+        /// Its file.
+        path: PathBuf,
+        /// Errors and warnings.
+        report: Box<crate::import::diagnostic::Report>,
+    },
+    /// A scene could not be made.
+    #[error(transparent)]
+    Procedural(#[from] crate::procedural::talbot::ProceduralError),
+    /// A ray tracer could not be built.
+    #[error("cannot build a ray tracer: {0}")]
+    Accel(#[from] crate::accel::embree::EmbreeError),
+    /// A rendering could not start.
+    #[error(transparent)]
+    Threads(#[from] crate::render::ThreadError),
+    /// A picture could not be written.
+    #[error(transparent)]
+    Image(#[from] crate::imaging::oiio::ImageError),
+    /// A file could not be written.
+    #[error("{path}: {source}")]
+    File {
+        /// Which.
+        path: PathBuf,
+        /// Why.
+        source: std::io::Error,
+    },
+    /// The observer ended it.
+    #[error("ended before it was done")]
+    Stopped,
+}
+
+/// Writes a file, with its name in the error.
+pub(crate) fn write_file(path: PathBuf, text: &str) -> Result<(), ReproduceError> {
+    std::fs::write(&path, text).map_err(|source| ReproduceError::File { path, source })
+}
+
+/// Makes a folder, with its name in the error.
+pub(crate) fn make_folder(path: &std::path::Path) -> Result<(), ReproduceError> {
+    std::fs::create_dir_all(path).map_err(|source| ReproduceError::File { path: path.to_owned(), source })
+}
+
+/// Time that is shared out among parts.
+#[derive(Clone, Copy, Debug)]
+pub struct Budget {
+    start: Instant,
+    total: Duration,
+}
+
+impl Budget {
+    /// Starts now.
+    pub fn new(total: Duration) -> Self {
+        Budget { start: Instant::now(), total }
+    }
+
+    /// Since the start.
+    pub fn elapsed(&self) -> Duration {
+        self.start.elapsed()
+    }
+
+    /// What a part may take whose weight is `weight` among `left` of all that are still to come, itself included.
+    pub fn share(&self, weight: f64, left: f64) -> Duration {
+        self.total.saturating_sub(self.elapsed()).mul_f64((weight / left.max(1e-9)).clamp(0.0, 1.0))
+    }
+}

@@ -1,0 +1,62 @@
+//! Lit, half-shadowed and shadowed pixels, by the part of the light that arrives.
+//!
+//! The part is v = L/L₀, where L is the picture and L₀ the same one with shadow segments that nothing hides: for
+//! one light without extent it is 0 or 1, for all others the mean visibility of the light weighted by what it would
+//! contribute. Pixels that show no surface belong to no class.
+
+use super::super::measure::{Method, Stage, View, luminance, radiance};
+use super::super::{Observer, ReproduceError};
+
+/// Least part of the light that arrives in lit pixels.
+pub const LIT: f64 = 0.9;
+/// Largest part of the light that arrives in shadowed pixels.
+pub const SHADOWED: f64 = 0.25;
+
+/// Names of the classes, in their order.
+pub const NAMES: [&str; 3] = ["lit", "penumbra", "shadow"];
+
+/// The class of every pixel.
+pub struct Classes {
+    /// Part of the light that arrives; NaN where there is no surface, or no light.
+    pub visibility: Vec<f64>,
+    /// Which pixels are lit, which in half-shadow, which in shadow.
+    pub masks: [Vec<bool>; 3],
+}
+
+impl Classes {
+    /// Renders the picture without shadows and compares it with `reference`.
+    pub fn new(stage: &mut Stage, reference: &[[f64; 3]], observer: Observer<'_>) -> Result<Self, ReproduceError> {
+        let method = Method::mis(8).stratified();
+        let rendering = stage.render(&method, View::Unshadowed, 32, 0, observer)?;
+        let surface = |i: usize| rendering.film.pixels[i].hits > 0;
+        let unshadowed = radiance(&rendering.film);
+        let visibility: Vec<f64> = (0..reference.len())
+            .map(|i| if surface(i) { luminance(reference[i]) / luminance(unshadowed[i]) } else { f64::NAN })
+            .map(|v| if v.is_finite() { v } else { f64::NAN })
+            .collect();
+        Ok(Classes { masks: masks(&visibility), visibility })
+    }
+
+    /// Number of pixels of each class.
+    pub fn counts(&self) -> [usize; 3] {
+        std::array::from_fn(|k| self.masks[k].iter().filter(|&&m| m).count())
+    }
+}
+
+fn masks(visibility: &[f64]) -> [Vec<bool>; 3] {
+    let of = |is: fn(f64) -> bool| visibility.iter().map(|&v| is(v)).collect();
+    [of(|v| v >= LIT), of(|v| v > SHADOWED && v < LIT), of(|v| v <= SHADOWED)]
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_pixel_with_a_surface_has_one_class_and_others_none() {
+        let [lit, half, dark] = masks(&[1.02, 0.9, 0.5, 0.25, 0.0, f64::NAN]);
+        assert_eq!(lit, [true, true, false, false, false, false]);
+        assert_eq!(half, [false, false, true, false, false, false]);
+        assert_eq!(dark, [false, false, false, true, true, false]);
+    }
+}

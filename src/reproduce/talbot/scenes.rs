@@ -1,0 +1,49 @@
+//! Where the scenes of the figures are.
+
+use super::super::{Options, ReproduceError};
+use crate::procedural::statue::StatueOptions;
+use crate::procedural::talbot::{TalbotOptions, write_scenes};
+use std::path::PathBuf;
+
+/// Cells of the grid along the statue's height: usual and quick.
+const DETAIL: [u32; 2] = [512, 128];
+
+/// A statue under a sky and two lights, and with either alone.
+#[derive(Clone, Debug)]
+pub struct Scenes {
+    folder: PathBuf,
+}
+
+/// Which of them.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Which {
+    /// Sky.
+    Environment,
+    /// Two area lights.
+    Lights,
+    /// Both.
+    Both,
+}
+
+impl Scenes {
+    /// Makes the scenes inside the folder of the page, unless the options name others.
+    pub fn new(options: &Options) -> Result<Self, ReproduceError> {
+        if let Some(folder) = &options.scenes {
+            return Ok(Scenes { folder: folder.clone() });
+        }
+        let folder = options.out.join("scenes");
+        let detail = DETAIL[usize::from(options.quick)];
+        let statue = StatueOptions { detail, ..StatueOptions::default() };
+        write_scenes(&folder, &TalbotOptions { statue, ..TalbotOptions::default() })?;
+        Ok(Scenes { folder })
+    }
+
+    /// The scene file.
+    pub fn path(&self, which: Which) -> PathBuf {
+        self.folder.join(match which {
+            Which::Environment => "statue-env.pbrt",
+            Which::Lights => "statue-lights.pbrt",
+            Which::Both => "statue-env-lights.pbrt",
+        })
+    }
+}

@@ -1,0 +1,284 @@
+//! Light transport: what is computed, and how direct light is estimated.
+
+use crate::bsdfs::ProposalDensity;
+use crate::estimators::mis::Heuristic;
+use crate::estimators::ris::choice::Costs;
+use crate::lights::LightSamplerKind;
+
+/// Light transport.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct IntegratorSettings {
+    /// What is computed.
+    pub kind: IntegratorKind,
+    /// Number of bounces for `path`; 1 is direct light.
+    pub max_depth: u32,
+    /// Direct-light estimator at each path vertex.
+    pub estimator: EstimatorKind,
+    /// Samples per estimate (N): shadow segments per shading point. `None` is the choice of the estimator:
+    /// [`DEFAULT_SAMPLES`], or from measured times for `ris`.
+    pub samples: Option<u32>,
+    /// Weights of the techniques; see [`Self::heuristic`].
+    pub heuristic: Option<Heuristic>,
+    /// How a light is chosen.
+    pub light_choice: LightSamplerKind,
+    /// What is particular to `ris`.
+    pub ris: RisSettings,
+    /// Directions proposed for each that continues a path (M), where the BSDF is one that can only be evaluated; 1 is
+    /// plain importance sampling.
+    pub bsdf_proposals: u32,
+    /// Density that proposes them.
+    pub bsdf_density: ProposalDensity,
+}
+
+/// Samples per estimate of `mc` and `mis` where none are asked for.
+pub const DEFAULT_SAMPLES: u32 = 2;
+
+impl Default for IntegratorSettings {
+    fn default() -> Self {
+        IntegratorSettings {
+            kind: IntegratorKind::Path,
+            max_depth: 5,
+            estimator: EstimatorKind::Mis,
+            samples: None,
+            heuristic: None,
+            light_choice: LightSamplerKind::Tree,
+            ris: RisSettings::default(),
+            bsdf_proposals: 4,
+            bsdf_density: ProposalDensity::Lobes,
+        }
+    }
+}
+
+impl IntegratorSettings {
+    /// The number of bounces that is really computed.
+    pub fn depth(&self) -> u32 {
+        match self.kind {
+            IntegratorKind::Direct => self.max_depth.min(1),
+            IntegratorKind::Path => self.max_depth,
+        }
+    }
+
+    /// MIS weights of `mis`, and of the techniques that propose for `ris`. Resampling has the least variance if proposals
+    /// have, which the balance heuristic comes near; the power heuristic serves where everything proposed is traced.
+    pub fn heuristic(&self) -> Heuristic {
+        self.heuristic.unwrap_or(match self.estimator {
+            EstimatorKind::Mc | EstimatorKind::Mis => Heuristic::Power,
+            EstimatorKind::Ris => Heuristic::Balance,
+        })
+    }
+
+    /// Samples and proposals of every estimate where they are not chosen per pixel. Open samples count as
+    /// [`DEFAULT_SAMPLES`].
+    pub fn split(&self) -> Split {
+        let samples = self.samples.unwrap_or(DEFAULT_SAMPLES).max(1);
+        match self.estimator {
+            EstimatorKind::Mc | EstimatorKind::Mis => Split { samples, proposals: samples },
+            EstimatorKind::Ris => {
+                let proposals = match self.ris.proposals {
+                    Proposals::Fixed(m) => m,
+                    Proposals::Auto | Proposals::Optimal => (f64::from(samples) * self.ris.ratio()).round() as u32,
+                };
+                Split { samples, proposals: proposals.max(samples) }
+            }
+        }
+    }
+}
+
+/// What is computed.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum IntegratorKind {
+    /// Emitted light and one bounce.
+    Direct,
+    /// Paths of up to `max_depth` bounces.
+    Path,
+}
+
+impl IntegratorKind {
+    /// The name on the command line and in metadata.
+    pub fn name(self) -> &'static str {
+        match self {
+            IntegratorKind::Direct => "direct",
+            IntegratorKind::Path => "path",
+        }
+    }
+}
+
+/// How direct light is estimated.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum EstimatorKind {
+    /// Light sampling only (and the specular lobes of BSDFs).
+    Mc,
+    /// Light and BSDF sampling, weighted.
+    Mis,
+    /// Resampled importance sampling: few of many proposals are traced [Talbot et al. 2005].
+    Ris,
+}
+
+impl EstimatorKind {
+    /// The name on the command line and in metadata.
+    pub fn name(self) -> &'static str {
+        match self {
+            EstimatorKind::Mc => "mc",
+            EstimatorKind::Mis => "mis",
+            EstimatorKind::Ris => "ris",
+        }
+    }
+}
+
+/// Numbers of one estimate: N samples (shadow segments) of M proposals.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Split {
+    /// N.
+    pub samples: u32,
+    /// M ≥ N; equal to N for estimators that trace what they propose.
+    pub proposals: u32,
+}
+
+/// Proposals for each sample where no times were measured.
+pub const DEFAULT_RATIO: f64 = 8.0;
+/// Most proposals for each sample that times alone ask for.
+pub const MOST_RATIO: f64 = 64.0;
+
+/// Resampled importance sampling [Talbot et al. 2005; Talbot 2005].
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct RisSettings {
+    /// How many proposals (M).
+    pub proposals: Proposals,
+    /// How samples are drawn from the proposals.
+    pub strata: Strata,
+    /// How proposals lie on the lights.
+    pub points: ProposalPoints,
+    /// What samples are drawn in proportion to.
+    pub target: Target,
+    /// Times of the stages, from which `auto` and `optimal` choose; measured on this scene if not given.
+    pub stage_times: Option<StageTimes>,
+}
+
+impl Default for RisSettings {
+    fn default() -> Self {
+        RisSettings {
+            proposals: Proposals::Auto,
+            strata: Strata::Systematic,
+            points: ProposalPoints::Stratified,
+            target: Target::Fgl,
+            stage_times: None,
+        }
+    }
+}
+
+impl RisSettings {
+    /// Proposals for each sample by the times of the stages, M/N = T2/T1 [Talbot 2005, Eq. 4.4], from 1 to [`MOST_RATIO`];
+    /// [`DEFAULT_RATIO`] without times.
+    pub fn ratio(&self) -> f64 {
+        let by_times = |t: StageTimes| Costs { t1: t.t1, t2: t.t2 }.robust_ratio();
+        self.stage_times.map_or(DEFAULT_RATIO, by_times).clamp(1.0, MOST_RATIO)
+    }
+}
+
+/// Measured cost of the stages of an estimate.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct StageTimes {
+    /// T1: one proposal with its weight (ns).
+    pub t1: f64,
+    /// T2: the visibility of one sample (ns).
+    pub t2: f64,
+}
+
+/// How the number of proposals is found.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Proposals {
+    /// This many.
+    Fixed(u32),
+    /// M/N = T2/T1 [Talbot 2005, Eq. 4.4].
+    Auto,
+    /// Per pixel, from variances and times [Talbot 2005, Eq. 4.3].
+    Optimal,
+}
+
+/// Strata of the samples over the proposals.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Strata {
+    /// Independent draws with replacement [Talbot 2005, Eq. 4.1].
+    None,
+    /// One draw from each of N equal numbers of proposals [Talbot 2005, §4.5.2.1].
+    Proposals,
+    /// One draw from each of N parts of nearly equal weight [Talbot 2005, §4.5.2.2].
+    Weights,
+    /// N draws at equal distances of the cumulative weight.
+    Systematic,
+}
+
+impl Strata {
+    /// The name on the command line and in metadata.
+    pub fn name(self) -> &'static str {
+        match self {
+            Strata::None => "none",
+            Strata::Proposals => "proposals",
+            Strata::Weights => "weights",
+            Strata::Systematic => "systematic",
+        }
+    }
+}
+
+/// How the proposals of light sampling lie on the lights.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum ProposalPoints {
+    /// Independent of each other.
+    Independent,
+    /// Stratified along a curve that passes all lights one after the other and fills each [He and Owen 2016].
+    Stratified,
+}
+
+impl ProposalPoints {
+    /// The name on the command line and in metadata.
+    pub fn name(self) -> &'static str {
+        match self {
+            ProposalPoints::Independent => "independent",
+            ProposalPoints::Stratified => "stratified",
+        }
+    }
+}
+
+/// The target q̂ of resampling.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Target {
+    /// Luminance of f·G·L: everything but visibility.
+    Fgl,
+    /// G·V: for surfaces and lights that are dearer to evaluate than a ray is to trace.
+    Gv,
+    /// G·V·L: for surfaces that are dearer to evaluate than a ray is to trace.
+    Gvl,
+}
+
+impl Target {
+    /// The name on the command line and in metadata.
+    pub fn name(self) -> &'static str {
+        match self {
+            Target::Fgl => "fgl",
+            Target::Gv => "gv",
+            Target::Gvl => "gvl",
+        }
+    }
+
+    /// True if proposals are traced before they are resampled.
+    pub fn has_visibility(self) -> bool {
+        match self {
+            Target::Fgl => false,
+            Target::Gv | Target::Gvl => true,
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn there_are_never_fewer_proposals_than_samples() {
+        let mut s = IntegratorSettings { estimator: EstimatorKind::Ris, samples: Some(16), ..Default::default() };
+        s.ris.proposals = Proposals::Fixed(4);
+        assert_eq!(s.split(), Split { samples: 16, proposals: 16 });
+        s.estimator = EstimatorKind::Mis;
+        assert_eq!(s.split(), Split { samples: 16, proposals: 16 });
+    }
+}

@@ -1,0 +1,35 @@
+//! The best numbers of samples and proposals, pixel by pixel.
+
+use super::Split;
+use crate::estimators::ris::choice::{Costs, counts};
+use crate::film::PixelBounds;
+
+/// M/N of every pixel, for the same time in all [Talbot 2005, §4.3; Talbot et al. 2005, Fig. 3].
+#[derive(Clone, Debug, PartialEq)]
+pub struct SplitMap {
+    /// The pixels.
+    pub bounds: PixelBounds,
+    /// M/N, row by row, at least 1.
+    pub ratios: Vec<f32>,
+    /// Time of a proposal.
+    pub t1: f64,
+    /// Time of a sample, in the same unit.
+    pub t2: f64,
+    /// Time of an estimate, in the same unit.
+    pub time: f64,
+}
+
+impl SplitMap {
+    /// M/N of a pixel.
+    pub fn ratio(&self, [x, y]: [u32; 2]) -> f32 {
+        let row = (y - self.bounds.y0) as usize * self.bounds.width() as usize;
+        self.ratios[row + (x - self.bounds.x0) as usize]
+    }
+
+    /// Numbers for one estimate in a pixel, rounded up or down by `u` so that their expectations are right.
+    pub fn split(&self, pixel: [u32; 2], u: [f32; 2]) -> Split {
+        let costs = Costs { t1: self.t1, t2: self.t2 };
+        let counts = counts(f64::from(self.ratio(pixel)), costs, self.time, u);
+        Split { samples: counts.n, proposals: counts.m }
+    }
+}

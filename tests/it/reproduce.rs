@@ -1,0 +1,80 @@
+//! `lumiris reproduce` from outside: a page and a file of numbers with every figure.
+
+use std::path::Path;
+use std::process::Command;
+
+const FIGURES: [&str; 6] = [
+    "paper-figure-3",
+    "paper-figure-4",
+    "paper-figure-4-lights",
+    "paper-figure-5",
+    "thesis-figure-5.3",
+    "thesis-figure-5.4",
+];
+
+/// Files that the page shows.
+fn sources(html: &str) -> Vec<&str> {
+    html.split("src=\"").skip(1).filter_map(|rest| rest.split('"').next()).collect()
+}
+
+/// A sky, a lamp, a floor and a ball, by the names of the scenes.
+fn write_scenes(folder: &Path) {
+    let head = "LookAt 0 1.6 -4.6  0 0.6 0  0 1 0\nCamera \"perspective\" \"float fov\" [ 34 ]\nWorldBegin\n";
+    let sky = "LightSource \"infinite\" \"rgb L\" [ 0.3 0.4 0.6 ]\n";
+    let lamp = "AttributeBegin\n  AreaLightSource \"diffuse\" \"rgb L\" [ 18 15 11 ]\n  Shape \"bilinearmesh\" \
+                \"point3 P\" [ -1.4 3.2 -1.2  -0.4 3.2 -1.2  -1.4 3.2 -0.2  -0.4 3.2 -0.2 ]\nAttributeEnd\n";
+    let things = "Material \"diffuse\"\nShape \"bilinearmesh\" \"point3 P\" [ -9 0 -9  9 0 -9  -9 0 9  9 0 9 ]\n\
+                  AttributeBegin Translate 0 0.7 0 Shape \"sphere\" \"float radius\" [ 0.7 ] AttributeEnd\n";
+    for (name, lights) in [("env", sky), ("lights", lamp), ("env-lights", &format!("{sky}{lamp}"))] {
+        std::fs::write(folder.join(format!("statue-{name}.pbrt")), format!("{head}{lights}{things}")).unwrap();
+    }
+}
+
+#[test]
+fn the_page_and_the_numbers_hold_every_figure() {
+    let folder = tempfile::tempdir().unwrap();
+    write_scenes(folder.path());
+    let output = Command::new(env!("CARGO_BIN_EXE_lumiris"))
+        .args(["reproduce", "talbot", "--out", "page", "--quick", "--size", "16", "--scenes", ".", "-q"])
+        .current_dir(folder.path())
+        .output()
+        .unwrap();
+    assert!(output.status.success(), "{}", String::from_utf8_lossy(&output.stderr));
+    let page = folder.path().join("page");
+    let html = std::fs::read_to_string(page.join("index.html")).unwrap();
+    let numbers: serde_json::Value =
+        serde_json::from_str(&std::fs::read_to_string(page.join("talbot.json")).unwrap()).unwrap();
+
+    let figures = numbers["figures"].as_object().unwrap();
+    assert_eq!(figures.len(), FIGURES.len());
+    for id in FIGURES {
+        assert!(html.contains(&format!("<h2 id=\"{id}\">")), "{id}");
+        let figure = &figures[id];
+        assert!(figure["summary"]["reached"].is_boolean(), "{id}");
+        let methods = figure["numbers"].get("methods").and_then(|m| m.as_array());
+        for m in methods.into_iter().flatten() {
+            assert_eq!(m["invalid_samples"], 0, "{id} {}", m["name"]);
+            assert!(m["at_equal_time"]["value"].as_f64().unwrap() > 0.0, "{id} {}", m["name"]);
+            // All methods are unbiased; of some fifty none has a mean this far off by chance.
+            assert!(m["same_mean_p"].as_f64().unwrap() > 1e-6, "{id} {}", m["name"]);
+        }
+    }
+    let shown = sources(&html);
+    assert!(shown.len() > 30, "{shown:?}");
+    for file in shown {
+        assert!(page.join(file).is_file(), "{file}");
+    }
+}
+
+#[test]
+fn a_folder_without_scenes_is_an_error_that_names_the_file() {
+    let folder = tempfile::tempdir().unwrap();
+    let output = Command::new(env!("CARGO_BIN_EXE_lumiris"))
+        .args(["reproduce", "talbot", "--out", "page", "--quick", "--scenes", "nowhere", "-q"])
+        .current_dir(folder.path())
+        .output()
+        .unwrap();
+    assert_eq!(output.status.code(), Some(3));
+    assert!(String::from_utf8_lossy(&output.stderr).contains("statue-env-lights.pbrt"));
+    assert!(!folder.path().join("page/index.html").exists());
+}
