@@ -107,7 +107,9 @@ fn area(shape: &Shape) -> Light {
     Light::Area(area_lights_of(shape, &emission).lights.remove(0))
 }
 
-fn lights() -> Vec<(&'static str, Box<dyn Fn() -> Light>)> {
+type Make = Box<dyn Fn() -> Light>;
+
+fn lights() -> Vec<(&'static str, Make)> {
     let l = Rgb::new(1.0, 2.0, 3.0);
     let (nearest, bilinear) = (EnvironmentFilter::Nearest, EnvironmentFilter::Bilinear);
     vec![
