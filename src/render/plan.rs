@@ -101,10 +101,7 @@ fn measure(world: &World) -> Measured {
     let Some([few, many]) = vertex_times(world) else { return Measured { times: None, other: 0.0 } };
     let [m0, m1] = TIMING.map(|split| f64::from(split.proposals));
     let [n0, n1] = TIMING.map(|split| f64::from(split.samples));
-    let times = StageTimes {
-        t1: rounded((many.t1 - few.t1) / (m1 - m0)),
-        t2: rounded((many.t2 - few.t2) / (n1 - n0)),
-    };
+    let times = StageTimes { t1: rounded((many.t1 - few.t1) / (m1 - m0)), t2: rounded((many.t2 - few.t2) / (n1 - n0)) };
     let fixed = (few.t1 - times.t1 * m0) + (few.t2 - times.t2 * n0);
     Measured { times: Some(times), other: 0.5 * (few.other + many.other) + fixed.max(0.0) }
 }
