@@ -64,12 +64,9 @@ mod tests {
 
     fn run(n: usize, sample: impl Fn(&mut LightLanes<'_>)) -> Lanes {
         let zeros = || std::array::from_fn(|_| vec![0.0; n]);
-        let (mut wi, mut li, mut pdf): Lanes = (zeros(), zeros(), vec![0.0; n]);
-        let slices = |v: &mut [Vec<f32>; 3]| v.each_mut().map(|v| std::mem::take(v));
-        let (mut w, mut l) = (slices(&mut wi), slices(&mut li));
-        let [wx, wy, wz] = &mut w;
-        let [lr, lg, lb] = &mut l;
-        sample(&mut LightLanes { wi: [wx, wy, wz], li: [lr, lg, lb], pdf: &mut pdf });
+        let (mut w, mut l, mut pdf): Lanes = (zeros(), zeros(), vec![0.0; n]);
+        let ([x, y, z], [r, g, b]) = (&mut w, &mut l);
+        sample(&mut LightLanes { wi: [x, y, z], li: [r, g, b], pdf: &mut pdf });
         (w, l, pdf)
     }
 
