@@ -74,7 +74,7 @@ impl Proposals {
     }
 
     /// Number of proposals.
-    pub fn len(&self) -> usize {
+    pub fn count(&self) -> usize {
         self.points.last().map_or(0, |p| p.end)
     }
 
@@ -114,7 +114,7 @@ impl Proposals {
         (light_draws, positions, phi): (u32, ProposalPoints, f32),
         bsdf_samples: &[Candidate],
     ) {
-        let start = self.len();
+        let start = self.count();
         let bsdf_start = start + light_draws as usize;
         let end = bsdf_start + bsdf_samples.len();
         self.grow(end);

@@ -91,7 +91,7 @@ impl Resampler {
             self.proposals.clear();
             self.numbers.clear();
             let (first_point, first_sample) = (first, next);
-            while first < points.len() && (self.proposals.len() < CHUNK || first == first_point) {
+            while first < points.len() && (self.proposals.count() < CHUNK || first == first_point) {
                 let point = &points[first];
                 let begin = next;
                 while next < bsdf_samples.len() && bsdf_samples[next].point == first as u32 {

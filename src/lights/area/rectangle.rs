@@ -62,12 +62,15 @@ fn inner_angles(x: [f64; 2], y: [f64; 2], z0: f64) -> [(f64, f64); 2] {
     [complex_product(corner(1, 0, 1.0), corner(1, 1, -1.0)), complex_product(corner(0, 1, 1.0), corner(0, 0, -1.0))]
 }
 
-/// The spherical rectangle under which a rectangle is seen, if it is large enough to be sampled by.
+/// The spherical rectangle under which a rectangle is seen, if that is what it is sampled by.
 fn spherical_rectangle(rectangle: &RectangleLight, from: Vec3) -> Option<SphericalRectangle> {
     let center = rectangle.corner + rectangle.ex * (0.5 * rectangle.size.x) + rectangle.ey * (0.5 * rectangle.size.y);
-    if rectangle.size.length_squared() < MAX_EXTENT * MAX_EXTENT * (center - from).length_squared() {
-        return None;
-    }
+    let is_far = rectangle.size.length_squared() < MAX_EXTENT * MAX_EXTENT * (center - from).length_squared();
+    if is_far { None } else { accurate_rectangle(rectangle, from) }
+}
+
+/// The spherical rectangle, if its angles are accurate.
+fn accurate_rectangle(rectangle: &RectangleLight, from: Vec3) -> Option<SphericalRectangle> {
     let d = rectangle.corner.as_dvec3() - from.as_dvec3();
     let (ex, ey) = (rectangle.ex.as_dvec3(), rectangle.ey.as_dvec3());
     let (width, height) = (f64::from(rectangle.size.x), f64::from(rectangle.size.y));
@@ -109,9 +112,9 @@ impl RectangleLight {
         self.size.x * self.size.y
     }
 
-    /// The solid angle under which it is seen, if that is large enough to be sampled by.
+    /// The solid angle under which it is seen, if that is large enough to be accurate.
     pub fn solid_angle(&self, from: Vec3) -> Option<f32> {
-        spherical_rectangle(self, from).map(|s| s.solid_angle as f32)
+        accurate_rectangle(self, from).map(|s| s.solid_angle as f32)
     }
 
     #[inline]
