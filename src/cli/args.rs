@@ -112,8 +112,8 @@ pub struct SceneArgs {
     /// Direct-light estimator [default: the file's, or mis]
     #[arg(long)]
     pub estimator: Option<EstimatorArg>,
-    /// Samples per estimate: shadow segments per shading point, or `auto`
-    /// [default: the file's, or 2; auto for ris]
+    /// Samples per estimate: shadow segments per shading point, or `auto` for the estimator's own number
+    /// [default: the file's, or auto: 2, or 4 for ris, which halves them with every bounce]
     #[arg(long, value_name = "N", value_parser = parse_samples)]
     pub samples: Option<SamplesArg>,
     /// Proposals per estimate of ris: a number, `auto` (by the measured times of stages) or `optimal` (per pixel, by times

@@ -225,7 +225,7 @@ pub(super) fn light_candidate(
 ) -> Option<Candidate> {
     // Lights at infinity overlap: a direction belongs to all of them together
     let lights = &world.scene.lights;
-    if lights.infinite.contains(&light) {
+    if lights.infinite.len() > 1 && lights.infinite.contains(&light) {
         (sample.li, sample.pdf) = (lights.le(sample.wi), lights.pdf_infinite(&point.light_ctx(), sample.wi));
     }
 
@@ -236,8 +236,9 @@ pub(super) fn light_candidate(
         return None;
     }
 
-    let (drawn, p_bsdf) =
-        if sample.is_delta { (Drawn::DeltaLight, 0.0) } else { (Drawn::Light, point.bsdf.pdf(point.wo, sample.wi)) };
+    // A technique without samples has no weight, whatever its density
+    let drawn = if sample.is_delta { Drawn::DeltaLight } else { Drawn::Light };
+    let p_bsdf = if sample.is_delta || shares.n_bsdf == 0.0 { 0.0 } else { point.bsdf.pdf(point.wo, sample.wi) };
     let end = sample.t.is_finite().then_some((sample.p, sample.p_error, sample.n));
     Some(Candidate {
         point: index,

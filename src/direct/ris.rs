@@ -48,7 +48,7 @@ pub struct Resampler {
 /// The proposals of a point by light and by BSDF sampling: M together, unless the BSDF is all specular.
 ///
 /// A BSDF sample costs as much as ten light samples, which are made many at a time, and a wide BSDF says little of where the
-/// light is: it gets one proposal in sixteen, one with a peak up to four; but where there are few proposals for each
+/// light is: it gets one proposal in sixteen, one with a peak two; but where there are few proposals for each
 /// sample, one BSDF sample for every two samples, or four if it is wide.
 pub(super) fn shares(point: &ShadePoint<'_>) -> Shares {
     let (m, n) = (point.split.proposals, point.split.samples);
@@ -58,11 +58,16 @@ pub(super) fn shares(point: &ShadePoint<'_>) -> Shares {
     }
     let (of_proposals, of_samples) = match bsdf {
         Bsdf::Diffuse(_) | Bsdf::DiffuseTransmission(_) | Bsdf::Evaluated(_) => (0.0625, 0.25),
-        Bsdf::CoatedDiffuse(_) => (0.125, 0.5),
-        Bsdf::Conductor(_) | Bsdf::Dielectric(_) | Bsdf::ThinDielectric(_) | Bsdf::Layered(_) => (0.25, 0.5),
+        Bsdf::CoatedDiffuse(_)
+        | Bsdf::Conductor(_)
+        | Bsdf::Dielectric(_)
+        | Bsdf::ThinDielectric(_)
+        | Bsdf::Layered(_) => (0.125, 0.5),
     };
     let by_bsdf = (m as f32 * of_proposals).max(n as f32 * of_samples);
-    let by_bsdf = (by_bsdf.round() as u32).clamp(1, m.saturating_sub(1).max(1));
+    // A power of two: so many points of a Sobol' sequence are well distributed, others less
+    let by_bsdf = 1 << (by_bsdf.log2().round().max(0.0) as u32);
+    let by_bsdf = if by_bsdf < m { by_bsdf } else { 1 };
     if m == 1 { Shares::one_of_both(point) } else { Shares::fixed(m - by_bsdf, by_bsdf) }
 }
 

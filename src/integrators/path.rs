@@ -13,7 +13,7 @@ use crate::lights::LightHit;
 use crate::materials::SurfaceBsdf;
 use crate::math::{Ray, Rgb, Vec2, Vec3};
 use crate::samplers::SampleStream;
-use crate::scene::{IntegratorSettings, Split, World};
+use crate::scene::{EstimatorKind, IntegratorSettings, Split, World};
 use crate::textures::TextureContext;
 use std::time::{Duration, Instant};
 
@@ -165,7 +165,10 @@ impl PathIntegrator {
                 break;
             }
             let vertices = self.find_vertices(world, vertex, depth, samples, out);
-            let split = settings.split();
+            let split = match settings.estimator {
+                EstimatorKind::Mc | EstimatorKind::Mis => settings.split(),
+                EstimatorKind::Ris => settings.split().after_bounces(vertex),
+            };
             let points: Vec<ShadePoint<'_>> = vertices
                 .iter()
                 .zip(&self.active)

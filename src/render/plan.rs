@@ -1,9 +1,8 @@
-//! What `ris` leaves open until the scene is there: the numbers of proposals M and of samples N.
+//! What `ris` leaves open until the scene is there: the number of proposals M for N samples.
 //!
 //! T1, the time of a proposal, and T2, that of a sample, are measured on a few thousand camera rays. Then
 //!
-//! * `auto`: M/N = T2/T1, so that both stages take the same time [Talbot 2005, Eq. 4.4]; and N, if it is open, by the same
-//!   rule: both stages together take as long as all that a vertex costs besides (T0), N = T0/(2·T2), at least 1.
+//! * `auto`: M/N = T2/T1, so that both stages take the same time [Talbot 2005, Eq. 4.4].
 //! * `optimal`: the same time per estimate, split in each pixel by the variances of its own light
 //!   [Talbot 2005, Eq. 4.3], which a pilot estimates from proposals that are all traced.
 //!
@@ -26,8 +25,6 @@ use std::time::Duration;
 const TIMING_RAYS: usize = 8192;
 /// Proposals and samples of the estimates that are timed: few and many.
 const TIMING: [Split; 2] = [Split { samples: 1, proposals: 8 }, Split { samples: 5, proposals: 40 }];
-/// Most samples of an estimate that times alone ask for.
-const MOST: f64 = 64.0;
 /// Camera samples per pixel of the pilot, and its proposals, all of which are traced.
 const PILOT_SPP: u32 = 2;
 const PILOT_PROPOSALS: u32 = 32;
@@ -49,26 +46,20 @@ pub struct Plan {
 /// map of the best M/N even if it is not used.
 pub fn prepare(world: &mut World, threads: Option<usize>, ratio_map: bool) -> Result<Option<Plan>, ThreadError> {
     let settings = world.scene.integrator;
-    let is_open = settings.samples.is_none() || !matches!(settings.ris.proposals, Proposals::Fixed(_));
+    let is_open = !matches!(settings.ris.proposals, Proposals::Fixed(_));
     if settings.estimator != EstimatorKind::Ris || !is_open && !ratio_map {
         return Ok(None);
     }
 
-    // Times
-    let measured = if settings.ris.stage_times.is_none() || settings.samples.is_none() {
-        measure(world)
-    } else {
-        Measured { times: None, other: 0.0 }
-    };
+    // Times; without light they do not matter
     let default = StageTimes { t1: 1.0, t2: 1.0 };
-    let times = settings.ris.stage_times.or(measured.times).unwrap_or(default);
+    let times = settings.ris.stage_times.or_else(|| measure(world)).unwrap_or(default);
 
     // Numbers
-    let samples = settings.samples.unwrap_or((measured.other / (2.0 * times.t2)).round().clamp(1.0, MOST) as u32);
     let integrator = &mut world.scene.integrator;
     integrator.ris.stage_times = Some(times);
-    integrator.samples = Some(samples);
     let split = integrator.split();
+    integrator.samples = Some(split.samples);
     let is_optimal = settings.ris.proposals == Proposals::Optimal;
     if !is_optimal {
         integrator.ris.proposals = Proposals::Fixed(split.proposals);
@@ -80,42 +71,25 @@ pub fn prepare(world: &mut World, threads: Option<usize>, ratio_map: bool) -> Re
     Ok(Some(Plan { times, split }))
 }
 
-/// What a vertex costs.
-struct Measured {
-    /// T1 and T2; `None` if there was nothing to light.
-    times: Option<StageTimes>,
-    /// All that does not grow with M and N (ns).
-    other: f64,
-}
-
-/// Times per vertex of some batches of camera rays on this thread, medians over the batches (ns).
-#[derive(Clone, Copy, Debug, Default)]
-struct VertexTimes {
-    t1: f64,
-    t2: f64,
-    other: f64,
-}
-
-/// Fits a + M·T1 and b + N·T2 to the times of few and of many proposals and samples.
-fn measure(world: &World) -> Measured {
-    let Some([few, many]) = vertex_times(world) else { return Measured { times: None, other: 0.0 } };
+/// Fits a + M·T1 and b + N·T2 to the times of few and of many proposals and samples; `None` if there was nothing to light.
+fn measure(world: &World) -> Option<StageTimes> {
+    let [few, many] = vertex_times(world)?;
     let [m0, m1] = TIMING.map(|split| f64::from(split.proposals));
     let [n0, n1] = TIMING.map(|split| f64::from(split.samples));
-    let times = StageTimes { t1: rounded((many.t1 - few.t1) / (m1 - m0)), t2: rounded((many.t2 - few.t2) / (n1 - n0)) };
-    let fixed = (few.t1 - times.t1 * m0) + (few.t2 - times.t2 * n0);
-    Measured { times: Some(times), other: 0.5 * (few.other + many.other) + fixed.max(0.0) }
+    Some(StageTimes { t1: rounded((many[0] - few[0]) / (m1 - m0)), t2: rounded((many[1] - few[1]) / (n1 - n0)) })
 }
 
-/// Times for each split of [`TIMING`], which take turns; `None` if nothing was lit.
-fn vertex_times(world: &World) -> Option<[VertexTimes; 2]> {
+/// Nanoseconds per vertex of both stages for each split of [`TIMING`], which take turns on this thread: medians over batches of
+/// camera rays. `None` if nothing was lit.
+fn vertex_times(world: &World) -> Option<[[f64; 2]; 2]> {
     let batches = camera_batches(world, RenderSettings::default().tile_size, TIMING_RAYS);
     let mut integrator = PathIntegrator::default();
     let (mut samples, mut out) = (Vec::new(), Vec::new());
-    let mut measured: [[Vec<f64>; 3]; 2] = Default::default();
+    let mut measured: [[Vec<f64>; 2]; 2] = Default::default();
     // The first turn fills caches
     for turn in 0..4 {
         for batch in batches.iter().flat_map(|b| b.chunks(1024)) {
-            for (split, [t1, t2, other]) in TIMING.into_iter().zip(&mut measured) {
+            for (split, [t1, t2]) in TIMING.into_iter().zip(&mut measured) {
                 let mut settings = world.scene.integrator;
                 settings.samples = Some(split.samples);
                 settings.ris.proposals = Proposals::Fixed(split.proposals);
@@ -131,18 +105,11 @@ fn vertex_times(world: &World) -> Option<[VertexTimes; 2]> {
                 let per_vertex = |time: Duration| time.as_nanos() as f64 / vertices as f64;
                 t1.push(per_vertex(d.t1));
                 t2.push(per_vertex(d.select + d.t2));
-                other.push(per_vertex(stats.camera_time + stats.bounce_time + stats.shade_time));
             }
         }
     }
     let is_lit = measured.iter().all(|m| !m[0].is_empty());
-    is_lit.then(|| {
-        measured.map(|[mut t1, mut t2, mut other]| VertexTimes {
-            t1: median(&mut t1),
-            t2: median(&mut t2),
-            other: median(&mut other),
-        })
-    })
+    is_lit.then(|| measured.map(|stages| stages.map(|mut times| median(&mut times))))
 }
 
 /// A time in tenths of nanoseconds, at least one: what is printed is what was used.

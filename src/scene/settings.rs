@@ -15,7 +15,7 @@ pub struct IntegratorSettings {
     /// Direct-light estimator at each path vertex.
     pub estimator: EstimatorKind,
     /// Samples per estimate (N): shadow segments per shading point. `None` is the choice of the estimator:
-    /// [`DEFAULT_SAMPLES`], or from measured times for `ris`.
+    /// [`DEFAULT_SAMPLES`], or [`DEFAULT_RIS_SAMPLES`].
     pub samples: Option<u32>,
     /// Weights of the techniques; see [`Self::heuristic`].
     pub heuristic: Option<Heuristic>,
@@ -32,6 +32,9 @@ pub struct IntegratorSettings {
 
 /// Samples per estimate of `mc` and `mis` where none are asked for.
 pub const DEFAULT_SAMPLES: u32 = 2;
+/// Samples per estimate of `ris` where none are asked for: what a shading point costs before its first proposal is worth more than
+/// one sample, and powers of two are well distributed.
+pub const DEFAULT_RIS_SAMPLES: u32 = 4;
 
 impl Default for IntegratorSettings {
     fn default() -> Self {
@@ -67,10 +70,13 @@ impl IntegratorSettings {
         })
     }
 
-    /// Samples and proposals of every estimate where they are not chosen per pixel. Open samples count as
-    /// [`DEFAULT_SAMPLES`].
+    /// Samples and proposals of every estimate where they are not chosen per pixel.
     pub fn split(&self) -> Split {
-        let samples = self.samples.unwrap_or(DEFAULT_SAMPLES).max(1);
+        let default = match self.estimator {
+            EstimatorKind::Mc | EstimatorKind::Mis => DEFAULT_SAMPLES,
+            EstimatorKind::Ris => DEFAULT_RIS_SAMPLES,
+        };
+        let samples = self.samples.unwrap_or(default).max(1);
         match self.estimator {
             EstimatorKind::Mc | EstimatorKind::Mis => Split { samples, proposals: samples },
             EstimatorKind::Ris => {
@@ -132,6 +138,17 @@ pub struct Split {
     pub samples: u32,
     /// M ≥ N; equal to N for estimators that trace what they propose.
     pub proposals: u32,
+}
+
+impl Split {
+    /// Half as many for each bounce that a path has made, at least one sample: what a path still carries grows less, and the
+    /// time of its vertices does not. The ratio M/N stays.
+    #[must_use]
+    pub fn after_bounces(self, bounces: u32) -> Split {
+        let samples = (self.samples >> bounces.min(31)).max(1);
+        let proposals = (u64::from(self.proposals) * u64::from(samples)).div_ceil(u64::from(self.samples.max(1)));
+        Split { samples, proposals: proposals as u32 }
+    }
 }
 
 /// Proposals for each sample where no times were measured.
@@ -272,6 +289,15 @@ impl Target {
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn later_vertices_have_fewer_samples_of_the_same_ratio() {
+        let split = Split { samples: 5, proposals: 40 };
+        assert_eq!(split.after_bounces(0), split);
+        assert_eq!(split.after_bounces(1), Split { samples: 2, proposals: 16 });
+        assert_eq!(split.after_bounces(100), Split { samples: 1, proposals: 8 });
+        assert_eq!(Split { samples: 4, proposals: 7 }.after_bounces(1), Split { samples: 2, proposals: 4 });
+    }
 
     #[test]
     fn there_are_never_fewer_proposals_than_samples() {
