@@ -53,6 +53,35 @@ fn render_writes_every_picture_and_the_statistics() {
 }
 
 #[test]
+fn numbers_that_ris_chose_give_the_same_picture_when_they_are_given() {
+    let folder = tempfile::tempdir().unwrap();
+    let path = scene("demo/gallery.pbrt");
+    let render = |name: &str, options: &[&str]| {
+        let common = ["render", &path, "--integrator", "direct", "--spp", "2", "--resolution", "48x27", "-o", name];
+        let output = lumiris(&[&common, options].concat(), folder.path());
+        assert!(output.status.success(), "{}", stderr(&output));
+        (stderr(&output), read_image(&folder.path().join(name), &ReadLimits::default()).unwrap())
+    };
+    let (said, chosen) = render("chosen.exr", &["--estimator", "ris", "--proposals", "optimal"]);
+    assert!(said.contains("ris: 4 of ") && said.contains("split anew in each pixel"), "{said}");
+    assert!(chosen.image.channels.iter().any(|c| c == "ratio.proposals"), "{:?}", chosen.image.channels);
+
+    let value = |key: &str| chosen.metadata[&format!("lumiris:{key}")].clone();
+    let (samples, times) = (value("samples"), value("stage_times"));
+    let given = ["--estimator", &value("estimator"), "--proposals", &value("proposals"), "--samples", &samples];
+    let (_, again) = render("again.exr", &[&given[..], &["--stage-times", &times, "--threads", "1"]].concat());
+    let bits = |image: &lumiris::imaging::Image| image.data.iter().map(|v| v.to_bits()).collect::<Vec<_>>();
+    assert_eq!(bits(&chosen.image), bits(&again.image));
+
+    let (said, auto) = render("auto.exr", &["--estimator", "ris"]);
+    assert!(said.contains("proposals are traced (a proposal takes "), "{said}");
+    let proposals = auto.metadata["lumiris:proposals"].clone();
+    assert!(proposals.parse::<u32>().unwrap() >= 4);
+    let (_, again) = render("auto-again.exr", &["--estimator", "ris", "--proposals", &proposals]);
+    assert_eq!(bits(&auto.image), bits(&again.image));
+}
+
+#[test]
 fn info_counts_what_the_scene_holds() {
     let folder = tempfile::tempdir().unwrap();
     let output = lumiris(&["info", &scene("demo/gallery.pbrt"), "--json"], folder.path());

@@ -136,3 +136,49 @@ fn count(p: &ParamSet, key: &'static str, d: &mut Diagnostics) -> Option<u32> {
         }
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::import::{LoadOptions, load};
+    use crate::scene::Split;
+
+    fn settings(integrator: &str) -> Result<IntegratorSettings, String> {
+        let folder = tempfile::tempdir().unwrap();
+        let path = folder.path().join("scene.pbrt");
+        std::fs::write(&path, format!("{integrator}\nWorldBegin\nShape \"sphere\"\n")).unwrap();
+        load(&path, &LoadOptions::default()).map(|loaded| loaded.scene.integrator).map_err(|report| report.to_string())
+    }
+
+    #[test]
+    fn settings_of_resampling_are_read() {
+        let s = settings(
+            "Integrator \"direct\" \"string estimator\" \"ris\" \"integer samples\" 2 \"integer proposals\" 24
+             \"string strata\" \"weights\" \"string proposalpoints\" \"independent\" \"string target\" \"gvl\"
+             \"string heuristic\" \"power\" \"integer bsdfproposals\" 9",
+        )
+        .unwrap();
+        assert_eq!((s.kind, s.estimator), (IntegratorKind::Direct, EstimatorKind::Ris));
+        assert_eq!(s.split(), Split { samples: 2, proposals: 24 });
+        assert_eq!((s.ris.strata, s.ris.points), (Strata::Weights, ProposalPoints::Independent));
+        assert_eq!((s.ris.target, s.heuristic(), s.bsdf_proposals), (Target::Gvl, Heuristic::Power, 9));
+        for (word, proposals) in [("auto", Proposals::Auto), ("optimal", Proposals::Optimal)] {
+            let s = settings(&format!("Integrator \"path\" \"string proposals\" \"{word}\"")).unwrap();
+            assert_eq!(s.ris.proposals, proposals);
+        }
+    }
+
+    #[test]
+    fn wrong_settings_of_resampling_are_errors_that_say_what_is_possible() {
+        for (parameter, message) in [
+            ("\"string proposals\" \"many\"", "one of auto, optimal"),
+            ("\"integer proposals\" 0", "proposals must be from 1 to 4096, not 0"),
+            ("\"string strata\" \"some\"", "one of none, proposals, weights, systematic"),
+            ("\"string target\" \"l\"", "one of fgl, gv, gvl"),
+            ("\"string estimator\" \"rys\"", "one of mc, mis, ris"),
+        ] {
+            let report = settings(&format!("Integrator \"path\" {parameter}")).unwrap_err();
+            assert!(report.contains(message), "{parameter}: {report}");
+        }
+    }
+}
