@@ -125,12 +125,13 @@ impl Proposals {
             self.weigh_lights(world, point, techniques, start, bsdf_start);
         }
         for (i, c) in (bsdf_start..end).zip(bsdf_samples) {
-            let cos = point.bsdf.cos(c.segment.d.normalize());
+            let cos = || point.bsdf.cos(c.segment.d.normalize());
             self.p_hat[i] = match techniques.target {
                 Target::Fgl => c.f.luminance(),
+                // The cosine of a delta is part of its weight
                 Target::Gv | Target::Gvl if c.drawn.is_delta() => c.f.luminance(),
-                Target::Gv => cos,
-                Target::Gvl => cos * c.li.luminance(),
+                Target::Gv => cos(),
+                Target::Gvl => cos() * c.li.luminance(),
             };
             self.r[i] = c.factor(techniques.heuristic);
             self.weight[i] = weight(self.p_hat[i], self.r[i]);

@@ -239,7 +239,6 @@ pub(super) fn light_candidate(
     // A technique without samples has no weight, whatever its density
     let drawn = if sample.is_delta { Drawn::DeltaLight } else { Drawn::Light };
     let p_bsdf = if sample.is_delta || shares.n_bsdf == 0.0 { 0.0 } else { point.bsdf.pdf(point.wo, sample.wi) };
-    let end = sample.t.is_finite().then_some((sample.p, sample.p_error, sample.n));
     Some(Candidate {
         point: index,
         drawn,
@@ -249,8 +248,14 @@ pub(super) fn light_candidate(
         p_bsdf,
         n_light: shares.n_light,
         n_bsdf: shares.n_bsdf,
-        segment: segment(point, sample.wi, end),
+        segment: light_segment(point, &sample),
     })
+}
+
+/// The segment to a point on a light, or to infinity.
+pub(super) fn light_segment(point: &ShadePoint<'_>, sample: &LightSample) -> Ray {
+    let end = sample.t.is_finite().then_some((sample.p, sample.p_error, sample.n));
+    segment(point, sample.wi, end)
 }
 
 /// Completes a BSDF sample with the emitter that it points at; `None` if it points at none.

@@ -5,7 +5,8 @@
 //! these are evaluated in colour and traced. Unbiased for any M ≥ N ≥ 1: given the proposals, the expectation over
 //! the draws is the estimate that would trace them all.
 //!
-//! Targets with visibility turn the order round: proposals are traced, and N of the visible ones are shaded.
+//! Targets with visibility turn the order round: proposals are traced, and N of the visible ones are shaded; light samples
+//! need no value of the BSDF before that.
 
 use super::ShadePoint;
 use super::proposals::{PointProposals, Proposals, Techniques};
@@ -13,7 +14,7 @@ use super::propose::{self, Candidate, Candidates, Shares};
 use super::visibility::Segments;
 use crate::bsdfs::Bsdf;
 use crate::estimators::ris::{Draw, strata, stratified, systematic, with_replacement};
-use crate::lights::LightSample;
+use crate::lights::{LightId, LightSample};
 use crate::math::Rgb;
 use crate::math::hash::{pcg4d, unit_f32};
 use crate::scene::{IntegratorSettings, Strata, World};
@@ -158,16 +159,20 @@ impl Resampler {
         for (i, point) in points.iter().enumerate() {
             let range = self.proposals.points()[i];
             for place in range.start..range.end {
-                let by_bsdf = if place >= range.bsdf_start { bsdf.next().copied() } else { None };
-                if self.proposals.weight[place] > 0.0 {
-                    let candidate = by_bsdf.or_else(|| self.light_candidate(world, 0, point, place));
-                    match candidate {
-                        Some(candidate) => {
-                            self.probes.push(&candidate, Rgb::BLACK);
-                            probed.push(place);
-                        }
-                        None => self.proposals.weight[place] = 0.0,
+                let by_bsdf = if place >= range.bsdf_start { bsdf.next() } else { None };
+                if !(self.proposals.weight[place] > 0.0) {
+                    continue;
+                }
+                let segment = match by_bsdf {
+                    Some(candidate) => Some(candidate.segment),
+                    None => self.light_sample(world, point, place).map(|(_, s)| propose::light_segment(point, &s)),
+                };
+                match segment {
+                    Some(segment) => {
+                        self.probes.push(&segment, i as u32, Rgb::BLACK);
+                        probed.push(place);
                     }
+                    None => self.proposals.weight[place] = 0.0,
                 }
             }
         }
@@ -206,11 +211,15 @@ impl Resampler {
     }
 
     /// A light sample, drawn again with all that a proposal leaves out.
-    fn light_candidate(&self, world: &World, index: u32, point: &ShadePoint<'_>, place: usize) -> Option<Candidate> {
+    fn light_sample(&self, world: &World, point: &ShadePoint<'_>, place: usize) -> Option<(LightId, LightSample)> {
         let (light, pmf, u) = self.proposals.light_sample(place);
         let sample = world.scene.lights.lights[light as usize].sample_li(&point.light_ctx(), u)?;
-        let sample = LightSample { pdf: sample.pdf * pmf, ..sample };
-        propose::light_candidate(world, index, point, &Shares::fixed(0, 0), (light, sample))
+        Some((light, LightSample { pdf: sample.pdf * pmf, ..sample }))
+    }
+
+    fn light_candidate(&self, world: &World, index: u32, point: &ShadePoint<'_>, place: usize) -> Option<Candidate> {
+        let sample = self.light_sample(world, point, place)?;
+        propose::light_candidate(world, index, point, &Shares::fixed(0, 0), sample)
     }
 }
 

@@ -1,8 +1,8 @@
 //! T2: shadow segments, packed in the order of their shading points, and the bits that come back.
 
-use super::propose::{Candidate, Candidates};
+use super::propose::Candidates;
 use crate::accel::{Accel, Coherence, RayBatch};
-use crate::math::Rgb;
+use crate::math::{Ray, Rgb};
 
 /// Segments of the candidates that matter, with what each is worth.
 #[derive(Debug, Default)]
@@ -31,11 +31,11 @@ impl Segments {
         self.points.clear();
     }
 
-    /// Adds the segment of a candidate.
-    pub fn push(&mut self, candidate: &Candidate, contribution: Rgb) {
-        self.rays.push(&candidate.segment);
+    /// Adds a segment with its point and what that adds if it is free.
+    pub fn push(&mut self, segment: &Ray, point: u32, contribution: Rgb) {
+        self.rays.push(segment);
         self.contributions.push(contribution);
-        self.points.push(candidate.point);
+        self.points.push(point);
     }
 
     /// Takes the segments of all candidates whose contribution is finite and not zero, in candidate order:
@@ -44,7 +44,7 @@ impl Segments {
         self.clear();
         for (candidate, &contribution) in candidates.records.iter().zip(contributions) {
             if !contribution.is_black() && contribution.is_finite() {
-                self.push(candidate, contribution);
+                self.push(&candidate.segment, candidate.point, contribution);
             }
         }
     }
