@@ -5,6 +5,7 @@
 //! | [`mc`] | (1/N) Σ f/p | none |
 //! | [`mis`] | Σᵢ (1/nᵢ) Σⱼ wᵢ f/pᵢ, weights that sum to one | none |
 //! | [`ris`] | Σ scale·f r over N proposals drawn from M | none |
+//! | [`ocv`] | ȳ − Σ βⱼ c̄ⱼ, β fitted: optimizing control variates | by form: none where β is independent of the samples |
 //! | [`baselines`] | weighted importance sampling, defensive mixture, bidirectional | stated with each |
 //!
 //! [`stats`] has running moments and the tests (t, z, χ²) that hold estimators to these claims.
@@ -12,5 +13,6 @@
 pub mod baselines;
 pub mod mc;
 pub mod mis;
+pub mod ocv;
 pub mod ris;
 pub mod stats;
