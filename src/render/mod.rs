@@ -9,12 +9,15 @@ pub mod crosscheck;
 pub mod output;
 pub mod plan;
 
+use crate::direct::Fits;
+use crate::estimators::ocv::block_of;
 use crate::film::filter::FilterSampler;
 use crate::film::{Film, PixelBounds, PixelSample, PixelSums};
-use crate::integrators::path::CameraSample;
 use crate::integrators::irradiance_cache::{self, BuildStats, IrradianceCache, LookupStats};
+use crate::integrators::path::CameraSample;
 use crate::integrators::{CacheIntegrator, PathIntegrator, PathStats};
 use crate::math::Vec2;
+use crate::math::hash::pcg4d;
 use crate::samplers::SampleStream;
 use crate::scene::{IntegratorKind, Proposals, World};
 use rayon::prelude::*;
@@ -30,6 +33,9 @@ mod domain {
 
 /// Paths that are traced together: enough that stages run long, few enough that their data stays in the cache.
 const BATCH_PATHS: usize = 4096;
+
+/// Seed of the blocks of progressive estimators.
+const BLOCK_SEED: u32 = 0x62_6c_6f_63;
 
 /// How to render; none of it changes the picture but the sample range.
 #[derive(Clone, Copy, Debug)]
@@ -161,6 +167,7 @@ fn camera_batches(world: &World, tile_size: u32, rays: usize) -> Vec<Vec<CameraS
     let chosen = parts.iter().step_by(stride).map(|(tile, pixels)| {
         let mut samples = Vec::new();
         run.camera_samples(tile, pixels.clone(), 0..per_pixel, &mut samples);
+        samples.iter_mut().for_each(|s| s.fit -= pixels.start as u32);
         samples
     });
     chosen.collect()
@@ -170,6 +177,8 @@ fn camera_batches(world: &World, tile_size: u32, rays: usize) -> Vec<Vec<CameraS
 struct Tile {
     bounds: PixelBounds,
     sums: Vec<PixelSums>,
+    /// Those of its pixels one after the other.
+    fits: Fits,
 }
 
 struct Run<'a> {
@@ -207,10 +216,15 @@ impl<'a> Run<'a> {
     fn run(mut self, threads: usize) -> Rendering {
         let bounds = self.world.scene.film.bounds;
         let build = self.build_cache();
+        let integrator = &self.world.scene.integrator;
         let mut tiles: Vec<Tile> = bounds
             .tiles(self.settings.tile_size)
             .into_iter()
-            .map(|bounds| Tile { bounds, sums: vec![PixelSums::default(); bounds.area()] })
+            .map(|bounds| Tile {
+                bounds,
+                sums: vec![PixelSums::default(); bounds.area()],
+                fits: Fits::new(self.world, integrator, bounds.area()),
+            })
             .collect();
 
         // Passes over all tiles: 1, 1, 2, 4, … samples, so that there is a whole picture soon
@@ -221,7 +235,12 @@ impl<'a> Run<'a> {
         let mut first = self.settings.first_sample;
         while first < end && !self.stopped() {
             let done = first - self.settings.first_sample;
-            let length = self.samples_in_time(done).min(done.clamp(1, longest));
+            let mut length = self.samples_in_time(done).min(done.clamp(1, longest));
+            if integrator.is_progressive() {
+                // A pass lies within a block
+                let block = block_of(done);
+                length = length.min(block.first + block.len - done);
+            }
             let samples = first..(first + length).min(end);
             stats.merge(&self.pass(&mut tiles, samples.clone(), noise));
             first = samples.end;
@@ -250,7 +269,8 @@ impl<'a> Run<'a> {
             return None;
         }
         let bounds = self.world.scene.film.bounds;
-        let camera = |pixel, sample| self.camera_sample(pixel, sample);
+        let seed = self.world.scene.sampling.seed;
+        let camera = |pixel, sample| self.camera_sample_of_seed(pixel, sample, seed);
         let (cache, stats) = irradiance_cache::build(self.world, bounds, &camera, self.stop);
         self.cache = Some(cache);
         Some(stats)
@@ -307,25 +327,32 @@ impl<'a> Run<'a> {
         let per_pixel = samples.len().max(1);
         let pixels_per_batch = (BATCH_PATHS / per_pixel).max(1);
         let bounds = tile.bounds;
+        let mut ill_conditioned = 0;
+        let settings = &self.world.scene.integrator;
+        let done = samples.start - self.settings.first_sample;
+        let start = Instant::now();
+        let begins_block = settings.is_progressive() && done > 0 && block_of(done).first == done;
+        if begins_block {
+            ill_conditioned = tile.fits.solve();
+        }
+        let solve = start.elapsed();
         for (batch, sums) in tile.sums.chunks_mut(pixels_per_batch).enumerate() {
             let first = batch * pixels_per_batch;
             self.camera_samples(&bounds, first..first + sums.len(), samples.clone(), &mut worker.samples);
-            let (samples, results) = (&worker.samples, &mut worker.results);
-            match &self.cache {
-                None => worker.integrator.trace(self.world, &self.world.scene.integrator, samples, results),
-                Some(cache) => worker.with_cache.trace(self.world, cache, samples, results),
-            }
+            worker.trace(self.world, self.cache.as_ref(), &mut tile.fits);
             for (pixel, results) in sums.iter_mut().zip(worker.results.chunks(per_pixel)) {
                 results.iter().for_each(|r| pixel.add(r));
             }
         }
-        match &self.cache {
-            None => WorkerStats { paths: worker.integrator.take_stats(), lookups: LookupStats::default() },
-            Some(_) => {
-                let (paths, lookups) = worker.with_cache.take_stats();
-                WorkerStats { paths, lookups }
-            }
+        let mut stats = worker.take_stats(self.cache.is_some());
+        if begins_block {
+            let direct = &mut stats.paths.direct;
+            direct.systems += tile.sums.len() as u64;
+            direct.ill_conditioned += ill_conditioned;
+            direct.solve += solve;
+            direct.select += solve;
         }
+        stats
     }
 
     /// The camera samples of some pixels of a tile, which are counted row by row.
@@ -340,12 +367,22 @@ impl<'a> Run<'a> {
         for index in pixels {
             let index = index as u32;
             let pixel = [tile.x0 + index % tile.width(), tile.y0 + index / tile.width()];
-            out.extend(samples.clone().map(|s| self.camera_sample(pixel, s)));
+            out.extend(samples.clone().map(|s| CameraSample { fit: index, ..self.camera_sample(pixel, s) }));
         }
     }
 
+    /// The direct light of a progressive estimator is drawn block by block, each with a seed of its own.
     fn camera_sample(&self, pixel: [u32; 2], sample: u32) -> CameraSample {
-        self.camera_sample_of_seed(pixel, sample, self.world.scene.sampling.seed)
+        let seed = self.world.scene.sampling.seed;
+        if !self.world.scene.integrator.is_progressive() {
+            return self.camera_sample_of_seed(pixel, sample, seed);
+        }
+        let first = self.settings.first_sample;
+        let block = block_of(sample - first);
+        let block_seed = pcg4d([seed, first, block.index, BLOCK_SEED])[0];
+        let kind = self.world.scene.sampling.sampler;
+        let direct = SampleStream::new(kind, pixel, sample - first - block.first, block_seed);
+        CameraSample { direct, ..self.camera_sample_of_seed(pixel, sample, seed) }
     }
 
     fn camera_sample_of_seed(&self, pixel: [u32; 2], sample: u32, seed: u32) -> CameraSample {
@@ -361,7 +398,14 @@ impl<'a> Run<'a> {
             Some(map) => map.split(pixel, stream.domain(domain::SPLIT).draw::<2>()),
             None => scene.integrator.split(),
         };
-        CameraSample { ray, weight: filter.weight * ray.weight * scene.film.scale, stream, split }
+        CameraSample {
+            ray,
+            weight: filter.weight * ray.weight * scene.film.scale,
+            stream,
+            direct: stream,
+            split,
+            fit: 0,
+        }
     }
 }
 
@@ -372,4 +416,24 @@ struct Worker {
     with_cache: CacheIntegrator,
     samples: Vec<CameraSample>,
     results: Vec<PixelSample>,
+}
+
+impl Worker {
+    /// Traces `samples` into `results`.
+    fn trace(&mut self, world: &World, cache: Option<&IrradianceCache>, fits: &mut Fits) {
+        let (samples, results) = (&self.samples, &mut self.results);
+        match cache {
+            None => self.integrator.trace(world, &world.scene.integrator, samples, fits, results),
+            Some(cache) => self.with_cache.trace(world, cache, samples, fits, results),
+        }
+    }
+
+    fn take_stats(&mut self, has_cache: bool) -> WorkerStats {
+        if has_cache {
+            let (paths, lookups) = self.with_cache.take_stats();
+            WorkerStats { paths, lookups }
+        } else {
+            WorkerStats { paths: self.integrator.take_stats(), lookups: LookupStats::default() }
+        }
+    }
 }

@@ -43,7 +43,7 @@ Integrator "path" "integer maxdepth" [ 12 ]
 WorldBegin
 AttributeBegin
   AreaLightSource "diffuse" "rgb L" [ 12 10 8 ]
-  Shape "trianglemesh" "point3 P" [ -0.3 1.98 -0.3  0.3 1.98 -0.3  0.3 1.98 0.3  -0.3 1.98 0.3 ] "integer indices" [ 0 1 2 0 2 3 ]
+  Shape "trianglemesh" "point3 P" [ -0.7 1.98 -0.7  0.7 1.98 -0.7  0.7 1.98 0.7  -0.7 1.98 0.7 ] "integer indices" [ 0 1 2 0 2 3 ]
 AttributeEnd
 Material "diffuse" "rgb reflectance" [ 0.7 0.7 0.7 ]
 Shape "trianglemesh" "point3 P" [ -1 0 -1  1 0 -1  1 0 1  -1 0 1 ] "integer indices" [ 0 1 2 0 2 3 ]
@@ -55,7 +55,7 @@ Shape "trianglemesh" "point3 P" [ -1 0 -1  -1 2 -1  -1 2 1  -1 0 1 ] "integer in
 Material "coateddiffuse" "rgb reflectance" [ 0.1 0.6 0.1 ] "float roughness" [ 0.2 ]
 Shape "trianglemesh" "point3 P" [ 1 0 -1  1 2 -1  1 2 1  1 0 1 ] "integer indices" [ 0 1 2 0 2 3 ]
 AttributeBegin
-  Material "conductor" "spectrum eta" [ "metal-Cu-eta" ] "spectrum k" [ "metal-Cu-k" ] "float roughness" [ 0.1 ]
+  Material "conductor" "spectrum eta" [ "metal-Cu-eta" ] "spectrum k" [ "metal-Cu-k" ] "float roughness" [ 0.5 ]
   Translate -0.5 0.35 -0.4
   Shape "sphere" "float radius" [ 0.35 ]
 AttributeEnd
@@ -72,11 +72,7 @@ fn world_of(text: &str, change: impl FnOnce(&mut lumiris::scene::Scene)) -> Worl
     world_with_packets(text, None, change)
 }
 
-fn world_with_packets(
-    text: &str,
-    packet_width: Option<u32>,
-    change: impl FnOnce(&mut lumiris::scene::Scene),
-) -> World {
+fn world_with_packets(text: &str, packet_width: Option<u32>, change: impl FnOnce(&mut lumiris::scene::Scene)) -> World {
     let folder = tempfile::tempdir().unwrap();
     let path = folder.path().join("scene.pbrt");
     std::fs::write(&path, text).unwrap();
@@ -99,8 +95,13 @@ fn the_analytic_scenes_have_their_known_answers() {
     // Their pictures are a thousandth of what they show, so that interpolation makes no error that counts, but for a spot whose
     // falloff is steeper than the gradients of sources know
     let files = scene_files();
-    let configurations =
-        [(Cached::Indirect, EstimatorKind::Mis), (Cached::All, EstimatorKind::Mis), (Cached::All, EstimatorKind::Ris)];
+    let configurations = [
+        (Cached::Indirect, EstimatorKind::Mis),
+        (Cached::All, EstimatorKind::Mis),
+        (Cached::All, EstimatorKind::Ris),
+        (Cached::Indirect, EstimatorKind::Ocv),
+        (Cached::All, EstimatorKind::Ocv),
+    ];
     let significance = sidak(1e-3, files.len() * configurations.len() * 3);
     let mut failures = Vec::new();
     for path in &files {
@@ -117,7 +118,8 @@ fn the_analytic_scenes_have_their_known_answers() {
                 let bias = if is_steep { 5e-3 } else { 1e-4 };
                 let exact = (mean.mean() - answer).abs() <= bias * answer.abs();
                 if !exact && t_test(mean, answer).p_value < significance {
-                    failures.push(format!("{} {cached:?} {estimator:?} {channel}: {mean:?}, not {answer}", path.display()));
+                    failures
+                        .push(format!("{} {cached:?} {estimator:?} {channel}: {mean:?}, not {answer}", path.display()));
                 }
             }
         }
@@ -181,7 +183,9 @@ fn bits(film: &Film) -> Vec<u32> {
 
 #[test]
 fn threads_tiles_and_packets_do_not_change_a_bit() {
-    for (cached, estimator) in [(Cached::Indirect, EstimatorKind::Mis), (Cached::All, EstimatorKind::Ris)] {
+    for (cached, estimator) in
+        [(Cached::Indirect, EstimatorKind::Mis), (Cached::All, EstimatorKind::Ris), (Cached::All, EstimatorKind::Ocv)]
+    {
         let world = |width| {
             world_with_packets(ROOM, width, |scene| {
                 with_cache(scene, cached);
@@ -197,9 +201,15 @@ fn threads_tiles_and_packets_do_not_change_a_bit() {
         };
         let reference = picture(None, 1, 16);
         assert!(reference.1 > 100);
-        for (width, threads, tile_size) in
-            [(None, 1, 8), (None, 2, 16), (None, 3, 13), (None, 3, 64), (Some(1), 2, 16), (Some(4), 1, 16), (Some(8), 3, 8)]
-        {
+        for (width, threads, tile_size) in [
+            (None, 1, 8),
+            (None, 2, 16),
+            (None, 3, 13),
+            (None, 3, 64),
+            (Some(1), 2, 16),
+            (Some(4), 1, 16),
+            (Some(8), 3, 8),
+        ] {
             let same = reference == picture(width, threads, tile_size);
             assert!(same, "{cached:?}, packets of {width:?}, {threads} threads, tiles of {tile_size}");
         }
@@ -250,7 +260,10 @@ fn assert_gradients(world: &World, p: Vec3, n: Vec3, h: f32, tolerance: f32) {
             assert!((found - expected).abs() < tolerance * scale, "along {t}, {c}: {found}, not {expected} of {scale}");
             let expected = (up.e[c] - down.e[c]) / (2.0 * h);
             let (found, scale) = (here.rotation[c].dot(n.cross(t)), here.rotation[c].length());
-            assert!((found - expected).abs() < tolerance * scale, "towards {t}, {c}: {found}, not {expected} of {scale}");
+            assert!(
+                (found - expected).abs() < tolerance * scale,
+                "towards {t}, {c}: {found}, not {expected} of {scale}"
+            );
         }
     }
 }
@@ -259,8 +272,10 @@ fn assert_gradients(world: &World, p: Vec3, n: Vec3, h: f32, tolerance: f32) {
 fn gradients_of_sources_are_finite_differences() {
     let folder = Path::new(env!("CARGO_MANIFEST_DIR")).join("scenes/analytic");
     for name in ["rectangle", "triangle", "point"] {
-        let mut scene =
-            load(&folder.join(name).with_extension("pbrt"), &LoadOptions::default()).map_err(|d| d.to_string()).unwrap().scene;
+        let mut scene = load(&folder.join(name).with_extension("pbrt"), &LoadOptions::default())
+            .map_err(|d| d.to_string())
+            .unwrap()
+            .scene;
         with_cache(&mut scene, Cached::All);
         scene.integrator.samples = Some(1024);
         let world = World::new(scene, AccelKind::Embree, None).unwrap();

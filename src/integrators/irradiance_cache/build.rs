@@ -76,8 +76,7 @@ pub fn build(
         let pixels = round.pixels(bounds);
         stats.camera_samples += pixels.len() as u64;
         let wanted = ask(world, &cache, &pixels, &|pixel| cameras(pixel, round.sample), &mut stats.paths);
-        let wanted: Vec<Wanted> =
-            wanted.into_iter().map(|w| Wanted { key: w.key | round.sample << 16, ..w }).collect();
+        let wanted: Vec<Wanted> = wanted.into_iter().map(|w| Wanted { key: w.key | round.sample << 16, ..w }).collect();
         let chosen = without_redundant(&wanted, &cache, &world_bounds);
         stats.dropped += (wanted.len() - chosen.len()) as u64;
         for part in chosen.chunks(MOST_AT_ONCE) {
@@ -190,7 +189,7 @@ fn ask_chunk(
                 key: vertex << 1 | side,
             }));
             // Mirrors and glass
-            let point = v.shade_point(state.ray.time, samples[sample].split);
+            let point = v.shade_point(state.ray.time, samples[sample].split, 0);
             let next = path::extend(state, v, &point, vertex, settings);
             paths.next.extend(next.filter(|(_, lobe)| lobe.is_specular()).map(|(state, _)| state));
         }
@@ -240,9 +239,7 @@ fn without_redundant(wanted: &[Wanted], cache: &IrradianceCache, bounds: &Bounds
 fn gather(world: &World, wanted: &[Wanted], stats: &mut PathStats) -> Vec<Record> {
     let parts: Vec<(Vec<Record>, PathStats)> = wanted
         .par_chunks(BATCH)
-        .map_init(Gatherer::default, |gatherer, wanted| {
-            (gatherer.records(world, wanted), gatherer.take_stats())
-        })
+        .map_init(Gatherer::default, |gatherer, wanted| (gatherer.records(world, wanted), gatherer.take_stats()))
         .collect();
     parts.iter().for_each(|(_, s)| stats.merge(s));
     parts.into_iter().flat_map(|(records, _)| records).collect()

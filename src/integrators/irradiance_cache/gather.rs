@@ -13,7 +13,8 @@ use super::record::Record;
 use crate::accel::{Hit, RayBatch};
 use crate::bsdfs::{Bsdf, Diffuse};
 use crate::cameras::CameraRay;
-use crate::direct::{DirectStage, ShadePoint};
+use crate::direct::{DirectStage, Fits, ShadePoint};
+use crate::estimators::ocv::block_of;
 use crate::film::PixelSample;
 use crate::integrators::path::{CameraSample, PathIntegrator, PathStats};
 use crate::materials::SurfaceBsdf;
@@ -21,7 +22,7 @@ use crate::math::hash::pcg4d;
 use crate::math::ray::offset_origin;
 use crate::math::{Frame, Ray, Rgb, Vec3};
 use crate::samplers::SampleStream;
-use crate::scene::{Cached, EmitterHit, IntegratorKind, IntegratorSettings, Split, World};
+use crate::scene::{Cached, EmitterHit, EstimatorKind, IntegratorKind, IntegratorSettings, Split, World};
 use std::f32::consts::PI;
 
 /// Records that are computed together.
@@ -98,9 +99,12 @@ impl Gatherer {
         let paths = IntegratorSettings {
             kind: IntegratorKind::Path,
             max_depth: settings.max_depth.saturating_sub(1),
-            ..*settings
+            ..settings.at_vertex(1)
         };
-        let split = split_of_paths(settings);
+        let split = match settings.estimator {
+            EstimatorKind::Ris => settings.split().after_bounces(1),
+            EstimatorKind::Mc | EstimatorKind::Mis | EstimatorKind::Ocv | EstimatorKind::OptimalMis => paths.split(),
+        };
         self.samples.clear();
         for w in wanted {
             let frame = Frame::from_z(w.ns);
@@ -110,11 +114,11 @@ impl Gatherer {
                 let o = offset_origin(w.p, w.p_error, w.n, d);
                 let ray = Ray { o, d, t_max: f32::INFINITY, time: w.time };
                 let ray = CameraRay { ray, spread: w.spread, width0: w.pixel_width, weight: 1.0 };
-                self.samples.push(CameraSample { ray, weight: 1.0, stream, split });
+                self.samples.push(CameraSample { ray, weight: 1.0, stream, direct: stream, split, fit: 0 });
             }
         }
         self.paths.only_reflected = true;
-        self.paths.trace(world, &paths, &self.samples, &mut self.results);
+        self.paths.trace(world, &paths, &self.samples, &mut Fits::default(), &mut self.results);
 
         // Irradiance
         let of_record = |(w, results): (&Wanted, &[PixelSample])| {
@@ -131,19 +135,32 @@ impl Gatherer {
         wanted.iter().zip(self.results.chunks(cells.count() as usize)).map(of_record).collect()
     }
 
-    /// Light of sources.
+    /// Light of sources. Progressive estimators are fitted to the passes of each record: to earlier blocks of them.
     fn sources(&mut self, world: &World, settings: &IntegratorSettings, wanted: &[Wanted]) -> Vec<Irradiance> {
         let passes = settings.cache.passes.max(1);
         let mut sums = vec![Irradiance::default(); wanted.len()];
+        let mut fits = Fits::new(world, settings, wanted.len());
         for pass in 0..passes {
-            let points: Vec<ShadePoint<'_>> =
-                wanted.iter().map(|w| w.white_point(world, pass, settings.split())).collect();
-            self.direct.estimate(world, settings, &points, &mut self.radiance);
+            let block = block_of(pass);
+            if settings.is_progressive() && pass > 0 && block.first == pass {
+                self.direct.stats.ill_conditioned += fits.solve();
+                self.direct.stats.systems += wanted.len() as u64;
+            }
+            let points: Vec<ShadePoint<'_>> = (0_u32..)
+                .zip(wanted)
+                .map(|(fit, w)| {
+                    let place = if settings.is_progressive() { (block.index, pass - block.first) } else { (0, pass) };
+                    ShadePoint { fit, ..w.white_point(world, place, settings.split()) }
+                })
+                .collect();
+            self.direct.estimate(world, settings, &points, &mut fits, &mut self.radiance);
             for (sum, &l) in sums.iter_mut().zip(&self.radiance) {
                 // E = π L of a white surface
                 sum.e += l * (PI / passes as f32);
             }
-            self.add_gradients(world, wanted, PI / passes as f32, &mut sums);
+            // Both halves of a crossfit are estimates
+            let halves = 1 + u32::from(settings.has_halves());
+            self.add_gradients(world, wanted, halves, PI / (passes * halves) as f32, &mut sums);
         }
         for sum in sums.iter_mut().filter(|s| !s.is_finite()) {
             *sum = Irradiance { e: if sum.e.is_finite() { sum.e } else { Rgb::BLACK }, ..Irradiance::default() };
@@ -151,35 +168,31 @@ impl Gatherer {
         sums
     }
 
-    /// Adds the gradients that the samples of the last estimates have, times `scale`.
-    fn add_gradients(&mut self, world: &World, wanted: &[Wanted], scale: f32, sums: &mut [Irradiance]) {
+    /// Adds the gradients that the samples of the last estimates have, `estimates` of each point, times `scale`.
+    fn add_gradients(&mut self, world: &World, wanted: &[Wanted], estimates: u32, scale: f32, sums: &mut [Irradiance]) {
         // Normals of the emitters at the ends of segments
         let segments = self.direct.segments();
         self.rays.clear();
-        let free = self.direct.outcomes().enumerate().filter(|(_, (_, _, is_free))| *is_free);
-        let free: Vec<(u32, Rgb)> = free
-            .map(|(i, (point, l, _))| {
-                self.rays.push(&Ray { t_max: f32::INFINITY, ..segments.get(i) });
-                (point, l * scale)
-            })
-            .collect();
-        let is_finite: Vec<bool> = (self.direct.outcomes().enumerate())
-            .filter(|(_, (_, _, is_free))| *is_free)
-            .map(|(i, _)| segments.t_max[i].is_finite())
-            .collect();
+        let mut free = Vec::new();
+        for (i, (point, l, is_free)) in self.direct.outcomes().enumerate() {
+            if is_free {
+                let segment = segments.get(i);
+                self.rays.push(&Ray { t_max: f32::INFINITY, ..segment });
+                free.push(((point / estimates) as usize, l * scale, segment.t_max.is_finite()));
+            }
+        }
         world.intersect_emitters(&self.rays, &mut self.hits, &mut self.emitters);
 
-        for (i, &(point, c)) in free.iter().enumerate() {
-            let (w, sum) = (&wanted[point as usize], &mut sums[point as usize]);
+        for (i, &(point, c, has_end)) in free.iter().enumerate() {
+            let (w, sum) = (&wanted[point], &mut sums[point]);
             let d = self.rays.get(i).d;
             let r2 = d.length_squared();
             if !(r2 > 0.0) {
                 continue;
             }
             let wi = d / r2.sqrt();
-            let cos = wi.dot(w.ns).max(MIN_COS);
-            Irradiance::add_gradient(&mut sum.rotation, w.ns.cross(wi), c / cos);
-            if is_finite[i] {
+            Irradiance::add_gradient(&mut sum.rotation, w.ns.cross(wi), c / wi.dot(w.ns).max(MIN_COS));
+            if has_end {
                 let gradient = log_gradient(world, w, d, self.emitters[i].as_ref());
                 // Tangential
                 Irradiance::add_gradient(&mut sum.translation, gradient - w.ns * gradient.dot(w.ns), c);
@@ -215,23 +228,21 @@ fn radius(light: &Irradiance, r: &[f32], kappa: f32) -> f32 {
     mean.min(by_gradient).min(nearest / kappa)
 }
 
-/// Samples and proposals at the vertices of a record's paths.
-fn split_of_paths(settings: &IntegratorSettings) -> Split {
-    match settings.estimator {
-        crate::scene::EstimatorKind::Mc | crate::scene::EstimatorKind::Mis => settings.split(),
-        crate::scene::EstimatorKind::Ris => settings.split().after_bounces(1),
-    }
-}
-
 impl Wanted {
     /// Random numbers of sample `index` of this record.
     fn stream(&self, world: &World, index: u32) -> SampleStream {
+        self.stream_of_block(world, 0, index)
+    }
+
+    /// The same for blocks that are independent of each other.
+    fn stream_of_block(&self, world: &World, block: u32, index: u32) -> SampleStream {
         let sampling = &world.scene.sampling;
-        let [seed, ..] = pcg4d([sampling.seed, self.key, 0x6972_7261, 1]);
+        let [seed, ..] = pcg4d([sampling.seed, self.key, 0x6972_7261, block]);
         SampleStream::new(sampling.sampler, self.pixel, index, seed)
     }
 
-    fn white_point(&self, world: &World, pass: u32, split: Split) -> ShadePoint<'static> {
+    /// A white surface here, whose light is estimated with sample `index` of `block`.
+    fn white_point(&self, world: &World, (block, index): (u32, u32), split: Split) -> ShadePoint<'static> {
         let bsdf = SurfaceBsdf {
             bsdf: Bsdf::Diffuse(Diffuse { reflectance: Rgb::WHITE }),
             frame: Frame::from_z(self.ns),
@@ -243,8 +254,9 @@ impl Wanted {
             wo: self.ns,
             bsdf,
             time: self.time,
-            stream: self.stream(world, pass).domain(domain::SOURCES),
+            stream: self.stream_of_block(world, block, index).domain(domain::SOURCES),
             split,
+            fit: 0,
         }
     }
 }

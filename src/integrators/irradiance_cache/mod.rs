@@ -27,7 +27,7 @@ pub use record::Record;
 
 use super::path::{self, CameraSample, PathIntegrator, PathStats, Vertex};
 use crate::bsdfs::Bsdf;
-use crate::direct::ShadePoint;
+use crate::direct::{Fits, ShadePoint};
 use crate::film::PixelSample;
 use crate::materials::SurfaceBsdf;
 use crate::math::{Rgb, Vec3};
@@ -74,12 +74,13 @@ impl CacheIntegrator {
         (self.paths.take_stats(), std::mem::take(&mut self.lookups))
     }
 
-    /// Estimates the radiance of each camera sample; `out[i]` belongs to `samples[i]`.
+    /// Estimates the radiance of each camera sample; `out[i]` belongs to `samples[i]`. `fits` are those of the samples' pixels.
     pub fn trace(
         &mut self,
         world: &World,
         cache: &IrradianceCache,
         samples: &[CameraSample],
+        fits: &mut Fits,
         out: &mut Vec<PixelSample>,
     ) {
         let settings = &world.scene.integrator;
@@ -91,17 +92,19 @@ impl CacheIntegrator {
             }
             let vertices = self.paths.find_vertices(world, vertex, depth, samples, out);
             let split = match settings.estimator {
-                EstimatorKind::Mc | EstimatorKind::Mis => settings.split(),
+                EstimatorKind::Mc | EstimatorKind::Mis | EstimatorKind::Ocv | EstimatorKind::OptimalMis => {
+                    settings.split()
+                }
                 EstimatorKind::Ris => settings.split().after_bounces(vertex),
             };
             let shadings: Vec<Shading<'_>> = vertices.iter().map(|v| self.shade(cache, v)).collect();
             let points: Vec<ShadePoint<'_>> = (vertices.iter().zip(&self.paths.active))
                 .map(|(v, path)| {
                     let split = if vertex == 0 { samples[path.sample as usize].split } else { split };
-                    v.shade_point(path.ray.time, split)
+                    v.shade_point(path.ray.time, split, samples[path.sample as usize].fit)
                 })
                 .collect();
-            self.light(world, settings, &shadings, &points, out);
+            self.light(world, &settings.at_vertex(vertex), (&shadings, &points), fits, out);
             self.extend(settings, vertex, (&vertices, &shadings, &points));
         }
     }
@@ -136,8 +139,8 @@ impl CacheIntegrator {
         &mut self,
         world: &World,
         settings: &IntegratorSettings,
-        shadings: &[Shading<'_>],
-        points: &[ShadePoint<'_>],
+        (shadings, points): (&[Shading<'_>], &[ShadePoint<'_>]),
+        fits: &mut Fits,
         out: &mut [PixelSample],
     ) {
         let paths = &mut self.paths;
@@ -147,7 +150,7 @@ impl CacheIntegrator {
         let lit: Vec<ShadePoint<'_>> = (shadings.iter().zip(points))
             .filter_map(|(shading, point)| shading.lit.map(|bsdf| ShadePoint { bsdf, ..*point }))
             .collect();
-        paths.direct.estimate(world, settings, &lit, &mut paths.radiance);
+        paths.direct.estimate(world, settings, &lit, fits, &mut paths.radiance);
         let lit_paths = paths.active.iter().zip(shadings).filter(|(_, shading)| shading.lit.is_some());
         for ((path, _), &radiance) in lit_paths.zip(&paths.radiance) {
             out[path.sample as usize].radiance += path.beta * radiance;
