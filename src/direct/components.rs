@@ -37,17 +37,13 @@ impl Method {
         }
     }
 
-    /// The columns of a sample from its r_j.
-    #[inline]
-    fn columns(self, mut columns: Columns, integrals: &Columns) -> Columns {
-        for (column, &integral) in columns.iter_mut().zip(integrals) {
-            match self {
-                Method::Ocv(Form::Paper) if integral > 0.0 => *column /= integral,
-                Method::Ocv(Form::Paper) | Method::Optimal(_) => {}
-                Method::Ocv(Form::Progressive | Form::Regression | Form::Crossfit) => *column -= integral,
-            }
+    /// Makes sums of the method's columns of those of r_j.
+    fn finish(self, equations: NormalEquations, sums: &mut [f32], integrals: &Columns) {
+        match self {
+            Method::Ocv(Form::Paper) => equations.scale(sums, &integrals.map(|i| if i > 0.0 { 1.0 / i } else { 1.0 })),
+            Method::Optimal(_) => {}
+            Method::Ocv(Form::Progressive | Form::Regression | Form::Crossfit) => equations.centre(sums, integrals),
         }
-        columns
     }
 }
 
@@ -225,18 +221,15 @@ impl Components {
         for ((c, contribution), &is_free) in candidates.records.iter().zip(contributions).zip(&self.is_free) {
             let mixture = &candidates.mixtures[c.point as usize];
             let y = if is_free { *contribution * mixture.samples() } else { Rgb::BLACK };
-            let columns = method.columns(mixture.columns(c).unwrap_or_default(), &mixture.integrals);
-            equations.add(&mut self.sums[c.point as usize * len..][..len], &columns[..m], y.to_array());
+            let (count, columns) = mixture.columns(c);
+            equations.add_sparse(&mut self.sums[c.point as usize * len..][..len], &columns[..count], y.to_array());
         }
         for (mixture, sums) in candidates.mixtures.iter().zip(self.sums.chunks_mut(len)) {
             for (component, &count) in mixture.dark[..m].iter().enumerate().filter(|(_, count)| **count > 0) {
-                let mut columns = Columns::default();
-                columns[component] = mixture.dark_column(component);
-                let columns = method.columns(columns, &mixture.integrals);
-                (0..count).for_each(|_| equations.add(sums, &columns[..m], [0.0; 3]));
+                equations.add_zeros(sums, (component, mixture.dark_column(component)), count);
             }
-            let columns = method.columns(Columns::default(), &mixture.integrals);
-            (0..mixture.void).for_each(|_| equations.add(sums, &columns[..m], [0.0; 3]));
+            equations.add_zeros(sums, (0, 0.0), mixture.void);
+            method.finish(equations, sums, &mixture.integrals);
         }
     }
 }
