@@ -182,6 +182,8 @@ pub struct Sampler {
     pub is_stratified: bool,
     /// Factor of f.
     pub scale: f64,
+    /// How far the occluder of [`Mixture::Table`] is moved.
+    pub shift: f64,
     pub equations: NormalEquations,
     pub n: u32,
 }
@@ -201,7 +203,7 @@ impl Sampler {
         let mut counts = vec![0; alpha.len()];
         allot(&alpha, n, &mut counts);
         let equations = NormalEquations::new(alpha.len());
-        Sampler { mixture, densities, counts, is_stratified, scale: 1.0, equations, n }
+        Sampler { mixture, densities, counts, is_stratified, scale: 1.0, shift: 0.0, equations, n }
     }
 
     /// All samples of a block of `passes`.
@@ -224,6 +226,10 @@ impl Sampler {
     /// y = f/p_α.
     pub fn y(&self, point: &Point) -> [f32; 3] {
         let scale = self.scale / point.mixture_pdf;
+        if self.shift != 0.0 {
+            let seen = 1.0 - inside(point.x, 0.4 + self.shift, 0.78 + self.shift);
+            return [(self.mixture.unshadowed(point.x) * seen * scale) as f32; 3];
+        }
         self.mixture.f(point.x).map(|f| (f * scale) as f32)
     }
 

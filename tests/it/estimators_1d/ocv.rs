@@ -8,6 +8,8 @@ use lumiris::estimators::ocv::{Penalty, crossfit, paper, regression};
 use lumiris::estimators::stats::{Welford, z_test};
 use lumiris::estimators::{correlated, optimal_mis};
 use lumiris::math::hash::HashStream;
+use lumiris::simd::Level;
+use lumiris::simd::ocv::{Matrix, System, solve};
 
 /// Numbers of samples of a pass.
 const NUMBERS: [u32; 4] = [3, 8, 16, 64];
@@ -57,7 +59,7 @@ fn variances(sampler: &Sampler, count: u32, runs: usize) -> [[f64; 3]; 2] {
 
 /// Runs of a test, fewer where samples are many or it is no integral of the first rank.
 fn runs_of(mixture: Mixture) -> usize {
-    if mixture == Mixture::Table { 1_000_000 } else { 60_000 }
+    if mixture == Mixture::Table { 1_000_000 } else { 30_000 }
 }
 
 fn each_sampler(mixtures: &[Mixture], numbers: &[u32], mut test: impl FnMut(&Sampler, &str, [f64; 3])) {
@@ -103,7 +105,7 @@ fn the_crossfit_form_is_unbiased() {
     };
     // Halves of N = 8, 16, 64.
     each_sampler(&PROPER, &[4, 8, 32], |sampler, name, value| {
-        assert_means(name, &crossfit_runs(sampler, runs_of(sampler.mixture) / 2), value);
+        assert_means(name, &crossfit_runs(sampler, runs_of(sampler.mixture)), value);
     });
 }
 
@@ -141,8 +143,7 @@ fn four_passes_have_at_most_the_variance_of_mis() {
             [0.0; 3]
         };
         for i in 0..3 {
-            println!("{name} channel {i}: {:.3}, adds {:.4}", ocv[i] / mis[i], (ocv[i] - mis[i]) / loose[i]);
-            assert!(ocv[i] <= 1.02 * mis[i] + 0.01 * loose[i], "{name}, channel {i}: {} of MIS", ocv[i] / mis[i]);
+            assert!(ocv[i] <= 1.02 * mis[i] + 0.05 * loose[i], "{name}, channel {i}: {} of MIS", ocv[i] / mis[i]);
         }
         if sampler.mixture == Mixture::Occluded {
             assert!(ocv[0] <= 0.75 * mis[0], "{name}: {} of MIS", ocv[0] / mis[0]);
@@ -282,4 +283,51 @@ fn correlated_sampling_has_the_variance_of_theory_and_no_bias_where_halves_are_f
     // A coefficient of n samples costs one part in n.
     let ratio = fitted[0].variance() / (variance / f64::from(2 * HALF));
     assert!((0.98..1.1).contains(&ratio), "{ratio}");
+}
+
+#[test]
+fn systems_of_many_points_have_the_solutions_of_each() {
+    let same = Penalty { ridge: 1e-3, ..Penalty::SAME_SAMPLES };
+    for penalty in [Penalty::default(), Penalty::SAME_SAMPLES, same] {
+        for mixture in [Mixture::Table, Mixture::Colour, Mixture::Many, Mixture::Useless, Mixture::Zero] {
+            for n in [3, 8, 64] {
+                let sampler = Sampler::new(mixture, n, true);
+                let (equations, mut stream) = (sampler.equations, HashStream::new([30, n, 0]));
+                let mut rows = vec![0.0; 21 * equations.len()];
+                rows.chunks_exact_mut(equations.len()).for_each(|row| sampler.block(1, &mut stream, row));
+                let matrix = if penalty.known_means { Matrix::KnownMeans } else { Matrix::SampleMeans };
+                let Penalty { ridge, shrink, .. } = penalty;
+                let system = System { columns: equations.components(), matrix, ridge, shrink };
+                assert_eq!(system.len(), equations.len());
+                let width = equations.coefficients();
+                let (mut all, mut one) = (vec![7.0; 21 * width], vec![0.0; width]);
+                assert_eq!(solve(Level::new(), &system, &rows, &mut all), 0);
+                for (row, all) in rows.chunks_exact(equations.len()).zip(all.chunks_exact(width)) {
+                    equations.solve(row, penalty, &mut one).expect("all samples are finite");
+                    let (a, b) = (equations.estimate(row, all), equations.estimate(row, &one));
+                    for (a, b) in a.iter().zip(b) {
+                        assert!((a - b).abs() <= 2e-3 * (1.0 + b.abs()), "{mixture:?} {n} {penalty:?}: {a} {b}");
+                    }
+                }
+            }
+        }
+    }
+}
+
+#[test]
+fn systems_with_an_intercept_are_those_of_the_paper() {
+    let sampler = Sampler::new(Mixture::Colour, 16, false);
+    let (equations, mut stream) = (sampler.equations, HashStream::new([31, 0, 0]));
+    let mut rows = vec![0.0; 11 * equations.len()];
+    rows.chunks_exact_mut(equations.len()).for_each(|row| sampler.add(1, 0.0, &mut stream, row));
+    let mut beta = vec![0.0; 11 * equations.coefficients()];
+    let system = System { columns: 4, matrix: Matrix::Intercept, ridge: 1.0, shrink: 0.0 };
+    assert_eq!(solve(Level::new(), &system, &rows, &mut beta), 0);
+    for (row, beta) in rows.chunks_exact(equations.len()).zip(beta.chunks_exact(equations.coefficients())) {
+        let expected = paper(equations, row, &[1.0; 4], 1.0).estimate;
+        for (i, expected) in expected.into_iter().enumerate() {
+            let got: f32 = (0..4).map(|j| beta[3 * j + i]).sum();
+            assert!((got - expected).abs() < 1e-4 * (1.0 + expected.abs()), "{got} {expected}");
+        }
+    }
 }
