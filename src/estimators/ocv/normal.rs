@@ -8,6 +8,9 @@ pub const MAX_COMPONENTS: usize = 8;
 /// Samples after which the sums stay as they are: the count would no longer be exact in f32.
 const MOST_SAMPLES: f32 = 16_777_216.0;
 
+/// Part of Σ c² below which Σ (c − c̄)² is rounding: the column is constant and takes no part.
+const CONSTANT: f64 = 1e-6;
+
 /// A system that has no usable solution: something in it is not finite. The estimate is then that of β = 0, which is MIS.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, thiserror::Error)]
 #[error("the normal equations are ill-conditioned")]
@@ -285,6 +288,9 @@ impl NormalEquations {
                 let centre = if known_means { 0.0 } else { mean * self.sum_of_column(sums, k) };
                 a[j][k] = self.sum_of_products(sums, j, k) - centre;
                 a[k][j] = a[j][k];
+            }
+            if a[j][j] < CONSTANT * self.sum_of_products(sums, j, j) {
+                a[j][j] = 0.0;
             }
             for (i, b) in b.iter_mut().enumerate() {
                 b[j] = self.sum_with_y(sums, j, i) - mean * self.sum_of_y(sums, i);
