@@ -15,9 +15,10 @@ use serde_json::{Value, json};
 use std::io::{self, Write};
 use std::path::{Path, PathBuf};
 
-const TEMPLATE: &str = include_str!("viewer.html");
-const STYLE: &str = include_str!("viewer.css");
-const SCRIPT: &str = include_str!("viewer.js");
+const TEMPLATE: &str = include_str!("viewer/index.html");
+const STYLE: &str = include_str!("viewer/style.css");
+const PICTURES: &str = include_str!("viewer/pictures.js");
+const VIEWER: &str = include_str!("viewer/viewer.js");
 
 /// Writes `index.html` into a folder, which is made if it is not there. Says where the page is.
 pub fn write_page(
@@ -51,11 +52,15 @@ fn page(pictures: &Pictures, settings: &Settings, compared: &[Compared]) -> io::
     // `<` could end the element that holds it.
     let manifest = manifest.to_string().replace('<', "\\u003c");
 
-    let mut out = String::with_capacity(data.len() + manifest.len() + TEMPLATE.len() + STYLE.len() + SCRIPT.len());
+    let mut out = String::with_capacity(data.len() + manifest.len() + (1 << 16));
     let mut rest = TEMPLATE;
-    for (mark, text) in
-        [("/*style*/", STYLE), ("/*manifest*/", &manifest), ("<!--data-->", &data), ("/*script*/", SCRIPT)]
-    {
+    for (mark, text) in [
+        ("/*style*/", STYLE),
+        ("/*manifest*/", &manifest),
+        ("<!--data-->", &data),
+        ("/*pictures*/", PICTURES),
+        ("/*viewer*/", VIEWER),
+    ] {
         let (before, after) = rest.split_once(mark).expect("the template has all marks, in this order");
         out.push_str(before);
         out.push_str(text);
