@@ -2,6 +2,7 @@
 
 use super::progress;
 use crate::compare::columns::{column, shown_columns};
+use crate::compare::page::write_whole;
 use crate::compare::{Column, Compared, Metric, Pictures, Scores, Settings, compare, load, write_page};
 use crate::imaging::metrics::bias::Z_95;
 use anyhow::{Context, bail};
@@ -140,7 +141,7 @@ pub fn run(args: &CompareArgs) -> anyhow::Result<ExitCode> {
     match args.json.as_deref() {
         Some(path) if path == Path::new("-") => progress::print(text.trim_end()),
         Some(path) => {
-            std::fs::write(path, text).with_context(|| format!("cannot write {}", path.display()))?;
+            write_whole(path, &text).with_context(|| format!("cannot write {}", path.display()))?;
             progress::print(&table(&pictures, &settings, &compared));
         }
         None => progress::print(&table(&pictures, &settings, &compared)),

@@ -52,9 +52,7 @@ pub enum Better {
     Lower,
     /// Large ones.
     Higher,
-    /// Those near 0.
-    NearZero,
-    /// No order of merit.
+    /// No order of merit: a bias within its interval is as good as any other.
     Neither,
 }
 
@@ -64,7 +62,6 @@ impl Better {
         match self {
             Better::Lower => "lower",
             Better::Higher => "higher",
-            Better::NearZero => "zero",
             Better::Neither => "none",
         }
     }
@@ -176,7 +173,7 @@ pub const COLUMNS: [Column; 17] = [
         title: "bias",
         help: "mean difference",
         metric: Some(Metric::Bias),
-        better: Better::NearZero,
+        better: Better::Neither,
         value: |s| s.bias.map(|b| b.mean),
         text: signed,
     },
@@ -194,7 +191,7 @@ pub const COLUMNS: [Column; 17] = [
         title: "bias/σ",
         help: "bias in its standard errors",
         metric: Some(Metric::Bias),
-        better: Better::NearZero,
+        better: Better::Neither,
         value: |s| s.bias.map(|b| b.z()),
         text: signed,
     },

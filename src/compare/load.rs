@@ -56,6 +56,8 @@ pub struct Shown {
     pub pixels: Vec<Pixel>,
     /// Variance of each pixel's mean.
     pub variance: Option<Vec<Pixel>>,
+    /// The file stores 16-bit floats.
+    pub is_half: bool,
 }
 
 /// Pictures of one size; the last one is the reference.
@@ -138,7 +140,8 @@ fn read(path: &Path, layer: Option<&str>) -> Result<Raw, String> {
     let encoding = read.encoding;
     let pixels = pixels(&read, &chosen.channels).into_iter().map(|p| p.map(|v| encoding.to_linear(v))).collect();
     let layer = chosen.title().to_owned();
-    let shown = Shown { path: path.to_owned(), name: String::new(), layer, remarks, pixels, variance };
+    let shown =
+        Shown { path: path.to_owned(), name: String::new(), layer, remarks, pixels, variance, is_half: read.is_half };
     // Pixels in the display window alone
     let whole = Region { x: 0, y: 0, width: read.image.width, height: read.image.height };
     let offset: [i64; 2] =

@@ -29,15 +29,20 @@ pub fn write_page(
 ) -> io::Result<PathBuf> {
     std::fs::create_dir_all(folder)?;
     let path = folder.join("index.html");
-    let partial = folder.join(format!(".index.{}.partial.html", std::process::id()));
-    let written = page(pictures, settings, compared)
-        .and_then(|text| std::fs::write(&partial, text))
-        .and_then(|()| std::fs::rename(&partial, &path));
+    write_whole(&path, &page(pictures, settings, compared)?)?;
+    Ok(path)
+}
+
+/// Writes a file; either the whole of it appears under its name, or nothing.
+pub fn write_whole(path: &Path, text: &str) -> io::Result<()> {
+    let name = path.file_name().unwrap_or_default().to_string_lossy();
+    let partial = path.with_file_name(format!(".{name}.{}.partial", std::process::id()));
+    let written = std::fs::write(&partial, text).and_then(|()| std::fs::rename(&partial, path));
     if written.is_err() {
         // What is left of the attempt is of no use; if it is not there, so much the better.
         let _ = std::fs::remove_file(&partial);
     }
-    written.map(|()| path)
+    written
 }
 
 /// The page as text.
@@ -204,6 +209,7 @@ mod tests {
             remarks: Vec::new(),
             pixels: vec![[v; 3]; 4],
             variance: Some(vec![[0.01; 3]; 4]),
+            is_half: false,
         };
         let region = Region { x: 0, y: 0, width: 2, height: 2 };
         let evil = "</script><script>alert(1)</script>.exr";

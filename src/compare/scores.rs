@@ -4,6 +4,7 @@ use super::columns::Metric;
 use super::load::{Pictures, Region, Shown};
 use crate::imaging::metrics::difference::DEFAULT_EPSILON;
 use crate::imaging::metrics::perceptual::perceptual_error_at;
+use crate::imaging::metrics::significance::{F32_ROUNDING, HALF_ROUNDING};
 use crate::imaging::metrics::{
     Bias, DEFAULT_PIXELS_PER_DEGREE, Differences, Pixel, Significance, bias, differences, hdr_flip, ldr_flip,
     mean_of_map, perceptual_map, significance, z_map,
@@ -122,6 +123,7 @@ fn compare_one(image: &Shown, reference: &Shown, region: Region, settings: &Sett
     let flip = wants(Metric::Flip).then(|| ldr_flip(x, r, size, settings.exposure.exp2(), settings.pixels_per_degree));
     let hdr = wants(Metric::HdrFlip).then(|| hdr_flip(x, r, size, settings.pixels_per_degree));
     let tested = variance.as_deref().filter(|_| wants(Metric::Z));
+    let rounding = if image.is_half || reference.is_half { HALF_ROUNDING } else { F32_ROUNDING };
     let scores = Scores {
         psnr: differences.psnr(settings.peak),
         differences,
@@ -130,13 +132,13 @@ fn compare_one(image: &Shown, reference: &Shown, region: Region, settings: &Sett
         hdr_exposures: hdr.as_ref().map(|h| (h.start, h.stop, h.count)),
         tvi: wants(Metric::Tvi).then(|| perceptual_error_at(x, r, settings.candelas)),
         bias: wants(Metric::Bias).then(|| bias(x, r, both)),
-        significance: tested.map(|v| significance(x, r, v)),
+        significance: tested.map(|v| significance(x, r, v, rounding)),
     };
     let maps = Maps {
         flip,
         hdr_flip: hdr.map(|h| h.map),
         tvi: wants(Metric::Tvi).then(|| perceptual_map(x, r, settings.candelas)),
-        z: tested.map(|v| z_map(x, r, v)),
+        z: tested.map(|v| z_map(x, r, v, rounding)),
     };
     Compared { scores, maps, noise }
 }
@@ -165,6 +167,7 @@ mod tests {
             remarks: Vec::new(),
             pixels: vec![[value; 3]; 6],
             variance: variance.map(|v| vec![[v; 3]; 6]),
+            is_half: false,
         }
     }
 

@@ -66,6 +66,8 @@ pub struct ReadImage {
     pub parts: usize,
     /// Where the pixels lie in the full picture.
     pub window: Window,
+    /// The values are stored as 16-bit floats.
+    pub is_half: bool,
 }
 
 /// A picture to write: one part of a file.
@@ -315,7 +317,7 @@ pub fn read_part(path: &Path, part: usize, limits: &ReadLimits) -> Result<ReadIm
         full_origin: [spec.full_x, spec.full_y],
         full_size: [size(spec.full_width), size(spec.full_height)],
     };
-    Ok(ReadImage { image, encoding, metadata, parts, window })
+    Ok(ReadImage { image, encoding, metadata, parts, window, is_half: spec.format == sys::OIIO_FORMAT_HALF })
 }
 
 /// Reads the headers of all parts of a picture, and no pixels.
@@ -550,6 +552,7 @@ mod tests {
         assert_eq!(headers.iter().map(|h| h.name.as_str()).collect::<Vec<_>>(), ["beauty", "albedo"]);
         assert!(headers[0].channels.contains(&"Z".to_owned()) && headers[1].channels.len() == 3);
         let read = read_part(&path, 1, &limits).unwrap();
+        assert!(read.is_half);
         assert_eq!(read.metadata["compression"], "piz");
         let g = read.image.channel("albedo.G").unwrap();
         assert!((0..6).all(|p| (read.image.data[p * 3 + g] - albedo[p * 3 + 1]).abs() < 1e-3));

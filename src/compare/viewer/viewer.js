@@ -137,8 +137,8 @@
       for (const cell of all) drawImage(cell, cell.image, viewOf(cell.view), cell.x, cell.x + cell.w);
     }
     if (state.mode === "grid") {
-      context.fillStyle = "#38383f";
       for (const cell of all) {
+        context.fillStyle = "#38383f";
         if (cell.x > 0) context.fillRect(cell.x, cell.y, 1, cell.h);
         if (cell.y > 0) context.fillRect(cell.x, cell.y, cell.w, 1);
         label(cell);
@@ -215,8 +215,7 @@
     const better = manifest.columns[column].better;
     if (values.length < 2 || better === "none") return null;
     if (better === "higher") return Math.max(...values);
-    if (better === "lower") return Math.min(...values);
-    return values.reduce((a, b) => (Math.abs(b) < Math.abs(a) ? b : a));
+    return Math.min(...values);
   }
   function metrics() {
     const header = (title, help, column) => {
