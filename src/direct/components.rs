@@ -1,0 +1,242 @@
+//! Estimates that measure samples against the components of their mixture: `ocv` and `optimal-mis`.
+//!
+//! After T2, the samples of a point become sums of normal equations in the columns c_j = h_j/p_α − I_j, whose expectation
+//! is 0, and in y = f·V/p_α. The estimate is ȳ − Σ_j β_j c̄_j [Fan et al. 2006, Eq. 7]; forms differ in what β is fitted to.
+//! `optimal-mis` has its systems in the columns r_j = h_j/p_α, and the form of the paper in r_j/I_j.
+
+use super::ShadePoint;
+use super::mixture::Columns;
+use super::propose::{Candidates, Drawn};
+use super::visibility::{Segments, is_traced};
+use crate::accel::RayBatch;
+use crate::estimators::ocv::forms::PAPER_LAMBDA;
+use crate::estimators::ocv::{self, Form, NormalEquations, Outcome, Penalty};
+use crate::estimators::optimal_mis;
+use crate::math::Rgb;
+use crate::scene::{EstimatorKind, IntegratorSettings, OptimalForm, Split, World};
+
+/// Domain below the stream of a shading point: half h of its samples uses `HALF + h`.
+const HALF: u32 = 32;
+
+/// What columns a system is of, and how it is solved.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+enum Method {
+    /// c_j = r_j − I_j.
+    Ocv(Form),
+    /// r_j.
+    Optimal(OptimalForm),
+}
+
+impl Method {
+    fn new(settings: &IntegratorSettings) -> Self {
+        match settings.estimator {
+            EstimatorKind::OptimalMis => Method::Optimal(settings.optimal_mis),
+            EstimatorKind::Mc | EstimatorKind::Mis | EstimatorKind::Ris | EstimatorKind::Ocv => {
+                Method::Ocv(settings.ocv.form)
+            }
+        }
+    }
+
+    /// The columns of a sample from its r_j.
+    #[inline]
+    fn columns(self, mut columns: Columns, integrals: &Columns) -> Columns {
+        for (column, &integral) in columns.iter_mut().zip(integrals) {
+            match self {
+                Method::Ocv(Form::Paper) if integral > 0.0 => *column /= integral,
+                Method::Ocv(Form::Paper) | Method::Optimal(_) => {}
+                Method::Ocv(Form::Progressive | Form::Regression | Form::Crossfit) => *column -= integral,
+            }
+        }
+        columns
+    }
+}
+
+/// Fits that estimates take part in: sums so far, and coefficients for those to come.
+///
+/// An estimate uses the coefficients of its fit and adds its samples to the sums; [`Self::solve`] begins a new block with
+/// coefficients that are fitted to all sums. What is estimated after that must be independent of what was before.
+#[derive(Clone, Debug)]
+pub struct Fits {
+    equations: NormalEquations,
+    is_optimal: bool,
+    sums: Vec<f32>,
+    beta: Vec<f32>,
+}
+
+impl Default for Fits {
+    fn default() -> Self {
+        Fits { equations: NormalEquations::new(0), is_optimal: false, sums: Vec::new(), beta: Vec::new() }
+    }
+}
+
+impl Fits {
+    /// `count` fits without samples for the mixtures of a world; none if its estimates do not use fits.
+    pub fn new(world: &World, settings: &IntegratorSettings, count: usize) -> Self {
+        if !settings.is_progressive() {
+            return Fits::default();
+        }
+        let equations = NormalEquations::new(world.components());
+        Fits {
+            equations,
+            is_optimal: settings.estimator == EstimatorKind::OptimalMis,
+            sums: vec![0.0; count * equations.len()],
+            beta: vec![0.0; count * equations.coefficients()],
+        }
+    }
+
+    /// True if there are none: estimates are then those without coefficients.
+    pub fn is_empty(&self) -> bool {
+        self.sums.is_empty()
+    }
+
+    /// Begins a block. Returns the number of fits whose system has no solution; their estimates are those of MIS.
+    pub fn solve(&mut self) -> u64 {
+        let betas = self.beta.chunks_mut(self.equations.coefficients().max(1));
+        let fits = self.sums.chunks(self.equations.len()).zip(betas);
+        let solved = fits.map(|(sums, beta)| {
+            if self.is_optimal {
+                optimal_mis::coefficients(self.equations, sums, beta)
+            } else {
+                self.equations.solve(sums, Penalty::default(), beta)
+            }
+        });
+        solved.map(|result| u64::from(result.is_err())).sum()
+    }
+
+    fn beta(&self, fit: u32) -> &[f32] {
+        let len = self.equations.coefficients();
+        &self.beta[fit as usize * len..][..len]
+    }
+
+    fn add(&mut self, fit: u32, sums: &[f32]) {
+        let len = self.equations.len();
+        self.equations.merge(&mut self.sums[fit as usize * len..][..len], sums);
+    }
+}
+
+/// The stage's buffers.
+#[derive(Debug, Default)]
+pub struct Components {
+    is_free: Vec<bool>,
+    hidden: RayBatch,
+    hidden_of: Vec<u32>,
+    is_hidden: Vec<bool>,
+    sums: Vec<f32>,
+    /// Systems that were to be solved.
+    pub systems: u64,
+    /// Those without solution, whose estimates are those of MIS.
+    pub ill_conditioned: u64,
+    /// Rays traced among emitters to find out what hides behind one.
+    pub emitter_rays: u64,
+}
+
+/// Both halves of every point's samples, as points with random numbers of their own, one after the other.
+pub(super) fn halves<'a>(points: &[ShadePoint<'a>]) -> Vec<ShadePoint<'a>> {
+    let half = |point: &ShadePoint<'a>, h: u32| {
+        let samples = (point.split.samples + 1 - h) / 2;
+        let split = Split { samples, proposals: samples };
+        ShadePoint { split, stream: point.stream.domain(HALF + h), ..*point }
+    };
+    points.iter().flat_map(|p| [half(p, 0), half(p, 1)]).collect()
+}
+
+impl Components {
+    /// The estimates of all points from their traced candidates; `out[i]` belongs to `points[i]`, or to both halves of a point,
+    /// `points[2i]` and `points[2i + 1]`, where the form has halves.
+    pub(super) fn resolve(
+        &mut self,
+        world: &World,
+        settings: &IntegratorSettings,
+        points: &[ShadePoint<'_>],
+        (candidates, contributions, segments): (&mut Candidates, &[Rgb], &Segments),
+        fits: &mut Fits,
+        out: &mut [Rgb],
+    ) {
+        (self.systems, self.ill_conditioned) = (0, 0);
+        self.find_hidden(world, candidates, contributions, segments);
+        let equations = NormalEquations::new(world.components());
+        let method = Method::new(settings);
+        self.gather(equations, method, candidates, contributions);
+
+        let len = equations.len();
+        let sums = |i: usize| &self.sums[i * len..][..len];
+        let known = |estimate| Outcome { estimate, ill_conditioned: 0 };
+        for (i, out) in out.iter_mut().enumerate() {
+            let integrals = || &candidates.mixtures[i].integrals;
+            let outcome = match method {
+                Method::Ocv(Form::Progressive) | Method::Optimal(OptimalForm::Progressive) if fits.is_empty() => {
+                    known(equations.mean(sums(i)))
+                }
+                Method::Ocv(Form::Progressive) => known(equations.estimate(sums(i), fits.beta(points[i].fit))),
+                Method::Optimal(OptimalForm::Progressive) => {
+                    known(optimal_mis::estimate(equations, sums(i), integrals(), fits.beta(points[i].fit)))
+                }
+                Method::Optimal(OptimalForm::Direct) => optimal_mis::direct(equations, sums(i), integrals()),
+                Method::Ocv(Form::Crossfit) => {
+                    ocv::crossfit(equations, [sums(2 * i), sums(2 * i + 1)], Penalty::default())
+                }
+                Method::Ocv(Form::Regression) => ocv::regression(equations, sums(i), Penalty::SAME_SAMPLES),
+                Method::Ocv(Form::Paper) => {
+                    let present = integrals().map(|integral| if integral > 0.0 { 1.0 } else { 0.0 });
+                    ocv::paper(equations, sums(i), &present, PAPER_LAMBDA)
+                }
+            };
+            if !fits.is_empty() {
+                fits.add(points[i].fit, sums(i));
+            }
+            self.systems += match method {
+                Method::Ocv(Form::Progressive) | Method::Optimal(OptimalForm::Progressive) => 0,
+                Method::Ocv(Form::Regression | Form::Paper) | Method::Optimal(OptimalForm::Direct) => 1,
+                Method::Ocv(Form::Crossfit) => 2,
+            };
+            self.ill_conditioned += u64::from(outcome.ill_conditioned);
+            let [r, g, b] = outcome.estimate;
+            *out = Rgb::new(r, g, b);
+        }
+    }
+
+    /// Finds which samples are free, and takes the density of BSDF sampling from those that an emitter hides.
+    fn find_hidden(&mut self, world: &World, candidates: &mut Candidates, contributions: &[Rgb], segments: &Segments) {
+        self.is_free.clear();
+        self.hidden.clear();
+        self.hidden_of.clear();
+        let mut occluded = segments.occluded().iter();
+        for (i, (c, contribution)) in candidates.records.iter().zip(contributions).enumerate() {
+            let is_free = is_traced(contribution) && occluded.next() == Some(&false);
+            self.is_free.push(is_free);
+            if !is_free && c.drawn == Drawn::Light && c.p_bsdf > 0.0 && world.emitters_hide() {
+                self.hidden.push(&c.segment);
+                self.hidden_of.push(i as u32);
+            }
+        }
+        self.emitter_rays = self.hidden.len() as u64;
+        world.occluded_by_emitters(&self.hidden, &mut self.is_hidden);
+        for (&i, _) in self.hidden_of.iter().zip(&self.is_hidden).filter(|(_, is_hidden)| **is_hidden) {
+            let c = &mut candidates.records[i as usize];
+            (c.p_bsdf, c.p_lobe) = (0.0, 0.0);
+        }
+    }
+
+    /// Sums of the normal equations of each point.
+    fn gather(&mut self, equations: NormalEquations, method: Method, candidates: &Candidates, contributions: &[Rgb]) {
+        let (m, len) = (equations.components(), equations.len());
+        self.sums.clear();
+        self.sums.resize(candidates.mixtures.len() * len, 0.0);
+        for ((c, contribution), &is_free) in candidates.records.iter().zip(contributions).zip(&self.is_free) {
+            let mixture = &candidates.mixtures[c.point as usize];
+            let y = if is_free { *contribution * mixture.samples() } else { Rgb::BLACK };
+            let columns = method.columns(mixture.columns(c).unwrap_or_default(), &mixture.integrals);
+            equations.add(&mut self.sums[c.point as usize * len..][..len], &columns[..m], y.to_array());
+        }
+        for (mixture, sums) in candidates.mixtures.iter().zip(self.sums.chunks_mut(len)) {
+            for (component, &count) in mixture.dark[..m].iter().enumerate().filter(|(_, count)| **count > 0) {
+                let mut columns = Columns::default();
+                columns[component] = mixture.dark_column(component);
+                let columns = method.columns(columns, &mixture.integrals);
+                (0..count).for_each(|_| equations.add(sums, &columns[..m], [0.0; 3]));
+            }
+            let columns = method.columns(Columns::default(), &mixture.integrals);
+            (0..mixture.void).for_each(|_| equations.add(sums, &columns[..m], [0.0; 3]));
+        }
+    }
+}
