@@ -1,7 +1,7 @@
 //! Bias and variance of optimizing control variates on integrals of known value: the tables of
 //! `docs/measurements/ocv/README.md`.
 //!
-//! `cargo run --release --example ocv_tables`
+//! `cargo run --release --example ocv_tables -- [forms|first|later|shared]`
 #![allow(clippy::print_stdout)]
 
 #[allow(dead_code)]
@@ -15,10 +15,14 @@ use lumiris::math::hash::HashStream;
 use mixtures::{Mixture, PROPER, Sampler};
 
 fn main() {
-    forms();
-    first_passes();
-    later_passes();
-    shared_sums();
+    let parts: [(&str, fn()); 4] =
+        [("forms", forms), ("first", first_passes), ("later", later_passes), ("shared", shared_sums)];
+    let wanted = std::env::args().nth(1);
+    for (name, part) in parts {
+        if wanted.as_deref().is_none_or(|w| w == name) {
+            part();
+        }
+    }
 }
 
 /// Moments of several estimates from each of `runs`, of their first channel.

@@ -229,13 +229,13 @@ impl<S: Simd> Factors<S> {
         let mut x = *b;
         for j in 0..m {
             for k in 0..j {
-                x[j] = x[j] - self.l[j][k] * x[k];
+                x[j] -= self.l[j][k] * x[k];
             }
         }
         for j in (0..m).rev() {
-            x[j] = x[j] * self.per_d[j];
+            x[j] *= self.per_d[j];
             for i in j + 1..m {
-                x[j] = x[j] - self.l[i][j] * x[i];
+                x[j] -= self.l[i][j] * x[i];
             }
         }
         x
@@ -252,7 +252,7 @@ impl<S: Simd> Factors<S> {
             v[c] = one;
             for j in c..m {
                 for k in c..j {
-                    v[j] = v[j] - self.l[j][k] * v[k];
+                    v[j] -= self.l[j][k] * v[k];
                 }
                 trace += v[j] * v[j] * self.per_d[j];
             }
