@@ -2,22 +2,64 @@
 //!
 //! After T2, the samples of a point become sums of normal equations in the columns c_j = h_j/p_α − I_j, whose expectation
 //! is 0, and in y = f·V/p_α. The estimate is ȳ − Σ_j β_j c̄_j [Fan et al. 2006, Eq. 7]; forms differ in what β is fitted to.
+//! `optimal-mis` has its systems in the columns r_j = h_j/p_α, and the form of the paper in r_j/I_j.
 
 use super::ShadePoint;
-use super::mixture::Mixture;
+use super::mixture::Columns;
 use super::propose::{Candidates, Drawn};
 use super::visibility::{Segments, is_traced};
 use crate::accel::RayBatch;
-use crate::estimators::ocv::forms::{Outcome, PAPER_LAMBDA};
-use crate::estimators::ocv::{self, Form, MAX_COMPONENTS, NormalEquations, Penalty};
+use crate::estimators::ocv::forms::PAPER_LAMBDA;
+use crate::estimators::ocv::{Form, NormalEquations, Penalty};
+use crate::estimators::optimal_mis;
 use crate::math::Rgb;
 use crate::scene::{EstimatorKind, IntegratorSettings, OptimalForm, Split, World};
+use crate::simd;
+use crate::simd::ocv::{Matrix, System};
 
 /// Domain below the stream of a shading point: half h of its samples uses `HALF + h`.
 const HALF: u32 = 32;
 
-/// Penalty of `optimal-mis`, which is none but for what keeps the system of a light that is hardly ever chosen regular.
-const OPTIMAL_PENALTY: Penalty = Penalty { ridge: 0.01, ..Penalty::NONE };
+/// What columns a system is of, and how it is solved.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+enum Method {
+    /// c_j = r_j − I_j.
+    Ocv(Form),
+    /// r_j.
+    Optimal(OptimalForm),
+}
+
+impl Method {
+    fn new(settings: &IntegratorSettings) -> Self {
+        match settings.estimator {
+            EstimatorKind::OptimalMis => Method::Optimal(settings.optimal_mis),
+            EstimatorKind::Mc
+            | EstimatorKind::Mis
+            | EstimatorKind::Ris
+            | EstimatorKind::Ocv
+            | EstimatorKind::Correlated => Method::Ocv(settings.ocv.form),
+        }
+    }
+
+    /// The systems that are solved for each point, or each half of one.
+    fn matrix(self) -> Option<(Matrix, Penalty)> {
+        match self {
+            Method::Ocv(Form::Paper) => Some((Matrix::Intercept, Penalty { ridge: PAPER_LAMBDA, ..Penalty::NONE })),
+            Method::Ocv(Form::Regression) => Some((Matrix::SampleMeans, Penalty::SAME_SAMPLES)),
+            Method::Ocv(Form::Crossfit) => Some((Matrix::KnownMeans, Penalty::default())),
+            Method::Ocv(Form::Progressive) | Method::Optimal(_) => None,
+        }
+    }
+
+    /// Makes sums of the method's columns of those of r_j.
+    fn finish(self, equations: NormalEquations, sums: &mut [f32], integrals: &Columns) {
+        match self {
+            Method::Ocv(Form::Paper) => equations.scale(sums, &integrals.map(|i| if i > 0.0 { 1.0 / i } else { 1.0 })),
+            Method::Optimal(_) => {}
+            Method::Ocv(Form::Progressive | Form::Regression | Form::Crossfit) => equations.centre(sums, integrals),
+        }
+    }
+}
 
 /// Fits that estimates take part in: sums so far, and coefficients for those to come.
 ///
@@ -26,15 +68,14 @@ const OPTIMAL_PENALTY: Penalty = Penalty { ridge: 0.01, ..Penalty::NONE };
 #[derive(Clone, Debug)]
 pub struct Fits {
     equations: NormalEquations,
-    penalty: Penalty,
+    is_optimal: bool,
     sums: Vec<f32>,
     beta: Vec<f32>,
 }
 
 impl Default for Fits {
     fn default() -> Self {
-        let (equations, penalty) = (NormalEquations::new(0), Penalty::default());
-        Fits { equations, penalty, sums: Vec::new(), beta: Vec::new() }
+        Fits { equations: NormalEquations::new(0), is_optimal: false, sums: Vec::new(), beta: Vec::new() }
     }
 }
 
@@ -45,12 +86,11 @@ impl Fits {
             return Fits::default();
         }
         let equations = NormalEquations::new(world.components());
-        let penalty = penalty(settings);
         Fits {
             equations,
-            penalty,
+            is_optimal: settings.estimator == EstimatorKind::OptimalMis,
             sums: vec![0.0; count * equations.len()],
-            beta: vec![0.0; count * 3 * equations.components()],
+            beta: vec![0.0; count * equations.coefficients()],
         }
     }
 
@@ -61,13 +101,18 @@ impl Fits {
 
     /// Begins a block. Returns the number of fits whose system has no solution; their estimates are those of MIS.
     pub fn solve(&mut self) -> u64 {
-        let betas = self.beta.chunks_mut((3 * self.equations.components()).max(1));
-        let fits = self.sums.chunks(self.equations.len().max(1)).zip(betas);
-        fits.map(|(sums, beta)| u64::from(self.equations.solve(sums, self.penalty, beta).is_err())).sum()
+        if !self.is_optimal {
+            return solve_all(self.equations, Penalty::default(), &self.sums, &mut self.beta);
+        }
+        let betas = self.beta.chunks_mut(self.equations.coefficients().max(1));
+        let fits = self.sums.chunks(self.equations.len()).zip(betas);
+        // Pixels that met no surface have nothing to solve
+        let lit = fits.filter(|(sums, _)| self.equations.samples(sums) > 0.0);
+        lit.map(|(sums, beta)| u64::from(optimal_mis::coefficients(self.equations, sums, beta).is_err())).sum()
     }
 
     fn beta(&self, fit: u32) -> &[f32] {
-        let len = 3 * self.equations.components();
+        let len = self.equations.coefficients();
         &self.beta[fit as usize * len..][..len]
     }
 
@@ -77,9 +122,32 @@ impl Fits {
     }
 }
 
-/// The penalty of the fits.
-fn penalty(settings: &IntegratorSettings) -> Penalty {
-    if settings.estimator == EstimatorKind::OptimalMis { OPTIMAL_PENALTY } else { Penalty::default() }
+/// Coefficients of many systems, some at a time; 0 where there is no solution. Returns how many those are.
+fn solve_all(equations: NormalEquations, penalty: Penalty, sums: &[f32], beta: &mut [f32]) -> u64 {
+    let matrix = if penalty.known_means { Matrix::KnownMeans } else { Matrix::SampleMeans };
+    solve_matrices(equations, (matrix, penalty), sums, beta)
+}
+
+fn solve_matrices(
+    equations: NormalEquations,
+    (matrix, penalty): (Matrix, Penalty),
+    sums: &[f32],
+    beta: &mut [f32],
+) -> u64 {
+    let Penalty { ridge, shrink, .. } = penalty;
+    let system = System { columns: equations.components(), matrix, ridge, shrink };
+    simd::ocv::solve(simd::level(), &system, sums, beta) as u64
+}
+
+/// β₀ + Σ β_j of the components that are there [Fan et al. 2006, Eq. 10]; the last unknown is β₀. The mean of y if there is no
+/// solution, whose coefficients are 0.
+fn paper_estimate(equations: NormalEquations, sums: &[f32], beta: &[f32], integrals: &Columns) -> [f32; 3] {
+    let last = equations.components().saturating_sub(1);
+    if beta.iter().all(|b| *b == 0.0) {
+        return equations.mean(sums);
+    }
+    let is_there = |j: usize| j == last || integrals[j] > 0.0;
+    [0, 1, 2].map(|c| (0..=last).filter(|&j| is_there(j)).map(|j| beta[3 * j + c]).sum())
 }
 
 /// The stage's buffers.
@@ -90,6 +158,7 @@ pub struct Components {
     hidden_of: Vec<u32>,
     is_hidden: Vec<bool>,
     sums: Vec<f32>,
+    beta: Vec<f32>,
     /// Systems that were to be solved.
     pub systems: u64,
     /// Those without solution, whose estimates are those of MIS.
@@ -123,41 +192,50 @@ impl Components {
         (self.systems, self.ill_conditioned) = (0, 0);
         self.find_hidden(world, candidates, contributions, segments);
         let equations = NormalEquations::new(world.components());
-        let is_paper = settings.estimator == EstimatorKind::Ocv && settings.ocv.form == Form::Paper;
-        self.gather(equations, is_paper, candidates, contributions);
+        let method = Method::new(settings);
+        self.gather(equations, method, candidates, contributions);
 
-        let form = match (settings.estimator, settings.optimal_mis) {
-            (EstimatorKind::OptimalMis, OptimalForm::Direct) => Form::Regression,
-            (EstimatorKind::OptimalMis, OptimalForm::Progressive) => Form::Progressive,
-            _ => settings.ocv.form,
-        };
-        let len = equations.len();
+        // β of the forms that have it from these samples
+        self.beta.clear();
+        if let Some(kind) = method.matrix() {
+            self.beta.resize(self.sums.len() / equations.len() * equations.coefficients(), 0.0);
+            self.ill_conditioned = solve_matrices(equations, kind, &self.sums, &mut self.beta);
+            self.systems = (self.sums.len() / equations.len()) as u64;
+        }
+
+        let (len, width) = (equations.len(), equations.coefficients());
         let sums = |i: usize| &self.sums[i * len..][..len];
+        let beta = |i: usize| &self.beta[i * width..][..width];
         for (i, out) in out.iter_mut().enumerate() {
-            let outcome = match form {
-                Form::Progressive if fits.is_empty() => {
-                    Outcome { estimate: equations.mean(sums(i)), ill_conditioned: 0 }
+            let integrals = || &candidates.mixtures[i].integrals;
+            let estimate = match method {
+                Method::Ocv(Form::Progressive) | Method::Optimal(OptimalForm::Progressive) if fits.is_empty() => {
+                    equations.mean(sums(i))
                 }
-                Form::Progressive => {
-                    let estimate = equations.estimate(sums(i), fits.beta(points[i].fit));
-                    fits.add(points[i].fit, sums(i));
-                    Outcome { estimate, ill_conditioned: 0 }
+                Method::Ocv(Form::Progressive) => equations.estimate(sums(i), fits.beta(points[i].fit)),
+                Method::Optimal(OptimalForm::Progressive) => {
+                    optimal_mis::estimate(equations, sums(i), integrals(), fits.beta(points[i].fit))
                 }
-                Form::Crossfit => ocv::crossfit(equations, [sums(2 * i), sums(2 * i + 1)], penalty(settings)),
-                Form::Regression => ocv::regression(equations, sums(i), penalty(settings)),
-                Form::Paper => {
-                    let present =
-                        candidates.mixtures[i].integrals.map(|integral| if integral > 0.0 { 1.0 } else { 0.0 });
-                    ocv::paper(equations, sums(i), &present, PAPER_LAMBDA)
+                Method::Optimal(OptimalForm::Direct) => {
+                    let outcome = optimal_mis::direct(equations, sums(i), integrals());
+                    self.systems += 1;
+                    self.ill_conditioned += u64::from(outcome.ill_conditioned);
+                    outcome.estimate
                 }
+                Method::Ocv(Form::Crossfit) => {
+                    // Each half with the coefficients of the other, by their numbers of samples
+                    let [a, b] = [2 * i, 2 * i + 1];
+                    let [of_a, of_b] = [equations.estimate(sums(a), beta(b)), equations.estimate(sums(b), beta(a))];
+                    let [n, m] = [a, b].map(|i| equations.samples(sums(i)));
+                    if n + m > 0.0 { [0, 1, 2].map(|c| (n * of_a[c] + m * of_b[c]) / (n + m)) } else { [0.0; 3] }
+                }
+                Method::Ocv(Form::Regression) => equations.estimate(sums(i), beta(i)),
+                Method::Ocv(Form::Paper) => paper_estimate(equations, sums(i), beta(i), integrals()),
             };
-            self.systems += match form {
-                Form::Progressive => 0,
-                Form::Regression | Form::Paper => 1,
-                Form::Crossfit => 2,
-            };
-            self.ill_conditioned += u64::from(outcome.ill_conditioned);
-            let [r, g, b] = outcome.estimate;
+            if !fits.is_empty() {
+                fits.add(points[i].fit, sums(i));
+            }
+            let [r, g, b] = estimate;
             *out = Rgb::new(r, g, b);
         }
     }
@@ -184,36 +262,23 @@ impl Components {
         }
     }
 
-    /// Sums of the normal equations of each point; of columns r_j/I_j that are not centred for the form of the paper.
-    fn gather(&mut self, equations: NormalEquations, is_paper: bool, candidates: &Candidates, contributions: &[Rgb]) {
+    /// Sums of the normal equations of each point.
+    fn gather(&mut self, equations: NormalEquations, method: Method, candidates: &Candidates, contributions: &[Rgb]) {
         let (m, len) = (equations.components(), equations.len());
         self.sums.clear();
         self.sums.resize(candidates.mixtures.len() * len, 0.0);
-        let finish = |mixture: &Mixture, mut columns: [f32; MAX_COMPONENTS]| {
-            for (column, integral) in columns.iter_mut().zip(mixture.integrals) {
-                if !is_paper {
-                    *column -= integral;
-                } else if integral > 0.0 {
-                    *column /= integral;
-                }
-            }
-            columns
-        };
         for ((c, contribution), &is_free) in candidates.records.iter().zip(contributions).zip(&self.is_free) {
             let mixture = &candidates.mixtures[c.point as usize];
             let y = if is_free { *contribution * mixture.samples() } else { Rgb::BLACK };
-            let columns = finish(mixture, mixture.columns(c).unwrap_or([0.0; MAX_COMPONENTS]));
-            equations.add(&mut self.sums[c.point as usize * len..][..len], &columns[..m], y.to_array());
+            let (count, columns) = mixture.columns(c);
+            equations.add_sparse(&mut self.sums[c.point as usize * len..][..len], &columns[..count], y.to_array());
         }
         for (mixture, sums) in candidates.mixtures.iter().zip(self.sums.chunks_mut(len)) {
             for (component, &count) in mixture.dark[..m].iter().enumerate().filter(|(_, count)| **count > 0) {
-                let mut columns = [0.0; MAX_COMPONENTS];
-                columns[component] = mixture.dark_column(component);
-                let columns = finish(mixture, columns);
-                (0..count).for_each(|_| equations.add(sums, &columns[..m], [0.0; 3]));
+                equations.add_zeros(sums, (component, mixture.dark_column(component)), count);
             }
-            let columns = finish(mixture, [0.0; MAX_COMPONENTS]);
-            (0..mixture.void).for_each(|_| equations.add(sums, &columns[..m], [0.0; 3]));
+            equations.add_zeros(sums, (0, 0.0), mixture.void);
+            method.finish(equations, sums, &mixture.integrals);
         }
     }
 }

@@ -8,6 +8,9 @@ pub const MAX_COMPONENTS: usize = 8;
 /// Samples after which the sums stay as they are: the count would no longer be exact in f32.
 const MOST_SAMPLES: f32 = 16_777_216.0;
 
+/// Part of Σ c² below which Σ (c − c̄)² is rounding: the column is constant and takes no part.
+const CONSTANT: f64 = 1e-6;
+
 /// A system that has no usable solution: something in it is not finite. The estimate is then that of β = 0, which is MIS.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, thiserror::Error)]
 #[error("the normal equations are ill-conditioned")]
@@ -130,28 +133,81 @@ impl NormalEquations {
             return;
         }
         sums[self.count()] += 1.0;
-        if !(columns.iter().chain(&y).all(|v| v.is_finite())) {
+        match self.m {
+            0 => accumulate::<0>(sums, columns, y),
+            1 => accumulate::<1>(sums, columns, y),
+            2 => accumulate::<2>(sums, columns, y),
+            3 => accumulate::<3>(sums, columns, y),
+            4 => accumulate::<4>(sums, columns, y),
+            5 => accumulate::<5>(sums, columns, y),
+            6 => accumulate::<6>(sums, columns, y),
+            7 => accumulate::<7>(sums, columns, y),
+            _ => accumulate::<MAX_COMPONENTS>(sums, columns, y),
+        }
+    }
+
+    /// Adds a sample whose columns are 0 but for `columns`, by their indices, which ascend; otherwise as [`add`](Self::add).
+    #[inline]
+    pub fn add_sparse(self, sums: &mut [f32], columns: &[(usize, f32)], y: [f32; 3]) {
+        if sums[self.count()] >= MOST_SAMPLES {
             return;
         }
-
-        let (products, rest) = sums.split_at_mut(self.products());
-        let (mixed, rest) = rest.split_at_mut(3 * self.m);
-        let (means, rest) = rest.split_at_mut(self.m);
-        let mut row = products;
-        for (j, &c) in columns.iter().enumerate() {
-            let (head, tail) = row.split_at_mut(j + 1);
-            for (sum, other) in head.iter_mut().zip(columns) {
-                *sum += c * other;
+        sums[self.count()] += 1.0;
+        if !(columns.iter().map(|(_, c)| c).chain(&y).all(|v| v.is_finite())) {
+            return;
+        }
+        for (place, &(j, c)) in columns.iter().enumerate() {
+            for &(k, other) in &columns[..=place] {
+                sums[j * (j + 1) / 2 + k] += c * other;
             }
-            row = tail;
-            for (sum, y) in mixed[3 * j..3 * j + 3].iter_mut().zip(y) {
+            for (sum, y) in sums[self.products() + 3 * j..][..3].iter_mut().zip(y) {
                 *sum += c * y;
             }
-            means[j] += c;
+            sums[self.columns() + j] += c;
         }
         for (i, y) in y.into_iter().enumerate() {
-            rest[i] += y;
-            rest[3 + i] += y * y;
+            sums[self.values() + i] += y;
+            sums[self.values() + 3 + i] += y * y;
+        }
+    }
+
+    /// Adds `count` samples of y = 0 whose columns are 0 but for column `j`.
+    pub fn add_zeros(self, sums: &mut [f32], (j, c): (usize, f32), count: u32) {
+        let count = (count as f32).min(MOST_SAMPLES - sums[self.count()]);
+        sums[self.count()] += count;
+        if c.is_finite() {
+            sums[j * (j + 1) / 2 + j] += count * c * c;
+            sums[self.columns() + j] += count * c;
+        }
+    }
+
+    /// Makes sums of columns s_j r_j of those of columns r_j.
+    pub fn scale(self, sums: &mut [f32], scales: &[f32]) {
+        for j in 0..self.m {
+            for k in 0..=j {
+                sums[j * (j + 1) / 2 + k] *= scales[j] * scales[k];
+            }
+            sums[self.products() + 3 * j..][..3].iter_mut().for_each(|sum| *sum *= scales[j]);
+            sums[self.columns() + j] *= scales[j];
+        }
+    }
+
+    /// Makes sums of columns r_j − I_j of those of columns r_j.
+    pub fn centre(self, sums: &mut [f32], integrals: &[f32]) {
+        let n = sums[self.count()];
+        let (rest, y) = (self.columns(), self.values());
+        for j in 0..self.m {
+            let at = integrals[j];
+            for k in 0..=j {
+                let (sum_j, sum_k) = (sums[rest + j], sums[rest + k]);
+                sums[j * (j + 1) / 2 + k] += n * at * integrals[k] - at * sum_k - integrals[k] * sum_j;
+            }
+            for i in 0..3 {
+                sums[self.products() + 3 * j + i] -= at * sums[y + i];
+            }
+        }
+        for (sum, integral) in sums[rest..rest + self.m].iter_mut().zip(integrals) {
+            *sum -= n * integral;
         }
     }
 
@@ -221,6 +277,9 @@ impl NormalEquations {
                 a[j][k] = self.sum_of_products(sums, j, k) - centre;
                 a[k][j] = a[j][k];
             }
+            if a[j][j] < CONSTANT * self.sum_of_products(sums, j, j) {
+                a[j][j] = 0.0;
+            }
             for (i, b) in b.iter_mut().enumerate() {
                 b[j] = self.sum_with_y(sums, j, i) - mean * self.sum_of_y(sums, i);
             }
@@ -239,6 +298,43 @@ impl NormalEquations {
             let control: f32 = c.iter().enumerate().map(|(j, c)| beta[3 * j + i] * c).sum();
             (y[i] - control) / n
         })
+    }
+}
+
+/// Adds a sample to all sums but the count, with loops of known length; nothing if it is not finite.
+#[inline(always)]
+fn accumulate<const M: usize>(sums: &mut [f32], columns: &[f32], y: [f32; 3]) {
+    let Some(c) = columns.first_chunk::<M>() else { return };
+    let mut probe = (y[0] + y[1] + y[2]) * 0.0;
+    for c in c {
+        probe += c * 0.0;
+    }
+    // ∞ · 0 and NaN · 0 are NaN; y whose sum overflows is of no use either.
+    if probe.is_nan() {
+        return;
+    }
+    let sums = &mut sums[..M * (M + 1) / 2 + 4 * M + 7];
+    let mut at = 0;
+    for j in 0..M {
+        for k in 0..=j {
+            sums[at] += c[j] * c[k];
+            at += 1;
+        }
+    }
+    for c in c {
+        for y in y {
+            sums[at] += c * y;
+            at += 1;
+        }
+    }
+    for c in c {
+        sums[at] += c;
+        at += 1;
+    }
+    for y in y {
+        sums[at] += y;
+        sums[at + 3] += y * y;
+        at += 1;
     }
 }
 
@@ -303,5 +399,31 @@ mod tests {
         equations.add(&mut sums, &[1e30, 1.0], [1.0; 3]);
         assert_eq!(equations.solve(&sums, Penalty::default(), &mut beta), Err(IllConditioned));
         assert_eq!(beta, [0.0; 6]);
+    }
+
+    #[test]
+    fn sparse_samples_centred_at_the_end_are_samples_added_one_by_one() {
+        let equations = NormalEquations::new(4);
+        let integrals = [0.3, 0.7, 0.25, 1e-3];
+        let (mut dense, mut sparse) = (vec![0.0; equations.len()], vec![0.0; equations.len()]);
+        let mut stream = HashStream::new([8, 8, 8]);
+        let centred = |columns: &[(usize, f32)]| {
+            let mut c = integrals.map(|i: f32| -i);
+            columns.iter().for_each(|&(j, r)| c[j] += r);
+            c
+        };
+        for i in 0..50 {
+            let [a, b] = stream.next_2d();
+            let columns = [(0, a), (1, b), (2 + i % 2, 2.0 - a - b)];
+            let y = [a + b, a * a, f32::from(u8::from(i % 3 == 0))];
+            equations.add_sparse(&mut sparse, &columns, y);
+            equations.add(&mut dense, &centred(&columns), y);
+        }
+        equations.add_zeros(&mut sparse, (2, 2.0), 7);
+        (0..7).for_each(|_| equations.add(&mut dense, &centred(&[(2, 2.0)]), [0.0; 3]));
+        equations.centre(&mut sparse, &integrals);
+        for (a, b) in dense.iter().zip(&sparse) {
+            assert!((a - b).abs() < 1e-4 * (1.0 + a.abs()), "{dense:?} {sparse:?}");
+        }
     }
 }
