@@ -224,8 +224,11 @@ mod tests {
             let [p, n] = [2.0, 1.0].map(|r| sample_uniform_sphere(stream.next_2d()) * r);
             let p = p * stream.next_f32() + Vec3::splat(0.2);
             let ctx = LightCtx { p, n, ns: n };
+            let e = f64::from(known.irradiance(set, p, n).g);
+            // A corner just above the horizon is found by few samples
+            let count = if e > 0.0 && e < 1e-3 { 400_000 } else { 4000 };
             let mut moments = Moments::default();
-            for _ in 0..4000 {
+            for _ in 0..count {
                 let sample = set.sample(&ctx, stream.next_f32(), stream.next_2d());
                 moments.add(sample.map_or(0.0, |(light, s)| {
                     let l = if set.infinite.contains(&light) {
@@ -236,9 +239,8 @@ mod tests {
                     f64::from(l.g * n.dot(s.wi).max(0.0) / s.pdf)
                 }));
             }
-            let e = known.irradiance(set, p, n);
-            moments.assert_mean(f64::from(e.g), 1e-5, 1e-4);
-            lit += u32::from(e.g > 0.0);
+            moments.assert_mean(e, 1e-5, 1e-4);
+            lit += u32::from(e > 0.0);
         }
         lit
     }
