@@ -1,0 +1,134 @@
+//! The methods that are held against each other, with stratified and with independent samples.
+
+use super::super::method::Method;
+use crate::estimators::mis::Heuristic;
+use crate::estimators::ocv::Form;
+use crate::scene::{OptimalForm, Split, Strata};
+
+/// Who takes part, in this order with stratified samples, then again with independent ones.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Role {
+    /// What all are compared with: mis with the balance heuristic.
+    Balance,
+    Power,
+    /// What the target is about.
+    Progressive,
+    Crossfit,
+    Regression,
+    Paper,
+    Optimal,
+    OptimalDirect,
+    Correlated,
+    /// `ris` in the time of the baseline.
+    Ris,
+    /// `ocv`, progressive, in the time of the baseline.
+    EqualTime,
+}
+
+/// All of them.
+pub const ROLES: [Role; 11] = [
+    Role::Balance,
+    Role::Power,
+    Role::Progressive,
+    Role::Crossfit,
+    Role::Regression,
+    Role::Paper,
+    Role::Optimal,
+    Role::OptimalDirect,
+    Role::Correlated,
+    Role::Ris,
+    Role::EqualTime,
+];
+
+/// Names of the two ways to draw samples.
+pub const WAYS: [&str; 2] = ["stratified", "independent"];
+
+/// Numbers of samples.
+#[derive(Clone, Copy, Debug)]
+pub struct Numbers {
+    /// Samples per estimate.
+    pub samples: u32,
+    /// Those of `ocv` that take as long as `mis` with the former.
+    pub equal_time: u32,
+    /// Those of `ris` that do.
+    pub ris: Split,
+}
+
+impl Role {
+    /// Name on the page.
+    pub fn name(self) -> &'static str {
+        match self {
+            Role::Balance => "mis, balance heuristic",
+            Role::Power => "mis, power heuristic",
+            Role::Progressive => "ocv, progressive",
+            Role::Crossfit => "ocv, crossfit",
+            Role::Regression => "ocv, regression",
+            Role::Paper => "ocv, paper",
+            Role::Optimal => "optimal-mis, progressive",
+            Role::OptimalDirect => "optimal-mis, direct",
+            Role::Correlated => "correlated",
+            Role::Ris => "ris in the time of mis",
+            Role::EqualTime => "ocv, progressive, in the time of mis",
+        }
+    }
+
+    /// False if the expectation may differ from the truth.
+    pub fn is_unbiased(self) -> bool {
+        match self {
+            Role::Regression | Role::Paper | Role::OptimalDirect | Role::Correlated => false,
+            Role::Balance
+            | Role::Power
+            | Role::Progressive
+            | Role::Crossfit
+            | Role::Optimal
+            | Role::Ris
+            | Role::EqualTime => true,
+        }
+    }
+
+    /// The method, stratified.
+    pub fn method(self, n: Numbers) -> Method {
+        let method = match self {
+            Role::Balance => Method::mis(n.samples).weighted(Heuristic::Balance),
+            Role::Power => Method::mis(n.samples).weighted(Heuristic::Power),
+            Role::Progressive => Method::ocv(Form::Progressive, n.samples),
+            Role::Crossfit => Method::ocv(Form::Crossfit, n.samples),
+            Role::Regression => Method::ocv(Form::Regression, n.samples),
+            Role::Paper => Method::ocv(Form::Paper, n.samples),
+            Role::Optimal => Method::optimal_mis(OptimalForm::Progressive, n.samples),
+            Role::OptimalDirect => Method::optimal_mis(OptimalForm::Direct, n.samples),
+            Role::Correlated => Method::correlated(n.samples),
+            Role::Ris => Method::ris(n.ris.proposals, n.ris.samples).strata(Strata::Systematic),
+            Role::EqualTime => Method::ocv(Form::Progressive, n.equal_time),
+        };
+        method.stratified()
+    }
+
+    /// Its place among all methods; `way` is one of [`WAYS`].
+    pub fn place(self, way: usize) -> usize {
+        way * ROLES.len() + self as usize
+    }
+}
+
+/// All methods, in the order of [`Role::place`].
+pub fn methods(n: Numbers) -> Vec<Method> {
+    let independent = |role: Role| Method { stratified: false, strata: Strata::None, ..role.method(n) };
+    ROLES.iter().map(|r| r.method(n)).chain(ROLES.iter().map(|&r| independent(r))).collect()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_role_finds_its_method() {
+        let n = Numbers { samples: 64, equal_time: 60, ris: Split { samples: 16, proposals: 99 } };
+        let all = methods(n);
+        assert_eq!(all.len(), WAYS.len() * ROLES.len());
+        for role in ROLES {
+            assert_eq!(all[role.place(0)], role.method(n));
+            let independent = all[role.place(1)];
+            assert!(!independent.stratified && independent.samples == role.method(n).samples);
+        }
+    }
+}
