@@ -86,8 +86,8 @@ pub const LONG: (u32, u32) = (16, 4);
 /// Seeds of long renderings, of antialiased pictures and of curves are those of turns from here on.
 pub const LONG_TURNS: u32 = 1_000_000;
 const ANTIALIASED_TURNS: u32 = 2_000_000;
-/// Edge of the picture on which times are found out, and the least edge.
-const PILOT_SIZE: u32 = 96;
+/// Edge of the picture on which times are found out (usual and quick), and the least edge.
+const PILOT_SIZE: [u32; 2] = [96, 48];
 const LEAST_SIZE: u32 = 32;
 /// Fewest and most turns, and those that the size of the picture is chosen for; quick ones are as few as that.
 const TURNS: [u32; 2] = [4, 32];
@@ -145,7 +145,7 @@ pub fn run(setup: &Setup<'_>, case: &Case, time: Duration) -> Result<Figure, Rep
     let path = setup.scenes.join(case.file);
 
     // As many pixels as fit
-    let pilot_size = setup.size.min(PILOT_SIZE);
+    let pilot_size = setup.size.min(PILOT_SIZE[usize::from(quick)]);
     let mut stage = Stage::load(&path, scaled(case.shape, pilot_size), setup.options.threads)?;
     let (mut numbers, mut seconds) = pilot(&mut stage, case, observer)?;
     let count = methods(numbers).len() as f64;

@@ -207,7 +207,8 @@ fn tables(o: &Outcome<'_>) -> Vec<Block> {
     for (way, name) in WAYS.iter().enumerate() {
         let mut table = Table::new(&HEADER);
         for role in ROLES {
-            table.row(method_row(role.name(), o.pair(role, way), o.errors(role, way)));
+            let name = if role.is_unbiased() { role.name().to_owned() } else { format!("{} (biased)", role.name()) };
+            table.row(method_row(&name, o.pair(role, way), o.errors(role, way)));
         }
         blocks.push(Block::Note(format!("With {name} samples:")));
         blocks.push(Block::Table(table));
