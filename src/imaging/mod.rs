@@ -1,8 +1,9 @@
-//! Pictures: pixels with named channels, their encodings, and pyramids for filtered lookups.
+//! Pictures: pixels with named channels, their encodings, pyramids for filtered lookups, and how far two are apart.
 //!
-//! Reading order: [`color`], [`mipmap`], [`oiio`].
+//! Reading order: [`color`], [`mipmap`], [`oiio`], [`metrics`].
 
 pub mod color;
+pub mod metrics;
 pub mod mipmap;
 pub mod oiio;
 
