@@ -83,9 +83,50 @@ impl Heuristic {
     }
 }
 
+/// Numbers of samples n_j of a deterministic mixture of weights `alpha`: Σ n_j = `n`, and each is as near to n α_j as whole
+/// numbers can be, but at least 1 where α_j > 0, if `n` suffices for that; else those of the largest α_j have one each.
+///
+/// The mixture is that of the weights n_j/n, which are α_j only if all n α_j are whole: densities must be weighted by what is
+/// returned here, or the estimate is biased. Equal claims are settled in favour of the earlier component.
+pub fn allot(alpha: &[f32], n: u32, counts: &mut [u32]) {
+    let counts = &mut counts[..alpha.len()];
+    counts.fill(0);
+    let total: f64 = alpha.iter().filter(|a| **a > 0.0).map(|a| f64::from(*a)).sum();
+    for _ in 0..n {
+        // Who has none comes first, by weight; then who is farthest below its share.
+        let claim = |j: usize, count: u32| match (alpha[j] > 0.0, count) {
+            (false, _) => f64::NEG_INFINITY,
+            (true, 0) => f64::from(n) + f64::from(alpha[j]) / total,
+            (true, count) => f64::from(n) * f64::from(alpha[j]) / total - f64::from(count),
+        };
+        let best = (0..alpha.len()).reduce(|b, j| if claim(j, counts[j]) > claim(b, counts[b]) { j } else { b });
+        match best {
+            Some(best) if alpha[best] > 0.0 => counts[best] += 1,
+            _ => return,
+        }
+    }
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn counts_of_a_mixture_are_its_shares_and_nobody_with_a_share_has_none() {
+        let counts = |alpha: &[f32], n| {
+            let mut counts = vec![9; alpha.len()];
+            allot(alpha, n, &mut counts);
+            counts
+        };
+        assert_eq!(counts(&[0.5, 0.25, 0.25], 8), [4, 2, 2]);
+        assert_eq!(counts(&[0.5, 0.25, 0.25], 64), [32, 16, 16]);
+        assert_eq!(counts(&[0.5, 0.25, 0.25], 3), [1, 1, 1]);
+        assert_eq!(counts(&[0.25, 0.5, 0.25], 2), [1, 1, 0]);
+        assert_eq!(counts(&[0.9, 0.05, 0.05], 10), [8, 1, 1]);
+        assert_eq!(counts(&[1.0, 0.0], 5), [5, 0]);
+        assert_eq!(counts(&[0.3, 0.2, 0.25, 0.25], 64), [19, 13, 16, 16]);
+        assert_eq!((counts(&[0.0], 4), counts(&[], 4)), (vec![0], vec![]));
+    }
 
     const ALL: [Heuristic; 3] = [Heuristic::Balance, Heuristic::Power, Heuristic::Maximum];
 

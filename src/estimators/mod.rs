@@ -6,13 +6,17 @@
 //! | [`mis`] | Σᵢ (1/nᵢ) Σⱼ wᵢ f/pᵢ, weights that sum to one | none |
 //! | [`ris`] | Σ scale·f r over N proposals drawn from M | none |
 //! | [`ocv`] | ȳ − Σ βⱼ c̄ⱼ, β fitted: optimizing control variates | by form: none where β is independent of the samples |
+//! | [`correlated`] | ȳ − λ c̄, one density, one control | O(1/N), or none with λ of other samples |
+//! | [`optimal_mis`] | Σ αⱼ + (1/N) Σ (f − Σ αⱼ pⱼ)/p_α, optimal weights | O(1/N), or none with α of other samples |
 //! | [`baselines`] | weighted importance sampling, defensive mixture, bidirectional | stated with each |
 //!
 //! [`stats`] has running moments and the tests (t, z, χ²) that hold estimators to these claims.
 
 pub mod baselines;
+pub mod correlated;
 pub mod mc;
 pub mod mis;
 pub mod ocv;
+pub mod optimal_mis;
 pub mod ris;
 pub mod stats;

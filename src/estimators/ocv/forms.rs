@@ -1,6 +1,6 @@
 //! The forms that fit β to samples of the same estimate.
 
-use super::ldlt::{self, Columns, Matrix};
+use super::ldlt::{Columns, Factors, Matrix};
 use super::normal::{IllConditioned, NormalEquations, Penalty};
 
 /// λ of equation (11) in the paper.
@@ -43,12 +43,13 @@ pub fn paper(equations: NormalEquations, sums: &[f32], integrals: &[f32], lambda
             x[j] = if j == last { equations.sum_of_y(sums, i) } else { equations.sum_with_y(sums, j, i) };
         }
     }
-    if ldlt::solve(m, &mut a, &mut x).is_err() {
-        return failed;
-    }
+    let Ok(factors) = Factors::new(m, a) else { return failed };
     let weight = |j: usize| if j == last { 1.0 } else { f64::from(integrals[j]) };
-    let estimate = x.map(|beta| (0..m).map(|j| beta[j] * weight(j)).sum::<f64>() as f32);
-    Outcome { estimate, ill_conditioned: 0 }
+    let estimate = x.map(|b| {
+        let beta = factors.solve(b);
+        (0..m).map(|j| beta[j] * weight(j)).sum::<f64>() as f32
+    });
+    if estimate.iter().all(|e| e.is_finite()) { Outcome { estimate, ill_conditioned: 0 } } else { failed }
 }
 
 /// Equation (7) with β from the same samples. Bias O(1/N).

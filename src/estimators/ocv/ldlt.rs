@@ -1,4 +1,4 @@
-//! Symmetric systems A X = B of up to [`MAX_COMPONENTS`] unknowns and three right-hand sides, by LDLᵀ with pivots.
+//! Symmetric systems of up to [`MAX_COMPONENTS`] unknowns, by LDLᵀ with pivots.
 //!
 //! The pivot is the largest remaining diagonal, relative to its original value. Where it has fallen to [`DEPENDENT`] of
 //! that, the columns that remain depend on the others as far as rounding of the sums can tell: they are dropped (their
@@ -14,57 +14,81 @@ pub type Matrix = [[f64; MAX_COMPONENTS]; MAX_COMPONENTS];
 /// Three right-hand sides or solutions.
 pub type Columns = [[f64; MAX_COMPONENTS]; 3];
 
-/// Solves A X = B in place for the leading `m` unknowns, A symmetric and not negative (both triangles are read); returns
-/// the rank. An error if a diagonal is negative or anything is not finite.
-pub fn solve(m: usize, a: &mut Matrix, x: &mut Columns) -> Result<usize, IllConditioned> {
-    let scale: [f64; MAX_COMPONENTS] = std::array::from_fn(|i| if i < m { a[i][i] } else { 0.0 });
-    if !scale.iter().all(|s| *s >= 0.0 && s.is_finite()) {
-        return Err(IllConditioned);
-    }
-
-    // Factorise, the rows in the order of their pivots; L below the diagonal, D on it.
-    let mut order: [usize; MAX_COMPONENTS] = std::array::from_fn(|i| i);
-    let relative = |a: &Matrix, i: usize| if scale[i] > 0.0 { a[i][i] / scale[i] } else { 0.0 };
-    let mut rank = 0;
-    while rank < m {
-        let best = (rank..m).fold(rank, |b, k| if relative(a, order[k]) > relative(a, order[b]) { k } else { b });
-        order.swap(rank, best);
-        let pivot = order[rank];
-        if !(relative(a, pivot) > DEPENDENT) {
-            break;
-        }
-        for k in rank + 1..m {
-            let i = order[k];
-            let factor = a[i][pivot] / a[pivot][pivot];
-            for &j in &order[rank + 1..=k] {
-                a[i][j] -= factor * a[j][pivot];
-                a[j][i] = a[i][j];
-            }
-        }
-        rank += 1;
-    }
-
-    for b in x.iter_mut() {
-        substitute(&order[..m], rank, a, b);
-    }
-    let is_finite = x.iter().all(|b| b.iter().all(|v| v.is_finite()));
-    if is_finite { Ok(rank) } else { Err(IllConditioned) }
+/// The factors of a symmetric matrix that is not negative.
+#[derive(Clone, Copy, Debug)]
+pub struct Factors {
+    /// Rows and columns in the order of their pivots.
+    order: [usize; MAX_COMPONENTS],
+    /// How many of them are not dropped.
+    rank: usize,
+    m: usize,
+    /// D on the diagonal; L D below it in the order of pivots, by original rows and columns.
+    a: Matrix,
 }
 
-/// Solves for one right-hand side with the factors of [`solve`]: column `pivot` of `a` below the diagonal holds L D.
-fn substitute(order: &[usize], rank: usize, a: &Matrix, b: &mut [f64; MAX_COMPONENTS]) {
-    for (k, &i) in order[..rank].iter().enumerate() {
-        for &j in &order[k + 1..rank] {
-            b[j] -= a[j][i] / a[i][i] * b[i];
+impl Factors {
+    /// The factors of the leading `m` rows and columns of `a`. An error if a diagonal is negative or not finite.
+    pub fn new(m: usize, mut a: Matrix) -> Result<Factors, IllConditioned> {
+        let scale: [f64; MAX_COMPONENTS] = std::array::from_fn(|i| if i < m { a[i][i] } else { 0.0 });
+        let is_finite = a[..m].iter().all(|row| row[..m].iter().all(|v| v.is_finite()));
+        if !is_finite || scale.iter().any(|s| *s < 0.0) {
+            return Err(IllConditioned);
         }
+
+        let mut order: [usize; MAX_COMPONENTS] = std::array::from_fn(|i| i);
+        let relative = |a: &Matrix, i: usize| if scale[i] > 0.0 { a[i][i] / scale[i] } else { 0.0 };
+        let mut rank = 0;
+        while rank < m {
+            let best = (rank..m).fold(rank, |b, k| if relative(&a, order[k]) > relative(&a, order[b]) { k } else { b });
+            order.swap(rank, best);
+            let pivot = order[rank];
+            if !(relative(&a, pivot) > DEPENDENT) {
+                break;
+            }
+            for k in rank + 1..m {
+                let i = order[k];
+                let factor = a[i][pivot] / a[pivot][pivot];
+                for &j in &order[rank + 1..=k] {
+                    a[i][j] -= factor * a[j][pivot];
+                    a[j][i] = a[i][j];
+                }
+            }
+            rank += 1;
+        }
+        Ok(Factors { order, rank, m, a })
     }
-    for k in (0..rank).rev() {
-        let i = order[k];
-        let below: f64 = order[k + 1..rank].iter().map(|&j| a[j][i] * b[j]).sum();
-        b[i] = (b[i] - below) / a[i][i];
+
+    /// Number of independent columns.
+    pub fn rank(&self) -> usize {
+        self.rank
     }
-    for &i in &order[rank..] {
-        b[i] = 0.0;
+
+    /// x with A x = b as far as the columns that are left can have it; 0 for those that were dropped.
+    pub fn solve(&self, mut b: [f64; MAX_COMPONENTS]) -> [f64; MAX_COMPONENTS] {
+        let (kept, a) = (&self.order[..self.rank], &self.a);
+        for (k, &i) in kept.iter().enumerate() {
+            for &j in &kept[k + 1..] {
+                b[j] -= a[j][i] / a[i][i] * b[i];
+            }
+        }
+        for (k, &i) in kept.iter().enumerate().rev() {
+            let below: f64 = kept[k + 1..].iter().map(|&j| a[j][i] * b[j]).sum();
+            b[i] = (b[i] - below) / a[i][i];
+        }
+        for &i in &self.order[self.rank..self.m] {
+            b[i] = 0.0;
+        }
+        b
+    }
+
+    /// Trace of the inverse of what is left of A.
+    pub fn inverse_trace(&self) -> f64 {
+        let diagonal = |&i: &usize| {
+            let mut unit = [0.0; MAX_COMPONENTS];
+            unit[i] = 1.0;
+            self.solve(unit)[i]
+        };
+        self.order[..self.rank].iter().map(diagonal).sum()
     }
 }
 
@@ -99,9 +123,10 @@ mod tests {
         for m in 0..=MAX_COMPONENTS {
             for rank in 0..=m {
                 let (a, b) = system(m, rank, &mut stream);
-                let (mut factors, mut x) = (a, b);
-                assert_eq!(solve(m, &mut factors, &mut x), Ok(rank), "m = {m}");
-                for (x, b) in x.iter().zip(&b) {
+                let factors = Factors::new(m, a).expect("it is not negative");
+                assert_eq!(factors.rank(), rank, "m = {m}");
+                for b in &b {
+                    let x = factors.solve(*b);
                     for i in 0..m {
                         let left: f64 = (0..m).map(|j| a[i][j] * x[j]).sum();
                         assert!((left - b[i]).abs() < 1e-6, "m = {m}, rank {rank}: {left} {}", b[i]);
@@ -112,13 +137,20 @@ mod tests {
     }
 
     #[test]
+    fn trace_of_the_inverse_is_that_of_a_diagonal_matrix() {
+        let mut a = Matrix::default();
+        (0..3).for_each(|i| a[i][i] = (i + 1) as f64);
+        let trace = Factors::new(4, a).expect("it is not negative").inverse_trace();
+        assert!((trace - (1.0 + 1.0 / 2.0 + 1.0 / 3.0)).abs() < 1e-12, "{trace}");
+    }
+
+    #[test]
     fn what_is_no_number_is_reported() {
-        let (mut a, mut b) = (Matrix::default(), Columns::default());
-        a[0][0] = f64::NAN;
-        assert_eq!(solve(1, &mut a, &mut b), Err(IllConditioned));
-        a[0][0] = -1.0;
-        assert_eq!(solve(1, &mut a, &mut b), Err(IllConditioned));
-        (a[0][0], b[2][0]) = (1.0, f64::INFINITY);
-        assert_eq!(solve(1, &mut a, &mut b), Err(IllConditioned));
+        let mut a = Matrix::default();
+        assert!(Factors::new(1, a).is_ok_and(|f| f.rank() == 0 && f.solve([1.0; MAX_COMPONENTS])[0] == 0.0));
+        for wrong in [f64::NAN, f64::INFINITY, -1.0] {
+            a[0][0] = wrong;
+            assert_eq!(Factors::new(1, a).err(), Some(IllConditioned));
+        }
     }
 }

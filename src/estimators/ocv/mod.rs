@@ -11,6 +11,9 @@
 //! estimate unbiased; the best one is that of the regression of y on the columns. There are four ways to come by it
 //! ([`Form`]), which differ in bias. Since Σ α_j c_j = 0, one column depends on the others.
 //!
+//! The densities of the columns are normalised, so that a ridge means the same for all: a component whose integral I_j over
+//! the domain is not 1 has the column p_j/(I_j p_α) − 1, and 0 where I_j = 0.
+//!
 //! In reading order:
 //!
 //! | module | what |
@@ -26,7 +29,7 @@ pub mod ldlt;
 pub mod normal;
 
 pub use block::{Block, block_of};
-pub use forms::{crossfit, paper, regression};
+pub use forms::{Outcome, crossfit, paper, regression};
 pub use normal::{IllConditioned, MAX_COMPONENTS, NormalEquations, Penalty};
 
 /// How β is found.

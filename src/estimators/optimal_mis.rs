@@ -1,0 +1,128 @@
+//! Optimal multiple importance sampling [Kondapaneni et al. 2019]: the weights of m techniques, not confined to 0..1, that
+//! have the least variance for given numbers of samples n_j.
+//!
+//! With p_α = Σ (n_j/N) p_j, r_j = p_j/p_α and y = f/p_α, all N samples estimate
+//!
+//! - the technique matrix A_jk = ∫ p_j p_k/p_α ≈ (1/N) Σ r_j r_k, and
+//! - the contribution vector b_j = ∫ f p_j/p_α ≈ (1/N) Σ r_j y.
+//!
+//! (Both are N times those of the paper, which cancels.) The coefficients solve A α = b, and the estimate that the optimal
+//! weights give is Σ_j α_j ∫p_j + (1/N) Σ (f − Σ_j α_j p_j)/p_α.
+//!
+//! - [`direct`]: α from the same samples. The second term is then 0, and the estimate Σ α_j ∫p_j. Bias O(1/N).
+//! - progressive, [`coefficients`] and [`estimate`]: α from earlier, independent samples. Unbiased.
+//!
+//! This is the regression of optimizing control variates without penalty: since Σ (n_j/N) r_j = 1, the columns r_j hold the
+//! intercept, and α_j differs from β_j there by a multiple of n_j.
+
+use super::ocv::ldlt::{Columns, Factors, Matrix};
+use super::ocv::{IllConditioned, MAX_COMPONENTS, NormalEquations, Outcome};
+
+/// α of A α = b from `sums` of columns that are **not** centred, r_j = p_j/p_α: `alpha[3 j + channel]`; all 0 on error.
+///
+/// An error if anything is not finite, or if there are no more samples than independent techniques.
+pub fn coefficients(equations: NormalEquations, sums: &[f32], alpha: &mut [f32]) -> Result<(), IllConditioned> {
+    let alpha = &mut alpha[..equations.coefficients()];
+    let result = try_coefficients(equations, sums, alpha);
+    if result.is_err() {
+        alpha.fill(0.0);
+    }
+    result
+}
+
+fn try_coefficients(equations: NormalEquations, sums: &[f32], alpha: &mut [f32]) -> Result<(), IllConditioned> {
+    let m = equations.components();
+    let (mut a, mut b) = (Matrix::default(), Columns::default());
+    for j in 0..m {
+        for k in 0..m {
+            a[j][k] = equations.sum_of_products(sums, j, k);
+        }
+        for (i, b) in b.iter_mut().enumerate() {
+            b[j] = equations.sum_with_y(sums, j, i);
+        }
+    }
+    let factors = Factors::new(m, a)?;
+    if f64::from(equations.samples(sums)) <= factors.rank() as f64 {
+        return Err(IllConditioned);
+    }
+    for (i, b) in b.into_iter().enumerate() {
+        let x = factors.solve(b);
+        for (alpha, x) in alpha.chunks_exact_mut(3).zip(x) {
+            alpha[i] = x as f32;
+        }
+    }
+    if alpha.iter().all(|a| a.is_finite()) { Ok(()) } else { Err(IllConditioned) }
+}
+
+/// Σ_j α_j I_j + (1/N) Σ (y − Σ_j α_j r_j) with the known integrals I_j = ∫p_j; 0 without samples. α = 0 is the balance
+/// heuristic.
+pub fn estimate(equations: NormalEquations, sums: &[f32], integrals: &[f32], alpha: &[f32]) -> [f32; 3] {
+    let n = f64::from(equations.samples(sums));
+    if !(n > 0.0) {
+        return [0.0; 3];
+    }
+    std::array::from_fn(|i| {
+        let control = (0..equations.components()).map(|j| {
+            let known = f64::from(integrals[j]) - equations.sum_of_column(sums, j) / n;
+            f64::from(alpha[3 * j + i]) * known
+        });
+        (equations.sum_of_y(sums, i) / n + control.sum::<f64>()) as f32
+    })
+}
+
+/// The estimate with α from the same samples; the balance heuristic if the system is ill-conditioned. Bias O(1/N).
+pub fn direct(equations: NormalEquations, sums: &[f32], integrals: &[f32]) -> Outcome {
+    let mut alpha = [0.0; 3 * MAX_COMPONENTS];
+    let result = coefficients(equations, sums, &mut alpha);
+    let estimate = estimate(equations, sums, integrals, &alpha);
+    Outcome { estimate, ill_conditioned: u32::from(result.is_err()) }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::estimators::ocv::{Penalty, regression};
+    use crate::math::hash::HashStream;
+
+    /// Samples of three techniques: sums of r_j, and of r_j − 1. Σ r_j/3 = 1.
+    fn both(n: usize) -> (NormalEquations, [Vec<f32>; 2]) {
+        let equations = NormalEquations::new(3);
+        let mut stream = HashStream::new([1, 5, 9]);
+        let mut sums = [vec![0.0; equations.len()], vec![0.0; equations.len()]];
+        for _ in 0..n {
+            let [a, b] = stream.next_2d();
+            let r = [a, b, 3.0 - a - b];
+            let y = [a * a, 1.0 + b, a * b + stream.next_f32()];
+            equations.add(&mut sums[0], &r, y);
+            equations.add(&mut sums[1], &r.map(|r| r - 1.0), y);
+        }
+        (equations, sums)
+    }
+
+    #[test]
+    fn direct_form_is_the_sum_of_coefficients_and_the_regression_without_penalty() {
+        for n in [6, 50] {
+            let (equations, [uncentred, centred]) = both(n);
+            let got = direct(equations, &uncentred, &[1.0; 3]);
+            let mut alpha = [0.0; 9];
+            coefficients(equations, &uncentred, &mut alpha).expect("there are enough samples");
+            let expected = regression(equations, &centred, Penalty::NONE).estimate;
+            for i in 0..3 {
+                let sum = alpha[i] + alpha[3 + i] + alpha[6 + i];
+                assert!(
+                    (got.estimate[i] - sum).abs() < 1e-4 && (sum - expected[i]).abs() < 1e-4,
+                    "{got:?} {expected:?}"
+                );
+            }
+        }
+    }
+
+    #[test]
+    fn without_enough_samples_it_is_the_balance_heuristic() {
+        let (equations, [uncentred, _]) = both(3);
+        let got = direct(equations, &uncentred, &[1.0; 3]);
+        assert_eq!((got.estimate, got.ill_conditioned), (equations.mean(&uncentred), 1));
+        let nothing = direct(equations, &vec![0.0; equations.len()], &[1.0; 3]);
+        assert_eq!(nothing.estimate, [0.0; 3]);
+    }
+}
