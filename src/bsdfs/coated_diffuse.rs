@@ -102,6 +102,17 @@ impl<'a> CoatedDiffuse<'a> {
         self.pdf_upper(wo, wi, self.p_interface(wo))
     }
 
+    /// Probability of sampling the interface, see [`super::Bsdf::first_lobe`].
+    pub(super) fn first_lobe(&self, wo: Vec3) -> f32 {
+        self.p_interface(if wo.z < 0.0 { -wo } else { wo })
+    }
+
+    /// Density of the interface alone, times its probability, see [`super::Bsdf::pdf_first_lobe`].
+    pub(super) fn pdf_first_lobe(&self, wo: Vec3, wi: Vec3) -> f32 {
+        let Some((wo, wi)) = super::to_upper(wo, wi) else { return 0.0 };
+        self.p_interface(wo) * self.interface.pdf_select(wo, wi, Select::Reflection)
+    }
+
     fn pdf_upper(&self, wo: Vec3, wi: Vec3, p: f32) -> f32 {
         p * self.interface.pdf_select(wo, wi, Select::Reflection) + (1.0 - p) * warp::pdf_cosine_hemisphere(wi)
     }

@@ -73,6 +73,23 @@ impl ProposalDensity {
         (wi.z > 0.0).then_some((wi * flip, lobe | Lobe::REFLECTION))
     }
 
+    /// Probability of the cosine lobe, see [`super::Bsdf::first_lobe`].
+    pub(super) fn first_lobe(self) -> f32 {
+        match self {
+            ProposalDensity::Lobes => COSINE_WEIGHT,
+            ProposalDensity::Uniform => 1.0,
+        }
+    }
+
+    /// Density of that lobe, times its probability, see [`super::Bsdf::pdf_first_lobe`].
+    pub(super) fn pdf_first_lobe(self, wo: Vec3, wi: Vec3) -> f32 {
+        match (self, super::to_upper(wo, wi)) {
+            (_, None) => 0.0,
+            (ProposalDensity::Lobes, Some((_, wi))) => COSINE_WEIGHT * warp::pdf_cosine_hemisphere(wi),
+            (ProposalDensity::Uniform, Some((_, wi))) => warp::pdf_uniform_hemisphere(wi),
+        }
+    }
+
     /// Density of [`Self::sample`] per steradian.
     #[inline]
     pub fn pdf(self, wo: Vec3, wi: Vec3) -> f32 {

@@ -21,6 +21,11 @@ impl DiffuseTransmission {
         (r + t > 0.0).then(|| r / (r + t))
     }
 
+    /// Probability of sampling reflection, see [`super::Bsdf::first_lobe`].
+    pub(super) fn first_lobe(&self) -> f32 {
+        self.p_reflect().unwrap_or(1.0)
+    }
+
     /// ρ/π or τ/π (1/sr).
     #[inline]
     pub fn f(&self, wo: Vec3, wi: Vec3) -> Rgb {

@@ -215,6 +215,18 @@ impl Layered {
         Lobes { interface: interface * scale, base: base * scale, cosine: cosine * scale }
     }
 
+    /// Probability of sampling the interface or the lobe of the base, see [`super::Bsdf::first_lobe`].
+    pub(super) fn first_lobe(&self, wo: Vec3) -> f32 {
+        let lobes = self.lobes(if wo.z < 0.0 { -wo } else { wo });
+        lobes.interface + lobes.base
+    }
+
+    /// Density of these, times their probabilities, see [`super::Bsdf::pdf_first_lobe`].
+    pub(super) fn pdf_first_lobe(&self, wo: Vec3, wi: Vec3) -> f32 {
+        let Some((wo, wi)) = super::to_upper(wo, wi) else { return 0.0 };
+        self.pdf_upper(wo, wi, &Lobes { cosine: 0.0, ..self.lobes(wo) })
+    }
+
     /// Density of the non-specular part of [`Self::sample`] per steradian.
     pub fn pdf(&self, wo: Vec3, wi: Vec3) -> f32 {
         let Some((wo, wi)) = super::to_upper(wo, wi) else { return 0.0 };

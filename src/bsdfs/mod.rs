@@ -79,6 +79,9 @@ impl Lobe {
     }
 }
 
+/// Most lobes that [`Bsdf::first_lobe`] tells apart.
+pub const MAX_LOBES: usize = 2;
+
 impl BitOr for Lobe {
     type Output = Lobe;
     #[inline]
@@ -172,6 +175,34 @@ impl Bsdf<'_> {
             Bsdf::Evaluated(b) => b.pdf(wo, wi),
         };
         if pdf.is_finite() { pdf } else { 0.0 }
+    }
+
+    /// Probability that [`Self::sample`] samples the first of at most two lobes, which it does if `uc` is less: the interface of a
+    /// coat, the reflection of a diffuse transmitter, the cosine lobe of a proposal density. 1 for BSDFs of one lobe.
+    #[inline]
+    pub fn first_lobe(&self, wo: Vec3) -> f32 {
+        match self {
+            Bsdf::DiffuseTransmission(b) => b.first_lobe(),
+            Bsdf::CoatedDiffuse(b) => b.first_lobe(wo),
+            Bsdf::Layered(b) => b.first_lobe(wo),
+            Bsdf::Evaluated(b) => b.density.first_lobe(),
+            Bsdf::Diffuse(_) | Bsdf::Conductor(_) | Bsdf::Dielectric(_) | Bsdf::ThinDielectric(_) => 1.0,
+        }
+    }
+
+    /// The part of [`Self::pdf`], whose value `pdf` is, that the first lobe contributes (1/sr).
+    #[inline]
+    pub fn pdf_first_lobe(&self, wo: Vec3, wi: Vec3, pdf: f32) -> f32 {
+        let first = match self {
+            Bsdf::Diffuse(_) | Bsdf::Conductor(_) | Bsdf::Dielectric(_) | Bsdf::ThinDielectric(_) => return pdf,
+            Bsdf::DiffuseTransmission(_) if wo.z * wi.z > 0.0 => return pdf,
+            Bsdf::DiffuseTransmission(_) => return 0.0,
+            Bsdf::CoatedDiffuse(b) => b.pdf_first_lobe(wo, wi),
+            Bsdf::Layered(b) => b.pdf_first_lobe(wo, wi),
+            Bsdf::Evaluated(b) => b.density.pdf_first_lobe(wo, wi),
+        };
+        // Not finite or, by rounding, more than the whole
+        if first > 0.0 { first.min(pdf) } else { 0.0 }
     }
 
     /// How f and pdf are evaluated for many directions at once, seen from `wo`; `None` if one by one: random walks,

@@ -2,10 +2,13 @@
 
 use crate::bsdfs::ProposalDensity;
 use crate::estimators::mis::Heuristic;
+use crate::estimators::ocv::Form;
 use crate::lights::LightSamplerKind;
 use crate::render::output::Aov;
 use crate::samplers::SamplerKind;
-use crate::scene::{AccelKind, EstimatorKind, IntegratorKind, ProposalPoints, Proposals, StageTimes, Strata, Target};
+use crate::scene::{
+    AccelKind, EstimatorKind, IntegratorKind, OptimalForm, ProposalPoints, Proposals, StageTimes, Strata, Target,
+};
 use clap::{Args, ValueEnum};
 use std::path::PathBuf;
 
@@ -41,7 +44,26 @@ choices!(
 );
 choices!(
     /// `--estimator`
-    EstimatorArg => EstimatorKind { Mc => EstimatorKind::Mc, Mis => EstimatorKind::Mis, Ris => EstimatorKind::Ris }
+    EstimatorArg => EstimatorKind {
+        Mc => EstimatorKind::Mc,
+        Mis => EstimatorKind::Mis,
+        Ris => EstimatorKind::Ris,
+        Ocv => EstimatorKind::Ocv,
+        OptimalMis => EstimatorKind::OptimalMis,
+    }
+);
+choices!(
+    /// `--ocv`
+    OcvArg => Form {
+        Progressive => Form::Progressive,
+        Crossfit => Form::Crossfit,
+        Regression => Form::Regression,
+        Paper => Form::Paper,
+    }
+);
+choices!(
+    /// `--optimal-mis`
+    OptimalMisArg => OptimalForm { Progressive => OptimalForm::Progressive, Direct => OptimalForm::Direct }
 );
 choices!(
     /// `--heuristic`
@@ -79,6 +101,7 @@ choices!(
     /// `--sampler`
     SamplerArg => SamplerKind {
         Independent => SamplerKind::Independent,
+        Stratified => SamplerKind::Stratified,
         Sobol => SamplerKind::Sobol,
         Zsobol => SamplerKind::SobolBlueNoise,
     }
@@ -133,6 +156,20 @@ pub struct SceneArgs {
     /// Nanoseconds of a proposal and of a sample, from which `auto` and `optimal` choose [default: measured on this scene]
     #[arg(long, value_name = "T1,T2", value_parser = parse_stage_times)]
     pub stage_times: Option<StageTimes>,
+    /// How ocv finds the coefficients of its control variates: from earlier samples of the pixel, from the other half of the
+    /// samples, or (biased) from the same samples [default: the file's, or progressive]
+    #[arg(long, value_name = "FORM")]
+    pub ocv: Option<OcvArg>,
+    /// How optimal-mis finds its weights: from earlier samples of the pixel, or (biased) from the same samples
+    /// [default: the file's, or progressive]
+    #[arg(long, value_name = "FORM")]
+    pub optimal_mis: Option<OptimalMisArg>,
+    /// Most components of the mixture of ocv and optimal-mis: lobes of BSDFs and groups of lights [default: the file's, or 8]
+    #[arg(long, value_name = "M", value_parser = clap::value_parser!(u32).range(2..=8))]
+    pub components: Option<u32>,
+    /// Share of the samples that the BSDF draws, for mis, ocv and optimal-mis [default: the file's, or 0.5]
+    #[arg(long, value_name = "SHARE", value_parser = parse_share)]
+    pub bsdf_share: Option<f32>,
     /// Weights of the techniques [default: the file's, or power; balance for ris]
     #[arg(long)]
     pub heuristic: Option<HeuristicArg>,
@@ -268,6 +305,13 @@ fn parse_crop(text: &str) -> Result<[f32; 4], String> {
         }
         [_, _, _, _] => Err("expected 0 <= X0 < X1 <= 1 and 0 <= Y0 < Y1 <= 1".to_owned()),
         _ => Err("expected four numbers X0,X1,Y0,Y1".to_owned()),
+    }
+}
+
+fn parse_share(text: &str) -> Result<f32, String> {
+    match text.parse::<f32>() {
+        Ok(s) if (0.0..=1.0).contains(&s) => Ok(s),
+        _ => Err("expected a number from 0 to 1".to_owned()),
     }
 }
 

@@ -141,10 +141,12 @@ fn stats(args: &RenderArgs, world: &World, rendering: &Rendering, setup: SetupTi
         "thread_seconds": {
             "camera_rays": seconds(s.camera_time), "bounce_rays": seconds(s.bounce_time), "shade": seconds(s.shade_time),
             "t1_propose": seconds(d.t1), "select_resolve": seconds(d.select), "t2_trace": seconds(d.t2),
+            "ocv_solve": seconds(d.solve),
         },
         "counts": {
             "camera_rays": s.camera_rays, "bounce_rays": s.bounce_rays, "proposals": d.proposals,
             "emitter_rays": d.emitter_rays, "shadow_segments": d.segments,
+            "ocv_systems": d.systems, "ocv_fallbacks_to_mis": d.ill_conditioned,
         },
         "rates": {
             "camera_mrays_per_second": mrays(s.camera_rays, s.camera_time),

@@ -72,6 +72,18 @@ fn apply(args: &SceneArgs, scene: &mut Scene) {
     if let Some(times) = args.stage_times {
         i.ris.stage_times = Some(times);
     }
+    if let Some(form) = args.ocv {
+        i.ocv.form = form.value();
+    }
+    if let Some(form) = args.optimal_mis {
+        i.optimal_mis = form.value();
+    }
+    if let Some(components) = args.components {
+        i.ocv.components = Some(components);
+    }
+    if let Some(share) = args.bsdf_share {
+        i.bsdf_share = share;
+    }
     if let Some(heuristic) = args.heuristic {
         i.heuristic = Some(heuristic.value());
     }

@@ -10,6 +10,8 @@
 //! * **T2** ([`visibility`]): shadow segments in packets.
 //! * **resolve**: the sum of the contributions whose segment is free.
 
+pub mod components;
+pub mod mixture;
 pub mod proposals;
 pub mod propose;
 pub mod ris;
@@ -23,6 +25,8 @@ use crate::math::ray::offset_origin;
 use crate::math::{Rgb, Vec3};
 use crate::samplers::SampleStream;
 use crate::scene::{EstimatorKind, IntegratorSettings, Split, World};
+pub use components::Fits;
+use components::{Components, halves};
 use propose::Candidates;
 use ris::Resampler;
 use std::time::{Duration, Instant};
@@ -45,6 +49,8 @@ pub struct ShadePoint<'a> {
     pub stream: SampleStream,
     /// Numbers of samples and proposals.
     pub split: Split,
+    /// The fit that the point takes part in, where there are any.
+    pub fit: u32,
 }
 
 impl ShadePoint<'_> {
@@ -80,6 +86,12 @@ pub struct DirectStats {
     pub select: Duration,
     /// Time in T2.
     pub t2: Duration,
+    /// Time in normal equations and their solutions, which is a part of `select`.
+    pub solve: Duration,
+    /// Systems that were solved, or found to have no solution.
+    pub systems: u64,
+    /// Those without solution, whose estimates are those of MIS.
+    pub ill_conditioned: u64,
 }
 
 impl DirectStats {
@@ -93,6 +105,9 @@ impl DirectStats {
         self.t1_light += other.t1_light;
         self.select += other.select;
         self.t2 += other.t2;
+        self.solve += other.solve;
+        self.systems += other.systems;
+        self.ill_conditioned += other.ill_conditioned;
     }
 }
 
@@ -101,6 +116,7 @@ impl DirectStats {
 pub struct DirectStage {
     candidates: Candidates,
     resampler: Resampler,
+    components: Components,
     contributions: Vec<Rgb>,
     segments: Segments,
     /// Counts and times so far.
@@ -118,14 +134,20 @@ impl DirectStage {
         self.segments.outcomes()
     }
 
-    /// Estimates ∫ f_s L_direct |cos θ| dω for each point; `out[i]` belongs to `points[i]`.
+    /// Estimates ∫ f_s L_direct |cos θ| dω for each point; `out[i]` belongs to `points[i]`. Estimators that are progressive use
+    /// the points' `fits` and add to them.
     pub fn estimate(
         &mut self,
         world: &World,
         settings: &IntegratorSettings,
         points: &[ShadePoint<'_>],
+        fits: &mut Fits,
         out: &mut Vec<Rgb>,
     ) {
+        let count = points.len();
+        let halves = settings.has_halves().then(|| halves(points));
+        let points = halves.as_deref().unwrap_or(points);
+
         // T1: propose candidates
         let start = Instant::now();
         self.candidates.propose(world, settings, points);
@@ -136,7 +158,7 @@ impl DirectStage {
         let proposed = Instant::now();
         let mut is_visible = false;
         match settings.estimator {
-            EstimatorKind::Mc | EstimatorKind::Mis => {
+            EstimatorKind::Mc | EstimatorKind::Mis | EstimatorKind::Ocv | EstimatorKind::OptimalMis => {
                 select::contributions(settings, &self.candidates, &mut self.contributions);
             }
             EstimatorKind::Ris => {
@@ -157,12 +179,21 @@ impl DirectStage {
             self.segments.trace(&*world.accel);
             self.stats.segments += self.segments.len() as u64;
         }
-        let traced = Instant::now();
+        let traced_at = Instant::now();
 
         // Resolve
         out.clear();
-        out.resize(points.len(), Rgb::BLACK);
-        self.segments.resolve(out);
+        out.resize(count, Rgb::BLACK);
+        if settings.estimator.has_components() {
+            let traced = (&mut self.candidates, &self.contributions[..], &self.segments);
+            self.components.resolve(world, settings, points, traced, fits, out);
+            self.stats.solve += traced_at.elapsed();
+            self.stats.systems += self.components.systems;
+            self.stats.ill_conditioned += self.components.ill_conditioned;
+            self.stats.emitter_rays += self.components.emitter_rays;
+        } else {
+            self.segments.resolve(out);
+        }
 
         self.stats.proposals += self.candidates.proposals;
         self.stats.light_proposals += self.candidates.light_proposals;
@@ -170,7 +201,7 @@ impl DirectStage {
         self.stats.segments += self.resampler.probed;
         self.stats.t1 += t1;
         self.stats.t1_light += t1_light;
-        self.stats.select += select + traced.elapsed();
-        self.stats.t2 += traced - selected;
+        self.stats.select += select + traced_at.elapsed();
+        self.stats.t2 += traced_at - selected;
     }
 }

@@ -1,9 +1,11 @@
 //! T1: candidates with their unshadowed integrand and the densities of every technique, one at a time.
 
 use super::ShadePoint;
+use super::mixture::Mixture;
 use crate::accel::{Hit, RayBatch};
 use crate::estimators::mc;
 use crate::estimators::mis::{Heuristic, Technique};
+use crate::lights::groups::MAX_GROUPS;
 use crate::lights::{LightHit, LightId, LightSample};
 use crate::math::ray::{SEGMENT_END, offset_origin};
 use crate::math::{Ray, Rgb, Vec3};
@@ -16,7 +18,14 @@ mod domain {
     pub const LIGHT: u32 = 0;
     pub const BSDF: u32 = 1;
     pub const TECHNIQUE: u32 = 2;
+    /// Where the samples of groups begin and end.
+    pub const GROUPS: u32 = 3;
+    /// Group g uses the domain `GROUP + g`.
+    pub const GROUP: u32 = 16;
 }
+
+/// Rounding of an expected number of samples that is meant to be whole.
+const COUNT_ROUNDING: f32 = 1e-3;
 
 /// Which technique drew a candidate.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -60,6 +69,10 @@ pub struct Candidate {
     pub n_light: f32,
     /// Expected number of BSDF samples of the point.
     pub n_bsdf: f32,
+    /// The part of `p_bsdf` that is the first lobe's; kept for estimators with components.
+    pub p_lobe: f32,
+    /// Group of the light; kept for estimators with components. Without meaning where `p_light` is 0.
+    pub group: u8,
     /// What must be free for the candidate to count.
     pub segment: Ray,
 }
@@ -84,6 +97,8 @@ impl Candidate {
 pub struct Candidates {
     /// Those whose integrand is not zero.
     pub records: Vec<Candidate>,
+    /// Of each point, what its samples have in common, for estimators with components.
+    pub mixtures: Vec<Mixture>,
     /// How many were drawn, zeros included.
     pub proposals: u64,
     /// How many of them were light samples.
@@ -107,6 +122,8 @@ struct PendingBsdf {
     f_cos: Rgb,
     pdf: f32,
     specular: bool,
+    /// The lobe that was sampled, of those that a mixture tells apart.
+    lobe: usize,
     shares: Shares,
 }
 
@@ -140,8 +157,11 @@ impl Shares {
         }
         match settings.estimator {
             EstimatorKind::Mc => Shares::fixed(n, u32::from(point.bsdf.bsdf.has_specular())),
-            EstimatorKind::Mis if n == 1 => Shares::one_of_both(point),
-            EstimatorKind::Mis => Shares::fixed(n.div_ceil(2), n / 2),
+            EstimatorKind::Mis | EstimatorKind::Ocv | EstimatorKind::OptimalMis if n == 1 => Shares::one_of_both(point),
+            EstimatorKind::Mis | EstimatorKind::Ocv | EstimatorKind::OptimalMis => {
+                let by_bsdf = ((n as f32 * settings.bsdf_share) as u32).clamp(1, n - 1);
+                Shares::fixed(n - by_bsdf, by_bsdf)
+            }
             EstimatorKind::Ris => super::ris::shares(point),
         }
     }
@@ -154,7 +174,9 @@ impl Candidates {
         self.records.clear();
         self.pending.clear();
         self.rays.clear();
+        self.mixtures.clear();
         (self.proposals, self.light_proposals) = (0, 0);
+        let has_components = settings.estimator.has_components();
 
         // Light samples
         let start = Instant::now();
@@ -163,6 +185,10 @@ impl Candidates {
             self.proposals += u64::from(shares.light_draws + shares.bsdf_draws);
             self.light_proposals += u64::from(shares.light_draws);
             if settings.estimator == EstimatorKind::Ris {
+                continue;
+            }
+            if has_components {
+                self.draw_groups(world, index as u32, point, &shares);
                 continue;
             }
             for i in 0..shares.light_draws {
@@ -191,17 +217,68 @@ impl Candidates {
         self.emitter_rays = self.rays.len() as u64;
         world.intersect_emitters(&self.rays, &mut self.hits, &mut self.emitter_hits);
         for (pending, hit) in self.pending.iter().zip(&self.emitter_hits) {
-            self.records.extend(bsdf_candidate(world, &points[pending.point as usize], pending, hit.as_ref()));
+            let point = &points[pending.point as usize];
+            let mut candidate = bsdf_candidate(world, point, pending, hit.as_ref());
+            if let Some(mixture) = self.mixtures.get_mut(pending.point as usize) {
+                match &mut candidate {
+                    Some(c) if pending.specular => c.p_lobe = if pending.lobe == 0 { c.p_bsdf } else { 0.0 },
+                    Some(c) => c.p_lobe = mixture.p_lobe(point, pending.wi, c.p_bsdf),
+                    None => mixture.dark[pending.lobe] += 1,
+                }
+            }
+            self.records.extend(candidate);
         }
+    }
+
+    /// Draws the light samples of a point for each group of lights by itself: of N samples as many as its probability says,
+    /// a fraction decided by one random number for all groups.
+    fn draw_groups(&mut self, world: &World, index: u32, point: &ShadePoint<'_>, shares: &Shares) {
+        let lights = &world.scene.lights;
+        let ctx = point.light_ctx();
+        let n = shares.light_draws;
+        let pmfs = if shares.n_light > 0.0 { lights.groups.pmfs(lights, &ctx) } else { [0.0; MAX_GROUPS] };
+        let mut mixture = Mixture::new(world, point, shares, &pmfs);
+
+        // Samples stand at (i + u)/N; those of a group lie between the sums of probabilities
+        let [u] = point.stream.domain(domain::GROUPS).draw::<1>();
+        let (mut first, mut sum) = (0, 0.0);
+        for (group, &pmf) in pmfs[..lights.groups.len()].iter().enumerate().filter(|(_, pmf)| **pmf > 0.0) {
+            sum += f64::from(pmf) * f64::from(n);
+            let end = ((sum - f64::from(u)).ceil() as u32).clamp(first, n);
+            // A count that does not change with u, so that samples of a pixel are points of one set
+            let count = ((pmf * n as f32 - COUNT_ROUNDING).ceil() as u32).max(end - first);
+            for i in 0..end - first {
+                let stream = point.stream.split(domain::GROUP + group as u32, count, i);
+                let [u0, u1, u_choice] = stream.draw::<3>();
+                let sample = lights.sample_group(&ctx, (group, pmf), u_choice, [u0, u1]);
+                let candidate = sample.and_then(|(light, sample)| {
+                    let c = light_candidate(world, index, point, shares, (light, sample))?;
+                    let p_lobe = mixture.p_lobe(point, sample.wi, c.p_bsdf);
+                    Some(Candidate { group: group as u8, p_lobe, ..c })
+                });
+                if candidate.is_none() {
+                    mixture.dark[mixture.component(group)] += 1;
+                }
+                self.records.extend(candidate);
+            }
+            first = end;
+        }
+        mixture.void = n - first;
+        self.mixtures.push(mixture);
     }
 
     fn draw_bsdf(&mut self, index: u32, point: &ShadePoint<'_>, shares: Shares, stream: SampleStream) {
         let [uc, u0, u1] = stream.draw::<3>();
-        let Some(sample) = point.bsdf.sample(point.wo, uc, [u0, u1]) else { return };
-        let f_cos = sample.f * sample.wi.dot(point.bsdf.frame.z).abs();
-        if f_cos.is_black() {
+        let lobe = self.mixtures.get(index as usize).map_or(0, |mixture| mixture.lobe(uc));
+        let sample = point.bsdf.sample(point.wo, uc, [u0, u1]);
+        let sample =
+            sample.map(|s| (s.f * s.wi.dot(point.bsdf.frame.z).abs(), s)).filter(|(f_cos, _)| !f_cos.is_black());
+        let Some((f_cos, sample)) = sample else {
+            if let Some(mixture) = self.mixtures.get_mut(index as usize) {
+                mixture.dark[lobe] += 1;
+            }
             return;
-        }
+        };
         let ray = Ray { o: point.origin(sample.wi), d: sample.wi, t_max: f32::INFINITY, time: point.time };
         self.rays.push(&ray);
         self.pending.push(PendingBsdf {
@@ -210,6 +287,7 @@ impl Candidates {
             f_cos,
             pdf: sample.pdf,
             specular: sample.lobe.is_specular(),
+            lobe,
             shares,
         });
     }
@@ -248,6 +326,8 @@ pub(super) fn light_candidate(
         p_bsdf,
         n_light: shares.n_light,
         n_bsdf: shares.n_bsdf,
+        p_lobe: 0.0,
+        group: 0,
         segment: light_segment(point, &sample),
     })
 }
@@ -267,7 +347,7 @@ fn bsdf_candidate(
 ) -> Option<Candidate> {
     let lights = &world.scene.lights;
     let ctx = point.light_ctx();
-    let (li, p_light, segment) = match hit {
+    let (li, p_light, group, segment) = match hit {
         Some(hit) => {
             let light = hit.light?;
             let surface =
@@ -275,11 +355,17 @@ fn bsdf_candidate(
             let light_hit = LightHit { t: hit.t, p: surface.p, n: surface.n, uv: surface.uv };
             let li = lights.lights[light as usize].l(&light_hit, -pending.wi);
             let pdf = if pending.specular { 0.0 } else { lights.pdf(&ctx, light, pending.wi, &light_hit) };
-            (li, pdf, segment(point, pending.wi, Some((surface.p, surface.p_error, surface.n))))
+            let group = lights.groups.group_of(light);
+            (li, pdf, group, segment(point, pending.wi, Some((surface.p, surface.p_error, surface.n))))
         }
         None => {
             let pdf = if pending.specular { 0.0 } else { lights.pdf_infinite(&ctx, pending.wi) };
-            (lights.le(pending.wi), pdf, segment(point, pending.wi, None))
+            (
+                lights.le(pending.wi),
+                pdf,
+                lights.infinite.iter().find_map(|&l| lights.groups.group_of(l)),
+                segment(point, pending.wi, None),
+            )
         }
     };
     let f = pending.f_cos * li;
@@ -295,6 +381,8 @@ fn bsdf_candidate(
         p_bsdf: pending.pdf,
         n_light: pending.shares.n_light,
         n_bsdf: pending.shares.n_bsdf,
+        p_lobe: 0.0,
+        group: group.unwrap_or(0) as u8,
         segment,
     })
 }

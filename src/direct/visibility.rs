@@ -4,6 +4,12 @@ use super::propose::Candidates;
 use crate::accel::{Accel, Coherence, RayBatch};
 use crate::math::{Ray, Rgb};
 
+/// True if a candidate of this contribution needs a segment: it is neither zero nor not finite.
+#[inline]
+pub(super) fn is_traced(contribution: &Rgb) -> bool {
+    !contribution.is_black() && contribution.is_finite()
+}
+
 /// Segments of the candidates that matter, with what each is worth.
 #[derive(Debug, Default)]
 pub struct Segments {
@@ -43,7 +49,7 @@ impl Segments {
     pub fn gather(&mut self, candidates: &Candidates, contributions: &[Rgb]) {
         self.clear();
         for (candidate, &contribution) in candidates.records.iter().zip(contributions) {
-            if !contribution.is_black() && contribution.is_finite() {
+            if is_traced(&contribution) {
                 self.push(&candidate.segment, candidate.point, contribution);
             }
         }

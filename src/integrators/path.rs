@@ -6,7 +6,7 @@
 
 use crate::accel::{Coherence, Hit, RayBatch};
 use crate::cameras::CameraRay;
-use crate::direct::{DirectStage, DirectStats, ShadePoint};
+use crate::direct::{DirectStage, DirectStats, Fits, ShadePoint};
 use crate::film::{Features, PixelSample};
 use crate::geometry::SurfaceHit;
 use crate::lights::LightHit;
@@ -92,8 +92,13 @@ pub struct CameraSample {
     pub weight: f32,
     /// Its random numbers.
     pub stream: SampleStream,
+    /// The random numbers of direct light, which progressive estimators draw anew for every block of samples: what they are
+    /// independent of are those of earlier blocks, wherever the path goes.
+    pub direct: SampleStream,
     /// Samples and proposals of its first vertex.
     pub split: Split,
+    /// The fit of its pixel.
+    pub fit: u32,
 }
 
 /// A path on its way.
@@ -137,12 +142,14 @@ impl PathIntegrator {
         PathStats { direct, ..std::mem::take(&mut self.stats) }
     }
 
-    /// Estimates the radiance of each camera sample; `out[i]` belongs to `samples[i]`.
+    /// Estimates the radiance of each camera sample; `out[i]` belongs to `samples[i]`. `fits` are those of the samples' pixels;
+    /// they may be none.
     pub fn trace(
         &mut self,
         world: &World,
         settings: &IntegratorSettings,
         samples: &[CameraSample],
+        fits: &mut Fits,
         out: &mut Vec<PixelSample>,
     ) {
         out.clear();
@@ -166,7 +173,9 @@ impl PathIntegrator {
             }
             let vertices = self.find_vertices(world, vertex, depth, samples, out);
             let split = match settings.estimator {
-                EstimatorKind::Mc | EstimatorKind::Mis => settings.split(),
+                EstimatorKind::Mc | EstimatorKind::Mis | EstimatorKind::Ocv | EstimatorKind::OptimalMis => {
+                    settings.split()
+                }
                 EstimatorKind::Ris => settings.split().after_bounces(vertex),
             };
             let points: Vec<ShadePoint<'_>> = vertices
@@ -174,10 +183,10 @@ impl PathIntegrator {
                 .zip(&self.active)
                 .map(|(v, path)| {
                     let split = if vertex == 0 { samples[path.sample as usize].split } else { split };
-                    v.shade_point(path.ray.time, split)
+                    v.shade_point(path.ray.time, split, samples[path.sample as usize].fit)
                 })
                 .collect();
-            self.light_points(world, settings, vertex, &points, out);
+            self.light_points(world, &settings.at_vertex(vertex), vertex, &points, fits, out);
             self.extend_paths(settings, vertex, &vertices, &points);
             std::mem::swap(&mut self.active, &mut self.next);
         }
@@ -222,8 +231,10 @@ impl PathIntegrator {
                                 .get_or_insert_with(|| found.features(world, path, &bsdf));
                         }
                         if vertex < depth {
-                            let stream = samples[path.sample as usize].stream.domain(domain::VERTEX + vertex);
-                            vertices.push(Vertex { surface: found.surface, bsdf, wo: found.wo, stream });
+                            let sample = &samples[path.sample as usize];
+                            let [stream, direct] =
+                                [sample.stream, sample.direct].map(|s| s.domain(domain::VERTEX + vertex));
+                            vertices.push(Vertex { surface: found.surface, bsdf, wo: found.wo, stream, direct });
                             kept.push(PathState { width: found.width, passed: 0, travelled: 0.0, ..*path });
                         }
                     }
@@ -267,9 +278,10 @@ impl PathIntegrator {
         settings: &IntegratorSettings,
         vertex: u32,
         points: &[ShadePoint<'_>],
+        fits: &mut Fits,
         out: &mut [PixelSample],
     ) {
-        self.direct.estimate(world, settings, points, &mut self.radiance);
+        self.direct.estimate(world, settings, points, fits, &mut self.radiance);
         if let Some(r) = &mut self.recording {
             let batches = if vertex == 0 { &mut r.segments } else { &mut r.bounce_segments };
             batches.push(self.direct.segments().clone());
@@ -311,18 +323,20 @@ struct Vertex<'w> {
     bsdf: SurfaceBsdf<'w>,
     wo: Vec3,
     stream: SampleStream,
+    direct: SampleStream,
 }
 
 impl<'w> Vertex<'w> {
-    fn shade_point(&self, time: f32, split: Split) -> ShadePoint<'w> {
+    fn shade_point(&self, time: f32, split: Split, fit: u32) -> ShadePoint<'w> {
         ShadePoint {
             p: self.surface.p,
             p_error: self.surface.p_error,
             wo: self.wo,
             bsdf: self.bsdf,
             time,
-            stream: self.stream.domain(domain::DIRECT),
+            stream: self.direct.domain(domain::DIRECT),
             split,
+            fit,
         }
     }
 }

@@ -1,10 +1,12 @@
 //! Lights: what they emit, how directions to them are sampled, and how one of many is chosen.
 //!
-//! Reading order: [`point`], [`spot`], [`area`], [`environment`], [`lanes`], [`bounds`], [`tree`], [`select`], [`set`].
+//! Reading order: [`point`], [`spot`], [`area`], [`environment`], [`lanes`], [`bounds`], [`tree`], [`select`], [`set`],
+//! [`groups`].
 
 pub mod area;
 pub mod bounds;
 pub mod environment;
+pub mod groups;
 pub mod lanes;
 pub mod point;
 pub mod select;
@@ -18,6 +20,7 @@ mod light_tests;
 pub use area::{AreaLight, AreaShape, Emission, EmissionImage, area_lights_of};
 pub use bounds::LightBounds;
 pub use environment::{EnvironmentFilter, EnvironmentMap, EnvironmentMapping};
+pub use groups::LightGroups;
 pub use lanes::LightLanes;
 pub use select::{LightChoice, LightRun, LightSampler, LightSamplerKind};
 pub use set::{LightSet, LightSetBuilder};

@@ -233,7 +233,7 @@ fn power_weights(powers: &[f32]) -> Vec<f32> {
 /// Probability of the infinite lights together: each has the share of the whole tree. All, where nothing of the tree
 /// can contribute.
 #[inline]
-fn infinite_probability(tree: &LightTree, infinite: &[LightId], ctx: &LightCtx) -> f32 {
+pub(super) fn infinite_probability(tree: &LightTree, infinite: &[LightId], ctx: &LightCtx) -> f32 {
     if infinite.is_empty() {
         return 0.0;
     }

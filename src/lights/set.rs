@@ -1,7 +1,9 @@
 //! All lights of a scene with the way one is chosen, and the map from hits to lights.
 
+use super::area::AreaShape;
 use super::{
-    Emission, Light, LightCtx, LightHit, LightId, LightSample, LightSampler, LightSamplerKind, area_lights_of,
+    Emission, Light, LightChoice, LightCtx, LightGroups, LightHit, LightId, LightSample, LightSampler,
+    LightSamplerKind, area_lights_of,
 };
 use crate::geometry::{GeometryId, Shape};
 use crate::math::{Bounds3, Rgb, Vec3};
@@ -44,7 +46,14 @@ impl LightSetBuilder {
         let has_le = |light: &Light| matches!(light, Light::InfiniteConstant { .. } | Light::InfiniteImage { .. });
         let infinite = (0..self.lights.len()).filter(|&i| has_le(&self.lights[i])).map(|i| i as LightId).collect();
         self.emitting.sort_by_key(|e| e.geometry);
-        LightSet { lights: self.lights, sampler, infinite, emitting: self.emitting, scene_radius }
+        LightSet {
+            lights: self.lights,
+            sampler,
+            groups: LightGroups::default(),
+            infinite,
+            emitting: self.emitting,
+            scene_radius,
+        }
     }
 }
 
@@ -55,6 +64,8 @@ pub struct LightSet {
     pub lights: Vec<Light>,
     /// Chooses one of them.
     pub sampler: LightSampler,
+    /// The lights as components of a mixture; none before [`set_groups`](Self::set_groups).
+    pub groups: LightGroups,
     /// Lights that rays which leave the scene see, ascending.
     pub infinite: Vec<LightId>,
     /// Sorted by geometry.
@@ -67,6 +78,36 @@ impl LightSet {
     /// Chooses lights in another way from now on.
     pub fn set_kind(&mut self, kind: LightSamplerKind) {
         self.sampler = LightSampler::new(kind, &self.lights, self.scene_radius);
+        self.groups = LightGroups::default();
+    }
+
+    /// Puts the lights into at most `most` groups.
+    pub fn set_groups(&mut self, most: usize) {
+        self.groups = LightGroups::new(self, most);
+    }
+
+    /// False if no emitter can hide a part of the lights, not even of itself, from a point that is lit by that part: as for lamps
+    /// in one ceiling. True in case of doubt.
+    pub fn may_hide_each_other(&self) -> bool {
+        if self.emitting.is_empty() {
+            return false;
+        }
+        if !self.infinite.is_empty() {
+            return true;
+        }
+        let area = || self.lights.iter().filter_map(|l| if let Light::Area(area) = l { Some(area) } else { None });
+        let all = area().fold(Bounds3::EMPTY, |b, light| b.union(light.bounds().bounds));
+        let tolerance = 1e-5 * all.diagonal().length();
+        area().any(|light| {
+            let (p, n) = match &light.shape {
+                AreaShape::Triangle(t) => (t.p[0], t.n),
+                AreaShape::Rectangle(r) => (r.corner, r.n),
+                AreaShape::Quadric(_) | AreaShape::Patch(_) => return true,
+            };
+            // The corner of the bounds that lies farthest along the normal
+            let corner = Vec3::select(n.cmpgt(Vec3::ZERO), all.max, all.min);
+            light.emission.two_sided || n.dot(corner - p) > tolerance
+        })
     }
 
     /// True if any primitive of the geometry emits.
@@ -86,7 +127,23 @@ impl LightSet {
     /// of the choice: it is per steradian, or a probability for delta lights.
     #[inline]
     pub fn sample(&self, ctx: &LightCtx, u_choice: f32, u: [f32; 2]) -> Option<(LightId, LightSample)> {
-        let choice = self.sampler.sample(ctx, u_choice)?;
+        self.sample_choice(ctx, self.sampler.sample(ctx, u_choice)?, u)
+    }
+
+    /// Samples a direction to a light of one group, whose probability is `group_pmf`; otherwise as [`sample`](Self::sample).
+    #[inline]
+    pub fn sample_group(
+        &self,
+        ctx: &LightCtx,
+        group: (usize, f32),
+        u_choice: f32,
+        u: [f32; 2],
+    ) -> Option<(LightId, LightSample)> {
+        self.sample_choice(ctx, self.groups.sample(self, ctx, group, u_choice)?, u)
+    }
+
+    #[inline]
+    fn sample_choice(&self, ctx: &LightCtx, choice: LightChoice, u: [f32; 2]) -> Option<(LightId, LightSample)> {
         let sample = self.lights[choice.light as usize].sample_li(ctx, u)?;
         let pdf = sample.pdf * choice.pmf;
         (pdf > 0.0 && pdf.is_finite()).then_some((choice.light, LightSample { pdf, ..sample }))

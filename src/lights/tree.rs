@@ -193,11 +193,12 @@ impl LightTree {
         }
     }
 
-    /// Chooses a light by `u` in [0, 1): its id, its probability, and `u` made uniform again.
+    /// Chooses a light of the subtree below a node by `u` in [0, 1): its id, its probability in that subtree, and `u` made
+    /// uniform again.
     #[inline]
-    pub fn sample(&self, ctx: &LightCtx, u: f32) -> Option<(LightId, f32, f32)> {
-        let (mut place, mut pmf, mut u) = (0, 1.0, u);
-        let mut node = self.nodes.first()?;
+    pub fn sample_below(&self, ctx: &LightCtx, place: u32, u: f32) -> Option<(LightId, f32, f32)> {
+        let (mut place, mut pmf, mut u) = (place as usize, 1.0, u);
+        let mut node = &self.nodes[place];
         while !node.is_leaf {
             let p = self.left_probability(ctx, place);
             if u < p {
@@ -256,6 +257,60 @@ impl LightTree {
                 Descent { place: place + 1, pmf: pmf * p, places: [first, split], interval: [interval[0], middle] };
             size += 2;
         }
+    }
+
+    /// At most `most` disjoint subtrees that hold all lights together, by their topmost nodes: of those so far, the one whose
+    /// lights are farthest apart, weighted by their intensity, is split next. None without lights, or if `most` is 0.
+    pub fn cut(&self, most: usize) -> Vec<u32> {
+        let mut cut: Vec<u32> = if self.is_empty() || most == 0 { Vec::new() } else { vec![0] };
+        while cut.len() < most {
+            let spread = |&place: &u32| {
+                let node = &self.nodes[place as usize];
+                if node.is_leaf { -1.0 } else { node.intensity * node.radius_squared }
+            };
+            let widest = (0..cut.len()).max_by(|&a, &b| spread(&cut[a]).total_cmp(&spread(&cut[b])));
+            let Some(widest) = widest.filter(|&i| !self.nodes[cut[i] as usize].is_leaf) else { break };
+            let place = cut[widest];
+            cut[widest] = place + 1;
+            cut.push(self.nodes[place as usize].index);
+        }
+        cut.sort_unstable();
+        cut
+    }
+
+    /// Calls `visit` with each light of the subtree below a node.
+    pub fn visit_lights(&self, place: u32, visit: &mut dyn FnMut(LightId)) {
+        let node = &self.nodes[place as usize];
+        if node.is_leaf {
+            visit(node.index);
+        } else {
+            self.visit_lights(place + 1, visit);
+            self.visit_lights(node.index, visit);
+        }
+    }
+
+    /// Probabilities by which [`sample`](Self::sample) gets into each subtree of a [`cut`](Self::cut), in its order.
+    pub fn cut_pmfs(&self, ctx: &LightCtx, cut: &[u32], pmfs: &mut [f32]) {
+        let mut stack = [(0_u32, 1.0_f32); MAX_DEPTH];
+        let mut size = usize::from(!cut.is_empty());
+        while size > 0 {
+            size -= 1;
+            let (place, pmf) = stack[size];
+            if let Ok(i) = cut.binary_search(&place) {
+                pmfs[i] = pmf;
+                continue;
+            }
+            let p = self.left_probability(ctx, place as usize);
+            stack[size] = (self.nodes[place as usize].index, pmf * (1.0 - p));
+            stack[size + 1] = (place + 1, pmf * p);
+            size += 2;
+        }
+    }
+
+    /// Chooses a light by `u` in [0, 1): its id, its probability, and `u` made uniform again.
+    #[inline]
+    pub fn sample(&self, ctx: &LightCtx, u: f32) -> Option<(LightId, f32, f32)> {
+        if self.is_empty() { None } else { self.sample_below(ctx, 0, u) }
     }
 
     /// Probability that [`sample`](Self::sample) chooses `light`.

@@ -213,6 +213,23 @@ impl MaterialSet {
         self.density = density;
     }
 
+    /// Most lobes that a BSDF of these materials has, by [`Bsdf::first_lobe`].
+    pub fn lobes(&self) -> usize {
+        let has_two = |material: &Material| match material {
+            Material::CoatedDiffuse { .. }
+            | Material::CoatedConductor { .. }
+            | Material::DiffuseTransmission { .. } => true,
+            Material::Evaluated(_) => self.density == ProposalDensity::Lobes,
+            Material::Diffuse { .. }
+            | Material::Conductor { .. }
+            | Material::Dielectric { .. }
+            | Material::ThinDielectric { .. }
+            | Material::Mix { .. }
+            | Material::Interface => false,
+        };
+        if self.entries.iter().any(|entry| has_two(&entry.material)) { 2 } else { 1 }
+    }
+
     /// The materials.
     pub fn entries(&self) -> &[MaterialEntry] {
         &self.entries

@@ -36,6 +36,18 @@ impl SurfaceBsdf<'_> {
         self.bsdf.pdf(self.frame.to_local(wo), self.frame.to_local(wi))
     }
 
+    /// Probability of sampling the first lobe, see [`Bsdf::first_lobe`].
+    #[inline]
+    pub fn first_lobe(&self, wo: Vec3) -> f32 {
+        self.bsdf.first_lobe(self.frame.to_local(wo))
+    }
+
+    /// The part of the density `pdf` that is the first lobe's, see [`Bsdf::pdf_first_lobe`].
+    #[inline]
+    pub fn pdf_first_lobe(&self, wo: Vec3, wi: Vec3, pdf: f32) -> f32 {
+        self.bsdf.pdf_first_lobe(self.frame.to_local(wo), self.frame.to_local(wi), pdf)
+    }
+
     /// [`f_cos`](Self::f_cos) and [`pdf`](Self::pdf) for many directions `wi` in world space, by component and channel;
     /// those of single calls up to rounding. All slices have the same length.
     pub fn eval_lanes(&self, wo: Vec3, wi: [&[f32]; 3], f_cos: [&mut [f32]; 3], pdf: &mut [f32]) {

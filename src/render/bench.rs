@@ -8,6 +8,7 @@ use super::{BATCH_PATHS, camera_batches};
 use crate::accel::embree::bare::{Bare, Packed};
 use crate::accel::embree::{EmbreeAccel, EmbreeError};
 use crate::accel::{Accel, AlphaSource, Coherence, RayBatch};
+use crate::direct::Fits;
 use crate::integrators::path::{CameraSample, Recording};
 use crate::integrators::{PathIntegrator, PathStats};
 use crate::math::hash::HashStream;
@@ -150,9 +151,9 @@ pub fn measure(mut world: World, settings: &BenchSettings) -> Result<Report, Emb
 fn record(world: &World, batches: &[Vec<CameraSample>]) -> Recording {
     let mut integrator = PathIntegrator::default();
     integrator.recording = Some(Recording::default());
-    let mut out = Vec::new();
+    let (mut fits, mut out) = (Fits::default(), Vec::new());
     for samples in batches {
-        integrator.trace(world, &world.scene.integrator, samples, &mut out);
+        integrator.trace(world, &world.scene.integrator, samples, &mut fits, &mut out);
     }
     integrator.recording.take().unwrap_or_default()
 }
@@ -161,10 +162,12 @@ fn record(world: &World, batches: &[Vec<CameraSample>]) -> Recording {
 fn stages(world: &World, batches: &[Vec<CameraSample>], runs: u32) -> (Vec<Stage>, Option<Proposals>) {
     let mut integrator = PathIntegrator::default();
     let mut out = Vec::new();
+    let fits = batches.iter().flatten().map(|s| s.fit + 1).max().unwrap_or(0) as usize;
+    let mut fits = Fits::new(world, &world.scene.integrator, fits);
     let mut one_run = || {
         let start = Instant::now();
         for samples in batches {
-            integrator.trace(world, &world.scene.integrator, samples, &mut out);
+            integrator.trace(world, &world.scene.integrator, samples, &mut fits, &mut out);
             black_box(&out);
         }
         (start.elapsed(), integrator.take_stats())

@@ -9,11 +9,14 @@ pub mod crosscheck;
 pub mod output;
 pub mod plan;
 
+use crate::direct::Fits;
+use crate::estimators::ocv::block_of;
 use crate::film::filter::FilterSampler;
 use crate::film::{Film, PixelBounds, PixelSample, PixelSums};
 use crate::integrators::path::CameraSample;
 use crate::integrators::{PathIntegrator, PathStats};
 use crate::math::Vec2;
+use crate::math::hash::pcg4d;
 use crate::samplers::SampleStream;
 use crate::scene::{Proposals, World};
 use rayon::prelude::*;
@@ -29,6 +32,9 @@ mod domain {
 
 /// Paths that are traced together: enough that stages run long, few enough that their data stays in the cache.
 const BATCH_PATHS: usize = 4096;
+
+/// Seed of the blocks of progressive estimators.
+const BLOCK_SEED: u32 = 0x62_6c_6f_63;
 
 /// How to render; none of it changes the picture but the sample range.
 #[derive(Clone, Copy, Debug)]
@@ -131,6 +137,7 @@ fn camera_batches(world: &World, tile_size: u32, rays: usize) -> Vec<Vec<CameraS
     let chosen = parts.iter().step_by(stride).map(|(tile, pixels)| {
         let mut samples = Vec::new();
         run.camera_samples(tile, pixels.clone(), 0..per_pixel, &mut samples);
+        samples.iter_mut().for_each(|s| s.fit -= pixels.start as u32);
         samples
     });
     chosen.collect()
@@ -140,6 +147,8 @@ fn camera_batches(world: &World, tile_size: u32, rays: usize) -> Vec<Vec<CameraS
 struct Tile {
     bounds: PixelBounds,
     sums: Vec<PixelSums>,
+    /// Those of its pixels one after the other.
+    fits: Fits,
 }
 
 struct Run<'a> {
@@ -174,10 +183,15 @@ impl<'a> Run<'a> {
 
     fn run(&self, threads: usize) -> Rendering {
         let bounds = self.world.scene.film.bounds;
+        let integrator = &self.world.scene.integrator;
         let mut tiles: Vec<Tile> = bounds
             .tiles(self.settings.tile_size)
             .into_iter()
-            .map(|bounds| Tile { bounds, sums: vec![PixelSums::default(); bounds.area()] })
+            .map(|bounds| Tile {
+                bounds,
+                sums: vec![PixelSums::default(); bounds.area()],
+                fits: Fits::new(self.world, integrator, bounds.area()),
+            })
             .collect();
 
         // Passes over all tiles: 1, 1, 2, 4, … samples, so that there is a whole picture soon
@@ -188,7 +202,12 @@ impl<'a> Run<'a> {
         let mut first = self.settings.first_sample;
         while first < end && !self.stopped() {
             let done = first - self.settings.first_sample;
-            let length = self.samples_in_time(done).min(done.clamp(1, longest));
+            let mut length = self.samples_in_time(done).min(done.clamp(1, longest));
+            if integrator.is_progressive() {
+                // A pass lies within a block
+                let block = block_of(done);
+                length = length.min(block.first + block.len - done);
+            }
             let samples = first..(first + length).min(end);
             stats.merge(&self.pass(&mut tiles, samples.clone(), noise));
             first = samples.end;
@@ -254,16 +273,32 @@ impl<'a> Run<'a> {
         let per_pixel = samples.len().max(1);
         let pixels_per_batch = (BATCH_PATHS / per_pixel).max(1);
         let bounds = tile.bounds;
+        let mut ill_conditioned = 0;
+        let settings = &self.world.scene.integrator;
+        let done = samples.start - self.settings.first_sample;
+        let start = Instant::now();
+        let begins_block = settings.is_progressive() && done > 0 && block_of(done).first == done;
+        if begins_block {
+            ill_conditioned = tile.fits.solve();
+        }
+        let solve = start.elapsed();
         let integrator = &mut worker.integrator;
         for (batch, sums) in tile.sums.chunks_mut(pixels_per_batch).enumerate() {
             let first = batch * pixels_per_batch;
             self.camera_samples(&bounds, first..first + sums.len(), samples.clone(), &mut worker.samples);
-            integrator.trace(self.world, &self.world.scene.integrator, &worker.samples, &mut worker.results);
+            integrator.trace(self.world, settings, &worker.samples, &mut tile.fits, &mut worker.results);
             for (pixel, results) in sums.iter_mut().zip(worker.results.chunks(per_pixel)) {
                 results.iter().for_each(|r| pixel.add(r));
             }
         }
-        integrator.take_stats()
+        let mut stats = integrator.take_stats();
+        if begins_block {
+            stats.direct.systems += tile.sums.len() as u64;
+            stats.direct.ill_conditioned += ill_conditioned;
+            stats.direct.solve += solve;
+            stats.direct.select += solve;
+        }
+        stats
     }
 
     /// The camera samples of some pixels of a tile, which are counted row by row.
@@ -278,12 +313,22 @@ impl<'a> Run<'a> {
         for index in pixels {
             let index = index as u32;
             let pixel = [tile.x0 + index % tile.width(), tile.y0 + index / tile.width()];
-            out.extend(samples.clone().map(|s| self.camera_sample(pixel, s)));
+            out.extend(samples.clone().map(|s| CameraSample { fit: index, ..self.camera_sample(pixel, s) }));
         }
     }
 
+    /// The direct light of a progressive estimator is drawn block by block, each with a seed of its own.
     fn camera_sample(&self, pixel: [u32; 2], sample: u32) -> CameraSample {
-        self.camera_sample_of_seed(pixel, sample, self.world.scene.sampling.seed)
+        let seed = self.world.scene.sampling.seed;
+        if !self.world.scene.integrator.is_progressive() {
+            return self.camera_sample_of_seed(pixel, sample, seed);
+        }
+        let first = self.settings.first_sample;
+        let block = block_of(sample - first);
+        let block_seed = pcg4d([seed, first, block.index, BLOCK_SEED])[0];
+        let kind = self.world.scene.sampling.sampler;
+        let direct = SampleStream::new(kind, pixel, sample - first - block.first, block_seed);
+        CameraSample { direct, ..self.camera_sample_of_seed(pixel, sample, seed) }
     }
 
     fn camera_sample_of_seed(&self, pixel: [u32; 2], sample: u32, seed: u32) -> CameraSample {
@@ -299,7 +344,14 @@ impl<'a> Run<'a> {
             Some(map) => map.split(pixel, stream.domain(domain::SPLIT).draw::<2>()),
             None => scene.integrator.split(),
         };
-        CameraSample { ray, weight: filter.weight * ray.weight * scene.film.scale, stream, split }
+        CameraSample {
+            ray,
+            weight: filter.weight * ray.weight * scene.film.scale,
+            stream,
+            direct: stream,
+            split,
+            fit: 0,
+        }
     }
 }
 

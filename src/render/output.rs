@@ -143,6 +143,17 @@ pub fn settings_metadata(scene: &Scene) -> Vec<(String, String)> {
         ]);
         entries.extend(i.ris.stage_times.map(|t| ("stage_times", format!("{},{}", t.t1, t.t2))));
     }
+    match i.estimator {
+        EstimatorKind::Mc | EstimatorKind::Ris => {}
+        EstimatorKind::Mis => entries.push(("bsdf_share", i.bsdf_share.to_string())),
+        EstimatorKind::Ocv | EstimatorKind::OptimalMis => {
+            let form = ("ocv", i.ocv.form.name().to_owned());
+            let optimal = ("optimal_mis", i.optimal_mis.name().to_owned());
+            entries.push(if i.estimator == EstimatorKind::Ocv { form } else { optimal });
+            entries.push(("components", i.ocv.most_components().to_string()));
+            entries.push(("bsdf_share", i.bsdf_share.to_string()));
+        }
+    }
     entries.into_iter().map(|(key, value)| (format!("lumiris:{key}"), value)).collect()
 }
 

@@ -10,6 +10,7 @@
 //! picture to the bit.
 
 use super::{RenderSettings, Run, ThreadError, camera_batches};
+use crate::direct::Fits;
 use crate::estimators::ris::choice::{Costs, MomentsEstimate, Variances, clamp_ratio, optimal_ratio};
 use crate::film::PixelBounds;
 use crate::integrators::PathIntegrator;
@@ -95,7 +96,7 @@ fn vertex_times(world: &World) -> Option<[[f64; 2]; 2]> {
                 settings.ris.proposals = Proposals::Fixed(split.proposals);
                 samples.clear();
                 samples.extend(batch.iter().map(|s| CameraSample { split, ..*s }));
-                integrator.trace(world, &settings, &samples, &mut out);
+                integrator.trace(world, &settings, &samples, &mut Fits::default(), &mut out);
                 let stats = integrator.take_stats();
                 let d = stats.direct;
                 let vertices = d.proposals / u64::from(split.proposals);
@@ -195,7 +196,7 @@ fn pilot_row(world: &World, row: &PixelBounds) -> Vec<MomentsEstimate> {
         samples.extend((0..PILOT_SPP).map(|s| run.camera_sample_of_seed(at, s, PILOT_SEED)));
         samples.iter_mut().for_each(|s| s.split = all);
         integrator.outcomes = Some(Vec::new());
-        integrator.trace(world, &settings, &samples, &mut out);
+        integrator.trace(world, &settings, &samples, &mut Fits::default(), &mut out);
         let outcomes = integrator.outcomes.take().unwrap_or_default();
         let m = f64::from(PILOT_PROPOSALS);
         for o in &outcomes {

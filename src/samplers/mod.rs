@@ -16,6 +16,8 @@ use openqmc::{SobolBnSampler, SobolSampler};
 pub enum SamplerKind {
     /// Independent uniform numbers.
     Independent,
+    /// The points of each sample and decision an Owen-scrambled Sobol' net by themselves, samples independent of each other.
+    Stratified,
     /// Owen-scrambled Sobol', pixels independent of each other.
     Sobol,
     /// Owen-scrambled Sobol' whose error is blue noise over the image.
@@ -25,12 +27,14 @@ pub enum SamplerKind {
 
 impl SamplerKind {
     /// All kinds, for tests and lists of options.
-    pub const ALL: [SamplerKind; 3] = [SamplerKind::Independent, SamplerKind::Sobol, SamplerKind::SobolBlueNoise];
+    pub const ALL: [SamplerKind; 4] =
+        [SamplerKind::Independent, SamplerKind::Stratified, SamplerKind::Sobol, SamplerKind::SobolBlueNoise];
 
     /// The name on the command line and in metadata.
     pub fn name(self) -> &'static str {
         match self {
             SamplerKind::Independent => "independent",
+            SamplerKind::Stratified => "stratified",
             SamplerKind::Sobol => "sobol",
             SamplerKind::SobolBlueNoise => "zsobol",
         }
@@ -60,6 +64,10 @@ impl SampleStream {
             SamplerKind::Independent => {
                 let h = pcg4d([pixel[0], pixel[1], sample, seed]);
                 Kind::Independent { key: [h[0], h[1], h[2]] }
+            }
+            SamplerKind::Stratified => {
+                let [frame, ..] = pcg4d([pixel[0], pixel[1], sample, seed]);
+                Kind::Sobol(SobolSampler::new(x, y, (frame >> 2) as i32, 0))
             }
             SamplerKind::Sobol => Kind::Sobol(SobolSampler::new(x, y, frame, index)),
             SamplerKind::SobolBlueNoise => Kind::SobolBlueNoise(SobolBnSampler::new(x, y, frame, index)),

@@ -2,6 +2,7 @@
 
 use crate::bsdfs::ProposalDensity;
 use crate::estimators::mis::Heuristic;
+use crate::estimators::ocv::{Form, MAX_COMPONENTS};
 use crate::estimators::ris::choice::Costs;
 use crate::lights::LightSamplerKind;
 
@@ -19,10 +20,17 @@ pub struct IntegratorSettings {
     pub samples: Option<u32>,
     /// Weights of the techniques; see [`Self::heuristic`].
     pub heuristic: Option<Heuristic>,
+    /// Share of the samples that is drawn by the BSDF, for the estimators that mix it with light sampling (0 to 1); each of both
+    /// has at least one sample, if there are two.
+    pub bsdf_share: f32,
     /// How a light is chosen.
     pub light_choice: LightSamplerKind,
     /// What is particular to `ris`.
     pub ris: RisSettings,
+    /// What is particular to `ocv`.
+    pub ocv: OcvSettings,
+    /// How `optimal-mis` finds its weights.
+    pub optimal_mis: OptimalForm,
     /// Directions proposed for each that continues a path (M), where the BSDF is one that can only be evaluated; 1 is
     /// plain importance sampling.
     pub bsdf_proposals: u32,
@@ -35,6 +43,8 @@ pub const DEFAULT_SAMPLES: u32 = 2;
 /// Samples per estimate of `ris` where none are asked for: what a shading point costs before its first proposal is worth more than
 /// one sample, and powers of two are well distributed.
 pub const DEFAULT_RIS_SAMPLES: u32 = 4;
+/// Samples per estimate of `ocv` and `optimal-mis` where none are asked for.
+pub const DEFAULT_OCV_SAMPLES: u32 = 4;
 
 impl Default for IntegratorSettings {
     fn default() -> Self {
@@ -44,8 +54,11 @@ impl Default for IntegratorSettings {
             estimator: EstimatorKind::Mis,
             samples: None,
             heuristic: None,
+            bsdf_share: 0.5,
             light_choice: LightSamplerKind::Tree,
             ris: RisSettings::default(),
+            ocv: OcvSettings::default(),
+            optimal_mis: OptimalForm::Progressive,
             bsdf_proposals: 4,
             bsdf_density: ProposalDensity::Lobes,
         }
@@ -66,8 +79,32 @@ impl IntegratorSettings {
     pub fn heuristic(&self) -> Heuristic {
         self.heuristic.unwrap_or(match self.estimator {
             EstimatorKind::Mc | EstimatorKind::Mis => Heuristic::Power,
-            EstimatorKind::Ris => Heuristic::Balance,
+            EstimatorKind::Ris | EstimatorKind::Ocv | EstimatorKind::OptimalMis => Heuristic::Balance,
         })
+    }
+
+    /// True if an estimate uses coefficients that were fitted to earlier samples of its pixel.
+    pub fn is_progressive(&self) -> bool {
+        match self.estimator {
+            EstimatorKind::Mc | EstimatorKind::Mis | EstimatorKind::Ris => false,
+            EstimatorKind::Ocv => self.ocv.form == Form::Progressive,
+            EstimatorKind::OptimalMis => self.optimal_mis == OptimalForm::Progressive,
+        }
+    }
+
+    /// Settings of direct light at the vertex of a path, which are counted from 0. What is fitted to earlier samples of a pixel is
+    /// fitted to first vertices, which lie together; at later ones, which lie anywhere, estimates are those of `mis`.
+    #[must_use]
+    pub fn at_vertex(&self, vertex: u32) -> IntegratorSettings {
+        if vertex == 0 || !self.is_progressive() {
+            return *self;
+        }
+        IntegratorSettings { estimator: EstimatorKind::Mis, samples: Some(self.split().samples), ..*self }
+    }
+
+    /// True if an estimate is made of two independent halves.
+    pub fn has_halves(&self) -> bool {
+        self.estimator == EstimatorKind::Ocv && self.ocv.form == Form::Crossfit
     }
 
     /// Samples and proposals of every estimate where they are not chosen per pixel.
@@ -75,10 +112,13 @@ impl IntegratorSettings {
         let default = match self.estimator {
             EstimatorKind::Mc | EstimatorKind::Mis => DEFAULT_SAMPLES,
             EstimatorKind::Ris => DEFAULT_RIS_SAMPLES,
+            EstimatorKind::Ocv | EstimatorKind::OptimalMis => DEFAULT_OCV_SAMPLES,
         };
         let samples = self.samples.unwrap_or(default).max(1);
         match self.estimator {
-            EstimatorKind::Mc | EstimatorKind::Mis => Split { samples, proposals: samples },
+            EstimatorKind::Mc | EstimatorKind::Mis | EstimatorKind::Ocv | EstimatorKind::OptimalMis => {
+                Split { samples, proposals: samples }
+            }
             EstimatorKind::Ris => {
                 let proposals = match self.ris.proposals {
                     Proposals::Fixed(m) => m,
@@ -118,6 +158,10 @@ pub enum EstimatorKind {
     Mis,
     /// Resampled importance sampling: few of many proposals are traced [Talbot et al. 2005].
     Ris,
+    /// Optimizing control variates: a mixture of the sampling densities, fitted to the integrand [Fan et al. 2006].
+    Ocv,
+    /// Optimal weights of multiple importance sampling [Kondapaneni et al. 2019].
+    OptimalMis,
 }
 
 impl EstimatorKind {
@@ -127,6 +171,52 @@ impl EstimatorKind {
             EstimatorKind::Mc => "mc",
             EstimatorKind::Mis => "mis",
             EstimatorKind::Ris => "ris",
+            EstimatorKind::Ocv => "ocv",
+            EstimatorKind::OptimalMis => "optimal-mis",
+        }
+    }
+
+    /// True if samples are drawn for each group of lights by itself, and are measured against the density of each component of
+    /// the mixture.
+    pub fn has_components(self) -> bool {
+        match self {
+            EstimatorKind::Mc | EstimatorKind::Mis | EstimatorKind::Ris => false,
+            EstimatorKind::Ocv | EstimatorKind::OptimalMis => true,
+        }
+    }
+}
+
+/// Optimizing control variates [Fan et al. 2006].
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct OcvSettings {
+    /// How the coefficients are found.
+    pub form: Form,
+    /// Most components of the mixture: lobes of BSDFs and groups of lights; `None` is as many as there can be.
+    pub components: Option<u32>,
+}
+
+impl OcvSettings {
+    /// Most components.
+    pub fn most_components(&self) -> usize {
+        self.components.map_or(MAX_COMPONENTS, |c| (c as usize).clamp(2, MAX_COMPONENTS))
+    }
+}
+
+/// How `optimal-mis` finds its weights.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum OptimalForm {
+    /// From the samples of the estimate. Biased.
+    Direct,
+    /// From earlier samples of the pixel.
+    Progressive,
+}
+
+impl OptimalForm {
+    /// The name on the command line and in metadata.
+    pub fn name(self) -> &'static str {
+        match self {
+            OptimalForm::Direct => "direct",
+            OptimalForm::Progressive => "progressive",
         }
     }
 }

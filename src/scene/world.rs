@@ -44,6 +44,9 @@ pub struct World {
     /// Emitters only; geometry ids are indices into `emitter_geometry`.
     emitters: Option<Box<dyn Accel>>,
     emitter_geometry: Vec<GeometryId>,
+    /// False if no emitter can hide another.
+    emitters_hide: bool,
+    lobes: usize,
 }
 
 /// The emitter that a ray meets first among emitters.
@@ -83,7 +86,9 @@ fn build(
 impl World {
     /// Builds the ray tracers. `packet_width` overrides the device's native width (1, 4 or 8); pictures do
     /// not depend on it.
-    pub fn new(scene: Scene, kind: AccelKind, packet_width: Option<u32>) -> Result<World, EmbreeError> {
+    pub fn new(mut scene: Scene, kind: AccelKind, packet_width: Option<u32>) -> Result<World, EmbreeError> {
+        let lobes = scene.materials.lobes();
+        scene.lights.set_groups(scene.integrator.ocv.most_components().saturating_sub(lobes).max(1));
         let accel = build(kind, &scene.geometry, &scene.textures, packet_width)?;
         let emitter_geometry: Vec<GeometryId> =
             scene.geometry.root.geometries.iter().copied().filter(|&g| scene.lights.emits(g)).collect();
@@ -97,7 +102,34 @@ impl World {
             };
             Some(build(kind, &Arc::new(set), &scene.textures, packet_width)?)
         };
-        Ok(World { scene, accel, splits: None, emitters, emitter_geometry })
+        let emitters_hide = scene.lights.may_hide_each_other();
+        Ok(World { scene, accel, splits: None, emitters, emitter_geometry, emitters_hide, lobes })
+    }
+
+    /// Number of components that BSDFs are in a mixture with the groups of lights: the lobes of those that have most.
+    pub fn lobes(&self) -> usize {
+        self.lobes
+    }
+
+    /// Number of components of a mixture: lobes, then groups of lights.
+    pub fn components(&self) -> usize {
+        self.lobes + self.scene.lights.groups.len()
+    }
+
+    /// True if an emitter can be in the way to another.
+    pub fn emitters_hide(&self) -> bool {
+        self.emitters_hide
+    }
+
+    /// For each segment, whether an emitter is in the way.
+    pub fn occluded_by_emitters(&self, segments: &RayBatch, out: &mut Vec<bool>) {
+        match &self.emitters {
+            Some(emitters) => emitters.occluded(segments, Coherence::Incoherent, out),
+            None => {
+                out.clear();
+                out.resize(segments.len(), false);
+            }
+        }
     }
 
     /// What each ray would meet first if only emitters were there.

@@ -9,7 +9,7 @@ use lumiris::scene::{AccelKind, EstimatorKind, Proposals, World};
 use std::path::Path;
 use std::sync::atomic::AtomicBool;
 
-const ESTIMATORS: [EstimatorKind; 2] = [EstimatorKind::Mis, EstimatorKind::Ris];
+const ESTIMATORS: [EstimatorKind; 3] = [EstimatorKind::Mis, EstimatorKind::Ris, EstimatorKind::Ocv];
 
 fn gallery(estimator: EstimatorKind, packet_width: Option<u32>) -> World {
     let path = Path::new(env!("CARGO_MANIFEST_DIR")).join("scenes/demo/gallery.pbrt");

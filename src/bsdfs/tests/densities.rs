@@ -114,3 +114,31 @@ fn the_chi_squared_test_finds_a_wrong_density() {
     let expected: Vec<f64> = expected(&|wi| b.pdf(wo, wi)).iter().map(|p| p * SAMPLES as f64).collect();
     assert!(chi_squared_test(&histogram(&|uc, u| a.sample(wo, uc, u), 5), &expected, 1e-6).rejected);
 }
+
+#[test]
+fn the_first_lobe_is_sampled_in_proportion_to_its_part_of_the_density() {
+    // Given the direction, the probability that the first lobe drew it is its part of the density
+    let tables = tables();
+    let mut of_two = 0;
+    for (i, (name, b)) in zoo(&tables).iter().enumerate() {
+        for wo in [warp::direction(0.85, 0.6), warp::direction(-0.6, 4.0)] {
+            let share = b.first_lobe(wo);
+            assert!((0.0..=1.0).contains(&share), "{name}: {share}");
+            let mut stream = HashStream::new([i as u32, 3, 7]);
+            let mut difference = crate::estimators::stats::Welford::new();
+            for _ in 0..100_000 {
+                let uc = stream.next_f32();
+                let Some(s) = raw_sample(b, wo, uc, stream.next_2d()).filter(|s| !s.lobe.is_specular()) else {
+                    continue;
+                };
+                let part = b.pdf_first_lobe(wo, s.wi, s.pdf);
+                assert!((0.0..=s.pdf).contains(&part), "{name}: {part} of {}", s.pdf);
+                difference.add(f64::from(part / s.pdf) - f64::from(u8::from(uc < share)));
+            }
+            of_two += usize::from(share > 0.0 && share < 1.0);
+            let z = crate::estimators::stats::z_test(difference.mean(), 0.0, difference.standard_error());
+            assert!(difference.mean().abs() < 1e-6 || z.p_value > 1e-5, "{name} {wo}: {difference:?}");
+        }
+    }
+    assert!(of_two >= 8, "BSDFs of two lobes are among them");
+}

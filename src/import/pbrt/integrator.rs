@@ -4,9 +4,12 @@ use super::options::{Pending, unknown};
 use super::params::{ParamSet, ParamType};
 use crate::bsdfs::ProposalDensity;
 use crate::estimators::mis::Heuristic;
+use crate::estimators::ocv::Form;
 use crate::import::diagnostic::Diagnostics;
 use crate::lights::LightSamplerKind;
-use crate::scene::{EstimatorKind, IntegratorKind, IntegratorSettings, ProposalPoints, Proposals, Strata, Target};
+use crate::scene::{
+    EstimatorKind, IntegratorKind, IntegratorSettings, OptimalForm, ProposalPoints, Proposals, Strata, Target,
+};
 
 /// Understands `Integrator`.
 pub(super) fn finish_integrator(pending: Option<&Pending>, d: &mut Diagnostics) -> IntegratorSettings {
@@ -64,9 +67,31 @@ pub(super) fn finish_integrator(pending: Option<&Pending>, d: &mut Diagnostics) 
 
 /// Parameters that are Lumiris's own, and pbrt's `lightsampler`.
 fn lumiris_parameters(s: &mut IntegratorSettings, p: &ParamSet, d: &mut Diagnostics) {
-    use EstimatorKind::{Mc, Mis, Ris};
-    if let Some(e) = choice(p, "estimator", &[Mc, Mis, Ris], EstimatorKind::name, d) {
+    use EstimatorKind::{Mc, Mis, Ocv, OptimalMis, Ris};
+    if let Some(e) = choice(p, "estimator", &[Mc, Mis, Ris, Ocv, OptimalMis], EstimatorKind::name, d) {
         s.estimator = e;
+    }
+    let forms = [Form::Progressive, Form::Crossfit, Form::Regression, Form::Paper];
+    if let Some(form) = choice(p, "ocv", &forms, Form::name, d) {
+        s.ocv.form = form;
+    }
+    if let Some(form) = choice(p, "optimalmis", &[OptimalForm::Progressive, OptimalForm::Direct], OptimalForm::name, d)
+    {
+        s.optimal_mis = form;
+    }
+    match p.integer("components", d) {
+        Some(n @ 2..=8) => s.ocv.components = Some(n as u32),
+        Some(n) => {
+            d.error(p.span_of("components"), format!("components must be from 2 to 8, not {n}"));
+        }
+        None => {}
+    }
+    match p.float("bsdfshare", d) {
+        Some(share) if (0.0..=1.0).contains(&share) => s.bsdf_share = share,
+        Some(share) => {
+            d.error(p.span_of("bsdfshare"), format!("bsdfshare must be from 0 to 1, not {share}"));
+        }
+        None => {}
     }
     let heuristics = [Heuristic::Balance, Heuristic::Power, Heuristic::Maximum];
     if let Some(h) = choice(p, "heuristic", &heuristics, Heuristic::name, d) {
@@ -175,7 +200,7 @@ mod tests {
             ("\"integer proposals\" 0", "proposals must be from 1 to 4096, not 0"),
             ("\"string strata\" \"some\"", "one of none, proposals, weights, systematic"),
             ("\"string target\" \"l\"", "one of fgl, gv, gvl"),
-            ("\"string estimator\" \"rys\"", "one of mc, mis, ris"),
+            ("\"string estimator\" \"rys\"", "one of mc, mis, ris, ocv, optimal-mis"),
         ] {
             let report = settings(&format!("Integrator \"path\" {parameter}")).unwrap_err();
             assert!(report.contains(message), "{parameter}: {report}");

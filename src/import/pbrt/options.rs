@@ -185,6 +185,7 @@ impl Options {
         let Some(Pending { name, params: p }) = &self.sampler else { return s };
         match name.text.as_str() {
             "independent" | "random" => s.sampler = SamplerKind::Independent,
+            // pbrt's stratified samples cover a pixel together, as those of a sequence do
             "sobol" | "paddedsobol" | "halton" | "pmj02bn" | "stratified" | "lowdiscrepancy" | "02sequence"
             | "maxmindist" => {
                 s.sampler = SamplerKind::Sobol;

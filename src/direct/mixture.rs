@@ -1,0 +1,109 @@
+//! The mixture of densities that a point's samples are drawn from, and what each sample says of its components.
+//!
+//! A sample is a direction together with the point on an emitter that it means, or with none. Its components are the lobes
+//! of the BSDF and the groups of lights, with densities h_j whose integrals I_j are known: the probabilities of a lobe or of
+//! a group within its technique. So p_α = (n_L/N) Σ_groups h_j + (n_B/N) Σ_lobes h_j, and the columns r_j = h_j/p_α have the
+//! expectation I_j under the mixture, exactly. For that
+//!
+//! * a light sample that another emitter hides has no density of BSDF sampling, which stops at the first emitter;
+//! * a *dark* sample, whose unshadowed integrand is zero, belongs to the component that drew it alone, as if every component had
+//!   a dark place of its own: its other densities need not be found.
+
+use super::ShadePoint;
+use super::propose::{Candidate, Shares};
+use crate::bsdfs::MAX_LOBES;
+use crate::estimators::ocv::MAX_COMPONENTS;
+use crate::lights::groups::MAX_GROUPS;
+use crate::math::Vec3;
+use crate::scene::World;
+
+/// The columns of a sample.
+pub type Columns = [f32; MAX_COMPONENTS];
+
+/// What the samples of a point have in common.
+#[derive(Clone, Copy, Debug)]
+pub struct Mixture {
+    /// I_j: lobes, then groups.
+    pub integrals: Columns,
+    /// Dark samples by the component that drew them.
+    pub dark: [u32; MAX_COMPONENTS],
+    /// Light samples for which there was no light to choose.
+    pub void: u32,
+    /// N.
+    n: f32,
+    n_light: f32,
+    n_bsdf: f32,
+    lobes: usize,
+}
+
+impl Mixture {
+    /// The mixture at a point where groups are chosen with probabilities `pmfs`.
+    pub(super) fn new(world: &World, point: &ShadePoint<'_>, shares: &Shares, pmfs: &[f32; MAX_GROUPS]) -> Self {
+        let lobes = world.lobes();
+        let mut integrals = [0.0; MAX_COMPONENTS];
+        if shares.n_bsdf > 0.0 {
+            integrals[0] = if lobes == MAX_LOBES { point.bsdf.first_lobe(point.wo) } else { 1.0 };
+            if lobes == MAX_LOBES {
+                integrals[1] = 1.0 - integrals[0];
+            }
+        }
+        if shares.n_light > 0.0 {
+            for (integral, pmf) in integrals[lobes..].iter_mut().zip(pmfs) {
+                *integral = *pmf;
+            }
+        }
+        let n = shares.n_light + shares.n_bsdf;
+        let (n_light, n_bsdf) = (shares.n_light, shares.n_bsdf);
+        Mixture { integrals, dark: [0; MAX_COMPONENTS], void: 0, n, n_light, n_bsdf, lobes }
+    }
+
+    /// The lobe that a BSDF sample of the number `uc` is drawn from.
+    #[inline]
+    pub fn lobe(&self, uc: f32) -> usize {
+        usize::from(self.lobes == MAX_LOBES && uc >= self.integrals[0])
+    }
+
+    /// Density of the first lobe in the direction `wi`, where that of all lobes is `pdf`.
+    #[inline]
+    pub(super) fn p_lobe(&self, point: &ShadePoint<'_>, wi: Vec3, pdf: f32) -> f32 {
+        if self.lobes == MAX_LOBES && pdf > 0.0 { point.bsdf.pdf_first_lobe(point.wo, wi, pdf) } else { pdf }
+    }
+
+    /// The component that a group of lights is.
+    #[inline]
+    pub fn component(&self, group: usize) -> usize {
+        self.lobes + group
+    }
+
+    /// N.
+    #[inline]
+    pub fn samples(&self) -> f32 {
+        self.n
+    }
+
+    /// r_j of a sample; `None` if its densities cannot be divided.
+    #[inline]
+    pub fn columns(&self, c: &Candidate) -> Option<Columns> {
+        let scale = self.n / (c.n_light * c.p_light + c.n_bsdf * c.p_bsdf);
+        if !(scale.is_finite() && scale > 0.0) {
+            return None;
+        }
+        let mut columns = [0.0; MAX_COMPONENTS];
+        if self.lobes == MAX_LOBES {
+            columns[0] = c.p_lobe * scale;
+            columns[1] = (c.p_bsdf - c.p_lobe) * scale;
+        } else {
+            columns[0] = c.p_bsdf * scale;
+        }
+        if c.p_light > 0.0 {
+            columns[self.component(usize::from(c.group))] = c.p_light * scale;
+        }
+        Some(columns)
+    }
+
+    /// r_j of a dark sample of component j; the other columns are 0.
+    #[inline]
+    pub fn dark_column(&self, component: usize) -> f32 {
+        self.n / if component < self.lobes { self.n_bsdf } else { self.n_light }
+    }
+}

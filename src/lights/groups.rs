@@ -1,0 +1,234 @@
+//! Lights in a few groups, each a component of the mixture that light sampling is.
+//!
+//! All lights at infinity are one group, since they overlap. The others are one group each while there are few, and
+//! subtrees of a light tree where there are many. A light is chosen with the probability that
+//! [`LightSampler`] gives it; the groups only split that choice in two, first a group and then a light of it, so that
+//! the number of samples of every group can be fixed.
+
+use super::{LightChoice, LightCtx, LightId, LightSampler, LightSet, LightTree};
+use crate::math::{AliasTable, ONE_MINUS_EPSILON};
+
+/// Most groups.
+pub const MAX_GROUPS: usize = 8;
+/// Group of lights that are never chosen.
+const NO_GROUP: u8 = u8::MAX;
+
+/// Lights in groups.
+#[derive(Clone, Debug, Default)]
+pub struct LightGroups {
+    /// Of each light.
+    group_of: Vec<u8>,
+    /// True if group 0 is that of the lights at infinity.
+    has_infinite: bool,
+    choice: Choice,
+}
+
+#[derive(Clone, Debug)]
+enum Choice {
+    /// Groups of fixed probabilities.
+    Fixed(Vec<FixedGroup>),
+    /// Subtrees of the sampler's tree, by their topmost nodes, ascending.
+    Tree(Vec<u32>),
+}
+
+impl Default for Choice {
+    fn default() -> Self {
+        Choice::Tree(Vec::new())
+    }
+}
+
+#[derive(Clone, Debug)]
+struct FixedGroup {
+    pmf: f32,
+    lights: Vec<LightId>,
+    table: AliasTable,
+}
+
+impl LightGroups {
+    /// Groups the lights of a set into at most `most` (1 to [`MAX_GROUPS`]) groups.
+    pub fn new(set: &LightSet, most: usize) -> Self {
+        let most = most.clamp(1, MAX_GROUPS);
+        let bounds: Vec<_> = set.lights.iter().map(super::Light::bounds).collect();
+        let own_tree;
+        let tree = match &set.sampler {
+            LightSampler::Tree { tree, .. } => tree,
+            LightSampler::Uniform(_) | LightSampler::Power(_) => {
+                own_tree = LightTree::new(&bounds);
+                &own_tree
+            }
+        };
+        let ctx = LightCtx::at(crate::math::Vec3::ZERO);
+        let is_infinite = |i: usize| set.lights[i].is_infinite() && set.sampler.pmf(&ctx, i as LightId) > 0.0;
+        let infinite: Vec<LightId> = (0..set.lights.len()).filter(|&i| is_infinite(i)).map(|i| i as LightId).collect();
+        let has_infinite = !infinite.is_empty();
+        let cut = tree.cut(most - usize::from(has_infinite && most > 1));
+
+        // Lights of each group; if there is to be one group only, everything is in it
+        let mut groups: Vec<Vec<LightId>> = Vec::new();
+        groups.extend(has_infinite.then_some(infinite));
+        for &place in &cut {
+            let mut lights = Vec::new();
+            tree.visit_lights(place, &mut |light| lights.push(light));
+            groups.push(lights);
+        }
+        let mut group_of = vec![NO_GROUP; set.lights.len()];
+        for (g, lights) in groups.iter().enumerate() {
+            lights.iter().for_each(|&l| group_of[l as usize] = g as u8);
+        }
+        let choice = match &set.sampler {
+            LightSampler::Tree { .. } => Choice::Tree(cut),
+            LightSampler::Uniform(_) | LightSampler::Power(_) => {
+                let fixed = |lights: Vec<LightId>| {
+                    let weights: Vec<f32> = lights.iter().map(|&l| set.sampler.pmf(&ctx, l)).collect();
+                    FixedGroup { pmf: weights.iter().sum(), table: AliasTable::new(&weights), lights }
+                };
+                Choice::Fixed(groups.into_iter().map(fixed).collect())
+            }
+        };
+        LightGroups { group_of, has_infinite, choice }
+    }
+
+    /// Number of groups.
+    pub fn len(&self) -> usize {
+        match &self.choice {
+            Choice::Fixed(groups) => groups.len(),
+            Choice::Tree(cut) => cut.len() + usize::from(self.has_infinite),
+        }
+    }
+
+    /// True if no light can be chosen.
+    pub fn is_empty(&self) -> bool {
+        self.len() == 0
+    }
+
+    /// The group of a light; `None` if it is never chosen.
+    #[inline]
+    pub fn group_of(&self, light: LightId) -> Option<usize> {
+        let group = *self.group_of.get(light as usize)?;
+        (group != NO_GROUP).then_some(usize::from(group))
+    }
+
+    /// Probability that the sampler of the set chooses a light of each group, seen from a point. They sum to one, unless
+    /// nothing can be chosen.
+    pub fn pmfs(&self, set: &LightSet, ctx: &LightCtx) -> [f32; MAX_GROUPS] {
+        let mut pmfs = [0.0; MAX_GROUPS];
+        match (&self.choice, &set.sampler) {
+            (Choice::Tree(cut), LightSampler::Tree { tree, infinite }) => {
+                let p_infinite = super::select::infinite_probability(tree, infinite, ctx);
+                let first = usize::from(self.has_infinite);
+                tree.cut_pmfs(ctx, cut, &mut pmfs[first..]);
+                pmfs[first..].iter_mut().for_each(|p| *p *= 1.0 - p_infinite);
+                if self.has_infinite {
+                    pmfs[0] = p_infinite;
+                }
+            }
+            (Choice::Fixed(groups), _) => groups.iter().zip(&mut pmfs).for_each(|(group, p)| *p = group.pmf),
+            (Choice::Tree(_), LightSampler::Uniform(_) | LightSampler::Power(_)) => {}
+        }
+        pmfs
+    }
+
+    /// Chooses a light of a group, whose probability is `group_pmf`, by `u` in [0, 1). The probability of the answer
+    /// includes that of the group.
+    pub fn sample(
+        &self,
+        set: &LightSet,
+        ctx: &LightCtx,
+        (group, group_pmf): (usize, f32),
+        u: f32,
+    ) -> Option<LightChoice> {
+        match (&self.choice, &set.sampler) {
+            (Choice::Tree(_), LightSampler::Tree { infinite, .. }) if self.has_infinite && group == 0 => {
+                let x = u * infinite.len() as f32;
+                let i = (x as usize).min(infinite.len() - 1);
+                let u = (x - i as f32).clamp(0.0, ONE_MINUS_EPSILON);
+                Some(LightChoice { light: infinite[i], pmf: group_pmf / infinite.len() as f32, u })
+            }
+            (Choice::Tree(cut), LightSampler::Tree { tree, .. }) => {
+                let place = *cut.get(group - usize::from(self.has_infinite))?;
+                let (light, pmf, u) = tree.sample_below(ctx, place, u)?;
+                Some(LightChoice { light, pmf: pmf * group_pmf, u })
+            }
+            (Choice::Fixed(groups), _) => {
+                let group = groups.get(group)?;
+                let s = group.table.sample(u)?;
+                Some(LightChoice { light: group.lights[s.index], pmf: s.pmf * group_pmf, u: s.u })
+            }
+            (Choice::Tree(_), LightSampler::Uniform(_) | LightSampler::Power(_)) => None,
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::lights::{Light, LightSamplerKind, LightSetBuilder};
+    use crate::math::hash::HashStream;
+    use crate::math::test_support::assert_chi_squared;
+    use crate::math::{Bounds3, Rgb, Vec3};
+
+    const KINDS: [LightSamplerKind; 3] = [LightSamplerKind::Uniform, LightSamplerKind::Power, LightSamplerKind::Tree];
+
+    fn set(kind: LightSamplerKind, points: u32, infinite: u32) -> LightSet {
+        let mut b = LightSetBuilder::default();
+        for _ in 0..infinite {
+            b.add(Light::InfiniteConstant { l: Rgb::splat(0.3) });
+        }
+        for i in 0..points {
+            let p = Vec3::new(i as f32 * 0.7 - 2.0, (i % 3) as f32, 2.0 + (i % 4) as f32);
+            b.add(Light::Point { p, intensity: Rgb::splat(if i == 2 { 0.0 } else { 0.5 + i as f32 }) });
+        }
+        b.build(kind, &Bounds3 { min: Vec3::ZERO, max: Vec3::splat(3.0) })
+    }
+
+    #[test]
+    fn choosing_a_group_and_then_a_light_is_choosing_a_light() {
+        for kind in KINDS {
+            for (points, infinite) in [(4, 0), (4, 1), (30, 2), (0, 2), (1, 0)] {
+                for most in [1, 2, 5, 8] {
+                    let set = set(kind, points, infinite);
+                    let groups = LightGroups::new(&set, most);
+                    let ctx = LightCtx { p: Vec3::new(0.4, 0.3, 0.0), n: Vec3::Z, ns: Vec3::Z };
+                    let pmfs = groups.pmfs(&set, &ctx);
+                    assert!((pmfs.iter().sum::<f32>() - 1.0).abs() < 1e-5, "{kind:?} {pmfs:?}");
+                    assert!(groups.len() <= most.max(usize::from(infinite > 0) + usize::from(points > 0)));
+
+                    let mut s = HashStream::new([points, infinite, most as u32]);
+                    let mut observed = vec![0.0; set.lights.len()];
+                    let n = 20_000;
+                    for _ in 0..n {
+                        let mut u = s.next_f32() * pmfs.iter().sum::<f32>();
+                        let pick = |p: &f32| {
+                            u -= p;
+                            u < 0.0
+                        };
+                        let group = pmfs.iter().position(pick).unwrap_or(0);
+                        let choice = groups.sample(&set, &ctx, (group, pmfs[group]), s.next_f32()).unwrap();
+                        assert_eq!(groups.group_of(choice.light), Some(group));
+                        let pmf = set.sampler.pmf(&ctx, choice.light);
+                        assert!((choice.pmf / pmf - 1.0).abs() < 1e-4, "{kind:?} {} {pmf}", choice.pmf);
+                        assert!((0.0..1.0).contains(&choice.u));
+                        observed[choice.light as usize] += 1.0;
+                    }
+                    let pmf = |i: usize| f64::from(set.sampler.pmf(&ctx, i as LightId)) * f64::from(n);
+                    let expected: Vec<f64> = (0..set.lights.len()).map(pmf).collect();
+                    assert_chi_squared(&observed, &expected, 1e-6);
+                }
+            }
+        }
+    }
+
+    #[test]
+    fn few_lights_have_a_group_each_and_dark_ones_none() {
+        for kind in KINDS {
+            let set = set(kind, 5, 1);
+            let groups = LightGroups::new(&set, 7);
+            assert_eq!(groups.len(), 5, "{kind:?}");
+            let mut seen: Vec<_> = (0..6).map(|l| groups.group_of(l)).collect();
+            assert_eq!(seen.remove(3), None);
+            seen.sort_unstable();
+            assert_eq!(seen, (0..5).map(Some).collect::<Vec<_>>());
+        }
+        assert!(LightGroups::new(&set(LightSamplerKind::Tree, 0, 0), 4).is_empty());
+    }
+}
