@@ -163,17 +163,15 @@ pub struct Seconds {
 }
 
 impl Seconds {
-    fn new(rendering: &Rendering, processor: Duration) -> Self {
+    /// Adds all but the processor time.
+    fn add(&mut self, rendering: &Rendering) {
         let s = &rendering.stats;
-        Seconds {
-            processor: processor.as_secs_f64(),
-            wall: rendering.elapsed.as_secs_f64(),
-            camera: (s.camera_time + s.bounce_time).as_secs_f64(),
-            shade: s.shade_time.as_secs_f64(),
-            t1: s.direct.t1.as_secs_f64(),
-            select: s.direct.select.as_secs_f64(),
-            t2: s.direct.t2.as_secs_f64(),
-        }
+        self.wall += rendering.elapsed.as_secs_f64();
+        self.camera += (s.camera_time + s.bounce_time).as_secs_f64();
+        self.shade += s.shade_time.as_secs_f64();
+        self.t1 += s.direct.t1.as_secs_f64();
+        self.select += s.direct.select.as_secs_f64();
+        self.t2 += s.direct.t2.as_secs_f64();
     }
 
     /// Direct lighting.
@@ -242,8 +240,20 @@ impl Measured {
         }
     }
 
-    fn add(&mut self, rendering: &Rendering, processor: Duration) {
-        let means = radiance(&rendering.film);
+    /// Takes a turn: renderings of which each has the same share of the picture.
+    fn add(&mut self, renderings: &[Rendering], processor: Duration) {
+        let share = 1.0 / renderings.len().max(1) as f64;
+        let mut means = vec![[0.0; 3]; renderings.first().map_or(0, |r| r.film.pixels.len())];
+        let mut seconds = Seconds { processor: processor.as_secs_f64(), ..Seconds::default() };
+        for rendering in renderings {
+            for (mean, p) in means.iter_mut().zip(radiance(&rendering.film)) {
+                (0..3).for_each(|c| mean[c] += p[c] * share);
+            }
+            seconds.add(rendering);
+            self.segments += rendering.stats.direct.segments;
+            self.proposals += rendering.stats.direct.proposals;
+            self.invalid += rendering.film.pixels.iter().map(|p| p.invalid).sum::<u64>();
+        }
         if self.first.is_empty() {
             self.first = means.iter().map(|p| p.map(|v| v as f32)).collect();
             self.sum = vec![[0.0; 3]; means.len()];
@@ -252,10 +262,7 @@ impl Measured {
             (0..3).for_each(|c| sum[c] += mean[c]);
         }
         self.luminance.push(means.iter().map(|&p| luminance(p) as f32).collect());
-        self.seconds.push(Seconds::new(rendering, processor));
-        self.segments += rendering.stats.direct.segments;
-        self.proposals += rendering.stats.direct.proposals;
-        self.invalid += rendering.film.pixels.iter().map(|p| p.invalid).sum::<u64>();
+        self.seconds.push(seconds);
     }
 
     /// Luminance of every pixel, turn by turn.
@@ -369,6 +376,9 @@ pub fn radiance(film: &Film) -> Vec<[f64; 3]> {
     film.pixels.iter().map(|p| p.mean()).collect()
 }
 
+/// Distance of the seeds of renderings that make up one turn; turns have smaller ones.
+const APART: u32 = 1 << 28;
+
 /// Renders `turns` turns of all methods, the first of each with seed `first_seed` and on.
 pub fn turns(
     stage: &mut Stage,
@@ -386,8 +396,10 @@ pub fn turns(
             let seed = 1 + turn * count + i;
             let m = &mut measured[i as usize];
             let start = processor_time();
-            let rendering = stage.render(&m.method, view, spp, seed, observer)?;
-            m.add(&rendering, processor_time().saturating_sub(start));
+            let (renderings, rays) = if m.method.apart { (spp, 1) } else { (1, spp) };
+            let render = |k: u32| stage.render(&m.method, view, rays, seed.wrapping_add(k * APART), observer);
+            let renderings: Result<Vec<Rendering>, _> = (0..renderings).map(render).collect();
+            m.add(&renderings?, processor_time().saturating_sub(start));
         }
     }
     Ok(measured)

@@ -42,6 +42,8 @@ pub struct Method {
     /// True if samples, or the proposals of `ris`, are well distributed over the lights and over the camera rays of a pixel;
     /// otherwise all random numbers are independent.
     pub stratified: bool,
+    /// True if camera rays of a pixel have nothing to do with each other: they are renderings of one ray each.
+    pub apart: bool,
 }
 
 impl Method {
@@ -59,6 +61,7 @@ impl Method {
             strata: Strata::None,
             per_pixel: false,
             stratified: false,
+            apart: false,
         }
     }
 
@@ -90,6 +93,11 @@ impl Method {
     /// The same with well distributed points.
     pub fn stratified(self) -> Self {
         Method { stratified: true, ..self }
+    }
+
+    /// The same with camera rays that have nothing to do with each other.
+    pub fn apart(self) -> Self {
+        Method { apart: true, ..self }
     }
 
     /// The same with other weights of the techniques.

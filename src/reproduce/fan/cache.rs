@@ -133,7 +133,7 @@ fn figure(setup: &Setup<'_>, o: &Outcome) -> Result<Figure, ReproduceError> {
     shown.push(Shown { file, title: "reference, path tracing".to_owned(), caption: String::new() });
     blocks.push(Block::Pictures(shown));
     let list = [0, BEST].map(|i| (o.names[i], &o.measured[i]));
-    blocks.extend(variances(setup, &o.truth, o.size, &list, "box-variance", "stratified")?);
+    blocks.extend(variances(setup, &o.truth, o.size, &list, "box-variance", "stratified over all rays")?);
     blocks.push(Block::Table(table));
 
     let rows: Vec<Value> = (0..o.names.len()).map(|i| method_json(o.names[i], pair(i), errors(i))).collect();

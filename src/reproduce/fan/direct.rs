@@ -107,7 +107,7 @@ pub struct Outcome<'a> {
     pub measured: Vec<Measured>,
     pub truth: Truth,
     pub errors: Vec<Errors>,
-    /// Those of [`SHOWN`] with rays all over the pixels, stratified.
+    /// Those of [`SHOWN`] with rays all over the pixels, stratified over all rays.
     pub antialiased: Vec<Measured>,
     pub antialiased_truth: Truth,
     pub growth: Growth,
@@ -167,13 +167,13 @@ pub fn run(setup: &Setup<'_>, case: &Case, time: Duration) -> Result<Figure, Rep
     let [width, height] = stage.size();
     (observer.say)(&format!("  {width} × {height} pixels, {count_turns} turns of {count} methods"));
     let list = methods(numbers);
-    let reference = list[Role::Balance.place(0)];
+    let reference = list[Role::Balance.place(1)];
     let true_picture = truth(&mut stage, reference, View::Centres, observer)?;
     let measured = turns(&mut stage, &list, View::Centres, case.spp, 0..count_turns, observer)?;
 
     // With antialiasing
     let antialiased_truth = truth(&mut stage, reference, View::Antialiased, observer)?;
-    let shown: Vec<Method> = SHOWN.iter().map(|r| list[r.place(0)]).collect();
+    let shown: Vec<Method> = SHOWN.iter().map(|r| list[r.place(1)]).collect();
     let range = ANTIALIASED_TURNS..ANTIALIASED_TURNS + PAIR_TURNS;
     let antialiased = turns(&mut stage, &shown, View::Antialiased, case.spp, range, observer)?;
     let (facts, size) = (stage.facts(), stage.size());

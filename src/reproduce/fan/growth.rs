@@ -8,7 +8,7 @@ use super::truth::Truth;
 use super::Setup;
 
 /// Numbers of camera rays: usual and quick.
-const RAYS: [&[u32]; 2] = [&[1, 2, 4, 8, 16, 32], &[1, 4, 16]];
+const RAYS: [&[u32]; 2] = [&[1, 2, 4, 8, 16], &[1, 4, 16]];
 /// Turns of each.
 const TURNS: u32 = 4;
 const FIRST_TURN: u32 = 3_000_000;
@@ -18,7 +18,7 @@ const SHRINK: u32 = 2;
 const PAIR: [Role; 2] = [Role::Balance, Role::Progressive];
 
 /// Camera rays and error of progressive `ocv` over that of `mis`, for each of the ways to draw samples.
-pub struct Growth(pub [Vec<(u32, Estimate)>; 2]);
+pub struct Growth(pub [Vec<(u32, Estimate)>; WAYS.len()]);
 
 /// Camera rays per pixel of the whole picture that take as long.
 pub fn cost(quick: bool) -> f64 {
@@ -32,10 +32,10 @@ pub fn measure(setup: &Setup<'_>, case: &Case, numbers: Numbers, size: [u32; 2])
     let mut stage = Stage::load(&setup.scenes.join(case.file), small, setup.options.threads)?;
     let list = methods(numbers);
     let range = LONG_TURNS..LONG_TURNS + LONG.1;
-    let long = turns(&mut stage, &[list[Role::Balance.place(0)]], View::Centres, LONG.0, range, setup.observer)?;
+    let long = turns(&mut stage, &[list[Role::Balance.place(1)]], View::Centres, LONG.0, range, setup.observer)?;
     let truth = Truth::new(&long[0]);
     let chosen: Vec<_> = (0..WAYS.len()).flat_map(|way| PAIR.map(|r| list[r.place(way)])).collect();
-    let mut curves = [Vec::new(), Vec::new()];
+    let mut curves = [const { Vec::new() }; WAYS.len()];
     for (k, &rays) in RAYS[usize::from(setup.options.quick)].iter().enumerate() {
         let first = FIRST_TURN + k as u32 * TURNS;
         let all = turns(&mut stage, &chosen, View::Centres, rays, first..first + TURNS, setup.observer)?;

@@ -27,7 +27,7 @@ pub fn method_json(name: &str, [m, base]: [&Measured; 2], [e, base_errors]: [&Er
     let time = m.time_ratio(base);
     json!({
         "name": name, "estimator": m.method.estimator.name(), "samples": m.method.samples,
-        "proposals": m.method.proposals, "stratified": m.method.stratified, "turns": m.turns(),
+        "proposals": m.method.proposals, "stratified": m.method.stratified, "rays_apart": m.method.apart, "turns": m.turns(),
         "error": estimate_json(e.error()), "relative_error": estimate_json(e.relative(base_errors)),
         "time_ratio": time, "efficiency": estimate_json(e.efficiency(base_errors, time)),
         "bias": { "value": e.bias.value, "half_width_95": e.bias.half }, "systematic_square": e.systematic,
@@ -141,7 +141,7 @@ pub fn direct(setup: &Setup<'_>, o: &Outcome<'_>) -> Result<Figure, ReproduceErr
         id: o.case.id,
         title: o.case.title,
         summary: row(0),
-        also: vec![("independent samples", row(1))],
+        also: (1..WAYS.len()).map(|way| (WAYS[way], row(way))).collect(),
         blocks,
         numbers: numbers(o),
     })
@@ -184,7 +184,7 @@ fn reason(o: &Outcome<'_>, way: usize) -> String {
     let mut text = others.join("; ");
     let equal = |role: Role| percent(o.relative(role, way));
     text += &format!("; in the time of mis: ocv {}, ris {}", equal(Role::EqualTime), equal(Role::Ris));
-    if way == 0 {
+    if way == 1 {
         let errors = o.antialiased_errors();
         text += &format!(
             "; with antialiasing {} → {} ({})",
@@ -192,12 +192,8 @@ fn reason(o: &Outcome<'_>, way: usize) -> String {
             significant(errors[1].error().value),
             percent(errors[1].relative(&errors[0]))
         );
-        let (stratified, independent) = (o.relative(Role::Progressive, 0), o.relative(Role::Progressive, 1));
-        let gain = o.errors[Role::Balance.place(0)].relative(&o.errors[Role::Balance.place(1)]);
-        text += &format!("; stratification alone takes mis to {} of its error", percent(gain));
-        if independent.value < stratified.value {
-            text += ", and leaves less to win";
-        }
+        let gain = o.errors[Role::Balance.place(1)].relative(&o.errors[Role::Balance.place(2)]);
+        text += &format!("; stratification alone changes the error of mis by {}", percent(gain));
     }
     text
 }
@@ -210,7 +206,7 @@ fn tables(o: &Outcome<'_>) -> Vec<Block> {
             let name = if role.is_unbiased() { role.name().to_owned() } else { format!("{} (biased)", role.name()) };
             table.row(method_row(&name, o.pair(role, way), o.errors(role, way)));
         }
-        blocks.push(Block::Note(format!("With {name} samples:")));
+        blocks.push(Block::Note(format!("Samples {name}:")));
         blocks.push(Block::Table(table));
     }
     let mut table = Table::new(&HEADER);
@@ -220,7 +216,7 @@ fn tables(o: &Outcome<'_>) -> Vec<Block> {
         table.row(method_row(role.name(), pair, [&errors[i], &errors[0]]));
     }
     blocks.push(Block::Note(
-        "With antialiasing, stratified: camera rays all over each pixel, against an antialiased reference. The noise of edges is in \
+        "With antialiasing, stratified over all rays: camera rays all over each pixel, against an antialiased reference. The noise of edges is in \
          every row."
             .to_owned(),
     ));
@@ -261,7 +257,7 @@ fn pictures(setup: &Setup<'_>, o: &Outcome<'_>) -> Result<Vec<Block>, ReproduceE
     for (way, name) in WAYS.iter().enumerate() {
         let chosen = [Role::Balance, Role::Progressive, Role::Correlated, Role::Ris];
         let list: Vec<(&str, &Measured)> = chosen.iter().map(|r| (r.name(), &o.measured[r.place(way)])).collect();
-        blocks.extend(variances(setup, &o.truth, o.size, &list, &format!("{id}-variance-{name}"), name)?);
+        blocks.extend(variances(setup, &o.truth, o.size, &list, &format!("{id}-variance-{way}"), name)?);
     }
     Ok(blocks)
 }
@@ -281,7 +277,7 @@ pub fn variances(
     for (k, ((name, _), map)) in list.iter().zip(&maps).enumerate() {
         let file = Picture::colored(size, map, &scale).write(&setup.options.out, &format!("{file}-{k}"))?;
         let mean = map.iter().sum::<f64>() / map.len().max(1) as f64;
-        let caption = format!("{way} samples; mean {}", significant(mean));
+        let caption = format!("samples {way}; mean {}", significant(mean));
         shown.push(Shown { file, title: format!("variance: {name}"), caption });
     }
     let title = "variance of the pixel over tvi², in the unit of eq. (12)".to_owned();
@@ -313,6 +309,6 @@ fn numbers(o: &Outcome<'_>) -> Value {
             "ris_proposals": o.numbers.ris.proposals },
         "reference": { "mean": estimate_json(o.truth.mean), "noise": o.truth.noise() },
         "methods": all, "antialiased": antialiased,
-        "growth": { WAYS[0]: curve(0), WAYS[1]: curve(1) },
+        "growth": { WAYS[0]: curve(0), WAYS[1]: curve(1), WAYS[2]: curve(2) },
     })
 }

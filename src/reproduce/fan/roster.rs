@@ -1,11 +1,12 @@
-//! The methods that are held against each other, with stratified and with independent samples.
+//! The methods that are held against each other, with three ways to draw samples: stratified in each estimate by itself, as
+//! the paper has them; stratified over all camera rays of a pixel; independent.
 
 use super::super::method::Method;
 use crate::estimators::mis::Heuristic;
 use crate::estimators::ocv::Form;
 use crate::scene::{OptimalForm, Split, Strata};
 
-/// Who takes part, in this order with stratified samples, then again with independent ones.
+/// Who takes part, in this order with each of the ways to draw samples.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Role {
     /// What all are compared with: mis with the balance heuristic.
@@ -40,8 +41,8 @@ pub const ROLES: [Role; 11] = [
     Role::EqualTime,
 ];
 
-/// Names of the two ways to draw samples.
-pub const WAYS: [&str; 2] = ["stratified", "independent"];
+/// Names of the ways to draw samples.
+pub const WAYS: [&str; 3] = ["stratified in each estimate", "stratified over all rays", "independent"];
 
 /// Numbers of samples.
 #[derive(Clone, Copy, Debug)]
@@ -86,7 +87,7 @@ impl Role {
         }
     }
 
-    /// The method, stratified.
+    /// The method, stratified over all rays.
     pub fn method(self, n: Numbers) -> Method {
         let method = match self {
             Role::Balance => Method::mis(n.samples).weighted(Heuristic::Balance),
@@ -110,10 +111,18 @@ impl Role {
     }
 }
 
-/// All methods, in the order of [`Role::place`].
+/// All methods, in the order of [`Role::place`]. What learns from earlier rays of the pixel cannot have them apart; it
+/// stratifies over the rays of a block.
 pub fn methods(n: Numbers) -> Vec<Method> {
-    let independent = |role: Role| Method { stratified: false, strata: Strata::None, ..role.method(n) };
-    ROLES.iter().map(|r| r.method(n)).chain(ROLES.iter().map(|&r| independent(r))).collect()
+    let way = |way: usize, role: Role| {
+        let method = role.method(n);
+        match (way, role) {
+            (0, Role::Progressive | Role::Optimal | Role::EqualTime) | (1, _) => method,
+            (0, _) => method.apart(),
+            _ => Method { stratified: false, strata: Strata::None, ..method },
+        }
+    };
+    (0..WAYS.len()).flat_map(|k| ROLES.map(|role| way(k, role))).collect()
 }
 
 #[cfg(test)]
@@ -126,8 +135,9 @@ mod tests {
         let all = methods(n);
         assert_eq!(all.len(), WAYS.len() * ROLES.len());
         for role in ROLES {
-            assert_eq!(all[role.place(0)], role.method(n));
-            let independent = all[role.place(1)];
+            assert_eq!(all[role.place(1)], role.method(n));
+            assert_eq!(Method { apart: false, ..all[role.place(0)] }, role.method(n));
+            let independent = all[role.place(2)];
             assert!(!independent.stratified && independent.samples == role.method(n).samples);
         }
     }
