@@ -2,22 +2,54 @@
 //!
 //! After T2, the samples of a point become sums of normal equations in the columns c_j = h_j/p_α − I_j, whose expectation
 //! is 0, and in y = f·V/p_α. The estimate is ȳ − Σ_j β_j c̄_j [Fan et al. 2006, Eq. 7]; forms differ in what β is fitted to.
+//! `optimal-mis` has its systems in the columns r_j = h_j/p_α, and the form of the paper in r_j/I_j.
 
 use super::ShadePoint;
-use super::mixture::Mixture;
+use super::mixture::Columns;
 use super::propose::{Candidates, Drawn};
 use super::visibility::{Segments, is_traced};
 use crate::accel::RayBatch;
-use crate::estimators::ocv::forms::{Outcome, PAPER_LAMBDA};
-use crate::estimators::ocv::{self, Form, MAX_COMPONENTS, NormalEquations, Penalty};
+use crate::estimators::ocv::forms::PAPER_LAMBDA;
+use crate::estimators::ocv::{self, Form, NormalEquations, Outcome, Penalty};
+use crate::estimators::optimal_mis;
 use crate::math::Rgb;
 use crate::scene::{EstimatorKind, IntegratorSettings, OptimalForm, Split, World};
 
 /// Domain below the stream of a shading point: half h of its samples uses `HALF + h`.
 const HALF: u32 = 32;
 
-/// Penalty of `optimal-mis`, which is none but for what keeps the system of a light that is hardly ever chosen regular.
-const OPTIMAL_PENALTY: Penalty = Penalty { ridge: 0.01, ..Penalty::NONE };
+/// What columns a system is of, and how it is solved.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+enum Method {
+    /// c_j = r_j − I_j.
+    Ocv(Form),
+    /// r_j.
+    Optimal(OptimalForm),
+}
+
+impl Method {
+    fn new(settings: &IntegratorSettings) -> Self {
+        match settings.estimator {
+            EstimatorKind::OptimalMis => Method::Optimal(settings.optimal_mis),
+            EstimatorKind::Mc | EstimatorKind::Mis | EstimatorKind::Ris | EstimatorKind::Ocv => {
+                Method::Ocv(settings.ocv.form)
+            }
+        }
+    }
+
+    /// The columns of a sample from its r_j.
+    #[inline]
+    fn columns(self, mut columns: Columns, integrals: &Columns) -> Columns {
+        for (column, &integral) in columns.iter_mut().zip(integrals) {
+            match self {
+                Method::Ocv(Form::Paper) if integral > 0.0 => *column /= integral,
+                Method::Ocv(Form::Paper) | Method::Optimal(_) => {}
+                Method::Ocv(Form::Progressive | Form::Regression | Form::Crossfit) => *column -= integral,
+            }
+        }
+        columns
+    }
+}
 
 /// Fits that estimates take part in: sums so far, and coefficients for those to come.
 ///
@@ -26,15 +58,14 @@ const OPTIMAL_PENALTY: Penalty = Penalty { ridge: 0.01, ..Penalty::NONE };
 #[derive(Clone, Debug)]
 pub struct Fits {
     equations: NormalEquations,
-    penalty: Penalty,
+    is_optimal: bool,
     sums: Vec<f32>,
     beta: Vec<f32>,
 }
 
 impl Default for Fits {
     fn default() -> Self {
-        let (equations, penalty) = (NormalEquations::new(0), Penalty::default());
-        Fits { equations, penalty, sums: Vec::new(), beta: Vec::new() }
+        Fits { equations: NormalEquations::new(0), is_optimal: false, sums: Vec::new(), beta: Vec::new() }
     }
 }
 
@@ -45,12 +76,11 @@ impl Fits {
             return Fits::default();
         }
         let equations = NormalEquations::new(world.components());
-        let penalty = penalty(settings);
         Fits {
             equations,
-            penalty,
+            is_optimal: settings.estimator == EstimatorKind::OptimalMis,
             sums: vec![0.0; count * equations.len()],
-            beta: vec![0.0; count * 3 * equations.components()],
+            beta: vec![0.0; count * equations.coefficients()],
         }
     }
 
@@ -61,13 +91,20 @@ impl Fits {
 
     /// Begins a block. Returns the number of fits whose system has no solution; their estimates are those of MIS.
     pub fn solve(&mut self) -> u64 {
-        let betas = self.beta.chunks_mut((3 * self.equations.components()).max(1));
-        let fits = self.sums.chunks(self.equations.len().max(1)).zip(betas);
-        fits.map(|(sums, beta)| u64::from(self.equations.solve(sums, self.penalty, beta).is_err())).sum()
+        let betas = self.beta.chunks_mut(self.equations.coefficients().max(1));
+        let fits = self.sums.chunks(self.equations.len()).zip(betas);
+        let solved = fits.map(|(sums, beta)| {
+            if self.is_optimal {
+                optimal_mis::coefficients(self.equations, sums, beta)
+            } else {
+                self.equations.solve(sums, Penalty::default(), beta)
+            }
+        });
+        solved.map(|result| u64::from(result.is_err())).sum()
     }
 
     fn beta(&self, fit: u32) -> &[f32] {
-        let len = 3 * self.equations.components();
+        let len = self.equations.coefficients();
         &self.beta[fit as usize * len..][..len]
     }
 
@@ -75,11 +112,6 @@ impl Fits {
         let len = self.equations.len();
         self.equations.merge(&mut self.sums[fit as usize * len..][..len], sums);
     }
-}
-
-/// The penalty of the fits.
-fn penalty(settings: &IntegratorSettings) -> Penalty {
-    if settings.estimator == EstimatorKind::OptimalMis { OPTIMAL_PENALTY } else { Penalty::default() }
 }
 
 /// The stage's buffers.
@@ -123,38 +155,39 @@ impl Components {
         (self.systems, self.ill_conditioned) = (0, 0);
         self.find_hidden(world, candidates, contributions, segments);
         let equations = NormalEquations::new(world.components());
-        let is_paper = settings.estimator == EstimatorKind::Ocv && settings.ocv.form == Form::Paper;
-        self.gather(equations, is_paper, candidates, contributions);
+        let method = Method::new(settings);
+        self.gather(equations, method, candidates, contributions);
 
-        let form = match (settings.estimator, settings.optimal_mis) {
-            (EstimatorKind::OptimalMis, OptimalForm::Direct) => Form::Regression,
-            (EstimatorKind::OptimalMis, OptimalForm::Progressive) => Form::Progressive,
-            _ => settings.ocv.form,
-        };
         let len = equations.len();
         let sums = |i: usize| &self.sums[i * len..][..len];
+        let known = |estimate| Outcome { estimate, ill_conditioned: 0 };
         for (i, out) in out.iter_mut().enumerate() {
-            let outcome = match form {
-                Form::Progressive if fits.is_empty() => {
-                    Outcome { estimate: equations.mean(sums(i)), ill_conditioned: 0 }
+            let integrals = || &candidates.mixtures[i].integrals;
+            let outcome = match method {
+                Method::Ocv(Form::Progressive) | Method::Optimal(OptimalForm::Progressive) if fits.is_empty() => {
+                    known(equations.mean(sums(i)))
                 }
-                Form::Progressive => {
-                    let estimate = equations.estimate(sums(i), fits.beta(points[i].fit));
-                    fits.add(points[i].fit, sums(i));
-                    Outcome { estimate, ill_conditioned: 0 }
+                Method::Ocv(Form::Progressive) => known(equations.estimate(sums(i), fits.beta(points[i].fit))),
+                Method::Optimal(OptimalForm::Progressive) => {
+                    known(optimal_mis::estimate(equations, sums(i), integrals(), fits.beta(points[i].fit)))
                 }
-                Form::Crossfit => ocv::crossfit(equations, [sums(2 * i), sums(2 * i + 1)], penalty(settings)),
-                Form::Regression => ocv::regression(equations, sums(i), penalty(settings)),
-                Form::Paper => {
-                    let present =
-                        candidates.mixtures[i].integrals.map(|integral| if integral > 0.0 { 1.0 } else { 0.0 });
+                Method::Optimal(OptimalForm::Direct) => optimal_mis::direct(equations, sums(i), integrals()),
+                Method::Ocv(Form::Crossfit) => {
+                    ocv::crossfit(equations, [sums(2 * i), sums(2 * i + 1)], Penalty::default())
+                }
+                Method::Ocv(Form::Regression) => ocv::regression(equations, sums(i), Penalty::SAME_SAMPLES),
+                Method::Ocv(Form::Paper) => {
+                    let present = integrals().map(|integral| if integral > 0.0 { 1.0 } else { 0.0 });
                     ocv::paper(equations, sums(i), &present, PAPER_LAMBDA)
                 }
             };
-            self.systems += match form {
-                Form::Progressive => 0,
-                Form::Regression | Form::Paper => 1,
-                Form::Crossfit => 2,
+            if !fits.is_empty() {
+                fits.add(points[i].fit, sums(i));
+            }
+            self.systems += match method {
+                Method::Ocv(Form::Progressive) | Method::Optimal(OptimalForm::Progressive) => 0,
+                Method::Ocv(Form::Regression | Form::Paper) | Method::Optimal(OptimalForm::Direct) => 1,
+                Method::Ocv(Form::Crossfit) => 2,
             };
             self.ill_conditioned += u64::from(outcome.ill_conditioned);
             let [r, g, b] = outcome.estimate;
@@ -184,35 +217,25 @@ impl Components {
         }
     }
 
-    /// Sums of the normal equations of each point; of columns r_j/I_j that are not centred for the form of the paper.
-    fn gather(&mut self, equations: NormalEquations, is_paper: bool, candidates: &Candidates, contributions: &[Rgb]) {
+    /// Sums of the normal equations of each point.
+    fn gather(&mut self, equations: NormalEquations, method: Method, candidates: &Candidates, contributions: &[Rgb]) {
         let (m, len) = (equations.components(), equations.len());
         self.sums.clear();
         self.sums.resize(candidates.mixtures.len() * len, 0.0);
-        let finish = |mixture: &Mixture, mut columns: [f32; MAX_COMPONENTS]| {
-            for (column, integral) in columns.iter_mut().zip(mixture.integrals) {
-                if !is_paper {
-                    *column -= integral;
-                } else if integral > 0.0 {
-                    *column /= integral;
-                }
-            }
-            columns
-        };
         for ((c, contribution), &is_free) in candidates.records.iter().zip(contributions).zip(&self.is_free) {
             let mixture = &candidates.mixtures[c.point as usize];
             let y = if is_free { *contribution * mixture.samples() } else { Rgb::BLACK };
-            let columns = finish(mixture, mixture.columns(c).unwrap_or([0.0; MAX_COMPONENTS]));
+            let columns = method.columns(mixture.columns(c).unwrap_or_default(), &mixture.integrals);
             equations.add(&mut self.sums[c.point as usize * len..][..len], &columns[..m], y.to_array());
         }
         for (mixture, sums) in candidates.mixtures.iter().zip(self.sums.chunks_mut(len)) {
             for (component, &count) in mixture.dark[..m].iter().enumerate().filter(|(_, count)| **count > 0) {
-                let mut columns = [0.0; MAX_COMPONENTS];
+                let mut columns = Columns::default();
                 columns[component] = mixture.dark_column(component);
-                let columns = finish(mixture, columns);
+                let columns = method.columns(columns, &mixture.integrals);
                 (0..count).for_each(|_| equations.add(sums, &columns[..m], [0.0; 3]));
             }
-            let columns = finish(mixture, [0.0; MAX_COMPONENTS]);
+            let columns = method.columns(Columns::default(), &mixture.integrals);
             (0..mixture.void).for_each(|_| equations.add(sums, &columns[..m], [0.0; 3]));
         }
     }
