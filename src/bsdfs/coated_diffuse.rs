@@ -62,6 +62,18 @@ impl<'a> CoatedDiffuse<'a> {
         Rgb::splat(r) + self.base * (PI * self.mean_transmittance * t)
     }
 
+    /// Albedo of the base seen from `wo`, under light that arrives evenly from all directions: what the base reflects is
+    /// Lambertian but for the factor T(wi), of which this has the mean.
+    pub(super) fn base_albedo(&self, wo: Vec3) -> Rgb {
+        self.base * (PI * self.mean_transmittance * self.directional(if wo.z < 0.0 { -wo } else { wo })[0])
+    }
+
+    /// The interface alone.
+    #[must_use]
+    pub(super) fn without_base(self) -> Self {
+        CoatedDiffuse { base: Rgb::BLACK, ..self }
+    }
+
     /// Probability of sampling the interface; `wo` is in the upper hemisphere.
     #[inline]
     fn p_interface(&self, wo: Vec3) -> f32 {

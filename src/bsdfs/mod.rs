@@ -126,6 +126,17 @@ pub enum Bsdf<'a> {
     Evaluated(Evaluated),
 }
 
+/// The part of a BSDF that needs of the light no more than its irradiance, and what remains.
+#[derive(Clone, Copy, Debug)]
+pub struct Lambertian<'a> {
+    /// Albedo for light that arrives on the side of `wo`.
+    pub reflectance: Rgb,
+    /// Albedo for light that arrives on the other side.
+    pub transmittance: Rgb,
+    /// The other lobes.
+    pub rest: Option<Bsdf<'a>>,
+}
+
 /// Both directions in the upper hemisphere, the whole surface being symmetric; `None` if they are on different sides.
 #[inline]
 fn to_upper(wo: Vec3, wi: Vec3) -> Option<(Vec3, Vec3)> {
@@ -138,7 +149,7 @@ fn to_upper(wo: Vec3, wi: Vec3) -> Option<(Vec3, Vec3)> {
     }
 }
 
-impl Bsdf<'_> {
+impl<'a> Bsdf<'a> {
     /// Value without cosine (1/sr), without deltas. 0 at the horizon and never NaN or infinite.
     #[inline]
     pub fn f(&self, wo: Vec3, wi: Vec3) -> Rgb {
@@ -290,6 +301,23 @@ impl Bsdf<'_> {
             | Bsdf::ThinDielectric(_)
             | Bsdf::CoatedDiffuse(_)
             | Bsdf::Layered(_) => false,
+        }
+    }
+
+    /// The Lambertian part as seen from `wo`; `None` if there is none. Exact but for the base below a coat, whose dependence
+    /// on the direction of the light (the coat's transmittance) is replaced by its mean: exact under even light.
+    pub fn lambertian(&self, wo: Vec3) -> Option<Lambertian<'a>> {
+        let of = |reflectance, transmittance, rest| Some(Lambertian { reflectance, transmittance, rest });
+        match self {
+            Bsdf::Diffuse(b) => of(b.reflectance, Rgb::BLACK, None),
+            Bsdf::DiffuseTransmission(b) => of(b.reflectance, b.transmittance, None),
+            Bsdf::CoatedDiffuse(b) => of(b.base_albedo(wo), Rgb::BLACK, Some(Bsdf::CoatedDiffuse(b.without_base()))),
+            Bsdf::Evaluated(Evaluated { model: Model::Diffuse(reflectance), .. }) => of(*reflectance, Rgb::BLACK, None),
+            Bsdf::Conductor(_)
+            | Bsdf::Dielectric(_)
+            | Bsdf::ThinDielectric(_)
+            | Bsdf::Layered(_)
+            | Bsdf::Evaluated(_) => None,
         }
     }
 

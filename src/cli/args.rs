@@ -7,7 +7,8 @@ use crate::lights::LightSamplerKind;
 use crate::render::output::Aov;
 use crate::samplers::SamplerKind;
 use crate::scene::{
-    AccelKind, EstimatorKind, IntegratorKind, OptimalForm, ProposalPoints, Proposals, StageTimes, Strata, Target,
+    AccelKind, Cached, EstimatorKind, IntegratorKind, IrradianceCacheSettings, OptimalForm, ProposalPoints, Proposals,
+    StageTimes, Strata, Target,
 };
 use clap::{Args, ValueEnum};
 use std::path::PathBuf;
@@ -40,7 +41,15 @@ macro_rules! choices {
 
 choices!(
     /// `--integrator`
-    IntegratorArg => IntegratorKind { Direct => IntegratorKind::Direct, Path => IntegratorKind::Path }
+    IntegratorArg => IntegratorKind {
+        Direct => IntegratorKind::Direct,
+        Path => IntegratorKind::Path,
+        IrradianceCache => IntegratorKind::IrradianceCache,
+    }
+);
+choices!(
+    /// `--cached`
+    CachedArg => Cached { Indirect => Cached::Indirect, All => Cached::All }
 );
 choices!(
     /// `--estimator`
@@ -121,6 +130,7 @@ choices!(
         Material => Aov::Material,
         Object => Aov::Object,
         Ratio => Aov::Ratio,
+        Records => Aov::Records,
     }
 );
 
@@ -182,6 +192,22 @@ pub struct SceneArgs {
     /// What proposes directions for such materials [default: the file's, or lobes]
     #[arg(long)]
     pub bsdf_density: Option<BsdfDensityArg>,
+    /// What the records of irradiance-cache hold: indirect light, or direct light too [default: the file's, or indirect]
+    #[arg(long)]
+    pub cached: Option<CachedArg>,
+    /// Error at which a record of irradiance-cache no longer serves: a share of the mean distance of what it sees
+    /// [default: the file's, or 0.2]
+    #[arg(long, value_name = "KAPPA", value_parser = parse_cache_error)]
+    pub cache_error: Option<f32>,
+    /// Least and greatest distance, in pixels, up to which a record serves [default: the file's, or 1.5,20]
+    #[arg(long, value_name = "MIN,MAX", value_parser = parse_cache_radius)]
+    pub cache_radius: Option<[f32; 2]>,
+    /// Directions in which a record samples indirect light [default: the file's, or 256]
+    #[arg(long, value_name = "N", value_parser = clap::value_parser!(u32).range(8..=65_536))]
+    pub cache_samples: Option<u32>,
+    /// Estimates of direct light at a record, with `--cached all` [default: the file's, or 4]
+    #[arg(long, value_name = "N", value_parser = clap::value_parser!(u32).range(1..=4096))]
+    pub cache_passes: Option<u32>,
     /// Bounces of `path` [default: the file's, or 5]
     #[arg(long, value_name = "D", value_parser = clap::value_parser!(u32).range(0..=10_000))]
     pub max_depth: Option<u32>,
@@ -282,6 +308,21 @@ fn parse_stage_times(text: &str) -> Result<StageTimes, String> {
     match times[..] {
         [t1, t2] if t1 > 0.0 && t2 > 0.0 && t1.is_finite() && t2.is_finite() => Ok(StageTimes { t1, t2 }),
         _ => Err("expected two positive numbers of nanoseconds T1,T2".to_owned()),
+    }
+}
+
+fn parse_cache_error(text: &str) -> Result<f32, String> {
+    match text.parse::<f32>() {
+        Ok(error) if IrradianceCacheSettings::is_error(error) => Ok(error),
+        _ => Err("expected a number above 0 and below 1".to_owned()),
+    }
+}
+
+fn parse_cache_radius(text: &str) -> Result<[f32; 2], String> {
+    let pixels: Vec<f32> = text.split(',').filter_map(|t| t.trim().parse().ok()).collect();
+    match pixels[..] {
+        [min, max] if IrradianceCacheSettings::is_radius([min, max]) => Ok([min, max]),
+        _ => Err("expected two numbers of pixels MIN,MAX, 0 < MIN <= MAX".to_owned()),
     }
 }
 

@@ -105,7 +105,11 @@ fn write(args: &RenderArgs, world: &World, rendering: &Rendering, path: &Path) -
     let part = if extension(path) == "exr" {
         let aovs: Vec<Aov> = match &args.aov {
             Some(list) => list.iter().map(|a| a.value()).collect(),
-            None => Aov::ALL.into_iter().chain(world.splits.as_ref().map(|_| Aov::Ratio)).collect(),
+            None => {
+                let ratio = world.splits.as_ref().map(|_| Aov::Ratio);
+                let records = rendering.cache.map(|_| Aov::Records);
+                Aov::ALL.into_iter().chain(ratio).chain(records).collect()
+            }
         };
         let channels = output::channels(film, &aovs, world.splits.as_ref());
         Part::linear(width, height, channels.names, channels.data)
@@ -157,6 +161,17 @@ fn stats(args: &RenderArgs, world: &World, rendering: &Rendering, setup: SetupTi
         "memory": {
             "accel_bytes": accel.bytes, "accel_peak_bytes": accel.peak_bytes,
         },
+        "irradiance_cache": rendering.cache.map(|c| json!({
+            "records": c.records,
+            "record_bytes": c.bytes,
+            "build_seconds": seconds(c.build.elapsed),
+            "build_rounds": c.build.rounds,
+            "build_camera_samples": c.build.camera_samples,
+            "dropped_points": c.build.dropped,
+            "build_rays": c.build.paths.camera_rays + c.build.paths.bounce_rays + c.build.paths.direct.segments,
+            "lookups": c.lookups.lookups,
+            "fallbacks": c.lookups.fallbacks,
+        })),
     })
 }
 
@@ -173,6 +188,15 @@ fn report(args: &RenderArgs, rendering: &Rendering, outputs: &[PathBuf]) {
         rendering.elapsed.as_secs_f64(),
         rendering.film.relative_noise() * 100.0
     ));
+    if let Some(c) = &rendering.cache {
+        progress::say(&format!(
+            "irradiance cache: {} records in {:.1} s, {:.2} % of {} lookups found none",
+            c.records,
+            c.build.elapsed.as_secs_f64(),
+            100.0 * c.lookups.fallbacks as f64 / c.lookups.lookups.max(1) as f64,
+            c.lookups.lookups
+        ));
+    }
     let invalid: u64 = rendering.film.pixels.iter().map(|p| p.invalid).sum();
     if invalid > 0 {
         progress::say(&format!("warning: {invalid} samples were not finite and count as black"));

@@ -84,6 +84,21 @@ fn apply(args: &SceneArgs, scene: &mut Scene) {
     if let Some(share) = args.bsdf_share {
         i.bsdf_share = share;
     }
+    if let Some(cached) = args.cached {
+        i.cache.cached = cached.value();
+    }
+    if let Some(error) = args.cache_error {
+        i.cache.error = error;
+    }
+    if let Some(radius) = args.cache_radius {
+        i.cache.radius = radius;
+    }
+    if let Some(samples) = args.cache_samples {
+        i.cache.samples = samples;
+    }
+    if let Some(passes) = args.cache_passes {
+        i.cache.passes = passes;
+    }
     if let Some(heuristic) = args.heuristic {
         i.heuristic = Some(heuristic.value());
     }

@@ -54,6 +54,8 @@ pub struct PixelSums {
     pub object: u32,
     /// Samples whose radiance was NaN or infinite; they count as black.
     pub invalid: u64,
+    /// Records of the irradiance cache that this pixel asked for.
+    pub records: u32,
 }
 
 impl PixelSums {

@@ -5,6 +5,7 @@
 //! the vertex straight from an emitter. So emission is added at the camera ray's hit only, and never twice.
 
 use crate::accel::{Coherence, Hit, RayBatch};
+use crate::bsdfs::Lobe;
 use crate::cameras::CameraRay;
 use crate::direct::{DirectStage, DirectStats, Fits, ShadePoint};
 use crate::film::{Features, PixelSample};
@@ -103,16 +104,16 @@ pub struct CameraSample {
 
 /// A path on its way.
 #[derive(Clone, Copy, Debug)]
-struct PathState {
+pub(super) struct PathState {
     /// Index of the camera sample.
-    sample: u32,
-    ray: Ray,
-    beta: Rgb,
+    pub(super) sample: u32,
+    pub(super) ray: Ray,
+    pub(super) beta: Rgb,
     /// Squared relative index of refraction along the path, which roulette takes out of β.
     eta_scale: f32,
     /// Width of the texture footprint at the ray's origin, and its growth per unit length.
-    width: f32,
-    spread: f32,
+    pub(super) width: f32,
+    pub(super) spread: f32,
     /// Surfaces without scattering passed since the last vertex.
     passed: u32,
     /// Distance travelled through such surfaces.
@@ -122,13 +123,15 @@ struct PathState {
 /// Traces paths; holds the buffers of one worker.
 #[derive(Debug, Default)]
 pub struct PathIntegrator {
-    active: Vec<PathState>,
-    next: Vec<PathState>,
+    pub(super) active: Vec<PathState>,
+    pub(super) next: Vec<PathState>,
     rays: RayBatch,
     hits: Vec<Option<Hit>>,
-    radiance: Vec<Rgb>,
-    direct: DirectStage,
-    stats: PathStats,
+    pub(super) radiance: Vec<Rgb>,
+    pub(super) direct: DirectStage,
+    pub(super) stats: PathStats,
+    /// Leaves out what is emitted towards the camera, and of the features all but the depth.
+    pub(super) only_reflected: bool,
     /// Where copies of what is traced go, if they are wanted.
     pub recording: Option<Recording>,
     /// Where the samples of direct light at first vertices go, if they are wanted.
@@ -152,20 +155,7 @@ impl PathIntegrator {
         fits: &mut Fits,
         out: &mut Vec<PixelSample>,
     ) {
-        out.clear();
-        out.resize(samples.len(), PixelSample::default());
-        self.active.clear();
-        self.active.extend(samples.iter().enumerate().map(|(i, s)| PathState {
-            sample: i as u32,
-            ray: s.ray.ray,
-            beta: Rgb::splat(s.weight),
-            eta_scale: 1.0,
-            width: s.ray.width0,
-            spread: s.ray.spread,
-            passed: 0,
-            travelled: 0.0,
-        }));
-
+        self.start(samples, out);
         let depth = settings.depth();
         for vertex in 0..=depth {
             if self.active.is_empty() {
@@ -192,9 +182,26 @@ impl PathIntegrator {
         }
     }
 
+    /// Makes the camera rays the active paths.
+    pub(super) fn start(&mut self, samples: &[CameraSample], out: &mut Vec<PixelSample>) {
+        out.clear();
+        out.resize(samples.len(), PixelSample::default());
+        self.active.clear();
+        self.active.extend(samples.iter().enumerate().map(|(i, s)| PathState {
+            sample: i as u32,
+            ray: s.ray.ray,
+            beta: Rgb::splat(s.weight),
+            eta_scale: 1.0,
+            width: s.ray.width0,
+            spread: s.ray.spread,
+            passed: 0,
+            travelled: 0.0,
+        }));
+    }
+
     /// Traces the active paths to their next vertex, adds what they see at the first one, and keeps those that hit
     /// something that scatters. The answer's items belong to the paths that `self.active` then holds.
-    fn find_vertices<'w>(
+    pub(super) fn find_vertices<'w>(
         &mut self,
         world: &'w World,
         vertex: u32,
@@ -213,22 +220,27 @@ impl PathIntegrator {
             for (path, hit) in self.active.iter().zip(&self.hits) {
                 let found = match hit {
                     None => {
-                        if vertex == 0 {
+                        if vertex == 0 && !self.only_reflected {
                             out[path.sample as usize].radiance += path.beta * world.scene.lights.le(path.ray.d);
                         }
                         continue;
                     }
                     Some(hit) => Found::new(world, path, hit),
                 };
-                if vertex == 0 {
+                if vertex == 0 && !self.only_reflected {
                     found.add_emission(world, path, &mut out[path.sample as usize].radiance);
                 }
                 match found.scatter(world) {
                     Some(bsdf) => {
                         if vertex == 0 {
-                            out[path.sample as usize]
-                                .features
-                                .get_or_insert_with(|| found.features(world, path, &bsdf));
+                            let depth_only = self.only_reflected;
+                            out[path.sample as usize].features.get_or_insert_with(|| {
+                                if depth_only {
+                                    Features { depth: found.depth(path), ..Features::default() }
+                                } else {
+                                    found.features(world, path, &bsdf)
+                                }
+                            });
                         }
                         if vertex < depth {
                             let sample = &samples[path.sample as usize];
@@ -310,24 +322,24 @@ impl PathIntegrator {
         self.next.clear();
         if vertex + 1 < depth {
             let paths = self.active.iter().zip(vertices).zip(points);
-            self.next.extend(paths.filter_map(|((path, v), point)| extend(path, v, point, vertex, settings)));
+            self.next.extend(paths.filter_map(|((path, v), point)| Some(extend(path, v, point, vertex, settings)?.0)));
         }
         self.stats.shade_time += start.elapsed();
     }
 }
 
 /// A vertex that scatters.
-#[derive(Debug)]
-struct Vertex<'w> {
-    surface: SurfaceHit,
-    bsdf: SurfaceBsdf<'w>,
-    wo: Vec3,
-    stream: SampleStream,
-    direct: SampleStream,
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Vertex<'w> {
+    pub(super) surface: SurfaceHit,
+    pub(super) bsdf: SurfaceBsdf<'w>,
+    pub(super) wo: Vec3,
+    pub(super) stream: SampleStream,
+    pub(super) direct: SampleStream,
 }
 
 impl<'w> Vertex<'w> {
-    fn shade_point(&self, time: f32, split: Split, fit: u32) -> ShadePoint<'w> {
+    pub(super) fn shade_point(&self, time: f32, split: Split, fit: u32) -> ShadePoint<'w> {
         ShadePoint {
             p: self.surface.p,
             p_error: self.surface.p_error,
@@ -341,15 +353,15 @@ impl<'w> Vertex<'w> {
     }
 }
 
-/// The next path segment by BSDF sampling and Russian roulette; `None` if the path ends.
-fn extend(
+/// The next path segment by BSDF sampling and Russian roulette, with the lobe that it took; `None` if the path ends.
+pub(super) fn extend(
     path: &PathState,
     v: &Vertex<'_>,
     point: &ShadePoint<'_>,
     vertex: u32,
     settings: &IntegratorSettings,
-) -> Option<PathState> {
-    let Direction { wi, weight, eta } = next_direction(v, settings)?;
+) -> Option<(PathState, Lobe)> {
+    let Direction { wi, weight, eta, lobe } = next_direction(v, settings)?;
     let mut beta = path.beta * weight;
     let eta_scale = path.eta_scale * eta * eta;
     if beta.is_black() || !beta.is_finite() {
@@ -366,7 +378,7 @@ fn extend(
     }
 
     let ray = Ray { o: point.origin(wi), d: wi, t_max: f32::INFINITY, time: path.ray.time };
-    Some(PathState { ray, beta, eta_scale, ..*path })
+    Some((PathState { ray, beta, eta_scale, ..*path }, lobe))
 }
 
 /// Where a path goes on.
@@ -376,6 +388,7 @@ struct Direction {
     weight: Rgb,
     /// Relative index of refraction.
     eta: f32,
+    lobe: Lobe,
 }
 
 /// A direction by BSDF sampling; of a BSDF that can only be evaluated, by resampling M proposals.
@@ -385,12 +398,12 @@ fn next_direction(v: &Vertex<'_>, settings: &IntegratorSettings) -> Option<Direc
         let proposal = |i| v.stream.split(domain::BSDF, count, i).draw::<3>();
         let [u_choice] = v.stream.domain(domain::RESAMPLE).draw::<1>();
         let r = v.bsdf.resample(v.wo, count, proposal, u_choice)?;
-        return Some(Direction { wi: r.wi, weight: r.f * (v.bsdf.cos(r.wi) * r.weight), eta: r.eta });
+        return Some(Direction { wi: r.wi, weight: r.f * (v.bsdf.cos(r.wi) * r.weight), eta: r.eta, lobe: r.lobe });
     }
     let [uc, u0, u1] = v.stream.domain(domain::BSDF).draw::<3>();
     let sample = v.bsdf.sample(v.wo, uc, [u0, u1])?;
     let weight = sample.f * (sample.wi.dot(v.bsdf.frame.z).abs() / sample.pdf);
-    Some(Direction { wi: sample.wi, weight, eta: sample.eta })
+    Some(Direction { wi: sample.wi, weight, eta: sample.eta, lobe: sample.lobe })
 }
 
 /// A hit with what shading needs of it.
@@ -444,10 +457,15 @@ impl Found {
         Features {
             albedo: bsdf.albedo_estimate(self.wo),
             normal: if z.dot(self.wo) < 0.0 { -z } else { z },
-            depth: path.travelled + self.distance,
+            depth: self.depth(path),
             material: world.scene.surfaces[self.hit.geometry as usize].material,
             object: self.hit.geometry,
         }
+    }
+
+    /// Distance from the camera along the ray.
+    fn depth(&self, path: &PathState) -> f32 {
+        path.travelled + self.distance
     }
 
     /// The path beyond a surface that does not scatter.

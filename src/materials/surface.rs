@@ -1,6 +1,6 @@
 //! A BSDF in the shading frame of a hit, for directions in world space.
 
-use crate::bsdfs::{Bsdf, BsdfSample, Resampled, resample};
+use crate::bsdfs::{Bsdf, BsdfSample, Lambertian, Resampled, resample};
 use crate::math::{Frame, Rgb, Vec3};
 use crate::simd::{self, bsdf::Values};
 
@@ -16,7 +16,7 @@ pub struct SurfaceBsdf<'a> {
     pub n: Vec3,
 }
 
-impl SurfaceBsdf<'_> {
+impl<'a> SurfaceBsdf<'a> {
     /// Value without cosine (1/sr), without deltas.
     #[inline]
     pub fn f(&self, wo: Vec3, wi: Vec3) -> Rgb {
@@ -100,6 +100,12 @@ impl SurfaceBsdf<'_> {
     #[inline]
     pub fn cos(&self, w: Vec3) -> f32 {
         self.frame.z.dot(w).abs()
+    }
+
+    /// The Lambertian part as seen from `wo`, see [`Bsdf::lambertian`].
+    #[inline]
+    pub fn lambertian(&self, wo: Vec3) -> Option<Lambertian<'a>> {
+        self.bsdf.lambertian(self.frame.to_local(wo))
     }
 
     /// Fraction of uniform light that reaches `wo`, see [`Bsdf::albedo_estimate`].

@@ -13,12 +13,13 @@ use crate::direct::Fits;
 use crate::estimators::ocv::block_of;
 use crate::film::filter::FilterSampler;
 use crate::film::{Film, PixelBounds, PixelSample, PixelSums};
+use crate::integrators::irradiance_cache::{self, BuildStats, IrradianceCache, LookupStats};
 use crate::integrators::path::CameraSample;
-use crate::integrators::{PathIntegrator, PathStats};
+use crate::integrators::{CacheIntegrator, PathIntegrator, PathStats};
 use crate::math::Vec2;
 use crate::math::hash::pcg4d;
 use crate::samplers::SampleStream;
-use crate::scene::{Proposals, World};
+use crate::scene::{IntegratorKind, Proposals, World};
 use rayon::prelude::*;
 use std::sync::atomic::{AtomicBool, AtomicU64, Ordering};
 use std::time::{Duration, Instant};
@@ -79,12 +80,41 @@ pub struct Rendering {
     pub film: Film,
     /// Counts and times, summed over threads.
     pub stats: PathStats,
+    /// The irradiance cache, if there is one.
+    pub cache: Option<CacheReport>,
     /// Wall-clock time.
     pub elapsed: Duration,
     /// True if every pixel has all its samples.
     pub complete: bool,
     /// Threads used.
     pub threads: usize,
+}
+
+/// What became of an irradiance cache.
+#[derive(Clone, Copy, Debug)]
+pub struct CacheReport {
+    /// Records.
+    pub records: usize,
+    /// Bytes that they take.
+    pub bytes: usize,
+    /// How it was made; the counts of its rays are also part of the rendering's.
+    pub build: BuildStats,
+    /// How often it was asked, and how often in vain.
+    pub lookups: LookupStats,
+}
+
+/// Counts of one worker.
+#[derive(Clone, Copy, Debug, Default)]
+struct WorkerStats {
+    paths: PathStats,
+    lookups: LookupStats,
+}
+
+impl WorkerStats {
+    fn merge(&mut self, other: &WorkerStats) {
+        self.paths.merge(&other.paths);
+        self.lookups.merge(&other.lookups);
+    }
 }
 
 /// Why a rendering could not start.
@@ -157,6 +187,7 @@ struct Run<'a> {
     stop: &'a AtomicBool,
     observe: &'a (dyn Fn(&Progress) + Sync),
     filter: FilterSampler,
+    cache: Option<IrradianceCache>,
     start: Instant,
     samples_done: AtomicU64,
     rays: AtomicU64,
@@ -175,14 +206,16 @@ impl<'a> Run<'a> {
             stop,
             observe,
             filter: world.scene.film.filter.sampler(),
+            cache: None,
             start: Instant::now(),
             samples_done: AtomicU64::new(0),
             rays: AtomicU64::new(0),
         }
     }
 
-    fn run(&self, threads: usize) -> Rendering {
+    fn run(mut self, threads: usize) -> Rendering {
         let bounds = self.world.scene.film.bounds;
+        let build = self.build_cache();
         let integrator = &self.world.scene.integrator;
         let mut tiles: Vec<Tile> = bounds
             .tiles(self.settings.tile_size)
@@ -197,7 +230,7 @@ impl<'a> Run<'a> {
         // Passes over all tiles: 1, 1, 2, 4, … samples, so that there is a whole picture soon
         let longest = self.pass_length();
         let end = self.settings.first_sample + self.settings.spp;
-        let mut stats = PathStats::default();
+        let mut stats = WorkerStats::default();
         let mut noise = None;
         let mut first = self.settings.first_sample;
         while first < end && !self.stopped() {
@@ -218,8 +251,29 @@ impl<'a> Run<'a> {
 
         let mut film = Film::new(self.world.scene.film.resolution, bounds);
         tiles.iter().for_each(|t| film.replace_tile(&t.bounds, &t.sums));
+        let cache = self.cache.as_ref().zip(build).map(|(cache, build)| {
+            stats.paths.merge(&build.paths);
+            for [x, y] in cache.records().iter().map(|r| r.pixel) {
+                let index = film.index(x, y);
+                film.pixels[index].records += 1;
+            }
+            CacheReport { records: cache.records().len(), bytes: cache.bytes(), build, lookups: stats.lookups }
+        });
         let complete = film.pixels.iter().all(|p| p.count == u64::from(self.settings.spp));
-        Rendering { film, stats, elapsed: self.start.elapsed(), complete, threads }
+        Rendering { film, stats: stats.paths, cache, elapsed: self.start.elapsed(), complete, threads }
+    }
+
+    /// Makes the irradiance cache, if the integrator has one.
+    fn build_cache(&mut self) -> Option<BuildStats> {
+        if self.world.scene.integrator.kind != IntegratorKind::IrradianceCache {
+            return None;
+        }
+        let bounds = self.world.scene.film.bounds;
+        let seed = self.world.scene.sampling.seed;
+        let camera = |pixel, sample| self.camera_sample_of_seed(pixel, sample, seed);
+        let (cache, stats) = irradiance_cache::build(self.world, bounds, &camera, self.stop);
+        self.cache = Some(cache);
+        Some(stats)
     }
 
     /// Samples per pixel of the longest pass.
@@ -241,17 +295,17 @@ impl<'a> Run<'a> {
     }
 
     /// Adds the samples of a range to every tile.
-    fn pass(&self, tiles: &mut [Tile], samples: std::ops::Range<u32>, noise: Option<f64>) -> PathStats {
+    fn pass(&self, tiles: &mut [Tile], samples: std::ops::Range<u32>, noise: Option<f64>) -> WorkerStats {
         tiles
             .par_iter_mut()
             .with_max_len(1)
             .map_init(Worker::default, |worker, tile| {
                 if self.stop.load(Ordering::Relaxed) {
-                    return PathStats::default();
+                    return WorkerStats::default();
                 }
                 let stats = self.render_tile(worker, tile, samples.clone());
-                let direct = stats.direct;
-                let rays = stats.camera_rays + stats.bounce_rays + direct.emitter_rays + direct.segments;
+                let (paths, direct) = (&stats.paths, &stats.paths.direct);
+                let rays = paths.camera_rays + paths.bounce_rays + direct.emitter_rays + direct.segments;
                 let done = tile.bounds.area() as u64 * u64::from(samples.end - samples.start);
                 (self.observe)(&Progress {
                     samples_done: self.samples_done.fetch_add(done, Ordering::Relaxed) + done,
@@ -262,14 +316,14 @@ impl<'a> Run<'a> {
                 });
                 stats
             })
-            .reduce(PathStats::default, |mut a, b| {
+            .reduce(WorkerStats::default, |mut a, b| {
                 a.merge(&b);
                 a
             })
     }
 
     /// Adds the samples of a range to one tile, in batches of whole pixels.
-    fn render_tile(&self, worker: &mut Worker, tile: &mut Tile, samples: std::ops::Range<u32>) -> PathStats {
+    fn render_tile(&self, worker: &mut Worker, tile: &mut Tile, samples: std::ops::Range<u32>) -> WorkerStats {
         let per_pixel = samples.len().max(1);
         let pixels_per_batch = (BATCH_PATHS / per_pixel).max(1);
         let bounds = tile.bounds;
@@ -282,21 +336,21 @@ impl<'a> Run<'a> {
             ill_conditioned = tile.fits.solve();
         }
         let solve = start.elapsed();
-        let integrator = &mut worker.integrator;
         for (batch, sums) in tile.sums.chunks_mut(pixels_per_batch).enumerate() {
             let first = batch * pixels_per_batch;
             self.camera_samples(&bounds, first..first + sums.len(), samples.clone(), &mut worker.samples);
-            integrator.trace(self.world, settings, &worker.samples, &mut tile.fits, &mut worker.results);
+            worker.trace(self.world, self.cache.as_ref(), &mut tile.fits);
             for (pixel, results) in sums.iter_mut().zip(worker.results.chunks(per_pixel)) {
                 results.iter().for_each(|r| pixel.add(r));
             }
         }
-        let mut stats = integrator.take_stats();
+        let mut stats = worker.take_stats(self.cache.is_some());
         if begins_block {
-            stats.direct.systems += tile.sums.len() as u64;
-            stats.direct.ill_conditioned += ill_conditioned;
-            stats.direct.solve += solve;
-            stats.direct.select += solve;
+            let direct = &mut stats.paths.direct;
+            direct.systems += tile.sums.len() as u64;
+            direct.ill_conditioned += ill_conditioned;
+            direct.solve += solve;
+            direct.select += solve;
         }
         stats
     }
@@ -359,6 +413,27 @@ impl<'a> Run<'a> {
 #[derive(Default)]
 struct Worker {
     integrator: PathIntegrator,
+    with_cache: CacheIntegrator,
     samples: Vec<CameraSample>,
     results: Vec<PixelSample>,
+}
+
+impl Worker {
+    /// Traces `samples` into `results`.
+    fn trace(&mut self, world: &World, cache: Option<&IrradianceCache>, fits: &mut Fits) {
+        let (samples, results) = (&self.samples, &mut self.results);
+        match cache {
+            None => self.integrator.trace(world, &world.scene.integrator, samples, fits, results),
+            Some(cache) => self.with_cache.trace(world, cache, samples, fits, results),
+        }
+    }
+
+    fn take_stats(&mut self, has_cache: bool) -> WorkerStats {
+        if has_cache {
+            let (paths, lookups) = self.with_cache.take_stats();
+            WorkerStats { paths, lookups }
+        } else {
+            WorkerStats { paths: self.integrator.take_stats(), lookups: LookupStats::default() }
+        }
+    }
 }

@@ -2,7 +2,7 @@
 
 use crate::film::Film;
 use crate::imaging::color::linear_to_srgb;
-use crate::scene::{EstimatorKind, Proposals, Scene, SplitMap};
+use crate::scene::{Cached, EstimatorKind, IntegratorKind, Proposals, Scene, SplitMap};
 
 /// A group of channels beside the picture itself.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -24,6 +24,8 @@ pub enum Aov {
     /// The best M/N of `ris`: as a colour `ratio.R/G/B`, green where more proposals and red where more samples are best
     /// [Talbot et al. 2005, Fig. 3], and as numbers `ratio.proposals` and `ratio.samples`.
     Ratio,
+    /// Records of the irradiance cache that the pixel asked for, `records`.
+    Records,
 }
 
 impl Aov {
@@ -42,6 +44,7 @@ impl Aov {
             Aov::Material => "material",
             Aov::Object => "object",
             Aov::Ratio => "ratio",
+            Aov::Records => "records",
         }
     }
 
@@ -55,6 +58,7 @@ impl Aov {
             Aov::Material => &["material"],
             Aov::Object => &["object"],
             Aov::Ratio => &["ratio.R", "ratio.G", "ratio.B", "ratio.proposals", "ratio.samples"],
+            Aov::Records => &["records"],
         }
     }
 }
@@ -87,6 +91,7 @@ pub fn channels(film: &Film, aovs: &[Aov], splits: Option<&SplitMap>) -> Channel
                 Aov::Material => data.push(pixel.material as f32),
                 Aov::Object => data.push(pixel.object as f32),
                 Aov::Ratio => data.extend(splits.map_or([0.0; 5], |map| ratio_values(map, i))),
+                Aov::Records => data.push(pixel.records as f32),
             }
         }
     }
@@ -152,6 +157,18 @@ pub fn settings_metadata(scene: &Scene) -> Vec<(String, String)> {
             entries.push(if i.estimator == EstimatorKind::Ocv { form } else { optimal });
             entries.push(("components", i.ocv.most_components().to_string()));
             entries.push(("bsdf_share", i.bsdf_share.to_string()));
+        }
+    }
+    if i.kind == IntegratorKind::IrradianceCache {
+        let c = &i.cache;
+        entries.extend([
+            ("cached", c.cached.name().to_owned()),
+            ("cache_error", c.error.to_string()),
+            ("cache_radius", format!("{},{}", c.radius[0], c.radius[1])),
+            ("cache_samples", c.samples.to_string()),
+        ]);
+        if c.cached == Cached::All {
+            entries.push(("cache_passes", c.passes.to_string()));
         }
     }
     entries.into_iter().map(|(key, value)| (format!("lumiris:{key}"), value)).collect()

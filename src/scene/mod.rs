@@ -7,8 +7,8 @@ mod split_map;
 mod world;
 
 pub use settings::{
-    EstimatorKind, IntegratorKind, IntegratorSettings, OcvSettings, OptimalForm, ProposalPoints, Proposals,
-    RisSettings, Split, StageTimes, Strata, Target,
+    Cached, EstimatorKind, IntegratorKind, IntegratorSettings, IrradianceCacheSettings, OcvSettings, OptimalForm,
+    ProposalPoints, Proposals, RisSettings, Split, StageTimes, Strata, Target,
 };
 pub use split_map::SplitMap;
 pub use world::{AccelKind, EmitterHit, World};

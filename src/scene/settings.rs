@@ -11,7 +11,7 @@ use crate::lights::LightSamplerKind;
 pub struct IntegratorSettings {
     /// What is computed.
     pub kind: IntegratorKind,
-    /// Number of bounces for `path`; 1 is direct light.
+    /// Number of bounces; 1 is direct light. With `irradiance-cache` those that a record holds count from the record.
     pub max_depth: u32,
     /// Direct-light estimator at each path vertex.
     pub estimator: EstimatorKind,
@@ -27,6 +27,8 @@ pub struct IntegratorSettings {
     pub light_choice: LightSamplerKind,
     /// What is particular to `ris`.
     pub ris: RisSettings,
+    /// What is particular to `irradiance-cache`.
+    pub cache: IrradianceCacheSettings,
     /// What is particular to `ocv`.
     pub ocv: OcvSettings,
     /// How `optimal-mis` finds its weights.
@@ -57,6 +59,7 @@ impl Default for IntegratorSettings {
             bsdf_share: 0.5,
             light_choice: LightSamplerKind::Tree,
             ris: RisSettings::default(),
+            cache: IrradianceCacheSettings::default(),
             ocv: OcvSettings::default(),
             optimal_mis: OptimalForm::Progressive,
             bsdf_proposals: 4,
@@ -70,7 +73,7 @@ impl IntegratorSettings {
     pub fn depth(&self) -> u32 {
         match self.kind {
             IntegratorKind::Direct => self.max_depth.min(1),
-            IntegratorKind::Path => self.max_depth,
+            IntegratorKind::Path | IntegratorKind::IrradianceCache => self.max_depth,
         }
     }
 
@@ -137,6 +140,8 @@ pub enum IntegratorKind {
     Direct,
     /// Paths of up to `max_depth` bounces.
     Path,
+    /// The same, with the light that diffuse surfaces reflect interpolated between records [Ward et al. 1988].
+    IrradianceCache,
 }
 
 impl IntegratorKind {
@@ -145,6 +150,60 @@ impl IntegratorKind {
         match self {
             IntegratorKind::Direct => "direct",
             IntegratorKind::Path => "path",
+            IntegratorKind::IrradianceCache => "irradiance-cache",
+        }
+    }
+}
+
+/// Irradiance caching [Ward et al. 1988; Ward and Heckbert 1992; Křivánek et al. 2008].
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct IrradianceCacheSettings {
+    /// What records hold.
+    pub cached: Cached,
+    /// κ: a record serves up to the distance κR from it, R being the harmonic mean distance of what it sees, and up to a turn
+    /// of the normal by some √2·κ radians. The bias grows with it.
+    pub error: f32,
+    /// Least and greatest distance up to which a record serves, in pixels as they lie on its surface.
+    pub radius: [f32; 2],
+    /// Directions of the hemisphere of a record, in which indirect light is sampled.
+    pub samples: u32,
+    /// Estimates of the light of sources at each record, with `cached` `all`.
+    pub passes: u32,
+}
+
+impl Default for IrradianceCacheSettings {
+    fn default() -> Self {
+        IrradianceCacheSettings { cached: Cached::Indirect, error: 0.2, radius: [1.5, 20.0], samples: 256, passes: 4 }
+    }
+}
+
+impl IrradianceCacheSettings {
+    /// True if `error` can be κ.
+    pub fn is_error(error: f32) -> bool {
+        error > 0.0 && error < 1.0
+    }
+
+    /// True if `radius` can be the least and the greatest number of pixels.
+    pub fn is_radius([min, max]: [f32; 2]) -> bool {
+        min > 0.0 && min <= max && max.is_finite()
+    }
+}
+
+/// What the records of the irradiance cache hold.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Cached {
+    /// Indirect light; light from sources is estimated at every camera ray's hit.
+    Indirect,
+    /// Indirect light and light from sources [Fan et al. 2006, §5.1].
+    All,
+}
+
+impl Cached {
+    /// The name on the command line and in metadata.
+    pub fn name(self) -> &'static str {
+        match self {
+            Cached::Indirect => "indirect",
+            Cached::All => "all",
         }
     }
 }

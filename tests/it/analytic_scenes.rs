@@ -25,7 +25,7 @@ const SIGNIFICANCE: f64 = 1e-3;
 /// What f32 arithmetic may be off where there is no noise, relative.
 const ROUNDING: f64 = 3e-5;
 
-fn scene_files() -> Vec<PathBuf> {
+pub fn scene_files() -> Vec<PathBuf> {
     let folder = Path::new(env!("CARGO_MANIFEST_DIR")).join("scenes/analytic");
     let mut files: Vec<PathBuf> = std::fs::read_dir(folder).unwrap().map(|e| e.unwrap().path()).collect();
     files.retain(|p| p.extension().is_some_and(|e| e == "pbrt"));
@@ -34,7 +34,7 @@ fn scene_files() -> Vec<PathBuf> {
     files
 }
 
-fn answer(path: &Path) -> [f64; 3] {
+pub fn answer(path: &Path) -> [f64; 3] {
     let text = std::fs::read_to_string(path).unwrap();
     let line = text.lines().find_map(|l| l.strip_prefix("# answer:")).unwrap();
     let values: Vec<f64> = line.split_whitespace().map(|v| v.parse().unwrap()).collect();
@@ -150,7 +150,7 @@ fn world(path: &Path, c: &Configuration) -> World {
 }
 
 /// Means of the pictures of `RUNS` seeds, per channel.
-fn picture_means(world: &mut World) -> [Welford; 3] {
+pub fn picture_means(world: &mut World) -> [Welford; 3] {
     let mut means = [Welford::default(); 3];
     for seed in 0..RUNS {
         world.scene.sampling.seed = seed;

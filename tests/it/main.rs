@@ -7,6 +7,7 @@ mod cli;
 mod crosscheck;
 mod estimators_1d;
 mod evaluated;
+mod irradiance_cache;
 mod layering;
 mod mutations;
 mod reproduce;

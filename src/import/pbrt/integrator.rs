@@ -8,7 +8,8 @@ use crate::estimators::ocv::Form;
 use crate::import::diagnostic::Diagnostics;
 use crate::lights::LightSamplerKind;
 use crate::scene::{
-    EstimatorKind, IntegratorKind, IntegratorSettings, OptimalForm, ProposalPoints, Proposals, Strata, Target,
+    Cached, EstimatorKind, IntegratorKind, IntegratorSettings, IrradianceCacheSettings, OptimalForm, ProposalPoints,
+    Proposals, Strata, Target,
 };
 
 /// Understands `Integrator`.
@@ -18,6 +19,7 @@ pub(super) fn finish_integrator(pending: Option<&Pending>, d: &mut Diagnostics) 
     match name.text.as_str() {
         "path" | "volpath" => {}
         "direct" => s.kind = IntegratorKind::Direct,
+        "irradiance-cache" => s.kind = IntegratorKind::IrradianceCache,
         "directlighting" => {
             s.kind = IntegratorKind::Direct;
             d.warning_once(name.span, "integrator `directlighting` is pbrt-v3: `direct` is used");
@@ -25,7 +27,7 @@ pub(super) fn finish_integrator(pending: Option<&Pending>, d: &mut Diagnostics) 
         "simplepath" | "simplevolpath" | "bdpt" | "mlt" | "sppm" | "lightpath" | "ao" | "randomwalk" | "whitted" => {
             d.warning_once(name.span, format!("integrator `{}` is not rendered here: `path` is used", name.text));
         }
-        other => unknown(other, name.span, "integrator", &["path", "direct", "volpath"], d),
+        other => unknown(other, name.span, "integrator", &["path", "direct", "irradiance-cache", "volpath"], d),
     }
     match p.integer("maxdepth", d) {
         Some(n @ 0..=10_000) => s.max_depth = n as u32,
@@ -36,6 +38,7 @@ pub(super) fn finish_integrator(pending: Option<&Pending>, d: &mut Diagnostics) 
         None => {}
     }
     lumiris_parameters(&mut s, p, d);
+    cache_parameters(&mut s.cache, p, d);
     if p.ignore("regularize") {
         d.warning_once(p.span_of("regularize"), "regularize is ignored: it would bias the picture");
     }
@@ -131,6 +134,39 @@ fn lumiris_parameters(s: &mut IntegratorSettings, p: &ParamSet, d: &mut Diagnost
         }
     } else if let Some(n) = count(p, "proposals", d) {
         s.ris.proposals = Proposals::Fixed(n);
+    }
+}
+
+/// Parameters of `irradiance-cache`.
+fn cache_parameters(s: &mut IrradianceCacheSettings, p: &ParamSet, d: &mut Diagnostics) {
+    if let Some(cached) = choice(p, "cached", &[Cached::Indirect, Cached::All], Cached::name, d) {
+        s.cached = cached;
+    }
+    if let Some(error) = p.float("cacheerror", d) {
+        if IrradianceCacheSettings::is_error(error) {
+            s.error = error;
+        } else {
+            d.error(p.span_of("cacheerror"), format!("cacheerror must be above 0 and below 1, not {error}"));
+        }
+    }
+    let min = p.float("cacheminradius", d).unwrap_or(s.radius[0]);
+    let radius = [min, p.float("cachemaxradius", d).unwrap_or(s.radius[1].max(min))];
+    if IrradianceCacheSettings::is_radius(radius) {
+        s.radius = radius;
+    } else {
+        let key = if p.type_of("cachemaxradius").is_some() { "cachemaxradius" } else { "cacheminradius" };
+        let message = format!("cacheminradius and cachemaxradius must be positive, and not {} and {}", min, radius[1]);
+        d.error(p.span_of(key), message).help("pixels; the least one first");
+    }
+    if let Some(n) = p.integer("cachesamples", d) {
+        if let n @ 8..=65_536 = n {
+            s.samples = n as u32;
+        } else {
+            d.error(p.span_of("cachesamples"), format!("cachesamples must be from 8 to 65536, not {n}"));
+        }
+    }
+    if let Some(n) = count(p, "cachepasses", d) {
+        s.passes = n;
     }
 }
 

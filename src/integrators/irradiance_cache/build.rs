@@ -1,0 +1,287 @@
+//! Makes the cache, the same for any number of threads.
+//!
+//! Camera samples ask in rounds, of coarser subsets of the pixels first: 16 pixels apart, then those between, and so on; the
+//! second camera sample of every pixel after the first of all. In a round
+//!
+//! 1. all its camera samples, and what they see in mirrors and through glass, are traced in parallel; those whose diffuse
+//!    surface no record of earlier rounds serves, ask for one;
+//! 2. one after the other, a point is dropped that a record at an accepted point would serve, however small its reach;
+//! 3. the records of the others are computed in parallel;
+//! 4. one after the other, in the order of pixels, they are added.
+//!
+//! So a round sees what earlier rounds made and nothing else.
+
+use super::cache::IrradianceCache;
+use super::gather::{BATCH, Gatherer, Wanted};
+use super::octree::Octree;
+use super::record::{Range, Record};
+use crate::film::{PixelBounds, PixelSample};
+use crate::integrators::path::{self, CameraSample, PathIntegrator, PathStats};
+use crate::math::{Bounds3, Vec3};
+use crate::scene::{Cached, World};
+use rayon::prelude::*;
+use std::sync::atomic::{AtomicBool, Ordering};
+use std::time::{Duration, Instant};
+
+/// Distance of the pixels of the first round.
+const COARSEST: u32 = 16;
+/// Camera samples of each pixel that ask.
+const SAMPLES: u32 = 2;
+/// Camera samples ask if no record serves them with this error: those of the picture find one with less than 1.
+const COVERED: f32 = 0.7;
+/// A vertex that a camera ray reaches by mirrors and glass asks only if so much of its light arrives.
+const WORTHWHILE: f32 = 0.2;
+/// Camera samples that are traced together.
+const CHUNK: usize = 1024;
+/// Records that are computed before they are added; no limit to what a round adds.
+const MOST_AT_ONCE: usize = 1 << 14;
+
+/// What making the cache took.
+#[derive(Clone, Copy, Debug, Default)]
+pub struct BuildStats {
+    /// Rounds.
+    pub rounds: u32,
+    /// Points that asked for a record and were served by another one of their round.
+    pub dropped: u64,
+    /// Camera samples that asked.
+    pub camera_samples: u64,
+    /// Counts and times of tracing, summed over threads.
+    pub paths: PathStats,
+    /// Wall-clock time.
+    pub elapsed: Duration,
+}
+
+/// Where the samples of the camera come from: pixel and index.
+pub type Cameras<'a> = &'a (dyn Fn([u32; 2], u32) -> CameraSample + Sync);
+
+/// Makes the cache of what the camera sees inside `bounds`. `stop` ends it early.
+pub fn build(
+    world: &World,
+    bounds: PixelBounds,
+    cameras: Cameras<'_>,
+    stop: &AtomicBool,
+) -> (IrradianceCache, BuildStats) {
+    let start = Instant::now();
+    let world_bounds = world.scene.geometry.world_bounds();
+    let mut cache = IrradianceCache::new(world.scene.integrator.cache, &world_bounds);
+    let mut stats = BuildStats::default();
+    if holds_nothing(world) {
+        return (cache, stats);
+    }
+    for round in rounds() {
+        if cache.is_full() || stop.load(Ordering::Relaxed) {
+            break;
+        }
+        stats.rounds += 1;
+        let pixels = round.pixels(bounds);
+        stats.camera_samples += pixels.len() as u64;
+        let wanted = ask(world, &cache, &pixels, &|pixel| cameras(pixel, round.sample), &mut stats.paths);
+        let wanted: Vec<Wanted> = wanted.into_iter().map(|w| Wanted { key: w.key | round.sample << 16, ..w }).collect();
+        let chosen = without_redundant(&wanted, &cache, &world_bounds);
+        stats.dropped += (wanted.len() - chosen.len()) as u64;
+        for part in chosen.chunks(MOST_AT_ONCE) {
+            if cache.is_full() || stop.load(Ordering::Relaxed) {
+                break;
+            }
+            gather(world, part, &mut stats.paths).into_iter().for_each(|r| cache.insert(r));
+        }
+    }
+    stats.elapsed = start.elapsed();
+    (cache, stats)
+}
+
+/// True if no record would have any light.
+fn holds_nothing(world: &World) -> bool {
+    let settings = &world.scene.integrator;
+    let least_depth = match settings.cache.cached {
+        Cached::Indirect => 2,
+        Cached::All => 1,
+    };
+    settings.max_depth < least_depth || world.scene.lights.lights.is_empty()
+}
+
+/// A subset of the pixels: those whose x and y are `offset` modulo `stride`.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+struct Round {
+    stride: u32,
+    offset: [u32; 2],
+    sample: u32,
+}
+
+/// All rounds: every pixel once for each of [`SAMPLES`] samples, far from each other first.
+fn rounds() -> Vec<Round> {
+    let mut rounds = vec![Round { stride: COARSEST, offset: [0, 0], sample: 0 }];
+    let mut stride = COARSEST;
+    while stride > 1 {
+        let half = stride / 2;
+        rounds.extend([[half, half], [half, 0], [0, half]].map(|offset| Round { stride, offset, sample: 0 }));
+        stride = half;
+    }
+    rounds.extend((1..SAMPLES).map(|sample| Round { stride: 1, offset: [0, 0], sample }));
+    rounds
+}
+
+impl Round {
+    /// The pixels, row by row.
+    fn pixels(&self, bounds: PixelBounds) -> Vec<[u32; 2]> {
+        let along = |from: u32, to: u32, offset: u32| {
+            (from..to).filter(move |v| (v - from) % self.stride == offset % self.stride)
+        };
+        let rows = along(bounds.y0, bounds.y1, self.offset[1]);
+        rows.flat_map(|y| along(bounds.x0, bounds.x1, self.offset[0]).map(move |x| [x, y])).collect()
+    }
+}
+
+/// The points that the camera samples of some pixels ask for, in the order of pixels.
+fn ask(
+    world: &World,
+    cache: &IrradianceCache,
+    pixels: &[[u32; 2]],
+    camera: &(dyn Fn([u32; 2]) -> CameraSample + Sync),
+    stats: &mut PathStats,
+) -> Vec<Wanted> {
+    let parts: Vec<(Vec<Wanted>, PathStats)> = pixels
+        .par_chunks(CHUNK)
+        .map_init(PathIntegrator::default, |paths, pixels| {
+            let samples: Vec<CameraSample> = pixels.iter().map(|&pixel| camera(pixel)).collect();
+            (ask_chunk(world, cache, pixels, &samples, paths), paths.take_stats())
+        })
+        .collect();
+    parts.iter().for_each(|(_, s)| stats.merge(s));
+    parts.into_iter().flat_map(|(wanted, _)| wanted).collect()
+}
+
+fn ask_chunk(
+    world: &World,
+    cache: &IrradianceCache,
+    pixels: &[[u32; 2]],
+    samples: &[CameraSample],
+    paths: &mut PathIntegrator,
+) -> Vec<Wanted> {
+    let settings = &world.scene.integrator;
+    let depth = settings.depth();
+    let mut wanted = Vec::new();
+    let mut out: Vec<PixelSample> = Vec::new();
+    paths.only_reflected = true;
+    paths.start(samples, &mut out);
+    for vertex in 0..depth {
+        if paths.active.is_empty() {
+            break;
+        }
+        let vertices = paths.find_vertices(world, vertex, depth, samples, &mut out);
+        paths.next.clear();
+        for (state, v) in paths.active.iter().zip(&vertices) {
+            let sample = state.sample as usize;
+            let weight = samples[sample].weight.abs();
+            if state.beta.map(f32::abs).max_component() < WORTHWHILE * weight {
+                continue;
+            }
+            let sides = unserved_sides(cache, v).into_iter().flatten();
+            wanted.extend(sides.map(|(side, ns)| Wanted {
+                p: v.surface.p,
+                p_error: v.surface.p_error,
+                n: v.bsdf.n,
+                ns,
+                time: state.ray.time,
+                pixel_width: pixel_width(state.width, v.surface.p),
+                spread: state.spread,
+                pixel: pixels[sample],
+                key: vertex << 1 | side,
+            }));
+            // Mirrors and glass
+            let point = v.shade_point(state.ray.time, samples[sample].split, 0);
+            let next = path::extend(state, v, &point, vertex, settings);
+            paths.next.extend(next.filter(|(_, lobe)| lobe.is_specular()).map(|(state, _)| state));
+        }
+        std::mem::swap(&mut paths.active, &mut paths.next);
+    }
+    // Paths went on vertex by vertex
+    wanted.sort_by_key(|w| [w.pixel[1], w.pixel[0]]);
+    wanted
+}
+
+/// The sides of a diffuse surface, 0 that of the viewer and 1 the other, that reflect or transmit light and that no record
+/// serves, with their normals.
+fn unserved_sides(cache: &IrradianceCache, v: &path::Vertex<'_>) -> [Option<(u32, Vec3)>; 2] {
+    let Some(part) = v.bsdf.lambertian(v.wo) else { return [None; 2] };
+    let ns = super::viewer_normal(v);
+    [(0, part.reflectance, ns), (1, part.transmittance, -ns)].map(|(side, albedo, ns)| {
+        let asks = !albedo.is_black() && !cache.serves(v.surface.p, ns, COVERED);
+        asks.then_some((side, ns))
+    })
+}
+
+/// Width of a pixel at `p`, not so small that positions cannot be told apart.
+fn pixel_width(width: f32, p: Vec3) -> f32 {
+    width.max(1e-6 * p.abs().max_element()).max(1e-30)
+}
+
+/// The points without those that a record of the least reach at an earlier one would serve.
+fn without_redundant(wanted: &[Wanted], cache: &IrradianceCache, bounds: &Bounds3) -> Vec<Wanted> {
+    let settings = cache.settings();
+    let mut chosen: Vec<Wanted> = Vec::new();
+    let mut ranges: Vec<Range> = Vec::new();
+    let mut tree = Octree::new(bounds);
+    for w in wanted {
+        let mut is_served = false;
+        tree.at_point(w.p, |id| is_served |= ranges[id as usize].error(settings.error, w.p, w.ns) <= COVERED);
+        if !is_served {
+            let reach = settings.radius[0] * w.pixel_width;
+            tree.insert(ranges.len() as u32, w.p, reach);
+            ranges.push(Range { p: w.p, n: w.ns, reach });
+            chosen.push(*w);
+        }
+    }
+    chosen
+}
+
+/// The records of the points, in their order.
+fn gather(world: &World, wanted: &[Wanted], stats: &mut PathStats) -> Vec<Record> {
+    let parts: Vec<(Vec<Record>, PathStats)> = wanted
+        .par_chunks(BATCH)
+        .map_init(Gatherer::default, |gatherer, wanted| (gatherer.records(world, wanted), gatherer.take_stats()))
+        .collect();
+    parts.iter().for_each(|(_, s)| stats.merge(s));
+    parts.into_iter().flat_map(|(records, _)| records).collect()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn rounds_take_every_pixel_once_for_each_sample() {
+        let bounds = PixelBounds { x0: 3, x1: 40, y0: 5, y1: 23 };
+        for sample in 0..SAMPLES {
+            let mut counts = vec![0; bounds.area()];
+            for round in rounds().iter().filter(|r| r.sample == sample) {
+                for [x, y] in round.pixels(bounds) {
+                    counts[((y - bounds.y0) * bounds.width() + x - bounds.x0) as usize] += 1;
+                }
+            }
+            assert!(counts.iter().all(|&c| c == 1), "sample {sample}");
+        }
+    }
+
+    #[test]
+    fn a_point_beside_an_accepted_one_is_dropped() {
+        let at = |x: f32, ns: Vec3| Wanted {
+            p: Vec3::new(x, 0.0, 0.0),
+            p_error: Vec3::ZERO,
+            n: Vec3::Z,
+            ns,
+            time: 0.0,
+            pixel_width: 0.01,
+            spread: 0.0,
+            pixel: [0, 0],
+            key: 0,
+        };
+        let bounds = Bounds3 { min: Vec3::splat(-1.0), max: Vec3::splat(1.0) };
+        let cache = IrradianceCache::new(Default::default(), &bounds);
+        // 1.5 pixels of 0.01 times 0.7
+        let wanted = [at(0.0, Vec3::Z), at(0.0, -Vec3::Z), at(0.010, Vec3::Z), at(0.011, Vec3::Z), at(0.02, Vec3::Z)];
+        let chosen = without_redundant(&wanted, &cache, &bounds);
+        let places: Vec<_> = chosen.iter().map(|w| (w.p.x, w.ns.z)).collect();
+        assert_eq!(places, [(0.0, 1.0), (0.0, -1.0), (0.011, 1.0)]);
+    }
+}

@@ -1,0 +1,262 @@
+//! Computes records: indirect light by path tracing over a stratified hemisphere, light of sources by the stage of direct
+//! light on a white Lambertian surface, whose radiance is E/π.
+//!
+//! A path from a record leaves out what its first hit emits, since that is light of sources. Its random numbers are those of
+//! the pixel that asks for the record, so that a record does not depend on which other records there are.
+//!
+//! E of sources has gradients from the samples themselves: with the weights that make Σ c_i an estimate of E, Σ c_i ∇ln g_i
+//! is one of its gradient, g = cos θ cos θ'/r² being what changes with the point. Visibility is taken as it is: how shadows
+//! move is left out, which only smaller reaches make good.
+
+use super::gradients::{Cells, Irradiance};
+use super::record::Record;
+use crate::accel::{Hit, RayBatch};
+use crate::bsdfs::{Bsdf, Diffuse};
+use crate::cameras::CameraRay;
+use crate::direct::{DirectStage, Fits, ShadePoint};
+use crate::estimators::ocv::block_of;
+use crate::film::PixelSample;
+use crate::integrators::path::{CameraSample, PathIntegrator, PathStats};
+use crate::materials::SurfaceBsdf;
+use crate::math::hash::pcg4d;
+use crate::math::ray::offset_origin;
+use crate::math::{Frame, Ray, Rgb, Vec3};
+use crate::samplers::SampleStream;
+use crate::scene::{Cached, EmitterHit, EstimatorKind, IntegratorKind, IntegratorSettings, Split, World};
+use std::f32::consts::PI;
+
+/// Records that are computed together.
+pub const BATCH: usize = 16;
+/// Cosines below this count as this in gradients, which they divide.
+const MIN_COS: f32 = 0.05;
+
+/// Domains below the stream of a record.
+mod domain {
+    pub const CELL: u32 = 0;
+    pub const SOURCES: u32 = 1;
+}
+
+/// A point that asks for a record.
+#[derive(Clone, Copy, Debug)]
+pub struct Wanted {
+    /// The point.
+    pub p: Vec3,
+    /// Bound of the rounding error of `p`.
+    pub p_error: Vec3,
+    /// Geometric normal, unit.
+    pub n: Vec3,
+    /// Shading normal on the side whose irradiance is wanted, unit.
+    pub ns: Vec3,
+    /// Time in 0..1.
+    pub time: f32,
+    /// Width of a pixel on the surface.
+    pub pixel_width: f32,
+    /// How that grows with distance.
+    pub spread: f32,
+    /// The pixel that asks.
+    pub pixel: [u32; 2],
+    /// Tells the records apart for which a pixel may ask.
+    pub key: u32,
+}
+
+/// Computes records; holds the buffers of one worker.
+#[derive(Default)]
+pub struct Gatherer {
+    paths: PathIntegrator,
+    direct: DirectStage,
+    samples: Vec<CameraSample>,
+    results: Vec<PixelSample>,
+    radiance: Vec<Rgb>,
+    rays: RayBatch,
+    hits: Vec<Option<Hit>>,
+    emitters: Vec<Option<EmitterHit>>,
+}
+
+impl Gatherer {
+    /// The counts and times since the last call.
+    pub fn take_stats(&mut self) -> PathStats {
+        let mut stats = self.paths.take_stats();
+        stats.direct.merge(&std::mem::take(&mut self.direct.stats));
+        stats
+    }
+
+    /// The records of some points, in their order.
+    pub fn records(&mut self, world: &World, wanted: &[Wanted]) -> Vec<Record> {
+        let settings = &world.scene.integrator;
+        let mut records = self.indirect(world, settings, wanted);
+        if settings.cache.cached == Cached::All {
+            for (record, sources) in records.iter_mut().zip(self.sources(world, settings, wanted)) {
+                record.light = record.light.plus(&sources);
+            }
+        }
+        records
+    }
+
+    /// Indirect light, and radii.
+    fn indirect(&mut self, world: &World, settings: &IntegratorSettings, wanted: &[Wanted]) -> Vec<Record> {
+        // Paths through every cell; one bounce, which the record's surface makes, is theirs no more
+        let cells = Cells::new(settings.cache.samples);
+        let paths = IntegratorSettings {
+            kind: IntegratorKind::Path,
+            max_depth: settings.max_depth.saturating_sub(1),
+            ..settings.at_vertex(1)
+        };
+        let split = match settings.estimator {
+            EstimatorKind::Ris => settings.split().after_bounces(1),
+            EstimatorKind::Mc | EstimatorKind::Mis | EstimatorKind::Ocv | EstimatorKind::OptimalMis => paths.split(),
+        };
+        self.samples.clear();
+        for w in wanted {
+            let frame = Frame::from_z(w.ns);
+            for cell in 0..cells.count() {
+                let stream = w.stream(world, cell);
+                let d = frame.to_world(cells.direction(cell, stream.domain(domain::CELL).draw::<2>()));
+                let o = offset_origin(w.p, w.p_error, w.n, d);
+                let ray = Ray { o, d, t_max: f32::INFINITY, time: w.time };
+                let ray = CameraRay { ray, spread: w.spread, width0: w.pixel_width, weight: 1.0 };
+                self.samples.push(CameraSample { ray, weight: 1.0, stream, direct: stream, split, fit: 0 });
+            }
+        }
+        self.paths.only_reflected = true;
+        self.paths.trace(world, &paths, &self.samples, &mut Fits::default(), &mut self.results);
+
+        // Irradiance
+        let of_record = |(w, results): (&Wanted, &[PixelSample])| {
+            let finite = |l: Rgb| if l.is_finite() { l } else { Rgb::BLACK };
+            let l: Vec<Rgb> = results.iter().map(|r| finite(r.radiance)).collect();
+            let r: Vec<f32> = results.iter().map(|r| r.features.map_or(f32::INFINITY, |f| f.depth)).collect();
+            let mut light = cells.irradiance(&Frame::from_z(w.ns), &l, &r);
+            if !light.is_finite() {
+                light = Irradiance { e: light.e, ..Irradiance::default() };
+            }
+            let radius = radius(&light, &r, settings.cache.error);
+            Record { p: w.p, n: w.ns, light, radius, pixel_width: w.pixel_width, pixel: w.pixel }
+        };
+        wanted.iter().zip(self.results.chunks(cells.count() as usize)).map(of_record).collect()
+    }
+
+    /// Light of sources. Progressive estimators are fitted to the passes of each record: to earlier blocks of them.
+    fn sources(&mut self, world: &World, settings: &IntegratorSettings, wanted: &[Wanted]) -> Vec<Irradiance> {
+        let passes = settings.cache.passes.max(1);
+        let mut sums = vec![Irradiance::default(); wanted.len()];
+        let mut fits = Fits::new(world, settings, wanted.len());
+        for pass in 0..passes {
+            let block = block_of(pass);
+            if settings.is_progressive() && pass > 0 && block.first == pass {
+                self.direct.stats.ill_conditioned += fits.solve();
+                self.direct.stats.systems += wanted.len() as u64;
+            }
+            let points: Vec<ShadePoint<'_>> = (0_u32..)
+                .zip(wanted)
+                .map(|(fit, w)| {
+                    let place = if settings.is_progressive() { (block.index, pass - block.first) } else { (0, pass) };
+                    ShadePoint { fit, ..w.white_point(world, place, settings.split()) }
+                })
+                .collect();
+            self.direct.estimate(world, settings, &points, &mut fits, &mut self.radiance);
+            for (sum, &l) in sums.iter_mut().zip(&self.radiance) {
+                // E = π L of a white surface
+                sum.e += l * (PI / passes as f32);
+            }
+            // Both halves of a crossfit are estimates
+            let halves = 1 + u32::from(settings.has_halves());
+            self.add_gradients(world, wanted, halves, PI / (passes * halves) as f32, &mut sums);
+        }
+        for sum in sums.iter_mut().filter(|s| !s.is_finite()) {
+            *sum = Irradiance { e: if sum.e.is_finite() { sum.e } else { Rgb::BLACK }, ..Irradiance::default() };
+        }
+        sums
+    }
+
+    /// Adds the gradients that the samples of the last estimates have, `estimates` of each point, times `scale`.
+    fn add_gradients(&mut self, world: &World, wanted: &[Wanted], estimates: u32, scale: f32, sums: &mut [Irradiance]) {
+        // Normals of the emitters at the ends of segments
+        let segments = self.direct.segments();
+        self.rays.clear();
+        let mut free = Vec::new();
+        for (i, (point, l, is_free)) in self.direct.outcomes().enumerate() {
+            if is_free {
+                let segment = segments.get(i);
+                self.rays.push(&Ray { t_max: f32::INFINITY, ..segment });
+                free.push(((point / estimates) as usize, l * scale, segment.t_max.is_finite()));
+            }
+        }
+        world.intersect_emitters(&self.rays, &mut self.hits, &mut self.emitters);
+
+        for (i, &(point, c, has_end)) in free.iter().enumerate() {
+            let (w, sum) = (&wanted[point], &mut sums[point]);
+            let d = self.rays.get(i).d;
+            let r2 = d.length_squared();
+            if !(r2 > 0.0) {
+                continue;
+            }
+            let wi = d / r2.sqrt();
+            Irradiance::add_gradient(&mut sum.rotation, w.ns.cross(wi), c / wi.dot(w.ns).max(MIN_COS));
+            if has_end {
+                let gradient = log_gradient(world, w, d, self.emitters[i].as_ref());
+                // Tangential
+                Irradiance::add_gradient(&mut sum.translation, gradient - w.ns * gradient.dot(w.ns), c);
+            }
+        }
+    }
+}
+
+/// ∇x ln(cos θ cos θ'/r²) up to a part along the normal, d being the way from x to the light: 4d/r² − n'/(n'·d) for an emitter at
+/// its end, 3d/r² for a light that is a point.
+fn log_gradient(world: &World, w: &Wanted, d: Vec3, emitter: Option<&EmitterHit>) -> Vec3 {
+    let r2 = d.length_squared();
+    match emitter {
+        Some(hit) if (hit.t - 1.0).abs() < 1e-3 => {
+            let s = world.scene.geometry.surface_hit(hit.geometry, hit.primitive, Hit::NO_INSTANCE, hit.uv, w.time);
+            let n = if s.n.dot(d) < 0.0 { -s.n } else { s.n };
+            d * (4.0 / r2) - n / n.dot(d).max(MIN_COS * r2.sqrt())
+        }
+        _ => d * (3.0 / r2),
+    }
+}
+
+/// R: the harmonic mean of the distances [Ward et al. 1988], but no more than E/|∇t E| [Křivánek et al. 2006], nor so much that
+/// κR passes the nearest surface: what lies behind that is another place.
+fn radius(light: &Irradiance, r: &[f32], kappa: f32) -> f32 {
+    let inverse: f32 = r.iter().map(|r| 1.0 / r).sum();
+    let mean = r.len() as f32 / inverse;
+    let nearest = r.iter().copied().fold(f32::INFINITY, f32::min);
+    let luminance = |v: [f32; 3]| Rgb::from_array(v).luminance();
+    let gradient: [f32; 3] = std::array::from_fn(|axis| luminance(light.translation.map(|g| g[axis])));
+    let by_gradient = light.e.luminance() / Vec3::from_array(gradient).length();
+    // Without light both are 0, and the quotient is NaN, which min leaves out
+    mean.min(by_gradient).min(nearest / kappa)
+}
+
+impl Wanted {
+    /// Random numbers of sample `index` of this record.
+    fn stream(&self, world: &World, index: u32) -> SampleStream {
+        self.stream_of_block(world, 0, index)
+    }
+
+    /// The same for blocks that are independent of each other.
+    fn stream_of_block(&self, world: &World, block: u32, index: u32) -> SampleStream {
+        let sampling = &world.scene.sampling;
+        let [seed, ..] = pcg4d([sampling.seed, self.key, 0x6972_7261, block]);
+        SampleStream::new(sampling.sampler, self.pixel, index, seed)
+    }
+
+    /// A white surface here, whose light is estimated with sample `index` of `block`.
+    fn white_point(&self, world: &World, (block, index): (u32, u32), split: Split) -> ShadePoint<'static> {
+        let bsdf = SurfaceBsdf {
+            bsdf: Bsdf::Diffuse(Diffuse { reflectance: Rgb::WHITE }),
+            frame: Frame::from_z(self.ns),
+            n: self.n,
+        };
+        ShadePoint {
+            p: self.p,
+            p_error: self.p_error,
+            wo: self.ns,
+            bsdf,
+            time: self.time,
+            stream: self.stream_of_block(world, block, index).domain(domain::SOURCES),
+            split,
+            fit: 0,
+        }
+    }
+}

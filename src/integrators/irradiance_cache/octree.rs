@@ -1,0 +1,185 @@
+//! An octree of balls: which of them hold a point, or meet another ball.
+//!
+//! A ball is stored in all nodes of one level that it meets, at most eight, where nodes are two to four times as wide as its
+//! radius. A point is in one node of each level, so a query goes down once. Space is cut at the centres of nodes only: the
+//! outermost nodes reach to infinity, and nothing need lie inside the box that the tree was made for.
+
+use crate::math::{Bounds3, Vec3};
+
+/// Levels below the root.
+const MAX_DEPTH: u32 = 24;
+/// No child.
+const NONE: u32 = u32::MAX;
+
+/// Balls by their ids.
+#[derive(Clone, Debug)]
+pub struct Octree {
+    center: Vec3,
+    half: f32,
+    nodes: Vec<Node>,
+}
+
+#[derive(Clone, Debug)]
+struct Node {
+    children: [u32; 8],
+    ids: Vec<u32>,
+}
+
+impl Node {
+    fn new() -> Self {
+        Node { children: [NONE; 8], ids: Vec::new() }
+    }
+}
+
+/// A node with its place.
+#[derive(Clone, Copy)]
+struct Place {
+    node: u32,
+    center: Vec3,
+    half: f32,
+    depth: u32,
+}
+
+impl Place {
+    /// Centre of child `i`; bit k is the upper half of axis k.
+    fn child_center(&self, i: usize) -> Vec3 {
+        let quarter = 0.5 * self.half;
+        let side = |bit: usize| if i >> bit & 1 == 1 { quarter } else { -quarter };
+        self.center + Vec3::new(side(0), side(1), side(2))
+    }
+
+    /// True if child `i` meets the ball's box.
+    fn meets(&self, i: usize, p: Vec3, radius: f32) -> bool {
+        (0..3).all(|axis| {
+            let (x, c) = (p[axis], self.center[axis]);
+            if i >> axis & 1 == 1 { x + radius >= c } else { x - radius <= c }
+        })
+    }
+}
+
+impl Octree {
+    /// An empty tree for balls that lie mostly inside `bounds`.
+    pub fn new(bounds: &Bounds3) -> Self {
+        let (center, half) = if bounds.is_empty() {
+            (Vec3::ZERO, 1.0)
+        } else {
+            (bounds.center(), (0.5 * bounds.diagonal().max_element()).max(f32::MIN_POSITIVE))
+        };
+        Octree { center, half, nodes: vec![Node::new()] }
+    }
+
+    /// Bytes of the nodes.
+    pub fn bytes(&self) -> usize {
+        self.nodes.iter().map(|n| size_of::<Node>() + n.ids.capacity() * size_of::<u32>()).sum()
+    }
+
+    fn root(&self) -> Place {
+        Place { node: 0, center: self.center, half: self.half, depth: 0 }
+    }
+
+    /// Adds a ball.
+    pub fn insert(&mut self, id: u32, p: Vec3, radius: f32) {
+        let mut pending = vec![self.root()];
+        while let Some(place) = pending.pop() {
+            if place.half <= 2.0 * radius || place.depth == MAX_DEPTH {
+                self.nodes[place.node as usize].ids.push(id);
+                continue;
+            }
+            for i in (0..8).filter(|&i| place.meets(i, p, radius)) {
+                let mut child = self.nodes[place.node as usize].children[i];
+                if child == NONE {
+                    child = self.nodes.len() as u32;
+                    self.nodes.push(Node::new());
+                    self.nodes[place.node as usize].children[i] = child;
+                }
+                pending.push(Place {
+                    node: child,
+                    center: place.child_center(i),
+                    half: 0.5 * place.half,
+                    depth: place.depth + 1,
+                });
+            }
+        }
+    }
+
+    /// Calls `f` with the ids of all balls that hold `p`, and some others nearby, each once, in an order that depends on the
+    /// insertions only.
+    #[inline]
+    pub fn at_point(&self, p: Vec3, mut f: impl FnMut(u32)) {
+        let mut place = self.root();
+        loop {
+            let node = &self.nodes[place.node as usize];
+            node.ids.iter().for_each(|&id| f(id));
+            let upper = p.cmpge(place.center);
+            let i = upper.bitmask() as usize;
+            if node.children[i] == NONE {
+                return;
+            }
+            place.node = node.children[i];
+            place.half *= 0.5;
+            place.center += Vec3::select(upper, Vec3::splat(place.half), Vec3::splat(-place.half));
+        }
+    }
+
+    /// Calls `f` with the ids of all balls that meet the ball about `p`, and some others nearby; perhaps more than once.
+    pub fn near(&self, p: Vec3, radius: f32, mut f: impl FnMut(u32)) {
+        let mut pending = vec![self.root()];
+        while let Some(place) = pending.pop() {
+            let node = &self.nodes[place.node as usize];
+            node.ids.iter().for_each(|&id| f(id));
+            for (i, &child) in node.children.iter().enumerate() {
+                if child != NONE && place.meets(i, p, radius) {
+                    pending.push(Place {
+                        node: child,
+                        center: place.child_center(i),
+                        half: 0.5 * place.half,
+                        depth: place.depth + 1,
+                    });
+                }
+            }
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::math::hash::HashStream;
+
+    fn random_point(s: &mut HashStream) -> Vec3 {
+        // Some outside of the box
+        Vec3::new(s.next_f32(), s.next_f32(), s.next_f32()) * 3.0 - 1.5
+    }
+
+    #[test]
+    fn queries_find_every_ball() {
+        let mut s = HashStream::new([3, 1, 4]);
+        let mut tree = Octree::new(&Bounds3 { min: Vec3::splat(-1.0), max: Vec3::splat(1.0) });
+        let balls: Vec<(Vec3, f32)> =
+            (0..500).map(|_| (random_point(&mut s), 0.5 * s.next_f32().powi(4) + 1e-9)).collect();
+        for (i, &(p, r)) in balls.iter().enumerate() {
+            tree.insert(i as u32, p, r);
+        }
+        for _ in 0..500 {
+            let (p, radius) = (random_point(&mut s), 0.3 * s.next_f32());
+            let mut at = Vec::new();
+            tree.at_point(p, |id| at.push(id));
+            let mut near = Vec::new();
+            tree.near(p, radius, |id| near.push(id));
+            for (i, &(center, r)) in balls.iter().enumerate() {
+                let count = at.iter().filter(|&&id| id == i as u32).count();
+                assert!(count <= 1 && (count == 1 || center.distance(p) > r), "ball {i} at {p}");
+                assert!(near.contains(&(i as u32)) || center.distance(p) > r + radius, "ball {i} near {p}");
+            }
+        }
+    }
+
+    #[test]
+    fn an_empty_box_and_balls_of_no_size_are_fine() {
+        let mut tree = Octree::new(&Bounds3::EMPTY);
+        tree.insert(7, Vec3::ZERO, 0.0);
+        let mut found = Vec::new();
+        tree.at_point(Vec3::ZERO, |id| found.push(id));
+        assert_eq!(found, [7]);
+    }
+}
