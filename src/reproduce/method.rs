@@ -4,7 +4,7 @@ use crate::estimators::mis::Heuristic;
 use crate::estimators::ocv::Form;
 use crate::samplers::SamplerKind;
 use crate::scene::{
-    EstimatorKind, IntegratorKind, IntegratorSettings, OptimalForm, ProposalPoints, Proposals, Strata, World,
+    Cached, EstimatorKind, IntegratorKind, IntegratorSettings, OptimalForm, ProposalPoints, Proposals, Strata, World,
 };
 
 /// Light that is computed.
@@ -80,11 +80,6 @@ impl Method {
         Method { estimator: EstimatorKind::OptimalMis, optimal, ..Method::mc(samples) }
     }
 
-    /// Correlated sampling with independent random numbers.
-    pub fn correlated(samples: u32) -> Self {
-        Method { estimator: EstimatorKind::Correlated, ..Method::mc(samples) }
-    }
-
     /// Resampled importance sampling with independent random numbers and draws.
     pub fn ris(proposals: u32, samples: u32) -> Self {
         Method { estimator: EstimatorKind::Ris, proposals: proposals.max(samples), ..Method::mc(samples) }
@@ -122,7 +117,7 @@ impl Method {
         let (kind, max_depth) = match self.transport {
             Transport::Direct => (IntegratorKind::Direct, 1),
             Transport::Path => (IntegratorKind::Path, depth),
-            Transport::Cached => (IntegratorKind::Path, depth),
+            Transport::Cached => (IntegratorKind::IrradianceCache, depth),
         };
         scene.integrator = IntegratorSettings {
             kind,
@@ -134,6 +129,7 @@ impl Method {
             ..old
         };
         scene.integrator.ocv.form = self.form;
+        scene.integrator.cache.cached = Cached::All;
         scene.integrator.ris.proposals =
             if self.per_pixel { Proposals::Optimal } else { Proposals::Fixed(self.proposals) };
         scene.integrator.ris.strata = self.strata;
@@ -142,4 +138,3 @@ impl Method {
         scene.sampling.sampler = if self.stratified { SamplerKind::Sobol } else { SamplerKind::Independent };
     }
 }
-

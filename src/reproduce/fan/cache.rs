@@ -68,7 +68,8 @@ pub fn run(setup: &Setup<'_>, time: Duration) -> Result<Figure, ReproduceError> 
     let pilot_size = setup.size.min(PILOT_SIZE);
     let mut stage = Stage::load(&path, scaled(SHAPE, pilot_size), setup.options.threads)?;
     let pilot = turns(&mut stage, &[list[BEST], long], View::Centres, SPP, 0..2, observer)?;
-    let [turn, ray] = [0, 1].map(|i| pilot[i].median_seconds(|s| s.wall) * [list.len() as f64, 1.0 / f64::from(SPP)][i]);
+    let [turn, ray] =
+        [0, 1].map(|i| pilot[i].median_seconds(|s| s.wall) * [list.len() as f64, 1.0 / f64::from(SPP)][i]);
     let reference = ray * f64::from(LONG.0 * LONG.1);
     let wanted = 1.2 * (turn * f64::from(2 * TURNS[0]) + reference);
     let fits = (time.saturating_sub(start.elapsed()).as_secs_f64() / wanted).sqrt();

@@ -96,7 +96,7 @@ const WANTED_TURNS: [f64; 2] = [8.0, 4.0];
 const PAIR_TURNS: u32 = 4;
 
 /// Who is shown with antialiasing.
-pub const SHOWN: [Role; 4] = [Role::Balance, Role::Progressive, Role::Correlated, Role::Ris];
+pub const SHOWN: [Role; 4] = [Role::Balance, Role::Progressive, Role::Light, Role::Ris];
 
 /// Everything that was measured for a case.
 pub struct Outcome<'a> {
@@ -114,12 +114,7 @@ pub struct Outcome<'a> {
 }
 
 /// The long renderings of a stage.
-fn truth(
-    stage: &mut Stage,
-    method: Method,
-    view: View,
-    observer: Observer<'_>,
-) -> Result<Truth, ReproduceError> {
+fn truth(stage: &mut Stage, method: Method, view: View, observer: Observer<'_>) -> Result<Truth, ReproduceError> {
     let range = LONG_TURNS..LONG_TURNS + LONG.1;
     Ok(Truth::new(&turns(stage, &[method], view, LONG.0, range, observer)?[0]))
 }

@@ -2,10 +2,10 @@
 
 use super::super::ReproduceError;
 use super::super::measure::{Estimate, Stage, View, turns};
+use super::Setup;
 use super::direct::{Case, LONG, LONG_TURNS};
 use super::roster::{Numbers, Role, WAYS, methods};
 use super::truth::Truth;
-use super::Setup;
 
 /// Numbers of camera rays: usual and quick.
 const RAYS: [&[u32]; 2] = [&[1, 2, 4, 8, 16], &[1, 4, 16]];

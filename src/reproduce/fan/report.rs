@@ -130,13 +130,10 @@ pub fn direct(setup: &Setup<'_>, o: &Outcome<'_>) -> Result<Figure, ReproduceErr
     blocks.extend(pictures(setup, o)?);
     blocks.extend(tables(o));
     blocks.push(growth(o));
-    let asked = Asked {
-        paper: o.case.paper,
-        time: o.case.paper_time,
-        target: o.case.target,
-        efficient: o.case.efficient,
-    };
-    let row = |way: usize| summary(&asked, o.pair(Role::Progressive, way), o.errors(Role::Progressive, way), reason(o, way));
+    let asked =
+        Asked { paper: o.case.paper, time: o.case.paper_time, target: o.case.target, efficient: o.case.efficient };
+    let row =
+        |way: usize| summary(&asked, o.pair(Role::Progressive, way), o.errors(Role::Progressive, way), reason(o, way));
     Ok(Figure {
         id: o.case.id,
         title: o.case.title,
@@ -177,7 +174,7 @@ impl Outcome<'_> {
 
 /// What a row of the table says beside its result.
 fn reason(o: &Outcome<'_>, way: usize) -> String {
-    let others: Vec<String> = [Role::Crossfit, Role::Regression, Role::Paper, Role::Optimal, Role::Correlated]
+    let others: Vec<String> = [Role::Crossfit, Role::Regression, Role::Paper, Role::Optimal, Role::Light]
         .iter()
         .map(|&r| format!("{} {}", r.name(), percent(o.relative(r, way))))
         .collect();
@@ -244,18 +241,23 @@ fn pictures(setup: &Setup<'_>, o: &Outcome<'_>) -> Result<Vec<Block>, ReproduceE
     for (k, role) in SHOWN.iter().enumerate() {
         let picture = &o.antialiased[k].first;
         let file = Picture::tone_mapped(o.size, picture, exposure).write(out, &format!("{id}-{k}"))?;
-        let caption = format!("N = {}; error with antialiasing {}", o.antialiased[k].method.samples, plus_minus(errors[k].error()));
+        let caption = format!(
+            "N = {}; error with antialiasing {}",
+            o.antialiased[k].method.samples,
+            plus_minus(errors[k].error())
+        );
         whole.push(Shown { file, title: role.name().to_owned(), caption });
         let size = [(r - l) as u32, (b - t) as u32];
         let file = Picture::tone_mapped(size, &cropped(picture), exposure).write(out, &format!("{id}-crop-{k}"))?;
         crops.push(Shown { file, title: format!("{}, a part", role.name()), caption: String::new() });
     }
-    let file = Picture::tone_mapped(o.size, &o.antialiased_truth.radiance, exposure).write(out, &format!("{id}-reference"))?;
+    let file =
+        Picture::tone_mapped(o.size, &o.antialiased_truth.radiance, exposure).write(out, &format!("{id}-reference"))?;
     whole.push(Shown { file, title: "reference".to_owned(), caption: String::new() });
 
     let mut blocks = vec![Block::Pictures(whole), Block::Pictures(crops)];
     for (way, name) in WAYS.iter().enumerate() {
-        let chosen = [Role::Balance, Role::Progressive, Role::Correlated, Role::Ris];
+        let chosen = [Role::Balance, Role::Progressive, Role::Light, Role::Ris];
         let list: Vec<(&str, &Measured)> = chosen.iter().map(|r| (r.name(), &o.measured[r.place(way)])).collect();
         blocks.extend(variances(setup, &o.truth, o.size, &list, &format!("{id}-variance-{way}"), name)?);
     }
@@ -293,12 +295,11 @@ fn numbers(o: &Outcome<'_>) -> Value {
     let antialiased: Vec<Value> = SHOWN
         .iter()
         .enumerate()
-        .map(|(i, role)| {
-            method_json(role.name(), [&o.antialiased[i], &o.antialiased[0]], [&errors[i], &errors[0]])
-        })
+        .map(|(i, role)| method_json(role.name(), [&o.antialiased[i], &o.antialiased[0]], [&errors[i], &errors[0]]))
         .collect();
     let curve = |way: usize| -> Vec<Value> {
-        let point = |(rays, left): &(u32, Estimate)| json!({ "camera_rays": rays, "relative_error": estimate_json(*left) });
+        let point =
+            |(rays, left): &(u32, Estimate)| json!({ "camera_rays": rays, "relative_error": estimate_json(*left) });
         o.growth.0[way].iter().map(point).collect()
     };
     let Case { spp, samples, paper, paper_time, target, .. } = o.case;

@@ -19,7 +19,8 @@ pub enum Role {
     Paper,
     Optimal,
     OptimalDirect,
-    Correlated,
+    /// One technique alone.
+    Light,
     /// `ris` in the time of the baseline.
     Ris,
     /// `ocv`, progressive, in the time of the baseline.
@@ -36,7 +37,7 @@ pub const ROLES: [Role; 11] = [
     Role::Paper,
     Role::Optimal,
     Role::OptimalDirect,
-    Role::Correlated,
+    Role::Light,
     Role::Ris,
     Role::EqualTime,
 ];
@@ -67,7 +68,7 @@ impl Role {
             Role::Paper => "ocv, paper",
             Role::Optimal => "optimal-mis, progressive",
             Role::OptimalDirect => "optimal-mis, direct",
-            Role::Correlated => "correlated",
+            Role::Light => "mc, light sampling alone",
             Role::Ris => "ris in the time of mis",
             Role::EqualTime => "ocv, progressive, in the time of mis",
         }
@@ -76,12 +77,13 @@ impl Role {
     /// False if the expectation may differ from the truth.
     pub fn is_unbiased(self) -> bool {
         match self {
-            Role::Regression | Role::Paper | Role::OptimalDirect | Role::Correlated => false,
+            Role::Regression | Role::Paper | Role::OptimalDirect => false,
             Role::Balance
             | Role::Power
             | Role::Progressive
             | Role::Crossfit
             | Role::Optimal
+            | Role::Light
             | Role::Ris
             | Role::EqualTime => true,
         }
@@ -98,7 +100,7 @@ impl Role {
             Role::Paper => Method::ocv(Form::Paper, n.samples),
             Role::Optimal => Method::optimal_mis(OptimalForm::Progressive, n.samples),
             Role::OptimalDirect => Method::optimal_mis(OptimalForm::Direct, n.samples),
-            Role::Correlated => Method::correlated(n.samples),
+            Role::Light => Method::mc(n.samples),
             Role::Ris => Method::ris(n.ris.proposals, n.ris.samples).strata(Strata::Systematic),
             Role::EqualTime => Method::ocv(Form::Progressive, n.equal_time),
         };

@@ -60,12 +60,7 @@ pub fn run(options: &Options, observer: Observer<'_>) -> Result<PathBuf, Reprodu
     let quick = usize::from(options.quick);
     let budget = Budget::new(TIME[quick]);
     make_folder(&options.out)?;
-    let setup = Setup {
-        options,
-        observer,
-        scenes: Scenes::new(options)?,
-        size: options.size.unwrap_or(SIZE[quick]),
-    };
+    let setup = Setup { options, observer, scenes: Scenes::new(options)?, size: options.size.unwrap_or(SIZE[quick]) };
 
     let mut left = 100.0;
     let mut share = |weight: f64| {

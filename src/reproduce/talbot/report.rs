@@ -1,13 +1,13 @@
 //! From measurements to sections of the page and to numbers.
 
+use super::super::ReproduceError;
 use super::super::figure::{Figure, Summary, estimate_json, percent, plus_minus};
 use super::super::measure::{Estimate, Measured, Seconds, same_mean};
 use super::super::page::{Block, Cell, Shown, Table};
 use super::super::pictures::{HEAT, Picture, Scale, gain, significant};
-use super::super::ReproduceError;
+use super::Setup;
 use super::classes::{Classes, LIT, NAMES, SHADOWED};
 use super::comparison::{Kind, Outcome};
-use super::Setup;
 use crate::scene::Split;
 use serde_json::{Value, json};
 
