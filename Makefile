@@ -2,6 +2,8 @@
 
 CARGO ?= $(shell command -v cargo || echo $(HOME)/.cargo/bin/cargo)
 PACKAGES = build-essential pkg-config libembree-dev libopenimageio-dev
+# What the tests need besides: a browser for the pages that `compare` writes.
+TEST_PACKAGES = chromium
 SCENE = scenes/demo/gallery.pbrt
 
 .PHONY: run test setup lint doc bindings clean
@@ -12,6 +14,7 @@ run: setup
 	@echo "The picture is in gallery.png and gallery.exr."
 
 test: setup
+	@.ci/setup.sh $(TEST_PACKAGES)
 	$(CARGO) test --workspace --doc
 	$(CARGO) test --workspace --lib --bins --tests
 

@@ -12,12 +12,13 @@
 //! | 5 | [`import`], [`direct`], [`procedural`] |
 //! | 6 | [`integrators`] |
 //! | 7 | [`render`] |
-//! | 8 | [`cli`], [`reproduce`] |
+//! | 8 | [`cli`], [`compare`], [`reproduce`] |
 
 pub mod accel;
 pub mod bsdfs;
 pub mod cameras;
 pub mod cli;
+pub mod compare;
 pub mod direct;
 pub mod estimators;
 pub mod film;

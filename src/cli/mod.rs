@@ -1,10 +1,11 @@
 //! The command line: one file per subcommand.
 //!
-//! Exit codes: 0 success, 130 a rendering that Ctrl-C ended and that was written, 1 the command ran and says no (`crosscheck` found a disagreement), 2 bad usage, 3 bad input
-//! or failed output.
+//! Exit codes: 0 success, 130 a rendering that Ctrl-C ended and that was written, 1 the command ran and says no
+//! (`crosscheck` found a disagreement, `compare` a number beyond a limit), 2 bad usage, 3 bad input or failed output.
 
 mod args;
 mod bench;
+mod compare;
 mod crosscheck;
 mod generate;
 mod info;
@@ -28,6 +29,8 @@ struct Cli {
 enum Command {
     /// Render a scene to pictures
     Render(args::RenderArgs),
+    /// Compare pictures with a reference, in numbers and on a page
+    Compare(compare::CompareArgs),
     /// Compare Embree with the pure-Rust BVH, ray by ray and image by image
     Crosscheck(crosscheck::CrosscheckArgs),
     /// Measure the stages of the renderer
@@ -46,6 +49,7 @@ pub fn run() -> ExitCode {
     let cli = Cli::parse();
     let result = match &cli.command {
         Command::Render(args) => render::run(args),
+        Command::Compare(args) => compare::run(args),
         Command::Crosscheck(args) => crosscheck::run(args),
         Command::Bench(args) => bench::run(args),
         Command::Info(args) => info::run(args),

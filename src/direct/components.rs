@@ -10,10 +10,12 @@ use super::propose::{Candidates, Drawn};
 use super::visibility::{Segments, is_traced};
 use crate::accel::RayBatch;
 use crate::estimators::ocv::forms::PAPER_LAMBDA;
-use crate::estimators::ocv::{self, Form, NormalEquations, Outcome, Penalty};
+use crate::estimators::ocv::{Form, NormalEquations, Penalty};
 use crate::estimators::optimal_mis;
 use crate::math::Rgb;
 use crate::scene::{EstimatorKind, IntegratorSettings, OptimalForm, Split, World};
+use crate::simd;
+use crate::simd::ocv::{Matrix, System};
 
 /// Domain below the stream of a shading point: half h of its samples uses `HALF + h`.
 const HALF: u32 = 32;
@@ -37,17 +39,23 @@ impl Method {
         }
     }
 
-    /// The columns of a sample from its r_j.
-    #[inline]
-    fn columns(self, mut columns: Columns, integrals: &Columns) -> Columns {
-        for (column, &integral) in columns.iter_mut().zip(integrals) {
-            match self {
-                Method::Ocv(Form::Paper) if integral > 0.0 => *column /= integral,
-                Method::Ocv(Form::Paper) | Method::Optimal(_) => {}
-                Method::Ocv(Form::Progressive | Form::Regression | Form::Crossfit) => *column -= integral,
-            }
+    /// The systems that are solved for each point, or each half of one.
+    fn matrix(self) -> Option<(Matrix, Penalty)> {
+        match self {
+            Method::Ocv(Form::Paper) => Some((Matrix::Intercept, Penalty { ridge: PAPER_LAMBDA, ..Penalty::NONE })),
+            Method::Ocv(Form::Regression) => Some((Matrix::SampleMeans, Penalty::SAME_SAMPLES)),
+            Method::Ocv(Form::Crossfit) => Some((Matrix::KnownMeans, Penalty::default())),
+            Method::Ocv(Form::Progressive) | Method::Optimal(_) => None,
         }
-        columns
+    }
+
+    /// Makes sums of the method's columns of those of r_j.
+    fn finish(self, equations: NormalEquations, sums: &mut [f32], integrals: &Columns) {
+        match self {
+            Method::Ocv(Form::Paper) => equations.scale(sums, &integrals.map(|i| if i > 0.0 { 1.0 / i } else { 1.0 })),
+            Method::Optimal(_) => {}
+            Method::Ocv(Form::Progressive | Form::Regression | Form::Crossfit) => equations.centre(sums, integrals),
+        }
     }
 }
 
@@ -91,16 +99,12 @@ impl Fits {
 
     /// Begins a block. Returns the number of fits whose system has no solution; their estimates are those of MIS.
     pub fn solve(&mut self) -> u64 {
+        if !self.is_optimal {
+            return solve_all(self.equations, Penalty::default(), &self.sums, &mut self.beta);
+        }
         let betas = self.beta.chunks_mut(self.equations.coefficients().max(1));
         let fits = self.sums.chunks(self.equations.len()).zip(betas);
-        let solved = fits.map(|(sums, beta)| {
-            if self.is_optimal {
-                optimal_mis::coefficients(self.equations, sums, beta)
-            } else {
-                self.equations.solve(sums, Penalty::default(), beta)
-            }
-        });
-        solved.map(|result| u64::from(result.is_err())).sum()
+        fits.map(|(sums, beta)| u64::from(optimal_mis::coefficients(self.equations, sums, beta).is_err())).sum()
     }
 
     fn beta(&self, fit: u32) -> &[f32] {
@@ -114,6 +118,34 @@ impl Fits {
     }
 }
 
+/// Coefficients of many systems, some at a time; 0 where there is no solution. Returns how many those are.
+fn solve_all(equations: NormalEquations, penalty: Penalty, sums: &[f32], beta: &mut [f32]) -> u64 {
+    let matrix = if penalty.known_means { Matrix::KnownMeans } else { Matrix::SampleMeans };
+    solve_matrices(equations, (matrix, penalty), sums, beta)
+}
+
+fn solve_matrices(
+    equations: NormalEquations,
+    (matrix, penalty): (Matrix, Penalty),
+    sums: &[f32],
+    beta: &mut [f32],
+) -> u64 {
+    let Penalty { ridge, shrink, .. } = penalty;
+    let system = System { columns: equations.components(), matrix, ridge, shrink };
+    simd::ocv::solve(simd::level(), &system, sums, beta) as u64
+}
+
+/// β₀ + Σ β_j of the components that are there [Fan et al. 2006, Eq. 10]; the last unknown is β₀. The mean of y if there is no
+/// solution, whose coefficients are 0.
+fn paper_estimate(equations: NormalEquations, sums: &[f32], beta: &[f32], integrals: &Columns) -> [f32; 3] {
+    let last = equations.components().saturating_sub(1);
+    if beta.iter().all(|b| *b == 0.0) {
+        return equations.mean(sums);
+    }
+    let is_there = |j: usize| j == last || integrals[j] > 0.0;
+    [0, 1, 2].map(|c| (0..=last).filter(|&j| is_there(j)).map(|j| beta[3 * j + c]).sum())
+}
+
 /// The stage's buffers.
 #[derive(Debug, Default)]
 pub struct Components {
@@ -122,6 +154,7 @@ pub struct Components {
     hidden_of: Vec<u32>,
     is_hidden: Vec<bool>,
     sums: Vec<f32>,
+    beta: Vec<f32>,
     /// Systems that were to be solved.
     pub systems: u64,
     /// Those without solution, whose estimates are those of MIS.
@@ -158,39 +191,47 @@ impl Components {
         let method = Method::new(settings);
         self.gather(equations, method, candidates, contributions);
 
-        let len = equations.len();
+        // β of the forms that have it from these samples
+        self.beta.clear();
+        if let Some(kind) = method.matrix() {
+            self.beta.resize(self.sums.len() / equations.len() * equations.coefficients(), 0.0);
+            self.ill_conditioned = solve_matrices(equations, kind, &self.sums, &mut self.beta);
+            self.systems = (self.sums.len() / equations.len()) as u64;
+        }
+
+        let (len, width) = (equations.len(), equations.coefficients());
         let sums = |i: usize| &self.sums[i * len..][..len];
-        let known = |estimate| Outcome { estimate, ill_conditioned: 0 };
+        let beta = |i: usize| &self.beta[i * width..][..width];
         for (i, out) in out.iter_mut().enumerate() {
             let integrals = || &candidates.mixtures[i].integrals;
-            let outcome = match method {
+            let estimate = match method {
                 Method::Ocv(Form::Progressive) | Method::Optimal(OptimalForm::Progressive) if fits.is_empty() => {
-                    known(equations.mean(sums(i)))
+                    equations.mean(sums(i))
                 }
-                Method::Ocv(Form::Progressive) => known(equations.estimate(sums(i), fits.beta(points[i].fit))),
+                Method::Ocv(Form::Progressive) => equations.estimate(sums(i), fits.beta(points[i].fit)),
                 Method::Optimal(OptimalForm::Progressive) => {
-                    known(optimal_mis::estimate(equations, sums(i), integrals(), fits.beta(points[i].fit)))
+                    optimal_mis::estimate(equations, sums(i), integrals(), fits.beta(points[i].fit))
                 }
-                Method::Optimal(OptimalForm::Direct) => optimal_mis::direct(equations, sums(i), integrals()),
+                Method::Optimal(OptimalForm::Direct) => {
+                    let outcome = optimal_mis::direct(equations, sums(i), integrals());
+                    self.systems += 1;
+                    self.ill_conditioned += u64::from(outcome.ill_conditioned);
+                    outcome.estimate
+                }
                 Method::Ocv(Form::Crossfit) => {
-                    ocv::crossfit(equations, [sums(2 * i), sums(2 * i + 1)], Penalty::default())
+                    // Each half with the coefficients of the other, by their numbers of samples
+                    let [a, b] = [2 * i, 2 * i + 1];
+                    let [of_a, of_b] = [equations.estimate(sums(a), beta(b)), equations.estimate(sums(b), beta(a))];
+                    let [n, m] = [a, b].map(|i| equations.samples(sums(i)));
+                    if n + m > 0.0 { [0, 1, 2].map(|c| (n * of_a[c] + m * of_b[c]) / (n + m)) } else { [0.0; 3] }
                 }
-                Method::Ocv(Form::Regression) => ocv::regression(equations, sums(i), Penalty::SAME_SAMPLES),
-                Method::Ocv(Form::Paper) => {
-                    let present = integrals().map(|integral| if integral > 0.0 { 1.0 } else { 0.0 });
-                    ocv::paper(equations, sums(i), &present, PAPER_LAMBDA)
-                }
+                Method::Ocv(Form::Regression) => equations.estimate(sums(i), beta(i)),
+                Method::Ocv(Form::Paper) => paper_estimate(equations, sums(i), beta(i), integrals()),
             };
             if !fits.is_empty() {
                 fits.add(points[i].fit, sums(i));
             }
-            self.systems += match method {
-                Method::Ocv(Form::Progressive) | Method::Optimal(OptimalForm::Progressive) => 0,
-                Method::Ocv(Form::Regression | Form::Paper) | Method::Optimal(OptimalForm::Direct) => 1,
-                Method::Ocv(Form::Crossfit) => 2,
-            };
-            self.ill_conditioned += u64::from(outcome.ill_conditioned);
-            let [r, g, b] = outcome.estimate;
+            let [r, g, b] = estimate;
             *out = Rgb::new(r, g, b);
         }
     }
@@ -225,18 +266,15 @@ impl Components {
         for ((c, contribution), &is_free) in candidates.records.iter().zip(contributions).zip(&self.is_free) {
             let mixture = &candidates.mixtures[c.point as usize];
             let y = if is_free { *contribution * mixture.samples() } else { Rgb::BLACK };
-            let columns = method.columns(mixture.columns(c).unwrap_or_default(), &mixture.integrals);
-            equations.add(&mut self.sums[c.point as usize * len..][..len], &columns[..m], y.to_array());
+            let (count, columns) = mixture.columns(c);
+            equations.add_sparse(&mut self.sums[c.point as usize * len..][..len], &columns[..count], y.to_array());
         }
         for (mixture, sums) in candidates.mixtures.iter().zip(self.sums.chunks_mut(len)) {
             for (component, &count) in mixture.dark[..m].iter().enumerate().filter(|(_, count)| **count > 0) {
-                let mut columns = Columns::default();
-                columns[component] = mixture.dark_column(component);
-                let columns = method.columns(columns, &mixture.integrals);
-                (0..count).for_each(|_| equations.add(sums, &columns[..m], [0.0; 3]));
+                equations.add_zeros(sums, (component, mixture.dark_column(component)), count);
             }
-            let columns = method.columns(Columns::default(), &mixture.integrals);
-            (0..mixture.void).for_each(|_| equations.add(sums, &columns[..m], [0.0; 3]));
+            equations.add_zeros(sums, (0, 0.0), mixture.void);
+            method.finish(equations, sums, &mixture.integrals);
         }
     }
 }

@@ -81,24 +81,23 @@ impl Mixture {
         self.n
     }
 
-    /// r_j of a sample; `None` if its densities cannot be divided.
+    /// r_j of a sample, by component, of those that are not 0; none if its densities cannot be divided. How many there are,
+    /// and they.
     #[inline]
-    pub fn columns(&self, c: &Candidate) -> Option<Columns> {
+    pub fn columns(&self, c: &Candidate) -> (usize, [(usize, f32); MAX_LOBES + 1]) {
         let scale = self.n / (c.n_light * c.p_light + c.n_bsdf * c.p_bsdf);
+        let (mut count, mut columns) = (0, [(0, 0.0); MAX_LOBES + 1]);
         if !(scale.is_finite() && scale > 0.0) {
-            return None;
+            return (count, columns);
         }
-        let mut columns = [0.0; MAX_COMPONENTS];
-        if self.lobes == MAX_LOBES {
-            columns[0] = c.p_lobe * scale;
-            columns[1] = (c.p_bsdf - c.p_lobe) * scale;
-        } else {
-            columns[0] = c.p_bsdf * scale;
+        let group = self.component(usize::from(c.group));
+        for (component, h) in [(0, c.p_lobe), (1, c.p_bsdf - c.p_lobe), (group, c.p_light)] {
+            if h > 0.0 {
+                columns[count] = (component, h * scale);
+                count += 1;
+            }
         }
-        if c.p_light > 0.0 {
-            columns[self.component(usize::from(c.group))] = c.p_light * scale;
-        }
-        Some(columns)
+        (count, columns)
     }
 
     /// r_j of a dark sample of component j; the other columns are 0.

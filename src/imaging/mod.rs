@@ -1,8 +1,10 @@
 //! Pictures: pixels with named channels, their encodings, pyramids for filtered lookups, and how far two are apart.
 //!
-//! Reading order: [`color`], [`mipmap`], [`oiio`], [`metrics`].
+//! Reading order: [`color`], [`mipmap`], [`file`], [`oiio`], [`metrics`], [`heat`].
 
 pub mod color;
+pub mod file;
+pub mod heat;
 pub mod metrics;
 pub mod mipmap;
 pub mod oiio;

@@ -6,76 +6,15 @@
 //! caller gives one (`DateTime`), since OpenImageIO would fill in the current time.
 #![allow(unsafe_code)]
 
+pub use super::file::{ImageError, PartHeader, ReadLimits, Window};
 use super::{ColorEncoding, Image};
 use openimageio_sys as sys;
 use std::collections::BTreeMap;
 use std::ffi::{CStr, CString, c_char};
-use std::path::{Path, PathBuf};
+use std::path::Path;
 use std::ptr;
 use std::sync::OnceLock;
 use std::sync::atomic::{AtomicU32, Ordering};
-
-/// Why a picture cannot be read or written.
-#[derive(Debug, thiserror::Error)]
-pub enum ImageError {
-    /// OpenImageIO itself cannot be used.
-    #[error("OpenImageIO cannot be loaded: {0}")]
-    Library(String),
-    /// There is no such file.
-    #[error("{}: no such file", path.display())]
-    NotFound {
-        /// The file.
-        path: PathBuf,
-    },
-    /// It is no picture, a damaged one, or of a kind that is not supported.
-    #[error("{}: {reason}", path.display())]
-    Unreadable {
-        /// The file.
-        path: PathBuf,
-        /// What is wrong with it.
-        reason: String,
-    },
-    /// It asks for more memory than allowed.
-    #[error("{}: {reason}", path.display())]
-    TooLarge {
-        /// The file.
-        path: PathBuf,
-        /// The sizes.
-        reason: String,
-    },
-    /// It cannot be written.
-    #[error("cannot write {}: {reason}", path.display())]
-    Write {
-        /// The file.
-        path: PathBuf,
-        /// Why.
-        reason: String,
-    },
-}
-
-/// What reading may cost.
-#[derive(Clone, Copy, Debug)]
-pub struct ReadLimits {
-    /// Largest decoded picture (bytes of f32).
-    pub max_bytes: u64,
-    /// Largest ratio of the decoded picture to the file: a header of a few bytes can claim any size.
-    pub max_expansion: u64,
-    /// Pictures up to this size (bytes of f32) may expand as they like.
-    pub free_bytes: u64,
-}
-
-impl Default for ReadLimits {
-    fn default() -> Self {
-        ReadLimits { max_bytes: 8 << 30, max_expansion: 4000, free_bytes: 64 << 20 }
-    }
-}
-
-impl ReadLimits {
-    /// The largest decoded picture of a file of `file_bytes`.
-    fn bytes_for(&self, file_bytes: u64) -> u64 {
-        file_bytes.saturating_mul(self.max_expansion).max(self.free_bytes).min(self.max_bytes)
-    }
-}
 
 /// What stands for a date where there is none.
 const NO_DATE: &str = "1970:01:01 00:00:00";
@@ -125,6 +64,10 @@ pub struct ReadImage {
     pub metadata: BTreeMap<String, String>,
     /// Number of parts in the file.
     pub parts: usize,
+    /// Where the pixels lie in the full picture.
+    pub window: Window,
+    /// The values are stored as 16-bit floats.
+    pub is_half: bool,
 }
 
 /// A picture to write: one part of a file.
@@ -309,6 +252,10 @@ impl Input {
         Ok(text(name))
     }
 
+    fn channels(&self, count: i32) -> Result<Vec<String>, (i32, String)> {
+        (0..count).map(|i| self.channel(i)).collect()
+    }
+
     fn metadata(&self, count: i32) -> BTreeMap<String, String> {
         let entry = |index| {
             let mut a = sys::OiioAttribute {
@@ -351,26 +298,50 @@ pub fn read_image(path: &Path, limits: &ReadLimits) -> Result<ReadImage, ImageEr
 /// Reads a part of a picture, counted from 0.
 pub fn read_part(path: &Path, part: usize, limits: &ReadLimits) -> Result<ReadImage, ImageError> {
     let input = Input::open(path, i32::try_from(part).unwrap_or(i32::MAX))?;
-    let failed = |(code, reason): (i32, String)| {
-        let path = path.to_owned();
-        match code {
-            sys::OIIO_TOO_LARGE => ImageError::TooLarge { path, reason },
-            _ => ImageError::Unreadable { path, reason },
-        }
-    };
+    let failed = |failure| read_failure(path, failure);
     let parts = input.parts().map_err(failed)?;
     if part >= parts {
         return Err(failed((sys::OIIO_INVALID_ARGUMENT, format!("has {parts} parts, none of number {part}"))));
     }
     let spec = input.spec().map_err(failed)?;
     let data = input.pixels(limits.bytes_for(path.metadata().map_or(0, |m| m.len()))).map_err(failed)?;
-    let channels = (0..spec.nchannels).map(|i| input.channel(i)).collect::<Result<Vec<_>, _>>().map_err(failed)?;
+    let channels = input.channels(spec.nchannels).map_err(failed)?;
     let metadata = input.metadata(spec.attributes);
     let is_integer = matches!(spec.format, sys::OIIO_FORMAT_U8 | sys::OIIO_FORMAT_U16);
     let encoding = if is_integer { ColorEncoding::Srgb } else { ColorEncoding::Linear };
     // The header was checked against the pixels by the shim: the sizes are positive.
     let image = Image { width: spec.width as usize, height: spec.height as usize, channels, data };
-    Ok(ReadImage { image, encoding, metadata, parts })
+    let size = |n: i32| usize::try_from(n).unwrap_or(0);
+    let window = Window {
+        origin: [spec.x, spec.y],
+        full_origin: [spec.full_x, spec.full_y],
+        full_size: [size(spec.full_width), size(spec.full_height)],
+    };
+    Ok(ReadImage { image, encoding, metadata, parts, window, is_half: spec.format == sys::OIIO_FORMAT_HALF })
+}
+
+/// Reads the headers of all parts of a picture, and no pixels.
+pub fn read_headers(path: &Path) -> Result<Vec<PartHeader>, ImageError> {
+    let mut input = Input::open(path, 0)?;
+    let failed = |failure| read_failure(path, failure);
+    let parts = input.parts().map_err(failed)?;
+    let mut headers = Vec::with_capacity(parts);
+    for part in 0..parts {
+        input.part = i32::try_from(part).unwrap_or(i32::MAX);
+        let spec = input.spec().map_err(failed)?;
+        let channels = input.channels(spec.nchannels).map_err(failed)?;
+        let name = input.metadata(spec.attributes).remove("oiio:subimagename").unwrap_or_default();
+        headers.push(PartHeader { name, channels });
+    }
+    Ok(headers)
+}
+
+fn read_failure(path: &Path, (code, reason): (i32, String)) -> ImageError {
+    let path = path.to_owned();
+    match code {
+        sys::OIIO_TOO_LARGE => ImageError::TooLarge { path, reason },
+        _ => ImageError::Unreadable { path, reason },
+    }
 }
 
 /// A file being written.
@@ -534,6 +505,7 @@ mod tests {
         }
         assert_eq!(read.metadata.get("lumiris:seed").map(String::as_str), Some("7"));
         assert_eq!(read.encoding, ColorEncoding::Linear);
+        assert_eq!(read.window, Window { origin: [4, 5], full_origin: [0, 0], full_size: [30, 20] });
         // Nothing is left beside it.
         assert_eq!(std::fs::read_dir(folder.path()).unwrap().count(), 1);
     }
@@ -576,7 +548,11 @@ mod tests {
         assert_eq!(value("compression"), Some("zip"));
         assert_eq!(value("DateTime"), Some(NO_DATE));
 
+        let headers = read_headers(&path).unwrap();
+        assert_eq!(headers.iter().map(|h| h.name.as_str()).collect::<Vec<_>>(), ["beauty", "albedo"]);
+        assert!(headers[0].channels.contains(&"Z".to_owned()) && headers[1].channels.len() == 3);
         let read = read_part(&path, 1, &limits).unwrap();
+        assert!(read.is_half);
         assert_eq!(read.metadata["compression"], "piz");
         let g = read.image.channel("albedo.G").unwrap();
         assert!((0..6).all(|p| (read.image.data[p * 3 + g] - albedo[p * 3 + 1]).abs() < 1e-3));

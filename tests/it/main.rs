@@ -3,7 +3,9 @@
 
 mod analytic_scenes;
 mod bit_exact;
+mod browser;
 mod cli;
+mod compare;
 mod crosscheck;
 mod estimators_1d;
 mod evaluated;

@@ -8,6 +8,9 @@ pub const MAX_COMPONENTS: usize = 8;
 /// Samples after which the sums stay as they are: the count would no longer be exact in f32.
 const MOST_SAMPLES: f32 = 16_777_216.0;
 
+/// Part of Σ c² below which Σ (c − c̄)² is rounding: the column is constant and takes no part.
+const CONSTANT: f64 = 1e-6;
+
 /// A system that has no usable solution: something in it is not finite. The estimate is then that of β = 0, which is MIS.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, thiserror::Error)]
 #[error("the normal equations are ill-conditioned")]
@@ -155,6 +158,71 @@ impl NormalEquations {
         }
     }
 
+    /// Adds a sample whose columns are 0 but for `columns`, by their indices, which ascend; otherwise as [`add`](Self::add).
+    #[inline]
+    pub fn add_sparse(self, sums: &mut [f32], columns: &[(usize, f32)], y: [f32; 3]) {
+        if sums[self.count()] >= MOST_SAMPLES {
+            return;
+        }
+        sums[self.count()] += 1.0;
+        if !(columns.iter().map(|(_, c)| c).chain(&y).all(|v| v.is_finite())) {
+            return;
+        }
+        for (place, &(j, c)) in columns.iter().enumerate() {
+            for &(k, other) in &columns[..=place] {
+                sums[j * (j + 1) / 2 + k] += c * other;
+            }
+            for (sum, y) in sums[self.products() + 3 * j..][..3].iter_mut().zip(y) {
+                *sum += c * y;
+            }
+            sums[self.columns() + j] += c;
+        }
+        for (i, y) in y.into_iter().enumerate() {
+            sums[self.values() + i] += y;
+            sums[self.values() + 3 + i] += y * y;
+        }
+    }
+
+    /// Adds `count` samples of y = 0 whose columns are 0 but for column `j`.
+    pub fn add_zeros(self, sums: &mut [f32], (j, c): (usize, f32), count: u32) {
+        let count = (count as f32).min(MOST_SAMPLES - sums[self.count()]);
+        sums[self.count()] += count;
+        if c.is_finite() {
+            sums[j * (j + 1) / 2 + j] += count * c * c;
+            sums[self.columns() + j] += count * c;
+        }
+    }
+
+    /// Makes sums of columns s_j r_j of those of columns r_j.
+    pub fn scale(self, sums: &mut [f32], scales: &[f32]) {
+        for j in 0..self.m {
+            for k in 0..=j {
+                sums[j * (j + 1) / 2 + k] *= scales[j] * scales[k];
+            }
+            sums[self.products() + 3 * j..][..3].iter_mut().for_each(|sum| *sum *= scales[j]);
+            sums[self.columns() + j] *= scales[j];
+        }
+    }
+
+    /// Makes sums of columns r_j − I_j of those of columns r_j.
+    pub fn centre(self, sums: &mut [f32], integrals: &[f32]) {
+        let n = sums[self.count()];
+        let (rest, y) = (self.columns(), self.values());
+        for j in 0..self.m {
+            let at = integrals[j];
+            for k in 0..=j {
+                let (sum_j, sum_k) = (sums[rest + j], sums[rest + k]);
+                sums[j * (j + 1) / 2 + k] += n * at * integrals[k] - at * sum_k - integrals[k] * sum_j;
+            }
+            for i in 0..3 {
+                sums[self.products() + 3 * j + i] -= at * sums[y + i];
+            }
+        }
+        for (sum, integral) in sums[rest..rest + self.m].iter_mut().zip(integrals) {
+            *sum -= n * integral;
+        }
+    }
+
     /// Adds the sums of other samples.
     pub fn merge(self, sums: &mut [f32], other: &[f32]) {
         if sums[self.count()] >= MOST_SAMPLES {
@@ -220,6 +288,9 @@ impl NormalEquations {
                 let centre = if known_means { 0.0 } else { mean * self.sum_of_column(sums, k) };
                 a[j][k] = self.sum_of_products(sums, j, k) - centre;
                 a[k][j] = a[j][k];
+            }
+            if a[j][j] < CONSTANT * self.sum_of_products(sums, j, j) {
+                a[j][j] = 0.0;
             }
             for (i, b) in b.iter_mut().enumerate() {
                 b[j] = self.sum_with_y(sums, j, i) - mean * self.sum_of_y(sums, i);
@@ -303,5 +374,31 @@ mod tests {
         equations.add(&mut sums, &[1e30, 1.0], [1.0; 3]);
         assert_eq!(equations.solve(&sums, Penalty::default(), &mut beta), Err(IllConditioned));
         assert_eq!(beta, [0.0; 6]);
+    }
+
+    #[test]
+    fn sparse_samples_centred_at_the_end_are_samples_added_one_by_one() {
+        let equations = NormalEquations::new(4);
+        let integrals = [0.3, 0.7, 0.25, 1e-3];
+        let (mut dense, mut sparse) = (vec![0.0; equations.len()], vec![0.0; equations.len()]);
+        let mut stream = HashStream::new([8, 8, 8]);
+        let centred = |columns: &[(usize, f32)]| {
+            let mut c = integrals.map(|i: f32| -i);
+            columns.iter().for_each(|&(j, r)| c[j] += r);
+            c
+        };
+        for i in 0..50 {
+            let [a, b] = stream.next_2d();
+            let columns = [(0, a), (1, b), (2 + i % 2, 2.0 - a - b)];
+            let y = [a + b, a * a, f32::from(u8::from(i % 3 == 0))];
+            equations.add_sparse(&mut sparse, &columns, y);
+            equations.add(&mut dense, &centred(&columns), y);
+        }
+        equations.add_zeros(&mut sparse, (2, 2.0), 7);
+        (0..7).for_each(|_| equations.add(&mut dense, &centred(&[(2, 2.0)]), [0.0; 3]));
+        equations.centre(&mut sparse, &integrals);
+        for (a, b) in dense.iter().zip(&sparse) {
+            assert!((a - b).abs() < 1e-4 * (1.0 + a.abs()), "{dense:?} {sparse:?}");
+        }
     }
 }

@@ -36,14 +36,21 @@ pub struct Significance {
     pub certain: usize,
 }
 
-/// z of a value; `None` if there is neither a variance nor a difference beyond the rounding of f32.
-fn z_of(x: f64, r: f64, variance: f64) -> Option<f64> {
+/// Relative rounding of values that were computed and stored in f32.
+pub const F32_ROUNDING: f64 = 1.0 / (1_u32 << 22) as f64;
+/// Relative rounding of values that were stored as 16-bit floats.
+pub const HALF_ROUNDING: f64 = 1.0 / (1_u32 << 11) as f64;
+
+/// z of a value; `None` if there is neither a variance nor a difference beyond rounding, `rounding` being that of the
+/// coarser of the two files.
+fn z_of(x: f64, r: f64, variance: f64, rounding: f64) -> Option<f64> {
     let difference = x - r;
+    let most = rounding * x.abs().max(r.abs());
     if variance > 0.0 {
-        return Some(difference / variance.sqrt());
+        // Rounding is uniform over ± `most`.
+        return Some(difference / (variance + most * most / 3.0).sqrt());
     }
-    let rounding = 4.0 * f64::from(f32::EPSILON) * x.abs().max(r.abs());
-    (difference.abs() > rounding).then_some(difference.signum() * f64::INFINITY)
+    (difference.abs() > 2.0 * most).then_some(difference.signum() * f64::INFINITY)
 }
 
 /// 1 − (1 − p)^n: the probability that the least of `n` independent p-values is at most `p`; 1 if there are none.
@@ -55,15 +62,16 @@ fn least_of(p: f64, n: usize) -> f64 {
 }
 
 /// Tests all values of a picture. `variance` holds v_x + v_r per pixel; values whose variance is not finite take no part.
+/// `rounding` is [`F32_ROUNDING`] or [`HALF_ROUNDING`].
 /// Panics if the lengths differ.
-pub fn significance(image: &[Pixel], reference: &[Pixel], variance: &[Pixel]) -> Significance {
+pub fn significance(image: &[Pixel], reference: &[Pixel], variance: &[Pixel], rounding: f64) -> Significance {
     assert_eq!(image.len(), variance.len(), "a variance per pixel");
     let (mut beyond, mut certain, mut max_z) = (0_usize, 0_usize, 0.0_f64);
     let (mut squares, mut dof) = ([0.0; 3], [0_usize; 3]);
     for (i, x, r) in finite_pairs(image, reference) {
         for c in 0..3 {
             let v = f64::from(variance[i][c]);
-            let Some(z) = v.is_finite().then(|| z_of(x[c], r[c], v)).flatten() else { continue };
+            let Some(z) = v.is_finite().then(|| z_of(x[c], r[c], v, rounding)).flatten() else { continue };
             beyond += usize::from(z.abs() > 3.0);
             max_z = max_z.max(z.abs());
             if z.is_finite() {
@@ -90,13 +98,13 @@ pub fn significance(image: &[Pixel], reference: &[Pixel], variance: &[Pixel]) ->
 
 /// The z of largest magnitude among the channels of each pixel; NaN where a pixel takes no part, 0 where it has neither
 /// variance nor difference. Panics if the lengths differ.
-pub fn z_map(image: &[Pixel], reference: &[Pixel], variance: &[Pixel]) -> Vec<f32> {
+pub fn z_map(image: &[Pixel], reference: &[Pixel], variance: &[Pixel], rounding: f64) -> Vec<f32> {
     assert_eq!(image.len(), variance.len(), "a variance per pixel");
     let mut map = vec![f32::NAN; image.len()];
     for (i, x, r) in finite_pairs(image, reference) {
         let v = variance[i].map(f64::from);
         if v.iter().all(|v| v.is_finite()) {
-            let zs = (0..3).map(|c| z_of(x[c], r[c], v[c]).unwrap_or(0.0));
+            let zs = (0..3).map(|c| z_of(x[c], r[c], v[c], rounding).unwrap_or(0.0));
             map[i] = zs.fold(0.0_f64, |a, b| if b.abs() > a.abs() { b } else { a }) as f32;
         }
     }
@@ -114,32 +122,45 @@ mod tests {
         let reference = [[1.0; 3], [1.0; 3]];
         let variance = [[1.0, 0.25, 1.0], [0.25, 4.0, 0.0]];
         // z: 0 6 0 | 1 0 –
-        let s = significance(&image, &reference, &variance);
-        assert_eq!((s.values, s.beyond, s.max_z, s.certain), (5, 0.2, 6.0, 0));
-        assert!((s.mean_square - 37.0 / 5.0).abs() < 1e-12);
+        let s = significance(&image, &reference, &variance, F32_ROUNDING);
+        assert_eq!((s.values, s.beyond, s.certain), (5, 0.2, 0));
+        // The rounding of f32 adds next to nothing to the variance.
+        assert!((s.max_z - 6.0).abs() < 1e-9);
+        assert!((s.mean_square - 37.0 / 5.0).abs() < 1e-9);
         // Two-sided p of 6σ: 1.9732e-9, the least of five.
         assert!((s.family_p / (5.0 * 1.973_175e-9) - 1.0).abs() < 1e-5, "{s:?}");
         // χ² = 36 with 2 degrees of freedom: e^-18, the least of three.
         assert!((s.chi_squared_p / (3.0 * (-18.0_f64).exp()) - 1.0).abs() < 1e-6, "{s:?}");
-        assert_eq!(z_map(&image, &reference, &variance), [6.0, 1.0]);
+        assert_eq!(z_map(&image, &reference, &variance, F32_ROUNDING), [6.0, 1.0]);
     }
 
     #[test]
     fn differences_without_variance_are_certain_and_rounding_is_none() {
-        let s = significance(&[[2.0, 1.0, 1.0 + 1e-7]], &[[1.0; 3]], &[[0.0; 3]]);
+        let s = significance(&[[2.0, 1.0, 1.0 + 1e-7]], &[[1.0; 3]], &[[0.0; 3]], F32_ROUNDING);
         assert_eq!((s.values, s.certain, s.beyond, s.family_p), (1, 1, 1.0, 0.0));
         assert!(s.max_z.is_infinite());
-        let same = significance(&[[1.0; 3]], &[[1.0; 3]], &[[0.0; 3]]);
+        let same = significance(&[[1.0; 3]], &[[1.0; 3]], &[[0.0; 3]], F32_ROUNDING);
         assert_eq!((same.values, same.beyond, same.max_z, same.family_p, same.chi_squared_p), (0, 0.0, 0.0, 1.0, 1.0));
+    }
+
+    #[test]
+    fn rounding_to_half_floats_is_no_difference() {
+        let (image, reference) = ([[17.0; 3]], [[17.0 * (1.0 + 9e-4); 3]]);
+        let test = |variance: f32, rounding| significance(&image, &reference, &[[variance; 3]], rounding);
+        assert_eq!(test(0.0, HALF_ROUNDING).values, 0);
+        assert_eq!(test(0.0, F32_ROUNDING).certain, 3);
+        // The variance of the rounding is (17 / 2048)² / 3 = (4.79e-3)².
+        assert!((test(1e-9, HALF_ROUNDING).max_z - 0.0153 / 4.79e-3).abs() < 0.01);
+        assert!(test(1e-9, F32_ROUNDING).max_z > 400.0);
     }
 
     #[test]
     fn values_that_are_not_finite_take_no_part() {
         let image = [[f32::NAN, 9.0, 9.0], [1.0, 1.0, 2.0]];
         let variance = [[1.0; 3], [1.0, f32::NAN, 1.0]];
-        let s = significance(&image, &[[1.0; 3]; 2], &variance);
-        assert_eq!((s.values, s.max_z), (2, 1.0));
-        let map = z_map(&image, &[[1.0; 3]; 2], &variance);
+        let s = significance(&image, &[[1.0; 3]; 2], &variance, F32_ROUNDING);
+        assert!(s.values == 2 && (s.max_z - 1.0).abs() < 1e-9, "{s:?}");
+        let map = z_map(&image, &[[1.0; 3]; 2], &variance, F32_ROUNDING);
         assert!(map[0].is_nan() && map[1].is_nan());
     }
 
@@ -158,15 +179,15 @@ mod tests {
         let reference = vec![[1.0; 3]; 4096];
         let variance = vec![[0.01; 3]; 4096];
         let image: Vec<Pixel> = reference.iter().map(|r| r.map(|v| v + 0.1 * noise(&mut state))).collect();
-        let s = significance(&image, &reference, &variance);
+        let s = significance(&image, &reference, &variance, F32_ROUNDING);
         assert!(s.family_p > 0.01 && s.chi_squared_p > 0.01 && s.beyond < 0.006, "{s:?}");
         assert!((s.mean_square - 1.0).abs() < 0.05, "{s:?}");
 
         let shifted: Vec<Pixel> = image.iter().map(|p| p.map(|v| v + 0.03)).collect();
-        assert!(significance(&shifted, &reference, &variance).chi_squared_p < 1e-4);
+        assert!(significance(&shifted, &reference, &variance, F32_ROUNDING).chi_squared_p < 1e-4);
         let mut spot = image;
         spot[77][1] += 0.8;
-        let s = significance(&spot, &reference, &variance);
+        let s = significance(&spot, &reference, &variance, F32_ROUNDING);
         assert!(s.family_p < 0.01 && z_test(s.max_z, 0.0, 1.0).p_value < sidak(0.01, s.values), "{s:?}");
         assert!(s.chi_squared_p > 0.001, "{s:?}");
     }

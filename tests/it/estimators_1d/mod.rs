@@ -9,11 +9,15 @@
 //! - [`stratification`]: strata against none, and the strata of equal weights against their printed form
 //! - [`parameters`]: the optimal numbers of proposals and samples
 //! - [`techniques`]: several techniques
+//! - [`mixtures`]: integrals that a deterministic mixture of densities samples
+//! - [`ocv`]: optimizing control variates, optimal multiple importance sampling, correlated sampling
 //! - [`biased`]: the biased baselines have the bias that is predicted
 
 mod biased;
 mod integrals;
 mod law;
+mod mixtures;
+mod ocv;
 mod parameters;
 mod stratification;
 mod techniques;
@@ -22,7 +26,7 @@ mod unbiased;
 use lumiris::estimators::stats::{Welford, sidak, z_test};
 
 /// At least the number of hypotheses that are tested in this module.
-const HYPOTHESES: usize = 200;
+const HYPOTHESES: usize = 1500;
 
 /// Significance of one hypothesis.
 fn level() -> f64 {

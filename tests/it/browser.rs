@@ -1,0 +1,215 @@
+//! A Chromium without a window, driven over the DevTools protocol: real mouse and key events, scripts, pixels.
+//!
+//! The protocol goes over two pipes, messages end in a zero byte. The browser is `chromium` of the path, or what the
+//! variable CHROMIUM names.
+
+use serde_json::{Value, json};
+use std::cell::{Cell, RefCell};
+use std::io::{BufRead, BufReader, Write};
+use std::path::Path;
+use std::process::{Child, ChildStdin, Command, Stdio};
+use std::sync::mpsc::{Receiver, channel};
+use std::time::{Duration, Instant};
+
+/// How long an answer may take: machines that test are slow and busy.
+const PATIENCE: Duration = Duration::from_secs(180);
+
+/// A browser with one open page.
+pub struct Browser {
+    process: Child,
+    input: ChildStdin,
+    messages: Receiver<Value>,
+    next: Cell<u64>,
+    session: String,
+    /// What the console said of errors and warnings, and exceptions that nothing caught.
+    pub complaints: RefCell<Vec<String>>,
+    _profile: tempfile::TempDir,
+}
+
+impl Browser {
+    /// Starts a browser whose window has this size (CSS pixels).
+    pub fn start(size: [u32; 2]) -> Browser {
+        let program = std::env::var("CHROMIUM").unwrap_or_else(|_| "chromium".to_owned());
+        let profile = tempfile::tempdir().unwrap();
+        // The protocol is spoken over the descriptors 3 (commands) and 4 (answers): the shell puts them there.
+        let script = "exec \"$@\" 3<&0 4>&1 0</dev/null 1>/dev/null 2>/dev/null";
+        let mut process = Command::new("sh")
+            .args(["-c", script, "sh", &program])
+            .args(["--headless=new", "--no-sandbox", "--disable-gpu", "--disable-dev-shm-usage", "--no-first-run"])
+            .args(["--disable-background-networking", "--disable-component-update", "--disable-extensions"])
+            .args(["--hide-scrollbars", "--force-device-scale-factor=1", "--remote-debugging-pipe"])
+            .arg(format!("--window-size={},{}", size[0], size[1]))
+            .arg(format!("--user-data-dir={}", profile.path().display()))
+            .arg("about:blank")
+            .stdin(Stdio::piped())
+            .stdout(Stdio::piped())
+            .spawn()
+            .unwrap();
+        let input = process.stdin.take().unwrap();
+        let output = BufReader::new(process.stdout.take().unwrap());
+        let (send, messages) = channel();
+        std::thread::spawn(move || {
+            for message in output.split(0) {
+                let Ok(value) = serde_json::from_slice(&message.unwrap_or_default()) else { return };
+                if send.send(value).is_err() {
+                    return;
+                }
+            }
+        });
+        let mut browser = Browser {
+            process,
+            input,
+            messages,
+            next: Cell::new(1),
+            session: String::new(),
+            complaints: RefCell::default(),
+            _profile: profile,
+        };
+        let target = browser.call("Target.createTarget", json!({ "url": "about:blank" }));
+        let session = browser.call("Target.attachToTarget", json!({ "targetId": target["targetId"], "flatten": true }));
+        browser.session = session["sessionId"].as_str().unwrap().to_owned();
+        for domain in ["Page.enable", "Runtime.enable", "Log.enable"] {
+            browser.call(domain, json!({}));
+        }
+        let metrics = json!({ "width": size[0], "height": size[1], "deviceScaleFactor": 1, "mobile": false });
+        browser.call("Emulation.setDeviceMetricsOverride", metrics);
+        browser
+    }
+
+    /// Sends a command and waits for its answer.
+    pub fn call(&self, method: &str, params: Value) -> Value {
+        let id = self.next.replace(self.next.get() + 1);
+        let mut message = json!({ "id": id, "method": method, "params": params });
+        if !self.session.is_empty() {
+            message["sessionId"] = json!(self.session);
+        }
+        let mut bytes = message.to_string().into_bytes();
+        bytes.push(0);
+        let hint = "is Chromium installed? CHROMIUM may name it";
+        (&self.input).write_all(&bytes).expect(hint);
+        let end = Instant::now() + PATIENCE;
+        loop {
+            let left = end.saturating_duration_since(Instant::now());
+            let message = self.messages.recv_timeout(left).unwrap_or_else(|e| panic!("{method}: {e}; {hint}"));
+            if message["id"] == id {
+                assert!(message["error"].is_null(), "{method}: {}", message["error"]);
+                return message["result"].clone();
+            }
+            self.listen(&message);
+        }
+    }
+
+    /// Keeps what a page complains of.
+    fn listen(&self, message: &Value) {
+        let params = &message["params"];
+        let complaint = match message["method"].as_str() {
+            Some("Runtime.exceptionThrown") => Some(params["exceptionDetails"].to_string()),
+            Some("Runtime.consoleAPICalled") if ["error", "warning", "assert"].iter().any(|t| params["type"] == *t) => {
+                Some(params["args"].to_string())
+            }
+            Some("Log.entryAdded") if params["entry"]["level"] != "verbose" && params["entry"]["level"] != "info" => {
+                Some(params["entry"].to_string())
+            }
+            _ => None,
+        };
+        self.complaints.borrow_mut().extend(complaint);
+    }
+
+    /// Opens a file and waits until `ready` (a script) is true.
+    pub fn open(&self, path: &Path, ready: &str) {
+        let url = format!("file://{}", path.display());
+        let answer = self.call("Page.navigate", json!({ "url": url }));
+        assert!(answer["errorText"].is_null(), "{answer}");
+        self.wait_for(ready);
+    }
+
+    /// Waits until a script is true.
+    pub fn wait_for(&self, condition: &str) {
+        let end = Instant::now() + PATIENCE;
+        while self.run(condition) != json!(true) {
+            assert!(Instant::now() < end, "{condition} does not come true; {:?}", self.complaints.borrow());
+            std::thread::sleep(Duration::from_millis(30));
+        }
+    }
+
+    /// The value of a script.
+    pub fn run(&self, script: &str) -> Value {
+        let params = json!({ "expression": script, "returnByValue": true, "awaitPromise": true });
+        let answer = self.call("Runtime.evaluate", params);
+        assert!(answer["exceptionDetails"].is_null(), "{script}: {}", answer["exceptionDetails"]);
+        answer["result"]["value"].clone()
+    }
+
+    /// Presses, moves and releases the left button along points of the window.
+    pub fn drag(&self, points: &[[f64; 2]]) {
+        let event = |kind: &str, [x, y]: [f64; 2], buttons: u32| {
+            let params = json!({ "type": kind, "x": x, "y": y, "button": "left", "buttons": buttons, "clickCount": 1 });
+            self.call("Input.dispatchMouseEvent", params);
+        };
+        event("mousePressed", points[0], 1);
+        points[1..].iter().for_each(|&p| event("mouseMoved", p, 1));
+        event("mouseReleased", points[points.len() - 1], 0);
+    }
+
+    /// Moves the mouse.
+    pub fn point(&self, [x, y]: [f64; 2]) {
+        self.call("Input.dispatchMouseEvent", json!({ "type": "mouseMoved", "x": x, "y": y }));
+    }
+
+    /// Turns the wheel; negative is away from the hand.
+    pub fn wheel(&self, [x, y]: [f64; 2], delta: f64) {
+        let params = json!({ "type": "mouseWheel", "x": x, "y": y, "deltaX": 0, "deltaY": delta });
+        self.call("Input.dispatchMouseEvent", params);
+    }
+
+    /// Presses and releases a key that types `text`.
+    pub fn key(&self, key: &str, code: &str, shift: bool) {
+        for kind in ["keyDown", "keyUp"] {
+            let params = json!({ "type": kind, "key": key, "code": code, "modifiers": if shift { 8 } else { 0 } });
+            self.call("Input.dispatchKeyEvent", params);
+        }
+    }
+
+    /// Waits until the page has drawn twice.
+    pub fn settle(&self) {
+        self.run("new Promise((f) => requestAnimationFrame(() => requestAnimationFrame(() => f(true))))");
+    }
+
+    /// A picture of the window, as a PNG file.
+    pub fn screenshot(&self, path: &Path) {
+        let answer = self.call("Page.captureScreenshot", json!({ "format": "png" }));
+        std::fs::write(path, decode_base64(answer["data"].as_str().unwrap())).unwrap();
+    }
+}
+
+impl Drop for Browser {
+    fn drop(&mut self) {
+        // Asked to close it takes its children along; one that does not listen is ended. Failing is no matter here.
+        let close = b"{\"id\":0,\"method\":\"Browser.close\"}\0";
+        let _ = (&self.input).write_all(close);
+        for _ in 0..200 {
+            if matches!(self.process.try_wait(), Ok(Some(_))) {
+                return;
+            }
+            std::thread::sleep(Duration::from_millis(25));
+        }
+        let _ = self.process.kill();
+        let _ = self.process.wait();
+    }
+}
+
+fn decode_base64(text: &str) -> Vec<u8> {
+    let value = |c: u8| match c {
+        b'A'..=b'Z' => c - b'A',
+        b'a'..=b'z' => c - b'a' + 26,
+        b'0'..=b'9' => c - b'0' + 52,
+        b'+' => 62,
+        _ => 63,
+    };
+    let mut bytes = Vec::new();
+    for chunk in text.trim_end_matches('=').as_bytes().chunks(4) {
+        let word = chunk.iter().enumerate().fold(0_u32, |w, (i, &c)| w | u32::from(value(c)) << (18 - 6 * i));
+        bytes.extend_from_slice(&word.to_be_bytes()[1..chunk.len()]);
+    }
+    bytes
+}
