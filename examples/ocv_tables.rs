@@ -1,7 +1,7 @@
 //! Bias and variance of optimizing control variates on integrals of known value: the tables of
 //! `docs/measurements/ocv/README.md`.
 //!
-//! `cargo run --release --example ocv_tables`
+//! `cargo run --release --example ocv_tables -- [forms|first|later|shared]`
 #![allow(clippy::print_stdout)]
 
 #[allow(dead_code)]
@@ -15,10 +15,14 @@ use lumiris::math::hash::HashStream;
 use mixtures::{Mixture, PROPER, Sampler};
 
 fn main() {
-    forms();
-    first_passes();
-    later_passes();
-    shared_sums();
+    let parts: [(&str, fn()); 4] =
+        [("forms", forms), ("first", first_passes), ("later", later_passes), ("shared", shared_sums)];
+    let wanted = std::env::args().nth(1);
+    for (name, part) in parts {
+        if wanted.as_deref().is_none_or(|w| w == name) {
+            part();
+        }
+    }
 }
 
 /// Moments of several estimates from each of `runs`, of their first channel.
@@ -168,7 +172,7 @@ fn shared_sums() {
                 [(1, 1e-9), (pixels, 1e-9), (pixels, 0.02), (pixels, 0.05), (pixels, 0.1)].map(|(pixels, spread)| {
                     let samplers: Vec<Sampler> = (0..pixels)
                         .map(|k| {
-                            let shift = spread * (k as f64 + 1.0) / pixels as f64;
+                            let shift = spread * (k as f64 + 1.0 - pixels as f64) / pixels as f64;
                             Sampler { shift, ..Sampler::new(Mixture::Table, n, true) }
                         })
                         .collect();
@@ -184,7 +188,7 @@ fn shared_sums() {
                             for (sampler, row) in samplers.iter().zip(&mut rows) {
                                 sampler.block(len, stream, row);
                             }
-                            // The last pixel is watched, whose occluder is farthest from those of the others.
+                            // The last pixel is watched, whose occluder is at the end of the range.
                             let last = &rows[pixels - 1];
                             total[0] += equations.mean(last)[0] * len as f32 / 4.0;
                             total[1] += equations.estimate(last, &beta)[0] * len as f32 / 4.0;

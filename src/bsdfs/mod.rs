@@ -245,9 +245,27 @@ impl<'a> Bsdf<'a> {
         }
     }
 
+    /// Probability of a lobe of [`Self::sample`] whose density is that of the cosine or uniform, on the side of `wo`: |cos θi|/pdf is at
+    /// most 2π over this everywhere there, and directions are found that no f tells of. 0 for BSDFs without such a lobe.
+    pub fn wide_lobe(&self, wo: Vec3) -> f32 {
+        match self {
+            Bsdf::Diffuse(_) => 1.0,
+            Bsdf::DiffuseTransmission(_) | Bsdf::Evaluated(_) => self.first_lobe(wo),
+            Bsdf::CoatedDiffuse(_) | Bsdf::Layered(_) => 1.0 - self.first_lobe(wo),
+            Bsdf::Conductor(_) | Bsdf::Dielectric(_) | Bsdf::ThinDielectric(_) => 0.0,
+        }
+    }
+
     /// A direction `wi`, by `uc` among the lobes and `u` within one. `None` if the sample carries no light.
     #[inline]
     pub fn sample(&self, wo: Vec3, uc: f32, u: [f32; 2]) -> Option<BsdfSample> {
+        self.sample_direction(wo, uc, u).filter(|s| s.f.is_finite() && !s.f.is_black())
+    }
+
+    /// As [`Self::sample`], but also directions that carry no light: `None` only where the density has a defect. So the directions of
+    /// non-specular samples are distributed by [`Self::pdf`].
+    #[inline]
+    pub fn sample_direction(&self, wo: Vec3, uc: f32, u: [f32; 2]) -> Option<BsdfSample> {
         if wo.z == 0.0 {
             return None;
         }
@@ -261,7 +279,7 @@ impl<'a> Bsdf<'a> {
             Bsdf::Layered(b) => b.sample(wo, uc, u),
             Bsdf::Evaluated(b) => b.sample(wo, uc, u),
         };
-        sample.filter(|s| s.pdf > 0.0 && s.pdf.is_finite() && s.wi.z != 0.0 && s.f.is_finite() && !s.f.is_black())
+        sample.filter(|s| s.pdf > 0.0 && s.pdf.is_finite() && s.wi.z != 0.0)
     }
 
     /// True if [`Self::f`] is not always 0: the point can be lit by sampling lights.

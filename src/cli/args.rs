@@ -7,8 +7,8 @@ use crate::lights::LightSamplerKind;
 use crate::render::output::Aov;
 use crate::samplers::SamplerKind;
 use crate::scene::{
-    AccelKind, Cached, EstimatorKind, IntegratorKind, IrradianceCacheSettings, OptimalForm, ProposalPoints, Proposals,
-    StageTimes, Strata, Target,
+    AccelKind, Cached, CorrelatedForm, EstimatorKind, IntegratorKind, IrradianceCacheSettings, OptimalForm,
+    ProposalPoints, Proposals, SamplingTechnique, StageTimes, Strata, Target,
 };
 use clap::{Args, ValueEnum};
 use std::path::PathBuf;
@@ -59,6 +59,7 @@ choices!(
         Ris => EstimatorKind::Ris,
         Ocv => EstimatorKind::Ocv,
         OptimalMis => EstimatorKind::OptimalMis,
+        Correlated => EstimatorKind::Correlated,
     }
 );
 choices!(
@@ -73,6 +74,14 @@ choices!(
 choices!(
     /// `--optimal-mis`
     OptimalMisArg => OptimalForm { Progressive => OptimalForm::Progressive, Direct => OptimalForm::Direct }
+);
+choices!(
+    /// `--correlated`
+    CorrelatedArg => CorrelatedForm { Combined => CorrelatedForm::Combined, Crossfit => CorrelatedForm::Crossfit }
+);
+choices!(
+    /// `--technique`
+    TechniqueArg => SamplingTechnique { Bsdf => SamplingTechnique::Bsdf, Light => SamplingTechnique::Light }
 );
 choices!(
     /// `--heuristic`
@@ -174,6 +183,13 @@ pub struct SceneArgs {
     /// [default: the file's, or progressive]
     #[arg(long, value_name = "FORM")]
     pub optimal_mis: Option<OptimalMisArg>,
+    /// How correlated weighs its two estimates: from the same samples (biased), or from the other half of them
+    /// [default: the file's, or combined]
+    #[arg(long, value_name = "FORM")]
+    pub correlated: Option<CorrelatedArg>,
+    /// What draws the samples of correlated [default: the file's, or bsdf]
+    #[arg(long)]
+    pub technique: Option<TechniqueArg>,
     /// Most components of the mixture of ocv and optimal-mis: lobes of BSDFs and groups of lights [default: the file's, or 8]
     #[arg(long, value_name = "M", value_parser = clap::value_parser!(u32).range(2..=8))]
     pub components: Option<u32>,

@@ -78,6 +78,12 @@ fn apply(args: &SceneArgs, scene: &mut Scene) {
     if let Some(form) = args.optimal_mis {
         i.optimal_mis = form.value();
     }
+    if let Some(form) = args.correlated {
+        i.correlated.form = form.value();
+    }
+    if let Some(technique) = args.technique {
+        i.correlated.technique = technique.value();
+    }
     if let Some(components) = args.components {
         i.ocv.components = Some(components);
     }

@@ -33,9 +33,11 @@ impl Method {
     fn new(settings: &IntegratorSettings) -> Self {
         match settings.estimator {
             EstimatorKind::OptimalMis => Method::Optimal(settings.optimal_mis),
-            EstimatorKind::Mc | EstimatorKind::Mis | EstimatorKind::Ris | EstimatorKind::Ocv => {
-                Method::Ocv(settings.ocv.form)
-            }
+            EstimatorKind::Mc
+            | EstimatorKind::Mis
+            | EstimatorKind::Ris
+            | EstimatorKind::Ocv
+            | EstimatorKind::Correlated => Method::Ocv(settings.ocv.form),
         }
     }
 

@@ -11,6 +11,7 @@
 //! * **resolve**: the sum of the contributions whose segment is free.
 
 pub mod components;
+pub mod correlated;
 pub mod mixture;
 pub mod proposals;
 pub mod propose;
@@ -27,6 +28,7 @@ use crate::samplers::SampleStream;
 use crate::scene::{EstimatorKind, IntegratorSettings, Split, World};
 pub use components::Fits;
 use components::{Components, halves};
+use correlated::Correlated;
 use propose::Candidates;
 use ris::Resampler;
 use std::time::{Duration, Instant};
@@ -117,6 +119,7 @@ pub struct DirectStage {
     candidates: Candidates,
     resampler: Resampler,
     components: Components,
+    correlated: Correlated,
     contributions: Vec<Rgb>,
     segments: Segments,
     /// Counts and times so far.
@@ -150,7 +153,11 @@ impl DirectStage {
 
         // T1: propose candidates
         let start = Instant::now();
-        self.candidates.propose(world, settings, points);
+        if settings.estimator == EstimatorKind::Correlated {
+            self.correlated.propose(world, settings, points, &mut self.candidates);
+        } else {
+            self.candidates.propose(world, settings, points);
+        }
         let mut t1 = start.elapsed();
         let mut t1_light = self.candidates.light_time;
 
@@ -158,7 +165,11 @@ impl DirectStage {
         let proposed = Instant::now();
         let mut is_visible = false;
         match settings.estimator {
-            EstimatorKind::Mc | EstimatorKind::Mis | EstimatorKind::Ocv | EstimatorKind::OptimalMis => {
+            EstimatorKind::Mc
+            | EstimatorKind::Mis
+            | EstimatorKind::Ocv
+            | EstimatorKind::OptimalMis
+            | EstimatorKind::Correlated => {
                 select::contributions(settings, &self.candidates, &mut self.contributions);
             }
             EstimatorKind::Ris => {
@@ -191,6 +202,9 @@ impl DirectStage {
             self.stats.systems += self.components.systems;
             self.stats.ill_conditioned += self.components.ill_conditioned;
             self.stats.emitter_rays += self.components.emitter_rays;
+        } else if settings.estimator == EstimatorKind::Correlated {
+            let form = settings.correlated.form;
+            self.correlated.resolve(form, &self.candidates, &self.contributions, &self.segments, out);
         } else {
             self.segments.resolve(out);
         }

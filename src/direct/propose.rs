@@ -6,7 +6,7 @@ use crate::accel::{Hit, RayBatch};
 use crate::estimators::mc;
 use crate::estimators::mis::{Heuristic, Technique};
 use crate::lights::groups::MAX_GROUPS;
-use crate::lights::{LightHit, LightId, LightSample};
+use crate::lights::{LightCtx, LightHit, LightId, LightSample};
 use crate::math::ray::{SEGMENT_END, offset_origin};
 use crate::math::{Ray, Rgb, Vec3};
 use crate::samplers::SampleStream;
@@ -14,12 +14,14 @@ use crate::scene::{EmitterHit, EstimatorKind, IntegratorSettings, World};
 use std::time::{Duration, Instant};
 
 /// Domains below the stream of a shading point.
-mod domain {
+pub(super) mod domain {
     pub const LIGHT: u32 = 0;
     pub const BSDF: u32 = 1;
     pub const TECHNIQUE: u32 = 2;
     /// Where the samples of groups begin and end.
     pub const GROUPS: u32 = 3;
+    /// Lights that no ray can hit, where they are sampled by themselves.
+    pub const DELTA: u32 = 4;
     /// Group g uses the domain `GROUP + g`.
     pub const GROUP: u32 = 16;
 }
@@ -116,15 +118,15 @@ pub struct Candidates {
 
 /// A BSDF sample that waits for the emitter it points at.
 #[derive(Clone, Copy, Debug)]
-struct PendingBsdf {
-    point: u32,
-    wi: Vec3,
-    f_cos: Rgb,
-    pdf: f32,
-    specular: bool,
+pub(super) struct PendingBsdf {
+    pub point: u32,
+    pub wi: Vec3,
+    pub f_cos: Rgb,
+    pub pdf: f32,
+    pub specular: bool,
     /// The lobe that was sampled, of those that a mixture tells apart.
-    lobe: usize,
-    shares: Shares,
+    pub lobe: usize,
+    pub shares: Shares,
 }
 
 /// How many samples each technique has at a point.
@@ -163,19 +165,26 @@ impl Shares {
                 Shares::fixed(n - by_bsdf, by_bsdf)
             }
             EstimatorKind::Ris => super::ris::shares(point),
+            EstimatorKind::Correlated => Shares::fixed(0, n),
         }
     }
 }
 
 impl Candidates {
+    /// Removes all.
+    pub(super) fn clear(&mut self) {
+        self.records.clear();
+        self.mixtures.clear();
+        (self.proposals, self.light_proposals, self.emitter_rays) = (0, 0, 0);
+        self.light_time = Duration::ZERO;
+    }
+
     /// Draws the candidates of all points; for `ris` only those by BSDF sampling, since light samples are many and stay
     /// with [`super::ris`].
     pub fn propose(&mut self, world: &World, settings: &IntegratorSettings, points: &[ShadePoint<'_>]) {
-        self.records.clear();
+        self.clear();
         self.pending.clear();
         self.rays.clear();
-        self.mixtures.clear();
-        (self.proposals, self.light_proposals) = (0, 0);
         let has_components = settings.estimator.has_components();
 
         // Light samples
@@ -293,19 +302,29 @@ impl Candidates {
     }
 }
 
+/// A sample of a light; of one at infinity, with the radiance of all that overlap it and the density to choose any of them.
+pub(super) fn with_infinite(
+    world: &World,
+    ctx: &LightCtx,
+    (light, mut sample): (LightId, LightSample),
+) -> (LightId, LightSample) {
+    let lights = &world.scene.lights;
+    if lights.infinite.len() > 1 && lights.infinite.contains(&light) {
+        (sample.li, sample.pdf) = (lights.le(sample.wi), lights.pdf_infinite(ctx, sample.wi));
+    }
+    (light, sample)
+}
+
 /// A sample of a light, whose density includes the choice; `None` if its integrand is zero.
 pub(super) fn light_candidate(
     world: &World,
     index: u32,
     point: &ShadePoint<'_>,
     shares: &Shares,
-    (light, mut sample): (LightId, LightSample),
+    drawn: (LightId, LightSample),
 ) -> Option<Candidate> {
     // Lights at infinity overlap: a direction belongs to all of them together
-    let lights = &world.scene.lights;
-    if lights.infinite.len() > 1 && lights.infinite.contains(&light) {
-        (sample.li, sample.pdf) = (lights.le(sample.wi), lights.pdf_infinite(&point.light_ctx(), sample.wi));
-    }
+    let (_, sample) = with_infinite(world, &point.light_ctx(), drawn);
 
     // Unshadowed integrand
     let f_cos = point.bsdf.f(point.wo, sample.wi) * sample.wi.dot(point.bsdf.frame.z).abs();
@@ -339,7 +358,7 @@ pub(super) fn light_segment(point: &ShadePoint<'_>, sample: &LightSample) -> Ray
 }
 
 /// Completes a BSDF sample with the emitter that it points at; `None` if it points at none.
-fn bsdf_candidate(
+pub(super) fn bsdf_candidate(
     world: &World,
     point: &ShadePoint<'_>,
     pending: &PendingBsdf,

@@ -1,4 +1,4 @@
-//! From candidates to contributions where all are traced: what `mc` and `mis` make of f and the densities.
+//! From candidates to contributions where all are traced: what `mc`, `mis` and the estimators that build on them make of f and the densities.
 
 use super::propose::{Candidates, Drawn};
 use crate::estimators::mc;
@@ -13,6 +13,8 @@ pub fn contributions(settings: &IntegratorSettings, candidates: &Candidates, out
         c.f * match (settings.estimator, c.drawn) {
             (EstimatorKind::Mc, Drawn::Light) => mc::weight(c.n_light, c.p_light),
             (EstimatorKind::Mc, Drawn::Bsdf) => 0.0,
+            (EstimatorKind::Correlated, Drawn::Light | Drawn::DeltaLight) => mc::weight(c.n_light, c.p_light),
+            (EstimatorKind::Correlated, Drawn::Bsdf | Drawn::DeltaBsdf) => mc::weight(c.n_bsdf, c.p_bsdf),
             _ => c.factor(heuristic),
         }
     }));

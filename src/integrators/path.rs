@@ -163,9 +163,11 @@ impl PathIntegrator {
             }
             let vertices = self.find_vertices(world, vertex, depth, samples, out);
             let split = match settings.estimator {
-                EstimatorKind::Mc | EstimatorKind::Mis | EstimatorKind::Ocv | EstimatorKind::OptimalMis => {
-                    settings.split()
-                }
+                EstimatorKind::Mc
+                | EstimatorKind::Mis
+                | EstimatorKind::Ocv
+                | EstimatorKind::OptimalMis
+                | EstimatorKind::Correlated => settings.split(),
                 EstimatorKind::Ris => settings.split().after_bounces(vertex),
             };
             let points: Vec<ShadePoint<'_>> = vertices

@@ -1,12 +1,13 @@
 //! Lights: what they emit, how directions to them are sampled, and how one of many is chosen.
 //!
 //! Reading order: [`point`], [`spot`], [`area`], [`environment`], [`lanes`], [`bounds`], [`tree`], [`select`], [`set`],
-//! [`groups`].
+//! [`groups`], [`irradiance`].
 
 pub mod area;
 pub mod bounds;
 pub mod environment;
 pub mod groups;
+pub mod irradiance;
 pub mod lanes;
 pub mod point;
 pub mod select;
@@ -21,6 +22,7 @@ pub use area::{AreaLight, AreaShape, Emission, EmissionImage, area_lights_of};
 pub use bounds::LightBounds;
 pub use environment::{EnvironmentFilter, EnvironmentMap, EnvironmentMapping};
 pub use groups::LightGroups;
+pub use irradiance::Irradiances;
 pub use lanes::LightLanes;
 pub use select::{LightChoice, LightRun, LightSampler, LightSamplerKind};
 pub use set::{LightSet, LightSetBuilder};

@@ -110,6 +110,25 @@ impl LightSet {
         })
     }
 
+    /// Chooses among the lights that no ray can hit, in the same way; `None` if there are none.
+    pub fn delta_sampler(&self, kind: LightSamplerKind) -> Option<LightSampler> {
+        let is_lit = |light: &&Light| light.is_delta() && light.phi(self.scene_radius) > 0.0;
+        self.lights.iter().find(is_lit)?;
+        let black = Light::Point { p: Vec3::ZERO, intensity: Rgb::BLACK };
+        let delta: Vec<Light> =
+            self.lights.iter().map(|l| if l.is_delta() { l.clone() } else { black.clone() }).collect();
+        Some(LightSampler::new(kind, &delta, self.scene_radius))
+    }
+
+    /// The area lights, with the geometries that they are.
+    pub fn emitters(&self) -> impl Iterator<Item = (GeometryId, LightId)> {
+        let lights = |e: &'_ EmittingGeometry| {
+            let (geometry, first_light) = (e.geometry, e.first_light);
+            e.light_of_primitive.iter().map(move |&i| (geometry, first_light + i)).collect::<Vec<_>>()
+        };
+        self.emitting.iter().flat_map(lights)
+    }
+
     /// True if any primitive of the geometry emits.
     pub fn emits(&self, geometry: GeometryId) -> bool {
         self.emitting.binary_search_by_key(&geometry, |e| e.geometry).is_ok()
@@ -142,8 +161,9 @@ impl LightSet {
         self.sample_choice(ctx, self.groups.sample(self, ctx, group, u_choice)?, u)
     }
 
+    /// Samples a direction to a light that was chosen; otherwise as [`sample`](Self::sample).
     #[inline]
-    fn sample_choice(&self, ctx: &LightCtx, choice: LightChoice, u: [f32; 2]) -> Option<(LightId, LightSample)> {
+    pub fn sample_choice(&self, ctx: &LightCtx, choice: LightChoice, u: [f32; 2]) -> Option<(LightId, LightSample)> {
         let sample = self.lights[choice.light as usize].sample_li(ctx, u)?;
         let pdf = sample.pdf * choice.pmf;
         (pdf > 0.0 && pdf.is_finite()).then_some((choice.light, LightSample { pdf, ..sample }))

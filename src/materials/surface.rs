@@ -82,6 +82,19 @@ impl<'a> SurfaceBsdf<'a> {
         Some(sample)
     }
 
+    /// A direction by the same density, in world space, whether it carries light or not, see [`Bsdf::sample_direction`].
+    #[inline]
+    pub fn sample_direction(&self, wo: Vec3, uc: f32, u: [f32; 2]) -> Option<BsdfSample> {
+        let mut sample = self.bsdf.sample_direction(self.frame.to_local(wo), uc, u)?;
+        sample.wi = self.frame.to_world(sample.wi);
+        Some(sample)
+    }
+
+    /// Probability of a wide lobe on the side of `wo`, see [`Bsdf::wide_lobe`].
+    pub fn wide_lobe(&self, wo: Vec3) -> f32 {
+        self.bsdf.wide_lobe(self.frame.to_local(wo))
+    }
+
     /// One of `proposals` directions to the light, in world space, see [`resample()`].
     #[inline]
     pub fn resample(

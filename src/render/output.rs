@@ -158,6 +158,10 @@ pub fn settings_metadata(scene: &Scene) -> Vec<(String, String)> {
             entries.push(("components", i.ocv.most_components().to_string()));
             entries.push(("bsdf_share", i.bsdf_share.to_string()));
         }
+        EstimatorKind::Correlated => {
+            entries.push(("correlated", i.correlated.form.name().to_owned()));
+            entries.push(("technique", i.correlated.technique.name().to_owned()));
+        }
     }
     if i.kind == IntegratorKind::IrradianceCache {
         let c = &i.cache;

@@ -80,6 +80,11 @@ impl Method {
         Method { estimator: EstimatorKind::OptimalMis, optimal, ..Method::mc(samples) }
     }
 
+    /// Combined correlated and importance sampling by the BSDF with independent random numbers.
+    pub fn correlated(samples: u32) -> Self {
+        Method { estimator: EstimatorKind::Correlated, ..Method::mc(samples) }
+    }
+
     /// Resampled importance sampling with independent random numbers and draws.
     pub fn ris(proposals: u32, samples: u32) -> Self {
         Method { estimator: EstimatorKind::Ris, proposals: proposals.max(samples), ..Method::mc(samples) }

@@ -33,6 +33,8 @@ pub struct IntegratorSettings {
     pub ocv: OcvSettings,
     /// How `optimal-mis` finds its weights.
     pub optimal_mis: OptimalForm,
+    /// What is particular to `correlated`.
+    pub correlated: CorrelatedSettings,
     /// Directions proposed for each that continues a path (M), where the BSDF is one that can only be evaluated; 1 is
     /// plain importance sampling.
     pub bsdf_proposals: u32,
@@ -45,7 +47,7 @@ pub const DEFAULT_SAMPLES: u32 = 2;
 /// Samples per estimate of `ris` where none are asked for: what a shading point costs before its first proposal is worth more than
 /// one sample, and powers of two are well distributed.
 pub const DEFAULT_RIS_SAMPLES: u32 = 4;
-/// Samples per estimate of `ocv` and `optimal-mis` where none are asked for.
+/// Samples per estimate of `ocv`, `optimal-mis` and `correlated` where none are asked for.
 pub const DEFAULT_OCV_SAMPLES: u32 = 4;
 
 impl Default for IntegratorSettings {
@@ -62,6 +64,7 @@ impl Default for IntegratorSettings {
             cache: IrradianceCacheSettings::default(),
             ocv: OcvSettings::default(),
             optimal_mis: OptimalForm::Progressive,
+            correlated: CorrelatedSettings::default(),
             bsdf_proposals: 4,
             bsdf_density: ProposalDensity::Lobes,
         }
@@ -81,7 +84,7 @@ impl IntegratorSettings {
     /// have, which the balance heuristic comes near; the power heuristic serves where everything proposed is traced.
     pub fn heuristic(&self) -> Heuristic {
         self.heuristic.unwrap_or(match self.estimator {
-            EstimatorKind::Mc | EstimatorKind::Mis => Heuristic::Power,
+            EstimatorKind::Mc | EstimatorKind::Mis | EstimatorKind::Correlated => Heuristic::Power,
             EstimatorKind::Ris | EstimatorKind::Ocv | EstimatorKind::OptimalMis => Heuristic::Balance,
         })
     }
@@ -89,7 +92,7 @@ impl IntegratorSettings {
     /// True if an estimate uses coefficients that were fitted to earlier samples of its pixel.
     pub fn is_progressive(&self) -> bool {
         match self.estimator {
-            EstimatorKind::Mc | EstimatorKind::Mis | EstimatorKind::Ris => false,
+            EstimatorKind::Mc | EstimatorKind::Mis | EstimatorKind::Ris | EstimatorKind::Correlated => false,
             EstimatorKind::Ocv => self.ocv.form == Form::Progressive,
             EstimatorKind::OptimalMis => self.optimal_mis == OptimalForm::Progressive,
         }
@@ -107,7 +110,11 @@ impl IntegratorSettings {
 
     /// True if an estimate is made of two independent halves.
     pub fn has_halves(&self) -> bool {
-        self.estimator == EstimatorKind::Ocv && self.ocv.form == Form::Crossfit
+        match self.estimator {
+            EstimatorKind::Mc | EstimatorKind::Mis | EstimatorKind::Ris | EstimatorKind::OptimalMis => false,
+            EstimatorKind::Ocv => self.ocv.form == Form::Crossfit,
+            EstimatorKind::Correlated => self.correlated.form == CorrelatedForm::Crossfit,
+        }
     }
 
     /// Samples and proposals of every estimate where they are not chosen per pixel.
@@ -115,13 +122,15 @@ impl IntegratorSettings {
         let default = match self.estimator {
             EstimatorKind::Mc | EstimatorKind::Mis => DEFAULT_SAMPLES,
             EstimatorKind::Ris => DEFAULT_RIS_SAMPLES,
-            EstimatorKind::Ocv | EstimatorKind::OptimalMis => DEFAULT_OCV_SAMPLES,
+            EstimatorKind::Ocv | EstimatorKind::OptimalMis | EstimatorKind::Correlated => DEFAULT_OCV_SAMPLES,
         };
         let samples = self.samples.unwrap_or(default).max(1);
         match self.estimator {
-            EstimatorKind::Mc | EstimatorKind::Mis | EstimatorKind::Ocv | EstimatorKind::OptimalMis => {
-                Split { samples, proposals: samples }
-            }
+            EstimatorKind::Mc
+            | EstimatorKind::Mis
+            | EstimatorKind::Ocv
+            | EstimatorKind::OptimalMis
+            | EstimatorKind::Correlated => Split { samples, proposals: samples },
             EstimatorKind::Ris => {
                 let proposals = match self.ris.proposals {
                     Proposals::Fixed(m) => m,
@@ -221,6 +230,8 @@ pub enum EstimatorKind {
     Ocv,
     /// Optimal weights of multiple importance sampling [Kondapaneni et al. 2019].
     OptimalMis,
+    /// Importance sampling by one technique, combined with correlated sampling [Szécsi, Sbert and Szirmay-Kalos 2004].
+    Correlated,
 }
 
 impl EstimatorKind {
@@ -232,6 +243,7 @@ impl EstimatorKind {
             EstimatorKind::Ris => "ris",
             EstimatorKind::Ocv => "ocv",
             EstimatorKind::OptimalMis => "optimal-mis",
+            EstimatorKind::Correlated => "correlated",
         }
     }
 
@@ -239,7 +251,7 @@ impl EstimatorKind {
     /// the mixture.
     pub fn has_components(self) -> bool {
         match self {
-            EstimatorKind::Mc | EstimatorKind::Mis | EstimatorKind::Ris => false,
+            EstimatorKind::Mc | EstimatorKind::Mis | EstimatorKind::Ris | EstimatorKind::Correlated => false,
             EstimatorKind::Ocv | EstimatorKind::OptimalMis => true,
         }
     }
@@ -276,6 +288,59 @@ impl OptimalForm {
         match self {
             OptimalForm::Direct => "direct",
             OptimalForm::Progressive => "progressive",
+        }
+    }
+}
+
+/// Combined correlated and importance sampling [Szécsi, Sbert and Szirmay-Kalos 2004].
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct CorrelatedSettings {
+    /// How the weight is found.
+    pub form: CorrelatedForm,
+    /// What draws the samples.
+    pub technique: SamplingTechnique,
+}
+
+impl Default for CorrelatedSettings {
+    fn default() -> Self {
+        CorrelatedSettings { form: CorrelatedForm::Combined, technique: SamplingTechnique::Bsdf }
+    }
+}
+
+/// How `correlated` finds the weight of its two estimates.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum CorrelatedForm {
+    /// From the samples of the estimate. Biased.
+    Combined,
+    /// From the other half of them.
+    Crossfit,
+}
+
+impl CorrelatedForm {
+    /// The name on the command line and in metadata.
+    pub fn name(self) -> &'static str {
+        match self {
+            CorrelatedForm::Combined => "combined",
+            CorrelatedForm::Crossfit => "crossfit",
+        }
+    }
+}
+
+/// A technique that draws directions of light.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum SamplingTechnique {
+    /// In proportion to the BSDF, nearly.
+    Bsdf,
+    /// Points on lights.
+    Light,
+}
+
+impl SamplingTechnique {
+    /// The name on the command line and in metadata.
+    pub fn name(self) -> &'static str {
+        match self {
+            SamplingTechnique::Bsdf => "bsdf",
+            SamplingTechnique::Light => "light",
         }
     }
 }

@@ -5,7 +5,7 @@ use crate::accel::bvh::Bvh;
 use crate::accel::embree::{EmbreeAccel, EmbreeError};
 use crate::accel::{Accel, AlphaSource, Coherence, Hit, RayBatch};
 use crate::geometry::{GeometryId, GeometrySet, Group};
-use crate::lights::LightId;
+use crate::lights::{Irradiances, LightId, LightSampler};
 use crate::math::{Vec2, Vec3};
 use crate::textures::{TextureContext, TextureSet};
 use std::sync::Arc;
@@ -41,6 +41,10 @@ pub struct World {
     pub accel: Box<dyn Accel>,
     /// Samples and proposals of each pixel, if they were chosen for each by itself.
     pub splits: Option<SplitMap>,
+    /// Irradiances of lights that are known in closed form.
+    pub irradiances: Irradiances,
+    /// Chooses among the lights that no ray can hit; `None` if there are none.
+    pub delta_lights: Option<LightSampler>,
     /// Emitters only; geometry ids are indices into `emitter_geometry`.
     emitters: Option<Box<dyn Accel>>,
     emitter_geometry: Vec<GeometryId>,
@@ -103,7 +107,20 @@ impl World {
             Some(build(kind, &Arc::new(set), &scene.textures, packet_width)?)
         };
         let emitters_hide = scene.lights.may_hide_each_other();
-        Ok(World { scene, accel, splits: None, emitters, emitter_geometry, emitters_hide, lobes })
+        let has_alpha = |geometry: GeometryId| scene.geometry.geometries[geometry as usize].alpha.is_some();
+        let irradiances = Irradiances::new(&scene.lights, has_alpha);
+        let delta_lights = scene.lights.delta_sampler(scene.integrator.light_choice);
+        Ok(World {
+            scene,
+            accel,
+            splits: None,
+            irradiances,
+            delta_lights,
+            emitters,
+            emitter_geometry,
+            emitters_hide,
+            lobes,
+        })
     }
 
     /// Number of components that BSDFs are in a mixture with the groups of lights: the lobes of those that have most.

@@ -13,8 +13,8 @@ use lumiris::lights::LightSamplerKind;
 use lumiris::render::{RenderSettings, render};
 use lumiris::samplers::SamplerKind;
 use lumiris::scene::{
-    AccelKind, EstimatorKind, IntegratorKind, OcvSettings, OptimalForm, ProposalPoints, Proposals, Strata, Target,
-    World,
+    AccelKind, CorrelatedForm, CorrelatedSettings, EstimatorKind, IntegratorKind, OcvSettings, OptimalForm,
+    ProposalPoints, Proposals, SamplingTechnique, Strata, Target, World,
 };
 use std::path::{Path, PathBuf};
 use std::sync::atomic::AtomicBool;
@@ -49,6 +49,7 @@ struct Configuration {
     /// Of `ocv`.
     ocv: OcvSettings,
     optimal_mis: OptimalForm,
+    correlated: CorrelatedSettings,
     bsdf_share: f32,
     /// Of `ris`.
     proposals: u32,
@@ -67,6 +68,7 @@ fn configurations() -> Vec<Configuration> {
         samples: 2,
         ocv: OcvSettings::default(),
         optimal_mis: OptimalForm::Progressive,
+        correlated: CorrelatedSettings::default(),
         bsdf_share: 0.5,
         proposals: 16,
         strata: Strata::Systematic,
@@ -92,6 +94,26 @@ fn configurations() -> Vec<Configuration> {
         ..base
     }));
     all.extend(component_configurations(&Configuration { estimator: EstimatorKind::Ocv, ..base }));
+    all.extend(correlated_configurations(&Configuration { estimator: EstimatorKind::Correlated, ..base }));
+    all
+}
+
+/// `correlated` in its unbiased form.
+fn correlated_configurations(base: &Configuration) -> Vec<Configuration> {
+    let of = |technique| Configuration {
+        correlated: CorrelatedSettings { form: CorrelatedForm::Crossfit, technique },
+        ..*base
+    };
+    let (bsdf, light) = (of(SamplingTechnique::Bsdf), of(SamplingTechnique::Light));
+    let mut all = [1, 2, 3, 4, 16].map(|samples| Configuration { samples, ..bsdf }).to_vec();
+    all.extend([1, 2, 5, 16].map(|samples| Configuration { samples, ..light }));
+    all.extend([LightSamplerKind::Uniform, LightSamplerKind::Power].map(|light_choice| Configuration {
+        samples: 5,
+        light_choice,
+        ..light
+    }));
+    all.push(Configuration { samples: 4, sampler: SamplerKind::Independent, ..bsdf });
+    all.push(Configuration { samples: 4, accel: AccelKind::Bvh, ..bsdf });
     all
 }
 
@@ -138,6 +160,7 @@ fn world(path: &Path, c: &Configuration) -> World {
     scene.integrator.samples = Some(c.samples);
     scene.integrator.ocv = c.ocv;
     scene.integrator.optimal_mis = c.optimal_mis;
+    scene.integrator.correlated = c.correlated;
     scene.integrator.bsdf_share = c.bsdf_share;
     scene.integrator.ris.proposals = Proposals::Fixed(c.proposals);
     scene.integrator.ris.strata = c.strata;
@@ -208,7 +231,13 @@ fn forms_that_fit_their_own_samples_are_near_the_answer() {
         let base = Configuration { estimator: EstimatorKind::Ocv, samples: 64, ..configurations()[0] };
         let form = |form| Configuration { ocv: OcvSettings { form, ..base.ocv }, ..base };
         let direct = Configuration { estimator: EstimatorKind::OptimalMis, optimal_mis: OptimalForm::Direct, ..base };
-        for c in [form(Form::Paper), form(Form::Regression), direct] {
+        let combined = |technique| Configuration {
+            estimator: EstimatorKind::Correlated,
+            correlated: CorrelatedSettings { form: CorrelatedForm::Combined, technique },
+            ..base
+        };
+        let [bsdf, light] = [SamplingTechnique::Bsdf, SamplingTechnique::Light].map(combined);
+        for c in [form(Form::Paper), form(Form::Regression), direct, bsdf, light] {
             let mean = picture_means(&mut world(&path, &c))[0].mean();
             let ratio = mean / answer(&path)[0];
             assert!((ratio - 1.0).abs() < 0.05, "{name} {c:?}: {ratio}");

@@ -9,7 +9,8 @@ use lumiris::scene::{AccelKind, EstimatorKind, Proposals, World};
 use std::path::Path;
 use std::sync::atomic::AtomicBool;
 
-const ESTIMATORS: [EstimatorKind; 3] = [EstimatorKind::Mis, EstimatorKind::Ris, EstimatorKind::Ocv];
+const ESTIMATORS: [EstimatorKind; 4] =
+    [EstimatorKind::Mis, EstimatorKind::Ris, EstimatorKind::Ocv, EstimatorKind::Correlated];
 
 fn gallery(estimator: EstimatorKind, packet_width: Option<u32>) -> World {
     let path = Path::new(env!("CARGO_MANIFEST_DIR")).join("scenes/demo/gallery.pbrt");

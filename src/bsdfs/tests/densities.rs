@@ -70,20 +70,6 @@ fn histogram(sample: &dyn Fn(f32, [f32; 2]) -> Option<BsdfSample>, seed: u32) ->
     counts
 }
 
-/// Sampler without the filter that drops samples of value zero: walks can return zero where the density does not.
-fn raw_sample(b: &Bsdf<'_>, wo: Vec3, uc: f32, u: [f32; 2]) -> Option<BsdfSample> {
-    match b {
-        Bsdf::Layered(l) => l.sample(wo, uc, u),
-        Bsdf::Diffuse(_)
-        | Bsdf::DiffuseTransmission(_)
-        | Bsdf::Conductor(_)
-        | Bsdf::Dielectric(_)
-        | Bsdf::ThinDielectric(_)
-        | Bsdf::CoatedDiffuse(_)
-        | Bsdf::Evaluated(_) => b.sample(wo, uc, u),
-    }
-}
-
 #[test]
 fn samples_follow_their_density_by_chi_squared() {
     let tables = tables();
@@ -96,7 +82,7 @@ fn samples_follow_their_density_by_chi_squared() {
             let probabilities = expected(&|wi| b.pdf(wo, wi));
             let total: f64 = probabilities[..THETAS * PHIS].iter().sum();
             let expected: Vec<f64> = probabilities.iter().map(|p| p * SAMPLES as f64).collect();
-            let observed = histogram(&|uc, u| raw_sample(b, wo, uc, u), (i * 8 + j) as u32);
+            let observed = histogram(&|uc, u| b.sample_direction(wo, uc, u), (i * 8 + j) as u32);
             let chi = chi_squared_test(&observed, &expected, significance);
             if chi.rejected || total > 1.0 + 1e-4 {
                 failures.push(format!("{name} {wo}: {chi:?}, ∫pdf = {total}"));
@@ -128,7 +114,7 @@ fn the_first_lobe_is_sampled_in_proportion_to_its_part_of_the_density() {
             let mut difference = crate::estimators::stats::Welford::new();
             for _ in 0..100_000 {
                 let uc = stream.next_f32();
-                let Some(s) = raw_sample(b, wo, uc, stream.next_2d()).filter(|s| !s.lobe.is_specular()) else {
+                let Some(s) = b.sample_direction(wo, uc, stream.next_2d()).filter(|s| !s.lobe.is_specular()) else {
                     continue;
                 };
                 let part = b.pdf_first_lobe(wo, s.wi, s.pdf);
@@ -141,4 +127,47 @@ fn the_first_lobe_is_sampled_in_proportion_to_its_part_of_the_density() {
         }
     }
     assert!(of_two >= 8, "BSDFs of two lobes are among them");
+}
+
+#[test]
+fn wide_lobes_find_every_direction_of_their_side() {
+    // ∫ cos θ/π = 1 by samples whose f may be black, with a bounded quotient
+    let tables = tables();
+    let mut all = zoo(&tables);
+    let half = |albedo, coat| {
+        Bsdf::Layered(layered(glass(1.5, coat), Base::Diffuse(Diffuse { reflectance: RED * albedo }), 0.0, 0.0))
+    };
+    let narrow = Model::CosineLobe(models::CosineLobe::new(Rgb::BLACK, RED, 900.0, models::LobeAxis::Mirror));
+    all.extend([
+        ("black base".into(), half(0.0, 0.0)),
+        ("dark base".into(), half(0.2, 0.3)),
+        ("narrow".into(), Bsdf::Evaluated(Evaluated { model: narrow, density: ProposalDensity::Lobes })),
+        (
+            "transmission".into(),
+            Bsdf::DiffuseTransmission(DiffuseTransmission { reflectance: Rgb::BLACK, transmittance: RED }),
+        ),
+    ]);
+    let mut tested = 0;
+    for (i, (name, b)) in all.iter().enumerate() {
+        for wo in [warp::direction(0.85, 0.6), warp::direction(-0.3, 4.0)] {
+            let wide = b.wide_lobe(wo);
+            assert!((0.0..=1.0).contains(&wide), "{name}: {wide}");
+            if wide < 0.01 {
+                continue;
+            }
+            tested += 1;
+            let mut stream = HashStream::new([i as u32, 9, 1]);
+            let mut mean = crate::estimators::stats::Welford::new();
+            for _ in 0..20_000 {
+                let sample = b.sample_direction(wo, stream.next_f32(), stream.next_2d());
+                let sample = sample.filter(|s| !s.lobe.is_specular() && s.wi.z * wo.z > 0.0);
+                let quotient = sample.map_or(0.0, |s| s.wi.z.abs() / s.pdf);
+                assert!(quotient <= 1.001 * TAU / wide, "{name}: {quotient}");
+                mean.add(f64::from(quotient / PI));
+            }
+            let z = crate::estimators::stats::z_test(mean.mean(), 1.0, mean.standard_error());
+            assert!((mean.mean() - 1.0).abs() < 1e-5 || z.p_value > 1e-5, "{name} {wo}: {mean:?}");
+        }
+    }
+    assert!(tested >= 24, "{tested}");
 }

@@ -133,28 +133,16 @@ impl NormalEquations {
             return;
         }
         sums[self.count()] += 1.0;
-        if !(columns.iter().chain(&y).all(|v| v.is_finite())) {
-            return;
-        }
-
-        let (products, rest) = sums.split_at_mut(self.products());
-        let (mixed, rest) = rest.split_at_mut(3 * self.m);
-        let (means, rest) = rest.split_at_mut(self.m);
-        let mut row = products;
-        for (j, &c) in columns.iter().enumerate() {
-            let (head, tail) = row.split_at_mut(j + 1);
-            for (sum, other) in head.iter_mut().zip(columns) {
-                *sum += c * other;
-            }
-            row = tail;
-            for (sum, y) in mixed[3 * j..3 * j + 3].iter_mut().zip(y) {
-                *sum += c * y;
-            }
-            means[j] += c;
-        }
-        for (i, y) in y.into_iter().enumerate() {
-            rest[i] += y;
-            rest[3 + i] += y * y;
+        match self.m {
+            0 => accumulate::<0>(sums, columns, y),
+            1 => accumulate::<1>(sums, columns, y),
+            2 => accumulate::<2>(sums, columns, y),
+            3 => accumulate::<3>(sums, columns, y),
+            4 => accumulate::<4>(sums, columns, y),
+            5 => accumulate::<5>(sums, columns, y),
+            6 => accumulate::<6>(sums, columns, y),
+            7 => accumulate::<7>(sums, columns, y),
+            _ => accumulate::<MAX_COMPONENTS>(sums, columns, y),
         }
     }
 
@@ -310,6 +298,43 @@ impl NormalEquations {
             let control: f32 = c.iter().enumerate().map(|(j, c)| beta[3 * j + i] * c).sum();
             (y[i] - control) / n
         })
+    }
+}
+
+/// Adds a sample to all sums but the count, with loops of known length; nothing if it is not finite.
+#[inline(always)]
+fn accumulate<const M: usize>(sums: &mut [f32], columns: &[f32], y: [f32; 3]) {
+    let Some(c) = columns.first_chunk::<M>() else { return };
+    let mut probe = (y[0] + y[1] + y[2]) * 0.0;
+    for c in c {
+        probe += c * 0.0;
+    }
+    // ∞ · 0 and NaN · 0 are NaN; y whose sum overflows is of no use either.
+    if probe.is_nan() {
+        return;
+    }
+    let sums = &mut sums[..M * (M + 1) / 2 + 4 * M + 7];
+    let mut at = 0;
+    for j in 0..M {
+        for k in 0..=j {
+            sums[at] += c[j] * c[k];
+            at += 1;
+        }
+    }
+    for c in c {
+        for y in y {
+            sums[at] += c * y;
+            at += 1;
+        }
+    }
+    for c in c {
+        sums[at] += c;
+        at += 1;
+    }
+    for y in y {
+        sums[at] += y;
+        sums[at + 3] += y * y;
+        at += 1;
     }
 }
 

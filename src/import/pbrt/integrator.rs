@@ -8,8 +8,8 @@ use crate::estimators::ocv::Form;
 use crate::import::diagnostic::Diagnostics;
 use crate::lights::LightSamplerKind;
 use crate::scene::{
-    Cached, EstimatorKind, IntegratorKind, IntegratorSettings, IrradianceCacheSettings, OptimalForm, ProposalPoints,
-    Proposals, Strata, Target,
+    Cached, CorrelatedForm, EstimatorKind, IntegratorKind, IntegratorSettings, IrradianceCacheSettings, OptimalForm,
+    ProposalPoints, Proposals, SamplingTechnique, Strata, Target,
 };
 
 /// Understands `Integrator`.
@@ -70,8 +70,8 @@ pub(super) fn finish_integrator(pending: Option<&Pending>, d: &mut Diagnostics) 
 
 /// Parameters that are Lumiris's own, and pbrt's `lightsampler`.
 fn lumiris_parameters(s: &mut IntegratorSettings, p: &ParamSet, d: &mut Diagnostics) {
-    use EstimatorKind::{Mc, Mis, Ocv, OptimalMis, Ris};
-    if let Some(e) = choice(p, "estimator", &[Mc, Mis, Ris, Ocv, OptimalMis], EstimatorKind::name, d) {
+    use EstimatorKind::{Correlated, Mc, Mis, Ocv, OptimalMis, Ris};
+    if let Some(e) = choice(p, "estimator", &[Mc, Mis, Ris, Ocv, OptimalMis, Correlated], EstimatorKind::name, d) {
         s.estimator = e;
     }
     let forms = [Form::Progressive, Form::Crossfit, Form::Regression, Form::Paper];
@@ -81,6 +81,14 @@ fn lumiris_parameters(s: &mut IntegratorSettings, p: &ParamSet, d: &mut Diagnost
     if let Some(form) = choice(p, "optimalmis", &[OptimalForm::Progressive, OptimalForm::Direct], OptimalForm::name, d)
     {
         s.optimal_mis = form;
+    }
+    let forms = [CorrelatedForm::Combined, CorrelatedForm::Crossfit];
+    if let Some(form) = choice(p, "correlated", &forms, CorrelatedForm::name, d) {
+        s.correlated.form = form;
+    }
+    let techniques = [SamplingTechnique::Bsdf, SamplingTechnique::Light];
+    if let Some(technique) = choice(p, "technique", &techniques, SamplingTechnique::name, d) {
+        s.correlated.technique = technique;
     }
     match p.integer("components", d) {
         Some(n @ 2..=8) => s.ocv.components = Some(n as u32),
@@ -230,13 +238,30 @@ mod tests {
     }
 
     #[test]
+    fn settings_of_correlated_sampling_are_read() {
+        let s = settings("Integrator \"path\" \"string estimator\" \"correlated\"").unwrap();
+        assert_eq!(s.estimator, EstimatorKind::Correlated);
+        assert_eq!((s.correlated.form, s.correlated.technique), (CorrelatedForm::Combined, SamplingTechnique::Bsdf));
+        let s =
+            settings("Integrator \"path\" \"string correlated\" \"crossfit\" \"string technique\" \"light\"").unwrap();
+        assert_eq!((s.correlated.form, s.correlated.technique), (CorrelatedForm::Crossfit, SamplingTechnique::Light));
+        for (parameter, message) in [
+            ("\"string correlated\" \"half\"", "one of combined, crossfit"),
+            ("\"string technique\" \"both\"", "one of bsdf, light"),
+        ] {
+            let report = settings(&format!("Integrator \"path\" {parameter}")).unwrap_err();
+            assert!(report.contains(message), "{parameter}: {report}");
+        }
+    }
+
+    #[test]
     fn wrong_settings_of_resampling_are_errors_that_say_what_is_possible() {
         for (parameter, message) in [
             ("\"string proposals\" \"many\"", "one of auto, optimal"),
             ("\"integer proposals\" 0", "proposals must be from 1 to 4096, not 0"),
             ("\"string strata\" \"some\"", "one of none, proposals, weights, systematic"),
             ("\"string target\" \"l\"", "one of fgl, gv, gvl"),
-            ("\"string estimator\" \"rys\"", "one of mc, mis, ris, ocv, optimal-mis"),
+            ("\"string estimator\" \"rys\"", "one of mc, mis, ris, ocv, optimal-mis, correlated"),
         ] {
             let report = settings(&format!("Integrator \"path\" {parameter}")).unwrap_err();
             assert!(report.contains(message), "{parameter}: {report}");

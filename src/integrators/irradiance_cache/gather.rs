@@ -103,7 +103,11 @@ impl Gatherer {
         };
         let split = match settings.estimator {
             EstimatorKind::Ris => settings.split().after_bounces(1),
-            EstimatorKind::Mc | EstimatorKind::Mis | EstimatorKind::Ocv | EstimatorKind::OptimalMis => paths.split(),
+            EstimatorKind::Mc
+            | EstimatorKind::Mis
+            | EstimatorKind::Ocv
+            | EstimatorKind::OptimalMis
+            | EstimatorKind::Correlated => paths.split(),
         };
         self.samples.clear();
         for w in wanted {

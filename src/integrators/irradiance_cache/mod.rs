@@ -92,9 +92,11 @@ impl CacheIntegrator {
             }
             let vertices = self.paths.find_vertices(world, vertex, depth, samples, out);
             let split = match settings.estimator {
-                EstimatorKind::Mc | EstimatorKind::Mis | EstimatorKind::Ocv | EstimatorKind::OptimalMis => {
-                    settings.split()
-                }
+                EstimatorKind::Mc
+                | EstimatorKind::Mis
+                | EstimatorKind::Ocv
+                | EstimatorKind::OptimalMis
+                | EstimatorKind::Correlated => settings.split(),
                 EstimatorKind::Ris => settings.split().after_bounces(vertex),
             };
             let shadings: Vec<Shading<'_>> = vertices.iter().map(|v| self.shade(cache, v)).collect();

@@ -32,10 +32,14 @@ impl Emission {
         }
     }
 
-    /// Luminance of the radiance, averaged over the image.
+    /// The radiance, averaged over the image.
+    pub fn mean(&self) -> Rgb {
+        self.image.as_ref().map_or(self.l, |image| self.l * image.mean)
+    }
+
+    /// Luminance of [`mean`](Self::mean).
     pub fn mean_luminance(&self) -> f32 {
-        let mean = self.image.as_ref().map_or(self.l, |image| self.l * image.mean);
-        let luminance = mean.luminance();
+        let luminance = self.mean().luminance();
         if luminance.is_finite() { luminance.max(0.0) } else { 0.0 }
     }
 }

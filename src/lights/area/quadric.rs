@@ -75,6 +75,11 @@ impl QuadricLight {
         light
     }
 
+    /// Centre and radius, if it is a full sphere whose normal points outwards.
+    pub(in crate::lights) fn outward_sphere(&self) -> Option<(Vec3, f32)> {
+        self.sphere.filter(|_| !self.reversed)
+    }
+
     /// ∫|cof(M)·n| dA by the midpoint rule, which is exact where the integrand is constant.
     fn world_area(&self) -> f32 {
         const CELLS: u32 = 32;

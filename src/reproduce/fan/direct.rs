@@ -96,7 +96,7 @@ const WANTED_TURNS: [f64; 2] = [8.0, 4.0];
 const PAIR_TURNS: u32 = 4;
 
 /// Who is shown with antialiasing.
-pub const SHOWN: [Role; 4] = [Role::Balance, Role::Progressive, Role::Light, Role::Ris];
+pub const SHOWN: [Role; 4] = [Role::Balance, Role::Progressive, Role::Correlated, Role::Ris];
 
 /// Everything that was measured for a case.
 pub struct Outcome<'a> {

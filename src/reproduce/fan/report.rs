@@ -174,7 +174,7 @@ impl Outcome<'_> {
 
 /// What a row of the table says beside its result.
 fn reason(o: &Outcome<'_>, way: usize) -> String {
-    let others: Vec<String> = [Role::Crossfit, Role::Regression, Role::Paper, Role::Optimal, Role::Light]
+    let others: Vec<String> = [Role::Crossfit, Role::Regression, Role::Paper, Role::Optimal, Role::Correlated]
         .iter()
         .map(|&r| format!("{} {}", r.name(), percent(o.relative(r, way))))
         .collect();
@@ -257,7 +257,7 @@ fn pictures(setup: &Setup<'_>, o: &Outcome<'_>) -> Result<Vec<Block>, ReproduceE
 
     let mut blocks = vec![Block::Pictures(whole), Block::Pictures(crops)];
     for (way, name) in WAYS.iter().enumerate() {
-        let chosen = [Role::Balance, Role::Progressive, Role::Light, Role::Ris];
+        let chosen = [Role::Balance, Role::Progressive, Role::Correlated, Role::Ris];
         let list: Vec<(&str, &Measured)> = chosen.iter().map(|r| (r.name(), &o.measured[r.place(way)])).collect();
         blocks.extend(variances(setup, &o.truth, o.size, &list, &format!("{id}-variance-{way}"), name)?);
     }

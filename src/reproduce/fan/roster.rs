@@ -19,6 +19,7 @@ pub enum Role {
     Paper,
     Optimal,
     OptimalDirect,
+    Correlated,
     /// One technique alone.
     Light,
     /// `ris` in the time of the baseline.
@@ -28,7 +29,7 @@ pub enum Role {
 }
 
 /// All of them.
-pub const ROLES: [Role; 11] = [
+pub const ROLES: [Role; 12] = [
     Role::Balance,
     Role::Power,
     Role::Progressive,
@@ -37,6 +38,7 @@ pub const ROLES: [Role; 11] = [
     Role::Paper,
     Role::Optimal,
     Role::OptimalDirect,
+    Role::Correlated,
     Role::Light,
     Role::Ris,
     Role::EqualTime,
@@ -68,6 +70,7 @@ impl Role {
             Role::Paper => "ocv, paper",
             Role::Optimal => "optimal-mis, progressive",
             Role::OptimalDirect => "optimal-mis, direct",
+            Role::Correlated => "correlated, BSDF sampling",
             Role::Light => "mc, light sampling alone",
             Role::Ris => "ris in the time of mis",
             Role::EqualTime => "ocv, progressive, in the time of mis",
@@ -77,7 +80,7 @@ impl Role {
     /// False if the expectation may differ from the truth.
     pub fn is_unbiased(self) -> bool {
         match self {
-            Role::Regression | Role::Paper | Role::OptimalDirect => false,
+            Role::Regression | Role::Paper | Role::OptimalDirect | Role::Correlated => false,
             Role::Balance
             | Role::Power
             | Role::Progressive
@@ -100,6 +103,7 @@ impl Role {
             Role::Paper => Method::ocv(Form::Paper, n.samples),
             Role::Optimal => Method::optimal_mis(OptimalForm::Progressive, n.samples),
             Role::OptimalDirect => Method::optimal_mis(OptimalForm::Direct, n.samples),
+            Role::Correlated => Method::correlated(n.samples),
             Role::Light => Method::mc(n.samples),
             Role::Ris => Method::ris(n.ris.proposals, n.ris.samples).strata(Strata::Systematic),
             Role::EqualTime => Method::ocv(Form::Progressive, n.equal_time),

@@ -1,0 +1,387 @@
+//! Combined correlated and importance sampling [Szécsi, Sbert and Szirmay-Kalos 2004]: all N samples of a point come from one
+//! technique, of density p, and are also samples of a control variate g whose integral G is known.
+//!
+//! g(wi) = (1/π) Σ L̄ cos θ over the lights that wi crosses, G = E/π: what a Lambertian surface of albedo 1 would reflect to wo if nothing
+//! were in the way, not even another light, and every light had its mean radiance L̄. θ is the angle to the shading normal on the
+//! side of wo, and g = 0 on the other side. [`crate::lights::irradiance`] tells which lights take part; the others are in no g.
+//! The estimate is ȳ − λ c̄ with y = f·V/p and c = g/p − G, see [`crate::estimators::correlated`].
+//!
+//! * **BSDF sampling.** g is summed over all lights along the ray. E(c) = 0 asks for p > 0 wherever g > 0, and a useful variance for a
+//!   bounded g/p. Both hold for BSDFs that sample a cosine or uniform lobe on the side of wo with a probability of at least
+//!   [`LEAST_WIDE_LOBE`] ([`crate::bsdfs::Bsdf::wide_lobe`]): diffuse, most coated and layered ones, and those that are only
+//!   evaluated. Mirror directions of a smooth coat are samples of g = 0. Of all others (metal, glass) the density of a peak is next to
+//!   nothing in most of the hemisphere; they have g = 0 everywhere, which leaves importance sampling. Lights that no ray can hit have
+//!   samples of their own, one of four and at least one, whose estimate is added; a single sample decides by itself which of both it
+//!   is.
+//! * **Light sampling.** The domain is that of points on lights: a sample has the g of its own light, and p includes the choice of
+//!   that light. It is positive wherever g is, whatever the BSDF. Lights that no ray can hit are samples of g = 0. Specular lobes have
+//!   one BSDF sample of their own in addition; BSDFs that are nothing else are sampled by the BSDF.
+//!
+//! A sample whose integrand is zero counts with its g like any other.
+
+use super::ShadePoint;
+use super::propose::{
+    Candidate, Candidates, PendingBsdf, Shares, bsdf_candidate, domain, light_candidate, with_infinite,
+};
+use super::visibility::{Segments, is_traced};
+use crate::accel::{Hit, RayBatch};
+use crate::estimators::correlated::{self, SUMS};
+use crate::lights::{LightId, LightSample};
+use crate::math::ray::offset_origin;
+use crate::math::{Ray, Rgb, Vec3};
+use crate::scene::{CorrelatedForm, EmitterHit, IntegratorSettings, SamplingTechnique, World};
+use std::f32::consts::FRAC_1_PI;
+use std::time::Instant;
+
+/// Least probability of a wide lobe for which BSDF samples have a control variate.
+pub const LEAST_WIDE_LOBE: f32 = 0.01;
+/// Of this many samples, one is drawn for lights that no ray can hit.
+pub const DELTA_SHARE: u32 = 4;
+
+/// How the samples of a point are drawn.
+#[derive(Clone, Copy, Debug)]
+struct Plan {
+    technique: SamplingTechnique,
+    /// Samples of the combination.
+    n: u32,
+    /// Those that the technique draws; one less if the only one is of a light that no ray can hit.
+    draws: u32,
+    /// Probability that a sample of the combination is drawn by the technique.
+    share: f32,
+    /// Samples of lights that no ray can hit, and how many are expected.
+    delta_draws: u32,
+    n_delta: f32,
+    /// BSDF samples for specular lobes, outside the combination.
+    specular_draws: u32,
+}
+
+impl Plan {
+    fn new(world: &World, settings: &IntegratorSettings, point: &ShadePoint<'_>) -> Self {
+        let n = point.split.samples;
+        let bsdf = &point.bsdf.bsdf;
+        let technique = if bsdf.has_non_specular() { settings.correlated.technique } else { SamplingTechnique::Bsdf };
+        let all = Plan { technique, n, draws: n, share: 1.0, delta_draws: 0, n_delta: 0.0, specular_draws: 0 };
+        match technique {
+            SamplingTechnique::Light => Plan { specular_draws: u32::from(n > 0 && bsdf.has_specular()), ..all },
+            SamplingTechnique::Bsdf if world.delta_lights.is_none() || !bsdf.has_non_specular() || n == 0 => all,
+            SamplingTechnique::Bsdf if n == 1 => {
+                let is_delta = u32::from(point.stream.domain(domain::TECHNIQUE).draw::<1>()[0] < 0.5);
+                Plan { draws: 1 - is_delta, share: 0.5, delta_draws: is_delta, n_delta: 0.5, ..all }
+            }
+            SamplingTechnique::Bsdf => {
+                let delta = (n / DELTA_SHARE).max(1);
+                Plan { n: n - delta, draws: n - delta, delta_draws: delta, n_delta: delta as f32, ..all }
+            }
+        }
+    }
+
+    /// Expected number of samples that the technique draws.
+    fn n_technique(&self) -> f32 {
+        self.n as f32 * self.share
+    }
+
+    /// True if samples of lights that no ray can hit are samples of the combination.
+    fn has_delta_inside(&self) -> bool {
+        self.share < 1.0
+    }
+}
+
+/// The estimate of a point in the making.
+#[derive(Clone, Copy, Debug)]
+struct Estimate {
+    plan: Plan,
+    /// G; black if g = 0 everywhere.
+    integral: Rgb,
+    /// Shading normal on the side of wo.
+    n: Vec3,
+    sums: [f32; SUMS],
+    /// Estimate of what is outside the combination.
+    outside: Rgb,
+}
+
+impl Estimate {
+    fn new(world: &World, settings: &IntegratorSettings, point: &ShadePoint<'_>) -> Self {
+        let plan = Plan::new(world, settings, point);
+        let is_controlled = match plan.technique {
+            SamplingTechnique::Light => true,
+            SamplingTechnique::Bsdf => point.bsdf.wide_lobe(point.wo) >= LEAST_WIDE_LOBE,
+        };
+        let z = point.bsdf.frame.z;
+        let n = if z.dot(point.wo) < 0.0 { -z } else { z };
+        let integral = if is_controlled && plan.n > 0 {
+            world.irradiances.irradiance(&world.scene.lights, point.p, n) * FRAC_1_PI
+        } else {
+            Rgb::BLACK
+        };
+        let integral = if integral.is_finite() { integral } else { Rgb::BLACK };
+        Estimate { plan, integral, n, sums: [0.0; SUMS], outside: Rgb::BLACK }
+    }
+
+    /// True if the direction `wi` has a g.
+    fn has_g(&self, wi: Vec3) -> bool {
+        !self.integral.is_black() && self.n.dot(wi) > 0.0
+    }
+
+    /// c of a sample towards `wi`, drawn with the density `pdf` by the technique, of lights whose L̄ sum to `l`.
+    fn control(&self, l: Rgb, wi: Vec3, pdf: f32) -> [f32; 3] {
+        if !self.has_g(wi) {
+            return self.without_g();
+        }
+        (l * (self.n.dot(wi) * FRAC_1_PI / (self.plan.share * pdf)) - self.integral).to_array()
+    }
+
+    /// c of a sample of g = 0.
+    fn without_g(&self) -> [f32; 3] {
+        (self.integral * -1.0).to_array()
+    }
+}
+
+/// The stage's buffers.
+#[derive(Debug, Default)]
+pub struct Correlated {
+    estimates: Vec<Estimate>,
+    /// c of each candidate; `None` outside the combination.
+    controls: Vec<Option<[f32; 3]>>,
+    /// BSDF samples, with the sum of L̄ along their rays, and with what each is a candidate for.
+    pending: Vec<PendingBsdf>,
+    crossed: Vec<Rgb>,
+    found: Vec<Option<Candidate>>,
+    rays: RayBatch,
+    ray_of: Vec<u32>,
+    next_rays: RayBatch,
+    next_ray_of: Vec<u32>,
+    hits: Vec<Option<Hit>>,
+    emitter_hits: Vec<Option<EmitterHit>>,
+}
+
+impl Correlated {
+    /// Draws the samples of all points. Those whose integrand is zero are counted, the others become candidates.
+    pub(super) fn propose(
+        &mut self,
+        world: &World,
+        settings: &IntegratorSettings,
+        points: &[ShadePoint<'_>],
+        candidates: &mut Candidates,
+    ) {
+        candidates.clear();
+        self.controls.clear();
+        self.pending.clear();
+        self.estimates.clear();
+        self.estimates.extend(points.iter().map(|point| Estimate::new(world, settings, point)));
+
+        let start = Instant::now();
+        for (index, point) in points.iter().enumerate() {
+            self.draw_delta(world, index, point, candidates);
+            if self.estimates[index].plan.technique == SamplingTechnique::Light {
+                self.draw_light(world, index, point, candidates);
+            }
+        }
+        candidates.light_time = start.elapsed();
+
+        self.rays.clear();
+        for (index, point) in points.iter().enumerate() {
+            self.draw_bsdf(index, point, candidates);
+        }
+        self.follow(world, points, candidates);
+        for (pending, (crossed, found)) in self.pending.iter().zip(self.crossed.iter().zip(&self.found)) {
+            let estimate = &mut self.estimates[pending.point as usize];
+            let control = if pending.specular {
+                estimate.without_g()
+            } else {
+                estimate.control(*crossed, pending.wi, pending.pdf)
+            };
+            let is_inside = estimate.plan.technique == SamplingTechnique::Bsdf;
+            match found {
+                Some(candidate) => {
+                    candidates.records.push(*candidate);
+                    self.controls.push(is_inside.then_some(control));
+                }
+                None if is_inside => correlated::add(&mut estimate.sums, control, [0.0; 3]),
+                None => {}
+            }
+        }
+    }
+
+    /// Samples of lights that no ray can hit.
+    fn draw_delta(&mut self, world: &World, index: usize, point: &ShadePoint<'_>, candidates: &mut Candidates) {
+        let estimate = &mut self.estimates[index];
+        let Plan { delta_draws, n_delta, .. } = estimate.plan;
+        let Some(sampler) = world.delta_lights.as_ref().filter(|_| delta_draws > 0) else { return };
+        let shares = Shares { light_draws: delta_draws, bsdf_draws: 0, n_light: n_delta, n_bsdf: 0.0 };
+        let control = estimate.plan.has_delta_inside().then_some(estimate.without_g());
+        let ctx = point.light_ctx();
+        candidates.proposals += u64::from(delta_draws);
+        candidates.light_proposals += u64::from(delta_draws);
+        for i in 0..delta_draws {
+            let [u_choice, u0, u1] = point.stream.split(domain::DELTA, delta_draws, i).draw::<3>();
+            let candidate = sampler
+                .sample(&ctx, u_choice)
+                .and_then(|choice| world.scene.lights.sample_choice(&ctx, choice, [u0, u1]))
+                .and_then(|drawn| light_candidate(world, index as u32, point, &shares, drawn));
+            match (candidate, control) {
+                (Some(candidate), control) => {
+                    candidates.records.push(candidate);
+                    self.controls.push(control);
+                }
+                (None, Some(control)) => correlated::add(&mut estimate.sums, control, [0.0; 3]),
+                (None, None) => {}
+            }
+        }
+    }
+
+    /// Samples of the combination by light sampling.
+    fn draw_light(&mut self, world: &World, index: usize, point: &ShadePoint<'_>, candidates: &mut Candidates) {
+        let estimate = &mut self.estimates[index];
+        let n = estimate.plan.draws;
+        let shares = Shares::fixed(n, 0);
+        let ctx = point.light_ctx();
+        candidates.proposals += u64::from(n);
+        candidates.light_proposals += u64::from(n);
+        for i in 0..n {
+            let [u_choice, u0, u1] = point.stream.split(domain::LIGHT, n, i).draw::<3>();
+            let drawn = world.scene.lights.sample(&ctx, u_choice, [u0, u1]);
+            let drawn = drawn.map(|drawn| with_infinite(world, &ctx, drawn));
+            let control = match &drawn {
+                Some((light, s)) if !s.is_delta => {
+                    estimate.control(sampled_l(world, estimate, point.p, *light, s), s.wi, s.pdf)
+                }
+                Some(_) | None => estimate.without_g(),
+            };
+            match drawn.and_then(|drawn| light_candidate(world, index as u32, point, &shares, drawn)) {
+                Some(candidate) => {
+                    candidates.records.push(candidate);
+                    self.controls.push(Some(control));
+                }
+                None => correlated::add(&mut estimate.sums, control, [0.0; 3]),
+            }
+        }
+    }
+
+    /// BSDF samples, up to the question which lights they point at.
+    fn draw_bsdf(&mut self, index: usize, point: &ShadePoint<'_>, candidates: &mut Candidates) {
+        let estimate = &mut self.estimates[index];
+        let plan = estimate.plan;
+        let (n, expected) = match plan.technique {
+            SamplingTechnique::Bsdf => (plan.draws, plan.n_technique()),
+            SamplingTechnique::Light => (plan.specular_draws, plan.specular_draws as f32),
+        };
+        candidates.proposals += u64::from(n);
+        for i in 0..n {
+            let [uc, u0, u1] = point.stream.split(domain::BSDF, n, i).draw::<3>();
+            let is_inside = plan.technique == SamplingTechnique::Bsdf;
+            let sample = point.bsdf.sample_direction(point.wo, uc, [u0, u1]);
+            let Some(s) = sample.filter(|s| is_inside || s.lobe.is_specular()) else {
+                if is_inside {
+                    let control = estimate.without_g();
+                    correlated::add(&mut estimate.sums, control, [0.0; 3]);
+                }
+                continue;
+            };
+            let f_cos = s.f * s.wi.dot(point.bsdf.frame.z).abs();
+            self.rays.push(&Ray { o: point.origin(s.wi), d: s.wi, t_max: f32::INFINITY, time: point.time });
+            self.pending.push(PendingBsdf {
+                point: index as u32,
+                wi: s.wi,
+                f_cos: if f_cos.is_finite() { f_cos } else { Rgb::BLACK },
+                pdf: s.pdf,
+                specular: s.lobe.is_specular(),
+                lobe: 0,
+                shares: Shares { light_draws: 0, bsdf_draws: n, n_light: 0.0, n_bsdf: expected },
+            });
+        }
+    }
+
+    /// Finds what BSDF samples point at: the first emitter for the integrand, and all of them for g.
+    fn follow(&mut self, world: &World, points: &[ShadePoint<'_>], candidates: &mut Candidates) {
+        self.found.clear();
+        self.crossed.clear();
+        self.crossed.resize(self.pending.len(), world.irradiances.environment());
+        self.ray_of.clear();
+        self.ray_of.extend(0..self.pending.len() as u32);
+        let lights = &world.scene.lights;
+        // A ray meets a light at most twice
+        for crossing in 0..=2 * lights.lights.len() {
+            if self.rays.is_empty() {
+                break;
+            }
+            candidates.emitter_rays += self.rays.len() as u64;
+            world.intersect_emitters(&self.rays, &mut self.hits, &mut self.emitter_hits);
+            self.next_rays.clear();
+            self.next_ray_of.clear();
+            for (&i, hit) in self.ray_of.iter().zip(&self.emitter_hits) {
+                let pending = &self.pending[i as usize];
+                let point = &points[pending.point as usize];
+                if crossing == 0 {
+                    self.found.push(bsdf_candidate(world, point, pending, hit.as_ref()));
+                }
+                let estimate = &self.estimates[pending.point as usize];
+                let Some(hit) = hit.filter(|_| !pending.specular && estimate.has_g(pending.wi)) else { continue };
+                let surface =
+                    world.scene.geometry.surface_hit(hit.geometry, hit.primitive, Hit::NO_INSTANCE, hit.uv, point.time);
+                if let Some(light) = hit.light {
+                    let at = (point.p, estimate.n);
+                    self.crossed[i as usize] += world.irradiances.l(lights, light, at, pending.wi, surface.n);
+                }
+                // Behind a light that nothing can hide there is none that shines here
+                if world.emitters_hide() {
+                    let o = offset_origin(surface.p, surface.p_error, surface.n, pending.wi);
+                    self.next_rays.push(&Ray { o, d: pending.wi, t_max: f32::INFINITY, time: point.time });
+                    self.next_ray_of.push(i);
+                }
+            }
+            std::mem::swap(&mut self.rays, &mut self.next_rays);
+            std::mem::swap(&mut self.ray_of, &mut self.next_ray_of);
+        }
+    }
+
+    /// The estimates of all points from their traced candidates; `out[i]` belongs to `points[i]`, or to both halves of a point,
+    /// `points[2i]` and `points[2i + 1]`, where the form has halves.
+    pub(super) fn resolve(
+        &mut self,
+        form: CorrelatedForm,
+        candidates: &Candidates,
+        contributions: &[Rgb],
+        segments: &Segments,
+        out: &mut [Rgb],
+    ) {
+        let mut occluded = segments.occluded().iter();
+        for ((c, contribution), control) in candidates.records.iter().zip(contributions).zip(&self.controls) {
+            let is_free = is_traced(contribution) && occluded.next() == Some(&false);
+            let value = if is_free { *contribution } else { Rgb::BLACK };
+            let estimate = &mut self.estimates[c.point as usize];
+            match control {
+                Some(control) => {
+                    correlated::add(&mut estimate.sums, *control, (value * estimate.plan.n as f32).to_array());
+                }
+                None => estimate.outside += value,
+            }
+        }
+        for (i, out) in out.iter_mut().enumerate() {
+            *out = match form {
+                CorrelatedForm::Combined => {
+                    let e = &self.estimates[i];
+                    Rgb::from_array(correlated::combined(&e.sums)) + e.outside
+                }
+                CorrelatedForm::Crossfit => {
+                    // What is outside has the weights of the halves too: where one of them is a single sample, nothing is outside of that
+                    let [a, b] = [&self.estimates[2 * i], &self.estimates[2 * i + 1]];
+                    let [n, m] = [a, b].map(|e| e.plan.n as f32);
+                    let outside = (a.outside * n + b.outside * m) / (n + m).max(1.0);
+                    Rgb::from_array(correlated::crossfit([&a.sums, &b.sums])) + outside
+                }
+            };
+        }
+    }
+}
+
+/// Σ L̄ of a light sample: that of its light or, at infinity, of all lights in its direction.
+fn sampled_l(world: &World, estimate: &Estimate, p: Vec3, light: LightId, sample: &LightSample) -> Rgb {
+    let lights = &world.scene.lights;
+    if !estimate.has_g(sample.wi) {
+        Rgb::BLACK
+    } else if lights.infinite.contains(&light) {
+        world.irradiances.environment()
+    } else {
+        world.irradiances.l(lights, light, (p, estimate.n), sample.wi, sample.n)
+    }
+}

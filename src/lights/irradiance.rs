@@ -1,0 +1,297 @@
+//! Irradiance of lights in closed form, if nothing is in the way: E = ∫ L̄ cos θ dω, with the mean radiance L̄ of the light and θ
+//! about a unit normal n, over the part of the light above the horizon of n.
+//!
+//! | light | E |
+//! |---|---|
+//! | triangle, rectangle | L̄/2 · abs Σ_edges γᵢ (Γᵢ · n) of the polygon above the horizon [Lambert 1760; Baum et al. 1989] |
+//! | one-sided sphere, seen from outside and wholly above the horizon | L̄ π (r/d)² cos θ_c |
+//! | constant environment | π L |
+//!
+//! γᵢ is the angle that an edge is seen under, Γᵢ the unit normal of the plane through it and the point; r and d are the radius and
+//! the distance of the centre, θ_c its angle. Of all other lights, and of flat ones seen edge-on, E is not known and they count as
+//! black, in E as in L̄. So do surfaces with cut-outs (alpha), whose extent is not that of their shape.
+
+use super::area::{AreaLight, AreaShape};
+use super::{Light, LightId, LightSet};
+use crate::geometry::GeometryId;
+use crate::math::{Rgb, Vec3, sqr};
+use glam::DVec3;
+use std::f32::consts::PI;
+
+/// Distance from the plane of a flat light, in units of its extent, up to which it is seen edge-on: rounding decides there on
+/// which side the point is.
+const EDGE_ON: f32 = 1e-4;
+
+/// The lights of a set whose irradiance is known.
+#[derive(Clone, Debug, Default)]
+pub struct Irradiances {
+    /// Area lights, ascending.
+    area: Vec<LightId>,
+    /// Of each light, L̄; black if E is not known.
+    mean_l: Vec<Rgb>,
+    /// Radiance of all constant environments.
+    environment: Rgb,
+}
+
+impl Irradiances {
+    /// Those of a set; `has_alpha` tells the geometries with cut-outs.
+    pub fn new(set: &LightSet, has_alpha: impl Fn(GeometryId) -> bool) -> Self {
+        let mut mean_l: Vec<Rgb> = set.lights.iter().map(mean_l).collect();
+        for (_, light) in set.emitters().filter(|(geometry, _)| has_alpha(*geometry)) {
+            mean_l[light as usize] = Rgb::BLACK;
+        }
+        let is_area = |&i: &usize| matches!(set.lights[i], Light::Area(_)) && !mean_l[i].is_black();
+        let area = (0..mean_l.len()).filter(is_area).map(|i| i as LightId).collect();
+        let environment = set.infinite.iter().map(|&i| mean_l[i as usize]).sum();
+        Irradiances { area, mean_l, environment }
+    }
+
+    /// E of all lights together at `p` about the unit normal `n`.
+    pub fn irradiance(&self, set: &LightSet, p: Vec3, n: Vec3) -> Rgb {
+        let area = |&i: &LightId| {
+            let Light::Area(light) = &set.lights[i as usize] else { return Rgb::BLACK };
+            self.mean_l[i as usize] * form(light, p, n)
+        };
+        self.environment * PI + self.area.iter().map(area).sum()
+    }
+
+    /// The radiance in E that an area light sends to `p` along `−wi`, from a point of it whose normal is `n_light`, where `wi` is above
+    /// the horizon of `n`.
+    pub fn l(&self, set: &LightSet, light: LightId, (p, n): (Vec3, Vec3), wi: Vec3, n_light: Vec3) -> Rgb {
+        let Light::Area(area) = &set.lights[light as usize] else { return Rgb::BLACK };
+        let mean_l = self.mean_l[light as usize];
+        if !mean_l.is_black() && faces(area, p, n, wi, n_light) { mean_l } else { Rgb::BLACK }
+    }
+
+    /// The radiance in E of every direction above the horizon, from infinity.
+    #[inline]
+    pub fn environment(&self) -> Rgb {
+        self.environment
+    }
+}
+
+/// L̄ of a light; black if its E is never known, or it emits nothing that a light sampler would choose it for.
+fn mean_l(light: &Light) -> Rgb {
+    let l = match light {
+        Light::Area(area) => match &area.shape {
+            AreaShape::Triangle(_) | AreaShape::Rectangle(_) => area.emission.mean(),
+            AreaShape::Quadric(quadric) if quadric.outward_sphere().is_some() && !area.emission.two_sided => {
+                area.emission.mean()
+            }
+            AreaShape::Quadric(_) | AreaShape::Patch(_) => Rgb::BLACK,
+        },
+        Light::InfiniteConstant { l } => *l,
+        Light::Point { .. } | Light::Spot { .. } | Light::Distant { .. } | Light::InfiniteImage { .. } => Rgb::BLACK,
+    };
+    if l.is_finite() && l.luminance() > 0.0 { l } else { Rgb::BLACK }
+}
+
+/// The corners of a flat light; of a triangle, the last one twice.
+fn corners(area: &AreaLight) -> Option<[Vec3; 4]> {
+    match &area.shape {
+        AreaShape::Triangle(t) => Some([t.p[0], t.p[1], t.p[2], t.p[2]]),
+        AreaShape::Rectangle(r) => {
+            let (x, y) = (r.ex * r.size.x, r.ey * r.size.y);
+            Some([r.corner, r.corner + x, r.corner + x + y, r.corner + y])
+        }
+        AreaShape::Quadric(_) | AreaShape::Patch(_) => None,
+    }
+}
+
+/// Centre and radius of a sphere that is seen from outside and wholly above the horizon.
+fn sphere_above(area: &AreaLight, p: Vec3, n: Vec3) -> Option<(Vec3, f32)> {
+    let AreaShape::Quadric(quadric) = &area.shape else { return None };
+    let (center, radius) = quadric.outward_sphere()?;
+    (n.dot(center - p) > radius && !area.is_dark_from(p)).then_some((center, radius))
+}
+
+/// True if a flat light, of the given normal, shines on `p` and is not seen edge-on.
+fn shines_on(area: &AreaLight, corners: &[Vec3; 4], n_light: Vec3, p: Vec3) -> bool {
+    let extent = (corners[2] - corners[0]).length().max((corners[1] - corners[0]).length());
+    let height = n_light.dot(p - corners[0]);
+    (if area.emission.two_sided { height.abs() } else { height }) > EDGE_ON * extent
+}
+
+/// True if the light counts at `p` in the direction `wi`.
+fn faces(area: &AreaLight, p: Vec3, n: Vec3, wi: Vec3, n_light: Vec3) -> bool {
+    match &area.shape {
+        AreaShape::Triangle(t) => corners(area).is_some_and(|c| shines_on(area, &c, t.n, p)),
+        AreaShape::Rectangle(r) => corners(area).is_some_and(|c| shines_on(area, &c, r.n, p)),
+        AreaShape::Quadric(_) => n_light.dot(wi) < 0.0 && sphere_above(area, p, n).is_some(),
+        AreaShape::Patch(_) => false,
+    }
+}
+
+/// E for L̄ = 1.
+fn form(area: &AreaLight, p: Vec3, n: Vec3) -> f32 {
+    let n_light = match &area.shape {
+        AreaShape::Triangle(t) => t.n,
+        AreaShape::Rectangle(r) => r.n,
+        AreaShape::Quadric(_) | AreaShape::Patch(_) => Vec3::ZERO,
+    };
+    match corners(area) {
+        Some(corners) if shines_on(area, &corners, n_light, p) => {
+            polygon_irradiance(&corners.map(|c| c.as_dvec3() - p.as_dvec3()), n.as_dvec3()) as f32
+        }
+        Some(_) => 0.0,
+        None => sphere_above(area, p, n).map_or(0.0, |(center, radius)| {
+            let d = center - p;
+            let distance = d.length();
+            PI * sqr(radius / distance) * n.dot(d) / distance
+        }),
+    }
+}
+
+/// ∫ cos θ dω over the part of a convex quadrilateral above the horizon of `n`; the point is at the origin, outside its plane.
+fn polygon_irradiance(corners: &[DVec3; 4], n: DVec3) -> f64 {
+    // Clip
+    let mut clipped = [DVec3::ZERO; 5];
+    let mut count = 0;
+    let mut push = |v: DVec3| {
+        if let Some(place) = clipped.get_mut(count) {
+            *place = v;
+            count += 1;
+        }
+    };
+    let heights = corners.map(|v| n.dot(v));
+    for i in 0..4 {
+        let j = (i + 1) % 4;
+        if heights[i] >= 0.0 {
+            push(corners[i]);
+        }
+        if (heights[i] >= 0.0) != (heights[j] >= 0.0) {
+            push(corners[i].lerp(corners[j], heights[i] / (heights[i] - heights[j])));
+        }
+    }
+
+    // Sum over the edges
+    let clipped = &clipped[..count];
+    let next = clipped.iter().cycle().skip(1);
+    let edge = |(&a, &b): (&DVec3, &DVec3)| {
+        let cross = a.cross(b);
+        let length = cross.length();
+        if length > 0.0 { length.atan2(a.dot(b)) * (n.dot(cross) / length) } else { 0.0 }
+    };
+    0.5 * clipped.iter().zip(next).map(edge).sum::<f64>().abs()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::geometry::{Quadric, QuadricKind, Shape, TriangleMesh};
+    use crate::lights::{Emission, EmissionImage, LightCtx, LightHit, LightSamplerKind, LightSetBuilder};
+    use crate::math::hash::HashStream;
+    use crate::math::test_support::Moments;
+    use crate::math::warp::sample_uniform_sphere;
+    use crate::math::{Affine3A, Bounds3, Vec2};
+    use std::sync::Arc;
+
+    const POINTS: u32 = 40;
+
+    fn mesh(p: &[Vec3], indices: &[[u32; 3]]) -> Shape {
+        Shape::Mesh(TriangleMesh::new(p.to_vec(), indices.to_vec()).unwrap())
+    }
+
+    fn sphere(center: Vec3, radius: f32, flip_normal: bool) -> Shape {
+        let kind = QuadricKind::Sphere { radius, z_min: -radius, z_max: radius, phi_max: std::f32::consts::TAU };
+        let group_from_local = Affine3A::from_translation(center);
+        Shape::Quadric(Quadric { kind, group_from_local, local_from_group: group_from_local.inverse(), flip_normal })
+    }
+
+    fn shapes() -> Vec<Shape> {
+        let v = Vec3::new;
+        vec![
+            mesh(&[v(0.0, 0.0, 1.0), v(0.0, 2.0, 1.0), v(1.0, 2.0, 1.0), v(1.0, 0.0, 1.0)], &[[0, 1, 2], [0, 2, 3]]),
+            mesh(&[v(-1.0, 0.0, -1.0), v(0.5, 1.5, 0.3), v(0.2, -1.0, 1.0)], &[[0, 1, 2]]),
+            sphere(v(0.3, 0.2, 0.5), 0.4, false),
+        ]
+    }
+
+    fn set(shapes: &[Shape], emission: &Emission) -> LightSet {
+        let mut builder = LightSetBuilder::default();
+        for (i, shape) in shapes.iter().enumerate() {
+            builder.add_area(i as GeometryId, shape, emission);
+        }
+        builder.build(LightSamplerKind::Tree, &Bounds3 { min: Vec3::splat(-1.0), max: Vec3::splat(2.0) })
+    }
+
+    /// E and the integral of L̄ cos θ by samples of the light, at random points and normals. The latter must be the former wherever the
+    /// light takes part.
+    fn assert_integrates(set: &LightSet, stream: &mut HashStream) -> u32 {
+        let known = Irradiances::new(set, |_| false);
+        let mut lit = 0;
+        for _ in 0..POINTS {
+            let [p, n] = [2.0, 1.0].map(|r| sample_uniform_sphere(stream.next_2d()) * r);
+            let p = p * stream.next_f32() + Vec3::splat(0.2);
+            let ctx = LightCtx { p, n, ns: n };
+            let mut moments = Moments::default();
+            for _ in 0..4000 {
+                let sample = set.sample(&ctx, stream.next_f32(), stream.next_2d());
+                moments.add(sample.map_or(0.0, |(light, s)| {
+                    let l = if set.infinite.contains(&light) {
+                        known.environment()
+                    } else {
+                        known.l(set, light, (p, n), s.wi, s.n)
+                    };
+                    f64::from(l.g * n.dot(s.wi).max(0.0) / s.pdf)
+                }));
+            }
+            let e = known.irradiance(set, p, n);
+            moments.assert_mean(f64::from(e.g), 1e-5, 1e-4);
+            lit += u32::from(e.g > 0.0);
+        }
+        lit
+    }
+
+    #[test]
+    fn irradiance_is_the_integral_of_radiance_and_cosine_above_the_horizon() {
+        let mut stream = HashStream::new([1, 8, 4]);
+        for shape in shapes() {
+            for two_sided in [false, true] {
+                let emission = Emission { l: Rgb::new(1.0, 3.0, 2.0), two_sided, image: None };
+                let lit = assert_integrates(&set(&[shape.clone()], &emission), &mut stream);
+                let is_left_out = two_sided && matches!(shape, Shape::Quadric(_));
+                assert_eq!(lit == 0, is_left_out);
+            }
+        }
+        let emission = Emission::constant(Rgb::splat(2.0));
+        assert!(assert_integrates(&set(&shapes(), &emission), &mut stream) > POINTS / 2);
+        assert_eq!(assert_integrates(&set(&[sphere(Vec3::ZERO, 3.0, true)], &emission), &mut stream), 0);
+        let mut builder = LightSetBuilder::default();
+        builder.add(Light::InfiniteConstant { l: Rgb::splat(0.5) });
+        builder.add(Light::Distant { wi_world: Vec3::Z, l: Rgb::WHITE });
+        let environment = builder.build(LightSamplerKind::Tree, &Bounds3::EMPTY);
+        assert_eq!(assert_integrates(&environment, &mut stream), POINTS);
+    }
+
+    #[test]
+    fn known_values_are_met() {
+        // A rectangle that fills the hemisphere, from below the middle; half of it below the horizon; from behind; on it
+        let s = 1e4;
+        let big = [[-s, -s], [-s, s], [s, s], [s, -s]].map(|[x, y]| Vec3::new(x, y, 10.0));
+        let set = set(&[mesh(&big, &[[0, 1, 2], [0, 2, 3]])], &Emission::constant(Rgb::splat(2.0)));
+        let known = Irradiances::new(&set, |_| false);
+        let e = |p: Vec3, n: Vec3| known.irradiance(&set, p, n).r / PI;
+        assert!((e(Vec3::ZERO, Vec3::Z) - 2.0).abs() < 1e-4, "{}", e(Vec3::ZERO, Vec3::Z));
+        assert!((e(Vec3::ZERO, Vec3::X) - 1.0).abs() < 1e-2);
+        assert_eq!(e(Vec3::ZERO, -Vec3::Z), 0.0);
+        assert_eq!(e(Vec3::new(0.0, 0.0, 20.0), -Vec3::Z), 0.0);
+        assert_eq!(e(Vec3::new(5.0, 7.0, 10.0), Vec3::Z), 0.0);
+    }
+
+    #[test]
+    fn lights_with_cut_outs_and_of_unknown_irradiance_take_no_part() {
+        let data = [1.0, 2.0, 3.0, 6.0].map(Rgb::splat).to_vec();
+        let image = Some(Arc::new(EmissionImage::new(2, 2, data).unwrap()));
+        let emission = Emission { l: Rgb::splat(2.0), two_sided: false, image };
+        let shapes = &shapes()[..1];
+        let (p, n) = (Vec3::new(0.5, 0.5, 0.0), Vec3::Z);
+        let set = set(shapes, &emission);
+        let constant = self::set(shapes, &Emission::constant(Rgb::splat(6.0)));
+        let e = |set: &LightSet, alpha| Irradiances::new(set, |_| alpha).irradiance(set, p, n).g;
+        assert!((e(&set, false) - e(&constant, false)).abs() < 1e-6 && e(&set, false) > 0.0);
+        assert_eq!(e(&set, true), 0.0);
+        let hit = LightHit { t: 1.0, p: Vec3::new(0.5, 0.5, 1.0), n: -Vec3::Z, uv: Vec2::ZERO };
+        assert!(Irradiances::new(&set, |_| true).l(&set, 0, (p, n), Vec3::Z, hit.n).is_black());
+    }
+}
