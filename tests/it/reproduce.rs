@@ -72,7 +72,9 @@ fn the_page_and_the_numbers_hold_every_figure() {
 fn write_fan_scenes(folder: &Path) {
     write_scenes(folder);
     let scene = folder.join("statue-lights.pbrt");
-    FAN_FIGURES.iter().for_each(|name| drop(std::fs::copy(&scene, folder.join(format!("{name}.pbrt"))).unwrap()));
+    for name in FAN_FIGURES {
+        std::fs::copy(&scene, folder.join(format!("{name}.pbrt"))).unwrap();
+    }
 }
 
 #[test]

@@ -27,9 +27,9 @@ const ASKED: Asked = Asked { paper: [4.9, 4.0], time: 1.05, target: 18.0, effici
 const LONG: (u32, u32) = (64, 4);
 /// Fewest and most turns.
 const TURNS: [u32; 2] = [4, 16];
-/// Edge of the picture on which times are found out, and the least edge.
+/// Edge of the picture on which times are found out, and the least edge, usual and quick.
 const PILOT_SIZE: u32 = 64;
-const LEAST_SIZE: u32 = 32;
+const LEAST_SIZE: [u32; 2] = [64, 32];
 /// Place of `ocv`, progressive.
 const BEST: usize = 2;
 
@@ -73,7 +73,9 @@ pub fn run(setup: &Setup<'_>, time: Duration) -> Result<Figure, ReproduceError> 
     let reference = ray * f64::from(LONG.0 * LONG.1);
     let wanted = 1.2 * (turn * f64::from(2 * TURNS[0]) + reference);
     let fits = (time.saturating_sub(start.elapsed()).as_secs_f64() / wanted).sqrt();
-    let size = ((f64::from(pilot_size) * fits) as u32 / 8 * 8).max(LEAST_SIZE).min(setup.size);
+    let size = ((f64::from(pilot_size) * fits) as u32 / 8 * 8)
+        .max(LEAST_SIZE[usize::from(setup.options.quick)])
+        .min(setup.size);
     let grown = (f64::from(size) / f64::from(pilot_size)).powi(2);
     stage = Stage::load(&path, scaled(SHAPE, size), setup.options.threads)?;
 

@@ -86,9 +86,9 @@ pub const LONG: (u32, u32) = (16, 4);
 /// Seeds of long renderings, of antialiased pictures and of curves are those of turns from here on.
 pub const LONG_TURNS: u32 = 1_000_000;
 const ANTIALIASED_TURNS: u32 = 2_000_000;
-/// Edge of the picture on which times are found out (usual and quick), and the least edge.
+/// Edge of the picture on which times are found out, and the least edge: usual and quick.
 const PILOT_SIZE: [u32; 2] = [96, 48];
-const LEAST_SIZE: u32 = 32;
+const LEAST_SIZE: [u32; 2] = [64, 32];
 /// Fewest and most turns, and those that the size of the picture is chosen for; quick ones are as few as that.
 const TURNS: [u32; 2] = [4, 32];
 const WANTED_TURNS: [f64; 2] = [8.0, 4.0];
@@ -149,7 +149,7 @@ pub fn run(setup: &Setup<'_>, case: &Case, time: Duration) -> Result<Figure, Rep
     let turn = count * f64::from(case.spp);
     let wanted = seconds * 1.15 * (WANTED_TURNS[usize::from(quick)] * turn + fixed);
     let fits = (time.saturating_sub(start.elapsed()).as_secs_f64() / wanted).sqrt();
-    let size = ((f64::from(pilot_size) * fits) as u32 / 8 * 8).max(LEAST_SIZE).min(setup.size);
+    let size = ((f64::from(pilot_size) * fits) as u32 / 8 * 8).max(LEAST_SIZE[usize::from(quick)]).min(setup.size);
     if size != pilot_size {
         stage = Stage::load(&path, scaled(case.shape, size), setup.options.threads)?;
         (numbers, seconds) = pilot(&mut stage, case, observer)?;
