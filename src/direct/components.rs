@@ -106,7 +106,9 @@ impl Fits {
         }
         let betas = self.beta.chunks_mut(self.equations.coefficients().max(1));
         let fits = self.sums.chunks(self.equations.len()).zip(betas);
-        fits.map(|(sums, beta)| u64::from(optimal_mis::coefficients(self.equations, sums, beta).is_err())).sum()
+        // Pixels that met no surface have nothing to solve
+        let lit = fits.filter(|(sums, _)| self.equations.samples(sums) > 0.0);
+        lit.map(|(sums, beta)| u64::from(optimal_mis::coefficients(self.equations, sums, beta).is_err())).sum()
     }
 
     fn beta(&self, fit: u32) -> &[f32] {

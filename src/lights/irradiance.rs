@@ -249,7 +249,7 @@ mod tests {
         for shape in shapes() {
             for two_sided in [false, true] {
                 let emission = Emission { l: Rgb::new(1.0, 3.0, 2.0), two_sided, image: None };
-                let lit = assert_integrates(&set(&[shape.clone()], &emission), &mut stream);
+                let lit = assert_integrates(&set(std::slice::from_ref(&shape), &emission), &mut stream);
                 let is_left_out = two_sided && matches!(shape, Shape::Quadric(_));
                 assert_eq!(lit == 0, is_left_out);
             }
