@@ -212,10 +212,10 @@ pub struct SceneArgs {
     #[arg(long)]
     pub cached: Option<CachedArg>,
     /// Error at which a record of irradiance-cache no longer serves: a share of the mean distance of what it sees
-    /// [default: the file's, or 0.2]
+    /// [default: the file's, or 0.25]
     #[arg(long, value_name = "KAPPA", value_parser = parse_cache_error)]
     pub cache_error: Option<f32>,
-    /// Least and greatest distance, in pixels, up to which a record serves [default: the file's, or 1.5,20]
+    /// Least and greatest distance, in pixels, up to which a record serves [default: the file's, or 3,20]
     #[arg(long, value_name = "MIN,MAX", value_parser = parse_cache_radius)]
     pub cache_radius: Option<[f32; 2]>,
     /// Directions in which a record samples indirect light [default: the file's, or 256]

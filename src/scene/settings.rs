@@ -182,7 +182,7 @@ pub struct IrradianceCacheSettings {
 
 impl Default for IrradianceCacheSettings {
     fn default() -> Self {
-        IrradianceCacheSettings { cached: Cached::Indirect, error: 0.2, radius: [1.5, 20.0], samples: 256, passes: 4 }
+        IrradianceCacheSettings { cached: Cached::Indirect, error: 0.25, radius: [3.0, 20.0], samples: 256, passes: 4 }
     }
 }
 

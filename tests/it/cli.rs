@@ -53,6 +53,34 @@ fn render_writes_every_picture_and_the_statistics() {
 }
 
 #[test]
+fn an_irradiance_cache_is_part_of_picture_and_statistics() {
+    let folder = tempfile::tempdir().unwrap();
+    let path = scene("demo/gallery.pbrt");
+    let options = "--integrator irradiance-cache --cached all --cache-samples 32 --cache-error 0.3 --cache-radius 2,16 --spp 2 \
+                   --resolution 48x27 -o a.exr --stats a.json";
+    let args: Vec<&str> = ["render", &path].into_iter().chain(options.split_whitespace()).collect();
+    let output = lumiris(&args, folder.path());
+    assert!(output.status.success(), "{}", stderr(&output));
+    assert!(stderr(&output).contains("irradiance cache: "), "{}", stderr(&output));
+
+    let exr = read_image(&folder.path().join("a.exr"), &ReadLimits::default()).unwrap();
+    assert!(exr.image.channels.iter().any(|c| c == "records"), "{:?}", exr.image.channels);
+    for (key, value) in [("integrator", "irradiance-cache"), ("cached", "all"), ("cache_radius", "2,16")] {
+        assert_eq!(exr.metadata.get(&format!("lumiris:{key}")).map(String::as_str), Some(value));
+    }
+    let stats: serde_json::Value =
+        serde_json::from_str(&std::fs::read_to_string(folder.path().join("a.json")).unwrap()).unwrap();
+    let cache = &stats["irradiance_cache"];
+    assert!(cache["records"].as_u64().unwrap() > 50 && cache["build_seconds"].as_f64().unwrap() > 0.0, "{cache}");
+    assert!(cache["lookups"].as_u64().unwrap() >= cache["fallbacks"].as_u64().unwrap(), "{cache}");
+
+    for (option, value) in [("--cache-error", "1.5"), ("--cache-radius", "5,2"), ("--cached", "none")] {
+        let output = lumiris(&["render", &path, option, value], folder.path());
+        assert_eq!(output.status.code(), Some(2), "{option}: {}", stderr(&output));
+    }
+}
+
+#[test]
 fn numbers_that_ris_chose_give_the_same_picture_when_they_are_given() {
     let folder = tempfile::tempdir().unwrap();
     let path = scene("demo/gallery.pbrt");

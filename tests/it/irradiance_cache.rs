@@ -109,6 +109,7 @@ fn the_analytic_scenes_have_their_known_answers() {
             let mut scene = load(path, &LoadOptions::default()).map_err(|d| d.to_string()).unwrap().scene;
             with_cache(&mut scene, cached);
             scene.integrator.cache.samples = 64;
+            scene.integrator.cache.passes = 32;
             scene.integrator.estimator = estimator;
             scene.integrator.ris.proposals = Proposals::Fixed(16);
             let mut world = World::new(scene, AccelKind::Embree, None).unwrap();
@@ -170,7 +171,7 @@ fn nearly_every_diffuse_vertex_finds_a_record_and_pixels_say_who_asked() {
     let world = world_of(ROOM, |scene| with_cache(scene, Cached::Indirect));
     let rendering = rendering(&world, RenderSettings { spp: 8, ..Default::default() });
     let cache = rendering.cache.unwrap();
-    assert!(cache.records > 200 && cache.records < 2 * 48 * 48, "{}", cache.records);
+    assert!(cache.records > 100 && cache.records < 2 * 48 * 48, "{}", cache.records);
     assert!(cache.lookups.fallbacks * 20 < cache.lookups.lookups, "{:?}", cache.lookups);
     let names = channels(&rendering.film, &[Aov::Records], None);
     let asked: f32 = names.data.iter().skip(3).step_by(4).sum();
@@ -317,7 +318,10 @@ Shape "trianglemesh" "point3 P" [ -1 -1 0  1 -1 0  1 -1 1  -1 -1 1 ] "integer in
 Shape "trianglemesh" "point3 P" [ -1 1 0  1 1 0  1 1 1  -1 1 1 ] "integer indices" [ 0 1 2 0 2 3 ]
 "#;
     for cached in CACHED {
-        let world = world_of(ROOMS, |scene| with_cache(scene, cached));
+        let world = world_of(ROOMS, |scene| {
+            with_cache(scene, cached);
+            scene.integrator.cache.radius = [1.5, 20.0];
+        });
         let film = rendering(&world, RenderSettings { spp: 4, ..Default::default() }).film;
         let column = |x: u32| (0..40).map(|y| film.pixels[film.index(x, y)].mean()[1]).sum::<f64>() / 40.0;
         // On the screen, x is to the left or to the right; the bright side tells

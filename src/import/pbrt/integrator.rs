@@ -255,6 +255,35 @@ mod tests {
     }
 
     #[test]
+    fn settings_of_the_irradiance_cache_are_read() {
+        let s = settings(
+            "Integrator \"irradiance-cache\" \"string cached\" \"all\" \"float cacheerror\" 0.3 \"float cacheminradius\" 2
+             \"float cachemaxradius\" 50 \"integer cachesamples\" 1000 \"integer cachepasses\" 7",
+        )
+        .unwrap();
+        let cache =
+            IrradianceCacheSettings { cached: Cached::All, error: 0.3, radius: [2.0, 50.0], samples: 1000, passes: 7 };
+        assert_eq!((s.kind, s.cache, s.max_depth), (IntegratorKind::IrradianceCache, cache, 5));
+        let s = settings("Integrator \"irradiance-cache\" \"float cacheminradius\" 90").unwrap();
+        assert_eq!(s.cache, IrradianceCacheSettings { radius: [90.0, 90.0], ..Default::default() });
+    }
+
+    #[test]
+    fn wrong_settings_of_the_irradiance_cache_are_errors() {
+        for (parameter, message) in [
+            ("\"string cached\" \"most\"", "one of indirect, all"),
+            ("\"float cacheerror\" 1", "cacheerror must be above 0 and below 1, not 1"),
+            ("\"float cacheminradius\" 0", "must be positive, and not 0 and 20"),
+            ("\"float cacheminradius\" 9 \"float cachemaxradius\" 8", "the least one first"),
+            ("\"integer cachesamples\" 4", "cachesamples must be from 8 to 65536, not 4"),
+            ("\"integer cachepasses\" 0", "cachepasses must be from 1 to 4096, not 0"),
+        ] {
+            let report = settings(&format!("Integrator \"irradiance-cache\" {parameter}")).unwrap_err();
+            assert!(report.contains(message), "{parameter}: {report}");
+        }
+    }
+
+    #[test]
     fn wrong_settings_of_resampling_are_errors_that_say_what_is_possible() {
         for (parameter, message) in [
             ("\"string proposals\" \"many\"", "one of auto, optimal"),

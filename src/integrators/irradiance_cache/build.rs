@@ -248,6 +248,7 @@ fn gather(world: &World, wanted: &[Wanted], stats: &mut PathStats) -> Vec<Record
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::scene::IrradianceCacheSettings;
 
     #[test]
     fn rounds_take_every_pixel_once_for_each_sample() {
@@ -277,7 +278,8 @@ mod tests {
             key: 0,
         };
         let bounds = Bounds3 { min: Vec3::splat(-1.0), max: Vec3::splat(1.0) };
-        let cache = IrradianceCache::new(Default::default(), &bounds);
+        let settings = IrradianceCacheSettings { radius: [1.5, 20.0], ..Default::default() };
+        let cache = IrradianceCache::new(settings, &bounds);
         // 1.5 pixels of 0.01 times 0.7
         let wanted = [at(0.0, Vec3::Z), at(0.0, -Vec3::Z), at(0.010, Vec3::Z), at(0.011, Vec3::Z), at(0.02, Vec3::Z)];
         let chosen = without_redundant(&wanted, &cache, &bounds);
