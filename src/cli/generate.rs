@@ -1,9 +1,11 @@
 //! `lumiris generate`
 
 use super::progress;
+use crate::procedural::files::{write_sky, write_statue};
 use crate::procedural::sky::SkyOptions;
 use crate::procedural::statue::{DEFAULT_DETAIL, StatueOptions};
-use crate::procedural::talbot::{TalbotOptions, write_scenes, write_sky, write_statue};
+use crate::procedural::talbot::TalbotOptions;
+use crate::procedural::{fan, talbot};
 use anyhow::ensure;
 use clap::{Args, Subcommand};
 use std::path::PathBuf;
@@ -24,6 +26,8 @@ enum What {
     Sky(SkyArgs),
     /// The scenes of scenes/talbot with their statue and sky
     Talbot(TalbotArgs),
+    /// The scenes of scenes/fan with their statue
+    Fan(FanArgs),
 }
 
 #[derive(Args, Clone, Debug)]
@@ -103,6 +107,16 @@ struct TalbotArgs {
     resolution: usize,
 }
 
+#[derive(Args, Clone, Debug)]
+struct FanArgs {
+    /// Folder to write into
+    #[arg(short, long, value_name = "DIR", default_value = "fan")]
+    output: PathBuf,
+    /// Grid cells along the height of the statue (8 to 4096)
+    #[arg(long, value_name = "N", default_value_t = DEFAULT_DETAIL)]
+    detail: u32,
+}
+
 pub fn run(args: &GenerateArgs) -> anyhow::Result<ExitCode> {
     match &args.what {
         What::Statue(args) => {
@@ -119,8 +133,13 @@ pub fn run(args: &GenerateArgs) -> anyhow::Result<ExitCode> {
             let mut options = TalbotOptions::default();
             options.statue.detail = args.detail;
             options.sky.resolution = args.resolution;
-            let written = write_scenes(&args.output, &options)?;
+            let written = talbot::write_scenes(&args.output, &options)?;
             progress::say(&format!("{}: three scenes, {} triangles", args.output.display(), written.triangles));
+        }
+        What::Fan(args) => {
+            let statue = StatueOptions { detail: args.detail, ..StatueOptions::default() };
+            let written = fan::write_scenes(&args.output, &statue)?;
+            progress::say(&format!("{}: four scenes, {} triangles", args.output.display(), written.triangles));
         }
     }
     Ok(ExitCode::SUCCESS)

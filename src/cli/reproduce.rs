@@ -1,7 +1,7 @@
 //! `lumiris reproduce`
 
 use super::progress;
-use crate::reproduce::{Observer, Options, ReproduceError, talbot};
+use crate::reproduce::{Observer, Options, ReproduceError, fan, talbot};
 use clap::{Args, ValueEnum};
 use std::path::PathBuf;
 use std::process::ExitCode;
@@ -22,11 +22,11 @@ pub struct ReproduceArgs {
     /// Threads [default: all cores]
     #[arg(long, value_name = "T", value_parser = clap::value_parser!(u32).range(1..=4096))]
     threads: Option<u32>,
-    /// Most pixels along an edge of a picture; fewer where time does not suffice [default: 400, quick 160]
+    /// Most pixels along an edge of a picture; fewer where time does not suffice [default: 400, quick 160 (talbot) or 128 (fan)]
     #[arg(long, value_name = "N", value_parser = clap::value_parser!(u32).range(16..=4096))]
     size: Option<u32>,
-    /// Folder with statue-env.pbrt, statue-lights.pbrt and statue-env-lights.pbrt to use instead of the scenes that are
-    /// made for the purpose
+    /// Folder with scenes of the same names to use instead of those that are made for the purpose: statue-env.pbrt,
+    /// statue-lights.pbrt and statue-env-lights.pbrt (talbot); checkers.pbrt, statue.pbrt, room.pbrt and box.pbrt (fan)
     #[arg(long, value_name = "DIR")]
     scenes: Option<PathBuf>,
     /// No progress, only errors
@@ -39,6 +39,8 @@ pub struct ReproduceArgs {
 enum Paper {
     /// Resampled importance sampling: Talbot, Cline and Egbert 2005, and Talbot's thesis
     Talbot,
+    /// Optimizing control variates: Fan, Chenney, Hu, Tsui and Lai 2006
+    Fan,
 }
 
 pub fn run(args: &ReproduceArgs) -> anyhow::Result<ExitCode> {
@@ -60,6 +62,7 @@ pub fn run(args: &ReproduceArgs) -> anyhow::Result<ExitCode> {
     let observer = Observer { say: &say, stop: &stop };
     let page = match args.paper {
         Paper::Talbot => talbot::run(&options, observer),
+        Paper::Fan => fan::run(&options, observer),
     };
     match page {
         Ok(page) => {

@@ -1,9 +1,11 @@
 //! Content that the program makes itself: a statue, a sky, and the scenes that show them.
 //!
 //! Reading order: [`noise`], [`nets`], [`solids`], [`relief`], [`dragon`] (with `head`), [`statue`], [`ply`], [`sky`],
-//! [`talbot`].
+//! [`files`], [`talbot`], [`fan`].
 
 pub mod dragon;
+pub mod fan;
+pub mod files;
 mod head;
 pub mod nets;
 pub mod noise;

@@ -5,7 +5,8 @@
 //! N = B/(2·T2), M = B/(2·T1) for a time of B per point: M/N = T2/T1 [Talbot 2005, Eq. 4.4]. Then M is corrected until
 //! renderings take as long as those of the baseline.
 
-use super::measure::{Measured, Method, Seconds, Stage, View, turns};
+use super::measure::{Measured, Seconds, Stage, View, turns};
+use super::method::Method;
 use super::{Observer, ReproduceError};
 use crate::scene::{Split, StageTimes};
 
@@ -77,6 +78,31 @@ pub fn calibrate(stage: &mut Stage, base: &Method, observer: Observer<'_>) -> Re
         found.split.proposals = corrected as u32;
     }
     Ok(found)
+}
+
+/// The number of samples of `method` with which a rendering of `spp` camera rays takes as long as one of the baseline.
+pub fn match_samples(
+    stage: &mut Stage,
+    base: &Method,
+    method: &Method,
+    spp: u32,
+    observer: Observer<'_>,
+) -> Result<u32, ReproduceError> {
+    let mut samples = method.samples;
+    for step in 0..2 {
+        let tried = Method { samples, proposals: samples, ..*method };
+        let range = (step + 8) * TURNS..(step + 9) * TURNS;
+        let pair = turns(stage, &[*base, tried], View::Centres, spp, range, observer)?;
+        // What an estimate takes grows with its samples, camera rays and materials do not
+        let direct = pair[1].median_seconds(|s| s.direct() / s.stages().max(1e-12)).clamp(0.1, 1.0);
+        let ratio = pair[1].time_ratio(&pair[0]);
+        if (ratio - 1.0).abs() < MATCH {
+            break;
+        }
+        let factor = 1.0 - (1.0 - 1.0 / ratio.max(1e-3)) / direct;
+        samples = (f64::from(samples) * factor.clamp(0.25, 2.0)).round().max(2.0) as u32;
+    }
+    Ok(samples)
 }
 
 #[cfg(test)]

@@ -6,6 +6,7 @@
 //! the processor time of the rendering over all threads, which does not count what else the machine does meanwhile; times of
 //! two methods are compared turn by turn: the median of the ratios. Camera rays pass through pixel centres, so that the variance is that of lighting and not of antialiasing.
 
+use super::method::Method;
 use super::{Observer, ReproduceError};
 use crate::accel::{Accel, AccelStats, Bvh, Coherence, Hit, RayBatch};
 use crate::estimators::stats::{Welford, z_test};
@@ -14,82 +15,13 @@ use crate::film::filter::PixelFilter;
 use crate::import::{LoadOptions, load};
 use crate::render::plan::prepare;
 use crate::render::{RenderSettings, Rendering, render};
-use crate::samplers::SamplerKind;
-use crate::scene::{
-    AccelKind, EstimatorKind, IntegratorKind, IntegratorSettings, ProposalPoints, Proposals, StageTimes, Strata, World,
-};
+use crate::scene::{AccelKind, Proposals, StageTimes, Strata, World};
 use rustix::time::{ClockId, clock_gettime};
 use serde::Serialize;
 use std::path::Path;
 use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::time::Duration;
-
-/// A way to estimate direct light.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Method {
-    /// Estimator.
-    pub estimator: EstimatorKind,
-    /// N.
-    pub samples: u32,
-    /// M, for `ris`.
-    pub proposals: u32,
-    /// Samples over proposals, for `ris`.
-    pub strata: Strata,
-    /// True if `ris` shares the time of an estimate out between M and N in each pixel as [`Stage::plan_per_pixel`] found out.
-    pub per_pixel: bool,
-    /// True if samples, or the proposals of `ris`, are well distributed over the lights and over the camera rays of a pixel;
-    /// otherwise all random numbers are independent.
-    pub stratified: bool,
-}
-
-impl Method {
-    /// Light sampling with independent random numbers.
-    pub fn mc(samples: u32) -> Self {
-        let estimator = EstimatorKind::Mc;
-        Method { estimator, samples, proposals: samples, strata: Strata::None, per_pixel: false, stratified: false }
-    }
-
-    /// Light and BSDF sampling with independent random numbers.
-    pub fn mis(samples: u32) -> Self {
-        Method { estimator: EstimatorKind::Mis, ..Method::mc(samples) }
-    }
-
-    /// Resampled importance sampling with independent random numbers and draws.
-    pub fn ris(proposals: u32, samples: u32) -> Self {
-        Method { estimator: EstimatorKind::Ris, proposals: proposals.max(samples), ..Method::mc(samples) }
-    }
-
-    /// The same with well distributed points.
-    pub fn stratified(self) -> Self {
-        Method { stratified: true, ..self }
-    }
-
-    /// The same with strata of samples.
-    pub fn strata(self, strata: Strata) -> Self {
-        Method { strata, ..self }
-    }
-
-    /// Settings of the scene that do what the method says.
-    fn apply(&self, world: &mut World) {
-        let scene = &mut world.scene;
-        let old = scene.integrator;
-        scene.integrator = IntegratorSettings {
-            kind: IntegratorKind::Direct,
-            max_depth: 1,
-            estimator: self.estimator,
-            samples: Some(self.samples),
-            heuristic: None,
-            ..old
-        };
-        scene.integrator.ris.proposals =
-            if self.per_pixel { Proposals::Optimal } else { Proposals::Fixed(self.proposals) };
-        scene.integrator.ris.strata = self.strata;
-        scene.integrator.ris.points =
-            if self.stratified { ProposalPoints::Stratified } else { ProposalPoints::Independent };
-        scene.sampling.sampler = if self.stratified { SamplerKind::Sobol } else { SamplerKind::Independent };
-    }
-}
 
 /// A ray tracer whose shadows can be turned off.
 struct Shadows {
@@ -124,6 +56,8 @@ pub struct Stage {
     world: World,
     shadows: Arc<AtomicBool>,
     threads: Option<usize>,
+    /// Bounces that the scene file asks for.
+    depth: u32,
 }
 
 /// What a picture shall show.
@@ -147,7 +81,8 @@ impl Stage {
         let nothing: Box<dyn Accel> = Box::new(Bvh::new(Arc::default(), None));
         let inner = std::mem::replace(&mut world.accel, nothing);
         world.accel = Box::new(Shadows { inner, cast: Arc::clone(&cast) });
-        Ok(Stage { world, shadows: cast, threads })
+        let depth = world.scene.integrator.max_depth;
+        Ok(Stage { world, shadows: cast, threads, depth })
     }
 
     /// Size of the picture.
@@ -163,7 +98,7 @@ impl Stage {
 
     /// T1 and T2 as the renderer measures them for its own choice; `None` if nothing in the picture is lit.
     pub fn stage_times(&mut self) -> Result<Option<StageTimes>, ReproduceError> {
-        Method::ris(1, 1).stratified().strata(Strata::Systematic).apply(&mut self.world);
+        Method::ris(1, 1).stratified().strata(Strata::Systematic).apply(&mut self.world, self.depth);
         self.world.scene.integrator.ris.proposals = Proposals::Auto;
         self.world.scene.integrator.ris.stage_times = None;
         self.shadows.store(true, Ordering::Relaxed);
@@ -176,7 +111,7 @@ impl Stage {
         let start = processor_time();
         // The pilot asks for a number of samples; half of the time is for proposals
         let samples = (0.5 * budget / times.t2).round().max(1.0) as u32;
-        Method { per_pixel: true, ..Method::ris(samples, samples) }.apply(&mut self.world);
+        Method { per_pixel: true, ..Method::ris(samples, samples) }.apply(&mut self.world, self.depth);
         self.world.scene.film.filter = PixelFilter::Box { rx: CENTRE, ry: CENTRE };
         self.world.scene.integrator.ris.stage_times = Some(times);
         self.shadows.store(true, Ordering::Relaxed);
@@ -196,7 +131,7 @@ impl Stage {
         seed: u32,
         observer: Observer<'_>,
     ) -> Result<Rendering, ReproduceError> {
-        method.apply(&mut self.world);
+        method.apply(&mut self.world, self.depth);
         let scene = &mut self.world.scene;
         let radius = if view == View::Antialiased { 0.5 } else { CENTRE };
         scene.film.filter = PixelFilter::Box { rx: radius, ry: radius };
@@ -228,17 +163,15 @@ pub struct Seconds {
 }
 
 impl Seconds {
-    fn new(rendering: &Rendering, processor: Duration) -> Self {
+    /// Adds all but the processor time.
+    fn add(&mut self, rendering: &Rendering) {
         let s = &rendering.stats;
-        Seconds {
-            processor: processor.as_secs_f64(),
-            wall: rendering.elapsed.as_secs_f64(),
-            camera: (s.camera_time + s.bounce_time).as_secs_f64(),
-            shade: s.shade_time.as_secs_f64(),
-            t1: s.direct.t1.as_secs_f64(),
-            select: s.direct.select.as_secs_f64(),
-            t2: s.direct.t2.as_secs_f64(),
-        }
+        self.wall += rendering.elapsed.as_secs_f64();
+        self.camera += (s.camera_time + s.bounce_time).as_secs_f64();
+        self.shade += s.shade_time.as_secs_f64();
+        self.t1 += s.direct.t1.as_secs_f64();
+        self.select += s.direct.select.as_secs_f64();
+        self.t2 += s.direct.t2.as_secs_f64();
     }
 
     /// Direct lighting.
@@ -307,8 +240,20 @@ impl Measured {
         }
     }
 
-    fn add(&mut self, rendering: &Rendering, processor: Duration) {
-        let means = radiance(&rendering.film);
+    /// Takes a turn: renderings of which each has the same share of the picture.
+    fn add(&mut self, renderings: &[Rendering], processor: Duration) {
+        let share = 1.0 / renderings.len().max(1) as f64;
+        let mut means = vec![[0.0; 3]; renderings.first().map_or(0, |r| r.film.pixels.len())];
+        let mut seconds = Seconds { processor: processor.as_secs_f64(), ..Seconds::default() };
+        for rendering in renderings {
+            for (mean, p) in means.iter_mut().zip(radiance(&rendering.film)) {
+                (0..3).for_each(|c| mean[c] += p[c] * share);
+            }
+            seconds.add(rendering);
+            self.segments += rendering.stats.direct.segments;
+            self.proposals += rendering.stats.direct.proposals;
+            self.invalid += rendering.film.pixels.iter().map(|p| p.invalid).sum::<u64>();
+        }
         if self.first.is_empty() {
             self.first = means.iter().map(|p| p.map(|v| v as f32)).collect();
             self.sum = vec![[0.0; 3]; means.len()];
@@ -317,10 +262,31 @@ impl Measured {
             (0..3).for_each(|c| sum[c] += mean[c]);
         }
         self.luminance.push(means.iter().map(|&p| luminance(p) as f32).collect());
-        self.seconds.push(Seconds::new(rendering, processor));
-        self.segments += rendering.stats.direct.segments;
-        self.proposals += rendering.stats.direct.proposals;
-        self.invalid += rendering.film.pixels.iter().map(|p| p.invalid).sum::<u64>();
+        self.seconds.push(seconds);
+    }
+
+    /// Luminance of every pixel, turn by turn.
+    pub fn luminances(&self) -> &[Vec<f32>] {
+        &self.luminance
+    }
+
+    /// Mean radiance of every pixel over the turns.
+    pub fn mean_radiance(&self) -> Vec<[f64; 3]> {
+        let turns = self.turns().max(1) as f64;
+        self.sum.iter().map(|p| p.map(|v| v / turns)).collect()
+    }
+
+    /// Grey pictures of these luminances, rendered in no time.
+    #[cfg(test)]
+    pub fn from_luminances(method: Method, turns: Vec<Vec<f32>>) -> Self {
+        let mut m = Measured::new(method);
+        m.sum = vec![[0.0; 3]; turns.first().map_or(0, Vec::len)];
+        for turn in &turns {
+            m.sum.iter_mut().zip(turn).for_each(|(s, &v)| *s = s.map(|x| x + f64::from(v)));
+            m.seconds.push(Seconds::default());
+        }
+        m.luminance = turns;
+        m
     }
 
     /// Number of turns.
@@ -410,6 +376,9 @@ pub fn radiance(film: &Film) -> Vec<[f64; 3]> {
     film.pixels.iter().map(|p| p.mean()).collect()
 }
 
+/// Distance of the seeds of renderings that make up one turn; turns have smaller ones.
+const APART: u32 = 1 << 28;
+
 /// Renders `turns` turns of all methods, the first of each with seed `first_seed` and on.
 pub fn turns(
     stage: &mut Stage,
@@ -427,8 +396,10 @@ pub fn turns(
             let seed = 1 + turn * count + i;
             let m = &mut measured[i as usize];
             let start = processor_time();
-            let rendering = stage.render(&m.method, view, spp, seed, observer)?;
-            m.add(&rendering, processor_time().saturating_sub(start));
+            let (renderings, rays) = if m.method.apart { (spp, 1) } else { (1, spp) };
+            let render = |k: u32| stage.render(&m.method, view, rays, seed.wrapping_add(k * APART), observer);
+            let renderings: Result<Vec<Rendering>, _> = (0..renderings).map(render).collect();
+            m.add(&renderings?, processor_time().saturating_sub(start));
         }
     }
     Ok(measured)
@@ -451,13 +422,8 @@ mod tests {
     use super::*;
 
     fn measured(turns: &[[f32; 2]], seconds: f64) -> Measured {
-        let mut m = Measured::new(Method::mc(1));
-        m.sum = vec![[0.0; 3]; 2];
-        for turn in turns {
-            m.luminance.push(turn.to_vec());
-            (0..2).for_each(|i| (0..3).for_each(|c| m.sum[i][c] += f64::from(turn[i])));
-            m.seconds.push(Seconds { processor: seconds, ..Seconds::default() });
-        }
+        let mut m = Measured::from_luminances(Method::mc(1), turns.iter().map(|t| t.to_vec()).collect());
+        m.seconds.iter_mut().for_each(|s| s.processor = seconds);
         m
     }
 

@@ -1,12 +1,15 @@
 //! Figures of papers, rendered and measured again, as a page with pictures and a file with all numbers.
 //!
-//! Reading order: [`measure`] (methods in turns on one scene, variances and times), [`calibrate`] (numbers of samples and
-//! proposals for equal time), [`talbot`] (resampled importance sampling), then what a page is made of: [`page`],
-//! [`pictures`], [`chart`].
+//! Reading order: [`method`] (a way to estimate light), [`measure`] (methods in turns on one scene, variances and times),
+//! [`calibrate`] (numbers of samples and proposals for equal time), [`talbot`] (resampled importance sampling), [`fan`]
+//! (optimizing control variates), then what a page is made of: [`figure`], [`page`], [`pictures`], [`chart`].
 
 pub mod calibrate;
 pub mod chart;
+pub mod fan;
+pub mod figure;
 pub mod measure;
+pub mod method;
 pub mod page;
 pub mod pictures;
 pub mod talbot;
@@ -32,6 +35,13 @@ pub struct Options {
     pub command: String,
 }
 
+impl Options {
+    /// Number of threads.
+    pub fn threads(&self) -> usize {
+        self.threads.unwrap_or_else(|| std::thread::available_parallelism().map_or(1, usize::from))
+    }
+}
+
 /// Who is told how far it is, and may end it.
 #[derive(Clone, Copy)]
 pub struct Observer<'a> {
@@ -54,7 +64,7 @@ pub enum ReproduceError {
     },
     /// A scene could not be made.
     #[error(transparent)]
-    Procedural(#[from] crate::procedural::talbot::ProceduralError),
+    Procedural(#[from] crate::procedural::files::ProceduralError),
     /// A ray tracer could not be built.
     #[error("cannot build a ray tracer: {0}")]
     Accel(#[from] crate::accel::embree::EmbreeError),

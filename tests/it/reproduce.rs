@@ -12,6 +12,8 @@ const FIGURES: [&str; 6] = [
     "thesis-figure-5.4",
 ];
 
+const FAN_FIGURES: [&str; 4] = ["checkers", "statue", "room", "box"];
+
 /// Files that the page shows.
 fn sources(html: &str) -> Vec<&str> {
     html.split("src=\"").skip(1).filter_map(|rest| rest.split('"').next()).collect()
@@ -61,6 +63,56 @@ fn the_page_and_the_numbers_hold_every_figure() {
     }
     let shown = sources(&html);
     assert!(shown.len() > 30, "{shown:?}");
+    for file in shown {
+        assert!(page.join(file).is_file(), "{file}");
+    }
+}
+
+/// A lamp, a floor and a ball, by the names of the scenes of optimizing control variates.
+fn write_fan_scenes(folder: &Path) {
+    write_scenes(folder);
+    let scene = folder.join("statue-lights.pbrt");
+    for name in FAN_FIGURES {
+        std::fs::copy(&scene, folder.join(format!("{name}.pbrt"))).unwrap();
+    }
+}
+
+#[test]
+fn the_page_of_control_variates_holds_every_scene_and_method() {
+    let folder = tempfile::tempdir().unwrap();
+    write_fan_scenes(folder.path());
+    let output = Command::new(env!("CARGO_BIN_EXE_lumiris"))
+        .args(["reproduce", "fan", "--out", "page", "--quick", "--size", "16", "--scenes", ".", "-q"])
+        .current_dir(folder.path())
+        .output()
+        .unwrap();
+    assert!(output.status.success(), "{}", String::from_utf8_lossy(&output.stderr));
+    let page = folder.path().join("page");
+    let html = std::fs::read_to_string(page.join("index.html")).unwrap();
+    let numbers: serde_json::Value =
+        serde_json::from_str(&std::fs::read_to_string(page.join("fan.json")).unwrap()).unwrap();
+
+    let figures = numbers["figures"].as_object().unwrap();
+    assert_eq!(figures.len(), FAN_FIGURES.len());
+    for id in FAN_FIGURES {
+        assert!(html.contains(&format!("<h2 id=\"{id}\">")), "{id}");
+        let figure = &figures[id];
+        assert!(figure["summary"]["reached"].is_boolean(), "{id}");
+        let methods = figure["numbers"]["methods"].as_array().unwrap();
+        assert_eq!(methods.len(), if id == "box" { 6 } else { 36 }, "{id}");
+        for m in methods {
+            assert_eq!(m["invalid_samples"], 0, "{id} {}", m["name"]);
+            let error = m["error"]["value"].as_f64().unwrap();
+            assert!(error > 0.0 && error < 50.0, "{id} {}: {error}", m["name"]);
+        }
+        // Independent samples are never much better than stratified ones
+        if id != "box" {
+            let error = |i: usize| methods[i]["error"]["value"].as_f64().unwrap();
+            assert!(error(12) < 1.2 * error(24), "{id}");
+        }
+    }
+    let shown = sources(&html);
+    assert!(shown.len() > 50, "{shown:?}");
     for file in shown {
         assert!(page.join(file).is_file(), "{file}");
     }

@@ -4,7 +4,8 @@
 //! one light without extent it is 0 or 1, for all others the mean visibility of the light weighted by what it would
 //! contribute. Pixels that show no surface belong to no class.
 
-use super::super::measure::{Method, Stage, View, luminance, radiance};
+use super::super::measure::{Stage, View, luminance, radiance};
+use super::super::method::Method;
 use super::super::{Observer, ReproduceError};
 
 /// Least part of the light that arrives in lit pixels.

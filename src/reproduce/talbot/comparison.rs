@@ -1,12 +1,14 @@
 //! Methods of equal time against each other: variances at equal time, and a pair of pictures of equal time.
 
 use super::super::calibrate::{Calibration, calibrate};
-use super::super::measure::{Measured, Method, Stage, View, reference, turns};
+use super::super::figure::Figure;
+use super::super::measure::{Measured, Stage, View, reference, turns};
+use super::super::method::Method;
 use super::super::{Observer, ReproduceError};
 use super::classes::Classes;
 use super::report;
 use super::scenes::Which;
-use super::{Figure, Setup, portrait};
+use super::{Setup, portrait};
 use crate::scene::{Split, Strata};
 use std::time::{Duration, Instant};
 

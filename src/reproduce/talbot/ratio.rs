@@ -4,14 +4,16 @@
 
 use super::super::calibrate::{Calibration, calibrate, spend_rest};
 use super::super::chart::Chart;
-use super::super::measure::{Measured, Method, Stage, View, radiance, reference, turns};
+use super::super::figure::{Figure, Summary, estimate_json, plus_minus};
+use super::super::measure::{Measured, Stage, View, radiance, reference, turns};
+use super::super::method::Method;
 use super::super::page::{Block, Cell, Shown, Table};
 use super::super::pictures::{HEAT, Picture, RED_GREEN, Scale, gain, significant};
 use super::super::{Observer, ReproduceError};
 use super::classes::{Classes, NAMES};
-use super::report::{estimate_json, method_json, plus_minus};
+use super::report::method_json;
 use super::scenes::Which;
-use super::{Figure, Setup, Summary, portrait};
+use super::{Setup, portrait};
 use crate::estimators::ris::choice::{Costs, Variances, clamp_ratio, optimal_ratio};
 use crate::scene::{Split, StageTimes};
 use serde_json::json;
@@ -309,6 +311,7 @@ fn figure(o: &Outcome, size: [u32; 2], blocks: Vec<Block>) -> Figure {
         id: "paper-figure-3",
         title: "Paper, figure 3; thesis, figures 5.1 and 5.2: proposals per sample",
         summary,
+        also: Vec::new(),
         blocks,
         numbers,
     }

@@ -1,30 +1,15 @@
 //! From measurements to sections of the page and to numbers.
 
+use super::super::ReproduceError;
+use super::super::figure::{Figure, Summary, estimate_json, percent, plus_minus};
 use super::super::measure::{Estimate, Measured, Seconds, same_mean};
-use super::super::page::{Block, Cell, Page, Shown, Table};
+use super::super::page::{Block, Cell, Shown, Table};
 use super::super::pictures::{HEAT, Picture, Scale, gain, significant};
-use super::super::{ReproduceError, write_file};
+use super::Setup;
 use super::classes::{Classes, LIT, NAMES, SHADOWED};
 use super::comparison::{Kind, Outcome};
-use super::{Figure, Setup, Summary};
 use crate::scene::Split;
 use serde_json::{Value, json};
-use std::path::PathBuf;
-use std::time::Duration;
-
-/// A number with its standard error.
-pub fn plus_minus(e: Estimate) -> String {
-    format!("{} ± {}", significant(e.value), significant(e.error))
-}
-
-/// A reduction in percent with its standard error.
-fn percent(left: Estimate) -> String {
-    format!("{:+.1} ± {:.1} %", (left.value - 1.0) * 100.0, left.error * 100.0)
-}
-
-pub fn estimate_json(e: Estimate) -> Value {
-    json!({ "value": e.value, "standard_error": e.error })
-}
 
 /// All numbers of a method among those it was in turns with, the first of which is the baseline.
 pub fn method_json(name: &str, all: &[Measured], method: usize, classes: &Classes) -> Value {
@@ -89,7 +74,7 @@ pub fn comparison(setup: &Setup<'_>, o: &Outcome<'_>) -> Result<Figure, Reproduc
         "visibility_share_of_ris": visibility(o).1, "visibility_bound": visibility(o).0,
         "methods": rows, "antialiased": antialiased,
     });
-    Ok(Figure { id: o.case.id, title: o.case.title, summary, blocks, numbers })
+    Ok(Figure { id: o.case.id, title: o.case.title, summary, also: Vec::new(), blocks, numbers })
 }
 
 /// Variance that visibility alone leaves unstratified resampling, relative to that of the baseline, both at the time of
@@ -246,81 +231,4 @@ fn tables(o: &Outcome<'_>) -> Vec<Block> {
         counts[0], counts[1], counts[2]
     );
     vec![Block::Table(table), Block::Note(classes), Block::Table(times)]
-}
-
-/// Writes the page and the numbers; the answer is the page.
-pub fn write(setup: &Setup<'_>, figures: &[Figure], elapsed: Duration) -> Result<PathBuf, ReproduceError> {
-    let out = &setup.options.out;
-    let mut page =
-        Page::new("Resampled importance sampling: the figures of Talbot, Cline and Egbert (2005), measured again");
-    page.push(Block::Text(
-        "Each figure of the paper “Importance Resampling for Global Illumination” and of Talbot's thesis, with other scenes \
-         of the same kind. The numbers below are from one run on one machine."
-            .to_owned(),
-    ));
-    let mut summary = Table::new(&["figure", "paper", "target", "measured", "reached", "why"]);
-    for f in figures {
-        let s = &f.summary;
-        summary.row([
-            Cell::text(f.title),
-            Cell::text(&s.paper),
-            Cell::text(&s.target),
-            Cell::text(&s.measured),
-            Cell::verdict(s.reached, if s.reached { "yes" } else { "no" }),
-            Cell::text(&s.reason),
-        ]);
-    }
-    page.push(Block::Table(summary));
-    METHOD.iter().for_each(|text| page.push(Block::Note((*text).to_owned())));
-    page.push(Block::Facts(vec![
-        ("machine".to_owned(), format!("{} threads; {}", setup.threads, processor())),
-        ("version".to_owned(), format!("{} {}", env!("CARGO_PKG_NAME"), env!("CARGO_PKG_VERSION"))),
-        ("command".to_owned(), setup.options.command.clone()),
-        ("time".to_owned(), format!("{:.0} s", elapsed.as_secs_f64())),
-        ("numbers".to_owned(), "talbot.json".to_owned()),
-    ]));
-    for f in figures {
-        page.push(Block::section(f.id, f.title));
-        page.extend(f.blocks.iter().cloned());
-    }
-
-    let by_figure: serde_json::Map<String, Value> = figures
-        .iter()
-        .map(|f| {
-            let s = &f.summary;
-            let summary = json!({
-                "paper": s.paper, "target": s.target, "measured": s.measured, "reached": s.reached, "reason": s.reason,
-            });
-            (f.id.to_owned(), json!({ "title": f.title, "summary": summary, "numbers": f.numbers }))
-        })
-        .collect();
-    let numbers = json!({
-        "version": env!("CARGO_PKG_VERSION"), "command": setup.options.command, "threads": setup.threads,
-        "processor": processor(), "seconds": elapsed.as_secs_f64(), "quick": setup.options.quick, "figures": by_figure,
-    });
-    write_file(out.join("talbot.json"), &format!("{numbers:#}\n"))?;
-    let path = out.join("index.html");
-    write_file(path.clone(), &page.html())?;
-    Ok(path)
-}
-
-/// How it is measured.
-const METHOD: [&str; 3] = [
-    "Variance: of the pixel's luminance over independent renderings with the camera rays of one turn each, unbiased, averaged \
-     over all pixels; no reference picture takes part. Camera rays pass through pixel centres, so that it is the variance of \
-     lighting; the pictures, and the variance below them, are with antialiasing. ± is one standard error, from how the turns differ.",
-    "Time: processor time of the whole rendering, all threads together. All methods take \
-     turns in one run, in an order that moves on from turn to turn; the ratio of times is the median over the turns. At equal time \
-     means variance × time, relative to the baseline. M and N of ris are chosen so that times agree within about one percent.",
-    "“Same mean, p” is the probability that the mean luminance differs from that of all other methods at least as much as it does if \
-     all have the same expectation; all are unbiased, so about one in a hundred should be below 0.01. “No stratification” means independent \
-     random numbers throughout.",
-];
-
-/// The name of the processor, where the system tells it.
-fn processor() -> String {
-    let text = std::fs::read_to_string("/proc/cpuinfo").unwrap_or_default();
-    let name =
-        text.lines().find_map(|l| l.strip_prefix("model name")?.split_once(':').map(|(_, n)| n.trim().to_owned()));
-    name.unwrap_or_else(|| std::env::consts::ARCH.to_owned())
 }

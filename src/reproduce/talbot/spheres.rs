@@ -1,11 +1,12 @@
 //! BSDFs that can only be evaluated, sampled from a default density with and without resampling [Talbot et al. 2005,
 //! Fig. 5]: one sample of M = 20 proposals against one of one.
 
+use super::super::figure::{Figure, Summary};
 use super::super::measure::luminance;
 use super::super::page::{Block, Cell, Shown, Table};
 use super::super::pictures::{HEAT, Picture, Scale, gain, significant};
 use super::super::{ReproduceError, page};
-use super::{Figure, Setup, Summary};
+use super::Setup;
 use crate::bsdfs::models::CookTorrance;
 use crate::bsdfs::sphere_study::{SphereSettings, SphereStudy, sphere_picture};
 use crate::bsdfs::{Bsdf, Evaluated, Model, ProposalDensity};
@@ -122,6 +123,7 @@ fn figure(spheres: &[Sphere], pairs: &[Pair], blocks: Vec<Block>, numbers: Value
                 100.0 / f64::from(PROPOSALS[1])
             ),
         },
+        also: Vec::new(),
         blocks,
         numbers,
     }

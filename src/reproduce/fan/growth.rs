@@ -1,0 +1,48 @@
+//! The error of progressive `ocv` relative to `mis` as camera rays become more: its coefficients are those of earlier rays.
+
+use super::super::ReproduceError;
+use super::super::measure::{Estimate, Stage, View, turns};
+use super::Setup;
+use super::direct::{Case, LONG, LONG_TURNS};
+use super::roster::{Numbers, Role, WAYS, methods};
+use super::truth::Truth;
+
+/// Numbers of camera rays: usual and quick.
+const RAYS: [&[u32]; 2] = [&[1, 2, 4, 8, 16], &[1, 4, 16]];
+/// Turns of each.
+const TURNS: u32 = 4;
+const FIRST_TURN: u32 = 3_000_000;
+/// Edges are this part of those of the picture.
+const SHRINK: u32 = 2;
+/// Who takes part.
+const PAIR: [Role; 2] = [Role::Balance, Role::Progressive];
+
+/// Camera rays and error of progressive `ocv` over that of `mis`, for each of the ways to draw samples.
+pub struct Growth(pub [Vec<(u32, Estimate)>; WAYS.len()]);
+
+/// Camera rays per pixel of the whole picture that take as long.
+pub fn cost(quick: bool) -> f64 {
+    let rays: u32 = RAYS[usize::from(quick)].iter().sum();
+    f64::from(TURNS * rays * (PAIR.len() * WAYS.len()) as u32 + LONG.0 * LONG.1) / f64::from(SHRINK * SHRINK)
+}
+
+/// Measures it on a smaller picture.
+pub fn measure(setup: &Setup<'_>, case: &Case, numbers: Numbers, size: [u32; 2]) -> Result<Growth, ReproduceError> {
+    let small = size.map(|s| (s / SHRINK).max(8));
+    let mut stage = Stage::load(&setup.scenes.join(case.file), small, setup.options.threads)?;
+    let list = methods(numbers);
+    let range = LONG_TURNS..LONG_TURNS + LONG.1;
+    let long = turns(&mut stage, &[list[Role::Balance.place(1)]], View::Centres, LONG.0, range, setup.observer)?;
+    let truth = Truth::new(&long[0]);
+    let chosen: Vec<_> = (0..WAYS.len()).flat_map(|way| PAIR.map(|r| list[r.place(way)])).collect();
+    let mut curves = [const { Vec::new() }; WAYS.len()];
+    for (k, &rays) in RAYS[usize::from(setup.options.quick)].iter().enumerate() {
+        let first = FIRST_TURN + k as u32 * TURNS;
+        let all = turns(&mut stage, &chosen, View::Centres, rays, first..first + TURNS, setup.observer)?;
+        for (way, curve) in curves.iter_mut().enumerate() {
+            let [base, ocv] = [0, 1].map(|i| truth.errors(&all[PAIR.len() * way + i]));
+            curve.push((rays, ocv.relative(&base)));
+        }
+    }
+    Ok(Growth(curves))
+}

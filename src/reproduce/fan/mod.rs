@@ -1,0 +1,108 @@
+//! The figures of optimizing control variates [Fan et al. 2006, Table 1].
+//!
+//! [`truth`] has the paper's measure of error, [`roster`] the methods, [`direct`] holds them against each other in direct light,
+//! [`growth`] with more camera rays, [`cache`] in irradiance caching; [`report`] writes it down.
+
+mod cache;
+mod direct;
+mod growth;
+mod report;
+mod roster;
+mod truth;
+
+use super::figure::{Study, write};
+use super::{Budget, Observer, Options, ReproduceError, make_folder};
+use crate::procedural::fan::write_scenes;
+use crate::procedural::statue::StatueOptions;
+use direct::Case;
+use std::path::PathBuf;
+use std::time::Duration;
+
+/// Time for everything, and for the tenth of it that `quick` takes; less than is promised, for what cannot be stopped
+/// half-way.
+const TIME: [Duration; 2] = [Duration::from_secs(1080), Duration::from_secs(85)];
+/// Most pixels along an edge of a picture: usual and quick.
+const SIZE: [u32; 2] = [400, 128];
+/// Cells of the grid along the statue's height: usual and quick.
+const DETAIL: [u32; 2] = [512, 128];
+
+/// The page around the figures.
+const STUDY: Study = Study {
+    title: "Optimizing control variates: table 1 of Fan et al. (2006), measured again",
+    intro: "The scenes of the paper “Optimizing Control Variate Estimators for Rendering” are not published; these are others of \
+            the same kind, made from its text and figures: a glossy board under a large and a small light, a statue with tight \
+            highlights, a room with small lights, a box. Samples per estimate, and camera rays per pixel, are those of its table 1. \
+            The numbers below are from one run on one machine.",
+    notes: &[
+        "Error: eq. (12) of the paper, the root of the mean of ((L − L_true)/tvi(L_true))², where tvi is the threshold of \
+         vision of Ferwerda et al. (1996) and a luminance of 1 counts as 100 cd/m², about white on a display. L_true is the mean of \
+         several long renderings by mis with other seeds; its own noise is subtracted from each square. Every method is rendered several times \
+         with independent seeds; ± is one standard error, from how these differ. Camera rays pass through pixel centres, so that it \
+         is the error of lighting; the picture with antialiasing, whose edges have noise of their own, is told beside it.",
+        "Time: processor time of the whole rendering, all threads together. All methods take turns in one run, in an order that moves on \
+         from turn to turn; the ratio of times is the median over the turns. Efficiency is 1/(error² × time).",
+        "Samples are drawn in three ways. Stratified in each estimate: the samples of each component are well distributed over its whole \
+         domain, and camera rays have nothing to do with each other, as in the paper. Stratified over all rays: the samples of all rays of \
+         a pixel are one well distributed set, as mis can have them; progressive ocv cannot, since its coefficients must not \
+         depend on the samples that they are used on: it has one set for each of its blocks of 1, 1, 2, 4, … rays (in both tables). \
+         Independent: all random numbers are.",
+        "Bias: mean luminance of the picture over that of the reference, less 1, with its 95 % confidence interval. ocv in the forms paper and \
+         regression and direct optimal-mis are biased by design, as they fit and estimate with the same samples; all others are \
+         not.",
+        "ocv, progressive, cannot do anything about the first camera ray of a pixel, which is mis; with four rays a quarter of the variance is \
+         untouched. The curves show how it goes on.",
+    ],
+    numbers: "fan.json",
+};
+
+/// What all figures need.
+struct Setup<'a> {
+    options: &'a Options,
+    observer: Observer<'a>,
+    /// Folder with the scenes.
+    scenes: PathBuf,
+    /// Most pixels along an edge.
+    size: u32,
+}
+
+impl<'a> Setup<'a> {
+    /// Makes the scenes inside the folder of the page, unless the options name others.
+    fn new(options: &'a Options, observer: Observer<'a>) -> Result<Self, ReproduceError> {
+        let quick = usize::from(options.quick);
+        let scenes = match &options.scenes {
+            Some(folder) => folder.clone(),
+            None => {
+                let folder = options.out.join("scenes");
+                write_scenes(&folder, &StatueOptions { detail: DETAIL[quick], ..StatueOptions::default() })?;
+                folder
+            }
+        };
+        Ok(Setup { options, observer, scenes, size: options.size.unwrap_or(SIZE[quick]) })
+    }
+}
+
+/// Width and height of a picture of a shape whose longer edge has `size` pixels.
+fn scaled(shape: [u32; 2], size: u32) -> [u32; 2] {
+    let longer = shape[0].max(shape[1]).max(1);
+    shape.map(|s| (s * size / longer).max(1))
+}
+
+/// Renders all figures and writes `index.html` and `fan.json`; the answer is the page.
+pub fn run(options: &Options, observer: Observer<'_>) -> Result<PathBuf, ReproduceError> {
+    let budget = Budget::new(TIME[usize::from(options.quick)]);
+    make_folder(&options.out)?;
+    let setup = Setup::new(options, observer)?;
+    let mut left = 100.0;
+    let mut share = |weight: f64| {
+        let time = budget.share(weight, left);
+        left -= weight;
+        time
+    };
+    let figures = [
+        direct::run(&setup, &Case::CHECKERS, share(32.0))?,
+        direct::run(&setup, &Case::STATUE, share(32.0))?,
+        direct::run(&setup, &Case::ROOM, share(20.0))?,
+        cache::run(&setup, share(16.0))?,
+    ];
+    write(&STUDY, options, &figures, budget.elapsed())
+}

@@ -1,0 +1,315 @@
+//! From measurements to sections of the page and to numbers.
+
+use super::super::ReproduceError;
+use super::super::chart::Chart;
+use super::super::figure::{Figure, Summary, estimate_json, percent, plus_minus};
+use super::super::measure::{Estimate, Measured};
+use super::super::page::{Block, Cell, Shown, Table};
+use super::super::pictures::{HEAT, Picture, Scale, gain, significant};
+use super::Setup;
+use super::direct::{Case, LONG, Outcome, SHOWN};
+use super::roster::{ROLES, Role, WAYS};
+use super::truth::{CANDELAS, Errors, Interval, Truth};
+use serde_json::{Value, json};
+
+/// A relative bias in percent with its confidence interval.
+pub fn bias_text(b: Interval) -> String {
+    format!("{:+.3} ± {:.3} %", b.value * 100.0, b.half * 100.0)
+}
+
+/// Time relative to that of a baseline, as more or less of it.
+pub fn more_time(ratio: f64) -> String {
+    format!("{:+.1} %", (ratio - 1.0) * 100.0)
+}
+
+/// All numbers of a method, relative to a baseline.
+pub fn method_json(name: &str, [m, base]: [&Measured; 2], [e, base_errors]: [&Errors; 2]) -> Value {
+    let time = m.time_ratio(base);
+    json!({
+        "name": name, "estimator": m.method.estimator.name(), "samples": m.method.samples,
+        "proposals": m.method.proposals, "stratified": m.method.stratified, "rays_apart": m.method.apart, "turns": m.turns(),
+        "error": estimate_json(e.error()), "relative_error": estimate_json(e.relative(base_errors)),
+        "time_ratio": time, "efficiency": estimate_json(e.efficiency(base_errors, time)),
+        "bias": { "value": e.bias.value, "half_width_95": e.bias.half }, "systematic_square": e.systematic,
+        "seconds": m.seconds, "segments": m.segments, "invalid_samples": m.invalid,
+    })
+}
+
+/// The row of a method in a table whose header is [`HEADER`].
+pub fn method_row(name: &str, [m, base]: [&Measured; 2], [e, base_errors]: [&Errors; 2]) -> Vec<Cell> {
+    let time = m.time_ratio(base);
+    vec![
+        Cell::text(name),
+        Cell::number(m.method.samples.to_string()),
+        Cell::number(plus_minus(e.error())),
+        Cell::number(percent(e.relative(base_errors))),
+        Cell::number(more_time(time)),
+        Cell::number(plus_minus(e.efficiency(base_errors, time))),
+        Cell::number(bias_text(e.bias)),
+    ]
+}
+
+/// Columns of the tables of methods.
+pub const HEADER: [&str; 7] = ["method", "N", "error", "against mis", "time", "efficiency", "bias of the mean"];
+
+/// What a target asks for.
+pub struct Asked {
+    /// Errors of mis and of ocv in the paper.
+    pub paper: [f64; 2],
+    /// Time of ocv over that of mis in the paper.
+    pub time: f64,
+    /// Reduction of the error (percent).
+    pub target: f64,
+    /// Whether the efficiency counts as well.
+    pub efficient: bool,
+}
+
+/// The row of the table at the top.
+pub fn summary(asked: &Asked, [m, base]: [&Measured; 2], [e, base_errors]: [&Errors; 2], reason: String) -> Summary {
+    let [mis, ocv] = asked.paper;
+    let (left, time) = (e.relative(base_errors), m.time_ratio(base));
+    let efficiency = e.efficiency(base_errors, time);
+    let enough = left.value > 0.0 && (1.0 - left.value) * 100.0 >= asked.target;
+    let mut target = format!("−{} %", asked.target);
+    let mut measured = format!(
+        "{} → {}: {}, {} time",
+        significant(base_errors.error().value),
+        significant(e.error().value),
+        percent(left),
+        more_time(time)
+    );
+    if asked.efficient {
+        target += ", efficiency ≥ 1";
+        measured += &format!(", efficiency {}", plus_minus(efficiency));
+    }
+    Summary {
+        paper: format!(
+            "{mis:.2} → {ocv:.2} (−{:.0} %), {:+.0} % time",
+            (1.0 - ocv / mis) * 100.0,
+            (asked.time - 1.0) * 100.0
+        ),
+        target,
+        measured,
+        reached: enough && (!asked.efficient || efficiency.value >= 1.0),
+        reason,
+    }
+}
+
+/// The section of a case.
+pub fn direct(setup: &Setup<'_>, o: &Outcome<'_>) -> Result<Figure, ReproduceError> {
+    let (triangles, lights) = o.facts;
+    let n = o.numbers;
+    let base = &o.measured[0];
+    let mut blocks = vec![
+        Block::Text(o.case.intro.to_owned()),
+        Block::Facts(vec![
+            ("scene".to_owned(), format!("{triangles} triangles, {lights} lights")),
+            (
+                "picture".to_owned(),
+                format!(
+                    "{} × {} pixels, {} camera rays per pixel, {} samples at each",
+                    o.size[0], o.size[1], o.case.spp, n.samples
+                ),
+            ),
+            ("turns".to_owned(), format!("{} of {} methods", base.turns(), o.measured.len())),
+            (
+                "in the time of mis".to_owned(),
+                format!("ocv N = {}; ris M = {}, N = {}", n.equal_time, n.ris.proposals, n.ris.samples),
+            ),
+            (
+                "reference".to_owned(),
+                format!(
+                    "{} renderings of {} camera rays; its noise would add an error of {}, and is subtracted",
+                    LONG.1,
+                    LONG.0,
+                    significant(o.truth.noise())
+                ),
+            ),
+        ]),
+    ];
+    blocks.extend(pictures(setup, o)?);
+    blocks.extend(tables(o));
+    blocks.push(growth(o));
+    let asked =
+        Asked { paper: o.case.paper, time: o.case.paper_time, target: o.case.target, efficient: o.case.efficient };
+    let row =
+        |way: usize| summary(&asked, o.pair(Role::Progressive, way), o.errors(Role::Progressive, way), reason(o, way));
+    Ok(Figure {
+        id: o.case.id,
+        title: o.case.title,
+        summary: row(0),
+        also: (1..WAYS.len()).map(|way| (WAYS[way], row(way))).collect(),
+        blocks,
+        numbers: numbers(o),
+    })
+}
+
+impl Outcome<'_> {
+    fn pair(&self, role: Role, way: usize) -> [&Measured; 2] {
+        [role, Role::Balance].map(|r| &self.measured[r.place(way)])
+    }
+
+    fn errors(&self, role: Role, way: usize) -> [&Errors; 2] {
+        [role, Role::Balance].map(|r| &self.errors[r.place(way)])
+    }
+
+    fn relative(&self, role: Role, way: usize) -> Estimate {
+        let [e, base] = self.errors(role, way);
+        e.relative(base)
+    }
+
+    /// Those with antialiasing, against their own reference.
+    fn antialiased_errors(&self) -> Vec<Errors> {
+        self.antialiased.iter().map(|m| self.antialiased_truth.errors(m)).collect()
+    }
+
+    fn crop_corners(&self) -> [usize; 4] {
+        let [w, h] = self.size.map(|s| s as usize);
+        let [l, t, r, b] = self.case.crop;
+        let at = |f: f64, n: usize| ((f * n as f64) as usize).min(n - 1);
+        let (l, t) = (at(l, w), at(t, h));
+        [l, t, at(r, w).max(l + 1), at(b, h).max(t + 1)]
+    }
+}
+
+/// What a row of the table says beside its result.
+fn reason(o: &Outcome<'_>, way: usize) -> String {
+    let others: Vec<String> = [Role::Crossfit, Role::Regression, Role::Paper, Role::Optimal, Role::Correlated]
+        .iter()
+        .map(|&r| format!("{} {}", r.name(), percent(o.relative(r, way))))
+        .collect();
+    let mut text = others.join("; ");
+    let equal = |role: Role| percent(o.relative(role, way));
+    text += &format!("; in the time of mis: ocv {}, ris {}", equal(Role::EqualTime), equal(Role::Ris));
+    if way == 1 {
+        let errors = o.antialiased_errors();
+        text += &format!(
+            "; with antialiasing {} → {} ({})",
+            significant(errors[0].error().value),
+            significant(errors[1].error().value),
+            percent(errors[1].relative(&errors[0]))
+        );
+        let gain = o.errors[Role::Balance.place(1)].relative(&o.errors[Role::Balance.place(2)]);
+        text += &format!("; stratification alone changes the error of mis by {}", percent(gain));
+    }
+    text
+}
+
+fn tables(o: &Outcome<'_>) -> Vec<Block> {
+    let mut blocks = Vec::new();
+    for (way, name) in WAYS.iter().enumerate() {
+        let mut table = Table::new(&HEADER);
+        for role in ROLES {
+            let name = if role.is_unbiased() { role.name().to_owned() } else { format!("{} (biased)", role.name()) };
+            table.row(method_row(&name, o.pair(role, way), o.errors(role, way)));
+        }
+        blocks.push(Block::Note(format!("Samples {name}:")));
+        blocks.push(Block::Table(table));
+    }
+    let mut table = Table::new(&HEADER);
+    let errors = o.antialiased_errors();
+    for (i, role) in SHOWN.iter().enumerate() {
+        let pair = [&o.antialiased[i], &o.antialiased[0]];
+        table.row(method_row(role.name(), pair, [&errors[i], &errors[0]]));
+    }
+    blocks.push(Block::Note(
+        "With antialiasing, stratified over all rays: camera rays all over each pixel, against an antialiased reference. The noise of edges is in \
+         every row."
+            .to_owned(),
+    ));
+    blocks.push(Block::Table(table));
+    blocks
+}
+
+fn growth(o: &Outcome<'_>) -> Block {
+    let mut chart = Chart::new("camera rays per pixel", "error of ocv, progressive, over that of mis");
+    for (name, curve) in WAYS.iter().zip(&o.growth.0) {
+        chart = chart.with(name, curve.iter().map(|(rays, left)| [f64::from(*rays), left.value]).collect());
+    }
+    Block::Chart(chart)
+}
+
+fn pictures(setup: &Setup<'_>, o: &Outcome<'_>) -> Result<Vec<Block>, ReproduceError> {
+    let (out, id) = (&setup.options.out, o.case.id);
+    let exposure = gain(&o.truth.radiance);
+    let [l, t, r, b] = o.crop_corners();
+    let cropped = |picture: &[[f32; 3]]| -> Vec<[f32; 3]> {
+        (t..b).flat_map(|y| picture[y * o.size[0] as usize + l..y * o.size[0] as usize + r].to_vec()).collect()
+    };
+    let errors = o.antialiased_errors();
+    let (mut whole, mut crops) = (Vec::new(), Vec::new());
+    for (k, role) in SHOWN.iter().enumerate() {
+        let picture = &o.antialiased[k].first;
+        let file = Picture::tone_mapped(o.size, picture, exposure).write(out, &format!("{id}-{k}"))?;
+        let caption = format!(
+            "N = {}; error with antialiasing {}",
+            o.antialiased[k].method.samples,
+            plus_minus(errors[k].error())
+        );
+        whole.push(Shown { file, title: role.name().to_owned(), caption });
+        let size = [(r - l) as u32, (b - t) as u32];
+        let file = Picture::tone_mapped(size, &cropped(picture), exposure).write(out, &format!("{id}-crop-{k}"))?;
+        crops.push(Shown { file, title: format!("{}, a part", role.name()), caption: String::new() });
+    }
+    let file =
+        Picture::tone_mapped(o.size, &o.antialiased_truth.radiance, exposure).write(out, &format!("{id}-reference"))?;
+    whole.push(Shown { file, title: "reference".to_owned(), caption: String::new() });
+
+    let mut blocks = vec![Block::Pictures(whole), Block::Pictures(crops)];
+    for (way, name) in WAYS.iter().enumerate() {
+        let chosen = [Role::Balance, Role::Progressive, Role::Correlated, Role::Ris];
+        let list: Vec<(&str, &Measured)> = chosen.iter().map(|r| (r.name(), &o.measured[r.place(way)])).collect();
+        blocks.extend(variances(setup, &o.truth, o.size, &list, &format!("{id}-variance-{way}"), name)?);
+    }
+    Ok(blocks)
+}
+
+/// Variance images of methods, weighted as in eq. (12), on one scale.
+pub fn variances(
+    setup: &Setup<'_>,
+    truth: &Truth,
+    size: [u32; 2],
+    list: &[(&str, &Measured)],
+    file: &str,
+    way: &str,
+) -> Result<Vec<Block>, ReproduceError> {
+    let maps: Vec<Vec<f64>> = list.iter().map(|(_, m)| truth.weighted(&m.variance_map())).collect();
+    let scale = Scale::of_values(HEAT, maps.iter().flatten());
+    let mut shown = Vec::new();
+    for (k, ((name, _), map)) in list.iter().zip(&maps).enumerate() {
+        let file = Picture::colored(size, map, &scale).write(&setup.options.out, &format!("{file}-{k}"))?;
+        let mean = map.iter().sum::<f64>() / map.len().max(1) as f64;
+        let caption = format!("samples {way}; mean {}", significant(mean));
+        shown.push(Shown { file, title: format!("variance: {name}"), caption });
+    }
+    let title = "variance of the pixel over tvi², in the unit of eq. (12)".to_owned();
+    Ok(vec![Block::Pictures(shown), Block::Legend { title, scale }])
+}
+
+fn numbers(o: &Outcome<'_>) -> Value {
+    let all: Vec<Value> = (0..WAYS.len())
+        .flat_map(|way| ROLES.map(|role| (way, role)))
+        .map(|(way, role)| method_json(role.name(), o.pair(role, way), o.errors(role, way)))
+        .collect();
+    let errors = o.antialiased_errors();
+    let antialiased: Vec<Value> = SHOWN
+        .iter()
+        .enumerate()
+        .map(|(i, role)| method_json(role.name(), [&o.antialiased[i], &o.antialiased[0]], [&errors[i], &errors[0]]))
+        .collect();
+    let curve = |way: usize| -> Vec<Value> {
+        let point =
+            |(rays, left): &(u32, Estimate)| json!({ "camera_rays": rays, "relative_error": estimate_json(*left) });
+        o.growth.0[way].iter().map(point).collect()
+    };
+    let Case { spp, samples, paper, paper_time, target, .. } = o.case;
+    json!({
+        "size": o.size, "camera_rays": spp, "samples": samples, "turns": o.measured[0].turns(), "candelas": CANDELAS,
+        "paper": { "mis": paper[0], "ocv": paper[1], "time_ratio": paper_time }, "target_percent": target,
+        "equal_time": { "ocv_samples": o.numbers.equal_time, "ris_samples": o.numbers.ris.samples,
+            "ris_proposals": o.numbers.ris.proposals },
+        "reference": { "mean": estimate_json(o.truth.mean), "noise": o.truth.noise() },
+        "methods": all, "antialiased": antialiased,
+        "growth": { WAYS[0]: curve(0), WAYS[1]: curve(1), WAYS[2]: curve(2) },
+    })
+}
