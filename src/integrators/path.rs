@@ -14,7 +14,7 @@ use crate::lights::LightHit;
 use crate::materials::SurfaceBsdf;
 use crate::math::{Ray, Rgb, Vec2, Vec3};
 use crate::samplers::SampleStream;
-use crate::scene::{EstimatorKind, IntegratorSettings, Split, World};
+use crate::scene::{IntegratorSettings, Split, World};
 use crate::textures::TextureContext;
 use std::time::{Duration, Instant};
 
@@ -162,14 +162,7 @@ impl PathIntegrator {
                 break;
             }
             let vertices = self.find_vertices(world, vertex, depth, samples, out);
-            let split = match settings.estimator {
-                EstimatorKind::Mc
-                | EstimatorKind::Mis
-                | EstimatorKind::Ocv
-                | EstimatorKind::OptimalMis
-                | EstimatorKind::Correlated => settings.split(),
-                EstimatorKind::Ris => settings.split().after_bounces(vertex),
-            };
+            let split = settings.split_at_vertex(vertex);
             let points: Vec<ShadePoint<'_>> = vertices
                 .iter()
                 .zip(&self.active)

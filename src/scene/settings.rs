@@ -117,6 +117,18 @@ impl IntegratorSettings {
         }
     }
 
+    /// [`Self::split`] at the vertex of a path, which are counted from 0.
+    pub fn split_at_vertex(&self, vertex: u32) -> Split {
+        match self.estimator {
+            EstimatorKind::Ris => self.split().after_bounces(vertex),
+            EstimatorKind::Mc
+            | EstimatorKind::Mis
+            | EstimatorKind::Ocv
+            | EstimatorKind::Correlated
+            | EstimatorKind::OptimalMis => self.split(),
+        }
+    }
+
     /// Samples and proposals of every estimate where they are not chosen per pixel.
     pub fn split(&self) -> Split {
         let default = match self.estimator {

@@ -1,6 +1,7 @@
 //! The irradiance cache: known answers, agreement with `path`, the same bits, gradients, walls, and scenes with nothing in them.
 
 use super::analytic_scenes::{answer, picture_means, scene_files};
+use lumiris::estimators::ocv::Form;
 use lumiris::estimators::stats::{sidak, t_test};
 use lumiris::film::{Film, PixelSums};
 use lumiris::import::{LoadOptions, load};
@@ -229,6 +230,38 @@ fn seeds_give_different_records() {
     };
     assert_eq!(picture(3), picture(3));
     assert_ne!(picture(3), picture(4));
+}
+
+#[test]
+fn records_take_any_estimator() {
+    let mean = |change: &dyn Fn(&mut lumiris::scene::IntegratorSettings)| {
+        let world = world_of(ROOM, |scene| {
+            with_cache(scene, Cached::All);
+            scene.integrator.cache.samples = 64;
+            scene.integrator.samples = Some(8);
+            scene.integrator.ris.proposals = Proposals::Fixed(32);
+            change(&mut scene.integrator);
+        });
+        let film = rendering(&world, RenderSettings { spp: 4, ..Default::default() }).film;
+        squares(&film, 48)[0]
+    };
+    let reference = mean(&|s| s.estimator = EstimatorKind::Mis);
+    for estimator in [
+        EstimatorKind::Mc,
+        EstimatorKind::Ris,
+        EstimatorKind::Ocv,
+        EstimatorKind::Correlated,
+        EstimatorKind::OptimalMis,
+    ] {
+        let ratio = mean(&|s| s.estimator = estimator) / reference;
+        assert!((ratio - 1.0).abs() < 0.05, "{estimator:?}: {ratio}");
+    }
+    for form in [Form::Paper, Form::Regression, Form::Crossfit] {
+        let by_form =
+            |s: &mut lumiris::scene::IntegratorSettings| (s.estimator, s.ocv.form) = (EstimatorKind::Ocv, form);
+        let ratio = mean(&by_form) / reference;
+        assert!((ratio - 1.0).abs() < 0.05, "{form:?}: {ratio}");
+    }
 }
 
 /// A point of the floor of [`ROOM`], or of a scene whose floor is z = 0.

@@ -238,23 +238,6 @@ mod tests {
     }
 
     #[test]
-    fn settings_of_correlated_sampling_are_read() {
-        let s = settings("Integrator \"path\" \"string estimator\" \"correlated\"").unwrap();
-        assert_eq!(s.estimator, EstimatorKind::Correlated);
-        assert_eq!((s.correlated.form, s.correlated.technique), (CorrelatedForm::Combined, SamplingTechnique::Bsdf));
-        let s =
-            settings("Integrator \"path\" \"string correlated\" \"crossfit\" \"string technique\" \"light\"").unwrap();
-        assert_eq!((s.correlated.form, s.correlated.technique), (CorrelatedForm::Crossfit, SamplingTechnique::Light));
-        for (parameter, message) in [
-            ("\"string correlated\" \"half\"", "one of combined, crossfit"),
-            ("\"string technique\" \"both\"", "one of bsdf, light"),
-        ] {
-            let report = settings(&format!("Integrator \"path\" {parameter}")).unwrap_err();
-            assert!(report.contains(message), "{parameter}: {report}");
-        }
-    }
-
-    #[test]
     fn settings_of_the_irradiance_cache_are_read() {
         let s = settings(
             "Integrator \"irradiance-cache\" \"string cached\" \"all\" \"float cacheerror\" 0.3 \"float cacheminradius\" 2
@@ -279,6 +262,23 @@ mod tests {
             ("\"integer cachepasses\" 0", "cachepasses must be from 1 to 4096, not 0"),
         ] {
             let report = settings(&format!("Integrator \"irradiance-cache\" {parameter}")).unwrap_err();
+            assert!(report.contains(message), "{parameter}: {report}");
+        }
+    }
+
+    #[test]
+    fn settings_of_correlated_sampling_are_read() {
+        let s = settings("Integrator \"path\" \"string estimator\" \"correlated\"").unwrap();
+        assert_eq!(s.estimator, EstimatorKind::Correlated);
+        assert_eq!((s.correlated.form, s.correlated.technique), (CorrelatedForm::Combined, SamplingTechnique::Bsdf));
+        let s =
+            settings("Integrator \"path\" \"string correlated\" \"crossfit\" \"string technique\" \"light\"").unwrap();
+        assert_eq!((s.correlated.form, s.correlated.technique), (CorrelatedForm::Crossfit, SamplingTechnique::Light));
+        for (parameter, message) in [
+            ("\"string correlated\" \"half\"", "one of combined, crossfit"),
+            ("\"string technique\" \"both\"", "one of bsdf, light"),
+        ] {
+            let report = settings(&format!("Integrator \"path\" {parameter}")).unwrap_err();
             assert!(report.contains(message), "{parameter}: {report}");
         }
     }

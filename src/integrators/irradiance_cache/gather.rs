@@ -22,7 +22,7 @@ use crate::math::hash::pcg4d;
 use crate::math::ray::offset_origin;
 use crate::math::{Frame, Ray, Rgb, Vec3};
 use crate::samplers::SampleStream;
-use crate::scene::{Cached, EmitterHit, EstimatorKind, IntegratorKind, IntegratorSettings, Split, World};
+use crate::scene::{Cached, EmitterHit, IntegratorKind, IntegratorSettings, Split, World};
 use std::f32::consts::PI;
 
 /// Records that are computed together.
@@ -101,14 +101,7 @@ impl Gatherer {
             max_depth: settings.max_depth.saturating_sub(1),
             ..settings.at_vertex(1)
         };
-        let split = match settings.estimator {
-            EstimatorKind::Ris => settings.split().after_bounces(1),
-            EstimatorKind::Mc
-            | EstimatorKind::Mis
-            | EstimatorKind::Ocv
-            | EstimatorKind::OptimalMis
-            | EstimatorKind::Correlated => paths.split(),
-        };
+        let split = settings.split_at_vertex(1);
         self.samples.clear();
         for w in wanted {
             let frame = Frame::from_z(w.ns);

@@ -31,7 +31,7 @@ use crate::direct::{Fits, ShadePoint};
 use crate::film::PixelSample;
 use crate::materials::SurfaceBsdf;
 use crate::math::{Rgb, Vec3};
-use crate::scene::{Cached, EstimatorKind, IntegratorSettings, World};
+use crate::scene::{Cached, IntegratorSettings, World};
 use std::f32::consts::FRAC_1_PI;
 
 /// How often vertices were served.
@@ -91,14 +91,7 @@ impl CacheIntegrator {
                 break;
             }
             let vertices = self.paths.find_vertices(world, vertex, depth, samples, out);
-            let split = match settings.estimator {
-                EstimatorKind::Mc
-                | EstimatorKind::Mis
-                | EstimatorKind::Ocv
-                | EstimatorKind::OptimalMis
-                | EstimatorKind::Correlated => settings.split(),
-                EstimatorKind::Ris => settings.split().after_bounces(vertex),
-            };
+            let split = settings.split_at_vertex(vertex);
             let shadings: Vec<Shading<'_>> = vertices.iter().map(|v| self.shade(cache, v)).collect();
             let points: Vec<ShadePoint<'_>> = (vertices.iter().zip(&self.paths.active))
                 .map(|(v, path)| {
