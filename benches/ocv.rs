@@ -6,7 +6,6 @@
 
 use lumiris::estimators::ocv::{NormalEquations, Penalty};
 use lumiris::math::hash::HashStream;
-use lumiris::simd::level;
 use lumiris::simd::ocv::{Matrix, System, solve};
 use std::hint::black_box;
 use std::time::Instant;
@@ -46,7 +45,7 @@ fn main() {
             let Penalty { ridge, shrink, .. } = Penalty::default();
             let system = System { columns: m, matrix: Matrix::KnownMeans, ridge, shrink };
             let lanes = time(|| {
-                black_box(solve(level(), &system, black_box(&sums), &mut beta));
+                black_box(solve(&system, black_box(&sums), &mut beta));
             });
             let single = time(|| {
                 for (row, beta) in

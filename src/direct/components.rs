@@ -136,7 +136,7 @@ fn solve_matrices(
 ) -> u64 {
     let Penalty { ridge, shrink, .. } = penalty;
     let system = System { columns: equations.components(), matrix, ridge, shrink };
-    simd::ocv::solve(simd::level(), &system, sums, beta) as u64
+    simd::ocv::solve(&system, sums, beta) as u64
 }
 
 /// β₀ + Σ β_j of the components that are there [Fan et al. 2006, Eq. 10]; the last unknown is β₀. The mean of y if there is no

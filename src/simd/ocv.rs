@@ -2,9 +2,14 @@
 //!
 //! The sums of a point lie in a row: Σ c_j c_k (k ≤ j, row by row), Σ c_j y (by column, then channel), Σ c_j, Σ y, Σ y², n.
 //! The factorisation is LDLᵀ without pivots. A column whose pivot is rounding is dropped.
+//!
+//! Lanes are arrays, of whose loops the compiler makes vector code: the loops over columns are too many to be unrolled for every
+//! level of a dispatch.
 
-use super::lane::{F, LANES, M, or_zero, store};
-use fearless_simd::{Level, Simd, dispatch, prelude::*};
+use std::ops::{Add, AddAssign, Div, Mul, MulAssign, Sub, SubAssign};
+
+/// Points that are solved together.
+const LANES: usize = 8;
 
 /// Most columns.
 const MOST: usize = 8;
@@ -49,66 +54,121 @@ impl System {
 
 /// Solves the system of each point of `sums` and writes `beta[3 columns · point + 3 j + channel]`, 0 where a solution is not
 /// finite. Returns the number of these.
-pub fn solve(level: Level, system: &System, sums: &[f32], beta: &mut [f32]) -> usize {
+pub fn solve(system: &System, sums: &[f32], beta: &mut [f32]) -> usize {
     assert!(system.columns <= MOST, "at most {MOST} columns");
-    if system.columns == 0 { 0 } else { dispatch!(level, simd => solve_points(simd, system, sums, beta)) }
-}
-
-#[inline(always)]
-fn solve_points<S: Simd>(simd: S, system: &System, sums: &[f32], beta: &mut [f32]) -> usize {
+    if system.columns == 0 {
+        return 0;
+    }
     let (len, width) = (system.len(), 3 * system.columns);
     let points = sums.len() / len;
     let mut failed = 0;
     for first in (0..points).step_by(LANES) {
-        let lanes = Lanes { simd, sums, len, first, last: points - 1 };
+        let lanes = Lanes { sums, len, first, last: points - 1 };
         let (x, ok) = solve_lanes(&lanes, system);
-        let mut row = [0.0; LANES];
-        let filled = LANES.min(points - first);
-        for k in 0..width {
-            store(x[k], &mut row, 0);
-            for p in 0..filled {
-                beta[(first + p) * width + k] = row[p];
+        for p in 0..LANES.min(points - first) {
+            for k in 0..width {
+                beta[(first + p) * width + k] = x[k].0[p];
             }
-        }
-        store(or_zero(ok, F::splat(simd, 1.0)), &mut row, 0);
-        for good in &row[..filled] {
-            failed += usize::from(*good == 0.0);
+            failed += usize::from(!ok[p]);
         }
     }
     failed
 }
 
+/// A number of each point.
+#[derive(Clone, Copy)]
+struct F([f32; LANES]);
+
+impl F {
+    const ZERO: F = F([0.0; LANES]);
+    const ONE: F = F([1.0; LANES]);
+
+    #[inline(always)]
+    fn zip(self, o: F, f: impl Fn(f32, f32) -> f32) -> F {
+        let mut v = [0.0; LANES];
+        for p in 0..LANES {
+            v[p] = f(self.0[p], o.0[p]);
+        }
+        F(v)
+    }
+
+    #[inline(always)]
+    fn max(self, least: f32) -> F {
+        self.zip(F::ZERO, |v, _| if v > least { v } else { least })
+    }
+
+    /// `self` where `test > bound`, else 0.
+    #[inline(always)]
+    fn where_greater(self, test: F, bound: F) -> F {
+        let mut v = [0.0; LANES];
+        for p in 0..LANES {
+            v[p] = if test.0[p] > bound.0[p] { self.0[p] } else { 0.0 };
+        }
+        F(v)
+    }
+}
+
+macro_rules! operators {
+    ($($trait:ident $method:ident $operator:tt),+) => {$(
+        impl $trait for F {
+            type Output = F;
+            #[inline(always)]
+            fn $method(self, o: F) -> F {
+                self.zip(o, |a, b| a $operator b)
+            }
+        }
+
+        impl $trait<f32> for F {
+            type Output = F;
+            #[inline(always)]
+            fn $method(self, o: f32) -> F {
+                self.zip(F::ZERO, |a, _| a $operator o)
+            }
+        }
+    )+};
+}
+operators!(Add add +, Sub sub -, Mul mul *, Div div /);
+
+macro_rules! assignments {
+    ($($trait:ident $method:ident $operator:tt),+) => {$(
+        impl $trait for F {
+            #[inline(always)]
+            fn $method(&mut self, o: F) {
+                *self = *self $operator o;
+            }
+        }
+    )+};
+}
+assignments!(AddAssign add_assign +, SubAssign sub_assign -, MulAssign mul_assign *);
+
 /// Sums of [`LANES`] points from `first` on; past the `last` one, of that one.
-struct Lanes<'a, S> {
-    simd: S,
+struct Lanes<'a> {
     sums: &'a [f32],
     len: usize,
     first: usize,
     last: usize,
 }
 
-impl<S: Simd> Lanes<'_, S> {
-    #[inline(always)]
-    fn get(&self, k: usize) -> F<S> {
+impl Lanes<'_> {
+    fn get(&self, k: usize) -> F {
         let mut v = [0.0; LANES];
         for p in 0..LANES {
             v[p] = self.sums[(self.first + p).min(self.last) * self.len + k];
         }
-        F::from_slice(self.simd, &v)
+        F(v)
     }
 }
 
 /// Coefficients by column and channel, and where they are finite.
-#[inline(always)]
-fn solve_lanes<S: Simd>(lanes: &Lanes<'_, S>, system: &System) -> ([F<S>; 3 * MOST], M<S>) {
-    let (m, simd) = (system.columns, lanes.simd);
-    let (zero, one) = (F::splat(simd, 0.0), F::splat(simd, 1.0));
+fn solve_lanes(lanes: &Lanes<'_>, system: &System) -> ([F; 3 * MOST], [bool; LANES]) {
+    let m = system.columns;
+    let (zero, one) = (F::ZERO, F::ONE);
     let [_, _, values] = offsets(m);
     let n = lanes.get(values + 6);
     let per_n = one / n.max(1.0);
     let (a, b) = assemble(lanes, system, per_n);
-    let factors = factorise(simd, m, &a, system.ridge);
-    let left = n - 1.0 - factors.effective(simd, m, system.ridge);
+    let factors = factorise(m, &a, system.ridge);
+    let left = n - 1.0 - factors.effective(m, system.ridge);
 
     let mut x = [zero; 3 * MOST];
     // What is not finite in the system or in a solution makes this NaN, whatever is dropped or shrunk to 0.
@@ -130,7 +190,7 @@ fn solve_lanes<S: Simd>(lanes: &Lanes<'_, S>, system: &System) -> ([F<S>; 3 * MO
             let variance = (total - explained).max(0.0) / left;
             let effective = n - 1.0 - left;
             let shrunk = (one - effective * variance / explained * system.shrink).max(0.0);
-            factor = or_zero(explained.simd_gt(zero) & left.simd_gt(F::splat(simd, 0.5)), shrunk);
+            factor = shrunk.where_greater(explained, zero).where_greater(left, one * 0.5);
         }
         for j in 0..m {
             sum += (solution[j] + b[i][j]) * 0.0;
@@ -138,27 +198,27 @@ fn solve_lanes<S: Simd>(lanes: &Lanes<'_, S>, system: &System) -> ([F<S>; 3 * MO
             sum += x[3 * j + i] * 0.0;
         }
     }
-    let ok = sum.is_finite();
+    let ok = sum.0.map(f32::is_finite);
     for x in &mut x[..3 * m] {
-        *x = or_zero(ok, *x);
+        for p in 0..LANES {
+            x.0[p] = if ok[p] { x.0[p] } else { 0.0 };
+        }
     }
     (x, ok)
 }
 
 /// Where Σ c_j y, Σ c_j and Σ y begin.
-#[inline(always)]
 fn offsets(m: usize) -> [usize; 3] {
     let mixed = m * (m + 1) / 2;
     [mixed, mixed + 3 * m, mixed + 4 * m]
 }
 
 /// The lower triangle of a matrix.
-type Triangle<S> = [[F<S>; MOST]; MOST];
+type Triangle = [[F; MOST]; MOST];
 
 /// The matrix without ridge, and three right-hand sides.
-#[inline(always)]
-fn assemble<S: Simd>(lanes: &Lanes<'_, S>, system: &System, per_n: F<S>) -> (Triangle<S>, [[F<S>; MOST]; 3]) {
-    let (m, zero) = (system.columns, F::splat(lanes.simd, 0.0));
+fn assemble(lanes: &Lanes<'_>, system: &System, per_n: F) -> (Triangle, [[F; MOST]; 3]) {
+    let (m, zero) = (system.columns, F::ZERO);
     let [mixed, means, values] = offsets(m);
     let (mut a, mut b) = ([[zero; MOST]; MOST], [[zero; MOST]; 3]);
     let mut at = 0;
@@ -168,8 +228,9 @@ fn assemble<S: Simd>(lanes: &Lanes<'_, S>, system: &System, per_n: F<S>) -> (Tri
             a[j][k] = lanes.get(at);
             if system.matrix == Matrix::SampleMeans {
                 let centred = a[j][k] - mean * lanes.get(means + k);
-                let is_constant = centred.simd_lt(a[j][k] * CONSTANT);
-                a[j][k] = if j == k { is_constant.select(zero, centred) } else { centred };
+                let is_constant = a[j][k] * CONSTANT;
+                a[j][k] =
+                    if j == k { centred.zip(is_constant, |c, least| if c < least { 0.0 } else { c }) } else { centred };
             }
             at += 1;
         }
@@ -193,14 +254,13 @@ fn assemble<S: Simd>(lanes: &Lanes<'_, S>, system: &System, per_n: F<S>) -> (Tri
 }
 
 /// L below the diagonal, and 1/D, which is 0 for columns that are dropped.
-struct Factors<S: Simd> {
-    l: Triangle<S>,
-    per_d: [F<S>; MOST],
+struct Factors {
+    l: Triangle,
+    per_d: [F; MOST],
 }
 
-#[inline(always)]
-fn factorise<S: Simd>(simd: S, m: usize, a: &Triangle<S>, ridge: f32) -> Factors<S> {
-    let (zero, one) = (F::splat(simd, 0.0), F::splat(simd, 1.0));
+fn factorise(m: usize, a: &Triangle, ridge: f32) -> Factors {
+    let (zero, one) = (F::ZERO, F::ONE);
     let (mut l, mut d, mut per_d) = ([[zero; MOST]; MOST], [zero; MOST], [zero; MOST]);
     for j in 0..m {
         let diagonal = a[j][j] + ridge;
@@ -208,9 +268,9 @@ fn factorise<S: Simd>(simd: S, m: usize, a: &Triangle<S>, ridge: f32) -> Factors
         for k in 0..j {
             pivot -= l[j][k] * l[j][k] * d[k];
         }
-        let is_kept = pivot.simd_gt(diagonal * DEPENDENT);
-        d[j] = or_zero(is_kept, pivot);
-        per_d[j] = or_zero(is_kept, one / pivot);
+        let least = diagonal * DEPENDENT;
+        d[j] = pivot.where_greater(pivot, least);
+        per_d[j] = (one / pivot).where_greater(pivot, least);
         for i in j + 1..m {
             let mut v = a[i][j];
             for k in 0..j {
@@ -222,10 +282,9 @@ fn factorise<S: Simd>(simd: S, m: usize, a: &Triangle<S>, ridge: f32) -> Factors
     Factors { l, per_d }
 }
 
-impl<S: Simd> Factors<S> {
+impl Factors {
     /// L D Lᵀ x = b, 0 for columns that were dropped.
-    #[inline(always)]
-    fn solve(&self, m: usize, b: &[F<S>; MOST]) -> [F<S>; MOST] {
+    fn solve(&self, m: usize, b: &[F; MOST]) -> [F; MOST] {
         let mut x = *b;
         for j in 0..m {
             for k in 0..j {
@@ -242,12 +301,11 @@ impl<S: Simd> Factors<S> {
     }
 
     /// rank − λ tr A⁻¹, by the columns of L⁻¹.
-    #[inline(always)]
-    fn effective(&self, simd: S, m: usize, ridge: f32) -> F<S> {
-        let (zero, one) = (F::splat(simd, 0.0), F::splat(simd, 1.0));
+    fn effective(&self, m: usize, ridge: f32) -> F {
+        let (zero, one) = (F::ZERO, F::ONE);
         let (mut rank, mut trace) = (zero, zero);
         for c in 0..m {
-            rank += or_zero(self.per_d[c].simd_gt(zero), one);
+            rank += one.where_greater(self.per_d[c], zero);
             let mut v = [zero; MOST];
             v[c] = one;
             for j in c..m {
@@ -265,7 +323,7 @@ impl<S: Simd> Factors<S> {
 mod tests {
     use super::*;
     use crate::math::hash::HashStream;
-    use crate::simd::test_support::{LENGTHS, assert_same_bits};
+    use crate::simd::test_support::LENGTHS;
 
     /// Sums of `n` samples of each of `points`.
     fn sums(system: &System, points: usize, n: usize) -> Vec<f32> {
@@ -292,7 +350,7 @@ mod tests {
     }
 
     #[test]
-    fn solutions_are_the_same_at_all_levels_and_what_is_not_finite_is_counted() {
+    fn solutions_do_not_depend_on_what_is_solved_beside_and_what_is_not_finite_is_counted() {
         for columns in [1, 3, 5, 8] {
             for matrix in [Matrix::KnownMeans, Matrix::SampleMeans, Matrix::Intercept] {
                 for points in LENGTHS {
@@ -302,10 +360,15 @@ mod tests {
                     if spoilt > 0 {
                         sums[2 * system.len() + offsets(columns)[2]] = f32::NAN;
                     }
-                    assert_same_bits::<1>(points * 3 * columns, |level, [beta]| {
-                        assert_eq!(solve(level, &system, &sums, beta), spoilt, "{columns} {matrix:?} {points}");
-                        assert!(beta.iter().all(|b| b.is_finite()));
-                    });
+                    let width = 3 * columns;
+                    let mut beta = vec![1.0; points * width];
+                    assert_eq!(solve(&system, &sums, &mut beta), spoilt, "{columns} {matrix:?} {points}");
+                    assert!(beta.iter().all(|b| b.is_finite()));
+                    for (row, beta) in sums.chunks_exact(system.len()).zip(beta.chunks_exact(width)) {
+                        let mut alone = vec![1.0; width];
+                        solve(&system, row, &mut alone);
+                        assert_eq!(alone, beta, "{columns} {matrix:?} {points}");
+                    }
                 }
             }
         }
@@ -315,9 +378,9 @@ mod tests {
     fn points_without_samples_and_without_columns_have_no_coefficients() {
         let system = System { columns: 3, matrix: Matrix::SampleMeans, ridge: 0.0, shrink: 0.0 };
         let mut beta = vec![7.0; 9 * 9];
-        assert_eq!(solve(super::super::level(), &system, &vec![0.0; 9 * system.len()], &mut beta), 0);
+        assert_eq!(solve(&system, &vec![0.0; 9 * system.len()], &mut beta), 0);
         assert!(beta.iter().all(|b| *b == 0.0));
         let none = System { columns: 0, ..system };
-        assert_eq!(solve(super::super::level(), &none, &[0.0; 7], &mut []), 0);
+        assert_eq!(solve(&none, &[0.0; 7], &mut []), 0);
     }
 }

@@ -8,7 +8,7 @@ use lumiris::estimators::ocv::{Penalty, crossfit, paper, regression};
 use lumiris::estimators::stats::{Welford, z_test};
 use lumiris::estimators::{correlated, optimal_mis};
 use lumiris::math::hash::HashStream;
-use lumiris::simd::Level;
+
 use lumiris::simd::ocv::{Matrix, System, solve};
 
 /// Numbers of samples of a pass.
@@ -301,7 +301,7 @@ fn systems_of_many_points_have_the_solutions_of_each() {
                 assert_eq!(system.len(), equations.len());
                 let width = equations.coefficients();
                 let (mut all, mut one) = (vec![7.0; 21 * width], vec![0.0; width]);
-                assert_eq!(solve(Level::new(), &system, &rows, &mut all), 0);
+                assert_eq!(solve(&system, &rows, &mut all), 0);
                 for (row, all) in rows.chunks_exact(equations.len()).zip(all.chunks_exact(width)) {
                     equations.solve(row, penalty, &mut one).expect("all samples are finite");
                     let (a, b) = (equations.estimate(row, all), equations.estimate(row, &one));
@@ -322,7 +322,7 @@ fn systems_with_an_intercept_are_those_of_the_paper() {
     rows.chunks_exact_mut(equations.len()).for_each(|row| sampler.add(1, 0.0, &mut stream, row));
     let mut beta = vec![0.0; 11 * equations.coefficients()];
     let system = System { columns: 4, matrix: Matrix::Intercept, ridge: 1.0, shrink: 0.0 };
-    assert_eq!(solve(Level::new(), &system, &rows, &mut beta), 0);
+    assert_eq!(solve(&system, &rows, &mut beta), 0);
     for (row, beta) in rows.chunks_exact(equations.len()).zip(beta.chunks_exact(equations.coefficients())) {
         let expected = paper(equations, row, &[1.0; 4], 1.0).estimate;
         for (i, expected) in expected.into_iter().enumerate() {
