@@ -1,6 +1,6 @@
 //! Pictures against a reference: numbers, and a page to look at them.
 //!
-//! Reading order: [`layers`] (which channels of a file are the picture), [`load`] (files to pixels of one size),
+//! Reading order: [`layers`] (which channels of a file are the picture), [`mod@load`] (files to pixels of one size),
 //! [`scores`] (metrics), [`columns`] (metrics by name), [`page`] (a page for a browser, whose own parts are in `viewer/`:
 //! `index.html`, `style.css`, `pictures.js` for values and their pictures, `viewer.js` for controls).
 

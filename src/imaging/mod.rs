@@ -1,6 +1,6 @@
 //! Pictures: pixels with named channels, their encodings, pyramids for filtered lookups, and how far two are apart.
 //!
-//! Reading order: [`color`], [`mipmap`], [`file`], [`oiio`], [`metrics`], [`heat`].
+//! Reading order: [`color`], [`mipmap`], [`mod@file`], [`oiio`], [`metrics`], [`heat`].
 
 pub mod color;
 pub mod file;

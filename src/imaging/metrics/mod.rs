@@ -4,7 +4,7 @@
 //! pictures takes no part in any mean**; [`Differences`] counts such pixels, maps are NaN there, and FLIP sees black in
 //! both pictures.
 //!
-//! Reading order: [`difference`] (MSE, relative MSE, PSNR), [`bias`], [`significance`] (z-tests), [`perceptual`]
+//! Reading order: [`difference`] (MSE, relative MSE, PSNR), [`mod@bias`], [`mod@significance`] (z-tests), [`perceptual`]
 //! (thresholds of vision), [`flip`].
 
 pub mod bias;
