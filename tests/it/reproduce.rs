@@ -1,6 +1,6 @@
 //! `lumiris reproduce` from outside: a page and a file of numbers with every figure.
 
-use std::path::Path;
+use std::path::{Path, PathBuf};
 use std::process::Command;
 
 const FIGURES: [&str; 6] = [
@@ -32,20 +32,25 @@ fn write_scenes(folder: &Path) {
     }
 }
 
+/// Reproduces a paper on the scenes of a folder: the page's folder, its text, and its numbers.
+fn reproduced(paper: &str, folder: &Path) -> (PathBuf, String, serde_json::Value) {
+    let output = Command::new(env!("CARGO_BIN_EXE_lumiris"))
+        .args(["reproduce", paper, "--out", "page", "--quick", "--size", "16", "--scenes", ".", "-q"])
+        .current_dir(folder)
+        .output()
+        .unwrap();
+    assert!(output.status.success(), "{}", String::from_utf8_lossy(&output.stderr));
+    let page = folder.join("page");
+    let html = std::fs::read_to_string(page.join("index.html")).unwrap();
+    let numbers = std::fs::read_to_string(page.join(format!("{paper}.json"))).unwrap();
+    (page, html, serde_json::from_str(&numbers).unwrap())
+}
+
 #[test]
 fn the_page_and_the_numbers_hold_every_figure() {
     let folder = tempfile::tempdir().unwrap();
     write_scenes(folder.path());
-    let output = Command::new(env!("CARGO_BIN_EXE_lumiris"))
-        .args(["reproduce", "talbot", "--out", "page", "--quick", "--size", "16", "--scenes", ".", "-q"])
-        .current_dir(folder.path())
-        .output()
-        .unwrap();
-    assert!(output.status.success(), "{}", String::from_utf8_lossy(&output.stderr));
-    let page = folder.path().join("page");
-    let html = std::fs::read_to_string(page.join("index.html")).unwrap();
-    let numbers: serde_json::Value =
-        serde_json::from_str(&std::fs::read_to_string(page.join("talbot.json")).unwrap()).unwrap();
+    let (page, html, numbers) = reproduced("talbot", folder.path());
 
     let figures = numbers["figures"].as_object().unwrap();
     assert_eq!(figures.len(), FIGURES.len());
@@ -81,16 +86,7 @@ fn write_fan_scenes(folder: &Path) {
 fn the_page_of_control_variates_holds_every_scene_and_method() {
     let folder = tempfile::tempdir().unwrap();
     write_fan_scenes(folder.path());
-    let output = Command::new(env!("CARGO_BIN_EXE_lumiris"))
-        .args(["reproduce", "fan", "--out", "page", "--quick", "--size", "16", "--scenes", ".", "-q"])
-        .current_dir(folder.path())
-        .output()
-        .unwrap();
-    assert!(output.status.success(), "{}", String::from_utf8_lossy(&output.stderr));
-    let page = folder.path().join("page");
-    let html = std::fs::read_to_string(page.join("index.html")).unwrap();
-    let numbers: serde_json::Value =
-        serde_json::from_str(&std::fs::read_to_string(page.join("fan.json")).unwrap()).unwrap();
+    let (page, html, numbers) = reproduced("fan", folder.path());
 
     let figures = numbers["figures"].as_object().unwrap();
     assert_eq!(figures.len(), FAN_FIGURES.len());
