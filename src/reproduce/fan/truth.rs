@@ -163,8 +163,9 @@ mod tests {
         let errors = exact.errors(&measured(&[[3.0, 3.0], [3.0, 3.0]]));
         assert!((errors.systematic / errors.error().value.powi(2) - 1.0).abs() < 1e-6);
         assert!((errors.bias.value - 0.5).abs() < 1e-6);
-        let noisy = exact.errors(&measured(&[[3.0, 1.0], [1.0, 3.0]]));
-        assert!(noisy.systematic.abs() < noisy.error().value.powi(2));
+        // Four turns whose mean is right: its square is 0, and their variance 4/3 says that noise would make it 1/3.
+        let noisy = exact.errors(&measured(&[[3.0, 1.0], [1.0, 3.0], [3.0, 1.0], [1.0, 3.0]]));
+        assert!((noisy.systematic / noisy.error().value.powi(2) + 1.0 / 3.0).abs() < 1e-6);
     }
 
     #[test]
