@@ -87,7 +87,7 @@ impl AreaSampler {
 
     /// Samples directions.
     pub fn sample(&self, level: Level, u: [&[f32]; 2], out: &mut LightLanes<'_>) {
-        out.with_padding(u, |u, out| dispatch!(level, simd => self.sample_lanes(simd, u, out)));
+        out.with_padding(u, &|u, out| dispatch!(level, simd => self.sample_lanes(simd, u, out)));
     }
 
     #[inline(always)]

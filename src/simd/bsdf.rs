@@ -92,61 +92,116 @@ impl Bsdf<'_> {
         }
         let n = out.pdf.len();
         if n >= LANES {
-            return dispatch!(level, simd => self.eval_lanes(simd, wi, out));
+            return self.eval_padded(level, wi, out);
         }
         let wi = wi.map(padded);
         let [mut r, mut g, mut b, mut pdf] = [[0.0; LANES]; 4];
         let mut few = Values { f_cos: [&mut r, &mut g, &mut b], pdf: &mut pdf };
-        dispatch!(level, simd => self.eval_lanes(simd, [&wi[0], &wi[1], &wi[2]], &mut few));
+        self.eval_padded(level, [&wi[0], &wi[1], &wi[2]], &mut few);
         for (to, from) in out.f_cos.iter_mut().zip([r, g, b]) {
             to.copy_from_slice(&from[..n]);
         }
         out.pdf.copy_from_slice(&pdf[..n]);
     }
 
-    #[inline(always)]
-    fn eval_lanes<S: Simd>(&self, simd: S, wi: [&[f32]; 3], out: &mut Values<'_>) {
+    /// The same for at least [`LANES`] directions. Each model has a function of its own, for the time that compiling takes:
+    /// it grows faster than a function without vector registers does.
+    fn eval_padded(&self, level: Level, wi: [&[f32]; 3], out: &mut Values<'_>) {
         match &self.model {
             Model::Lambertian { reflection, transmission, p } => {
-                for i in (0..out.pdf.len()).step_by(LANES) {
-                    let i = begin(i, out.pdf.len());
-                    let cos = self.cosines(simd, wi, i);
-                    self.lambertian([*reflection, *transmission], *p, cos, (i, out));
-                }
+                self.eval_lambertian(level, ([*reflection, *transmission], *p), wi, out);
             }
             Model::Conductor { alpha, eta, k } => {
-                let facets = Facets::new(*alpha, self.wo);
                 let metal = [0, 1, 2].map(|c| Metal::new(eta[c], k[c]));
-                for i in (0..out.pdf.len()).step_by(LANES) {
-                    let i = begin(i, out.pdf.len());
-                    self.conductor(&facets, &metal, self.local(simd, wi, i), (i, out));
-                }
+                self.eval_conductor(level, (&Facets::new(*alpha, self.wo), &metal), wi, out);
             }
             Model::Dielectric(interface) => {
-                let (facets, eta) = (Facets::new(interface.alpha, self.wo), interface.eta);
-                let eta_p = if self.wo.z > 0.0 { eta } else { 1.0 / eta };
-                for i in (0..out.pdf.len()).step_by(LANES) {
-                    let i = begin(i, out.pdf.len());
-                    self.dielectric(&facets, eta_p, self.local(simd, wi, i), (i, out));
-                }
+                let eta_p = if self.wo.z > 0.0 { interface.eta } else { 1.0 / interface.eta };
+                self.eval_dielectric(level, (&Facets::new(interface.alpha, self.wo), eta_p), wi, out);
             }
-            Model::Coated { interface, base, p_interface, transmittance } => {
-                let coat = interface.map(|c| (Facets::new(c.alpha, self.wo), c.eta));
-                for i in (0..out.pdf.len()).step_by(LANES) {
-                    let i = begin(i, out.pdf.len());
-                    let wi = self.local(simd, wi, i);
-                    let cos = wi.z.abs();
-                    let specular = match &coat {
-                        Some((facets, eta)) => self.coat(facets, *eta, wi),
-                        None => (F::splat(simd, 0.0), F::splat(simd, 0.0)),
-                    };
-                    let t = transmittance.along(cos) * cos;
-                    let is_same_side = (wi.z * self.wo.z).simd_gt(F::splat(simd, 0.0));
-                    let f = [specular.0 + t * base[0], specular.0 + t * base[1], specular.0 + t * base[2]];
-                    let pdf = specular.1 * *p_interface + cos * (FRAC_1_PI * (1.0 - *p_interface));
-                    write(is_same_side, f, pdf, (i, out));
-                }
-            }
+            Model::Coated { .. } => self.eval_coated(level, wi, out),
+        }
+    }
+
+    #[inline(never)]
+    fn eval_lambertian(&self, level: Level, model: ([[f32; 3]; 2], [f32; 2]), wi: [&[f32]; 3], out: &mut Values<'_>) {
+        dispatch!(level, simd => self.lambertian_lanes(simd, model, wi, out));
+    }
+
+    #[inline(never)]
+    fn eval_conductor(&self, level: Level, model: (&Facets, &[Metal; 3]), wi: [&[f32]; 3], out: &mut Values<'_>) {
+        dispatch!(level, simd => self.conductor_lanes(simd, model, wi, out));
+    }
+
+    #[inline(never)]
+    fn eval_dielectric(&self, level: Level, model: (&Facets, f32), wi: [&[f32]; 3], out: &mut Values<'_>) {
+        dispatch!(level, simd => self.dielectric_lanes(simd, model, wi, out));
+    }
+
+    #[inline(never)]
+    fn eval_coated(&self, level: Level, wi: [&[f32]; 3], out: &mut Values<'_>) {
+        dispatch!(level, simd => self.coated_lanes(simd, wi, out));
+    }
+
+    #[inline(always)]
+    fn lambertian_lanes<S: Simd>(
+        &self,
+        simd: S,
+        (f, p): ([[f32; 3]; 2], [f32; 2]),
+        wi: [&[f32]; 3],
+        out: &mut Values<'_>,
+    ) {
+        for i in (0..out.pdf.len()).step_by(LANES) {
+            let i = begin(i, out.pdf.len());
+            self.lambertian(f, p, self.cosines(simd, wi, i), (i, out));
+        }
+    }
+
+    #[inline(always)]
+    fn conductor_lanes<S: Simd>(
+        &self,
+        simd: S,
+        (facets, metal): (&Facets, &[Metal; 3]),
+        wi: [&[f32]; 3],
+        out: &mut Values<'_>,
+    ) {
+        for i in (0..out.pdf.len()).step_by(LANES) {
+            let i = begin(i, out.pdf.len());
+            self.conductor(facets, metal, self.local(simd, wi, i), (i, out));
+        }
+    }
+
+    #[inline(always)]
+    fn dielectric_lanes<S: Simd>(
+        &self,
+        simd: S,
+        (facets, eta_p): (&Facets, f32),
+        wi: [&[f32]; 3],
+        out: &mut Values<'_>,
+    ) {
+        for i in (0..out.pdf.len()).step_by(LANES) {
+            let i = begin(i, out.pdf.len());
+            self.dielectric(facets, eta_p, self.local(simd, wi, i), (i, out));
+        }
+    }
+
+    #[inline(always)]
+    fn coated_lanes<S: Simd>(&self, simd: S, wi: [&[f32]; 3], out: &mut Values<'_>) {
+        let Model::Coated { interface, base, p_interface, transmittance } = &self.model else { return };
+        let coat = interface.map(|c| (Facets::new(c.alpha, self.wo), c.eta));
+        for i in (0..out.pdf.len()).step_by(LANES) {
+            let i = begin(i, out.pdf.len());
+            let wi = self.local(simd, wi, i);
+            let cos = wi.z.abs();
+            let specular = match &coat {
+                Some((facets, eta)) => self.coat(facets, *eta, wi),
+                None => (F::splat(simd, 0.0), F::splat(simd, 0.0)),
+            };
+            let t = transmittance.along(cos) * cos;
+            let is_same_side = (wi.z * self.wo.z).simd_gt(F::splat(simd, 0.0));
+            let f = [specular.0 + t * base[0], specular.0 + t * base[1], specular.0 + t * base[2]];
+            let pdf = specular.1 * *p_interface + cos * (FRAC_1_PI * (1.0 - *p_interface));
+            write(is_same_side, f, pdf, (i, out));
         }
     }
 

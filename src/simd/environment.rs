@@ -130,7 +130,7 @@ fn lat_long<S: Simd>(x: F<S>, y: F<S>) -> (Vec3s<S>, F<S>) {
 impl Environment<'_> {
     /// Samples directions; densities are 0 where the image is black.
     pub fn sample(&self, level: Level, u: [&[f32]; 2], out: &mut LightLanes<'_>) {
-        out.with_padding(u, |u, out| dispatch!(level, simd => self.sample_lanes(simd, u, out)));
+        out.with_padding(u, &|u, out| dispatch!(level, simd => self.sample_lanes(simd, u, out)));
     }
 
     #[inline(always)]

@@ -24,8 +24,9 @@ impl LightLanes<'_> {
         self.pdf.fill(pdf);
     }
 
-    /// Calls `sample` with at least [`LANES`] numbers, the first of which are `u`.
-    pub(super) fn with_padding(&mut self, u: [&[f32]; 2], sample: impl FnOnce([&[f32]; 2], &mut LightLanes<'_>)) {
+    /// Calls `sample` with at least [`LANES`] numbers, the first of which are `u`. (By reference, so that a kernel is compiled once
+    /// and not for each of the two calls.)
+    pub(super) fn with_padding(&mut self, u: [&[f32]; 2], sample: &dyn Fn([&[f32]; 2], &mut LightLanes<'_>)) {
         let n = self.pdf.len();
         if n >= LANES {
             return sample(u, self);
@@ -43,7 +44,7 @@ impl LightLanes<'_> {
 
 /// Directions uniform on the sphere; see [`warp::sample_uniform_sphere`].
 pub fn sample_uniform_sphere(level: Level, u: [&[f32]; 2], li: [f32; 3], out: &mut LightLanes<'_>) {
-    out.with_padding(u, |u, out| dispatch!(level, simd => sample_uniform_sphere_lanes(simd, u, out)));
+    out.with_padding(u, &|u, out| dispatch!(level, simd => sample_uniform_sphere_lanes(simd, u, out)));
     out.fill(li, warp::pdf_uniform_sphere());
 }
 
