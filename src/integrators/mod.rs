@@ -1,5 +1,6 @@
 //! Light transport: from camera rays to radiance.
 
+mod diffuse;
 pub mod irradiance_cache;
 pub mod path;
 

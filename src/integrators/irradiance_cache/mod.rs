@@ -4,9 +4,7 @@
 //! ([`Cached::Indirect`], direct light being estimated at every hit) or both ([`Cached::All`]). They are computed where
 //! the camera looks, before the picture is ([`build()`]), and do not change after that.
 //!
-//! At each vertex of a camera path the Lambertian part of the BSDF ([`crate::bsdfs::Bsdf::lambertian`]) takes its irradiance from the
-//! records, and the path goes on with the other lobes: mirrors, glass, coats, metals, up to the next vertex, which does the
-//! same. Where no record serves a vertex, its path goes on as in `path`. So no light is counted twice or lost.
+//! Camera paths take the Lambertian part of a BSDF from the records, and go on with the other lobes (`diffuse.rs`).
 //!
 //! Biased: irradiance is interpolated, the base below a coat is taken for Lambertian, and the light of a record counts its
 //! bounces from the record, whatever mirrors lie before it; records at different times of the shutter are not told apart.
@@ -25,13 +23,13 @@ pub use build::{BuildStats, build};
 pub use cache::IrradianceCache;
 pub use record::Record;
 
-use super::path::{self, CameraSample, PathIntegrator, PathStats, Vertex};
-use crate::bsdfs::Bsdf;
-use crate::direct::{Fits, ShadePoint};
+use super::diffuse::{self, Reflected, viewer_normal};
+use super::path::{CameraSample, PathIntegrator, PathState, PathStats, Vertex};
+use crate::bsdfs::Lambertian;
+use crate::direct::Fits;
 use crate::film::PixelSample;
-use crate::materials::SurfaceBsdf;
-use crate::math::{Rgb, Vec3};
-use crate::scene::{Cached, IntegratorSettings, World};
+use crate::math::Rgb;
+use crate::scene::{Cached, World};
 use std::f32::consts::FRAC_1_PI;
 
 /// How often vertices were served.
@@ -58,16 +56,6 @@ pub struct CacheIntegrator {
     lookups: LookupStats,
 }
 
-/// What a vertex does with its light.
-struct Shading<'w> {
-    /// Radiance that needs no more samples.
-    known: Rgb,
-    /// What direct light is estimated for; `None` if that is known.
-    lit: Option<SurfaceBsdf<'w>>,
-    /// What the path goes on by; `None` if it ends.
-    next: Option<SurfaceBsdf<'w>>,
-}
-
 impl CacheIntegrator {
     /// The counts and times since the last call.
     pub fn take_stats(&mut self) -> (PathStats, LookupStats) {
@@ -83,97 +71,36 @@ impl CacheIntegrator {
         fits: &mut Fits,
         out: &mut Vec<PixelSample>,
     ) {
-        let settings = &world.scene.integrator;
-        let depth = settings.depth();
-        self.paths.start(samples, out);
-        for vertex in 0..=depth {
-            if self.paths.active.is_empty() {
-                break;
-            }
-            let vertices = self.paths.find_vertices(world, vertex, depth, samples, out);
-            let split = settings.split_at_vertex(vertex);
-            let shadings: Vec<Shading<'_>> = vertices.iter().map(|v| self.shade(cache, v)).collect();
-            let points: Vec<ShadePoint<'_>> = (vertices.iter().zip(&self.paths.active))
-                .map(|(v, path)| {
-                    let split = if vertex == 0 { samples[path.sample as usize].split } else { split };
-                    v.shade_point(path.ray.time, split, samples[path.sample as usize].fit)
-                })
-                .collect();
-            self.light(world, &settings.at_vertex(vertex), (&shadings, &points), fits, out);
-            self.extend(settings, vertex, (&vertices, &shadings, &points));
-        }
+        let mut lookup = Lookup { cache, stats: &mut self.lookups };
+        diffuse::trace(&mut self.paths, world, &mut lookup, samples, fits, out);
     }
+}
 
-    /// Asks the cache.
-    fn shade<'w>(&mut self, cache: &IrradianceCache, v: &Vertex<'w>) -> Shading<'w> {
-        let by_path = Shading { known: Rgb::BLACK, lit: Some(v.bsdf), next: Some(v.bsdf) };
-        let Some(part) = v.bsdf.lambertian(v.wo) else { return by_path };
-        self.lookups.lookups += 1;
+/// Asks the cache, and counts.
+struct Lookup<'a> {
+    cache: &'a IrradianceCache,
+    stats: &'a mut LookupStats,
+}
+
+impl Reflected for Lookup<'_> {
+    fn reflected(&mut self, _: &PathState, _: u32, v: &Vertex<'_>, part: &Lambertian<'_>) -> Option<Rgb> {
+        self.stats.lookups += 1;
         let ns = viewer_normal(v);
         let mut known = Rgb::BLACK;
         for (albedo, ns) in [(part.reflectance, ns), (part.transmittance, -ns)] {
             if albedo.is_black() {
                 continue;
             }
-            let Some(e) = cache.irradiance(v.surface.p, ns) else {
-                self.lookups.fallbacks += 1;
-                return by_path;
+            let Some(e) = self.cache.irradiance(v.surface.p, ns) else {
+                self.stats.fallbacks += 1;
+                return None;
             };
             known += albedo * e * FRAC_1_PI;
         }
-        let rest = part.rest.map(|bsdf: Bsdf<'w>| SurfaceBsdf { bsdf, ..v.bsdf });
-        let lit = match cache.settings().cached {
-            Cached::Indirect => Some(v.bsdf),
-            Cached::All => rest,
-        };
-        Shading { known, lit, next: rest }
+        Some(known)
     }
 
-    /// Adds what is known, and estimates of the direct light that is not.
-    fn light(
-        &mut self,
-        world: &World,
-        settings: &IntegratorSettings,
-        (shadings, points): (&[Shading<'_>], &[ShadePoint<'_>]),
-        fits: &mut Fits,
-        out: &mut [PixelSample],
-    ) {
-        let paths = &mut self.paths;
-        for (path, shading) in paths.active.iter().zip(shadings) {
-            out[path.sample as usize].radiance += path.beta * shading.known;
-        }
-        let lit: Vec<ShadePoint<'_>> = (shadings.iter().zip(points))
-            .filter_map(|(shading, point)| shading.lit.map(|bsdf| ShadePoint { bsdf, ..*point }))
-            .collect();
-        paths.direct.estimate(world, settings, &lit, fits, &mut paths.radiance);
-        let lit_paths = paths.active.iter().zip(shadings).filter(|(_, shading)| shading.lit.is_some());
-        for ((path, _), &radiance) in lit_paths.zip(&paths.radiance) {
-            out[path.sample as usize].radiance += path.beta * radiance;
-        }
+    fn has_sources(&self) -> bool {
+        self.cache.settings().cached == Cached::All
     }
-
-    /// Goes on with the paths that have a lobe to go on by.
-    fn extend(
-        &mut self,
-        settings: &IntegratorSettings,
-        vertex: u32,
-        (vertices, shadings, points): (&[Vertex<'_>], &[Shading<'_>], &[ShadePoint<'_>]),
-    ) {
-        let paths = &mut self.paths;
-        paths.next.clear();
-        if vertex + 1 < settings.depth() {
-            let all = paths.active.iter().zip(vertices).zip(shadings).zip(points);
-            paths.next.extend(all.filter_map(|(((path, v), shading), point)| {
-                let v = Vertex { bsdf: shading.next?, ..*v };
-                Some(path::extend(path, &v, point, vertex, settings)?.0)
-            }));
-        }
-        std::mem::swap(&mut paths.active, &mut paths.next);
-    }
-}
-
-/// The shading normal on the side of the viewer.
-fn viewer_normal(v: &Vertex<'_>) -> Vec3 {
-    let z = v.bsdf.frame.z;
-    if z.dot(v.wo) < 0.0 { -z } else { z }
 }

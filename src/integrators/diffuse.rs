@@ -1,0 +1,119 @@
+//! Camera paths that take what Lambertian parts of BSDFs reflect from elsewhere: from records of irradiance, from photons.
+//!
+//! At each vertex the Lambertian part ([`crate::bsdfs::Bsdf::lambertian`]) has its light from there, and the path goes on with the
+//! other lobes: mirrors, glass, coats, metals, up to the next vertex, which does the same. A vertex that is not served, and one
+//! without such a part, goes on as in `path`. So no light is counted twice or lost.
+
+use super::path::{self, CameraSample, PathIntegrator, PathState, Vertex};
+use crate::bsdfs::Lambertian;
+use crate::direct::{Fits, ShadePoint};
+use crate::film::PixelSample;
+use crate::materials::SurfaceBsdf;
+use crate::math::{Rgb, Vec3};
+use crate::scene::{IntegratorSettings, World};
+
+/// Where the light comes from that Lambertian parts reflect.
+pub(super) trait Reflected {
+    /// Radiance that the Lambertian part of a vertex, the `vertex`-th of its path from 0, reflects to the viewer; `None` if that is
+    /// not known.
+    fn reflected(&mut self, path: &PathState, vertex: u32, v: &Vertex<'_>, part: &Lambertian<'_>) -> Option<Rgb>;
+
+    /// True if that includes light that comes straight from sources.
+    fn has_sources(&self) -> bool;
+}
+
+/// What a vertex does with its light.
+struct Shading<'w> {
+    /// Radiance that needs no more samples.
+    known: Rgb,
+    /// What direct light is estimated for; `None` if that is known.
+    lit: Option<SurfaceBsdf<'w>>,
+    /// What the path goes on by; `None` if it ends.
+    next: Option<SurfaceBsdf<'w>>,
+}
+
+/// Estimates the radiance of each camera sample; `out[i]` belongs to `samples[i]`. `fits` are those of the samples' pixels.
+pub(super) fn trace(
+    paths: &mut PathIntegrator,
+    world: &World,
+    source: &mut dyn Reflected,
+    samples: &[CameraSample],
+    fits: &mut Fits,
+    out: &mut Vec<PixelSample>,
+) {
+    let settings = &world.scene.integrator;
+    let depth = settings.depth();
+    paths.start(samples, out);
+    for vertex in 0..=depth {
+        if paths.active.is_empty() {
+            break;
+        }
+        let vertices = paths.find_vertices(world, vertex, depth, samples, out);
+        let split = settings.split_at_vertex(vertex);
+        let shadings: Vec<Shading<'_>> =
+            paths.active.iter().zip(&vertices).map(|(path, v)| shade(source, path, vertex, v)).collect();
+        let points: Vec<ShadePoint<'_>> = (vertices.iter().zip(&paths.active))
+            .map(|(v, path)| {
+                let split = if vertex == 0 { samples[path.sample as usize].split } else { split };
+                v.shade_point(path.ray.time, split, samples[path.sample as usize].fit)
+            })
+            .collect();
+        light(paths, world, &settings.at_vertex(vertex), (&shadings, &points), fits, out);
+        extend(paths, settings, vertex, (&vertices, &shadings, &points));
+    }
+}
+
+/// Asks the source.
+fn shade<'w>(source: &mut dyn Reflected, path: &PathState, vertex: u32, v: &Vertex<'w>) -> Shading<'w> {
+    let by_path = Shading { known: Rgb::BLACK, lit: Some(v.bsdf), next: Some(v.bsdf) };
+    let Some(part) = v.bsdf.lambertian(v.wo) else { return by_path };
+    let Some(known) = source.reflected(path, vertex, v, &part) else { return by_path };
+    let rest = part.rest.map(|bsdf| SurfaceBsdf { bsdf, ..v.bsdf });
+    Shading { known, lit: if source.has_sources() { rest } else { Some(v.bsdf) }, next: rest }
+}
+
+/// Adds what is known, and estimates of the direct light that is not.
+fn light(
+    paths: &mut PathIntegrator,
+    world: &World,
+    settings: &IntegratorSettings,
+    (shadings, points): (&[Shading<'_>], &[ShadePoint<'_>]),
+    fits: &mut Fits,
+    out: &mut [PixelSample],
+) {
+    for (path, shading) in paths.active.iter().zip(shadings) {
+        out[path.sample as usize].radiance += path.beta * shading.known;
+    }
+    let lit: Vec<ShadePoint<'_>> = (shadings.iter().zip(points))
+        .filter_map(|(shading, point)| shading.lit.map(|bsdf| ShadePoint { bsdf, ..*point }))
+        .collect();
+    paths.direct.estimate(world, settings, &lit, fits, &mut paths.radiance);
+    let lit_paths = paths.active.iter().zip(shadings).filter(|(_, shading)| shading.lit.is_some());
+    for ((path, _), &radiance) in lit_paths.zip(&paths.radiance) {
+        out[path.sample as usize].radiance += path.beta * radiance;
+    }
+}
+
+/// Goes on with the paths that have a lobe to go on by.
+fn extend(
+    paths: &mut PathIntegrator,
+    settings: &IntegratorSettings,
+    vertex: u32,
+    (vertices, shadings, points): (&[Vertex<'_>], &[Shading<'_>], &[ShadePoint<'_>]),
+) {
+    paths.next.clear();
+    if vertex + 1 < settings.depth() {
+        let all = paths.active.iter().zip(vertices).zip(shadings).zip(points);
+        paths.next.extend(all.filter_map(|(((path, v), shading), point)| {
+            let v = Vertex { bsdf: shading.next?, ..*v };
+            Some(path::extend(path, &v, point, vertex, settings)?.0)
+        }));
+    }
+    std::mem::swap(&mut paths.active, &mut paths.next);
+}
+
+/// The shading normal on the side of the viewer.
+pub(super) fn viewer_normal(v: &Vertex<'_>) -> Vec3 {
+    let z = v.bsdf.frame.z;
+    if z.dot(v.wo) < 0.0 { -z } else { z }
+}
