@@ -1,5 +1,6 @@
 //! Options that several subcommands share, as typed.
 
+use super::photon_args::PhotonArgs;
 use crate::bsdfs::ProposalDensity;
 use crate::estimators::mis::Heuristic;
 use crate::estimators::ocv::Form;
@@ -45,6 +46,7 @@ choices!(
         Direct => IntegratorKind::Direct,
         Path => IntegratorKind::Path,
         IrradianceCache => IntegratorKind::IrradianceCache,
+        PhotonMap => IntegratorKind::PhotonMap,
     }
 );
 choices!(
@@ -224,6 +226,8 @@ pub struct SceneArgs {
     /// Estimates of direct light at a record, with `--cached all` [default: the file's, or 4]
     #[arg(long, value_name = "N", value_parser = clap::value_parser!(u32).range(1..=4096))]
     pub cache_passes: Option<u32>,
+    #[command(flatten)]
+    pub photons: PhotonArgs,
     /// Bounces of `path` [default: the file's, or 5]
     #[arg(long, value_name = "D", value_parser = clap::value_parser!(u32).range(0..=10_000))]
     pub max_depth: Option<u32>,

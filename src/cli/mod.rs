@@ -9,6 +9,7 @@ mod compare;
 mod crosscheck;
 mod generate;
 mod info;
+mod photon_args;
 mod progress;
 mod render;
 mod reproduce;

@@ -161,6 +161,18 @@ fn stats(args: &RenderArgs, world: &World, rendering: &Rendering, setup: SetupTi
         "memory": {
             "accel_bytes": accel.bytes, "accel_peak_bytes": accel.peak_bytes,
         },
+        "photon_maps": rendering.photons.map(|p| json!({
+            "maps": p.maps,
+            "trajectories": p.trajectories,
+            "global_photons": p.global,
+            "caustic_photons": p.caustic,
+            "importons": p.importons,
+            "bytes": p.bytes,
+            "trace_seconds": seconds(p.tracing),
+            "sort_seconds": seconds(p.sorting),
+            "photons_per_second": (p.global + p.caustic) as f64 / seconds(p.tracing).max(1e-12),
+            "trajectories_per_second": p.trajectories as f64 / seconds(p.tracing).max(1e-12),
+        })),
         "irradiance_cache": rendering.cache.map(|c| json!({
             "records": c.records,
             "record_bytes": c.bytes,
@@ -195,6 +207,17 @@ fn report(args: &RenderArgs, rendering: &Rendering, outputs: &[PathBuf]) {
             c.build.elapsed.as_secs_f64(),
             100.0 * c.lookups.fallbacks as f64 / c.lookups.lookups.max(1) as f64,
             c.lookups.lookups
+        ));
+    }
+    if let Some(p) = &rendering.photons {
+        progress::say(&format!(
+            "photon maps: {} global and {} caustic photons of {} trajectories in {:.1} s, {:.1} MB{}",
+            p.global,
+            p.caustic,
+            p.trajectories,
+            (p.tracing + p.sorting).as_secs_f64(),
+            p.bytes as f64 * 1e-6,
+            if p.maps > 1 { format!(", {} maps", p.maps) } else { String::new() }
         ));
     }
     let invalid: u64 = rendering.film.pixels.iter().map(|p| p.invalid).sum();

@@ -105,6 +105,7 @@ fn apply(args: &SceneArgs, scene: &mut Scene) {
     if let Some(passes) = args.cache_passes {
         i.cache.passes = passes;
     }
+    args.photons.apply(&mut i.photons);
     if let Some(heuristic) = args.heuristic {
         i.heuristic = Some(heuristic.value());
     }

@@ -3,6 +3,8 @@
 mod diffuse;
 pub mod irradiance_cache;
 pub mod path;
+pub mod photon_map;
 
 pub use irradiance_cache::{CacheIntegrator, IrradianceCache};
 pub use path::{PathIntegrator, PathStats};
+pub use photon_map::PhotonMapIntegrator;

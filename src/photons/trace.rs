@@ -47,6 +47,8 @@ pub struct Tracing {
     pub seed: u32,
     /// Most scatterings of a photon before it is stored; 0 stores photons straight from lights only.
     pub max_depth: u32,
+    /// The same for photons of the global map.
+    pub max_global_depth: u32,
     /// Ratio q of trajectories that fill the global map to all, in (0, 1].
     pub q: f32,
     /// How that is done.
@@ -64,6 +66,7 @@ impl Default for Tracing {
         Tracing {
             seed: 0,
             max_depth: 16,
+            max_global_depth: 16,
             q: 1.0,
             caustics: CausticRule::default(),
             floor: 0.1,
@@ -340,6 +343,7 @@ impl Run<'_> {
         let particle = arrival.particle;
         let (factor, deposits) = match particle.origin {
             Origin::Caustic => (rules::caustic(xi[0], p()), &mut batch.caustic),
+            Origin::Primary(_) | Origin::Diffuse if arrival.scatterings > self.tracing.max_global_depth => return,
             Origin::Primary(_) | Origin::Diffuse => {
                 let factor = self.tracing.caustics.global(self.tracing.q, fills_global, xi, p);
                 (factor, &mut batch.global)

@@ -65,6 +65,8 @@ pub(super) struct Arrival<'a> {
     /// Geometric normal on the side of `wi`.
     pub(super) n: Vec3,
     pub(super) part: &'a Lambertian<'a>,
+    /// How often it was scattered before.
+    pub(super) scatterings: u32,
     stream: SampleStream,
 }
 
@@ -133,7 +135,7 @@ impl Walker {
             let part = bsdf.lambertian(found.wo);
             if let Some(part) = &part {
                 let n = if bsdf.n.dot(found.wo) < 0.0 { -bsdf.n } else { bsdf.n };
-                arrive(&Arrival { particle, p: found.surface.p, wi: found.wo, n, part, stream });
+                arrive(&Arrival { particle, p: found.surface.p, wi: found.wo, n, part, scatterings: vertex, stream });
             }
             if vertex < settings.max_depth {
                 let proposals = world.scene.integrator.bsdf_proposals;

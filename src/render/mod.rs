@@ -15,9 +15,11 @@ use crate::film::filter::FilterSampler;
 use crate::film::{Film, PixelBounds, PixelSample, PixelSums};
 use crate::integrators::irradiance_cache::{self, BuildStats, IrradianceCache, LookupStats};
 use crate::integrators::path::CameraSample;
-use crate::integrators::{CacheIntegrator, PathIntegrator, PathStats};
+use crate::integrators::photon_map::{self, MapMaker, MapStats, PhotonMaps};
+use crate::integrators::{CacheIntegrator, PathIntegrator, PathStats, PhotonMapIntegrator};
 use crate::math::Vec2;
 use crate::math::hash::pcg4d;
+use crate::photons::PhotonError;
 use crate::samplers::SampleStream;
 use crate::scene::{IntegratorKind, Proposals, World};
 use rayon::prelude::*;
@@ -82,6 +84,8 @@ pub struct Rendering {
     pub stats: PathStats,
     /// The irradiance cache, if there is one.
     pub cache: Option<CacheReport>,
+    /// The photon maps, if there are any.
+    pub photons: Option<MapStats>,
     /// Wall-clock time.
     pub elapsed: Duration,
     /// True if every pixel has all its samples.
@@ -117,7 +121,18 @@ impl WorkerStats {
     }
 }
 
-/// Why a rendering could not start.
+/// Why a rendering ended without a picture.
+#[derive(Debug, thiserror::Error)]
+pub enum RenderError {
+    /// The system gives no threads.
+    #[error(transparent)]
+    Threads(#[from] ThreadError),
+    /// There are no photon maps.
+    #[error(transparent)]
+    Photons(#[from] PhotonError),
+}
+
+/// Why threads could not start.
 #[derive(Debug, thiserror::Error)]
 #[error("cannot start {threads} threads: {source}")]
 pub struct ThreadError {
@@ -131,10 +146,10 @@ pub fn render(
     settings: &RenderSettings,
     stop: &AtomicBool,
     observe: &(dyn Fn(&Progress) + Sync),
-) -> Result<Rendering, ThreadError> {
+) -> Result<Rendering, RenderError> {
     let pool = thread_pool(settings.threads)?;
     let threads = pool.current_num_threads();
-    Ok(pool.install(|| Run::new(world, settings, stop, observe).run(threads)))
+    pool.install(|| Run::new(world, settings, stop, observe).run(threads))
 }
 
 /// Threads, all cores if their number is not given.
@@ -188,6 +203,8 @@ struct Run<'a> {
     observe: &'a (dyn Fn(&Progress) + Sync),
     filter: FilterSampler,
     cache: Option<IrradianceCache>,
+    /// Photon maps of the pass under way.
+    maps: Option<PhotonMaps>,
     start: Instant,
     samples_done: AtomicU64,
     rays: AtomicU64,
@@ -207,15 +224,17 @@ impl<'a> Run<'a> {
             observe,
             filter: world.scene.film.filter.sampler(),
             cache: None,
+            maps: None,
             start: Instant::now(),
             samples_done: AtomicU64::new(0),
             rays: AtomicU64::new(0),
         }
     }
 
-    fn run(mut self, threads: usize) -> Rendering {
+    fn run(mut self, threads: usize) -> Result<Rendering, RenderError> {
         let bounds = self.world.scene.film.bounds;
         let build = self.build_cache();
+        let mut maker = self.map_maker()?;
         let integrator = &self.world.scene.integrator;
         let mut tiles: Vec<Tile> = bounds
             .tiles(self.settings.tile_size)
@@ -241,6 +260,14 @@ impl<'a> Run<'a> {
                 let block = block_of(done);
                 length = length.min(block.first + block.len - done);
             }
+            if let Some(maker) = &mut maker {
+                // A progressive map serves one sample of each pixel
+                length = if integrator.photons.progressive.is_some() { 1 } else { length };
+                if self.maps.is_none() || integrator.photons.progressive.is_some() {
+                    self.maps = None;
+                    self.maps = Some(maker.make(self.world, first)?);
+                }
+            }
             let samples = first..(first + length).min(end);
             stats.merge(&self.pass(&mut tiles, samples.clone(), noise));
             first = samples.end;
@@ -260,7 +287,8 @@ impl<'a> Run<'a> {
             CacheReport { records: cache.records().len(), bytes: cache.bytes(), build, lookups: stats.lookups }
         });
         let complete = film.pixels.iter().all(|p| p.count == u64::from(self.settings.spp));
-        Rendering { film, stats: stats.paths, cache, elapsed: self.start.elapsed(), complete, threads }
+        let photons = maker.map(|m| m.stats);
+        Ok(Rendering { film, stats: stats.paths, cache, photons, elapsed: self.start.elapsed(), complete, threads })
     }
 
     /// Makes the irradiance cache, if the integrator has one.
@@ -274,6 +302,16 @@ impl<'a> Run<'a> {
         let (cache, stats) = irradiance_cache::build(self.world, bounds, &camera, self.stop);
         self.cache = Some(cache);
         Some(stats)
+    }
+
+    /// What makes the photon maps, if the integrator has any.
+    fn map_maker(&self) -> Result<Option<MapMaker>, PhotonError> {
+        if self.world.scene.integrator.kind != IntegratorKind::PhotonMap {
+            return Ok(None);
+        }
+        let seed = self.world.scene.sampling.seed;
+        let seen = photon_map::maps::seen(self.world, &|pixel, sample| self.camera_sample_of_seed(pixel, sample, seed));
+        MapMaker::new(self.world, &seen).map(Some)
     }
 
     /// Samples per pixel of the longest pass.
@@ -339,12 +377,12 @@ impl<'a> Run<'a> {
         for (batch, sums) in tile.sums.chunks_mut(pixels_per_batch).enumerate() {
             let first = batch * pixels_per_batch;
             self.camera_samples(&bounds, first..first + sums.len(), samples.clone(), &mut worker.samples);
-            worker.trace(self.world, self.cache.as_ref(), &mut tile.fits);
+            worker.trace(self.world, (self.cache.as_ref(), self.maps.as_ref()), &mut tile.fits);
             for (pixel, results) in sums.iter_mut().zip(worker.results.chunks(per_pixel)) {
                 results.iter().for_each(|r| pixel.add(r));
             }
         }
-        let mut stats = worker.take_stats(self.cache.is_some());
+        let mut stats = worker.take_stats();
         if begins_block {
             let direct = &mut stats.paths.direct;
             direct.systems += tile.sums.len() as u64;
@@ -414,26 +452,31 @@ impl<'a> Run<'a> {
 struct Worker {
     integrator: PathIntegrator,
     with_cache: CacheIntegrator,
+    with_photons: PhotonMapIntegrator,
     samples: Vec<CameraSample>,
     results: Vec<PixelSample>,
 }
 
 impl Worker {
     /// Traces `samples` into `results`.
-    fn trace(&mut self, world: &World, cache: Option<&IrradianceCache>, fits: &mut Fits) {
+    fn trace(
+        &mut self,
+        world: &World,
+        (cache, maps): (Option<&IrradianceCache>, Option<&PhotonMaps>),
+        fits: &mut Fits,
+    ) {
         let (samples, results) = (&self.samples, &mut self.results);
-        match cache {
-            None => self.integrator.trace(world, &world.scene.integrator, samples, fits, results),
-            Some(cache) => self.with_cache.trace(world, cache, samples, fits, results),
+        match (cache, maps) {
+            (Some(cache), _) => self.with_cache.trace(world, cache, samples, fits, results),
+            (None, Some(maps)) => self.with_photons.trace(world, maps, samples, fits, results),
+            (None, None) => self.integrator.trace(world, &world.scene.integrator, samples, fits, results),
         }
     }
 
-    fn take_stats(&mut self, has_cache: bool) -> WorkerStats {
-        if has_cache {
-            let (paths, lookups) = self.with_cache.take_stats();
-            WorkerStats { paths, lookups }
-        } else {
-            WorkerStats { paths: self.integrator.take_stats(), lookups: LookupStats::default() }
-        }
+    fn take_stats(&mut self) -> WorkerStats {
+        let (mut paths, lookups) = self.with_cache.take_stats();
+        paths.merge(&self.with_photons.take_stats());
+        paths.merge(&self.integrator.take_stats());
+        WorkerStats { paths, lookups }
     }
 }

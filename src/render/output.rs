@@ -2,7 +2,7 @@
 
 use crate::film::Film;
 use crate::imaging::color::linear_to_srgb;
-use crate::scene::{Cached, EstimatorKind, IntegratorKind, Proposals, Scene, SplitMap};
+use crate::scene::{Cached, Deposition, EstimatorKind, IntegratorKind, Proposals, Scene, SplitMap};
 
 /// A group of channels beside the picture itself.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -173,6 +173,24 @@ pub fn settings_metadata(scene: &Scene) -> Vec<(String, String)> {
         ]);
         if c.cached == Cached::All {
             entries.push(("cache_passes", c.passes.to_string()));
+        }
+    }
+    if i.kind == IntegratorKind::PhotonMap {
+        let p = &i.photons;
+        entries.extend([
+            ("photons", p.photons.to_string()),
+            ("caustic_ratio", p.caustic_ratio.to_string()),
+            ("importance", p.deposition.to_string()),
+            ("nearest", p.nearest.to_string()),
+            ("gather", p.gather.to_string()),
+            ("gather_guide", p.guide.to_string()),
+        ]);
+        if let Some(shrinking) = p.progressive {
+            entries.push(("progressive", shrinking.alpha.to_string()));
+            entries.extend(shrinking.radius.map(|r| ("photon_radius", r.to_string())));
+        }
+        if let Deposition::CutOff(_) = p.deposition {
+            entries.push(("biased", "photons where importance is low are left out".to_owned()));
         }
     }
     entries.into_iter().map(|(key, value)| (format!("lumiris:{key}"), value)).collect()

@@ -14,7 +14,7 @@ use crate::film::Film;
 use crate::film::filter::PixelFilter;
 use crate::import::{LoadOptions, load};
 use crate::render::plan::prepare;
-use crate::render::{RenderSettings, Rendering, render};
+use crate::render::{RenderError, RenderSettings, Rendering, render};
 use crate::scene::{AccelKind, Proposals, StageTimes, Strata, World};
 use rustix::time::{ClockId, clock_gettime};
 use serde::Serialize;
@@ -102,7 +102,7 @@ impl Stage {
         self.world.scene.integrator.ris.proposals = Proposals::Auto;
         self.world.scene.integrator.ris.stage_times = None;
         self.shadows.store(true, Ordering::Relaxed);
-        Ok(prepare(&mut self.world, self.threads, false)?.map(|plan| plan.times))
+        Ok(prepare(&mut self.world, self.threads, false).map_err(RenderError::from)?.map(|plan| plan.times))
     }
 
     /// Finds out how each pixel best shares the time of an estimate out between proposals and samples, by the renderer's own
@@ -115,7 +115,7 @@ impl Stage {
         self.world.scene.film.filter = PixelFilter::Box { rx: CENTRE, ry: CENTRE };
         self.world.scene.integrator.ris.stage_times = Some(times);
         self.shadows.store(true, Ordering::Relaxed);
-        prepare(&mut self.world, self.threads, false)?;
+        prepare(&mut self.world, self.threads, false).map_err(RenderError::from)?;
         let seconds = processor_time().saturating_sub(start).as_secs_f64();
         let Some(map) = &mut self.world.splits else { return Ok((Vec::new(), seconds)) };
         map.time = budget;

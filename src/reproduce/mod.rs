@@ -68,9 +68,9 @@ pub enum ReproduceError {
     /// A ray tracer could not be built.
     #[error("cannot build a ray tracer: {0}")]
     Accel(#[from] crate::accel::embree::EmbreeError),
-    /// A rendering could not start.
+    /// A rendering ended without a picture.
     #[error(transparent)]
-    Threads(#[from] crate::render::ThreadError),
+    Render(#[from] crate::render::RenderError),
     /// A picture could not be written.
     #[error(transparent)]
     Image(#[from] crate::imaging::oiio::ImageError),

@@ -3,11 +3,13 @@
 //! [`Scene`] is data, as an importer makes it; [`World`] is a scene with its ray tracers, ready to render.
 
 mod found;
+mod photon_settings;
 mod settings;
 mod split_map;
 mod world;
 
 pub use found::Found;
+pub use photon_settings::{Deposition, PhotonMapSettings, Shrinking};
 pub use settings::{
     Cached, CorrelatedForm, CorrelatedSettings, EstimatorKind, IntegratorKind, IntegratorSettings,
     IrradianceCacheSettings, OcvSettings, OptimalForm, ProposalPoints, Proposals, RisSettings, SamplingTechnique,

@@ -1,5 +1,6 @@
 //! Light transport: what is computed, and how direct light is estimated.
 
+use super::photon_settings::PhotonMapSettings;
 use crate::bsdfs::ProposalDensity;
 use crate::estimators::mis::Heuristic;
 use crate::estimators::ocv::{Form, MAX_COMPONENTS};
@@ -29,6 +30,8 @@ pub struct IntegratorSettings {
     pub ris: RisSettings,
     /// What is particular to `irradiance-cache`.
     pub cache: IrradianceCacheSettings,
+    /// What is particular to `photon-map`.
+    pub photons: PhotonMapSettings,
     /// What is particular to `ocv`.
     pub ocv: OcvSettings,
     /// How `optimal-mis` finds its weights.
@@ -62,6 +65,7 @@ impl Default for IntegratorSettings {
             light_choice: LightSamplerKind::Tree,
             ris: RisSettings::default(),
             cache: IrradianceCacheSettings::default(),
+            photons: PhotonMapSettings::default(),
             ocv: OcvSettings::default(),
             optimal_mis: OptimalForm::Progressive,
             correlated: CorrelatedSettings::default(),
@@ -76,7 +80,7 @@ impl IntegratorSettings {
     pub fn depth(&self) -> u32 {
         match self.kind {
             IntegratorKind::Direct => self.max_depth.min(1),
-            IntegratorKind::Path | IntegratorKind::IrradianceCache => self.max_depth,
+            IntegratorKind::Path | IntegratorKind::IrradianceCache | IntegratorKind::PhotonMap => self.max_depth,
         }
     }
 
@@ -163,6 +167,8 @@ pub enum IntegratorKind {
     Path,
     /// The same, with the light that diffuse surfaces reflect interpolated between records [Ward et al. 1988].
     IrradianceCache,
+    /// The same, with the light that diffuse surfaces reflect from photon maps [Jensen 1996; Keller and Wald 2000].
+    PhotonMap,
 }
 
 impl IntegratorKind {
@@ -172,6 +178,7 @@ impl IntegratorKind {
             IntegratorKind::Direct => "direct",
             IntegratorKind::Path => "path",
             IntegratorKind::IrradianceCache => "irradiance-cache",
+            IntegratorKind::PhotonMap => "photon-map",
         }
     }
 }

@@ -35,7 +35,7 @@ Shape "trianglemesh" "point3 P" [ 1 0 -1  1 2 -1  1 2 1  1 0 1 ] "integer indice
 "#;
 
 /// A room of diffuse, coated, transmitting, metal and glass things, lit by a panel below its ceiling.
-const ROOM: &str = r#"
+pub(crate) const ROOM: &str = r#"
 LookAt 0 1 3.9  0 0.9 0  0 1 0
 Camera "perspective" "float fov" [ 38 ]
 Film "rgb" "integer xresolution" [ 48 ] "integer yresolution" [ 48 ]
@@ -69,7 +69,7 @@ Material "diffusetransmission" "rgb reflectance" [ 0.3 0.3 0.3 ] "rgb transmitta
 Shape "trianglemesh" "point3 P" [ -0.9 0.8 0.3  -0.3 0.8 0.3  -0.3 1.3 0.1  -0.9 1.3 0.1 ] "integer indices" [ 0 1 2 0 2 3 ]
 "#;
 
-fn world_of(text: &str, change: impl FnOnce(&mut lumiris::scene::Scene)) -> World {
+pub(crate) fn world_of(text: &str, change: impl FnOnce(&mut lumiris::scene::Scene)) -> World {
     world_with_packets(text, None, change)
 }
 
@@ -82,7 +82,7 @@ fn world_with_packets(text: &str, packet_width: Option<u32>, change: impl FnOnce
     World::new(scene, AccelKind::Embree, packet_width).unwrap()
 }
 
-fn rendering(world: &World, settings: RenderSettings) -> Rendering {
+pub(crate) fn rendering(world: &World, settings: RenderSettings) -> Rendering {
     render(world, &settings, &AtomicBool::new(false), &|_| ()).unwrap()
 }
 
@@ -130,7 +130,7 @@ fn the_analytic_scenes_have_their_known_answers() {
 }
 
 /// Mean luminance of squares of pixels, row by row.
-fn squares(film: &Film, size: u32) -> Vec<f64> {
+pub(crate) fn squares(film: &Film, size: u32) -> Vec<f64> {
     let mut sums = Vec::new();
     for tile in film.bounds.tiles(size) {
         let pixels = (tile.y0..tile.y1).flat_map(|y| (tile.x0..tile.x1).map(move |x| (x, y)));

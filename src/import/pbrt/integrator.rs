@@ -8,8 +8,8 @@ use crate::estimators::ocv::Form;
 use crate::import::diagnostic::Diagnostics;
 use crate::lights::LightSamplerKind;
 use crate::scene::{
-    Cached, CorrelatedForm, EstimatorKind, IntegratorKind, IntegratorSettings, IrradianceCacheSettings, OptimalForm,
-    ProposalPoints, Proposals, SamplingTechnique, Strata, Target,
+    Cached, CorrelatedForm, Deposition, EstimatorKind, IntegratorKind, IntegratorSettings, IrradianceCacheSettings,
+    OptimalForm, PhotonMapSettings, ProposalPoints, Proposals, SamplingTechnique, Shrinking, Strata, Target,
 };
 
 /// Understands `Integrator`.
@@ -20,14 +20,21 @@ pub(super) fn finish_integrator(pending: Option<&Pending>, d: &mut Diagnostics) 
         "path" | "volpath" => {}
         "direct" => s.kind = IntegratorKind::Direct,
         "irradiance-cache" => s.kind = IntegratorKind::IrradianceCache,
+        "photon-map" => s.kind = IntegratorKind::PhotonMap,
+        "sppm" => {
+            s.kind = IntegratorKind::PhotonMap;
+            s.photons.progressive = Some(Shrinking::default());
+        }
         "directlighting" => {
             s.kind = IntegratorKind::Direct;
             d.warning_once(name.span, "integrator `directlighting` is pbrt-v3: `direct` is used");
         }
-        "simplepath" | "simplevolpath" | "bdpt" | "mlt" | "sppm" | "lightpath" | "ao" | "randomwalk" | "whitted" => {
+        "simplepath" | "simplevolpath" | "bdpt" | "mlt" | "lightpath" | "ao" | "randomwalk" | "whitted" => {
             d.warning_once(name.span, format!("integrator `{}` is not rendered here: `path` is used", name.text));
         }
-        other => unknown(other, name.span, "integrator", &["path", "direct", "irradiance-cache", "volpath"], d),
+        other => {
+            unknown(other, name.span, "integrator", &["path", "direct", "irradiance-cache", "photon-map", "volpath"], d)
+        }
     }
     match p.integer("maxdepth", d) {
         Some(n @ 0..=10_000) => s.max_depth = n as u32,
@@ -39,12 +46,11 @@ pub(super) fn finish_integrator(pending: Option<&Pending>, d: &mut Diagnostics) 
     }
     lumiris_parameters(&mut s, p, d);
     cache_parameters(&mut s.cache, p, d);
+    photon_parameters(&mut s.photons, p, d);
     if p.ignore("regularize") {
         d.warning_once(p.span_of("regularize"), "regularize is ignored: it would bias the picture");
     }
     for key in [
-        "radius",
-        "photonsperiteration",
         "iterations",
         "imagewritefrequency",
         "rrthreshold",
@@ -176,6 +182,51 @@ fn cache_parameters(s: &mut IrradianceCacheSettings, p: &ParamSet, d: &mut Diagn
     if let Some(n) = count(p, "cachepasses", d) {
         s.passes = n;
     }
+}
+
+/// Parameters of `photon-map`, and those of `sppm` that mean the same.
+fn photon_parameters(s: &mut PhotonMapSettings, p: &ParamSet, d: &mut Diagnostics) {
+    s.photons = count(p, "photons", d).unwrap_or(s.photons);
+    // Trajectories there, stored photons here; −1 is the choice of the renderer
+    if let Some(n @ 1..) = p.integer("photonsperiteration", d) {
+        s.photons = n as u32;
+    }
+    s.nearest = count(p, "nearest", d).unwrap_or(s.nearest).max(2);
+    if let Some(n) = p.integer("gather", d) {
+        if let n @ 0..=4096 = n {
+            s.gather = n as u32;
+        } else {
+            d.error(p.span_of("gather"), format!("gather must be from 0 to 4096, not {n}"));
+        }
+    }
+    let (q, guide) = (PhotonMapSettings::is_ratio, PhotonMapSettings::is_guide);
+    s.caustic_ratio = within(p, "causticratio", q, "above 0 and up to 1", d).unwrap_or(s.caustic_ratio);
+    s.guide = within(p, "gatherguide", guide, "from 0 to 0.95", d).unwrap_or(s.guide);
+    let least = within(p, "leastimportance", Deposition::is_least, "above 0 and up to 1", d);
+    let kinds = [Deposition::All, Deposition::Floor(least.unwrap_or(0.01)), Deposition::CutOff(least.unwrap_or(0.01))];
+    s.deposition = choice(p, "importance", &kinds, Deposition::name, d).unwrap_or(s.deposition);
+    if let Some(alpha) = within(p, "alpha", Shrinking::is_alpha, "above 0 and below 1", d) {
+        s.progressive.get_or_insert_default().alpha = alpha;
+    }
+    if let Some(radius) = within(p, "radius", |r| r > 0.0 && r.is_finite(), "positive", d) {
+        s.progressive.get_or_insert_default().radius = Some(radius);
+    }
+}
+
+/// A number that must lie somewhere.
+fn within(
+    p: &ParamSet,
+    key: &'static str,
+    is_valid: impl Fn(f32) -> bool,
+    where_: &str,
+    d: &mut Diagnostics,
+) -> Option<f32> {
+    let value = p.float(key, d)?;
+    if is_valid(value) {
+        return Some(value);
+    }
+    d.error(p.span_of(key), format!("{key} must be {where_}, not {value}"));
+    None
 }
 
 /// One of `known`, by its name.

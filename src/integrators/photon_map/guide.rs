@@ -1,0 +1,51 @@
+//! Directions for the final gather, by the photons around [Jensen 1995].
+//!
+//! Directions are places in the unit square by the map of the cosine-distributed hemisphere. A histogram over a grid of that
+//! square holds the power that photons bring from there; with the share s of the rays its density is p(ω) = cos θ/π·(1 − s + s·h),
+//! h being the histogram's density in the square. So cos θ/p ≤ π/(1 − s) whatever the photons say.
+
+use crate::math::warp::{invert_cosine_hemisphere, pdf_cosine_hemisphere, sample_cosine_hemisphere};
+use crate::math::{PiecewiseConstant2D, Vec2, Vec3};
+
+/// Cells of the grid per axis.
+const CELLS: usize = 8;
+
+/// A density of directions about a normal (+z).
+#[derive(Clone, Debug)]
+pub struct Guide {
+    histogram: Option<PiecewiseConstant2D>,
+    share: f32,
+}
+
+impl Guide {
+    /// From directions to where photons came from, with their power. Without photons the cosine alone.
+    pub fn new(photons: impl IntoIterator<Item = (Vec3, f32)>, share: f32) -> Self {
+        let mut cells = [0.0; CELLS * CELLS];
+        for (wi, power) in photons {
+            if wi.z > 0.0 && power > 0.0 && power.is_finite() {
+                let [x, y] = invert_cosine_hemisphere(wi).map(|u| ((u * CELLS as f32) as usize).min(CELLS - 1));
+                cells[y * CELLS + x] += power;
+            }
+        }
+        let is_lit = cells.iter().any(|&power| power > 0.0) && share > 0.0;
+        Guide { histogram: is_lit.then(|| PiecewiseConstant2D::new(&cells, CELLS)), share }
+    }
+
+    /// A direction, with z > 0 but for rounding.
+    pub fn sample(&self, u_choice: f32, u: [f32; 2]) -> Vec3 {
+        let by_photons = self.histogram.as_ref().filter(|_| u_choice < self.share).and_then(|h| h.sample(u));
+        sample_cosine_hemisphere(by_photons.map_or(u, |s| s.p.to_array()))
+    }
+
+    /// Density per steradian of [`sample`](Self::sample).
+    pub fn pdf(&self, w: Vec3) -> f32 {
+        let cosine = pdf_cosine_hemisphere(w);
+        match &self.histogram {
+            None => cosine,
+            Some(h) => {
+                let place = Vec2::from_array(invert_cosine_hemisphere(w));
+                cosine * (1.0 - self.share + self.share * h.pdf(place))
+            }
+        }
+    }
+}

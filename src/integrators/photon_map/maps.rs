@@ -1,0 +1,263 @@
+//! The maps of a picture: what photons are traced, how they are asked for, and irradiances computed beforehand.
+//!
+//! One map: estimates take the k nearest photons, and the final gather takes irradiances that were computed at every fourth photon
+//! of the global map, from the nearest of them [Christensen 1999]. Progressive: each pass has photons of its own and radii that shrink,
+//! so that the mean over the passes converges while the memory of one map suffices [Knaus and Zwicker 2011].
+
+use crate::integrators::path::{CameraSample, PathIntegrator};
+use crate::math::hash::pcg4d;
+use crate::math::{Rgb, Vec3};
+use crate::photons::{
+    GatherScratch, Importance, ImportanceSettings, Origin, Photon, PhotonError, PhotonMap, Place, Search, Traced,
+    Tracing, Unimportant, Want, trace_importons, trace_photons,
+};
+use crate::scene::{Deposition, PhotonMapSettings, World};
+use rayon::prelude::*;
+use std::time::{Duration, Instant};
+
+/// One of so many photons of the global map gets an irradiance.
+const RECORD_STRIDE: usize = 4;
+/// Photons per thread and step when irradiances are computed.
+const CHUNK: usize = 1024;
+/// Photons that radii are measured at.
+const PROBES: usize = 512;
+/// Seeds of passes.
+const PASS_SEED: u32 = 0x70_68_6f_74;
+
+/// What maps took.
+#[derive(Clone, Copy, Debug, Default)]
+pub struct MapStats {
+    /// Maps that were made.
+    pub maps: u64,
+    /// Trajectories that were traced, over all maps.
+    pub trajectories: u64,
+    /// Photons in the global map, over all maps.
+    pub global: u64,
+    /// Photons in the caustic map, over all maps.
+    pub caustic: u64,
+    /// Importons of the last map.
+    pub importons: u64,
+    /// Most bytes that the maps of one pass took.
+    pub bytes: u64,
+    /// Time of tracing.
+    pub tracing: Duration,
+    /// Time of sorting, and of irradiances.
+    pub sorting: Duration,
+}
+
+/// Photon maps of one pass, or of a whole picture.
+#[derive(Debug)]
+pub struct PhotonMaps {
+    pub(super) global: PhotonMap,
+    pub(super) caustic: PhotonMap,
+    /// Irradiances where photons of the global map are, in place of power.
+    records: Option<PhotonMap>,
+    pub(super) search: Search,
+    pub(super) caustic_search: Search,
+    nearest: u32,
+}
+
+/// Makes the maps of a picture.
+#[derive(Debug)]
+pub struct MapMaker {
+    settings: PhotonMapSettings,
+    max_depth: u32,
+    seed: u32,
+    importance: Option<Importance>,
+    /// First radii of progressive maps: global, caustic.
+    radii: Option<[f32; 2]>,
+    /// What was made so far.
+    pub stats: MapStats,
+}
+
+impl MapMaker {
+    /// Traces importons, if there are to be any, and finds the first radii of progressive maps: as far as the nearest photons reach
+    /// from `seen`, places and normals where the camera looks.
+    pub fn new(world: &World, seen: &[(Vec3, Vec3)]) -> Result<Self, PhotonError> {
+        let settings = world.scene.integrator.photons;
+        let (max_depth, seed) = (world.scene.integrator.max_depth, world.scene.sampling.seed);
+        let unimportant = match settings.deposition {
+            Deposition::All => None,
+            Deposition::Floor(least) => Some(Unimportant::Floor(least)),
+            Deposition::CutOff(least) => Some(Unimportant::CutOff(least)),
+        };
+        let importance = match unimportant {
+            None => None,
+            Some(unimportant) => {
+                // Importons lie where final gathers look, and where light goes from there
+                let settings = ImportanceSettings { seed, unimportant, ..ImportanceSettings::default() };
+                Some(trace_importons(world, &settings)?)
+            }
+        };
+        let mut maker = MapMaker { settings, max_depth, seed, importance, radii: None, stats: MapStats::default() };
+        if let Some(shrinking) = settings.progressive {
+            maker.radii = Some(match shrinking.radius {
+                Some(radius) => [radius; 2],
+                None => {
+                    let traced = maker.traced(world, 0)?;
+                    let global = PhotonMap::new(traced.global);
+                    let caustic = PhotonMap::new(traced.caustic);
+                    let most = world.scene.lights.scene_radius;
+                    let radius = median_reach(&global, seen, settings.nearest, most).unwrap_or(0.01 * most);
+                    let at_caustics = places_of(&caustic);
+                    [radius, median_reach(&caustic, &at_caustics, settings.nearest, radius).unwrap_or(radius)]
+                }
+            });
+        }
+        Ok(maker)
+    }
+
+    /// The importance that decides what is stored.
+    pub fn importance(&self) -> Option<&Importance> {
+        self.importance.as_ref()
+    }
+
+    fn traced(&self, world: &World, pass: u32) -> Result<Traced, PhotonError> {
+        let s = &self.settings;
+        let [seed, ..] = pcg4d([self.seed, pass, PASS_SEED, 0]);
+        let tracing = Tracing {
+            seed,
+            // A photon that was scattered n times is light of n + 1 bounces where it lies, and of n + 2 where a gather sees it
+            max_depth: self.max_depth.saturating_sub(1),
+            max_global_depth: self.max_depth.saturating_sub(1 + u32::from(s.gather > 0)),
+            q: s.caustic_ratio,
+            memory: Some(s.memory),
+            ..Tracing::default()
+        };
+        let want = Want::Stored { global: u64::from(s.photons), most_trajectories: s.trajectories };
+        trace_photons(world, &tracing, self.importance.as_ref(), want)
+    }
+
+    /// The maps of a pass.
+    pub fn make(&mut self, world: &World, pass: u32) -> Result<PhotonMaps, PhotonError> {
+        let start = Instant::now();
+        let traced = self.traced(world, pass)?;
+        let traced_at = Instant::now();
+        self.stats.maps += 1;
+        self.stats.trajectories += traced.trajectories;
+        self.stats.global += traced.global.len() as u64;
+        self.stats.caustic += traced.caustic.len() as u64;
+        self.stats.importons = self.importance.as_ref().map_or(0, |i| i.map().len() as u64);
+        let maps = self.maps(world, pass, traced);
+        self.stats.bytes = self.stats.bytes.max(maps.bytes());
+        self.stats.tracing += traced_at - start;
+        self.stats.sorting += traced_at.elapsed();
+        Ok(maps)
+    }
+
+    fn maps(&self, world: &World, pass: u32, traced: Traced) -> PhotonMaps {
+        let nearest = self.settings.nearest;
+        let (global, caustic) = (PhotonMap::new(traced.global), PhotonMap::new(traced.caustic));
+        if let (Some(shrinking), Some(radii)) = (self.settings.progressive, self.radii) {
+            let [search, caustic_search] = radii.map(|r| Search::Radius(r * shrinking.factor(pass)));
+            return PhotonMaps { global, caustic, records: None, search, caustic_search, nearest };
+        }
+        let most = world.scene.lights.scene_radius;
+        // Where caustics end, the nearest photons are far away and not of that place
+        let reach = median_reach(&caustic, &places_of(&caustic), nearest, most).unwrap_or(0.01 * most);
+        let search = Search::Nearest { count: nearest, max_radius: most };
+        let caustic_search = Search::Nearest { count: nearest, max_radius: 2.0 * reach };
+        let mut maps = PhotonMaps { global, caustic, records: None, search, caustic_search, nearest };
+        if self.settings.gather > 0 {
+            maps.records = Some(PhotonMap::new(maps.irradiances()));
+        }
+        maps
+    }
+}
+
+impl PhotonMaps {
+    /// Bytes that the maps take.
+    pub fn bytes(&self) -> u64 {
+        self.global.bytes() + self.caustic.bytes() + self.records.as_ref().map_or(0, PhotonMap::bytes)
+    }
+
+    /// Photons of the global map.
+    pub fn global(&self) -> &PhotonMap {
+        &self.global
+    }
+
+    /// Photons of the caustic map.
+    pub fn caustic(&self) -> &PhotonMap {
+        &self.caustic
+    }
+
+    /// Irradiance by all photons (W/m²), and the radius within which photons were asked for.
+    pub(super) fn irradiance(&self, at: &Place, scratch: &mut GatherScratch) -> (Rgb, f32) {
+        if let Some(records) = &self.records {
+            // The nearest one: of two, the farther lies on the rim of the kernel and does not count
+            let most = Search::Nearest { count: 2, max_radius: self.max_radius() };
+            let mut e = None;
+            let spacing = records.gather(at, most, scratch, |record, _| e = Some(record.power()));
+            if let Some(e) = e {
+                // k photons lie in the disk that holds k/4 records
+                let reach = spacing * (self.nearest as f32 / (2 * RECORD_STRIDE) as f32).sqrt();
+                return (e, reach);
+            }
+        }
+        self.estimate(at, scratch)
+    }
+
+    fn max_radius(&self) -> f32 {
+        match self.search {
+            Search::Nearest { max_radius, .. } => max_radius,
+            Search::Radius(radius) => radius,
+        }
+    }
+
+    /// Irradiance from the photons themselves.
+    fn estimate(&self, at: &Place, scratch: &mut GatherScratch) -> (Rgb, f32) {
+        let mut e = Rgb::BLACK;
+        let radius = self.global.gather(at, self.search, scratch, |photon, weight| e += photon.power() * weight);
+        e += self.caustic.irradiance(at, self.caustic_search, scratch);
+        (e, radius)
+    }
+
+    /// Irradiances at every fourth photon, as photons whose power they are.
+    fn irradiances(&self) -> Vec<Photon> {
+        let chosen: Vec<&Photon> = self.global.photons().iter().step_by(RECORD_STRIDE).collect();
+        let of_chunk = |chunk: &[&Photon]| {
+            let mut scratch = GatherScratch::default();
+            let record = |photon: &&Photon| {
+                let (p, n) = (photon.p(), photon.n());
+                let (e, _) = self.estimate(&Place::flat(p, n), &mut scratch);
+                Photon::new(p, n, n, e, Origin::Diffuse)
+            };
+            chunk.iter().map(record).collect::<Vec<_>>()
+        };
+        chosen.par_chunks(CHUNK).map(of_chunk).collect::<Vec<_>>().concat()
+    }
+}
+
+/// Diffuse places that the camera sees, spread over the picture, with their normals; `camera` gives the samples of a pixel.
+pub fn seen(world: &World, camera: &dyn Fn([u32; 2], u32) -> CameraSample) -> Vec<(Vec3, Vec3)> {
+    let b = world.scene.film.bounds;
+    let stride = (b.area() / PROBES).max(1);
+    let pixels = (0..b.area() as u32).step_by(stride).map(|i| [b.x0 + i % b.width(), b.y0 + i / b.width()]);
+    let samples: Vec<CameraSample> = pixels.map(|pixel| camera(pixel, 0)).collect();
+    let (mut paths, mut results) = (PathIntegrator::default(), Vec::new());
+    paths.start(&samples, &mut results);
+    let vertices = paths.find_vertices(world, 0, 1, &samples, &mut results);
+    let diffuse = vertices.iter().filter(|v| v.bsdf.lambertian(v.wo).is_some());
+    diffuse.map(|v| (v.surface.p, if v.surface.n.dot(v.wo) < 0.0 { -v.surface.n } else { v.surface.n })).collect()
+}
+
+/// Some places where photons of a map lie.
+fn places_of(map: &PhotonMap) -> Vec<(Vec3, Vec3)> {
+    let stride = (map.len() / PROBES).max(1);
+    map.photons().iter().step_by(stride).map(|photon| (photon.p(), photon.n())).collect()
+}
+
+/// The median over some places of the radius that holds `nearest` photons; `None` where fewer than half have so many within `most`.
+fn median_reach(map: &PhotonMap, places: &[(Vec3, Vec3)], nearest: u32, most: f32) -> Option<f32> {
+    let mut scratch = GatherScratch::default();
+    let search = Search::Nearest { count: nearest, max_radius: most };
+    let mut radii: Vec<f32> = places
+        .iter()
+        .map(|&(p, n)| {
+            let radius = map.gather(&Place::flat(p, n), search, &mut scratch, |_, _| ());
+            if radius > 0.0 { radius } else { most }
+        })
+        .collect();
+    radii.sort_by(f32::total_cmp);
+    radii.get(radii.len() / 2).copied().filter(|&radius| radius < most)
+}

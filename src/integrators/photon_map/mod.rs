@@ -1,0 +1,275 @@
+//! Photon mapping [Jensen 1996] with what [Keller and Wald 2000] made of it.
+//!
+//! Light straight from sources is estimated at every vertex, by any estimator; specular and glossy lobes are followed by paths
+//! (`diffuse.rs`). What Lambertian parts reflect besides comes from photons: from the caustic map, where the light's last
+//! scattering before was by another lobe, and else by a final gather, whose rays ask the maps what Lambertian surfaces
+//! reflect where they arrive. So each path of light counts once: its last scattering before the vertex was by a Lambertian lobe,
+//! which the gather sees, or not, which the caustic map holds.
+//!
+//! Where a ray of the gather is shorter than the photons reach that would be asked for at its end, the density there says
+//! little about the corner between both surfaces: the ray goes on as a path, with direct light and another ray.
+//!
+//! Biased by the density estimate, the base below a coat being taken for Lambertian besides; with `progressive` consistent.
+//! Numbers of bounces count from the vertex that asks, whatever mirrors lie before it.
+//!
+//! Reading order: [`maps`], [`guide`]; this file renders.
+
+pub mod guide;
+pub mod maps;
+
+pub use maps::{MapMaker, MapStats, PhotonMaps};
+
+use super::diffuse::{self, Reflected, viewer_normal};
+use super::path::{self, CameraSample, PathIntegrator, PathState, PathStats, Vertex};
+use crate::bsdfs::{Bsdf, Diffuse, DiffuseTransmission, Lambertian};
+use crate::cameras::CameraRay;
+use crate::direct::{Fits, ShadePoint};
+use crate::film::PixelSample;
+use crate::materials::SurfaceBsdf;
+use crate::math::ray::offset_origin;
+use crate::math::{Frame, Ray, Rgb, Vec3};
+use crate::photons::{GatherScratch, Photon, Place, Search};
+use crate::samplers::SampleStream;
+use crate::scene::{PhotonMapSettings, World};
+use guide::Guide;
+use std::f32::consts::FRAC_1_PI;
+
+/// Domain of the final gather below the stream of a vertex.
+const GATHER: u32 = 4;
+/// Photons that choose directions.
+const GUIDES: u32 = 32;
+
+/// Renders with photon maps; holds the buffers of one worker.
+#[derive(Debug, Default)]
+pub struct PhotonMapIntegrator {
+    paths: PathIntegrator,
+    gather: PathIntegrator,
+    scratch: GatherScratch,
+    jobs: Vec<Job>,
+    samples: Vec<CameraSample>,
+    results: Vec<PixelSample>,
+}
+
+/// A place that asks for a final gather.
+#[derive(Clone, Copy, Debug)]
+struct Job {
+    /// Index of the camera sample.
+    sample: u32,
+    /// What radiance that arrives with the density of the cosine is worth: throughput times albedo.
+    beta: Rgb,
+    /// The vertex of its path, from 0.
+    vertex: u32,
+    place: Place,
+    p_error: Vec3,
+    time: f32,
+    stream: SampleStream,
+    /// Width of the texture footprint, and its growth.
+    width: f32,
+    spread: f32,
+}
+
+impl PhotonMapIntegrator {
+    /// The counts and times since the last call.
+    pub fn take_stats(&mut self) -> PathStats {
+        let mut stats = self.paths.take_stats();
+        let mut gather = self.gather.take_stats();
+        // Rays of the gather are no camera rays
+        gather.bounce_rays += std::mem::take(&mut gather.camera_rays);
+        gather.bounce_time += std::mem::take(&mut gather.camera_time);
+        stats.merge(&gather);
+        stats
+    }
+
+    /// Estimates the radiance of each camera sample; `out[i]` belongs to `samples[i]`. `fits` are those of the samples' pixels.
+    pub fn trace(
+        &mut self,
+        world: &World,
+        maps: &PhotonMaps,
+        samples: &[CameraSample],
+        fits: &mut Fits,
+        out: &mut Vec<PixelSample>,
+    ) {
+        self.jobs.clear();
+        let (scratch, jobs) = (&mut self.scratch, &mut self.jobs);
+        let settings = &world.scene.integrator;
+        let mut lookup = Lookup { maps, settings: &settings.photons, depth: settings.depth(), samples, scratch, jobs };
+        diffuse::trace(&mut self.paths, world, &mut lookup, samples, fits, out);
+        self.start_gather(maps, &settings.photons);
+        self.finish_gather(world, maps);
+        let rays_of_job = self.results.chunks(settings.photons.gather.max(1) as usize);
+        for (job, rays) in self.jobs.iter().zip(rays_of_job) {
+            for ray in rays {
+                out[job.sample as usize].radiance += job.beta * ray.radiance;
+            }
+        }
+    }
+
+    /// The rays of all gathers.
+    fn start_gather(&mut self, maps: &PhotonMaps, settings: &PhotonMapSettings) {
+        self.samples.clear();
+        let count = settings.gather;
+        for job in &self.jobs {
+            let frame = Frame::from_z(job.place.ns);
+            let guide = guide(maps, &job.place, &frame, settings.guide, &mut self.scratch);
+            for i in 0..count {
+                let stream = job.stream.split(GATHER, count, i);
+                let [u_choice, u0, u1] = stream.draw::<3>();
+                let w = guide.sample(u_choice, [u0, u1]);
+                let pdf = guide.pdf(w);
+                let d = frame.to_world(w);
+                // Below the surface itself there is nothing to see
+                let is_above = w.z > 0.0 && pdf > 0.0 && d.dot(job.place.n) > 0.0;
+                let weight = if is_above { w.z * FRAC_1_PI / (pdf * count as f32) } else { 0.0 };
+                let o = offset_origin(job.place.p, job.p_error, job.place.n, d);
+                let ray = Ray { o, d, t_max: f32::INFINITY, time: job.time };
+                let ray = CameraRay { ray, spread: job.spread, width0: job.width, weight: 1.0 };
+                let split = crate::scene::Split { samples: 1, proposals: 1 };
+                self.samples.push(CameraSample { ray, weight, stream, direct: stream, split, fit: 0 });
+            }
+        }
+    }
+
+    /// What the rays of all gathers bring.
+    fn finish_gather(&mut self, world: &World, maps: &PhotonMaps) {
+        let settings = &world.scene.integrator;
+        let depth = settings.depth();
+        let (gather, scratch) = (&mut self.gather, &mut self.scratch);
+        let rays_per_job = settings.photons.gather.max(1);
+        gather.only_reflected = true;
+        gather.start(&self.samples, &mut self.results);
+        gather.active.retain(|path| !path.beta.is_black());
+        for vertex in 0..depth {
+            if gather.active.is_empty() {
+                break;
+            }
+            let vertices = gather.find_vertices(world, vertex, depth, &self.samples, &mut self.results);
+
+            // Ask the maps, but where what they would answer comes from too near
+            let mut near = Vec::new();
+            for (path, v) in gather.active.iter().zip(&vertices) {
+                let Some(part) = v.bsdf.lambertian(v.wo) else { continue };
+                let (radiance, reach) = reflected(maps, v, &part, scratch);
+                if v.surface.p.distance(path.ray.o) < reach {
+                    near.push((*path, Vertex { bsdf: only_lambertian(v, &part), ..*v }, part));
+                } else {
+                    self.results[path.sample as usize].radiance += path.beta * radiance;
+                }
+            }
+
+            // Light the near ones as vertices of a path
+            let at_vertex = settings.at_vertex(1);
+            let split = settings.split_at_vertex(1);
+            let points: Vec<ShadePoint<'_>> =
+                near.iter().map(|(path, v, _)| v.shade_point(path.ray.time, split, 0)).collect();
+            gather.direct.estimate(world, &at_vertex, &points, &mut Fits::default(), &mut gather.radiance);
+            gather.next.clear();
+            for (((path, v, part), point), &radiance) in near.iter().zip(&points).zip(&gather.radiance) {
+                let caustic = by_sides(v, part, |place| maps.caustic.irradiance(place, maps.caustic_search, scratch));
+                self.results[path.sample as usize].radiance += path.beta * (radiance + caustic);
+                let before = self.jobs[(path.sample / rays_per_job) as usize].vertex;
+                if before + vertex + 2 < depth {
+                    gather.next.extend(path::extend(path, v, point, vertex, settings).map(|(next, _)| next));
+                }
+            }
+            std::mem::swap(&mut gather.active, &mut gather.next);
+        }
+    }
+}
+
+/// Takes caustics from the map, and notes who wants a gather.
+struct Lookup<'a> {
+    maps: &'a PhotonMaps,
+    settings: &'a PhotonMapSettings,
+    depth: u32,
+    samples: &'a [CameraSample],
+    scratch: &'a mut GatherScratch,
+    jobs: &'a mut Vec<Job>,
+}
+
+impl Reflected for Lookup<'_> {
+    fn reflected(&mut self, path: &PathState, vertex: u32, v: &Vertex<'_>, part: &Lambertian<'_>) -> Option<Rgb> {
+        if vertex + 1 >= self.depth {
+            return Some(Rgb::BLACK);
+        }
+        let (maps, scratch) = (self.maps, &mut *self.scratch);
+        let caustic = by_sides(v, part, |place| maps.caustic.irradiance(place, maps.caustic_search, scratch));
+        if self.settings.gather == 0 {
+            let indirect =
+                |photon: &Photon, weight| if photon.is_primary() { Rgb::BLACK } else { photon.power() * weight };
+            let global = by_sides(v, part, |place| {
+                let mut e = Rgb::BLACK;
+                maps.global.gather(place, maps.search, scratch, |photon, weight| e += indirect(photon, weight));
+                e
+            });
+            return Some(caustic + global);
+        }
+        self.jobs.extend(sides(v, part).map(|(albedo, place)| Job {
+            sample: path.sample,
+            beta: path.beta * albedo,
+            vertex,
+            place,
+            p_error: v.surface.p_error,
+            time: path.ray.time,
+            stream: v.stream,
+            width: path.width,
+            spread: self.samples[path.sample as usize].ray.spread,
+        }));
+        Some(caustic)
+    }
+
+    fn has_sources(&self) -> bool {
+        false
+    }
+}
+
+/// The sides of a vertex that reflect to the viewer, with their albedos.
+fn sides(v: &Vertex<'_>, part: &Lambertian<'_>) -> impl Iterator<Item = (Rgb, Place)> {
+    let (n, ns, p) = (v.surface.n, viewer_normal(v), v.surface.p);
+    let n = if n.dot(v.wo) < 0.0 { -n } else { n };
+    let both = [(part.reflectance, Place { p, n, ns }), (part.transmittance, Place { p, n: -n, ns: -ns })];
+    both.into_iter().filter(|(albedo, _)| !albedo.is_black())
+}
+
+/// Reflected radiance Σ albedo·E/π.
+fn by_sides(v: &Vertex<'_>, part: &Lambertian<'_>, mut irradiance: impl FnMut(&Place) -> Rgb) -> Rgb {
+    sides(v, part).fold(Rgb::BLACK, |sum, (albedo, place)| sum + albedo * irradiance(&place) * FRAC_1_PI)
+}
+
+/// What the Lambertian part of a vertex reflects by all photons, and how far away these are.
+fn reflected(maps: &PhotonMaps, v: &Vertex<'_>, part: &Lambertian<'_>, scratch: &mut GatherScratch) -> (Rgb, f32) {
+    let mut reach = 0.0_f32;
+    let radiance = by_sides(v, part, |place| {
+        let (e, radius) = maps.irradiance(place, scratch);
+        reach = reach.max(radius);
+        e
+    });
+    (radiance, reach)
+}
+
+/// The Lambertian part as a BSDF.
+fn only_lambertian<'a>(v: &Vertex<'a>, part: &Lambertian<'_>) -> SurfaceBsdf<'a> {
+    let (reflectance, transmittance) = (part.reflectance, part.transmittance);
+    let bsdf = if transmittance.is_black() {
+        Bsdf::Diffuse(Diffuse { reflectance })
+    } else {
+        Bsdf::DiffuseTransmission(DiffuseTransmission { reflectance, transmittance })
+    };
+    SurfaceBsdf { bsdf, ..v.bsdf }
+}
+
+/// Directions by the photons around that the gather is about.
+fn guide(maps: &PhotonMaps, place: &Place, frame: &Frame, share: f32, scratch: &mut GatherScratch) -> Guide {
+    let mut photons = Vec::new();
+    if share > 0.0 {
+        let search = match maps.search {
+            Search::Nearest { max_radius, .. } => Search::Nearest { count: GUIDES, max_radius },
+            Search::Radius(radius) => Search::Radius(radius),
+        };
+        maps.global.gather(place, search, scratch, |photon, _| {
+            if !photon.is_primary() {
+                photons.push((frame.to_local(photon.wi()), photon.power().luminance()));
+            }
+        });
+    }
+    Guide::new(photons, share)
+}

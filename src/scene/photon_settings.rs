@@ -1,0 +1,135 @@
+//! Settings of photon maps.
+
+use std::fmt;
+
+/// Photon maps [Jensen 1996; Keller and Wald 2000].
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct PhotonMapSettings {
+    /// Photons that the global map stores; a progressive map so many in each pass.
+    pub photons: u32,
+    /// q: the share of the trajectories that fill the global map too; all of them fill the caustic map.
+    pub caustic_ratio: f32,
+    /// Which photons are stored.
+    pub deposition: Deposition,
+    /// Photons of an estimate (k).
+    pub nearest: u32,
+    /// Rays of the final gather at a diffuse vertex; 0 shows the global map directly.
+    pub gather: u32,
+    /// Share of the rays of the final gather whose directions photons choose.
+    pub guide: f32,
+    /// New photons and smaller radii from sample to sample; `None` for one map.
+    pub progressive: Option<Shrinking>,
+    /// Most bytes that the maps may take.
+    pub memory: u64,
+    /// Most trajectories that are traced for one map.
+    pub trajectories: u64,
+}
+
+impl Default for PhotonMapSettings {
+    fn default() -> Self {
+        PhotonMapSettings {
+            photons: 200_000,
+            caustic_ratio: 0.2,
+            deposition: Deposition::All,
+            nearest: 50,
+            gather: 4,
+            guide: 0.5,
+            progressive: None,
+            memory: 4 << 30,
+            trajectories: 1 << 30,
+        }
+    }
+}
+
+impl PhotonMapSettings {
+    /// True if this can be q.
+    pub fn is_ratio(q: f32) -> bool {
+        q > 0.0 && q <= 1.0
+    }
+
+    /// True if photons can choose this share of directions: not all, since there may be none from where light comes.
+    pub fn is_guide(share: f32) -> bool {
+        (0.0..=0.95).contains(&share)
+    }
+}
+
+/// Which photons are stored [Keller and Wald 2000, §2].
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub enum Deposition {
+    /// All.
+    All,
+    /// With the probability p(x) by visual importance, but at least this. Unbiased.
+    Floor(f32),
+    /// With the probability p(x), none where it is below this. Biased.
+    CutOff(f32),
+}
+
+impl Deposition {
+    /// True if this can be a least probability.
+    pub fn is_least(probability: f32) -> bool {
+        probability > 0.0 && probability <= 1.0
+    }
+
+    /// The name on the command line and in metadata.
+    pub fn name(self) -> &'static str {
+        match self {
+            Deposition::All => "none",
+            Deposition::Floor(_) => "floor",
+            Deposition::CutOff(_) => "cut-off",
+        }
+    }
+}
+
+impl fmt::Display for Deposition {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        match self {
+            Deposition::All => f.write_str(self.name()),
+            Deposition::Floor(least) | Deposition::CutOff(least) => write!(f, "{}:{least}", self.name()),
+        }
+    }
+}
+
+/// Radii of progressive photon mapping: r²ᵢ₊₁ = r²ᵢ·(i + α)/(i + 1) [Knaus and Zwicker 2011, Eq. 15].
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Shrinking {
+    /// α, above 0 and below 1: near 0 variance falls slowly and bias fast.
+    pub alpha: f32,
+    /// Radius of the first pass (m); as far as the `nearest` photons reach, where the camera looks, if `None`.
+    pub radius: Option<f32>,
+}
+
+impl Default for Shrinking {
+    fn default() -> Self {
+        Shrinking { alpha: 2.0 / 3.0, radius: None }
+    }
+}
+
+impl Shrinking {
+    /// True if this can be α.
+    pub fn is_alpha(alpha: f32) -> bool {
+        alpha > 0.0 && alpha < 1.0
+    }
+
+    /// The factor of the first radius in pass `pass`, which are counted from 0.
+    pub fn factor(&self, pass: u32) -> f32 {
+        let alpha = f64::from(self.alpha);
+        let squares = (1..=pass).map(|i| (f64::from(i) - 1.0 + alpha) / f64::from(i));
+        squares.product::<f64>().sqrt() as f32
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn areas_fall_with_the_power_alpha_less_one_of_the_passes() {
+        for alpha in [0.3, 0.5, 2.0 / 3.0, 0.9] {
+            let shrinking = Shrinking { alpha, radius: None };
+            assert_eq!(shrinking.factor(0), 1.0);
+            let area = |pass| f64::from(shrinking.factor(pass)).powi(2);
+            let slope = (area(10_000) / area(100)).ln() / 100.0_f64.ln();
+            assert!((slope - f64::from(alpha - 1.0)).abs() < 2e-3, "{alpha}: {slope}");
+        }
+    }
+}
