@@ -12,4 +12,5 @@ mod evaluated;
 mod irradiance_cache;
 mod layering;
 mod mutations;
+mod photons;
 mod reproduce;
