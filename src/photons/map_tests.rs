@@ -5,8 +5,8 @@ use crate::math::warp::{sample_cosine_hemisphere, sample_uniform_sphere};
 use crate::math::{Frame, Rgb, Vec3};
 use std::time::{Duration, Instant};
 
-/// Photons of constant density on the square |x|, |z| ≤ 1 of the plane y = height, by a Poisson process of `mean` photons, which together
-/// carry 4 W: an irradiance of 1 W/m² on average.
+/// Photons of constant density on the square |x|, |z| ≤ 1 of the plane y = height, by a Poisson process of `mean`
+/// photons, which together carry 4 W: an irradiance of 1 W/m² on average.
 fn plane(mean: f64, height: f32, n: Vec3, stream: &mut HashStream) -> Vec<Photon> {
     // Sum of exponential gaps
     let mut photons = Vec::new();

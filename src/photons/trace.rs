@@ -1,11 +1,12 @@
 //! Photon tracing: random walks from the lights in batches, put together in the order of trajectories.
 //!
-//! Trajectory t is a point of a scrambled Sobol' sequence over path space [Keller 1998, ch. 3; Burley 2020], whose numbers choose the light, where and
-//! which way the photon leaves it, and every scattering. The sequence has 2¹⁶ points, so trajectories come in blocks of as many, which
-//! are scrambled independently. What is stored depends on the scene, the settings and the number of trajectories only.
+//! Trajectory t is a point of a scrambled Sobol' sequence over path space [Keller 1998, ch. 3; Burley 2020], whose
+//! numbers choose the light, where and which way the photon leaves it, and every scattering. The sequence has 2¹⁶
+//! points, so trajectories come in blocks of as many, which are scrambled independently. What is stored depends on the
+//! scene, the settings and the number of trajectories only.
 //!
-//! Photons that the global map holds (from lights, and scattered by Lambertian surfaces) and those of caustics come from the same trajectories,
-//! see [`super::rules`].
+//! Photons that the global map holds (from lights, and scattered by Lambertian surfaces) and those of caustics come
+//! from the same trajectories, see [`super::rules`].
 
 use super::error::PhotonError;
 use super::importance::Importance;
@@ -123,8 +124,8 @@ impl Traced {
     }
 }
 
-/// Traces photons, on all threads of the current pool. The powers are such that Σ weight·power of a map's photons is an estimate of the irradiance
-/// that it holds.
+/// Traces photons, on all threads of the current pool. The powers are such that Σ weight·power of a map's photons is an
+/// estimate of the irradiance that it holds.
 pub fn trace_photons(
     world: &World,
     tracing: &Tracing,

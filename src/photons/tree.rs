@@ -1,8 +1,8 @@
 //! A kd-tree over photons, which lie in the order of its leaves: 8 bytes a node, in preorder.
 //!
-//! A node halves its photons across the longest side of their box. Photons lie on walls, and many have one equal coordinate: those stay
-//! together, so that the two cells do not touch; halves are unequal then, but what has an equal coordinate is never cut along it again,
-//! so that the tree is no deeper for it than by three.
+//! A node halves its photons across the longest side of their box. Photons lie on walls, and many have one equal
+//! coordinate: those stay together, so that the two cells do not touch; halves are unequal then, but what has an equal
+//! coordinate is never cut along it again, so that the tree is no deeper for it than by three.
 
 use super::photon::Photon;
 use crate::math::Vec3;
@@ -123,8 +123,8 @@ fn build(photons: &mut [Photon], begin: u32, nodes: &mut Vec<Node>) {
     }
 }
 
-/// Sorts photons into two sets, the first of which has the lesser coordinates, equal ones being in one set; about half of all if that can
-/// be. Returns the size of the first. Not all coordinates are equal.
+/// Sorts photons into two sets, the first of which has the lesser coordinates, equal ones being in one set; about half
+/// of all if that can be. Returns the size of the first. Not all coordinates are equal.
 fn cut(photons: &mut [Photon], axis: usize) -> usize {
     let half = photons.len() / 2;
     let (below, median, above) = photons.select_nth_unstable_by(half, |a, b| a.p()[axis].total_cmp(&b.p()[axis]));

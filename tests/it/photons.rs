@@ -230,7 +230,8 @@ fn the_rules_of_caustics_give_the_same_maps() {
     }
 }
 
-/// Two rooms and a slit between them; the camera looks at the floor of the left one, the light is in the right one or in both.
+/// Two rooms and a slit between them; the camera looks at the floor of the left one, the light is in the right one or
+/// in both.
 const ROOMS: &str = r#"
 LookAt -1 1.9 0  -1 0 0  0 0 1
 Camera "perspective" "float fov" [ 60 ]
