@@ -122,6 +122,11 @@ fn a_furnace_has_its_irradiance_whatever_lossless_things_stand_in_it() {
     }
 }
 
+/// A place whose irradiance path tracing tells.
+fn wanted(p: Vec3, n: Vec3) -> Wanted {
+    Wanted { p, p_error: Vec3::splat(1e-6), n, ns: n, time: 0.5, pixel_width: 0.0, spread: 0.0, pixel: [0, 0], key: 7 }
+}
+
 #[test]
 fn photons_agree_with_path_tracing_among_many_materials() {
     let depth = 8;
@@ -138,18 +143,7 @@ fn photons_agree_with_path_tracing_among_many_materials() {
         ("the coated wall", Vec3::new(0.2, 1.1, -1.0), Vec3::Z),
         ("the ceiling", Vec3::new(0.9, 2.0, 0.3), -Vec3::Y),
     ];
-    let wanted = places.map(|(_, p, n)| Wanted {
-        p,
-        p_error: Vec3::splat(1e-6),
-        n,
-        ns: n,
-        time: 0.5,
-        pixel_width: 0.0,
-        spread: 0.0,
-        pixel: [0, 0],
-        key: 7,
-    });
-    let records = Gatherer::default().records(&world, &wanted);
+    let records = Gatherer::default().records(&world, &places.map(|(_, p, n)| wanted(p, n)));
     for ((name, p, n), record) in places.into_iter().zip(records) {
         let tracing = |seed| Tracing { seed, max_depth: depth - 1, ..Tracing::default() };
         let search = Search::Radius(0.08);
@@ -160,6 +154,50 @@ fn photons_agree_with_path_tracing_among_many_materials() {
             assert!((e[c].mean() - expected).abs() < bound, "{name} {c}: {}, not {expected} ± {bound}", e[c].mean());
         }
     }
+}
+
+#[test]
+fn inside_glass_light_is_denser_by_the_square_of_the_index() {
+    // A white ball in a glass one takes no light away: L = 1.5² · 0.5/(1 − ρ) around it
+    let things = "Translate 0.2 -0.9 0.1\nMaterial \"dielectric\"\nShape \"sphere\" \"float radius\" [ 0.9 ]\n\
+        Material \"diffuse\" \"rgb reflectance\" [ 1 1 1 ]\nShape \"sphere\" \"float radius\" [ 0.6 ]\n";
+    let world = world_of(&furnace(things), |_| ());
+    let place = Place::flat(Vec3::new(0.2, -0.3, 0.1), Vec3::Y);
+    let tracing = |seed| Tracing { seed, max_depth: 150, ..Tracing::default() };
+    let e = irradiances(12, &place, Search::Radius(0.25), |seed| both(&trace(&world, &tracing(seed), 20_000)));
+    for (c, rho) in [0.5, 0.25, 0.75].into_iter().enumerate() {
+        assert!(e[c].standard_error() < 0.1 * e[c].mean(), "the test can tell");
+        assert_mean(&e[c], 2.25 * PI * 0.5 / (1.0 - rho), "inside glass");
+    }
+}
+
+#[test]
+fn shading_normals_reflect_photons_as_they_reflect_light() {
+    // A spot lights a part of an upright wall whose shading normals look up; the floor gets light from there only
+    const WALL: &str = r#"
+Camera "perspective"
+WorldBegin
+LightSource "spot" "rgb I" [ 10 10 10 ] "point3 from" [ 2 1 0 ] "point3 to" [ 0 1 0 ] "float coneangle" [ 14 ]
+Material "diffuse" "rgb reflectance" [ 0.8 0.8 0.8 ]
+Shape "trianglemesh" "point3 P" [ -3 0 -3  3 0 -3  3 0 3  -3 0 3 ] "integer indices" [ 0 1 2 0 2 3 ]
+Shape "trianglemesh" "point3 P" [ 0 0 -1  0 2 -1  0 2 1  0 0 1 ] "integer indices" [ 0 1 2 0 2 3 ]
+  "normal N" [ 0.8 0.6 0  0.8 0.6 0  0.8 0.6 0  0.8 0.6 0 ]
+"#;
+    let world = world_of(WALL, |scene| {
+        scene.integrator.kind = IntegratorKind::IrradianceCache;
+        scene.integrator.cache.cached = Cached::All;
+        scene.integrator.cache.samples = 65_536;
+        scene.integrator.max_depth = 2;
+    });
+    let (p, n) = (Vec3::new(1.0, 0.0, 0.1), Vec3::Y);
+    let [record] = Gatherer::default().records(&world, &[wanted(p, n)])[..] else { panic!("one record") };
+    let tracing = |seed| Tracing { seed, max_depth: 1, ..Tracing::default() };
+    let e =
+        irradiances(10, &Place::flat(p, n), Search::Radius(0.15), |seed| trace(&world, &tracing(seed), 200_000).global);
+    let expected = f64::from(record.light.e.g);
+    let bound = 4.0 * e[1].standard_error() + 0.02 * expected;
+    assert!(bound < 0.08 * expected, "the test can tell");
+    assert!((e[1].mean() - expected).abs() < bound, "{}, not {expected} ± {bound}", e[1].mean());
 }
 
 /// A floor below a glass ball. The light looks up or down.
