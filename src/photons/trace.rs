@@ -54,7 +54,8 @@ pub struct Tracing {
     pub caustics: CausticRule,
     /// Part of the trajectories that lights share evenly, whatever their powers (0..1).
     pub floor: f32,
-    /// Trajectories in a row without a stored photon after which tracing stops with an error.
+    /// Trajectories without a stored photon after which tracing stops with an error: at the beginning, and in a row
+    /// while photons of the global map are counted.
     pub most_without_deposit: u64,
     /// Most memory of the maps (bytes).
     pub memory: Option<u64>,
@@ -176,6 +177,8 @@ struct Batch {
 struct Limits {
     global: u64,
     all: u64,
+    /// True while it is not known how many trajectories the global map takes.
+    is_open: bool,
 }
 
 struct Run<'a> {
@@ -195,12 +198,12 @@ impl Run<'_> {
     }
 
     fn trajectories(&self, count: u64) -> Result<Traced, PhotonError> {
-        let limits = Limits { global: self.global_part(count), all: count };
+        let limits = Limits { global: self.global_part(count), all: count, is_open: false };
         self.trace(limits, |_| limits)
     }
 
     fn stored(&self, wanted: u64, most: u64) -> Result<Traced, PhotonError> {
-        let mut limits = Limits { global: most, all: most };
+        let mut limits = Limits { global: most, all: most, is_open: true };
         let mut stored = 0;
         self.trace(limits, |round| {
             // Where the global map is full; photons of one trajectory stay together
@@ -214,7 +217,7 @@ impl Run<'_> {
                     CausticRule::OneRule | CausticRule::TwoTests => global,
                     CausticRule::FirstTrajectories => (global as f64 / f64::from(self.tracing.q)).ceil() as u64,
                 };
-                limits = Limits { global, all: all.clamp(global, most) };
+                limits = Limits { global, all: all.clamp(global, most), is_open: false };
             }
             limits
         })
@@ -223,10 +226,13 @@ impl Run<'_> {
     /// Traces trajectories, round by round, until the limits that `look` makes of each round.
     fn trace(&self, mut limits: Limits, mut look: impl FnMut(&[Batch]) -> Limits) -> Result<Traced, PhotonError> {
         let mut traced = Traced::default();
+        let mut last_deposit = 0;
         while traced.trajectories < limits.all {
             let end = (traced.trajectories + ROUND * BATCH).min(limits.all);
             let round = self.round(traced.trajectories..end, limits.global);
             limits = look(&round);
+            let counted = |traced: &Traced| if limits.is_open { traced.global.len() as u64 } else { traced.stored() };
+            let before = counted(&traced);
             for batch in round {
                 let kept = |deposits: Vec<Deposit>, limit: u64| {
                     deposits.into_iter().take_while(move |(t, _)| *t < limit).map(|(_, photon)| photon)
@@ -237,8 +243,14 @@ impl Run<'_> {
                 traced.rays += batch.rays;
             }
             traced.trajectories = end;
-            if traced.stored() == 0 && end >= self.tracing.most_without_deposit.min(limits.all) {
-                return Err(PhotonError::NoDeposit { trajectories: end, by_importance: traced.arrivals > 0 });
+            if counted(&traced) > before {
+                last_deposit = end;
+            }
+            let without = end - last_deposit;
+            let is_vain = traced.stored() == 0 && end >= limits.all;
+            let is_waiting = traced.stored() == 0 || limits.is_open;
+            if is_vain || is_waiting && without >= self.tracing.most_without_deposit {
+                return Err(PhotonError::NoDeposit { trajectories: without, by_importance: traced.arrivals > 0 });
             }
             if let Some(limit) = self.tracing.memory.filter(|limit| traced.stored() * BYTES > *limit) {
                 return Err(PhotonError::OutOfMemory { limit, photons: traced.stored() });
