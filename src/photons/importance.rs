@@ -1,11 +1,12 @@
-//! Where photons matter to the picture: importons, and the probability that a photon is stored [Keller and Wald 2000, §2.3].
+//! Where photons matter to the picture: importons, and the probability that a photon is stored [Keller and Wald 2000,
+//! §2.3].
 //!
-//! Importons are photons of importance, which the camera sends and which scatter as light does [Peter and Pietrek 1998]. With the density I(x) of their
-//! importance, p(x) = min(1, f·I(x)), where 1/f is the least I that test rays from the camera find: so p = 1 wherever the camera looks,
-//! and the photons there keep their power.
+//! Importons are photons of importance, which the camera sends and which scatter as light does [Peter and Pietrek
+//! 1998]. With the density I(x) of their importance, p(x) = min(1, f·I(x)), where 1/f is the least I that test rays
+//! from the camera find: so p = 1 wherever the camera looks, and the photons there keep their power.
 //!
-//! Where p is small, powers Φ/p are large and rare. Either p is at least ε, which keeps the expectation of every map, or photons with p < ε are
-//! dropped, which makes light that they carry be missing.
+//! Where p is small, powers Φ/p are large and rare. Either p is at least ε, which keeps the expectation of every map,
+//! or photons with p < ε are dropped, which makes light that they carry be missing.
 
 use super::error::PhotonError;
 use super::map::{GatherScratch, PhotonMap, Place, Search};

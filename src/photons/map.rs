@@ -1,18 +1,19 @@
 //! Photons by place, and the density of their power.
 //!
-//! The irradiance at x is estimated by the photons around it, E ≈ Σ K(d_k) Φ_k, with the kernel of Epanechnikov,
-//! K(d) = 2/(πr²) (1 − d²/r²), whose integral over the disk of radius r is 1 [Epanechnikov 1969; Silverman 1986, §4.2]. r is given or the distance of
-//! the k-th nearest photon [Jensen 1996], which itself does not count then: for photons of constant density λ,
-//! E[(k − 1)/(πr²)] = λ, whereas k/(πr²) would be too much by the factor k/(k − 1). If the disk of the largest radius has
-//! fewer than k photons, all of them count with that radius; so the estimate is unbiased whichever happens:
-//! λ P(N ≥ k − 1) + λ P(N ≤ k − 2), N being the photons in the largest disk.
+//! The irradiance at x is estimated by the photons around it, E ≈ Σ K(d_k) Φ_k, with the kernel of Epanechnikov, K(d) =
+//! 2/(πr²) (1 − d²/r²), whose integral over the disk of radius r is 1 [Epanechnikov 1969; Silverman 1986, §4.2]. r is
+//! given or the distance of the k-th nearest photon [Jensen 1996], which itself does not count then: for photons of
+//! constant density λ, E[(k − 1)/(πr²)] = λ, whereas k/(πr²) would be too much by the factor k/(k − 1). If the disk of
+//! the largest radius has fewer than k photons, all of them count with that radius; so the estimate is unbiased
+//! whichever happens: λ P(N ≥ k − 1) + λ P(N ≤ k − 2), N being the photons in the largest disk.
 //!
-//! Which photons belong to a place: those that lie on a surface of nearly its normal, on its side of it, and about in its
-//! tangent plane. The distance is d² + (4 d·n)², so that photons farther from the plane than a quarter of r never
-//! count, as in the flattened spheres of [Jensen 2001, §7.2]; on a plane it is the distance.
+//! Which photons belong to a place: those that lie on a surface of nearly its normal, on its side of it, and about in
+//! its tangent plane. What is compared with r is the greater one of d and 4 |d·n|, so that photons farther from the plane
+//! than a quarter of r never count, as in the flattened spheres of [Jensen 2001, §7.2]. On a plane, and on a ball of more
+//! than twice the radius r, that is d, and of a ball the area within the distance d is πd² as well.
 //!
-//! The irradiance is about the shading normal of the place: a photon's power is weighed by |wi·ns|/|wi·n_k|, n_k being the geometric
-//! normal where it lies, since it is the area about n_k over which photons are spread.
+//! The irradiance is about the shading normal of the place: a photon's power is weighed by |wi·ns|/|wi·n_k|, n_k being
+//! the geometric normal where it lies, since it is the area about n_k over which photons are spread.
 
 use super::photon::Photon;
 use super::tree::{Tree, Visit};
@@ -22,7 +23,7 @@ use std::f32::consts::FRAC_1_PI;
 
 /// Cosine of the largest angle between the normals of a place and of photons that count.
 const MIN_NORMAL_COS: f32 = 0.8;
-/// Squared factor of distances along the normal, less 1.
+/// Squared factor of distances along the normal.
 const FLATTENING: f32 = 16.0;
 /// Cosines below this count as this where they divide: packed directions do not tell them apart.
 const MIN_COS: f32 = 0.01;
@@ -122,8 +123,8 @@ impl PhotonMap {
     }
 
     /// Calls `f(photon, weight)` for the photons around that count. The irradiance about `at.ns` is Σ weight·power
-    /// (weight in 1/m²), the radiance that a BSDF f reflects is Σ weight·f·power, without a cosine. Returns the radius of the kernel (m), which is 0 if
-    /// there is none.
+    /// (weight in 1/m²), the radiance that a BSDF f reflects is Σ weight·f·power, without a cosine. Returns the radius
+    /// of the kernel (m), which is 0 if there is none.
     pub fn gather(
         &self,
         at: &Place,
@@ -183,7 +184,7 @@ impl Place {
     #[inline]
     fn distance_squared(&self, photon: &Photon, d: Vec3, d2: f32, bound: f32) -> Option<f32> {
         let along = d.dot(self.n);
-        let d2 = d2 + FLATTENING * along * along;
+        let d2 = d2.max(FLATTENING * along * along);
         let belongs = d2 <= bound && photon.n().dot(self.n) >= MIN_NORMAL_COS && photon.wi().dot(self.n) > 0.0;
         belongs.then_some(d2)
     }

@@ -5,8 +5,8 @@ use crate::math::warp::{sample_cosine_hemisphere, sample_uniform_sphere};
 use crate::math::{Frame, Rgb, Vec3};
 use std::time::{Duration, Instant};
 
-/// Photons of constant density on the square |x|, |z| ≤ 1 of the plane y = height, by a Poisson process of `mean` photons, which together
-/// carry 4 W: an irradiance of 1 W/m² on average.
+/// Photons of constant density on the square |x|, |z| ≤ 1 of the plane y = height, by a Poisson process of `mean`
+/// photons, which together carry 4 W: an irradiance of 1 W/m² on average.
 fn plane(mean: f64, height: f32, n: Vec3, stream: &mut HashStream) -> Vec<Photon> {
     // Sum of exponential gaps
     let mut photons = Vec::new();
@@ -117,7 +117,7 @@ fn searches_find_what_a_scan_finds() {
         let q = photons[i * 13].p() + sample_uniform_sphere(stream.next_2d()) * (0.01 * (i % 3) as f32);
         let at = Place::flat(q, Vec3::Y);
         let mut distances: Vec<f32> =
-            photons.iter().map(|p| (p.p() - q).length_squared() + 16.0 * (p.p() - q).y.powi(2)).collect();
+            photons.iter().map(|p| (p.p() - q).length_squared().max(16.0 * (p.p() - q).y.powi(2))).collect();
         distances.sort_by(f32::total_cmp);
         let radius = map.gather(&at, Search::Nearest { count: 40, max_radius: 9.0 }, &mut scratch, |_, _| ());
         assert!((radius - distances[39].sqrt()).abs() <= 1e-5 * radius, "{radius} {}", distances[39].sqrt());
@@ -152,7 +152,7 @@ fn a_million_photons_on_a_plane_are_sorted_fast_and_found() {
     let map = PhotonMap::new(photons);
     // A second on a loaded machine, even without optimisation ten; a tree that cannot split would take hours
     assert!(start.elapsed() < Duration::from_secs(60), "{:?}", start.elapsed());
-    assert!(map.bytes() < 30 * map.len() as u64);
+    assert!(map.bytes() < 31 * map.len() as u64);
     let mut scratch = GatherScratch::default();
     let search = Search::Nearest { count: 1000, max_radius: 0.5 };
     let e = map.irradiance(&Place::flat(Vec3::new(0.3, 0.0, 0.4), Vec3::Y), search, &mut scratch).g;

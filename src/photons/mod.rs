@@ -5,9 +5,9 @@
 //! lights ─random walks─▶ arrivals ─store with probability p(x), or q·p(x)─▶ caustic and global photons ─tree─▶ maps
 //! ```
 //!
-//! Photons lie on surfaces whose BSDF has a Lambertian part ([`crate::bsdfs::Bsdf::lambertian`]), and tell how they came there
-//! ([`Origin`]): straight from a light, scattered by a Lambertian lobe, or by any other one, which makes them caustics, whether the light before that
-//! was direct or not.
+//! Photons lie on surfaces whose BSDF has a Lambertian part ([`crate::bsdfs::Bsdf::lambertian`]), and tell how they
+//! came there ([`Origin`]): straight from a light, scattered by a Lambertian lobe, or by any other one, which makes
+//! them caustics, whether the light before that was direct or not.
 //!
 //! Reading order: [`photon`], `tree`, [`map`]; [`shares`], `walk`, [`rules`], [`trace`]; [`importance`], [`error`].
 

@@ -61,8 +61,8 @@ pub struct Photon {
 const _: () = assert!(size_of::<Photon>() == 28);
 
 impl Photon {
-    /// A photon at `p` that came from the direction `wi` (unit, away from the surface). `n`: geometric normal of the surface
-    /// on the side of `wi`, unit. `power` (W) is not negative; what is not a number counts as 0.
+    /// A photon at `p` that came from the direction `wi` (unit, away from the surface). `n`: geometric normal of the
+    /// surface on the side of `wi`, unit. `power` (W) is not negative; what is not a number counts as 0.
     #[inline]
     pub fn new(p: Vec3, wi: Vec3, n: Vec3, power: Rgb, origin: Origin) -> Self {
         let (exponent, [r, g, b]) = pack_power(power);

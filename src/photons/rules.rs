@@ -1,7 +1,7 @@
 //! Which photons are stored [Keller and Wald 2000, §2.3].
 //!
-//! Of trajectories more are traced than the global map needs, so that the caustic map is finer: its photons are stored with probability
-//! p(x), those of the global map with q·p(x), and their power is divided by it.
+//! Of trajectories more are traced than the global map needs, so that the caustic map is finer: its photons are stored
+//! with probability p(x), those of the global map with q·p(x), and their power is divided by it.
 
 /// How the global map is thinned by the ratio q. All give the same maps on average.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
@@ -28,8 +28,8 @@ impl CausticRule {
         }
     }
 
-    /// Whether a photon of the global map is stored, and the factor of its power. `fills_global` is about its trajectory; `p` is only called
-    /// where the cheap tests pass.
+    /// Whether a photon of the global map is stored, and the factor of its power. `fills_global` is about its
+    /// trajectory; `p` is only called where the cheap tests pass.
     #[inline]
     pub fn global(self, q: f32, fills_global: bool, xi: [f32; 2], p: impl FnOnce() -> f32) -> Option<f32> {
         match self {

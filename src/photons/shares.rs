@@ -1,7 +1,8 @@
-//! Which light a trajectory starts from: p_i = (1 − a) Φ_i/Σ Φ + a/L over the L lights that emit anything, Φ being powers and a the
-//! floor, so that no light has less than a/L of the trajectories.
+//! Which light a trajectory starts from: p_i = (1 − a) Φ_i/Σ Φ + a/L over the L lights that emit anything, Φ being
+//! powers and a the floor, so that no light has less than a/L of the trajectories.
 //!
-//! The choice is by inversion, so that the numbers of a stratified sequence give each light its share to within few trajectories.
+//! The choice is by inversion, so that the numbers of a stratified sequence give each light its share to within few
+//! trajectories.
 
 use crate::lights::{LightId, LightSet};
 
@@ -35,8 +36,8 @@ impl LightShares {
         Some(LightShares { lights: lit.into_iter().map(|(light, _)| light).collect(), cumulative })
     }
 
-    /// A light, and its probability, by a number of twice 24 bits: `u[1]` fills the gaps between the values of `u[0]`, which
-    /// are wider than the shares of many lights.
+    /// A light, and its probability, by a number of twice 24 bits: `u[1]` fills the gaps between the values of `u[0]`,
+    /// which are wider than the shares of many lights.
     #[inline]
     pub fn sample(&self, u: [f32; 2]) -> (LightId, f32) {
         const STEPS: f64 = 16_777_216.0;

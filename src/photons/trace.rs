@@ -1,11 +1,12 @@
 //! Photon tracing: random walks from the lights in batches, put together in the order of trajectories.
 //!
-//! Trajectory t is a point of a scrambled Sobol' sequence over path space [Keller 1998, ch. 3; Burley 2020], whose numbers choose the light, where and
-//! which way the photon leaves it, and every scattering. The sequence has 2¹⁶ points, so trajectories come in blocks of as many, which
-//! are scrambled independently. What is stored depends on the scene, the settings and the number of trajectories only.
+//! Trajectory t is a point of a scrambled Sobol' sequence over path space [Keller 1998, ch. 3; Burley 2020], whose
+//! numbers choose the light, where and which way the photon leaves it, and every scattering. The sequence has 2¹⁶
+//! points, so trajectories come in blocks of as many, which are scrambled independently. What is stored depends on the
+//! scene, the settings and the number of trajectories only.
 //!
-//! Photons that the global map holds (from lights, and scattered by Lambertian surfaces) and those of caustics come from the same trajectories,
-//! see [`super::rules`].
+//! Photons that the global map holds (from lights, and scattered by Lambertian surfaces) and those of caustics come
+//! from the same trajectories, see [`super::rules`].
 
 use super::error::PhotonError;
 use super::importance::Importance;
@@ -31,7 +32,7 @@ const ROUND: u64 = 32;
 /// log₂ of the points of a sequence.
 const SEQUENCE_BITS: u32 = 16;
 /// Bytes that a photon takes in a map, tree included.
-const BYTES: u64 = 30;
+const BYTES: u64 = 31;
 
 /// Domains below the stream of a trajectory.
 pub(super) mod domain {
@@ -55,7 +56,8 @@ pub struct Tracing {
     pub caustics: CausticRule,
     /// Part of the trajectories that lights share evenly, whatever their powers (0..1).
     pub floor: f32,
-    /// Trajectories in a row without a stored photon after which tracing stops with an error.
+    /// Trajectories without a stored photon after which tracing stops with an error: at the beginning, and in a row
+    /// while photons of the global map are counted.
     pub most_without_deposit: u64,
     /// Most memory of the maps (bytes).
     pub memory: Option<u64>,
@@ -126,8 +128,8 @@ impl Traced {
     }
 }
 
-/// Traces photons, on all threads of the current pool. The powers are such that Σ weight·power of a map's photons is an estimate of the irradiance
-/// that it holds.
+/// Traces photons, on all threads of the current pool. The powers are such that Σ weight·power of a map's photons is an
+/// estimate of the irradiance that it holds.
 pub fn trace_photons(
     world: &World,
     tracing: &Tracing,
@@ -151,9 +153,6 @@ pub fn trace_photons(
         Want::Trajectories(count) => run.trajectories(count)?,
         Want::Stored { global, most_trajectories } => run.stored(global, most_trajectories)?,
     };
-    if traced.stored() == 0 {
-        return Err(run.no_deposit(&traced));
-    }
     let per_trajectory = |photons: &mut [Photon], count: u64| {
         let factor = (1.0 / count as f64) as f32;
         photons.par_iter_mut().for_each(|photon| *photon = photon.scaled(factor));
@@ -181,6 +180,8 @@ struct Batch {
 struct Limits {
     global: u64,
     all: u64,
+    /// True while it is not known how many trajectories the global map takes.
+    is_open: bool,
 }
 
 struct Run<'a> {
@@ -200,59 +201,41 @@ impl Run<'_> {
     }
 
     fn trajectories(&self, count: u64) -> Result<Traced, PhotonError> {
-        let limits = Limits { global: self.global_part(count), all: count };
-        let mut traced = Traced { trajectories: count, global_trajectories: limits.global, ..Traced::default() };
-        self.trace_on(&mut traced, 0, limits, |_| limits)?;
-        Ok(traced)
+        let limits = Limits { global: self.global_part(count), all: count, is_open: false };
+        self.trace(limits, |_| limits)
     }
 
     fn stored(&self, wanted: u64, most: u64) -> Result<Traced, PhotonError> {
-        // Until the global map is full
-        let mut limits = Limits { global: most, all: most };
+        let mut limits = Limits { global: most, all: most, is_open: true };
         let mut stored = 0;
-        let mut traced = Traced::default();
-        let traced_so_far = self.trace_on(&mut traced, 0, limits, |round| {
-            for deposit in round.iter().flat_map(|batch| &batch.global) {
-                stored += 1;
-                // Photons of one trajectory stay together
-                if stored >= wanted && limits.global == most {
-                    let global = deposit.0 + 1;
-                    let all = match self.tracing.caustics {
-                        CausticRule::OneRule | CausticRule::TwoTests => global,
-                        CausticRule::FirstTrajectories => (global as f64 / f64::from(self.tracing.q)).ceil() as u64,
-                    };
-                    limits = Limits { global, all: all.clamp(global, most) };
-                }
+        self.trace(limits, |round| {
+            // Where the global map is full; photons of one trajectory stay together
+            let before = stored;
+            stored += round.iter().map(|batch| batch.global.len() as u64).sum::<u64>();
+            if before < wanted && stored >= wanted {
+                let mut deposits = round.iter().flat_map(|batch| &batch.global);
+                let last = deposits.nth((wanted - before - 1) as usize);
+                let global = last.map_or(most, |(trajectory, _)| trajectory + 1);
+                let all = match self.tracing.caustics {
+                    CausticRule::OneRule | CausticRule::TwoTests => global,
+                    CausticRule::FirstTrajectories => (global as f64 / f64::from(self.tracing.q)).ceil() as u64,
+                };
+                limits = Limits { global, all: all.clamp(global, most), is_open: false };
             }
             limits
-        })?;
-
-        // The caustic map goes on
-        traced.trajectories = limits.all;
-        traced.global_trajectories = limits.global;
-        self.trace_on(&mut traced, traced_so_far, limits, |_| limits)?;
-        Ok(traced)
+        })
     }
 
-    /// Traces trajectories from `first` on, round by round, until the limits that `look` makes of each round; returns where it stopped.
-    fn trace_on(
-        &self,
-        traced: &mut Traced,
-        first: u64,
-        mut limits: Limits,
-        mut look: impl FnMut(&[Batch]) -> Limits,
-    ) -> Result<u64, PhotonError> {
-        let mut begin = first;
-        let mut last_deposit = first;
-        // Limits may shrink while the rounds go on: then the rest is for the caustic map alone
-        let all = limits.all;
-        let mut global = limits.global;
-        while begin < limits.all.min(all) {
-            let end = (begin + ROUND * BATCH).min(limits.all);
-            let round = self.round(begin..end, global);
+    /// Traces trajectories, round by round, until the limits that `look` makes of each round.
+    fn trace(&self, mut limits: Limits, mut look: impl FnMut(&[Batch]) -> Limits) -> Result<Traced, PhotonError> {
+        let mut traced = Traced::default();
+        let mut last_deposit = 0;
+        while traced.trajectories < limits.all {
+            let end = (traced.trajectories + ROUND * BATCH).min(limits.all);
+            let round = self.round(traced.trajectories..end, limits.global);
             limits = look(&round);
-            global = limits.global;
-            let before = traced.stored();
+            let counted = |traced: &Traced| if limits.is_open { traced.global.len() as u64 } else { traced.stored() };
+            let before = counted(&traced);
             for batch in round {
                 let kept = |deposits: Vec<Deposit>, limit: u64| {
                     deposits.into_iter().take_while(move |(t, _)| *t < limit).map(|(_, photon)| photon)
@@ -262,21 +245,23 @@ impl Run<'_> {
                 traced.arrivals += batch.arrivals;
                 traced.rays += batch.rays;
             }
-            if traced.stored() > before {
+            traced.trajectories = end;
+            if counted(&traced) > before {
                 last_deposit = end;
-            } else if end - last_deposit >= self.tracing.most_without_deposit && traced.stored() == 0 {
-                return Err(self.no_deposit(&Traced { trajectories: end, ..std::mem::take(traced) }));
+            }
+            let without = end - last_deposit;
+            let is_vain = traced.stored() == 0 && end >= limits.all;
+            let is_waiting = traced.stored() == 0 || limits.is_open;
+            if is_vain || is_waiting && without >= self.tracing.most_without_deposit {
+                return Err(PhotonError::NoDeposit { trajectories: without, by_importance: traced.arrivals > 0 });
             }
             if let Some(limit) = self.tracing.memory.filter(|limit| traced.stored() * BYTES > *limit) {
                 return Err(PhotonError::OutOfMemory { limit, photons: traced.stored() });
             }
-            begin = end;
         }
-        Ok(begin)
-    }
-
-    fn no_deposit(&self, traced: &Traced) -> PhotonError {
-        PhotonError::NoDeposit { trajectories: traced.trajectories, by_importance: traced.arrivals > 0 }
+        traced.trajectories = limits.all;
+        traced.global_trajectories = limits.global;
+        Ok(traced)
     }
 
     /// Some trajectories, in parallel, in their order.
@@ -299,6 +284,9 @@ impl Run<'_> {
         let settings = WalkSettings { transport: Transport::Importance, max_depth: self.tracing.max_depth };
         let mut batch = Batch::default();
         walker.walk(self.world, &settings, |arrival| {
+            if arrival.part.reflectance.is_black() && arrival.part.transmittance.is_black() {
+                return;
+            }
             batch.arrivals += 1;
             let trajectory = trajectories.start + u64::from(arrival.particle.index);
             self.deposit(&mut batch, arrival, trajectory, trajectory < global, scratch);
@@ -335,9 +323,6 @@ impl Run<'_> {
         fills_global: bool,
         scratch: &mut GatherScratch,
     ) {
-        if arrival.part.reflectance.is_black() && arrival.part.transmittance.is_black() {
-            return;
-        }
         let mut p = || self.importance.map_or(1.0, |importance| importance.probability(arrival.p, arrival.n, scratch));
         let xi = arrival.xi();
         let particle = arrival.particle;

@@ -1,23 +1,26 @@
-//! A kd-tree that holds photons in its leaves and no pointers: the photons lie in the order of the leaves, a node has its
-//! plane, and all else follows from counts.
+//! A kd-tree over photons, which lie in the order of its leaves: 8 bytes a node, in preorder.
 //!
-//! Every node halves its photons by number across the longest side of their box, so that photons on a plane, of which all
-//! have one equal coordinate, are cut along the others. The nodes of a tree of L levels, 2^L − 1 of them, lie in preorder:
-//! those of the first half follow their parent, 2^(L − 1) − 1 of them, and then come those of the second half.
+//! A node halves its photons across the longest side of their box. Photons lie on walls, and many have one equal
+//! coordinate: those stay together, so that the two cells do not touch; halves are unequal then, but what has an equal
+//! coordinate is never cut along it again, so that the tree is no deeper for it than by three.
 
 use super::photon::Photon;
 use crate::math::Vec3;
 
-/// Most photons of a leaf.
-const LEAF: usize = 12;
-/// Halves of at least this many photons are built in parallel.
+/// Most photons of a leaf, unless they are all at one point.
+const LEAF: usize = 10;
+/// Photons from which on halves are built in parallel.
 const PARALLEL: usize = 1 << 14;
+/// The kind of leaves, beside the axes 0, 1, 2.
+const IS_LEAF: u32 = 3;
 
-/// A plane across which photons are halved.
-#[derive(Clone, Copy, Debug, Default)]
+/// A plane, or a leaf.
+#[derive(Clone, Copy, Debug)]
 struct Node {
-    split: f32,
-    axis: u32,
+    /// The plane's coordinate, by bits, or the first photon.
+    value: u32,
+    /// Axis or `IS_LEAF` in two bits; how many nodes on the second child is, or the number of photons.
+    kind: u32,
 }
 
 /// Photons in a tree.
@@ -25,35 +28,26 @@ struct Node {
 pub(super) struct Tree {
     pub(super) photons: Vec<Photon>,
     nodes: Vec<Node>,
-    levels: u32,
 }
 
-/// Part of the tree.
-#[derive(Clone, Copy)]
-struct Part {
-    node: usize,
-    levels: u32,
-    begin: usize,
-    end: usize,
-}
-
-/// A visitor of photons by distance. Positions differ from the query's by a vector whose length is at most the bound when visited.
+/// A visitor of photons.
 pub(super) trait Visit {
-    /// Squared distance from which on photons do not matter (m²).
+    /// Squared distance beyond which photons do not matter (m²).
     fn bound(&self) -> f32;
-    /// A photon within the bound.
+    /// A photon within the bound, by its offset and squared distance.
     fn photon(&mut self, index: usize, photon: &Photon, d: Vec3, d2: f32);
 }
 
 impl Tree {
     pub(super) fn new(mut photons: Vec<Photon>) -> Self {
-        let mut levels = 0;
-        while photons.len().div_ceil(1 << levels) > LEAF {
-            levels += 1;
+        // A place that is no number has no side
+        photons.retain(|photon| photon.p().is_finite());
+        let mut nodes = Vec::with_capacity(photons.len() / (LEAF / 3) + 1);
+        if !photons.is_empty() {
+            build(&mut photons, 0, &mut nodes);
         }
-        let mut nodes = vec![Node::default(); (1 << levels) - 1];
-        build(&mut photons, &mut nodes);
-        Tree { photons, nodes, levels }
+        nodes.shrink_to_fit();
+        Tree { photons, nodes }
     }
 
     /// Memory (bytes).
@@ -63,14 +57,17 @@ impl Tree {
 
     /// Visits the photons around `p`, the nearer halves first.
     pub(super) fn visit(&self, p: Vec3, visitor: &mut impl Visit) {
-        let all = Part { node: 0, levels: self.levels, begin: 0, end: self.photons.len() };
-        self.visit_part(all, p, Vec3::ZERO, visitor);
+        if !self.nodes.is_empty() {
+            self.visit_node(0, p, Vec3::ZERO, visitor);
+        }
     }
 
-    /// `offset`: from `p` to the nearest point of the part's cell, by axis.
-    fn visit_part(&self, part: Part, p: Vec3, offset: Vec3, visitor: &mut impl Visit) {
-        if part.levels == 0 {
-            for (i, photon) in (part.begin..).zip(&self.photons[part.begin..part.end]) {
+    /// `offset`: from `p` to the nearest point of the node's cell, by axis.
+    fn visit_node(&self, node: usize, p: Vec3, offset: Vec3, visitor: &mut impl Visit) {
+        let Node { value, kind } = self.nodes[node];
+        if kind & 3 == IS_LEAF {
+            let begin = value as usize;
+            for (i, photon) in (begin..).zip(&self.photons[begin..begin + (kind >> 2) as usize]) {
                 let d = photon.p() - p;
                 let d2 = d.length_squared();
                 if d2 <= visitor.bound() {
@@ -79,50 +76,77 @@ impl Tree {
             }
             return;
         }
-        let Node { split, axis } = self.nodes[part.node];
-        let axis = axis as usize;
-        let (middle, levels) = (half(part.begin, part.end), part.levels - 1);
-        let first = Part { node: part.node + 1, levels, begin: part.begin, end: middle };
-        let second = Part { node: part.node + (1 << levels), levels, begin: middle, end: part.end };
-        let across = split - p[axis];
+        let axis = (kind & 3) as usize;
+        let across = f32::from_bits(value) - p[axis];
+        let (first, second) = (node + 1, node + (kind >> 2) as usize);
         let (near, far) = if across > 0.0 { (first, second) } else { (second, first) };
-        self.visit_part(near, p, offset, visitor);
+        self.visit_node(near, p, offset, visitor);
         let mut offset = offset;
         offset[axis] = across;
         if offset.length_squared() <= visitor.bound() {
-            self.visit_part(far, p, offset, visitor);
+            self.visit_node(far, p, offset, visitor);
         }
     }
 }
 
-/// Where the second half begins.
-#[inline]
-fn half(begin: usize, end: usize) -> usize {
-    begin + (end - begin) / 2
+/// Appends the tree of some photons, which are those from `begin` on.
+fn build(photons: &mut [Photon], begin: u32, nodes: &mut Vec<Node>) {
+    let bounds = |photons: &[Photon]| {
+        let extremes = |(min, max): (Vec3, Vec3), photon: &Photon| (min.min(photon.p()), max.max(photon.p()));
+        photons.iter().fold((Vec3::INFINITY, Vec3::NEG_INFINITY), extremes)
+    };
+    let (min, max) = bounds(photons);
+    let axis = (max - min).max_position();
+    if photons.len() <= LEAF || !(max[axis] > min[axis]) {
+        nodes.push(Node { value: begin, kind: IS_LEAF | (photons.len() as u32) << 2 });
+        return;
+    }
+
+    // Cut
+    let middle = cut(photons, axis);
+    let (first, second) = photons.split_at_mut(middle);
+    let (low, high) = (bounds(first).1[axis], bounds(second).0[axis]);
+    let node = nodes.len();
+    nodes.push(Node { value: (0.5 * low + 0.5 * high).clamp(low, high).to_bits(), kind: axis as u32 });
+
+    // Children
+    let second_begin = begin + middle as u32;
+    if first.len() + second.len() >= PARALLEL {
+        let mut second_nodes = Vec::new();
+        rayon::join(|| build(first, begin, nodes), || build(second, second_begin, &mut second_nodes));
+        nodes[node].kind |= ((nodes.len() - node) as u32) << 2;
+        nodes.append(&mut second_nodes);
+    } else {
+        build(first, begin, nodes);
+        nodes[node].kind |= ((nodes.len() - node) as u32) << 2;
+        build(second, second_begin, nodes);
+    }
 }
 
-fn build(photons: &mut [Photon], nodes: &mut [Node]) {
-    let Some((node, below)) = nodes.split_first_mut() else { return };
-    // The longest side
-    let (mut min, mut max) = (Vec3::INFINITY, Vec3::NEG_INFINITY);
-    for photon in photons.iter() {
-        min = min.min(photon.p());
-        max = max.max(photon.p());
+/// Sorts photons into two sets, the first of which has the lesser coordinates, equal ones being in one set; about half
+/// of all if that can be. Returns the size of the first. Not all coordinates are equal.
+fn cut(photons: &mut [Photon], axis: usize) -> usize {
+    let half = photons.len() / 2;
+    let (below, median, above) = photons.select_nth_unstable_by(half, |a, b| a.p()[axis].total_cmp(&b.p()[axis]));
+    let median = median.p()[axis];
+    if below.iter().all(|photon| photon.p()[axis] < median) {
+        return half;
     }
-    let axis = (max - min).max_position();
+    let less = partition(below, |photon| photon.p()[axis] < median);
+    let equal_above = partition(above, |photon| photon.p()[axis] <= median);
+    let not_more = half + 1 + equal_above;
+    let is_nearer = half - less <= not_more - half;
+    if less > 0 && (is_nearer || not_more == photons.len()) { less } else { not_more }
+}
 
-    // Half of the photons on each side of it
-    let middle = half(0, photons.len());
-    let (_, median, _) = photons.select_nth_unstable_by(middle, |a, b| a.p()[axis].total_cmp(&b.p()[axis]));
-    *node = Node { split: median.p()[axis], axis: axis as u32 };
-
-    let is_large = photons.len() >= PARALLEL;
-    let (first, second) = photons.split_at_mut(middle);
-    let (first_nodes, second_nodes) = below.split_at_mut(below.len() / 2);
-    if is_large {
-        rayon::join(|| build(first, first_nodes), || build(second, second_nodes));
-    } else {
-        build(first, first_nodes);
-        build(second, second_nodes);
+/// Moves those that `belongs` tells to the front; returns their number.
+fn partition(photons: &mut [Photon], belongs: impl Fn(&Photon) -> bool) -> usize {
+    let mut count = 0;
+    for i in 0..photons.len() {
+        if belongs(&photons[i]) {
+            photons.swap(i, count);
+            count += 1;
+        }
     }
+    count
 }

@@ -1,21 +1,24 @@
 //! Random walks of particles, a batch at a time: of photons from lights, and of importons from the camera.
 //!
-//! At each surface a particle is scattered by its BSDF and survives with the probability by which its power would shrink, so that powers
-//! stay about equal [Arvo and Kirk 1990]. Photons carry flux, importons importance; their weights differ by the adjoint [Veach 1997, §5.3.2]:
+//! At each surface a particle is scattered by its BSDF and survives with the probability by which its power would
+//! shrink, so that powers stay about equal [Arvo and Kirk 1990]. Photons carry flux, importons importance; their
+//! weights differ by the adjoint [Veach 1997, §5.3.2]:
 //!
 //! * importons, as camera paths: f |wi·ns|/p
 //! * photons: f η² |wo·ns| |wi·n|/(|wo·n| p), f being that of radiance, which is scaled by 1/η² where light is refracted
 //!
 //! with the shading normal ns and the geometric normal n, and `wo` to where the particle comes from.
 //!
-//! What a scattering was is told apart by what it is *of*: the Lambertian part of the BSDF, or the rest. Where both scatter into the direction that
-//! was sampled, one of them is chosen in proportion to its f, and the weight is that of the chosen one over its probability.
+//! What a scattering was is told apart by what it is *of*: the Lambertian part of the BSDF, or the rest. Where both
+//! scatter into the direction that was sampled, one of them is chosen in proportion to its f, and the weight is that of
+//! the chosen one over its probability.
 
 use super::photon::Origin;
 use crate::accel::{Coherence, Hit, RayBatch};
 use crate::bsdfs::dielectric::Transport;
 use crate::bsdfs::{Lambertian, Resampled};
 use crate::materials::SurfaceBsdf;
+use crate::math::sphere_map::equal_area_sphere_to_square;
 use crate::math::{Ray, Rgb, Vec3};
 use crate::samplers::SampleStream;
 use crate::scene::{Found, World};
@@ -100,24 +103,47 @@ pub(super) struct Walker {
 }
 
 impl Walker {
-    /// Lets the active particles walk until all are gone, and tells of their arrivals at Lambertian surfaces: vertex by vertex, not
-    /// particle by particle.
+    /// Lets the active particles walk until all are gone, and tells of their arrivals at Lambertian surfaces: vertex by
+    /// vertex, not particle by particle.
     pub(super) fn walk(&mut self, world: &World, settings: &WalkSettings, mut arrive: impl FnMut(&Arrival<'_>)) {
+        self.sort(world);
+        let mut coherence = Coherence::Packets;
         for vertex in 0..=settings.max_depth {
             self.next.clear();
             while !self.active.is_empty() {
-                self.step(world, settings, vertex, &mut arrive);
+                self.step(world, settings, (vertex, coherence), &mut arrive);
+                coherence = Coherence::Incoherent;
             }
             std::mem::swap(&mut self.active, &mut self.next);
         }
         self.active.clear();
     }
 
+    /// Makes neighbours of particles that start alike: from one light, in like directions, near each other.
+    fn sort(&mut self, world: &World) {
+        let lights = &world.scene.lights;
+        let key = |particle: &Particle| {
+            let source = if let Origin::Primary(light) = particle.origin { light } else { 0 };
+            let direction = equal_area_sphere_to_square(particle.ray.d) * 64.0;
+            let place = (particle.ray.o - lights.scene_centre) / lights.scene_radius * 32.0 + 32.0;
+            let direction = [direction.x, direction.y].map(|x| (x as u32).min(63));
+            let place = place.to_array().map(|x| (x as u32).min(63));
+            (source, interleave(direction), interleave(place))
+        };
+        self.active.sort_by_cached_key(key);
+    }
+
     /// Takes the active particles to the next surface; those that pass it stay active.
-    fn step(&mut self, world: &World, settings: &WalkSettings, vertex: u32, arrive: &mut impl FnMut(&Arrival<'_>)) {
+    fn step(
+        &mut self,
+        world: &World,
+        settings: &WalkSettings,
+        (vertex, coherence): (u32, Coherence),
+        arrive: &mut impl FnMut(&Arrival<'_>),
+    ) {
         self.rays.clear();
         self.active.iter().for_each(|particle| self.rays.push(&particle.ray));
-        world.accel.intersect(&self.rays, Coherence::Incoherent, &mut self.hits);
+        world.accel.intersect(&self.rays, coherence, &mut self.hits);
         self.traced += self.rays.len() as u64;
 
         self.passing.clear();
@@ -145,6 +171,11 @@ impl Walker {
         }
         std::mem::swap(&mut self.active, &mut self.passing);
     }
+}
+
+/// The bits of coordinates below 64 by turns, highest first: near points have near codes [Morton 1966].
+fn interleave<const N: usize>(coordinates: [u32; N]) -> u32 {
+    (0..6).rev().flat_map(|bit| coordinates.map(move |x| x >> bit & 1)).fold(0, |code, bit| code << 1 | bit)
 }
 
 /// A surface that a particle leaves.

@@ -13,4 +13,5 @@ mod irradiance_cache;
 mod layering;
 mod mutations;
 mod photon_map;
+mod photons;
 mod reproduce;

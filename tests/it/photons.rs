@@ -1,0 +1,413 @@
+//! Photons: energy, known and path-traced irradiance, caustics, importance, the same bits, and scenes without any.
+
+use super::irradiance_cache::{ROOM, world_of};
+use lumiris::estimators::stats::{Welford, t_test, two_sample_z_test};
+use lumiris::integrators::irradiance_cache::gather::{Gatherer, Wanted};
+use lumiris::math::{Rgb, Vec3};
+use lumiris::photons::{
+    CausticRule, GatherScratch, Importance, ImportanceSettings, Photon, PhotonError, PhotonMap, Place, Search, Traced,
+    Tracing, Unimportant, Want, trace_importons, trace_photons,
+};
+use lumiris::scene::{Cached, IntegratorKind, World};
+use std::f64::consts::PI;
+
+/// Probability that a test fails by chance.
+const SIGNIFICANCE: f64 = 1e-4;
+/// What rounding may be off where there is no noise, relative.
+const ROUNDING: f64 = 5e-4;
+
+/// A closed box of side 4 about the origin, whose walls of albedo 0.5, 0.25, 0.75 emit 0.5 inwards, with things in it.
+fn furnace(things: &str) -> String {
+    let mut text = "Camera \"perspective\"\nWorldBegin\nMaterial \"diffuse\" \"rgb reflectance\" [ 0.5 0.25 0.75 ]\nAttributeBegin\n\
+        AreaLightSource \"diffuse\" \"rgb L\" [ 0.5 0.5 0.5 ]\n"
+        .to_owned();
+    for wall in [
+        "-2 -2 -2  2 -2 -2  2 2 -2  -2 2 -2",
+        "-2 -2 2  -2 2 2  2 2 2  2 -2 2",
+        "-2 -2 -2  -2 2 -2  -2 2 2  -2 -2 2",
+        "2 -2 -2  2 -2 2  2 2 2  2 2 -2",
+        "-2 -2 -2  -2 -2 2  2 -2 2  2 -2 -2",
+        "-2 2 -2  2 2 -2  2 2 2  -2 2 2",
+    ] {
+        text += &format!("Shape \"trianglemesh\" \"point3 P\" [ {wall} ] \"integer indices\" [ 0 1 2 0 2 3 ]\n");
+    }
+    text + "AttributeEnd\n" + things
+}
+
+fn trace(world: &World, tracing: &Tracing, count: u64) -> Traced {
+    trace_photons(world, tracing, None, Want::Trajectories(count)).unwrap()
+}
+
+fn both(traced: &Traced) -> Vec<Photon> {
+    traced.global.iter().chain(&traced.caustic).copied().collect()
+}
+
+fn assert_mean(values: &Welford, expected: f64, what: &str) {
+    let near = (values.mean() - expected).abs() <= ROUNDING * expected.abs();
+    assert!(
+        near || t_test(values, expected).p_value > SIGNIFICANCE,
+        "{what}: {} ± {}, not {expected}",
+        values.mean(),
+        values.standard_error()
+    );
+}
+
+fn channels(rgb: Rgb) -> [f64; 3] {
+    rgb.to_array().map(f64::from)
+}
+
+/// Irradiance at a place over seeds, by channel.
+fn irradiances(runs: u32, place: &Place, search: Search, photons: impl Fn(u32) -> Vec<Photon>) -> [Welford; 3] {
+    let mut e = [Welford::default(); 3];
+    for seed in 0..runs {
+        let map = PhotonMap::new(photons(seed));
+        let value = map.irradiance(place, search, &mut GatherScratch::default());
+        e.iter_mut().zip(channels(value)).for_each(|(e, value)| e.add(value));
+    }
+    e
+}
+
+#[test]
+fn energy_is_kept_at_every_bounce() {
+    let world = world_of(&furnace(""), |_| ());
+    // π L A through all walls
+    let flux = PI * 0.5 * 96.0;
+    let mut sums: [[Welford; 3]; 2] = Default::default();
+    for seed in 0..10 {
+        for (depth, sums) in [0, 3].into_iter().zip(&mut sums) {
+            let traced = trace(&world, &Tracing { seed, max_depth: depth, ..Tracing::default() }, 20_000);
+            assert!(traced.caustic.is_empty());
+            let mut sum = [0.0; 3];
+            for photon in &traced.global {
+                sum.iter_mut().zip(channels(photon.power())).for_each(|(sum, power)| *sum += power);
+            }
+            sums.iter_mut().zip(sum).for_each(|(w, sum)| w.add(sum));
+        }
+    }
+    for (c, rho) in [0.5_f64, 0.25, 0.75].into_iter().enumerate() {
+        assert_mean(&sums[0][c], flux, "primary photons");
+        let series: f64 = (0..=3).map(|k| rho.powi(k)).sum();
+        assert_mean(&sums[1][c], flux * series, "photons of four bounces");
+    }
+}
+
+#[test]
+fn a_furnace_has_its_irradiance_whatever_lossless_things_stand_in_it() {
+    // In equilibrium L = 0.5/(1 − ρ) everywhere
+    for (name, things) in [
+        ("nothing", ""),
+        ("glass", "Material \"dielectric\" Translate 0.2 -0.9 0.1 Shape \"sphere\" \"float radius\" [ 0.9 ]\n"),
+        (
+            "a mirror",
+            "Material \"conductor\" \"rgb reflectance\" [ 1 1 1 ] \"float roughness\" [ 0 ] Translate 0.2 -0.9 0.1 Shape \"sphere\" \"float radius\" [ 0.9 ]\n",
+        ),
+        (
+            "thin glass",
+            "Material \"thindielectric\" Shape \"trianglemesh\" \"point3 P\" [ -2 -1.5 -2  2 -1.5 -2  2 -1.2 2  -2 -1.2 2 ] \"integer indices\" [ 0 1 2 0 2 3 ]\n",
+        ),
+        ("no surface", "Material \"interface\" Translate 0.2 -0.9 0.1 Shape \"sphere\" \"float radius\" [ 0.9 ]\n"),
+    ] {
+        let world = world_of(&furnace(things), |_| ());
+        let place = Place::flat(Vec3::new(0.1, -2.0, 0.2), Vec3::Y);
+        let tracing = |seed| Tracing { seed, max_depth: 80, ..Tracing::default() };
+        let e = irradiances(12, &place, Search::Radius(0.5), |seed| both(&trace(&world, &tracing(seed), 20_000)));
+        for (c, rho) in [0.5, 0.25, 0.75].into_iter().enumerate() {
+            assert!(e[c].standard_error() < 0.05 * e[c].mean(), "{name}: the test can tell");
+            assert_mean(&e[c], PI * 0.5 / (1.0 - rho), name);
+        }
+        let traced = trace(&world, &tracing(0), 20_000);
+        let scatters = ["glass", "a mirror", "thin glass"].contains(&name);
+        assert_eq!(traced.caustic.is_empty(), !scatters, "{name}");
+        assert!(traced.caustic.iter().all(Photon::is_caustic) && !traced.global.iter().any(Photon::is_caustic));
+    }
+}
+
+/// A place whose irradiance path tracing tells.
+fn wanted(p: Vec3, n: Vec3) -> Wanted {
+    Wanted { p, p_error: Vec3::splat(1e-6), n, ns: n, time: 0.5, pixel_width: 0.0, spread: 0.0, pixel: [0, 0], key: 7 }
+}
+
+#[test]
+fn photons_agree_with_path_tracing_among_many_materials() {
+    let depth = 8;
+    let world = world_of(ROOM, |scene| {
+        scene.integrator.kind = IntegratorKind::IrradianceCache;
+        scene.integrator.cache.cached = Cached::All;
+        scene.integrator.cache.samples = 16_384;
+        scene.integrator.cache.passes = 256;
+        scene.integrator.max_depth = depth;
+    });
+    let places = [
+        ("the floor", Vec3::new(-0.1, 0.0, 0.5), Vec3::Y),
+        ("the red wall", Vec3::new(-1.0, 1.3, -0.3), Vec3::X),
+        ("the coated wall", Vec3::new(0.2, 1.1, -1.0), Vec3::Z),
+        ("the ceiling", Vec3::new(0.9, 2.0, 0.3), -Vec3::Y),
+    ];
+    let records = Gatherer::default().records(&world, &places.map(|(_, p, n)| wanted(p, n)));
+    for ((name, p, n), record) in places.into_iter().zip(records) {
+        let tracing = |seed| Tracing { seed, max_depth: depth - 1, ..Tracing::default() };
+        let search = Search::Radius(0.08);
+        let e = irradiances(6, &Place::flat(p, n), search, |seed| both(&trace(&world, &tracing(seed), 200_000)));
+        for (c, expected) in channels(record.light.e).into_iter().enumerate() {
+            // The kernel is not a point, and the reference has noise as well
+            let bound = 4.0 * e[c].standard_error() + 0.025 * expected;
+            assert!((e[c].mean() - expected).abs() < bound, "{name} {c}: {}, not {expected} ± {bound}", e[c].mean());
+        }
+    }
+}
+
+#[test]
+fn inside_glass_light_is_denser_by_the_square_of_the_index() {
+    // A white ball in a glass one takes no light away: L = 1.5² · 0.5/(1 − ρ) around it
+    let things = "Translate 0.2 -0.9 0.1\nMaterial \"dielectric\"\nShape \"sphere\" \"float radius\" [ 0.9 ]\n\
+        Material \"diffuse\" \"rgb reflectance\" [ 1 1 1 ]\nShape \"sphere\" \"float radius\" [ 0.6 ]\n";
+    let world = world_of(&furnace(things), |_| ());
+    let place = Place::flat(Vec3::new(0.2, -0.3, 0.1), Vec3::Y);
+    let tracing = |seed| Tracing { seed, max_depth: 150, ..Tracing::default() };
+    let e = irradiances(12, &place, Search::Radius(0.25), |seed| both(&trace(&world, &tracing(seed), 20_000)));
+    for (c, rho) in [0.5, 0.25, 0.75].into_iter().enumerate() {
+        assert!(e[c].standard_error() < 0.1 * e[c].mean(), "the test can tell");
+        assert_mean(&e[c], 2.25 * PI * 0.5 / (1.0 - rho), "inside glass");
+    }
+}
+
+#[test]
+fn shading_normals_reflect_photons_as_they_reflect_light() {
+    // A spot lights a part of an upright wall whose shading normals look up; the floor gets light from there only
+    const WALL: &str = r#"
+Camera "perspective"
+WorldBegin
+LightSource "spot" "rgb I" [ 10 10 10 ] "point3 from" [ 2 1 0 ] "point3 to" [ 0 1 0 ] "float coneangle" [ 14 ]
+Material "diffuse" "rgb reflectance" [ 0.8 0.8 0.8 ]
+Shape "trianglemesh" "point3 P" [ -3 0 -3  3 0 -3  3 0 3  -3 0 3 ] "integer indices" [ 0 1 2 0 2 3 ]
+Shape "trianglemesh" "point3 P" [ 0 0 -1  0 2 -1  0 2 1  0 0 1 ] "integer indices" [ 0 1 2 0 2 3 ]
+  "normal N" [ 0.8 0.6 0  0.8 0.6 0  0.8 0.6 0  0.8 0.6 0 ]
+"#;
+    let world = world_of(WALL, |scene| {
+        scene.integrator.kind = IntegratorKind::IrradianceCache;
+        scene.integrator.cache.cached = Cached::All;
+        scene.integrator.cache.samples = 65_536;
+        scene.integrator.max_depth = 2;
+    });
+    let (p, n) = (Vec3::new(1.0, 0.0, 0.1), Vec3::Y);
+    let [record] = Gatherer::default().records(&world, &[wanted(p, n)])[..] else { panic!("one record") };
+    let tracing = |seed| Tracing { seed, max_depth: 1, ..Tracing::default() };
+    let e =
+        irradiances(10, &Place::flat(p, n), Search::Radius(0.15), |seed| trace(&world, &tracing(seed), 200_000).global);
+    let expected = f64::from(record.light.e.g);
+    let bound = 4.0 * e[1].standard_error() + 0.02 * expected;
+    assert!(bound < 0.08 * expected, "the test can tell");
+    assert!((e[1].mean() - expected).abs() < bound, "{}, not {expected} ± {bound}", e[1].mean());
+}
+
+/// A floor below a glass ball. The light looks up or down.
+fn ball(light: &str) -> String {
+    "Camera \"perspective\"\nWorldBegin\n".to_owned()
+        + light
+        + r#"
+Material "diffuse" "rgb reflectance" [ 0.8 0.8 0.8 ]
+Shape "trianglemesh" "point3 P" [ -3 0 -3  3 0 -3  3 0 3  -3 0 3 ] "integer indices" [ 0 1 2 0 2 3 ]
+Shape "trianglemesh" "point3 P" [ -3 4 -3  3 4 -3  3 4 3  -3 4 3 ] "integer indices" [ 0 1 2 0 2 3 ]
+Material "dielectric" Translate 0 1.05 0 Shape "sphere" "float radius" [ 0.7 ]
+"#
+}
+
+#[test]
+fn caustics_come_from_direct_and_from_indirect_light() {
+    let below = Place::flat(Vec3::ZERO, Vec3::Y);
+    let mut scratch = GatherScratch::default();
+    let tracing = Tracing { max_depth: 6, ..Tracing::default() };
+
+    // A light above the ball: brighter below it than it would be without
+    let lit = ball("LightSource \"point\" \"rgb I\" [ 10 10 10 ] \"point3 from\" [ 0 3.5 0 ]\n");
+    let direct = trace(&world_of(&lit, |_| ()), &tracing, 100_000);
+    let e = PhotonMap::new(direct.caustic).irradiance(&below, Search::Radius(0.1), &mut scratch).g;
+    assert!(e > 2.0 * 10.0 / (3.5 * 3.5), "{e}");
+    // No light of the global map passes the ball
+    let shadow = PhotonMap::new(direct.global.iter().filter(|p| p.is_primary()).copied().collect());
+    assert_eq!(shadow.irradiance(&below, Search::Radius(0.1), &mut scratch), Rgb::BLACK);
+
+    // A spot that lights the ceiling only
+    let up = ball(
+        "LightSource \"spot\" \"rgb I\" [ 100 100 100 ] \"point3 from\" [ 0 2.5 0 ] \"point3 to\" [ 0 4 0 ] \"float coneangle\" [ 20 ]\n",
+    );
+    let indirect = trace(&world_of(&up, |_| ()), &tracing, 100_000);
+    assert!(indirect.global.iter().filter(|p| p.is_primary()).all(|p| p.p().y > 3.9));
+    let map = PhotonMap::new(indirect.caustic);
+    let at = |x: f32| Place::flat(Vec3::new(x, 0.0, 0.0), Vec3::Y);
+    let e = |x: f32, scratch: &mut GatherScratch| map.irradiance(&at(x), Search::Radius(0.15), scratch).g;
+    assert!(e(0.0, &mut scratch) > 10.0 * e(2.0, &mut scratch) && e(0.0, &mut scratch) > 0.0);
+}
+
+#[test]
+fn the_rules_of_caustics_give_the_same_maps() {
+    let world = world_of(ROOM, |_| ());
+    let place = Place::flat(Vec3::new(0.4, 0.0, 0.5), Vec3::Y);
+    let (q, count) = (0.2, 40_000);
+    let of = |rule, q| {
+        let tracing = move |seed| Tracing { seed, q, caustics: rule, max_depth: 5, ..Tracing::default() };
+        let run = |seed| trace(&world, &tracing(seed), count);
+        let search = Search::Radius(0.3);
+        let global = irradiances(12, &place, search, |seed| run(seed).global);
+        let caustic = irradiances(12, &place, search, |seed| run(seed).caustic);
+        (global, caustic, run(0))
+    };
+    let reference = of(CausticRule::FirstTrajectories, 1.0);
+    for rule in CausticRule::ALL {
+        let thinned = of(rule, q);
+        for c in 0..3 {
+            for (a, b) in [(&reference.0, &thinned.0), (&reference.1, &thinned.1)] {
+                let test = two_sample_z_test(&a[c], &b[c]);
+                assert!(test.p_value > SIGNIFICANCE, "{rule:?} {c}: {} {}", a[c].mean(), b[c].mean());
+            }
+        }
+        // The caustic map is that of all trajectories, the global one is as much smaller as q says
+        assert_eq!(thinned.2.caustic.len(), reference.2.caustic.len(), "{rule:?}");
+        let share = thinned.2.global.len() as f64 / reference.2.global.len() as f64;
+        assert!((share / f64::from(q) - 1.0).abs() < 0.03, "{rule:?} {share}");
+    }
+}
+
+/// Two rooms and a slit between them; the camera looks at the floor of the left one, the light is in the right one or
+/// in both.
+const ROOMS: &str = r#"
+LookAt -1 1.9 0  -1 0 0  0 0 1
+Camera "perspective" "float fov" [ 60 ]
+Film "rgb" "integer xresolution" [ 16 ] "integer yresolution" [ 16 ]
+WorldBegin
+LightSource "point" "rgb I" [ 5 4 3 ] "point3 from" [ 1 1.5 0 ]
+LightSource "point" "rgb I" [ 1 1 1 ] "point3 from" [ -1.5 1.5 0.5 ]
+Material "diffuse" "rgb reflectance" [ 0.7 0.6 0.5 ]
+Shape "trianglemesh" "point3 P" [ -2 0 -1  2 0 -1  2 0 1  -2 0 1 ] "integer indices" [ 0 1 2 0 2 3 ]
+Shape "trianglemesh" "point3 P" [ -2 2 -1  2 2 -1  2 2 1  -2 2 1 ] "integer indices" [ 0 1 2 0 2 3 ]
+Shape "trianglemesh" "point3 P" [ -2 0 -1  2 0 -1  2 2 -1  -2 2 -1 ] "integer indices" [ 0 1 2 0 2 3 ]
+Shape "trianglemesh" "point3 P" [ -2 0 1  2 0 1  2 2 1  -2 2 1 ] "integer indices" [ 0 1 2 0 2 3 ]
+Shape "trianglemesh" "point3 P" [ -2 0 -1  -2 2 -1  -2 2 1  -2 0 1 ] "integer indices" [ 0 1 2 0 2 3 ]
+Shape "trianglemesh" "point3 P" [ 2 0 -1  2 2 -1  2 2 1  2 0 1 ] "integer indices" [ 0 1 2 0 2 3 ]
+Shape "trianglemesh" "point3 P" [ 0 0 -1  0 2 -1  0 2 0.7  0 0 0.7 ] "integer indices" [ 0 1 2 0 2 3 ]
+"#;
+
+fn importance(world: &World, unimportant: Unimportant) -> Importance {
+    let settings = ImportanceSettings { trajectories: 20_000, unimportant, ..ImportanceSettings::default() };
+    trace_importons(world, &settings).unwrap()
+}
+
+#[test]
+fn importance_moves_photons_to_what_is_seen_and_keeps_their_light() {
+    let world = world_of(ROOMS, |_| ());
+    let tracing = |seed| Tracing { seed, max_depth: 4, q: 0.5, ..Tracing::default() };
+    let (count, runs) = (30_000, 20);
+    let by = |importance: Option<&Importance>, seed| {
+        trace_photons(&world, &tracing(seed), importance, Want::Trajectories(count)).unwrap()
+    };
+    let floor = importance(&world, Unimportant::Floor(0.02));
+    assert!(floor.is_unbiased() && !importance(&world, Unimportant::CutOff(0.02)).is_unbiased());
+
+    // The same light in expectation, whether the place is seen or not
+    let seen = Place::flat(Vec3::new(-1.0, 0.0, 0.2), Vec3::Y);
+    let hidden = Place::flat(Vec3::new(1.2, 0.0, -0.3), Vec3::Y);
+    for place in [seen, hidden] {
+        let plain = irradiances(runs, &place, Search::Radius(0.3), |seed| by(None, seed).global);
+        let thinned = irradiances(runs, &place, Search::Radius(0.3), |seed| by(Some(&floor), 100 + seed).global);
+        for c in 0..3 {
+            let test = two_sample_z_test(&plain[c], &thinned[c]);
+            assert!(test.p_value > SIGNIFICANCE, "{} {}", plain[c].mean(), thinned[c].mean());
+        }
+    }
+
+    // Where the camera looks photons are as many and as strong as before, elsewhere few
+    let mut scratch = GatherScratch::default();
+    assert!(floor.probability(seen.p, seen.n, &mut scratch) > 0.9);
+    assert!(floor.probability(hidden.p, hidden.n, &mut scratch) < 0.2);
+    let (plain, thinned) = (by(None, 0), by(Some(&floor), 0));
+    let count = |traced: &Traced, side: f32| traced.global.iter().filter(|p| p.p().x * side > 0.0).count() as f64;
+    let kept = |side| count(&thinned, side) / count(&plain, side);
+    assert!(kept(-1.0) > 0.5 && kept(1.0) < 0.4 * kept(-1.0), "{} {}", kept(-1.0), kept(1.0));
+
+    // Cut off, photons are missing and none is strong
+    let cut = by(Some(&importance(&world, Unimportant::CutOff(0.2))), 0);
+    assert!(cut.stored() < plain.stored());
+    let strongest = |traced: &Traced| traced.global.iter().map(|p| p.power().r).fold(0.0, f32::max);
+    assert!(strongest(&cut) < 5.1 * strongest(&plain));
+}
+
+#[test]
+fn stored_photons_are_as_many_as_wanted_and_estimate_the_same() {
+    let world = world_of(ROOM, |_| ());
+    for rule in CausticRule::ALL {
+        let tracing = Tracing { q: 0.25, caustics: rule, max_depth: 4, ..Tracing::default() };
+        let want = Want::Stored { global: 20_000, most_trajectories: 10_000_000 };
+        let traced = trace_photons(&world, &tracing, None, want).unwrap();
+        assert!((20_000..20_005).contains(&traced.global.len()), "{rule:?} {}", traced.global.len());
+        // The same as of that many trajectories, but for the end of the last one
+        let again = trace(&world, &tracing, traced.trajectories);
+        assert_eq!(again.caustic, traced.caustic, "{rule:?}");
+        assert!(again.global.len().abs_diff(traced.global.len()) < 10, "{rule:?}");
+        assert!(again.global_trajectories.abs_diff(traced.global_trajectories) <= 1);
+    }
+    let want = Want::Stored { global: u64::MAX, most_trajectories: 5000 };
+    let traced = trace_photons(&world, &Tracing::default(), None, want).unwrap();
+    assert_eq!((traced.trajectories, traced.global_trajectories), (5000, 5000));
+}
+
+#[test]
+fn photons_are_the_same_for_any_number_of_threads() {
+    let world = world_of(ROOM, |_| ());
+    let run = |threads: usize| {
+        let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build().unwrap();
+        pool.install(|| {
+            let importance = importance(&world, Unimportant::Floor(0.05));
+            let tracing = Tracing { q: 0.3, max_depth: 5, ..Tracing::default() };
+            let want = Want::Stored { global: 30_000, most_trajectories: 1_000_000 };
+            trace_photons(&world, &tracing, Some(&importance), want).unwrap()
+        })
+    };
+    let one = run(1);
+    assert!(one.caustic.len() > 1000);
+    for threads in [2, 3] {
+        let other = run(threads);
+        assert_eq!((&other.global, &other.caustic), (&one.global, &one.caustic), "{threads} threads");
+        assert_eq!(other.trajectories, one.trajectories);
+    }
+}
+
+#[test]
+fn what_cannot_be_traced_is_said() {
+    const FLOOR: &str =
+        "Shape \"trianglemesh\" \"point3 P\" [ -1 0 -1  1 0 -1  1 0 1  -1 0 1 ] \"integer indices\" [ 0 1 2 0 2 3 ]\n";
+    let scene =
+        |light: &str, things: &str| world_of(&format!("Camera \"perspective\"\nWorldBegin\n{light}{things}"), |_| ());
+    let some = Want::Trajectories(1000);
+    let error = |world: &World, tracing: &Tracing, want| trace_photons(world, tracing, None, want).unwrap_err();
+    let tracing = Tracing::default();
+    let lamp = "LightSource \"point\" \"point3 from\" [ 0 1 0 ]\n";
+
+    assert_eq!(error(&scene("", FLOOR), &tracing, some), PhotonError::NoLight);
+    let black = "LightSource \"point\" \"rgb I\" [ 0 0 0 ]\n";
+    assert_eq!(error(&scene(black, FLOOR), &tracing, some), PhotonError::NoEmission);
+    let lit = scene(lamp, FLOOR);
+    assert_eq!(error(&lit, &tracing, Want::Trajectories(0)), PhotonError::NothingWanted);
+    assert_eq!(error(&lit, &tracing, Want::Stored { global: 0, most_trajectories: 9 }), PhotonError::NothingWanted);
+    for q in [0.0, 1.5, f32::NAN] {
+        assert!(matches!(error(&lit, &Tracing { q, ..tracing }, some), PhotonError::InvalidRatio(_)));
+    }
+
+    // Never a hang: nothing is hit, or nothing that is diffuse
+    let mirror = format!("Material \"conductor\"\n{FLOOR}");
+    for things in ["", &mirror] {
+        let tracing = Tracing { most_without_deposit: 300_000, ..tracing };
+        let want = Want::Stored { global: 10, most_trajectories: u64::MAX };
+        match error(&scene(lamp, things), &tracing, want) {
+            PhotonError::NoDeposit { trajectories, by_importance: false } => {
+                assert!((300_000..600_000).contains(&trajectories));
+            }
+            other => panic!("{other}"),
+        }
+    }
+    let tight = Tracing { memory: Some(100_000), ..tracing };
+    assert!(matches!(error(&lit, &tight, Want::Trajectories(1_000_000)), PhotonError::OutOfMemory { .. }));
+
+    // A camera that sees nothing: the floor is behind it
+    let blind = trace_importons(&scene("Scale 1 1 1\n", "Translate 0 -1 -5 \n"), &ImportanceSettings::default());
+    assert_eq!(blind.unwrap_err(), PhotonError::CameraSeesNothing);
+}
