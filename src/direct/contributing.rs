@@ -64,8 +64,7 @@ impl Contributing {
         let ctx = point.light_ctx();
         let at = At { lights, index, point, ctx };
         self.seen.clear();
-        let is_lit = |&&(light, _): &&(LightId, u32)| lights.lit.binary_search(&light).is_ok();
-        self.seen.extend(lights.around(&ctx).lights.iter().filter(is_lit));
+        self.seen.extend_from_slice(lights.around(&ctx).lights);
 
         let n = point.split.samples;
         if self.seen.is_empty() {

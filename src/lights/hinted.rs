@@ -118,7 +118,7 @@ impl HintedChoice {
         if self.base.tree.contains(light) {
             self.base.tree.light_importance(ctx, light)
         } else {
-            self.irradiances.get(light as usize).copied().unwrap_or(0.0)
+            self.irradiances[light as usize]
         }
     }
 

@@ -184,6 +184,22 @@ impl LightHints {
         slot
     }
 
+    /// The same without the lights that are not in question.
+    #[must_use]
+    pub fn of_lights(self, is_light: impl Fn(LightId) -> bool) -> Self {
+        if self.entries.iter().all(|&(light, _)| is_light(light)) {
+            return self;
+        }
+        let items_of = |slot: &Slot| {
+            let entries = &self.entries[slot.first as usize..(slot.first + slot.len) as usize];
+            entries.iter().map(|&(light, count)| (slot.key, light, count)).collect::<Vec<_>>()
+        };
+        let mut items: Vec<_> = self.slots.iter().flat_map(items_of).collect();
+        items.retain(|&(_, light, _)| is_light(light));
+        items.sort_unstable();
+        LightHints::from_sorted(self.origin, self.radius, &items)
+    }
+
     /// The radius r (m) within which photons are always found.
     pub fn radius(&self) -> f32 {
         self.radius
@@ -306,6 +322,10 @@ mod tests {
         let around = hints.around_with_sums(at(0.5, 0.5), Vec3::Z);
         assert_eq!(around.sums.last().copied(), Some(around.lights[0].1));
         assert!(around.visibility(3) > 0.9 && around.visibility(8) == UNSEEN);
+
+        let some = hints.clone().of_lights(|light| light != 3);
+        assert_eq!(some.around(at(0.5, 0.5), Vec3::NEG_Z), hints.around(at(0.5, 0.5), Vec3::NEG_Z));
+        assert!(some.around(at(0.5, 0.5), Vec3::Z).is_empty());
         assert_eq!(Around::default().visibility(8), 1.0);
     }
 

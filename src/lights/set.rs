@@ -97,9 +97,10 @@ impl LightSet {
     }
 
     /// From now on uses what photons tell of the visibility of lights, wherever settings ask for it. Estimates stay unbiased
-    /// whatever it is.
+    /// whatever it is. Lights without power, and those that there are not, are left out.
     pub fn set_hints(&mut self, hints: Option<LightHints>) {
-        self.hints = hints.map(Arc::new);
+        let is_lit = |light: LightId| self.lit.binary_search(&light).is_ok();
+        self.hints = hints.map(|hints| Arc::new(hints.of_lights(is_lit)));
         self.sampler.set_hints(self.hints.clone());
     }
 
