@@ -11,6 +11,7 @@ mod estimators_1d;
 mod evaluated;
 mod irradiance_cache;
 mod layering;
+mod light_hints;
 mod mutations;
 mod photon_map;
 mod photons;
