@@ -2,14 +2,15 @@
 //!
 //! [`Scene`] is data, as an importer makes it; [`World`] is a scene with its ray tracers, ready to render.
 
+mod ris_settings;
 mod settings;
 mod split_map;
 mod world;
 
+pub use ris_settings::{ProposalPoints, Proposals, RisSettings, StageTimes, Strata, Target};
 pub use settings::{
     Cached, ContributingSettings, CorrelatedForm, CorrelatedSettings, EstimatorKind, IntegratorKind,
-    IntegratorSettings, IrradianceCacheSettings, OcvSettings, OptimalForm, ProposalPoints, Proposals, RisSettings,
-    SamplingTechnique, Split, StageTimes, Strata, Target,
+    IntegratorSettings, IrradianceCacheSettings, OcvSettings, OptimalForm, SamplingTechnique, Split,
 };
 pub use split_map::SplitMap;
 pub use world::{AccelKind, EmitterHit, World};
