@@ -4,16 +4,17 @@
 
 mod found;
 mod photon_settings;
+mod ris_settings;
 mod settings;
 mod split_map;
 mod world;
 
 pub use found::Found;
 pub use photon_settings::{Deposition, PhotonMapSettings, Shrinking};
+pub use ris_settings::{ProposalPoints, Proposals, RisSettings, StageTimes, Strata, Target};
 pub use settings::{
     Cached, ContributingSettings, CorrelatedForm, CorrelatedSettings, EstimatorKind, IntegratorKind,
-    IntegratorSettings, IrradianceCacheSettings, OcvSettings, OptimalForm, ProposalPoints, Proposals, RisSettings,
-    SamplingTechnique, Split, StageTimes, Strata, Target,
+    IntegratorSettings, IrradianceCacheSettings, OcvSettings, OptimalForm, SamplingTechnique, Split,
 };
 pub use split_map::SplitMap;
 pub use world::{AccelKind, EmitterHit, World};

@@ -35,11 +35,7 @@ Shape "trianglemesh" "point3 P" [ 1 0 -1  1 2 -1  1 2 1  1 0 1 ] "integer indice
 "#;
 
 /// A room of diffuse, coated, transmitting, metal and glass things, lit by a panel below its ceiling.
-<<<<<<< HEAD
 pub(crate) const ROOM: &str = r#"
-=======
-pub const ROOM: &str = r#"
->>>>>>> photons
 LookAt 0 1 3.9  0 0.9 0  0 1 0
 Camera "perspective" "float fov" [ 38 ]
 Film "rgb" "integer xresolution" [ 48 ] "integer yresolution" [ 48 ]
@@ -73,11 +69,7 @@ Material "diffusetransmission" "rgb reflectance" [ 0.3 0.3 0.3 ] "rgb transmitta
 Shape "trianglemesh" "point3 P" [ -0.9 0.8 0.3  -0.3 0.8 0.3  -0.3 1.3 0.1  -0.9 1.3 0.1 ] "integer indices" [ 0 1 2 0 2 3 ]
 "#;
 
-<<<<<<< HEAD
 pub(crate) fn world_of(text: &str, change: impl FnOnce(&mut lumiris::scene::Scene)) -> World {
-=======
-pub fn world_of(text: &str, change: impl FnOnce(&mut lumiris::scene::Scene)) -> World {
->>>>>>> photons
     world_with_packets(text, None, change)
 }
 
