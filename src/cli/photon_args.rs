@@ -33,6 +33,10 @@ pub struct PhotonArgs {
     /// First radius of a progressive map [default: how far the nearest K photons reach where the camera looks]
     #[arg(long, value_name = "METRES", value_parser = parse_radius)]
     pub photon_radius: Option<f32>,
+    /// Photons that tell which lights are seen, for --light-choice photons, --target visibility and --estimator contributing
+    /// [default: the file's, or 256 for each light, at least 131072]
+    #[arg(long, value_name = "N", value_parser = clap::value_parser!(u32).range(1..))]
+    pub light_photons: Option<u32>,
     /// Most memory of the maps, such as 800M or 4G [default: 4G]
     #[arg(long, value_name = "BYTES", value_parser = parse_bytes)]
     pub memory: Option<u64>,
@@ -48,6 +52,7 @@ impl PhotonArgs {
         s.caustic_ratio = self.caustic_ratio.unwrap_or(s.caustic_ratio);
         s.deposition = self.importance.unwrap_or(s.deposition);
         s.guide = self.gather_guide.unwrap_or(s.guide);
+        s.light_photons = self.light_photons.or(s.light_photons);
         s.memory = self.memory.unwrap_or(s.memory);
         if let Some(alpha) = self.progressive {
             s.progressive = Some(Shrinking { alpha, ..s.progressive.unwrap_or_default() });

@@ -181,6 +181,9 @@ pub fn settings_metadata(scene: &Scene) -> Vec<(String, String)> {
             entries.push(("cache_passes", c.passes.to_string()));
         }
     }
+    if i.uses_light_hints() {
+        entries.extend(i.photons.light_photons.map(|n| ("light_photons", n.to_string())));
+    }
     if i.kind == IntegratorKind::PhotonMap {
         let p = &i.photons;
         entries.extend([

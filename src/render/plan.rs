@@ -1,4 +1,5 @@
-//! What `ris` leaves open until the scene is there: the number of proposals M for N samples.
+//! What settings leave open until the scene is there: photons that tell which lights are seen, and of `ris` the number of proposals M
+//! for N samples.
 //!
 //! T1, the time of a proposal, and T2, that of a sample, are measured on a few thousand camera rays. Then
 //!
@@ -9,7 +10,7 @@
 //! Times differ from run to run; so the numbers chosen are part of the picture's metadata, and giving them back gives the same
 //! picture to the bit.
 
-use super::{RenderSettings, Run, ThreadError, camera_batches};
+use super::{RenderSettings, Run, ThreadError, camera_batches, hints};
 use crate::direct::Fits;
 use crate::estimators::ris::choice::{Costs, MomentsEstimate, Variances, clamp_ratio, optimal_ratio};
 use crate::film::PixelBounds;
@@ -47,6 +48,9 @@ pub struct Plan {
 /// map of the best M/N even if it is not used.
 pub fn prepare(world: &mut World, threads: Option<usize>, ratio_map: bool) -> Result<Option<Plan>, ThreadError> {
     let settings = world.scene.integrator;
+    if settings.uses_light_hints() && world.scene.lights.hints().is_none() {
+        super::thread_pool(threads)?.install(|| hints::trace(world));
+    }
     let is_open = !matches!(settings.ris.proposals, Proposals::Fixed(_));
     if settings.estimator != EstimatorKind::Ris || !is_open && !ratio_map {
         return Ok(None);

@@ -19,6 +19,9 @@ pub struct PhotonMapSettings {
     pub guide: f32,
     /// New photons and smaller radii from sample to sample; `None` for one map.
     pub progressive: Option<Shrinking>,
+    /// Trajectories of photons that tell which lights are seen, for all integrators and where settings of direct light ask for it;
+    /// by the number of lights if `None`.
+    pub light_photons: Option<u32>,
     /// Most bytes that the maps may take.
     pub memory: u64,
     /// Most trajectories that are traced for one map.
@@ -35,6 +38,7 @@ impl Default for PhotonMapSettings {
             gather: 4,
             guide: 0.5,
             progressive: None,
+            light_photons: None,
             memory: 4 << 30,
             trajectories: 1 << 30,
         }

@@ -196,11 +196,12 @@ fn cache_parameters(s: &mut IrradianceCacheSettings, p: &ParamSet, d: &mut Diagn
 
 /// Parameters of `photon-map`, and those of `sppm` that mean the same.
 fn photon_parameters(s: &mut PhotonMapSettings, p: &ParamSet, d: &mut Diagnostics) {
-    s.photons = count(p, "photons", d).unwrap_or(s.photons);
+    s.photons = photon_count(p, "photons", d).unwrap_or(s.photons);
     // Trajectories there, stored photons here; −1 is the choice of the renderer
     if let Some(n @ 1..) = p.integer("photonsperiteration", d) {
         s.photons = n as u32;
     }
+    s.light_photons = photon_count(p, "lightphotons", d).or(s.light_photons);
     s.nearest = count(p, "nearest", d).unwrap_or(s.nearest).max(2);
     if let Some(n) = p.integer("gather", d) {
         if let n @ 0..=4096 = n {
@@ -220,6 +221,17 @@ fn photon_parameters(s: &mut PhotonMapSettings, p: &ParamSet, d: &mut Diagnostic
     }
     if let Some(radius) = within(p, "radius", |r| r > 0.0 && r.is_finite(), "positive", d) {
         s.progressive.get_or_insert_default().radius = Some(radius);
+    }
+}
+
+/// A number of photons.
+fn photon_count(p: &ParamSet, key: &'static str, d: &mut Diagnostics) -> Option<u32> {
+    match p.integer(key, d)? {
+        n @ 1.. => Some(n as u32),
+        n => {
+            d.error(p.span_of(key), format!("{key} must be at least 1, not {n}"));
+            None
+        }
     }
 }
 
@@ -310,6 +322,43 @@ mod tests {
         assert_eq!((s.kind, s.cache, s.max_depth), (IntegratorKind::IrradianceCache, cache, 5));
         let s = settings("Integrator \"irradiance-cache\" \"float cacheminradius\" 90").unwrap();
         assert_eq!(s.cache, IrradianceCacheSettings { radius: [90.0, 90.0], ..Default::default() });
+    }
+
+    #[test]
+    fn settings_of_photon_maps_are_read() {
+        let s = settings(
+            "Integrator \"photon-map\" \"integer photons\" 1000000 \"float causticratio\" 0.5 \"string importance\" \"floor\"
+             \"float leastimportance\" 0.25 \"integer nearest\" 80 \"integer gather\" 0 \"float gatherguide\" 0 \"integer lightphotons\" 9000",
+        )
+        .unwrap();
+        let photons = PhotonMapSettings {
+            photons: 1_000_000,
+            caustic_ratio: 0.5,
+            deposition: Deposition::Floor(0.25),
+            nearest: 80,
+            gather: 0,
+            guide: 0.0,
+            light_photons: Some(9000),
+            ..Default::default()
+        };
+        assert_eq!((s.kind, s.photons), (IntegratorKind::PhotonMap, photons));
+        let s = settings("Integrator \"sppm\" \"float radius\" 0.5 \"integer photonsperiteration\" -1").unwrap();
+        assert_eq!(s.photons.progressive, Some(Shrinking { radius: Some(0.5), ..Default::default() }));
+    }
+
+    #[test]
+    fn wrong_settings_of_photon_maps_are_errors() {
+        for (parameter, message) in [
+            ("\"integer photons\" 0", "photons must be at least 1, not 0"),
+            ("\"float causticratio\" 0", "causticratio must be above 0 and up to 1, not 0"),
+            ("\"float gatherguide\" 1", "gatherguide must be from 0 to 0.95, not 1"),
+            ("\"integer gather\" -1", "gather must be from 0 to 4096, not -1"),
+            ("\"float alpha\" 1", "alpha must be above 0 and below 1, not 1"),
+            ("\"string importance\" \"all\"", "one of none, floor, cut-off"),
+        ] {
+            let error = settings(&format!("Integrator \"photon-map\" {parameter}")).unwrap_err();
+            assert!(error.contains(message), "{error}");
+        }
     }
 
     #[test]

@@ -1,0 +1,33 @@
+//! What photons tell of the visibility of lights, traced before the picture where its settings ask for it
+//! [Keller and Wald 2000, §3].
+
+use crate::lights::LightHints;
+use crate::photons::{Tracing, Want, trace_photons};
+use crate::scene::World;
+
+/// Trajectories for each light, and their least and greatest number.
+const PER_LIGHT: u64 = 256;
+const TRAJECTORIES: [u64; 2] = [1 << 17, 1 << 23];
+/// Share of the trajectories that all lights have evenly: a weak light next to a surface matters as a strong one far away does.
+const EVEN_SHARE: f32 = 0.5;
+
+/// Traces photons straight from lights and lets them tell which lights are seen. A scene that no photon arrives in has no hints, and
+/// estimates do without.
+pub(super) fn trace(world: &mut World) {
+    let lights = &world.scene.lights;
+    let fitting = (PER_LIGHT * lights.lights.len() as u64).clamp(TRAJECTORIES[0], TRAJECTORIES[1]);
+    let trajectories = world.scene.integrator.photons.light_photons.map_or(fitting, u64::from);
+    let tracing = Tracing {
+        seed: world.scene.sampling.seed,
+        max_depth: 0,
+        max_global_depth: 0,
+        floor: EVEN_SHARE,
+        ..Tracing::default()
+    };
+    let hints = trace_photons(world, &tracing, None, Want::Trajectories(trajectories)).ok().map(|traced| {
+        let primary: Vec<_> =
+            traced.global.iter().filter_map(|photon| Some((photon.p(), photon.n(), photon.light()?))).collect();
+        LightHints::adapted(&primary, lights.scene_radius)
+    });
+    world.scene.lights.set_hints(hints);
+}
