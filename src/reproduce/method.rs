@@ -2,6 +2,7 @@
 
 use crate::estimators::mis::Heuristic;
 use crate::estimators::ocv::Form;
+use crate::lights::LightSamplerKind;
 use crate::samplers::SamplerKind;
 use crate::scene::{
     Cached, EstimatorKind, IntegratorKind, IntegratorSettings, OptimalForm, ProposalPoints, Proposals, Strata, World,
@@ -25,6 +26,8 @@ pub struct Method {
     pub transport: Transport,
     /// Estimator of direct light.
     pub estimator: EstimatorKind,
+    /// How a light is chosen.
+    pub light_choice: LightSamplerKind,
     /// Weights of the techniques; the estimator's own if `None`.
     pub heuristic: Option<Heuristic>,
     /// How `ocv` finds its coefficients.
@@ -53,6 +56,7 @@ impl Method {
         Method {
             transport: Transport::Direct,
             estimator,
+            light_choice: LightSamplerKind::Tree,
             heuristic: None,
             form: Form::Progressive,
             optimal: OptimalForm::Progressive,
@@ -117,6 +121,7 @@ impl Method {
 
     /// Settings of the scene that do what the method says, where the file says `depth` bounces.
     pub(super) fn apply(&self, world: &mut World, depth: u32) {
+        world.set_light_choice(self.light_choice);
         let scene = &mut world.scene;
         let old = scene.integrator;
         let (kind, max_depth) = match self.transport {

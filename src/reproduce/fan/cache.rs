@@ -1,6 +1,6 @@
 //! Irradiance caching: records whose light of sources is computed by `mis` or by `ocv` [Fan et al. 2006, Fig. 4].
 
-use super::super::ReproduceError;
+use super::super::{ReproduceError, scaled};
 use super::super::figure::Figure;
 use super::super::measure::{Measured, Stage, View, turns};
 use super::super::method::{Method, Transport};
@@ -9,7 +9,7 @@ use super::super::pictures::{Picture, gain, significant};
 use super::direct::LONG_TURNS;
 use super::report::{Asked, HEADER, method_json, method_row, summary, variances};
 use super::truth::{Errors, Truth};
-use super::{Setup, scaled};
+use super::Setup;
 use crate::estimators::mis::Heuristic;
 use crate::estimators::ocv::Form;
 use serde_json::{Value, json};

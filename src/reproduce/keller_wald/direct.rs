@@ -1,0 +1,255 @@
+//! Direct light among many lights that are mostly hidden [Keller and Wald 2000, Fig. 5]: variance at equal time in the rooms with
+//! 100 lights, and what a sample costs among 10,000.
+
+use super::super::calibrate::{Calibration, calibrate};
+use super::super::figure::{Figure, Summary, estimate_json, plus_minus};
+use super::super::measure::{Estimate, Measured, Stage, View, reference, same_mean, turns};
+use super::super::method::Method;
+use super::super::page::{Block, Cell, Shown, Table};
+use super::super::pictures::{HEAT, Picture, Scale, gain, significant};
+use super::super::{Observer, ReproduceError, scaled};
+use super::{SHAPE, Setup};
+use crate::lights::LightSamplerKind;
+use crate::scene::{Split, Strata};
+use serde_json::{Value, json};
+use std::time::{Duration, Instant};
+
+/// Shadow rays of an estimate, and camera rays per pixel and turn.
+const SAMPLES: u32 = 4;
+const SPP: u32 = 4;
+/// Edge of the picture on which times are found out, and the least edge.
+const PILOT_SIZE: u32 = 64;
+const LEAST_SIZE: u32 = 16;
+/// Fewest and most turns.
+const TURNS: [u32; 2] = [4, 24];
+const QUICK_TURNS: u32 = 6;
+/// Turns that the size of the picture is chosen for.
+const WANTED_TURNS: f64 = 8.0;
+/// Part of the time for the scene with more lights.
+const MANY_SHARE: f64 = 0.3;
+
+/// What a method is for.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+enum Role {
+    /// Light and BSDF sampling over all lights: what others are compared with.
+    All,
+    /// Resampling without knowledge of visibility.
+    Resampled,
+    /// For completeness.
+    Other,
+}
+
+/// A method with its name on the page.
+struct Named {
+    name: &'static str,
+    role: Role,
+    method: Method,
+}
+
+fn methods(split: Split) -> Vec<Named> {
+    let named = |name, role, method: Method| Named { name, role, method: method.stratified() };
+    let by = |light_choice| Method { light_choice, ..Method::mis(SAMPLES) };
+    let ris = Method::ris(split.proposals, split.samples).strata(Strata::Systematic);
+    vec![
+        named("mis, all lights", Role::All, Method::mis(SAMPLES)),
+        named("mis, all lights, by power", Role::Other, by(LightSamplerKind::Power)),
+        named("mis, all lights alike", Role::Other, by(LightSamplerKind::Uniform)),
+        named("ris, visibility unknown", Role::Resampled, ris),
+    ]
+}
+
+/// What was measured on one scene.
+struct Outcome {
+    lights: usize,
+    size: [u32; 2],
+    calibration: Calibration,
+    named: Vec<Named>,
+    measured: Vec<Measured>,
+}
+
+impl Outcome {
+    /// Place of the method with a role.
+    fn place(&self, role: Role) -> usize {
+        self.named.iter().position(|n| n.role == role).expect("the roster has every role")
+    }
+
+    /// Variance at equal time of a method, relative to that with a role.
+    fn against(&self, i: usize, role: Role) -> Estimate {
+        self.measured[i].at_equal_time(&self.measured[self.place(role)], None)
+    }
+
+    /// Processor time of a method for each shadow segment (ns).
+    fn per_sample(&self, i: usize) -> f64 {
+        let m = &self.measured[i];
+        let segments = m.segments as f64 / m.turns().max(1) as f64;
+        m.median_seconds(|s| s.processor) * 1e9 / segments.max(1.0)
+    }
+}
+
+/// Measures both scenes within about `time`.
+pub fn run(setup: &Setup<'_>, time: Duration) -> Result<Figure, ReproduceError> {
+    (setup.observer.say)("Direct light …");
+    let few = measure(setup, "rooms.pbrt", time.mul_f64(1.0 - MANY_SHARE))?;
+    let many = measure(setup, "rooms-10000.pbrt", time.mul_f64(MANY_SHARE))?;
+    figure(setup, &few, &many)
+}
+
+fn measure(setup: &Setup<'_>, file: &str, time: Duration) -> Result<Outcome, ReproduceError> {
+    let start = Instant::now();
+    let Observer { say, .. } = setup.observer;
+    let path = setup.scenes.join(file);
+    let base = Method::mis(SAMPLES).stratified();
+
+    // As many pixels as fit
+    let pilot_size = setup.size.min(PILOT_SIZE);
+    let mut stage = Stage::load(&path, scaled(SHAPE, pilot_size), setup.options.threads)?;
+    let mut calibration = calibrate(&mut stage, &base, setup.observer)?;
+    let count = methods(calibration.split).len() as f64;
+    let turn = |c: &Calibration| c.seconds * f64::from(SPP) * count * 1.2;
+    let left = |spent: Duration| time.saturating_sub(spent).as_secs_f64();
+    let fits = (left(start.elapsed()) / (turn(&calibration) * WANTED_TURNS)).sqrt();
+    let size = ((f64::from(pilot_size) * fits) as u32 / 8 * 8).max(LEAST_SIZE).min(setup.size);
+    if size != pilot_size {
+        stage = Stage::load(&path, scaled(SHAPE, size), setup.options.threads)?;
+        calibration = calibrate(&mut stage, &base, setup.observer)?;
+    }
+
+    // As many turns as fit
+    let named = methods(calibration.split);
+    let list: Vec<Method> = named.iter().map(|n| n.method).collect();
+    let most = if setup.options.quick { QUICK_TURNS } else { TURNS[1] };
+    let count_turns = ((left(start.elapsed()) / turn(&calibration)) as u32).clamp(TURNS[0], most);
+    let (size, lights) = (stage.size(), stage.facts().1);
+    say(&format!("  {lights} lights, {} × {} pixels, {count_turns} turns of {count} methods", size[0], size[1]));
+    let measured = turns(&mut stage, &list, View::Centres, SPP, 0..count_turns, setup.observer)?;
+    Ok(Outcome { lights, size, calibration, named, measured })
+}
+
+fn figure(setup: &Setup<'_>, few: &Outcome, many: &Outcome) -> Result<Figure, ReproduceError> {
+    let mut blocks = vec![Block::Text(
+        "Direct light in rooms with a light each, of which a point sees one or two: the others are behind walls, and no bound on \
+         their distance and direction tells. Below it the same rooms with a hundred small lights each."
+            .to_owned(),
+    )];
+    for (o, name) in [(few, "direct"), (many, "direct-many")] {
+        blocks.push(facts(o));
+        blocks.extend(pictures(setup, o, name)?);
+        blocks.push(Block::Table(table(o)));
+    }
+    blocks.push(Block::Text("Processor time for each shadow segment, everything included:".to_owned()));
+    blocks.push(Block::Table(growth_table(few, many)));
+
+    let best = few.place(Role::Resampled);
+    let left = few.against(best, Role::All);
+    let factor = if left.value > 0.0 { 1.0 / left.value } else { 0.0 };
+    let growth = many.per_sample(best) / few.per_sample(best).max(1e-300);
+    Ok(Figure {
+        id: "direct",
+        title: "Figure 5: direct light among 100 and 10,000 lights",
+        summary: Summary {
+            paper: "“much less noise … at the same computational cost”".to_owned(),
+            target: "at equal time 10× less variance than mis over all lights".to_owned(),
+            measured: format!("{}: {}×", few.named[best].name, significant(factor)),
+            reached: factor >= 10.0,
+            reason: format!("relative variance {}", plus_minus(left)),
+        },
+        also: vec![(
+            "10,000 lights",
+            Summary {
+                paper: "effort “independent of the actual number of light sources”".to_owned(),
+                target: "cost of a sample grows less than 1.5×".to_owned(),
+                measured: format!("{}×", significant(growth)),
+                reached: growth < 1.5,
+                reason: format!(
+                    "{} → {} ns",
+                    significant(few.per_sample(best)),
+                    significant(many.per_sample(best))
+                ),
+            },
+        )],
+        blocks,
+        numbers: json!({ "few": outcome_json(few), "many": outcome_json(many), "growth": growth }),
+    })
+}
+
+fn facts(o: &Outcome) -> Block {
+    let Split { samples, proposals } = o.calibration.split;
+    Block::Facts(vec![
+        ("scene".to_owned(), format!("{} lights", o.lights)),
+        ("picture".to_owned(), format!("{} × {} pixels, {SPP} camera rays per pixel", o.size[0], o.size[1])),
+        ("turns".to_owned(), format!("{} of {} methods", o.measured[0].turns(), o.named.len())),
+        ("ris".to_owned(), format!("M = {proposals}, N = {samples} in the time of mis with N = {SAMPLES}")),
+    ])
+}
+
+/// Pictures of one turn of each method, and their variances.
+fn pictures(setup: &Setup<'_>, o: &Outcome, name: &str) -> Result<Vec<Block>, ReproduceError> {
+    let mean: Vec<[f32; 3]> = reference(&o.measured).iter().map(|p| p.map(|v| v as f32)).collect();
+    let exposure = gain(&mean);
+    let maps: Vec<Vec<f64>> = o.measured.iter().map(Measured::variance_map).collect();
+    let scale = Scale::of_values(HEAT, maps.iter().flatten());
+    let (mut shown, mut variances) = (Vec::new(), Vec::new());
+    for (i, (named, m)) in o.named.iter().zip(&o.measured).enumerate() {
+        let file = Picture::tone_mapped(o.size, &m.first, exposure).write(&setup.options.out, &format!("{name}-{i}"))?;
+        shown.push(Shown { file, title: named.name.to_owned(), caption: String::new() });
+        let picture = Picture::colored(o.size, &maps[i], &scale);
+        let file = picture.write(&setup.options.out, &format!("{name}-variance-{i}"))?;
+        let caption = format!("mean {}", significant(m.variance(None).value));
+        variances.push(Shown { file, title: named.name.to_owned(), caption });
+    }
+    let file = Picture::tone_mapped(o.size, &mean, exposure).write(&setup.options.out, &format!("{name}-mean"))?;
+    shown.push(Shown { file, title: "mean of all".to_owned(), caption: String::new() });
+    let legend = Block::Legend { title: "variance of a pixel (luminance²), one turn".to_owned(), scale };
+    Ok(vec![Block::Pictures(shown), Block::Pictures(variances), legend])
+}
+
+fn table(o: &Outcome) -> Table {
+    let header = ["method", "N", "variance", "time", "variance at equal time", "efficiency against mis", "against ris", "same mean, p"];
+    let mut table = Table::new(&header);
+    let base = &o.measured[o.place(Role::All)];
+    for (i, m) in o.measured.iter().enumerate() {
+        let relative = o.against(i, Role::All);
+        let against_ris = o.against(i, Role::Resampled);
+        let inverse = |e: Estimate| if e.value > 0.0 { significant(1.0 / e.value) + "×" } else { "–".to_owned() };
+        table.row([
+            Cell::text(o.named[i].name),
+            Cell::number(m.method.samples.to_string()),
+            Cell::number(plus_minus(m.variance(None))),
+            Cell::number(format!("{:.2}", m.time_ratio(base))),
+            Cell::number(plus_minus(relative)),
+            Cell::number(inverse(relative)),
+            Cell::number(inverse(against_ris)),
+            Cell::number(format!("{:.3}", same_mean(&o.measured, i))),
+        ]);
+    }
+    table
+}
+
+fn growth_table(few: &Outcome, many: &Outcome) -> Table {
+    let (a, b) = (format!("{} lights (ns)", few.lights), format!("{} lights (ns)", many.lights));
+    let mut table = Table::new(&["method", &a, &b, "growth"]);
+    for (i, named) in few.named.iter().enumerate() {
+        let [x, y] = [few.per_sample(i), many.per_sample(i)];
+        let cells = [significant(x), significant(y), format!("{:.2}×", y / x.max(1e-300))];
+        table.row(std::iter::once(Cell::text(named.name)).chain(cells.map(Cell::number)));
+    }
+    table
+}
+
+fn outcome_json(o: &Outcome) -> Value {
+    let base = &o.measured[o.place(Role::All)];
+    let method = |(i, m): (usize, &Measured)| {
+        json!({
+            "name": o.named[i].name, "estimator": m.method.estimator.name(), "light_choice": m.method.light_choice.name(),
+            "samples": m.method.samples, "proposals": m.method.proposals, "turns": m.turns(),
+            "variance": estimate_json(m.variance(None)), "time_ratio": m.time_ratio(base),
+            "at_equal_time": estimate_json(o.against(i, Role::All)),
+            "at_equal_time_of_ris": estimate_json(o.against(i, Role::Resampled)),
+            "mean": estimate_json(m.mean()), "same_mean_p": same_mean(&o.measured, i),
+            "nanoseconds_per_sample": o.per_sample(i), "segments": m.segments, "invalid_samples": m.invalid,
+            "seconds": m.seconds,
+        })
+    };
+    let methods: Vec<Value> = o.measured.iter().enumerate().map(method).collect();
+    json!({ "lights": o.lights, "size": o.size, "camera_rays": SPP, "methods": methods })
+}
