@@ -9,7 +9,7 @@
 //! | 2 | [`textures`], [`geometry`], [`bsdfs`], [`cameras`], [`film`] |
 //! | 3 | [`materials`], [`lights`], [`accel`] |
 //! | 4 | [`scene`] |
-//! | 5 | [`import`], [`direct`], [`procedural`] |
+//! | 5 | [`import`], [`direct`], [`photons`], [`procedural`] |
 //! | 6 | [`integrators`] |
 //! | 7 | [`render`] |
 //! | 8 | [`cli`], [`compare`], [`reproduce`] |
@@ -29,6 +29,7 @@ pub mod integrators;
 pub mod lights;
 pub mod materials;
 pub mod math;
+pub mod photons;
 pub mod procedural;
 pub mod render;
 pub mod reproduce;

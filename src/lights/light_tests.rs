@@ -9,23 +9,23 @@ use crate::math::warp::{invert_uniform_triangle, sample_uniform_triangle};
 use crate::math::{Affine3A, Mat3, Quat, Rgb, Vec2, Vec3};
 use std::f64::consts::PI;
 
-const CELLS: usize = 16;
+pub(super) const CELLS: usize = 16;
 
 /// A light with a map of the unit square onto its surface: point, normal and area per unit of the square.
-struct Surface {
-    light: AreaLight,
-    point: Box<dyn Fn([f32; 2]) -> Vec3>,
-    invert: Box<dyn Fn(Vec3) -> [f32; 2]>,
+pub(super) struct Surface {
+    pub(super) light: AreaLight,
+    pub(super) point: Box<dyn Fn([f32; 2]) -> Vec3>,
+    pub(super) invert: Box<dyn Fn(Vec3) -> [f32; 2]>,
 }
 
-fn light_of(shape: &Shape) -> AreaLight {
+pub(super) fn light_of(shape: &Shape) -> AreaLight {
     let emission = Emission { l: Rgb::WHITE, two_sided: true, image: None };
     let mut out = area_lights_of(shape, &emission);
     assert_eq!(out.lights.len(), 1);
     out.lights.remove(0)
 }
 
-fn triangle_surface(p: [Vec3; 3]) -> Surface {
+pub(super) fn triangle_surface(p: [Vec3; 3]) -> Surface {
     let mesh = TriangleMesh::new(p.to_vec(), vec![[0, 1, 2]]).unwrap();
     let point = move |u: [f32; 2]| {
         let [a, b] = sample_uniform_triangle(u);
@@ -39,19 +39,19 @@ fn triangle_surface(p: [Vec3; 3]) -> Surface {
     Surface { light: light_of(&Shape::Mesh(mesh)), point: Box::new(point), invert: Box::new(invert) }
 }
 
-fn rectangle_mesh(corner: Vec3, x: Vec3, y: Vec3) -> Shape {
+pub(super) fn rectangle_mesh(corner: Vec3, x: Vec3, y: Vec3) -> Shape {
     let p = vec![corner, corner + x, corner + x + y, corner + y];
     Shape::Mesh(TriangleMesh::new(p, vec![[0, 1, 2], [0, 2, 3]]).unwrap())
 }
 
-fn rectangle_surface(corner: Vec3, x: Vec3, y: Vec3) -> Surface {
+pub(super) fn rectangle_surface(corner: Vec3, x: Vec3, y: Vec3) -> Surface {
     let light = light_of(&rectangle_mesh(corner, x, y));
     assert!(matches!(light.shape, AreaShape::Rectangle(_)));
     let invert = move |p: Vec3| [(p - corner).dot(x) / x.length_squared(), (p - corner).dot(y) / y.length_squared()];
     Surface { light, point: Box::new(move |[u, v]| corner + x * u + y * v), invert: Box::new(invert) }
 }
 
-fn patch_surface(corners: [Vec3; 4]) -> Surface {
+pub(super) fn patch_surface(corners: [Vec3; 4]) -> Surface {
     let mesh = BilinearMesh { positions: corners.to_vec(), indices: vec![[0, 1, 2, 3]], ..BilinearMesh::default() };
     let light = light_of(&Shape::Bilinear(mesh));
     let AreaShape::Patch(patch) = light.shape.clone() else { panic!("a patch is expected") };
@@ -59,12 +59,12 @@ fn patch_surface(corners: [Vec3; 4]) -> Surface {
     Surface { light, point: Box::new(point), invert: Box::new(move |p| patch.invert(p).to_array()) }
 }
 
-fn quadric(kind: QuadricKind, placement: Affine3A) -> Quadric {
+pub(super) fn quadric(kind: QuadricKind, placement: Affine3A) -> Quadric {
     Quadric { kind, group_from_local: placement, local_from_group: placement.inverse(), flip_normal: false }
 }
 
 /// Coordinates (z or squared radius, φ), both over their ranges.
-fn quadric_surface(kind: QuadricKind, placement: Affine3A) -> Surface {
+pub(super) fn quadric_surface(kind: QuadricKind, placement: Affine3A) -> Surface {
     let light = light_of(&Shape::Quadric(quadric(kind, placement)));
     let inverse = placement.inverse();
     let point = move |[u, v]: [f32; 2]| {
@@ -101,7 +101,7 @@ fn quadric_surface(kind: QuadricKind, placement: Affine3A) -> Surface {
 
 impl Surface {
     /// ∂p/∂u × ∂p/∂v by central differences in f64 of the positions.
-    fn area_vector(&self, [u, v]: [f32; 2]) -> glam::DVec3 {
+    pub(super) fn area_vector(&self, [u, v]: [f32; 2]) -> glam::DVec3 {
         let h = 1e-3;
         let at = |u: f32, v: f32| (self.point)([u, v]).as_dvec3();
         let (du, dv) = (at(u + h, v) - at(u - h, v), at(u, v + h) - at(u, v - h));
@@ -163,14 +163,14 @@ impl Surface {
     }
 }
 
-fn placement() -> Affine3A {
+pub(super) fn placement() -> Affine3A {
     Affine3A::from_rotation_translation(
         Quat::from_euler(glam::EulerRot::XYZ, 0.3, 1.1, -0.7),
         Vec3::new(1.0, -2.0, 0.5),
     )
 }
 
-fn squash() -> Affine3A {
+pub(super) fn squash() -> Affine3A {
     placement() * Affine3A::from_scale(Vec3::new(1.0, -0.5, 2.0))
 }
 

@@ -1,10 +1,11 @@
 //! Lights: what they emit, how directions to them are sampled, and how one of many is chosen.
 //!
-//! Reading order: [`point`], [`spot`], [`area`], [`environment`], [`lanes`], [`bounds`], [`tree`], [`select`], [`set`],
+//! Reading order: [`point`], [`spot`], [`area`], [`environment`], [`emit`], [`lanes`], [`bounds`], [`tree`], [`select`], [`set`],
 //! [`groups`], [`irradiance`].
 
 pub mod area;
 pub mod bounds;
+pub mod emit;
 pub mod environment;
 pub mod groups;
 pub mod irradiance;
@@ -16,10 +17,13 @@ pub mod spot;
 pub mod tree;
 
 #[cfg(test)]
+mod emit_tests;
+#[cfg(test)]
 mod light_tests;
 
 pub use area::{AreaLight, AreaShape, Emission, EmissionImage, area_lights_of};
 pub use bounds::LightBounds;
+pub use emit::EmissionSample;
 pub use environment::{EnvironmentFilter, EnvironmentMap, EnvironmentMapping};
 pub use groups::LightGroups;
 pub use irradiance::Irradiances;

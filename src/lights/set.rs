@@ -40,8 +40,9 @@ impl LightSetBuilder {
 
     /// The set, for a scene of the given bounds.
     pub fn build(mut self, kind: LightSamplerKind, scene_bounds: &Bounds3) -> LightSet {
-        let (_, radius) = scene_bounds.bounding_sphere();
-        let scene_radius = if radius > 0.0 && radius.is_finite() { radius } else { 1.0 };
+        let (center, radius) = scene_bounds.bounding_sphere();
+        let has_extent = radius > 0.0 && radius.is_finite();
+        let scene_radius = if has_extent { radius } else { 1.0 };
         let sampler = LightSampler::new(kind, &self.lights, scene_radius);
         let has_le = |light: &Light| matches!(light, Light::InfiniteConstant { .. } | Light::InfiniteImage { .. });
         let infinite = (0..self.lights.len()).filter(|&i| has_le(&self.lights[i])).map(|i| i as LightId).collect();
@@ -52,6 +53,7 @@ impl LightSetBuilder {
             groups: LightGroups::default(),
             infinite,
             emitting: self.emitting,
+            scene_centre: if center.is_finite() { center } else { Vec3::ZERO },
             scene_radius,
         }
     }
@@ -70,6 +72,8 @@ pub struct LightSet {
     pub infinite: Vec<LightId>,
     /// Sorted by geometry.
     emitting: Vec<EmittingGeometry>,
+    /// Centre of the scene's bounding sphere; the origin for an empty scene.
+    pub scene_centre: Vec3,
     /// Radius of the scene's bounding sphere; 1 for a scene without extent.
     pub scene_radius: f32,
 }

@@ -16,6 +16,27 @@ pub fn spot_solid_angle(cos_total: f32, cos_falloff_start: f32) -> f32 {
     std::f32::consts::TAU * ((1.0 - cos_falloff_start) + (cos_falloff_start - cos_total).max(0.0) * 0.5)
 }
 
+/// A polar cosine with the density [`spot_falloff`]/[`spot_solid_angle`] per steradian: uniform in the inner cone; between
+/// the cones P(x) = 2x³ − x⁴ of the relative place x is inverted by Newton's method, which on a convex function falls to
+/// the root once it is above it.
+pub fn sample_spot_cos(u: f32, cos_total: f32, cos_falloff_start: f32) -> f32 {
+    let inner = 1.0 - cos_falloff_start;
+    let band = (cos_falloff_start - cos_total).max(0.0);
+    let p_inner = inner / (inner + 0.5 * band);
+    if u < p_inner || band == 0.0 {
+        return 1.0 - inner * (u / p_inner).min(1.0);
+    }
+    let target = f64::from((u - p_inner) / (1.0 - p_inner));
+    let mut x = (0.5 * target).cbrt().max(1e-9);
+    for _ in 0..SPOT_STEPS {
+        x = (x - (x * x * x * (2.0 - x) - target) / (x * x * (6.0 - 4.0 * x))).min(1.0);
+    }
+    cos_total + band * x as f32
+}
+
+/// Steps of Newton's method that f32 needs, from below the root by a fifth at most.
+const SPOT_STEPS: u32 = 6;
+
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -31,6 +52,24 @@ mod tests {
                 / f64::from(n);
         let integral = mean * 4.0 * std::f64::consts::PI;
         assert!((integral - f64::from(spot_solid_angle(total, start))).abs() < 1e-4);
+    }
+
+    #[test]
+    fn the_sampled_cosine_inverts_the_integral_of_the_falloff() {
+        for (total, start) in [(0.6_f32, 0.85_f32), (-0.5, 0.2), (0.5, 1.0), (0.7, 0.7)] {
+            let solid_angle = f64::from(spot_solid_angle(total, start));
+            for i in 0..=64 {
+                let u = (i as f32 / 64.0).min(crate::math::ONE_MINUS_EPSILON);
+                let cos = f64::from(sample_spot_cos(u, total, start));
+                // The share of the flux in the part from the axis, or between the cones, to this cosine
+                let (inner, band) = (1.0 - f64::from(start), f64::from(start - total));
+                let x = (cos - f64::from(total)) / band;
+                let flux =
+                    if cos >= f64::from(start) { 1.0 - cos } else { inner + band * (2.0 * x * x * x - x * x * x * x) };
+                let share = flux * std::f64::consts::TAU / solid_angle;
+                assert!((share - f64::from(u)).abs() < 1e-5, "{total} {start} {u}: {cos} {share}");
+            }
+        }
     }
 
     #[test]

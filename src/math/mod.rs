@@ -4,7 +4,7 @@
 //! both unit and both away from the surface; the shading frame has n = +z; transforms are named
 //! `to_from`; colour is linear Rec.709; angles are radians; f32 for light.
 //!
-//! Reading order: [`rgb`], [`frame`], [`transform`], [`ray`], [`bounds`], [`warp`], [`sphere_map`],
+//! Reading order: [`rgb`], [`frame`], [`transform`], [`ray`], [`bounds`], [`warp`], [`sphere_map`], [`octahedral`],
 //! [`distribution`], [`alias`], [`hash`].
 
 pub mod alias;
@@ -12,6 +12,7 @@ pub mod bounds;
 pub mod distribution;
 pub mod frame;
 pub mod hash;
+pub mod octahedral;
 pub mod ray;
 pub mod rgb;
 pub mod sphere_map;

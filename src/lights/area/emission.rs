@@ -26,6 +26,12 @@ impl Emission {
         if !self.two_sided && n.dot(w) <= 0.0 {
             return Rgb::BLACK;
         }
+        self.radiance(uv)
+    }
+
+    /// Radiance at `uv` on a side that emits.
+    #[inline]
+    pub fn radiance(&self, uv: Vec2) -> Rgb {
         match &self.image {
             None => self.l,
             Some(image) => self.l * image.lookup(uv),

@@ -53,6 +53,16 @@ pub struct AreaLight {
     pub primitive: u32,
 }
 
+/// A point sampled on a shape.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct ShapePoint {
+    pub(super) p: Vec3,
+    pub(super) n: Vec3,
+    pub(super) p_error: Vec3,
+    /// Density (1/m²).
+    pub(super) pdf_area: f32,
+}
+
 /// A point sampled on a shape, and the direction to it.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct ShapeSample {
@@ -65,9 +75,10 @@ pub(super) struct ShapeSample {
 }
 
 impl ShapeSample {
-    /// From a density per area at `p`: pdf = pdf_area·t²/|cos θ|.
+    /// From a density per area at the point: pdf = pdf_area·t²/|cos θ|.
     #[inline]
-    fn by_area(from: Vec3, p: Vec3, n: Vec3, p_error: Vec3, pdf_area: f32) -> Option<Self> {
+    fn by_area(from: Vec3, point: ShapePoint) -> Option<Self> {
+        let ShapePoint { p, n, p_error, pdf_area } = point;
         let d = p - from;
         let t2 = d.length_squared();
         let t = t2.sqrt();
@@ -104,6 +115,22 @@ impl AreaLight {
         let li = self.emission.l(s.n, uv, -s.wi);
         let ShapeSample { p, n, p_error, wi, t, pdf } = s;
         Some(LightSample { li, wi, pdf, t, p, n, p_error, is_delta: false })
+    }
+
+    /// Samples a point of the surface, by area or nearly so, whatever looks at it.
+    pub(super) fn sample_point(&self, u: [f32; 2]) -> ShapePoint {
+        match &self.shape {
+            AreaShape::Triangle(triangle) => triangle.sample_point(u),
+            AreaShape::Rectangle(rectangle) => rectangle.sample_point(u),
+            AreaShape::Quadric(quadric) => quadric.sample_point(u),
+            AreaShape::Patch(patch) => patch.sample_point(u),
+        }
+    }
+
+    /// Radiance that leaves the point `p` of the surface on a side that emits.
+    pub(super) fn radiance(&self, p: Vec3) -> Rgb {
+        let uv = if self.emission.image.is_some() { self.uv(p) } else { Vec2::ZERO };
+        self.emission.radiance(uv)
     }
 
     /// What samples many directions at once from `ctx`; `None` where they are sampled one by one: patches, quadrics but

@@ -3,7 +3,7 @@
 //! p(u, v) = a + u·b + v·c + uv·d; the density per area is 1/|∂p/∂u × ∂p/∂v|. The normal before normalisation is
 //! bilinear in (u, v) too, so it lies in any cone (narrower than a half-space) about its four corner values.
 
-use super::{ShapeSample, pdf_by_area};
+use super::{ShapePoint, ShapeSample, pdf_by_area};
 use crate::math::{Bounds3, Vec2, Vec3, gamma};
 use glam::DVec3;
 
@@ -65,11 +65,15 @@ impl PatchLight {
         if self.flip_normal { -n } else { n }
     }
 
-    pub(super) fn sample(&self, from: Vec3, [u, v]: [f32; 2]) -> Option<ShapeSample> {
+    pub(super) fn sample(&self, from: Vec3, u: [f32; 2]) -> Option<ShapeSample> {
+        ShapeSample::by_area(from, self.sample_point(u))
+    }
+
+    pub(super) fn sample_point(&self, [u, v]: [f32; 2]) -> ShapePoint {
         let n = self.scaled_normal(u, v);
         let jacobian = n.length();
         let magnitude = self.corners.iter().fold(Vec3::ZERO, |m, c| m.max(c.abs()));
-        ShapeSample::by_area(from, self.point(u, v), n / jacobian, magnitude * gamma(8), 1.0 / jacobian)
+        ShapePoint { p: self.point(u, v), n: n / jacobian, p_error: magnitude * gamma(8), pdf_area: 1.0 / jacobian }
     }
 
     pub(super) fn pdf(&self, from: Vec3, p: Vec3) -> f32 {

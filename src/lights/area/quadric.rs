@@ -5,7 +5,7 @@
 //! uniformly in the area of their true local shape. With M the placement, an area element grows by
 //! |cof(M)·n|, n the local normal.
 
-use super::{ShapeSample, pdf_by_area};
+use super::{ShapePoint, ShapeSample, pdf_by_area};
 use crate::geometry::{Quadric, QuadricKind};
 use crate::math::warp::{azimuth, direction, pdf_uniform_cone, sample_uniform_cone, sample_uniform_disk_concentric};
 use crate::math::{Bounds3, Frame, Mat3, Vec2, Vec3, gamma, safe_sqrt, sqr};
@@ -142,7 +142,7 @@ impl QuadricLight {
     pub(super) fn sample(&self, from: Vec3, u: [f32; 2]) -> Option<ShapeSample> {
         match (self.cone(from), self.sphere) {
             (Some(cone), Some(sphere)) => self.sample_cone(from, u, sphere, cone),
-            _ => self.sample_area(from, u),
+            _ => ShapeSample::by_area(from, self.sample_point(u)),
         }
     }
 
@@ -182,7 +182,8 @@ impl QuadricLight {
         (pdf.is_finite() && t > 0.0).then_some(ShapeSample { p, n, p_error, wi, t, pdf })
     }
 
-    fn sample_area(&self, from: Vec3, u: [f32; 2]) -> Option<ShapeSample> {
+    /// A point uniform in the area of the local quadric.
+    pub(super) fn sample_point(&self, u: [f32; 2]) -> ShapePoint {
         let (local, local_n) = self.sample_local(u);
         let to_world = &self.quadric.group_from_local;
         let scaled_n = self.cofactor * local_n;
@@ -193,7 +194,7 @@ impl QuadricLight {
         let m = Mat3::from(to_world.matrix3);
         let magnitude = m.x_axis.abs() * local.x + m.y_axis.abs() * local.y + m.z_axis.abs() * local.z;
         let p_error = (magnitude + Vec3::from(to_world.translation).abs()) * gamma(10);
-        ShapeSample::by_area(from, p, n, p_error, 1.0 / (self.local_area * jacobian))
+        ShapePoint { p, n, p_error, pdf_area: 1.0 / (self.local_area * jacobian) }
     }
 
     pub(super) fn pdf(&self, from: Vec3, p: Vec3) -> f32 {

@@ -9,7 +9,7 @@
 //! that density per steradian is in proportion to t³, which varies by less than two to each side then, and it costs a tenth. So it is for points within
 //! [`MIN_HEIGHT`] diagonals of the plane. `sample` and `pdf` ask the same function, so they always agree.
 
-use super::{ShapeSample, pdf_by_area};
+use super::{ShapePoint, ShapeSample, pdf_by_area};
 use crate::math::{Bounds3, Vec2, Vec3, gamma};
 use crate::simd::area::{self, SphericalRectangle, Surface};
 use std::f64::consts::TAU;
@@ -120,8 +120,7 @@ impl RectangleLight {
     #[inline]
     pub(super) fn sample(&self, from: Vec3, u: [f32; 2]) -> Option<ShapeSample> {
         let Some(spherical) = spherical_rectangle(self, from) else {
-            let (p, p_error) = self.point(u[0] * self.size.x, u[1] * self.size.y);
-            return ShapeSample::by_area(from, p, self.n, p_error, 1.0 / self.area());
+            return ShapeSample::by_area(from, self.sample_point(u));
         };
         let [x, y] = sample_spherical(&spherical, u);
         let (p, p_error) = self.point((x - spherical.x[0]) as f32, (y - spherical.y[0]) as f32);
@@ -131,6 +130,12 @@ impl RectangleLight {
             let pdf = (1.0 / spherical.solid_angle) as f32;
             ShapeSample { p, n: self.n, p_error, wi: d / t, t, pdf }
         })
+    }
+
+    #[inline]
+    pub(super) fn sample_point(&self, u: [f32; 2]) -> ShapePoint {
+        let (p, p_error) = self.point(u[0] * self.size.x, u[1] * self.size.y);
+        ShapePoint { p, n: self.n, p_error, pdf_area: 1.0 / self.area() }
     }
 
     #[inline]

@@ -1,6 +1,6 @@
 //! Triangles, sampled uniformly in area.
 
-use super::{ShapeSample, pdf_by_area};
+use super::{ShapePoint, ShapeSample, pdf_by_area};
 use crate::math::warp::sample_uniform_triangle;
 use crate::math::{Bounds3, Vec2, Vec3, gamma};
 
@@ -28,10 +28,15 @@ impl TriangleLight {
 
     #[inline]
     pub(super) fn sample(&self, from: Vec3, u: [f32; 2]) -> Option<ShapeSample> {
+        ShapeSample::by_area(from, self.sample_point(u))
+    }
+
+    #[inline]
+    pub(super) fn sample_point(&self, u: [f32; 2]) -> ShapePoint {
         let [b0, b1] = sample_uniform_triangle(u);
         let parts = [self.p[0] * b0, self.p[1] * b1, self.p[2] * (1.0 - b0 - b1)];
         let p_error = (parts[0].abs() + parts[1].abs() + parts[2].abs()) * gamma(6);
-        ShapeSample::by_area(from, parts[0] + parts[1] + parts[2], self.n, p_error, 1.0 / self.area)
+        ShapePoint { p: parts[0] + parts[1] + parts[2], n: self.n, p_error, pdf_area: 1.0 / self.area }
     }
 
     #[inline]

@@ -1,0 +1,109 @@
+//! Light as it leaves its sources: the start of photons.
+//!
+//! A sample is a ray with the power Φ = Le·|cos θ|/(p_A·p_ω), p_A the density of its origin (1/m²) and p_ω that of its
+//! direction (1/sr), so E\[Φ\] is the emitted flux (W); for light without a surface the intensity takes the place of
+//! Le·|cos θ|/p_A.
+//!
+//! | light | origin | direction | Φ |
+//! |---|---|---|---|
+//! | point | its place | uniform on the sphere | 4π·I, constant |
+//! | spot | its place | by its falloff | I times the solid angle of the falloff, constant |
+//! | area | by area, see [`area`](super::area) | cosine about the normal, of one side or of either | π·Le/p_A |
+//! | distant | disk | its own | π·R²·E, constant |
+//! | environment | disk | by its image, or uniform | π·R²·Le/p_ω |
+//!
+//! The disk has the radius R of the scene, is perpendicular to the direction and touches the sphere about the scene on the
+//! side where the light comes from [Pharr et al. 2023, §12.2, §12.5]. Flux beside the scene is counted with the rest.
+
+use super::{AreaLight, Light, spot};
+use crate::math::warp::{
+    direction, pdf_uniform_sphere, sample_cosine_hemisphere, sample_uniform_disk_concentric, sample_uniform_sphere,
+};
+use crate::math::{Frame, ONE_MINUS_EPSILON, Rgb, Vec3};
+use std::f32::consts::{PI, TAU};
+
+/// A photon as it leaves a light.
+#[derive(Clone, Copy, Debug)]
+pub struct EmissionSample {
+    /// Where it starts.
+    pub p: Vec3,
+    /// Bound of the rounding error of `p` per axis; zero without a surface.
+    pub p_error: Vec3,
+    /// Normal of the surface there, on the side that it leaves; zero without a surface.
+    pub n: Vec3,
+    /// Unit direction, away from the light.
+    pub d: Vec3,
+    /// Its power (W): Le·|cos θ| by the densities of position and direction. Its mean is the emitted flux.
+    pub power: Rgb,
+}
+
+impl EmissionSample {
+    /// Of light that leaves no surface.
+    fn in_space(p: Vec3, d: Vec3, power: Rgb) -> Option<Self> {
+        EmissionSample { p, p_error: Vec3::ZERO, n: Vec3::ZERO, d, power }.if_lit()
+    }
+
+    /// `None` if it carries nothing.
+    fn if_lit(self) -> Option<Self> {
+        (!self.power.is_black() && self.power.is_finite() && self.p.is_finite() && self.d.is_finite()).then_some(self)
+    }
+}
+
+impl Light {
+    /// Samples light that leaves this source into a scene with a bounding sphere of the given centre and radius (m);
+    /// `None` if it carries nothing. The first number of `u_direction` also chooses the side of a two-sided surface.
+    pub fn sample_le(&self, scene: (Vec3, f32), u_position: [f32; 2], u_direction: [f32; 2]) -> Option<EmissionSample> {
+        match self {
+            Light::Point { p, intensity } => {
+                EmissionSample::in_space(*p, sample_uniform_sphere(u_direction), *intensity * (4.0 * PI))
+            }
+            Light::Spot { p, axis, cos_total, cos_falloff_start, intensity } => {
+                let cos = spot::sample_spot_cos(u_direction[0], *cos_total, *cos_falloff_start);
+                let d = Frame::from_z(*axis).to_world(direction(cos, TAU * u_direction[1]));
+                let solid_angle = spot::spot_solid_angle(*cos_total, *cos_falloff_start);
+                EmissionSample::in_space(*p, d.normalize(), *intensity * solid_angle)
+            }
+            Light::Distant { wi_world, l } => from_infinity(scene, u_position, *wi_world, *l),
+            Light::Area(area) => area.sample_le(u_position, u_direction),
+            Light::InfiniteConstant { l } => {
+                from_infinity(scene, u_position, sample_uniform_sphere(u_direction), *l / pdf_uniform_sphere())
+            }
+            Light::InfiniteImage { map, world_from_light, scale } => {
+                let s = map.sample(u_direction)?;
+                from_infinity(scene, u_position, *world_from_light * s.w, s.le * (*scale / s.pdf))
+            }
+        }
+    }
+}
+
+/// Light from the unit direction `wi` through the disk that the scene is seen as from there; `irradiance` is that of the disk.
+fn from_infinity(
+    (centre, radius): (Vec3, f32),
+    u_position: [f32; 2],
+    wi: Vec3,
+    irradiance: Rgb,
+) -> Option<EmissionSample> {
+    let place = sample_uniform_disk_concentric(u_position);
+    let p = centre + Frame::from_z(wi).to_world(place.extend(1.0)) * radius;
+    EmissionSample::in_space(p, -wi, irradiance * (PI * radius * radius))
+}
+
+impl AreaLight {
+    /// [`Light::sample_le`] of a surface: by area, and by the cosine about the normal.
+    fn sample_le(&self, u_position: [f32; 2], u_direction: [f32; 2]) -> Option<EmissionSample> {
+        let point = self.sample_point(u_position);
+
+        // Choose the side
+        let [u, v] = u_direction;
+        let (u, n, sides) = match (self.emission.two_sided, u < 0.5) {
+            (false, _) => (u, point.n, 1.0),
+            (true, true) => (2.0 * u, point.n, 2.0),
+            (true, false) => ((2.0 * u - 1.0).min(ONE_MINUS_EPSILON), -point.n, 2.0),
+        };
+
+        // The cosine of the radiance cancels with that of the density, cos θ/π.
+        let d = Frame::from_z(n).to_world(sample_cosine_hemisphere([u, v])).normalize();
+        let power = self.radiance(point.p) * (PI * sides / point.pdf_area);
+        EmissionSample { p: point.p, p_error: point.p_error, n, d, power }.if_lit()
+    }
+}

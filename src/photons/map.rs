@@ -1,0 +1,278 @@
+//! Photons by place, and the density of their power.
+//!
+//! The irradiance at x is estimated by the photons around it, E ≈ Σ K(d_k) Φ_k, with the kernel of Epanechnikov,
+//! K(d) = 2/(πr²) (1 − d²/r²), whose integral over the disk of radius r is 1 [Epanechnikov 1969; Silverman 1986, §4.2]. r is given or the distance of
+//! the k-th nearest photon [Jensen 1996], which itself does not count then: for photons of constant density λ,
+//! E[(k − 1)/(πr²)] = λ, whereas k/(πr²) would be too much by the factor k/(k − 1). If the disk of the largest radius has
+//! fewer than k photons, all of them count with that radius; so the estimate is unbiased whichever happens:
+//! λ P(N ≥ k − 1) + λ P(N ≤ k − 2), N being the photons in the largest disk.
+//!
+//! Which photons belong to a place: those that lie on a surface of nearly its normal, on its side of it, and about in its
+//! tangent plane. The distance is d² + (4 d·n)², so that photons farther from the plane than a quarter of r never
+//! count, as in the flattened spheres of [Jensen 2001, §7.2]; on a plane it is the distance.
+//!
+//! The irradiance is about the shading normal of the place: a photon's power is weighed by |wi·ns|/|wi·n_k|, n_k being the geometric
+//! normal where it lies, since it is the area about n_k over which photons are spread.
+
+use super::photon::Photon;
+use super::tree::{Tree, Visit};
+use crate::math::{Rgb, Vec3};
+use std::collections::BinaryHeap;
+use std::f32::consts::FRAC_1_PI;
+
+/// Cosine of the largest angle between the normals of a place and of photons that count.
+const MIN_NORMAL_COS: f32 = 0.8;
+/// Squared factor of distances along the normal, less 1.
+const FLATTENING: f32 = 16.0;
+/// Cosines below this count as this where they divide: packed directions do not tell them apart.
+const MIN_COS: f32 = 0.01;
+
+/// A place on a surface, seen from one side.
+#[derive(Clone, Copy, Debug)]
+pub struct Place {
+    /// The point.
+    pub p: Vec3,
+    /// Geometric normal on the side whose light is wanted, unit.
+    pub n: Vec3,
+    /// Shading normal on that side, about which irradiance is taken, unit.
+    pub ns: Vec3,
+}
+
+impl Place {
+    /// A place whose shading normal is the geometric one.
+    pub fn flat(p: Vec3, n: Vec3) -> Self {
+        Place { p, n, ns: n }
+    }
+}
+
+/// Which photons are around.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub enum Search {
+    /// The nearest ones.
+    Nearest {
+        /// Their number, at least 2.
+        count: u32,
+        /// Radius beyond which none is looked for (m).
+        max_radius: f32,
+    },
+    /// All within a radius (m).
+    Radius(f32),
+}
+
+/// Memory of searches; one for each thread.
+#[derive(Clone, Debug, Default)]
+pub struct GatherScratch {
+    nearest: BinaryHeap<Candidate>,
+}
+
+/// A photon by its distance.
+#[derive(Clone, Copy, Debug)]
+struct Candidate {
+    d2: f32,
+    index: u32,
+}
+
+impl PartialEq for Candidate {
+    fn eq(&self, other: &Self) -> bool {
+        self.cmp(other).is_eq()
+    }
+}
+impl Eq for Candidate {}
+impl PartialOrd for Candidate {
+    fn partial_cmp(&self, other: &Self) -> Option<std::cmp::Ordering> {
+        Some(self.cmp(other))
+    }
+}
+impl Ord for Candidate {
+    fn cmp(&self, other: &Self) -> std::cmp::Ordering {
+        self.d2.total_cmp(&other.d2).then(self.index.cmp(&other.index))
+    }
+}
+
+/// Photons that can be asked for by place.
+#[derive(Clone, Debug, Default)]
+pub struct PhotonMap {
+    tree: Tree,
+}
+
+impl PhotonMap {
+    /// Sorts photons, on all threads of the current pool; the map does not depend on how many those are.
+    pub fn new(photons: Vec<Photon>) -> Self {
+        PhotonMap { tree: Tree::new(photons) }
+    }
+
+    /// Number of photons.
+    pub fn len(&self) -> usize {
+        self.tree.photons.len()
+    }
+
+    /// True if there is no photon.
+    pub fn is_empty(&self) -> bool {
+        self.tree.photons.is_empty()
+    }
+
+    /// All photons, in the order of the tree.
+    pub fn photons(&self) -> &[Photon] {
+        &self.tree.photons
+    }
+
+    /// Memory of photons and tree (bytes).
+    pub fn bytes(&self) -> u64 {
+        self.tree.bytes()
+    }
+
+    /// Calls `f(photon, weight)` for the photons around that count. The irradiance about `at.ns` is Σ weight·power
+    /// (weight in 1/m²), the radiance that a BSDF f reflects is Σ weight·f·power, without a cosine. Returns the radius of the kernel (m), which is 0 if
+    /// there is none.
+    pub fn gather(
+        &self,
+        at: &Place,
+        search: Search,
+        scratch: &mut GatherScratch,
+        mut f: impl FnMut(&Photon, f32),
+    ) -> f32 {
+        match search {
+            Search::Radius(radius) => {
+                if !(radius > 0.0) {
+                    return 0.0;
+                }
+                let kernel = Kernel::new(radius * radius);
+                self.tree.visit(at.p, &mut Within { at, kernel, f: &mut f });
+                radius
+            }
+            Search::Nearest { count, max_radius } => {
+                if !(max_radius > 0.0) || count == 0 {
+                    return 0.0;
+                }
+                let heap = &mut scratch.nearest;
+                heap.clear();
+                let most = max_radius * max_radius;
+                let mut nearest = Nearest { at, count: count as usize, bound: most, heap };
+                self.tree.visit(at.p, &mut nearest);
+                let bound = nearest.bound;
+                let Some(farthest) = heap.peek() else { return 0.0 };
+                // Without any bound, what was found has to do
+                let r2 = if bound.is_finite() { bound } else { farthest.d2 };
+                if !(r2 > 0.0) {
+                    return 0.0;
+                }
+                // The k-th photon, if there is one, lies on the rim, where the kernel is 0
+                let kernel = Kernel::new(r2);
+                for candidate in heap.iter() {
+                    let photon = &self.tree.photons[candidate.index as usize];
+                    let weight = kernel.at(candidate.d2) * at.cosine_ratio(photon);
+                    if weight > 0.0 {
+                        f(photon, weight);
+                    }
+                }
+                r2.sqrt()
+            }
+        }
+    }
+
+    /// Irradiance about the shading normal (W/m²).
+    pub fn irradiance(&self, at: &Place, search: Search, scratch: &mut GatherScratch) -> Rgb {
+        let mut sum = Rgb::BLACK;
+        self.gather(at, search, scratch, |photon, weight| sum += photon.power() * weight);
+        sum
+    }
+}
+
+impl Place {
+    /// The squared distance of a photon that differs by `d`, of squared length `d2`; `None` if it does not belong here.
+    #[inline]
+    fn distance_squared(&self, photon: &Photon, d: Vec3, d2: f32, bound: f32) -> Option<f32> {
+        let along = d.dot(self.n);
+        let d2 = d2 + FLATTENING * along * along;
+        let belongs = d2 <= bound && photon.n().dot(self.n) >= MIN_NORMAL_COS && photon.wi().dot(self.n) > 0.0;
+        belongs.then_some(d2)
+    }
+
+    /// |wi·ns|/|wi·n_k|; 0 if the photon comes from below.
+    #[inline]
+    fn cosine_ratio(&self, photon: &Photon) -> f32 {
+        if self.ns == self.n {
+            return 1.0;
+        }
+        let wi = photon.wi();
+        wi.dot(self.ns).max(0.0) / wi.dot(photon.n()).max(MIN_COS)
+    }
+}
+
+/// Epanechnikov's.
+#[derive(Clone, Copy)]
+struct Kernel {
+    r2: f32,
+    inverse_r2: f32,
+    /// 2/(πr²).
+    peak: f32,
+}
+
+impl Kernel {
+    fn new(r2: f32) -> Self {
+        Kernel { r2, inverse_r2: 1.0 / r2, peak: 2.0 * FRAC_1_PI / r2 }
+    }
+
+    #[inline]
+    fn at(&self, d2: f32) -> f32 {
+        self.peak * (1.0 - d2 * self.inverse_r2).max(0.0)
+    }
+}
+
+/// All photons within a radius.
+struct Within<'a, F> {
+    at: &'a Place,
+    kernel: Kernel,
+    f: &'a mut F,
+}
+
+impl<F: FnMut(&Photon, f32)> Visit for Within<'_, F> {
+    #[inline]
+    fn bound(&self) -> f32 {
+        self.kernel.r2
+    }
+
+    #[inline]
+    fn photon(&mut self, _index: usize, photon: &Photon, d: Vec3, d2: f32) {
+        if let Some(d2) = self.at.distance_squared(photon, d, d2, self.kernel.r2) {
+            let weight = self.kernel.at(d2) * self.at.cosine_ratio(photon);
+            if weight > 0.0 {
+                (self.f)(photon, weight);
+            }
+        }
+    }
+}
+
+/// The nearest photons so far.
+struct Nearest<'a> {
+    at: &'a Place,
+    count: usize,
+    /// Squared distance of the last of them, once there are as many as wanted.
+    bound: f32,
+    heap: &'a mut BinaryHeap<Candidate>,
+}
+
+impl Visit for Nearest<'_> {
+    #[inline]
+    fn bound(&self) -> f32 {
+        self.bound
+    }
+
+    #[inline]
+    fn photon(&mut self, index: usize, photon: &Photon, d: Vec3, d2: f32) {
+        let Some(d2) = self.at.distance_squared(photon, d, d2, self.bound) else { return };
+        let candidate = Candidate { d2, index: index as u32 };
+        if self.heap.len() < self.count {
+            self.heap.push(candidate);
+        } else if let Some(mut farthest) = self.heap.peek_mut()
+            && candidate < *farthest
+        {
+            *farthest = candidate;
+        }
+        if self.heap.len() == self.count
+            && let Some(farthest) = self.heap.peek()
+        {
+            self.bound = farthest.d2;
+        }
+    }
+}
