@@ -85,6 +85,11 @@ impl Stage {
         Ok(Stage { world, shadows: cast, threads, depth })
     }
 
+    /// The scene.
+    pub fn world(&self) -> &World {
+        &self.world
+    }
+
     /// Size of the picture.
     pub fn size(&self) -> [u32; 2] {
         self.world.scene.film.resolution

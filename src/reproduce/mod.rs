@@ -72,6 +72,9 @@ pub enum ReproduceError {
     /// A rendering could not start.
     #[error(transparent)]
     Threads(#[from] crate::render::ThreadError),
+    /// There is no photon map.
+    #[error(transparent)]
+    Photons(#[from] crate::photons::PhotonError),
     /// A picture could not be written.
     #[error(transparent)]
     Image(#[from] crate::imaging::oiio::ImageError),

@@ -1,15 +1,21 @@
 //! The figures of importance sampling for photon maps [Keller and Wald 2000].
 //!
 //! [`above`] draws points as they lie on the plan, [`seen`] has what the camera sees of diffuse surfaces and the error of pictures
-//! that show a map directly, [`direct`] measures direct light among many lights.
+//! that show a map directly, [`maps`] makes such pictures; then the figures: [`rooms`] (1 and 2), [`ring`] (3), [`slit`] (4) and
+//! [`direct`] (5).
 
-pub mod above;
+mod above;
 mod direct;
-pub mod seen;
+mod maps;
+mod ring;
+mod rooms;
+mod seen;
+mod slit;
 
 use super::figure::{Study, write};
 use super::{Budget, Observer, Options, ReproduceError, make_folder};
 use crate::procedural::keller_wald::write_scenes;
+use crate::render::thread_pool;
 use std::path::PathBuf;
 use std::time::Duration;
 
@@ -34,6 +40,10 @@ const STUDY: Study = Study {
         "Time: processor time of the whole rendering, all threads together. All methods take turns in one run, in an order that moves on \
          from turn to turn; the ratio of times is the median over the turns. At equal time means variance × time, relative to \
          another method.",
+        "Figures 1 to 4 show maps directly, as the report does: the radiance of a diffuse surface is albedo × irradiance / π, and the \
+         irradiance is the density of the power of the nearest photons by the kernel of Epanechnikov, direct light included. Pixels that show lights \
+         or metal take no part. Error: root of the mean square of the difference in luminance from a reference, over the mean luminance; the \
+         reference's own noise is subtracted.",
         "“Same mean, p” is the probability that the mean luminance differs from that of all other methods at least as much as it does if \
          all have the same expectation.",
     ],
@@ -48,6 +58,8 @@ struct Setup<'a> {
     scenes: PathBuf,
     /// Most pixels along an edge.
     size: u32,
+    /// Threads for photons.
+    pool: rayon::ThreadPool,
 }
 
 impl<'a> Setup<'a> {
@@ -61,7 +73,8 @@ impl<'a> Setup<'a> {
                 folder
             }
         };
-        Ok(Setup { options, observer, scenes, size: options.size.unwrap_or(SIZE[usize::from(options.quick)]) })
+        let size = options.size.unwrap_or(SIZE[usize::from(options.quick)]);
+        Ok(Setup { options, observer, scenes, size, pool: thread_pool(options.threads)? })
     }
 }
 
@@ -70,6 +83,17 @@ pub fn run(options: &Options, observer: Observer<'_>) -> Result<PathBuf, Reprodu
     let budget = Budget::new(TIME[usize::from(options.quick)]);
     make_folder(&options.out)?;
     let setup = Setup::new(options, observer)?;
-    let figures = [direct::run(&setup, budget.share(1.0, 1.0))?];
+    let mut left = 100.0;
+    let mut share = |weight: f64| {
+        let time = budget.share(weight, left);
+        left -= weight;
+        time
+    };
+    let figures = [
+        rooms::run(&setup, share(30.0))?,
+        ring::run(&setup, share(15.0))?,
+        slit::run(&setup, share(20.0))?,
+        direct::run(&setup, share(35.0))?,
+    ];
     write(&STUDY, options, &figures, budget.elapsed())
 }

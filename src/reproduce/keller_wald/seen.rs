@@ -99,6 +99,14 @@ impl Reference {
     }
 }
 
+/// Root of the mean square of the difference in luminance from another picture over the pixels of a mask, relative to the mean luminance of
+/// the other.
+pub fn relative_rmse(picture: &[[f32; 3]], other: &[[f32; 3]], mask: &[bool]) -> f64 {
+    let light = |p: &[f32; 3]| luminance(p.map(f64::from));
+    let square = mean_where(mask, picture.iter().zip(other).map(|(a, b)| (light(a) - light(b)).powi(2)));
+    square.sqrt() / mean_where(mask, other.iter().map(light)).max(1e-300)
+}
+
 fn mean_where(mask: &[bool], values: impl Iterator<Item = f64>) -> f64 {
     let (mut sum, mut count) = (0.0, 0.0);
     for (value, _) in values.zip(mask).filter(|(_, m)| **m) {
