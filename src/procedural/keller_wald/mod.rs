@@ -14,8 +14,7 @@ const SCENES: [(&str, &str); 3] = [
     ("slit.pbrt", include_str!("../../../scenes/keller-wald/slit.pbrt")),
 ];
 /// What `ring.pbrt` and `ring-indirect.pbrt` share.
-const SHARED: (&str, &str) =
-    ("ring-geometry.pbrt", include_str!("../../../scenes/keller-wald/ring-geometry.pbrt"));
+const SHARED: (&str, &str) = ("ring-geometry.pbrt", include_str!("../../../scenes/keller-wald/ring-geometry.pbrt"));
 
 /// Number of scenes.
 pub const COUNT: usize = SCENES.len() + 2;

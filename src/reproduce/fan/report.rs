@@ -162,7 +162,6 @@ impl Outcome<'_> {
     fn antialiased_errors(&self) -> Vec<Errors> {
         self.antialiased.iter().map(|m| self.antialiased_truth.errors(m)).collect()
     }
-
 }
 
 /// What a row of the table says beside its result.

@@ -160,11 +160,7 @@ fn figure(setup: &Setup<'_>, few: &Outcome, many: &Outcome) -> Result<Figure, Re
                 target: "cost of a sample grows less than 1.5×".to_owned(),
                 measured: format!("{}×", significant(growth)),
                 reached: growth < 1.5,
-                reason: format!(
-                    "{} → {} ns",
-                    significant(few.per_sample(best)),
-                    significant(many.per_sample(best))
-                ),
+                reason: format!("{} → {} ns", significant(few.per_sample(best)), significant(many.per_sample(best))),
             },
         )],
         blocks,
@@ -190,7 +186,8 @@ fn pictures(setup: &Setup<'_>, o: &Outcome, name: &str) -> Result<Vec<Block>, Re
     let scale = Scale::of_values(HEAT, maps.iter().flatten());
     let (mut shown, mut variances) = (Vec::new(), Vec::new());
     for (i, (named, m)) in o.named.iter().zip(&o.measured).enumerate() {
-        let file = Picture::tone_mapped(o.size, &m.first, exposure).write(&setup.options.out, &format!("{name}-{i}"))?;
+        let file =
+            Picture::tone_mapped(o.size, &m.first, exposure).write(&setup.options.out, &format!("{name}-{i}"))?;
         shown.push(Shown { file, title: named.name.to_owned(), caption: String::new() });
         let picture = Picture::colored(o.size, &maps[i], &scale);
         let file = picture.write(&setup.options.out, &format!("{name}-variance-{i}"))?;
@@ -204,7 +201,16 @@ fn pictures(setup: &Setup<'_>, o: &Outcome, name: &str) -> Result<Vec<Block>, Re
 }
 
 fn table(o: &Outcome) -> Table {
-    let header = ["method", "N", "variance", "time", "variance at equal time", "efficiency against mis", "against ris", "same mean, p"];
+    let header = [
+        "method",
+        "N",
+        "variance",
+        "time",
+        "variance at equal time",
+        "efficiency against mis",
+        "against ris",
+        "same mean, p",
+    ];
     let mut table = Table::new(&header);
     let base = &o.measured[o.place(Role::All)];
     for (i, m) in o.measured.iter().enumerate() {

@@ -1,15 +1,17 @@
 //! Photon maps of a scene, and what they look like: from above, and shown directly.
 
+use super::super::ReproduceError;
 use super::super::measure::{Stage, View, turns};
 use super::super::method::{Method, Transport};
 use super::super::page::{Block, Shown};
 use super::super::pictures::Picture;
-use super::super::{Observer, ReproduceError};
 use super::Setup;
 use super::above::Plan;
 use super::seen::{Reference, Seen};
 use crate::math::{Rgb, Vec3};
-use crate::photons::{GatherScratch, Importance, Photon, PhotonMap, Place, Search, Traced, Tracing, Want, trace_photons};
+use crate::photons::{
+    GatherScratch, Importance, Photon, PhotonMap, Place, Search, Traced, Tracing, Want, trace_photons,
+};
 use crate::scene::World;
 use rayon::prelude::*;
 use std::time::{Duration, Instant};
@@ -20,6 +22,8 @@ const MAX_RADIUS: f32 = 0.05;
 const PLAN_SIZE: u32 = 400;
 /// Turns of a reference; their seeds begin here.
 const LONG_TURNS: std::ops::Range<u32> = 1_000_000..1_000_004;
+/// Most camera rays of a turn of a reference: usual and quick.
+const MOST_RAYS: [f64; 2] = [16384.0, 256.0];
 /// Trajectories that find out how fast photons are traced.
 const PILOT: u64 = 50_000;
 
@@ -77,13 +81,7 @@ pub fn positions(map: &PhotonMap) -> impl Iterator<Item = Vec3> {
 }
 
 /// The radiance of each pixel by the `count` nearest photons of each of some maps.
-pub fn show(
-    setup: &Setup<'_>,
-    world: &World,
-    seen: &[Option<Seen>],
-    maps: &[&PhotonMap],
-    count: u32,
-) -> Vec<[f32; 3]> {
+pub fn show(setup: &Setup<'_>, world: &World, seen: &[Option<Seen>], maps: &[&PhotonMap], count: u32) -> Vec<[f32; 3]> {
     let search = Search::Nearest { count, max_radius: MAX_RADIUS * world.scene.lights.scene_radius };
     let pixel = |scratch: &mut GatherScratch, seen: &Option<Seen>| {
         seen.map_or([0.0; 3], |s| {
@@ -123,12 +121,13 @@ pub fn speed(
 }
 
 /// The picture by path tracing, for about `time`.
-pub fn path_traced(stage: &mut Stage, time: Duration, observer: Observer<'_>) -> Result<Reference, ReproduceError> {
+pub fn path_traced(setup: &Setup<'_>, stage: &mut Stage, time: Duration) -> Result<Reference, ReproduceError> {
+    let observer = setup.observer;
     let method = Method::ris(16, 2).stratified().of(Transport::Path);
     let first = LONG_TURNS.start;
     let pilot = turns(stage, &[method], View::Centres, 1, first - 1..first, observer)?;
     let each = pilot[0].median_seconds(|s| s.wall).max(1e-6) * LONG_TURNS.len() as f64;
-    let spp = (time.as_secs_f64() / each).clamp(1.0, 16384.0) as u32;
+    let spp = (time.as_secs_f64() / each).clamp(1.0, MOST_RAYS[usize::from(setup.options.quick)]) as u32;
     Ok(Reference::new(&turns(stage, &[method], View::Centres, spp, LONG_TURNS, observer)?[0]))
 }
 

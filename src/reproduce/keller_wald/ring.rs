@@ -20,8 +20,9 @@ const LONGER: u64 = 8;
 const REFERENCE_COUNT: u32 = 120;
 /// Photons of an estimate.
 const COUNT: u32 = 50;
-/// Fewest and most trajectories of the global map.
-const TRAJECTORIES: [f64; 2] = [2_000.0, 400_000.0];
+/// Fewest trajectories of the global map, and most: usual and quick.
+const FEWEST: f64 = 1_000.0;
+const MOST: [f64; 2] = [400_000.0, 10_000.0];
 /// Most pixels along an edge: usual and quick.
 const SIZE: [u32; 2] = [320, 96];
 /// The part of the picture that is shown larger.
@@ -76,7 +77,7 @@ fn measure(setup: &Setup<'_>, scene: &'static Scene, time: Duration) -> Result<O
     let finest = RATIOS[RATIOS.len() - 1];
     let all = finest * LONGER + RATIOS.iter().sum::<u64>();
     let left = time.saturating_sub(start.elapsed()).as_secs_f64() * PHOTON_SHARE;
-    let count = (left * trajectories / all as f64).clamp(TRAJECTORIES[0], TRAJECTORIES[1]) as u64;
+    let count = (left * trajectories / all as f64).clamp(FEWEST, MOST[usize::from(setup.options.quick)]) as u64;
     (setup.observer.say)(&format!("  {}, {} × {} pixels, {count} trajectories", scene.name, size[0], size[1]));
 
     // The reference holds no global photons to speak of
@@ -119,7 +120,9 @@ fn figure(setup: &Setup<'_>, outcomes: &[Outcome; 2]) -> Result<Figure, Reproduc
     ))];
     for o in outcomes {
         let exposure = gain(&o.rows[o.rows.len() - 1].all);
-        let caption = |r: &Row| format!("{} photons in the global map, {} in the caustic map", r.maps.global.len(), r.maps.caustic.len());
+        let caption = |r: &Row| {
+            format!("{} photons in the global map, {} in the caustic map", r.maps.global.len(), r.maps.caustic.len())
+        };
         let whole: Vec<Print<'_>> = (o.rows.iter())
             .map(|r| Print {
                 name: format!("{}-{}", o.scene.id, r.q),
@@ -184,7 +187,8 @@ fn summary(o: &Outcome) -> Summary {
 }
 
 fn table(o: &Outcome) -> Table {
-    let mut table = Table::new(&["q", "trajectories", "global photons", "caustic photons", "MB", "s", "error of the caustic"]);
+    let mut table =
+        Table::new(&["q", "trajectories", "global photons", "caustic photons", "MB", "s", "error of the caustic"]);
     for r in &o.rows {
         let cells = [
             r.maps.trajectories.to_string(),

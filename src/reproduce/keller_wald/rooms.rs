@@ -19,8 +19,9 @@ use std::time::{Duration, Instant};
 
 /// Photons of the larger maps over those of the smaller ones.
 const LARGER: u64 = 8;
-/// Fewest and most photons of the smaller maps: the report has 6·10⁵.
-const PHOTONS: [f64; 2] = [2_000.0, 600_000.0];
+/// Fewest photons of the smaller maps, and most: usual and quick. The report has 6·10⁵.
+const FEWEST: f64 = 2_000.0;
+const MOST: [f64; 2] = [600_000.0, 20_000.0];
 /// Photons of an estimate: each map is shown with the number that serves it best.
 const COUNTS: [u32; 4] = [20, 60, 200, 600];
 /// Most pixels along an edge: usual and quick.
@@ -87,7 +88,7 @@ pub fn run(setup: &Setup<'_>, time: Duration) -> Result<Figure, ReproduceError> 
     (setup.observer.say)("Rooms …");
     let size = setup.size.min(SIZE[usize::from(setup.options.quick)]);
     let mut stage = Stage::load(&setup.scenes.join("rooms.pbrt"), scaled(SHAPE, size), setup.options.threads)?;
-    let reference = path_traced(&mut stage, time.mul_f64(REFERENCE_SHARE), setup.observer)?;
+    let reference = path_traced(setup, &mut stage, time.mul_f64(REFERENCE_SHARE))?;
     let (world, size) = (stage.world(), stage.size());
     let seen = seen(world);
     let mask: Vec<bool> = seen.iter().map(Option::is_some).collect();
@@ -98,7 +99,7 @@ pub fn run(setup: &Setup<'_>, time: Duration) -> Result<Figure, ReproduceError> 
     let tracing = Tracing { seed: 2, ..Tracing::default() };
     let [stored, _] = speed(setup, world, &tracing, Some(&importance))?;
     let left = time.saturating_sub(start.elapsed()).as_secs_f64() * PHOTON_SHARE / (1.0 - REFERENCE_SHARE);
-    let photons = (left * stored / (1 + LARGER) as f64).clamp(PHOTONS[0], PHOTONS[1]) as u64;
+    let photons = (left * stored / (1 + LARGER) as f64).clamp(FEWEST, MOST[usize::from(setup.options.quick)]) as u64;
     (setup.observer.say)(&format!("  {} × {} pixels, {photons} photons and {LARGER} times as many", size[0], size[1]));
     let judge = Judge { setup, world, seen: &seen, mask: &mask, reference: &reference, room: room() };
     let rows = [
@@ -137,14 +138,20 @@ fn figure(
             .to_owned(),
     ));
     let exposure = gain(&judge.reference.radiance);
-    let print = |(i, r): (usize, &Row)| Print {
-        name: format!("rooms-{i}"),
-        title: r.name.to_owned(),
-        caption: format!("{} photons; error {} with k = {}", r.maps.stored(), significant(r.error()), COUNTS[r.best]),
-        size,
-        radiance: &r.picture,
-    };
-    let mut list: Vec<Print<'_>> = rows.iter().enumerate().map(print).collect();
+    let mut list: Vec<Print<'_>> = (rows.iter().enumerate())
+        .map(|(i, r)| Print {
+            name: format!("rooms-{i}"),
+            title: r.name.to_owned(),
+            caption: format!(
+                "{} photons; error {} with k = {}",
+                r.maps.stored(),
+                significant(r.error()),
+                COUNTS[r.best]
+            ),
+            size,
+            radiance: &r.picture,
+        })
+        .collect();
     list.push(Print {
         name: "rooms-reference".to_owned(),
         title: "path tracing".to_owned(),

@@ -86,9 +86,8 @@ impl Reference {
     /// Root of the mean square of the difference in luminance over the pixels of a mask, relative to the mean luminance. The
     /// reference's own noise is subtracted from each square.
     pub fn rmse(&self, picture: &[[f32; 3]], mask: &[bool]) -> f64 {
-        let square = |(i, p): (usize, &[f32; 3])| {
-            (luminance(p.map(f64::from)) - self.luminance[i]).powi(2) - self.variance[i]
-        };
+        let square =
+            |(i, p): (usize, &[f32; 3])| (luminance(p.map(f64::from)) - self.luminance[i]).powi(2) - self.variance[i];
         mean_where(mask, picture.iter().enumerate().map(square)).max(0.0).sqrt() / self.mean(mask).max(1e-300)
     }
 

@@ -20,8 +20,9 @@ use std::time::{Duration, Instant};
 const LEAST: f32 = 0.05;
 /// Maps of each kind, with seeds of their own.
 const SEEDS: u32 = 4;
-/// Fewest and most photons of a map.
-const PHOTONS: [f64; 2] = [1_000.0, 200_000.0];
+/// Fewest photons of a map, and most: usual and quick.
+const FEWEST: f64 = 500.0;
+const MOST: [f64; 2] = [200_000.0, 10_000.0];
 /// Photons of an estimate.
 const COUNT: u32 = 60;
 /// Most pixels along an edge: usual and quick.
@@ -65,7 +66,7 @@ pub fn run(setup: &Setup<'_>, time: Duration) -> Result<Figure, ReproduceError> 
     let [by_cut, _] = speed(setup, world, &Tracing::default(), Some(&cut))?;
     let each = f64::from(SEEDS) * (1.0 / by_floor.max(1.0) + 2.0 / by_cut.max(1.0));
     let left = time.saturating_sub(start.elapsed()).as_secs_f64() * PHOTON_SHARE;
-    let photons = (left / each).clamp(PHOTONS[0], PHOTONS[1]) as u64;
+    let photons = (left / each).clamp(FEWEST, MOST[usize::from(setup.options.quick)]) as u64;
     (setup.observer.say)(&format!("  {} × {} pixels, {photons} photons, {SEEDS} maps of each kind", size[0], size[1]));
     let of = |name, id, importance| row(setup, (world, &seen), (name, id), importance, photons);
     let rows = [
@@ -128,14 +129,15 @@ fn figure(
     let mut list = vec![cloud("importons", "importons", positions(importance.map()).collect())];
     list.extend(rows.iter().map(|r| cloud(r.id, r.name, r.maps.positions())));
     blocks.extend(clouds(setup, &plan(world), &list)?);
-    let print = |r: &Row| Print {
-        name: format!("slit-{}", r.id),
-        title: r.name.to_owned(),
-        caption: format!("{} photons in the room", r.in_room),
-        size,
-        radiance: &r.picture,
-    };
-    let list: Vec<Print<'_>> = rows.iter().map(print).collect();
+    let list: Vec<Print<'_>> = (rows.iter())
+        .map(|r| Print {
+            name: format!("slit-{}", r.id),
+            title: r.name.to_owned(),
+            caption: format!("{} photons in the room", r.in_room),
+            size,
+            radiance: &r.picture,
+        })
+        .collect();
     blocks.push(prints(setup, gain(&rows[1].picture), &list)?);
     blocks.push(Block::Table(table(rows)));
 
@@ -155,7 +157,10 @@ fn figure(
                 percent(loss)
             ),
             reached: share(&rows[1]) > share(&rows[0]) && share(&rows[2]) > share(&rows[1]),
-            reason: format!("{} trajectories for as many photons as {}", rows[2].maps.trajectories, rows[0].maps.trajectories),
+            reason: format!(
+                "{} trajectories for as many photons as {}",
+                rows[2].maps.trajectories, rows[0].maps.trajectories
+            ),
         },
         also: Vec::new(),
         blocks,
@@ -167,7 +172,8 @@ fn figure(
 }
 
 fn table(rows: &[Row; 3]) -> Table {
-    let header = ["map", "photons", "in the visible room", "trajectories", "s", "mean luminance", "against the unbiased map"];
+    let header =
+        ["map", "photons", "in the visible room", "trajectories", "s", "mean luminance", "against the unbiased map"];
     let mut table = Table::new(&header);
     for r in rows {
         let cells = [
