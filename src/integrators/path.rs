@@ -12,10 +12,9 @@ use crate::film::{Features, PixelSample};
 use crate::geometry::SurfaceHit;
 use crate::lights::LightHit;
 use crate::materials::SurfaceBsdf;
-use crate::math::{Ray, Rgb, Vec2, Vec3};
+use crate::math::{Ray, Rgb, Vec3};
 use crate::samplers::SampleStream;
-use crate::scene::{IntegratorSettings, Split, World};
-use crate::textures::TextureContext;
+use crate::scene::{Found, IntegratorSettings, Split, World};
 use std::time::{Duration, Instant};
 
 /// Domains below the stream of a path vertex.
@@ -220,10 +219,10 @@ impl PathIntegrator {
                         }
                         continue;
                     }
-                    Some(hit) => Found::new(world, path, hit),
+                    Some(hit) => Found::new(world, &path.ray, (path.width, path.spread), hit),
                 };
                 if vertex == 0 && !self.only_reflected {
-                    found.add_emission(world, path, &mut out[path.sample as usize].radiance);
+                    path.add_emission(world, &found, &mut out[path.sample as usize].radiance);
                 }
                 match found.scatter(world) {
                     Some(bsdf) => {
@@ -231,9 +230,9 @@ impl PathIntegrator {
                             let depth_only = self.only_reflected;
                             out[path.sample as usize].features.get_or_insert_with(|| {
                                 if depth_only {
-                                    Features { depth: found.depth(path), ..Features::default() }
+                                    Features { depth: path.depth(&found), ..Features::default() }
                                 } else {
-                                    found.features(world, path, &bsdf)
+                                    path.features(world, &found, &bsdf)
                                 }
                             });
                         }
@@ -245,7 +244,7 @@ impl PathIntegrator {
                             kept.push(PathState { width: found.width, passed: 0, travelled: 0.0, ..*path });
                         }
                     }
-                    None if path.passed < MAX_PASSED => passing.push(found.pass(path)),
+                    None if path.passed < MAX_PASSED => passing.push(path.pass(&found)),
                     None => {}
                 }
             }
@@ -401,77 +400,44 @@ fn next_direction(v: &Vertex<'_>, settings: &IntegratorSettings) -> Option<Direc
     Some(Direction { wi: sample.wi, weight, eta: sample.eta, lobe: sample.lobe })
 }
 
-/// A hit with what shading needs of it.
-struct Found {
-    hit: Hit,
-    surface: SurfaceHit,
-    wo: Vec3,
-    /// Width of the footprint at the hit.
-    width: f32,
-    distance: f32,
-    context: TextureContext,
-}
-
-impl Found {
-    fn new(world: &World, path: &PathState, hit: &Hit) -> Self {
-        let surface =
-            world.scene.geometry.surface_hit(hit.geometry, hit.primitive, hit.instance, hit.uv, path.ray.time);
-        let distance = hit.t * path.ray.d.length();
-        let width = path.width + path.spread * distance;
-        let extent = |d: Vec3| {
-            let length = d.length();
-            if length > 0.0 { width / length } else { 0.0 }
-        };
-        let uv_width = Vec2::new(extent(surface.dpdu), extent(surface.dpdv));
-        let context = TextureContext { uv: surface.uv, uv_width, p: surface.p, n: surface.n };
-        Found { hit: *hit, surface, wo: -path.ray.d.normalize(), width, distance, context }
-    }
-
-    /// Adds what the surface emits towards the camera.
-    fn add_emission(&self, world: &World, path: &PathState, radiance: &mut Rgb) {
+impl PathState {
+    /// Adds what the surface that was found emits towards the camera.
+    fn add_emission(&self, world: &World, found: &Found, radiance: &mut Rgb) {
         let lights = &world.scene.lights;
-        if self.hit.instance != Hit::NO_INSTANCE {
+        if found.hit.instance != Hit::NO_INSTANCE {
             return;
         }
-        if let Some(light) = lights.light_of(self.hit.geometry, self.hit.primitive) {
-            let s = &self.surface;
-            let hit = LightHit { t: self.hit.t, p: s.p, n: s.n, uv: s.uv };
-            *radiance += path.beta * lights.lights[light as usize].l(&hit, self.wo);
+        if let Some(light) = lights.light_of(found.hit.geometry, found.hit.primitive) {
+            let s = &found.surface;
+            let hit = LightHit { t: found.hit.t, p: s.p, n: s.n, uv: s.uv };
+            *radiance += self.beta * lights.lights[light as usize].l(&hit, found.wo);
         }
     }
 
-    /// The scattering at the hit; `None` where rays pass.
-    fn scatter<'w>(&self, world: &'w World) -> Option<SurfaceBsdf<'w>> {
-        let scene = &world.scene;
-        let material = scene.surfaces[self.hit.geometry as usize].material;
-        scene.materials.bsdf(material, &scene.textures, &self.surface, &self.context, self.wo)
-    }
-
-    fn features(&self, world: &World, path: &PathState, bsdf: &SurfaceBsdf<'_>) -> Features {
+    fn features(&self, world: &World, found: &Found, bsdf: &SurfaceBsdf<'_>) -> Features {
         let z = bsdf.frame.z;
         Features {
-            albedo: bsdf.albedo_estimate(self.wo),
-            normal: if z.dot(self.wo) < 0.0 { -z } else { z },
-            depth: self.depth(path),
-            material: world.scene.surfaces[self.hit.geometry as usize].material,
-            object: self.hit.geometry,
+            albedo: bsdf.albedo_estimate(found.wo),
+            normal: if z.dot(found.wo) < 0.0 { -z } else { z },
+            depth: self.depth(found),
+            material: world.scene.surfaces[found.hit.geometry as usize].material,
+            object: found.hit.geometry,
         }
     }
 
     /// Distance from the camera along the ray.
-    fn depth(&self, path: &PathState) -> f32 {
-        path.travelled + self.distance
+    fn depth(&self, found: &Found) -> f32 {
+        self.travelled + found.distance
     }
 
     /// The path beyond a surface that does not scatter.
-    fn pass(&self, path: &PathState) -> PathState {
-        let o = crate::math::ray::offset_origin(self.surface.p, self.surface.p_error, self.surface.n, path.ray.d);
+    fn pass(&self, found: &Found) -> PathState {
         PathState {
-            ray: Ray { o, ..path.ray },
-            width: self.width,
-            passed: path.passed + 1,
-            travelled: path.travelled + self.distance,
-            ..*path
+            ray: Ray { o: found.origin(self.ray.d), ..self.ray },
+            width: found.width,
+            passed: self.passed + 1,
+            travelled: self.travelled + found.distance,
+            ..*self
         }
     }
 }

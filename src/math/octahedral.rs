@@ -15,7 +15,7 @@ const HALF: f32 = ((1 << (BITS - 1)) - 1) as f32;
 pub const PACKED_BITS: u32 = 2 * BITS;
 
 /// The largest angle between a vector and what comes back of it (radians).
-pub const MAX_ERROR: f32 = 2.2e-4;
+pub const MAX_ERROR: f32 = 2.7e-4;
 
 /// Packs the unit vector `v`.
 #[inline]

@@ -26,7 +26,7 @@ fn plane(mean: f64, height: f32, n: Vec3, stream: &mut HashStream) -> Vec<Photon
 fn searches() -> [Search; 5] {
     [
         Search::Radius(0.2),
-        Search::Nearest { count: 2, max_radius: 0.5 },
+        Search::Nearest { count: 5, max_radius: 0.5 },
         Search::Nearest { count: 20, max_radius: 0.5 },
         // Of about as many photons as the largest disk holds: both cases happen
         Search::Nearest { count: 13, max_radius: 0.2 },
@@ -62,7 +62,7 @@ fn a_thin_wall_that_is_lit_on_one_side_is_black_on_the_other() {
             assert_eq!(map.irradiance(&behind, search, &mut scratch), Rgb::BLACK, "{search:?}");
         }
         let lit = Place::flat(Vec3::ZERO, Vec3::Y);
-        assert!(map.irradiance(&lit, search, &mut scratch).g > 0.3);
+        assert!(map.irradiance(&lit, search, &mut scratch).g > 0.05);
     }
 }
 

@@ -1,12 +1,32 @@
-//! Photon maps [Jensen 1996] with deposition by importance [Keller and Wald 2000].
+//! Photon maps [Jensen 1996], whose photons are stored by their importance to the picture [Keller and Wald 2000].
 //!
-//! Reading order: [`photon`], `tree`, [`map`].
+//! ```text
+//! camera ─importons─▶ p(x) ──┐
+//! lights ─random walks─▶ arrivals ─store with probability p(x), or q·p(x)─▶ caustic and global photons ─tree─▶ maps
+//! ```
+//!
+//! Photons lie on surfaces whose BSDF has a Lambertian part ([`crate::bsdfs::Bsdf::lambertian`]), and tell how they came there
+//! ([`Origin`]): straight from a light, scattered by a Lambertian lobe, or by any other one, which makes them caustics, whether the light before that
+//! was direct or not.
+//!
+//! Reading order: [`photon`], `tree`, [`map`]; [`shares`], `walk`, [`rules`], [`trace`]; [`importance`], [`error`].
 
+pub mod error;
+pub mod importance;
 pub mod map;
 #[cfg(test)]
 mod map_tests;
 pub mod photon;
+pub mod rules;
+pub mod shares;
+pub mod trace;
 mod tree;
+mod walk;
 
+pub use error::PhotonError;
+pub use importance::{Importance, ImportanceSettings, Unimportant, trace_importons};
 pub use map::{GatherScratch, PhotonMap, Place, Search};
 pub use photon::{Origin, Photon};
+pub use rules::CausticRule;
+pub use shares::LightShares;
+pub use trace::{Traced, Tracing, Want, trace_photons};

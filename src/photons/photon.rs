@@ -3,7 +3,7 @@
 //! | bits | what |
 //! |---|---|
 //! | 3 × 32 | position |
-//! | 28 + 28 | direction and normal, by [`crate::math::octahedral`]: within 2.2·10⁻⁴ rad |
+//! | 28 + 28 | direction and normal, by [`crate::math::octahedral`]: within 2.7·10⁻⁴ rad |
 //! | 8 + 3 × 12 | power: an exponent for all channels and their mantissas, as in [Ward 1991] with more bits: within 0.025 % of the largest |
 //! | 2 + 26 | origin, light |
 

@@ -2,10 +2,12 @@
 //!
 //! [`Scene`] is data, as an importer makes it; [`World`] is a scene with its ray tracers, ready to render.
 
+mod found;
 mod settings;
 mod split_map;
 mod world;
 
+pub use found::Found;
 pub use settings::{
     Cached, CorrelatedForm, CorrelatedSettings, EstimatorKind, IntegratorKind, IntegratorSettings,
     IrradianceCacheSettings, OcvSettings, OptimalForm, ProposalPoints, Proposals, RisSettings, SamplingTechnique,

@@ -1,0 +1,43 @@
+//! Why there is no photon map.
+
+/// What went wrong with photons or importons.
+#[derive(Clone, Copy, Debug, PartialEq, thiserror::Error)]
+pub enum PhotonError {
+    /// There is nothing that could emit.
+    #[error("the scene has no light, so there are no photons to trace")]
+    NoLight,
+    /// There are lights, and all of them are black.
+    #[error("the lights of the scene emit nothing, so there are no photons to trace")]
+    NoEmission,
+    /// A number of trajectories, photons or importons is 0.
+    #[error("zero photons were asked for")]
+    NothingWanted,
+    /// The ratio q is not in (0, 1].
+    #[error("the ratio of global to caustic trajectories is {0}; it must be more than 0 and at most 1")]
+    InvalidRatio(f32),
+    /// A limit of the deposition probability is not in (0, 1].
+    #[error("the least deposition probability is {0}; it must be more than 0 and at most 1")]
+    InvalidProbability(f32),
+    /// No photon was stored.
+    #[error(
+        "no photon was stored in {trajectories} trajectories: no light reaches a diffuse surface{}",
+        if *.by_importance { " that matters to the camera" } else { "" }
+    )]
+    NoDeposit {
+        /// How many in a row left nothing.
+        trajectories: u64,
+        /// Whether photons arrived that had too little importance.
+        by_importance: bool,
+    },
+    /// No importon was stored.
+    #[error("the camera sees no diffuse surface, not even in mirrors, so that nothing is important to it")]
+    CameraSeesNothing,
+    /// The maps do not fit.
+    #[error("the photon maps need more than {} MB; {photons} photons were stored", limit / 1_000_000)]
+    OutOfMemory {
+        /// The limit (bytes).
+        limit: u64,
+        /// Photons when it was reached.
+        photons: u64,
+    },
+}

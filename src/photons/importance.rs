@@ -1,0 +1,195 @@
+//! Where photons matter to the picture: importons, and the probability that a photon is stored [Keller and Wald 2000, §2.3].
+//!
+//! Importons are photons of importance, which the camera sends and which scatter as light does [Peter and Pietrek 1998]. With the density I(x) of their
+//! importance, p(x) = min(1, f·I(x)), where 1/f is the least I that test rays from the camera find: so p = 1 wherever the camera looks,
+//! and the photons there keep their power.
+//!
+//! Where p is small, powers Φ/p are large and rare. Either p is at least ε, which keeps the expectation of every map, or photons with p < ε are
+//! dropped, which makes light that they carry be missing.
+
+use super::error::PhotonError;
+use super::map::{GatherScratch, PhotonMap, Place, Search};
+use super::photon::{Origin, Photon};
+use super::trace::{BATCH, domain, trajectory_stream};
+use super::walk::{Particle, WalkSettings, Walker};
+use crate::bsdfs::dielectric::Transport;
+use crate::math::{Rgb, Vec2, Vec3};
+use crate::scene::World;
+use rayon::prelude::*;
+
+/// Seeds of importons and of test rays are those of photons with this.
+const SEEDS: [u32; 2] = [0x696d_706f, 0x7465_7374];
+
+/// What becomes of photons that hardly matter.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub enum Unimportant {
+    /// p(x) is at least this, in (0, 1]: unbiased.
+    Floor(f32),
+    /// Photons with p(x) below this are dropped: biased, light is missing.
+    CutOff(f32),
+}
+
+/// How importance is found.
+#[derive(Clone, Copy, Debug)]
+pub struct ImportanceSettings {
+    /// Importance maps of different seeds are independent.
+    pub seed: u32,
+    /// Trajectories of importons.
+    pub trajectories: u64,
+    /// Most scatterings of an importon.
+    pub max_depth: u32,
+    /// Camera rays that look for the least importance.
+    pub test_rays: u64,
+    /// The part of test rays whose importance may be below 1/f; 0 takes their minimum.
+    pub quantile: f32,
+    /// Importons of a query.
+    pub count: u32,
+    /// Largest radius of a query, in radii of the scene.
+    pub max_radius: f32,
+    /// What becomes of photons that hardly matter.
+    pub unimportant: Unimportant,
+}
+
+impl Default for ImportanceSettings {
+    fn default() -> Self {
+        ImportanceSettings {
+            seed: 0,
+            trajectories: 100_000,
+            max_depth: 4,
+            test_rays: 1024,
+            quantile: 0.0,
+            count: 40,
+            max_radius: 0.05,
+            unimportant: Unimportant::Floor(0.01),
+        }
+    }
+}
+
+/// The probability of deposition.
+#[derive(Clone, Debug)]
+pub struct Importance {
+    map: PhotonMap,
+    /// f.
+    scale: f32,
+    search: Search,
+    unimportant: Unimportant,
+    rays: u64,
+}
+
+impl Importance {
+    /// p(x), for photons that arrive at `p` on the side of the geometric normal `n`.
+    pub fn probability(&self, p: Vec3, n: Vec3, scratch: &mut GatherScratch) -> f32 {
+        let important = (self.scale * density(&self.map, p, n, self.search, scratch)).min(1.0);
+        match self.unimportant {
+            Unimportant::Floor(least) => important.max(least),
+            Unimportant::CutOff(least) if important < least => 0.0,
+            Unimportant::CutOff(_) => important,
+        }
+    }
+
+    /// Maps made with it have the light that they would have without it, on average.
+    pub fn is_unbiased(&self) -> bool {
+        matches!(self.unimportant, Unimportant::Floor(_))
+    }
+
+    /// The importons.
+    pub fn map(&self) -> &PhotonMap {
+        &self.map
+    }
+
+    /// f, the reciprocal of the density of importance where p becomes 1 (m²).
+    pub fn scale(&self) -> f32 {
+        self.scale
+    }
+
+    /// Rays that importons and tests took.
+    pub fn rays(&self) -> u64 {
+        self.rays
+    }
+}
+
+/// Importance per area (1/m²).
+fn density(map: &PhotonMap, p: Vec3, n: Vec3, search: Search, scratch: &mut GatherScratch) -> f32 {
+    map.irradiance(&Place::flat(p, n), search, scratch).average()
+}
+
+/// Sends importons, on all threads of the current pool.
+pub fn trace_importons(world: &World, settings: &ImportanceSettings) -> Result<Importance, PhotonError> {
+    if settings.trajectories == 0 || settings.test_rays == 0 {
+        return Err(PhotonError::NothingWanted);
+    }
+    let (Unimportant::Floor(least) | Unimportant::CutOff(least)) = settings.unimportant;
+    if !(least > 0.0 && least <= 1.0) {
+        return Err(PhotonError::InvalidProbability(least));
+    }
+
+    // The map
+    let (importons, mut rays) =
+        trace(world, settings.seed ^ SEEDS[0], settings.trajectories, settings.max_depth, false);
+    let map = PhotonMap::new(importons);
+    let search = Search::Nearest {
+        count: settings.count.max(2),
+        max_radius: settings.max_radius * world.scene.lights.scene_radius,
+    };
+
+    // The scale, by what the camera sees at first
+    let (seen, test_rays) = trace(world, settings.seed ^ SEEDS[1], settings.test_rays, settings.max_depth, true);
+    rays += test_rays;
+    let of_place = |scratch: &mut GatherScratch, seen: &Photon| density(&map, seen.p(), seen.n(), search, scratch);
+    let mut found: Vec<f32> = seen.par_iter().map_init(GatherScratch::default, of_place).collect();
+    found.retain(|&importance| importance > 0.0 && importance.is_finite());
+    found.sort_by(f32::total_cmp);
+    let index = (settings.quantile.clamp(0.0, 1.0) * found.len() as f32) as usize;
+    let least = found.get(index.min(found.len().saturating_sub(1))).ok_or(PhotonError::CameraSeesNothing)?;
+    Ok(Importance { scale: 1.0 / least, map, search, unimportant: settings.unimportant, rays })
+}
+
+/// Importons where they arrive, and the number of rays; of each trajectory the first one only if `only_first`.
+fn trace(world: &World, seed: u32, count: u64, max_depth: u32, only_first: bool) -> (Vec<Photon>, u64) {
+    let settings = WalkSettings { transport: Transport::Radiance, max_depth };
+    let power = Rgb::splat((1.0 / count as f64) as f32);
+    let batches: Vec<(Vec<Photon>, u64)> = (0..count.div_ceil(BATCH) as usize)
+        .into_par_iter()
+        .with_max_len(1)
+        .map_init(Walker::default, |walker, i| {
+            let begin = i as u64 * BATCH;
+            let trajectories = begin..(begin + BATCH).min(count);
+            walker.traced = 0;
+            walker.active.clear();
+            walker.active.extend((0..).zip(trajectories).map(|(i, t)| emit(world, seed, i, t, power)));
+            let mut importons: Vec<(u32, Photon)> = Vec::new();
+            walker.walk(world, &settings, |arrival| {
+                let (wi, n, particle) = (arrival.wi, arrival.n, arrival.particle);
+                let importon = |wi, n| (particle.index, Photon::new(arrival.p, wi, n, particle.power, particle.origin));
+                if !arrival.part.reflectance.is_black() {
+                    importons.push(importon(wi, n));
+                }
+                // Light on the other side matters as well
+                if !arrival.part.transmittance.is_black() {
+                    importons.push(importon(wi - n * (2.0 * wi.dot(n)), -n));
+                }
+            });
+            importons.sort_by_key(|(index, _)| *index);
+            if only_first {
+                importons.dedup_by_key(|(index, _)| *index);
+            }
+            (importons.into_iter().map(|(_, importon)| importon).collect(), walker.traced)
+        })
+        .collect();
+    let rays = batches.iter().map(|(_, rays)| rays).sum();
+    (batches.into_iter().flat_map(|(importons, _)| importons).collect(), rays)
+}
+
+/// An importon as it leaves the camera, anywhere in the picture.
+fn emit(world: &World, seed: u32, index: u32, trajectory: u64, power: Rgb) -> Particle {
+    let stream = trajectory_stream(seed, trajectory);
+    let [x, y, lens_u, lens_v] = stream.domain(domain::EMISSION).draw::<4>();
+    let [u_time] = stream.domain(domain::TIME).draw::<1>();
+    let bounds = &world.scene.film.bounds;
+    let film = Vec2::new(
+        bounds.x0 as f32 + x * bounds.width() as f32,
+        bounds.y0 as f32 + y * (bounds.area() as f32 / bounds.width().max(1) as f32),
+    );
+    let ray = world.scene.camera.ray(film, [lens_u, lens_v], u_time);
+    Particle::new(index, ray.ray, power * ray.weight, Origin::Primary(0), stream)
+}

@@ -1,0 +1,104 @@
+//! Which light a trajectory starts from: p_i = (1 − a) Φ_i/Σ Φ + a/L over the L lights that emit anything, Φ being powers and a the
+//! floor, so that no light has less than a/L of the trajectories.
+//!
+//! The choice is by inversion, so that the numbers of a stratified sequence give each light its share to within few trajectories.
+
+use crate::lights::{LightId, LightSet};
+
+/// Shares of lights in trajectories.
+#[derive(Clone, Debug)]
+pub struct LightShares {
+    lights: Vec<LightId>,
+    /// Σ p_j for j ≤ i.
+    cumulative: Vec<f64>,
+}
+
+impl LightShares {
+    /// `floor`: a in 0..1. `None` if no light emits anything.
+    pub fn new(lights: &LightSet, floor: f32) -> Option<Self> {
+        let phi = |i: usize| f64::from(lights.lights[i].phi(lights.scene_radius));
+        let lit: Vec<(LightId, f64)> =
+            (0..lights.lights.len()).map(|i| (i as LightId, phi(i))).filter(|(_, phi)| *phi > 0.0).collect();
+        let total: f64 = lit.iter().map(|(_, phi)| phi).sum();
+        if !(total > 0.0 && total.is_finite()) {
+            return None;
+        }
+        let floor = f64::from(floor.clamp(0.0, 1.0));
+        let mut sum = 0.0;
+        let cumulative = lit
+            .iter()
+            .map(|(_, phi)| {
+                sum += (1.0 - floor) * phi / total + floor / lit.len() as f64;
+                sum
+            })
+            .collect();
+        Some(LightShares { lights: lit.into_iter().map(|(light, _)| light).collect(), cumulative })
+    }
+
+    /// A light, and its probability, by a number of twice 24 bits: `u[1]` fills the gaps between the values of `u[0]`, which
+    /// are wider than the shares of many lights.
+    #[inline]
+    pub fn sample(&self, u: [f32; 2]) -> (LightId, f32) {
+        const STEPS: f64 = 16_777_216.0;
+        let u = ((f64::from(u[0]) * STEPS).floor() + f64::from(u[1])) / STEPS;
+        let last = self.lights.len() - 1;
+        let i = self.cumulative.partition_point(|&c| c <= u * self.cumulative[last]).min(last);
+        (self.lights[i], self.pmf_at(i))
+    }
+
+    /// Probability of a light; 0 if it emits nothing.
+    pub fn pmf(&self, light: LightId) -> f32 {
+        self.lights.binary_search(&light).map_or(0.0, |i| self.pmf_at(i))
+    }
+
+    #[inline]
+    fn pmf_at(&self, i: usize) -> f32 {
+        let before = if i == 0 { 0.0 } else { self.cumulative[i - 1] };
+        (self.cumulative[i] - before) as f32
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::lights::{Light, LightSamplerKind, LightSetBuilder};
+    use crate::math::{Bounds3, Rgb, Vec3};
+    use crate::samplers::{SampleStream, SamplerKind};
+
+    fn points(intensities: &[f32]) -> LightSet {
+        let mut builder = LightSetBuilder::default();
+        for &i in intensities {
+            builder.add(Light::Point { p: Vec3::ZERO, intensity: Rgb::splat(i) });
+        }
+        builder.build(LightSamplerKind::Power, &Bounds3 { min: Vec3::ZERO, max: Vec3::ONE })
+    }
+
+    #[test]
+    fn shares_are_by_power_with_a_floor_and_black_lights_have_none() {
+        let shares = LightShares::new(&points(&[3.0, 0.0, 1.0, 0.0]), 0.1).unwrap();
+        let expected = [0.9 * 0.75 + 0.05, 0.0, 0.9 * 0.25 + 0.05, 0.0];
+        for (i, e) in expected.into_iter().enumerate() {
+            assert!((shares.pmf(i as LightId) - e).abs() < 1e-6, "{i}");
+        }
+        assert!(LightShares::new(&points(&[]), 0.1).is_none());
+        assert!(LightShares::new(&points(&[0.0]), 0.1).is_none());
+    }
+
+    #[test]
+    fn a_stratified_sequence_gives_each_light_its_share() {
+        let intensities: Vec<f32> = (0..1000).map(|i| 0.01 + (i % 17) as f32).collect();
+        let shares = LightShares::new(&points(&intensities), 0.05).unwrap();
+        let count = 1 << 16;
+        let mut counts = vec![0.0_f64; intensities.len()];
+        for i in 0..count {
+            let (light, pmf) = shares.sample(SampleStream::new(SamplerKind::Sobol, [0, 0], i, 5).draw::<2>());
+            assert_eq!(pmf, shares.pmf(light));
+            counts[light as usize] += 1.0;
+        }
+        for (i, counted) in counts.into_iter().enumerate() {
+            let expected = f64::from(shares.pmf(i as LightId)) * f64::from(count);
+            // An interval of a (0, 1)-sequence's 2¹⁶ points: at most one more or less at each end
+            assert!((counted - expected).abs() <= 2.0, "{i} {counted} {expected}");
+        }
+    }
+}

@@ -1,0 +1,220 @@
+//! Random walks of particles, a batch at a time: of photons from lights, and of importons from the camera.
+//!
+//! At each surface a particle is scattered by its BSDF and survives with the probability by which its power would shrink, so that powers
+//! stay about equal [Arvo and Kirk 1990]. Photons carry flux, importons importance; their weights differ by the adjoint [Veach 1997, §5.3.2]:
+//!
+//! * importons, as camera paths: f |wi·ns|/p
+//! * photons: f η² |wo·ns| |wi·n|/(|wo·n| p), f being that of radiance, which is scaled by 1/η² where light is refracted
+//!
+//! with the shading normal ns and the geometric normal n, and `wo` to where the particle comes from.
+//!
+//! What a scattering was is told apart by what it is *of*: the Lambertian part of the BSDF, or the rest. Where both scatter into the direction that
+//! was sampled, one of them is chosen in proportion to its f, and the weight is that of the chosen one over its probability.
+
+use super::photon::Origin;
+use crate::accel::{Coherence, Hit, RayBatch};
+use crate::bsdfs::dielectric::Transport;
+use crate::bsdfs::{Lambertian, Resampled};
+use crate::materials::SurfaceBsdf;
+use crate::math::{Ray, Rgb, Vec3};
+use crate::samplers::SampleStream;
+use crate::scene::{Found, World};
+
+/// Surfaces without scattering that a particle may pass between two vertices.
+const MAX_PASSED: u32 = 64;
+
+/// Domains below the stream of a vertex.
+mod domain {
+    pub const BSDF: u32 = 0;
+    pub const RESAMPLE: u32 = 1;
+    pub const ROULETTE: u32 = 2;
+    pub const PART: u32 = 3;
+    /// Two numbers for the deposit.
+    pub const DEPOSIT: u32 = 4;
+    /// Vertex k has the domain `VERTEX + k` of the trajectory.
+    pub const VERTEX: u32 = 16;
+}
+
+/// A particle on its way.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Particle {
+    /// Index in its batch.
+    pub(super) index: u32,
+    pub(super) ray: Ray,
+    /// What it carries.
+    pub(super) power: Rgb,
+    /// How it came to be where it is.
+    pub(super) origin: Origin,
+    /// Random numbers of its trajectory.
+    pub(super) stream: SampleStream,
+    passed: u32,
+}
+
+impl Particle {
+    pub(super) fn new(index: u32, ray: Ray, power: Rgb, origin: Origin, stream: SampleStream) -> Self {
+        Particle { index, ray, power, origin, stream, passed: 0 }
+    }
+}
+
+/// A particle at a surface that has a Lambertian part.
+pub(super) struct Arrival<'a> {
+    pub(super) particle: &'a Particle,
+    pub(super) p: Vec3,
+    /// To where it came from, unit.
+    pub(super) wi: Vec3,
+    /// Geometric normal on the side of `wi`.
+    pub(super) n: Vec3,
+    pub(super) part: &'a Lambertian<'a>,
+    stream: SampleStream,
+}
+
+impl Arrival<'_> {
+    /// Numbers that decide whether it is stored.
+    pub(super) fn xi(&self) -> [f32; 2] {
+        let stream = self.stream.domain(domain::DEPOSIT);
+        [0, 1].map(|key| stream.draw_random(key))
+    }
+}
+
+/// How particles walk.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct WalkSettings {
+    pub(super) transport: Transport,
+    /// Most scatterings before an arrival.
+    pub(super) max_depth: u32,
+}
+
+/// Walks with particles; holds the buffers of one worker.
+#[derive(Debug, Default)]
+pub(super) struct Walker {
+    /// The particles that are to walk.
+    pub(super) active: Vec<Particle>,
+    next: Vec<Particle>,
+    passing: Vec<Particle>,
+    rays: RayBatch,
+    hits: Vec<Option<Hit>>,
+    /// Rays traced so far.
+    pub(super) traced: u64,
+}
+
+impl Walker {
+    /// Lets the active particles walk until all are gone, and tells of their arrivals at Lambertian surfaces: vertex by vertex, not
+    /// particle by particle.
+    pub(super) fn walk(&mut self, world: &World, settings: &WalkSettings, mut arrive: impl FnMut(&Arrival<'_>)) {
+        for vertex in 0..=settings.max_depth {
+            self.next.clear();
+            while !self.active.is_empty() {
+                self.step(world, settings, vertex, &mut arrive);
+            }
+            std::mem::swap(&mut self.active, &mut self.next);
+        }
+        self.active.clear();
+    }
+
+    /// Takes the active particles to the next surface; those that pass it stay active.
+    fn step(&mut self, world: &World, settings: &WalkSettings, vertex: u32, arrive: &mut impl FnMut(&Arrival<'_>)) {
+        self.rays.clear();
+        self.active.iter().for_each(|particle| self.rays.push(&particle.ray));
+        world.accel.intersect(&self.rays, Coherence::Incoherent, &mut self.hits);
+        self.traced += self.rays.len() as u64;
+
+        self.passing.clear();
+        for (particle, hit) in self.active.iter().zip(&self.hits) {
+            let Some(hit) = hit else { continue };
+            let found = Found::new(world, &particle.ray, (0.0, 0.0), hit);
+            let Some(bsdf) = found.scatter(world) else {
+                if particle.passed < MAX_PASSED {
+                    let ray = Ray { o: found.origin(particle.ray.d), ..particle.ray };
+                    self.passing.push(Particle { ray, passed: particle.passed + 1, ..*particle });
+                }
+                continue;
+            };
+            let stream = particle.stream.domain(domain::VERTEX + vertex);
+            let part = bsdf.lambertian(found.wo);
+            if let Some(part) = &part {
+                let n = if bsdf.n.dot(found.wo) < 0.0 { -bsdf.n } else { bsdf.n };
+                arrive(&Arrival { particle, p: found.surface.p, wi: found.wo, n, part, stream });
+            }
+            if vertex < settings.max_depth {
+                let proposals = world.scene.integrator.bsdf_proposals;
+                let scattering = Scattering { found: &found, bsdf: &bsdf, part: part.as_ref(), stream, proposals };
+                self.next.extend(scattering.scatter(particle, settings.transport));
+            }
+        }
+        std::mem::swap(&mut self.active, &mut self.passing);
+    }
+}
+
+/// A surface that a particle leaves.
+struct Scattering<'a> {
+    found: &'a Found,
+    bsdf: &'a SurfaceBsdf<'a>,
+    part: Option<&'a Lambertian<'a>>,
+    stream: SampleStream,
+    /// Of BSDFs that can only be evaluated.
+    proposals: u32,
+}
+
+impl Scattering<'_> {
+    /// The particle after the surface; `None` if it ends there.
+    fn scatter(&self, particle: &Particle, transport: Transport) -> Option<Particle> {
+        let drawn = self.draw()?;
+        let (wo, wi) = (self.found.wo, drawn.wi);
+        let (f, origin) = self.of_part(&drawn);
+
+        // Weight
+        let (n, ns) = (self.bsdf.n, self.bsdf.frame.z);
+        let cosine = match transport {
+            Transport::Radiance => wi.dot(ns).abs(),
+            Transport::Importance => (wo.dot(ns) * wi.dot(n) / wo.dot(n)).abs() * drawn.eta * drawn.eta,
+        };
+        let power = particle.power * f * (cosine * drawn.weight);
+        if power.is_black() || !power.is_finite() {
+            return None;
+        }
+
+        // Roulette by what is left, apart from the scaling of radiance by refraction
+        let scale = match transport {
+            Transport::Radiance => drawn.eta * drawn.eta,
+            Transport::Importance => 1.0,
+        };
+        let survival = power.max_component() * scale / particle.power.max_component();
+        if survival < 1.0 && self.stream.draw_random(domain::ROULETTE) >= survival {
+            return None;
+        }
+        let power = power / survival.min(1.0);
+        let ray = Ray { o: self.found.origin(wi), d: wi, ..particle.ray };
+        Some(Particle { ray, power, origin, passed: 0, ..*particle })
+    }
+
+    /// A direction by the BSDF; of one that can only be evaluated, by resampling.
+    fn draw(&self) -> Option<Resampled> {
+        let wo = self.found.wo;
+        if self.bsdf.bsdf.is_only_evaluated() {
+            let count = self.proposals.max(1);
+            let proposal = |i| self.stream.split(domain::BSDF, count, i).draw::<3>();
+            let [u_choice] = self.stream.domain(domain::RESAMPLE).draw::<1>();
+            return self.bsdf.resample(wo, count, proposal, u_choice);
+        }
+        let [uc, u0, u1] = self.stream.domain(domain::BSDF).draw::<3>();
+        let s = self.bsdf.sample(wo, uc, [u0, u1])?;
+        Some(Resampled { f: s.f, wi: s.wi, weight: 1.0 / s.pdf, lobe: s.lobe, eta: s.eta })
+    }
+
+    /// f of the part that scatters, over the probability of its choice; and what that part is.
+    fn of_part(&self, drawn: &Resampled) -> (Rgb, Origin) {
+        let Some(part) = self.part else { return (drawn.f, Origin::Caustic) };
+        let Some(rest) = part.rest else { return (drawn.f, Origin::Diffuse) };
+        if drawn.lobe.is_specular() {
+            return (drawn.f, Origin::Caustic);
+        }
+        let rest = SurfaceBsdf { bsdf: rest, ..*self.bsdf };
+        let f_rest = rest.f(self.found.wo, drawn.wi);
+        let p_rest = (f_rest.average() / drawn.f.average()).clamp(0.0, 1.0);
+        if self.stream.draw_random(domain::PART) < p_rest {
+            (f_rest / p_rest, Origin::Caustic)
+        } else {
+            ((drawn.f - f_rest).map(|c| c.max(0.0)) / (1.0 - p_rest), Origin::Diffuse)
+        }
+    }
+}

@@ -1,0 +1,53 @@
+//! What a ray found: a hit with what shading needs of it.
+
+use super::World;
+use crate::accel::Hit;
+use crate::geometry::SurfaceHit;
+use crate::materials::SurfaceBsdf;
+use crate::math::ray::offset_origin;
+use crate::math::{Ray, Vec2, Vec3};
+use crate::textures::TextureContext;
+
+/// A hit with its surface.
+#[derive(Clone, Copy, Debug)]
+pub struct Found {
+    /// What was hit.
+    pub hit: Hit,
+    /// The point on the surface.
+    pub surface: SurfaceHit,
+    /// Unit direction to where the ray came from.
+    pub wo: Vec3,
+    /// Width of the texture footprint at the hit (m).
+    pub width: f32,
+    /// Distance that the ray went (m).
+    pub distance: f32,
+    context: TextureContext,
+}
+
+impl Found {
+    /// The first hit of `ray`, whose texture footprint has `width` at its origin and grows by `spread` per unit length.
+    pub fn new(world: &World, ray: &Ray, (width, spread): (f32, f32), hit: &Hit) -> Self {
+        let surface = world.scene.geometry.surface_hit(hit.geometry, hit.primitive, hit.instance, hit.uv, ray.time);
+        let distance = hit.t * ray.d.length();
+        let width = width + spread * distance;
+        let extent = |d: Vec3| {
+            let length = d.length();
+            if length > 0.0 { width / length } else { 0.0 }
+        };
+        let uv_width = Vec2::new(extent(surface.dpdu), extent(surface.dpdv));
+        let context = TextureContext { uv: surface.uv, uv_width, p: surface.p, n: surface.n };
+        Found { hit: *hit, surface, wo: -ray.d.normalize(), width, distance, context }
+    }
+
+    /// The scattering at the hit; `None` where rays pass.
+    pub fn scatter<'w>(&self, world: &'w World) -> Option<SurfaceBsdf<'w>> {
+        let scene = &world.scene;
+        let material = scene.surfaces[self.hit.geometry as usize].material;
+        scene.materials.bsdf(material, &scene.textures, &self.surface, &self.context, self.wo)
+    }
+
+    /// Origin of a ray that leaves the surface in direction `w`.
+    pub fn origin(&self, w: Vec3) -> Vec3 {
+        offset_origin(self.surface.p, self.surface.p_error, self.surface.n, w)
+    }
+}
