@@ -67,11 +67,11 @@ impl Plan {
         Picture::colored(self.size, density, scale)
     }
 
-    /// One scale for several pictures: from the density of a single point to the greatest but for outliers.
+    /// One scale for several pictures: from the density of a single point to that which a twentieth of the squares exceed: walls.
     pub fn scale(&self, densities: &[&[f64]]) -> Scale {
         let mut sorted: Vec<f64> = densities.iter().flat_map(|d| d.iter().copied()).filter(|v| *v > 0.0).collect();
         sorted.sort_by(f64::total_cmp);
-        let high = sorted.get(sorted.len().saturating_sub(1 + sorted.len() / 200)).copied().unwrap_or(1.0);
+        let high = sorted.get(sorted.len().saturating_sub(1 + sorted.len() / 20)).copied().unwrap_or(1.0);
         Scale::new(HEAT, 0.5 / (self.edge * self.edge), high)
     }
 }

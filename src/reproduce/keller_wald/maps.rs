@@ -18,8 +18,8 @@ use std::time::{Duration, Instant};
 
 /// Largest radius in which photons are looked for, in radii of the scene.
 const MAX_RADIUS: f32 = 0.05;
-/// Squares along the longer side of a plan.
-const PLAN_SIZE: u32 = 400;
+/// Squares along the longer side of a plan: usual and quick.
+const PLAN_SIZE: [u32; 2] = [400, 240];
 /// Turns of a reference; their seeds begin here.
 const LONG_TURNS: std::ops::Range<u32> = 1_000_000..1_000_004;
 /// Most camera rays of a turn of a reference: usual and quick.
@@ -132,8 +132,8 @@ pub fn path_traced(setup: &Setup<'_>, stage: &mut Stage, time: Duration) -> Resu
 }
 
 /// A plan of a scene.
-pub fn plan(world: &World) -> Plan {
-    Plan::new(&world.scene.geometry.world_bounds(), PLAN_SIZE)
+pub fn plan(setup: &Setup<'_>, world: &World) -> Plan {
+    Plan::new(&world.scene.geometry.world_bounds(), PLAN_SIZE[usize::from(setup.options.quick)])
 }
 
 /// Points from above: name of the file, heading, caption, and where they are.

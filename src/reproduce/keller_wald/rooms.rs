@@ -132,7 +132,7 @@ fn figure(
         cloud("importons", "importons", positions(importance.map()).collect()),
         cloud("importance", "map by importance", rows[1].maps.positions()),
     ];
-    blocks.extend(clouds(setup, &plan(judge.world), &list)?);
+    blocks.extend(clouds(setup, &plan(setup, judge.world), &list)?);
     blocks.push(Block::Text(
         "Figure 2: the maps shown directly, each with the number of nearest photons k that serves it best. Rows have the same number of photons."
             .to_owned(),

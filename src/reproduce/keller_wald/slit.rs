@@ -30,6 +30,8 @@ const SIZE: [u32; 2] = [240, 96];
 /// Part of the time for photons.
 const PHOTON_SHARE: f64 = 0.7;
 const IMPORTONS: u64 = 100_000;
+/// Part of the camera rays whose importance may be less than that of p = 1: a few see into the other room, or corners.
+const QUANTILE: f32 = 0.1;
 /// The room with the camera.
 const ROOM: Area = Area { low: [-4.1, -2.1], high: [-0.11, 2.1] };
 
@@ -55,7 +57,8 @@ pub fn run(setup: &Setup<'_>, time: Duration) -> Result<Figure, ReproduceError> 
     // What the slit shows of the other room is no part of this one
     let in_this_room = |s: Seen| Some(s).filter(|s| ROOM.holds(s.p));
     let seen: Vec<Option<Seen>> = seen(world).into_iter().map(|s| s.and_then(in_this_room)).collect();
-    let settings = ImportanceSettings { trajectories: IMPORTONS, seed: 1, ..ImportanceSettings::default() };
+    let settings =
+        ImportanceSettings { trajectories: IMPORTONS, seed: 1, quantile: QUANTILE, ..ImportanceSettings::default() };
     let floor = ImportanceSettings { unimportant: Unimportant::Floor(LEAST), ..settings };
     let cut = ImportanceSettings { unimportant: Unimportant::CutOff(LEAST), ..settings };
     let importance = |s: &ImportanceSettings| setup.pool.install(|| trace_importons(world, s));
@@ -128,7 +131,7 @@ fn figure(
     };
     let mut list = vec![cloud("importons", "importons", positions(importance.map()).collect())];
     list.extend(rows.iter().map(|r| cloud(r.id, r.name, r.maps.positions())));
-    blocks.extend(clouds(setup, &plan(world), &list)?);
+    blocks.extend(clouds(setup, &plan(setup, world), &list)?);
     let list: Vec<Print<'_>> = (rows.iter())
         .map(|r| Print {
             name: format!("slit-{}", r.id),
