@@ -245,6 +245,17 @@ impl<'a> Bsdf<'a> {
         }
     }
 
+    /// True if light that arrives on the other side than that of `wo` may reach it.
+    #[inline]
+    pub fn transmits(&self) -> bool {
+        match self {
+            Bsdf::DiffuseTransmission(_) | Bsdf::Dielectric(_) | Bsdf::ThinDielectric(_) => true,
+            Bsdf::Diffuse(_) | Bsdf::Conductor(_) | Bsdf::CoatedDiffuse(_) | Bsdf::Layered(_) | Bsdf::Evaluated(_) => {
+                false
+            }
+        }
+    }
+
     /// Probability of a lobe of [`Self::sample`] whose density is that of the cosine or uniform, on the side of `wo`: |cos θi|/pdf is at
     /// most 2π over this everywhere there, and directions are found that no f tells of. 0 for BSDFs without such a lobe.
     pub fn wide_lobe(&self, wo: Vec3) -> f32 {

@@ -60,6 +60,7 @@ choices!(
         Ocv => EstimatorKind::Ocv,
         OptimalMis => EstimatorKind::OptimalMis,
         Correlated => EstimatorKind::Correlated,
+        Contributing => EstimatorKind::Contributing,
     }
 );
 choices!(
@@ -105,11 +106,21 @@ choices!(
 );
 choices!(
     /// `--target`
-    TargetArg => Target { Fgl => Target::Fgl, Gv => Target::Gv, Gvl => Target::Gvl }
+    TargetArg => Target {
+        Fgl => Target::Fgl,
+        Gv => Target::Gv,
+        Gvl => Target::Gvl,
+        Visibility => Target::Visibility,
+    }
 );
 choices!(
     /// `--light-choice`
-    LightChoiceArg => LightSamplerKind { Uniform => LightSamplerKind::Uniform, Power => LightSamplerKind::Power, Tree => LightSamplerKind::Tree }
+    LightChoiceArg => LightSamplerKind {
+        Uniform => LightSamplerKind::Uniform,
+        Power => LightSamplerKind::Power,
+        Tree => LightSamplerKind::Tree,
+        Photons => LightSamplerKind::Photons,
+    }
 );
 choices!(
     /// `--bsdf-density`
@@ -168,8 +179,8 @@ pub struct SceneArgs {
     /// How the proposals of ris lie on the lights [default: the file's, or stratified]
     #[arg(long)]
     pub proposal_points: Option<ProposalPointsArg>,
-    /// What ris draws samples in proportion to: f*G*L, or with visibility V where shading is dearer than rays
-    /// [default: the file's, or fgl]
+    /// What ris draws samples in proportion to: f*G*L, with visibility V where shading is dearer than rays, or
+    /// (visibility) f*G*L with an estimate of V by photons [default: the file's, or fgl]
     #[arg(long)]
     pub target: Option<TargetArg>,
     /// Nanoseconds of a proposal and of a sample, from which `auto` and `optimal` choose [default: measured on this scene]
@@ -193,13 +204,18 @@ pub struct SceneArgs {
     /// Most components of the mixture of ocv and optimal-mis: lobes of BSDFs and groups of lights [default: the file's, or 8]
     #[arg(long, value_name = "M", value_parser = clap::value_parser!(u32).range(2..=8))]
     pub components: Option<u32>,
+    /// Samples of contributing on the lights that no photon came from, besides --samples on the others; 0 leaves these lights
+    /// out, which is biased [default: the file's, or 1]
+    #[arg(long, value_name = "N", value_parser = clap::value_parser!(u32).range(0..=4096))]
+    pub rest_samples: Option<u32>,
     /// Share of the samples that the BSDF draws, for mis, ocv and optimal-mis [default: the file's, or 0.5]
     #[arg(long, value_name = "SHARE", value_parser = parse_share)]
     pub bsdf_share: Option<f32>,
     /// Weights of the techniques [default: the file's, or power; balance for ris]
     #[arg(long)]
     pub heuristic: Option<HeuristicArg>,
-    /// How a light is chosen [default: the file's lightsampler, or tree]
+    /// How a light is chosen; by photons, mostly among those that photons have come from
+    /// [default: the file's lightsampler, or tree]
     #[arg(long)]
     pub light_choice: Option<LightChoiceArg>,
     /// Directions proposed per bounce off materials that can only be evaluated [default: the file's, or 4]

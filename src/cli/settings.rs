@@ -35,6 +35,9 @@ pub fn load_scene(args: &SceneArgs) -> anyhow::Result<Scene> {
     }
     let mut scene = loaded.scene;
     apply(args, &mut scene);
+    if scene.integrator.leaves_lights_out() {
+        progress::say("warning: without samples on the lights that no photon came from, direct light is biased");
+    }
     Ok(scene)
 }
 
@@ -83,6 +86,9 @@ fn apply(args: &SceneArgs, scene: &mut Scene) {
     }
     if let Some(technique) = args.technique {
         i.correlated.technique = technique.value();
+    }
+    if let Some(rest) = args.rest_samples {
+        i.contributing.rest_samples = rest;
     }
     if let Some(components) = args.components {
         i.ocv.components = Some(components);

@@ -37,7 +37,8 @@ impl Method {
             | EstimatorKind::Mis
             | EstimatorKind::Ris
             | EstimatorKind::Ocv
-            | EstimatorKind::Correlated => Method::Ocv(settings.ocv.form),
+            | EstimatorKind::Correlated
+            | EstimatorKind::Contributing => Method::Ocv(settings.ocv.form),
         }
     }
 

@@ -11,6 +11,7 @@
 //! * **resolve**: the sum of the contributions whose segment is free.
 
 pub mod components;
+pub mod contributing;
 pub mod correlated;
 pub mod mixture;
 pub mod proposals;
@@ -65,7 +66,13 @@ impl ShadePoint<'_> {
     /// The point as lights see it.
     #[inline]
     pub fn light_ctx(&self) -> LightCtx {
-        LightCtx { p: self.p, n: self.bsdf.n, ns: self.bsdf.frame.z }
+        let n = self.bsdf.n;
+        let n = match (self.bsdf.bsdf.transmits(), n.dot(self.wo) < 0.0) {
+            (true, _) => Vec3::ZERO,
+            (false, true) => -n,
+            (false, false) => n,
+        };
+        LightCtx { p: self.p, n, ns: self.bsdf.frame.z }
     }
 }
 
@@ -169,7 +176,8 @@ impl DirectStage {
             | EstimatorKind::Mis
             | EstimatorKind::Ocv
             | EstimatorKind::OptimalMis
-            | EstimatorKind::Correlated => {
+            | EstimatorKind::Correlated
+            | EstimatorKind::Contributing => {
                 select::contributions(settings, &self.candidates, &mut self.contributions);
             }
             EstimatorKind::Ris => {

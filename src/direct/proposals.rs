@@ -124,10 +124,12 @@ impl Proposals {
             self.sample_lights(world, point, start, bsdf_start);
             self.weigh_lights(world, point, techniques, start, bsdf_start);
         }
+        let around = world.scene.lights.around(&point.light_ctx());
         for (i, c) in (bsdf_start..end).zip(bsdf_samples) {
             let cos = || point.bsdf.cos(c.segment.d.normalize());
             self.p_hat[i] = match techniques.target {
                 Target::Fgl => c.f.luminance(),
+                Target::Visibility => c.f.luminance() * around.visibility(c.light),
                 // The cosine of a delta is part of its weight
                 Target::Gv | Target::Gvl if c.drawn.is_delta() => c.f.luminance(),
                 Target::Gv => cos(),
@@ -215,7 +217,9 @@ impl Proposals {
         let wi = self.wi.each_ref().map(|a| &a[start..end]);
         let f_cos = self.f_cos.each_mut().map(|a| &mut a[start..end]);
         match techniques.target {
-            Target::Fgl => point.bsdf.eval_lanes(point.wo, wi, f_cos, &mut self.p_bsdf[start..end]),
+            Target::Fgl | Target::Visibility => {
+                point.bsdf.eval_lanes(point.wo, wi, f_cos, &mut self.p_bsdf[start..end])
+            }
             Target::Gv | Target::Gvl => {
                 for i in start..end {
                     let wi = self.wi.each_ref().map(|a| a[i]).into();
@@ -246,10 +250,22 @@ impl Proposals {
             w: &mut self.weight[start..end],
         };
         combine::combine(simd::level(), &proposals, &mut weights);
-        if techniques.target == Target::Gv {
-            for i in start..end {
-                self.p_hat[i] = self.f_cos[0][i];
-                self.weight[i] = weight(self.p_hat[i], self.r[i]);
+        match techniques.target {
+            Target::Fgl | Target::Gvl => {}
+            Target::Gv => {
+                for i in start..end {
+                    self.p_hat[i] = self.f_cos[0][i];
+                    self.weight[i] = weight(self.p_hat[i], self.r[i]);
+                }
+            }
+            Target::Visibility => {
+                let around = world.scene.lights.around(&point.light_ctx());
+                for run in &self.runs {
+                    let visibility = around.visibility(run.light);
+                    let places = start + run.places[0] as usize..start + run.places[1] as usize;
+                    self.p_hat[places.clone()].iter_mut().for_each(|p_hat| *p_hat *= visibility);
+                    self.weight[places].iter_mut().for_each(|weight| *weight *= visibility);
+                }
             }
         }
     }

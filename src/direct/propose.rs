@@ -1,6 +1,7 @@
 //! T1: candidates with their unshadowed integrand and the densities of every technique, one at a time.
 
 use super::ShadePoint;
+use super::contributing::Contributing;
 use super::mixture::Mixture;
 use crate::accel::{Hit, RayBatch};
 use crate::estimators::mc;
@@ -22,6 +23,12 @@ pub(super) mod domain {
     pub const GROUPS: u32 = 3;
     /// Lights that no ray can hit, where they are sampled by themselves.
     pub const DELTA: u32 = 4;
+    /// Lights that no photon came from.
+    pub const REST: u32 = 5;
+    /// Which of the dim lights is traced.
+    pub const DIM: u32 = 6;
+    /// Light number k of those that are seen uses the domain `SEEN + k`.
+    pub const SEEN: u32 = 64;
     /// Group g uses the domain `GROUP + g`.
     pub const GROUP: u32 = 16;
 }
@@ -63,6 +70,8 @@ pub struct Candidate {
     pub f: Rgb,
     /// The radiance L in it.
     pub li: Rgb,
+    /// The light; one of those at infinity for a direction of BSDF sampling that meets no surface.
+    pub light: LightId,
     /// Density of light sampling at the direction (per steradian, light choice included; a probability for deltas).
     pub p_light: f32,
     /// Density of BSDF sampling (per steradian; as the BSDF gives it for specular lobes).
@@ -110,6 +119,7 @@ pub struct Candidates {
     /// Time in light samples.
     pub light_time: Duration,
     pub(super) spare: Vec<Candidate>,
+    contributing: Contributing,
     pending: Vec<PendingBsdf>,
     rays: RayBatch,
     hits: Vec<Option<Hit>>,
@@ -158,7 +168,9 @@ impl Shares {
             return Shares::fixed(0, n);
         }
         match settings.estimator {
-            EstimatorKind::Mc => Shares::fixed(n, u32::from(point.bsdf.bsdf.has_specular())),
+            EstimatorKind::Mc | EstimatorKind::Contributing => {
+                Shares::fixed(n, u32::from(point.bsdf.bsdf.has_specular()))
+            }
             EstimatorKind::Mis | EstimatorKind::Ocv | EstimatorKind::OptimalMis if n == 1 => Shares::one_of_both(point),
             EstimatorKind::Mis | EstimatorKind::Ocv | EstimatorKind::OptimalMis => {
                 let by_bsdf = ((n as f32 * settings.bsdf_share) as u32).clamp(1, n - 1);
@@ -194,6 +206,15 @@ impl Candidates {
             self.proposals += u64::from(shares.light_draws + shares.bsdf_draws);
             self.light_proposals += u64::from(shares.light_draws);
             if settings.estimator == EstimatorKind::Ris {
+                continue;
+            }
+            if settings.estimator == EstimatorKind::Contributing {
+                if shares.light_draws > 0 {
+                    let rest = settings.contributing.rest_samples;
+                    let drawn = self.contributing.draw(world, (index as u32, point), rest, &mut self.records);
+                    self.proposals = self.proposals + u64::from(drawn) - u64::from(shares.light_draws);
+                    self.light_proposals = self.light_proposals + u64::from(drawn) - u64::from(shares.light_draws);
+                }
                 continue;
             }
             if has_components {
@@ -324,8 +345,16 @@ pub(super) fn light_candidate(
     drawn: (LightId, LightSample),
 ) -> Option<Candidate> {
     // Lights at infinity overlap: a direction belongs to all of them together
-    let (_, sample) = with_infinite(world, &point.light_ctx(), drawn);
+    unshadowed_candidate(index, point, shares, with_infinite(world, &point.light_ctx(), drawn))
+}
 
+/// A sample of a light by itself, whose density includes the choice; `None` if its integrand is zero.
+pub(super) fn unshadowed_candidate(
+    index: u32,
+    point: &ShadePoint<'_>,
+    shares: &Shares,
+    (light, sample): (LightId, LightSample),
+) -> Option<Candidate> {
     // Unshadowed integrand
     let f_cos = point.bsdf.f(point.wo, sample.wi) * sample.wi.dot(point.bsdf.frame.z).abs();
     let f = f_cos * sample.li;
@@ -341,6 +370,7 @@ pub(super) fn light_candidate(
         drawn,
         f,
         li: sample.li,
+        light,
         p_light: sample.pdf,
         p_bsdf,
         n_light: shares.n_light,
@@ -366,7 +396,7 @@ pub(super) fn bsdf_candidate(
 ) -> Option<Candidate> {
     let lights = &world.scene.lights;
     let ctx = point.light_ctx();
-    let (li, p_light, group, segment) = match hit {
+    let (li, light, p_light, segment) = match hit {
         Some(hit) => {
             let light = hit.light?;
             let surface =
@@ -374,34 +404,30 @@ pub(super) fn bsdf_candidate(
             let light_hit = LightHit { t: hit.t, p: surface.p, n: surface.n, uv: surface.uv };
             let li = lights.lights[light as usize].l(&light_hit, -pending.wi);
             let pdf = if pending.specular { 0.0 } else { lights.pdf(&ctx, light, pending.wi, &light_hit) };
-            let group = lights.groups.group_of(light);
-            (li, pdf, group, segment(point, pending.wi, Some((surface.p, surface.p_error, surface.n))))
+            (li, Some(light), pdf, segment(point, pending.wi, Some((surface.p, surface.p_error, surface.n))))
         }
         None => {
             let pdf = if pending.specular { 0.0 } else { lights.pdf_infinite(&ctx, pending.wi) };
-            (
-                lights.le(pending.wi),
-                pdf,
-                lights.infinite.iter().find_map(|&l| lights.groups.group_of(l)),
-                segment(point, pending.wi, None),
-            )
+            // Of those at infinity one that can be chosen, if there is one, so that it has a group
+            let has_group = |&&l: &&LightId| lights.groups.group_of(l).is_some();
+            let light = lights.infinite.iter().find(has_group).or(lights.infinite.first());
+            (lights.le(pending.wi), light.copied(), pdf, segment(point, pending.wi, None))
         }
     };
     let f = pending.f_cos * li;
-    if f.is_black() {
-        return None;
-    }
+    let light = light.filter(|_| !f.is_black())?;
     Some(Candidate {
         point: pending.point,
         drawn: if pending.specular { Drawn::DeltaBsdf } else { Drawn::Bsdf },
         f,
         li,
+        light,
         p_light,
         p_bsdf: pending.pdf,
         n_light: pending.shares.n_light,
         n_bsdf: pending.shares.n_bsdf,
         p_lobe: 0.0,
-        group: group.unwrap_or(0) as u8,
+        group: lights.groups.group_of(light).unwrap_or(0) as u8,
         segment,
     })
 }

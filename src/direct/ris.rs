@@ -5,6 +5,9 @@
 //! these are evaluated in colour and traced. Unbiased for any M ≥ N ≥ 1: given the proposals, the expectation over
 //! the draws is the estimate that would trace them all.
 //!
+//! The target `visibility` multiplies q̂ by an estimate V̂ > 0 of the visibility of each light, from photons that came from it
+//! ([`crate::lights::hints`]): fewer samples are drawn that find something in their way, and any V̂ is unbiased.
+//!
 //! Targets with visibility turn the order round: proposals are traced, and N of the visible ones are shaded; light samples
 //! need no value of the BSDF before that.
 

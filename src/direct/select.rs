@@ -11,8 +11,8 @@ pub fn contributions(settings: &IntegratorSettings, candidates: &Candidates, out
     out.clear();
     out.extend(candidates.records.iter().map(|c| {
         c.f * match (settings.estimator, c.drawn) {
-            (EstimatorKind::Mc, Drawn::Light) => mc::weight(c.n_light, c.p_light),
-            (EstimatorKind::Mc, Drawn::Bsdf) => 0.0,
+            (EstimatorKind::Mc | EstimatorKind::Contributing, Drawn::Light) => mc::weight(c.n_light, c.p_light),
+            (EstimatorKind::Mc | EstimatorKind::Contributing, Drawn::Bsdf) => 0.0,
             (EstimatorKind::Correlated, Drawn::Light | Drawn::DeltaLight) => mc::weight(c.n_light, c.p_light),
             (EstimatorKind::Correlated, Drawn::Bsdf | Drawn::DeltaBsdf) => mc::weight(c.n_bsdf, c.p_bsdf),
             _ => c.factor(heuristic),

@@ -50,9 +50,9 @@ impl LightGroups {
         let most = most.clamp(1, MAX_GROUPS);
         let bounds: Vec<_> = set.lights.iter().map(super::Light::bounds).collect();
         let own_tree;
-        let tree = match &set.sampler {
-            LightSampler::Tree { tree, .. } => tree,
-            LightSampler::Uniform(_) | LightSampler::Power(_) => {
+        let tree = match set.sampler.tree() {
+            Some(choice) => &choice.tree,
+            None => {
                 own_tree = LightTree::new(&bounds);
                 &own_tree
             }
@@ -75,9 +75,9 @@ impl LightGroups {
         for (g, lights) in groups.iter().enumerate() {
             lights.iter().for_each(|&l| group_of[l as usize] = g as u8);
         }
-        let choice = match &set.sampler {
-            LightSampler::Tree { .. } => Choice::Tree(cut),
-            LightSampler::Uniform(_) | LightSampler::Power(_) => {
+        let choice = match set.sampler.tree() {
+            Some(_) => Choice::Tree(cut),
+            None => {
                 let fixed = |lights: Vec<LightId>| {
                     let weights: Vec<f32> = lights.iter().map(|&l| set.sampler.pmf(&ctx, l)).collect();
                     FixedGroup { pmf: weights.iter().sum(), table: AliasTable::new(&weights), lights }
@@ -112,18 +112,21 @@ impl LightGroups {
     /// nothing can be chosen.
     pub fn pmfs(&self, set: &LightSet, ctx: &LightCtx) -> [f32; MAX_GROUPS] {
         let mut pmfs = [0.0; MAX_GROUPS];
-        match (&self.choice, &set.sampler) {
-            (Choice::Tree(cut), LightSampler::Tree { tree, infinite }) => {
-                let p_infinite = super::select::infinite_probability(tree, infinite, ctx);
+        match &self.choice {
+            Choice::Tree(cut) => {
+                let Some(choice) = set.sampler.tree() else { return pmfs };
+                let p_infinite = choice.infinite_probability(ctx);
                 let first = usize::from(self.has_infinite);
-                tree.cut_pmfs(ctx, cut, &mut pmfs[first..]);
+                choice.tree.cut_pmfs(ctx, cut, &mut pmfs[first..]);
                 pmfs[first..].iter_mut().for_each(|p| *p *= 1.0 - p_infinite);
                 if self.has_infinite {
                     pmfs[0] = p_infinite;
                 }
             }
-            (Choice::Fixed(groups), _) => groups.iter().zip(&mut pmfs).for_each(|(group, p)| *p = group.pmf),
-            (Choice::Tree(_), LightSampler::Uniform(_) | LightSampler::Power(_)) => {}
+            Choice::Fixed(groups) => groups.iter().zip(&mut pmfs).for_each(|(group, p)| *p = group.pmf),
+        }
+        if let LightSampler::Photons(choice) = &set.sampler {
+            choice.group_pmfs(ctx, |light| self.group_of(light), &mut pmfs);
         }
         pmfs
     }
@@ -137,24 +140,41 @@ impl LightGroups {
         (group, group_pmf): (usize, f32),
         u: f32,
     ) -> Option<LightChoice> {
-        match (&self.choice, &set.sampler) {
-            (Choice::Tree(_), LightSampler::Tree { infinite, .. }) if self.has_infinite && group == 0 => {
+        let of_base = |u| self.sample_base(set, ctx, (group, group_pmf), u);
+        match &set.sampler {
+            LightSampler::Photons(choice) => {
+                choice.sample_group(ctx, |light| self.group_of(light) == Some(group), group_pmf, u, of_base)
+            }
+            LightSampler::Uniform(_) | LightSampler::Power(_) | LightSampler::Tree(_) => of_base(u),
+        }
+    }
+
+    /// [`sample`](Self::sample) without what photons tell.
+    fn sample_base(
+        &self,
+        set: &LightSet,
+        ctx: &LightCtx,
+        (group, group_pmf): (usize, f32),
+        u: f32,
+    ) -> Option<LightChoice> {
+        match &self.choice {
+            Choice::Tree(_) if self.has_infinite && group == 0 => {
+                let infinite = &set.sampler.tree()?.infinite;
                 let x = u * infinite.len() as f32;
                 let i = (x as usize).min(infinite.len() - 1);
                 let u = (x - i as f32).clamp(0.0, ONE_MINUS_EPSILON);
                 Some(LightChoice { light: infinite[i], pmf: group_pmf / infinite.len() as f32, u })
             }
-            (Choice::Tree(cut), LightSampler::Tree { tree, .. }) => {
+            Choice::Tree(cut) => {
                 let place = *cut.get(group - usize::from(self.has_infinite))?;
-                let (light, pmf, u) = tree.sample_below(ctx, place, u)?;
+                let (light, pmf, u) = set.sampler.tree()?.tree.sample_below(ctx, place, u)?;
                 Some(LightChoice { light, pmf: pmf * group_pmf, u })
             }
-            (Choice::Fixed(groups), _) => {
+            Choice::Fixed(groups) => {
                 let group = groups.get(group)?;
                 let s = group.table.sample(u)?;
                 Some(LightChoice { light: group.lights[s.index], pmf: s.pmf * group_pmf, u: s.u })
             }
-            (Choice::Tree(_), LightSampler::Uniform(_) | LightSampler::Power(_)) => None,
         }
     }
 }
@@ -162,12 +182,13 @@ impl LightGroups {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::lights::{Light, LightSamplerKind, LightSetBuilder};
+    use crate::lights::{Light, LightHints, LightSamplerKind, LightSetBuilder};
     use crate::math::hash::HashStream;
     use crate::math::test_support::assert_chi_squared;
     use crate::math::{Bounds3, Rgb, Vec3};
 
-    const KINDS: [LightSamplerKind; 3] = [LightSamplerKind::Uniform, LightSamplerKind::Power, LightSamplerKind::Tree];
+    const KINDS: [LightSamplerKind; 4] =
+        [LightSamplerKind::Uniform, LightSamplerKind::Power, LightSamplerKind::Tree, LightSamplerKind::Photons];
 
     fn set(kind: LightSamplerKind, points: u32, infinite: u32) -> LightSet {
         let mut b = LightSetBuilder::default();
@@ -178,13 +199,19 @@ mod tests {
             let p = Vec3::new(i as f32 * 0.7 - 2.0, (i % 3) as f32, 2.0 + (i % 4) as f32);
             b.add(Light::Point { p, intensity: Rgb::splat(if i == 2 { 0.0 } else { 0.5 + i as f32 }) });
         }
-        b.build(kind, &Bounds3 { min: Vec3::ZERO, max: Vec3::splat(3.0) })
+        let mut set = b.build(kind, &Bounds3 { min: Vec3::ZERO, max: Vec3::splat(3.0) });
+        // Every third light is seen, and every one of many
+        let step = if points > 90 { 1 } else { 3 };
+        let at = Vec3::new(0.4, 0.3, 0.0);
+        let photons = (0..points + infinite).step_by(step).flat_map(|l| (0..=l % 5).map(move |_| (at, Vec3::Z, l)));
+        set.set_hints(Some(LightHints::new(photons, 0.5)));
+        set
     }
 
     #[test]
     fn choosing_a_group_and_then_a_light_is_choosing_a_light() {
         for kind in KINDS {
-            for (points, infinite) in [(4, 0), (4, 1), (30, 2), (0, 2), (1, 0)] {
+            for (points, infinite) in [(4, 0), (4, 1), (30, 2), (100, 1), (0, 2), (1, 0)] {
                 for most in [1, 2, 5, 8] {
                     let set = set(kind, points, infinite);
                     let groups = LightGroups::new(&set, most);

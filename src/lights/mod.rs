@@ -1,6 +1,6 @@
 //! Lights: what they emit, how directions to them are sampled, and how one of many is chosen.
 //!
-//! Reading order: [`point`], [`spot`], [`area`], [`environment`], [`emit`], [`lanes`], [`bounds`], [`tree`], [`select`], [`set`],
+//! Reading order: [`point`], [`spot`], [`area`], [`environment`], [`emit`], [`lanes`], [`bounds`], [`tree`], [`hints`], [`select`], [`hinted`], [`set`],
 //! [`groups`], [`irradiance`].
 
 pub mod area;
@@ -8,6 +8,8 @@ pub mod bounds;
 pub mod emit;
 pub mod environment;
 pub mod groups;
+pub mod hinted;
+pub mod hints;
 pub mod irradiance;
 pub mod lanes;
 pub mod point;
@@ -26,6 +28,8 @@ pub use bounds::LightBounds;
 pub use emit::EmissionSample;
 pub use environment::{EnvironmentFilter, EnvironmentMap, EnvironmentMapping};
 pub use groups::LightGroups;
+pub use hinted::HintedChoice;
+pub use hints::LightHints;
 pub use irradiance::Irradiances;
 pub use lanes::LightLanes;
 pub use select::{LightChoice, LightRun, LightSampler, LightSamplerKind};
@@ -44,7 +48,7 @@ pub type LightId = u32;
 pub struct LightCtx {
     /// Position.
     pub p: Vec3,
-    /// Geometric normal, unit; zero if there is none.
+    /// Geometric normal, unit, on the side that is lit; zero if there is none, or if both sides are lit.
     pub n: Vec3,
     /// Shading normal, unit; zero if there is none.
     pub ns: Vec3,

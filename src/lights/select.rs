@@ -5,11 +5,13 @@
 //! | uniform | the same for all |
 //! | power | 95 % in proportion to the power, 5 % the same for all, so that no light starves |
 //! | tree | every infinite light, and all others together by the [`LightTree`], the same share |
+//! | photons | where photons tell which lights are seen, nearly always one of these; see [`super::hinted`] |
 //!
 //! Lights without power are never chosen.
 
-use super::{Light, LightCtx, LightId, LightTree};
+use super::{HintedChoice, Light, LightCtx, LightHints, LightId, LightTree};
 use crate::math::{AliasTable, ONE_MINUS_EPSILON};
+use std::sync::Arc;
 
 /// Share of the power sampler that does not follow the power.
 const UNIFORM_SHARE: f64 = 0.05;
@@ -23,6 +25,8 @@ pub enum LightSamplerKind {
     Power,
     /// By a bound of the contribution at the point.
     Tree,
+    /// By the same bound, of lights that photons say are seen from around the point.
+    Photons,
 }
 
 impl LightSamplerKind {
@@ -32,6 +36,7 @@ impl LightSamplerKind {
             LightSamplerKind::Uniform => "uniform",
             LightSamplerKind::Power => "power",
             LightSamplerKind::Tree => "tree",
+            LightSamplerKind::Photons => "photons",
         }
     }
 }
@@ -71,7 +76,7 @@ impl LightRun {
 }
 
 /// 2⁻³².
-const UNIT: f64 = 1.0 / 4_294_967_296.0;
+pub(super) const UNIT: f64 = 1.0 / 4_294_967_296.0;
 
 /// A fixed distribution over lights: for single choices, and in order.
 #[derive(Clone, Debug)]
@@ -109,6 +114,93 @@ impl FixedChoice {
     }
 }
 
+/// A light tree, with the lights at infinity beside it.
+#[derive(Clone, Debug)]
+pub struct TreeChoice {
+    /// Lights with a place.
+    pub tree: LightTree,
+    /// Lights at infinity, ascending.
+    pub infinite: Vec<LightId>,
+}
+
+impl TreeChoice {
+    fn new(lights: &[Light], powers: &[f32]) -> Self {
+        let bounds: Vec<_> = lights.iter().map(Light::bounds).collect();
+        let is_chosen = |&i: &usize| lights[i].is_infinite() && powers[i] > 0.0;
+        let infinite = (0..lights.len()).filter(is_chosen).map(|i| i as LightId).collect();
+        TreeChoice { tree: LightTree::new(&bounds), infinite }
+    }
+
+    /// Probability of the infinite lights together: each has the share of the whole tree. All, where nothing of the tree
+    /// can contribute.
+    #[inline]
+    pub(super) fn infinite_probability(&self, ctx: &LightCtx) -> f32 {
+        let count = self.infinite.len();
+        if count == 0 {
+            return 0.0;
+        }
+        if self.tree.importance(ctx) > 0.0 { count as f32 / (count + 1) as f32 } else { 1.0 }
+    }
+
+    #[inline]
+    pub(super) fn sample(&self, ctx: &LightCtx, u: f32) -> Option<LightChoice> {
+        let TreeChoice { tree, infinite } = self;
+        let p_infinite = self.infinite_probability(ctx);
+        if u < p_infinite {
+            let x = u / p_infinite * infinite.len() as f32;
+            let i = (x as usize).min(infinite.len() - 1);
+            let u = (x - i as f32).clamp(0.0, ONE_MINUS_EPSILON);
+            return Some(LightChoice { light: infinite[i], pmf: p_infinite / infinite.len() as f32, u });
+        }
+        let u = ((u - p_infinite) / (1.0 - p_infinite)).min(ONE_MINUS_EPSILON);
+        let (light, pmf, u) = tree.sample(ctx, u)?;
+        Some(LightChoice { light, pmf: pmf * (1.0 - p_infinite), u })
+    }
+
+    /// Adds runs for the positions from `first` on, which lie in [`start`, 1); `share` = 1 − `start` is a factor of all
+    /// probabilities.
+    pub(super) fn runs(
+        &self,
+        ctx: &LightCtx,
+        positions: &[u32],
+        first: usize,
+        (start, share): (f64, f32),
+        out: &mut Vec<LightRun>,
+    ) {
+        let TreeChoice { tree, infinite } = self;
+        let p_infinite = self.infinite_probability(ctx);
+        let each = f64::from(p_infinite * share) / infinite.len() as f64;
+        let mut first = first;
+        for (i, &light) in infinite.iter().enumerate().filter(|_| p_infinite > 0.0) {
+            let interval = [start + each * i as f64, start + each * (i + 1) as f64];
+            let is_in = |&p: &u32| f64::from(p) * UNIT < interval[1] || p_infinite == 1.0 && i + 1 == infinite.len();
+            let count = positions[first..].partition_point(is_in);
+            if count > 0 {
+                let pmf = p_infinite * share / infinite.len() as f32;
+                out.push(LightRun { light, pmf, places: [first as u32, (first + count) as u32], interval });
+            }
+            first += count;
+        }
+        let places = [first as u32, positions.len() as u32];
+        if !tree.is_empty() && p_infinite < 1.0 {
+            let start = start + f64::from(p_infinite * share);
+            tree.runs(ctx, positions, places, (start, (1.0 - p_infinite) * share), out);
+        }
+    }
+
+    #[inline]
+    pub(super) fn pmf(&self, ctx: &LightCtx, light: LightId) -> f32 {
+        let p_infinite = self.infinite_probability(ctx);
+        if self.tree.contains(light) {
+            self.tree.pmf(ctx, light) * (1.0 - p_infinite)
+        } else if self.infinite.binary_search(&light).is_ok() {
+            p_infinite / self.infinite.len() as f32
+        } else {
+            0.0
+        }
+    }
+}
+
 /// Chooses lights of a fixed set.
 #[derive(Clone, Debug)]
 pub enum LightSampler {
@@ -117,16 +209,14 @@ pub enum LightSampler {
     /// By power.
     Power(FixedChoice),
     /// By the tree; infinite lights beside it.
-    Tree {
-        /// Lights with a place.
-        tree: LightTree,
-        /// Lights at infinity, ascending.
-        infinite: Vec<LightId>,
-    },
+    Tree(TreeChoice),
+    /// By what photons tell, and by the tree.
+    Photons(HintedChoice),
 }
 
 impl LightSampler {
-    /// A sampler of `lights`, indexed as they are; `scene_radius` weighs infinite lights against others.
+    /// A sampler of `lights`, indexed as they are; `scene_radius` weighs infinite lights against others. That by photons has no
+    /// hints yet.
     pub fn new(kind: LightSamplerKind, lights: &[Light], scene_radius: f32) -> Self {
         let powers: Vec<f32> = lights.iter().map(|light| light.phi(scene_radius)).collect();
         match kind {
@@ -135,12 +225,28 @@ impl LightSampler {
                 LightSampler::Uniform(FixedChoice::new(&weights))
             }
             LightSamplerKind::Power => LightSampler::Power(FixedChoice::new(&power_weights(&powers))),
-            LightSamplerKind::Tree => {
-                let bounds: Vec<_> = lights.iter().map(Light::bounds).collect();
-                let is_chosen = |&i: &usize| lights[i].is_infinite() && powers[i] > 0.0;
-                let infinite = (0..lights.len()).filter(is_chosen).map(|i| i as LightId).collect();
-                LightSampler::Tree { tree: LightTree::new(&bounds), infinite }
+            LightSamplerKind::Tree => LightSampler::Tree(TreeChoice::new(lights, &powers)),
+            LightSamplerKind::Photons => {
+                let base = TreeChoice::new(lights, &powers);
+                LightSampler::Photons(HintedChoice::new(base, lights, scene_radius))
             }
+        }
+    }
+
+    /// Sets what photons tell, for the sampler by them.
+    pub(super) fn set_hints(&mut self, hints: Option<Arc<LightHints>>) {
+        match self {
+            LightSampler::Photons(choice) => choice.hints = hints,
+            LightSampler::Uniform(_) | LightSampler::Power(_) | LightSampler::Tree(_) => {}
+        }
+    }
+
+    /// The tree, if it takes part.
+    pub(super) fn tree(&self) -> Option<&TreeChoice> {
+        match self {
+            LightSampler::Tree(choice) => Some(choice),
+            LightSampler::Photons(choice) => Some(&choice.base),
+            LightSampler::Uniform(_) | LightSampler::Power(_) => None,
         }
     }
 
@@ -152,49 +258,20 @@ impl LightSampler {
                 let s = choice.table.sample(u)?;
                 Some(LightChoice { light: s.index as LightId, pmf: s.pmf, u: s.u })
             }
-            LightSampler::Tree { tree, infinite } => {
-                let p_infinite = infinite_probability(tree, infinite, ctx);
-                if u < p_infinite {
-                    let x = u / p_infinite * infinite.len() as f32;
-                    let i = (x as usize).min(infinite.len() - 1);
-                    let u = (x - i as f32).clamp(0.0, ONE_MINUS_EPSILON);
-                    return Some(LightChoice { light: infinite[i], pmf: p_infinite / infinite.len() as f32, u });
-                }
-                let u = ((u - p_infinite) / (1.0 - p_infinite)).min(ONE_MINUS_EPSILON);
-                let (light, pmf, u) = tree.sample(ctx, u)?;
-                Some(LightChoice { light, pmf: pmf * (1.0 - p_infinite), u })
-            }
+            LightSampler::Tree(choice) => choice.sample(ctx, u),
+            LightSampler::Photons(choice) => choice.sample(ctx, u),
         }
     }
 
     /// Chooses a light for each position of an ascending list in units of 2⁻³², by inversion: neighbours in the list choose
-    /// the same light or neighbours. Each light is chosen with the probability [`pmf`](Self::pmf). A list without a
-    /// light to choose has no runs.
+    /// the same light or neighbours. Each light is chosen with the probability [`pmf`](Self::pmf), which two runs may share. A
+    /// list without a light to choose has no runs.
     pub fn runs(&self, ctx: &LightCtx, positions: &[u32], out: &mut Vec<LightRun>) {
         out.clear();
         match self {
             LightSampler::Uniform(choice) | LightSampler::Power(choice) => choice.runs(positions, out),
-            LightSampler::Tree { tree, infinite } => {
-                let p_infinite = infinite_probability(tree, infinite, ctx);
-                let share = f64::from(p_infinite) / infinite.len() as f64;
-                let mut first = 0;
-                for (i, &light) in infinite.iter().enumerate().filter(|_| p_infinite > 0.0) {
-                    let interval = [share * i as f64, share * (i + 1) as f64];
-                    let is_in =
-                        |&p: &u32| f64::from(p) * UNIT < interval[1] || p_infinite == 1.0 && i + 1 == infinite.len();
-                    let count = positions[first..].partition_point(is_in);
-                    if count > 0 {
-                        let (pmf, places) =
-                            (p_infinite / infinite.len() as f32, [first as u32, (first + count) as u32]);
-                        out.push(LightRun { light, pmf, places, interval });
-                    }
-                    first += count;
-                }
-                let places = [first as u32, positions.len() as u32];
-                if !tree.is_empty() && p_infinite < 1.0 {
-                    tree.runs(ctx, positions, places, (f64::from(p_infinite), 1.0 - p_infinite), out);
-                }
-            }
+            LightSampler::Tree(choice) => choice.runs(ctx, positions, 0, (0.0, 1.0), out),
+            LightSampler::Photons(choice) => choice.runs(ctx, positions, out),
         }
     }
 
@@ -203,16 +280,8 @@ impl LightSampler {
     pub fn pmf(&self, ctx: &LightCtx, light: LightId) -> f32 {
         match self {
             LightSampler::Uniform(choice) | LightSampler::Power(choice) => choice.table.pmf(light as usize),
-            LightSampler::Tree { tree, infinite } => {
-                let p_infinite = infinite_probability(tree, infinite, ctx);
-                if tree.contains(light) {
-                    tree.pmf(ctx, light) * (1.0 - p_infinite)
-                } else if infinite.binary_search(&light).is_ok() {
-                    p_infinite / infinite.len() as f32
-                } else {
-                    0.0
-                }
-            }
+            LightSampler::Tree(choice) => choice.pmf(ctx, light),
+            LightSampler::Photons(choice) => choice.pmf(ctx, light),
         }
     }
 }
@@ -228,14 +297,4 @@ fn power_weights(powers: &[f32]) -> Vec<f32> {
         ((1.0 - UNIFORM_SHARE) * f64::from(p) / total + UNIFORM_SHARE / count as f64) as f32
     };
     powers.iter().map(|&p| weight(p)).collect()
-}
-
-/// Probability of the infinite lights together: each has the share of the whole tree. All, where nothing of the tree
-/// can contribute.
-#[inline]
-pub(super) fn infinite_probability(tree: &LightTree, infinite: &[LightId], ctx: &LightCtx) -> f32 {
-    if infinite.is_empty() {
-        return 0.0;
-    }
-    if tree.importance(ctx) > 0.0 { infinite.len() as f32 / (infinite.len() + 1) as f32 } else { 1.0 }
 }

@@ -1,12 +1,14 @@
 //! All lights of a scene with the way one is chosen, and the map from hits to lights.
 
 use super::area::AreaShape;
+use super::hints::Around;
 use super::{
-    Emission, Light, LightChoice, LightCtx, LightGroups, LightHit, LightId, LightSample, LightSampler,
+    Emission, Light, LightChoice, LightCtx, LightGroups, LightHints, LightHit, LightId, LightSample, LightSampler,
     LightSamplerKind, area_lights_of,
 };
 use crate::geometry::{GeometryId, Shape};
 use crate::math::{Bounds3, Rgb, Vec3};
+use std::sync::Arc;
 
 /// Lights of the primitives of one geometry: one for all, or one for each.
 #[derive(Clone, Debug)]
@@ -46,12 +48,16 @@ impl LightSetBuilder {
         let sampler = LightSampler::new(kind, &self.lights, scene_radius);
         let has_le = |light: &Light| matches!(light, Light::InfiniteConstant { .. } | Light::InfiniteImage { .. });
         let infinite = (0..self.lights.len()).filter(|&i| has_le(&self.lights[i])).map(|i| i as LightId).collect();
+        let is_lit = |&i: &usize| self.lights[i].phi(scene_radius) > 0.0;
+        let lit = (0..self.lights.len()).filter(is_lit).map(|i| i as LightId).collect();
         self.emitting.sort_by_key(|e| e.geometry);
         LightSet {
             lights: self.lights,
             sampler,
             groups: LightGroups::default(),
+            hints: None,
             infinite,
+            lit,
             emitting: self.emitting,
             scene_centre: if center.is_finite() { center } else { Vec3::ZERO },
             scene_radius,
@@ -68,8 +74,12 @@ pub struct LightSet {
     pub sampler: LightSampler,
     /// The lights as components of a mixture; none before [`set_groups`](Self::set_groups).
     pub groups: LightGroups,
+    /// What photons tell of the visibility of lights, where that is known; see [`set_hints`](Self::set_hints).
+    hints: Option<Arc<LightHints>>,
     /// Lights that rays which leave the scene see, ascending.
     pub infinite: Vec<LightId>,
+    /// Lights with power, ascending.
+    pub lit: Vec<LightId>,
     /// Sorted by geometry.
     emitting: Vec<EmittingGeometry>,
     /// Centre of the scene's bounding sphere; the origin for an empty scene.
@@ -82,7 +92,26 @@ impl LightSet {
     /// Chooses lights in another way from now on.
     pub fn set_kind(&mut self, kind: LightSamplerKind) {
         self.sampler = LightSampler::new(kind, &self.lights, self.scene_radius);
+        self.sampler.set_hints(self.hints.clone());
         self.groups = LightGroups::default();
+    }
+
+    /// From now on uses what photons tell of the visibility of lights, wherever settings ask for it. Estimates stay unbiased
+    /// whatever it is.
+    pub fn set_hints(&mut self, hints: Option<LightHints>) {
+        self.hints = hints.map(Arc::new);
+        self.sampler.set_hints(self.hints.clone());
+    }
+
+    /// What photons tell of the visibility of lights.
+    pub fn hints(&self) -> Option<&LightHints> {
+        self.hints.as_deref()
+    }
+
+    /// The lights that photons say are seen around a point; nothing where nothing is known.
+    #[inline]
+    pub fn around(&self, ctx: &LightCtx) -> Around<'_> {
+        self.hints.as_ref().map_or_else(Around::default, |hints| hints.around_with_sums(ctx.p, ctx.n))
     }
 
     /// Puts the lights into at most `most` groups.
@@ -204,7 +233,17 @@ mod tests {
     use crate::math::test_support::{Moments, assert_chi_squared};
     use std::sync::Arc;
 
-    const KINDS: [LightSamplerKind; 3] = [LightSamplerKind::Uniform, LightSamplerKind::Power, LightSamplerKind::Tree];
+    const KINDS: [LightSamplerKind; 4] =
+        [LightSamplerKind::Uniform, LightSamplerKind::Power, LightSamplerKind::Tree, LightSamplerKind::Photons];
+
+    /// The set, with photons of some lights around (0.4, 0.3, 0): more of those with a greater id.
+    fn hinted(builder: LightSetBuilder, kind: LightSamplerKind, seen: &[LightId]) -> LightSet {
+        let mut set = builder.build(kind, &bounds());
+        let at = Vec3::new(0.4, 0.3, 0.0);
+        let photons = seen.iter().flat_map(|&id| (0..=id % 7).map(move |_| (at, Vec3::Z, id)));
+        set.set_hints(Some(LightHints::new(photons, 0.5)));
+        set
+    }
 
     fn quad(z: f32) -> Shape {
         let p = vec![Vec3::new(0.0, 0.0, z), Vec3::new(0.0, 1.0, z), Vec3::new(1.0, 1.0, z), Vec3::new(1.0, 0.0, z)];
@@ -230,8 +269,8 @@ mod tests {
 
     #[test]
     fn every_sampler_is_a_distribution_over_the_lights_that_shine() {
-        for kind in KINDS {
-            let set = builder().build(kind, &bounds());
+        for (kind, seen) in KINDS.into_iter().flat_map(|k| [(k, &[0, 2, 4][..]), (k, &[5, 900]), (k, &[])]) {
+            let set = hinted(builder(), kind, seen);
             let mut s = HashStream::new([1, 2, 3]);
             for ns in [Vec3::ZERO, Vec3::Z] {
                 let ctx = LightCtx { p: Vec3::new(0.4, 0.3, 0.0), n: ns, ns };
@@ -255,12 +294,14 @@ mod tests {
     #[test]
     fn runs_choose_each_light_by_its_probability_and_leave_a_uniform_number() {
         let mut builder = builder();
-        for i in 0..40 {
-            let p = Vec3::new(i as f32 * 0.3 - 6.0, 1.5, 2.0 + (i % 3) as f32);
+        for i in 0..80 {
+            let p = Vec3::new(i as f32 * 0.15 - 6.0, 1.5, 2.0 + (i % 3) as f32);
             builder.add(Light::Point { p, intensity: Rgb::splat(0.1 + i as f32) });
         }
-        for kind in KINDS {
-            let set = builder.clone().build(kind, &bounds());
+        // Few lights are compared at the point, many by the number of their photons
+        let (few, many): (Vec<LightId>, Vec<LightId>) = ((0..80).step_by(7).collect(), (2..80).collect());
+        for (kind, seen) in KINDS.into_iter().flat_map(|k| [(k, &few), (k, &many)]) {
+            let set = hinted(builder.clone(), kind, seen);
             for ns in [Vec3::ZERO, Vec3::Z] {
                 let ctx = LightCtx { p: Vec3::new(0.4, 0.3, 0.0), n: ns, ns };
                 // A regular list: counts are exact up to one at each end of a run
@@ -268,15 +309,17 @@ mod tests {
                 let positions: Vec<u32> = (0..count).map(|i| (i << 16) + 0x8000).collect();
                 let mut runs = Vec::new();
                 set.sampler.runs(&ctx, &positions, &mut runs);
-                let (mut place, mut total) = (0, 0.0);
+                let (mut place, mut parts) = (0, std::collections::BTreeMap::new());
                 for run in &runs {
                     assert_eq!(run.places[0], place, "{kind:?}: runs follow each other");
                     place = run.places[1];
                     let number = run.places[1] - run.places[0];
-                    assert_eq!(run.pmf, set.sampler.pmf(&ctx, run.light), "{kind:?} {run:?}");
-                    let expected = f64::from(run.pmf) * f64::from(count);
+                    let pmf = set.sampler.pmf(&ctx, run.light);
+                    assert!((run.pmf - pmf).abs() <= 1e-5 * pmf, "{kind:?} {run:?} {pmf}");
+                    let part = run.interval[1] - run.interval[0];
+                    let expected = part * f64::from(count);
                     assert!((f64::from(number) - expected).abs() <= 1.5, "{kind:?} {run:?} {expected}");
-                    total += f64::from(run.pmf);
+                    *parts.entry(run.light).or_insert(0.0) += part;
 
                     // What remains of the positions fills [0, 1) evenly
                     let of = |place: u32| f64::from(run.within(positions[place as usize])) / 4_294_967_296.0;
@@ -287,7 +330,13 @@ mod tests {
                     }
                 }
                 assert_eq!(place, count, "{kind:?}: every position chooses a light");
-                assert!((total - 1.0).abs() < 1e-5, "{kind:?} {total}");
+                for (&light, &part) in &parts {
+                    let pmf = f64::from(set.sampler.pmf(&ctx, light));
+                    // A light of the base may be so improbable that it has no position
+                    assert!((pmf - part).abs() <= 1.5e-5 + 1e-4 * pmf, "{kind:?} {light}: {pmf} {part}");
+                }
+                let total: f64 = parts.values().sum();
+                assert!((total - 1.0).abs() < 1e-3, "{kind:?} {total}");
             }
         }
     }
@@ -308,7 +357,8 @@ mod tests {
             }
         }
         for kind in KINDS {
-            let set = builder().build(kind, &bounds());
+            // Photons of the wrong lights change nothing
+            let set = hinted(builder(), kind, &[2, 4]);
             let mut moments = Moments::default();
             for _ in 0..200_000 {
                 let sample = set.sample(&ctx, s.next_f32(), s.next_2d());

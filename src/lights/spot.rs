@@ -64,8 +64,7 @@ mod tests {
                 // The share of the flux in the part from the axis, or between the cones, to this cosine
                 let (inner, band) = (1.0 - f64::from(start), f64::from(start - total));
                 let x = (cos - f64::from(total)) / band;
-                let flux =
-                    if cos >= f64::from(start) { 1.0 - cos } else { inner + band * (2.0 * x * x * x - x * x * x * x) };
+                let flux = if cos >= f64::from(start) { 1.0 - cos } else { inner + 0.5 * band * x * x * x * (2.0 - x) };
                 let share = flux * std::f64::consts::TAU / solid_angle;
                 assert!((share - f64::from(u)).abs() < 1e-5, "{total} {start} {u}: {cos} {share}");
             }

@@ -107,6 +107,8 @@ pub struct LightTree {
     nodes: Vec<Node>,
     /// Per light, the turns from the root to its leaf, first turn in the lowest bit; 1 is right.
     trails: Vec<u64>,
+    /// Per light, its leaf.
+    leaves: Vec<u32>,
 }
 
 /// Positions on their way down the tree.
@@ -133,7 +135,8 @@ impl LightTree {
             .filter_map(|(id, b)| b.map(|b| Item { id: id as LightId, bounds: b, center: b.bounds.center() }))
             .filter(|item| item.center.is_finite() && item.bounds.intensity > 0.0)
             .collect();
-        let mut tree = LightTree { nodes: Vec::new(), trails: vec![NO_TRAIL; bounds.len()] };
+        let mut tree =
+            LightTree { nodes: Vec::new(), trails: vec![NO_TRAIL; bounds.len()], leaves: vec![0; bounds.len()] };
         if !items.is_empty() {
             tree.nodes.reserve_exact(2 * items.len() - 1);
             tree.build(&mut items, 0, 0);
@@ -145,6 +148,7 @@ impl LightTree {
         if let [item] = items {
             self.nodes.push(Node::new(&item.bounds, true, item.id));
             self.trails[item.id as usize] = trail;
+            self.leaves[item.id as usize] = self.nodes.len() as u32 - 1;
             return item.bounds;
         }
         let place = self.nodes.len();
@@ -175,6 +179,12 @@ impl LightTree {
     #[inline]
     pub fn importance(&self, ctx: &LightCtx) -> f32 {
         self.nodes.first().map_or(0.0, |root| root.importance(ctx))
+    }
+
+    /// Upper bound, up to the same factor, of what one light contributes at a point; 0 if it is not in the tree.
+    #[inline]
+    pub fn light_importance(&self, ctx: &LightCtx, light: LightId) -> f32 {
+        if self.contains(light) { self.nodes[self.leaves[light as usize] as usize].importance(ctx) } else { 0.0 }
     }
 
     /// Probability to turn left at an inner node. If neither child can contribute, the intensities decide; so the

@@ -162,6 +162,12 @@ pub fn settings_metadata(scene: &Scene) -> Vec<(String, String)> {
             entries.push(("correlated", i.correlated.form.name().to_owned()));
             entries.push(("technique", i.correlated.technique.name().to_owned()));
         }
+        EstimatorKind::Contributing => {
+            entries.push(("rest_samples", i.contributing.rest_samples.to_string()));
+            if i.leaves_lights_out() {
+                entries.push(("biased", "lights that no photon came from are left out".to_owned()));
+            }
+        }
     }
     if i.kind == IntegratorKind::IrradianceCache {
         let c = &i.cache;

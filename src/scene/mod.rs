@@ -9,9 +9,9 @@ mod world;
 
 pub use found::Found;
 pub use settings::{
-    Cached, CorrelatedForm, CorrelatedSettings, EstimatorKind, IntegratorKind, IntegratorSettings,
-    IrradianceCacheSettings, OcvSettings, OptimalForm, ProposalPoints, Proposals, RisSettings, SamplingTechnique,
-    Split, StageTimes, Strata, Target,
+    Cached, ContributingSettings, CorrelatedForm, CorrelatedSettings, EstimatorKind, IntegratorKind,
+    IntegratorSettings, IrradianceCacheSettings, OcvSettings, OptimalForm, ProposalPoints, Proposals, RisSettings,
+    SamplingTechnique, Split, StageTimes, Strata, Target,
 };
 pub use split_map::SplitMap;
 pub use world::{AccelKind, EmitterHit, World};

@@ -35,6 +35,8 @@ pub struct IntegratorSettings {
     pub optimal_mis: OptimalForm,
     /// What is particular to `correlated`.
     pub correlated: CorrelatedSettings,
+    /// What is particular to `contributing`.
+    pub contributing: ContributingSettings,
     /// Directions proposed for each that continues a path (M), where the BSDF is one that can only be evaluated; 1 is
     /// plain importance sampling.
     pub bsdf_proposals: u32,
@@ -47,7 +49,7 @@ pub const DEFAULT_SAMPLES: u32 = 2;
 /// Samples per estimate of `ris` where none are asked for: what a shading point costs before its first proposal is worth more than
 /// one sample, and powers of two are well distributed.
 pub const DEFAULT_RIS_SAMPLES: u32 = 4;
-/// Samples per estimate of `ocv`, `optimal-mis` and `correlated` where none are asked for.
+/// Samples per estimate of `ocv`, `optimal-mis`, `correlated` and `contributing` where none are asked for.
 pub const DEFAULT_OCV_SAMPLES: u32 = 4;
 
 impl Default for IntegratorSettings {
@@ -65,6 +67,7 @@ impl Default for IntegratorSettings {
             ocv: OcvSettings::default(),
             optimal_mis: OptimalForm::Progressive,
             correlated: CorrelatedSettings::default(),
+            contributing: ContributingSettings::default(),
             bsdf_proposals: 4,
             bsdf_density: ProposalDensity::Lobes,
         }
@@ -84,7 +87,9 @@ impl IntegratorSettings {
     /// have, which the balance heuristic comes near; the power heuristic serves where everything proposed is traced.
     pub fn heuristic(&self) -> Heuristic {
         self.heuristic.unwrap_or(match self.estimator {
-            EstimatorKind::Mc | EstimatorKind::Mis | EstimatorKind::Correlated => Heuristic::Power,
+            EstimatorKind::Mc | EstimatorKind::Mis | EstimatorKind::Correlated | EstimatorKind::Contributing => {
+                Heuristic::Power
+            }
             EstimatorKind::Ris | EstimatorKind::Ocv | EstimatorKind::OptimalMis => Heuristic::Balance,
         })
     }
@@ -92,7 +97,11 @@ impl IntegratorSettings {
     /// True if an estimate uses coefficients that were fitted to earlier samples of its pixel.
     pub fn is_progressive(&self) -> bool {
         match self.estimator {
-            EstimatorKind::Mc | EstimatorKind::Mis | EstimatorKind::Ris | EstimatorKind::Correlated => false,
+            EstimatorKind::Mc
+            | EstimatorKind::Mis
+            | EstimatorKind::Ris
+            | EstimatorKind::Correlated
+            | EstimatorKind::Contributing => false,
             EstimatorKind::Ocv => self.ocv.form == Form::Progressive,
             EstimatorKind::OptimalMis => self.optimal_mis == OptimalForm::Progressive,
         }
@@ -108,10 +117,26 @@ impl IntegratorSettings {
         IntegratorSettings { estimator: EstimatorKind::Mis, samples: Some(self.split().samples), ..*self }
     }
 
+    /// True if direct light asks which lights photons have come from.
+    pub fn uses_light_hints(&self) -> bool {
+        self.light_choice == LightSamplerKind::Photons
+            || self.estimator == EstimatorKind::Contributing
+            || self.estimator == EstimatorKind::Ris && self.ris.target == Target::Visibility
+    }
+
+    /// True if lights that no photon came from are left out, which is biased.
+    pub fn leaves_lights_out(&self) -> bool {
+        self.estimator == EstimatorKind::Contributing && self.contributing.rest_samples == 0
+    }
+
     /// True if an estimate is made of two independent halves.
     pub fn has_halves(&self) -> bool {
         match self.estimator {
-            EstimatorKind::Mc | EstimatorKind::Mis | EstimatorKind::Ris | EstimatorKind::OptimalMis => false,
+            EstimatorKind::Mc
+            | EstimatorKind::Mis
+            | EstimatorKind::Ris
+            | EstimatorKind::OptimalMis
+            | EstimatorKind::Contributing => false,
             EstimatorKind::Ocv => self.ocv.form == Form::Crossfit,
             EstimatorKind::Correlated => self.correlated.form == CorrelatedForm::Crossfit,
         }
@@ -125,6 +150,7 @@ impl IntegratorSettings {
             | EstimatorKind::Mis
             | EstimatorKind::Ocv
             | EstimatorKind::Correlated
+            | EstimatorKind::Contributing
             | EstimatorKind::OptimalMis => self.split(),
         }
     }
@@ -134,7 +160,10 @@ impl IntegratorSettings {
         let default = match self.estimator {
             EstimatorKind::Mc | EstimatorKind::Mis => DEFAULT_SAMPLES,
             EstimatorKind::Ris => DEFAULT_RIS_SAMPLES,
-            EstimatorKind::Ocv | EstimatorKind::OptimalMis | EstimatorKind::Correlated => DEFAULT_OCV_SAMPLES,
+            EstimatorKind::Ocv
+            | EstimatorKind::OptimalMis
+            | EstimatorKind::Correlated
+            | EstimatorKind::Contributing => DEFAULT_OCV_SAMPLES,
         };
         let samples = self.samples.unwrap_or(default).max(1);
         match self.estimator {
@@ -142,7 +171,8 @@ impl IntegratorSettings {
             | EstimatorKind::Mis
             | EstimatorKind::Ocv
             | EstimatorKind::OptimalMis
-            | EstimatorKind::Correlated => Split { samples, proposals: samples },
+            | EstimatorKind::Correlated
+            | EstimatorKind::Contributing => Split { samples, proposals: samples },
             EstimatorKind::Ris => {
                 let proposals = match self.ris.proposals {
                     Proposals::Fixed(m) => m,
@@ -244,6 +274,8 @@ pub enum EstimatorKind {
     OptimalMis,
     /// Importance sampling by one technique, combined with correlated sampling [Szécsi, Sbert and Szirmay-Kalos 2004].
     Correlated,
+    /// Light sampling, by itself of the lights that photons say are seen and of all others [Keller and Wald 2000, §3].
+    Contributing,
 }
 
 impl EstimatorKind {
@@ -256,6 +288,7 @@ impl EstimatorKind {
             EstimatorKind::Ocv => "ocv",
             EstimatorKind::OptimalMis => "optimal-mis",
             EstimatorKind::Correlated => "correlated",
+            EstimatorKind::Contributing => "contributing",
         }
     }
 
@@ -263,7 +296,11 @@ impl EstimatorKind {
     /// the mixture.
     pub fn has_components(self) -> bool {
         match self {
-            EstimatorKind::Mc | EstimatorKind::Mis | EstimatorKind::Ris | EstimatorKind::Correlated => false,
+            EstimatorKind::Mc
+            | EstimatorKind::Mis
+            | EstimatorKind::Ris
+            | EstimatorKind::Correlated
+            | EstimatorKind::Contributing => false,
             EstimatorKind::Ocv | EstimatorKind::OptimalMis => true,
         }
     }
@@ -335,6 +372,19 @@ impl CorrelatedForm {
             CorrelatedForm::Combined => "combined",
             CorrelatedForm::Crossfit => "crossfit",
         }
+    }
+}
+
+/// Direct light by the lights that photons say are seen [Keller and Wald 2000, §3].
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct ContributingSettings {
+    /// Samples on the lights that no photon came from (S_non), besides those of an estimate (S_con). 0 is biased.
+    pub rest_samples: u32,
+}
+
+impl Default for ContributingSettings {
+    fn default() -> Self {
+        ContributingSettings { rest_samples: 1 }
     }
 }
 
@@ -492,6 +542,8 @@ pub enum Target {
     Gv,
     /// G·V·L: for surfaces that are dearer to evaluate than a ray is to trace.
     Gvl,
+    /// Luminance of f·G·L times an estimate of V for each light, from photons. Nothing is traced.
+    Visibility,
 }
 
 impl Target {
@@ -501,13 +553,14 @@ impl Target {
             Target::Fgl => "fgl",
             Target::Gv => "gv",
             Target::Gvl => "gvl",
+            Target::Visibility => "visibility",
         }
     }
 
     /// True if proposals are traced before they are resampled.
     pub fn has_visibility(self) -> bool {
         match self {
-            Target::Fgl => false,
+            Target::Fgl | Target::Visibility => false,
             Target::Gv | Target::Gvl => true,
         }
     }

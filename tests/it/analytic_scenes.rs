@@ -4,6 +4,7 @@
 //! different seeds; the means of the pictures are independent, and Student's t-test compares them with the answer.
 //! The significance is `SIGNIFICANCE` for the whole set of tests (Šidák-corrected); seeds are fixed.
 
+use super::light_hints::{Hints, hints};
 use lumiris::estimators::mis::Heuristic;
 use lumiris::estimators::ocv::Form;
 use lumiris::estimators::stats::{Welford, sidak, t_test};
@@ -57,6 +58,10 @@ struct Configuration {
     points: ProposalPoints,
     target: Target,
     light_choice: LightSamplerKind,
+    /// What photons tell of the visibility of lights.
+    hints: Hints,
+    /// Of `contributing`.
+    rest_samples: u32,
     sampler: SamplerKind,
     accel: AccelKind,
 }
@@ -75,6 +80,8 @@ fn configurations() -> Vec<Configuration> {
         points: ProposalPoints::Stratified,
         target: Target::Fgl,
         light_choice: LightSamplerKind::Tree,
+        hints: Hints::Absent,
+        rest_samples: 1,
         sampler: SamplerKind::SobolBlueNoise,
         accel: AccelKind::Embree,
     };
@@ -95,6 +102,33 @@ fn configurations() -> Vec<Configuration> {
     }));
     all.extend(component_configurations(&Configuration { estimator: EstimatorKind::Ocv, ..base }));
     all.extend(correlated_configurations(&Configuration { estimator: EstimatorKind::Correlated, ..base }));
+    all.extend(hinted_configurations(&base));
+    all
+}
+
+/// Everything that asks photons which lights are seen, whatever they say.
+fn hinted_configurations(base: &Configuration) -> Vec<Configuration> {
+    use Hints::{Absent, Empty, Right, Wrong};
+    let light_choice = LightSamplerKind::Photons;
+    let mut all = [Absent, Empty, Right, Wrong].map(|hints| Configuration { hints, light_choice, ..*base }).to_vec();
+    let ris = Configuration {
+        estimator: EstimatorKind::Ris,
+        heuristic: Heuristic::Balance,
+        target: Target::Visibility,
+        ..*base
+    };
+    all.extend([Absent, Right, Wrong].map(|hints| Configuration { hints, ..ris }));
+    all.extend([Right, Wrong].map(|hints| Configuration { hints, samples: 1, light_choice, ..ris }));
+    all.push(Configuration { hints: Wrong, strata: Strata::None, points: ProposalPoints::Independent, ..ris });
+    let ocv = Configuration { estimator: EstimatorKind::Ocv, samples: 5, light_choice, ..*base };
+    all.extend([Right, Wrong].map(|hints| Configuration { hints, ..ocv }));
+    all.push(Configuration { hints: Right, estimator: EstimatorKind::OptimalMis, samples: 8, ..ocv });
+    let correlated = CorrelatedSettings { form: CorrelatedForm::Crossfit, technique: SamplingTechnique::Light };
+    all.push(Configuration { estimator: EstimatorKind::Correlated, correlated, hints: Right, ..ocv });
+    let contributing = Configuration { estimator: EstimatorKind::Contributing, ..*base };
+    all.extend([Absent, Empty, Right, Wrong].map(|hints| Configuration { hints, samples: 4, ..contributing }));
+    all.extend([1, 2, 3, 16].map(|samples| Configuration { hints: Right, samples, ..contributing }));
+    all.push(Configuration { hints: Wrong, samples: 2, rest_samples: 3, light_choice, ..contributing });
     all
 }
 
@@ -167,9 +201,13 @@ fn world(path: &Path, c: &Configuration) -> World {
     scene.integrator.ris.points = c.points;
     scene.integrator.ris.target = c.target;
     scene.integrator.light_choice = c.light_choice;
+    scene.integrator.contributing.rest_samples = c.rest_samples;
     scene.lights.set_kind(c.light_choice);
     scene.sampling.sampler = c.sampler;
-    World::new(scene, c.accel, None).unwrap()
+    let mut world = World::new(scene, c.accel, None).unwrap();
+    let hints = hints(&world, c.hints);
+    world.scene.lights.set_hints(hints);
+    world
 }
 
 /// Means of the pictures of `RUNS` seeds, per channel.

@@ -11,5 +11,6 @@ mod estimators_1d;
 mod evaluated;
 mod irradiance_cache;
 mod layering;
+mod light_hints;
 mod mutations;
 mod reproduce;

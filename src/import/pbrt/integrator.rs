@@ -70,8 +70,9 @@ pub(super) fn finish_integrator(pending: Option<&Pending>, d: &mut Diagnostics) 
 
 /// Parameters that are Lumiris's own, and pbrt's `lightsampler`.
 fn lumiris_parameters(s: &mut IntegratorSettings, p: &ParamSet, d: &mut Diagnostics) {
-    use EstimatorKind::{Correlated, Mc, Mis, Ocv, OptimalMis, Ris};
-    if let Some(e) = choice(p, "estimator", &[Mc, Mis, Ris, Ocv, OptimalMis, Correlated], EstimatorKind::name, d) {
+    use EstimatorKind::{Contributing, Correlated, Mc, Mis, Ocv, OptimalMis, Ris};
+    let kinds = [Mc, Mis, Ris, Ocv, OptimalMis, Correlated, Contributing];
+    if let Some(e) = choice(p, "estimator", &kinds, EstimatorKind::name, d) {
         s.estimator = e;
     }
     let forms = [Form::Progressive, Form::Crossfit, Form::Regression, Form::Paper];
@@ -97,6 +98,13 @@ fn lumiris_parameters(s: &mut IntegratorSettings, p: &ParamSet, d: &mut Diagnost
         }
         None => {}
     }
+    match p.integer("restsamples", d) {
+        Some(n @ 0..=4096) => s.contributing.rest_samples = n as u32,
+        Some(n) => {
+            d.error(p.span_of("restsamples"), format!("restsamples must be from 0 to 4096, not {n}"));
+        }
+        None => {}
+    }
     match p.float("bsdfshare", d) {
         Some(share) if (0.0..=1.0).contains(&share) => s.bsdf_share = share,
         Some(share) => {
@@ -116,14 +124,16 @@ fn lumiris_parameters(s: &mut IntegratorSettings, p: &ParamSet, d: &mut Diagnost
     if let Some(points) = choice(p, "proposalpoints", &kinds, ProposalPoints::name, d) {
         s.ris.points = points;
     }
-    if let Some(target) = choice(p, "target", &[Target::Fgl, Target::Gv, Target::Gvl], Target::name, d) {
+    let kinds = [Target::Fgl, Target::Gv, Target::Gvl, Target::Visibility];
+    if let Some(target) = choice(p, "target", &kinds, Target::name, d) {
         s.ris.target = target;
     }
-    let samplers = ["uniform", "power", "bvh", "tree", "exhaustive", "spatial"];
+    let samplers = ["uniform", "power", "bvh", "tree", "exhaustive", "spatial", "photons"];
     if let Some(name) = choice(p, "lightsampler", &samplers, |name| name, d) {
         s.light_choice = match name {
             "uniform" => LightSamplerKind::Uniform,
             "power" => LightSamplerKind::Power,
+            "photons" => LightSamplerKind::Photons,
             _ => LightSamplerKind::Tree,
         };
     }

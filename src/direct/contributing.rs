@@ -1,0 +1,224 @@
+//! Direct light by the lights that photons say are seen, 𝓛_con, and by all others [Keller and Wald 2000, §3].
+//!
+//! S_con samples are on 𝓛_con:
+//!
+//! * |𝓛_con| ≤ S_con: every light has one, and those that are left are given to the lights by their emission area. The sum of
+//!   the lights' estimates is the estimate. A light at infinity has the area of the disk that its photons start from; lights at a
+//!   point and distant ones have no area, and never a second sample.
+//! * |𝓛_con| > S_con: every light makes an unshadowed contribution k_l, and these are put in order [Ward 1991]. The S_con − 1
+//!   brightest are traced. Ward estimates the sum of the rest by the visibility of those; here one of them is traced, chosen with the
+//!   probability q_l = Y(k_l)/Σ Y(k) by luminance Y, and counts k_l/q_l. Its expectation is the sum of what is seen of the rest, so
+//!   the estimate is unbiased.
+//! * |𝓛_con| > [`MOST_ORDERED`]: S_con lights are chosen in proportion to the number of their photons.
+//!
+//! S_non samples are on the others: a light chosen uniformly of the n that have power counts n times, Eq. 1 of the paper. Without
+//! these (S_non = 0) the estimate is biased. Where nothing is known all S_con + S_non are drawn as `mc` draws them.
+
+use super::ShadePoint;
+use super::propose::{Candidate, Shares, domain, light_candidate, unshadowed_candidate};
+use crate::lights::{Light, LightCtx, LightId, LightSample, LightSet};
+use crate::scene::World;
+use std::f32::consts::PI;
+
+/// Most lights that are put in order at a point.
+pub const MOST_ORDERED: usize = 64;
+
+/// The stage's buffers.
+#[derive(Debug, Default)]
+pub struct Contributing {
+    /// 𝓛_con, ascending: lights with their numbers of photons.
+    seen: Vec<(LightId, u32)>,
+    /// Samples of each.
+    counts: Vec<u32>,
+    /// Contributions by brightness.
+    ordered: Vec<(f32, Candidate)>,
+}
+
+/// A point with the lights that are sampled from it.
+struct At<'a> {
+    lights: &'a LightSet,
+    index: u32,
+    point: &'a ShadePoint<'a>,
+    ctx: LightCtx,
+}
+
+impl At<'_> {
+    /// A sample of one light that is chosen with the probability `pmf`, of `n` that are drawn in this way.
+    fn sample(&self, light: LightId, pmf: f32, n: u32, u: [f32; 2]) -> Option<Candidate> {
+        let sample = self.lights.lights[light as usize].sample_li(&self.ctx, u)?;
+        let drawn = (light, LightSample { pdf: sample.pdf * pmf, ..sample });
+        unshadowed_candidate(self.index, self.point, &Shares::fixed(n, 0), drawn)
+    }
+}
+
+impl Contributing {
+    /// Draws the light samples of a point, `rest` of them on lights that no photon came from. Returns how many were drawn.
+    pub(super) fn draw(
+        &mut self,
+        world: &World,
+        (index, point): (u32, &ShadePoint<'_>),
+        rest: u32,
+        records: &mut Vec<Candidate>,
+    ) -> u32 {
+        let lights = &world.scene.lights;
+        let ctx = point.light_ctx();
+        let at = At { lights, index, point, ctx };
+        self.seen.clear();
+        let is_lit = |&&(light, _): &&(LightId, u32)| lights.lit.binary_search(&light).is_ok();
+        self.seen.extend(lights.around(&ctx).lights.iter().filter(is_lit));
+
+        let n = point.split.samples;
+        if self.seen.is_empty() {
+            draw_by_choice(world, &at, n + rest, records);
+            return n + rest;
+        }
+        let drawn = if self.seen.len() <= n as usize {
+            self.draw_each(&at, n, records)
+        } else if self.seen.len() <= MOST_ORDERED {
+            self.draw_ordered(&at, n, records)
+        } else {
+            self.draw_by_photons(&at, n, records)
+        };
+        drawn + self.draw_rest(&at, rest, records)
+    }
+
+    /// At least one sample of every light that is seen.
+    fn draw_each(&mut self, at: &At<'_>, n: u32, records: &mut Vec<Candidate>) -> u32 {
+        let seen = &self.seen;
+        let areas = seen.iter().map(|&(light, _)| emission_area(at.lights, light));
+        share_out(n - seen.len() as u32, areas, &mut self.counts);
+        for (k, (&(light, _), &count)) in seen.iter().zip(&self.counts).enumerate() {
+            for i in 0..count {
+                let u = at.point.stream.split(domain::SEEN + k as u32, count, i).draw::<2>();
+                records.extend(at.sample(light, 1.0, count, u));
+            }
+        }
+        self.counts.iter().sum()
+    }
+
+    /// The brightest contributions, and one of the others.
+    fn draw_ordered(&mut self, at: &At<'_>, n: u32, records: &mut Vec<Candidate>) -> u32 {
+        self.ordered.clear();
+        for (k, &(light, _)) in self.seen.iter().enumerate() {
+            let u = at.point.stream.domain(domain::SEEN + k as u32).draw::<2>();
+            let candidate = at.sample(light, 1.0, 1, u);
+            self.ordered.extend(candidate.map(|c| (c.f.luminance() / c.p_light, c)));
+        }
+        // The sort is stable: equal ones stay in the order of their lights
+        self.ordered.sort_by(|a, b| b.0.total_cmp(&a.0));
+        let sure = self.ordered.len().min(n as usize - 1);
+        let (brightest, dim) = self.ordered.split_at(sure);
+        records.extend(brightest.iter().map(|(_, c)| *c));
+
+        // One of the rest, with the probability of its brightness
+        let total: f32 = dim.iter().map(|(brightness, _)| brightness).sum();
+        let [u] = at.point.stream.domain(domain::DIM).draw::<1>();
+        let mut x = u * total;
+        let chosen = dim.iter().enumerate().find(|(i, (brightness, _))| {
+            x -= brightness;
+            x < 0.0 || i + 1 == dim.len()
+        });
+        let chosen = chosen.map(|(_, (brightness, c))| Candidate { n_light: brightness / total, ..*c });
+        records.extend(chosen.filter(|c| c.n_light > 0.0));
+        self.seen.len() as u32
+    }
+
+    /// Lights by the number of their photons.
+    fn draw_by_photons(&mut self, at: &At<'_>, n: u32, records: &mut Vec<Candidate>) -> u32 {
+        // Sums up to and with each light, in place of the numbers
+        let numbers = self.seen.iter().map(|&(_, count)| count);
+        self.counts.clear();
+        self.counts.extend(numbers.scan(0_u32, |sum, count| {
+            *sum = sum.saturating_add(count);
+            Some(*sum)
+        }));
+        let total = self.counts.last().copied().unwrap_or(0) as f32;
+        for i in 0..n {
+            let [u_choice, u0, u1] = at.point.stream.split(domain::LIGHT, n, i).draw::<3>();
+            let k = self.counts.partition_point(|&sum| sum as f32 <= u_choice * total).min(self.seen.len() - 1);
+            let before = if k > 0 { self.counts[k - 1] as f32 } else { 0.0 };
+            let pmf = (self.counts[k] as f32 - before) / total;
+            records.extend(at.sample(self.seen[k].0, pmf, n, [u0, u1]));
+        }
+        n
+    }
+
+    /// Lights that no photon came from, uniformly.
+    fn draw_rest(&self, at: &At<'_>, rest: u32, records: &mut Vec<Candidate>) -> u32 {
+        let lit = &at.lights.lit;
+        let others = lit.len() - self.seen.len();
+        if others == 0 {
+            return 0;
+        }
+        for i in 0..rest {
+            let [u_choice, u0, u1] = at.point.stream.split(domain::REST, rest, i).draw::<3>();
+            let mut place = ((f64::from(u_choice) * others as f64) as usize).min(others - 1);
+            // Those that are seen are passed over
+            for &(light, _) in &self.seen {
+                if lit[place] < light {
+                    break;
+                }
+                place += 1;
+            }
+            records.extend(at.sample(lit[place], 1.0 / others as f32, rest, [u0, u1]));
+        }
+        rest
+    }
+}
+
+/// Samples of lights as `mc` draws them.
+fn draw_by_choice(world: &World, at: &At<'_>, n: u32, records: &mut Vec<Candidate>) {
+    for i in 0..n {
+        let [u_choice, u0, u1] = at.point.stream.split(domain::LIGHT, n, i).draw::<3>();
+        let drawn = at.lights.sample(&at.ctx, u_choice, [u0, u1]);
+        let candidate = drawn.and_then(|drawn| light_candidate(world, at.index, at.point, &Shares::fixed(n, 0), drawn));
+        records.extend(candidate);
+    }
+}
+
+/// Emission area of a light (m²); 0 if more than one sample of it is of no use.
+fn emission_area(lights: &LightSet, light: LightId) -> f32 {
+    match &lights.lights[light as usize] {
+        Light::Point { .. } | Light::Spot { .. } | Light::Distant { .. } => 0.0,
+        Light::Area(area) => area.area(),
+        Light::InfiniteConstant { .. } | Light::InfiniteImage { .. } => PI * lights.scene_radius * lights.scene_radius,
+    }
+}
+
+/// One for each, and `extra` in proportion to the areas, rounded so that sums are off by less than one.
+fn share_out(extra: u32, areas: impl Iterator<Item = f32> + Clone, counts: &mut Vec<u32>) {
+    let total: f64 = areas.clone().map(f64::from).sum();
+    let scale = if total > 0.0 && total.is_finite() { f64::from(extra) / total } else { 0.0 };
+    let (mut sum, mut given) = (0.0, 0);
+    counts.clear();
+    counts.extend(areas.map(|area| {
+        sum += f64::from(area) * scale;
+        let upto = (sum.round() as u32).min(extra);
+        let count = 1 + upto - given;
+        given = upto;
+        count
+    }));
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn samples_are_shared_out_by_area_with_one_for_each() {
+        let shared = |extra, areas: &[f32]| {
+            let mut counts = vec![7];
+            share_out(extra, areas.iter().copied(), &mut counts);
+            counts
+        };
+        assert_eq!(shared(0, &[1.0, 5.0]), [1, 1]);
+        assert_eq!(shared(6, &[1.0, 2.0, 3.0]), [2, 3, 4]);
+        assert_eq!(shared(6, &[0.0, 0.0]), [1, 1]);
+        assert_eq!(shared(5, &[0.0, 2.0, 0.0]), [1, 6, 1]);
+        for extra in 0..40 {
+            let counts = shared(extra, &[0.3, 0.0, 2.7, 1.1, 1.1, 0.2]);
+            assert_eq!(counts.iter().sum::<u32>(), extra + 6);
+            assert!(counts.iter().all(|&c| c > 0) && counts[1] == 1);
+        }
+    }
+}

@@ -1,0 +1,238 @@
+//! The choice of a light by photons that tell which lights are seen around a point [Keller and Wald 2000, §3], never quite
+//! without the others.
+//!
+//! pmf(l) = (1 − δ)·w_l/Σ w + δ·pmf_base(l), w_l = 0 for lights that no photon came from. The base is the [`LightTree`]
+//! with the lights at infinity beside it, so every light that can contribute has a probability: estimates are unbiased
+//! whatever the photons say. Where they say nothing, δ = 1.
+//!
+//! w_l is the tree's bound of the contribution of a light at the point: cos θ′·cos θi′·I/d², of a light at infinity its irradiance
+//! [lm/m² by luminance, both up to a common factor]. Where more than [`MOST_WEIGHED`] lights are seen it is the number of their
+//! photons, so that the choice takes logarithmic time.
+//!
+//! [`LightTree`]: super::LightTree
+
+use super::groups::MAX_GROUPS;
+use super::hints::Around;
+use super::select::{TreeChoice, UNIT};
+use super::{Light, LightChoice, LightCtx, LightHints, LightId, LightRun};
+use crate::math::ONE_MINUS_EPSILON;
+use std::f32::consts::PI;
+use std::sync::Arc;
+
+/// δ: share of the choices that the photons have no part in.
+pub const BASE_SHARE: f32 = 0.1;
+/// Most lights whose contributions are compared at the point.
+pub const MOST_WEIGHED: usize = 64;
+
+/// Chooses by hints where there are any.
+#[derive(Clone, Debug)]
+pub struct HintedChoice {
+    pub(super) base: TreeChoice,
+    /// Of each light at infinity, the luminance of the irradiance on a surface that faces it; 0 for others.
+    irradiances: Vec<f32>,
+    pub(super) hints: Option<Arc<LightHints>>,
+}
+
+/// The lights that are known at a point, with their weights.
+struct Known<'a> {
+    around: Around<'a>,
+    /// Sums of the weights up to and with each light; not used where photons are counted.
+    sums: [f32; MOST_WEIGHED],
+    total: f32,
+}
+
+impl Known<'_> {
+    fn is_counted(&self) -> bool {
+        self.around.lights.len() > MOST_WEIGHED
+    }
+
+    /// Sum of the weights of the lights before place `i`.
+    #[inline]
+    fn sum_before(&self, i: usize) -> f32 {
+        match (i, self.is_counted()) {
+            (0, _) => 0.0,
+            (_, true) => self.around.sums[i - 1] as f32,
+            (_, false) => self.sums[i - 1],
+        }
+    }
+
+    /// Probability that place `i` is chosen among the known lights.
+    #[inline]
+    fn pmf_at(&self, i: usize) -> f32 {
+        (self.sum_before(i + 1) - self.sum_before(i)) / self.total
+    }
+
+    #[inline]
+    fn pmf(&self, light: LightId) -> f32 {
+        self.around.place(light).map_or(0.0, |i| self.pmf_at(i))
+    }
+
+    /// Chooses a place by `u` in [0, 1), and makes `u` uniform again.
+    #[inline]
+    fn choose(&self, u: f32) -> (usize, f32) {
+        let x = u * self.total;
+        let count = self.around.lights.len();
+        let place = if self.is_counted() {
+            self.around.sums.partition_point(|&sum| sum as f32 <= x)
+        } else {
+            self.sums[..count].partition_point(|&sum| sum <= x)
+        };
+        // Rounding may reach the total: the last light with a weight
+        let place = if place < count { place } else { (0..count).rfind(|&i| self.pmf_at(i) > 0.0).unwrap_or(0) };
+        let before = self.sum_before(place);
+        let rest = (x - before) / (self.sum_before(place + 1) - before);
+        (place, rest.clamp(0.0, ONE_MINUS_EPSILON))
+    }
+}
+
+impl HintedChoice {
+    pub(super) fn new(base: TreeChoice, lights: &[Light], scene_radius: f32) -> Self {
+        let disk = PI * scene_radius * scene_radius;
+        let irradiance = |light: &Light| match light {
+            Light::Distant { .. } => light.phi(scene_radius) / disk,
+            // π times the mean radiance
+            Light::InfiniteConstant { .. } | Light::InfiniteImage { .. } => light.phi(scene_radius) / (4.0 * disk),
+            Light::Point { .. } | Light::Spot { .. } | Light::Area(_) => 0.0,
+        };
+        HintedChoice { base, irradiances: lights.iter().map(irradiance).collect(), hints: None }
+    }
+
+    /// The known lights; `None` if none of them can contribute.
+    #[inline]
+    fn known(&self, ctx: &LightCtx) -> Option<Known<'_>> {
+        let around = self.hints.as_ref()?.around_with_sums(ctx.p, ctx.n);
+        let mut known = Known { around, sums: [0.0; MOST_WEIGHED], total: 0.0 };
+        if known.is_counted() {
+            known.total = around.sums.last().map_or(0.0, |&sum| sum as f32);
+        } else {
+            for (sum, &(light, _)) in known.sums.iter_mut().zip(around.lights) {
+                known.total += self.weight(ctx, light);
+                *sum = known.total;
+            }
+        }
+        (known.total > 0.0 && known.total.is_finite()).then_some(known)
+    }
+
+    #[inline]
+    fn weight(&self, ctx: &LightCtx, light: LightId) -> f32 {
+        if self.base.tree.contains(light) {
+            self.base.tree.light_importance(ctx, light)
+        } else {
+            self.irradiances.get(light as usize).copied().unwrap_or(0.0)
+        }
+    }
+
+    #[inline]
+    pub(super) fn sample(&self, ctx: &LightCtx, u: f32) -> Option<LightChoice> {
+        let Some(known) = self.known(ctx) else { return self.base.sample(ctx, u) };
+        if u < BASE_SHARE {
+            let choice = self.base.sample(ctx, (u / BASE_SHARE).min(ONE_MINUS_EPSILON))?;
+            let pmf = mixed(known.pmf(choice.light), choice.pmf);
+            return Some(LightChoice { pmf, ..choice });
+        }
+        let (place, u) = known.choose((u - BASE_SHARE) / (1.0 - BASE_SHARE));
+        let light = known.around.lights[place].0;
+        Some(LightChoice { light, pmf: mixed(known.pmf_at(place), self.base.pmf(ctx, light)), u })
+    }
+
+    #[inline]
+    pub(super) fn pmf(&self, ctx: &LightCtx, light: LightId) -> f32 {
+        let base = self.base.pmf(ctx, light);
+        self.known(ctx).map_or(base, |known| mixed(known.pmf(light), base))
+    }
+
+    /// Known lights first, then those of the base; a light may have a run of each.
+    pub(super) fn runs(&self, ctx: &LightCtx, positions: &[u32], out: &mut Vec<LightRun>) {
+        let Some(known) = self.known(ctx) else {
+            self.base.runs(ctx, positions, 0, (0.0, 1.0), out);
+            return;
+        };
+        let share = f64::from(1.0 - BASE_SHARE);
+        let end_of = |i: usize| share * f64::from(known.sum_before(i + 1)) / f64::from(known.total);
+        let count = known.around.lights.len();
+        let mut first = 0;
+        while first < positions.len() && f64::from(positions[first]) * UNIT < share {
+            let x = f64::from(positions[first]) * UNIT;
+            let place = partition(count, |i| end_of(i) <= x);
+            if place == count {
+                break;
+            }
+            let interval = [if place > 0 { end_of(place - 1) } else { 0.0 }, end_of(place)];
+            let last = first + positions[first..].partition_point(|&p| f64::from(p) * UNIT < interval[1]);
+            let light = known.around.lights[place].0;
+            let pmf = mixed(known.pmf_at(place), self.base.pmf(ctx, light));
+            out.push(LightRun { light, pmf, places: [first as u32, last as u32], interval });
+            first = last;
+        }
+        let of_base = out.len();
+        self.base.runs(ctx, positions, first, (share, BASE_SHARE), out);
+        for run in &mut out[of_base..] {
+            run.pmf += (1.0 - BASE_SHARE) * known.pmf(run.light);
+        }
+    }
+
+    /// Mixes the probabilities of the known lights into those of groups by the base.
+    pub(super) fn group_pmfs(
+        &self,
+        ctx: &LightCtx,
+        group_of: impl Fn(LightId) -> Option<usize>,
+        pmfs: &mut [f32; MAX_GROUPS],
+    ) {
+        let Some(known) = self.known(ctx) else { return };
+        pmfs.iter_mut().for_each(|p| *p *= BASE_SHARE);
+        for (i, &(light, _)) in known.around.lights.iter().enumerate() {
+            if let Some(group) = group_of(light) {
+                pmfs[group] += (1.0 - BASE_SHARE) * known.pmf_at(i);
+            }
+        }
+    }
+
+    /// Chooses a light of the group of probability `group_pmf` by `u` in [0, 1); `base` does so for the base alone. The
+    /// probability of the answer includes that of the group.
+    pub(super) fn sample_group(
+        &self,
+        ctx: &LightCtx,
+        is_in: impl Fn(LightId) -> bool,
+        group_pmf: f32,
+        u: f32,
+        base: impl Fn(f32) -> Option<LightChoice>,
+    ) -> Option<LightChoice> {
+        let Some(known) = self.known(ctx) else { return base(u) };
+        let places = || (0..known.around.lights.len()).filter(|&i| is_in(known.around.lights[i].0));
+        let p_known = places().map(|i| known.pmf_at(i)).sum::<f32>();
+        let share = ((1.0 - BASE_SHARE) * p_known / group_pmf).min(1.0);
+        if u >= share {
+            let choice = base(((u - share) / (1.0 - share)).min(ONE_MINUS_EPSILON))?;
+            return Some(LightChoice { pmf: self.pmf(ctx, choice.light), ..choice });
+        }
+        let mut x = u / share * p_known;
+        let mut chosen = None;
+        for i in places().filter(|&i| known.pmf_at(i) > 0.0) {
+            let p = known.pmf_at(i);
+            chosen = Some((i, (x / p).clamp(0.0, ONE_MINUS_EPSILON)));
+            if x < p {
+                break;
+            }
+            x -= p;
+        }
+        let (place, u) = chosen?;
+        let light = known.around.lights[place].0;
+        Some(LightChoice { light, pmf: mixed(known.pmf_at(place), self.base.pmf(ctx, light)), u })
+    }
+}
+
+/// The probability of a choice with the probability `known` among the known lights and `base` by the base.
+#[inline]
+fn mixed(known: f32, base: f32) -> f32 {
+    (1.0 - BASE_SHARE) * known + BASE_SHARE * base
+}
+
+/// The first of `count` places for which `is_before` is false.
+fn partition(count: usize, is_before: impl Fn(usize) -> bool) -> usize {
+    let (mut low, mut high) = (0, count);
+    while low < high {
+        let middle = low.midpoint(high);
+        if is_before(middle) { low = middle + 1 } else { high = middle }
+    }
+    low
+}

@@ -1,0 +1,342 @@
+//! Which lights are seen around a point, by photons that came straight from them [Keller and Wald 2000, §3].
+//!
+//! Space is cut into cubes of edge 2r. A photon is put into the 8 cubes that a cube of half-edge r about it touches, so one
+//! look-up finds every photon within r of the point, whatever its place in its cube, and some of up to 3r. The lights whose
+//! photons it finds are 𝓛_con; all others are most probably occluded. Cubes are told apart by the side of the surface too: a
+//! photon belongs to each of the six axis directions that its normal is within [`SIDE_COS`] of, a look-up to the one its normal
+//! is nearest to. So photons whose normals are within 17° of that of the point are always found, and the other side of a wall
+//! never is.
+//!
+//! A radius is secure if a light that is seen has a photon there almost surely. Of an expected number μ of them none
+//! comes with probability e^−μ; [`LightHints::adapted`] takes the radius at which a photon has [`SECURE_COUNT`] of its
+//! light around it on the average.
+
+use super::LightId;
+use crate::math::{Bounds3, Vec3};
+use rayon::prelude::*;
+
+/// Least cosine between a photon's normal and an axis direction for it to count on that side: cos(54.7° + 17.8°), of the
+/// greatest angle between a direction and its nearest axis, and of a margin.
+pub const SIDE_COS: f32 = 0.3;
+/// Mean number of photons of the same light that a photon finds around it by [`LightHints::adapted`].
+pub const SECURE_COUNT: f64 = 64.0;
+/// Least and greatest radius by [`LightHints::adapted`], as shares of the scene's.
+const RADIUS_SHARES: [f32; 2] = [1.0 / 4096.0, 1.0 / 16.0];
+/// What [`LightHints::visibility`] is where no photon of a light came.
+pub const UNSEEN: f32 = 0.04;
+
+/// Bits of a cube's index along each axis.
+const AXIS_BITS: u32 = 20;
+/// Key of a slot that holds nothing.
+const EMPTY: u64 = u64::MAX;
+
+/// A cube on one side, with the part of the entries that is its.
+#[derive(Clone, Copy, Debug)]
+struct Slot {
+    key: u64,
+    first: u32,
+    len: u32,
+}
+
+/// Which lights photons that came straight from them say are visible around a point.
+#[derive(Clone, Debug)]
+pub struct LightHints {
+    origin: Vec3,
+    /// 1/(2r).
+    scale: f32,
+    radius: f32,
+    /// A hash table with linear probing, filled in the order of the keys.
+    slots: Vec<Slot>,
+    /// Lights and numbers of their photons, cube by cube; ids ascend in each.
+    entries: Vec<(LightId, u32)>,
+    /// Numbers of photons of a cube up to and with each entry.
+    sums: Vec<u32>,
+}
+
+/// What is known around a point.
+#[derive(Clone, Copy, Debug, Default)]
+pub struct Around<'a> {
+    /// Lights and numbers of their photons, ids ascending.
+    pub lights: &'a [(LightId, u32)],
+    /// Numbers of photons up to and with each light.
+    pub sums: &'a [u32],
+}
+
+impl Around<'_> {
+    /// Where a light is.
+    #[inline]
+    pub fn place(&self, light: LightId) -> Option<usize> {
+        self.lights.binary_search_by_key(&light, |&(id, _)| id).ok()
+    }
+
+    /// An estimate of the visibility of a light, from [`UNSEEN`] to 1: (c + [`UNSEEN`])/(c + 1) of a light with c photons, and 1
+    /// where nothing is known.
+    #[inline]
+    pub fn visibility(&self, light: LightId) -> f32 {
+        if self.lights.is_empty() {
+            return 1.0;
+        }
+        let count = self.place(light).map_or(0.0, |i| self.lights[i].1 as f32);
+        (count + UNSEEN) / (count + 1.0)
+    }
+}
+
+/// The axis direction nearest to `n`: 2·axis, plus one if it is negative.
+#[inline]
+fn side_of(n: Vec3) -> u64 {
+    let a = n.abs();
+    let axis = if a.x >= a.y && a.x >= a.z { 0 } else { 1 + usize::from(a.z > a.y) };
+    2 * axis as u64 + u64::from(n[axis] < 0.0)
+}
+
+#[inline]
+fn key_of([x, y, z]: [u64; 3], side: u64) -> u64 {
+    ((side << AXIS_BITS | x) << AXIS_BITS | y) << AXIS_BITS | z
+}
+
+/// The index of a cube along an axis for a distance from the origin in edges.
+#[inline]
+fn index_of(x: f32) -> u64 {
+    // A cast of what lies outside saturates; NaN is 0
+    (x as u64).min((1 << AXIS_BITS) - 1)
+}
+
+impl LightHints {
+    /// Hints of photons that came straight from lights: position, unit normal on the side that they came to, light.
+    /// `radius` (m) is enlarged where the scene has more than 2²⁰ cubes along an axis. Photons whose place is not finite and
+    /// those without a normal are left out.
+    pub fn new(primary: impl Iterator<Item = (Vec3, Vec3, LightId)>, radius: f32) -> Self {
+        let photons: Vec<_> = primary.collect();
+        LightHints::of_photons(&photons, radius)
+    }
+
+    /// [`Self::new`] with a secure radius; `scene_radius` (m) bounds it.
+    pub fn adapted(primary: &[(Vec3, Vec3, LightId)], scene_radius: f32) -> Self {
+        let [min, max] = RADIUS_SHARES.map(|share| share * scene_radius);
+        let mut hints = LightHints::of_photons(primary, scene_radius / 64.0);
+        // Numbers of photons on a surface grow with the square of the radius, nearly
+        for _ in 0..3 {
+            let ratio = (SECURE_COUNT / hints.mean_count().max(1.0)).sqrt() as f32;
+            let radius = (hints.radius * ratio.clamp(0.125, 8.0)).clamp(min, max);
+            if (radius / hints.radius - 1.0).abs() < 0.1 {
+                break;
+            }
+            hints = LightHints::of_photons(primary, radius);
+        }
+        hints
+    }
+
+    fn of_photons(photons: &[(Vec3, Vec3, LightId)], radius: f32) -> Self {
+        let photons = || photons.iter().filter(|(p, ..)| p.is_finite());
+        let bounds = Bounds3::from_points(photons().map(|&(p, ..)| p));
+        let extent = if bounds.is_empty() { 0.0 } else { bounds.diagonal().max_element() };
+        // Two cubes of margin at each end
+        let radius = radius.max(extent / (2.0 * ((1_u64 << AXIS_BITS) - 8) as f32)).max(f32::MIN_POSITIVE);
+        let edge = 2.0 * radius;
+        let origin = if bounds.is_empty() { Vec3::ZERO } else { bounds.min - 2.0 * edge };
+        let scale = 1.0 / edge;
+
+        // Photons with the same 8 cubes, side and light are one item with their number
+        let mut items: Vec<(u64, LightId, u32)> = Vec::new();
+        for &(p, n, light) in photons() {
+            let lowest = ((p - origin) * scale - 0.5).to_array().map(index_of);
+            let sides = (0..6).filter(|&side| (if side & 1 == 0 { n[side / 2] } else { -n[side / 2] }) >= SIDE_COS);
+            items.extend(sides.map(|side| (key_of(lowest, side as u64), light, 1)));
+        }
+        let items = merged(items);
+        let cubes = (0..8_u64).map(|i| key_of([i & 1, i >> 1 & 1, i >> 2], 0));
+        let spread = cubes.flat_map(|step| items.iter().map(move |&(key, light, count)| (key + step, light, count)));
+        LightHints::from_sorted(origin, radius, &merged(spread.collect()))
+    }
+
+    fn from_sorted(origin: Vec3, radius: f32, items: &[(u64, LightId, u32)]) -> Self {
+        let cells = items.chunk_by(|a, b| a.0 == b.0);
+        let slots = (2 * cells.clone().count()).next_power_of_two();
+        let mut hints = LightHints {
+            origin,
+            scale: 0.5 / radius,
+            radius,
+            slots: vec![Slot { key: EMPTY, first: 0, len: 0 }; slots],
+            entries: Vec::with_capacity(items.len()),
+            sums: Vec::with_capacity(items.len()),
+        };
+        for cell in cells {
+            let slot = hints.find(cell[0].0);
+            hints.slots[slot] = Slot { key: cell[0].0, first: hints.entries.len() as u32, len: cell.len() as u32 };
+            let mut sum = 0_u32;
+            for &(_, light, count) in cell {
+                sum = sum.saturating_add(count);
+                hints.entries.push((light, count));
+                hints.sums.push(sum);
+            }
+        }
+        hints
+    }
+
+    /// The slot of a key, or the empty one where it would be.
+    #[inline]
+    fn find(&self, key: u64) -> usize {
+        let mask = self.slots.len() - 1;
+        let mut slot = (key.wrapping_mul(0x9e37_79b9_7f4a_7c15) >> 32) as usize & mask;
+        while self.slots[slot].key != key && self.slots[slot].key != EMPTY {
+            slot = (slot + 1) & mask;
+        }
+        slot
+    }
+
+    /// The radius r (m) within which photons are always found.
+    pub fn radius(&self) -> f32 {
+        self.radius
+    }
+
+    /// True if there was no photon.
+    pub fn is_empty(&self) -> bool {
+        self.entries.is_empty()
+    }
+
+    /// Memory (bytes).
+    pub fn bytes(&self) -> u64 {
+        let entry = size_of::<(LightId, u32)>() + size_of::<u32>();
+        (self.slots.len() * size_of::<Slot>() + self.entries.len() * entry) as u64
+    }
+
+    /// 𝓛_con of the point `p` on the side of the unit normal `n`, with numbers of photons; ids ascend. Empty where nothing is known,
+    /// and for a normal that is zero.
+    #[inline]
+    pub fn around(&self, p: Vec3, n: Vec3) -> &[(LightId, u32)] {
+        self.around_with_sums(p, n).lights
+    }
+
+    /// [`Self::around`] with sums of the numbers.
+    #[inline]
+    pub fn around_with_sums(&self, p: Vec3, n: Vec3) -> Around<'_> {
+        if n == Vec3::ZERO {
+            return Around::default();
+        }
+        let place = ((p - self.origin) * self.scale).to_array().map(index_of);
+        let Slot { first, len, .. } = self.slots[self.find(key_of(place, side_of(n)))];
+        let range = first as usize..(first + len) as usize;
+        Around { lights: &self.entries[range.clone()], sums: &self.sums[range] }
+    }
+
+    /// Mean over all photons of the number of photons of the same light that are found where they are.
+    pub fn mean_count(&self) -> f64 {
+        let sum = |f: fn(f64) -> f64| self.entries.iter().map(|&(_, count)| f(f64::from(count))).sum::<f64>();
+        let (photons, squares) = (sum(|c| c), sum(|c| c * c));
+        if photons > 0.0 { squares / photons } else { 0.0 }
+    }
+}
+
+/// Items in order, those of the same cube and light made one.
+fn merged(mut items: Vec<(u64, LightId, u32)>) -> Vec<(u64, LightId, u32)> {
+    items.par_sort_unstable();
+    items.dedup_by(|next, kept| {
+        let is_same = (next.0, next.1) == (kept.0, kept.1);
+        if is_same {
+            kept.2 = kept.2.saturating_add(next.2);
+        }
+        is_same
+    });
+    items.shrink_to_fit();
+    items
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::math::hash::HashStream;
+    use crate::math::warp::sample_uniform_sphere;
+
+    fn random_photons(count: usize, lights: u32) -> Vec<(Vec3, Vec3, LightId)> {
+        let mut s = HashStream::new([5, 5, 5]);
+        let photon = |_| {
+            let [x, y] = s.next_2d();
+            let p = Vec3::new(x, y, s.next_f32()) * 4.0 - 1.0;
+            (p, sample_uniform_sphere(s.next_2d()), (s.next_f32() * lights as f32) as LightId)
+        };
+        (0..count).map(photon).collect()
+    }
+
+    #[test]
+    fn every_photon_within_the_radius_on_the_same_side_is_found() {
+        let photons = random_photons(20_000, 50);
+        let radius = 0.1;
+        let hints = LightHints::new(photons.iter().copied(), radius);
+        let mut s = HashStream::new([6, 6, 6]);
+        let mut found = 0;
+        for _ in 0..2000 {
+            let [x, y] = s.next_2d();
+            let (p, n) = (Vec3::new(x, y, s.next_f32()) * 4.4 - 1.2, sample_uniform_sphere(s.next_2d()));
+            let around = hints.around(p, n);
+            assert!(around.windows(2).all(|w| w[0].0 < w[1].0));
+            let near = |most: f32, turn: f32| {
+                let is_near =
+                    move |&&(q, m, _): &&(Vec3, Vec3, LightId)| (p - q).abs().max_element() <= most && n.dot(m) >= turn;
+                photons.iter().filter(is_near)
+            };
+            for (_, _, light) in near(radius * 0.999, 17.0_f32.to_radians().cos()) {
+                assert!(around.iter().any(|(id, _)| id == light));
+                found += 1;
+            }
+            // No photon is found beyond three radii, none of the other side, and each only once.
+            for &(light, count) in around {
+                let most = near(radius * 3.001, -0.61).filter(|(_, _, id)| *id == light).count();
+                assert!(count as usize <= most, "{light} {count} {most}");
+            }
+        }
+        assert!(found > 20);
+    }
+
+    #[test]
+    fn both_sides_of_a_wall_have_hints_of_their_own() {
+        let at = |x: f32, y: f32| Vec3::new(x, y, 1.0);
+        let photons = (0..100).flat_map(|i| {
+            let p = at((i % 10) as f32 * 0.1, (i / 10) as f32 * 0.1);
+            [(p, Vec3::Z, 3), (p, Vec3::NEG_Z, 7), (p + Vec3::Z * 5.0, Vec3::Z, 9)]
+        });
+        let hints = LightHints::new(photons, 0.15);
+        let lights = |p, n| hints.around(p, n).iter().map(|(id, _)| *id).collect::<Vec<_>>();
+        assert_eq!(lights(at(0.5, 0.5), Vec3::Z), [3]);
+        assert_eq!(lights(at(0.5, 0.5), Vec3::NEG_Z), [7]);
+        assert!(lights(at(0.5, 0.5), Vec3::X).is_empty());
+        assert!(lights(at(0.5, 0.5), Vec3::ZERO).is_empty());
+        assert!(lights(at(50.0, 0.5), Vec3::Z).is_empty());
+        assert!(lights(at(-50.0, f32::NAN), Vec3::Z).is_empty());
+        assert!(hints.bytes() > 0 && hints.radius() == 0.15);
+        let around = hints.around_with_sums(at(0.5, 0.5), Vec3::Z);
+        assert_eq!(around.sums.last().copied(), Some(around.lights[0].1));
+        assert!(around.visibility(3) > 0.9 && around.visibility(8) == UNSEEN);
+        assert_eq!(Around::default().visibility(8), 1.0);
+    }
+
+    #[test]
+    fn the_adapted_radius_gives_photons_enough_company() {
+        let mut s = HashStream::new([7, 7, 7]);
+        for count in [3_000, 100_000] {
+            // Four lights on a square of 10 m, each seen in its own quarter
+            let photons: Vec<_> = (0..count)
+                .map(|_| {
+                    let [x, y] = s.next_2d().map(|u| u * 10.0);
+                    (Vec3::new(x, y, 0.0), Vec3::Z, u32::from(x > 5.0) + 2 * u32::from(y > 5.0))
+                })
+                .collect();
+            let hints = LightHints::adapted(&photons, 7.1);
+            assert!((32.0..128.0).contains(&hints.mean_count()), "{} {}", hints.radius(), hints.mean_count());
+            let again = LightHints::new(photons.iter().rev().copied(), hints.radius());
+            assert_eq!(hints.entries, again.entries, "hints do not depend on the order of photons");
+        }
+    }
+
+    #[test]
+    fn no_photons_and_photons_in_one_place_are_handled() {
+        let none = LightHints::new(std::iter::empty(), 1.0);
+        assert!(none.is_empty() && none.around(Vec3::ZERO, Vec3::Z).is_empty() && none.mean_count() == 0.0);
+        assert!(LightHints::adapted(&[], 1.0).is_empty());
+        let same = [(Vec3::ONE, Vec3::Z, 1), (Vec3::splat(f32::NAN), Vec3::Z, 2), (Vec3::ONE, Vec3::ZERO, 3)];
+        assert_eq!(LightHints::new(same.into_iter(), 0.0).around(Vec3::ONE, Vec3::Z), [(1, 1)]);
+        let far = [(Vec3::ZERO, Vec3::Z, 1), (Vec3::splat(1e9), Vec3::Z, 2)];
+        let hints = LightHints::new(far.into_iter(), 1e-3);
+        assert_eq!(hints.around(Vec3::splat(1e9), Vec3::Z), [(2, 1)]);
+        assert_eq!(hints.around(Vec3::ZERO, Vec3::Z), [(1, 1)]);
+    }
+}

@@ -1,0 +1,167 @@
+//! Direct light by photons that tell which lights are seen [Keller and Wald 2000, §3]: what they say changes the noise, and
+//! nothing else, unless lights are left out on request.
+//!
+//! That every estimator gives the known answer with hints absent, empty, right and wrong is in [`super::analytic_scenes`].
+
+use super::analytic_scenes::answer;
+use lumiris::accel::{Coherence, RayBatch};
+use lumiris::estimators::stats::{Welford, t_test};
+use lumiris::film::PixelSums;
+use lumiris::import::{LoadOptions, load};
+use lumiris::lights::{LightHints, LightId, LightSamplerKind};
+use lumiris::math::hash::{HashStream, pcg4d};
+use lumiris::math::ray::offset_origin;
+use lumiris::math::{Ray, Vec3};
+use lumiris::render::{RenderSettings, render};
+use lumiris::scene::{AccelKind, EstimatorKind, IntegratorSettings, Proposals, Target, World};
+use std::path::Path;
+use std::sync::atomic::AtomicBool;
+
+/// What photons say.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Hints {
+    /// Nobody asked them.
+    Absent,
+    /// There were none.
+    Empty,
+    /// Where each light shines.
+    Right,
+    /// The same of other lights, chosen at random, and of lights that there are not.
+    Wrong,
+}
+
+/// Photons of a light.
+const PHOTONS: u32 = 1000;
+
+/// Photons of every light where they first meet a surface.
+fn primary_photons(world: &World) -> Vec<(Vec3, Vec3, LightId)> {
+    let lights = &world.scene.lights;
+    let (mut rays, mut ids) = (RayBatch::default(), Vec::new());
+    for (id, light) in (0..).zip(&lights.lights) {
+        let mut stream = HashStream::new([id, 99, 3]);
+        for _ in 0..PHOTONS {
+            let scene = (lights.scene_centre, lights.scene_radius);
+            if let Some(s) = light.sample_le(scene, stream.next_2d(), stream.next_2d()) {
+                let o = if s.n == Vec3::ZERO { s.p } else { offset_origin(s.p, s.p_error, s.n, s.d) };
+                rays.push(&Ray { o, d: s.d, t_max: f32::INFINITY, time: 0.0 });
+                ids.push(id);
+            }
+        }
+    }
+    let mut hits = Vec::new();
+    world.accel.intersect(&rays, Coherence::Incoherent, &mut hits);
+    let photon = |(i, hit): (usize, &Option<lumiris::accel::Hit>)| {
+        let hit = hit.as_ref()?;
+        let surface = world.scene.geometry.surface_hit(hit.geometry, hit.primitive, hit.instance, hit.uv, 0.0);
+        let n = if surface.n.dot(rays.get(i).d) > 0.0 { -surface.n } else { surface.n };
+        Some((surface.p, n, ids[i]))
+    };
+    hits.iter().enumerate().filter_map(photon).collect()
+}
+
+/// Hints of a kind for a world.
+pub fn hints(world: &World, kind: Hints) -> Option<LightHints> {
+    let radius = world.scene.lights.scene_radius;
+    match kind {
+        Hints::Absent => None,
+        Hints::Empty => Some(LightHints::new(std::iter::empty(), 1.0)),
+        Hints::Right => Some(LightHints::adapted(&primary_photons(world), radius)),
+        Hints::Wrong => {
+            let mut photons = primary_photons(world);
+            let choices = world.scene.lights.lights.len() as u32 + 2;
+            for (i, photon) in photons.iter_mut().enumerate() {
+                photon.2 = pcg4d([i as u32, 1, 2, 3])[0] % choices / 2;
+            }
+            Some(LightHints::adapted(&photons, radius))
+        }
+    }
+}
+
+/// The lights of the scene that the origin sees, and the others.
+fn is_seen(world: &World, light: LightId) -> bool {
+    let ctx = lumiris::lights::LightCtx::at(Vec3::ZERO);
+    world.scene.lights.lights[light as usize].sample_li(&ctx, [0.5; 2]).is_some_and(|s| s.p.x < 0.5)
+}
+
+fn world(settings: impl Fn(&mut IntegratorSettings), seen: impl Fn(&World, LightId) -> bool) -> World {
+    let path = Path::new(env!("CARGO_MANIFEST_DIR")).join("scenes/analytic/hidden-lights.pbrt");
+    let mut scene = load(&path, &LoadOptions::default()).map_err(|d| d.to_string()).unwrap().scene;
+    settings(&mut scene.integrator);
+    scene.lights.set_kind(scene.integrator.light_choice);
+    let mut world = World::new(scene, AccelKind::Embree, None).unwrap();
+    let ids = (0..world.scene.lights.lights.len() as LightId).filter(|&id| seen(&world, id));
+    let hints = LightHints::new(ids.flat_map(|id| vec![(Vec3::ZERO, Vec3::Z, id); 20]), 0.1);
+    world.scene.lights.set_hints(Some(hints));
+    world
+}
+
+/// Red of all camera samples of some renderings.
+fn pixels(world: &mut World, seeds: u32) -> Welford {
+    let mut values = Welford::default();
+    for seed in 0..seeds {
+        world.scene.sampling.seed = seed;
+        let settings = RenderSettings { threads: Some(1), spp: 1, ..RenderSettings::default() };
+        let film = render(world, &settings, &AtomicBool::new(false), &|_| ()).unwrap().film;
+        film.pixels.iter().for_each(|p: &PixelSums| values.add(p.mean()[0]));
+    }
+    values
+}
+
+fn red() -> f64 {
+    answer(&Path::new(env!("CARGO_MANIFEST_DIR")).join("scenes/analytic/hidden-lights.pbrt"))[0]
+}
+
+fn contributing(samples: u32, rest: u32) -> impl Fn(&mut IntegratorSettings) {
+    move |s| {
+        s.estimator = EstimatorKind::Contributing;
+        s.samples = Some(samples);
+        s.contributing.rest_samples = rest;
+    }
+}
+
+#[test]
+fn leaving_lights_out_is_biased_where_a_light_that_is_seen_has_no_photon() {
+    let is_some = |world: &World, id: LightId| is_seen(world, id) && id != 0 && id != 18;
+    for samples in [1, 4, 16] {
+        let right = pixels(&mut world(contributing(samples, 0), is_seen), 60);
+        assert!(t_test(&right, red()).p_value > 1e-4, "{samples} {right:?}");
+        let biased = pixels(&mut world(contributing(samples, 0), is_some), 60);
+        assert!(t_test(&biased, red()).p_value < 1e-6 && biased.mean() < red(), "{samples} {biased:?}");
+        let whole = pixels(&mut world(contributing(samples, 1), is_some), 60);
+        assert!(t_test(&whole, red()).p_value > 1e-4, "{samples} {whole:?}");
+    }
+}
+
+#[test]
+fn right_hints_lower_the_variance() {
+    let ratio = |settings: &dyn Fn(&mut IntegratorSettings), least: f64| {
+        let without = pixels(&mut world(settings, |_, _| false), 100).variance();
+        let with = pixels(&mut world(settings, is_seen), 100).variance();
+        assert!(without > least * with, "{without} without hints, {with} with");
+    };
+    ratio(
+        &|s| {
+            s.light_choice = LightSamplerKind::Photons;
+            s.samples = Some(4);
+        },
+        1.5,
+    );
+    ratio(
+        &|s| {
+            s.estimator = EstimatorKind::Ris;
+            s.ris.target = Target::Visibility;
+            s.ris.proposals = Proposals::Fixed(64);
+            s.samples = Some(2);
+        },
+        3.0,
+    );
+    ratio(&contributing(12, 1), 3.0);
+}
+
+#[test]
+fn more_samples_than_lights_that_are_seen_leave_the_noise_within_lights() {
+    // Nine lights are seen; the six points among them have no noise, and in Ward's order the brightest have none.
+    let variance = |samples| pixels(&mut world(contributing(samples, 0), is_seen), 100).variance();
+    let [one, five, nine, all] = [1, 5, 9, 40].map(variance);
+    assert!(one > 2.0 * five && five > 2.0 * nine && nine > all, "{one} {five} {nine} {all}");
+}
