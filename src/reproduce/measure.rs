@@ -13,6 +13,7 @@ use crate::estimators::stats::{Welford, z_test};
 use crate::film::Film;
 use crate::film::filter::PixelFilter;
 use crate::import::{LoadOptions, load};
+use crate::lights::LightHints;
 use crate::render::plan::prepare;
 use crate::render::{RenderSettings, Rendering, render};
 use crate::scene::{AccelKind, Proposals, StageTimes, Strata, World};
@@ -88,6 +89,11 @@ impl Stage {
     /// The scene.
     pub fn world(&self) -> &World {
         &self.world
+    }
+
+    /// Says which lights are seen from where, until it says otherwise.
+    pub fn set_light_hints(&mut self, hints: Option<LightHints>) {
+        self.world.scene.lights.set_hints(hints);
     }
 
     /// Size of the picture.

@@ -166,7 +166,8 @@ fn the_page_of_photon_maps_holds_every_figure_and_its_maps() {
     for scene in ["few", "many"] {
         for m in figures["direct"]["numbers"][scene]["methods"].as_array().unwrap() {
             assert_eq!(m["invalid_samples"], 0, "{}", m["name"]);
-            assert!(m["same_mean_p"].as_f64().unwrap() > 1e-6, "{}", m["name"]);
+            let is_same = m["same_mean_p"].as_f64().unwrap() > 1e-6;
+            assert!(is_same || m["biased"] == true, "{}", m["name"]);
         }
     }
     let shown = sources(&html);

@@ -133,7 +133,7 @@ fn figure(setup: &Setup<'_>, outcomes: &[Outcome; 2]) -> Result<Figure, Reproduc
             })
             .collect();
         blocks.push(prints(setup, exposure, &whole)?);
-        let parts: Vec<(String, String, [u32; 2], Vec<[f32; 3]>)> = (o.rows.iter())
+        let parts: Vec<_> = (o.rows.iter())
             .map(|r| (format!("{}", r.q), format!("caustic, q = 1/{}", r.q), &r.caustic))
             .chain([("reference".to_owned(), "caustic, reference".to_owned(), &o.reference)])
             .map(|(name, title, picture)| {
