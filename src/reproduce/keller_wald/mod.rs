@@ -31,7 +31,7 @@ const SHAPE: [u32; 2] = [4, 3];
 const STUDY: Study = Study {
     title: "Importance sampling for photon maps: the figures of Keller and Wald (2000), measured again",
     intro: "Each figure of the report “Efficient Importance Sampling Techniques for the Photon Map”. Its scenes are not published; these \
-            are others of the same kind, made from its text: 10 × 10 rooms with a light each, the same rooms with 10,000 lights, a polished \
+            are others of the same kind, made from its text: 10 × 10 rooms with a light each, 50 × 50 rooms with 10,000 lights, a polished \
             ring, and a room that is lit through a slit. The numbers below are from one run on one machine.",
     notes: &[
         "Variance: of the pixel's luminance over independent renderings, unbiased, averaged over all pixels; no reference picture takes \
