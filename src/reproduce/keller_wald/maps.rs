@@ -16,8 +16,8 @@ use crate::scene::World;
 use rayon::prelude::*;
 use std::time::{Duration, Instant};
 
-/// Largest radius in which photons are looked for, in radii of the scene.
-const MAX_RADIUS: f32 = 0.05;
+/// Largest radius in which photons are looked for (m): that of furniture.
+const MAX_RADIUS: f32 = 0.5;
 /// Squares along the longer side of a plan: usual and quick.
 const PLAN_SIZE: [u32; 2] = [400, 240];
 /// Turns of a reference; their seeds begin here.
@@ -70,8 +70,8 @@ impl Maps {
     }
 
     /// The radiance of each pixel by the `count` nearest photons of each map.
-    pub fn picture(&self, setup: &Setup<'_>, world: &World, seen: &[Option<Seen>], count: u32) -> Vec<[f32; 3]> {
-        show(setup, world, seen, &[&self.global, &self.caustic], count)
+    pub fn picture(&self, setup: &Setup<'_>, seen: &[Option<Seen>], count: u32) -> Vec<[f32; 3]> {
+        show(setup, seen, &[&self.global, &self.caustic], count)
     }
 }
 
@@ -81,8 +81,8 @@ pub fn positions(map: &PhotonMap) -> impl Iterator<Item = Vec3> {
 }
 
 /// The radiance of each pixel by the `count` nearest photons of each of some maps.
-pub fn show(setup: &Setup<'_>, world: &World, seen: &[Option<Seen>], maps: &[&PhotonMap], count: u32) -> Vec<[f32; 3]> {
-    let search = Search::Nearest { count, max_radius: MAX_RADIUS * world.scene.lights.scene_radius };
+pub fn show(setup: &Setup<'_>, seen: &[Option<Seen>], maps: &[&PhotonMap], count: u32) -> Vec<[f32; 3]> {
+    let search = Search::Nearest { count, max_radius: MAX_RADIUS };
     let pixel = |scratch: &mut GatherScratch, seen: &Option<Seen>| {
         seen.map_or([0.0; 3], |s| {
             let place = Place::flat(s.p, s.n);
@@ -148,16 +148,25 @@ pub struct Cloud {
     pub points: Vec<Vec3>,
 }
 
-/// Pictures of points with one scale for all.
+/// Pictures of points with one scale for all. Densities are those of as many points as the last has.
 pub fn clouds(setup: &Setup<'_>, plan: &Plan, clouds: &[Cloud]) -> Result<Vec<Block>, ReproduceError> {
-    let densities: Vec<Vec<f64>> = clouds.iter().map(|c| plan.density(&c.points)).collect();
+    let count = clouds.last().map_or(0, |c| c.points.len()) as f64;
+    let density = |c: &Cloud| {
+        let factor = count / c.points.len().max(1) as f64;
+        plan.density(&c.points).into_iter().map(|d| d * factor).collect()
+    };
+    let densities: Vec<Vec<f64>> = clouds.iter().map(density).collect();
     let scale = plan.scale(&densities.iter().map(|d| &d[..]).collect::<Vec<_>>());
     let mut shown = Vec::new();
     for (cloud, density) in clouds.iter().zip(&densities) {
         let file = plan.picture(density, &scale).write(&setup.options.out, &cloud.name)?;
         shown.push(Shown { file, title: cloud.title.clone(), caption: cloud.caption.clone() });
     }
-    let legend = Block::Legend { title: "from above: points per square metre of the floor".to_owned(), scale };
+    let legend = Block::Legend {
+        title: "from above: points per square metre of the floor, as if each picture had as many as the last"
+            .to_owned(),
+        scale,
+    };
     Ok(vec![Block::Pictures(shown), legend])
 }
 

@@ -82,11 +82,11 @@ fn measure(setup: &Setup<'_>, scene: &'static Scene, time: Duration) -> Result<O
 
     // The reference holds no global photons to speak of
     let long = trace_ratio(setup, world, 2, finest * LONGER, count)?;
-    let reference = show(setup, world, &seen, &[&long.caustic], REFERENCE_COUNT);
+    let reference = show(setup, &seen, &[&long.caustic], REFERENCE_COUNT);
     let mask: Vec<bool> = seen.iter().map(Option::is_some).collect();
     let mut rows = Vec::new();
     for q in RATIOS {
-        rows.push(row(setup, world, &seen, (q, trace_ratio(setup, world, 1, q, count)?), |caustic| {
+        rows.push(row(setup, &seen, (q, trace_ratio(setup, world, 1, q, count)?), |caustic| {
             relative_rmse(caustic, &reference, &mask)
         }));
     }
@@ -99,15 +99,9 @@ fn trace_ratio(setup: &Setup<'_>, world: &World, seed: u32, finer: u64, count: u
     trace(setup, world, &tracing, None, Want::Trajectories(count * finer))
 }
 
-fn row(
-    setup: &Setup<'_>,
-    world: &World,
-    seen: &[Option<Seen>],
-    (q, maps): (u64, Maps),
-    error: impl Fn(&[[f32; 3]]) -> f64,
-) -> Row {
-    let caustic = show(setup, world, seen, &[&maps.caustic], COUNT);
-    let all = maps.picture(setup, world, seen, COUNT);
+fn row(setup: &Setup<'_>, seen: &[Option<Seen>], (q, maps): (u64, Maps), error: impl Fn(&[[f32; 3]]) -> f64) -> Row {
+    let caustic = show(setup, seen, &[&maps.caustic], COUNT);
+    let all = maps.picture(setup, seen, COUNT);
     Row { q, error: error(&caustic), maps, caustic, all }
 }
 

@@ -66,7 +66,7 @@ impl Judge<'_> {
         let tracing = Tracing { seed: 1, ..Tracing::default() };
         let want = Want::Stored { global: photons, most_trajectories: photons.saturating_mul(2000) };
         let maps = trace(self.setup, self.world, &tracing, importance, want)?;
-        let pictures = COUNTS.map(|count| maps.picture(self.setup, self.world, self.seen, count));
+        let pictures = COUNTS.map(|count| maps.picture(self.setup, self.seen, count));
         let errors: Vec<f64> = pictures.iter().map(|p| self.reference.rmse(p, self.mask)).collect();
         let best = (0..errors.len()).min_by(|&a, &b| errors[a].total_cmp(&errors[b])).unwrap_or(0);
         let picture = pictures.into_iter().nth(best).unwrap_or_default();

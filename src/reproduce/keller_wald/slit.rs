@@ -93,7 +93,7 @@ fn row(
     let mut first = None;
     for seed in 1..=SEEDS {
         let maps = trace(setup, world, &Tracing { seed, ..Tracing::default() }, importance, want)?;
-        let picture = maps.picture(setup, world, seen, COUNT);
+        let picture = maps.picture(setup, seen, COUNT);
         means.add(picture.iter().map(|p| luminance(p.map(f64::from))).sum::<f64>() / pixels);
         first.get_or_insert((maps, picture));
     }
