@@ -5,7 +5,7 @@ use crate::procedural::files::{write_sky, write_statue};
 use crate::procedural::sky::SkyOptions;
 use crate::procedural::statue::{DEFAULT_DETAIL, StatueOptions};
 use crate::procedural::talbot::TalbotOptions;
-use crate::procedural::{fan, talbot};
+use crate::procedural::{fan, keller_wald, talbot};
 use anyhow::ensure;
 use clap::{Args, Subcommand};
 use std::path::PathBuf;
@@ -28,6 +28,8 @@ enum What {
     Talbot(TalbotArgs),
     /// The scenes of scenes/fan with their statue
     Fan(FanArgs),
+    /// The scenes of scenes/keller-wald, and rooms with 10,000 lights
+    KellerWald(KellerWaldArgs),
 }
 
 #[derive(Args, Clone, Debug)]
@@ -117,6 +119,13 @@ struct FanArgs {
     detail: u32,
 }
 
+#[derive(Args, Clone, Debug)]
+struct KellerWaldArgs {
+    /// Folder to write into
+    #[arg(short, long, value_name = "DIR", default_value = "keller-wald")]
+    output: PathBuf,
+}
+
 pub fn run(args: &GenerateArgs) -> anyhow::Result<ExitCode> {
     match &args.what {
         What::Statue(args) => {
@@ -140,6 +149,10 @@ pub fn run(args: &GenerateArgs) -> anyhow::Result<ExitCode> {
             let statue = StatueOptions { detail: args.detail, ..StatueOptions::default() };
             let written = fan::write_scenes(&args.output, &statue)?;
             progress::say(&format!("{}: four scenes, {} triangles", args.output.display(), written.triangles));
+        }
+        What::KellerWald(args) => {
+            keller_wald::write_scenes(&args.output)?;
+            progress::say(&format!("{}: {} scenes", args.output.display(), keller_wald::COUNT));
         }
     }
     Ok(ExitCode::SUCCESS)

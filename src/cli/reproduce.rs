@@ -1,7 +1,7 @@
 //! `lumiris reproduce`
 
 use super::progress;
-use crate::reproduce::{Observer, Options, ReproduceError, fan, talbot};
+use crate::reproduce::{Observer, Options, ReproduceError, fan, keller_wald, talbot};
 use clap::{Args, ValueEnum};
 use std::path::PathBuf;
 use std::process::ExitCode;
@@ -22,11 +22,12 @@ pub struct ReproduceArgs {
     /// Threads [default: all cores]
     #[arg(long, value_name = "T", value_parser = clap::value_parser!(u32).range(1..=4096))]
     threads: Option<u32>,
-    /// Most pixels along an edge of a picture; fewer where time does not suffice [default: 400, quick 160 (talbot) or 128 (fan)]
+    /// Most pixels along an edge of a picture; fewer where time does not suffice [default: 400, quick 160 (talbot) or 128 (fan, keller-wald)]
     #[arg(long, value_name = "N", value_parser = clap::value_parser!(u32).range(16..=4096))]
     size: Option<u32>,
     /// Folder with scenes of the same names to use instead of those that are made for the purpose: statue-env.pbrt,
-    /// statue-lights.pbrt and statue-env-lights.pbrt (talbot); checkers.pbrt, statue.pbrt, room.pbrt and box.pbrt (fan)
+    /// statue-lights.pbrt and statue-env-lights.pbrt (talbot); checkers.pbrt, statue.pbrt, room.pbrt and box.pbrt (fan);
+    /// rooms.pbrt, rooms-10000.pbrt, ring.pbrt, ring-indirect.pbrt and slit.pbrt (keller-wald)
     #[arg(long, value_name = "DIR")]
     scenes: Option<PathBuf>,
     /// No progress, only errors
@@ -41,6 +42,8 @@ enum Paper {
     Talbot,
     /// Optimizing control variates: Fan, Chenney, Hu, Tsui and Lai 2006
     Fan,
+    /// Importance sampling for photon maps: Keller and Wald 2000
+    KellerWald,
 }
 
 pub fn run(args: &ReproduceArgs) -> anyhow::Result<ExitCode> {
@@ -63,6 +66,7 @@ pub fn run(args: &ReproduceArgs) -> anyhow::Result<ExitCode> {
     let page = match args.paper {
         Paper::Talbot => talbot::run(&options, observer),
         Paper::Fan => fan::run(&options, observer),
+        Paper::KellerWald => keller_wald::run(&options, observer),
     };
     match page {
         Ok(page) => {

@@ -1,12 +1,13 @@
 //! Content that the program makes itself: a statue, a sky, and the scenes that show them.
 //!
 //! Reading order: [`noise`], [`nets`], [`solids`], [`relief`], [`dragon`] (with `head`), [`statue`], [`ply`], [`sky`],
-//! [`files`], [`talbot`], [`fan`].
+//! [`files`], [`talbot`], [`fan`], [`keller_wald`].
 
 pub mod dragon;
 pub mod fan;
 pub mod files;
 mod head;
+pub mod keller_wald;
 pub mod nets;
 pub mod noise;
 pub mod ply;

@@ -154,7 +154,7 @@ pub fn render(
 }
 
 /// Threads, all cores if their number is not given.
-fn thread_pool(threads: Option<usize>) -> Result<rayon::ThreadPool, ThreadError> {
+pub fn thread_pool(threads: Option<usize>) -> Result<rayon::ThreadPool, ThreadError> {
     let threads = threads.unwrap_or_else(|| std::thread::available_parallelism().map_or(1, usize::from));
     let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build();
     pool.map_err(|source| ThreadError { threads, source })

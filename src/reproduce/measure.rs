@@ -13,6 +13,7 @@ use crate::estimators::stats::{Welford, z_test};
 use crate::film::Film;
 use crate::film::filter::PixelFilter;
 use crate::import::{LoadOptions, load};
+use crate::lights::LightHints;
 use crate::render::plan::prepare;
 use crate::render::{RenderError, RenderSettings, Rendering, render};
 use crate::scene::{AccelKind, Proposals, StageTimes, Strata, World};
@@ -83,6 +84,16 @@ impl Stage {
         world.accel = Box::new(Shadows { inner, cast: Arc::clone(&cast) });
         let depth = world.scene.integrator.max_depth;
         Ok(Stage { world, shadows: cast, threads, depth })
+    }
+
+    /// The scene.
+    pub fn world(&self) -> &World {
+        &self.world
+    }
+
+    /// Says which lights are seen from where, until it says otherwise.
+    pub fn set_light_hints(&mut self, hints: Option<LightHints>) {
+        self.world.scene.lights.set_hints(hints);
     }
 
     /// Size of the picture.

@@ -2,9 +2,11 @@
 
 use crate::estimators::mis::Heuristic;
 use crate::estimators::ocv::Form;
+use crate::lights::LightSamplerKind;
 use crate::samplers::SamplerKind;
 use crate::scene::{
-    Cached, EstimatorKind, IntegratorKind, IntegratorSettings, OptimalForm, ProposalPoints, Proposals, Strata, World,
+    Cached, EstimatorKind, IntegratorKind, IntegratorSettings, OptimalForm, ProposalPoints, Proposals, Strata, Target,
+    World,
 };
 
 /// Light that is computed.
@@ -25,6 +27,8 @@ pub struct Method {
     pub transport: Transport,
     /// Estimator of direct light.
     pub estimator: EstimatorKind,
+    /// How a light is chosen.
+    pub light_choice: LightSamplerKind,
     /// Weights of the techniques; the estimator's own if `None`.
     pub heuristic: Option<Heuristic>,
     /// How `ocv` finds its coefficients.
@@ -35,6 +39,10 @@ pub struct Method {
     pub samples: u32,
     /// M, for `ris`.
     pub proposals: u32,
+    /// What `ris` draws samples in proportion to.
+    pub target: Target,
+    /// Samples of `contributing` on the lights that no photon came from.
+    pub rest_samples: u32,
     /// Samples over proposals, for `ris`.
     pub strata: Strata,
     /// True if `ris` shares the time of an estimate out between M and N in each pixel as [`Stage::plan_per_pixel`](super::measure::Stage::plan_per_pixel) found out.
@@ -53,11 +61,14 @@ impl Method {
         Method {
             transport: Transport::Direct,
             estimator,
+            light_choice: LightSamplerKind::Tree,
             heuristic: None,
             form: Form::Progressive,
             optimal: OptimalForm::Progressive,
             samples,
             proposals: samples,
+            target: Target::Fgl,
+            rest_samples: 1,
             strata: Strata::None,
             per_pixel: false,
             stratified: false,
@@ -83,6 +94,11 @@ impl Method {
     /// Combined correlated and importance sampling by the BSDF with independent random numbers.
     pub fn correlated(samples: u32) -> Self {
         Method { estimator: EstimatorKind::Correlated, ..Method::mc(samples) }
+    }
+
+    /// Sampling of the lights that photons came from, and of the others, with independent random numbers.
+    pub fn contributing(samples: u32, rest_samples: u32) -> Self {
+        Method { estimator: EstimatorKind::Contributing, rest_samples, ..Method::mc(samples) }
     }
 
     /// Resampled importance sampling with independent random numbers and draws.
@@ -117,6 +133,7 @@ impl Method {
 
     /// Settings of the scene that do what the method says, where the file says `depth` bounces.
     pub(super) fn apply(&self, world: &mut World, depth: u32) {
+        world.set_light_choice(self.light_choice);
         let scene = &mut world.scene;
         let old = scene.integrator;
         let (kind, max_depth) = match self.transport {
@@ -138,6 +155,8 @@ impl Method {
         scene.integrator.ris.proposals =
             if self.per_pixel { Proposals::Optimal } else { Proposals::Fixed(self.proposals) };
         scene.integrator.ris.strata = self.strata;
+        scene.integrator.ris.target = self.target;
+        scene.integrator.contributing.rest_samples = self.rest_samples;
         scene.integrator.ris.points =
             if self.stratified { ProposalPoints::Stratified } else { ProposalPoints::Independent };
         scene.sampling.sampler = if self.stratified { SamplerKind::Sobol } else { SamplerKind::Independent };

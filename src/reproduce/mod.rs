@@ -2,12 +2,13 @@
 //!
 //! Reading order: [`method`] (a way to estimate light), [`measure`] (methods in turns on one scene, variances and times),
 //! [`calibrate`] (numbers of samples and proposals for equal time), [`talbot`] (resampled importance sampling), [`fan`]
-//! (optimizing control variates), then what a page is made of: [`figure`], [`page`], [`pictures`], [`chart`].
+//! (optimizing control variates), [`keller_wald`] (photon maps), then what a page is made of: [`figure`], [`page`], [`pictures`], [`chart`].
 
 pub mod calibrate;
 pub mod chart;
 pub mod fan;
 pub mod figure;
+pub mod keller_wald;
 pub mod measure;
 pub mod method;
 pub mod page;
@@ -71,6 +72,9 @@ pub enum ReproduceError {
     /// A rendering ended without a picture.
     #[error(transparent)]
     Render(#[from] crate::render::RenderError),
+    /// There is no photon map.
+    #[error(transparent)]
+    Photons(#[from] crate::photons::PhotonError),
     /// A picture could not be written.
     #[error(transparent)]
     Image(#[from] crate::imaging::oiio::ImageError),
@@ -85,6 +89,12 @@ pub enum ReproduceError {
     /// The observer ended it.
     #[error("ended before it was done")]
     Stopped,
+}
+
+/// Width and height of a picture of a shape whose longer edge has `size` pixels.
+fn scaled(shape: [u32; 2], size: u32) -> [u32; 2] {
+    let longer = shape[0].max(shape[1]).max(1);
+    shape.map(|s| (s * size / longer).max(1))
 }
 
 /// Writes a file, with its name in the error.

@@ -44,6 +44,16 @@ impl Picture {
     }
 }
 
+/// The part of a picture between left, top, right and bottom, in fractions: its size and its pixels.
+pub fn crop(size: [u32; 2], picture: &[[f32; 3]], [l, t, r, b]: [f64; 4]) -> ([u32; 2], Vec<[f32; 3]>) {
+    let [w, h] = size.map(|s| s as usize);
+    let at = |f: f64, n: usize| ((f * n as f64) as usize).min(n - 1);
+    let (l, t) = (at(l, w), at(t, h));
+    let (r, b) = (at(r, w).max(l + 1), at(b, h).max(t + 1));
+    let pixels = (t..b).flat_map(|y| picture[y * w + l..y * w + r].iter().copied()).collect();
+    ([(r - l) as u32, (b - t) as u32], pixels)
+}
+
 /// The gain that maps the value which one pixel in twenty exceeds to 0.8.
 pub fn gain(radiance: &[[f32; 3]]) -> f32 {
     let mut maxima: Vec<f32> = radiance.iter().map(|p| p[0].max(p[1]).max(p[2])).filter(|v| *v > 0.0).collect();

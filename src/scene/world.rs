@@ -5,7 +5,7 @@ use crate::accel::bvh::Bvh;
 use crate::accel::embree::{EmbreeAccel, EmbreeError};
 use crate::accel::{Accel, AlphaSource, Coherence, Hit, RayBatch};
 use crate::geometry::{GeometryId, GeometrySet, Group};
-use crate::lights::{Irradiances, LightId, LightSampler};
+use crate::lights::{Irradiances, LightId, LightSampler, LightSamplerKind};
 use crate::math::{Vec2, Vec3};
 use crate::textures::{TextureContext, TextureSet};
 use std::sync::Arc;
@@ -87,12 +87,17 @@ fn build(
     })
 }
 
+/// Puts lights into as many groups as a mixture has components beside `lobes`.
+fn set_groups(scene: &mut Scene, lobes: usize) {
+    scene.lights.set_groups(scene.integrator.ocv.most_components().saturating_sub(lobes).max(1));
+}
+
 impl World {
     /// Builds the ray tracers. `packet_width` overrides the device's native width (1, 4 or 8); pictures do
     /// not depend on it.
     pub fn new(mut scene: Scene, kind: AccelKind, packet_width: Option<u32>) -> Result<World, EmbreeError> {
         let lobes = scene.materials.lobes();
-        scene.lights.set_groups(scene.integrator.ocv.most_components().saturating_sub(lobes).max(1));
+        set_groups(&mut scene, lobes);
         let accel = build(kind, &scene.geometry, &scene.textures, packet_width)?;
         let emitter_geometry: Vec<GeometryId> =
             scene.geometry.root.geometries.iter().copied().filter(|&g| scene.lights.emits(g)).collect();
@@ -121,6 +126,16 @@ impl World {
             emitters_hide,
             lobes,
         })
+    }
+
+    /// Chooses lights in another way from now on.
+    pub fn set_light_choice(&mut self, kind: LightSamplerKind) {
+        if self.scene.integrator.light_choice != kind {
+            self.scene.integrator.light_choice = kind;
+            self.scene.lights.set_kind(kind);
+            set_groups(&mut self.scene, self.lobes);
+            self.delta_lights = self.scene.lights.delta_sampler(kind);
+        }
     }
 
     /// Number of components that BSDFs are in a mixture with the groups of lights: the lobes of those that have most.

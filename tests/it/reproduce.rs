@@ -14,6 +14,8 @@ const FIGURES: [&str; 6] = [
 
 const FAN_FIGURES: [&str; 4] = ["checkers", "statue", "room", "box"];
 
+const PHOTON_FIGURES: [&str; 4] = ["rooms", "ring", "slit", "direct"];
+
 /// Files that the page shows.
 fn sources(html: &str) -> Vec<&str> {
     html.split("src=\"").skip(1).filter_map(|rest| rest.split('"').next()).collect()
@@ -111,6 +113,65 @@ fn the_page_of_control_variates_holds_every_scene_and_method() {
     }
     let shown = sources(&html);
     assert!(shown.len() > 50, "{shown:?}");
+    for file in shown {
+        assert!(page.join(file).is_file(), "{file}");
+    }
+}
+
+/// The scenes of the repository; the rooms with many lights are those with few.
+fn write_photon_scenes(folder: &Path) {
+    let scenes = Path::new(env!("CARGO_MANIFEST_DIR")).join("scenes/keller-wald");
+    for name in ["rooms", "ring", "ring-indirect", "ring-geometry", "slit"] {
+        let file = format!("{name}.pbrt");
+        std::fs::copy(scenes.join(&file), folder.join(&file)).unwrap();
+    }
+    std::fs::copy(scenes.join("rooms.pbrt"), folder.join("rooms-10000.pbrt")).unwrap();
+}
+
+#[test]
+fn the_page_of_photon_maps_holds_every_figure_and_its_maps() {
+    let folder = tempfile::tempdir().unwrap();
+    write_photon_scenes(folder.path());
+    let (page, html, numbers) = reproduced("keller-wald", folder.path());
+
+    let figures = numbers["figures"].as_object().unwrap();
+    assert_eq!(figures.len(), PHOTON_FIGURES.len());
+    for id in PHOTON_FIGURES {
+        assert!(html.contains(&format!("<h2 id=\"{id}\">")), "{id}");
+        assert!(figures[id]["summary"]["reached"].is_boolean(), "{id}");
+    }
+    let maps = |figure: &serde_json::Value| figure["maps"].as_array().unwrap().clone();
+    let count = |map: &serde_json::Value, key: &str| map[key].as_f64().unwrap();
+
+    // Importance brings photons into the room, and not more of them into the map
+    let rooms = maps(&figures["rooms"]["numbers"]);
+    assert_eq!(rooms.len(), 4);
+    for pair in rooms.chunks(2) {
+        assert!(count(&pair[1], "photons_in_room") > 5.0 * count(&pair[0], "photons_in_room"));
+        assert!((count(&pair[1], "photons") / count(&pair[0], "photons") - 1.0).abs() < 0.02);
+    }
+    let slit = maps(&figures["slit"]["numbers"]);
+    assert!(count(&slit[2], "photons_in_room") > count(&slit[0], "photons_in_room"));
+
+    // The global map stays, the caustic map grows
+    for scene in figures["ring"]["numbers"]["scenes"].as_array().unwrap() {
+        let maps = maps(scene);
+        for pair in maps.windows(2) {
+            assert!((count(&pair[1], "global_photons") / count(&pair[0], "global_photons") - 1.0).abs() < 0.02);
+            assert!(count(&pair[1], "caustic_photons") > 2.0 * count(&pair[0], "caustic_photons"));
+        }
+    }
+
+    // Direct light is the same by every method without bias
+    for scene in ["few", "many"] {
+        for m in figures["direct"]["numbers"][scene]["methods"].as_array().unwrap() {
+            assert_eq!(m["invalid_samples"], 0, "{}", m["name"]);
+            let is_same = m["same_mean_p"].as_f64().unwrap() > 1e-6;
+            assert!(is_same || m["biased"] == true, "{}", m["name"]);
+        }
+    }
+    let shown = sources(&html);
+    assert!(shown.len() > 30, "{shown:?}");
     for file in shown {
         assert!(page.join(file).is_file(), "{file}");
     }

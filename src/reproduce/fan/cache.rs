@@ -1,15 +1,15 @@
 //! Irradiance caching: records whose light of sources is computed by `mis` or by `ocv` [Fan et al. 2006, Fig. 4].
 
-use super::super::ReproduceError;
 use super::super::figure::Figure;
 use super::super::measure::{Measured, Stage, View, turns};
 use super::super::method::{Method, Transport};
 use super::super::page::{Block, Shown, Table};
 use super::super::pictures::{Picture, gain, significant};
+use super::super::{ReproduceError, scaled};
+use super::Setup;
 use super::direct::LONG_TURNS;
 use super::report::{Asked, HEADER, method_json, method_row, summary, variances};
 use super::truth::{Errors, Truth};
-use super::{Setup, scaled};
 use crate::estimators::mis::Heuristic;
 use crate::estimators::ocv::Form;
 use serde_json::{Value, json};

@@ -4,11 +4,11 @@ use super::super::calibrate::{calibrate, match_samples};
 use super::super::figure::Figure;
 use super::super::measure::{Measured, Stage, View, turns};
 use super::super::method::Method;
-use super::super::{Observer, ReproduceError};
+use super::super::{Observer, ReproduceError, scaled};
 use super::growth::{Growth, measure as measure_growth};
 use super::roster::{Numbers, Role, methods};
 use super::truth::{Errors, Truth};
-use super::{Setup, report, scaled};
+use super::{Setup, report};
 use crate::scene::Split;
 use std::time::{Duration, Instant};
 

@@ -81,12 +81,6 @@ impl<'a> Setup<'a> {
     }
 }
 
-/// Width and height of a picture of a shape whose longer edge has `size` pixels.
-fn scaled(shape: [u32; 2], size: u32) -> [u32; 2] {
-    let longer = shape[0].max(shape[1]).max(1);
-    shape.map(|s| (s * size / longer).max(1))
-}
-
 /// Renders all figures and writes `index.html` and `fan.json`; the answer is the page.
 pub fn run(options: &Options, observer: Observer<'_>) -> Result<PathBuf, ReproduceError> {
     let budget = Budget::new(TIME[usize::from(options.quick)]);

@@ -5,7 +5,7 @@ use super::super::chart::Chart;
 use super::super::figure::{Figure, Summary, estimate_json, percent, plus_minus};
 use super::super::measure::{Estimate, Measured};
 use super::super::page::{Block, Cell, Shown, Table};
-use super::super::pictures::{HEAT, Picture, Scale, gain, significant};
+use super::super::pictures::{HEAT, Picture, Scale, crop, gain, significant};
 use super::Setup;
 use super::direct::{Case, LONG, Outcome, SHOWN};
 use super::roster::{ROLES, Role, WAYS};
@@ -162,14 +162,6 @@ impl Outcome<'_> {
     fn antialiased_errors(&self) -> Vec<Errors> {
         self.antialiased.iter().map(|m| self.antialiased_truth.errors(m)).collect()
     }
-
-    fn crop_corners(&self) -> [usize; 4] {
-        let [w, h] = self.size.map(|s| s as usize);
-        let [l, t, r, b] = self.case.crop;
-        let at = |f: f64, n: usize| ((f * n as f64) as usize).min(n - 1);
-        let (l, t) = (at(l, w), at(t, h));
-        [l, t, at(r, w).max(l + 1), at(b, h).max(t + 1)]
-    }
 }
 
 /// What a row of the table says beside its result.
@@ -232,10 +224,6 @@ fn growth(o: &Outcome<'_>) -> Block {
 fn pictures(setup: &Setup<'_>, o: &Outcome<'_>) -> Result<Vec<Block>, ReproduceError> {
     let (out, id) = (&setup.options.out, o.case.id);
     let exposure = gain(&o.truth.radiance);
-    let [l, t, r, b] = o.crop_corners();
-    let cropped = |picture: &[[f32; 3]]| -> Vec<[f32; 3]> {
-        (t..b).flat_map(|y| picture[y * o.size[0] as usize + l..y * o.size[0] as usize + r].to_vec()).collect()
-    };
     let errors = o.antialiased_errors();
     let (mut whole, mut crops) = (Vec::new(), Vec::new());
     for (k, role) in SHOWN.iter().enumerate() {
@@ -247,8 +235,8 @@ fn pictures(setup: &Setup<'_>, o: &Outcome<'_>) -> Result<Vec<Block>, ReproduceE
             plus_minus(errors[k].error())
         );
         whole.push(Shown { file, title: role.name().to_owned(), caption });
-        let size = [(r - l) as u32, (b - t) as u32];
-        let file = Picture::tone_mapped(size, &cropped(picture), exposure).write(out, &format!("{id}-crop-{k}"))?;
+        let (size, part) = crop(o.size, picture, o.case.crop);
+        let file = Picture::tone_mapped(size, &part, exposure).write(out, &format!("{id}-crop-{k}"))?;
         crops.push(Shown { file, title: format!("{}, a part", role.name()), caption: String::new() });
     }
     let file =
