@@ -12,6 +12,7 @@ use lumiris::lights::{LightHints, LightId, LightSamplerKind};
 use lumiris::math::hash::{HashStream, pcg4d};
 use lumiris::math::ray::offset_origin;
 use lumiris::math::{Ray, Vec3};
+use lumiris::render::output::settings_metadata;
 use lumiris::render::{RenderSettings, render};
 use lumiris::scene::{AccelKind, EstimatorKind, IntegratorSettings, Proposals, Target, World};
 use std::path::Path;
@@ -129,6 +130,15 @@ fn leaving_lights_out_is_biased_where_a_light_that_is_seen_has_no_photon() {
         assert!(t_test(&biased, red()).p_value < 1e-6 && biased.mean() < red(), "{samples} {biased:?}");
         let whole = pixels(&mut world(contributing(samples, 1), is_some), 60);
         assert!(t_test(&whole, red()).p_value > 1e-4, "{samples} {whole:?}");
+    }
+}
+
+#[test]
+fn a_picture_says_that_lights_were_left_out() {
+    for (rest, is_biased) in [(0, true), (1, false)] {
+        let entries = settings_metadata(&world(contributing(4, rest), is_seen).scene);
+        assert!(entries.contains(&("lumiris:rest_samples".to_owned(), rest.to_string())));
+        assert_eq!(entries.iter().any(|(key, _)| key == "lumiris:biased"), is_biased);
     }
 }
 

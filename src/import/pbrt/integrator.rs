@@ -394,6 +394,24 @@ mod tests {
     }
 
     #[test]
+    fn settings_of_light_by_photons_are_read() {
+        let s = settings("Integrator \"path\" \"string estimator\" \"contributing\" \"integer samples\" 8").unwrap();
+        assert_eq!((s.estimator, s.contributing.rest_samples), (EstimatorKind::Contributing, 1));
+        assert!(s.uses_light_hints() && !s.leaves_lights_out() && s.split() == Split { samples: 8, proposals: 8 });
+        let s =
+            settings("Integrator \"path\" \"string estimator\" \"contributing\" \"integer restsamples\" 0").unwrap();
+        assert!(s.leaves_lights_out());
+        let s = settings("Integrator \"path\" \"string lightsampler\" \"photons\"").unwrap();
+        assert!(s.light_choice == LightSamplerKind::Photons && s.uses_light_hints() && !s.leaves_lights_out());
+        let s = settings("Integrator \"path\" \"string target\" \"visibility\"").unwrap();
+        assert!(s.ris.target == Target::Visibility && !s.uses_light_hints(), "the target is that of ris alone");
+        let s = settings("Integrator \"path\" \"string estimator\" \"ris\" \"string target\" \"visibility\"").unwrap();
+        assert!(s.uses_light_hints());
+        let report = settings("Integrator \"path\" \"integer restsamples\" -1").unwrap_err();
+        assert!(report.contains("restsamples must be from 0 to 4096, not -1"), "{report}");
+    }
+
+    #[test]
     fn wrong_settings_of_resampling_are_errors_that_say_what_is_possible() {
         for (parameter, message) in [
             ("\"string proposals\" \"many\"", "one of auto, optimal"),
