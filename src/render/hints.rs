@@ -11,9 +11,9 @@ const TRAJECTORIES: [u64; 2] = [1 << 17, 1 << 23];
 /// Share of the trajectories that all lights have evenly: a weak light next to a surface matters as a strong one far away does.
 const EVEN_SHARE: f32 = 0.5;
 
-/// Traces photons straight from lights and lets them tell which lights are seen. A scene that no photon arrives in has no hints, and
-/// estimates do without.
-pub(super) fn trace(world: &mut World) {
+/// Traces photons straight from lights, on all threads of the current pool, and lets them tell which lights are seen; with their number.
+/// `None` for a scene that no photon arrives in: estimates do without.
+pub fn light_hints(world: &World) -> Option<(LightHints, usize)> {
     let lights = &world.scene.lights;
     let fitting = (PER_LIGHT * lights.lights.len() as u64).clamp(TRAJECTORIES[0], TRAJECTORIES[1]);
     let trajectories = world.scene.integrator.photons.light_photons.map_or(fitting, u64::from);
@@ -24,10 +24,8 @@ pub(super) fn trace(world: &mut World) {
         floor: EVEN_SHARE,
         ..Tracing::default()
     };
-    let hints = trace_photons(world, &tracing, None, Want::Trajectories(trajectories)).ok().map(|traced| {
-        let primary: Vec<_> =
-            traced.global.iter().filter_map(|photon| Some((photon.p(), photon.n(), photon.light()?))).collect();
-        LightHints::adapted(&primary, lights.scene_radius)
-    });
-    world.scene.lights.set_hints(hints);
+    let traced = trace_photons(world, &tracing, None, Want::Trajectories(trajectories)).ok()?;
+    let primary: Vec<_> =
+        traced.global.iter().filter_map(|photon| Some((photon.p(), photon.n(), photon.light()?))).collect();
+    Some((LightHints::adapted(&primary, lights.scene_radius), primary.len()))
 }

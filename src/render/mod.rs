@@ -6,7 +6,7 @@
 
 pub mod bench;
 pub mod crosscheck;
-mod hints;
+pub mod hints;
 pub mod output;
 pub mod plan;
 

@@ -10,7 +10,8 @@
 //! Times differ from run to run; so the numbers chosen are part of the picture's metadata, and giving them back gives the same
 //! picture to the bit.
 
-use super::{RenderSettings, Run, ThreadError, camera_batches, hints};
+use super::hints::light_hints;
+use super::{RenderSettings, Run, ThreadError, camera_batches};
 use crate::direct::Fits;
 use crate::estimators::ris::choice::{Costs, MomentsEstimate, Variances, clamp_ratio, optimal_ratio};
 use crate::film::PixelBounds;
@@ -49,7 +50,8 @@ pub struct Plan {
 pub fn prepare(world: &mut World, threads: Option<usize>, ratio_map: bool) -> Result<Option<Plan>, ThreadError> {
     let settings = world.scene.integrator;
     if settings.uses_light_hints() && world.scene.lights.hints().is_none() {
-        super::thread_pool(threads)?.install(|| hints::trace(world));
+        let hints = super::thread_pool(threads)?.install(|| light_hints(world));
+        world.scene.lights.set_hints(hints.map(|(hints, _)| hints));
     }
     let is_open = !matches!(settings.ris.proposals, Proposals::Fixed(_));
     if settings.estimator != EstimatorKind::Ris || !is_open && !ratio_map {

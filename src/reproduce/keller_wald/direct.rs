@@ -9,9 +9,8 @@ use super::super::page::{Block, Cell, Shown, Table};
 use super::super::pictures::{HEAT, Picture, Scale, gain, significant};
 use super::super::{Observer, ReproduceError, scaled};
 use super::{SHAPE, Setup};
-use crate::lights::{LightHints, LightId, LightSamplerKind};
-use crate::math::Vec3;
-use crate::photons::{Tracing, Want, trace_photons};
+use crate::lights::LightSamplerKind;
+use crate::render::hints::light_hints;
 use crate::scene::{Split, Strata, Target};
 use serde_json::{Value, json};
 use std::time::{Duration, Instant};
@@ -19,9 +18,6 @@ use std::time::{Duration, Instant};
 /// Shadow rays of an estimate, and camera rays per pixel and turn.
 const SAMPLES: u32 = 4;
 const SPP: u32 = 4;
-/// Photons of each light that tell where it is seen, and fewest of all lights.
-const PER_LIGHT: u64 = 100;
-const LEAST_HINTS: u64 = 200_000;
 /// Edge of the picture on which times are found out, and the least edge.
 const PILOT_SIZE: u32 = 64;
 const LEAST_SIZE: u32 = 16;
@@ -150,7 +146,7 @@ fn measure(setup: &Setup<'_>, file: &str, time: Duration) -> Result<Outcome, Rep
 
     // As many turns as fit
     let named = methods(calibration.split);
-    let hints = tell_lights(setup, &mut stage)?;
+    let hints = tell_lights(setup, &mut stage);
     let list: Vec<Method> = named.iter().map(|n| n.method).collect();
     let most = if setup.options.quick { QUICK_TURNS } else { TURNS[1] };
     let count_turns = ((left(start.elapsed()) / turn(&calibration)) as u32).clamp(TURNS[0], most);
@@ -162,17 +158,12 @@ fn measure(setup: &Setup<'_>, file: &str, time: Duration) -> Result<Outcome, Rep
 
 /// Traces photons that come straight from lights, and lets them say which lights are seen. The answer is their number, and the
 /// time that it took (s).
-fn tell_lights(setup: &Setup<'_>, stage: &mut Stage) -> Result<(u64, f64), ReproduceError> {
+fn tell_lights(setup: &Setup<'_>, stage: &mut Stage) -> (u64, f64) {
     let start = Instant::now();
-    let lights = &stage.world().scene.lights;
-    let tracing = Tracing { seed: 1, max_depth: 0, floor: 1.0, ..Tracing::default() };
-    let want = Want::Trajectories((lights.lights.len() as u64 * PER_LIGHT).max(LEAST_HINTS));
-    let traced = setup.pool.install(|| trace_photons(stage.world(), &tracing, None, want))?;
-    let primary: Vec<(Vec3, Vec3, LightId)> =
-        traced.global.iter().filter_map(|photon| Some((photon.p(), photon.n(), photon.light()?))).collect();
-    let hints = LightHints::adapted(&primary, lights.scene_radius);
-    stage.set_light_hints(Some(hints));
-    Ok((primary.len() as u64, start.elapsed().as_secs_f64()))
+    let hints = setup.pool.install(|| light_hints(stage.world()));
+    let count = hints.as_ref().map_or(0, |(_, count)| *count as u64);
+    stage.set_light_hints(hints.map(|(hints, _)| hints));
+    (count, start.elapsed().as_secs_f64())
 }
 
 fn figure(setup: &Setup<'_>, few: &Outcome, many: &Outcome) -> Result<Figure, ReproduceError> {
