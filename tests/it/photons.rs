@@ -193,7 +193,7 @@ Shape "trianglemesh" "point3 P" [ 0 0 -1  0 2 -1  0 2 1  0 0 1 ] "integer indice
     let [record] = Gatherer::default().records(&world, &[wanted(p, n)])[..] else { panic!("one record") };
     let tracing = |seed| Tracing { seed, max_depth: 1, ..Tracing::default() };
     let search = Search::Radius(0.2);
-    let e = irradiances(12, &Place::flat(p, n), search, |seed| trace(&world, &tracing(seed), 400_000).global);
+    let e = irradiances(12, &Place::flat(p, n), search, |seed| trace(&world, &tracing(seed), 700_000).global);
     let expected = f64::from(record.light.e.g);
     let bound = 4.0 * e[1].standard_error() + 0.02 * expected;
     assert!(bound < 0.08 * expected, "the test can tell");
