@@ -4,6 +4,8 @@ use super::args::{AccelArg, SceneArgs};
 use super::progress;
 use super::settings::{load_world, plan};
 use crate::render::bench::{BenchSettings, RayCase, Report, measure};
+use crate::render::bench_photons::{PhotonReport, measure_photons};
+use crate::scene::World;
 use anyhow::{Context, bail};
 use clap::{Args, ValueEnum};
 use serde_json::json;
@@ -19,6 +21,8 @@ enum Subject {
     T2,
     /// First hits against a bare Embree loop
     Intersect,
+    /// Photon tracing, and maps of photons
+    Photons,
     /// Everything
     All,
 }
@@ -58,11 +62,15 @@ pub fn run(args: &BenchArgs) -> anyhow::Result<ExitCode> {
         packet_width: args.scene.packet_width,
         tile_size: args.scene.tile_size,
     };
+    let photons = if asked(Subject::Photons) { photons(args, &world)? } else { None };
     let report = measure(world, &settings)?;
-    progress::print(&table(&report));
+    if args.subject != Subject::Photons {
+        progress::print(&table(&report));
+    }
     if let Some(path) = &args.json {
         let mut value = serde_json::to_value(&report)?;
         let name = args.scene.scene.display().to_string();
+        value["photons"] = serde_json::to_value(&photons)?;
         value["scene"] = json!(name);
         value["seconds"] = json!({ "load": times.load, "build": times.build });
         value["embree"] = json!(env!("LUMIRIS_EMBREE_VERSION"));
@@ -70,6 +78,21 @@ pub fn run(args: &BenchArgs) -> anyhow::Result<ExitCode> {
             .with_context(|| format!("cannot write {}", path.display()))?;
     }
     Ok(ExitCode::SUCCESS)
+}
+
+/// Measures photons, and prints what was found; a scene without photons has everything else, if that is asked for.
+fn photons(args: &BenchArgs, world: &World) -> anyhow::Result<Option<PhotonReport>> {
+    match measure_photons(world, args.scene.threads.map(|t| t as usize), args.runs) {
+        Ok(report) => {
+            progress::print(&photon_table(&report));
+            Ok(Some(report))
+        }
+        Err(e) if args.subject == Subject::All => {
+            progress::say(&format!("photons: {e}"));
+            Ok(None)
+        }
+        Err(e) => Err(e.into()),
+    }
 }
 
 fn table(report: &Report) -> String {
@@ -93,6 +116,26 @@ fn table(report: &Report) -> String {
         text += &line(case);
     }
     text.trim_end().to_owned()
+}
+
+fn photon_table(report: &PhotonReport) -> String {
+    let mut text = format!("{} trajectories, {} photons, {} rays\n", report.trajectories, report.photons, report.rays);
+    for (threads, seconds) in &report.tracing {
+        let rate = |count: u64| count as f64 * 1e-6 / seconds.max(1e-12);
+        text += &format!(
+            "tracing, {threads} threads: {seconds:.3} s, {:.3} M photons/s, {:.3} M rays/s\n",
+            rate(report.photons),
+            rate(report.rays)
+        );
+    }
+    text += &format!(
+        "map of {} photons: {:.1} bytes each, built in {:.3} s\n",
+        report.stored, report.bytes_per_photon, report.build_seconds
+    );
+    for (name, rate) in &report.queries {
+        text += &format!("{name}: {rate:.0} queries/s on one thread\n");
+    }
+    text
 }
 
 fn line(case: &RayCase) -> String {

@@ -106,7 +106,7 @@ fn parse_bytes(text: &str) -> Result<u64, String> {
         t => (t, 0),
     };
     let bytes = digits.trim().parse::<f64>().map_err(|_| expected())? * f64::from(1_u32 << shift);
-    if bytes >= 1.0 && bytes < 1e18 { Ok(bytes as u64) } else { Err(expected()) }
+    if (1.0..1e18).contains(&bytes) { Ok(bytes as u64) } else { Err(expected()) }
 }
 
 #[cfg(test)]

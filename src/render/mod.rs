@@ -5,6 +5,7 @@
 //! of their index; so neither threads, nor tiles, nor passes change a bit.
 
 pub mod bench;
+pub mod bench_photons;
 pub mod crosscheck;
 pub mod hints;
 pub mod output;

@@ -13,7 +13,7 @@ const FURNACE: &str = r#"
 Camera "perspective" "float fov" [ 60 ]
 Film "rgb" "integer xresolution" [ 8 ] "integer yresolution" [ 8 ]
 PixelFilter "box"
-Integrator "path" "integer maxdepth" [ 64 ]
+Integrator "path" "integer maxdepth" [ 48 ]
 WorldBegin
 AreaLightSource "diffuse" "rgb L" [ 1 1 1 ]
 Material "diffuse" "rgb reflectance" [ 0.5 0.25 0.75 ]
@@ -23,7 +23,7 @@ Shape "sphere" "float radius" [ 2 ]
 
 fn with_photons(scene: &mut Scene, change: impl FnOnce(&mut PhotonMapSettings)) {
     scene.integrator.kind = IntegratorKind::PhotonMap;
-    scene.integrator.photons.photons = 50_000;
+    scene.integrator.photons.photons = 30_000;
     change(&mut scene.integrator.photons);
 }
 

@@ -21,6 +21,8 @@ const RECORD_STRIDE: usize = 4;
 const CHUNK: usize = 1024;
 /// Photons that radii are measured at.
 const PROBES: usize = 512;
+/// Part of the seen places where p(x) may be below 1. With none, a dim corner that is hardly seen makes everything else certain.
+const QUANTILE: f32 = 0.1;
 /// Seeds of passes.
 const PASS_SEED: u32 = 0x70_68_6f_74;
 
@@ -84,8 +86,8 @@ impl MapMaker {
         let importance = match unimportant {
             None => None,
             Some(unimportant) => {
-                // Importons lie where final gathers look, and where light goes from there
-                let settings = ImportanceSettings { seed, unimportant, ..ImportanceSettings::default() };
+                let settings =
+                    ImportanceSettings { seed, unimportant, quantile: QUANTILE, ..ImportanceSettings::default() };
                 Some(trace_importons(world, &settings)?)
             }
         };
