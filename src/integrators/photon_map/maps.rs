@@ -4,6 +4,7 @@
 //! of the global map, from the nearest of them [Christensen 1999]. Progressive: each pass has photons of its own and radii that shrink,
 //! so that the mean over the passes converges while the memory of one map suffices [Knaus and Zwicker 2011].
 
+use super::boundary::{Boundary, Probe};
 use crate::integrators::path::{CameraSample, PathIntegrator};
 use crate::math::hash::pcg4d;
 use crate::math::{Rgb, Vec3};
@@ -11,6 +12,7 @@ use crate::photons::{
     GatherScratch, Importance, ImportanceSettings, Origin, Photon, PhotonError, PhotonMap, Place, Search, Traced,
     Tracing, Unimportant, Want, trace_importons, trace_photons,
 };
+use crate::samplers::{SampleStream, SamplerKind};
 use crate::scene::{Deposition, PhotonMapSettings, World};
 use rayon::prelude::*;
 use std::time::{Duration, Instant};
@@ -23,6 +25,10 @@ const CHUNK: usize = 1024;
 const PROBES: usize = 512;
 /// Part of the seen places where p(x) may be below 1. With none, a dim corner that is hardly seen makes everything else certain.
 const QUANTILE: f32 = 0.1;
+/// Numbers of trials, of which irradiances that were computed beforehand take the mean.
+const TRIES: u32 = 4;
+/// Seed of these trials.
+const RECORD_SEED: u32 = 0x65_64_67_65;
 /// Seeds of passes.
 const PASS_SEED: u32 = 0x70_68_6f_74;
 
@@ -57,6 +63,19 @@ pub struct PhotonMaps {
     pub(super) search: Search,
     pub(super) caustic_search: Search,
     nearest: u32,
+}
+
+/// Irradiance (W/m²) in three parts.
+#[derive(Clone, Copy, Debug, Default)]
+pub(super) struct Answer {
+    /// What was computed beforehand.
+    pub(super) known: Rgb,
+    /// By photons of the global map, and the radius of the kernel.
+    pub(super) global: (Rgb, f32),
+    /// By photons of caustics, and the radius of the kernel.
+    pub(super) caustic: (Rgb, f32),
+    /// How far away the photons are.
+    pub(super) reach: f32,
 }
 
 /// Makes the maps of a picture.
@@ -161,7 +180,7 @@ impl MapMaker {
         let caustic_search = Search::Nearest { count: nearest, max_radius: 2.0 * reach };
         let mut maps = PhotonMaps { global, caustic, records: None, search, caustic_search, nearest };
         if self.settings.gather > 0 {
-            maps.records = Some(PhotonMap::new(maps.irradiances()));
+            maps.records = Some(PhotonMap::new(maps.irradiances(world)));
         }
         maps
     }
@@ -183,20 +202,21 @@ impl PhotonMaps {
         &self.caustic
     }
 
-    /// Irradiance by all photons (W/m²), and the radius within which photons were asked for.
-    pub(super) fn irradiance(&self, at: &Place, scratch: &mut GatherScratch) -> (Rgb, f32) {
+    /// Irradiance by all photons.
+    pub(super) fn irradiance(&self, at: &Place, scratch: &mut GatherScratch) -> Answer {
         if let Some(records) = &self.records {
             // The nearest one: of two, the farther lies on the rim of the kernel and does not count
             let most = Search::Nearest { count: 2, max_radius: self.max_radius() };
             let mut e = None;
             let spacing = records.gather(at, most, scratch, |record, _| e = Some(record.power()));
-            if let Some(e) = e {
+            if let Some(known) = e {
                 // k photons lie in the disk that holds k/4 records
                 let reach = spacing * (self.nearest as f32 / (2 * RECORD_STRIDE) as f32).sqrt();
-                return (e, reach);
+                return Answer { known, reach, ..Answer::default() };
             }
         }
-        self.estimate(at, scratch)
+        let [global, caustic] = self.estimate(at, scratch);
+        Answer { global, caustic, reach: global.1, ..Answer::default() }
     }
 
     fn max_radius(&self) -> f32 {
@@ -207,26 +227,60 @@ impl PhotonMaps {
     }
 
     /// Irradiance from the photons themselves.
-    fn estimate(&self, at: &Place, scratch: &mut GatherScratch) -> (Rgb, f32) {
+    fn estimate(&self, at: &Place, scratch: &mut GatherScratch) -> [(Rgb, f32); 2] {
         let mut e = Rgb::BLACK;
         let radius = self.global.gather(at, self.search, scratch, |photon, weight| e += photon.power() * weight);
-        e += self.caustic.irradiance(at, self.caustic_search, scratch);
+        [(e, radius), self.caustics(at, scratch)]
+    }
+
+    /// Irradiance by the photons of caustics, and the radius of the kernel.
+    pub(super) fn caustics(&self, at: &Place, scratch: &mut GatherScratch) -> (Rgb, f32) {
+        let mut e = Rgb::BLACK;
+        let radius =
+            self.caustic.gather(at, self.caustic_search, scratch, |photon, weight| e += photon.power() * weight);
+        (e, radius)
+    }
+
+    /// Irradiance by photons of the global map that were scattered, and the radius of the kernel.
+    pub(super) fn indirect(&self, at: &Place, scratch: &mut GatherScratch) -> (Rgb, f32) {
+        let mut e = Rgb::BLACK;
+        let radius = self.global.gather(at, self.search, scratch, |photon, weight| {
+            if !photon.is_primary() {
+                e += photon.power() * weight;
+            }
+        });
         (e, radius)
     }
 
     /// Irradiances at every fourth photon, as photons whose power they are.
-    fn irradiances(&self) -> Vec<Photon> {
+    fn irradiances(&self, world: &World) -> Vec<Photon> {
         let chosen: Vec<&Photon> = self.global.photons().iter().step_by(RECORD_STRIDE).collect();
-        let of_chunk = |chunk: &[&Photon]| {
-            let mut scratch = GatherScratch::default();
-            let record = |photon: &&Photon| {
-                let (p, n) = (photon.p(), photon.n());
-                let (e, _) = self.estimate(&Place::flat(p, n), &mut scratch);
-                Photon::new(p, n, n, e, Origin::Diffuse)
-            };
-            chunk.iter().map(record).collect::<Vec<_>>()
+        let of_chunk = |(c, chunk): (usize, &[&Photon])| {
+            let (mut scratch, mut boundary) = (GatherScratch::default(), Boundary::default());
+            let (mut probes, mut parts) = (Vec::new(), Vec::new());
+            for (i, photon) in chunk.iter().enumerate() {
+                let place = Place::flat(photon.p(), photon.n());
+                for (part, (e, radius)) in self.estimate(&place, &mut scratch).into_iter().enumerate() {
+                    if e.is_black() {
+                        continue;
+                    }
+                    parts.push((i, e * (1.0 / TRIES as f32)));
+                    let stream =
+                        SampleStream::new(SamplerKind::Independent, [c as u32, i as u32], part as u32, RECORD_SEED);
+                    probes.extend((0..TRIES).map(|k| Probe { place, radius, time: 0.0, stream: stream.domain(k) }));
+                }
+            }
+            let mut trials = Vec::new();
+            boundary.trials(world, &probes, &mut trials);
+            let mut irradiances = vec![Rgb::BLACK; chunk.len()];
+            for (&(i, e), trials) in parts.iter().zip(trials.chunks(TRIES as usize)) {
+                irradiances[i] += e * trials.iter().sum::<u32>() as f32;
+            }
+            let record =
+                |(photon, &e): (&&Photon, &Rgb)| Photon::new(photon.p(), photon.n(), photon.n(), e, Origin::Diffuse);
+            chunk.iter().zip(&irradiances).map(record).collect::<Vec<_>>()
         };
-        chosen.par_chunks(CHUNK).map(of_chunk).collect::<Vec<_>>().concat()
+        chosen.par_chunks(CHUNK).enumerate().map(of_chunk).collect::<Vec<_>>().concat()
     }
 }
 

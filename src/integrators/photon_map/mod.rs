@@ -12,8 +12,9 @@
 //! Biased by the density estimate, the base below a coat being taken for Lambertian besides; with `progressive` consistent.
 //! Numbers of bounces count from the vertex that asks, whatever mirrors lie before it.
 //!
-//! Reading order: [`maps`], [`guide`]; this file renders.
+//! Reading order: [`maps`], `boundary`, [`guide`]; this file renders.
 
+mod boundary;
 pub mod guide;
 pub mod maps;
 
@@ -28,14 +29,18 @@ use crate::film::PixelSample;
 use crate::materials::SurfaceBsdf;
 use crate::math::ray::offset_origin;
 use crate::math::{Frame, Ray, Rgb, Vec3};
-use crate::photons::{GatherScratch, Photon, Place, Search};
+use crate::photons::{GatherScratch, Place, Search};
 use crate::samplers::SampleStream;
 use crate::scene::{PhotonMapSettings, World};
+use boundary::{Boundary, Probe};
 use guide::Guide;
 use std::f32::consts::FRAC_1_PI;
 
 /// Domain of the final gather below the stream of a vertex.
 const GATHER: u32 = 4;
+/// Domains of the trials of kernels there, one for each side.
+const CAUSTIC: u32 = 5;
+const GLOBAL: u32 = 7;
 /// Photons that choose directions.
 const GUIDES: u32 = 32;
 
@@ -48,6 +53,19 @@ pub struct PhotonMapIntegrator {
     jobs: Vec<Job>,
     samples: Vec<CameraSample>,
     results: Vec<PixelSample>,
+    boundary: Boundary,
+    pending: Vec<Pending>,
+    probes: Vec<Probe>,
+    trials: Vec<u32>,
+}
+
+/// Radiance that waits for the correction of its kernel.
+#[derive(Clone, Copy, Debug)]
+struct Pending {
+    /// Index of the camera sample, or of the ray of a gather.
+    owner: u32,
+    radiance: Rgb,
+    probe: Probe,
 }
 
 /// A place that asks for a final gather.
@@ -90,10 +108,19 @@ impl PhotonMapIntegrator {
         out: &mut Vec<PixelSample>,
     ) {
         self.jobs.clear();
-        let (scratch, jobs) = (&mut self.scratch, &mut self.jobs);
+        self.pending.clear();
         let settings = &world.scene.integrator;
-        let mut lookup = Lookup { maps, settings: &settings.photons, depth: settings.depth(), samples, scratch, jobs };
+        let mut lookup = Lookup {
+            maps,
+            settings: &settings.photons,
+            depth: settings.depth(),
+            samples,
+            scratch: &mut self.scratch,
+            jobs: &mut self.jobs,
+            pending: &mut self.pending,
+        };
         diffuse::trace(&mut self.paths, world, &mut lookup, samples, fits, out);
+        self.correct(world, out);
         self.start_gather(maps, &settings.photons);
         self.finish_gather(world, maps);
         let rays_of_job = self.results.chunks(settings.photons.gather.max(1) as usize);
@@ -102,6 +129,17 @@ impl PhotonMapIntegrator {
                 out[job.sample as usize].radiance += job.beta * ray.radiance;
             }
         }
+    }
+
+    /// Adds what waits, times the numbers of trials of its kernels.
+    fn correct(&mut self, world: &World, out: &mut [PixelSample]) {
+        self.probes.clear();
+        self.probes.extend(self.pending.iter().map(|p| p.probe));
+        self.boundary.trials(world, &self.probes, &mut self.trials);
+        for (pending, &trials) in self.pending.iter().zip(&self.trials) {
+            out[pending.owner as usize].radiance += pending.radiance * trials as f32;
+        }
+        self.pending.clear();
     }
 
     /// The rays of all gathers.
@@ -148,8 +186,10 @@ impl PhotonMapIntegrator {
             let mut near = Vec::new();
             for (path, v) in gather.active.iter().zip(&vertices) {
                 let Some(part) = v.bsdf.lambertian(v.wo) else { continue };
-                let (radiance, reach) = reflected(maps, v, &part, scratch);
+                let first = self.pending.len();
+                let (radiance, reach) = reflected(maps, path, v, &part, (&mut *scratch, &mut self.pending));
                 if v.surface.p.distance(path.ray.o) < reach {
+                    self.pending.truncate(first);
                     near.push((*path, Vertex { bsdf: only_lambertian(v, &part), ..*v }, part));
                 } else {
                     self.results[path.sample as usize].radiance += path.beta * radiance;
@@ -164,8 +204,10 @@ impl PhotonMapIntegrator {
             gather.direct.estimate(world, &at_vertex, &points, &mut Fits::default(), &mut gather.radiance);
             gather.next.clear();
             for (((path, v, part), point), &radiance) in near.iter().zip(&points).zip(&gather.radiance) {
-                let caustic = by_sides(v, part, |place| maps.caustic.irradiance(place, maps.caustic_search, scratch));
-                self.results[path.sample as usize].radiance += path.beta * (radiance + caustic);
+                self.results[path.sample as usize].radiance += path.beta * radiance;
+                for (i, side) in (0..).zip(sides(v, part)) {
+                    wait((path, v, CAUSTIC + i), side, maps.caustics(&side.1, scratch), &mut self.pending);
+                }
                 let before = self.jobs[(path.sample / rays_per_job) as usize].vertex;
                 if before + vertex + 2 < depth {
                     gather.next.extend(path::extend(path, v, point, vertex, settings).map(|(next, _)| next));
@@ -173,6 +215,9 @@ impl PhotonMapIntegrator {
             }
             std::mem::swap(&mut gather.active, &mut gather.next);
         }
+        let mut results = std::mem::take(&mut self.results);
+        self.correct(world, &mut results);
+        self.results = results;
     }
 }
 
@@ -184,6 +229,7 @@ struct Lookup<'a> {
     samples: &'a [CameraSample],
     scratch: &'a mut GatherScratch,
     jobs: &'a mut Vec<Job>,
+    pending: &'a mut Vec<Pending>,
 }
 
 impl Reflected for Lookup<'_> {
@@ -192,16 +238,14 @@ impl Reflected for Lookup<'_> {
             return Some(Rgb::BLACK);
         }
         let (maps, scratch) = (self.maps, &mut *self.scratch);
-        let caustic = by_sides(v, part, |place| maps.caustic.irradiance(place, maps.caustic_search, scratch));
+        for (i, side) in (0..).zip(sides(v, part)) {
+            wait((path, v, CAUSTIC + i), side, maps.caustics(&side.1, scratch), self.pending);
+            if self.settings.gather == 0 {
+                wait((path, v, GLOBAL + i), side, maps.indirect(&side.1, scratch), self.pending);
+            }
+        }
         if self.settings.gather == 0 {
-            let indirect =
-                |photon: &Photon, weight| if photon.is_primary() { Rgb::BLACK } else { photon.power() * weight };
-            let global = by_sides(v, part, |place| {
-                let mut e = Rgb::BLACK;
-                maps.global.gather(place, maps.search, scratch, |photon, weight| e += indirect(photon, weight));
-                e
-            });
-            return Some(caustic + global);
+            return Some(Rgb::BLACK);
         }
         self.jobs.extend(sides(v, part).map(|(albedo, place)| Job {
             sample: path.sample,
@@ -214,7 +258,7 @@ impl Reflected for Lookup<'_> {
             width: path.width,
             spread: self.samples[path.sample as usize].ray.spread,
         }));
-        Some(caustic)
+        Some(Rgb::BLACK)
     }
 
     fn has_sources(&self) -> bool {
@@ -230,19 +274,36 @@ fn sides(v: &Vertex<'_>, part: &Lambertian<'_>) -> impl Iterator<Item = (Rgb, Pl
     both.into_iter().filter(|(albedo, _)| !albedo.is_black())
 }
 
-/// Reflected radiance Σ albedo·E/π.
-fn by_sides(v: &Vertex<'_>, part: &Lambertian<'_>, mut irradiance: impl FnMut(&Place) -> Rgb) -> Rgb {
-    sides(v, part).fold(Rgb::BLACK, |sum, (albedo, place)| sum + albedo * irradiance(&place) * FRAC_1_PI)
+/// Puts light that the side of a vertex reflects on the list of what waits: of irradiance `e`, by a kernel of `radius`.
+fn wait(
+    (path, v, key): (&PathState, &Vertex<'_>, u32),
+    (albedo, place): (Rgb, Place),
+    (e, radius): (Rgb, f32),
+    pending: &mut Vec<Pending>,
+) {
+    if !e.is_black() {
+        let probe = Probe { place, radius, time: path.ray.time, stream: v.stream.domain(key) };
+        pending.push(Pending { owner: path.sample, radiance: path.beta * albedo * e * FRAC_1_PI, probe });
+    }
 }
 
-/// What the Lambertian part of a vertex reflects by all photons, and how far away these are.
-fn reflected(maps: &PhotonMaps, v: &Vertex<'_>, part: &Lambertian<'_>, scratch: &mut GatherScratch) -> (Rgb, f32) {
-    let mut reach = 0.0_f32;
-    let radiance = by_sides(v, part, |place| {
-        let (e, radius) = maps.irradiance(place, scratch);
-        reach = reach.max(radius);
-        e
-    });
+/// What the Lambertian part of a vertex reflects by all photons, as far as it needs no correction, and how far away these are; the rest
+/// waits.
+fn reflected(
+    maps: &PhotonMaps,
+    path: &PathState,
+    v: &Vertex<'_>,
+    part: &Lambertian<'_>,
+    (scratch, pending): (&mut GatherScratch, &mut Vec<Pending>),
+) -> (Rgb, f32) {
+    let (mut radiance, mut reach) = (Rgb::BLACK, 0.0_f32);
+    for (i, (albedo, place)) in (0..).zip(sides(v, part)) {
+        let answer = maps.irradiance(&place, scratch);
+        reach = reach.max(answer.reach);
+        radiance += albedo * answer.known * FRAC_1_PI;
+        wait((path, v, GLOBAL + i), (albedo, place), answer.global, pending);
+        wait((path, v, CAUSTIC + i), (albedo, place), answer.caustic, pending);
+    }
     (radiance, reach)
 }
 

@@ -1,0 +1,106 @@
+//! What a density estimate loses where a surface ends: at edges, in corners, where something stands on it.
+//!
+//! An estimate with kernel K of radius r sees the irradiance times the part p = ∫ K dA of the kernel that lies on the surface. p is not known,
+//! but points of the kernel can be tried: the number of trials up to the first one that lies on the surface is 1/p in the mean. So
+//! times that number the estimate is right on average wherever irradiance and surface are even; where the kernel lies on the surface
+//! as a whole the number is 1, and no noise is added.
+//!
+//! A point lies on the surface if the way to it along the surface is free, and a short ray down from there meets a surface of nearly the same normal.
+//! Points are drawn with the density of Epanechnikov's kernel, whose radii have the distribution F(s) = 2s² − s⁴, s = d/r.
+
+use crate::accel::{Coherence, Hit, RayBatch};
+use crate::math::{Frame, Ray, Vec3};
+use crate::photons::Place;
+use crate::samplers::SampleStream;
+use crate::scene::World;
+use std::f32::consts::TAU;
+
+/// Most trials; where so little of the surface is left, a bias remains.
+const MOST: u32 = 32;
+/// Least cosine between the normals of points that belong together, as in photon maps.
+const MIN_NORMAL_COS: f32 = 0.8;
+/// Height of the way above the surface, in radii: photons farther than a quarter from the tangent plane do not count.
+const HEIGHT: f32 = 0.25;
+
+/// A kernel that is tried.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Probe {
+    pub(super) place: Place,
+    /// r.
+    pub(super) radius: f32,
+    pub(super) time: f32,
+    pub(super) stream: SampleStream,
+}
+
+impl Probe {
+    /// Foot of a trial on the tangent plane, and its height.
+    fn point(&self, trial: u32) -> (Vec3, f32) {
+        let [u, v] = self.stream.domain(trial).draw::<2>();
+        let s2 = 1.0 - (1.0 - u).sqrt();
+        let (sin, cos) = (TAU * v).sin_cos();
+        let d = self.radius * s2.sqrt();
+        let height = HEIGHT * self.radius * (1.0 - s2).sqrt().max(0.2);
+        (self.place.p + Frame::from_z(self.place.n).to_world(Vec3::new(d * cos, d * sin, 0.0)), height)
+    }
+}
+
+/// Tries kernels; holds the buffers of one worker.
+#[derive(Debug, Default)]
+pub(super) struct Boundary {
+    rays: RayBatch,
+    blocked: Vec<bool>,
+    hits: Vec<Option<Hit>>,
+    open: Vec<u32>,
+    free: Vec<u32>,
+}
+
+impl Boundary {
+    /// The numbers of trials of some kernels; `out[i]` belongs to `probes[i]`.
+    pub(super) fn trials(&mut self, world: &World, probes: &[Probe], out: &mut Vec<u32>) {
+        out.clear();
+        out.resize(probes.len(), MOST);
+        self.open.clear();
+        self.open.extend(0..probes.len() as u32);
+        for trial in 1..=MOST {
+            if self.open.is_empty() {
+                break;
+            }
+            self.round(world, probes, trial, out);
+        }
+    }
+
+    /// One trial of each that is open.
+    fn round(&mut self, world: &World, probes: &[Probe], trial: u32, out: &mut [u32]) {
+        // The way there
+        self.rays.clear();
+        for &i in &self.open {
+            let probe = &probes[i as usize];
+            let (foot, height) = probe.point(trial);
+            let o = probe.place.p + probe.place.n * height;
+            let d = foot - probe.place.p;
+            self.rays.push(&Ray { o, d, t_max: 1.0, time: probe.time });
+        }
+        world.accel.occluded(&self.rays, Coherence::Incoherent, &mut self.blocked);
+
+        // Down to the surface
+        self.rays.clear();
+        self.free.clear();
+        for (&i, _) in self.open.iter().zip(&self.blocked).filter(|(_, blocked)| !**blocked) {
+            let probe = &probes[i as usize];
+            let (foot, height) = probe.point(trial);
+            let (o, d) = (foot + probe.place.n * height, probe.place.n * (-2.0 * height));
+            self.rays.push(&Ray { o, d, t_max: 1.0, time: probe.time });
+            self.free.push(i);
+        }
+        world.accel.intersect(&self.rays, Coherence::Incoherent, &mut self.hits);
+        for (&i, hit) in self.free.iter().zip(&self.hits) {
+            let Some(h) = hit else { continue };
+            let probe = &probes[i as usize];
+            let n = world.scene.geometry.surface_hit(h.geometry, h.primitive, h.instance, h.uv, probe.time).n;
+            if n.dot(probe.place.n).abs() >= MIN_NORMAL_COS {
+                out[i as usize] = trial;
+            }
+        }
+        self.open.retain(|&i| out[i as usize] == MOST);
+    }
+}
