@@ -104,3 +104,57 @@ impl Boundary {
         self.open.retain(|&i| out[i as usize] == MOST);
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::estimators::stats::{Welford, t_test};
+    use crate::import::{LoadOptions, load};
+    use crate::samplers::SamplerKind;
+    use crate::scene::AccelKind;
+
+    /// A square of edge 2 about the origin, its upper side being +z, with a wall on it at x = −0.5.
+    const SQUARE_AND_WALL: &str = r#"
+WorldBegin
+LightSource "point"
+Shape "trianglemesh" "point3 P" [ -1 -1 0  1 -1 0  1 1 0  -1 1 0 ] "integer indices" [ 0 1 2 0 2 3 ]
+Shape "trianglemesh" "point3 P" [ -0.5 -1 0  -0.5 1 0  -0.5 1 1  -0.5 -1 1 ] "integer indices" [ 0 1 2 0 2 3 ]
+"#;
+
+    fn world() -> World {
+        let folder = tempfile::tempdir().unwrap();
+        let path = folder.path().join("scene.pbrt");
+        std::fs::write(&path, SQUARE_AND_WALL).unwrap();
+        let scene = load(&path, &LoadOptions::default()).map_err(|d| d.to_string()).unwrap().scene;
+        World::new(scene, AccelKind::Embree, None).unwrap()
+    }
+
+    fn numbers(world: &World, p: Vec3, radius: f32) -> Welford {
+        let probe = |i| Probe {
+            place: Place::flat(p, Vec3::Z),
+            radius,
+            time: 0.0,
+            stream: SampleStream::new(SamplerKind::Independent, [i, 0], 0, 9),
+        };
+        let probes: Vec<Probe> = (0..20_000).map(probe).collect();
+        let (mut boundary, mut trials) = (Boundary::default(), Vec::new());
+        boundary.trials(world, &probes, &mut trials);
+        let mut numbers = Welford::new();
+        trials.iter().for_each(|&n| numbers.add(f64::from(n)));
+        numbers
+    }
+
+    #[test]
+    fn the_mean_number_of_trials_is_the_reciprocal_of_what_lies_on_the_surface() {
+        // Inside, on an edge, in a corner, on an edge where the kernel also reaches the wall no more, and beside the wall
+        let world = world();
+        let inside = numbers(&world, Vec3::new(0.2, 0.0, 0.0), 0.3);
+        assert_eq!((inside.mean(), inside.variance()), (1.0, 0.0));
+        for (p, reciprocal) in [([1.0, 0.0], 2.0), ([1.0, 1.0], 4.0), ([-0.4999, 0.1], 2.0), ([-0.4999, 1.0], 4.0)] {
+            let numbers = numbers(&world, Vec3::new(p[0], p[1], 0.0), 0.3);
+            // 32 trials are 1 − (1 − 1/4)³² = 0.9999 of what 1/4 takes
+            let near = (numbers.mean() / reciprocal - 1.0).abs() < 1e-3;
+            assert!(near || t_test(&numbers, reciprocal).p_value > 1e-4, "{p:?}: {numbers:?}");
+        }
+    }
+}
