@@ -22,7 +22,7 @@ pub const SIDE_COS: f32 = 0.3;
 pub const SECURE_COUNT: f64 = 16.0;
 /// Least and greatest radius by [`LightHints::adapted`], as shares of the scene's.
 const RADIUS_SHARES: [f32; 2] = [1.0 / 4096.0, 1.0 / 16.0];
-/// What [`LightHints::visibility`] is where no photon of a light came.
+/// What [`Around::visibility`] is where no photon of a light came.
 pub const UNSEEN: f32 = 0.04;
 
 /// Bits of a cube's index along each axis.

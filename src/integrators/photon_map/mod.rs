@@ -12,7 +12,7 @@
 //! Biased by the density estimate, the base below a coat being taken for Lambertian besides; with `progressive` consistent.
 //! Numbers of bounces count from the vertex that asks, whatever mirrors lie before it.
 //!
-//! Reading order: [`maps`], `boundary`, [`guide`]; this file renders.
+//! Reading order: [`maps`], `boundary`, [`mod@guide`]; this file renders.
 
 mod boundary;
 pub mod guide;
