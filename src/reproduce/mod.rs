@@ -15,7 +15,8 @@ pub mod page;
 pub mod pictures;
 pub mod talbot;
 
-use std::path::PathBuf;
+use crate::procedural::files::ProceduralError;
+use std::path::{Path, PathBuf};
 use std::sync::atomic::AtomicBool;
 use std::time::{Duration, Instant};
 
@@ -65,7 +66,7 @@ pub enum ReproduceError {
     },
     /// A scene could not be made.
     #[error(transparent)]
-    Procedural(#[from] crate::procedural::files::ProceduralError),
+    Procedural(#[from] ProceduralError),
     /// A ray tracer could not be built.
     #[error("cannot build a ray tracer: {0}")]
     Accel(#[from] crate::accel::embree::EmbreeError),
@@ -112,12 +113,14 @@ pub(crate) fn make_folder(path: &std::path::Path) -> Result<(), ReproduceError> 
 pub struct Budget {
     start: Instant,
     total: Duration,
+    /// Weights of the parts that are still to come; those of all parts add up to 100.
+    left: f64,
 }
 
 impl Budget {
     /// Starts now.
     pub fn new(total: Duration) -> Self {
-        Budget { start: Instant::now(), total }
+        Budget { start: Instant::now(), total, left: 100.0 }
     }
 
     /// Since the start.
@@ -125,8 +128,23 @@ impl Budget {
         self.start.elapsed()
     }
 
-    /// What a part may take whose weight is `weight` among `left` of all that are still to come, itself included.
-    pub fn share(&self, weight: f64, left: f64) -> Duration {
-        self.total.saturating_sub(self.elapsed()).mul_f64((weight / left.max(1e-9)).clamp(0.0, 1.0))
+    /// What the next part may take, whose weight is `weight` of 100: its share of the time that is left.
+    pub fn share(&mut self, weight: f64) -> Duration {
+        let share = (weight / self.left.max(1e-9)).clamp(0.0, 1.0);
+        self.left -= weight;
+        self.total.saturating_sub(self.elapsed()).mul_f64(share)
     }
+}
+
+/// The folder of the scenes: that of the options, or one inside the page's, which `make` fills.
+fn scenes_folder(
+    options: &Options,
+    make: impl FnOnce(&Path) -> Result<(), ProceduralError>,
+) -> Result<PathBuf, ReproduceError> {
+    if let Some(folder) = &options.scenes {
+        return Ok(folder.clone());
+    }
+    let folder = options.out.join("scenes");
+    make(&folder)?;
+    Ok(folder)
 }

@@ -11,7 +11,7 @@ mod roster;
 mod truth;
 
 use super::figure::{Study, write};
-use super::{Budget, Observer, Options, ReproduceError, make_folder};
+use super::{Budget, Observer, Options, ReproduceError, make_folder, scenes_folder};
 use crate::procedural::fan::write_scenes;
 use crate::procedural::statue::StatueOptions;
 use direct::Case;
@@ -69,34 +69,22 @@ impl<'a> Setup<'a> {
     /// Makes the scenes inside the folder of the page, unless the options name others.
     fn new(options: &'a Options, observer: Observer<'a>) -> Result<Self, ReproduceError> {
         let quick = usize::from(options.quick);
-        let scenes = match &options.scenes {
-            Some(folder) => folder.clone(),
-            None => {
-                let folder = options.out.join("scenes");
-                write_scenes(&folder, &StatueOptions { detail: DETAIL[quick], ..StatueOptions::default() })?;
-                folder
-            }
-        };
+        let statue = StatueOptions { detail: DETAIL[quick], ..StatueOptions::default() };
+        let scenes = scenes_folder(options, |folder| write_scenes(folder, &statue).map(|_| ()))?;
         Ok(Setup { options, observer, scenes, size: options.size.unwrap_or(SIZE[quick]) })
     }
 }
 
 /// Renders all figures and writes `index.html` and `fan.json`; the answer is the page.
 pub fn run(options: &Options, observer: Observer<'_>) -> Result<PathBuf, ReproduceError> {
-    let budget = Budget::new(TIME[usize::from(options.quick)]);
+    let mut budget = Budget::new(TIME[usize::from(options.quick)]);
     make_folder(&options.out)?;
     let setup = Setup::new(options, observer)?;
-    let mut left = 100.0;
-    let mut share = |weight: f64| {
-        let time = budget.share(weight, left);
-        left -= weight;
-        time
-    };
     let figures = [
-        direct::run(&setup, &Case::CHECKERS, share(32.0))?,
-        direct::run(&setup, &Case::STATUE, share(32.0))?,
-        direct::run(&setup, &Case::ROOM, share(20.0))?,
-        cache::run(&setup, share(16.0))?,
+        direct::run(&setup, &Case::CHECKERS, budget.share(32.0))?,
+        direct::run(&setup, &Case::STATUE, budget.share(32.0))?,
+        direct::run(&setup, &Case::ROOM, budget.share(20.0))?,
+        cache::run(&setup, budget.share(16.0))?,
     ];
     write(&STUDY, options, &figures, budget.elapsed())
 }

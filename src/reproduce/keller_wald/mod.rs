@@ -13,7 +13,7 @@ mod seen;
 mod slit;
 
 use super::figure::{Study, write};
-use super::{Budget, Observer, Options, ReproduceError, make_folder};
+use super::{Budget, Observer, Options, ReproduceError, make_folder, scenes_folder};
 use crate::procedural::keller_wald::write_scenes;
 use crate::render::{RenderError, thread_pool};
 use std::path::PathBuf;
@@ -65,14 +65,7 @@ struct Setup<'a> {
 impl<'a> Setup<'a> {
     /// Makes the scenes inside the folder of the page, unless the options name others.
     fn new(options: &'a Options, observer: Observer<'a>) -> Result<Self, ReproduceError> {
-        let scenes = match &options.scenes {
-            Some(folder) => folder.clone(),
-            None => {
-                let folder = options.out.join("scenes");
-                write_scenes(&folder)?;
-                folder
-            }
-        };
+        let scenes = scenes_folder(options, write_scenes)?;
         let size = options.size.unwrap_or(SIZE[usize::from(options.quick)]);
         Ok(Setup { options, observer, scenes, size, pool: thread_pool(options.threads).map_err(RenderError::from)? })
     }
@@ -80,20 +73,14 @@ impl<'a> Setup<'a> {
 
 /// Renders all figures and writes `index.html` and `keller-wald.json`; the answer is the page.
 pub fn run(options: &Options, observer: Observer<'_>) -> Result<PathBuf, ReproduceError> {
-    let budget = Budget::new(TIME[usize::from(options.quick)]);
+    let mut budget = Budget::new(TIME[usize::from(options.quick)]);
     make_folder(&options.out)?;
     let setup = Setup::new(options, observer)?;
-    let mut left = 100.0;
-    let mut share = |weight: f64| {
-        let time = budget.share(weight, left);
-        left -= weight;
-        time
-    };
     let figures = [
-        rooms::run(&setup, share(30.0))?,
-        ring::run(&setup, share(15.0))?,
-        slit::run(&setup, share(20.0))?,
-        direct::run(&setup, share(35.0))?,
+        rooms::run(&setup, budget.share(30.0))?,
+        ring::run(&setup, budget.share(15.0))?,
+        slit::run(&setup, budget.share(20.0))?,
+        direct::run(&setup, budget.share(35.0))?,
     ];
     write(&STUDY, options, &figures, budget.elapsed())
 }

@@ -58,22 +58,16 @@ fn portrait(size: u32) -> [u32; 2] {
 /// Renders all figures and writes `index.html` and `talbot.json`; the answer is the page.
 pub fn run(options: &Options, observer: Observer<'_>) -> Result<PathBuf, ReproduceError> {
     let quick = usize::from(options.quick);
-    let budget = Budget::new(TIME[quick]);
+    let mut budget = Budget::new(TIME[quick]);
     make_folder(&options.out)?;
     let setup = Setup { options, observer, scenes: Scenes::new(options)?, size: options.size.unwrap_or(SIZE[quick]) };
 
-    let mut left = 100.0;
-    let mut share = |weight: f64| {
-        let time = budget.share(weight, left);
-        left -= weight;
-        time
-    };
     let figures = [
-        comparison::run(&setup, &Case::PAPER_4, share(26.0))?,
-        comparison::run(&setup, &Case::PAPER_4_LIGHTS, share(16.0))?,
-        comparison::run(&setup, &Case::THESIS_53, share(22.0))?,
-        comparison::run(&setup, &Case::THESIS_54, share(16.0))?,
-        ratio::run(&setup, share(18.0))?,
+        comparison::run(&setup, &Case::PAPER_4, budget.share(26.0))?,
+        comparison::run(&setup, &Case::PAPER_4_LIGHTS, budget.share(16.0))?,
+        comparison::run(&setup, &Case::THESIS_53, budget.share(22.0))?,
+        comparison::run(&setup, &Case::THESIS_54, budget.share(16.0))?,
+        ratio::run(&setup, budget.share(18.0))?,
         spheres::run(&setup)?,
     ];
     write(&STUDY, options, &figures, budget.elapsed())

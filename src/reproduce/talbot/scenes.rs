@@ -1,6 +1,6 @@
 //! Where the scenes of the figures are.
 
-use super::super::{Options, ReproduceError};
+use super::super::{Options, ReproduceError, scenes_folder};
 use crate::procedural::statue::StatueOptions;
 use crate::procedural::talbot::{TalbotOptions, write_scenes};
 use std::path::PathBuf;
@@ -28,14 +28,10 @@ pub enum Which {
 impl Scenes {
     /// Makes the scenes inside the folder of the page, unless the options name others.
     pub fn new(options: &Options) -> Result<Self, ReproduceError> {
-        if let Some(folder) = &options.scenes {
-            return Ok(Scenes { folder: folder.clone() });
-        }
-        let folder = options.out.join("scenes");
         let detail = DETAIL[usize::from(options.quick)];
         let statue = StatueOptions { detail, ..StatueOptions::default() };
-        write_scenes(&folder, &TalbotOptions { statue, ..TalbotOptions::default() })?;
-        Ok(Scenes { folder })
+        let all = TalbotOptions { statue, ..TalbotOptions::default() };
+        Ok(Scenes { folder: scenes_folder(options, |folder| write_scenes(folder, &all).map(|_| ()))? })
     }
 
     /// The scene file.
