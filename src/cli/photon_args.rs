@@ -27,8 +27,8 @@ pub struct PhotonArgs {
     #[arg(long, value_name = "SHARE", value_parser = parse_guide)]
     pub gather_guide: Option<f32>,
     /// New photons and smaller radii from sample to sample, so that the picture converges: r² falls with the power ALPHA - 1
-    /// [default: the file's; ALPHA: 0.667]
-    #[arg(long, value_name = "ALPHA", num_args = 0..=1, default_missing_value = "0.6666667", value_parser = parse_alpha)]
+    /// [default: the file's; ALPHA: 0.5]
+    #[arg(long, value_name = "ALPHA", num_args = 0..=1, default_missing_value = "0.5", value_parser = parse_alpha)]
     pub progressive: Option<f32>,
     /// First radius of a progressive map [default: how far the nearest K photons reach where the camera looks]
     #[arg(long, value_name = "METRES", value_parser = parse_radius)]

@@ -27,7 +27,7 @@ use std::time::{Duration, Instant};
 
 /// Trajectories that are traced together.
 pub(super) const BATCH: u64 = 4096;
-/// Batches between two looks at what is stored.
+/// Most batches between two looks at what is stored; there are few at first, since few photons may be wanted.
 const ROUND: u64 = 32;
 /// log₂ of the points of a sequence.
 const SEQUENCE_BITS: u32 = 16;
@@ -230,8 +230,10 @@ impl Run<'_> {
     fn trace(&self, mut limits: Limits, mut look: impl FnMut(&[Batch]) -> Limits) -> Result<Traced, PhotonError> {
         let mut traced = Traced::default();
         let mut last_deposit = 0;
+        let mut batches = 1;
         while traced.trajectories < limits.all {
-            let end = (traced.trajectories + ROUND * BATCH).min(limits.all);
+            let end = (traced.trajectories + batches * BATCH).min(limits.all);
+            batches = (2 * batches).min(ROUND);
             let round = self.round(traced.trajectories..end, limits.global);
             limits = look(&round);
             let counted = |traced: &Traced| if limits.is_open { traced.global.len() as u64 } else { traced.stored() };

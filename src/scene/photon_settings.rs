@@ -104,7 +104,7 @@ pub struct Shrinking {
 
 impl Default for Shrinking {
     fn default() -> Self {
-        Shrinking { alpha: 2.0 / 3.0, radius: None }
+        Shrinking { alpha: 0.5, radius: None }
     }
 }
 

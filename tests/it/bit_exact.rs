@@ -2,10 +2,11 @@
 
 use lumiris::film::Film;
 use lumiris::import::{LoadOptions, load};
+use lumiris::lights::LightSamplerKind;
 use lumiris::render::output::{Aov, channels};
 use lumiris::render::plan::prepare;
 use lumiris::render::{RenderSettings, render};
-use lumiris::scene::{AccelKind, EstimatorKind, Proposals, World};
+use lumiris::scene::{AccelKind, EstimatorKind, Proposals, Target, World};
 use std::path::Path;
 use std::sync::atomic::AtomicBool;
 
@@ -80,6 +81,26 @@ fn what_a_plan_chose_gives_the_same_picture_when_it_is_given() {
             integrator.ris.proposals = Proposals::Fixed(plan.split.proposals);
         }
         assert_same_bits(&reference, &film(&given, RenderSettings::default()), &format!("{proposals:?}"));
+    }
+}
+
+#[test]
+fn pictures_with_photons_that_tell_of_lights_are_the_same_for_any_number_of_threads() {
+    for estimator in [EstimatorKind::Mis, EstimatorKind::Ris, EstimatorKind::Ocv, EstimatorKind::Contributing] {
+        let picture = |threads| {
+            let mut world = gallery(estimator, None);
+            world.scene.integrator.ris.proposals = Proposals::Fixed(16);
+            world.scene.integrator.ris.target = Target::Visibility;
+            world.scene.integrator.photons.light_photons = Some(20_000);
+            world.set_light_choice(LightSamplerKind::Photons);
+            prepare(&mut world, Some(threads), false).unwrap();
+            assert!(world.scene.lights.hints().is_some());
+            film(&world, RenderSettings { threads: Some(threads), ..RenderSettings::default() })
+        };
+        let reference = picture(1);
+        for threads in [2, 3] {
+            assert_same_bits(&reference, &picture(threads), &format!("{estimator:?}, {threads} threads"));
+        }
     }
 }
 
