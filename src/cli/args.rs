@@ -244,7 +244,7 @@ pub struct SceneArgs {
     pub cache_passes: Option<u32>,
     #[command(flatten)]
     pub photons: PhotonArgs,
-    /// Bounces of `path` [default: the file's, or 5]
+    /// Bounces of light, but for `direct` [default: the file's, or 5]
     #[arg(long, value_name = "D", value_parser = clap::value_parser!(u32).range(0..=10_000))]
     pub max_depth: Option<u32>,
     /// Camera samples per pixel [default: the file's, or 16]

@@ -41,7 +41,7 @@ enum Command {
     Info(info::InfoArgs),
     /// Render and measure the figures of a paper again, as a page with pictures
     Reproduce(reproduce::ReproduceArgs),
-    /// Make a statue or a sky to render
+    /// Make a statue, a sky, or the scenes of talbot, fan and keller-wald
     Generate(generate::GenerateArgs),
 }
 

@@ -5,41 +5,52 @@ use clap::Args;
 
 /// Options of `--integrator photon-map`.
 #[derive(Args, Clone, Copy, Debug)]
-#[command(next_help_heading = "Photon maps")]
 pub struct PhotonArgs {
     /// Photons that the global map stores, in each pass if progressive [default: the file's, or 200000]
-    #[arg(long, value_name = "N")]
+    #[arg(long, help_heading = "Photon maps", value_name = "N", value_parser = clap::value_parser!(u32).range(1..))]
     pub photons: Option<u32>,
     /// Share q of the trajectories that fill the global map too; all fill the caustic map [default: the file's, or 0.2]
-    #[arg(long, value_name = "Q", value_parser = parse_ratio)]
+    #[arg(long, help_heading = "Photon maps", value_name = "Q", value_parser = parse_ratio)]
     pub caustic_ratio: Option<f32>,
     /// Store photons by visual importance: none, floor:E (with the probability p(x), at least E), or cut-off:E (biased: none
     /// where p(x) is below E) [default: the file's, or none]
-    #[arg(long, value_name = "WHICH", value_parser = parse_deposition)]
+    #[arg(long, help_heading = "Photon maps", value_name = "WHICH", value_parser = parse_deposition)]
     pub importance: Option<Deposition>,
     /// Photons of an estimate [default: the file's, or 50]
-    #[arg(long, value_name = "K", value_parser = clap::value_parser!(u32).range(2..=100_000))]
+    #[arg(long, help_heading = "Photon maps", value_name = "K", value_parser = clap::value_parser!(u32).range(2..=100_000))]
     pub nearest: Option<u32>,
     /// Rays of the final gather at a diffuse point; 0 shows the global map directly [default: the file's, or 4]
-    #[arg(long, value_name = "G", value_parser = clap::value_parser!(u32).range(0..=4096))]
+    #[arg(long, help_heading = "Photon maps", value_name = "G", value_parser = clap::value_parser!(u32).range(0..=4096))]
     pub gather: Option<u32>,
     /// Share of these rays whose directions photons choose [default: the file's, or 0.5]
-    #[arg(long, value_name = "SHARE", value_parser = parse_guide)]
+    #[arg(long, help_heading = "Photon maps", value_name = "SHARE", value_parser = parse_guide)]
     pub gather_guide: Option<f32>,
     /// New photons and smaller radii from sample to sample, so that the picture converges: r² falls with the power ALPHA - 1
-    /// [default: the file's; ALPHA: 0.5]
-    #[arg(long, value_name = "ALPHA", num_args = 0..=1, default_missing_value = "0.5", value_parser = parse_alpha)]
-    pub progressive: Option<f32>,
+    /// [default: the file's; ALPHA: 0.5]; off for one map where the file asks for sppm
+    #[arg(long, help_heading = "Photon maps", value_name = "ALPHA", num_args = 0..=1, default_missing_value = "0.5", value_parser = parse_alpha)]
+    pub progressive: Option<Progressive>,
     /// First radius of a progressive map [default: how far the nearest K photons reach where the camera looks]
-    #[arg(long, value_name = "METRES", value_parser = parse_radius)]
+    #[arg(long, help_heading = "Photon maps", value_name = "METRES", value_parser = parse_radius)]
     pub photon_radius: Option<f32>,
     /// Photons that tell which lights are seen, for --light-choice photons, --target visibility and --estimator contributing
     /// [default: the file's, or 256 for each light, at least 131072]
-    #[arg(long, value_name = "N", value_parser = clap::value_parser!(u32).range(1..))]
+    #[arg(long, help_heading = "Photon maps", value_name = "N", value_parser = clap::value_parser!(u32).range(1..))]
     pub light_photons: Option<u32>,
+    /// Most trajectories for one map: with importance it can take many to store what was asked for [default: 1073741824]
+    #[arg(long, help_heading = "Photon maps", value_name = "N", value_parser = clap::value_parser!(u64).range(1..))]
+    pub photon_paths: Option<u64>,
     /// Most memory of the maps, such as 800M or 4G [default: 4G]
-    #[arg(long, value_name = "BYTES", value_parser = parse_bytes)]
+    #[arg(long, help_heading = "Photon maps", value_name = "BYTES", value_parser = parse_bytes)]
     pub memory: Option<u64>,
+}
+
+/// `--progressive`
+#[derive(Clone, Copy, Debug)]
+pub enum Progressive {
+    /// One map.
+    Off,
+    /// Radii that shrink with this α.
+    On(f32),
 }
 
 impl PhotonArgs {
@@ -53,9 +64,14 @@ impl PhotonArgs {
         s.deposition = self.importance.unwrap_or(s.deposition);
         s.guide = self.gather_guide.unwrap_or(s.guide);
         s.light_photons = self.light_photons.or(s.light_photons);
+        s.trajectories = self.photon_paths.unwrap_or(s.trajectories);
         s.memory = self.memory.unwrap_or(s.memory);
-        if let Some(alpha) = self.progressive {
-            s.progressive = Some(Shrinking { alpha, ..s.progressive.unwrap_or_default() });
+        match self.progressive {
+            None => {}
+            Some(Progressive::Off) => s.progressive = None,
+            Some(Progressive::On(alpha)) => {
+                s.progressive = Some(Shrinking { alpha, ..s.progressive.unwrap_or_default() });
+            }
         }
         if let (Some(radius), Some(shrinking)) = (self.photon_radius, &mut s.progressive) {
             shrinking.radius = Some(radius);
@@ -74,8 +90,11 @@ fn parse_ratio(text: &str) -> Result<f32, String> {
     parse_within(text, PhotonMapSettings::is_ratio, "a number above 0 and up to 1")
 }
 
-fn parse_alpha(text: &str) -> Result<f32, String> {
-    parse_within(text, Shrinking::is_alpha, "a number above 0 and below 1")
+fn parse_alpha(text: &str) -> Result<Progressive, String> {
+    match text {
+        "off" => Ok(Progressive::Off),
+        _ => parse_within(text, Shrinking::is_alpha, "a number above 0 and below 1, or off").map(Progressive::On),
+    }
 }
 
 fn parse_guide(text: &str) -> Result<f32, String> {

@@ -32,8 +32,17 @@ pub enum PhotonError {
     /// No importon was stored.
     #[error("the camera sees no diffuse surface, not even in mirrors, so that nothing is important to it")]
     CameraSeesNothing,
+    /// The observer ended it.
+    #[error("stopped after {trajectories} trajectories, before the photon maps were done")]
+    Stopped {
+        /// How many were traced.
+        trajectories: u64,
+    },
     /// The maps do not fit.
-    #[error("the photon maps need more than {} MB; {photons} photons were stored", limit / 1_000_000)]
+    #[error(
+        "the photon maps need more than {} kB, which {photons} photons took: ask for fewer photons or allow more memory",
+        limit / 1000
+    )]
     OutOfMemory {
         /// The limit (bytes).
         limit: u64,

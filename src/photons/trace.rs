@@ -23,6 +23,7 @@ use crate::samplers::{SampleStream, SamplerKind};
 use crate::scene::World;
 use rayon::prelude::*;
 use std::ops::Range;
+use std::sync::atomic::{AtomicBool, Ordering};
 use std::time::{Duration, Instant};
 
 /// Trajectories that are traced together.
@@ -43,7 +44,7 @@ pub(super) mod domain {
 
 /// How photons are traced.
 #[derive(Clone, Copy, Debug)]
-pub struct Tracing {
+pub struct Tracing<'a> {
     /// Maps of different seeds are independent.
     pub seed: u32,
     /// Most scatterings of a photon before it is stored; 0 stores photons straight from lights only.
@@ -59,11 +60,13 @@ pub struct Tracing {
     /// Trajectories without a stored photon after which tracing stops with an error: at the beginning, and in a row
     /// while photons of the global map are counted.
     pub most_without_deposit: u64,
+    /// Ends it between two rounds when it becomes true.
+    pub stop: Option<&'a AtomicBool>,
     /// Most memory of the maps (bytes).
     pub memory: Option<u64>,
 }
 
-impl Default for Tracing {
+impl Default for Tracing<'_> {
     fn default() -> Self {
         Tracing {
             seed: 0,
@@ -73,6 +76,7 @@ impl Default for Tracing {
             caustics: CausticRule::default(),
             floor: 0.1,
             most_without_deposit: 1_000_000,
+            stop: None,
             memory: None,
         }
     }
@@ -132,7 +136,7 @@ impl Traced {
 /// estimate of the irradiance that it holds.
 pub fn trace_photons(
     world: &World,
-    tracing: &Tracing,
+    tracing: &Tracing<'_>,
     importance: Option<&Importance>,
     want: Want,
 ) -> Result<Traced, PhotonError> {
@@ -186,7 +190,7 @@ struct Limits {
 
 struct Run<'a> {
     world: &'a World,
-    tracing: &'a Tracing,
+    tracing: &'a Tracing<'a>,
     importance: Option<&'a Importance>,
     shares: LightShares,
 }
@@ -232,6 +236,9 @@ impl Run<'_> {
         let mut last_deposit = 0;
         let mut batches = 1;
         while traced.trajectories < limits.all {
+            if self.tracing.stop.is_some_and(|stop| stop.load(Ordering::Relaxed)) {
+                return Err(PhotonError::Stopped { trajectories: traced.trajectories });
+            }
             let end = (traced.trajectories + batches * BATCH).min(limits.all);
             batches = (2 * batches).min(ROUND);
             let round = self.round(traced.trajectories..end, limits.global);

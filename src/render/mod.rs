@@ -267,7 +267,12 @@ impl<'a> Run<'a> {
                 length = if integrator.photons.progressive.is_some() { 1 } else { length };
                 if self.maps.is_none() || integrator.photons.progressive.is_some() {
                     self.maps = None;
-                    self.maps = Some(maker.make(self.world, first)?);
+                    self.maps = match maker.make(self.world, first) {
+                        Ok(maps) => Some(maps),
+                        // The samples so far are a picture
+                        Err(PhotonError::Stopped { .. }) if first > self.settings.first_sample => break,
+                        Err(e) => return Err(e.into()),
+                    };
                 }
             }
             let samples = first..(first + length).min(end);
@@ -307,13 +312,13 @@ impl<'a> Run<'a> {
     }
 
     /// What makes the photon maps, if the integrator has any.
-    fn map_maker(&self) -> Result<Option<MapMaker>, PhotonError> {
+    fn map_maker(&self) -> Result<Option<MapMaker<'a>>, PhotonError> {
         if self.world.scene.integrator.kind != IntegratorKind::PhotonMap {
             return Ok(None);
         }
         let seed = self.world.scene.sampling.seed;
         let seen = photon_map::maps::seen(self.world, &|pixel, sample| self.camera_sample_of_seed(pixel, sample, seed));
-        MapMaker::new(self.world, &seen).map(Some)
+        MapMaker::new(self.world, &seen, self.stop).map(Some)
     }
 
     /// Samples per pixel of the longest pass.

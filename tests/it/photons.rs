@@ -34,7 +34,7 @@ fn furnace(things: &str) -> String {
     text + "AttributeEnd\n" + things
 }
 
-fn trace(world: &World, tracing: &Tracing, count: u64) -> Traced {
+fn trace(world: &World, tracing: &Tracing<'_>, count: u64) -> Traced {
     trace_photons(world, tracing, None, Want::Trajectories(count)).unwrap()
 }
 
@@ -378,7 +378,7 @@ fn what_cannot_be_traced_is_said() {
     let scene =
         |light: &str, things: &str| world_of(&format!("Camera \"perspective\"\nWorldBegin\n{light}{things}"), |_| ());
     let some = Want::Trajectories(1000);
-    let error = |world: &World, tracing: &Tracing, want| trace_photons(world, tracing, None, want).unwrap_err();
+    let error = |world: &World, tracing: &Tracing<'_>, want| trace_photons(world, tracing, None, want).unwrap_err();
     let tracing = Tracing::default();
     let lamp = "LightSource \"point\" \"point3 from\" [ 0 1 0 ]\n";
 

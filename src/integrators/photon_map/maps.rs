@@ -15,6 +15,7 @@ use crate::photons::{
 use crate::samplers::{SampleStream, SamplerKind};
 use crate::scene::{Deposition, PhotonMapSettings, World};
 use rayon::prelude::*;
+use std::sync::atomic::AtomicBool;
 use std::time::{Duration, Instant};
 
 /// One of so many photons of the global map gets an irradiance.
@@ -80,7 +81,9 @@ pub(super) struct Answer {
 
 /// Makes the maps of a picture.
 #[derive(Debug)]
-pub struct MapMaker {
+pub struct MapMaker<'a> {
+    /// Ends tracing when it becomes true.
+    stop: &'a AtomicBool,
     settings: PhotonMapSettings,
     max_depth: u32,
     seed: u32,
@@ -91,10 +94,10 @@ pub struct MapMaker {
     pub stats: MapStats,
 }
 
-impl MapMaker {
+impl<'a> MapMaker<'a> {
     /// Traces importons, if there are to be any, and finds the first radii of progressive maps: as far as the nearest photons reach
     /// from `seen`, places and normals where the camera looks.
-    pub fn new(world: &World, seen: &[(Vec3, Vec3)]) -> Result<Self, PhotonError> {
+    pub fn new(world: &World, seen: &[(Vec3, Vec3)], stop: &'a AtomicBool) -> Result<Self, PhotonError> {
         let settings = world.scene.integrator.photons;
         let (max_depth, seed) = (world.scene.integrator.max_depth, world.scene.sampling.seed);
         let unimportant = match settings.deposition {
@@ -110,7 +113,8 @@ impl MapMaker {
                 Some(trace_importons(world, &settings)?)
             }
         };
-        let mut maker = MapMaker { settings, max_depth, seed, importance, radii: None, stats: MapStats::default() };
+        let mut maker =
+            MapMaker { stop, settings, max_depth, seed, importance, radii: None, stats: MapStats::default() };
         if let Some(shrinking) = settings.progressive {
             maker.radii = Some(match shrinking.radius {
                 Some(radius) => [radius; 2],
@@ -143,6 +147,7 @@ impl MapMaker {
             max_global_depth: self.max_depth.saturating_sub(1 + u32::from(s.gather > 0)),
             q: s.caustic_ratio,
             memory: Some(s.memory),
+            stop: Some(self.stop),
             ..Tracing::default()
         };
         let want = Want::Stored { global: u64::from(s.photons), most_trajectories: s.trajectories };

@@ -97,7 +97,7 @@ pub fn show(setup: &Setup<'_>, seen: &[Option<Seen>], maps: &[&PhotonMap], count
 pub fn trace(
     setup: &Setup<'_>,
     world: &World,
-    tracing: &Tracing,
+    tracing: &Tracing<'_>,
     importance: Option<&Importance>,
     want: Want,
 ) -> Result<Maps, ReproduceError> {
@@ -111,7 +111,7 @@ pub fn trace(
 pub fn speed(
     setup: &Setup<'_>,
     world: &World,
-    tracing: &Tracing,
+    tracing: &Tracing<'_>,
     importance: Option<&Importance>,
 ) -> Result<[f64; 2], ReproduceError> {
     let start = Instant::now();
