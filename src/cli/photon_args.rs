@@ -22,7 +22,7 @@ pub struct PhotonArgs {
     /// Rays of the final gather at a diffuse point; 0 shows the global map directly [default: the file's, or 4]
     #[arg(long, help_heading = "Photon maps", value_name = "G", value_parser = clap::value_parser!(u32).range(0..=4096))]
     pub gather: Option<u32>,
-    /// Share of these rays whose directions photons choose [default: the file's, or 0.5]
+    /// Share of these rays whose directions photons choose [default: the file's, or 0]
     #[arg(long, help_heading = "Photon maps", value_name = "SHARE", value_parser = parse_guide)]
     pub gather_guide: Option<f32>,
     /// New photons and smaller radii from sample to sample, so that the picture converges: r² falls with the power ALPHA - 1

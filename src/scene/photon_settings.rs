@@ -36,7 +36,7 @@ impl Default for PhotonMapSettings {
             deposition: Deposition::All,
             nearest: 50,
             gather: 4,
-            guide: 0.5,
+            guide: 0.0,
             progressive: None,
             light_photons: None,
             memory: 4 << 30,

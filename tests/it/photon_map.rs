@@ -40,7 +40,7 @@ fn a_furnace_has_its_known_radiance() {
         |p| p.gather = 0,
         |p| p.deposition = Deposition::Floor(0.05),
         |p| p.progressive = Some(Shrinking::default()),
-        |p| (p.guide, p.caustic_ratio) = (0.0, 1.0),
+        |p| (p.guide, p.caustic_ratio) = (0.5, 1.0),
     ];
     let significance = sidak(1e-3, forms.len() * 3);
     for (i, form) in forms.into_iter().enumerate() {

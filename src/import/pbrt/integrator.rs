@@ -328,7 +328,7 @@ mod tests {
     fn settings_of_photon_maps_are_read() {
         let s = settings(
             "Integrator \"photon-map\" \"integer photons\" 1000000 \"float causticratio\" 0.5 \"string importance\" \"floor\"
-             \"float leastimportance\" 0.25 \"integer nearest\" 80 \"integer gather\" 0 \"float gatherguide\" 0 \"integer lightphotons\" 9000",
+             \"float leastimportance\" 0.25 \"integer nearest\" 80 \"integer gather\" 0 \"float gatherguide\" 0.5 \"integer lightphotons\" 9000",
         )
         .unwrap();
         let photons = PhotonMapSettings {
@@ -337,7 +337,7 @@ mod tests {
             deposition: Deposition::Floor(0.25),
             nearest: 80,
             gather: 0,
-            guide: 0.0,
+            guide: 0.5,
             light_photons: Some(9000),
             ..Default::default()
         };
