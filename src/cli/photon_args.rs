@@ -33,7 +33,7 @@ pub struct PhotonArgs {
     #[arg(long, help_heading = "Photon maps", value_name = "METRES", value_parser = parse_radius)]
     pub photon_radius: Option<f32>,
     /// Photons that tell which lights are seen, for --light-choice photons, --target visibility and --estimator contributing
-    /// [default: the file's, or 256 for each light, at least 131072]
+    /// [default: the file's, or 512 for each light, at least 262144]
     #[arg(long, help_heading = "Photon maps", value_name = "N", value_parser = clap::value_parser!(u32).range(1..))]
     pub light_photons: Option<u32>,
     /// Most trajectories for one map: with importance it can take many to store what was asked for [default: 1073741824]

@@ -19,7 +19,7 @@ use rayon::prelude::*;
 /// greatest angle between a direction and its nearest axis, and of a margin.
 pub const SIDE_COS: f32 = 0.3;
 /// Mean number of photons of the same light that a photon finds around it by [`LightHints::adapted`].
-pub const SECURE_COUNT: f64 = 16.0;
+pub const SECURE_COUNT: f64 = 64.0;
 /// Least and greatest radius by [`LightHints::adapted`], as shares of the scene's.
 const RADIUS_SHARES: [f32; 2] = [1.0 / 4096.0, 1.0 / 16.0];
 /// What [`Around::visibility`] is where no photon of a light came.

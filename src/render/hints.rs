@@ -6,8 +6,8 @@ use crate::photons::{Tracing, Want, trace_photons};
 use crate::scene::World;
 
 /// Trajectories for each light, and their least and greatest number.
-const PER_LIGHT: u64 = 256;
-const TRAJECTORIES: [u64; 2] = [1 << 17, 1 << 23];
+const PER_LIGHT: u64 = 512;
+const TRAJECTORIES: [u64; 2] = [1 << 18, 1 << 23];
 /// Share of the trajectories that all lights have evenly: a weak light next to a surface matters as a strong one far away does.
 const EVEN_SHARE: f32 = 0.5;
 
