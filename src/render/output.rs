@@ -193,6 +193,7 @@ pub fn settings_metadata(scene: &Scene) -> Vec<(String, String)> {
             ("nearest", p.nearest.to_string()),
             ("gather", p.gather.to_string()),
             ("gather_guide", p.guide.to_string()),
+            ("photon_paths", p.trajectories.to_string()),
         ]);
         if let Some(shrinking) = p.progressive {
             entries.push(("progressive", shrinking.alpha.to_string()));
