@@ -8,11 +8,12 @@
 //! | 1 | [`samplers`], [`imaging`] |
 //! | 2 | [`textures`], [`geometry`], [`bsdfs`], [`cameras`], [`film`] |
 //! | 3 | [`materials`], [`lights`], [`accel`] |
-//! | 4 | [`scene`] |
-//! | 5 | [`import`], [`direct`], [`photons`], [`procedural`] |
-//! | 6 | [`integrators`] |
-//! | 7 | [`render`] |
-//! | 8 | [`cli`], [`compare`], [`reproduce`] |
+//! | 4 | [`settings`] |
+//! | 5 | [`scene`] |
+//! | 6 | [`import`], [`direct`], [`photons`], [`procedural`] |
+//! | 7 | [`integrators`] |
+//! | 8 | [`render`] |
+//! | 9 | [`cli`], [`compare`], [`reproduce`] |
 
 pub mod accel;
 pub mod bsdfs;
@@ -35,5 +36,6 @@ pub mod render;
 pub mod reproduce;
 pub mod samplers;
 pub mod scene;
+pub mod settings;
 pub mod simd;
 pub mod textures;

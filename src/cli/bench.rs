@@ -1,11 +1,11 @@
 //! `lumiris bench`
 
-use super::args::{AccelArg, SceneArgs};
+use super::args::SceneArgs;
 use super::progress;
 use super::settings::{load_world, plan};
 use crate::render::bench::{BenchSettings, RayCase, Report, measure};
 use crate::render::bench_photons::{PhotonReport, measure_photons};
-use crate::scene::World;
+use crate::scene::{AccelKind, World};
 use anyhow::{Context, bail};
 use clap::{Args, ValueEnum};
 use serde_json::json;
@@ -47,7 +47,7 @@ pub struct BenchArgs {
 }
 
 pub fn run(args: &BenchArgs) -> anyhow::Result<ExitCode> {
-    if !matches!(args.scene.accel, AccelArg::Embree) {
+    if args.scene.accel != AccelKind::Embree {
         bail!("bench measures Embree; leave out --accel");
     }
     let (mut world, times) = load_world(&args.scene)?;

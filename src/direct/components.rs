@@ -13,7 +13,8 @@ use crate::estimators::ocv::forms::PAPER_LAMBDA;
 use crate::estimators::ocv::{Form, NormalEquations, Penalty};
 use crate::estimators::optimal_mis;
 use crate::math::Rgb;
-use crate::scene::{EstimatorKind, IntegratorSettings, OptimalForm, Split, World};
+use crate::scene::World;
+use crate::settings::{EstimatorKind, IntegratorSettings, OptimalForm, Split};
 use crate::simd;
 use crate::simd::ocv::{Matrix, System};
 

@@ -29,7 +29,8 @@ use crate::estimators::correlated::{self, SUMS};
 use crate::lights::{LightId, LightSample};
 use crate::math::ray::offset_origin;
 use crate::math::{Ray, Rgb, Vec3};
-use crate::scene::{CorrelatedForm, EmitterHit, IntegratorSettings, SamplingTechnique, World};
+use crate::scene::{EmitterHit, World};
+use crate::settings::{CorrelatedForm, IntegratorSettings, SamplingTechnique};
 use std::f32::consts::FRAC_1_PI;
 use std::time::Instant;
 

@@ -13,7 +13,8 @@ use super::propose::Candidate;
 use crate::estimators::mis::Heuristic;
 use crate::lights::{LightId, LightLanes, LightRun};
 use crate::math::hash::pcg4d;
-use crate::scene::{ProposalPoints, Target, World};
+use crate::scene::World;
+use crate::settings::{ProposalPoints, Target};
 use crate::simd::combine::{self, Weighting};
 use crate::simd::{self, curve};
 

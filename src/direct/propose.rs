@@ -11,7 +11,8 @@ use crate::lights::{LightCtx, LightHit, LightId, LightSample};
 use crate::math::ray::{SEGMENT_END, offset_origin};
 use crate::math::{Ray, Rgb, Vec3};
 use crate::samplers::SampleStream;
-use crate::scene::{EmitterHit, EstimatorKind, IntegratorSettings, World};
+use crate::scene::{EmitterHit, World};
+use crate::settings::{EstimatorKind, IntegratorSettings};
 use std::time::{Duration, Instant};
 
 /// Domains below the stream of a shading point.

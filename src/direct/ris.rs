@@ -20,7 +20,8 @@ use crate::estimators::ris::{Draw, strata, stratified, systematic, with_replacem
 use crate::lights::{LightId, LightSample};
 use crate::math::Rgb;
 use crate::math::hash::{pcg4d, unit_f32};
-use crate::scene::{IntegratorSettings, Strata, World};
+use crate::scene::World;
+use crate::settings::{IntegratorSettings, Strata};
 use std::time::{Duration, Instant};
 
 /// Domains below the stream of a shading point, beside those of [`super::propose`].

@@ -3,7 +3,7 @@
 use super::propose::{Candidates, Drawn};
 use crate::estimators::mc;
 use crate::math::Rgb;
-use crate::scene::{EstimatorKind, IntegratorSettings};
+use crate::settings::{EstimatorKind, IntegratorSettings};
 
 /// `out[i]` becomes the contribution of candidate `i` if its segment is free; zeros need no segment.
 pub fn contributions(settings: &IntegratorSettings, candidates: &Candidates, out: &mut Vec<Rgb>) {

@@ -10,7 +10,8 @@ use crate::direct::{Fits, ShadePoint};
 use crate::film::PixelSample;
 use crate::materials::SurfaceBsdf;
 use crate::math::{Rgb, Vec3};
-use crate::scene::{IntegratorSettings, World};
+use crate::scene::World;
+use crate::settings::IntegratorSettings;
 
 /// Where the light comes from that Lambertian parts reflect.
 pub(super) trait Reflected {

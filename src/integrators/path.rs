@@ -14,7 +14,8 @@ use crate::lights::LightHit;
 use crate::materials::SurfaceBsdf;
 use crate::math::{Ray, Rgb, Vec3};
 use crate::samplers::SampleStream;
-use crate::scene::{Found, IntegratorSettings, Split, World};
+use crate::scene::{Found, World};
+use crate::settings::{IntegratorSettings, Split};
 use std::time::{Duration, Instant};
 
 /// Domains below the stream of a path vertex.

@@ -12,12 +12,14 @@
 use super::{HintedChoice, Light, LightCtx, LightHints, LightId, LightTree};
 use crate::math::{AliasTable, ONE_MINUS_EPSILON};
 use std::sync::Arc;
+use strum::{EnumIter, EnumString, IntoStaticStr, VariantNames};
 
 /// Share of the power sampler that does not follow the power.
 const UNIFORM_SHARE: f64 = 0.05;
 
 /// How a light is chosen.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[derive(Clone, Copy, Debug, PartialEq, Eq, EnumIter, EnumString, IntoStaticStr, VariantNames)]
+#[strum(serialize_all = "kebab-case", const_into_str)]
 pub enum LightSamplerKind {
     /// All lights alike.
     Uniform,
@@ -27,18 +29,6 @@ pub enum LightSamplerKind {
     Tree,
     /// By the same bound, of lights that photons say are seen from around the point.
     Photons,
-}
-
-impl LightSamplerKind {
-    /// The name on the command line and in metadata.
-    pub fn name(self) -> &'static str {
-        match self {
-            LightSamplerKind::Uniform => "uniform",
-            LightSamplerKind::Power => "power",
-            LightSamplerKind::Tree => "tree",
-            LightSamplerKind::Photons => "photons",
-        }
-    }
 }
 
 /// A chosen light.

@@ -17,8 +17,9 @@ use crate::estimators::ris::choice::{Costs, MomentsEstimate, Variances, clamp_ra
 use crate::film::PixelBounds;
 use crate::integrators::PathIntegrator;
 use crate::integrators::path::CameraSample;
-use crate::scene::{
-    EstimatorKind, IntegratorKind, IntegratorSettings, Proposals, Split, SplitMap, StageTimes, Strata, Target, World,
+use crate::scene::{SplitMap, World};
+use crate::settings::{
+    EstimatorKind, IntegratorKind, IntegratorSettings, Proposals, Split, StageTimes, Strata, Target,
 };
 use rayon::prelude::*;
 use std::sync::atomic::AtomicBool;

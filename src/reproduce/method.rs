@@ -4,9 +4,9 @@ use crate::estimators::mis::Heuristic;
 use crate::estimators::ocv::Form;
 use crate::lights::LightSamplerKind;
 use crate::samplers::SamplerKind;
-use crate::scene::{
+use crate::scene::World;
+use crate::settings::{
     Cached, EstimatorKind, IntegratorKind, IntegratorSettings, OptimalForm, ProposalPoints, Proposals, Strata, Target,
-    World,
 };
 
 /// Light that is computed.

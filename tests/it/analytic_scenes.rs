@@ -13,9 +13,10 @@ use lumiris::import::{LoadOptions, load};
 use lumiris::lights::LightSamplerKind;
 use lumiris::render::{RenderSettings, render};
 use lumiris::samplers::SamplerKind;
-use lumiris::scene::{
-    AccelKind, CorrelatedForm, CorrelatedSettings, EstimatorKind, IntegratorKind, OcvSettings, OptimalForm,
-    ProposalPoints, Proposals, SamplingTechnique, Strata, Target, World,
+use lumiris::scene::{AccelKind, World};
+use lumiris::settings::{
+    CorrelatedForm, CorrelatedSettings, EstimatorKind, IntegratorKind, OcvSettings, OptimalForm, ProposalPoints,
+    Proposals, SamplingTechnique, Strata, Target,
 };
 use std::path::{Path, PathBuf};
 use std::sync::atomic::AtomicBool;

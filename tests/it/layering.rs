@@ -9,6 +9,7 @@ const LAYERS: &[&[&str]] = &[
     &["samplers", "imaging"],
     &["textures", "geometry", "bsdfs", "cameras", "film"],
     &["materials", "lights", "accel"],
+    &["settings"],
     &["scene"],
     &["import", "direct", "photons", "procedural"],
     &["integrators"],

@@ -5,7 +5,8 @@ use super::irradiance_cache::{ROOM, rendering, squares, world_of};
 use lumiris::estimators::stats::{Welford, sidak, t_test};
 use lumiris::render::output::{Aov, channels};
 use lumiris::render::{RenderSettings, render};
-use lumiris::scene::{Deposition, IntegratorKind, PhotonMapSettings, Scene, Shrinking, World};
+use lumiris::scene::{Scene, World};
+use lumiris::settings::{Deposition, IntegratorKind, PhotonMapSettings, Shrinking};
 use std::sync::atomic::AtomicBool;
 
 /// The inside of a sphere that emits and reflects: radiance is L/(1 − ρ) everywhere.

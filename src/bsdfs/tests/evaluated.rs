@@ -251,7 +251,7 @@ fn study(model: Model, density: ProposalDensity, l: fn(Vec3) -> Rgb, proposals: 
 #[test]
 fn variance_falls_with_proposals_for_every_model() {
     for (name, model) in models() {
-        for density in ProposalDensity::ALL {
+        for density in ProposalDensity::iter() {
             for (under, l) in [("uniform", (|_| Rgb::WHITE) as fn(Vec3) -> Rgb), ("uneven", light)] {
                 let [one, eight, twenty] = [1, 8, 20].map(|m| study(model, density, l, m));
                 let v = [&one, &eight, &twenty].map(|s| luminance(s.mean_variance()));

@@ -18,7 +18,8 @@ use super::record::{Range, Record};
 use crate::film::{PixelBounds, PixelSample};
 use crate::integrators::path::{self, CameraSample, PathIntegrator, PathStats};
 use crate::math::{Bounds3, Vec3};
-use crate::scene::{Cached, World};
+use crate::scene::World;
+use crate::settings::Cached;
 use rayon::prelude::*;
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::time::{Duration, Instant};
@@ -248,7 +249,7 @@ fn gather(world: &World, wanted: &[Wanted], stats: &mut PathStats) -> Vec<Record
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::scene::IrradianceCacheSettings;
+    use crate::settings::IrradianceCacheSettings;
 
     #[test]
     fn rounds_take_every_pixel_once_for_each_sample() {

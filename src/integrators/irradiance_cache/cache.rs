@@ -4,7 +4,7 @@ use super::gradients::Irradiance;
 use super::octree::Octree;
 use super::record::{Range, Record};
 use crate::math::{Bounds3, Rgb, Vec3};
-use crate::scene::IrradianceCacheSettings;
+use crate::settings::IrradianceCacheSettings;
 
 /// Most records: about 400 MB with the trees.
 pub const MAX_RECORDS: usize = 1 << 20;

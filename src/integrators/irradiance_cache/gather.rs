@@ -22,7 +22,8 @@ use crate::math::hash::pcg4d;
 use crate::math::ray::offset_origin;
 use crate::math::{Frame, Ray, Rgb, Vec3};
 use crate::samplers::SampleStream;
-use crate::scene::{Cached, EmitterHit, IntegratorKind, IntegratorSettings, Split, World};
+use crate::scene::{EmitterHit, World};
+use crate::settings::{Cached, IntegratorKind, IntegratorSettings, Split};
 use std::f32::consts::PI;
 
 /// Records that are computed together.

@@ -29,7 +29,8 @@ use crate::bsdfs::Lambertian;
 use crate::direct::Fits;
 use crate::film::PixelSample;
 use crate::math::Rgb;
-use crate::scene::{Cached, World};
+use crate::scene::World;
+use crate::settings::Cached;
 use std::f32::consts::FRAC_1_PI;
 
 /// How often vertices were served.

@@ -8,7 +8,7 @@
 
 use super::gradients::Irradiance;
 use crate::math::{Rgb, Vec3};
-use crate::scene::IrradianceCacheSettings;
+use crate::settings::IrradianceCacheSettings;
 
 /// How far a point may lie behind the tangent plane that it shares with a record, over a_i: what lies deeper is hidden from light
 /// that the record sees [Ward et al. 1988].

@@ -13,7 +13,8 @@ use crate::photons::{
     Tracing, Unimportant, Want, trace_importons, trace_photons,
 };
 use crate::samplers::{SampleStream, SamplerKind};
-use crate::scene::{Deposition, PhotonMapSettings, World};
+use crate::scene::World;
+use crate::settings::{Deposition, PhotonMapSettings};
 use rayon::prelude::*;
 use std::sync::atomic::AtomicBool;
 use std::time::{Duration, Instant};

@@ -9,7 +9,7 @@ use super::growth::{Growth, measure as measure_growth};
 use super::roster::{Numbers, Role, methods};
 use super::truth::{Errors, Truth};
 use super::{Setup, report};
-use crate::scene::Split;
+use crate::settings::Split;
 use std::time::{Duration, Instant};
 
 /// A row of the paper's table.

@@ -4,7 +4,7 @@
 use super::super::method::Method;
 use crate::estimators::mis::Heuristic;
 use crate::estimators::ocv::Form;
-use crate::scene::{OptimalForm, Split, Strata};
+use crate::settings::{OptimalForm, Split, Strata};
 
 /// Who takes part, in this order with each of the ways to draw samples.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]

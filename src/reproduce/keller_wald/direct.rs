@@ -11,7 +11,7 @@ use super::super::{Observer, ReproduceError, scaled};
 use super::{SHAPE, Setup};
 use crate::lights::LightSamplerKind;
 use crate::render::hints::light_hints;
-use crate::scene::{Split, Strata, Target};
+use crate::settings::{Split, Strata, Target};
 use serde_json::{Value, json};
 use std::time::{Duration, Instant};
 
@@ -330,7 +330,7 @@ fn outcome_json(o: &Outcome) -> Value {
     let base = &o.measured[o.place(Role::All)];
     let method = |(i, m): (usize, &Measured)| {
         json!({
-            "name": o.named[i].name, "estimator": m.method.estimator.name(), "light_choice": m.method.light_choice.name(),
+            "name": o.named[i].name, "estimator": m.method.estimator.into_str(), "light_choice": m.method.light_choice.into_str(),
             "samples": m.method.samples, "proposals": m.method.proposals, "turns": m.turns(),
             "variance": estimate_json(m.variance(None)), "time_ratio": m.time_ratio(base),
             "at_equal_time": estimate_json(o.against(i, Role::All)),

@@ -9,7 +9,7 @@ use super::classes::Classes;
 use super::report;
 use super::scenes::Which;
 use super::{Setup, portrait};
-use crate::scene::{Split, Strata};
+use crate::settings::{Split, Strata};
 use std::time::{Duration, Instant};
 
 /// A figure that compares methods.

@@ -15,7 +15,7 @@ use super::report::method_json;
 use super::scenes::Which;
 use super::{Setup, portrait};
 use crate::estimators::ris::choice::{Costs, Variances, clamp_ratio, optimal_ratio};
-use crate::scene::{Split, StageTimes};
+use crate::settings::{Split, StageTimes};
 use serde_json::json;
 use std::time::{Duration, Instant};
 
