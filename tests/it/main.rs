@@ -9,6 +9,7 @@ mod compare;
 mod crosscheck;
 mod estimators_1d;
 mod evaluated;
+mod image_hashes;
 mod irradiance_cache;
 mod layering;
 mod light_hints;
