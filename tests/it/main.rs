@@ -3,11 +3,7 @@
 
 mod analytic_scenes;
 mod bit_exact;
-mod browser;
-mod cli;
-mod compare;
 mod crosscheck;
-mod estimators_1d;
 mod evaluated;
 mod image_hashes;
 mod irradiance_cache;
@@ -16,4 +12,3 @@ mod light_hints;
 mod mutations;
 mod photon_map;
 mod photons;
-mod reproduce;
