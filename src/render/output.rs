@@ -121,7 +121,7 @@ pub fn metadata(film: &FilmSettings, settings: &Settings) -> Vec<(String, String
 mod tests {
     use super::*;
     use crate::film::{PixelBounds, PixelSample};
-    use crate::math::Rgb;
+    use lumiris_numbers::math::Rgb;
 
     #[test]
     fn channel_count_matches_names_for_every_aov() {

@@ -13,7 +13,6 @@
 use super::hints::light_hints;
 use super::{RenderSettings, Run, ThreadError, camera_batches};
 use crate::direct::Fits;
-use crate::estimators::ris::choice::{Costs, MomentsEstimate, Variances, clamp_ratio, optimal_ratio};
 use crate::film::PixelBounds;
 use crate::integrators::PathIntegrator;
 use crate::integrators::path::CameraSample;
@@ -21,6 +20,7 @@ use crate::scene::{SplitMap, World};
 use crate::settings::{
     EstimatorKind, IntegratorKind, IntegratorSettings, Proposals, Split, StageTimes, Strata, Target,
 };
+use lumiris_numbers::estimators::ris::choice::{Costs, MomentsEstimate, Variances, clamp_ratio, optimal_ratio};
 use rayon::prelude::*;
 use std::sync::atomic::AtomicBool;
 use std::time::Duration;

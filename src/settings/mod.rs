@@ -20,7 +20,7 @@ pub use ris::{ProposalPoints, Proposals, RisSettings, StageTimes, Strata, Target
 pub use table::Setting;
 pub use value::Value;
 
-use crate::samplers::SamplerKind;
+use lumiris_numbers::samplers::SamplerKind;
 
 /// All settings of a picture but its size and filter, which belong to the film.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]

@@ -1,16 +1,16 @@
 //! What stands before `WorldBegin`: the camera; integrator and sampler are in [`super::settings`], film and filter are in
 //! [`super::film`].
 
-use super::directive::Name;
-use super::params::ParamSet;
 use super::settings::{finish_integrator, finish_sampler};
 use super::transform::{Ctm, affine};
 use crate::cameras::{Camera, SphericalMapping, default_screen_window};
 use crate::import::LoadOptions;
-use crate::import::diagnostic::{Diagnostics, did_you_mean};
-use crate::import::source::Span;
 use crate::scene::FilmSettings;
 use crate::settings::Settings;
+use lumiris_formats::diagnostic::{Diagnostics, did_you_mean};
+use lumiris_formats::pbrt::directive::Name;
+use lumiris_formats::pbrt::params::ParamSet;
+use lumiris_formats::source::Span;
 
 /// A directive that is understood when all of them are known: the camera needs the film's size.
 pub(super) struct Pending {
@@ -195,7 +195,7 @@ pub(super) fn positive(p: &ParamSet, key: &'static str, default: f32, d: &mut Di
 
 fn perspective(
     p: &ParamSet,
-    world_from_camera: &crate::math::Affine3A,
+    world_from_camera: &lumiris_numbers::math::Affine3A,
     frame: &CameraFrame,
     d: &mut Diagnostics,
 ) -> Option<Camera> {

@@ -1,12 +1,12 @@
 //! `Integrator` and `Sampler`: the settings of [`crate::settings::table`], and what pbrt calls otherwise.
 
 use super::options::{Pending, unknown};
-use super::params::{ParamSet, ParamType};
-use crate::import::diagnostic::Diagnostics;
-use crate::samplers::SamplerKind;
 use crate::settings::table::{Directive, rows};
 use crate::settings::value::{Integers, Interval, Kind, Value};
 use crate::settings::{IntegratorKind, Setting, Settings, Shrinking};
+use lumiris_formats::diagnostic::Diagnostics;
+use lumiris_formats::pbrt::params::{ParamSet, ParamType};
+use lumiris_numbers::samplers::SamplerKind;
 
 /// Parameters of pbrt's integrators that mean nothing here.
 const IGNORED: [&str; 16] = [
@@ -210,13 +210,13 @@ fn within(key: &'static str, range: &Interval, p: &ParamSet, d: &mut Diagnostics
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::estimators::mis::Heuristic;
     use crate::import::{LoadOptions, load};
     use crate::lights::LightSamplerKind;
     use crate::settings::{
         Cached, CorrelatedForm, Deposition, EstimatorKind, IntegratorSettings, IrradianceCacheSettings,
         PhotonMapSettings, ProposalPoints, Proposals, SamplingTechnique, Split, Strata, Target,
     };
+    use lumiris_numbers::estimators::mis::Heuristic;
 
     fn settings(integrator: &str) -> Result<IntegratorSettings, String> {
         let folder = tempfile::tempdir().unwrap();

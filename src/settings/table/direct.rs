@@ -1,14 +1,14 @@
 //! How direct light is estimated.
 
 use super::{Applies, Group, MOST_SAMPLES, Setting, choice, integer};
-use crate::estimators::mis::Heuristic;
-use crate::estimators::ocv::{Form, MAX_COMPONENTS};
 use crate::settings::EstimatorKind::{Contributing, Correlated, Mis, Ocv, OptimalMis, Ris};
 use crate::settings::value::{Integers, Interval, Kind, Value};
 use crate::settings::{
     CorrelatedForm, EstimatorKind, OptimalForm, ProposalPoints, Proposals, SamplingTechnique, StageTimes, Strata,
     Target,
 };
+use lumiris_numbers::estimators::mis::Heuristic;
+use lumiris_numbers::estimators::ocv::{Form, MAX_COMPONENTS};
 use strum::VariantNames;
 
 /// Samples of an estimate.

@@ -3,9 +3,9 @@
 use super::{Directive, Group, MOST_SAMPLES, MOST_U32, Setting, choice, integer};
 use crate::bsdfs::ProposalDensity;
 use crate::lights::LightSamplerKind;
-use crate::samplers::SamplerKind;
 use crate::settings::IntegratorKind;
 use crate::settings::value::{Integers, Kind, Value};
+use lumiris_numbers::samplers::SamplerKind;
 use strum::VariantNames;
 
 /// Light transport.

@@ -1,0 +1,113 @@
+//! Options that several subcommands share, as typed.
+
+use super::settings_args::SettingsArgs;
+use clap::Args;
+use clap::builder::{PossibleValuesParser, TypedValueParser};
+use lumiris::render::output::Aov;
+use lumiris::scene::AccelKind;
+use std::path::PathBuf;
+use std::str::FromStr;
+use strum::VariantNames;
+
+/// A parser of the names of an enumeration.
+fn named<T>() -> impl TypedValueParser<Value = T>
+where
+    T: VariantNames + FromStr<Err = strum::ParseError> + Clone + Send + Sync + 'static,
+{
+    PossibleValuesParser::new(T::VARIANTS).try_map(|name| name.parse::<T>())
+}
+
+/// What a scene file says and the command line overrides.
+#[derive(Args, Clone, Debug)]
+pub struct SceneArgs {
+    /// Scene file (.pbrt or .pbrt.gz)
+    pub scene: PathBuf,
+    #[command(flatten)]
+    pub settings: SettingsArgs,
+    /// Size of the picture, such as 640x480 [default: the file's]
+    #[arg(long, value_name = "WxH", value_parser = parse_resolution)]
+    pub resolution: Option<[u32; 2]>,
+    /// The part that is rendered, in fractions of the picture [default: the file's]
+    #[arg(long, value_name = "X0,X1,Y0,Y1", value_parser = parse_crop)]
+    pub crop: Option<[f32; 4]>,
+    /// Replace the file's pixel filter by a box of one pixel
+    #[arg(long)]
+    pub box_filter: bool,
+    /// Ray tracer
+    #[arg(long, default_value = "embree", value_parser = named::<AccelKind>())]
+    pub accel: AccelKind,
+    /// Rays per Embree packet; changes speed, not the picture [default: the processor's native width]
+    #[arg(long, value_name = "W", value_parser = parse_packet_width)]
+    pub packet_width: Option<u32>,
+    /// Threads [default: all cores]
+    #[arg(long, value_name = "T", value_parser = clap::value_parser!(u32).range(1..=4096))]
+    pub threads: Option<u32>,
+    /// Edge of a tile in pixels; changes speed, not the picture
+    #[arg(long, value_name = "PIXELS", default_value_t = 16, value_parser = clap::value_parser!(u32).range(1..=4096))]
+    pub tile_size: u32,
+}
+
+/// `lumiris render`
+#[derive(Args, Clone, Debug)]
+pub struct RenderArgs {
+    #[command(flatten)]
+    pub scene: SceneArgs,
+    /// Where to write; may be given several times. EXR holds everything; PNG, JPEG, TIFF and TGA what a display shows
+    /// [default: the name in the file, or SCENE.exr]
+    #[arg(short, long, value_name = "FILE")]
+    pub output: Vec<PathBuf>,
+    /// Stop after the pass in which this many seconds run out
+    #[arg(long, value_name = "SECONDS", value_parser = parse_seconds)]
+    pub time: Option<f64>,
+    /// Channels beside the picture, in EXR [default: all, and ratio with --proposals optimal]
+    #[arg(long, value_name = "LIST", value_delimiter = ',', value_parser = named::<Aov>())]
+    pub aov: Option<Vec<Aov>>,
+    /// Exposure of what a display shows (PNG and its like), in stops
+    #[arg(long, value_name = "STOPS", default_value_t = 0.0, allow_negative_numbers = true)]
+    pub exposure: f32,
+    /// Write seconds and counts of every stage
+    #[arg(long, value_name = "FILE.json")]
+    pub stats: Option<PathBuf>,
+    /// No progress, only warnings and errors
+    #[arg(short, long)]
+    pub quiet: bool,
+}
+
+fn parse_resolution(text: &str) -> Result<[u32; 2], String> {
+    let (w, h) = text.split_once(['x', 'X']).ok_or("expected WIDTHxHEIGHT, such as 640x480")?;
+    let parse = |s: &str| match s.trim().parse::<u32>() {
+        Ok(n @ 1..=65_536) => Ok(n),
+        _ => Err(format!("`{s}` is not a whole number from 1 to 65536")),
+    };
+    Ok([parse(w)?, parse(h)?])
+}
+
+fn parse_crop(text: &str) -> Result<[f32; 4], String> {
+    let values: Vec<f32> = text
+        .split(',')
+        .map(|s| s.trim().parse().map_err(|_| format!("`{s}` is not a number")))
+        .collect::<Result<_, _>>()?;
+    match values[..] {
+        [x0, x1, y0, y1] if 0.0 <= x0 && x0 < x1 && x1 <= 1.0 && 0.0 <= y0 && y0 < y1 && y1 <= 1.0 => {
+            Ok([x0, x1, y0, y1])
+        }
+        [_, _, _, _] => Err("expected 0 <= X0 < X1 <= 1 and 0 <= Y0 < Y1 <= 1".to_owned()),
+        _ => Err("expected four numbers X0,X1,Y0,Y1".to_owned()),
+    }
+}
+
+fn parse_packet_width(text: &str) -> Result<u32, String> {
+    match text {
+        "1" => Ok(1),
+        "4" => Ok(4),
+        "8" => Ok(8),
+        _ => Err("expected 1, 4 or 8".to_owned()),
+    }
+}
+
+fn parse_seconds(text: &str) -> Result<f64, String> {
+    match text.parse::<f64>() {
+        Ok(s) if s > 0.0 && s.is_finite() => Ok(s),
+        _ => Err("expected a positive number of seconds".to_owned()),
+    }
+}
