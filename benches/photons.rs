@@ -8,7 +8,7 @@ use lumiris::photons::{
     GatherScratch, ImportanceSettings, Origin, Photon, PhotonMap, Place, Search, Tracing, Want, trace_importons,
     trace_photons,
 };
-use lumiris::scene::{AccelKind, World};
+use lumiris::scene::AccelKind;
 use lumiris_numbers::math::hash::HashStream;
 use lumiris_numbers::math::{Rgb, Vec3};
 use std::path::Path;
@@ -57,12 +57,12 @@ fn maps() {
 }
 
 fn tracing(path: &Path, trajectories: u64) {
-    let scene = load(path, &LoadOptions::default()).map_err(|d| d.to_string()).unwrap().scene;
-    let world = World::new(scene, AccelKind::Embree, None).unwrap();
+    let loaded = load(path, &LoadOptions::default()).map_err(|d| d.to_string()).unwrap();
+    let job = loaded.job(AccelKind::Embree, None).unwrap();
     for threads in [1, 2] {
         let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build().unwrap();
         pool.install(|| {
-            let traced = trace_photons(&world, &Tracing::default(), None, Want::Trajectories(trajectories)).unwrap();
+            let traced = trace_photons(&job, &Tracing::default(), None, Want::Trajectories(trajectories)).unwrap();
             let seconds = traced.elapsed.as_secs_f64();
             println!(
                 "{} on {threads} threads: {:.0} photons/s, {:.0} trajectories/s, {:.0} rays/s; {} global, {} caustic",
@@ -74,9 +74,9 @@ fn tracing(path: &Path, trajectories: u64) {
                 traced.caustic.len(),
             );
             let start = Instant::now();
-            let importance = trace_importons(&world, &ImportanceSettings::default()).unwrap();
+            let importance = trace_importons(&job, &ImportanceSettings::default()).unwrap();
             println!("  importance: {} importons in {:.2} s", importance.map().len(), start.elapsed().as_secs_f64());
-            let by = trace_photons(&world, &Tracing::default(), Some(&importance), Want::Trajectories(trajectories));
+            let by = trace_photons(&job, &Tracing::default(), Some(&importance), Want::Trajectories(trajectories));
             let by = by.unwrap();
             println!("  with it: {:.0} photons/s, {} stored", by.arrivals_per_second(), by.stored());
         });

@@ -7,7 +7,7 @@ use lumiris::imaging::oiio::{Part, write_image};
 use lumiris::import::{LoadOptions, load};
 use lumiris::render::output::{self, Aov};
 use lumiris::render::{RenderSettings, render};
-use lumiris::scene::{AccelKind, World};
+use lumiris::scene::AccelKind;
 use std::error::Error;
 use std::path::Path;
 use std::sync::atomic::AtomicBool;
@@ -22,11 +22,11 @@ fn main() -> Result<(), Box<dyn Error>> {
     let loaded = load(Path::new(scene), &LoadOptions::default())?;
     println!("{}", loaded.warnings);
 
-    // A world is a scene with its ray tracers: one over everything, one over emitters only.
-    let world = World::new(loaded.scene, AccelKind::Embree, None)?;
+    // Ray tracers, one over everything and one over emitters only, and what the file's settings ask for.
+    let job = loaded.job(AccelKind::Embree, None)?;
 
-    let settings = RenderSettings { spp: world.scene.sampling.spp, ..RenderSettings::default() };
-    let rendering = render(&world, &settings, &AtomicBool::new(false), &|_progress| ())?;
+    let settings = RenderSettings { spp: job.settings().sampling.spp, ..RenderSettings::default() };
+    let rendering = render(&job, &settings, &AtomicBool::new(false), &|_progress| ())?;
 
     let film = &rendering.film;
     let channels = output::channels(film, &[Aov::Variance], None);

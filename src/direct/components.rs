@@ -9,7 +9,7 @@ use super::mixture::Columns;
 use super::propose::{Candidates, Drawn};
 use super::visibility::{Segments, is_traced};
 use crate::accel::RayBatch;
-use crate::scene::World;
+use crate::scene::RenderJob;
 use crate::settings::{EstimatorKind, IntegratorSettings, OptimalForm, Split};
 use lumiris_numbers::estimators::ocv::forms::PAPER_LAMBDA;
 use lumiris_numbers::estimators::ocv::{Form, NormalEquations, Penalty};
@@ -82,12 +82,12 @@ impl Default for Fits {
 }
 
 impl Fits {
-    /// `count` fits without samples for the mixtures of a world; none if its estimates do not use fits.
-    pub fn new(world: &World, settings: &IntegratorSettings, count: usize) -> Self {
+    /// `count` fits without samples for the mixtures of a job; none if its estimates do not use fits.
+    pub fn new(job: &RenderJob, settings: &IntegratorSettings, count: usize) -> Self {
         if !settings.is_progressive() {
             return Fits::default();
         }
-        let equations = NormalEquations::new(world.components());
+        let equations = NormalEquations::new(job.components());
         Fits {
             equations,
             is_optimal: settings.estimator == EstimatorKind::OptimalMis,
@@ -184,7 +184,7 @@ impl Components {
     /// `points[2i]` and `points[2i + 1]`, where the form has halves.
     pub(super) fn resolve(
         &mut self,
-        world: &World,
+        job: &RenderJob,
         settings: &IntegratorSettings,
         points: &[ShadePoint<'_>],
         (candidates, contributions, segments): (&mut Candidates, &[Rgb], &Segments),
@@ -192,8 +192,8 @@ impl Components {
         out: &mut [Rgb],
     ) {
         (self.systems, self.ill_conditioned) = (0, 0);
-        self.find_hidden(world, candidates, contributions, segments);
-        let equations = NormalEquations::new(world.components());
+        self.find_hidden(job, candidates, contributions, segments);
+        let equations = NormalEquations::new(job.components());
         let method = Method::new(settings);
         self.gather(equations, method, candidates, contributions);
 
@@ -243,7 +243,13 @@ impl Components {
     }
 
     /// Finds which samples are free, and takes the density of BSDF sampling from those that an emitter hides.
-    fn find_hidden(&mut self, world: &World, candidates: &mut Candidates, contributions: &[Rgb], segments: &Segments) {
+    fn find_hidden(
+        &mut self,
+        job: &RenderJob,
+        candidates: &mut Candidates,
+        contributions: &[Rgb],
+        segments: &Segments,
+    ) {
         self.is_free.clear();
         self.hidden.clear();
         self.hidden_of.clear();
@@ -251,13 +257,13 @@ impl Components {
         for (i, (c, contribution)) in candidates.records.iter().zip(contributions).enumerate() {
             let is_free = is_traced(contribution) && occluded.next() == Some(&false);
             self.is_free.push(is_free);
-            if !is_free && c.drawn == Drawn::Light && c.p_bsdf > 0.0 && world.emitters_hide() {
+            if !is_free && c.drawn == Drawn::Light && c.p_bsdf > 0.0 && job.world.emitters_hide() {
                 self.hidden.push(&c.segment);
                 self.hidden_of.push(i as u32);
             }
         }
         self.emitter_rays = self.hidden.len() as u64;
-        world.occluded_by_emitters(&self.hidden, &mut self.is_hidden);
+        job.world.occluded_by_emitters(&self.hidden, &mut self.is_hidden);
         for (&i, _) in self.hidden_of.iter().zip(&self.is_hidden).filter(|(_, is_hidden)| **is_hidden) {
             let c = &mut candidates.records[i as usize];
             (c.p_bsdf, c.p_lobe) = (0.0, 0.0);

@@ -17,7 +17,7 @@
 use super::ShadePoint;
 use super::propose::{Candidate, Shares, domain, light_candidate, unshadowed_candidate};
 use crate::lights::{Light, LightCtx, LightId, LightSample, LightSet};
-use crate::scene::World;
+use crate::scene::RenderJob;
 use std::f32::consts::PI;
 
 /// Most lights that are put in order at a point.
@@ -55,12 +55,12 @@ impl Contributing {
     /// Draws the light samples of a point, `rest` of them on lights that no photon came from. Returns how many were drawn.
     pub(super) fn draw(
         &mut self,
-        world: &World,
+        job: &RenderJob,
         (index, point): (u32, &ShadePoint<'_>),
         rest: u32,
         records: &mut Vec<Candidate>,
     ) -> u32 {
-        let lights = &world.scene.lights;
+        let lights = &job.lights;
         let ctx = point.light_ctx();
         let at = At { lights, index, point, ctx };
         self.seen.clear();
@@ -68,7 +68,7 @@ impl Contributing {
 
         let n = point.split.samples;
         if self.seen.is_empty() {
-            draw_by_choice(world, &at, n + rest, records);
+            draw_by_choice(job, &at, n + rest, records);
             return n + rest;
         }
         let drawn = if self.seen.len() <= n as usize {
@@ -166,11 +166,11 @@ impl Contributing {
 }
 
 /// Samples of lights as `mc` draws them.
-fn draw_by_choice(world: &World, at: &At<'_>, n: u32, records: &mut Vec<Candidate>) {
+fn draw_by_choice(job: &RenderJob, at: &At<'_>, n: u32, records: &mut Vec<Candidate>) {
     for i in 0..n {
         let [u_choice, u0, u1] = at.point.stream.split(domain::LIGHT, n, i).draw::<3>();
         let drawn = at.lights.sample(&at.ctx, u_choice, [u0, u1]);
-        let candidate = drawn.and_then(|drawn| light_candidate(world, at.index, at.point, &Shares::fixed(n, 0), drawn));
+        let candidate = drawn.and_then(|drawn| light_candidate(job, at.index, at.point, &Shares::fixed(n, 0), drawn));
         records.extend(candidate);
     }
 }

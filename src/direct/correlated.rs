@@ -26,7 +26,7 @@ use super::propose::{
 use super::visibility::{Segments, is_traced};
 use crate::accel::{Hit, RayBatch};
 use crate::lights::{LightId, LightSample};
-use crate::scene::{EmitterHit, World};
+use crate::scene::{EmitterHit, RenderJob};
 use crate::settings::{CorrelatedForm, IntegratorSettings, SamplingTechnique};
 use lumiris_numbers::estimators::correlated::{self, SUMS};
 use lumiris_numbers::math::ray::offset_origin;
@@ -57,14 +57,14 @@ struct Plan {
 }
 
 impl Plan {
-    fn new(world: &World, settings: &IntegratorSettings, point: &ShadePoint<'_>) -> Self {
+    fn new(job: &RenderJob, settings: &IntegratorSettings, point: &ShadePoint<'_>) -> Self {
         let n = point.split.samples;
         let bsdf = &point.bsdf.bsdf;
         let technique = if bsdf.has_non_specular() { settings.correlated.technique } else { SamplingTechnique::Bsdf };
         let all = Plan { technique, n, draws: n, share: 1.0, delta_draws: 0, n_delta: 0.0, specular_draws: 0 };
         match technique {
             SamplingTechnique::Light => Plan { specular_draws: u32::from(n > 0 && bsdf.has_specular()), ..all },
-            SamplingTechnique::Bsdf if world.delta_lights.is_none() || !bsdf.has_non_specular() || n == 0 => all,
+            SamplingTechnique::Bsdf if job.lights.delta.is_none() || !bsdf.has_non_specular() || n == 0 => all,
             SamplingTechnique::Bsdf if n == 1 => {
                 let is_delta = u32::from(point.stream.domain(domain::TECHNIQUE).draw::<1>()[0] < 0.5);
                 Plan { draws: 1 - is_delta, share: 0.5, delta_draws: is_delta, n_delta: 0.5, ..all }
@@ -101,8 +101,8 @@ struct Estimate {
 }
 
 impl Estimate {
-    fn new(world: &World, settings: &IntegratorSettings, point: &ShadePoint<'_>) -> Self {
-        let plan = Plan::new(world, settings, point);
+    fn new(job: &RenderJob, settings: &IntegratorSettings, point: &ShadePoint<'_>) -> Self {
+        let plan = Plan::new(job, settings, point);
         let is_controlled = match plan.technique {
             SamplingTechnique::Light => true,
             SamplingTechnique::Bsdf => point.bsdf.wide_lobe(point.wo) >= LEAST_WIDE_LOBE,
@@ -110,7 +110,7 @@ impl Estimate {
         let z = point.bsdf.frame.z;
         let n = if z.dot(point.wo) < 0.0 { -z } else { z };
         let integral = if is_controlled && plan.n > 0 {
-            world.irradiances.irradiance(&world.scene.lights, point.p, n) * FRAC_1_PI
+            job.irradiances.irradiance(&job.lights, point.p, n) * FRAC_1_PI
         } else {
             Rgb::BLACK
         };
@@ -159,7 +159,7 @@ impl Correlated {
     /// Draws the samples of all points. Those whose integrand is zero are counted, the others become candidates.
     pub(super) fn propose(
         &mut self,
-        world: &World,
+        job: &RenderJob,
         settings: &IntegratorSettings,
         points: &[ShadePoint<'_>],
         candidates: &mut Candidates,
@@ -168,13 +168,13 @@ impl Correlated {
         self.controls.clear();
         self.pending.clear();
         self.estimates.clear();
-        self.estimates.extend(points.iter().map(|point| Estimate::new(world, settings, point)));
+        self.estimates.extend(points.iter().map(|point| Estimate::new(job, settings, point)));
 
         let start = Instant::now();
         for (index, point) in points.iter().enumerate() {
-            self.draw_delta(world, index, point, candidates);
+            self.draw_delta(job, index, point, candidates);
             if self.estimates[index].plan.technique == SamplingTechnique::Light {
-                self.draw_light(world, index, point, candidates);
+                self.draw_light(job, index, point, candidates);
             }
         }
         candidates.light_time = start.elapsed();
@@ -183,7 +183,7 @@ impl Correlated {
         for (index, point) in points.iter().enumerate() {
             self.draw_bsdf(index, point, candidates);
         }
-        self.follow(world, points, candidates);
+        self.follow(job, points, candidates);
         for (pending, (crossed, found)) in self.pending.iter().zip(self.crossed.iter().zip(&self.found)) {
             let estimate = &mut self.estimates[pending.point as usize];
             let control = if pending.specular {
@@ -204,10 +204,10 @@ impl Correlated {
     }
 
     /// Samples of lights that no ray can hit.
-    fn draw_delta(&mut self, world: &World, index: usize, point: &ShadePoint<'_>, candidates: &mut Candidates) {
+    fn draw_delta(&mut self, job: &RenderJob, index: usize, point: &ShadePoint<'_>, candidates: &mut Candidates) {
         let estimate = &mut self.estimates[index];
         let Plan { delta_draws, n_delta, .. } = estimate.plan;
-        let Some(sampler) = world.delta_lights.as_ref().filter(|_| delta_draws > 0) else { return };
+        let Some(sampler) = job.lights.delta.as_ref().filter(|_| delta_draws > 0) else { return };
         let shares = Shares { light_draws: delta_draws, bsdf_draws: 0, n_light: n_delta, n_bsdf: 0.0 };
         let control = estimate.plan.has_delta_inside().then_some(estimate.without_g());
         let ctx = point.light_ctx();
@@ -217,8 +217,8 @@ impl Correlated {
             let [u_choice, u0, u1] = point.stream.split(domain::DELTA, delta_draws, i).draw::<3>();
             let candidate = sampler
                 .sample(&ctx, u_choice)
-                .and_then(|choice| world.scene.lights.sample_choice(&ctx, choice, [u0, u1]))
-                .and_then(|drawn| light_candidate(world, index as u32, point, &shares, drawn));
+                .and_then(|choice| job.lights.sample_choice(&ctx, choice, [u0, u1]))
+                .and_then(|drawn| light_candidate(job, index as u32, point, &shares, drawn));
             match (candidate, control) {
                 (Some(candidate), control) => {
                     candidates.records.push(candidate);
@@ -231,7 +231,7 @@ impl Correlated {
     }
 
     /// Samples of the combination by light sampling.
-    fn draw_light(&mut self, world: &World, index: usize, point: &ShadePoint<'_>, candidates: &mut Candidates) {
+    fn draw_light(&mut self, job: &RenderJob, index: usize, point: &ShadePoint<'_>, candidates: &mut Candidates) {
         let estimate = &mut self.estimates[index];
         let n = estimate.plan.draws;
         let shares = Shares::fixed(n, 0);
@@ -240,15 +240,15 @@ impl Correlated {
         candidates.light_proposals += u64::from(n);
         for i in 0..n {
             let [u_choice, u0, u1] = point.stream.split(domain::LIGHT, n, i).draw::<3>();
-            let drawn = world.scene.lights.sample(&ctx, u_choice, [u0, u1]);
-            let drawn = drawn.map(|drawn| with_infinite(world, &ctx, drawn));
+            let drawn = job.lights.sample(&ctx, u_choice, [u0, u1]);
+            let drawn = drawn.map(|drawn| with_infinite(job, &ctx, drawn));
             let control = match &drawn {
                 Some((light, s)) if !s.is_delta => {
-                    estimate.control(sampled_l(world, estimate, point.p, *light, s), s.wi, s.pdf)
+                    estimate.control(sampled_l(job, estimate, point.p, *light, s), s.wi, s.pdf)
                 }
                 Some(_) | None => estimate.without_g(),
             };
-            match drawn.and_then(|drawn| light_candidate(world, index as u32, point, &shares, drawn)) {
+            match drawn.and_then(|drawn| light_candidate(job, index as u32, point, &shares, drawn)) {
                 Some(candidate) => {
                     candidates.records.push(candidate);
                     self.controls.push(Some(control));
@@ -293,38 +293,43 @@ impl Correlated {
     }
 
     /// Finds what BSDF samples point at: the first emitter for the integrand, and all of them for g.
-    fn follow(&mut self, world: &World, points: &[ShadePoint<'_>], candidates: &mut Candidates) {
+    fn follow(&mut self, job: &RenderJob, points: &[ShadePoint<'_>], candidates: &mut Candidates) {
         self.found.clear();
         self.crossed.clear();
-        self.crossed.resize(self.pending.len(), world.irradiances.environment());
+        self.crossed.resize(self.pending.len(), job.irradiances.environment());
         self.ray_of.clear();
         self.ray_of.extend(0..self.pending.len() as u32);
-        let lights = &world.scene.lights;
+        let lights = &job.lights;
         // A ray meets a light at most twice
         for crossing in 0..=2 * lights.lights.len() {
             if self.rays.is_empty() {
                 break;
             }
             candidates.emitter_rays += self.rays.len() as u64;
-            world.intersect_emitters(&self.rays, &mut self.hits, &mut self.emitter_hits);
+            job.world.intersect_emitters(&self.rays, &mut self.hits, &mut self.emitter_hits);
             self.next_rays.clear();
             self.next_ray_of.clear();
             for (&i, hit) in self.ray_of.iter().zip(&self.emitter_hits) {
                 let pending = &self.pending[i as usize];
                 let point = &points[pending.point as usize];
                 if crossing == 0 {
-                    self.found.push(bsdf_candidate(world, point, pending, hit.as_ref()));
+                    self.found.push(bsdf_candidate(job, point, pending, hit.as_ref()));
                 }
                 let estimate = &self.estimates[pending.point as usize];
                 let Some(hit) = hit.filter(|_| !pending.specular && estimate.has_g(pending.wi)) else { continue };
-                let surface =
-                    world.scene.geometry.surface_hit(hit.geometry, hit.primitive, Hit::NO_INSTANCE, hit.uv, point.time);
+                let surface = job.world.scene.geometry.surface_hit(
+                    hit.geometry,
+                    hit.primitive,
+                    Hit::NO_INSTANCE,
+                    hit.uv,
+                    point.time,
+                );
                 if let Some(light) = hit.light {
                     let at = (point.p, estimate.n);
-                    self.crossed[i as usize] += world.irradiances.l(lights, light, at, pending.wi, surface.n);
+                    self.crossed[i as usize] += job.irradiances.l(lights, light, at, pending.wi, surface.n);
                 }
                 // Behind a light that nothing can hide there is none that shines here
-                if world.emitters_hide() {
+                if job.world.emitters_hide() {
                     let o = offset_origin(surface.p, surface.p_error, surface.n, pending.wi);
                     self.next_rays.push(&Ray { o, d: pending.wi, t_max: f32::INFINITY, time: point.time });
                     self.next_ray_of.push(i);
@@ -376,13 +381,13 @@ impl Correlated {
 }
 
 /// Σ L̄ of a light sample: that of its light or, at infinity, of all lights in its direction.
-fn sampled_l(world: &World, estimate: &Estimate, p: Vec3, light: LightId, sample: &LightSample) -> Rgb {
-    let lights = &world.scene.lights;
+fn sampled_l(job: &RenderJob, estimate: &Estimate, p: Vec3, light: LightId, sample: &LightSample) -> Rgb {
+    let lights = &job.lights;
     if !estimate.has_g(sample.wi) {
         Rgb::BLACK
     } else if lights.infinite.contains(&light) {
-        world.irradiances.environment()
+        job.irradiances.environment()
     } else {
-        world.irradiances.l(lights, light, (p, estimate.n), sample.wi, sample.n)
+        job.irradiances.l(lights, light, (p, estimate.n), sample.wi, sample.n)
     }
 }

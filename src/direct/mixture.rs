@@ -13,7 +13,7 @@ use super::ShadePoint;
 use super::propose::{Candidate, Shares};
 use crate::bsdfs::MAX_LOBES;
 use crate::lights::groups::MAX_GROUPS;
-use crate::scene::World;
+use crate::scene::RenderJob;
 use lumiris_numbers::estimators::ocv::MAX_COMPONENTS;
 use lumiris_numbers::math::Vec3;
 
@@ -38,8 +38,8 @@ pub struct Mixture {
 
 impl Mixture {
     /// The mixture at a point where groups are chosen with probabilities `pmfs`.
-    pub(super) fn new(world: &World, point: &ShadePoint<'_>, shares: &Shares, pmfs: &[f32; MAX_GROUPS]) -> Self {
-        let lobes = world.lobes();
+    pub(super) fn new(job: &RenderJob, point: &ShadePoint<'_>, shares: &Shares, pmfs: &[f32; MAX_GROUPS]) -> Self {
+        let lobes = job.lobes();
         let mut integrals = [0.0; MAX_COMPONENTS];
         if shares.n_bsdf > 0.0 {
             integrals[0] = if lobes == MAX_LOBES { point.bsdf.first_lobe(point.wo) } else { 1.0 };

@@ -23,7 +23,7 @@ pub mod visibility;
 use crate::accel::RayBatch;
 use crate::lights::LightCtx;
 use crate::materials::SurfaceBsdf;
-use crate::scene::World;
+use crate::scene::RenderJob;
 use crate::settings::{EstimatorKind, IntegratorSettings, Split};
 pub use components::Fits;
 use components::{Components, halves};
@@ -149,7 +149,7 @@ impl DirectStage {
     /// the points' `fits` and add to them.
     pub fn estimate(
         &mut self,
-        world: &World,
+        job: &RenderJob,
         settings: &IntegratorSettings,
         points: &[ShadePoint<'_>],
         fits: &mut Fits,
@@ -162,9 +162,9 @@ impl DirectStage {
         // T1: propose candidates
         let start = Instant::now();
         if settings.estimator == EstimatorKind::Correlated {
-            self.correlated.propose(world, settings, points, &mut self.candidates);
+            self.correlated.propose(job, settings, points, &mut self.candidates);
         } else {
-            self.candidates.propose(world, settings, points);
+            self.candidates.propose(job, settings, points);
         }
         let mut t1 = start.elapsed();
         let mut t1_light = self.candidates.light_time;
@@ -182,7 +182,7 @@ impl DirectStage {
                 select::contributions(settings, &self.candidates, &mut self.contributions);
             }
             EstimatorKind::Ris => {
-                self.resampler.run(world, settings, points, &mut self.candidates, &mut self.contributions);
+                self.resampler.run(job, settings, points, &mut self.candidates, &mut self.contributions);
                 t1 += self.resampler.t1;
                 t1_light += self.resampler.t1;
                 is_visible = settings.ris.target.has_visibility();
@@ -196,7 +196,7 @@ impl DirectStage {
         if is_visible {
             self.segments.set_free();
         } else {
-            self.segments.trace(&*world.accel);
+            self.segments.trace(&*job.world.accel);
             self.stats.segments += self.segments.len() as u64;
         }
         let traced_at = Instant::now();
@@ -206,7 +206,7 @@ impl DirectStage {
         out.resize(count, Rgb::BLACK);
         if settings.estimator.has_components() {
             let traced = (&mut self.candidates, &self.contributions[..], &self.segments);
-            self.components.resolve(world, settings, points, traced, fits, out);
+            self.components.resolve(job, settings, points, traced, fits, out);
             self.stats.solve += traced_at.elapsed();
             self.stats.systems += self.components.systems;
             self.stats.ill_conditioned += self.components.ill_conditioned;

@@ -11,7 +11,7 @@
 use super::ShadePoint;
 use super::propose::Candidate;
 use crate::lights::{LightId, LightLanes, LightRun};
-use crate::scene::World;
+use crate::scene::RenderJob;
 use crate::settings::{ProposalPoints, Target};
 use lumiris_numbers::estimators::mis::Heuristic;
 use lumiris_numbers::math::hash::pcg4d;
@@ -109,7 +109,7 @@ impl Proposals {
     /// distributed over the samples of a pixel.
     pub fn add(
         &mut self,
-        world: &World,
+        job: &RenderJob,
         point: &ShadePoint<'_>,
         techniques: &Techniques,
         (light_draws, positions, phi): (u32, ProposalPoints, f32),
@@ -122,10 +122,10 @@ impl Proposals {
         self.points.push(PointProposals { start, bsdf_start, end });
         if light_draws > 0 {
             self.place(positions, phi, light_draws);
-            self.sample_lights(world, point, start, bsdf_start);
-            self.weigh_lights(world, point, techniques, start, bsdf_start);
+            self.sample_lights(job, point, start, bsdf_start);
+            self.weigh_lights(job, point, techniques, start, bsdf_start);
         }
-        let around = world.scene.lights.around(&point.light_ctx());
+        let around = job.lights.around(&point.light_ctx());
         for (i, c) in (bsdf_start..end).zip(bsdf_samples) {
             let cos = || point.bsdf.cos(c.segment.d.normalize());
             self.p_hat[i] = match techniques.target {
@@ -160,8 +160,8 @@ impl Proposals {
     }
 
     /// Lights at the positions, and directions to them.
-    fn sample_lights(&mut self, world: &World, point: &ShadePoint<'_>, start: usize, end: usize) {
-        let lights = &world.scene.lights;
+    fn sample_lights(&mut self, job: &RenderJob, point: &ShadePoint<'_>, start: usize, end: usize) {
+        let lights = &job.lights;
         let ctx = point.light_ctx();
         lights.sampler.runs(&ctx, &self.positions, &mut self.runs);
         self.p_light[start..end].fill(0.0);
@@ -208,7 +208,7 @@ impl Proposals {
     /// Targets and weights of light samples.
     fn weigh_lights(
         &mut self,
-        world: &World,
+        job: &RenderJob,
         point: &ShadePoint<'_>,
         techniques: &Techniques,
         start: usize,
@@ -229,7 +229,7 @@ impl Proposals {
                 }
             }
         }
-        for run in self.runs.iter().filter(|run| world.scene.lights.lights[run.light as usize].is_delta()) {
+        for run in self.runs.iter().filter(|run| job.lights.lights[run.light as usize].is_delta()) {
             self.p_bsdf[start + run.places[0] as usize..start + run.places[1] as usize].fill(0.0);
         }
         let proposals = combine::Proposals {
@@ -260,7 +260,7 @@ impl Proposals {
                 }
             }
             Target::Visibility => {
-                let around = world.scene.lights.around(&point.light_ctx());
+                let around = job.lights.around(&point.light_ctx());
                 for run in &self.runs {
                     let visibility = around.visibility(run.light);
                     let places = start + run.places[0] as usize..start + run.places[1] as usize;

@@ -6,7 +6,7 @@ use super::mixture::Mixture;
 use crate::accel::{Hit, RayBatch};
 use crate::lights::groups::MAX_GROUPS;
 use crate::lights::{LightCtx, LightHit, LightId, LightSample};
-use crate::scene::{EmitterHit, World};
+use crate::scene::{EmitterHit, RenderJob};
 use crate::settings::{EstimatorKind, IntegratorSettings};
 use lumiris_numbers::estimators::mc;
 use lumiris_numbers::estimators::mis::{Heuristic, Technique};
@@ -194,7 +194,7 @@ impl Candidates {
 
     /// Draws the candidates of all points; for `ris` only those by BSDF sampling, since light samples are many and stay
     /// with [`super::ris`].
-    pub fn propose(&mut self, world: &World, settings: &IntegratorSettings, points: &[ShadePoint<'_>]) {
+    pub fn propose(&mut self, job: &RenderJob, settings: &IntegratorSettings, points: &[ShadePoint<'_>]) {
         self.clear();
         self.pending.clear();
         self.rays.clear();
@@ -212,24 +212,24 @@ impl Candidates {
             if settings.estimator == EstimatorKind::Contributing {
                 if shares.light_draws > 0 {
                     let rest = settings.contributing.rest_samples;
-                    let drawn = self.contributing.draw(world, (index as u32, point), rest, &mut self.records);
+                    let drawn = self.contributing.draw(job, (index as u32, point), rest, &mut self.records);
                     self.proposals = self.proposals + u64::from(drawn) - u64::from(shares.light_draws);
                     self.light_proposals = self.light_proposals + u64::from(drawn) - u64::from(shares.light_draws);
                 }
                 continue;
             }
             if has_components {
-                self.draw_groups(world, index as u32, point, &shares);
+                self.draw_groups(job, index as u32, point, &shares);
                 continue;
             }
             for i in 0..shares.light_draws {
                 let stream = point.stream.split(domain::LIGHT, shares.light_draws, i);
                 let [u_choice, u0, u1] = stream.draw::<3>();
                 let ctx = point.light_ctx();
-                let candidate =
-                    world.scene.lights.sample(&ctx, u_choice, [u0, u1]).and_then(|(light, sample)| {
-                        light_candidate(world, index as u32, point, &shares, (light, sample))
-                    });
+                let candidate = job
+                    .lights
+                    .sample(&ctx, u_choice, [u0, u1])
+                    .and_then(|(light, sample)| light_candidate(job, index as u32, point, &shares, (light, sample)));
                 self.records.extend(candidate);
             }
         }
@@ -246,10 +246,10 @@ impl Candidates {
 
         // The emitters that the BSDF samples point at
         self.emitter_rays = self.rays.len() as u64;
-        world.intersect_emitters(&self.rays, &mut self.hits, &mut self.emitter_hits);
+        job.world.intersect_emitters(&self.rays, &mut self.hits, &mut self.emitter_hits);
         for (pending, hit) in self.pending.iter().zip(&self.emitter_hits) {
             let point = &points[pending.point as usize];
-            let mut candidate = bsdf_candidate(world, point, pending, hit.as_ref());
+            let mut candidate = bsdf_candidate(job, point, pending, hit.as_ref());
             if let Some(mixture) = self.mixtures.get_mut(pending.point as usize) {
                 match &mut candidate {
                     Some(c) if pending.specular => c.p_lobe = if pending.lobe == 0 { c.p_bsdf } else { 0.0 },
@@ -263,12 +263,12 @@ impl Candidates {
 
     /// Draws the light samples of a point for each group of lights by itself: of N samples as many as its probability says,
     /// a fraction decided by one random number for all groups.
-    fn draw_groups(&mut self, world: &World, index: u32, point: &ShadePoint<'_>, shares: &Shares) {
-        let lights = &world.scene.lights;
+    fn draw_groups(&mut self, job: &RenderJob, index: u32, point: &ShadePoint<'_>, shares: &Shares) {
+        let lights = &job.lights;
         let ctx = point.light_ctx();
         let n = shares.light_draws;
         let pmfs = if shares.n_light > 0.0 { lights.groups.pmfs(lights, &ctx) } else { [0.0; MAX_GROUPS] };
-        let mut mixture = Mixture::new(world, point, shares, &pmfs);
+        let mut mixture = Mixture::new(job, point, shares, &pmfs);
 
         // Samples stand at (i + u)/N; those of a group lie between the sums of probabilities
         let [u] = point.stream.domain(domain::GROUPS).draw::<1>();
@@ -283,7 +283,7 @@ impl Candidates {
                 let [u0, u1, u_choice] = stream.draw::<3>();
                 let sample = lights.sample_group(&ctx, (group, pmf), u_choice, [u0, u1]);
                 let candidate = sample.and_then(|(light, sample)| {
-                    let c = light_candidate(world, index, point, shares, (light, sample))?;
+                    let c = light_candidate(job, index, point, shares, (light, sample))?;
                     let p_lobe = mixture.p_lobe(point, sample.wi, c.p_bsdf);
                     Some(Candidate { group: group as u8, p_lobe, ..c })
                 });
@@ -326,11 +326,11 @@ impl Candidates {
 
 /// A sample of a light; of one at infinity, with the radiance of all that overlap it and the density to choose any of them.
 pub(super) fn with_infinite(
-    world: &World,
+    job: &RenderJob,
     ctx: &LightCtx,
     (light, mut sample): (LightId, LightSample),
 ) -> (LightId, LightSample) {
-    let lights = &world.scene.lights;
+    let lights = &job.lights;
     if lights.infinite.len() > 1 && lights.infinite.contains(&light) {
         (sample.li, sample.pdf) = (lights.le(sample.wi), lights.pdf_infinite(ctx, sample.wi));
     }
@@ -339,14 +339,14 @@ pub(super) fn with_infinite(
 
 /// A sample of a light, whose density includes the choice; `None` if its integrand is zero.
 pub(super) fn light_candidate(
-    world: &World,
+    job: &RenderJob,
     index: u32,
     point: &ShadePoint<'_>,
     shares: &Shares,
     drawn: (LightId, LightSample),
 ) -> Option<Candidate> {
     // Lights at infinity overlap: a direction belongs to all of them together
-    unshadowed_candidate(index, point, shares, with_infinite(world, &point.light_ctx(), drawn))
+    unshadowed_candidate(index, point, shares, with_infinite(job, &point.light_ctx(), drawn))
 }
 
 /// A sample of a light by itself, whose density includes the choice; `None` if its integrand is zero.
@@ -390,18 +390,18 @@ pub(super) fn light_segment(point: &ShadePoint<'_>, sample: &LightSample) -> Ray
 
 /// Completes a BSDF sample with the emitter that it points at; `None` if it points at none.
 pub(super) fn bsdf_candidate(
-    world: &World,
+    job: &RenderJob,
     point: &ShadePoint<'_>,
     pending: &PendingBsdf,
     hit: Option<&EmitterHit>,
 ) -> Option<Candidate> {
-    let lights = &world.scene.lights;
+    let lights = &job.lights;
     let ctx = point.light_ctx();
     let (li, light, p_light, segment) = match hit {
         Some(hit) => {
             let light = hit.light?;
             let surface =
-                world.scene.geometry.surface_hit(hit.geometry, hit.primitive, Hit::NO_INSTANCE, hit.uv, point.time);
+                job.world.scene.geometry.surface_hit(hit.geometry, hit.primitive, Hit::NO_INSTANCE, hit.uv, point.time);
             let light_hit = LightHit { t: hit.t, p: surface.p, n: surface.n, uv: surface.uv };
             let li = lights.lights[light as usize].l(&light_hit, -pending.wi);
             let pdf = if pending.specular { 0.0 } else { lights.pdf(&ctx, light, pending.wi, &light_hit) };

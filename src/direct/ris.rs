@@ -17,7 +17,7 @@ use super::propose::{self, Candidate, Candidates, Shares};
 use super::visibility::Segments;
 use crate::bsdfs::Bsdf;
 use crate::lights::{LightId, LightSample};
-use crate::scene::World;
+use crate::scene::RenderJob;
 use crate::settings::{IntegratorSettings, Strata};
 use lumiris_numbers::estimators::ris::{Draw, strata, stratified, systematic, with_replacement};
 use lumiris_numbers::math::Rgb;
@@ -81,7 +81,7 @@ impl Resampler {
     /// free. `bsdf_samples` are sorted by point.
     pub(super) fn run(
         &mut self,
-        world: &World,
+        job: &RenderJob,
         settings: &IntegratorSettings,
         points: &[ShadePoint<'_>],
         candidates: &mut Candidates,
@@ -107,13 +107,13 @@ impl Resampler {
                 while next < bsdf_samples.len() && bsdf_samples[next].point == first as u32 {
                     next += 1;
                 }
-                self.propose(world, settings, point, &bsdf_samples[begin..next]);
+                self.propose(job, settings, point, &bsdf_samples[begin..next]);
                 first += 1;
             }
             let chunk = &points[first_point..first];
             let bsdf_of_chunk = &bsdf_samples[first_sample..next];
             if settings.ris.target.has_visibility() {
-                self.probe(world, chunk, bsdf_of_chunk);
+                self.probe(job, chunk, bsdf_of_chunk);
             }
             self.t1 += start.elapsed();
 
@@ -127,7 +127,7 @@ impl Resampler {
                 for draw in &self.draws {
                     let place = range.start + draw.index as usize;
                     let evaluated = if place < range.bsdf_start {
-                        self.light_candidate(world, (first_point + i) as u32, point, place)
+                        self.light_candidate(job, (first_point + i) as u32, point, place)
                     } else {
                         Some(own[place - range.bsdf_start])
                     };
@@ -141,7 +141,7 @@ impl Resampler {
         candidates.spare = bsdf_samples;
     }
 
-    fn propose(&mut self, world: &World, settings: &IntegratorSettings, point: &ShadePoint<'_>, bsdf: &[Candidate]) {
+    fn propose(&mut self, job: &RenderJob, settings: &IntegratorSettings, point: &ShadePoint<'_>, bsdf: &[Candidate]) {
         let shares = shares(point);
         let techniques = Techniques {
             n_light: shares.n_light,
@@ -152,11 +152,11 @@ impl Resampler {
         let numbers = point.stream.domain(domain::RESAMPLE).draw::<2>();
         self.numbers.push(numbers);
         let positions = (shares.light_draws, settings.ris.points, numbers[0]);
-        self.proposals.add(world, point, &techniques, positions, bsdf);
+        self.proposals.add(job, point, &techniques, positions, bsdf);
     }
 
     /// Traces all proposals and sets the weights of those that are not visible to 0.
-    fn probe(&mut self, world: &World, points: &[ShadePoint<'_>], bsdf_samples: &[Candidate]) {
+    fn probe(&mut self, job: &RenderJob, points: &[ShadePoint<'_>], bsdf_samples: &[Candidate]) {
         self.probes.clear();
         let mut bsdf = bsdf_samples.iter();
         let mut probed = Vec::new();
@@ -169,7 +169,7 @@ impl Resampler {
                 }
                 let segment = match by_bsdf {
                     Some(candidate) => Some(candidate.segment),
-                    None => self.light_sample(world, point, place).map(|(_, s)| propose::light_segment(point, &s)),
+                    None => self.light_sample(job, point, place).map(|(_, s)| propose::light_segment(point, &s)),
                 };
                 match segment {
                     Some(segment) => {
@@ -180,7 +180,7 @@ impl Resampler {
                 }
             }
         }
-        self.probes.trace(&*world.accel);
+        self.probes.trace(&*job.world.accel);
         self.probed += probed.len() as u64;
         for (&place, &occluded) in probed.iter().zip(self.probes.occluded()) {
             if occluded {
@@ -215,15 +215,15 @@ impl Resampler {
     }
 
     /// A light sample, drawn again with all that a proposal leaves out.
-    fn light_sample(&self, world: &World, point: &ShadePoint<'_>, place: usize) -> Option<(LightId, LightSample)> {
+    fn light_sample(&self, job: &RenderJob, point: &ShadePoint<'_>, place: usize) -> Option<(LightId, LightSample)> {
         let (light, pmf, u) = self.proposals.light_sample(place);
-        let sample = world.scene.lights.lights[light as usize].sample_li(&point.light_ctx(), u)?;
+        let sample = job.lights.lights[light as usize].sample_li(&point.light_ctx(), u)?;
         Some((light, LightSample { pdf: sample.pdf * pmf, ..sample }))
     }
 
-    fn light_candidate(&self, world: &World, index: u32, point: &ShadePoint<'_>, place: usize) -> Option<Candidate> {
-        let sample = self.light_sample(world, point, place)?;
-        propose::light_candidate(world, index, point, &Shares::fixed(0, 0), sample)
+    fn light_candidate(&self, job: &RenderJob, index: u32, point: &ShadePoint<'_>, place: usize) -> Option<Candidate> {
+        let sample = self.light_sample(job, point, place)?;
+        propose::light_candidate(job, index, point, &Shares::fixed(0, 0), sample)
     }
 }
 

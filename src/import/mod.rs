@@ -6,7 +6,9 @@
 pub mod pbrt;
 pub mod resources;
 
-use crate::scene::Scene;
+use crate::accel::embree::EmbreeError;
+use crate::scene::{AccelKind, RenderJob, Scene, World};
+use crate::settings::Settings;
 use lumiris_formats::diagnostic::{Diagnostics, Report};
 use lumiris_formats::pbrt::parser::parse_file;
 use lumiris_formats::source::SourceMap;
@@ -27,8 +29,17 @@ pub struct LoadOptions {
 pub struct Loaded {
     /// The scene.
     pub scene: Scene,
+    /// How the file asks to render it.
+    pub settings: Settings,
     /// Warnings.
     pub warnings: Report,
+}
+
+impl Loaded {
+    /// Builds the ray tracers, and prepares what the settings ask for; see [`World::new`].
+    pub fn job(self, kind: AccelKind, packet_width: Option<u32>) -> Result<RenderJob, EmbreeError> {
+        Ok(RenderJob::new(World::new(self.scene, kind, packet_width)?, self.settings))
+    }
 }
 
 /// Loads a scene file. `Err` holds all errors that were found, and the warnings.
@@ -38,11 +49,11 @@ pub fn load(path: &Path, options: &LoadOptions) -> Result<Loaded, Box<Report>> {
     let folder = path.parent().map(Path::to_path_buf).unwrap_or_default();
     let mut builder = Builder::new(folder, options);
     parse_file(path, &mut sources, &mut diagnostics, &mut builder);
-    let scene = builder.finish(&mut diagnostics);
+    let finished = builder.finish(&mut diagnostics);
     let failed = diagnostics.has_errors();
     let report = diagnostics.finish(&sources);
-    match scene {
-        Some(scene) if !failed => Ok(Loaded { scene, warnings: report }),
+    match finished {
+        Some((scene, settings)) if !failed => Ok(Loaded { scene, settings, warnings: report }),
         _ => Err(Box::new(report)),
     }
 }

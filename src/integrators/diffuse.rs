@@ -9,7 +9,7 @@ use crate::bsdfs::Lambertian;
 use crate::direct::{Fits, ShadePoint};
 use crate::film::PixelSample;
 use crate::materials::SurfaceBsdf;
-use crate::scene::World;
+use crate::scene::RenderJob;
 use crate::settings::IntegratorSettings;
 use lumiris_numbers::math::{Rgb, Vec3};
 
@@ -36,20 +36,20 @@ struct Shading<'w> {
 /// Estimates the radiance of each camera sample; `out[i]` belongs to `samples[i]`. `fits` are those of the samples' pixels.
 pub(super) fn trace(
     paths: &mut PathIntegrator,
-    world: &World,
+    job: &RenderJob,
     source: &mut dyn Reflected,
     samples: &[CameraSample],
     fits: &mut Fits,
     out: &mut Vec<PixelSample>,
 ) {
-    let settings = &world.scene.integrator;
+    let settings = &job.settings().integrator;
     let depth = settings.depth();
     paths.start(samples, out);
     for vertex in 0..=depth {
         if paths.active.is_empty() {
             break;
         }
-        let vertices = paths.find_vertices(world, vertex, depth, samples, out);
+        let vertices = paths.find_vertices(job, vertex, depth, samples, out);
         let split = settings.split_at_vertex(vertex);
         let shadings: Vec<Shading<'_>> =
             paths.active.iter().zip(&vertices).map(|(path, v)| shade(source, path, vertex, v)).collect();
@@ -59,7 +59,7 @@ pub(super) fn trace(
                 v.shade_point(path.ray.time, split, samples[path.sample as usize].fit)
             })
             .collect();
-        light(paths, world, &settings.at_vertex(vertex), (&shadings, &points), fits, out);
+        light(paths, job, &settings.at_vertex(vertex), (&shadings, &points), fits, out);
         extend(paths, settings, vertex, (&vertices, &shadings, &points));
     }
 }
@@ -76,7 +76,7 @@ fn shade<'w>(source: &mut dyn Reflected, path: &PathState, vertex: u32, v: &Vert
 /// Adds what is known, and estimates of the direct light that is not.
 fn light(
     paths: &mut PathIntegrator,
-    world: &World,
+    job: &RenderJob,
     settings: &IntegratorSettings,
     (shadings, points): (&[Shading<'_>], &[ShadePoint<'_>]),
     fits: &mut Fits,
@@ -88,7 +88,7 @@ fn light(
     let lit: Vec<ShadePoint<'_>> = (shadings.iter().zip(points))
         .filter_map(|(shading, point)| shading.lit.map(|bsdf| ShadePoint { bsdf, ..*point }))
         .collect();
-    paths.direct.estimate(world, settings, &lit, fits, &mut paths.radiance);
+    paths.direct.estimate(job, settings, &lit, fits, &mut paths.radiance);
     let lit_paths = paths.active.iter().zip(shadings).filter(|(_, shading)| shading.lit.is_some());
     for ((path, _), &radiance) in lit_paths.zip(&paths.radiance) {
         out[path.sample as usize].radiance += path.beta * radiance;

@@ -12,7 +12,7 @@ use crate::film::{Features, PixelSample};
 use crate::geometry::SurfaceHit;
 use crate::lights::LightHit;
 use crate::materials::SurfaceBsdf;
-use crate::scene::{Found, World};
+use crate::scene::{Found, RenderJob};
 use crate::settings::{IntegratorSettings, Split};
 use lumiris_numbers::math::{Ray, Rgb, Vec3};
 use lumiris_numbers::samplers::SampleStream;
@@ -149,7 +149,7 @@ impl PathIntegrator {
     /// they may be none.
     pub fn trace(
         &mut self,
-        world: &World,
+        job: &RenderJob,
         settings: &IntegratorSettings,
         samples: &[CameraSample],
         fits: &mut Fits,
@@ -161,7 +161,7 @@ impl PathIntegrator {
             if self.active.is_empty() {
                 break;
             }
-            let vertices = self.find_vertices(world, vertex, depth, samples, out);
+            let vertices = self.find_vertices(job, vertex, depth, samples, out);
             let split = settings.split_at_vertex(vertex);
             let points: Vec<ShadePoint<'_>> = vertices
                 .iter()
@@ -171,7 +171,7 @@ impl PathIntegrator {
                     v.shade_point(path.ray.time, split, samples[path.sample as usize].fit)
                 })
                 .collect();
-            self.light_points(world, &settings.at_vertex(vertex), vertex, &points, fits, out);
+            self.light_points(job, &settings.at_vertex(vertex), vertex, &points, fits, out);
             self.extend_paths(settings, vertex, &vertices, &points);
             std::mem::swap(&mut self.active, &mut self.next);
         }
@@ -198,7 +198,7 @@ impl PathIntegrator {
     /// something that scatters. The answer's items belong to the paths that `self.active` then holds.
     pub(super) fn find_vertices<'w>(
         &mut self,
-        world: &'w World,
+        job: &'w RenderJob,
         vertex: u32,
         depth: u32,
         samples: &[CameraSample],
@@ -208,7 +208,7 @@ impl PathIntegrator {
         let mut kept = Vec::with_capacity(self.active.len());
         let mut coherence = if vertex == 0 { Coherence::Coherent } else { Coherence::Incoherent };
         while !self.active.is_empty() {
-            self.trace_active(world, vertex, coherence);
+            self.trace_active(job, vertex, coherence);
             coherence = Coherence::Incoherent;
             let start = Instant::now();
             let mut passing = Vec::new();
@@ -216,16 +216,16 @@ impl PathIntegrator {
                 let found = match hit {
                     None => {
                         if vertex == 0 && !self.only_reflected {
-                            out[path.sample as usize].radiance += path.beta * world.scene.lights.le(path.ray.d);
+                            out[path.sample as usize].radiance += path.beta * job.lights.le(path.ray.d);
                         }
                         continue;
                     }
-                    Some(hit) => Found::new(world, &path.ray, (path.width, path.spread), hit),
+                    Some(hit) => Found::new(&job.world, &path.ray, (path.width, path.spread), hit),
                 };
                 if vertex == 0 && !self.only_reflected {
-                    path.add_emission(world, &found, &mut out[path.sample as usize].radiance);
+                    path.add_emission(job, &found, &mut out[path.sample as usize].radiance);
                 }
-                match found.scatter(world) {
+                match found.scatter(job) {
                     Some(bsdf) => {
                         if vertex == 0 {
                             let depth_only = self.only_reflected;
@@ -233,7 +233,7 @@ impl PathIntegrator {
                                 if depth_only {
                                     Features { depth: path.depth(&found), ..Features::default() }
                                 } else {
-                                    path.features(world, &found, &bsdf)
+                                    path.features(job, &found, &bsdf)
                                 }
                             });
                         }
@@ -257,7 +257,7 @@ impl PathIntegrator {
     }
 
     /// First hits of the active paths.
-    fn trace_active(&mut self, world: &World, vertex: u32, coherence: Coherence) {
+    fn trace_active(&mut self, job: &RenderJob, vertex: u32, coherence: Coherence) {
         self.rays.clear();
         for path in &self.active {
             self.rays.push(&path.ray);
@@ -267,7 +267,7 @@ impl PathIntegrator {
             batches.push(self.rays.clone());
         }
         let start = Instant::now();
-        world.accel.intersect(&self.rays, coherence, &mut self.hits);
+        job.world.accel.intersect(&self.rays, coherence, &mut self.hits);
         let (count, time) = (self.rays.len() as u64, start.elapsed());
         if vertex == 0 {
             self.stats.camera_rays += count;
@@ -281,14 +281,14 @@ impl PathIntegrator {
     /// Adds the direct light of the vertices of the active paths.
     fn light_points(
         &mut self,
-        world: &World,
+        job: &RenderJob,
         settings: &IntegratorSettings,
         vertex: u32,
         points: &[ShadePoint<'_>],
         fits: &mut Fits,
         out: &mut [PixelSample],
     ) {
-        self.direct.estimate(world, settings, points, fits, &mut self.radiance);
+        self.direct.estimate(job, settings, points, fits, &mut self.radiance);
         if let Some(r) = &mut self.recording {
             let batches = if vertex == 0 { &mut r.segments } else { &mut r.bounce_segments };
             batches.push(self.direct.segments().clone());
@@ -403,8 +403,8 @@ fn next_direction(v: &Vertex<'_>, settings: &IntegratorSettings) -> Option<Direc
 
 impl PathState {
     /// Adds what the surface that was found emits towards the camera.
-    fn add_emission(&self, world: &World, found: &Found, radiance: &mut Rgb) {
-        let lights = &world.scene.lights;
+    fn add_emission(&self, job: &RenderJob, found: &Found, radiance: &mut Rgb) {
+        let lights = &job.lights;
         if found.hit.instance != Hit::NO_INSTANCE {
             return;
         }
@@ -415,13 +415,13 @@ impl PathState {
         }
     }
 
-    fn features(&self, world: &World, found: &Found, bsdf: &SurfaceBsdf<'_>) -> Features {
+    fn features(&self, job: &RenderJob, found: &Found, bsdf: &SurfaceBsdf<'_>) -> Features {
         let z = bsdf.frame.z;
         Features {
             albedo: bsdf.albedo_estimate(found.wo),
             normal: if z.dot(found.wo) < 0.0 { -z } else { z },
             depth: self.depth(found),
-            material: world.scene.surfaces[found.hit.geometry as usize].material,
+            material: job.world.scene.surfaces[found.hit.geometry as usize].material,
             object: found.hit.geometry,
         }
     }

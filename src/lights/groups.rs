@@ -46,11 +46,11 @@ struct FixedGroup {
 
 impl LightGroups {
     /// Groups the lights of a set into at most `most` (1 to [`MAX_GROUPS`]) groups.
-    pub fn new(set: &LightSet, most: usize) -> Self {
+    pub fn new(set: &LightSet, sampler: &LightSampler, most: usize) -> Self {
         let most = most.clamp(1, MAX_GROUPS);
         let bounds: Vec<_> = set.lights.iter().map(super::Light::bounds).collect();
         let own_tree;
-        let tree = match set.sampler.tree() {
+        let tree = match sampler.tree() {
             Some(choice) => &choice.tree,
             None => {
                 own_tree = LightTree::new(&bounds);
@@ -58,7 +58,7 @@ impl LightGroups {
             }
         };
         let ctx = LightCtx::at(lumiris_numbers::math::Vec3::ZERO);
-        let is_infinite = |i: usize| set.lights[i].is_infinite() && set.sampler.pmf(&ctx, i as LightId) > 0.0;
+        let is_infinite = |i: usize| set.lights[i].is_infinite() && sampler.pmf(&ctx, i as LightId) > 0.0;
         let infinite: Vec<LightId> = (0..set.lights.len()).filter(|&i| is_infinite(i)).map(|i| i as LightId).collect();
         let has_infinite = !infinite.is_empty();
         let cut = tree.cut(most - usize::from(has_infinite && most > 1));
@@ -75,11 +75,11 @@ impl LightGroups {
         for (g, lights) in groups.iter().enumerate() {
             lights.iter().for_each(|&l| group_of[l as usize] = g as u8);
         }
-        let choice = match set.sampler.tree() {
+        let choice = match sampler.tree() {
             Some(_) => Choice::Tree(cut),
             None => {
                 let fixed = |lights: Vec<LightId>| {
-                    let weights: Vec<f32> = lights.iter().map(|&l| set.sampler.pmf(&ctx, l)).collect();
+                    let weights: Vec<f32> = lights.iter().map(|&l| sampler.pmf(&ctx, l)).collect();
                     FixedGroup { pmf: weights.iter().sum(), table: AliasTable::new(&weights), lights }
                 };
                 Choice::Fixed(groups.into_iter().map(fixed).collect())
@@ -110,11 +110,11 @@ impl LightGroups {
 
     /// Probability that the sampler of the set chooses a light of each group, seen from a point. They sum to one, unless
     /// nothing can be chosen.
-    pub fn pmfs(&self, set: &LightSet, ctx: &LightCtx) -> [f32; MAX_GROUPS] {
+    pub fn pmfs(&self, sampler: &LightSampler, ctx: &LightCtx) -> [f32; MAX_GROUPS] {
         let mut pmfs = [0.0; MAX_GROUPS];
         match &self.choice {
             Choice::Tree(cut) => {
-                let Some(choice) = set.sampler.tree() else { return pmfs };
+                let Some(choice) = sampler.tree() else { return pmfs };
                 let p_infinite = choice.infinite_probability(ctx);
                 let first = usize::from(self.has_infinite);
                 choice.tree.cut_pmfs(ctx, cut, &mut pmfs[first..]);
@@ -125,7 +125,7 @@ impl LightGroups {
             }
             Choice::Fixed(groups) => groups.iter().zip(&mut pmfs).for_each(|(group, p)| *p = group.pmf),
         }
-        if let LightSampler::Photons(choice) = &set.sampler {
+        if let LightSampler::Photons(choice) = sampler {
             choice.group_pmfs(ctx, |light| self.group_of(light), &mut pmfs);
         }
         pmfs
@@ -135,13 +135,13 @@ impl LightGroups {
     /// includes that of the group.
     pub fn sample(
         &self,
-        set: &LightSet,
+        sampler: &LightSampler,
         ctx: &LightCtx,
         (group, group_pmf): (usize, f32),
         u: f32,
     ) -> Option<LightChoice> {
-        let of_base = |u| self.sample_base(set, ctx, (group, group_pmf), u);
-        match &set.sampler {
+        let of_base = |u| self.sample_base(sampler, ctx, (group, group_pmf), u);
+        match sampler {
             LightSampler::Photons(choice) => {
                 choice.sample_group(ctx, |light| self.group_of(light) == Some(group), group_pmf, u, of_base)
             }
@@ -152,14 +152,14 @@ impl LightGroups {
     /// [`sample`](Self::sample) without what photons tell.
     fn sample_base(
         &self,
-        set: &LightSet,
+        sampler: &LightSampler,
         ctx: &LightCtx,
         (group, group_pmf): (usize, f32),
         u: f32,
     ) -> Option<LightChoice> {
         match &self.choice {
             Choice::Tree(_) if self.has_infinite && group == 0 => {
-                let infinite = &set.sampler.tree()?.infinite;
+                let infinite = &sampler.tree()?.infinite;
                 let x = u * infinite.len() as f32;
                 let i = (x as usize).min(infinite.len() - 1);
                 let u = (x - i as f32).clamp(0.0, ONE_MINUS_EPSILON);
@@ -167,7 +167,7 @@ impl LightGroups {
             }
             Choice::Tree(cut) => {
                 let place = *cut.get(group - usize::from(self.has_infinite))?;
-                let (light, pmf, u) = set.sampler.tree()?.tree.sample_below(ctx, place, u)?;
+                let (light, pmf, u) = sampler.tree()?.tree.sample_below(ctx, place, u)?;
                 Some(LightChoice { light, pmf: pmf * group_pmf, u })
             }
             Choice::Fixed(groups) => {
@@ -182,15 +182,16 @@ impl LightGroups {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::lights::{Light, LightHints, LightSamplerKind, LightSetBuilder};
+    use crate::lights::{Light, LightHints, LightSamplerKind, LightSampling, LightSetBuilder};
     use lumiris_numbers::math::hash::HashStream;
     use lumiris_numbers::math::{Bounds3, Rgb, Vec3};
     use lumiris_test_support::assert_chi_squared;
+    use std::sync::Arc;
 
     const KINDS: [LightSamplerKind; 4] =
         [LightSamplerKind::Uniform, LightSamplerKind::Power, LightSamplerKind::Tree, LightSamplerKind::Photons];
 
-    fn set(kind: LightSamplerKind, points: u32, infinite: u32) -> LightSet {
+    fn set(kind: LightSamplerKind, points: u32, infinite: u32) -> LightSampling {
         let mut b = LightSetBuilder::default();
         for _ in 0..infinite {
             b.add(Light::InfiniteConstant { l: Rgb::splat(0.3) });
@@ -199,7 +200,8 @@ mod tests {
             let p = Vec3::new(i as f32 * 0.7 - 2.0, (i % 3) as f32, 2.0 + (i % 4) as f32);
             b.add(Light::Point { p, intensity: Rgb::splat(if i == 2 { 0.0 } else { 0.5 + i as f32 }) });
         }
-        let mut set = b.build(kind, &Bounds3 { min: Vec3::ZERO, max: Vec3::splat(3.0) });
+        let set = b.build(&Bounds3 { min: Vec3::ZERO, max: Vec3::splat(3.0) });
+        let mut set = LightSampling::new(Arc::new(set), kind, 1);
         // Every third light is seen, and every one of many
         let step = if points > 90 { 1 } else { 3 };
         let at = Vec3::new(0.4, 0.3, 0.0);
@@ -214,9 +216,9 @@ mod tests {
             for (points, infinite) in [(4, 0), (4, 1), (30, 2), (100, 1), (0, 2), (1, 0)] {
                 for most in [1, 2, 5, 8] {
                     let set = set(kind, points, infinite);
-                    let groups = LightGroups::new(&set, most);
+                    let groups = LightGroups::new(&set, &set.sampler, most);
                     let ctx = LightCtx { p: Vec3::new(0.4, 0.3, 0.0), n: Vec3::Z, ns: Vec3::Z };
-                    let pmfs = groups.pmfs(&set, &ctx);
+                    let pmfs = groups.pmfs(&set.sampler, &ctx);
                     assert!((pmfs.iter().sum::<f32>() - 1.0).abs() < 1e-5, "{kind:?} {pmfs:?}");
                     assert!(groups.len() <= most.max(usize::from(infinite > 0) + usize::from(points > 0)));
 
@@ -230,7 +232,7 @@ mod tests {
                             u < 0.0
                         };
                         let group = pmfs.iter().position(pick).unwrap_or(0);
-                        let choice = groups.sample(&set, &ctx, (group, pmfs[group]), s.next_f32()).unwrap();
+                        let choice = groups.sample(&set.sampler, &ctx, (group, pmfs[group]), s.next_f32()).unwrap();
                         assert_eq!(groups.group_of(choice.light), Some(group));
                         let pmf = set.sampler.pmf(&ctx, choice.light);
                         assert!((choice.pmf / pmf - 1.0).abs() < 1e-4, "{kind:?} {} {pmf}", choice.pmf);
@@ -249,13 +251,14 @@ mod tests {
     fn few_lights_have_a_group_each_and_dark_ones_none() {
         for kind in KINDS {
             let set = set(kind, 5, 1);
-            let groups = LightGroups::new(&set, 7);
+            let groups = LightGroups::new(&set, &set.sampler, 7);
             assert_eq!(groups.len(), 5, "{kind:?}");
             let mut seen: Vec<_> = (0..6).map(|l| groups.group_of(l)).collect();
             assert_eq!(seen.remove(3), None);
             seen.sort_unstable();
             assert_eq!(seen, (0..5).map(Some).collect::<Vec<_>>());
         }
-        assert!(LightGroups::new(&set(LightSamplerKind::Tree, 0, 0), 4).is_empty());
+        let empty = set(LightSamplerKind::Tree, 0, 0);
+        assert!(LightGroups::new(&empty, &empty.sampler, 4).is_empty());
     }
 }

@@ -179,7 +179,7 @@ fn polygon_irradiance(corners: &[DVec3; 4], n: DVec3) -> f64 {
 mod tests {
     use super::*;
     use crate::geometry::{Quadric, QuadricKind, Shape, TriangleMesh};
-    use crate::lights::{Emission, EmissionImage, LightCtx, LightHit, LightSamplerKind, LightSetBuilder};
+    use crate::lights::{Emission, EmissionImage, LightCtx, LightHit, LightSetBuilder};
     use lumiris_numbers::math::hash::HashStream;
     use lumiris_numbers::math::warp::sample_uniform_sphere;
     use lumiris_numbers::math::{Affine3A, Bounds3, Vec2};
@@ -212,7 +212,7 @@ mod tests {
         for (i, shape) in shapes.iter().enumerate() {
             builder.add_area(i as GeometryId, shape, emission);
         }
-        builder.build(LightSamplerKind::Tree, &Bounds3 { min: Vec3::splat(-1.0), max: Vec3::splat(2.0) })
+        builder.build(&Bounds3 { min: Vec3::splat(-1.0), max: Vec3::splat(2.0) })
     }
 
     /// True if a point is near the plane of a flat light.
@@ -280,7 +280,7 @@ mod tests {
         let mut builder = LightSetBuilder::default();
         builder.add(Light::InfiniteConstant { l: Rgb::splat(0.5) });
         builder.add(Light::Distant { wi_world: Vec3::Z, l: Rgb::WHITE });
-        let environment = builder.build(LightSamplerKind::Tree, &Bounds3::EMPTY);
+        let environment = builder.build(&Bounds3::EMPTY);
         assert_eq!(assert_integrates(&environment, &mut stream), POINTS);
     }
 

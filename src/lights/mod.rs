@@ -1,7 +1,7 @@
 //! Lights: what they emit, how directions to them are sampled, and how one of many is chosen.
 //!
 //! Reading order: [`point`], [`spot`], [`area`], [`environment`], [`emit`], [`lanes`], [`bounds`], [`tree`], [`hints`], [`select`], [`hinted`], [`set`],
-//! [`groups`], [`irradiance`].
+//! [`groups`], [`sampling`], [`irradiance`].
 
 pub mod area;
 pub mod bounds;
@@ -13,6 +13,7 @@ pub mod hints;
 pub mod irradiance;
 pub mod lanes;
 pub mod point;
+pub mod sampling;
 pub mod select;
 pub mod set;
 pub mod spot;
@@ -32,6 +33,7 @@ pub use hinted::HintedChoice;
 pub use hints::LightHints;
 pub use irradiance::Irradiances;
 pub use lanes::LightLanes;
+pub use sampling::LightSampling;
 pub use select::{LightChoice, LightRun, LightSampler, LightSamplerKind};
 pub use set::{LightSet, LightSetBuilder};
 pub use tree::LightTree;

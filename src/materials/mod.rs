@@ -176,7 +176,6 @@ pub struct MaterialSet {
     coats: Vec<CoatTable>,
     /// Per material, its table.
     coat_of: Vec<Option<u32>>,
-    density: ProposalDensity,
 }
 
 /// What a coat's table depends on, by bits: η, thickness, and the alphas unless they are textured.
@@ -205,21 +204,17 @@ impl MaterialSet {
             None => CoatTable::for_all_roughness(key.eta, key.thickness),
         };
         let coats = keys.par_iter().map(tabulate).collect();
-        MaterialSet { entries, coats, coat_of, density: ProposalDensity::default() }
+        MaterialSet { entries, coats, coat_of }
     }
 
-    /// Chooses what proposes directions for materials that can only be evaluated.
-    pub fn set_proposal_density(&mut self, density: ProposalDensity) {
-        self.density = density;
-    }
-
-    /// Most lobes that a BSDF of these materials has, by [`Bsdf::first_lobe`].
-    pub fn lobes(&self) -> usize {
+    /// Most lobes that a BSDF of these materials has, by [`Bsdf::first_lobe`], if `density` proposes directions for those that can
+    /// only be evaluated.
+    pub fn lobes(&self, density: ProposalDensity) -> usize {
         let has_two = |material: &Material| match material {
             Material::CoatedDiffuse { .. }
             | Material::CoatedConductor { .. }
             | Material::DiffuseTransmission { .. } => true,
-            Material::Evaluated(_) => self.density == ProposalDensity::Lobes,
+            Material::Evaluated(_) => density == ProposalDensity::Lobes,
             Material::Diffuse { .. }
             | Material::Conductor { .. }
             | Material::Dielectric { .. }
@@ -321,7 +316,7 @@ impl MaterialSet {
                 })
             }
             Material::Evaluated(material) => {
-                Bsdf::Evaluated(Evaluated { model: material.model(t), density: self.density })
+                Bsdf::Evaluated(Evaluated { model: material.model(t), density: ProposalDensity::default() })
             }
             Material::Mix { .. } | Material::Interface => return None,
         })

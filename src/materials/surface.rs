@@ -1,6 +1,6 @@
 //! A BSDF in the shading frame of a hit, for directions in world space.
 
-use crate::bsdfs::{Bsdf, BsdfSample, Lambertian, Resampled, resample};
+use crate::bsdfs::{Bsdf, BsdfSample, Lambertian, ProposalDensity, Resampled, resample};
 use lumiris_numbers::math::{Frame, Rgb, Vec3};
 use lumiris_numbers::simd::{self, bsdf::Values};
 
@@ -17,6 +17,16 @@ pub struct SurfaceBsdf<'a> {
 }
 
 impl<'a> SurfaceBsdf<'a> {
+    /// The same, directions of what can only be evaluated being proposed by `density`.
+    #[inline]
+    #[must_use]
+    pub fn proposed_by(mut self, density: ProposalDensity) -> Self {
+        if let Bsdf::Evaluated(evaluated) = &mut self.bsdf {
+            evaluated.density = density;
+        }
+        self
+    }
+
     /// Value without cosine (1/sr), without deltas.
     #[inline]
     pub fn f(&self, wo: Vec3, wi: Vec3) -> Rgb {

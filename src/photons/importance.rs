@@ -14,7 +14,7 @@ use super::photon::{Origin, Photon};
 use super::trace::{BATCH, domain, trajectory_stream};
 use super::walk::{Particle, WalkSettings, Walker};
 use crate::bsdfs::dielectric::Transport;
-use crate::scene::World;
+use crate::scene::RenderJob;
 use lumiris_numbers::math::{Rgb, Vec2, Vec3};
 use rayon::prelude::*;
 
@@ -115,7 +115,7 @@ fn density(map: &PhotonMap, p: Vec3, n: Vec3, search: Search, scratch: &mut Gath
 }
 
 /// Sends importons, on all threads of the current pool.
-pub fn trace_importons(world: &World, settings: &ImportanceSettings) -> Result<Importance, PhotonError> {
+pub fn trace_importons(job: &RenderJob, settings: &ImportanceSettings) -> Result<Importance, PhotonError> {
     if settings.trajectories == 0 || settings.test_rays == 0 {
         return Err(PhotonError::NothingWanted);
     }
@@ -125,16 +125,13 @@ pub fn trace_importons(world: &World, settings: &ImportanceSettings) -> Result<I
     }
 
     // The map
-    let (importons, mut rays) =
-        trace(world, settings.seed ^ SEEDS[0], settings.trajectories, settings.max_depth, false);
+    let (importons, mut rays) = trace(job, settings.seed ^ SEEDS[0], settings.trajectories, settings.max_depth, false);
     let map = PhotonMap::new(importons);
-    let search = Search::Nearest {
-        count: settings.count.max(2),
-        max_radius: settings.max_radius * world.scene.lights.scene_radius,
-    };
+    let search =
+        Search::Nearest { count: settings.count.max(2), max_radius: settings.max_radius * job.lights.scene_radius };
 
     // The scale, by what the camera sees at first
-    let (seen, test_rays) = trace(world, settings.seed ^ SEEDS[1], settings.test_rays, settings.max_depth, true);
+    let (seen, test_rays) = trace(job, settings.seed ^ SEEDS[1], settings.test_rays, settings.max_depth, true);
     rays += test_rays;
     let of_place = |scratch: &mut GatherScratch, seen: &Photon| density(&map, seen.p(), seen.n(), search, scratch);
     let mut found: Vec<f32> = seen.par_iter().map_init(GatherScratch::default, of_place).collect();
@@ -146,7 +143,7 @@ pub fn trace_importons(world: &World, settings: &ImportanceSettings) -> Result<I
 }
 
 /// Importons where they arrive, and the number of rays; of each trajectory the first one only if `only_first`.
-fn trace(world: &World, seed: u32, count: u64, max_depth: u32, only_first: bool) -> (Vec<Photon>, u64) {
+fn trace(job: &RenderJob, seed: u32, count: u64, max_depth: u32, only_first: bool) -> (Vec<Photon>, u64) {
     let settings = WalkSettings { transport: Transport::Radiance, max_depth };
     let power = Rgb::splat((1.0 / count as f64) as f32);
     let batches: Vec<(Vec<Photon>, u64)> = (0..count.div_ceil(BATCH) as usize)
@@ -157,9 +154,9 @@ fn trace(world: &World, seed: u32, count: u64, max_depth: u32, only_first: bool)
             let trajectories = begin..(begin + BATCH).min(count);
             walker.traced = 0;
             walker.active.clear();
-            walker.active.extend((0..).zip(trajectories).map(|(i, t)| emit(world, seed, i, t, power)));
+            walker.active.extend((0..).zip(trajectories).map(|(i, t)| emit(job, seed, i, t, power)));
             let mut importons: Vec<(u32, Photon)> = Vec::new();
-            walker.walk(world, &settings, |arrival| {
+            walker.walk(job, &settings, |arrival| {
                 let (wi, n, particle) = (arrival.wi, arrival.n, arrival.particle);
                 let importon = |wi, n| (particle.index, Photon::new(arrival.p, wi, n, particle.power, particle.origin));
                 if !arrival.part.reflectance.is_black() {
@@ -182,15 +179,15 @@ fn trace(world: &World, seed: u32, count: u64, max_depth: u32, only_first: bool)
 }
 
 /// An importon as it leaves the camera, anywhere in the picture.
-fn emit(world: &World, seed: u32, index: u32, trajectory: u64, power: Rgb) -> Particle {
+fn emit(job: &RenderJob, seed: u32, index: u32, trajectory: u64, power: Rgb) -> Particle {
     let stream = trajectory_stream(seed, trajectory);
     let [x, y, lens_u, lens_v] = stream.domain(domain::EMISSION).draw::<4>();
     let [u_time] = stream.domain(domain::TIME).draw::<1>();
-    let bounds = &world.scene.film.bounds;
+    let bounds = &job.world.scene.film.bounds;
     let film = Vec2::new(
         bounds.x0 as f32 + x * bounds.width() as f32,
         bounds.y0 as f32 + y * (bounds.area() as f32 / bounds.width().max(1) as f32),
     );
-    let ray = world.scene.camera.ray(film, [lens_u, lens_v], u_time);
+    let ray = job.world.scene.camera.ray(film, [lens_u, lens_v], u_time);
     Particle::new(index, ray.ray, power * ray.weight, Origin::Primary(0), stream)
 }

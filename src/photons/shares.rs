@@ -62,7 +62,7 @@ impl LightShares {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::lights::{Light, LightSamplerKind, LightSetBuilder};
+    use crate::lights::{Light, LightSetBuilder};
     use lumiris_numbers::math::{Bounds3, Rgb, Vec3};
     use lumiris_numbers::samplers::{SampleStream, SamplerKind};
 
@@ -71,7 +71,7 @@ mod tests {
         for &i in intensities {
             builder.add(Light::Point { p: Vec3::ZERO, intensity: Rgb::splat(i) });
         }
-        builder.build(LightSamplerKind::Power, &Bounds3 { min: Vec3::ZERO, max: Vec3::ONE })
+        builder.build(&Bounds3 { min: Vec3::ZERO, max: Vec3::ONE })
     }
 
     #[test]

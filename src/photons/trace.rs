@@ -16,7 +16,7 @@ use super::rules::{self, CausticRule};
 use super::shares::LightShares;
 use super::walk::{Arrival, Particle, WalkSettings, Walker};
 use crate::bsdfs::dielectric::Transport;
-use crate::scene::World;
+use crate::scene::RenderJob;
 use lumiris_numbers::math::hash::pcg4d;
 use lumiris_numbers::math::ray::offset_origin;
 use lumiris_numbers::math::{Ray, Vec2};
@@ -135,13 +135,13 @@ impl Traced {
 /// Traces photons, on all threads of the current pool. The powers are such that Σ weight·power of a map's photons is an
 /// estimate of the irradiance that it holds.
 pub fn trace_photons(
-    world: &World,
+    job: &RenderJob,
     tracing: &Tracing<'_>,
     importance: Option<&Importance>,
     want: Want,
 ) -> Result<Traced, PhotonError> {
     let start = Instant::now();
-    let lights = &world.scene.lights;
+    let lights = &job.lights;
     if lights.lights.is_empty() {
         return Err(PhotonError::NoLight);
     }
@@ -149,7 +149,7 @@ pub fn trace_photons(
     if !(tracing.q > 0.0 && tracing.q <= 1.0) {
         return Err(PhotonError::InvalidRatio(tracing.q));
     }
-    let run = Run { world, tracing, importance, shares };
+    let run = Run { job, tracing, importance, shares };
     let mut traced = match want {
         Want::Trajectories(0) | Want::Stored { global: 0, .. } | Want::Stored { most_trajectories: 0, .. } => {
             return Err(PhotonError::NothingWanted);
@@ -189,7 +189,7 @@ struct Limits {
 }
 
 struct Run<'a> {
-    world: &'a World,
+    job: &'a RenderJob,
     tracing: &'a Tracing<'a>,
     importance: Option<&'a Importance>,
     shares: LightShares,
@@ -292,7 +292,7 @@ impl Run<'_> {
         walker.active.extend((0_u32..).zip(trajectories.clone()).filter_map(|(i, t)| self.emit(i, t)));
         let settings = WalkSettings { transport: Transport::Importance, max_depth: self.tracing.max_depth };
         let mut batch = Batch::default();
-        walker.walk(self.world, &settings, |arrival| {
+        walker.walk(self.job, &settings, |arrival| {
             if arrival.part.reflectance.is_black() && arrival.part.transmittance.is_black() {
                 return;
             }
@@ -309,7 +309,7 @@ impl Run<'_> {
 
     /// A photon as it leaves a light.
     fn emit(&self, index: u32, trajectory: u64) -> Option<Particle> {
-        let scene = &self.world.scene;
+        let scene = &self.job.world.scene;
         let stream = trajectory_stream(self.tracing.seed, trajectory);
         let (light, pmf) = self.shares.sample(stream.domain(domain::LIGHT).draw::<2>());
         let [p0, p1, d0, d1] = stream.domain(domain::EMISSION).draw::<4>();

@@ -18,7 +18,7 @@ use crate::accel::{Coherence, Hit, RayBatch};
 use crate::bsdfs::dielectric::Transport;
 use crate::bsdfs::{Lambertian, Resampled};
 use crate::materials::SurfaceBsdf;
-use crate::scene::{Found, World};
+use crate::scene::{Found, RenderJob};
 use lumiris_numbers::math::sphere_map::equal_area_sphere_to_square;
 use lumiris_numbers::math::{Ray, Rgb, Vec3};
 use lumiris_numbers::samplers::SampleStream;
@@ -105,13 +105,13 @@ pub(super) struct Walker {
 impl Walker {
     /// Lets the active particles walk until all are gone, and tells of their arrivals at Lambertian surfaces: vertex by
     /// vertex, not particle by particle.
-    pub(super) fn walk(&mut self, world: &World, settings: &WalkSettings, mut arrive: impl FnMut(&Arrival<'_>)) {
-        self.sort(world);
+    pub(super) fn walk(&mut self, job: &RenderJob, settings: &WalkSettings, mut arrive: impl FnMut(&Arrival<'_>)) {
+        self.sort(job);
         let mut coherence = Coherence::Packets;
         for vertex in 0..=settings.max_depth {
             self.next.clear();
             while !self.active.is_empty() {
-                self.step(world, settings, (vertex, coherence), &mut arrive);
+                self.step(job, settings, (vertex, coherence), &mut arrive);
                 coherence = Coherence::Incoherent;
             }
             std::mem::swap(&mut self.active, &mut self.next);
@@ -120,8 +120,8 @@ impl Walker {
     }
 
     /// Makes neighbours of particles that start alike: from one light, in like directions, near each other.
-    fn sort(&mut self, world: &World) {
-        let lights = &world.scene.lights;
+    fn sort(&mut self, job: &RenderJob) {
+        let lights = &job.lights;
         let key = |particle: &Particle| {
             let source = if let Origin::Primary(light) = particle.origin { light } else { 0 };
             let direction = equal_area_sphere_to_square(particle.ray.d) * 64.0;
@@ -136,21 +136,21 @@ impl Walker {
     /// Takes the active particles to the next surface; those that pass it stay active.
     fn step(
         &mut self,
-        world: &World,
+        job: &RenderJob,
         settings: &WalkSettings,
         (vertex, coherence): (u32, Coherence),
         arrive: &mut impl FnMut(&Arrival<'_>),
     ) {
         self.rays.clear();
         self.active.iter().for_each(|particle| self.rays.push(&particle.ray));
-        world.accel.intersect(&self.rays, coherence, &mut self.hits);
+        job.world.accel.intersect(&self.rays, coherence, &mut self.hits);
         self.traced += self.rays.len() as u64;
 
         self.passing.clear();
         for (particle, hit) in self.active.iter().zip(&self.hits) {
             let Some(hit) = hit else { continue };
-            let found = Found::new(world, &particle.ray, (0.0, 0.0), hit);
-            let Some(bsdf) = found.scatter(world) else {
+            let found = Found::new(&job.world, &particle.ray, (0.0, 0.0), hit);
+            let Some(bsdf) = found.scatter(job) else {
                 if particle.passed < MAX_PASSED {
                     let ray = Ray { o: found.origin(particle.ray.d), ..particle.ray };
                     self.passing.push(Particle { ray, passed: particle.passed + 1, ..*particle });
@@ -164,7 +164,7 @@ impl Walker {
                 arrive(&Arrival { particle, p: found.surface.p, wi: found.wo, n, part, scatterings: vertex, stream });
             }
             if vertex < settings.max_depth {
-                let proposals = world.scene.integrator.bsdf_proposals;
+                let proposals = job.settings().integrator.bsdf_proposals;
                 let scattering = Scattering { found: &found, bsdf: &bsdf, part: part.as_ref(), stream, proposals };
                 self.next.extend(scattering.scatter(particle, settings.transport));
             }

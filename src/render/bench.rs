@@ -11,7 +11,7 @@ use crate::accel::{Accel, AlphaSource, Coherence, RayBatch};
 use crate::direct::Fits;
 use crate::integrators::path::{CameraSample, Recording};
 use crate::integrators::{PathIntegrator, PathStats};
-use crate::scene::World;
+use crate::scene::RenderJob;
 use crate::settings::IntegratorKind;
 use lumiris_numbers::math::hash::HashStream;
 use serde::Serialize;
@@ -109,9 +109,9 @@ pub struct Stage {
     pub items: u64,
 }
 
-/// Measures. The ray tracer of `world` is dropped before bare loops run, so that a large scene is not held three times.
-pub fn measure(mut world: World, settings: &BenchSettings) -> Result<Report, EmbreeError> {
-    let batches = camera_batches(&world, settings.tile_size, settings.rays);
+/// Measures. The ray tracers of `job` are dropped before bare loops run, so that a large scene is not held three times.
+pub fn measure(mut job: RenderJob, settings: &BenchSettings) -> Result<Report, EmbreeError> {
+    let batches = camera_batches(&job, settings.tile_size, settings.rays);
     let camera_rays = batches.iter().map(Vec::len).sum();
     let mut report = Report {
         camera_rays,
@@ -122,18 +122,17 @@ pub fn measure(mut world: World, settings: &BenchSettings) -> Result<Report, Emb
         stages: Vec::new(),
     };
     if settings.t1 {
-        (report.stages, report.t1) = stages(&world, &batches, settings.runs);
+        (report.stages, report.t1) = stages(&job, &batches, settings.runs);
     }
     if !settings.intersect && !settings.t2 {
         return Ok(report);
     }
 
     // The rays of a path of two segments, and the segments of its vertices
-    world.scene.integrator.kind = IntegratorKind::Path;
-    world.scene.integrator.max_depth = 2;
-    let recording = record(&world, &batches);
-    let (geometry, textures) = (Arc::clone(&world.scene.geometry), Arc::clone(&world.scene.textures));
-    drop(world);
+    job.change(|settings| (settings.integrator.kind, settings.integrator.max_depth) = (IntegratorKind::Path, 2));
+    let recording = record(&job, &batches);
+    let (geometry, textures) = (Arc::clone(&job.world.scene.geometry), Arc::clone(&job.world.scene.textures));
+    drop(job);
 
     let alpha = Some(textures as Arc<dyn AlphaSource>);
     let accel = EmbreeAccel::new(Arc::clone(&geometry), alpha.clone(), settings.packet_width)?;
@@ -149,26 +148,26 @@ pub fn measure(mut world: World, settings: &BenchSettings) -> Result<Report, Emb
     Ok(report)
 }
 
-fn record(world: &World, batches: &[Vec<CameraSample>]) -> Recording {
+fn record(job: &RenderJob, batches: &[Vec<CameraSample>]) -> Recording {
     let mut integrator = PathIntegrator::default();
     integrator.recording = Some(Recording::default());
     let (mut fits, mut out) = (Fits::default(), Vec::new());
     for samples in batches {
-        integrator.trace(world, &world.scene.integrator, samples, &mut fits, &mut out);
+        integrator.trace(job, &job.settings().integrator, samples, &mut fits, &mut out);
     }
     integrator.recording.take().unwrap_or_default()
 }
 
 /// Renders the batches some times.
-fn stages(world: &World, batches: &[Vec<CameraSample>], runs: u32) -> (Vec<Stage>, Option<Proposals>) {
+fn stages(job: &RenderJob, batches: &[Vec<CameraSample>], runs: u32) -> (Vec<Stage>, Option<Proposals>) {
     let mut integrator = PathIntegrator::default();
     let mut out = Vec::new();
     let fits = batches.iter().flatten().map(|s| s.fit + 1).max().unwrap_or(0) as usize;
-    let mut fits = Fits::new(world, &world.scene.integrator, fits);
+    let mut fits = Fits::new(job, &job.settings().integrator, fits);
     let mut one_run = || {
         let start = Instant::now();
         for samples in batches {
-            integrator.trace(world, &world.scene.integrator, samples, &mut fits, &mut out);
+            integrator.trace(job, &job.settings().integrator, samples, &mut fits, &mut out);
             black_box(&out);
         }
         (start.elapsed(), integrator.take_stats())

@@ -2,7 +2,7 @@
 
 use super::{RenderError, thread_pool};
 use crate::photons::{GatherScratch, PhotonMap, Place, Search, Tracing, Want, trace_photons};
-use crate::scene::World;
+use crate::scene::RenderJob;
 use serde::Serialize;
 use std::hint::black_box;
 use std::time::Instant;
@@ -34,7 +34,7 @@ pub struct PhotonReport {
 }
 
 /// Traces photons on one thread and on `threads` (all cores if `None`), `runs` times each, and asks their map.
-pub fn measure_photons(world: &World, threads: Option<usize>, runs: u32) -> Result<PhotonReport, RenderError> {
+pub fn measure_photons(job: &RenderJob, threads: Option<usize>, runs: u32) -> Result<PhotonReport, RenderError> {
     let one = thread_pool(Some(1))?;
     let all = thread_pool(threads)?;
     let want = Want::Trajectories(TRAJECTORIES);
@@ -43,7 +43,7 @@ pub fn measure_photons(world: &World, threads: Option<usize>, runs: u32) -> Resu
     for run in 0..runs.max(1) {
         let tracing = Tracing { seed: run, ..Tracing::default() };
         for (pool, times) in [&one, &all].into_iter().zip(&mut times) {
-            let traced = pool.install(|| trace_photons(world, &tracing, None, want))?;
+            let traced = pool.install(|| trace_photons(job, &tracing, None, want))?;
             times.push(traced.elapsed.as_secs_f64());
             last = Some(traced);
         }
@@ -62,7 +62,7 @@ pub fn measure_photons(world: &World, threads: Option<usize>, runs: u32) -> Resu
         map = all.install(|| PhotonMap::new(copy));
         builds.push(start.elapsed().as_secs_f64());
     }
-    let max_radius = world.scene.lights.scene_radius;
+    let max_radius = job.lights.scene_radius;
     let nearest = |count| Search::Nearest { count, max_radius };
     let queries = [("50 nearest", nearest(50)), ("200 nearest", nearest(200))];
     Ok(PhotonReport {

@@ -10,7 +10,7 @@
 use crate::accel::{Accel, Coherence, Hit, RayBatch};
 use crate::geometry::Shape;
 use crate::lights::LightCtx;
-use crate::scene::{Scene, World};
+use crate::scene::{RenderJob, Scene};
 use glam::DVec3;
 use lumiris_numbers::math::ray::{SEGMENT_END, offset_origin};
 use lumiris_numbers::math::{Ray, Vec2, Vec3, warp};
@@ -100,25 +100,25 @@ impl Report {
 const MAX_EXAMPLES: usize = 16;
 
 /// Traces `rays` rays of each family through both tracers of the same scene.
-pub fn crosscheck(world: &World, other: &dyn Accel, rays: u32) -> Report {
+pub fn crosscheck(job: &RenderJob, other: &dyn Accel, rays: u32) -> Report {
     let mut report = Report { tallies: Vec::new(), examples: Vec::new() };
-    let scene = &world.scene;
+    let scene = &job.world.scene;
     let camera = camera_rays(scene, rays);
     let mut hits = Vec::new();
-    world.accel.intersect(&camera, Coherence::Coherent, &mut hits);
+    job.world.accel.intersect(&camera, Coherence::Coherent, &mut hits);
     for family in Family::ALL {
         let batch = match family {
             Family::Camera => camera.clone(),
-            Family::Shadow => shadow_rays(scene, &camera, &hits),
+            Family::Shadow => shadow_rays(job, &camera, &hits),
             Family::Random => random_rays(scene, rays),
             Family::Grazing => grazing_rays(scene, &camera, &hits),
             Family::Edge => edge_rays(scene, rays),
         };
         let mut checker = Checker { scene, family, tally: Tally::default(), examples: &mut report.examples };
         if family == Family::Shadow {
-            checker.check_occlusion(&*world.accel, other, &batch);
+            checker.check_occlusion(&*job.world.accel, other, &batch);
         } else {
-            checker.check_hits(&*world.accel, other, &batch);
+            checker.check_hits(&*job.world.accel, other, &batch);
         }
         let tally = checker.tally;
         report.tallies.push((family, tally));
@@ -153,15 +153,15 @@ fn random_rays(scene: &Scene, count: u32) -> RayBatch {
     batch
 }
 
-fn shadow_rays(scene: &Scene, camera: &RayBatch, hits: &[Option<Hit>]) -> RayBatch {
+fn shadow_rays(job: &RenderJob, camera: &RayBatch, hits: &[Option<Hit>]) -> RayBatch {
     let mut batch = RayBatch::default();
     for (i, hit) in hits.iter().enumerate() {
         let Some(hit) = hit else { continue };
         let time = camera.time[i];
-        let s = scene.geometry.surface_hit(hit.geometry, hit.primitive, hit.instance, hit.uv, time);
+        let s = job.world.scene.geometry.surface_hit(hit.geometry, hit.primitive, hit.instance, hit.uv, time);
         let u = uniforms(Family::Shadow, i as u32);
         let ctx = LightCtx { p: s.p, n: s.n, ns: s.ns };
-        let Some((_, sample)) = scene.lights.sample(&ctx, u[0], [u[1], u[2]]) else { continue };
+        let Some((_, sample)) = job.lights.sample(&ctx, u[0], [u[1], u[2]]) else { continue };
         let o = offset_origin(s.p, s.p_error, s.n, sample.wi);
         if sample.t.is_finite() {
             let end = offset_origin(sample.p, sample.p_error, sample.n, o - sample.p);

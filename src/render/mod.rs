@@ -19,7 +19,7 @@ use crate::integrators::path::CameraSample;
 use crate::integrators::photon_map::{self, MapMaker, MapStats, PhotonMaps};
 use crate::integrators::{CacheIntegrator, PathIntegrator, PathStats, PhotonMapIntegrator};
 use crate::photons::PhotonError;
-use crate::scene::World;
+use crate::scene::RenderJob;
 use crate::settings::{IntegratorKind, Proposals};
 use lumiris_numbers::estimators::ocv::block_of;
 use lumiris_numbers::math::Vec2;
@@ -145,14 +145,14 @@ pub struct ThreadError {
 
 /// Renders. `stop` ends it after the tiles under way; `observe` is called from worker threads.
 pub fn render(
-    world: &World,
+    job: &RenderJob,
     settings: &RenderSettings,
     stop: &AtomicBool,
     observe: &(dyn Fn(&Progress) + Sync),
 ) -> Result<Rendering, RenderError> {
     let pool = thread_pool(settings.threads)?;
     let threads = pool.current_num_threads();
-    pool.install(|| Run::new(world, settings, stop, observe).run(threads))
+    pool.install(|| Run::new(job, settings, stop, observe).run(threads))
 }
 
 /// Threads, all cores if their number is not given.
@@ -163,14 +163,14 @@ pub fn thread_pool(threads: Option<usize>) -> Result<rayon::ThreadPool, ThreadEr
 }
 
 /// Batches of camera samples as the renderer makes them in its first pass, spread over the picture; about `rays` together.
-fn camera_batches(world: &World, tile_size: u32, rays: usize) -> Vec<Vec<CameraSample>> {
+fn camera_batches(job: &RenderJob, tile_size: u32, rays: usize) -> Vec<Vec<CameraSample>> {
     let stop = AtomicBool::new(false);
-    let spp = world.scene.sampling.spp;
+    let spp = job.settings().sampling.spp;
     let settings = RenderSettings { tile_size, spp, ..RenderSettings::default() };
-    let run = Run::new(world, &settings, &stop, &|_| ());
+    let run = Run::new(job, &settings, &stop, &|_| ());
     let per_pixel = spp.min(run.pass_length()).max(1);
     let pixels_per_batch = (BATCH_PATHS / per_pixel as usize).max(1);
-    let tiles = world.scene.film.bounds.tiles(tile_size);
+    let tiles = job.world.scene.film.bounds.tiles(tile_size);
     let parts: Vec<_> = tiles
         .iter()
         .flat_map(|tile| {
@@ -200,7 +200,7 @@ struct Tile {
 }
 
 struct Run<'a> {
-    world: &'a World,
+    job: &'a RenderJob,
     settings: &'a RenderSettings,
     stop: &'a AtomicBool,
     observe: &'a (dyn Fn(&Progress) + Sync),
@@ -215,17 +215,17 @@ struct Run<'a> {
 
 impl<'a> Run<'a> {
     fn new(
-        world: &'a World,
+        job: &'a RenderJob,
         settings: &'a RenderSettings,
         stop: &'a AtomicBool,
         observe: &'a (dyn Fn(&Progress) + Sync),
     ) -> Self {
         Run {
-            world,
+            job,
             settings,
             stop,
             observe,
-            filter: world.scene.film.filter.sampler(),
+            filter: job.world.scene.film.filter.sampler(),
             cache: None,
             maps: None,
             start: Instant::now(),
@@ -235,17 +235,17 @@ impl<'a> Run<'a> {
     }
 
     fn run(mut self, threads: usize) -> Result<Rendering, RenderError> {
-        let bounds = self.world.scene.film.bounds;
+        let bounds = self.job.world.scene.film.bounds;
         let build = self.build_cache();
         let mut maker = self.map_maker()?;
-        let integrator = &self.world.scene.integrator;
+        let integrator = &self.job.settings().integrator;
         let mut tiles: Vec<Tile> = bounds
             .tiles(self.settings.tile_size)
             .into_iter()
             .map(|bounds| Tile {
                 bounds,
                 sums: vec![PixelSums::default(); bounds.area()],
-                fits: Fits::new(self.world, integrator, bounds.area()),
+                fits: Fits::new(self.job, integrator, bounds.area()),
             })
             .collect();
 
@@ -268,7 +268,7 @@ impl<'a> Run<'a> {
                 length = if integrator.photons.progressive.is_some() { 1 } else { length };
                 if self.maps.is_none() || integrator.photons.progressive.is_some() {
                     self.maps = None;
-                    self.maps = match maker.make(self.world, first) {
+                    self.maps = match maker.make(self.job, first) {
                         Ok(maps) => Some(maps),
                         // The samples so far are a picture
                         Err(PhotonError::Stopped { .. }) if first > self.settings.first_sample => break,
@@ -279,12 +279,12 @@ impl<'a> Run<'a> {
             let samples = first..(first + length).min(end);
             stats.merge(&self.pass(&mut tiles, samples.clone(), noise));
             first = samples.end;
-            let mut film = Film::new(self.world.scene.film.resolution, bounds);
+            let mut film = Film::new(self.job.world.scene.film.resolution, bounds);
             tiles.iter().for_each(|t| film.replace_tile(&t.bounds, &t.sums));
             noise = Some(film.relative_noise());
         }
 
-        let mut film = Film::new(self.world.scene.film.resolution, bounds);
+        let mut film = Film::new(self.job.world.scene.film.resolution, bounds);
         tiles.iter().for_each(|t| film.replace_tile(&t.bounds, &t.sums));
         let cache = self.cache.as_ref().zip(build).map(|(cache, build)| {
             stats.paths.merge(&build.paths);
@@ -301,25 +301,25 @@ impl<'a> Run<'a> {
 
     /// Makes the irradiance cache, if the integrator has one.
     fn build_cache(&mut self) -> Option<BuildStats> {
-        if self.world.scene.integrator.kind != IntegratorKind::IrradianceCache {
+        if self.job.settings().integrator.kind != IntegratorKind::IrradianceCache {
             return None;
         }
-        let bounds = self.world.scene.film.bounds;
-        let seed = self.world.scene.sampling.seed;
+        let bounds = self.job.world.scene.film.bounds;
+        let seed = self.job.settings().sampling.seed;
         let camera = |pixel, sample| self.camera_sample_of_seed(pixel, sample, seed);
-        let (cache, stats) = irradiance_cache::build(self.world, bounds, &camera, self.stop);
+        let (cache, stats) = irradiance_cache::build(self.job, bounds, &camera, self.stop);
         self.cache = Some(cache);
         Some(stats)
     }
 
     /// What makes the photon maps, if the integrator has any.
     fn map_maker(&self) -> Result<Option<MapMaker<'a>>, PhotonError> {
-        if self.world.scene.integrator.kind != IntegratorKind::PhotonMap {
+        if self.job.settings().integrator.kind != IntegratorKind::PhotonMap {
             return Ok(None);
         }
-        let seed = self.world.scene.sampling.seed;
-        let seen = photon_map::maps::seen(self.world, &|pixel, sample| self.camera_sample_of_seed(pixel, sample, seed));
-        MapMaker::new(self.world, &seen, self.stop).map(Some)
+        let seed = self.job.settings().sampling.seed;
+        let seen = photon_map::maps::seen(self.job, &|pixel, sample| self.camera_sample_of_seed(pixel, sample, seed));
+        MapMaker::new(self.job, &seen, self.stop).map(Some)
     }
 
     /// Samples per pixel of the longest pass.
@@ -355,7 +355,7 @@ impl<'a> Run<'a> {
                 let done = tile.bounds.area() as u64 * u64::from(samples.end - samples.start);
                 (self.observe)(&Progress {
                     samples_done: self.samples_done.fetch_add(done, Ordering::Relaxed) + done,
-                    samples_total: self.world.scene.film.bounds.area() as u64 * u64::from(self.settings.spp),
+                    samples_total: self.job.world.scene.film.bounds.area() as u64 * u64::from(self.settings.spp),
                     rays: self.rays.fetch_add(rays, Ordering::Relaxed) + rays,
                     elapsed: self.start.elapsed(),
                     noise,
@@ -374,7 +374,7 @@ impl<'a> Run<'a> {
         let pixels_per_batch = (BATCH_PATHS / per_pixel).max(1);
         let bounds = tile.bounds;
         let mut ill_conditioned = 0;
-        let settings = &self.world.scene.integrator;
+        let settings = &self.job.settings().integrator;
         let done = samples.start - self.settings.first_sample;
         let start = Instant::now();
         let begins_block = settings.is_progressive() && done > 0 && block_of(done).first == done;
@@ -385,7 +385,7 @@ impl<'a> Run<'a> {
         for (batch, sums) in tile.sums.chunks_mut(pixels_per_batch).enumerate() {
             let first = batch * pixels_per_batch;
             self.camera_samples(&bounds, first..first + sums.len(), samples.clone(), &mut worker.samples);
-            worker.trace(self.world, (self.cache.as_ref(), self.maps.as_ref()), &mut tile.fits);
+            worker.trace(self.job, (self.cache.as_ref(), self.maps.as_ref()), &mut tile.fits);
             for (pixel, results) in sums.iter_mut().zip(worker.results.chunks(per_pixel)) {
                 results.iter().for_each(|r| pixel.add(r));
             }
@@ -419,30 +419,30 @@ impl<'a> Run<'a> {
 
     /// The direct light of a progressive estimator is drawn block by block, each with a seed of its own.
     fn camera_sample(&self, pixel: [u32; 2], sample: u32) -> CameraSample {
-        let seed = self.world.scene.sampling.seed;
-        if !self.world.scene.integrator.is_progressive() {
+        let seed = self.job.settings().sampling.seed;
+        if !self.job.settings().integrator.is_progressive() {
             return self.camera_sample_of_seed(pixel, sample, seed);
         }
         let first = self.settings.first_sample;
         let block = block_of(sample - first);
         let block_seed = pcg4d([seed, first, block.index, BLOCK_SEED])[0];
-        let kind = self.world.scene.sampling.sampler;
+        let kind = self.job.settings().sampling.sampler;
         let direct = SampleStream::new(kind, pixel, sample - first - block.first, block_seed);
         CameraSample { direct, ..self.camera_sample_of_seed(pixel, sample, seed) }
     }
 
     fn camera_sample_of_seed(&self, pixel: [u32; 2], sample: u32, seed: u32) -> CameraSample {
-        let scene = &self.world.scene;
-        let stream = SampleStream::new(scene.sampling.sampler, pixel, sample, seed);
+        let (scene, settings) = (&self.job.world.scene, self.job.settings());
+        let stream = SampleStream::new(settings.sampling.sampler, pixel, sample, seed);
         let [fx, fy, lx, ly] = stream.domain(domain::FILM_AND_LENS).draw::<4>();
         let [u_time] = stream.domain(domain::TIME).draw::<1>();
         let filter = self.filter.sample([fx, fy]);
         let film = Vec2::new(pixel[0] as f32 + 0.5, pixel[1] as f32 + 0.5) + filter.offset;
         let ray = scene.camera.ray(film, [lx, ly], u_time);
-        let chosen = self.world.splits.as_ref().filter(|_| scene.integrator.ris.proposals == Proposals::Optimal);
+        let chosen = self.job.splits.as_ref().filter(|_| settings.integrator.ris.proposals == Proposals::Optimal);
         let split = match chosen {
             Some(map) => map.split(pixel, stream.domain(domain::SPLIT).draw::<2>()),
-            None => scene.integrator.split(),
+            None => settings.integrator.split(),
         };
         CameraSample {
             ray,
@@ -469,15 +469,15 @@ impl Worker {
     /// Traces `samples` into `results`.
     fn trace(
         &mut self,
-        world: &World,
+        job: &RenderJob,
         (cache, maps): (Option<&IrradianceCache>, Option<&PhotonMaps>),
         fits: &mut Fits,
     ) {
         let (samples, results) = (&self.samples, &mut self.results);
         match (cache, maps) {
-            (Some(cache), _) => self.with_cache.trace(world, cache, samples, fits, results),
-            (None, Some(maps)) => self.with_photons.trace(world, maps, samples, fits, results),
-            (None, None) => self.integrator.trace(world, &world.scene.integrator, samples, fits, results),
+            (Some(cache), _) => self.with_cache.trace(job, cache, samples, fits, results),
+            (None, Some(maps)) => self.with_photons.trace(job, maps, samples, fits, results),
+            (None, None) => self.integrator.trace(job, &job.settings().integrator, samples, fits, results),
         }
     }
 

@@ -16,9 +16,9 @@ use crate::direct::Fits;
 use crate::film::PixelBounds;
 use crate::integrators::PathIntegrator;
 use crate::integrators::path::CameraSample;
-use crate::scene::{SplitMap, World};
+use crate::scene::{RenderJob, SplitMap};
 use crate::settings::{
-    EstimatorKind, IntegratorKind, IntegratorSettings, Proposals, Split, StageTimes, Strata, Target,
+    EstimatorKind, IntegratorKind, IntegratorSettings, Proposals, RisSettings, Split, StageTimes, Strata, Target,
 };
 use lumiris_numbers::estimators::ris::choice::{Costs, MomentsEstimate, Variances, clamp_ratio, optimal_ratio};
 use rayon::prelude::*;
@@ -46,13 +46,13 @@ pub struct Plan {
     pub split: Split,
 }
 
-/// Chooses what the settings of `world` leave open, and sets it. `None` if they leave nothing open. `ratio_map` asks for the
+/// Chooses what the settings of `job` leave open, and sets it. `None` if they leave nothing open. `ratio_map` asks for the
 /// map of the best M/N even if it is not used.
-pub fn prepare(world: &mut World, threads: Option<usize>, ratio_map: bool) -> Result<Option<Plan>, ThreadError> {
-    let settings = world.scene.integrator;
-    if settings.uses_light_hints() && world.scene.lights.hints().is_none() {
-        let hints = super::thread_pool(threads)?.install(|| light_hints(world));
-        world.scene.lights.set_hints(hints.map(|(hints, _)| hints));
+pub fn prepare(job: &mut RenderJob, threads: Option<usize>, ratio_map: bool) -> Result<Option<Plan>, ThreadError> {
+    let settings = job.settings().integrator;
+    if settings.uses_light_hints() && job.lights.hints().is_none() {
+        let hints = super::thread_pool(threads)?.install(|| light_hints(job));
+        job.lights.set_hints(hints.map(|(hints, _)| hints));
     }
     let is_open = !matches!(settings.ris.proposals, Proposals::Fixed(_));
     if settings.estimator != EstimatorKind::Ris || !is_open && !ratio_map {
@@ -61,27 +61,29 @@ pub fn prepare(world: &mut World, threads: Option<usize>, ratio_map: bool) -> Re
 
     // Times; without light they do not matter
     let default = StageTimes { t1: 1.0, t2: 1.0 };
-    let times = settings.ris.stage_times.or_else(|| measure(world)).unwrap_or(default);
+    let times = settings.ris.stage_times.or_else(|| measure(job)).unwrap_or(default);
 
     // Numbers
-    let integrator = &mut world.scene.integrator;
-    integrator.ris.stage_times = Some(times);
-    let split = integrator.split();
-    integrator.samples = Some(split.samples);
     let is_optimal = settings.ris.proposals == Proposals::Optimal;
-    if !is_optimal {
-        integrator.ris.proposals = Proposals::Fixed(split.proposals);
-    }
-    world.splits = None;
+    let split =
+        IntegratorSettings { ris: RisSettings { stage_times: Some(times), ..settings.ris }, ..settings }.split();
+    job.change(|s| {
+        s.integrator.ris.stage_times = Some(times);
+        s.integrator.samples = Some(split.samples);
+        if !is_optimal {
+            s.integrator.ris.proposals = Proposals::Fixed(split.proposals);
+        }
+    });
+    job.splits = None;
     if is_optimal || ratio_map {
-        world.splits = Some(split_map(world, threads, times, split)?);
+        job.splits = Some(split_map(job, threads, times, split)?);
     }
     Ok(Some(Plan { times, split }))
 }
 
 /// Fits a + M·T1 and b + N·T2 to the times of few and of many proposals and samples; `None` if there was nothing to light.
-fn measure(world: &World) -> Option<StageTimes> {
-    let [few, many] = vertex_times(world)?;
+fn measure(job: &RenderJob) -> Option<StageTimes> {
+    let [few, many] = vertex_times(job)?;
     let [m0, m1] = TIMING.map(|split| f64::from(split.proposals));
     let [n0, n1] = TIMING.map(|split| f64::from(split.samples));
     Some(StageTimes { t1: rounded((many[0] - few[0]) / (m1 - m0)), t2: rounded((many[1] - few[1]) / (n1 - n0)) })
@@ -89,8 +91,8 @@ fn measure(world: &World) -> Option<StageTimes> {
 
 /// Nanoseconds per vertex of both stages for each split of [`TIMING`], which take turns on this thread: medians over batches of
 /// camera rays. `None` if nothing was lit.
-fn vertex_times(world: &World) -> Option<[[f64; 2]; 2]> {
-    let batches = camera_batches(world, RenderSettings::default().tile_size, TIMING_RAYS);
+fn vertex_times(job: &RenderJob) -> Option<[[f64; 2]; 2]> {
+    let batches = camera_batches(job, RenderSettings::default().tile_size, TIMING_RAYS);
     let mut integrator = PathIntegrator::default();
     let (mut samples, mut out) = (Vec::new(), Vec::new());
     let mut measured: [[Vec<f64>; 2]; 2] = Default::default();
@@ -98,12 +100,12 @@ fn vertex_times(world: &World) -> Option<[[f64; 2]; 2]> {
     for turn in 0..4 {
         for batch in batches.iter().flat_map(|b| b.chunks(1024)) {
             for (split, [t1, t2]) in TIMING.into_iter().zip(&mut measured) {
-                let mut settings = world.scene.integrator;
+                let mut settings = job.settings().integrator;
                 settings.samples = Some(split.samples);
                 settings.ris.proposals = Proposals::Fixed(split.proposals);
                 samples.clear();
                 samples.extend(batch.iter().map(|s| CameraSample { split, ..*s }));
-                integrator.trace(world, &settings, &samples, &mut Fits::default(), &mut out);
+                integrator.trace(job, &settings, &samples, &mut Fits::default(), &mut out);
                 let stats = integrator.take_stats();
                 let d = stats.direct;
                 let vertices = d.proposals / u64::from(split.proposals);
@@ -131,12 +133,17 @@ fn median(values: &mut [f64]) -> f64 {
 }
 
 /// The best M/N of each pixel for the time that `split` takes.
-fn split_map(world: &World, threads: Option<usize>, times: StageTimes, split: Split) -> Result<SplitMap, ThreadError> {
+fn split_map(
+    job: &RenderJob,
+    threads: Option<usize>,
+    times: StageTimes,
+    split: Split,
+) -> Result<SplitMap, ThreadError> {
     let pool = super::thread_pool(threads)?;
     let costs = Costs { t1: times.t1, t2: times.t2 };
     let time = f64::from(split.samples) * costs.t2 + f64::from(split.proposals) * costs.t1;
-    let variances = pool.install(|| pilot(world));
-    let bounds = world.scene.film.bounds;
+    let variances = pool.install(|| pilot(job));
+    let bounds = job.world.scene.film.bounds;
     let ratio = |v: &Option<Variances>| {
         let ratio = v.map_or(costs.robust_ratio(), |v| optimal_ratio(costs, v, time));
         clamp_ratio(ratio, costs, time)
@@ -151,12 +158,12 @@ fn split_map(world: &World, threads: Option<usize>, times: StageTimes, split: Sp
 }
 
 /// V(f/p) and V(f/q) around each pixel, row by row; `None` where nothing is lit.
-fn pilot(world: &World) -> Vec<Option<Variances>> {
+fn pilot(job: &RenderJob) -> Vec<Option<Variances>> {
     // Moments of each pixel
-    let bounds = world.scene.film.bounds;
+    let bounds = job.world.scene.film.bounds;
     let rows: Vec<Vec<MomentsEstimate>> = (bounds.y0..bounds.y1)
         .into_par_iter()
-        .map(|y| pilot_row(world, &PixelBounds { y0: y, y1: y + 1, ..bounds }))
+        .map(|y| pilot_row(job, &PixelBounds { y0: y, y1: y + 1, ..bounds }))
         .collect();
 
     // Sums over neighbours
@@ -180,20 +187,20 @@ fn pilot(world: &World) -> Vec<Option<Variances>> {
         .collect()
 }
 
-fn pilot_row(world: &World, row: &PixelBounds) -> Vec<MomentsEstimate> {
+fn pilot_row(job: &RenderJob, row: &PixelBounds) -> Vec<MomentsEstimate> {
     let all = Split { samples: PILOT_PROPOSALS, proposals: PILOT_PROPOSALS };
     let mut settings = IntegratorSettings {
         kind: IntegratorKind::Direct,
         max_depth: 1,
         samples: Some(all.samples),
-        ..world.scene.integrator
+        ..job.settings().integrator
     };
     settings.ris.proposals = Proposals::Fixed(all.proposals);
     settings.ris.strata = Strata::Proposals;
     settings.ris.target = Target::Fgl;
 
     let (stop, render) = (AtomicBool::new(false), RenderSettings::default());
-    let run = Run::new(world, &render, &stop, &|_| ());
+    let run = Run::new(job, &render, &stop, &|_| ());
     let mut integrator = PathIntegrator::default();
     let (mut samples, mut out) = (Vec::<CameraSample>::new(), Vec::new());
     let mut sums = vec![MomentsEstimate::new(); row.area()];
@@ -203,7 +210,7 @@ fn pilot_row(world: &World, row: &PixelBounds) -> Vec<MomentsEstimate> {
         samples.extend((0..PILOT_SPP).map(|s| run.camera_sample_of_seed(at, s, PILOT_SEED)));
         samples.iter_mut().for_each(|s| s.split = all);
         integrator.outcomes = Some(Vec::new());
-        integrator.trace(world, &settings, &samples, &mut Fits::default(), &mut out);
+        integrator.trace(job, &settings, &samples, &mut Fits::default(), &mut out);
         let outcomes = integrator.outcomes.take().unwrap_or_default();
         let m = f64::from(PILOT_PROPOSALS);
         for o in &outcomes {

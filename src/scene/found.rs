@@ -1,6 +1,6 @@
 //! What a ray found: a hit with what shading needs of it.
 
-use super::World;
+use super::{RenderJob, World};
 use crate::accel::Hit;
 use crate::geometry::SurfaceHit;
 use crate::materials::SurfaceBsdf;
@@ -40,10 +40,11 @@ impl Found {
     }
 
     /// The scattering at the hit; `None` where rays pass.
-    pub fn scatter<'w>(&self, world: &'w World) -> Option<SurfaceBsdf<'w>> {
-        let scene = &world.scene;
+    pub fn scatter<'j>(&self, job: &'j RenderJob) -> Option<SurfaceBsdf<'j>> {
+        let scene = &job.world.scene;
         let material = scene.surfaces[self.hit.geometry as usize].material;
-        scene.materials.bsdf(material, &scene.textures, &self.surface, &self.context, self.wo)
+        let bsdf = scene.materials.bsdf(material, &scene.textures, &self.surface, &self.context, self.wo)?;
+        Some(bsdf.proposed_by(job.settings().integrator.bsdf_density))
     }
 
     /// Origin of a ray that leaves the surface in direction `w`.

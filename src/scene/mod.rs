@@ -1,12 +1,15 @@
 //! A scene owns everything that is rendered, in vectors; what refers to something holds its index.
 //!
-//! [`Scene`] is data, as an importer makes it; [`World`] is a scene with its ray tracers, ready to render.
+//! [`Scene`] is data, as an importer makes it; [`World`] is a scene with its ray tracers; [`RenderJob`] is a world with the settings
+//! that it is rendered by, and with what they prepare.
 
 mod found;
+mod job;
 mod split_map;
 mod world;
 
 pub use found::Found;
+pub use job::RenderJob;
 pub use split_map::SplitMap;
 pub use world::{AccelKind, EmitterHit, World};
 
@@ -16,21 +19,16 @@ use crate::film::filter::PixelFilter;
 use crate::geometry::GeometrySet;
 use crate::lights::LightSet;
 use crate::materials::{MaterialId, MaterialSet};
-use crate::settings::{IntegratorSettings, SamplingSettings, Settings};
 use crate::textures::TextureSet;
 use std::sync::Arc;
 
-/// What is rendered and how the file asks for it.
+/// What is rendered.
 #[derive(Debug)]
 pub struct Scene {
     /// The camera.
     pub camera: Camera,
     /// Size and filter of the picture.
     pub film: FilmSettings,
-    /// Random numbers and samples per pixel.
-    pub sampling: SamplingSettings,
-    /// Light transport.
-    pub integrator: IntegratorSettings,
     /// All textures and texture images.
     pub textures: Arc<TextureSet>,
     /// All materials.
@@ -40,23 +38,7 @@ pub struct Scene {
     /// One per geometry of `geometry`.
     pub surfaces: Vec<Surface>,
     /// All lights.
-    pub lights: LightSet,
-}
-
-impl Scene {
-    /// All settings.
-    pub fn settings(&self) -> Settings {
-        Settings { integrator: self.integrator, sampling: self.sampling }
-    }
-
-    /// Renders by other settings from now on.
-    pub fn set(&mut self, settings: Settings) {
-        if settings.integrator.light_choice != self.integrator.light_choice {
-            self.lights.set_kind(settings.integrator.light_choice);
-        }
-        self.materials.set_proposal_density(settings.integrator.bsdf_density);
-        (self.integrator, self.sampling) = (settings.integrator, settings.sampling);
-    }
+    pub lights: Arc<LightSet>,
 }
 
 /// What a geometry is made of.

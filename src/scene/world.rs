@@ -1,11 +1,11 @@
 //! A scene with its ray tracers.
 
-use super::{Scene, SplitMap};
+use super::Scene;
 use crate::accel::bvh::Bvh;
 use crate::accel::embree::{EmbreeAccel, EmbreeError};
 use crate::accel::{Accel, AlphaSource, Coherence, Hit, RayBatch};
 use crate::geometry::{GeometryId, GeometrySet, Group};
-use crate::lights::{Irradiances, LightId, LightSampler, LightSamplerKind};
+use crate::lights::LightId;
 use crate::textures::{TextureContext, TextureSet};
 use lumiris_numbers::math::{Vec2, Vec3};
 use std::sync::Arc;
@@ -31,18 +31,11 @@ pub struct World {
     pub scene: Scene,
     /// Everything.
     pub accel: Box<dyn Accel>,
-    /// Samples and proposals of each pixel, if they were chosen for each by itself.
-    pub splits: Option<SplitMap>,
-    /// Irradiances of lights that are known in closed form.
-    pub irradiances: Irradiances,
-    /// Chooses among the lights that no ray can hit; `None` if there are none.
-    pub delta_lights: Option<LightSampler>,
     /// Emitters only; geometry ids are indices into `emitter_geometry`.
     emitters: Option<Box<dyn Accel>>,
     emitter_geometry: Vec<GeometryId>,
     /// False if no emitter can hide another.
     emitters_hide: bool,
-    lobes: usize,
 }
 
 /// The emitter that a ray meets first among emitters.
@@ -79,17 +72,10 @@ fn build(
     })
 }
 
-/// Puts lights into as many groups as a mixture has components beside `lobes`.
-fn set_groups(scene: &mut Scene, lobes: usize) {
-    scene.lights.set_groups(scene.integrator.ocv.most_components().saturating_sub(lobes).max(1));
-}
-
 impl World {
     /// Builds the ray tracers. `packet_width` overrides the device's native width (1, 4 or 8); pictures do
     /// not depend on it.
-    pub fn new(mut scene: Scene, kind: AccelKind, packet_width: Option<u32>) -> Result<World, EmbreeError> {
-        let lobes = scene.materials.lobes();
-        set_groups(&mut scene, lobes);
+    pub fn new(scene: Scene, kind: AccelKind, packet_width: Option<u32>) -> Result<World, EmbreeError> {
         let accel = build(kind, &scene.geometry, &scene.textures, packet_width)?;
         let emitter_geometry: Vec<GeometryId> =
             scene.geometry.root.geometries.iter().copied().filter(|&g| scene.lights.emits(g)).collect();
@@ -104,40 +90,7 @@ impl World {
             Some(build(kind, &Arc::new(set), &scene.textures, packet_width)?)
         };
         let emitters_hide = scene.lights.may_hide_each_other();
-        let has_alpha = |geometry: GeometryId| scene.geometry.geometries[geometry as usize].alpha.is_some();
-        let irradiances = Irradiances::new(&scene.lights, has_alpha);
-        let delta_lights = scene.lights.delta_sampler(scene.integrator.light_choice);
-        Ok(World {
-            scene,
-            accel,
-            splits: None,
-            irradiances,
-            delta_lights,
-            emitters,
-            emitter_geometry,
-            emitters_hide,
-            lobes,
-        })
-    }
-
-    /// Chooses lights in another way from now on.
-    pub fn set_light_choice(&mut self, kind: LightSamplerKind) {
-        if self.scene.integrator.light_choice != kind {
-            self.scene.integrator.light_choice = kind;
-            self.scene.lights.set_kind(kind);
-            set_groups(&mut self.scene, self.lobes);
-            self.delta_lights = self.scene.lights.delta_sampler(kind);
-        }
-    }
-
-    /// Number of components that BSDFs are in a mixture with the groups of lights: the lobes of those that have most.
-    pub fn lobes(&self) -> usize {
-        self.lobes
-    }
-
-    /// Number of components of a mixture: lobes, then groups of lights.
-    pub fn components(&self) -> usize {
-        self.lobes + self.scene.lights.groups.len()
+        Ok(World { scene, accel, emitters, emitter_geometry, emitters_hide })
     }
 
     /// True if an emitter can be in the way to another.

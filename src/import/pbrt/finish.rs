@@ -10,6 +10,7 @@ use crate::import::resources::{load_rgb, report};
 use crate::lights::{Emission, EmissionImage, LightSetBuilder, area_lights_of};
 use crate::materials::{Material, MaterialId, MaterialSet};
 use crate::scene::{Scene, Surface};
+use crate::settings::Settings;
 use lumiris_formats::diagnostic::Diagnostics;
 use lumiris_numbers::math::Rgb;
 use rayon::prelude::*;
@@ -32,7 +33,7 @@ struct Assembly {
 
 impl Builder<'_> {
     /// Reads what the text asks for and makes the scene; `None` after an error.
-    pub fn finish(mut self, d: &mut Diagnostics) -> Option<Scene> {
+    pub fn finish(mut self, d: &mut Diagnostics) -> Option<(Scene, Settings)> {
         let understood = self.options.finish(self.load_options, d);
 
         // Read all files, whatever went wrong before: all missing ones are named in one run
@@ -40,7 +41,7 @@ impl Builder<'_> {
         let environment_paths: Vec<PathBuf> = self.environments.iter().map(|e| e.path.clone()).collect();
         let emission_paths = self.emission_image_paths();
         // Images first: while one thread loads the library that reads them, the others have meshes and coats to work on
-        let ((images, emission_images, texture_images), (made, mut materials)) = rayon::join(
+        let ((images, emission_images, texture_images), (made, materials)) = rayon::join(
             || (load_images(&environment_paths), load_emission_images(&emission_paths), self.resources.load(d)),
             || {
                 rayon::join(
@@ -83,7 +84,6 @@ impl Builder<'_> {
             return None;
         }
         let Understood { camera, film, settings, .. } = understood?;
-        materials.set_proposal_density(settings.integrator.bsdf_density);
 
         // Lights
         let mut lights = LightSetBuilder::default();
@@ -93,18 +93,17 @@ impl Builder<'_> {
         for (geometry, emission) in &assembly.emitters {
             lights.add_area(*geometry, &assembly.set.geometries[*geometry as usize].shape, emission);
         }
-        let lights = lights.build(settings.integrator.light_choice, &assembly.set.world_bounds());
-        Some(Scene {
+        let lights = lights.build(&assembly.set.world_bounds());
+        let scene = Scene {
             camera,
             film,
-            sampling: settings.sampling,
-            integrator: settings.integrator,
             materials,
             textures: Arc::new(self.textures),
             geometry: Arc::new(assembly.set),
             surfaces: assembly.surfaces,
-            lights,
-        })
+            lights: Arc::new(lights),
+        };
+        Some((scene, settings))
     }
 
     /// Adds the shapes of one description to their group, or to the root, or to an instance of their own if they move.

@@ -222,7 +222,9 @@ mod tests {
         let folder = tempfile::tempdir().unwrap();
         let path = folder.path().join("scene.pbrt");
         std::fs::write(&path, format!("{integrator}\nWorldBegin\nShape \"sphere\"\n")).unwrap();
-        load(&path, &LoadOptions::default()).map(|loaded| loaded.scene.integrator).map_err(|report| report.to_string())
+        load(&path, &LoadOptions::default())
+            .map(|loaded| loaded.settings.integrator)
+            .map_err(|report| report.to_string())
     }
 
     #[test]

@@ -17,7 +17,7 @@ use super::octree::Octree;
 use super::record::{Range, Record};
 use crate::film::{PixelBounds, PixelSample};
 use crate::integrators::path::{self, CameraSample, PathIntegrator, PathStats};
-use crate::scene::World;
+use crate::scene::RenderJob;
 use crate::settings::Cached;
 use lumiris_numbers::math::{Bounds3, Vec3};
 use rayon::prelude::*;
@@ -57,16 +57,16 @@ pub type Cameras<'a> = &'a (dyn Fn([u32; 2], u32) -> CameraSample + Sync);
 
 /// Makes the cache of what the camera sees inside `bounds`. `stop` ends it early.
 pub fn build(
-    world: &World,
+    job: &RenderJob,
     bounds: PixelBounds,
     cameras: Cameras<'_>,
     stop: &AtomicBool,
 ) -> (IrradianceCache, BuildStats) {
     let start = Instant::now();
-    let world_bounds = world.scene.geometry.world_bounds();
-    let mut cache = IrradianceCache::new(world.scene.integrator.cache, &world_bounds);
+    let world_bounds = job.world.scene.geometry.world_bounds();
+    let mut cache = IrradianceCache::new(job.settings().integrator.cache, &world_bounds);
     let mut stats = BuildStats::default();
-    if holds_nothing(world) {
+    if holds_nothing(job) {
         return (cache, stats);
     }
     for round in rounds() {
@@ -76,7 +76,7 @@ pub fn build(
         stats.rounds += 1;
         let pixels = round.pixels(bounds);
         stats.camera_samples += pixels.len() as u64;
-        let wanted = ask(world, &cache, &pixels, &|pixel| cameras(pixel, round.sample), &mut stats.paths);
+        let wanted = ask(job, &cache, &pixels, &|pixel| cameras(pixel, round.sample), &mut stats.paths);
         let wanted: Vec<Wanted> = wanted.into_iter().map(|w| Wanted { key: w.key | round.sample << 16, ..w }).collect();
         let chosen = without_redundant(&wanted, &cache, &world_bounds);
         stats.dropped += (wanted.len() - chosen.len()) as u64;
@@ -84,7 +84,7 @@ pub fn build(
             if cache.is_full() || stop.load(Ordering::Relaxed) {
                 break;
             }
-            gather(world, part, &mut stats.paths).into_iter().for_each(|r| cache.insert(r));
+            gather(job, part, &mut stats.paths).into_iter().for_each(|r| cache.insert(r));
         }
     }
     stats.elapsed = start.elapsed();
@@ -92,13 +92,13 @@ pub fn build(
 }
 
 /// True if no record would have any light.
-fn holds_nothing(world: &World) -> bool {
-    let settings = &world.scene.integrator;
+fn holds_nothing(job: &RenderJob) -> bool {
+    let settings = &job.settings().integrator;
     let least_depth = match settings.cache.cached {
         Cached::Indirect => 2,
         Cached::All => 1,
     };
-    settings.max_depth < least_depth || world.scene.lights.lights.is_empty()
+    settings.max_depth < least_depth || job.lights.lights.is_empty()
 }
 
 /// A subset of the pixels: those whose x and y are `offset` modulo `stride`.
@@ -135,7 +135,7 @@ impl Round {
 
 /// The points that the camera samples of some pixels ask for, in the order of pixels.
 fn ask(
-    world: &World,
+    job: &RenderJob,
     cache: &IrradianceCache,
     pixels: &[[u32; 2]],
     camera: &(dyn Fn([u32; 2]) -> CameraSample + Sync),
@@ -145,7 +145,7 @@ fn ask(
         .par_chunks(CHUNK)
         .map_init(PathIntegrator::default, |paths, pixels| {
             let samples: Vec<CameraSample> = pixels.iter().map(|&pixel| camera(pixel)).collect();
-            (ask_chunk(world, cache, pixels, &samples, paths), paths.take_stats())
+            (ask_chunk(job, cache, pixels, &samples, paths), paths.take_stats())
         })
         .collect();
     parts.iter().for_each(|(_, s)| stats.merge(s));
@@ -153,13 +153,13 @@ fn ask(
 }
 
 fn ask_chunk(
-    world: &World,
+    job: &RenderJob,
     cache: &IrradianceCache,
     pixels: &[[u32; 2]],
     samples: &[CameraSample],
     paths: &mut PathIntegrator,
 ) -> Vec<Wanted> {
-    let settings = &world.scene.integrator;
+    let settings = &job.settings().integrator;
     let depth = settings.depth();
     let mut wanted = Vec::new();
     let mut out: Vec<PixelSample> = Vec::new();
@@ -169,7 +169,7 @@ fn ask_chunk(
         if paths.active.is_empty() {
             break;
         }
-        let vertices = paths.find_vertices(world, vertex, depth, samples, &mut out);
+        let vertices = paths.find_vertices(job, vertex, depth, samples, &mut out);
         paths.next.clear();
         for (state, v) in paths.active.iter().zip(&vertices) {
             let sample = state.sample as usize;
@@ -237,10 +237,10 @@ fn without_redundant(wanted: &[Wanted], cache: &IrradianceCache, bounds: &Bounds
 }
 
 /// The records of the points, in their order.
-fn gather(world: &World, wanted: &[Wanted], stats: &mut PathStats) -> Vec<Record> {
+fn gather(job: &RenderJob, wanted: &[Wanted], stats: &mut PathStats) -> Vec<Record> {
     let parts: Vec<(Vec<Record>, PathStats)> = wanted
         .par_chunks(BATCH)
-        .map_init(Gatherer::default, |gatherer, wanted| (gatherer.records(world, wanted), gatherer.take_stats()))
+        .map_init(Gatherer::default, |gatherer, wanted| (gatherer.records(job, wanted), gatherer.take_stats()))
         .collect();
     parts.iter().for_each(|(_, s)| stats.merge(s));
     parts.into_iter().flat_map(|(records, _)| records).collect()

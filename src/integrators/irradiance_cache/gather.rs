@@ -17,7 +17,7 @@ use crate::direct::{DirectStage, Fits, ShadePoint};
 use crate::film::PixelSample;
 use crate::integrators::path::{CameraSample, PathIntegrator, PathStats};
 use crate::materials::SurfaceBsdf;
-use crate::scene::{EmitterHit, World};
+use crate::scene::{EmitterHit, RenderJob};
 use crate::settings::{Cached, IntegratorKind, IntegratorSettings, Split};
 use lumiris_numbers::estimators::ocv::block_of;
 use lumiris_numbers::math::hash::pcg4d;
@@ -82,11 +82,11 @@ impl Gatherer {
     }
 
     /// The records of some points, in their order.
-    pub fn records(&mut self, world: &World, wanted: &[Wanted]) -> Vec<Record> {
-        let settings = &world.scene.integrator;
-        let mut records = self.indirect(world, settings, wanted);
+    pub fn records(&mut self, job: &RenderJob, wanted: &[Wanted]) -> Vec<Record> {
+        let settings = &job.settings().integrator;
+        let mut records = self.indirect(job, settings, wanted);
         if settings.cache.cached == Cached::All {
-            for (record, sources) in records.iter_mut().zip(self.sources(world, settings, wanted)) {
+            for (record, sources) in records.iter_mut().zip(self.sources(job, settings, wanted)) {
                 record.light = record.light.plus(&sources);
             }
         }
@@ -94,7 +94,7 @@ impl Gatherer {
     }
 
     /// Indirect light, and radii.
-    fn indirect(&mut self, world: &World, settings: &IntegratorSettings, wanted: &[Wanted]) -> Vec<Record> {
+    fn indirect(&mut self, job: &RenderJob, settings: &IntegratorSettings, wanted: &[Wanted]) -> Vec<Record> {
         // Paths through every cell; one bounce, which the record's surface makes, is theirs no more
         let cells = Cells::new(settings.cache.samples);
         let paths = IntegratorSettings {
@@ -107,7 +107,7 @@ impl Gatherer {
         for w in wanted {
             let frame = Frame::from_z(w.ns);
             for cell in 0..cells.count() {
-                let stream = w.stream(world, cell);
+                let stream = w.stream(job, cell);
                 let d = frame.to_world(cells.direction(cell, stream.domain(domain::CELL).draw::<2>()));
                 let o = offset_origin(w.p, w.p_error, w.n, d);
                 let ray = Ray { o, d, t_max: f32::INFINITY, time: w.time };
@@ -116,7 +116,7 @@ impl Gatherer {
             }
         }
         self.paths.only_reflected = true;
-        self.paths.trace(world, &paths, &self.samples, &mut Fits::default(), &mut self.results);
+        self.paths.trace(job, &paths, &self.samples, &mut Fits::default(), &mut self.results);
 
         // Irradiance
         let of_record = |(w, results): (&Wanted, &[PixelSample])| {
@@ -134,10 +134,10 @@ impl Gatherer {
     }
 
     /// Light of sources. Progressive estimators are fitted to the passes of each record: to earlier blocks of them.
-    fn sources(&mut self, world: &World, settings: &IntegratorSettings, wanted: &[Wanted]) -> Vec<Irradiance> {
+    fn sources(&mut self, job: &RenderJob, settings: &IntegratorSettings, wanted: &[Wanted]) -> Vec<Irradiance> {
         let passes = settings.cache.passes.max(1);
         let mut sums = vec![Irradiance::default(); wanted.len()];
-        let mut fits = Fits::new(world, settings, wanted.len());
+        let mut fits = Fits::new(job, settings, wanted.len());
         for pass in 0..passes {
             let block = block_of(pass);
             if settings.is_progressive() && pass > 0 && block.first == pass {
@@ -148,17 +148,17 @@ impl Gatherer {
                 .zip(wanted)
                 .map(|(fit, w)| {
                     let place = if settings.is_progressive() { (block.index, pass - block.first) } else { (0, pass) };
-                    ShadePoint { fit, ..w.white_point(world, place, settings.split()) }
+                    ShadePoint { fit, ..w.white_point(job, place, settings.split()) }
                 })
                 .collect();
-            self.direct.estimate(world, settings, &points, &mut fits, &mut self.radiance);
+            self.direct.estimate(job, settings, &points, &mut fits, &mut self.radiance);
             for (sum, &l) in sums.iter_mut().zip(&self.radiance) {
                 // E = π L of a white surface
                 sum.e += l * (PI / passes as f32);
             }
             // Both halves of a crossfit are estimates
             let halves = 1 + u32::from(settings.has_halves());
-            self.add_gradients(world, wanted, halves, PI / (passes * halves) as f32, &mut sums);
+            self.add_gradients(job, wanted, halves, PI / (passes * halves) as f32, &mut sums);
         }
         for sum in sums.iter_mut().filter(|s| !s.is_finite()) {
             *sum = Irradiance { e: if sum.e.is_finite() { sum.e } else { Rgb::BLACK }, ..Irradiance::default() };
@@ -167,7 +167,14 @@ impl Gatherer {
     }
 
     /// Adds the gradients that the samples of the last estimates have, `estimates` of each point, times `scale`.
-    fn add_gradients(&mut self, world: &World, wanted: &[Wanted], estimates: u32, scale: f32, sums: &mut [Irradiance]) {
+    fn add_gradients(
+        &mut self,
+        job: &RenderJob,
+        wanted: &[Wanted],
+        estimates: u32,
+        scale: f32,
+        sums: &mut [Irradiance],
+    ) {
         // Normals of the emitters at the ends of segments
         let segments = self.direct.segments();
         self.rays.clear();
@@ -179,7 +186,7 @@ impl Gatherer {
                 free.push(((point / estimates) as usize, l * scale, segment.t_max.is_finite()));
             }
         }
-        world.intersect_emitters(&self.rays, &mut self.hits, &mut self.emitters);
+        job.world.intersect_emitters(&self.rays, &mut self.hits, &mut self.emitters);
 
         for (i, &(point, c, has_end)) in free.iter().enumerate() {
             let (w, sum) = (&wanted[point], &mut sums[point]);
@@ -191,7 +198,7 @@ impl Gatherer {
             let wi = d / r2.sqrt();
             Irradiance::add_gradient(&mut sum.rotation, w.ns.cross(wi), c / wi.dot(w.ns).max(MIN_COS));
             if has_end {
-                let gradient = log_gradient(world, w, d, self.emitters[i].as_ref());
+                let gradient = log_gradient(job, w, d, self.emitters[i].as_ref());
                 // Tangential
                 Irradiance::add_gradient(&mut sum.translation, gradient - w.ns * gradient.dot(w.ns), c);
             }
@@ -201,11 +208,11 @@ impl Gatherer {
 
 /// ∇x ln(cos θ cos θ'/r²) up to a part along the normal, d being the way from x to the light: 4d/r² − n'/(n'·d) for an emitter at
 /// its end, 3d/r² for a light that is a point.
-fn log_gradient(world: &World, w: &Wanted, d: Vec3, emitter: Option<&EmitterHit>) -> Vec3 {
+fn log_gradient(job: &RenderJob, w: &Wanted, d: Vec3, emitter: Option<&EmitterHit>) -> Vec3 {
     let r2 = d.length_squared();
     match emitter {
         Some(hit) if (hit.t - 1.0).abs() < 1e-3 => {
-            let s = world.scene.geometry.surface_hit(hit.geometry, hit.primitive, Hit::NO_INSTANCE, hit.uv, w.time);
+            let s = job.world.scene.geometry.surface_hit(hit.geometry, hit.primitive, Hit::NO_INSTANCE, hit.uv, w.time);
             let n = if s.n.dot(d) < 0.0 { -s.n } else { s.n };
             d * (4.0 / r2) - n / n.dot(d).max(MIN_COS * r2.sqrt())
         }
@@ -228,19 +235,19 @@ fn radius(light: &Irradiance, r: &[f32], kappa: f32) -> f32 {
 
 impl Wanted {
     /// Random numbers of sample `index` of this record.
-    fn stream(&self, world: &World, index: u32) -> SampleStream {
-        self.stream_of_block(world, 0, index)
+    fn stream(&self, job: &RenderJob, index: u32) -> SampleStream {
+        self.stream_of_block(job, 0, index)
     }
 
     /// The same for blocks that are independent of each other.
-    fn stream_of_block(&self, world: &World, block: u32, index: u32) -> SampleStream {
-        let sampling = &world.scene.sampling;
+    fn stream_of_block(&self, job: &RenderJob, block: u32, index: u32) -> SampleStream {
+        let sampling = &job.settings().sampling;
         let [seed, ..] = pcg4d([sampling.seed, self.key, 0x6972_7261, block]);
         SampleStream::new(sampling.sampler, self.pixel, index, seed)
     }
 
     /// A white surface here, whose light is estimated with sample `index` of `block`.
-    fn white_point(&self, world: &World, (block, index): (u32, u32), split: Split) -> ShadePoint<'static> {
+    fn white_point(&self, job: &RenderJob, (block, index): (u32, u32), split: Split) -> ShadePoint<'static> {
         let bsdf = SurfaceBsdf {
             bsdf: Bsdf::Diffuse(Diffuse { reflectance: Rgb::WHITE }),
             frame: Frame::from_z(self.ns),
@@ -252,7 +259,7 @@ impl Wanted {
             wo: self.ns,
             bsdf,
             time: self.time,
-            stream: self.stream_of_block(world, block, index).domain(domain::SOURCES),
+            stream: self.stream_of_block(job, block, index).domain(domain::SOURCES),
             split,
             fit: 0,
         }

@@ -28,7 +28,7 @@ use super::path::{CameraSample, PathIntegrator, PathState, PathStats, Vertex};
 use crate::bsdfs::Lambertian;
 use crate::direct::Fits;
 use crate::film::PixelSample;
-use crate::scene::World;
+use crate::scene::RenderJob;
 use crate::settings::Cached;
 use lumiris_numbers::math::Rgb;
 use std::f32::consts::FRAC_1_PI;
@@ -66,14 +66,14 @@ impl CacheIntegrator {
     /// Estimates the radiance of each camera sample; `out[i]` belongs to `samples[i]`. `fits` are those of the samples' pixels.
     pub fn trace(
         &mut self,
-        world: &World,
+        job: &RenderJob,
         cache: &IrradianceCache,
         samples: &[CameraSample],
         fits: &mut Fits,
         out: &mut Vec<PixelSample>,
     ) {
         let mut lookup = Lookup { cache, stats: &mut self.lookups };
-        diffuse::trace(&mut self.paths, world, &mut lookup, samples, fits, out);
+        diffuse::trace(&mut self.paths, job, &mut lookup, samples, fits, out);
     }
 }
 

@@ -10,7 +10,7 @@ use crate::photons::{
     GatherScratch, Importance, ImportanceSettings, Origin, Photon, PhotonError, PhotonMap, Place, Search, Traced,
     Tracing, Unimportant, Want, trace_importons, trace_photons,
 };
-use crate::scene::World;
+use crate::scene::{RenderJob, World};
 use crate::settings::{Deposition, PhotonMapSettings};
 use lumiris_numbers::math::hash::pcg4d;
 use lumiris_numbers::math::{Rgb, Vec3};
@@ -98,9 +98,9 @@ pub struct MapMaker<'a> {
 impl<'a> MapMaker<'a> {
     /// Traces importons, if there are to be any, and finds the first radii of progressive maps: as far as the nearest photons reach
     /// from `seen`, places and normals where the camera looks.
-    pub fn new(world: &World, seen: &[(Vec3, Vec3)], stop: &'a AtomicBool) -> Result<Self, PhotonError> {
-        let settings = world.scene.integrator.photons;
-        let (max_depth, seed) = (world.scene.integrator.max_depth, world.scene.sampling.seed);
+    pub fn new(job: &RenderJob, seen: &[(Vec3, Vec3)], stop: &'a AtomicBool) -> Result<Self, PhotonError> {
+        let settings = job.settings().integrator.photons;
+        let (max_depth, seed) = (job.settings().integrator.max_depth, job.settings().sampling.seed);
         let unimportant = match settings.deposition {
             Deposition::All => None,
             Deposition::Floor(least) => Some(Unimportant::Floor(least)),
@@ -111,7 +111,7 @@ impl<'a> MapMaker<'a> {
             Some(unimportant) => {
                 let settings =
                     ImportanceSettings { seed, unimportant, quantile: QUANTILE, ..ImportanceSettings::default() };
-                Some(trace_importons(world, &settings)?)
+                Some(trace_importons(job, &settings)?)
             }
         };
         let mut maker =
@@ -120,10 +120,10 @@ impl<'a> MapMaker<'a> {
             maker.radii = Some(match shrinking.radius {
                 Some(radius) => [radius; 2],
                 None => {
-                    let traced = maker.traced(world, 0)?;
+                    let traced = maker.traced(job, 0)?;
                     let global = PhotonMap::new(traced.global);
                     let caustic = PhotonMap::new(traced.caustic);
-                    let most = world.scene.lights.scene_radius;
+                    let most = job.lights.scene_radius;
                     let radius = median_reach(&global, seen, settings.nearest, most).unwrap_or(0.01 * most);
                     let at_caustics = places_of(&caustic);
                     [radius, median_reach(&caustic, &at_caustics, settings.nearest, radius).unwrap_or(radius)]
@@ -138,7 +138,7 @@ impl<'a> MapMaker<'a> {
         self.importance.as_ref()
     }
 
-    fn traced(&self, world: &World, pass: u32) -> Result<Traced, PhotonError> {
+    fn traced(&self, job: &RenderJob, pass: u32) -> Result<Traced, PhotonError> {
         let s = &self.settings;
         let [seed, ..] = pcg4d([self.seed, pass, PASS_SEED, 0]);
         let tracing = Tracing {
@@ -152,41 +152,41 @@ impl<'a> MapMaker<'a> {
             ..Tracing::default()
         };
         let want = Want::Stored { global: u64::from(s.photons), most_trajectories: s.trajectories };
-        trace_photons(world, &tracing, self.importance.as_ref(), want)
+        trace_photons(job, &tracing, self.importance.as_ref(), want)
     }
 
     /// The maps of a pass.
-    pub fn make(&mut self, world: &World, pass: u32) -> Result<PhotonMaps, PhotonError> {
+    pub fn make(&mut self, job: &RenderJob, pass: u32) -> Result<PhotonMaps, PhotonError> {
         let start = Instant::now();
-        let traced = self.traced(world, pass)?;
+        let traced = self.traced(job, pass)?;
         let traced_at = Instant::now();
         self.stats.maps += 1;
         self.stats.trajectories += traced.trajectories;
         self.stats.global += traced.global.len() as u64;
         self.stats.caustic += traced.caustic.len() as u64;
         self.stats.importons = self.importance.as_ref().map_or(0, |i| i.map().len() as u64);
-        let maps = self.maps(world, pass, traced);
+        let maps = self.maps(job, pass, traced);
         self.stats.bytes = self.stats.bytes.max(maps.bytes());
         self.stats.tracing += traced_at - start;
         self.stats.sorting += traced_at.elapsed();
         Ok(maps)
     }
 
-    fn maps(&self, world: &World, pass: u32, traced: Traced) -> PhotonMaps {
+    fn maps(&self, job: &RenderJob, pass: u32, traced: Traced) -> PhotonMaps {
         let nearest = self.settings.nearest;
         let (global, caustic) = (PhotonMap::new(traced.global), PhotonMap::new(traced.caustic));
         if let (Some(shrinking), Some(radii)) = (self.settings.progressive, self.radii) {
             let [search, caustic_search] = radii.map(|r| Search::Radius(r * shrinking.factor(pass)));
             return PhotonMaps { global, caustic, records: None, search, caustic_search, nearest };
         }
-        let most = world.scene.lights.scene_radius;
+        let most = job.lights.scene_radius;
         // Where caustics end, the nearest photons are far away and not of that place
         let reach = median_reach(&caustic, &places_of(&caustic), nearest, most).unwrap_or(0.01 * most);
         let search = Search::Nearest { count: nearest, max_radius: most };
         let caustic_search = Search::Nearest { count: nearest, max_radius: 2.0 * reach };
         let mut maps = PhotonMaps { global, caustic, records: None, search, caustic_search, nearest };
         if self.settings.gather > 0 {
-            maps.records = Some(PhotonMap::new(maps.irradiances(world)));
+            maps.records = Some(PhotonMap::new(maps.irradiances(&job.world)));
         }
         maps
     }
@@ -291,14 +291,14 @@ impl PhotonMaps {
 }
 
 /// Diffuse places that the camera sees, spread over the picture, with their normals; `camera` gives the samples of a pixel.
-pub fn seen(world: &World, camera: &dyn Fn([u32; 2], u32) -> CameraSample) -> Vec<(Vec3, Vec3)> {
-    let b = world.scene.film.bounds;
+pub fn seen(job: &RenderJob, camera: &dyn Fn([u32; 2], u32) -> CameraSample) -> Vec<(Vec3, Vec3)> {
+    let b = job.world.scene.film.bounds;
     let stride = (b.area() / PROBES).max(1);
     let pixels = (0..b.area() as u32).step_by(stride).map(|i| [b.x0 + i % b.width(), b.y0 + i / b.width()]);
     let samples: Vec<CameraSample> = pixels.map(|pixel| camera(pixel, 0)).collect();
     let (mut paths, mut results) = (PathIntegrator::default(), Vec::new());
     paths.start(&samples, &mut results);
-    let vertices = paths.find_vertices(world, 0, 1, &samples, &mut results);
+    let vertices = paths.find_vertices(job, 0, 1, &samples, &mut results);
     let diffuse = vertices.iter().filter(|v| v.bsdf.lambertian(v.wo).is_some());
     diffuse.map(|v| (v.surface.p, if v.surface.n.dot(v.wo) < 0.0 { -v.surface.n } else { v.surface.n })).collect()
 }

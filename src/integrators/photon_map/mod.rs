@@ -28,7 +28,7 @@ use crate::direct::{Fits, ShadePoint};
 use crate::film::PixelSample;
 use crate::materials::SurfaceBsdf;
 use crate::photons::{GatherScratch, Place, Search};
-use crate::scene::World;
+use crate::scene::RenderJob;
 use crate::settings::PhotonMapSettings;
 use boundary::{Boundary, Probe};
 use guide::Guide;
@@ -51,7 +51,7 @@ pub struct PhotonMapIntegrator {
     paths: PathIntegrator,
     gather: PathIntegrator,
     scratch: GatherScratch,
-    jobs: Vec<Job>,
+    requests: Vec<GatherRequest>,
     samples: Vec<CameraSample>,
     results: Vec<PixelSample>,
     boundary: Boundary,
@@ -71,7 +71,7 @@ struct Pending {
 
 /// A place that asks for a final gather.
 #[derive(Clone, Copy, Debug)]
-struct Job {
+struct GatherRequest {
     /// Index of the camera sample.
     sample: u32,
     /// What radiance that arrives with the density of the cosine is worth: throughput times albedo.
@@ -102,41 +102,41 @@ impl PhotonMapIntegrator {
     /// Estimates the radiance of each camera sample; `out[i]` belongs to `samples[i]`. `fits` are those of the samples' pixels.
     pub fn trace(
         &mut self,
-        world: &World,
+        job: &RenderJob,
         maps: &PhotonMaps,
         samples: &[CameraSample],
         fits: &mut Fits,
         out: &mut Vec<PixelSample>,
     ) {
-        self.jobs.clear();
+        self.requests.clear();
         self.pending.clear();
-        let settings = &world.scene.integrator;
+        let settings = &job.settings().integrator;
         let mut lookup = Lookup {
             maps,
             settings: &settings.photons,
             depth: settings.depth(),
             samples,
             scratch: &mut self.scratch,
-            jobs: &mut self.jobs,
+            requests: &mut self.requests,
             pending: &mut self.pending,
         };
-        diffuse::trace(&mut self.paths, world, &mut lookup, samples, fits, out);
-        self.correct(world, out);
+        diffuse::trace(&mut self.paths, job, &mut lookup, samples, fits, out);
+        self.correct(job, out);
         self.start_gather(maps, &settings.photons);
-        self.finish_gather(world, maps);
-        let rays_of_job = self.results.chunks(settings.photons.gather.max(1) as usize);
-        for (job, rays) in self.jobs.iter().zip(rays_of_job) {
+        self.finish_gather(job, maps);
+        let rays_of_request = self.results.chunks(settings.photons.gather.max(1) as usize);
+        for (request, rays) in self.requests.iter().zip(rays_of_request) {
             for ray in rays {
-                out[job.sample as usize].radiance += job.beta * ray.radiance;
+                out[request.sample as usize].radiance += request.beta * ray.radiance;
             }
         }
     }
 
     /// Adds what waits, times the numbers of trials of its kernels.
-    fn correct(&mut self, world: &World, out: &mut [PixelSample]) {
+    fn correct(&mut self, job: &RenderJob, out: &mut [PixelSample]) {
         self.probes.clear();
         self.probes.extend(self.pending.iter().map(|p| p.probe));
-        self.boundary.trials(world, &self.probes, &mut self.trials);
+        self.boundary.trials(&job.world, &self.probes, &mut self.trials);
         for (pending, &trials) in self.pending.iter().zip(&self.trials) {
             out[pending.owner as usize].radiance += pending.radiance * trials as f32;
         }
@@ -147,21 +147,21 @@ impl PhotonMapIntegrator {
     fn start_gather(&mut self, maps: &PhotonMaps, settings: &PhotonMapSettings) {
         self.samples.clear();
         let count = settings.gather;
-        for job in &self.jobs {
-            let frame = Frame::from_z(job.place.ns);
-            let guide = guide(maps, &job.place, &frame, settings.guide, &mut self.scratch);
+        for request in &self.requests {
+            let frame = Frame::from_z(request.place.ns);
+            let guide = guide(maps, &request.place, &frame, settings.guide, &mut self.scratch);
             for i in 0..count {
-                let stream = job.stream.split(GATHER, count, i);
+                let stream = request.stream.split(GATHER, count, i);
                 let [u_choice, u0, u1] = stream.draw::<3>();
                 let w = guide.sample(u_choice, [u0, u1]);
                 let pdf = guide.pdf(w);
                 let d = frame.to_world(w);
                 // Below the surface itself there is nothing to see
-                let is_above = w.z > 0.0 && pdf > 0.0 && d.dot(job.place.n) > 0.0;
+                let is_above = w.z > 0.0 && pdf > 0.0 && d.dot(request.place.n) > 0.0;
                 let weight = if is_above { w.z * FRAC_1_PI / (pdf * count as f32) } else { 0.0 };
-                let o = offset_origin(job.place.p, job.p_error, job.place.n, d);
-                let ray = Ray { o, d, t_max: f32::INFINITY, time: job.time };
-                let ray = CameraRay { ray, spread: job.spread, width0: job.width, weight: 1.0 };
+                let o = offset_origin(request.place.p, request.p_error, request.place.n, d);
+                let ray = Ray { o, d, t_max: f32::INFINITY, time: request.time };
+                let ray = CameraRay { ray, spread: request.spread, width0: request.width, weight: 1.0 };
                 let split = crate::settings::Split { samples: 1, proposals: 1 };
                 self.samples.push(CameraSample { ray, weight, stream, direct: stream, split, fit: 0 });
             }
@@ -169,11 +169,11 @@ impl PhotonMapIntegrator {
     }
 
     /// What the rays of all gathers bring.
-    fn finish_gather(&mut self, world: &World, maps: &PhotonMaps) {
-        let settings = &world.scene.integrator;
+    fn finish_gather(&mut self, job: &RenderJob, maps: &PhotonMaps) {
+        let settings = &job.settings().integrator;
         let depth = settings.depth();
         let (gather, scratch) = (&mut self.gather, &mut self.scratch);
-        let rays_per_job = settings.photons.gather.max(1);
+        let rays_per_request = settings.photons.gather.max(1);
         gather.only_reflected = true;
         gather.start(&self.samples, &mut self.results);
         gather.active.retain(|path| !path.beta.is_black());
@@ -181,7 +181,7 @@ impl PhotonMapIntegrator {
             if gather.active.is_empty() {
                 break;
             }
-            let vertices = gather.find_vertices(world, vertex, depth, &self.samples, &mut self.results);
+            let vertices = gather.find_vertices(job, vertex, depth, &self.samples, &mut self.results);
 
             // Ask the maps, but where what they would answer comes from too near
             let mut near = Vec::new();
@@ -202,14 +202,14 @@ impl PhotonMapIntegrator {
             let split = settings.split_at_vertex(1);
             let points: Vec<ShadePoint<'_>> =
                 near.iter().map(|(path, v, _)| v.shade_point(path.ray.time, split, 0)).collect();
-            gather.direct.estimate(world, &at_vertex, &points, &mut Fits::default(), &mut gather.radiance);
+            gather.direct.estimate(job, &at_vertex, &points, &mut Fits::default(), &mut gather.radiance);
             gather.next.clear();
             for (((path, v, part), point), &radiance) in near.iter().zip(&points).zip(&gather.radiance) {
                 self.results[path.sample as usize].radiance += path.beta * radiance;
                 for (i, side) in (0..).zip(sides(v, part)) {
                     wait((path, v, CAUSTIC + i), side, maps.caustics(&side.1, scratch), &mut self.pending);
                 }
-                let before = self.jobs[(path.sample / rays_per_job) as usize].vertex;
+                let before = self.requests[(path.sample / rays_per_request) as usize].vertex;
                 if before + vertex + 2 < depth {
                     gather.next.extend(path::extend(path, v, point, vertex, settings).map(|(next, _)| next));
                 }
@@ -217,7 +217,7 @@ impl PhotonMapIntegrator {
             std::mem::swap(&mut gather.active, &mut gather.next);
         }
         let mut results = std::mem::take(&mut self.results);
-        self.correct(world, &mut results);
+        self.correct(job, &mut results);
         self.results = results;
     }
 }
@@ -229,7 +229,7 @@ struct Lookup<'a> {
     depth: u32,
     samples: &'a [CameraSample],
     scratch: &'a mut GatherScratch,
-    jobs: &'a mut Vec<Job>,
+    requests: &'a mut Vec<GatherRequest>,
     pending: &'a mut Vec<Pending>,
 }
 
@@ -248,7 +248,7 @@ impl Reflected for Lookup<'_> {
         if self.settings.gather == 0 {
             return Some(Rgb::BLACK);
         }
-        self.jobs.extend(sides(v, part).map(|(albedo, place)| Job {
+        self.requests.extend(sides(v, part).map(|(albedo, place)| GatherRequest {
             sample: path.sample,
             beta: path.beta * albedo,
             vertex,

@@ -2,12 +2,12 @@
 
 use super::args::SceneArgs;
 use super::progress;
-use super::settings::{load_world, plan};
+use super::settings::{load_job, plan};
 use anyhow::{Context, bail};
 use clap::{Args, ValueEnum};
 use lumiris::render::bench::{BenchSettings, RayCase, Report, measure};
 use lumiris::render::bench_photons::{PhotonReport, measure_photons};
-use lumiris::scene::{AccelKind, World};
+use lumiris::scene::{AccelKind, RenderJob};
 use serde_json::json;
 use std::path::PathBuf;
 use std::process::ExitCode;
@@ -50,8 +50,8 @@ pub fn run(args: &BenchArgs) -> anyhow::Result<ExitCode> {
     if args.scene.accel != AccelKind::Embree {
         bail!("bench measures Embree; leave out --accel");
     }
-    let (mut world, times) = load_world(&args.scene)?;
-    plan(&args.scene, &mut world, false, false)?;
+    let (mut job, times) = load_job(&args.scene)?;
+    plan(&args.scene, &mut job, false, false)?;
     let asked = |subject| args.subject == subject || args.subject == Subject::All;
     let settings = BenchSettings {
         intersect: asked(Subject::Intersect),
@@ -62,8 +62,8 @@ pub fn run(args: &BenchArgs) -> anyhow::Result<ExitCode> {
         packet_width: args.scene.packet_width,
         tile_size: args.scene.tile_size,
     };
-    let photons = if asked(Subject::Photons) { photons(args, &world)? } else { None };
-    let report = measure(world, &settings)?;
+    let photons = if asked(Subject::Photons) { photons(args, &job)? } else { None };
+    let report = measure(job, &settings)?;
     if args.subject != Subject::Photons {
         progress::print(&table(&report));
     }
@@ -81,8 +81,8 @@ pub fn run(args: &BenchArgs) -> anyhow::Result<ExitCode> {
 }
 
 /// Measures photons, and prints what was found; a scene without photons has everything else, if that is asked for.
-fn photons(args: &BenchArgs, world: &World) -> anyhow::Result<Option<PhotonReport>> {
-    match measure_photons(world, args.scene.threads.map(|t| t as usize), args.runs) {
+fn photons(args: &BenchArgs, job: &RenderJob) -> anyhow::Result<Option<PhotonReport>> {
+    match measure_photons(job, args.scene.threads.map(|t| t as usize), args.runs) {
         Ok(report) => {
             progress::print(&photon_table(&report));
             Ok(Some(report))

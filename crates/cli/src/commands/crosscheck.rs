@@ -2,7 +2,7 @@
 
 use super::args::SceneArgs;
 use super::progress;
-use super::settings::{load_world, plan, render_settings};
+use super::settings::{load_job, plan, render_settings};
 use anyhow::{Context, bail};
 use clap::Args;
 use lumiris::accel::Accel;
@@ -10,7 +10,7 @@ use lumiris::accel::bvh::Bvh;
 use lumiris::imaging::oiio::{self, Part};
 use lumiris::render::crosscheck::{EDGE_ULPS, Report, T_TOLERANCE_ULPS, crosscheck};
 use lumiris::render::{output, render};
-use lumiris::scene::{AccelKind, World};
+use lumiris::scene::{AccelKind, RenderJob, World};
 use serde::Serialize;
 use std::path::PathBuf;
 use std::process::ExitCode;
@@ -62,17 +62,17 @@ pub fn run(args: &CrosscheckArgs) -> anyhow::Result<ExitCode> {
     }
 
     // Rays
-    let (mut world, _) = load_world(&args.scene)?;
-    plan(&args.scene, &mut world, false, true)?;
+    let (mut job, _) = load_job(&args.scene)?;
+    plan(&args.scene, &mut job, false, true)?;
     let bvh: Box<dyn Accel> =
-        Box::new(Bvh::new(Arc::clone(&world.scene.geometry), Some(Arc::clone(&world.scene.textures) as _)));
-    let report = crosscheck(&world, &*bvh, args.rays);
+        Box::new(Bvh::new(Arc::clone(&job.world.scene.geometry), Some(Arc::clone(&job.world.scene.textures) as _)));
+    let report = crosscheck(&job, &*bvh, args.rays);
     progress::print(&table(&report));
 
     // Pictures
-    let embree_picture = picture(args, &world)?;
-    world = World::new(world.scene, AccelKind::Bvh, None)?;
-    let bvh_picture = picture(args, &world)?;
+    let embree_picture = picture(args, &job)?;
+    job.world = World::new(job.world.scene, AccelKind::Bvh, None)?;
+    let bvh_picture = picture(args, &job)?;
     let images = compare(&embree_picture, &bvh_picture);
     progress::print(&format!(
         "pictures: {} of {} pixels identical to the bit, {} off by more than {} %, means differ by {:.2e}",
@@ -83,7 +83,7 @@ pub fn run(args: &CrosscheckArgs) -> anyhow::Result<ExitCode> {
         images.relative_mean_difference
     ));
     if let Some(folder) = &args.images {
-        write_pictures(folder, &world, &embree_picture, &bvh_picture)?;
+        write_pictures(folder, &job, &embree_picture, &bvh_picture)?;
     }
     if let Some(path) = &args.json {
         let text = serde_json::to_string_pretty(&serde_json::json!({ "rays": report, "images": images }))?;
@@ -115,9 +115,9 @@ fn table(report: &Report) -> String {
 }
 
 /// The mean of each pixel, RGB interleaved.
-fn picture(args: &CrosscheckArgs, world: &World) -> anyhow::Result<Vec<f32>> {
-    let settings = render_settings(&args.scene, world);
-    let rendering = render(world, &settings, &AtomicBool::new(false), &|_| ())?;
+fn picture(args: &CrosscheckArgs, job: &RenderJob) -> anyhow::Result<Vec<f32>> {
+    let settings = render_settings(&args.scene, job);
+    let rendering = render(job, &settings, &AtomicBool::new(false), &|_| ())?;
     Ok(output::channels(&rendering.film, &[], None).data)
 }
 
@@ -137,9 +137,9 @@ fn compare(a: &[f32], b: &[f32]) -> ImageReport {
     ImageReport { pixels: a.len() / 3, identical, different, relative_mean_difference }
 }
 
-fn write_pictures(folder: &std::path::Path, world: &World, a: &[f32], b: &[f32]) -> anyhow::Result<()> {
+fn write_pictures(folder: &std::path::Path, job: &RenderJob, a: &[f32], b: &[f32]) -> anyhow::Result<()> {
     std::fs::create_dir_all(folder).with_context(|| format!("cannot make {}", folder.display()))?;
-    let bounds = world.scene.film.bounds;
+    let bounds = job.world.scene.film.bounds;
     let difference: Vec<f32> = a.iter().zip(b).map(|(x, y)| (x - y).abs()).collect();
     for (name, data) in [("embree", a), ("bvh", b), ("difference", &difference)] {
         let names = ["R", "G", "B"].map(str::to_owned).to_vec();

@@ -2,11 +2,11 @@
 
 use super::args::SceneArgs;
 use super::progress;
-use super::settings::load_world;
+use super::settings::load_job;
 use clap::Args;
 use lumiris::geometry::Shape;
 use lumiris::render::output::metadata;
-use lumiris::scene::World;
+use lumiris::scene::{RenderJob, Scene};
 use lumiris::settings::{Setting, Value as SettingValue};
 use serde_json::{Value, json};
 use std::collections::BTreeMap;
@@ -23,8 +23,8 @@ pub struct InfoArgs {
 }
 
 pub fn run(args: &InfoArgs) -> anyhow::Result<ExitCode> {
-    let (world, times) = load_world(&args.scene)?;
-    let mut facts = facts(&world);
+    let (job, times) = load_job(&args.scene)?;
+    let mut facts = facts(&job);
     facts["seconds"] = json!({ "load": times.load, "build": times.build });
     facts["scene"] = json!(args.scene.scene.display().to_string());
     if args.json {
@@ -38,8 +38,8 @@ pub fn run(args: &InfoArgs) -> anyhow::Result<ExitCode> {
 }
 
 /// Everything that is worth knowing of a scene, as JSON.
-fn facts(world: &World) -> Value {
-    let scene = &world.scene;
+fn facts(job: &RenderJob) -> Value {
+    let scene = &job.world.scene;
     let set = &scene.geometry;
     let (triangles, quadrics, patches) = set.primitive_counts();
     let group_triangles = |group: &lumiris::geometry::Group| -> usize {
@@ -60,8 +60,8 @@ fn facts(world: &World) -> Value {
     for light in &scene.lights.lights {
         *lights.entry(light.kind_name()).or_default() += 1;
     }
-    let accel = world.accel.stats();
-    let settings = scene.settings();
+    let accel = job.world.accel.stats();
+    let settings = job.settings();
     let changed = |(row, value): (&Setting, SettingValue)| (format!("--{}", row.flag), value.to_string());
     json!({
         "geometry": {
@@ -77,17 +77,17 @@ fn facts(world: &World) -> Value {
             "float": scene.textures.floats.len(), "rgb": scene.textures.rgbs.len(), "images": scene.textures.images.len(),
         },
         "memory": {
-            "geometry_bytes": geometry_bytes(world),
+            "geometry_bytes": geometry_bytes(scene),
             "texture_bytes": scene.textures.images.iter().map(|i| i.bytes() as u64).sum::<u64>(),
             "accel_bytes": accel.bytes, "accel_peak_bytes": accel.peak_bytes,
         },
-        "settings": metadata(&scene.film, &settings).into_iter().collect::<BTreeMap<_, _>>(),
+        "settings": metadata(&scene.film, settings).into_iter().collect::<BTreeMap<_, _>>(),
         "changed_settings": settings.changed().map(changed).collect::<BTreeMap<_, _>>(),
     })
 }
 
-fn geometry_bytes(world: &World) -> u64 {
-    let bytes = world.scene.geometry.geometries.iter().map(|g| match &g.shape {
+fn geometry_bytes(scene: &Scene) -> u64 {
+    let bytes = scene.geometry.geometries.iter().map(|g| match &g.shape {
         Shape::Mesh(m) => {
             let vectors = m.padded_positions().len() + m.normals.len() + m.tangents.len() + m.indices.len();
             vectors * 12 + m.uvs.len() * 8

@@ -2,12 +2,12 @@
 
 use super::args::RenderArgs;
 use super::progress::{self, Bar};
-use super::settings::{SetupTimes, load_world, plan, render_settings};
+use super::settings::{SetupTimes, load_job, plan, render_settings};
 use anyhow::{Context, bail};
 use lumiris::imaging::oiio::{self, Part};
 use lumiris::render::output::{self, Aov};
 use lumiris::render::{RenderSettings, Rendering, render};
-use lumiris::scene::World;
+use lumiris::scene::RenderJob;
 use serde_json::json;
 use std::path::{Path, PathBuf};
 use std::process::ExitCode;
@@ -22,10 +22,10 @@ pub const INTERRUPTED: u8 = 130;
 
 pub fn run(args: &RenderArgs) -> anyhow::Result<ExitCode> {
     check_outputs(&args.output)?;
-    let (mut world, setup) = load_world(&args.scene)?;
+    let (mut job, setup) = load_job(&args.scene)?;
     let asks_for_ratio = args.aov.iter().flatten().any(|a| *a == Aov::Ratio);
-    plan(&args.scene, &mut world, asks_for_ratio, args.quiet)?;
-    let outputs = outputs(args, &world);
+    plan(&args.scene, &mut job, asks_for_ratio, args.quiet)?;
+    let outputs = outputs(args, &job);
     check_outputs(&outputs)?;
 
     let stop = Arc::new(AtomicBool::new(false));
@@ -33,15 +33,15 @@ pub fn run(args: &RenderArgs) -> anyhow::Result<ExitCode> {
 
     let bar = Bar::new(args.quiet);
     let time_limit = args.time.map(Duration::from_secs_f64);
-    let settings = RenderSettings { time_limit, ..render_settings(&args.scene, &world) };
-    let rendering = render(&world, &settings, &stop, &|p| bar.update(p))?;
+    let settings = RenderSettings { time_limit, ..render_settings(&args.scene, &job) };
+    let rendering = render(&job, &settings, &stop, &|p| bar.update(p))?;
     bar.finish();
 
     for path in &outputs {
-        write(args, &world, &rendering, path)?;
+        write(args, &job, &rendering, path)?;
     }
     if let Some(path) = &args.stats {
-        let text = serde_json::to_string_pretty(&stats(args, &world, &rendering, setup))?;
+        let text = serde_json::to_string_pretty(&stats(args, &job, &rendering, setup))?;
         std::fs::write(path, text).with_context(|| format!("cannot write {}", path.display()))?;
     }
     report(args, &rendering, &outputs);
@@ -60,11 +60,11 @@ pub fn stop_at_ctrl_c(stop: &Arc<AtomicBool>) -> anyhow::Result<()> {
     .context("cannot watch for Ctrl-C")
 }
 
-fn outputs(args: &RenderArgs, world: &World) -> Vec<PathBuf> {
+fn outputs(args: &RenderArgs, job: &RenderJob) -> Vec<PathBuf> {
     if !args.output.is_empty() {
         return args.output.clone();
     }
-    let from_file = world.scene.film.file_name.as_ref().map(PathBuf::from);
+    let from_file = job.world.scene.film.file_name.as_ref().map(PathBuf::from);
     vec![from_file.unwrap_or_else(|| {
         let name = args.scene.scene.file_name().unwrap_or_default().to_string_lossy().into_owned();
         let stem = name.trim_end_matches(".gz").trim_end_matches(".pbrt").to_owned();
@@ -91,10 +91,10 @@ fn check_outputs(outputs: &[PathBuf]) -> anyhow::Result<()> {
     Ok(())
 }
 
-fn write(args: &RenderArgs, world: &World, rendering: &Rendering, path: &Path) -> anyhow::Result<()> {
+fn write(args: &RenderArgs, job: &RenderJob, rendering: &Rendering, path: &Path) -> anyhow::Result<()> {
     let film = &rendering.film;
     let (width, height) = (film.bounds.width() as usize, film.bounds.height() as usize);
-    let mut metadata = output::metadata(&world.scene.film, &world.scene.settings());
+    let mut metadata = output::metadata(&job.world.scene.film, job.settings());
     metadata.push(("lumiris:scene".to_owned(), args.scene.scene.display().to_string()));
     metadata.push(("lumiris:accel".to_owned(), args.scene.accel.into_str().to_owned()));
     metadata.push(("lumiris:complete".to_owned(), rendering.complete.to_string()));
@@ -106,12 +106,12 @@ fn write(args: &RenderArgs, world: &World, rendering: &Rendering, path: &Path) -
         let aovs: Vec<Aov> = match &args.aov {
             Some(list) => list.clone(),
             None => {
-                let ratio = world.splits.as_ref().map(|_| Aov::Ratio);
+                let ratio = job.splits.as_ref().map(|_| Aov::Ratio);
                 let records = rendering.cache.map(|_| Aov::Records);
                 Aov::ALL.into_iter().chain(ratio).chain(records).collect()
             }
         };
-        let channels = output::channels(film, &aovs, world.splits.as_ref());
+        let channels = output::channels(film, &aovs, job.splits.as_ref());
         Part::linear(width, height, channels.names, channels.data)
     } else {
         let names = ["R", "G", "B"].map(str::to_owned).to_vec();
@@ -123,14 +123,14 @@ fn write(args: &RenderArgs, world: &World, rendering: &Rendering, path: &Path) -
     Ok(())
 }
 
-fn stats(args: &RenderArgs, world: &World, rendering: &Rendering, setup: SetupTimes) -> serde_json::Value {
+fn stats(args: &RenderArgs, job: &RenderJob, rendering: &Rendering, setup: SetupTimes) -> serde_json::Value {
     let s = &rendering.stats;
     let d = &s.direct;
     let seconds = |t: Duration| t.as_secs_f64();
     let mrays = |count: u64, t: Duration| count as f64 / seconds(t).max(1e-12) * 1e-6;
-    let accel = world.accel.stats();
+    let accel = job.world.accel.stats();
     let metadata: serde_json::Map<_, _> =
-        output::metadata(&world.scene.film, &world.scene.settings()).into_iter().map(|(k, v)| (k, v.into())).collect();
+        output::metadata(&job.world.scene.film, job.settings()).into_iter().map(|(k, v)| (k, v.into())).collect();
     json!({
         "scene": args.scene.scene.display().to_string(),
         "settings": metadata,

@@ -1,13 +1,13 @@
-//! From typed options to a world that is ready to render.
+//! From typed options to what a rendering works on.
 
 use super::args::SceneArgs;
 use super::progress;
 use anyhow::{Context, bail};
 use lumiris::film::filter::PixelFilter;
-use lumiris::import::{LoadOptions, load};
+use lumiris::import::{LoadOptions, Loaded, load};
 use lumiris::render::RenderSettings;
 use lumiris::render::plan::prepare;
-use lumiris::scene::{Scene, World};
+use lumiris::scene::RenderJob;
 use lumiris::settings::{Proposals, Split, StageTimes};
 use std::time::Instant;
 
@@ -20,10 +20,10 @@ pub struct SetupTimes {
     pub build: f64,
 }
 
-/// Loads the scene and applies the options; warnings are printed unless `quiet`.
-pub fn load_scene(args: &SceneArgs) -> anyhow::Result<Scene> {
+/// Loads the scene and applies the options; says what there is to warn of.
+fn load_scene(args: &SceneArgs) -> anyhow::Result<Loaded> {
     let options = LoadOptions { resolution: args.resolution, crop: args.crop };
-    let loaded = match load(&args.scene, &options) {
+    let mut loaded = match load(&args.scene, &options) {
         Ok(loaded) => loaded,
         Err(diagnostics) => {
             progress::say(diagnostics.to_string().trim_end());
@@ -34,42 +34,36 @@ pub fn load_scene(args: &SceneArgs) -> anyhow::Result<Scene> {
     if !warnings.is_empty() {
         progress::say(warnings.trim_end());
     }
-    let mut scene = loaded.scene;
-    apply(args, &mut scene);
-    if scene.integrator.leaves_lights_out() {
+    args.settings.apply(&mut loaded.settings);
+    if args.box_filter {
+        loaded.scene.film.filter = PixelFilter::Box { rx: 0.5, ry: 0.5 };
+    }
+    if loaded.settings.integrator.leaves_lights_out() {
         progress::say("warning: without samples on the lights that no photon came from, direct light is biased");
     }
-    Ok(scene)
-}
-
-fn apply(args: &SceneArgs, scene: &mut Scene) {
-    let mut settings = scene.settings();
-    args.settings.apply(&mut settings);
-    scene.set(settings);
-    if args.box_filter {
-        scene.film.filter = PixelFilter::Box { rx: 0.5, ry: 0.5 };
-    }
+    Ok(loaded)
 }
 
 /// Loads the scene and builds its ray tracers.
-pub fn load_world(args: &SceneArgs) -> anyhow::Result<(World, SetupTimes)> {
+pub fn load_job(args: &SceneArgs) -> anyhow::Result<(RenderJob, SetupTimes)> {
     let start = Instant::now();
-    let scene = load_scene(args)?;
+    let loaded = load_scene(args)?;
     let load = start.elapsed().as_secs_f64();
     let start = Instant::now();
-    let world = World::new(scene, args.accel, args.packet_width)
+    let job = loaded
+        .job(args.accel, args.packet_width)
         .with_context(|| format!("cannot build the ray tracer of {}", args.scene.display()))?;
-    Ok((world, SetupTimes { load, build: start.elapsed().as_secs_f64() }))
+    Ok((job, SetupTimes { load, build: start.elapsed().as_secs_f64() }))
 }
 
 /// Chooses the numbers of samples and proposals that are still open, and says what it chose unless `quiet`.
-pub fn plan(args: &SceneArgs, world: &mut World, ratio_map: bool, quiet: bool) -> anyhow::Result<()> {
+pub fn plan(args: &SceneArgs, job: &mut RenderJob, ratio_map: bool, quiet: bool) -> anyhow::Result<()> {
     let threads = args.threads.map(|t| t as usize);
-    if let (Some(plan), false) = (prepare(world, threads, ratio_map)?, quiet) {
+    if let (Some(plan), false) = (prepare(job, threads, ratio_map)?, quiet) {
         let Split { samples, proposals } = plan.split;
         let StageTimes { t1, t2 } = plan.times;
-        let by_pixel =
-            if world.scene.integrator.ris.proposals == Proposals::Optimal { ", split anew in each pixel" } else { "" };
+        let is_optimal = job.settings().integrator.ris.proposals == Proposals::Optimal;
+        let by_pixel = if is_optimal { ", split anew in each pixel" } else { "" };
         progress::say(&format!(
             "ris: {samples} of {proposals} proposals are traced{by_pixel} (a proposal takes {t1} ns, a sample {t2} ns)"
         ));
@@ -78,11 +72,11 @@ pub fn plan(args: &SceneArgs, world: &mut World, ratio_map: bool, quiet: bool) -
 }
 
 /// How the options say to render.
-pub fn render_settings(args: &SceneArgs, world: &World) -> RenderSettings {
+pub fn render_settings(args: &SceneArgs, job: &RenderJob) -> RenderSettings {
     RenderSettings {
         threads: args.threads.map(|t| t as usize),
         tile_size: args.tile_size,
-        spp: world.scene.sampling.spp,
+        spp: job.settings().sampling.spp,
         ..RenderSettings::default()
     }
 }

@@ -15,7 +15,7 @@ use lumiris::import::{LoadOptions, load};
 use lumiris::lights::LightHints;
 use lumiris::render::plan::prepare;
 use lumiris::render::{RenderError, RenderSettings, Rendering, render};
-use lumiris::scene::{AccelKind, World};
+use lumiris::scene::{AccelKind, RenderJob};
 use lumiris::settings::{Proposals, StageTimes, Strata};
 use lumiris_numbers::estimators::stats::{Welford, z_test};
 use rustix::time::{ClockId, clock_gettime};
@@ -55,7 +55,7 @@ const CENTRE: f32 = 1e-3;
 
 /// A scene, ready to be rendered by many methods.
 pub struct Stage {
-    world: World,
+    job: RenderJob,
     shadows: Arc<AtomicBool>,
     threads: Option<usize>,
     /// Bounces that the scene file asks for.
@@ -78,43 +78,46 @@ impl Stage {
     pub fn load(path: &Path, size: [u32; 2], threads: Option<usize>) -> Result<Self, ReproduceError> {
         let options = LoadOptions { resolution: Some(size), crop: None };
         let loaded = load(path, &options).map_err(|report| ReproduceError::Scene { path: path.to_owned(), report })?;
-        let mut world = World::new(loaded.scene, AccelKind::Embree, None)?;
+        let mut job = loaded.job(AccelKind::Embree, None)?;
         let cast = Arc::new(AtomicBool::new(true));
         let nothing: Box<dyn Accel> = Box::new(Bvh::new(Arc::default(), None));
-        let inner = std::mem::replace(&mut world.accel, nothing);
-        world.accel = Box::new(Shadows { inner, cast: Arc::clone(&cast) });
-        let depth = world.scene.integrator.max_depth;
-        Ok(Stage { world, shadows: cast, threads, depth })
+        let inner = std::mem::replace(&mut job.world.accel, nothing);
+        job.world.accel = Box::new(Shadows { inner, cast: Arc::clone(&cast) });
+        let depth = job.settings().integrator.max_depth;
+        Ok(Stage { job, shadows: cast, threads, depth })
     }
 
-    /// The scene.
-    pub fn world(&self) -> &World {
-        &self.world
+    /// The scene with the settings of the last method.
+    pub fn job(&self) -> &RenderJob {
+        &self.job
     }
 
     /// Says which lights are seen from where, until it says otherwise.
     pub fn set_light_hints(&mut self, hints: Option<LightHints>) {
-        self.world.scene.lights.set_hints(hints);
+        self.job.lights.set_hints(hints);
     }
 
     /// Size of the picture.
     pub fn size(&self) -> [u32; 2] {
-        self.world.scene.film.resolution
+        self.job.world.scene.film.resolution
     }
 
     /// Triangles and lights, for the page.
     pub fn facts(&self) -> (usize, usize) {
-        let scene = &self.world.scene;
+        let scene = &self.job.world.scene;
         (scene.geometry.primitive_counts().0, scene.lights.lights.len())
+    }
+
+    fn set(&mut self, method: &Method) {
+        self.job.change(|settings| method.apply(settings, self.depth));
     }
 
     /// T1 and T2 as the renderer measures them for its own choice; `None` if nothing in the picture is lit.
     pub fn stage_times(&mut self) -> Result<Option<StageTimes>, ReproduceError> {
-        Method::ris(1, 1).stratified().strata(Strata::Systematic).apply(&mut self.world, self.depth);
-        self.world.scene.integrator.ris.proposals = Proposals::Auto;
-        self.world.scene.integrator.ris.stage_times = None;
+        self.set(&Method::ris(1, 1).stratified().strata(Strata::Systematic));
+        self.job.change(|s| (s.integrator.ris.proposals, s.integrator.ris.stage_times) = (Proposals::Auto, None));
         self.shadows.store(true, Ordering::Relaxed);
-        Ok(prepare(&mut self.world, self.threads, false).map_err(RenderError::from)?.map(|plan| plan.times))
+        Ok(prepare(&mut self.job, self.threads, false).map_err(RenderError::from)?.map(|plan| plan.times))
     }
 
     /// Finds out how each pixel best shares the time of an estimate out between proposals and samples, by the renderer's own
@@ -123,13 +126,13 @@ impl Stage {
         let start = processor_time();
         // The pilot asks for a number of samples; half of the time is for proposals
         let samples = (0.5 * budget / times.t2).round().max(1.0) as u32;
-        Method { per_pixel: true, ..Method::ris(samples, samples) }.apply(&mut self.world, self.depth);
-        self.world.scene.film.filter = PixelFilter::Box { rx: CENTRE, ry: CENTRE };
-        self.world.scene.integrator.ris.stage_times = Some(times);
+        self.set(&Method { per_pixel: true, ..Method::ris(samples, samples) });
+        self.job.world.scene.film.filter = PixelFilter::Box { rx: CENTRE, ry: CENTRE };
+        self.job.change(|s| s.integrator.ris.stage_times = Some(times));
         self.shadows.store(true, Ordering::Relaxed);
-        prepare(&mut self.world, self.threads, false).map_err(RenderError::from)?;
+        prepare(&mut self.job, self.threads, false).map_err(RenderError::from)?;
         let seconds = processor_time().saturating_sub(start).as_secs_f64();
-        let Some(map) = &mut self.world.splits else { return Ok((Vec::new(), seconds)) };
+        let Some(map) = &mut self.job.splits else { return Ok((Vec::new(), seconds)) };
         map.time = budget;
         Ok((map.ratios.clone(), seconds))
     }
@@ -143,14 +146,13 @@ impl Stage {
         seed: u32,
         observer: Observer<'_>,
     ) -> Result<Rendering, ReproduceError> {
-        method.apply(&mut self.world, self.depth);
-        let scene = &mut self.world.scene;
+        self.set(method);
         let radius = if view == View::Antialiased { 0.5 } else { CENTRE };
-        scene.film.filter = PixelFilter::Box { rx: radius, ry: radius };
-        (scene.sampling.seed, scene.sampling.spp) = (seed, spp);
+        self.job.world.scene.film.filter = PixelFilter::Box { rx: radius, ry: radius };
+        self.job.change(|s| (s.sampling.seed, s.sampling.spp) = (seed, spp));
         self.shadows.store(view != View::Unshadowed, Ordering::Relaxed);
         let settings = RenderSettings { threads: self.threads, spp, ..RenderSettings::default() };
-        let rendering = render(&self.world, &settings, observer.stop, &|_| ())?;
+        let rendering = render(&self.job, &settings, observer.stop, &|_| ())?;
         if observer.stop.load(Ordering::Relaxed) { Err(ReproduceError::Stopped) } else { Ok(rendering) }
     }
 }

@@ -2,7 +2,8 @@
 
 use lumiris::lights::LightSamplerKind;
 use lumiris::settings::{
-    Cached, EstimatorKind, IntegratorKind, IntegratorSettings, OptimalForm, ProposalPoints, Proposals, Strata, Target,
+    Cached, EstimatorKind, IntegratorKind, IntegratorSettings, OptimalForm, ProposalPoints, Proposals, Settings,
+    Strata, Target,
 };
 use lumiris_numbers::estimators::mis::Heuristic;
 use lumiris_numbers::estimators::ocv::Form;
@@ -130,34 +131,31 @@ impl Method {
         Method { transport, ..self }
     }
 
-    /// Settings of the scene that do what the method says, where the file says `depth` bounces.
-    pub(super) fn apply(&self, world: &mut World, depth: u32) {
-        world.set_light_choice(self.light_choice);
-        let scene = &mut world.scene;
-        let old = scene.integrator;
+    /// Sets what the method says, where the file says `depth` bounces.
+    pub(super) fn apply(&self, settings: &mut Settings, depth: u32) {
         let (kind, max_depth) = match self.transport {
             Transport::Direct => (IntegratorKind::Direct, 1),
             Transport::Path => (IntegratorKind::Path, depth),
             Transport::Cached => (IntegratorKind::IrradianceCache, depth),
         };
-        scene.integrator = IntegratorSettings {
+        let i = &mut settings.integrator;
+        *i = IntegratorSettings {
             kind,
             max_depth,
             estimator: self.estimator,
             samples: Some(self.samples),
             heuristic: self.heuristic,
             optimal_mis: self.optimal,
-            ..old
+            light_choice: self.light_choice,
+            ..*i
         };
-        scene.integrator.ocv.form = self.form;
-        scene.integrator.cache.cached = Cached::All;
-        scene.integrator.ris.proposals =
-            if self.per_pixel { Proposals::Optimal } else { Proposals::Fixed(self.proposals) };
-        scene.integrator.ris.strata = self.strata;
-        scene.integrator.ris.target = self.target;
-        scene.integrator.contributing.rest_samples = self.rest_samples;
-        scene.integrator.ris.points =
-            if self.stratified { ProposalPoints::Stratified } else { ProposalPoints::Independent };
-        scene.sampling.sampler = if self.stratified { SamplerKind::Sobol } else { SamplerKind::Independent };
+        i.ocv.form = self.form;
+        i.cache.cached = Cached::All;
+        i.ris.proposals = if self.per_pixel { Proposals::Optimal } else { Proposals::Fixed(self.proposals) };
+        i.ris.strata = self.strata;
+        i.ris.target = self.target;
+        i.contributing.rest_samples = self.rest_samples;
+        i.ris.points = if self.stratified { ProposalPoints::Stratified } else { ProposalPoints::Independent };
+        settings.sampling.sampler = if self.stratified { SamplerKind::Sobol } else { SamplerKind::Independent };
     }
 }

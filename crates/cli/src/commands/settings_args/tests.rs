@@ -20,7 +20,7 @@ fn settings_of_scene(head: &str) -> Settings {
     let path = folder.path().join("scene.pbrt");
     std::fs::write(&path, format!("{head}\nWorldBegin\nShape \"sphere\"\n")).unwrap();
     let loaded = load(&path, &LoadOptions::default()).unwrap_or_else(|report| panic!("{head}\n{report}"));
-    loaded.scene.settings()
+    loaded.settings
 }
 
 /// Values of a kind: the bounds of its range, all names and words.

@@ -160,7 +160,7 @@ fn measure(setup: &Setup<'_>, file: &str, time: Duration) -> Result<Outcome, Rep
 /// time that it took (s).
 fn tell_lights(setup: &Setup<'_>, stage: &mut Stage) -> (u64, f64) {
     let start = Instant::now();
-    let hints = setup.pool.install(|| light_hints(stage.world()));
+    let hints = setup.pool.install(|| light_hints(stage.job()));
     let count = hints.as_ref().map_or(0, |(_, count)| *count as u64);
     stage.set_light_hints(hints.map(|(hints, _)| hints));
     (count, start.elapsed().as_secs_f64())

@@ -11,7 +11,7 @@ use super::seen::{Reference, Seen};
 use lumiris::photons::{
     GatherScratch, Importance, Photon, PhotonMap, Place, Search, Traced, Tracing, Want, trace_photons,
 };
-use lumiris::scene::World;
+use lumiris::scene::RenderJob;
 use lumiris_numbers::math::{Rgb, Vec3};
 use rayon::prelude::*;
 use std::time::{Duration, Instant};
@@ -96,7 +96,7 @@ pub fn show(setup: &Setup<'_>, seen: &[Option<Seen>], maps: &[&PhotonMap], count
 /// Traces photons for maps.
 pub fn trace(
     setup: &Setup<'_>,
-    world: &World,
+    job: &RenderJob,
     tracing: &Tracing<'_>,
     importance: Option<&Importance>,
     want: Want,
@@ -104,18 +104,18 @@ pub fn trace(
     if setup.observer.stop.load(std::sync::atomic::Ordering::Relaxed) {
         return Err(ReproduceError::Stopped);
     }
-    setup.pool.install(|| Ok(Maps::new(trace_photons(world, tracing, importance, want)?)))
+    setup.pool.install(|| Ok(Maps::new(trace_photons(job, tracing, importance, want)?)))
 }
 
 /// Photons stored and trajectories traced in a second.
 pub fn speed(
     setup: &Setup<'_>,
-    world: &World,
+    job: &RenderJob,
     tracing: &Tracing<'_>,
     importance: Option<&Importance>,
 ) -> Result<[f64; 2], ReproduceError> {
     let start = Instant::now();
-    let maps = trace(setup, world, tracing, importance, Want::Trajectories(PILOT))?;
+    let maps = trace(setup, job, tracing, importance, Want::Trajectories(PILOT))?;
     let seconds = start.elapsed().as_secs_f64().max(1e-6);
     Ok([maps.stored() as f64 / seconds, maps.trajectories as f64 / seconds])
 }
@@ -132,8 +132,8 @@ pub fn path_traced(setup: &Setup<'_>, stage: &mut Stage, time: Duration) -> Resu
 }
 
 /// A plan of a scene.
-pub fn plan(setup: &Setup<'_>, world: &World) -> Plan {
-    Plan::new(&world.scene.geometry.world_bounds(), PLAN_SIZE[usize::from(setup.options.quick)])
+pub fn plan(setup: &Setup<'_>, job: &RenderJob) -> Plan {
+    Plan::new(&job.world.scene.geometry.world_bounds(), PLAN_SIZE[usize::from(setup.options.quick)])
 }
 
 /// Points from above: name of the file, heading, caption, and where they are.

@@ -9,7 +9,7 @@ use super::maps::{Maps, Print, prints, show, speed, trace};
 use super::seen::{Seen, relative_rmse, seen};
 use super::{SHAPE, Setup};
 use lumiris::photons::{Tracing, Want};
-use lumiris::scene::World;
+use lumiris::scene::RenderJob;
 use serde_json::{Value, json};
 use std::time::{Duration, Instant};
 
@@ -71,9 +71,9 @@ fn measure(setup: &Setup<'_>, scene: &'static Scene, time: Duration) -> Result<O
     let start = Instant::now();
     let size = setup.size.min(SIZE[usize::from(setup.options.quick)]);
     let stage = Stage::load(&setup.scenes.join(scene.file), scaled(SHAPE, size), setup.options.threads)?;
-    let (world, size) = (stage.world(), stage.size());
-    let seen = seen(world);
-    let [_, trajectories] = speed(setup, world, &Tracing::default(), None)?;
+    let (job, size) = (stage.job(), stage.size());
+    let seen = seen(&job.world);
+    let [_, trajectories] = speed(setup, job, &Tracing::default(), None)?;
     let finest = RATIOS[RATIOS.len() - 1];
     let all = finest * LONGER + RATIOS.iter().sum::<u64>();
     let left = time.saturating_sub(start.elapsed()).as_secs_f64() * PHOTON_SHARE;
@@ -81,12 +81,12 @@ fn measure(setup: &Setup<'_>, scene: &'static Scene, time: Duration) -> Result<O
     (setup.observer.say)(&format!("  {}, {} × {} pixels, {count} trajectories", scene.name, size[0], size[1]));
 
     // The reference holds no global photons to speak of
-    let long = trace_ratio(setup, world, 2, finest * LONGER, count)?;
+    let long = trace_ratio(setup, job, 2, finest * LONGER, count)?;
     let reference = show(setup, &seen, &[&long.caustic], REFERENCE_COUNT);
     let mask: Vec<bool> = seen.iter().map(Option::is_some).collect();
     let mut rows = Vec::new();
     for q in RATIOS {
-        rows.push(row(setup, &seen, (q, trace_ratio(setup, world, 1, q, count)?), |caustic| {
+        rows.push(row(setup, &seen, (q, trace_ratio(setup, job, 1, q, count)?), |caustic| {
             relative_rmse(caustic, &reference, &mask)
         }));
     }
@@ -94,9 +94,9 @@ fn measure(setup: &Setup<'_>, scene: &'static Scene, time: Duration) -> Result<O
 }
 
 /// Maps for q = 1/`finer`, whose global map has `count` trajectories.
-fn trace_ratio(setup: &Setup<'_>, world: &World, seed: u32, finer: u64, count: u64) -> Result<Maps, ReproduceError> {
+fn trace_ratio(setup: &Setup<'_>, job: &RenderJob, seed: u32, finer: u64, count: u64) -> Result<Maps, ReproduceError> {
     let tracing = Tracing { seed, q: (1.0 / finer as f64) as f32, ..Tracing::default() };
-    trace(setup, world, &tracing, None, Want::Trajectories(count * finer))
+    trace(setup, job, &tracing, None, Want::Trajectories(count * finer))
 }
 
 fn row(setup: &Setup<'_>, seen: &[Option<Seen>], (q, maps): (u64, Maps), error: impl Fn(&[[f32; 3]]) -> f64) -> Row {

@@ -12,7 +12,7 @@ use super::seen::{Reference, Seen, seen};
 use super::{SHAPE, Setup};
 use crate::procedural::keller_wald::rooms::{Building, PITCH};
 use lumiris::photons::{Importance, ImportanceSettings, Tracing, Want, trace_importons};
-use lumiris::scene::World;
+use lumiris::scene::RenderJob;
 use lumiris_numbers::math::Vec3;
 use serde_json::{Value, json};
 use std::time::{Duration, Instant};
@@ -48,7 +48,7 @@ struct Row {
 /// What maps are held against.
 struct Judge<'a> {
     setup: &'a Setup<'a>,
-    world: &'a World,
+    job: &'a RenderJob,
     seen: &'a [Option<Seen>],
     mask: &'a [bool],
     reference: &'a Reference,
@@ -65,7 +65,7 @@ impl Judge<'_> {
     fn row(&self, name: &'static str, importance: Option<&Importance>, photons: u64) -> Result<Row, ReproduceError> {
         let tracing = Tracing { seed: 1, ..Tracing::default() };
         let want = Want::Stored { global: photons, most_trajectories: photons.saturating_mul(2000) };
-        let maps = trace(self.setup, self.world, &tracing, importance, want)?;
+        let maps = trace(self.setup, self.job, &tracing, importance, want)?;
         let pictures = COUNTS.map(|count| maps.picture(self.setup, self.seen, count));
         let errors: Vec<f64> = pictures.iter().map(|p| self.reference.rmse(p, self.mask)).collect();
         let best = (0..errors.len()).min_by(|&a, &b| errors[a].total_cmp(&errors[b])).unwrap_or(0);
@@ -89,19 +89,19 @@ pub fn run(setup: &Setup<'_>, time: Duration) -> Result<Figure, ReproduceError> 
     let size = setup.size.min(SIZE[usize::from(setup.options.quick)]);
     let mut stage = Stage::load(&setup.scenes.join("rooms.pbrt"), scaled(SHAPE, size), setup.options.threads)?;
     let reference = path_traced(setup, &mut stage, time.mul_f64(REFERENCE_SHARE))?;
-    let (world, size) = (stage.world(), stage.size());
-    let seen = seen(world);
+    let (job, size) = (stage.job(), stage.size());
+    let seen = seen(&job.world);
     let mask: Vec<bool> = seen.iter().map(Option::is_some).collect();
     let settings = ImportanceSettings { trajectories: IMPORTONS, seed: 1, ..ImportanceSettings::default() };
-    let importance = setup.pool.install(|| trace_importons(world, &settings))?;
+    let importance = setup.pool.install(|| trace_importons(job, &settings))?;
 
     // As many photons as fit
     let tracing = Tracing { seed: 2, ..Tracing::default() };
-    let [stored, _] = speed(setup, world, &tracing, Some(&importance))?;
+    let [stored, _] = speed(setup, job, &tracing, Some(&importance))?;
     let left = time.saturating_sub(start.elapsed()).as_secs_f64() * PHOTON_SHARE / (1.0 - REFERENCE_SHARE);
     let photons = (left * stored / (1 + LARGER) as f64).clamp(FEWEST, MOST[usize::from(setup.options.quick)]) as u64;
     (setup.observer.say)(&format!("  {} × {} pixels, {photons} photons and {LARGER} times as many", size[0], size[1]));
-    let judge = Judge { setup, world, seen: &seen, mask: &mask, reference: &reference, room: room() };
+    let judge = Judge { setup, job, seen: &seen, mask: &mask, reference: &reference, room: room() };
     let rows = [
         judge.row("standard", None, photons)?,
         judge.row("by importance", Some(&importance), photons)?,
@@ -132,7 +132,7 @@ fn figure(
         cloud("importons", "importons", positions(importance.map()).collect()),
         cloud("importance", "map by importance", rows[1].maps.positions()),
     ];
-    blocks.extend(clouds(setup, &plan(setup, judge.world), &list)?);
+    blocks.extend(clouds(setup, &plan(setup, judge.job), &list)?);
     blocks.push(Block::Text(
         "Figure 2: the maps shown directly, each with the number of nearest photons k that serves it best. Rows have the same number of photons."
             .to_owned(),

@@ -10,7 +10,7 @@ use super::maps::{Cloud, Maps, Print, clouds, plan, positions, prints, speed, tr
 use super::seen::{Seen, seen};
 use super::{SHAPE, Setup};
 use lumiris::photons::{Importance, ImportanceSettings, Tracing, Unimportant, Want, trace_importons};
-use lumiris::scene::World;
+use lumiris::scene::RenderJob;
 use lumiris_numbers::estimators::stats::Welford;
 use lumiris_numbers::math::Vec3;
 use serde_json::{Value, json};
@@ -53,36 +53,36 @@ pub fn run(setup: &Setup<'_>, time: Duration) -> Result<Figure, ReproduceError> 
     (setup.observer.say)("Slit …");
     let size = setup.size.min(SIZE[usize::from(setup.options.quick)]);
     let stage = Stage::load(&setup.scenes.join("slit.pbrt"), scaled(SHAPE, size), setup.options.threads)?;
-    let (world, size) = (stage.world(), stage.size());
+    let (job, size) = (stage.job(), stage.size());
     // What the slit shows of the other room is no part of this one
     let in_this_room = |s: Seen| Some(s).filter(|s| ROOM.holds(s.p));
-    let seen: Vec<Option<Seen>> = seen(world).into_iter().map(|s| s.and_then(in_this_room)).collect();
+    let seen: Vec<Option<Seen>> = seen(&job.world).into_iter().map(|s| s.and_then(in_this_room)).collect();
     let settings =
         ImportanceSettings { trajectories: IMPORTONS, seed: 1, quantile: QUANTILE, ..ImportanceSettings::default() };
     let floor = ImportanceSettings { unimportant: Unimportant::Floor(LEAST), ..settings };
     let cut = ImportanceSettings { unimportant: Unimportant::CutOff(LEAST), ..settings };
-    let importance = |s: &ImportanceSettings| setup.pool.install(|| trace_importons(world, s));
+    let importance = |s: &ImportanceSettings| setup.pool.install(|| trace_importons(job, s));
     let (floor, cut) = (importance(&floor)?, importance(&cut)?);
 
     // As many photons as fit
-    let [by_floor, _] = speed(setup, world, &Tracing::default(), Some(&floor))?;
-    let [by_cut, _] = speed(setup, world, &Tracing::default(), Some(&cut))?;
+    let [by_floor, _] = speed(setup, job, &Tracing::default(), Some(&floor))?;
+    let [by_cut, _] = speed(setup, job, &Tracing::default(), Some(&cut))?;
     let each = f64::from(SEEDS) * (1.0 / by_floor.max(1.0) + 2.0 / by_cut.max(1.0));
     let left = time.saturating_sub(start.elapsed()).as_secs_f64() * PHOTON_SHARE;
     let photons = (left / each).clamp(FEWEST, MOST[usize::from(setup.options.quick)]) as u64;
     (setup.observer.say)(&format!("  {} × {} pixels, {photons} photons, {SEEDS} maps of each kind", size[0], size[1]));
-    let of = |name, id, importance| row(setup, (world, &seen), (name, id), importance, photons);
+    let of = |name, id, importance| row(setup, (job, &seen), (name, id), importance, photons);
     let rows = [
         of("standard map", "standard", None)?,
         of("by importance, p ≥ ε: unbiased", "floor", Some(&floor))?,
         of("by importance, cut off at p < ε: biased", "cut-off", Some(&cut))?,
     ];
-    figure(setup, (world, size), &floor, &rows)
+    figure(setup, (job, size), &floor, &rows)
 }
 
 fn row(
     setup: &Setup<'_>,
-    (world, seen): (&World, &[Option<Seen>]),
+    (job, seen): (&RenderJob, &[Option<Seen>]),
     (name, id): (&'static str, &'static str),
     importance: Option<&Importance>,
     photons: u64,
@@ -92,7 +92,7 @@ fn row(
     let mut means = Welford::new();
     let mut first = None;
     for seed in 1..=SEEDS {
-        let maps = trace(setup, world, &Tracing { seed, ..Tracing::default() }, importance, want)?;
+        let maps = trace(setup, job, &Tracing { seed, ..Tracing::default() }, importance, want)?;
         let picture = maps.picture(setup, seen, COUNT);
         means.add(picture.iter().map(|p| luminance(p.map(f64::from))).sum::<f64>() / pixels);
         first.get_or_insert((maps, picture));
@@ -116,7 +116,7 @@ fn percent(e: Estimate) -> String {
 
 fn figure(
     setup: &Setup<'_>,
-    (world, size): (&World, [u32; 2]),
+    (job, size): (&RenderJob, [u32; 2]),
     importance: &Importance,
     rows: &[Row; 3],
 ) -> Result<Figure, ReproduceError> {
@@ -131,7 +131,7 @@ fn figure(
     };
     let mut list = vec![cloud("importons", "importons", positions(importance.map()).collect())];
     list.extend(rows.iter().map(|r| cloud(r.id, r.name, r.maps.positions())));
-    blocks.extend(clouds(setup, &plan(setup, world), &list)?);
+    blocks.extend(clouds(setup, &plan(setup, job), &list)?);
     let list: Vec<Print<'_>> = (rows.iter())
         .map(|r| Print {
             name: format!("slit-{}", r.id),

@@ -1,0 +1,294 @@
+//! The lights of a scene with a way to choose one: what settings and photons make of a [`LightSet`].
+
+use super::hints::Around;
+use super::{
+    LightChoice, LightCtx, LightGroups, LightHints, LightHit, LightId, LightSample, LightSampler, LightSamplerKind,
+    LightSet,
+};
+use lumiris_numbers::math::Vec3;
+use std::ops::Deref;
+use std::sync::Arc;
+
+/// Lights, and how they are chosen.
+#[derive(Clone, Debug)]
+pub struct LightSampling {
+    set: Arc<LightSet>,
+    /// Chooses one of them.
+    pub sampler: LightSampler,
+    /// Chooses among those that no ray can hit, in the same way; `None` if there are none.
+    pub delta: Option<LightSampler>,
+    /// The lights as components of a mixture.
+    pub groups: LightGroups,
+    hints: Option<Arc<LightHints>>,
+}
+
+impl Deref for LightSampling {
+    type Target = LightSet;
+
+    fn deref(&self) -> &LightSet {
+        &self.set
+    }
+}
+
+impl LightSampling {
+    /// Chooses in the way `kind`, with at most `most` groups.
+    pub fn new(set: Arc<LightSet>, kind: LightSamplerKind, most: usize) -> Self {
+        let sampler = LightSampler::new(kind, &set.lights, set.scene_radius);
+        let (delta, groups) = (set.delta_sampler(kind), LightGroups::new(&set, &sampler, most));
+        LightSampling { set, sampler, delta, groups, hints: None }
+    }
+
+    /// Chooses in another way from now on, with what photons tell as before.
+    pub fn choose_by(&mut self, kind: LightSamplerKind, most: usize) {
+        self.sampler = LightSampler::new(kind, &self.set.lights, self.set.scene_radius);
+        self.sampler.set_hints(self.hints.clone());
+        self.delta = self.set.delta_sampler(kind);
+        self.set_groups(most);
+    }
+
+    /// Puts the lights into at most `most` groups.
+    pub fn set_groups(&mut self, most: usize) {
+        self.groups = LightGroups::new(&self.set, &self.sampler, most);
+    }
+
+    /// From now on uses what photons tell of the visibility of lights, wherever settings ask for it. Estimates stay unbiased
+    /// whatever it is. Lights without power, and those that there are not, are left out.
+    pub fn set_hints(&mut self, hints: Option<LightHints>) {
+        let is_lit = |light: LightId| self.set.lit.binary_search(&light).is_ok();
+        self.hints = hints.map(|hints| Arc::new(hints.of_lights(is_lit)));
+        self.sampler.set_hints(self.hints.clone());
+    }
+
+    /// What photons tell of the visibility of lights.
+    pub fn hints(&self) -> Option<&LightHints> {
+        self.hints.as_deref()
+    }
+
+    /// The lights that photons say are seen around a point; nothing where nothing is known.
+    #[inline]
+    pub fn around(&self, ctx: &LightCtx) -> Around<'_> {
+        self.hints.as_ref().map_or_else(Around::default, |hints| hints.around_with_sums(ctx.p, ctx.n))
+    }
+
+    /// Chooses a light by `u_choice` and samples a direction to it by `u`. `pdf` of the sample includes the probability
+    /// of the choice: it is per steradian, or a probability for delta lights.
+    #[inline]
+    pub fn sample(&self, ctx: &LightCtx, u_choice: f32, u: [f32; 2]) -> Option<(LightId, LightSample)> {
+        self.set.sample_choice(ctx, self.sampler.sample(ctx, u_choice)?, u)
+    }
+
+    /// Samples a direction to a light of one group, whose probability is `group_pmf`; otherwise as [`sample`](Self::sample).
+    #[inline]
+    pub fn sample_group(
+        &self,
+        ctx: &LightCtx,
+        group: (usize, f32),
+        u_choice: f32,
+        u: [f32; 2],
+    ) -> Option<(LightId, LightSample)> {
+        self.set.sample_choice(ctx, self.groups.sample(&self.sampler, ctx, group, u_choice)?, u)
+    }
+
+    /// Density per steradian of [`sample`](Self::sample) to choose `light` and the direction `wi`, which hits it at
+    /// `hit` ([`LightHit::INFINITE`] for infinite lights).
+    #[inline]
+    pub fn pdf(&self, ctx: &LightCtx, light: LightId, wi: Vec3, hit: &LightHit) -> f32 {
+        let pdf = self.set.lights[light as usize].pdf_li(ctx, wi, hit);
+        if pdf > 0.0 { pdf * self.sampler.pmf(ctx, light) } else { 0.0 }
+    }
+
+    /// Density per steradian of [`sample`](Self::sample) to choose any infinite light and the direction `wi`.
+    #[inline]
+    pub fn pdf_infinite(&self, ctx: &LightCtx, wi: Vec3) -> f32 {
+        self.set.infinite.iter().map(|&i| self.pdf(ctx, i, wi, &LightHit::INFINITE)).sum()
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::geometry::{Shape, TriangleMesh};
+    use crate::lights::{Emission, EnvironmentFilter, EnvironmentMap, EnvironmentMapping, Light, LightSetBuilder};
+    use lumiris_numbers::math::Affine3A;
+    use lumiris_numbers::math::hash::HashStream;
+    use lumiris_test_support::{Moments, assert_chi_squared};
+    use std::sync::Arc;
+
+    const KINDS: [LightSamplerKind; 4] =
+        [LightSamplerKind::Uniform, LightSamplerKind::Power, LightSamplerKind::Tree, LightSamplerKind::Photons];
+
+    /// The set, with photons of some lights around (0.4, 0.3, 0): more of those with a greater id.
+    fn hinted(builder: LightSetBuilder, kind: LightSamplerKind, seen: &[LightId]) -> LightSampling {
+        let mut set = sampling(builder, kind, &bounds());
+        let at = Vec3::new(0.4, 0.3, 0.0);
+        let photons = seen.iter().flat_map(|&id| (0..=id % 7).map(move |_| (at, Vec3::Z, id)));
+        set.set_hints(Some(LightHints::new(photons, 0.5)));
+        set
+    }
+
+    fn sampling(builder: LightSetBuilder, kind: LightSamplerKind, bounds: &Bounds3) -> LightSampling {
+        LightSampling::new(Arc::new(builder.build(bounds)), kind, 1)
+    }
+
+    fn quad(z: f32) -> Shape {
+        let p = vec![Vec3::new(0.0, 0.0, z), Vec3::new(0.0, 1.0, z), Vec3::new(1.0, 1.0, z), Vec3::new(1.0, 0.0, z)];
+        Shape::Mesh(TriangleMesh::new(p, vec![[0, 1, 2], [0, 2, 3]]).unwrap())
+    }
+
+    fn builder() -> LightSetBuilder {
+        let mut b = LightSetBuilder::default();
+        b.add(Light::Point { p: Vec3::new(2.0, 2.0, 2.0), intensity: Rgb::splat(3.0) });
+        b.add_area(7, &quad(3.0), &Emission::constant(Rgb::splat(5.0)));
+        b.add_area(3, &quad(2.0), &Emission::constant(Rgb::BLACK));
+        b.add(Light::InfiniteConstant { l: Rgb::splat(0.1) });
+        b.add(Light::Distant { wi_world: Vec3::Z, l: Rgb::WHITE });
+        let texels = (0..16).map(|i| Rgb::splat(i as f32 * 0.01)).collect();
+        let map = EnvironmentMap::new(texels, [4, 4], EnvironmentMapping::EqualArea, EnvironmentFilter::Bilinear);
+        b.add(Light::infinite_image(Arc::new(map.unwrap()), &Affine3A::IDENTITY, 2.0));
+        b
+    }
+
+    fn bounds() -> Bounds3 {
+        Bounds3 { min: Vec3::ZERO, max: Vec3::splat(3.0) }
+    }
+
+    #[test]
+    fn every_sampler_is_a_distribution_over_the_lights_that_shine() {
+        for (kind, seen) in KINDS.into_iter().flat_map(|k| [(k, &[0, 2, 4][..]), (k, &[5, 900]), (k, &[])]) {
+            let set = hinted(builder(), kind, seen);
+            let mut s = HashStream::new([1, 2, 3]);
+            for ns in [Vec3::ZERO, Vec3::Z] {
+                let ctx = LightCtx { p: Vec3::new(0.4, 0.3, 0.0), n: ns, ns };
+                let pmf: Vec<f64> = (0..6).map(|i| f64::from(set.sampler.pmf(&ctx, i))).collect();
+                assert!((pmf.iter().sum::<f64>() - 1.0).abs() < 1e-5, "{kind:?} {pmf:?}");
+                assert_eq!(pmf.iter().map(|&p| p > 0.0).collect::<Vec<_>>(), [true, true, false, true, true, true]);
+                let count = 50_000;
+                let mut observed = vec![0.0; 6];
+                for _ in 0..count {
+                    let choice = set.sampler.sample(&ctx, s.next_f32()).unwrap();
+                    assert!((0.0..1.0).contains(&choice.u));
+                    assert_eq!(choice.pmf, set.sampler.pmf(&ctx, choice.light));
+                    observed[choice.light as usize] += 1.0;
+                }
+                let expected: Vec<f64> = pmf.iter().map(|p| p * f64::from(count)).collect();
+                assert_chi_squared(&observed, &expected, 1e-5);
+            }
+        }
+    }
+
+    #[test]
+    fn runs_choose_each_light_by_its_probability_and_leave_a_uniform_number() {
+        let mut builder = builder();
+        for i in 0..80 {
+            let p = Vec3::new(i as f32 * 0.15 - 6.0, 1.5, 2.0 + (i % 3) as f32);
+            builder.add(Light::Point { p, intensity: Rgb::splat(0.1 + i as f32) });
+        }
+        // Few lights are compared at the point, many by the number of their photons
+        let (few, many): (Vec<LightId>, Vec<LightId>) = ((0..80).step_by(7).collect(), (2..80).collect());
+        for (kind, seen) in KINDS.into_iter().flat_map(|k| [(k, &few), (k, &many)]) {
+            let set = hinted(builder.clone(), kind, seen);
+            for ns in [Vec3::ZERO, Vec3::Z] {
+                let ctx = LightCtx { p: Vec3::new(0.4, 0.3, 0.0), n: ns, ns };
+                // A regular list: counts are exact up to one at each end of a run
+                let count = 1_u32 << 16;
+                let positions: Vec<u32> = (0..count).map(|i| (i << 16) + 0x8000).collect();
+                let mut runs = Vec::new();
+                set.sampler.runs(&ctx, &positions, &mut runs);
+                let (mut place, mut parts) = (0, std::collections::BTreeMap::new());
+                for run in &runs {
+                    assert_eq!(run.places[0], place, "{kind:?}: runs follow each other");
+                    place = run.places[1];
+                    let number = run.places[1] - run.places[0];
+                    let pmf = set.sampler.pmf(&ctx, run.light);
+                    assert!((run.pmf - pmf).abs() <= 1e-5 * pmf, "{kind:?} {run:?} {pmf}");
+                    let part = run.interval[1] - run.interval[0];
+                    let expected = part * f64::from(count);
+                    assert!((f64::from(number) - expected).abs() <= 1.5, "{kind:?} {run:?} {expected}");
+                    *parts.entry(run.light).or_insert(0.0) += part;
+
+                    // What remains of the positions fills [0, 1) evenly
+                    let of = |place: u32| f64::from(run.within(positions[place as usize])) / 4_294_967_296.0;
+                    let step = 1.0 / expected;
+                    for place in run.places[0]..run.places[1] {
+                        let expected = (f64::from(place - run.places[0]) + 0.5) * step;
+                        assert!((of(place) - expected).abs() <= 1.01 * step, "{kind:?} {run:?} {place}");
+                    }
+                }
+                assert_eq!(place, count, "{kind:?}: every position chooses a light");
+                for (&light, &part) in &parts {
+                    let pmf = f64::from(set.sampler.pmf(&ctx, light));
+                    // A light of the base may be so improbable that it has no position
+                    assert!((pmf - part).abs() <= 1.5e-5 + 1e-4 * pmf, "{kind:?} {light}: {pmf} {part}");
+                }
+                let total: f64 = parts.values().sum();
+                assert!((total - 1.0).abs() < 1e-3, "{kind:?} {total}");
+            }
+        }
+    }
+
+    #[test]
+    fn all_samplers_agree_on_the_irradiance_and_with_the_sum_over_lights() {
+        let (p, n) = (Vec3::new(0.4, 0.3, 0.0), Vec3::Z);
+        let ctx = LightCtx { p, n, ns: n };
+        let reference = sampling(builder(), LightSamplerKind::Uniform, &bounds());
+        let mut s = HashStream::new([4, 2, 3]);
+        let mut exact = 0.0;
+        for light in &reference.lights {
+            let n_samples = 200_000;
+            for _ in 0..n_samples {
+                exact += light
+                    .sample_li(&ctx, s.next_2d())
+                    .map_or(0.0, |s| f64::from(s.li.g * s.wi.dot(n).max(0.0) / s.pdf) / f64::from(n_samples));
+            }
+        }
+        for kind in KINDS {
+            // Photons of the wrong lights change nothing
+            let set = hinted(builder(), kind, &[2, 4]);
+            let mut moments = Moments::default();
+            for _ in 0..200_000 {
+                let sample = set.sample(&ctx, s.next_f32(), s.next_2d());
+                moments.add(sample.map_or(0.0, |(light, s)| {
+                    if !s.is_delta {
+                        let hit = LightHit { t: s.t, p: s.p, n: s.n, uv: lumiris_numbers::math::Vec2::ZERO };
+                        let pdf = set.pdf(&ctx, light, s.wi, &hit);
+                        assert!((pdf - s.pdf).abs() <= 1e-3 * s.pdf || set.lights[light as usize].is_infinite());
+                    }
+                    f64::from(s.li.g * s.wi.dot(n).max(0.0) / s.pdf)
+                }));
+            }
+            moments.assert_mean(exact, 1e-5, 2e-3);
+        }
+    }
+
+    #[test]
+    fn hits_find_their_lights_and_rays_that_leave_find_the_environment() {
+        let set = sampling(builder(), LightSamplerKind::Tree, &bounds());
+        assert_eq!((set.light_of(7, 0), set.light_of(7, 1), set.light_of(3, 1)), (Some(1), Some(1), Some(2)));
+        assert_eq!((set.light_of(7, 2), set.light_of(0, 0), set.light_of(9, 0)), (None, None, None));
+        assert_eq!(set.infinite, [3, 5]);
+        let w = Vec3::new(0.6, 0.0, 0.8);
+        assert_eq!(set.le(w), set.lights[3].le(w) + set.lights[5].le(w));
+        let ctx = LightCtx::at(Vec3::ZERO);
+        let each: f32 = [3, 5].iter().map(|&i| set.pdf(&ctx, i, w, &LightHit::INFINITE)).sum();
+        assert!(each > 0.0 && set.pdf_infinite(&ctx, w) == each);
+    }
+
+    #[test]
+    fn scenes_without_light_or_without_extent_are_handled() {
+        let ctx = LightCtx::at(Vec3::ZERO);
+        for kind in KINDS {
+            let set = sampling(LightSetBuilder::default(), kind, &Bounds3::EMPTY);
+            assert!(set.sample(&ctx, 0.5, [0.5; 2]).is_none() && set.le(Vec3::Z).is_black());
+            let mut b = LightSetBuilder::default();
+            b.add(Light::InfiniteConstant { l: Rgb::WHITE });
+            assert!(sampling(b, kind, &Bounds3::EMPTY).sample(&ctx, 0.999, [0.5; 2]).is_some());
+            let mut b = LightSetBuilder::default();
+            b.add_area(0, &quad(1.0), &Emission::constant(Rgb::BLACK));
+            let set = sampling(b, kind, &bounds());
+            assert!(set.sample(&ctx, 0.5, [0.5; 2]).is_none());
+            let mut runs = Vec::new();
+            set.sampler.runs(&ctx, &[0, 1 << 31, u32::MAX], &mut runs);
+            assert!(runs.is_empty(), "{kind:?} {runs:?}");
+        }
+    }
+}

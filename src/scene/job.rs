@@ -1,0 +1,69 @@
+//! What a rendering works on: a world, its settings, and what these prepare.
+
+use super::{SplitMap, World};
+use crate::geometry::GeometryId;
+use crate::lights::{Irradiances, LightSampling};
+use crate::settings::{IntegratorSettings, Settings};
+use std::sync::Arc;
+
+/// A world with the settings that it is rendered by.
+pub struct RenderJob {
+    /// Geometry, materials, lights, and ray tracers.
+    pub world: World,
+    settings: Settings,
+    /// The lights, as settings and photons choose among them.
+    pub lights: LightSampling,
+    /// Irradiances of lights that are known in closed form.
+    pub irradiances: Irradiances,
+    /// Samples and proposals of each pixel, if they were chosen for each by itself.
+    pub splits: Option<SplitMap>,
+    lobes: usize,
+}
+
+impl RenderJob {
+    /// Prepares what does not need rays.
+    pub fn new(world: World, settings: Settings) -> Self {
+        let i = &settings.integrator;
+        let scene = &world.scene;
+        let lobes = scene.materials.lobes(i.bsdf_density);
+        let lights = LightSampling::new(Arc::clone(&scene.lights), i.light_choice, most_groups(i, lobes));
+        let has_alpha = |geometry: GeometryId| scene.geometry.geometries[geometry as usize].alpha.is_some();
+        let irradiances = Irradiances::new(&scene.lights, has_alpha);
+        RenderJob { world, settings, lights, irradiances, splits: None, lobes }
+    }
+
+    /// The settings.
+    #[inline]
+    pub fn settings(&self) -> &Settings {
+        &self.settings
+    }
+
+    /// Changes the settings, and what depends on them. What photons and pilots told stays.
+    pub fn change(&mut self, change: impl FnOnce(&mut Settings)) {
+        let before = self.settings.integrator;
+        change(&mut self.settings);
+        let i = &self.settings.integrator;
+        self.lobes = self.world.scene.materials.lobes(i.bsdf_density);
+        let most = most_groups(i, self.lobes);
+        if i.light_choice != before.light_choice {
+            self.lights.choose_by(i.light_choice, most);
+        } else if (i.bsdf_density, i.ocv.components) != (before.bsdf_density, before.ocv.components) {
+            self.lights.set_groups(most);
+        }
+    }
+
+    /// Number of components that BSDFs are in a mixture with the groups of lights: the lobes of those that have most.
+    pub fn lobes(&self) -> usize {
+        self.lobes
+    }
+
+    /// Number of components of a mixture: lobes, then groups of lights.
+    pub fn components(&self) -> usize {
+        self.lobes + self.lights.groups.len()
+    }
+}
+
+/// Most groups of lights: as many as a mixture has components beside `lobes`.
+fn most_groups(settings: &IntegratorSettings, lobes: usize) -> usize {
+    settings.ocv.most_components().saturating_sub(lobes).max(1)
+}
