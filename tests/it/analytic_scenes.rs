@@ -9,7 +9,7 @@ use lumiris::film::PixelSums;
 use lumiris::import::{LoadOptions, load};
 use lumiris::lights::LightSamplerKind;
 use lumiris::render::{RenderSettings, render};
-use lumiris::scene::{AccelKind, World};
+use lumiris::scene::{AccelKind, RenderJob};
 use lumiris::settings::{
     CorrelatedForm, CorrelatedSettings, EstimatorKind, IntegratorKind, OcvSettings, OptimalForm, ProposalPoints,
     Proposals, SamplingTechnique, Strata, Target,
@@ -188,36 +188,36 @@ fn ris_configurations(base: &Configuration) -> Vec<Configuration> {
     all
 }
 
-fn world(path: &Path, c: &Configuration) -> World {
-    let mut scene = load(path, &LoadOptions::default()).map_err(|d| d.to_string()).unwrap().scene;
-    scene.integrator.estimator = c.estimator;
-    scene.integrator.heuristic = Some(c.heuristic);
-    scene.integrator.samples = Some(c.samples);
-    scene.integrator.ocv = c.ocv;
-    scene.integrator.optimal_mis = c.optimal_mis;
-    scene.integrator.correlated = c.correlated;
-    scene.integrator.bsdf_share = c.bsdf_share;
-    scene.integrator.ris.proposals = Proposals::Fixed(c.proposals);
-    scene.integrator.ris.strata = c.strata;
-    scene.integrator.ris.points = c.points;
-    scene.integrator.ris.target = c.target;
-    scene.integrator.light_choice = c.light_choice;
-    scene.integrator.contributing.rest_samples = c.rest_samples;
-    scene.lights.set_kind(c.light_choice);
-    scene.sampling.sampler = c.sampler;
-    let mut world = World::new(scene, c.accel, None).unwrap();
-    let hints = hints(&world, c.hints);
-    world.scene.lights.set_hints(hints);
-    world
+fn job(path: &Path, c: &Configuration) -> RenderJob {
+    let mut loaded = load(path, &LoadOptions::default()).map_err(|d| d.to_string()).unwrap();
+    loaded.settings.integrator.estimator = c.estimator;
+    loaded.settings.integrator.heuristic = Some(c.heuristic);
+    loaded.settings.integrator.samples = Some(c.samples);
+    loaded.settings.integrator.ocv = c.ocv;
+    loaded.settings.integrator.optimal_mis = c.optimal_mis;
+    loaded.settings.integrator.correlated = c.correlated;
+    loaded.settings.integrator.bsdf_share = c.bsdf_share;
+    loaded.settings.integrator.ris.proposals = Proposals::Fixed(c.proposals);
+    loaded.settings.integrator.ris.strata = c.strata;
+    loaded.settings.integrator.ris.points = c.points;
+    loaded.settings.integrator.ris.target = c.target;
+    loaded.settings.integrator.light_choice = c.light_choice;
+    loaded.settings.integrator.contributing.rest_samples = c.rest_samples;
+    loaded.settings.sampling.sampler = c.sampler;
+    let mut job = loaded.job(c.accel, None).unwrap();
+    let hints = hints(&job, c.hints);
+    job.lights.set_hints(hints);
+    job
 }
 
 /// Means of the pictures of `RUNS` seeds, per channel.
-pub fn picture_means(world: &mut World) -> [Welford; 3] {
+pub fn picture_means(job: &mut RenderJob) -> [Welford; 3] {
     let mut means = [Welford::default(); 3];
     for seed in 0..RUNS {
-        world.scene.sampling.seed = seed;
-        let settings = RenderSettings { threads: Some(1), spp: world.scene.sampling.spp, ..RenderSettings::default() };
-        let film = render(world, &settings, &AtomicBool::new(false), &|_| ()).unwrap().film;
+        job.change(|s| s.sampling.seed = seed);
+        let settings =
+            RenderSettings { threads: Some(1), spp: job.settings().sampling.spp, ..RenderSettings::default() };
+        let film = render(job, &settings, &AtomicBool::new(false), &|_| ()).unwrap().film;
         for (channel, mean) in means.iter_mut().enumerate() {
             let sum: f64 = film.pixels.iter().map(|p: &PixelSums| p.mean()[channel]).sum();
             mean.add(sum / film.pixels.len() as f64);
@@ -235,7 +235,7 @@ fn check(list: &[Configuration]) {
     for path in &files {
         let answer = answer(path);
         for c in list {
-            let means = picture_means(&mut world(path, c));
+            let means = picture_means(&mut job(path, c));
             for (channel, mean) in means.iter().enumerate() {
                 let exact = (mean.mean() - answer[channel]).abs() <= ROUNDING * answer[channel].abs();
                 if !exact && t_test(mean, answer[channel]).p_value < significance {
@@ -266,7 +266,7 @@ fn the_test_notices_a_bias_of_one_percent() {
     // The oracle itself: with the answer moved by 1 %, scenes with noise and without it must fail.
     for name in ["rectangle", "point", "furnace-closed-4"] {
         let path = Path::new(env!("CARGO_MANIFEST_DIR")).join("scenes/analytic").join(name).with_extension("pbrt");
-        let means = picture_means(&mut world(&path, &configurations()[3]));
+        let means = picture_means(&mut job(&path, &configurations()[3]));
         let wrong = answer(&path)[0] * 1.01;
         assert!(t_test(&means[0], wrong).p_value < 1e-4, "{name}: {:?} passes for {wrong}", means[0]);
     }
@@ -287,7 +287,7 @@ fn forms_that_fit_their_own_samples_are_near_the_answer() {
         };
         let [bsdf, light] = [SamplingTechnique::Bsdf, SamplingTechnique::Light].map(combined);
         for c in [form(Form::Paper), form(Form::Regression), direct, bsdf, light] {
-            let mean = picture_means(&mut world(&path, &c))[0].mean();
+            let mean = picture_means(&mut job(&path, &c))[0].mean();
             let ratio = mean / answer(&path)[0];
             assert!((ratio - 1.0).abs() < 0.05, "{name} {c:?}: {ratio}");
         }
@@ -297,13 +297,13 @@ fn forms_that_fit_their_own_samples_are_near_the_answer() {
 #[test]
 fn direct_is_path_of_one_bounce() {
     let path = Path::new(env!("CARGO_MANIFEST_DIR")).join("scenes/analytic/furnace-closed-4.pbrt");
-    let mut world = world(&path, &configurations()[0]);
-    world.scene.integrator.kind = IntegratorKind::Direct;
+    let mut job = job(&path, &configurations()[0]);
+    job.change(|s| s.integrator.kind = IntegratorKind::Direct);
     let settings = RenderSettings { spp: 4, ..RenderSettings::default() };
-    let direct = render(&world, &settings, &AtomicBool::new(false), &|_| ()).unwrap().film;
-    world.scene.integrator.kind = IntegratorKind::Path;
-    world.scene.integrator.max_depth = 1;
-    let path = render(&world, &settings, &AtomicBool::new(false), &|_| ()).unwrap().film;
+    let direct = render(&job, &settings, &AtomicBool::new(false), &|_| ()).unwrap().film;
+    job.change(|s| s.integrator.kind = IntegratorKind::Path);
+    job.change(|s| s.integrator.max_depth = 1);
+    let path = render(&job, &settings, &AtomicBool::new(false), &|_| ()).unwrap().film;
     let means = |film: &lumiris::film::Film| film.pixels.iter().map(PixelSums::mean).collect::<Vec<_>>();
     assert_eq!(means(&direct), means(&path));
 }

@@ -4,24 +4,24 @@ use lumiris::accel::bvh::Bvh;
 use lumiris::accel::{Accel, AccelStats, Coherence, Hit, RayBatch};
 use lumiris::import::{LoadOptions, load};
 use lumiris::render::crosscheck::{Family, crosscheck};
-use lumiris::scene::{AccelKind, World};
+use lumiris::scene::{AccelKind, RenderJob};
 use std::path::Path;
 use std::sync::Arc;
 
-fn gallery() -> World {
+fn gallery() -> RenderJob {
     let path = Path::new(env!("CARGO_MANIFEST_DIR")).join("scenes/demo/gallery.pbrt");
-    let scene = load(&path, &LoadOptions::default()).map_err(|d| d.to_string()).unwrap().scene;
-    World::new(scene, AccelKind::Embree, None).unwrap()
+    let loaded = load(&path, &LoadOptions::default()).map_err(|d| d.to_string()).unwrap();
+    loaded.job(AccelKind::Embree, None).unwrap()
 }
 
-fn bvh(world: &World) -> Bvh {
-    Bvh::new(Arc::clone(&world.scene.geometry), Some(Arc::clone(&world.scene.textures) as _))
+fn bvh(job: &RenderJob) -> Bvh {
+    Bvh::new(Arc::clone(&job.world.scene.geometry), Some(Arc::clone(&job.world.scene.textures) as _))
 }
 
 #[test]
 fn embree_and_the_bvh_agree_on_every_family_of_rays() {
-    let world = gallery();
-    let report = crosscheck(&world, &bvh(&world), 50_000);
+    let job = gallery();
+    let report = crosscheck(&job, &bvh(&job), 50_000);
     assert_eq!(report.tallies.len(), 5);
     for (family, tally) in &report.tallies {
         assert!(tally.rays > 10_000 && tally.hits > 100, "{family:?} {tally:?}");
@@ -52,8 +52,8 @@ impl Accel for Leaky {
 
 #[test]
 fn a_tracer_that_loses_hits_is_caught() {
-    let world = gallery();
-    let report = crosscheck(&world, &Leaky(bvh(&world)), 20_000);
+    let job = gallery();
+    let report = crosscheck(&job, &Leaky(bvh(&job)), 20_000);
     for (family, tally) in &report.tallies {
         assert!(tally.disagreements > 0, "{family:?} {tally:?}");
     }

@@ -1,10 +1,10 @@
 //! Materials that can only be evaluated, from the scene file to the picture.
 
 use lumiris::bsdfs::ProposalDensity;
-use lumiris::import::{LoadOptions, load};
+use lumiris::import::{LoadOptions, Loaded, load};
 use lumiris::materials::{EvaluatedMaterial, Material};
 use lumiris::render::{RenderSettings, render};
-use lumiris::scene::{AccelKind, Scene, World};
+use lumiris::scene::AccelKind;
 use lumiris_numbers::estimators::stats::{Welford, sidak, t_test, two_sample_z_test};
 use std::path::Path;
 use std::sync::atomic::AtomicBool;
@@ -15,17 +15,17 @@ Film \"rgb\" \"integer xresolution\" [ 8 ] \"integer yresolution\" [ 8 ]
 Sampler \"zsobol\" \"integer pixelsamples\" [ 64 ]
 ";
 
-fn load_text(text: &str) -> Result<Scene, String> {
+fn load_text(text: &str) -> Result<Loaded, String> {
     let folder = tempfile::tempdir().unwrap();
     let path = folder.path().join("scene.pbrt");
     std::fs::write(&path, text).unwrap();
-    load(&path, &LoadOptions::default()).map(|loaded| loaded.scene).map_err(|report| report.to_string())
+    load(&path, &LoadOptions::default()).map_err(|report| report.to_string())
 }
 
 /// The material of the only shape.
 fn material(text: &str) -> Result<Material, String> {
     let text = format!("{HEAD}WorldBegin\nLightSource \"infinite\"\n{text}\nShape \"sphere\"");
-    load_text(&text).map(|scene| scene.materials.entries()[scene.surfaces[0].material as usize].material)
+    load_text(&text).map(|Loaded { scene, .. }| scene.materials.entries()[scene.surfaces[0].material as usize].material)
 }
 
 fn model(text: &str) -> Result<EvaluatedMaterial, String> {
@@ -72,23 +72,24 @@ fn matte_is_oren_nayar_where_sigma_is_not_zero() {
 #[test]
 fn integrators_take_proposals_and_density() {
     let with = |parameters: &str| load_text(&format!("{HEAD}Integrator \"path\" {parameters}\nWorldBegin\n"));
-    let scene = with("\"integer bsdfproposals\" 12 \"string bsdfdensity\" \"uniform\"").unwrap();
-    assert_eq!((scene.integrator.bsdf_proposals, scene.integrator.bsdf_density), (12, ProposalDensity::Uniform));
+    let settings = with("\"integer bsdfproposals\" 12 \"string bsdfdensity\" \"uniform\"").unwrap().settings.integrator;
+    assert_eq!((settings.bsdf_proposals, settings.bsdf_density), (12, ProposalDensity::Uniform));
     assert!(with("\"integer bsdfproposals\" 0").unwrap_err().contains("from 1 to 4096"));
     assert!(with("\"string bsdfdensity\" \"cosine\"").unwrap_err().contains("lobes, uniform"));
 }
 
 /// Means of the pictures of 12 seeds, per channel.
-fn picture_means(mut scene: Scene, proposals: u32, density: ProposalDensity) -> [Welford; 3] {
-    scene.integrator.bsdf_proposals = proposals;
-    scene.materials.set_proposal_density(density);
-    let mut world = World::new(scene, AccelKind::Embree, None).unwrap();
+fn picture_means(mut loaded: Loaded, proposals: u32, density: ProposalDensity) -> [Welford; 3] {
+    loaded.settings.integrator.bsdf_proposals = proposals;
+    loaded.settings.integrator.bsdf_density = density;
+    let mut job = loaded.job(AccelKind::Embree, None).unwrap();
     let mut means = [Welford::default(); 3];
     for seed in 0..12 {
         // Other seeds for other settings, so that the pictures are independent.
-        world.scene.sampling.seed = seed + 100 * proposals + 50 * u32::from(density == ProposalDensity::Uniform);
-        let settings = RenderSettings { threads: Some(1), spp: world.scene.sampling.spp, ..RenderSettings::default() };
-        let film = render(&world, &settings, &AtomicBool::new(false), &|_| ()).unwrap().film;
+        job.change(|s| s.sampling.seed = seed + 100 * proposals + 50 * u32::from(density == ProposalDensity::Uniform));
+        let settings =
+            RenderSettings { threads: Some(1), spp: job.settings().sampling.spp, ..RenderSettings::default() };
+        let film = render(&job, &settings, &AtomicBool::new(false), &|_| ()).unwrap().film;
         for (channel, mean) in means.iter_mut().enumerate() {
             mean.add(film.pixels.iter().map(|p| p.mean()[channel]).sum::<f64>() / film.pixels.len() as f64);
         }
@@ -109,8 +110,8 @@ fn a_closed_furnace_has_its_radiance_for_every_number_of_proposals() {
     let path = Path::new(env!("CARGO_MANIFEST_DIR")).join("scenes/analytic/furnace-evaluated.pbrt");
     let significance = sidak(1e-3, SETTINGS.len() * 3);
     for (proposals, density) in SETTINGS {
-        let scene = load(&path, &LoadOptions::default()).map_err(|d| d.to_string()).unwrap().scene;
-        let means = picture_means(scene, proposals, density);
+        let loaded = load(&path, &LoadOptions::default()).map_err(|d| d.to_string()).unwrap();
+        let means = picture_means(loaded, proposals, density);
         for (mean, rho) in means.iter().zip([0.5_f64, 0.25, 0.75]) {
             let expected = 0.5 * (1.0 - rho.powi(5)) / (1.0 - rho);
             assert!(t_test(mean, expected).p_value > significance, "{proposals} {density:?} {mean:?} {expected}");
@@ -147,12 +148,12 @@ fn proposals_are_for_what_can_only_be_evaluated() {
         )
     };
     let picture = |material: &str, proposals: u32| {
-        let mut scene = load_text(&text(material)).unwrap();
-        scene.integrator.bsdf_proposals = proposals;
-        scene.sampling.spp = 2;
-        let world = World::new(scene, AccelKind::Embree, None).unwrap();
+        let mut loaded = load_text(&text(material)).unwrap();
+        loaded.settings.integrator.bsdf_proposals = proposals;
+        loaded.settings.sampling.spp = 2;
+        let job = loaded.job(AccelKind::Embree, None).unwrap();
         let settings = RenderSettings { spp: 2, ..RenderSettings::default() };
-        let film = render(&world, &settings, &AtomicBool::new(false), &|_| ()).unwrap().film;
+        let film = render(&job, &settings, &AtomicBool::new(false), &|_| ()).unwrap().film;
         film.pixels.iter().map(|p| p.mean()).collect::<Vec<_>>()
     };
     for (material, same) in [

@@ -6,8 +6,8 @@ use lumiris::import::{LoadOptions, load};
 use lumiris::integrators::irradiance_cache::gather::{Gatherer, Wanted};
 use lumiris::render::output::{Aov, channels};
 use lumiris::render::{RenderSettings, Rendering, render};
-use lumiris::scene::{AccelKind, World};
-use lumiris::settings::{Cached, EstimatorKind, IntegratorKind, Proposals};
+use lumiris::scene::{AccelKind, RenderJob};
+use lumiris::settings::{Cached, EstimatorKind, IntegratorKind, Proposals, Settings};
 use lumiris_numbers::estimators::ocv::Form;
 use lumiris_numbers::estimators::stats::{sidak, t_test};
 use lumiris_numbers::math::Vec3;
@@ -70,26 +70,26 @@ Material "diffusetransmission" "rgb reflectance" [ 0.3 0.3 0.3 ] "rgb transmitta
 Shape "trianglemesh" "point3 P" [ -0.9 0.8 0.3  -0.3 0.8 0.3  -0.3 1.3 0.1  -0.9 1.3 0.1 ] "integer indices" [ 0 1 2 0 2 3 ]
 "#;
 
-pub(crate) fn world_of(text: &str, change: impl FnOnce(&mut lumiris::scene::Scene)) -> World {
+pub(crate) fn world_of(text: &str, change: impl FnOnce(&mut Settings)) -> RenderJob {
     world_with_packets(text, None, change)
 }
 
-fn world_with_packets(text: &str, packet_width: Option<u32>, change: impl FnOnce(&mut lumiris::scene::Scene)) -> World {
+fn world_with_packets(text: &str, packet_width: Option<u32>, change: impl FnOnce(&mut Settings)) -> RenderJob {
     let folder = tempfile::tempdir().unwrap();
     let path = folder.path().join("scene.pbrt");
     std::fs::write(&path, text).unwrap();
-    let mut scene = load(&path, &LoadOptions::default()).map_err(|d| d.to_string()).unwrap().scene;
-    change(&mut scene);
-    World::new(scene, AccelKind::Embree, packet_width).unwrap()
+    let mut loaded = load(&path, &LoadOptions::default()).map_err(|d| d.to_string()).unwrap();
+    change(&mut loaded.settings);
+    loaded.job(AccelKind::Embree, packet_width).unwrap()
 }
 
-pub(crate) fn rendering(world: &World, settings: RenderSettings) -> Rendering {
-    render(world, &settings, &AtomicBool::new(false), &|_| ()).unwrap()
+pub(crate) fn rendering(job: &RenderJob, settings: RenderSettings) -> Rendering {
+    render(job, &settings, &AtomicBool::new(false), &|_| ()).unwrap()
 }
 
-fn with_cache(scene: &mut lumiris::scene::Scene, cached: Cached) {
-    scene.integrator.kind = IntegratorKind::IrradianceCache;
-    scene.integrator.cache.cached = cached;
+fn with_cache(s: &mut Settings, cached: Cached) {
+    s.integrator.kind = IntegratorKind::IrradianceCache;
+    s.integrator.cache.cached = cached;
 }
 
 #[test]
@@ -108,14 +108,14 @@ fn the_analytic_scenes_have_their_known_answers() {
     let mut failures = Vec::new();
     for path in &files {
         for (cached, estimator) in configurations {
-            let mut scene = load(path, &LoadOptions::default()).map_err(|d| d.to_string()).unwrap().scene;
-            with_cache(&mut scene, cached);
-            scene.integrator.cache.samples = 64;
-            scene.integrator.cache.passes = 32;
-            scene.integrator.estimator = estimator;
-            scene.integrator.ris.proposals = Proposals::Fixed(16);
-            let mut world = World::new(scene, AccelKind::Embree, None).unwrap();
-            let means = picture_means(&mut world);
+            let mut loaded = load(path, &LoadOptions::default()).map_err(|d| d.to_string()).unwrap();
+            with_cache(&mut loaded.settings, cached);
+            loaded.settings.integrator.cache.samples = 64;
+            loaded.settings.integrator.cache.passes = 32;
+            loaded.settings.integrator.estimator = estimator;
+            loaded.settings.integrator.ris.proposals = Proposals::Fixed(16);
+            let mut job = loaded.job(AccelKind::Embree, None).unwrap();
+            let means = picture_means(&mut job);
             for (channel, (mean, answer)) in means.iter().zip(answer(path)).enumerate() {
                 let is_steep = cached == Cached::All && path.ends_with("spot-falloff.pbrt");
                 let bias = if is_steep { 5e-3 } else { 1e-4 };
@@ -148,18 +148,18 @@ pub(crate) fn squares(film: &Film, size: u32) -> Vec<f64> {
 fn a_room_of_all_materials_agrees_with_path_tracing() {
     // No more than 5 % off in any square of 8 × 8 pixels and 1.5 % in the mean, of which 1 % and 0.3 % are noise. Light
     // counted twice or lost at a coat, in a mirror or through glass is 4 % and more.
-    let path = world_of(ROOM, |scene| scene.integrator.samples = Some(4));
+    let path = world_of(ROOM, |s| s.integrator.samples = Some(4));
     let reference = squares(&rendering(&path, RenderSettings { spp: 768, ..Default::default() }).film, 8);
     let mean = |v: &[f64]| v.iter().sum::<f64>() / v.len() as f64;
     for cached in CACHED {
-        let world = world_of(ROOM, |scene| {
-            with_cache(scene, cached);
-            scene.integrator.samples = Some(8);
-            scene.integrator.cache.samples = 512;
-            scene.integrator.cache.error = 0.1;
-            scene.integrator.cache.radius = [0.5, 10.0];
+        let job = world_of(ROOM, |s| {
+            with_cache(s, cached);
+            s.integrator.samples = Some(8);
+            s.integrator.cache.samples = 512;
+            s.integrator.cache.error = 0.1;
+            s.integrator.cache.radius = [0.5, 10.0];
         });
-        let cached_picture = squares(&rendering(&world, RenderSettings { spp: 64, ..Default::default() }).film, 8);
+        let cached_picture = squares(&rendering(&job, RenderSettings { spp: 64, ..Default::default() }).film, 8);
         let ratio = mean(&cached_picture) / mean(&reference);
         assert!((ratio - 1.0).abs() < 0.015, "{cached:?}: mean {ratio}");
         for (i, (a, b)) in cached_picture.iter().zip(&reference).enumerate() {
@@ -170,8 +170,8 @@ fn a_room_of_all_materials_agrees_with_path_tracing() {
 
 #[test]
 fn nearly_every_diffuse_vertex_finds_a_record_and_pixels_say_who_asked() {
-    let world = world_of(ROOM, |scene| with_cache(scene, Cached::Indirect));
-    let rendering = rendering(&world, RenderSettings { spp: 8, ..Default::default() });
+    let job = world_of(ROOM, |s| with_cache(s, Cached::Indirect));
+    let rendering = rendering(&job, RenderSettings { spp: 8, ..Default::default() });
     let cache = rendering.cache.unwrap();
     assert!(cache.records > 100 && cache.records < 2 * 48 * 48, "{}", cache.records);
     assert!(cache.lookups.fallbacks * 20 < cache.lookups.lookups, "{:?}", cache.lookups);
@@ -189,17 +189,17 @@ fn threads_tiles_and_packets_do_not_change_a_bit() {
     for (cached, estimator) in
         [(Cached::Indirect, EstimatorKind::Mis), (Cached::All, EstimatorKind::Ris), (Cached::All, EstimatorKind::Ocv)]
     {
-        let world = |width| {
-            world_with_packets(ROOM, width, |scene| {
-                with_cache(scene, cached);
-                scene.integrator.estimator = estimator;
-                scene.integrator.ris.proposals = Proposals::Fixed(16);
-                scene.integrator.cache.samples = 32;
+        let job = |width| {
+            world_with_packets(ROOM, width, |s| {
+                with_cache(s, cached);
+                s.integrator.estimator = estimator;
+                s.integrator.ris.proposals = Proposals::Fixed(16);
+                s.integrator.cache.samples = 32;
             })
         };
         let picture = |width, threads, tile_size| {
             let settings = RenderSettings { threads: Some(threads), tile_size, spp: 4, ..Default::default() };
-            let r = rendering(&world(width), settings);
+            let r = rendering(&job(width), settings);
             (bits(&r.film), r.cache.unwrap().records)
         };
         let reference = picture(None, 1, 16);
@@ -222,12 +222,12 @@ fn threads_tiles_and_packets_do_not_change_a_bit() {
 #[test]
 fn seeds_give_different_records() {
     let picture = |seed| {
-        let world = world_of(ROOM, |scene| {
-            with_cache(scene, Cached::Indirect);
-            scene.integrator.cache.samples = 32;
-            scene.sampling.seed = seed;
+        let job = world_of(ROOM, |s| {
+            with_cache(s, Cached::Indirect);
+            s.integrator.cache.samples = 32;
+            s.sampling.seed = seed;
         });
-        bits(&rendering(&world, RenderSettings::default()).film)
+        bits(&rendering(&job, RenderSettings::default()).film)
     };
     assert_eq!(picture(3), picture(3));
     assert_ne!(picture(3), picture(4));
@@ -236,14 +236,14 @@ fn seeds_give_different_records() {
 #[test]
 fn records_take_any_estimator() {
     let mean = |change: &dyn Fn(&mut lumiris::settings::IntegratorSettings)| {
-        let world = world_of(ROOM, |scene| {
-            with_cache(scene, Cached::All);
-            scene.integrator.cache.samples = 64;
-            scene.integrator.samples = Some(8);
-            scene.integrator.ris.proposals = Proposals::Fixed(32);
-            change(&mut scene.integrator);
+        let job = world_of(ROOM, |s| {
+            with_cache(s, Cached::All);
+            s.integrator.cache.samples = 64;
+            s.integrator.samples = Some(8);
+            s.integrator.ris.proposals = Proposals::Fixed(32);
+            change(&mut s.integrator);
         });
-        let film = rendering(&world, RenderSettings { spp: 4, ..Default::default() }).film;
+        let film = rendering(&job, RenderSettings { spp: 4, ..Default::default() }).film;
         squares(&film, 48)[0]
     };
     let reference = mean(&|s| s.estimator = EstimatorKind::Mis);
@@ -280,9 +280,9 @@ fn wanted(p: Vec3, n: Vec3) -> Wanted {
 }
 
 /// Gradients of the irradiance at `p` against differences of the irradiance at `p ± h t`, relative to the length of the former.
-fn assert_gradients(world: &World, p: Vec3, n: Vec3, h: f32, tolerance: f32) {
+fn assert_gradients(job: &RenderJob, p: Vec3, n: Vec3, h: f32, tolerance: f32) {
     let mut gatherer = Gatherer::default();
-    let mut at = |p: Vec3, n: Vec3| gatherer.records(world, &[wanted(p, n)])[0].light;
+    let mut at = |p: Vec3, n: Vec3| gatherer.records(job, &[wanted(p, n)])[0].light;
     let here = at(p, n);
     let (x, y) = n.any_orthonormal_pair();
     for t in [x, y] {
@@ -306,27 +306,26 @@ fn assert_gradients(world: &World, p: Vec3, n: Vec3, h: f32, tolerance: f32) {
 fn gradients_of_sources_are_finite_differences() {
     let folder = Path::new(env!("CARGO_MANIFEST_DIR")).join("scenes/analytic");
     for name in ["rectangle", "triangle", "point"] {
-        let mut scene = load(&folder.join(name).with_extension("pbrt"), &LoadOptions::default())
+        let mut loaded = load(&folder.join(name).with_extension("pbrt"), &LoadOptions::default())
             .map_err(|d| d.to_string())
-            .unwrap()
-            .scene;
-        with_cache(&mut scene, Cached::All);
-        scene.integrator.samples = Some(1024);
-        let world = World::new(scene, AccelKind::Embree, None).unwrap();
-        assert_gradients(&world, Vec3::new(0.1, 0.2, 0.0), Vec3::Z, 0.03, 0.05);
+            .unwrap();
+        with_cache(&mut loaded.settings, Cached::All);
+        loaded.settings.integrator.samples = Some(1024);
+        let job = loaded.job(AccelKind::Embree, None).unwrap();
+        assert_gradients(&job, Vec3::new(0.1, 0.2, 0.0), Vec3::Z, 0.03, 0.05);
     }
 }
 
 #[test]
 fn gradients_of_indirect_light_are_finite_differences() {
-    let world = world_of(BOX, |scene| {
-        with_cache(scene, Cached::Indirect);
-        scene.integrator.cache.samples = 65_536;
-        scene.integrator.max_depth = 2;
-        scene.integrator.samples = Some(4);
+    let job = world_of(BOX, |s| {
+        with_cache(s, Cached::Indirect);
+        s.integrator.cache.samples = 65_536;
+        s.integrator.max_depth = 2;
+        s.integrator.samples = Some(4);
     });
     // Near the green wall
-    assert_gradients(&world, Vec3::new(0.75, 0.0, 0.8), Vec3::Y, 0.05, 0.15);
+    assert_gradients(&job, Vec3::new(0.75, 0.0, 0.8), Vec3::Y, 0.05, 0.15);
 }
 
 #[test]
@@ -351,11 +350,11 @@ Shape "trianglemesh" "point3 P" [ -1 -1 0  1 -1 0  1 -1 1  -1 -1 1 ] "integer in
 Shape "trianglemesh" "point3 P" [ -1 1 0  1 1 0  1 1 1  -1 1 1 ] "integer indices" [ 0 1 2 0 2 3 ]
 "#;
     for cached in CACHED {
-        let world = world_of(ROOMS, |scene| {
-            with_cache(scene, cached);
-            scene.integrator.cache.radius = [1.5, 20.0];
+        let job = world_of(ROOMS, |s| {
+            with_cache(s, cached);
+            s.integrator.cache.radius = [1.5, 20.0];
         });
-        let film = rendering(&world, RenderSettings { spp: 4, ..Default::default() }).film;
+        let film = rendering(&job, RenderSettings { spp: 4, ..Default::default() }).film;
         let column = |x: u32| (0..40).map(|y| film.pixels[film.index(x, y)].mean()[1]).sum::<f64>() / 40.0;
         // On the screen, x is to the left or to the right; the bright side tells
         let mut columns: Vec<f64> = (0..40).map(column).collect();
@@ -380,8 +379,8 @@ fn scenes_without_light_or_without_things_have_no_records() {
         ("", 0.0),
     ] {
         for cached in CACHED {
-            let world = world_of(&(EMPTY.to_owned() + things), |scene| with_cache(scene, cached));
-            let r = rendering(&world, RenderSettings { spp: 2, ..Default::default() });
+            let job = world_of(&(EMPTY.to_owned() + things), |s| with_cache(s, cached));
+            let r = rendering(&job, RenderSettings { spp: 2, ..Default::default() });
             assert_eq!(r.cache.unwrap().records, 0, "{things}");
             assert!(r.film.pixels.iter().all(|p| p.mean() == [expected; 3]), "{things}");
         }

@@ -10,7 +10,7 @@ use lumiris::import::{LoadOptions, load};
 use lumiris::lights::{LightHints, LightId, LightSamplerKind};
 use lumiris::render::output::metadata;
 use lumiris::render::{RenderSettings, render};
-use lumiris::scene::{AccelKind, World};
+use lumiris::scene::{AccelKind, RenderJob};
 use lumiris::settings::{EstimatorKind, IntegratorSettings, Proposals, Target};
 use lumiris_numbers::estimators::stats::{Welford, t_test};
 use lumiris_numbers::math::hash::{HashStream, pcg4d};
@@ -36,8 +36,8 @@ pub enum Hints {
 const PHOTONS: u32 = 1000;
 
 /// Photons of every light where they first meet a surface.
-fn primary_photons(world: &World) -> Vec<(Vec3, Vec3, LightId)> {
-    let lights = &world.scene.lights;
+fn primary_photons(job: &RenderJob) -> Vec<(Vec3, Vec3, LightId)> {
+    let lights = &job.lights;
     let (mut rays, mut ids) = (RayBatch::default(), Vec::new());
     for (id, light) in (0..).zip(&lights.lights) {
         let mut stream = HashStream::new([id, 99, 3]);
@@ -51,26 +51,26 @@ fn primary_photons(world: &World) -> Vec<(Vec3, Vec3, LightId)> {
         }
     }
     let mut hits = Vec::new();
-    world.accel.intersect(&rays, Coherence::Incoherent, &mut hits);
+    job.world.accel.intersect(&rays, Coherence::Incoherent, &mut hits);
     let photon = |(i, hit): (usize, &Option<lumiris::accel::Hit>)| {
         let hit = hit.as_ref()?;
-        let surface = world.scene.geometry.surface_hit(hit.geometry, hit.primitive, hit.instance, hit.uv, 0.0);
+        let surface = job.world.scene.geometry.surface_hit(hit.geometry, hit.primitive, hit.instance, hit.uv, 0.0);
         let n = if surface.n.dot(rays.get(i).d) > 0.0 { -surface.n } else { surface.n };
         Some((surface.p, n, ids[i]))
     };
     hits.iter().enumerate().filter_map(photon).collect()
 }
 
-/// Hints of a kind for a world.
-pub fn hints(world: &World, kind: Hints) -> Option<LightHints> {
-    let radius = world.scene.lights.scene_radius;
+/// Hints of a kind for a job.
+pub fn hints(job: &RenderJob, kind: Hints) -> Option<LightHints> {
+    let radius = job.lights.scene_radius;
     match kind {
         Hints::Absent => None,
         Hints::Empty => Some(LightHints::new(std::iter::empty(), 1.0)),
-        Hints::Right => Some(LightHints::adapted(&primary_photons(world), radius)),
+        Hints::Right => Some(LightHints::adapted(&primary_photons(job), radius)),
         Hints::Wrong => {
-            let mut photons = primary_photons(world);
-            let choices = world.scene.lights.lights.len() as u32 + 2;
+            let mut photons = primary_photons(job);
+            let choices = job.lights.lights.len() as u32 + 2;
             for (i, photon) in photons.iter_mut().enumerate() {
                 photon.2 = pcg4d([i as u32, 1, 2, 3])[0] % choices / 2;
             }
@@ -80,30 +80,29 @@ pub fn hints(world: &World, kind: Hints) -> Option<LightHints> {
 }
 
 /// The lights of the scene that the origin sees, and the others.
-fn is_seen(world: &World, light: LightId) -> bool {
+fn is_seen(job: &RenderJob, light: LightId) -> bool {
     let ctx = lumiris::lights::LightCtx::at(Vec3::ZERO);
-    world.scene.lights.lights[light as usize].sample_li(&ctx, [0.5; 2]).is_some_and(|s| s.p.x < 0.5)
+    job.lights.lights[light as usize].sample_li(&ctx, [0.5; 2]).is_some_and(|s| s.p.x < 0.5)
 }
 
-fn world(settings: impl Fn(&mut IntegratorSettings), seen: impl Fn(&World, LightId) -> bool) -> World {
+fn job(settings: impl Fn(&mut IntegratorSettings), seen: impl Fn(&RenderJob, LightId) -> bool) -> RenderJob {
     let path = Path::new(env!("CARGO_MANIFEST_DIR")).join("scenes/analytic/hidden-lights.pbrt");
-    let mut scene = load(&path, &LoadOptions::default()).map_err(|d| d.to_string()).unwrap().scene;
-    settings(&mut scene.integrator);
-    scene.lights.set_kind(scene.integrator.light_choice);
-    let mut world = World::new(scene, AccelKind::Embree, None).unwrap();
-    let ids = (0..world.scene.lights.lights.len() as LightId).filter(|&id| seen(&world, id));
+    let mut loaded = load(&path, &LoadOptions::default()).map_err(|d| d.to_string()).unwrap();
+    settings(&mut loaded.settings.integrator);
+    let mut job = loaded.job(AccelKind::Embree, None).unwrap();
+    let ids = (0..job.lights.lights.len() as LightId).filter(|&id| seen(&job, id));
     let hints = LightHints::new(ids.flat_map(|id| vec![(Vec3::ZERO, Vec3::Z, id); 20]), 0.1);
-    world.scene.lights.set_hints(Some(hints));
-    world
+    job.lights.set_hints(Some(hints));
+    job
 }
 
 /// Red of all camera samples of some renderings.
-fn pixels(world: &mut World, seeds: u32) -> Welford {
+fn pixels(job: &mut RenderJob, seeds: u32) -> Welford {
     let mut values = Welford::default();
     for seed in 0..seeds {
-        world.scene.sampling.seed = seed;
+        job.change(|s| s.sampling.seed = seed);
         let settings = RenderSettings { threads: Some(1), spp: 1, ..RenderSettings::default() };
-        let film = render(world, &settings, &AtomicBool::new(false), &|_| ()).unwrap().film;
+        let film = render(job, &settings, &AtomicBool::new(false), &|_| ()).unwrap().film;
         film.pixels.iter().for_each(|p: &PixelSums| values.add(p.mean()[0]));
     }
     values
@@ -123,13 +122,13 @@ fn contributing(samples: u32, rest: u32) -> impl Fn(&mut IntegratorSettings) {
 
 #[test]
 fn leaving_lights_out_is_biased_where_a_light_that_is_seen_has_no_photon() {
-    let is_some = |world: &World, id: LightId| is_seen(world, id) && id != 0 && id != 18;
+    let is_some = |job: &RenderJob, id: LightId| is_seen(job, id) && id != 0 && id != 18;
     for samples in [1, 4, 16] {
-        let right = pixels(&mut world(contributing(samples, 0), is_seen), 60);
+        let right = pixels(&mut job(contributing(samples, 0), is_seen), 60);
         assert!(t_test(&right, red()).p_value > 1e-4, "{samples} {right:?}");
-        let biased = pixels(&mut world(contributing(samples, 0), is_some), 60);
+        let biased = pixels(&mut job(contributing(samples, 0), is_some), 60);
         assert!(t_test(&biased, red()).p_value < 1e-6 && biased.mean() < red(), "{samples} {biased:?}");
-        let whole = pixels(&mut world(contributing(samples, 1), is_some), 60);
+        let whole = pixels(&mut job(contributing(samples, 1), is_some), 60);
         assert!(t_test(&whole, red()).p_value > 1e-4, "{samples} {whole:?}");
     }
 }
@@ -137,8 +136,8 @@ fn leaving_lights_out_is_biased_where_a_light_that_is_seen_has_no_photon() {
 #[test]
 fn a_picture_says_that_lights_were_left_out() {
     for (rest, is_biased) in [(0, true), (1, false)] {
-        let scene = world(contributing(4, rest), is_seen).scene;
-        let entries = metadata(&scene.film, &scene.settings());
+        let job = job(contributing(4, rest), is_seen);
+        let entries = metadata(&job.world.scene.film, job.settings());
         assert!(entries.contains(&("lumiris:rest_samples".to_owned(), rest.to_string())));
         assert_eq!(entries.iter().any(|(key, _)| key == "lumiris:biased"), is_biased);
     }
@@ -147,8 +146,8 @@ fn a_picture_says_that_lights_were_left_out() {
 #[test]
 fn right_hints_lower_the_variance() {
     let ratio = |settings: &dyn Fn(&mut IntegratorSettings), least: f64| {
-        let without = pixels(&mut world(settings, |_, _| false), 100).variance();
-        let with = pixels(&mut world(settings, is_seen), 100).variance();
+        let without = pixels(&mut job(settings, |_, _| false), 100).variance();
+        let with = pixels(&mut job(settings, is_seen), 100).variance();
         assert!(without > least * with, "{without} without hints, {with} with");
     };
     ratio(
@@ -173,7 +172,7 @@ fn right_hints_lower_the_variance() {
 #[test]
 fn brighter_lights_first_leave_little_noise_and_no_bias() {
     // All 25 lights are taken for seen: 16 of them are hidden, which the order does not know.
-    let estimate = |samples| pixels(&mut world(contributing(samples, 0), |_, _| true), 100);
+    let estimate = |samples| pixels(&mut job(contributing(samples, 0), |_, _| true), 100);
     let estimates = [1, 8, 20, 60].map(estimate);
     for e in &estimates {
         assert!(t_test(e, red()).p_value > 1e-4, "{e:?}");
@@ -182,6 +181,6 @@ fn brighter_lights_first_leave_little_noise_and_no_bias() {
     assert!(one > 2.0 * eight && eight > 2.0 * twenty && twenty > sixty, "{one} {eight} {twenty} {sixty}");
 
     // Where all are seen, one of them in proportion to its brightness is worth as much as all.
-    let [one, all] = [1, 9].map(|samples| pixels(&mut world(contributing(samples, 0), is_seen), 100).variance());
+    let [one, all] = [1, 9].map(|samples| pixels(&mut job(contributing(samples, 0), is_seen), 100).variance());
     assert!(one < 2.0 * all, "{one} {all}");
 }

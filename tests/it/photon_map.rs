@@ -4,8 +4,8 @@
 use super::irradiance_cache::{ROOM, rendering, squares, world_of};
 use lumiris::render::output::{Aov, channels};
 use lumiris::render::{RenderSettings, render};
-use lumiris::scene::{Scene, World};
-use lumiris::settings::{Deposition, IntegratorKind, PhotonMapSettings, Shrinking};
+use lumiris::scene::RenderJob;
+use lumiris::settings::{Deposition, IntegratorKind, PhotonMapSettings, Settings, Shrinking};
 use lumiris_numbers::estimators::stats::{Welford, sidak, t_test};
 use std::sync::atomic::AtomicBool;
 
@@ -22,10 +22,10 @@ ReverseOrientation
 Shape "sphere" "float radius" [ 2 ]
 "#;
 
-fn with_photons(scene: &mut Scene, change: impl FnOnce(&mut PhotonMapSettings)) {
-    scene.integrator.kind = IntegratorKind::PhotonMap;
-    scene.integrator.photons.photons = 30_000;
-    change(&mut scene.integrator.photons);
+fn with_photons(s: &mut Settings, change: impl FnOnce(&mut PhotonMapSettings)) {
+    s.integrator.kind = IntegratorKind::PhotonMap;
+    s.integrator.photons.photons = 30_000;
+    change(&mut s.integrator.photons);
 }
 
 fn mean(values: &[f64]) -> f64 {
@@ -45,11 +45,11 @@ fn a_furnace_has_its_known_radiance() {
     ];
     let significance = sidak(1e-3, forms.len() * 3);
     for (i, form) in forms.into_iter().enumerate() {
-        let mut world = world_of(FURNACE, |scene| with_photons(scene, form));
+        let mut job = world_of(FURNACE, |s| with_photons(s, form));
         let mut means = [Welford::new(); 3];
         for seed in 0..6 {
-            world.scene.sampling.seed = seed;
-            let film = rendering(&world, RenderSettings { spp: 2, ..Default::default() }).film;
+            job.change(|s| s.sampling.seed = seed);
+            let film = rendering(&job, RenderSettings { spp: 2, ..Default::default() }).film;
             for (c, mean) in means.iter_mut().enumerate() {
                 mean.add(film.pixels.iter().map(|p| p.mean()[c]).sum::<f64>() / film.pixels.len() as f64);
             }
@@ -66,31 +66,31 @@ fn a_furnace_has_its_known_radiance() {
 fn a_room_of_all_materials_agrees_with_path_tracing() {
     // Light counted twice or lost at a coat, in a mirror or through glass is 4 % and more; the density of photons in corners and
     // below the glass sphere is off by less.
-    let path = world_of(ROOM, |scene| scene.integrator.samples = Some(4));
+    let path = world_of(ROOM, |s| s.integrator.samples = Some(4));
     let reference = squares(&rendering(&path, RenderSettings { spp: 512, ..Default::default() }).film, 8);
     for deposition in [Deposition::All, Deposition::Floor(0.1)] {
-        let world = world_of(ROOM, |scene| {
-            scene.integrator.samples = Some(4);
-            with_photons(scene, |p| (p.photons, p.deposition) = (200_000, deposition));
+        let job = world_of(ROOM, |s| {
+            s.integrator.samples = Some(4);
+            with_photons(s, |p| (p.photons, p.deposition) = (200_000, deposition));
         });
-        let picture = squares(&rendering(&world, RenderSettings { spp: 32, ..Default::default() }).film, 8);
+        let picture = squares(&rendering(&job, RenderSettings { spp: 32, ..Default::default() }).film, 8);
         let ratio = mean(&picture) / mean(&reference);
-        assert!((ratio - 1.0).abs() < 0.015, "{deposition}: mean {ratio}");
+        assert!((ratio - 1.0).abs() < 0.015, "{deposition:?}: mean {ratio}");
         for (i, (a, b)) in picture.iter().zip(&reference).enumerate() {
-            assert!((a / b - 1.0).abs() < 0.06, "{deposition}: square {i} has {a}, not {b}");
+            assert!((a / b - 1.0).abs() < 0.06, "{deposition:?}: square {i} has {a}, not {b}");
         }
     }
 }
 
 #[test]
 fn more_passes_bring_a_progressive_map_nearer_to_the_truth() {
-    let path = world_of(ROOM, |scene| scene.integrator.samples = Some(4));
+    let path = world_of(ROOM, |s| s.integrator.samples = Some(4));
     let reference = squares(&rendering(&path, RenderSettings { spp: 1024, ..Default::default() }).film, 4);
-    let world = world_of(ROOM, |scene| {
-        with_photons(scene, |p| (p.photons, p.gather, p.progressive) = (2_000, 0, Some(Shrinking::default())));
+    let job = world_of(ROOM, |s| {
+        with_photons(s, |p| (p.photons, p.gather, p.progressive) = (2_000, 0, Some(Shrinking::default())));
     });
     let error = |spp| {
-        let picture = squares(&rendering(&world, RenderSettings { spp, ..Default::default() }).film, 4);
+        let picture = squares(&rendering(&job, RenderSettings { spp, ..Default::default() }).film, 4);
         let square = |(a, b): (&f64, &f64)| (a - b) * (a - b);
         (picture.iter().zip(&reference).map(square).sum::<f64>() / picture.len() as f64).sqrt()
     };
@@ -101,19 +101,19 @@ fn more_passes_bring_a_progressive_map_nearer_to_the_truth() {
 
 #[test]
 fn threads_tiles_and_packets_do_not_change_a_bit() {
-    let bits = |world: &World, settings: RenderSettings| {
-        let film = rendering(world, RenderSettings { spp: 4, ..settings }).film;
+    let bits = |job: &RenderJob, settings: RenderSettings| {
+        let film = rendering(job, RenderSettings { spp: 4, ..settings }).film;
         channels(&film, &Aov::ALL, None).data.iter().map(|v| v.to_bits()).collect::<Vec<_>>()
     };
     for progressive in [None, Some(Shrinking::default())] {
-        let world = world_of(ROOM, |scene| {
-            with_photons(scene, |p| {
+        let job = world_of(ROOM, |s| {
+            with_photons(s, |p| {
                 (p.photons, p.progressive, p.deposition) = (20_000, progressive, Deposition::Floor(0.1));
             });
         });
-        let reference = bits(&world, RenderSettings { threads: Some(1), ..Default::default() });
+        let reference = bits(&job, RenderSettings { threads: Some(1), ..Default::default() });
         for (threads, tile_size) in [(2, 16), (3, 7), (1, 64)] {
-            let other = bits(&world, RenderSettings { threads: Some(threads), tile_size, ..Default::default() });
+            let other = bits(&job, RenderSettings { threads: Some(threads), tile_size, ..Default::default() });
             assert!(reference == other, "{threads} threads, tiles of {tile_size}, {progressive:?}");
         }
     }
@@ -122,8 +122,8 @@ fn threads_tiles_and_packets_do_not_change_a_bit() {
 #[test]
 fn without_photons_there_is_a_message_and_no_picture() {
     let error = |text: &str, change: fn(&mut PhotonMapSettings)| {
-        let world = world_of(text, |scene| with_photons(scene, change));
-        let rendering = render(&world, &RenderSettings::default(), &AtomicBool::new(false), &|_| ());
+        let job = world_of(text, |s| with_photons(s, change));
+        let rendering = render(&job, &RenderSettings::default(), &AtomicBool::new(false), &|_| ());
         rendering.err().map(|e| e.to_string()).unwrap_or_default()
     };
     let dark = ROOM.replace("[ 12 10 8 ]", "[ 0 0 0 ]");

@@ -6,7 +6,7 @@ use lumiris::photons::{
     CausticRule, GatherScratch, Importance, ImportanceSettings, Photon, PhotonError, PhotonMap, Place, Search, Traced,
     Tracing, Unimportant, Want, trace_importons, trace_photons,
 };
-use lumiris::scene::World;
+use lumiris::scene::RenderJob;
 use lumiris::settings::{Cached, IntegratorKind};
 use lumiris_numbers::estimators::stats::{Welford, t_test, two_sample_z_test};
 use lumiris_numbers::math::{Rgb, Vec3};
@@ -36,8 +36,8 @@ fn furnace(things: &str) -> String {
     text + "AttributeEnd\n" + things
 }
 
-fn trace(world: &World, tracing: &Tracing<'_>, count: u64) -> Traced {
-    trace_photons(world, tracing, None, Want::Trajectories(count)).unwrap()
+fn trace(job: &RenderJob, tracing: &Tracing<'_>, count: u64) -> Traced {
+    trace_photons(job, tracing, None, Want::Trajectories(count)).unwrap()
 }
 
 fn both(traced: &Traced) -> Vec<Photon> {
@@ -71,13 +71,13 @@ fn irradiances(runs: u32, place: &Place, search: Search, photons: impl Fn(u32) -
 
 #[test]
 fn energy_is_kept_at_every_bounce() {
-    let world = world_of(&furnace(""), |_| ());
+    let job = world_of(&furnace(""), |_| ());
     // π L A through all walls
     let flux = PI * 0.5 * 96.0;
     let mut sums: [[Welford; 3]; 2] = Default::default();
     for seed in 0..10 {
         for (depth, sums) in [0, 3].into_iter().zip(&mut sums) {
-            let traced = trace(&world, &Tracing { seed, max_depth: depth, ..Tracing::default() }, 20_000);
+            let traced = trace(&job, &Tracing { seed, max_depth: depth, ..Tracing::default() }, 20_000);
             assert!(traced.caustic.is_empty());
             let mut sum = [0.0; 3];
             for photon in &traced.global {
@@ -109,15 +109,15 @@ fn a_furnace_has_its_irradiance_whatever_lossless_things_stand_in_it() {
         ),
         ("no surface", "Material \"interface\" Translate 0.2 -0.9 0.1 Shape \"sphere\" \"float radius\" [ 0.9 ]\n"),
     ] {
-        let world = world_of(&furnace(things), |_| ());
+        let job = world_of(&furnace(things), |_| ());
         let place = Place::flat(Vec3::new(0.1, -2.0, 0.2), Vec3::Y);
         let tracing = |seed| Tracing { seed, max_depth: 80, ..Tracing::default() };
-        let e = irradiances(12, &place, Search::Radius(0.5), |seed| both(&trace(&world, &tracing(seed), 20_000)));
+        let e = irradiances(12, &place, Search::Radius(0.5), |seed| both(&trace(&job, &tracing(seed), 20_000)));
         for (c, rho) in [0.5, 0.25, 0.75].into_iter().enumerate() {
             assert!(e[c].standard_error() < 0.05 * e[c].mean(), "{name}: the test can tell");
             assert_mean(&e[c], PI * 0.5 / (1.0 - rho), name);
         }
-        let traced = trace(&world, &tracing(0), 20_000);
+        let traced = trace(&job, &tracing(0), 20_000);
         let scatters = ["glass", "a mirror", "thin glass"].contains(&name);
         assert_eq!(traced.caustic.is_empty(), !scatters, "{name}");
         assert!(traced.caustic.iter().all(Photon::is_caustic) && !traced.global.iter().any(Photon::is_caustic));
@@ -132,12 +132,12 @@ fn wanted(p: Vec3, n: Vec3) -> Wanted {
 #[test]
 fn photons_agree_with_path_tracing_among_many_materials() {
     let depth = 8;
-    let world = world_of(ROOM, |scene| {
-        scene.integrator.kind = IntegratorKind::IrradianceCache;
-        scene.integrator.cache.cached = Cached::All;
-        scene.integrator.cache.samples = 16_384;
-        scene.integrator.cache.passes = 256;
-        scene.integrator.max_depth = depth;
+    let job = world_of(ROOM, |s| {
+        s.integrator.kind = IntegratorKind::IrradianceCache;
+        s.integrator.cache.cached = Cached::All;
+        s.integrator.cache.samples = 16_384;
+        s.integrator.cache.passes = 256;
+        s.integrator.max_depth = depth;
     });
     let places = [
         ("the floor", Vec3::new(-0.1, 0.0, 0.5), Vec3::Y),
@@ -145,11 +145,11 @@ fn photons_agree_with_path_tracing_among_many_materials() {
         ("the coated wall", Vec3::new(0.2, 1.1, -1.0), Vec3::Z),
         ("the ceiling", Vec3::new(0.9, 2.0, 0.3), -Vec3::Y),
     ];
-    let records = Gatherer::default().records(&world, &places.map(|(_, p, n)| wanted(p, n)));
+    let records = Gatherer::default().records(&job, &places.map(|(_, p, n)| wanted(p, n)));
     for ((name, p, n), record) in places.into_iter().zip(records) {
         let tracing = |seed| Tracing { seed, max_depth: depth - 1, ..Tracing::default() };
         let search = Search::Radius(0.08);
-        let e = irradiances(6, &Place::flat(p, n), search, |seed| both(&trace(&world, &tracing(seed), 200_000)));
+        let e = irradiances(6, &Place::flat(p, n), search, |seed| both(&trace(&job, &tracing(seed), 200_000)));
         for (c, expected) in channels(record.light.e).into_iter().enumerate() {
             // The kernel is not a point, and the reference has noise as well
             let bound = 4.0 * e[c].standard_error() + 0.025 * expected;
@@ -163,10 +163,10 @@ fn inside_glass_light_is_denser_by_the_square_of_the_index() {
     // A white ball in a glass one takes no light away: L = 1.5² · 0.5/(1 − ρ) around it
     let things = "Translate 0.2 -0.9 0.1\nMaterial \"dielectric\"\nShape \"sphere\" \"float radius\" [ 0.9 ]\n\
         Material \"diffuse\" \"rgb reflectance\" [ 1 1 1 ]\nShape \"sphere\" \"float radius\" [ 0.6 ]\n";
-    let world = world_of(&furnace(things), |_| ());
+    let job = world_of(&furnace(things), |_| ());
     let place = Place::flat(Vec3::new(0.2, -0.3, 0.1), Vec3::Y);
     let tracing = |seed| Tracing { seed, max_depth: 150, ..Tracing::default() };
-    let e = irradiances(12, &place, Search::Radius(0.25), |seed| both(&trace(&world, &tracing(seed), 20_000)));
+    let e = irradiances(12, &place, Search::Radius(0.25), |seed| both(&trace(&job, &tracing(seed), 20_000)));
     for (c, rho) in [0.5, 0.25, 0.75].into_iter().enumerate() {
         assert!(e[c].standard_error() < 0.1 * e[c].mean(), "the test can tell");
         assert_mean(&e[c], 2.25 * PI * 0.5 / (1.0 - rho), "inside glass");
@@ -185,17 +185,17 @@ Shape "trianglemesh" "point3 P" [ -3 0 -3  3 0 -3  3 0 3  -3 0 3 ] "integer indi
 Shape "trianglemesh" "point3 P" [ 0 0 -1  0 2 -1  0 2 1  0 0 1 ] "integer indices" [ 0 1 2 0 2 3 ]
   "normal N" [ 0.8 0.6 0  0.8 0.6 0  0.8 0.6 0  0.8 0.6 0 ]
 "#;
-    let world = world_of(WALL, |scene| {
-        scene.integrator.kind = IntegratorKind::IrradianceCache;
-        scene.integrator.cache.cached = Cached::All;
-        scene.integrator.cache.samples = 65_536;
-        scene.integrator.max_depth = 2;
+    let job = world_of(WALL, |s| {
+        s.integrator.kind = IntegratorKind::IrradianceCache;
+        s.integrator.cache.cached = Cached::All;
+        s.integrator.cache.samples = 65_536;
+        s.integrator.max_depth = 2;
     });
     let (p, n) = (Vec3::new(1.0, 0.0, 0.1), Vec3::Y);
-    let [record] = Gatherer::default().records(&world, &[wanted(p, n)])[..] else { panic!("one record") };
+    let [record] = Gatherer::default().records(&job, &[wanted(p, n)])[..] else { panic!("one record") };
     let tracing = |seed| Tracing { seed, max_depth: 1, ..Tracing::default() };
     let search = Search::Radius(0.2);
-    let e = irradiances(12, &Place::flat(p, n), search, |seed| trace(&world, &tracing(seed), 700_000).global);
+    let e = irradiances(12, &Place::flat(p, n), search, |seed| trace(&job, &tracing(seed), 700_000).global);
     let expected = f64::from(record.light.e.g);
     let bound = 4.0 * e[1].standard_error() + 0.02 * expected;
     assert!(bound < 0.08 * expected, "the test can tell");
@@ -243,12 +243,12 @@ fn caustics_come_from_direct_and_from_indirect_light() {
 
 #[test]
 fn the_rules_of_caustics_give_the_same_maps() {
-    let world = world_of(ROOM, |_| ());
+    let job = world_of(ROOM, |_| ());
     let place = Place::flat(Vec3::new(0.4, 0.0, 0.5), Vec3::Y);
     let (q, count) = (0.2, 40_000);
     let of = |rule, q| {
         let tracing = move |seed| Tracing { seed, q, caustics: rule, max_depth: 5, ..Tracing::default() };
-        let run = |seed| trace(&world, &tracing(seed), count);
+        let run = |seed| trace(&job, &tracing(seed), count);
         let search = Search::Radius(0.3);
         let global = irradiances(12, &place, search, |seed| run(seed).global);
         let caustic = irradiances(12, &place, search, |seed| run(seed).caustic);
@@ -289,21 +289,21 @@ Shape "trianglemesh" "point3 P" [ 2 0 -1  2 2 -1  2 2 1  2 0 1 ] "integer indice
 Shape "trianglemesh" "point3 P" [ 0 0 -1  0 2 -1  0 2 0.7  0 0 0.7 ] "integer indices" [ 0 1 2 0 2 3 ]
 "#;
 
-fn importance(world: &World, unimportant: Unimportant) -> Importance {
+fn importance(job: &RenderJob, unimportant: Unimportant) -> Importance {
     let settings = ImportanceSettings { trajectories: 20_000, unimportant, ..ImportanceSettings::default() };
-    trace_importons(world, &settings).unwrap()
+    trace_importons(job, &settings).unwrap()
 }
 
 #[test]
 fn importance_moves_photons_to_what_is_seen_and_keeps_their_light() {
-    let world = world_of(ROOMS, |_| ());
+    let job = world_of(ROOMS, |_| ());
     let tracing = |seed| Tracing { seed, max_depth: 4, q: 0.5, ..Tracing::default() };
     let (count, runs) = (30_000, 20);
     let by = |importance: Option<&Importance>, seed| {
-        trace_photons(&world, &tracing(seed), importance, Want::Trajectories(count)).unwrap()
+        trace_photons(&job, &tracing(seed), importance, Want::Trajectories(count)).unwrap()
     };
-    let floor = importance(&world, Unimportant::Floor(0.02));
-    assert!(floor.is_unbiased() && !importance(&world, Unimportant::CutOff(0.02)).is_unbiased());
+    let floor = importance(&job, Unimportant::Floor(0.02));
+    assert!(floor.is_unbiased() && !importance(&job, Unimportant::CutOff(0.02)).is_unbiased());
 
     // The same light in expectation, whether the place is seen or not
     let seen = Place::flat(Vec3::new(-1.0, 0.0, 0.2), Vec3::Y);
@@ -327,7 +327,7 @@ fn importance_moves_photons_to_what_is_seen_and_keeps_their_light() {
     assert!(kept(-1.0) > 0.5 && kept(1.0) < 0.4 * kept(-1.0), "{} {}", kept(-1.0), kept(1.0));
 
     // Cut off, photons are missing and none is strong
-    let cut = by(Some(&importance(&world, Unimportant::CutOff(0.2))), 0);
+    let cut = by(Some(&importance(&job, Unimportant::CutOff(0.2))), 0);
     assert!(cut.stored() < plain.stored());
     let strongest = |traced: &Traced| traced.global.iter().map(|p| p.power().r).fold(0.0, f32::max);
     assert!(strongest(&cut) < 5.1 * strongest(&plain));
@@ -335,33 +335,33 @@ fn importance_moves_photons_to_what_is_seen_and_keeps_their_light() {
 
 #[test]
 fn stored_photons_are_as_many_as_wanted_and_estimate_the_same() {
-    let world = world_of(ROOM, |_| ());
+    let job = world_of(ROOM, |_| ());
     for rule in CausticRule::iter() {
         let tracing = Tracing { q: 0.25, caustics: rule, max_depth: 4, ..Tracing::default() };
         let want = Want::Stored { global: 20_000, most_trajectories: 10_000_000 };
-        let traced = trace_photons(&world, &tracing, None, want).unwrap();
+        let traced = trace_photons(&job, &tracing, None, want).unwrap();
         assert!((20_000..20_005).contains(&traced.global.len()), "{rule:?} {}", traced.global.len());
         // The same as of that many trajectories, but for the end of the last one
-        let again = trace(&world, &tracing, traced.trajectories);
+        let again = trace(&job, &tracing, traced.trajectories);
         assert_eq!(again.caustic, traced.caustic, "{rule:?}");
         assert!(again.global.len().abs_diff(traced.global.len()) < 10, "{rule:?}");
         assert!(again.global_trajectories.abs_diff(traced.global_trajectories) <= 1);
     }
     let want = Want::Stored { global: u64::MAX, most_trajectories: 5000 };
-    let traced = trace_photons(&world, &Tracing::default(), None, want).unwrap();
+    let traced = trace_photons(&job, &Tracing::default(), None, want).unwrap();
     assert_eq!((traced.trajectories, traced.global_trajectories), (5000, 5000));
 }
 
 #[test]
 fn photons_are_the_same_for_any_number_of_threads() {
-    let world = world_of(ROOM, |_| ());
+    let job = world_of(ROOM, |_| ());
     let run = |threads: usize| {
         let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build().unwrap();
         pool.install(|| {
-            let importance = importance(&world, Unimportant::Floor(0.05));
+            let importance = importance(&job, Unimportant::Floor(0.05));
             let tracing = Tracing { q: 0.3, max_depth: 5, ..Tracing::default() };
             let want = Want::Stored { global: 30_000, most_trajectories: 1_000_000 };
-            trace_photons(&world, &tracing, Some(&importance), want).unwrap()
+            trace_photons(&job, &tracing, Some(&importance), want).unwrap()
         })
     };
     let one = run(1);
@@ -380,7 +380,7 @@ fn what_cannot_be_traced_is_said() {
     let scene =
         |light: &str, things: &str| world_of(&format!("Camera \"perspective\"\nWorldBegin\n{light}{things}"), |_| ());
     let some = Want::Trajectories(1000);
-    let error = |world: &World, tracing: &Tracing<'_>, want| trace_photons(world, tracing, None, want).unwrap_err();
+    let error = |job: &RenderJob, tracing: &Tracing<'_>, want| trace_photons(job, tracing, None, want).unwrap_err();
     let tracing = Tracing::default();
     let lamp = "LightSource \"point\" \"point3 from\" [ 0 1 0 ]\n";
 

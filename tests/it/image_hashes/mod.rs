@@ -8,7 +8,7 @@ use lumiris::film::Film;
 use lumiris::import::{LoadOptions, load};
 use lumiris::render::plan::prepare;
 use lumiris::render::{RenderSettings, render};
-use lumiris::scene::{AccelKind, World};
+use lumiris::scene::{AccelKind, RenderJob};
 use std::fmt::Write;
 use std::path::{Path, PathBuf};
 use std::sync::atomic::AtomicBool;
@@ -124,11 +124,11 @@ fn scene_file(folder: &Path, scene: &str, sampler: &str, integrator: &str) -> Pa
 fn row(folder: &Path, scene: &str, size: [u32; 2], sampler: &str, integrator: &str) -> u64 {
     let path = scene_file(folder, scene, sampler, integrator);
     let options = LoadOptions { resolution: Some(size), ..LoadOptions::default() };
-    let scene = load(&path, &options).map_err(|report| report.to_string()).unwrap().scene;
-    let mut world = World::new(scene, AccelKind::Embree, None).unwrap();
-    prepare(&mut world, Some(2), false).unwrap();
+    let loaded = load(&path, &options).map_err(|report| report.to_string()).unwrap();
+    let mut job = loaded.job(AccelKind::Embree, None).unwrap();
+    prepare(&mut job, Some(2), false).unwrap();
     let settings = RenderSettings { threads: Some(2), spp: SPP, ..RenderSettings::default() };
-    hash(&render(&world, &settings, &AtomicBool::new(false), &|_| ()).unwrap().film)
+    hash(&render(&job, &settings, &AtomicBool::new(false), &|_| ()).unwrap().film)
 }
 
 #[test]
