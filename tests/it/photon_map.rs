@@ -75,9 +75,9 @@ fn a_room_of_all_materials_agrees_with_path_tracing() {
         });
         let picture = squares(&rendering(&world, RenderSettings { spp: 32, ..Default::default() }).film, 8);
         let ratio = mean(&picture) / mean(&reference);
-        assert!((ratio - 1.0).abs() < 0.015, "{deposition}: mean {ratio}");
+        assert!((ratio - 1.0).abs() < 0.015, "{deposition:?}: mean {ratio}");
         for (i, (a, b)) in picture.iter().zip(&reference).enumerate() {
-            assert!((a / b - 1.0).abs() < 0.06, "{deposition}: square {i} has {a}, not {b}");
+            assert!((a / b - 1.0).abs() < 0.06, "{deposition:?}: square {i} has {a}, not {b}");
         }
     }
 }
