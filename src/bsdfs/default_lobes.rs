@@ -43,7 +43,7 @@ const RETRO: TrowbridgeReitz = TrowbridgeReitz { alpha_x: 0.15, alpha_y: 0.15 };
 
 /// A density of directions on the side of `wo`, whatever the reflection.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, EnumIter, EnumString, IntoStaticStr, VariantNames)]
-#[strum(serialize_all = "kebab-case", const_into_str)]
+#[strum(serialize_all = "kebab-case")]
 pub enum ProposalDensity {
     /// Cosine-weighted hemisphere with a mirror lobe and a retroreflective one.
     #[default]

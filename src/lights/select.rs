@@ -19,7 +19,7 @@ const UNIFORM_SHARE: f64 = 0.05;
 
 /// How a light is chosen.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, EnumIter, EnumString, IntoStaticStr, VariantNames)]
-#[strum(serialize_all = "kebab-case", const_into_str)]
+#[strum(serialize_all = "kebab-case")]
 pub enum LightSamplerKind {
     /// All lights alike.
     Uniform,

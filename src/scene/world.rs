@@ -13,7 +13,7 @@ use strum::{EnumString, IntoStaticStr, VariantNames};
 
 /// Which ray tracer.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, EnumString, IntoStaticStr, VariantNames)]
-#[strum(serialize_all = "kebab-case", const_into_str)]
+#[strum(serialize_all = "kebab-case")]
 pub enum AccelKind {
     /// Intel Embree.
     #[default]

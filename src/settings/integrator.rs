@@ -191,7 +191,7 @@ impl IntegratorSettings {
 
 /// What is computed.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, EnumString, IntoStaticStr, VariantNames)]
-#[strum(serialize_all = "kebab-case", const_into_str)]
+#[strum(serialize_all = "kebab-case")]
 pub enum IntegratorKind {
     /// Emitted light and one bounce.
     Direct,
@@ -227,7 +227,7 @@ impl Default for IrradianceCacheSettings {
 
 /// What the records of the irradiance cache hold.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, EnumString, IntoStaticStr, VariantNames)]
-#[strum(serialize_all = "kebab-case", const_into_str)]
+#[strum(serialize_all = "kebab-case")]
 pub enum Cached {
     /// Indirect light; light from sources is estimated at every camera ray's hit.
     Indirect,
@@ -237,7 +237,7 @@ pub enum Cached {
 
 /// How direct light is estimated.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, EnumString, IntoStaticStr, VariantNames)]
-#[strum(serialize_all = "kebab-case", const_into_str)]
+#[strum(serialize_all = "kebab-case")]
 pub enum EstimatorKind {
     /// Light sampling only (and the specular lobes of BSDFs).
     Mc,
@@ -288,7 +288,7 @@ impl OcvSettings {
 
 /// How `optimal-mis` finds its weights.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, EnumString, IntoStaticStr, VariantNames)]
-#[strum(serialize_all = "kebab-case", const_into_str)]
+#[strum(serialize_all = "kebab-case")]
 pub enum OptimalForm {
     /// From the samples of the estimate. Biased.
     Direct,
@@ -313,7 +313,7 @@ impl Default for CorrelatedSettings {
 
 /// How `correlated` finds the weight of its two estimates.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, EnumString, IntoStaticStr, VariantNames)]
-#[strum(serialize_all = "kebab-case", const_into_str)]
+#[strum(serialize_all = "kebab-case")]
 pub enum CorrelatedForm {
     /// From the samples of the estimate. Biased.
     Combined,
@@ -336,7 +336,7 @@ impl Default for ContributingSettings {
 
 /// A technique that draws directions of light.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, EnumString, IntoStaticStr, VariantNames)]
-#[strum(serialize_all = "kebab-case", const_into_str)]
+#[strum(serialize_all = "kebab-case")]
 pub enum SamplingTechnique {
     /// In proportion to the BSDF, nearly.
     Bsdf,

@@ -67,7 +67,7 @@ pub enum Proposals {
 
 /// Strata of the samples over the proposals.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, EnumString, IntoStaticStr, VariantNames)]
-#[strum(serialize_all = "kebab-case", const_into_str)]
+#[strum(serialize_all = "kebab-case")]
 pub enum Strata {
     /// Independent draws with replacement [Talbot 2005, Eq. 4.1].
     None,
@@ -81,7 +81,7 @@ pub enum Strata {
 
 /// How the proposals of light sampling lie on the lights.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, EnumString, IntoStaticStr, VariantNames)]
-#[strum(serialize_all = "kebab-case", const_into_str)]
+#[strum(serialize_all = "kebab-case")]
 pub enum ProposalPoints {
     /// Independent of each other.
     Independent,
@@ -91,7 +91,7 @@ pub enum ProposalPoints {
 
 /// The target q̂ of resampling.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, EnumString, IntoStaticStr, VariantNames)]
-#[strum(serialize_all = "kebab-case", const_into_str)]
+#[strum(serialize_all = "kebab-case")]
 pub enum Target {
     /// Luminance of f·G·L: everything but visibility.
     Fgl,

@@ -52,7 +52,7 @@ pub(super) fn finish_integrator(pending: Option<&Pending>, s: &mut Settings, d: 
             unknown(other, name.span, "integrator", &["path", "direct", "irradiance-cache", "photon-map", "volpath"], d)
         }
     }
-    set_name("integrator", kind.into_str(), s);
+    set_name("integrator", kind.into(), s);
     parameters(Directive::Integrator, s, p, d);
     // Trajectories there, stored photons here; −1 is the choice of the renderer
     if let Some(n @ 1..) = p.integer("photonsperiteration", d) {

@@ -18,7 +18,7 @@ pub(super) const IRRADIANCE_CACHE: Group = Group {
             kind: choice(Cached::VARIANTS),
             help: "What records hold: indirect light, or direct light too",
             applies: CACHE,
-            get: |s| Some(Value::Name(s.integrator.cache.cached.into_str())),
+            get: |s| Some(Value::Name(s.integrator.cache.cached.into())),
             set: |s, v| v.named().map(|cached| s.integrator.cache.cached = cached),
             ..Setting::BASE
         },

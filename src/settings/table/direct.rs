@@ -24,7 +24,7 @@ pub(super) const DIRECT: Group = Group {
             key: "estimator",
             kind: choice(EstimatorKind::VARIANTS),
             help: "Estimator of direct light at each vertex of a path",
-            get: |s| Some(Value::Name(s.integrator.estimator.into_str())),
+            get: |s| Some(Value::Name(s.integrator.estimator.into())),
             set: |s, v| v.named().map(|kind| s.integrator.estimator = kind),
             ..Setting::BASE
         },
@@ -51,8 +51,8 @@ pub(super) const DIRECT: Group = Group {
             kind: choice(Heuristic::VARIANTS),
             help: "Weights of the techniques",
             default: "power; balance for ris, ocv and optimal-mis",
-            get: |s| s.integrator.heuristic.map(|h| Value::Name(h.into_str())),
-            resolved: Some(|s| Some(Value::Name(s.integrator.heuristic().into_str()))),
+            get: |s| s.integrator.heuristic.map(|h| Value::Name(h.into())),
+            resolved: Some(|s| Some(Value::Name(s.integrator.heuristic().into()))),
             set: |s, v| v.named().map(|heuristic| s.integrator.heuristic = Some(heuristic)),
             ..Setting::BASE
         },
@@ -127,7 +127,7 @@ pub(super) const RIS: Group = Group {
             kind: choice(Strata::VARIANTS),
             help: "How samples are drawn from the proposals",
             applies: Applies::Estimators(&[Ris]),
-            get: |s| Some(Value::Name(s.integrator.ris.strata.into_str())),
+            get: |s| Some(Value::Name(s.integrator.ris.strata.into())),
             set: |s, v| v.named().map(|strata| s.integrator.ris.strata = strata),
             ..Setting::BASE
         },
@@ -138,7 +138,7 @@ pub(super) const RIS: Group = Group {
             kind: choice(ProposalPoints::VARIANTS),
             help: "How proposals lie on the lights",
             applies: Applies::Estimators(&[Ris]),
-            get: |s| Some(Value::Name(s.integrator.ris.points.into_str())),
+            get: |s| Some(Value::Name(s.integrator.ris.points.into())),
             set: |s, v| v.named().map(|points| s.integrator.ris.points = points),
             ..Setting::BASE
         },
@@ -150,7 +150,7 @@ pub(super) const RIS: Group = Group {
             help: "What samples are drawn in proportion to: f*G*L, with visibility V where shading is dearer than rays, or \
                    (visibility) f*G*L with an estimate of V by photons",
             applies: Applies::Estimators(&[Ris]),
-            get: |s| Some(Value::Name(s.integrator.ris.target.into_str())),
+            get: |s| Some(Value::Name(s.integrator.ris.target.into())),
             set: |s, v| v.named().map(|target| s.integrator.ris.target = target),
             ..Setting::BASE
         },
@@ -188,7 +188,7 @@ pub(super) const CONTROL_VARIATES: Group = Group {
             help: "How ocv finds the coefficients of its control variates: from earlier samples of the pixel, from the other half \
                    of the samples, or (biased) from the same samples",
             applies: Applies::Estimators(&[Ocv]),
-            get: |s| Some(Value::Name(s.integrator.ocv.form.into_str())),
+            get: |s| Some(Value::Name(s.integrator.ocv.form.into())),
             set: |s, v| v.named().map(|form| s.integrator.ocv.form = form),
             ..Setting::BASE
         },
@@ -214,7 +214,7 @@ pub(super) const CONTROL_VARIATES: Group = Group {
             kind: choice(OptimalForm::VARIANTS),
             help: "How optimal-mis finds its weights: from earlier samples of the pixel, or (biased) from the same samples",
             applies: Applies::Estimators(&[OptimalMis]),
-            get: |s| Some(Value::Name(s.integrator.optimal_mis.into_str())),
+            get: |s| Some(Value::Name(s.integrator.optimal_mis.into())),
             set: |s, v| v.named().map(|form| s.integrator.optimal_mis = form),
             ..Setting::BASE
         },
@@ -226,7 +226,7 @@ pub(super) const CONTROL_VARIATES: Group = Group {
             kind: choice(CorrelatedForm::VARIANTS),
             help: "How correlated weighs its two estimates: from the same samples (biased), or from the other half of them",
             applies: Applies::Estimators(&[Correlated]),
-            get: |s| Some(Value::Name(s.integrator.correlated.form.into_str())),
+            get: |s| Some(Value::Name(s.integrator.correlated.form.into())),
             set: |s, v| v.named().map(|form| s.integrator.correlated.form = form),
             ..Setting::BASE
         },
@@ -237,7 +237,7 @@ pub(super) const CONTROL_VARIATES: Group = Group {
             kind: choice(SamplingTechnique::VARIANTS),
             help: "What draws the samples of correlated",
             applies: Applies::Estimators(&[Correlated]),
-            get: |s| Some(Value::Name(s.integrator.correlated.technique.into_str())),
+            get: |s| Some(Value::Name(s.integrator.correlated.technique.into())),
             set: |s, v| v.named().map(|technique| s.integrator.correlated.technique = technique),
             ..Setting::BASE
         },

@@ -17,7 +17,7 @@ pub(super) const TRANSPORT: Group = Group {
             key: "integrator",
             kind: choice(IntegratorKind::VARIANTS),
             help: "What is computed",
-            get: |s| Some(Value::Name(s.integrator.kind.into_str())),
+            get: |s| Some(Value::Name(s.integrator.kind.into())),
             set: |s, v| {
                 s.integrator.kind = v.named()?;
                 // One bounce, unless another number follows
@@ -48,7 +48,7 @@ pub(super) const TRANSPORT: Group = Group {
                 synonyms: &[("bvh", "tree"), ("exhaustive", "tree"), ("spatial", "tree")],
             },
             help: "How a light is chosen; by photons, mostly among those that photons have come from",
-            get: |s| Some(Value::Name(s.integrator.light_choice.into_str())),
+            get: |s| Some(Value::Name(s.integrator.light_choice.into())),
             set: |s, v| v.named().map(|kind| s.integrator.light_choice = kind),
             ..Setting::BASE
         },
@@ -69,7 +69,7 @@ pub(super) const TRANSPORT: Group = Group {
             key: "bsdf_density",
             kind: choice(ProposalDensity::VARIANTS),
             help: "What proposes directions for such materials",
-            get: |s| Some(Value::Name(s.integrator.bsdf_density.into_str())),
+            get: |s| Some(Value::Name(s.integrator.bsdf_density.into())),
             set: |s, v| v.named().map(|density| s.integrator.bsdf_density = density),
             ..Setting::BASE
         },
@@ -86,7 +86,7 @@ pub(super) const SAMPLING: Group = Group {
             key: "sampler",
             kind: choice(SamplerKind::VARIANTS),
             help: "Random sequence",
-            get: |s| Some(Value::Name(s.sampling.sampler.into_str())),
+            get: |s| Some(Value::Name(s.sampling.sampler.into())),
             set: |s, v| v.named().map(|kind| s.sampling.sampler = kind),
             ..Setting::BASE
         },

@@ -96,7 +96,7 @@ fn write(args: &RenderArgs, job: &RenderJob, rendering: &Rendering, path: &Path)
     let (width, height) = (film.bounds.width() as usize, film.bounds.height() as usize);
     let mut metadata = output::metadata(&job.world.scene.film, job.settings());
     metadata.push(("lumiris:scene".to_owned(), args.scene.scene.display().to_string()));
-    metadata.push(("lumiris:accel".to_owned(), args.scene.accel.into_str().to_owned()));
+    metadata.push(("lumiris:accel".to_owned(), <&str>::from(args.scene.accel).to_owned()));
     metadata.push(("lumiris:complete".to_owned(), rendering.complete.to_string()));
     let done = || film.pixels.iter().map(|p| p.count);
     let range = format!("{} to {} per pixel", done().min().unwrap_or(0), done().max().unwrap_or(0));
@@ -134,7 +134,7 @@ fn stats(args: &RenderArgs, job: &RenderJob, rendering: &Rendering, setup: Setup
     json!({
         "scene": args.scene.scene.display().to_string(),
         "settings": metadata,
-        "accel": args.scene.accel.into_str(),
+        "accel": <&str>::from(args.scene.accel),
         "threads": rendering.threads,
         "complete": rendering.complete,
         "invalid_samples": rendering.film.pixels.iter().map(|p| p.invalid).sum::<u64>(),

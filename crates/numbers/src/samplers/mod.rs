@@ -14,7 +14,7 @@ use strum::{EnumIter, EnumString, IntoStaticStr, VariantNames};
 
 /// Which sequence.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, EnumIter, EnumString, IntoStaticStr, VariantNames)]
-#[strum(serialize_all = "kebab-case", const_into_str)]
+#[strum(serialize_all = "kebab-case")]
 pub enum SamplerKind {
     /// Independent uniform numbers.
     Independent,

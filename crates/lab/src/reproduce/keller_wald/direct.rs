@@ -330,7 +330,7 @@ fn outcome_json(o: &Outcome) -> Value {
     let base = &o.measured[o.place(Role::All)];
     let method = |(i, m): (usize, &Measured)| {
         json!({
-            "name": o.named[i].name, "estimator": m.method.estimator.into_str(), "light_choice": m.method.light_choice.into_str(),
+            "name": o.named[i].name, "estimator": <&str>::from(m.method.estimator), "light_choice": <&str>::from(m.method.light_choice),
             "samples": m.method.samples, "proposals": m.method.proposals, "turns": m.turns(),
             "variance": estimate_json(m.variance(None)), "time_ratio": m.time_ratio(base),
             "at_equal_time": estimate_json(o.against(i, Role::All)),

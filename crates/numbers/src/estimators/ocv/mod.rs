@@ -35,7 +35,7 @@ use strum::{EnumString, IntoStaticStr, VariantNames};
 
 /// How β is found.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, EnumString, IntoStaticStr, VariantNames)]
-#[strum(serialize_all = "kebab-case", const_into_str)]
+#[strum(serialize_all = "kebab-case")]
 pub enum Form {
     /// Equations (10) and (11): β₀ + Σ β_j of the ridge solution with λ = 1 on the same samples. Biased.
     Paper,
