@@ -82,7 +82,7 @@ impl Default for Fits {
 }
 
 impl Fits {
-    /// `count` fits without samples for the mixtures of a job; none if its estimates do not use fits.
+    /// `count` fits without samples for the mixtures of an estimate; none if its estimates do not use fits.
     pub fn new(job: &RenderJob, settings: &IntegratorSettings, count: usize) -> Self {
         if !settings.is_progressive() {
             return Fits::default();

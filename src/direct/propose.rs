@@ -267,7 +267,7 @@ impl Candidates {
         let lights = &job.lights;
         let ctx = point.light_ctx();
         let n = shares.light_draws;
-        let pmfs = if shares.n_light > 0.0 { lights.groups.pmfs(lights, &ctx) } else { [0.0; MAX_GROUPS] };
+        let pmfs = if shares.n_light > 0.0 { lights.groups.pmfs(&lights.sampler, &ctx) } else { [0.0; MAX_GROUPS] };
         let mut mixture = Mixture::new(job, point, shares, &pmfs);
 
         // Samples stand at (i + u)/N; those of a group lie between the sums of probabilities

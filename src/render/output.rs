@@ -16,7 +16,7 @@ pub enum Aov {
     Samples,
     /// Albedo estimate of the first surface, `albedo.R/G/B`.
     Albedo,
-    /// Shading normal of the first surface, job space, `normal.X/Y/Z`.
+    /// Shading normal of the first surface, world space, `normal.X/Y/Z`.
     Normal,
     /// Mean distance to the first surface, `depth.Z`; infinity where there is none.
     Depth,

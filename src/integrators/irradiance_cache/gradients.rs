@@ -95,7 +95,7 @@ impl Cells {
         (sin2.sqrt(), safe_sqrt(1.0 - sin2))
     }
 
-    /// Irradiance and its gradients in job space from the radiance `l` and the distance `r` (infinite if there is
+    /// Irradiance and its gradients in world space from the radiance `l` and the distance `r` (infinite if there is
     /// nothing) of each cell.
     pub fn irradiance(self, frame: &Frame, l: &[Rgb], r: &[f32]) -> Irradiance {
         let mut sum = Irradiance::default();
