@@ -20,6 +20,7 @@ use crate::textures::{FloatTextureId, ImageId, RgbTextureId, TextureContext, Tex
 use lumiris_numbers::math::hash::{hash_floats, unit_f32};
 use lumiris_numbers::math::{Rgb, Vec3};
 use rayon::prelude::*;
+use strum::IntoStaticStr;
 
 /// Index into a [`MaterialSet`].
 pub type MaterialId = u32;
@@ -50,7 +51,8 @@ pub enum ConductorSpectrum {
 }
 
 /// A surface material.
-#[derive(Clone, Copy, Debug)]
+#[derive(Clone, Copy, Debug, IntoStaticStr)]
+#[strum(serialize_all = "lowercase")]
 pub enum Material {
     /// Lambertian.
     Diffuse {
@@ -141,18 +143,7 @@ pub enum Material {
 impl Material {
     /// What kind of material it is, for people.
     pub fn kind_name(&self) -> &'static str {
-        match self {
-            Material::Diffuse { .. } => "diffuse",
-            Material::Conductor { .. } => "conductor",
-            Material::Dielectric { .. } => "dielectric",
-            Material::ThinDielectric { .. } => "thindielectric",
-            Material::DiffuseTransmission { .. } => "diffusetransmission",
-            Material::CoatedDiffuse { .. } => "coateddiffuse",
-            Material::CoatedConductor { .. } => "coatedconductor",
-            Material::Evaluated(_) => "evaluated",
-            Material::Mix { .. } => "mix",
-            Material::Interface => "interface",
-        }
+        self.into()
     }
 }
 

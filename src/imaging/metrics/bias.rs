@@ -9,27 +9,19 @@
 
 use super::{Pixel, finite_pairs};
 use lumiris_numbers::estimators::stats::Welford;
+use strum::IntoStaticStr;
 
 /// Two-sided 95 % point of the normal distribution.
 pub const Z_95: f64 = 1.959_963_984_540_054;
 
 /// What a standard error was computed from.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[derive(Clone, Copy, Debug, PartialEq, Eq, IntoStaticStr)]
+#[strum(serialize_all = "lowercase")]
 pub enum ErrorSource {
     /// Variances of the pixels.
     Variances,
     /// Spread of the differences over the pixels.
     Spread,
-}
-
-impl ErrorSource {
-    /// The name in reports.
-    pub fn name(self) -> &'static str {
-        match self {
-            ErrorSource::Variances => "variances",
-            ErrorSource::Spread => "spread",
-        }
-    }
 }
 
 /// Mean difference of two pictures.

@@ -299,9 +299,9 @@ fn numbers(map: &mut Map<String, Value>, settings: &Settings, compared: &Compare
         let half = b.channel_errors.map(|e| Z_95 * e);
         map.insert("bias_rgb".into(), json!(b.channels));
         map.insert("bias_rgb_ci95".into(), json!(half));
-        map.insert("bias_error_from".into(), json!(b.source.name()));
+        map.insert("bias_error_from".into(), json!(<&str>::from(b.source)));
     }
-    map.insert("variances".into(), json!(compared.noise.name()));
+    map.insert("variances".into(), json!(<&str>::from(compared.noise)));
     if let Some(z) = s.significance {
         map.insert("z_values".into(), json!(z.values));
         map.insert("z_certain".into(), json!(z.certain));

@@ -3,6 +3,7 @@
 use super::scores::Scores;
 use lumiris::imaging::heat::significant;
 use std::collections::BTreeSet;
+use strum::IntoStaticStr;
 
 /// A metric that can be asked for.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
@@ -46,25 +47,16 @@ impl Metric {
 }
 
 /// Which values are good.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[derive(Clone, Copy, Debug, PartialEq, Eq, IntoStaticStr)]
+#[strum(serialize_all = "lowercase")]
 pub enum Better {
     /// Small ones.
     Lower,
     /// Large ones.
     Higher,
     /// No order of merit: a bias within its interval is as good as any other.
+    #[strum(serialize = "none")]
     Neither,
-}
-
-impl Better {
-    /// The name in the page.
-    pub fn name(self) -> &'static str {
-        match self {
-            Better::Lower => "lower",
-            Better::Higher => "higher",
-            Better::Neither => "none",
-        }
-    }
 }
 
 /// A number that each picture has.

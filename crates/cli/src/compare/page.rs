@@ -81,7 +81,7 @@ fn manifest(pictures: &Pictures, settings: &Settings, compared: &[Compared], ima
     let columns = shown_columns(&settings.metrics, &scores);
     let described: Vec<Value> = columns
         .iter()
-        .map(|c| json!({ "key": c.key, "title": c.title, "help": c.help, "better": c.better.name() }))
+        .map(|c| json!({ "key": c.key, "title": c.title, "help": c.help, "better": <&str>::from(c.better) }))
         .collect();
     let rows: Vec<Value> = scores
         .iter()

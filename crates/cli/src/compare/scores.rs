@@ -10,6 +10,7 @@ use lumiris::imaging::metrics::{
     mean_of_map, perceptual_map, significance, z_map,
 };
 use std::collections::BTreeSet;
+use strum::IntoStaticStr;
 
 /// What is computed, and how.
 #[derive(Clone, Debug, PartialEq)]
@@ -87,25 +88,17 @@ pub struct Compared {
 }
 
 /// Which of the two pictures have variances.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[derive(Clone, Copy, Debug, PartialEq, Eq, IntoStaticStr)]
+#[strum(serialize_all = "lowercase")]
 pub enum Noise {
     /// Both.
     Both,
     /// The picture alone: the reference is taken as exact.
+    #[strum(serialize = "image")]
     ImageOnly,
     /// Not the picture.
+    #[strum(serialize = "none")]
     Unknown,
-}
-
-impl Noise {
-    /// The name in reports.
-    pub fn name(self) -> &'static str {
-        match self {
-            Noise::Both => "both",
-            Noise::ImageOnly => "image",
-            Noise::Unknown => "none",
-        }
-    }
 }
 
 /// Compares each picture with the reference.
@@ -181,10 +174,10 @@ mod tests {
         let test = |a, b| compare(&pictures(shown(1.5, a), shown(1.0, b)), &Settings::default()).remove(0);
         let both = test(Some(0.09), Some(0.16));
         assert!((both.scores.significance.unwrap().max_z - 1.0).abs() < 1e-6 && both.noise == Noise::Both);
-        assert_eq!(both.scores.bias.unwrap().source.name(), "variances");
+        assert_eq!(<&str>::from(both.scores.bias.unwrap().source), "variances");
         let image = test(Some(0.25), None);
         assert!((image.scores.significance.unwrap().max_z - 1.0).abs() < 1e-6 && image.noise == Noise::ImageOnly);
-        assert_eq!(image.scores.bias.unwrap().source.name(), "spread");
+        assert_eq!(<&str>::from(image.scores.bias.unwrap().source), "spread");
         let none = test(None, Some(0.1));
         assert!(none.scores.significance.is_none() && none.maps.z.is_none() && none.noise == Noise::Unknown);
     }
