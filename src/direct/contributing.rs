@@ -16,7 +16,7 @@
 
 use super::ShadePoint;
 use super::propose::{Candidate, Shares, domain, light_candidate, unshadowed_candidate};
-use crate::lights::{Light, LightCtx, LightId, LightSample, LightSet};
+use crate::lights::{Light, LightCtx, LightId, LightSample, LightSampling, LightSet};
 use crate::scene::RenderJob;
 use std::f32::consts::PI;
 
@@ -36,7 +36,7 @@ pub struct Contributing {
 
 /// A point with the lights that are sampled from it.
 struct At<'a> {
-    lights: &'a LightSet,
+    lights: &'a LightSampling,
     index: u32,
     point: &'a ShadePoint<'a>,
     ctx: LightCtx,

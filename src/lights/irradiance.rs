@@ -179,7 +179,9 @@ fn polygon_irradiance(corners: &[DVec3; 4], n: DVec3) -> f64 {
 mod tests {
     use super::*;
     use crate::geometry::{Quadric, QuadricKind, Shape, TriangleMesh};
-    use crate::lights::{Emission, EmissionImage, LightCtx, LightHit, LightSetBuilder};
+    use crate::lights::{
+        Emission, EmissionImage, LightCtx, LightHit, LightSamplerKind, LightSampling, LightSetBuilder,
+    };
     use lumiris_numbers::math::hash::HashStream;
     use lumiris_numbers::math::warp::sample_uniform_sphere;
     use lumiris_numbers::math::{Affine3A, Bounds3, Vec2};
@@ -207,12 +209,12 @@ mod tests {
         ]
     }
 
-    fn set(shapes: &[Shape], emission: &Emission) -> LightSet {
+    fn set(shapes: &[Shape], emission: &Emission) -> Arc<LightSet> {
         let mut builder = LightSetBuilder::default();
         for (i, shape) in shapes.iter().enumerate() {
             builder.add_area(i as GeometryId, shape, emission);
         }
-        builder.build(&Bounds3 { min: Vec3::splat(-1.0), max: Vec3::splat(2.0) })
+        Arc::new(builder.build(&Bounds3 { min: Vec3::splat(-1.0), max: Vec3::splat(2.0) }))
     }
 
     /// True if a point is near the plane of a flat light.
@@ -231,8 +233,9 @@ mod tests {
 
     /// E and the integral of L̄ cos θ by samples of the light, at random points and normals. The latter must be the former wherever the
     /// light takes part.
-    fn assert_integrates(set: &LightSet, stream: &mut HashStream) -> u32 {
+    fn assert_integrates(set: &Arc<LightSet>, stream: &mut HashStream) -> u32 {
         let known = Irradiances::new(set, |_| false);
+        let sampling = LightSampling::new(Arc::clone(set), LightSamplerKind::Tree, 1);
         let mut lit = 0;
         for _ in 0..POINTS {
             let [p, n] = [2.0, 1.0].map(|r| sample_uniform_sphere(stream.next_2d()) * r);
@@ -247,7 +250,7 @@ mod tests {
             let count = if e > 0.0 && e < 1e-3 { 400_000 } else { 4000 };
             let mut moments = Moments::default();
             for _ in 0..count {
-                let sample = set.sample(&ctx, stream.next_f32(), stream.next_2d());
+                let sample = sampling.sample(&ctx, stream.next_f32(), stream.next_2d());
                 moments.add(sample.map_or(0.0, |(light, s)| {
                     let l = if set.infinite.contains(&light) {
                         known.environment()
@@ -280,7 +283,7 @@ mod tests {
         let mut builder = LightSetBuilder::default();
         builder.add(Light::InfiniteConstant { l: Rgb::splat(0.5) });
         builder.add(Light::Distant { wi_world: Vec3::Z, l: Rgb::WHITE });
-        let environment = builder.build(&Bounds3::EMPTY);
+        let environment = Arc::new(builder.build(&Bounds3::EMPTY));
         assert_eq!(assert_integrates(&environment, &mut stream), POINTS);
     }
 

@@ -2,8 +2,7 @@
 
 use super::hints::Around;
 use super::{
-    LightChoice, LightCtx, LightGroups, LightHints, LightHit, LightId, LightSample, LightSampler, LightSamplerKind,
-    LightSet,
+    LightCtx, LightGroups, LightHints, LightHit, LightId, LightSample, LightSampler, LightSamplerKind, LightSet,
 };
 use lumiris_numbers::math::Vec3;
 use std::ops::Deref;
@@ -109,8 +108,8 @@ mod tests {
     use super::*;
     use crate::geometry::{Shape, TriangleMesh};
     use crate::lights::{Emission, EnvironmentFilter, EnvironmentMap, EnvironmentMapping, Light, LightSetBuilder};
-    use lumiris_numbers::math::Affine3A;
     use lumiris_numbers::math::hash::HashStream;
+    use lumiris_numbers::math::{Affine3A, Bounds3, Rgb};
     use lumiris_test_support::{Moments, assert_chi_squared};
     use std::sync::Arc;
 
