@@ -1,9 +1,9 @@
 //! Rectangles, sampled uniformly in the solid angle that they subtend [Ureña, Fajardo and King 2013].
 //!
-//! In the frame of the rectangle's edges with the point at the origin, the rectangle is [x0, x1] × [y0, y1] × {z0}, z0
-//! < 0. The planes through the origin and the edges have the inner angles g0 … g3; the solid angle is S = g0 + g1 + g2
-//! + g3 − 2π. For a first number u, the part of the spherical rectangle left of x(u) has the area u·S; for a second
-//! number v, the height is uniform on that arc.
+//! In the frame of the rectangle's edges with the point at the origin, the rectangle is [x0, x1] × [y0, y1] × {z0},
+//! z0 < 0. The planes through the origin and the edges have the inner angles g0 … g3; the solid angle is
+//! S = g0 + g1 + g2 + g3 − 2π. For a first number u, the part of the spherical rectangle left of x(u) has the area
+//! u·S; for a second number v, the height is uniform on that arc.
 //!
 //! Beyond a distance of diagonal/[`MAX_EXTENT`] from the centre, points are sampled uniformly in area instead: the
 //! density per steradian is then proportional to t³/|z0| and varies by less than a factor of two to either side, at a
