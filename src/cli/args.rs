@@ -250,6 +250,10 @@ pub struct SceneArgs {
     /// Camera samples per pixel [default: the file's, or 16]
     #[arg(long, value_name = "K", value_parser = clap::value_parser!(u32).range(1..=1_000_000_000))]
     pub spp: Option<u32>,
+    /// Camera samples per pixel that textures and bumps are filtered for: their footprint is 1/sqrt(K) of a pixel wide, at
+    /// least an eighth. A picture that is rendered in parts needs the number of all its samples [default: the file's, or --spp]
+    #[arg(long, value_name = "K", value_parser = clap::value_parser!(u32).range(1..=1_000_000_000))]
+    pub footprint_spp: Option<u32>,
     /// Random sequence [default: the file's sampler, or zsobol]
     #[arg(long)]
     pub sampler: Option<SamplerArg>,

@@ -129,6 +129,9 @@ fn apply(args: &SceneArgs, scene: &mut Scene) {
     if let Some(spp) = args.spp {
         scene.sampling.spp = spp;
     }
+    if let Some(spp) = args.footprint_spp {
+        scene.sampling.footprint_spp = Some(spp);
+    }
     if let Some(sampler) = args.sampler {
         scene.sampling.sampler = sampler.value();
     }

@@ -132,6 +132,7 @@ pub fn settings_metadata(scene: &Scene) -> Vec<(String, String)> {
         ("sampler", scene.sampling.sampler.name().to_owned()),
         ("spp", scene.sampling.spp.to_string()),
         ("seed", scene.sampling.seed.to_string()),
+        ("footprint_spp", scene.sampling.footprint_spp().to_string()),
         ("filter", format!("{:?}", scene.film.filter)),
         ("resolution", format!("{}x{}", scene.film.resolution[0], scene.film.resolution[1])),
         ("crop", format!("{},{},{},{}", b.x0, b.x1, b.y0, b.y1)),

@@ -16,7 +16,7 @@ use crate::import::{LoadOptions, load};
 use crate::lights::LightHints;
 use crate::render::plan::prepare;
 use crate::render::{RenderError, RenderSettings, Rendering, render};
-use crate::scene::{AccelKind, Proposals, StageTimes, Strata, World};
+use crate::scene::{AccelKind, Proposals, SamplingSettings, StageTimes, Strata, World};
 use rustix::time::{ClockId, clock_gettime};
 use serde::Serialize;
 use std::path::Path;
@@ -146,7 +146,8 @@ impl Stage {
         let scene = &mut self.world.scene;
         let radius = if view == View::Antialiased { 0.5 } else { CENTRE };
         scene.film.filter = PixelFilter::Box { rx: radius, ry: radius };
-        (scene.sampling.seed, scene.sampling.spp) = (seed, spp);
+        // One footprint for short and long renderings, which estimate the same picture
+        scene.sampling = SamplingSettings { seed, spp, footprint_spp: Some(1), ..scene.sampling };
         self.shadows.store(view != View::Unshadowed, Ordering::Relaxed);
         let settings = RenderSettings { threads: self.threads, spp, ..RenderSettings::default() };
         let rendering = render(&self.world, &settings, observer.stop, &|_| ())?;

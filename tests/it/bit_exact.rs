@@ -60,6 +60,25 @@ fn packet_width_does_not_change_a_bit() {
 }
 
 #[test]
+fn parts_of_a_picture_add_up_if_their_footprints_are_those_of_the_whole() {
+    let part = |spp, footprint_spp, samples: std::ops::Range<u32>| {
+        let mut world = gallery(EstimatorKind::Mis, None);
+        (world.scene.sampling.spp, world.scene.sampling.footprint_spp) = (spp, footprint_spp);
+        let settings =
+            RenderSettings { first_sample: samples.start, spp: samples.len() as u32, ..RenderSettings::default() };
+        render(&world, &settings, &AtomicBool::new(false), &|_| ()).unwrap().film
+    };
+    let sums = |films: &[Film]| -> Vec<[f64; 3]> {
+        let sum = |i: usize| [0, 1, 2].map(|c| films.iter().map(|f| f.pixels[i].radiance[c]).sum::<f64>());
+        (0..films[0].pixels.len()).map(sum).collect()
+    };
+    // Sums of a few f32 in f64 are exact here
+    let whole = sums(&[part(8, None, 0..8)]);
+    assert_eq!(whole, sums(&[part(3, Some(8), 0..3), part(5, Some(8), 3..8)]));
+    assert_ne!(whole, sums(&[part(3, None, 0..3), part(5, None, 3..8)]), "the gallery has textures");
+}
+
+#[test]
 fn what_a_plan_chose_gives_the_same_picture_when_it_is_given() {
     for proposals in [Proposals::Auto, Proposals::Optimal] {
         // Chosen from times of this run

@@ -181,7 +181,8 @@ impl Options {
     }
 
     fn finish_sampler(&self, d: &mut Diagnostics) -> SamplingSettings {
-        let mut s = SamplingSettings { sampler: SamplerKind::SobolBlueNoise, spp: 16, seed: self.seed.unwrap_or(0) };
+        let (sampler, seed) = (SamplerKind::SobolBlueNoise, self.seed.unwrap_or(0));
+        let mut s = SamplingSettings { sampler, spp: 16, seed, footprint_spp: None };
         let Some(Pending { name, params: p }) = &self.sampler else { return s };
         match name.text.as_str() {
             "independent" | "random" => s.sampler = SamplerKind::Independent,
@@ -212,6 +213,7 @@ impl Options {
         if let Some(spp) = count("pixelsamples", d) {
             s.spp = spp;
         }
+        s.footprint_spp = count("footprintspp", d);
         if let Some(seed) = p.integer("seed", d) {
             s.seed = seed as u32;
         }
