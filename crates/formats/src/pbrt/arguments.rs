@@ -67,7 +67,8 @@ impl Arguments<'_> {
         if [x, y, z] != [0.0; 3] || w == 0.0 {
             let row = last_row.map(|v| v.to_string()).join(" ");
             let span = lexer.span(start, lexer.position());
-            let message = format!("the last row of this matrix is {row}: an affine one has 0 0 0 w, with w other than 0");
+            let message =
+                format!("the last row of this matrix is {row}: an affine one has 0 0 0 w, with w other than 0");
             self.diagnostics.error(span, message).help("the last row is every fourth number");
             return Err(Reported);
         }
