@@ -111,7 +111,7 @@ pub(super) struct PathState {
     pub(super) beta: Rgb,
     /// Squared relative index of refraction along the path, which roulette takes out of β.
     eta_scale: f32,
-    /// Width of the texture footprint at the ray's origin, and its growth per unit length.
+    /// Width of a pixel at the ray's origin, and its growth per unit length.
     pub(super) width: f32,
     pub(super) spread: f32,
     /// Surfaces without scattering passed since the last vertex.
