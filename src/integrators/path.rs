@@ -111,7 +111,7 @@ pub(super) struct PathState {
     pub(super) beta: Rgb,
     /// Squared relative index of refraction along the path, which roulette takes out of β.
     eta_scale: f32,
-    /// Width of the texture footprint at the ray's origin, and its growth per unit length.
+    /// Width of a pixel at the ray's origin, and its growth per unit length.
     pub(super) width: f32,
     pub(super) spread: f32,
     /// Surfaces without scattering passed since the last vertex.
@@ -220,7 +220,7 @@ impl PathIntegrator {
                         }
                         continue;
                     }
-                    Some(hit) => Found::new(&job.world, &path.ray, (path.width, path.spread), hit),
+                    Some(hit) => Found::new(job, &path.ray, (path.width, path.spread), hit),
                 };
                 if vertex == 0 && !self.only_reflected {
                     path.add_emission(job, &found, &mut out[path.sample as usize].radiance);

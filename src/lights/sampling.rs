@@ -1,4 +1,4 @@
-//! The lights of a scene with a way to choose one: what settings and photons make of a [`LightSet`].
+//! The lights of a scene with a light sampler: what settings and photons make of a [`LightSet`].
 
 use super::hints::Around;
 use super::{
@@ -8,7 +8,7 @@ use lumiris_numbers::math::Vec3;
 use std::ops::Deref;
 use std::sync::Arc;
 
-/// Lights, and how they are chosen.
+/// Lights with their light sampler.
 #[derive(Clone, Debug)]
 pub struct LightSampling {
     set: Arc<LightSet>,
@@ -37,7 +37,7 @@ impl LightSampling {
         LightSampling { set, sampler, delta, groups, hints: None }
     }
 
-    /// Chooses in another way from now on, with what photons tell as before.
+    /// Changes the light sampler; the visibility cache stays.
     pub fn choose_by(&mut self, kind: LightSamplerKind, most: usize) {
         self.sampler = LightSampler::new(kind, &self.set.lights, self.set.scene_radius);
         self.sampler.set_hints(self.hints.clone());
@@ -45,25 +45,25 @@ impl LightSampling {
         self.set_groups(most);
     }
 
-    /// Puts the lights into at most `most` groups.
+    /// Divides the lights into at most `most` groups.
     pub fn set_groups(&mut self, most: usize) {
         self.groups = LightGroups::new(&self.set, &self.sampler, most);
     }
 
-    /// From now on uses what photons tell of the visibility of lights, wherever settings ask for it. Estimates stay unbiased
-    /// whatever it is. Lights without power, and those that there are not, are left out.
+    /// Sets the visibility cache, which is used wherever settings ask for it. Estimates remain unbiased whatever it
+    /// contains. Lights without power and unknown ids are ignored.
     pub fn set_hints(&mut self, hints: Option<LightHints>) {
         let is_lit = |light: LightId| self.set.lit.binary_search(&light).is_ok();
         self.hints = hints.map(|hints| Arc::new(hints.of_lights(is_lit)));
         self.sampler.set_hints(self.hints.clone());
     }
 
-    /// What photons tell of the visibility of lights.
+    /// The visibility cache.
     pub fn hints(&self) -> Option<&LightHints> {
         self.hints.as_deref()
     }
 
-    /// The lights that photons say are seen around a point; nothing where nothing is known.
+    /// The contributing lights of a point; none without a visibility cache.
     #[inline]
     pub fn around(&self, ctx: &LightCtx) -> Around<'_> {
         self.hints.as_ref().map_or_else(Around::default, |hints| hints.around_with_sums(ctx.p, ctx.n))

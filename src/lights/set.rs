@@ -23,7 +23,7 @@ pub struct LightSetBuilder {
 }
 
 impl LightSetBuilder {
-    /// Adds a light that is no surface.
+    /// Adds a light that is not an area light.
     pub fn add(&mut self, light: Light) -> LightId {
         self.lights.push(light);
         (self.lights.len() - 1) as LightId
@@ -63,7 +63,7 @@ impl LightSetBuilder {
 pub struct LightSet {
     /// The lights; a [`LightId`] is an index.
     pub lights: Vec<Light>,
-    /// Lights that rays which leave the scene see, ascending.
+    /// Infinite lights, seen by rays that leave the scene, ascending.
     pub infinite: Vec<LightId>,
     /// Lights with power, ascending.
     pub lit: Vec<LightId>,
@@ -76,8 +76,8 @@ pub struct LightSet {
 }
 
 impl LightSet {
-    /// False if no emitter can hide a part of the lights, not even of itself, from a point that is lit by that part: as for lamps
-    /// in one ceiling. True in case of doubt.
+    /// False if no emitter can occlude another light, or itself, from any point: as for lamps in one ceiling. True in
+    /// case of doubt.
     pub fn may_hide_each_other(&self) -> bool {
         if self.emitting.is_empty() {
             return false;
@@ -100,7 +100,7 @@ impl LightSet {
         })
     }
 
-    /// Chooses among the lights that no ray can hit, in the same way; `None` if there are none.
+    /// A sampler of the same kind over the delta lights; `None` if there are none.
     pub fn delta_sampler(&self, kind: LightSamplerKind) -> Option<LightSampler> {
         let is_lit = |light: &&Light| light.is_delta() && light.phi(self.scene_radius) > 0.0;
         self.lights.iter().find(is_lit)?;
@@ -132,8 +132,8 @@ impl LightSet {
         e.light_of_primitive.get(primitive as usize).map(|&i| e.first_light + i)
     }
 
-    /// Samples a direction to a light that was chosen by `choice`. `pdf` of the sample includes the probability of the choice: it is
-    /// per steradian, or a probability for delta lights.
+    /// Samples a direction to a light that was chosen by `choice`. `pdf` of the sample includes the probability of the
+    /// choice: it is per steradian, or a probability for delta lights.
     #[inline]
     pub fn sample_choice(&self, ctx: &LightCtx, choice: LightChoice, u: [f32; 2]) -> Option<(LightId, LightSample)> {
         let sample = self.lights[choice.light as usize].sample_li(ctx, u)?;

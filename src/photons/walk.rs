@@ -149,7 +149,7 @@ impl Walker {
         self.passing.clear();
         for (particle, hit) in self.active.iter().zip(&self.hits) {
             let Some(hit) = hit else { continue };
-            let found = Found::new(&job.world, &particle.ray, (0.0, 0.0), hit);
+            let found = Found::new(job, &particle.ray, (0.0, 0.0), hit);
             let Some(bsdf) = found.scatter(job) else {
                 if particle.passed < MAX_PASSED {
                     let ray = Ray { o: found.origin(particle.ray.d), ..particle.ray };

@@ -1,6 +1,6 @@
 //! What a ray found: a hit with what shading needs of it.
 
-use super::{RenderJob, World};
+use super::RenderJob;
 use crate::accel::Hit;
 use crate::geometry::SurfaceHit;
 use crate::materials::SurfaceBsdf;
@@ -17,7 +17,7 @@ pub struct Found {
     pub surface: SurfaceHit,
     /// Unit direction to where the ray came from.
     pub wo: Vec3,
-    /// Width of the texture footprint at the hit (m).
+    /// Width of a pixel at the hit (m).
     pub width: f32,
     /// Distance that the ray went (m).
     pub distance: f32,
@@ -25,14 +25,15 @@ pub struct Found {
 }
 
 impl Found {
-    /// The first hit of `ray`, whose texture footprint has `width` at its origin and grows by `spread` per unit length.
-    pub fn new(world: &World, ray: &Ray, (width, spread): (f32, f32), hit: &Hit) -> Self {
-        let surface = world.scene.geometry.surface_hit(hit.geometry, hit.primitive, hit.instance, hit.uv, ray.time);
+    /// The first hit of `ray`. A pixel is `width` wide at its origin, and `spread` wider per unit length.
+    pub fn new(job: &RenderJob, ray: &Ray, (width, spread): (f32, f32), hit: &Hit) -> Self {
+        let surface = job.world.scene.geometry.surface_hit(hit.geometry, hit.primitive, hit.instance, hit.uv, ray.time);
         let distance = hit.t * ray.d.length();
         let width = width + spread * distance;
+        let footprint = width * job.settings().sampling.footprint();
         let extent = |d: Vec3| {
             let length = d.length();
-            if length > 0.0 { width / length } else { 0.0 }
+            if length > 0.0 { footprint / length } else { 0.0 }
         };
         let uv_width = Vec2::new(extent(surface.dpdu), extent(surface.dpdv));
         let context = TextureContext { uv: surface.uv, uv_width, p: surface.p, n: surface.n };
@@ -41,7 +42,7 @@ impl Found {
 
     /// The scattering at the hit; `None` where rays pass.
     pub fn scatter<'j>(&self, job: &'j RenderJob) -> Option<SurfaceBsdf<'j>> {
-        let scene = &job.world.scene;
+        let scene = &job.job.world.scene;
         let material = scene.surfaces[self.hit.geometry as usize].material;
         let bsdf = scene.materials.bsdf(material, &scene.textures, &self.surface, &self.context, self.wo)?;
         Some(bsdf.proposed_by(job.settings().integrator.bsdf_density))

@@ -3,11 +3,12 @@
 //! [`Settings`] is plain data, which the renderer reads. [`table`] has a row for each setting, with its names, range, default, help
 //! and where it applies: command line, scene files, metadata and `lumiris info` are made from it.
 //!
-//! Reading order: [`integrator`], [`ris`], [`photon_map`], [`value`], [`table`].
+//! Reading order: [`integrator`], [`ris`], [`photon_map`], [`sampling`], [`value`], [`table`].
 
 pub mod integrator;
 pub mod photon_map;
 pub mod ris;
+pub mod sampling;
 pub mod table;
 pub mod value;
 
@@ -17,10 +18,9 @@ pub use integrator::{
 };
 pub use photon_map::{Deposition, PhotonMapSettings, Shrinking};
 pub use ris::{ProposalPoints, Proposals, RisSettings, StageTimes, Strata, Target};
+pub use sampling::SamplingSettings;
 pub use table::Setting;
 pub use value::Value;
-
-use lumiris_numbers::samplers::SamplerKind;
 
 /// All settings of a picture but its size and filter, which belong to the film.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
@@ -52,22 +52,5 @@ impl Settings {
         let default = Settings::default();
         let is_changed = move |row: &&Setting| (row.get)(self) != (row.get)(&default);
         table::rows().filter(is_changed).filter_map(|row| Some((row, (row.get)(self)?)))
-    }
-}
-
-/// Random numbers.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub struct SamplingSettings {
-    /// Which sequence.
-    pub sampler: SamplerKind,
-    /// Camera samples per pixel.
-    pub spp: u32,
-    /// Images of different seeds are independent estimates of the same picture.
-    pub seed: u32,
-}
-
-impl Default for SamplingSettings {
-    fn default() -> Self {
-        SamplingSettings { sampler: SamplerKind::default(), spp: 16, seed: 0 }
     }
 }

@@ -82,7 +82,7 @@ struct GatherRequest {
     p_error: Vec3,
     time: f32,
     stream: SampleStream,
-    /// Width of the texture footprint, and its growth.
+    /// Width of a pixel, and its growth.
     width: f32,
     spread: f32,
 }

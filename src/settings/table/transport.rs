@@ -103,6 +103,21 @@ pub(super) const SAMPLING: Group = Group {
             ..Setting::BASE
         },
         Setting {
+            flag: "footprint-spp",
+            value_name: "K",
+            directive: Directive::Sampler,
+            parameters: &["footprintspp"],
+            key: "footprint_spp",
+            kind: integer(1, MOST_U32),
+            help: "Camera samples per pixel that textures and bumps are filtered for: their footprint is 1/sqrt(K) of a pixel wide, \
+                   at least an eighth. An image that is rendered in parts needs the number of all its samples",
+            default: "--spp",
+            get: |s| s.sampling.footprint_spp.map(|n| Value::Integer(n.into())),
+            resolved: Some(|s| Some(Value::Integer(s.sampling.footprint_spp().into()))),
+            set: |s, v| v.count().map(|n| s.sampling.footprint_spp = Some(n)),
+            ..Setting::BASE
+        },
+        Setting {
             flag: "seed",
             value_name: "S",
             directive: Directive::Sampler,

@@ -149,7 +149,10 @@ impl Stage {
         self.set(method);
         let radius = if view == View::Antialiased { 0.5 } else { CENTRE };
         self.job.world.scene.film.filter = PixelFilter::Box { rx: radius, ry: radius };
-        self.job.change(|s| (s.sampling.seed, s.sampling.spp) = (seed, spp));
+        // One footprint for short and long renderings, which estimate the same picture
+        self.job.change(|s| {
+            (s.sampling.seed, s.sampling.spp, s.sampling.footprint_spp) = (seed, spp, Some(1));
+        });
         self.shadows.store(view != View::Unshadowed, Ordering::Relaxed);
         let settings = RenderSettings { threads: self.threads, spp, ..RenderSettings::default() };
         let rendering = render(&self.job, &settings, observer.stop, &|_| ())?;

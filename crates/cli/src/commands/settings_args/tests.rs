@@ -146,13 +146,14 @@ fn at_default_where_nothing_depends_on_it(settings: Settings) -> Settings {
 
 #[test]
 fn help_has_the_range_and_the_default_of_every_setting_under_its_heading() {
-    let mut command = SettingsArgs::augment_args(Command::new("test").term_width(200));
+    let mut command = SettingsArgs::augment_args(Command::new("test"));
     let text = command.render_long_help().to_string();
     for group in GROUPS {
         let part = text.split(&format!("{}:\n", group.title)).nth(1).unwrap_or_else(|| panic!("{}", group.title));
         for row in group.rows {
             let option = part.split(&format!("--{}", row.flag)).nth(1).unwrap_or_else(|| panic!("--{}", row.flag));
             let option = option.split("\n      --").next().unwrap_or_default();
+            let option = option.split_whitespace().collect::<Vec<_>>().join(" ");
             assert!(option.contains(&format!("default: the file's, or {}", row.default_text())), "{option}");
             match row.kind {
                 Kind::Choice { names, .. } => assert!(names.iter().all(|name| option.contains(name)), "{option}"),
