@@ -42,7 +42,7 @@ impl Found {
 
     /// The scattering at the hit; `None` where rays pass.
     pub fn scatter<'j>(&self, job: &'j RenderJob) -> Option<SurfaceBsdf<'j>> {
-        let scene = &job.job.world.scene;
+        let scene = &job.world.scene;
         let material = scene.surfaces[self.hit.geometry as usize].material;
         let bsdf = scene.materials.bsdf(material, &scene.textures, &self.surface, &self.context, self.wo)?;
         Some(bsdf.proposed_by(job.settings().integrator.bsdf_density))
