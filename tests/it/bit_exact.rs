@@ -6,7 +6,8 @@ use lumiris::lights::LightSamplerKind;
 use lumiris::render::output::{Aov, channels};
 use lumiris::render::plan::prepare;
 use lumiris::render::{RenderSettings, render};
-use lumiris::scene::{AccelKind, EstimatorKind, Proposals, Target, World};
+use lumiris::scene::{AccelKind, World};
+use lumiris::settings::{EstimatorKind, Proposals, Target};
 use std::path::Path;
 use std::sync::atomic::AtomicBool;
 
