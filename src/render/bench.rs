@@ -9,6 +9,7 @@ use crate::accel::embree::bare::{Bare, Packed};
 use crate::accel::embree::{EmbreeAccel, EmbreeError};
 use crate::accel::{Accel, AlphaSource, Coherence, RayBatch};
 use crate::direct::Fits;
+use crate::estimators::stats::median;
 use crate::integrators::path::{CameraSample, Recording};
 use crate::integrators::{PathIntegrator, PathStats};
 use crate::math::hash::HashStream;
@@ -334,16 +335,6 @@ fn time(run: impl FnOnce()) -> Duration {
     let start = Instant::now();
     run();
     start.elapsed()
-}
-
-/// The middle of some numbers, or the mean of the middle two; 0 of none.
-fn median(values: impl Iterator<Item = f64>) -> f64 {
-    let mut sorted: Vec<f64> = values.collect();
-    sorted.sort_by(f64::total_cmp);
-    match sorted.len() {
-        0 => 0.0,
-        n => 0.5 * (sorted[(n - 1) / 2] + sorted[n / 2]),
-    }
 }
 
 /// All rays of the batches in random order, in batches as large as the renderer's.

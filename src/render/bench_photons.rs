@@ -1,6 +1,7 @@
 //! How fast photons are traced, and how fast their maps are built and asked.
 
 use super::{RenderError, thread_pool};
+use crate::estimators::stats::median;
 use crate::photons::{GatherScratch, PhotonMap, Place, Search, Tracing, Want, trace_photons};
 use crate::scene::World;
 use serde::Serialize;
@@ -90,9 +91,4 @@ fn queries_per_second(map: &PhotonMap, search: Search, runs: u32) -> f64 {
         times.push(start.elapsed().as_secs_f64());
     }
     places.len() as f64 / median(times).max(1e-12)
-}
-
-fn median(mut values: Vec<f64>) -> f64 {
-    values.sort_by(f64::total_cmp);
-    values.get(values.len() / 2).copied().unwrap_or(0.0)
 }

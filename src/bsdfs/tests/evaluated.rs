@@ -4,6 +4,7 @@ use super::*;
 use crate::bsdfs::models::{AshikhminShirley, CookTorrance, CosineLobe, LobeAxis, OrenNayar};
 use crate::bsdfs::sphere_study::{SphereSettings, SphereStudy, sphere_picture};
 use crate::estimators::stats::{Welford, sidak, two_sample_z_test, z_test};
+use crate::math::luminance;
 
 const BLUE: Rgb = Rgb::new(0.1, 0.4, 0.8);
 
@@ -237,10 +238,6 @@ fn resampled_directions_follow_the_target_in_the_limit() {
     }
     assert!((mean.mean() - expected).abs() < 0.02, "{mean:?} {expected}");
     assert!((proposals.mean() - expected).abs() > 0.2, "{proposals:?}");
-}
-
-fn luminance([r, g, b]: [f64; 3]) -> f64 {
-    0.2126 * r + 0.7152 * g + 0.0722 * b
 }
 
 fn study(model: Model, density: ProposalDensity, l: fn(Vec3) -> Rgb, proposals: u32) -> SphereStudy {

@@ -16,13 +16,16 @@
 //! | module | what | source |
 //! |---|---|---|
 //! | [`draw`] | N of M by weight: with replacement, systematic, one per stratum, independent sets | thesis (4.1), (4.5); paper (1) |
+//! | [`reservoir`] | one of a stream | [Chao 1982] |
 //! | [`strata`] | the strata: equal counts or equal weights | thesis 4.5.2.1, 4.5.2.2 |
 //! | [`techniques`] | proposals or samples of several techniques | thesis 4.6 |
 //! | [`choice`] | how many proposals for how many samples | thesis (4.3), (4.4); paper (2), (3) |
 
 pub mod choice;
 pub mod draw;
+pub mod reservoir;
 pub mod strata;
 pub mod techniques;
 
 pub use draw::{Draw, independent_sets, stratified, systematic, with_replacement};
+pub use reservoir::Reservoir;

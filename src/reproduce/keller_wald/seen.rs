@@ -1,8 +1,9 @@
 //! What the camera sees of diffuse surfaces, for pictures that show a photon map directly: L = albedo·E/π at the hit of the ray
 //! through the middle of each pixel [Keller and Wald 2000, Fig. 2].
 
-use super::super::measure::{Measured, luminance};
+use super::super::measure::Measured;
 use crate::accel::{Coherence, Hit, RayBatch};
+use crate::math::luminance;
 use crate::math::{Rgb, Vec2, Vec3};
 use crate::scene::World;
 use crate::textures::TextureContext;

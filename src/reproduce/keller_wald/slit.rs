@@ -1,7 +1,7 @@
 //! A room that is lit through a slit: where importance puts photons, and what the cut-off loses [Keller and Wald 2000, Fig. 4].
 
 use super::super::figure::{Figure, Summary};
-use super::super::measure::{Estimate, Stage, luminance};
+use super::super::measure::{Estimate, Stage};
 use super::super::page::{Block, Cell, Table};
 use super::super::pictures::{gain, significant};
 use super::super::{ReproduceError, scaled};
@@ -11,6 +11,7 @@ use super::seen::{Seen, seen};
 use super::{SHAPE, Setup};
 use crate::estimators::stats::Welford;
 use crate::math::Vec3;
+use crate::math::luminance;
 use crate::photons::{Importance, ImportanceSettings, Tracing, Unimportant, Want, trace_importons};
 use crate::scene::World;
 use serde_json::{Value, json};

@@ -1,10 +1,11 @@
 //! Biased baselines: the measured bias is the predicted one, and it is there.
 
-use super::integrals::{Integral, Proposals, luminance, run};
+use super::integrals::{Integral, Proposals, run};
 use super::{assert_means, level};
 use lumiris::estimators::baselines::{bidirectional, weighted};
 use lumiris::estimators::ris::with_replacement;
 use lumiris::estimators::stats::z_test;
+use lumiris::math::luminance;
 
 const RUNS: usize = 1_000_000;
 const LINE: Integral = Integral::Line;
