@@ -11,10 +11,10 @@
 use super::ShadePoint;
 use super::propose::Candidate;
 use crate::estimators::mis::Heuristic;
+use crate::estimators::ris::weights::{self, weight};
 use crate::lights::{LightId, LightLanes, LightRun};
 use crate::math::hash::pcg4d;
 use crate::scene::{ProposalPoints, Target, World};
-use crate::simd::combine::{self, Weighting};
 use crate::simd::{self, curve};
 
 /// Seed of the positions.
@@ -231,25 +231,21 @@ impl Proposals {
         for run in self.runs.iter().filter(|run| world.scene.lights.lights[run.light as usize].is_delta()) {
             self.p_bsdf[start + run.places[0] as usize..start + run.places[1] as usize].fill(0.0);
         }
-        let proposals = combine::Proposals {
+        let proposals = weights::Proposals {
             f_cos: self.f_cos.each_ref().map(|a| &a[start..end]),
             li: self.li.each_ref().map(|a| &a[start..end]),
             p: &self.p_light[start..end],
             p_other: &self.p_bsdf[start..end],
             m: techniques.n_light,
             m_other: techniques.n_bsdf,
-            weighting: match techniques.heuristic {
-                Heuristic::Balance => Weighting::Balance,
-                Heuristic::Power => Weighting::Power,
-                Heuristic::Maximum => Weighting::Maximum,
-            },
+            heuristic: techniques.heuristic,
         };
-        let mut weights = combine::Weights {
+        let mut out = weights::Weights {
             q_hat: &mut self.p_hat[start..end],
             r: &mut self.r[start..end],
             w: &mut self.weight[start..end],
         };
-        combine::combine(simd::level(), &proposals, &mut weights);
+        weights::combine(simd::level(), &proposals, &mut out);
         match techniques.target {
             Target::Fgl | Target::Gvl => {}
             Target::Gv => {
@@ -269,11 +265,4 @@ impl Proposals {
             }
         }
     }
-}
-
-/// q̂·r; 0 if it is no finite number.
-#[inline]
-fn weight(p_hat: f32, r: f32) -> f32 {
-    let weight = p_hat * r;
-    if weight.is_finite() { weight } else { 0.0 }
 }

@@ -1,8 +1,8 @@
 //! Biased baselines: the measured bias is the predicted one, and it is there.
 
+use super::baselines::{bidirectional, weighted};
 use super::integrals::{Integral, Proposals, run};
 use super::{assert_means, level};
-use lumiris::estimators::baselines::{bidirectional, weighted};
 use lumiris::estimators::ris::with_replacement;
 use lumiris::estimators::stats::z_test;
 use lumiris::math::luminance;

@@ -1,7 +1,6 @@
 //! Integrals on 0..1 that a deterministic mixture of several densities samples, and blocks of passes over them.
 
-use lumiris::estimators::mis::allot;
-use lumiris::estimators::ocv::{MAX_COMPONENTS, NormalEquations, block_of};
+use lumiris::estimators::ocv::{Form, MAX_COMPONENTS, NormalEquations, block_of};
 use lumiris::math::hash::HashStream;
 
 /// A density on 0..1.
@@ -173,6 +172,47 @@ impl Mixture {
     }
 }
 
+/// Numbers of samples n_j of a deterministic mixture of weights `alpha`: Σ n_j = `n`, and each is as near to n α_j as whole
+/// numbers can be, but at least 1 where α_j > 0, if `n` suffices for that; else those of the largest α_j have one each.
+///
+/// The mixture is that of the weights n_j/n, which are α_j only if all n α_j are whole: densities must be weighted by what is
+/// returned here, or the estimate is biased. Equal claims are settled in favour of the earlier component.
+fn allot(alpha: &[f32], n: u32, counts: &mut [u32]) {
+    let counts = &mut counts[..alpha.len()];
+    counts.fill(0);
+    let total: f64 = alpha.iter().filter(|a| **a > 0.0).map(|a| f64::from(*a)).sum();
+    for _ in 0..n {
+        // Who has none comes first, by weight; then who is farthest below its share.
+        let claim = |j: usize, count: u32| match (alpha[j] > 0.0, count) {
+            (false, _) => f64::NEG_INFINITY,
+            (true, 0) => f64::from(n) + f64::from(alpha[j]) / total,
+            (true, count) => f64::from(n) * f64::from(alpha[j]) / total - f64::from(count),
+        };
+        let best = (0..alpha.len()).reduce(|b, j| if claim(j, counts[j]) > claim(b, counts[b]) { j } else { b });
+        match best {
+            Some(best) if alpha[best] > 0.0 => counts[best] += 1,
+            _ => return,
+        }
+    }
+}
+
+#[test]
+fn counts_of_a_mixture_are_its_shares_and_nobody_with_a_share_has_none() {
+    let counts = |alpha: &[f32], n| {
+        let mut counts = vec![9; alpha.len()];
+        allot(alpha, n, &mut counts);
+        counts
+    };
+    assert_eq!(counts(&[0.5, 0.25, 0.25], 8), [4, 2, 2]);
+    assert_eq!(counts(&[0.5, 0.25, 0.25], 64), [32, 16, 16]);
+    assert_eq!(counts(&[0.5, 0.25, 0.25], 3), [1, 1, 1]);
+    assert_eq!(counts(&[0.25, 0.5, 0.25], 2), [1, 1, 0]);
+    assert_eq!(counts(&[0.9, 0.05, 0.05], 10), [8, 1, 1]);
+    assert_eq!(counts(&[1.0, 0.0], 5), [5, 0]);
+    assert_eq!(counts(&[0.3, 0.2, 0.25, 0.25], 64), [19, 13, 16, 16]);
+    assert_eq!((counts(&[0.0], 4), counts(&[], 4)), (vec![0], vec![]));
+}
+
 /// Samples of a mixture: for each component its number n_j per pass.
 pub struct Sampler {
     pub mixture: Mixture,
@@ -185,6 +225,8 @@ pub struct Sampler {
     /// How far the occluder of [`Mixture::Table`] is moved.
     pub shift: f64,
     pub equations: NormalEquations,
+    /// I_j of each component: 1, or 0 if it has no samples and is no column.
+    pub integrals: Vec<f32>,
     pub n: u32,
 }
 
@@ -203,7 +245,8 @@ impl Sampler {
         let mut counts = vec![0; alpha.len()];
         allot(&alpha, n, &mut counts);
         let equations = NormalEquations::new(alpha.len());
-        Sampler { mixture, densities, counts, is_stratified, scale: 1.0, shift: 0.0, equations, n }
+        let integrals = counts.iter().map(|&n| f32::from(u8::from(n > 0))).collect();
+        Sampler { mixture, densities, counts, is_stratified, scale: 1.0, shift: 0.0, equations, integrals, n }
     }
 
     /// All samples of a block of `passes`.
@@ -233,23 +276,23 @@ impl Sampler {
         self.mixture.f(point.x).map(|f| (f * scale) as f32)
     }
 
-    /// Adds a block of `passes` to `sums`, whose columns are p_j/p_α − `centre`. A component without samples is no column.
-    pub fn add(&self, passes: u32, centre: f64, stream: &mut HashStream, sums: &mut [f32]) {
+    /// Adds a block of `passes` to `sums`, whose columns are r_j = p_j/p_α. A component without samples is no column.
+    pub fn add(&self, passes: u32, stream: &mut HashStream, sums: &mut [f32]) {
         self.points(passes, stream, |point| {
-            let mut columns = [0.0; MAX_COMPONENTS];
-            for (j, column) in columns[..self.densities.len()].iter_mut().enumerate() {
-                if self.counts[j] > 0 {
-                    *column = (point.pdfs[j] / point.mixture_pdf - centre) as f32;
-                }
+            let (mut columns, mut count) = ([(0, 0.0); MAX_COMPONENTS], 0);
+            for j in (0..self.counts.len()).filter(|&j| self.counts[j] > 0 && point.pdfs[j] > 0.0) {
+                columns[count] = (j, (point.pdfs[j] / point.mixture_pdf) as f32);
+                count += 1;
             }
-            self.equations.add(sums, &columns[..self.densities.len()], self.y(point));
+            self.equations.add_sparse(sums, &columns[..count], self.y(point));
         });
     }
 
-    /// The sums of a new block with centred columns.
-    pub fn block(&self, passes: u32, stream: &mut HashStream, sums: &mut [f32]) {
+    /// The sums of a new block in the columns of a form.
+    pub fn block(&self, form: Form, passes: u32, stream: &mut HashStream, sums: &mut [f32]) {
         sums.fill(0.0);
-        self.add(passes, 1.0, stream, sums);
+        self.add(passes, stream, sums);
+        form.finish(self.equations, sums, &self.integrals);
     }
 
     /// Lengths of the blocks of the first `passes` passes.

@@ -1,18 +1,15 @@
-//! Small symmetric systems of many shading points, a point per lane: the kernel of `estimators::ocv`, whose sums it reads.
+//! β from the sums of many shading points at once, a point per lane: small symmetric systems.
 //!
-//! The sums of a point lie in a row: Σ c_j c_k (k ≤ j, row by row), Σ c_j y (by column, then channel), Σ c_j, Σ y, Σ y², n.
 //! The factorisation is LDLᵀ without pivots. A column whose pivot is rounding is dropped.
 //!
 //! Lanes are arrays, of whose loops the compiler makes vector code: the loops over columns are too many to be unrolled for every
 //! level of a dispatch.
 
+use super::normal::{MAX_COMPONENTS, NormalEquations};
 use std::ops::{Add, AddAssign, Div, Mul, MulAssign, Sub, SubAssign};
 
 /// Points that are solved together.
 const LANES: usize = 8;
-
-/// Most columns.
-const MOST: usize = 8;
 
 /// Part of its diagonal below which a pivot is rounding.
 const DEPENDENT: f32 = 1e-5;
@@ -25,55 +22,65 @@ const CONSTANT: f32 = 1e-6;
 pub enum Matrix {
     /// Σ c_j c_k: columns of mean 0.
     KnownMeans,
-    /// Σ (c_j − c̄_j)(c_k − c̄_k).
+    /// Σ (c_j − c̄_j)(c_k − c̄_k), as in a regression with an intercept.
     SampleMeans,
     /// Σ c_j c_k with a column of ones in place of the last one.
     Intercept,
 }
 
-/// The system of a point and how its solution is held back; see `estimators::ocv::Penalty`.
+/// The system whose solution β is, and how it is held back where samples are few: β = 0 is MIS, and so is every multiple of α.
+///
+/// The columns c_j are dimensionless and of order one, so that the ridge is a number of samples, and scaling f scales β.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct System {
-    /// Number of columns, at most 8.
-    pub columns: usize,
     /// The matrix.
     pub matrix: Matrix,
-    /// λ, which is added to the diagonal.
+    /// λ of λ Σ β_j², in samples whose columns have a mean square of one.
     pub ridge: f32,
-    /// κ of the factor max(0, 1 − κ σ² p/T); 0 is no factor.
+    /// κ of the factor max(0, 1 − κ σ² p/T) of each channel [James and Stein 1961]: T is what β explains of the sum of
+    /// squares of y, p = tr (C + λ1)⁻¹C the number of effective coefficients, and σ² what is not explained, by degree of
+    /// freedom n − 1 − p; 0 if fewer than half a degree is left. κ = 0 is no factor.
     pub shrink: f32,
 }
 
 impl System {
-    /// Number of sums of a point.
-    #[allow(clippy::len_without_is_empty)]
-    pub fn len(&self) -> usize {
-        self.columns * (self.columns + 1) / 2 + 4 * self.columns + 7
-    }
+    /// Plain least squares with an intercept.
+    pub const LEAST_SQUARES: System = System { matrix: Matrix::SampleMeans, ridge: 0.0, shrink: 0.0 };
+
+    /// For β that is applied to the samples it was fitted to.
+    pub const SAME_SAMPLES: System = System { matrix: Matrix::SampleMeans, ridge: 1.0, shrink: 0.0 };
+
+    /// For β that is applied to other samples. Chosen by measurement, see `docs/measurements/ocv`: the smallest that keeps the
+    /// first four passes within 2 % of MIS where nothing is to be gained.
+    pub const OTHER_SAMPLES: System = System { matrix: Matrix::KnownMeans, ridge: 4.0, shrink: 1.0 };
+
+    /// Equation (11) of the paper, λ = 1. The penalty draws the intercept, which is most of the estimate, to 0 as well.
+    pub const PAPER: System = System { matrix: Matrix::Intercept, ridge: 1.0, shrink: 0.0 };
 }
 
-/// Solves the system of each point of `sums` and writes `beta[3 columns · point + 3 j + channel]`, 0 where a solution is not
-/// finite. Returns the number of ill-conditioned systems: those without a finite solution, and those that dropped a column which
-/// is not 0 in all samples.
-pub fn solve(system: &System, sums: &[f32], beta: &mut [f32]) -> usize {
-    assert!(system.columns <= MOST, "at most {MOST} columns");
-    if system.columns == 0 {
-        return 0;
-    }
-    let (len, width) = (system.len(), 3 * system.columns);
-    let points = sums.len() / len;
-    let mut ill_conditioned = 0;
-    for first in (0..points).step_by(LANES) {
-        let lanes = Lanes { sums, len, first, last: points - 1 };
-        let (x, is_ill) = solve_lanes(&lanes, system);
-        for p in 0..LANES.min(points - first) {
-            for k in 0..width {
-                beta[(first + p) * width + k] = x[k].0[p];
-            }
-            ill_conditioned += usize::from(is_ill[p]);
+impl NormalEquations {
+    /// Solves the system of each row of `sums` and writes `beta[coefficients·row + 3 j + channel]`, 0 where a solution is not
+    /// finite. Returns the number of ill-conditioned systems: those without a finite solution, and those that dropped a column
+    /// which is not 0 in all samples.
+    pub fn solve(self, system: System, sums: &[f32], beta: &mut [f32]) -> usize {
+        let (len, width) = (self.len(), self.coefficients());
+        if width == 0 {
+            return 0;
         }
+        let points = sums.len() / len;
+        let mut ill_conditioned = 0;
+        for first in (0..points).step_by(LANES) {
+            let lanes = Lanes { equations: self, sums, len, first, last: points - 1 };
+            let (x, is_ill) = solve_lanes(&lanes, system);
+            for p in 0..LANES.min(points - first) {
+                for k in 0..width {
+                    beta[(first + p) * width + k] = x[k].0[p];
+                }
+                ill_conditioned += usize::from(is_ill[p]);
+            }
+        }
+        ill_conditioned
     }
-    ill_conditioned
 }
 
 /// A number of each point.
@@ -144,7 +151,9 @@ assignments!(AddAssign add_assign +, SubAssign sub_assign -, MulAssign mul_assig
 
 /// Sums of [`LANES`] points from `first` on; past the `last` one, of that one.
 struct Lanes<'a> {
+    equations: NormalEquations,
     sums: &'a [f32],
+    /// Number of sums of a point.
     len: usize,
     first: usize,
     last: usize,
@@ -160,32 +169,30 @@ impl Lanes<'_> {
     }
 
     /// Σ c_j², n for a column of ones.
-    fn squares(&self, system: &System) -> [F; MOST] {
-        let m = system.columns;
-        let mut squares = [F::ZERO; MOST];
+    fn squares(&self, system: System) -> [F; MAX_COMPONENTS] {
+        let m = self.equations.components();
+        let mut squares = [F::ZERO; MAX_COMPONENTS];
         for j in 0..m {
             squares[j] = self.get(j * (j + 3) / 2);
         }
         if system.matrix == Matrix::Intercept {
-            let [_, _, values] = offsets(m);
-            squares[m - 1] = self.get(values + 6);
+            squares[m - 1] = self.get(self.equations.count());
         }
         squares
     }
 }
 
 /// Coefficients by column and channel, and which systems are ill-conditioned.
-fn solve_lanes(lanes: &Lanes<'_>, system: &System) -> ([F; 3 * MOST], [bool; LANES]) {
-    let m = system.columns;
+fn solve_lanes(lanes: &Lanes<'_>, system: System) -> ([F; 3 * MAX_COMPONENTS], [bool; LANES]) {
+    let (m, values) = (lanes.equations.components(), lanes.equations.values());
     let (zero, one) = (F::ZERO, F::ONE);
-    let [_, _, values] = offsets(m);
-    let n = lanes.get(values + 6);
+    let n = lanes.get(lanes.equations.count());
     let per_n = one / n.max(1.0);
     let (a, b) = assemble(lanes, system, per_n);
     let factors = factorise(m, &a, system.ridge);
     let left = n - 1.0 - factors.effective(m, system.ridge);
 
-    let mut x = [zero; 3 * MOST];
+    let mut x = [zero; 3 * MAX_COMPONENTS];
     // What is not finite in the system or in a solution makes this NaN, whatever is dropped or shrunk to 0.
     let mut sum = zero;
     for j in 0..m {
@@ -226,20 +233,14 @@ fn solve_lanes(lanes: &Lanes<'_>, system: &System) -> ([F; 3 * MOST], [bool; LAN
     (x, is_ill)
 }
 
-/// Where Σ c_j y, Σ c_j and Σ y begin.
-fn offsets(m: usize) -> [usize; 3] {
-    let mixed = m * (m + 1) / 2;
-    [mixed, mixed + 3 * m, mixed + 4 * m]
-}
-
 /// The lower triangle of a matrix.
-type Triangle = [[F; MOST]; MOST];
+type Triangle = [[F; MAX_COMPONENTS]; MAX_COMPONENTS];
 
 /// The matrix without ridge, and three right-hand sides.
-fn assemble(lanes: &Lanes<'_>, system: &System, per_n: F) -> (Triangle, [[F; MOST]; 3]) {
-    let (m, zero) = (system.columns, F::ZERO);
-    let [mixed, means, values] = offsets(m);
-    let (mut a, mut b) = ([[zero; MOST]; MOST], [[zero; MOST]; 3]);
+fn assemble(lanes: &Lanes<'_>, system: System, per_n: F) -> (Triangle, [[F; MAX_COMPONENTS]; 3]) {
+    let (m, zero) = (lanes.equations.components(), F::ZERO);
+    let [mixed, means, values] = [lanes.equations.products(), lanes.equations.columns(), lanes.equations.values()];
+    let (mut a, mut b) = ([[zero; MAX_COMPONENTS]; MAX_COMPONENTS], [[zero; MAX_COMPONENTS]; 3]);
     let mut at = 0;
     for j in 0..m {
         let mean = lanes.get(means + j) * per_n;
@@ -264,7 +265,7 @@ fn assemble(lanes: &Lanes<'_>, system: &System, per_n: F) -> (Triangle, [[F; MOS
         for k in 0..m - 1 {
             a[m - 1][k] = lanes.get(means + k);
         }
-        a[m - 1][m - 1] = lanes.get(values + 6);
+        a[m - 1][m - 1] = lanes.get(lanes.equations.count());
         for i in 0..3 {
             b[i][m - 1] = lanes.get(values + i);
         }
@@ -275,12 +276,13 @@ fn assemble(lanes: &Lanes<'_>, system: &System, per_n: F) -> (Triangle, [[F; MOS
 /// L below the diagonal, and 1/D, which is 0 for columns that are dropped.
 struct Factors {
     l: Triangle,
-    per_d: [F; MOST],
+    per_d: [F; MAX_COMPONENTS],
 }
 
 fn factorise(m: usize, a: &Triangle, ridge: f32) -> Factors {
     let (zero, one) = (F::ZERO, F::ONE);
-    let (mut l, mut d, mut per_d) = ([[zero; MOST]; MOST], [zero; MOST], [zero; MOST]);
+    let (mut l, mut d, mut per_d) =
+        ([[zero; MAX_COMPONENTS]; MAX_COMPONENTS], [zero; MAX_COMPONENTS], [zero; MAX_COMPONENTS]);
     for j in 0..m {
         let diagonal = a[j][j] + ridge;
         let mut pivot = diagonal;
@@ -303,7 +305,7 @@ fn factorise(m: usize, a: &Triangle, ridge: f32) -> Factors {
 
 impl Factors {
     /// L D Lᵀ x = b, 0 for columns that were dropped.
-    fn solve(&self, m: usize, b: &[F; MOST]) -> [F; MOST] {
+    fn solve(&self, m: usize, b: &[F; MAX_COMPONENTS]) -> [F; MAX_COMPONENTS] {
         let mut x = *b;
         for j in 0..m {
             for k in 0..j {
@@ -320,7 +322,7 @@ impl Factors {
     }
 
     /// Where a column takes no part though its sum of squares is not 0: it is constant, or depends on those before it.
-    fn drops(&self, squares: &[F; MOST], a: &Triangle) -> [bool; LANES] {
+    fn drops(&self, squares: &[F; MAX_COMPONENTS], a: &Triangle) -> [bool; LANES] {
         let mut drops = [false; LANES];
         for (j, squares) in squares.iter().enumerate() {
             for p in 0..LANES {
@@ -336,7 +338,7 @@ impl Factors {
         let (mut rank, mut trace) = (zero, zero);
         for c in 0..m {
             rank += one.where_greater(self.per_d[c], zero);
-            let mut v = [zero; MOST];
+            let mut v = [zero; MAX_COMPONENTS];
             v[c] = one;
             for j in c..m {
                 for k in c..j {
@@ -355,48 +357,41 @@ mod tests {
     use crate::math::hash::HashStream;
     use crate::simd::test_support::LENGTHS;
 
-    /// Sums of `n` samples of each of `points`.
-    fn sums(system: &System, points: usize, n: usize) -> Vec<f32> {
-        let (m, len) = (system.columns, system.len());
-        let [mixed, means, values] = offsets(m);
-        let (mut sums, mut stream) = (vec![0.0; points * len], HashStream::new([m as u32, n as u32, 3]));
-        for row in sums.chunks_exact_mut(len) {
+    const MATRICES: [Matrix; 3] = [Matrix::KnownMeans, Matrix::SampleMeans, Matrix::Intercept];
+
+    /// Rows of sums of `n` samples each, whose columns `column` changes.
+    fn rows(m: usize, points: usize, n: usize, column: fn(&mut [f32], f32)) -> (NormalEquations, Vec<f32>) {
+        let equations = NormalEquations::new(m);
+        let (mut sums, mut stream) = (vec![0.0; points * equations.len()], HashStream::new([m as u32, n as u32, 3]));
+        for row in sums.chunks_exact_mut(equations.len()) {
             for _ in 0..n {
-                let c: Vec<f32> = (0..m).map(|_| 2.0 * stream.next_f32() - 1.0).collect();
+                let mut c: Vec<f32> = (0..m).map(|_| 2.0 * stream.next_f32() - 1.0).collect();
                 let y: [f32; 3] = std::array::from_fn(|i| 1.0 + c[i % m] + stream.next_f32());
-                let mut at = 0;
-                for j in 0..m {
-                    (0..=j).for_each(|k| row[at + k] += c[j] * c[k]);
-                    at += j + 1;
-                    (0..3).for_each(|i| row[mixed + 3 * j + i] += c[j] * y[i]);
-                    row[means + j] += c[j];
-                }
-                (0..3).for_each(|i| row[values + i] += y[i]);
-                (0..3).for_each(|i| row[values + 3 + i] += y[i] * y[i]);
-                row[values + 6] += 1.0;
+                column(&mut c, stream.next_f32());
+                equations.add_sparse(row, &c.into_iter().enumerate().collect::<Vec<_>>(), y);
             }
         }
-        sums
+        (equations, sums)
     }
 
     #[test]
     fn solutions_do_not_depend_on_what_is_solved_beside_and_what_is_not_finite_is_counted() {
         for columns in [1, 3, 5, 8] {
-            for matrix in [Matrix::KnownMeans, Matrix::SampleMeans, Matrix::Intercept] {
+            for matrix in MATRICES {
                 for points in LENGTHS {
-                    let system = System { columns, matrix, ridge: 1.5, shrink: 1.0 };
-                    let mut sums = sums(&system, points, 7);
+                    let system = System { matrix, ridge: 1.5, shrink: 1.0 };
+                    let (equations, mut sums) = rows(columns, points, 7, |_, _| ());
                     let spoilt = (points > 2) as usize;
                     if spoilt > 0 {
-                        sums[2 * system.len() + offsets(columns)[2]] = f32::NAN;
+                        sums[2 * equations.len() + equations.values()] = f32::NAN;
                     }
-                    let width = 3 * columns;
+                    let width = equations.coefficients();
                     let mut beta = vec![1.0; points * width];
-                    assert_eq!(solve(&system, &sums, &mut beta), spoilt, "{columns} {matrix:?} {points}");
+                    assert_eq!(equations.solve(system, &sums, &mut beta), spoilt, "{columns} {matrix:?} {points}");
                     assert!(beta.iter().all(|b| b.is_finite()));
-                    for (row, beta) in sums.chunks_exact(system.len()).zip(beta.chunks_exact(width)) {
+                    for (row, beta) in sums.chunks_exact(equations.len()).zip(beta.chunks_exact(width)) {
                         let mut alone = vec![1.0; width];
-                        solve(&system, row, &mut alone);
+                        equations.solve(system, row, &mut alone);
                         assert_eq!(alone, beta, "{columns} {matrix:?} {points}");
                     }
                 }
@@ -406,50 +401,30 @@ mod tests {
 
     #[test]
     fn systems_that_drop_a_column_are_counted_unless_it_is_zero() {
-        let count = |matrix, ridge, column: fn([f32; 3]) -> f32| {
-            let system = System { columns: 3, matrix, ridge, shrink: 0.0 };
-            let (points, mut stream) = (11, HashStream::new([4, 4, 4]));
-            let mut sums = vec![0.0; points * system.len()];
-            for row in sums.chunks_exact_mut(system.len()) {
-                for _ in 0..20 {
-                    let [u, v] = stream.next_2d();
-                    let c = [u, v, column([u, v, stream.next_f32()])];
-                    let [mixed, means, values] = offsets(3);
-                    for (at, (j, k)) in [(0, 0), (1, 0), (1, 1), (2, 0), (2, 1), (2, 2)].into_iter().enumerate() {
-                        row[at] += c[j] * c[k];
-                    }
-                    for j in 0..3 {
-                        (0..3).for_each(|i| row[mixed + 3 * j + i] += c[j] * u);
-                        row[means + j] += c[j];
-                        row[values + j] += u;
-                        row[values + 3 + j] += u * u;
-                    }
-                    row[values + 6] += 1.0;
-                }
-            }
-            let mut beta = vec![7.0; 9 * points];
-            let count = solve(&system, &sums, &mut beta);
+        let count = |matrix, ridge, column| {
+            let (equations, sums) = rows(3, 11, 20, column);
+            let mut beta = vec![7.0; 11 * equations.coefficients()];
+            let count = equations.solve(System { matrix, ridge, shrink: 0.0 }, &sums, &mut beta);
             assert!(beta.iter().all(|b| b.is_finite()));
             count
         };
         for matrix in [Matrix::KnownMeans, Matrix::SampleMeans] {
-            assert_eq!(count(matrix, 0.0, |[u, v, _]| u - 0.5 * v), 11, "{matrix:?}");
-            assert_eq!(count(matrix, 0.0, |[_, _, w]| w), 0, "{matrix:?}");
-            assert_eq!(count(matrix, 0.0, |_| 0.0), 0, "{matrix:?}");
+            assert_eq!(count(matrix, 0.0, |c, _| c[2] = c[0] - 0.5 * c[1]), 11, "{matrix:?}");
+            assert_eq!(count(matrix, 0.0, |c, u| c[2] = u), 0, "{matrix:?}");
+            assert_eq!(count(matrix, 0.0, |c, _| c[2] = 0.0), 0, "{matrix:?}");
             // The penalty makes the columns independent
-            assert_eq!(count(matrix, 1.0, |[u, v, _]| u - 0.5 * v), 0, "{matrix:?}");
+            assert_eq!(count(matrix, 1.0, |c, _| c[2] = c[0] - 0.5 * c[1]), 0, "{matrix:?}");
         }
-        assert_eq!([0.0, 1.0].map(|ridge| count(Matrix::SampleMeans, ridge, |_| 1.5)), [11, 11]);
-        assert_eq!(count(Matrix::KnownMeans, 0.0, |_| 1.5), 0);
+        assert_eq!([0.0, 1.0].map(|ridge| count(Matrix::SampleMeans, ridge, |c, _| c[2] = 1.5)), [11, 11]);
+        assert_eq!(count(Matrix::KnownMeans, 0.0, |c, _| c[2] = 1.5), 0);
     }
 
     #[test]
     fn points_without_samples_and_without_columns_have_no_coefficients() {
-        let system = System { columns: 3, matrix: Matrix::SampleMeans, ridge: 0.0, shrink: 0.0 };
+        let equations = NormalEquations::new(3);
         let mut beta = vec![7.0; 9 * 9];
-        assert_eq!(solve(&system, &vec![0.0; 9 * system.len()], &mut beta), 0);
+        assert_eq!(equations.solve(System::LEAST_SQUARES, &vec![0.0; 9 * equations.len()], &mut beta), 0);
         assert!(beta.iter().all(|b| *b == 0.0));
-        let none = System { columns: 0, ..system };
-        assert_eq!(solve(&none, &[0.0; 7], &mut []), 0);
+        assert_eq!(NormalEquations::new(0).solve(System::LEAST_SQUARES, &[0.0; 7], &mut []), 0);
     }
 }

@@ -1,17 +1,18 @@
-//! The weights of proposals: q̂ = Y(f·cos θ · L), r = w/(m p), w·q̂ of resampling.
+//! The weights of proposals of two techniques [Talbot 2005, Section 4.6.1]: q̂ = Y(f·cos θ·L), r = w/(m p), and q̂·r.
+//!
+//! With m_i proposals of density p_i of each technique, r_j = w_i(x_j)/(m_i p_i(x_j)), one target q̂ and one drawing, c_j = f r_j and
+//! w_j = q̂ r_j are as for a single technique. The thesis prints the weight as w_i q̂/p_i without 1/m_i, for an estimate that divides
+//! by M afterwards; that is right only if all m_i are equal to M, and off by m_i/M otherwise.
 
-use super::lane::{F, LANES, Vec3s, begin, load, or_zero, padded, store};
+use crate::estimators::mis::Heuristic;
+use crate::math::rgb::LUMINANCE;
+use crate::simd::lane::{F, LANES, Number, Vec3s, begin, load, or_zero, padded, store};
 use fearless_simd::{Level, Simd, dispatch, prelude::*};
 
-/// How the weights of two techniques are chosen; see the heuristics of the same names in `estimators::mis`.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum Weighting {
-    /// x/(x + y).
-    Balance,
-    /// x²/(x² + y²).
-    Power,
-    /// 1 where x is larger, 0 where y is, 1/2 where the smaller is at least 0.999 of the larger.
-    Maximum,
+/// q̂·r; 0 if that is not finite.
+#[inline(always)]
+pub fn weight<N: Number>(q_hat: N, r: N) -> N {
+    (q_hat * r).or_zero_if_not_finite()
 }
 
 /// Samples of one technique, and the density of another one at them. All slices have the same length.
@@ -30,7 +31,7 @@ pub struct Proposals<'a> {
     /// Number of samples of the other technique; 0 if it is not used.
     pub m_other: f32,
     /// How both are weighted.
-    pub weighting: Weighting,
+    pub heuristic: Heuristic,
 }
 
 /// What [`combine`] computes.
@@ -63,40 +64,28 @@ pub fn combine(level: Level, proposals: &Proposals<'_>, out: &mut Weights<'_>) {
 
 #[inline(always)]
 fn combine_lanes<S: Simd>(simd: S, proposals: &Proposals<'_>, out: &mut Weights<'_>) {
-    let (zero, one) = (F::splat(simd, 0.0), F::splat(simd, 1.0));
+    let zero = F::splat(simd, 0.0);
     for i in (0..proposals.p.len()).step_by(LANES) {
         let i = begin(i, proposals.p.len());
         let f = Vec3s::load(simd, proposals.f_cos, i);
         let l = Vec3s::load(simd, proposals.li, i);
         let (x, y) = (load(simd, proposals.p, i) * proposals.m, load(simd, proposals.p_other, i) * proposals.m_other);
 
-        // The ratio y/x, and not the products, so that neither squares overflow nor inf/inf appears.
-        let (is_sample, has_other) = (x.simd_gt(zero), y.simd_gt(zero));
-        let ratio = y / x;
-        let both_infinite = x.is_infinite() & y.is_infinite();
-        let weight = match proposals.weighting {
-            Weighting::Balance => one / (ratio + one),
-            Weighting::Power => one / (ratio * ratio + one),
-            Weighting::Maximum => {
-                let is_tie = x.min(y).simd_ge(x.max(y) * 0.999);
-                is_tie.select(F::splat(simd, 0.5), x.simd_gt(y).select(one, zero))
-            }
-        };
-        let weight = both_infinite.select(F::splat(simd, 0.5), has_other.select(weight, one));
-
-        let luminance = f.x * l.x * 0.212_671 + f.y * l.y * 0.715_160 + f.z * l.z * 0.072_169;
+        let is_sample = x.simd_gt(zero);
+        let weight_of_both = proposals.heuristic.weight_of_expected(x, y);
+        let luminance = f.x * l.x * LUMINANCE[0] + f.y * l.y * LUMINANCE[1] + f.z * l.z * LUMINANCE[2];
         let q_hat = or_zero(is_sample, luminance);
-        let r = or_zero(is_sample, weight / x);
-        let w = q_hat * r;
+        let r = or_zero(is_sample, weight_of_both / x);
         store(q_hat, out.q_hat, i);
         store(r, out.r, i);
-        store(or_zero(w.is_finite(), w), out.w, i);
+        store(weight(q_hat, r), out.w, i);
     }
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::estimators::mis::Technique;
     use crate::math::Rgb;
     use crate::math::hash::HashStream;
     use crate::simd::test_support::{LENGTHS, assert_same_bits, levels};
@@ -111,39 +100,24 @@ mod tests {
             .collect()
     }
 
-    /// As `estimators::mis` has it.
-    fn weight(weighting: Weighting, x: f32, y: f32) -> f32 {
-        if !(x > 0.0) {
-            return 0.0;
-        }
-        if !(y > 0.0) || x.is_infinite() {
-            return if x.is_infinite() && y.is_infinite() { 0.5 } else { 1.0 };
-        }
-        let ratio = y / x;
-        match weighting {
-            Weighting::Balance => 1.0 / (1.0 + ratio),
-            Weighting::Power => 1.0 / (1.0 + ratio * ratio),
-            Weighting::Maximum if x.min(y) >= 0.999 * x.max(y) => 0.5,
-            Weighting::Maximum => f32::from(u8::from(x > y)),
-        }
-    }
-
     #[test]
     fn weights_are_those_of_single_samples_to_the_bit_at_all_levels() {
         let mut stream = HashStream::new([5, 6, 7]);
-        for weighting in [Weighting::Balance, Weighting::Power, Weighting::Maximum] {
+        for heuristic in [Heuristic::Balance, Heuristic::Power, Heuristic::Maximum] {
             for n in LENGTHS {
                 let v: [Vec<f32>; 8] = std::array::from_fn(|_| numbers(&mut stream, n));
                 let (f_cos, li) = ([&v[0][..], &v[1], &v[2]], [&v[3][..], &v[4], &v[5]]);
                 let (m, m_other) = (8.0, 3.0);
-                let proposals = Proposals { f_cos, li, p: &v[6], p_other: &v[7], m, m_other, weighting };
+                let proposals = Proposals { f_cos, li, p: &v[6], p_other: &v[7], m, m_other, heuristic };
                 assert_same_bits::<3>(n, |level, [q_hat, r, w]| {
                     combine(level, &proposals, &mut Weights { q_hat, r, w });
                     for i in 0..n {
                         let x = proposals.p[i] * m;
                         let product = Rgb::new(v[0][i] * v[3][i], v[1][i] * v[4][i], v[2][i] * v[5][i]);
                         let expected_q = if x > 0.0 { product.luminance() } else { 0.0 };
-                        let mis = weight(weighting, x, proposals.p_other[i] * m_other);
+                        let techniques =
+                            [(m, proposals.p[i]), (m_other, proposals.p_other[i])].map(|(n, p)| Technique { n, p });
+                        let mis = heuristic.weight(techniques[0], techniques[1]);
                         let expected_r = if x > 0.0 { mis / x } else { 0.0 };
                         let same = |a: f32, b: f32| a.to_bits() == b.to_bits() || a.is_nan() && b.is_nan();
                         assert!(same(q_hat[i], expected_q) && same(r[i], expected_r), "{} {expected_r}", r[i]);
@@ -159,13 +133,14 @@ mod tests {
         let p: Vec<f32> = (1..200).map(|i| 0.01 * i as f32).collect();
         for edge in edges {
             for ulps in -20_i32..=20 {
-                let q: Vec<f32> = p.iter().map(|p| f32::from_bits((p * edge).to_bits().wrapping_add_signed(ulps))).collect();
+                let q: Vec<f32> =
+                    p.iter().map(|p| f32::from_bits((p * edge).to_bits().wrapping_add_signed(ulps))).collect();
                 let ones = vec![1.0; p.len()];
                 // r·p of one technique, whose luminance does not matter
                 let weights = |level, p: &[f32], p_other: &[f32]| {
                     let [mut q_hat, mut r, mut w] = [(); 3].map(|()| vec![0.0; p.len()]);
-                    let (f_cos, weighting) = ([&ones[..]; 3], Weighting::Maximum);
-                    let proposals = Proposals { f_cos, li: f_cos, p, p_other, m: 1.0, m_other: 1.0, weighting };
+                    let (f_cos, heuristic) = ([&ones[..]; 3], Heuristic::Maximum);
+                    let proposals = Proposals { f_cos, li: f_cos, p, p_other, m: 1.0, m_other: 1.0, heuristic };
                     combine(level, &proposals, &mut Weights { q_hat: &mut q_hat, r: &mut r, w: &mut w });
                     r.iter().zip(p).map(|(r, p)| r * p).collect::<Vec<_>>()
                 };
