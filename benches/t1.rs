@@ -7,6 +7,8 @@
 use lumiris::bsdfs::{
     Bsdf, CoatTable, CoatedDiffuse, Conductor, Dielectric, Diffuse, DiffuseTransmission, TrowbridgeReitz,
 };
+use lumiris::estimators::mis::Heuristic;
+use lumiris::estimators::ris::weights::{Proposals, Weights, combine};
 use lumiris::geometry::{Quadric, QuadricKind, Shape, TriangleMesh};
 use lumiris::lights::{Emission, EnvironmentFilter, EnvironmentMap, EnvironmentMapping, area_lights_of};
 use lumiris::lights::{Light, LightCtx, LightLanes};
@@ -14,7 +16,6 @@ use lumiris::materials::surface::SurfaceBsdf;
 use lumiris::math::hash::{HashStream, pcg4d};
 use lumiris::math::warp::sample_uniform_sphere;
 use lumiris::math::{Affine3A, Frame, Rgb, Vec3};
-use lumiris::simd::combine::{Proposals, Weighting, Weights, combine};
 use lumiris::simd::curve::{hilbert_points, hilbert_points_scalar, strata, strata_scalar};
 use std::hint::black_box;
 use std::sync::Arc;
@@ -221,7 +222,7 @@ fn kernels(m: usize) {
         let [a, b, c, d, e, f, q_hat, r, w] = rest else { unreachable!("there are nine") };
         let (f_cos, li) = ([&a[..], b, c], [&d[..], e, f]);
         let proposals =
-            Proposals { f_cos, li, p: u0, p_other: u1, m: m as f32, m_other: 1.0, weighting: Weighting::Power };
+            Proposals { f_cos, li, p: u0, p_other: u1, m: m as f32, m_other: 1.0, heuristic: Heuristic::Power };
         let mut out = Weights { q_hat, r, w };
         let lanes = time(m, |_| combine(lumiris::simd::level(), black_box(&proposals), &mut out));
         let single = time(m, |_| combine(lumiris::simd::Level::baseline(), black_box(&proposals), &mut out));
