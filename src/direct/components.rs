@@ -9,10 +9,10 @@ use super::mixture::Columns;
 use super::propose::{Candidates, Drawn};
 use super::visibility::{Segments, is_traced};
 use crate::accel::RayBatch;
-use crate::estimators::ocv::{Form, NormalEquations, System};
-use crate::estimators::optimal_mis;
-use crate::math::Rgb;
 use crate::scene::{EstimatorKind, IntegratorSettings, OptimalForm, Split, World};
+use lumiris_numbers::estimators::ocv::{Form, NormalEquations, System};
+use lumiris_numbers::estimators::optimal_mis;
+use lumiris_numbers::math::Rgb;
 
 /// Domain below the stream of a shading point: half h of its samples uses `HALF + h`.
 const HALF: u32 = 32;

@@ -17,8 +17,8 @@
 use super::ShadePoint;
 use super::propose::{Candidate, Shares, domain, light_candidate, unshadowed_candidate};
 use crate::lights::{Light, LightCtx, LightId, LightSample, LightSet};
-use crate::math::cumulative;
 use crate::scene::World;
+use lumiris_numbers::math::cumulative;
 use std::f32::consts::PI;
 
 /// Most lights that are put in order at a point.

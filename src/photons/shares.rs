@@ -5,7 +5,7 @@
 //! trajectories.
 
 use crate::lights::{LightId, LightSet};
-use crate::math::cumulative;
+use lumiris_numbers::math::cumulative;
 
 /// Shares of lights in trajectories.
 #[derive(Clone, Debug)]
@@ -63,8 +63,8 @@ impl LightShares {
 mod tests {
     use super::*;
     use crate::lights::{Light, LightSamplerKind, LightSetBuilder};
-    use crate::math::{Bounds3, Rgb, Vec3};
-    use crate::samplers::{SampleStream, SamplerKind};
+    use lumiris_numbers::math::{Bounds3, Rgb, Vec3};
+    use lumiris_numbers::samplers::{SampleStream, SamplerKind};
 
     fn points(intensities: &[f32]) -> LightSet {
         let mut builder = LightSetBuilder::default();

@@ -1,9 +1,9 @@
 //! How fast photons are traced, and how fast their maps are built and asked.
 
 use super::{RenderError, thread_pool};
-use crate::estimators::stats::median;
 use crate::photons::{GatherScratch, PhotonMap, Place, Search, Tracing, Want, trace_photons};
 use crate::scene::World;
+use lumiris_numbers::estimators::stats::median;
 use serde::Serialize;
 use std::hint::black_box;
 use std::time::Instant;

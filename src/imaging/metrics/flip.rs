@@ -7,9 +7,9 @@
 //! approximation (a x² + b x) / (c x² + d x + e) with the constants of the paper.
 
 use super::{Pixel, is_finite};
-use crate::estimators::stats::median;
 use crate::imaging::color::linear_to_srgb;
-use crate::math::Rgb;
+use lumiris_numbers::estimators::stats::median;
+use lumiris_numbers::math::Rgb;
 use nv_flip::FlipImageRgb8;
 use rayon::prelude::*;
 

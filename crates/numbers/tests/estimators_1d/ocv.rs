@@ -1,0 +1,307 @@
+//! Optimizing control variates and its relatives: bias, variance, scale, and what happens where something is missing.
+
+use super::integrals::run;
+use super::mixtures::{DEGENERATE, Density, Mixture, PROPER, Sampler};
+use super::{assert_means, assert_variances, level, oracle};
+use lumiris_numbers::estimators::mis::{Heuristic, Technique};
+use lumiris_numbers::estimators::ocv::{Form, System};
+use lumiris_numbers::estimators::stats::{Welford, z_test};
+use lumiris_numbers::estimators::{correlated, optimal_mis};
+use lumiris_numbers::math::hash::HashStream;
+
+const PROGRESSIVE: Form = Form::Progressive;
+
+/// Numbers of samples of a pass.
+const NUMBERS: [u32; 4] = [3, 8, 16, 64];
+
+/// Passes in a row, each with the coefficients of the one before: uncorrelated estimates, since each has the expectation
+/// ∫f whatever its coefficients are.
+fn chain(sampler: &Sampler, runs: usize, key: u32) -> [Welford; 3] {
+    let equations = sampler.equations;
+    let (mut sums, mut beta) = (vec![0.0; equations.len()], vec![0.0; equations.coefficients()]);
+    run(runs, [21, key, sampler.mixture as u32], |stream| {
+        sampler.block(PROGRESSIVE, 1, stream, &mut sums);
+        let estimate = equations.estimate(&sums, &beta);
+        assert_eq!(equations.solve(PROGRESSIVE.system(), &sums, &mut beta), 0, "all samples are finite");
+        estimate.map(f64::from)
+    })
+}
+
+/// Estimates of the first `passes` passes: MIS, and the progressive form.
+fn passes(sampler: &Sampler, passes: u32, stream: &mut HashStream) -> [[f64; 3]; 2] {
+    let equations = sampler.equations;
+    let (mut all, mut sums) = (vec![0.0; equations.len()], vec![0.0; equations.len()]);
+    let mut beta = vec![0.0; equations.coefficients()];
+    let mut total = [[0.0; 3]; 2];
+    for len in Sampler::blocks(passes) {
+        sampler.block(PROGRESSIVE, len, stream, &mut sums);
+        let block = [equations.mean(&sums), equations.estimate(&sums, &beta)];
+        for (total, block) in total.iter_mut().zip(block) {
+            (0..3).for_each(|i| total[i] += f64::from(block[i]) * f64::from(len) / f64::from(passes));
+        }
+        equations.merge(&mut all, &sums);
+        assert_eq!(equations.solve(PROGRESSIVE.system(), &all, &mut beta), 0, "all samples are finite");
+    }
+    total
+}
+
+/// Variances of both of [`passes`], by channel.
+fn variances(sampler: &Sampler, count: u32, runs: usize) -> [[f64; 3]; 2] {
+    let mut welford = [[Welford::new(); 3]; 2];
+    let mut stream = HashStream::new([22, count, sampler.mixture as u32]);
+    for _ in 0..runs {
+        for (welford, estimate) in welford.iter_mut().zip(passes(sampler, count, &mut stream)) {
+            welford.iter_mut().zip(estimate).for_each(|(w, e)| w.add(e));
+        }
+    }
+    welford.map(|form| form.map(|w| w.variance()))
+}
+
+/// Runs of a test, fewer where samples are many or it is no integral of the first rank.
+fn runs_of(mixture: Mixture) -> usize {
+    if mixture == Mixture::Table { 1_000_000 } else { 30_000 }
+}
+
+fn each_sampler(mixtures: &[Mixture], numbers: &[u32], mut test: impl FnMut(&Sampler, &str, [f64; 3])) {
+    for &mixture in mixtures {
+        let value = mixture.value();
+        for &n in numbers {
+            for stratified in [false, true] {
+                let name = format!("{mixture:?}, N = {n}{}", if stratified { ", stratified" } else { "" });
+                test(&Sampler::new(mixture, n, stratified), &name, value);
+            }
+        }
+    }
+}
+
+#[test]
+fn the_progressive_form_is_unbiased() {
+    each_sampler(&PROPER, &NUMBERS, |sampler, name, value| {
+        assert_means(name, &chain(sampler, runs_of(sampler.mixture), 0), value);
+    });
+}
+
+#[test]
+fn estimates_without_lights_with_too_many_components_and_of_nothing_are_finite_and_unbiased() {
+    each_sampler(&DEGENERATE, &[1, 2, 3, 8], |sampler, name, value| {
+        // A single sample may have a component that nothing else can take the place of.
+        if sampler.counts[0] > 0 {
+            let channels = chain(sampler, 50_000, 1);
+            assert!(channels.iter().all(|w| w.mean().is_finite() && w.variance().is_finite()), "{name}: {channels:?}");
+            assert_means(name, &channels, value);
+        }
+    });
+}
+
+/// Estimates of a form with the coefficients of the same samples, as it makes them.
+fn form_runs(form: Form, sampler: &Sampler, runs: usize) -> [Welford; 3] {
+    let (equations, rows) = (sampler.equations, form.rows());
+    let (mut sums, mut beta) = (vec![0.0; rows * equations.len()], vec![0.0; rows * equations.coefficients()]);
+    run(runs, [23, form as u32, sampler.mixture as u32], |stream| {
+        sums.chunks_exact_mut(equations.len()).for_each(|row| sampler.block(form, 1, stream, row));
+        equations.solve(form.system(), &sums, &mut beta);
+        form.estimate(equations, &sums, &beta, &sampler.integrals).map(f64::from)
+    })
+}
+
+#[test]
+fn the_crossfit_form_is_unbiased() {
+    // Halves of N = 8, 16, 64.
+    each_sampler(&PROPER, &[4, 8, 32], |sampler, name, value| {
+        assert_means(name, &form_runs(Form::Crossfit, sampler, runs_of(sampler.mixture)), value);
+    });
+}
+
+#[test]
+fn coefficients_of_the_same_samples_are_biased_in_both_other_forms() {
+    // What the tests above would see if a block were fitted to itself.
+    let sampler = Sampler::new(Mixture::Table, 8, false);
+    let value = Mixture::Table.value();
+    for form in [Form::Regression, Form::Paper] {
+        let [w, ..] = form_runs(form, &sampler, 300_000);
+        assert!(
+            z_test(w.mean(), value[0], w.standard_error()).p_value < level(),
+            "{form:?}: {} {}",
+            w.mean(),
+            value[0]
+        );
+    }
+}
+
+#[test]
+fn four_passes_have_at_most_the_variance_of_mis() {
+    each_sampler(&PROPER, &NUMBERS, |sampler, name, _| {
+        let runs = if sampler.mixture == Mixture::Optimal { 60_000 } else { 12_000 };
+        let [mis, ocv] = variances(sampler, 4, runs);
+        // Where strata leave next to nothing of the variance, coefficients that were fitted to the samples one by one may
+        // multiply it: what they add is small against the variance without strata.
+        let loose = if sampler.is_stratified {
+            variances(&Sampler::new(sampler.mixture, sampler.n, false), 4, 4_000)[0]
+        } else {
+            [0.0; 3]
+        };
+        for i in 0..3 {
+            assert!(ocv[i] <= 1.02 * mis[i] + 0.05 * loose[i], "{name}, channel {i}: {} of MIS", ocv[i] / mis[i]);
+        }
+        if sampler.mixture == Mixture::Occluded {
+            assert!(ocv[0] <= 0.75 * mis[0], "{name}: {} of MIS", ocv[0] / mis[0]);
+        }
+    });
+}
+
+/// Variance of the pass that follows `passes` over that of MIS.
+fn ratio_after(sampler: &Sampler, passes: u32, runs: usize) -> f64 {
+    let equations = sampler.equations;
+    let (mut all, mut sums) = (vec![0.0; equations.len()], vec![0.0; equations.len()]);
+    let mut beta = vec![0.0; equations.coefficients()];
+    let mut stream = HashStream::new([25, passes, sampler.mixture as u32]);
+    let (mut mis, mut ocv) = (Welford::new(), Welford::new());
+    for _ in 0..runs {
+        all.fill(0.0);
+        for len in Sampler::blocks(passes) {
+            sampler.block(PROGRESSIVE, len, &mut stream, &mut sums);
+            equations.merge(&mut all, &sums);
+        }
+        assert_eq!(equations.solve(PROGRESSIVE.system(), &all, &mut beta), 0, "all samples are finite");
+        sampler.block(PROGRESSIVE, 1, &mut stream, &mut sums);
+        mis.add(f64::from(equations.mean(&sums)[0]));
+        ocv.add(f64::from(equations.estimate(&sums, &beta)[0]));
+    }
+    ocv.variance() / mis.variance()
+}
+
+#[test]
+fn after_four_passes_the_variance_is_three_quarters_of_that_of_mis() {
+    // The optimum for N = 3 is 0.77: it has one sample of each component.
+    for n in [8, 16, 64] {
+        let ratio = ratio_after(&Sampler::new(Mixture::Table, n, false), 4, 12_000);
+        assert!(ratio <= 0.75, "N = {n}: {ratio}");
+    }
+    let ratio = ratio_after(&Sampler::new(Mixture::Occluded, 3, false), 4, 12_000);
+    assert!(ratio <= 0.75, "N = 3: {ratio}");
+}
+
+#[test]
+fn scaling_the_integrand_scales_the_estimate() {
+    let estimates = |scale: f64| {
+        let sampler = Sampler { scale, ..Sampler::new(Mixture::Colour, 8, true) };
+        let mut stream = HashStream::new([26, 0, 0]);
+        (0..200).map(|_| passes(&sampler, 16, &mut stream)[1]).collect::<Vec<_>>()
+    };
+    let one = estimates(1.0);
+    for (scale, tolerance) in [(1e-6, 1e-4), (1e6, 1e-4), (2.0_f64.powi(-20), 0.0), (2.0_f64.powi(20), 0.0)] {
+        for (one, scaled) in one.iter().flatten().zip(estimates(scale).iter().flatten()) {
+            assert!((scaled - scale * one).abs() <= tolerance * (scale * one).abs(), "{scale}: {one} {scaled}");
+        }
+    }
+}
+
+#[test]
+fn progressive_optimal_mis_is_unbiased() {
+    each_sampler(&PROPER[..6], &[3, 8, 16], |sampler, name, value| {
+        let equations = sampler.equations;
+        let mut sums = vec![0.0; equations.len()];
+        let mut alpha = vec![0.0; equations.coefficients()];
+        let channels = run(100_000, [27, 0, sampler.mixture as u32], |stream| {
+            sums.fill(0.0);
+            sampler.add(1, stream, &mut sums);
+            let estimate = optimal_mis::estimate(equations, &sums, &sampler.integrals, &alpha);
+            // Too few samples leave the balance heuristic.
+            let _ = optimal_mis::coefficients(equations, &sums, &mut alpha);
+            estimate.map(f64::from)
+        });
+        assert_means(name, &channels, value);
+    });
+}
+
+#[test]
+fn two_techniques_are_unbiased_with_every_heuristic() {
+    for heuristic in [Heuristic::Balance, Heuristic::Power, Heuristic::Maximum] {
+        each_sampler(&[Mixture::Peak, Mixture::OneLight], &[5, 16], |sampler, name, value| {
+            let channels = run(60_000, [28, heuristic as u32, sampler.mixture as u32], |stream| {
+                let mut sum = [0.0; 3];
+                sampler.points(1, stream, |point| {
+                    let technique = |j: usize| Technique { n: sampler.counts[j] as f32, p: point.pdfs[j] as f32 };
+                    let own = point.component;
+                    let factor = f64::from(heuristic.factor(technique(own), technique(1 - own)));
+                    let f = sampler.mixture.f(point.x);
+                    (0..3).for_each(|i| sum[i] += f[i] * factor);
+                });
+                sum
+            });
+            assert_means(&format!("{}: {name}", heuristic.name()), &channels, value);
+        });
+    }
+}
+
+#[test]
+fn correlated_sampling_has_the_variance_of_theory_and_no_bias_where_halves_are_fitted_to_each_other() {
+    // The lobe samples; the control is what would be reflected without the occluder.
+    let (density, mixture) = (Density::Tent, Mixture::Table);
+    let value = mixture.value();
+    let unshadowed = |x: f64| mixture.unshadowed(x);
+    const POINTS: u32 = 400_000;
+    let mut moments = [0.0; 5];
+    for k in 0..POINTS {
+        let x = density.sample((f64::from(k) + 0.5) / f64::from(POINTS));
+        let (y, g) = (mixture.f(x)[0] / density.pdf(x), unshadowed(x) / density.pdf(x));
+        for (m, v) in moments.iter_mut().zip([y, y * y, g, g * g, g * y]) {
+            *m += v / f64::from(POINTS);
+        }
+    }
+    let [y, yy, g, gg, gy] = moments;
+    let (variance, lambda) = (yy - y * y - (gy - g * y).powi(2) / (gg - g * g), (gy - g * y) / (gg - g * g));
+
+    const HALF: u32 = 32;
+    let fill = |stream: &mut HashStream, sums: &mut [f32; correlated::SUMS]| {
+        sums.fill(0.0);
+        for _ in 0..HALF {
+            let x = density.sample(f64::from(stream.next_f32()));
+            let p = density.pdf(x);
+            let control = (unshadowed(x) / p - g) as f32;
+            correlated::add(sums, [control, 0.5 * control, control], mixture.f(x).map(|f| (f / p) as f32));
+        }
+    };
+    let mut halves = [[0.0; correlated::SUMS]; 2];
+    let fixed = run(100_000, [29, 0, 0], |stream| {
+        fill(stream, &mut halves[0]);
+        let lambda = lambda as f32;
+        correlated::estimate(&halves[0], [lambda, 2.0 * lambda, lambda]).map(f64::from)
+    });
+    assert_means("correlated, fixed", &fixed, value);
+    assert_variances("correlated, fixed", &fixed, [variance / f64::from(HALF); 3]);
+    let fitted = run(100_000, [29, 1, 0], |stream| {
+        halves.iter_mut().for_each(|half| fill(stream, half));
+        correlated::crossfit([&halves[0], &halves[1]]).map(f64::from)
+    });
+    assert_means("correlated, crossfit", &fitted, value);
+    // A coefficient of n samples costs one part in n.
+    let ratio = fitted[0].variance() / (variance / f64::from(2 * HALF));
+    assert!((0.98..1.1).contains(&ratio), "{ratio}");
+}
+
+#[test]
+fn solutions_in_lanes_are_those_of_the_oracle() {
+    let nearly_none = System { ridge: 1e-3, ..System::SAME_SAMPLES };
+    for system in [System::OTHER_SAMPLES, System::SAME_SAMPLES, nearly_none, System::PAPER] {
+        for mixture in [Mixture::Table, Mixture::Colour, Mixture::Many, Mixture::Useless, Mixture::Zero] {
+            for n in [3, 8, 64] {
+                let sampler = Sampler::new(mixture, n, true);
+                let form = if system == System::PAPER { Form::Paper } else { PROGRESSIVE };
+                let (equations, mut stream) = (sampler.equations, HashStream::new([30, n, 0]));
+                let mut rows = vec![0.0; 21 * equations.len()];
+                rows.chunks_exact_mut(equations.len()).for_each(|row| sampler.block(form, 1, &mut stream, row));
+                let width = equations.coefficients();
+                let mut all = vec![7.0; 21 * width];
+                equations.solve(system, &rows, &mut all);
+                for (row, beta) in rows.chunks_exact(equations.len()).zip(all.chunks_exact(width)) {
+                    let expected: Vec<f32> = oracle::solve(equations, system, row).iter().map(|b| *b as f32).collect();
+                    let of = |beta: &[f32]| form.estimate(equations, row, beta, &sampler.integrals);
+                    for (a, b) in of(beta).iter().zip(of(&expected)) {
+                        assert!((a - b).abs() <= 2e-3 * (1.0 + b.abs()), "{mixture:?} {n} {system:?}: {a} {b}");
+                    }
+                }
+            }
+        }
+    }
+}
