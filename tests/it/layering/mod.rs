@@ -32,12 +32,11 @@ const LAYERS: &[&[&str]] = &[
 
 /// Modules of the arithmetic and what each may import.
 const NUMBERS: &[(&str, &[&str])] =
-    &[("math", &[]), ("estimators", &["math"]), ("simd", &["math"]), ("samplers", &["math"])];
+    &[("math", &[]), ("estimators", &["math", "simd"]), ("simd", &["math"]), ("samplers", &["math"])];
 
 /// Folders whose circles are left until their rebuilding.
 const CIRCLES_LEFT: &[&str] = &[
     "lumiris::direct",
-    "lumiris_numbers::estimators::ocv",
     "lumiris_formats::pbrt",
     "lumiris::accel::embree",
     "lumiris::import::pbrt",

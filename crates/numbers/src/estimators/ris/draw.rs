@@ -447,9 +447,9 @@ mod tests {
         /// One set with one draw is the same proposal in all ways of drawing.
         #[test]
         fn one_draw_is_the_same_in_all_ways(weights in weights(), u in 0.0_f32..1.0) {
-            let [a, b, c, d] = all_ways(&weights, 1, u);
+            let [a, b, c] = all_ways(&weights, 1, u);
             let same = |x: &[Draw], y: &[Draw]| x.len() == y.len() && x.iter().zip(y).all(|(x, y)| x.index.abs_diff(y.index) <= 1);
-            prop_assert!(same(&a, &b) && b == c && c == d);
+            prop_assert!(same(&a, &b) && b == c);
         }
     }
 }
