@@ -8,6 +8,7 @@ use lumiris::imaging::oiio::{self, Part};
 use lumiris::render::output::{self, Aov};
 use lumiris::render::{RenderSettings, Rendering, render};
 use lumiris::scene::World;
+use lumiris_formats::output::write_text;
 use serde_json::json;
 use std::path::{Path, PathBuf};
 use std::process::ExitCode;
@@ -42,7 +43,7 @@ pub fn run(args: &RenderArgs) -> anyhow::Result<ExitCode> {
     }
     if let Some(path) = &args.stats {
         let text = serde_json::to_string_pretty(&stats(args, &world, &rendering, setup))?;
-        std::fs::write(path, text).with_context(|| format!("cannot write {}", path.display()))?;
+        write_text(path, &text).with_context(|| format!("cannot write {}", path.display()))?;
     }
     report(args, &rendering, &outputs);
     let interrupted = stop.load(Ordering::Relaxed);
