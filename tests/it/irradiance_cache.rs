@@ -9,7 +9,6 @@ use lumiris::render::{RenderSettings, Rendering, render};
 use lumiris::scene::{AccelKind, Cached, EstimatorKind, IntegratorKind, Proposals, World};
 use lumiris_numbers::estimators::ocv::Form;
 use lumiris_numbers::estimators::stats::{sidak, t_test};
-use lumiris_numbers::math::Vec3;
 use lumiris_numbers::math::{Vec3, luminance};
 use std::path::Path;
 use std::sync::atomic::AtomicBool;
