@@ -12,10 +12,11 @@ use super::ShadePoint;
 use super::propose::Candidate;
 use crate::lights::{LightId, LightLanes, LightRun};
 use crate::scene::{ProposalPoints, Target, World};
+use lumiris_lanes::combine;
+use lumiris_lanes::curve;
 use lumiris_numbers::estimators::mis::Heuristic;
-use lumiris_numbers::estimators::ris::weights::{self, weight};
+use lumiris_numbers::estimators::ris::weight;
 use lumiris_numbers::math::hash::pcg4d;
-use lumiris_numbers::simd::{self, curve};
 
 /// Seed of the positions.
 const POSITIONS: u32 = 0x517c_c1b7;
@@ -231,7 +232,7 @@ impl Proposals {
         for run in self.runs.iter().filter(|run| world.scene.lights.lights[run.light as usize].is_delta()) {
             self.p_bsdf[start + run.places[0] as usize..start + run.places[1] as usize].fill(0.0);
         }
-        let proposals = weights::Proposals {
+        let proposals = combine::Proposals {
             f_cos: self.f_cos.each_ref().map(|a| &a[start..end]),
             li: self.li.each_ref().map(|a| &a[start..end]),
             p: &self.p_light[start..end],
@@ -240,12 +241,12 @@ impl Proposals {
             m_other: techniques.n_bsdf,
             heuristic: techniques.heuristic,
         };
-        let mut out = weights::Weights {
+        let mut out = combine::Weights {
             q_hat: &mut self.p_hat[start..end],
             r: &mut self.r[start..end],
             w: &mut self.weight[start..end],
         };
-        weights::combine(simd::level(), &proposals, &mut out);
+        combine::combine(lumiris_lanes::level(), &proposals, &mut out);
         match techniques.target {
             Target::Fgl | Target::Gvl => {}
             Target::Gv => {

@@ -5,7 +5,7 @@
 //! p_i = 0. The deterministic mixture is the balance heuristic.
 
 use super::mc;
-use crate::simd::lane::Number;
+use crate::math::number::Number;
 
 /// How the weights of techniques are chosen.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]

@@ -6,8 +6,8 @@ use std::ops::{Add, AddAssign, Div, Index, Mul, MulAssign, Sub};
 /// What red, green and blue add to the relative luminance: the Y row of the Rec.709 matrix [ITU-R BT.709].
 const WEIGHTS: [f64; 3] = [0.212_671, 0.715_160, 0.072_169];
 
-/// [`WEIGHTS`] for colours.
-pub(crate) const LUMINANCE: [f32; 3] = [WEIGHTS[0] as f32, WEIGHTS[1] as f32, WEIGHTS[2] as f32];
+/// What red, green and blue add to the luminance of a colour.
+pub const LUMINANCE: [f32; 3] = [WEIGHTS[0] as f32, WEIGHTS[1] as f32, WEIGHTS[2] as f32];
 
 /// Relative luminance of sums and means, which are f64.
 #[inline]

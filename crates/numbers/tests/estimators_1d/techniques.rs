@@ -2,11 +2,11 @@
 
 use super::integrals::{Integral, fill, run};
 use super::{assert_means, level};
+use lumiris_lanes::combine;
 use lumiris_numbers::estimators::mis::{Heuristic, Technique};
-use lumiris_numbers::estimators::ris::{systematic, weights, with_replacement};
+use lumiris_numbers::estimators::ris::{systematic, with_replacement};
 use lumiris_numbers::estimators::stats::{Welford, z_test};
 use lumiris_numbers::math::hash::HashStream;
-use lumiris_numbers::simd;
 
 const RUNS: usize = 500_000;
 const HEURISTICS: [Heuristic; 3] = [Heuristic::Balance, Heuristic::Power, Heuristic::Maximum];
@@ -58,7 +58,7 @@ impl Table {
         let ones = [1.0; (NUMBERS[0] + NUMBERS[1]) as usize];
         let first = NUMBERS[0] as usize;
         for (own, range) in [(0, 0..first), (1, first..self.x.len())] {
-            let proposals = weights::Proposals {
+            let proposals = combine::Proposals {
                 f_cos: self.colour.each_ref().map(|c| &c[range.clone()]),
                 li: [&ones[range.clone()]; 3],
                 p: &self.p[own][range.clone()],
@@ -67,12 +67,12 @@ impl Table {
                 m_other: m[1 - own],
                 heuristic,
             };
-            let mut out = weights::Weights {
+            let mut out = combine::Weights {
                 q_hat: &mut self.q_hat[range.clone()],
                 r: &mut self.r[range.clone()],
                 w: &mut self.weight[range.clone()],
             };
-            weights::combine(simd::level(), &proposals, &mut out);
+            combine::combine(lumiris_lanes::level(), &proposals, &mut out);
         }
     }
 }

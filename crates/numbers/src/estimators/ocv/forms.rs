@@ -1,6 +1,7 @@
 //! How β is found: what its columns are, which system it solves, and the estimate with it.
 
-use super::normal::{MAX_COMPONENTS, NormalEquations};
+use super::ldlt::MAX_COMPONENTS;
+use super::normal::NormalEquations;
 use super::solve::System;
 use crate::estimators::mc;
 

@@ -32,5 +32,6 @@ pub mod solve;
 
 pub use block::{Block, block_of};
 pub use forms::Form;
-pub use normal::{IllConditioned, MAX_COMPONENTS, NormalEquations};
+pub use ldlt::{IllConditioned, MAX_COMPONENTS};
+pub use normal::NormalEquations;
 pub use solve::{Matrix, System};

@@ -1,15 +1,9 @@
 //! The sums of the regression of y on the columns, and the estimate with β from them.
 
-/// Most components of one system.
-pub const MAX_COMPONENTS: usize = 8;
+use super::ldlt::MAX_COMPONENTS;
 
 /// Samples after which the sums stay as they are: the count would no longer be exact in f32.
 const MOST_SAMPLES: f32 = 16_777_216.0;
-
-/// A system that has no usable solution: something in it is not finite. The estimate is then that of β = 0, which is MIS.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, thiserror::Error)]
-#[error("the normal equations are ill-conditioned")]
-pub struct IllConditioned;
 
 /// Where the sums over samples lie in a slice of f32: Σ c_j c_k (k ≤ j, row by row), Σ c_j y (by column, then channel),
 /// Σ c_j, Σ y, Σ y², and the number of samples.

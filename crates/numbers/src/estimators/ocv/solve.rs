@@ -5,7 +5,8 @@
 //! Lanes are arrays, of whose loops the compiler makes vector code: the loops over columns are too many to be unrolled for every
 //! level of a dispatch.
 
-use super::normal::{MAX_COMPONENTS, NormalEquations};
+use super::ldlt::MAX_COMPONENTS;
+use super::normal::NormalEquations;
 use std::ops::{Add, AddAssign, Div, Mul, MulAssign, Sub, SubAssign};
 
 /// Points that are solved together.
@@ -226,11 +227,21 @@ fn solve_lanes(lanes: &Lanes<'_>, system: System) -> ([F; 3 * MAX_COMPONENTS], [
             x.0[p] = if ok[p] { x.0[p] } else { 0.0 };
         }
     }
+<<<<<<<< HEAD:crates/numbers/src/estimators/ocv/solve.rs
     let mut is_ill = factors.drops(&lanes.squares(system), &a);
     for p in 0..LANES {
         is_ill[p] |= !ok[p];
     }
     (x, is_ill)
+========
+    (x, ok)
+}
+
+/// Where Σ c_j y, Σ c_j and Σ y begin.
+pub fn offsets(m: usize) -> [usize; 3] {
+    let mixed = m * (m + 1) / 2;
+    [mixed, mixed + 3 * m, mixed + 4 * m]
+>>>>>>>> 5b348562ce83d17b7fa3f5d2ed4a23667da6e333:crates/lanes/src/ocv.rs
 }
 
 /// The lower triangle of a matrix.
@@ -350,13 +361,15 @@ impl Factors {
         rank - trace * ridge
     }
 }
+<<<<<<<< HEAD:crates/numbers/src/estimators/ocv/solve.rs
 
 #[cfg(test)]
 mod tests {
     use super::*;
     use crate::math::hash::HashStream;
-    use crate::simd::test_support::LENGTHS;
 
+    /// Numbers of points with and without full lanes.
+    const LENGTHS: [usize; 8] = [0, 1, 3, 7, 8, 9, 23, 32];
     const MATRICES: [Matrix; 3] = [Matrix::KnownMeans, Matrix::SampleMeans, Matrix::Intercept];
 
     /// Rows of sums of `n` samples each, whose columns `column` changes.
@@ -428,3 +441,5 @@ mod tests {
         assert_eq!(NormalEquations::new(0).solve(System::LEAST_SQUARES, &[0.0; 7], &mut []), 0);
     }
 }
+========
+>>>>>>>> 5b348562ce83d17b7fa3f5d2ed4a23667da6e333:crates/lanes/src/ocv.rs

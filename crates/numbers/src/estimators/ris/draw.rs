@@ -13,6 +13,7 @@
 //! give equal bits, and a probability is off by about 1e-7 of its block's, which is the step of a uniform f32.
 
 use crate::math::ONE_MINUS_EPSILON;
+use crate::math::number::Number;
 
 /// A drawn proposal. The estimate is Σ scale·c_index, scale = 1/E[number of times that it is drawn].
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -33,6 +34,12 @@ const CELLS: usize = 64;
 const DOWN: f32 = 1.0 / 1024.0;
 
 type Block = [f32; BLOCK];
+
+/// The weight q̂·r of a proposal, or of several; 0 if that is not finite.
+#[inline(always)]
+pub fn weight<N: Number>(q_hat: N, r: N) -> N {
+    (q_hat * r).or_zero_if_not_finite()
+}
 
 /// The weight that counts: 0 for NaN, infinite and negative weights.
 #[inline(always)]

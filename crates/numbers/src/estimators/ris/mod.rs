@@ -2,7 +2,7 @@
 //! [Talbot et al. 2005; Talbot 2005].
 //!
 //! RIS is an unbiased subsampling of a Monte Carlo sum. M proposals x_j of density p give ∫f as Σ c_j with
-//! c_j = f(x_j)·r_j and r_j = 1/(M p(x_j)); proposals of several techniques have r_j = wᵢ/(mᵢ pᵢ) ([`weights`]).
+//! c_j = f(x_j)·r_j and r_j = 1/(M p(x_j)); proposals of several techniques have r_j = wᵢ/(mᵢ pᵢ) (thesis 4.6.1).
 //! The weight of a proposal is w_j = q̂(x_j)·r_j, where the target q̂ resembles f but is cheap (f without visibility,
 //! say), so that S = Σ w_j estimates ∫q̂. A drawn proposal j stands for the ones that were not drawn:
 //!
@@ -15,7 +15,6 @@
 //!
 //! | module | what | source |
 //! |---|---|---|
-//! | [`weights`] | q̂, r and w of many proposals of two techniques | thesis 4.6.1 |
 //! | [`draw`] | N of M by weight: with replacement, systematic, one per stratum or set | thesis (4.1), (4.5); paper (1) |
 //! | [`reservoir`] | one of a stream | [Chao 1982] |
 //! | [`strata`] | the strata: equal counts or equal weights | thesis 4.5.2.1, 4.5.2.2 |
@@ -25,7 +24,6 @@ pub mod choice;
 pub mod draw;
 pub mod reservoir;
 pub mod strata;
-pub mod weights;
 
-pub use draw::{Draw, stratified, systematic, with_replacement};
+pub use draw::{Draw, stratified, systematic, weight, with_replacement};
 pub use reservoir::Reservoir;

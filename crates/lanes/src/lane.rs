@@ -1,7 +1,8 @@
 //! Vectors of lanes: loads and stores with padding, directions by component, and elementary functions.
 
-use crate::math::{Frame, Mat3, Vec3};
 use fearless_simd::{Simd, prelude::*};
+use lumiris_numbers::math::number::Number;
+use lumiris_numbers::math::{Frame, Mat3, Vec3};
 use std::f32::consts::{FRAC_PI_2, TAU};
 use std::ops::{Add, Div, Mul};
 
@@ -41,89 +42,66 @@ pub fn padded(from: &[f32]) -> [f32; LANES] {
     to
 }
 
-/// A number of one sample or of a vector of them: what a single sample and a kernel both need is written once over it. NaN
-/// compares as false.
-pub trait Number: Copy + Add<Output = Self> + Mul<Output = Self> + Div<Output = Self> {
-    /// `v`, in all lanes.
-    fn constant(self, v: f32) -> Self;
+/// Lanes as a [`Number`], for formulas that kernels and single samples share.
+#[derive(Clone, Copy)]
+pub struct Wide<S: Simd>(pub F<S>);
 
-    /// The smaller of both.
-    fn lesser(self, other: Self) -> Self;
-
-    /// The larger of both.
-    fn greater(self, other: Self) -> Self;
-
-    /// `yes` where `self > bound`, else `no`.
-    fn if_above(self, bound: Self, yes: Self, no: Self) -> Self;
-
-    /// `yes` where `self ≥ bound`, else `no`.
-    fn if_at_least(self, bound: Self, yes: Self, no: Self) -> Self;
-
-    /// 0 where it is infinite or NaN.
-    fn or_zero_if_not_finite(self) -> Self;
-}
-
-impl Number for f32 {
-    #[inline(always)]
-    fn constant(self, v: f32) -> f32 {
-        v
-    }
+impl<S: Simd> Add for Wide<S> {
+    type Output = Self;
 
     #[inline(always)]
-    fn lesser(self, other: f32) -> f32 {
-        self.min(other)
-    }
-
-    #[inline(always)]
-    fn greater(self, other: f32) -> f32 {
-        self.max(other)
-    }
-
-    #[inline(always)]
-    fn if_above(self, bound: f32, yes: f32, no: f32) -> f32 {
-        if self > bound { yes } else { no }
-    }
-
-    #[inline(always)]
-    fn if_at_least(self, bound: f32, yes: f32, no: f32) -> f32 {
-        if self >= bound { yes } else { no }
-    }
-
-    #[inline(always)]
-    fn or_zero_if_not_finite(self) -> f32 {
-        if self.is_finite() { self } else { 0.0 }
+    fn add(self, other: Self) -> Self {
+        Wide(self.0 + other.0)
     }
 }
 
-impl<S: Simd> Number for F<S> {
+impl<S: Simd> Mul for Wide<S> {
+    type Output = Self;
+
+    #[inline(always)]
+    fn mul(self, other: Self) -> Self {
+        Wide(self.0 * other.0)
+    }
+}
+
+impl<S: Simd> Div for Wide<S> {
+    type Output = Self;
+
+    #[inline(always)]
+    fn div(self, other: Self) -> Self {
+        Wide(self.0 / other.0)
+    }
+}
+
+impl<S: Simd> Number for Wide<S> {
     #[inline(always)]
     fn constant(self, v: f32) -> Self {
-        F::splat(self.token(), v)
+        Wide(F::splat(self.0.token(), v))
     }
 
     #[inline(always)]
     fn lesser(self, other: Self) -> Self {
-        self.min(other)
+        Wide(self.0.min(other.0))
     }
 
     #[inline(always)]
     fn greater(self, other: Self) -> Self {
-        self.max(other)
+        Wide(self.0.max(other.0))
     }
 
     #[inline(always)]
     fn if_above(self, bound: Self, yes: Self, no: Self) -> Self {
-        self.simd_gt(bound).select(yes, no)
+        Wide(self.0.simd_gt(bound.0).select(yes.0, no.0))
     }
 
     #[inline(always)]
     fn if_at_least(self, bound: Self, yes: Self, no: Self) -> Self {
-        self.simd_ge(bound).select(yes, no)
+        Wide(self.0.simd_ge(bound.0).select(yes.0, no.0))
     }
 
     #[inline(always)]
     fn or_zero_if_not_finite(self) -> Self {
-        or_zero(self.is_finite(), self)
+        Wide(or_zero(self.0.is_finite(), self.0))
     }
 }
 
@@ -265,68 +243,4 @@ pub fn exp<S: Simd>(x: F<S>) -> F<S> {
         (((((r * (1.0 / 720.0) + 1.0 / 120.0) * r + 1.0 / 24.0) * r + 1.0 / 6.0) * r + 0.5) * r + 1.0) * r + 1.0;
     let exponent: I<S> = (powers.to_int::<I<S>>() + 127) << 23;
     or_zero(x.simd_gt(F::splat(simd, -86.0)), series * exponent.bitcast::<F<S>>())
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-    use crate::simd::test_support::assert_same_bits;
-    use fearless_simd::dispatch;
-
-    #[inline(always)]
-    fn run<S: Simd>(simd: S, t: &[f32], [s, c, qs, qc]: [&mut [f32]; 4]) {
-        for i in (0..t.len()).step_by(LANES) {
-            let i = begin(i, t.len());
-            let v = load(simd, t, i);
-            let (sin, cos) = sin_cos_turns(v);
-            store(sin, s, i);
-            store(cos, c, i);
-            let (sin, cos) = sin_cos_quadrant(v.min(1.0).max(-1.0));
-            store(sin, qs, i);
-            store(cos, qc, i);
-        }
-    }
-
-    #[test]
-    fn sines_and_cosines_are_accurate_and_the_same_at_all_levels() {
-        for n in [8, 9, 31, 4000] {
-            let t: Vec<f32> = (0..n).map(|i| i as f32 / 1000.0 - 1.5).collect();
-            assert_same_bits::<4>(n, |level, out| {
-                let [s, c, qs, qc] = out;
-                dispatch!(level, simd => run(simd, &t, [&mut *s, &mut *c, &mut *qs, &mut *qc]));
-                for i in 0..n {
-                    let (sin, cos) = (f64::from(t[i]) * std::f64::consts::TAU).sin_cos();
-                    assert!(
-                        (f64::from(s[i]) - sin).abs() < 1.3e-7 && (f64::from(c[i]) - cos).abs() < 1.3e-7,
-                        "{}",
-                        t[i]
-                    );
-                    let a = f64::from(t[i].clamp(-1.0, 1.0));
-                    let (sin, cos) = ((a + 1.0) * std::f64::consts::FRAC_PI_4).sin_cos();
-                    assert!((f64::from(qs[i]) - sin).abs() < 2e-7 && (f64::from(qc[i]) - cos).abs() < 2e-7, "{}", t[i]);
-                }
-            });
-        }
-    }
-
-    #[inline(always)]
-    fn run_exp<S: Simd>(simd: S, x: &[f32], out: &mut [f32]) {
-        for i in (0..x.len()).step_by(LANES) {
-            let i = begin(i, x.len());
-            store(exp(load(simd, x, i)), out, i);
-        }
-    }
-
-    #[test]
-    fn exponentials_are_accurate_and_the_same_at_all_levels() {
-        let x: Vec<f32> = (0..4000).map(|i| i as f32 * -0.0231).chain([f32::NEG_INFINITY, f32::NAN]).collect();
-        assert_same_bits::<1>(x.len(), |level, [out]| {
-            dispatch!(level, simd => run_exp(simd, &x, &mut *out));
-            for i in 0..4000 {
-                let expected = f64::from(x[i]).exp();
-                assert!((f64::from(out[i]) - expected).abs() <= 2.4e-7 * expected || x[i] < -85.9 && out[i] == 0.0);
-            }
-            assert!(out[4000] == 0.0 && out[4001] == 0.0);
-        });
-    }
 }
