@@ -76,4 +76,3 @@ fn combine_lanes<S: Simd>(simd: S, proposals: &Proposals<'_>, out: &mut Weights<
         store(weight(Wide(q_hat), Wide(r)).0, out.w, i);
     }
 }
-<<<<<<<< HEAD:crates/numbers/src/estimators/ris/weights.rs

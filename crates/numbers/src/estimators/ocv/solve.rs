@@ -227,21 +227,11 @@ fn solve_lanes(lanes: &Lanes<'_>, system: System) -> ([F; 3 * MAX_COMPONENTS], [
             x.0[p] = if ok[p] { x.0[p] } else { 0.0 };
         }
     }
-<<<<<<<< HEAD:crates/numbers/src/estimators/ocv/solve.rs
     let mut is_ill = factors.drops(&lanes.squares(system), &a);
     for p in 0..LANES {
         is_ill[p] |= !ok[p];
     }
     (x, is_ill)
-========
-    (x, ok)
-}
-
-/// Where Σ c_j y, Σ c_j and Σ y begin.
-pub fn offsets(m: usize) -> [usize; 3] {
-    let mixed = m * (m + 1) / 2;
-    [mixed, mixed + 3 * m, mixed + 4 * m]
->>>>>>>> 5b348562ce83d17b7fa3f5d2ed4a23667da6e333:crates/lanes/src/ocv.rs
 }
 
 /// The lower triangle of a matrix.
@@ -361,7 +351,6 @@ impl Factors {
         rank - trace * ridge
     }
 }
-<<<<<<<< HEAD:crates/numbers/src/estimators/ocv/solve.rs
 
 #[cfg(test)]
 mod tests {
@@ -441,5 +430,3 @@ mod tests {
         assert_eq!(NormalEquations::new(0).solve(System::LEAST_SQUARES, &[0.0; 7], &mut []), 0);
     }
 }
-========
->>>>>>>> 5b348562ce83d17b7fa3f5d2ed4a23667da6e333:crates/lanes/src/ocv.rs
