@@ -334,9 +334,12 @@ impl Sampler {
     /// Adds a block of `passes` to `sums`, whose columns are r_j.
     pub fn add(&self, passes: u32, stream: &mut HashStream, sums: &mut [f32]) {
         self.points(passes, stream, |point| {
-            let columns = self.columns(point);
-            let there: Vec<(usize, f32)> = columns.into_iter().enumerate().filter(|(_, c)| *c > 0.0).collect();
-            self.equations.add_sparse(sums, &there, self.y(point));
+            let (columns, mut there, mut count) = (self.columns(point), [(0, 0.0); MAX_COMPONENTS], 0);
+            for (j, c) in columns.into_iter().enumerate().filter(|(_, c)| *c > 0.0) {
+                there[count] = (j, c);
+                count += 1;
+            }
+            self.equations.add_sparse(sums, &there[..count], self.y(point));
         });
     }
 
