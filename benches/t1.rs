@@ -11,8 +11,9 @@ use lumiris::geometry::{Quadric, QuadricKind, Shape, TriangleMesh};
 use lumiris::lights::{Emission, EnvironmentFilter, EnvironmentMap, EnvironmentMapping, area_lights_of};
 use lumiris::lights::{Light, LightCtx, LightLanes};
 use lumiris::materials::surface::SurfaceBsdf;
-use lumiris_lanes::combine::{Proposals, Weighting, Weights, combine};
+use lumiris_lanes::combine::{Proposals, Weights, combine};
 use lumiris_lanes::curve::{hilbert_points, hilbert_points_scalar, strata, strata_scalar};
+use lumiris_numbers::estimators::mis::Heuristic;
 use lumiris_numbers::math::hash::{HashStream, pcg4d};
 use lumiris_numbers::math::warp::sample_uniform_sphere;
 use lumiris_numbers::math::{Affine3A, Frame, Rgb, Vec3};
@@ -221,7 +222,7 @@ fn kernels(m: usize) {
         let [a, b, c, d, e, f, q_hat, r, w] = rest else { unreachable!("there are nine") };
         let (f_cos, li) = ([&a[..], b, c], [&d[..], e, f]);
         let proposals =
-            Proposals { f_cos, li, p: u0, p_other: u1, m: m as f32, m_other: 1.0, weighting: Weighting::Power };
+            Proposals { f_cos, li, p: u0, p_other: u1, m: m as f32, m_other: 1.0, heuristic: Heuristic::Power };
         let mut out = Weights { q_hat, r, w };
         let lanes = time(m, |_| combine(lumiris_lanes::level(), black_box(&proposals), &mut out));
         let single = time(m, |_| combine(lumiris_lanes::Level::baseline(), black_box(&proposals), &mut out));

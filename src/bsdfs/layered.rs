@@ -15,6 +15,7 @@
 use super::dielectric::{Dielectric, Select, Transport};
 use super::fresnel::{fr_conductor, fr_dielectric, reflect};
 use super::{BsdfSample, Conductor, Diffuse, Lobe, TrowbridgeReitz};
+use lumiris_numbers::estimators::mis::{Heuristic, Technique};
 use lumiris_numbers::math::hash::{HashStream, hash_floats};
 use lumiris_numbers::math::{Frame, Rgb, Vec3, safe_sqrt, sqr, warp};
 use std::f32::consts::{PI, TAU};
@@ -308,7 +309,7 @@ impl Walk<'_> {
     fn connect_exit(&mut self, z: f32, event: impl Fn(Vec3) -> (Rgb, f32)) {
         let Some(exit) = &self.exit else { return };
         let (value, pdf) = event(-exit.wi);
-        let weight = if self.layer.top.is_specular() { 1.0 } else { power_heuristic(exit.pdf, pdf) };
+        let weight = if self.layer.top.is_specular() { 1.0 } else { power_weight(exit.pdf, pdf) };
         let transmittance = Layered::transmittance(self.layer.thickness - z, exit.wi);
         self.f += self.beta * value * exit.f * (transmittance * weight / exit.pdf);
     }
@@ -350,7 +351,7 @@ impl Walk<'_> {
         let f = self.layer.top.value(-w, self.wi, Transport::Radiance);
         if f > 0.0 {
             let exit_pdf = self.layer.top.pdf_select(self.wi, -w, Select::Transmission);
-            let weight = pdf.map_or(1.0, |pdf| power_heuristic(pdf, exit_pdf));
+            let weight = pdf.map_or(1.0, |pdf| power_weight(pdf, exit_pdf));
             self.f += self.beta * (f * weight * Layered::transmittance(self.layer.thickness - z, w));
         }
     }
@@ -392,14 +393,11 @@ impl Walk<'_> {
     }
 }
 
-/// Weight of a sample of density `a` against a technique of density `b`, exponent 2 [Veach 1997].
+/// Weight of a sample of density `a` against a technique of density `b`, one sample of each.
 #[inline]
-fn power_heuristic(a: f32, b: f32) -> f32 {
-    if a.is_infinite() {
-        return 1.0;
-    }
-    // The ratio form cannot overflow.
-    1.0 / (1.0 + sqr(b / a))
+fn power_weight(a: f32, b: f32) -> f32 {
+    let [a, b] = [a, b].map(|p| Technique { n: 1.0, p });
+    Heuristic::Power.weight(a, b)
 }
 
 /// Phase function (1/sr) of the cosine between two directions that both point away from the event.

@@ -12,6 +12,7 @@
 //! same measure; stochastic values (layered BSDFs) do as well, f being the value that came with the sample.
 
 use super::{Bsdf, Lobe};
+use lumiris_numbers::estimators::ris::Reservoir;
 use lumiris_numbers::math::{Rgb, Vec3};
 
 /// A resampled direction. The weight of the path is `f·|cos θi|·weight` for all lobes.
@@ -39,27 +40,14 @@ pub fn resample(
     u_choice: f32,
 ) -> Option<Resampled> {
     let proposals = proposals.max(1);
-    let (mut chosen, mut sum) = (None, 0.0_f64);
-    // One number serves for all choices: what is left of it after each is uniform again.
-    let mut u = f64::from(u_choice);
+    let mut reservoir = Reservoir::new(u_choice);
     for j in 0..proposals {
         let [uc, u0, u1] = u_proposal(j);
         let Some(s) = bsdf.sample(wo, uc, [u0, u1]) else { continue };
         let p_hat = s.f.luminance() * s.wi.z.abs();
-        let w = f64::from(p_hat / s.pdf);
-        if !(w > 0.0 && w.is_finite()) {
-            continue;
-        }
-        sum += w;
-        let p_take = w / sum;
-        if u < p_take {
-            chosen = Some((s, p_hat));
-            u /= p_take;
-        } else {
-            u = (u - p_take) / (1.0 - p_take);
-        }
+        reservoir.offer((s, p_hat), p_hat / s.pdf);
     }
-    let (s, p_hat) = chosen?;
+    let ((s, p_hat), sum) = reservoir.into_kept()?;
     let weight = (sum / (f64::from(proposals) * f64::from(p_hat))) as f32;
     weight.is_finite().then_some(Resampled { f: s.f, wi: s.wi, weight, lobe: s.lobe, eta: s.eta })
 }

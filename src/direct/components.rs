@@ -11,9 +11,7 @@ use super::visibility::{Segments, is_traced};
 use crate::accel::RayBatch;
 use crate::scene::RenderJob;
 use crate::settings::{EstimatorKind, IntegratorSettings, OptimalForm, Split};
-use lumiris_lanes::ocv::{Matrix, System};
-use lumiris_numbers::estimators::ocv::forms::PAPER_LAMBDA;
-use lumiris_numbers::estimators::ocv::{Form, NormalEquations, Penalty};
+use lumiris_numbers::estimators::ocv::{Form, NormalEquations, System};
 use lumiris_numbers::estimators::optimal_mis;
 use lumiris_numbers::math::Rgb;
 
@@ -42,22 +40,27 @@ impl Method {
         }
     }
 
-    /// The systems that are solved for each point, or each half of one.
-    fn matrix(self) -> Option<(Matrix, Penalty)> {
+    /// The system that is solved for each row of sums.
+    fn system(self) -> Option<System> {
         match self {
-            Method::Ocv(Form::Paper) => Some((Matrix::Intercept, Penalty { ridge: PAPER_LAMBDA, ..Penalty::NONE })),
-            Method::Ocv(Form::Regression) => Some((Matrix::SampleMeans, Penalty::SAME_SAMPLES)),
-            Method::Ocv(Form::Crossfit) => Some((Matrix::KnownMeans, Penalty::default())),
+            Method::Ocv(form @ (Form::Paper | Form::Regression | Form::Crossfit)) => Some(form.system()),
             Method::Ocv(Form::Progressive) | Method::Optimal(_) => None,
+        }
+    }
+
+    /// How many rows of sums an estimate has.
+    fn rows(self) -> usize {
+        match self {
+            Method::Ocv(form) => form.rows(),
+            Method::Optimal(_) => 1,
         }
     }
 
     /// Makes sums of the method's columns of those of r_j.
     fn finish(self, equations: NormalEquations, sums: &mut [f32], integrals: &Columns) {
         match self {
-            Method::Ocv(Form::Paper) => equations.scale(sums, &integrals.map(|i| if i > 0.0 { 1.0 / i } else { 1.0 })),
+            Method::Ocv(form) => form.finish(equations, sums, integrals),
             Method::Optimal(_) => {}
-            Method::Ocv(Form::Progressive | Form::Regression | Form::Crossfit) => equations.centre(sums, integrals),
         }
     }
 }
@@ -100,16 +103,16 @@ impl Fits {
         self.sums.is_empty()
     }
 
-    /// Begins a block. Returns the number of fits whose system has no solution; their estimates are those of MIS.
+    /// Begins a block. Returns the number of fits whose system is ill-conditioned; without a solution, estimates are those of MIS.
     pub fn solve(&mut self) -> u64 {
         if !self.is_optimal {
-            return solve_all(self.equations, Penalty::default(), &self.sums, &mut self.beta);
+            return self.equations.solve(Form::Progressive.system(), &self.sums, &mut self.beta) as u64;
         }
         let betas = self.beta.chunks_mut(self.equations.coefficients().max(1));
         let fits = self.sums.chunks(self.equations.len()).zip(betas);
         // Pixels that met no surface have nothing to solve
         let lit = fits.filter(|(sums, _)| self.equations.samples(sums) > 0.0);
-        lit.map(|(sums, beta)| u64::from(optimal_mis::coefficients(self.equations, sums, beta).is_err())).sum()
+        lit.map(|(sums, beta)| u64::from(optimal_mis::coefficients(self.equations, sums, beta) != Ok(0))).sum()
     }
 
     fn beta(&self, fit: u32) -> &[f32] {
@@ -123,34 +126,6 @@ impl Fits {
     }
 }
 
-/// Coefficients of many systems, some at a time; 0 where there is no solution. Returns how many those are.
-fn solve_all(equations: NormalEquations, penalty: Penalty, sums: &[f32], beta: &mut [f32]) -> u64 {
-    let matrix = if penalty.known_means { Matrix::KnownMeans } else { Matrix::SampleMeans };
-    solve_matrices(equations, (matrix, penalty), sums, beta)
-}
-
-fn solve_matrices(
-    equations: NormalEquations,
-    (matrix, penalty): (Matrix, Penalty),
-    sums: &[f32],
-    beta: &mut [f32],
-) -> u64 {
-    let Penalty { ridge, shrink, .. } = penalty;
-    let system = System { columns: equations.components(), matrix, ridge, shrink };
-    lumiris_lanes::ocv::solve(&system, sums, beta) as u64
-}
-
-/// β₀ + Σ β_j of the components that are there [Fan et al. 2006, Eq. 10]; the last unknown is β₀. The mean of y if there is no
-/// solution, whose coefficients are 0.
-fn paper_estimate(equations: NormalEquations, sums: &[f32], beta: &[f32], integrals: &Columns) -> [f32; 3] {
-    let last = equations.components().saturating_sub(1);
-    if beta.iter().all(|b| *b == 0.0) {
-        return equations.mean(sums);
-    }
-    let is_there = |j: usize| j == last || integrals[j] > 0.0;
-    [0, 1, 2].map(|c| (0..=last).filter(|&j| is_there(j)).map(|j| beta[3 * j + c]).sum())
-}
-
 /// The stage's buffers.
 #[derive(Debug, Default)]
 pub struct Components {
@@ -162,7 +137,7 @@ pub struct Components {
     beta: Vec<f32>,
     /// Systems that were to be solved.
     pub systems: u64,
-    /// Those without solution, whose estimates are those of MIS.
+    /// Those without solution, whose estimates are those of MIS, and those whose columns were dropped.
     pub ill_conditioned: u64,
     /// Rays traced among emitters to find out what hides behind one.
     pub emitter_rays: u64,
@@ -197,44 +172,41 @@ impl Components {
         self.gather(equations, method, candidates, contributions);
 
         // β of the forms that have it from these samples
+        let (len, width) = (equations.len(), equations.coefficients());
         self.beta.clear();
-        if let Some(kind) = method.matrix() {
-            self.beta.resize(self.sums.len() / equations.len() * equations.coefficients(), 0.0);
-            self.ill_conditioned = solve_matrices(equations, kind, &self.sums, &mut self.beta);
-            self.systems = (self.sums.len() / equations.len()) as u64;
+        if let Some(system) = method.system() {
+            self.systems = (self.sums.len() / len) as u64;
+            self.beta.resize(self.systems as usize * width, 0.0);
+            self.ill_conditioned = equations.solve(system, &self.sums, &mut self.beta) as u64;
         }
 
-        let (len, width) = (equations.len(), equations.coefficients());
-        let sums = |i: usize| &self.sums[i * len..][..len];
-        let beta = |i: usize| &self.beta[i * width..][..width];
+        let rows = method.rows();
         for (i, out) in out.iter_mut().enumerate() {
-            let integrals = || &candidates.mixtures[i].integrals;
+            let sums = &self.sums[i * rows * len..][..rows * len];
+            let integrals = &candidates.mixtures[i * rows].integrals;
             let estimate = match method {
                 Method::Ocv(Form::Progressive) | Method::Optimal(OptimalForm::Progressive) if fits.is_empty() => {
-                    equations.mean(sums(i))
+                    equations.mean(sums)
                 }
-                Method::Ocv(Form::Progressive) => equations.estimate(sums(i), fits.beta(points[i].fit)),
+                Method::Ocv(Form::Progressive) => {
+                    Form::Progressive.estimate(equations, sums, fits.beta(points[i].fit), integrals)
+                }
+                Method::Ocv(form) => {
+                    let beta = &self.beta[i * rows * width..][..rows * width];
+                    form.estimate(equations, sums, beta, integrals)
+                }
                 Method::Optimal(OptimalForm::Progressive) => {
-                    optimal_mis::estimate(equations, sums(i), integrals(), fits.beta(points[i].fit))
+                    optimal_mis::estimate(equations, sums, integrals, fits.beta(points[i].fit))
                 }
                 Method::Optimal(OptimalForm::Direct) => {
-                    let outcome = optimal_mis::direct(equations, sums(i), integrals());
+                    let outcome = optimal_mis::direct(equations, sums, integrals);
                     self.systems += 1;
-                    self.ill_conditioned += u64::from(outcome.ill_conditioned);
+                    self.ill_conditioned += u64::from(outcome.is_ill_conditioned);
                     outcome.estimate
                 }
-                Method::Ocv(Form::Crossfit) => {
-                    // Each half with the coefficients of the other, by their numbers of samples
-                    let [a, b] = [2 * i, 2 * i + 1];
-                    let [of_a, of_b] = [equations.estimate(sums(a), beta(b)), equations.estimate(sums(b), beta(a))];
-                    let [n, m] = [a, b].map(|i| equations.samples(sums(i)));
-                    if n + m > 0.0 { [0, 1, 2].map(|c| (n * of_a[c] + m * of_b[c]) / (n + m)) } else { [0.0; 3] }
-                }
-                Method::Ocv(Form::Regression) => equations.estimate(sums(i), beta(i)),
-                Method::Ocv(Form::Paper) => paper_estimate(equations, sums(i), beta(i), integrals()),
             };
             if !fits.is_empty() {
-                fits.add(points[i].fit, sums(i));
+                fits.add(points[i].fit, sums);
             }
             let [r, g, b] = estimate;
             *out = Rgb::new(r, g, b);

@@ -18,6 +18,7 @@ use super::ShadePoint;
 use super::propose::{Candidate, Shares, domain, light_candidate, unshadowed_candidate};
 use crate::lights::{Light, LightCtx, LightId, LightSample, LightSampling, LightSet};
 use crate::scene::RenderJob;
+use lumiris_numbers::math::cumulative;
 use std::f32::consts::PI;
 
 /// Most lights that are put in order at a point.
@@ -134,9 +135,8 @@ impl Contributing {
         let total = self.counts.last().copied().unwrap_or(0) as f32;
         for i in 0..n {
             let [u_choice, u0, u1] = at.point.stream.split(domain::LIGHT, n, i).draw::<3>();
-            let k = self.counts.partition_point(|&sum| sum as f32 <= u_choice * total).min(self.seen.len() - 1);
-            let before = if k > 0 { self.counts[k - 1] as f32 } else { 0.0 };
-            let pmf = (self.counts[k] as f32 - before) / total;
+            let k = cumulative::find(&self.counts, u_choice * total).min(self.seen.len() - 1);
+            let pmf = cumulative::weight(&self.counts, k) / total;
             records.extend(at.sample(self.seen[k].0, pmf, n, [u0, u1]));
         }
         n

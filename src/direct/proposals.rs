@@ -13,9 +13,10 @@ use super::propose::Candidate;
 use crate::lights::{LightId, LightLanes, LightRun};
 use crate::scene::RenderJob;
 use crate::settings::{ProposalPoints, Target};
-use lumiris_lanes::combine::{self, Weighting};
+use lumiris_lanes::combine;
 use lumiris_lanes::curve;
 use lumiris_numbers::estimators::mis::Heuristic;
+use lumiris_numbers::estimators::ris::weight;
 use lumiris_numbers::math::hash::pcg4d;
 
 /// Seed of the positions.
@@ -239,18 +240,14 @@ impl Proposals {
             p_other: &self.p_bsdf[start..end],
             m: techniques.n_light,
             m_other: techniques.n_bsdf,
-            weighting: match techniques.heuristic {
-                Heuristic::Balance => Weighting::Balance,
-                Heuristic::Power => Weighting::Power,
-                Heuristic::Maximum => Weighting::Maximum,
-            },
+            heuristic: techniques.heuristic,
         };
-        let mut weights = combine::Weights {
+        let mut out = combine::Weights {
             q_hat: &mut self.p_hat[start..end],
             r: &mut self.r[start..end],
             w: &mut self.weight[start..end],
         };
-        combine::combine(lumiris_lanes::level(), &proposals, &mut weights);
+        combine::combine(lumiris_lanes::level(), &proposals, &mut out);
         match techniques.target {
             Target::Fgl | Target::Gvl => {}
             Target::Gv => {
@@ -270,11 +267,4 @@ impl Proposals {
             }
         }
     }
-}
-
-/// q̂·r; 0 if it is no finite number.
-#[inline]
-fn weight(p_hat: f32, r: f32) -> f32 {
-    let weight = p_hat * r;
-    if weight.is_finite() { weight } else { 0.0 }
 }

@@ -98,8 +98,8 @@ impl Candidate {
         match self.drawn {
             Drawn::DeltaLight => mc::weight(light.n, light.p),
             Drawn::DeltaBsdf => mc::weight(bsdf.n, bsdf.p),
-            Drawn::Light => heuristic.weight(light, bsdf) * mc::weight(light.n, light.p),
-            Drawn::Bsdf => heuristic.weight(bsdf, light) * mc::weight(bsdf.n, bsdf.p),
+            Drawn::Light => heuristic.factor(light, bsdf),
+            Drawn::Bsdf => heuristic.factor(bsdf, light),
         }
     }
 }

@@ -5,7 +5,7 @@
 
 pub mod filter;
 
-use lumiris_numbers::math::{Rgb, Vec3};
+use lumiris_numbers::math::{Rgb, Vec3, luminance};
 
 /// What one camera sample says of its pixel.
 #[derive(Clone, Copy, Debug, Default)]
@@ -177,7 +177,6 @@ impl Film {
     /// Mean over pixels of the relative standard error of the luminance of the mean: the noise that a progress bar
     /// shows. Pixels without light do not count.
     pub fn relative_noise(&self) -> f64 {
-        let luminance = |v: [f64; 3]| 0.212_671 * v[0] + 0.715_160 * v[1] + 0.072_169 * v[2];
         let (mut sum, mut count) = (0.0, 0_u64);
         for pixel in &self.pixels {
             let mean = luminance(pixel.mean());

@@ -8,13 +8,14 @@
 
 pub use super::file::{ImageError, PartHeader, ReadLimits, Window};
 use super::{ColorEncoding, Image};
+use lumiris_formats::output::write_whole;
 use openimageio_sys as sys;
 use std::collections::BTreeMap;
 use std::ffi::{CStr, CString, c_char};
+use std::io;
 use std::path::Path;
 use std::ptr;
 use std::sync::OnceLock;
-use std::sync::atomic::{AtomicU32, Ordering};
 
 /// What stands for a date where there is none.
 const NO_DATE: &str = "1970:01:01 00:00:00";
@@ -449,24 +450,9 @@ impl Drop for Output {
 
 /// Writes a picture; several parts in EXR only. Either the whole file appears under its name, or none.
 pub fn write_image(path: &Path, parts: &[Part]) -> Result<(), ImageError> {
-    let failed = |reason: String| ImageError::Write { path: path.to_owned(), reason };
-    // The extension chooses the format, so the file on its way keeps it.
-    let extension = path.extension().unwrap_or_default().to_string_lossy().into_owned();
-    let stem = path.file_stem().unwrap_or_default().to_string_lossy().into_owned();
-    static COUNT: AtomicU32 = AtomicU32::new(0);
-    let (process, count) = (std::process::id(), COUNT.fetch_add(1, Ordering::Relaxed));
-    let partial = path.with_file_name(format!(".{stem}.{process}.{count}.partial.{extension}"));
-    let replace = || {
-        // On the disk before it takes the name, lest a crash leaves an empty file in place of a good one.
-        std::fs::File::open(&partial)?.sync_all()?;
-        std::fs::rename(&partial, path)
-    };
-    let written = write_to(&partial, parts).and_then(|()| replace().map_err(|e| e.to_string()));
-    written.map_err(|reason| {
-        // What is left of the attempt is of no use; if it is not there, so much the better.
-        let _ = std::fs::remove_file(&partial);
-        failed(reason)
-    })
+    // The extension chooses the format: the file on its way has the same
+    write_whole(path, |file| write_to(file.path(), parts).map_err(io::Error::other))
+        .map_err(|e| ImageError::Write { path: path.to_owned(), reason: e.to_string() })
 }
 
 fn write_to(path: &Path, parts: &[Part]) -> Result<(), String> {

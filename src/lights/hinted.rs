@@ -15,7 +15,7 @@ use super::groups::MAX_GROUPS;
 use super::hints::Around;
 use super::select::{TreeChoice, UNIT};
 use super::{Light, LightChoice, LightCtx, LightHints, LightId, LightRun};
-use lumiris_numbers::math::ONE_MINUS_EPSILON;
+use lumiris_numbers::math::{ONE_MINUS_EPSILON, cumulative};
 use std::f32::consts::PI;
 use std::sync::Arc;
 
@@ -49,10 +49,10 @@ impl Known<'_> {
     /// Sum of the weights of the lights before index `i`.
     #[inline]
     fn sum_before(&self, i: usize) -> f32 {
-        match (i, self.is_counted()) {
-            (0, _) => 0.0,
-            (_, true) => self.around.sums[i - 1] as f32,
-            (_, false) => self.sums[i - 1],
+        if self.is_counted() {
+            cumulative::sum_before(self.around.sums, i)
+        } else {
+            cumulative::sum_before(&self.sums, i)
         }
     }
 
@@ -73,9 +73,9 @@ impl Known<'_> {
         let x = u * self.total;
         let count = self.around.lights.len();
         let place = if self.is_counted() {
-            self.around.sums.partition_point(|&sum| sum as f32 <= x)
+            cumulative::find(self.around.sums, x)
         } else {
-            self.sums[..count].partition_point(|&sum| sum <= x)
+            cumulative::find(&self.sums[..count], x)
         };
         // Rounding may reach the total: the last light with a weight
         let place = if place < count { place } else { (0..count).rfind(|&i| self.pmf_at(i) > 0.0).unwrap_or(0) };
@@ -153,7 +153,7 @@ impl HintedChoice {
         let mut first = 0;
         while first < positions.len() && f64::from(positions[first]) * UNIT < share {
             let x = f64::from(positions[first]) * UNIT;
-            let place = partition(count, |i| end_of(i) <= x);
+            let place = cumulative::find_computed(count, end_of, x);
             if place == count {
                 break;
             }
@@ -225,14 +225,4 @@ impl HintedChoice {
 #[inline]
 fn mixed(known: f32, base: f32) -> f32 {
     (1.0 - BASE_SHARE) * known + BASE_SHARE * base
-}
-
-/// The first of `count` indices for which `is_before` is false.
-fn partition(count: usize, is_before: impl Fn(usize) -> bool) -> usize {
-    let (mut low, mut high) = (0, count);
-    while low < high {
-        let middle = low.midpoint(high);
-        if is_before(middle) { low = middle + 1 } else { high = middle }
-    }
-    low
 }

@@ -10,7 +10,7 @@
 //! Lights without power are never chosen.
 
 use super::{HintedChoice, Light, LightCtx, LightHints, LightId, LightTree};
-use lumiris_numbers::math::{AliasTable, ONE_MINUS_EPSILON};
+use lumiris_numbers::math::{AliasTable, ONE_MINUS_EPSILON, cumulative};
 use std::sync::Arc;
 use strum::{EnumIter, EnumString, IntoStaticStr, VariantNames};
 
@@ -93,9 +93,9 @@ impl FixedChoice {
         let mut first = 0;
         while let Some(&position) = positions.get(first) {
             let x = f64::from(position) * UNIT;
-            let light = self.cumulative.partition_point(|&c| c <= x);
+            let light = cumulative::find(&self.cumulative, x);
             let Some(&end) = self.cumulative.get(light) else { return };
-            let start = if light > 0 { self.cumulative[light - 1] } else { 0.0 };
+            let start = cumulative::sum_before(&self.cumulative, light);
             let count = positions[first..].partition_point(|&p| f64::from(p) * UNIT < end);
             let (pmf, places) = (self.table.pmf(light), [first as u32, (first + count) as u32]);
             out.push(LightRun { light: light as LightId, pmf, places, interval: [start, end] });

@@ -5,6 +5,7 @@
 //! trajectories.
 
 use crate::lights::{LightId, LightSet};
+use lumiris_numbers::math::cumulative;
 
 /// Shares of lights in trajectories.
 #[derive(Clone, Debug)]
@@ -43,7 +44,7 @@ impl LightShares {
         const STEPS: f64 = 16_777_216.0;
         let u = ((f64::from(u[0]) * STEPS).floor() + f64::from(u[1])) / STEPS;
         let last = self.lights.len() - 1;
-        let i = self.cumulative.partition_point(|&c| c <= u * self.cumulative[last]).min(last);
+        let i = cumulative::find(&self.cumulative, u * self.cumulative[last]).min(last);
         (self.lights[i], self.pmf_at(i))
     }
 
@@ -54,8 +55,7 @@ impl LightShares {
 
     #[inline]
     fn pmf_at(&self, i: usize) -> f32 {
-        let before = if i == 0 { 0.0 } else { self.cumulative[i - 1] };
-        (self.cumulative[i] - before) as f32
+        cumulative::weight(&self.cumulative, i) as f32
     }
 }
 

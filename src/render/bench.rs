@@ -13,6 +13,7 @@ use crate::integrators::path::{CameraSample, Recording};
 use crate::integrators::{PathIntegrator, PathStats};
 use crate::scene::RenderJob;
 use crate::settings::IntegratorKind;
+use lumiris_numbers::estimators::stats::median;
 use lumiris_numbers::math::hash::HashStream;
 use serde::Serialize;
 use std::hint::black_box;
@@ -334,16 +335,6 @@ fn time(run: impl FnOnce()) -> Duration {
     let start = Instant::now();
     run();
     start.elapsed()
-}
-
-/// The middle of some numbers, or the mean of the middle two; 0 of none.
-fn median(values: impl Iterator<Item = f64>) -> f64 {
-    let mut sorted: Vec<f64> = values.collect();
-    sorted.sort_by(f64::total_cmp);
-    match sorted.len() {
-        0 => 0.0,
-        n => 0.5 * (sorted[(n - 1) / 2] + sorted[n / 2]),
-    }
 }
 
 /// All rays of the batches in random order, in batches as large as the renderer's.

@@ -3,6 +3,7 @@
 use super::{RenderError, thread_pool};
 use crate::photons::{GatherScratch, PhotonMap, Place, Search, Tracing, Want, trace_photons};
 use crate::scene::RenderJob;
+use lumiris_numbers::estimators::stats::median;
 use serde::Serialize;
 use std::hint::black_box;
 use std::time::Instant;
@@ -90,9 +91,4 @@ fn queries_per_second(map: &PhotonMap, search: Search, runs: u32) -> f64 {
         times.push(start.elapsed().as_secs_f64());
     }
     places.len() as f64 / median(times).max(1e-12)
-}
-
-fn median(mut values: Vec<f64>) -> f64 {
-    values.sort_by(f64::total_cmp);
-    values.get(values.len() / 2).copied().unwrap_or(0.0)
 }

@@ -21,6 +21,7 @@ use crate::settings::{
     EstimatorKind, IntegratorKind, IntegratorSettings, Proposals, RisSettings, Split, StageTimes, Strata, Target,
 };
 use lumiris_numbers::estimators::ris::choice::{Costs, MomentsEstimate, Variances, clamp_ratio, optimal_ratio};
+use lumiris_numbers::estimators::stats::median;
 use rayon::prelude::*;
 use std::sync::atomic::AtomicBool;
 use std::time::Duration;
@@ -119,17 +120,12 @@ fn vertex_times(job: &RenderJob) -> Option<[[f64; 2]; 2]> {
         }
     }
     let is_lit = measured.iter().all(|m| !m[0].is_empty());
-    is_lit.then(|| measured.map(|stages| stages.map(|mut times| median(&mut times))))
+    is_lit.then(|| measured.map(|stages| stages.map(median)))
 }
 
 /// A time in tenths of nanoseconds, at least one: what is printed is what was used.
 fn rounded(nanoseconds: f64) -> f64 {
     (nanoseconds * 10.0).round().max(1.0) / 10.0
-}
-
-fn median(values: &mut [f64]) -> f64 {
-    values.sort_by(f64::total_cmp);
-    values.get(values.len() / 2).copied().unwrap_or(0.0)
 }
 
 /// The best M/N of each pixel for the time that `split` takes.

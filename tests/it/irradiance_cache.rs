@@ -1,7 +1,7 @@
 //! The irradiance cache: known answers, agreement with `path`, the same bits, gradients, walls, and scenes with nothing in them.
 
 use super::analytic_scenes::{answer, picture_means, scene_files};
-use lumiris::film::{Film, PixelSums};
+use lumiris::film::Film;
 use lumiris::import::{LoadOptions, load};
 use lumiris::integrators::irradiance_cache::gather::{Gatherer, Wanted};
 use lumiris::render::output::{Aov, channels};
@@ -10,7 +10,7 @@ use lumiris::scene::{AccelKind, RenderJob};
 use lumiris::settings::{Cached, EstimatorKind, IntegratorKind, Proposals, Settings};
 use lumiris_numbers::estimators::ocv::Form;
 use lumiris_numbers::estimators::stats::{sidak, t_test};
-use lumiris_numbers::math::Vec3;
+use lumiris_numbers::math::{Vec3, luminance};
 use std::path::Path;
 use std::sync::atomic::AtomicBool;
 
@@ -135,11 +135,8 @@ pub(crate) fn squares(film: &Film, size: u32) -> Vec<f64> {
     let mut sums = Vec::new();
     for tile in film.bounds.tiles(size) {
         let pixels = (tile.y0..tile.y1).flat_map(|y| (tile.x0..tile.x1).map(move |x| (x, y)));
-        let luminance = |p: &PixelSums| {
-            let [r, g, b] = p.mean();
-            0.2126 * r + 0.7152 * g + 0.0722 * b
-        };
-        sums.push(pixels.map(|(x, y)| luminance(&film.pixels[film.index(x, y)])).sum::<f64>() / tile.area() as f64);
+        let of_pixel = |(x, y)| luminance(film.pixels[film.index(x, y)].mean());
+        sums.push(pixels.map(of_pixel).sum::<f64>() / tile.area() as f64);
     }
     sums
 }

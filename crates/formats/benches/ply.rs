@@ -1,8 +1,9 @@
-//! Processor seconds for reading PLY meshes made by code, on one thread.
+//! Processor seconds for reading PLY meshes made by code, and the numbers of a pbrt file, on one thread.
 //!
 //! `cargo bench --bench ply -- [triangles in millions, default 10]`
 #![allow(clippy::print_stdout, missing_docs)]
 
+use lumiris_formats::pbrt::lexer::Lexer;
 use lumiris_formats::ply::read_ply;
 use std::error::Error;
 use std::fmt::Write as _;
@@ -122,6 +123,29 @@ fn measure(name: &str, path: &Path) -> Result<(), Box<dyn Error>> {
     Ok(())
 }
 
+/// Reads a list of `count` numbers as it stands in a pbrt file.
+fn measure_pbrt(count: u32) -> Result<(), Box<dyn Error>> {
+    let mut text = String::from("[");
+    for i in 0..count {
+        write!(text, " {}", (i as f32 * 0.1).sin() * 37.0)?;
+    }
+    text.push_str(" ]");
+    let start = Instant::now();
+    let (mut processor, mut numbers) = (f64::INFINITY, Vec::new());
+    for _ in 0..5 {
+        let before = processor_seconds(start);
+        numbers.clear();
+        let mut lexer = Lexer::new(text.as_bytes(), 0);
+        lexer.next_token().map_err(|e| e.message)?;
+        lexer.numbers_f32(&mut numbers).map_err(|e| e.message)?;
+        processor = processor.min(processor_seconds(start) - before);
+    }
+    let (megabytes, count) = (text.len() as f64 * 1e-6, numbers.len());
+    let rate = megabytes / processor;
+    println!("{:<24} {count:>9} numbers {megabytes:>4.0} MB  cpu {processor:.3} s  {rate:>18.0} MB/s", "pbrt numbers");
+    Ok(())
+}
+
 fn main() -> Result<(), Box<dyn Error>> {
     let millions = std::env::args().skip(1).find_map(|a| a.parse::<f64>().ok()).unwrap_or(10.0);
     let cells = (millions.clamp(0.01, 100.0) * 0.5e6).sqrt() as u32;
@@ -142,5 +166,6 @@ fn main() -> Result<(), Box<dyn Error>> {
     let mut encoder = flate2::write::GzEncoder::new(fs::File::create(&path)?, flate2::Compression::fast());
     encoder.write_all(&grid(Layout::Plain, columns, rows)?)?;
     encoder.finish()?;
-    measure("little endian, gzip", &path)
+    measure("little endian, gzip", &path)?;
+    measure_pbrt(3 * cells * cells)
 }

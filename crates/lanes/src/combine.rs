@@ -1,18 +1,14 @@
-//! The weights of proposals: q̂ = Y(f·cos θ · L), r = w/(m p), w·q̂ of resampling.
+//! The weights of proposals of two techniques [Talbot 2005, Section 4.6.1]: q̂ = Y(f·cos θ·L), r = w/(m p), and q̂·r.
+//!
+//! With m_i proposals of density p_i of each technique, r_j = w_i(x_j)/(m_i p_i(x_j)), one target q̂ and one drawing, c_j = f r_j and
+//! w_j = q̂ r_j are as for a single technique. The thesis prints the weight as w_i q̂/p_i without 1/m_i, for an estimate that divides
+//! by M afterwards; that is right only if all m_i are equal to M, and off by m_i/M otherwise.
 
-use super::lane::{F, LANES, Vec3s, begin, load, or_zero, padded, store};
+use super::lane::{F, LANES, Vec3s, Wide, begin, load, or_zero, padded, store};
 use fearless_simd::{Level, Simd, dispatch, prelude::*};
-
-/// How the weights of two techniques are chosen; see the heuristics of the same names in `estimators::mis`.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum Weighting {
-    /// x/(x + y).
-    Balance,
-    /// x²/(x² + y²).
-    Power,
-    /// 1 where x is larger, 0 where y is, 1/2 where they differ by less than one part in a thousand.
-    Maximum,
-}
+use lumiris_numbers::estimators::mis::Heuristic;
+use lumiris_numbers::estimators::ris::weight;
+use lumiris_numbers::math::rgb::LUMINANCE;
 
 /// Samples of one technique, and the density of another one at them. All slices have the same length.
 #[derive(Clone, Copy, Debug)]
@@ -30,7 +26,7 @@ pub struct Proposals<'a> {
     /// Number of samples of the other technique; 0 if it is not used.
     pub m_other: f32,
     /// How both are weighted.
-    pub weighting: Weighting,
+    pub heuristic: Heuristic,
 }
 
 /// What [`combine`] computes.
@@ -63,33 +59,20 @@ pub fn combine(level: Level, proposals: &Proposals<'_>, out: &mut Weights<'_>) {
 
 #[inline(always)]
 fn combine_lanes<S: Simd>(simd: S, proposals: &Proposals<'_>, out: &mut Weights<'_>) {
-    let (zero, one) = (F::splat(simd, 0.0), F::splat(simd, 1.0));
+    let zero = F::splat(simd, 0.0);
     for i in (0..proposals.p.len()).step_by(LANES) {
         let i = begin(i, proposals.p.len());
         let f = Vec3s::load(simd, proposals.f_cos, i);
         let l = Vec3s::load(simd, proposals.li, i);
         let (x, y) = (load(simd, proposals.p, i) * proposals.m, load(simd, proposals.p_other, i) * proposals.m_other);
 
-        // The ratio y/x, and not the products, so that neither squares overflow nor inf/inf appears.
-        let (is_sample, has_other) = (x.simd_gt(zero), y.simd_gt(zero));
-        let ratio = y / x;
-        let both_infinite = x.is_infinite() & y.is_infinite();
-        let weight = match proposals.weighting {
-            Weighting::Balance => one / (ratio + one),
-            Weighting::Power => one / (ratio * ratio + one),
-            Weighting::Maximum => {
-                let is_tie = (ratio - one).abs().simd_le(F::splat(simd, 1e-3));
-                is_tie.select(F::splat(simd, 0.5), ratio.simd_lt(one).select(one, zero))
-            }
-        };
-        let weight = both_infinite.select(F::splat(simd, 0.5), has_other.select(weight, one));
-
-        let luminance = f.x * l.x * 0.212_671 + f.y * l.y * 0.715_160 + f.z * l.z * 0.072_169;
+        let is_sample = x.simd_gt(zero);
+        let weight_of_both = proposals.heuristic.weight_of_expected(Wide(x), Wide(y)).0;
+        let luminance = f.x * l.x * LUMINANCE[0] + f.y * l.y * LUMINANCE[1] + f.z * l.z * LUMINANCE[2];
         let q_hat = or_zero(is_sample, luminance);
-        let r = or_zero(is_sample, weight / x);
-        let w = q_hat * r;
+        let r = or_zero(is_sample, weight_of_both / x);
         store(q_hat, out.q_hat, i);
         store(r, out.r, i);
-        store(or_zero(w.is_finite(), w), out.w, i);
+        store(weight(Wide(q_hat), Wide(r)).0, out.w, i);
     }
 }

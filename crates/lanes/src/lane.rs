@@ -1,8 +1,10 @@
 //! Vectors of lanes: loads and stores with padding, directions by component, and elementary functions.
 
 use fearless_simd::{Simd, prelude::*};
+use lumiris_numbers::math::number::Number;
 use lumiris_numbers::math::{Frame, Mat3, Vec3};
 use std::f32::consts::{FRAC_PI_2, TAU};
+use std::ops::{Add, Div, Mul};
 
 /// The vector of f32 lanes.
 pub type F<S> = fearless_simd::f32x8<S>;
@@ -38,6 +40,69 @@ pub fn padded(from: &[f32]) -> [f32; LANES] {
     let mut to = [from.last().copied().unwrap_or(0.0); LANES];
     to[..from.len()].copy_from_slice(from);
     to
+}
+
+/// Lanes as a [`Number`], for formulas that kernels and single samples share.
+#[derive(Clone, Copy)]
+pub struct Wide<S: Simd>(pub F<S>);
+
+impl<S: Simd> Add for Wide<S> {
+    type Output = Self;
+
+    #[inline(always)]
+    fn add(self, other: Self) -> Self {
+        Wide(self.0 + other.0)
+    }
+}
+
+impl<S: Simd> Mul for Wide<S> {
+    type Output = Self;
+
+    #[inline(always)]
+    fn mul(self, other: Self) -> Self {
+        Wide(self.0 * other.0)
+    }
+}
+
+impl<S: Simd> Div for Wide<S> {
+    type Output = Self;
+
+    #[inline(always)]
+    fn div(self, other: Self) -> Self {
+        Wide(self.0 / other.0)
+    }
+}
+
+impl<S: Simd> Number for Wide<S> {
+    #[inline(always)]
+    fn constant(self, v: f32) -> Self {
+        Wide(F::splat(self.0.token(), v))
+    }
+
+    #[inline(always)]
+    fn lesser(self, other: Self) -> Self {
+        Wide(self.0.min(other.0))
+    }
+
+    #[inline(always)]
+    fn greater(self, other: Self) -> Self {
+        Wide(self.0.max(other.0))
+    }
+
+    #[inline(always)]
+    fn if_above(self, bound: Self, yes: Self, no: Self) -> Self {
+        Wide(self.0.simd_gt(bound.0).select(yes.0, no.0))
+    }
+
+    #[inline(always)]
+    fn if_at_least(self, bound: Self, yes: Self, no: Self) -> Self {
+        Wide(self.0.simd_ge(bound.0).select(yes.0, no.0))
+    }
+
+    #[inline(always)]
+    fn or_zero_if_not_finite(self) -> Self {
+        Wide(or_zero(self.0.is_finite(), self.0))
+    }
 }
 
 /// Directions or points by component.

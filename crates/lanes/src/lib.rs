@@ -8,7 +8,7 @@
 //!
 //! In kernels there are no closures and no `map` over arrays: their code would be compiled without the vectors.
 //!
-//! Reading order: [`lane`], [`curve`], [`light`], [`area`], [`environment`], [`bsdf`], [`combine`], [`ocv`].
+//! Reading order: [`lane`], [`curve`], [`light`], [`area`], [`environment`], [`bsdf`], [`combine`].
 
 pub mod area;
 pub mod bsdf;
@@ -17,7 +17,6 @@ pub mod curve;
 pub mod environment;
 pub mod lane;
 pub mod light;
-pub mod ocv;
 
 pub use environment::Environment;
 pub use fearless_simd::Level;

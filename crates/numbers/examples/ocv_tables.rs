@@ -8,7 +8,7 @@
 #[path = "../tests/estimators_1d/mixtures.rs"]
 mod mixtures;
 
-use lumiris_numbers::estimators::ocv::{Penalty, crossfit, paper, regression};
+use lumiris_numbers::estimators::ocv::{Form, Matrix, System};
 use lumiris_numbers::estimators::optimal_mis;
 use lumiris_numbers::estimators::stats::Welford;
 use lumiris_numbers::math::hash::HashStream;
@@ -34,6 +34,15 @@ fn moments<const K: usize>(runs: usize, key: u32, mut run: impl FnMut(&mut HashS
     welford
 }
 
+/// The first channel of the estimate of a form with the coefficients that `system` gives of the same `rows` of sums of r_j.
+fn estimate(form: Form, system: System, sampler: &Sampler, rows: &[f32]) -> f32 {
+    let equations = sampler.equations;
+    let (mut sums, mut beta) = (rows.to_vec(), vec![0.0; form.rows() * equations.coefficients()]);
+    sums.chunks_exact_mut(equations.len()).for_each(|row| form.finish(equations, row, &sampler.integrals));
+    equations.solve(system, &sums, &mut beta);
+    form.estimate(equations, &sums, &beta, &sampler.integrals)[0]
+}
+
 /// Bias and variance of each form on the same samples.
 fn forms() {
     println!("## Bias (% of the value) and variance over that of MIS\n");
@@ -47,22 +56,20 @@ fn forms() {
         for stratified in [false, true] {
             let (whole, half) = (Sampler::new(mixture, n, stratified), Sampler::new(mixture, n / 2, stratified));
             let equations = whole.equations;
-            let row = || vec![0.0; equations.len()];
-            let (mut centred, mut plain, mut halves) = (row(), row(), [row(), row()]);
-            let ones = [1.0; 8];
+            let (mut all, mut halves) = (vec![0.0; equations.len()], vec![0.0; 2 * equations.len()]);
             let w = moments(400_000, n, |stream| {
-                plain.fill(0.0);
-                let again = *stream;
-                whole.add(1, 0.0, stream, &mut plain);
-                whole.block(1, &mut again.clone(), &mut centred);
-                halves.iter_mut().for_each(|h| half.block(1, stream, h));
+                all.fill(0.0);
+                halves.fill(0.0);
+                whole.add(1, stream, &mut all);
+                halves.chunks_exact_mut(equations.len()).for_each(|row| half.add(1, stream, row));
+                let of = |form: Form| estimate(form, form.system(), &whole, &all);
                 [
-                    equations.mean(&centred)[0],
-                    paper(equations, &plain, &ones, 1.0).estimate[0],
-                    regression(equations, &centred, Penalty::NONE).estimate[0],
-                    regression(equations, &centred, Penalty::SAME_SAMPLES).estimate[0],
-                    optimal_mis::direct(equations, &plain, &ones).estimate[0],
-                    crossfit(equations, [&halves[0], &halves[1]], Penalty::default()).estimate[0],
+                    equations.mean(&all)[0],
+                    of(Form::Paper),
+                    estimate(Form::Regression, System::LEAST_SQUARES, &whole, &all),
+                    of(Form::Regression),
+                    optimal_mis::direct(equations, &all, &whole.integrals).estimate[0],
+                    estimate(Form::Crossfit, Form::Crossfit.system(), &half, &halves),
                 ]
             });
             let value = mixture.value()[0];
@@ -84,29 +91,27 @@ fn forms() {
     }
 }
 
-/// Estimates of MIS and of the progressive form over the first `passes`, with one penalty.
-fn progressive(sampler: &Sampler, passes: u32, penalty: Penalty, stream: &mut HashStream) -> [[f32; 3]; 2] {
+/// Estimates of MIS and of the progressive form over the first `passes`, with one system.
+fn progressive(sampler: &Sampler, passes: u32, system: System, stream: &mut HashStream) -> [[f32; 3]; 2] {
     let equations = sampler.equations;
     let (mut all, mut sums) = (vec![0.0; equations.len()], vec![0.0; equations.len()]);
     let (mut beta, mut total) = (vec![0.0; equations.coefficients()], [[0.0; 3]; 2]);
     for len in Sampler::blocks(passes) {
-        sampler.block(len, stream, &mut sums);
+        sampler.block(Form::Progressive, len, stream, &mut sums);
         let block = [equations.mean(&sums), equations.estimate(&sums, &beta)];
         for (total, block) in total.iter_mut().zip(block) {
             (0..3).for_each(|i| total[i] += block[i] * len as f32 / passes as f32);
         }
         equations.merge(&mut all, &sums);
-        if equations.solve(&all, penalty, &mut beta).is_err() {
-            beta.fill(0.0);
-        }
+        equations.solve(system, &all, &mut beta);
     }
     total
 }
 
-fn ratio(sampler: &Sampler, passes: u32, penalty: Penalty, runs: usize) -> f64 {
+fn ratio(sampler: &Sampler, passes: u32, system: System, runs: usize) -> f64 {
     let mut worst = 0.0_f64;
     for i in 0..3 {
-        let w = moments(runs, passes, |stream| progressive(sampler, passes, penalty, stream).map(|e| e[i]));
+        let w = moments(runs, passes, |stream| progressive(sampler, passes, system, stream).map(|e| e[i]));
         worst = worst.max(w[1].variance() / w[0].variance());
         if sampler.mixture != Mixture::Colour {
             break;
@@ -115,27 +120,27 @@ fn ratio(sampler: &Sampler, passes: u32, penalty: Penalty, runs: usize) -> f64 {
     worst
 }
 
-/// Variance of the mean of the first four passes over that of MIS, for several penalties.
+/// Variance of the mean of the first four passes over that of MIS, for several systems.
 fn first_passes() {
-    let ridge = |ridge| Penalty { ridge, known_means: true, shrink: 0.0 };
-    let penalties = [
+    let ridge = |ridge| System { matrix: Matrix::KnownMeans, ridge, shrink: 0.0 };
+    let systems = [
         ("λ = 1", ridge(1.0)),
         ("λ = 4", ridge(4.0)),
         ("λ = 16", ridge(16.0)),
-        ("λ = 4, sample means", Penalty { known_means: false, ..ridge(4.0) }),
-        ("λ = 1, κ = 1", Penalty { shrink: 1.0, ..ridge(1.0) }),
-        ("**λ = 4, κ = 1**", Penalty::default()),
-        ("λ = 4, κ = 2", Penalty { shrink: 2.0, ..ridge(4.0) }),
+        ("λ = 4, sample means", System { matrix: Matrix::SampleMeans, ..ridge(4.0) }),
+        ("λ = 1, κ = 1", System { shrink: 1.0, ..ridge(1.0) }),
+        ("**λ = 4, κ = 1**", System::OTHER_SAMPLES),
+        ("λ = 4, κ = 2", System { shrink: 2.0, ..ridge(4.0) }),
     ];
     for stratified in [false, true] {
         let samples = if stratified { "stratified" } else { "independent" };
         println!("\n## Mean of the first four passes, {samples} samples, worst channel: variance over that of MIS\n");
-        println!("| integral | N | {} |", penalties.map(|p| p.0).join(" | "));
-        println!("|---|---|{}", "---|".repeat(penalties.len()));
+        println!("| integral | N | {} |", systems.map(|p| p.0).join(" | "));
+        println!("|---|---|{}", "---|".repeat(systems.len()));
         for mixture in PROPER {
             for n in [3, 8, 16, 64] {
                 let sampler = Sampler::new(mixture, n, stratified);
-                let cells = penalties.map(|p| format!("{:.3}", ratio(&sampler, 4, p.1, 10_000)));
+                let cells = systems.map(|p| format!("{:.3}", ratio(&sampler, 4, p.1, 10_000)));
                 println!("| {mixture:?} | {n} | {} |", cells.join(" | "));
             }
         }
@@ -151,7 +156,7 @@ fn later_passes() {
             for stratified in [false, true] {
                 let sampler = Sampler::new(mixture, n, stratified);
                 let cells = [2, 4, 8, 16, 64].map(|p| {
-                    format!("{:.2}", ratio(&sampler, p, Penalty::default(), if p > 16 { 2_000 } else { 5_000 }))
+                    format!("{:.2}", ratio(&sampler, p, System::OTHER_SAMPLES, if p > 16 { 2_000 } else { 5_000 }))
                 });
                 let samples = if stratified { "stratified" } else { "independent" };
                 println!("| {mixture:?} | {n} | {samples} | {} |", cells.join(" | "));
@@ -186,14 +191,14 @@ fn shared_sums() {
                         let mut total = [0.0; 2];
                         for len in Sampler::blocks(4) {
                             for (sampler, row) in samplers.iter().zip(&mut rows) {
-                                sampler.block(len, stream, row);
+                                sampler.block(Form::Progressive, len, stream, row);
                             }
                             // The last pixel is watched, whose occluder is at the end of the range.
                             let last = &rows[pixels - 1];
                             total[0] += equations.mean(last)[0] * len as f32 / 4.0;
                             total[1] += equations.estimate(last, &beta)[0] * len as f32 / 4.0;
                             rows.iter().for_each(|row| equations.merge(&mut all, row));
-                            equations.solve(&all, Penalty::default(), &mut beta).expect("all samples are finite");
+                            equations.solve(System::OTHER_SAMPLES, &all, &mut beta);
                         }
                         total
                     });

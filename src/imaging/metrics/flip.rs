@@ -8,6 +8,7 @@
 
 use super::{Pixel, is_finite};
 use crate::imaging::color::linear_to_srgb;
+use lumiris_numbers::estimators::stats::median;
 use lumiris_numbers::math::Rgb;
 use nv_flip::FlipImageRgb8;
 use rayon::prelude::*;
@@ -84,12 +85,11 @@ fn exposure_range(reference: &[Pixel]) -> [f64; 2] {
     let luminances = reference.iter().filter(|p| is_finite(p)).map(|p| f64::from(Rgb::from_array(*p).luminance()));
     let mut sorted: Vec<f64> = luminances.collect();
     sorted.sort_by(f64::total_cmp);
-    let median = |sorted: &[f64]| 0.5 * (sorted[(sorted.len() - 1) / 2] + sorted[sorted.len() / 2]);
     let lit = &sorted[sorted.partition_point(|&l| l <= 0.0)..];
     let Some(&greatest) = lit.last() else { return [0.0; 2] };
-    let of_all = median(&sorted);
+    let of_all = median(sorted.iter().copied());
     let white = aces_inverse(0.85);
-    [greatest, if of_all > 0.0 { of_all } else { median(lit) }].map(|l| (white / l).log2())
+    [greatest, if of_all > 0.0 { of_all } else { median(lit.iter().copied()) }].map(|l| (white / l).log2())
 }
 
 /// LDR-ꟻLIP of what `display` makes of the values. Pixels that are not finite are black in both pictures.

@@ -8,7 +8,7 @@ use lumiris::film::Film;
 use lumiris::import::{LoadOptions, load};
 use lumiris::render::plan::prepare;
 use lumiris::render::{RenderSettings, render};
-use lumiris::scene::{AccelKind, RenderJob};
+use lumiris::scene::AccelKind;
 use std::fmt::Write;
 use std::path::{Path, PathBuf};
 use std::sync::atomic::AtomicBool;

@@ -8,6 +8,7 @@ use clap::{Args, ValueEnum};
 use lumiris::render::bench::{BenchSettings, RayCase, Report, measure};
 use lumiris::render::bench_photons::{PhotonReport, measure_photons};
 use lumiris::scene::{AccelKind, RenderJob};
+use lumiris_formats::output::write_text;
 use serde_json::json;
 use std::path::PathBuf;
 use std::process::ExitCode;
@@ -74,7 +75,7 @@ pub fn run(args: &BenchArgs) -> anyhow::Result<ExitCode> {
         value["scene"] = json!(name);
         value["seconds"] = json!({ "load": times.load, "build": times.build });
         value["embree"] = json!(env!("LUMIRIS_EMBREE_VERSION"));
-        std::fs::write(path, serde_json::to_string_pretty(&value)?)
+        write_text(path, &serde_json::to_string_pretty(&value)?)
             .with_context(|| format!("cannot write {}", path.display()))?;
     }
     Ok(ExitCode::SUCCESS)

@@ -2,11 +2,11 @@
 
 use super::progress;
 use crate::compare::columns::{column, shown_columns};
-use crate::compare::page::write_whole;
 use crate::compare::{Column, Compared, Metric, Pictures, Scores, Settings, compare, load, write_page};
 use anyhow::{Context, bail};
 use clap::{Args, ValueEnum};
 use lumiris::imaging::metrics::bias::Z_95;
+use lumiris_formats::output::write_text;
 use serde_json::{Map, Value, json};
 use std::path::{Path, PathBuf};
 use std::process::ExitCode;
@@ -141,7 +141,7 @@ pub fn run(args: &CompareArgs) -> anyhow::Result<ExitCode> {
     match args.json.as_deref() {
         Some(path) if path == Path::new("-") => progress::print(text.trim_end()),
         Some(path) => {
-            write_whole(path, &text).with_context(|| format!("cannot write {}", path.display()))?;
+            write_text(path, &text).with_context(|| format!("cannot write {}", path.display()))?;
             progress::print(&table(&pictures, &settings, &compared));
         }
         None => progress::print(&table(&pictures, &settings, &compared)),

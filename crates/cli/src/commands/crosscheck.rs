@@ -11,6 +11,7 @@ use lumiris::imaging::oiio::{self, Part};
 use lumiris::render::crosscheck::{EDGE_ULPS, Report, T_TOLERANCE_ULPS, crosscheck};
 use lumiris::render::{output, render};
 use lumiris::scene::{AccelKind, RenderJob, World};
+use lumiris_formats::output::write_text;
 use serde::Serialize;
 use std::path::PathBuf;
 use std::process::ExitCode;
@@ -87,7 +88,7 @@ pub fn run(args: &CrosscheckArgs) -> anyhow::Result<ExitCode> {
     }
     if let Some(path) = &args.json {
         let text = serde_json::to_string_pretty(&serde_json::json!({ "rays": report, "images": images }))?;
-        std::fs::write(path, text).with_context(|| format!("cannot write {}", path.display()))?;
+        write_text(path, &text).with_context(|| format!("cannot write {}", path.display()))?;
     }
 
     let agree = report.disagreements() == 0 && images.agrees();

@@ -8,6 +8,7 @@ use lumiris::imaging::oiio::{self, Part};
 use lumiris::render::output::{self, Aov};
 use lumiris::render::{RenderSettings, Rendering, render};
 use lumiris::scene::RenderJob;
+use lumiris_formats::output::write_text;
 use serde_json::json;
 use std::path::{Path, PathBuf};
 use std::process::ExitCode;
@@ -42,7 +43,7 @@ pub fn run(args: &RenderArgs) -> anyhow::Result<ExitCode> {
     }
     if let Some(path) = &args.stats {
         let text = serde_json::to_string_pretty(&stats(args, &job, &rendering, setup))?;
-        std::fs::write(path, text).with_context(|| format!("cannot write {}", path.display()))?;
+        write_text(path, &text).with_context(|| format!("cannot write {}", path.display()))?;
     }
     report(args, &rendering, &outputs);
     let interrupted = stop.load(Ordering::Relaxed);
@@ -150,7 +151,7 @@ fn stats(args: &RenderArgs, job: &RenderJob, rendering: &Rendering, setup: Setup
         "counts": {
             "camera_rays": s.camera_rays, "bounce_rays": s.bounce_rays, "proposals": d.proposals,
             "emitter_rays": d.emitter_rays, "shadow_segments": d.segments,
-            "ocv_systems": d.systems, "ocv_fallbacks_to_mis": d.ill_conditioned,
+            "ocv_systems": d.systems, "ocv_ill_conditioned": d.ill_conditioned,
         },
         "rates": {
             "camera_mrays_per_second": mrays(s.camera_rays, s.camera_time),

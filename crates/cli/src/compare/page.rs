@@ -8,11 +8,15 @@
 use super::columns::shown_columns;
 use super::load::{Pictures, Shown};
 use super::scores::{Compared, Scores, Settings};
+use base64::Engine;
+use base64::engine::general_purpose::STANDARD;
 use flate2::{Compression, write::ZlibEncoder};
 use lumiris::imaging::heat::{BLUE_RED, HEAT, Stops};
 use lumiris::imaging::metrics::Pixel;
+use lumiris_formats::output::write_whole;
+use minijinja::{Environment, Value as Safe, context};
 use serde_json::{Value, json};
-use std::io::{self, Write};
+use std::io::{self, BufWriter, Write};
 use std::path::{Path, PathBuf};
 
 const TEMPLATE: &str = include_str!("viewer/index.html");
@@ -29,24 +33,16 @@ pub fn write_page(
 ) -> io::Result<PathBuf> {
     std::fs::create_dir_all(folder)?;
     let path = folder.join("index.html");
-    write_whole(&path, &page(pictures, settings, compared)?)?;
+    write_whole(&path, |file| {
+        let mut out = BufWriter::new(file);
+        write(&mut out, pictures, settings, compared)?;
+        out.flush()
+    })?;
     Ok(path)
 }
 
-/// Writes a file; either the whole of it appears under its name, or nothing.
-pub fn write_whole(path: &Path, text: &str) -> io::Result<()> {
-    let name = path.file_name().unwrap_or_default().to_string_lossy();
-    let partial = path.with_file_name(format!(".{name}.{}.partial", std::process::id()));
-    let written = std::fs::write(&partial, text).and_then(|()| std::fs::rename(&partial, path));
-    if written.is_err() {
-        // What is left of the attempt is of no use; if it is not there, so much the better.
-        let _ = std::fs::remove_file(&partial);
-    }
-    written
-}
-
-/// The page as text.
-fn page(pictures: &Pictures, settings: &Settings, compared: &[Compared]) -> io::Result<String> {
+/// Writes the page as text.
+fn write(out: impl Write, pictures: &Pictures, settings: &Settings, compared: &[Compared]) -> io::Result<()> {
     let mut data = String::new();
     let mut images = Vec::new();
     for (index, shown) in pictures.images.iter().enumerate() {
@@ -57,22 +53,13 @@ fn page(pictures: &Pictures, settings: &Settings, compared: &[Compared]) -> io::
     // `<` could end the element that holds it.
     let manifest = manifest.to_string().replace('<', "\\u003c");
 
-    let mut out = String::with_capacity(data.len() + manifest.len() + (1 << 16));
-    let mut rest = TEMPLATE;
-    for (mark, text) in [
-        ("/*style*/", STYLE),
-        ("/*manifest*/", &manifest),
-        ("<!--data-->", &data),
-        ("/*pictures*/", PICTURES),
-        ("/*viewer*/", VIEWER),
-    ] {
-        let (before, after) = rest.split_once(mark).expect("the template has all marks, in this order");
-        out.push_str(before);
-        out.push_str(text);
-        rest = after;
-    }
-    out.push_str(rest);
-    Ok(out)
+    let [style, pictures, viewer] = [STYLE, PICTURES, VIEWER].map(|text| Safe::from_safe_string(text.to_owned()));
+    let [manifest, data] = [manifest, data].map(Safe::from_safe_string);
+    let context = context! { style, manifest, data, pictures, viewer };
+    let environment = Environment::new();
+    let template = environment.template_from_named_str("index.html", TEMPLATE).map_err(io::Error::other)?;
+    template.render_captured_to(context, out).map_err(io::Error::other)?;
+    Ok(())
 }
 
 /// Everything but the pixels.
@@ -137,7 +124,7 @@ fn append(data: &mut String, id: &str, values: &[f32]) -> io::Result<()> {
     data.push_str(&format!("<script type=\"application/octet-stream\" id=\"{id}\">"));
     let mut encoder = ZlibEncoder::new(Vec::new(), Compression::new(6));
     encoder.write_all(&planes(values))?;
-    base64(&encoder.finish()?, data);
+    STANDARD.encode_string(encoder.finish()?, data);
     data.push_str("</script>\n");
     Ok(())
 }
@@ -159,35 +146,11 @@ fn planes(values: &[f32]) -> Vec<u8> {
     bytes
 }
 
-/// Appends bytes in base64 [RFC 4648].
-fn base64(bytes: &[u8], out: &mut String) {
-    const DIGITS: &[u8; 64] = b"ABCDEFGHIJKLMNOPQRSTUVWXYZabcdefghijklmnopqrstuvwxyz0123456789+/";
-    out.reserve(bytes.len().div_ceil(3) * 4);
-    for chunk in bytes.chunks(3) {
-        let word = (0..3).fold(0_u32, |w, i| w << 8 | u32::from(chunk.get(i).copied().unwrap_or(0)));
-        for digit in 0..4 {
-            let value = (word >> (18 - 6 * digit)) & 63;
-            out.push(if digit <= chunk.len() { char::from(DIGITS[value as usize]) } else { '=' });
-        }
-    }
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;
     use crate::compare::load::Region;
     use crate::compare::scores::compare;
-
-    #[test]
-    fn base64_is_that_of_the_standard() {
-        for (text, expected) in
-            [("", ""), ("f", "Zg=="), ("fo", "Zm8="), ("foo", "Zm9v"), ("foob", "Zm9vYg=="), ("foobar", "Zm9vYmFy")]
-        {
-            let mut out = String::new();
-            base64(text.as_bytes(), &mut out);
-            assert_eq!(out, expected);
-        }
-    }
 
     #[test]
     fn values_keep_sixteen_bits_and_their_kind() {
@@ -228,7 +191,7 @@ mod tests {
             assert_eq!(html.matches(&format!("id=\"{id}\"")).count(), 1, "{id}");
         }
         assert_eq!(html.matches("<script").count(), html.matches("</script>").count());
-        assert!(!html.contains("data-1-flip") && !html.contains("/*style*/") && !html.contains("<!--data-->"));
+        assert!(!html.contains("data-1-flip") && !html.contains("{{"));
         assert_eq!(std::fs::read_dir(folder.path().join("new")).unwrap().count(), 1);
     }
 }

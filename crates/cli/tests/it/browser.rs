@@ -3,6 +3,8 @@
 //! The protocol goes over two pipes, messages end in a zero byte. The browser is `chromium` of the path, or what the
 //! variable CHROMIUM names.
 
+use base64::Engine;
+use base64::engine::general_purpose::STANDARD;
 use serde_json::{Value, json};
 use std::cell::{Cell, RefCell};
 use std::io::{BufRead, BufReader, Write};
@@ -178,7 +180,7 @@ impl Browser {
     /// A picture of the window, as a PNG file.
     pub fn screenshot(&self, path: &Path) {
         let answer = self.call("Page.captureScreenshot", json!({ "format": "png" }));
-        std::fs::write(path, decode_base64(answer["data"].as_str().unwrap())).unwrap();
+        std::fs::write(path, STANDARD.decode(answer["data"].as_str().unwrap()).unwrap()).unwrap();
     }
 }
 
@@ -196,20 +198,4 @@ impl Drop for Browser {
         let _ = self.process.kill();
         let _ = self.process.wait();
     }
-}
-
-fn decode_base64(text: &str) -> Vec<u8> {
-    let value = |c: u8| match c {
-        b'A'..=b'Z' => c - b'A',
-        b'a'..=b'z' => c - b'a' + 26,
-        b'0'..=b'9' => c - b'0' + 52,
-        b'+' => 62,
-        _ => 63,
-    };
-    let mut bytes = Vec::new();
-    for chunk in text.trim_end_matches('=').as_bytes().chunks(4) {
-        let word = chunk.iter().enumerate().fold(0_u32, |w, (i, &c)| w | u32::from(value(c)) << (18 - 6 * i));
-        bytes.extend_from_slice(&word.to_be_bytes()[1..chunk.len()]);
-    }
-    bytes
 }

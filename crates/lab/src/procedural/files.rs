@@ -4,6 +4,7 @@ use super::ply::write_ply;
 use super::sky::{SkyOptions, sky};
 use super::statue::{StatueOptions, statue};
 use lumiris::imaging::oiio::{ImageError, Part, Storage, write_image};
+use lumiris_formats::output::write_text;
 use std::io;
 use std::path::{Path, PathBuf};
 
@@ -56,7 +57,7 @@ pub(super) fn write_texts(folder: &Path, texts: &[(&str, &str)]) -> Result<(), P
     std::fs::create_dir_all(folder).map_err(failed(folder))?;
     for (name, text) in texts {
         let path = folder.join(name);
-        std::fs::write(&path, text).map_err(failed(&path))?;
+        write_text(&path, text).map_err(failed(&path))?;
     }
     Ok(())
 }

@@ -1,23 +1,16 @@
 //! Writes meshes as PLY, binary and little-endian: positions, normals if there are any, and triangles.
 
 use lumiris::geometry::TriangleMesh;
-use std::fs::File;
+use lumiris_formats::output::write_whole;
 use std::io::{self, BufWriter, Write};
 use std::path::Path;
 
 /// Writes a mesh. Either the whole file appears under its name, or none.
 pub fn write_ply(path: &Path, mesh: &TriangleMesh) -> io::Result<()> {
-    let name = path.file_name().ok_or_else(|| io::Error::new(io::ErrorKind::InvalidInput, "is no name of a file"))?;
-    let partial = path.with_file_name(format!(".{}.{}.partial", name.to_string_lossy(), std::process::id()));
-    let write = || {
-        let mut file = BufWriter::with_capacity(1 << 20, File::create(&partial)?);
+    write_whole(path, |file| {
+        let mut file = BufWriter::with_capacity(1 << 20, file);
         write_to(&mut file, mesh)?;
-        file.into_inner().map_err(io::IntoInnerError::into_error)?.sync_all()?;
-        std::fs::rename(&partial, path)
-    };
-    write().inspect_err(|_| {
-        // What is left of the attempt is of no use; if it is not there, so much the better.
-        let _ = std::fs::remove_file(&partial);
+        file.flush()
     })
 }
 

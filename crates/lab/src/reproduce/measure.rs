@@ -17,7 +17,8 @@ use lumiris::render::plan::prepare;
 use lumiris::render::{RenderError, RenderSettings, Rendering, render};
 use lumiris::scene::{AccelKind, RenderJob};
 use lumiris::settings::{Proposals, StageTimes, Strata};
-use lumiris_numbers::estimators::stats::{Welford, z_test};
+use lumiris_numbers::estimators::stats::{Welford, median, z_test};
+use lumiris_numbers::math::luminance;
 use rustix::time::{ClockId, clock_gettime};
 use serde::Serialize;
 use std::path::Path;
@@ -238,11 +239,6 @@ pub struct Measured {
     pub invalid: u64,
 }
 
-/// Luminance of linear Rec.709.
-pub fn luminance(v: [f64; 3]) -> f64 {
-    0.212_671 * v[0] + 0.715_160 * v[1] + 0.072_169 * v[2]
-}
-
 impl Measured {
     fn new(method: Method) -> Self {
         Measured {
@@ -345,12 +341,12 @@ impl Measured {
 
     /// Median over the turns of some time.
     pub fn median_seconds(&self, of: impl Fn(&Seconds) -> f64) -> f64 {
-        median(self.seconds.iter().map(of).collect())
+        median(self.seconds.iter().map(of))
     }
 
     /// Time relative to another method: the median over the turns.
     pub fn time_ratio(&self, base: &Measured) -> f64 {
-        median(self.seconds.iter().zip(&base.seconds).map(|(a, b)| a.processor / b.processor.max(1e-12)).collect())
+        median(self.seconds.iter().zip(&base.seconds).map(|(a, b)| a.processor / b.processor.max(1e-12)))
     }
 
     /// Variance at equal time, relative to another method, over the pixels of `mask`.
@@ -376,16 +372,6 @@ pub fn same_mean(all: &[Measured], method: usize) -> f64 {
     }
     let own = all[method].mean();
     if weights == 0.0 { 1.0 } else { z_test(own.value, sum / weights, own.error.hypot(weights.sqrt().recip())).p_value }
-}
-
-/// The median; 0 of nothing.
-pub fn median(mut values: Vec<f64>) -> f64 {
-    values.sort_by(f64::total_cmp);
-    match values.len() {
-        0 => 0.0,
-        n if n % 2 == 1 => values[n / 2],
-        n => 0.5 * (values[n / 2 - 1] + values[n / 2]),
-    }
 }
 
 /// Mean radiance of every pixel.
@@ -460,7 +446,6 @@ mod tests {
         let r = 0.5_f32.sqrt();
         let b = measured(&[[2.0 - r, 2.0 - r], [2.0 + r, 2.0 + r]], 0.5);
         assert!((b.at_equal_time(&a, None).value - 0.25).abs() < 1e-6);
-        assert_eq!(median(vec![3.0, 1.0, 2.0, 10.0]), 2.5);
         assert!(same_mean(&[a, b], 0) > 0.9);
     }
 }

@@ -1,7 +1,6 @@
 //! What takes turns: ways to estimate direct light.
 
 use lumiris::lights::LightSamplerKind;
-use lumiris::scene::World;
 use lumiris::settings::{
     Cached, EstimatorKind, IntegratorKind, IntegratorSettings, OptimalForm, ProposalPoints, Proposals, Settings,
     Strata, Target,

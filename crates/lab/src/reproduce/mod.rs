@@ -16,6 +16,7 @@ pub mod pictures;
 pub mod talbot;
 
 use crate::procedural::files::ProceduralError;
+use lumiris_formats::output::write_text;
 use std::path::{Path, PathBuf};
 use std::sync::atomic::AtomicBool;
 use std::time::{Duration, Instant};
@@ -100,7 +101,7 @@ fn scaled(shape: [u32; 2], size: u32) -> [u32; 2] {
 
 /// Writes a file, with its name in the error.
 pub(crate) fn write_file(path: PathBuf, text: &str) -> Result<(), ReproduceError> {
-    std::fs::write(&path, text).map_err(|source| ReproduceError::File { path, source })
+    write_text(&path, text).map_err(|source| ReproduceError::File { path, source })
 }
 
 /// Makes a folder, with its name in the error.

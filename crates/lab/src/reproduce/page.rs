@@ -3,7 +3,7 @@
 
 use super::chart::Chart;
 use super::pictures::Scale;
-use std::fmt::Write;
+use minijinja::{Environment, HtmlEscape, Value, context};
 
 /// A page: a title and blocks in order.
 #[derive(Clone, Debug)]
@@ -112,35 +112,11 @@ impl Table {
 
 /// The text with everything replaced that HTML would take for its own.
 pub fn escape(text: &str) -> String {
-    let mut out = String::with_capacity(text.len());
-    for c in text.chars() {
-        match c {
-            '&' => out.push_str("&amp;"),
-            '<' => out.push_str("&lt;"),
-            '>' => out.push_str("&gt;"),
-            '"' => out.push_str("&quot;"),
-            '\'' => out.push_str("&#39;"),
-            c => out.push(c),
-        }
-    }
-    out
+    HtmlEscape(text).to_string()
 }
 
-const STYLE: &str = "\
-body{font:15px/1.5 system-ui,sans-serif;color:#1c1c1e;background:#fff;margin:2rem auto;max-width:76rem;padding:0 1rem}\
-h1{font-size:1.7rem;line-height:1.2}h2{margin-top:2.6rem;border-top:1px solid #ddd;padding-top:1.2rem;font-size:1.25rem}\
-p{max-width:52rem}.note{font-size:.87rem;color:#555}\
-.scroll{overflow-x:auto}table{border-collapse:collapse;margin:1rem 0;font-size:.92rem}\
-th,td{padding:.32rem .7rem;border-bottom:1px solid #e4e4e7;text-align:left;vertical-align:top}th{background:#f4f4f5}\
-td.number{text-align:right;font-variant-numeric:tabular-nums;white-space:nowrap}\
-td.good{color:#166534;font-weight:600}td.bad{color:#b42318;font-weight:600}\
-.pictures{display:flex;flex-wrap:wrap;gap:1rem;margin:1rem 0}\
-figure{margin:0;flex:0 1 23rem;min-width:12rem}figure img{width:100%;display:block;image-rendering:pixelated;background:#000}\
-figcaption{font-size:.87rem;margin-top:.3rem}figcaption b{display:block}\
-.legend{margin:.5rem 0 1.2rem;max-width:32rem;font-size:.85rem}.legend .bar{height:.9rem;border:1px solid #bbb}\
-.legend .ticks{display:flex;justify-content:space-between;font-variant-numeric:tabular-nums}\
-dl{display:grid;grid-template-columns:max-content 1fr;gap:.15rem 1rem;font-size:.92rem}dt{color:#555}\
-dd{margin:0;overflow-wrap:anywhere}svg{max-width:100%;height:auto}";
+const TEMPLATE: &str = include_str!("page.html");
+const STYLE: &str = include_str!("page.css");
 
 impl Page {
     /// An empty page.
@@ -160,14 +136,12 @@ impl Page {
 
     /// The page as HTML.
     pub fn html(&self) -> String {
-        let title = escape(&self.title);
-        let mut out = format!(
-            "<!DOCTYPE html>\n<html lang=\"en\">\n<head>\n<meta charset=\"utf-8\">\n\
-             <meta name=\"viewport\" content=\"width=device-width,initial-scale=1\">\n<title>{title}</title>\n\
-             <style>{STYLE}</style>\n</head>\n<body>\n<h1>{title}</h1>\n"
-        );
-        self.blocks.iter().for_each(|b| b.write(&mut out));
-        out + "</body>\n</html>\n"
+        let blocks: Vec<Value> = self.blocks.iter().map(Block::context).collect();
+        let page =
+            context! { title => self.title.as_str(), style => Value::from_safe_string(STYLE.to_owned()), blocks };
+        // What it shows is escaped, since its name ends in html
+        let html = Environment::new().render_named_str("page.html", TEMPLATE, page);
+        html.expect("the template knows the blocks") + "\n"
     }
 }
 
@@ -177,62 +151,51 @@ impl Block {
         Block::Section { id: id.to_owned(), title: title.into() }
     }
 
-    fn write(&self, out: &mut String) {
-        // Writing to a string cannot fail.
-        let _ = match self {
-            Block::Section { id, title } => writeln!(out, "<h2 id=\"{}\">{}</h2>", escape(id), escape(title)),
-            Block::Text(text) => writeln!(out, "<p>{}</p>", escape(text)),
-            Block::Note(text) => writeln!(out, "<p class=\"note\">{}</p>", escape(text)),
-            Block::Table(table) => writeln!(out, "<div class=\"scroll\">{}</div>", table.html()),
-            Block::Pictures(list) => writeln!(out, "<div class=\"pictures\">{}</div>", pictures(list)),
-            Block::Legend { title, scale } => writeln!(out, "{}", legend(title, scale)),
-            Block::Facts(list) => {
-                let items = list.iter().map(|(k, v)| format!("<dt>{}</dt><dd>{}</dd>", escape(k), escape(v)));
-                writeln!(out, "<dl>{}</dl>", items.collect::<String>())
+    /// What the template makes the block of.
+    fn context(&self) -> Value {
+        match self {
+            Block::Section { id, title } => context! { kind => "section", id => id.as_str(), title => title.as_str() },
+            Block::Text(text) => context! { kind => "text", text => text.as_str() },
+            Block::Note(text) => context! { kind => "note", text => text.as_str() },
+            Block::Table(table) => context! { kind => "table", header => table.header.clone(), rows => table.rows() },
+            Block::Pictures(list) => {
+                let pictures: Vec<Value> = list.iter().map(Shown::context).collect();
+                context! { kind => "pictures", pictures }
             }
-            Block::Chart(chart) => writeln!(out, "{}", chart.svg()),
-        };
+            Block::Legend { title, scale } => {
+                context! { kind => "legend", title => title.as_str(), background => scale.css(), ticks => scale.ticks(5) }
+            }
+            Block::Facts(list) => {
+                let facts: Vec<Value> =
+                    list.iter().map(|(k, v)| context! { name => k.as_str(), value => v.as_str() }).collect();
+                context! { kind => "facts", facts }
+            }
+            Block::Chart(chart) => context! { kind => "chart", svg => Value::from_safe_string(chart.svg()) },
+        }
+    }
+}
+
+impl Shown {
+    fn context(&self) -> Value {
+        let Shown { file, title, caption } = self;
+        context! { file => file.as_str(), title => title.as_str(), caption => caption.as_str() }
     }
 }
 
 impl Table {
-    fn html(&self) -> String {
-        let header: String = self.header.iter().map(|h| format!("<th>{}</th>", escape(h))).collect();
-        let mut out = format!("<table><thead><tr>{header}</tr></thead><tbody>\n");
-        for row in &self.rows {
-            let cells = row.iter().map(|cell| {
-                let class = match cell.tone {
-                    Tone::Plain => "",
-                    Tone::Number => " class=\"number\"",
-                    Tone::Good => " class=\"good\"",
-                    Tone::Bad => " class=\"bad\"",
-                };
-                format!("<td{class}>{}</td>", escape(&cell.text))
-            });
-            let _ = writeln!(out, "<tr>{}</tr>", cells.collect::<String>());
-        }
-        out + "</tbody></table>"
+    /// Rows of entries with their texts and classes.
+    fn rows(&self) -> Vec<Value> {
+        let entry = |cell: &Cell| {
+            let class = match cell.tone {
+                Tone::Plain => "",
+                Tone::Number => "number",
+                Tone::Good => "good",
+                Tone::Bad => "bad",
+            };
+            context! { class, text => cell.text.as_str() }
+        };
+        self.rows.iter().map(|row| Value::from(row.iter().map(entry).collect::<Vec<Value>>())).collect()
     }
-}
-
-fn pictures(list: &[Shown]) -> String {
-    let figure = |s: &Shown| {
-        let (file, title, caption) = (escape(&s.file), escape(&s.title), escape(&s.caption));
-        format!(
-            "<figure><a href=\"{file}\"><img src=\"{file}\" alt=\"{title}\"></a>\
-             <figcaption><b>{title}</b>{caption}</figcaption></figure>\n"
-        )
-    };
-    list.iter().map(figure).collect()
-}
-
-fn legend(title: &str, scale: &Scale) -> String {
-    let ticks: String = scale.ticks(5).iter().map(|t| format!("<span>{}</span>", escape(t))).collect();
-    format!(
-        "<div class=\"legend\">{}<div class=\"bar\" style=\"background:{}\"></div><div class=\"ticks\">{ticks}</div></div>",
-        escape(title),
-        scale.css()
-    )
 }
 
 #[cfg(test)]
@@ -258,7 +221,7 @@ mod tests {
         ]);
         let html = page.html();
         assert!(!html.contains("<script") && !html.contains("'b'"));
-        assert_eq!(html.matches("&lt;script&gt;&quot;a&quot; &amp; &#39;b&#39;&lt;/script&gt;").count(), 18);
+        assert_eq!(html.matches("&lt;script&gt;&quot;a&quot; &amp; &#x27;b&#x27;&lt;&#x2f;script&gt;").count(), 18);
     }
 
     #[test]

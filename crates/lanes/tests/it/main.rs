@@ -8,5 +8,4 @@ mod curve;
 mod environment;
 mod lane;
 mod light;
-mod ocv;
 mod support;

@@ -6,6 +6,8 @@
 //! (V(y) − 2λ Cov(c, y) + λ² V(c))/N, which is least, V(y)(1 − ρ²)/N, for λ = Cov(c, y)/V(c), ρ being their correlation.
 //! λ is estimated for each channel: from the same samples (bias O(1/N)), or from the other half of them (none).
 
+use super::mc;
+
 /// Number of sums: n, and Σ c, Σ c², Σ c y, Σ y of three channels.
 pub const SUMS: usize = 13;
 
@@ -54,9 +56,7 @@ pub fn combined(sums: &[f32; SUMS]) -> [f32; 3] {
 
 /// The estimate of each of two independent halves with λ of the other, and the mean of both by numbers of samples. Unbiased.
 pub fn crossfit(halves: [&[f32; SUMS]; 2]) -> [f32; 3] {
-    let [a, b] = [0, 1].map(|k| estimate(halves[k], weight(halves[1 - k])));
-    let (n, m) = (halves[0][0], halves[1][0]);
-    if n + m > 0.0 { [0, 1, 2].map(|i| (n * a[i] + m * b[i]) / (n + m)) } else { [0.0; 3] }
+    mc::pooled(halves.map(|sums| sums[0]), [0, 1].map(|k| estimate(halves[k], weight(halves[1 - k]))))
 }
 
 #[cfg(test)]

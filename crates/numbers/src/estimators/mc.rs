@@ -5,3 +5,10 @@
 pub fn weight(n: f32, p: f32) -> f32 {
     if p > 0.0 { 1.0 / (n * p) } else { 0.0 }
 }
+
+/// The mean of two estimates of the same integral by their numbers of samples `n`; 0 without samples.
+#[inline]
+pub fn pooled(n: [f32; 2], [a, b]: [[f32; 3]; 2]) -> [f32; 3] {
+    let sum = n[0] + n[1];
+    if sum > 0.0 { [0, 1, 2].map(|i| (n[0] * a[i] + n[1] * b[i]) / sum) } else { [0.0; 3] }
+}

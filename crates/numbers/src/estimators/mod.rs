@@ -8,11 +8,9 @@
 //! | [`ocv`] | ȳ − Σ βⱼ c̄ⱼ, β fitted: optimizing control variates | by form: none where β is independent of the samples |
 //! | [`correlated`] | ȳ − λ c̄, one density, one control | O(1/N), or none with λ of other samples |
 //! | [`optimal_mis`] | Σ αⱼ + (1/N) Σ (f − Σ αⱼ pⱼ)/p_α, optimal weights | O(1/N), or none with α of other samples |
-//! | [`baselines`] | weighted importance sampling, defensive mixture, bidirectional | stated with each |
 //!
 //! [`stats`] has running moments and the tests (t, z, χ²) that hold estimators to these claims.
 
-pub mod baselines;
 pub mod correlated;
 pub mod mc;
 pub mod mis;

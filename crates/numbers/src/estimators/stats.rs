@@ -120,6 +120,16 @@ fn standardised(difference: f64, standard_error: f64) -> f64 {
     if difference == 0.0 { 0.0 } else { difference / standard_error }
 }
 
+/// The median: the middle value, or the mean of the middle two; 0 of none.
+pub fn median(values: impl IntoIterator<Item = f64>) -> f64 {
+    let mut sorted: Vec<f64> = values.into_iter().collect();
+    sorted.sort_by(f64::total_cmp);
+    match sorted.len() {
+        0 => 0.0,
+        n => 0.5 * (sorted[(n - 1) / 2] + sorted[n / 2]),
+    }
+}
+
 /// Running mean and variance.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct Welford {
@@ -240,6 +250,12 @@ mod tests {
         assert_eq!(whole.count(), parts.count());
         assert!((whole.mean() - parts.mean()).abs() < 1e-7);
         assert!((whole.variance() / parts.variance() - 1.0).abs() < 1e-9);
+    }
+
+    #[test]
+    fn median_is_the_middle_or_the_mean_of_the_middle_two() {
+        assert_eq!(median([3.0, 1.0, 2.0, 10.0]), 2.5);
+        assert_eq!((median([3.0, -1.0, 2.0]), median([7.0]), median([])), (2.0, 7.0, 0.0));
     }
 
     #[test]

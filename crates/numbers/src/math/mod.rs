@@ -5,13 +5,15 @@
 //! `to_from`; colour is linear Rec.709; angles are radians; f32 for light.
 //!
 //! Reading order: [`rgb`], [`frame`], [`transform`], [`ray`], [`bounds`], [`warp`], [`sphere_map`], [`octahedral`],
-//! [`distribution`], [`alias`], [`hash`].
+//! [`cumulative`], [`distribution`], [`alias`], [`hash`], [`number`].
 
 pub mod alias;
 pub mod bounds;
+pub mod cumulative;
 pub mod distribution;
 pub mod frame;
 pub mod hash;
+pub mod number;
 pub mod octahedral;
 pub mod ray;
 pub mod rgb;
@@ -25,7 +27,7 @@ pub use distribution::{PiecewiseConstant1D, PiecewiseConstant2D, Sample1D, Sampl
 pub use frame::Frame;
 pub use glam::{Affine3A, Mat3, Mat3A, Mat4, Quat, Vec2, Vec3, Vec3A, Vec4};
 pub use ray::Ray;
-pub use rgb::Rgb;
+pub use rgb::{Rgb, luminance};
 
 /// Largest f32 below one; random numbers are clamped to it so that `u < 1` holds after arithmetic.
 pub const ONE_MINUS_EPSILON: f32 = 1.0 - f32::EPSILON / 2.0;

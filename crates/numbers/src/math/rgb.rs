@@ -3,6 +3,18 @@
 use std::iter::Sum;
 use std::ops::{Add, AddAssign, Div, Index, Mul, MulAssign, Sub};
 
+/// What red, green and blue add to the relative luminance: the Y row of the Rec.709 matrix [ITU-R BT.709].
+const WEIGHTS: [f64; 3] = [0.212_671, 0.715_160, 0.072_169];
+
+/// What red, green and blue add to the luminance of a colour.
+pub const LUMINANCE: [f32; 3] = [WEIGHTS[0] as f32, WEIGHTS[1] as f32, WEIGHTS[2] as f32];
+
+/// Relative luminance of sums and means, which are f64.
+#[inline]
+pub fn luminance([r, g, b]: [f64; 3]) -> f64 {
+    WEIGHTS[0] * r + WEIGHTS[1] * g + WEIGHTS[2] * b
+}
+
 /// Linear Rec.709 (sRGB primaries, D65 white) triple: radiance, reflectance or weight.
 #[derive(Clone, Copy, Debug, Default, PartialEq, bytemuck::Pod, bytemuck::Zeroable)]
 #[repr(C)]
@@ -45,10 +57,10 @@ impl Rgb {
         Rgb::new(c[0], c[1], c[2])
     }
 
-    /// Relative luminance, the Y row of the Rec.709 matrix [ITU-R BT.709].
+    /// Relative luminance.
     #[inline]
     pub fn luminance(self) -> f32 {
-        0.212_671 * self.r + 0.715_160 * self.g + 0.072_169 * self.b
+        LUMINANCE[0] * self.r + LUMINANCE[1] * self.g + LUMINANCE[2] * self.b
     }
 
     /// The largest component.

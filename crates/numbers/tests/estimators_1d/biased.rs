@@ -1,10 +1,11 @@
 //! Biased baselines: the measured bias is the predicted one, and it is there.
 
-use super::integrals::{Integral, Proposals, luminance, run};
+use super::baselines::{bidirectional, weighted};
+use super::integrals::{Integral, Proposals, run};
 use super::{assert_means, level};
-use lumiris_numbers::estimators::baselines::{bidirectional, weighted};
 use lumiris_numbers::estimators::ris::with_replacement;
 use lumiris_numbers::estimators::stats::z_test;
+use lumiris_numbers::math::luminance;
 
 const RUNS: usize = 1_000_000;
 const LINE: Integral = Integral::Line;

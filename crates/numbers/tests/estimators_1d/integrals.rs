@@ -4,6 +4,7 @@ use lumiris_numbers::estimators::ris::Draw;
 use lumiris_numbers::estimators::ris::choice::Moments;
 use lumiris_numbers::estimators::stats::Welford;
 use lumiris_numbers::math::hash::HashStream;
+use lumiris_numbers::math::luminance;
 
 /// An integral over a line or a square of f = colour · visibility; the target q̂ is the luminance of the colour.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -96,10 +97,6 @@ impl Integral {
     pub fn moments(self) -> ([f64; 3], Moments) {
         self.moments_between(0.0, 1.0)
     }
-}
-
-pub fn luminance(c: [f64; 3]) -> f64 {
-    0.2126 * c[0] + 0.7152 * c[1] + 0.0722 * c[2]
 }
 
 /// M proposals of one run.

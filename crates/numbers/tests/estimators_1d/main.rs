@@ -11,13 +11,16 @@
 //! - [`techniques`]: several techniques
 //! - [`mixtures`]: integrals that a deterministic mixture of densities samples
 //! - [`ocv`]: optimizing control variates, optimal multiple importance sampling, correlated sampling
-//! - [`biased`]: the biased baselines have the bias that is predicted
+//! - [`oracle`]: slow versions in f64 of what ships in f32 and lanes
+//! - [`baselines`], [`biased`]: estimators that others are measured against have the bias that is predicted
 
+mod baselines;
 mod biased;
 mod integrals;
 mod law;
 mod mixtures;
 mod ocv;
+mod oracle;
 mod parameters;
 mod stratification;
 mod techniques;

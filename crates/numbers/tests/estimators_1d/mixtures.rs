@@ -1,7 +1,6 @@
 //! Integrals on 0..1 that a deterministic mixture of several densities samples, and blocks of passes over them.
 
-use lumiris_numbers::estimators::mis::allot;
-use lumiris_numbers::estimators::ocv::{MAX_COMPONENTS, NormalEquations, block_of};
+use lumiris_numbers::estimators::ocv::{Form, MAX_COMPONENTS, NormalEquations, block_of};
 use lumiris_numbers::math::hash::HashStream;
 
 /// A density on 0..1.
@@ -173,6 +172,47 @@ impl Mixture {
     }
 }
 
+/// Numbers of samples n_j of a deterministic mixture of weights `alpha`: Σ n_j = `n`, and each is as near to n α_j as whole
+/// numbers can be, but at least 1 where α_j > 0, if `n` suffices for that; else those of the largest α_j have one each.
+///
+/// The mixture is that of the weights n_j/n, which are α_j only if all n α_j are whole: densities must be weighted by what is
+/// returned here, or the estimate is biased. Equal claims are settled in favour of the earlier component.
+fn allot(alpha: &[f32], n: u32, counts: &mut [u32]) {
+    let counts = &mut counts[..alpha.len()];
+    counts.fill(0);
+    let total: f64 = alpha.iter().filter(|a| **a > 0.0).map(|a| f64::from(*a)).sum();
+    for _ in 0..n {
+        // Who has none comes first, by weight; then who is farthest below its share.
+        let claim = |j: usize, count: u32| match (alpha[j] > 0.0, count) {
+            (false, _) => f64::NEG_INFINITY,
+            (true, 0) => f64::from(n) + f64::from(alpha[j]) / total,
+            (true, count) => f64::from(n) * f64::from(alpha[j]) / total - f64::from(count),
+        };
+        let best = (0..alpha.len()).reduce(|b, j| if claim(j, counts[j]) > claim(b, counts[b]) { j } else { b });
+        match best {
+            Some(best) if alpha[best] > 0.0 => counts[best] += 1,
+            _ => return,
+        }
+    }
+}
+
+#[test]
+fn counts_of_a_mixture_are_its_shares_and_nobody_with_a_share_has_none() {
+    let counts = |alpha: &[f32], n| {
+        let mut counts = vec![9; alpha.len()];
+        allot(alpha, n, &mut counts);
+        counts
+    };
+    assert_eq!(counts(&[0.5, 0.25, 0.25], 8), [4, 2, 2]);
+    assert_eq!(counts(&[0.5, 0.25, 0.25], 64), [32, 16, 16]);
+    assert_eq!(counts(&[0.5, 0.25, 0.25], 3), [1, 1, 1]);
+    assert_eq!(counts(&[0.25, 0.5, 0.25], 2), [1, 1, 0]);
+    assert_eq!(counts(&[0.9, 0.05, 0.05], 10), [8, 1, 1]);
+    assert_eq!(counts(&[1.0, 0.0], 5), [5, 0]);
+    assert_eq!(counts(&[0.3, 0.2, 0.25, 0.25], 64), [19, 13, 16, 16]);
+    assert_eq!((counts(&[0.0], 4), counts(&[], 4)), (vec![0], vec![]));
+}
+
 /// Samples of a mixture: for each component its number n_j per pass.
 pub struct Sampler {
     pub mixture: Mixture,
@@ -185,6 +225,8 @@ pub struct Sampler {
     /// How far the occluder of [`Mixture::Table`] is moved.
     pub shift: f64,
     pub equations: NormalEquations,
+    /// I_j of each component: 1, or 0 if it has no samples and is no column.
+    pub integrals: Vec<f32>,
     pub n: u32,
 }
 
@@ -197,30 +239,86 @@ pub struct Point {
     pub mixture_pdf: f64,
 }
 
+/// Values of a sample: y by channel, and the columns.
+const VALUES: usize = 3 + MAX_COMPONENTS;
+
+/// A covariance for each pair of values.
+pub type Covariances = [[f64; VALUES]; VALUES];
+
 impl Sampler {
     pub fn new(mixture: Mixture, n: u32, is_stratified: bool) -> Sampler {
         let (densities, alpha): (Vec<Density>, Vec<f32>) = mixture.components().into_iter().unzip();
         let mut counts = vec![0; alpha.len()];
         allot(&alpha, n, &mut counts);
         let equations = NormalEquations::new(alpha.len());
-        Sampler { mixture, densities, counts, is_stratified, scale: 1.0, shift: 0.0, equations, n }
+        let integrals = counts.iter().map(|&n| f32::from(u8::from(n > 0))).collect();
+        Sampler { mixture, densities, counts, is_stratified, scale: 1.0, shift: 0.0, equations, integrals, n }
     }
 
     /// All samples of a block of `passes`.
     pub fn points(&self, passes: u32, stream: &mut HashStream, mut each: impl FnMut(&Point)) {
-        for (component, (density, count)) in self.densities.iter().zip(&self.counts).enumerate() {
+        for (component, count) in self.counts.iter().enumerate() {
             let strata = count * passes;
             for k in 0..strata {
                 let u = f64::from(stream.next_f32());
                 let u = if self.is_stratified { (f64::from(k) + u) / f64::from(strata) } else { u };
-                let mut point = Point { x: density.sample(u), component, pdfs: [0.0; 8], mixture_pdf: 0.0 };
-                for (j, d) in self.densities.iter().enumerate() {
-                    point.pdfs[j] = d.pdf(point.x);
-                    point.mixture_pdf += f64::from(self.counts[j]) / f64::from(self.n) * point.pdfs[j];
-                }
-                each(&point);
+                each(&self.point(component, u));
             }
         }
+    }
+
+    /// The sample of a component that `u` chooses.
+    fn point(&self, component: usize, u: f64) -> Point {
+        let x = self.densities[component].sample(u);
+        let mut point = Point { x, component, pdfs: [0.0; 8], mixture_pdf: 0.0 };
+        for (j, d) in self.densities.iter().enumerate() {
+            point.pdfs[j] = d.pdf(x);
+            point.mixture_pdf += f64::from(self.counts[j]) / f64::from(self.n) * point.pdfs[j];
+        }
+        point
+    }
+
+    /// r_j = p_j/p_α. A component without samples is no column.
+    fn columns(&self, point: &Point) -> [f32; MAX_COMPONENTS] {
+        let mut columns = [0.0; MAX_COMPONENTS];
+        for j in (0..self.counts.len()).filter(|&j| self.counts[j] > 0) {
+            columns[j] = (point.pdfs[j] / point.mixture_pdf) as f32;
+        }
+        columns
+    }
+
+    /// Covariances of the means over a block of `passes` of y, by channel, and of the columns, which follow; by quadrature
+    /// over each stratum.
+    pub fn covariances(&self, passes: u32) -> Covariances {
+        const POINTS: u32 = 1 << 15;
+        let mut covariances = Covariances::default();
+        let samples = f64::from(self.counts.iter().sum::<u32>() * passes);
+        for (component, count) in self.counts.iter().enumerate() {
+            let [strata, each] = if self.is_stratified { [count * passes, 1] } else { [1, count * passes] };
+            let points = (POINTS / strata.max(1)).max(256);
+            for stratum in 0..strata {
+                let (mut sum, mut products) = ([0.0; VALUES], Covariances::default());
+                for k in 0..points {
+                    let u = f64::from(stratum) + (f64::from(k) + 0.5) / f64::from(points);
+                    let point = self.point(component, u / f64::from(strata));
+                    let (y, columns) = (self.y(&point), self.columns(&point));
+                    let value = |i: usize| f64::from(if i < 3 { y[i] } else { columns[i - 3] });
+                    for i in 0..3 + self.densities.len() {
+                        sum[i] += value(i);
+                        (0..=i).for_each(|j| products[i][j] += value(i) * value(j));
+                    }
+                }
+                let (points, each) = (f64::from(points), f64::from(each));
+                for i in 0..VALUES {
+                    for j in 0..=i {
+                        let covariance = products[i][j] / points - sum[i] * sum[j] / (points * points);
+                        covariances[i][j] += covariance * each / (samples * samples);
+                        covariances[j][i] = covariances[i][j];
+                    }
+                }
+            }
+        }
+        covariances
     }
 
     /// y = f/p_α.
@@ -233,23 +331,23 @@ impl Sampler {
         self.mixture.f(point.x).map(|f| (f * scale) as f32)
     }
 
-    /// Adds a block of `passes` to `sums`, whose columns are p_j/p_α − `centre`. A component without samples is no column.
-    pub fn add(&self, passes: u32, centre: f64, stream: &mut HashStream, sums: &mut [f32]) {
+    /// Adds a block of `passes` to `sums`, whose columns are r_j.
+    pub fn add(&self, passes: u32, stream: &mut HashStream, sums: &mut [f32]) {
         self.points(passes, stream, |point| {
-            let mut columns = [0.0; MAX_COMPONENTS];
-            for (j, column) in columns[..self.densities.len()].iter_mut().enumerate() {
-                if self.counts[j] > 0 {
-                    *column = (point.pdfs[j] / point.mixture_pdf - centre) as f32;
-                }
+            let (columns, mut there, mut count) = (self.columns(point), [(0, 0.0); MAX_COMPONENTS], 0);
+            for (j, c) in columns.into_iter().enumerate().filter(|(_, c)| *c > 0.0) {
+                there[count] = (j, c);
+                count += 1;
             }
-            self.equations.add(sums, &columns[..self.densities.len()], self.y(point));
+            self.equations.add_sparse(sums, &there[..count], self.y(point));
         });
     }
 
-    /// The sums of a new block with centred columns.
-    pub fn block(&self, passes: u32, stream: &mut HashStream, sums: &mut [f32]) {
+    /// The sums of a new block in the columns of a form.
+    pub fn block(&self, form: Form, passes: u32, stream: &mut HashStream, sums: &mut [f32]) {
         sums.fill(0.0);
-        self.add(passes, 1.0, stream, sums);
+        self.add(passes, stream, sums);
+        form.finish(self.equations, sums, &self.integrals);
     }
 
     /// Lengths of the blocks of the first `passes` passes.

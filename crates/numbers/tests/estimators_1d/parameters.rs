@@ -5,7 +5,7 @@ use super::level;
 use lumiris_numbers::estimators::ris::choice::{
     Costs, Moments, MomentsEstimate, Variances, clamp_ratio, counts, counts_of_sets, length, optimal_ratio,
 };
-use lumiris_numbers::estimators::ris::{independent_sets, with_replacement};
+use lumiris_numbers::estimators::ris::{strata, stratified, with_replacement};
 use lumiris_numbers::estimators::stats::{Welford, z_test};
 
 const COSTS: Costs = Costs { t1: 1.0, t2: 40.0 };
@@ -99,13 +99,14 @@ fn the_optimal_set_size_beats_a_quarter_and_four_times_when_measured() {
     let (_, moments) = Integral::Line.moments();
     let size = one_channel(moments, 1).optimal_set_size(COSTS);
     let [best, quarter, four] = [size, size / 4.0, size * 4.0].map(|size| {
-        let (mut p, mut draws, mut u) = (Proposals::default(), Vec::new(), Vec::new());
+        let (mut p, mut draws, mut ends, mut u) = (Proposals::default(), Vec::new(), Vec::new(), Vec::new());
         let channels = run(40_000, [9, 0, (size * 100.0) as u32], |stream| {
             let c = counts_of_sets(size, COSTS, TIME, stream.next_2d());
             p.independent(Integral::Line, (c.m * c.n) as usize, stream);
             u.resize(c.n as usize, 0.0);
             fill(&mut u, stream);
-            independent_sets(&p.weights, c.n, &u, &mut draws);
+            strata::equal_proposals(p.weights.len(), c.n as usize, &mut ends);
+            stratified(&p.weights, &ends, &u, &mut draws);
             p.estimate(&draws)
         });
         channels[1].variance()

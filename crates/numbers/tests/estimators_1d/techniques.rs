@@ -1,69 +1,114 @@
-//! Several techniques, on proposals and on samples.
+//! Two techniques, on proposals and on samples.
 
-use super::integrals::{Integral, Proposals, fill, run};
+use super::integrals::{Integral, fill, run};
 use super::{assert_means, level};
+use lumiris_lanes::combine;
 use lumiris_numbers::estimators::mis::{Heuristic, Technique};
-use lumiris_numbers::estimators::ris::techniques::{proposal_factor, sample_weight};
 use lumiris_numbers::estimators::ris::{systematic, with_replacement};
-use lumiris_numbers::estimators::stats::z_test;
+use lumiris_numbers::estimators::stats::{Welford, z_test};
 use lumiris_numbers::math::hash::HashStream;
 
 const RUNS: usize = 500_000;
 const HEURISTICS: [Heuristic; 3] = [Heuristic::Balance, Heuristic::Power, Heuristic::Maximum];
 const LINE: Integral = Integral::Line;
 /// Proposals of each technique.
-const NUMBERS: [u32; 3] = [5, 2, 1];
+const NUMBERS: [u32; 2] = [5, 3];
 
-/// Techniques on the line: ½ + x, 1, and 2 on the lower half.
+/// Techniques on the line: ½ + x, and 2 on the lower half.
 fn sample(technique: usize, u: f64) -> [f64; 2] {
     match technique {
         0 => LINE.sample([u, 0.0]),
-        1 => [u, 0.0],
         _ => [0.5 * u, 0.0],
     }
 }
 
-fn techniques(x: [f64; 2]) -> [Technique; 3] {
-    let densities = [LINE.pdf(x) as f32, 1.0, if x[0] < 0.5 { 2.0 } else { 0.0 }];
-    [0, 1, 2].map(|i| Technique { n: NUMBERS[i] as f32, p: densities[i] })
+fn densities(x: [f64; 2]) -> [f32; 2] {
+    [LINE.pdf(x) as f32, if x[0] < 0.5 { 2.0 } else { 0.0 }]
 }
 
-/// Proposals of all techniques, with the factor that `factor` gives technique i.
-fn propose(p: &mut Proposals, stream: &mut HashStream, factor: impl Fn(usize, &[Technique; 3]) -> f64) {
-    p.clear();
-    for (i, &m) in NUMBERS.iter().enumerate() {
-        for _ in 0..m {
-            let x = sample(i, f64::from(stream.next_f32()));
-            p.push(LINE, x, factor(i, &techniques(x)));
+/// Proposals of one technique in columns, of both one after the other.
+#[derive(Default)]
+struct Table {
+    x: Vec<[f64; 2]>,
+    colour: [Vec<f32>; 3],
+    p: [Vec<f32>; 2],
+    q_hat: Vec<f32>,
+    r: Vec<f32>,
+    weight: Vec<f32>,
+}
+
+impl Table {
+    /// Draws the proposals of both techniques.
+    fn draw(&mut self, stream: &mut HashStream) {
+        self.x.clear();
+        self.colour.iter_mut().chain(&mut self.p).for_each(Vec::clear);
+        for (i, &m) in NUMBERS.iter().enumerate() {
+            for _ in 0..m {
+                let x = sample(i, f64::from(stream.next_f32()));
+                self.x.push(x);
+                self.colour.iter_mut().zip(LINE.colour(x)).for_each(|(column, c)| column.push(c as f32));
+                self.p.iter_mut().zip(densities(x)).for_each(|(column, p)| column.push(p));
+            }
+        }
+        [&mut self.q_hat, &mut self.r, &mut self.weight].into_iter().for_each(|v| v.resize(self.x.len(), 0.0));
+    }
+
+    /// q̂, r and w of all proposals; the techniques are weighted by the expected numbers `m`.
+    fn weigh(&mut self, heuristic: Heuristic, m: [f32; 2]) {
+        let ones = [1.0; (NUMBERS[0] + NUMBERS[1]) as usize];
+        let first = NUMBERS[0] as usize;
+        for (own, range) in [(0, 0..first), (1, first..self.x.len())] {
+            let proposals = combine::Proposals {
+                f_cos: self.colour.each_ref().map(|c| &c[range.clone()]),
+                li: [&ones[range.clone()]; 3],
+                p: &self.p[own][range.clone()],
+                p_other: &self.p[1 - own][range.clone()],
+                m: m[own],
+                m_other: m[1 - own],
+                heuristic,
+            };
+            let mut out = combine::Weights {
+                q_hat: &mut self.q_hat[range.clone()],
+                r: &mut self.r[range.clone()],
+                w: &mut self.weight[range.clone()],
+            };
+            combine::combine(lumiris_lanes::level(), &proposals, &mut out);
         }
     }
+}
+
+/// Two of the proposals of each run, which are weighted by the expected numbers `m`.
+fn estimates(heuristic: Heuristic, key: u32, m: [f32; 2]) -> [Welford; 3] {
+    let (mut table, mut draws) = (Table::default(), Vec::new());
+    run(RUNS, [key, heuristic as u32, 0], |stream| {
+        table.draw(stream);
+        table.weigh(heuristic, m);
+        systematic(&table.weight, 2, stream.next_f32(), &mut draws);
+        let mut sum = [0.0; 3];
+        for draw in &draws {
+            let i = draw.index as usize;
+            let factor = f64::from(draw.scale * table.r[i]);
+            let f = LINE.f(table.x[i]);
+            (0..3).for_each(|c| sum[c] += factor * f[c]);
+        }
+        sum
+    })
 }
 
 #[test]
 fn mis_on_proposals_is_unbiased() {
     let (value, _) = LINE.moments();
     for heuristic in HEURISTICS {
-        let (mut p, mut draws) = (Proposals::default(), Vec::new());
-        let channels = run(RUNS, [11, heuristic as u32, 0], |stream| {
-            propose(&mut p, stream, |i, t| f64::from(proposal_factor(heuristic, i, t)));
-            systematic(&p.weights, 2, stream.next_f32(), &mut draws);
-            p.estimate(&draws)
-        });
+        let channels = estimates(heuristic, 11, NUMBERS.map(|n| n as f32));
         assert_means(heuristic.into(), &channels, value);
     }
 }
 
 #[test]
-fn the_printed_weight_of_proposals_without_their_number_is_biased() {
+fn weights_by_wrong_numbers_of_proposals_are_biased() {
     let (value, _) = LINE.moments();
-    let (mut p, mut draws) = (Proposals::default(), Vec::new());
-    let channels = run(RUNS, [12, 0, 0], |stream| {
-        let total = f64::from(NUMBERS.iter().sum::<u32>());
-        propose(&mut p, stream, |i, t| f64::from(Heuristic::Balance.weight_of(i, t)) / (total * f64::from(t[i].p)));
-        systematic(&p.weights, 2, stream.next_f32(), &mut draws);
-        p.estimate(&draws)
-    });
-    for (w, value) in channels.iter().zip(value) {
+    let mean = NUMBERS.iter().sum::<u32>() as f32 / 2.0;
+    for (w, value) in estimates(Heuristic::Balance, 12, [mean; 2]).iter().zip(value) {
         assert!(z_test(w.mean(), value, w.standard_error()).p_value < level(), "{} {value}", w.mean());
     }
 }
@@ -73,6 +118,9 @@ fn mis_on_samples_is_unbiased() {
     // Two targets that each resemble f in another place, with sets of 4 and 6 proposals and 1 and 2 draws.
     let targets = |x: [f64; 2]| [0.1 + x[0] * x[0], if x[0] < 0.6 { 2.0 - x[0] } else { 0.0 }];
     const SETS: [(usize, usize); 2] = [(4, 1), (6, 2)];
+    // Proposals of ½ + x and of 1
+    let pdfs = |x: [f64; 2]| [LINE.pdf(x), 1.0];
+    let propose = |k: usize, u: f64| if k == 0 { LINE.sample([u, 0.0]) } else { [u, 0.0] };
     let (value, _) = LINE.moments();
     for heuristic in HEURISTICS {
         let (mut weights, mut points, mut draws) = (Vec::new(), Vec::new(), Vec::new());
@@ -80,8 +128,8 @@ fn mis_on_samples_is_unbiased() {
             let mut sum = [0.0; 3];
             for (k, (m, n)) in SETS.into_iter().enumerate() {
                 points.clear();
-                points.extend((0..m).map(|_| sample(k, f64::from(stream.next_f32()))));
-                let pdf = |x: [f64; 2]| f64::from(techniques(x)[k].p) * m as f64;
+                points.extend((0..m).map(|_| propose(k, f64::from(stream.next_f32()))));
+                let pdf = |x: [f64; 2]| pdfs(x)[k] * m as f64;
                 weights.clear();
                 weights.extend(points.iter().map(|&x| (targets(x)[k] / pdf(x)) as f32));
                 let mut u = [0.0; 2];
@@ -90,8 +138,8 @@ fn mis_on_samples_is_unbiased() {
                 for d in &draws {
                     let x = points[d.index as usize];
                     let q_hat = targets(x);
-                    let all = [0, 1].map(|i| Technique { n: SETS[i].1 as f32, p: q_hat[i] as f32 });
-                    let scale = f64::from(d.scale * sample_weight(heuristic, k, &all)) / pdf(x);
+                    let set = |i: usize| Technique { n: SETS[i].1 as f32, p: q_hat[i] as f32 };
+                    let scale = f64::from(d.scale * heuristic.weight(set(k), set(1 - k))) / pdf(x);
                     let f = LINE.f(x);
                     (0..3).for_each(|i| sum[i] += scale * f[i]);
                 }

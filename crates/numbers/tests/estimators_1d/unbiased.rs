@@ -1,10 +1,10 @@
 //! Means and variances of the ways of drawing.
 
+use super::baselines::{defensive_choice, defensive_pdf};
 use super::integrals::{ALL, Integral, Proposals, fill, run};
 use super::{assert_means, assert_variances};
-use lumiris_numbers::estimators::baselines::{defensive_choice, defensive_pdf};
 use lumiris_numbers::estimators::mc;
-use lumiris_numbers::estimators::ris::{independent_sets, strata, stratified, systematic, with_replacement};
+use lumiris_numbers::estimators::ris::{strata, stratified, systematic, with_replacement};
 use lumiris_numbers::math::hash::HashStream;
 
 const RUNS: usize = 1_000_000;
@@ -35,11 +35,12 @@ fn with_replacement_has_the_variance_of_thesis_equation_4_2() {
 fn independent_sets_have_the_variance_of_paper_equation_2() {
     for integral in ALL {
         let (value, moments) = integral.moments();
-        let (mut p, mut draws, mut u) = (Proposals::default(), Vec::new(), [0.0; N]);
+        let (mut p, mut draws, mut ends, mut u) = (Proposals::default(), Vec::new(), Vec::new(), [0.0; N]);
         let channels = run(RUNS, [2, integral as u32, 0], |stream| {
             p.independent(integral, M, stream);
             fill(&mut u, stream);
-            independent_sets(&p.weights, N as u32, &u, &mut draws);
+            strata::equal_proposals(M, N, &mut ends);
+            stratified(&p.weights, &ends, &u, &mut draws);
             p.estimate(&draws)
         });
         assert_means("independent sets", &channels, value);

@@ -4,9 +4,10 @@
 //! picture is [`CANDELAS`]. L_true is the mean of K long renderings and has noise of its own: its variance, from how the K
 //! differ, is subtracted from each square, so that E² has the expectation that it would have with the exact L_true.
 
-use super::super::measure::{Estimate, Measured, luminance};
+use super::super::measure::{Estimate, Measured};
 use lumiris::imaging::metrics::tvi;
 use lumiris_numbers::estimators::stats::Welford;
+use lumiris_numbers::math::luminance;
 
 /// Luminance (cd/m²) of a pixel whose luminance is 1: that of white on a display.
 pub const CANDELAS: f64 = 100.0;

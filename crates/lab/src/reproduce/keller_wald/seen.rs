@@ -1,10 +1,11 @@
 //! What the camera sees of diffuse surfaces, for pictures that show a photon map directly: L = albedo·E/π at the hit of the ray
 //! through the middle of each pixel [Keller and Wald 2000, Fig. 2].
 
-use super::super::measure::{Measured, luminance};
+use super::super::measure::Measured;
 use lumiris::accel::{Coherence, Hit, RayBatch};
 use lumiris::scene::World;
 use lumiris::textures::TextureContext;
+use lumiris_numbers::math::luminance;
 use lumiris_numbers::math::{Rgb, Vec2, Vec3};
 use std::f32::consts::FRAC_1_PI;
 

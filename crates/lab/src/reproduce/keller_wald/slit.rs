@@ -1,7 +1,7 @@
 //! A room that is lit through a slit: where importance puts photons, and what the cut-off loses [Keller and Wald 2000, Fig. 4].
 
 use super::super::figure::{Figure, Summary};
-use super::super::measure::{Estimate, Stage, luminance};
+use super::super::measure::{Estimate, Stage};
 use super::super::page::{Block, Cell, Table};
 use super::super::pictures::{gain, significant};
 use super::super::{ReproduceError, scaled};
@@ -13,6 +13,7 @@ use lumiris::photons::{Importance, ImportanceSettings, Tracing, Unimportant, Wan
 use lumiris::scene::RenderJob;
 use lumiris_numbers::estimators::stats::Welford;
 use lumiris_numbers::math::Vec3;
+use lumiris_numbers::math::luminance;
 use serde_json::{Value, json};
 use std::time::{Duration, Instant};
 

@@ -4,9 +4,10 @@
 //! one light without extent it is 0 or 1, for all others the mean visibility of the light weighted by what it would
 //! contribute. Pixels that show no surface belong to no class.
 
-use super::super::measure::{Stage, View, luminance, radiance};
+use super::super::measure::{Stage, View, radiance};
 use super::super::method::Method;
 use super::super::{Observer, ReproduceError};
+use lumiris_numbers::math::luminance;
 
 /// Least part of the light that arrives in lit pixels.
 pub const LIT: f64 = 0.9;

@@ -2,7 +2,6 @@
 //! Fig. 5]: one sample of M = 20 proposals against one of one.
 
 use super::super::figure::{Figure, Summary};
-use super::super::measure::luminance;
 use super::super::page::{Block, Cell, Shown, Table};
 use super::super::pictures::{HEAT, Picture, Scale, gain, significant};
 use super::super::{ReproduceError, page};
@@ -11,6 +10,7 @@ use crate::sphere_study::{SphereSettings, SphereStudy, sphere_picture};
 use lumiris::bsdfs::models::CookTorrance;
 use lumiris::bsdfs::{Bsdf, Evaluated, Model, ProposalDensity};
 use lumiris_numbers::math::Rgb;
+use lumiris_numbers::math::luminance;
 use serde_json::{Value, json};
 use std::time::Instant;
 

@@ -1,80 +1,85 @@
-//! The forms that fit β to samples of the same estimate.
+//! How β is found: what its columns are, which system it solves, and the estimate with it.
 
-use super::ldlt::IllConditioned;
-use super::ldlt::{Columns, Factors, Matrix};
-use super::normal::{NormalEquations, Penalty};
+use super::ldlt::MAX_COMPONENTS;
+use super::normal::NormalEquations;
+use super::solve::System;
+use crate::estimators::mc;
+use strum::{EnumString, IntoStaticStr, VariantNames};
 
-/// λ of equation (11) in the paper.
-pub const PAPER_LAMBDA: f32 = 1.0;
-
-/// An estimate, and whether it had to do without β.
-#[derive(Clone, Copy, Debug, Default, PartialEq)]
-pub struct Outcome {
-    /// The estimate of ∫f by channel.
-    pub estimate: [f32; 3],
-    /// Number of systems without solution; the estimate, or a half of it, is then that of MIS.
-    pub ill_conditioned: u32,
+/// How β is found.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, EnumString, IntoStaticStr, VariantNames)]
+#[strum(serialize_all = "kebab-case")]
+pub enum Form {
+    /// Equations (10) and (11): β₀ + Σ β_j of the ridge solution with λ = 1 on the same samples. Biased.
+    Paper,
+    /// Equation (7), β from the same samples. Bias O(1/N).
+    Regression,
+    /// Equation (7), β from the other of two independently randomised halves. Unbiased.
+    Crossfit,
+    /// Equation (7), β from earlier blocks of passes of the same pixel ([`block_of`](super::block_of)). Unbiased.
+    #[default]
+    Progressive,
 }
 
-/// Equations (10) and (11): β₀ + Σ_{j<m} β_j I_j, where β minimises Σ (y − β₀ − Σ_{j<m} β_j r_j)² + λ Σ_{j≥0} β_j².
-///
-/// `sums` are of columns that are **not** centred, r_j = p_j/p_α, and `integrals` are the I_j = ∫p_j (1 in the paper). The last
-/// component is left out. The penalty draws β₀, which is most of the estimate, to 0 as well: biased.
-pub fn paper(equations: NormalEquations, sums: &[f32], integrals: &[f32], lambda: f32) -> Outcome {
-    let m = equations.components();
-    let failed = Outcome { estimate: equations.mean(sums), ill_conditioned: 1 };
-    if m == 0 || !(equations.samples(sums) > 0.0) {
-        return Outcome { ill_conditioned: 0, ..failed };
-    }
-
-    // The unknown of the last column is that of the intercept.
-    let (mut a, mut x) = (Matrix::default(), Columns::default());
-    let last = m - 1;
-    for j in 0..m {
-        for k in 0..m {
-            a[j][k] = match (j == last, k == last) {
-                (false, false) => equations.sum_of_products(sums, j, k),
-                (false, true) => equations.sum_of_column(sums, j),
-                (true, false) => equations.sum_of_column(sums, k),
-                (true, true) => f64::from(equations.samples(sums)),
-            };
-        }
-        a[j][j] += f64::from(lambda);
-        for (i, x) in x.iter_mut().enumerate() {
-            x[j] = if j == last { equations.sum_of_y(sums, i) } else { equations.sum_with_y(sums, j, i) };
+impl Form {
+    /// How many rows of sums the samples of an estimate are: each half of them has its own in the form that fits β to the other.
+    pub fn rows(self) -> usize {
+        match self {
+            Form::Crossfit => 2,
+            Form::Paper | Form::Regression | Form::Progressive => 1,
         }
     }
-    let Ok(factors) = Factors::new(m, a) else { return failed };
-    let weight = |j: usize| if j == last { 1.0 } else { f64::from(integrals[j]) };
-    let estimate = x.map(|b| {
-        let beta = factors.solve(b);
-        (0..m).map(|j| beta[j] * weight(j)).sum::<f64>() as f32
-    });
-    if estimate.iter().all(|e| e.is_finite()) { Outcome { estimate, ill_conditioned: 0 } } else { failed }
-}
 
-/// Equation (7) with β from the same samples. Bias O(1/N).
-pub fn regression(equations: NormalEquations, sums: &[f32], penalty: Penalty) -> Outcome {
-    applied(equations, sums, sums, penalty)
-}
-
-/// Equation (7) on each half of the samples with β from the other, and the mean of both by numbers of samples. Unbiased if
-/// the halves are independent and each is a whole deterministic mixture.
-pub fn crossfit(equations: NormalEquations, halves: [&[f32]; 2], penalty: Penalty) -> Outcome {
-    let [a, b] = [0, 1].map(|k| applied(equations, halves[k], halves[1 - k], penalty));
-    let n = halves.map(|sums| equations.samples(sums));
-    if !(n[0] + n[1] > 0.0) {
-        return Outcome::default();
+    /// The system that β solves.
+    pub fn system(self) -> System {
+        match self {
+            Form::Paper => System::PAPER,
+            Form::Regression => System::SAME_SAMPLES,
+            Form::Crossfit | Form::Progressive => System::OTHER_SAMPLES,
+        }
     }
-    let estimate = [0, 1, 2].map(|i| (n[0] * a.estimate[i] + n[1] * b.estimate[i]) / (n[0] + n[1]));
-    Outcome { estimate, ill_conditioned: a.ill_conditioned + b.ill_conditioned }
+
+    /// Makes sums of the form's columns of those of r_j = p_j/p_α: r_j/I_j for the paper, r_j − I_j for the others.
+    pub fn finish(self, equations: NormalEquations, sums: &mut [f32], integrals: &[f32]) {
+        match self {
+            Form::Paper => {
+                let mut scales = [1.0; MAX_COMPONENTS];
+                for (scale, integral) in scales.iter_mut().zip(integrals).filter(|(_, integral)| **integral > 0.0) {
+                    *scale = 1.0 / integral;
+                }
+                equations.scale(sums, &scales);
+            }
+            Form::Regression | Form::Crossfit | Form::Progressive => equations.centre(sums, integrals),
+        }
+    }
+
+    /// The estimate of the samples of [`rows`](Self::rows) rows of `sums` with the coefficients `beta` of the systems of these
+    /// rows; in the progressive form, with those that were fitted to earlier samples.
+    ///
+    /// A system without solution has coefficients of 0; the estimate, or the half of it that they are for, is then that of MIS.
+    pub fn estimate(self, equations: NormalEquations, sums: &[f32], beta: &[f32], integrals: &[f32]) -> [f32; 3] {
+        match self {
+            Form::Paper => with_intercept(equations, sums, beta, integrals),
+            Form::Regression | Form::Progressive => equations.estimate(sums, beta),
+            Form::Crossfit => {
+                let [a, b] = [0, 1].map(|half| &sums[half * equations.len()..][..equations.len()]);
+                let (beta_of_a, beta_of_b) = beta.split_at(equations.coefficients());
+                let estimates = [equations.estimate(a, beta_of_b), equations.estimate(b, beta_of_a)];
+                mc::pooled([equations.samples(a), equations.samples(b)], estimates)
+            }
+        }
+    }
 }
 
-/// Equation (7) on the samples of `sums` with β from those of `fit`.
-fn applied(equations: NormalEquations, sums: &[f32], fit: &[f32], penalty: Penalty) -> Outcome {
-    let mut beta = [0.0; 3 * super::MAX_COMPONENTS];
-    let result = equations.solve(fit, penalty, &mut beta);
-    Outcome { estimate: equations.estimate(sums, &beta), ill_conditioned: u32::from(result == Err(IllConditioned)) }
+/// β₀ + Σ β_j of the components that are there [Fan et al. 2006, Eq. 10]; the last unknown is β₀. The mean of y if there is no
+/// solution.
+fn with_intercept(equations: NormalEquations, sums: &[f32], beta: &[f32], integrals: &[f32]) -> [f32; 3] {
+    let last = equations.components().saturating_sub(1);
+    if beta.iter().all(|b| *b == 0.0) {
+        return equations.mean(sums);
+    }
+    let is_there = |j: usize| j == last || integrals[j] > 0.0;
+    [0, 1, 2].map(|c| (0..=last).filter(|&j| is_there(j)).map(|j| beta[3 * j + c]).sum())
 }
 
 #[cfg(test)]
@@ -82,51 +87,66 @@ mod tests {
     use super::*;
     use crate::math::hash::HashStream;
 
-    /// Sums of `n` samples of y = 3 + 2 c₀ − c₁ + `noise`, and their columns plus `shift`.
-    fn sums(n: usize, noise: f32, shift: f32) -> (NormalEquations, Vec<f32>) {
+    const INTEGRALS: [f32; 3] = [1.0; 3];
+
+    /// Sums of `n` samples of y = 3 + 2 c₀ − c₁ + `noise` in the columns r_j = 1 + c_j, where Σ c_j = 0.
+    fn sums(n: usize, noise: f32) -> (NormalEquations, Vec<f32>) {
         let equations = NormalEquations::new(3);
         let (mut sums, mut stream) = (vec![0.0; equations.len()], HashStream::new([4, 5, 6]));
         for _ in 0..n {
             let [a, b] = stream.next_2d().map(|u| 2.0 * u - 1.0);
             let y = 3.0 + 2.0 * a - b + noise * (stream.next_f32() - 0.5);
-            equations.add(&mut sums, &[a + shift, b + shift, shift - a - b], [y, 2.0 * y, 0.0]);
+            equations.add_sparse(&mut sums, &[(0, 1.0 + a), (1, 1.0 + b), (2, 1.0 - a - b)], [y, 2.0 * y, 0.0]);
         }
         (equations, sums)
     }
 
+    /// The estimate with β of `system` from the same rows.
+    fn estimate(form: Form, system: System, equations: NormalEquations, rows: &[&[f32]]) -> [f32; 3] {
+        let mut sums = rows.concat();
+        sums.chunks_exact_mut(equations.len()).for_each(|row| form.finish(equations, row, &INTEGRALS));
+        let mut beta = vec![0.0; rows.len() * equations.coefficients()];
+        equations.solve(system, &sums, &mut beta);
+        form.estimate(equations, &sums, &beta, &INTEGRALS)
+    }
+
     #[test]
     fn what_the_columns_explain_is_integrated_exactly() {
-        let (equations, all) = sums(40, 0.0, 0.0);
-        let exact = |o: Outcome| (o.estimate[0] - 3.0).abs() < 1e-5 && (o.estimate[1] - 6.0).abs() < 2e-5;
-        let outcome = regression(equations, &all, Penalty::NONE);
-        assert!(exact(outcome) && outcome.estimate[2] == 0.0, "{outcome:?}");
-        let (_, other) = sums(9, 0.0, 0.0);
-        assert!(exact(crossfit(equations, [&all, &other], Penalty::NONE)));
+        let (equations, all) = sums(40, 0.0);
+        let (_, other) = sums(9, 0.0);
         assert!((equations.mean(&all)[0] - 3.0).abs() > 0.01);
+        for (form, rows) in
+            [(Form::Regression, &[&all[..]][..]), (Form::Progressive, &[&all]), (Form::Crossfit, &[&all, &other])]
+        {
+            assert_eq!(rows.len(), form.rows());
+            let [a, b, c] = estimate(form, System::LEAST_SQUARES, equations, rows);
+            assert!((a - 3.0).abs() < 1e-4 && (b - 6.0).abs() < 2e-4 && c == 0.0, "{form:?}: {a} {b} {c}");
+        }
     }
 
     #[test]
     fn paper_without_penalty_is_the_regression_and_its_penalty_fades() {
-        let (equations, uncentred) = sums(40, 1.0, 1.0);
-        let (_, centred) = sums(40, 1.0, 0.0);
-        let expected = regression(equations, &centred, Penalty::NONE).estimate[0];
+        let (equations, all) = sums(40, 1.0);
+        let without = System { ridge: 0.0, ..System::PAPER };
         // The last column is 3 less the others here, so that the fit is the same without it.
-        let got = paper(equations, &uncentred, &[1.0; 3], 0.0).estimate[0];
-        assert!((got - expected).abs() < 1e-4, "{got} {expected}");
+        let expected = estimate(Form::Regression, System::LEAST_SQUARES, equations, &[&all])[0];
+        let got = estimate(Form::Paper, without, equations, &[&all])[0];
+        assert!((got - expected).abs() < 1e-3, "{got} {expected}");
         let distance = |n: usize| {
-            let (e, s) = sums(n, 1.0, 1.0);
-            let at = |lambda| paper(e, &s, &[1.0; 3], lambda).estimate[0];
-            (at(PAPER_LAMBDA) - at(0.0)).abs()
+            let (e, s) = sums(n, 1.0);
+            let at = |system| estimate(Form::Paper, system, e, &[&s])[0];
+            (at(System::PAPER) - at(without)).abs()
         };
         assert!(distance(10) > 10.0 * distance(1000));
     }
 
     #[test]
     fn nothing_is_zero() {
-        let equations = NormalEquations::new(2);
-        let sums = vec![0.0; equations.len()];
-        assert_eq!(regression(equations, &sums, Penalty::default()), Outcome::default());
-        assert_eq!(crossfit(equations, [&sums, &sums], Penalty::default()), Outcome::default());
-        assert_eq!(paper(equations, &sums, &[1.0; 2], 1.0), Outcome::default());
+        let equations = NormalEquations::new(3);
+        let nothing = vec![0.0; equations.len()];
+        for form in [Form::Paper, Form::Regression, Form::Crossfit, Form::Progressive] {
+            let rows = vec![&nothing[..]; form.rows()];
+            assert_eq!(estimate(form, form.system(), equations, &rows), [0.0; 3], "{form:?}");
+        }
     }
 }

@@ -18,33 +18,20 @@
 //!
 //! | module | what |
 //! |---|---|
-//! | [`normal`] | the sums Σ c_j c_k, Σ c_j y, … of the regression, and β from them |
-//! | [`ldlt`] | small symmetric systems, with pivots |
-//! | [`forms`] | the forms that fit β to samples of the same estimate |
+//! | [`normal`] | the sums Σ c_j c_k, Σ c_j y, … of the regression, and the estimate with β |
+//! | [`solve`] | β from the sums of many points at once |
+//! | [`forms`] | the forms: which system, of which columns, and what is made of β |
+//! | [`ldlt`] | one small symmetric system in f64, with pivots, for [`super::optimal_mis`] |
 //! | [`block`] | the blocks of passes of the progressive form |
 
 pub mod block;
 pub mod forms;
 pub mod ldlt;
 pub mod normal;
+pub mod solve;
 
 pub use block::{Block, block_of};
-pub use forms::{Outcome, crossfit, paper, regression};
+pub use forms::Form;
 pub use ldlt::{IllConditioned, MAX_COMPONENTS};
-pub use normal::{NormalEquations, Penalty};
-use strum::{EnumString, IntoStaticStr, VariantNames};
-
-/// How β is found.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, EnumString, IntoStaticStr, VariantNames)]
-#[strum(serialize_all = "kebab-case")]
-pub enum Form {
-    /// Equations (10) and (11): β₀ + Σ β_j of the ridge solution with λ = 1 on the same samples. Biased.
-    Paper,
-    /// Equation (7), β from the same samples. Bias O(1/N).
-    Regression,
-    /// Equation (7), β from the other of two independently randomised halves. Unbiased.
-    Crossfit,
-    /// Equation (7), β from earlier blocks of passes of the same pixel ([`block_of`]). Unbiased.
-    #[default]
-    Progressive,
-}
+pub use normal::NormalEquations;
+pub use solve::{Matrix, System};

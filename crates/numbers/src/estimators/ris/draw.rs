@@ -4,8 +4,7 @@
 //! |---|---|---|---|---|
 //! | [`with_replacement`] | N w_j/S | S/(N w_j) | up to N times | thesis (4.1) |
 //! | [`systematic`] | N w_j/S | S/(N w_j) | ⌊N w_j/S⌋ or ⌈N w_j/S⌉ times | [Kitagawa 1996] |
-//! | [`stratified`] | w_j/S_k | S_k/w_j | once | thesis (4.5) |
-//! | [`independent_sets`] | w_j/S_k | S_k/w_j | once | paper (1) |
+//! | [`stratified`] | w_j/S_k | S_k/w_j | once | thesis (4.5); paper (1) |
 //!
 //! S is the sum of all weights, S_k that of stratum k. A weight that is not positive and finite counts as 0; such a proposal
 //! is never drawn, and nothing is drawn if there is no other. Uniform numbers outside 0..1 are clamped.
@@ -14,6 +13,7 @@
 //! give equal bits, and a probability is off by about 1e-7 of its block's, which is the step of a uniform f32.
 
 use crate::math::ONE_MINUS_EPSILON;
+use crate::math::number::Number;
 
 /// A drawn proposal. The estimate is Σ scale·c_index, scale = 1/E[number of times that it is drawn].
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -34,6 +34,12 @@ const CELLS: usize = 64;
 const DOWN: f32 = 1.0 / 1024.0;
 
 type Block = [f32; BLOCK];
+
+/// The weight q̂·r of a proposal, or of several; 0 if that is not finite.
+#[inline(always)]
+pub fn weight<N: Number>(q_hat: N, r: N) -> N {
+    (q_hat * r).or_zero_if_not_finite()
+}
 
 /// The weight that counts: 0 for NaN, infinite and negative weights.
 #[inline(always)]
@@ -204,7 +210,8 @@ pub fn systematic(weights: &[f32], n: u32, u: f32, out: &mut Vec<Draw>) {
 /// weight draws nothing. O(M).
 ///
 /// With M strata the estimate is that of plain Monte Carlo, bit for bit if the sum is formed in the same order. Proposals
-/// after the last end are in no stratum, and their part of the integral would be missing.
+/// after the last end are in no stratum, and their part of the integral would be missing. With strata of equal numbers of
+/// independent proposals this is one draw from each of n independent sets [Talbot et al. 2005, Eq. 1].
 pub fn stratified(weights: &[f32], ends: &[u32], u: &[f32], out: &mut Vec<Draw>) {
     out.clear();
     let mut begin = 0;
@@ -212,20 +219,6 @@ pub fn stratified(weights: &[f32], ends: &[u32], u: &[f32], out: &mut Vec<Draw>)
         let end = (end as usize).clamp(begin, weights.len());
         draw_evenly(&weights[begin..end], begin, 1, u, out);
         begin = end;
-    }
-}
-
-/// One draw from each of `n` sets of M consecutive proposals, as equal in size as `weights.len()` = nM allows; scale =
-/// S_k/w_j [Talbot et al. 2005, Eq. 1]. `u.len()` = n. O(nM).
-///
-/// With r_j = 1/(nM p(x_j)), Σ scale·c_j is (1/n) Σ_k (f(y_k)/q̂(y_k)) (1/M) Σ_j q̂(x_kj)/p(x_kj). This is [`stratified`] with
-/// strata of equal counts; the variance is [Talbot et al. 2005, Eq. 2] if the proposals are independent.
-pub fn independent_sets(weights: &[f32], n: u32, u: &[f32], out: &mut Vec<Draw>) {
-    out.clear();
-    let (m, n) = (weights.len(), n as usize);
-    for (k, &u) in (0..n).zip(u) {
-        let (begin, end) = (k * m / n, (k + 1) * m / n);
-        draw_evenly(&weights[begin..end], begin, 1, u, out);
     }
 }
 
@@ -301,14 +294,13 @@ mod tests {
     const EDGES: [f32; 4] = [0.0, 0.5, ONE_MINUS_EPSILON, f32::NAN];
 
     /// The draws of every function with the same number u everywhere and n samples (or strata).
-    fn all_ways(weights: &[f32], n: usize, u: f32) -> [Vec<Draw>; 4] {
-        let mut draws = [Vec::new(), Vec::new(), Vec::new(), Vec::new()];
+    fn all_ways(weights: &[f32], n: usize, u: f32) -> [Vec<Draw>; 3] {
+        let mut draws = [Vec::new(), Vec::new(), Vec::new()];
         let us = vec![u; n];
         let ends: Vec<u32> = (1..=n).map(|k| (k * weights.len() / n.max(1)) as u32).collect();
         with_replacement(weights, &us, &mut draws[0]);
         systematic(weights, n as u32, u, &mut draws[1]);
         stratified(weights, &ends, &us, &mut draws[2]);
-        independent_sets(weights, n as u32, &us, &mut draws[3]);
         draws
     }
 
@@ -361,8 +353,6 @@ mod tests {
         let indices: Vec<u32> = draws.iter().map(|d| d.index).collect();
         assert_eq!(indices, [0, 0, 1, 1, 1, 1, 3, 3]);
         assert_eq!((draws[0].scale, draws[2].scale), (0.5, 0.25));
-        independent_sets(&[1.0, 2.0], 5, &[0.5; 5], &mut draws);
-        assert_eq!(draws, [Draw { index: 0, scale: 1.0 }, Draw { index: 1, scale: 1.0 }]);
     }
 
     #[test]
@@ -464,9 +454,9 @@ mod tests {
         /// One set with one draw is the same proposal in all ways of drawing.
         #[test]
         fn one_draw_is_the_same_in_all_ways(weights in weights(), u in 0.0_f32..1.0) {
-            let [a, b, c, d] = all_ways(&weights, 1, u);
+            let [a, b, c] = all_ways(&weights, 1, u);
             let same = |x: &[Draw], y: &[Draw]| x.len() == y.len() && x.iter().zip(y).all(|(x, y)| x.index.abs_diff(y.index) <= 1);
-            prop_assert!(same(&a, &b) && b == c && c == d);
+            prop_assert!(same(&a, &b) && b == c);
         }
     }
 }

@@ -2,7 +2,7 @@
 //! [Talbot et al. 2005; Talbot 2005].
 //!
 //! RIS is an unbiased subsampling of a Monte Carlo sum. M proposals x_j of density p give ∫f as Σ c_j with
-//! c_j = f(x_j)·r_j and r_j = 1/(M p(x_j)); proposals of several techniques have r_j = wᵢ/(mᵢ pᵢ) ([`techniques`]).
+//! c_j = f(x_j)·r_j and r_j = 1/(M p(x_j)); proposals of several techniques have r_j = wᵢ/(mᵢ pᵢ) (thesis 4.6.1).
 //! The weight of a proposal is w_j = q̂(x_j)·r_j, where the target q̂ resembles f but is cheap (f without visibility,
 //! say), so that S = Σ w_j estimates ∫q̂. A drawn proposal j stands for the ones that were not drawn:
 //!
@@ -15,14 +15,15 @@
 //!
 //! | module | what | source |
 //! |---|---|---|
-//! | [`draw`] | N of M by weight: with replacement, systematic, one per stratum, independent sets | thesis (4.1), (4.5); paper (1) |
+//! | [`draw`] | N of M by weight: with replacement, systematic, one per stratum or set | thesis (4.1), (4.5); paper (1) |
+//! | [`reservoir`] | one of a stream | [Chao 1982] |
 //! | [`strata`] | the strata: equal counts or equal weights | thesis 4.5.2.1, 4.5.2.2 |
-//! | [`techniques`] | proposals or samples of several techniques | thesis 4.6 |
 //! | [`choice`] | how many proposals for how many samples | thesis (4.3), (4.4); paper (2), (3) |
 
 pub mod choice;
 pub mod draw;
+pub mod reservoir;
 pub mod strata;
-pub mod techniques;
 
-pub use draw::{Draw, independent_sets, stratified, systematic, with_replacement};
+pub use draw::{Draw, stratified, systematic, weight, with_replacement};
+pub use reservoir::Reservoir;

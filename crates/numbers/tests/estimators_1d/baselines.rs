@@ -1,10 +1,12 @@
-//! Estimators that others are measured against, each with its bias.
+//! Estimators that nothing renders with, each with its bias: what the others are measured against.
 //!
 //! | function | estimate | bias |
 //! |---|---|---|
 //! | [`weighted`] | ∫g · Σ f/p / Σ g/p | O(1/M), consistent |
 //! | [`defensive_pdf`] | a sampling density α p₀ + (1 − α) p₁ | none |
 //! | [`bidirectional`] | unshadowed colour times mean visibility | does not vanish for colours |
+
+use lumiris_numbers::math::ONE_MINUS_EPSILON;
 
 /// Weighted importance sampling [Powell and Swann 1966; Bekaert et al. 2000]: ∫g · Σ c_j / Σ w_j of all M proposals, with
 /// c_j = f/(M p), w_j = g/(M p) and `integral` = ∫g known; 0 if no proposal has weight.
@@ -26,11 +28,7 @@ pub fn defensive_pdf(alpha: f32, p0: f32, p1: f32) -> f32 {
 /// Choice of the defensive mixture: whether to sample p₀, and the number `u` made uniform again for that sampling.
 #[inline]
 pub fn defensive_choice(alpha: f32, u: f32) -> (bool, f32) {
-    if u < alpha {
-        (true, u / alpha)
-    } else {
-        (false, ((u - alpha) / (1.0 - alpha)).min(crate::math::ONE_MINUS_EPSILON))
-    }
+    if u < alpha { (true, u / alpha) } else { (false, ((u - alpha) / (1.0 - alpha)).min(ONE_MINUS_EPSILON)) }
 }
 
 /// Bidirectional importance sampling by resampling [Burke et al. 2005]: the unshadowed colour Σ_j c_j of all proposals times
@@ -44,32 +42,26 @@ pub fn bidirectional(unshadowed: [f32; 3], visibilities: &[f32]) -> [f32; 3] {
     unshadowed.map(|c| (f64::from(c) * visible) as f32)
 }
 
-#[cfg(test)]
-mod tests {
-    use super::*;
-    use crate::math::ONE_MINUS_EPSILON;
+#[test]
+fn no_proposals_and_no_samples_are_zero() {
+    assert_eq!(weighted(&[], &[], 2.0), 0.0);
+    assert_eq!(weighted(&[1.0], &[0.0], 2.0), 0.0);
+    assert_eq!(bidirectional([1.0, 2.0, 3.0], &[]), [0.0; 3]);
+}
 
-    #[test]
-    fn no_proposals_and_no_samples_are_zero() {
-        assert_eq!(weighted(&[], &[], 2.0), 0.0);
-        assert_eq!(weighted(&[1.0], &[0.0], 2.0), 0.0);
-        assert_eq!(bidirectional([1.0, 2.0, 3.0], &[]), [0.0; 3]);
-    }
+#[test]
+fn weighted_is_exact_if_g_is_proportional_to_f() {
+    assert!((weighted(&[0.2, 0.6, 4.0], &[0.1, 0.3, 2.0], 1.5) - 3.0).abs() < 1e-6);
+}
 
-    #[test]
-    fn weighted_is_exact_if_g_is_proportional_to_f() {
-        assert!((weighted(&[0.2, 0.6, 4.0], &[0.1, 0.3, 2.0], 1.5) - 3.0).abs() < 1e-6);
-    }
-
-    #[test]
-    fn defensive_choice_keeps_numbers_uniform_for_any_alpha() {
-        for alpha in [0.0, 0.3, 1.0] {
-            for u in [0.0, 0.29, 0.31, ONE_MINUS_EPSILON] {
-                let (safe, v) = defensive_choice(alpha, u);
-                assert_eq!(safe, u < alpha);
-                assert!((0.0..1.0).contains(&v), "{alpha} {u} {v}");
-            }
+#[test]
+fn defensive_choice_keeps_numbers_uniform_for_any_alpha() {
+    for alpha in [0.0, 0.3, 1.0] {
+        for u in [0.0, 0.29, 0.31, ONE_MINUS_EPSILON] {
+            let (safe, v) = defensive_choice(alpha, u);
+            assert_eq!(safe, u < alpha);
+            assert!((0.0..1.0).contains(&v), "{alpha} {u} {v}");
         }
-        assert_eq!(defensive_pdf(0.25, 2.0, 4.0), 3.5);
     }
+    assert_eq!(defensive_pdf(0.25, 2.0, 4.0), 3.5);
 }

@@ -1,0 +1,68 @@
+//! Writing of files: either the whole file appears under its name, or what was there before stays.
+
+use std::fs::File;
+use std::io::{self, Write};
+use std::path::Path;
+use tempfile::{Builder, NamedTempFile};
+
+/// Writes a file. `write` gets another one beside it with the same extension, which takes the name when all of it is on the disk,
+/// and is removed if anything fails.
+pub fn write_whole(path: &Path, write: impl FnOnce(&mut NamedTempFile) -> io::Result<()>) -> io::Result<()> {
+    let folder = path.parent().filter(|folder| !folder.as_os_str().is_empty()).unwrap_or(Path::new("."));
+    let suffix = path.extension().map_or_else(String::new, |extension| format!(".{}", extension.to_string_lossy()));
+    let mut builder = Builder::new();
+    builder.prefix(".partial-").suffix(&suffix);
+    #[cfg(unix)]
+    builder.permissions(std::os::unix::fs::PermissionsExt::from_mode(0o666));
+    let mut partial = builder.tempfile_in(folder)?;
+    write(&mut partial)?;
+    // On the disk before it takes the name, lest a crash leaves an empty file in place of a good one. It is opened anew, for whoever
+    // wrote it by its name may have made it anew.
+    File::open(partial.path())?.sync_all()?;
+    partial.persist(path)?;
+    Ok(())
+}
+
+/// Writes a text, as [`write_whole`]; what is no file (a pipe, a terminal) gets it directly.
+pub fn write_text(path: &Path, text: &str) -> io::Result<()> {
+    match path.metadata() {
+        Ok(is) if !is.is_file() && !is.is_dir() => std::fs::write(path, text),
+        _ => write_whole(path, |file| file.write_all(text.as_bytes())),
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_write_that_fails_leaves_the_old_file_and_nothing_else() {
+        let folder = tempfile::tempdir().unwrap();
+        let path = folder.path().join("a.txt");
+        write_text(&path, "first").unwrap();
+        let failed = write_whole(&path, |file| {
+            assert_eq!(file.path().extension(), path.extension());
+            file.write_all(b"half of the sec")?;
+            Err(io::Error::other("the disk is full"))
+        });
+        assert_eq!(failed.unwrap_err().to_string(), "the disk is full");
+        assert_eq!(std::fs::read_to_string(&path).unwrap(), "first");
+        write_text(&path, "second").unwrap();
+        assert_eq!(std::fs::read_to_string(&path).unwrap(), "second");
+        assert_eq!(std::fs::read_dir(folder.path()).unwrap().count(), 1);
+        assert!(write_text(&folder.path().join("no/where.txt"), "").is_err());
+        assert!(write_text(folder.path(), "").is_err());
+    }
+
+    #[cfg(unix)]
+    #[test]
+    fn others_may_read_what_the_user_lets_them_read() {
+        use std::os::unix::fs::PermissionsExt;
+        let folder = tempfile::tempdir().unwrap();
+        let [ours, plain] = ["ours", "plain"].map(|name| folder.path().join(name));
+        write_text(&ours, "").unwrap();
+        std::fs::write(&plain, "").unwrap();
+        let mode = |path: &Path| path.metadata().unwrap().permissions().mode();
+        assert_eq!(mode(&ours), mode(&plain));
+    }
+}
