@@ -150,7 +150,7 @@ fn stats(args: &RenderArgs, world: &World, rendering: &Rendering, setup: SetupTi
         "counts": {
             "camera_rays": s.camera_rays, "bounce_rays": s.bounce_rays, "proposals": d.proposals,
             "emitter_rays": d.emitter_rays, "shadow_segments": d.segments,
-            "ocv_systems": d.systems, "ocv_fallbacks_to_mis": d.ill_conditioned,
+            "ocv_systems": d.systems, "ocv_ill_conditioned": d.ill_conditioned,
         },
         "rates": {
             "camera_mrays_per_second": mrays(s.camera_rays, s.camera_time),

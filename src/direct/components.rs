@@ -100,7 +100,7 @@ impl Fits {
         self.sums.is_empty()
     }
 
-    /// Begins a block. Returns the number of fits whose system has no solution; their estimates are those of MIS.
+    /// Begins a block. Returns the number of fits whose system is ill-conditioned; without a solution, estimates are those of MIS.
     pub fn solve(&mut self) -> u64 {
         if !self.is_optimal {
             return solve_all(self.equations, Penalty::default(), &self.sums, &mut self.beta);
@@ -109,7 +109,7 @@ impl Fits {
         let fits = self.sums.chunks(self.equations.len()).zip(betas);
         // Pixels that met no surface have nothing to solve
         let lit = fits.filter(|(sums, _)| self.equations.samples(sums) > 0.0);
-        lit.map(|(sums, beta)| u64::from(optimal_mis::coefficients(self.equations, sums, beta).is_err())).sum()
+        lit.map(|(sums, beta)| u64::from(optimal_mis::coefficients(self.equations, sums, beta) != Ok(0))).sum()
     }
 
     fn beta(&self, fit: u32) -> &[f32] {
@@ -123,7 +123,7 @@ impl Fits {
     }
 }
 
-/// Coefficients of many systems, some at a time; 0 where there is no solution. Returns how many those are.
+/// Coefficients of many systems, some at a time; 0 where there is no solution. Returns how many are ill-conditioned.
 fn solve_all(equations: NormalEquations, penalty: Penalty, sums: &[f32], beta: &mut [f32]) -> u64 {
     let matrix = if penalty.known_means { Matrix::KnownMeans } else { Matrix::SampleMeans };
     solve_matrices(equations, (matrix, penalty), sums, beta)
@@ -162,7 +162,7 @@ pub struct Components {
     beta: Vec<f32>,
     /// Systems that were to be solved.
     pub systems: u64,
-    /// Those without solution, whose estimates are those of MIS.
+    /// Those without solution, whose estimates are those of MIS, and those whose columns were dropped.
     pub ill_conditioned: u64,
     /// Rays traced among emitters to find out what hides behind one.
     pub emitter_rays: u64,

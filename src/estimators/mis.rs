@@ -25,9 +25,10 @@ pub struct Technique {
     pub p: f32,
 }
 
-/// Relative difference of densities within which the maximum heuristic takes them for equal: the same density, computed on
-/// the way of one technique and of the other, differs by rounding.
-const TIE: f32 = 1e-3;
+/// Part of the larger of two densities from which on the maximum heuristic takes the smaller for equal to it: the same density,
+/// computed on the way of one technique and of the other, differs by rounding. Nothing but the two values decides, and not which
+/// of them is whose, so that both techniques agree on what is a tie.
+const TIE: f32 = 0.999;
 
 impl Heuristic {
     /// The name on the command line and in metadata.
@@ -54,8 +55,8 @@ impl Heuristic {
         match self {
             Heuristic::Balance => 1.0 / (1.0 + ratio),
             Heuristic::Power => 1.0 / (1.0 + ratio * ratio),
-            Heuristic::Maximum if (ratio - 1.0).abs() <= TIE => 0.5,
-            Heuristic::Maximum => f32::from(u8::from(ratio < 1.0)),
+            Heuristic::Maximum if x.min(y) >= TIE * x.max(y) => 0.5,
+            Heuristic::Maximum => f32::from(u8::from(x > y)),
         }
     }
 
@@ -77,7 +78,7 @@ impl Heuristic {
         let relative = |y: f32| match self {
             Heuristic::Balance => y / most,
             Heuristic::Power => (y / most) * (y / most),
-            Heuristic::Maximum => f32::from(u8::from(y / most >= 1.0 - TIE)),
+            Heuristic::Maximum => f32::from(u8::from(y >= TIE * most)),
         };
         relative(x) / techniques.iter().map(|t| relative(expected(t))).sum::<f32>()
     }
@@ -141,6 +142,25 @@ mod tests {
                 }
             }
         }
+    }
+
+    #[test]
+    fn weights_of_two_techniques_sum_to_one_at_the_edges_of_a_tie() {
+        // 0.5 where y/x was 1.0010005, whose reciprocal counted as a tie
+        for x in [1e-40, 3e-7, 0.3, 1.0, 7.0, 3e38_f32] {
+            for of_tie in [0.998_999, 0.999, 0.999_000_1, 1.0, 1.001, 1.001_000_5, 1.001_001] {
+                for ulps in -40_i32..=40 {
+                    let y = f32::from_bits((x * of_tie).to_bits().wrapping_add_signed(ulps));
+                    let (a, b) = (Technique { n: 1.0, p: x }, Technique { n: 1.0, p: y });
+                    let (w, v) = (Heuristic::Maximum.weight(a, b), Heuristic::Maximum.weight(b, a));
+                    assert_eq!(w + v, 1.0, "{x} {y}: {w} {v}");
+                    let of = |i| Heuristic::Maximum.weight_of(i, &[a, b]);
+                    assert_eq!([of(0), of(1)], [w, v], "{x} {y}");
+                }
+            }
+        }
+        let weight = |y| Heuristic::Maximum.weight(Technique { n: 1.0, p: 1.0 }, Technique { n: 1.0, p: y });
+        assert_eq!([0.998, 0.9995, 1.0005, 1.002].map(weight), [1.0, 0.5, 0.5, 0.0]);
     }
 
     #[test]

@@ -20,8 +20,9 @@ use super::ocv::{IllConditioned, MAX_COMPONENTS, NormalEquations, Outcome};
 
 /// α of A α = b from `sums` of columns that are **not** centred, r_j = p_j/p_α: `alpha[3 j + channel]`; all 0 on error.
 ///
-/// An error if anything is not finite, or if there are no more samples than independent techniques.
-pub fn coefficients(equations: NormalEquations, sums: &[f32], alpha: &mut [f32]) -> Result<(), IllConditioned> {
+/// Returns the number of techniques that were dropped because they depend on the others: the solution is one of many then. An
+/// error if anything is not finite, or if there are no more samples than independent techniques.
+pub fn coefficients(equations: NormalEquations, sums: &[f32], alpha: &mut [f32]) -> Result<usize, IllConditioned> {
     let alpha = &mut alpha[..equations.coefficients()];
     let result = try_coefficients(equations, sums, alpha);
     if result.is_err() {
@@ -30,7 +31,7 @@ pub fn coefficients(equations: NormalEquations, sums: &[f32], alpha: &mut [f32])
     result
 }
 
-fn try_coefficients(equations: NormalEquations, sums: &[f32], alpha: &mut [f32]) -> Result<(), IllConditioned> {
+fn try_coefficients(equations: NormalEquations, sums: &[f32], alpha: &mut [f32]) -> Result<usize, IllConditioned> {
     let m = equations.components();
     let (mut a, mut b) = (Matrix::default(), Columns::default());
     for j in 0..m {
@@ -51,7 +52,7 @@ fn try_coefficients(equations: NormalEquations, sums: &[f32], alpha: &mut [f32])
             alpha[i] = x as f32;
         }
     }
-    if alpha.iter().all(|a| a.is_finite()) { Ok(()) } else { Err(IllConditioned) }
+    if alpha.iter().all(|a| a.is_finite()) { Ok(factors.dropped()) } else { Err(IllConditioned) }
 }
 
 /// Σ_j α_j I_j + (1/N) Σ (y − Σ_j α_j r_j) with the known integrals I_j = ∫p_j; 0 without samples. α = 0 is the balance
@@ -70,12 +71,12 @@ pub fn estimate(equations: NormalEquations, sums: &[f32], integrals: &[f32], alp
     })
 }
 
-/// The estimate with α from the same samples; the balance heuristic if the system is ill-conditioned. Bias O(1/N).
+/// The estimate with α from the same samples; the balance heuristic if there is no α. Bias O(1/N).
 pub fn direct(equations: NormalEquations, sums: &[f32], integrals: &[f32]) -> Outcome {
     let mut alpha = [0.0; 3 * MAX_COMPONENTS];
     let result = coefficients(equations, sums, &mut alpha);
     let estimate = estimate(equations, sums, integrals, &alpha);
-    Outcome { estimate, ill_conditioned: u32::from(result.is_err()) }
+    Outcome { estimate, ill_conditioned: u32::from(result != Ok(0)) }
 }
 
 #[cfg(test)]
@@ -115,6 +116,22 @@ mod tests {
                 );
             }
         }
+    }
+
+    #[test]
+    fn techniques_that_are_alike_are_counted_and_those_that_are_not_there_are_not() {
+        let equations = NormalEquations::new(3);
+        let ill_conditioned = |third: fn(f32) -> f32| {
+            let (mut sums, mut stream) = (vec![0.0; equations.len()], HashStream::new([1, 5, 9]));
+            for _ in 0..40 {
+                let u = stream.next_f32();
+                equations.add(&mut sums, &[u, 2.0 - u, third(u)], [1.0 + u, u, 1.0]);
+            }
+            let outcome = direct(equations, &sums, &[1.0; 3]);
+            assert!((outcome.estimate[2] - 1.0).abs() < 1e-4, "{outcome:?}");
+            outcome.ill_conditioned
+        };
+        assert_eq!([ill_conditioned(|u| u), ill_conditioned(|_| 0.0)], [1, 0]);
     }
 
     #[test]

@@ -10,7 +10,7 @@ pub enum Weighting {
     Balance,
     /// x²/(x² + y²).
     Power,
-    /// 1 where x is larger, 0 where y is, 1/2 where they differ by less than one part in a thousand.
+    /// 1 where x is larger, 0 where y is, 1/2 where the smaller is at least 0.999 of the larger.
     Maximum,
 }
 
@@ -78,8 +78,8 @@ fn combine_lanes<S: Simd>(simd: S, proposals: &Proposals<'_>, out: &mut Weights<
             Weighting::Balance => one / (ratio + one),
             Weighting::Power => one / (ratio * ratio + one),
             Weighting::Maximum => {
-                let is_tie = (ratio - one).abs().simd_le(F::splat(simd, 1e-3));
-                is_tie.select(F::splat(simd, 0.5), ratio.simd_lt(one).select(one, zero))
+                let is_tie = x.min(y).simd_ge(x.max(y) * 0.999);
+                is_tie.select(F::splat(simd, 0.5), x.simd_gt(y).select(one, zero))
             }
         };
         let weight = both_infinite.select(F::splat(simd, 0.5), has_other.select(weight, one));
@@ -99,7 +99,7 @@ mod tests {
     use super::*;
     use crate::math::Rgb;
     use crate::math::hash::HashStream;
-    use crate::simd::test_support::{LENGTHS, assert_same_bits};
+    use crate::simd::test_support::{LENGTHS, assert_same_bits, levels};
 
     fn numbers(stream: &mut HashStream, n: usize) -> Vec<f32> {
         let special = [0.0, f32::INFINITY, f32::NAN, -1.0, 1e-38, 3e38];
@@ -123,8 +123,8 @@ mod tests {
         match weighting {
             Weighting::Balance => 1.0 / (1.0 + ratio),
             Weighting::Power => 1.0 / (1.0 + ratio * ratio),
-            Weighting::Maximum if (ratio - 1.0).abs() <= 1e-3 => 0.5,
-            Weighting::Maximum => f32::from(u8::from(ratio < 1.0)),
+            Weighting::Maximum if x.min(y) >= 0.999 * x.max(y) => 0.5,
+            Weighting::Maximum => f32::from(u8::from(x > y)),
         }
     }
 
@@ -150,6 +150,31 @@ mod tests {
                         assert!(w[i].is_finite() && (w[i] == q_hat[i] * r[i] || w[i] == 0.0));
                     }
                 });
+            }
+        }
+    }
+    #[test]
+    fn weights_of_two_techniques_sum_to_one_at_the_edges_of_a_tie() {
+        let edges = [0.999_f32, 1.0, 1.001, 1.001_001];
+        let p: Vec<f32> = (1..200).map(|i| 0.01 * i as f32).collect();
+        for edge in edges {
+            for ulps in -20_i32..=20 {
+                let q: Vec<f32> =
+                    p.iter().map(|p| f32::from_bits((p * edge).to_bits().wrapping_add_signed(ulps))).collect();
+                let ones = vec![1.0; p.len()];
+                // r·p of one technique, whose luminance does not matter
+                let weights = |level, p: &[f32], p_other: &[f32]| {
+                    let [mut q_hat, mut r, mut w] = [(); 3].map(|()| vec![0.0; p.len()]);
+                    let (f_cos, weighting) = ([&ones[..]; 3], Weighting::Maximum);
+                    let proposals = Proposals { f_cos, li: f_cos, p, p_other, m: 1.0, m_other: 1.0, weighting };
+                    combine(level, &proposals, &mut Weights { q_hat: &mut q_hat, r: &mut r, w: &mut w });
+                    r.iter().zip(p).map(|(r, p)| r * p).collect::<Vec<_>>()
+                };
+                for level in levels() {
+                    for (a, b) in weights(level, &p, &q).iter().zip(weights(level, &q, &p)) {
+                        assert!((a + b - 1.0).abs() < 1e-6, "{edge} {ulps}: {a} {b}");
+                    }
+                }
             }
         }
     }

@@ -53,7 +53,8 @@ impl System {
 }
 
 /// Solves the system of each point of `sums` and writes `beta[3 columns · point + 3 j + channel]`, 0 where a solution is not
-/// finite. Returns the number of these.
+/// finite. Returns the number of ill-conditioned systems: those without a finite solution, and those that dropped a column which
+/// is not 0 in all samples.
 pub fn solve(system: &System, sums: &[f32], beta: &mut [f32]) -> usize {
     assert!(system.columns <= MOST, "at most {MOST} columns");
     if system.columns == 0 {
@@ -61,18 +62,18 @@ pub fn solve(system: &System, sums: &[f32], beta: &mut [f32]) -> usize {
     }
     let (len, width) = (system.len(), 3 * system.columns);
     let points = sums.len() / len;
-    let mut failed = 0;
+    let mut ill_conditioned = 0;
     for first in (0..points).step_by(LANES) {
         let lanes = Lanes { sums, len, first, last: points - 1 };
-        let (x, ok) = solve_lanes(&lanes, system);
+        let (x, is_ill) = solve_lanes(&lanes, system);
         for p in 0..LANES.min(points - first) {
             for k in 0..width {
                 beta[(first + p) * width + k] = x[k].0[p];
             }
-            failed += usize::from(!ok[p]);
+            ill_conditioned += usize::from(is_ill[p]);
         }
     }
-    failed
+    ill_conditioned
 }
 
 /// A number of each point.
@@ -157,9 +158,23 @@ impl Lanes<'_> {
         }
         F(v)
     }
+
+    /// Σ c_j², n for a column of ones.
+    fn squares(&self, system: &System) -> [F; MOST] {
+        let m = system.columns;
+        let mut squares = [F::ZERO; MOST];
+        for j in 0..m {
+            squares[j] = self.get(j * (j + 3) / 2);
+        }
+        if system.matrix == Matrix::Intercept {
+            let [_, _, values] = offsets(m);
+            squares[m - 1] = self.get(values + 6);
+        }
+        squares
+    }
 }
 
-/// Coefficients by column and channel, and where they are finite.
+/// Coefficients by column and channel, and which systems are ill-conditioned.
 fn solve_lanes(lanes: &Lanes<'_>, system: &System) -> ([F; 3 * MOST], [bool; LANES]) {
     let m = system.columns;
     let (zero, one) = (F::ZERO, F::ONE);
@@ -204,7 +219,11 @@ fn solve_lanes(lanes: &Lanes<'_>, system: &System) -> ([F; 3 * MOST], [bool; LAN
             x.0[p] = if ok[p] { x.0[p] } else { 0.0 };
         }
     }
-    (x, ok)
+    let mut is_ill = factors.drops(&lanes.squares(system), &a);
+    for p in 0..LANES {
+        is_ill[p] |= !ok[p];
+    }
+    (x, is_ill)
 }
 
 /// Where Σ c_j y, Σ c_j and Σ y begin.
@@ -300,6 +319,17 @@ impl Factors {
         x
     }
 
+    /// Where a column takes no part though its sum of squares is not 0: it is constant, or depends on those before it.
+    fn drops(&self, squares: &[F; MOST], a: &Triangle) -> [bool; LANES] {
+        let mut drops = [false; LANES];
+        for (j, squares) in squares.iter().enumerate() {
+            for p in 0..LANES {
+                drops[p] |= squares.0[p] > 0.0 && (a[j][j].0[p] == 0.0 || self.per_d[j].0[p] == 0.0);
+            }
+        }
+        drops
+    }
+
     /// rank − λ tr A⁻¹, by the columns of L⁻¹.
     fn effective(&self, m: usize, ridge: f32) -> F {
         let (zero, one) = (F::ZERO, F::ONE);
@@ -372,6 +402,45 @@ mod tests {
                 }
             }
         }
+    }
+
+    #[test]
+    fn systems_that_drop_a_column_are_counted_unless_it_is_zero() {
+        let count = |matrix, ridge, column: fn([f32; 3]) -> f32| {
+            let system = System { columns: 3, matrix, ridge, shrink: 0.0 };
+            let (points, mut stream) = (11, HashStream::new([4, 4, 4]));
+            let mut sums = vec![0.0; points * system.len()];
+            for row in sums.chunks_exact_mut(system.len()) {
+                for _ in 0..20 {
+                    let [u, v] = stream.next_2d();
+                    let c = [u, v, column([u, v, stream.next_f32()])];
+                    let [mixed, means, values] = offsets(3);
+                    for (at, (j, k)) in [(0, 0), (1, 0), (1, 1), (2, 0), (2, 1), (2, 2)].into_iter().enumerate() {
+                        row[at] += c[j] * c[k];
+                    }
+                    for j in 0..3 {
+                        (0..3).for_each(|i| row[mixed + 3 * j + i] += c[j] * u);
+                        row[means + j] += c[j];
+                        row[values + j] += u;
+                        row[values + 3 + j] += u * u;
+                    }
+                    row[values + 6] += 1.0;
+                }
+            }
+            let mut beta = vec![7.0; 9 * points];
+            let count = solve(&system, &sums, &mut beta);
+            assert!(beta.iter().all(|b| b.is_finite()));
+            count
+        };
+        for matrix in [Matrix::KnownMeans, Matrix::SampleMeans] {
+            assert_eq!(count(matrix, 0.0, |[u, v, _]| u - 0.5 * v), 11, "{matrix:?}");
+            assert_eq!(count(matrix, 0.0, |[_, _, w]| w), 0, "{matrix:?}");
+            assert_eq!(count(matrix, 0.0, |_| 0.0), 0, "{matrix:?}");
+            // The penalty makes the columns independent
+            assert_eq!(count(matrix, 1.0, |[u, v, _]| u - 0.5 * v), 0, "{matrix:?}");
+        }
+        assert_eq!([0.0, 1.0].map(|ridge| count(Matrix::SampleMeans, ridge, |_| 1.5)), [11, 11]);
+        assert_eq!(count(Matrix::KnownMeans, 0.0, |_| 1.5), 0);
     }
 
     #[test]

@@ -1,7 +1,7 @@
 //! The forms that fit β to samples of the same estimate.
 
 use super::ldlt::{Columns, Factors, Matrix};
-use super::normal::{IllConditioned, NormalEquations, Penalty};
+use super::normal::{NormalEquations, Penalty};
 
 /// λ of equation (11) in the paper.
 pub const PAPER_LAMBDA: f32 = 1.0;
@@ -11,7 +11,8 @@ pub const PAPER_LAMBDA: f32 = 1.0;
 pub struct Outcome {
     /// The estimate of ∫f by channel.
     pub estimate: [f32; 3],
-    /// Number of systems without solution; the estimate, or a half of it, is then that of MIS.
+    /// Number of systems without solution, where the estimate, or a half of it, is that of MIS, and of those whose columns were
+    /// dropped.
     pub ill_conditioned: u32,
 }
 
@@ -49,7 +50,8 @@ pub fn paper(equations: NormalEquations, sums: &[f32], integrals: &[f32], lambda
         let beta = factors.solve(b);
         (0..m).map(|j| beta[j] * weight(j)).sum::<f64>() as f32
     });
-    if estimate.iter().all(|e| e.is_finite()) { Outcome { estimate, ill_conditioned: 0 } } else { failed }
+    let ill_conditioned = u32::from(factors.dropped() > 0);
+    if estimate.iter().all(|e| e.is_finite()) { Outcome { estimate, ill_conditioned } } else { failed }
 }
 
 /// Equation (7) with β from the same samples. Bias O(1/N).
@@ -73,7 +75,7 @@ pub fn crossfit(equations: NormalEquations, halves: [&[f32]; 2], penalty: Penalt
 fn applied(equations: NormalEquations, sums: &[f32], fit: &[f32], penalty: Penalty) -> Outcome {
     let mut beta = [0.0; 3 * super::MAX_COMPONENTS];
     let result = equations.solve(fit, penalty, &mut beta);
-    Outcome { estimate: equations.estimate(sums, &beta), ill_conditioned: u32::from(result == Err(IllConditioned)) }
+    Outcome { estimate: equations.estimate(sums, &beta), ill_conditioned: u32::from(result != Ok(0)) }
 }
 
 #[cfg(test)]

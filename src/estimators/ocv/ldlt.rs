@@ -21,6 +21,8 @@ pub struct Factors {
     order: [usize; MAX_COMPONENTS],
     /// How many of them are not dropped.
     rank: usize,
+    /// How many were dropped though they are not 0.
+    dropped: usize,
     m: usize,
     /// D on the diagonal; L D below it in the order of pivots, by original rows and columns.
     a: Matrix,
@@ -55,12 +57,18 @@ impl Factors {
             }
             rank += 1;
         }
-        Ok(Factors { order, rank, m, a })
+        let dropped = order[rank..m].iter().filter(|&&i| scale[i] > 0.0).count();
+        Ok(Factors { order, rank, dropped, m, a })
     }
 
     /// Number of independent columns.
     pub fn rank(&self) -> usize {
         self.rank
+    }
+
+    /// Number of columns that were dropped though they are not 0.
+    pub fn dropped(&self) -> usize {
+        self.dropped
     }
 
     /// x with A x = b as far as the columns that are left can have it; 0 for those that were dropped.
@@ -125,6 +133,7 @@ mod tests {
                 let (a, b) = system(m, rank, &mut stream);
                 let factors = Factors::new(m, a).expect("it is not negative");
                 assert_eq!(factors.rank(), rank, "m = {m}");
+                assert_eq!(factors.dropped(), if rank > 0 { m - rank } else { 0 }, "m = {m}, rank {rank}");
                 for b in &b {
                     let x = factors.solve(*b);
                     for i in 0..m {

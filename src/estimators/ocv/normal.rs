@@ -228,8 +228,9 @@ impl NormalEquations {
         if n > 0.0 { [y[0] / n, y[1] / n, y[2] / n] } else { [0.0; 3] }
     }
 
-    /// Coefficients of the regression of y on the columns, `beta[3 j + channel]`; all 0 on error.
-    pub fn solve(self, sums: &[f32], penalty: Penalty, beta: &mut [f32]) -> Result<(), IllConditioned> {
+    /// Coefficients of the regression of y on the columns, `beta[3 j + channel]`; all 0 on error. Returns the number of columns
+    /// that were dropped though they are not 0 in all samples, since they are constant or depend on others.
+    pub fn solve(self, sums: &[f32], penalty: Penalty, beta: &mut [f32]) -> Result<usize, IllConditioned> {
         let beta = &mut beta[..self.coefficients()];
         let result = self.try_solve(sums, penalty, beta);
         if result.is_err() {
@@ -238,13 +239,14 @@ impl NormalEquations {
         result
     }
 
-    fn try_solve(self, sums: &[f32], penalty: Penalty, beta: &mut [f32]) -> Result<(), IllConditioned> {
+    fn try_solve(self, sums: &[f32], penalty: Penalty, beta: &mut [f32]) -> Result<usize, IllConditioned> {
         let n = f64::from(sums[self.count()]);
         if n == 0.0 {
             beta.fill(0.0);
-            return Ok(());
+            return Ok(0);
         }
         let (mut a, b) = self.system(&sums[..self.len()], n, penalty.known_means);
+        let constant = (0..self.m).filter(|&j| a[j][j] == 0.0 && self.sum_of_products(sums, j, j) > 0.0).count();
         let ridge = f64::from(penalty.ridge);
         for (j, row) in a.iter_mut().enumerate().take(self.m) {
             row[j] += ridge;
@@ -264,7 +266,7 @@ impl NormalEquations {
                 beta[i] = (factor * x) as f32;
             }
         }
-        if beta.iter().all(|b| b.is_finite()) { Ok(()) } else { Err(IllConditioned) }
+        if beta.iter().all(|b| b.is_finite()) { Ok(constant + factors.dropped()) } else { Err(IllConditioned) }
     }
 
     /// Σ c_j c_k, less n c̄_j c̄_k where the means are not known, and Σ (c_j − c̄_j) y.
@@ -395,7 +397,7 @@ mod tests {
         equations.add(&mut sums, &[0.0, 1.0], [1.0, f32::INFINITY, 1.0]);
         assert_eq!(equations.mean(&sums), [4.0 / 6.0; 3]);
         let mut beta = [7.0; 6];
-        assert_eq!(equations.solve(&sums, Penalty::default(), &mut beta), Ok(()));
+        assert_eq!(equations.solve(&sums, Penalty::default(), &mut beta), Ok(0));
         equations.add(&mut sums, &[1e30, 1.0], [1.0; 3]);
         assert_eq!(equations.solve(&sums, Penalty::default(), &mut beta), Err(IllConditioned));
         assert_eq!(beta, [0.0; 6]);

@@ -197,6 +197,12 @@ pub struct Point {
     pub mixture_pdf: f64,
 }
 
+/// Values of a sample: y by channel, and the columns.
+const VALUES: usize = 3 + MAX_COMPONENTS;
+
+/// A covariance for each pair of values.
+pub type Covariances = [[f64; VALUES]; VALUES];
+
 impl Sampler {
     pub fn new(mixture: Mixture, n: u32, is_stratified: bool) -> Sampler {
         let (densities, alpha): (Vec<Density>, Vec<f32>) = mixture.components().into_iter().unzip();
@@ -213,14 +219,65 @@ impl Sampler {
             for k in 0..strata {
                 let u = f64::from(stream.next_f32());
                 let u = if self.is_stratified { (f64::from(k) + u) / f64::from(strata) } else { u };
-                let mut point = Point { x: density.sample(u), component, pdfs: [0.0; 8], mixture_pdf: 0.0 };
-                for (j, d) in self.densities.iter().enumerate() {
-                    point.pdfs[j] = d.pdf(point.x);
-                    point.mixture_pdf += f64::from(self.counts[j]) / f64::from(self.n) * point.pdfs[j];
-                }
-                each(&point);
+                each(&self.point(component, u));
             }
         }
+    }
+
+    /// The sample of a component that `u` chooses.
+    fn point(&self, component: usize, u: f64) -> Point {
+        let x = self.densities[component].sample(u);
+        let mut point = Point { x, component, pdfs: [0.0; 8], mixture_pdf: 0.0 };
+        for (j, d) in self.densities.iter().enumerate() {
+            point.pdfs[j] = d.pdf(x);
+            point.mixture_pdf += f64::from(self.counts[j]) / f64::from(self.n) * point.pdfs[j];
+        }
+        point
+    }
+
+    /// p_j/p_α − `centre`. A component without samples is no column.
+    fn columns(&self, point: &Point, centre: f64) -> [f32; MAX_COMPONENTS] {
+        let mut columns = [0.0; MAX_COMPONENTS];
+        for (j, column) in columns[..self.densities.len()].iter_mut().enumerate() {
+            if self.counts[j] > 0 {
+                *column = (point.pdfs[j] / point.mixture_pdf - centre) as f32;
+            }
+        }
+        columns
+    }
+
+    /// Covariances of the means over a block of `passes` of y, by channel, and of the centred columns, which follow; by quadrature
+    /// over each stratum.
+    pub fn covariances(&self, passes: u32) -> Covariances {
+        const POINTS: u32 = 1 << 15;
+        let mut covariances = Covariances::default();
+        let samples = f64::from(self.counts.iter().sum::<u32>() * passes);
+        for (component, count) in self.counts.iter().enumerate() {
+            let [strata, each] = if self.is_stratified { [count * passes, 1] } else { [1, count * passes] };
+            let points = (POINTS / strata.max(1)).max(256);
+            for stratum in 0..strata {
+                let (mut sum, mut products) = ([0.0; VALUES], Covariances::default());
+                for k in 0..points {
+                    let u = f64::from(stratum) + (f64::from(k) + 0.5) / f64::from(points);
+                    let point = self.point(component, u / f64::from(strata));
+                    let (y, columns) = (self.y(&point), self.columns(&point, 1.0));
+                    let value = |i: usize| f64::from(if i < 3 { y[i] } else { columns[i - 3] });
+                    for i in 0..3 + self.densities.len() {
+                        sum[i] += value(i);
+                        (0..=i).for_each(|j| products[i][j] += value(i) * value(j));
+                    }
+                }
+                let (points, each) = (f64::from(points), f64::from(each));
+                for i in 0..VALUES {
+                    for j in 0..=i {
+                        let covariance = products[i][j] / points - sum[i] * sum[j] / (points * points);
+                        covariances[i][j] += covariance * each / (samples * samples);
+                        covariances[j][i] = covariances[i][j];
+                    }
+                }
+            }
+        }
+        covariances
     }
 
     /// y = f/p_α.
@@ -233,15 +290,10 @@ impl Sampler {
         self.mixture.f(point.x).map(|f| (f * scale) as f32)
     }
 
-    /// Adds a block of `passes` to `sums`, whose columns are p_j/p_α − `centre`. A component without samples is no column.
+    /// Adds a block of `passes` to `sums`, whose columns are p_j/p_α − `centre`.
     pub fn add(&self, passes: u32, centre: f64, stream: &mut HashStream, sums: &mut [f32]) {
         self.points(passes, stream, |point| {
-            let mut columns = [0.0; MAX_COMPONENTS];
-            for (j, column) in columns[..self.densities.len()].iter_mut().enumerate() {
-                if self.counts[j] > 0 {
-                    *column = (point.pdfs[j] / point.mixture_pdf - centre) as f32;
-                }
-            }
+            let columns = self.columns(point, centre);
             self.equations.add(sums, &columns[..self.densities.len()], self.y(point));
         });
     }
