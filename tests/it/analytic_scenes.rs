@@ -5,18 +5,18 @@
 //! The significance is `SIGNIFICANCE` for the whole set of tests (Šidák-corrected); seeds are fixed.
 
 use super::light_hints::{Hints, hints};
-use lumiris::estimators::mis::Heuristic;
-use lumiris::estimators::ocv::Form;
-use lumiris::estimators::stats::{Welford, sidak, t_test};
 use lumiris::film::PixelSums;
 use lumiris::import::{LoadOptions, load};
 use lumiris::lights::LightSamplerKind;
 use lumiris::render::{RenderSettings, render};
-use lumiris::samplers::SamplerKind;
 use lumiris::scene::{
     AccelKind, CorrelatedForm, CorrelatedSettings, EstimatorKind, IntegratorKind, OcvSettings, OptimalForm,
     ProposalPoints, Proposals, SamplingTechnique, Strata, Target, World,
 };
+use lumiris_numbers::estimators::mis::Heuristic;
+use lumiris_numbers::estimators::ocv::Form;
+use lumiris_numbers::estimators::stats::{Welford, sidak, t_test};
+use lumiris_numbers::samplers::SamplerKind;
 use std::path::{Path, PathBuf};
 use std::sync::atomic::AtomicBool;
 

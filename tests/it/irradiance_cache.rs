@@ -1,15 +1,15 @@
 //! The irradiance cache: known answers, agreement with `path`, the same bits, gradients, walls, and scenes with nothing in them.
 
 use super::analytic_scenes::{answer, picture_means, scene_files};
-use lumiris::estimators::ocv::Form;
-use lumiris::estimators::stats::{sidak, t_test};
 use lumiris::film::{Film, PixelSums};
 use lumiris::import::{LoadOptions, load};
 use lumiris::integrators::irradiance_cache::gather::{Gatherer, Wanted};
-use lumiris::math::Vec3;
 use lumiris::render::output::{Aov, channels};
 use lumiris::render::{RenderSettings, Rendering, render};
 use lumiris::scene::{AccelKind, Cached, EstimatorKind, IntegratorKind, Proposals, World};
+use lumiris_numbers::estimators::ocv::Form;
+use lumiris_numbers::estimators::stats::{sidak, t_test};
+use lumiris_numbers::math::Vec3;
 use std::path::Path;
 use std::sync::atomic::AtomicBool;
 
