@@ -1,7 +1,7 @@
 //! How fast photons are traced, and how fast their maps are built and asked.
 
 use super::{RenderError, thread_pool};
-use crate::photons::{GatherScratch, PhotonMap, Place, Search, Tracing, Want, trace_photons};
+use crate::photons::{GatherScratch, PhotonError, PhotonMap, Place, Search, Tracing, Want, trace_photons};
 use crate::scene::World;
 use serde::Serialize;
 use std::hint::black_box;
@@ -49,6 +49,9 @@ pub fn measure_photons(world: &World, threads: Option<usize>, runs: u32) -> Resu
         }
     }
     let traced = last.unwrap_or_default();
+    if traced.stored() == 0 {
+        return Err(PhotonError::NoDeposit { trajectories: TRAJECTORIES, by_importance: false }.into());
+    }
     let [alone, together] = times.map(median);
     let (photons, rays) = (traced.arrivals, traced.rays);
 

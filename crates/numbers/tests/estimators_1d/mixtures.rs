@@ -214,7 +214,7 @@ impl Sampler {
 
     /// All samples of a block of `passes`.
     pub fn points(&self, passes: u32, stream: &mut HashStream, mut each: impl FnMut(&Point)) {
-        for (component, (density, count)) in self.densities.iter().zip(&self.counts).enumerate() {
+        for (component, count) in self.counts.iter().enumerate() {
             let strata = count * passes;
             for k in 0..strata {
                 let u = f64::from(stream.next_f32());
