@@ -10,6 +10,7 @@ use lumiris::scene::{Cached, IntegratorKind, World};
 use lumiris_numbers::estimators::stats::{Welford, sidak, t_test, two_sample_z_test};
 use lumiris_numbers::math::hash::HashStream;
 use lumiris_numbers::math::{Frame, Rgb, Vec3};
+use rayon::prelude::*;
 use std::f64::consts::PI;
 
 /// Probability that a test fails by chance.
@@ -370,19 +371,26 @@ fn importance_moves_photons_to_what_is_seen_and_keeps_their_light() {
 }
 
 /// Light that maps of about `k` photons hold, over that which they should: the powers of their photons over `power`. One pilot for
-/// every 32 maps, as for the passes of a picture. With the number of maps that are empty.
+/// every 32 maps, as for the passes of an image. With the number of maps that are empty.
 fn relative_light(world: &World, k: u64, maps: u32, power: f64) -> (Welford, u32) {
-    let (mut light, mut empty) = (Welford::new(), 0);
-    for seed in 0..maps {
+    let group = |pilot: u32| {
+        let (mut light, mut empty) = (Welford::new(), 0);
         let tracing = |seed| Tracing { seed, max_depth: 60, max_global_depth: 60, ..Tracing::default() };
         let want = Want::Stored { global: k, most_trajectories: 1 << 20 };
-        let count = trajectories_for(world, &tracing(seed / 32), None, want).unwrap();
-        let traced = trace(world, &tracing(seed), count);
-        assert_eq!((traced.trajectories, traced.global_trajectories), (count, count));
-        light.add(traced.global.iter().map(|p| f64::from(p.power().g)).sum::<f64>() / power);
-        empty += u32::from(traced.global.is_empty());
-    }
-    (light, empty)
+        let count = trajectories_for(world, &tracing(pilot), None, want).unwrap();
+        for seed in 32 * pilot..32 * (pilot + 1) {
+            let traced = trace(world, &tracing(seed), count);
+            assert_eq!((traced.trajectories, traced.global_trajectories), (count, count));
+            light.add(traced.global.iter().map(|p| f64::from(p.power().g)).sum::<f64>() / power);
+            empty += u32::from(traced.global.is_empty());
+        }
+        (light, empty)
+    };
+    let groups: Vec<(Welford, u32)> = (0..maps.div_ceil(32)).into_par_iter().map(group).collect();
+    groups.into_iter().fold((Welford::new(), 0), |(mut all, empty), (light, more)| {
+        all.merge(&light);
+        (all, empty + more)
+    })
 }
 
 #[test]
@@ -391,8 +399,8 @@ fn maps_of_few_photons_have_all_the_light_and_no_more() {
     let grey = furnace("").replace("[ 0.5 0.25 0.75 ]", "[ 0.5 0.5 0.5 ]");
     let world = world_of(&grey, |_| ());
     for k in [4, 16, 100, 1000] {
-        // Two photons for each trajectory, whose number has a variance of 2: 2/k of the squared light of a map
-        let maps = (1.3 * 2.0 / (k as f64 * 0.003 * 0.003)) as u32;
+        // A path stores two photons on average with a variance of 2, so that the relative variance of a map is 1/k
+        let maps = (1.2 / (k as f64 * 0.003 * 0.003)) as u32;
         let (light, _) = relative_light(&world, k, maps, PI * 0.5 * 96.0 / (1.0 - 0.5));
         let sigma = light.standard_error();
         assert!(sigma <= 0.003, "{k} photons: ± {sigma}");

@@ -1,5 +1,6 @@
 //! The forms that fit β to samples of the same estimate.
 
+use super::ldlt::IllConditioned;
 use super::ldlt::{Columns, Factors, Matrix};
 use super::normal::{NormalEquations, Penalty};
 
