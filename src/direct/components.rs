@@ -99,7 +99,8 @@ impl Fits {
         self.sums.is_empty()
     }
 
-    /// Begins a block. Returns the number of fits whose system is ill-conditioned; without a solution, estimates are those of MIS.
+    /// Begins a block. Returns the number of fits whose system is ill-conditioned; without a solution, estimates are
+    /// those of MIS.
     pub fn solve(&mut self) -> u64 {
         if !self.is_optimal {
             return solve_all(self.equations, Penalty::default(), &self.sums, &mut self.beta);

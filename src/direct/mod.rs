@@ -99,8 +99,8 @@ pub struct DirectStats {
     pub solve: Duration,
     /// Systems that were solved, or found to have no solution.
     pub systems: u64,
-    /// Those without solution, whose estimates are those of MIS, and those whose columns depend on one another, so that some were
-    /// dropped.
+    /// Those without solution, whose estimates are those of MIS, and those whose columns depend on one another, so that
+    /// some were dropped.
     pub ill_conditioned: u64,
 }
 

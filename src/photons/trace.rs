@@ -3,7 +3,8 @@
 //! Trajectory t is a point of a scrambled Sobol' sequence over path space [Keller 1998, ch. 3; Burley 2020], whose
 //! numbers choose the light, where and which way the photon leaves it, and every scattering. The sequence has 2¹⁶
 //! points, so trajectories come in blocks of as many, which are scrambled independently. What is stored depends on the
-//! scene, the settings and the number of trajectories only, which is fixed before they are traced, see [`trajectories_for`].
+//! scene, the settings and the number of trajectories only, which is fixed before they are traced, see
+//! [`trajectories_for`].
 //!
 //! Photons that the global map holds (from lights, and scattered by Lambertian surfaces) and those of caustics come
 //! from the same trajectories, see [`super::rules`].
@@ -160,13 +161,14 @@ pub fn trace_photons(
     Ok(traced)
 }
 
-/// The number N of trajectories that [`trace_photons`] traces. Where photons are counted, it comes from a pilot, whose random
-/// numbers are not those of any map: maps of N trajectories have the right light on average whatever N is, while the number of
-/// photons that they store varies. Were N where the last photon wanted falls, as many as wanted would be divided by a random
-/// number, and light would be too bright by about one part in as many as the photons are [Haldane 1945].
+/// The number N of trajectories that [`trace_photons`] traces. Where photons are counted, it comes from a pilot, whose
+/// random numbers are not those of any map: maps of N trajectories have the right light on average whatever N is, while
+/// the number of photons that they store varies. Were N where the last photon wanted falls, as many as wanted would be
+/// divided by a random number, and light would be too bright by about one part in as many as the photons are [Haldane
+/// 1945].
 ///
-/// The pilot stores about an eighth of the photons, at least 1024 and at most 16 384, and one N may serve many maps. An error if it
-/// stores nothing.
+/// The pilot stores about an eighth of the photons, at least 1024 and at most 16 384, and one N may serve many maps. An
+/// error if it stores nothing.
 pub fn trajectories_for(
     world: &World,
     tracing: &Tracing<'_>,
@@ -229,7 +231,8 @@ impl<'a> Run<'a> {
         }
     }
 
-    /// The number of trajectories that store about `wanted` photons in the global map, by trajectories of a seed of their own.
+    /// The number of trajectories that store about `wanted` photons in the global map, by trajectories of a seed of
+    /// their own.
     fn pilot(&self, wanted: u64, most: u64) -> Result<u64, PhotonError> {
         let enough = (wanted / PILOT_SHARE).clamp(PILOT_PHOTONS[0], PILOT_PHOTONS[1]);
         let limit = self.tracing.most_in_pilot.min(most);

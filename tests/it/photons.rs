@@ -371,8 +371,8 @@ fn importance_moves_photons_to_what_is_seen_and_keeps_their_light() {
     assert!(strongest(&cut) < 5.1 * strongest(&plain));
 }
 
-/// Light that maps of about `k` photons hold, over that which they should: the powers of their photons over `power`. One pilot for
-/// every 32 maps, as for the passes of an image. With the number of maps that are empty.
+/// Light that maps of about `k` photons hold, over that which they should: the powers of their photons over `power`.
+/// One pilot for every 32 maps, as for the passes of an image. With the number of maps that are empty.
 fn relative_light(world: &World, k: u64, maps: u32, power: f64) -> (Welford, u32) {
     let group = |pilot: u32| {
         let (mut light, mut empty) = (Welford::new(), 0);
@@ -431,8 +431,8 @@ fn a_pilot_says_how_many_trajectories_store_as_many_photons_as_wanted() {
         let traced = trace_photons(&world, &tracing, None, want).unwrap();
         assert_eq!(trajectories_for(&world, &tracing, None, want), Ok(traced.trajectories));
 
-        // The pilot stores 2500 photons. A path of 1 to 5 photons at albedos of 0.4 to 0.8 makes their number vary as that of 2500/5
-        // independent ones at most: 5 standard deviations
+        // The pilot stores 2500 photons. A path of 1 to 5 photons at albedos of 0.4 to 0.8 makes their number vary as
+        // that of 2500/5 independent ones at most: 5 standard deviations
         let off = traced.global.len() as f64 / 20_000.0 - 1.0;
         assert!(off.abs() < 5.0 * (5.0_f64 / 2500.0 + 5.0 / 20_000.0).sqrt(), "{rule:?}: {off}");
         let again = trace(&world, &tracing, traced.trajectories);

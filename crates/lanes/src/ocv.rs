@@ -53,8 +53,8 @@ impl System {
 }
 
 /// Solves the system of each point of `sums` and writes `beta[3 columns · point + 3 j + channel]`, 0 where a solution is not
-/// finite. Returns the number of ill-conditioned systems: those without a finite solution, and those that dropped a column which
-/// is not 0 in all samples.
+/// finite. Returns the number of ill-conditioned systems: those without a finite solution, and those that dropped a
+/// column which is not 0 in all samples.
 pub fn solve(system: &System, sums: &[f32], beta: &mut [f32]) -> usize {
     assert!(system.columns <= MOST, "at most {MOST} columns");
     if system.columns == 0 {

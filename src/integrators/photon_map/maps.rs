@@ -1,8 +1,9 @@
 //! The maps of a picture: what photons are traced, how they are asked for, and irradiances computed beforehand.
 //!
 //! One map: estimates take the k nearest photons, and the final gather takes irradiances that were computed at every fourth photon
-//! of the global map, from the nearest of them [Christensen 1999]. A pilot fixes the number of trajectories of all maps. Progressive: each pass has photons of its own and radii that shrink,
-//! so that the mean over the passes converges while the memory of one map suffices [Knaus and Zwicker 2011].
+//! of the global map, from the nearest of them [Christensen 1999]. A pilot fixes the number of trajectories of all
+//! maps. Progressive: each pass has photons of its own and radii that shrink, so that the mean over the passes
+//! converges while the memory of one map suffices [Knaus and Zwicker 2011].
 
 use super::boundary::{Boundary, Probe};
 use crate::integrators::path::{CameraSample, PathIntegrator};
@@ -89,7 +90,8 @@ pub struct MapMaker<'a> {
     max_depth: u32,
     seed: u32,
     importance: Option<Importance>,
-    /// Trajectories of each map: fixed before any is traced, since a number that depends on what was stored makes light too bright.
+    /// Trajectories of each map: fixed before any is traced, since a number that depends on what was stored makes light
+    /// too bright.
     trajectories: u64,
     /// First radii of progressive maps: global, caustic.
     radii: Option<[f32; 2]>,
@@ -98,8 +100,8 @@ pub struct MapMaker<'a> {
 }
 
 impl<'a> MapMaker<'a> {
-    /// Traces importons, if there are to be any, and finds out how many trajectories a map takes, and the first radii of progressive
-    /// maps: as far as the nearest photons reach from `seen`, places and normals where the camera looks.
+    /// Traces importons, if there are to be any, and finds out how many trajectories a map takes, and the first radii
+    /// of progressive maps: as far as the nearest photons reach from `seen`, places and normals where the camera looks.
     pub fn new(world: &World, seen: &[(Vec3, Vec3)], stop: &'a AtomicBool) -> Result<Self, PhotonError> {
         let settings = world.scene.integrator.photons;
         let (max_depth, seed) = (world.scene.integrator.max_depth, world.scene.sampling.seed);

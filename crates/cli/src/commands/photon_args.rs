@@ -6,7 +6,7 @@ use lumiris::scene::{Deposition, PhotonMapSettings, Shrinking};
 /// Options of `--integrator photon-map`.
 #[derive(Args, Clone, Copy, Debug)]
 pub struct PhotonArgs {
-    /// Photons that the global map is to store, about, in each pass if progressive [default: the file's, or 200000]
+    /// Approximate number of photons stored in the global map, in each pass if progressive [default: the file's, or 200000]
     #[arg(long, help_heading = "Photon maps", value_name = "N", value_parser = clap::value_parser!(u32).range(1..))]
     pub photons: Option<u32>,
     /// Share q of the trajectories that fill the global map too; all fill the caustic map [default: the file's, or 0.2]

@@ -25,9 +25,9 @@ pub struct Technique {
     pub p: f32,
 }
 
-/// Part of the larger of two densities from which on the maximum heuristic takes the smaller for equal to it: the same density,
-/// computed on the way of one technique and of the other, differs by rounding. Nothing but the two values decides, and not which
-/// of them is whose, so that both techniques agree on what is a tie.
+/// Part of the larger of two densities from which on the maximum heuristic takes the smaller for equal to it: the same
+/// density, computed on the way of one technique and of the other, differs by rounding. Nothing but the two values
+/// decides, and not which of them is whose, so that both techniques agree on what is a tie.
 const TIE: f32 = 0.999;
 
 impl Heuristic {

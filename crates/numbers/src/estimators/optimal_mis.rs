@@ -20,8 +20,8 @@ use super::ocv::{IllConditioned, MAX_COMPONENTS, NormalEquations, Outcome};
 
 /// α of A α = b from `sums` of columns that are **not** centred, r_j = p_j/p_α: `alpha[3 j + channel]`; all 0 on error.
 ///
-/// Returns the number of techniques that were dropped because they depend on the others: the solution is one of many then. An
-/// error if anything is not finite, or if there are no more samples than independent techniques.
+/// Returns the number of techniques that were dropped because they depend on the others: the solution is one of many
+/// then. An error if anything is not finite, or if there are no more samples than independent techniques.
 pub fn coefficients(equations: NormalEquations, sums: &[f32], alpha: &mut [f32]) -> Result<usize, IllConditioned> {
     let alpha = &mut alpha[..equations.coefficients()];
     let result = try_coefficients(equations, sums, alpha);

@@ -246,8 +246,8 @@ impl Sampler {
         columns
     }
 
-    /// Covariances of the means over a block of `passes` of y, by channel, and of the centred columns, which follow; by quadrature
-    /// over each stratum.
+    /// Covariances of the means over a block of `passes` of y, by channel, and of the centred columns, which follow; by
+    /// quadrature over each stratum.
     pub fn covariances(&self, passes: u32) -> Covariances {
         const POINTS: u32 = 1 << 15;
         let mut covariances = Covariances::default();

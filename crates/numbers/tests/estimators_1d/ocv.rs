@@ -57,8 +57,9 @@ fn variances(sampler: &Sampler, count: u32, runs: usize) -> [[f64; 3]; 2] {
     welford.map(|form| form.map(|w| w.variance()))
 }
 
-/// Variance of the progressive form of [`passes`] by channel, from that of a block with given coefficients, which is known, over
-/// coefficients that are fitted as there: Var(ȳ − Σ β_j c̄_j) of each block, since blocks are not correlated.
+/// Variance of the progressive form of [`passes`] by channel, from that of a block with given coefficients, which is
+/// known, over coefficients that are fitted as there: Var(ȳ − Σ β_j c̄_j) of each block, since blocks are not
+/// correlated.
 fn predicted_variances(sampler: &Sampler, passes: u32, runs: usize) -> [Welford; 3] {
     let equations = sampler.equations;
     let blocks: Vec<_> = Sampler::blocks(passes).map(|len| (len, sampler.covariances(len))).collect();
@@ -174,8 +175,8 @@ fn four_passes_of_independent_samples_have_at_most_the_variance_of_mis() {
 
 #[test]
 fn four_passes_have_the_variance_of_their_blocks_and_coefficients() {
-    // Strata leave little variance, and coefficients that were fitted to the samples one by one may multiply it: what holds is the
-    // law of the estimate, with the variance within strata by quadrature.
+    // Strata leave little variance, and coefficients that were fitted to the samples one by one may multiply it: what
+    // holds is the law of the estimate, with the variance within strata by quadrature.
     const PASSES: u32 = 4;
     each_sampler(&PROPER, &NUMBERS, |sampler, name, value| {
         let predicted = predicted_variances(sampler, PASSES, 3_000);

@@ -12,8 +12,8 @@ pub const PAPER_LAMBDA: f32 = 1.0;
 pub struct Outcome {
     /// The estimate of ∫f by channel.
     pub estimate: [f32; 3],
-    /// Number of systems without solution, where the estimate, or a half of it, is that of MIS, and of those whose columns were
-    /// dropped.
+    /// Number of systems without solution, where the estimate, or a half of it, is that of MIS, and of those whose
+    /// columns were dropped.
     pub ill_conditioned: u32,
 }
 

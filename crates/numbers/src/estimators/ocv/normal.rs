@@ -220,8 +220,8 @@ impl NormalEquations {
         if n > 0.0 { [y[0] / n, y[1] / n, y[2] / n] } else { [0.0; 3] }
     }
 
-    /// Coefficients of the regression of y on the columns, `beta[3 j + channel]`; all 0 on error. Returns the number of columns
-    /// that were dropped though they are not 0 in all samples, since they are constant or depend on others.
+    /// Coefficients of the regression of y on the columns, `beta[3 j + channel]`; all 0 on error. Returns the number of
+    /// columns that were dropped though they are not 0 in all samples, since they are constant or depend on others.
     pub fn solve(self, sums: &[f32], penalty: Penalty, beta: &mut [f32]) -> Result<usize, IllConditioned> {
         let beta = &mut beta[..self.coefficients()];
         let result = self.try_solve(sums, penalty, beta);
