@@ -1,6 +1,5 @@
 //! The forms that fit β to samples of the same estimate.
 
-use super::ldlt::IllConditioned;
 use super::ldlt::{Columns, Factors, Matrix};
 use super::normal::{NormalEquations, Penalty};
 
