@@ -6,12 +6,14 @@ use lumiris::photons::{
     CausticRule, GatherScratch, Importance, ImportanceSettings, Photon, PhotonError, PhotonMap, Place, Search, Traced,
     Tracing, Unimportant, Want, trace_importons, trace_photons, trajectories_for,
 };
-use lumiris::scene::{Cached, IntegratorKind, World};
+use lumiris::scene::World;
+use lumiris::settings::{Cached, IntegratorKind};
 use lumiris_numbers::estimators::stats::{Welford, sidak, t_test, two_sample_z_test};
 use lumiris_numbers::math::hash::HashStream;
 use lumiris_numbers::math::{Frame, Rgb, Vec3};
 use rayon::prelude::*;
 use std::f64::consts::PI;
+use strum::IntoEnumIterator;
 
 /// Probability that a test fails by chance.
 const SIGNIFICANCE: f64 = 1e-4;
@@ -293,7 +295,7 @@ fn the_rules_of_caustics_give_the_same_maps() {
         (global, caustic, run(0))
     };
     let reference = of(CausticRule::FirstTrajectories, 1.0);
-    for rule in CausticRule::ALL {
+    for rule in CausticRule::iter() {
         let thinned = of(rule, q);
         for c in 0..3 {
             for (a, b) in [(&reference.0, &thinned.0), (&reference.1, &thinned.1)] {
@@ -425,7 +427,7 @@ fn an_empty_map_counts_as_no_light() {
 #[test]
 fn a_pilot_says_how_many_trajectories_store_as_many_photons_as_wanted() {
     let world = world_of(ROOM, |_| ());
-    for rule in CausticRule::ALL {
+    for rule in CausticRule::iter() {
         let tracing = Tracing { q: 0.25, caustics: rule, max_depth: 4, ..Tracing::default() };
         let want = Want::Stored { global: 20_000, most_trajectories: 10_000_000 };
         let traced = trace_photons(&world, &tracing, None, want).unwrap();
