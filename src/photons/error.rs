@@ -24,7 +24,7 @@ pub enum PhotonError {
         if *.by_importance { " that matters to the camera" } else { "" }
     )]
     NoDeposit {
-        /// How many in a row left nothing.
+        /// How many were traced.
         trajectories: u64,
         /// Whether photons arrived that had too little importance.
         by_importance: bool,

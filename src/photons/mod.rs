@@ -29,4 +29,4 @@ pub use map::{GatherScratch, PhotonMap, Place, Search};
 pub use photon::{Origin, Photon};
 pub use rules::CausticRule;
 pub use shares::LightShares;
-pub use trace::{Traced, Tracing, Want, trace_photons};
+pub use trace::{Traced, Tracing, Want, trace_photons, trajectories_for};

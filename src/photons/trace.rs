@@ -3,7 +3,8 @@
 //! Trajectory t is a point of a scrambled Sobol' sequence over path space [Keller 1998, ch. 3; Burley 2020], whose
 //! numbers choose the light, where and which way the photon leaves it, and every scattering. The sequence has 2¹⁶
 //! points, so trajectories come in blocks of as many, which are scrambled independently. What is stored depends on the
-//! scene, the settings and the number of trajectories only.
+//! scene, the settings and the number of trajectories only, which is fixed before they are traced, see
+//! [`trajectories_for`].
 //!
 //! Photons that the global map holds (from lights, and scattered by Lambertian surfaces) and those of caustics come
 //! from the same trajectories, see [`super::rules`].
@@ -28,8 +29,16 @@ use std::time::{Duration, Instant};
 
 /// Trajectories that are traced together.
 pub(super) const BATCH: u64 = 4096;
-/// Most batches between two looks at what is stored; there are few at first, since few photons may be wanted.
+/// Batches between two looks at memory.
 const ROUND: u64 = 32;
+/// Trajectories of the first round of a pilot; later rounds double what is traced.
+const PILOT_TRAJECTORIES: u64 = 128;
+/// A pilot stores one part in so many of the photons that are wanted.
+const PILOT_SHARE: u64 = 8;
+/// Fewest photons of a pilot, and most.
+const PILOT_PHOTONS: [u64; 2] = [1024, 16_384];
+/// Seed of pilots.
+const PILOT_SEED: u32 = 0x70_69_6c_6f;
 /// log₂ of the points of a sequence.
 const SEQUENCE_BITS: u32 = 16;
 /// Bytes that a photon takes in a map, tree included.
@@ -57,9 +66,8 @@ pub struct Tracing<'a> {
     pub caustics: CausticRule,
     /// Part of the trajectories that lights share evenly, whatever their powers (0..1).
     pub floor: f32,
-    /// Trajectories without a stored photon after which tracing stops with an error: at the beginning, and in a row
-    /// while photons of the global map are counted.
-    pub most_without_deposit: u64,
+    /// Most trajectories of a pilot, and so of one that stores nothing and ends with an error.
+    pub most_in_pilot: u64,
     /// Ends it between two rounds when it becomes true.
     pub stop: Option<&'a AtomicBool>,
     /// Most memory of the maps (bytes).
@@ -75,7 +83,7 @@ impl Default for Tracing<'_> {
             q: 1.0,
             caustics: CausticRule::default(),
             floor: 0.1,
-            most_without_deposit: 1_000_000,
+            most_in_pilot: 1_000_000,
             stop: None,
             memory: None,
         }
@@ -87,11 +95,11 @@ impl Default for Tracing<'_> {
 pub enum Want {
     /// N trajectories.
     Trajectories(u64),
-    /// As many trajectories as it takes; the last one is stored as a whole.
+    /// As many trajectories as store about so many photons, see [`trajectories_for`].
     Stored {
         /// Photons of the global map.
         global: u64,
-        /// Trajectories after which there are as many as there are.
+        /// Most trajectories.
         most_trajectories: u64,
     },
 }
@@ -133,7 +141,7 @@ impl Traced {
 }
 
 /// Traces photons, on all threads of the current pool. The powers are such that Σ weight·power of a map's photons is an
-/// estimate of the irradiance that it holds.
+/// estimate of the irradiance that it holds; a map without photons is an estimate of 0.
 pub fn trace_photons(
     job: &RenderJob,
     tracing: &Tracing<'_>,
@@ -141,22 +149,8 @@ pub fn trace_photons(
     want: Want,
 ) -> Result<Traced, PhotonError> {
     let start = Instant::now();
-    let lights = &job.lights;
-    if lights.lights.is_empty() {
-        return Err(PhotonError::NoLight);
-    }
-    let shares = LightShares::new(lights, tracing.floor).ok_or(PhotonError::NoEmission)?;
-    if !(tracing.q > 0.0 && tracing.q <= 1.0) {
-        return Err(PhotonError::InvalidRatio(tracing.q));
-    }
-    let run = Run { job, tracing, importance, shares };
-    let mut traced = match want {
-        Want::Trajectories(0) | Want::Stored { global: 0, .. } | Want::Stored { most_trajectories: 0, .. } => {
-            return Err(PhotonError::NothingWanted);
-        }
-        Want::Trajectories(count) => run.trajectories(count)?,
-        Want::Stored { global, most_trajectories } => run.stored(global, most_trajectories)?,
-    };
+    let count = trajectories_for(job, tracing, importance, want)?;
+    let mut traced = Run::new(job, tracing, importance)?.trace(count)?;
     let per_trajectory = |photons: &mut [Photon], count: u64| {
         let factor = (1.0 / count as f64) as f32;
         photons.par_iter_mut().for_each(|photon| *photon = photon.scaled(factor));
@@ -165,6 +159,32 @@ pub fn trace_photons(
     per_trajectory(&mut traced.caustic, traced.trajectories);
     traced.elapsed = start.elapsed();
     Ok(traced)
+}
+
+/// The number N of trajectories that [`trace_photons`] traces. Where photons are counted, it comes from a pilot, whose
+/// random numbers are not those of any map: maps of N trajectories have the right light on average whatever N is, while
+/// the number of photons that they store varies. Were N where the last photon wanted falls, as many as wanted would be
+/// divided by a random number, and light would be too bright by about one part in as many as the photons are [Haldane
+/// 1945].
+///
+/// The pilot stores about an eighth of the photons, at least 1024 and at most 16 384, and one N may serve many maps. An
+/// error if it stores nothing.
+pub fn trajectories_for(
+    job: &RenderJob,
+    tracing: &Tracing<'_>,
+    importance: Option<&Importance>,
+    want: Want,
+) -> Result<u64, PhotonError> {
+    match want {
+        Want::Trajectories(0) | Want::Stored { global: 0, .. } | Want::Stored { most_trajectories: 0, .. } => {
+            Err(PhotonError::NothingWanted)
+        }
+        Want::Trajectories(count) => Ok(count),
+        Want::Stored { global, most_trajectories } => {
+            let tracing = Tracing { seed: pilot_seed(tracing.seed), ..*tracing };
+            Run::new(job, &tracing, importance)?.pilot(global, most_trajectories)
+        }
+    }
 }
 
 /// A photon with its trajectory.
@@ -179,15 +199,6 @@ struct Batch {
     rays: u64,
 }
 
-/// Which trajectories end up in the maps, as far as is known.
-#[derive(Clone, Copy)]
-struct Limits {
-    global: u64,
-    all: u64,
-    /// True while it is not known how many trajectories the global map takes.
-    is_open: bool,
-}
-
 struct Run<'a> {
     job: &'a RenderJob,
     tracing: &'a Tracing<'a>,
@@ -195,7 +206,23 @@ struct Run<'a> {
     shares: LightShares,
 }
 
-impl Run<'_> {
+impl<'a> Run<'a> {
+    fn new(
+        job: &'a RenderJob,
+        tracing: &'a Tracing<'a>,
+        importance: Option<&'a Importance>,
+    ) -> Result<Self, PhotonError> {
+        let lights = &job.lights;
+        if lights.lights.is_empty() {
+            return Err(PhotonError::NoLight);
+        }
+        if !(tracing.q > 0.0 && tracing.q <= 1.0) {
+            return Err(PhotonError::InvalidRatio(tracing.q));
+        }
+        let shares = LightShares::new(lights, tracing.floor).ok_or(PhotonError::NoEmission)?;
+        Ok(Run { job, tracing, importance, shares })
+    }
+
     /// The trajectories of the global map among `all`.
     fn global_part(&self, all: u64) -> u64 {
         match self.tracing.caustics {
@@ -204,72 +231,58 @@ impl Run<'_> {
         }
     }
 
-    fn trajectories(&self, count: u64) -> Result<Traced, PhotonError> {
-        let limits = Limits { global: self.global_part(count), all: count, is_open: false };
-        self.trace(limits, |_| limits)
+    /// The number of trajectories that store about `wanted` photons in the global map, by trajectories of a seed of
+    /// their own.
+    fn pilot(&self, wanted: u64, most: u64) -> Result<u64, PhotonError> {
+        let enough = (wanted / PILOT_SHARE).clamp(PILOT_PHOTONS[0], PILOT_PHOTONS[1]);
+        let limit = self.tracing.most_in_pilot.min(most);
+        let (mut traced, mut global, mut stored, mut arrivals) = (0, 0, 0, 0);
+        while global < enough && traced < limit {
+            self.check_stop(traced)?;
+            let end = (2 * traced).max(PILOT_TRAJECTORIES).min(traced + ROUND * BATCH).min(limit);
+            for batch in self.round(traced..end, u64::MAX) {
+                global += batch.global.len() as u64;
+                stored += (batch.global.len() + batch.caustic.len()) as u64;
+                arrivals += batch.arrivals;
+            }
+            traced = end;
+        }
+        if stored == 0 {
+            return Err(PhotonError::NoDeposit { trajectories: traced, by_importance: arrivals > 0 });
+        }
+
+        // A map of caustics alone has as many as were looked at
+        let of_global = if global > 0 { wanted as f64 * traced as f64 / global as f64 } else { traced as f64 };
+        let all = match self.tracing.caustics {
+            CausticRule::OneRule | CausticRule::TwoTests => of_global,
+            CausticRule::FirstTrajectories => of_global / f64::from(self.tracing.q),
+        };
+        Ok((all.ceil() as u64).clamp(1, most))
     }
 
-    fn stored(&self, wanted: u64, most: u64) -> Result<Traced, PhotonError> {
-        let mut limits = Limits { global: most, all: most, is_open: true };
-        let mut stored = 0;
-        self.trace(limits, |round| {
-            // Where the global map is full; photons of one trajectory stay together
-            let before = stored;
-            stored += round.iter().map(|batch| batch.global.len() as u64).sum::<u64>();
-            if before < wanted && stored >= wanted {
-                let mut deposits = round.iter().flat_map(|batch| &batch.global);
-                let last = deposits.nth((wanted - before - 1) as usize);
-                let global = last.map_or(most, |(trajectory, _)| trajectory + 1);
-                let all = match self.tracing.caustics {
-                    CausticRule::OneRule | CausticRule::TwoTests => global,
-                    CausticRule::FirstTrajectories => (global as f64 / f64::from(self.tracing.q)).ceil() as u64,
-                };
-                limits = Limits { global, all: all.clamp(global, most), is_open: false };
-            }
-            limits
-        })
+    fn check_stop(&self, trajectories: u64) -> Result<(), PhotonError> {
+        let is_stopped = self.tracing.stop.is_some_and(|stop| stop.load(Ordering::Relaxed));
+        if is_stopped { Err(PhotonError::Stopped { trajectories }) } else { Ok(()) }
     }
 
-    /// Traces trajectories, round by round, until the limits that `look` makes of each round.
-    fn trace(&self, mut limits: Limits, mut look: impl FnMut(&[Batch]) -> Limits) -> Result<Traced, PhotonError> {
-        let mut traced = Traced::default();
-        let mut last_deposit = 0;
-        let mut batches = 1;
-        while traced.trajectories < limits.all {
-            if self.tracing.stop.is_some_and(|stop| stop.load(Ordering::Relaxed)) {
-                return Err(PhotonError::Stopped { trajectories: traced.trajectories });
-            }
-            let end = (traced.trajectories + batches * BATCH).min(limits.all);
-            batches = (2 * batches).min(ROUND);
-            let round = self.round(traced.trajectories..end, limits.global);
-            limits = look(&round);
-            let counted = |traced: &Traced| if limits.is_open { traced.global.len() as u64 } else { traced.stored() };
-            let before = counted(&traced);
-            for batch in round {
-                let kept = |deposits: Vec<Deposit>, limit: u64| {
-                    deposits.into_iter().take_while(move |(t, _)| *t < limit).map(|(_, photon)| photon)
-                };
-                traced.global.extend(kept(batch.global, limits.global));
-                traced.caustic.extend(kept(batch.caustic, limits.all));
+    /// Traces `count` trajectories, round by round.
+    fn trace(&self, count: u64) -> Result<Traced, PhotonError> {
+        let global_trajectories = self.global_part(count);
+        let mut traced = Traced { global_trajectories, ..Traced::default() };
+        while traced.trajectories < count {
+            self.check_stop(traced.trajectories)?;
+            let end = (traced.trajectories + ROUND * BATCH).min(count);
+            for batch in self.round(traced.trajectories..end, global_trajectories) {
+                traced.global.extend(batch.global.into_iter().map(|(_, photon)| photon));
+                traced.caustic.extend(batch.caustic.into_iter().map(|(_, photon)| photon));
                 traced.arrivals += batch.arrivals;
                 traced.rays += batch.rays;
             }
             traced.trajectories = end;
-            if counted(&traced) > before {
-                last_deposit = end;
-            }
-            let without = end - last_deposit;
-            let is_vain = traced.stored() == 0 && end >= limits.all;
-            let is_waiting = traced.stored() == 0 || limits.is_open;
-            if is_vain || is_waiting && without >= self.tracing.most_without_deposit {
-                return Err(PhotonError::NoDeposit { trajectories: without, by_importance: traced.arrivals > 0 });
-            }
             if let Some(limit) = self.tracing.memory.filter(|limit| traced.stored() * BYTES > *limit) {
                 return Err(PhotonError::OutOfMemory { limit, photons: traced.stored() });
             }
         }
-        traced.trajectories = limits.all;
-        traced.global_trajectories = limits.global;
         Ok(traced)
     }
 
@@ -348,6 +361,12 @@ impl Run<'_> {
             deposits.push((trajectory, Photon::new(arrival.p, arrival.wi, arrival.n, power, particle.origin)));
         }
     }
+}
+
+/// The seed of the pilot of maps of `seed`.
+fn pilot_seed(seed: u32) -> u32 {
+    let [pilot, ..] = pcg4d([seed, PILOT_SEED, 0, 0]);
+    pilot
 }
 
 /// Random numbers of a trajectory.

@@ -1,7 +1,7 @@
 //! How fast photons are traced, and how fast their maps are built and asked.
 
 use super::{RenderError, thread_pool};
-use crate::photons::{GatherScratch, PhotonMap, Place, Search, Tracing, Want, trace_photons};
+use crate::photons::{GatherScratch, PhotonError, PhotonMap, Place, Search, Tracing, Want, trace_photons};
 use crate::scene::RenderJob;
 use lumiris_numbers::estimators::stats::median;
 use serde::Serialize;
@@ -50,6 +50,9 @@ pub fn measure_photons(job: &RenderJob, threads: Option<usize>, runs: u32) -> Re
         }
     }
     let traced = last.unwrap_or_default();
+    if traced.stored() == 0 {
+        return Err(PhotonError::NoDeposit { trajectories: TRAJECTORIES, by_importance: false }.into());
+    }
     let [alone, together] = times.map(median);
     let (photons, rays) = (traced.arrivals, traced.rays);
 

@@ -27,5 +27,5 @@ pub fn light_hints(job: &RenderJob) -> Option<(LightHints, usize)> {
     let traced = trace_photons(job, &tracing, None, Want::Trajectories(trajectories)).ok()?;
     let primary: Vec<_> =
         traced.global.iter().filter_map(|photon| Some((photon.p(), photon.n(), photon.light()?))).collect();
-    Some((LightHints::adapted(&primary, lights.scene_radius), primary.len()))
+    (!primary.is_empty()).then(|| (LightHints::adapted(&primary, lights.scene_radius), primary.len()))
 }

@@ -3,7 +3,7 @@
 /// Photon maps [Jensen 1996; Keller and Wald 2000].
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct PhotonMapSettings {
-    /// Photons that the global map stores; a progressive map so many in each pass.
+    /// About how many photons the global map stores; a progressive map so many in each pass.
     pub photons: u32,
     /// q: the share of the trajectories that fill the global map too; all of them fill the caustic map.
     pub caustic_ratio: f32,

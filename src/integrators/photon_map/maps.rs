@@ -1,14 +1,15 @@
 //! The maps of a picture: what photons are traced, how they are asked for, and irradiances computed beforehand.
 //!
 //! One map: estimates take the k nearest photons, and the final gather takes irradiances that were computed at every fourth photon
-//! of the global map, from the nearest of them [Christensen 1999]. Progressive: each pass has photons of its own and radii that shrink,
-//! so that the mean over the passes converges while the memory of one map suffices [Knaus and Zwicker 2011].
+//! of the global map, from the nearest of them [Christensen 1999]. A pilot fixes the number of trajectories of all
+//! maps. Progressive: each pass has photons of its own and radii that shrink, so that the mean over the passes
+//! converges while the memory of one map suffices [Knaus and Zwicker 2011].
 
 use super::boundary::{Boundary, Probe};
 use crate::integrators::path::{CameraSample, PathIntegrator};
 use crate::photons::{
     GatherScratch, Importance, ImportanceSettings, Origin, Photon, PhotonError, PhotonMap, Place, Search, Traced,
-    Tracing, Unimportant, Want, trace_importons, trace_photons,
+    Tracing, Unimportant, Want, trace_importons, trace_photons, trajectories_for,
 };
 use crate::scene::{RenderJob, World};
 use crate::settings::{Deposition, PhotonMapSettings};
@@ -31,8 +32,9 @@ const QUANTILE: f32 = 0.1;
 const TRIES: u32 = 4;
 /// Seed of these trials.
 const RECORD_SEED: u32 = 0x65_64_67_65;
-/// Seeds of passes.
+/// Seeds of passes, and of the maps that the first radii come from.
 const PASS_SEED: u32 = 0x70_68_6f_74;
+const RADIUS_SEED: u32 = 0x72_61_64_69;
 
 /// What maps took.
 #[derive(Clone, Copy, Debug, Default)]
@@ -89,6 +91,9 @@ pub struct MapMaker<'a> {
     max_depth: u32,
     seed: u32,
     importance: Option<Importance>,
+    /// Trajectories of each map: fixed before any is traced, since a number that depends on what was stored makes light
+    /// too bright.
+    trajectories: u64,
     /// First radii of progressive maps: global, caustic.
     radii: Option<[f32; 2]>,
     /// What was made so far.
@@ -96,8 +101,8 @@ pub struct MapMaker<'a> {
 }
 
 impl<'a> MapMaker<'a> {
-    /// Traces importons, if there are to be any, and finds the first radii of progressive maps: as far as the nearest photons reach
-    /// from `seen`, places and normals where the camera looks.
+    /// Traces importons, if there are to be any, and finds out how many trajectories a map takes, and the first radii
+    /// of progressive maps: as far as the nearest photons reach from `seen`, places and normals where the camera looks.
     pub fn new(job: &RenderJob, seen: &[(Vec3, Vec3)], stop: &'a AtomicBool) -> Result<Self, PhotonError> {
         let settings = job.settings().integrator.photons;
         let (max_depth, seed) = (job.settings().integrator.max_depth, job.settings().sampling.seed);
@@ -114,13 +119,17 @@ impl<'a> MapMaker<'a> {
                 Some(trace_importons(job, &settings)?)
             }
         };
-        let mut maker =
-            MapMaker { stop, settings, max_depth, seed, importance, radii: None, stats: MapStats::default() };
+        let (radii, stats) = (None, MapStats::default());
+        let mut maker = MapMaker { stop, settings, max_depth, seed, importance, trajectories: 0, radii, stats };
+        let start = Instant::now();
+        let want = Want::Stored { global: u64::from(settings.photons), most_trajectories: settings.trajectories };
+        maker.trajectories = trajectories_for(job, &maker.tracing(seed), maker.importance.as_ref(), want)?;
+        maker.stats.tracing = start.elapsed();
         if let Some(shrinking) = settings.progressive {
             maker.radii = Some(match shrinking.radius {
                 Some(radius) => [radius; 2],
                 None => {
-                    let traced = maker.traced(job, 0)?;
+                    let traced = maker.traced(job, [0, RADIUS_SEED])?;
                     let global = PhotonMap::new(traced.global);
                     let caustic = PhotonMap::new(traced.caustic);
                     let most = job.lights.scene_radius;
@@ -138,10 +147,9 @@ impl<'a> MapMaker<'a> {
         self.importance.as_ref()
     }
 
-    fn traced(&self, job: &RenderJob, pass: u32) -> Result<Traced, PhotonError> {
+    fn tracing(&self, seed: u32) -> Tracing<'a> {
         let s = &self.settings;
-        let [seed, ..] = pcg4d([self.seed, pass, PASS_SEED, 0]);
-        let tracing = Tracing {
+        Tracing {
             seed,
             // A photon that was scattered n times is light of n + 1 bounces where it lies, and of n + 2 where a gather sees it
             max_depth: self.max_depth.saturating_sub(1),
@@ -150,15 +158,20 @@ impl<'a> MapMaker<'a> {
             memory: Some(s.memory),
             stop: Some(self.stop),
             ..Tracing::default()
-        };
-        let want = Want::Stored { global: u64::from(s.photons), most_trajectories: s.trajectories };
-        trace_photons(job, &tracing, self.importance.as_ref(), want)
+        }
+    }
+
+    /// Photons whose random numbers are those of a pass and a purpose.
+    fn traced(&self, job: &RenderJob, [pass, purpose]: [u32; 2]) -> Result<Traced, PhotonError> {
+        let [seed, ..] = pcg4d([self.seed, pass, purpose, 0]);
+        let want = Want::Trajectories(self.trajectories);
+        trace_photons(job, &self.tracing(seed), self.importance.as_ref(), want)
     }
 
     /// The maps of a pass.
     pub fn make(&mut self, job: &RenderJob, pass: u32) -> Result<PhotonMaps, PhotonError> {
         let start = Instant::now();
-        let traced = self.traced(job, pass)?;
+        let traced = self.traced(job, [pass, PASS_SEED])?;
         let traced_at = Instant::now();
         self.stats.maps += 1;
         self.stats.trajectories += traced.trajectories;

@@ -119,8 +119,8 @@ fn figure(
 ) -> Result<Figure, ReproduceError> {
     let setup = judge.setup;
     let mut blocks = vec![Block::Text(
-        "Figure 1: photons of a building of 10 × 10 rooms with one light each, from above. The standard map, importons, and as many photons as \
-         in the standard map, deposited by importance; the camera stands in one room and sees a part of the next."
+        "Figure 1: photons of a building of 10 × 10 rooms with one light each, from above. The standard map, importons, and about as many \
+         photons as in the standard map, deposited by importance; the camera stands in one room and sees a part of the next."
             .to_owned(),
     )];
     let cloud = |name: &str, title: &str, points: Vec<Vec3>| {

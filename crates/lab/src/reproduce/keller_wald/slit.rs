@@ -122,8 +122,8 @@ fn figure(
     rows: &[Row; 3],
 ) -> Result<Figure, ReproduceError> {
     let mut blocks = vec![Block::Text(format!(
-        "The room on the left has the camera and no light; the one on the right has a light. From above: importons, and the same number of \
-         photons in three maps: all that arrive, by importance with probabilities of at least ε = {LEAST}, and without those whose \
+        "The room on the left has the camera and no light; the one on the right has a light. From above: importons, and about the same number \
+         of photons in three maps: all that arrive, by importance with probabilities of at least ε = {LEAST}, and without those whose \
          probability is below ε."
     ))];
     let cloud = |name: &str, title: &str, points: Vec<Vec3>| {
