@@ -16,3 +16,4 @@ mod mutations;
 mod photon_map;
 mod photons;
 mod reproduce;
+mod significance;
