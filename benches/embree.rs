@@ -9,10 +9,10 @@ use lumiris::accel::embree::bare::Bare;
 use lumiris::accel::embree::{EmbreeAccel, EmbreeError};
 use lumiris::accel::{Accel, Coherence, Hit, RayBatch};
 use lumiris::geometry::{Geometry, GeometrySet, Group, Shape, TriangleMesh, Visibility};
-use lumiris::math::hash::HashStream;
-use lumiris::math::ray::offset_origin;
-use lumiris::math::{Frame, Ray, Vec3, warp};
 use lumiris::render::bench::{Pair, RayCase};
+use lumiris_numbers::math::hash::HashStream;
+use lumiris_numbers::math::ray::offset_origin;
+use lumiris_numbers::math::{Frame, Ray, Vec3, warp};
 use std::f32::consts::{PI, TAU};
 use std::sync::Arc;
 

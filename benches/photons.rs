@@ -4,13 +4,13 @@
 #![allow(clippy::print_stdout, clippy::unwrap_used, missing_docs)]
 
 use lumiris::import::{LoadOptions, load};
-use lumiris::math::hash::HashStream;
-use lumiris::math::{Rgb, Vec3};
 use lumiris::photons::{
     GatherScratch, ImportanceSettings, Origin, Photon, PhotonMap, Place, Search, Tracing, Want, trace_importons,
     trace_photons,
 };
 use lumiris::scene::{AccelKind, World};
+use lumiris_numbers::math::hash::HashStream;
+use lumiris_numbers::math::{Rgb, Vec3};
 use std::path::Path;
 use std::time::Instant;
 

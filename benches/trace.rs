@@ -5,9 +5,9 @@
 
 use lumiris::accel::{Accel, Bvh, Coherence, Hit, RayBatch};
 use lumiris::geometry::{Geometry, GeometrySet, Group, Shape, TriangleMesh, Visibility};
-use lumiris::math::hash::HashStream;
-use lumiris::math::ray::offset_origin;
-use lumiris::math::{Frame, Ray, Vec3, warp};
+use lumiris_numbers::math::hash::HashStream;
+use lumiris_numbers::math::ray::offset_origin;
+use lumiris_numbers::math::{Frame, Ray, Vec3, warp};
 use std::f32::consts::{PI, TAU};
 use std::sync::Arc;
 use std::time::Instant;

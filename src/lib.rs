@@ -1,26 +1,22 @@
 //! Lumiris: an offline CPU renderer for lighting integrals that are hard to sample.
 //!
-//! The code is layered; a module imports only from layers above it in this list (`tests/it/layering.rs` holds it):
+//! Arithmetic without scenes is in the crate `lumiris_numbers`, reading of files in `lumiris_formats`. The code here is layered; a
+//! module imports only from layers above it in this list (`tests/it/layering.rs` holds it):
 //!
 //! | layer | modules |
 //! |---|---|
-//! | 0 | [`math`], [`estimators`], [`simd`] |
-//! | 1 | [`samplers`], [`imaging`] |
+//! | 1 | [`imaging`] |
 //! | 2 | [`textures`], [`geometry`], [`bsdfs`], [`cameras`], [`film`] |
 //! | 3 | [`materials`], [`lights`], [`accel`] |
 //! | 4 | [`scene`] |
-//! | 5 | [`import`], [`direct`], [`photons`], [`procedural`] |
+//! | 5 | [`import`], [`direct`], [`photons`] |
 //! | 6 | [`integrators`] |
 //! | 7 | [`render`] |
-//! | 8 | [`cli`], [`compare`], [`reproduce`] |
 
 pub mod accel;
 pub mod bsdfs;
 pub mod cameras;
-pub mod cli;
-pub mod compare;
 pub mod direct;
-pub mod estimators;
 pub mod film;
 pub mod geometry;
 pub mod imaging;
@@ -28,12 +24,7 @@ pub mod import;
 pub mod integrators;
 pub mod lights;
 pub mod materials;
-pub mod math;
 pub mod photons;
-pub mod procedural;
 pub mod render;
-pub mod reproduce;
-pub mod samplers;
 pub mod scene;
-pub mod simd;
 pub mod textures;

@@ -2,8 +2,8 @@
 
 use super::Hit;
 use crate::geometry::GeometrySet;
-use crate::math::hash::{hash_floats, pcg4d, unit_f32};
-use crate::math::{Ray, Vec2, Vec3};
+use lumiris_numbers::math::hash::{hash_floats, pcg4d, unit_f32};
+use lumiris_numbers::math::{Ray, Vec2, Vec3};
 use std::sync::Arc;
 
 /// Values of alpha textures.

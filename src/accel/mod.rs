@@ -11,7 +11,7 @@ pub use alpha::{AlphaSource, AlphaTest};
 pub use bvh::Bvh;
 
 use crate::geometry::GeometryId;
-use crate::math::{Ray, Vec3};
+use lumiris_numbers::math::{Ray, Vec3};
 
 /// Rays as a structure of arrays. All vectors have the same length.
 #[derive(Clone, Debug, Default)]

@@ -14,7 +14,7 @@
 use super::dielectric::Dielectric;
 use super::fresnel::{fr_dielectric, reflect, refract};
 use super::microfacet::{SMOOTH_ALPHA, TrowbridgeReitz};
-use crate::math::{Vec3, sqr, warp};
+use lumiris_numbers::math::{Vec3, sqr, warp};
 use rayon::prelude::*;
 use std::f32::consts::FRAC_PI_2;
 

@@ -14,8 +14,8 @@ use super::coat_table::{CoatTable, Hemispherical};
 use super::dielectric::{Dielectric, Select};
 use super::fresnel::reflect;
 use super::{BsdfSample, Lobe, TrowbridgeReitz};
-use crate::math::{Rgb, Vec3, sqr, warp};
-use crate::simd::{self, bsdf::Transmittance};
+use lumiris_numbers::math::{Rgb, Vec3, sqr, warp};
+use lumiris_numbers::simd::{self, bsdf::Transmittance};
 use std::f32::consts::{FRAC_1_PI, PI};
 
 /// Coated Lambertian reflection without scattering in the coat.

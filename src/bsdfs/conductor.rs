@@ -3,7 +3,7 @@
 
 use super::fresnel::{fr_conductor, reflect};
 use super::{BsdfSample, Lobe, TrowbridgeReitz};
-use crate::math::{Rgb, Vec3};
+use lumiris_numbers::math::{Rgb, Vec3};
 
 /// Metallic reflection, on both sides of the surface.
 #[derive(Clone, Copy, Debug)]

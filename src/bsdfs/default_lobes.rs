@@ -27,7 +27,7 @@
 
 use super::fresnel::reflect;
 use super::{Lobe, TrowbridgeReitz};
-use crate::math::{Vec3, warp};
+use lumiris_numbers::math::{Vec3, warp};
 
 /// Weight of the cosine lobe.
 const COSINE_WEIGHT: f32 = 0.5;

@@ -6,8 +6,8 @@
 
 use super::fresnel::{fr_dielectric, reflect, refract};
 use super::{BsdfSample, Lobe, TrowbridgeReitz};
-use crate::math::{Rgb, Vec3, sqr};
-use crate::simd;
+use lumiris_numbers::math::{Rgb, Vec3, sqr};
+use lumiris_numbers::simd;
 
 /// What is transported along the path, which decides whether transmission scales by 1/η².
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]

@@ -1,7 +1,7 @@
 //! Lambertian reflection and transmission: f = ρ/π on the side of `wo`, τ/π on the other.
 
 use super::{BsdfSample, Lobe};
-use crate::math::{Rgb, Vec3, warp};
+use lumiris_numbers::math::{Rgb, Vec3, warp};
 use std::f32::consts::FRAC_1_PI;
 
 /// Lambertian reflection and transmission.

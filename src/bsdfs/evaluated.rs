@@ -4,7 +4,7 @@
 //! badly; [`super::resample()`] draws from f |cos θi| itself, in the limit of many proposals.
 
 use super::{BsdfSample, Model, ProposalDensity};
-use crate::math::{Rgb, Vec3};
+use lumiris_numbers::math::{Rgb, Vec3};
 
 /// A reflectance model with the density that proposes directions for it.
 #[derive(Clone, Copy, Debug)]

@@ -2,7 +2,7 @@
 //!
 //! η is the index of refraction of the side that `-n` points to, relative to the side that `+n` points to.
 
-use crate::math::{Rgb, Vec3, safe_sqrt, sqr};
+use lumiris_numbers::math::{Rgb, Vec3, safe_sqrt, sqr};
 
 /// Mirror of `w` about `n`; both point away from the surface.
 #[inline]

@@ -15,8 +15,8 @@
 use super::dielectric::{Dielectric, Select, Transport};
 use super::fresnel::{fr_conductor, fr_dielectric, reflect};
 use super::{BsdfSample, Conductor, Diffuse, Lobe, TrowbridgeReitz};
-use crate::math::hash::{HashStream, hash_floats};
-use crate::math::{Frame, Rgb, Vec3, safe_sqrt, sqr, warp};
+use lumiris_numbers::math::hash::{HashStream, hash_floats};
+use lumiris_numbers::math::{Frame, Rgb, Vec3, safe_sqrt, sqr, warp};
 use std::f32::consts::{PI, TAU};
 
 /// The lower boundary of the layer.

@@ -4,7 +4,7 @@
 //! G = 1/(1 + Λ(wo) + Λ(wi)) [Walter et al. 2007; Heitz 2014]. Normals are sampled by the density of the normals
 //! visible from w, D_w(m) = G1(w) D(m) max(0, w·m)/cos θ, by spherical caps [Dupuy and Benyoub 2023].
 
-use crate::math::{Vec3, sqr};
+use lumiris_numbers::math::{Vec3, sqr};
 use std::f32::consts::{PI, TAU};
 
 /// Alpha below which an interface counts as perfectly smooth.
@@ -98,7 +98,7 @@ impl TrowbridgeReitz {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::math::warp;
+    use lumiris_numbers::math::warp;
 
     #[test]
     fn projected_microfacet_area_is_the_macro_area() {
@@ -141,7 +141,7 @@ mod tests {
     fn samples_are_unit_upper_and_visible() {
         let t = TrowbridgeReitz::new(0.3, 0.01);
         for i in 0..10_000 {
-            let r = crate::math::hash::pcg4d([i, 1, 2, 3]).map(crate::math::hash::unit_f32);
+            let r = lumiris_numbers::math::hash::pcg4d([i, 1, 2, 3]).map(lumiris_numbers::math::hash::unit_f32);
             let w = warp::direction(r[2] * 1e-3 + 1e-7, r[3] * TAU);
             let m = t.sample_m(w, [r[0], r[1]]);
             assert!((m.length() - 1.0).abs() < 1e-5 && m.z > 0.0);

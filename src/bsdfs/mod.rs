@@ -4,7 +4,7 @@
 //!
 //! Reading order: [`fresnel`], [`microfacet`], [`diffuse`], [`diffuse_transmission`], [`conductor`], [`dielectric`],
 //! [`thin_dielectric`], [`coat_table`], [`coated_diffuse`], [`layered`]; then what can only be evaluated: [`models`],
-//! [`default_lobes`], [`evaluated`], [`mod@resample`], [`sphere_study`].
+//! [`default_lobes`], [`evaluated`], [`mod@resample`].
 
 pub mod coat_table;
 pub mod coated_diffuse;
@@ -19,7 +19,6 @@ pub mod layered;
 pub mod microfacet;
 pub mod models;
 pub mod resample;
-pub mod sphere_study;
 #[cfg(test)]
 mod tests;
 pub mod thin_dielectric;
@@ -38,9 +37,9 @@ pub use models::Model;
 pub use resample::{Resampled, resample};
 pub use thin_dielectric::ThinDielectric;
 
-use crate::math::hash::{pcg4d, unit_f32};
-use crate::math::{Rgb, Vec3};
-use crate::simd::bsdf::Model as LaneModel;
+use lumiris_numbers::math::hash::{pcg4d, unit_f32};
+use lumiris_numbers::math::{Rgb, Vec3};
+use lumiris_numbers::simd::bsdf::Model as LaneModel;
 use std::f32::consts::FRAC_1_PI;
 use std::ops::BitOr;
 

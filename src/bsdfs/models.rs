@@ -13,7 +13,7 @@
 //! above ρ near σ = 11°, which the source leaves so.
 
 use super::fresnel::fr_dielectric;
-use crate::math::{Rgb, Vec3, sqr};
+use lumiris_numbers::math::{Rgb, Vec3, sqr};
 use std::f32::consts::{FRAC_1_PI, PI};
 
 /// Rough diffuse reflection.

@@ -12,7 +12,7 @@
 //! values that are themselves random (layers) do as well, f being what came with the sample.
 
 use super::{Bsdf, Lobe};
-use crate::math::{Rgb, Vec3};
+use lumiris_numbers::math::{Rgb, Vec3};
 
 /// A resampled direction. The weight of the path is `f·|cos θi|·weight` for all lobes.
 #[derive(Clone, Copy, Debug)]

@@ -3,7 +3,7 @@
 
 use super::fresnel::fr_dielectric;
 use super::{BsdfSample, Lobe};
-use crate::math::{Rgb, Vec3, sqr};
+use lumiris_numbers::math::{Rgb, Vec3, sqr};
 
 /// Thin sheet: mirror and straight transmission.
 #[derive(Clone, Copy, Debug)]

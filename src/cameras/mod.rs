@@ -4,9 +4,9 @@
 //! their origin at the upper left, one unit per pixel, y downwards. A screen window `[x0, x1, y0, y1]` says which part
 //! of the screen the film covers; the default spans −1..1 on the shorter axis.
 
-use crate::math::sphere_map::{equal_area_square_to_sphere, lat_long_to_sphere, wrap_equal_area_square};
-use crate::math::warp::sample_uniform_disk_concentric;
-use crate::math::{Affine3A, Ray, Vec2, Vec3};
+use lumiris_numbers::math::sphere_map::{equal_area_square_to_sphere, lat_long_to_sphere, wrap_equal_area_square};
+use lumiris_numbers::math::warp::sample_uniform_disk_concentric;
+use lumiris_numbers::math::{Affine3A, Ray, Vec2, Vec3};
 use std::f32::consts::PI;
 
 /// A ray from the camera.
@@ -218,9 +218,9 @@ impl Camera {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::math::hash::HashStream;
-    use crate::math::test_support::assert_chi_squared;
-    use crate::math::warp::invert_uniform_disk_concentric;
+    use lumiris_numbers::math::hash::HashStream;
+    use lumiris_numbers::math::warp::invert_uniform_disk_concentric;
+    use lumiris_test_support::assert_chi_squared;
 
     const PINHOLE: Lens = Lens { radius: 0.0, focal_distance: 1e6 };
 
@@ -295,7 +295,8 @@ mod tests {
     #[test]
     fn rays_through_the_lens_meet_in_the_plane_of_focus() {
         let lens = Lens { radius: 0.3, focal_distance: 4.0 };
-        let placement = Affine3A::from_rotation_translation(crate::math::Quat::from_rotation_y(0.7), Vec3::ONE);
+        let placement =
+            Affine3A::from_rotation_translation(lumiris_numbers::math::Quat::from_rotation_y(0.7), Vec3::ONE);
         let inverse = placement.inverse();
         let ortho = orthographic(placement, default_screen_window(2.0), lens);
         for (camera, pinhole) in [
@@ -331,7 +332,7 @@ mod tests {
         for _ in 0..40_000 {
             let o = camera.ray(Vec2::new(100.0, 50.0), stream.next_2d(), 0.5).ray.o / 2.0;
             let ring = ((o.length_squared() * 5.0) as usize).min(4);
-            let sector = ((crate::math::warp::azimuth(o) / (2.0 * PI) * 16.0) as usize).min(15);
+            let sector = ((lumiris_numbers::math::warp::azimuth(o) / (2.0 * PI) * 16.0) as usize).min(15);
             observed[ring * 16 + sector] += 1.0;
         }
         assert_chi_squared(&observed, &[500.0; 80], 1e-5);

@@ -9,13 +9,13 @@ use super::mixture::Columns;
 use super::propose::{Candidates, Drawn};
 use super::visibility::{Segments, is_traced};
 use crate::accel::RayBatch;
-use crate::estimators::ocv::forms::PAPER_LAMBDA;
-use crate::estimators::ocv::{Form, NormalEquations, Penalty};
-use crate::estimators::optimal_mis;
-use crate::math::Rgb;
 use crate::scene::{EstimatorKind, IntegratorSettings, OptimalForm, Split, World};
-use crate::simd;
-use crate::simd::ocv::{Matrix, System};
+use lumiris_numbers::estimators::ocv::forms::PAPER_LAMBDA;
+use lumiris_numbers::estimators::ocv::{Form, NormalEquations, Penalty};
+use lumiris_numbers::estimators::optimal_mis;
+use lumiris_numbers::math::Rgb;
+use lumiris_numbers::simd;
+use lumiris_numbers::simd::ocv::{Matrix, System};
 
 /// Domain below the stream of a shading point: half h of its samples uses `HALF + h`.
 const HALF: u32 = 32;

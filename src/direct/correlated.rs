@@ -4,7 +4,7 @@
 //! g(wi) = (1/π) Σ L̄ cos θ over the lights that wi crosses, G = E/π: what a Lambertian surface of albedo 1 would reflect to wo if nothing
 //! were in the way, not even another light, and every light had its mean radiance L̄. θ is the angle to the shading normal on the
 //! side of wo, and g = 0 on the other side. [`crate::lights::irradiance`] tells which lights take part; the others are in no g.
-//! The estimate is ȳ − λ c̄ with y = f·V/p and c = g/p − G, see [`crate::estimators::correlated`].
+//! The estimate is ȳ − λ c̄ with y = f·V/p and c = g/p − G, see [`lumiris_numbers::estimators::correlated`].
 //!
 //! * **BSDF sampling.** g is summed over all lights along the ray. E(c) = 0 asks for p > 0 wherever g > 0, and a useful variance for a
 //!   bounded g/p. Both hold for BSDFs that sample a cosine or uniform lobe on the side of wo with a probability of at least
@@ -25,11 +25,11 @@ use super::propose::{
 };
 use super::visibility::{Segments, is_traced};
 use crate::accel::{Hit, RayBatch};
-use crate::estimators::correlated::{self, SUMS};
 use crate::lights::{LightId, LightSample};
-use crate::math::ray::offset_origin;
-use crate::math::{Ray, Rgb, Vec3};
 use crate::scene::{CorrelatedForm, EmitterHit, IntegratorSettings, SamplingTechnique, World};
+use lumiris_numbers::estimators::correlated::{self, SUMS};
+use lumiris_numbers::math::ray::offset_origin;
+use lumiris_numbers::math::{Ray, Rgb, Vec3};
 use std::f32::consts::FRAC_1_PI;
 use std::time::Instant;
 

@@ -12,10 +12,10 @@
 use super::ShadePoint;
 use super::propose::{Candidate, Shares};
 use crate::bsdfs::MAX_LOBES;
-use crate::estimators::ocv::MAX_COMPONENTS;
 use crate::lights::groups::MAX_GROUPS;
-use crate::math::Vec3;
 use crate::scene::World;
+use lumiris_numbers::estimators::ocv::MAX_COMPONENTS;
+use lumiris_numbers::math::Vec3;
 
 /// The columns of a sample.
 pub type Columns = [f32; MAX_COMPONENTS];

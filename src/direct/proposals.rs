@@ -10,12 +10,12 @@
 
 use super::ShadePoint;
 use super::propose::Candidate;
-use crate::estimators::mis::Heuristic;
 use crate::lights::{LightId, LightLanes, LightRun};
-use crate::math::hash::pcg4d;
 use crate::scene::{ProposalPoints, Target, World};
-use crate::simd::combine::{self, Weighting};
-use crate::simd::{self, curve};
+use lumiris_numbers::estimators::mis::Heuristic;
+use lumiris_numbers::math::hash::pcg4d;
+use lumiris_numbers::simd::combine::{self, Weighting};
+use lumiris_numbers::simd::{self, curve};
 
 /// Seed of the positions.
 const POSITIONS: u32 = 0x517c_c1b7;

@@ -4,14 +4,14 @@ use super::ShadePoint;
 use super::contributing::Contributing;
 use super::mixture::Mixture;
 use crate::accel::{Hit, RayBatch};
-use crate::estimators::mc;
-use crate::estimators::mis::{Heuristic, Technique};
 use crate::lights::groups::MAX_GROUPS;
 use crate::lights::{LightCtx, LightHit, LightId, LightSample};
-use crate::math::ray::{SEGMENT_END, offset_origin};
-use crate::math::{Ray, Rgb, Vec3};
-use crate::samplers::SampleStream;
 use crate::scene::{EmitterHit, EstimatorKind, IntegratorSettings, World};
+use lumiris_numbers::estimators::mc;
+use lumiris_numbers::estimators::mis::{Heuristic, Technique};
+use lumiris_numbers::math::ray::{SEGMENT_END, offset_origin};
+use lumiris_numbers::math::{Ray, Rgb, Vec3};
+use lumiris_numbers::samplers::SampleStream;
 use std::time::{Duration, Instant};
 
 /// Domains below the stream of a shading point.

@@ -16,11 +16,11 @@ use super::proposals::{PointProposals, Proposals, Techniques};
 use super::propose::{self, Candidate, Candidates, Shares};
 use super::visibility::Segments;
 use crate::bsdfs::Bsdf;
-use crate::estimators::ris::{Draw, strata, stratified, systematic, with_replacement};
 use crate::lights::{LightId, LightSample};
-use crate::math::Rgb;
-use crate::math::hash::{pcg4d, unit_f32};
 use crate::scene::{IntegratorSettings, Strata, World};
+use lumiris_numbers::estimators::ris::{Draw, strata, stratified, systematic, with_replacement};
+use lumiris_numbers::math::Rgb;
+use lumiris_numbers::math::hash::{pcg4d, unit_f32};
 use std::time::{Duration, Instant};
 
 /// Domains below the stream of a shading point, beside those of [`super::propose`].

@@ -1,9 +1,9 @@
 //! From candidates to contributions where all are traced: what `mc`, `mis` and the estimators that build on them make of f and the densities.
 
 use super::propose::{Candidates, Drawn};
-use crate::estimators::mc;
-use crate::math::Rgb;
 use crate::scene::{EstimatorKind, IntegratorSettings};
+use lumiris_numbers::estimators::mc;
+use lumiris_numbers::math::Rgb;
 
 /// `out[i]` becomes the contribution of candidate `i` if its segment is free; zeros need no segment.
 pub fn contributions(settings: &IntegratorSettings, candidates: &Candidates, out: &mut Vec<Rgb>) {

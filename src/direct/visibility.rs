@@ -2,7 +2,7 @@
 
 use super::propose::Candidates;
 use crate::accel::{Accel, Coherence, RayBatch};
-use crate::math::{Ray, Rgb};
+use lumiris_numbers::math::{Ray, Rgb};
 
 /// True if a candidate of this contribution needs a segment: it is neither zero nor not finite.
 #[inline]

@@ -5,8 +5,8 @@
 //! All filters are products of a function of x and one of y. Box and triangle are sampled in closed form, the others
 //! from tables of [`ENTRIES_PER_UNIT`] equal steps per pixel, within which they are taken to be constant.
 
-use crate::math::warp::sample_tent;
-use crate::math::{PiecewiseConstant1D, Vec2};
+use lumiris_numbers::math::warp::sample_tent;
+use lumiris_numbers::math::{PiecewiseConstant1D, Vec2};
 use std::f32::consts::PI;
 
 /// Table entries per unit of radius, as in pbrt-v4 (the table covers twice the radius).
@@ -200,8 +200,8 @@ impl FilterSampler {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::math::hash::HashStream;
-    use crate::math::test_support::{Moments, assert_chi_squared};
+    use lumiris_numbers::math::hash::HashStream;
+    use lumiris_test_support::{Moments, assert_chi_squared};
 
     const FILTERS: [PixelFilter; 7] = [
         PixelFilter::Box { rx: 0.5, ry: 0.5 },

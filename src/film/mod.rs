@@ -5,7 +5,7 @@
 
 pub mod filter;
 
-use crate::math::{Rgb, Vec3};
+use lumiris_numbers::math::{Rgb, Vec3};
 
 /// What one camera sample says of its pixel.
 #[derive(Clone, Copy, Debug, Default)]

@@ -4,8 +4,8 @@
 //! [Reshetov 2019], solved in f64, so that only the rounding of the ray itself limits the result.
 
 use super::hit::{LocalHit, SurfaceHit, face_forward, round, spanning};
-use crate::math::{Bounds3, Ray, Vec2, Vec3, gamma};
 use glam::DVec3;
+use lumiris_numbers::math::{Bounds3, Ray, Vec2, Vec3, gamma};
 
 /// Indexed bilinear patches; p(u, v) blends corners p00, p10, p01, p11 in this order (pbrt's `bilinearmesh`).
 #[derive(Clone, Debug, Default)]
@@ -42,7 +42,7 @@ impl BilinearMesh {
 
     /// The first hit of patch `i` in (0, t_max); uv are its parameters (u, v).
     ///
-    /// A ray that leaves from [`crate::math::ray::offset_origin`] does not meet the same planar patch again.
+    /// A ray that leaves from [`lumiris_numbers::math::ray::offset_origin`] does not meet the same planar patch again.
     pub fn intersect_patch(&self, i: usize, ray: &Ray) -> Option<LocalHit> {
         /// Parameters this far outside 0..1 count as on the border, so that adjacent patches do not leak.
         const BORDER: f64 = 1e-10;
@@ -157,8 +157,8 @@ pub(super) fn solve_quadratic(a: f64, b: f64, c: f64) -> Option<[f64; 2]> {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::math::hash::HashStream;
-    use crate::math::ray::offset_origin;
+    use lumiris_numbers::math::hash::HashStream;
+    use lumiris_numbers::math::ray::offset_origin;
 
     fn patch(corners: [Vec3; 4]) -> BilinearMesh {
         BilinearMesh { positions: corners.to_vec(), indices: vec![[0, 1, 2, 3]], ..BilinearMesh::default() }

@@ -1,8 +1,8 @@
 //! What an intersection returns, and the differential geometry of a hit.
 
-use crate::math::transform::transform_normal;
-use crate::math::{Affine3A, Frame, Vec2, Vec3, gamma};
 use glam::DVec3;
+use lumiris_numbers::math::transform::transform_normal;
+use lumiris_numbers::math::{Affine3A, Frame, Vec2, Vec3, gamma};
 
 /// Where a ray met one shape.
 #[derive(Clone, Copy, Debug, PartialEq)]

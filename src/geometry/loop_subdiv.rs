@@ -4,7 +4,7 @@
 //! ring of neighbours, counter-clockwise if faces are; a manifold vertex has exactly one chain, closed or open.
 
 use super::TriangleMesh;
-use crate::math::Vec3;
+use lumiris_numbers::math::Vec3;
 use std::f32::consts::{PI, TAU};
 
 /// More triangles than this are refused.

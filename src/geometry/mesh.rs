@@ -1,7 +1,7 @@
 //! Indexed triangle meshes.
 
 use super::hit::{SurfaceHit, face_forward, round, spanning};
-use crate::math::{Bounds3, Vec2, Vec3, gamma};
+use lumiris_numbers::math::{Bounds3, Vec2, Vec3, gamma};
 
 /// Indexed triangles. Optional per-vertex arrays are empty if absent, else as long as the positions.
 #[derive(Clone, Debug, Default)]
@@ -136,9 +136,9 @@ fn partial_derivatives([p0, p1, p2]: [Vec3; 3], [uv0, uv1, uv2]: [Vec2; 3]) -> (
 mod tests {
     use super::*;
     use crate::geometry::triangle::{RayPrecomputed, intersect_triangle};
-    use crate::math::hash::HashStream;
-    use crate::math::ray::offset_origin;
-    use crate::math::{Affine3A, Ray};
+    use lumiris_numbers::math::hash::HashStream;
+    use lumiris_numbers::math::ray::offset_origin;
+    use lumiris_numbers::math::{Affine3A, Ray};
 
     fn triangle() -> TriangleMesh {
         let positions = vec![Vec3::new(1.0, 0.0, 2.0), Vec3::new(3.0, 0.0, 2.0), Vec3::new(1.0, 2.0, 2.0)];

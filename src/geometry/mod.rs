@@ -17,7 +17,7 @@ pub use mesh::TriangleMesh;
 pub use quadric::{Quadric, QuadricKind};
 pub use set::{Geometry, GeometryId, GeometrySet, Group, GroupId, Instance, NO_INSTANCE, Visibility};
 
-use crate::math::{Bounds3, Vec2};
+use lumiris_numbers::math::{Bounds3, Vec2};
 
 /// A shape in the space of its group (world space for the root group).
 #[derive(Clone, Debug)]

@@ -9,9 +9,9 @@
 //! otherwise be an error of the point.
 
 use super::hit::{LocalHit, SurfaceHit, round, spanning};
-use crate::math::transform::{swaps_handedness, transform_normal};
-use crate::math::{Affine3A, Bounds3, Ray, Vec2, Vec3, gamma};
 use glam::{DAffine3, DVec3};
+use lumiris_numbers::math::transform::{swaps_handedness, transform_normal};
+use lumiris_numbers::math::{Affine3A, Bounds3, Ray, Vec2, Vec3, gamma};
 use std::f64::consts::TAU;
 
 /// Which quadric, in its local space (pbrt's parameters; angles in radians).
@@ -83,7 +83,7 @@ impl Quadric {
 
     /// The first hit in (0, t_max); uv are the parameters (u, v).
     ///
-    /// A ray that leaves from [`crate::math::ray::offset_origin`] does not meet the point again that it left.
+    /// A ray that leaves from [`lumiris_numbers::math::ray::offset_origin`] does not meet the point again that it left.
     pub fn intersect(&self, ray: &Ray) -> Option<LocalHit> {
         let local_from_group = self.local_from_group.as_daffine3();
         let o = local_from_group.transform_point3(ray.o.as_dvec3());
@@ -263,8 +263,8 @@ fn sphere_roots(o: DVec3, d: DVec3, radius: f64) -> Option<[f64; 2]> {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::math::hash::HashStream;
-    use crate::math::ray::offset_origin;
+    use lumiris_numbers::math::hash::HashStream;
+    use lumiris_numbers::math::ray::offset_origin;
     use std::f32::consts::TAU as TAU32;
 
     fn kinds() -> [QuadricKind; 6] {

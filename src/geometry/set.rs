@@ -4,7 +4,7 @@
 //! Instances do not nest.
 
 use super::{Shape, SurfaceHit};
-use crate::math::{Affine3A, Bounds3};
+use lumiris_numbers::math::{Affine3A, Bounds3};
 use rayon::prelude::*;
 
 /// Index into [`GeometrySet::geometries`].
@@ -65,7 +65,11 @@ impl Instance {
         }
         let x = time.clamp(0.0, 1.0) * last as f32;
         let i = (x as usize).min(last - 1);
-        crate::math::transform::lerp_affine(&self.world_from_group[i], &self.world_from_group[i + 1], x - i as f32)
+        lumiris_numbers::math::transform::lerp_affine(
+            &self.world_from_group[i],
+            &self.world_from_group[i + 1],
+            x - i as f32,
+        )
     }
 }
 
@@ -129,7 +133,7 @@ impl GeometrySet {
 mod tests {
     use super::*;
     use crate::geometry::TriangleMesh;
-    use crate::math::Vec3;
+    use lumiris_numbers::math::Vec3;
 
     #[test]
     fn surface_hits_of_instances_follow_their_motion() {

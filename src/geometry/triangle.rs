@@ -5,8 +5,8 @@
 //! to its sign, and rounding is monotonic, so a computed sign is right or the value is 0; zeros are evaluated again in
 //! f64, where the products are exact. Edges and vertices count as inside, so a closed mesh does not leak.
 
-use crate::math::{Ray, Vec3, gamma};
 use glam::DVec3;
+use lumiris_numbers::math::{Ray, Vec3, gamma};
 
 /// A ray with its shear. Axis `kz` is the largest of the direction; `kx`, `ky` follow cyclically.
 #[derive(Clone, Copy, Debug)]
@@ -52,7 +52,7 @@ pub struct TriangleHit {
 
 /// The hit with 0 < t ≤ `t_limit`, if any; both sides count.
 ///
-/// The sign of t is decided in f64 where f32 cannot, so a ray from [`crate::math::ray::offset_origin`] does not meet the
+/// The sign of t is decided in f64 where f32 cannot, so a ray from [`lumiris_numbers::math::ray::offset_origin`] does not meet the
 /// triangle that it left.
 #[inline]
 pub fn intersect_triangle(ray: &RayPrecomputed, triangle: [Vec3; 3], t_limit: f32) -> Option<TriangleHit> {
@@ -109,7 +109,7 @@ fn plane_parameter(ray: &Ray, [p0, p1, p2]: [Vec3; 3]) -> Option<f32> {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::math::hash::HashStream;
+    use lumiris_numbers::math::hash::HashStream;
 
     fn random_point(s: &mut HashStream) -> Vec3 {
         Vec3::new(s.next_f32(), s.next_f32(), s.next_f32()) * 2.0 - 1.0

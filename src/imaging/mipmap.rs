@@ -5,7 +5,7 @@
 //! who has t upwards flips it. A filter of width w in (s, t) reads the level ℓ = levels − 1 + log₂ w, as pbrt-v4.
 
 use super::{ColorEncoding, Image};
-use crate::math::{Rgb, Vec2};
+use lumiris_numbers::math::{Rgb, Vec2};
 
 /// What lies outside the image.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]

@@ -1,25 +1,16 @@
-//! Scene files to scenes: the pbrt-v4 format, PLY meshes, measured spectra.
+//! Scene files to scenes: what directives mean ([`pbrt`]), and the images and meshes that they name ([`resources`]).
 //!
-//! User input never panics. What is wrong with it is collected, with places, in [`diagnostic::Diagnostics`].
-//!
-//! Reading order: [`source`], [`diagnostic`], [`number`], [`pbrt`], [`ply`], [`resources`], [`spectra`], [`upsampling`],
-//! [`color_space`].
+//! The files themselves are read by the crate `lumiris_formats`. User input never panics. What is wrong with it is collected, with
+//! places, in [`Diagnostics`].
 
-pub mod color_space;
-pub mod diagnostic;
-pub mod number;
 pub mod pbrt;
-pub mod ply;
 pub mod resources;
-pub mod source;
-pub mod spectra;
-pub mod spectra_data;
-pub mod upsampling;
 
 use crate::scene::Scene;
-use diagnostic::{Diagnostics, Report};
+use lumiris_formats::diagnostic::{Diagnostics, Report};
+use lumiris_formats::pbrt::parser::parse_file;
+use lumiris_formats::source::SourceMap;
 use pbrt::state::Builder;
-use source::SourceMap;
 use std::path::Path;
 
 /// What a caller overrides of a scene file.
@@ -46,7 +37,7 @@ pub fn load(path: &Path, options: &LoadOptions) -> Result<Loaded, Box<Report>> {
     let mut diagnostics = Diagnostics::new();
     let folder = path.parent().map(Path::to_path_buf).unwrap_or_default();
     let mut builder = Builder::new(folder, options);
-    pbrt::parser::parse_file(path, &mut sources, &mut diagnostics, &mut builder);
+    parse_file(path, &mut sources, &mut diagnostics, &mut builder);
     let scene = builder.finish(&mut diagnostics);
     let failed = diagnostics.has_errors();
     let report = diagnostics.finish(&sources);

@@ -1,12 +1,12 @@
 //! Image files of a scene: each is asked for once, and all are read in parallel.
 
-use super::diagnostic::Diagnostics;
-use super::source::Span;
 use crate::imaging::oiio::ImageError;
 use crate::imaging::oiio::{self, ReadLimits};
 use crate::imaging::{ColorChannels, ColorEncoding, MipMap};
-use crate::math::Rgb;
 use crate::textures::{Filter, ImageId, Wrap};
+use lumiris_formats::diagnostic::Diagnostics;
+use lumiris_formats::source::Span;
+use lumiris_numbers::math::Rgb;
 use rayon::prelude::*;
 use std::collections::HashMap;
 use std::path::{Path, PathBuf};

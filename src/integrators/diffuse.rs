@@ -9,8 +9,8 @@ use crate::bsdfs::Lambertian;
 use crate::direct::{Fits, ShadePoint};
 use crate::film::PixelSample;
 use crate::materials::SurfaceBsdf;
-use crate::math::{Rgb, Vec3};
 use crate::scene::{IntegratorSettings, World};
+use lumiris_numbers::math::{Rgb, Vec3};
 
 /// Where the light comes from that Lambertian parts reflect.
 pub(super) trait Reflected {

@@ -12,9 +12,9 @@ use crate::film::{Features, PixelSample};
 use crate::geometry::SurfaceHit;
 use crate::lights::LightHit;
 use crate::materials::SurfaceBsdf;
-use crate::math::{Ray, Rgb, Vec3};
-use crate::samplers::SampleStream;
 use crate::scene::{Found, IntegratorSettings, Split, World};
+use lumiris_numbers::math::{Ray, Rgb, Vec3};
+use lumiris_numbers::samplers::SampleStream;
 use std::time::{Duration, Instant};
 
 /// Domains below the stream of a path vertex.

@@ -2,7 +2,7 @@
 //!
 //! A cone of half-angle θo about the axis holds all normals; emission leaves within θe of a normal.
 
-use crate::math::{Bounds3, Vec3, safe_sqrt};
+use lumiris_numbers::math::{Bounds3, Vec3, safe_sqrt};
 use std::f32::consts::{FRAC_PI_2, PI};
 
 /// Bounds of the emission of a set of lights.
@@ -120,9 +120,9 @@ pub(super) fn union_cones(a: (Vec3, f32), b: (Vec3, f32)) -> (Vec3, f32) {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::math::hash::HashStream;
-    use crate::math::warp::{sample_uniform_cone, sample_uniform_sphere};
-    use crate::math::{Frame, ONE_MINUS_EPSILON};
+    use lumiris_numbers::math::hash::HashStream;
+    use lumiris_numbers::math::warp::{sample_uniform_cone, sample_uniform_sphere};
+    use lumiris_numbers::math::{Frame, ONE_MINUS_EPSILON};
 
     #[test]
     fn the_union_of_cones_holds_both() {

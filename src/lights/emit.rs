@@ -16,10 +16,10 @@
 //! side where the light comes from [Pharr et al. 2023, §12.2, §12.5]. Flux beside the scene is counted with the rest.
 
 use super::{AreaLight, Light, spot};
-use crate::math::warp::{
+use lumiris_numbers::math::warp::{
     direction, pdf_uniform_sphere, sample_cosine_hemisphere, sample_uniform_disk_concentric, sample_uniform_sphere,
 };
-use crate::math::{Frame, ONE_MINUS_EPSILON, Rgb, Vec3};
+use lumiris_numbers::math::{Frame, ONE_MINUS_EPSILON, Rgb, Vec3};
 use std::f32::consts::{PI, TAU};
 
 /// A photon as it leaves a light.

@@ -9,10 +9,10 @@ use super::{
     area_lights_of,
 };
 use crate::geometry::{BilinearMesh, Quadric, QuadricKind, Shape, TriangleMesh};
-use crate::math::hash::HashStream;
-use crate::math::test_support::{Moments, assert_chi_squared};
-use crate::math::warp::azimuth;
-use crate::math::{Affine3A, Frame, Rgb, Vec3};
+use lumiris_numbers::math::hash::HashStream;
+use lumiris_numbers::math::warp::azimuth;
+use lumiris_numbers::math::{Affine3A, Frame, Rgb, Vec3};
+use lumiris_test_support::{Moments, assert_chi_squared};
 use std::f32::consts::TAU;
 use std::sync::Arc;
 
@@ -254,7 +254,7 @@ fn check_directions(samples: &[EmissionSample], frame: Frame, density: impl Fn(V
     let mut expected = vec![0.0; CELLS * CELLS];
     for i in 0..n * n {
         let [x, y] = [i % n, i / n].map(|i| (i as f32 + 0.5) / n as f32);
-        let w = frame.to_world(crate::math::warp::direction(2.0 * x - 1.0, TAU * y));
+        let w = frame.to_world(lumiris_numbers::math::warp::direction(2.0 * x - 1.0, TAU * y));
         expected[(i / n) / FINE * CELLS + (i % n) / FINE] += density(w);
     }
     let total: f64 = expected.iter().sum();
@@ -268,7 +268,7 @@ fn check_directions(samples: &[EmissionSample], frame: Frame, density: impl Fn(V
 fn directions_from_points_and_from_infinity_follow_their_densities() {
     let world = Frame { x: Vec3::X, y: Vec3::Y, z: Vec3::Z };
     let point = Light::Point { p: Vec3::ONE, intensity: Rgb::WHITE };
-    let uniform = |_: Vec3| f64::from(crate::math::warp::pdf_uniform_sphere());
+    let uniform = |_: Vec3| f64::from(lumiris_numbers::math::warp::pdf_uniform_sphere());
     check_directions(&emitted(&point, 10), world, uniform);
     check_directions(&emitted(&Light::InfiniteConstant { l: Rgb::WHITE }, 11), world, uniform);
 

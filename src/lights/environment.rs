@@ -7,12 +7,12 @@
 //! latitude-longitude images.
 
 use super::LightSample;
-use crate::math::sphere_map::{
+use lumiris_numbers::math::sphere_map::{
     equal_area_sphere_to_square, equal_area_square_to_sphere, lat_long_to_sphere, pdf_equal_area_square_to_sphere,
     pdf_lat_long_to_sphere, sphere_to_lat_long, wrap_equal_area_texel,
 };
-use crate::math::{Mat3, PiecewiseConstant2D, Rgb, Vec2, Vec3};
-use crate::simd::Environment;
+use lumiris_numbers::math::{Mat3, PiecewiseConstant2D, Rgb, Vec2, Vec3};
+use lumiris_numbers::simd::Environment;
 use std::f64::consts::PI;
 
 /// How the unit square covers the sphere; z is up in the space of the light.
@@ -293,9 +293,9 @@ impl EnvironmentMap {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::math::hash::HashStream;
-    use crate::math::test_support::{Moments, assert_chi_squared};
-    use crate::math::warp::sample_uniform_sphere;
+    use lumiris_numbers::math::hash::HashStream;
+    use lumiris_numbers::math::warp::sample_uniform_sphere;
+    use lumiris_test_support::{Moments, assert_chi_squared};
 
     fn one_bright(mapping: EnvironmentMapping, size: [usize; 2], at: usize) -> EnvironmentMap {
         let mut texels = vec![Rgb::BLACK; size[0] * size[1]];
@@ -356,7 +356,7 @@ mod tests {
             // Rounding may carry a direction at an edge into the next texel.
             disagreements += u32::from((map.pdf(s.w) - s.pdf).abs() > 1e-3 * s.pdf);
             let row = ((s.w.z + 1.0) * 0.5 * ROWS as f32).clamp(0.0, ROWS as f32 - 1.0) as usize;
-            let phi = crate::math::warp::azimuth(s.w) / std::f32::consts::TAU;
+            let phi = lumiris_numbers::math::warp::azimuth(s.w) / std::f32::consts::TAU;
             observed[row * COLUMNS + ((phi * COLUMNS as f32) as usize).min(COLUMNS - 1)] += 1.0;
         }
         assert!(disagreements < 20, "{disagreements} directions have another density than their samples");
@@ -368,7 +368,9 @@ mod tests {
                 for i in 0..sub * sub {
                     let y = (row as f32 + ((i / sub) as f32 + 0.5) / sub as f32) / ROWS as f32;
                     let x = (column as f32 + ((i % sub) as f32 + 0.5) / sub as f32) / COLUMNS as f32;
-                    sum += f64::from(map.pdf(crate::math::warp::direction(2.0 * y - 1.0, std::f32::consts::TAU * x)));
+                    sum += f64::from(
+                        map.pdf(lumiris_numbers::math::warp::direction(2.0 * y - 1.0, std::f32::consts::TAU * x)),
+                    );
                 }
                 sum / (sub * sub) as f64 * 4.0 * PI / (ROWS * COLUMNS) as f64 * f64::from(count)
             })

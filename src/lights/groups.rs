@@ -6,7 +6,7 @@
 //! the number of samples of every group can be fixed.
 
 use super::{LightChoice, LightCtx, LightId, LightSampler, LightSet, LightTree};
-use crate::math::{AliasTable, ONE_MINUS_EPSILON};
+use lumiris_numbers::math::{AliasTable, ONE_MINUS_EPSILON};
 
 /// Most groups.
 pub const MAX_GROUPS: usize = 8;
@@ -57,7 +57,7 @@ impl LightGroups {
                 &own_tree
             }
         };
-        let ctx = LightCtx::at(crate::math::Vec3::ZERO);
+        let ctx = LightCtx::at(lumiris_numbers::math::Vec3::ZERO);
         let is_infinite = |i: usize| set.lights[i].is_infinite() && set.sampler.pmf(&ctx, i as LightId) > 0.0;
         let infinite: Vec<LightId> = (0..set.lights.len()).filter(|&i| is_infinite(i)).map(|i| i as LightId).collect();
         let has_infinite = !infinite.is_empty();
@@ -183,9 +183,9 @@ impl LightGroups {
 mod tests {
     use super::*;
     use crate::lights::{Light, LightHints, LightSamplerKind, LightSetBuilder};
-    use crate::math::hash::HashStream;
-    use crate::math::test_support::assert_chi_squared;
-    use crate::math::{Bounds3, Rgb, Vec3};
+    use lumiris_numbers::math::hash::HashStream;
+    use lumiris_numbers::math::{Bounds3, Rgb, Vec3};
+    use lumiris_test_support::assert_chi_squared;
 
     const KINDS: [LightSamplerKind; 4] =
         [LightSamplerKind::Uniform, LightSamplerKind::Power, LightSamplerKind::Tree, LightSamplerKind::Photons];

@@ -15,7 +15,7 @@ use super::groups::MAX_GROUPS;
 use super::hints::Around;
 use super::select::{TreeChoice, UNIT};
 use super::{Light, LightChoice, LightCtx, LightHints, LightId, LightRun};
-use crate::math::ONE_MINUS_EPSILON;
+use lumiris_numbers::math::ONE_MINUS_EPSILON;
 use std::f32::consts::PI;
 use std::sync::Arc;
 

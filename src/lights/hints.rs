@@ -12,7 +12,7 @@
 //! light around it on the average.
 
 use super::LightId;
-use crate::math::{Bounds3, Vec3};
+use lumiris_numbers::math::{Bounds3, Vec3};
 use rayon::prelude::*;
 
 /// Least cosine between a photon's normal and an axis direction for it to count on that side: cos(54.7° + 17.8°), of the
@@ -260,8 +260,8 @@ fn merged(mut items: Vec<(u64, LightId, u32)>) -> Vec<(u64, LightId, u32)> {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::math::hash::HashStream;
-    use crate::math::warp::sample_uniform_sphere;
+    use lumiris_numbers::math::hash::HashStream;
+    use lumiris_numbers::math::warp::sample_uniform_sphere;
 
     fn random_photons(count: usize, lights: u32) -> Vec<(Vec3, Vec3, LightId)> {
         let mut s = HashStream::new([5, 5, 5]);

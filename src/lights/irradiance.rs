@@ -14,8 +14,8 @@
 use super::area::{AreaLight, AreaShape};
 use super::{Light, LightId, LightSet};
 use crate::geometry::GeometryId;
-use crate::math::{Rgb, Vec3, sqr};
 use glam::DVec3;
+use lumiris_numbers::math::{Rgb, Vec3, sqr};
 use std::f32::consts::PI;
 
 /// Distance from the plane of a flat light, in units of its extent, up to which it is seen edge-on: rounding decides there on
@@ -180,10 +180,10 @@ mod tests {
     use super::*;
     use crate::geometry::{Quadric, QuadricKind, Shape, TriangleMesh};
     use crate::lights::{Emission, EmissionImage, LightCtx, LightHit, LightSamplerKind, LightSetBuilder};
-    use crate::math::hash::HashStream;
-    use crate::math::test_support::Moments;
-    use crate::math::warp::sample_uniform_sphere;
-    use crate::math::{Affine3A, Bounds3, Vec2};
+    use lumiris_numbers::math::hash::HashStream;
+    use lumiris_numbers::math::warp::sample_uniform_sphere;
+    use lumiris_numbers::math::{Affine3A, Bounds3, Vec2};
+    use lumiris_test_support::Moments;
     use std::sync::Arc;
 
     const POINTS: u32 = 40;

@@ -1,9 +1,9 @@
 //! Many samples of one light at one point, as structure of arrays.
 
 use super::{Light, LightCtx};
-use crate::simd;
+use lumiris_numbers::simd;
 
-pub use crate::simd::LightLanes;
+pub use lumiris_numbers::simd::LightLanes;
 
 /// So many samples of an area light are cheaper in vectors than one by one, if a single one is cheap.
 const FEW: usize = 3;
@@ -56,8 +56,8 @@ mod tests {
     use super::*;
     use crate::geometry::{Quadric, QuadricKind, Shape, TriangleMesh};
     use crate::lights::{Emission, EnvironmentFilter, EnvironmentMap, EnvironmentMapping, area_lights_of};
-    use crate::math::hash::HashStream;
-    use crate::math::{Affine3A, Rgb, Vec3};
+    use lumiris_numbers::math::hash::HashStream;
+    use lumiris_numbers::math::{Affine3A, Rgb, Vec3};
     use std::sync::Arc;
 
     type Lanes = ([Vec<f32>; 3], [Vec<f32>; 3], Vec<f32>);

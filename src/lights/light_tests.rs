@@ -3,10 +3,10 @@
 use super::area::AreaShape;
 use super::{AreaLight, Emission, Light, LightCtx, LightHit, area_lights_of};
 use crate::geometry::{BilinearMesh, Quadric, QuadricKind, Shape, TriangleMesh};
-use crate::math::hash::HashStream;
-use crate::math::test_support::{Moments, assert_chi_squared};
-use crate::math::warp::{invert_uniform_triangle, sample_uniform_triangle};
-use crate::math::{Affine3A, Mat3, Quat, Rgb, Vec2, Vec3};
+use lumiris_numbers::math::hash::HashStream;
+use lumiris_numbers::math::warp::{invert_uniform_triangle, sample_uniform_triangle};
+use lumiris_numbers::math::{Affine3A, Mat3, Quat, Rgb, Vec2, Vec3};
+use lumiris_test_support::{Moments, assert_chi_squared};
 use std::f64::consts::PI;
 
 pub(super) const CELLS: usize = 16;
@@ -85,7 +85,7 @@ pub(super) fn quadric_surface(kind: QuadricKind, placement: Affine3A) -> Surface
     };
     let invert = move |p: Vec3| {
         let p = inverse.transform_point3(p);
-        let phi = crate::math::warp::azimuth(p);
+        let phi = lumiris_numbers::math::warp::azimuth(p);
         match kind {
             QuadricKind::Sphere { z_min, z_max, phi_max, .. } | QuadricKind::Cylinder { z_min, z_max, phi_max, .. } => {
                 [(p.z - z_min) / (z_max - z_min), phi / phi_max]

@@ -36,7 +36,7 @@ pub use select::{LightChoice, LightRun, LightSampler, LightSamplerKind};
 pub use set::{LightSet, LightSetBuilder};
 pub use tree::LightTree;
 
-use crate::math::{Affine3A, Bounds3, Mat3, Rgb, Vec2, Vec3};
+use lumiris_numbers::math::{Affine3A, Bounds3, Mat3, Rgb, Vec2, Vec3};
 use std::f32::consts::PI;
 use std::sync::Arc;
 
@@ -193,8 +193,9 @@ impl Light {
             }
             Light::Area(area) => area.sample_li(ctx, u),
             Light::InfiniteConstant { l } => {
-                let wi = crate::math::warp::sample_uniform_sphere(u);
-                (!l.is_black()).then(|| environment::infinite_sample(wi, *l, crate::math::warp::pdf_uniform_sphere()))
+                let wi = lumiris_numbers::math::warp::sample_uniform_sphere(u);
+                (!l.is_black())
+                    .then(|| environment::infinite_sample(wi, *l, lumiris_numbers::math::warp::pdf_uniform_sphere()))
             }
             Light::InfiniteImage { map, world_from_light, scale } => {
                 let s = map.sample(u)?;
@@ -214,7 +215,7 @@ impl Light {
                 if l.is_black() {
                     0.0
                 } else {
-                    crate::math::warp::pdf_uniform_sphere()
+                    lumiris_numbers::math::warp::pdf_uniform_sphere()
                 }
             }
             Light::InfiniteImage { map, world_from_light, .. } => map.pdf(world_from_light.transpose() * wi),

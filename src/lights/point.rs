@@ -3,7 +3,7 @@
 //! li = I(−wi)/t², with I the radiant intensity.
 
 use super::{LightCtx, LightSample};
-use crate::math::{Rgb, Vec3};
+use lumiris_numbers::math::{Rgb, Vec3};
 
 /// The sample of a light at `p` whose intensity towards the unit direction `w` is `intensity(w)`.
 pub(super) fn sample_li_from(p: Vec3, ctx: &LightCtx, intensity: impl Fn(Vec3) -> Rgb) -> Option<LightSample> {
@@ -24,7 +24,7 @@ pub(super) fn sample_li_from(p: Vec3, ctx: &LightCtx, intensity: impl Fn(Vec3) -
 #[cfg(test)]
 mod tests {
     use crate::lights::{Light, LightCtx};
-    use crate::math::{Rgb, Vec3};
+    use lumiris_numbers::math::{Rgb, Vec3};
     use std::f32::consts::PI;
 
     #[test]

@@ -10,7 +10,7 @@
 //! Lights without power are never chosen.
 
 use super::{HintedChoice, Light, LightCtx, LightHints, LightId, LightTree};
-use crate::math::{AliasTable, ONE_MINUS_EPSILON};
+use lumiris_numbers::math::{AliasTable, ONE_MINUS_EPSILON};
 use std::sync::Arc;
 
 /// Share of the power sampler that does not follow the power.

@@ -7,7 +7,7 @@ use super::{
     LightSamplerKind, area_lights_of,
 };
 use crate::geometry::{GeometryId, Shape};
-use crate::math::{Bounds3, Rgb, Vec3};
+use lumiris_numbers::math::{Bounds3, Rgb, Vec3};
 use std::sync::Arc;
 
 /// Lights of the primitives of one geometry: one for all, or one for each.
@@ -229,9 +229,9 @@ mod tests {
     use super::*;
     use crate::geometry::TriangleMesh;
     use crate::lights::{EnvironmentFilter, EnvironmentMap, EnvironmentMapping};
-    use crate::math::Affine3A;
-    use crate::math::hash::HashStream;
-    use crate::math::test_support::{Moments, assert_chi_squared};
+    use lumiris_numbers::math::Affine3A;
+    use lumiris_numbers::math::hash::HashStream;
+    use lumiris_test_support::{Moments, assert_chi_squared};
     use std::sync::Arc;
 
     const KINDS: [LightSamplerKind; 4] =
@@ -365,7 +365,7 @@ mod tests {
                 let sample = set.sample(&ctx, s.next_f32(), s.next_2d());
                 moments.add(sample.map_or(0.0, |(light, s)| {
                     if !s.is_delta {
-                        let hit = LightHit { t: s.t, p: s.p, n: s.n, uv: crate::math::Vec2::ZERO };
+                        let hit = LightHit { t: s.t, p: s.p, n: s.n, uv: lumiris_numbers::math::Vec2::ZERO };
                         let pdf = set.pdf(&ctx, light, s.wi, &hit);
                         assert!((pdf - s.pdf).abs() <= 1e-3 * s.pdf || set.lights[light as usize].is_infinite());
                     }

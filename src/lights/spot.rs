@@ -41,7 +41,7 @@ const SPOT_STEPS: u32 = 6;
 mod tests {
     use super::*;
     use crate::lights::{Light, LightCtx};
-    use crate::math::{Rgb, Vec3};
+    use lumiris_numbers::math::{Rgb, Vec3};
 
     #[test]
     fn solid_angle_is_the_integral_of_the_falloff() {
@@ -59,7 +59,7 @@ mod tests {
         for (total, start) in [(0.6_f32, 0.85_f32), (-0.5, 0.2), (0.5, 1.0), (0.7, 0.70001)] {
             let solid_angle = f64::from(spot_solid_angle(total, start));
             for i in 0..=64 {
-                let u = (i as f32 / 64.0).min(crate::math::ONE_MINUS_EPSILON);
+                let u = (i as f32 / 64.0).min(lumiris_numbers::math::ONE_MINUS_EPSILON);
                 let cos = f64::from(sample_spot_cos(u, total, start));
                 // The share of the flux in the part from the axis, or between the cones, to this cosine
                 let (inner, band) = (1.0 - f64::from(start), f64::from(start - total));

@@ -8,7 +8,7 @@
 
 use super::select::LightRun;
 use super::{LightBounds, LightCtx, LightId};
-use crate::math::{Bounds3, ONE_MINUS_EPSILON, Vec3, safe_sqrt, sqr};
+use lumiris_numbers::math::{Bounds3, ONE_MINUS_EPSILON, Vec3, safe_sqrt, sqr};
 
 /// Slack of the cosines, for rounding: a light that can contribute never has importance 0.
 const COSINE_SLACK: f32 = 1e-3;
@@ -414,10 +414,10 @@ mod tests {
     use super::*;
     use crate::geometry::{Shape, TriangleMesh};
     use crate::lights::{Emission, Light, area_lights_of};
-    use crate::math::Rgb;
-    use crate::math::hash::HashStream;
-    use crate::math::test_support::assert_chi_squared;
-    use crate::math::warp::sample_uniform_sphere;
+    use lumiris_numbers::math::Rgb;
+    use lumiris_numbers::math::hash::HashStream;
+    use lumiris_numbers::math::warp::sample_uniform_sphere;
+    use lumiris_test_support::assert_chi_squared;
 
     /// Lights of all kinds in the cube 0..scale, about half of them in small clusters.
     fn random_lights(count: usize, scale: f32, key: u32) -> Vec<Light> {

@@ -2,8 +2,8 @@
 
 use super::MaterialEntry;
 use crate::geometry::SurfaceHit;
-use crate::math::{Frame, Vec2, Vec3};
 use crate::textures::{FloatTextureId, ImageId, TextureContext, TextureSet};
+use lumiris_numbers::math::{Frame, Vec2, Vec3};
 
 /// Step in u and v of the finite differences where the footprint is unknown.
 const DEFAULT_STEP: f32 = 5e-4;

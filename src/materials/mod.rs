@@ -16,9 +16,9 @@ use crate::bsdfs::{
     ProposalDensity, ThinDielectric, TrowbridgeReitz,
 };
 use crate::geometry::SurfaceHit;
-use crate::math::hash::{hash_floats, unit_f32};
-use crate::math::{Rgb, Vec3};
 use crate::textures::{FloatTextureId, ImageId, RgbTextureId, TextureContext, TextureSet};
+use lumiris_numbers::math::hash::{hash_floats, unit_f32};
+use lumiris_numbers::math::{Rgb, Vec3};
 use rayon::prelude::*;
 
 /// Index into a [`MaterialSet`].

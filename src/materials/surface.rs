@@ -1,8 +1,8 @@
 //! A BSDF in the shading frame of a hit, for directions in world space.
 
 use crate::bsdfs::{Bsdf, BsdfSample, Lambertian, Resampled, resample};
-use crate::math::{Frame, Rgb, Vec3};
-use crate::simd::{self, bsdf::Values};
+use lumiris_numbers::math::{Frame, Rgb, Vec3};
+use lumiris_numbers::simd::{self, bsdf::Values};
 
 /// The scattering at a hit. Sides are told by the shading normal alone, as in pbrt-v4: where it disagrees with the
 /// geometric normal, light may leak through or fail to arrive, and the integrator finds the former blocked.
@@ -134,8 +134,8 @@ mod tests {
     use crate::bsdfs::{
         CoatTable, CoatedDiffuse, Conductor, Dielectric, Diffuse, DiffuseTransmission, ThinDielectric, TrowbridgeReitz,
     };
-    use crate::math::hash::HashStream;
-    use crate::math::warp::sample_uniform_sphere;
+    use lumiris_numbers::math::hash::HashStream;
+    use lumiris_numbers::math::warp::sample_uniform_sphere;
 
     /// Near equal, relative to the value and to 1e-3.
     fn assert_near(a: f32, b: f32, what: &dyn std::fmt::Debug) {

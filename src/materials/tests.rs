@@ -1,14 +1,14 @@
 use super::*;
 use crate::bsdfs::Lobe;
 use crate::imaging::{ColorEncoding, Filter, Image, MipMap, Wrap};
-use crate::math::hash::HashStream;
-use crate::math::{Vec2, warp};
 use crate::textures::{FloatTexture, ImageTexture, Mapping2d, RgbTexture};
+use lumiris_numbers::math::hash::HashStream;
+use lumiris_numbers::math::{Vec2, warp};
 use std::f32::consts::FRAC_1_PI;
 
 /// A hit on a plane whose normal is `n`, with ∂p/∂u and ∂p/∂v of lengths 2 and 3.
 fn hit(n: Vec3) -> SurfaceHit {
-    let frame = crate::math::Frame::from_xz(Vec3::new(1.0, 0.2, 0.1), n);
+    let frame = lumiris_numbers::math::Frame::from_xz(Vec3::new(1.0, 0.2, 0.1), n);
     let (dpdu, dpdv) = (frame.x * 2.0, frame.y * 3.0);
     let p = Vec3::new(1.0, 2.0, 3.0);
     SurfaceHit { p, p_error: Vec3::ZERO, n, ns: n, dpdu, dpdv, dpdus: dpdu, uv: Vec2::new(0.4, 0.6) }
@@ -136,7 +136,7 @@ fn a_normal_map_sets_the_normal_in_the_tangent_frame() {
     bench.entries[0].normal_map = Some(map);
     let (set, hit) = (bench.set(), hit(UP));
     let s = set.bsdf(id, &bench.textures, &hit, &context(&hit), UP).unwrap();
-    let frame = crate::math::Frame::from_xz(hit.dpdus, hit.ns);
+    let frame = lumiris_numbers::math::Frame::from_xz(hit.dpdus, hit.ns);
     assert!((s.frame.z - frame.to_world(local)).length() < 1e-5);
     assert!(s.frame.x.dot(s.frame.z).abs() < 1e-6 && s.frame.x.dot(hit.dpdus) > 0.0);
 }

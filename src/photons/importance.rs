@@ -14,8 +14,8 @@ use super::photon::{Origin, Photon};
 use super::trace::{BATCH, domain, trajectory_stream};
 use super::walk::{Particle, WalkSettings, Walker};
 use crate::bsdfs::dielectric::Transport;
-use crate::math::{Rgb, Vec2, Vec3};
 use crate::scene::World;
+use lumiris_numbers::math::{Rgb, Vec2, Vec3};
 use rayon::prelude::*;
 
 /// Seeds of importons and of test rays are those of photons with this.

@@ -17,7 +17,7 @@
 
 use super::photon::Photon;
 use super::tree::{Tree, Visit};
-use crate::math::{Rgb, Vec3};
+use lumiris_numbers::math::{Rgb, Vec3};
 use std::collections::BinaryHeap;
 use std::f32::consts::FRAC_1_PI;
 

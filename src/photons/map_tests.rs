@@ -1,8 +1,8 @@
 use super::{GatherScratch, Origin, Photon, PhotonMap, Place, Search};
-use crate::estimators::stats::{Welford, t_test};
-use crate::math::hash::HashStream;
-use crate::math::warp::{sample_cosine_hemisphere, sample_uniform_sphere};
-use crate::math::{Frame, Rgb, Vec3};
+use lumiris_numbers::estimators::stats::{Welford, t_test};
+use lumiris_numbers::math::hash::HashStream;
+use lumiris_numbers::math::warp::{sample_cosine_hemisphere, sample_uniform_sphere};
+use lumiris_numbers::math::{Frame, Rgb, Vec3};
 use std::time::{Duration, Instant};
 
 /// Photons of constant density on the square |x|, |z| ≤ 1 of the plane y = height, by a Poisson process of `mean`

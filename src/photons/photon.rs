@@ -3,13 +3,13 @@
 //! | bits | what |
 //! |---|---|
 //! | 3 × 32 | position |
-//! | 28 + 28 | direction and normal, by [`crate::math::octahedral`]: within 2.7·10⁻⁴ rad |
+//! | 28 + 28 | direction and normal, by [`lumiris_numbers::math::octahedral`]: within 2.7·10⁻⁴ rad |
 //! | 8 + 3 × 12 | power: an exponent for all channels and their mantissas, as in [Ward 1991] with more bits: within 0.025 % of the largest |
 //! | 2 + 26 | origin, light |
 
 use crate::lights::LightId;
-use crate::math::octahedral::{PACKED_BITS, pack_unit, unpack_unit};
-use crate::math::{Rgb, Vec3};
+use lumiris_numbers::math::octahedral::{PACKED_BITS, pack_unit, unpack_unit};
+use lumiris_numbers::math::{Rgb, Vec3};
 
 /// Bits of a channel's mantissa.
 const MANTISSA_BITS: u32 = 12;
@@ -166,9 +166,9 @@ fn unpack_power(exponent: u32, mantissas: [u32; 3]) -> Rgb {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::math::hash::HashStream;
-    use crate::math::octahedral::MAX_ERROR;
-    use crate::math::warp::sample_uniform_sphere;
+    use lumiris_numbers::math::hash::HashStream;
+    use lumiris_numbers::math::octahedral::MAX_ERROR;
+    use lumiris_numbers::math::warp::sample_uniform_sphere;
 
     #[test]
     fn a_photon_comes_back_as_it_was() {

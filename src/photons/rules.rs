@@ -67,8 +67,8 @@ pub fn caustic(xi: f32, p: f32) -> Option<f32> {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::estimators::stats::{Welford, t_test};
-    use crate::math::hash::HashStream;
+    use lumiris_numbers::estimators::stats::{Welford, t_test};
+    use lumiris_numbers::math::hash::HashStream;
 
     #[test]
     fn all_rules_keep_the_power_on_average_and_ask_for_p_no_more_than_they_must() {
@@ -94,11 +94,11 @@ mod tests {
 
     #[test]
     fn certain_photons_are_always_stored_and_impossible_ones_never() {
-        assert_eq!(caustic(crate::math::ONE_MINUS_EPSILON, 1.0), Some(1.0));
+        assert_eq!(caustic(lumiris_numbers::math::ONE_MINUS_EPSILON, 1.0), Some(1.0));
         assert_eq!(caustic(0.0, 0.0), None);
         for rule in CausticRule::ALL {
             assert_eq!(rule.global(1.0, true, [0.0; 2], || 0.0), None);
-            assert_eq!(rule.global(1.0, true, [crate::math::ONE_MINUS_EPSILON; 2], || 1.0), Some(1.0));
+            assert_eq!(rule.global(1.0, true, [lumiris_numbers::math::ONE_MINUS_EPSILON; 2], || 1.0), Some(1.0));
         }
     }
 }

@@ -63,8 +63,8 @@ impl LightShares {
 mod tests {
     use super::*;
     use crate::lights::{Light, LightSamplerKind, LightSetBuilder};
-    use crate::math::{Bounds3, Rgb, Vec3};
-    use crate::samplers::{SampleStream, SamplerKind};
+    use lumiris_numbers::math::{Bounds3, Rgb, Vec3};
+    use lumiris_numbers::samplers::{SampleStream, SamplerKind};
 
     fn points(intensities: &[f32]) -> LightSet {
         let mut builder = LightSetBuilder::default();

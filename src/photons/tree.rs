@@ -5,7 +5,7 @@
 //! coordinate is never cut along it again, so that the tree is no deeper for it than by three.
 
 use super::photon::Photon;
-use crate::math::Vec3;
+use lumiris_numbers::math::Vec3;
 
 /// Most photons of a leaf, unless they are all at one point.
 const LEAF: usize = 10;

@@ -18,10 +18,10 @@ use crate::accel::{Coherence, Hit, RayBatch};
 use crate::bsdfs::dielectric::Transport;
 use crate::bsdfs::{Lambertian, Resampled};
 use crate::materials::SurfaceBsdf;
-use crate::math::sphere_map::equal_area_sphere_to_square;
-use crate::math::{Ray, Rgb, Vec3};
-use crate::samplers::SampleStream;
 use crate::scene::{Found, World};
+use lumiris_numbers::math::sphere_map::equal_area_sphere_to_square;
+use lumiris_numbers::math::{Ray, Rgb, Vec3};
+use lumiris_numbers::samplers::SampleStream;
 
 /// Surfaces without scattering that a particle may pass between two vertices.
 const MAX_PASSED: u32 = 64;

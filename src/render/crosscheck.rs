@@ -10,11 +10,11 @@
 use crate::accel::{Accel, Coherence, Hit, RayBatch};
 use crate::geometry::Shape;
 use crate::lights::LightCtx;
-use crate::math::ray::{SEGMENT_END, offset_origin};
-use crate::math::{Ray, Vec2, Vec3, warp};
-use crate::samplers::{SampleStream, SamplerKind};
 use crate::scene::{Scene, World};
 use glam::DVec3;
+use lumiris_numbers::math::ray::{SEGMENT_END, offset_origin};
+use lumiris_numbers::math::{Ray, Vec2, Vec3, warp};
+use lumiris_numbers::samplers::{SampleStream, SamplerKind};
 use serde::Serialize;
 
 /// Allowed difference of t in units in the last place of the largest of t·|d|, |o| and the hit's coordinates.
@@ -182,7 +182,7 @@ fn grazing_rays(scene: &Scene, camera: &RayBatch, hits: &[Option<Hit>]) -> RayBa
         let u = uniforms(Family::Grazing, i as u32);
         // Elevations from 10⁻⁵ to 10⁻¹ radians, log-uniform.
         let elevation = 10.0_f32.powf(-5.0 + 4.0 * u[0]);
-        let frame = crate::math::Frame::from_z(s.n);
+        let frame = lumiris_numbers::math::Frame::from_z(s.n);
         let d = frame.to_world(warp::direction(elevation.sin(), std::f32::consts::TAU * u[1]));
         batch.push(&Ray { o: offset_origin(s.p, s.p_error, s.n, d), d, t_max: f32::INFINITY, time });
     }

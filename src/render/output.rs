@@ -210,7 +210,7 @@ pub fn settings_metadata(scene: &Scene) -> Vec<(String, String)> {
 mod tests {
     use super::*;
     use crate::film::{PixelBounds, PixelSample};
-    use crate::math::Rgb;
+    use lumiris_numbers::math::Rgb;
 
     #[test]
     fn channel_count_matches_names_for_every_aov() {

@@ -13,13 +13,13 @@
 use super::hints::light_hints;
 use super::{RenderSettings, Run, ThreadError, camera_batches};
 use crate::direct::Fits;
-use crate::estimators::ris::choice::{Costs, MomentsEstimate, Variances, clamp_ratio, optimal_ratio};
 use crate::film::PixelBounds;
 use crate::integrators::PathIntegrator;
 use crate::integrators::path::CameraSample;
 use crate::scene::{
     EstimatorKind, IntegratorKind, IntegratorSettings, Proposals, Split, SplitMap, StageTimes, Strata, Target, World,
 };
+use lumiris_numbers::estimators::ris::choice::{Costs, MomentsEstimate, Variances, clamp_ratio, optimal_ratio};
 use rayon::prelude::*;
 use std::sync::atomic::AtomicBool;
 use std::time::Duration;

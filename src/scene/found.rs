@@ -4,9 +4,9 @@ use super::World;
 use crate::accel::Hit;
 use crate::geometry::SurfaceHit;
 use crate::materials::SurfaceBsdf;
-use crate::math::ray::offset_origin;
-use crate::math::{Ray, Vec2, Vec3};
 use crate::textures::TextureContext;
+use lumiris_numbers::math::ray::offset_origin;
+use lumiris_numbers::math::{Ray, Vec2, Vec3};
 
 /// A hit with its surface.
 #[derive(Clone, Copy, Debug)]

@@ -25,8 +25,8 @@ use crate::film::filter::PixelFilter;
 use crate::geometry::GeometrySet;
 use crate::lights::LightSet;
 use crate::materials::{MaterialId, MaterialSet};
-use crate::samplers::SamplerKind;
 use crate::textures::TextureSet;
+use lumiris_numbers::samplers::SamplerKind;
 use std::sync::Arc;
 
 /// What is rendered and how the file asks for it.

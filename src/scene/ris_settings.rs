@@ -1,6 +1,6 @@
 //! What is particular to `ris`: proposals, strata and targets.
 
-use crate::estimators::ris::choice::Costs;
+use lumiris_numbers::estimators::ris::choice::Costs;
 
 /// Proposals for each sample where no times were measured.
 pub const DEFAULT_RATIO: f64 = 8.0;

@@ -3,9 +3,9 @@
 use super::photon_settings::PhotonMapSettings;
 use super::ris_settings::{Proposals, RisSettings, Target};
 use crate::bsdfs::ProposalDensity;
-use crate::estimators::mis::Heuristic;
-use crate::estimators::ocv::{Form, MAX_COMPONENTS};
 use crate::lights::LightSamplerKind;
+use lumiris_numbers::estimators::mis::Heuristic;
+use lumiris_numbers::estimators::ocv::{Form, MAX_COMPONENTS};
 
 /// Light transport.
 #[derive(Clone, Copy, Debug, PartialEq)]

@@ -1,8 +1,8 @@
 //! The best numbers of samples and proposals, pixel by pixel.
 
 use super::Split;
-use crate::estimators::ris::choice::{Costs, counts};
 use crate::film::PixelBounds;
+use lumiris_numbers::estimators::ris::choice::{Costs, counts};
 
 /// M/N of every pixel, for the same time in all [Talbot 2005, §4.3; Talbot et al. 2005, Fig. 3].
 #[derive(Clone, Debug, PartialEq)]

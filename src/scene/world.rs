@@ -6,8 +6,8 @@ use crate::accel::embree::{EmbreeAccel, EmbreeError};
 use crate::accel::{Accel, AlphaSource, Coherence, Hit, RayBatch};
 use crate::geometry::{GeometryId, GeometrySet, Group};
 use crate::lights::{Irradiances, LightId, LightSampler, LightSamplerKind};
-use crate::math::{Vec2, Vec3};
 use crate::textures::{TextureContext, TextureSet};
+use lumiris_numbers::math::{Vec2, Vec3};
 use std::sync::Arc;
 
 /// Which ray tracer.

@@ -1,7 +1,7 @@
 //! From a surface point to texture coordinates.
 
 use super::TextureContext;
-use crate::math::{Affine3A, Vec2, Vec3, warp};
+use lumiris_numbers::math::{Affine3A, Vec2, Vec3, warp};
 use std::f32::consts::{FRAC_1_PI, PI, TAU};
 
 /// Map of a surface point to the plane of a texture.

@@ -9,7 +9,7 @@ pub use crate::imaging::{Filter, Wrap};
 pub use mapping::{CheckerboardMapping, Mapping2d};
 
 use crate::imaging::MipMap;
-use crate::math::{Rgb, Vec2, Vec3};
+use lumiris_numbers::math::{Rgb, Vec2, Vec3};
 
 /// Index into [`TextureSet::floats`].
 pub type FloatTextureId = u32;

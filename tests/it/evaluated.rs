@@ -1,11 +1,11 @@
 //! Materials that can only be evaluated, from the scene file to the picture.
 
 use lumiris::bsdfs::ProposalDensity;
-use lumiris::estimators::stats::{Welford, sidak, t_test, two_sample_z_test};
 use lumiris::import::{LoadOptions, load};
 use lumiris::materials::{EvaluatedMaterial, Material};
 use lumiris::render::{RenderSettings, render};
 use lumiris::scene::{AccelKind, Scene, World};
+use lumiris_numbers::estimators::stats::{Welford, sidak, t_test, two_sample_z_test};
 use std::path::Path;
 use std::sync::atomic::AtomicBool;
 

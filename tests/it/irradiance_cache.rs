@@ -1,13 +1,13 @@
 //! The irradiance cache: known answers, agreement with `path`, the same bits, gradients, walls, and scenes with nothing in them.
 
-use lumiris::estimators::ocv::Form;
 use lumiris::film::{Film, PixelSums};
 use lumiris::import::{LoadOptions, load};
 use lumiris::integrators::irradiance_cache::gather::{Gatherer, Wanted};
-use lumiris::math::Vec3;
 use lumiris::render::output::{Aov, channels};
 use lumiris::render::{RenderSettings, Rendering, render};
 use lumiris::scene::{AccelKind, Cached, EstimatorKind, IntegratorKind, Proposals, World};
+use lumiris_numbers::estimators::ocv::Form;
+use lumiris_numbers::math::Vec3;
 use std::path::Path;
 use std::sync::atomic::AtomicBool;
 
@@ -190,6 +190,50 @@ fn seeds_give_different_records() {
     };
     assert_eq!(picture(3), picture(3));
     assert_ne!(picture(3), picture(4));
+}
+
+#[test]
+#[ignore = "explore"]
+fn explore_records() {
+    use lumiris_numbers::estimators::stats::Welford;
+    let mean = |name: &str, size: u32, change: &dyn Fn(&mut lumiris::scene::IntegratorSettings)| {
+        let start = std::time::Instant::now();
+        let mut w = Welford::new();
+        for seed in 0..12 {
+            let world = world_of(&ROOM.replace("[ 48 ]", &format!("[ {size} ]")), |scene| {
+                with_cache(scene, Cached::All);
+                scene.integrator.cache.samples = 64;
+                scene.integrator.samples = Some(8);
+                scene.integrator.ris.proposals = Proposals::Fixed(32);
+                scene.sampling.seed = seed + 100;
+                change(&mut scene.integrator);
+            });
+            let film = rendering(&world, RenderSettings { spp: 4, threads: Some(1), ..Default::default() }).film;
+            w.add(squares(&film, size)[0]);
+        }
+        println!(
+            "{size} {name} {:.5} {:.5} rel {:.5} t {:.2}",
+            w.mean(),
+            w.standard_error(),
+            w.variance().sqrt() / w.mean(),
+            start.elapsed().as_secs_f64()
+        );
+    };
+    for size in [24, 48] {
+        mean("mis", size, &|s| s.estimator = EstimatorKind::Mis);
+        for estimator in [
+            EstimatorKind::Mc,
+            EstimatorKind::Ris,
+            EstimatorKind::Ocv,
+            EstimatorKind::Correlated,
+            EstimatorKind::OptimalMis,
+        ] {
+            mean(estimator.name(), size, &|s| s.estimator = estimator);
+        }
+        for form in [Form::Paper, Form::Regression, Form::Crossfit] {
+            mean(form.name(), size, &|s| (s.estimator, s.ocv.form) = (EstimatorKind::Ocv, form));
+        }
+    }
 }
 
 #[test]

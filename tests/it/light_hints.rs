@@ -5,16 +5,16 @@
 
 use super::analytic_scenes::answer;
 use lumiris::accel::{Coherence, RayBatch};
-use lumiris::estimators::stats::{Welford, t_test};
 use lumiris::film::PixelSums;
 use lumiris::import::{LoadOptions, load};
 use lumiris::lights::{LightHints, LightId, LightSamplerKind};
-use lumiris::math::hash::{HashStream, pcg4d};
-use lumiris::math::ray::offset_origin;
-use lumiris::math::{Ray, Vec3};
 use lumiris::render::output::settings_metadata;
 use lumiris::render::{RenderSettings, render};
 use lumiris::scene::{AccelKind, EstimatorKind, IntegratorSettings, Proposals, Target, World};
+use lumiris_numbers::estimators::stats::{Welford, t_test};
+use lumiris_numbers::math::hash::{HashStream, pcg4d};
+use lumiris_numbers::math::ray::offset_origin;
+use lumiris_numbers::math::{Ray, Vec3};
 use std::path::Path;
 use std::sync::atomic::AtomicBool;
 

@@ -2,10 +2,10 @@
 //! without light.
 
 use super::irradiance_cache::{ROOM, rendering, squares, world_of};
-use lumiris::estimators::stats::{Welford, sidak, t_test};
 use lumiris::render::output::{Aov, channels};
 use lumiris::render::{RenderSettings, render};
 use lumiris::scene::{Deposition, IntegratorKind, PhotonMapSettings, Scene, Shrinking, World};
+use lumiris_numbers::estimators::stats::{Welford, sidak, t_test};
 use std::sync::atomic::AtomicBool;
 
 /// The inside of a sphere that emits and reflects: radiance is L/(1 − ρ) everywhere.

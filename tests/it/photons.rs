@@ -1,14 +1,14 @@
 //! Photons: energy, known and path-traced irradiance, caustics, importance, the same bits, and scenes without any.
 
 use super::irradiance_cache::{ROOM, world_of};
-use lumiris::estimators::stats::{Welford, t_test, two_sample_z_test};
 use lumiris::integrators::irradiance_cache::gather::{Gatherer, Wanted};
-use lumiris::math::{Rgb, Vec3};
 use lumiris::photons::{
     CausticRule, GatherScratch, Importance, ImportanceSettings, Photon, PhotonError, PhotonMap, Place, Search, Traced,
     Tracing, Unimportant, Want, trace_importons, trace_photons,
 };
 use lumiris::scene::{Cached, IntegratorKind, World};
+use lumiris_numbers::estimators::stats::{Welford, t_test, two_sample_z_test};
+use lumiris_numbers::math::{Rgb, Vec3};
 use std::f64::consts::PI;
 
 /// Probability that a test fails by chance.

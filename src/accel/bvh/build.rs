@@ -3,7 +3,7 @@
 //! Every choice is a function of the set of primitives in a range alone, and minima, maxima and counts are exact in any
 //! grouping, so the tree does not depend on the number of threads.
 
-use crate::math::{Bounds3, Vec3, Vec3A};
+use lumiris_numbers::math::{Bounds3, Vec3, Vec3A};
 use rayon::prelude::*;
 
 /// Most triangles in a leaf: the width of a block.

@@ -16,8 +16,8 @@ mod walk;
 
 use super::{Accel, AccelStats, AlphaSource, AlphaTest, Coherence, Hit, RayBatch};
 use crate::geometry::{Geometry, GeometrySet, Group, Shape, Visibility};
-use crate::math::{Affine3A, Bounds3, Vec3};
 use build::{PrimRef, build_binary};
+use lumiris_numbers::math::{Affine3A, Bounds3, Vec3};
 use rayon::prelude::*;
 use std::sync::Arc;
 use std::time::Instant;

@@ -3,8 +3,8 @@
 use super::*;
 use crate::geometry::triangle::{RayPrecomputed, intersect_triangle};
 use crate::geometry::{BilinearMesh, GeometryId, Instance, Quadric, QuadricKind, TriangleMesh, loop_subdivide};
-use crate::math::hash::HashStream;
-use crate::math::{Quat, Ray, Vec2};
+use lumiris_numbers::math::hash::HashStream;
+use lumiris_numbers::math::{Quat, Ray, Vec2};
 
 struct Stripes;
 

@@ -3,7 +3,7 @@
 use super::build::{Binary, BinaryKind, LEAF_TRIANGLES, PrimRef};
 use crate::geometry::triangle::RayPrecomputed;
 use crate::geometry::{GeometrySet, Shape};
-use crate::math::{Bounds3, Vec3, Vec4};
+use lumiris_numbers::math::{Bounds3, Vec3, Vec4};
 use rayon::prelude::*;
 
 /// Relative growth of every box, of its largest coordinate. With the like growth of the ray's origin this covers the

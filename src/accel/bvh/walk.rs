@@ -5,7 +5,7 @@ use super::{Bvh, TESTED};
 use crate::accel::Hit;
 use crate::geometry::triangle::{RayPrecomputed, intersect_triangle};
 use crate::geometry::{Shape, Visibility};
-use crate::math::{Ray, Vec4, gamma};
+use lumiris_numbers::math::{Ray, Vec4, gamma};
 
 /// What is looked for along the ray.
 pub(super) trait Query {

@@ -1,7 +1,7 @@
 //! Exact triangle hits, several at once: the arithmetic of [`crate::geometry::triangle`] without its rare branches.
 
 use crate::accel::RayBatch;
-use crate::math::{Vec3, gamma};
+use lumiris_numbers::math::{Vec3, gamma};
 
 /// Rays and triangles side by side, in the order of each ray's axes (x, y, z: the last is the direction's largest).
 #[derive(Clone, Copy, Debug)]
@@ -150,8 +150,8 @@ impl<const N: usize> Lanes<N> {
 mod tests {
     use super::*;
     use crate::geometry::triangle::{RayPrecomputed, TriangleHit, intersect_triangle};
-    use crate::math::Ray;
-    use crate::math::hash::HashStream;
+    use lumiris_numbers::math::Ray;
+    use lumiris_numbers::math::hash::HashStream;
 
     fn hits_of(found: LaneHits<8>) -> [Option<TriangleHit>; 8] {
         let LaneHits { t, b1, b2, plain } = found;

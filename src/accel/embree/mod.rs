@@ -28,7 +28,7 @@
 //! decided alike in all of 2·10⁷ rays (camera, random, along edges, at vertices, grazing; soups, crossing, coplanar
 //! and closed meshes, quadrics, patches, instances) with AVX-512, and 10⁷ each with AVX2, AVX and SSE 4.2, single and in
 //! packets of 4 and 8, with and without the coherence flag: no first hit and no occlusion bit differed. The tests repeat
-//! this with fewer rays. Rays that leave a surface by [`crate::math::ray::offset_origin`] do not meet it again.
+//! this with fewer rays. Rays that leave a surface by [`lumiris_numbers::math::ray::offset_origin`] do not meet it again.
 //!
 //! # Cost
 //!

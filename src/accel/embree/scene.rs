@@ -5,9 +5,9 @@ use super::EmbreeError;
 use super::callbacks::{self, GeometryContext};
 use super::device::Device;
 use crate::geometry::{GeometryId, GeometrySet, Instance, Shape};
-use crate::math::Affine3A;
 use embree4_sys as sys;
 use embree4_sys::{RTCBufferType, RTCFormat, RTCGeometryType, RTCSceneFlags};
+use lumiris_numbers::math::Affine3A;
 use std::ffi::c_void;
 use std::sync::Arc;
 

@@ -3,9 +3,9 @@
 use super::*;
 use crate::accel::Bvh;
 use crate::geometry::{BilinearMesh, Geometry, Group, Instance, Quadric, QuadricKind, Shape, TriangleMesh, Visibility};
-use crate::math::hash::HashStream;
-use crate::math::ray::offset_origin;
-use crate::math::{Affine3A, Frame, Quat, Ray, Vec2, Vec3, warp};
+use lumiris_numbers::math::hash::HashStream;
+use lumiris_numbers::math::ray::offset_origin;
+use lumiris_numbers::math::{Affine3A, Frame, Quat, Ray, Vec2, Vec3, warp};
 
 use std::ffi::CStr;
 

@@ -4,7 +4,7 @@ use super::lanes::{LaneHits, Lanes, RayRows};
 use crate::accel::{Hit, RayBatch};
 use crate::geometry::triangle::{RayPrecomputed, intersect_triangle};
 use crate::geometry::{GeometryId, GeometrySet, Group, Shape};
-use crate::math::{Affine3A, Ray, Vec3};
+use lumiris_numbers::math::{Affine3A, Ray, Vec3};
 use std::sync::Arc;
 
 /// What Embree reports of a hit.

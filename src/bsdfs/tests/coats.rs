@@ -2,7 +2,7 @@
 
 use super::*;
 use crate::bsdfs::dielectric::Transport;
-use crate::estimators::stats::{Welford, sidak, two_sample_z_test, z_test};
+use lumiris_numbers::estimators::stats::{Welford, sidak, two_sample_z_test, z_test};
 
 fn over_lambert(top: Dielectric, rho: f32, max_depth: u32) -> Layered {
     let base = Base::Diffuse(Diffuse { reflectance: Rgb::splat(rho) });
@@ -81,7 +81,7 @@ fn analog_walk(l: &Layered, wo: Vec3, s: &mut HashStream) -> Option<(Vec3, Rgb, 
             // Henyey-Greenstein about the direction of travel, in its usual form.
             let (g, u) = (l.g, s.next_2d());
             let cos = (1.0 + g * g - sqr((1.0 - g * g) / (1.0 - g + 2.0 * g * u[0]))) / (2.0 * g);
-            w = crate::math::Frame::from_z(w).to_world(warp::direction(cos, TAU * u[1]));
+            w = lumiris_numbers::math::Frame::from_z(w).to_world(warp::direction(cos, TAU * u[1]));
             beta *= l.albedo;
             specular = false;
             continue;

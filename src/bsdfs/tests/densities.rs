@@ -1,7 +1,7 @@
 //! χ² tests of every sampler against its density. 10⁶ samples each; familywise significance 1 % (Šidák), fixed seeds.
 
 use super::*;
-use crate::estimators::stats::{chi_squared_test, sidak};
+use lumiris_numbers::estimators::stats::{chi_squared_test, sidak};
 
 const THETAS: usize = 32;
 const PHIS: usize = 64;
@@ -111,7 +111,7 @@ fn the_first_lobe_is_sampled_in_proportion_to_its_part_of_the_density() {
             let share = b.first_lobe(wo);
             assert!((0.0..=1.0).contains(&share), "{name}: {share}");
             let mut stream = HashStream::new([i as u32, 3, 7]);
-            let mut difference = crate::estimators::stats::Welford::new();
+            let mut difference = lumiris_numbers::estimators::stats::Welford::new();
             for _ in 0..100_000 {
                 let uc = stream.next_f32();
                 let Some(s) = b.sample_direction(wo, uc, stream.next_2d()).filter(|s| !s.lobe.is_specular()) else {
@@ -122,7 +122,7 @@ fn the_first_lobe_is_sampled_in_proportion_to_its_part_of_the_density() {
                 difference.add(f64::from(part / s.pdf) - f64::from(u8::from(uc < share)));
             }
             of_two += usize::from(share > 0.0 && share < 1.0);
-            let z = crate::estimators::stats::z_test(difference.mean(), 0.0, difference.standard_error());
+            let z = lumiris_numbers::estimators::stats::z_test(difference.mean(), 0.0, difference.standard_error());
             assert!(difference.mean().abs() < 1e-6 || z.p_value > 1e-5, "{name} {wo}: {difference:?}");
         }
     }
@@ -157,7 +157,7 @@ fn wide_lobes_find_every_direction_of_their_side() {
             }
             tested += 1;
             let mut stream = HashStream::new([i as u32, 9, 1]);
-            let mut mean = crate::estimators::stats::Welford::new();
+            let mut mean = lumiris_numbers::estimators::stats::Welford::new();
             for _ in 0..20_000 {
                 let sample = b.sample_direction(wo, stream.next_f32(), stream.next_2d());
                 let sample = sample.filter(|s| !s.lobe.is_specular() && s.wi.z * wo.z > 0.0);
@@ -165,7 +165,7 @@ fn wide_lobes_find_every_direction_of_their_side() {
                 assert!(quotient <= 1.001 * TAU / wide, "{name}: {quotient}");
                 mean.add(f64::from(quotient / PI));
             }
-            let z = crate::estimators::stats::z_test(mean.mean(), 1.0, mean.standard_error());
+            let z = lumiris_numbers::estimators::stats::z_test(mean.mean(), 1.0, mean.standard_error());
             assert!((mean.mean() - 1.0).abs() < 1e-5 || z.p_value > 1e-5, "{name} {wo}: {mean:?}");
         }
     }

@@ -2,8 +2,7 @@
 
 use super::*;
 use crate::bsdfs::models::{AshikhminShirley, CookTorrance, CosineLobe, LobeAxis, OrenNayar};
-use crate::bsdfs::sphere_study::{SphereSettings, SphereStudy, sphere_picture};
-use crate::estimators::stats::{Welford, sidak, two_sample_z_test, z_test};
+use lumiris_numbers::estimators::stats::{Welford, sidak, two_sample_z_test, z_test};
 
 const BLUE: Rgb = Rgb::new(0.1, 0.4, 0.8);
 
@@ -237,46 +236,4 @@ fn resampled_directions_follow_the_target_in_the_limit() {
     }
     assert!((mean.mean() - expected).abs() < 0.02, "{mean:?} {expected}");
     assert!((proposals.mean() - expected).abs() > 0.2, "{proposals:?}");
-}
-
-fn luminance([r, g, b]: [f64; 3]) -> f64 {
-    0.2126 * r + 0.7152 * g + 0.0722 * b
-}
-
-fn study(model: Model, density: ProposalDensity, l: fn(Vec3) -> Rgb, proposals: u32) -> SphereStudy {
-    let settings = SphereSettings { proposals, spp: 64, size: 32, seed: 4 };
-    sphere_picture(&Bsdf::Evaluated(Evaluated { model, density }), &l, &settings)
-}
-
-#[test]
-fn variance_falls_with_proposals_for_every_model() {
-    for (name, model) in models() {
-        for density in ProposalDensity::ALL {
-            for (under, l) in [("uniform", (|_| Rgb::WHITE) as fn(Vec3) -> Rgb), ("uneven", light)] {
-                let [one, eight, twenty] = [1, 8, 20].map(|m| study(model, density, l, m));
-                let v = [&one, &eight, &twenty].map(|s| luminance(s.mean_variance()));
-                // What f alone cannot tell stays: differences of colour, and those of the light.
-                let limit = if under == "uniform" { 0.3 } else { 0.5 };
-                assert!(v[2] < limit * v[0], "{name} {density:?} {under}: {v:?}");
-                assert!(v[2] < v[1] && v[1] < v[0], "{name} {density:?} {under}: {v:?}");
-            }
-        }
-    }
-}
-
-#[test]
-fn spheres_have_the_radiance_of_their_albedo() {
-    let white: fn(Vec3) -> Rgb = |_| Rgb::WHITE;
-    let sphere = study(Model::Diffuse(RED), ProposalDensity::Lobes, white, 8);
-    let mean = sphere.mean();
-    assert!((mean[0] - 0.9).abs() < 5e-3 && (mean[1] - 0.5).abs() < 5e-3, "{mean:?}");
-    assert_eq!(sphere.pixels.len(), 32 * 32);
-    assert!(!sphere.covered[0] && sphere.pixels[0].is_black() && sphere.covered[16 * 32 + 16]);
-    // A cosine-free uniform density costs a Lambertian a relative variance of 4/3 − 1.
-    let uniform = study(Model::Diffuse(RED), ProposalDensity::Uniform, white, 1);
-    assert!((uniform.mean_variance()[0] / 0.81 - 1.0 / 3.0).abs() < 0.02, "{:?}", uniform.mean_variance());
-    // The same twice, and another picture for another seed.
-    assert_eq!(study(Model::Diffuse(RED), ProposalDensity::Lobes, white, 8).pixels, sphere.pixels);
-    let other = SphereSettings { proposals: 8, spp: 64, size: 32, seed: 5 };
-    assert_ne!(sphere_picture(&evaluated(Model::Diffuse(RED)), &white, &other).pixels, sphere.pixels);
 }

@@ -5,8 +5,8 @@ mod densities;
 mod evaluated;
 
 use super::*;
-use crate::math::hash::HashStream;
-use crate::math::{safe_sqrt, sqr, warp};
+use lumiris_numbers::math::hash::HashStream;
+use lumiris_numbers::math::{safe_sqrt, sqr, warp};
 use std::f32::consts::{PI, TAU};
 
 pub(super) fn ggx(alpha_x: f32, alpha_y: f32) -> TrowbridgeReitz {

@@ -8,7 +8,7 @@
 //!   to pixel for noise, and is too small where neighbours err alike.
 
 use super::{Pixel, finite_pairs};
-use crate::estimators::stats::Welford;
+use lumiris_numbers::estimators::stats::Welford;
 
 /// Two-sided 95 % point of the normal distribution.
 pub const Z_95: f64 = 1.959_963_984_540_054;

@@ -8,7 +8,7 @@
 
 use super::{Pixel, is_finite};
 use crate::imaging::color::linear_to_srgb;
-use crate::math::Rgb;
+use lumiris_numbers::math::Rgb;
 use nv_flip::FlipImageRgb8;
 use rayon::prelude::*;
 

@@ -13,7 +13,7 @@
 //! channels has lost it, and both systems take the photopic luminance.
 
 use super::{Pixel, finite_pairs, is_finite};
-use crate::math::Rgb;
+use lumiris_numbers::math::Rgb;
 
 /// Threshold of the cones (cd/m²) at the luminance 10^`log` cd/m².
 fn cone_threshold(log: f64) -> f64 {

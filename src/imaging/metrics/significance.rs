@@ -15,7 +15,7 @@
 //! samples.
 
 use super::{Pixel, finite_pairs};
-use crate::estimators::stats::{chi_squared_tail, z_test};
+use lumiris_numbers::estimators::stats::{chi_squared_tail, z_test};
 
 /// Outcome of the tests of [`significance`].
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -114,7 +114,7 @@ pub fn z_map(image: &[Pixel], reference: &[Pixel], variance: &[Pixel], rounding:
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::estimators::stats::sidak;
+    use lumiris_numbers::estimators::stats::sidak;
 
     #[test]
     fn values_are_those_by_hand() {

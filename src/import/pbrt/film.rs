@@ -1,14 +1,14 @@
 //! `Film` and `PixelFilter`
 
-use super::directive::Name;
 use super::options::{Options, Pending, positive, unknown};
-use super::params::{ParamSet, ParamType, Values};
 use crate::film::PixelBounds;
 use crate::film::filter::PixelFilter;
 use crate::import::LoadOptions;
-use crate::import::diagnostic::Diagnostics;
-use crate::import::source::Span;
 use crate::scene::FilmSettings;
+use lumiris_formats::diagnostic::Diagnostics;
+use lumiris_formats::pbrt::directive::Name;
+use lumiris_formats::pbrt::params::{ParamSet, ParamType, Values};
+use lumiris_formats::source::Span;
 
 impl Options {
     /// The film, and the factor that its sensor's ISO gives.

@@ -1,16 +1,16 @@
 //! `Integrator`: light transport and the estimator of direct light.
 
 use super::options::{Pending, unknown};
-use super::params::{ParamSet, ParamType};
 use crate::bsdfs::ProposalDensity;
-use crate::estimators::mis::Heuristic;
-use crate::estimators::ocv::Form;
-use crate::import::diagnostic::Diagnostics;
 use crate::lights::LightSamplerKind;
 use crate::scene::{
     Cached, CorrelatedForm, Deposition, EstimatorKind, IntegratorKind, IntegratorSettings, IrradianceCacheSettings,
     OptimalForm, PhotonMapSettings, ProposalPoints, Proposals, SamplingTechnique, Shrinking, Strata, Target,
 };
+use lumiris_formats::diagnostic::Diagnostics;
+use lumiris_formats::pbrt::params::{ParamSet, ParamType};
+use lumiris_numbers::estimators::mis::Heuristic;
+use lumiris_numbers::estimators::ocv::Form;
 
 /// Understands `Integrator`.
 pub(super) fn finish_integrator(pending: Option<&Pending>, d: &mut Diagnostics) -> IntegratorSettings {

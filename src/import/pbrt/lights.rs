@@ -1,15 +1,15 @@
 //! `LightSource`, `AreaLightSource`
 
-use super::directive::Name;
 use super::options::unknown;
-use super::params::{ParamSet, ParamType};
 use super::spectrum::SpectrumUse;
 use super::state::Builder;
-use crate::import::diagnostic::Diagnostics;
-use crate::import::source::Span;
 use crate::lights::spot::spot_solid_angle;
 use crate::lights::{EnvironmentFilter, EnvironmentMap, EnvironmentMapping, Light};
-use crate::math::{Affine3A, Rgb, Vec3, warp};
+use lumiris_formats::diagnostic::Diagnostics;
+use lumiris_formats::pbrt::directive::Name;
+use lumiris_formats::pbrt::params::{ParamSet, ParamType};
+use lumiris_formats::source::Span;
+use lumiris_numbers::math::{Affine3A, Rgb, Vec3, warp};
 use std::f32::consts::PI;
 use std::path::PathBuf;
 use std::sync::Arc;

@@ -1,17 +1,17 @@
 //! `Material`, `MakeNamedMaterial`
 
-use super::directive::Name;
 use super::options::unknown;
-use super::params::{Input, ParamSet, ParamType};
 use super::spectrum::{Resolved, SpectrumUse};
 use super::state::Builder;
 use crate::bsdfs::models::LobeAxis;
-use crate::import::diagnostic::{Diagnostics, did_you_mean};
 use crate::import::resources::{ImageEncoding, ImageRequest};
-use crate::import::spectra;
 use crate::materials::{ConductorSpectrum, EvaluatedMaterial, Material, MaterialEntry, MaterialId, Roughness};
-use crate::math::Rgb;
 use crate::textures::{Filter, FloatTexture, ImageId, RgbTexture, RgbTextureId, TextureSet, Wrap};
+use lumiris_formats::diagnostic::{Diagnostics, did_you_mean};
+use lumiris_formats::pbrt::directive::Name;
+use lumiris_formats::pbrt::params::{Input, ParamSet, ParamType};
+use lumiris_formats::spectra;
+use lumiris_numbers::math::Rgb;
 
 /// The material of a shape: known, or by a name that may be defined later.
 #[derive(Clone, Debug)]
@@ -338,7 +338,7 @@ impl Builder<'_> {
         let mut input = |builder: &Self, name: &'static str, default: &str| match p.spectrum_input(name, d) {
             Some(Input::Texture(_)) => None,
             Some(Input::Value(value)) => builder.resolve_spectrum(value, p.span_of(name), d),
-            None => builder.resolve_spectrum(super::params::SpectrumValue::Named(default), p.span, d),
+            None => builder.resolve_spectrum(lumiris_formats::pbrt::params::SpectrumValue::Named(default), p.span, d),
         };
         let eta = input(self, eta_name, "metal-Cu-eta");
         let k = input(self, k_name, "metal-Cu-k");
@@ -371,7 +371,12 @@ impl Builder<'_> {
     }
 
     /// The material of a name that must be known by now.
-    fn named_material(&self, name: &str, span: crate::import::source::Span, d: &mut Diagnostics) -> Option<MaterialId> {
+    fn named_material(
+        &self,
+        name: &str,
+        span: lumiris_formats::source::Span,
+        d: &mut Diagnostics,
+    ) -> Option<MaterialId> {
         let found = self.named_materials.get(name).copied();
         if found.is_none() {
             let near = did_you_mean(name, self.named_materials.keys().map(String::as_str)).map(str::to_owned);

@@ -1,16 +1,16 @@
 //! What stands before `WorldBegin`: camera and sampler; the integrator is in [`super::integrator`], film and filter are in
 //! [`super::film`].
 
-use super::directive::Name;
 use super::integrator::finish_integrator;
-use super::params::ParamSet;
 use super::transform::{Ctm, affine};
 use crate::cameras::{Camera, SphericalMapping, default_screen_window};
 use crate::import::LoadOptions;
-use crate::import::diagnostic::{Diagnostics, did_you_mean};
-use crate::import::source::Span;
-use crate::samplers::SamplerKind;
 use crate::scene::{FilmSettings, IntegratorSettings, SamplingSettings};
+use lumiris_formats::diagnostic::{Diagnostics, did_you_mean};
+use lumiris_formats::pbrt::directive::Name;
+use lumiris_formats::pbrt::params::ParamSet;
+use lumiris_formats::source::Span;
+use lumiris_numbers::samplers::SamplerKind;
 
 /// A directive that is understood when all of them are known: the camera needs the film's size.
 pub(super) struct Pending {
@@ -236,7 +236,7 @@ pub(super) fn positive(p: &ParamSet, key: &'static str, default: f32, d: &mut Di
 
 fn perspective(
     p: &ParamSet,
-    world_from_camera: &crate::math::Affine3A,
+    world_from_camera: &lumiris_numbers::math::Affine3A,
     frame: &CameraFrame,
     d: &mut Diagnostics,
 ) -> Option<Camera> {

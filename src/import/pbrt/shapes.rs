@@ -1,20 +1,20 @@
 //! `Shape`: checked when it is read, made when all files are asked for.
 
-use super::directive::Name;
 use super::lights::AreaLightDesc;
 use super::materials::MaterialUse;
 use super::options::unknown;
-use super::params::{Input, ParamSet, ParamType};
 use super::state::Builder;
 use super::transform::{Ctm, affine};
 use crate::geometry::loop_subdiv::loop_subdivide;
 use crate::geometry::{BilinearMesh, Quadric, QuadricKind, Shape, TriangleMesh};
-use crate::import::diagnostic::Diagnostics;
-use crate::import::ply::{PlyError, read_ply};
-use crate::import::source::Span;
-use crate::math::transform::{swaps_handedness, transform_normal};
-use crate::math::{Affine3A, Vec2, Vec3};
 use crate::textures::FloatTexture;
+use lumiris_formats::diagnostic::Diagnostics;
+use lumiris_formats::pbrt::directive::Name;
+use lumiris_formats::pbrt::params::{Input, ParamSet, ParamType};
+use lumiris_formats::ply::{PlyError, read_ply};
+use lumiris_formats::source::Span;
+use lumiris_numbers::math::transform::{swaps_handedness, transform_normal};
+use lumiris_numbers::math::{Affine3A, Vec2, Vec3};
 use std::path::PathBuf;
 
 /// An object: what `ObjectBegin` … `ObjectEnd` define.

@@ -1,12 +1,12 @@
 //! Spectrum parameters to linear Rec.709.
 
-use super::params::SpectrumValue;
 use super::state::Builder;
-use crate::import::diagnostic::Diagnostics;
-use crate::import::source::Span;
-use crate::import::spectra::{self, Spectrum};
-use crate::import::upsampling::unbounded_spectrum;
-use crate::math::Rgb;
+use lumiris_formats::diagnostic::Diagnostics;
+use lumiris_formats::pbrt::params::SpectrumValue;
+use lumiris_formats::source::Span;
+use lumiris_formats::spectra::{self, Spectrum};
+use lumiris_formats::upsampling::unbounded_spectrum;
+use lumiris_numbers::math::Rgb;
 
 /// What a spectrum is of; the same samples mean different colours.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]

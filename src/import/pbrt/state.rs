@@ -1,23 +1,23 @@
 //! The state machine of the format: directives change the graphics state, or add something in it to the scene.
 
-use super::directive::{ActiveTimes, AttributeTarget, Directive, DirectiveKind, Name};
 use super::lights::AreaLightDesc;
 use super::materials::MaterialUse;
 use super::options::Options;
-use super::params::{Param, ParamSet};
-use super::parser::Visitor;
 use super::shapes::{InstanceDesc, ObjectDesc, ShapeDesc};
 use super::textures::TextureNames;
 use super::transform::{Ctm, affine, matrix_of};
 use crate::import::LoadOptions;
-use crate::import::color_space::ColorSpace;
-use crate::import::diagnostic::{Diagnostics, did_you_mean};
 use crate::import::resources::Resources;
-use crate::import::source::{SourceMap, Span};
 use crate::lights::Light;
 use crate::materials::MaterialEntry;
-use crate::math::Affine3A;
 use crate::textures::TextureSet;
+use lumiris_formats::color_space::ColorSpace;
+use lumiris_formats::diagnostic::{Diagnostics, did_you_mean};
+use lumiris_formats::pbrt::directive::{ActiveTimes, AttributeTarget, Directive, DirectiveKind, Name};
+use lumiris_formats::pbrt::params::{Param, ParamSet};
+use lumiris_formats::pbrt::parser::Visitor;
+use lumiris_formats::source::{SourceMap, Span};
+use lumiris_numbers::math::Affine3A;
 use std::collections::HashMap;
 use std::path::PathBuf;
 

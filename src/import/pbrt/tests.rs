@@ -2,10 +2,10 @@
 //!
 //! A missing `.txt` is written by a run with `LUMIRIS_BLESS=1` in the environment.
 
-use super::directive::Directive;
-use super::parser::parse_source;
-use crate::import::diagnostic::{Diagnostics, Report};
-use crate::import::source::SourceMap;
+use lumiris_formats::diagnostic::{Diagnostics, Report};
+use lumiris_formats::pbrt::directive::Directive;
+use lumiris_formats::pbrt::parser::parse_source;
+use lumiris_formats::source::SourceMap;
 use proptest::prelude::*;
 use std::fmt::Write as _;
 use std::path::{Path, PathBuf};

@@ -1,17 +1,17 @@
 //! `Texture`
 
-use super::directive::Name;
 use super::options::unknown;
-use super::params::{Input, ParamSet, ParamType, SpectrumValue};
 use super::spectrum::SpectrumUse;
 use super::state::Builder;
 use super::transform::affine;
-use crate::import::diagnostic::{Diagnostics, did_you_mean};
 use crate::import::resources::{ImageEncoding, ImageRequest};
-use crate::math::{Affine3A, Rgb, Vec2, Vec3};
 use crate::textures::{
     CheckerboardMapping, Filter, FloatTexture, FloatTextureId, ImageTexture, Mapping2d, RgbTexture, RgbTextureId, Wrap,
 };
+use lumiris_formats::diagnostic::{Diagnostics, did_you_mean};
+use lumiris_formats::pbrt::directive::Name;
+use lumiris_formats::pbrt::params::{Input, ParamSet, ParamType, SpectrumValue};
+use lumiris_numbers::math::{Affine3A, Rgb, Vec2, Vec3};
 use std::collections::HashMap;
 
 /// Textures by name; floats and spectra have names of their own.
@@ -238,7 +238,7 @@ impl Builder<'_> {
     pub fn float_texture_named(
         &self,
         name: &str,
-        span: crate::import::source::Span,
+        span: lumiris_formats::source::Span,
         d: &mut Diagnostics,
     ) -> Option<FloatTextureId> {
         let found = self.texture_names.floats.get(name).copied();

@@ -1,7 +1,7 @@
 //! The current transformation matrix, with its value at the start and at the end of the motion.
 
-use super::directive::{ActiveTimes, DirectiveKind};
-use crate::math::{Affine3A, Mat3, Mat4, Quat, Vec3};
+use lumiris_formats::pbrt::directive::{ActiveTimes, DirectiveKind};
+use lumiris_numbers::math::{Affine3A, Mat3, Mat4, Quat, Vec3};
 
 /// Placements between start and end that a turning motion is sampled at; between samples it is linear.
 const ROTATION_SAMPLES: usize = 17;

@@ -3,8 +3,8 @@
 use super::gradients::Irradiance;
 use super::octree::Octree;
 use super::record::{Range, Record};
-use crate::math::{Bounds3, Rgb, Vec3};
 use crate::scene::IrradianceCacheSettings;
+use lumiris_numbers::math::{Bounds3, Rgb, Vec3};
 
 /// Most records: about 400 MB with the trees.
 pub const MAX_RECORDS: usize = 1 << 20;
@@ -128,8 +128,8 @@ fn limit_gradients(light: &mut Irradiance, reach: f32, error: f32) {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::math::hash::HashStream;
-    use crate::math::warp::sample_uniform_sphere;
+    use lumiris_numbers::math::hash::HashStream;
+    use lumiris_numbers::math::warp::sample_uniform_sphere;
 
     fn unit_box() -> Bounds3 {
         Bounds3 { min: Vec3::ZERO, max: Vec3::ONE }

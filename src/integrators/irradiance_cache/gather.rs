@@ -14,15 +14,15 @@ use crate::accel::{Hit, RayBatch};
 use crate::bsdfs::{Bsdf, Diffuse};
 use crate::cameras::CameraRay;
 use crate::direct::{DirectStage, Fits, ShadePoint};
-use crate::estimators::ocv::block_of;
 use crate::film::PixelSample;
 use crate::integrators::path::{CameraSample, PathIntegrator, PathStats};
 use crate::materials::SurfaceBsdf;
-use crate::math::hash::pcg4d;
-use crate::math::ray::offset_origin;
-use crate::math::{Frame, Ray, Rgb, Vec3};
-use crate::samplers::SampleStream;
 use crate::scene::{Cached, EmitterHit, IntegratorKind, IntegratorSettings, Split, World};
+use lumiris_numbers::estimators::ocv::block_of;
+use lumiris_numbers::math::hash::pcg4d;
+use lumiris_numbers::math::ray::offset_origin;
+use lumiris_numbers::math::{Frame, Ray, Rgb, Vec3};
+use lumiris_numbers::samplers::SampleStream;
 use std::f32::consts::PI;
 
 /// Records that are computed together.

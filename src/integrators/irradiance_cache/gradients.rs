@@ -16,7 +16,7 @@
 //! has no bound. ∇t is how bounds between cells move, with the nearer of the two surfaces, if the point does. Both are
 //! tangential: E(x, n) ≈ E + (x − x_i)·∇t E + (n_i × n)·∇r E.
 
-use crate::math::{Frame, Rgb, Vec3, safe_sqrt};
+use lumiris_numbers::math::{Frame, Rgb, Vec3, safe_sqrt};
 use std::f32::consts::{PI, TAU};
 
 /// The cells.

@@ -4,7 +4,7 @@
 //! radius. A point is in one node of each level, so a query goes down once. Space is cut at the centres of nodes only: the
 //! outermost nodes reach to infinity, and nothing need lie inside the box that the tree was made for.
 
-use crate::math::{Bounds3, Vec3};
+use lumiris_numbers::math::{Bounds3, Vec3};
 
 /// Levels below the root.
 const MAX_DEPTH: u32 = 24;
@@ -144,7 +144,7 @@ impl Octree {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::math::hash::HashStream;
+    use lumiris_numbers::math::hash::HashStream;
 
     fn random_point(s: &mut HashStream) -> Vec3 {
         // Some outside of the box

@@ -9,10 +9,10 @@
 //! Points are drawn with the density of Epanechnikov's kernel, whose radii have the distribution F(s) = 2s² − s⁴, s = d/r.
 
 use crate::accel::{Coherence, Hit, RayBatch};
-use crate::math::{Frame, Ray, Vec3};
 use crate::photons::Place;
-use crate::samplers::SampleStream;
 use crate::scene::World;
+use lumiris_numbers::math::{Frame, Ray, Vec3};
+use lumiris_numbers::samplers::SampleStream;
 use std::f32::consts::TAU;
 
 /// Most trials; where so little of the surface is left, a bias remains.
@@ -108,10 +108,10 @@ impl Boundary {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::estimators::stats::{Welford, t_test};
     use crate::import::{LoadOptions, load};
-    use crate::samplers::SamplerKind;
     use crate::scene::AccelKind;
+    use lumiris_numbers::estimators::stats::{Welford, t_test};
+    use lumiris_numbers::samplers::SamplerKind;
 
     /// A square of edge 2 about the origin, its upper side being +z, with a wall on it at x = −0.5.
     const SQUARE_AND_WALL: &str = r#"

@@ -4,8 +4,8 @@
 //! square holds the power that photons bring from there; with the share s of the rays its density is p(ω) = cos θ/π·(1 − s + s·h),
 //! h being the histogram's density in the square. So cos θ/p ≤ π/(1 − s) whatever the photons say.
 
-use crate::math::warp::{invert_cosine_hemisphere, pdf_cosine_hemisphere, sample_cosine_hemisphere};
-use crate::math::{PiecewiseConstant2D, Vec2, Vec3};
+use lumiris_numbers::math::warp::{invert_cosine_hemisphere, pdf_cosine_hemisphere, sample_cosine_hemisphere};
+use lumiris_numbers::math::{PiecewiseConstant2D, Vec2, Vec3};
 
 /// Cells of the grid per axis.
 const CELLS: usize = 8;

@@ -6,14 +6,14 @@
 
 use super::boundary::{Boundary, Probe};
 use crate::integrators::path::{CameraSample, PathIntegrator};
-use crate::math::hash::pcg4d;
-use crate::math::{Rgb, Vec3};
 use crate::photons::{
     GatherScratch, Importance, ImportanceSettings, Origin, Photon, PhotonError, PhotonMap, Place, Search, Traced,
     Tracing, Unimportant, Want, trace_importons, trace_photons,
 };
-use crate::samplers::{SampleStream, SamplerKind};
 use crate::scene::{Deposition, PhotonMapSettings, World};
+use lumiris_numbers::math::hash::pcg4d;
+use lumiris_numbers::math::{Rgb, Vec3};
+use lumiris_numbers::samplers::{SampleStream, SamplerKind};
 use rayon::prelude::*;
 use std::sync::atomic::AtomicBool;
 use std::time::{Duration, Instant};

@@ -27,13 +27,13 @@ use crate::cameras::CameraRay;
 use crate::direct::{Fits, ShadePoint};
 use crate::film::PixelSample;
 use crate::materials::SurfaceBsdf;
-use crate::math::ray::offset_origin;
-use crate::math::{Frame, Ray, Rgb, Vec3};
 use crate::photons::{GatherScratch, Place, Search};
-use crate::samplers::SampleStream;
 use crate::scene::{PhotonMapSettings, World};
 use boundary::{Boundary, Probe};
 use guide::Guide;
+use lumiris_numbers::math::ray::offset_origin;
+use lumiris_numbers::math::{Frame, Ray, Rgb, Vec3};
+use lumiris_numbers::samplers::SampleStream;
 use std::f32::consts::FRAC_1_PI;
 
 /// Domain of the final gather below the stream of a vertex.

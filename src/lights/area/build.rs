@@ -2,7 +2,7 @@
 
 use super::{AreaLight, AreaShape, Emission, PatchLight, QuadricLight, RectangleLight, TriangleLight};
 use crate::geometry::{BilinearMesh, Shape, TriangleMesh};
-use crate::math::{Vec2, Vec3};
+use lumiris_numbers::math::{Vec2, Vec3};
 
 /// Tolerance of right angles, of coplanarity and of parallel edges, relative to the edges.
 const RECTANGLE_TOLERANCE: f32 = 1e-4;
@@ -160,7 +160,7 @@ mod tests {
     }
 
     fn lights(mesh: TriangleMesh) -> AreaLights {
-        area_lights_of(&Shape::Mesh(mesh), &Emission::constant(crate::math::Rgb::WHITE))
+        area_lights_of(&Shape::Mesh(mesh), &Emission::constant(lumiris_numbers::math::Rgb::WHITE))
     }
 
     #[test]
@@ -208,7 +208,8 @@ mod tests {
         let positions = vec![Vec3::ZERO, Vec3::X, Vec3::Y * 2.0, Vec3::X + Vec3::Y * 2.0];
         let mut mesh = BilinearMesh { positions, indices: vec![[0, 1, 2, 3]], ..BilinearMesh::default() };
         let normal = |mesh: &BilinearMesh| {
-            let out = area_lights_of(&Shape::Bilinear(mesh.clone()), &Emission::constant(crate::math::Rgb::WHITE));
+            let out =
+                area_lights_of(&Shape::Bilinear(mesh.clone()), &Emission::constant(lumiris_numbers::math::Rgb::WHITE));
             let AreaShape::Rectangle(r) = &out.lights[0].shape else { panic!() };
             r.n
         };

@@ -1,6 +1,6 @@
 //! What the surface of an area light emits.
 
-use crate::math::{Rgb, Vec2, Vec3};
+use lumiris_numbers::math::{Rgb, Vec2, Vec3};
 use std::sync::Arc;
 
 /// Emission of a surface.

@@ -4,8 +4,8 @@
 //! bilinear in (u, v) too, so it lies in any cone (narrower than a half-space) about its four corner values.
 
 use super::{ShapePoint, ShapeSample, pdf_by_area};
-use crate::math::{Bounds3, Vec2, Vec3, gamma};
 use glam::DVec3;
+use lumiris_numbers::math::{Bounds3, Vec2, Vec3, gamma};
 
 /// A bilinear patch that emits.
 #[derive(Clone, Debug)]
@@ -133,7 +133,7 @@ fn quadratic_roots(a: f64, b: f64, c: f64) -> [f64; 2] {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::math::hash::HashStream;
+    use lumiris_numbers::math::hash::HashStream;
 
     #[test]
     fn points_invert_to_their_parameters() {

@@ -10,8 +10,8 @@
 //! [`MIN_HEIGHT`] diagonals of the plane. `sample` and `pdf` ask the same function, so they always agree.
 
 use super::{ShapePoint, ShapeSample, pdf_by_area};
-use crate::math::{Bounds3, Vec2, Vec3, gamma};
-use crate::simd::area::{self, SphericalRectangle, Surface};
+use lumiris_numbers::math::{Bounds3, Vec2, Vec3, gamma};
+use lumiris_numbers::simd::area::{self, SphericalRectangle, Surface};
 use std::f64::consts::TAU;
 
 /// Largest diagonal, by the distance of the centre, that is sampled by area.

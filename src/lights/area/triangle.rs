@@ -1,8 +1,8 @@
 //! Triangles, sampled uniformly in area.
 
 use super::{ShapePoint, ShapeSample, pdf_by_area};
-use crate::math::warp::sample_uniform_triangle;
-use crate::math::{Bounds3, Vec2, Vec3, gamma};
+use lumiris_numbers::math::warp::sample_uniform_triangle;
+use lumiris_numbers::math::{Bounds3, Vec2, Vec3, gamma};
 
 /// A triangle that emits.
 #[derive(Clone, Debug)]

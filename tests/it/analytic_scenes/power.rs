@@ -5,12 +5,12 @@
 //! independent whatever the sampler does within a picture, and Student's t-test compares them with the answer. What a test
 //! notices is computed from the spread of its own pictures; a stale table makes it notice less, which is an error.
 
+use super::Scene;
 use super::rows::{Configuration, SPP, configurations, world};
-use super::{Scene, scenes};
-use crate::significance::{detectable_bias, detectable_deviation};
-use lumiris::estimators::stats::{Welford, sidak, t_test};
 use lumiris::render::{RenderSettings, render};
 use lumiris::scene::Cached;
+use lumiris_numbers::estimators::stats::{Welford, sidak, t_test};
+use lumiris_test_support::significance::{detectable_bias, detectable_deviation};
 use std::collections::HashMap;
 use std::path::{Path, PathBuf};
 use std::sync::Mutex;
@@ -26,6 +26,8 @@ const ROUNDING: f64 = 3e-5;
 const MARGIN: f64 = 1.2;
 /// Pictures of rows without noise.
 const EXACT_PICTURES: u32 = 8;
+/// An environment variable: the noise is measured anew, and the table written.
+pub const MEASURE: &str = "MEASURE_POWER";
 /// Pictures by which the noise of a row is first measured.
 const PILOT_PICTURES: u32 = 32;
 
@@ -45,8 +47,6 @@ pub struct Effort {
     pub goal: f64,
     /// Fewest pictures of a row with noise.
     pub least_pictures: u32,
-    /// The noise is measured anew.
-    pub has_pilot: bool,
 }
 
 /// A scene with one of the configurations.
@@ -156,6 +156,21 @@ impl Outcome<'_> {
         })
     }
 
+    /// Whether its answer comes with noise, and not but rounding or interpolation.
+    pub fn has_noise(&self) -> bool {
+        self.pictures.len() > EXACT_PICTURES as usize
+    }
+
+    /// Camera samples.
+    pub fn samples(&self) -> u64 {
+        self.pictures.len() as u64 * u64::from(self.budget.edge.pow(2) * SPP)
+    }
+
+    /// Mean, and its error, of each channel.
+    pub fn means(&self) -> [(f64, f64); 3] {
+        std::array::from_fn(|c| moments(&self.pictures, c, 1.0)).map(|w| (w.mean(), w.standard_error()))
+    }
+
     /// The channel with the most noise.
     pub fn channel(&self) -> usize {
         let relative = |c: &usize| moments(&self.pictures, *c, 1.0).standard_error() / self.row.scene.answer[*c];
@@ -169,7 +184,7 @@ impl Outcome<'_> {
         detectable_bias(relative, self.pictures.len() as u64, level, POWER).max(self.row.tolerance())
     }
 
-    pub fn noise(&self) -> f64 {
+    fn noise(&self) -> f64 {
         self.row.noise(self.budget, &self.pictures)
     }
 
@@ -179,8 +194,8 @@ impl Outcome<'_> {
         let mean = moments(&self.pictures, channel, 1.0);
         let truth = self.row.scene.answer[channel];
         let error = mean.standard_error();
-        let samples = self.pictures.len() as u64 * u64::from(self.budget.edge.pow(2) * SPP);
-        let (name, detectable, noise) = (self.row.name(), 100.0 * self.detectable(level), self.noise());
+        let (name, samples, noise) = (self.row.name(), self.samples(), self.noise());
+        let detectable = 100.0 * self.detectable(level);
         format!("{name},{samples},{:.7},{truth:.7},{error:.2e},{detectable:.4},{noise:.3e}", mean.mean())
     }
 }
@@ -220,7 +235,7 @@ pub fn print_table(out: &mut dyn std::io::Write, outcomes: &[Outcome<'_>], level
 /// Renders all rows of the scenes.
 pub fn render_rows<'a>(scenes: &'a [Scene], effort: &Effort) -> Vec<Outcome<'a>> {
     let level = level(scenes);
-    let known = measured_noise();
+    let known = if std::env::var_os(MEASURE).is_some() { HashMap::new() } else { measured_noise() };
     let rows = scenes.iter().flat_map(|scene| configurations().into_iter().map(move |c| (scene, c)));
     let rows: Vec<(&Scene, Configuration)> = rows.collect();
     let outcomes = Mutex::new(Vec::new());
@@ -230,7 +245,7 @@ pub fn render_rows<'a>(scenes: &'a [Scene], effort: &Effort) -> Vec<Outcome<'a>>
             let index = next.fetch_add(1, Ordering::Relaxed);
             let Some(&(scene, configuration)) = rows.get(index) else { break };
             let row = Row { scene, configuration };
-            let noise = known.get(&row.name()).copied().filter(|_| !effort.has_pilot);
+            let noise = known.get(&row.name()).copied();
             let noise = noise.unwrap_or_else(|| row.pilot());
             let budget = row.budget(noise, effort, level);
             let pictures = row.render(budget, 0);

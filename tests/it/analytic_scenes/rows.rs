@@ -1,15 +1,15 @@
 //! The rows of the table: every integrator, estimator, light choice, sampler and ray tracer.
 
 use crate::light_hints::{Hints, hints};
-use lumiris::estimators::mis::Heuristic;
-use lumiris::estimators::ocv::Form;
 use lumiris::import::{LoadOptions, load};
 use lumiris::lights::LightSamplerKind;
-use lumiris::samplers::SamplerKind;
 use lumiris::scene::{
     AccelKind, Cached, CorrelatedForm, CorrelatedSettings, EstimatorKind, IntegratorKind, OcvSettings, OptimalForm,
     ProposalPoints, Proposals, SamplingTechnique, Strata, Target, World,
 };
+use lumiris_numbers::estimators::mis::Heuristic;
+use lumiris_numbers::estimators::ocv::Form;
+use lumiris_numbers::samplers::SamplerKind;
 use std::fmt;
 use std::path::Path;
 
@@ -217,7 +217,12 @@ impl Configuration {
             EstimatorKind::Mis => write!(f, " {}", self.heuristic.name())?,
             EstimatorKind::Ris => {
                 let (strata, points, target) = (self.strata.name(), self.points.name(), self.target.name());
-                write!(f, " M={} {} strata={strata} points={points} target={target}", self.proposals, self.heuristic.name())?;
+                write!(
+                    f,
+                    " M={} {} strata={strata} points={points} target={target}",
+                    self.proposals,
+                    self.heuristic.name()
+                )?;
             }
             EstimatorKind::Ocv => {
                 write!(f, " {} bsdf-share={}", self.ocv.form.name(), self.bsdf_share)?;

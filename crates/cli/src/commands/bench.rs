@@ -1,0 +1,148 @@
+//! `lumiris bench`
+
+use super::args::{AccelArg, SceneArgs};
+use super::progress;
+use super::settings::{load_world, plan};
+use anyhow::{Context, bail};
+use clap::{Args, ValueEnum};
+use lumiris::render::bench::{BenchSettings, RayCase, Report, measure};
+use lumiris::render::bench_photons::{PhotonReport, measure_photons};
+use lumiris::scene::World;
+use serde_json::json;
+use std::path::PathBuf;
+use std::process::ExitCode;
+
+/// What to measure.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
+enum Subject {
+    /// Proposals, and the time of every stage
+    T1,
+    /// Shadow segments against a bare Embree loop
+    T2,
+    /// First hits against a bare Embree loop
+    Intersect,
+    /// Photon tracing, and maps of photons
+    Photons,
+    /// Everything
+    All,
+}
+
+/// `lumiris bench`
+#[derive(Args, Clone, Debug)]
+pub struct BenchArgs {
+    /// What is measured
+    #[arg(default_value = "all")]
+    subject: Subject,
+    #[command(flatten)]
+    scene: SceneArgs,
+    /// Turns of the renderer and of the bare loop; medians are reported
+    #[arg(long, value_name = "N", default_value_t = 5, value_parser = clap::value_parser!(u32).range(1..=10_000))]
+    runs: u32,
+    /// Camera rays at most: batches of them are spread over the picture
+    #[arg(long, value_name = "K", default_value_t = 1 << 20, value_parser = clap::value_parser!(u32).range(1..))]
+    rays: u32,
+    /// Write the report
+    #[arg(long, value_name = "FILE.json")]
+    json: Option<PathBuf>,
+}
+
+pub fn run(args: &BenchArgs) -> anyhow::Result<ExitCode> {
+    if !matches!(args.scene.accel, AccelArg::Embree) {
+        bail!("bench measures Embree; leave out --accel");
+    }
+    let (mut world, times) = load_world(&args.scene)?;
+    plan(&args.scene, &mut world, false, false)?;
+    let asked = |subject| args.subject == subject || args.subject == Subject::All;
+    let settings = BenchSettings {
+        intersect: asked(Subject::Intersect),
+        t1: asked(Subject::T1),
+        t2: asked(Subject::T2),
+        runs: args.runs,
+        rays: args.rays as usize,
+        packet_width: args.scene.packet_width,
+        tile_size: args.scene.tile_size,
+    };
+    let photons = if asked(Subject::Photons) { photons(args, &world)? } else { None };
+    let report = measure(world, &settings)?;
+    if args.subject != Subject::Photons {
+        progress::print(&table(&report));
+    }
+    if let Some(path) = &args.json {
+        let mut value = serde_json::to_value(&report)?;
+        let name = args.scene.scene.display().to_string();
+        value["photons"] = serde_json::to_value(&photons)?;
+        value["scene"] = json!(name);
+        value["seconds"] = json!({ "load": times.load, "build": times.build });
+        value["embree"] = json!(env!("LUMIRIS_EMBREE_VERSION"));
+        std::fs::write(path, serde_json::to_string_pretty(&value)?)
+            .with_context(|| format!("cannot write {}", path.display()))?;
+    }
+    Ok(ExitCode::SUCCESS)
+}
+
+/// Measures photons, and prints what was found; a scene without photons has everything else, if that is asked for.
+fn photons(args: &BenchArgs, world: &World) -> anyhow::Result<Option<PhotonReport>> {
+    match measure_photons(world, args.scene.threads.map(|t| t as usize), args.runs) {
+        Ok(report) => {
+            progress::print(&photon_table(&report));
+            Ok(Some(report))
+        }
+        Err(e) if args.subject == Subject::All => {
+            progress::say(&format!("photons: {e}"));
+            Ok(None)
+        }
+        Err(e) => Err(e.into()),
+    }
+}
+
+fn table(report: &Report) -> String {
+    let mut text = format!("{} camera rays, one thread\n", report.camera_rays);
+    if !report.stages.is_empty() {
+        text += &format!("\n{:<22}{:>10}{:>12}{:>10}\n", "stage", "seconds", "items", "ns/item");
+    }
+    for stage in &report.stages {
+        let each = stage.seconds * 1e9 / stage.items.max(1) as f64;
+        text += &format!("{:<22}{:>10.4}{:>12}{each:>10.1}\n", stage.name, stage.seconds, stage.items);
+    }
+    if let Some([ours, bare]) = report.build_seconds {
+        text += &format!("\nbuild on all cores: renderer {ours:.3} s, bare {bare:.3} s\n");
+        text += "ratio: speed of the renderer by that of the bare loop, from medians of batches; of turns: median of whole runs (range)\n";
+        text += &format!(
+            "{:<22}{:>6}{:>10}{:>13}{:>13}{:>11}{:>20}\n",
+            "rays", "width", "rays", "Mrays/s", "bare Mrays/s", "ratio", "of turns"
+        );
+    }
+    for case in report.intersect.iter().chain(&report.t2) {
+        text += &line(case);
+    }
+    text.trim_end().to_owned()
+}
+
+fn photon_table(report: &PhotonReport) -> String {
+    let mut text = format!("{} trajectories, {} photons, {} rays\n", report.trajectories, report.photons, report.rays);
+    for (threads, seconds) in &report.tracing {
+        let rate = |count: u64| count as f64 * 1e-6 / seconds.max(1e-12);
+        text += &format!(
+            "tracing, {threads} threads: {seconds:.3} s, {:.3} M photons/s, {:.3} M rays/s\n",
+            rate(report.photons),
+            rate(report.rays)
+        );
+    }
+    text += &format!(
+        "map of {} photons: {:.1} bytes each, built in {:.3} s\n",
+        report.stored, report.bytes_per_photon, report.build_seconds
+    );
+    for (name, rate) in &report.queries {
+        text += &format!("{name}: {rate:.0} queries/s on one thread\n");
+    }
+    text
+}
+
+fn line(case: &RayCase) -> String {
+    let [least, most] = case.turn_ratio_range;
+    let range = format!("{:.3} ({least:.2}-{most:.2})", case.turn_ratio);
+    format!(
+        "{:<22}{:>6}{:>10}{:>13.2}{:>13.2}{:>11.3}{range:>20}\n",
+        case.name, case.width, case.rays, case.mrays, case.bare_mrays, case.ratio
+    )
+}

@@ -1,0 +1,309 @@
+//! `lumiris compare`
+
+use super::progress;
+use crate::compare::columns::{column, shown_columns};
+use crate::compare::page::write_whole;
+use crate::compare::{Column, Compared, Metric, Pictures, Scores, Settings, compare, load, write_page};
+use anyhow::{Context, bail};
+use clap::{Args, ValueEnum};
+use lumiris::imaging::metrics::bias::Z_95;
+use serde_json::{Map, Value, json};
+use std::path::{Path, PathBuf};
+use std::process::ExitCode;
+
+/// `lumiris compare`
+#[derive(Args, Clone, Debug)]
+pub struct CompareArgs {
+    /// Pictures: EXR, HDR, PFM, PNG, or anything that OpenImageIO reads
+    #[arg(required = true, value_name = "IMAGE")]
+    images: Vec<PathBuf>,
+    /// What they are compared with
+    #[arg(short, long, value_name = "IMAGE")]
+    reference: PathBuf,
+    /// Metrics to compute [default: all]
+    #[arg(long, value_name = "LIST", value_delimiter = ',')]
+    metrics: Vec<MetricArg>,
+    /// Channels to compare instead of the picture: a layer (`albedo`), a part, or a channel (`depth.Z`)
+    #[arg(long, value_name = "NAME")]
+    layer: Option<String>,
+    /// Exposure of the display, for `flip` and as the page begins
+    #[arg(long, value_name = "STOPS", default_value_t = 0.0, allow_hyphen_values = true)]
+    exposure: f32,
+    /// ε of `relmse`: mean of (x − r)² / (r² + ε)
+    #[arg(long, value_name = "E", default_value_t = 0.01, value_parser = not_negative)]
+    epsilon: f64,
+    /// The largest value, for `psnr`
+    #[arg(long, value_name = "V", default_value_t = 1.0, value_parser = positive)]
+    peak: f64,
+    /// Luminance of a pixel of value 1, for `tvi`
+    #[arg(long, value_name = "CD/M2", default_value_t = 1.0, value_parser = positive)]
+    luminance: f64,
+    /// Pixels per degree of the visual field, for `flip` and `hdrflip`
+    #[arg(long, value_name = "N", default_value_t = 67.0, value_parser = pixels_per_degree)]
+    ppd: f64,
+    /// Write a page with the pictures and maps of their differences into this folder (index.html)
+    #[arg(long, value_name = "DIR")]
+    html: Option<PathBuf>,
+    /// Write all numbers; `-` prints them instead of the table
+    #[arg(long, value_name = "FILE")]
+    json: Option<PathBuf>,
+    /// End with exit code 1 if a number of any picture is above this (in magnitude), as `relmse=0.02`
+    #[arg(long, value_name = "NUMBER=LIMIT", value_parser = limit)]
+    fail_above: Vec<Limit>,
+    /// End with exit code 1 if a number of any picture is below this (in magnitude), as `psnr=30`
+    #[arg(long, value_name = "NUMBER=LIMIT", value_parser = limit)]
+    fail_below: Vec<Limit>,
+}
+
+#[derive(Clone, Copy, Debug, ValueEnum)]
+enum MetricArg {
+    /// Mean squared error
+    Mse,
+    /// Its root
+    Rmse,
+    /// Mean of squared errors over the squared reference plus ε
+    Relmse,
+    /// Mean squared error over the mean square of the reference
+    Nmse,
+    /// Peak signal-to-noise ratio
+    Psnr,
+    /// ꟻLIP on a display
+    Flip,
+    /// The greatest ꟻLIP over all exposures
+    Hdrflip,
+    /// Error in thresholds of vision
+    Tvi,
+    /// Mean difference with its confidence interval
+    Bias,
+    /// Tests against the variances in the files
+    Z,
+}
+
+impl MetricArg {
+    fn metric(self) -> Metric {
+        match self {
+            MetricArg::Mse => Metric::Mse,
+            MetricArg::Rmse => Metric::Rmse,
+            MetricArg::Relmse => Metric::RelMse,
+            MetricArg::Nmse => Metric::Nmse,
+            MetricArg::Psnr => Metric::Psnr,
+            MetricArg::Flip => Metric::Flip,
+            MetricArg::Hdrflip => Metric::HdrFlip,
+            MetricArg::Tvi => Metric::Tvi,
+            MetricArg::Bias => Metric::Bias,
+            MetricArg::Z => Metric::Z,
+        }
+    }
+}
+
+/// A number and where it may not go.
+#[derive(Clone, Copy, Debug)]
+struct Limit {
+    column: &'static Column,
+    value: f64,
+}
+
+fn number(text: &str) -> Result<f64, String> {
+    text.trim().parse().ok().filter(|v: &f64| v.is_finite()).ok_or_else(|| format!("`{text}` is not a number"))
+}
+
+fn positive(text: &str) -> Result<f64, String> {
+    number(text).and_then(|v| if v > 0.0 { Ok(v) } else { Err("must be greater than 0".to_owned()) })
+}
+
+fn not_negative(text: &str) -> Result<f64, String> {
+    number(text).and_then(|v| if v >= 0.0 { Ok(v) } else { Err("must not be negative".to_owned()) })
+}
+
+/// Filters of ꟻLIP are as wide as a part of a degree: a few pixels to a few hundred.
+fn pixels_per_degree(text: &str) -> Result<f64, String> {
+    number(text).and_then(|v| if (1.0..=1000.0).contains(&v) { Ok(v) } else { Err("must be in 1..1000".to_owned()) })
+}
+
+fn limit(text: &str) -> Result<Limit, String> {
+    let (name, value) = text.split_once('=').ok_or("is not of the form NUMBER=LIMIT")?;
+    let names = || crate::compare::COLUMNS.map(|c| c.key).join(", ");
+    let column = column(name.trim()).ok_or_else(|| format!("there is no number `{name}`; there are {}", names()))?;
+    Ok(Limit { column, value: number(value)? })
+}
+
+pub fn run(args: &CompareArgs) -> anyhow::Result<ExitCode> {
+    let pictures = load(&args.images, &args.reference, args.layer.as_deref())?;
+    let settings = settings(args);
+    let compared = compare(&pictures, &settings);
+    for (name, remark) in remarks(&pictures, &compared) {
+        progress::say(&format!("{name}: {remark}"));
+    }
+    let failures = failures(args, &pictures, &compared)?;
+
+    let report = report(args, &pictures, &settings, &compared, &failures);
+    let text = serde_json::to_string_pretty(&report)? + "\n";
+    match args.json.as_deref() {
+        Some(path) if path == Path::new("-") => progress::print(text.trim_end()),
+        Some(path) => {
+            write_whole(path, &text).with_context(|| format!("cannot write {}", path.display()))?;
+            progress::print(&table(&pictures, &settings, &compared));
+        }
+        None => progress::print(&table(&pictures, &settings, &compared)),
+    }
+    if let Some(folder) = &args.html {
+        let page = write_page(folder, &pictures, &settings, &compared)
+            .with_context(|| format!("cannot write the page into {}", folder.display()))?;
+        progress::say(&format!("The page is in {}", page.display()));
+    }
+    failures.iter().for_each(|f| progress::say(f));
+    Ok(if failures.is_empty() { ExitCode::SUCCESS } else { ExitCode::from(1) })
+}
+
+/// Metrics asked for and those that limits need.
+fn settings(args: &CompareArgs) -> Settings {
+    let limits = args.fail_above.iter().chain(&args.fail_below);
+    let mut metrics: Vec<Metric> = args.metrics.iter().map(|m| m.metric()).collect();
+    if metrics.is_empty() {
+        metrics.extend(Metric::ALL);
+    }
+    metrics.extend(limits.filter_map(|l| l.column.metric));
+    Settings {
+        metrics: metrics.into_iter().collect(),
+        exposure: args.exposure,
+        epsilon: args.epsilon,
+        peak: args.peak,
+        candelas: args.luminance,
+        pixels_per_degree: args.ppd as f32,
+    }
+}
+
+/// What a person should know of the pictures, each with the name of one.
+fn remarks(pictures: &Pictures, compared: &[Compared]) -> Vec<(String, String)> {
+    let mut remarks = Vec::new();
+    for shown in pictures.images.iter().chain([&pictures.reference]) {
+        remarks.extend(shown.remarks.iter().map(|r| (shown.name.clone(), r.clone())));
+    }
+    let odd = compared.iter().map(|c| c.scores.differences.nonfinite);
+    let reference_odd = compared.first().map_or(0, |c| c.scores.differences.reference_nonfinite);
+    let names = pictures.images.iter().chain([&pictures.reference]).map(|s| &s.name);
+    for (name, count) in names.zip(odd.chain([reference_odd])).filter(|(_, count)| *count > 0) {
+        remarks.push((name.clone(), format!("{count} pixels are not finite and take no part")));
+    }
+    let [region, display] = [pictures.region.size(), pictures.display];
+    if region != display {
+        let r = pictures.region;
+        let text = format!(
+            "only columns {}..{} and rows {}..{} of {}×{} are in all pictures, and only they are compared",
+            r.x,
+            r.x + r.width,
+            r.y,
+            r.y + r.height,
+            display[0],
+            display[1]
+        );
+        remarks.push(("region".to_owned(), text));
+    }
+    remarks
+}
+
+/// The limits that pictures exceed, in words. A limit on what cannot be computed is an error.
+fn failures(args: &CompareArgs, pictures: &Pictures, compared: &[Compared]) -> anyhow::Result<Vec<String>> {
+    let mut failures = Vec::new();
+    let above = args.fail_above.iter().map(|l| (l, "above"));
+    for (limit, side) in above.chain(args.fail_below.iter().map(|l| (l, "below"))) {
+        for (image, c) in pictures.images.iter().zip(compared) {
+            let Some(value) = (limit.column.value)(&c.scores) else {
+                bail!("{}: `{}` cannot be computed: the file has no variances", image.name, limit.column.key);
+            };
+            // Not within, so that NaN fails.
+            let magnitude = value.abs();
+            let within = if side == "above" { magnitude <= limit.value } else { magnitude >= limit.value };
+            if !within {
+                failures.push(format!("{}: {} = {value} is {side} {}", image.name, limit.column.key, limit.value));
+            }
+        }
+    }
+    Ok(failures)
+}
+
+/// One line per picture, a column per number, aligned.
+fn table(pictures: &Pictures, settings: &Settings, compared: &[Compared]) -> String {
+    let scores: Vec<&Scores> = compared.iter().map(|c| &c.scores).collect();
+    let columns = shown_columns(&settings.metrics, &scores);
+    let header = ["image"].into_iter().chain(columns.iter().map(|c| c.title)).map(str::to_owned);
+    let mut rows: Vec<Vec<String>> = vec![header.collect()];
+    for (image, s) in pictures.images.iter().zip(&scores) {
+        let cell = |c: &&Column| (c.value)(s).map_or("–".to_owned(), c.text);
+        rows.push([image.name.clone()].into_iter().chain(columns.iter().map(cell)).collect());
+    }
+    let width = |column: usize| rows.iter().map(|r| r[column].chars().count()).max().unwrap_or(0);
+    let widths: Vec<usize> = (0..=columns.len()).map(width).collect();
+    let line = |row: &Vec<String>| {
+        let cells = row.iter().zip(&widths).enumerate().map(|(i, (cell, &width))| match i {
+            0 => format!("{cell:<width$}"),
+            _ => format!("{cell:>width$}"),
+        });
+        cells.collect::<Vec<_>>().join("  ")
+    };
+    rows.iter().map(line).collect::<Vec<_>>().join("\n")
+}
+
+/// All numbers. What is infinite or undefined is null.
+fn report(
+    args: &CompareArgs,
+    pictures: &Pictures,
+    settings: &Settings,
+    compared: &[Compared],
+    failures: &[String],
+) -> Value {
+    let picture = |shown: &crate::compare::Shown| {
+        json!({
+            "path": shown.path.display().to_string(), "layer": shown.layer,
+            "has_variance": shown.variance.is_some(),
+        })
+    };
+    let images = pictures.images.iter().zip(compared).map(|(image, c)| {
+        let mut entry = picture(image);
+        if let Value::Object(map) = &mut entry {
+            numbers(map, settings, c);
+        }
+        entry
+    });
+    let r = pictures.region;
+    json!({
+        "reference": picture(&pictures.reference),
+        "resolution": pictures.display,
+        "region": { "x": r.x, "y": r.y, "width": r.width, "height": r.height },
+        "settings": {
+            "exposure": settings.exposure, "epsilon": settings.epsilon, "peak": settings.peak,
+            "luminance": settings.candelas, "ppd": settings.pixels_per_degree,
+            "layer": args.layer, "confidence_z": Z_95,
+        },
+        "images": images.collect::<Vec<_>>(),
+        "failures": failures,
+    })
+}
+
+fn numbers(map: &mut Map<String, Value>, settings: &Settings, compared: &Compared) {
+    let s = &compared.scores;
+    for column in &crate::compare::COLUMNS {
+        if column.metric.is_none_or(|m| settings.metrics.contains(&m)) {
+            map.insert(column.key.to_owned(), json!((column.value)(s)));
+        }
+    }
+    let d = &s.differences;
+    map.insert("pixels".into(), json!(d.pixels));
+    map.insert("reference_nonfinite".into(), json!(d.reference_nonfinite));
+    map.insert("mean".into(), json!(d.mean));
+    map.insert("reference_mean".into(), json!(d.reference_mean));
+    if let Some((start, stop, count)) = s.hdr_exposures {
+        map.insert("hdrflip_exposures".into(), json!({ "start": start, "stop": stop, "count": count }));
+    }
+    if let Some(b) = s.bias {
+        let half = b.channel_errors.map(|e| Z_95 * e);
+        map.insert("bias_rgb".into(), json!(b.channels));
+        map.insert("bias_rgb_ci95".into(), json!(half));
+        map.insert("bias_error_from".into(), json!(b.source.name()));
+    }
+    map.insert("variances".into(), json!(compared.noise.name()));
+    if let Some(z) = s.significance {
+        map.insert("z_values".into(), json!(z.values));
+        map.insert("z_certain".into(), json!(z.certain));
+    }
+}

@@ -1,0 +1,150 @@
+//! `lumiris crosscheck`
+
+use super::args::{AccelArg, SceneArgs};
+use super::progress;
+use super::settings::{load_world, plan, render_settings};
+use anyhow::{Context, bail};
+use clap::Args;
+use lumiris::accel::Accel;
+use lumiris::accel::bvh::Bvh;
+use lumiris::imaging::oiio::{self, Part};
+use lumiris::render::crosscheck::{EDGE_ULPS, Report, T_TOLERANCE_ULPS, crosscheck};
+use lumiris::render::{output, render};
+use lumiris::scene::{AccelKind, World};
+use serde::Serialize;
+use std::path::PathBuf;
+use std::process::ExitCode;
+use std::sync::Arc;
+use std::sync::atomic::AtomicBool;
+
+/// Part of the pixels that may differ visibly between the two pictures: rays at edges.
+const MAX_DIFFERENT_PIXELS: f64 = 0.005;
+/// A pixel differs visibly if it is off by more than this, relative to the larger of it and the picture's mean.
+const PIXEL_TOLERANCE: f64 = 0.01;
+/// Allowed difference of the pictures' means, relative.
+const MEAN_TOLERANCE: f64 = 1e-3;
+
+/// `lumiris crosscheck`
+#[derive(Args, Clone, Debug)]
+pub struct CrosscheckArgs {
+    #[command(flatten)]
+    scene: SceneArgs,
+    /// Rays of each family
+    #[arg(long, value_name = "K", default_value_t = 1_000_000)]
+    rays: u32,
+    /// Write the report
+    #[arg(long, value_name = "FILE.json")]
+    json: Option<PathBuf>,
+    /// Write both pictures and their difference into this folder
+    #[arg(long, value_name = "DIR")]
+    images: Option<PathBuf>,
+}
+
+/// How two pictures of the same random numbers differ.
+#[derive(Clone, Copy, Debug, Serialize)]
+struct ImageReport {
+    pixels: usize,
+    identical: usize,
+    different: usize,
+    relative_mean_difference: f64,
+}
+
+impl ImageReport {
+    fn agrees(&self) -> bool {
+        self.different as f64 <= MAX_DIFFERENT_PIXELS * self.pixels as f64
+            && self.relative_mean_difference.abs() <= MEAN_TOLERANCE
+    }
+}
+
+pub fn run(args: &CrosscheckArgs) -> anyhow::Result<ExitCode> {
+    if !matches!(args.scene.accel, AccelArg::Embree) {
+        bail!("crosscheck always compares Embree with the BVH; leave out --accel");
+    }
+
+    // Rays
+    let (mut world, _) = load_world(&args.scene)?;
+    plan(&args.scene, &mut world, false, true)?;
+    let bvh: Box<dyn Accel> =
+        Box::new(Bvh::new(Arc::clone(&world.scene.geometry), Some(Arc::clone(&world.scene.textures) as _)));
+    let report = crosscheck(&world, &*bvh, args.rays);
+    progress::print(&table(&report));
+
+    // Pictures
+    let embree_picture = picture(args, &world)?;
+    world = World::new(world.scene, AccelKind::Bvh, None)?;
+    let bvh_picture = picture(args, &world)?;
+    let images = compare(&embree_picture, &bvh_picture);
+    progress::print(&format!(
+        "pictures: {} of {} pixels identical to the bit, {} off by more than {} %, means differ by {:.2e}",
+        images.identical,
+        images.pixels,
+        images.different,
+        PIXEL_TOLERANCE * 100.0,
+        images.relative_mean_difference
+    ));
+    if let Some(folder) = &args.images {
+        write_pictures(folder, &world, &embree_picture, &bvh_picture)?;
+    }
+    if let Some(path) = &args.json {
+        let text = serde_json::to_string_pretty(&serde_json::json!({ "rays": report, "images": images }))?;
+        std::fs::write(path, text).with_context(|| format!("cannot write {}", path.display()))?;
+    }
+
+    let agree = report.disagreements() == 0 && images.agrees();
+    progress::print(if agree { "Embree and the BVH agree" } else { "Embree and the BVH DISAGREE" });
+    Ok(ExitCode::from(u8::from(!agree)))
+}
+
+fn table(report: &Report) -> String {
+    let mut text = format!(
+        "t equal within {T_TOLERANCE_ULPS} ulp of the largest coordinate; edge: the ray passes an edge within {EDGE_ULPS} ulp\n\
+         {:<10}{:>12}{:>12}{:>12}{:>8}{:>12}{:>14}{:>12}\n",
+        "family", "rays", "hits", "equal", "ties", "edge flips", "disagreements", "max t ulps"
+    );
+    for (family, t) in &report.tallies {
+        let name = format!("{family:?}").to_lowercase();
+        text += &format!(
+            "{name:<10}{:>12}{:>12}{:>12}{:>8}{:>12}{:>14}{:>12.1}\n",
+            t.rays, t.hits, t.equal, t.ties, t.edge_flips, t.disagreements, t.max_t_ulps
+        );
+    }
+    for e in &report.examples {
+        text += &format!("  {:?} o {:?} d {:?}: t {:?} against {:?}\n", e.family, e.o, e.d, e.t_a, e.t_b);
+    }
+    text.trim_end().to_owned()
+}
+
+/// The mean of each pixel, RGB interleaved.
+fn picture(args: &CrosscheckArgs, world: &World) -> anyhow::Result<Vec<f32>> {
+    let settings = render_settings(&args.scene, world);
+    let rendering = render(world, &settings, &AtomicBool::new(false), &|_| ())?;
+    Ok(output::channels(&rendering.film, &[], None).data)
+}
+
+fn compare(a: &[f32], b: &[f32]) -> ImageReport {
+    let sum = |v: &[f32]| v.iter().map(|&x| f64::from(x)).sum::<f64>();
+    let mean = sum(a) / a.len().max(1) as f64;
+    let (mut identical, mut different) = (0, 0);
+    for (x, y) in a.chunks(3).zip(b.chunks(3)) {
+        identical += usize::from(x == y);
+        let off = x.iter().zip(y).any(|(&x, &y)| {
+            let (x, y) = (f64::from(x), f64::from(y));
+            (x - y).abs() > PIXEL_TOLERANCE * x.abs().max(y.abs()).max(mean)
+        });
+        different += usize::from(off);
+    }
+    let relative_mean_difference = if sum(a) == 0.0 { sum(b) } else { (sum(b) - sum(a)) / sum(a) };
+    ImageReport { pixels: a.len() / 3, identical, different, relative_mean_difference }
+}
+
+fn write_pictures(folder: &std::path::Path, world: &World, a: &[f32], b: &[f32]) -> anyhow::Result<()> {
+    std::fs::create_dir_all(folder).with_context(|| format!("cannot make {}", folder.display()))?;
+    let bounds = world.scene.film.bounds;
+    let difference: Vec<f32> = a.iter().zip(b).map(|(x, y)| (x - y).abs()).collect();
+    for (name, data) in [("embree", a), ("bvh", b), ("difference", &difference)] {
+        let names = ["R", "G", "B"].map(str::to_owned).to_vec();
+        let part = Part::linear(bounds.width() as usize, bounds.height() as usize, names, data.to_vec());
+        oiio::write_image(&folder.join(format!("{name}.exr")), &[part])?;
+    }
+    Ok(())
+}

@@ -1,0 +1,110 @@
+//! `lumiris info`
+
+use super::args::SceneArgs;
+use super::progress;
+use super::settings::load_world;
+use clap::Args;
+use lumiris::geometry::Shape;
+use lumiris::scene::World;
+use serde_json::{Value, json};
+use std::collections::BTreeMap;
+use std::process::ExitCode;
+
+/// `lumiris info`
+#[derive(Args, Clone, Debug)]
+pub struct InfoArgs {
+    #[command(flatten)]
+    scene: SceneArgs,
+    /// Print JSON
+    #[arg(long)]
+    json: bool,
+}
+
+pub fn run(args: &InfoArgs) -> anyhow::Result<ExitCode> {
+    let (world, times) = load_world(&args.scene)?;
+    let mut facts = facts(&world);
+    facts["seconds"] = json!({ "load": times.load, "build": times.build });
+    facts["scene"] = json!(args.scene.scene.display().to_string());
+    if args.json {
+        progress::print(&serde_json::to_string_pretty(&facts)?);
+    } else {
+        let mut text = String::new();
+        list(&facts, 0, &mut text);
+        progress::print(text.trim_end());
+    }
+    Ok(ExitCode::SUCCESS)
+}
+
+/// Everything that is worth knowing of a scene, as JSON.
+fn facts(world: &World) -> Value {
+    let scene = &world.scene;
+    let set = &scene.geometry;
+    let (triangles, quadrics, patches) = set.primitive_counts();
+    let group_triangles = |group: &lumiris::geometry::Group| -> usize {
+        let meshes = group.geometries.iter().map(|&id| match &set.geometries[id as usize].shape {
+            Shape::Mesh(mesh) => mesh.triangle_count(),
+            Shape::Quadric(_) | Shape::Bilinear(_) => 0,
+        });
+        meshes.sum()
+    };
+    let per_group: Vec<usize> = set.groups.iter().map(group_triangles).collect();
+    let instanced: usize = set.instances.iter().map(|i| per_group[i.group as usize]).sum();
+    let bounds = set.world_bounds();
+    let mut materials: BTreeMap<&str, usize> = BTreeMap::new();
+    for entry in scene.materials.entries() {
+        *materials.entry(entry.material.kind_name()).or_default() += 1;
+    }
+    let mut lights: BTreeMap<&str, usize> = BTreeMap::new();
+    for light in &scene.lights.lights {
+        *lights.entry(light.kind_name()).or_default() += 1;
+    }
+    let accel = world.accel.stats();
+    json!({
+        "geometry": {
+            "geometries": set.geometries.len(),
+            "triangles": triangles, "quadrics": quadrics, "patches": patches,
+            "groups": set.groups.len(), "instances": set.instances.len(),
+            "triangles_with_instances": group_triangles(&set.root) + instanced,
+            "bounds": [bounds.min.to_array(), bounds.max.to_array()],
+        },
+        "materials": materials,
+        "lights": lights,
+        "textures": {
+            "float": scene.textures.floats.len(), "rgb": scene.textures.rgbs.len(), "images": scene.textures.images.len(),
+        },
+        "memory": {
+            "geometry_bytes": geometry_bytes(world),
+            "texture_bytes": scene.textures.images.iter().map(|i| i.bytes() as u64).sum::<u64>(),
+            "accel_bytes": accel.bytes, "accel_peak_bytes": accel.peak_bytes,
+        },
+        "settings": lumiris::render::output::settings_metadata(scene).into_iter().collect::<BTreeMap<_, _>>(),
+    })
+}
+
+fn geometry_bytes(world: &World) -> u64 {
+    let bytes = world.scene.geometry.geometries.iter().map(|g| match &g.shape {
+        Shape::Mesh(m) => {
+            let vectors = m.padded_positions().len() + m.normals.len() + m.tangents.len() + m.indices.len();
+            vectors * 12 + m.uvs.len() * 8
+        }
+        Shape::Quadric(q) => size_of_val(q),
+        Shape::Bilinear(m) => (m.positions.len() + m.normals.len()) * 12 + m.uvs.len() * 8 + m.indices.len() * 16,
+    });
+    bytes.sum::<usize>() as u64
+}
+
+/// Writes a JSON object as an indented list.
+fn list(value: &Value, indent: usize, out: &mut String) {
+    let Value::Object(map) = value else { return };
+    for (key, value) in map {
+        let name = format!("{:indent$}{}", "", key.replace('_', " "));
+        match value {
+            Value::Object(_) => {
+                *out += &format!("{name}\n");
+                list(value, indent + 2, out);
+            }
+            Value::String(text) => *out += &format!("{name:<34}{text}\n"),
+            other => *out += &format!("{name:<34}{other}\n"),
+        }
+    }
+}

@@ -1,0 +1,46 @@
+//! What a person sees while it runs; the only place that writes to the terminal.
+#![allow(clippy::print_stdout, clippy::print_stderr)]
+
+use indicatif::{ProgressBar, ProgressDrawTarget, ProgressStyle};
+use lumiris::render::Progress;
+
+/// A line for the person at the terminal (standard error).
+pub fn say(text: &str) {
+    eprintln!("{text}");
+}
+
+/// A line of output (standard output); a closed pipe is not an error.
+pub fn print(text: &str) {
+    use std::io::Write;
+    let mut out = std::io::stdout().lock();
+    // A reader such as `head` may have gone; there is nobody left to tell.
+    let _ = writeln!(out, "{text}");
+}
+
+/// A progress bar of a rendering: part done, time left, rays per second, noise.
+pub struct Bar(ProgressBar);
+
+impl Bar {
+    /// A bar, or nothing visible if `quiet`.
+    pub fn new(quiet: bool) -> Self {
+        let target = if quiet { ProgressDrawTarget::hidden() } else { ProgressDrawTarget::stderr_with_hz(8) };
+        let bar = ProgressBar::with_draw_target(Some(0), target);
+        let style = ProgressStyle::with_template("{bar:30} {percent:>3} %  {elapsed} + {eta} left  {msg}");
+        bar.set_style(style.unwrap_or_else(|_| ProgressStyle::default_bar()));
+        Bar(bar)
+    }
+
+    /// Shows the state of a rendering.
+    pub fn update(&self, progress: &Progress) {
+        self.0.set_length(progress.samples_total);
+        self.0.set_position(progress.samples_done);
+        let rate = progress.rays as f64 / progress.elapsed.as_secs_f64().max(1e-9) * 1e-6;
+        let noise = progress.noise.filter(|n| n.is_finite()).map(|n| format!("  noise {:.2} %", n * 100.0));
+        self.0.set_message(format!("{rate:.2} Mrays/s{}", noise.unwrap_or_default()));
+    }
+
+    /// Removes the bar.
+    pub fn finish(&self) {
+        self.0.finish_and_clear();
+    }
+}

@@ -1,0 +1,227 @@
+//! `lumiris render`
+
+use super::args::{AovArg, RenderArgs};
+use super::progress::{self, Bar};
+use super::settings::{SetupTimes, load_world, plan, render_settings};
+use anyhow::{Context, bail};
+use lumiris::imaging::oiio::{self, Part};
+use lumiris::render::output::{self, Aov};
+use lumiris::render::{RenderSettings, Rendering, render};
+use lumiris::scene::World;
+use serde_json::json;
+use std::path::{Path, PathBuf};
+use std::process::ExitCode;
+use std::sync::Arc;
+use std::sync::atomic::{AtomicBool, Ordering};
+use std::time::Duration;
+
+/// File types that hold what a display shows.
+const DISPLAY_TYPES: [&str; 6] = ["png", "jpg", "jpeg", "tif", "tiff", "tga"];
+/// Exit code of a rendering that Ctrl-C ended, as shells have it.
+pub const INTERRUPTED: u8 = 130;
+
+pub fn run(args: &RenderArgs) -> anyhow::Result<ExitCode> {
+    check_outputs(&args.output)?;
+    let (mut world, setup) = load_world(&args.scene)?;
+    let asks_for_ratio = args.aov.iter().flatten().any(|a| matches!(a, AovArg::Ratio));
+    plan(&args.scene, &mut world, asks_for_ratio, args.quiet)?;
+    let outputs = outputs(args, &world);
+    check_outputs(&outputs)?;
+
+    let stop = Arc::new(AtomicBool::new(false));
+    stop_at_ctrl_c(&stop)?;
+
+    let bar = Bar::new(args.quiet);
+    let time_limit = args.time.map(Duration::from_secs_f64);
+    let settings = RenderSettings { time_limit, ..render_settings(&args.scene, &world) };
+    let rendering = render(&world, &settings, &stop, &|p| bar.update(p))?;
+    bar.finish();
+
+    for path in &outputs {
+        write(args, &world, &rendering, path)?;
+    }
+    if let Some(path) = &args.stats {
+        let text = serde_json::to_string_pretty(&stats(args, &world, &rendering, setup))?;
+        std::fs::write(path, text).with_context(|| format!("cannot write {}", path.display()))?;
+    }
+    report(args, &rendering, &outputs);
+    let interrupted = stop.load(Ordering::Relaxed);
+    Ok(if interrupted { ExitCode::from(INTERRUPTED) } else { ExitCode::SUCCESS })
+}
+
+/// Ctrl-C sets `stop`, which ends a rendering in good order; a second one ends the program.
+pub fn stop_at_ctrl_c(stop: &Arc<AtomicBool>) -> anyhow::Result<()> {
+    let handler = Arc::clone(stop);
+    ctrlc::set_handler(move || {
+        if handler.swap(true, Ordering::Relaxed) {
+            std::process::abort();
+        }
+    })
+    .context("cannot watch for Ctrl-C")
+}
+
+fn outputs(args: &RenderArgs, world: &World) -> Vec<PathBuf> {
+    if !args.output.is_empty() {
+        return args.output.clone();
+    }
+    let from_file = world.scene.film.file_name.as_ref().map(PathBuf::from);
+    vec![from_file.unwrap_or_else(|| {
+        let name = args.scene.scene.file_name().unwrap_or_default().to_string_lossy().into_owned();
+        let stem = name.trim_end_matches(".gz").trim_end_matches(".pbrt").to_owned();
+        PathBuf::from(stem + ".exr")
+    })]
+}
+
+fn extension(path: &Path) -> String {
+    path.extension().unwrap_or_default().to_string_lossy().to_lowercase()
+}
+
+/// Refuses what cannot be written before an hour is spent on rendering it.
+fn check_outputs(outputs: &[PathBuf]) -> anyhow::Result<()> {
+    for path in outputs {
+        let kind = extension(path);
+        if kind != "exr" && !DISPLAY_TYPES.contains(&kind.as_str()) {
+            bail!("{}: the picture can be written as .exr, .{}", path.display(), DISPLAY_TYPES.join(", ."));
+        }
+        let folder = path.parent().filter(|p| !p.as_os_str().is_empty()).unwrap_or(Path::new("."));
+        if !folder.is_dir() {
+            bail!("{}: there is no folder {}", path.display(), folder.display());
+        }
+    }
+    Ok(())
+}
+
+fn write(args: &RenderArgs, world: &World, rendering: &Rendering, path: &Path) -> anyhow::Result<()> {
+    let film = &rendering.film;
+    let (width, height) = (film.bounds.width() as usize, film.bounds.height() as usize);
+    let mut metadata = output::settings_metadata(&world.scene);
+    metadata.push(("lumiris:scene".to_owned(), args.scene.scene.display().to_string()));
+    metadata.push(("lumiris:accel".to_owned(), args.scene.accel.value().name().to_owned()));
+    metadata.push(("lumiris:complete".to_owned(), rendering.complete.to_string()));
+    let done = || film.pixels.iter().map(|p| p.count);
+    let range = format!("{} to {} per pixel", done().min().unwrap_or(0), done().max().unwrap_or(0));
+    metadata.push(("lumiris:samples_done".to_owned(), range));
+    metadata.push(("lumiris:seconds".to_owned(), format!("{:.3}", rendering.elapsed.as_secs_f64())));
+    let part = if extension(path) == "exr" {
+        let aovs: Vec<Aov> = match &args.aov {
+            Some(list) => list.iter().map(|a| a.value()).collect(),
+            None => {
+                let ratio = world.splits.as_ref().map(|_| Aov::Ratio);
+                let records = rendering.cache.map(|_| Aov::Records);
+                Aov::ALL.into_iter().chain(ratio).chain(records).collect()
+            }
+        };
+        let channels = output::channels(film, &aovs, world.splits.as_ref());
+        Part::linear(width, height, channels.names, channels.data)
+    } else {
+        let names = ["R", "G", "B"].map(str::to_owned).to_vec();
+        Part::display(width, height, names, output::display(film, args.exposure))
+    };
+    let full = [film.resolution[0] as usize, film.resolution[1] as usize];
+    let part = part.with_metadata(metadata).with_window([film.bounds.x0 as usize, film.bounds.y0 as usize], full);
+    oiio::write_image(path, &[part])?;
+    Ok(())
+}
+
+fn stats(args: &RenderArgs, world: &World, rendering: &Rendering, setup: SetupTimes) -> serde_json::Value {
+    let s = &rendering.stats;
+    let d = &s.direct;
+    let seconds = |t: Duration| t.as_secs_f64();
+    let mrays = |count: u64, t: Duration| count as f64 / seconds(t).max(1e-12) * 1e-6;
+    let accel = world.accel.stats();
+    let metadata: serde_json::Map<_, _> =
+        output::settings_metadata(&world.scene).into_iter().map(|(k, v)| (k, v.into())).collect();
+    json!({
+        "scene": args.scene.scene.display().to_string(),
+        "settings": metadata,
+        "accel": args.scene.accel.value().name(),
+        "threads": rendering.threads,
+        "complete": rendering.complete,
+        "invalid_samples": rendering.film.pixels.iter().map(|p| p.invalid).sum::<u64>(),
+        "relative_noise": rendering.film.relative_noise(),
+        "seconds": {
+            "load": setup.load, "build": setup.build, "render": seconds(rendering.elapsed),
+        },
+        "thread_seconds": {
+            "camera_rays": seconds(s.camera_time), "bounce_rays": seconds(s.bounce_time), "shade": seconds(s.shade_time),
+            "t1_propose": seconds(d.t1), "select_resolve": seconds(d.select), "t2_trace": seconds(d.t2),
+            "ocv_solve": seconds(d.solve),
+        },
+        "counts": {
+            "camera_rays": s.camera_rays, "bounce_rays": s.bounce_rays, "proposals": d.proposals,
+            "emitter_rays": d.emitter_rays, "shadow_segments": d.segments,
+            "ocv_systems": d.systems, "ocv_fallbacks_to_mis": d.ill_conditioned,
+        },
+        "rates": {
+            "camera_mrays_per_second": mrays(s.camera_rays, s.camera_time),
+            "bounce_mrays_per_second": mrays(s.bounce_rays, s.bounce_time),
+            "shadow_mrays_per_second": mrays(d.segments, d.t2),
+            "nanoseconds_per_proposal": seconds(d.t1) * 1e9 / (d.proposals.max(1) as f64),
+        },
+        "memory": {
+            "accel_bytes": accel.bytes, "accel_peak_bytes": accel.peak_bytes,
+        },
+        "photon_maps": rendering.photons.map(|p| json!({
+            "maps": p.maps,
+            "trajectories": p.trajectories,
+            "global_photons": p.global,
+            "caustic_photons": p.caustic,
+            "importons": p.importons,
+            "bytes": p.bytes,
+            "trace_seconds": seconds(p.tracing),
+            "sort_seconds": seconds(p.sorting),
+            "photons_per_second": (p.global + p.caustic) as f64 / seconds(p.tracing).max(1e-12),
+            "trajectories_per_second": p.trajectories as f64 / seconds(p.tracing).max(1e-12),
+        })),
+        "irradiance_cache": rendering.cache.map(|c| json!({
+            "records": c.records,
+            "record_bytes": c.bytes,
+            "build_seconds": seconds(c.build.elapsed),
+            "build_rounds": c.build.rounds,
+            "build_camera_samples": c.build.camera_samples,
+            "dropped_points": c.build.dropped,
+            "build_rays": c.build.paths.camera_rays + c.build.paths.bounce_rays + c.build.paths.direct.segments,
+            "lookups": c.lookups.lookups,
+            "fallbacks": c.lookups.fallbacks,
+        })),
+    })
+}
+
+fn report(args: &RenderArgs, rendering: &Rendering, outputs: &[PathBuf]) {
+    if args.quiet {
+        return;
+    }
+    let names: Vec<String> = outputs.iter().map(|p| p.display().to_string()).collect();
+    let spp = rendering.film.pixels.iter().map(|p| p.count).min().unwrap_or(0);
+    let partial = if rendering.complete { "" } else { " (stopped early)" };
+    progress::say(&format!(
+        "{} after {:.1} s, {spp} samples per pixel{partial}, noise {:.2} %",
+        names.join(", "),
+        rendering.elapsed.as_secs_f64(),
+        rendering.film.relative_noise() * 100.0
+    ));
+    if let Some(c) = &rendering.cache {
+        progress::say(&format!(
+            "irradiance cache: {} records in {:.1} s, {:.2} % of {} lookups found none",
+            c.records,
+            c.build.elapsed.as_secs_f64(),
+            100.0 * c.lookups.fallbacks as f64 / c.lookups.lookups.max(1) as f64,
+            c.lookups.lookups
+        ));
+    }
+    if let Some(p) = &rendering.photons {
+        progress::say(&format!(
+            "photon maps: {} global and {} caustic photons of {} trajectories in {:.1} s, {:.1} MB{}",
+            p.global,
+            p.caustic,
+            p.trajectories,
+            (p.tracing + p.sorting).as_secs_f64(),
+            p.bytes as f64 * 1e-6,
+            if p.maps > 1 { format!(", {} maps", p.maps) } else { String::new() }
+        ));
+    }
+    let invalid: u64 = rendering.film.pixels.iter().map(|p| p.invalid).sum();
+    if invalid > 0 {
+        progress::say(&format!("warning: {invalid} samples were not finite and count as black"));
+    }
+}

@@ -1,0 +1,79 @@
+//! `lumiris reproduce`
+
+use super::progress;
+use clap::{Args, ValueEnum};
+use lumiris_lab::reproduce::{Observer, Options, ReproduceError, fan, keller_wald, talbot};
+use std::path::PathBuf;
+use std::process::ExitCode;
+use std::sync::Arc;
+use std::sync::atomic::AtomicBool;
+
+/// `lumiris reproduce`
+#[derive(Args, Clone, Debug)]
+pub struct ReproduceArgs {
+    /// Which paper
+    paper: Paper,
+    /// Folder that takes the page (index.html), its pictures, and all numbers
+    #[arg(short, long, value_name = "DIR")]
+    out: PathBuf,
+    /// At most 2 minutes on two cores instead of 20
+    #[arg(long)]
+    quick: bool,
+    /// Threads [default: all cores]
+    #[arg(long, value_name = "T", value_parser = clap::value_parser!(u32).range(1..=4096))]
+    threads: Option<u32>,
+    /// Most pixels along an edge of a picture; fewer where time does not suffice [default: 400, quick 160 (talbot) or 128 (fan, keller-wald)]
+    #[arg(long, value_name = "N", value_parser = clap::value_parser!(u32).range(16..=4096))]
+    size: Option<u32>,
+    /// Folder with scenes of the same names to use instead of those that are made for the purpose: statue-env.pbrt,
+    /// statue-lights.pbrt and statue-env-lights.pbrt (talbot); checkers.pbrt, statue.pbrt, room.pbrt and box.pbrt (fan);
+    /// rooms.pbrt, rooms-10000.pbrt, ring.pbrt, ring-indirect.pbrt and slit.pbrt (keller-wald)
+    #[arg(long, value_name = "DIR")]
+    scenes: Option<PathBuf>,
+    /// No progress, only errors
+    #[arg(short, long)]
+    quiet: bool,
+}
+
+/// A paper whose figures can be reproduced.
+#[derive(Clone, Copy, Debug, ValueEnum)]
+enum Paper {
+    /// Resampled importance sampling: Talbot, Cline and Egbert 2005, and Talbot's thesis
+    Talbot,
+    /// Optimizing control variates: Fan, Chenney, Hu, Tsui and Lai 2006
+    Fan,
+    /// Importance sampling for photon maps: Keller and Wald 2000
+    KellerWald,
+}
+
+pub fn run(args: &ReproduceArgs) -> anyhow::Result<ExitCode> {
+    let stop = Arc::new(AtomicBool::new(false));
+    super::render::stop_at_ctrl_c(&stop)?;
+    let options = Options {
+        out: args.out.clone(),
+        scenes: args.scenes.clone(),
+        quick: args.quick,
+        threads: args.threads.map(|t| t as usize),
+        size: args.size,
+        command: std::env::args().collect::<Vec<_>>().join(" "),
+    };
+    let say = |text: &str| {
+        if !args.quiet {
+            progress::say(text);
+        }
+    };
+    let observer = Observer { say: &say, stop: &stop };
+    let page = match args.paper {
+        Paper::Talbot => talbot::run(&options, observer),
+        Paper::Fan => fan::run(&options, observer),
+        Paper::KellerWald => keller_wald::run(&options, observer),
+    };
+    match page {
+        Ok(page) => {
+            progress::print(&page.display().to_string());
+            Ok(ExitCode::SUCCESS)
+        }
+        Err(ReproduceError::Stopped) => Ok(ExitCode::from(super::render::INTERRUPTED)),
+        Err(error) => Err(error.into()),
+    }
+}

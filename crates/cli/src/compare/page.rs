@@ -1,0 +1,234 @@
+//! A page for a browser: one file without anything from elsewhere.
+//!
+//! The browser gets the pictures as numbers, so that exposures, differences and read values are true ones: f32 of which
+//! the low 8 bits are rounded away (16 significant bits, the whole range, NaN and infinity), the bytes of all values
+//! sorted by significance, compressed by zlib, in base64. What it cannot compute cheaply (ꟻLIP, the thresholds of
+//! vision) comes as maps in the same form.
+
+use super::columns::shown_columns;
+use super::load::{Pictures, Shown};
+use super::scores::{Compared, Scores, Settings};
+use flate2::{Compression, write::ZlibEncoder};
+use lumiris::imaging::heat::{BLUE_RED, HEAT, Stops};
+use lumiris::imaging::metrics::Pixel;
+use serde_json::{Value, json};
+use std::io::{self, Write};
+use std::path::{Path, PathBuf};
+
+const TEMPLATE: &str = include_str!("viewer/index.html");
+const STYLE: &str = include_str!("viewer/style.css");
+const PICTURES: &str = include_str!("viewer/pictures.js");
+const VIEWER: &str = include_str!("viewer/viewer.js");
+
+/// Writes `index.html` into a folder, which is made if it is not there. Says where the page is.
+pub fn write_page(
+    folder: &Path,
+    pictures: &Pictures,
+    settings: &Settings,
+    compared: &[Compared],
+) -> io::Result<PathBuf> {
+    std::fs::create_dir_all(folder)?;
+    let path = folder.join("index.html");
+    write_whole(&path, &page(pictures, settings, compared)?)?;
+    Ok(path)
+}
+
+/// Writes a file; either the whole of it appears under its name, or nothing.
+pub fn write_whole(path: &Path, text: &str) -> io::Result<()> {
+    let name = path.file_name().unwrap_or_default().to_string_lossy();
+    let partial = path.with_file_name(format!(".{name}.{}.partial", std::process::id()));
+    let written = std::fs::write(&partial, text).and_then(|()| std::fs::rename(&partial, path));
+    if written.is_err() {
+        // What is left of the attempt is of no use; if it is not there, so much the better.
+        let _ = std::fs::remove_file(&partial);
+    }
+    written
+}
+
+/// The page as text.
+fn page(pictures: &Pictures, settings: &Settings, compared: &[Compared]) -> io::Result<String> {
+    let mut data = String::new();
+    let mut images = Vec::new();
+    for (index, shown) in pictures.images.iter().enumerate() {
+        images.push(image(index, shown, Some(&compared[index]), &mut data)?);
+    }
+    images.push(image(pictures.images.len(), &pictures.reference, None, &mut data)?);
+    let manifest = manifest(pictures, settings, compared, images);
+    // `<` could end the element that holds it.
+    let manifest = manifest.to_string().replace('<', "\\u003c");
+
+    let mut out = String::with_capacity(data.len() + manifest.len() + (1 << 16));
+    let mut rest = TEMPLATE;
+    for (mark, text) in [
+        ("/*style*/", STYLE),
+        ("/*manifest*/", &manifest),
+        ("<!--data-->", &data),
+        ("/*pictures*/", PICTURES),
+        ("/*viewer*/", VIEWER),
+    ] {
+        let (before, after) = rest.split_once(mark).expect("the template has all marks, in this order");
+        out.push_str(before);
+        out.push_str(text);
+        rest = after;
+    }
+    out.push_str(rest);
+    Ok(out)
+}
+
+/// Everything but the pixels.
+fn manifest(pictures: &Pictures, settings: &Settings, compared: &[Compared], images: Vec<Value>) -> Value {
+    let scores: Vec<&Scores> = compared.iter().map(|c| &c.scores).collect();
+    let columns = shown_columns(&settings.metrics, &scores);
+    let described: Vec<Value> = columns
+        .iter()
+        .map(|c| json!({ "key": c.key, "title": c.title, "help": c.help, "better": c.better.name() }))
+        .collect();
+    let rows: Vec<Value> = scores
+        .iter()
+        .map(|s| {
+            let cells = columns.iter().map(|c| {
+                let value = (c.value)(s);
+                // JSON has no infinity; for sorting the largest number will do.
+                let sortable = value.map(|v| if v.is_nan() { f64::MAX } else { v.clamp(f64::MIN, f64::MAX) });
+                json!({ "value": sortable, "text": value.map_or("–".to_owned(), c.text) })
+            });
+            Value::from(cells.collect::<Vec<_>>())
+        })
+        .collect();
+    let r = pictures.region;
+    json!({
+        "x": r.x, "y": r.y, "width": r.width, "height": r.height,
+        "images": images, "columns": described, "rows": rows,
+        "exposure": settings.exposure, "epsilon": settings.epsilon,
+        "heat": colors(HEAT), "signed": colors(BLUE_RED),
+        "version": env!("CARGO_PKG_VERSION"),
+    })
+}
+
+fn colors(stops: Stops) -> Value {
+    json!(stops)
+}
+
+/// Appends the pixels and maps of a picture and describes them.
+fn image(index: usize, shown: &Shown, compared: Option<&Compared>, data: &mut String) -> io::Result<Value> {
+    let mut layers = Vec::new();
+    let mut add = |key: &str, values: &[f32]| -> io::Result<()> {
+        layers.push(key.to_owned());
+        append(data, &format!("data-{index}-{key}"), values)
+    };
+    add("color", shown.pixels.as_flattened())?;
+    if let Some(variance) = &shown.variance {
+        let mean = |v: &Pixel| (v[0] + v[1] + v[2]) / 3.0;
+        add("variance", &variance.iter().map(mean).collect::<Vec<_>>())?;
+    }
+    if let Some(maps) = compared.map(|c| &c.maps) {
+        for (key, map) in [("flip", &maps.flip), ("hdrflip", &maps.hdr_flip), ("tvi", &maps.tvi), ("z", &maps.z)] {
+            if let Some(map) = map {
+                add(key, map)?;
+            }
+        }
+    }
+    let path = shown.path.display().to_string();
+    Ok(json!({ "name": shown.name, "path": path, "layer": shown.layer, "data": layers }))
+}
+
+/// Appends an element that holds values.
+fn append(data: &mut String, id: &str, values: &[f32]) -> io::Result<()> {
+    data.push_str(&format!("<script type=\"application/octet-stream\" id=\"{id}\">"));
+    let mut encoder = ZlibEncoder::new(Vec::new(), Compression::new(6));
+    encoder.write_all(&planes(values))?;
+    base64(&encoder.finish()?, data);
+    data.push_str("</script>\n");
+    Ok(())
+}
+
+/// The upper three bytes of all values: all first bytes, all second ones, all third ones.
+fn planes(values: &[f32]) -> Vec<u8> {
+    let n = values.len();
+    let mut bytes = vec![0; 3 * n];
+    for (i, &v) in values.iter().enumerate() {
+        let bits = v.to_bits();
+        let rounded = bits.wrapping_add(0x80);
+        // The largest numbers would become infinite; NaN and infinity have nothing to round.
+        let kept = if v.is_finite() && f32::from_bits(rounded).is_finite() { rounded } else { bits };
+        let kept = if v.is_nan() { f32::NAN.to_bits() } else { kept };
+        for (plane, byte) in kept.to_be_bytes()[..3].iter().enumerate() {
+            bytes[plane * n + i] = *byte;
+        }
+    }
+    bytes
+}
+
+/// Appends bytes in base64 [RFC 4648].
+fn base64(bytes: &[u8], out: &mut String) {
+    const DIGITS: &[u8; 64] = b"ABCDEFGHIJKLMNOPQRSTUVWXYZabcdefghijklmnopqrstuvwxyz0123456789+/";
+    out.reserve(bytes.len().div_ceil(3) * 4);
+    for chunk in bytes.chunks(3) {
+        let word = (0..3).fold(0_u32, |w, i| w << 8 | u32::from(chunk.get(i).copied().unwrap_or(0)));
+        for digit in 0..4 {
+            let value = (word >> (18 - 6 * digit)) & 63;
+            out.push(if digit <= chunk.len() { char::from(DIGITS[value as usize]) } else { '=' });
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::compare::load::Region;
+    use crate::compare::scores::compare;
+
+    #[test]
+    fn base64_is_that_of_the_standard() {
+        for (text, expected) in
+            [("", ""), ("f", "Zg=="), ("fo", "Zm8="), ("foo", "Zm9v"), ("foob", "Zm9vYg=="), ("foobar", "Zm9vYmFy")]
+        {
+            let mut out = String::new();
+            base64(text.as_bytes(), &mut out);
+            assert_eq!(out, expected);
+        }
+    }
+
+    #[test]
+    fn values_keep_sixteen_bits_and_their_kind() {
+        let values = [0.0, 1.0, -0.1, 1e-30, 65_504.0 * 7.3, f32::MAX, f32::INFINITY, f32::NEG_INFINITY, f32::NAN];
+        let bytes = planes(&values);
+        for (i, &v) in values.iter().enumerate() {
+            let back = f32::from_be_bytes([bytes[i], bytes[values.len() + i], bytes[2 * values.len() + i], 0]);
+            let same = (v.is_nan() && back.is_nan()) || v == back || (v - back).abs() <= v.abs() / 65_536.0;
+            assert!(same, "{v} {back}");
+        }
+    }
+
+    #[test]
+    fn the_page_is_one_file_without_anything_from_elsewhere() {
+        let shown = |name: &str, v: f32| Shown {
+            path: name.into(),
+            name: name.into(),
+            layer: "R G B".into(),
+            remarks: Vec::new(),
+            pixels: vec![[v; 3]; 4],
+            variance: Some(vec![[0.01; 3]; 4]),
+            is_half: false,
+        };
+        let region = Region { x: 0, y: 0, width: 2, height: 2 };
+        let evil = "</script><script>alert(1)</script>.exr";
+        let pictures =
+            Pictures { images: vec![shown(evil, 0.5)], reference: shown("r.exr", 0.25), region, display: [2, 2] };
+        let settings = Settings::default();
+        let folder = tempfile::tempdir().unwrap();
+        let path =
+            write_page(&folder.path().join("new"), &pictures, &settings, &compare(&pictures, &settings)).unwrap();
+        let html = std::fs::read_to_string(path).unwrap();
+        assert!(!html.contains("alert(1)</script>") && html.contains("\\u003c/script>"));
+        assert!(
+            !html.contains("http:") && !html.contains("https:") && !html.contains("src=") && !html.contains("url(")
+        );
+        for id in ["data-0-color", "data-0-variance", "data-0-flip", "data-0-hdrflip", "data-0-z", "data-1-color"] {
+            assert_eq!(html.matches(&format!("id=\"{id}\"")).count(), 1, "{id}");
+        }
+        assert_eq!(html.matches("<script").count(), html.matches("</script>").count());
+        assert!(!html.contains("data-1-flip") && !html.contains("/*style*/") && !html.contains("<!--data-->"));
+        assert_eq!(std::fs::read_dir(folder.path().join("new")).unwrap().count(), 1);
+    }
+}

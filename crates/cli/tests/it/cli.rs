@@ -1,0 +1,301 @@
+//! The program from outside: pictures, statistics, and what it says of bad input.
+
+use lumiris::imaging::oiio::{ReadLimits, read_image};
+use std::path::Path;
+use std::process::{Command, Output};
+
+fn lumiris(args: &[&str], folder: &Path) -> Output {
+    Command::new(env!("CARGO_BIN_EXE_lumiris")).args(args).current_dir(folder).output().unwrap()
+}
+
+fn scene(name: &str) -> String {
+    Path::new(env!("CARGO_MANIFEST_DIR")).join("../../scenes").join(name).display().to_string()
+}
+
+fn stderr(output: &Output) -> String {
+    String::from_utf8_lossy(&output.stderr).into_owned()
+}
+
+#[test]
+fn render_writes_every_picture_and_the_statistics() {
+    let folder = tempfile::tempdir().unwrap();
+    let path = scene("demo/gallery.pbrt");
+    let args = [
+        "render",
+        &path,
+        "--spp",
+        "2",
+        "--resolution",
+        "64x36",
+        "-o",
+        "a.exr",
+        "-o",
+        "a.png",
+        "--stats",
+        "a.json",
+        "-q",
+    ];
+    let output = lumiris(&args, folder.path());
+    assert!(output.status.success(), "{}", stderr(&output));
+
+    let exr = read_image(&folder.path().join("a.exr"), &ReadLimits::default()).unwrap();
+    assert_eq!((exr.image.width, exr.image.height), (64, 36));
+    for name in ["R", "albedo.G", "normal.Z", "depth.Z", "material", "object", "samples", "variance.B"] {
+        assert!(exr.image.channels.iter().any(|c| c == name), "{name} in {:?}", exr.image.channels);
+    }
+    assert_eq!(exr.metadata.get("lumiris:estimator").map(String::as_str), Some("mis"));
+    assert!(read_image(&folder.path().join("a.png"), &ReadLimits::default()).is_ok());
+
+    let stats: serde_json::Value =
+        serde_json::from_str(&std::fs::read_to_string(folder.path().join("a.json")).unwrap()).unwrap();
+    assert_eq!(stats["counts"]["camera_rays"], 64 * 36 * 2);
+    assert_eq!(stats["complete"], true);
+}
+
+#[test]
+fn an_irradiance_cache_is_part_of_picture_and_statistics() {
+    let folder = tempfile::tempdir().unwrap();
+    let path = scene("demo/gallery.pbrt");
+    let options = "--integrator irradiance-cache --cached all --cache-samples 32 --cache-error 0.3 --cache-radius 2,16 --spp 2 \
+                   --resolution 48x27 -o a.exr --stats a.json";
+    let args: Vec<&str> = ["render", &path].into_iter().chain(options.split_whitespace()).collect();
+    let output = lumiris(&args, folder.path());
+    assert!(output.status.success(), "{}", stderr(&output));
+    assert!(stderr(&output).contains("irradiance cache: "), "{}", stderr(&output));
+
+    let exr = read_image(&folder.path().join("a.exr"), &ReadLimits::default()).unwrap();
+    assert!(exr.image.channels.iter().any(|c| c == "records"), "{:?}", exr.image.channels);
+    for (key, value) in [("integrator", "irradiance-cache"), ("cached", "all"), ("cache_radius", "2,16")] {
+        assert_eq!(exr.metadata.get(&format!("lumiris:{key}")).map(String::as_str), Some(value));
+    }
+    let stats: serde_json::Value =
+        serde_json::from_str(&std::fs::read_to_string(folder.path().join("a.json")).unwrap()).unwrap();
+    let cache = &stats["irradiance_cache"];
+    assert!(cache["records"].as_u64().unwrap() > 50 && cache["build_seconds"].as_f64().unwrap() > 0.0, "{cache}");
+    assert!(cache["lookups"].as_u64().unwrap() >= cache["fallbacks"].as_u64().unwrap(), "{cache}");
+
+    for (option, value) in [("--cache-error", "1.5"), ("--cache-radius", "5,2"), ("--cached", "none")] {
+        let output = lumiris(&["render", &path, option, value], folder.path());
+        assert_eq!(output.status.code(), Some(2), "{option}: {}", stderr(&output));
+    }
+}
+
+#[test]
+fn numbers_that_ris_chose_give_the_same_picture_when_they_are_given() {
+    let folder = tempfile::tempdir().unwrap();
+    let path = scene("demo/gallery.pbrt");
+    let render = |name: &str, options: &[&str]| {
+        let common = ["render", &path, "--integrator", "direct", "--spp", "2", "--resolution", "48x27", "-o", name];
+        let output = lumiris(&[&common, options].concat(), folder.path());
+        assert!(output.status.success(), "{}", stderr(&output));
+        (stderr(&output), read_image(&folder.path().join(name), &ReadLimits::default()).unwrap())
+    };
+    let (said, chosen) = render("chosen.exr", &["--estimator", "ris", "--proposals", "optimal"]);
+    assert!(said.contains("ris: 4 of ") && said.contains("split anew in each pixel"), "{said}");
+    assert!(chosen.image.channels.iter().any(|c| c == "ratio.proposals"), "{:?}", chosen.image.channels);
+
+    let value = |key: &str| chosen.metadata[&format!("lumiris:{key}")].clone();
+    let (samples, times) = (value("samples"), value("stage_times"));
+    let given = ["--estimator", &value("estimator"), "--proposals", &value("proposals"), "--samples", &samples];
+    let (_, again) = render("again.exr", &[&given[..], &["--stage-times", &times, "--threads", "1"]].concat());
+    let bits = |image: &lumiris::imaging::Image| image.data.iter().map(|v| v.to_bits()).collect::<Vec<_>>();
+    assert_eq!(bits(&chosen.image), bits(&again.image));
+
+    let (said, auto) = render("auto.exr", &["--estimator", "ris"]);
+    assert!(said.contains("proposals are traced (a proposal takes "), "{said}");
+    let proposals = auto.metadata["lumiris:proposals"].clone();
+    assert!(proposals.parse::<u32>().unwrap() >= 4);
+    let (_, again) = render("auto-again.exr", &["--estimator", "ris", "--proposals", &proposals]);
+    assert_eq!(bits(&auto.image), bits(&again.image));
+}
+
+#[test]
+fn info_counts_what_the_scene_holds() {
+    let folder = tempfile::tempdir().unwrap();
+    let output = lumiris(&["info", &scene("demo/gallery.pbrt"), "--json"], folder.path());
+    assert!(output.status.success(), "{}", stderr(&output));
+    let facts: serde_json::Value = serde_json::from_slice(&output.stdout).unwrap();
+    assert_eq!(facts["geometry"]["instances"], 8);
+    // A knot of 576 triangles, four times subdivided, four walls and a lamp of two triangles each.
+    assert_eq!(facts["geometry"]["triangles"], 576 * 256 + 5 * 2);
+}
+
+#[test]
+fn an_unknown_parameter_is_an_error_with_its_place() {
+    let folder = tempfile::tempdir().unwrap();
+    std::fs::write(folder.path().join("bad.pbrt"), "WorldBegin\nShape \"sphere\" \"float radios\" [ 1 ]\n").unwrap();
+    let output = lumiris(&["render", "bad.pbrt"], folder.path());
+    assert_eq!(output.status.code(), Some(3));
+    let text = stderr(&output);
+    assert!(text.contains("bad.pbrt:2:16") && text.contains("radios") && text.contains("radius"), "{text}");
+    assert!(!folder.path().join("bad.exr").exists());
+}
+
+#[test]
+fn all_missing_files_are_named_at_once() {
+    let folder = tempfile::tempdir().unwrap();
+    let text = "WorldBegin\nShape \"plymesh\" \"string filename\" \"one.ply\"\nTexture \"t\" \"spectrum\" \"imagemap\" \
+                \"string filename\" \"two.png\"\nLightSource \"infinite\" \"string filename\" \"three.exr\"\n";
+    std::fs::write(folder.path().join("missing.pbrt"), text).unwrap();
+    let output = lumiris(&["render", "missing.pbrt"], folder.path());
+    assert_eq!(output.status.code(), Some(3));
+    let text = stderr(&output);
+    for name in ["one.ply", "two.png", "three.exr"] {
+        assert!(text.contains(name), "{text}");
+    }
+}
+
+#[test]
+fn outputs_that_cannot_be_written_are_refused_before_rendering() {
+    let folder = tempfile::tempdir().unwrap();
+    for name in ["a.xyz", "nowhere/a.exr"] {
+        let output = lumiris(&["render", &scene("analytic/point.pbrt"), "-o", name], folder.path());
+        assert_eq!(output.status.code(), Some(3), "{name}");
+        assert!(stderr(&output).contains(name.split('/').next().unwrap()), "{}", stderr(&output));
+    }
+}
+
+#[test]
+fn options_out_of_range_are_usage_errors() {
+    let folder = tempfile::tempdir().unwrap();
+    let path = scene("analytic/point.pbrt");
+    for args in [["--resolution", "0x5"], ["--crop", "0.5,0.2,0,1"], ["--spp", "0"], ["--estimator", "magic"]] {
+        let output = lumiris(&["render", &path, args[0], args[1]], folder.path());
+        assert_eq!(output.status.code(), Some(2), "{args:?}");
+    }
+}
+
+#[test]
+fn a_time_limit_ends_the_rendering_and_writes_it() {
+    let folder = tempfile::tempdir().unwrap();
+    let args = ["render", &scene("demo/gallery.pbrt"), "--resolution", "64x36", "--spp", "1000000", "--time", "0.5"];
+    let output = lumiris(&args, folder.path());
+    assert!(output.status.success(), "{}", stderr(&output));
+    assert!(stderr(&output).contains("stopped early"), "{}", stderr(&output));
+    assert!(folder.path().join("gallery.exr").exists());
+}
+
+#[test]
+fn crosscheck_of_a_small_scene_succeeds() {
+    let folder = tempfile::tempdir().unwrap();
+    let args = ["crosscheck", &scene("analytic/furnace-box-3.pbrt"), "--rays", "20000", "--json", "c.json"];
+    let output = lumiris(&args, folder.path());
+    let text = String::from_utf8_lossy(&output.stdout);
+    assert_eq!(output.status.code(), Some(0), "{text}{}", stderr(&output));
+    let report: serde_json::Value =
+        serde_json::from_str(&std::fs::read_to_string(folder.path().join("c.json")).unwrap()).unwrap();
+    assert_eq!(report["rays"]["tallies"].as_array().unwrap().len(), 5);
+}
+
+#[test]
+fn bench_reports_every_case_with_the_hits_of_both_loops() {
+    let folder = tempfile::tempdir().unwrap();
+    let path = scene("analytic/rectangle.pbrt");
+    let common = ["--resolution", "32x32", "--spp", "4", "--runs", "1", "--rays", "2048", "--json", "b.json"];
+    let report = |subject: &[&str]| -> serde_json::Value {
+        let args = [&["bench"], subject, &[path.as_str()], &common].concat();
+        let output = lumiris(&args, folder.path());
+        assert!(output.status.success(), "{}", stderr(&output));
+        serde_json::from_str(&std::fs::read_to_string(folder.path().join("b.json")).unwrap()).unwrap()
+    };
+
+    // Everything, as by default
+    let all = report(&[]);
+    assert_eq!(all["camera_rays"], 2048);
+    let names = |cases: &serde_json::Value| -> Vec<String> {
+        cases.as_array().unwrap().iter().map(|c| format!("{} {}", c["name"].as_str().unwrap(), c["width"])).collect()
+    };
+    assert!(names(&all["intersect"])[0].starts_with("camera rays"), "{all}");
+    assert!(names(&all["t2"]).len() >= 4, "{all}");
+    for case in all["intersect"].as_array().unwrap().iter().chain(all["t2"].as_array().unwrap()) {
+        assert_eq!(case["hits"], case["bare_hits"], "{case}");
+        assert!(case["rays"].as_u64().unwrap() > 0 && case["ratio"].as_f64().unwrap() > 0.0, "{case}");
+    }
+    assert_eq!(all["intersect"][0]["rays"], 2048);
+    assert!(all["t1"]["light_proposals"].as_u64().unwrap() > 0, "{all}");
+    assert_eq!(all["stages"].as_array().unwrap().last().unwrap()["name"], "all");
+
+    // One thing
+    let t1 = report(&["t1"]);
+    assert_eq!((names(&t1["intersect"]).len(), names(&t1["t2"]).len()), (0, 0));
+    assert!(t1["t1"]["bsdf_nanoseconds"].is_number(), "{t1}");
+    let intersect = report(&["intersect"]);
+    assert!(intersect["t1"].is_null() && !names(&intersect["intersect"]).is_empty());
+}
+
+#[test]
+fn ctrl_c_writes_what_there_is() {
+    let folder = tempfile::tempdir().unwrap();
+    let args = ["render", &scene("analytic/rectangle.pbrt"), "--spp", "1000000000", "-q", "-o", "a.exr"];
+    let mut child = Command::new(env!("CARGO_BIN_EXE_lumiris")).args(args).current_dir(folder.path()).spawn().unwrap();
+    // Long enough for the scene to be read and the first pass to be done, even on a busy machine.
+    std::thread::sleep(std::time::Duration::from_secs(4));
+    assert!(Command::new("kill").args(["-INT", &child.id().to_string()]).status().unwrap().success());
+    assert_eq!(child.wait().unwrap().code(), Some(130));
+    let picture = read_image(&folder.path().join("a.exr"), &ReadLimits::default()).unwrap();
+    assert_eq!(picture.metadata.get("lumiris:complete").map(String::as_str), Some("false"));
+    let samples = picture.image.channel("samples").unwrap();
+    let channels = picture.image.channels.len();
+    assert!(picture.image.data.iter().skip(samples).step_by(channels).all(|&n| n >= 1.0));
+}
+
+#[test]
+fn generated_scenes_render_and_say_what_is_missing_before_they_are_generated() {
+    let folder = tempfile::tempdir().unwrap();
+    let output = lumiris(&["generate", "talbot", "-o", "t", "--detail", "40", "--resolution", "32"], folder.path());
+    assert!(output.status.success(), "{}", stderr(&output));
+    for name in ["statue-env", "statue-lights", "statue-env-lights"] {
+        let scene = format!("t/{name}.pbrt");
+        let args = ["render", &scene, "--spp", "1", "--resolution", "24x32", "-o", "a.exr", "-q"];
+        let output = lumiris(&args, folder.path());
+        assert!(output.status.success() && stderr(&output).is_empty(), "{}", stderr(&output));
+        let image = read_image(&folder.path().join("a.exr"), &ReadLimits::default()).unwrap().image;
+        let green = image.channel("G").unwrap();
+        let sum: f32 = (0..24 * 32).map(|i| image.get(i % 24, i / 24, green)).sum();
+        assert!(sum > 10.0, "{name} is dark: {sum}");
+        // The folder holds what the project holds.
+        let original = std::fs::read(self::scene(&format!("talbot/{name}.pbrt"))).unwrap();
+        assert!(original == std::fs::read(folder.path().join(&scene)).unwrap());
+    }
+
+    std::fs::remove_file(folder.path().join("t/statue.ply")).unwrap();
+    std::fs::remove_file(folder.path().join("t/sky.exr")).unwrap();
+    let output = lumiris(&["render", "t/statue-env.pbrt"], folder.path());
+    assert_eq!(output.status.code(), Some(3));
+    let text = stderr(&output);
+    assert!(text.contains("statue.ply") && text.contains("sky.exr"), "{text}");
+}
+
+#[test]
+fn a_generated_statue_and_sky_are_read_back() {
+    let folder = tempfile::tempdir().unwrap();
+    let output = lumiris(&["generate", "statue", "-o", "s.ply", "--detail", "32"], folder.path());
+    assert!(output.status.success(), "{}", stderr(&output));
+    let mesh = lumiris_formats::ply::read_ply(&folder.path().join("s.ply")).unwrap();
+    assert!(mesh.warnings.is_empty() && mesh.triangles.len() > 3000 && mesh.normals.len() == mesh.positions.len());
+    let count = stderr(&output);
+    assert!(count.contains(&format!("{} triangles", mesh.triangles.len())), "{count}");
+
+    let args = ["generate", "sky", "-o", "s.exr", "--resolution", "48", "--clouds", "0.3", "--azimuth", "-30"];
+    let output = lumiris(&args, folder.path());
+    assert!(output.status.success(), "{}", stderr(&output));
+    let sky = read_image(&folder.path().join("s.exr"), &ReadLimits::default()).unwrap();
+    assert_eq!((sky.image.width, sky.image.height, sky.image.channels.len()), (48, 48, 3));
+}
+
+#[test]
+fn what_cannot_be_generated_is_an_error_that_says_why() {
+    let folder = tempfile::tempdir().unwrap();
+    for (args, words) in [
+        (vec!["statue", "--detail", "3"], "8 to 4096"),
+        (vec!["statue", "-o", "s.obj"], ".ply"),
+        (vec!["statue", "-o", "no/s.ply", "--detail", "8"], "no/s.ply"),
+        (vec!["sky", "--elevation", "-5"], "elevation"),
+        (vec!["sky", "-o", "no/s.exr", "--resolution", "8"], "s.exr"),
+    ] {
+        let output = lumiris(&[&["generate"], &args[..]].concat(), folder.path());
+        assert_eq!(output.status.code(), Some(3), "{args:?}");
+        assert!(stderr(&output).contains(words), "{}", stderr(&output));
+    }
+    assert_eq!(std::fs::read_dir(folder.path()).unwrap().count(), 0);
+}

@@ -1,0 +1,7 @@
+//! The program from outside; one binary, a module per subject.
+#![allow(clippy::unwrap_used)]
+
+mod browser;
+mod cli;
+mod compare;
+mod reproduce;

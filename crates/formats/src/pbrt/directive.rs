@@ -1,0 +1,140 @@
+//! The directives of a pbrt file, checked for their form.
+
+use super::params::ParamSet;
+use crate::source::Span;
+
+/// A string argument and its place.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct Name {
+    /// The string.
+    pub text: String,
+    /// Where it stands.
+    pub span: Span,
+}
+
+/// Which time samples of the current transform a transform directive changes.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum ActiveTimes {
+    /// The first.
+    Start,
+    /// The last.
+    End,
+    /// Both.
+    All,
+}
+
+/// What `Attribute` sets default parameters of.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum AttributeTarget {
+    /// Shapes.
+    Shape,
+    /// Lights and area lights.
+    Light,
+    /// Materials.
+    Material,
+    /// Media.
+    Medium,
+    /// Textures.
+    Texture,
+}
+
+/// A directive without its parameter list. Matrices are as written: pbrt writes columns of `to_from · point` one after another.
+#[derive(Clone, Debug, PartialEq)]
+#[allow(missing_docs, reason = "the variants are pbrt's directives")]
+pub enum DirectiveKind {
+    Identity,
+    Translate([f32; 3]),
+    Scale([f32; 3]),
+    Rotate([f32; 4]),
+    LookAt([f32; 9]),
+    Transform([f32; 16]),
+    ConcatTransform([f32; 16]),
+    CoordinateSystem(Name),
+    CoordSysTransform(Name),
+    ActiveTransform(ActiveTimes),
+    TransformTimes([f32; 2]),
+    TransformBegin,
+    TransformEnd,
+    AttributeBegin,
+    AttributeEnd,
+    Attribute(AttributeTarget),
+    Option,
+    ColorSpace(Name),
+    Camera(Name),
+    Film(Name),
+    Sampler(Name),
+    Integrator(Name),
+    PixelFilter(Name),
+    Accelerator(Name),
+    MakeNamedMedium(Name),
+    MediumInterface { inside: Name, outside: Name },
+    WorldBegin,
+    WorldEnd,
+    ReverseOrientation,
+    Material(Name),
+    MakeNamedMaterial(Name),
+    NamedMaterial(Name),
+    Texture { name: Name, value: Name, class: Name },
+    LightSource(Name),
+    AreaLightSource(Name),
+    Shape(Name),
+    ObjectBegin(Name),
+    ObjectEnd,
+    ObjectInstance(Name),
+}
+
+/// A directive.
+#[derive(Clone, Debug)]
+pub struct Directive {
+    /// What it says.
+    pub kind: DirectiveKind,
+    /// Its keyword.
+    pub span: Span,
+    /// Its parameters; empty for directives that take none.
+    pub params: ParamSet,
+}
+
+/// Every keyword, for suggestions and for finding the next directive after an error.
+pub const KEYWORDS: &[&str] = &[
+    "Accelerator",
+    "ActiveTransform",
+    "AreaLightSource",
+    "Attribute",
+    "AttributeBegin",
+    "AttributeEnd",
+    "Camera",
+    "ColorSpace",
+    "ConcatTransform",
+    "CoordSysTransform",
+    "CoordinateSystem",
+    "Film",
+    "Identity",
+    "Import",
+    "Include",
+    "Integrator",
+    "LightSource",
+    "LookAt",
+    "MakeNamedMaterial",
+    "MakeNamedMedium",
+    "Material",
+    "MediumInterface",
+    "NamedMaterial",
+    "ObjectBegin",
+    "ObjectEnd",
+    "ObjectInstance",
+    "Option",
+    "PixelFilter",
+    "ReverseOrientation",
+    "Rotate",
+    "Sampler",
+    "Scale",
+    "Shape",
+    "Texture",
+    "Transform",
+    "TransformBegin",
+    "TransformEnd",
+    "TransformTimes",
+    "Translate",
+    "WorldBegin",
+    "WorldEnd",
+];

@@ -1,0 +1,243 @@
+//! The tables of faces and of triangle strips.
+
+use super::header::{Element, Scalar};
+use super::numbers::{ByteOrder, Numbers, number_at};
+use super::stream::{MAX_FILL, Stream};
+use super::{Place, PlyError, PlyMesh};
+use lumiris_numbers::math::Vec3;
+
+/// Ends a strip and begins another inside one list.
+const RESTART: i64 = -1;
+
+/// Faces as they come in.
+#[derive(Default)]
+pub struct Faces {
+    vertices: u64,
+    triangles: Vec<[u32; 3]>,
+    quads: Vec<[u32; 4]>,
+    polygons: u64,
+    degenerate: u64,
+}
+
+impl Faces {
+    /// No faces yet, of `vertices` vertices.
+    pub fn new(vertices: u64) -> Self {
+        Faces { vertices, ..Faces::default() }
+    }
+
+    /// Reads a table of faces.
+    pub fn read<'a, N: Numbers<'a>>(&mut self, element: &Element, numbers: &mut N) -> Result<(), PlyError> {
+        let Some(column) = element.indices() else {
+            return numbers.skip_element(element);
+        };
+        let list = &element.properties[column];
+        let triangle = N::size(list.list.unwrap_or(list.ty)) + 3 * N::size(list.ty);
+        self.triangles.reserve_exact(numbers.stream().trusted_items(element.count, triangle));
+        let mut row = 0;
+        while row < element.count {
+            // Runs of triangles in blocks; what stops them, and other layouts, face by face.
+            row += match (N::ORDER, TriangleRows::of(element, column)) {
+                (Some(ByteOrder::Little), Some(rows)) => {
+                    self.read_run::<false>(rows, element.count - row, numbers.stream())?
+                }
+                (Some(ByteOrder::Big), Some(rows)) => {
+                    self.read_run::<true>(rows, element.count - row, numbers.stream())?
+                }
+                (None, _) | (_, None) => 0,
+            };
+            let end = element.count.min(row + SLOW_RUN);
+            self.read_rows(element, column, row..end, numbers)?;
+            row = end;
+        }
+        Ok(())
+    }
+
+    /// Reads rows number by number.
+    fn read_rows<'a>(
+        &mut self,
+        element: &Element,
+        column: usize,
+        rows: std::ops::Range<u64>,
+        numbers: &mut impl Numbers<'a>,
+    ) -> Result<(), PlyError> {
+        let mut corners = Vec::new();
+        for row in rows {
+            for (i, property) in element.properties.iter().enumerate() {
+                match property.list {
+                    Some(count_type) if i == column => {
+                        let count = numbers.list_length(count_type, property.ty, &element.name)?;
+                        corners.clear();
+                        for _ in 0..count {
+                            let place = numbers.place();
+                            let index = numbers.integer(property.ty, &element.name)?;
+                            corners.push(self.check(index, row, place)?);
+                        }
+                        self.push(&corners);
+                    }
+                    Some(_) | None => numbers.skip_property(property, &element.name)?,
+                }
+            }
+        }
+        Ok(())
+    }
+
+    /// Reads triangles up to another face, an index out of range, or the end, and at most `left`; returns their number.
+    fn read_run<const BIG: bool>(
+        &mut self,
+        rows: TriangleRows,
+        left: u64,
+        stream: &mut Stream<'_>,
+    ) -> Result<u64, PlyError> {
+        let mut done = 0;
+        loop {
+            let available = stream.fill(rows.stride)?;
+            let faces = available.chunks_exact(rows.stride).take(usize::try_from(left - done).unwrap_or(usize::MAX));
+            let block = faces.take_while(|face| face[rows.offset] == 3).count();
+            let before = self.triangles.len();
+            let mut largest = 0_u32;
+            self.triangles.extend(available[..block * rows.stride].chunks_exact(rows.stride).map(|face| {
+                let face = &face[rows.offset..rows.offset + TriangleRows::LIST];
+                let t = [number_at!(u32, BIG, face, 1), number_at!(u32, BIG, face, 5), number_at!(u32, BIG, face, 9)];
+                largest = largest.max(t[0]).max(t[1]).max(t[2]);
+                t
+            }));
+            if block == 0 || u64::from(largest) >= self.vertices {
+                self.triangles.truncate(before);
+                return Ok(done);
+            }
+            stream.consume(block * rows.stride);
+            done += block as u64;
+        }
+    }
+
+    /// Adds the face of some vertices, all in range.
+    fn push(&mut self, corners: &[u32]) {
+        match *corners {
+            [a, b, c] => self.triangles.push([a, b, c]),
+            [a, b, c, d] => self.quads.push([a, b, c, d]),
+            [first, ref rest @ ..] if rest.len() > 3 => {
+                self.polygons += 1;
+                self.triangles.extend(rest.windows(2).map(|pair| [first, pair[0], pair[1]]));
+            }
+            _ => self.degenerate += 1,
+        }
+    }
+
+    /// Reads a table of strips: of the vertices a, b, c, d, e the triangles abc, cbd, cde, so that all have one
+    /// orientation. Triangles that repeat a vertex only join strips, and are left out.
+    pub fn read_strips<'a>(&mut self, element: &Element, numbers: &mut impl Numbers<'a>) -> Result<(), PlyError> {
+        let Some(column) = element.indices() else {
+            return numbers.skip_element(element);
+        };
+        for row in 0..element.count {
+            for (i, property) in element.properties.iter().enumerate() {
+                match property.list {
+                    Some(count_type) if i == column => {
+                        let count = numbers.list_length(count_type, property.ty, &element.name)?;
+                        self.read_strip(count, property.ty, row, numbers)?;
+                    }
+                    Some(_) | None => numbers.skip_property(property, &element.name)?,
+                }
+            }
+        }
+        Ok(())
+    }
+
+    fn read_strip<'a>(
+        &mut self,
+        count: u64,
+        ty: Scalar,
+        row: u64,
+        numbers: &mut impl Numbers<'a>,
+    ) -> Result<(), PlyError> {
+        let (mut a, mut b, mut length) = (0, 0, 0_u64);
+        for _ in 0..count {
+            let place = numbers.place();
+            let index = numbers.integer(ty, "tristrips")?;
+            if index == RESTART {
+                length = 0;
+                continue;
+            }
+            let c = self.check(index, row, place)?;
+            if length >= 2 && a != b && b != c && c != a {
+                self.triangles.push(if length % 2 == 0 { [a, b, c] } else { [b, a, c] });
+            }
+            (a, b) = (b, c);
+            length += 1;
+        }
+        Ok(())
+    }
+
+    #[inline]
+    fn check(&self, index: i64, face: u64, place: Place) -> Result<u32, PlyError> {
+        match u32::try_from(index) {
+            Ok(i) if u64::from(i) < self.vertices => Ok(i),
+            _ => Err(PlyError::IndexOutOfRange { place, face, index, vertices: self.vertices }),
+        }
+    }
+
+    /// Hands all faces to the mesh, whose vertices are complete.
+    pub fn finish(mut self, mesh: &mut PlyMesh) {
+        // Memory was taken for as many triangles as there are faces.
+        self.triangles.shrink_to_fit();
+        mesh.triangles = self.triangles;
+        mesh.quads = self.quads;
+        if self.polygons > 0 {
+            let n = self.polygons;
+            mesh.warnings.push(format!("{n} faces have more than four vertices; each becomes a fan of triangles"));
+        }
+        if self.degenerate > 0 {
+            mesh.warnings.push(format!("{} faces have less than three vertices and are left out", self.degenerate));
+        }
+        if mesh.triangles.is_empty() && mesh.quads.is_empty() {
+            mesh.warnings.push("there are no faces".to_owned());
+        }
+        drop_broken_vertices(mesh);
+    }
+}
+
+/// Faces that are read one by one before another run of triangles is tried.
+const SLOW_RUN: u64 = 256;
+
+/// Rows of a fixed size if they are triangles: one list `uchar, int`, and numbers around it.
+#[derive(Clone, Copy)]
+struct TriangleRows {
+    /// Of the list in the row (bytes).
+    offset: usize,
+    /// Of the row (bytes).
+    stride: usize,
+}
+
+impl TriangleRows {
+    /// Bytes of the list: a length of one byte, three indices of four.
+    const LIST: usize = 13;
+
+    fn of(element: &Element, column: usize) -> Option<Self> {
+        let list = &element.properties[column];
+        let is_common = list.list == Some(Scalar::U8) && matches!(list.ty, Scalar::I32 | Scalar::U32);
+        let others = element.properties.iter().filter(|p| p.list.is_some()).count();
+        let offset = element.properties[..column].iter().map(|p| p.ty.size()).sum();
+        let stride = element.min_stride() - 1 + Self::LIST;
+        (is_common && others == 1 && stride <= MAX_FILL).then_some(TriangleRows { offset, stride })
+    }
+}
+
+/// Removes faces of vertices that are not finite, and replaces such vertices by the origin.
+fn drop_broken_vertices(mesh: &mut PlyMesh) {
+    // A sum of products with zero is zero only if all are finite: one pass without branches finds the common case.
+    let probe: f32 = mesh.positions.iter().map(|p| (p.x + p.y + p.z) * 0.0).sum();
+    if probe == 0.0 {
+        return;
+    }
+    let broken: Vec<bool> = mesh.positions.iter().map(|p| !p.is_finite()).collect();
+    let count = broken.iter().filter(|&&b| b).count();
+    if count == 0 {
+        return;
+    }
+    let faces = mesh.triangles.len() + mesh.quads.len();
+    mesh.triangles.retain(|t| t.iter().all(|&v| !broken[v as usize]));
+    mesh.quads.retain(|q| q.iter().all(|&v| !broken[v as usize]));
+    mesh.positions.iter_mut().filter(|p| !p.is_finite()).for_each(|p| *p = Vec3::ZERO);
+    let left_out = faces - mesh.triangles.len() - mesh.quads.len();
+    mesh.warnings.push(format!("{count} vertices are not finite; {left_out} faces of them are left out"));
+}

@@ -1,0 +1,222 @@
+//! Stanford PLY meshes: ASCII and binary of both byte orders, plain or gzip.
+//!
+//! The file is streamed through a small buffer: that takes less time than mapping it (no page faults), needs no
+//! `unsafe`, and costs no memory but the mesh. Counts in the header are compared with the size of the file before
+//! anything is allocated, and every index is checked. Faces of three vertices become triangles, of four quads (bilinear
+//! patches in pbrt), of more a fan of triangles; triangle strips are taken apart.
+//!
+//! Reading order: `header`, `stream`, `numbers`, `vertices`, `faces`.
+
+mod faces;
+mod header;
+mod numbers;
+mod stream;
+mod vertices;
+
+use flate2::read::MultiGzDecoder;
+use header::{Encoding, Header};
+use lumiris_numbers::math::{Vec2, Vec3};
+use numbers::{Ascii, Binary, Numbers};
+use std::fmt;
+use std::fs::File;
+use std::io::{self, Read};
+use std::path::{Path, PathBuf};
+use stream::Stream;
+
+/// The first bytes of a gzip file.
+const GZIP_MAGIC: [u8; 2] = [0x1f, 0x8b];
+
+/// What a PLY file holds.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub struct PlyMesh {
+    /// Vertex positions, all finite; there is capacity for one more.
+    pub positions: Vec<Vec3>,
+    /// Normals as written, one per vertex, or empty.
+    pub normals: Vec<Vec3>,
+    /// Texture coordinates, one per vertex, or empty.
+    pub uvs: Vec<Vec2>,
+    /// Faces of three vertices, fans of larger ones, and strips; indices are in range.
+    pub triangles: Vec<[u32; 3]>,
+    /// Faces of four vertices in the order of the file, which is around the face; indices are in range.
+    /// A bilinear patch p00, p10, p01, p11 has the corners 0, 1, 3, 2 of it.
+    pub quads: Vec<[u32; 4]>,
+    /// What was odd.
+    pub warnings: Vec<String>,
+}
+
+/// A place in a file.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Place {
+    /// Line of a text, from 1.
+    Line(u64),
+    /// Offset from the start (bytes), after decompression.
+    Byte(u64),
+}
+
+impl fmt::Display for Place {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        match self {
+            Place::Line(line) => write!(f, "line {line}"),
+            Place::Byte(byte) => write!(f, "byte {byte}"),
+        }
+    }
+}
+
+/// Why a PLY file cannot be used.
+#[derive(Debug, thiserror::Error)]
+pub enum PlyError {
+    /// It cannot be read, or not be decompressed.
+    #[error("{}{source}", if path.as_os_str().is_empty() { String::new() } else { format!("{}: ", path.display()) })]
+    Io {
+        /// The file; empty if bytes were given.
+        path: PathBuf,
+        /// The reason.
+        source: io::Error,
+    },
+    /// The header is broken, or does not describe a mesh.
+    #[error("line {line} of the header: {message}")]
+    Header {
+        /// Line, from 1.
+        line: u64,
+        /// What is wrong.
+        message: String,
+    },
+    /// The header announces more than the file can hold.
+    #[error(
+        "{count} of `{element}` are announced, which takes at least {needed} bytes, but at most {available} follow the \
+         header"
+    )]
+    Counts {
+        /// Name of the element.
+        element: String,
+        /// Rows of it.
+        count: u64,
+        /// Least size of it and of the elements before it (bytes).
+        needed: u64,
+        /// Largest size of what follows the header (bytes).
+        available: u64,
+    },
+    /// The file ends too early.
+    #[error("the file ends at {place}, inside `{element}`")]
+    Truncated {
+        /// Where it ends, or where a list begins that does not fit.
+        place: Place,
+        /// What should have followed.
+        element: String,
+    },
+    /// A word of a text is no number of the kind that is expected.
+    #[error("{place}: `{word}` in `{element}`, where {expected} is expected")]
+    Number {
+        /// Where it is.
+        place: Place,
+        /// The word.
+        word: String,
+        /// What it belongs to.
+        element: String,
+        /// What is expected.
+        expected: &'static str,
+    },
+    /// A list has a negative length.
+    #[error("{place}: a list of {length} items in `{element}`")]
+    ListLength {
+        /// Where it begins.
+        place: Place,
+        /// Its length.
+        length: i64,
+        /// What it belongs to.
+        element: String,
+    },
+    /// A face refers to a vertex that does not exist.
+    #[error("{place}: face {face} refers to vertex {index}, but there are {vertices} vertices")]
+    IndexOutOfRange {
+        /// Where the index is, or the face.
+        place: Place,
+        /// The face, from 0; of strips, the strip.
+        face: u64,
+        /// The index; −1 if it is no whole number.
+        index: i64,
+        /// Number of vertices.
+        vertices: u64,
+    },
+}
+
+impl PlyError {
+    fn header(line: u64, message: impl Into<String>) -> Self {
+        PlyError::Header { line, message: message.into() }
+    }
+}
+
+impl From<io::Error> for PlyError {
+    fn from(source: io::Error) -> Self {
+        PlyError::Io { path: PathBuf::new(), source }
+    }
+}
+
+/// Reads a PLY file, which may be compressed by gzip.
+pub fn read_ply(path: &Path) -> Result<PlyMesh, PlyError> {
+    open(path).map_err(PlyError::from).and_then(|(file, size)| read_any(file, size)).map_err(|error| match error {
+        PlyError::Io { source, .. } => PlyError::Io { path: path.to_owned(), source },
+        other => other,
+    })
+}
+
+/// Reads the bytes of a PLY file, which may be compressed by gzip.
+pub fn parse_ply(bytes: &[u8]) -> Result<PlyMesh, PlyError> {
+    read_any(bytes, bytes.len() as u64)
+}
+
+fn open(path: &Path) -> io::Result<(File, u64)> {
+    // Opening a pipe would wait for a writer, and reading a folder gives an unclear message.
+    let metadata = std::fs::metadata(path)?;
+    if !metadata.is_file() {
+        return Err(io::Error::new(io::ErrorKind::InvalidInput, "is not a regular file"));
+    }
+    Ok((File::open(path)?, metadata.len()))
+}
+
+/// Reads from `reader`, which yields `size` bytes.
+fn read_any(mut reader: impl Read, size: u64) -> Result<PlyMesh, PlyError> {
+    let mut magic = Vec::new();
+    reader.by_ref().take(2).read_to_end(&mut magic)?;
+    let is_gzip = magic == GZIP_MAGIC;
+    let mut whole = io::Cursor::new(magic).chain(reader);
+    if is_gzip {
+        let mut decoder = MultiGzDecoder::new(whole);
+        let mut stream = Stream::inflated(&mut decoder, size);
+        let mesh = read_stream(&mut stream)?;
+        stream.drain()?;
+        Ok(mesh)
+    } else {
+        read_stream(&mut Stream::new(&mut whole, size))
+    }
+}
+
+fn read_stream(stream: &mut Stream<'_>) -> Result<PlyMesh, PlyError> {
+    let header = header::read_header(stream)?;
+    header.check_counts(stream.remaining_limit())?;
+    match header.encoding {
+        Encoding::Ascii => read_body(&header, &mut Ascii(stream)),
+        Encoding::LittleEndian => read_body(&header, &mut Binary::<false>(stream)),
+        Encoding::BigEndian => read_body(&header, &mut Binary::<true>(stream)),
+    }
+}
+
+fn read_body<'a>(header: &Header, numbers: &mut impl Numbers<'a>) -> Result<PlyMesh, PlyError> {
+    let vertices =
+        header.element("vertex").ok_or_else(|| PlyError::header(header.lines, "there is no `vertex` element"))?;
+    let mut mesh = PlyMesh::default();
+    let mut faces = faces::Faces::new(vertices.count);
+    for element in &header.elements {
+        match element.name.as_str() {
+            "vertex" => vertices::read(element, numbers, &mut mesh)?,
+            "face" => faces.read(element, numbers)?,
+            "tristrips" => faces.read_strips(element, numbers)?,
+            _ => numbers.skip_element(element)?,
+        }
+    }
+    faces.finish(&mut mesh);
+    Ok(mesh)
+}
+
+#[cfg(test)]
+mod tests;

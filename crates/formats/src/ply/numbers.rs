@@ -1,0 +1,293 @@
+//! Numbers of the three encodings, one after another.
+
+use super::header::{Element, Property, Scalar};
+use super::stream::Stream;
+use super::{Place, PlyError};
+use crate::number::{NumberError, parse_f32, parse_i32};
+
+/// Longest word of a text (bytes).
+const MAX_WORD: usize = 256;
+
+/// Which byte of a number comes first.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum ByteOrder {
+    /// The low one.
+    Little,
+    /// The high one.
+    Big,
+}
+
+/// A source of numbers of given types. `element` is named in errors.
+pub trait Numbers<'a> {
+    /// The order of bytes; `None` for texts.
+    const ORDER: Option<ByteOrder>;
+
+    /// The bytes that the numbers are made of.
+    fn stream(&mut self) -> &mut Stream<'a>;
+
+    /// The next number.
+    fn float(&mut self, ty: Scalar, element: &str) -> Result<f32, PlyError>;
+
+    /// The next number, which should be whole.
+    fn integer(&mut self, ty: Scalar, element: &str) -> Result<i64, PlyError>;
+
+    /// Passes over `count` numbers.
+    fn skip(&mut self, ty: Scalar, count: u64, element: &str) -> Result<(), PlyError>;
+
+    /// Where the next number is.
+    fn place(&mut self) -> Place;
+
+    /// Least size of a number (bytes).
+    fn size(ty: Scalar) -> u64;
+
+    /// The length of a list, which fits into the rest of the file.
+    fn list_length(&mut self, count_type: Scalar, ty: Scalar, element: &str) -> Result<u64, PlyError> {
+        let place = self.place();
+        let length = self.integer(count_type, element)?;
+        let element = element.to_owned();
+        let Ok(count) = u64::try_from(length) else {
+            return Err(PlyError::ListLength { place, length, element });
+        };
+        // A text may lack the blank after its last number.
+        if count.saturating_mul(Self::size(ty)) > self.stream().remaining_limit() + 1 {
+            return Err(PlyError::Truncated { place, element });
+        }
+        Ok(count)
+    }
+
+    /// Passes over a column of a row.
+    fn skip_property(&mut self, property: &Property, element: &str) -> Result<(), PlyError> {
+        let count = match property.list {
+            None => 1,
+            Some(count_type) => self.list_length(count_type, property.ty, element)?,
+        };
+        self.skip(property.ty, count, element)
+    }
+
+    /// Passes over all rows.
+    fn skip_element(&mut self, element: &Element) -> Result<(), PlyError> {
+        if element.properties.is_empty() {
+            return Ok(());
+        }
+        for _ in 0..element.count {
+            for property in &element.properties {
+                self.skip_property(property, &element.name)?;
+            }
+        }
+        Ok(())
+    }
+}
+
+/// The number of type `$ty` at `$at`.
+macro_rules! number_at {
+    ($ty:ty, $big:expr, $bytes:expr, $at:expr) => {{
+        let mut raw = [0; size_of::<$ty>()];
+        raw.copy_from_slice(&$bytes[$at..$at + size_of::<$ty>()]);
+        if $big { <$ty>::from_be_bytes(raw) } else { <$ty>::from_le_bytes(raw) }
+    }};
+}
+pub(super) use number_at;
+
+/// The number of type `ty` at the offset `at`, as a float.
+#[inline]
+pub fn float_at<const BIG: bool>(bytes: &[u8], at: usize, ty: Scalar) -> f32 {
+    match ty {
+        Scalar::F32 => number_at!(f32, BIG, bytes, at),
+        Scalar::F64 => number_at!(f64, BIG, bytes, at) as f32,
+        Scalar::I8 | Scalar::U8 | Scalar::I16 | Scalar::U16 | Scalar::I32 | Scalar::U32 => {
+            integer_at::<BIG>(bytes, at, ty) as f32
+        }
+    }
+}
+
+#[inline]
+fn integer_at<const BIG: bool>(bytes: &[u8], at: usize, ty: Scalar) -> i64 {
+    match ty {
+        Scalar::I8 => i64::from(bytes[at] as i8),
+        Scalar::U8 => i64::from(bytes[at]),
+        Scalar::I16 => i64::from(number_at!(i16, BIG, bytes, at)),
+        Scalar::U16 => i64::from(number_at!(u16, BIG, bytes, at)),
+        Scalar::I32 => i64::from(number_at!(i32, BIG, bytes, at)),
+        Scalar::U32 => i64::from(number_at!(u32, BIG, bytes, at)),
+        Scalar::F32 => whole(f64::from(number_at!(f32, BIG, bytes, at))),
+        Scalar::F64 => whole(number_at!(f64, BIG, bytes, at)),
+    }
+}
+
+/// A float that is used as an index; what is no whole number becomes one that is out of range.
+fn whole(value: f64) -> i64 {
+    if value.fract() == 0.0 { value as i64 } else { -1 }
+}
+
+/// Numbers as bytes; the high one first if `BIG`.
+pub struct Binary<'s, 'a, const BIG: bool>(pub &'s mut Stream<'a>);
+
+impl<'a, const BIG: bool> Numbers<'a> for Binary<'_, 'a, BIG> {
+    const ORDER: Option<ByteOrder> = Some(if BIG { ByteOrder::Big } else { ByteOrder::Little });
+
+    #[inline]
+    fn stream(&mut self) -> &mut Stream<'a> {
+        self.0
+    }
+
+    #[inline]
+    fn float(&mut self, ty: Scalar, element: &str) -> Result<f32, PlyError> {
+        let value = float_at::<BIG>(self.0.require(ty.size(), element)?, 0, ty);
+        self.0.consume(ty.size());
+        Ok(value)
+    }
+
+    #[inline]
+    fn integer(&mut self, ty: Scalar, element: &str) -> Result<i64, PlyError> {
+        let value = integer_at::<BIG>(self.0.require(ty.size(), element)?, 0, ty);
+        self.0.consume(ty.size());
+        Ok(value)
+    }
+
+    fn skip(&mut self, ty: Scalar, count: u64, element: &str) -> Result<(), PlyError> {
+        self.0.skip(count.saturating_mul(ty.size() as u64), element)
+    }
+
+    #[inline]
+    fn place(&mut self) -> Place {
+        Place::Byte(self.0.offset())
+    }
+
+    fn size(ty: Scalar) -> u64 {
+        ty.size() as u64
+    }
+}
+
+/// Numbers as words between blanks; line ends mean nothing, as in most readers.
+pub struct Ascii<'s, 'a>(pub &'s mut Stream<'a>);
+
+impl Ascii<'_, '_> {
+    /// Hands the next word to `parse`, which returns a value and the length of the word.
+    #[inline]
+    fn word<T>(
+        &mut self,
+        element: &str,
+        expected: &'static str,
+        parse: impl Fn(&[u8]) -> Result<(T, usize), NumberError>,
+    ) -> Result<T, PlyError> {
+        self.skip_blanks()?;
+        let bytes = self.0.fill(MAX_WORD)?;
+        match parse(bytes) {
+            // A longer word may be cut by the end of the buffer; other delimiters than blanks do not belong here.
+            Ok((value, length)) if length < MAX_WORD && bytes.get(length).is_none_or(u8::is_ascii_whitespace) => {
+                self.0.consume(length);
+                Ok(value)
+            }
+            Ok(_) | Err(_) => Err(self.wrong_word(element, expected)),
+        }
+    }
+
+    #[inline]
+    fn skip_blanks(&mut self) -> Result<(), PlyError> {
+        loop {
+            let newline = self.0.newline;
+            let bytes = self.0.fill(1)?;
+            let blanks = bytes.iter().position(|b| !b.is_ascii_whitespace()).unwrap_or(bytes.len());
+            let lines = bytes[..blanks].iter().filter(|&&b| b == newline).count();
+            let is_done = blanks < bytes.len() || bytes.is_empty();
+            self.0.line += lines as u64;
+            self.0.consume(blanks);
+            if is_done {
+                return Ok(());
+            }
+        }
+    }
+
+    #[cold]
+    fn wrong_word(&mut self, element: &str, expected: &'static str) -> PlyError {
+        let (place, element) = (Place::Line(self.0.line), element.to_owned());
+        match self.0.fill(MAX_WORD) {
+            Err(error) => error,
+            Ok([]) => PlyError::Truncated { place, element },
+            Ok(bytes) => {
+                let length = word_length(bytes).clamp(1, 40).min(bytes.len());
+                let word = bytes[..length].escape_ascii().to_string();
+                PlyError::Number { place, word, element, expected }
+            }
+        }
+    }
+}
+
+/// Length of the word at the start, at most [`MAX_WORD`].
+fn word_length(bytes: &[u8]) -> usize {
+    bytes.iter().take(MAX_WORD).position(u8::is_ascii_whitespace).unwrap_or(bytes.len().min(MAX_WORD))
+}
+
+/// As [`parse_f32`], and also `nan` and `inf` in their spellings, which exporters write for broken vertices.
+#[inline]
+fn parse_any_f32(bytes: &[u8]) -> Result<(f32, usize), NumberError> {
+    parse_f32(bytes).or_else(|error| odd_f32(&bytes[..word_length(bytes)], error))
+}
+
+#[cold]
+fn odd_f32(word: &[u8], error: NumberError) -> Result<(f32, usize), NumberError> {
+    let name = word.strip_prefix(b"-").or(word.strip_prefix(b"+")).unwrap_or(word).to_ascii_lowercase();
+    let negative = word.starts_with(b"-");
+    let infinity = if negative { f32::NEG_INFINITY } else { f32::INFINITY };
+    match name.as_slice() {
+        _ if error == NumberError::Overflow => Ok((infinity, word.len())),
+        b"inf" | b"infinity" => Ok((infinity, word.len())),
+        name if name.starts_with(b"nan") => Ok((f32::NAN, word.len())),
+        _ => Err(error),
+    }
+}
+
+/// A whole number; one that is written with a point, as some exporters do, is taken too.
+#[inline]
+fn parse_whole(bytes: &[u8]) -> Result<(i64, usize), NumberError> {
+    match parse_i32(bytes) {
+        Ok((value, length)) => Ok((i64::from(value), length)),
+        Err(error) => odd_whole(&bytes[..word_length(bytes)], error),
+    }
+}
+
+#[cold]
+fn odd_whole(word: &[u8], error: NumberError) -> Result<(i64, usize), NumberError> {
+    let text = std::str::from_utf8(word).map_err(|_| error)?;
+    if let Ok(value) = text.parse::<i64>() {
+        return Ok((value, word.len()));
+    }
+    let value = text.parse::<f64>().map_err(|_| error)?;
+    if value.fract() == 0.0 { Ok((value as i64, word.len())) } else { Err(error) }
+}
+
+impl<'a> Numbers<'a> for Ascii<'_, 'a> {
+    const ORDER: Option<ByteOrder> = None;
+
+    #[inline]
+    fn stream(&mut self) -> &mut Stream<'a> {
+        self.0
+    }
+
+    #[inline]
+    fn float(&mut self, _: Scalar, element: &str) -> Result<f32, PlyError> {
+        self.word(element, "a number", parse_any_f32)
+    }
+
+    #[inline]
+    fn integer(&mut self, _: Scalar, element: &str) -> Result<i64, PlyError> {
+        self.word(element, "a whole number", parse_whole)
+    }
+
+    fn skip(&mut self, ty: Scalar, count: u64, element: &str) -> Result<(), PlyError> {
+        for _ in 0..count {
+            self.float(ty, element)?;
+        }
+        Ok(())
+    }
+
+    #[inline]
+    fn place(&mut self) -> Place {
+        Place::Line(self.0.line)
+    }
+
+    fn size(_: Scalar) -> u64 {
+        // A digit and a blank.
+        2
+    }
+}

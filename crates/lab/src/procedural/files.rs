@@ -1,0 +1,62 @@
+//! Content as files.
+
+use super::ply::write_ply;
+use super::sky::{SkyOptions, sky};
+use super::statue::{StatueOptions, statue};
+use lumiris::imaging::oiio::{ImageError, Part, Storage, write_image};
+use std::io;
+use std::path::{Path, PathBuf};
+
+/// What kept content from being made.
+#[derive(Debug, thiserror::Error)]
+pub enum ProceduralError {
+    /// An option is out of range.
+    #[error("{0}")]
+    Option(String),
+    /// A file cannot be written.
+    #[error("cannot write {}: {source}", path.display())]
+    Io {
+        /// The file.
+        path: PathBuf,
+        /// Why.
+        source: io::Error,
+    },
+    /// A picture cannot be written.
+    #[error(transparent)]
+    Image(#[from] ImageError),
+}
+
+/// What was written.
+#[derive(Clone, Copy, Debug)]
+pub struct Written {
+    /// Triangles of the statue.
+    pub triangles: usize,
+}
+
+/// Makes a statue and writes it as PLY.
+pub fn write_statue(path: &Path, options: &StatueOptions) -> Result<Written, ProceduralError> {
+    let mesh = statue(options).map_err(ProceduralError::Option)?;
+    write_ply(path, &mesh).map_err(|source| ProceduralError::Io { path: path.to_owned(), source })?;
+    Ok(Written { triangles: mesh.triangle_count() })
+}
+
+/// Makes a sky and writes it, usually as EXR.
+pub fn write_sky(path: &Path, options: &SkyOptions) -> Result<(), ProceduralError> {
+    let image = sky(options).map_err(ProceduralError::Option)?;
+    let part = Part::linear(image.width, image.height, image.channels, image.data).stored_as(Storage::Float);
+    Ok(write_image(path, &[part])?)
+}
+
+/// Writes files, by name and text, into a folder, which is made if there is none.
+pub(super) fn write_texts(folder: &Path, texts: &[(&str, &str)]) -> Result<(), ProceduralError> {
+    let failed = |path: &Path| {
+        let path = path.to_owned();
+        move |source| ProceduralError::Io { path, source }
+    };
+    std::fs::create_dir_all(folder).map_err(failed(folder))?;
+    for (name, text) in texts {
+        let path = folder.join(name);
+        std::fs::write(&path, text).map_err(failed(&path))?;
+    }
+    Ok(())
+}

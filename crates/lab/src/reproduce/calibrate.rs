@@ -1,0 +1,126 @@
+//! Numbers of samples and proposals for equal time.
+//!
+//! A rendering costs c + P·(M·T1 + N·T2), where P counts shading points. T1 is what a proposal and its weight cost, T2 a
+//! sample: to draw it, to evaluate it, to trace it; the renderer measures both for its own choice. The split is
+//! N = B/(2·T2), M = B/(2·T1) for a time of B per point: M/N = T2/T1 [Talbot 2005, Eq. 4.4]. Then M is corrected until
+//! renderings take as long as those of the baseline.
+
+use super::measure::{Measured, Seconds, Stage, View, turns};
+use super::method::Method;
+use super::{Observer, ReproduceError};
+use lumiris::scene::{Split, StageTimes};
+
+/// Turns of a measurement of times.
+const TURNS: u32 = 3;
+/// Most corrections of the number of proposals.
+const CORRECTIONS: u32 = 4;
+/// Good enough a match of times.
+const MATCH: f64 = 0.01;
+/// Most proposals: the buffers of a batch grow with them.
+const MAX_PROPOSALS: u32 = 1024;
+
+/// Times of the stages, and a split that costs as much as the baseline.
+#[derive(Clone, Copy, Debug)]
+pub struct Calibration {
+    /// T1 and T2 (ns), by the renderer's own measurement.
+    pub times: StageTimes,
+    /// Direct lighting of one point by the baseline (ns).
+    pub budget: f64,
+    /// M and N.
+    pub split: Split,
+    /// Wall-clock seconds of one camera ray per pixel by the baseline.
+    pub seconds: f64,
+}
+
+/// Shading points of a turn of `ris`.
+fn points(m: &Measured) -> f64 {
+    (m.proposals as f64 / f64::from(m.method.proposals) / m.turns().max(1) as f64).max(1.0)
+}
+
+/// N and M for a time per point, of which half goes to samples; at least one sample, and no fewer proposals than samples.
+pub fn equal_halves(budget: f64, times: StageTimes) -> Split {
+    let samples = (0.5 * budget / times.t2).round().max(1.0);
+    let samples = samples.min((budget / (times.t1 + times.t2)).floor().max(1.0));
+    spend_rest(budget, times, samples as u32)
+}
+
+/// The proposals that fit beside a number of samples.
+pub fn spend_rest(budget: f64, times: StageTimes, samples: u32) -> Split {
+    let proposals = ((budget - f64::from(samples) * times.t2) / times.t1).round().clamp(1.0, f64::from(MAX_PROPOSALS));
+    Split { samples, proposals: (proposals as u32).max(samples) }
+}
+
+/// Measures times, and finds a split that costs what the baseline costs, within about a percent.
+pub fn calibrate(stage: &mut Stage, base: &Method, observer: Observer<'_>) -> Result<Calibration, ReproduceError> {
+    // Times, and that of the baseline
+    let default = StageTimes { t1: 100.0, t2: 100.0 };
+    let times = stage.stage_times()?.unwrap_or(default);
+    let guess = Method::ris(4 * base.samples, base.samples.div_ceil(2)).stratified();
+    let pilot = turns(stage, &[*base, guess], View::Centres, 1, 0..TURNS, observer)?;
+    let busy = pilot[0].median_seconds(|s| s.processor / s.stages().max(1e-12)).min(1.0);
+    let budget = pilot[0].median_seconds(Seconds::direct) * busy * 1e9 / points(&pilot[1]);
+    let seconds = pilot[0].median_seconds(|s| s.wall);
+    let mut found = Calibration { times, budget, split: equal_halves(budget, times), seconds };
+
+    // The split in turns with the baseline; the number of proposals changes until times match
+    for step in 0..CORRECTIONS {
+        let Split { samples, proposals } = found.split;
+        let method = Method::ris(proposals, samples).stratified();
+        let range = (step + 1) * TURNS..(step + 2) * TURNS;
+        let pair = turns(stage, &[*base, method], View::Centres, 1, range, observer)?;
+        let excess = pair[1].time_ratio(&pair[0]) - 1.0;
+        if excess.abs() < MATCH {
+            break;
+        }
+        // The excess is a part of the whole time of the baseline; a proposal takes T1 of it at every point.
+        let surplus = excess * pair[0].median_seconds(|s| s.processor) * 1e9 / (points(&pair[1]) * found.times.t1);
+        let corrected = (f64::from(proposals) - surplus).round().clamp(f64::from(samples), f64::from(MAX_PROPOSALS));
+        found.split.proposals = corrected as u32;
+    }
+    Ok(found)
+}
+
+/// The number of samples of `method` with which a rendering of `spp` camera rays takes as long as one of the baseline.
+pub fn match_samples(
+    stage: &mut Stage,
+    base: &Method,
+    method: &Method,
+    spp: u32,
+    observer: Observer<'_>,
+) -> Result<u32, ReproduceError> {
+    let mut samples = method.samples;
+    for step in 0..2 {
+        let tried = Method { samples, proposals: samples, ..*method };
+        let range = (step + 8) * TURNS..(step + 9) * TURNS;
+        let pair = turns(stage, &[*base, tried], View::Centres, spp, range, observer)?;
+        // What an estimate takes grows with its samples, camera rays and materials do not
+        let direct = pair[1].median_seconds(|s| s.direct() / s.stages().max(1e-12)).clamp(0.1, 1.0);
+        let ratio = pair[1].time_ratio(&pair[0]);
+        if (ratio - 1.0).abs() < MATCH {
+            break;
+        }
+        let factor = 1.0 - (1.0 - 1.0 / ratio.max(1e-3)) / direct;
+        samples = (f64::from(samples) * factor.clamp(0.25, 2.0)).round().max(2.0) as u32;
+    }
+    Ok(samples)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn halves_of_the_time_go_to_proposals_and_to_samples() {
+        let times = StageTimes { t1: 10.0, t2: 160.0 };
+        // The paper's case: 20 samples of one proposal each.
+        let split = equal_halves(20.0 * 170.0, times);
+        assert_eq!(split.samples, 11);
+        assert_eq!(split.proposals, 164);
+        let spent = |s: Split| f64::from(s.proposals) * times.t1 + f64::from(s.samples) * times.t2;
+        assert!((spent(split) - 3400.0).abs() < times.t1);
+        // One sample at least; proposals as dear as samples leave M = N.
+        assert_eq!(equal_halves(100.0, times).samples, 1);
+        assert_eq!(equal_halves(2000.0, StageTimes { t1: 100.0, t2: 100.0 }), Split { samples: 10, proposals: 10 });
+        assert_eq!(equal_halves(2000.0, StageTimes { t1: 100.0, t2: 10.0 }), Split { samples: 18, proposals: 18 });
+    }
+}

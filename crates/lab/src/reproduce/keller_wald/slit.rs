@@ -1,0 +1,201 @@
+//! A room that is lit through a slit: where importance puts photons, and what the cut-off loses [Keller and Wald 2000, Fig. 4].
+
+use super::super::figure::{Figure, Summary};
+use super::super::measure::{Estimate, Stage, luminance};
+use super::super::page::{Block, Cell, Table};
+use super::super::pictures::{gain, significant};
+use super::super::{ReproduceError, scaled};
+use super::above::Area;
+use super::maps::{Cloud, Maps, Print, clouds, plan, positions, prints, speed, trace};
+use super::seen::{Seen, seen};
+use super::{SHAPE, Setup};
+use lumiris::photons::{Importance, ImportanceSettings, Tracing, Unimportant, Want, trace_importons};
+use lumiris::scene::World;
+use lumiris_numbers::estimators::stats::Welford;
+use lumiris_numbers::math::Vec3;
+use serde_json::{Value, json};
+use std::time::{Duration, Instant};
+
+/// ε of the floor and of the cut-off.
+const LEAST: f32 = 0.05;
+/// Maps of each kind, with seeds of their own.
+const SEEDS: u32 = 4;
+/// Fewest photons of a map, and most: usual and quick.
+const FEWEST: f64 = 500.0;
+const MOST: [f64; 2] = [200_000.0, 10_000.0];
+/// Photons of an estimate.
+const COUNT: u32 = 60;
+/// Most pixels along an edge: usual and quick.
+const SIZE: [u32; 2] = [240, 96];
+/// Part of the time for photons.
+const PHOTON_SHARE: f64 = 0.7;
+const IMPORTONS: u64 = 100_000;
+/// Part of the camera rays whose importance may be less than that of p = 1: a few see into the other room, or corners.
+const QUANTILE: f32 = 0.1;
+/// The room with the camera.
+const ROOM: Area = Area { low: [-4.1, -2.1], high: [-0.11, 2.1] };
+
+/// A way to deposit photons, and what it gave.
+struct Row {
+    name: &'static str,
+    id: &'static str,
+    /// The map of the first seed, and its picture.
+    maps: Maps,
+    picture: Vec<[f32; 3]>,
+    in_room: u64,
+    /// Mean luminance of the picture over seeds.
+    mean: Estimate,
+}
+
+/// Measures it within about `time`.
+pub fn run(setup: &Setup<'_>, time: Duration) -> Result<Figure, ReproduceError> {
+    let start = Instant::now();
+    (setup.observer.say)("Slit …");
+    let size = setup.size.min(SIZE[usize::from(setup.options.quick)]);
+    let stage = Stage::load(&setup.scenes.join("slit.pbrt"), scaled(SHAPE, size), setup.options.threads)?;
+    let (world, size) = (stage.world(), stage.size());
+    // What the slit shows of the other room is no part of this one
+    let in_this_room = |s: Seen| Some(s).filter(|s| ROOM.holds(s.p));
+    let seen: Vec<Option<Seen>> = seen(world).into_iter().map(|s| s.and_then(in_this_room)).collect();
+    let settings =
+        ImportanceSettings { trajectories: IMPORTONS, seed: 1, quantile: QUANTILE, ..ImportanceSettings::default() };
+    let floor = ImportanceSettings { unimportant: Unimportant::Floor(LEAST), ..settings };
+    let cut = ImportanceSettings { unimportant: Unimportant::CutOff(LEAST), ..settings };
+    let importance = |s: &ImportanceSettings| setup.pool.install(|| trace_importons(world, s));
+    let (floor, cut) = (importance(&floor)?, importance(&cut)?);
+
+    // As many photons as fit
+    let [by_floor, _] = speed(setup, world, &Tracing::default(), Some(&floor))?;
+    let [by_cut, _] = speed(setup, world, &Tracing::default(), Some(&cut))?;
+    let each = f64::from(SEEDS) * (1.0 / by_floor.max(1.0) + 2.0 / by_cut.max(1.0));
+    let left = time.saturating_sub(start.elapsed()).as_secs_f64() * PHOTON_SHARE;
+    let photons = (left / each).clamp(FEWEST, MOST[usize::from(setup.options.quick)]) as u64;
+    (setup.observer.say)(&format!("  {} × {} pixels, {photons} photons, {SEEDS} maps of each kind", size[0], size[1]));
+    let of = |name, id, importance| row(setup, (world, &seen), (name, id), importance, photons);
+    let rows = [
+        of("standard map", "standard", None)?,
+        of("by importance, p ≥ ε: unbiased", "floor", Some(&floor))?,
+        of("by importance, cut off at p < ε: biased", "cut-off", Some(&cut))?,
+    ];
+    figure(setup, (world, size), &floor, &rows)
+}
+
+fn row(
+    setup: &Setup<'_>,
+    (world, seen): (&World, &[Option<Seen>]),
+    (name, id): (&'static str, &'static str),
+    importance: Option<&Importance>,
+    photons: u64,
+) -> Result<Row, ReproduceError> {
+    let want = Want::Stored { global: photons, most_trajectories: photons.saturating_mul(2000) };
+    let pixels = seen.iter().flatten().count().max(1) as f64;
+    let mut means = Welford::new();
+    let mut first = None;
+    for seed in 1..=SEEDS {
+        let maps = trace(setup, world, &Tracing { seed, ..Tracing::default() }, importance, want)?;
+        let picture = maps.picture(setup, seen, COUNT);
+        means.add(picture.iter().map(|p| luminance(p.map(f64::from))).sum::<f64>() / pixels);
+        first.get_or_insert((maps, picture));
+    }
+    let (maps, picture) = first.expect("there is a first seed");
+    let mean = Estimate { value: means.mean(), error: means.standard_error() };
+    let in_room = ROOM.count(&maps.positions());
+    Ok(Row { name, id, maps, picture, in_room, mean })
+}
+
+/// Mean of a row over that of another, less 1.
+fn bias(row: &Row, base: &Row) -> Estimate {
+    let value = row.mean.value / base.mean.value.max(1e-300);
+    let relative = |e: Estimate| e.error / e.value.max(1e-300);
+    Estimate { value: value - 1.0, error: value * relative(row.mean).hypot(relative(base.mean)) }
+}
+
+fn percent(e: Estimate) -> String {
+    format!("{:+.1} ± {:.1} %", e.value * 100.0, e.error * 100.0)
+}
+
+fn figure(
+    setup: &Setup<'_>,
+    (world, size): (&World, [u32; 2]),
+    importance: &Importance,
+    rows: &[Row; 3],
+) -> Result<Figure, ReproduceError> {
+    let mut blocks = vec![Block::Text(format!(
+        "The room on the left has the camera and no light; the one on the right has a light. From above: importons, and the same number of \
+         photons in three maps: all that arrive, by importance with probabilities of at least ε = {LEAST}, and without those whose \
+         probability is below ε."
+    ))];
+    let cloud = |name: &str, title: &str, points: Vec<Vec3>| {
+        let caption = format!("{} points, {} in the room with the camera", points.len(), ROOM.count(&points));
+        Cloud { name: format!("slit-above-{name}"), title: title.to_owned(), caption, points }
+    };
+    let mut list = vec![cloud("importons", "importons", positions(importance.map()).collect())];
+    list.extend(rows.iter().map(|r| cloud(r.id, r.name, r.maps.positions())));
+    blocks.extend(clouds(setup, &plan(setup, world), &list)?);
+    let list: Vec<Print<'_>> = (rows.iter())
+        .map(|r| Print {
+            name: format!("slit-{}", r.id),
+            title: r.name.to_owned(),
+            caption: format!("{} photons in the room", r.in_room),
+            size,
+            radiance: &r.picture,
+        })
+        .collect();
+    blocks.push(prints(setup, gain(&rows[1].picture), &list)?);
+    blocks.push(Block::Table(table(rows)));
+
+    let loss = bias(&rows[2], &rows[1]);
+    let share = |r: &Row| r.in_room as f64 / r.maps.stored().max(1) as f64;
+    Ok(Figure {
+        id: "slit",
+        title: "Figure 4: a room that is lit through a slit",
+        summary: Summary {
+            paper: "photons “only where they are important”, “hardly perceivable” bias".to_owned(),
+            target: "pictures, counts of photons in the visible room, bias of the cut-off form".to_owned(),
+            measured: format!(
+                "in the visible room {:.1} % → {:.1} % (ε) and {:.1} % (cut-off) of the photons; mean of the cut-off form {}",
+                share(&rows[0]) * 100.0,
+                share(&rows[1]) * 100.0,
+                share(&rows[2]) * 100.0,
+                percent(loss)
+            ),
+            reached: share(&rows[1]) > share(&rows[0]) && share(&rows[2]) > share(&rows[1]),
+            reason: format!(
+                "{} trajectories for as many photons as {}",
+                rows[2].maps.trajectories, rows[0].maps.trajectories
+            ),
+        },
+        also: Vec::new(),
+        blocks,
+        numbers: json!({
+            "size": size, "epsilon": LEAST, "seeds": SEEDS, "nearest": COUNT,
+            "maps": rows.iter().map(|r| row_json(r, &rows[1])).collect::<Vec<Value>>(),
+        }),
+    })
+}
+
+fn table(rows: &[Row; 3]) -> Table {
+    let header =
+        ["map", "photons", "in the visible room", "trajectories", "s", "mean luminance", "against the unbiased map"];
+    let mut table = Table::new(&header);
+    for r in rows {
+        let cells = [
+            r.maps.stored().to_string(),
+            r.in_room.to_string(),
+            r.maps.trajectories.to_string(),
+            significant(r.maps.seconds),
+            format!("{} ± {}", significant(r.mean.value), significant(r.mean.error)),
+            percent(bias(r, &rows[1])),
+        ];
+        table.row(std::iter::once(Cell::text(r.name)).chain(cells.map(Cell::number)));
+    }
+    table
+}
+
+fn row_json(r: &Row, unbiased: &Row) -> Value {
+    let b = bias(r, unbiased);
+    json!({
+        "name": r.id, "photons": r.maps.stored(), "photons_in_room": r.in_room, "trajectories": r.maps.trajectories,
+        "seconds": r.maps.seconds, "mean": r.mean, "bias": { "value": b.value, "standard_error": b.error },
+    })
+}

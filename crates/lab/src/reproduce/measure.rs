@@ -1,0 +1,460 @@
+//! Methods in turns on one scene: variance and time of each, in the same run.
+//!
+//! A *turn* renders the picture once with each method, each with its own seed; the order of the methods moves on by one
+//! from turn to turn, so that a machine that slows down slows all of them. The variance of a method is that of its
+//! pixel estimates over the turns (luminance; unbiased; no reference picture is needed), averaged over pixels. Its time is
+//! the processor time of the rendering over all threads, which does not count what else the machine does meanwhile; times of
+//! two methods are compared turn by turn: the median of the ratios. Camera rays pass through pixel centres, so that the variance is that of lighting and not of antialiasing.
+
+use super::method::Method;
+use super::{Observer, ReproduceError};
+use lumiris::accel::{Accel, AccelStats, Bvh, Coherence, Hit, RayBatch};
+use lumiris::film::Film;
+use lumiris::film::filter::PixelFilter;
+use lumiris::import::{LoadOptions, load};
+use lumiris::lights::LightHints;
+use lumiris::render::plan::prepare;
+use lumiris::render::{RenderError, RenderSettings, Rendering, render};
+use lumiris::scene::{AccelKind, Proposals, StageTimes, Strata, World};
+use lumiris_numbers::estimators::stats::{Welford, z_test};
+use rustix::time::{ClockId, clock_gettime};
+use serde::Serialize;
+use std::path::Path;
+use std::sync::Arc;
+use std::sync::atomic::{AtomicBool, Ordering};
+use std::time::Duration;
+
+/// A ray tracer whose shadows can be turned off.
+struct Shadows {
+    inner: Box<dyn Accel>,
+    cast: Arc<AtomicBool>,
+}
+
+impl Accel for Shadows {
+    fn intersect(&self, rays: &RayBatch, coherence: Coherence, hits: &mut Vec<Option<Hit>>) {
+        self.inner.intersect(rays, coherence, hits);
+    }
+
+    fn occluded(&self, rays: &RayBatch, coherence: Coherence, occluded: &mut Vec<bool>) {
+        if self.cast.load(Ordering::Relaxed) {
+            self.inner.occluded(rays, coherence, occluded);
+        } else {
+            occluded.clear();
+            occluded.resize(rays.len(), false);
+        }
+    }
+
+    fn stats(&self) -> AccelStats {
+        self.inner.stats()
+    }
+}
+
+/// Half the edge of the square around the pixel's centre through which camera rays pass, in pixels.
+const CENTRE: f32 = 1e-3;
+
+/// A scene, ready to be rendered by many methods.
+pub struct Stage {
+    world: World,
+    shadows: Arc<AtomicBool>,
+    threads: Option<usize>,
+    /// Bounces that the scene file asks for.
+    depth: u32,
+}
+
+/// What a picture shall show.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum View {
+    /// Rays through the centres of pixels.
+    Centres,
+    /// Rays all over each pixel.
+    Antialiased,
+    /// Rays through the centres, and light that nothing hides.
+    Unshadowed,
+}
+
+impl Stage {
+    /// Loads a scene for a picture of `size` (width, height) pixels.
+    pub fn load(path: &Path, size: [u32; 2], threads: Option<usize>) -> Result<Self, ReproduceError> {
+        let options = LoadOptions { resolution: Some(size), crop: None };
+        let loaded = load(path, &options).map_err(|report| ReproduceError::Scene { path: path.to_owned(), report })?;
+        let mut world = World::new(loaded.scene, AccelKind::Embree, None)?;
+        let cast = Arc::new(AtomicBool::new(true));
+        let nothing: Box<dyn Accel> = Box::new(Bvh::new(Arc::default(), None));
+        let inner = std::mem::replace(&mut world.accel, nothing);
+        world.accel = Box::new(Shadows { inner, cast: Arc::clone(&cast) });
+        let depth = world.scene.integrator.max_depth;
+        Ok(Stage { world, shadows: cast, threads, depth })
+    }
+
+    /// The scene.
+    pub fn world(&self) -> &World {
+        &self.world
+    }
+
+    /// Says which lights are seen from where, until it says otherwise.
+    pub fn set_light_hints(&mut self, hints: Option<LightHints>) {
+        self.world.scene.lights.set_hints(hints);
+    }
+
+    /// Size of the picture.
+    pub fn size(&self) -> [u32; 2] {
+        self.world.scene.film.resolution
+    }
+
+    /// Triangles and lights, for the page.
+    pub fn facts(&self) -> (usize, usize) {
+        let scene = &self.world.scene;
+        (scene.geometry.primitive_counts().0, scene.lights.lights.len())
+    }
+
+    /// T1 and T2 as the renderer measures them for its own choice; `None` if nothing in the picture is lit.
+    pub fn stage_times(&mut self) -> Result<Option<StageTimes>, ReproduceError> {
+        Method::ris(1, 1).stratified().strata(Strata::Systematic).apply(&mut self.world, self.depth);
+        self.world.scene.integrator.ris.proposals = Proposals::Auto;
+        self.world.scene.integrator.ris.stage_times = None;
+        self.shadows.store(true, Ordering::Relaxed);
+        Ok(prepare(&mut self.world, self.threads, false).map_err(RenderError::from)?.map(|plan| plan.times))
+    }
+
+    /// Finds out how each pixel best shares the time of an estimate out between proposals and samples, by the renderer's own
+    /// pilot. The answer is M/N of every pixel, and the processor time that it took (s).
+    pub fn plan_per_pixel(&mut self, times: StageTimes, budget: f64) -> Result<(Vec<f32>, f64), ReproduceError> {
+        let start = processor_time();
+        // The pilot asks for a number of samples; half of the time is for proposals
+        let samples = (0.5 * budget / times.t2).round().max(1.0) as u32;
+        Method { per_pixel: true, ..Method::ris(samples, samples) }.apply(&mut self.world, self.depth);
+        self.world.scene.film.filter = PixelFilter::Box { rx: CENTRE, ry: CENTRE };
+        self.world.scene.integrator.ris.stage_times = Some(times);
+        self.shadows.store(true, Ordering::Relaxed);
+        prepare(&mut self.world, self.threads, false).map_err(RenderError::from)?;
+        let seconds = processor_time().saturating_sub(start).as_secs_f64();
+        let Some(map) = &mut self.world.splits else { return Ok((Vec::new(), seconds)) };
+        map.time = budget;
+        Ok((map.ratios.clone(), seconds))
+    }
+
+    /// Renders `spp` camera rays per pixel.
+    pub fn render(
+        &mut self,
+        method: &Method,
+        view: View,
+        spp: u32,
+        seed: u32,
+        observer: Observer<'_>,
+    ) -> Result<Rendering, ReproduceError> {
+        method.apply(&mut self.world, self.depth);
+        let scene = &mut self.world.scene;
+        let radius = if view == View::Antialiased { 0.5 } else { CENTRE };
+        scene.film.filter = PixelFilter::Box { rx: radius, ry: radius };
+        (scene.sampling.seed, scene.sampling.spp) = (seed, spp);
+        self.shadows.store(view != View::Unshadowed, Ordering::Relaxed);
+        let settings = RenderSettings { threads: self.threads, spp, ..RenderSettings::default() };
+        let rendering = render(&self.world, &settings, observer.stop, &|_| ())?;
+        if observer.stop.load(Ordering::Relaxed) { Err(ReproduceError::Stopped) } else { Ok(rendering) }
+    }
+}
+
+/// Seconds of a rendering. Those of the stages are by the clock on the wall, summed over threads.
+#[derive(Clone, Copy, Debug, Default, Serialize)]
+pub struct Seconds {
+    /// Processor time of all threads.
+    pub processor: f64,
+    /// From start to end.
+    pub wall: f64,
+    /// Tracing camera rays.
+    pub camera: f64,
+    /// Hits, textures, materials.
+    pub shade: f64,
+    /// Proposals.
+    pub t1: f64,
+    /// Drawing samples from them, and adding up.
+    pub select: f64,
+    /// Shadow segments.
+    pub t2: f64,
+}
+
+impl Seconds {
+    /// Adds all but the processor time.
+    fn add(&mut self, rendering: &Rendering) {
+        let s = &rendering.stats;
+        self.wall += rendering.elapsed.as_secs_f64();
+        self.camera += (s.camera_time + s.bounce_time).as_secs_f64();
+        self.shade += s.shade_time.as_secs_f64();
+        self.t1 += s.direct.t1.as_secs_f64();
+        self.select += s.direct.select.as_secs_f64();
+        self.t2 += s.direct.t2.as_secs_f64();
+    }
+
+    /// Direct lighting.
+    pub fn direct(&self) -> f64 {
+        self.t1 + self.select + self.t2
+    }
+
+    /// All stages.
+    pub fn stages(&self) -> f64 {
+        self.camera + self.shade + self.direct()
+    }
+}
+
+/// Processor time of this process so far, of threads that have ended too.
+fn processor_time() -> Duration {
+    let t = clock_gettime(ClockId::ProcessCPUTime);
+    Duration::new(u64::try_from(t.tv_sec).unwrap_or(0), u32::try_from(t.tv_nsec).unwrap_or(0))
+}
+
+/// A number and its standard error.
+#[derive(Clone, Copy, Debug, Default, Serialize)]
+pub struct Estimate {
+    /// The number.
+    pub value: f64,
+    /// Its standard error.
+    pub error: f64,
+}
+
+/// What the turns of a method gave.
+#[derive(Clone, Debug)]
+pub struct Measured {
+    /// The method.
+    pub method: Method,
+    /// Luminance of every pixel, turn by turn.
+    luminance: Vec<Vec<f32>>,
+    /// Sum over the turns of the pixels' radiance.
+    sum: Vec<[f64; 3]>,
+    /// The picture of the first turn.
+    pub first: Vec<[f32; 3]>,
+    /// Times, turn by turn.
+    pub seconds: Vec<Seconds>,
+    /// Shadow segments of all turns.
+    pub segments: u64,
+    /// Proposals of all turns.
+    pub proposals: u64,
+    /// Samples that were not finite, of all turns.
+    pub invalid: u64,
+}
+
+/// Luminance of linear Rec.709.
+pub fn luminance(v: [f64; 3]) -> f64 {
+    0.212_671 * v[0] + 0.715_160 * v[1] + 0.072_169 * v[2]
+}
+
+impl Measured {
+    fn new(method: Method) -> Self {
+        Measured {
+            method,
+            luminance: Vec::new(),
+            sum: Vec::new(),
+            first: Vec::new(),
+            seconds: Vec::new(),
+            segments: 0,
+            proposals: 0,
+            invalid: 0,
+        }
+    }
+
+    /// Takes a turn: renderings of which each has the same share of the picture.
+    fn add(&mut self, renderings: &[Rendering], processor: Duration) {
+        let share = 1.0 / renderings.len().max(1) as f64;
+        let mut means = vec![[0.0; 3]; renderings.first().map_or(0, |r| r.film.pixels.len())];
+        let mut seconds = Seconds { processor: processor.as_secs_f64(), ..Seconds::default() };
+        for rendering in renderings {
+            for (mean, p) in means.iter_mut().zip(radiance(&rendering.film)) {
+                (0..3).for_each(|c| mean[c] += p[c] * share);
+            }
+            seconds.add(rendering);
+            self.segments += rendering.stats.direct.segments;
+            self.proposals += rendering.stats.direct.proposals;
+            self.invalid += rendering.film.pixels.iter().map(|p| p.invalid).sum::<u64>();
+        }
+        if self.first.is_empty() {
+            self.first = means.iter().map(|p| p.map(|v| v as f32)).collect();
+            self.sum = vec![[0.0; 3]; means.len()];
+        }
+        for (sum, mean) in self.sum.iter_mut().zip(&means) {
+            (0..3).for_each(|c| sum[c] += mean[c]);
+        }
+        self.luminance.push(means.iter().map(|&p| luminance(p) as f32).collect());
+        self.seconds.push(seconds);
+    }
+
+    /// Luminance of every pixel, turn by turn.
+    pub fn luminances(&self) -> &[Vec<f32>] {
+        &self.luminance
+    }
+
+    /// Mean radiance of every pixel over the turns.
+    pub fn mean_radiance(&self) -> Vec<[f64; 3]> {
+        let turns = self.turns().max(1) as f64;
+        self.sum.iter().map(|p| p.map(|v| v / turns)).collect()
+    }
+
+    /// Grey pictures of these luminances, rendered in no time.
+    #[cfg(test)]
+    pub fn from_luminances(method: Method, turns: Vec<Vec<f32>>) -> Self {
+        let mut m = Measured::new(method);
+        m.sum = vec![[0.0; 3]; turns.first().map_or(0, Vec::len)];
+        for turn in &turns {
+            m.sum.iter_mut().zip(turn).for_each(|(s, &v)| *s = s.map(|x| x + f64::from(v)));
+            m.seconds.push(Seconds::default());
+        }
+        m.luminance = turns;
+        m
+    }
+
+    /// Number of turns.
+    pub fn turns(&self) -> usize {
+        self.luminance.len()
+    }
+
+    /// Variance of every pixel's estimate (luminance).
+    pub fn variance_map(&self) -> Vec<f64> {
+        let moments = |i: usize| {
+            let mut w = Welford::new();
+            self.luminance.iter().for_each(|turn| w.add(f64::from(turn[i])));
+            w.variance()
+        };
+        (0..self.sum.len()).map(moments).collect()
+    }
+
+    /// Mean over the pixels of `mask` (all without one) of the variance of the pixel's estimate. Its standard error is
+    /// from how the turns differ.
+    pub fn variance(&self, mask: Option<&[bool]>) -> Estimate {
+        let turns = self.turns() as f64;
+        let chosen: Vec<usize> = (0..self.sum.len()).filter(|&i| mask.is_none_or(|m| m[i])).collect();
+        let mean = |i: usize| self.luminance.iter().map(|t| f64::from(t[i])).sum::<f64>() / turns;
+        let means: Vec<f64> = chosen.iter().map(|&i| mean(i)).collect();
+        let mut over_turns = Welford::new();
+        for turn in &self.luminance {
+            let squares = chosen.iter().zip(&means).map(|(&i, m)| (f64::from(turn[i]) - m).powi(2));
+            over_turns.add(squares.sum::<f64>() / chosen.len().max(1) as f64 * turns / (turns - 1.0).max(1.0));
+        }
+        Estimate { value: over_turns.mean(), error: over_turns.standard_error() }
+    }
+
+    /// Mean luminance of the picture, and its standard error from the variances of the pixels.
+    pub fn mean(&self) -> Estimate {
+        let (turns, pixels) = (self.turns() as f64, self.sum.len().max(1) as f64);
+        let value = self.sum.iter().map(|&p| luminance(p)).sum::<f64>() / (turns * pixels);
+        Estimate { value, error: (self.variance(None).value / (turns * pixels)).sqrt() }
+    }
+
+    /// Median over the turns of some time.
+    pub fn median_seconds(&self, of: impl Fn(&Seconds) -> f64) -> f64 {
+        median(self.seconds.iter().map(of).collect())
+    }
+
+    /// Time relative to another method: the median over the turns.
+    pub fn time_ratio(&self, base: &Measured) -> f64 {
+        median(self.seconds.iter().zip(&base.seconds).map(|(a, b)| a.processor / b.processor.max(1e-12)).collect())
+    }
+
+    /// Variance at equal time, relative to another method, over the pixels of `mask`.
+    pub fn at_equal_time(&self, base: &Measured, mask: Option<&[bool]>) -> Estimate {
+        let (a, b) = (self.variance(mask), base.variance(mask));
+        if !(a.value > 0.0 && b.value > 0.0) {
+            return Estimate::default();
+        }
+        let value = a.value / b.value * self.time_ratio(base);
+        Estimate { value, error: value * (a.error / a.value).hypot(b.error / b.value) }
+    }
+}
+
+/// Probability that the mean of a method differs from that of all others (weighted by their errors) at least as much as
+/// it does, if all have the same expectation.
+pub fn same_mean(all: &[Measured], method: usize) -> f64 {
+    let (mut weights, mut sum) = (0.0, 0.0);
+    for (_, m) in all.iter().enumerate().filter(|(i, _)| *i != method) {
+        let mean = m.mean();
+        let weight = 1.0 / mean.error.powi(2).max(1e-300);
+        weights += weight;
+        sum += weight * mean.value;
+    }
+    let own = all[method].mean();
+    if weights == 0.0 { 1.0 } else { z_test(own.value, sum / weights, own.error.hypot(weights.sqrt().recip())).p_value }
+}
+
+/// The median; 0 of nothing.
+pub fn median(mut values: Vec<f64>) -> f64 {
+    values.sort_by(f64::total_cmp);
+    match values.len() {
+        0 => 0.0,
+        n if n % 2 == 1 => values[n / 2],
+        n => 0.5 * (values[n / 2 - 1] + values[n / 2]),
+    }
+}
+
+/// Mean radiance of every pixel.
+pub fn radiance(film: &Film) -> Vec<[f64; 3]> {
+    film.pixels.iter().map(|p| p.mean()).collect()
+}
+
+/// Distance of the seeds of renderings that make up one turn; turns have smaller ones.
+const APART: u32 = 1 << 28;
+
+/// Renders `turns` turns of all methods, the first of each with seed `first_seed` and on.
+pub fn turns(
+    stage: &mut Stage,
+    methods: &[Method],
+    view: View,
+    spp: u32,
+    turns: std::ops::Range<u32>,
+    observer: Observer<'_>,
+) -> Result<Vec<Measured>, ReproduceError> {
+    let count = methods.len() as u32;
+    let mut measured: Vec<Measured> = methods.iter().map(|&m| Measured::new(m)).collect();
+    for turn in turns {
+        for k in 0..count {
+            let i = (k + turn) % count;
+            let seed = 1 + turn * count + i;
+            let m = &mut measured[i as usize];
+            let start = processor_time();
+            let (renderings, rays) = if m.method.apart { (spp, 1) } else { (1, spp) };
+            let render = |k: u32| stage.render(&m.method, view, rays, seed.wrapping_add(k * APART), observer);
+            let renderings: Result<Vec<Rendering>, _> = (0..renderings).map(render).collect();
+            m.add(&renderings?, processor_time().saturating_sub(start));
+        }
+    }
+    Ok(measured)
+}
+
+/// The mean picture of all turns of all methods, each with the same weight.
+pub fn reference(all: &[Measured]) -> Vec<[f64; 3]> {
+    let pixels = all.first().map_or(0, |m| m.sum.len());
+    let turns: usize = all.iter().map(Measured::turns).sum();
+    let mean = |i: usize| {
+        let mut p = [0.0; 3];
+        all.iter().for_each(|m| (0..3).for_each(|c| p[c] += m.sum[i][c]));
+        p.map(|v| v / turns.max(1) as f64)
+    };
+    (0..pixels).map(mean).collect()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn measured(turns: &[[f32; 2]], seconds: f64) -> Measured {
+        let mut m = Measured::from_luminances(Method::mc(1), turns.iter().map(|t| t.to_vec()).collect());
+        m.seconds.iter_mut().for_each(|s| s.processor = seconds);
+        m
+    }
+
+    #[test]
+    fn variance_is_the_unbiased_variance_over_turns_averaged_over_pixels() {
+        let m = measured(&[[1.0, 0.0], [2.0, 4.0], [6.0, 2.0]], 1.0);
+        assert_eq!(m.variance_map(), [7.0, 4.0]);
+        assert!((m.variance(None).value - 5.5).abs() < 1e-12);
+        assert!((m.variance(Some(&[false, true])).value - 4.0).abs() < 1e-12);
+        assert!((m.mean().value - 2.5).abs() < 1e-6);
+        assert!((m.mean().error - (5.5_f64 / 6.0).sqrt()).abs() < 1e-12);
+    }
+
+    #[test]
+    fn a_method_of_half_the_variance_and_half_the_time_has_a_quarter_at_equal_time() {
+        let a = measured(&[[1.0, 1.0], [3.0, 3.0]], 1.0);
+        let r = 0.5_f32.sqrt();
+        let b = measured(&[[2.0 - r, 2.0 - r], [2.0 + r, 2.0 + r]], 0.5);
+        assert!((b.at_equal_time(&a, None).value - 0.25).abs() < 1e-6);
+        assert_eq!(median(vec![3.0, 1.0, 2.0, 10.0]), 2.5);
+        assert!(same_mean(&[a, b], 0) > 0.9);
+    }
+}

@@ -1,0 +1,164 @@
+//! What takes turns: ways to estimate direct light.
+
+use lumiris::lights::LightSamplerKind;
+use lumiris::scene::{
+    Cached, EstimatorKind, IntegratorKind, IntegratorSettings, OptimalForm, ProposalPoints, Proposals, Strata, Target,
+    World,
+};
+use lumiris_numbers::estimators::mis::Heuristic;
+use lumiris_numbers::estimators::ocv::Form;
+use lumiris_numbers::samplers::SamplerKind;
+
+/// Light that is computed.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Transport {
+    /// Direct light alone.
+    Direct,
+    /// Paths as long as the scene file says.
+    Path,
+    /// The same, with everything that diffuse surfaces reflect interpolated between records.
+    Cached,
+}
+
+/// A way to estimate direct light.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Method {
+    /// Light that is computed.
+    pub transport: Transport,
+    /// Estimator of direct light.
+    pub estimator: EstimatorKind,
+    /// How a light is chosen.
+    pub light_choice: LightSamplerKind,
+    /// Weights of the techniques; the estimator's own if `None`.
+    pub heuristic: Option<Heuristic>,
+    /// How `ocv` finds its coefficients.
+    pub form: Form,
+    /// How `optimal-mis` finds its weights.
+    pub optimal: OptimalForm,
+    /// N.
+    pub samples: u32,
+    /// M, for `ris`.
+    pub proposals: u32,
+    /// What `ris` draws samples in proportion to.
+    pub target: Target,
+    /// Samples of `contributing` on the lights that no photon came from.
+    pub rest_samples: u32,
+    /// Samples over proposals, for `ris`.
+    pub strata: Strata,
+    /// True if `ris` shares the time of an estimate out between M and N in each pixel as [`Stage::plan_per_pixel`](super::measure::Stage::plan_per_pixel) found out.
+    pub per_pixel: bool,
+    /// True if samples, or the proposals of `ris`, are well distributed over the lights and over the camera rays of a pixel;
+    /// otherwise all random numbers are independent.
+    pub stratified: bool,
+    /// True if camera rays of a pixel have nothing to do with each other: they are renderings of one ray each.
+    pub apart: bool,
+}
+
+impl Method {
+    /// Light sampling with independent random numbers.
+    pub fn mc(samples: u32) -> Self {
+        let estimator = EstimatorKind::Mc;
+        Method {
+            transport: Transport::Direct,
+            estimator,
+            light_choice: LightSamplerKind::Tree,
+            heuristic: None,
+            form: Form::Progressive,
+            optimal: OptimalForm::Progressive,
+            samples,
+            proposals: samples,
+            target: Target::Fgl,
+            rest_samples: 1,
+            strata: Strata::None,
+            per_pixel: false,
+            stratified: false,
+            apart: false,
+        }
+    }
+
+    /// Light and BSDF sampling with independent random numbers.
+    pub fn mis(samples: u32) -> Self {
+        Method { estimator: EstimatorKind::Mis, ..Method::mc(samples) }
+    }
+
+    /// Optimizing control variates with independent random numbers.
+    pub fn ocv(form: Form, samples: u32) -> Self {
+        Method { estimator: EstimatorKind::Ocv, form, ..Method::mc(samples) }
+    }
+
+    /// Optimal weights of the techniques with independent random numbers.
+    pub fn optimal_mis(optimal: OptimalForm, samples: u32) -> Self {
+        Method { estimator: EstimatorKind::OptimalMis, optimal, ..Method::mc(samples) }
+    }
+
+    /// Combined correlated and importance sampling by the BSDF with independent random numbers.
+    pub fn correlated(samples: u32) -> Self {
+        Method { estimator: EstimatorKind::Correlated, ..Method::mc(samples) }
+    }
+
+    /// Sampling of the lights that photons came from, and of the others, with independent random numbers.
+    pub fn contributing(samples: u32, rest_samples: u32) -> Self {
+        Method { estimator: EstimatorKind::Contributing, rest_samples, ..Method::mc(samples) }
+    }
+
+    /// Resampled importance sampling with independent random numbers and draws.
+    pub fn ris(proposals: u32, samples: u32) -> Self {
+        Method { estimator: EstimatorKind::Ris, proposals: proposals.max(samples), ..Method::mc(samples) }
+    }
+
+    /// The same with well distributed points.
+    pub fn stratified(self) -> Self {
+        Method { stratified: true, ..self }
+    }
+
+    /// The same with camera rays that have nothing to do with each other.
+    pub fn apart(self) -> Self {
+        Method { apart: true, ..self }
+    }
+
+    /// The same with other weights of the techniques.
+    pub fn weighted(self, heuristic: Heuristic) -> Self {
+        Method { heuristic: Some(heuristic), ..self }
+    }
+
+    /// The same with strata of samples.
+    pub fn strata(self, strata: Strata) -> Self {
+        Method { strata, ..self }
+    }
+
+    /// The same for other light.
+    pub fn of(self, transport: Transport) -> Self {
+        Method { transport, ..self }
+    }
+
+    /// Settings of the scene that do what the method says, where the file says `depth` bounces.
+    pub(super) fn apply(&self, world: &mut World, depth: u32) {
+        world.set_light_choice(self.light_choice);
+        let scene = &mut world.scene;
+        let old = scene.integrator;
+        let (kind, max_depth) = match self.transport {
+            Transport::Direct => (IntegratorKind::Direct, 1),
+            Transport::Path => (IntegratorKind::Path, depth),
+            Transport::Cached => (IntegratorKind::IrradianceCache, depth),
+        };
+        scene.integrator = IntegratorSettings {
+            kind,
+            max_depth,
+            estimator: self.estimator,
+            samples: Some(self.samples),
+            heuristic: self.heuristic,
+            optimal_mis: self.optimal,
+            ..old
+        };
+        scene.integrator.ocv.form = self.form;
+        scene.integrator.cache.cached = Cached::All;
+        scene.integrator.ris.proposals =
+            if self.per_pixel { Proposals::Optimal } else { Proposals::Fixed(self.proposals) };
+        scene.integrator.ris.strata = self.strata;
+        scene.integrator.ris.target = self.target;
+        scene.integrator.contributing.rest_samples = self.rest_samples;
+        scene.integrator.ris.points =
+            if self.stratified { ProposalPoints::Stratified } else { ProposalPoints::Independent };
+        scene.sampling.sampler = if self.stratified { SamplerKind::Sobol } else { SamplerKind::Independent };
+    }
+}

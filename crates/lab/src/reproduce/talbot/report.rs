@@ -1,0 +1,234 @@
+//! From measurements to sections of the page and to numbers.
+
+use super::super::ReproduceError;
+use super::super::figure::{Figure, Summary, estimate_json, percent, plus_minus};
+use super::super::measure::{Estimate, Measured, Seconds, same_mean};
+use super::super::page::{Block, Cell, Shown, Table};
+use super::super::pictures::{HEAT, Picture, Scale, gain, significant};
+use super::Setup;
+use super::classes::{Classes, LIT, NAMES, SHADOWED};
+use super::comparison::{Kind, Outcome};
+use lumiris::scene::Split;
+use serde_json::{Value, json};
+
+/// All numbers of a method among those it was in turns with, the first of which is the baseline.
+pub fn method_json(name: &str, all: &[Measured], method: usize, classes: &Classes) -> Value {
+    let (m, base) = (&all[method], &all[0]);
+    let class = |k: usize| {
+        let mask = Some(&classes.masks[k][..]);
+        json!({
+            "pixels": classes.counts()[k],
+            "variance": estimate_json(m.variance(mask)),
+            "at_equal_time": estimate_json(m.at_equal_time(base, mask)),
+        })
+    };
+    let by_class: serde_json::Map<String, Value> = (0..3).map(|k| (NAMES[k].to_owned(), class(k))).collect();
+    json!({
+        "name": name,
+        "estimator": m.method.estimator.name(), "samples": m.method.samples, "proposals": m.method.proposals,
+        "strata": m.method.strata.name(), "stratified_points": m.method.stratified,
+        "turns": m.turns(), "variance": estimate_json(m.variance(None)),
+        "time_ratio": m.time_ratio(base), "at_equal_time": estimate_json(m.at_equal_time(base, None)),
+        "mean": estimate_json(m.mean()), "same_mean_p": same_mean(all, method),
+        "classes": by_class, "seconds": m.seconds,
+        "segments": m.segments, "proposals_drawn": m.proposals, "invalid_samples": m.invalid,
+    })
+}
+
+/// The section of a case.
+pub fn comparison(setup: &Setup<'_>, o: &Outcome<'_>) -> Result<Figure, ReproduceError> {
+    let Split { samples, proposals } = o.calibration.split;
+    let (triangles, lights) = o.stage_facts;
+    let base = &o.measured[o.roles.base];
+    let mut blocks = vec![
+        Block::Text(o.case.intro.to_owned()),
+        Block::Facts(vec![
+            ("scene".to_owned(), format!("{triangles} triangles, {lights} lights")),
+            (
+                "picture".to_owned(),
+                format!("{} × {} pixels, {} camera rays per pixel", o.size[0], o.size[1], o.case.primary),
+            ),
+            ("turns".to_owned(), format!("{} of {} methods each", base.turns(), o.measured.len())),
+            ("T1, a proposal".to_owned(), format!("{} ns", significant(o.calibration.times.t1))),
+            ("T2, a sample".to_owned(), format!("{} ns", significant(o.calibration.times.t2))),
+            (
+                "M and N".to_owned(),
+                format!("{proposals} and {samples}, for {} ns per point", significant(o.calibration.budget)),
+            ),
+        ]),
+    ];
+    blocks.extend(pictures(setup, o)?);
+    blocks.extend(tables(o));
+    let summary = match o.case.kind {
+        Kind::Reduction { paper, target } => reduction(o, paper, target),
+        Kind::Stratification => stratification(o),
+    };
+    let rows: Vec<Value> =
+        (0..o.methods.len()).map(|i| method_json(&o.methods[i].name, &o.measured, i, &o.classes)).collect();
+    let antialiased: Vec<Value> =
+        (0..o.antialiased.len()).map(|i| method_json("antialiased", &o.antialiased, i, &o.classes)).collect();
+    let numbers = json!({
+        "size": o.size, "camera_rays": o.case.primary, "turns": base.turns(),
+        "t1_ns": o.calibration.times.t1, "t2_ns": o.calibration.times.t2, "budget_ns": o.calibration.budget,
+        "proposals": proposals, "samples": samples,
+        "visibility_share_of_ris": visibility(o).1, "visibility_bound": visibility(o).0,
+        "methods": rows, "antialiased": antialiased,
+    });
+    Ok(Figure { id: o.case.id, title: o.case.title, summary, also: Vec::new(), blocks, numbers })
+}
+
+/// Variance that visibility alone leaves unstratified resampling, relative to that of the baseline, both at the time of
+/// the baseline; and its part of what unstratified resampling has. V(f/q) is from one sample of many proposals by
+/// [Talbot 2005, Eq. 4.2].
+fn visibility(o: &Outcome<'_>) -> (f64, f64) {
+    let (base, plain) = (&o.measured[o.roles.base], &o.measured[o.roles.plain]);
+    let many = &o.measured[o.roles.visibility];
+    let (m, n) = (f64::from(plain.method.proposals), f64::from(plain.method.samples));
+    let share = 1.0 / f64::from(many.method.proposals);
+    // V_many = s·P + (1 − s)·Q and V_plain = P/M + (1 − 1/M)·Q/N, for P = V(f/p) and Q = V(f/q)
+    let (v_many, v_plain) = (many.variance(None).value, plain.variance(None).value);
+    let determinant = share * (1.0 - 1.0 / m) / n - (1.0 - share) / m;
+    let q = if determinant.abs() > 1e-12 { (share * v_plain - v_many / m) / determinant } else { v_many };
+    let left = (1.0 - 1.0 / m) * q.max(0.0) / n;
+    let base_variance = base.variance(None).value.max(1e-300);
+    (left / base_variance * plain.time_ratio(base), left / v_plain.max(1e-300))
+}
+
+fn reduction(o: &Outcome<'_>, paper: f64, target: f64) -> Summary {
+    let base = &o.measured[o.roles.base];
+    let at = |i: usize| o.measured[i].at_equal_time(base, None);
+    let best = at(o.roles.best);
+    let reached = (1.0 - best.value) * 100.0 >= target;
+    let (bound, share) = visibility(o);
+    let mut reason = format!("without stratification {}", percent(at(o.roles.plain)));
+    if let Some(stratified) = o.roles.base_stratified {
+        let over = o.measured[o.roles.best].at_equal_time(&o.measured[stratified], None);
+        reason += &format!(
+            "; stratified samples alone give mc {}, and against that it is {}",
+            percent(at(stratified)),
+            percent(over)
+        );
+        let [base, best, stratified] = [0, 1, 2].map(|k| &o.antialiased[k]);
+        reason += &format!(
+            "; with antialiasing it is {} against mc, {} against mc with stratified samples",
+            percent(best.at_equal_time(base, None)),
+            percent(best.at_equal_time(stratified, None))
+        );
+    }
+    reason += &format!("; visibility is {:.0} % of the variance of unstratified ris", share * 100.0);
+    if !reached {
+        reason += &format!(", so that no number of proposals brings it below {:+.0} %", (bound - 1.0) * 100.0);
+    }
+    Summary {
+        paper: format!("−{paper} % variance at equal time"),
+        target: format!("−{target} %"),
+        measured: percent(best),
+        reached,
+        reason,
+    }
+}
+
+fn stratification(o: &Outcome<'_>) -> Summary {
+    let base = &o.measured[o.roles.base];
+    let masks = &o.classes.masks;
+    let at = |i: usize, mask: Option<&[bool]>| o.measured[i].at_equal_time(base, mask);
+    // The order of the thesis: none, proposals, and either strata of samples below that; two standard errors for chance
+    let below = |a: Estimate, b: Estimate| a.value < b.value + 2.0 * a.error.hypot(b.error);
+    let none = Estimate { value: 1.0, error: 0.0 };
+    let ordered = below(at(1, None), none) && (2..=4).all(|i| below(at(i, None), at(1, None)));
+    let step = |k: usize| {
+        let mask = Some(&masks[k][..]);
+        at(4, mask).value / at(1, mask).value.max(1e-300)
+    };
+    let steps: Vec<String> = (0..3).map(|k| format!("{} {:.2}", NAMES[k], step(k))).collect();
+    let of_proposals: Vec<String> =
+        (0..3).map(|k| format!("{} {:.2}", NAMES[k], at(1, Some(&masks[k])).value)).collect();
+    let list: Vec<String> = (1..=4).map(|i| format!("{:.2}", at(i, None).value)).collect();
+    let most_in_shadow = step(1).min(step(2)) <= step(0);
+    Summary {
+        paper: "each step less variance; strata of samples most in shadow".to_owned(),
+        target: "same order".to_owned(),
+        measured: format!("1 → {} (proposals, equal-proposals, equal-weights, systematic)", list.join(", ")),
+        reached: ordered && most_in_shadow,
+        reason: format!(
+            "stratified proposals leave {} of the variance; systematic samples leave {} of that",
+            of_proposals.join(", "),
+            steps.join(", ")
+        ),
+    }
+}
+
+fn pictures(setup: &Setup<'_>, o: &Outcome<'_>) -> Result<Vec<Block>, ReproduceError> {
+    let out = &setup.options.out;
+    let id = o.case.id.replace('.', "-");
+    let reference: Vec<[f32; 3]> = o.reference.iter().map(|p| p.map(|v| v as f32)).collect();
+    let exposure = gain(&reference);
+    let chosen = [o.roles.base, o.roles.best];
+    let base_seconds = o.antialiased[0].seconds[0].processor;
+    let mut shown = Vec::new();
+    for (k, &i) in chosen.iter().enumerate() {
+        let m = &o.antialiased[k];
+        let Split { samples, proposals } = Split { samples: m.method.samples, proposals: m.method.proposals };
+        let file = Picture::tone_mapped(o.size, &m.first, exposure).write(out, &format!("{id}-{k}"))?;
+        let seconds = m.seconds[0].processor;
+        let caption = format!(
+            "M = {proposals}, N = {samples}; {} processor seconds ({:+.1} %); variance with antialiasing {}",
+            significant(seconds),
+            (seconds / base_seconds - 1.0) * 100.0,
+            significant(m.variance(None).value)
+        );
+        shown.push(Shown { file, title: o.methods[i].name.clone(), caption });
+    }
+    let maps: Vec<Vec<f64>> = chosen.iter().map(|&i| o.measured[i].variance_map()).collect();
+    let scale = Scale::of_values(HEAT, maps.iter().flatten());
+    for (k, (&i, map)) in chosen.iter().zip(&maps).enumerate() {
+        let file = Picture::colored(o.size, map, &scale).write(out, &format!("{id}-variance-{k}"))?;
+        shown.push(Shown { file, title: format!("variance: {}", o.methods[i].name), caption: String::new() });
+    }
+    let file = Picture::tone_mapped(o.size, &reference, exposure).write(out, &format!("{id}-mean"))?;
+    let title = "mean of all turns of all methods".to_owned();
+    shown.push(Shown { file, title, caption: String::new() });
+    let grey = |&v: &f64| if v.is_nan() { [0.0, 0.0, 0.1] } else { [v.clamp(0.0, 1.0) as f32; 3] };
+    let visibility: Vec<[f32; 3]> = o.classes.visibility.iter().map(grey).collect();
+    let file = Picture::tone_mapped(o.size, &visibility, 1.0).write(out, &format!("{id}-visibility"))?;
+    let title = "part of the light that arrives".to_owned();
+    shown.push(Shown { file, title, caption: String::new() });
+    let title = "variance of the pixel (luminance)".to_owned();
+    Ok(vec![Block::Pictures(shown), Block::Legend { title, scale }])
+}
+
+fn tables(o: &Outcome<'_>) -> Vec<Block> {
+    let base = &o.measured[o.roles.base];
+    let mut header = vec!["method", "M", "N", "variance", "time", "at equal time"];
+    header.extend(NAMES);
+    header.push("same mean, p");
+    let mut table = Table::new(&header);
+    for (i, (named, m)) in o.methods.iter().zip(&o.measured).enumerate() {
+        let mut cells = vec![
+            Cell::text(&named.name),
+            Cell::number(m.method.proposals.to_string()),
+            Cell::number(m.method.samples.to_string()),
+            Cell::number(plus_minus(m.variance(None))),
+            Cell::number(format!("{:.3}", m.time_ratio(base))),
+            Cell::number(percent(m.at_equal_time(base, None))),
+        ];
+        cells.extend(o.classes.masks.iter().map(|mask| Cell::number(percent(m.at_equal_time(base, Some(mask))))));
+        cells.push(Cell::number(significant(same_mean(&o.measured, i))));
+        table.row(cells);
+    }
+    let mut times =
+        Table::new(&["method", "camera rays", "materials", "T1", "select", "T2", "processor seconds of a turn"]);
+    for (named, m) in o.methods.iter().zip(&o.measured) {
+        let mean = |f: fn(&Seconds) -> f64| m.median_seconds(f);
+        let values = [mean(|s| s.camera), mean(|s| s.shade), mean(|s| s.t1), mean(|s| s.select), mean(|s| s.t2)];
+        let total = Cell::number(significant(m.median_seconds(|s| s.processor)));
+        let cells = values.iter().map(|&v| Cell::number(significant(v)));
+        times.row(std::iter::once(Cell::text(&named.name)).chain(cells).chain([total]));
+    }
+    let counts = o.classes.counts();
+    let classes = format!(
+        "Pixels by the part v of the light that arrives: {} lit (v ≥ {LIT}), {} in penumbra, {} in shadow (v ≤ {SHADOWED}).",
+        counts[0], counts[1], counts[2]
+    );
+    vec![Block::Table(table), Block::Note(classes), Block::Table(times)]
+}

@@ -1,0 +1,205 @@
+//! Bias and variance of optimizing control variates on integrals of known value: the tables of
+//! `docs/measurements/ocv/README.md`.
+//!
+//! `cargo run --release --example ocv_tables -- [forms|first|later|shared]`
+#![allow(clippy::print_stdout)]
+
+#[allow(dead_code)]
+#[path = "../tests/estimators_1d/mixtures.rs"]
+mod mixtures;
+
+use lumiris_numbers::estimators::ocv::{Penalty, crossfit, paper, regression};
+use lumiris_numbers::estimators::optimal_mis;
+use lumiris_numbers::estimators::stats::Welford;
+use lumiris_numbers::math::hash::HashStream;
+use mixtures::{Mixture, PROPER, Sampler};
+
+fn main() {
+    let parts: [(&str, fn()); 4] =
+        [("forms", forms), ("first", first_passes), ("later", later_passes), ("shared", shared_sums)];
+    let wanted = std::env::args().nth(1);
+    for (name, part) in parts {
+        if wanted.as_deref().is_none_or(|w| w == name) {
+            part();
+        }
+    }
+}
+
+/// Moments of several estimates from each of `runs`, of their first channel.
+fn moments<const K: usize>(runs: usize, key: u32, mut run: impl FnMut(&mut HashStream) -> [f32; K]) -> [Welford; K] {
+    let (mut stream, mut welford) = (HashStream::new([40, key, 0]), [Welford::new(); K]);
+    for _ in 0..runs {
+        welford.iter_mut().zip(run(&mut stream)).for_each(|(w, e)| w.add(f64::from(e)));
+    }
+    welford
+}
+
+/// Bias and variance of each form on the same samples.
+fn forms() {
+    println!("## Bias (% of the value) and variance over that of MIS\n");
+    println!(
+        "| integral | N | samples | paper | regression | regression, λ = 1 | optimal MIS, direct | crossfit, against MIS of N |"
+    );
+    println!("|---|---|---|---|---|---|---|---|");
+    for (mixture, n) in
+        [Mixture::Table, Mixture::Occluded, Mixture::Colour].into_iter().flat_map(|m| [8, 16, 64].map(|n| (m, n)))
+    {
+        for stratified in [false, true] {
+            let (whole, half) = (Sampler::new(mixture, n, stratified), Sampler::new(mixture, n / 2, stratified));
+            let equations = whole.equations;
+            let row = || vec![0.0; equations.len()];
+            let (mut centred, mut plain, mut halves) = (row(), row(), [row(), row()]);
+            let ones = [1.0; 8];
+            let w = moments(400_000, n, |stream| {
+                plain.fill(0.0);
+                let again = *stream;
+                whole.add(1, 0.0, stream, &mut plain);
+                whole.block(1, &mut again.clone(), &mut centred);
+                halves.iter_mut().for_each(|h| half.block(1, stream, h));
+                [
+                    equations.mean(&centred)[0],
+                    paper(equations, &plain, &ones, 1.0).estimate[0],
+                    regression(equations, &centred, Penalty::NONE).estimate[0],
+                    regression(equations, &centred, Penalty::SAME_SAMPLES).estimate[0],
+                    optimal_mis::direct(equations, &plain, &ones).estimate[0],
+                    crossfit(equations, [&halves[0], &halves[1]], Penalty::default()).estimate[0],
+                ]
+            });
+            let value = mixture.value()[0];
+            let cell = |k: usize| {
+                let bias = 100.0 * (w[k].mean() / value - 1.0);
+                let error = 100.0 * w[k].standard_error() / value;
+                format!("{bias:+.2} ± {error:.2}, {:.2}", w[k].variance() / w[0].variance())
+            };
+            let samples = if stratified { "stratified" } else { "independent" };
+            println!(
+                "| {mixture:?} | {n} | {samples} | {} | {} | {} | {} | {} |",
+                cell(1),
+                cell(2),
+                cell(3),
+                cell(4),
+                cell(5)
+            );
+        }
+    }
+}
+
+/// Estimates of MIS and of the progressive form over the first `passes`, with one penalty.
+fn progressive(sampler: &Sampler, passes: u32, penalty: Penalty, stream: &mut HashStream) -> [[f32; 3]; 2] {
+    let equations = sampler.equations;
+    let (mut all, mut sums) = (vec![0.0; equations.len()], vec![0.0; equations.len()]);
+    let (mut beta, mut total) = (vec![0.0; equations.coefficients()], [[0.0; 3]; 2]);
+    for len in Sampler::blocks(passes) {
+        sampler.block(len, stream, &mut sums);
+        let block = [equations.mean(&sums), equations.estimate(&sums, &beta)];
+        for (total, block) in total.iter_mut().zip(block) {
+            (0..3).for_each(|i| total[i] += block[i] * len as f32 / passes as f32);
+        }
+        equations.merge(&mut all, &sums);
+        if equations.solve(&all, penalty, &mut beta).is_err() {
+            beta.fill(0.0);
+        }
+    }
+    total
+}
+
+fn ratio(sampler: &Sampler, passes: u32, penalty: Penalty, runs: usize) -> f64 {
+    let mut worst = 0.0_f64;
+    for i in 0..3 {
+        let w = moments(runs, passes, |stream| progressive(sampler, passes, penalty, stream).map(|e| e[i]));
+        worst = worst.max(w[1].variance() / w[0].variance());
+        if sampler.mixture != Mixture::Colour {
+            break;
+        }
+    }
+    worst
+}
+
+/// Variance of the mean of the first four passes over that of MIS, for several penalties.
+fn first_passes() {
+    let ridge = |ridge| Penalty { ridge, known_means: true, shrink: 0.0 };
+    let penalties = [
+        ("λ = 1", ridge(1.0)),
+        ("λ = 4", ridge(4.0)),
+        ("λ = 16", ridge(16.0)),
+        ("λ = 4, sample means", Penalty { known_means: false, ..ridge(4.0) }),
+        ("λ = 1, κ = 1", Penalty { shrink: 1.0, ..ridge(1.0) }),
+        ("**λ = 4, κ = 1**", Penalty::default()),
+        ("λ = 4, κ = 2", Penalty { shrink: 2.0, ..ridge(4.0) }),
+    ];
+    for stratified in [false, true] {
+        let samples = if stratified { "stratified" } else { "independent" };
+        println!("\n## Mean of the first four passes, {samples} samples, worst channel: variance over that of MIS\n");
+        println!("| integral | N | {} |", penalties.map(|p| p.0).join(" | "));
+        println!("|---|---|{}", "---|".repeat(penalties.len()));
+        for mixture in PROPER {
+            for n in [3, 8, 16, 64] {
+                let sampler = Sampler::new(mixture, n, stratified);
+                let cells = penalties.map(|p| format!("{:.3}", ratio(&sampler, 4, p.1, 10_000)));
+                println!("| {mixture:?} | {n} | {} |", cells.join(" | "));
+            }
+        }
+    }
+}
+
+/// Variance of all passes so far over that of MIS.
+fn later_passes() {
+    println!("\n## Variance of the mean of all passes over that of MIS\n");
+    println!("| integral | N | samples | 2 | 4 | 8 | 16 | 64 passes |\n|---|---|---|---|---|---|---|---|");
+    for mixture in [Mixture::Table, Mixture::Occluded, Mixture::Peak, Mixture::Colour, Mixture::Many] {
+        for n in [3, 8, 16] {
+            for stratified in [false, true] {
+                let sampler = Sampler::new(mixture, n, stratified);
+                let cells = [2, 4, 8, 16, 64].map(|p| {
+                    format!("{:.2}", ratio(&sampler, p, Penalty::default(), if p > 16 { 2_000 } else { 5_000 }))
+                });
+                let samples = if stratified { "stratified" } else { "independent" };
+                println!("| {mixture:?} | {n} | {samples} | {} |", cells.join(" | "));
+            }
+        }
+    }
+}
+
+/// Sums of `pixels` whose occluders differ by up to `spread`, shared or not: variance of the mean of four passes.
+fn shared_sums() {
+    println!("\n## Sums shared by pixels, mean of the first four passes: variance over that of MIS\n");
+    println!(
+        "| N | pixels | none | all alike | occluder moves by 0.02 | by 0.05 | by 0.1 |\n|---|---|---|---|---|---|---|"
+    );
+    for n in [3, 8, 16, 64] {
+        for pixels in [4_usize, 9] {
+            let cells =
+                [(1, 1e-9), (pixels, 1e-9), (pixels, 0.02), (pixels, 0.05), (pixels, 0.1)].map(|(pixels, spread)| {
+                    let samplers: Vec<Sampler> = (0..pixels)
+                        .map(|k| {
+                            let shift = spread * (k as f64 + 1.0 - pixels as f64) / pixels as f64;
+                            Sampler { shift, ..Sampler::new(Mixture::Table, n, true) }
+                        })
+                        .collect();
+                    let equations = samplers[0].equations;
+                    let row = || vec![0.0; equations.len()];
+                    let (mut all, mut rows) = (row(), vec![row(); pixels]);
+                    let mut beta = vec![0.0; equations.coefficients()];
+                    let w = moments(6_000, n, |stream| {
+                        all.fill(0.0);
+                        beta.fill(0.0);
+                        let mut total = [0.0; 2];
+                        for len in Sampler::blocks(4) {
+                            for (sampler, row) in samplers.iter().zip(&mut rows) {
+                                sampler.block(len, stream, row);
+                            }
+                            // The last pixel is watched, whose occluder is at the end of the range.
+                            let last = &rows[pixels - 1];
+                            total[0] += equations.mean(last)[0] * len as f32 / 4.0;
+                            total[1] += equations.estimate(last, &beta)[0] * len as f32 / 4.0;
+                            rows.iter().for_each(|row| equations.merge(&mut all, row));
+                            equations.solve(&all, Penalty::default(), &mut beta).expect("all samples are finite");
+                        }
+                        total
+                    });
+                    format!("{:.3}", w[1].variance() / w[0].variance())
+                });
+            println!("| {n} | {pixels} | {} |", cells.join(" | "));
+        }
+    }
+}

@@ -1,0 +1,51 @@
+//! Numbers that know nothing of scenes: vectors, frames, colour, warps, distributions, rays.
+//!
+//! Conventions that hold in the whole program: `wo` points to the viewer and `wi` to the light,
+//! both unit and both away from the surface; the shading frame has n = +z; transforms are named
+//! `to_from`; colour is linear Rec.709; angles are radians; f32 for light.
+//!
+//! Reading order: [`rgb`], [`frame`], [`transform`], [`ray`], [`bounds`], [`warp`], [`sphere_map`], [`octahedral`],
+//! [`distribution`], [`alias`], [`hash`].
+
+pub mod alias;
+pub mod bounds;
+pub mod distribution;
+pub mod frame;
+pub mod hash;
+pub mod octahedral;
+pub mod ray;
+pub mod rgb;
+pub mod sphere_map;
+pub mod transform;
+pub mod warp;
+
+pub use alias::{AliasTable, DiscreteSample};
+pub use bounds::Bounds3;
+pub use distribution::{PiecewiseConstant1D, PiecewiseConstant2D, Sample1D, Sample2D};
+pub use frame::Frame;
+pub use glam::{Affine3A, Mat3, Mat3A, Mat4, Quat, Vec2, Vec3, Vec3A, Vec4};
+pub use ray::Ray;
+pub use rgb::Rgb;
+
+/// Largest f32 below one; random numbers are clamped to it so that `u < 1` holds after arithmetic.
+pub const ONE_MINUS_EPSILON: f32 = 1.0 - f32::EPSILON / 2.0;
+
+/// `x²`.
+#[inline]
+pub fn sqr(x: f32) -> f32 {
+    x * x
+}
+
+/// `sqrt(max(x, 0))`: for expressions that are non-negative but for rounding.
+#[inline]
+pub fn safe_sqrt(x: f32) -> f32 {
+    x.max(0.0).sqrt()
+}
+
+/// Bound of the relative rounding error of `n` chained f32 operations,
+/// γₙ = nε/(1 − nε), ε = 2⁻²⁴ [Higham 2002; Pharr et al. 2023, §6.8.1].
+#[inline]
+pub const fn gamma(n: u32) -> f32 {
+    let n_eps = n as f32 * (f32::EPSILON * 0.5);
+    n_eps / (1.0 - n_eps)
+}

@@ -1,0 +1,242 @@
+//! Points along the Hilbert curve, at scrambled strata.
+//!
+//! The k-th base-4 digit of a position on the curve, hi·2 + lo, chooses a quadrant: x = hi, y = hi ⊕ lo. Digit 0 reflects
+//! what is inside of it about the diagonal, digit 3 about the antidiagonal, which is the diagonal and both axes. These
+//! reflections commute, so that all digits are done at once: whether the axes are swapped and whether they are reversed
+//! in digit k are the parities of the digits 0 or 3, and 3, before it.
+
+use fearless_simd::{Level, dispatch};
+
+/// A 32-bit hash: two rounds of multiply and xor-shift [Wellons 2018].
+#[inline(always)]
+const fn mix(mut x: u32) -> u32 {
+    x ^= x >> 16;
+    x = x.wrapping_mul(0x7feb_352d);
+    x ^= x >> 15;
+    x = x.wrapping_mul(0x846c_a68b);
+    x ^ (x >> 16)
+}
+
+/// The even bits of `x`, packed into the low half.
+#[inline(always)]
+const fn even_bits(x: u32) -> u32 {
+    let x = x & 0x5555_5555;
+    let x = (x | (x >> 1)) & 0x3333_3333;
+    let x = (x | (x >> 2)) & 0x0f0f_0f0f;
+    let x = (x | (x >> 4)) & 0x00ff_00ff;
+    (x | (x >> 8)) & 0xffff
+}
+
+/// Each bit the parity of the bits above it, of 16.
+#[inline(always)]
+const fn parity_above(x: u32) -> u32 {
+    let x = x >> 1;
+    let x = x ^ (x >> 1);
+    let x = x ^ (x >> 2);
+    let x = x ^ (x >> 4);
+    x ^ (x >> 8)
+}
+
+/// The cell of position `t` on the curve of order 16, 16 bits each.
+#[inline(always)]
+const fn hilbert_cell(t: u32) -> [u32; 2] {
+    let (hi, lo) = (even_bits(t >> 1), even_bits(t));
+    let swap = parity_above(!(hi ^ lo) & 0xffff);
+    let reverse = parity_above(hi & lo);
+    // x and y differ where lo is set.
+    let x = hi ^ reverse ^ (lo & swap);
+    [x, x ^ lo]
+}
+
+#[inline(always)]
+fn hilbert_points_lanes(t: &[u32], jitter: &[u32], u0: &mut [f32], u1: &mut [f32]) {
+    let n = t.len();
+    let (jitter, u0, u1) = (&jitter[..n], &mut u0[..n], &mut u1[..n]);
+    for i in 0..n {
+        let [x, y] = hilbert_cell(t[i]);
+        let unit = |cell: u32, low: u32| (cell << 8 | low & 0xff) as i32 as f32 * (1.0 / 16_777_216.0);
+        u0[i] = unit(x, jitter[i]);
+        u1[i] = unit(y, jitter[i] >> 8);
+    }
+}
+
+/// Points of [0, 1)² at the positions `t`/2³² along the Hilbert curve of order 16: its cell gives 16 bits to each
+/// coordinate, and the low byte of `jitter` (for x) and the next byte (for y) give 8 more. All slices have the same
+/// length.
+pub fn hilbert_points(t: &[u32], jitter: &[u32], u0: &mut [f32], u1: &mut [f32]) {
+    dispatch!(Level::new(), _simd => hilbert_points_lanes(t, jitter, u0, u1));
+}
+
+/// The scalar twin of [`hilbert_points`].
+pub fn hilbert_points_scalar(t: &[u32], jitter: &[u32], u0: &mut [f32], u1: &mut [f32]) {
+    for i in 0..t.len() {
+        let cell = hilbert_cell(t[i]);
+        u0[i] = (cell[0] * 256 + (jitter[i] & 255)) as f32 / 16_777_216.0;
+        u1[i] = (cell[1] * 256 + (jitter[i] >> 8 & 255)) as f32 / 16_777_216.0;
+    }
+}
+
+/// Owen scrambling of the fraction whose bits, lowest first, are `reversed` [Laine and Karras 2011; the constants of
+/// Burley 2020]: a bit is flipped or not by a hash of the bits before it.
+#[inline(always)]
+const fn owen_scramble_reversed(reversed: u32, seed: u32) -> u32 {
+    let mut x = reversed.wrapping_add(seed);
+    x ^= x.wrapping_mul(0x6c50_b47c);
+    x ^= x.wrapping_mul(0xb82f_1e52);
+    x ^= x.wrapping_mul(0xc7af_e638);
+    x ^= x.wrapping_mul(0x8d22_f6e6);
+    x.reverse_bits()
+}
+
+/// Hash of a stratum, the seed of its scramble.
+#[inline(always)]
+const fn stratum_seed(seed: u32, i: u32) -> u32 {
+    mix(mix(seed).wrapping_add(i.wrapping_mul(0x9e37_79b9)))
+}
+
+/// ξ of stratum `i`, and its jitter.
+#[inline(always)]
+const fn stratum(reversed: u32, hash_phi: u32, seed: u32, i: u32) -> (u32, u32) {
+    let key = stratum_seed(seed, i);
+    (owen_scramble_reversed(reversed, key), mix(key ^ hash_phi))
+}
+
+/// Hash of `phi` for the jitter.
+#[inline(always)]
+const fn phi_hash(phi: u32) -> u32 {
+    mix(phi ^ 0x68bc_21eb)
+}
+
+#[inline(always)]
+fn strata_lanes(phi: u32, seed: u32, m: u32, out: &mut [u32], jitter: &mut [u32]) {
+    let n = out.len().min(jitter.len());
+    let (out, jitter) = (&mut out[..n], &mut jitter[..n]);
+    let (reversed, hash_phi) = (phi.reverse_bits(), phi_hash(phi));
+    if m.is_power_of_two() {
+        let bits = m.trailing_zeros();
+        for i in 0..n {
+            let (xi, j) = stratum(reversed, hash_phi, seed, i as u32);
+            out[i] = (i as u32).wrapping_shl(32 - bits) | xi >> bits;
+            jitter[i] = j;
+        }
+        return;
+    }
+    // The dividend is an integer below 2⁴⁸, so the fraction of the quotient is within 2⁻²⁰ of a multiple of 1/m. Less
+    // (1 − 1/m)/2 it rounds to its floor, in the low bits of a number whose last digit is 1.
+    let (count, bias) = (f64::from(m), 0.5 / f64::from(m) - 0.5);
+    for i in 0..n {
+        let (xi, j) = stratum(reversed, hash_phi, seed, i as u32);
+        let quotient = (i as u32 as f64 * 4_294_967_296.0 + f64::from(xi)) / count;
+        out[i] = ((quotient + bias) + 4_503_599_627_370_496.0).to_bits() as u32;
+        jitter[i] = j;
+    }
+}
+
+/// One position in each of `m` ≤ 2¹⁶ equal strata of [0, 1), in units of 2⁻³²: `out[i]` = ⌊(i·2³² + ξᵢ)/m⌋, where ξᵢ is
+/// the fraction `phi`/2³² in a nested (Owen) scramble of its own, seeded by `seed` and i. Each ξᵢ is stratified over the
+/// samples of a pixel if `phi` is. `jitter[i]` is a hash of `phi`, `seed` and i. Both slices have the length `m`.
+pub fn strata(phi: u32, seed: u32, m: u32, out: &mut [u32], jitter: &mut [u32]) {
+    dispatch!(Level::new(), _simd => strata_lanes(phi, seed, m, out, jitter));
+}
+
+/// The scalar twin of [`strata`], in integers.
+pub fn strata_scalar(phi: u32, seed: u32, m: u32, out: &mut [u32], jitter: &mut [u32]) {
+    for i in 0..out.len() {
+        let (xi, j) = stratum(phi.reverse_bits(), phi_hash(phi), seed, i as u32);
+        out[i] = (((i as u64) << 32 | u64::from(xi)) / u64::from(m)) as u32;
+        jitter[i] = j;
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::math::hash::pcg4d;
+    use lumiris_test_support::assert_chi_squared;
+
+    #[test]
+    fn lanes_give_the_bits_of_the_scalar_twins() {
+        for (case, m) in [1, 2, 3, 7, 8, 15, 16, 17, 100, 128, 255, 256, 1000, 65535, 65536].into_iter().enumerate() {
+            let [phi, seed, ..] = pcg4d([case as u32, 1, 2, 3]);
+            let mut a = [vec![0; m], vec![0; m]];
+            let mut b = a.clone();
+            let [out, jitter] = &mut a;
+            strata(phi, seed, m as u32, out, jitter);
+            let [out, jitter] = &mut b;
+            strata_scalar(phi, seed, m as u32, out, jitter);
+            assert_eq!(a, b);
+
+            let t: Vec<u32> = (0..m as u32).map(|i| pcg4d([i, 5, case as u32, 7])[0]).collect();
+            let mut c = [vec![0.0; m], vec![0.0; m]];
+            let mut d = c.clone();
+            let [u0, u1] = &mut c;
+            hilbert_points(&t, &a[1], u0, u1);
+            let [u0, u1] = &mut d;
+            hilbert_points_scalar(&t, &a[1], u0, u1);
+            assert_eq!(c, d);
+        }
+    }
+
+    #[test]
+    fn the_curve_visits_every_cell_and_steps_to_neighbours() {
+        let mut seen = vec![false; 1 << 16];
+        for i in 0..1_u32 << 16 {
+            let [x, y] = hilbert_cell(i << 16);
+            let cell = (y >> 8 << 8 | x >> 8) as usize;
+            assert!(!std::mem::replace(&mut seen[cell], true));
+        }
+        for i in 0..100_000 {
+            let t = pcg4d([i, 1, 2, 3])[0].min(u32::MAX - 1);
+            let (a, b) = (hilbert_cell(t), hilbert_cell(t + 1));
+            assert_eq!(a[0].abs_diff(b[0]) + a[1].abs_diff(b[1]), 1, "{t}");
+        }
+        assert_eq!((hilbert_cell(0), hilbert_cell(u32::MAX)), ([0, 0], [0xffff, 0]));
+    }
+
+    #[test]
+    fn jitter_completes_the_coordinates() {
+        let (mut u0, mut u1) = ([0.0], [0.0]);
+        hilbert_points(&[u32::MAX], &[0xabcd_12ff], &mut u0, &mut u1);
+        assert_eq!((u0[0] * 16_777_216.0, u1[0] * 16_777_216.0), (16_777_215.0, 18.0));
+    }
+
+    #[test]
+    fn strata_hold_one_position_each_and_the_samples_of_a_pixel_stratify_each() {
+        let m = 12_u32;
+        let samples = 64_u32;
+        let mut rows: Vec<Vec<u32>> = vec![Vec::new(); m as usize];
+        for s in 0..samples {
+            let phi = (s << 26) | (pcg4d([s, 3, 3, 3])[0] >> 6);
+            let (mut out, mut jitter) = (vec![0; m as usize], vec![0; m as usize]);
+            strata(phi, 77, m, &mut out, &mut jitter);
+            for (i, &t) in out.iter().enumerate() {
+                let place = u64::from(t) * u64::from(m);
+                assert!(place + u64::from(m) > (i as u64) << 32 && place < (i as u64 + 1) << 32);
+                let xi = place.saturating_sub((i as u64) << 32);
+                rows[i].push(((xi + u64::from(m) / 2) >> 26).min(63) as u32);
+            }
+        }
+        for row in &mut rows {
+            row.sort_unstable();
+            assert_eq!(*row, (0..samples).collect::<Vec<_>>());
+        }
+    }
+
+    #[test]
+    fn positions_within_strata_are_uniform_and_independent_by_chi_squared() {
+        let m = 16_u32;
+        let (mut pairs, mut jitters) = (vec![0.0; 64], vec![0.0; 64]);
+        let count = 20_000;
+        for s in 0..count {
+            let [phi, seed, ..] = pcg4d([s, 9, 9, 9]);
+            let (mut out, mut jitter) = (vec![0; 16], vec![0; 16]);
+            strata(phi, seed, m, &mut out, &mut jitter);
+            let xi = |i: usize| (out[i] << 4) >> 29;
+            pairs[(xi(3) * 8 + xi(11)) as usize] += 1.0;
+            jitters[((jitter[5] & 7) * 8 + (jitter[5] >> 8 & 7)) as usize] += 1.0;
+        }
+        for observed in [&pairs, &jitters] {
+            assert_chi_squared(observed, &[f64::from(count) / 64.0; 64], 1e-4);
+        }
+    }
+}

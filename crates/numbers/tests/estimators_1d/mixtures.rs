@@ -1,0 +1,259 @@
+//! Integrals on 0..1 that a deterministic mixture of several densities samples, and blocks of passes over them.
+
+use lumiris_numbers::estimators::mis::allot;
+use lumiris_numbers::estimators::ocv::{MAX_COMPONENTS, NormalEquations, block_of};
+use lumiris_numbers::math::hash::HashStream;
+
+/// A density on 0..1.
+#[derive(Clone, Copy, Debug)]
+pub enum Density {
+    /// Constant between two ends.
+    Uniform(f64, f64),
+    /// 4x up to ½, then 4(1 − x): a lobe.
+    Tent,
+    /// 1/(w(1 + ((x − c)/w)²)) for x in 0..1, normalised: centre, width, and the angles atan((0 − c)/w), atan((1 − c)/w).
+    Peak(f64, f64, [f64; 2]),
+}
+
+impl Density {
+    fn peak(centre: f64, width: f64) -> Density {
+        Density::Peak(centre, width, [(-centre / width).atan(), ((1.0 - centre) / width).atan()])
+    }
+
+    pub fn sample(self, u: f64) -> f64 {
+        match self {
+            Density::Uniform(a, b) => a + (b - a) * u,
+            Density::Tent if u < 0.5 => (0.5 * u).sqrt(),
+            Density::Tent => 1.0 - (0.5 * (1.0 - u)).sqrt(),
+            Density::Peak(c, w, [a, b]) => (c + w * (a + (b - a) * u).tan()).clamp(0.0, 1.0),
+        }
+    }
+
+    pub fn pdf(self, x: f64) -> f64 {
+        match self {
+            Density::Uniform(a, b) => inside(x, a, b) / (b - a),
+            Density::Tent => 4.0 * x.min(1.0 - x),
+            Density::Peak(c, w, [a, b]) => lorentz(x, c, w) / (w * (b - a)),
+        }
+    }
+}
+
+fn inside(x: f64, a: f64, b: f64) -> f64 {
+    f64::from(u8::from((a..b).contains(&x)))
+}
+
+fn lorentz(x: f64, c: f64, w: f64) -> f64 {
+    1.0 / (1.0 + ((x - c) / w) * ((x - c) / w))
+}
+
+/// An integral and the mixture that samples it.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Mixture {
+    /// A lobe and two lights; an occluder hides the end of one and most of the other.
+    Table,
+    /// The same; the occluder hides one of them and a little more.
+    Occluded,
+    /// A steep lobe and a wide light, of which it reflects a part.
+    Peak,
+    /// f is the mixture itself, up to a ripple that no component resembles: nothing is to be gained.
+    Optimal,
+    /// Diffuse and glossy lobes and two lights of different colours, partly hidden.
+    Colour,
+    /// A lobe and seven lights of different power, some of them hidden.
+    Many,
+    /// A light that is seen through a narrow slit: most estimates are 0.
+    Slit,
+    /// A lobe and one light.
+    OneLight,
+    /// A lobe, and no light.
+    NoLight,
+    /// [`Mixture::Table`] with both lights twice.
+    Duplicates,
+    /// [`Mixture::Table`] and a component outside of the part where f is not 0.
+    Useless,
+    /// f = 0.
+    Zero,
+}
+
+/// Those that bounds of variance hold for.
+pub const PROPER: [Mixture; 7] =
+    [Mixture::Table, Mixture::Occluded, Mixture::Peak, Mixture::Optimal, Mixture::Colour, Mixture::Many, Mixture::Slit];
+
+/// Those in which something is missing or too much.
+pub const DEGENERATE: [Mixture; 5] =
+    [Mixture::OneLight, Mixture::NoLight, Mixture::Duplicates, Mixture::Useless, Mixture::Zero];
+
+const MANY: [(f64, f64, f64); 7] = [
+    (0.05, 0.12, 3.0),
+    (0.12, 0.19, 0.2),
+    (0.2, 0.31, 1.0),
+    (0.33, 0.41, 5.0),
+    (0.41, 0.54, 0.4),
+    (0.55, 0.66, 2.0),
+    (0.68, 0.83, 1.0),
+];
+
+impl Mixture {
+    /// Components and their weights.
+    fn components(self) -> Vec<(Density, f32)> {
+        let lights = [(0.2, 0.5), (0.6, 0.9)].map(|(a, b)| Density::Uniform(a, b));
+        let three =
+            |weights: [f32; 3]| vec![(Density::Tent, weights[0]), (lights[0], weights[1]), (lights[1], weights[2])];
+        match self {
+            Mixture::Table | Mixture::Occluded | Mixture::Zero => three([0.5, 0.25, 0.25]),
+            Mixture::Optimal => three([1.0 / 3.0; 3]),
+            Mixture::Peak => vec![(Density::peak(0.4, 0.02), 0.5), (Density::Uniform(0.2, 0.7), 0.5)],
+            Mixture::Colour => {
+                let glossy = Density::peak(0.7, 0.03);
+                vec![(Density::Tent, 0.25), (glossy, 0.25), (lights[0], 0.25), (lights[1], 0.25)]
+            }
+            Mixture::Many => {
+                let light = |&(a, b, _): &(f64, f64, f64)| (Density::Uniform(a, b), 0.5 / 7.0);
+                std::iter::once((Density::Tent, 0.5)).chain(MANY.iter().map(light)).collect()
+            }
+            Mixture::Slit | Mixture::OneLight => vec![(Density::Tent, 0.5), (lights[0], 0.5)],
+            Mixture::NoLight => vec![(Density::Tent, 1.0)],
+            Mixture::Duplicates => {
+                let mut twice = three([0.5, 0.125, 0.125]);
+                twice.extend_from_within(1..);
+                twice
+            }
+            Mixture::Useless => {
+                let mut four = three([0.4, 0.2, 0.2]);
+                four.push((Density::Uniform(0.0, 0.1), 0.2));
+                four
+            }
+        }
+    }
+
+    /// f by channel.
+    pub fn f(self, x: f64) -> [f64; 3] {
+        let bsdf = 4.0 * x * (1.0 - x);
+        let (a, b) = (inside(x, 0.2, 0.5), inside(x, 0.6, 0.9));
+        let visible = |from, to| 1.0 - inside(x, from, to);
+        match self {
+            Mixture::Table | Mixture::Duplicates | Mixture::Useless => [2.0 * bsdf * (a + b) * visible(0.4, 0.78); 3],
+            Mixture::Occluded => [2.0 * bsdf * (a + b) * visible(0.55, 0.9); 3],
+            Mixture::Peak => [inside(x, 0.2, 0.7) * (20.0 * lorentz(x, 0.41, 0.022) + 0.5); 3],
+            Mixture::Optimal => {
+                let mixture = (4.0 * x.min(1.0 - x) + (a + b) / 0.3) / 3.0;
+                [mixture * (1.0 + 0.5 * (150.0 * x).sin()); 3]
+            }
+            Mixture::Colour => {
+                let gloss = 8.0 * lorentz(x, 0.71, 0.03);
+                let seen = visible(0.25, 0.35);
+                let [red, green, blue] = [4.0 * a + 0.1 * b, a + b, 0.2 * a + 5.0 * b].map(|l| l * seen);
+                [red * (0.3 * bsdf + 0.2 * gloss), green * (bsdf + 0.1 * gloss), blue * (0.5 * bsdf + 0.2 * gloss)]
+            }
+            Mixture::Many => {
+                let li = MANY.iter().map(|&(a, b, l)| l * inside(x, a, b)).sum::<f64>();
+                [bsdf * li * visible(0.3, 0.45); 3]
+            }
+            Mixture::Slit => [30.0 * bsdf * inside(x, 0.3, 0.31); 3],
+            Mixture::OneLight => [2.0 * bsdf * a * visible(0.4, 0.78); 3],
+            Mixture::NoLight => [bsdf, bsdf * x, 1.0 - x],
+            Mixture::Zero => [0.0; 3],
+        }
+    }
+
+    /// A channel of f without the occluder, for the integrals of lights of one power.
+    pub fn unshadowed(self, x: f64) -> f64 {
+        8.0 * x * (1.0 - x) * (inside(x, 0.2, 0.5) + inside(x, 0.6, 0.9))
+    }
+
+    /// ∫f by the midpoint rule, whose points are symmetric about every step of f.
+    pub fn value(self) -> [f64; 3] {
+        const POINTS: u32 = 1_000_000;
+        let mut sum = [0.0; 3];
+        for k in 0..POINTS {
+            let f = self.f((f64::from(k) + 0.5) / f64::from(POINTS));
+            (0..3).for_each(|i| sum[i] += f[i]);
+        }
+        sum.map(|s| s / f64::from(POINTS))
+    }
+}
+
+/// Samples of a mixture: for each component its number n_j per pass.
+pub struct Sampler {
+    pub mixture: Mixture,
+    pub densities: Vec<Density>,
+    pub counts: Vec<u32>,
+    /// Stratified samples: each component over its whole domain, in as many equal strata as it has samples in a block.
+    pub is_stratified: bool,
+    /// Factor of f.
+    pub scale: f64,
+    /// How far the occluder of [`Mixture::Table`] is moved.
+    pub shift: f64,
+    pub equations: NormalEquations,
+    pub n: u32,
+}
+
+/// A sample: where, of which component, all densities there, and p_α.
+#[derive(Clone, Copy, Debug)]
+pub struct Point {
+    pub x: f64,
+    pub component: usize,
+    pub pdfs: [f64; MAX_COMPONENTS],
+    pub mixture_pdf: f64,
+}
+
+impl Sampler {
+    pub fn new(mixture: Mixture, n: u32, is_stratified: bool) -> Sampler {
+        let (densities, alpha): (Vec<Density>, Vec<f32>) = mixture.components().into_iter().unzip();
+        let mut counts = vec![0; alpha.len()];
+        allot(&alpha, n, &mut counts);
+        let equations = NormalEquations::new(alpha.len());
+        Sampler { mixture, densities, counts, is_stratified, scale: 1.0, shift: 0.0, equations, n }
+    }
+
+    /// All samples of a block of `passes`.
+    pub fn points(&self, passes: u32, stream: &mut HashStream, mut each: impl FnMut(&Point)) {
+        for (component, (density, count)) in self.densities.iter().zip(&self.counts).enumerate() {
+            let strata = count * passes;
+            for k in 0..strata {
+                let u = f64::from(stream.next_f32());
+                let u = if self.is_stratified { (f64::from(k) + u) / f64::from(strata) } else { u };
+                let mut point = Point { x: density.sample(u), component, pdfs: [0.0; 8], mixture_pdf: 0.0 };
+                for (j, d) in self.densities.iter().enumerate() {
+                    point.pdfs[j] = d.pdf(point.x);
+                    point.mixture_pdf += f64::from(self.counts[j]) / f64::from(self.n) * point.pdfs[j];
+                }
+                each(&point);
+            }
+        }
+    }
+
+    /// y = f/p_α.
+    pub fn y(&self, point: &Point) -> [f32; 3] {
+        let scale = self.scale / point.mixture_pdf;
+        if self.shift != 0.0 {
+            let seen = 1.0 - inside(point.x, 0.4 + self.shift, 0.78 + self.shift);
+            return [(self.mixture.unshadowed(point.x) * seen * scale) as f32; 3];
+        }
+        self.mixture.f(point.x).map(|f| (f * scale) as f32)
+    }
+
+    /// Adds a block of `passes` to `sums`, whose columns are p_j/p_α − `centre`. A component without samples is no column.
+    pub fn add(&self, passes: u32, centre: f64, stream: &mut HashStream, sums: &mut [f32]) {
+        self.points(passes, stream, |point| {
+            let mut columns = [0.0; MAX_COMPONENTS];
+            for (j, column) in columns[..self.densities.len()].iter_mut().enumerate() {
+                if self.counts[j] > 0 {
+                    *column = (point.pdfs[j] / point.mixture_pdf - centre) as f32;
+                }
+            }
+            self.equations.add(sums, &columns[..self.densities.len()], self.y(point));
+        });
+    }
+
+    /// The sums of a new block with centred columns.
+    pub fn block(&self, passes: u32, stream: &mut HashStream, sums: &mut [f32]) {
+        sums.fill(0.0);
+        self.add(passes, 1.0, stream, sums);
+    }
+
+    /// Lengths of the blocks of the first `passes` passes.
+    pub fn blocks(passes: u32) -> impl Iterator<Item = u32> {
+        (0..passes).map(block_of).enumerate().filter(|(pass, b)| *pass == b.first as usize).map(|(_, b)| b.len)
+    }
+}

@@ -1,0 +1,153 @@
+//! Means and variances of the ways of drawing.
+
+use super::integrals::{ALL, Integral, Proposals, fill, run};
+use super::{assert_means, assert_variances};
+use lumiris_numbers::estimators::baselines::{defensive_choice, defensive_pdf};
+use lumiris_numbers::estimators::mc;
+use lumiris_numbers::estimators::ris::{independent_sets, strata, stratified, systematic, with_replacement};
+use lumiris_numbers::math::hash::HashStream;
+
+const RUNS: usize = 1_000_000;
+const M: usize = 12;
+const N: usize = 3;
+
+#[test]
+fn with_replacement_has_the_variance_of_thesis_equation_4_2() {
+    for integral in ALL {
+        let (value, moments) = integral.moments();
+        let (m, n) = (M as f64, N as f64);
+        let expected = std::array::from_fn(|i| {
+            (moments.e3[i] - moments.e1[i]) / m + (1.0 - 1.0 / m) * (moments.e2[i] - moments.e1[i]) / n
+        });
+        let (mut p, mut draws, mut u) = (Proposals::default(), Vec::new(), [0.0; N]);
+        let channels = run(RUNS, [1, integral as u32, 0], |stream| {
+            p.independent(integral, M, stream);
+            fill(&mut u, stream);
+            with_replacement(&p.weights, &u, &mut draws);
+            p.estimate(&draws)
+        });
+        assert_means("with replacement", &channels, value);
+        assert_variances("with replacement", &channels, expected);
+    }
+}
+
+#[test]
+fn independent_sets_have_the_variance_of_paper_equation_2() {
+    for integral in ALL {
+        let (value, moments) = integral.moments();
+        let (mut p, mut draws, mut u) = (Proposals::default(), Vec::new(), [0.0; N]);
+        let channels = run(RUNS, [2, integral as u32, 0], |stream| {
+            p.independent(integral, M, stream);
+            fill(&mut u, stream);
+            independent_sets(&p.weights, N as u32, &u, &mut draws);
+            p.estimate(&draws)
+        });
+        assert_means("independent sets", &channels, value);
+        assert_variances("independent sets", &channels, moments.variance_of_sets((M / N) as f64, N as f64));
+    }
+}
+
+#[test]
+fn stratified_draws_have_the_variance_of_thesis_equation_4_6() {
+    // Four strata of the domain with different numbers of proposals, of which one each is drawn.
+    const SIZES: [u32; 4] = [1, 2, 5, 3];
+    for integral in ALL {
+        let (mut value, mut expected) = ([0.0; 3], [0.0; 3]);
+        for (k, &m) in SIZES.iter().enumerate() {
+            let (v, e) = integral.moments_between(k as f64 / 4.0, (k + 1) as f64 / 4.0);
+            let m = f64::from(m);
+            for i in 0..3 {
+                value[i] += v[i];
+                expected[i] += (e.e3[i] - e.e1[i]) / m + (1.0 - 1.0 / m) * (e.e2[i] - e.e1[i]);
+            }
+        }
+        let (mut p, mut draws, mut u) = (Proposals::default(), Vec::new(), [0.0; 4]);
+        let ends = [1, 3, 8, 11];
+        let channels = run(RUNS, [3, integral as u32, 0], |stream| {
+            p.clear();
+            for (k, &m) in SIZES.iter().enumerate() {
+                for _ in 0..m {
+                    let [a, b] = stream.next_2d().map(f64::from);
+                    let x = integral.sample([(k as f64 + a) / 4.0, b]);
+                    p.push(integral, x, 1.0 / (f64::from(m) * 4.0 * integral.pdf(x)));
+                }
+            }
+            fill(&mut u, stream);
+            stratified(&p.weights, &ends, &u, &mut draws);
+            p.estimate(&draws)
+        });
+        assert_means("stratified", &channels, value);
+        assert_variances("stratified", &channels, expected);
+    }
+}
+
+/// One estimate of `integral` by some way of drawing.
+type Estimate = fn(Integral, &mut HashStream, &mut Proposals) -> [f64; 3];
+
+fn systematic_estimate(integral: Integral, stream: &mut HashStream, p: &mut Proposals) -> [f64; 3] {
+    let mut draws = Vec::new();
+    p.independent(integral, M, stream);
+    systematic(&p.weights, N as u32, stream.next_f32(), &mut draws);
+    p.estimate(&draws)
+}
+
+fn jittered_systematic_estimate(integral: Integral, stream: &mut HashStream, p: &mut Proposals) -> [f64; 3] {
+    let mut draws = Vec::new();
+    p.jittered(integral, M, stream);
+    systematic(&p.weights, N as u32, stream.next_f32(), &mut draws);
+    p.estimate(&draws)
+}
+
+fn equal_weights_estimate(integral: Integral, stream: &mut HashStream, p: &mut Proposals) -> [f64; 3] {
+    let (mut draws, mut ends, mut u) = (Vec::new(), Vec::new(), [0.0; 2 * N]);
+    p.independent(integral, M, stream);
+    fill(&mut u, stream);
+    strata::equal_weights(&p.weights, N, &u[N..], &mut ends);
+    stratified(&p.weights, &ends, &u[..ends.len()], &mut draws);
+    p.estimate(&draws)
+}
+
+fn single_draw_estimate(integral: Integral, stream: &mut HashStream, p: &mut Proposals) -> [f64; 3] {
+    let mut draws = Vec::new();
+    p.independent(integral, 2, stream);
+    with_replacement(&p.weights, &[stream.next_f32()], &mut draws);
+    p.estimate(&draws)
+}
+
+fn plain_estimate(integral: Integral, stream: &mut HashStream, _: &mut Proposals) -> [f64; 3] {
+    let x = integral.sample(stream.next_2d().map(f64::from));
+    let weight = f64::from(mc::weight(1.0, integral.pdf(x) as f32));
+    integral.f(x).map(|f| f * weight)
+}
+
+fn defensive_estimate(integral: Integral, stream: &mut HashStream, _: &mut Proposals) -> [f64; 3] {
+    // p₁ = 2 on the lower half of the first axis misses half of f; p₀ = p.
+    const ALPHA: f32 = 0.3;
+    let [u, v] = stream.next_2d();
+    let (safe, u) = defensive_choice(ALPHA, u);
+    let u = [f64::from(u), f64::from(v)];
+    let x = if safe { integral.sample(u) } else { [0.5 * u[0], integral.sample(u)[1]] };
+    let p1 = if x[0] < 0.5 { 2.0 } else { 0.0 };
+    let pdf = f64::from(defensive_pdf(ALPHA, integral.pdf(x) as f32, p1));
+    integral.f(x).map(|f| f / pdf)
+}
+
+#[test]
+fn every_other_way_of_drawing_is_unbiased() {
+    let estimates: [(&str, Estimate); 6] = [
+        ("systematic", systematic_estimate),
+        ("systematic, jittered proposals", jittered_systematic_estimate),
+        ("equal weights", equal_weights_estimate),
+        ("one of two", single_draw_estimate),
+        ("plain", plain_estimate),
+        ("defensive mixture", defensive_estimate),
+    ];
+    for integral in ALL {
+        let (value, _) = integral.moments();
+        for (k, (name, estimate)) in estimates.iter().enumerate() {
+            let mut p = Proposals::default();
+            let channels = run(RUNS, [4, integral as u32, k as u32], |stream| estimate(integral, stream, &mut p));
+            assert_means(name, &channels, value);
+        }
+    }
+}
