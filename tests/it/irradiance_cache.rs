@@ -7,7 +7,9 @@ use lumiris::render::output::{Aov, channels};
 use lumiris::render::{RenderSettings, Rendering, render};
 use lumiris::scene::{AccelKind, Cached, EstimatorKind, IntegratorKind, Proposals, World};
 use lumiris_numbers::estimators::ocv::Form;
+use lumiris_numbers::estimators::stats::{Welford, sidak};
 use lumiris_numbers::math::Vec3;
+use lumiris_test_support::significance::{detectable_deviation, is_beyond};
 use std::path::Path;
 use std::sync::atomic::AtomicBool;
 
@@ -192,79 +194,59 @@ fn seeds_give_different_records() {
     assert_ne!(picture(3), picture(4));
 }
 
-#[test]
-#[ignore = "explore"]
-fn explore_records() {
-    use lumiris_numbers::estimators::stats::Welford;
-    let mean = |name: &str, size: u32, change: &dyn Fn(&mut lumiris::scene::IntegratorSettings)| {
-        let start = std::time::Instant::now();
-        let mut w = Welford::new();
-        for seed in 0..12 {
-            let world = world_of(&ROOM.replace("[ 48 ]", &format!("[ {size} ]")), |scene| {
-                with_cache(scene, Cached::All);
-                scene.integrator.cache.samples = 64;
-                scene.integrator.samples = Some(8);
-                scene.integrator.ris.proposals = Proposals::Fixed(32);
-                scene.sampling.seed = seed + 100;
-                change(&mut scene.integrator);
-            });
-            let film = rendering(&world, RenderSettings { spp: 4, threads: Some(1), ..Default::default() }).film;
-            w.add(squares(&film, size)[0]);
-        }
-        println!(
-            "{size} {name} {:.5} {:.5} rel {:.5} t {:.2}",
-            w.mean(),
-            w.standard_error(),
-            w.variance().sqrt() / w.mean(),
-            start.elapsed().as_secs_f64()
-        );
-    };
-    for size in [24, 48] {
-        mean("mis", size, &|s| s.estimator = EstimatorKind::Mis);
-        for estimator in [
-            EstimatorKind::Mc,
-            EstimatorKind::Ris,
-            EstimatorKind::Ocv,
-            EstimatorKind::Correlated,
-            EstimatorKind::OptimalMis,
-        ] {
-            mean(estimator.name(), size, &|s| s.estimator = estimator);
-        }
-        for form in [Form::Paper, Form::Regression, Form::Crossfit] {
-            mean(form.name(), size, &|s| (s.estimator, s.ocv.form) = (EstimatorKind::Ocv, form));
-        }
-    }
-}
+/// A change of the settings, by name, and the relative bias that it has at most.
+type Choice = (&'static str, f64, fn(&mut lumiris::scene::IntegratorSettings));
+
+/// Those that fit their coefficients to the eight samples of an estimate are biased: −6 % and −9 % were measured of those with a
+/// limit, ± 0.2 %.
+const RECORD_ESTIMATORS: [Choice; 8] = [
+    ("mc", 0.0, |s| s.estimator = EstimatorKind::Mc),
+    ("ris", 0.0, |s| s.estimator = EstimatorKind::Ris),
+    ("ocv, progressive", 0.0, |s| s.estimator = EstimatorKind::Ocv),
+    ("ocv, crossfit", 0.0, |s| (s.estimator, s.ocv.form) = (EstimatorKind::Ocv, Form::Crossfit)),
+    ("ocv, regression", 0.005, |s| (s.estimator, s.ocv.form) = (EstimatorKind::Ocv, Form::Regression)),
+    ("ocv, paper", 0.08, |s| (s.estimator, s.ocv.form) = (EstimatorKind::Ocv, Form::Paper)),
+    ("optimal-mis, progressive", 0.0, |s| s.estimator = EstimatorKind::OptimalMis),
+    ("correlated, combined", 0.11, |s| s.estimator = EstimatorKind::Correlated),
+];
 
 #[test]
 fn records_take_any_estimator() {
-    let mean = |change: &dyn Fn(&mut lumiris::scene::IntegratorSettings)| {
-        let world = world_of(ROOM, |scene| {
+    const PICTURES: u32 = 16;
+    let small_room = ROOM.replace("[ 48 ]", "[ 24 ]");
+    let picture = |seed, change: fn(&mut lumiris::scene::IntegratorSettings)| {
+        let world = world_of(&small_room, |scene| {
             with_cache(scene, Cached::All);
-            scene.integrator.cache.samples = 64;
+            scene.integrator.cache.samples = 16;
             scene.integrator.samples = Some(8);
             scene.integrator.ris.proposals = Proposals::Fixed(32);
+            scene.sampling.seed = seed;
             change(&mut scene.integrator);
         });
-        let film = rendering(&world, RenderSettings { spp: 4, ..Default::default() }).film;
-        squares(&film, 48)[0]
+        squares(&rendering(&world, RenderSettings::default()).film, 24)[0]
     };
-    let reference = mean(&|s| s.estimator = EstimatorKind::Mis);
-    for estimator in [EstimatorKind::Mc, EstimatorKind::Ris, EstimatorKind::Ocv] {
-        let ratio = mean(&|s| s.estimator = estimator) / reference;
-        assert!((ratio - 1.0).abs() < 0.05, "{estimator:?}: {ratio}");
-    }
 
-    // Those that are biased, or without a penalty, at eight samples
-    for estimator in [EstimatorKind::Correlated, EstimatorKind::OptimalMis] {
-        assert!(mean(&|s| s.estimator = estimator).is_finite(), "{estimator:?}");
+    // Pictures of the same seed have the same camera rays and the same final gathers
+    let references: Vec<f64> = (0..PICTURES).map(|seed| picture(seed, |s| s.estimator = EstimatorKind::Mis)).collect();
+    let significance = sidak(1e-3, RECORD_ESTIMATORS.len());
+    let mut faults = Vec::new();
+    for (name, limit, change) in RECORD_ESTIMATORS {
+        let ratios: Vec<f64> = (0..).zip(&references).map(|(seed, r)| picture(seed, change) / r).collect();
+        let is_biased = |factor: f64| {
+            let ratios: Welford = ratios.iter().map(|r| r * factor).collect();
+            is_beyond(&ratios, 1.0, limit, significance)
+        };
+        let mean: Welford = ratios.iter().copied().collect();
+        let error = mean.standard_error();
+        let noticed = limit + detectable_deviation(significance, 0.99, mean.count() - 1) * error;
+        let found = format!("{name}: {:.4} ± {error:.4}, limit {limit}, notices {noticed:.4}", mean.mean());
+        let injected = limit + noticed + 0.005;
+        let is_noticed = noticed < limit + 0.02 && is_biased(1.0 + injected) && is_biased(1.0 - injected);
+        if is_biased(1.0) || !is_noticed {
+            faults.push(found);
+        }
     }
-    for form in [Form::Paper, Form::Regression, Form::Crossfit] {
-        let by_form =
-            |s: &mut lumiris::scene::IntegratorSettings| (s.estimator, s.ocv.form) = (EstimatorKind::Ocv, form);
-        let ratio = mean(&by_form) / reference;
-        assert!((ratio - 1.0).abs() < 0.25, "{form:?}: {ratio}");
-    }
+    assert!(faults.is_empty(), "{}", faults.join("\n"));
 }
 
 /// A point of the floor of [`ROOM`], or of a scene whose floor is z = 0.

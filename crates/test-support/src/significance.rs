@@ -3,6 +3,7 @@
 //! A test of level α rejects where the mean is t_α standard errors or more from the answer; a mean that is off by
 //! (t_α + t_β) standard errors is then rejected with probability 1 − β, t_β being the quantile of Student's distribution.
 
+use lumiris_numbers::estimators::stats::Welford;
 use statrs::function::beta::beta_reg;
 
 /// |t| that is reached with probability `p` if the mean is right: where `t_test` has this p-value.
@@ -36,10 +37,16 @@ pub fn detectable_bias(relative_error: f64, count: u64, significance: f64, power
     if deviation < 1.0 { deviation / (1.0 - deviation) } else { f64::INFINITY }
 }
 
+/// Whether a two-sided t-test of this level rejects that the mean is within `limit` of `expected`.
+pub fn is_beyond(samples: &Welford, expected: f64, limit: f64, significance: f64) -> bool {
+    let excess = (samples.mean() - expected).abs() - limit;
+    excess > critical_t(significance, samples.count() - 1) * samples.standard_error()
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
-    use lumiris_numbers::estimators::stats::{Welford, t_test};
+    use lumiris_numbers::estimators::stats::t_test;
     use lumiris_numbers::math::hash::HashStream;
 
     #[test]
@@ -66,7 +73,9 @@ mod tests {
             let right: Welford = values.iter().copied().collect();
             let bias = detectable_bias(right.standard_error(), 32, significance, power);
             let wrong: Welford = values.iter().map(|v| v * (1.0 + bias)).collect();
-            found += usize::from(t_test(&wrong, 1.0).p_value < significance);
+            let is_found = t_test(&wrong, 1.0).p_value < significance;
+            assert_eq!(is_found, is_beyond(&wrong, 1.0, 0.0, significance));
+            found += usize::from(is_found);
         }
         // The share of 4000 runs has σ = 0.0016; four of them
         let share = found as f64 / RUNS as f64;

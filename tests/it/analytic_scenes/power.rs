@@ -11,7 +11,7 @@ use lumiris::render::{RenderSettings, render};
 use lumiris::scene::Cached;
 use lumiris_numbers::estimators::stats::{Welford, sidak, t_test};
 use lumiris_test_support::significance::{detectable_bias, detectable_deviation};
-use std::collections::HashMap;
+use std::collections::{BTreeMap, HashMap};
 use std::path::{Path, PathBuf};
 use std::sync::Mutex;
 use std::sync::atomic::{AtomicBool, AtomicUsize, Ordering};
@@ -218,12 +218,20 @@ fn measured_noise() -> HashMap<String, f64> {
     text.lines().skip(1).filter_map(entry).collect()
 }
 
-/// Replaces the table.
+/// Replaces the lines of these scenes in the table.
 pub fn write_table(outcomes: &[Outcome<'_>], level: f64) {
-    let lines = outcomes.iter().map(|o| o.line(level) + "\n");
-    let text = format!("{HEADER}\n") + &lines.collect::<String>();
+    let old = std::fs::read_to_string(table_path()).unwrap_or_default();
+    let mut scenes: BTreeMap<&str, String> = BTreeMap::new();
+    for line in
+        old.lines().skip(1).filter(|l| outcomes.iter().all(|o| !l.starts_with(&format!("{},", o.row.scene.name))))
+    {
+        *scenes.entry(line.split(',').next().unwrap()).or_default() += &format!("{line}\n");
+    }
+    for outcome in outcomes {
+        *scenes.entry(&outcome.row.scene.name).or_default() += &format!("{}\n", outcome.line(level));
+    }
     std::fs::create_dir_all(table_path().parent().unwrap()).unwrap();
-    std::fs::write(table_path(), text).unwrap();
+    std::fs::write(table_path(), format!("{HEADER}\n") + &scenes.into_values().collect::<String>()).unwrap();
 }
 
 /// Prints the table.
@@ -233,8 +241,7 @@ pub fn print_table(out: &mut dyn std::io::Write, outcomes: &[Outcome<'_>], level
 }
 
 /// Renders all rows of the scenes.
-pub fn render_rows<'a>(scenes: &'a [Scene], effort: &Effort) -> Vec<Outcome<'a>> {
-    let level = level(scenes);
+pub fn render_rows<'a>(scenes: &'a [Scene], effort: &Effort, level: f64) -> Vec<Outcome<'a>> {
     let known = if std::env::var_os(MEASURE).is_some() { HashMap::new() } else { measured_noise() };
     let rows = scenes.iter().flat_map(|scene| configurations().into_iter().map(move |c| (scene, c)));
     let rows: Vec<(&Scene, Configuration)> = rows.collect();
