@@ -1,11 +1,10 @@
-//! Embree by itself: loops over packets that were filled before, and nothing of what the renderer adds. They say how
-//! fast a query can be at best, and what conversion and exact hits cost.
+//! Plain Embree: loops over packets filled in advance, without anything the renderer adds. They show how fast a query
+//! can be at best, and what conversion and exact hits cost.
 //!
-//! The scene is built as the renderer's, but without the flag by which queries bring a filter. Quadrics, patches and
-//! cut-outs call back as they do in the renderer.
+//! The scene is built like the renderer's, but without the flag that lets queries bring a filter function. Quadrics,
+//! patches and alpha masks use callbacks as in the renderer.
 #![allow(unsafe_code)]
 
-use super::callbacks::QueryContext;
 use super::device::Device;
 use super::kernels::{self, Ask, Mode, RayHitPacket, RayPacket, Valid};
 use super::query::{ANY_SINGLE, can_trace, load, single_ray};
@@ -18,11 +17,11 @@ use embree4_sys as sys;
 use std::sync::Arc;
 use std::time::{Duration, Instant};
 
-/// Embree's structures over a scene.
+/// Embree's data structures for a scene.
 pub struct Bare {
     root: EmbreeScene,
     world: Arc<World>,
-    /// Whether callbacks report hits, for which the context must be made ready.
+    /// Whether callbacks report hits, for which the context must be prepared.
     calls_back: bool,
     build_time: Duration,
 }
@@ -43,7 +42,7 @@ enum Packets {
 }
 
 impl Bare {
-    /// Builds on all cores. Without `alpha`, cut-outs are opaque.
+    /// Builds on all cores. Without `alpha`, alpha masks are opaque.
     pub fn new(set: Arc<GeometrySet>, alpha: Option<Arc<dyn AlphaSource>>) -> Result<Bare, EmbreeError> {
         let start = Instant::now();
         let device = Arc::new(Device::new(c"", None)?);
@@ -74,7 +73,7 @@ impl Bare {
 
     fn nearest_singly(&self, rays: &RayBatch, singles: &mut [sys::RTCRayHit]) {
         let mode = Mode { ask: Ask::Nearest, coherent: false };
-        let mut context = QueryContext::new(&self.world, rays, mode);
+        let mut context = kernels::query_context(&self.world, rays, mode);
         for single in singles {
             if self.calls_back {
                 context.begin(single.ray.id as usize);
@@ -87,7 +86,7 @@ impl Bare {
 
     fn nearest<const N: usize>(&self, rays: &RayBatch, packets: &mut [(Valid<N>, RayHitPacket<N>)], coherent: bool) {
         let mode = Mode { ask: Ask::Nearest, coherent };
-        let mut context = QueryContext::new(&self.world, rays, mode);
+        let mut context = kernels::query_context(&self.world, rays, mode);
         for (valid, packet) in packets {
             if self.calls_back {
                 context.begin(packet.rays.id[0] as usize);
@@ -99,7 +98,7 @@ impl Bare {
     }
 
     fn any_singly(&self, rays: &RayBatch, singles: &mut [sys::RTCRay]) {
-        let mut context = QueryContext::new(&self.world, rays, ANY_SINGLE);
+        let mut context = kernels::query_context(&self.world, rays, ANY_SINGLE);
         for single in singles {
             // SAFETY: the scene is committed, the ray is finite and its id an index of the batch.
             unsafe { kernels::occluded1(self.root.raw(), &mut context, single) };
@@ -109,7 +108,7 @@ impl Bare {
 
     fn any<const N: usize>(&self, rays: &RayBatch, packets: &mut [(Valid<N>, RayPacket<N>)], coherent: bool) {
         let mode = Mode { ask: Ask::Any, coherent };
-        let mut context = QueryContext::new(&self.world, rays, mode);
+        let mut context = kernels::query_context(&self.world, rays, mode);
         for (valid, packet) in packets {
             // SAFETY: the scene is committed, the lanes in `valid` are finite, ids are indices of the batch.
             unsafe { kernels::occluded_packet(self.root.raw(), &mut context, mode, valid, packet) };
@@ -119,7 +118,7 @@ impl Bare {
 }
 
 impl<'a> Packed<'a> {
-    /// Rays whose first hits are asked for, in packets of `width`: 1, 4 or 8.
+    /// Rays whose nearest hits are queried, in packets of `width`: 1, 4 or 8.
     pub fn first(rays: &'a RayBatch, width: u32) -> Result<Packed<'a>, EmbreeError> {
         let packets = match checked_width(width)? {
             4 => Packets::First4(pack_first(rays)),
@@ -147,7 +146,7 @@ impl<'a> Packed<'a> {
         Ok(Packed { rays, packets })
     }
 
-    /// How many of the traced rays hit something.
+    /// Number of rays that hit something.
     pub fn hits(&self) -> usize {
         fn first<const N: usize>(packets: &[(Valid<N>, RayHitPacket<N>)]) -> usize {
             let geometries = packets.iter().flat_map(|(_, packet)| packet.geometry);

@@ -1,20 +1,21 @@
-//! Embree's query functions, alike for both families.
+//! Embree's query functions, with one interface for both API versions.
 #![allow(unsafe_code)]
 
-use super::callbacks::{MAX_WIDTH, QueryContext, first_filter};
-use super::world::{Reported, World};
+use super::callbacks::first_filter;
+use super::context::{QueryContext, RtcContext};
+use super::world::World;
 use crate::accel::RayBatch;
 use embree4_sys as sys;
 
 /// Words per hit beyond the eight that every version has: `instPrimID`, where it exists.
 const EXTRA_HIT_WORDS: usize = if size_of::<sys::RTCRayHit8>() == 640 { 0 } else { 1 };
 
-/// What is asked.
+/// The kind of query.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) enum Ask {
-    /// First hits, which the filter of the query collects.
+    /// Nearest hits, collected by the filter function of the query.
     First,
-    /// First hits as Embree itself keeps them.
+    /// Nearest hits as Embree determines them.
     Nearest,
     /// Whether anything is hit.
     Any,
@@ -23,7 +24,7 @@ pub(super) enum Ask {
 /// How to trace.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) struct Mode {
-    /// What is asked.
+    /// The kind of query.
     pub ask: Ask,
     /// Traverse packets by their common frustum.
     pub coherent: bool,
@@ -101,26 +102,9 @@ impl<const N: usize> RayHitPacket<N> {
     }
 }
 
-/// The part of a query that Embree knows.
-#[cfg(embree3)]
-pub(super) type RtcContext = sys::RTCIntersectContext;
-/// The part of a query that Embree knows.
-#[cfg(embree4)]
-pub(super) type RtcContext = sys::RTCRayQueryContext;
-
-impl<'a> QueryContext<'a> {
-    pub fn new(world: &'a World, rays: &'a RayBatch, mode: Mode) -> Self {
-        let (best_t, first) = ([f32::INFINITY; MAX_WIDTH], [Reported::NONE; MAX_WIDTH]);
-        QueryContext { rtc: rtc_context(mode), world, rays, base: 0, best_t, first, panic: None }
-    }
-
-    /// Goes on with the panic of a callback.
-    #[inline]
-    pub fn finish(self) {
-        if let Some(panic) = self.panic {
-            std::panic::resume_unwind(panic);
-        }
-    }
+/// The context of queries on a batch.
+pub(super) fn query_context<'a>(world: &'a World, rays: &'a RayBatch, mode: Mode) -> QueryContext<'a> {
+    QueryContext::new(rtc_context(mode), world, rays)
 }
 
 #[cfg(embree3)]

@@ -1,4 +1,4 @@
-//! Content that the program makes itself: a statue, a sky, and the scenes that show them.
+//! Generated content: a statue, a sky, and the scenes that use them.
 //!
 //! Reading order: [`noise`], [`nets`], [`solids`], [`relief`], [`dragon`] (with `head`), [`statue`], [`ply`], [`sky`],
 //! [`files`], [`talbot`], [`fan`], [`keller_wald`].
@@ -8,6 +8,7 @@ pub mod fan;
 pub mod files;
 mod head;
 pub mod keller_wald;
+mod limbs;
 pub mod nets;
 pub mod noise;
 pub mod ply;
