@@ -6,7 +6,7 @@ PACKAGES = build-essential pkg-config libembree-dev libopenimageio-dev
 TEST_PACKAGES = chromium
 SCENE = scenes/demo/gallery.pbrt
 
-.PHONY: run test setup lint doc bindings clean
+.PHONY: run test test-power measure-power setup lint doc bindings clean
 
 run: setup
 	$(CARGO) build --release
@@ -17,6 +17,15 @@ test: setup
 	@.ci/setup.sh $(TEST_PACKAGES)
 	$(CARGO) test --workspace --doc
 	$(CARGO) test --workspace --lib --bins --tests
+
+# Scenes with known answers at full power: as many samples as find a bias of 2 % (of 0.5 % in quiet scenes), the injection of
+# that bias, and the table of what each row finds. `make test` does the same with a sixth of the samples or less.
+test-power: setup
+	$(CARGO) test -p lumiris --test it -- --ignored --nocapture known_answer_at_full_power
+
+# The same; counts the samples of each row anew, and writes docs/measurements/power/rows.csv, by which both tests go.
+measure-power: setup
+	MEASURE_POWER=1 $(CARGO) test -p lumiris --test it -- --ignored --nocapture known_answer_at_full_power
 
 # Installs what is missing; does nothing, and needs no rights, where everything is there.
 setup:

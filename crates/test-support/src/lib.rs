@@ -1,5 +1,7 @@
 //! Statistical assertions for tests.
 
+pub mod significance;
+
 use lumiris_numbers::estimators::stats::{Welford, chi_squared_test, z_test};
 
 /// Panics if Pearson's χ² test rejects `observed` counts against `expected` ones at significance `alpha`.

@@ -1,0 +1,269 @@
+//! How many pictures each row needs, what its t-test then notices, and the table that says so.
+//!
+//! The noise of a row is the relative standard deviation of one camera sample. It stands in `docs/measurements/power/rows.csv`
+//! and says how many pictures, of seeds of their own, a test needs to notice a bias. The means of the pictures are
+//! independent whatever the sampler does within a picture, and Student's t-test compares them with the answer. What a test
+//! notices is computed from the spread of its own pictures; a stale table makes it notice less, which is an error.
+
+use super::Scene;
+use super::rows::{Configuration, SPP, configurations, job};
+use lumiris::render::{RenderSettings, render};
+use lumiris::settings::Cached;
+use lumiris_numbers::estimators::stats::{Welford, sidak, t_test};
+use lumiris_test_support::significance::{detectable_bias, detectable_deviation};
+use std::collections::{BTreeMap, HashMap};
+use std::path::{Path, PathBuf};
+use std::sync::Mutex;
+use std::sync::atomic::{AtomicBool, AtomicUsize, Ordering};
+
+/// Probability that any test of the whole set rejects a renderer that is right.
+const SIGNIFICANCE: f64 = 1e-3;
+/// Probability that a bias of the size stated is noticed.
+pub const POWER: f64 = 0.99;
+/// What f32 arithmetic may be off where there is no noise, relative.
+const ROUNDING: f64 = 3e-5;
+/// Factor of the standard error below what the power needs: most rows then notice the bias with a power far above.
+const MARGIN: f64 = 1.2;
+/// Pictures of rows without noise.
+const EXACT_PICTURES: u32 = 8;
+/// An environment variable: the noise is measured anew, and the table written.
+pub const MEASURE: &str = "MEASURE_POWER";
+/// Pictures by which the noise of a row is first measured.
+const PILOT_PICTURES: u32 = 32;
+
+/// Pictures of a row.
+#[derive(Clone, Copy, Debug)]
+pub struct Budget {
+    /// Pixels along an edge.
+    pub edge: u32,
+    /// Pictures, each with its own seed.
+    pub pictures: u32,
+}
+
+/// How much is rendered.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Effort {
+    /// The bias that rows have to notice, over that of their scene.
+    pub goal: f64,
+    /// Fewest pictures of a row with noise.
+    pub least_pictures: u32,
+}
+
+/// A scene with one of the configurations.
+pub struct Row<'a> {
+    pub scene: &'a Scene,
+    pub configuration: Configuration,
+}
+
+/// What was rendered for a row.
+pub struct Outcome<'a> {
+    pub row: Row<'a>,
+    pub budget: Budget,
+    /// Means of the pictures.
+    pub pictures: Vec<[f64; 3]>,
+}
+
+/// Level of each test of the set.
+pub fn level(scenes: &[Scene]) -> f64 {
+    sidak(SIGNIFICANCE, scenes.len() * configurations().len() * 3)
+}
+
+/// Means of pictures with seeds from `seed` on.
+pub fn picture_means(path: &Path, c: &Configuration, budget: Budget, seed: u32) -> Vec<[f64; 3]> {
+    let mut job = job(path, c, budget.edge);
+    let settings = RenderSettings { threads: Some(1), spp: SPP, ..RenderSettings::default() };
+    let mut picture = |i: u32| {
+        job.change(|s| s.sampling.seed = seed.wrapping_add(i));
+        let film = render(&job, &settings, &AtomicBool::new(false), &|_| ()).unwrap().film;
+        let mean = |c: usize| film.pixels.iter().map(|p| p.mean()[c]).sum::<f64>() / film.pixels.len() as f64;
+        [mean(0), mean(1), mean(2)]
+    };
+    (0..budget.pictures).map(&mut picture).collect()
+}
+
+/// Moments of a channel of pictures whose values are multiplied by `factor`.
+pub fn moments(pictures: &[[f64; 3]], channel: usize, factor: f64) -> Welford {
+    pictures.iter().map(|p| p[channel] * factor).collect()
+}
+
+impl Row<'_> {
+    /// Scene and settings.
+    pub fn name(&self) -> String {
+        format!("{},{}", self.scene.name, self.configuration)
+    }
+
+    /// The first seed, far from those of other rows.
+    fn seed(&self) -> u32 {
+        // FNV-1a
+        self.name().bytes().fold(0x811c_9dc5, |hash, byte| (hash ^ u32::from(byte)).wrapping_mul(0x0100_0193))
+    }
+
+    /// What the mean may be off without noise, relative.
+    fn tolerance(&self) -> f64 {
+        // A picture shows so little of its scene that interpolation makes no error that counts, but for a spot whose falloff
+        // is steeper than the gradients of sources know
+        match self.configuration.cached {
+            None => ROUNDING,
+            Some(Cached::All) if self.scene.name == "spot-falloff" => 5e-3,
+            Some(_) => 1e-4,
+        }
+    }
+
+    /// Pictures that notice the bias, of a row with this noise.
+    fn budget(&self, noise: f64, effort: &Effort, level: f64) -> Budget {
+        if noise <= self.tolerance() {
+            return Budget { edge: 4, pictures: EXACT_PICTURES };
+        }
+        let bias = effort.goal * self.scene.detects;
+        let errors = MARGIN * detectable_deviation(level, POWER, u64::from(effort.least_pictures - 1));
+        let samples = (errors * noise * (1.0 + bias) / bias).powi(2);
+        let pictures = |edge: u32| (samples / f64::from(edge * edge * SPP)).ceil() as u32;
+        let edge = self.edges().iter().copied().find(|&edge| pictures(edge) >= effort.least_pictures).unwrap_or(4);
+        Budget { edge, pictures: pictures(edge).max(effort.least_pictures) }
+    }
+
+    /// Pixels along an edge that a picture can have.
+    fn edges(&self) -> &[u32] {
+        // Records of irradiance serve all pixels of a picture: more of them tell nothing new
+        if self.configuration.cached.is_some() { &[4] } else { &[16, 8, 4] }
+    }
+
+    /// The noise by other pictures than those that are judged.
+    fn pilot(&self) -> f64 {
+        let budget = Budget { edge: self.edges()[self.edges().len() / 2], pictures: PILOT_PICTURES };
+        self.noise(budget, &self.render(budget, 1 << 31))
+    }
+
+    fn render(&self, budget: Budget, salt: u32) -> Vec<[f64; 3]> {
+        picture_means(&self.scene.path, &self.configuration, budget, self.seed().wrapping_add(salt))
+    }
+
+    /// Relative standard deviation of a camera sample, the largest of the channels.
+    fn noise(&self, budget: Budget, pictures: &[[f64; 3]]) -> f64 {
+        let samples = f64::from(budget.edge * budget.edge * SPP);
+        let relative = |c: usize| moments(pictures, c, 1.0).variance().sqrt() / self.scene.answer[c];
+        (0..3).map(relative).fold(0.0, f64::max) * samples.sqrt()
+    }
+}
+
+impl Outcome<'_> {
+    /// Whether the t-tests of the channels reject the values that were rendered, multiplied by `factor`.
+    pub fn rejected(&self, factor: f64, level: f64) -> [bool; 3] {
+        std::array::from_fn(|c| {
+            let (values, answer) = (moments(&self.pictures, c, factor), self.row.scene.answer[c]);
+            let is_exact = (values.mean() - answer).abs() <= self.row.tolerance() * answer.abs();
+            !is_exact && t_test(&values, answer).p_value < level
+        })
+    }
+
+    /// Whether its answer comes with noise, and not but rounding or interpolation.
+    pub fn has_noise(&self) -> bool {
+        self.pictures.len() > EXACT_PICTURES as usize
+    }
+
+    /// Camera samples.
+    pub fn samples(&self) -> u64 {
+        self.pictures.len() as u64 * u64::from(self.budget.edge.pow(2) * SPP)
+    }
+
+    /// Mean, and its error, of each channel.
+    pub fn means(&self) -> [(f64, f64); 3] {
+        std::array::from_fn(|c| moments(&self.pictures, c, 1.0)).map(|w| (w.mean(), w.standard_error()))
+    }
+
+    /// The channel with the most noise.
+    pub fn channel(&self) -> usize {
+        let relative = |c: &usize| moments(&self.pictures, *c, 1.0).standard_error() / self.row.scene.answer[*c];
+        (0..3).max_by(|a, b| relative(a).total_cmp(&relative(b))).unwrap()
+    }
+
+    /// The bias that is noticed in every channel.
+    pub fn detectable(&self, level: f64) -> f64 {
+        let error = moments(&self.pictures, self.channel(), 1.0).standard_error();
+        let relative = error / self.row.scene.answer[self.channel()];
+        detectable_bias(relative, self.pictures.len() as u64, level, POWER).max(self.row.tolerance())
+    }
+
+    fn noise(&self) -> f64 {
+        self.row.noise(self.budget, &self.pictures)
+    }
+
+    /// A line of the table.
+    fn line(&self, level: f64) -> String {
+        let channel = self.channel();
+        let mean = moments(&self.pictures, channel, 1.0);
+        let truth = self.row.scene.answer[channel];
+        let error = mean.standard_error();
+        let (name, samples, noise) = (self.row.name(), self.samples(), self.noise());
+        let detectable = 100.0 * self.detectable(level);
+        format!("{name},{samples},{:.7},{truth:.7},{error:.2e},{detectable:.4},{noise:.3e}", mean.mean())
+    }
+}
+
+/// Where the table is.
+fn table_path() -> PathBuf {
+    Path::new(env!("CARGO_MANIFEST_DIR")).join("docs/measurements/power/rows.csv")
+}
+
+const HEADER: &str = "scene,integrator estimator sampler,samples,mean,truth,sigma,detectable bias %,noise of a sample";
+
+/// The noise of the rows as it was last measured.
+fn measured_noise() -> HashMap<String, f64> {
+    let text = std::fs::read_to_string(table_path()).unwrap_or_default();
+    let entry = |line: &str| {
+        let mut fields = line.split(',');
+        let name = format!("{},{}", fields.next()?, fields.next()?);
+        Some((name, fields.next_back()?.parse().ok()?))
+    };
+    text.lines().skip(1).filter_map(entry).collect()
+}
+
+/// Replaces the lines of these scenes in the table.
+pub fn write_table(outcomes: &[Outcome<'_>], level: f64) {
+    let old = std::fs::read_to_string(table_path()).unwrap_or_default();
+    let mut scenes: BTreeMap<&str, String> = BTreeMap::new();
+    for line in
+        old.lines().skip(1).filter(|l| outcomes.iter().all(|o| !l.starts_with(&format!("{},", o.row.scene.name))))
+    {
+        *scenes.entry(line.split(',').next().unwrap()).or_default() += &format!("{line}\n");
+    }
+    for outcome in outcomes {
+        *scenes.entry(&outcome.row.scene.name).or_default() += &format!("{}\n", outcome.line(level));
+    }
+    std::fs::create_dir_all(table_path().parent().unwrap()).unwrap();
+    std::fs::write(table_path(), format!("{HEADER}\n") + &scenes.into_values().collect::<String>()).unwrap();
+}
+
+/// Prints the table.
+pub fn print_table(out: &mut dyn std::io::Write, outcomes: &[Outcome<'_>], level: f64) {
+    writeln!(out, "{HEADER}").unwrap();
+    outcomes.iter().for_each(|o| writeln!(out, "{}", o.line(level)).unwrap());
+}
+
+/// Renders all rows of the scenes.
+pub fn render_rows<'a>(scenes: &'a [Scene], effort: &Effort, level: f64) -> Vec<Outcome<'a>> {
+    let known = if std::env::var_os(MEASURE).is_some() { HashMap::new() } else { measured_noise() };
+    let rows = scenes.iter().flat_map(|scene| configurations().into_iter().map(move |c| (scene, c)));
+    let rows: Vec<(&Scene, Configuration)> = rows.collect();
+    let outcomes = Mutex::new(Vec::new());
+    let next = AtomicUsize::new(0);
+    let work = || {
+        loop {
+            let index = next.fetch_add(1, Ordering::Relaxed);
+            let Some(&(scene, configuration)) = rows.get(index) else { break };
+            let row = Row { scene, configuration };
+            let noise = known.get(&row.name()).copied();
+            let noise = noise.unwrap_or_else(|| row.pilot());
+            let budget = row.budget(noise, effort, level);
+            let pictures = row.render(budget, 0);
+            outcomes.lock().unwrap().push((index, Outcome { row, budget, pictures }));
+        }
+    };
+    std::thread::scope(|scope| {
+        let threads = std::thread::available_parallelism().map_or(1, usize::from);
+        (0..threads).for_each(|_| drop(scope.spawn(work)));
+    });
+    let mut outcomes = outcomes.into_inner().unwrap();
+    outcomes.sort_by_key(|(index, _)| *index);
+    outcomes.into_iter().map(|(_, outcome)| outcome).collect()
+}

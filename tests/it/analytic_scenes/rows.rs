@@ -1,0 +1,279 @@
+//! The rows of the table: every integrator, estimator, light choice, sampler and ray tracer.
+
+use crate::light_hints::{Hints, hints};
+use lumiris::import::{LoadOptions, load};
+use lumiris::lights::LightSamplerKind;
+use lumiris::scene::{AccelKind, RenderJob};
+use lumiris::settings::{
+    Cached, CorrelatedForm, CorrelatedSettings, EstimatorKind, IntegratorKind, OcvSettings, OptimalForm,
+    ProposalPoints, Proposals, SamplingTechnique, Strata, Target,
+};
+use lumiris_numbers::estimators::mis::Heuristic;
+use lumiris_numbers::estimators::ocv::Form;
+use lumiris_numbers::samplers::SamplerKind;
+use std::fmt;
+use std::path::Path;
+
+/// Settings of a renderer that has to give the known answer.
+#[derive(Clone, Copy, Debug)]
+pub struct Configuration {
+    /// What records of an irradiance cache hold; paths are traced if there is none.
+    pub cached: Option<Cached>,
+    pub estimator: EstimatorKind,
+    pub heuristic: Heuristic,
+    pub samples: u32,
+    /// Of `ocv`.
+    pub ocv: OcvSettings,
+    pub optimal_mis: OptimalForm,
+    pub correlated: CorrelatedSettings,
+    pub bsdf_share: f32,
+    /// Of `ris`.
+    pub proposals: u32,
+    pub strata: Strata,
+    pub points: ProposalPoints,
+    pub target: Target,
+    pub light_choice: LightSamplerKind,
+    /// What photons tell of the visibility of lights.
+    pub hints: Hints,
+    /// Of `contributing`.
+    pub rest_samples: u32,
+    pub sampler: SamplerKind,
+    pub accel: AccelKind,
+}
+
+/// Camera samples per pixel.
+pub const SPP: u32 = 16;
+
+/// What a row has that says nothing else.
+pub const BASE: Configuration = Configuration {
+    cached: None,
+    estimator: EstimatorKind::Mis,
+    heuristic: Heuristic::Power,
+    samples: 2,
+    ocv: OcvSettings { form: Form::Progressive, components: None },
+    optimal_mis: OptimalForm::Progressive,
+    correlated: CorrelatedSettings { form: CorrelatedForm::Combined, technique: SamplingTechnique::Bsdf },
+    bsdf_share: 0.5,
+    proposals: 16,
+    strata: Strata::Systematic,
+    points: ProposalPoints::Stratified,
+    target: Target::Fgl,
+    light_choice: LightSamplerKind::Tree,
+    hints: Hints::Absent,
+    rest_samples: 1,
+    sampler: SamplerKind::SobolBlueNoise,
+    accel: AccelKind::Embree,
+};
+
+/// Those that are not the base's.
+const SAMPLERS: [SamplerKind; 3] = [SamplerKind::Independent, SamplerKind::Stratified, SamplerKind::Sobol];
+
+fn path_configurations() -> Vec<Configuration> {
+    let base = BASE;
+    let mut all = vec![base];
+    all.extend([1, 3, 16].map(|samples| Configuration { samples, ..base }));
+    all.extend([Heuristic::Balance, Heuristic::Maximum].map(|heuristic| Configuration { heuristic, ..base }));
+    all.extend([1, 4].map(|samples| Configuration { estimator: EstimatorKind::Mc, samples, ..base }));
+    all.extend(
+        [LightSamplerKind::Uniform, LightSamplerKind::Power].map(|light_choice| Configuration { light_choice, ..base }),
+    );
+    all.extend(SAMPLERS.map(|sampler| Configuration { sampler, ..base }));
+    all.push(Configuration { accel: AccelKind::Bvh, ..base });
+    all.push(Configuration { accel: AccelKind::Bvh, estimator: EstimatorKind::Mc, ..base });
+    let ris = Configuration { estimator: EstimatorKind::Ris, heuristic: Heuristic::Balance, ..base };
+    all.extend(ris_configurations(&ris));
+    all.extend(component_configurations(&Configuration { estimator: EstimatorKind::Ocv, ..base }));
+    all.extend(correlated_configurations(&Configuration { estimator: EstimatorKind::Correlated, ..base }));
+    all
+}
+
+/// Irradiance caches.
+fn cached_configurations() -> Vec<Configuration> {
+    let of = |cached, estimator| Configuration { cached: Some(cached), estimator, ..BASE };
+    vec![
+        of(Cached::Indirect, EstimatorKind::Mis),
+        of(Cached::All, EstimatorKind::Mis),
+        of(Cached::All, EstimatorKind::Ris),
+        of(Cached::Indirect, EstimatorKind::Ocv),
+        of(Cached::All, EstimatorKind::Ocv),
+    ]
+}
+
+/// All rows of a scene.
+pub fn configurations() -> Vec<Configuration> {
+    [path_configurations(), hinted_configurations(), cached_configurations()].concat()
+}
+
+/// Everything that asks photons which lights are seen, whatever they say.
+fn hinted_configurations() -> Vec<Configuration> {
+    use Hints::{Absent, Empty, Right, Wrong};
+    let base = &BASE;
+    let light_choice = LightSamplerKind::Photons;
+    let mut all = [Absent, Empty, Right, Wrong].map(|hints| Configuration { hints, light_choice, ..*base }).to_vec();
+    let ris = Configuration {
+        estimator: EstimatorKind::Ris,
+        heuristic: Heuristic::Balance,
+        target: Target::Visibility,
+        ..*base
+    };
+    all.extend([Absent, Right, Wrong].map(|hints| Configuration { hints, ..ris }));
+    all.extend([Right, Wrong].map(|hints| Configuration { hints, samples: 1, light_choice, ..ris }));
+    all.push(Configuration { hints: Wrong, strata: Strata::None, points: ProposalPoints::Independent, ..ris });
+    let ocv = Configuration { estimator: EstimatorKind::Ocv, samples: 5, light_choice, ..*base };
+    all.extend([Right, Wrong].map(|hints| Configuration { hints, ..ocv }));
+    all.push(Configuration { hints: Right, estimator: EstimatorKind::OptimalMis, samples: 8, ..ocv });
+    let correlated = CorrelatedSettings { form: CorrelatedForm::Crossfit, technique: SamplingTechnique::Light };
+    all.push(Configuration { estimator: EstimatorKind::Correlated, correlated, hints: Right, ..ocv });
+    let contributing = Configuration { estimator: EstimatorKind::Contributing, ..*base };
+    all.extend([Absent, Empty, Right, Wrong].map(|hints| Configuration { hints, samples: 4, ..contributing }));
+    all.extend([1, 2, 3, 16].map(|samples| Configuration { hints: Right, samples, ..contributing }));
+    all.push(Configuration { hints: Wrong, samples: 2, rest_samples: 3, light_choice, ..contributing });
+    all
+}
+
+/// `correlated` in its unbiased form.
+fn correlated_configurations(base: &Configuration) -> Vec<Configuration> {
+    let of = |technique| Configuration {
+        correlated: CorrelatedSettings { form: CorrelatedForm::Crossfit, technique },
+        ..*base
+    };
+    let (bsdf, light) = (of(SamplingTechnique::Bsdf), of(SamplingTechnique::Light));
+    let mut all = [1, 2, 3, 4, 16].map(|samples| Configuration { samples, ..bsdf }).to_vec();
+    all.extend([1, 2, 5, 16].map(|samples| Configuration { samples, ..light }));
+    all.extend([LightSamplerKind::Uniform, LightSamplerKind::Power].map(|light_choice| Configuration {
+        samples: 5,
+        light_choice,
+        ..light
+    }));
+    all.push(Configuration { samples: 4, sampler: SamplerKind::Independent, ..bsdf });
+    all.push(Configuration { samples: 4, accel: AccelKind::Bvh, ..bsdf });
+    all
+}
+
+/// `ocv` and `optimal-mis` in their unbiased forms.
+fn component_configurations(base: &Configuration) -> Vec<Configuration> {
+    let base = *base;
+    let mut all = [1, 2, 3, 16].map(|samples| Configuration { samples, ..base }).to_vec();
+    let crossfit = OcvSettings { form: Form::Crossfit, ..base.ocv };
+    all.extend([2, 5, 16].map(|samples| Configuration { samples, ocv: crossfit, ..base }));
+    all.extend([2, 8].map(|samples| Configuration { samples, estimator: EstimatorKind::OptimalMis, ..base }));
+    let few = OcvSettings { components: Some(3), ..base.ocv };
+    all.push(Configuration { samples: 8, ocv: few, ..base });
+    all.push(Configuration { samples: 8, bsdf_share: 0.25, ..base });
+    all.extend([LightSamplerKind::Uniform, LightSamplerKind::Power].map(|light_choice| Configuration {
+        samples: 5,
+        light_choice,
+        ..base
+    }));
+    all.push(Configuration { samples: 4, sampler: SamplerKind::Independent, ..base });
+    all.push(Configuration { samples: 4, accel: AccelKind::Bvh, ..base });
+    all
+}
+
+fn ris_configurations(base: &Configuration) -> Vec<Configuration> {
+    let base = *base;
+    let counts = [(1, 1), (1, 2), (1, 8), (3, 7), (8, 8), (4, 64)];
+    let mut all: Vec<_> = counts.map(|(samples, proposals)| Configuration { samples, proposals, ..base }).to_vec();
+    all.extend([Strata::None, Strata::Proposals, Strata::Weights].map(|strata| Configuration { strata, ..base }));
+    all.extend([Target::Gv, Target::Gvl].map(|target| Configuration { target, ..base }));
+    all.extend(
+        [LightSamplerKind::Uniform, LightSamplerKind::Power].map(|light_choice| Configuration { light_choice, ..base }),
+    );
+    all.push(Configuration { points: ProposalPoints::Independent, ..base });
+    all.push(Configuration { heuristic: Heuristic::Power, ..base });
+    all.push(Configuration { sampler: SamplerKind::Independent, ..base });
+    all.push(Configuration { accel: AccelKind::Bvh, ..base });
+    all
+}
+
+/// The name of a choice, as on the command line.
+fn name(choice: impl Into<&'static str>) -> &'static str {
+    choice.into()
+}
+
+/// Integrator, estimator and sampler, and what differs from the base.
+impl fmt::Display for Configuration {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        match self.cached {
+            Some(cached) => write!(f, "irradiance-cache {} ", name(cached))?,
+            None => write!(f, "path ")?,
+        }
+        write!(f, "{} {} N={}", name(self.estimator), name(self.sampler), self.samples)?;
+        self.write_estimator(f)?;
+        if self.light_choice != BASE.light_choice {
+            write!(f, " lights={}", name(self.light_choice))?;
+        }
+        match self.hints {
+            Hints::Absent => {}
+            Hints::Empty => write!(f, " hints=empty")?,
+            Hints::Right => write!(f, " hints=right")?,
+            Hints::Wrong => write!(f, " hints=wrong")?,
+        }
+        if self.accel != BASE.accel {
+            write!(f, " {}", name(self.accel))?;
+        }
+        Ok(())
+    }
+}
+
+impl Configuration {
+    fn write_estimator(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        match self.estimator {
+            EstimatorKind::Mc => {}
+            EstimatorKind::Mis => write!(f, " {}", name(self.heuristic))?,
+            EstimatorKind::Ris => {
+                let (strata, points, target) = (name(self.strata), name(self.points), name(self.target));
+                write!(
+                    f,
+                    " M={} {} strata={strata} points={points} target={target}",
+                    self.proposals,
+                    name(self.heuristic)
+                )?;
+            }
+            EstimatorKind::Ocv => {
+                write!(f, " {} bsdf-share={}", name(self.ocv.form), self.bsdf_share)?;
+                if let Some(components) = self.ocv.components {
+                    write!(f, " components={components}")?;
+                }
+            }
+            EstimatorKind::OptimalMis => write!(f, " {}", name(self.optimal_mis))?,
+            EstimatorKind::Correlated => {
+                write!(f, " {} {}", name(self.correlated.form), name(self.correlated.technique))?;
+            }
+            EstimatorKind::Contributing => write!(f, " rest={}", self.rest_samples)?,
+        }
+        Ok(())
+    }
+}
+
+/// The scene with these settings, as a picture of `edge` × `edge` pixels of the same rectangle.
+pub fn job(path: &Path, c: &Configuration, edge: u32) -> RenderJob {
+    let options = LoadOptions { resolution: Some([edge; 2]), ..LoadOptions::default() };
+    let mut loaded = load(path, &options).map_err(|d| d.to_string()).unwrap();
+    assert_eq!(loaded.settings.sampling.spp, SPP, "{}", path.display());
+    let settings = &mut loaded.settings.integrator;
+    settings.estimator = c.estimator;
+    settings.heuristic = Some(c.heuristic);
+    settings.samples = Some(c.samples);
+    settings.ocv = c.ocv;
+    settings.optimal_mis = c.optimal_mis;
+    settings.correlated = c.correlated;
+    settings.bsdf_share = c.bsdf_share;
+    settings.ris.proposals = Proposals::Fixed(c.proposals);
+    settings.ris.strata = c.strata;
+    settings.ris.points = c.points;
+    settings.ris.target = c.target;
+    settings.light_choice = c.light_choice;
+    settings.contributing.rest_samples = c.rest_samples;
+    if let Some(cached) = c.cached {
+        settings.kind = IntegratorKind::IrradianceCache;
+        settings.cache.cached = cached;
+        settings.cache.samples = 64;
+        settings.cache.passes = 32;
+    }
+    loaded.settings.sampling.sampler = c.sampler;
+    let mut job = loaded.job(c.accel, None).unwrap();
+    let hints = hints(&job, c.hints);
+    job.lights.set_hints(hints);
+    job
+}
