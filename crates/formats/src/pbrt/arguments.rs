@@ -1,9 +1,8 @@
 //! The arguments of directives: numbers, names and parameter lists.
 
-use super::directive::{ActiveTimes, AttributeTarget, DirectiveKind, Name};
+use super::directive::{ActiveTimes, AttributeTarget, DirectiveKind, KEYWORDS, Name};
 use super::lexer::{LexError, Lexer, Token, TokenKind, shorten};
 use super::params::{Param, ParamSet, ParamType, Values};
-use super::parser::is_keyword;
 use crate::diagnostic::{Diagnostics, did_you_mean};
 use crate::source::Span;
 
@@ -295,4 +294,9 @@ pub fn skip_until(lexer: &mut Lexer<'_>, stop: impl Fn(&Lexer<'_>, Token) -> boo
             Ok(Some(_)) | Err(_) => {}
         }
     }
+}
+
+/// True for the keyword of a directive.
+pub fn is_keyword(lexer: &Lexer<'_>, token: Token) -> bool {
+    token.kind == TokenKind::Word && KEYWORDS.iter().any(|k| k.as_bytes() == lexer.slice(token.span))
 }

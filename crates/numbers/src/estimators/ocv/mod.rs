@@ -30,7 +30,8 @@ pub mod normal;
 
 pub use block::{Block, block_of};
 pub use forms::{Outcome, crossfit, paper, regression};
-pub use normal::{IllConditioned, MAX_COMPONENTS, NormalEquations, Penalty};
+pub use ldlt::{IllConditioned, MAX_COMPONENTS};
+pub use normal::{NormalEquations, Penalty};
 
 /// How β is found.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
