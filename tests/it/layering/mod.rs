@@ -25,6 +25,7 @@ const LAYERS: &[&[&str]] = &[
     &["imaging"],
     &["textures", "geometry", "bsdfs", "cameras", "film"],
     &["materials", "lights", "accel"],
+    &["settings"],
     &["scene"],
     &["import", "direct", "photons"],
     &["integrators"],

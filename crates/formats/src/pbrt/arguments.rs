@@ -56,6 +56,24 @@ impl Arguments<'_> {
         }
     }
 
+    /// An affine matrix, column after column. pbrt divides points by w, so a last row 0 0 0 w is made 0 0 0 1; any other
+    /// would be a projection.
+    pub fn matrix(&mut self, lexer: &mut Lexer<'_>, keyword: &str) -> Result<[f32; 16], Reported> {
+        let start = self.peek(lexer)?.map_or(lexer.position(), |t| t.span.start as usize);
+        let m: [f32; 16] = self.numbers(lexer, keyword)?;
+        let last_row = [m[3], m[7], m[11], m[15]];
+        let [x, y, z, w] = last_row;
+        if [x, y, z] != [0.0; 3] || w == 0.0 {
+            let row = last_row.map(|v| v.to_string()).join(" ");
+            let span = lexer.span(start, lexer.position());
+            let message =
+                format!("the last row of this matrix is {row}: an affine one has 0 0 0 w, with w other than 0");
+            self.diagnostics.error(span, message).help("the last row is every fourth number");
+            return Err(Reported);
+        }
+        Ok(m.map(|v| v / w))
+    }
+
     /// `StartTime`, `EndTime` or `All`.
     pub fn active_times(&mut self, lexer: &mut Lexer<'_>) -> Result<ActiveTimes, Reported> {
         let token = self.next(lexer, "StartTime, EndTime or All")?;

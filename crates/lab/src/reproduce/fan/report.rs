@@ -26,7 +26,7 @@ pub fn more_time(ratio: f64) -> String {
 pub fn method_json(name: &str, [m, base]: [&Measured; 2], [e, base_errors]: [&Errors; 2]) -> Value {
     let time = m.time_ratio(base);
     json!({
-        "name": name, "estimator": m.method.estimator.name(), "samples": m.method.samples,
+        "name": name, "estimator": <&str>::from(m.method.estimator), "samples": m.method.samples,
         "proposals": m.method.proposals, "stratified": m.method.stratified, "rays_apart": m.method.apart, "turns": m.turns(),
         "error": estimate_json(e.error()), "relative_error": estimate_json(e.relative(base_errors)),
         "time_ratio": time, "efficiency": estimate_json(e.efficiency(base_errors, time)),

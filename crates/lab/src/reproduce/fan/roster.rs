@@ -2,7 +2,7 @@
 //! the paper has them; stratified over all camera rays of a pixel; independent.
 
 use super::super::method::Method;
-use lumiris::scene::{OptimalForm, Split, Strata};
+use lumiris::settings::{OptimalForm, Split, Strata};
 use lumiris_numbers::estimators::mis::Heuristic;
 use lumiris_numbers::estimators::ocv::Form;
 
