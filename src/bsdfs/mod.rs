@@ -38,7 +38,6 @@ pub use resample::{Resampled, resample};
 pub use thin_dielectric::ThinDielectric;
 
 use lumiris_lanes::bsdf::Model as LaneModel;
-use lumiris_numbers::math::hash::{pcg4d, unit_f32};
 use lumiris_numbers::math::{Rgb, Vec3};
 use std::f32::consts::FRAC_1_PI;
 use std::ops::BitOr;
@@ -349,10 +348,10 @@ impl<'a> Bsdf<'a> {
         }
     }
 
-    /// Fraction of uniform light that reaches `wo`, for the albedo image: exact for the Lambertian and coated ones,
-    /// otherwise the mean of 16 fixed samples.
-    pub fn albedo_estimate(&self, wo: Vec3) -> Rgb {
-        const SAMPLES: u32 = 16;
+    /// Fraction of uniform light that reaches `wo`, for the albedo image: exact for the Lambertian and coated ones, otherwise
+    /// the unbiased estimate f |cos θ|/pdf of one sample, drawn by the numbers that `u` gives. One is enough: an image has a
+    /// sample of its own for each camera sample, and many for each would cost more than all light transport.
+    pub fn albedo_estimate(&self, wo: Vec3, u: impl FnOnce() -> [f32; 3]) -> Rgb {
         match self {
             Bsdf::Diffuse(b) => b.reflectance,
             Bsdf::DiffuseTransmission(b) => b.reflectance + b.transmittance,
@@ -363,15 +362,8 @@ impl<'a> Bsdf<'a> {
             | Bsdf::ThinDielectric(_)
             | Bsdf::Layered(_)
             | Bsdf::Evaluated(_) => {
-                let mut sum = Rgb::BLACK;
-                for i in 0..SAMPLES {
-                    let stratum = (i as f32 + 0.5) / SAMPLES as f32;
-                    let u = pcg4d([i, 1, 2, 3]).map(unit_f32);
-                    if let Some(s) = self.sample(wo, stratum, [u[0], u[1]]) {
-                        sum += s.f * (s.wi.z.abs() / s.pdf);
-                    }
-                }
-                sum / SAMPLES as f32
+                let [uc, u0, u1] = u();
+                self.sample(wo, uc, [u0, u1]).map_or(Rgb::BLACK, |s| s.f * (s.wi.z.abs() / s.pdf))
             }
         }
     }

@@ -103,6 +103,11 @@ impl GeometrySet {
         placed.fold(self.group_bounds(&self.root), Bounds3::union)
     }
 
+    /// True if an instance moves, so that time matters.
+    pub fn has_motion(&self) -> bool {
+        self.instances.iter().any(|i| i.world_from_group.len() > 1)
+    }
+
     /// The surface in world space at the parametric position `uv` of a hit; `instance` is [`NO_INSTANCE`] in the root.
     pub fn surface_hit(
         &self,

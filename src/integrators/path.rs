@@ -24,6 +24,7 @@ mod domain {
     pub const BSDF: u32 = 1;
     pub const ROULETTE: u32 = 2;
     pub const RESAMPLE: u32 = 3;
+    pub const ALBEDO: u32 = 4;
     /// Vertex k uses the domain `VERTEX + k` of the camera sample.
     pub const VERTEX: u32 = 16;
 }
@@ -233,7 +234,8 @@ impl PathIntegrator {
                                 if depth_only {
                                     Features { depth: path.depth(&found), ..Features::default() }
                                 } else {
-                                    path.features(job, &found, &bsdf)
+                                    let stream = samples[path.sample as usize].stream.domain(domain::VERTEX);
+                                    path.features(job, &found, &bsdf, &stream)
                                 }
                             });
                         }
@@ -415,10 +417,10 @@ impl PathState {
         }
     }
 
-    fn features(&self, job: &RenderJob, found: &Found, bsdf: &SurfaceBsdf<'_>) -> Features {
+    fn features(&self, job: &RenderJob, found: &Found, bsdf: &SurfaceBsdf<'_>, stream: &SampleStream) -> Features {
         let z = bsdf.frame.z;
         Features {
-            albedo: bsdf.albedo_estimate(found.wo),
+            albedo: bsdf.albedo_estimate(found.wo, || stream.domain(domain::ALBEDO).draw::<3>()),
             normal: if z.dot(found.wo) < 0.0 { -z } else { z },
             depth: self.depth(found),
             material: job.world.scene.surfaces[found.hit.geometry as usize].material,

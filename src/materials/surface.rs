@@ -133,8 +133,8 @@ impl<'a> SurfaceBsdf<'a> {
 
     /// Fraction of uniform light that reaches `wo`, see [`Bsdf::albedo_estimate`].
     #[inline]
-    pub fn albedo_estimate(&self, wo: Vec3) -> Rgb {
-        self.bsdf.albedo_estimate(self.frame.to_local(wo))
+    pub fn albedo_estimate(&self, wo: Vec3, u: impl FnOnce() -> [f32; 3]) -> Rgb {
+        self.bsdf.albedo_estimate(self.frame.to_local(wo), u)
     }
 }
 

@@ -90,7 +90,7 @@ fn a_diffuse_material_clamps_its_texture_and_works_in_world_space() {
     assert_eq!(s.f(wo, -UP), Rgb::BLACK);
     let x = s.sample(wo, 0.5, [0.3, 0.7]).unwrap();
     assert!((s.pdf(wo, x.wi) - x.pdf).abs() < 1e-5 && (x.pdf - UP.dot(x.wi) * FRAC_1_PI).abs() < 1e-5);
-    assert_eq!(s.albedo_estimate(wo).g, 1.0);
+    assert_eq!(s.albedo_estimate(wo, || [0.5; 3]).g, 1.0);
 }
 
 #[test]

@@ -205,6 +205,8 @@ struct Run<'a> {
     stop: &'a AtomicBool,
     observe: &'a (dyn Fn(&Progress) + Sync),
     filter: FilterSampler,
+    /// False if the time of a ray does not matter.
+    has_motion: bool,
     cache: Option<IrradianceCache>,
     /// Photon maps of the pass under way.
     maps: Option<PhotonMaps>,
@@ -226,6 +228,7 @@ impl<'a> Run<'a> {
             stop,
             observe,
             filter: job.world.scene.film.filter.sampler(),
+            has_motion: job.world.scene.geometry.has_motion(),
             cache: None,
             maps: None,
             start: Instant::now(),
@@ -435,7 +438,7 @@ impl<'a> Run<'a> {
         let (scene, settings) = (&self.job.world.scene, self.job.settings());
         let stream = SampleStream::new(settings.sampling.sampler, pixel, sample, seed);
         let [fx, fy, lx, ly] = stream.domain(domain::FILM_AND_LENS).draw::<4>();
-        let [u_time] = stream.domain(domain::TIME).draw::<1>();
+        let [u_time] = if self.has_motion { stream.domain(domain::TIME).draw::<1>() } else { [0.0] };
         let filter = self.filter.sample([fx, fy]);
         let film = Vec2::new(pixel[0] as f32 + 0.5, pixel[1] as f32 + 0.5) + filter.offset;
         let ray = scene.camera.ray(film, [lx, ly], u_time);

@@ -1,7 +1,11 @@
-//! Finds Embree, checks its headers against the committed bindings, and links it.
+//! Finds Embree, checks its headers against the committed bindings, and links it. With the feature `generate-bindings` the
+//! bindings are made from the headers instead.
 //!
 //! Search order: `EMBREE_DIR` (an installation prefix, or its CMake configuration directory), the
 //! compiler's own include directories, then `embree_DIR` (CMake's variable) and pkg-config.
+
+#[cfg(feature = "generate-bindings")]
+mod generate;
 
 use std::env;
 use std::path::{Path, PathBuf};
@@ -10,6 +14,11 @@ use std::process::{Command, ExitStatus, exit};
 /// How to get the headers, for the end of each error message.
 const HELP: &str = "Install Embree's headers (Debian, Ubuntu: apt-get install libembree-dev), or \
                     set EMBREE_DIR to the prefix of an installation of Embree 3.13 or 4.x.";
+
+/// What to do about headers that no committed file fits.
+#[cfg(not(feature = "generate-bindings"))]
+const GENERATE: &str = "The feature `generate-bindings` makes bindings from these headers: build with \
+                        --features embree4-sys/generate-bindings (needs libclang: apt-get install libclang-dev).";
 
 /// Library directories below an installation prefix, most specific first.
 const LIB_DIRS: [&str; 4] = ["lib/x86_64-linux-gnu", "lib/aarch64-linux-gnu", "lib64", "lib"];
@@ -23,20 +32,26 @@ struct Embree {
     instance_array: bool,
 }
 
+impl Embree {
+    fn version_string(&self) -> String {
+        self.version.map(|number| number.to_string()).join(".")
+    }
+}
+
 fn main() {
     println!("cargo:rerun-if-changed=build.rs");
     println!("cargo:rerun-if-changed=detect.c");
     println!("cargo:rerun-if-changed=probe.c");
     println!("cargo:rerun-if-env-changed=EMBREE_DIR");
     println!("cargo:rerun-if-env-changed=embree_DIR");
+    println!("cargo:rerun-if-changed=generate.rs");
     for cfg in ["embree3", "embree4", "embree_instance_array"] {
         println!("cargo:rustc-check-cfg=cfg({cfg})");
     }
 
     let embree = find().unwrap_or_else(|reason| fail(&reason));
-    if let Err(reason) = check_layout(&embree) {
-        fail(&reason);
-    }
+    let bindings = bindings(&embree).unwrap_or_else(|reason| fail(&reason));
+    println!("cargo:rustc-env=EMBREE_BINDINGS={}", bindings.display());
     emit(&embree);
 }
 
@@ -134,7 +149,37 @@ fn detect(prefix: Option<PathBuf>) -> Result<Option<Embree>, String> {
     Ok(Some(Embree { prefix, family, version: [major, minor, patch], instance_array: instance_array == 1 }))
 }
 
+/// The file with the bindings: made from the headers found.
+#[cfg(feature = "generate-bindings")]
+fn bindings(embree: &Embree) -> Result<PathBuf, String> {
+    let include = embree.prefix.as_ref().map(|prefix| prefix.join("include"));
+    let text = generate::bindings(include.as_deref(), embree.family, &embree.version_string())?;
+    let path = PathBuf::from(env::var_os("OUT_DIR").ok_or("cargo sets no OUT_DIR")?).join("bindings.rs");
+    std::fs::write(&path, text).map_err(|e| format!("{}: {e}", path.display()))?;
+    println!("cargo:rustc-env=EMBREE_COMMITTED_BINDINGS={}", committed(embree)?.display());
+    Ok(path)
+}
+
+/// The file with the bindings: the committed one, if it fits the headers found.
+#[cfg(not(feature = "generate-bindings"))]
+fn bindings(embree: &Embree) -> Result<PathBuf, String> {
+    check_layout(embree).map_err(|reason| format!("{reason}\n{GENERATE}"))?;
+    committed(embree)
+}
+
+/// The committed bindings of a family and, in family 4, of a layout of the hits.
+fn committed(embree: &Embree) -> Result<PathBuf, String> {
+    let name = match (embree.family, embree.instance_array) {
+        (3, _) => "embree3.rs",
+        (_, true) => "embree4.rs",
+        (_, false) => "embree4_pre43.rs",
+    };
+    let root = PathBuf::from(env::var_os("CARGO_MANIFEST_DIR").ok_or("cargo sets no CARGO_MANIFEST_DIR")?);
+    Ok(root.join("src/bindings").join(name))
+}
+
 /// Compiles the static assertions of probe.c against the headers found.
+#[cfg(not(feature = "generate-bindings"))]
 fn check_layout(embree: &Embree) -> Result<(), String> {
     let family = format!("-DEXPECT_FAMILY={}", embree.family);
     let instance_array = format!("-DEXPECT_INSTANCE_ARRAY={}", u32::from(embree.instance_array));
@@ -143,8 +188,7 @@ fn check_layout(embree: &Embree) -> Result<(), String> {
     if status.success() {
         return Ok(());
     }
-    let [major, minor, patch] = embree.version;
-    let mut reason = format!("the headers of Embree {major}.{minor}.{patch} do not fit the bindings:");
+    let mut reason = format!("the headers of Embree {} do not fit the committed bindings:", embree.version_string());
     let asserts: Vec<&str> = errors.lines().filter(|line| line.contains("static assertion failed")).collect();
     for line in &asserts {
         reason += &format!("\n  {}", line.trim());
@@ -164,7 +208,7 @@ fn emit(embree: &Embree) {
     }
     let [major, minor, patch] = embree.version;
     println!("cargo:rustc-env=EMBREE_HEADER_VERSION={}", major * 10_000 + minor * 100 + patch);
-    println!("cargo:version={major}.{minor}.{patch}");
+    println!("cargo:version={}", embree.version_string());
     println!("cargo:family={family}");
 
     let libdir = find_libdir(embree);

@@ -177,7 +177,7 @@ impl EmbreeAccel {
         let builder = Builder { device: &device, world: &world, alpha, query_filter: true };
         let root = Arc::new(builder.root()?);
 
-        let has_motion = world.instances.iter().any(|&i| set.instances[i as usize].world_from_group.len() > 1);
+        let has_motion = set.has_motion();
         let (bytes, peak_bytes) = device.memory();
         let stats = AccelStats { bytes, peak_bytes, build_seconds: start.elapsed().as_secs_f64() };
         Ok(EmbreeAccel { root, world, width, has_motion, stats })

@@ -4,6 +4,7 @@
 use super::*;
 use crate::bsdfs::models::{AshikhminShirley, CookTorrance, CosineLobe, LobeAxis, OrenNayar};
 use lumiris_numbers::estimators::stats::{Welford, sidak, two_sample_z_test, z_test};
+use lumiris_numbers::math::hash::{pcg4d, unit_f32};
 
 const BLUE: Rgb = Rgb::new(0.1, 0.4, 0.8);
 

@@ -7,6 +7,7 @@ mod evaluated;
 use super::*;
 use lumiris_numbers::math::hash::HashStream;
 use lumiris_numbers::math::{safe_sqrt, sqr, warp};
+use lumiris_test_support::Moments;
 use std::f32::consts::{PI, TAU};
 use strum::IntoEnumIterator;
 
@@ -112,7 +113,32 @@ fn nothing_is_ever_nan_negative_or_infinite() {
                 assert!((x.wi.length() - 1.0).abs() < 1e-4 && x.wi.z != 0.0, "{name} {wo} {x:?}");
                 assert_eq!(x.lobe.is_transmission(), x.wi.z * wo.z < 0.0, "{name} {wo} {x:?}");
             }
-            assert!(b.albedo_estimate(wo).is_finite());
+            let u = s.next_2d();
+            assert!(b.albedo_estimate(wo, || [s.next_f32(), u[0], u[1]]).is_finite());
+        }
+    }
+}
+
+#[test]
+fn albedo_estimates_average_to_the_integral_of_f_times_the_cosine() {
+    let tables = tables();
+    let mut s = HashStream::new([4, 8, 15]);
+    // Wide lobes only, which directions that are uniform on the sphere meet often
+    let wide = ["gold 0.4 0.1", "glass 0.3", "glass 0.6 0.2", "layered 5"];
+    let is_wide = |name: &str| wide.contains(&name) || name.starts_with("evaluated");
+    let tested: Vec<_> = zoo(&tables).into_iter().filter(|(name, _)| is_wide(name)).collect();
+    assert_eq!(tested.len(), wide.len() + ProposalDensity::ALL.len());
+    for (_, b) in tested {
+        for wo in [warp::direction(0.9, 0.3), warp::direction(0.4, 2.0)] {
+            // The difference of two estimates with independent numbers has the mean 0.
+            let mut difference = Moments::default();
+            for _ in 0..60_000 {
+                let (u, v) = (s.next_2d(), s.next_2d());
+                let estimate = b.albedo_estimate(wo, || [s.next_f32(), u[0], u[1]]).g;
+                let wi = warp::sample_uniform_sphere(v);
+                difference.add(f64::from(estimate - b.f(wo, wi).g * wi.z.abs() * 2.0 * TAU));
+            }
+            difference.assert_mean(0.0, 1e-6, 0.0);
         }
     }
 }

@@ -1,6 +1,7 @@
 //! Raw bindings for Embree 4.x and for Embree 3.13 (Debian 12).
 //!
-//! The build script chooses the bindings by the header it finds and sets the cfg `embree3` or
+//! The build script chooses the bindings by the header it finds, or with the feature `generate-bindings` makes them from
+//! it, and sets the cfg `embree3` or
 //! `embree4`, and `embree_instance_array` if hits carry `instPrimID`. Dependents read the family
 //! from `DEP_EMBREE_FAMILY` in their build script, or from [`FAMILY`].
 //!
@@ -20,22 +21,15 @@
 #![allow(clippy::all, clippy::pedantic, clippy::undocumented_unsafe_blocks)]
 #![allow(non_camel_case_types, non_snake_case, non_upper_case_globals)]
 
-#[cfg(all(embree4, embree_instance_array))]
-#[path = "bindings/embree4.rs"]
+/// A committed file, or what the feature `generate-bindings` made of the headers.
 #[rustfmt::skip]
-mod bindings;
-
-#[cfg(all(embree4, not(embree_instance_array)))]
-#[path = "bindings/embree4_pre43.rs"]
-#[rustfmt::skip]
-mod bindings;
-
-#[cfg(embree3)]
-#[path = "bindings/embree3.rs"]
-#[rustfmt::skip]
-mod bindings;
+mod bindings {
+    include!(env!("EMBREE_BINDINGS"));
+}
 
 mod inline;
+// Bindings that were made from the headers assert the layout of these.
+#[cfg(not(feature = "generate-bindings"))]
 mod layout;
 
 pub use bindings::*;
