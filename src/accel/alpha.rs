@@ -1,4 +1,4 @@
-//! Cut-outs: which hits on a geometry with an alpha texture stop a ray. Both ray tracers ask here.
+//! Alpha masks: which hits on a geometry with an alpha texture stop a ray. Both ray tracers call this.
 
 use super::Hit;
 use crate::geometry::GeometrySet;
@@ -12,7 +12,7 @@ pub trait AlphaSource: Send + Sync {
     fn alpha(&self, texture: u32, uv: Vec2, p: Vec3) -> f32;
 }
 
-/// The test of a hit on a cut-out.
+/// The alpha test of a hit.
 #[derive(Clone)]
 pub struct AlphaTest {
     geometry: Arc<GeometrySet>,
@@ -25,11 +25,11 @@ impl AlphaTest {
         AlphaTest { geometry, source }
     }
 
-    /// True if the ray is stopped, which happens with probability alpha. `world_ray` is the ray as the caller gave it,
-    /// not one that was moved into an instance.
+    /// True if the ray is stopped, which happens with probability alpha. `world_ray` is the ray in world space, not one
+    /// transformed into an instance.
     ///
-    /// The decision is a hash of the ray and of what was hit, so it is the same however often and in whatever order a
-    /// tracer asks, and independent between the surfaces along a ray.
+    /// The decision is a hash of the ray and of the hit, so it is the same however often and in whatever order a tracer
+    /// calls this, and independent between the surfaces along a ray.
     pub fn stops(&self, hit: &Hit, world_ray: &Ray) -> bool {
         let geometry = &self.geometry.geometries[hit.geometry as usize];
         let Some(texture) = geometry.alpha else { return true };

@@ -1,7 +1,7 @@
-//! Ray tracing: one interface, two implementations that check each other.
+//! Ray tracing: one interface and two implementations that check each other.
 //!
-//! [`embree`] is the fast one, [`bvh`] the pure-Rust reference. Rays come in structure-of-arrays batches;
-//! a batch's answers do not depend on how it is cut into packets.
+//! [`embree`] is the fast one, [`bvh`] the pure-Rust reference. Rays come in structure-of-arrays batches; the results
+//! of a batch do not depend on how it is divided into packets.
 
 pub mod alpha;
 pub mod bvh;
@@ -89,11 +89,11 @@ pub struct Hit {
     /// Parametric position on the primitive: barycentric weights of vertices 1 and 2 of a triangle; (u, v) of a
     /// bilinear patch; (φ/φ_max, v) of a quadric as its docs say.
     pub uv: [f32; 2],
-    /// What was hit.
+    /// The hit.
     pub geometry: GeometryId,
     /// Triangle or patch inside the geometry; 0 for a quadric.
     pub primitive: u32,
-    /// Placement, or [`Hit::NO_INSTANCE`].
+    /// Instance, or [`Hit::NO_INSTANCE`].
     pub instance: u32,
 }
 
@@ -102,12 +102,12 @@ impl Hit {
     pub const NO_INSTANCE: u32 = crate::geometry::NO_INSTANCE;
 }
 
-/// What a tracer may assume of the neighbours in a batch. It never changes an answer.
+/// What a tracer may assume about neighbouring rays of a batch. It never changes a result.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Coherence {
-    /// Neighbours have like origins and like directions (camera rays of a tile).
+    /// Neighbours have similar origins and directions (camera rays of a tile).
     Coherent,
-    /// Neighbours share an origin or an end (shadow segments of a shading point): packets, no frustum culling.
+    /// Neighbours share an origin or an end (shadow segments of a shading point): packets without frustum culling.
     Packets,
     /// Nothing (bounces): single rays.
     Incoherent,
@@ -126,7 +126,7 @@ pub struct AccelStats {
 
 /// A built ray tracer. Queries may come from any number of threads.
 pub trait Accel: Send + Sync {
-    /// First hits: `hits[i]` becomes the answer of ray `i`; `hits` is resized. Sees geometries of `Visibility::PATH`.
+    /// Nearest hits: `hits[i]` becomes the result of ray `i`; `hits` is resized. Sees geometries of `Visibility::PATH`.
     fn intersect(&self, rays: &RayBatch, coherence: Coherence, hits: &mut Vec<Option<Hit>>);
 
     /// `occluded[i]` becomes true if anything of `Visibility::SHADOW` lies inside (0, t_max) of ray `i`.

@@ -1,18 +1,18 @@
-//! Proposal densities for reflection of which nothing is known but its value.
+//! Default sampling densities for BSDFs that can only be evaluated.
 //!
-//! [`ProposalDensity::Lobes`] is what [Talbot et al. 2005, §5.2] recommend: a cosine-weighted hemisphere with lobes about
+//! [`ProposalDensity::Lobes`] follows [Talbot et al. 2005, §5.2]: a cosine-weighted hemisphere mixed with lobes about
 //! the mirror direction of `wo` and about `wo` itself,
 //!
 //! p(wi) = w_c |cos θi|/π + w_m p_α(wi; α_m) + w_r p_α(R wi; α_r),   R (x, y, z) = (−x, −y, z)
 //!
-//! where p_α(wi) = D_wo(m)/(4 wo·m) is the density of reflection by the visible normals of a GGX surface, m being the
-//! half vector. GGX has long tails, so that one width serves lobes of many widths, and its lobes have the shape that
-//! reflection has at grazing angles. What falls below the horizon of `wo` is no sample, so p integrates to a little
-//! less than 1 and stays exact.
+//! where p_α(wi) = D_wo(m)/(4 wo·m) is the density of reflection by the visible normals of a GGX surface and m the half
+//! vector. GGX has long tails, so that a single width serves BSDF lobes of many widths, and its lobes have the right
+//! shape at grazing angles. Directions below the horizon of `wo` are failed samples: p integrates to slightly less than
+//! 1 and remains exact.
 //!
-//! The weights and widths were chosen by the relative variance (∫ g²/p)/(∫ g)² − 1 of g = f |cos θi| over four angles of
-//! 18 reflectances (Lambert, Oren-Nayar, Beckmann of slope 0.1 to 0.5, cosine lobes of exponent 10 to 150 of both kinds,
-//! Ashikhmin-Shirley, and mixtures). The mean logarithm of 1 + that is
+//! Weights and widths were chosen by the relative variance (∫ g²/p)/(∫ g)² − 1 of g = f |cos θi| over four angles of 18
+//! BSDFs (Lambert, Oren-Nayar, Beckmann of slope 0.1 to 0.5, cosine lobes of exponent 10 to 150 of both kinds,
+//! Ashikhmin-Shirley, and mixtures). The mean logarithm of 1 plus that variance is
 //!
 //! | density | mean log second moment | worst relative variance |
 //! |---|---|---|
@@ -23,7 +23,7 @@
 //! | 0.5, 0.3, 0.2 with α = 0.1, 0.15 (used) | 1.16 | 22 |
 //! | 0.4, 0.2, 0.2, 0.2 with two mirror lobes, α = 0.1, 0.3, and 0.15 | 1.15 | 22 |
 //!
-//! and a Lambertian, which the cosine alone would match, pays a relative variance of 0.34 to 0.69.
+//! A Lambertian BSDF, which the cosine alone would match, has a relative variance of 0.34 to 0.69.
 
 use super::fresnel::reflect;
 use super::{Lobe, TrowbridgeReitz};
@@ -62,7 +62,8 @@ impl ProposalDensity {
         }
     }
 
-    /// A direction on the side of `wo`, by `uc` among the lobes and `u` within one; `None` if it falls below the horizon.
+    /// A direction on the side of `wo`, by `uc` among the lobes and `u` within one; `None` if it falls below the
+    /// horizon.
     #[inline]
     pub fn sample(self, wo: Vec3, uc: f32, u: [f32; 2]) -> Option<(Vec3, Lobe)> {
         let flip = if wo.z < 0.0 { -1.0 } else { 1.0 };

@@ -1,7 +1,7 @@
-//! Reflection of which only the value f(wo, wi) is known, sampled by a density that knows nothing of it.
+//! BSDFs of which only the value f(wo, wi) is known, sampled by a density that ignores their shape.
 //!
-//! Sample and density are those of [`ProposalDensity`] and are exact, so a light sampler may weigh against them. They fit
-//! badly; [`super::resample()`] draws from f |cos θi| itself, in the limit of many proposals.
+//! Sample and density are those of [`ProposalDensity`] and are exact, so they can be combined with light sampling by
+//! MIS. They fit badly; [`super::resample()`] samples f |cos θi| itself in the limit of many proposals.
 
 use super::{BsdfSample, Model, ProposalDensity};
 use lumiris_numbers::math::{Rgb, Vec3};

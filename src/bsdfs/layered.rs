@@ -1,16 +1,16 @@
 //! A dielectric coat over a base, with a scattering medium between them: the position-free random walk of
 //! [Guo, Hašan and Zhao 2018] in the form of pbrt-v4's layered BxDF.
 //!
-//! f is an expectation over walks that enter at `wo` and are connected to `wi` through the interface, by sampling the
-//! interface from `wi` and by letting the walk leave, weighted by the power heuristic. The numbers of the walk are a
-//! hash of (wo, wi), so that f is a function, though a noisy one; averaged over directions it is unbiased. Directions
-//! are sampled from fixed lobes of known density, not by the walk, so that `pdf` is exact.
+//! f is an expectation over walks that enter at `wo` and are connected to `wi` through the interface, both by sampling
+//! the interface from `wi` and by letting the walk leave, combined by the power heuristic. The random numbers of the
+//! walk are a hash of (wo, wi), so that f is a function, though a noisy one; averaged over directions it is unbiased.
+//! Directions are sampled from fixed lobes of known density rather than by the walk, so that `pdf` is exact.
 //!
-//! The heuristic weighs both techniques by their densities of the direction inside the layer. pbrt-v4 weighs one of them
-//! by the density of `wi` instead, so that its weights do not add up to one where interface and base are both rough: its
-//! light that leaves a Lambertian base is 2–11 % too bright for alphas 0.1–0.6 and steep directions, and more at grazing
-//! ones, where it evaluates f, though not where it samples (its issue 187 is an effect). It also leaves out the mirror
-//! reflections after the last scattering event where interface and base are both smooth.
+//! The heuristic weights both techniques by their densities of the direction inside the layer. pbrt-v4 weights one of
+//! them by the density of `wi` instead, so that its weights do not sum to one where interface and base are both rough:
+//! light leaving a Lambertian base is 2–11 % too bright for alphas 0.1–0.6 and steep directions, and more at grazing
+//! ones, where f is evaluated but not where it is sampled (pbrt-v4 issue 187 is a consequence). It also omits the
+//! mirror reflections after the last scattering event where interface and base are both smooth.
 
 use super::dielectric::{Dielectric, Select, Transport};
 use super::fresnel::{fr_conductor, fr_dielectric, reflect};
@@ -341,8 +341,8 @@ impl Walk<'_> {
         self.f += self.beta * layer.albedo * sum * exit.f / exit.pdf;
     }
 
-    /// Lets the walk, at depth `z` in direction `w` which it sampled with density `pdf` (`None`: a delta), leave through
-    /// a rough interface.
+    /// Lets the walk, at depth `z` in direction `w` which it sampled with density `pdf` (`None`: a delta), leave
+    /// through a rough interface.
     fn leave(&mut self, z: f32, w: Vec3, pdf: Option<f32>) {
         if self.layer.top.is_specular() || w.z <= 0.0 {
             return;

@@ -1,15 +1,15 @@
 //! Sampling any BSDF by resampled importance sampling [Talbot et al. 2005, §5.2].
 //!
-//! M proposals x_j of density p come from [`Bsdf::sample`]; one of them, y, is drawn in proportion to q̂/p with the
+//! M proposals x_j with density p come from [`Bsdf::sample`]; one of them, y, is drawn in proportion to q̂/p with the
 //! target q̂ = luminance(f) |cos θ|. Its contribution weight
 //!
 //! W = 1/q̂(y) · (1/M) Σ_j q̂(x_j)/p(x_j)
 //!
-//! makes f |cos θ| L W an unbiased estimate of ∫ f |cos θ| L dω for every M, since luminance is 0 only where f is. With
-//! M = 1, W = 1/p. In the limit y has the density q̂/∫q̂, which is f |cos θ| itself for a grey surface.
+//! makes f |cos θ| L W an unbiased estimate of ∫ f |cos θ| L dω for every M, since the luminance is 0 only where f is.
+//! With M = 1, W = 1/p. In the limit y has the density q̂/∫q̂, which for a grey surface is proportional to f |cos θ|.
 //!
-//! Nothing depends on the model. Deltas take part with their probabilities for p, for f is then a probability's too;
-//! values that are themselves random (layers) do as well, f being what came with the sample.
+//! This works for any BSDF model. Specular lobes take part with probabilities in place of p, since f is relative to the
+//! same measure; stochastic values (layered BSDFs) do as well, f being the value that came with the sample.
 
 use super::{Bsdf, Lobe};
 use lumiris_numbers::math::{Rgb, Vec3};
@@ -29,8 +29,8 @@ pub struct Resampled {
     pub eta: f32,
 }
 
-/// Draws one of `proposals` (M, at least 1) samples of `bsdf`. `u_proposal(j)` are the numbers of proposal j, the first of
-/// them chooses the lobe; `u_choice` chooses among the proposals. `None` if no proposal carries light.
+/// Draws one of `proposals` (M, at least 1) samples of `bsdf`. `u_proposal(j)` are the numbers of proposal j, the first
+/// of them chooses the lobe; `u_choice` chooses among the proposals. `None` if no proposal carries light.
 pub fn resample(
     bsdf: &Bsdf<'_>,
     wo: Vec3,

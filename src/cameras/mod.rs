@@ -1,8 +1,8 @@
-//! Cameras: from a point of the film, of the lens and in time to a ray.
+//! Cameras: generate a ray from a film position, a lens sample and a time.
 //!
-//! Camera space is that of pbrt: x right, y up, z forward. The placement may mirror and scale. Raster coordinates have
-//! their origin at the upper left, one unit per pixel, y downwards. A screen window `[x0, x1, y0, y1]` says which part
-//! of the screen the film covers; the default spans −1..1 on the shorter axis.
+//! Camera space is that of pbrt: x right, y up, z forward. The camera transform may mirror and scale. Raster
+//! coordinates have their origin at the upper left, one unit per pixel, y down. The screen window `[x0, x1, y0, y1]` is
+//! the part of the screen covered by the film; by default it spans −1..1 on the shorter axis.
 
 use lumiris_numbers::math::sphere_map::{equal_area_square_to_sphere, lat_long_to_sphere, wrap_equal_area_square};
 use lumiris_numbers::math::warp::sample_uniform_disk_concentric;
@@ -176,7 +176,8 @@ impl Camera {
         self
     }
 
-    /// The ray of the raster point `film_xy`, through the point `u_lens` of the lens, at `time_u` of the shutter interval.
+    /// The ray of the raster point `film_xy`, through the point `u_lens` of the lens, at `time_u` of the shutter
+    /// interval.
     #[inline]
     pub fn ray(&self, film_xy: Vec2, u_lens: [f32; 2], time_u: f32) -> CameraRay {
         match self {

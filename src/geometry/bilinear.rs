@@ -1,7 +1,7 @@
 //! Meshes of bilinear patches.
 //!
-//! The ray meets the patch where it meets one of the segments from edge p00–p10 to edge p01–p11: a quadratic in u
-//! [Reshetov 2019], solved in f64, so that only the rounding of the ray itself limits the result.
+//! A ray hits the patch where it meets one of the segments from edge p00–p10 to edge p01–p11: a quadratic in u
+//! [Reshetov 2019], solved in f64, so that only the rounding of the ray itself limits the accuracy.
 
 use super::hit::{LocalHit, SurfaceHit, face_forward, round, spanning};
 use glam::DVec3;

@@ -1,7 +1,7 @@
 //! Loop subdivision to limit positions and limit normals: pbrt's `loopsubdiv` [Loop 1987; Hoppe et al. 1994].
 //!
-//! The mesh is held as links: a face (v, a, b) has, seen from v, the link a → b. The links of a vertex chain up to its
-//! ring of neighbours, counter-clockwise if faces are; a manifold vertex has exactly one chain, closed or open.
+//! The mesh is stored as links: a face (v, a, b) has, seen from v, the link a → b. The links of a vertex form its ring
+//! of neighbours, counter-clockwise if faces are; a manifold vertex has exactly one chain, closed or open.
 
 use super::TriangleMesh;
 use lumiris_numbers::math::Vec3;
@@ -173,7 +173,7 @@ impl Ring<u32> {
 }
 
 impl Ring<Vec3> {
-    /// The new place of the vertex at `p`.
+    /// The new position of the vertex at `p`.
     fn blend(&self, p: Vec3, rule: Rule) -> Vec3 {
         let ring = &self.neighbours;
         let valence = ring.len() as f32;

@@ -1,4 +1,4 @@
-//! Shapes as data, their exact intersection on the CPU, and the differential geometry of a hit.
+//! Shapes as data, their exact intersection on the CPU, and the differential geometry of hits.
 //!
 //! Reading order: [`hit`], [`triangle`], [`mesh`], [`quadric`], [`bilinear`], [`loop_subdiv`], [`set`].
 

@@ -4,9 +4,9 @@
 //! u = φ / φ_max, and v = (θ − θ(z_min)) / (θ(z_max) − θ(z_min)) on a sphere with cos θ = z / radius,
 //! (radius − r) / (radius − inner_radius) on a disk, (z − z_min) / (z_max − z_min) on a cylinder.
 //!
-//! Roots are found in f64 in local space. The point of a hit is placed so that the map that rays go through,
-//! `local_from_group`, takes it onto the local surface: the two maps are rounded separately, and the difference would
-//! otherwise be an error of the point.
+//! Roots are found in f64 in local space. The hit point is chosen such that `local_from_group`, the transform that is
+//! applied to rays, takes it onto the local surface: the two transforms are rounded separately, and their difference
+//! would otherwise be an error of the point.
 
 use super::hit::{LocalHit, SurfaceHit, round, spanning};
 use glam::{DAffine3, DVec3};

@@ -1,7 +1,7 @@
-//! All geometry of a scene: what a ray tracer is built from.
+//! All geometry of a scene: the input of a ray tracer.
 //!
-//! A [`GeometrySet`] has a root group of geometries in world space, and instances of other groups.
-//! Instances do not nest.
+//! A [`GeometrySet`] has a root group of geometries in world space, and instances of other groups. Instances do not
+//! nest.
 
 use super::{Shape, SurfaceHit};
 use lumiris_numbers::math::{Affine3A, Bounds3};
@@ -12,7 +12,7 @@ pub type GeometryId = u32;
 /// Index into [`GeometrySet::groups`].
 pub type GroupId = u32;
 
-/// Stands in place of an instance's index for what is in the root group.
+/// The instance index of everything in the root group.
 pub const NO_INSTANCE: u32 = u32::MAX;
 
 /// Which rays a geometry stops; a bit set.

@@ -1,9 +1,10 @@
 //! The watertight ray–triangle test, one triangle at a time.
 //!
-//! The triangle is moved to the ray's origin and sheared so that the ray runs along +z; then three 2D edge functions
-//! decide [Woop et al. 2013]. The edge function of a shared edge is the same rounded expression for both triangles up
-//! to its sign, and rounding is monotonic, so a computed sign is right or the value is 0; zeros are evaluated again in
-//! f64, where the products are exact. Edges and vertices count as inside, so a closed mesh does not leak.
+//! The triangle is translated to the ray's origin and sheared so that the ray runs along +z; then three 2D edge
+//! functions decide [Woop et al. 2013]. The edge function of a shared edge is the same rounded expression for both
+//! triangles up to its sign, and rounding is monotonic, so a computed sign is correct or the value is 0; zeros are
+//! evaluated again in f64, where the products are exact. Edges and vertices count as inside, so a closed mesh does not
+//! leak.
 
 use glam::DVec3;
 use lumiris_numbers::math::{Ray, Vec3, gamma};
@@ -52,8 +53,8 @@ pub struct TriangleHit {
 
 /// The hit with 0 < t ≤ `t_limit`, if any; both sides count.
 ///
-/// The sign of t is decided in f64 where f32 cannot, so a ray from [`lumiris_numbers::math::ray::offset_origin`] does not meet the
-/// triangle that it left.
+/// The sign of t is decided in f64 where f32 cannot, so a ray from [`lumiris_numbers::math::ray::offset_origin`] does
+/// not meet the triangle that it left.
 #[inline]
 pub fn intersect_triangle(ray: &RayPrecomputed, triangle: [Vec3; 3], t_limit: f32) -> Option<TriangleHit> {
     let [kx, ky, kz] = ray.axes;
@@ -77,7 +78,7 @@ pub fn intersect_triangle(ray: &RayPrecomputed, triangle: [Vec3; 3], t_limit: f3
         return None;
     }
 
-    // The parameter of the plane, in f64 if f32 cannot tell that it is positive.
+    // The parameter of the plane, in f64 if f32 cannot decide that it is positive.
     let inv_det = 1.0 / det;
     let mut t = (u * a.z + v * b.z + w * c.z) * ray.shear[2] * inv_det;
     if t <= parameter_error([a, b, c], ray.shear[2], inv_det) {

@@ -1,6 +1,6 @@
 //! Bounds of emission: where lights are, where they point, how bright they are [Conty Estévez and Kulla 2018].
 //!
-//! A cone of half-angle θo about the axis holds all normals; emission leaves within θe of a normal.
+//! A cone of half-angle θo about the axis contains all normals; light is emitted within θe of a normal.
 
 use lumiris_numbers::math::{Bounds3, Vec3, safe_sqrt};
 use std::f32::consts::{FRAC_PI_2, PI};
@@ -18,7 +18,7 @@ pub struct LightBounds {
     pub cos_theta_e: f32,
     /// True if they emit along the reversed normals too.
     pub two_sided: bool,
-    /// Sum of the luminances of their greatest radiant intensities.
+    /// Sum of the luminances of their maximum radiant intensities.
     pub intensity: f32,
 }
 
@@ -67,7 +67,7 @@ impl LightBounds {
     }
 
     /// The heuristic's cost of a cluster. A little of the squared diagonal is added to the area, so that lights on a
-    /// line are told apart as well.
+    /// line are distinguished as well.
     pub fn cost(&self) -> f32 {
         if self.intensity <= 0.0 {
             return 0.0;

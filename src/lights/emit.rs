@@ -1,19 +1,19 @@
-//! Light as it leaves its sources: the start of photons.
+//! Sampling of emitted rays: the start of photon paths.
 //!
-//! A sample is a ray with the power Φ = Le·|cos θ|/(p_A·p_ω), p_A the density of its origin (1/m²) and p_ω that of its
-//! direction (1/sr), so E\[Φ\] is the emitted flux (W); for light without a surface the intensity takes the place of
+//! A sample is a ray with the power Φ = Le·|cos θ|/(p_A·p_ω), p_A being the density of its origin (1/m²) and p_ω that
+//! of its direction (1/sr), so E\[Φ\] is the emitted flux (W); for delta lights with a position, the intensity replaces
 //! Le·|cos θ|/p_A.
 //!
 //! | light | origin | direction | Φ |
 //! |---|---|---|---|
-//! | point | its place | uniform on the sphere | 4π·I, constant |
-//! | spot | its place | by its falloff | I times the solid angle of the falloff, constant |
+//! | point | its position | uniform on the sphere | 4π·I, constant |
+//! | spot | its position | by its falloff | I times the solid angle of the falloff, constant |
 //! | area | by area, see [`area`](super::area) | cosine about the normal, of one side or of either | π·Le/p_A |
 //! | distant | disk | its own | π·R²·E, constant |
 //! | environment | disk | by its image, or uniform | π·R²·Le/p_ω |
 //!
-//! The disk has the radius R of the scene, is perpendicular to the direction and touches the sphere about the scene on the
-//! side where the light comes from [Pharr et al. 2023, §12.2, §12.5]. Flux beside the scene is counted with the rest.
+//! The disk has the radius R of the scene's bounding sphere, is perpendicular to the direction and touches that sphere
+//! on the side the light comes from [Pharr et al. 2023, §12.2, §12.5]. Flux that misses the scene is included.
 
 use super::{AreaLight, Light, spot};
 use lumiris_numbers::math::warp::{
@@ -22,14 +22,14 @@ use lumiris_numbers::math::warp::{
 use lumiris_numbers::math::{Frame, ONE_MINUS_EPSILON, Rgb, Vec3};
 use std::f32::consts::{PI, TAU};
 
-/// A photon as it leaves a light.
+/// A photon leaving a light.
 #[derive(Clone, Copy, Debug)]
 pub struct EmissionSample {
     /// Where it starts.
     pub p: Vec3,
     /// Bound of the rounding error of `p` per axis; zero without a surface.
     pub p_error: Vec3,
-    /// Normal of the surface there, on the side that it leaves; zero without a surface.
+    /// Normal of the surface there, on the emitting side; zero without a surface.
     pub n: Vec3,
     /// Unit direction, away from the light.
     pub d: Vec3,
@@ -38,7 +38,7 @@ pub struct EmissionSample {
 }
 
 impl EmissionSample {
-    /// Of light that leaves no surface.
+    /// For lights without a surface.
     fn in_space(p: Vec3, d: Vec3, power: Rgb) -> Option<Self> {
         EmissionSample { p, p_error: Vec3::ZERO, n: Vec3::ZERO, d, power }.if_lit()
     }
@@ -76,7 +76,7 @@ impl Light {
     }
 }
 
-/// Light from the unit direction `wi` through the disk that the scene is seen as from there; `irradiance` is that of the disk.
+/// Light from the unit direction `wi` through the disk that the scene projects to; `irradiance` is that of the disk.
 fn from_infinity(
     (centre, radius): (Vec3, f32),
     u_position: [f32; 2],

@@ -1,4 +1,4 @@
-//! Emitted light against the power of its source, against the samplers of direct light, and against its densities.
+//! Emitted rays against the power of the light, against light sampling, and against their pdfs.
 
 use super::light_tests::{
     CELLS, Surface, patch_surface, placement, quadric, quadric_surface, rectangle_mesh, rectangle_surface, squash,

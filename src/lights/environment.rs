@@ -1,10 +1,10 @@
-//! Environment maps: radiance from all directions by an image, sampled in proportion to it.
+//! Environment maps: radiance from all directions by an image, importance sampled.
 //!
 //! The image covers the unit square, which [`EnvironmentMapping`] maps to directions. The density is constant per texel
-//! and proportional to the mean of the looked-up luminance over the texel (times the solid angle of its row for
-//! latitude-longitude images): for bilinear lookups that is the image smoothed by [1/8, 6/8, 1/8] in both axes, which is
-//! positive wherever a lookup is. Per steradian it is pdf(u, v)/4π for equal-area images, and pdf(u, v)/(2π² sin θ) for
-//! latitude-longitude images.
+//! and proportional to the mean of the interpolated luminance over the texel (times the solid angle of its row for
+//! latitude-longitude images): for bilinear lookups that is the image smoothed by [1/8, 6/8, 1/8] in both axes, which
+//! is positive wherever a lookup is. Per steradian it is pdf(u, v)/4π for equal-area images, and pdf(u, v)/(2π² sin θ)
+//! for latitude-longitude images.
 
 use super::LightSample;
 use lumiris_numbers::math::sphere_map::{
@@ -90,7 +90,7 @@ fn with_border(texels: &[Rgb], [width, height]: [usize; 2], mapping: Environment
     bordered
 }
 
-/// A sample of a light at infinity.
+/// A sample of an infinite light.
 #[inline]
 pub(super) fn infinite_sample(wi: Vec3, li: Rgb, pdf: f32) -> LightSample {
     LightSample { li, wi, pdf, t: f32::INFINITY, p: Vec3::ZERO, n: Vec3::ZERO, p_error: Vec3::ZERO, is_delta: false }
@@ -182,7 +182,7 @@ impl EnvironmentMap {
         (pdf > 0.0 && pdf.is_finite()).then(|| EnvironmentSample { w: w.normalize(), le: self.lookup(p), pdf })
     }
 
-    /// What many samples at once need.
+    /// The data for sampling in lanes.
     pub(super) fn lanes(&self, world_from_light: Mat3, scale: f32) -> Environment<'_> {
         Environment {
             distribution: &self.distribution,
@@ -213,13 +213,13 @@ impl EnvironmentMap {
         }
     }
 
-    /// Where the texel is whose indices may lie outside by one.
+    /// Index of a texel whose coordinates may be outside by one.
     #[inline]
     fn texel_index(&self, x: isize, y: isize) -> usize {
         (y + 1) as usize * (self.width + 2) + (x + 1) as usize
     }
 
-    /// Where the texel is that holds a point of the unit square.
+    /// Index of the texel that contains a point of the unit square.
     #[inline]
     fn nearest(&self, p: Vec2) -> usize {
         let bin = |x: f32, n: usize| ((x * n as f32) as usize).min(n - 1) as isize;

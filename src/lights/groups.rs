@@ -1,14 +1,14 @@
-//! Lights in a few groups, each a component of the mixture that light sampling is.
+//! Groups of lights, each a component of the mixture density of light sampling.
 //!
-//! All lights at infinity are one group, since they overlap. The others are one group each while there are few, and
-//! subtrees of a light tree where there are many. A light is chosen with the probability that
-//! [`LightSampler`] gives it; the groups only split that choice in two, first a group and then a light of it, so that
-//! the number of samples of every group can be fixed.
+//! All infinite lights form one group, since they overlap. The others form one group each while there are few, and
+//! subtrees of a light tree where there are many. A light is chosen with the probability that [`LightSampler`] gives
+//! it; the groups merely divide that choice in two, first a group and then a light of it, so that the number of samples
+//! per group can be fixed.
 
 use super::{LightChoice, LightCtx, LightId, LightSampler, LightSet, LightTree};
 use lumiris_numbers::math::{AliasTable, ONE_MINUS_EPSILON};
 
-/// Most groups.
+/// Maximum number of groups.
 pub const MAX_GROUPS: usize = 8;
 /// Group of lights that are never chosen.
 const NO_GROUP: u8 = u8::MAX;
@@ -18,7 +18,7 @@ const NO_GROUP: u8 = u8::MAX;
 pub struct LightGroups {
     /// Of each light.
     group_of: Vec<u8>,
-    /// True if group 0 is that of the lights at infinity.
+    /// True if group 0 is that of the infinite lights.
     has_infinite: bool,
     choice: Choice,
 }
@@ -108,8 +108,8 @@ impl LightGroups {
         (group != NO_GROUP).then_some(usize::from(group))
     }
 
-    /// Probability that the sampler of the set chooses a light of each group, seen from a point. They sum to one, unless
-    /// nothing can be chosen.
+    /// Probability that the sampler of the set chooses a light of each group, seen from a point. They sum to one,
+    /// unless nothing can be chosen.
     pub fn pmfs(&self, set: &LightSet, ctx: &LightCtx) -> [f32; MAX_GROUPS] {
         let mut pmfs = [0.0; MAX_GROUPS];
         match &self.choice {
@@ -149,7 +149,7 @@ impl LightGroups {
         }
     }
 
-    /// [`sample`](Self::sample) without what photons tell.
+    /// [`sample`](Self::sample) without the visibility cache.
     fn sample_base(
         &self,
         set: &LightSet,

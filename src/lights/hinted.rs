@@ -1,13 +1,13 @@
-//! The choice of a light by photons that tell which lights are seen around a point [Keller and Wald 2000, §3], never quite
-//! without the others.
+//! A light sampler that prefers the lights that the visibility cache finds at a point [Keller and Wald 2000, §3], mixed
+//! with a light tree.
 //!
-//! pmf(l) = (1 − δ)·w_l/Σ w + δ·pmf_base(l), w_l = 0 for lights that no photon came from. The base is the [`LightTree`]
-//! with the lights at infinity beside it, so every light that can contribute has a probability: estimates are unbiased
-//! whatever the photons say. Where they say nothing, δ = 1.
+//! pmf(l) = (1 − δ)·w_l/Σ w + δ·pmf_base(l), where w_l = 0 for lights that are not in the cache. The base is the
+//! [`LightTree`] with the infinite lights beside it, so every light that can contribute has a positive probability, and
+//! estimates are unbiased whatever the cache holds. Where the cache is empty, δ = 1.
 //!
-//! w_l is the tree's bound of the contribution of a light at the point: cos θ′·cos θi′·I/d², of a light at infinity its irradiance
-//! [lm/m² by luminance, both up to a common factor]. Where more than [`MOST_WEIGHED`] lights are seen it is the number of their
-//! photons, so that the choice takes logarithmic time.
+//! w_l is the tree's bound of the light's contribution at the point, cos θ′·cos θi′·I/d², or the irradiance of an
+//! infinite light [lm/m² by luminance, both up to a common factor]. Beyond [`MOST_WEIGHED`] lights w_l is the number of
+//! their photons instead, so that sampling takes logarithmic time.
 //!
 //! [`LightTree`]: super::LightTree
 
@@ -19,24 +19,24 @@ use lumiris_numbers::math::ONE_MINUS_EPSILON;
 use std::f32::consts::PI;
 use std::sync::Arc;
 
-/// δ: share of the choices that the photons have no part in.
+/// δ: probability of sampling the base instead of the contributing lights.
 pub const BASE_SHARE: f32 = 0.1;
-/// Most lights whose contributions are compared at the point.
+/// Maximum number of lights whose contributions are compared at the point.
 pub const MOST_WEIGHED: usize = 64;
 
-/// Chooses by hints where there are any.
+/// Samples the contributing lights of the visibility cache, if there are any.
 #[derive(Clone, Debug)]
 pub struct HintedChoice {
     pub(super) base: TreeChoice,
-    /// Of each light at infinity, the luminance of the irradiance on a surface that faces it; 0 for others.
+    /// For each infinite light, the luminance of the irradiance on a surface facing it; 0 for others.
     irradiances: Vec<f32>,
     pub(super) hints: Option<Arc<LightHints>>,
 }
 
-/// The lights that are known at a point, with their weights.
+/// The contributing lights of a point, with their weights.
 struct Known<'a> {
     around: Around<'a>,
-    /// Sums of the weights up to and with each light; not used where photons are counted.
+    /// Cumulative weights; not used where photon counts are the weights.
     sums: [f32; MOST_WEIGHED],
     total: f32,
 }
@@ -46,7 +46,7 @@ impl Known<'_> {
         self.around.lights.len() > MOST_WEIGHED
     }
 
-    /// Sum of the weights of the lights before place `i`.
+    /// Sum of the weights of the lights before index `i`.
     #[inline]
     fn sum_before(&self, i: usize) -> f32 {
         match (i, self.is_counted()) {
@@ -56,7 +56,7 @@ impl Known<'_> {
         }
     }
 
-    /// Probability that place `i` is chosen among the known lights.
+    /// Probability of index `i` among the contributing lights.
     #[inline]
     fn pmf_at(&self, i: usize) -> f32 {
         (self.sum_before(i + 1) - self.sum_before(i)) / self.total
@@ -67,7 +67,7 @@ impl Known<'_> {
         self.around.place(light).map_or(0.0, |i| self.pmf_at(i))
     }
 
-    /// Chooses a place by `u` in [0, 1), and makes `u` uniform again.
+    /// Chooses an index by `u` in [0, 1), and remaps `u` to be uniform again.
     #[inline]
     fn choose(&self, u: f32) -> (usize, f32) {
         let x = u * self.total;
@@ -97,7 +97,7 @@ impl HintedChoice {
         HintedChoice { base, irradiances: lights.iter().map(irradiance).collect(), hints: None }
     }
 
-    /// The known lights; `None` if none of them can contribute.
+    /// The contributing lights; `None` if none of them has a weight.
     #[inline]
     fn known(&self, ctx: &LightCtx) -> Option<Known<'_>> {
         let around = self.hints.as_ref()?.around_with_sums(ctx.p, ctx.n);
@@ -141,7 +141,7 @@ impl HintedChoice {
         self.known(ctx).map_or(base, |known| mixed(known.pmf(light), base))
     }
 
-    /// Known lights first, then those of the base; a light may have a run of each.
+    /// Contributing lights first, then those of the base; a light may have a run of each.
     pub(super) fn runs(&self, ctx: &LightCtx, positions: &[u32], out: &mut Vec<LightRun>) {
         let Some(known) = self.known(ctx) else {
             self.base.runs(ctx, positions, 0, (0.0, 1.0), out);
@@ -171,7 +171,7 @@ impl HintedChoice {
         }
     }
 
-    /// Mixes the probabilities of the known lights into those of groups by the base.
+    /// Mixes the probabilities of the contributing lights into those of the groups by the base.
     pub(super) fn group_pmfs(
         &self,
         ctx: &LightCtx,
@@ -221,13 +221,13 @@ impl HintedChoice {
     }
 }
 
-/// The probability of a choice with the probability `known` among the known lights and `base` by the base.
+/// The probability of a choice with the probability `known` among the contributing lights and `base` by the base.
 #[inline]
 fn mixed(known: f32, base: f32) -> f32 {
     (1.0 - BASE_SHARE) * known + BASE_SHARE * base
 }
 
-/// The first of `count` places for which `is_before` is false.
+/// The first of `count` indices for which `is_before` is false.
 fn partition(count: usize, is_before: impl Fn(usize) -> bool) -> usize {
     let (mut low, mut high) = (0, count);
     while low < high {

@@ -1,28 +1,29 @@
-//! Which lights are seen around a point, by photons that came straight from them [Keller and Wald 2000, §3].
+//! The visibility cache: finds the lights that contribute at a point, by the photons that arrived around it straight
+//! from lights [Keller and Wald 2000, §3].
 //!
-//! Space is cut into cubes of edge 2r. A photon is put into the 8 cubes that a cube of half-edge r about it touches, so one
-//! look-up finds every photon within r of the point, whatever its place in its cube, and some of up to 3r. The lights whose
-//! photons it finds are 𝓛_con; all others are most probably occluded. Cubes are told apart by the side of the surface too: a
-//! photon belongs to each of the six axis directions that its normal is within [`SIDE_COS`] of, a look-up to the one its normal
-//! is nearest to. So photons whose normals are within 17° of that of the point are always found, and the other side of a wall
-//! never is.
+//! Space is divided into cubes of edge 2r. A photon is stored in the 8 cubes touched by a cube of half-edge r about it,
+//! so that a single lookup finds every photon within r of the point, and some up to 3r away. The lights of these
+//! photons are 𝓛_con; all others are most probably occluded. Cubes are also distinguished by the orientation of the
+//! surface: a photon is stored for each of the six axis directions within [`SIDE_COS`] of its normal, and a lookup uses
+//! the direction nearest to its own normal. So photons whose normals are within 17° of that of the point are always
+//! found, and photons on the other side of a wall never.
 //!
-//! A radius is secure if a light that is seen has a photon there almost surely. Of an expected number μ of them none
-//! comes with probability e^−μ; [`LightHints::adapted`] takes the radius at which a photon has [`SECURE_COUNT`] of its
-//! light around it on the average.
+//! A radius is safe if a visible light almost surely has a photon within it. If μ photons are expected, none arrives
+//! with probability e^−μ; [`LightHints::adapted`] chooses the radius at which a photon has [`SECURE_COUNT`] photons of
+//! its light around it on average.
 
 use super::LightId;
 use lumiris_numbers::math::{Bounds3, Vec3};
 use rayon::prelude::*;
 
-/// Least cosine between a photon's normal and an axis direction for it to count on that side: cos(54.7° + 17.8°), of the
-/// greatest angle between a direction and its nearest axis, and of a margin.
+/// Minimum cosine between a photon's normal and an axis direction for it to count on that side: cos(54.7° + 17.8°), the
+/// maximum angle between a direction and its nearest axis plus a margin.
 pub const SIDE_COS: f32 = 0.3;
-/// Mean number of photons of the same light that a photon finds around it by [`LightHints::adapted`].
+/// Mean number of photons of the same light around a photon, for [`LightHints::adapted`].
 pub const SECURE_COUNT: f64 = 64.0;
-/// Least and greatest radius by [`LightHints::adapted`], as shares of the scene's.
+/// Minimum and maximum radius of [`LightHints::adapted`], relative to the radius of the scene.
 const RADIUS_SHARES: [f32; 2] = [1.0 / 4096.0, 1.0 / 16.0];
-/// What [`Around::visibility`] is where no photon of a light came.
+/// Value of [`Around::visibility`] for non-contributing lights.
 pub const UNSEEN: f32 = 0.04;
 
 /// Bits of a cube's index along each axis.
@@ -30,7 +31,7 @@ const AXIS_BITS: u32 = 20;
 /// Key of a slot that holds nothing.
 const EMPTY: u64 = u64::MAX;
 
-/// A cube on one side, with the part of the entries that is its.
+/// A cube for one orientation, with its range of entries.
 #[derive(Clone, Copy, Debug)]
 struct Slot {
     key: u64,
@@ -38,7 +39,7 @@ struct Slot {
     len: u32,
 }
 
-/// Which lights photons that came straight from them say are visible around a point.
+/// The visibility cache: the lights that contribute around a point, found by photons that came straight from them.
 #[derive(Clone, Debug)]
 pub struct LightHints {
     origin: Vec3,
@@ -47,30 +48,30 @@ pub struct LightHints {
     radius: f32,
     /// A hash table with linear probing, filled in the order of the keys.
     slots: Vec<Slot>,
-    /// Lights and numbers of their photons, cube by cube; ids ascend in each.
+    /// Lights and their photon counts, cube by cube; ids ascend in each.
     entries: Vec<(LightId, u32)>,
-    /// Numbers of photons of a cube up to and with each entry.
+    /// Cumulative photon counts of each cube.
     sums: Vec<u32>,
 }
 
-/// What is known around a point.
+/// The contributing lights of a point.
 #[derive(Clone, Copy, Debug, Default)]
 pub struct Around<'a> {
-    /// Lights and numbers of their photons, ids ascending.
+    /// Lights and their photon counts, ids ascending.
     pub lights: &'a [(LightId, u32)],
-    /// Numbers of photons up to and with each light.
+    /// Cumulative photon counts.
     pub sums: &'a [u32],
 }
 
 impl Around<'_> {
-    /// Where a light is.
+    /// Index of a light.
     #[inline]
     pub fn place(&self, light: LightId) -> Option<usize> {
         self.lights.binary_search_by_key(&light, |&(id, _)| id).ok()
     }
 
-    /// An estimate of the visibility of a light, from [`UNSEEN`] to 1: (c + [`UNSEEN`])/(c + 1) of a light with c photons, and 1
-    /// where nothing is known.
+    /// An estimate of the visibility of a light, from [`UNSEEN`] to 1: (c + [`UNSEEN`])/(c + 1) for a light with c
+    /// photons, and 1 where the cache is empty.
     #[inline]
     pub fn visibility(&self, light: LightId) -> f32 {
         if self.lights.is_empty() {
@@ -97,24 +98,24 @@ fn key_of([x, y, z]: [u64; 3], side: u64) -> u64 {
 /// The index of a cube along an axis for a distance from the origin in edges.
 #[inline]
 fn index_of(x: f32) -> u64 {
-    // A cast of what lies outside saturates; NaN is 0
+    // Casts saturate; NaN becomes 0
     (x as u64).min((1 << AXIS_BITS) - 1)
 }
 
 impl LightHints {
-    /// Hints of photons that came straight from lights: position, unit normal on the side that they came to, light.
-    /// `radius` (m) is enlarged where the scene has more than 2²⁰ cubes along an axis. Photons whose place is not finite and
-    /// those without a normal are left out.
+    /// Built from photons that came straight from lights: position, unit normal on the lit side, light. `radius` (m) is
+    /// enlarged where the scene has more than 2²⁰ cubes along an axis. Photons without a finite position or without a
+    /// normal are ignored.
     pub fn new(primary: impl Iterator<Item = (Vec3, Vec3, LightId)>, radius: f32) -> Self {
         let photons: Vec<_> = primary.collect();
         LightHints::of_photons(&photons, radius)
     }
 
-    /// [`Self::new`] with a secure radius; `scene_radius` (m) bounds it.
+    /// [`Self::new`] with a safe radius, bounded by `scene_radius` (m).
     pub fn adapted(primary: &[(Vec3, Vec3, LightId)], scene_radius: f32) -> Self {
         let [min, max] = RADIUS_SHARES.map(|share| share * scene_radius);
         let mut hints = LightHints::of_photons(primary, scene_radius / 64.0);
-        // Numbers of photons on a surface grow with the square of the radius, nearly
+        // Photon counts on a surface grow approximately with the square of the radius
         for _ in 0..3 {
             let ratio = (SECURE_COUNT / hints.mean_count().max(1.0)).sqrt() as f32;
             let radius = (hints.radius * ratio.clamp(0.125, 8.0)).clamp(min, max);
@@ -136,7 +137,7 @@ impl LightHints {
         let origin = if bounds.is_empty() { Vec3::ZERO } else { bounds.min - 2.0 * edge };
         let scale = 1.0 / edge;
 
-        // Photons with the same 8 cubes, side and light are one item with their number
+        // Photons with the same 8 cubes, orientation and light are one item with their count
         let mut items: Vec<(u64, LightId, u32)> = Vec::new();
         for &(p, n, light) in photons() {
             let lowest = ((p - origin) * scale - 0.5).to_array().map(index_of);
@@ -184,7 +185,7 @@ impl LightHints {
         slot
     }
 
-    /// The same without the lights that are not in question.
+    /// The same for some of the lights only.
     #[must_use]
     pub fn of_lights(self, is_light: impl Fn(LightId) -> bool) -> Self {
         if self.entries.iter().all(|&(light, _)| is_light(light)) {
@@ -216,14 +217,14 @@ impl LightHints {
         (self.slots.len() * size_of::<Slot>() + self.entries.len() * entry) as u64
     }
 
-    /// 𝓛_con of the point `p` on the side of the unit normal `n`, with numbers of photons; ids ascend. Empty where nothing is known,
-    /// and for a normal that is zero.
+    /// 𝓛_con of the point `p` on the side of the unit normal `n`, with photon counts; ids ascend. Empty where no photon
+    /// was found, and for a zero normal.
     #[inline]
     pub fn around(&self, p: Vec3, n: Vec3) -> &[(LightId, u32)] {
         self.around_with_sums(p, n).lights
     }
 
-    /// [`Self::around`] with sums of the numbers.
+    /// [`Self::around`] with cumulative counts.
     #[inline]
     pub fn around_with_sums(&self, p: Vec3, n: Vec3) -> Around<'_> {
         if n == Vec3::ZERO {
@@ -235,7 +236,7 @@ impl LightHints {
         Around { lights: &self.entries[range.clone()], sums: &self.sums[range] }
     }
 
-    /// Mean over all photons of the number of photons of the same light that are found where they are.
+    /// Mean over all photons of the number of photons of the same light found at their position.
     pub fn mean_count(&self) -> f64 {
         let sum = |f: fn(f64) -> f64| self.entries.iter().map(|&(_, count)| f(f64::from(count))).sum::<f64>();
         let (photons, squares) = (sum(|c| c), sum(|c| c * c));
@@ -243,7 +244,7 @@ impl LightHints {
     }
 }
 
-/// Items in order, those of the same cube and light made one.
+/// Sorted items; those of the same cube and light are merged.
 fn merged(mut items: Vec<(u64, LightId, u32)>) -> Vec<(u64, LightId, u32)> {
     items.par_sort_unstable();
     items.dedup_by(|next, kept| {
@@ -294,7 +295,7 @@ mod tests {
                 assert!(around.iter().any(|(id, _)| id == light));
                 found += 1;
             }
-            // No photon is found beyond three radii, none of the other side, and each only once.
+            // No photon is found beyond three radii or from the other side, and each only once.
             for &(light, count) in around {
                 let most = near(radius * 3.001, -0.61).filter(|(_, _, id)| *id == light).count();
                 assert!(count as usize <= most, "{light} {count} {most}");

@@ -1,4 +1,4 @@
-//! Irradiance of lights in closed form, if nothing is in the way: E = ∫ L̄ cos θ dω, with the mean radiance L̄ of the light and θ
+//! Unoccluded irradiance of lights in closed form: E = ∫ L̄ cos θ dω, with the mean radiance L̄ of the light and θ
 //! about a unit normal n, over the part of the light above the horizon of n.
 //!
 //! | light | E |
@@ -7,9 +7,10 @@
 //! | one-sided sphere, seen from outside and wholly above the horizon | L̄ π (r/d)² cos θ_c |
 //! | constant environment | π L |
 //!
-//! γᵢ is the angle that an edge is seen under, Γᵢ the unit normal of the plane through it and the point; r and d are the radius and
-//! the distance of the centre, θ_c its angle. Of all other lights, and of flat ones seen edge-on, E is not known and they count as
-//! black, in E as in L̄. So do surfaces with cut-outs (alpha), whose extent is not that of their shape.
+//! γᵢ is the angle subtended by an edge, Γᵢ the unit normal of the plane through the edge and the point; r and d are
+//! the radius and the distance of the centre, θ_c its angle. For all other lights, and for flat ones seen edge-on, E is
+//! not known and they count as black, in E as in L̄. So do surfaces with alpha masks, whose extent is not that of their
+//! shape.
 
 use super::area::{AreaLight, AreaShape};
 use super::{Light, LightId, LightSet};
@@ -18,8 +19,8 @@ use glam::DVec3;
 use lumiris_numbers::math::{Rgb, Vec3, sqr};
 use std::f32::consts::PI;
 
-/// Distance from the plane of a flat light, in units of its extent, up to which it is seen edge-on: rounding decides there on
-/// which side the point is.
+/// Distance from the plane of a flat light, relative to its extent, below which it counts as edge-on: rounding decides
+/// there on which side the point is.
 const EDGE_ON: f32 = 1e-4;
 
 /// The lights of a set whose irradiance is known.
@@ -27,14 +28,14 @@ const EDGE_ON: f32 = 1e-4;
 pub struct Irradiances {
     /// Area lights, ascending.
     area: Vec<LightId>,
-    /// Of each light, L̄; black if E is not known.
+    /// L̄ of each light; black if E is not known.
     mean_l: Vec<Rgb>,
     /// Radiance of all constant environments.
     environment: Rgb,
 }
 
 impl Irradiances {
-    /// Those of a set; `has_alpha` tells the geometries with cut-outs.
+    /// Those of a set; `has_alpha`: geometries with alpha masks.
     pub fn new(set: &LightSet, has_alpha: impl Fn(GeometryId) -> bool) -> Self {
         let mut mean_l: Vec<Rgb> = set.lights.iter().map(mean_l).collect();
         for (_, light) in set.emitters().filter(|(geometry, _)| has_alpha(*geometry)) {
@@ -55,8 +56,8 @@ impl Irradiances {
         self.environment * PI + self.area.iter().map(area).sum()
     }
 
-    /// The radiance in E that an area light sends to `p` along `−wi`, from a point of it whose normal is `n_light`, where `wi` is above
-    /// the horizon of `n`.
+    /// The radiance in E that an area light sends to `p` along `−wi`, from a point of it whose normal is `n_light`,
+    /// where `wi` is above the horizon of `n`.
     pub fn l(&self, set: &LightSet, light: LightId, (p, n): (Vec3, Vec3), wi: Vec3, n_light: Vec3) -> Rgb {
         let Light::Area(area) = &set.lights[light as usize] else { return Rgb::BLACK };
         let mean_l = self.mean_l[light as usize];
@@ -142,7 +143,8 @@ fn form(area: &AreaLight, p: Vec3, n: Vec3) -> f32 {
     }
 }
 
-/// ∫ cos θ dω over the part of a convex quadrilateral above the horizon of `n`; the point is at the origin, outside its plane.
+/// ∫ cos θ dω over the part of a convex quadrilateral above the horizon of `n`; the point is at the origin, outside its
+/// plane.
 fn polygon_irradiance(corners: &[DVec3; 4], n: DVec3) -> f64 {
     // Clip
     let mut clipped = [DVec3::ZERO; 5];
@@ -229,8 +231,8 @@ mod tests {
         })
     }
 
-    /// E and the integral of L̄ cos θ by samples of the light, at random points and normals. The latter must be the former wherever the
-    /// light takes part.
+    /// E and the integral of L̄ cos θ by samples of the light, at random points and normals. The latter must be the
+    /// former wherever the light takes part.
     fn assert_integrates(set: &LightSet, stream: &mut HashStream) -> u32 {
         let known = Irradiances::new(set, |_| false);
         let mut lit = 0;
@@ -286,7 +288,8 @@ mod tests {
 
     #[test]
     fn known_values_are_met() {
-        // A rectangle that fills the hemisphere, from below the middle; half of it below the horizon; from behind; on it
+        // A rectangle that fills the hemisphere, from below the middle; half of it below the horizon; from behind; on
+        // it
         let s = 1e4;
         let big = [[-s, -s], [-s, s], [s, s], [s, -s]].map(|[x, y]| Vec3::new(x, y, 10.0));
         let set = set(&[mesh(&big, &[[0, 1, 2], [0, 2, 3]])], &Emission::constant(Rgb::splat(2.0)));

@@ -1,11 +1,11 @@
-//! Many samples of one light at one point, as structure of arrays.
+//! Many samples of one light from one point, as a structure of arrays.
 
 use super::{Light, LightCtx};
 use lumiris_numbers::simd;
 
 pub use lumiris_numbers::simd::LightLanes;
 
-/// So many samples of an area light are cheaper in vectors than one by one, if a single one is cheap.
+/// Number of samples of an area light from which on lanes are faster than single samples.
 const FEW: usize = 3;
 
 impl Light {

@@ -1,4 +1,4 @@
-//! Every area light's sampler against its density, and against irradiances in closed form.
+//! Every area light's sampling routine against its pdf, and against irradiances in closed form.
 
 use super::area::AreaShape;
 use super::{AreaLight, Emission, Light, LightCtx, LightHit, area_lights_of};

@@ -1,7 +1,7 @@
-//! Lights: what they emit, how directions to them are sampled, and how one of many is chosen.
+//! Lights: their emission, the sampling of directions towards them, and the choice of one of many.
 //!
-//! Reading order: [`point`], [`spot`], [`area`], [`environment`], [`emit`], [`lanes`], [`bounds`], [`tree`], [`hints`], [`select`], [`hinted`], [`set`],
-//! [`groups`], [`irradiance`].
+//! Reading order: [`point`], [`spot`], [`area`], [`environment`], [`emit`], [`lanes`], [`bounds`], [`tree`], [`hints`],
+//! [`select`], [`hinted`], [`set`], [`groups`], [`irradiance`].
 
 pub mod area;
 pub mod bounds;
@@ -65,7 +65,7 @@ impl LightCtx {
 /// A direction sampled towards a light.
 #[derive(Clone, Copy, Debug)]
 pub struct LightSample {
-    /// Radiance that arrives if nothing is between. It may be black where a light has dark parts.
+    /// Unoccluded incident radiance. It may be black where parts of a light do not emit.
     /// For delta lights it is the weight of the delta, with `pdf` 1.
     pub li: Rgb,
     /// Unit direction to the light.
@@ -118,7 +118,7 @@ pub enum Light {
         p: Vec3,
         /// Unit axis of the cone.
         axis: Vec3,
-        /// Cosine of the half-angle beyond which it is dark.
+        /// Cosine of the half-angle beyond which it does not emit.
         cos_total: f32,
         /// Cosine of the half-angle up to which it is brightest.
         cos_falloff_start: f32,
@@ -263,7 +263,7 @@ impl Light {
         if phi.is_finite() { phi.max(0.0) } else { 0.0 }
     }
 
-    /// True for lights at infinity, which have no place in the light tree.
+    /// True for infinite lights, which are not in the light tree.
     #[inline]
     pub fn is_infinite(&self) -> bool {
         match self {
@@ -272,7 +272,7 @@ impl Light {
         }
     }
 
-    /// True if no ray can hit it: only light sampling finds it.
+    /// True for delta lights, which no ray can hit: only light sampling finds them.
     #[inline]
     pub fn is_delta(&self) -> bool {
         match self {
@@ -281,7 +281,7 @@ impl Light {
         }
     }
 
-    /// Bounds for the light tree; `None` for lights at infinity and for lights that emit nothing.
+    /// Bounds for the light tree; `None` for infinite lights and for lights that emit nothing.
     pub fn bounds(&self) -> Option<LightBounds> {
         let at = |p: Vec3, axis, cos_theta_o, cos_theta_e, intensity: Rgb| LightBounds {
             bounds: Bounds3 { min: p, max: p },

@@ -1,4 +1,4 @@
-//! Lights at a point: the same in all directions, or within a cone.
+//! Point and spot lights.
 //!
 //! li = I(−wi)/t², with I the radiant intensity.
 

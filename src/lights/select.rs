@@ -1,11 +1,11 @@
-//! The choice of one light.
+//! Light samplers: the choice of one light.
 //!
 //! | kind | probability |
 //! |---|---|
-//! | uniform | the same for all |
-//! | power | 95 % in proportion to the power, 5 % the same for all, so that no light starves |
-//! | tree | every infinite light, and all others together by the [`LightTree`], the same share |
-//! | photons | where photons tell which lights are seen, nearly always one of these; see [`super::hinted`] |
+//! | uniform | the same for all lights |
+//! | power | 95 % proportional to power, 5 % uniform, so that no light starves |
+//! | tree | equal for every infinite light and for the [`LightTree`] over all others |
+//! | photons | nearly always one of the lights that the visibility cache finds, if any; see [`super::hinted`] |
 //!
 //! Lights without power are never chosen.
 
@@ -13,10 +13,10 @@ use super::{HintedChoice, Light, LightCtx, LightHints, LightId, LightTree};
 use lumiris_numbers::math::{AliasTable, ONE_MINUS_EPSILON};
 use std::sync::Arc;
 
-/// Share of the power sampler that does not follow the power.
+/// Uniform fraction of the power sampler.
 const UNIFORM_SHARE: f64 = 0.05;
 
-/// How a light is chosen.
+/// The light sampler.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum LightSamplerKind {
     /// All lights alike.
@@ -25,7 +25,7 @@ pub enum LightSamplerKind {
     Power,
     /// By a bound of the contribution at the point.
     Tree,
-    /// By the same bound, of lights that photons say are seen from around the point.
+    /// By the same bound, over the lights that the visibility cache finds.
     Photons,
 }
 
@@ -48,7 +48,7 @@ pub struct LightChoice {
     pub light: LightId,
     /// Probability of the choice.
     pub pmf: f32,
-    /// The random number, made uniform in [0, 1) again.
+    /// The random number, remapped to be uniform in [0, 1) again.
     pub u: f32,
 }
 
@@ -70,7 +70,7 @@ impl LightRun {
     #[inline]
     pub fn within(&self, position: u32) -> u32 {
         let [start, end] = self.interval;
-        // A cast of what lies outside saturates.
+        // Casts saturate.
         ((f64::from(position) * UNIT - start) / (end - start) / UNIT) as u32
     }
 }
@@ -82,7 +82,7 @@ pub(super) const UNIT: f64 = 1.0 / 4_294_967_296.0;
 #[derive(Clone, Debug)]
 pub struct FixedChoice {
     table: AliasTable,
-    /// Sums of the probabilities up to and with each light; none if nothing can be chosen.
+    /// Cumulative probabilities; none if nothing can be chosen.
     cumulative: Vec<f64>,
 }
 
@@ -114,12 +114,12 @@ impl FixedChoice {
     }
 }
 
-/// A light tree, with the lights at infinity beside it.
+/// A light tree, with the infinite lights beside it.
 #[derive(Clone, Debug)]
 pub struct TreeChoice {
     /// Lights with a place.
     pub tree: LightTree,
-    /// Lights at infinity, ascending.
+    /// Infinite lights, ascending.
     pub infinite: Vec<LightId>,
 }
 
@@ -131,8 +131,8 @@ impl TreeChoice {
         TreeChoice { tree: LightTree::new(&bounds), infinite }
     }
 
-    /// Probability of the infinite lights together: each has the share of the whole tree. All, where nothing of the tree
-    /// can contribute.
+    /// Probability of the infinite lights together: each has that of the whole tree. 1 where nothing in the tree can
+    /// contribute.
     #[inline]
     pub(super) fn infinite_probability(&self, ctx: &LightCtx) -> f32 {
         let count = self.infinite.len();
@@ -210,13 +210,13 @@ pub enum LightSampler {
     Power(FixedChoice),
     /// By the tree; infinite lights beside it.
     Tree(TreeChoice),
-    /// By what photons tell, and by the tree.
+    /// By the visibility cache, and by the tree.
     Photons(HintedChoice),
 }
 
 impl LightSampler {
-    /// A sampler of `lights`, indexed as they are; `scene_radius` weighs infinite lights against others. That by photons has no
-    /// hints yet.
+    /// A sampler of `lights`, indexed as they are; `scene_radius` weighs infinite lights against others. That by
+    /// photons has no hints yet.
     pub fn new(kind: LightSamplerKind, lights: &[Light], scene_radius: f32) -> Self {
         let powers: Vec<f32> = lights.iter().map(|light| light.phi(scene_radius)).collect();
         match kind {
@@ -233,7 +233,7 @@ impl LightSampler {
         }
     }
 
-    /// Sets what photons tell, for the sampler by them.
+    /// Sets the visibility cache of the sampler that uses it.
     pub(super) fn set_hints(&mut self, hints: Option<Arc<LightHints>>) {
         match self {
             LightSampler::Photons(choice) => choice.hints = hints,
@@ -263,9 +263,9 @@ impl LightSampler {
         }
     }
 
-    /// Chooses a light for each position of an ascending list in units of 2⁻³², by inversion: neighbours in the list choose
-    /// the same light or neighbours. Each light is chosen with the probability [`pmf`](Self::pmf), which two runs may share. A
-    /// list without a light to choose has no runs.
+    /// Chooses a light for each position of an ascending list in units of 2⁻³², by inversion: neighbours in the list
+    /// choose the same light or neighbours. Each light is chosen with the probability [`pmf`](Self::pmf), which two
+    /// runs may share. A list without a light to choose has no runs.
     pub fn runs(&self, ctx: &LightCtx, positions: &[u32], out: &mut Vec<LightRun>) {
         out.clear();
         match self {

@@ -1,4 +1,4 @@
-//! All lights of a scene with the way one is chosen, and the map from hits to lights.
+//! All lights of a scene with their light sampler, and the map from hits to lights.
 
 use super::area::AreaShape;
 use super::hints::Around;
@@ -26,7 +26,7 @@ pub struct LightSetBuilder {
 }
 
 impl LightSetBuilder {
-    /// Adds a light that is no surface.
+    /// Adds a light that is not an area light.
     pub fn add(&mut self, light: Light) -> LightId {
         self.lights.push(light);
         (self.lights.len() - 1) as LightId
@@ -74,9 +74,9 @@ pub struct LightSet {
     pub sampler: LightSampler,
     /// The lights as components of a mixture; none before [`set_groups`](Self::set_groups).
     pub groups: LightGroups,
-    /// What photons tell of the visibility of lights, where that is known; see [`set_hints`](Self::set_hints).
+    /// The visibility cache, if there is one; see [`set_hints`](Self::set_hints).
     hints: Option<Arc<LightHints>>,
-    /// Lights that rays which leave the scene see, ascending.
+    /// Infinite lights, seen by rays that leave the scene, ascending.
     pub infinite: Vec<LightId>,
     /// Lights with power, ascending.
     pub lit: Vec<LightId>,
@@ -89,39 +89,39 @@ pub struct LightSet {
 }
 
 impl LightSet {
-    /// Chooses lights in another way from now on.
+    /// Changes the light sampler.
     pub fn set_kind(&mut self, kind: LightSamplerKind) {
         self.sampler = LightSampler::new(kind, &self.lights, self.scene_radius);
         self.sampler.set_hints(self.hints.clone());
         self.groups = LightGroups::default();
     }
 
-    /// From now on uses what photons tell of the visibility of lights, wherever settings ask for it. Estimates stay unbiased
-    /// whatever it is. Lights without power, and those that there are not, are left out.
+    /// Sets the visibility cache, which is used wherever settings ask for it. Estimates remain unbiased whatever it
+    /// contains. Lights without power and unknown ids are ignored.
     pub fn set_hints(&mut self, hints: Option<LightHints>) {
         let is_lit = |light: LightId| self.lit.binary_search(&light).is_ok();
         self.hints = hints.map(|hints| Arc::new(hints.of_lights(is_lit)));
         self.sampler.set_hints(self.hints.clone());
     }
 
-    /// What photons tell of the visibility of lights.
+    /// The visibility cache.
     pub fn hints(&self) -> Option<&LightHints> {
         self.hints.as_deref()
     }
 
-    /// The lights that photons say are seen around a point; nothing where nothing is known.
+    /// The contributing lights of a point; none without a visibility cache.
     #[inline]
     pub fn around(&self, ctx: &LightCtx) -> Around<'_> {
         self.hints.as_ref().map_or_else(Around::default, |hints| hints.around_with_sums(ctx.p, ctx.n))
     }
 
-    /// Puts the lights into at most `most` groups.
+    /// Divides the lights into at most `most` groups.
     pub fn set_groups(&mut self, most: usize) {
         self.groups = LightGroups::new(self, most);
     }
 
-    /// False if no emitter can hide a part of the lights, not even of itself, from a point that is lit by that part: as for lamps
-    /// in one ceiling. True in case of doubt.
+    /// False if no emitter can occlude another light, or itself, from any point: as for lamps in one ceiling. True in
+    /// case of doubt.
     pub fn may_hide_each_other(&self) -> bool {
         if self.emitting.is_empty() {
             return false;
@@ -144,7 +144,7 @@ impl LightSet {
         })
     }
 
-    /// Chooses among the lights that no ray can hit, in the same way; `None` if there are none.
+    /// A sampler of the same kind over the delta lights; `None` if there are none.
     pub fn delta_sampler(&self, kind: LightSamplerKind) -> Option<LightSampler> {
         let is_lit = |light: &&Light| light.is_delta() && light.phi(self.scene_radius) > 0.0;
         self.lights.iter().find(is_lit)?;
@@ -183,7 +183,8 @@ impl LightSet {
         self.sample_choice(ctx, self.sampler.sample(ctx, u_choice)?, u)
     }
 
-    /// Samples a direction to a light of one group, whose probability is `group_pmf`; otherwise as [`sample`](Self::sample).
+    /// Samples a direction to a light of one group, whose probability is `group_pmf`; otherwise as
+    /// [`sample`](Self::sample).
     #[inline]
     pub fn sample_group(
         &self,

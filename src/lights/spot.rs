@@ -16,9 +16,9 @@ pub fn spot_solid_angle(cos_total: f32, cos_falloff_start: f32) -> f32 {
     std::f32::consts::TAU * ((1.0 - cos_falloff_start) + (cos_falloff_start - cos_total).max(0.0) * 0.5)
 }
 
-/// A polar cosine with the density [`spot_falloff`]/[`spot_solid_angle`] per steradian: uniform in the inner cone; between
-/// the cones P(x) = 2x³ − x⁴ of the relative place x is inverted by Newton's method, which on a convex function falls to
-/// the root once it is above it.
+/// A polar cosine with the density [`spot_falloff`]/[`spot_solid_angle`] per steradian: uniform in the inner cone;
+/// between the cones P(x) = 2x³ − x⁴ of the relative place x is inverted by Newton's method, which on a convex function
+/// falls to the root once it is above it.
 pub fn sample_spot_cos(u: f32, cos_total: f32, cos_falloff_start: f32) -> f32 {
     let inner = 1.0 - cos_falloff_start;
     let band = (cos_falloff_start - cos_total).max(0.0);
@@ -61,7 +61,7 @@ mod tests {
             for i in 0..=64 {
                 let u = (i as f32 / 64.0).min(lumiris_numbers::math::ONE_MINUS_EPSILON);
                 let cos = f64::from(sample_spot_cos(u, total, start));
-                // The share of the flux in the part from the axis, or between the cones, to this cosine
+                // The fraction of the flux from the axis, or between the cones, to this cosine
                 let (inner, band) = (1.0 - f64::from(start), f64::from(start - total));
                 let x = (cos - f64::from(total)) / band;
                 let is_inner = f64::from(u) * solid_angle < std::f64::consts::TAU * inner;

@@ -1,10 +1,10 @@
-//! A bounding-volume hierarchy over lights, descended at random in proportion to an upper bound of what each child
-//! can contribute [Conty Estévez and Kulla 2018; Pharr et al. 2023, §12.6.3].
+//! A bounding volume hierarchy over lights, descended at random in proportion to an upper bound of each child's
+//! contribution [Conty Estévez and Kulla 2018; Pharr et al. 2023, §12.6.3].
 //!
 //! The importance of a node at p is I·cos θ′·cos θi′/max(d², r²): I the summed intensity, d the distance to the centre
-//! of its bounding sphere, r that sphere's radius, θ′ the least angle between an emitter's normal and the direction to p,
-//! θi′ the least angle between the surface normal and a direction to the node. Both compared quantities are squared
-//! lengths, so the choice does not depend on the unit of length.
+//! of its bounding sphere, r that sphere's radius, θ′ the minimum angle between an emitter's normal and the direction
+//! to p, θi′ the minimum angle between the surface normal and a direction to the node. Both sides of the maximum are
+//! squared lengths, so the result does not depend on the unit of length.
 
 use super::select::LightRun;
 use super::{LightBounds, LightCtx, LightId};
@@ -14,11 +14,11 @@ use lumiris_numbers::math::{Bounds3, ONE_MINUS_EPSILON, Vec3, safe_sqrt, sqr};
 const COSINE_SLACK: f32 = 1e-3;
 /// Beyond this depth lights are split in halves, so that the trail of any leaf fits 64 bits.
 const MAX_HEURISTIC_DEPTH: u32 = 30;
-/// Subtrees that wait while positions go down together: one for each level.
+/// Subtrees on the stack while positions descend together: one per level.
 const MAX_DEPTH: usize = 66;
-/// Least probability of a child that can contribute; f32 uniforms and 1 − p do not resolve much less.
+/// Minimum probability of a child that can contribute; f32 uniforms and 1 − p do not resolve much less.
 const MIN_SHARE: f32 = 1.0 / (1 << 20) as f32;
-/// Places where an axis is tried to be cut, plus one.
+/// Number of split candidates per axis, plus one.
 const BUCKETS: usize = 12;
 /// Trail of lights that are not in the tree.
 const NO_TRAIL: u64 = u64::MAX;
@@ -105,13 +105,13 @@ impl Node {
 #[derive(Clone, Debug, Default)]
 pub struct LightTree {
     nodes: Vec<Node>,
-    /// Per light, the turns from the root to its leaf, first turn in the lowest bit; 1 is right.
+    /// Per light, the path from the root to its leaf, first turn in the lowest bit; 1 is right.
     trails: Vec<u64>,
     /// Per light, its leaf.
     leaves: Vec<u32>,
 }
 
-/// Positions on their way down the tree.
+/// Positions descending the tree.
 #[derive(Clone, Copy, Default)]
 struct Descent {
     place: u32,
@@ -203,8 +203,8 @@ impl LightTree {
         }
     }
 
-    /// Chooses a light of the subtree below a node by `u` in [0, 1): its id, its probability in that subtree, and `u` made
-    /// uniform again.
+    /// Chooses a light of the subtree below a node by `u` in [0, 1): its id, its probability in that subtree, and `u`
+    /// remapped to be uniform again.
     #[inline]
     pub fn sample_below(&self, ctx: &LightCtx, place: u32, u: f32) -> Option<(LightId, f32, f32)> {
         let (mut place, mut pmf, mut u) = (place as usize, 1.0, u);
@@ -227,8 +227,8 @@ impl LightTree {
     }
 
     /// Chooses a light for each of the ascending `positions[places[0]..places[1]]` in units of 2⁻³², which the tree has
-    /// from `start` on with a share `share` of the probability. They go down the tree together, so that a node is looked at
-    /// once for all that pass it.
+    /// from `start` on with a share `share` of the probability. They descend the tree together, so that each node is
+    /// evaluated once for all of them.
     pub fn runs(
         &self,
         ctx: &LightCtx,
@@ -269,8 +269,9 @@ impl LightTree {
         }
     }
 
-    /// At most `most` disjoint subtrees that hold all lights together, by their topmost nodes: of those so far, the one whose
-    /// lights are farthest apart, weighted by their intensity, is split next. None without lights, or if `most` is 0.
+    /// At most `most` disjoint subtrees that hold all lights together, by their topmost nodes: of those so far, the one
+    /// whose lights are farthest apart, weighted by their intensity, is split next. None without lights, or if `most`
+    /// is 0.
     pub fn cut(&self, most: usize) -> Vec<u32> {
         let mut cut: Vec<u32> = if self.is_empty() || most == 0 { Vec::new() } else { vec![0] };
         while cut.len() < most {
@@ -317,7 +318,7 @@ impl LightTree {
         }
     }
 
-    /// Chooses a light by `u` in [0, 1): its id, its probability, and `u` made uniform again.
+    /// Chooses a light by `u` in [0, 1): its id, its probability, and `u` remapped to be uniform again.
     #[inline]
     pub fn sample(&self, ctx: &LightCtx, u: f32) -> Option<(LightId, f32, f32)> {
         if self.is_empty() { None } else { self.sample_below(ctx, 0, u) }
@@ -350,7 +351,7 @@ fn bucket(center: f32, min: f32, extent: f32) -> usize {
     (((center - min) / extent * BUCKETS as f32) as usize).min(BUCKETS - 1)
 }
 
-/// Reorders at least two items and returns where to cut them; both parts have items.
+/// Reorders at least two items and returns where to split them; neither part is empty.
 fn split(items: &mut [Item]) -> usize {
     let centers = Bounds3::from_points(items.iter().map(|i| i.center));
     let all = items.iter().fold(Bounds3::EMPTY, |b, i| b.union(i.bounds.bounds));
@@ -383,7 +384,7 @@ fn split(items: &mut [Item]) -> usize {
     middle
 }
 
-/// The least cost of a cut along an axis, and the first bucket right of it.
+/// The minimum cost of a split along an axis, and the first bucket right of it.
 fn best_cut(items: &[Item], axis: usize, min: f32, extent: f32) -> Option<(f32, usize)> {
     let mut buckets = [LightBounds::EMPTY; BUCKETS];
     for item in items {

@@ -1,4 +1,4 @@
-//! Shading frames, plain or changed by a normal map or a displacement texture [Blinn 1978].
+//! Shading frames, optionally perturbed by a normal map or a displacement texture [Blinn 1978].
 
 use super::MaterialEntry;
 use crate::geometry::SurfaceHit;

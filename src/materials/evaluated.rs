@@ -1,4 +1,4 @@
-//! Materials whose reflection can only be evaluated, see [`crate::bsdfs::models`].
+//! Materials whose BSDF can only be evaluated, see [`crate::bsdfs::models`].
 
 use super::Textures;
 use crate::bsdfs::Model;

@@ -1,4 +1,4 @@
-//! Materials: textures at a hit become a BSDF in its shading frame. Semantics are pbrt-v4's.
+//! Materials: evaluate textures at a hit and build the BSDF in its shading frame. Semantics are pbrt-v4's.
 //!
 //! Reading order: this file, [`evaluated`], [`bump`], [`surface`].
 
@@ -189,7 +189,8 @@ struct CoatKey {
 
 impl MaterialSet {
     /// Takes the materials and tabulates their coats, some 30 ms for each (η, thickness, roughness), and one second
-    /// where the roughness is textured. `textures` is the set that the materials refer to; its images need not be there yet.
+    /// where the roughness is textured. `textures` is the set that the materials refer to; its images need not be there
+    /// yet.
     pub fn new(entries: Vec<MaterialEntry>, textures: &TextureSet) -> Self {
         let mut keys: Vec<CoatKey> = Vec::new();
         let mut intern = |key: CoatKey| {
@@ -213,7 +214,7 @@ impl MaterialSet {
         self.density = density;
     }
 
-    /// Most lobes that a BSDF of these materials has, by [`Bsdf::first_lobe`].
+    /// Maximum number of lobes of a BSDF of these materials, by [`Bsdf::first_lobe`].
     pub fn lobes(&self) -> usize {
         let has_two = |material: &Material| match material {
             Material::CoatedDiffuse { .. }

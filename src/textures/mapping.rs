@@ -1,4 +1,4 @@
-//! From a surface point to texture coordinates.
+//! Maps from surface points to texture coordinates.
 
 use super::TextureContext;
 use lumiris_numbers::math::{Affine3A, Vec2, Vec3, warp};

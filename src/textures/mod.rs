@@ -1,7 +1,7 @@
-//! Textures: float and RGB functions of a surface point. All textures of a scene live in one [`TextureSet`].
+//! Textures: float and RGB functions of a surface point. All textures of a scene are stored in one [`TextureSet`].
 //!
-//! Textures are trees whose nodes refer to earlier ones by number, so that no tree can hold itself. Semantics are
-//! pbrt-v4's. Checkerboards are looked up at points: the pixel integrates over their edges.
+//! Textures are trees whose nodes refer to earlier ones by index, so that no tree can contain itself. Semantics are
+//! pbrt-v4's. Checkerboards are point sampled: the pixel integrates over their edges.
 
 pub mod mapping;
 
@@ -142,8 +142,8 @@ pub struct TextureSet {
 }
 
 impl TextureSet {
-    /// Adds a float texture. Panics if it refers to a texture that is not in the set yet; its image may come later, before the
-    /// first look-up.
+    /// Adds a float texture. Panics if it refers to a texture that is not in the set yet; its image may come later,
+    /// before the first lookup.
     pub fn add_float(&mut self, texture: FloatTexture) -> FloatTextureId {
         let children: &[FloatTextureId] = match &texture {
             FloatTexture::Constant(_) => &[],
@@ -161,8 +161,8 @@ impl TextureSet {
         id
     }
 
-    /// Adds an RGB texture. Panics if it refers to a texture that is not in the set yet; its image may come later, before the
-    /// first look-up.
+    /// Adds an RGB texture. Panics if it refers to a texture that is not in the set yet; its image may come later,
+    /// before the first lookup.
     pub fn add_rgb(&mut self, texture: RgbTexture) -> RgbTextureId {
         let (children, weight): (&[RgbTextureId], Option<FloatTextureId>) = match &texture {
             RgbTexture::Constant(_) => (&[], None),

@@ -1,15 +1,15 @@
-//! The binary tree by the binned surface-area heuristic [Wald 2007].
+//! Builds the binary tree by the binned surface-area heuristic [Wald 2007].
 //!
-//! Every choice is a function of the set of primitives in a range alone, and minima, maxima and counts are exact in any
-//! grouping, so the tree does not depend on the number of threads.
+//! Every decision is a function of the set of primitives in a range alone, and minima, maxima and counts are exact in
+//! any grouping, so the tree does not depend on the number of threads.
 
 use lumiris_numbers::math::{Bounds3, Vec3, Vec3A};
 use rayon::prelude::*;
 
-/// Most triangles in a leaf: the width of a block.
+/// Maximum number of triangles in a leaf: the width of a block.
 pub(super) const LEAF_TRIANGLES: usize = 4;
 const MAX_BINS: usize = 32;
-/// Below this depth ranges are halved without looking, which bounds the depth of the tree.
+/// Below this depth ranges are simply halved, which bounds the depth of the tree.
 const MAX_SAH_DEPTH: u32 = 64;
 /// Ranges longer than this are split by parallel tasks.
 const PARALLEL_RANGE: usize = 4096;
@@ -33,7 +33,7 @@ impl PrimRef {
 
     /// `None` if a point is not finite.
     pub fn of_points(geometry: u32, primitive: usize, points: &[Vec3]) -> Option<Self> {
-        // Minima and maxima may skip NaN.
+        // Minima and maxima may ignore NaN.
         let finite = points.iter().all(|p| p.is_finite());
         finite.then(|| Self::of_bounds(geometry, primitive, Bounds3::from_points(points.iter().copied()))).flatten()
     }
@@ -101,7 +101,7 @@ pub(super) enum BinaryKind {
 }
 
 impl Binary {
-    /// Bytes of the tree below, with the node itself.
+    /// Bytes of the subtree, including the node itself.
     pub fn bytes(&self) -> u64 {
         let below = match &self.kind {
             BinaryKind::Leaf { .. } => 0,
@@ -193,7 +193,7 @@ impl Binning {
     }
 }
 
-/// What the bins of the three axes hold.
+/// The bins of the three axes.
 struct Bins {
     bounds: [[Range3; MAX_BINS]; 3],
     counts: [[u32; MAX_BINS]; 3],
@@ -222,8 +222,8 @@ impl Bins {
         self
     }
 
-    /// The cheapest split after a bin: (axis, last bin of the left side). Cost is area times blocks of triangles, summed
-    /// over the sides.
+    /// The cheapest split after a bin: (axis, last bin of the left side). Cost is area times blocks of triangles,
+    /// summed over the sides.
     fn best_split(&self, bin_count: usize) -> Option<(usize, usize)> {
         let mut best: Option<(f32, usize, usize)> = None;
         for axis in 0..3 {

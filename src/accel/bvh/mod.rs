@@ -1,12 +1,12 @@
-//! The pure-Rust bounding volume hierarchy, the reference that the other tracer is checked against.
+//! The pure-Rust bounding volume hierarchy, the reference for the Embree tracer.
 //!
-//! Two levels: a tree per group, and one over the root's primitives and the instances. A tree is built as a binary one by
-//! the surface-area heuristic ([`build`]), then collapsed to nodes of eight boxes with leaves of four triangles
-//! ([`tree`]), and walked one ray at a time ([`walk`]). Triangles are watertight; quadrics and bilinear patches use the
-//! exact intersections of [`crate::geometry`].
+//! Two levels: a tree per group, and one over the root's primitives and the instances. A binary tree is built by the
+//! surface-area heuristic ([`build`]), collapsed to eight-wide nodes with leaves of four triangles ([`tree`]), and
+//! traversed one ray at a time ([`walk`]). Triangles are watertight; quadrics and bilinear patches use the exact
+//! intersections of [`crate::geometry`].
 //!
-//! Answers do not depend on the order of the walk: of hits with equal t, the smallest (instance, geometry, primitive)
-//! wins. Primitives and placements with NaN or infinite coordinates are left out.
+//! Results do not depend on traversal order: among hits with equal t, the smallest (instance, geometry, primitive)
+//! wins. Primitives and instances with NaN or infinite coordinates are left out.
 
 mod build;
 #[cfg(test)]

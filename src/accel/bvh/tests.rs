@@ -1,4 +1,4 @@
-//! Against brute force with the same exact intersections, so answers must agree bit for bit.
+//! Comparison with brute force. Both use the same exact intersections, so results must agree bit for bit.
 
 use super::*;
 use crate::geometry::triangle::{RayPrecomputed, intersect_triangle};
@@ -161,7 +161,7 @@ fn trace(bvh: &Bvh, rays: &RayBatch) -> (Vec<Option<Hit>>, Vec<bool>) {
     (hits, occluded)
 }
 
-/// Compares with brute force; returns the numbers of hits and of occluded rays.
+/// Compares with brute force; returns the number of hits and of occluded rays.
 fn assert_exact(set: &Arc<GeometrySet>, alpha: Option<Arc<dyn AlphaSource>>, rays: &RayBatch) -> (usize, usize) {
     let bvh = Bvh::new(Arc::clone(set), alpha.clone());
     let test = alpha.map(|source| AlphaTest::new(Arc::clone(set), source));

@@ -1,4 +1,4 @@
-//! The tree that is walked: nodes of eight boxes, blocks of four triangles, structure of arrays.
+//! The tree that is traversed: nodes of eight boxes and blocks of four triangles, as structures of arrays.
 
 use super::build::{Binary, BinaryKind, LEAF_TRIANGLES, PrimRef};
 use crate::geometry::triangle::RayPrecomputed;
@@ -10,7 +10,7 @@ use rayon::prelude::*;
 /// rounding of the triangle test, which moves corners by up to 5·2⁻²⁴ of their distance from the origin.
 const BOX_GROWTH: f32 = 1.0 / (1 << 20) as f32;
 
-/// What a slot of a node refers to: two bits of kind, thirty of index.
+/// The child in a slot of a node: two bits of kind, thirty of index.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) struct ChildRef(u32);
 
@@ -23,7 +23,7 @@ pub(super) enum Child {
 
 impl ChildRef {
     const KIND_SHIFT: u32 = 30;
-    /// An unused slot; its box is empty, so no walk gets there.
+    /// An unused slot; its box is empty, so it is never visited.
     pub const EMPTY: ChildRef = ChildRef(u32::MAX);
 
     fn new(kind: u32, index: usize) -> Self {
@@ -42,7 +42,7 @@ impl ChildRef {
     }
 }
 
-/// Eight boxes and what they hold.
+/// Eight boxes and their children.
 #[derive(Clone, Debug, PartialEq)]
 #[repr(C, align(64))]
 pub(super) struct Node {
@@ -128,7 +128,7 @@ pub(super) enum Other {
 #[derive(Debug)]
 pub(super) struct Tree {
     pub bounds: Bounds3,
-    /// Where a walk starts; `None` if the tree is empty.
+    /// The root; `None` if the tree is empty.
     pub root: Option<ChildRef>,
     pub nodes: Vec<Node>,
     pub blocks: Vec<Block>,
@@ -183,7 +183,7 @@ impl Collapse<'_> {
         ChildRef::new(2, self.others.len() - 1)
     }
 
-    /// What stands for a binary subtree: its leaf, or a new node that is still to be filled.
+    /// The child for a binary subtree: its leaf, or a new node that is filled later.
     fn place(&mut self, binary: &Binary) -> ChildRef {
         match binary.kind {
             BinaryKind::Leaf { start, count } => self.leaf(start, count),
@@ -194,7 +194,8 @@ impl Collapse<'_> {
         }
     }
 
-    /// Fills the node of a subtree and all below. Siblings lie side by side: a ray that meets one often meets another.
+    /// Fills the node of a subtree and all nodes below. Siblings are stored together: a ray that visits one often
+    /// visits another.
     fn fill(&mut self, place: ChildRef, binary: &Binary) {
         let (Child::Node(index), BinaryKind::Inner(children)) = (place.decode(), &binary.kind) else { return };
         let slots = opened(children);

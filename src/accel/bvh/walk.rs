@@ -1,4 +1,4 @@
-//! The walk of one ray through the two levels.
+//! Traversal of the two levels by a single ray.
 
 use super::tree::{Block, Child, ChildRef, Node, Other, Tree};
 use super::{Bvh, TESTED};
@@ -7,17 +7,17 @@ use crate::geometry::triangle::{RayPrecomputed, intersect_triangle};
 use crate::geometry::{Shape, Visibility};
 use lumiris_numbers::math::{Ray, Vec4, gamma};
 
-/// What is looked for along the ray.
+/// The query along the ray.
 pub(super) trait Query {
     /// Whether near boxes come first.
     const ORDERED: bool;
     /// Which geometries count.
     const MASK: u32;
-    /// Boxes and hits beyond this parameter are of no interest.
+    /// Boxes and hits beyond this parameter are ignored.
     fn limit(&self) -> f32;
-    /// True if the hit, at a parameter of `limit` or less, changes the answer.
+    /// True if the hit, at a parameter of `limit` or less, changes the result.
     fn wants(&self, hit: &Hit) -> bool;
-    /// Takes a wanted hit; true if the answer is final.
+    /// Accepts a hit; true if the result is final.
     fn take(&mut self, hit: Hit) -> bool;
 }
 
@@ -147,7 +147,7 @@ impl Slabs {
     }
 }
 
-/// A subtree that is still to be walked.
+/// A subtree that is still to be traversed.
 #[derive(Clone, Copy)]
 pub(super) struct Pending {
     child: ChildRef,
@@ -179,7 +179,7 @@ impl<'a, Q: Query> Walk<'a, Q> {
         self.query
     }
 
-    /// Walks a tree with the ray in its space; true if the answer is final.
+    /// Traverses a tree with the ray in its space; true if the result is final.
     fn tree(&mut self, tree: &'a Tree, ray: &RayPrecomputed, instance: u32) -> bool {
         let Some(root) = tree.root else { return false };
         let slabs = Slabs::new(&ray.ray);
@@ -283,7 +283,7 @@ impl<'a, Q: Query> Walk<'a, Q> {
         }
     }
 
-    /// Walks a placed group. Parameters are those of the world ray: its direction is transformed, not normalised.
+    /// Traverses an instance. Parameters are those of the world ray: its direction is transformed, not normalised.
     fn instance(&mut self, index: u32) -> bool {
         let placed = &self.bvh.geometry.instances[index as usize];
         let world = self.world_ray;
@@ -298,7 +298,7 @@ impl<'a, Q: Query> Walk<'a, Q> {
         RayPrecomputed::new(&ray).is_some_and(|ray| self.tree(&bvh.groups[placed.group as usize], &ray, index))
     }
 
-    /// Offers a hit to the query; true if the answer is final.
+    /// Passes a hit to the query; true if the result is final.
     #[inline]
     fn offer(&mut self, hit: Hit) -> bool {
         let flags = self.bvh.flags[hit.geometry as usize];

@@ -1,8 +1,8 @@
-//! Embree by itself: loops over packets that were filled before, and nothing of what the renderer adds. They say how
-//! fast a query can be at best, and what conversion and exact hits cost.
+//! Plain Embree: loops over packets filled in advance, without anything the renderer adds. They show how fast a query
+//! can be at best, and what conversion and exact hits cost.
 //!
-//! The scene is built as the renderer's, but without the flag by which queries bring a filter. Quadrics, patches and
-//! cut-outs call back as they do in the renderer.
+//! The scene is built like the renderer's, but without the flag that lets queries bring a filter function. Quadrics,
+//! patches and alpha masks use callbacks as in the renderer.
 #![allow(unsafe_code)]
 
 use super::callbacks::QueryContext;
@@ -18,11 +18,11 @@ use embree4_sys as sys;
 use std::sync::Arc;
 use std::time::{Duration, Instant};
 
-/// Embree's structures over a scene.
+/// Embree's data structures for a scene.
 pub struct Bare {
     root: EmbreeScene,
     world: Arc<World>,
-    /// Whether callbacks report hits, for which the context must be made ready.
+    /// Whether callbacks report hits, for which the context must be prepared.
     calls_back: bool,
     build_time: Duration,
 }
@@ -43,7 +43,7 @@ enum Packets {
 }
 
 impl Bare {
-    /// Builds on all cores. Without `alpha`, cut-outs are opaque.
+    /// Builds on all cores. Without `alpha`, alpha masks are opaque.
     pub fn new(set: Arc<GeometrySet>, alpha: Option<Arc<dyn AlphaSource>>) -> Result<Bare, EmbreeError> {
         let start = Instant::now();
         let device = Arc::new(Device::new(c"", None)?);
@@ -119,7 +119,7 @@ impl Bare {
 }
 
 impl<'a> Packed<'a> {
-    /// Rays whose first hits are asked for, in packets of `width`: 1, 4 or 8.
+    /// Rays whose nearest hits are queried, in packets of `width`: 1, 4 or 8.
     pub fn first(rays: &'a RayBatch, width: u32) -> Result<Packed<'a>, EmbreeError> {
         let packets = match checked_width(width)? {
             4 => Packets::First4(pack_first(rays)),
@@ -147,7 +147,7 @@ impl<'a> Packed<'a> {
         Ok(Packed { rays, packets })
     }
 
-    /// How many of the traced rays hit something.
+    /// Number of rays that hit something.
     pub fn hits(&self) -> usize {
         fn first<const N: usize>(packets: &[(Valid<N>, RayHitPacket<N>)]) -> usize {
             let geometries = packets.iter().flat_map(|(_, packet)| packet.geometry);

@@ -1,7 +1,7 @@
-//! What Embree calls while it traces: first hits, cut-outs, quadrics and bilinear patches.
+//! Callbacks from Embree: nearest hits, alpha masks, quadrics and bilinear patches.
 //!
-//! Embree hands over N rays at once as a structure of arrays with N elements per field; lanes whose `valid` is not −1 are
-//! left alone. Fields are reached by their index in the header's order, which holds for any N, 1 included.
+//! Embree passes N rays at once as a structure of arrays with N elements per field; lanes whose `valid` is not −1 are
+//! ignored. Fields are addressed by their index in the header's order, which holds for any N, including 1.
 #![allow(unsafe_code)]
 
 use super::kernels::RtcContext;
@@ -25,7 +25,7 @@ const TIE: f32 = 1.0 / (1 << 12) as f32;
 /// Relative growth of the boxes of quadrics and patches, for the rounding of rays on their way into a group.
 const BOX_GROWTH: f32 = 1.0 / (1 << 20) as f32;
 
-/// What the callbacks of one geometry read.
+/// The data that the callbacks of one geometry read.
 #[derive(Clone)]
 pub(super) struct GeometryContext {
     pub world: Arc<World>,
@@ -57,7 +57,7 @@ impl GeometryContext {
     }
 }
 
-/// What a query brings along; Embree passes the address of its first member to the callbacks.
+/// The context of a query; Embree passes the address of its first member to the callbacks.
 #[repr(C)]
 pub(super) struct QueryContext<'a> {
     pub rtc: RtcContext,
@@ -70,7 +70,7 @@ pub(super) struct QueryContext<'a> {
     pub best_t: [f32; MAX_WIDTH],
     /// The hit of each lane.
     pub first: [Reported; MAX_WIDTH],
-    /// What a callback panicked with: it goes on when Embree has returned.
+    /// The payload of a panic in a callback, resumed when Embree has returned.
     pub panic: Option<Box<dyn Any + Send>>,
 }
 
@@ -85,8 +85,8 @@ impl QueryContext<'_> {
         }
     }
 
-    /// Offers a hit of the ray `id`; the new end of the ray, or `None` if another hit stays the first. The end lies a
-    /// little beyond the hit, so that a tie is seen whichever of the hits comes first.
+    /// Records a hit of the ray `id`; returns the new end of the ray, or `None` if another hit is nearer. The end is
+    /// slightly beyond the hit, so that ties are found whichever of the hits comes first.
     #[inline]
     fn offer(&mut self, id: u32, hit: Reported) -> Option<f32> {
         let lane = (id - self.base) as usize % MAX_WIDTH;
@@ -116,7 +116,7 @@ impl QueryContext<'_> {
         wins
     }
 
-    /// Runs the body of a callback; a panic is kept for later.
+    /// Runs the body of a callback; a panic is stored for later.
     #[inline]
     fn guard(&mut self, body: impl FnOnce(&mut Self)) {
         let result = catch_unwind(AssertUnwindSafe(|| body(self)));
@@ -180,7 +180,7 @@ unsafe fn active(valid: *const i32, n: usize) -> impl Iterator<Item = usize> {
     (0..n).filter(move |&lane| unsafe { *valid.add(lane) == -1 })
 }
 
-/// Refuses the hits of triangles that a cut-out lets through.
+/// Rejects the hits of triangles that an alpha mask lets through.
 pub(super) unsafe extern "C" fn alpha_filter(arguments: *const sys::RTCFilterFunctionNArguments) {
     // SAFETY: Embree passes valid arguments: the user data that was set, the context of this query, N lanes each.
     unsafe {
@@ -207,7 +207,7 @@ pub(super) unsafe extern "C" fn alpha_filter(arguments: *const sys::RTCFilterFun
     }
 }
 
-/// Offers the hits of triangles.
+/// Records the hits of triangles.
 pub(super) unsafe extern "C" fn first_filter(arguments: *const sys::RTCFilterFunctionNArguments) {
     // SAFETY: Embree passes valid arguments: the context of this query, N lanes each.
     unsafe {
@@ -224,7 +224,7 @@ pub(super) unsafe extern "C" fn first_filter(arguments: *const sys::RTCFilterFun
     }
 }
 
-/// The hit of a triangle in a lane of a filter. Where on the triangle is left to the exact hit.
+/// The hit of a triangle in a lane of a filter. The position on the triangle is computed by the exact hit.
 ///
 /// # Safety
 /// `rays` and `hits` have n lanes of rays and of hits, and `lane` is below n.

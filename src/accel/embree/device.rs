@@ -8,11 +8,11 @@ use std::ffi::{CStr, c_char, c_void};
 use std::sync::atomic::{AtomicI64, Ordering};
 use std::sync::{Mutex, PoisonError};
 
-/// An Embree device. All else that Embree makes holds a reference to it.
+/// An Embree device. All other Embree objects hold a reference to it.
 #[derive(Debug)]
 pub(super) struct Device {
     raw: sys::RTCDevice,
-    /// What the device's callbacks write; boxed, since they hold its address.
+    /// The log written by the device's callbacks; boxed, since they hold its address.
     log: Box<DeviceLog>,
 }
 

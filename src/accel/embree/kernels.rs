@@ -1,4 +1,4 @@
-//! Embree's query functions, alike for both families.
+//! Embree's query functions, with one interface for both API versions.
 #![allow(unsafe_code)]
 
 use super::callbacks::{MAX_WIDTH, QueryContext, first_filter};
@@ -9,12 +9,12 @@ use embree4_sys as sys;
 /// Words per hit beyond the eight that every version has: `instPrimID`, where it exists.
 const EXTRA_HIT_WORDS: usize = if size_of::<sys::RTCRayHit8>() == 640 { 0 } else { 1 };
 
-/// What is asked.
+/// The kind of query.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) enum Ask {
-    /// First hits, which the filter of the query collects.
+    /// Nearest hits, collected by the filter function of the query.
     First,
-    /// First hits as Embree itself keeps them.
+    /// Nearest hits as Embree determines them.
     Nearest,
     /// Whether anything is hit.
     Any,
@@ -23,7 +23,7 @@ pub(super) enum Ask {
 /// How to trace.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) struct Mode {
-    /// What is asked.
+    /// The kind of query.
     pub ask: Ask,
     /// Traverse packets by their common frustum.
     pub coherent: bool,
@@ -101,10 +101,10 @@ impl<const N: usize> RayHitPacket<N> {
     }
 }
 
-/// The part of a query that Embree knows.
+/// The part of a query that Embree sees.
 #[cfg(embree3)]
 pub(super) type RtcContext = sys::RTCIntersectContext;
-/// The part of a query that Embree knows.
+/// The part of a query that Embree sees.
 #[cfg(embree4)]
 pub(super) type RtcContext = sys::RTCRayQueryContext;
 
@@ -114,7 +114,7 @@ impl<'a> QueryContext<'a> {
         QueryContext { rtc: rtc_context(mode), world, rays, base: 0, best_t, first, panic: None }
     }
 
-    /// Goes on with the panic of a callback.
+    /// Resumes the panic of a callback.
     #[inline]
     pub fn finish(self) {
         if let Some(panic) = self.panic {

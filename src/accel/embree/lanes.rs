@@ -1,4 +1,4 @@
-//! Exact triangle hits, several at once: the arithmetic of [`crate::geometry::triangle`] without its rare branches.
+//! Exact triangle hits, several at a time: the arithmetic of [`crate::geometry::triangle`] without its rare branches.
 
 use crate::accel::RayBatch;
 use lumiris_numbers::math::{Vec3, gamma};
@@ -20,7 +20,7 @@ pub(super) struct RayRows<const N: usize> {
 }
 
 impl<const N: usize> RayRows<N> {
-    /// The rays from `base` on; where the batch has ended, something.
+    /// The rays from `base` on; beyond the end of the batch, arbitrary ones.
     #[inline]
     pub fn load(rays: &RayBatch, base: usize) -> Self {
         let row = |values: &[f32]| match values[base..].first_chunk::<N>() {
@@ -47,7 +47,7 @@ pub(super) struct LaneHits<const N: usize> {
     pub b1: [f32; N],
     /// Weights of vertices 2.
     pub b2: [f32; N],
-    /// False where `intersect_triangle` may take one of its branches, and the rest means nothing.
+    /// False where `intersect_triangle` may take one of its branches, and the other values are undefined.
     pub plain: [bool; N],
 }
 
@@ -113,7 +113,7 @@ impl<const N: usize> Lanes<N> {
         }
     }
 
-    /// What `intersect_triangle` gives for each lane, to the bit.
+    /// The result of `intersect_triangle` for each lane, to the bit.
     #[inline]
     pub fn intersect(&self) -> LaneHits<N> {
         let [a, b, c] = &self.corners;

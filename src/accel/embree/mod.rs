@@ -1,21 +1,22 @@
 //! Ray tracing by Embree, 3.13 or 4.x.
 //!
 //! Reading order: [`device`] (errors, memory), [`scene`] (geometries, instances), [`world`] (ids and exact hits),
-//! [`lanes`] (several exact hits at once), [`callbacks`] (first hits, cut-outs, quadrics, patches), [`kernels`] (the two
-//! families' functions), [`query`] (batches), [`bare`] (Embree by itself, to compare with).
+//! [`lanes`] (several exact hits at once), [`callbacks`] (first hits, cut-outs, quadrics, patches), [`kernels`] (the
+//! two families' functions), [`query`] (batches), [`bare`] (Embree by itself, to compare with).
 //!
 //! # Answers do not depend on packets
 //!
-//! Embree decides which triangles a ray meets; all else is exact arithmetic of this program, so a ray has one answer, to
-//! the bit, in packets of any width and beside any neighbours:
+//! Embree decides which triangles a ray meets; all else is exact arithmetic of this program, so a ray has one answer,
+//! to the bit, in packets of any width and beside any neighbours:
 //!
-//! 1. (t, u, v) of a hit are computed from the vertices by the same function as in [`super::bvh`], in the group's space. The
-//!    two tracers, and processors with other vector units, give the same bits for the same triangle.
-//! 2. Of hits whose parameters as Embree reports them differ by less than 2⁻¹², the exact one that comes first is taken,
-//!    and of equal ones the smallest (instance, geometry, primitive), again as in [`super::bvh`]. To see them all, a
-//!    filter takes every hit and leaves the end of the ray that little beyond it. Without this the first of a tie is a
-//!    matter of the order of traversal: among rays at vertices of a closed mesh, packets with the coherence flag gave
-//!    other triangles than single rays for 10 %, at edges for 0.2 %, camera rays on coplanar triangles for 13 %.
+//! 1. (t, u, v) of a hit are computed from the vertices by the same function as in [`super::bvh`], in the group's
+//!    space. The two tracers, and processors with other vector units, give the same bits for the same triangle.
+//! 2. Of hits whose parameters as Embree reports them differ by less than 2⁻¹², the exact one that comes first is
+//!    taken, and of equal ones the smallest (instance, geometry, primitive), again as in [`super::bvh`]. To see them
+//!    all, a filter takes every hit and leaves the end of the ray that little beyond it. Without this the first of a
+//!    tie is a matter of the order of traversal: among rays at vertices of a closed mesh, packets with the coherence
+//!    flag gave other triangles than single rays for 10 %, at edges for 0.2 %, camera rays on coplanar triangles for 13
+//!    %.
 //! 3. Packets are traced for first hits of coherent rays and for occlusion. For other first hits Embree 3.13 traces the
 //!    rays of a packet one by one anyway.
 //! 4. Scenes with moving instances are traced by single rays. Embree interpolates and inverts their matrices in another
@@ -24,18 +25,19 @@
 //!    AVX-512, and it is no faster.
 //! 6. Rays of unused lanes are empty: Embree 3.13 emulates packets that the processor lacks, and then ignores `valid`.
 //!
-//! Whether a ray meets a triangle at all, by less than a rounding error of its edge, remains Embree's decision. Its kernels
-//! decided alike in all of 2·10⁷ rays (camera, random, along edges, at vertices, grazing; soups, crossing, coplanar
-//! and closed meshes, quadrics, patches, instances) with AVX-512, and 10⁷ each with AVX2, AVX and SSE 4.2, single and in
-//! packets of 4 and 8, with and without the coherence flag: no first hit and no occlusion bit differed. The tests repeat
-//! this with fewer rays. Rays that leave a surface by [`lumiris_numbers::math::ray::offset_origin`] do not meet it again.
+//! Whether a ray meets a triangle at all, by less than a rounding error of its edge, remains Embree's decision. Its
+//! kernels decided alike in all of 2·10⁷ rays (camera, random, along edges, at vertices, grazing; soups, crossing,
+//! coplanar and closed meshes, quadrics, patches, instances) with AVX-512, and 10⁷ each with AVX2, AVX and SSE 4.2,
+//! single and in packets of 4 and 8, with and without the coherence flag: no first hit and no occlusion bit differed.
+//! The tests repeat this with fewer rays. Rays that leave a surface by [`lumiris_numbers::math::ray::offset_origin`] do
+//! not meet it again.
 //!
 //! # Cost
 //!
 //! Against a bare loop over Embree with packets filled in advance (`benches/embree.rs`: 10⁶ triangles of the size of a
 //! pixel, 10⁶ rays, one thread): occlusion in packets 0.97–1.04 of its speed, single rays 0.83–0.92, coherent packets
-//! 0.70–0.78, which are still twice as fast as single rays. Of the some 25 ns more per coherent ray, exact hits take 12, mostly
-//! waiting for the vertices that shading needs next, and the filter 9.
+//! 0.70–0.78, which are still twice as fast as single rays. Of the some 25 ns more per coherent ray, exact hits take
+//! 12, mostly waiting for the vertices that shading needs next, and the filter 9.
 
 pub mod bare;
 mod callbacks;
@@ -121,7 +123,7 @@ pub enum EmbreeError {
     /// The library was built without something that is needed.
     #[error("this build of Embree has no {0}")]
     Unsupported(&'static str),
-    /// An unknown packet width was asked for.
+    /// Unsupported packet width.
     #[error("packets of {0} rays are not supported: 1, 4 or 8")]
     PacketWidth(u32),
     /// A shape has more primitives than 32 bits count.
@@ -129,18 +131,18 @@ pub enum EmbreeError {
     TooManyPrimitives,
 }
 
-/// What a tracer may be told beyond the scene.
+/// Options of a tracer.
 #[derive(Clone, Debug, Default, PartialEq, Eq)]
 pub struct EmbreeOptions {
     /// Rays per packet: 1, 4 or 8; the processor's own width if not given.
     pub packet_width: Option<u32>,
-    /// Most bytes that Embree may hold.
+    /// Maximum memory of Embree (bytes).
     pub memory_limit: Option<u64>,
     /// Embree's own configuration, for instance `threads=4,isa=avx2`.
     pub config: CString,
 }
 
-/// Embree's structures over a scene.
+/// Embree's data structures for a scene.
 pub struct EmbreeAccel {
     root: Arc<EmbreeScene>,
     world: Arc<World>,
@@ -254,7 +256,7 @@ impl Builder<'_> {
     }
 }
 
-/// The width that was asked for, or the widest that pays.
+/// The requested width, or the widest that pays off.
 fn packet_width(device: &Device, asked: Option<u32>) -> Result<usize, EmbreeError> {
     if !device.has(Property::RTC_DEVICE_PROPERTY_RAY_MASK_SUPPORTED) {
         return Err(EmbreeError::Unsupported("ray masks"));

@@ -1,4 +1,4 @@
-//! Batches of rays to Embree's single rays and packets, and back.
+//! Converts batches of rays to Embree's single rays and packets, and the results back.
 #![allow(unsafe_code)]
 
 use super::EmbreeAccel;
@@ -9,7 +9,7 @@ use crate::accel::{Coherence, Hit, RayBatch};
 use crate::geometry::Visibility;
 use embree4_sys as sys;
 
-/// Trials to leave the surface that a ray starts on.
+/// Maximum number of retries to leave the surface that a ray starts on.
 const MAX_RETRIES: u32 = 64;
 
 const FIRST_SINGLE: Mode = Mode { ask: Ask::First, coherent: false };
@@ -87,7 +87,7 @@ impl EmbreeAccel {
         unsafe { kernels::intersect1(self.root.raw(), context, FIRST_SINGLE, &mut query) };
     }
 
-    /// Turns what the context collected of N rays into exact hits.
+    /// Converts the hits collected for N rays to exact hits.
     #[inline]
     fn finish<const N: usize>(&self, context: &mut QueryContext<'_>, base: usize, hits: &mut [Option<Hit>]) {
         let count = N.min(context.rays.len() - base);
@@ -102,8 +102,8 @@ impl EmbreeAccel {
         }
     }
 
-    /// The exact hit of ray `i`, for which Embree reported `first`. If that is the surface that the ray left, the ray goes
-    /// on behind it.
+    /// The exact hit of ray `i`, for which Embree reported `first`. If that is the surface that the ray left, the ray
+    /// is continued behind it.
     #[cold]
     fn refine_one(&self, rays: &RayBatch, i: usize, mut first: Reported) -> Option<Hit> {
         let ray = rays.get(i);
@@ -176,7 +176,7 @@ pub(super) fn single_ray(rays: &RayBatch, i: usize, visibility: Visibility) -> s
     }
 }
 
-/// Fills a packet from ray `base` on; what is −1 in the result holds a ray that can be traced.
+/// Fills a packet from ray `base` on; lanes that are −1 in the result hold rays that can be traced.
 #[inline]
 pub(super) fn load<const N: usize>(packet: &mut RayPacket<N>, rays: &RayBatch, base: usize) -> Valid<N> {
     let count = N.min(rays.len() - base);

@@ -57,8 +57,8 @@ impl EmbreeGeometry {
             Shape::Bilinear(mesh) => Self::user(device, mesh.patch_count())?,
         };
         let user: *mut c_void = Arc::as_ptr(&context).cast_mut().cast();
-        // SAFETY: the geometry, then the scene keeps the context, so it outlives the callbacks, which only read it. Filters
-        // serve triangles only: the callbacks of other shapes ask the alpha test themselves.
+        // SAFETY: the geometry, then the scene keeps the context, so it outlives the callbacks, which only read it.
+        // Filters serve triangles only: the callbacks of other shapes ask the alpha test themselves.
         unsafe {
             sys::rtcSetGeometryUserData(result.raw, user);
             if context.has_alpha() && matches!(geometry.shape, Shape::Mesh(_)) {
@@ -149,13 +149,14 @@ pub(super) struct EmbreeScene {
     _set: Arc<GeometrySet>,
 }
 
-// SAFETY: after the commit, queries may run on any number of threads at once; before it, only the builder has the scene.
+// SAFETY: after the commit, queries may run on any number of threads at once; before it, only the builder has the
+// scene.
 unsafe impl Send for EmbreeScene {}
 // SAFETY: as above. The contexts are read only.
 unsafe impl Sync for EmbreeScene {}
 
 impl EmbreeScene {
-    /// An empty scene; `query_filter` tells whether queries bring a filter.
+    /// An empty scene; `query_filter`: whether queries bring a filter function.
     pub fn new(device: &Arc<Device>, set: &Arc<GeometrySet>, query_filter: bool) -> Result<Self, EmbreeError> {
         // SAFETY: the device is live.
         let raw = unsafe { sys::rtcNewScene(device.raw()) };

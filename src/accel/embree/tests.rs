@@ -1,4 +1,4 @@
-//! Against the pure-Rust tracer, and packets against single rays.
+//! Embree against the pure-Rust tracer, and packets against single rays.
 
 use super::*;
 use crate::accel::Bvh;
@@ -221,7 +221,7 @@ fn bits(hit: &Option<Hit>) -> Option<[u32; 6]> {
     hit.map(|h| [h.t.to_bits(), h.uv[0].to_bits(), h.uv[1].to_bits(), h.geometry, h.primitive, h.instance])
 }
 
-/// Asserts that all widths and hints give the same bits.
+/// Asserts that all widths and coherence flags give the same bits.
 fn assert_widths_agree(name: &str, set: &Arc<GeometrySet>, batches: &[RayBatch], config: &CStr) {
     let accels = WIDTHS.map(|width| configured(set, width, config));
     for (b, rays) in batches.iter().enumerate() {

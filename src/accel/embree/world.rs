@@ -1,4 +1,4 @@
-//! From Embree's ids to the scene's, and from Embree's hits to exact ones.
+//! Maps Embree's ids to those of the scene, and Embree's hits to exact ones.
 
 use super::lanes::{LaneHits, Lanes, RayRows};
 use crate::accel::{Hit, RayBatch};
@@ -81,8 +81,8 @@ impl Reported {
 }
 
 impl Refined {
-    /// True if this is to be taken rather than `other`: it is a hit, and first, or of hits at the same place the one with
-    /// the smallest (instance, geometry, primitive), as in the Rust tracer.
+    /// True if this is to be taken rather than `other`: it is a hit, and first, or of hits at the same place the one
+    /// with the smallest (instance, geometry, primitive), as in the Rust tracer.
     pub fn precedes(&self, other: &Refined) -> bool {
         let key = |h: &Hit| (h.instance, h.geometry, h.primitive);
         match (self, other) {
@@ -94,7 +94,7 @@ impl Refined {
 }
 
 impl World {
-    /// Numbers what rays can meet. `can_place` tells usable instances.
+    /// Assigns ids to everything that rays can hit. `can_place` is true for usable instances.
     pub fn new(set: Arc<GeometrySet>, can_place: impl Fn(u32) -> bool) -> World {
         let members = |group: &Group| group.geometries.iter().copied().filter(|&id| can_be_met(&set, id)).collect();
         let groups: Vec<Vec<GeometryId>> = set.groups.iter().map(members).collect();
@@ -136,8 +136,8 @@ impl World {
         Ray { o: group_from_world.transform_point3(world.o), d: group_from_world.transform_vector3(world.d), ..*world }
     }
 
-    /// The exact hits of the N rays from `base` on, whose reported hits are in `first`; not `plain` where there is none or
-    /// [`Self::refine`] must decide.
+    /// The exact hits of the N rays from `base` on, whose reported hits are in `first`; not `plain` where there is none
+    /// or [`Self::refine`] must decide.
     #[inline]
     pub fn refine_lanes<const N: usize>(&self, rays: &RayBatch, base: usize, first: &[Reported]) -> Exact<N> {
         let rows = RayRows::<N>::load(rays, base);
@@ -166,8 +166,8 @@ impl World {
         Exact::new(lanes.intersect(), t_max, geometries, instances)
     }
 
-    /// As [`Self::refine_lanes`] where all rays hit one triangle that is not placed, as camera rays of a pixel often do.
-    /// `None` where this does not hold.
+    /// As [`Self::refine_lanes`] where all rays hit one triangle that is not placed, as camera rays of a pixel often
+    /// do. `None` where this does not hold.
     #[inline]
     fn refine_same<const N: usize>(
         &self,

@@ -1,4 +1,4 @@
-//! The closed form of a coat over a Lambertian base against the random walk, and the walk against its analog twin.
+//! The closed form of a coat over a Lambertian base against the random walk, and the walk against an analog simulation.
 
 use super::*;
 use crate::bsdfs::dielectric::Transport;

@@ -1,4 +1,5 @@
-//! χ² tests of every sampler against its density. 10⁶ samples each; familywise significance 1 % (Šidák), fixed seeds.
+//! χ² tests of every sampling routine against its pdf. 10⁶ samples each; family-wise significance 1 % (Šidák), fixed
+//! seeds.
 
 use super::*;
 use lumiris_numbers::estimators::stats::{chi_squared_test, sidak};

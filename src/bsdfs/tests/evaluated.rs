@@ -1,4 +1,5 @@
-//! What can only be evaluated: its models, its densities, and resampling, which must work for every BSDF.
+//! BSDFs that can only be evaluated: their models, their sampling densities, and resampling, which must work for any
+//! BSDF.
 
 use super::*;
 use crate::bsdfs::models::{AshikhminShirley, CookTorrance, CosineLobe, LobeAxis, OrenNayar};

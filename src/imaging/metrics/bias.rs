@@ -1,11 +1,11 @@
-//! Is the picture too bright or too dark as a whole?
+//! Is the image too bright or too dark overall?
 //!
-//! The bias is the mean of x − r over pixels and channels, and its standard error is found in one of two ways:
-//! - from the variances of the pixels, where there are any: σ_c² = Σ variance / n² per channel c, for pixels that are
-//!   independent. What the channels of a pixel have in common is unknown, so that the mean of the three has at most
-//!   (σ_R + σ_G + σ_B) / 3, which is taken;
-//! - from the spread of x − r over the pixels, s / √n. It holds for any picture, but takes errors that differ from pixel
-//!   to pixel for noise, and is too small where neighbours err alike.
+//! The bias is the mean of x − r over pixels and channels. Its standard error is computed in one of two ways:
+//! - from the variances of the pixels, if available: σ_c² = Σ variance / n² per channel c, for independent pixels. The
+//!   correlation between the channels of a pixel is unknown; the standard error of their mean is at most
+//!   (σ_R + σ_G + σ_B) / 3, which is used;
+//! - from the standard deviation of x − r over the pixels, s / √n. This works for any image, but counts errors that
+//!   vary over the image as noise, and is too small where the errors of neighbouring pixels are correlated.
 
 use super::{Pixel, finite_pairs};
 use lumiris_numbers::estimators::stats::Welford;

@@ -1,9 +1,9 @@
 //! Squared differences.
 //!
-//! With x the picture, r the reference and means over pixels and channels:
+//! With x the image, r the reference and means over pixels and channels:
 //! - MSE = mean (x − r)², RMSE = √MSE;
-//! - relMSE = mean (x − r)² / (r² + ε), ε = 0.01 if not told [Rousselle et al. 2011, Sec. 4];
-//! - nMSE = MSE / mean r², the same for the picture as a whole: no ε, and no pixel weighs more for being dark;
+//! - relMSE = mean (x − r)² / (r² + ε), ε = 0.01 by default [Rousselle et al. 2011, Sec. 4];
+//! - nMSE = MSE / mean r²: no ε, and dark pixels have no extra weight;
 //! - PSNR = 10 log₁₀ (peak² / MSE) decibels.
 
 use super::{Pixel, finite_pairs, is_finite};

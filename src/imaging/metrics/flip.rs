@@ -1,9 +1,9 @@
-//! ꟻLIP: the difference that is seen when two pictures are flipped in place [Andersson et al. 2020], by the library of
-//! its authors, and its form for high dynamic range [Andersson et al. 2021].
+//! ꟻLIP: the perceived difference when two images are flipped in place [Andersson et al. 2020], by its authors'
+//! library, and its form for high dynamic range [Andersson et al. 2021].
 //!
-//! LDR-ꟻLIP sees both pictures on a display: radiance times a gain, clipped to 0..1, through the sRGB curve, in 8 bits.
-//! HDR-ꟻLIP is the maximum of LDR-ꟻLIP over exposures: between the one that maps the greatest luminance of the reference
-//! and the one that maps its median to 0.85 of the display, at most one stop apart, tone-mapped by the ACES
+//! LDR-ꟻLIP compares both images as displayed: radiance times a gain, clipped to 0..1, through the sRGB curve, in 8
+//! bits. HDR-ꟻLIP is the maximum of LDR-ꟻLIP over exposures: between the one that maps the maximum luminance of the
+//! reference and the one that maps its median to 0.85 of the display, at most one stop apart, tone-mapped by the ACES
 //! approximation (a x² + b x) / (c x² + d x + e) with the constants of the paper.
 
 use super::{Pixel, is_finite};
@@ -15,7 +15,7 @@ use rayon::prelude::*;
 /// Pixels per degree of a display 0.7 m away, 3840 pixels on 0.7 m.
 pub const DEFAULT_PIXELS_PER_DEGREE: f32 = nv_flip::DEFAULT_PIXELS_PER_DEGREE;
 
-/// The most pixels of a picture that the library can count.
+/// Maximum number of pixels that the library supports.
 pub const MAX_PIXELS: usize = (u32::MAX / 3) as usize;
 
 /// Outcome of [`hdr_flip`].
@@ -23,11 +23,11 @@ pub const MAX_PIXELS: usize = (u32::MAX / 3) as usize;
 pub struct HdrFlip {
     /// Maximum over the exposures per pixel, 0..1; NaN where a pixel is not finite.
     pub map: Vec<f32>,
-    /// The least exposure (stops).
+    /// The minimum exposure (stops).
     pub start: f64,
-    /// The greatest exposure (stops).
+    /// The maximum exposure (stops).
     pub stop: f64,
-    /// How many exposures were tried, from the least to the greatest at equal distances.
+    /// Number of exposures, equally spaced from minimum to maximum.
     pub count: usize,
 }
 

@@ -1,11 +1,10 @@
-//! How far a picture is from its reference: numbers for the whole, maps for the pixels.
+//! How far an image is from its reference: numbers for the whole, maps for the pixels.
 //!
-//! Pictures are linear Rec.709 radiance, row-major from the top left. **A pixel that is not finite in one of the two
-//! pictures takes no part in any mean**; [`Differences`] counts such pixels, maps are NaN there, and FLIP sees black in
-//! both pictures.
+//! Images are linear Rec.709 radiance, row-major from the top left. **Pixels that are not finite in either image are
+//! excluded from all means**; [`Differences`] counts them, maps are NaN there, and ꟻLIP sees black in both images.
 //!
-//! Reading order: [`difference`] (MSE, relative MSE, PSNR), [`mod@bias`], [`mod@significance`] (z-tests), [`perceptual`]
-//! (thresholds of vision), [`flip`].
+//! Reading order: [`difference`] (MSE, relative MSE, PSNR), [`mod@bias`], [`mod@significance`] (z-tests),
+//! [`perceptual`] (visual thresholds), [`flip`].
 
 pub mod bias;
 pub mod difference;

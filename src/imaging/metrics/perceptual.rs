@@ -1,16 +1,16 @@
-//! Differences in units of what the eye just notices.
+//! Differences in units of the just noticeable difference.
 //!
-//! E = √(mean ((L − L_true) / tvi(L_true))²) over the pixels [Fan et al. 2006, Eq. 12], with L the luminance and tvi the
-//! threshold versus intensity of [Ferwerda et al. 1996, Sec. 3.1], piecewise in log₁₀ of the luminance (cd/m²):
+//! E = √(mean ((L − L_true) / tvi(L_true))²) over the pixels [Fan et al. 2006, Eq. 12], with L the luminance and tvi
+//! the threshold versus intensity of [Ferwerda et al. 1996, Sec. 3.1], piecewise in log₁₀ of the luminance (cd/m²):
 //!
 //! | | lowest | between | highest |
 //! |---|---|---|---|
 //! | cones, log t_p | −0.72 below −2.6 | (0.249 log L + 0.65)^2.7 − 0.72 | log L − 1.255 from 1.9 |
 //! | rods, log t_s | −2.86 below −3.94 | (0.405 log L + 1.6)^2.18 − 2.86 | log L − 0.395 from −1.44 |
 //!
-//! The paper names one function: here the more sensitive system sees the difference, so tvi is the smaller of the two
-//! thresholds. They meet near 1 cd/m², rods below. Rods have their own spectral sensitivity; a picture of three
-//! channels has lost it, and both systems take the photopic luminance.
+//! The paper does not say which function it uses: here tvi is the smaller of the two thresholds, that of the more
+//! sensitive system. They cross near 1 cd/m², rods below. Both use the photopic luminance, since an RGB image does not
+//! contain the scotopic one.
 
 use super::{Pixel, finite_pairs, is_finite};
 use lumiris_numbers::math::Rgb;
@@ -45,8 +45,8 @@ pub fn tvi(luminance: f64) -> f64 {
     cone_threshold(log).min(rod_threshold(log))
 }
 
-/// (L − L_true) / tvi(L_true) per pixel, where a luminance of 1 in the pictures is `candelas` cd/m²; NaN where a pixel is
-/// not finite. Panics if the lengths differ.
+/// (L − L_true) / tvi(L_true) per pixel, where a luminance of 1 in the pictures is `candelas` cd/m²; NaN where a pixel
+/// is not finite. Panics if the lengths differ.
 pub fn perceptual_map(image: &[Pixel], reference: &[Pixel], candelas: f64) -> Vec<f32> {
     assert_eq!(image.len(), reference.len(), "pictures of one size");
     let thresholds = |(x, r): (&Pixel, &Pixel)| {

@@ -1,18 +1,18 @@
-//! Can the difference of two pictures be noise?
+//! Can the difference of two images be noise?
 //!
-//! Per value (pixel and channel) z = (x − r) / √(v_x + v_r) with the variances of the two means. If both pictures have
-//! the same expectation, the means are normal, and the variances are right, z is standard normal. Three summaries:
-//! - the share of values with |z| > 3, of which 0.27 % are expected;
+//! Per value (pixel and channel) z = (x − r) / √(v_x + v_r) with the variances of the two means. If both images have
+//! the same expectation, the means are normal, and the variances are correct, z is standard normal. Three summaries:
+//! - the fraction of values with |z| > 3, of which 0.27 % are expected;
 //! - the family-wise test: the smallest p-value p of n values rejects at the level α if it is below the Šidák level
-//!   1 − (1 − α)^(1/n); reported as 1 − (1 − p)^n. Channels of a pixel are not independent, which makes it stricter than
-//!   it says (Šidák's inequality);
-//! - χ² = Σ z² per channel with one degree of freedom per pixel; its upper tail, the least of three channels, again by
-//!   Šidák. It sees small deviations in many pixels.
+//!   1 − (1 − α)^(1/n); reported as 1 − (1 − p)^n. Channels of a pixel are not independent, which makes the test
+//!   conservative (Šidák's inequality);
+//! - χ² = Σ z² per channel with one degree of freedom per pixel; its upper tail, the smallest of three channels, again
+//!   by Šidák. It detects small deviations in many pixels.
 //!
-//! What breaks the assumptions: variances estimated from few samples (z has the tails of Student's t, and where bright
-//! samples are rare, the variance is low just where the mean is), variances of stratified samples computed as if they
-//! were independent (too large: z is too small, and the tests miss differences), and neighbouring pixels that share
-//! samples.
+//! What violates the assumptions: variances estimated from few samples (z has the tails of Student's t, and where
+//! bright samples are rare, the variance is low exactly where the mean is), variances of stratified samples computed as
+//! if they were independent (too large: z is too small, and the tests miss differences), and neighbouring pixels that
+//! share samples.
 
 use super::{Pixel, finite_pairs};
 use lumiris_numbers::estimators::stats::{chi_squared_tail, z_test};
@@ -22,7 +22,7 @@ use lumiris_numbers::estimators::stats::{chi_squared_tail, z_test};
 pub struct Significance {
     /// Values tested: finite, with a variance or a difference.
     pub values: usize,
-    /// Share of the values with |z| > 3.
+    /// Fraction of the values with |z| > 3.
     pub beyond: f64,
     /// The largest |z|; infinite if values without variance differ.
     pub max_z: f64,
@@ -53,7 +53,7 @@ fn z_of(x: f64, r: f64, variance: f64, rounding: f64) -> Option<f64> {
     (difference.abs() > 2.0 * most).then_some(difference.signum() * f64::INFINITY)
 }
 
-/// 1 − (1 − p)^n: the probability that the least of `n` independent p-values is at most `p`; 1 if there are none.
+/// 1 − (1 − p)^n: the probability that the smallest of `n` independent p-values is at most `p`; 1 if there are none.
 fn least_of(p: f64, n: usize) -> f64 {
     if n == 0 {
         return 1.0;
@@ -61,9 +61,8 @@ fn least_of(p: f64, n: usize) -> f64 {
     -((-p).ln_1p() * n as f64).exp_m1()
 }
 
-/// Tests all values of a picture. `variance` holds v_x + v_r per pixel; values whose variance is not finite take no part.
-/// `rounding` is [`F32_ROUNDING`] or [`HALF_ROUNDING`].
-/// Panics if the lengths differ.
+/// Tests all values of a picture. `variance` holds v_x + v_r per pixel; values whose variance is not finite take no
+/// part. `rounding` is [`F32_ROUNDING`] or [`HALF_ROUNDING`]. Panics if the lengths differ.
 pub fn significance(image: &[Pixel], reference: &[Pixel], variance: &[Pixel], rounding: f64) -> Significance {
     assert_eq!(image.len(), variance.len(), "a variance per pixel");
     let (mut beyond, mut certain, mut max_z) = (0_usize, 0_usize, 0.0_f64);

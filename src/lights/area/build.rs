@@ -1,4 +1,4 @@
-//! Area lights of a geometry: one per emitting primitive, and one for two triangles that form a rectangle.
+//! Area lights of a geometry: one per emissive primitive, or one for two triangles that form a rectangle.
 
 use super::{AreaLight, AreaShape, Emission, PatchLight, QuadricLight, RectangleLight, TriangleLight};
 use crate::geometry::{BilinearMesh, Shape, TriangleMesh};

@@ -1,4 +1,4 @@
-//! What the surface of an area light emits.
+//! Emission of an area light's surface.
 
 use lumiris_numbers::math::{Rgb, Vec2, Vec3};
 use std::sync::Arc;

@@ -1,4 +1,4 @@
-//! Area lights: surfaces that emit the same radiance in all directions of one side, or of both.
+//! Area lights: surfaces that emit the same radiance in all directions, on one or both sides.
 //!
 //! | shape | density of `sample_li` |
 //! |---|---|
@@ -99,7 +99,7 @@ fn pdf_by_area(from: Vec3, p: Vec3, n: Vec3, pdf_area: f32) -> f32 {
 
 impl AreaLight {
     /// Samples a direction to the surface. `None` if the point is behind a flat one-sided light or the geometry is
-    /// degenerate; a sample on the dark side of a curved light has black `li`.
+    /// degenerate; a sample on the non-emitting side of a curved light has black `li`.
     #[inline]
     pub fn sample_li(&self, ctx: &LightCtx, u: [f32; 2]) -> Option<LightSample> {
         if self.is_dark_from(ctx.p) {

@@ -1,9 +1,8 @@
 //! Spheres, disks and cylinders.
 //!
-//! A full sphere that its placement keeps a sphere is sampled uniformly in the cone that it subtends
-//! [Pharr et al. 2023, §6.2.4], and uniformly in area from inside. All others, partial ones included, are sampled
-//! uniformly in the area of their true local shape. With M the placement, an area element grows by
-//! |cof(M)·n|, n the local normal.
+//! A full sphere under a similarity transform is sampled uniformly in the cone that it subtends [Pharr et al. 2023,
+//! §6.2.4], and uniformly in area from inside. All others, including partial ones, are sampled uniformly in the area of
+//! their local shape. Under a transform M, an area element is scaled by |cof(M)·n|, n being the local normal.
 
 use super::{ShapePoint, ShapeSample, pdf_by_area};
 use crate::geometry::{Quadric, QuadricKind};
@@ -126,8 +125,8 @@ impl QuadricLight {
         }
     }
 
-    /// 1 − cos θ of the cone of the sphere seen from `from`, the unit direction to its centre and the squared sine; `None` if it
-    /// is no sphere or `from` is inside.
+    /// 1 − cos θ of the cone of the sphere seen from `from`, the unit direction to its centre and the squared sine;
+    /// `None` if it is no sphere or `from` is inside.
     #[inline]
     fn cone(&self, from: Vec3) -> Option<(f32, Vec3, f32)> {
         let (center, radius) = self.sphere?;

@@ -2,12 +2,13 @@
 //!
 //! In the frame of the rectangle's edges with the point at the origin, the rectangle is [x0, x1] × [y0, y1] × {z0},
 //! z0 < 0. The planes through the origin and the edges have the inner angles g0 … g3; the solid angle is
-//! S = g0 + g1 + g2 + g3 − 2π. For a first number u the part of the spherical rectangle left of x(u) has the area
-//! u·S; for a second number v the height is uniform on that arc.
+//! S = g0 + g1 + g2 + g3 − 2π. For a first number u, the part of the spherical rectangle left of x(u) has the area
+//! u·S; for a second number v, the height is uniform on that arc.
 //!
-//! From far away, beyond a distance of diagonal/[`MAX_EXTENT`] of the centre, points are sampled uniformly in area instead:
-//! that density per steradian is in proportion to t³, which varies by less than two to each side then, and it costs a tenth. So it is for points within
-//! [`MIN_HEIGHT`] diagonals of the plane. `sample` and `pdf` ask the same function, so they always agree.
+//! Beyond a distance of diagonal/[`MAX_EXTENT`] from the centre, points are sampled uniformly in area instead: the
+//! density per steradian is then proportional to t³/|z0| and varies by less than a factor of two to either side, at a
+//! tenth of the cost. The same holds for points within [`MIN_HEIGHT`] diagonals of the plane. `sample` and `pdf` decide
+//! by the same function, so they always agree.
 
 use super::{ShapePoint, ShapeSample, pdf_by_area};
 use lumiris_numbers::math::{Bounds3, Vec2, Vec3, gamma};
@@ -16,8 +17,8 @@ use std::f64::consts::TAU;
 
 /// Largest diagonal, by the distance of the centre, that is sampled by area.
 pub const MAX_EXTENT: f32 = 0.5;
-/// Smallest solid angle that is sampled by solid angle, in steradians: of what is nearly edge-on, angles in f64 keep their
-/// digits down to here.
+/// Smallest solid angle that is sampled by solid angle, in steradians: of what is nearly edge-on, angles in f64 keep
+/// their digits down to here.
 pub const MIN_SOLID_ANGLE: f64 = 1e-4;
 /// Smallest distance from the plane, in diagonals of the rectangle, that is sampled by solid angle.
 pub const MIN_HEIGHT: f64 = 1e-5;

@@ -1,5 +1,5 @@
-//! The scenes of `scenes/fan`, of the kinds that [Fan et al. 2006] shows: a glossy board under a large light and a small one, a
-//! statue with tight highlights, a room with small lights, a box for irradiance caching.
+//! The scenes of `scenes/fan`, after those of [Fan et al. 2006]: a glossy board under a large light and a small one, a
+//! statue with narrow highlights, a room with small lights, a box for irradiance caching.
 
 use super::files::{ProceduralError, Written, write_statue, write_texts};
 use super::statue::StatueOptions;

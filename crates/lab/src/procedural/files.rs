@@ -1,4 +1,4 @@
-//! Content as files.
+//! Writing generated content to files.
 
 use super::ply::write_ply;
 use super::sky::{SkyOptions, sky};

@@ -1,4 +1,4 @@
-//! Content that the program makes itself: a statue, a sky, and the scenes that show them.
+//! Generated content: a statue, a sky, and the scenes that use them.
 //!
 //! Reading order: [`noise`], [`nets`], [`solids`], [`relief`], [`dragon`] (with `head`), [`statue`], [`ply`], [`sky`],
 //! [`files`], [`talbot`], [`fan`], [`keller_wald`].

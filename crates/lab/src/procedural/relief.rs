@@ -1,10 +1,10 @@
-//! Carvings: heights above the surface of a solid, as functions of where on it one is.
+//! Carved reliefs: heights above the surface of a solid, as functions of the position on it.
 
 use super::noise::{fractal, noise, ridged, smoothstep};
 use lumiris_numbers::math::Vec3;
 use std::f32::consts::{PI, TAU};
 
-/// A place on a solid.
+/// A position on a solid.
 #[derive(Clone, Copy, Debug)]
 pub struct Spot {
     /// The point.
@@ -141,7 +141,7 @@ fn scale(y: f32, x: f32) -> f32 {
     (0.1 + 0.62 * y / 2.1 + keel + rim) * smoothstep(0.0, 0.09, to_tip)
 }
 
-/// Relative place in `low..high`, if inside.
+/// Relative position in `low..high`, if inside.
 fn within(x: f32, low: f32, high: f32) -> Option<f32> {
     (low..high).contains(&x).then(|| (x - low) / (high - low))
 }

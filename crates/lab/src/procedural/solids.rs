@@ -1,8 +1,9 @@
-//! Solids of which sculptures are put together, by their distances: strokes (round cones) and turned profiles.
+//! Solids for sculptures, as distance functions: strokes (round cones) and turned profiles.
 //!
-//! The distance of a stroke is that to the sphere at the nearest point of its axis; it changes by at most
-//! √(1 + (Δr/l)²) per unit of way, l the length and Δr the change of the radius. Parts meet by the smooth minimum
-//! min(a, b) − k h²/4, h = max(1 − |a − b|/k, 0) [Quilez 2013], which is the minimum where they differ by k or more.
+//! The distance of a stroke is that to the sphere at the nearest point of its axis; it changes by at most √(1 +
+//! (Δr/l)²) per unit length, l being the length and Δr the change of the radius. Parts are joined by the smooth minimum
+//! min(a, b) − k h²/4, h = max(1 − |a − b|/k, 0) [Quilez 2013], which equals the minimum where they differ by k or
+//! more.
 
 use super::relief::{Relief, Spot};
 use lumiris_numbers::math::{Vec2, Vec3};
@@ -100,7 +101,8 @@ pub struct Part {
 }
 
 impl Part {
-    /// Distance after carving, or `None` if it is certainly more than `limit`. Of strokes only those of `selected` count.
+    /// Distance after carving, or `None` if it is certainly more than `limit`. Of strokes only those of `selected`
+    /// count.
     pub fn distance(&self, selected: &[u32], p: Vec3, limit: f32) -> Option<f32> {
         let amplitude = self.relief.amplitude();
         match &self.shape {

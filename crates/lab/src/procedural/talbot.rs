@@ -1,5 +1,5 @@
 //! The scenes of `scenes/talbot`: one statue, lit by a sky, by panels, or by both, after the test scenes of
-//! [Talbot et al. 2005]. Nearly every point sees a part of each light.
+//! [Talbot et al. 2005]. Nearly every point sees part of each light.
 
 use super::files::{ProceduralError, Written, write_sky, write_statue, write_texts};
 use super::sky::SkyOptions;

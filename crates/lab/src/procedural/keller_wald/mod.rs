@@ -1,5 +1,5 @@
-//! The scenes of `scenes/keller-wald`, of the kinds that [Keller and Wald 2000] shows: rooms of which one is seen, a caustic
-//! ring, a room that is lit through a slit. [`rooms`] writes the rooms.
+//! The scenes of `scenes/keller-wald`, after those of [Keller and Wald 2000]: rooms of which one is visible, a caustic
+//! ring, a room lit through a slit. [`rooms`] writes the rooms.
 
 pub mod rooms;
 

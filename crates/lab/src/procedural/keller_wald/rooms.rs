@@ -1,7 +1,7 @@
-//! A building of square rooms side by side, closed by walls and a ceiling, with a door between every two neighbours and
-//! lights of its own in each: of many lights, a point sees those of one room, and a little of the next.
+//! A building of adjacent square rooms, closed by walls and a ceiling, with a door between every two neighbours and
+//! separate lights in each: of many lights, a point sees those of one room and a little of the next.
 //!
-//! z is up; room (i, j) has its walls' middles at x = 4i and 4(i + 1), y = 4j and 4(j + 1) (m).
+//! z is up; room (i, j) has the middles of its walls at x = 4i and 4(i + 1), y = 4j and 4(j + 1) (m).
 
 use lumiris_numbers::math::Vec3;
 use lumiris_numbers::math::hash::{pcg4d, unit_f32};
@@ -43,7 +43,8 @@ impl Default for Building {
 }
 
 impl Building {
-    /// 10,000 lights: 50 × 50 rooms with four in each, of the same power all together as the one of the smaller building.
+    /// 10,000 lights: 50 × 50 rooms with four in each, of the same power all together as the one of the smaller
+    /// building.
     pub fn with_many_lights() -> Self {
         Building { rooms: 50, lights: 2, ..Building::default() }
     }
@@ -79,7 +80,8 @@ struct Boxes {
     triangles: Vec<[u32; 3]>,
 }
 
-/// Corners of the sides of a box, counter-clockwise from outside; corner k has the greater x, y, z where bits 0, 1, 2 of k are 1.
+/// Corners of the sides of a box, counter-clockwise from outside; corner k has the greater x, y, z where bits 0, 1, 2
+/// of k are 1.
 const SIDES: [[u32; 4]; 6] = [[0, 4, 6, 2], [1, 3, 7, 5], [0, 1, 5, 4], [2, 6, 7, 3], [0, 2, 3, 1], [4, 5, 7, 6]];
 
 impl Boxes {
@@ -238,8 +240,8 @@ fn furniture(b: &Building, out: &mut String) {
     }
 }
 
-/// Squares below the ceilings. Rooms differ in the strength and the warmth of their light; around the camera they differ less,
-/// so that one exposure serves.
+/// Squares below the ceilings. Rooms differ in the strength and the warmth of their light; around the camera they
+/// differ less, so that one exposure serves.
 fn lights(b: &Building, out: &mut String) {
     let edge = (LIGHT_AREA / (b.lights * b.lights) as f32).sqrt();
     let z = mm(HEIGHT - LIGHT_DROP);

@@ -2,10 +2,10 @@
 //! [Nielson 2004], so that the mesh is closed and every edge has exactly two triangles.
 //!
 //! The field f is sampled at the corners of a grid of cubes. A cell through which f changes sign gets a vertex for each
-//! of its sheets ([`cases`]): the mean of the crossings of the sheet's edges, moved onto f = 0 by one Newton step of the
-//! trilinear interpolant where the cell has one sheet. Every crossed grid edge gives the polygon of the four vertices
-//! around it. Where a face of two cells is passed twice, both polygons of each passage get a vertex of their own
-//! between the two cells: without it the two passages might share an edge.
+//! of its sheets ([`cases`]): the mean of the crossings of the sheet's edges, moved onto f = 0 by one Newton step of
+//! the trilinear interpolant where the cell has one sheet. Every crossed grid edge gives the polygon of the four
+//! vertices around it. Where a face of two cells is passed twice, both polygons of each passage get a vertex of their
+//! own between the two cells: without it the two passages might share an edge.
 //!
 //! Cubes of 16³ cells are made in parallel and joined in order, so the mesh does not depend on the number of threads.
 //! Leaves of 4³ cells are left out where the field bounds its own sign.
@@ -30,7 +30,7 @@ const SAMPLES: usize = BLOCK + 1;
 /// Crossings keep this far from the ends of an edge (parts of its length), so that vertices of different cells differ.
 const MARGIN: f32 = 0.04;
 
-/// A ball in which something is asked of a field.
+/// A sphere in which a field is queried.
 #[derive(Clone, Copy, Debug)]
 pub struct Ball {
     /// Centre.

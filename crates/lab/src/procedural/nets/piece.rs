@@ -1,4 +1,4 @@
-//! The largest connected piece of a mesh: carving leaves crumbs beside the surface and bubbles below it.
+//! The largest connected component of a mesh: carving leaves debris above the surface and bubbles below it.
 
 use lumiris::geometry::TriangleMesh;
 

@@ -131,7 +131,7 @@ impl Atmosphere {
         self.scattering[0][band] * air + self.haze_extinction[band] * haze + self.ozone[band] * ozone
     }
 
-    /// Transmittance from radius `r` along cosine `mu` out of the air; 0 if the ground is in the way.
+    /// Transmittance from radius `r` along cosine `mu` out of the atmosphere; 0 if the ground is hit.
     fn transmittance(&self, r: f32, mu: f32) -> Spectrum {
         if mu < 0.0 && way_to_sphere(r, mu, GROUND).is_some() {
             return [0.0; BANDS];
@@ -171,8 +171,8 @@ impl Atmosphere {
         })
     }
 
-    /// Light scattered into the observer's view of cosine `mu` with the zenith, where the sun has cosine `mu_s` with the
-    /// zenith and `nu` with the view. The view ends at the ground.
+    /// Light scattered into the observer's view of cosine `mu` with the zenith, where the sun has cosine `mu_s` with
+    /// the zenith and `nu` with the view. The view ends at the ground.
     pub fn scattered(&self, mu: f32, mu_s: f32, nu: f32) -> Scattered {
         self.march(GROUND + OBSERVER, mu, mu_s, nu).0
     }

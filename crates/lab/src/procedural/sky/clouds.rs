@@ -40,7 +40,7 @@ impl Clouds {
         Clouds { threshold, seed, to_sun, beam, sky }
     }
 
-    /// Optical depth of the layer at a place of the plane.
+    /// Optical depth of the layer at a point of the plane.
     fn depth(&self, p: Vec2) -> f32 {
         let q = Vec3::new(p.x, p.y, 0.37) * 1.3;
         let drift = noise(q * 0.6 + 3.7, self.seed.wrapping_add(50));

@@ -108,7 +108,7 @@ pub fn sky(options: &SkyOptions) -> Result<Image, String> {
     Ok(image)
 }
 
-/// Direction of a place of the image, in texels.
+/// Direction of a position in the image, in texels.
 fn direction(x: f32, y: f32, resolution: usize) -> Vec3 {
     equal_area_square_to_sphere(Vec2::new(x, y) / resolution as f32)
 }

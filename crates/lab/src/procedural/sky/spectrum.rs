@@ -1,7 +1,7 @@
-//! Light in bands of wavelength, and its colour.
+//! Light in wavelength bands, and its colour.
 //!
-//! The sun is a black body of 5772 K above the atmosphere. Colours are the CIE 1931 observer's by the fit of
-//! [Wyman et al. 2013, Eq. 4], carried to linear Rec.709.
+//! The sun is a black body of 5772 K above the atmosphere. Colours are those of the CIE 1931 observer, by the fit of
+//! [Wyman et al. 2013, Eq. 4], converted to linear Rec.709.
 
 use lumiris_numbers::math::Rgb;
 
