@@ -11,11 +11,11 @@ use lumiris::geometry::{Quadric, QuadricKind, Shape, TriangleMesh};
 use lumiris::lights::{Emission, EnvironmentFilter, EnvironmentMap, EnvironmentMapping, area_lights_of};
 use lumiris::lights::{Light, LightCtx, LightLanes};
 use lumiris::materials::surface::SurfaceBsdf;
+use lumiris_lanes::combine::{Proposals, Weighting, Weights, combine};
+use lumiris_lanes::curve::{hilbert_points, hilbert_points_scalar, strata, strata_scalar};
 use lumiris_numbers::math::hash::{HashStream, pcg4d};
 use lumiris_numbers::math::warp::sample_uniform_sphere;
 use lumiris_numbers::math::{Affine3A, Frame, Rgb, Vec3};
-use lumiris_numbers::simd::combine::{Proposals, Weighting, Weights, combine};
-use lumiris_numbers::simd::curve::{hilbert_points, hilbert_points_scalar, strata, strata_scalar};
 use std::hint::black_box;
 use std::sync::Arc;
 use std::time::Instant;
@@ -223,8 +223,8 @@ fn kernels(m: usize) {
         let proposals =
             Proposals { f_cos, li, p: u0, p_other: u1, m: m as f32, m_other: 1.0, weighting: Weighting::Power };
         let mut out = Weights { q_hat, r, w };
-        let lanes = time(m, |_| combine(lumiris_numbers::simd::level(), black_box(&proposals), &mut out));
-        let single = time(m, |_| combine(lumiris_numbers::simd::Level::baseline(), black_box(&proposals), &mut out));
+        let lanes = time(m, |_| combine(lumiris_lanes::level(), black_box(&proposals), &mut out));
+        let single = time(m, |_| combine(lumiris_lanes::Level::baseline(), black_box(&proposals), &mut out));
         report("combine (single: baseline)", m, lanes, single);
     }
 }

@@ -14,8 +14,8 @@ use super::coat_table::{CoatTable, Hemispherical};
 use super::dielectric::{Dielectric, Select};
 use super::fresnel::reflect;
 use super::{BsdfSample, Lobe, TrowbridgeReitz};
+use lumiris_lanes::bsdf::Transmittance;
 use lumiris_numbers::math::{Rgb, Vec3, sqr, warp};
-use lumiris_numbers::simd::{self, bsdf::Transmittance};
 use std::f32::consts::{FRAC_1_PI, PI};
 
 /// Coated Lambertian reflection without scattering in the coat.
@@ -89,7 +89,7 @@ impl<'a> CoatedDiffuse<'a> {
     }
 
     /// How many directions are evaluated at once; `None` if one by one, where the roughness is anisotropic.
-    pub(super) fn lanes(&self, wo: Vec3) -> Option<simd::bsdf::Model<'_>> {
+    pub(super) fn lanes(&self, wo: Vec3) -> Option<lumiris_lanes::bsdf::Model<'_>> {
         let wo = if wo.z < 0.0 { -wo } else { wo };
         let (transmittance, interface) = if self.interface.is_specular() {
             (Transmittance::Smooth(self.table.eta(), self.table.thickness()), None)
@@ -98,7 +98,7 @@ impl<'a> CoatedDiffuse<'a> {
             (Transmittance::Table(rows, t), Some(self.interface.lanes()))
         };
         let base = (self.base * self.directional(wo)[0]).to_array();
-        Some(simd::bsdf::Model::Coated { interface, base, p_interface: self.p_interface(wo), transmittance })
+        Some(lumiris_lanes::bsdf::Model::Coated { interface, base, p_interface: self.p_interface(wo), transmittance })
     }
 
     /// Value without cosine (1/sr), without the mirror of a smooth interface.

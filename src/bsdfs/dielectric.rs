@@ -7,7 +7,6 @@
 use super::fresnel::{fr_dielectric, reflect, refract};
 use super::{BsdfSample, Lobe, TrowbridgeReitz};
 use lumiris_numbers::math::{Rgb, Vec3, sqr};
-use lumiris_numbers::simd;
 
 /// What is transported along the path, which decides whether transmission scales by 1/η².
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -46,9 +45,9 @@ impl Dielectric {
     }
 
     /// For many directions at once.
-    pub(super) fn lanes(&self) -> simd::bsdf::Interface {
+    pub(super) fn lanes(&self) -> lumiris_lanes::bsdf::Interface {
         let TrowbridgeReitz { alpha_x, alpha_y } = self.distribution;
-        simd::bsdf::Interface { alpha: [alpha_x, alpha_y], eta: self.eta }
+        lumiris_lanes::bsdf::Interface { alpha: [alpha_x, alpha_y], eta: self.eta }
     }
 
     /// Probability of reflection among the selected lobes; `None` if they carry no light.

@@ -37,9 +37,9 @@ pub use models::Model;
 pub use resample::{Resampled, resample};
 pub use thin_dielectric::ThinDielectric;
 
+use lumiris_lanes::bsdf::Model as LaneModel;
 use lumiris_numbers::math::hash::{pcg4d, unit_f32};
 use lumiris_numbers::math::{Rgb, Vec3};
-use lumiris_numbers::simd::bsdf::Model as LaneModel;
 use std::f32::consts::FRAC_1_PI;
 use std::ops::BitOr;
 

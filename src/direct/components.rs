@@ -10,12 +10,11 @@ use super::propose::{Candidates, Drawn};
 use super::visibility::{Segments, is_traced};
 use crate::accel::RayBatch;
 use crate::scene::{EstimatorKind, IntegratorSettings, OptimalForm, Split, World};
+use lumiris_lanes::ocv::{Matrix, System};
 use lumiris_numbers::estimators::ocv::forms::PAPER_LAMBDA;
 use lumiris_numbers::estimators::ocv::{Form, NormalEquations, Penalty};
 use lumiris_numbers::estimators::optimal_mis;
 use lumiris_numbers::math::Rgb;
-use lumiris_numbers::simd;
-use lumiris_numbers::simd::ocv::{Matrix, System};
 
 /// Domain below the stream of a shading point: half h of its samples uses `HALF + h`.
 const HALF: u32 = 32;
@@ -137,7 +136,7 @@ fn solve_matrices(
 ) -> u64 {
     let Penalty { ridge, shrink, .. } = penalty;
     let system = System { columns: equations.components(), matrix, ridge, shrink };
-    simd::ocv::solve(&system, sums, beta) as u64
+    lumiris_lanes::ocv::solve(&system, sums, beta) as u64
 }
 
 /// β₀ + Σ β_j of the components that are there [Fan et al. 2006, Eq. 10]; the last unknown is β₀. The mean of y if there is no

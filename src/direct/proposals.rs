@@ -12,10 +12,10 @@ use super::ShadePoint;
 use super::propose::Candidate;
 use crate::lights::{LightId, LightLanes, LightRun};
 use crate::scene::{ProposalPoints, Target, World};
+use lumiris_lanes::combine::{self, Weighting};
+use lumiris_lanes::curve;
 use lumiris_numbers::estimators::mis::Heuristic;
 use lumiris_numbers::math::hash::pcg4d;
-use lumiris_numbers::simd::combine::{self, Weighting};
-use lumiris_numbers::simd::{self, curve};
 
 /// Seed of the positions.
 const POSITIONS: u32 = 0x517c_c1b7;
@@ -249,7 +249,7 @@ impl Proposals {
             r: &mut self.r[start..end],
             w: &mut self.weight[start..end],
         };
-        combine::combine(simd::level(), &proposals, &mut weights);
+        combine::combine(lumiris_lanes::level(), &proposals, &mut weights);
         match techniques.target {
             Target::Fgl | Target::Gvl => {}
             Target::Gv => {

@@ -7,12 +7,12 @@
 //! for latitude-longitude images.
 
 use super::LightSample;
+use lumiris_lanes::Environment;
 use lumiris_numbers::math::sphere_map::{
     equal_area_sphere_to_square, equal_area_square_to_sphere, lat_long_to_sphere, pdf_equal_area_square_to_sphere,
     pdf_lat_long_to_sphere, sphere_to_lat_long, wrap_equal_area_texel,
 };
 use lumiris_numbers::math::{Mat3, PiecewiseConstant2D, Rgb, Vec2, Vec3};
-use lumiris_numbers::simd::Environment;
 use std::f64::consts::PI;
 
 /// How the unit square covers the sphere; z is up in the space of the light.

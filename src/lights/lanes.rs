@@ -1,9 +1,8 @@
 //! Many samples of one light from one point, as a structure of arrays.
 
 use super::{Light, LightCtx};
-use lumiris_numbers::simd;
 
-pub use lumiris_numbers::simd::LightLanes;
+pub use lumiris_lanes::LightLanes;
 
 /// Number of samples of an area light from which on lanes are faster than single samples.
 const FEW: usize = 3;
@@ -14,10 +13,10 @@ impl Light {
     pub fn sample_li_lanes(&self, ctx: &LightCtx, u: [&[f32]; 2], out: &mut LightLanes<'_>) {
         match self {
             Light::InfiniteConstant { l } if !l.is_black() => {
-                simd::light::sample_uniform_sphere(simd::level(), u, l.to_array(), out);
+                lumiris_lanes::light::sample_uniform_sphere(lumiris_lanes::level(), u, l.to_array(), out);
             }
             Light::InfiniteImage { map, world_from_light, scale } => {
-                map.lanes(*world_from_light, *scale).sample(simd::level(), u, out);
+                map.lanes(*world_from_light, *scale).sample(lumiris_lanes::level(), u, out);
             }
             // The same for all numbers
             Light::Point { .. } | Light::Spot { .. } | Light::Distant { .. } | Light::InfiniteConstant { .. } => {
@@ -29,7 +28,9 @@ impl Light {
             }
             Light::Area(area) if area.is_dark_from(ctx.p) => out.pdf.fill(0.0),
             Light::Area(area) => match area.lanes(ctx) {
-                Some(sampler) if out.pdf.len() >= FEW || sampler.has_setup() => sampler.sample(simd::level(), u, out),
+                Some(sampler) if out.pdf.len() >= FEW || sampler.has_setup() => {
+                    sampler.sample(lumiris_lanes::level(), u, out)
+                }
                 _ => self.sample_li_each(ctx, u, out),
             },
         }

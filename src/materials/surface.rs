@@ -1,8 +1,8 @@
 //! A BSDF in the shading frame of a hit, for directions in world space.
 
 use crate::bsdfs::{Bsdf, BsdfSample, Lambertian, Resampled, resample};
+use lumiris_lanes::bsdf::Values;
 use lumiris_numbers::math::{Frame, Rgb, Vec3};
-use lumiris_numbers::simd::{self, bsdf::Values};
 
 /// The scattering at a hit. Sides are told by the shading normal alone, as in pbrt-v4: where it disagrees with the
 /// geometric normal, light may leak through or fail to arrive, and the integrator finds the former blocked.
@@ -54,8 +54,8 @@ impl<'a> SurfaceBsdf<'a> {
         let local = self.frame.to_local(wo);
         match self.bsdf.lanes(local) {
             Some(model) => {
-                let lanes = simd::bsdf::Bsdf { frame: self.frame, wo: local, model };
-                lanes.eval(simd::level(), wi, &mut Values { f_cos, pdf });
+                let lanes = lumiris_lanes::bsdf::Bsdf { frame: self.frame, wo: local, model };
+                lanes.eval(lumiris_lanes::level(), wi, &mut Values { f_cos, pdf });
             }
             None => self.eval_each(wo, wi, f_cos, pdf),
         }

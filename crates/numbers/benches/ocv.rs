@@ -4,9 +4,9 @@
 //! `cargo bench --bench ocv`
 #![allow(clippy::print_stdout, missing_docs)]
 
+use lumiris_lanes::ocv::{Matrix, System, solve};
 use lumiris_numbers::estimators::ocv::{NormalEquations, Penalty};
 use lumiris_numbers::math::hash::HashStream;
-use lumiris_numbers::simd::ocv::{Matrix, System, solve};
 use std::hint::black_box;
 use std::time::Instant;
 

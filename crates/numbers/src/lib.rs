@@ -4,10 +4,8 @@
 //! |---|---|
 //! | [`math`] | vectors, frames, colour, warps with their densities, tabulated distributions, robust ray origins |
 //! | [`estimators`] | Monte Carlo, MIS, RIS, OCV and their relatives; running moments and statistical tests |
-//! | [`simd`] | lane kernels over slices, chosen for the processor when they are called |
 //! | [`samplers`] | stateless random numbers `u(pixel, sample, domain)` |
 
 pub mod estimators;
 pub mod math;
 pub mod samplers;
-pub mod simd;

@@ -25,8 +25,8 @@ pub use rectangle::RectangleLight;
 pub use triangle::TriangleLight;
 
 use super::{LightBounds, LightCtx, LightHit, LightSample};
+use lumiris_lanes::area::{AreaSampler, Surface};
 use lumiris_numbers::math::{Rgb, Vec2, Vec3};
-use lumiris_numbers::simd::area::{AreaSampler, Surface};
 use std::f32::consts::PI;
 
 /// The surface of an area light.

@@ -6,11 +6,11 @@
 
 use super::{ShapePoint, ShapeSample, pdf_by_area};
 use crate::geometry::{Quadric, QuadricKind};
+use lumiris_lanes::area::Surface;
 use lumiris_numbers::math::warp::{
     azimuth, direction, pdf_uniform_cone, sample_uniform_cone, sample_uniform_disk_concentric,
 };
 use lumiris_numbers::math::{Bounds3, Frame, Mat3, Vec2, Vec3, gamma, safe_sqrt, sqr};
-use lumiris_numbers::simd::area::Surface;
 use std::f32::consts::TAU;
 
 /// A quadric that emits.

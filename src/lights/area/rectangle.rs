@@ -11,8 +11,8 @@
 //! by the same function, so they always agree.
 
 use super::{ShapePoint, ShapeSample, pdf_by_area};
+use lumiris_lanes::area::{self, SphericalRectangle, Surface};
 use lumiris_numbers::math::{Bounds3, Vec2, Vec3, gamma};
-use lumiris_numbers::simd::area::{self, SphericalRectangle, Surface};
 use std::f64::consts::TAU;
 
 /// Largest diagonal, by the distance of the centre, that is sampled by area.

@@ -12,10 +12,11 @@ use std::path::Path;
 /// Crates: package folder, name in code, and the crates of the workspace that it may import.
 const CRATES: &[(&str, &str, &[&str])] = &[
     ("crates/numbers", "lumiris_numbers", &[]),
+    ("crates/lanes", "lumiris_lanes", &["lumiris_numbers"]),
     ("crates/formats", "lumiris_formats", &["lumiris_numbers"]),
-    (".", "lumiris", &["lumiris_numbers", "lumiris_formats"]),
-    ("crates/lab", "lumiris_lab", &["lumiris_numbers", "lumiris_formats", "lumiris"]),
-    ("crates/cli", "lumiris_cli", &["lumiris_numbers", "lumiris_formats", "lumiris", "lumiris_lab"]),
+    (".", "lumiris", &["lumiris_numbers", "lumiris_lanes", "lumiris_formats"]),
+    ("crates/lab", "lumiris_lab", &["lumiris_numbers", "lumiris_lanes", "lumiris_formats", "lumiris"]),
+    ("crates/cli", "lumiris_cli", &["lumiris_numbers", "lumiris_lanes", "lumiris_formats", "lumiris", "lumiris_lab"]),
     ("crates/test-support", "lumiris_test_support", &["lumiris_numbers"]),
 ];
 
@@ -31,8 +32,7 @@ const LAYERS: &[&[&str]] = &[
 ];
 
 /// Modules of the arithmetic and what each may import.
-const NUMBERS: &[(&str, &[&str])] =
-    &[("math", &[]), ("estimators", &["math"]), ("simd", &["math"]), ("samplers", &["math"])];
+const NUMBERS: &[(&str, &[&str])] = &[("math", &[]), ("estimators", &["math"]), ("samplers", &["math"])];
 
 /// Folders whose circles are left until their rebuilding.
 const CIRCLES_LEFT: &[&str] = &[

@@ -34,7 +34,7 @@ fn bin_of(x: f32, n: usize) -> usize {
 }
 
 /// Bins that are passed at a time.
-pub(crate) const STEP: usize = 8;
+pub const STEP: usize = 8;
 
 /// Length of the table of a running integral over `n` bins: n + 1 values, and as many as may be read behind them.
 const fn cdf_len(n: usize) -> usize {
@@ -82,7 +82,7 @@ pub struct Bin {
 
 /// A running integral and its guide.
 #[derive(Clone, Copy, Debug)]
-pub(crate) struct Running<'a> {
+pub struct Running<'a> {
     /// The integral at the bounds of the bins, and behind them infinity, [`STEP`] times.
     pub cdf: &'a [f32],
     /// For each equal part of [0, 1), a power of two, at most the bin of its beginning.
@@ -106,7 +106,7 @@ impl Running<'_> {
 
     /// The bin that begins at bound `i`, or the last one.
     #[inline(always)]
-    pub(crate) fn found(&self, i: usize) -> Bin {
+    pub fn found(&self, i: usize) -> Bin {
         let index = i.min(self.cdf.len() - cdf_len(0) - 1);
         Bin { index, begin: self.cdf[index], end: self.cdf[index + 1] }
     }
@@ -114,7 +114,7 @@ impl Running<'_> {
 
 /// The number clamped to those that have a bin.
 #[inline(always)]
-pub(crate) fn clamped(u: f32) -> f32 {
+pub fn clamped(u: f32) -> f32 {
     u.clamp(0.0, ONE_MINUS_EPSILON)
 }
 
@@ -270,13 +270,13 @@ impl PiecewiseConstant2D {
 
     /// The running integral over the rows.
     #[inline(always)]
-    pub(crate) fn rows(&self) -> Running<'_> {
+    pub fn rows(&self) -> Running<'_> {
         self.marginal.running()
     }
 
     /// The running integral along a row.
     #[inline(always)]
-    pub(crate) fn row(&self, y: usize) -> Running<'_> {
+    pub fn row(&self, y: usize) -> Running<'_> {
         let guide = &self.conditional_guide[y * self.guide_len..(y + 1) * self.guide_len];
         Running { cdf: self.row_cdf(y), guide }
     }

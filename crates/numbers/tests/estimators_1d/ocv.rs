@@ -9,7 +9,7 @@ use lumiris_numbers::estimators::stats::{Welford, z_test};
 use lumiris_numbers::estimators::{correlated, optimal_mis};
 use lumiris_numbers::math::hash::HashStream;
 
-use lumiris_numbers::simd::ocv::{Matrix, System, solve};
+use lumiris_lanes::ocv::{Matrix, System, solve};
 
 /// Numbers of samples of a pass.
 const NUMBERS: [u32; 4] = [3, 8, 16, 64];

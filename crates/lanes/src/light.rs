@@ -1,8 +1,8 @@
 //! Directions to one light from one point, many at once.
 
 use super::lane::{F, LANES, Vec3s, begin, load, padded, safe_sqrt, sin_cos_turns};
-use crate::math::warp;
 use fearless_simd::{Level, Simd, dispatch, prelude::*};
+use lumiris_numbers::math::warp;
 
 /// Directions to one light. All slices have the same length.
 #[derive(Debug)]
@@ -56,24 +56,5 @@ fn sample_uniform_sphere_lanes<S: Simd>(simd: S, u: [&[f32]; 2], out: &mut Light
         let sin_theta = safe_sqrt(F::splat(simd, 1.0) - z * z);
         let (sin_phi, cos_phi) = sin_cos_turns(load(simd, u[1], i));
         Vec3s { x: sin_theta * cos_phi, y: sin_theta * sin_phi, z }.store(&mut out.wi, i);
-    }
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-    use crate::simd::test_support::{LENGTHS, assert_same_bits};
-
-    #[test]
-    fn lanes_are_the_same_at_all_levels() {
-        for n in LENGTHS {
-            let u: Vec<f32> = (0..n).map(|i| (i as f32 * 0.618) % 1.0).collect();
-            let v: Vec<f32> = (0..n).map(|i| (i as f32 + 0.5) / n as f32).collect();
-            assert_same_bits::<7>(n, |level, [x, y, z, r, g, b, pdf]| {
-                let mut out = LightLanes { wi: [x, y, z], li: [r, g, b], pdf };
-                sample_uniform_sphere(level, [&u, &v], [1.0, 2.0, 3.0], &mut out);
-                assert!(out.pdf.iter().all(|&p| p == warp::pdf_uniform_sphere()));
-            });
-        }
     }
 }

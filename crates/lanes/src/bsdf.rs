@@ -5,8 +5,8 @@
 //! A = (αx wix)² + (αy wiy)², G(wo, wi) = |cos θi| / ((1/2 + Λ(wo)) |cos θi| + √(cos²θi + A)/2).
 
 use super::lane::{F, I, LANES, M, Vec3s, begin, exp, or_zero, padded, safe_sqrt, store};
-use crate::math::{Frame, Vec3, sqr};
 use fearless_simd::{Level, Simd, dispatch, prelude::*};
+use lumiris_numbers::math::{Frame, Vec3, sqr};
 use std::f32::consts::{FRAC_1_PI, PI};
 
 /// Columns that [`Bsdf::eval`] writes.
@@ -432,48 +432,4 @@ fn table_row<S: Simd>(simd: S, row: &[[f32; 2]], first: I<S>, dx: F<S>) -> F<S> 
     }
     let (a, b) = (F::load_array(simd, ends[0]), F::load_array(simd, ends[1]));
     a + (b - a) * dx
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-    use crate::math::hash::HashStream;
-    use crate::math::warp;
-    use crate::simd::test_support::{LENGTHS, assert_same_bits};
-
-    #[test]
-    fn lanes_are_the_same_at_all_levels() {
-        let alpha = [0.3, 0.1];
-        let rows: [Vec<[f32; 2]>; 2] =
-            [0.3, 0.5].map(|a| (0..128).map(|i| [a * (i as f32 / 127.0).sqrt(), 0.1]).collect());
-        let (base, p_interface) = ([0.1, 0.2, 0.3], 0.4);
-        let coated = |transmittance, interface| Model::Coated { interface, base, p_interface, transmittance };
-        let interface = Interface { alpha, eta: 1.5 };
-        let mut stream = HashStream::new([8, 8, 8]);
-        for model in [
-            Model::Lambertian { reflection: base, transmission: [0.3, 0.2, 0.0], p: [0.6, 0.4] },
-            Model::Conductor { alpha, eta: [0.2, 0.9, 1.1], k: [3.9, 2.4, 0.0] },
-            Model::Dielectric(interface),
-            coated(Transmittance::Table([&rows[0], &rows[1]], 0.0), Some(interface)),
-            coated(Transmittance::Table([&rows[0], &rows[1]], 0.25), Some(interface)),
-            coated(Transmittance::Smooth(1.5, 0.0), None),
-            coated(Transmittance::Smooth(1.5, 0.1), None),
-        ] {
-            for n in LENGTHS {
-                let wo = warp::sample_uniform_sphere(stream.next_2d());
-                let frame = Frame::from_z(warp::sample_uniform_sphere(stream.next_2d()));
-                let mut wi = [vec![0.0; n], vec![0.0; n], vec![0.0; n]];
-                for i in 0..n {
-                    let w =
-                        if i % 50 == 7 { Vec3::splat(f32::NAN) } else { warp::sample_uniform_sphere(stream.next_2d()) };
-                    (0..3).for_each(|c| wi[c][i] = w[c]);
-                }
-                assert_same_bits::<4>(n, |level, [r, g, b, pdf]| {
-                    let wi = wi.each_ref().map(|v| &v[..]);
-                    Bsdf { frame, wo, model }.eval(level, wi, &mut Values { f_cos: [r, g, b], pdf });
-                    assert!(pdf.iter().chain(r.iter()).all(|&p| p >= 0.0 && p.is_finite()));
-                });
-            }
-        }
-    }
 }

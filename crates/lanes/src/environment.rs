@@ -1,14 +1,14 @@
 //! Directions sampled in proportion to an image of radiance over the sphere.
 //!
 //! The running integrals are inverted lane by lane, since that is a matter of cache lines; directions and densities are in
-//! lanes; a texel is one load of four floats. The maps of the square to the sphere are those of [`crate::math::sphere_map`].
+//! lanes; a texel is one load of four floats. The maps of the square to the sphere are those of [`lumiris_numbers::math::sphere_map`].
 
 use super::lane::{F, I, LANES, Vec3s, begin, load, or_zero, safe_sqrt, sin_cos_quadrant, sin_cos_turns, store};
 use super::light::LightLanes;
-use crate::math::distribution::{Running, STEP, clamped};
-use crate::math::sphere_map::pdf_equal_area_square_to_sphere;
-use crate::math::{Mat3, PiecewiseConstant2D};
 use fearless_simd::{Level, Simd, dispatch, f32x4, f32x8, prelude::*};
+use lumiris_numbers::math::distribution::{Running, STEP, clamped};
+use lumiris_numbers::math::sphere_map::pdf_equal_area_square_to_sphere;
+use lumiris_numbers::math::{Mat3, PiecewiseConstant2D};
 use std::f32::consts::{PI, TAU};
 
 /// An image of the radiance from all directions, and how it is sampled.
@@ -224,44 +224,6 @@ impl Environment<'_> {
             red[i] = l[0];
             green[i] = l[1];
             blue[i] = l[2];
-        }
-    }
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-    use crate::math::hash::HashStream;
-    use crate::simd::test_support::{LENGTHS, assert_same_bits};
-
-    #[test]
-    fn lanes_are_the_same_at_all_levels() {
-        let mut stream = HashStream::new([6, 6, 6]);
-        let [width, height] = [37, 20];
-        // Some rows and many texels are black.
-        let values: Vec<f32> = (0..width * height)
-            .map(|i| if i / width % 7 == 3 { 0.0 } else { (stream.next_f32() - 0.3).max(0.0).powi(6) })
-            .collect();
-        let distribution = PiecewiseConstant2D::new(&values, width);
-        let texels: Vec<[f32; 4]> = (0..(width + 2) * (height + 2))
-            .map(|_| [stream.next_f32(), stream.next_f32(), stream.next_f32(), stream.next_f32()])
-            .collect();
-        let world_from_light = Mat3::from_rotation_x(0.3) * Mat3::from_rotation_y(1.0);
-        for (is_equal_area, is_bilinear) in [(false, false), (false, true), (true, false), (true, true)] {
-            let texels = &texels;
-            let distribution = &distribution;
-            let map = Environment { distribution, texels, is_equal_area, is_bilinear, world_from_light, scale: 2.0 };
-            for n in LENGTHS {
-                let (u0, u1): (Vec<f32>, Vec<f32>) =
-                    (0..n).map(|i| if i == 5 { (0.0, 1.0) } else { (stream.next_f32(), stream.next_f32()) }).unzip();
-                assert_same_bits::<7>(n, |level, [x, y, z, r, g, b, pdf]| {
-                    map.sample(level, [&u0, &u1], &mut LightLanes { wi: [x, y, z], li: [r, g, b], pdf });
-                    for i in 0..n {
-                        let length2 = x[i] * x[i] + y[i] * y[i] + z[i] * z[i];
-                        assert!((length2 - 1.0).abs() < 1e-6 && pdf[i] >= 0.0);
-                    }
-                });
-            }
         }
     }
 }

@@ -3,8 +3,8 @@
 
 use super::lane::{F, LANES, Vec3s, begin, load, or_zero, safe_sqrt, sin_cos_turns, store};
 use super::light::LightLanes;
-use crate::math::{Frame, Vec2, Vec3, warp};
 use fearless_simd::{Level, Simd, dispatch, f64x4, mask64x4, prelude::*};
+use lumiris_numbers::math::{Frame, Vec2, Vec3, warp};
 use std::f64::consts::TAU;
 
 /// A rectangle.
@@ -277,7 +277,7 @@ impl SphericalSetup {
 
 /// sin 2πt and cos 2πt for |t| < 2²⁰, by the series about the nearest quarter turn; errors below 2⁻⁴⁵.
 #[inline(always)]
-fn sin_cos_turns_f64<S: Simd>(t: f64x4<S>) -> (f64x4<S>, f64x4<S>) {
+pub fn sin_cos_turns_f64<S: Simd>(t: f64x4<S>) -> (f64x4<S>, f64x4<S>) {
     let simd = t.token();
     let quarters = (t * 4.0).round_ties_even();
     let x = (t - quarters * 0.25) * TAU;
@@ -308,66 +308,4 @@ fn sin_cos_turns_f64<S: Simd>(t: f64x4<S>) -> (f64x4<S>, f64x4<S>) {
     let is_odd = is_1 | is_3;
     let (s, c) = (is_odd.select(cos, sin), is_odd.select(sin, cos));
     ((is_2 | is_3).select(-s, s), (is_1 | is_2).select(-c, c))
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-    use crate::math::hash::HashStream;
-    use crate::simd::test_support::{LENGTHS, assert_same_bits};
-
-    #[test]
-    fn lanes_are_the_same_at_all_levels() {
-        let rectangle = Rectangle {
-            corner: Vec3::new(-1.0, 2.0, -1.0),
-            ex: Vec3::X,
-            ey: Vec3::Z,
-            size: Vec2::new(2.0, 3.0),
-            n: Vec3::NEG_Y,
-        };
-        let spherical =
-            SphericalRectangle { x: [-1.0, 1.0], y: [-1.0, 2.0], z0: -2.0, solid_angle: 1.1, g23: (-0.3, 0.9) };
-        let corners = [Vec3::new(0.0, 3.0, 1.0), Vec3::new(2.0, 3.0, 0.0), Vec3::new(1.0, 2.0, 2.0)];
-        let axis = Vec3::new(0.6, 0.0, 0.8);
-        let cone = |one_minus_cos: f32| {
-            let sin2_max = one_minus_cos * (2.0 - one_minus_cos);
-            Surface::Cone { center: axis * 2.0, radius: 0.5, axis, one_minus_cos, sin2_max, reversed: false }
-        };
-        let mut stream = HashStream::new([4, 4, 4]);
-        for surface in [
-            Surface::SphericalRectangle(rectangle, spherical),
-            Surface::Rectangle(rectangle),
-            Surface::Triangle(corners, Vec3::Y, 1.5),
-            cone(0.03),
-            cone(1e-6),
-        ] {
-            let sampler = AreaSampler { from: Vec3::ZERO, surface, l: [1.0, 2.0, 3.0], two_sided: false };
-            for n in LENGTHS {
-                let (u0, u1): (Vec<f32>, Vec<f32>) = (0..n).map(|_| (stream.next_f32(), stream.next_f32())).unzip();
-                assert_same_bits::<7>(n, |level, [x, y, z, r, g, b, pdf]| {
-                    sampler.sample(level, [&u0, &u1], &mut LightLanes { wi: [x, y, z], li: [r, g, b], pdf });
-                    assert!(pdf.iter().all(|&p| p >= 0.0 && p.is_finite()));
-                });
-            }
-        }
-    }
-
-    #[test]
-    fn sines_of_f64_are_accurate() {
-        #[inline(always)]
-        fn run<S: Simd>(simd: S, t: &[f64; 4]) -> [[f64; 4]; 2] {
-            let (s, c) = sin_cos_turns_f64(f64x4::load_array(simd, *t));
-            [s.to_array(), c.to_array()]
-        }
-        for i in -300..1000 {
-            let t = [0.0, 0.1, 0.2, 0.3].map(|x| x * 0.01 + f64::from(i) / 777.0);
-            for level in crate::simd::test_support::levels() {
-                let [s, c] = dispatch!(level, simd => run(simd, &t));
-                for k in 0..4 {
-                    let (sin, cos) = (t[k] * TAU).sin_cos();
-                    assert!((s[k] - sin).abs() < 1e-13 && (c[k] - cos).abs() < 1e-13, "{}", t[k]);
-                }
-            }
-        }
-    }
 }

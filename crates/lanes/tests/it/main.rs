@@ -1,0 +1,12 @@
+//! The kernels at every level; outside the crate, so that they are compiled once.
+#![allow(clippy::unwrap_used)]
+
+mod area;
+mod bsdf;
+mod combine;
+mod curve;
+mod environment;
+mod lane;
+mod light;
+mod ocv;
+mod support;

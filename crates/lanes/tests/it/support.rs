@@ -1,0 +1,34 @@
+//! Levels and lengths that kernels are tested at.
+
+use lumiris_lanes::Level;
+
+/// All levels of this machine, the scalar one first.
+pub fn levels() -> Vec<Level> {
+    let mut levels = vec![Level::fallback(), Level::baseline()];
+    #[cfg(target_arch = "x86_64")]
+    {
+        let best = Level::new();
+        levels.extend(best.as_sse4_2().map(Level::Sse4_2));
+        levels.extend(best.as_avx2().map(Level::Avx2));
+        levels.extend(best.as_avx512().map(Level::Avx512));
+    }
+    levels
+}
+
+/// Lengths with and without full vectors.
+pub const LENGTHS: [usize; 12] = [0, 1, 3, 4, 7, 8, 9, 16, 23, 32, 77, 128];
+
+/// Asserts that `run` writes the same bits at all levels.
+pub fn assert_same_bits<const N: usize>(len: usize, mut run: impl FnMut(Level, [&mut [f32]; N])) {
+    let mut first: Option<[Vec<u32>; N]> = None;
+    for level in levels() {
+        let mut out: [Vec<f32>; N] = std::array::from_fn(|_| vec![-7.0; len]);
+        run(level, out.each_mut().map(|v| &mut v[..]));
+        // NaN is NaN: its payload is not kept by all.
+        let bits = out.map(|v| v.iter().map(|x| if x.is_nan() { u32::MAX } else { x.to_bits() }).collect());
+        match &first {
+            None => first = Some(bits),
+            Some(first) => assert_eq!(*first, bits, "{level:?}, {len} lanes"),
+        }
+    }
+}
