@@ -8,10 +8,11 @@
 //! | 1 | [`imaging`] |
 //! | 2 | [`textures`], [`geometry`], [`bsdfs`], [`cameras`], [`film`] |
 //! | 3 | [`materials`], [`lights`], [`accel`] |
-//! | 4 | [`scene`] |
-//! | 5 | [`import`], [`direct`], [`photons`] |
-//! | 6 | [`integrators`] |
-//! | 7 | [`render`] |
+//! | 4 | [`settings`] |
+//! | 5 | [`scene`] |
+//! | 6 | [`import`], [`direct`], [`photons`] |
+//! | 7 | [`integrators`] |
+//! | 8 | [`render`] |
 
 pub mod accel;
 pub mod bsdfs;
@@ -27,4 +28,5 @@ pub mod materials;
 pub mod photons;
 pub mod render;
 pub mod scene;
+pub mod settings;
 pub mod textures;

@@ -28,6 +28,7 @@
 use super::fresnel::reflect;
 use super::{Lobe, TrowbridgeReitz};
 use lumiris_numbers::math::{Vec3, warp};
+use strum::{EnumIter, EnumString, IntoStaticStr, VariantNames};
 
 /// Weight of the cosine lobe.
 const COSINE_WEIGHT: f32 = 0.5;
@@ -41,7 +42,8 @@ const MIRROR: TrowbridgeReitz = TrowbridgeReitz { alpha_x: 0.1, alpha_y: 0.1 };
 const RETRO: TrowbridgeReitz = TrowbridgeReitz { alpha_x: 0.15, alpha_y: 0.15 };
 
 /// A density of directions on the side of `wo`, whatever the reflection.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, EnumIter, EnumString, IntoStaticStr, VariantNames)]
+#[strum(serialize_all = "kebab-case")]
 pub enum ProposalDensity {
     /// Cosine-weighted hemisphere with a mirror lobe and a retroreflective one.
     #[default]
@@ -51,17 +53,6 @@ pub enum ProposalDensity {
 }
 
 impl ProposalDensity {
-    /// All, for tests and lists of options.
-    pub const ALL: [ProposalDensity; 2] = [ProposalDensity::Lobes, ProposalDensity::Uniform];
-
-    /// The name on the command line and in metadata.
-    pub fn name(self) -> &'static str {
-        match self {
-            ProposalDensity::Lobes => "lobes",
-            ProposalDensity::Uniform => "uniform",
-        }
-    }
-
     /// A direction on the side of `wo`, by `uc` among the lobes and `u` within one; `None` if it falls below the
     /// horizon.
     #[inline]

@@ -26,7 +26,8 @@ use super::propose::{
 use super::visibility::{Segments, is_traced};
 use crate::accel::{Hit, RayBatch};
 use crate::lights::{LightId, LightSample};
-use crate::scene::{CorrelatedForm, EmitterHit, IntegratorSettings, SamplingTechnique, World};
+use crate::scene::{EmitterHit, World};
+use crate::settings::{CorrelatedForm, IntegratorSettings, SamplingTechnique};
 use lumiris_numbers::estimators::correlated::{self, SUMS};
 use lumiris_numbers::math::ray::offset_origin;
 use lumiris_numbers::math::{Ray, Rgb, Vec3};

@@ -11,7 +11,8 @@
 use super::ShadePoint;
 use super::propose::Candidate;
 use crate::lights::{LightId, LightLanes, LightRun};
-use crate::scene::{ProposalPoints, Target, World};
+use crate::scene::World;
+use crate::settings::{ProposalPoints, Target};
 use lumiris_lanes::combine::{self, Weighting};
 use lumiris_lanes::curve;
 use lumiris_numbers::estimators::mis::Heuristic;

@@ -1,7 +1,7 @@
 //! From candidates to contributions where all are traced: what `mc`, `mis` and the estimators that build on them make of f and the densities.
 
 use super::propose::{Candidates, Drawn};
-use crate::scene::{EstimatorKind, IntegratorSettings};
+use crate::settings::{EstimatorKind, IntegratorSettings};
 use lumiris_numbers::estimators::mc;
 use lumiris_numbers::math::Rgb;
 

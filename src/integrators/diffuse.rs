@@ -9,7 +9,8 @@ use crate::bsdfs::Lambertian;
 use crate::direct::{Fits, ShadePoint};
 use crate::film::PixelSample;
 use crate::materials::SurfaceBsdf;
-use crate::scene::{IntegratorSettings, World};
+use crate::scene::World;
+use crate::settings::IntegratorSettings;
 use lumiris_numbers::math::{Rgb, Vec3};
 
 /// Where the light comes from that Lambertian parts reflect.

@@ -12,7 +12,8 @@ use crate::film::{Features, PixelSample};
 use crate::geometry::SurfaceHit;
 use crate::lights::LightHit;
 use crate::materials::SurfaceBsdf;
-use crate::scene::{Found, IntegratorSettings, Split, World};
+use crate::scene::{Found, World};
+use crate::settings::{IntegratorSettings, Split};
 use lumiris_numbers::math::{Ray, Rgb, Vec3};
 use lumiris_numbers::samplers::SampleStream;
 use std::time::{Duration, Instant};
@@ -110,7 +111,7 @@ pub(super) struct PathState {
     pub(super) beta: Rgb,
     /// Squared relative index of refraction along the path, which roulette takes out of β.
     eta_scale: f32,
-    /// Width of the texture footprint at the ray's origin, and its growth per unit length.
+    /// Width of a pixel at the ray's origin, and its growth per unit length.
     pub(super) width: f32,
     pub(super) spread: f32,
     /// Surfaces without scattering passed since the last vertex.

@@ -12,12 +12,14 @@
 use super::{HintedChoice, Light, LightCtx, LightHints, LightId, LightTree};
 use lumiris_numbers::math::{AliasTable, ONE_MINUS_EPSILON};
 use std::sync::Arc;
+use strum::{EnumIter, EnumString, IntoStaticStr, VariantNames};
 
 /// Uniform fraction of the power sampler.
 const UNIFORM_SHARE: f64 = 0.05;
 
 /// The light sampler.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[derive(Clone, Copy, Debug, PartialEq, Eq, EnumIter, EnumString, IntoStaticStr, VariantNames)]
+#[strum(serialize_all = "kebab-case")]
 pub enum LightSamplerKind {
     /// All lights alike.
     Uniform,
@@ -27,18 +29,6 @@ pub enum LightSamplerKind {
     Tree,
     /// By the same bound, over the lights that the visibility cache finds.
     Photons,
-}
-
-impl LightSamplerKind {
-    /// The name on the command line and in metadata.
-    pub fn name(self) -> &'static str {
-        match self {
-            LightSamplerKind::Uniform => "uniform",
-            LightSamplerKind::Power => "power",
-            LightSamplerKind::Tree => "tree",
-            LightSamplerKind::Photons => "photons",
-        }
-    }
 }
 
 /// A chosen light.

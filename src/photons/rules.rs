@@ -3,8 +3,10 @@
 //! Of trajectories more are traced than the global map needs, so that the caustic map is finer: its photons are stored
 //! with probability p(x), those of the global map with q·p(x), and their power is divided by it.
 
+use strum::EnumIter;
+
 /// How the global map is thinned by the ratio q. All give the same maps on average.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, EnumIter)]
 pub enum CausticRule {
     /// One number: ξ < q·p(x).
     OneRule,
@@ -16,18 +18,6 @@ pub enum CausticRule {
 }
 
 impl CausticRule {
-    /// All, for tests and lists of options.
-    pub const ALL: [CausticRule; 3] = [CausticRule::OneRule, CausticRule::TwoTests, CausticRule::FirstTrajectories];
-
-    /// The name on the command line and in metadata.
-    pub fn name(self) -> &'static str {
-        match self {
-            CausticRule::OneRule => "one-rule",
-            CausticRule::TwoTests => "two-tests",
-            CausticRule::FirstTrajectories => "first-trajectories",
-        }
-    }
-
     /// Whether a photon of the global map is stored, and the factor of its power. `fills_global` is about its
     /// trajectory; `p` is only called where the cheap tests pass.
     #[inline]
@@ -69,11 +59,12 @@ mod tests {
     use super::*;
     use lumiris_numbers::estimators::stats::{Welford, t_test};
     use lumiris_numbers::math::hash::HashStream;
+    use strum::IntoEnumIterator;
 
     #[test]
     fn all_rules_keep_the_power_on_average_and_ask_for_p_no_more_than_they_must() {
         let (q, p, count) = (0.25_f32, 0.4_f32, 100_000);
-        for rule in CausticRule::ALL {
+        for rule in CausticRule::iter() {
             let mut stream = HashStream::new([4, 4, rule as u32]);
             let (mut power, mut asked) = (Welford::default(), 0);
             for i in 0..count {
@@ -96,7 +87,7 @@ mod tests {
     fn certain_photons_are_always_stored_and_impossible_ones_never() {
         assert_eq!(caustic(lumiris_numbers::math::ONE_MINUS_EPSILON, 1.0), Some(1.0));
         assert_eq!(caustic(0.0, 0.0), None);
-        for rule in CausticRule::ALL {
+        for rule in CausticRule::iter() {
             assert_eq!(rule.global(1.0, true, [0.0; 2], || 0.0), None);
             assert_eq!(rule.global(1.0, true, [lumiris_numbers::math::ONE_MINUS_EPSILON; 2], || 1.0), Some(1.0));
         }

@@ -2,10 +2,13 @@
 
 use crate::film::Film;
 use crate::imaging::color::linear_to_srgb;
-use crate::scene::{Cached, Deposition, EstimatorKind, IntegratorKind, Proposals, Scene, SplitMap};
+use crate::scene::{FilmSettings, SplitMap};
+use crate::settings::Settings;
+use strum::{EnumString, IntoStaticStr, VariantNames};
 
 /// A group of channels beside the picture itself.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[derive(Clone, Copy, Debug, PartialEq, Eq, EnumString, IntoStaticStr, VariantNames)]
+#[strum(serialize_all = "kebab-case")]
 pub enum Aov {
     /// Variance of the pixel's mean, `variance.R/G/B`.
     Variance,
@@ -32,21 +35,6 @@ impl Aov {
     /// All that every picture has, in the order of the file.
     pub const ALL: [Aov; 7] =
         [Aov::Variance, Aov::Samples, Aov::Albedo, Aov::Normal, Aov::Depth, Aov::Material, Aov::Object];
-
-    /// The name on the command line.
-    pub fn name(self) -> &'static str {
-        match self {
-            Aov::Variance => "variance",
-            Aov::Samples => "samples",
-            Aov::Albedo => "albedo",
-            Aov::Normal => "normal",
-            Aov::Depth => "depth",
-            Aov::Material => "material",
-            Aov::Object => "object",
-            Aov::Ratio => "ratio",
-            Aov::Records => "records",
-        }
-    }
 
     fn channels(self) -> &'static [&'static str] {
         match self {
@@ -114,96 +102,19 @@ pub fn display(film: &Film, exposure: f32) -> Vec<f32> {
     film.pixels.iter().flat_map(|p| p.mean().map(|v| linear_to_srgb((v as f32 * gain).clamp(0.0, 1.0)))).collect()
 }
 
-/// Every setting that the picture depends on, as metadata entries `lumiris:…`.
-pub fn settings_metadata(scene: &Scene) -> Vec<(String, String)> {
-    let i = &scene.integrator;
-    let b = &scene.film.bounds;
-    let split = i.split();
-    let mut entries = vec![
-        ("version", env!("CARGO_PKG_VERSION").to_owned()),
-        ("integrator", i.kind.name().to_owned()),
-        ("max_depth", i.max_depth.to_string()),
-        ("estimator", i.estimator.name().to_owned()),
-        ("samples", split.samples.to_string()),
-        ("heuristic", i.heuristic().name().to_owned()),
-        ("light_choice", i.light_choice.name().to_owned()),
-        ("bsdf_proposals", i.bsdf_proposals.to_string()),
-        ("bsdf_density", i.bsdf_density.name().to_owned()),
-        ("sampler", scene.sampling.sampler.name().to_owned()),
-        ("spp", scene.sampling.spp.to_string()),
-        ("seed", scene.sampling.seed.to_string()),
-        ("filter", format!("{:?}", scene.film.filter)),
-        ("resolution", format!("{}x{}", scene.film.resolution[0], scene.film.resolution[1])),
+/// What a picture depends on, as metadata entries `lumiris:…`: its settings, and what the film is like.
+pub fn metadata(film: &FilmSettings, settings: &Settings) -> Vec<(String, String)> {
+    let b = &film.bounds;
+    let film = [
+        ("filter", format!("{:?}", film.filter)),
+        ("resolution", format!("{}x{}", film.resolution[0], film.resolution[1])),
         ("crop", format!("{},{},{},{}", b.x0, b.x1, b.y0, b.y1)),
     ];
-    if i.estimator == EstimatorKind::Ris {
-        entries.extend([
-            (
-                "proposals",
-                if i.ris.proposals == Proposals::Optimal { "optimal".to_owned() } else { split.proposals.to_string() },
-            ),
-            ("strata", i.ris.strata.name().to_owned()),
-            ("proposal_points", i.ris.points.name().to_owned()),
-            ("target", i.ris.target.name().to_owned()),
-        ]);
-        entries.extend(i.ris.stage_times.map(|t| ("stage_times", format!("{},{}", t.t1, t.t2))));
-    }
-    match i.estimator {
-        EstimatorKind::Mc | EstimatorKind::Ris => {}
-        EstimatorKind::Mis => entries.push(("bsdf_share", i.bsdf_share.to_string())),
-        EstimatorKind::Ocv | EstimatorKind::OptimalMis => {
-            let form = ("ocv", i.ocv.form.name().to_owned());
-            let optimal = ("optimal_mis", i.optimal_mis.name().to_owned());
-            entries.push(if i.estimator == EstimatorKind::Ocv { form } else { optimal });
-            entries.push(("components", i.ocv.most_components().to_string()));
-            entries.push(("bsdf_share", i.bsdf_share.to_string()));
-        }
-        EstimatorKind::Correlated => {
-            entries.push(("correlated", i.correlated.form.name().to_owned()));
-            entries.push(("technique", i.correlated.technique.name().to_owned()));
-        }
-        EstimatorKind::Contributing => {
-            entries.push(("rest_samples", i.contributing.rest_samples.to_string()));
-            if i.leaves_lights_out() {
-                entries.push(("biased", "lights that no photon came from are left out".to_owned()));
-            }
-        }
-    }
-    if i.kind == IntegratorKind::IrradianceCache {
-        let c = &i.cache;
-        entries.extend([
-            ("cached", c.cached.name().to_owned()),
-            ("cache_error", c.error.to_string()),
-            ("cache_radius", format!("{},{}", c.radius[0], c.radius[1])),
-            ("cache_samples", c.samples.to_string()),
-        ]);
-        if c.cached == Cached::All {
-            entries.push(("cache_passes", c.passes.to_string()));
-        }
-    }
-    if i.uses_light_hints() {
-        entries.extend(i.photons.light_photons.map(|n| ("light_photons", n.to_string())));
-    }
-    if i.kind == IntegratorKind::PhotonMap {
-        let p = &i.photons;
-        entries.extend([
-            ("photons", p.photons.to_string()),
-            ("caustic_ratio", p.caustic_ratio.to_string()),
-            ("importance", p.deposition.to_string()),
-            ("nearest", p.nearest.to_string()),
-            ("gather", p.gather.to_string()),
-            ("gather_guide", p.guide.to_string()),
-            ("photon_paths", p.trajectories.to_string()),
-        ]);
-        if let Some(shrinking) = p.progressive {
-            entries.push(("progressive", shrinking.alpha.to_string()));
-            entries.extend(shrinking.radius.map(|r| ("photon_radius", r.to_string())));
-        }
-        if let Deposition::CutOff(_) = p.deposition {
-            entries.push(("biased", "photons where importance is low are left out".to_owned()));
-        }
-    }
-    entries.into_iter().map(|(key, value)| (format!("lumiris:{key}"), value)).collect()
+    let version = [("version", env!("CARGO_PKG_VERSION").to_owned())].into_iter();
+    let recorded = settings.recorded().map(|(key, value)| (key, value.to_string()));
+    let biases = settings.biases().into_iter().map(|bias| ("biased", bias.to_owned()));
+    let entries = version.chain(film).chain(recorded).chain(biases);
+    entries.map(|(key, value)| (format!("lumiris:{key}"), value)).collect()
 }
 
 #[cfg(test)]

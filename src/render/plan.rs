@@ -16,8 +16,9 @@ use crate::direct::Fits;
 use crate::film::PixelBounds;
 use crate::integrators::PathIntegrator;
 use crate::integrators::path::CameraSample;
-use crate::scene::{
-    EstimatorKind, IntegratorKind, IntegratorSettings, Proposals, Split, SplitMap, StageTimes, Strata, Target, World,
+use crate::scene::{SplitMap, World};
+use crate::settings::{
+    EstimatorKind, IntegratorKind, IntegratorSettings, Proposals, Split, StageTimes, Strata, Target,
 };
 use lumiris_numbers::estimators::ris::choice::{Costs, MomentsEstimate, Variances, clamp_ratio, optimal_ratio};
 use rayon::prelude::*;

@@ -17,7 +17,7 @@ pub struct Found {
     pub surface: SurfaceHit,
     /// Unit direction to where the ray came from.
     pub wo: Vec3,
-    /// Width of the texture footprint at the hit (m).
+    /// Width of a pixel at the hit (m).
     pub width: f32,
     /// Distance that the ray went (m).
     pub distance: f32,
@@ -25,14 +25,15 @@ pub struct Found {
 }
 
 impl Found {
-    /// The first hit of `ray`, whose texture footprint has `width` at its origin and grows by `spread` per unit length.
+    /// The first hit of `ray`. A pixel is `width` wide at its origin, and `spread` wider per unit length.
     pub fn new(world: &World, ray: &Ray, (width, spread): (f32, f32), hit: &Hit) -> Self {
         let surface = world.scene.geometry.surface_hit(hit.geometry, hit.primitive, hit.instance, hit.uv, ray.time);
         let distance = hit.t * ray.d.length();
         let width = width + spread * distance;
+        let footprint = width * world.scene.sampling.footprint();
         let extent = |d: Vec3| {
             let length = d.length();
-            if length > 0.0 { width / length } else { 0.0 }
+            if length > 0.0 { footprint / length } else { 0.0 }
         };
         let uv_width = Vec2::new(extent(surface.dpdu), extent(surface.dpdv));
         let context = TextureContext { uv: surface.uv, uv_width, p: surface.p, n: surface.n };

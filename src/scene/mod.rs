@@ -3,19 +3,10 @@
 //! [`Scene`] is data, as an importer makes it; [`World`] is a scene with its ray tracers, ready to render.
 
 mod found;
-mod photon_settings;
-mod ris_settings;
-mod settings;
 mod split_map;
 mod world;
 
 pub use found::Found;
-pub use photon_settings::{Deposition, PhotonMapSettings, Shrinking};
-pub use ris_settings::{ProposalPoints, Proposals, RisSettings, StageTimes, Strata, Target};
-pub use settings::{
-    Cached, ContributingSettings, CorrelatedForm, CorrelatedSettings, EstimatorKind, IntegratorKind,
-    IntegratorSettings, IrradianceCacheSettings, OcvSettings, OptimalForm, SamplingTechnique, Split,
-};
 pub use split_map::SplitMap;
 pub use world::{AccelKind, EmitterHit, World};
 
@@ -25,8 +16,8 @@ use crate::film::filter::PixelFilter;
 use crate::geometry::GeometrySet;
 use crate::lights::LightSet;
 use crate::materials::{MaterialId, MaterialSet};
+use crate::settings::{IntegratorSettings, SamplingSettings, Settings};
 use crate::textures::TextureSet;
-use lumiris_numbers::samplers::SamplerKind;
 use std::sync::Arc;
 
 /// What is rendered and how the file asks for it.
@@ -52,6 +43,22 @@ pub struct Scene {
     pub lights: LightSet,
 }
 
+impl Scene {
+    /// All settings.
+    pub fn settings(&self) -> Settings {
+        Settings { integrator: self.integrator, sampling: self.sampling }
+    }
+
+    /// Renders by other settings from now on.
+    pub fn set(&mut self, settings: Settings) {
+        if settings.integrator.light_choice != self.integrator.light_choice {
+            self.lights.set_kind(settings.integrator.light_choice);
+        }
+        self.materials.set_proposal_density(settings.integrator.bsdf_density);
+        (self.integrator, self.sampling) = (settings.integrator, settings.sampling);
+    }
+}
+
 /// What a geometry is made of.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Surface {
@@ -74,15 +81,4 @@ pub struct FilmSettings {
     pub file_name: Option<String>,
     /// Factor from radiance to pixel value (ISO and exposure of the sensor); 1 by default.
     pub scale: f32,
-}
-
-/// Random numbers.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub struct SamplingSettings {
-    /// Which sequence.
-    pub sampler: SamplerKind,
-    /// Camera samples per pixel.
-    pub spp: u32,
-    /// Images of different seeds are independent estimates of the same picture.
-    pub seed: u32,
 }

@@ -1,7 +1,7 @@
 //! The best numbers of samples and proposals, pixel by pixel.
 
-use super::Split;
 use crate::film::PixelBounds;
+use crate::settings::Split;
 use lumiris_numbers::estimators::ris::choice::{Costs, counts};
 
 /// M/N of every pixel, for the same time in all [Talbot 2005, §4.3; Talbot et al. 2005, Fig. 3].

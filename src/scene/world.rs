@@ -9,25 +9,17 @@ use crate::lights::{Irradiances, LightId, LightSampler, LightSamplerKind};
 use crate::textures::{TextureContext, TextureSet};
 use lumiris_numbers::math::{Vec2, Vec3};
 use std::sync::Arc;
+use strum::{EnumString, IntoStaticStr, VariantNames};
 
 /// Which ray tracer.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, EnumString, IntoStaticStr, VariantNames)]
+#[strum(serialize_all = "kebab-case")]
 pub enum AccelKind {
     /// Intel Embree.
     #[default]
     Embree,
     /// The pure-Rust BVH.
     Bvh,
-}
-
-impl AccelKind {
-    /// The name on the command line and in metadata.
-    pub fn name(self) -> &'static str {
-        match self {
-            AccelKind::Embree => "embree",
-            AccelKind::Bvh => "bvh",
-        }
-    }
 }
 
 /// A scene and two ray tracers: over everything, and over emitters only.

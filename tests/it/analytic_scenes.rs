@@ -9,9 +9,10 @@ use lumiris::film::PixelSums;
 use lumiris::import::{LoadOptions, load};
 use lumiris::lights::LightSamplerKind;
 use lumiris::render::{RenderSettings, render};
-use lumiris::scene::{
-    AccelKind, CorrelatedForm, CorrelatedSettings, EstimatorKind, IntegratorKind, OcvSettings, OptimalForm,
-    ProposalPoints, Proposals, SamplingTechnique, Strata, Target, World,
+use lumiris::scene::{AccelKind, World};
+use lumiris::settings::{
+    CorrelatedForm, CorrelatedSettings, EstimatorKind, IntegratorKind, OcvSettings, OptimalForm, ProposalPoints,
+    Proposals, SamplingTechnique, Strata, Target,
 };
 use lumiris_numbers::estimators::mis::Heuristic;
 use lumiris_numbers::estimators::ocv::Form;

@@ -6,7 +6,8 @@ use lumiris::lights::LightSamplerKind;
 use lumiris::render::output::{Aov, channels};
 use lumiris::render::plan::prepare;
 use lumiris::render::{RenderSettings, render};
-use lumiris::scene::{AccelKind, EstimatorKind, Proposals, Target, World};
+use lumiris::scene::{AccelKind, World};
+use lumiris::settings::{EstimatorKind, Proposals, Target};
 use std::path::Path;
 use std::sync::atomic::AtomicBool;
 
@@ -57,6 +58,43 @@ fn packet_width_does_not_change_a_bit() {
             assert_same_bits(&reference, &other, &format!("{estimator:?}, packets of {width}"));
         }
     }
+}
+
+/// A floor with an image on it, seen at a grazing angle.
+const TEXTURED: &str = r#"
+LookAt 0 0.4 -2  0 0 0  0 1 0
+Camera "perspective" "float fov" 50
+Film "rgb" "integer xresolution" 24 "integer yresolution" 16
+WorldBegin
+LightSource "distant" "point3 from" [ 1 3 -2 ]
+Texture "dots" "spectrum" "imagemap" "string filename" "dots.pgm" "float uscale" 20 "float vscale" 20
+Material "diffuse" "texture reflectance" "dots"
+Shape "bilinearmesh" "point3 P" [ -3 0 -3  3 0 -3  -3 0 6  3 0 6 ] "point2 uv" [ 0 0  1 0  0 1  1 1 ]
+"#;
+
+#[test]
+fn parts_of_an_image_add_up_if_their_footprints_are_those_of_the_whole() {
+    let folder = tempfile::tempdir().unwrap();
+    let dots: Vec<String> = (0..256_u32).map(|i| ((i * 97 + i / 16 * 31) % 256).to_string()).collect();
+    std::fs::write(folder.path().join("dots.pgm"), format!("P2 16 16 255\n{}\n", dots.join("\n"))).unwrap();
+    let path = folder.path().join("floor.pbrt");
+    std::fs::write(&path, TEXTURED).unwrap();
+    let part = |spp, footprint_spp, samples: std::ops::Range<u32>| {
+        let mut scene = load(&path, &LoadOptions::default()).map_err(|d| d.to_string()).unwrap().scene;
+        (scene.sampling.spp, scene.sampling.footprint_spp) = (spp, footprint_spp);
+        let world = World::new(scene, AccelKind::Embree, None).unwrap();
+        let settings =
+            RenderSettings { first_sample: samples.start, spp: samples.len() as u32, ..RenderSettings::default() };
+        render(&world, &settings, &AtomicBool::new(false), &|_| ()).unwrap().film
+    };
+    let sums = |films: &[Film]| -> Vec<[f64; 3]> {
+        let sum = |i: usize| [0, 1, 2].map(|c| films.iter().map(|f| f.pixels[i].radiance[c]).sum::<f64>());
+        (0..films[0].pixels.len()).map(sum).collect()
+    };
+    // Sums of a few f32 in f64 are exact here
+    let whole = sums(&[part(8, None, 0..8)]);
+    assert_eq!(whole, sums(&[part(3, Some(8), 0..3), part(5, Some(8), 3..8)]));
+    assert_ne!(whole, sums(&[part(3, None, 0..3), part(5, None, 3..8)]), "footprints of fewer samples are wider");
 }
 
 #[test]

@@ -6,7 +6,8 @@ use lumiris::import::{LoadOptions, load};
 use lumiris::integrators::irradiance_cache::gather::{Gatherer, Wanted};
 use lumiris::render::output::{Aov, channels};
 use lumiris::render::{RenderSettings, Rendering, render};
-use lumiris::scene::{AccelKind, Cached, EstimatorKind, IntegratorKind, Proposals, World};
+use lumiris::scene::{AccelKind, World};
+use lumiris::settings::{Cached, EstimatorKind, IntegratorKind, Proposals};
 use lumiris_numbers::estimators::ocv::Form;
 use lumiris_numbers::estimators::stats::{sidak, t_test};
 use lumiris_numbers::math::Vec3;
@@ -234,7 +235,7 @@ fn seeds_give_different_records() {
 
 #[test]
 fn records_take_any_estimator() {
-    let mean = |change: &dyn Fn(&mut lumiris::scene::IntegratorSettings)| {
+    let mean = |change: &dyn Fn(&mut lumiris::settings::IntegratorSettings)| {
         let world = world_of(ROOM, |scene| {
             with_cache(scene, Cached::All);
             scene.integrator.cache.samples = 64;
@@ -257,7 +258,7 @@ fn records_take_any_estimator() {
     }
     for form in [Form::Paper, Form::Regression, Form::Crossfit] {
         let by_form =
-            |s: &mut lumiris::scene::IntegratorSettings| (s.estimator, s.ocv.form) = (EstimatorKind::Ocv, form);
+            |s: &mut lumiris::settings::IntegratorSettings| (s.estimator, s.ocv.form) = (EstimatorKind::Ocv, form);
         let ratio = mean(&by_form) / reference;
         assert!((ratio - 1.0).abs() < 0.25, "{form:?}: {ratio}");
     }

@@ -8,9 +8,10 @@ use lumiris::accel::{Coherence, RayBatch};
 use lumiris::film::PixelSums;
 use lumiris::import::{LoadOptions, load};
 use lumiris::lights::{LightHints, LightId, LightSamplerKind};
-use lumiris::render::output::settings_metadata;
+use lumiris::render::output::metadata;
 use lumiris::render::{RenderSettings, render};
-use lumiris::scene::{AccelKind, EstimatorKind, IntegratorSettings, Proposals, Target, World};
+use lumiris::scene::{AccelKind, World};
+use lumiris::settings::{EstimatorKind, IntegratorSettings, Proposals, Target};
 use lumiris_numbers::estimators::stats::{Welford, t_test};
 use lumiris_numbers::math::hash::{HashStream, pcg4d};
 use lumiris_numbers::math::ray::offset_origin;
@@ -136,7 +137,8 @@ fn leaving_lights_out_is_biased_where_a_light_that_is_seen_has_no_photon() {
 #[test]
 fn a_picture_says_that_lights_were_left_out() {
     for (rest, is_biased) in [(0, true), (1, false)] {
-        let entries = settings_metadata(&world(contributing(4, rest), is_seen).scene);
+        let scene = world(contributing(4, rest), is_seen).scene;
+        let entries = metadata(&scene.film, &scene.settings());
         assert!(entries.contains(&("lumiris:rest_samples".to_owned(), rest.to_string())));
         assert_eq!(entries.iter().any(|(key, _)| key == "lumiris:biased"), is_biased);
     }

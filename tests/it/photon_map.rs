@@ -4,7 +4,8 @@
 use super::irradiance_cache::{ROOM, rendering, squares, world_of};
 use lumiris::render::output::{Aov, channels};
 use lumiris::render::{RenderSettings, render};
-use lumiris::scene::{Deposition, IntegratorKind, PhotonMapSettings, Scene, Shrinking, World};
+use lumiris::scene::{Scene, World};
+use lumiris::settings::{Deposition, IntegratorKind, PhotonMapSettings, Shrinking};
 use lumiris_numbers::estimators::stats::{Welford, sidak, t_test};
 use std::sync::atomic::AtomicBool;
 
@@ -74,9 +75,9 @@ fn a_room_of_all_materials_agrees_with_path_tracing() {
         });
         let picture = squares(&rendering(&world, RenderSettings { spp: 32, ..Default::default() }).film, 8);
         let ratio = mean(&picture) / mean(&reference);
-        assert!((ratio - 1.0).abs() < 0.015, "{deposition}: mean {ratio}");
+        assert!((ratio - 1.0).abs() < 0.015, "{deposition:?}: mean {ratio}");
         for (i, (a, b)) in picture.iter().zip(&reference).enumerate() {
-            assert!((a / b - 1.0).abs() < 0.06, "{deposition}: square {i} has {a}, not {b}");
+            assert!((a / b - 1.0).abs() < 0.06, "{deposition:?}: square {i} has {a}, not {b}");
         }
     }
 }

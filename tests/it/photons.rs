@@ -6,10 +6,12 @@ use lumiris::photons::{
     CausticRule, GatherScratch, Importance, ImportanceSettings, Photon, PhotonError, PhotonMap, Place, Search, Traced,
     Tracing, Unimportant, Want, trace_importons, trace_photons,
 };
-use lumiris::scene::{Cached, IntegratorKind, World};
+use lumiris::scene::World;
+use lumiris::settings::{Cached, IntegratorKind};
 use lumiris_numbers::estimators::stats::{Welford, t_test, two_sample_z_test};
 use lumiris_numbers::math::{Rgb, Vec3};
 use std::f64::consts::PI;
+use strum::IntoEnumIterator;
 
 /// Probability that a test fails by chance.
 const SIGNIFICANCE: f64 = 1e-4;
@@ -253,7 +255,7 @@ fn the_rules_of_caustics_give_the_same_maps() {
         (global, caustic, run(0))
     };
     let reference = of(CausticRule::FirstTrajectories, 1.0);
-    for rule in CausticRule::ALL {
+    for rule in CausticRule::iter() {
         let thinned = of(rule, q);
         for c in 0..3 {
             for (a, b) in [(&reference.0, &thinned.0), (&reference.1, &thinned.1)] {
@@ -334,7 +336,7 @@ fn importance_moves_photons_to_what_is_seen_and_keeps_their_light() {
 #[test]
 fn stored_photons_are_as_many_as_wanted_and_estimate_the_same() {
     let world = world_of(ROOM, |_| ());
-    for rule in CausticRule::ALL {
+    for rule in CausticRule::iter() {
         let tracing = Tracing { q: 0.25, caustics: rule, max_depth: 4, ..Tracing::default() };
         let want = Want::Stored { global: 20_000, most_trajectories: 10_000_000 };
         let traced = trace_photons(&world, &tracing, None, want).unwrap();

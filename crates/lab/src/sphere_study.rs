@@ -129,6 +129,7 @@ mod tests {
     use super::*;
     use lumiris::bsdfs::models::{AshikhminShirley, CookTorrance, CosineLobe, LobeAxis, Model, OrenNayar};
     use lumiris::bsdfs::{Evaluated, ProposalDensity};
+    use strum::IntoEnumIterator;
 
     const RED: Rgb = Rgb::new(0.9, 0.5, 0.2);
     const BLUE: Rgb = Rgb::new(0.1, 0.4, 0.8);
@@ -159,7 +160,7 @@ mod tests {
     #[test]
     fn variance_falls_with_proposals_for_every_model() {
         for (name, model) in models() {
-            for density in ProposalDensity::ALL {
+            for density in ProposalDensity::iter() {
                 for (under, l) in [("uniform", (|_| Rgb::WHITE) as fn(Vec3) -> Rgb), ("uneven", uneven)] {
                     let [one, eight, twenty] = [1, 8, 20].map(|m| study(model, density, l, m));
                     let v = [&one, &eight, &twenty].map(|s| s.mean_variance()[1]);

@@ -5,7 +5,6 @@
 //! patches and alpha masks use callbacks as in the renderer.
 #![allow(unsafe_code)]
 
-use super::callbacks::QueryContext;
 use super::device::Device;
 use super::kernels::{self, Ask, Mode, RayHitPacket, RayPacket, Valid};
 use super::query::{ANY_SINGLE, can_trace, load, single_ray};
@@ -74,7 +73,7 @@ impl Bare {
 
     fn nearest_singly(&self, rays: &RayBatch, singles: &mut [sys::RTCRayHit]) {
         let mode = Mode { ask: Ask::Nearest, coherent: false };
-        let mut context = QueryContext::new(&self.world, rays, mode);
+        let mut context = kernels::query_context(&self.world, rays, mode);
         for single in singles {
             if self.calls_back {
                 context.begin(single.ray.id as usize);
@@ -87,7 +86,7 @@ impl Bare {
 
     fn nearest<const N: usize>(&self, rays: &RayBatch, packets: &mut [(Valid<N>, RayHitPacket<N>)], coherent: bool) {
         let mode = Mode { ask: Ask::Nearest, coherent };
-        let mut context = QueryContext::new(&self.world, rays, mode);
+        let mut context = kernels::query_context(&self.world, rays, mode);
         for (valid, packet) in packets {
             if self.calls_back {
                 context.begin(packet.rays.id[0] as usize);
@@ -99,7 +98,7 @@ impl Bare {
     }
 
     fn any_singly(&self, rays: &RayBatch, singles: &mut [sys::RTCRay]) {
-        let mut context = QueryContext::new(&self.world, rays, ANY_SINGLE);
+        let mut context = kernels::query_context(&self.world, rays, ANY_SINGLE);
         for single in singles {
             // SAFETY: the scene is committed, the ray is finite and its id an index of the batch.
             unsafe { kernels::occluded1(self.root.raw(), &mut context, single) };
@@ -109,7 +108,7 @@ impl Bare {
 
     fn any<const N: usize>(&self, rays: &RayBatch, packets: &mut [(Valid<N>, RayPacket<N>)], coherent: bool) {
         let mode = Mode { ask: Ask::Any, coherent };
-        let mut context = QueryContext::new(&self.world, rays, mode);
+        let mut context = kernels::query_context(&self.world, rays, mode);
         for (valid, packet) in packets {
             // SAFETY: the scene is committed, the lanes in `valid` are finite, ids are indices of the batch.
             unsafe { kernels::occluded_packet(self.root.raw(), &mut context, mode, valid, packet) };

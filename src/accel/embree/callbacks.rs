@@ -4,23 +4,15 @@
 //! ignored. Fields are addressed by their index in the header's order, which holds for any N, including 1.
 #![allow(unsafe_code)]
 
-use super::kernels::RtcContext;
+use super::context::QueryContext;
 use super::world::{Refined, Reported, World};
-use crate::accel::{AlphaTest, Hit, RayBatch};
+use crate::accel::{AlphaTest, Hit};
 use crate::geometry::hit::LocalHit;
 use crate::geometry::{GeometryId, Shape};
 use embree4_sys as sys;
 use lumiris_numbers::math::{Bounds3, Ray};
-use std::any::Any;
 use std::panic::{AssertUnwindSafe, catch_unwind};
 use std::sync::Arc;
-
-/// The largest packet.
-pub(super) const MAX_WIDTH: usize = 8;
-
-/// Hits whose parameters differ by less than this fraction are compared exactly: much more than what Embree's
-/// parameter is off, but for rays at less than some 0.1° to a triangle.
-const TIE: f32 = 1.0 / (1 << 12) as f32;
 
 /// Relative growth of the boxes of quadrics and patches, for the rounding of rays on their way into a group.
 const BOX_GROWTH: f32 = 1.0 / (1 << 20) as f32;
@@ -54,75 +46,6 @@ impl GeometryContext {
         }?;
         let found = Hit { t: hit.t, uv: hit.uv, geometry: self.id, primitive, instance };
         self.stops(&found, world_ray).then_some(hit)
-    }
-}
-
-/// The context of a query; Embree passes the address of its first member to the callbacks.
-#[repr(C)]
-pub(super) struct QueryContext<'a> {
-    pub rtc: RtcContext,
-    pub world: &'a World,
-    /// The batch; a ray's `id` is its index in it.
-    pub rays: &'a RayBatch,
-    /// Index of the packet's first ray.
-    pub base: u32,
-    /// The smallest parameter reported for each lane.
-    pub best_t: [f32; MAX_WIDTH],
-    /// The hit of each lane.
-    pub first: [Reported; MAX_WIDTH],
-    /// The payload of a panic in a callback, resumed when Embree has returned.
-    pub panic: Option<Box<dyn Any + Send>>,
-}
-
-impl QueryContext<'_> {
-    /// Forgets the last packet.
-    #[inline]
-    pub fn begin(&mut self, base: usize) {
-        self.base = base as u32;
-        self.best_t = [f32::INFINITY; MAX_WIDTH];
-        for first in &mut self.first {
-            first.geometry = u32::MAX;
-        }
-    }
-
-    /// Records a hit of the ray `id`; returns the new end of the ray, or `None` if another hit is nearer. The end is
-    /// slightly beyond the hit, so that ties are found whichever of the hits comes first.
-    #[inline]
-    fn offer(&mut self, id: u32, hit: Reported) -> Option<f32> {
-        let lane = (id - self.base) as usize % MAX_WIDTH;
-        let best = self.best_t[lane];
-        if hit.t < best * (1.0 - TIE) {
-            self.best_t[lane] = hit.t;
-        } else {
-            self.best_t[lane] = best.min(hit.t);
-            if !self.wins_tie(id, lane, &hit) {
-                return None;
-            }
-        }
-        self.first[lane] = hit;
-        Some(self.best_t[lane] * (1.0 + TIE))
-    }
-
-    /// Whether the exact hits put `hit` before the lane's first.
-    #[cold]
-    fn wins_tie(&mut self, id: u32, lane: usize, hit: &Reported) -> bool {
-        let mut wins = self.first[lane].geometry == u32::MAX;
-        self.guard(|query| {
-            if !wins {
-                let (ray, first) = (query.rays.get(id as usize), &query.first[lane]);
-                wins = query.world.refine(&ray, hit).precedes(&query.world.refine(&ray, first));
-            }
-        });
-        wins
-    }
-
-    /// Runs the body of a callback; a panic is stored for later.
-    #[inline]
-    fn guard(&mut self, body: impl FnOnce(&mut Self)) {
-        let result = catch_unwind(AssertUnwindSafe(|| body(self)));
-        if let Err(panic) = result {
-            self.panic = Some(panic);
-        }
     }
 }
 

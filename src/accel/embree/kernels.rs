@@ -1,8 +1,9 @@
 //! Embree's query functions, with one interface for both API versions.
 #![allow(unsafe_code)]
 
-use super::callbacks::{MAX_WIDTH, QueryContext, first_filter};
-use super::world::{Reported, World};
+use super::callbacks::first_filter;
+use super::context::{QueryContext, RtcContext};
+use super::world::World;
 use crate::accel::RayBatch;
 use embree4_sys as sys;
 
@@ -101,26 +102,9 @@ impl<const N: usize> RayHitPacket<N> {
     }
 }
 
-/// The part of a query that Embree sees.
-#[cfg(embree3)]
-pub(super) type RtcContext = sys::RTCIntersectContext;
-/// The part of a query that Embree sees.
-#[cfg(embree4)]
-pub(super) type RtcContext = sys::RTCRayQueryContext;
-
-impl<'a> QueryContext<'a> {
-    pub fn new(world: &'a World, rays: &'a RayBatch, mode: Mode) -> Self {
-        let (best_t, first) = ([f32::INFINITY; MAX_WIDTH], [Reported::NONE; MAX_WIDTH]);
-        QueryContext { rtc: rtc_context(mode), world, rays, base: 0, best_t, first, panic: None }
-    }
-
-    /// Resumes the panic of a callback.
-    #[inline]
-    pub fn finish(self) {
-        if let Some(panic) = self.panic {
-            std::panic::resume_unwind(panic);
-        }
-    }
+/// The context of queries on a batch.
+pub(super) fn query_context<'a>(world: &'a World, rays: &'a RayBatch, mode: Mode) -> QueryContext<'a> {
+    QueryContext::new(rtc_context(mode), world, rays)
 }
 
 #[cfg(embree3)]

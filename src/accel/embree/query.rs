@@ -2,7 +2,7 @@
 #![allow(unsafe_code)]
 
 use super::EmbreeAccel;
-use super::callbacks::{MAX_WIDTH, QueryContext};
+use super::context::{MAX_WIDTH, QueryContext};
 use super::kernels::{self, Ask, Mode, RayHitPacket, RayPacket, Valid};
 use super::world::{Refined, Reported};
 use crate::accel::{Coherence, Hit, RayBatch};
@@ -44,7 +44,7 @@ impl EmbreeAccel {
     }
 
     fn intersect_singly(&self, rays: &RayBatch, hits: &mut [Option<Hit>]) {
-        let mut context = QueryContext::new(&self.world, rays, FIRST_SINGLE);
+        let mut context = kernels::query_context(&self.world, rays, FIRST_SINGLE);
         for base in (0..rays.len()).step_by(MAX_WIDTH) {
             // Each ray is a lane of its own, so that the exact hits are computed side by side.
             context.begin(base);
@@ -58,7 +58,7 @@ impl EmbreeAccel {
 
     fn intersect_packets<const N: usize>(&self, rays: &RayBatch, mode: Mode, hits: &mut [Option<Hit>]) {
         let mut packet = RayHitPacket::<N>::new(Visibility::PATH.0);
-        let mut context = QueryContext::new(&self.world, rays, mode);
+        let mut context = kernels::query_context(&self.world, rays, mode);
         for base in (0..rays.len()).step_by(N) {
             let valid = load(&mut packet.rays, rays, base);
             packet.geometry = [sys::RTC_INVALID_GEOMETRY_ID; N];
@@ -107,7 +107,7 @@ impl EmbreeAccel {
     #[cold]
     fn refine_one(&self, rays: &RayBatch, i: usize, mut first: Reported) -> Option<Hit> {
         let ray = rays.get(i);
-        let mut context = QueryContext::new(&self.world, rays, FIRST_SINGLE);
+        let mut context = kernels::query_context(&self.world, rays, FIRST_SINGLE);
         let mut exact = self.world.refine(&ray, &first);
         for _ in 0..MAX_RETRIES {
             if exact != Refined::Behind {
@@ -129,7 +129,7 @@ impl EmbreeAccel {
     }
 
     fn occluded_singly(&self, rays: &RayBatch, occluded: &mut Vec<bool>) {
-        let mut context = QueryContext::new(&self.world, rays, ANY_SINGLE);
+        let mut context = kernels::query_context(&self.world, rays, ANY_SINGLE);
         occluded.extend((0..rays.len()).map(|i| {
             let o = [rays.ox[i], rays.oy[i], rays.oz[i]];
             if !can_trace(o, [rays.dx[i], rays.dy[i], rays.dz[i]], rays.t_max[i]) {
@@ -145,7 +145,7 @@ impl EmbreeAccel {
 
     fn occluded_packets<const N: usize>(&self, rays: &RayBatch, mode: Mode, occluded: &mut Vec<bool>) {
         let mut packet = RayPacket::<N>::new(Visibility::SHADOW.0);
-        let mut context = QueryContext::new(&self.world, rays, mode);
+        let mut context = kernels::query_context(&self.world, rays, mode);
         for base in (0..rays.len()).step_by(N) {
             let valid = load(&mut packet, rays, base);
             // SAFETY: the scene is committed, the lanes in `valid` are finite, ids are indices of the batch.

@@ -8,6 +8,7 @@ use super::*;
 use lumiris_numbers::math::hash::HashStream;
 use lumiris_numbers::math::{safe_sqrt, sqr, warp};
 use std::f32::consts::{PI, TAU};
+use strum::IntoEnumIterator;
 
 pub(super) fn ggx(alpha_x: f32, alpha_y: f32) -> TrowbridgeReitz {
     TrowbridgeReitz::new(alpha_x, alpha_y)
@@ -63,7 +64,7 @@ pub(super) fn zoo<'a>(tables: &'a [CoatTable]) -> Vec<(String, Bsdf<'a>)> {
         layered(glass(1.5, 0.0), lambert, 0.9, 0.7),
     ];
     zoo.extend(layers.iter().enumerate().map(|(i, &l)| (format!("layered {i}"), Bsdf::Layered(l))));
-    for density in ProposalDensity::ALL {
+    for density in ProposalDensity::iter() {
         let model = Model::CookTorrance(models::CookTorrance::new(RED, RED, 0.4, 0.5));
         zoo.push((format!("evaluated {density:?}"), Bsdf::Evaluated(Evaluated { model, density })));
     }

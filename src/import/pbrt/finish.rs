@@ -1,6 +1,7 @@
 //! The end of an import: all files are read in parallel, and the scene is put together in the order of its text.
 
 use super::lights::power_factor;
+use super::options::Understood;
 use super::shapes::{Made, ShapeDesc, ShapeError};
 use super::state::Builder;
 use crate::geometry::{Geometry, GeometryId, GeometrySet, Group, Instance, Shape, Visibility};
@@ -32,7 +33,7 @@ struct Assembly {
 impl Builder<'_> {
     /// Reads what the text asks for and makes the scene; `None` after an error.
     pub fn finish(mut self, d: &mut Diagnostics) -> Option<Scene> {
-        let settings = self.options.finish(self.load_options, d);
+        let understood = self.options.finish(self.load_options, d);
 
         // Read all files, whatever went wrong before: all missing ones are named in one run
         let mut shapes = std::mem::take(&mut self.shapes);
@@ -53,7 +54,7 @@ impl Builder<'_> {
         let images = self.check_emission_images(emission_images, &shapes, d);
 
         // Put the geometry together
-        let shutter = settings.as_ref().map_or([0.0, 1.0], |s| s.shutter);
+        let shutter = understood.as_ref().map_or([0.0, 1.0], |s| s.shutter);
         let mut assembly = Assembly { shutter, images, ..Assembly::default() };
         assembly.set.groups.resize_with(self.objects.len(), Group::default);
         for (desc, made) in shapes.iter().zip(made) {
@@ -81,7 +82,7 @@ impl Builder<'_> {
         if d.has_errors() {
             return None;
         }
-        let settings = settings?;
+        let Understood { camera, film, settings, .. } = understood?;
         materials.set_proposal_density(settings.integrator.bsdf_density);
 
         // Lights
@@ -94,8 +95,8 @@ impl Builder<'_> {
         }
         let lights = lights.build(settings.integrator.light_choice, &assembly.set.world_bounds());
         Some(Scene {
-            camera: settings.camera,
-            film: settings.film,
+            camera,
+            film,
             sampling: settings.sampling,
             integrator: settings.integrator,
             materials,

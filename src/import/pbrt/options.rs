@@ -1,16 +1,16 @@
-//! What stands before `WorldBegin`: camera and sampler; the integrator is in [`super::integrator`], film and filter are in
+//! What stands before `WorldBegin`: the camera; integrator and sampler are in [`super::settings`], film and filter are in
 //! [`super::film`].
 
-use super::integrator::finish_integrator;
+use super::settings::{finish_integrator, finish_sampler};
 use super::transform::{Ctm, affine};
 use crate::cameras::{Camera, SphericalMapping, default_screen_window};
 use crate::import::LoadOptions;
-use crate::scene::{FilmSettings, IntegratorSettings, SamplingSettings};
+use crate::scene::FilmSettings;
+use crate::settings::Settings;
 use lumiris_formats::diagnostic::{Diagnostics, did_you_mean};
 use lumiris_formats::pbrt::directive::Name;
 use lumiris_formats::pbrt::params::ParamSet;
 use lumiris_formats::source::Span;
-use lumiris_numbers::samplers::SamplerKind;
 
 /// A directive that is understood when all of them are known: the camera needs the film's size.
 pub(super) struct Pending {
@@ -30,16 +30,14 @@ pub struct Options {
     seed: Option<u32>,
 }
 
-/// The options as the scene holds them.
-pub struct Settings {
+/// The options, understood.
+pub struct Understood {
     /// Camera.
     pub camera: Camera,
     /// Film.
     pub film: FilmSettings,
-    /// Sampler.
-    pub sampling: SamplingSettings,
-    /// Integrator.
-    pub integrator: IntegratorSettings,
+    /// Integrator and sampler.
+    pub settings: Settings,
     /// Opening and closing of the shutter as fractions of the motion.
     pub shutter: [f32; 2],
 }
@@ -111,13 +109,15 @@ impl Options {
     }
 
     /// Understands all options.
-    pub fn finish(&self, load: &LoadOptions, d: &mut Diagnostics) -> Option<Settings> {
+    pub fn finish(&self, load: &LoadOptions, d: &mut Diagnostics) -> Option<Understood> {
         let (film, exposure_scale) = self.finish_film(load, d);
-        let sampling = self.finish_sampler(d);
-        let integrator = finish_integrator(self.integrator.as_ref(), d);
+        let mut settings = Settings::default();
+        settings.sampling.seed = self.seed.unwrap_or(settings.sampling.seed);
+        finish_sampler(self.sampler.as_ref(), &mut settings, d);
+        finish_integrator(self.integrator.as_ref(), &mut settings, d);
         let (camera, shutter, seconds) = self.finish_camera(film.resolution, d)?;
         let film = FilmSettings { scale: exposure_scale * seconds, ..film };
-        Some(Settings { camera, film, sampling, integrator, shutter })
+        Some(Understood { camera, film, settings, shutter })
     }
 
     fn finish_camera(&self, resolution: [u32; 2], d: &mut Diagnostics) -> Option<(Camera, [f32; 2], f32)> {
@@ -178,47 +178,6 @@ impl Options {
         };
         params.report_unused(d);
         Some((camera?, frame.shutter, close - open))
-    }
-
-    fn finish_sampler(&self, d: &mut Diagnostics) -> SamplingSettings {
-        let mut s = SamplingSettings { sampler: SamplerKind::SobolBlueNoise, spp: 16, seed: self.seed.unwrap_or(0) };
-        let Some(Pending { name, params: p }) = &self.sampler else { return s };
-        match name.text.as_str() {
-            "independent" | "random" => s.sampler = SamplerKind::Independent,
-            // pbrt's stratified samples cover a pixel together, as those of a sequence do
-            "sobol" | "paddedsobol" | "halton" | "pmj02bn" | "stratified" | "lowdiscrepancy" | "02sequence"
-            | "maxmindist" => {
-                s.sampler = SamplerKind::Sobol;
-            }
-            "zsobol" => s.sampler = SamplerKind::SobolBlueNoise,
-            other => {
-                unknown(other, name.span, "sampler", &["independent", "sobol", "zsobol", "halton", "stratified"], d)
-            }
-        }
-        let count = |key: &'static str, d: &mut Diagnostics| match p.integer(key, d) {
-            Some(n @ 1..) => Some(n as u32),
-            Some(n) => {
-                d.error(p.span_of(key), format!("{key} must be at least 1, not {n}"));
-                None
-            }
-            None => None,
-        };
-        if name.text == "stratified" {
-            let (x, y) = (count("xsamples", d).unwrap_or(4), count("ysamples", d).unwrap_or(4));
-            s.spp = x.saturating_mul(y);
-            p.ignore("jitter");
-            p.ignore("dimensions");
-        }
-        if let Some(spp) = count("pixelsamples", d) {
-            s.spp = spp;
-        }
-        if let Some(seed) = p.integer("seed", d) {
-            s.seed = seed as u32;
-        }
-        // How the numbers are randomised is the sampler's own business here.
-        p.ignore("randomization");
-        p.report_unused(d);
-        s
     }
 }
 

@@ -17,7 +17,8 @@ use super::octree::Octree;
 use super::record::{Range, Record};
 use crate::film::{PixelBounds, PixelSample};
 use crate::integrators::path::{self, CameraSample, PathIntegrator, PathStats};
-use crate::scene::{Cached, World};
+use crate::scene::World;
+use crate::settings::Cached;
 use lumiris_numbers::math::{Bounds3, Vec3};
 use rayon::prelude::*;
 use std::sync::atomic::{AtomicBool, Ordering};
@@ -248,7 +249,7 @@ fn gather(world: &World, wanted: &[Wanted], stats: &mut PathStats) -> Vec<Record
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::scene::IrradianceCacheSettings;
+    use crate::settings::IrradianceCacheSettings;
 
     #[test]
     fn rounds_take_every_pixel_once_for_each_sample() {

@@ -3,7 +3,7 @@
 use super::gradients::Irradiance;
 use super::octree::Octree;
 use super::record::{Range, Record};
-use crate::scene::IrradianceCacheSettings;
+use crate::settings::IrradianceCacheSettings;
 use lumiris_numbers::math::{Bounds3, Rgb, Vec3};
 
 /// Most records: about 400 MB with the trees.

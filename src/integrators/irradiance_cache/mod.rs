@@ -28,7 +28,8 @@ use super::path::{CameraSample, PathIntegrator, PathState, PathStats, Vertex};
 use crate::bsdfs::Lambertian;
 use crate::direct::Fits;
 use crate::film::PixelSample;
-use crate::scene::{Cached, World};
+use crate::scene::World;
+use crate::settings::Cached;
 use lumiris_numbers::math::Rgb;
 use std::f32::consts::FRAC_1_PI;
 

@@ -7,7 +7,7 @@
 //! is below 1, where a_i = κR_i kept to some pixels; the weight 1 − ε_i falls to 0 where that ends, so that nothing jumps.
 
 use super::gradients::Irradiance;
-use crate::scene::IrradianceCacheSettings;
+use crate::settings::IrradianceCacheSettings;
 use lumiris_numbers::math::{Rgb, Vec3};
 
 /// How far a point may lie behind the tangent plane that it shares with a record, over a_i: what lies deeper is hidden from light

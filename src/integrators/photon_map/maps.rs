@@ -10,7 +10,8 @@ use crate::photons::{
     GatherScratch, Importance, ImportanceSettings, Origin, Photon, PhotonError, PhotonMap, Place, Search, Traced,
     Tracing, Unimportant, Want, trace_importons, trace_photons,
 };
-use crate::scene::{Deposition, PhotonMapSettings, World};
+use crate::scene::World;
+use crate::settings::{Deposition, PhotonMapSettings};
 use lumiris_numbers::math::hash::pcg4d;
 use lumiris_numbers::math::{Rgb, Vec3};
 use lumiris_numbers::samplers::{SampleStream, SamplerKind};

@@ -28,7 +28,8 @@ use crate::direct::{Fits, ShadePoint};
 use crate::film::PixelSample;
 use crate::materials::SurfaceBsdf;
 use crate::photons::{GatherScratch, Place, Search};
-use crate::scene::{PhotonMapSettings, World};
+use crate::scene::World;
+use crate::settings::PhotonMapSettings;
 use boundary::{Boundary, Probe};
 use guide::Guide;
 use lumiris_numbers::math::ray::offset_origin;
@@ -81,7 +82,7 @@ struct Job {
     p_error: Vec3,
     time: f32,
     stream: SampleStream,
-    /// Width of the texture footprint, and its growth.
+    /// Width of a pixel, and its growth.
     width: f32,
     spread: f32,
 }
@@ -161,7 +162,7 @@ impl PhotonMapIntegrator {
                 let o = offset_origin(job.place.p, job.p_error, job.place.n, d);
                 let ray = Ray { o, d, t_max: f32::INFINITY, time: job.time };
                 let ray = CameraRay { ray, spread: job.spread, width0: job.width, weight: 1.0 };
-                let split = crate::scene::Split { samples: 1, proposals: 1 };
+                let split = crate::settings::Split { samples: 1, proposals: 1 };
                 self.samples.push(CameraSample { ray, weight, stream, direct: stream, split, fit: 0 });
             }
         }

@@ -1,13 +1,13 @@
 //! `lumiris bench`
 
-use super::args::{AccelArg, SceneArgs};
+use super::args::SceneArgs;
 use super::progress;
 use super::settings::{load_world, plan};
 use anyhow::{Context, bail};
 use clap::{Args, ValueEnum};
 use lumiris::render::bench::{BenchSettings, RayCase, Report, measure};
 use lumiris::render::bench_photons::{PhotonReport, measure_photons};
-use lumiris::scene::World;
+use lumiris::scene::{AccelKind, World};
 use serde_json::json;
 use std::path::PathBuf;
 use std::process::ExitCode;
@@ -47,7 +47,7 @@ pub struct BenchArgs {
 }
 
 pub fn run(args: &BenchArgs) -> anyhow::Result<ExitCode> {
-    if !matches!(args.scene.accel, AccelArg::Embree) {
+    if args.scene.accel != AccelKind::Embree {
         bail!("bench measures Embree; leave out --accel");
     }
     let (mut world, times) = load_world(&args.scene)?;

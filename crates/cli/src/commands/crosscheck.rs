@@ -1,6 +1,6 @@
 //! `lumiris crosscheck`
 
-use super::args::{AccelArg, SceneArgs};
+use super::args::SceneArgs;
 use super::progress;
 use super::settings::{load_world, plan, render_settings};
 use anyhow::{Context, bail};
@@ -57,7 +57,7 @@ impl ImageReport {
 }
 
 pub fn run(args: &CrosscheckArgs) -> anyhow::Result<ExitCode> {
-    if !matches!(args.scene.accel, AccelArg::Embree) {
+    if args.scene.accel != AccelKind::Embree {
         bail!("crosscheck always compares Embree with the BVH; leave out --accel");
     }
 

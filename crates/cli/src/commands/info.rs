@@ -5,7 +5,9 @@ use super::progress;
 use super::settings::load_world;
 use clap::Args;
 use lumiris::geometry::Shape;
+use lumiris::render::output::metadata;
 use lumiris::scene::World;
+use lumiris::settings::{Setting, Value as SettingValue};
 use serde_json::{Value, json};
 use std::collections::BTreeMap;
 use std::process::ExitCode;
@@ -59,6 +61,8 @@ fn facts(world: &World) -> Value {
         *lights.entry(light.kind_name()).or_default() += 1;
     }
     let accel = world.accel.stats();
+    let settings = scene.settings();
+    let changed = |(row, value): (&Setting, SettingValue)| (format!("--{}", row.flag), value.to_string());
     json!({
         "geometry": {
             "geometries": set.geometries.len(),
@@ -77,7 +81,8 @@ fn facts(world: &World) -> Value {
             "texture_bytes": scene.textures.images.iter().map(|i| i.bytes() as u64).sum::<u64>(),
             "accel_bytes": accel.bytes, "accel_peak_bytes": accel.peak_bytes,
         },
-        "settings": lumiris::render::output::settings_metadata(scene).into_iter().collect::<BTreeMap<_, _>>(),
+        "settings": metadata(&scene.film, &settings).into_iter().collect::<BTreeMap<_, _>>(),
+        "changed_settings": settings.changed().map(changed).collect::<BTreeMap<_, _>>(),
     })
 }
 

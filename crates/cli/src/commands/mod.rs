@@ -9,11 +9,11 @@ mod compare;
 mod crosscheck;
 mod generate;
 mod info;
-mod photon_args;
 mod progress;
 mod render;
 mod reproduce;
 mod settings;
+mod settings_args;
 
 use clap::{Parser, Subcommand};
 use std::process::ExitCode;

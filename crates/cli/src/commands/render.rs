@@ -1,6 +1,6 @@
 //! `lumiris render`
 
-use super::args::{AovArg, RenderArgs};
+use super::args::RenderArgs;
 use super::progress::{self, Bar};
 use super::settings::{SetupTimes, load_world, plan, render_settings};
 use anyhow::{Context, bail};
@@ -23,7 +23,7 @@ pub const INTERRUPTED: u8 = 130;
 pub fn run(args: &RenderArgs) -> anyhow::Result<ExitCode> {
     check_outputs(&args.output)?;
     let (mut world, setup) = load_world(&args.scene)?;
-    let asks_for_ratio = args.aov.iter().flatten().any(|a| matches!(a, AovArg::Ratio));
+    let asks_for_ratio = args.aov.iter().flatten().any(|a| *a == Aov::Ratio);
     plan(&args.scene, &mut world, asks_for_ratio, args.quiet)?;
     let outputs = outputs(args, &world);
     check_outputs(&outputs)?;
@@ -94,9 +94,9 @@ fn check_outputs(outputs: &[PathBuf]) -> anyhow::Result<()> {
 fn write(args: &RenderArgs, world: &World, rendering: &Rendering, path: &Path) -> anyhow::Result<()> {
     let film = &rendering.film;
     let (width, height) = (film.bounds.width() as usize, film.bounds.height() as usize);
-    let mut metadata = output::settings_metadata(&world.scene);
+    let mut metadata = output::metadata(&world.scene.film, &world.scene.settings());
     metadata.push(("lumiris:scene".to_owned(), args.scene.scene.display().to_string()));
-    metadata.push(("lumiris:accel".to_owned(), args.scene.accel.value().name().to_owned()));
+    metadata.push(("lumiris:accel".to_owned(), <&str>::from(args.scene.accel).to_owned()));
     metadata.push(("lumiris:complete".to_owned(), rendering.complete.to_string()));
     let done = || film.pixels.iter().map(|p| p.count);
     let range = format!("{} to {} per pixel", done().min().unwrap_or(0), done().max().unwrap_or(0));
@@ -104,7 +104,7 @@ fn write(args: &RenderArgs, world: &World, rendering: &Rendering, path: &Path) -
     metadata.push(("lumiris:seconds".to_owned(), format!("{:.3}", rendering.elapsed.as_secs_f64())));
     let part = if extension(path) == "exr" {
         let aovs: Vec<Aov> = match &args.aov {
-            Some(list) => list.iter().map(|a| a.value()).collect(),
+            Some(list) => list.clone(),
             None => {
                 let ratio = world.splits.as_ref().map(|_| Aov::Ratio);
                 let records = rendering.cache.map(|_| Aov::Records);
@@ -130,11 +130,11 @@ fn stats(args: &RenderArgs, world: &World, rendering: &Rendering, setup: SetupTi
     let mrays = |count: u64, t: Duration| count as f64 / seconds(t).max(1e-12) * 1e-6;
     let accel = world.accel.stats();
     let metadata: serde_json::Map<_, _> =
-        output::settings_metadata(&world.scene).into_iter().map(|(k, v)| (k, v.into())).collect();
+        output::metadata(&world.scene.film, &world.scene.settings()).into_iter().map(|(k, v)| (k, v.into())).collect();
     json!({
         "scene": args.scene.scene.display().to_string(),
         "settings": metadata,
-        "accel": args.scene.accel.value().name(),
+        "accel": <&str>::from(args.scene.accel),
         "threads": rendering.threads,
         "complete": rendering.complete,
         "invalid_samples": rendering.film.pixels.iter().map(|p| p.invalid).sum::<u64>(),

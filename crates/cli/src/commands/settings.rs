@@ -1,13 +1,14 @@
 //! From typed options to a world that is ready to render.
 
-use super::args::{SamplesArg, SceneArgs};
+use super::args::SceneArgs;
 use super::progress;
 use anyhow::{Context, bail};
 use lumiris::film::filter::PixelFilter;
 use lumiris::import::{LoadOptions, load};
 use lumiris::render::RenderSettings;
 use lumiris::render::plan::prepare;
-use lumiris::scene::{IntegratorKind, Proposals, Scene, Split, StageTimes, World};
+use lumiris::scene::{Scene, World};
+use lumiris::settings::{Proposals, Split, StageTimes};
 use std::time::Instant;
 
 /// Seconds of what happens before the first ray.
@@ -42,99 +43,9 @@ pub fn load_scene(args: &SceneArgs) -> anyhow::Result<Scene> {
 }
 
 fn apply(args: &SceneArgs, scene: &mut Scene) {
-    let i = &mut scene.integrator;
-    if let Some(kind) = args.integrator {
-        i.kind = kind.value();
-    }
-    if let Some(depth) = args.max_depth {
-        i.max_depth = depth;
-    } else if i.kind == IntegratorKind::Direct {
-        i.max_depth = 1;
-    }
-    if let Some(estimator) = args.estimator {
-        i.estimator = estimator.value();
-    }
-    if let Some(samples) = args.samples {
-        i.samples = match samples {
-            SamplesArg::Fixed(n) => Some(n),
-            SamplesArg::Auto => None,
-        };
-    }
-    if let Some(proposals) = args.proposals {
-        i.ris.proposals = proposals;
-    }
-    if let Some(strata) = args.strata {
-        i.ris.strata = strata.value();
-    }
-    if let Some(points) = args.proposal_points {
-        i.ris.points = points.value();
-    }
-    if let Some(target) = args.target {
-        i.ris.target = target.value();
-    }
-    if let Some(times) = args.stage_times {
-        i.ris.stage_times = Some(times);
-    }
-    if let Some(form) = args.ocv {
-        i.ocv.form = form.value();
-    }
-    if let Some(form) = args.optimal_mis {
-        i.optimal_mis = form.value();
-    }
-    if let Some(form) = args.correlated {
-        i.correlated.form = form.value();
-    }
-    if let Some(technique) = args.technique {
-        i.correlated.technique = technique.value();
-    }
-    if let Some(rest) = args.rest_samples {
-        i.contributing.rest_samples = rest;
-    }
-    if let Some(components) = args.components {
-        i.ocv.components = Some(components);
-    }
-    if let Some(share) = args.bsdf_share {
-        i.bsdf_share = share;
-    }
-    if let Some(cached) = args.cached {
-        i.cache.cached = cached.value();
-    }
-    if let Some(error) = args.cache_error {
-        i.cache.error = error;
-    }
-    if let Some(radius) = args.cache_radius {
-        i.cache.radius = radius;
-    }
-    if let Some(samples) = args.cache_samples {
-        i.cache.samples = samples;
-    }
-    if let Some(passes) = args.cache_passes {
-        i.cache.passes = passes;
-    }
-    args.photons.apply(&mut i.photons);
-    if let Some(heuristic) = args.heuristic {
-        i.heuristic = Some(heuristic.value());
-    }
-    if let Some(choice) = args.light_choice {
-        i.light_choice = choice.value();
-        scene.lights.set_kind(i.light_choice);
-    }
-    if let Some(proposals) = args.bsdf_proposals {
-        i.bsdf_proposals = proposals;
-    }
-    if let Some(density) = args.bsdf_density {
-        i.bsdf_density = density.value();
-        scene.materials.set_proposal_density(i.bsdf_density);
-    }
-    if let Some(spp) = args.spp {
-        scene.sampling.spp = spp;
-    }
-    if let Some(sampler) = args.sampler {
-        scene.sampling.sampler = sampler.value();
-    }
-    if let Some(seed) = args.seed {
-        scene.sampling.seed = seed;
-    }
+    let mut settings = scene.settings();
+    args.settings.apply(&mut settings);
+    scene.set(settings);
     if args.box_filter {
         scene.film.filter = PixelFilter::Box { rx: 0.5, ry: 0.5 };
     }
@@ -146,7 +57,7 @@ pub fn load_world(args: &SceneArgs) -> anyhow::Result<(World, SetupTimes)> {
     let scene = load_scene(args)?;
     let load = start.elapsed().as_secs_f64();
     let start = Instant::now();
-    let world = World::new(scene, args.accel.value(), args.packet_width)
+    let world = World::new(scene, args.accel, args.packet_width)
         .with_context(|| format!("cannot build the ray tracer of {}", args.scene.display()))?;
     Ok((world, SetupTimes { load, build: start.elapsed().as_secs_f64() }))
 }

@@ -1,49 +1,9 @@
 //! Metrics by name: the columns of tables, the entries of JSON, and what limits can be set on.
 
+use super::metric::Metric;
 use super::scores::Scores;
 use lumiris::imaging::heat::significant;
 use std::collections::BTreeSet;
-
-/// A metric that can be asked for.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
-pub enum Metric {
-    /// Mean squared error.
-    Mse,
-    /// Its root.
-    Rmse,
-    /// Mean of squared errors relative to the squared reference.
-    RelMse,
-    /// Mean squared error relative to the mean square of the reference.
-    Nmse,
-    /// Peak signal-to-noise ratio.
-    Psnr,
-    /// ꟻLIP on a display.
-    Flip,
-    /// ꟻLIP over all exposures.
-    HdrFlip,
-    /// Error in thresholds of vision.
-    Tvi,
-    /// Mean difference.
-    Bias,
-    /// Tests against the variances.
-    Z,
-}
-
-impl Metric {
-    /// All, in the order of tables.
-    pub const ALL: [Metric; 10] = [
-        Metric::Mse,
-        Metric::Rmse,
-        Metric::RelMse,
-        Metric::Nmse,
-        Metric::Psnr,
-        Metric::Flip,
-        Metric::HdrFlip,
-        Metric::Tvi,
-        Metric::Bias,
-        Metric::Z,
-    ];
-}
 
 /// Which values are good.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]

@@ -1,7 +1,7 @@
 //! The metrics of a picture, as numbers and as maps.
 
-use super::columns::Metric;
 use super::load::{Pictures, Region, Shown};
+use super::metric::Metric;
 use lumiris::imaging::metrics::difference::DEFAULT_EPSILON;
 use lumiris::imaging::metrics::perceptual::perceptual_error_at;
 use lumiris::imaging::metrics::significance::{F32_ROUNDING, HALF_ROUNDING};

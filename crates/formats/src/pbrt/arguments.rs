@@ -1,9 +1,8 @@
 //! The arguments of directives: numbers, names and parameter lists.
 
-use super::directive::{ActiveTimes, AttributeTarget, DirectiveKind, Name};
+use super::directive::{ActiveTimes, AttributeTarget, DirectiveKind, KEYWORDS, Name};
 use super::lexer::{LexError, Lexer, Token, TokenKind, shorten};
 use super::params::{Param, ParamSet, ParamType, Values};
-use super::parser::is_keyword;
 use crate::diagnostic::{Diagnostics, did_you_mean};
 use crate::source::Span;
 
@@ -55,6 +54,24 @@ impl Arguments<'_> {
             Ok(array) => Ok(array),
             Err(_) => self.fail(span, format!("{keyword} takes {N} numbers, not {count}")),
         }
+    }
+
+    /// An affine matrix, column after column. pbrt divides points by w, so a last row 0 0 0 w is made 0 0 0 1; any other
+    /// would be a projection.
+    pub fn matrix(&mut self, lexer: &mut Lexer<'_>, keyword: &str) -> Result<[f32; 16], Reported> {
+        let start = self.peek(lexer)?.map_or(lexer.position(), |t| t.span.start as usize);
+        let m: [f32; 16] = self.numbers(lexer, keyword)?;
+        let last_row = [m[3], m[7], m[11], m[15]];
+        let [x, y, z, w] = last_row;
+        if [x, y, z] != [0.0; 3] || w == 0.0 {
+            let row = last_row.map(|v| v.to_string()).join(" ");
+            let span = lexer.span(start, lexer.position());
+            let message =
+                format!("the last row of this matrix is {row}: an affine one has 0 0 0 w, with w other than 0");
+            self.diagnostics.error(span, message).help("the last row is every fourth number");
+            return Err(Reported);
+        }
+        Ok(m.map(|v| v / w))
     }
 
     /// `StartTime`, `EndTime` or `All`.
@@ -295,4 +312,9 @@ pub fn skip_until(lexer: &mut Lexer<'_>, stop: impl Fn(&Lexer<'_>, Token) -> boo
             Ok(Some(_)) | Err(_) => {}
         }
     }
+}
+
+/// True for the keyword of a directive.
+pub fn is_keyword(lexer: &Lexer<'_>, token: Token) -> bool {
+    token.kind == TokenKind::Word && KEYWORDS.iter().any(|k| k.as_bytes() == lexer.slice(token.span))
 }

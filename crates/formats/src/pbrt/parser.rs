@@ -4,7 +4,7 @@
 //! directive, so that one run finds the errors of a whole scene. It hands each directive to a [`Visitor`] as soon as
 //! it is read.
 
-use super::arguments::{Arguments, Reported, skip_until};
+use super::arguments::{Arguments, Reported, is_keyword, skip_until};
 use super::directive::{Directive, DirectiveKind, KEYWORDS, Name};
 use super::lexer::{Lexer, Token, TokenKind, shorten};
 use super::params::ParamSet;
@@ -155,8 +155,8 @@ impl Parser<'_> {
             "Scale" => D::Scale(self.arguments().numbers(lexer, keyword)?),
             "Rotate" => D::Rotate(self.arguments().numbers(lexer, keyword)?),
             "LookAt" => D::LookAt(self.arguments().numbers(lexer, keyword)?),
-            "Transform" => D::Transform(self.arguments().numbers(lexer, keyword)?),
-            "ConcatTransform" => D::ConcatTransform(self.arguments().numbers(lexer, keyword)?),
+            "Transform" => D::Transform(self.arguments().matrix(lexer, keyword)?),
+            "ConcatTransform" => D::ConcatTransform(self.arguments().matrix(lexer, keyword)?),
             "TransformTimes" => D::TransformTimes(self.arguments().numbers(lexer, keyword)?),
             "ActiveTransform" => D::ActiveTransform(self.arguments().active_times(lexer)?),
             "CoordinateSystem" => D::CoordinateSystem(self.arguments().name(lexer, keyword)?),
@@ -366,9 +366,4 @@ impl Parser<'_> {
 /// Goes on to the next keyword.
 fn skip_to_directive(lexer: &mut Lexer<'_>) {
     skip_until(lexer, is_keyword);
-}
-
-/// True for the keyword of a directive.
-pub fn is_keyword(lexer: &Lexer<'_>, token: Token) -> bool {
-    token.kind == TokenKind::Word && KEYWORDS.iter().any(|k| k.as_bytes() == lexer.slice(token.span))
 }

@@ -3,6 +3,7 @@
 //! z is up and the head looks towards −y. Lengths are in units of space (about metres); angles count from +x to +y.
 
 use super::head::{Head, head_parts};
+use super::limbs::{knot, limb, part, tuft};
 use super::relief::Relief;
 use super::solids::{Knot, Part, Shape, Stroke, Turned, spline, strokes};
 use lumiris_numbers::math::{Vec2, Vec3};
@@ -23,21 +24,6 @@ const SHAFT: f32 = 0.3;
 const TURNS: f32 = 3.25;
 /// Angle of the last turn's end.
 const END_ANGLE: f32 = 0.36 * PI;
-
-/// A knot of a curve that is not finished: dorsal vectors need not be perpendicular.
-pub(super) fn knot(center: Vec3, radius: f32, dorsal: Vec3) -> Knot {
-    Knot { center, radius, dorsal, along: 0.0 }
-}
-
-/// A smooth stroke through points with radii.
-pub(super) fn limb(points: &[(Vec3, f32)], dorsal: Vec3, steps: usize) -> Vec<Stroke> {
-    let knots: Vec<Knot> = points.iter().map(|&(p, r)| knot(p, r, dorsal)).collect();
-    strokes(&spline(&knots, steps)).collect()
-}
-
-pub(super) fn part(strokes: Vec<Stroke>, relief: Relief, blend: f32) -> Part {
-    Part { shape: Shape::Strokes(strokes), relief, blend }
-}
 
 /// The point at an angle, a distance from the axis, and a height.
 fn around(angle: f32, radius: f32, z: f32) -> Vec3 {
@@ -179,19 +165,6 @@ fn spines(body: &[Knot]) -> Vec<Stroke> {
         out.extend(limb(&points, tangent, 3));
     }
     out
-}
-
-/// A wavy tuft from `root` along `direction`, bent towards `bend`.
-pub(super) fn tuft(root: Vec3, direction: Vec3, bend: Vec3, length: f32, radius: f32) -> Vec<Stroke> {
-    let at = |t: f32, b: f32| root + direction * (length * t) + bend * (length * b);
-    let points = [
-        (at(0.0, 0.0), radius),
-        (at(0.3, 0.1), radius * 1.05),
-        (at(0.6, 0.06), radius * 0.75),
-        (at(0.85, 0.16), radius * 0.4),
-        (at(1.0, 0.34), radius * 0.08),
-    ];
-    limb(&points, bend, 4)
 }
 
 /// Flames at the end of the tail.

@@ -1,6 +1,6 @@
 //! The head of the dragon: skull, open jaws with teeth, tongue and whiskers, horns, ears, brows and beard.
 
-use super::dragon::{limb, part, tuft};
+use super::limbs::{limb, part, tuft};
 use super::relief::Relief;
 use super::solids::{Part, Stroke};
 use lumiris_numbers::math::Vec3;

@@ -8,6 +8,7 @@ pub mod fan;
 pub mod files;
 mod head;
 pub mod keller_wald;
+mod limbs;
 pub mod nets;
 pub mod noise;
 pub mod ply;

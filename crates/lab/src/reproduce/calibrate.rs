@@ -8,7 +8,7 @@
 use super::measure::{Measured, Seconds, Stage, View, turns};
 use super::method::Method;
 use super::{Observer, ReproduceError};
-use lumiris::scene::{Split, StageTimes};
+use lumiris::settings::{Split, StageTimes};
 
 /// Turns of a measurement of times.
 const TURNS: u32 = 3;

@@ -15,7 +15,8 @@ use lumiris::import::{LoadOptions, load};
 use lumiris::lights::{LightHints, LightSamplerKind};
 use lumiris::render::plan::prepare;
 use lumiris::render::{RenderError, RenderSettings, Rendering, render};
-use lumiris::scene::{AccelKind, Proposals, StageTimes, Strata, World};
+use lumiris::scene::{AccelKind, World};
+use lumiris::settings::{Proposals, SamplingSettings, StageTimes, Strata};
 use lumiris_numbers::estimators::stats::{Welford, z_test};
 use rustix::time::{ClockId, clock_gettime};
 use serde::Serialize;
@@ -148,7 +149,8 @@ impl Stage {
         let scene = &mut self.world.scene;
         let radius = if view == View::Antialiased { 0.5 } else { CENTRE };
         scene.film.filter = PixelFilter::Box { rx: radius, ry: radius };
-        (scene.sampling.seed, scene.sampling.spp) = (seed, spp);
+        // One footprint for short and long renderings, which estimate the same picture
+        scene.sampling = SamplingSettings { seed, spp, footprint_spp: Some(1), ..scene.sampling };
         self.shadows.store(view != View::Unshadowed, Ordering::Relaxed);
         let settings = RenderSettings { threads: self.threads, spp, ..RenderSettings::default() };
         let rendering = render(&self.world, &settings, observer.stop, &|_| ())?;

@@ -1,9 +1,9 @@
 //! What takes turns: ways to estimate direct light.
 
 use lumiris::lights::LightSamplerKind;
-use lumiris::scene::{
+use lumiris::scene::World;
+use lumiris::settings::{
     Cached, EstimatorKind, IntegratorKind, IntegratorSettings, OptimalForm, ProposalPoints, Proposals, Strata, Target,
-    World,
 };
 use lumiris_numbers::estimators::mis::Heuristic;
 use lumiris_numbers::estimators::ocv::Form;

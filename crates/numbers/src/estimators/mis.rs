@@ -4,8 +4,11 @@
 //! Σ_i (1/n_i) Σ_j w_i(x_ij) f(x_ij)/p_i(x_ij), and it is unbiased if Σ_i w_i = 1 wherever f ≠ 0 and w_i = 0 where
 //! p_i = 0. The deterministic mixture is the balance heuristic.
 
+use strum::{EnumString, IntoStaticStr, VariantNames};
+
 /// How the weights of techniques are chosen.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, EnumString, IntoStaticStr, VariantNames)]
+#[strum(serialize_all = "kebab-case")]
 pub enum Heuristic {
     /// w_i = n_i p_i / Σ n_k p_k.
     Balance,
@@ -30,15 +33,6 @@ pub struct Technique {
 const TIE: f32 = 1e-3;
 
 impl Heuristic {
-    /// The name on the command line and in metadata.
-    pub fn name(self) -> &'static str {
-        match self {
-            Heuristic::Balance => "balance",
-            Heuristic::Power => "power",
-            Heuristic::Maximum => "maximum",
-        }
-    }
-
     /// Weight of technique `a` against `b` at a sample that `a` drew. In 0..=1; finite for any densities.
     #[inline]
     pub fn weight(self, a: Technique, b: Technique) -> f32 {

@@ -10,9 +10,11 @@
 use crate::math::ONE_MINUS_EPSILON;
 use crate::math::hash::{pcg4d, unit_f32};
 use openqmc::{SobolBnSampler, SobolSampler};
+use strum::{EnumIter, EnumString, IntoStaticStr, VariantNames};
 
 /// Which sequence.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, EnumIter, EnumString, IntoStaticStr, VariantNames)]
+#[strum(serialize_all = "kebab-case")]
 pub enum SamplerKind {
     /// Independent uniform numbers.
     Independent,
@@ -22,23 +24,8 @@ pub enum SamplerKind {
     Sobol,
     /// Owen-scrambled Sobol' whose error is blue noise over the image.
     #[default]
+    #[strum(serialize = "zsobol")]
     SobolBlueNoise,
-}
-
-impl SamplerKind {
-    /// All kinds, for tests and lists of options.
-    pub const ALL: [SamplerKind; 4] =
-        [SamplerKind::Independent, SamplerKind::Stratified, SamplerKind::Sobol, SamplerKind::SobolBlueNoise];
-
-    /// The name on the command line and in metadata.
-    pub fn name(self) -> &'static str {
-        match self {
-            SamplerKind::Independent => "independent",
-            SamplerKind::Stratified => "stratified",
-            SamplerKind::Sobol => "sobol",
-            SamplerKind::SobolBlueNoise => "zsobol",
-        }
-    }
 }
 
 /// A place in the tree of domains of one sample.
@@ -130,10 +117,11 @@ impl SampleStream {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use strum::IntoEnumIterator;
 
     #[test]
     fn streams_are_functions_of_their_arguments() {
-        for kind in SamplerKind::ALL {
+        for kind in SamplerKind::iter() {
             let draw = |seed| SampleStream::new(kind, [3, 9], 17, seed).domain(4).split(2, 8, 5).draw::<4>();
             assert_eq!(draw(1), draw(1));
             assert_ne!(draw(1), draw(2));
@@ -142,7 +130,7 @@ mod tests {
 
     #[test]
     fn a_seed_does_not_shift_the_picture_of_another() {
-        for kind in SamplerKind::ALL {
+        for kind in SamplerKind::iter() {
             let draw = |x, y, seed| SampleStream::new(kind, [x, y], 0, seed).domain(4).draw::<2>();
             for seed in 1..200 {
                 for shift in 0..64 {
@@ -155,7 +143,7 @@ mod tests {
 
     #[test]
     fn every_dimension_has_mean_one_half_over_pixels_and_samples() {
-        for kind in SamplerKind::ALL {
+        for kind in SamplerKind::iter() {
             let mut sums = [0.0_f64; 4];
             let n = 64 * 64 * 4;
             for i in 0..n {

@@ -234,7 +234,7 @@ fn mixtures_of_whole_numbers_are_unbiased_with_every_heuristic() {
                 });
                 sum
             });
-            assert_means(&format!("{}: {name}", heuristic.name()), &channels, value);
+            assert_means(&format!("{}: {name}", <&str>::from(heuristic)), &channels, value);
         });
     }
 }

@@ -49,7 +49,7 @@ fn mis_on_proposals_is_unbiased() {
             systematic(&p.weights, 2, stream.next_f32(), &mut draws);
             p.estimate(&draws)
         });
-        assert_means(heuristic.name(), &channels, value);
+        assert_means(heuristic.into(), &channels, value);
     }
 }
 
@@ -98,6 +98,6 @@ fn mis_on_samples_is_unbiased() {
             }
             sum
         });
-        assert_means(heuristic.name(), &channels, value);
+        assert_means(heuristic.into(), &channels, value);
     }
 }

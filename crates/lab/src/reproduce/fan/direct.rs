@@ -9,7 +9,7 @@ use super::growth::{Growth, cost as growth_cost, measure as measure_growth};
 use super::roster::{Numbers, Role, methods};
 use super::truth::{Errors, Truth};
 use super::{Setup, report};
-use lumiris::scene::Split;
+use lumiris::settings::Split;
 use std::time::{Duration, Instant};
 
 /// A row of the paper's table.

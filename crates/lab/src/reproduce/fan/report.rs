@@ -27,8 +27,8 @@ pub fn more_time(ratio: f64) -> String {
 pub fn method_json(name: &str, [m, base]: [&Measured; 2], [e, base_errors]: [&Errors; 2]) -> Value {
     let time = m.time_ratio(base);
     json!({
-        "name": name, "estimator": m.method.estimator.name(), "samples": m.method.samples,
-        "proposals": m.method.proposals, "points": m.method.points.name(), "light_choice": m.method.light_choice.name(),
+        "name": name, "estimator": <&str>::from(m.method.estimator), "samples": m.method.samples,
+        "proposals": m.method.proposals, "points": m.method.points.name(), "light_choice": <&str>::from(m.method.light_choice),
         "turns": m.turns(),
         "error": estimate_json(e.error()), "relative_error": estimate_json(e.relative(base_errors)),
         "time_ratio": time, "efficiency": estimate_json(e.efficiency(base_errors, time)),

@@ -4,7 +4,7 @@
 
 use super::super::method::{Method, Points};
 use lumiris::lights::LightSamplerKind;
-use lumiris::scene::{OptimalForm, Split, Strata};
+use lumiris::settings::{OptimalForm, Split, Strata};
 use lumiris_numbers::estimators::mis::Heuristic;
 use lumiris_numbers::estimators::ocv::Form;
 

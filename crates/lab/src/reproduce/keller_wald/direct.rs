@@ -12,7 +12,7 @@ use super::super::{Observer, ReproduceError, scaled};
 use super::{SHAPE, Setup};
 use lumiris::lights::LightSamplerKind;
 use lumiris::render::hints::light_hints;
-use lumiris::scene::{Split, Strata, Target};
+use lumiris::settings::{Split, Strata, Target};
 use serde_json::{Value, json};
 use std::time::{Duration, Instant};
 
@@ -332,7 +332,7 @@ fn outcome_json(o: &Outcome) -> Value {
     let base = &o.measured[o.place(Role::All)];
     let method = |(i, m): (usize, &Measured)| {
         json!({
-            "name": o.named[i].name, "estimator": m.method.estimator.name(), "light_choice": m.method.light_choice.name(),
+            "name": o.named[i].name, "estimator": <&str>::from(m.method.estimator), "light_choice": <&str>::from(m.method.light_choice),
             "samples": m.method.samples, "proposals": m.method.proposals, "turns": m.turns(),
             "variance": estimate_json(m.variance(None)), "time_ratio": m.time_ratio(base),
             "at_equal_time": estimate_json(o.against(i, Role::All)),

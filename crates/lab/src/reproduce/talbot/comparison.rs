@@ -9,7 +9,7 @@ use super::classes::Classes;
 use super::report;
 use super::scenes::Which;
 use super::{Setup, portrait};
-use lumiris::scene::{Split, Strata};
+use lumiris::settings::{Split, Strata};
 use std::time::{Duration, Instant};
 
 /// A figure that compares methods.

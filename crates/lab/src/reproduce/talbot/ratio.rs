@@ -14,7 +14,7 @@ use super::classes::{Classes, NAMES};
 use super::report::method_json;
 use super::scenes::Which;
 use super::{Setup, portrait};
-use lumiris::scene::{Split, StageTimes};
+use lumiris::settings::{Split, StageTimes};
 use lumiris_numbers::estimators::ris::choice::{Costs, Variances, clamp_ratio, optimal_ratio};
 use serde_json::json;
 use std::time::{Duration, Instant};

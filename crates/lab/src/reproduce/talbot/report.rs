@@ -9,7 +9,7 @@ use super::super::verdicts::{falls, helps_most_in_shadow, reduced_by};
 use super::Setup;
 use super::classes::{Classes, LIT, NAMES, SHADOWED};
 use super::comparison::{Kind, Outcome, Roles};
-use lumiris::scene::Split;
+use lumiris::settings::Split;
 use serde_json::{Value, json};
 
 /// All numbers of a method among those it was in turns with, the first of which is the baseline.
@@ -26,8 +26,8 @@ pub fn method_json(name: &str, all: &[Measured], method: usize, classes: &Classe
     let by_class: serde_json::Map<String, Value> = (0..3).map(|k| (NAMES[k].to_owned(), class(k))).collect();
     json!({
         "name": name,
-        "estimator": m.method.estimator.name(), "samples": m.method.samples, "proposals": m.method.proposals,
-        "strata": m.method.strata.name(), "points": m.method.points.name(),
+        "estimator": <&str>::from(m.method.estimator), "samples": m.method.samples, "proposals": m.method.proposals,
+        "strata": <&str>::from(m.method.strata), "points": m.method.points.name(),
         "turns": m.turns(), "variance": estimate_json(m.variance(None)),
         "time_ratio": m.time_ratio(base), "at_equal_time": estimate_json(m.at_equal_time(base, None)),
         "mean": estimate_json(m.mean()), "same_mean_p": same_mean(all, method),

@@ -1,7 +1,8 @@
 //! The forms that fit β to samples of the same estimate.
 
+use super::ldlt::IllConditioned;
 use super::ldlt::{Columns, Factors, Matrix};
-use super::normal::{IllConditioned, NormalEquations, Penalty};
+use super::normal::{NormalEquations, Penalty};
 
 /// λ of equation (11) in the paper.
 pub const PAPER_LAMBDA: f32 = 1.0;

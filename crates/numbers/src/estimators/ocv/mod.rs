@@ -30,10 +30,13 @@ pub mod normal;
 
 pub use block::{Block, block_of};
 pub use forms::{Outcome, crossfit, paper, regression};
-pub use normal::{IllConditioned, MAX_COMPONENTS, NormalEquations, Penalty};
+pub use ldlt::{IllConditioned, MAX_COMPONENTS};
+pub use normal::{NormalEquations, Penalty};
+use strum::{EnumString, IntoStaticStr, VariantNames};
 
 /// How β is found.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, EnumString, IntoStaticStr, VariantNames)]
+#[strum(serialize_all = "kebab-case")]
 pub enum Form {
     /// Equations (10) and (11): β₀ + Σ β_j of the ridge solution with λ = 1 on the same samples. Biased.
     Paper,
@@ -44,19 +47,4 @@ pub enum Form {
     /// Equation (7), β from earlier blocks of passes of the same pixel ([`block_of`]). Unbiased.
     #[default]
     Progressive,
-}
-
-impl Form {
-    /// All forms.
-    pub const ALL: [Form; 4] = [Form::Paper, Form::Regression, Form::Crossfit, Form::Progressive];
-
-    /// The name on the command line and in metadata.
-    pub fn name(self) -> &'static str {
-        match self {
-            Form::Paper => "paper",
-            Form::Regression => "regression",
-            Form::Crossfit => "crossfit",
-            Form::Progressive => "progressive",
-        }
-    }
 }

@@ -1,20 +1,12 @@
 //! The sums of the regression of y on the columns, and β from them.
 
-use super::ldlt::{Columns, Factors, Matrix};
-
-/// Most components of one system.
-pub const MAX_COMPONENTS: usize = 8;
+use super::ldlt::{Columns, Factors, IllConditioned, MAX_COMPONENTS, Matrix};
 
 /// Samples after which the sums stay as they are: the count would no longer be exact in f32.
 const MOST_SAMPLES: f32 = 16_777_216.0;
 
 /// Part of Σ c² below which Σ (c − c̄)² is rounding: the column is constant and takes no part.
 const CONSTANT: f64 = 1e-6;
-
-/// A system that has no usable solution: something in it is not finite. The estimate is then that of β = 0, which is MIS.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, thiserror::Error)]
-#[error("the normal equations are ill-conditioned")]
-pub struct IllConditioned;
 
 /// How coefficients of few samples are held back: β = 0 is MIS, and so is every multiple of α.
 ///

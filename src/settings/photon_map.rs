@@ -1,7 +1,5 @@
 //! Settings of photon maps.
 
-use std::fmt;
-
 /// Photon maps [Jensen 1996; Keller and Wald 2000].
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct PhotonMapSettings {
@@ -45,18 +43,6 @@ impl Default for PhotonMapSettings {
     }
 }
 
-impl PhotonMapSettings {
-    /// True if this can be q.
-    pub fn is_ratio(q: f32) -> bool {
-        q > 0.0 && q <= 1.0
-    }
-
-    /// True if photons can choose this share of directions: not all, since there may be none from where light comes.
-    pub fn is_guide(share: f32) -> bool {
-        (0.0..=0.95).contains(&share)
-    }
-}
-
 /// Which photons are stored [Keller and Wald 2000, §2].
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum Deposition {
@@ -66,31 +52,6 @@ pub enum Deposition {
     Floor(f32),
     /// With the probability p(x), none where it is below this. Biased.
     CutOff(f32),
-}
-
-impl Deposition {
-    /// True if this can be a least probability.
-    pub fn is_least(probability: f32) -> bool {
-        probability > 0.0 && probability <= 1.0
-    }
-
-    /// The name on the command line and in metadata.
-    pub fn name(self) -> &'static str {
-        match self {
-            Deposition::All => "none",
-            Deposition::Floor(_) => "floor",
-            Deposition::CutOff(_) => "cut-off",
-        }
-    }
-}
-
-impl fmt::Display for Deposition {
-    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        match self {
-            Deposition::All => f.write_str(self.name()),
-            Deposition::Floor(least) | Deposition::CutOff(least) => write!(f, "{}:{least}", self.name()),
-        }
-    }
 }
 
 /// Radii of progressive photon mapping: r²ᵢ₊₁ = r²ᵢ·(i + α)/(i + 1) [Knaus and Zwicker 2011, Eq. 15].
@@ -109,11 +70,6 @@ impl Default for Shrinking {
 }
 
 impl Shrinking {
-    /// True if this can be α.
-    pub fn is_alpha(alpha: f32) -> bool {
-        alpha > 0.0 && alpha < 1.0
-    }
-
     /// The factor of the first radius in pass `pass`, which are counted from 0.
     pub fn factor(&self, pass: u32) -> f32 {
         let alpha = f64::from(self.alpha);

@@ -1,6 +1,7 @@
 //! What is particular to `ris`: proposals, strata and targets.
 
 use lumiris_numbers::estimators::ris::choice::Costs;
+use strum::{EnumString, IntoStaticStr, VariantNames};
 
 /// Proposals for each sample where no times were measured.
 pub const DEFAULT_RATIO: f64 = 8.0;
@@ -65,7 +66,8 @@ pub enum Proposals {
 }
 
 /// Strata of the samples over the proposals.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[derive(Clone, Copy, Debug, PartialEq, Eq, EnumString, IntoStaticStr, VariantNames)]
+#[strum(serialize_all = "kebab-case")]
 pub enum Strata {
     /// Independent draws with replacement [Talbot 2005, Eq. 4.1].
     None,
@@ -77,20 +79,9 @@ pub enum Strata {
     Systematic,
 }
 
-impl Strata {
-    /// The name on the command line and in metadata.
-    pub fn name(self) -> &'static str {
-        match self {
-            Strata::None => "none",
-            Strata::Proposals => "proposals",
-            Strata::Weights => "weights",
-            Strata::Systematic => "systematic",
-        }
-    }
-}
-
 /// How the proposals of light sampling lie on the lights.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[derive(Clone, Copy, Debug, PartialEq, Eq, EnumString, IntoStaticStr, VariantNames)]
+#[strum(serialize_all = "kebab-case")]
 pub enum ProposalPoints {
     /// Independent of each other.
     Independent,
@@ -98,18 +89,9 @@ pub enum ProposalPoints {
     Stratified,
 }
 
-impl ProposalPoints {
-    /// The name on the command line and in metadata.
-    pub fn name(self) -> &'static str {
-        match self {
-            ProposalPoints::Independent => "independent",
-            ProposalPoints::Stratified => "stratified",
-        }
-    }
-}
-
 /// The target q̂ of resampling.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[derive(Clone, Copy, Debug, PartialEq, Eq, EnumString, IntoStaticStr, VariantNames)]
+#[strum(serialize_all = "kebab-case")]
 pub enum Target {
     /// Luminance of f·G·L: everything but visibility.
     Fgl,
@@ -122,16 +104,6 @@ pub enum Target {
 }
 
 impl Target {
-    /// The name on the command line and in metadata.
-    pub fn name(self) -> &'static str {
-        match self {
-            Target::Fgl => "fgl",
-            Target::Gv => "gv",
-            Target::Gvl => "gvl",
-            Target::Visibility => "visibility",
-        }
-    }
-
     /// True if proposals are traced before they are resampled.
     pub fn has_visibility(self) -> bool {
         match self {

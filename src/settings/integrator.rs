@@ -1,11 +1,12 @@
 //! Light transport: what is computed, and how direct light is estimated.
 
-use super::photon_settings::PhotonMapSettings;
-use super::ris_settings::{Proposals, RisSettings, Target};
+use super::photon_map::PhotonMapSettings;
+use super::ris::{Proposals, RisSettings, Target};
 use crate::bsdfs::ProposalDensity;
 use crate::lights::LightSamplerKind;
 use lumiris_numbers::estimators::mis::Heuristic;
 use lumiris_numbers::estimators::ocv::{Form, MAX_COMPONENTS};
+use strum::{EnumString, IntoStaticStr, VariantNames};
 
 /// Light transport.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -189,7 +190,8 @@ impl IntegratorSettings {
 }
 
 /// What is computed.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[derive(Clone, Copy, Debug, PartialEq, Eq, EnumString, IntoStaticStr, VariantNames)]
+#[strum(serialize_all = "kebab-case")]
 pub enum IntegratorKind {
     /// Emitted light and one bounce.
     Direct,
@@ -199,18 +201,6 @@ pub enum IntegratorKind {
     IrradianceCache,
     /// The same, with the light that diffuse surfaces reflect from photon maps [Jensen 1996; Keller and Wald 2000].
     PhotonMap,
-}
-
-impl IntegratorKind {
-    /// The name on the command line and in metadata.
-    pub fn name(self) -> &'static str {
-        match self {
-            IntegratorKind::Direct => "direct",
-            IntegratorKind::Path => "path",
-            IntegratorKind::IrradianceCache => "irradiance-cache",
-            IntegratorKind::PhotonMap => "photon-map",
-        }
-    }
 }
 
 /// Irradiance caching [Ward et al. 1988; Ward and Heckbert 1992; Křivánek et al. 2008].
@@ -235,20 +225,9 @@ impl Default for IrradianceCacheSettings {
     }
 }
 
-impl IrradianceCacheSettings {
-    /// True if `error` can be κ.
-    pub fn is_error(error: f32) -> bool {
-        error > 0.0 && error < 1.0
-    }
-
-    /// True if `radius` can be the least and the greatest number of pixels.
-    pub fn is_radius([min, max]: [f32; 2]) -> bool {
-        min > 0.0 && min <= max && max.is_finite()
-    }
-}
-
 /// What the records of the irradiance cache hold.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[derive(Clone, Copy, Debug, PartialEq, Eq, EnumString, IntoStaticStr, VariantNames)]
+#[strum(serialize_all = "kebab-case")]
 pub enum Cached {
     /// Indirect light; light from sources is estimated at every camera ray's hit.
     Indirect,
@@ -256,18 +235,9 @@ pub enum Cached {
     All,
 }
 
-impl Cached {
-    /// The name on the command line and in metadata.
-    pub fn name(self) -> &'static str {
-        match self {
-            Cached::Indirect => "indirect",
-            Cached::All => "all",
-        }
-    }
-}
-
 /// How direct light is estimated.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[derive(Clone, Copy, Debug, PartialEq, Eq, EnumString, IntoStaticStr, VariantNames)]
+#[strum(serialize_all = "kebab-case")]
 pub enum EstimatorKind {
     /// Light sampling only (and the specular lobes of BSDFs).
     Mc,
@@ -286,19 +256,6 @@ pub enum EstimatorKind {
 }
 
 impl EstimatorKind {
-    /// The name on the command line and in metadata.
-    pub fn name(self) -> &'static str {
-        match self {
-            EstimatorKind::Mc => "mc",
-            EstimatorKind::Mis => "mis",
-            EstimatorKind::Ris => "ris",
-            EstimatorKind::Ocv => "ocv",
-            EstimatorKind::OptimalMis => "optimal-mis",
-            EstimatorKind::Correlated => "correlated",
-            EstimatorKind::Contributing => "contributing",
-        }
-    }
-
     /// True if samples are drawn for each group of lights by itself, and are measured against the density of each component of
     /// the mixture.
     pub fn has_components(self) -> bool {
@@ -330,22 +287,13 @@ impl OcvSettings {
 }
 
 /// How `optimal-mis` finds its weights.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[derive(Clone, Copy, Debug, PartialEq, Eq, EnumString, IntoStaticStr, VariantNames)]
+#[strum(serialize_all = "kebab-case")]
 pub enum OptimalForm {
     /// From the samples of the estimate. Biased.
     Direct,
     /// From earlier samples of the pixel.
     Progressive,
-}
-
-impl OptimalForm {
-    /// The name on the command line and in metadata.
-    pub fn name(self) -> &'static str {
-        match self {
-            OptimalForm::Direct => "direct",
-            OptimalForm::Progressive => "progressive",
-        }
-    }
 }
 
 /// Combined correlated and importance sampling [Szécsi, Sbert and Szirmay-Kalos 2004].
@@ -364,22 +312,13 @@ impl Default for CorrelatedSettings {
 }
 
 /// How `correlated` finds the weight of its two estimates.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[derive(Clone, Copy, Debug, PartialEq, Eq, EnumString, IntoStaticStr, VariantNames)]
+#[strum(serialize_all = "kebab-case")]
 pub enum CorrelatedForm {
     /// From the samples of the estimate. Biased.
     Combined,
     /// From the other half of them.
     Crossfit,
-}
-
-impl CorrelatedForm {
-    /// The name on the command line and in metadata.
-    pub fn name(self) -> &'static str {
-        match self {
-            CorrelatedForm::Combined => "combined",
-            CorrelatedForm::Crossfit => "crossfit",
-        }
-    }
 }
 
 /// Direct light by the lights that photons say are seen [Keller and Wald 2000, §3].
@@ -396,22 +335,13 @@ impl Default for ContributingSettings {
 }
 
 /// A technique that draws directions of light.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[derive(Clone, Copy, Debug, PartialEq, Eq, EnumString, IntoStaticStr, VariantNames)]
+#[strum(serialize_all = "kebab-case")]
 pub enum SamplingTechnique {
     /// In proportion to the BSDF, nearly.
     Bsdf,
     /// Points on lights.
     Light,
-}
-
-impl SamplingTechnique {
-    /// The name on the command line and in metadata.
-    pub fn name(self) -> &'static str {
-        match self {
-            SamplingTechnique::Bsdf => "bsdf",
-            SamplingTechnique::Light => "light",
-        }
-    }
 }
 
 /// Numbers of one estimate: N samples (shadow segments) of M proposals.

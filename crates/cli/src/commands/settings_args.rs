@@ -1,0 +1,82 @@
+//! The options that are settings: one for each row of [`lumiris::settings::table`].
+
+use clap::builder::{PossibleValuesParser, TypedValueParser, ValueParser};
+use clap::{Arg, ArgMatches, Args, Command, FromArgMatches};
+use lumiris::settings::Settings;
+use lumiris::settings::table::{GROUPS, Setting, rows};
+use lumiris::settings::value::{Integers, Kind, Value};
+
+/// The settings that were typed, in the order of the table.
+#[derive(Clone, Debug, Default)]
+pub struct SettingsArgs {
+    typed: Vec<(&'static Setting, Value)>,
+}
+
+impl SettingsArgs {
+    /// Puts them in.
+    pub fn apply(&self, settings: &mut Settings) {
+        for (row, value) in &self.typed {
+            (row.set)(settings, *value).expect("the parser of a setting lets through what its kind is");
+        }
+    }
+}
+
+impl Args for SettingsArgs {
+    fn augment_args(command: Command) -> Command {
+        let options =
+            GROUPS.iter().flat_map(|group| group.rows.iter().map(|row| option(row).help_heading(group.title)));
+        command.args(options)
+    }
+
+    fn augment_args_for_update(command: Command) -> Command {
+        Self::augment_args(command)
+    }
+}
+
+impl FromArgMatches for SettingsArgs {
+    fn from_arg_matches(matches: &ArgMatches) -> Result<Self, clap::Error> {
+        let mut args = SettingsArgs::default();
+        args.update_from_arg_matches(matches)?;
+        Ok(args)
+    }
+
+    fn update_from_arg_matches(&mut self, matches: &ArgMatches) -> Result<(), clap::Error> {
+        let typed = |row: &'static Setting| Some((row, *matches.get_one::<Value>(row.flag)?));
+        self.typed.extend(rows().filter_map(typed));
+        Ok(())
+    }
+}
+
+/// The option of a setting.
+fn option(row: &'static Setting) -> Arg {
+    let option = Arg::new(row.flag).long(row.flag).aliases(row.aliases).help(help(row)).value_parser(parser(row.kind));
+    let option = if row.value_name.is_empty() { option } else { option.value_name(row.value_name) };
+    match row.bare {
+        Some(value) => option.num_args(0..=1).default_missing_value(value),
+        None => option,
+    }
+}
+
+/// What the option does, its range, and its default.
+fn help(row: &Setting) -> String {
+    let range = match row.kind {
+        Kind::Integer { range: Integers::ALL, .. } => String::new(),
+        Kind::Integer { range, .. } => format!("{range}; "),
+        Kind::Real { range, .. } => format!("{range}; "),
+        // They are listed, or part of the sentence
+        Kind::Choice { .. } | Kind::Pair { .. } | Kind::Graded { .. } | Kind::Bytes => String::new(),
+    };
+    format!("{} [{range}default: the file's, or {}]", row.help, row.default_text())
+}
+
+fn parser(kind: Kind) -> ValueParser {
+    match kind {
+        Kind::Choice { names, .. } => PossibleValuesParser::new(names).try_map(move |name| kind.parse(&name)).into(),
+        Kind::Integer { .. } | Kind::Real { .. } | Kind::Pair { .. } | Kind::Graded { .. } | Kind::Bytes => {
+            ValueParser::new(move |text: &str| kind.parse(text))
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests;

@@ -1,0 +1,56 @@
+//! Random numbers, samples per pixel, and the footprints of textures that follow from them.
+
+use lumiris_numbers::samplers::SamplerKind;
+
+/// Least width of a texture footprint, in pixels, as in pbrt-v4.
+const LEAST_FOOTPRINT: f32 = 0.125;
+
+/// Random numbers.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct SamplingSettings {
+    /// Which sequence.
+    pub sampler: SamplerKind,
+    /// Camera samples per pixel.
+    pub spp: u32,
+    /// Images of different seeds are independent estimates of the same picture.
+    pub seed: u32,
+    /// Samples per pixel that texture footprints are made for; `spp` if `None`.
+    pub footprint_spp: Option<u32>,
+}
+
+impl Default for SamplingSettings {
+    fn default() -> Self {
+        SamplingSettings { sampler: SamplerKind::default(), spp: 16, seed: 0, footprint_spp: None }
+    }
+}
+
+impl SamplingSettings {
+    /// Samples per pixel that texture footprints are made for.
+    pub fn footprint_spp(&self) -> u32 {
+        self.footprint_spp.unwrap_or(self.spp).max(1)
+    }
+
+    /// Width of a texture footprint in pixels: the distance of neighbouring samples, 1/√spp, but at least an eighth
+    /// [Pharr et al. 2023, §5.1.3]. The pixel filter averages over the samples.
+    #[inline]
+    pub fn footprint(&self) -> f32 {
+        (1.0 / (self.footprint_spp() as f32).sqrt()).max(LEAST_FOOTPRINT)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn footprints_are_as_wide_as_samples_lie_apart() {
+        let mut s = SamplingSettings { sampler: SamplerKind::Sobol, spp: 16, seed: 0, footprint_spp: None };
+        assert_eq!((s.footprint_spp(), s.footprint()), (16, 0.25));
+        for (spp, width) in [(1, 1.0), (2, 0.5_f32.sqrt()), (4, 0.5), (64, 0.125), (65, 0.125), (u32::MAX, 0.125)] {
+            s.footprint_spp = Some(spp);
+            assert_eq!((s.footprint_spp(), s.footprint()), (spp, width), "{spp}");
+        }
+        // Asked for no samples at all
+        assert_eq!(SamplingSettings { spp: 0, footprint_spp: None, ..s }.footprint(), 1.0);
+    }
+}

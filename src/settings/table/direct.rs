@@ -1,0 +1,245 @@
+//! How direct light is estimated.
+
+use super::{Applies, Group, MOST_SAMPLES, Setting, choice, integer};
+use crate::settings::EstimatorKind::{Contributing, Correlated, Mis, Ocv, OptimalMis, Ris};
+use crate::settings::value::{Integers, Interval, Kind, Value};
+use crate::settings::{
+    CorrelatedForm, EstimatorKind, OptimalForm, ProposalPoints, Proposals, SamplingTechnique, StageTimes, Strata,
+    Target,
+};
+use lumiris_numbers::estimators::mis::Heuristic;
+use lumiris_numbers::estimators::ocv::{Form, MAX_COMPONENTS};
+use strum::VariantNames;
+
+/// Samples of an estimate.
+const SAMPLES: Integers = Integers { least: 1, most: MOST_SAMPLES };
+
+/// Direct light.
+pub(super) const DIRECT: Group = Group {
+    title: "Direct light",
+    rows: &[
+        Setting {
+            flag: "estimator",
+            parameters: &["estimator"],
+            key: "estimator",
+            kind: choice(EstimatorKind::VARIANTS),
+            help: "Estimator of direct light at each vertex of a path",
+            get: |s| Some(Value::Name(s.integrator.estimator.into())),
+            set: |s, v| v.named().map(|kind| s.integrator.estimator = kind),
+            ..Setting::BASE
+        },
+        Setting {
+            flag: "samples",
+            value_name: "N",
+            parameters: &["samples"],
+            key: "samples",
+            kind: Kind::Integer { range: SAMPLES, words: &["auto"] },
+            help: "Samples per estimate: shadow segments per shading point, or `auto` for the estimator's own number",
+            default: "auto: 2 for mc and mis, 4 for others; ris halves them with every bounce",
+            get: |s| Some(s.integrator.samples.map_or(Value::Name("auto"), |n| Value::Integer(n.into()))),
+            resolved: Some(|s| Some(Value::Integer(s.integrator.split().samples.into()))),
+            set: |s, v| {
+                s.integrator.samples = if v.name().is_some() { None } else { Some(v.count()?) };
+                Some(())
+            },
+            ..Setting::BASE
+        },
+        Setting {
+            flag: "heuristic",
+            parameters: &["heuristic"],
+            key: "heuristic",
+            kind: choice(Heuristic::VARIANTS),
+            help: "Weights of the techniques",
+            default: "power; balance for ris, ocv and optimal-mis",
+            get: |s| s.integrator.heuristic.map(|h| Value::Name(h.into())),
+            resolved: Some(|s| Some(Value::Name(s.integrator.heuristic().into()))),
+            set: |s, v| v.named().map(|heuristic| s.integrator.heuristic = Some(heuristic)),
+            ..Setting::BASE
+        },
+        Setting {
+            flag: "bsdf-share",
+            value_name: "SHARE",
+            parameters: &["bsdfshare"],
+            key: "bsdf_share",
+            kind: Kind::Real { range: Interval::closed(0.0, 1.0), words: &[] },
+            help: "Share of the samples that the BSDF draws, for mis, ocv and optimal-mis",
+            applies: Applies::Estimators(&[Mis, Ocv, OptimalMis]),
+            get: |s| Some(Value::Real(s.integrator.bsdf_share)),
+            set: |s, v| v.real().map(|share| s.integrator.bsdf_share = share),
+            ..Setting::BASE
+        },
+        Setting {
+            flag: "rest-samples",
+            value_name: "N",
+            parameters: &["restsamples"],
+            key: "rest_samples",
+            kind: integer(0, MOST_SAMPLES),
+            help: "Samples of contributing on the lights that no photon came from, besides --samples on the others; 0 leaves \
+                   these lights out, which is biased",
+            applies: Applies::Estimators(&[Contributing]),
+            get: |s| Some(Value::Integer(s.integrator.contributing.rest_samples.into())),
+            set: |s, v| v.count().map(|n| s.integrator.contributing.rest_samples = n),
+            ..Setting::BASE
+        },
+    ],
+};
+
+/// Resampling.
+pub(super) const RIS: Group = Group {
+    title: "Resampling (--estimator ris)",
+    rows: &[
+        Setting {
+            flag: "proposals",
+            value_name: "M",
+            parameters: &["proposals"],
+            key: "proposals",
+            kind: Kind::Integer { range: SAMPLES, words: &["auto", "optimal"] },
+            help: "Proposals per estimate: a number, `auto` (by the measured times of stages) or `optimal` (per pixel, by times \
+                   and variances)",
+            applies: Applies::Estimators(&[Ris]),
+            get: |s| {
+                Some(match s.integrator.ris.proposals {
+                    Proposals::Fixed(n) => Value::Integer(n.into()),
+                    Proposals::Auto => Value::Name("auto"),
+                    Proposals::Optimal => Value::Name("optimal"),
+                })
+            },
+            resolved: Some(|s| {
+                Some(match s.integrator.ris.proposals {
+                    Proposals::Fixed(_) | Proposals::Auto => Value::Integer(s.integrator.split().proposals.into()),
+                    Proposals::Optimal => Value::Name("optimal"),
+                })
+            }),
+            set: |s, v| {
+                s.integrator.ris.proposals = match v.name() {
+                    Some("auto") => Proposals::Auto,
+                    Some(_) => Proposals::Optimal,
+                    None => Proposals::Fixed(v.count()?),
+                };
+                Some(())
+            },
+            ..Setting::BASE
+        },
+        Setting {
+            flag: "strata",
+            parameters: &["strata"],
+            key: "strata",
+            kind: choice(Strata::VARIANTS),
+            help: "How samples are drawn from the proposals",
+            applies: Applies::Estimators(&[Ris]),
+            get: |s| Some(Value::Name(s.integrator.ris.strata.into())),
+            set: |s, v| v.named().map(|strata| s.integrator.ris.strata = strata),
+            ..Setting::BASE
+        },
+        Setting {
+            flag: "proposal-points",
+            parameters: &["proposalpoints"],
+            key: "proposal_points",
+            kind: choice(ProposalPoints::VARIANTS),
+            help: "How proposals lie on the lights",
+            applies: Applies::Estimators(&[Ris]),
+            get: |s| Some(Value::Name(s.integrator.ris.points.into())),
+            set: |s, v| v.named().map(|points| s.integrator.ris.points = points),
+            ..Setting::BASE
+        },
+        Setting {
+            flag: "target",
+            parameters: &["target"],
+            key: "target",
+            kind: choice(Target::VARIANTS),
+            help: "What samples are drawn in proportion to: f*G*L, with visibility V where shading is dearer than rays, or \
+                   (visibility) f*G*L with an estimate of V by photons",
+            applies: Applies::Estimators(&[Ris]),
+            get: |s| Some(Value::Name(s.integrator.ris.target.into())),
+            set: |s, v| v.named().map(|target| s.integrator.ris.target = target),
+            ..Setting::BASE
+        },
+        Setting {
+            flag: "stage-times",
+            value_name: "T1,T2",
+            parameters: &["stagetimes"],
+            key: "stage_times",
+            kind: Kind::Pair { range: Interval::POSITIVE, ascends: false, unit: "nanoseconds" },
+            help: "Time of a proposal and of a sample (ns), from which `auto` and `optimal` choose",
+            default: "measured on this scene",
+            applies: Applies::Estimators(&[Ris]),
+            get: |s| s.integrator.ris.stage_times.map(|t| Value::Pair([t.t1 as f32, t.t2 as f32])),
+            set: |s, v| {
+                // As written, and not as the nearest f32 has it
+                let [t1, t2] = v.pair()?.map(|t| t.to_string().parse().ok());
+                s.integrator.ris.stage_times = Some(StageTimes { t1: t1?, t2: t2? });
+                Some(())
+            },
+            ..Setting::BASE
+        },
+    ],
+};
+
+/// Control variates and optimal weights.
+pub(super) const CONTROL_VARIATES: Group = Group {
+    title: "Control variates (--estimator ocv, optimal-mis, correlated)",
+    rows: &[
+        Setting {
+            flag: "ocv",
+            value_name: "FORM",
+            parameters: &["ocv"],
+            key: "ocv",
+            kind: choice(Form::VARIANTS),
+            help: "How ocv finds the coefficients of its control variates: from earlier samples of the pixel, from the other half \
+                   of the samples, or (biased) from the same samples",
+            applies: Applies::Estimators(&[Ocv]),
+            get: |s| Some(Value::Name(s.integrator.ocv.form.into())),
+            set: |s, v| v.named().map(|form| s.integrator.ocv.form = form),
+            ..Setting::BASE
+        },
+        Setting {
+            flag: "components",
+            value_name: "M",
+            parameters: &["components"],
+            key: "components",
+            kind: integer(2, MAX_COMPONENTS as u64),
+            help: "Most components of the mixture of ocv and optimal-mis: lobes of BSDFs and groups of lights",
+            default: "8: as many as there can be",
+            applies: Applies::Estimators(&[Ocv, OptimalMis]),
+            get: |s| s.integrator.ocv.components.map(|n| Value::Integer(n.into())),
+            resolved: Some(|s| Some(Value::Integer(s.integrator.ocv.most_components() as u64))),
+            set: |s, v| v.count().map(|n| s.integrator.ocv.components = Some(n)),
+            ..Setting::BASE
+        },
+        Setting {
+            flag: "optimal-mis",
+            value_name: "FORM",
+            parameters: &["optimalmis"],
+            key: "optimal_mis",
+            kind: choice(OptimalForm::VARIANTS),
+            help: "How optimal-mis finds its weights: from earlier samples of the pixel, or (biased) from the same samples",
+            applies: Applies::Estimators(&[OptimalMis]),
+            get: |s| Some(Value::Name(s.integrator.optimal_mis.into())),
+            set: |s, v| v.named().map(|form| s.integrator.optimal_mis = form),
+            ..Setting::BASE
+        },
+        Setting {
+            flag: "correlated",
+            value_name: "FORM",
+            parameters: &["correlated"],
+            key: "correlated",
+            kind: choice(CorrelatedForm::VARIANTS),
+            help: "How correlated weighs its two estimates: from the same samples (biased), or from the other half of them",
+            applies: Applies::Estimators(&[Correlated]),
+            get: |s| Some(Value::Name(s.integrator.correlated.form.into())),
+            set: |s, v| v.named().map(|form| s.integrator.correlated.form = form),
+            ..Setting::BASE
+        },
+        Setting {
+            flag: "technique",
+            parameters: &["technique"],
+            key: "technique",
+            kind: choice(SamplingTechnique::VARIANTS),
+            help: "What draws the samples of correlated",
+            applies: Applies::Estimators(&[Correlated]),
+            get: |s| Some(Value::Name(s.integrator.correlated.technique.into())),
+            set: |s, v| v.named().map(|technique| s.integrator.correlated.technique = technique),
+            ..Setting::BASE
+        },
+    ],
+};

@@ -1,0 +1,200 @@
+//! The table of settings: one row for each, in groups as the help of the command line has them.
+//!
+//! A new setting is a field of [`Settings`] and a row here.
+
+mod cache;
+mod direct;
+mod photons;
+mod transport;
+
+use super::value::{Integers, Kind, Value};
+use super::{EstimatorKind, IntegratorKind, Settings};
+
+/// A setting.
+#[derive(Clone, Copy, Debug)]
+pub struct Setting {
+    /// Name on the command line, without `--`.
+    pub flag: &'static str,
+    /// Names on the command line that it had before.
+    pub aliases: &'static [&'static str],
+    /// What stands for the value in help; `""` for the name itself.
+    pub value_name: &'static str,
+    /// Value that the name alone stands for on the command line, if it may stand alone.
+    pub bare: Option<&'static str>,
+    /// Directive of scene files whose parameter it is.
+    pub directive: Directive,
+    /// Parameters of the directive that make up the value; none if it is the name of the directive itself.
+    pub parameters: &'static [&'static str],
+    /// Name in metadata.
+    pub key: &'static str,
+    /// Values.
+    pub kind: Kind,
+    /// A sentence or two for the command line.
+    pub help: &'static str,
+    /// What help says of the default; `""` for the value in [`Settings::default`].
+    pub default: &'static str,
+    /// Pictures that it can change.
+    pub applies: Applies,
+    /// False if it cannot change a picture at all, but only keep it from being made.
+    pub is_recorded: bool,
+    /// The value; `None` where the renderer chooses and there is no word for that.
+    pub get: fn(&Settings) -> Option<Value>,
+    /// The value with the renderer's choice, where that is known from the settings alone.
+    pub resolved: Option<fn(&Settings) -> Option<Value>>,
+    /// Sets a value of `kind`. `None` if it is of another kind.
+    pub set: fn(&mut Settings, Value) -> Option<()>,
+}
+
+/// Where scene files have a setting.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Directive {
+    /// `Integrator`
+    Integrator,
+    /// `Sampler`
+    Sampler,
+}
+
+/// Pictures that a setting can change.
+#[derive(Clone, Copy, Debug)]
+pub enum Applies {
+    /// All.
+    Always,
+    /// Those with one of these estimators of direct light.
+    Estimators(&'static [EstimatorKind]),
+    /// Those with one of these integrators.
+    Integrators(&'static [IntegratorKind]),
+    /// Those for whose settings this is true.
+    If(fn(&Settings) -> bool),
+}
+
+impl Applies {
+    /// True if a picture with these settings is one of them.
+    pub fn to(&self, settings: &Settings) -> bool {
+        match self {
+            Applies::Always => true,
+            Applies::Estimators(list) => list.contains(&settings.integrator.estimator),
+            Applies::Integrators(list) => list.contains(&settings.integrator.kind),
+            Applies::If(is_so) => is_so(settings),
+        }
+    }
+}
+
+/// Settings under one heading.
+#[derive(Clone, Copy, Debug)]
+pub struct Group {
+    /// The heading.
+    pub title: &'static str,
+    /// Its settings.
+    pub rows: &'static [Setting],
+}
+
+/// All settings. Those that others depend on come first: values are set in this order.
+pub const GROUPS: &[Group] = &[
+    transport::TRANSPORT,
+    transport::SAMPLING,
+    direct::DIRECT,
+    direct::RIS,
+    direct::CONTROL_VARIATES,
+    cache::IRRADIANCE_CACHE,
+    photons::PHOTONS,
+];
+
+/// All settings, one after the other.
+pub fn rows() -> impl Iterator<Item = &'static Setting> {
+    GROUPS.iter().flat_map(|group| group.rows)
+}
+
+impl Setting {
+    /// Sets the value that a text stands for. `Err` says what is expected.
+    pub fn set_text(&self, settings: &mut Settings, text: &str) -> Result<(), String> {
+        let value = self.kind.parse(text)?;
+        (self.set)(settings, value).ok_or_else(|| format!("expected {}", self.kind))
+    }
+
+    /// What help says of the default.
+    pub fn default_text(&self) -> String {
+        let value = || (self.get)(&Settings::default()).map_or_else(String::new, |value| value.to_string());
+        if self.default.is_empty() { value() } else { self.default.to_owned() }
+    }
+
+    /// What rows leave out.
+    const BASE: Setting = Setting {
+        flag: "",
+        aliases: &[],
+        value_name: "",
+        bare: None,
+        directive: Directive::Integrator,
+        parameters: &[],
+        key: "",
+        kind: Kind::Bytes,
+        help: "",
+        default: "",
+        applies: Applies::Always,
+        is_recorded: true,
+        get: |_| None,
+        resolved: None,
+        set: |_, _| None,
+    };
+}
+
+/// One of these names.
+const fn choice(names: &'static [&'static str]) -> Kind {
+    Kind::Choice { names, synonyms: &[] }
+}
+
+/// A whole number in a range.
+const fn integer(least: u64, most: u64) -> Kind {
+    Kind::Integer { range: Integers { least, most }, words: &[] }
+}
+
+/// Most samples and proposals of an estimate.
+const MOST_SAMPLES: u64 = 4096;
+/// Largest number of 32 bits.
+const MOST_U32: u64 = u32::MAX as u64;
+
+impl Value {
+    /// The whole number, of 32 bits.
+    fn count(&self) -> Option<u32> {
+        self.integer().and_then(|n| u32::try_from(n).ok())
+    }
+
+    /// The member of an enumeration that has the name.
+    fn named<T: std::str::FromStr>(&self) -> Option<T> {
+        self.name()?.parse().ok()
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use std::collections::HashSet;
+
+    #[test]
+    fn no_two_settings_share_a_name() {
+        let mut flags = HashSet::new();
+        let mut parameters = HashSet::new();
+        let mut keys = HashSet::new();
+        for row in rows() {
+            let all = row.aliases.iter().chain([&row.flag]);
+            assert!(all.copied().all(|flag| !flag.is_empty() && flags.insert(flag)), "--{}", row.flag);
+            let all = row.parameters.iter();
+            assert!(all.copied().all(|name| parameters.insert((row.directive as u8, name))), "{}", row.flag);
+            assert!(!row.key.is_empty() && keys.insert(row.key), "{}", row.flag);
+        }
+    }
+
+    #[test]
+    fn defaults_are_values_of_their_kind_and_setting_them_changes_nothing() {
+        for row in rows() {
+            let mut settings = Settings::default();
+            if let Some(value) = (row.get)(&settings) {
+                assert_eq!(row.kind.parse(&value.to_string()), Ok(value), "{}", row.flag);
+                row.set_text(&mut settings, &value.to_string()).unwrap();
+                assert_eq!(settings, Settings::default(), "{}", row.flag);
+            }
+            assert!(!row.default_text().is_empty(), "{}: help says nothing of the default", row.flag);
+            assert!(!row.help.is_empty() && !row.help.ends_with('.'), "{}: {}", row.flag, row.help);
+        }
+        assert_eq!(Settings::default().changed().count(), 0);
+    }
+}

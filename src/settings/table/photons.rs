@@ -1,0 +1,181 @@
+//! Photon maps, and photons that tell which lights are seen.
+
+use super::{Applies, Group, MOST_SAMPLES, MOST_U32, Setting, integer};
+use crate::settings::value::{Integers, Interval, Kind, Value};
+use crate::settings::{Deposition, IntegratorKind, Shrinking};
+
+const MAPS: Applies = Applies::Integrators(&[IntegratorKind::PhotonMap]);
+
+/// Photons.
+pub(super) const PHOTONS: Group = Group {
+    title: "Photon maps (--integrator photon-map)",
+    rows: &[
+        Setting {
+            flag: "photons",
+            value_name: "N",
+            parameters: &["photons"],
+            key: "photons",
+            kind: integer(1, MOST_U32),
+            help: "Photons that the global map stores, in each pass if progressive",
+            applies: MAPS,
+            get: |s| Some(Value::Integer(s.integrator.photons.photons.into())),
+            set: |s, v| v.count().map(|n| s.integrator.photons.photons = n),
+            ..Setting::BASE
+        },
+        Setting {
+            flag: "caustic-ratio",
+            value_name: "Q",
+            parameters: &["causticratio"],
+            key: "caustic_ratio",
+            kind: Kind::Real { range: Interval::above(0.0, 1.0), words: &[] },
+            help: "Share q of the trajectories that fill the global map too; all fill the caustic map",
+            applies: MAPS,
+            get: |s| Some(Value::Real(s.integrator.photons.caustic_ratio)),
+            set: |s, v| v.real().map(|q| s.integrator.photons.caustic_ratio = q),
+            ..Setting::BASE
+        },
+        Setting {
+            flag: "importance",
+            value_name: "WHICH",
+            parameters: &["importance", "leastimportance"],
+            key: "importance",
+            kind: Kind::Graded {
+                plain: "none",
+                graded: &["floor", "cut-off"],
+                range: Interval::above(0.0, 1.0),
+                default: 0.01,
+            },
+            help: "Store photons by visual importance: none, floor:E (with the probability p(x), at least E), or cut-off:E \
+                   (biased: none where p(x) is below E)",
+            applies: MAPS,
+            get: |s| {
+                Some(match s.integrator.photons.deposition {
+                    Deposition::All => Value::Name("none"),
+                    Deposition::Floor(least) => Value::Graded("floor", least),
+                    Deposition::CutOff(least) => Value::Graded("cut-off", least),
+                })
+            },
+            set: |s, v| {
+                s.integrator.photons.deposition = match v.name()? {
+                    "floor" => Deposition::Floor(v.real()?),
+                    "cut-off" => Deposition::CutOff(v.real()?),
+                    _ => Deposition::All,
+                };
+                Some(())
+            },
+            ..Setting::BASE
+        },
+        Setting {
+            flag: "nearest",
+            value_name: "K",
+            parameters: &["nearest"],
+            key: "nearest",
+            kind: integer(2, 100_000),
+            help: "Photons of an estimate",
+            applies: MAPS,
+            get: |s| Some(Value::Integer(s.integrator.photons.nearest.into())),
+            set: |s, v| v.count().map(|n| s.integrator.photons.nearest = n),
+            ..Setting::BASE
+        },
+        Setting {
+            flag: "gather",
+            value_name: "G",
+            parameters: &["gather"],
+            key: "gather",
+            kind: integer(0, MOST_SAMPLES),
+            help: "Rays of the final gather at a diffuse point; 0 shows the global map directly",
+            applies: MAPS,
+            get: |s| Some(Value::Integer(s.integrator.photons.gather.into())),
+            set: |s, v| v.count().map(|n| s.integrator.photons.gather = n),
+            ..Setting::BASE
+        },
+        Setting {
+            flag: "gather-guide",
+            value_name: "SHARE",
+            parameters: &["gatherguide"],
+            key: "gather_guide",
+            // Not all: there may be no photons from where light comes
+            kind: Kind::Real { range: Interval::closed(0.0, 0.95), words: &[] },
+            help: "Share of these rays whose directions photons choose",
+            applies: MAPS,
+            get: |s| Some(Value::Real(s.integrator.photons.guide)),
+            set: |s, v| v.real().map(|share| s.integrator.photons.guide = share),
+            ..Setting::BASE
+        },
+        Setting {
+            flag: "progressive",
+            value_name: "ALPHA",
+            bare: Some("0.5"),
+            parameters: &["alpha"],
+            key: "progressive",
+            kind: Kind::Real { range: Interval::open(0.0, 1.0), words: &["off"] },
+            help: "New photons and smaller radii from sample to sample, so that the picture converges: r² falls with the power \
+                   ALPHA - 1; off for one map where the file asks for sppm",
+            default: "off; ALPHA: 0.5",
+            applies: MAPS,
+            get: |s| Some(s.integrator.photons.progressive.map_or(Value::Name("off"), |p| Value::Real(p.alpha))),
+            set: |s, v| {
+                let progressive = &mut s.integrator.photons.progressive;
+                *progressive = v.real().map(|alpha| Shrinking { alpha, ..progressive.unwrap_or_default() });
+                Some(())
+            },
+            ..Setting::BASE
+        },
+        Setting {
+            flag: "photon-radius",
+            value_name: "METRES",
+            parameters: &["radius"],
+            key: "photon_radius",
+            kind: Kind::Real { range: Interval::POSITIVE, words: &[] },
+            help: "First radius of a progressive map, which it asks for",
+            default: "how far the nearest K photons reach where the camera looks",
+            applies: MAPS,
+            get: |s| s.integrator.photons.progressive.and_then(|p| p.radius).map(Value::Real),
+            set: |s, v| {
+                s.integrator.photons.progressive.get_or_insert_default().radius = Some(v.real()?);
+                Some(())
+            },
+            ..Setting::BASE
+        },
+        Setting {
+            flag: "light-photons",
+            value_name: "N",
+            parameters: &["lightphotons"],
+            key: "light_photons",
+            kind: integer(1, MOST_U32),
+            help: "Photons that tell which lights are seen, for --light-choice photons, --target visibility and --estimator \
+                   contributing",
+            default: "512 for each light, at least 262144",
+            applies: Applies::If(|s| s.integrator.uses_light_hints()),
+            get: |s| s.integrator.photons.light_photons.map(|n| Value::Integer(n.into())),
+            set: |s, v| v.count().map(|n| s.integrator.photons.light_photons = Some(n)),
+            ..Setting::BASE
+        },
+        Setting {
+            flag: "photon-paths",
+            value_name: "N",
+            parameters: &["photonpaths"],
+            key: "photon_paths",
+            kind: Kind::Integer { range: Integers { least: 1, most: i64::MAX as u64 }, words: &[] },
+            help: "Most trajectories for one map: with importance it can take many to store what was asked for",
+            applies: MAPS,
+            get: |s| Some(Value::Integer(s.integrator.photons.trajectories)),
+            set: |s, v| v.integer().map(|n| s.integrator.photons.trajectories = n),
+            ..Setting::BASE
+        },
+        Setting {
+            flag: "memory",
+            value_name: "BYTES",
+            parameters: &["memory"],
+            key: "memory",
+            kind: Kind::Bytes,
+            help: "Most memory of the maps, such as 800M or 4G",
+            default: "4G",
+            applies: MAPS,
+            is_recorded: false,
+            get: |s| Some(Value::Integer(s.integrator.photons.memory)),
+            set: |s, v| v.integer().map(|n| s.integrator.photons.memory = n),
+            ..Setting::BASE
+        },
+    ],
+};

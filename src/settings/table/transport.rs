@@ -1,0 +1,133 @@
+//! What is computed, and with which random numbers.
+
+use super::{Directive, Group, MOST_SAMPLES, MOST_U32, Setting, choice, integer};
+use crate::bsdfs::ProposalDensity;
+use crate::lights::LightSamplerKind;
+use crate::settings::IntegratorKind;
+use crate::settings::value::{Integers, Kind, Value};
+use lumiris_numbers::samplers::SamplerKind;
+use strum::VariantNames;
+
+/// Light transport.
+pub(super) const TRANSPORT: Group = Group {
+    title: "Light transport",
+    rows: &[
+        Setting {
+            flag: "integrator",
+            key: "integrator",
+            kind: choice(IntegratorKind::VARIANTS),
+            help: "What is computed",
+            get: |s| Some(Value::Name(s.integrator.kind.into())),
+            set: |s, v| {
+                s.integrator.kind = v.named()?;
+                // One bounce, unless another number follows
+                if s.integrator.kind == IntegratorKind::Direct {
+                    s.integrator.max_depth = 1;
+                }
+                Some(())
+            },
+            ..Setting::BASE
+        },
+        Setting {
+            flag: "max-depth",
+            value_name: "D",
+            parameters: &["maxdepth"],
+            key: "max_depth",
+            kind: integer(0, 10_000),
+            help: "Bounces of light, but for `direct`",
+            get: |s| Some(Value::Integer(s.integrator.max_depth.into())),
+            set: |s, v| v.count().map(|n| s.integrator.max_depth = n),
+            ..Setting::BASE
+        },
+        Setting {
+            flag: "light-choice",
+            parameters: &["lightsampler"],
+            key: "light_choice",
+            kind: Kind::Choice {
+                names: LightSamplerKind::VARIANTS,
+                synonyms: &[("bvh", "tree"), ("exhaustive", "tree"), ("spatial", "tree")],
+            },
+            help: "How a light is chosen; by photons, mostly among those that photons have come from",
+            get: |s| Some(Value::Name(s.integrator.light_choice.into())),
+            set: |s, v| v.named().map(|kind| s.integrator.light_choice = kind),
+            ..Setting::BASE
+        },
+        Setting {
+            flag: "bsdf-proposals",
+            value_name: "M",
+            parameters: &["bsdfproposals"],
+            key: "bsdf_proposals",
+            kind: integer(1, MOST_SAMPLES),
+            help: "Directions proposed per bounce off materials that can only be evaluated",
+            get: |s| Some(Value::Integer(s.integrator.bsdf_proposals.into())),
+            set: |s, v| v.count().map(|n| s.integrator.bsdf_proposals = n),
+            ..Setting::BASE
+        },
+        Setting {
+            flag: "bsdf-density",
+            parameters: &["bsdfdensity"],
+            key: "bsdf_density",
+            kind: choice(ProposalDensity::VARIANTS),
+            help: "What proposes directions for such materials",
+            get: |s| Some(Value::Name(s.integrator.bsdf_density.into())),
+            set: |s, v| v.named().map(|density| s.integrator.bsdf_density = density),
+            ..Setting::BASE
+        },
+    ],
+};
+
+/// Random numbers.
+pub(super) const SAMPLING: Group = Group {
+    title: "Sampling",
+    rows: &[
+        Setting {
+            flag: "sampler",
+            directive: Directive::Sampler,
+            key: "sampler",
+            kind: choice(SamplerKind::VARIANTS),
+            help: "Random sequence",
+            get: |s| Some(Value::Name(s.sampling.sampler.into())),
+            set: |s, v| v.named().map(|kind| s.sampling.sampler = kind),
+            ..Setting::BASE
+        },
+        Setting {
+            flag: "spp",
+            value_name: "K",
+            directive: Directive::Sampler,
+            parameters: &["pixelsamples"],
+            key: "spp",
+            kind: integer(1, MOST_U32),
+            help: "Camera samples per pixel",
+            get: |s| Some(Value::Integer(s.sampling.spp.into())),
+            set: |s, v| v.count().map(|n| s.sampling.spp = n),
+            ..Setting::BASE
+        },
+        Setting {
+            flag: "footprint-spp",
+            value_name: "K",
+            directive: Directive::Sampler,
+            parameters: &["footprintspp"],
+            key: "footprint_spp",
+            kind: integer(1, MOST_U32),
+            help: "Camera samples per pixel that textures and bumps are filtered for: their footprint is 1/sqrt(K) of a pixel wide, \
+                   at least an eighth. An image that is rendered in parts needs the number of all its samples",
+            default: "--spp",
+            get: |s| s.sampling.footprint_spp.map(|n| Value::Integer(n.into())),
+            resolved: Some(|s| Some(Value::Integer(s.sampling.footprint_spp().into()))),
+            set: |s, v| v.count().map(|n| s.sampling.footprint_spp = Some(n)),
+            ..Setting::BASE
+        },
+        Setting {
+            flag: "seed",
+            value_name: "S",
+            directive: Directive::Sampler,
+            parameters: &["seed"],
+            key: "seed",
+            kind: Kind::Integer { range: Integers::ALL, words: &[] },
+            help: "Pictures of different seeds are independent",
+            get: |s| Some(Value::Integer(s.sampling.seed.into())),
+            set: |s, v| v.count().map(|n| s.sampling.seed = n),
+            ..Setting::BASE
+        },
+    ],
+};

@@ -1,0 +1,329 @@
+//! Values of settings: what they may be, and how they are written.
+
+use std::fmt;
+
+/// What a setting is set to. [`fmt::Display`] writes what [`Kind::parse`] reads.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub enum Value {
+    /// One of a list of names.
+    Name(&'static str),
+    /// A name with a number, such as `floor:0.01`.
+    Graded(&'static str, f32),
+    /// A whole number.
+    Integer(u64),
+    /// A number.
+    Real(f32),
+    /// Two numbers.
+    Pair([f32; 2]),
+}
+
+impl Value {
+    /// The name.
+    pub fn name(&self) -> Option<&'static str> {
+        match self {
+            Value::Name(name) | Value::Graded(name, _) => Some(name),
+            Value::Integer(_) | Value::Real(_) | Value::Pair(_) => None,
+        }
+    }
+
+    /// The whole number.
+    pub fn integer(&self) -> Option<u64> {
+        match self {
+            Value::Integer(n) => Some(*n),
+            Value::Name(_) | Value::Graded(..) | Value::Real(_) | Value::Pair(_) => None,
+        }
+    }
+
+    /// The number; of a graded name its grade.
+    pub fn real(&self) -> Option<f32> {
+        match self {
+            Value::Real(x) | Value::Graded(_, x) => Some(*x),
+            Value::Name(_) | Value::Integer(_) | Value::Pair(_) => None,
+        }
+    }
+
+    /// The two numbers.
+    pub fn pair(&self) -> Option<[f32; 2]> {
+        match self {
+            Value::Pair(pair) => Some(*pair),
+            Value::Name(_) | Value::Graded(..) | Value::Integer(_) | Value::Real(_) => None,
+        }
+    }
+}
+
+impl fmt::Display for Value {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        match self {
+            Value::Name(name) => f.write_str(name),
+            Value::Graded(name, grade) => write!(f, "{name}:{grade}"),
+            Value::Integer(n) => write!(f, "{n}"),
+            Value::Real(x) => write!(f, "{x}"),
+            Value::Pair([a, b]) => write!(f, "{a},{b}"),
+        }
+    }
+}
+
+/// Numbers between two bounds. The upper one may be infinite, which no number then reaches.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Interval {
+    /// The lower bound.
+    pub least: f32,
+    /// True if it belongs to the interval.
+    pub has_least: bool,
+    /// The upper bound.
+    pub most: f32,
+    /// True if it belongs to the interval.
+    pub has_most: bool,
+}
+
+impl Interval {
+    /// Above 0.
+    pub const POSITIVE: Interval = Interval { least: 0.0, has_least: false, most: f32::INFINITY, has_most: false };
+
+    /// Both bounds belong to it.
+    pub const fn closed(least: f32, most: f32) -> Interval {
+        Interval { least, has_least: true, most, has_most: true }
+    }
+
+    /// Neither bound belongs to it.
+    pub const fn open(least: f32, most: f32) -> Interval {
+        Interval { least, has_least: false, most, has_most: false }
+    }
+
+    /// The upper bound belongs to it.
+    pub const fn above(least: f32, most: f32) -> Interval {
+        Interval { least, has_least: false, most, has_most: true }
+    }
+
+    /// True if `x` lies in it; no NaN does.
+    pub fn contains(&self, x: f32) -> bool {
+        let above = x > self.least || self.has_least && x == self.least;
+        above && (x < self.most || self.has_most && x == self.most)
+    }
+}
+
+impl fmt::Display for Interval {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        let Interval { least, most, .. } = self;
+        match (self.has_least, self.has_most) {
+            (false, false) if *self == Interval::POSITIVE => f.write_str("positive"),
+            (true, true) => write!(f, "from {least} to {most}"),
+            (true, false) => write!(f, "at least {least} and below {most}"),
+            (false, true) => write!(f, "above {least} and up to {most}"),
+            (false, false) => write!(f, "above {least} and below {most}"),
+        }
+    }
+}
+
+/// Whole numbers between two bounds that belong to it. A bound that is that of the type goes without saying.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Integers {
+    /// The lower bound.
+    pub least: u64,
+    /// The upper bound.
+    pub most: u64,
+}
+
+impl Integers {
+    /// All numbers of 32 bits.
+    pub const ALL: Integers = Integers { least: 0, most: u32::MAX as u64 };
+
+    /// True if `n` lies between the bounds.
+    pub fn contains(&self, n: i64) -> bool {
+        u64::try_from(n).is_ok_and(|n| (self.least..=self.most).contains(&n))
+    }
+}
+
+impl fmt::Display for Integers {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        let Integers { least, most } = self;
+        if *most >= u64::from(u32::MAX) { write!(f, "at least {least}") } else { write!(f, "from {least} to {most}") }
+    }
+}
+
+/// Values that a setting can have.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub enum Kind {
+    /// One of `names`. Scene files may also write a synonym, which pbrt has and which means one of the names.
+    Choice {
+        /// What is written.
+        names: &'static [&'static str],
+        /// What is read too, with its meaning.
+        synonyms: &'static [(&'static str, &'static str)],
+    },
+    /// A whole number, or a word in place of one.
+    Integer {
+        /// Its range.
+        range: Integers,
+        /// The words.
+        words: &'static [&'static str],
+    },
+    /// A number, or a word in place of one.
+    Real {
+        /// Its range.
+        range: Interval,
+        /// The words.
+        words: &'static [&'static str],
+    },
+    /// Two numbers with a comma between them.
+    Pair {
+        /// The range of both.
+        range: Interval,
+        /// True if the second one is at least the first.
+        ascends: bool,
+        /// Their unit.
+        unit: &'static str,
+    },
+    /// A name that stands alone, or one of those that take a number after a colon.
+    Graded {
+        /// The name that stands alone.
+        plain: &'static str,
+        /// The others.
+        graded: &'static [&'static str],
+        /// The range of the number.
+        range: Interval,
+        /// The number where none is written.
+        default: f32,
+    },
+    /// A number of bytes, with a unit if need be.
+    Bytes,
+}
+
+impl Kind {
+    /// Reads a value from text. `Err` says what is expected.
+    pub fn parse(&self, text: &str) -> Result<Value, String> {
+        let value = match self {
+            Kind::Choice { names, .. } => named(names, text),
+            Kind::Integer { range, words } => named(words, text).or_else(|| {
+                let n = text.parse::<i64>().ok().filter(|&n| range.contains(n))?;
+                Some(Value::Integer(n.unsigned_abs()))
+            }),
+            Kind::Real { range, words } => named(words, text).or_else(|| Some(Value::Real(real_in(range, text)?))),
+            Kind::Pair { range, ascends, .. } => text.split_once(',').and_then(|(a, b)| {
+                let pair = [real_in(range, a)?, real_in(range, b)?];
+                (!ascends || pair[0] <= pair[1]).then_some(Value::Pair(pair))
+            }),
+            Kind::Graded { plain, graded, range, default } => {
+                let (name, grade) = text.split_once(':').map_or((text, None), |(name, grade)| (name, Some(grade)));
+                match named(graded, name) {
+                    Some(Value::Name(name)) => {
+                        let grade = grade.map_or(Some(*default), |grade| real_in(range, grade));
+                        grade.map(|grade| Value::Graded(name, grade))
+                    }
+                    _ => (text == *plain).then_some(Value::Name(plain)),
+                }
+            }
+            Kind::Bytes => bytes(text).map(Value::Integer),
+        };
+        value.ok_or_else(|| format!("expected {self}"))
+    }
+}
+
+/// What is expected.
+impl fmt::Display for Kind {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        match self {
+            Kind::Choice { names, .. } => write!(f, "one of {}", names.join(", ")),
+            Kind::Integer { range, words } => write!(f, "a whole number {range}{}", or(words)),
+            Kind::Real { range, words } if *range == Interval::POSITIVE => write!(f, "a positive number{}", or(words)),
+            Kind::Real { range, words } => write!(f, "a number {range}{}", or(words)),
+            Kind::Pair { range, ascends, unit } => {
+                let order = if *ascends { ", the least one first" } else { "" };
+                write!(f, "two {range} numbers of {unit} with a comma between them{order}")
+            }
+            Kind::Graded { plain, graded, range, .. } => {
+                let graded: Vec<String> = graded.iter().map(|name| format!("{name}:E")).collect();
+                write!(f, "{plain}, {}, E being {range}", graded.join(" or "))
+            }
+            Kind::Bytes => f.write_str("a number of bytes, such as 4000000, 800M or 4G"),
+        }
+    }
+}
+
+/// `, or` a list of words.
+fn or(words: &[&str]) -> String {
+    match words {
+        [] => String::new(),
+        [word] => format!(", or {word}"),
+        [first @ .., last] => format!(", {}, or {last}", first.join(", ")),
+    }
+}
+
+fn named(names: &[&'static str], text: &str) -> Option<Value> {
+    names.iter().find(|&&name| name == text).map(|name| Value::Name(name))
+}
+
+fn real_in(range: &Interval, text: &str) -> Option<f32> {
+    text.trim().parse().ok().filter(|&x| range.contains(x))
+}
+
+fn bytes(text: &str) -> Option<u64> {
+    let (digits, shift) = match text.trim_end_matches(['B', 'b', 'i']) {
+        t if t.ends_with(['k', 'K']) => (&t[..t.len() - 1], 10),
+        t if t.ends_with(['m', 'M']) => (&t[..t.len() - 1], 20),
+        t if t.ends_with(['g', 'G']) => (&t[..t.len() - 1], 30),
+        t => (t, 0),
+    };
+    let bytes = digits.trim().parse::<f64>().ok()? * f64::from(1_u32 << shift);
+    (1.0..1e18).contains(&bytes).then_some(bytes as u64)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn sizes_have_units() {
+        assert_eq!(Kind::Bytes.parse("1234"), Ok(Value::Integer(1234)));
+        assert_eq!(Kind::Bytes.parse("800M"), Ok(Value::Integer(800 << 20)));
+        assert_eq!(Kind::Bytes.parse("1.5GiB"), Ok(Value::Integer(3 << 29)));
+        for wrong in ["", "G", "-1", "0", "1e30", "lots"] {
+            assert!(Kind::Bytes.parse(wrong).is_err(), "{wrong}");
+        }
+    }
+
+    #[test]
+    fn graded_names_have_a_number_or_the_default() {
+        let range = Interval::above(0.0, 1.0);
+        let kind = Kind::Graded { plain: "none", graded: &["floor", "cut-off"], range, default: 0.01 };
+        assert_eq!(kind.parse("none"), Ok(Value::Name("none")));
+        assert_eq!(kind.parse("floor:0.2"), Ok(Value::Graded("floor", 0.2)));
+        assert_eq!(kind.parse("cut-off"), Ok(Value::Graded("cut-off", 0.01)));
+        for wrong in ["floor:0", "floor:2", "cut-off:", "most", "none:1", ""] {
+            let expected = "expected none, floor:E or cut-off:E, E being above 0 and up to 1";
+            assert_eq!(kind.parse(wrong), Err(expected.to_owned()), "{wrong}");
+        }
+    }
+
+    #[test]
+    fn ranges_hold_their_bounds_or_not_and_say_so() {
+        let integer = Kind::Integer { range: Integers { least: 1, most: 4096 }, words: &["auto", "optimal"] };
+        assert_eq!(integer.parse("optimal"), Ok(Value::Name("optimal")));
+        assert_eq!((integer.parse("1"), integer.parse("4096")), (Ok(Value::Integer(1)), Ok(Value::Integer(4096))));
+        for wrong in ["0", "4097", "-1", "1.5", "Auto", ""] {
+            let expected = "expected a whole number from 1 to 4096, auto, or optimal";
+            assert_eq!(integer.parse(wrong), Err(expected.to_owned()), "{wrong}");
+        }
+        let real = |range| Kind::Real { range, words: &[] };
+        for (range, inside, outside, text) in [
+            (Interval::open(0.0, 1.0), "0.5", ["0", "1"], "above 0 and below 1"),
+            (Interval::above(0.0, 1.0), "1", ["0", "1.01"], "above 0 and up to 1"),
+            (Interval::closed(0.0, 0.95), "0", ["-0.1", "0.96"], "from 0 to 0.95"),
+            (Interval::POSITIVE, "1e30", ["0", "inf"], "positive"),
+        ] {
+            assert!(real(range).parse(inside).is_ok(), "{range}");
+            assert!(outside.iter().chain(&["nan"]).all(|text| real(range).parse(text).is_err()), "{range}");
+            assert_eq!(range.to_string(), text);
+        }
+    }
+
+    #[test]
+    fn pairs_ascend_where_they_must() {
+        let pair = |ascends| Kind::Pair { range: Interval::POSITIVE, ascends, unit: "pixels" };
+        assert_eq!(pair(true).parse("2,2"), Ok(Value::Pair([2.0, 2.0])));
+        assert_eq!(pair(false).parse("3, 2"), Ok(Value::Pair([3.0, 2.0])));
+        for wrong in ["3,2", "0,2", "3", "3,4,5", "3,x", "2,inf"] {
+            assert!(pair(true).parse(wrong).is_err(), "{wrong}");
+        }
+    }
+}
