@@ -13,6 +13,11 @@ pub fn reduced_by(left: Estimate, percent: f64) -> bool {
     left.value > 0.0 && (1.0 - left.value) * 100.0 >= percent
 }
 
+/// The same for resampling of `proposals` to `samples`: with as many of both nothing is resampled, and nothing is reached.
+pub fn reduced_by_resampling([proposals, samples]: [u32; 2], left: Estimate, percent: f64) -> bool {
+    proposals > samples && reduced_by(left, percent)
+}
+
 /// True if each number is lower than the one before it, by more than chance explains.
 pub fn falls(steps: &[Estimate]) -> bool {
     let is_lower = |a: Estimate, b: Estimate| b.value + ERRORS * a.error.hypot(b.error) < a.value;
@@ -49,6 +54,13 @@ mod tests {
         assert!(!reduced_by(of(1.049, 0.021), 45.0));
         assert!(!reduced_by(Estimate::default(), 45.0));
         assert!(!reduced_by(of(f64::NAN, 0.0), 45.0));
+    }
+
+    #[test]
+    fn a_reduction_without_resampling_does_not_count() {
+        assert!(reduced_by_resampling([139, 138], of(0.12, 0.005), 45.0));
+        assert!(!reduced_by_resampling([138, 138], of(0.12, 0.005), 45.0));
+        assert!(!reduced_by_resampling([229, 64], of(0.567, 0.011), 45.0));
     }
 
     #[test]

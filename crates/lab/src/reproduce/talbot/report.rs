@@ -5,7 +5,7 @@ use super::super::figure::{Figure, Summary, estimate_json, percent, plus_minus};
 use super::super::measure::{Estimate, Measured, Seconds, same_mean};
 use super::super::page::{Block, Cell, Shown, Table};
 use super::super::pictures::{HEAT, Picture, Scale, gain, significant};
-use super::super::verdicts::{falls, helps_most_in_shadow, reduced_by};
+use super::super::verdicts::{falls, helps_most_in_shadow, reduced_by_resampling};
 use super::Setup;
 use super::classes::{Classes, LIT, NAMES, SHADOWED};
 use super::comparison::{Kind, Outcome, Roles};
@@ -101,7 +101,8 @@ fn reduction(o: &Outcome<'_>, i: usize, [paper, target]: [f64; 2]) -> Summary {
     let base = &o.measured[o.roles.base];
     let m = &o.measured[i];
     let at = |i: usize| o.measured[i].at_equal_time(base, None);
-    let reached = reduced_by(at(i), target);
+    let counts = [m.method.proposals, m.method.samples];
+    let reached = reduced_by_resampling(counts, at(i), target);
     let (bound, share) = visibility(o);
     let mut reason = format!("M = {}, N = {}", m.method.proposals, m.method.samples);
     if m.method.proposals == m.method.samples {
