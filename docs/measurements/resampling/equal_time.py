@@ -1,13 +1,19 @@
 #!/usr/bin/env python3
 """Error of direct-light estimators at equal time, against long references.
 
+    equal_time.py best SCENES OUT [direct|path]    `ris` by the best number of samples of `mis`, without references
     equal_time.py references SCENES OUT    renders the references that are missing (an hour on two cores)
     equal_time.py compare SCENES OUT [direct|path]
 
 SCENES has a folder for each scene; OUT keeps references and pictures. `LUMIRIS` is the program, `SEEDS` how many pictures of
 each estimator are averaged. Wants numpy and OpenEXR. Time is processor time of the process without loading the scene.
+
+`best`: the error is the variance between seeds, since the estimators have no bias; relMSE divides that of a pixel by the square
+of the mean of all pictures. Estimators take turns in an order that moves on from seed to seed, one thread each, and times are
+medians; ± is one standard error, by leaving out one seed after the other.
 """
 import json, os, resource, subprocess, sys
+from statistics import median
 import numpy as np
 import OpenEXR
 
@@ -28,14 +34,17 @@ ESTIMATORS = {
     "ris, N = 2, M = 16": "--estimator ris --samples 2 --proposals 16",
     "ris, N = 4, M = 32": "--estimator ris --samples 4 --proposals 32",
 }
+BEST_OF = {f"mis, N = {n}": f"--estimator mis --samples {n}" for n in [1, 2, 4, 8]}
+JUDGED = {"ris, N = 4, M = 32": ESTIMATORS["ris, N = 4, M = 32"]}
 LUMINANCE = np.array([0.212671, 0.715160, 0.072169])
 REGION = 16
 
 
 def processor_seconds(command):
-    before = resource.getrusage(resource.RUSAGE_CHILDREN).ru_utime
+    used = lambda: sum(resource.getrusage(resource.RUSAGE_CHILDREN)[:2])
+    before = used()
     subprocess.run(command, check=True, stderr=subprocess.DEVNULL)
-    return resource.getrusage(resource.RUSAGE_CHILDREN).ru_utime - before
+    return used() - before
 
 
 def render(scenes, name, kind, out, options):
@@ -87,6 +96,49 @@ def compare(scenes, out, kind):
                   f"| {mse * time / base[0]:.2f} | {relative * time / base[1]:.2f} | {largest:.1f} |", flush=True)
 
 
+def turns(scenes, out, kind, name):
+    """Luminances (seed, pixel) and processor seconds of each estimator, loading left out."""
+    methods = {"loading": "--spp 1"} | {k: v + " --spp 64" for k, v in (BEST_OF | JUDGED).items()}
+    labels, picture = list(methods), os.path.join(out, "picture.exr")
+    seconds, pictures = {label: [] for label in labels}, {label: [] for label in labels}
+    for turn in range(SEEDS):
+        for k in range(len(labels)):
+            i = (k + turn) % len(labels)
+            seed = ["--seed", str(1 + turn * len(labels) + i), "--threads", "1"]
+            seconds[labels[i]].append(render(scenes, name, kind, picture, methods[labels[i]].split() + seed))
+            pictures[labels[i]].append((read(picture)[0] @ LUMINANCE).ravel())
+    loading = median(seconds.pop("loading"))
+    pictures.pop("loading")
+    return {k: np.array(v) for k, v in pictures.items()}, {k: median(v) - loading for k, v in seconds.items()}
+
+
+def variances(pictures):
+    """MSE and relMSE of each estimator: the variance between its pictures."""
+    y = np.mean([p.mean(0) for p in pictures.values()], 0)
+    scale = y**2 + 0.01 * y.mean() ** 2
+    spread = {k: p.var(0, ddof=1) for k, p in pictures.items()}
+    return {k: np.array([v.mean(), (v / scale).mean()]) for k, v in spread.items()}
+
+
+def best(scenes, out, kind):
+    print("| scene | estimator | CPU s | MSE | relMSE | MSE at equal time | relMSE at equal time |")
+    print("|---|---|---|---|---|---|---|")
+    for name in SCENES:
+        pictures, seconds = turns(scenes, out, kind, name)
+        cost = lambda of: {k: e * seconds[k] for k, e in variances(of).items()}
+        costs, errors = cost(pictures), variances(pictures)
+        chosen = [min(BEST_OF, key=lambda k: costs[k][error]) for error in range(2)]
+        ratios = lambda c: {k: [v[e] / c[chosen[e]][e] for e in range(2)] for k, v in c.items()}
+        without = [ratios(cost({k: np.delete(p, s, 0) for k, p in pictures.items()})) for s in range(SEEDS)]
+        for label in pictures:
+            left = np.array([w[label] for w in without])
+            spread = np.sqrt((SEEDS - 1) * left.var(0))
+            cells = [f"{r:.2f}" + (" (best)" if chosen[e] == label else f" ± {spread[e]:.2f}")
+                     for e, r in enumerate(ratios(costs)[label])]
+            print(f"| {name} | {label} | {seconds[label]:.2f} | {errors[label][0]:.2e} | {errors[label][1]:.2e} "
+                  f"| {cells[0]} | {cells[1]} |", flush=True)
+
+
 def main():
     command, scenes, out = sys.argv[1:4]
     if command == "references":
@@ -95,6 +147,8 @@ def main():
                 path = os.path.join(out, f"{name}-{kind}.exr")
                 if not os.path.exists(path):
                     render(scenes, name, kind, path, ["--estimator", "mis", "--spp", "10240", "--seed", "1000"])
+    elif command == "best":
+        best(scenes, out, sys.argv[4] if len(sys.argv) > 4 else "direct")
     else:
         compare(scenes, out, sys.argv[4] if len(sys.argv) > 4 else "direct")
 

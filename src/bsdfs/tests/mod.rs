@@ -127,7 +127,7 @@ fn albedo_estimates_average_to_the_integral_of_f_times_the_cosine() {
     let wide = ["gold 0.4 0.1", "glass 0.3", "glass 0.6 0.2", "layered 5"];
     let is_wide = |name: &str| wide.contains(&name) || name.starts_with("evaluated");
     let tested: Vec<_> = zoo(&tables).into_iter().filter(|(name, _)| is_wide(name)).collect();
-    assert_eq!(tested.len(), wide.len() + ProposalDensity::ALL.len());
+    assert_eq!(tested.len(), wide.len() + ProposalDensity::iter().len());
     for (_, b) in tested {
         for wo in [warp::direction(0.9, 0.3), warp::direction(0.4, 2.0)] {
             // The difference of two estimates with independent numbers has the mean 0.

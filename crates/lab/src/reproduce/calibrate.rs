@@ -54,8 +54,9 @@ pub fn spend_rest(budget: f64, times: StageTimes, samples: u32) -> Split {
 pub fn calibrate(stage: &mut Stage, base: &Method, observer: Observer<'_>) -> Result<Calibration, ReproduceError> {
     // Times, and that of the baseline
     let default = StageTimes { t1: 100.0, t2: 100.0 };
-    let times = stage.stage_times()?.unwrap_or(default);
-    let guess = Method::ris(4 * base.samples, base.samples.div_ceil(2)).stratified();
+    let times = stage.stage_times(base.light_choice)?.unwrap_or(default);
+    let ris = |proposals, samples| Method::ris(proposals, samples).lights_by(base.light_choice).stratified();
+    let guess = ris(4 * base.samples, base.samples.div_ceil(2));
     let pilot = turns(stage, &[*base, guess], View::Centres, 1, 0..TURNS, observer)?;
     let busy = pilot[0].median_seconds(|s| s.processor / s.stages().max(1e-12)).min(1.0);
     let budget = pilot[0].median_seconds(Seconds::direct) * busy * 1e9 / points(&pilot[1]);
@@ -65,7 +66,7 @@ pub fn calibrate(stage: &mut Stage, base: &Method, observer: Observer<'_>) -> Re
     // The split in turns with the baseline; the number of proposals changes until times match
     for step in 0..CORRECTIONS {
         let Split { samples, proposals } = found.split;
-        let method = Method::ris(proposals, samples).stratified();
+        let method = ris(proposals, samples);
         let range = (step + 1) * TURNS..(step + 2) * TURNS;
         let pair = turns(stage, &[*base, method], View::Centres, 1, range, observer)?;
         let excess = pair[1].time_ratio(&pair[0]) - 1.0;

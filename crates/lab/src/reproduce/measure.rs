@@ -12,7 +12,7 @@ use lumiris::accel::{Accel, AccelStats, Bvh, Coherence, Hit, RayBatch};
 use lumiris::film::Film;
 use lumiris::film::filter::PixelFilter;
 use lumiris::import::{LoadOptions, load};
-use lumiris::lights::LightHints;
+use lumiris::lights::{LightHints, LightSamplerKind};
 use lumiris::render::plan::prepare;
 use lumiris::render::{RenderError, RenderSettings, Rendering, render};
 use lumiris::scene::{AccelKind, RenderJob};
@@ -113,9 +113,10 @@ impl Stage {
         self.job.change(|settings| method.apply(settings, self.depth));
     }
 
-    /// T1 and T2 as the renderer measures them for its own choice; `None` if nothing in the picture is lit.
-    pub fn stage_times(&mut self) -> Result<Option<StageTimes>, ReproduceError> {
-        self.set(&Method::ris(1, 1).stratified().strata(Strata::Systematic));
+    /// T1 and T2 as the renderer measures them for its own choice, with lights chosen in this way; `None` if nothing in the
+    /// image is lit.
+    pub fn stage_times(&mut self, lights: LightSamplerKind) -> Result<Option<StageTimes>, ReproduceError> {
+        self.set(&Method::ris(1, 1).lights_by(lights).stratified().strata(Strata::Systematic));
         self.job.change(|s| (s.integrator.ris.proposals, s.integrator.ris.stage_times) = (Proposals::Auto, None));
         self.shadows.store(true, Ordering::Relaxed);
         Ok(prepare(&mut self.job, self.threads, false).map_err(RenderError::from)?.map(|plan| plan.times))
@@ -181,15 +182,18 @@ pub struct Seconds {
 }
 
 impl Seconds {
-    /// Adds all but the processor time.
-    fn add(&mut self, rendering: &Rendering) {
+    /// Those of a rendering that took so much processor time.
+    fn new(rendering: &Rendering, processor: Duration) -> Self {
         let s = &rendering.stats;
-        self.wall += rendering.elapsed.as_secs_f64();
-        self.camera += (s.camera_time + s.bounce_time).as_secs_f64();
-        self.shade += s.shade_time.as_secs_f64();
-        self.t1 += s.direct.t1.as_secs_f64();
-        self.select += s.direct.select.as_secs_f64();
-        self.t2 += s.direct.t2.as_secs_f64();
+        Seconds {
+            processor: processor.as_secs_f64(),
+            wall: rendering.elapsed.as_secs_f64(),
+            camera: (s.camera_time + s.bounce_time).as_secs_f64(),
+            shade: s.shade_time.as_secs_f64(),
+            t1: s.direct.t1.as_secs_f64(),
+            select: s.direct.select.as_secs_f64(),
+            t2: s.direct.t2.as_secs_f64(),
+        }
     }
 
     /// Direct lighting.
@@ -253,20 +257,12 @@ impl Measured {
         }
     }
 
-    /// Takes a turn: renderings of which each has the same share of the picture.
-    fn add(&mut self, renderings: &[Rendering], processor: Duration) {
-        let share = 1.0 / renderings.len().max(1) as f64;
-        let mut means = vec![[0.0; 3]; renderings.first().map_or(0, |r| r.film.pixels.len())];
-        let mut seconds = Seconds { processor: processor.as_secs_f64(), ..Seconds::default() };
-        for rendering in renderings {
-            for (mean, p) in means.iter_mut().zip(radiance(&rendering.film)) {
-                (0..3).for_each(|c| mean[c] += p[c] * share);
-            }
-            seconds.add(rendering);
-            self.segments += rendering.stats.direct.segments;
-            self.proposals += rendering.stats.direct.proposals;
-            self.invalid += rendering.film.pixels.iter().map(|p| p.invalid).sum::<u64>();
-        }
+    /// Takes a turn.
+    fn add(&mut self, rendering: &Rendering, processor: Duration) {
+        let means = radiance(&rendering.film);
+        self.segments += rendering.stats.direct.segments;
+        self.proposals += rendering.stats.direct.proposals;
+        self.invalid += rendering.film.pixels.iter().map(|p| p.invalid).sum::<u64>();
         if self.first.is_empty() {
             self.first = means.iter().map(|p| p.map(|v| v as f32)).collect();
             self.sum = vec![[0.0; 3]; means.len()];
@@ -275,7 +271,7 @@ impl Measured {
             (0..3).for_each(|c| sum[c] += mean[c]);
         }
         self.luminance.push(means.iter().map(|&p| luminance(p) as f32).collect());
-        self.seconds.push(seconds);
+        self.seconds.push(Seconds::new(rendering, processor));
     }
 
     /// Luminance of every pixel, turn by turn.
@@ -379,9 +375,6 @@ pub fn radiance(film: &Film) -> Vec<[f64; 3]> {
     film.pixels.iter().map(|p| p.mean()).collect()
 }
 
-/// Distance of the seeds of renderings that make up one turn; turns have smaller ones.
-const APART: u32 = 1 << 28;
-
 /// Renders `turns` turns of all methods, the first of each with seed `first_seed` and on.
 pub fn turns(
     stage: &mut Stage,
@@ -399,10 +392,8 @@ pub fn turns(
             let seed = 1 + turn * count + i;
             let m = &mut measured[i as usize];
             let start = processor_time();
-            let (renderings, rays) = if m.method.apart { (spp, 1) } else { (1, spp) };
-            let render = |k: u32| stage.render(&m.method, view, rays, seed.wrapping_add(k * APART), observer);
-            let renderings: Result<Vec<Rendering>, _> = (0..renderings).map(render).collect();
-            m.add(&renderings?, processor_time().saturating_sub(start));
+            let rendering = stage.render(&m.method, view, spp, seed, observer)?;
+            m.add(&rendering, processor_time().saturating_sub(start));
         }
     }
     Ok(measured)

@@ -20,6 +20,29 @@ pub enum Transport {
     Cached,
 }
 
+/// How the random numbers of a pixel are distributed.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Points {
+    /// All are independent.
+    Independent,
+    /// Samples of an estimate, or the proposals of `ris`, are well distributed over the lights; camera rays have nothing to do
+    /// with each other.
+    PerEstimate,
+    /// They are well distributed over the camera rays of the pixel, too.
+    PerPixel,
+}
+
+impl Points {
+    /// Name in the file of numbers.
+    pub fn name(self) -> &'static str {
+        match self {
+            Points::Independent => "independent",
+            Points::PerEstimate => "stratified in each estimate",
+            Points::PerPixel => "stratified over all rays",
+        }
+    }
+}
+
 /// A way to estimate direct light.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Method {
@@ -47,11 +70,8 @@ pub struct Method {
     pub strata: Strata,
     /// True if `ris` shares the time of an estimate out between M and N in each pixel as [`Stage::plan_per_pixel`](super::measure::Stage::plan_per_pixel) found out.
     pub per_pixel: bool,
-    /// True if samples, or the proposals of `ris`, are well distributed over the lights and over the camera rays of a pixel;
-    /// otherwise all random numbers are independent.
-    pub stratified: bool,
-    /// True if camera rays of a pixel have nothing to do with each other: they are renderings of one ray each.
-    pub apart: bool,
+    /// How random numbers are distributed.
+    pub points: Points,
 }
 
 impl Method {
@@ -71,8 +91,7 @@ impl Method {
             rest_samples: 1,
             strata: Strata::None,
             per_pixel: false,
-            stratified: false,
-            apart: false,
+            points: Points::Independent,
         }
     }
 
@@ -106,14 +125,14 @@ impl Method {
         Method { estimator: EstimatorKind::Ris, proposals: proposals.max(samples), ..Method::mc(samples) }
     }
 
-    /// The same with well distributed points.
+    /// The same with points that are well distributed over all camera rays of a pixel.
     pub fn stratified(self) -> Self {
-        Method { stratified: true, ..self }
+        Method { points: Points::PerPixel, ..self }
     }
 
-    /// The same with camera rays that have nothing to do with each other.
-    pub fn apart(self) -> Self {
-        Method { apart: true, ..self }
+    /// The same with another choice of lights.
+    pub fn lights_by(self, light_choice: LightSamplerKind) -> Self {
+        Method { light_choice, ..self }
     }
 
     /// The same with other weights of the techniques.
@@ -155,7 +174,10 @@ impl Method {
         i.ris.strata = self.strata;
         i.ris.target = self.target;
         i.contributing.rest_samples = self.rest_samples;
-        i.ris.points = if self.stratified { ProposalPoints::Stratified } else { ProposalPoints::Independent };
-        settings.sampling.sampler = if self.stratified { SamplerKind::Sobol } else { SamplerKind::Independent };
+        (settings.sampling.sampler, i.ris.points) = match self.points {
+            Points::Independent => (SamplerKind::Independent, ProposalPoints::Independent),
+            Points::PerEstimate => (SamplerKind::Stratified, ProposalPoints::Stratified),
+            Points::PerPixel => (SamplerKind::Sobol, ProposalPoints::Stratified),
+        };
     }
 }

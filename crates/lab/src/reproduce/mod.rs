@@ -2,7 +2,8 @@
 //!
 //! Reading order: [`method`] (a way to estimate light), [`measure`] (methods in turns on one scene, variances and times),
 //! [`calibrate`] (numbers of samples and proposals for equal time), [`talbot`] (resampled importance sampling), [`fan`]
-//! (optimizing control variates), [`keller_wald`] (photon maps), then what a page is made of: [`figure`], [`page`], [`pictures`], [`chart`].
+//! (optimizing control variates), [`keller_wald`] (photon maps), [`verdicts`] (when a figure counts as reached), then what a page is
+//! made of: [`figure`], [`page`], [`pictures`], [`chart`].
 
 pub mod calibrate;
 pub mod chart;
@@ -14,6 +15,7 @@ pub mod method;
 pub mod page;
 pub mod pictures;
 pub mod talbot;
+pub mod verdicts;
 
 use crate::procedural::files::ProceduralError;
 use lumiris_formats::output::write_text;

@@ -35,6 +35,7 @@ const BEST: usize = 2;
 
 /// Names and methods; the first is the baseline.
 fn methods() -> Vec<(&'static str, Method)> {
+    // The box has one light, so that no choice of lights takes part
     let of = |m: Method| m.stratified().of(Transport::Cached);
     vec![
         ("mis, balance heuristic", of(Method::mis(SAMPLES).weighted(Heuristic::Balance))),

@@ -5,7 +5,7 @@ use super::super::figure::Figure;
 use super::super::measure::{Measured, Stage, View, turns};
 use super::super::method::Method;
 use super::super::{Observer, ReproduceError, scaled};
-use super::growth::{Growth, measure as measure_growth};
+use super::growth::{Growth, cost as growth_cost, measure as measure_growth};
 use super::roster::{Numbers, Role, methods};
 use super::truth::{Errors, Truth};
 use super::{Setup, report};
@@ -95,8 +95,9 @@ const WANTED_TURNS: [f64; 2] = [8.0, 4.0];
 /// Turns of the antialiased pictures.
 const PAIR_TURNS: u32 = 4;
 
-/// Who is shown with antialiasing.
+/// Who is shown with antialiasing, and with samples drawn in which ways.
 pub const SHOWN: [Role; 4] = [Role::Balance, Role::Progressive, Role::Correlated, Role::Ris];
+pub const SHOWN_WAYS: [usize; 2] = [0, 1];
 
 /// Everything that was measured for a case.
 pub struct Outcome<'a> {
@@ -107,8 +108,8 @@ pub struct Outcome<'a> {
     pub measured: Vec<Measured>,
     pub truth: Truth,
     pub errors: Vec<Errors>,
-    /// Those of [`SHOWN`] with rays all over the pixels, stratified over all rays.
-    pub antialiased: Vec<Measured>,
+    /// Those of [`SHOWN`] with rays all over the pixels, for each of [`SHOWN_WAYS`].
+    pub antialiased: Vec<Vec<Measured>>,
     pub antialiased_truth: Truth,
     pub growth: Growth,
 }
@@ -132,6 +133,12 @@ fn pilot(stage: &mut Stage, case: &Case, observer: Observer<'_>) -> Result<(Numb
     Ok((Numbers { equal_time, ris: calibration.split, ..unknown }, calibration.seconds))
 }
 
+/// Camera rays per pixel for everything but the turns.
+fn fixed_cost(case: &Case, quick: bool) -> f64 {
+    let shown = (SHOWN.len() * SHOWN_WAYS.len()) as f64;
+    2.0 * f64::from(LONG.0 * LONG.1) + f64::from(PAIR_TURNS * case.spp) * shown + growth_cost(quick)
+}
+
 /// Measures a case within about `time`.
 pub fn run(setup: &Setup<'_>, case: &Case, time: Duration) -> Result<Figure, ReproduceError> {
     let start = Instant::now();
@@ -144,8 +151,7 @@ pub fn run(setup: &Setup<'_>, case: &Case, time: Duration) -> Result<Figure, Rep
     let mut stage = Stage::load(&path, scaled(case.shape, pilot_size), setup.options.threads)?;
     let (mut numbers, mut seconds) = pilot(&mut stage, case, observer)?;
     let count = methods(numbers).len() as f64;
-    let long = f64::from(LONG.0 * LONG.1);
-    let fixed = 2.0 * long + f64::from(PAIR_TURNS * case.spp) * SHOWN.len() as f64 + super::growth::cost(quick);
+    let fixed = fixed_cost(case, quick);
     let turn = count * f64::from(case.spp);
     let wanted = seconds * 1.15 * (WANTED_TURNS[usize::from(quick)] * turn + fixed);
     let fits = (time.saturating_sub(start.elapsed()).as_secs_f64() / wanted).sqrt();
@@ -168,9 +174,11 @@ pub fn run(setup: &Setup<'_>, case: &Case, time: Duration) -> Result<Figure, Rep
 
     // With antialiasing
     let antialiased_truth = truth(&mut stage, reference, View::Antialiased, observer)?;
-    let shown: Vec<Method> = SHOWN.iter().map(|r| list[r.place(1)]).collect();
+    let shown = SHOWN_WAYS.iter().flat_map(|&way| SHOWN.map(|r| list[r.place(way)]));
+    let shown: Vec<Method> = shown.collect();
     let range = ANTIALIASED_TURNS..ANTIALIASED_TURNS + PAIR_TURNS;
     let antialiased = turns(&mut stage, &shown, View::Antialiased, case.spp, range, observer)?;
+    let antialiased = antialiased.chunks(SHOWN.len()).map(<[_]>::to_vec).collect();
     let (facts, size) = (stage.facts(), stage.size());
 
     let growth = measure_growth(setup, case, numbers, size)?;

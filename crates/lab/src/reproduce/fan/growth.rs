@@ -4,7 +4,7 @@ use super::super::ReproduceError;
 use super::super::measure::{Estimate, Stage, View, turns};
 use super::Setup;
 use super::direct::{Case, LONG, LONG_TURNS};
-use super::roster::{Numbers, Role, WAYS, methods};
+use super::roster::{FULL_WAYS, Numbers, Role, methods};
 use super::truth::Truth;
 
 /// Numbers of camera rays: usual and quick.
@@ -18,12 +18,12 @@ const SHRINK: u32 = 2;
 const PAIR: [Role; 2] = [Role::Balance, Role::Progressive];
 
 /// Camera rays and error of progressive `ocv` over that of `mis`, for each of the ways to draw samples.
-pub struct Growth(pub [Vec<(u32, Estimate)>; WAYS.len()]);
+pub struct Growth(pub [Vec<(u32, Estimate)>; FULL_WAYS]);
 
 /// Camera rays per pixel of the whole picture that take as long.
 pub fn cost(quick: bool) -> f64 {
     let rays: u32 = RAYS[usize::from(quick)].iter().sum();
-    f64::from(TURNS * rays * (PAIR.len() * WAYS.len()) as u32 + LONG.0 * LONG.1) / f64::from(SHRINK * SHRINK)
+    f64::from(TURNS * rays * (PAIR.len() * FULL_WAYS) as u32 + LONG.0 * LONG.1) / f64::from(SHRINK * SHRINK)
 }
 
 /// Measures it on a smaller picture.
@@ -34,8 +34,8 @@ pub fn measure(setup: &Setup<'_>, case: &Case, numbers: Numbers, size: [u32; 2])
     let range = LONG_TURNS..LONG_TURNS + LONG.1;
     let long = turns(&mut stage, &[list[Role::Balance.place(1)]], View::Centres, LONG.0, range, setup.observer)?;
     let truth = Truth::new(&long[0]);
-    let chosen: Vec<_> = (0..WAYS.len()).flat_map(|way| PAIR.map(|r| list[r.place(way)])).collect();
-    let mut curves = [const { Vec::new() }; WAYS.len()];
+    let chosen: Vec<_> = (0..FULL_WAYS).flat_map(|way| PAIR.map(|r| list[r.place(way)])).collect();
+    let mut curves = [const { Vec::new() }; FULL_WAYS];
     for (k, &rays) in RAYS[usize::from(setup.options.quick)].iter().enumerate() {
         let first = FIRST_TURN + k as u32 * TURNS;
         let all = turns(&mut stage, &chosen, View::Centres, rays, first..first + TURNS, setup.observer)?;

@@ -41,10 +41,14 @@ const STUDY: Study = Study {
          is the error of lighting; the picture with antialiasing, whose edges have noise of their own, is told beside it.",
         "Time: processor time of the whole rendering, all threads together. All methods take turns in one run, in an order that moves on \
          from turn to turn; the ratio of times is the median over the turns. Efficiency is 1/(error² × time).",
-        "Samples are drawn in three ways. Stratified in each estimate: the samples of each component are well distributed over its whole \
+        "Half of the samples come from the BSDF and the rest from the lights, every light alike, as in the paper: ocv gives each light \
+         the same number, mis as nearly as its well distributed points do (independent samples: on average). The last three rows of \
+         each scene, and the tables after the third, choose lights by the light tree instead, as the renderer does by default.",
+        "Samples are drawn in three ways, and methods are compared with methods that draw them in the same way. Stratified in each \
+         estimate: the samples of each component are well distributed over its whole \
          domain, and camera rays have nothing to do with each other, as in the paper. Stratified over all rays: the samples of all rays of \
          a pixel are one well distributed set, as mis can have them; progressive ocv cannot, since its coefficients must not \
-         depend on the samples that they are used on: it has one set for each of its blocks of 1, 1, 2, 4, … rays (in both tables). \
+         depend on the samples that they are used on: it has one set for each of its blocks of 1, 1, 2, 4, … rays. \
          Independent: all random numbers are.",
         "Bias: mean luminance of the picture over that of the reference, less 1, with its 95 % confidence interval. ocv in the forms paper and \
          regression and direct optimal-mis are biased by design, as they fit and estimate with the same samples; all others are \

@@ -6,9 +6,10 @@ use super::super::figure::{Figure, Summary, estimate_json, percent, plus_minus};
 use super::super::measure::{Estimate, Measured};
 use super::super::page::{Block, Cell, Shown, Table};
 use super::super::pictures::{HEAT, Picture, Scale, crop, gain, significant};
+use super::super::verdicts::reduced_by;
 use super::Setup;
-use super::direct::{Case, LONG, Outcome, SHOWN};
-use super::roster::{ROLES, Role, WAYS};
+use super::direct::{Case, LONG, Outcome, SHOWN, SHOWN_WAYS};
+use super::roster::{FULL_WAYS, Role, WAYS};
 use super::truth::{CANDELAS, Errors, Interval, Truth};
 use serde_json::{Value, json};
 
@@ -27,7 +28,8 @@ pub fn method_json(name: &str, [m, base]: [&Measured; 2], [e, base_errors]: [&Er
     let time = m.time_ratio(base);
     json!({
         "name": name, "estimator": <&str>::from(m.method.estimator), "samples": m.method.samples,
-        "proposals": m.method.proposals, "stratified": m.method.stratified, "rays_apart": m.method.apart, "turns": m.turns(),
+        "proposals": m.method.proposals, "points": m.method.points.name(), "light_choice": <&str>::from(m.method.light_choice),
+        "turns": m.turns(),
         "error": estimate_json(e.error()), "relative_error": estimate_json(e.relative(base_errors)),
         "time_ratio": time, "efficiency": estimate_json(e.efficiency(base_errors, time)),
         "bias": { "value": e.bias.value, "half_width_95": e.bias.half }, "systematic_square": e.systematic,
@@ -69,7 +71,6 @@ pub fn summary(asked: &Asked, [m, base]: [&Measured; 2], [e, base_errors]: [&Err
     let [mis, ocv] = asked.paper;
     let (left, time) = (e.relative(base_errors), m.time_ratio(base));
     let efficiency = e.efficiency(base_errors, time);
-    let enough = left.value > 0.0 && (1.0 - left.value) * 100.0 >= asked.target;
     let mut target = format!("−{} %", asked.target);
     let mut measured = format!(
         "{} → {}: {}, {} time",
@@ -90,7 +91,7 @@ pub fn summary(asked: &Asked, [m, base]: [&Measured; 2], [e, base_errors]: [&Err
         ),
         target,
         measured,
-        reached: enough && (!asked.efficient || efficiency.value >= 1.0),
+        reached: reduced_by(left, asked.target) && (!asked.efficient || efficiency.value >= 1.0),
         reason,
     }
 }
@@ -138,7 +139,7 @@ pub fn direct(setup: &Setup<'_>, o: &Outcome<'_>) -> Result<Figure, ReproduceErr
         id: o.case.id,
         title: o.case.title,
         summary: row(0),
-        also: (1..WAYS.len()).map(|way| (WAYS[way], row(way))).collect(),
+        also: (1..WAYS.len()).map(|way| (WAYS[way].name, row(way))).collect(),
         blocks,
         numbers: numbers(o),
     })
@@ -158,14 +159,19 @@ impl Outcome<'_> {
         e.relative(base)
     }
 
-    /// Those with antialiasing, against their own reference.
-    fn antialiased_errors(&self) -> Vec<Errors> {
-        self.antialiased.iter().map(|m| self.antialiased_truth.errors(m)).collect()
+    /// Those with antialiasing, in one of [`SHOWN_WAYS`], against their own reference.
+    fn antialiased_errors(&self, shown: usize) -> Vec<Errors> {
+        self.antialiased[shown].iter().map(|m| self.antialiased_truth.errors(m)).collect()
     }
 }
 
 /// What a row of the table says beside its result.
 fn reason(o: &Outcome<'_>, way: usize) -> String {
+    if let Some(alike) = way.checked_sub(FULL_WAYS) {
+        let [mis, ocv] = [Role::Balance, Role::Progressive]
+            .map(|r| percent(o.errors[r.place(way)].relative(&o.errors[r.place(alike)])));
+        return format!("against lights chosen alike: mis {mis}, ocv {ocv}");
+    }
     let others: Vec<String> = [Role::Crossfit, Role::Regression, Role::Paper, Role::Optimal, Role::Correlated]
         .iter()
         .map(|&r| format!("{} {}", r.name(), percent(o.relative(r, way))))
@@ -173,14 +179,16 @@ fn reason(o: &Outcome<'_>, way: usize) -> String {
     let mut text = others.join("; ");
     let equal = |role: Role| percent(o.relative(role, way));
     text += &format!("; in the time of mis: ocv {}, ris {}", equal(Role::EqualTime), equal(Role::Ris));
-    if way == 1 {
-        let errors = o.antialiased_errors();
+    if let Some(shown) = SHOWN_WAYS.iter().position(|&shown| shown == way) {
+        let errors = o.antialiased_errors(shown);
         text += &format!(
             "; with antialiasing {} → {} ({})",
             significant(errors[0].error().value),
             significant(errors[1].error().value),
             percent(errors[1].relative(&errors[0]))
         );
+    }
+    if way == 1 {
         let gain = o.errors[Role::Balance.place(1)].relative(&o.errors[Role::Balance.place(2)]);
         text += &format!("; stratification alone changes the error of mis by {}", percent(gain));
     }
@@ -189,34 +197,36 @@ fn reason(o: &Outcome<'_>, way: usize) -> String {
 
 fn tables(o: &Outcome<'_>) -> Vec<Block> {
     let mut blocks = Vec::new();
-    for (way, name) in WAYS.iter().enumerate() {
+    for (way, of_way) in WAYS.iter().enumerate() {
         let mut table = Table::new(&HEADER);
-        for role in ROLES {
+        for &role in of_way.roles {
             let name = if role.is_unbiased() { role.name().to_owned() } else { format!("{} (biased)", role.name()) };
             table.row(method_row(&name, o.pair(role, way), o.errors(role, way)));
         }
-        blocks.push(Block::Note(format!("Samples {name}:")));
+        let lights = if way < FULL_WAYS { ", every light as often as any other" } else { "" };
+        blocks.push(Block::Note(format!("Samples {}{lights}:", of_way.name)));
         blocks.push(Block::Table(table));
     }
-    let mut table = Table::new(&HEADER);
-    let errors = o.antialiased_errors();
-    for (i, role) in SHOWN.iter().enumerate() {
-        let pair = [&o.antialiased[i], &o.antialiased[0]];
-        table.row(method_row(role.name(), pair, [&errors[i], &errors[0]]));
+    for (shown, &way) in SHOWN_WAYS.iter().enumerate() {
+        let mut table = Table::new(&HEADER);
+        let (all, errors) = (&o.antialiased[shown], o.antialiased_errors(shown));
+        for (i, role) in SHOWN.iter().enumerate() {
+            table.row(method_row(role.name(), [&all[i], &all[0]], [&errors[i], &errors[0]]));
+        }
+        blocks.push(Block::Note(format!(
+            "With antialiasing, {}: camera rays all over each pixel, against an antialiased reference. The noise of edges is in \
+             every row.",
+            WAYS[way].name
+        )));
+        blocks.push(Block::Table(table));
     }
-    blocks.push(Block::Note(
-        "With antialiasing, stratified over all rays: camera rays all over each pixel, against an antialiased reference. The noise of edges is in \
-         every row."
-            .to_owned(),
-    ));
-    blocks.push(Block::Table(table));
     blocks
 }
 
 fn growth(o: &Outcome<'_>) -> Block {
     let mut chart = Chart::new("camera rays per pixel", "error of ocv, progressive, over that of mis");
-    for (name, curve) in WAYS.iter().zip(&o.growth.0) {
-        chart = chart.with(name, curve.iter().map(|(rays, left)| [f64::from(*rays), left.value]).collect());
+    for (way, curve) in WAYS.iter().zip(&o.growth.0) {
+        chart = chart.with(way.name, curve.iter().map(|(rays, left)| [f64::from(*rays), left.value]).collect());
     }
     Block::Chart(chart)
 }
@@ -224,16 +234,13 @@ fn growth(o: &Outcome<'_>) -> Block {
 fn pictures(setup: &Setup<'_>, o: &Outcome<'_>) -> Result<Vec<Block>, ReproduceError> {
     let (out, id) = (&setup.options.out, o.case.id);
     let exposure = gain(&o.truth.radiance);
-    let errors = o.antialiased_errors();
+    let (antialiased, errors) = (&o.antialiased[0], o.antialiased_errors(0));
     let (mut whole, mut crops) = (Vec::new(), Vec::new());
     for (k, role) in SHOWN.iter().enumerate() {
-        let picture = &o.antialiased[k].first;
+        let picture = &antialiased[k].first;
         let file = Picture::tone_mapped(o.size, picture, exposure).write(out, &format!("{id}-{k}"))?;
-        let caption = format!(
-            "N = {}; error with antialiasing {}",
-            o.antialiased[k].method.samples,
-            plus_minus(errors[k].error())
-        );
+        let caption =
+            format!("N = {}; error with antialiasing {}", antialiased[k].method.samples, plus_minus(errors[k].error()));
         whole.push(Shown { file, title: role.name().to_owned(), caption });
         let (size, part) = crop(o.size, picture, o.case.crop);
         let file = Picture::tone_mapped(size, &part, exposure).write(out, &format!("{id}-crop-{k}"))?;
@@ -244,10 +251,10 @@ fn pictures(setup: &Setup<'_>, o: &Outcome<'_>) -> Result<Vec<Block>, ReproduceE
     whole.push(Shown { file, title: "reference".to_owned(), caption: String::new() });
 
     let mut blocks = vec![Block::Pictures(whole), Block::Pictures(crops)];
-    for (way, name) in WAYS.iter().enumerate() {
+    for (way, of_way) in WAYS.iter().enumerate().take(FULL_WAYS) {
         let chosen = [Role::Balance, Role::Progressive, Role::Correlated, Role::Ris];
         let list: Vec<(&str, &Measured)> = chosen.iter().map(|r| (r.name(), &o.measured[r.place(way)])).collect();
-        blocks.extend(variances(setup, &o.truth, o.size, &list, &format!("{id}-variance-{way}"), name)?);
+        blocks.extend(variances(setup, &o.truth, o.size, &list, &format!("{id}-variance-{way}"), of_way.name)?);
     }
     Ok(blocks)
 }
@@ -275,15 +282,17 @@ pub fn variances(
 }
 
 fn numbers(o: &Outcome<'_>) -> Value {
-    let all: Vec<Value> = (0..WAYS.len())
-        .flat_map(|way| ROLES.map(|role| (way, role)))
+    let all: Vec<Value> = (WAYS.iter().enumerate())
+        .flat_map(|(way, of_way)| of_way.roles.iter().map(move |&role| (way, role)))
         .map(|(way, role)| method_json(role.name(), o.pair(role, way), o.errors(role, way)))
         .collect();
-    let errors = o.antialiased_errors();
-    let antialiased: Vec<Value> = SHOWN
-        .iter()
-        .enumerate()
-        .map(|(i, role)| method_json(role.name(), [&o.antialiased[i], &o.antialiased[0]], [&errors[i], &errors[0]]))
+    let antialiased: Vec<Value> = (0..SHOWN_WAYS.len())
+        .flat_map(|shown| {
+            let (all, errors) = (&o.antialiased[shown], o.antialiased_errors(shown));
+            let row =
+                |(i, role): (usize, &Role)| method_json(role.name(), [&all[i], &all[0]], [&errors[i], &errors[0]]);
+            SHOWN.iter().enumerate().map(row).collect::<Vec<Value>>()
+        })
         .collect();
     let curve = |way: usize| -> Vec<Value> {
         let point =
@@ -298,6 +307,6 @@ fn numbers(o: &Outcome<'_>) -> Value {
             "ris_proposals": o.numbers.ris.proposals },
         "reference": { "mean": estimate_json(o.truth.mean), "noise": o.truth.noise() },
         "methods": all, "antialiased": antialiased,
-        "growth": { WAYS[0]: curve(0), WAYS[1]: curve(1), WAYS[2]: curve(2) },
+        "growth": { WAYS[0].name: curve(0), WAYS[1].name: curve(1), WAYS[2].name: curve(2) },
     })
 }

@@ -1,7 +1,9 @@
 //! The methods that are held against each other, with three ways to draw samples: stratified in each estimate by itself, as
-//! the paper has them; stratified over all camera rays of a pixel; independent.
+//! the paper has them; stratified over all camera rays of a pixel; independent. Every light is chosen as often as any other,
+//! as in the paper; `mis` and progressive `ocv` also choose lights by the light tree, as the renderer does by default.
 
-use super::super::method::Method;
+use super::super::method::{Method, Points};
+use lumiris::lights::LightSamplerKind;
 use lumiris::settings::{OptimalForm, Split, Strata};
 use lumiris_numbers::estimators::mis::Heuristic;
 use lumiris_numbers::estimators::ocv::Form;
@@ -44,8 +46,40 @@ pub const ROLES: [Role; 12] = [
     Role::EqualTime,
 ];
 
-/// Names of the ways to draw samples.
-pub const WAYS: [&str; 3] = ["stratified in each estimate", "stratified over all rays", "independent"];
+/// Those that also choose lights by the tree.
+const PAIR: [Role; 2] = [Role::Balance, Role::Progressive];
+
+/// A way to draw samples and to choose lights.
+#[derive(Clone, Copy, Debug)]
+pub struct Way {
+    /// Name on the page.
+    pub name: &'static str,
+    pub points: Points,
+    pub lights: LightSamplerKind,
+    /// Who takes part.
+    pub roles: &'static [Role],
+}
+
+const fn alike(name: &'static str, points: Points) -> Way {
+    Way { name, points, lights: LightSamplerKind::Uniform, roles: &ROLES }
+}
+
+const fn by_tree(name: &'static str, points: Points) -> Way {
+    Way { name, points, lights: LightSamplerKind::Tree, roles: &PAIR }
+}
+
+/// All ways.
+pub const WAYS: [Way; 6] = [
+    alike("stratified in each estimate", Points::PerEstimate),
+    alike("stratified over all rays", Points::PerPixel),
+    alike("independent", Points::Independent),
+    by_tree("stratified in each estimate, lights by the tree", Points::PerEstimate),
+    by_tree("stratified over all rays, lights by the tree", Points::PerPixel),
+    by_tree("independent, lights by the tree", Points::Independent),
+];
+
+/// Number of ways in which all take part: the first ones.
+pub const FULL_WAYS: usize = 3;
 
 /// Numbers of samples.
 #[derive(Clone, Copy, Debug)]
@@ -92,7 +126,7 @@ impl Role {
         }
     }
 
-    /// The method, stratified over all rays.
+    /// The method, stratified over all rays, with every light as often as any other.
     pub fn method(self, n: Numbers) -> Method {
         let method = match self {
             Role::Balance => Method::mis(n.samples).weighted(Heuristic::Balance),
@@ -108,27 +142,25 @@ impl Role {
             Role::Ris => Method::ris(n.ris.proposals, n.ris.samples).strata(Strata::Systematic),
             Role::EqualTime => Method::ocv(Form::Progressive, n.equal_time),
         };
-        method.stratified()
+        method.lights_by(LightSamplerKind::Uniform).stratified()
     }
 
-    /// Its place among all methods; `way` is one of [`WAYS`].
+    /// Its place among all methods; `way` is one of [`WAYS`] in which it takes part.
     pub fn place(self, way: usize) -> usize {
-        way * ROLES.len() + self as usize
+        let before: usize = WAYS[..way].iter().map(|w| w.roles.len()).sum();
+        let own = WAYS[way].roles.iter().position(|&r| r == self);
+        before + own.expect("only roles that take part are asked for")
     }
 }
 
-/// All methods, in the order of [`Role::place`]. What learns from earlier rays of the pixel cannot have them apart; it
-/// stratifies over the rays of a block.
+/// All methods, in the order of [`Role::place`].
 pub fn methods(n: Numbers) -> Vec<Method> {
-    let way = |way: usize, role: Role| {
-        let method = role.method(n);
-        match (way, role) {
-            (0, Role::Progressive | Role::Optimal | Role::EqualTime) | (1, _) => method,
-            (0, _) => method.apart(),
-            _ => Method { stratified: false, strata: Strata::None, ..method },
-        }
+    let of = |way: &Way, role: Role| {
+        let method = Method { points: way.points, light_choice: way.lights, ..role.method(n) };
+        let is_independent = way.points == Points::Independent;
+        if is_independent { method.strata(Strata::None) } else { method }
     };
-    (0..WAYS.len()).flat_map(|k| ROLES.map(|role| way(k, role))).collect()
+    WAYS.iter().flat_map(|way| way.roles.iter().map(move |&role| of(way, role))).collect()
 }
 
 #[cfg(test)]
@@ -139,12 +171,27 @@ mod tests {
     fn a_role_finds_its_method() {
         let n = Numbers { samples: 64, equal_time: 60, ris: Split { samples: 16, proposals: 99 } };
         let all = methods(n);
-        assert_eq!(all.len(), WAYS.len() * ROLES.len());
-        for role in ROLES {
-            assert_eq!(all[role.place(1)], role.method(n));
-            assert_eq!(Method { apart: false, ..all[role.place(0)] }, role.method(n));
-            let independent = all[role.place(2)];
-            assert!(!independent.stratified && independent.samples == role.method(n).samples);
+        assert_eq!(all.len(), FULL_WAYS * ROLES.len() + (WAYS.len() - FULL_WAYS) * PAIR.len());
+        for (k, way) in WAYS.iter().enumerate() {
+            for role in way.roles {
+                let expected = role.method(n);
+                let found = all[role.place(k)];
+                assert_eq!((found.points, found.light_choice), (way.points, way.lights));
+                assert_eq!((found.estimator, found.form), (expected.estimator, expected.form));
+                assert_eq!((found.samples, found.proposals), (expected.samples, expected.proposals));
+            }
+        }
+    }
+
+    #[test]
+    fn methods_of_a_way_draw_samples_alike() {
+        let n = Numbers { samples: 64, equal_time: 60, ris: Split { samples: 16, proposals: 99 } };
+        let all = methods(n);
+        for k in 0..WAYS.len() {
+            let of = |role: Role| all[role.place(k)];
+            let [mis, ocv] = PAIR.map(of);
+            let like_mis = Method { estimator: mis.estimator, heuristic: mis.heuristic, ..ocv };
+            assert_eq!(like_mis, mis, "they differ in the estimator alone: {}", WAYS[k].name);
         }
     }
 }

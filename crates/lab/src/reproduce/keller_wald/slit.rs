@@ -4,6 +4,7 @@ use super::super::figure::{Figure, Summary};
 use super::super::measure::{Estimate, Stage};
 use super::super::page::{Block, Cell, Table};
 use super::super::pictures::{gain, significant};
+use super::super::verdicts::hardly_perceivable;
 use super::super::{ReproduceError, scaled};
 use super::above::Area;
 use super::maps::{Cloud, Maps, Print, clouds, plan, positions, prints, speed, trace};
@@ -145,34 +146,54 @@ fn figure(
     blocks.push(prints(setup, gain(&rows[1].picture), &list)?);
     blocks.push(Block::Table(table(rows)));
 
-    let loss = bias(&rows[2], &rows[1]);
-    let share = |r: &Row| r.in_room as f64 / r.maps.stored().max(1) as f64;
     Ok(Figure {
         id: "slit",
         title: "Figure 4: a room that is lit through a slit",
-        summary: Summary {
-            paper: "photons “only where they are important”, “hardly perceivable” bias".to_owned(),
-            target: "pictures, counts of photons in the visible room, bias of the cut-off form".to_owned(),
-            measured: format!(
-                "in the visible room {:.1} % → {:.1} % (ε) and {:.1} % (cut-off) of the photons; mean of the cut-off form {}",
-                share(&rows[0]) * 100.0,
-                share(&rows[1]) * 100.0,
-                share(&rows[2]) * 100.0,
-                percent(loss)
-            ),
-            reached: share(&rows[1]) > share(&rows[0]) && share(&rows[2]) > share(&rows[1]),
-            reason: format!(
-                "{} trajectories for as many photons as {}",
-                rows[2].maps.trajectories, rows[0].maps.trajectories
-            ),
-        },
-        also: Vec::new(),
+        summary: summary(rows),
+        also: vec![("the form without bias", unbiased_summary(rows))],
         blocks,
         numbers: json!({
             "size": size, "epsilon": LEAST, "seeds": SEEDS, "nearest": COUNT,
             "maps": rows.iter().map(|r| row_json(r, &rows[1])).collect::<Vec<Value>>(),
         }),
     })
+}
+
+/// Part of a map's photons that lie in the visible room, of the standard map, with ε, and with the cut-off.
+fn shares(rows: &[Row; 3]) -> [f64; 3] {
+    [0, 1, 2].map(|i| rows[i].in_room as f64 / rows[i].maps.stored().max(1) as f64)
+}
+
+fn summary(rows: &[Row; 3]) -> Summary {
+    let loss = bias(&rows[2], &rows[1]);
+    let [standard, floor, cut] = shares(rows);
+    Summary {
+        paper: "photons “only where they are important”, “hardly perceivable” bias".to_owned(),
+        target: "more photons in the visible room with each form; bias of the cut-off form below 2 %".to_owned(),
+        measured: format!(
+            "in the visible room {:.1} % → {:.1} % (ε) and {:.1} % (cut-off) of the photons; mean of the cut-off form {}",
+            standard * 100.0,
+            floor * 100.0,
+            cut * 100.0,
+            percent(loss)
+        ),
+        reached: floor > standard && cut > floor && hardly_perceivable(loss),
+        reason: format!(
+            "{} trajectories for as many photons as {}",
+            rows[2].maps.trajectories, rows[0].maps.trajectories
+        ),
+    }
+}
+
+fn unbiased_summary(rows: &[Row; 3]) -> Summary {
+    let [standard, floor, _] = shares(rows);
+    Summary {
+        paper: "photons “only where they are important”".to_owned(),
+        target: "more photons in the visible room".to_owned(),
+        measured: format!("{:.1} % → {:.1} % of the photons", standard * 100.0, floor * 100.0),
+        reached: floor > standard,
+        reason: format!("mean of the standard map against it {}", percent(bias(&rows[0], &rows[1]))),
+    }
 }
 
 fn table(rows: &[Row; 3]) -> Table {

@@ -5,9 +5,10 @@ use super::super::figure::{Figure, Summary, estimate_json, percent, plus_minus};
 use super::super::measure::{Estimate, Measured, Seconds, same_mean};
 use super::super::page::{Block, Cell, Shown, Table};
 use super::super::pictures::{HEAT, Picture, Scale, gain, significant};
+use super::super::verdicts::{falls, helps_most_in_shadow, reduced_by_resampling};
 use super::Setup;
 use super::classes::{Classes, LIT, NAMES, SHADOWED};
-use super::comparison::{Kind, Outcome};
+use super::comparison::{Kind, Outcome, Roles};
 use lumiris::settings::Split;
 use serde_json::{Value, json};
 
@@ -26,7 +27,7 @@ pub fn method_json(name: &str, all: &[Measured], method: usize, classes: &Classe
     json!({
         "name": name,
         "estimator": <&str>::from(m.method.estimator), "samples": m.method.samples, "proposals": m.method.proposals,
-        "strata": <&str>::from(m.method.strata), "stratified_points": m.method.stratified,
+        "strata": <&str>::from(m.method.strata), "points": m.method.points.name(),
         "turns": m.turns(), "variance": estimate_json(m.variance(None)),
         "time_ratio": m.time_ratio(base), "at_equal_time": estimate_json(m.at_equal_time(base, None)),
         "mean": estimate_json(m.mean()), "same_mean_p": same_mean(all, method),
@@ -59,9 +60,9 @@ pub fn comparison(setup: &Setup<'_>, o: &Outcome<'_>) -> Result<Figure, Reproduc
     ];
     blocks.extend(pictures(setup, o)?);
     blocks.extend(tables(o));
-    let summary = match o.case.kind {
-        Kind::Reduction { paper, target } => reduction(o, paper, target),
-        Kind::Stratification => stratification(o),
+    let (summary, also) = match o.case.kind {
+        Kind::Reduction { paper, target, .. } => reductions(o, [paper, target]),
+        Kind::Stratification => (stratification(o), Vec::new()),
     };
     let rows: Vec<Value> =
         (0..o.methods.len()).map(|i| method_json(&o.methods[i].name, &o.measured, i, &o.classes)).collect();
@@ -72,9 +73,10 @@ pub fn comparison(setup: &Setup<'_>, o: &Outcome<'_>) -> Result<Figure, Reproduc
         "t1_ns": o.calibration.times.t1, "t2_ns": o.calibration.times.t2, "budget_ns": o.calibration.budget,
         "proposals": proposals, "samples": samples,
         "visibility_share_of_ris": visibility(o).1, "visibility_bound": visibility(o).0,
+        "judged": o.roles.judged, "equal_halves": o.roles.equal_halves,
         "methods": rows, "antialiased": antialiased,
     });
-    Ok(Figure { id: o.case.id, title: o.case.title, summary, also: Vec::new(), blocks, numbers })
+    Ok(Figure { id: o.case.id, title: o.case.title, summary, also, blocks, numbers })
 }
 
 /// Variance that visibility alone leaves unstratified resampling, relative to that of the baseline, both at the time of
@@ -94,66 +96,90 @@ fn visibility(o: &Outcome<'_>) -> (f64, f64) {
     (left / base_variance * plain.time_ratio(base), left / v_plain.max(1e-300))
 }
 
-fn reduction(o: &Outcome<'_>, paper: f64, target: f64) -> Summary {
+/// The row of resampling number `i`.
+fn reduction(o: &Outcome<'_>, i: usize, [paper, target]: [f64; 2]) -> Summary {
     let base = &o.measured[o.roles.base];
+    let m = &o.measured[i];
     let at = |i: usize| o.measured[i].at_equal_time(base, None);
-    let best = at(o.roles.best);
-    let reached = (1.0 - best.value) * 100.0 >= target;
+    let counts = [m.method.proposals, m.method.samples];
+    let reached = reduced_by_resampling(counts, at(i), target);
     let (bound, share) = visibility(o);
-    let mut reason = format!("without stratification {}", percent(at(o.roles.plain)));
+    let mut reason = format!("M = {}, N = {}", m.method.proposals, m.method.samples);
+    if m.method.proposals == m.method.samples {
+        reason += ", so that nothing is resampled";
+    }
+    reason += &format!("; without stratification {}", percent(at(o.roles.plain)));
     if let Some(stratified) = o.roles.base_stratified {
-        let over = o.measured[o.roles.best].at_equal_time(&o.measured[stratified], None);
         reason += &format!(
             "; stratified samples alone give mc {}, and against that it is {}",
             percent(at(stratified)),
-            percent(over)
+            percent(m.at_equal_time(&o.measured[stratified], None))
         );
-        let [base, best, stratified] = [0, 1, 2].map(|k| &o.antialiased[k]);
-        reason += &format!(
-            "; with antialiasing it is {} against mc, {} against mc with stratified samples",
-            percent(best.at_equal_time(base, None)),
-            percent(best.at_equal_time(stratified, None))
-        );
+        if i == o.roles.judged {
+            let [base, judged, stratified] = [0, 1, 2].map(|k| &o.antialiased[k]);
+            reason += &format!(
+                "; with antialiasing it is {} against mc, {} against mc with stratified samples",
+                percent(judged.at_equal_time(base, None)),
+                percent(judged.at_equal_time(stratified, None))
+            );
+        }
     }
     reason += &format!("; visibility is {:.0} % of the variance of unstratified ris", share * 100.0);
-    if !reached {
+    if !reached && i == o.roles.equal_halves {
         reason += &format!(", so that no number of proposals brings it below {:+.0} %", (bound - 1.0) * 100.0);
     }
     Summary {
         paper: format!("−{paper} % variance at equal time"),
         target: format!("−{target} %"),
-        measured: percent(best),
+        measured: percent(at(i)),
         reached,
         reason,
     }
 }
 
+/// The row of the judged M and N, and that of equal halves of the time where it is another.
+fn reductions(o: &Outcome<'_>, printed: [f64; 2]) -> (Summary, Vec<(&'static str, Summary)>) {
+    let Roles { judged, equal_halves, .. } = o.roles;
+    let beside = (judged != equal_halves).then(|| {
+        let about = "equal halves of the time for proposals and samples, stratified";
+        (about, reduction(o, equal_halves, printed))
+    });
+    (reduction(o, judged, printed), beside.into_iter().collect())
+}
+
+/// The row of the ways to stratify, which the list of methods has in the order of the thesis.
 fn stratification(o: &Outcome<'_>) -> Summary {
     let base = &o.measured[o.roles.base];
     let masks = &o.classes.masks;
     let at = |i: usize, mask: Option<&[bool]>| o.measured[i].at_equal_time(base, mask);
-    // The order of the thesis: none, proposals, and either strata of samples below that; two standard errors for chance
-    let below = |a: Estimate, b: Estimate| a.value < b.value + 2.0 * a.error.hypot(b.error);
     let none = Estimate { value: 1.0, error: 0.0 };
-    let ordered = below(at(1, None), none) && (2..=4).all(|i| below(at(i, None), at(1, None)));
-    let step = |k: usize| {
-        let mask = Some(&masks[k][..]);
-        at(4, mask).value / at(1, mask).value.max(1e-300)
+    let steps: Vec<Estimate> = std::iter::once(none).chain((1..=4).map(|i| at(i, None))).collect();
+    // What strata of samples leave of the variance that stratified proposals leave
+    let left = |i: usize| {
+        [0, 1, 2].map(|k| {
+            let mask = Some(&masks[k][..]);
+            at(i, mask).value / at(1, mask).value.max(1e-300)
+        })
     };
-    let steps: Vec<String> = (0..3).map(|k| format!("{} {:.2}", NAMES[k], step(k))).collect();
-    let of_proposals: Vec<String> =
-        (0..3).map(|k| format!("{} {:.2}", NAMES[k], at(1, Some(&masks[k])).value)).collect();
-    let list: Vec<String> = (1..=4).map(|i| format!("{:.2}", at(i, None).value)).collect();
-    let most_in_shadow = step(1).min(step(2)) <= step(0);
+    let by_class = |left: [f64; 3]| -> String {
+        let classes: Vec<String> = NAMES.iter().zip(left).map(|(name, v)| format!("{name} {v:.2}")).collect();
+        classes.join(", ")
+    };
+    let of_proposals = [0, 1, 2].map(|k| at(1, Some(&masks[k])).value);
+    let list: Vec<String> = steps[1..].iter().map(|e| format!("{:.3} ± {:.3}", e.value, e.error)).collect();
     Summary {
         paper: "each step less variance; strata of samples most in shadow".to_owned(),
-        target: "same order".to_owned(),
+        target: "same order, each step by more than its noise; less left in penumbra and in shadow than in light"
+            .to_owned(),
         measured: format!("1 → {} (proposals, equal-proposals, equal-weights, systematic)", list.join(", ")),
-        reached: ordered && most_in_shadow,
+        reached: falls(&steps) && (2..=4).all(|i| helps_most_in_shadow(left(i))),
         reason: format!(
-            "stratified proposals leave {} of the variance; systematic samples leave {} of that",
-            of_proposals.join(", "),
-            steps.join(", ")
+            "stratified proposals leave {} of the variance; of that, equal-proposals strata leave {}, equal-weights strata {}, \
+             systematic samples {}",
+            by_class(of_proposals),
+            by_class(left(2)),
+            by_class(left(3)),
+            by_class(left(4))
         ),
     }
 }
@@ -163,7 +189,7 @@ fn pictures(setup: &Setup<'_>, o: &Outcome<'_>) -> Result<Vec<Block>, ReproduceE
     let id = o.case.id.replace('.', "-");
     let reference: Vec<[f32; 3]> = o.reference.iter().map(|p| p.map(|v| v as f32)).collect();
     let exposure = gain(&reference);
-    let chosen = [o.roles.base, o.roles.best];
+    let chosen = [o.roles.base, o.roles.judged];
     let base_seconds = o.antialiased[0].seconds[0].processor;
     let mut shown = Vec::new();
     for (k, &i) in chosen.iter().enumerate() {
