@@ -16,7 +16,7 @@ pub(super) const PHOTONS: Group = Group {
             parameters: &["photons"],
             key: "photons",
             kind: integer(1, MOST_U32),
-            help: "Photons that the global map stores, in each pass if progressive",
+            help: "Approximate number of photons stored in the global map, in each pass if progressive",
             applies: MAPS,
             get: |s| Some(Value::Integer(s.integrator.photons.photons.into())),
             set: |s, v| v.count().map(|n| s.integrator.photons.photons = n),
