@@ -252,31 +252,17 @@ impl<'a> Run<'a> {
             })
             .collect();
 
-        // Passes over all tiles: 1, 1, 2, 4, … samples, so that there is a whole picture soon
-        let longest = self.pass_length();
         let end = self.settings.first_sample + self.settings.spp;
         let mut stats = WorkerStats::default();
         let mut noise = None;
         let mut first = self.settings.first_sample;
         while first < end && !self.stopped() {
-            let done = first - self.settings.first_sample;
-            let mut length = self.samples_in_time(done).min(done.clamp(1, longest));
-            if integrator.is_progressive() {
-                // A pass lies within a block
-                let block = block_of(done);
-                length = length.min(block.first + block.len - done);
-            }
+            let mut length = self.next_pass(first - self.settings.first_sample);
             if let Some(maker) = &mut maker {
                 // A progressive map serves one sample of each pixel
                 length = if integrator.photons.progressive.is_some() { 1 } else { length };
-                if self.maps.is_none() || integrator.photons.progressive.is_some() {
-                    self.maps = None;
-                    self.maps = match maker.make(self.job, first) {
-                        Ok(maps) => Some(maps),
-                        // The samples so far are a picture
-                        Err(PhotonError::Stopped { .. }) if first > self.settings.first_sample => break,
-                        Err(e) => return Err(e.into()),
-                    };
+                if !self.renew_maps(maker, first)? {
+                    break;
                 }
             }
             let samples = first..(first + length).min(end);
@@ -323,6 +309,35 @@ impl<'a> Run<'a> {
         let seed = self.job.settings().sampling.seed;
         let seen = photon_map::maps::seen(self.job, &|pixel, sample| self.camera_sample_of_seed(pixel, sample, seed));
         MapMaker::new(self.job, &seen, self.stop).map(Some)
+    }
+
+    /// Makes the photon maps of the pass that begins with the sample `first`, if it needs others. False if it was told to stop and
+    /// the samples so far are a picture.
+    fn renew_maps(&mut self, maker: &mut MapMaker<'_>, first: u32) -> Result<bool, PhotonError> {
+        let is_progressive = self.job.settings().integrator.photons.progressive.is_some();
+        if self.maps.is_some() && !is_progressive {
+            return Ok(true);
+        }
+        self.maps = None;
+        match maker.make(self.job, first) {
+            Ok(maps) => {
+                self.maps = Some(maps);
+                Ok(true)
+            }
+            Err(PhotonError::Stopped { .. }) if first > self.settings.first_sample => Ok(false),
+            Err(error) => Err(error),
+        }
+    }
+
+    /// Samples per pixel of the next pass over all tiles: 1, 1, 2, 4, …, so that there is a whole picture soon. It lies within a block
+    /// of what is fitted in blocks.
+    fn next_pass(&self, done: u32) -> u32 {
+        let length = self.samples_in_time(done).min(done.clamp(1, self.pass_length()));
+        if !self.job.settings().integrator.is_progressive() {
+            return length;
+        }
+        let block = block_of(done);
+        length.min(block.first + block.len - done)
     }
 
     /// Samples per pixel of the longest pass.

@@ -5,8 +5,9 @@ use super::progress::{self, Bar};
 use super::settings::{SetupTimes, load_job, plan, render_settings};
 use anyhow::{Context, bail};
 use lumiris::imaging::oiio::{self, Part};
+use lumiris::integrators::photon_map::MapStats;
 use lumiris::render::output::{self, Aov};
-use lumiris::render::{RenderSettings, Rendering, render};
+use lumiris::render::{CacheReport, RenderSettings, Rendering, render};
 use lumiris::scene::RenderJob;
 use lumiris_formats::output::write_text;
 use serde_json::json;
@@ -162,29 +163,38 @@ fn stats(args: &RenderArgs, job: &RenderJob, rendering: &Rendering, setup: Setup
         "memory": {
             "accel_bytes": accel.bytes, "accel_peak_bytes": accel.peak_bytes,
         },
-        "photon_maps": rendering.photons.map(|p| json!({
-            "maps": p.maps,
-            "trajectories": p.trajectories,
-            "global_photons": p.global,
-            "caustic_photons": p.caustic,
-            "importons": p.importons,
-            "bytes": p.bytes,
-            "trace_seconds": seconds(p.tracing),
-            "sort_seconds": seconds(p.sorting),
-            "photons_per_second": (p.global + p.caustic) as f64 / seconds(p.tracing).max(1e-12),
-            "trajectories_per_second": p.trajectories as f64 / seconds(p.tracing).max(1e-12),
-        })),
-        "irradiance_cache": rendering.cache.map(|c| json!({
-            "records": c.records,
-            "record_bytes": c.bytes,
-            "build_seconds": seconds(c.build.elapsed),
-            "build_rounds": c.build.rounds,
-            "build_camera_samples": c.build.camera_samples,
-            "dropped_points": c.build.dropped,
-            "build_rays": c.build.paths.camera_rays + c.build.paths.bounce_rays + c.build.paths.direct.segments,
-            "lookups": c.lookups.lookups,
-            "fallbacks": c.lookups.fallbacks,
-        })),
+        "photon_maps": rendering.photons.map(|p| photon_stats(&p)),
+        "irradiance_cache": rendering.cache.map(|c| cache_stats(&c)),
+    })
+}
+
+fn photon_stats(p: &MapStats) -> serde_json::Value {
+    let seconds = p.tracing.as_secs_f64();
+    json!({
+        "maps": p.maps,
+        "trajectories": p.trajectories,
+        "global_photons": p.global,
+        "caustic_photons": p.caustic,
+        "importons": p.importons,
+        "bytes": p.bytes,
+        "trace_seconds": seconds,
+        "sort_seconds": p.sorting.as_secs_f64(),
+        "photons_per_second": (p.global + p.caustic) as f64 / seconds.max(1e-12),
+        "trajectories_per_second": p.trajectories as f64 / seconds.max(1e-12),
+    })
+}
+
+fn cache_stats(c: &CacheReport) -> serde_json::Value {
+    json!({
+        "records": c.records,
+        "record_bytes": c.bytes,
+        "build_seconds": c.build.elapsed.as_secs_f64(),
+        "build_rounds": c.build.rounds,
+        "build_camera_samples": c.build.camera_samples,
+        "dropped_points": c.build.dropped,
+        "build_rays": c.build.paths.camera_rays + c.build.paths.bounce_rays + c.build.paths.direct.segments,
+        "lookups": c.lookups.lookups,
+        "fallbacks": c.lookups.fallbacks,
     })
 }
 
