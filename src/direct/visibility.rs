@@ -1,16 +1,16 @@
-//! T2: shadow segments, packed in the order of their shading points, and the bits that come back.
+//! T2: shadow segments, packed in the order of their shading points, and the resulting visibility bits.
 
 use super::propose::Candidates;
 use crate::accel::{Accel, Coherence, RayBatch};
 use lumiris_numbers::math::{Ray, Rgb};
 
-/// True if a candidate of this contribution needs a segment: it is neither zero nor not finite.
+/// True if a candidate with this contribution needs a segment: it is finite and not zero.
 #[inline]
 pub(super) fn is_traced(contribution: &Rgb) -> bool {
     !contribution.is_black() && contribution.is_finite()
 }
 
-/// Segments of the candidates that matter, with what each is worth.
+/// Segments of the candidates with a contribution, and these contributions.
 #[derive(Debug, Default)]
 pub struct Segments {
     rays: RayBatch,
@@ -37,7 +37,7 @@ impl Segments {
         self.points.clear();
     }
 
-    /// Adds a segment with its point and what that adds if it is free.
+    /// Adds a segment with its point and its contribution if unoccluded.
     pub fn push(&mut self, segment: &Ray, point: u32, contribution: Rgb) {
         self.rays.push(segment);
         self.contributions.push(contribution);
@@ -65,24 +65,24 @@ impl Segments {
         accel.occluded(&self.rays, Coherence::Packets, &mut self.occluded);
     }
 
-    /// Takes all segments for free without tracing them.
+    /// Marks all segments as unoccluded without tracing them.
     pub fn set_free(&mut self) {
         self.occluded.clear();
         self.occluded.resize(self.rays.len(), false);
     }
 
-    /// For each segment, whether something was in the way.
+    /// For each segment, whether it is occluded.
     pub fn occluded(&self) -> &[bool] {
         &self.occluded
     }
 
-    /// Point, contribution if free, and whether it is free, of each segment.
+    /// Point, contribution if unoccluded, and visibility of each segment.
     pub fn outcomes(&self) -> impl Iterator<Item = (u32, Rgb, bool)> {
         let segments = self.points.iter().zip(&self.contributions).zip(&self.occluded);
         segments.map(|((&point, &contribution), &occluded)| (point, contribution, !occluded))
     }
 
-    /// Adds the contributions of the free segments to their points, in order.
+    /// Adds the contributions of the unoccluded segments to their points, in order.
     pub fn resolve(&self, out: &mut [Rgb]) {
         for (point, contribution, is_free) in self.outcomes() {
             if is_free {

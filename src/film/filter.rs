@@ -1,9 +1,10 @@
-//! Pixel filters, and samples from them.
+//! Pixel filters and their importance sampling.
 //!
-//! A sample's place in the pixel is drawn from |f|/∫|f| and weighs f/(pdf·∫f) = ±∫|f|/∫f, so that the mean weight is 1 and
-//! the weighted mean of radiance is the filtered image [Ernst, Stamminger and Greiner 2006; Pharr et al. 2023, §8.8].
-//! All filters are products of a function of x and one of y. Box and triangle are sampled in closed form, the others
-//! from tables of [`ENTRIES_PER_UNIT`] equal steps per pixel, within which they are taken to be constant.
+//! A sample's position in the pixel is drawn from |f|/∫|f| and has the weight f/(pdf·∫f) = ±∫|f|/∫f, so that the mean
+//! weight is 1 and the weighted mean of radiance is the filtered image [Ernst, Stamminger and Greiner 2006; Pharr et
+//! al. 2023, §8.8]. All filters are products of a function of x and one of y. Box and triangle are sampled in closed
+//! form, the others from tables of [`ENTRIES_PER_UNIT`] equal steps per pixel, within which they are taken to be
+//! constant.
 
 use lumiris_numbers::math::warp::sample_tent;
 use lumiris_numbers::math::{PiecewiseConstant1D, Vec2};
@@ -60,7 +61,7 @@ pub enum PixelFilter {
     },
 }
 
-/// A place in the filter.
+/// A position in the filter.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct FilterSample {
     /// Offset from the pixel's centre, in pixels.

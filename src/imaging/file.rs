@@ -1,4 +1,4 @@
-//! What is said of picture files beside their pixels.
+//! Metadata of image files: everything beside the pixels.
 
 use std::path::PathBuf;
 
@@ -22,7 +22,7 @@ pub enum ImageError {
         /// What is wrong with it.
         reason: String,
     },
-    /// It asks for more memory than allowed.
+    /// It needs more memory than allowed.
     #[error("{}: {reason}", path.display())]
     TooLarge {
         /// The file.

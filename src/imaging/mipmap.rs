@@ -1,8 +1,9 @@
 //! Image pyramids for filtered lookups.
 //!
 //! Level 0 is the image; each next level halves both sides, rounding down, by the exact area mean (a box filter over
-//! what may be fractions of pixels), down to one pixel. Texture coordinates (s, t) run over 0..1 from the **top left**;
-//! who has t upwards flips it. A filter of width w in (s, t) reads the level ℓ = levels − 1 + log₂ w, as pbrt-v4.
+//! possibly fractional pixels), down to one pixel. Texture coordinates (s, t) run over 0..1 from the **top left**;
+//! callers with t upwards flip it. A filter of width w in (s, t) reads the level ℓ = levels − 1 + log₂ w, as in
+//! pbrt-v4.
 
 use super::{ColorEncoding, Image};
 use lumiris_numbers::math::{Rgb, Vec2};
@@ -21,7 +22,7 @@ pub enum Wrap {
     OctahedralSphere,
 }
 
-/// How a lookup reads the pyramid.
+/// The filter of a lookup.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub enum Filter {
     /// The nearest pixel of the level below the filter's width.
@@ -31,8 +32,8 @@ pub enum Filter {
     Bilinear,
     /// Bilinear in two levels, linear between them.
     Trilinear,
-    /// Read as [`Filter::Trilinear`] with the mean width of the footprint's axes: no anisotropic kernel, since the pixel
-    /// integrates over the footprint.
+    /// Read as [`Filter::Trilinear`] with the mean width of the footprint's axes: no anisotropic kernel, since the
+    /// pixel integrates over the footprint.
     Ewa,
 }
 
@@ -300,7 +301,7 @@ impl MipMap {
     }
 }
 
-/// Source pixels under pixel `i` of `n` over a source of `m` pixels, with their shares of its area.
+/// Source pixels under pixel `i` of `n` over a source of `m` pixels, with their fractions of its area.
 fn overlaps(i: usize, n: usize, m: usize) -> Vec<(usize, f32)> {
     // In units of 1/n source pixels all edges are integers.
     let (start, end) = (i * m, (i + 1) * m);

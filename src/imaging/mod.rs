@@ -1,4 +1,4 @@
-//! Pictures: pixels with named channels, their encodings, pyramids for filtered lookups, and how far two are apart.
+//! Images: pixels with named channels, their encodings, pyramids for filtered lookups, and metrics of their difference.
 //!
 //! Reading order: [`color`], [`mipmap`], [`mod@file`], [`oiio`], [`metrics`], [`heat`].
 

@@ -1,9 +1,9 @@
-//! Pictures in files, by OpenImageIO: the safe layer over the shim.
+//! Image files, by OpenImageIO: the safe layer over the shim.
 //!
-//! OpenImageIO is loaded when the first picture is read or written. Reading refuses pictures whose header asks for more
-//! memory than the caller allows; writing goes to a file beside the target and renames it at the end, so that a
-//! failure never leaves half a picture under the name. Equal pictures give equal files: a date is written only if the
-//! caller gives one (`DateTime`), since OpenImageIO would fill in the current time.
+//! OpenImageIO is loaded when the first image is read or written. Reading refuses images whose header requests more
+//! memory than the caller allows; writing goes to a temporary file beside the target, which is renamed at the end, so
+//! that a failure never leaves a partial image under the name. Equal images give equal files: a date is written only if
+//! the caller gives one (`DateTime`), since OpenImageIO would fill in the current time.
 #![allow(unsafe_code)]
 
 pub use super::file::{ImageError, PartHeader, ReadLimits, Window};
@@ -59,7 +59,7 @@ pub enum MetaValue {
 pub struct ReadImage {
     /// The pixels: integers of the file are 0..1 here, and nothing is decoded.
     pub image: Image,
-    /// What the numbers of such a file usually mean: sRGB for 8-bit and 16-bit integers, linear for everything else.
+    /// The usual encoding of such a file: sRGB for 8-bit and 16-bit integers, linear for everything else.
     pub encoding: ColorEncoding,
     /// Metadata by name, as text.
     pub metadata: BTreeMap<String, String>,
@@ -149,7 +149,7 @@ impl Part {
         self
     }
 
-    /// Chooses the compression, as OpenImageIO names it: `piz`, `dwaa:45`, `jpeg:90`. EXR files have `zip` if not told.
+    /// Chooses the compression, as OpenImageIO names it: `piz`, `dwaa:45`, `jpeg:90`. EXR files use `zip` by default.
     #[must_use]
     pub fn compressed_by(mut self, compression: &str) -> Self {
         self.compression = Some(compression.to_owned());

@@ -1,4 +1,4 @@
-//! Image files of a scene: each is asked for once, and all are read in parallel.
+//! Image files of a scene: each is requested once, and all are read in parallel.
 
 use crate::imaging::oiio::ImageError;
 use crate::imaging::oiio::{self, ReadLimits};

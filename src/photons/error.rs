@@ -1,9 +1,9 @@
-//! Why there is no photon map.
+//! Why a photon map could not be built.
 
-/// What went wrong with photons or importons.
+/// Errors of photon and importon tracing.
 #[derive(Clone, Copy, Debug, PartialEq, thiserror::Error)]
 pub enum PhotonError {
-    /// There is nothing that could emit.
+    /// There is no light.
     #[error("the scene has no light, so there are no photons to trace")]
     NoLight,
     /// There are lights, and all of them are black.

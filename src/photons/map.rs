@@ -1,19 +1,19 @@
-//! Photons by place, and the density of their power.
+//! Photons in a spatial index, and the density of their power.
 //!
-//! The irradiance at x is estimated by the photons around it, E ≈ Σ K(d_k) Φ_k, with the kernel of Epanechnikov, K(d) =
+//! The irradiance at x is estimated from the photons around it, E ≈ Σ K(d_k) Φ_k, with the Epanechnikov kernel K(d) =
 //! 2/(πr²) (1 − d²/r²), whose integral over the disk of radius r is 1 [Epanechnikov 1969; Silverman 1986, §4.2]. r is
-//! given or the distance of the k-th nearest photon [Jensen 1996], which itself does not count then: for photons of
-//! constant density λ, E[(k − 1)/(πr²)] = λ, whereas k/(πr²) would be too much by the factor k/(k − 1). If the disk of
-//! the largest radius has fewer than k photons, all of them count with that radius; so the estimate is unbiased
-//! whichever happens: λ P(N ≥ k − 1) + λ P(N ≤ k − 2), N being the photons in the largest disk.
+//! given, or it is the distance of the k-th nearest photon [Jensen 1996], which is then excluded: for photons of
+//! constant density λ, E[(k − 1)/(πr²)] = λ, whereas k/(πr²) would be too large by the factor k/(k − 1). If the disk of
+//! the maximum radius has fewer than k photons, all of them count with that radius; so the estimate is unbiased in
+//! either case: λ P(N ≥ k − 1) + λ P(N ≤ k − 2), N being the number of photons in the largest disk.
 //!
-//! Which photons belong to a place: those that lie on a surface of nearly its normal, on its side of it, and about in
-//! its tangent plane. What is compared with r is the greater one of d and 4 |d·n|, so that photons farther from the plane
-//! than a quarter of r never count, as in the flattened spheres of [Jensen 2001, §7.2]. On a plane, and on a ball of more
-//! than twice the radius r, that is d, and of a ball the area within the distance d is πd² as well.
+//! A photon counts at a point if it lies on a surface of nearly the same normal, on the same side, and close to the
+//! tangent plane. The maximum of d and 4 |d·n| is compared with r, so that photons farther from the plane than r/4
+//! never count, as in the flattened spheres of [Jensen 2001, §7.2]. On a plane, and on a sphere of more than twice the
+//! radius r, that is d, and the area of a sphere within the distance d is πd² as well.
 //!
-//! The irradiance is about the shading normal of the place: a photon's power is weighed by |wi·ns|/|wi·n_k|, n_k being
-//! the geometric normal where it lies, since it is the area about n_k over which photons are spread.
+//! The irradiance is about the shading normal: a photon's power is weighted by |wi·ns|/|wi·n_k|, n_k being the
+//! geometric normal at the photon, since photons are spread over the area about n_k.
 
 use super::photon::Photon;
 use super::tree::{Tree, Visit};
@@ -21,26 +21,26 @@ use lumiris_numbers::math::{Rgb, Vec3};
 use std::collections::BinaryHeap;
 use std::f32::consts::FRAC_1_PI;
 
-/// Cosine of the largest angle between the normals of a place and of photons that count.
+/// Cosine of the maximum angle between the normals of a point and of photons that count.
 const MIN_NORMAL_COS: f32 = 0.8;
 /// Squared factor of distances along the normal.
 const FLATTENING: f32 = 16.0;
-/// Cosines below this count as this where they divide: packed directions do not tell them apart.
+/// Lower bound of cosines in denominators: packed directions cannot resolve smaller ones.
 const MIN_COS: f32 = 0.01;
 
-/// A place on a surface, seen from one side.
+/// A point on a surface, on one side.
 #[derive(Clone, Copy, Debug)]
 pub struct Place {
     /// The point.
     pub p: Vec3,
-    /// Geometric normal on the side whose light is wanted, unit.
+    /// Geometric normal on the lit side, unit.
     pub n: Vec3,
-    /// Shading normal on that side, about which irradiance is taken, unit.
+    /// Shading normal on that side, which defines the irradiance, unit.
     pub ns: Vec3,
 }
 
 impl Place {
-    /// A place whose shading normal is the geometric one.
+    /// A point whose shading normal is the geometric one.
     pub fn flat(p: Vec3, n: Vec3) -> Self {
         Place { p, n, ns: n }
     }
@@ -53,14 +53,14 @@ pub enum Search {
     Nearest {
         /// Their number, at least 2.
         count: u32,
-        /// Radius beyond which none is looked for (m).
+        /// Maximum radius of a search (m).
         max_radius: f32,
     },
     /// All within a radius (m).
     Radius(f32),
 }
 
-/// Memory of searches; one for each thread.
+/// Buffers of searches; one per thread.
 #[derive(Clone, Debug, Default)]
 pub struct GatherScratch {
     nearest: BinaryHeap<Candidate>,
@@ -90,14 +90,14 @@ impl Ord for Candidate {
     }
 }
 
-/// Photons that can be asked for by place.
+/// Photons in a spatial index.
 #[derive(Clone, Debug, Default)]
 pub struct PhotonMap {
     tree: Tree,
 }
 
 impl PhotonMap {
-    /// Sorts photons, on all threads of the current pool; the map does not depend on how many those are.
+    /// Builds the map on all threads of the current pool; the result does not depend on their number.
     pub fn new(photons: Vec<Photon>) -> Self {
         PhotonMap { tree: Tree::new(photons) }
     }
@@ -152,7 +152,7 @@ impl PhotonMap {
                 self.tree.visit(at.p, &mut nearest);
                 let bound = nearest.bound;
                 let Some(farthest) = heap.peek() else { return 0.0 };
-                // Without any bound, what was found has to do
+                // Without any bound, the photons found have to suffice
                 let r2 = if bound.is_finite() { bound } else { farthest.d2 };
                 if !(r2 > 0.0) {
                     return 0.0;
@@ -180,7 +180,7 @@ impl PhotonMap {
 }
 
 impl Place {
-    /// The squared distance of a photon that differs by `d`, of squared length `d2`; `None` if it does not belong here.
+    /// The squared distance of a photon at offset `d`, of squared length `d2`; `None` if it does not count.
     #[inline]
     fn distance_squared(&self, photon: &Photon, d: Vec3, d2: f32, bound: f32) -> Option<f32> {
         let along = d.dot(self.n);
@@ -248,7 +248,7 @@ impl<F: FnMut(&Photon, f32)> Visit for Within<'_, F> {
 struct Nearest<'a> {
     at: &'a Place,
     count: usize,
-    /// Squared distance of the last of them, once there are as many as wanted.
+    /// Squared distance of the farthest, once there are enough.
     bound: f32,
     heap: &'a mut BinaryHeap<Candidate>,
 }

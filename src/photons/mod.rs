@@ -1,13 +1,13 @@
-//! Photon maps [Jensen 1996], whose photons are stored by their importance to the picture [Keller and Wald 2000].
+//! Photon maps [Jensen 1996], whose photons are stored by visual importance [Keller and Wald 2000].
 //!
 //! ```text
 //! camera ─importons─▶ p(x) ──┐
 //! lights ─random walks─▶ arrivals ─store with probability p(x), or q·p(x)─▶ caustic and global photons ─tree─▶ maps
 //! ```
 //!
-//! Photons lie on surfaces whose BSDF has a Lambertian part ([`crate::bsdfs::Bsdf::lambertian`]), and tell how they
-//! came there ([`Origin`]): straight from a light, scattered by a Lambertian lobe, or by any other one, which makes
-//! them caustics, whether the light before that was direct or not.
+//! Photons lie on surfaces whose BSDF has a Lambertian part ([`crate::bsdfs::Bsdf::lambertian`]), and record how they
+//! got there ([`Origin`]): straight from a light, scattered by a Lambertian lobe, or by any other one, which makes them
+//! caustic photons, whether the light before that was direct or not.
 //!
 //! Reading order: [`photon`], `tree`, [`map`]; [`shares`], `walk`, [`rules`], [`trace`]; [`importance`], [`error`].
 

@@ -15,10 +15,10 @@ use lumiris_numbers::math::{Rgb, Vec3};
 const MANTISSA_BITS: u32 = 12;
 /// Bits of a light's id.
 const LIGHT_BITS: u32 = 26;
-/// The id of lights that have no room.
+/// The id that stands for lights whose id does not fit.
 const NO_LIGHT: u32 = (1 << LIGHT_BITS) - 1;
 
-/// How a photon came to its surface. Surfaces that rays pass without scattering do not count.
+/// The last scattering event of a photon. Interface materials do not count.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Origin {
     /// Straight from a light.
@@ -62,7 +62,7 @@ const _: () = assert!(size_of::<Photon>() == 28);
 
 impl Photon {
     /// A photon at `p` that came from the direction `wi` (unit, away from the surface). `n`: geometric normal of the
-    /// surface on the side of `wi`, unit. `power` (W) is not negative; what is not a number counts as 0.
+    /// surface on the side of `wi`, unit. `power` (W) is not negative; NaN counts as 0.
     #[inline]
     pub fn new(p: Vec3, wi: Vec3, n: Vec3, power: Rgb, origin: Origin) -> Self {
         let (exponent, [r, g, b]) = pack_power(power);
@@ -81,7 +81,7 @@ impl Photon {
         Vec3::from_array(self.p)
     }
 
-    /// Where it came from: unit, away from the surface.
+    /// Direction to where it came from: unit, away from the surface.
     #[inline]
     pub fn wi(&self) -> Vec3 {
         unpack_unit(self.wi)
@@ -116,7 +116,7 @@ impl Photon {
         }
     }
 
-    /// The light that it came straight from, if it did so; lights of ids from 2²⁶ − 1 on are not told.
+    /// The light that it came straight from, if so; ids from 2²⁶ − 1 on are not stored.
     #[inline]
     pub fn light(&self) -> Option<LightId> {
         let (kind, light) = (self.rest >> 4 & 3, self.rest >> 6);

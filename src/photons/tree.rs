@@ -1,15 +1,15 @@
-//! A kd-tree over photons, which lie in the order of its leaves: 8 bytes a node, in preorder.
+//! A kd-tree over photons, which are stored in the order of its leaves: 8 bytes a node, in preorder.
 //!
-//! A node halves its photons across the longest side of their box. Photons lie on walls, and many have one equal
-//! coordinate: those stay together, so that the two cells do not touch; halves are unequal then, but what has an equal
-//! coordinate is never cut along it again, so that the tree is no deeper for it than by three.
+//! A node divides its photons in halves across the longest side of their box. Photons lie on walls, and many share one
+//! coordinate: these stay together, so that the two cells do not touch; the halves are then unequal, but photons with
+//! an equal coordinate are never divided along it again, which makes the tree deeper by at most three.
 
 use super::photon::Photon;
 use lumiris_numbers::math::Vec3;
 
-/// Most photons of a leaf, unless they are all at one point.
+/// Maximum number of photons in a leaf, unless they are all at one point.
 const LEAF: usize = 10;
-/// Photons from which on halves are built in parallel.
+/// Number of photons from which on halves are built in parallel.
 const PARALLEL: usize = 1 << 14;
 /// The kind of leaves, beside the axes 0, 1, 2.
 const IS_LEAF: u32 = 3;
@@ -17,9 +17,9 @@ const IS_LEAF: u32 = 3;
 /// A plane, or a leaf.
 #[derive(Clone, Copy, Debug)]
 struct Node {
-    /// The plane's coordinate, by bits, or the first photon.
+    /// The plane's coordinate, as bits, or the first photon.
     value: u32,
-    /// Axis or `IS_LEAF` in two bits; how many nodes on the second child is, or the number of photons.
+    /// Axis or `IS_LEAF` in two bits; the offset of the second child, or the number of photons.
     kind: u32,
 }
 
@@ -32,7 +32,7 @@ pub(super) struct Tree {
 
 /// A visitor of photons.
 pub(super) trait Visit {
-    /// Squared distance beyond which photons do not matter (m²).
+    /// Maximum squared distance (m²).
     fn bound(&self) -> f32;
     /// A photon within the bound, by its offset and squared distance.
     fn photon(&mut self, index: usize, photon: &Photon, d: Vec3, d2: f32);
@@ -40,7 +40,7 @@ pub(super) trait Visit {
 
 impl Tree {
     pub(super) fn new(mut photons: Vec<Photon>) -> Self {
-        // A place that is no number has no side
+        // A position that is NaN is on no side
         photons.retain(|photon| photon.p().is_finite());
         let mut nodes = Vec::with_capacity(photons.len() / (LEAF / 3) + 1);
         if !photons.is_empty() {
@@ -123,8 +123,8 @@ fn build(photons: &mut [Photon], begin: u32, nodes: &mut Vec<Node>) {
     }
 }
 
-/// Sorts photons into two sets, the first of which has the lesser coordinates, equal ones being in one set; about half
-/// of all if that can be. Returns the size of the first. Not all coordinates are equal.
+/// Partitions photons into two sets, the first of which has the smaller coordinates, with equal ones in the same set;
+/// about half of all if possible. Returns the size of the first. Not all coordinates are equal.
 fn cut(photons: &mut [Photon], axis: usize) -> usize {
     let half = photons.len() / 2;
     let (below, median, above) = photons.select_nth_unstable_by(half, |a, b| a.p()[axis].total_cmp(&b.p()[axis]));
@@ -139,7 +139,7 @@ fn cut(photons: &mut [Photon], axis: usize) -> usize {
     if less > 0 && (is_nearer || not_more == photons.len()) { less } else { not_more }
 }
 
-/// Moves those that `belongs` tells to the front; returns their number.
+/// Moves the items that satisfy `belongs` to the front; returns their number.
 fn partition(photons: &mut [Photon], belongs: impl Fn(&Photon) -> bool) -> usize {
     let mut count = 0;
     for i in 0..photons.len() {

@@ -1,4 +1,4 @@
-//! Light transport: what is computed, and how direct light is estimated.
+//! Light transport: the integrator, and how direct light is estimated.
 
 use super::photon_map::PhotonMapSettings;
 use super::ris::{Proposals, RisSettings, Target};
@@ -11,49 +11,49 @@ use strum::{EnumString, IntoStaticStr, VariantNames};
 /// Light transport.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct IntegratorSettings {
-    /// What is computed.
+    /// The integrator.
     pub kind: IntegratorKind,
-    /// Number of bounces; 1 is direct light. With `irradiance-cache` those that a record holds count from the record.
+    /// Maximum number of bounces; 1 is direct light. In records of `irradiance-cache` they are counted from the record.
     pub max_depth: u32,
     /// Direct-light estimator at each path vertex.
     pub estimator: EstimatorKind,
-    /// Samples per estimate (N): shadow segments per shading point. `None` is the choice of the estimator:
+    /// Samples per estimate (N): shadow segments per shading point. `None` is the default of the estimator:
     /// [`DEFAULT_SAMPLES`], or [`DEFAULT_RIS_SAMPLES`].
     pub samples: Option<u32>,
     /// Weights of the techniques; see [`Self::heuristic`].
     pub heuristic: Option<Heuristic>,
-    /// Share of the samples that is drawn by the BSDF, for the estimators that mix it with light sampling (0 to 1); each of both
-    /// has at least one sample, if there are two.
+    /// Fraction of the samples drawn by BSDF sampling, for estimators that combine it with light sampling (0 to 1);
+    /// with two or more samples, each technique gets at least one.
     pub bsdf_share: f32,
-    /// How a light is chosen.
+    /// The light sampler.
     pub light_choice: LightSamplerKind,
-    /// What is particular to `ris`.
+    /// Settings of `ris`.
     pub ris: RisSettings,
-    /// What is particular to `irradiance-cache`.
+    /// Settings of `irradiance-cache`.
     pub cache: IrradianceCacheSettings,
-    /// What is particular to `photon-map`.
+    /// Settings of `photon-map`.
     pub photons: PhotonMapSettings,
-    /// What is particular to `ocv`.
+    /// Settings of `ocv`.
     pub ocv: OcvSettings,
-    /// How `optimal-mis` finds its weights.
+    /// How `optimal-mis` determines its weights.
     pub optimal_mis: OptimalForm,
-    /// What is particular to `correlated`.
+    /// Settings of `correlated`.
     pub correlated: CorrelatedSettings,
-    /// What is particular to `contributing`.
+    /// Settings of `contributing`.
     pub contributing: ContributingSettings,
-    /// Directions proposed for each that continues a path (M), where the BSDF is one that can only be evaluated; 1 is
-    /// plain importance sampling.
+    /// Proposals (M) per direction that continues a path, for BSDFs that can only be evaluated; 1 is plain importance
+    /// sampling.
     pub bsdf_proposals: u32,
-    /// Density that proposes them.
+    /// Density of these proposals.
     pub bsdf_density: ProposalDensity,
 }
 
-/// Samples per estimate of `mc` and `mis` where none are asked for.
+/// Default number of samples per estimate of `mc` and `mis`.
 pub const DEFAULT_SAMPLES: u32 = 2;
-/// Samples per estimate of `ris` where none are asked for: what a shading point costs before its first proposal is worth more than
-/// one sample, and powers of two are well distributed.
+/// Default number of samples per estimate of `ris`: the fixed cost of a shading point justifies more than one sample,
+/// and powers of two are well distributed.
 pub const DEFAULT_RIS_SAMPLES: u32 = 4;
-/// Samples per estimate of `ocv`, `optimal-mis`, `correlated` and `contributing` where none are asked for.
+/// Default number of samples per estimate of `ocv`, `optimal-mis`, `correlated` and `contributing`.
 pub const DEFAULT_OCV_SAMPLES: u32 = 4;
 
 impl Default for IntegratorSettings {
@@ -80,7 +80,7 @@ impl Default for IntegratorSettings {
 }
 
 impl IntegratorSettings {
-    /// The number of bounces that is really computed.
+    /// The maximum number of bounces of the integrator.
     pub fn depth(&self) -> u32 {
         match self.kind {
             IntegratorKind::Direct => self.max_depth.min(1),
@@ -88,8 +88,9 @@ impl IntegratorSettings {
         }
     }
 
-    /// MIS weights of `mis`, and of the techniques that propose for `ris`. Resampling has the least variance if proposals
-    /// have, which the balance heuristic comes near; the power heuristic serves where everything proposed is traced.
+    /// MIS heuristic of `mis`, and of the techniques that propose for `ris`. Resampling has minimal variance if the
+    /// proposals have, which the balance heuristic approximates; the power heuristic is better where all samples are
+    /// traced.
     pub fn heuristic(&self) -> Heuristic {
         self.heuristic.unwrap_or(match self.estimator {
             EstimatorKind::Mc | EstimatorKind::Mis | EstimatorKind::Correlated | EstimatorKind::Contributing => {
@@ -99,7 +100,7 @@ impl IntegratorSettings {
         })
     }
 
-    /// True if an estimate uses coefficients that were fitted to earlier samples of its pixel.
+    /// True if an estimate uses coefficients fitted to earlier samples of its pixel.
     pub fn is_progressive(&self) -> bool {
         match self.estimator {
             EstimatorKind::Mc
@@ -112,8 +113,8 @@ impl IntegratorSettings {
         }
     }
 
-    /// Settings of direct light at the vertex of a path, which are counted from 0. What is fitted to earlier samples of a pixel is
-    /// fitted to first vertices, which lie together; at later ones, which lie anywhere, estimates are those of `mis`.
+    /// Settings of direct light at a path vertex, counted from 0. Progressive estimators are fitted to the first
+    /// vertices of a pixel, which are close together; at later ones, which lie anywhere, `mis` is used.
     #[must_use]
     pub fn at_vertex(&self, vertex: u32) -> IntegratorSettings {
         if vertex == 0 || !self.is_progressive() {
@@ -122,19 +123,19 @@ impl IntegratorSettings {
         IntegratorSettings { estimator: EstimatorKind::Mis, samples: Some(self.split().samples), ..*self }
     }
 
-    /// True if direct light asks which lights photons have come from.
+    /// True if direct light uses the visibility cache.
     pub fn uses_light_hints(&self) -> bool {
         self.light_choice == LightSamplerKind::Photons
             || self.estimator == EstimatorKind::Contributing
             || self.estimator == EstimatorKind::Ris && self.ris.target == Target::Visibility
     }
 
-    /// True if lights that no photon came from are left out, which is biased.
+    /// True if non-contributing lights are left out, which is biased.
     pub fn leaves_lights_out(&self) -> bool {
         self.estimator == EstimatorKind::Contributing && self.contributing.rest_samples == 0
     }
 
-    /// True if an estimate is made of two independent halves.
+    /// True if an estimate consists of two independent halves.
     pub fn has_halves(&self) -> bool {
         match self.estimator {
             EstimatorKind::Mc
@@ -147,7 +148,7 @@ impl IntegratorSettings {
         }
     }
 
-    /// [`Self::split`] at the vertex of a path, which are counted from 0.
+    /// [`Self::split`] at a path vertex, counted from 0.
     pub fn split_at_vertex(&self, vertex: u32) -> Split {
         match self.estimator {
             EstimatorKind::Ris => self.split().after_bounces(vertex),
@@ -160,7 +161,7 @@ impl IntegratorSettings {
         }
     }
 
-    /// Samples and proposals of every estimate where they are not chosen per pixel.
+    /// Sample and proposal counts of an estimate, unless chosen per pixel.
     pub fn split(&self) -> Split {
         let default = match self.estimator {
             EstimatorKind::Mc | EstimatorKind::Mis => DEFAULT_SAMPLES,
@@ -195,11 +196,11 @@ impl IntegratorSettings {
 pub enum IntegratorKind {
     /// Emitted light and one bounce.
     Direct,
-    /// Paths of up to `max_depth` bounces.
+    /// Path tracing of up to `max_depth` bounces.
     Path,
-    /// The same, with the light that diffuse surfaces reflect interpolated between records [Ward et al. 1988].
+    /// Paths, with the light reflected by diffuse surfaces interpolated between records [Ward et al. 1988].
     IrradianceCache,
-    /// The same, with the light that diffuse surfaces reflect from photon maps [Jensen 1996; Keller and Wald 2000].
+    /// Paths, with the light reflected by diffuse surfaces from photon maps [Jensen 1996; Keller and Wald 2000].
     PhotonMap,
 }
 
@@ -208,14 +209,14 @@ pub enum IntegratorKind {
 pub struct IrradianceCacheSettings {
     /// What records hold.
     pub cached: Cached,
-    /// κ: a record serves up to the distance κR from it, R being the harmonic mean distance of what it sees, and up to a turn
-    /// of the normal by some √2·κ radians. The bias grows with it.
+    /// κ: a record is used up to a distance of κR, R being the harmonic mean distance to the surfaces that it sees, and
+    /// up to a change of the normal by some √2·κ radians. The bias grows with it.
     pub error: f32,
-    /// Least and greatest distance up to which a record serves, in pixels as they lie on its surface.
+    /// Minimum and maximum radius of a record, in pixels projected onto its surface.
     pub radius: [f32; 2],
-    /// Directions of the hemisphere of a record, in which indirect light is sampled.
+    /// Directions per record in which indirect light is sampled.
     pub samples: u32,
-    /// Estimates of the light of sources at each record, with `cached` `all`.
+    /// Estimates of direct light per record, with `cached` `all`.
     pub passes: u32,
 }
 
@@ -229,9 +230,9 @@ impl Default for IrradianceCacheSettings {
 #[derive(Clone, Copy, Debug, PartialEq, Eq, EnumString, IntoStaticStr, VariantNames)]
 #[strum(serialize_all = "kebab-case")]
 pub enum Cached {
-    /// Indirect light; light from sources is estimated at every camera ray's hit.
+    /// Indirect light; direct light is estimated at every hit of a camera ray.
     Indirect,
-    /// Indirect light and light from sources [Fan et al. 2006, §5.1].
+    /// Indirect and direct light [Fan et al. 2006, §5.1].
     All,
 }
 
@@ -241,7 +242,7 @@ pub enum Cached {
 pub enum EstimatorKind {
     /// Light sampling only (and the specular lobes of BSDFs).
     Mc,
-    /// Light and BSDF sampling, weighted.
+    /// Light and BSDF sampling, combined by multiple importance sampling.
     Mis,
     /// Resampled importance sampling: few of many proposals are traced [Talbot et al. 2005].
     Ris,
@@ -251,7 +252,8 @@ pub enum EstimatorKind {
     OptimalMis,
     /// Importance sampling by one technique, combined with correlated sampling [Szécsi, Sbert and Szirmay-Kalos 2004].
     Correlated,
-    /// Light sampling, by itself of the lights that photons say are seen and of all others [Keller and Wald 2000, §3].
+    /// Light sampling, separately of the contributing lights that the visibility cache finds and of all others [Keller
+    /// and Wald 2000, §3].
     Contributing,
 }
 
@@ -273,14 +275,14 @@ impl EstimatorKind {
 /// Optimizing control variates [Fan et al. 2006].
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct OcvSettings {
-    /// How the coefficients are found.
+    /// How the coefficients are determined.
     pub form: Form,
-    /// Most components of the mixture: lobes of BSDFs and groups of lights; `None` is as many as there can be.
+    /// Maximum number of components of the mixture: BSDF lobes and groups of lights; `None`: as many as possible.
     pub components: Option<u32>,
 }
 
 impl OcvSettings {
-    /// Most components.
+    /// Maximum number of components.
     pub fn most_components(&self) -> usize {
         self.components.map_or(MAX_COMPONENTS, |c| (c as usize).clamp(2, MAX_COMPONENTS))
     }
@@ -299,7 +301,7 @@ pub enum OptimalForm {
 /// Combined correlated and importance sampling [Szécsi, Sbert and Szirmay-Kalos 2004].
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct CorrelatedSettings {
-    /// How the weight is found.
+    /// How the weight is determined.
     pub form: CorrelatedForm,
     /// What draws the samples.
     pub technique: SamplingTechnique,
@@ -324,7 +326,7 @@ pub enum CorrelatedForm {
 /// Direct light by the lights that photons say are seen [Keller and Wald 2000, §3].
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct ContributingSettings {
-    /// Samples on the lights that no photon came from (S_non), besides those of an estimate (S_con). 0 is biased.
+    /// Samples on non-contributing lights (S_non), in addition to those of an estimate (S_con). 0 is biased.
     pub rest_samples: u32,
 }
 
@@ -338,9 +340,9 @@ impl Default for ContributingSettings {
 #[derive(Clone, Copy, Debug, PartialEq, Eq, EnumString, IntoStaticStr, VariantNames)]
 #[strum(serialize_all = "kebab-case")]
 pub enum SamplingTechnique {
-    /// In proportion to the BSDF, nearly.
+    /// BSDF sampling.
     Bsdf,
-    /// Points on lights.
+    /// Light sampling.
     Light,
 }
 
@@ -354,8 +356,8 @@ pub struct Split {
 }
 
 impl Split {
-    /// Half as many for each bounce that a path has made, at least one sample: what a path still carries grows less, and the
-    /// time of its vertices does not. The ratio M/N stays.
+    /// Halves the counts for each bounce, down to one sample: the throughput of a path decreases, while the time per
+    /// vertex does not. The ratio M/N stays the same.
     #[must_use]
     pub fn after_bounces(self, bounces: u32) -> Split {
         let samples = (self.samples >> bounces.min(31)).max(1);

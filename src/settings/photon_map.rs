@@ -5,24 +5,24 @@
 pub struct PhotonMapSettings {
     /// About how many photons the global map stores; a progressive map so many in each pass.
     pub photons: u32,
-    /// q: the share of the trajectories that fill the global map too; all of them fill the caustic map.
+    /// q: the fraction of the trajectories that also fill the global map; all of them fill the caustic map.
     pub caustic_ratio: f32,
     /// Which photons are stored.
     pub deposition: Deposition,
     /// Photons of an estimate (k).
     pub nearest: u32,
-    /// Rays of the final gather at a diffuse vertex; 0 shows the global map directly.
+    /// Final-gather rays per diffuse vertex; 0 visualises the global map directly.
     pub gather: u32,
-    /// Share of the rays of the final gather whose directions photons choose.
+    /// Fraction of the final-gather rays that are guided by photons.
     pub guide: f32,
-    /// New photons and smaller radii from sample to sample; `None` for one map.
+    /// New photons and smaller radii for every sample; `None` for a single map.
     pub progressive: Option<Shrinking>,
-    /// Trajectories of photons that tell which lights are seen, for all integrators and where settings of direct light ask for it;
-    /// by the number of lights if `None`.
+    /// Trajectories of the photons of the visibility cache, which any integrator can use; `None`: by the number of
+    /// lights.
     pub light_photons: Option<u32>,
-    /// Most bytes that the maps may take.
+    /// Maximum memory of the maps (bytes).
     pub memory: u64,
-    /// Most trajectories that are traced for one map.
+    /// Maximum number of trajectories per map.
     pub trajectories: u64,
 }
 
@@ -57,9 +57,9 @@ pub enum Deposition {
 /// Radii of progressive photon mapping: r²ᵢ₊₁ = r²ᵢ·(i + α)/(i + 1) [Knaus and Zwicker 2011, Eq. 15].
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Shrinking {
-    /// α, above 0 and below 1: near 0 variance falls slowly and bias fast.
+    /// α, above 0 and below 1: near 0, variance decreases slowly and bias fast.
     pub alpha: f32,
-    /// Radius of the first pass (m); as far as the `nearest` photons reach, where the camera looks, if `None`.
+    /// Radius of the first pass (m); `None`: the distance of the `nearest` photons where the camera looks.
     pub radius: Option<f32>,
 }
 

@@ -1,12 +1,12 @@
-//! What is particular to `ris`: proposals, strata and targets.
+//! Settings of `ris`: proposals, strata and targets.
 
 use lumiris_numbers::estimators::ris::choice::Costs;
 use strum::{EnumString, IntoStaticStr, VariantNames};
 
-/// Proposals for each sample where no times were measured.
+/// Proposals per sample if no times were measured.
 pub const DEFAULT_RATIO: f64 = 8.0;
-/// Most proposals for each sample that times alone ask for: T1 and T2 leave out what a shading point costs in any case, and on no
-/// scene measured did more than eight pay, of which `docs/measurements/resampling` has the figures.
+/// Maximum number of proposals per sample by times alone: T1 and T2 exclude the fixed cost of a shading point, and more
+/// than eight did not pay off on any scene measured (`docs/measurements/resampling`).
 pub const MOST_RATIO: f64 = 8.0;
 
 /// Resampled importance sampling [Talbot et al. 2005; Talbot 2005].
@@ -14,13 +14,13 @@ pub const MOST_RATIO: f64 = 8.0;
 pub struct RisSettings {
     /// How many proposals (M).
     pub proposals: Proposals,
-    /// How samples are drawn from the proposals.
+    /// Resampling of the proposals.
     pub strata: Strata,
-    /// How proposals lie on the lights.
+    /// Distribution of the proposals over the lights.
     pub points: ProposalPoints,
-    /// What samples are drawn in proportion to.
+    /// The target density.
     pub target: Target,
-    /// Times of the stages, from which `auto` and `optimal` choose; measured on this scene if not given.
+    /// Times of the stages, for `auto` and `optimal`; measured on this scene if `None`.
     pub stage_times: Option<StageTimes>,
 }
 
@@ -37,8 +37,8 @@ impl Default for RisSettings {
 }
 
 impl RisSettings {
-    /// Proposals for each sample by the times of the stages, M/N = T2/T1 [Talbot 2005, Eq. 4.4], from 1 to [`MOST_RATIO`];
-    /// [`DEFAULT_RATIO`] without times.
+    /// Proposals for each sample by the times of the stages, M/N = T2/T1 [Talbot 2005, Eq. 4.4], from 1 to
+    /// [`MOST_RATIO`]; [`DEFAULT_RATIO`] without times.
     pub fn ratio(&self) -> f64 {
         let by_times = |t: StageTimes| Costs { t1: t.t1, t2: t.t2 }.robust_ratio();
         self.stage_times.map_or(DEFAULT_RATIO, by_times).clamp(1.0, MOST_RATIO)
@@ -54,7 +54,7 @@ pub struct StageTimes {
     pub t2: f64,
 }
 
-/// How the number of proposals is found.
+/// Choice of the number of proposals.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Proposals {
     /// This many.
@@ -71,11 +71,11 @@ pub enum Proposals {
 pub enum Strata {
     /// Independent draws with replacement [Talbot 2005, Eq. 4.1].
     None,
-    /// One draw from each of N equal numbers of proposals [Talbot 2005, §4.5.2.1].
+    /// One draw from each of N strata of equally many proposals [Talbot 2005, §4.5.2.1].
     Proposals,
-    /// One draw from each of N parts of nearly equal weight [Talbot 2005, §4.5.2.2].
+    /// One draw from each of N strata of nearly equal weight [Talbot 2005, §4.5.2.2].
     Weights,
-    /// N draws at equal distances of the cumulative weight.
+    /// N draws at equal distances of the cumulative weight (systematic resampling).
     Systematic,
 }
 
@@ -85,7 +85,7 @@ pub enum Strata {
 pub enum ProposalPoints {
     /// Independent of each other.
     Independent,
-    /// Stratified along a curve that passes all lights one after the other and fills each [He and Owen 2016].
+    /// Stratified along a curve that visits all lights in turn and fills each of them [He and Owen 2016].
     Stratified,
 }
 
@@ -95,11 +95,11 @@ pub enum ProposalPoints {
 pub enum Target {
     /// Luminance of f·G·L: everything but visibility.
     Fgl,
-    /// G·V: for surfaces and lights that are dearer to evaluate than a ray is to trace.
+    /// G·V: for surfaces and lights that are more expensive to evaluate than a ray is to trace.
     Gv,
-    /// G·V·L: for surfaces that are dearer to evaluate than a ray is to trace.
+    /// G·V·L: for surfaces that are more expensive to evaluate than a ray is to trace.
     Gvl,
-    /// Luminance of f·G·L times an estimate of V for each light, from photons. Nothing is traced.
+    /// Luminance of f·G·L times an estimate of V for each light, from the visibility cache. Proposals are not traced.
     Visibility,
 }
 

@@ -1,4 +1,4 @@
-//! Truncated and bit-flipped versions of the project's own scenes: an answer or a message, never a panic.
+//! Truncated and bit-flipped versions of the project's own scenes: a result or a message, never a panic.
 
 use lumiris::import::{LoadOptions, load};
 use std::panic::{AssertUnwindSafe, catch_unwind};

@@ -1,4 +1,4 @@
-//! RGB colour spaces of scene files, and their way to linear Rec.709.
+//! RGB colour spaces of scene files, and their conversion to linear Rec.709.
 
 use glam::{DMat3, DVec3};
 use lumiris_numbers::math::Rgb;
@@ -39,8 +39,8 @@ impl ColorSpace {
         }
     }
 
-    /// A colour of this space in linear Rec.709, through XYZ and without adapting the white: the white of a space is the
-    /// light of that chromaticity.
+    /// A colour of this space in linear Rec.709, through XYZ and without adapting the white: the white of a space is
+    /// the light of that chromaticity.
     pub fn to_rec709(self, rgb: [f32; 3]) -> Rgb {
         if self == ColorSpace::Srgb {
             return Rgb::from_array(rgb);

@@ -1,7 +1,7 @@
-//! What an importer has to say: errors and warnings that point into the files they come from.
+//! Errors and warnings of importers, with positions in the files they refer to.
 //!
-//! A run collects many [`Diagnostic`]s in [`Diagnostics`]; at its end they become a [`Report`], which holds the
-//! finished text and needs the sources no more. Files that cannot be opened are gathered into one error.
+//! A run collects [`Diagnostic`]s in [`Diagnostics`]; at the end they become a [`Report`], which holds the formatted
+//! text and no longer needs the sources. Files that cannot be opened are gathered into one error.
 
 use super::source::{SourceMap, Span};
 use codespan_reporting::diagnostic as codespan;
@@ -44,7 +44,7 @@ pub struct Diagnostic {
     pub severity: Severity,
     /// One sentence without a full stop.
     pub message: String,
-    /// Places; the first is the primary one.
+    /// Positions; the first is the primary one.
     pub labels: Vec<Label>,
     /// What the author may do about it.
     pub help: Option<String>,
@@ -77,7 +77,7 @@ impl Diagnostic {
     }
 }
 
-/// A file that could not be opened, and where it was asked for.
+/// A file that could not be opened, and the position that refers to it.
 #[derive(Clone, Debug)]
 struct MissingFile {
     path: PathBuf,
@@ -85,7 +85,7 @@ struct MissingFile {
     span: Option<Span>,
 }
 
-/// Collects what a run has to say, in the order of its discovery.
+/// Collects the diagnostics of a run, in order of discovery.
 #[derive(Debug, Default)]
 pub struct Diagnostics {
     list: Vec<Diagnostic>,
@@ -226,7 +226,7 @@ pub struct Entry {
     pub rendered: String,
 }
 
-/// All that a run had to say, as text.
+/// The diagnostics of a run, as text.
 #[derive(Clone, Debug, Default)]
 pub struct Report {
     /// Errors, then warnings.

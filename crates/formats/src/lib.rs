@@ -1,7 +1,7 @@
 //! Files: pbrt-v4 text to checked directives, PLY files to meshes, measured spectra to colours; writing as a whole or not at all.
 //!
-//! User input never panics. What is wrong with it is collected, with places, in [`diagnostic::Diagnostics`]. What directives mean is
-//! not decided here: the renderer builds its scene from them.
+//! User input never panics. Errors are collected with their positions in [`diagnostic::Diagnostics`]. The meaning of
+//! directives is not decided here: the renderer builds its scene from them.
 //!
 //! Reading order: [`source`], [`diagnostic`], [`number`], [`pbrt`], [`ply`], [`spectra`], [`upsampling`], [`color_space`],
 //! [`output`].

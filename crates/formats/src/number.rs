@@ -1,13 +1,13 @@
-//! Decimal numbers from bytes, fast.
+//! Fast parsing of decimal numbers from bytes.
 //!
 //! A number with at most 19 digits and a power of ten up to 22 is exact in one f64 operation [Clinger 1990]; it is then
-//! rounded to f32, unless it is the middle of two f32, where the second rounding could go wrong. All other
-//! numbers take the slow and exact way of the standard library. So every result is the nearest f32.
+//! rounded to f32, unless it is the midpoint of two f32, where the second rounding could go wrong. All other numbers
+//! take the slow, exact path of the standard library. So every result is the nearest f32.
 
 /// Why bytes are no number.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum NumberError {
-    /// Not the spelling of a number.
+    /// Not a number.
     Malformed,
     /// Too large to be represented.
     Overflow,

@@ -1,4 +1,4 @@
-//! The texts that an importer reads, and places in them.
+//! The source texts of an import, and positions in them.
 
 use flate2::read::GzDecoder;
 use std::fmt;
@@ -29,7 +29,7 @@ impl Span {
     }
 }
 
-/// A place as people read it; lines and columns count from 1.
+/// A position as shown to users; lines and columns count from 1.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Location {
     /// Name of the file.

@@ -4,9 +4,9 @@
 //! observer would show:
 //!
 //! - reflectance ρ(λ): X = ∫ρ·x̄·D65 dλ / ∫ȳ·D65 dλ and so on, so that ρ = 1 is white;
-//! - emission E(λ): the same without D65, scaled to Y = 1: as in pbrt-v4, the brightness of a light is
-//!   in its `scale` or `power`, and its spectrum says the colour only;
-//! - a conductor's η(λ), k(λ): see [`conductor_rgb`].
+//! - emission E(λ): the same without D65, scaled to Y = 1: as in pbrt-v4, the brightness of a light is given by its
+//!   `scale` or `power`, and its spectrum determines only the colour;
+//! - η(λ), k(λ) of a conductor: see [`conductor_rgb`].
 
 use super::number::parse_f32;
 use super::spectra_data as data;
@@ -255,12 +255,14 @@ fn emission_of(f: impl Fn(f32) -> f64) -> Rgb {
     if xyz[1] > 0.0 { rgb(to_rgb(xyz.map(|c| c / xyz[1]))).map(|c| c.max(0.0)) } else { Rgb::BLACK }
 }
 
-/// The colour of a black body of a temperature (K) scaled to Y = 1 by Planck's law; black for temperatures that are not positive.
+/// The colour of a black body of a temperature (K) scaled to Y = 1 by Planck's law; black for temperatures that are not
+/// positive.
 pub fn blackbody_rgb(kelvin: f32) -> Rgb {
     if kelvin.is_nan() || kelvin <= 0.0 {
         return Rgb::BLACK;
     }
-    // Second radiation constant hc/k (m·K). The exponent is taken relative to 555 nm, so that cold bodies do not underflow.
+    // Second radiation constant hc/k (m·K). The exponent is taken relative to 555 nm, so that cold bodies do not
+    // underflow.
     const C2: f64 = 1.438_776_877e-2;
     let exponent = |l: f64| C2 / (l * 1e-9 * f64::from(kelvin));
     emission_of(|l| {
@@ -344,7 +346,8 @@ fn k_of(normal: f64, eta: f64) -> f64 {
     ((normal * up * up - down * down) / (1.0 - normal)).max(0.0).sqrt()
 }
 
-/// The (η, k) nearest to the index `typical` with the reflectances `normal` at 0° and `grazing` at 75°, if there is one.
+/// The (η, k) nearest to the index `typical` with the reflectances `normal` at 0° and `grazing` at 75°, if there is
+/// one.
 fn fit_conductor(normal: f64, grazing: f64, typical: f64) -> Option<(f64, f64)> {
     const STEPS: i32 = 400;
     let root = normal.sqrt();

@@ -1,15 +1,15 @@
 //! Linear Rec.709 colours to smooth spectra.
 //!
-//! Of the many spectra that show a colour under D65, pbrt-v4 takes the one of the family [Jakob and Hanika 2019]
+//! Of the many spectra that have a given colour under D65, pbrt-v4 takes the one of the family [Jakob and Hanika 2019]
 //!
 //! ```text
 //! s(λ) = S(c0·λ² + c1·λ + c2),   S(x) = 1/2 + x / (2·sqrt(1 + x²)),
 //! ```
 //!
-//! which lies between 0 and 1 and has three coefficients for three channels. They are found by damped Gauss-Newton steps
-//! on the difference in CIELAB, whose cube roots keep dark channels as exact as bright ones. The path to a colour starts
-//! at the grey of its largest channel, where the solution is known in closed form, and follows the straight
-//! line between the two, so that steep spectra of saturated colours are reached through flatter ones.
+//! which lies between 0 and 1 and has three coefficients for three channels. They are found by damped Gauss-Newton
+//! steps on the difference in CIELAB, whose cube roots keep dark channels as accurate as bright ones. The path to a
+//! colour starts at the grey of its largest channel, where the solution is known in closed form, and follows the
+//! straight line between the two, so that steep spectra of saturated colours are approached through flatter ones.
 
 use super::spectra::{LAMBDA_MAX, LAMBDA_MIN, Spectrum, d65_observer, rec709_matrix};
 use glam::{DMat3, DVec3};

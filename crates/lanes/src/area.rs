@@ -1,5 +1,5 @@
-//! Directions to a surface of constant emission from one point, many at once. The formulas are those of the modules of
-//! `lights::area`; what depends on the point alone is computed once.
+//! Directions from one point to a surface of constant emission, many at once. The formulas are those of the modules of
+//! `lights::area`; whatever depends on the point alone is computed once.
 
 use super::lane::{F, LANES, Vec3s, begin, load, or_zero, safe_sqrt, sin_cos_turns, store};
 use super::light::LightLanes;

@@ -1,5 +1,5 @@
-//! Values and densities of one BSDF for many directions. The models are those of `bsdfs`; what depends on `wo` alone is
-//! computed once.
+//! Values and densities of one BSDF for many directions. The models are those of `bsdfs`; whatever depends on `wo`
+//! alone is computed once.
 //!
 //! With h = wo + η'wi not normalised, D(m) = (h²/q)²/(π αx αy), q = hx²/αx² + hy²/αy² + hz²; and with
 //! A = (αx wix)² + (αy wiy)², G(wo, wi) = |cos θi| / ((1/2 + Λ(wo)) |cos θi| + √(cos²θi + A)/2).
@@ -84,7 +84,8 @@ pub struct Bsdf<'a> {
 }
 
 impl Bsdf<'_> {
-    /// Evaluates for unit directions `wi` in world space. Values that are not finite are 0, as are those at the horizon.
+    /// Evaluates for unit directions `wi` in world space. Values that are not finite are 0, as are those at the
+    /// horizon.
     pub fn eval(&self, level: Level, wi: [&[f32]; 3], out: &mut Values<'_>) {
         if self.wo.z == 0.0 {
             out.f_cos.iter_mut().for_each(|f| f.fill(0.0));
@@ -104,8 +105,8 @@ impl Bsdf<'_> {
         out.pdf.copy_from_slice(&pdf[..n]);
     }
 
-    /// The same for at least [`LANES`] directions. Each model has a function of its own, for the time that compiling takes:
-    /// it grows faster than a function without vector registers does.
+    /// The same for at least [`LANES`] directions. Each model has a function of its own, for the time that compiling
+    /// takes: it grows faster than a function without vector registers does.
     fn eval_padded(&self, level: Level, wi: [&[f32]; 3], out: &mut Values<'_>) {
         match &self.model {
             Model::Lambertian { reflection, transmission, p } => {
@@ -265,8 +266,8 @@ impl Bsdf<'_> {
         write(is_seen, [f, f, f], pdf, at);
     }
 
-    /// f·cos θi and density of the reflection by a rough interface, for directions of the same side, which counts as the
-    /// outside.
+    /// f·cos θi and density of the reflection by a rough interface, for directions of the same side, which counts as
+    /// the outside.
     #[inline(always)]
     fn coat<S: Simd>(&self, facets: &Facets, eta: f32, wi: Vec3s<S>) -> (F<S>, F<S>) {
         let simd = wi.x.token();

@@ -1,9 +1,9 @@
 //! Points along the Hilbert curve, at scrambled strata.
 //!
-//! The k-th base-4 digit of a position on the curve, hi·2 + lo, chooses a quadrant: x = hi, y = hi ⊕ lo. Digit 0 reflects
-//! what is inside of it about the diagonal, digit 3 about the antidiagonal, which is the diagonal and both axes. These
-//! reflections commute, so that all digits are done at once: whether the axes are swapped and whether they are reversed
-//! in digit k are the parities of the digits 0 or 3, and 3, before it.
+//! The k-th base-4 digit of a position on the curve, hi·2 + lo, selects a quadrant: x = hi, y = hi ⊕ lo. Digit 0
+//! reflects the quadrant's contents about the diagonal, digit 3 about the antidiagonal, which is the diagonal and both
+//! axes. These reflections commute, so all digits are processed at once: whether the axes are swapped and whether they
+//! are reversed in digit k are the parities of the number of digits 0 or 3, and of digits 3, before it.
 
 use fearless_simd::{Level, dispatch};
 
@@ -133,8 +133,8 @@ fn strata_lanes(phi: u32, seed: u32, m: u32, out: &mut [u32], jitter: &mut [u32]
 }
 
 /// One position in each of `m` ≤ 2¹⁶ equal strata of [0, 1), in units of 2⁻³²: `out[i]` = ⌊(i·2³² + ξᵢ)/m⌋, where ξᵢ is
-/// the fraction `phi`/2³² in a nested (Owen) scramble of its own, seeded by `seed` and i. Each ξᵢ is stratified over the
-/// samples of a pixel if `phi` is. `jitter[i]` is a hash of `phi`, `seed` and i. Both slices have the length `m`.
+/// the fraction `phi`/2³² in a nested (Owen) scramble of its own, seeded by `seed` and i. Each ξᵢ is stratified over
+/// the samples of a pixel if `phi` is. `jitter[i]` is a hash of `phi`, `seed` and i. Both slices have the length `m`.
 pub fn strata(phi: u32, seed: u32, m: u32, out: &mut [u32], jitter: &mut [u32]) {
     dispatch!(Level::new(), _simd => strata_lanes(phi, seed, m, out, jitter));
 }

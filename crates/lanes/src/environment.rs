@@ -1,4 +1,4 @@
-//! Directions sampled in proportion to an image of radiance over the sphere.
+//! Directions importance sampled from an image of radiance over the sphere.
 //!
 //! The running integrals are inverted lane by lane, since that is a matter of cache lines; directions and densities are in
 //! lanes; a texel is one load of four floats. The maps of the square to the sphere are those of [`lumiris_numbers::math::sphere_map`].
@@ -16,8 +16,8 @@ use std::f32::consts::{PI, TAU};
 pub struct Environment<'a> {
     /// Density over the unit square.
     pub distribution: &'a PiecewiseConstant2D,
-    /// Red, green, blue and the density per unit area of the square, row by row, with a border of one texel that continues
-    /// the image around the sphere.
+    /// Red, green, blue and the density per unit area of the square, row by row, with a border of one texel that
+    /// continues the image around the sphere.
     pub texels: &'a [[f32; 4]],
     /// True for the equal-area octahedral map, false for latitude and longitude.
     pub is_equal_area: bool,

@@ -1,4 +1,4 @@
-//! Directions to one light from one point, many at once.
+//! Directions from one point to one light, many at once.
 
 use super::lane::{F, LANES, Vec3s, begin, load, padded, safe_sqrt, sin_cos_turns};
 use fearless_simd::{Level, Simd, dispatch, prelude::*};
@@ -11,7 +11,8 @@ pub struct LightLanes<'a> {
     pub wi: [&'a mut [f32]; 3],
     /// Radiance that arrives if nothing is between, by channel. For delta lights it is the weight of the delta.
     pub li: [&'a mut [f32]; 3],
-    /// Density per steradian; 1 for delta lights; 0 where there is no sample, whose direction and radiance are arbitrary.
+    /// Density per steradian; 1 for delta lights; 0 where there is no sample, whose direction and radiance are
+    /// arbitrary.
     pub pdf: &'a mut [f32],
 }
 
@@ -24,8 +25,8 @@ impl LightLanes<'_> {
         self.pdf.fill(pdf);
     }
 
-    /// Calls `sample` with at least [`LANES`] numbers, the first of which are `u`. (By reference, so that a kernel is compiled once
-    /// and not for each of the two calls.)
+    /// Calls `sample` with at least [`LANES`] numbers, the first of which are `u`. (By reference, so that a kernel is
+    /// compiled once and not for each of the two calls.)
     pub(super) fn with_padding(&mut self, u: [&[f32]; 2], sample: &dyn Fn([&[f32]; 2], &mut LightLanes<'_>)) {
         let n = self.pdf.len();
         if n >= LANES {

@@ -1,4 +1,4 @@
-//! `Shape`: checked when it is read, made when all files are asked for.
+//! `Shape`: checked when it is parsed, created once all files have been read.
 
 use super::lights::AreaLightDesc;
 use super::materials::MaterialUse;
@@ -431,8 +431,8 @@ fn triangles(mut data: MeshData, placement: &Placement) -> Result<TriangleMesh, 
 /// Largest distance of a corner of a parallelogram from where the other three put it, relative to its edges.
 const PARALLELOGRAM: f32 = 1e-6;
 
-/// Two triangles for each patch, if all patches are parallelograms without normals: the same surface and the same texture
-/// coordinates, which ray tracers meet much faster.
+/// Two triangles for each patch, if all patches are parallelograms without normals: the same surface and the same
+/// texture coordinates, which ray tracers meet much faster.
 fn parallelograms(data: &PatchData) -> Option<MeshData> {
     let corners = |c: &[u32; 4]| c.map(|i| data.positions[i as usize]);
     let is_flat = |c: &[u32; 4]| {

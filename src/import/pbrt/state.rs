@@ -1,4 +1,4 @@
-//! The state machine of the format: directives change the graphics state, or add something in it to the scene.
+//! The state machine of the format: directives change the graphics state, or add objects with that state to the scene.
 
 use super::lights::AreaLightDesc;
 use super::materials::MaterialUse;

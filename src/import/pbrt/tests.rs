@@ -1,4 +1,4 @@
-//! The files of `tests/pbrt`: each is parsed, and what the parser says is compared with the `.txt` beside it.
+//! The files of `tests/pbrt`: each is parsed, and the parser's output is compared with the `.txt` beside it.
 //!
 //! A missing `.txt` is written by a run with `LUMIRIS_BLESS=1` in the environment.
 

@@ -1,4 +1,4 @@
-//! The current transformation matrix, with its value at the start and at the end of the motion.
+//! The current transformation matrix, at the start and at the end of the motion.
 
 use lumiris_formats::pbrt::directive::{ActiveTimes, DirectiveKind};
 use lumiris_numbers::math::{Affine3A, Mat3, Mat4, Quat, Vec3};

@@ -1,9 +1,9 @@
-//! A stratified hemisphere, its irradiance, and how that changes with position and normal
+//! A stratified hemisphere, its irradiance, and the derivatives of the irradiance by position and normal
 //! [Ward and Heckbert 1992; Křivánek et al. 2008].
 //!
-//! M × N cells (M rings of polar angle θ, N sectors of azimuth φ) of equal projected solid angle π/(MN), in each of which one
-//! direction is drawn. With L_jk and r_jk the radiance and distance of cell (j, k), u_k the tangent at the sector's middle, v_k the
-//! one across, and index − and + for the lower and upper bounds of a cell:
+//! M × N cells (M rings of polar angle θ, N sectors of azimuth φ) of equal projected solid angle π/(MN), with one
+//! direction each. With L_jk and r_jk the radiance and distance of cell (j, k), u_k the tangent at the middle of the
+//! sector, v_k the one across, and index − and + for the lower and upper bounds of a cell:
 //!
 //! E    = π/(MN) Σ L_jk
 //!
@@ -12,9 +12,9 @@
 //! ∇t E = Σ_k [ u_k (2π/N) Σ_{j≥1} sin θ_j− cos²θ_j− (L_jk − L_{j−1,k}) / min(r_jk, r_{j−1,k})
 //!            + v_k− Σ_j (sin θ_j+ − sin θ_j−) (L_jk − L_{j,k−1}) / min(r_jk, r_{j,k−1}) ]
 //!
-//! ∇r is the integral of L (n × ω) dω with L constant in each cell, and not the sum of tan θ_jk L_jk of the source, whose variance
-//! has no bound. ∇t is how bounds between cells move, with the nearer of the two surfaces, if the point does. Both are
-//! tangential: E(x, n) ≈ E + (x − x_i)·∇t E + (n_i × n)·∇r E.
+//! ∇r is the integral of L (n × ω) dω with L constant in each cell, not the sum of tan θ_jk L_jk of the source, whose
+//! variance is unbounded. ∇t is the movement of the boundaries between cells, at the nearer of the two surfaces, as the
+//! point moves. Both are tangential: E(x, n) ≈ E + (x − x_i)·∇t E + (n_i × n)·∇r E.
 
 use lumiris_numbers::math::{Frame, Rgb, Vec3, safe_sqrt};
 use std::f32::consts::{PI, TAU};
@@ -40,7 +40,7 @@ pub struct Irradiance {
 }
 
 impl Irradiance {
-    /// The sum of two kinds of light.
+    /// The sum of two contributions.
     #[must_use]
     pub fn plus(&self, other: &Irradiance) -> Irradiance {
         Irradiance {

@@ -1,8 +1,9 @@
-//! An octree of balls: which of them hold a point, or meet another ball.
+//! An octree of spheres: which of them contain a point, or intersect another sphere.
 //!
-//! A ball is stored in all nodes of one level that it meets, at most eight, where nodes are two to four times as wide as its
-//! radius. A point is in one node of each level, so a query goes down once. Space is cut at the centres of nodes only: the
-//! outermost nodes reach to infinity, and nothing need lie inside the box that the tree was made for.
+//! A sphere is stored in all nodes of one level that it intersects, at most eight, where nodes are two to four times as
+//! wide as its radius. A point is in one node of each level, so a query descends once. Space is divided at the centres
+//! of nodes only: the outermost nodes extend to infinity, and nothing need lie inside the box that the tree was built
+//! for.
 
 use lumiris_numbers::math::{Bounds3, Vec3};
 
@@ -48,7 +49,7 @@ impl Place {
         self.center + Vec3::new(side(0), side(1), side(2))
     }
 
-    /// True if child `i` meets the ball's box.
+    /// True if child `i` intersects the sphere's box.
     fn meets(&self, i: usize, p: Vec3, radius: f32) -> bool {
         (0..3).all(|axis| {
             let (x, c) = (p[axis], self.center[axis]);
@@ -58,7 +59,7 @@ impl Place {
 }
 
 impl Octree {
-    /// An empty tree for balls that lie mostly inside `bounds`.
+    /// An empty tree for spheres that lie mostly inside `bounds`.
     pub fn new(bounds: &Bounds3) -> Self {
         let (center, half) = if bounds.is_empty() {
             (Vec3::ZERO, 1.0)
@@ -102,8 +103,8 @@ impl Octree {
         }
     }
 
-    /// Calls `f` with the ids of all balls that hold `p`, and some others nearby, each once, in an order that depends on the
-    /// insertions only.
+    /// Calls `f` with the ids of all spheres that contain `p`, and some others nearby, each once, in an order that
+    /// depends on the insertions only.
     #[inline]
     pub fn at_point(&self, p: Vec3, mut f: impl FnMut(u32)) {
         let mut place = self.root();
@@ -121,7 +122,8 @@ impl Octree {
         }
     }
 
-    /// Calls `f` with the ids of all balls that meet the ball about `p`, and some others nearby; perhaps more than once.
+    /// Calls `f` with the ids of all spheres that intersect the sphere about `p`, and some others nearby, possibly more
+    /// than once.
     pub fn near(&self, p: Vec3, radius: f32, mut f: impl FnMut(u32)) {
         let mut pending = vec![self.root()];
         while let Some(place) = pending.pop() {

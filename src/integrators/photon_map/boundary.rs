@@ -1,12 +1,14 @@
-//! What a density estimate loses where a surface ends: at edges, in corners, where something stands on it.
+//! Boundary bias of density estimation: what an estimate loses at edges, in corners, and beside other objects.
 //!
-//! An estimate with kernel K of radius r sees the irradiance times the part p = ∫ K dA of the kernel that lies on the surface. p is not known,
-//! but points of the kernel can be tried: the number of trials up to the first one that lies on the surface is 1/p in the mean. So
-//! times that number the estimate is right on average wherever irradiance and surface are even; where the kernel lies on the surface
-//! as a whole the number is 1, and no noise is added.
+//! An estimate with kernel K of radius r sees the irradiance times p = ∫ K dA, the part of the kernel that lies on the
+//! surface. p is not known, but points of the kernel can be tested: the number of trials up to and including the first
+//! one on the surface has the expectation 1/p. Multiplied by that number, the estimate is correct on average wherever
+//! irradiance and surface are smooth; where the kernel lies entirely on the surface the number is 1, and no noise is
+//! added.
 //!
-//! A point lies on the surface if the way to it along the surface is free, and a short ray down from there meets a surface of nearly the same normal.
-//! Points are drawn with the density of Epanechnikov's kernel, whose radii have the distribution F(s) = 2s² − s⁴, s = d/r.
+//! A point lies on the surface if the way to it along the surface is unoccluded, and a short ray down from there hits a
+//! surface of nearly the same normal. Points are drawn with the density of the Epanechnikov kernel, whose radii have
+//! the distribution F(s) = 2s² − s⁴, s = d/r.
 
 use crate::accel::{Coherence, Hit, RayBatch};
 use crate::photons::Place;
@@ -15,9 +17,9 @@ use lumiris_numbers::math::{Frame, Ray, Vec3};
 use lumiris_numbers::samplers::SampleStream;
 use std::f32::consts::TAU;
 
-/// Most trials; where so little of the surface is left, a bias remains.
+/// Maximum number of trials; where less of the surface is left, some bias remains.
 const MOST: u32 = 32;
-/// Least cosine between the normals of points that belong together, as in photon maps.
+/// Minimum cosine between the normals of points on the same surface, as in photon maps.
 const MIN_NORMAL_COS: f32 = 0.8;
 /// Height of the way above the surface, in radii: photons farther than a quarter from the tangent plane do not count.
 const HEIGHT: f32 = 0.25;
@@ -44,7 +46,7 @@ impl Probe {
     }
 }
 
-/// Tries kernels; holds the buffers of one worker.
+/// Tests kernels; holds the buffers of one worker.
 #[derive(Debug, Default)]
 pub(super) struct Boundary {
     rays: RayBatch,
@@ -55,7 +57,7 @@ pub(super) struct Boundary {
 }
 
 impl Boundary {
-    /// The numbers of trials of some kernels; `out[i]` belongs to `probes[i]`.
+    /// The trial counts of some kernels; `out[i]` belongs to `probes[i]`.
     pub(super) fn trials(&mut self, world: &World, probes: &[Probe], out: &mut Vec<u32>) {
         out.clear();
         out.resize(probes.len(), MOST);
@@ -69,7 +71,7 @@ impl Boundary {
         }
     }
 
-    /// One trial of each that is open.
+    /// One trial for each unfinished kernel.
     fn round(&mut self, world: &World, probes: &[Probe], trial: u32, out: &mut [u32]) {
         // The way there
         self.rays.clear();
@@ -146,7 +148,8 @@ Shape "trianglemesh" "point3 P" [ -0.5 -1 0  -0.5 1 0  -0.5 1 1  -0.5 -1 1 ] "in
 
     #[test]
     fn the_mean_number_of_trials_is_the_reciprocal_of_what_lies_on_the_surface() {
-        // Inside, on an edge, in a corner, on an edge where the kernel also reaches the wall no more, and beside the wall
+        // Inside, on an edge, in a corner, on an edge where the kernel also reaches the wall no more, and beside the
+        // wall
         let world = world();
         let inside = numbers(&world, Vec3::new(0.2, 0.0, 0.0), 0.3);
         assert_eq!((inside.mean(), inside.variance()), (1.0, 0.0));

@@ -1,8 +1,9 @@
-//! Directions for the final gather, by the photons around [Jensen 1995].
+//! Guiding of the final gather by nearby photons [Jensen 1995].
 //!
-//! Directions are places in the unit square by the map of the cosine-distributed hemisphere. A histogram over a grid of that
-//! square holds the power that photons bring from there; with the share s of the rays its density is p(ω) = cos θ/π·(1 − s + s·h),
-//! h being the histogram's density in the square. So cos θ/p ≤ π/(1 − s) whatever the photons say.
+//! Directions are points of the unit square under the cosine-weighted map of the hemisphere. A histogram over a grid of
+//! that square holds the power of the photons that arrive from there; with a fraction s of the rays guided, the density
+//! is p(ω) = cos θ/π·(1 − s + s·h), h being the histogram's density in the square. So cos θ/p ≤ π/(1 − s) whatever the
+//! photons are.
 
 use lumiris_numbers::math::warp::{invert_cosine_hemisphere, pdf_cosine_hemisphere, sample_cosine_hemisphere};
 use lumiris_numbers::math::{PiecewiseConstant2D, Vec2, Vec3};

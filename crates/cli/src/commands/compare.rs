@@ -14,7 +14,7 @@ use std::process::ExitCode;
 /// `lumiris compare`
 #[derive(Args, Clone, Debug)]
 pub struct CompareArgs {
-    /// Pictures: EXR, HDR, PFM, PNG, or anything that OpenImageIO reads
+    /// Images: EXR, HDR, PFM, PNG, or anything that OpenImageIO reads
     #[arg(required = true, value_name = "IMAGE")]
     images: Vec<PathBuf>,
     /// What they are compared with
@@ -23,34 +23,34 @@ pub struct CompareArgs {
     /// Metrics to compute [default: all]
     #[arg(long, value_name = "LIST", value_delimiter = ',')]
     metrics: Vec<MetricArg>,
-    /// Channels to compare instead of the picture: a layer (`albedo`), a part, or a channel (`depth.Z`)
+    /// Channels to compare instead of the colour: a layer (`albedo`), a part, or a channel (`depth.Z`)
     #[arg(long, value_name = "NAME")]
     layer: Option<String>,
-    /// Exposure of the display, for `flip` and as the page begins
+    /// Exposure of the display, for `flip` and initially in the page
     #[arg(long, value_name = "STOPS", default_value_t = 0.0, allow_hyphen_values = true)]
     exposure: f32,
     /// ε of `relmse`: mean of (x − r)² / (r² + ε)
     #[arg(long, value_name = "E", default_value_t = 0.01, value_parser = not_negative)]
     epsilon: f64,
-    /// The largest value, for `psnr`
+    /// Peak value, for `psnr`
     #[arg(long, value_name = "V", default_value_t = 1.0, value_parser = positive)]
     peak: f64,
-    /// Luminance of a pixel of value 1, for `tvi`
+    /// Luminance (cd/m²) of a pixel of value 1, for `tvi`
     #[arg(long, value_name = "CD/M2", default_value_t = 1.0, value_parser = positive)]
     luminance: f64,
     /// Pixels per degree of the visual field, for `flip` and `hdrflip`
     #[arg(long, value_name = "N", default_value_t = 67.0, value_parser = pixels_per_degree)]
     ppd: f64,
-    /// Write a page with the pictures and maps of their differences into this folder (index.html)
+    /// Write an HTML page with the images and difference maps into this folder (index.html)
     #[arg(long, value_name = "DIR")]
     html: Option<PathBuf>,
     /// Write all numbers; `-` prints them instead of the table
     #[arg(long, value_name = "FILE")]
     json: Option<PathBuf>,
-    /// End with exit code 1 if a number of any picture is above this (in magnitude), as `relmse=0.02`
+    /// Exit with code 1 if a metric of any image is above this (in magnitude), such as `relmse=0.02`
     #[arg(long, value_name = "NUMBER=LIMIT", value_parser = limit)]
     fail_above: Vec<Limit>,
-    /// End with exit code 1 if a number of any picture is below this (in magnitude), as `psnr=30`
+    /// Exit with code 1 if a metric of any image is below this (in magnitude), such as `psnr=30`
     #[arg(long, value_name = "NUMBER=LIMIT", value_parser = limit)]
     fail_below: Vec<Limit>,
 }
@@ -69,9 +69,9 @@ enum MetricArg {
     Psnr,
     /// ꟻLIP on a display
     Flip,
-    /// The greatest ꟻLIP over all exposures
+    /// Maximum ꟻLIP over all exposures
     Hdrflip,
-    /// Error in thresholds of vision
+    /// Error in units of the visual threshold
     Tvi,
     /// Mean difference with its confidence interval
     Bias,
@@ -96,7 +96,7 @@ impl MetricArg {
     }
 }
 
-/// A number and where it may not go.
+/// A metric and its limit.
 #[derive(Clone, Copy, Debug)]
 struct Limit {
     column: &'static Column,
@@ -115,7 +115,7 @@ fn not_negative(text: &str) -> Result<f64, String> {
     number(text).and_then(|v| if v >= 0.0 { Ok(v) } else { Err("must not be negative".to_owned()) })
 }
 
-/// Filters of ꟻLIP are as wide as a part of a degree: a few pixels to a few hundred.
+/// Filters of ꟻLIP cover a fraction of a degree: a few pixels to a few hundred.
 fn pixels_per_degree(text: &str) -> Result<f64, String> {
     number(text).and_then(|v| if (1.0..=1000.0).contains(&v) { Ok(v) } else { Err("must be in 1..1000".to_owned()) })
 }
@@ -155,7 +155,7 @@ pub fn run(args: &CompareArgs) -> anyhow::Result<ExitCode> {
     Ok(if failures.is_empty() { ExitCode::SUCCESS } else { ExitCode::from(1) })
 }
 
-/// Metrics asked for and those that limits need.
+/// Selected metrics, and those that limits need.
 fn settings(args: &CompareArgs) -> Settings {
     let limits = args.fail_above.iter().chain(&args.fail_below);
     let mut metrics: Vec<Metric> = args.metrics.iter().map(|m| m.metric()).collect();
@@ -173,7 +173,7 @@ fn settings(args: &CompareArgs) -> Settings {
     }
 }
 
-/// What a person should know of the pictures, each with the name of one.
+/// Remarks about the images, each with the name of an image.
 fn remarks(pictures: &Pictures, compared: &[Compared]) -> Vec<(String, String)> {
     let mut remarks = Vec::new();
     for shown in pictures.images.iter().chain([&pictures.reference]) {
@@ -202,7 +202,7 @@ fn remarks(pictures: &Pictures, compared: &[Compared]) -> Vec<(String, String)> 
     remarks
 }
 
-/// The limits that pictures exceed, in words. A limit on what cannot be computed is an error.
+/// The violated limits, in words. A limit on a metric that cannot be computed is an error.
 fn failures(args: &CompareArgs, pictures: &Pictures, compared: &[Compared]) -> anyhow::Result<Vec<String>> {
     let mut failures = Vec::new();
     let above = args.fail_above.iter().map(|l| (l, "above"));
@@ -211,7 +211,7 @@ fn failures(args: &CompareArgs, pictures: &Pictures, compared: &[Compared]) -> a
             let Some(value) = (limit.column.value)(&c.scores) else {
                 bail!("{}: `{}` cannot be computed: the file has no variances", image.name, limit.column.key);
             };
-            // Not within, so that NaN fails.
+            // Negated, so that NaN fails.
             let magnitude = value.abs();
             let within = if side == "above" { magnitude <= limit.value } else { magnitude >= limit.value };
             if !within {
@@ -222,7 +222,7 @@ fn failures(args: &CompareArgs, pictures: &Pictures, compared: &[Compared]) -> a
     Ok(failures)
 }
 
-/// One line per picture, a column per number, aligned.
+/// One line per image, one aligned column per metric.
 fn table(pictures: &Pictures, settings: &Settings, compared: &[Compared]) -> String {
     let scores: Vec<&Scores> = compared.iter().map(|c| &c.scores).collect();
     let columns = shown_columns(&settings.metrics, &scores);
@@ -244,7 +244,7 @@ fn table(pictures: &Pictures, settings: &Settings, compared: &[Compared]) -> Str
     rows.iter().map(line).collect::<Vec<_>>().join("\n")
 }
 
-/// All numbers. What is infinite or undefined is null.
+/// All numbers. Infinite and undefined ones are null.
 fn report(
     args: &CompareArgs,
     pictures: &Pictures,

@@ -22,7 +22,7 @@ pub struct GenerateArgs {
 enum What {
     /// A finely carved statue, as a PLY mesh
     Statue(StatueArgs),
-    /// An environment map of sun, sky and clouds, as an EXR picture for `LightSource "infinite"`
+    /// An environment map of sun, sky and clouds, as an EXR image for `LightSource "infinite"`
     Sky(SkyArgs),
     /// The scenes of scenes/talbot with their statue and sky
     Talbot(TalbotArgs),
@@ -60,16 +60,16 @@ struct SkyArgs {
     /// Direction of the sun, from +x towards +y (degrees)
     #[arg(long, value_name = "DEGREES", default_value_t = 225.0)]
     azimuth: f32,
-    /// Haze: 0 none, 1 a clear day, 10 very much
+    /// Haze: 0 none, 1 a clear day, 10 very hazy
     #[arg(long, value_name = "AMOUNT", default_value_t = 1.5)]
     haze: f32,
-    /// Size of the sun over that of the real one; its energy stays the same
+    /// Size of the sun relative to the real one; its energy stays the same
     #[arg(long, value_name = "FACTOR", default_value_t = 1.0)]
     sun_size: f32,
     /// Reflectance of the ground below the horizon
     #[arg(long, value_name = "ALBEDO", default_value_t = 0.25)]
     ground: f32,
-    /// Part of the sky that clouds cover (0 to 1)
+    /// Fraction of the sky covered by clouds (0 to 1)
     #[arg(long, value_name = "PART", default_value_t = 0.0)]
     clouds: f32,
     /// Irradiance of a horizontal surface (luminance)

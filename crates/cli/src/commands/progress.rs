@@ -1,23 +1,23 @@
-//! What a person sees while it runs; the only place that writes to the terminal.
+//! Terminal output while the program runs; the only place that writes to the terminal.
 #![allow(clippy::print_stdout, clippy::print_stderr)]
 
 use indicatif::{ProgressBar, ProgressDrawTarget, ProgressStyle};
 use lumiris::render::Progress;
 
-/// A line for the person at the terminal (standard error).
+/// Prints a line to standard error.
 pub fn say(text: &str) {
     eprintln!("{text}");
 }
 
-/// A line of output (standard output); a closed pipe is not an error.
+/// Prints a line to standard output; a closed pipe is not an error.
 pub fn print(text: &str) {
     use std::io::Write;
     let mut out = std::io::stdout().lock();
-    // A reader such as `head` may have gone; there is nobody left to tell.
+    // A reader such as `head` may have closed the pipe; the error is ignored.
     let _ = writeln!(out, "{text}");
 }
 
-/// A progress bar of a rendering: part done, time left, rays per second, noise.
+/// A progress bar of a rendering: progress, time left, rays per second, noise.
 pub struct Bar(ProgressBar);
 
 impl Bar {
@@ -30,7 +30,7 @@ impl Bar {
         Bar(bar)
     }
 
-    /// Shows the state of a rendering.
+    /// Shows the progress of a rendering.
     pub fn update(&self, progress: &Progress) {
         self.0.set_length(progress.samples_total);
         self.0.set_position(progress.samples_done);

@@ -13,7 +13,7 @@ use std::sync::atomic::AtomicBool;
 pub struct ReproduceArgs {
     /// Which paper
     paper: Paper,
-    /// Folder that takes the page (index.html), its pictures, and all numbers
+    /// Output folder for the page (index.html), its images, and all numbers
     #[arg(short, long, value_name = "DIR")]
     out: PathBuf,
     /// At most 2 minutes on two cores instead of 20
@@ -22,12 +22,13 @@ pub struct ReproduceArgs {
     /// Threads [default: all cores]
     #[arg(long, value_name = "T", value_parser = clap::value_parser!(u32).range(1..=4096))]
     threads: Option<u32>,
-    /// Most pixels along an edge of a picture; fewer where time does not suffice [default: 400, quick 160 (talbot) or 128 (fan, keller-wald)]
+    /// Maximum image edge in pixels; smaller if time is short [default: 400, quick 160 (talbot) or 128 (fan,
+    /// keller-wald)]
     #[arg(long, value_name = "N", value_parser = clap::value_parser!(u32).range(16..=4096))]
     size: Option<u32>,
-    /// Folder with scenes of the same names to use instead of those that are made for the purpose: statue-env.pbrt,
-    /// statue-lights.pbrt and statue-env-lights.pbrt (talbot); checkers.pbrt, statue.pbrt, room.pbrt and box.pbrt (fan);
-    /// rooms.pbrt, rooms-10000.pbrt, ring.pbrt, ring-indirect.pbrt and slit.pbrt (keller-wald)
+    /// Folder with scenes of the same names to use instead of the generated ones: statue-env.pbrt, statue-lights.pbrt
+    /// and statue-env-lights.pbrt (talbot); checkers.pbrt, statue.pbrt, room.pbrt and box.pbrt (fan); rooms.pbrt,
+    /// rooms-10000.pbrt, ring.pbrt, ring-indirect.pbrt and slit.pbrt (keller-wald)
     #[arg(long, value_name = "DIR")]
     scenes: Option<PathBuf>,
     /// No progress, only errors

@@ -1,4 +1,4 @@
-//! Metrics by name: the columns of tables, the entries of JSON, and what limits can be set on.
+//! Metrics by name: the columns of tables, the entries of JSON, and the limits of `--fail-above` and `--fail-below`.
 
 use super::metric::Metric;
 use super::scores::Scores;
@@ -203,7 +203,7 @@ pub const COLUMNS: [Column; 17] = [
     },
 ];
 
-/// The columns of a table of `scores`: those of the metrics asked for that some picture has, and counts that are not 0.
+/// The columns of a table of `scores`: the selected metrics that some image has, and counts that are not 0.
 pub fn shown_columns(metrics: &BTreeSet<Metric>, scores: &[&Scores]) -> Vec<&'static Column> {
     let is_shown = |c: &&Column| match c.metric {
         Some(metric) => metrics.contains(&metric) && scores.iter().any(|s| (c.value)(s).is_some()),

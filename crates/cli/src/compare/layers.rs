@@ -1,8 +1,8 @@
-//! Which channels of a file are the picture.
+//! Which channels of a file are the image.
 //!
 //! Programs name them in many ways: `R G B` (pbrt, Mitsuba, Lumiris), `rgb.R` (Mitsuba with several films),
 //! `Combined.R` or `ViewLayer.Combined.R` (Cycles), parts of one file that all have `R G B` (then the name of the part
-//! counts). A **layer** is what has red, green and blue under one name.
+//! counts). A **layer** is a set of red, green and blue under one name.
 
 use lumiris::imaging::file::PartHeader;
 

@@ -1,6 +1,6 @@
-//! Files to pixels of one size.
+//! Loads files as images of one size.
 //!
-//! Values are linear Rec.709 radiance; 8-bit and 16-bit files are decoded by the sRGB curve. The pictures must have
+//! Values are linear Rec.709 radiance; 8-bit and 16-bit files are decoded by the sRGB curve. The images must have
 //! display windows of one size; what is compared is the rectangle for which all of them have pixels, so that a crop can
 //! be compared with a whole reference.
 
@@ -63,7 +63,7 @@ pub struct Shown {
 /// Pictures of one size; the last one is the reference.
 #[derive(Clone, Debug)]
 pub struct Pictures {
-    /// Pictures in the order asked for.
+    /// Images in the order of the command line.
     pub images: Vec<Shown>,
     /// What they are compared with.
     pub reference: Shown,

@@ -1,4 +1,4 @@
-//! Pictures against a reference: numbers, and a page to look at them.
+//! Images against a reference: metrics, and a page to inspect them.
 //!
 //! Reading order: [`layers`] (which channels of a file are the picture), [`mod@load`] (files to pixels of one size),
 //! [`metric`] (their names), [`scores`] (metrics), [`columns`] (metrics by name), [`page`] (a page for a browser, whose own parts are in `viewer/`:

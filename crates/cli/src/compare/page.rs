@@ -1,9 +1,9 @@
-//! A page for a browser: one file without anything from elsewhere.
+//! The HTML page: a single self-contained file.
 //!
-//! The browser gets the pictures as numbers, so that exposures, differences and read values are true ones: f32 of which
-//! the low 8 bits are rounded away (16 significant bits, the whole range, NaN and infinity), the bytes of all values
-//! sorted by significance, compressed by zlib, in base64. What it cannot compute cheaply (ꟻLIP, the thresholds of
-//! vision) comes as maps in the same form.
+//! The browser receives pixel values, so that exposures, differences and displayed values are exact: f32 with the low 8
+//! bits rounded away (16 significant bits, the whole range, NaN and infinity), the bytes of all values sorted by
+//! significance, compressed by zlib, in base64. Maps that are expensive to compute (ꟻLIP, tvi) are embedded in the same
+//! form.
 
 use super::columns::shown_columns;
 use super::load::{Pictures, Shown};

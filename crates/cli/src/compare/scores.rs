@@ -1,4 +1,4 @@
-//! The metrics of a picture, as numbers and as maps.
+//! The metrics of an image, as numbers and as maps.
 
 use super::load::{Pictures, Region, Shown};
 use super::metric::Metric;
@@ -42,7 +42,7 @@ impl Default for Settings {
     }
 }
 
-/// The numbers of a picture. `None`: not asked for, or not possible.
+/// The metrics of an image. `None`: not selected, or not possible.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Scores {
     /// Squared differences and counts.

@@ -1,7 +1,7 @@
-//! A Chromium without a window, driven over the DevTools protocol: real mouse and key events, scripts, pixels.
+//! Headless Chromium, driven over the DevTools protocol: real mouse and key events, scripts, pixels.
 //!
-//! The protocol goes over two pipes, messages end in a zero byte. The browser is `chromium` of the path, or what the
-//! variable CHROMIUM names.
+//! The protocol uses two pipes; messages end with a zero byte. The browser is the `chromium` in the path, or the value
+//! of the variable CHROMIUM.
 
 use base64::Engine;
 use base64::engine::general_purpose::STANDARD;

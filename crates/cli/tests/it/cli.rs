@@ -1,4 +1,4 @@
-//! The program from outside: pictures, statistics, and what it says of bad input.
+//! The program from outside: images, statistics, and its messages about bad input.
 
 use lumiris::imaging::oiio::{ReadLimits, read_image};
 use std::path::Path;

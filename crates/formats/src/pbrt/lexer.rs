@@ -1,7 +1,7 @@
 //! Tokens of a pbrt file.
 //!
-//! The text is bytes; what is not ASCII may stand in strings and comments only. Words, quoted strings and brackets are
-//! tokens; lists of numbers are read without making tokens of them.
+//! The text is bytes; bytes outside ASCII may occur in strings and comments only. Words, quoted strings and brackets
+//! are tokens; lists of numbers are parsed without creating tokens.
 
 use crate::number::{NumberError, is_delimiter, parse_f32, parse_i32};
 use crate::source::{FileId, Span};
@@ -29,7 +29,7 @@ pub struct Token {
     pub span: Span,
 }
 
-/// Why bytes are no token or no value.
+/// Why bytes are not a token or a value.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct LexError {
     /// One sentence without a full stop.
@@ -53,7 +53,7 @@ impl<'a> Lexer<'a> {
         Lexer { bytes, file, position }
     }
 
-    /// The place between tokens where the lexer stands.
+    /// The current position between tokens.
     pub fn position(&self) -> usize {
         self.position
     }

@@ -1,6 +1,6 @@
-//! Typed parameter lists, and look-ups that remember what was asked for.
+//! Typed parameter lists, with lookups that record which parameters were used.
 //!
-//! After a directive was understood, [`ParamSet::report_unused`] names every parameter that nobody asked for: a
+//! After a directive was processed, [`ParamSet::report_unused`] reports every parameter that was never looked up: a
 //! misspelled parameter is an error, never silently a default.
 
 use crate::diagnostic::{Diagnostics, did_you_mean};
@@ -153,7 +153,7 @@ pub struct Param {
 }
 
 impl Param {
-    /// A parameter that nobody has asked for yet.
+    /// A parameter that has not been used yet.
     pub fn new(ty: ParamType, name: String, span: Span, value_span: Span, values: Values) -> Self {
         Param { ty, name, span, value_span, values, used: Cell::new(false), inherited: false }
     }
@@ -230,7 +230,7 @@ impl ParamSet {
         self.params.is_empty()
     }
 
-    /// The declared type of a parameter, without counting as a question for it.
+    /// The declared type of a parameter, without marking it as used.
     pub fn type_of(&self, name: &str) -> Option<ParamType> {
         self.params.iter().find(|p| p.name == name).map(|p| p.ty)
     }
@@ -240,14 +240,14 @@ impl ParamSet {
         self.params.iter().find(|p| p.name == name).map_or(self.span, |p| p.span.to(p.value_span))
     }
 
-    /// Counts the parameter as asked for, whatever its type; true if it is there.
+    /// Marks the parameter as used, whatever its type; true if it is present.
     pub fn ignore(&self, name: &'static str) -> bool {
         self.note(name);
         let found = self.params.iter().find(|p| p.name == name);
         found.inspect(|p| p.used.set(true)).is_some()
     }
 
-    /// Counts all parameters as asked for.
+    /// Marks all parameters as used.
     pub fn ignore_all(&self) {
         self.params.iter().for_each(|p| p.used.set(true));
     }
@@ -376,7 +376,7 @@ impl ParamSet {
         param.spectrum(diagnostics).map(Input::Value)
     }
 
-    /// An error for each parameter that nobody asked for.
+    /// Reports an error for each unused parameter.
     pub fn report_unused(&self, diagnostics: &mut Diagnostics) {
         for param in self.params.iter().filter(|p| !p.used.get() && !p.inherited) {
             let asked = self.asked.borrow();

@@ -1,4 +1,4 @@
-//! The tables of faces and of triangle strips.
+//! Face lists and triangle strips.
 
 use super::header::{Element, Scalar};
 use super::numbers::{ByteOrder, Numbers, number_at};

@@ -3,7 +3,7 @@
 use super::PlyError;
 use super::stream::{MAX_FILL, Stream};
 
-/// Most header lines, and so elements and properties.
+/// Maximum number of header lines, and so of elements and properties.
 const MAX_LINES: u64 = 10_000;
 /// Elements that have a meaning, and so can be there once only.
 const KNOWN: [&str; 3] = ["vertex", "face", "tristrips"];

@@ -1,9 +1,9 @@
 //! Stanford PLY meshes: ASCII and binary of both byte orders, plain or gzip.
 //!
-//! The file is streamed through a small buffer: that takes less time than mapping it (no page faults), needs no
-//! `unsafe`, and costs no memory but the mesh. Counts in the header are compared with the size of the file before
-//! anything is allocated, and every index is checked. Faces of three vertices become triangles, of four quads (bilinear
-//! patches in pbrt), of more a fan of triangles; triangle strips are taken apart.
+//! The file is streamed through a small buffer: that is faster than mapping it (no page faults), needs no `unsafe`, and
+//! allocates only the mesh. Counts in the header are compared with the size of the file before anything is allocated,
+//! and every index is checked. Faces with three vertices become triangles, faces with four become quads (bilinear
+//! patches in pbrt), larger ones triangle fans; triangle strips are expanded.
 //!
 //! Reading order: `header`, `stream`, `numbers`, `vertices`, `faces`.
 
@@ -62,10 +62,10 @@ impl fmt::Display for Place {
     }
 }
 
-/// Why a PLY file cannot be used.
+/// Errors of PLY files.
 #[derive(Debug, thiserror::Error)]
 pub enum PlyError {
-    /// It cannot be read, or not be decompressed.
+    /// It cannot be read or decompressed.
     #[error("{}{source}", if path.as_os_str().is_empty() { String::new() } else { format!("{}: ", path.display()) })]
     Io {
         /// The file; empty if bytes were given.
@@ -91,7 +91,7 @@ pub enum PlyError {
         element: String,
         /// Rows of it.
         count: u64,
-        /// Least size of it and of the elements before it (bytes).
+        /// Minimum size of it and of the elements before it (bytes).
         needed: u64,
         /// Largest size of what follows the header (bytes).
         available: u64,
@@ -104,7 +104,7 @@ pub enum PlyError {
         /// What should have followed.
         element: String,
     },
-    /// A word of a text is no number of the kind that is expected.
+    /// A word of an ASCII file is not a number of the expected kind.
     #[error("{place}: `{word}` in `{element}`, where {expected} is expected")]
     Number {
         /// Where it is.

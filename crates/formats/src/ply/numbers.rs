@@ -1,4 +1,4 @@
-//! Numbers of the three encodings, one after another.
+//! Sequences of numbers in the three encodings.
 
 use super::header::{Element, Property, Scalar};
 use super::stream::Stream;
@@ -37,7 +37,7 @@ pub trait Numbers<'a> {
     /// Where the next number is.
     fn place(&mut self) -> Place;
 
-    /// Least size of a number (bytes).
+    /// Minimum size of a number (bytes).
     fn size(ty: Scalar) -> u64;
 
     /// The length of a list, which fits into the rest of the file.

@@ -1,11 +1,11 @@
-//! Bytes of a reader, seen through a buffer of fixed size.
+//! A reader seen through a buffer of fixed size.
 
 use super::{Place, PlyError};
 use std::io::{self, Read};
 
 /// Size of the buffer (bytes): fits the second-level cache.
 const BUFFER: usize = 1 << 18;
-/// Most bytes that can be asked for at once.
+/// Maximum number of bytes per request.
 pub const MAX_FILL: usize = 4096;
 /// Largest factor by which deflate expands; bounds what a gzip file can hold.
 const MAX_INFLATION: u64 = 1032;

@@ -1,4 +1,4 @@
-//! The table of vertices.
+//! The vertex table.
 
 use super::header::{Element, Scalar};
 use super::numbers::{ByteOrder, Numbers, float_at, number_at};

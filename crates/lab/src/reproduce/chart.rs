@@ -1,4 +1,4 @@
-//! Curves over two logarithmic axes, as SVG.
+//! Line charts with two logarithmic axes, as SVG.
 
 use super::page::escape;
 use super::pictures::significant;

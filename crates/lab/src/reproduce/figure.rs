@@ -1,5 +1,5 @@
-//! Figures of a paper and the page that holds them: a table of what the paper says and what was measured, the figures one
-//! after the other, and a file with all numbers.
+//! Figures of a paper and their page: a table of the paper's results and the measured ones, the figures one after the
+//! other, and a file with all numbers.
 
 use super::measure::Estimate;
 use super::page::{Block, Cell, Page, Table};
@@ -137,7 +137,7 @@ impl Figure {
     }
 }
 
-/// The name of the processor, where the system tells it.
+/// The name of the processor, if known.
 fn processor() -> String {
     let text = std::fs::read_to_string("/proc/cpuinfo").unwrap_or_default();
     let name =

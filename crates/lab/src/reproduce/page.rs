@@ -1,5 +1,5 @@
-//! A static page of results: text, tables, rows of pictures, colour scales, curves. HTML and CSS without anything from
-//! elsewhere; pictures lie beside it.
+//! A static page of results: text, tables, rows of images, colour scales, charts. Self-contained HTML and CSS; images
+//! are separate files beside it.
 
 use super::chart::Chart;
 use super::pictures::Scale;

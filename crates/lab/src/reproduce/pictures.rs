@@ -1,4 +1,4 @@
-//! Pictures for a page: tone-mapped radiance, and values as colours.
+//! Images for a page: tone-mapped radiance, and values as colours.
 
 use lumiris::imaging::color::linear_to_srgb;
 pub use lumiris::imaging::heat::{HEAT, RED_GREEN, Scale, significant};

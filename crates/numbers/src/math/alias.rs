@@ -1,6 +1,6 @@
-//! Choice from a discrete distribution in constant time: the alias method [Walker 1977; Vose 1991].
+//! Sampling a discrete distribution in constant time: the alias method [Walker 1977; Vose 1991].
 //!
-//! Bin i keeps a threshold qᵢ and a partner aᵢ. A uniform number picks a bin, its remainder picks i (below qᵢ) or aᵢ.
+//! Bin i stores a threshold qᵢ and an alias aᵢ. A uniform number picks a bin; its remainder picks i (below qᵢ) or aᵢ.
 
 use super::ONE_MINUS_EPSILON;
 

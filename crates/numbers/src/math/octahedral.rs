@@ -1,9 +1,9 @@
 //! Unit vectors in few bits: the sphere is projected onto the octahedron |x| + |y| + |z| = 1, whose lower half is
-//! folded over the upper one to fill the square [−1, 1]², which is a grid of 2^b − 1 points a side [Meyer et al. 2010;
+//! folded over the upper one to fill the square [−1, 1]², quantised to 2^b − 1 points a side [Meyer et al. 2010;
 //! Cigolle et al. 2014].
 //!
 //! No trigonometry, unlike the equal-area map of [`super::sphere_map`]. The number of grid points is odd, so that the
-//! axes, which are the normals of most walls, come back as they were.
+//! axes, which are the normals of most walls, are reproduced exactly.
 
 use super::Vec3;
 

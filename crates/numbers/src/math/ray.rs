@@ -1,4 +1,4 @@
-//! Rays and the robust choice of their origins.
+//! Rays and robust ray origins.
 
 use glam::Vec3;
 

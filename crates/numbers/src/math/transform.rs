@@ -1,4 +1,4 @@
-//! Transforms that change in time, and the transforms of normals.
+//! Time-dependent transforms, and the transformation of normals.
 
 use glam::{Affine3A, Mat3A, Vec3};
 

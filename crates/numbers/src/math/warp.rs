@@ -1,4 +1,4 @@
-//! Warps of the unit square, each with its density and its inverse, side by side.
+//! Warps of the unit square, each with its pdf and its inverse, side by side.
 
 use super::{safe_sqrt, sqr};
 use glam::{Vec2, Vec3};
@@ -211,7 +211,8 @@ mod tests {
         (0..SAMPLES).map(move |_| stream.next_2d())
     }
 
-    /// χ² over the cells of a square of parameters, with the density integrated over each cell. Five such tests at 10⁻⁴.
+    /// χ² over the cells of a square of parameters, with the density integrated over each cell. Five such tests at
+    /// 10⁻⁴.
     fn assert_density(place: impl Fn([f32; 2]) -> [f64; 2], density: impl Fn(f64, f64) -> f64) {
         let mut observed = vec![0.0; CELLS * CELLS];
         for u in numbers() {

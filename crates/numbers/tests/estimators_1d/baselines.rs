@@ -31,12 +31,13 @@ pub fn defensive_choice(alpha: f32, u: f32) -> (bool, f32) {
     if u < alpha { (true, u / alpha) } else { (false, ((u - alpha) / (1.0 - alpha)).min(ONE_MINUS_EPSILON)) }
 }
 
-/// Bidirectional importance sampling by resampling [Burke et al. 2005]: the unshadowed colour Σ_j c_j of all proposals times
-/// the mean of the visibilities of the samples, which are drawn with replacement by the luminance q̂ of the colour.
+/// Bidirectional importance sampling by resampling [Burke et al. 2005]: the unshadowed colour Σ_j c_j of all proposals
+/// times the mean of the visibilities of the samples, which are drawn with replacement by the luminance q̂ of the
+/// colour.
 ///
 /// Biased in a channel by E[(1/S) Σ_j w_j v_j Σ_j c_j] − ∫f, where v is the visibility: zero if the channel is
-/// proportional to q̂ (range of one dimension), else it tends to C E_q(v) − ∫f for M → ∞, C being the unshadowed integral
-/// [Talbot 2005, Section 4.7].
+/// proportional to q̂ (range of one dimension), else it tends to C E_q(v) − ∫f for M → ∞, C being the unshadowed
+/// integral [Talbot 2005, Section 4.7].
 pub fn bidirectional(unshadowed: [f32; 3], visibilities: &[f32]) -> [f32; 3] {
     let visible = visibilities.iter().map(|&v| f64::from(v)).sum::<f64>() / visibilities.len().max(1) as f64;
     unshadowed.map(|c| (f64::from(c) * visible) as f32)

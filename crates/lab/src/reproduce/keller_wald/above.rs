@@ -1,4 +1,4 @@
-//! Points of a scene seen from above: how densely they lie over each square of the plan. x is to the right, y upwards.
+//! Points of a scene seen from above: their density over each square of the floor plan. x is to the right, y upwards.
 
 use super::super::pictures::{HEAT, Picture, Scale};
 use lumiris_numbers::math::{Bounds3, Vec3};
@@ -6,7 +6,7 @@ use lumiris_numbers::math::{Bounds3, Vec3};
 /// A raster over the x and y of a scene.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Plan {
-    /// The corner with the least x and y (m).
+    /// The corner with the minimum x and y (m).
     low: [f64; 2],
     /// Edge of a square (m).
     edge: f64,
@@ -14,10 +14,10 @@ pub struct Plan {
     size: [u32; 2],
 }
 
-/// A part of the floor: least and greatest x and y (m).
+/// A part of the floor: minimum and maximum x and y (m).
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Area {
-    /// Least x and y.
+    /// Minimum x and y.
     pub low: [f32; 2],
     /// Greatest x and y.
     pub high: [f32; 2],
@@ -67,7 +67,8 @@ impl Plan {
         Picture::colored(self.size, density, scale)
     }
 
-    /// One scale for several pictures: from the density of a single point to that which a twentieth of the squares exceed: walls.
+    /// One scale for several pictures: from the density of a single point to that which a twentieth of the squares
+    /// exceed: walls.
     pub fn scale(&self, densities: &[&[f64]]) -> Scale {
         let mut sorted: Vec<f64> = densities.iter().flat_map(|d| d.iter().copied()).filter(|v| *v > 0.0).collect();
         sorted.sort_by(f64::total_cmp);

@@ -1,8 +1,8 @@
 //! The figures of importance sampling for photon maps [Keller and Wald 2000].
 //!
-//! [`above`] draws points as they lie on the plan, [`seen`] has what the camera sees of diffuse surfaces and the error of pictures
-//! that show a map directly, [`maps`] makes such pictures; then the figures: [`rooms`] (1 and 2), [`ring`] (3), [`slit`] (4) and
-//! [`direct`] (5).
+//! [`above`] draws points on the floor plan, [`seen`] has the diffuse surfaces that the camera sees and the error of
+//! images that visualise a map directly, [`maps`] renders such images; then the figures: [`rooms`] (1 and 2), [`ring`]
+//! (3), [`slit`] (4) and [`direct`] (5).
 
 mod above;
 mod direct;
@@ -22,7 +22,7 @@ use std::time::Duration;
 /// Time for everything, and for the tenth of it that `quick` takes; less than is promised, for what cannot be stopped
 /// half-way.
 const TIME: [Duration; 2] = [Duration::from_secs(1080), Duration::from_secs(80)];
-/// Most pixels along an edge of a picture: usual and quick.
+/// Maximum number of pixels along an edge of an image: normal and quick.
 const SIZE: [u32; 2] = [400, 128];
 /// Width and height of the pictures of rooms.
 const SHAPE: [u32; 2] = [4, 3];
@@ -56,7 +56,7 @@ struct Setup<'a> {
     observer: Observer<'a>,
     /// Folder with the scenes.
     scenes: PathBuf,
-    /// Most pixels along an edge.
+    /// Maximum number of pixels along an edge.
     size: u32,
     /// Threads for photons.
     pool: rayon::ThreadPool,

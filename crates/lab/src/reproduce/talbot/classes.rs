@@ -1,15 +1,15 @@
-//! Lit, half-shadowed and shadowed pixels, by the part of the light that arrives.
+//! Lit, penumbra and shadowed pixels, by the fraction of the light that arrives.
 //!
-//! The part is v = L/L₀, where L is the picture and L₀ the same one with shadow segments that nothing hides: for
-//! one light without extent it is 0 or 1, for all others the mean visibility of the light weighted by what it would
-//! contribute. Pixels that show no surface belong to no class.
+//! The fraction is v = L/L₀, where L is the image and L₀ the same image without occlusion: for delta lights it is 0 or
+//! 1, for all others the mean visibility of the light weighted by its contribution. Pixels without a surface belong to
+//! no class.
 
 use super::super::measure::{Stage, View, radiance};
 use super::super::method::Method;
 use super::super::{Observer, ReproduceError};
 use lumiris_numbers::math::luminance;
 
-/// Least part of the light that arrives in lit pixels.
+/// Minimum fraction of the light that arrives in lit pixels.
 pub const LIT: f64 = 0.9;
 /// Largest part of the light that arrives in shadowed pixels.
 pub const SHADOWED: f64 = 0.25;

@@ -1,7 +1,7 @@
 //! The figures of resampled importance sampling for direct light [Talbot et al. 2005; Talbot 2005, ch. 5].
 //!
-//! [`comparison`] holds methods of equal time against each other, [`classes`] tells lit pixels from shadowed ones,
-//! [`ratio`] looks for the best number of proposals per sample, [`spheres`] samples BSDFs, [`report`] writes it down.
+//! [`comparison`] compares methods at equal time, [`classes`] classifies lit and shadowed pixels, [`ratio`] searches
+//! the best number of proposals per sample, [`spheres`] samples BSDFs, [`report`] writes the results.
 
 mod classes;
 mod comparison;
@@ -20,7 +20,7 @@ use std::time::Duration;
 /// Time for everything, and for the tenth of it that `quick` takes; less than is promised, for what cannot be stopped
 /// half-way.
 const TIME: [Duration; 2] = [Duration::from_secs(1080), Duration::from_secs(80)];
-/// Most pixels along an edge of a picture: usual and quick.
+/// Maximum number of pixels along an edge of an image: normal and quick.
 const SIZE: [u32; 2] = [400, 160];
 
 /// The page around the figures.

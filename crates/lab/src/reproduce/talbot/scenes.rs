@@ -1,4 +1,4 @@
-//! Where the scenes of the figures are.
+//! Locations of the scenes of the figures.
 
 use super::super::{Options, ReproduceError, scenes_folder};
 use crate::procedural::statue::StatueOptions;

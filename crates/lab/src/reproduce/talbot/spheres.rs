@@ -1,5 +1,5 @@
 //! BSDFs that can only be evaluated, sampled from a default density with and without resampling [Talbot et al. 2005,
-//! Fig. 5]: one sample of M = 20 proposals against one of one.
+//! Fig. 5]: one sample of M = 20 proposals against one of M = 1.
 
 use super::super::figure::{Figure, Summary};
 use super::super::page::{Block, Cell, Shown, Table};
