@@ -106,15 +106,15 @@ fn maps_without_photons_are_no_light_and_no_error() {
         Film \"rgb\" \"integer xresolution\" [ 8 ] \"integer yresolution\" [ 8 ]\nWorldBegin\n\
         LightSource \"point\" \"rgb I\" [ 3 3 3 ]\nShape \"trianglemesh\"\n\
         \"point3 P\" [ -1 -1 1  1 -1 1  1 1 1  -1 1 1 ] \"integer indices\" [ 0 1 2 0 2 3 ]\n";
-    let mean = |world: &World| {
-        let film = rendering(world, RenderSettings { spp: 16, ..Default::default() }).film;
+    let mean = |job: &RenderJob| {
+        let film = rendering(job, RenderSettings { spp: 16, ..Default::default() }).film;
         film.pixels.iter().map(|p| p.mean()[1]).sum::<f64>() / film.pixels.len() as f64
     };
     let path = mean(&world_of(WALL, |_| ()));
     let shrinking = Shrinking { radius: Some(0.5), ..Default::default() };
     for progressive in [None, Some(shrinking)] {
-        let world = world_of(WALL, |scene| with_photons(scene, |p| (p.photons, p.progressive) = (1, progressive)));
-        let photons = mean(&world);
+        let job = world_of(WALL, |s| with_photons(s, |p| (p.photons, p.progressive) = (1, progressive)));
+        let photons = mean(&job);
         assert!((photons / path - 1.0).abs() < 1e-5 && path > 0.1, "{progressive:?}: {photons}, not {path}");
     }
 }
