@@ -26,6 +26,8 @@ const ROUNDING: f64 = 3e-5;
 const MARGIN: f64 = 1.2;
 /// Pictures of rows without noise.
 const EXACT_PICTURES: u32 = 8;
+/// How often a row is rendered at most, until its pictures notice the bias.
+const ATTEMPTS: u32 = 4;
 /// An environment variable: the noise is measured anew, and the table written.
 pub const MEASURE: &str = "MEASURE_POWER";
 /// Pictures by which the noise of a row is first measured.
@@ -45,7 +47,7 @@ pub struct Budget {
 pub struct Effort {
     /// The bias that rows have to notice, over that of their scene.
     pub goal: f64,
-    /// Fewest pictures of a row with noise.
+    /// Fewest pictures of a row with noise; twice as many before pixels are added to them.
     pub least_pictures: u32,
 }
 
@@ -86,10 +88,30 @@ pub fn moments(pictures: &[[f64; 3]], channel: usize, factor: f64) -> Welford {
     pictures.iter().map(|p| p[channel] * factor).collect()
 }
 
-impl Row<'_> {
+impl<'a> Row<'a> {
+    /// Pictures that notice the bias. Where they turn out to be noisier than was known, others take their place.
+    fn render_until_noticed(self, mut noise: f64, effort: &Effort, level: f64) -> Outcome<'a> {
+        let goal = self.goal(effort);
+        let mut outcome = Outcome { row: self, budget: Budget { edge: 4, pictures: 0 }, pictures: Vec::new() };
+        for attempt in 0..ATTEMPTS {
+            outcome.budget = outcome.row.budget(noise, effort, level);
+            outcome.pictures = outcome.row.render(outcome.budget, attempt << 24);
+            if outcome.detectable(level) <= goal {
+                break;
+            }
+            noise = 1.1 * outcome.noise();
+        }
+        outcome
+    }
+
     /// Scene and settings.
     pub fn name(&self) -> String {
         format!("{},{}", self.scene.name, self.configuration)
+    }
+
+    /// The bias that has to be noticed.
+    pub fn goal(&self, effort: &Effort) -> f64 {
+        effort.goal * self.scene.detects + 2.0 * self.tolerance()
     }
 
     /// The first seed, far from those of other rows.
@@ -118,7 +140,7 @@ impl Row<'_> {
         let errors = MARGIN * detectable_deviation(level, POWER, u64::from(effort.least_pictures - 1));
         let samples = (errors * noise * (1.0 + bias) / bias).powi(2);
         let pictures = |edge: u32| (samples / f64::from(edge * edge * SPP)).ceil() as u32;
-        let edge = self.edges().iter().copied().find(|&edge| pictures(edge) >= effort.least_pictures).unwrap_or(4);
+        let edge = self.edges().iter().copied().find(|&edge| pictures(edge) >= 2 * effort.least_pictures).unwrap_or(4);
         Budget { edge, pictures: pictures(edge).max(effort.least_pictures) }
     }
 
@@ -181,7 +203,8 @@ impl Outcome<'_> {
     pub fn detectable(&self, level: f64) -> f64 {
         let error = moments(&self.pictures, self.channel(), 1.0).standard_error();
         let relative = error / self.row.scene.answer[self.channel()];
-        detectable_bias(relative, self.pictures.len() as u64, level, POWER).max(self.row.tolerance())
+        // The mean may be within the tolerance on the other side
+        detectable_bias(relative, self.pictures.len() as u64, level, POWER) + 2.0 * self.row.tolerance()
     }
 
     fn noise(&self) -> f64 {
@@ -252,11 +275,9 @@ pub fn render_rows<'a>(scenes: &'a [Scene], effort: &Effort, level: f64) -> Vec<
             let index = next.fetch_add(1, Ordering::Relaxed);
             let Some(&(scene, configuration)) = rows.get(index) else { break };
             let row = Row { scene, configuration };
-            let noise = known.get(&row.name()).copied();
-            let noise = noise.unwrap_or_else(|| row.pilot());
-            let budget = row.budget(noise, effort, level);
-            let pictures = row.render(budget, 0);
-            outcomes.lock().unwrap().push((index, Outcome { row, budget, pictures }));
+            let noise = known.get(&row.name()).copied().unwrap_or_else(|| row.pilot());
+            let outcome = row.render_until_noticed(noise, effort, level);
+            outcomes.lock().unwrap().push((index, outcome));
         }
     };
     std::thread::scope(|scope| {
