@@ -17,7 +17,7 @@ pub struct Setting {
     pub flag: &'static str,
     /// Names on the command line that it had before.
     pub aliases: &'static [&'static str],
-    /// What stands for the value in help; `""` for the name itself.
+    /// What stands for the value in help.
     pub value_name: &'static str,
     /// Value that the name alone stands for on the command line, if it may stand alone.
     pub bare: Option<&'static str>,
@@ -121,7 +121,7 @@ impl Setting {
     const BASE: Setting = Setting {
         flag: "",
         aliases: &[],
-        value_name: "",
+        value_name: "NAME",
         bare: None,
         directive: Directive::Integrator,
         parameters: &[],

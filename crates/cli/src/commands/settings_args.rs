@@ -49,8 +49,8 @@ impl FromArgMatches for SettingsArgs {
 
 /// The option of a setting.
 fn option(row: &'static Setting) -> Arg {
-    let option = Arg::new(row.flag).long(row.flag).aliases(row.aliases).help(help(row)).value_parser(parser(row.kind));
-    let option = if row.value_name.is_empty() { option } else { option.value_name(row.value_name) };
+    let option = Arg::new(row.flag).long(row.flag).aliases(row.aliases).value_name(row.value_name);
+    let option = option.help(help(row)).value_parser(parser(row.kind));
     match row.bare {
         Some(value) => option.num_args(0..=1).default_missing_value(value),
         None => option,
