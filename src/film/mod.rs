@@ -1,11 +1,14 @@
 //! The film: f64 sums per pixel, from which means, variances and AOVs are read.
 //!
 //! Pixel filters work by importance sampling: a sample belongs to one pixel, and its weight is the sign of the
-//! filter ([`filter`]). So films of disjoint sample ranges add up.
+//! filter ([`filter`]). So films of disjoint sample ranges add up, and so do their [`replicas`], from which the variance of a
+//! pixel's mean is told.
 
 pub mod filter;
+pub mod replicas;
 
 use lumiris_numbers::math::{Rgb, Vec3, luminance};
+use replicas::Replica;
 
 /// What one camera sample says of its pixel.
 #[derive(Clone, Copy, Debug, Default)]
@@ -88,8 +91,8 @@ impl PixelSums {
         self.radiance.map(|s| s / self.count.max(1) as f64)
     }
 
-    /// Estimated variance of the mean per channel, from the spread of the samples as if they were independent:
-    /// an upper estimate for stratified samples. 0 with fewer than two samples.
+    /// Variance of the mean per channel if the samples are independent, from their spread; see [`Film::variances`] for
+    /// others. 0 with fewer than two samples.
     pub fn variance_of_mean(&self) -> [f64; 3] {
         if self.count < 2 {
             return [0.0; 3];
@@ -153,12 +156,14 @@ pub struct Film {
     pub bounds: PixelBounds,
     /// Sums, row-major inside `bounds`.
     pub pixels: Vec<PixelSums>,
+    /// Second estimates of some pixels, which are not part of the image; none if samples are independent.
+    pub replicas: Vec<Replica>,
 }
 
 impl Film {
     /// An empty film.
     pub fn new(resolution: [u32; 2], bounds: PixelBounds) -> Self {
-        Film { resolution, bounds, pixels: vec![PixelSums::default(); bounds.area()] }
+        Film { resolution, bounds, pixels: vec![PixelSums::default(); bounds.area()], replicas: Vec::new() }
     }
 
     /// Index of a pixel inside `pixels`.
@@ -166,22 +171,26 @@ impl Film {
         (y - self.bounds.y0) as usize * self.bounds.width() as usize + (x - self.bounds.x0) as usize
     }
 
-    /// Replaces the part of the film that `tile` covers.
-    pub fn replace_tile(&mut self, tile: &PixelBounds, sums: &[PixelSums]) {
+    /// Sets the part of an empty film that `tile` covers; pixels of replicas are indexed in the tile.
+    pub fn set_tile(&mut self, tile: &PixelBounds, sums: &[PixelSums], replicas: &[Replica]) {
         for (row, y) in (tile.y0..tile.y1).enumerate() {
             let (start, width) = (self.index(tile.x0, y), tile.width() as usize);
             self.pixels[start..start + width].copy_from_slice(&sums[row * width..(row + 1) * width]);
         }
+        let width = tile.width().max(1);
+        let pixel = |r: &Replica| self.index(tile.x0 + r.pixel % width, tile.y0 + r.pixel / width) as u32;
+        let moved: Vec<Replica> = replicas.iter().map(|r| Replica { pixel: pixel(r), ..*r }).collect();
+        self.replicas.extend(moved);
     }
 
     /// Mean over pixels of the relative standard error of the luminance of the mean: the noise that a progress bar
     /// shows. Pixels without light do not count.
     pub fn relative_noise(&self) -> f64 {
         let (mut sum, mut count) = (0.0, 0_u64);
-        for pixel in &self.pixels {
+        for (pixel, variance) in self.pixels.iter().zip(self.variances()) {
             let mean = luminance(pixel.mean());
             if mean > 0.0 && pixel.count > 1 {
-                sum += luminance(pixel.variance_of_mean()).sqrt() / mean;
+                sum += luminance(variance).sqrt() / mean;
                 count += 1;
             }
         }

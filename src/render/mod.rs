@@ -10,14 +10,16 @@ pub mod crosscheck;
 pub mod hints;
 pub mod output;
 pub mod plan;
+mod worker;
 
 use crate::direct::Fits;
 use crate::film::filter::FilterSampler;
-use crate::film::{Film, PixelBounds, PixelSample, PixelSums};
+use crate::film::replicas::{Replica, replicas};
+use crate::film::{Film, PixelBounds, PixelSums};
+use crate::integrators::PathStats;
 use crate::integrators::irradiance_cache::{self, BuildStats, IrradianceCache, LookupStats};
 use crate::integrators::path::CameraSample;
 use crate::integrators::photon_map::{self, MapMaker, MapStats, PhotonMaps};
-use crate::integrators::{CacheIntegrator, PathIntegrator, PathStats, PhotonMapIntegrator};
 use crate::photons::PhotonError;
 use crate::scene::RenderJob;
 use crate::settings::{IntegratorKind, Proposals};
@@ -28,6 +30,7 @@ use lumiris_numbers::samplers::SampleStream;
 use rayon::prelude::*;
 use std::sync::atomic::{AtomicBool, AtomicU64, Ordering};
 use std::time::{Duration, Instant};
+use worker::{Worker, WorkerStats};
 
 /// Domains of a camera sample.
 mod domain {
@@ -42,6 +45,9 @@ const BATCH_PATHS: usize = 4096;
 /// Seed of the blocks of progressive estimators.
 const BLOCK_SEED: u32 = 0x62_6c_6f_63;
 
+/// Makes the seed of replicas from that of the image.
+const REPLICA_SEED: u32 = 0x72_65_70_73;
+
 /// How to render; none of it changes the picture but the sample range.
 #[derive(Clone, Copy, Debug)]
 pub struct RenderSettings {
@@ -55,11 +61,13 @@ pub struct RenderSettings {
     pub spp: u32,
     /// Stops after the pass in which this runs out.
     pub time_limit: Option<Duration>,
+    /// Estimates some pixels twice where that tells the variance of their means; see [`crate::film::replicas`].
+    pub with_replicas: bool,
 }
 
 impl Default for RenderSettings {
     fn default() -> Self {
-        RenderSettings { threads: None, tile_size: 16, first_sample: 0, spp: 1, time_limit: None }
+        RenderSettings { threads: None, tile_size: 16, first_sample: 0, spp: 1, time_limit: None, with_replicas: false }
     }
 }
 
@@ -108,20 +116,6 @@ pub struct CacheReport {
     pub build: BuildStats,
     /// How often it was asked, and how often in vain.
     pub lookups: LookupStats,
-}
-
-/// Counts of one worker.
-#[derive(Clone, Copy, Debug, Default)]
-struct WorkerStats {
-    paths: PathStats,
-    lookups: LookupStats,
-}
-
-impl WorkerStats {
-    fn merge(&mut self, other: &WorkerStats) {
-        self.paths.merge(&other.paths);
-        self.lookups.merge(&other.lookups);
-    }
 }
 
 /// Why a rendering ended without a picture.
@@ -195,7 +189,8 @@ fn camera_batches(job: &RenderJob, tile_size: u32, rays: usize) -> Vec<Vec<Camer
 struct Tile {
     bounds: PixelBounds,
     sums: Vec<PixelSums>,
-    /// Those of its pixels one after the other.
+    replicas: Vec<Replica>,
+    /// Those of its pixels one after the other, then those of its replicas.
     fits: Fits,
 }
 
@@ -242,15 +237,7 @@ impl<'a> Run<'a> {
         let build = self.build_cache();
         let mut maker = self.map_maker()?;
         let integrator = &self.job.settings().integrator;
-        let mut tiles: Vec<Tile> = bounds
-            .tiles(self.settings.tile_size)
-            .into_iter()
-            .map(|bounds| Tile {
-                bounds,
-                sums: vec![PixelSums::default(); bounds.area()],
-                fits: Fits::new(self.job, integrator, bounds.area()),
-            })
-            .collect();
+        let mut tiles: Vec<Tile> = bounds.tiles(self.settings.tile_size).into_iter().map(|b| self.tile(b)).collect();
 
         let end = self.settings.first_sample + self.settings.spp;
         let mut stats = WorkerStats::default();
@@ -268,13 +255,10 @@ impl<'a> Run<'a> {
             let samples = first..(first + length).min(end);
             stats.merge(&self.pass(&mut tiles, samples.clone(), noise));
             first = samples.end;
-            let mut film = Film::new(self.job.world.scene.film.resolution, bounds);
-            tiles.iter().for_each(|t| film.replace_tile(&t.bounds, &t.sums));
-            noise = Some(film.relative_noise());
+            noise = Some(self.film(&tiles).relative_noise());
         }
 
-        let mut film = Film::new(self.job.world.scene.film.resolution, bounds);
-        tiles.iter().for_each(|t| film.replace_tile(&t.bounds, &t.sums));
+        let mut film = self.film(&tiles);
         let cache = self.cache.as_ref().zip(build).map(|(cache, build)| {
             stats.paths.merge(&build.paths);
             for [x, y] in cache.records().iter().map(|r| r.pixel) {
@@ -286,6 +270,27 @@ impl<'a> Run<'a> {
         let complete = film.pixels.iter().all(|p| p.count == u64::from(self.settings.spp));
         let photons = maker.map(|m| m.stats);
         Ok(Rendering { film, stats: stats.paths, cache, photons, elapsed: self.start.elapsed(), complete, threads })
+    }
+
+    /// A tile without samples.
+    fn tile(&self, bounds: PixelBounds) -> Tile {
+        let (scene, settings) = (&self.job.world.scene, self.job.settings());
+        // Samples of a progressive photon map vary with their maps, which pixels and replicas share
+        let is_told = !settings.sampling.sampler.has_independent_samples()
+            && !(settings.integrator.kind == IntegratorKind::PhotonMap
+                && settings.integrator.photons.progressive.is_some());
+        let wants_replicas = self.settings.with_replicas && is_told;
+        let replicas = if wants_replicas { replicas(&scene.film.bounds, &bounds) } else { Vec::new() };
+        let fits = Fits::new(self.job, &settings.integrator, bounds.area() + replicas.len());
+        Tile { bounds, sums: vec![PixelSums::default(); bounds.area()], replicas, fits }
+    }
+
+    /// The film of all tiles.
+    fn film(&self, tiles: &[Tile]) -> Film {
+        let mut film = Film::new(self.job.world.scene.film.resolution, self.job.world.scene.film.bounds);
+        tiles.iter().for_each(|t| film.set_tile(&t.bounds, &t.sums, &t.replicas));
+        film.replicas.sort_unstable_by_key(|r| r.pixel);
+        film
     }
 
     /// Makes the irradiance cache, if the integrator has one.
@@ -408,15 +413,35 @@ impl<'a> Run<'a> {
                 results.iter().for_each(|r| pixel.add(r));
             }
         }
+        self.render_replicas(worker, tile, samples);
         let mut stats = worker.take_stats();
         if begins_block {
             let direct = &mut stats.paths.direct;
-            direct.systems += tile.sums.len() as u64;
+            direct.systems += (tile.sums.len() + tile.replicas.len()) as u64;
             direct.ill_conditioned += ill_conditioned;
             direct.solve += solve;
             direct.select += solve;
         }
         stats
+    }
+
+    /// Adds the samples of a range to the replicas of a tile.
+    fn render_replicas(&self, worker: &mut Worker, tile: &mut Tile, samples: std::ops::Range<u32>) {
+        let per_pixel = samples.len().max(1);
+        let seed = pcg4d([self.job.settings().sampling.seed, REPLICA_SEED, 0, 0])[0];
+        let mut fits = tile.bounds.area() as u32..;
+        for replicas in tile.replicas.chunks_mut((BATCH_PATHS / per_pixel).max(1)) {
+            worker.samples.clear();
+            for (replica, fit) in replicas.iter().zip(&mut fits) {
+                let pixel = position(&tile.bounds, replica.pixel);
+                let of_pixel = samples.clone().map(|s| CameraSample { fit, ..self.camera_sample(pixel, s, seed) });
+                worker.samples.extend(of_pixel);
+            }
+            worker.trace(self.job, (self.cache.as_ref(), self.maps.as_ref()), &mut tile.fits);
+            for (replica, results) in replicas.iter_mut().zip(worker.results.chunks(per_pixel)) {
+                results.iter().for_each(|r| replica.add(r));
+            }
+        }
     }
 
     /// The camera samples of some pixels of a tile, which are counted row by row.
@@ -428,16 +453,16 @@ impl<'a> Run<'a> {
         out: &mut Vec<CameraSample>,
     ) {
         out.clear();
+        let seed = self.job.settings().sampling.seed;
         for index in pixels {
             let index = index as u32;
-            let pixel = [tile.x0 + index % tile.width(), tile.y0 + index / tile.width()];
-            out.extend(samples.clone().map(|s| CameraSample { fit: index, ..self.camera_sample(pixel, s) }));
+            let pixel = position(tile, index);
+            out.extend(samples.clone().map(|s| CameraSample { fit: index, ..self.camera_sample(pixel, s, seed) }));
         }
     }
 
     /// The direct light of a progressive estimator is drawn block by block, each with a seed of its own.
-    fn camera_sample(&self, pixel: [u32; 2], sample: u32) -> CameraSample {
-        let seed = self.job.settings().sampling.seed;
+    fn camera_sample(&self, pixel: [u32; 2], sample: u32, seed: u32) -> CameraSample {
         if !self.job.settings().integrator.is_progressive() {
             return self.camera_sample_of_seed(pixel, sample, seed);
         }
@@ -473,36 +498,7 @@ impl<'a> Run<'a> {
     }
 }
 
-/// Buffers of one thread.
-#[derive(Default)]
-struct Worker {
-    integrator: PathIntegrator,
-    with_cache: CacheIntegrator,
-    with_photons: PhotonMapIntegrator,
-    samples: Vec<CameraSample>,
-    results: Vec<PixelSample>,
-}
-
-impl Worker {
-    /// Traces `samples` into `results`.
-    fn trace(
-        &mut self,
-        job: &RenderJob,
-        (cache, maps): (Option<&IrradianceCache>, Option<&PhotonMaps>),
-        fits: &mut Fits,
-    ) {
-        let (samples, results) = (&self.samples, &mut self.results);
-        match (cache, maps) {
-            (Some(cache), _) => self.with_cache.trace(job, cache, samples, fits, results),
-            (None, Some(maps)) => self.with_photons.trace(job, maps, samples, fits, results),
-            (None, None) => self.integrator.trace(job, &job.settings().integrator, samples, fits, results),
-        }
-    }
-
-    fn take_stats(&mut self) -> WorkerStats {
-        let (mut paths, lookups) = self.with_cache.take_stats();
-        paths.merge(&self.with_photons.take_stats());
-        paths.merge(&self.integrator.take_stats());
-        WorkerStats { paths, lookups }
-    }
+/// Coordinates of the pixel of a tile with the given index, row by row.
+fn position(tile: &PixelBounds, index: u32) -> [u32; 2] {
+    [tile.x0 + index % tile.width(), tile.y0 + index / tile.width()]
 }

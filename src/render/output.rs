@@ -65,12 +65,13 @@ pub fn channels(film: &Film, aovs: &[Aov], splits: Option<&SplitMap>) -> Channel
     let aov_names = aovs.iter().flat_map(|a| a.channels().iter().copied());
     let names: Vec<String> = ["R", "G", "B"].into_iter().chain(aov_names).map(str::to_owned).collect();
     let mut data = Vec::with_capacity(names.len() * film.pixels.len());
+    let variances = if aovs.contains(&Aov::Variance) { film.variances() } else { Vec::new() };
     for (i, pixel) in film.pixels.iter().enumerate() {
         data.extend(pixel.mean().map(|v| v as f32));
         let count = pixel.count.max(1) as f64;
         for aov in aovs {
             match aov {
-                Aov::Variance => data.extend(pixel.variance_of_mean().map(|v| v as f32)),
+                Aov::Variance => data.extend(variances[i].map(|v| v as f32)),
                 Aov::Samples => data.push(pixel.count as f32),
                 Aov::Albedo => data.extend(pixel.albedo.map(|v| (v / count) as f32)),
                 Aov::Normal => data.extend(pixel.normal.map(|v| (v / count) as f32)),

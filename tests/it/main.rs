@@ -12,3 +12,4 @@ mod light_hints;
 mod mutations;
 mod photon_map;
 mod photons;
+mod variance;

@@ -10,9 +10,9 @@
 //!   by Šidák. It detects small deviations in many pixels.
 //!
 //! What violates the assumptions: variances estimated from few samples (z has the tails of Student's t, and where
-//! bright samples are rare, the variance is low exactly where the mean is), variances of stratified samples computed as
-//! if they were independent (too large: z is too small, and the tests miss differences), and neighbouring pixels that
-//! share samples.
+//! bright samples are rare, the variance is low exactly where the mean is), variances of stratified samples that are
+//! stated as if they were independent (too large: z is too small, and the tests miss differences), and neighbouring
+//! pixels that share samples.
 
 use super::{Pixel, finite_pairs};
 use lumiris_numbers::estimators::stats::{chi_squared_tail, z_test};

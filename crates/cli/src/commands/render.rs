@@ -35,7 +35,7 @@ pub fn run(args: &RenderArgs) -> anyhow::Result<ExitCode> {
 
     let bar = Bar::new(args.quiet);
     let time_limit = args.time.map(Duration::from_secs_f64);
-    let settings = RenderSettings { time_limit, ..render_settings(&args.scene, &job) };
+    let settings = RenderSettings { time_limit, with_replicas: true, ..render_settings(&args.scene, &job) };
     let rendering = render(&job, &settings, &stop, &|p| bar.update(p))?;
     bar.finish();
 
@@ -150,7 +150,7 @@ fn stats(args: &RenderArgs, job: &RenderJob, rendering: &Rendering, setup: Setup
             "ocv_solve": seconds(d.solve),
         },
         "counts": {
-            "camera_rays": s.camera_rays, "bounce_rays": s.bounce_rays, "proposals": d.proposals,
+            "replica_pixels": rendering.film.replicas.len(), "camera_rays": s.camera_rays, "bounce_rays": s.bounce_rays, "proposals": d.proposals,
             "emitter_rays": d.emitter_rays, "shadow_segments": d.segments,
             "ocv_systems": d.systems, "ocv_ill_conditioned": d.ill_conditioned,
         },

@@ -28,6 +28,16 @@ pub enum SamplerKind {
     SobolBlueNoise,
 }
 
+impl SamplerKind {
+    /// True if the samples of a pixel are independent of each other.
+    pub fn has_independent_samples(self) -> bool {
+        match self {
+            SamplerKind::Independent | SamplerKind::Stratified => true,
+            SamplerKind::Sobol | SamplerKind::SobolBlueNoise => false,
+        }
+    }
+}
+
 /// A place in the tree of domains of one sample.
 #[derive(Clone, Copy, Debug)]
 pub struct SampleStream(Kind);

@@ -1,0 +1,220 @@
+//! The variance of pixel means for any sampler, from pixels that are estimated twice.
+//!
+//! The mean of N independent samples has the variance s²/N, where s² is the variance of the samples. Points of a net are
+//! spread more evenly, and their mean varies less. By how much cannot be told from one net: its error is what lies between
+//! its points. So some pixels, the *replicas*, are estimated a second time, with as many samples of an independent scramble.
+//! Of two such means A and B, (A − B)²/2 is an unbiased estimate of their variance, and a class of pixels has the variances
+//!
+//! V = f s²/N, with f = Σ (A − B)²/2 / Σ s²/N over the replicas of the class.
+//!
+//! f depends on what is seen: strata gain much at edges and in soft shadows, and little in light that many bounces
+//! bring. Classes are intervals of the mean of s²/N over the 3 × 3 pixels around, which has less noise than a pixel's own
+//! value. Whatever the classes, the sum of V over the image is that of the replicas, scaled to all pixels.
+
+use super::{Film, PixelBounds, PixelSample, PixelSums};
+use lumiris_numbers::math::hash::{pcg4d, unit_f32};
+
+/// Replicas that an image should have; it has more if [`LEAST_SHARE`] of its pixels are more, and fewer if its pixels are.
+const WANTED: f64 = 512.0;
+/// Least share of the pixels that are replicated.
+const LEAST_SHARE: f64 = 1.0 / 64.0;
+/// Most classes of pixels.
+const MOST_CLASSES: usize = 8;
+/// Least number of replicas in a class: f then has a relative standard error of √(2/64) = 18 % if means are normal.
+const LEAST_OF_CLASS: usize = 64;
+/// Keeps the choice of replicas apart from other hashes of pixels.
+const CHOICE: u32 = 0x72_65_70_6c;
+
+/// The second estimate of a pixel.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Replica {
+    /// Index of the pixel in the film or tile.
+    pub pixel: u32,
+    /// Number of samples.
+    pub count: u64,
+    /// Σ radiance.
+    pub radiance: [f64; 3],
+}
+
+impl Replica {
+    /// Adds a sample, as [`PixelSums::add`] does.
+    pub fn add(&mut self, sample: &PixelSample) {
+        self.count += 1;
+        if sample.radiance.is_finite() {
+            for (sum, value) in self.radiance.iter_mut().zip(sample.radiance.to_array()) {
+                *sum += f64::from(value);
+            }
+        }
+    }
+
+    /// Σ (A − B)²/2 over channels.
+    fn half_square(&self, pixel: &PixelSums) -> f64 {
+        let difference = |c: usize| (pixel.radiance[c] - self.radiance[c]) / self.count as f64;
+        (0..3).map(|c| 0.5 * difference(c) * difference(c)).sum()
+    }
+}
+
+/// Replicas without samples for the pixels of a tile that are estimated twice, in an image with the given bounds. They are
+/// indexed in the tile.
+pub fn replicas(image: &PixelBounds, tile: &PixelBounds) -> Vec<Replica> {
+    let share = (WANTED / image.area().max(1) as f64).max(LEAST_SHARE);
+    let is_chosen = |i: &u32| {
+        let (x, y) = (tile.x0 + i % tile.width(), tile.y0 + i / tile.width());
+        f64::from(unit_f32(pcg4d([x, y, CHOICE, 0])[0])) < share
+    };
+    let none = |pixel| Replica { pixel, count: 0, radiance: [0.0; 3] };
+    (0..tile.area() as u32).filter(is_chosen).map(none).collect()
+}
+
+/// Pixels whose s²/N, averaged over their neighbours, is up to `limit` and above that of the class before.
+struct Class {
+    limit: f64,
+    /// f.
+    factor: f64,
+}
+
+/// What a replica tells.
+#[derive(Clone, Copy)]
+struct Told {
+    /// s²/N, averaged over neighbours.
+    key: f64,
+    /// s²/N.
+    independent: f64,
+    /// (A − B)²/2.
+    measured: f64,
+}
+
+impl Film {
+    /// Estimated variance of each pixel's mean per channel. Without replicas it is that of independent samples.
+    pub fn variances(&self) -> Vec<[f64; 3]> {
+        let mut variances: Vec<[f64; 3]> = self.pixels.iter().map(PixelSums::variance_of_mean).collect();
+        if self.replicas.is_empty() {
+            return variances;
+        }
+        let sums: Vec<f64> = variances.iter().map(|v| v.iter().sum()).collect();
+        let keys = self.neighbourhood_means(&sums);
+        let told = self.replicas.iter().filter_map(|replica| {
+            let i = replica.pixel as usize;
+            let pixel = &self.pixels[i];
+            let told = Told { key: keys[i], independent: sums[i], measured: replica.half_square(pixel) };
+            (pixel.count == replica.count && pixel.count > 1).then_some(told)
+        });
+        let classes = classes(told.collect());
+        if !classes.is_empty() {
+            for (variance, key) in variances.iter_mut().zip(&keys) {
+                let class = classes.partition_point(|c| c.limit < *key).min(classes.len() - 1);
+                variance.iter_mut().for_each(|v| *v *= classes[class].factor);
+            }
+        }
+        variances
+    }
+
+    /// Mean of `values` over the 3 × 3 pixels around each pixel, as far as there are any.
+    fn neighbourhood_means(&self, values: &[f64]) -> Vec<f64> {
+        let (width, height) = (self.bounds.width() as usize, self.bounds.height() as usize);
+        let around = |i: usize, len: usize| i.saturating_sub(1)..(i + 2).min(len);
+        let mean = |i: usize| {
+            let (columns, rows) = (around(i % width, width), around(i / width, height));
+            let count = columns.len() * rows.len();
+            let sum: f64 = rows.map(|y| values[y * width..][columns.clone()].iter().sum::<f64>()).sum();
+            sum / count as f64
+        };
+        (0..values.len()).map(mean).collect()
+    }
+}
+
+/// Classes of about equally many replicas, by rising keys; none if nothing varies.
+fn classes(mut told: Vec<Told>) -> Vec<Class> {
+    // Where samples are all the same, there is nothing to scale
+    told.retain(|t| t.key > 0.0 || t.measured > 0.0);
+    told.sort_by(|a, b| a.key.total_cmp(&b.key));
+    let size = told.len().div_ceil(MOST_CLASSES).max(LEAST_OF_CLASS);
+    let mut classes = Vec::new();
+    let (mut members, mut independent, mut measured) = (0, 0.0, 0.0);
+    for (i, t) in told.iter().enumerate() {
+        members += 1;
+        independent += t.independent;
+        measured += t.measured;
+        let rest = &told[i + 1..];
+        let is_full = members >= size && 2 * rest.len() >= size && independent > 0.0;
+        if rest.is_empty() || is_full && rest[0].key > t.key {
+            let factor = if independent > 0.0 { measured / independent } else { 1.0 };
+            classes.push(Class { limit: t.key, factor });
+            (members, independent, measured) = (0, 0.0, 0.0);
+        }
+    }
+    classes
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// A film of 64 × 64 pixels and as many replicas, means of two samples each. Means are 1 ± σ, and s²/N is `independent`;
+    /// both are given for the column of a pixel.
+    fn film(sigma: impl Fn(u32) -> f64, independent: impl Fn(u32) -> f64) -> Film {
+        let bounds = PixelBounds { x0: 0, x1: 64, y0: 0, y1: 64 };
+        let mut film = Film::new([64, 64], bounds);
+        for i in 0..4096_u32 {
+            let bits = pcg4d([i, 3, 1, 4]);
+            let mean = |bit: u32| 1.0 + if bit & 1 == 0 { sigma(i % 64) } else { -sigma(i % 64) };
+            let (a, b) = (mean(bits[0]), mean(bits[1]));
+            film.replicas.push(Replica { pixel: i, count: 2, radiance: [2.0 * b; 3] });
+            // s²/N = Σ x²/N − mean² for two samples
+            let squares = 2.0 * (a * a + independent(i % 64));
+            film.pixels[i as usize] =
+                PixelSums { count: 2, radiance: [2.0 * a; 3], radiance_squared: [squares; 3], ..PixelSums::default() };
+        }
+        film
+    }
+
+    #[test]
+    fn variances_are_those_that_replicas_show() {
+        let mut film = film(|_| 0.1, |_| 0.05);
+        let mean = film.variances().iter().map(|v| v[1]).sum::<f64>() / 4096.0;
+        // (A − B)²/2 is 0 or 2σ²: its mean over 4096 replicas has the standard error σ²/64.
+        assert!((mean / 0.01 - 1.0).abs() < 4.0 / 64.0, "{mean}");
+        film.replicas.clear();
+        assert!(film.variances().iter().all(|v| (v[1] - 0.05).abs() < 1e-12), "as if independent");
+    }
+
+    #[test]
+    fn parts_of_an_image_that_gain_unlike_are_told_apart() {
+        // s²/N is 4 on the left and 1 on the right; the variances are 1 and 0.01.
+        let film = film(|x| if x < 32 { 1.0 } else { 0.1 }, |x| if x < 32 { 4.0 } else { 1.0 });
+        let variances = film.variances();
+        for (columns, expected) in [(0..31, 1.0), (33..64, 0.01)] {
+            let inside = |i: &usize| columns.contains(&(i % 64));
+            let values: Vec<f64> = (0..4096).filter(inside).map(|i| variances[i][0]).collect();
+            let mean = values.iter().sum::<f64>() / values.len() as f64;
+            // Some 2000 replicas: a standard error of 1/45
+            assert!((mean / expected - 1.0).abs() < 4.0 / 45.0, "{mean}, not {expected}");
+        }
+    }
+
+    #[test]
+    fn differences_between_pixels_that_do_not_vary_are_not_lost() {
+        // One pixel in four varies within itself; means vary everywhere.
+        let film = film(|_| 0.1, |x| if x % 16 < 4 { 0.05 } else { 0.0 });
+        let total = film.variances().iter().map(|v| v[1]).sum::<f64>();
+        assert!((total / (4096.0 * 0.01) - 1.0).abs() < 4.0 / 64.0, "{total}");
+    }
+
+    #[test]
+    fn replicas_are_the_same_pixels_for_all_tiles_and_few_in_large_images() {
+        let image = PixelBounds { x0: 10, x1: 410, y0: 7, y1: 307 };
+        let position =
+            |tile: &PixelBounds, r: &Replica| [tile.x0 + r.pixel % tile.width(), tile.y0 + r.pixel / tile.width()];
+        let mut whole: Vec<_> = replicas(&image, &image).iter().map(|r| position(&image, r)).collect();
+        let tiles = image.tiles(13);
+        let mut parts: Vec<_> =
+            tiles.iter().flat_map(|t| replicas(&image, t).into_iter().map(|r| position(t, &r))).collect();
+        whole.sort_unstable();
+        parts.sort_unstable();
+        assert_eq!(whole, parts);
+        // 120,000/64 = 1875 with a standard deviation of 43
+        assert!((whole.len() as f64 - 1875.0).abs() < 4.0 * 43.0, "{}", whole.len());
+        let small = PixelBounds { x0: 0, x1: 20, y0: 0, y1: 20 };
+        assert_eq!(replicas(&small, &small).len(), 400);
+    }
+}

@@ -1,0 +1,57 @@
+//! What one thread holds: an integrator of each kind, with its buffers and counts.
+
+use crate::direct::Fits;
+use crate::film::PixelSample;
+use crate::integrators::irradiance_cache::{IrradianceCache, LookupStats};
+use crate::integrators::path::CameraSample;
+use crate::integrators::photon_map::PhotonMaps;
+use crate::integrators::{CacheIntegrator, PathIntegrator, PathStats, PhotonMapIntegrator};
+use crate::scene::RenderJob;
+
+/// Counts of one worker.
+#[derive(Clone, Copy, Debug, Default)]
+pub(super) struct WorkerStats {
+    pub(super) paths: PathStats,
+    pub(super) lookups: LookupStats,
+}
+
+impl WorkerStats {
+    pub(super) fn merge(&mut self, other: &WorkerStats) {
+        self.paths.merge(&other.paths);
+        self.lookups.merge(&other.lookups);
+    }
+}
+
+/// Buffers of one thread.
+#[derive(Default)]
+pub(super) struct Worker {
+    integrator: PathIntegrator,
+    with_cache: CacheIntegrator,
+    with_photons: PhotonMapIntegrator,
+    pub(super) samples: Vec<CameraSample>,
+    pub(super) results: Vec<PixelSample>,
+}
+
+impl Worker {
+    /// Traces `samples` into `results`.
+    pub(super) fn trace(
+        &mut self,
+        job: &RenderJob,
+        (cache, maps): (Option<&IrradianceCache>, Option<&PhotonMaps>),
+        fits: &mut Fits,
+    ) {
+        let (samples, results) = (&self.samples, &mut self.results);
+        match (cache, maps) {
+            (Some(cache), _) => self.with_cache.trace(job, cache, samples, fits, results),
+            (None, Some(maps)) => self.with_photons.trace(job, maps, samples, fits, results),
+            (None, None) => self.integrator.trace(job, &job.settings().integrator, samples, fits, results),
+        }
+    }
+
+    pub(super) fn take_stats(&mut self) -> WorkerStats {
+        let (mut paths, lookups) = self.with_cache.take_stats();
+        paths.merge(&self.with_photons.take_stats());
+        paths.merge(&self.integrator.take_stats());
+        WorkerStats { paths, lookups }
+    }
+}
