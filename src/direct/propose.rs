@@ -17,21 +17,21 @@ use std::time::{Duration, Instant};
 
 /// Domains below the stream of a shading point.
 pub(super) mod domain {
-    pub const LIGHT: u32 = 0;
-    pub const BSDF: u32 = 1;
-    pub const TECHNIQUE: u32 = 2;
+    pub(crate) const LIGHT: u32 = 0;
+    pub(crate) const BSDF: u32 = 1;
+    pub(crate) const TECHNIQUE: u32 = 2;
     /// Where the samples of groups begin and end.
-    pub const GROUPS: u32 = 3;
+    pub(crate) const GROUPS: u32 = 3;
     /// Lights that no ray can hit, where they are sampled by themselves.
-    pub const DELTA: u32 = 4;
+    pub(crate) const DELTA: u32 = 4;
     /// Lights that no photon came from.
-    pub const REST: u32 = 5;
+    pub(crate) const REST: u32 = 5;
     /// Which of the dim lights is traced.
-    pub const DIM: u32 = 6;
+    pub(crate) const DIM: u32 = 6;
     /// Light number k of those that are seen uses the domain `SEEN + k`.
-    pub const SEEN: u32 = 64;
+    pub(crate) const SEEN: u32 = 64;
     /// Group g uses the domain `GROUP + g`.
-    pub const GROUP: u32 = 16;
+    pub(crate) const GROUP: u32 = 16;
 }
 
 /// Rounding of an expected number of samples that is meant to be whole.
@@ -152,12 +152,12 @@ pub(super) struct Shares {
 
 impl Shares {
     /// So many of each.
-    pub fn fixed(light: u32, bsdf: u32) -> Self {
+    pub(super) fn fixed(light: u32, bsdf: u32) -> Self {
         Shares { light_draws: light, bsdf_draws: bsdf, n_light: light as f32, n_bsdf: bsdf as f32 }
     }
 
     /// A single sample that chooses its technique at random, so that the expected numbers are one half each.
-    pub fn one_of_both(point: &ShadePoint<'_>) -> Self {
+    pub(super) fn one_of_both(point: &ShadePoint<'_>) -> Self {
         let light = point.stream.domain(domain::TECHNIQUE).draw::<1>()[0] < 0.5;
         Shares { light_draws: u32::from(light), bsdf_draws: u32::from(!light), n_light: 0.5, n_bsdf: 0.5 }
     }

@@ -26,8 +26,8 @@ use std::time::{Duration, Instant};
 
 /// Domains below the stream of a shading point, beside those of [`super::propose`].
 mod domain {
-    pub const RESAMPLE: u32 = 8;
-    pub const STRATA: u32 = 9;
+    pub(super) const RESAMPLE: u32 = 8;
+    pub(super) const STRATA: u32 = 9;
 }
 
 /// Proposals that are made before samples are drawn from them: few enough to stay in the cache.

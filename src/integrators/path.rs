@@ -20,13 +20,13 @@ use std::time::{Duration, Instant};
 
 /// Domains below the stream of a path vertex.
 mod domain {
-    pub const DIRECT: u32 = 0;
-    pub const BSDF: u32 = 1;
-    pub const ROULETTE: u32 = 2;
-    pub const RESAMPLE: u32 = 3;
-    pub const ALBEDO: u32 = 4;
+    pub(super) const DIRECT: u32 = 0;
+    pub(super) const BSDF: u32 = 1;
+    pub(super) const ROULETTE: u32 = 2;
+    pub(super) const RESAMPLE: u32 = 3;
+    pub(super) const ALBEDO: u32 = 4;
     /// Vertex k uses the domain `VERTEX + k` of the camera sample.
-    pub const VERTEX: u32 = 16;
+    pub(super) const VERTEX: u32 = 16;
 }
 
 /// Surfaces without scattering that a path may pass between two vertices.

@@ -46,9 +46,9 @@ const BYTES: u64 = 31;
 
 /// Domains below the stream of a trajectory.
 pub(super) mod domain {
-    pub const LIGHT: u32 = 0;
-    pub const EMISSION: u32 = 1;
-    pub const TIME: u32 = 2;
+    pub(crate) const LIGHT: u32 = 0;
+    pub(crate) const EMISSION: u32 = 1;
+    pub(crate) const TIME: u32 = 2;
 }
 
 /// How photons are traced.

@@ -28,14 +28,14 @@ const MAX_PASSED: u32 = 64;
 
 /// Domains below the stream of a vertex.
 mod domain {
-    pub const BSDF: u32 = 0;
-    pub const RESAMPLE: u32 = 1;
-    pub const ROULETTE: u32 = 2;
-    pub const PART: u32 = 3;
+    pub(super) const BSDF: u32 = 0;
+    pub(super) const RESAMPLE: u32 = 1;
+    pub(super) const ROULETTE: u32 = 2;
+    pub(super) const PART: u32 = 3;
     /// Two numbers for the deposit.
-    pub const DEPOSIT: u32 = 4;
+    pub(super) const DEPOSIT: u32 = 4;
     /// Vertex k has the domain `VERTEX + k` of the trajectory.
-    pub const VERTEX: u32 = 16;
+    pub(super) const VERTEX: u32 = 16;
 }
 
 /// A particle on its way.

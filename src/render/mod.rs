@@ -34,9 +34,9 @@ use worker::{Worker, WorkerStats};
 
 /// Domains of a camera sample.
 mod domain {
-    pub const FILM_AND_LENS: u32 = 0;
-    pub const TIME: u32 = 1;
-    pub const SPLIT: u32 = 2;
+    pub(super) const FILM_AND_LENS: u32 = 0;
+    pub(super) const TIME: u32 = 1;
+    pub(super) const SPLIT: u32 = 2;
 }
 
 /// Paths that are traced together: enough that stages run long, few enough that their data stays in the cache.
@@ -276,12 +276,12 @@ impl<'a> Run<'a> {
     fn tile(&self, bounds: PixelBounds) -> Tile {
         let (scene, settings) = (&self.job.world.scene, self.job.settings());
         // Samples of a progressive photon map vary with their maps, which pixels and replicas share
-        let is_told = !settings.sampling.sampler.has_independent_samples()
-            && !(settings.integrator.kind == IntegratorKind::PhotonMap
-                && settings.integrator.photons.progressive.is_some());
+        let integrator = &settings.integrator;
+        let shares_maps = integrator.kind == IntegratorKind::PhotonMap && integrator.photons.progressive.is_some();
+        let is_told = !settings.sampling.sampler.has_independent_samples() && !shares_maps;
         let wants_replicas = self.settings.with_replicas && is_told;
         let replicas = if wants_replicas { replicas(&scene.film.bounds, &bounds) } else { Vec::new() };
-        let fits = Fits::new(self.job, &settings.integrator, bounds.area() + replicas.len());
+        let fits = Fits::new(self.job, integrator, bounds.area() + replicas.len());
         Tile { bounds, sums: vec![PixelSums::default(); bounds.area()], replicas, fits }
     }
 

@@ -21,7 +21,7 @@ use std::sync::atomic::AtomicBool;
 
 /// What photons say.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum Hints {
+pub(crate) enum Hints {
     /// Nobody asked them.
     Absent,
     /// There were none.
@@ -62,7 +62,7 @@ fn primary_photons(job: &RenderJob) -> Vec<(Vec3, Vec3, LightId)> {
 }
 
 /// Hints of a kind for a job.
-pub fn hints(job: &RenderJob, kind: Hints) -> Option<LightHints> {
+pub(crate) fn hints(job: &RenderJob, kind: Hints) -> Option<LightHints> {
     let radius = job.lights.scene_radius;
     match kind {
         Hints::Absent => None,

@@ -11,8 +11,8 @@ use rayon::prelude::*;
 
 /// Domains below the stream of an estimate.
 mod domain {
-    pub const PROPOSAL: u32 = 0;
-    pub const CHOICE: u32 = 1;
+    pub(super) const PROPOSAL: u32 = 0;
+    pub(super) const CHOICE: u32 = 1;
 }
 
 /// Part of the picture's half-width that the sphere fills.

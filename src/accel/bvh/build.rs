@@ -29,17 +29,17 @@ pub(super) struct PrimRef {
 
 impl PrimRef {
     /// The value of `geometry` for an instance.
-    pub const INSTANCE: u32 = u32::MAX;
+    pub(super) const INSTANCE: u32 = u32::MAX;
 
     /// `None` if a point is not finite.
-    pub fn of_points(geometry: u32, primitive: usize, points: &[Vec3]) -> Option<Self> {
+    pub(super) fn of_points(geometry: u32, primitive: usize, points: &[Vec3]) -> Option<Self> {
         // Minima and maxima may ignore NaN.
         let finite = points.iter().all(|p| p.is_finite());
         finite.then(|| Self::of_bounds(geometry, primitive, Bounds3::from_points(points.iter().copied()))).flatten()
     }
 
     /// `None` if the bounds are not finite.
-    pub fn of_bounds(geometry: u32, primitive: usize, bounds: Bounds3) -> Option<Self> {
+    pub(super) fn of_bounds(geometry: u32, primitive: usize, bounds: Bounds3) -> Option<Self> {
         let finite = bounds.min.is_finite() && bounds.max.is_finite();
         finite.then_some(PrimRef { lo: bounds.min, geometry, hi: bounds.max, primitive: primitive as u32 })
     }
@@ -77,7 +77,7 @@ impl Range3 {
 
     /// Half the surface area.
     #[inline]
-    pub fn half_area(&self) -> f32 {
+    pub(super) fn half_area(&self) -> f32 {
         let d = self.hi - self.lo;
         d.x * d.y + d.y * d.z + d.z * d.x
     }
@@ -102,7 +102,7 @@ pub(super) enum BinaryKind {
 
 impl Binary {
     /// Bytes of the subtree, including the node itself.
-    pub fn bytes(&self) -> u64 {
+    pub(super) fn bytes(&self) -> u64 {
         let below = match &self.kind {
             BinaryKind::Leaf { .. } => 0,
             BinaryKind::Inner(children) => children[0].bytes() + children[1].bytes(),

@@ -24,7 +24,7 @@ pub(super) enum Child {
 impl ChildRef {
     const KIND_SHIFT: u32 = 30;
     /// An unused slot; its box is empty, so it is never visited.
-    pub const EMPTY: ChildRef = ChildRef(u32::MAX);
+    pub(super) const EMPTY: ChildRef = ChildRef(u32::MAX);
 
     fn new(kind: u32, index: usize) -> Self {
         debug_assert!(index < 1 << Self::KIND_SHIFT);
@@ -32,7 +32,7 @@ impl ChildRef {
     }
 
     #[inline]
-    pub fn decode(self) -> Child {
+    pub(super) fn decode(self) -> Child {
         let index = (self.0 & ((1 << Self::KIND_SHIFT) - 1)) as usize;
         match self.0 >> Self::KIND_SHIFT {
             0 => Child::Node(index),
@@ -80,20 +80,20 @@ impl Block {
 
     /// (geometry, primitive) of a lane.
     #[inline]
-    pub fn id(&self, lane: usize) -> (u32, u32) {
+    pub(super) fn id(&self, lane: usize) -> (u32, u32) {
         (self.geometry[lane], self.primitive[lane])
     }
 
     /// Corners of a lane.
     #[inline]
-    pub fn triangle(&self, lane: usize) -> [Vec3; 3] {
+    pub(super) fn triangle(&self, lane: usize) -> [Vec3; 3] {
         self.corners.map(|axes| Vec3::from(axes.map(|x| x[lane])))
     }
 
     /// Lanes whose f32 edge functions do not exclude a hit: those of
     /// [`crate::geometry::triangle::intersect_triangle`], four at a time.
     #[inline]
-    pub fn candidates(&self, ray: &RayPrecomputed) -> u32 {
+    pub(super) fn candidates(&self, ray: &RayPrecomputed) -> u32 {
         let [kx, ky, kz] = ray.axes;
         let o = ray.ray.o;
         let (ox, oy, oz) = (Vec4::splat(o[kx]), Vec4::splat(o[ky]), Vec4::splat(o[kz]));
@@ -137,7 +137,12 @@ pub(super) struct Tree {
 
 impl Tree {
     /// Collapses a binary tree over the reordered primitives.
-    pub fn new(geometry: &GeometrySet, prims: &[PrimRef], binary: Option<&Binary>, is_triangle: &[bool]) -> Self {
+    pub(super) fn new(
+        geometry: &GeometrySet,
+        prims: &[PrimRef],
+        binary: Option<&Binary>,
+        is_triangle: &[bool],
+    ) -> Self {
         let mut collapse = Collapse { prims, is_triangle, nodes: Vec::new(), leaves: Vec::new(), others: Vec::new() };
         let root = binary.map(|binary| {
             let root = collapse.place(binary);
@@ -154,7 +159,7 @@ impl Tree {
     }
 
     /// Bytes held.
-    pub fn bytes(&self) -> u64 {
+    pub(super) fn bytes(&self) -> u64 {
         (size_of_val(&self.nodes[..]) + size_of_val(&self.blocks[..]) + size_of_val(&self.others[..])) as u64
     }
 }

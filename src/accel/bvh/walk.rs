@@ -29,7 +29,7 @@ pub(super) struct Closest {
 }
 
 impl Closest {
-    pub fn new(t_max: f32) -> Self {
+    pub(super) fn new(t_max: f32) -> Self {
         Closest { limit: t_max, best: None }
     }
 }
@@ -66,7 +66,7 @@ pub(super) struct Any {
 }
 
 impl Any {
-    pub fn new(t_max: f32) -> Self {
+    pub(super) fn new(t_max: f32) -> Self {
         Any { limit: t_max, found: false }
     }
 }
@@ -164,13 +164,13 @@ pub(super) struct Walk<'a, Q> {
 }
 
 impl<'a, Q: Query> Walk<'a, Q> {
-    pub fn new(bvh: &'a Bvh, world_ray: &'a Ray, query: Q, stack: &'a mut Vec<Pending>) -> Self {
+    pub(super) fn new(bvh: &'a Bvh, world_ray: &'a Ray, query: Q, stack: &'a mut Vec<Pending>) -> Self {
         stack.clear();
         Walk { bvh, world_ray, query, stack }
     }
 
     /// Walks to the end.
-    pub fn run(mut self) -> Q {
+    pub(super) fn run(mut self) -> Q {
         if self.world_ray.t_max > 0.0
             && let Some(ray) = RayPrecomputed::new(self.world_ray)
         {

@@ -27,7 +27,7 @@ pub(super) struct GeometryContext {
 }
 
 impl GeometryContext {
-    pub fn has_alpha(&self) -> bool {
+    pub(super) fn has_alpha(&self) -> bool {
         self.alpha.is_some()
     }
 

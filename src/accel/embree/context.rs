@@ -38,14 +38,14 @@ pub(super) struct QueryContext<'a> {
 }
 
 impl<'a> QueryContext<'a> {
-    pub fn new(rtc: RtcContext, world: &'a World, rays: &'a RayBatch) -> Self {
+    pub(super) fn new(rtc: RtcContext, world: &'a World, rays: &'a RayBatch) -> Self {
         let (best_t, first) = ([f32::INFINITY; MAX_WIDTH], [Reported::NONE; MAX_WIDTH]);
         QueryContext { rtc, world, rays, base: 0, best_t, first, panic: None }
     }
 
     /// Forgets the last packet.
     #[inline]
-    pub fn begin(&mut self, base: usize) {
+    pub(super) fn begin(&mut self, base: usize) {
         self.base = base as u32;
         self.best_t = [f32::INFINITY; MAX_WIDTH];
         for first in &mut self.first {
@@ -56,7 +56,7 @@ impl<'a> QueryContext<'a> {
     /// Records a hit of the ray `id`; returns the new end of the ray, or `None` if another hit is nearer. The end is
     /// slightly beyond the hit, so that ties are found whichever of the hits comes first.
     #[inline]
-    pub fn offer(&mut self, id: u32, hit: Reported) -> Option<f32> {
+    pub(super) fn offer(&mut self, id: u32, hit: Reported) -> Option<f32> {
         let lane = (id - self.base) as usize % MAX_WIDTH;
         let best = self.best_t[lane];
         if hit.t < best * (1.0 - TIE) {
@@ -86,7 +86,7 @@ impl<'a> QueryContext<'a> {
 
     /// Runs the body of a callback; a panic is stored for later.
     #[inline]
-    pub fn guard(&mut self, body: impl FnOnce(&mut Self)) {
+    pub(super) fn guard(&mut self, body: impl FnOnce(&mut Self)) {
         let result = catch_unwind(AssertUnwindSafe(|| body(self)));
         if let Err(panic) = result {
             self.panic = Some(panic);
@@ -95,7 +95,7 @@ impl<'a> QueryContext<'a> {
 
     /// Resumes the panic of a callback.
     #[inline]
-    pub fn finish(self) {
+    pub(super) fn finish(self) {
         if let Some(panic) = self.panic {
             std::panic::resume_unwind(panic);
         }

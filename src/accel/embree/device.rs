@@ -31,7 +31,7 @@ struct DeviceLog {
 
 impl Device {
     /// A device whose structures take `memory_limit` bytes at most, if given. `config` is Embree's own configuration.
-    pub fn new(config: &CStr, memory_limit: Option<u64>) -> Result<Device, EmbreeError> {
+    pub(super) fn new(config: &CStr, memory_limit: Option<u64>) -> Result<Device, EmbreeError> {
         // SAFETY: the configuration ends in a zero byte and is read during the call.
         let raw = unsafe { sys::rtcNewDevice(config.as_ptr()) };
         if raw.is_null() {
@@ -56,12 +56,12 @@ impl Device {
         Ok(device)
     }
 
-    pub fn raw(&self) -> sys::RTCDevice {
+    pub(super) fn raw(&self) -> sys::RTCDevice {
         self.raw
     }
 
     /// The first error since the last call, as the failure of `action`.
-    pub fn check(&self, action: &'static str) -> Result<(), EmbreeError> {
+    pub(super) fn check(&self, action: &'static str) -> Result<(), EmbreeError> {
         // SAFETY: the device is live.
         let code = ErrorCode::from(unsafe { sys::rtcGetDeviceError(self.raw) });
         let mut errors = self.log.errors.lock().unwrap_or_else(PoisonError::into_inner);
@@ -74,13 +74,13 @@ impl Device {
     }
 
     /// True if the build of Embree has a feature.
-    pub fn has(&self, property: Property) -> bool {
+    pub(super) fn has(&self, property: Property) -> bool {
         // SAFETY: the device is live; an unknown property is an error, not undefined.
         unsafe { sys::rtcGetDeviceProperty(self.raw, property) != 0 }
     }
 
     /// Bytes now and at the peak.
-    pub fn memory(&self) -> (u64, u64) {
+    pub(super) fn memory(&self) -> (u64, u64) {
         let load = |value: &AtomicI64| u64::try_from(value.load(Ordering::Relaxed)).unwrap_or(0);
         (load(&self.log.bytes), load(&self.log.peak_bytes))
     }

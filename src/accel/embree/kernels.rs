@@ -76,10 +76,10 @@ const _: () = {
 
 /// Start of the interval that Embree tests: it takes a hit at t = 0 for a hit, and rays that leave a plane through a
 /// coordinate origin start exactly on it. Far below any distance, and far above what underflows when it is multiplied.
-pub const T_NEAR: f32 = 1e-20;
+pub(super) const T_NEAR: f32 = 1e-20;
 
 impl<const N: usize> RayPacket<N> {
-    pub fn new(mask: u32) -> Self {
+    pub(super) fn new(mask: u32) -> Self {
         let zero = [0.0; N];
         let (o, d) = ([zero; 3], [zero; 3]);
         RayPacket { o, tnear: [T_NEAR; N], d, time: zero, tfar: zero, mask: [mask; N], id: [0; N], flags: [0; N] }
@@ -87,7 +87,7 @@ impl<const N: usize> RayPacket<N> {
 }
 
 impl<const N: usize> RayHitPacket<N> {
-    pub fn new(mask: u32) -> Self {
+    pub(super) fn new(mask: u32) -> Self {
         let (zero, none) = ([0.0; N], [u32::MAX; N]);
         RayHitPacket {
             rays: RayPacket::new(mask),

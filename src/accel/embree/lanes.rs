@@ -22,7 +22,7 @@ pub(super) struct RayRows<const N: usize> {
 impl<const N: usize> RayRows<N> {
     /// The rays from `base` on; beyond the end of the batch, arbitrary ones.
     #[inline]
-    pub fn load(rays: &RayBatch, base: usize) -> Self {
+    pub(super) fn load(rays: &RayBatch, base: usize) -> Self {
         let row = |values: &[f32]| match values[base..].first_chunk::<N>() {
             Some(row) => *row,
             None => std::array::from_fn(|k| values.get(base + k).copied().unwrap_or(1.0)),
@@ -32,7 +32,7 @@ impl<const N: usize> RayRows<N> {
 
     /// Origin and direction of a ray.
     #[inline]
-    pub fn get(&self, lane: usize) -> (Vec3, Vec3) {
+    pub(super) fn get(&self, lane: usize) -> (Vec3, Vec3) {
         let at = |rows: &[[f32; N]; 3]| Vec3::new(rows[0][lane], rows[1][lane], rows[2][lane]);
         (at(&self.o), at(&self.d))
     }
@@ -53,11 +53,11 @@ pub(super) struct LaneHits<const N: usize> {
 
 impl<const N: usize> Lanes<N> {
     /// Nothing in any lane.
-    pub const EMPTY: Self = Lanes { corners: [[[0.0; N]; 3]; 3], d: [[1.0; N]; 3] };
+    pub(super) const EMPTY: Self = Lanes { corners: [[[0.0; N]; 3]; 3], d: [[1.0; N]; 3] };
 
     /// All rays with one triangle; `None` unless they have the same largest axis.
     #[inline]
-    pub fn of_one_triangle(rays: &RayRows<N>, triangle: [Vec3; 3]) -> Option<Self> {
+    pub(super) fn of_one_triangle(rays: &RayRows<N>, triangle: [Vec3; 3]) -> Option<Self> {
         let (o, d) = (&rays.o, &rays.d);
         let (mut all_x, mut all_y, mut all_z) = (true, true, true);
         for ((x, y), z) in d[0].iter().zip(&d[1]).zip(&d[2]) {
@@ -89,7 +89,7 @@ impl<const N: usize> Lanes<N> {
 
     /// Puts a ray and a triangle into a lane.
     #[inline]
-    pub fn set(&mut self, lane: usize, (o, direction): (Vec3, Vec3), triangle: [Vec3; 3]) {
+    pub(super) fn set(&mut self, lane: usize, (o, direction): (Vec3, Vec3), triangle: [Vec3; 3]) {
         let d = direction.abs();
         let z = if d.x > d.y && d.x > d.z {
             0
@@ -115,7 +115,7 @@ impl<const N: usize> Lanes<N> {
 
     /// The result of `intersect_triangle` for each lane, to the bit.
     #[inline]
-    pub fn intersect(&self) -> LaneHits<N> {
+    pub(super) fn intersect(&self) -> LaneHits<N> {
         let [a, b, c] = &self.corners;
         let (mut t, mut b1, mut b2) = ([0.0_f32; N], [0.0_f32; N], [0.0_f32; N]);
         let mut plain = [false; N];

@@ -157,7 +157,7 @@ unsafe impl Sync for EmbreeScene {}
 
 impl EmbreeScene {
     /// An empty scene; `query_filter`: whether queries bring a filter function.
-    pub fn new(device: &Arc<Device>, set: &Arc<GeometrySet>, query_filter: bool) -> Result<Self, EmbreeError> {
+    pub(super) fn new(device: &Arc<Device>, set: &Arc<GeometrySet>, query_filter: bool) -> Result<Self, EmbreeError> {
         // SAFETY: the device is live.
         let raw = unsafe { sys::rtcNewScene(device.raw()) };
         let scene = EmbreeScene {
@@ -179,14 +179,14 @@ impl EmbreeScene {
     }
 
     /// Adds a shape; ids count from 0 in the order of the calls.
-    pub fn add_shape(&mut self, id: GeometryId, context: GeometryContext) -> Result<(), EmbreeError> {
+    pub(super) fn add_shape(&mut self, id: GeometryId, context: GeometryContext) -> Result<(), EmbreeError> {
         let set = Arc::clone(&self._set);
         let geometry = EmbreeGeometry::of_shape(&self.device, &set, id, Arc::new(context))?;
         self.attach(geometry)
     }
 
     /// Adds a placement of a committed scene.
-    pub fn add_instance(&mut self, group: &Arc<EmbreeScene>, instance: &Instance) -> Result<(), EmbreeError> {
+    pub(super) fn add_instance(&mut self, group: &Arc<EmbreeScene>, instance: &Instance) -> Result<(), EmbreeError> {
         let geometry = EmbreeGeometry::placing(&self.device, group, instance)?;
         if self.groups.last().is_none_or(|last| !Arc::ptr_eq(last, group)) {
             self.groups.push(Arc::clone(group));
@@ -202,13 +202,13 @@ impl EmbreeScene {
     }
 
     /// Builds the hierarchy, on all cores.
-    pub fn commit(&self) -> Result<(), EmbreeError> {
+    pub(super) fn commit(&self) -> Result<(), EmbreeError> {
         // SAFETY: the scene is live and nobody queries it yet.
         unsafe { sys::rtcCommitScene(self.raw) };
         self.device.check("build a scene")
     }
 
-    pub fn raw(&self) -> sys::RTCScene {
+    pub(super) fn raw(&self) -> sys::RTCScene {
         self.raw
     }
 }

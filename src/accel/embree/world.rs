@@ -67,7 +67,7 @@ impl<const N: usize> Exact<N> {
 
     /// The hit of a lane, on the primitive that was reported; `None` where [`World::refine`] must decide.
     #[inline]
-    pub fn hit(&self, lane: usize, primitive: u32) -> Option<Hit> {
+    pub(super) fn hit(&self, lane: usize, primitive: u32) -> Option<Hit> {
         let LaneHits { t, b1, b2, plain } = &self.hits;
         let (geometry, instance) = (self.geometries[lane], self.instances[lane]);
         plain[lane].then(|| Hit { t: t[lane], uv: [b1[lane], b2[lane]], geometry, primitive, instance })
@@ -76,14 +76,14 @@ impl<const N: usize> Exact<N> {
 
 impl Reported {
     /// Nothing.
-    pub const NONE: Reported =
+    pub(super) const NONE: Reported =
         Reported { geometry: u32::MAX, primitive: u32::MAX, instance: u32::MAX, t: f32::INFINITY, uv: [0.0; 2] };
 }
 
 impl Refined {
     /// True if this is to be taken rather than `other`: it is a hit, and first, or of hits at the same place the one
     /// with the smallest (instance, geometry, primitive), as in the Rust tracer.
-    pub fn precedes(&self, other: &Refined) -> bool {
+    pub(super) fn precedes(&self, other: &Refined) -> bool {
         let key = |h: &Hit| (h.instance, h.geometry, h.primitive);
         match (self, other) {
             (Refined::Hit(a), Refined::Hit(b)) => a.t < b.t || (a.t == b.t && key(a) < key(b)),
@@ -95,7 +95,7 @@ impl Refined {
 
 impl World {
     /// Assigns ids to everything that rays can hit. `can_place` is true for usable instances.
-    pub fn new(set: Arc<GeometrySet>, can_place: impl Fn(u32) -> bool) -> World {
+    pub(super) fn new(set: Arc<GeometrySet>, can_place: impl Fn(u32) -> bool) -> World {
         let members = |group: &Group| group.geometries.iter().copied().filter(|&id| can_be_met(&set, id)).collect();
         let groups: Vec<Vec<GeometryId>> = set.groups.iter().map(members).collect();
         let root = members(&set.root);
@@ -111,7 +111,7 @@ impl World {
 
     /// The instance of an `instID`.
     #[inline]
-    pub fn instance(&self, inst_id: u32) -> u32 {
+    pub(super) fn instance(&self, inst_id: u32) -> u32 {
         if inst_id == u32::MAX { Hit::NO_INSTANCE } else { self.instances[inst_id as usize - self.root.len()] }
     }
 
@@ -126,7 +126,7 @@ impl World {
 
     /// The ray in the space of the group that `instance` places.
     #[inline]
-    pub fn group_ray(&self, world: &Ray, instance: u32) -> Ray {
+    pub(super) fn group_ray(&self, world: &Ray, instance: u32) -> Ray {
         if instance == Hit::NO_INSTANCE {
             return *world;
         }
@@ -139,7 +139,7 @@ impl World {
     /// The exact hits of the N rays from `base` on, whose reported hits are in `first`; not `plain` where there is none
     /// or [`Self::refine`] must decide.
     #[inline]
-    pub fn refine_lanes<const N: usize>(&self, rays: &RayBatch, base: usize, first: &[Reported]) -> Exact<N> {
+    pub(super) fn refine_lanes<const N: usize>(&self, rays: &RayBatch, base: usize, first: &[Reported]) -> Exact<N> {
         let rows = RayRows::<N>::load(rays, base);
         if let Some(exact) = self.refine_same(rays, &rows, base, first) {
             return exact;
@@ -191,7 +191,7 @@ impl World {
 
     /// The exact hit of `world_ray`: the same arithmetic for any kernel, packet width and processor.
     #[inline]
-    pub fn refine(&self, world_ray: &Ray, reported: &Reported) -> Refined {
+    pub(super) fn refine(&self, world_ray: &Ray, reported: &Reported) -> Refined {
         let instance = self.instance(reported.instance);
         let geometry = self.geometry(reported.geometry, instance);
         self.refine_primitive(world_ray, geometry, instance, reported)
@@ -199,7 +199,13 @@ impl World {
 
     /// As [`Self::refine`], with Embree's `geomID` and `instID` translated.
     #[inline]
-    pub fn refine_primitive(&self, ray: &Ray, geometry: GeometryId, instance: u32, reported: &Reported) -> Refined {
+    pub(super) fn refine_primitive(
+        &self,
+        ray: &Ray,
+        geometry: GeometryId,
+        instance: u32,
+        reported: &Reported,
+    ) -> Refined {
         let primitive = reported.primitive;
         let hit_at = |t: f32, uv| {
             let hit = Hit { t, uv, geometry, primitive, instance };

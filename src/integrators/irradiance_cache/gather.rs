@@ -33,8 +33,8 @@ const MIN_COS: f32 = 0.05;
 
 /// Domains below the stream of a record.
 mod domain {
-    pub const CELL: u32 = 0;
-    pub const SOURCES: u32 = 1;
+    pub(super) const CELL: u32 = 0;
+    pub(super) const SOURCES: u32 = 1;
 }
 
 /// A point that asks for a record.

@@ -54,7 +54,7 @@ fn numbers(path: &Path, key: &str) -> Vec<f64> {
 }
 
 /// The known radiance of a scene file.
-pub fn answer(path: &Path) -> [f64; 3] {
+pub(crate) fn answer(path: &Path) -> [f64; 3] {
     numbers(path, "# answer:").try_into().unwrap()
 }
 

@@ -19,7 +19,7 @@ use std::sync::atomic::{AtomicBool, AtomicUsize, Ordering};
 /// Probability that any test of the whole set rejects a renderer that is right.
 const SIGNIFICANCE: f64 = 1e-3;
 /// Probability that a bias of the size stated is noticed.
-pub const POWER: f64 = 0.99;
+pub(super) const POWER: f64 = 0.99;
 /// What f32 arithmetic may be off where there is no noise, relative.
 const ROUNDING: f64 = 3e-5;
 /// Factor of the standard error below what the power needs: most rows then notice the bias with a power far above.
@@ -29,13 +29,13 @@ const EXACT_PICTURES: u32 = 8;
 /// How often a row is rendered at most, until its pictures notice the bias.
 const ATTEMPTS: u32 = 4;
 /// An environment variable: the noise is measured anew, and the table written.
-pub const MEASURE: &str = "MEASURE_POWER";
+pub(super) const MEASURE: &str = "MEASURE_POWER";
 /// Pictures by which the noise of a row is first measured.
 const PILOT_PICTURES: u32 = 32;
 
 /// Pictures of a row.
 #[derive(Clone, Copy, Debug)]
-pub struct Budget {
+pub(super) struct Budget {
     /// Pixels along an edge.
     pub edge: u32,
     /// Pictures, each with its own seed.
@@ -44,7 +44,7 @@ pub struct Budget {
 
 /// How much is rendered.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Effort {
+pub(super) struct Effort {
     /// The bias that rows have to notice, over that of their scene.
     pub goal: f64,
     /// Fewest pictures of a row with noise; twice as many before pixels are added to them.
@@ -52,13 +52,13 @@ pub struct Effort {
 }
 
 /// A scene with one of the configurations.
-pub struct Row<'a> {
+pub(super) struct Row<'a> {
     pub scene: &'a Scene,
     pub configuration: Configuration,
 }
 
 /// What was rendered for a row.
-pub struct Outcome<'a> {
+pub(super) struct Outcome<'a> {
     pub row: Row<'a>,
     pub budget: Budget,
     /// Means of the pictures.
@@ -66,12 +66,12 @@ pub struct Outcome<'a> {
 }
 
 /// Level of each test of the set.
-pub fn level(scenes: &[Scene]) -> f64 {
+pub(super) fn level(scenes: &[Scene]) -> f64 {
     sidak(SIGNIFICANCE, scenes.len() * configurations().len() * 3)
 }
 
 /// Means of pictures with seeds from `seed` on.
-pub fn picture_means(path: &Path, c: &Configuration, budget: Budget, seed: u32) -> Vec<[f64; 3]> {
+pub(super) fn picture_means(path: &Path, c: &Configuration, budget: Budget, seed: u32) -> Vec<[f64; 3]> {
     let mut job = job(path, c, budget.edge);
     let settings = RenderSettings { threads: Some(1), spp: SPP, ..RenderSettings::default() };
     let mut picture = |i: u32| {
@@ -84,7 +84,7 @@ pub fn picture_means(path: &Path, c: &Configuration, budget: Budget, seed: u32) 
 }
 
 /// Moments of a channel of pictures whose values are multiplied by `factor`.
-pub fn moments(pictures: &[[f64; 3]], channel: usize, factor: f64) -> Welford {
+pub(super) fn moments(pictures: &[[f64; 3]], channel: usize, factor: f64) -> Welford {
     pictures.iter().map(|p| p[channel] * factor).collect()
 }
 
@@ -105,12 +105,12 @@ impl<'a> Row<'a> {
     }
 
     /// Scene and settings.
-    pub fn name(&self) -> String {
+    pub(super) fn name(&self) -> String {
         format!("{},{}", self.scene.name, self.configuration)
     }
 
     /// The bias that has to be noticed.
-    pub fn goal(&self, effort: &Effort) -> f64 {
+    pub(super) fn goal(&self, effort: &Effort) -> f64 {
         effort.goal * self.scene.detects + 2.0 * self.tolerance()
     }
 
@@ -170,7 +170,7 @@ impl<'a> Row<'a> {
 
 impl Outcome<'_> {
     /// Whether the t-tests of the channels reject the values that were rendered, multiplied by `factor`.
-    pub fn rejected(&self, factor: f64, level: f64) -> [bool; 3] {
+    pub(super) fn rejected(&self, factor: f64, level: f64) -> [bool; 3] {
         std::array::from_fn(|c| {
             let (values, answer) = (moments(&self.pictures, c, factor), self.row.scene.answer[c]);
             let is_exact = (values.mean() - answer).abs() <= self.row.tolerance() * answer.abs();
@@ -179,28 +179,28 @@ impl Outcome<'_> {
     }
 
     /// Whether its answer comes with noise, and not but rounding or interpolation.
-    pub fn has_noise(&self) -> bool {
+    pub(super) fn has_noise(&self) -> bool {
         self.pictures.len() > EXACT_PICTURES as usize
     }
 
     /// Camera samples.
-    pub fn samples(&self) -> u64 {
+    pub(super) fn samples(&self) -> u64 {
         self.pictures.len() as u64 * u64::from(self.budget.edge.pow(2) * SPP)
     }
 
     /// Mean, and its error, of each channel.
-    pub fn means(&self) -> [(f64, f64); 3] {
+    pub(super) fn means(&self) -> [(f64, f64); 3] {
         std::array::from_fn(|c| moments(&self.pictures, c, 1.0)).map(|w| (w.mean(), w.standard_error()))
     }
 
     /// The channel with the most noise.
-    pub fn channel(&self) -> usize {
+    pub(super) fn channel(&self) -> usize {
         let relative = |c: &usize| moments(&self.pictures, *c, 1.0).standard_error() / self.row.scene.answer[*c];
         (0..3).max_by(|a, b| relative(a).total_cmp(&relative(b))).unwrap()
     }
 
     /// The bias that is noticed in every channel.
-    pub fn detectable(&self, level: f64) -> f64 {
+    pub(super) fn detectable(&self, level: f64) -> f64 {
         let error = moments(&self.pictures, self.channel(), 1.0).standard_error();
         let relative = error / self.row.scene.answer[self.channel()];
         // The mean may be within the tolerance on the other side
@@ -242,7 +242,7 @@ fn measured_noise() -> HashMap<String, f64> {
 }
 
 /// Replaces the lines of these scenes in the table.
-pub fn write_table(outcomes: &[Outcome<'_>], level: f64) {
+pub(super) fn write_table(outcomes: &[Outcome<'_>], level: f64) {
     let old = std::fs::read_to_string(table_path()).unwrap_or_default();
     let mut scenes: BTreeMap<&str, String> = BTreeMap::new();
     for line in
@@ -258,13 +258,13 @@ pub fn write_table(outcomes: &[Outcome<'_>], level: f64) {
 }
 
 /// Prints the table.
-pub fn print_table(out: &mut dyn std::io::Write, outcomes: &[Outcome<'_>], level: f64) {
+pub(super) fn print_table(out: &mut dyn std::io::Write, outcomes: &[Outcome<'_>], level: f64) {
     writeln!(out, "{HEADER}").unwrap();
     outcomes.iter().for_each(|o| writeln!(out, "{}", o.line(level)).unwrap());
 }
 
 /// Renders all rows of the scenes.
-pub fn render_rows<'a>(scenes: &'a [Scene], effort: &Effort, level: f64) -> Vec<Outcome<'a>> {
+pub(super) fn render_rows<'a>(scenes: &'a [Scene], effort: &Effort, level: f64) -> Vec<Outcome<'a>> {
     let known = if std::env::var_os(MEASURE).is_some() { HashMap::new() } else { measured_noise() };
     let rows = scenes.iter().flat_map(|scene| configurations().into_iter().map(move |c| (scene, c)));
     let rows: Vec<(&Scene, Configuration)> = rows.collect();

@@ -16,7 +16,7 @@ use std::path::Path;
 
 /// Settings of a renderer that has to give the known answer.
 #[derive(Clone, Copy, Debug)]
-pub struct Configuration {
+pub(super) struct Configuration {
     /// What records of an irradiance cache hold; paths are traced if there is none.
     pub cached: Option<Cached>,
     pub estimator: EstimatorKind,
@@ -42,10 +42,10 @@ pub struct Configuration {
 }
 
 /// Camera samples per pixel.
-pub const SPP: u32 = 16;
+pub(super) const SPP: u32 = 16;
 
 /// What a row has that says nothing else.
-pub const BASE: Configuration = Configuration {
+pub(super) const BASE: Configuration = Configuration {
     cached: None,
     estimator: EstimatorKind::Mis,
     heuristic: Heuristic::Power,
@@ -100,7 +100,7 @@ fn cached_configurations() -> Vec<Configuration> {
 }
 
 /// All rows of a scene.
-pub fn configurations() -> Vec<Configuration> {
+pub(super) fn configurations() -> Vec<Configuration> {
     [path_configurations(), hinted_configurations(), cached_configurations()].concat()
 }
 
@@ -247,7 +247,7 @@ impl Configuration {
 }
 
 /// The scene with these settings, as a picture of `edge` × `edge` pixels of the same rectangle.
-pub fn job(path: &Path, c: &Configuration, edge: u32) -> RenderJob {
+pub(super) fn job(path: &Path, c: &Configuration, edge: u32) -> RenderJob {
     let options = LoadOptions { resolution: Some([edge; 2]), ..LoadOptions::default() };
     let mut loaded = load(path, &options).map_err(|d| d.to_string()).unwrap();
     assert_eq!(loaded.settings.sampling.spp, SPP, "{}", path.display());

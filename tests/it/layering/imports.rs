@@ -5,7 +5,7 @@ use std::fs;
 use std::path::Path;
 
 /// Path of a module below the crate's root.
-pub type Module = Vec<String>;
+pub(super) type Module = Vec<String>;
 
 /// A file of a crate.
 #[derive(Debug)]
@@ -17,7 +17,7 @@ struct Source {
 
 /// One module names something of another.
 #[derive(Debug)]
-pub struct Import {
+pub(super) struct Import {
     /// The module that imports.
     pub from: Module,
     /// The module that defines what is imported.
@@ -28,7 +28,7 @@ pub struct Import {
 
 /// The sources of a crate without comments and unit tests.
 #[derive(Debug)]
-pub struct Crate {
+pub(super) struct Crate {
     /// Its name in code.
     pub name: String,
     sources: Vec<Source>,
@@ -36,7 +36,7 @@ pub struct Crate {
 
 impl Crate {
     /// Reads the sources below `folder`.
-    pub fn read(name: &str, folder: &Path) -> Crate {
+    pub(super) fn read(name: &str, folder: &Path) -> Crate {
         let mut sources = Vec::new();
         visit(folder, &mut Vec::new(), &mut sources);
         assert!(!sources.is_empty(), "{} has sources", folder.display());
@@ -44,7 +44,7 @@ impl Crate {
     }
 
     /// Files in which another crate is named.
-    pub fn files_that_name<'a>(&'a self, name: &str) -> impl Iterator<Item = &'a str> {
+    pub(super) fn files_that_name<'a>(&'a self, name: &str) -> impl Iterator<Item = &'a str> {
         let path = format!("{name}::");
         let names = move |s: &&Source| {
             s.code.match_indices(&path).any(|(i, _)| !s.code[..i].ends_with(|c: char| c == '_' || c.is_alphanumeric()))
@@ -53,7 +53,7 @@ impl Crate {
     }
 
     /// All imports between different modules of the crate.
-    pub fn imports(&self) -> Vec<Import> {
+    pub(super) fn imports(&self) -> Vec<Import> {
         let re_exports: BTreeMap<Module, BTreeMap<String, Module>> =
             self.sources.iter().map(|s| (s.module.clone(), self.re_exports(s))).collect();
         let mut imports = Vec::new();

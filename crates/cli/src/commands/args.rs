@@ -19,7 +19,7 @@ where
 
 /// What a scene file says and the command line overrides.
 #[derive(Args, Clone, Debug)]
-pub struct SceneArgs {
+pub(super) struct SceneArgs {
     /// Scene file (.pbrt or .pbrt.gz)
     pub scene: PathBuf,
     #[command(flatten)]
@@ -49,7 +49,7 @@ pub struct SceneArgs {
 
 /// `lumiris render`
 #[derive(Args, Clone, Debug)]
-pub struct RenderArgs {
+pub(super) struct RenderArgs {
     #[command(flatten)]
     pub scene: SceneArgs,
     /// Where to write; may be given several times. EXR holds everything; PNG, JPEG, TIFF and TGA what a display shows

@@ -30,7 +30,7 @@ enum Subject {
 
 /// `lumiris bench`
 #[derive(Args, Clone, Debug)]
-pub struct BenchArgs {
+pub(super) struct BenchArgs {
     /// What is measured
     #[arg(default_value = "all")]
     subject: Subject,
@@ -47,7 +47,7 @@ pub struct BenchArgs {
     json: Option<PathBuf>,
 }
 
-pub fn run(args: &BenchArgs) -> anyhow::Result<ExitCode> {
+pub(super) fn run(args: &BenchArgs) -> anyhow::Result<ExitCode> {
     if args.scene.accel != AccelKind::Embree {
         bail!("bench measures Embree; leave out --accel");
     }

@@ -13,7 +13,7 @@ use std::process::ExitCode;
 
 /// `lumiris compare`
 #[derive(Args, Clone, Debug)]
-pub struct CompareArgs {
+pub(super) struct CompareArgs {
     /// Images: EXR, HDR, PFM, PNG, or anything that OpenImageIO reads
     #[arg(required = true, value_name = "IMAGE")]
     images: Vec<PathBuf>,
@@ -127,7 +127,7 @@ fn limit(text: &str) -> Result<Limit, String> {
     Ok(Limit { column, value: number(value)? })
 }
 
-pub fn run(args: &CompareArgs) -> anyhow::Result<ExitCode> {
+pub(super) fn run(args: &CompareArgs) -> anyhow::Result<ExitCode> {
     let pictures = load(&args.images, &args.reference, args.layer.as_deref())?;
     let settings = settings(args);
     let compared = compare(&pictures, &settings);

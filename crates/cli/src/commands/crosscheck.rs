@@ -27,7 +27,7 @@ const MEAN_TOLERANCE: f64 = 1e-3;
 
 /// `lumiris crosscheck`
 #[derive(Args, Clone, Debug)]
-pub struct CrosscheckArgs {
+pub(super) struct CrosscheckArgs {
     #[command(flatten)]
     scene: SceneArgs,
     /// Rays of each family
@@ -57,7 +57,7 @@ impl ImageReport {
     }
 }
 
-pub fn run(args: &CrosscheckArgs) -> anyhow::Result<ExitCode> {
+pub(super) fn run(args: &CrosscheckArgs) -> anyhow::Result<ExitCode> {
     if args.scene.accel != AccelKind::Embree {
         bail!("crosscheck always compares Embree with the BVH; leave out --accel");
     }

@@ -13,7 +13,7 @@ use std::process::ExitCode;
 
 /// `lumiris generate`
 #[derive(Args, Clone, Debug)]
-pub struct GenerateArgs {
+pub(super) struct GenerateArgs {
     #[command(subcommand)]
     what: What,
 }
@@ -126,7 +126,7 @@ struct KellerWaldArgs {
     output: PathBuf,
 }
 
-pub fn run(args: &GenerateArgs) -> anyhow::Result<ExitCode> {
+pub(super) fn run(args: &GenerateArgs) -> anyhow::Result<ExitCode> {
     match &args.what {
         What::Statue(args) => {
             ensure!(has_extension(&args.output, "ply"), "the statue is written as .ply, not {}", args.output.display());

@@ -14,7 +14,7 @@ use std::process::ExitCode;
 
 /// `lumiris info`
 #[derive(Args, Clone, Debug)]
-pub struct InfoArgs {
+pub(super) struct InfoArgs {
     #[command(flatten)]
     scene: SceneArgs,
     /// Print JSON
@@ -22,7 +22,7 @@ pub struct InfoArgs {
     json: bool,
 }
 
-pub fn run(args: &InfoArgs) -> anyhow::Result<ExitCode> {
+pub(super) fn run(args: &InfoArgs) -> anyhow::Result<ExitCode> {
     let (job, times) = load_job(&args.scene)?;
     let mut facts = facts(&job);
     facts["seconds"] = json!({ "load": times.load, "build": times.build });

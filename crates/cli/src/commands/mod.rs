@@ -46,7 +46,7 @@ enum Command {
 }
 
 /// Parses the command line, runs, and says how it went.
-pub fn run() -> ExitCode {
+pub(crate) fn run() -> ExitCode {
     let cli = Cli::parse();
     let result = match &cli.command {
         Command::Render(args) => render::run(args),

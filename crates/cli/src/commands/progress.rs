@@ -5,12 +5,12 @@ use indicatif::{ProgressBar, ProgressDrawTarget, ProgressStyle};
 use lumiris::render::Progress;
 
 /// Prints a line to standard error.
-pub fn say(text: &str) {
+pub(super) fn say(text: &str) {
     eprintln!("{text}");
 }
 
 /// Prints a line to standard output; a closed pipe is not an error.
-pub fn print(text: &str) {
+pub(super) fn print(text: &str) {
     use std::io::Write;
     let mut out = std::io::stdout().lock();
     // A reader such as `head` may have closed the pipe; the error is ignored.
@@ -18,11 +18,11 @@ pub fn print(text: &str) {
 }
 
 /// A progress bar of a rendering: progress, time left, rays per second, noise.
-pub struct Bar(ProgressBar);
+pub(super) struct Bar(ProgressBar);
 
 impl Bar {
     /// A bar, or nothing visible if `quiet`.
-    pub fn new(quiet: bool) -> Self {
+    pub(super) fn new(quiet: bool) -> Self {
         let target = if quiet { ProgressDrawTarget::hidden() } else { ProgressDrawTarget::stderr_with_hz(8) };
         let bar = ProgressBar::with_draw_target(Some(0), target);
         let style = ProgressStyle::with_template("{bar:30} {percent:>3} %  {elapsed} + {eta} left  {msg}");
@@ -31,7 +31,7 @@ impl Bar {
     }
 
     /// Shows the progress of a rendering.
-    pub fn update(&self, progress: &Progress) {
+    pub(super) fn update(&self, progress: &Progress) {
         self.0.set_length(progress.samples_total);
         self.0.set_position(progress.samples_done);
         let rate = progress.rays as f64 / progress.elapsed.as_secs_f64().max(1e-9) * 1e-6;
@@ -40,7 +40,7 @@ impl Bar {
     }
 
     /// Removes the bar.
-    pub fn finish(&self) {
+    pub(super) fn finish(&self) {
         self.0.finish_and_clear();
     }
 }

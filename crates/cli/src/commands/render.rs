@@ -20,9 +20,9 @@ use std::time::Duration;
 /// File types that hold what a display shows.
 const DISPLAY_TYPES: [&str; 6] = ["png", "jpg", "jpeg", "tif", "tiff", "tga"];
 /// Exit code of a rendering that Ctrl-C ended, as shells have it.
-pub const INTERRUPTED: u8 = 130;
+pub(super) const INTERRUPTED: u8 = 130;
 
-pub fn run(args: &RenderArgs) -> anyhow::Result<ExitCode> {
+pub(super) fn run(args: &RenderArgs) -> anyhow::Result<ExitCode> {
     check_outputs(&args.output)?;
     let (mut job, setup) = load_job(&args.scene)?;
     let asks_for_ratio = args.aov.iter().flatten().any(|a| *a == Aov::Ratio);
@@ -52,7 +52,7 @@ pub fn run(args: &RenderArgs) -> anyhow::Result<ExitCode> {
 }
 
 /// Ctrl-C sets `stop`, which ends a rendering in good order; a second one ends the program.
-pub fn stop_at_ctrl_c(stop: &Arc<AtomicBool>) -> anyhow::Result<()> {
+pub(super) fn stop_at_ctrl_c(stop: &Arc<AtomicBool>) -> anyhow::Result<()> {
     let handler = Arc::clone(stop);
     ctrlc::set_handler(move || {
         if handler.swap(true, Ordering::Relaxed) {

@@ -10,7 +10,7 @@ use std::sync::atomic::AtomicBool;
 
 /// `lumiris reproduce`
 #[derive(Args, Clone, Debug)]
-pub struct ReproduceArgs {
+pub(super) struct ReproduceArgs {
     /// Which paper
     paper: Paper,
     /// Output folder for the page (index.html), its images, and all numbers
@@ -47,7 +47,7 @@ enum Paper {
     KellerWald,
 }
 
-pub fn run(args: &ReproduceArgs) -> anyhow::Result<ExitCode> {
+pub(super) fn run(args: &ReproduceArgs) -> anyhow::Result<ExitCode> {
     let stop = Arc::new(AtomicBool::new(false));
     super::render::stop_at_ctrl_c(&stop)?;
     let options = Options {

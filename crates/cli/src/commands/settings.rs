@@ -13,7 +13,7 @@ use std::time::Instant;
 
 /// Seconds of what happens before the first ray.
 #[derive(Clone, Copy, Debug)]
-pub struct SetupTimes {
+pub(super) struct SetupTimes {
     /// Reading files.
     pub load: f64,
     /// Building ray tracers.
@@ -45,7 +45,7 @@ fn load_scene(args: &SceneArgs) -> anyhow::Result<Loaded> {
 }
 
 /// Loads the scene and builds its ray tracers.
-pub fn load_job(args: &SceneArgs) -> anyhow::Result<(RenderJob, SetupTimes)> {
+pub(super) fn load_job(args: &SceneArgs) -> anyhow::Result<(RenderJob, SetupTimes)> {
     let start = Instant::now();
     let loaded = load_scene(args)?;
     let load = start.elapsed().as_secs_f64();
@@ -57,7 +57,7 @@ pub fn load_job(args: &SceneArgs) -> anyhow::Result<(RenderJob, SetupTimes)> {
 }
 
 /// Chooses the numbers of samples and proposals that are still open, and says what it chose unless `quiet`.
-pub fn plan(args: &SceneArgs, job: &mut RenderJob, ratio_map: bool, quiet: bool) -> anyhow::Result<()> {
+pub(super) fn plan(args: &SceneArgs, job: &mut RenderJob, ratio_map: bool, quiet: bool) -> anyhow::Result<()> {
     let threads = args.threads.map(|t| t as usize);
     if let (Some(plan), false) = (prepare(job, threads, ratio_map)?, quiet) {
         let Split { samples, proposals } = plan.split;
@@ -72,7 +72,7 @@ pub fn plan(args: &SceneArgs, job: &mut RenderJob, ratio_map: bool, quiet: bool)
 }
 
 /// How the options say to render.
-pub fn render_settings(args: &SceneArgs, job: &RenderJob) -> RenderSettings {
+pub(super) fn render_settings(args: &SceneArgs, job: &RenderJob) -> RenderSettings {
     RenderSettings {
         threads: args.threads.map(|t| t as usize),
         tile_size: args.tile_size,

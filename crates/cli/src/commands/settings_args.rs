@@ -8,13 +8,13 @@ use lumiris::settings::value::{Integers, Kind, Value};
 
 /// The settings that were typed, in the order of the table.
 #[derive(Clone, Debug, Default)]
-pub struct SettingsArgs {
+pub(super) struct SettingsArgs {
     typed: Vec<(&'static Setting, Value)>,
 }
 
 impl SettingsArgs {
     /// Puts them in.
-    pub fn apply(&self, settings: &mut Settings) {
+    pub(super) fn apply(&self, settings: &mut Settings) {
         for (row, value) in &self.typed {
             (row.set)(settings, *value).expect("the parser of a setting lets through what its kind is");
         }

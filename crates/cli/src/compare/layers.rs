@@ -8,7 +8,7 @@ use lumiris::imaging::file::PartHeader;
 
 /// Channels that make a colour.
 #[derive(Clone, Debug, PartialEq, Eq)]
-pub struct Layer {
+pub(crate) struct Layer {
     /// Part of the file, from 0.
     pub part: usize,
     /// What stands before the channels' last dot, or the name of the part; empty for plain `R G B`.
@@ -34,7 +34,7 @@ impl Layer {
     }
 
     /// The name as in messages.
-    pub fn title(&self) -> &str {
+    pub(crate) fn title(&self) -> &str {
         if self.name.is_empty() { "R G B" } else { &self.name }
     }
 
@@ -61,7 +61,7 @@ fn component(name: &str) -> Option<usize> {
 }
 
 /// All colour layers of a file, in its order.
-pub fn color_layers(parts: &[PartHeader]) -> Vec<Layer> {
+pub(crate) fn color_layers(parts: &[PartHeader]) -> Vec<Layer> {
     let mut layers = Vec::new();
     for (part, header) in parts.iter().enumerate() {
         let mut names: Vec<&str> = Vec::new();
@@ -88,7 +88,7 @@ pub fn color_layers(parts: &[PartHeader]) -> Vec<Layer> {
 }
 
 /// The layer that is the picture, or the one called `wanted` (a single channel as well). `Err` says what there is.
-pub fn choose(parts: &[PartHeader], wanted: Option<&str>) -> Result<Layer, String> {
+pub(crate) fn choose(parts: &[PartHeader], wanted: Option<&str>) -> Result<Layer, String> {
     let layers = color_layers(parts);
     let channels =
         || parts.iter().enumerate().flat_map(|(p, h)| h.channels.iter().enumerate().map(move |(c, n)| (p, c, n)));
@@ -112,7 +112,7 @@ pub fn choose(parts: &[PartHeader], wanted: Option<&str>) -> Result<Layer, Strin
 }
 
 /// What a person should know of the choice; `None` if there was none to make.
-pub fn remark(parts: &[PartHeader], chosen: &Layer) -> Option<String> {
+pub(crate) fn remark(parts: &[PartHeader], chosen: &Layer) -> Option<String> {
     let layers = color_layers(parts);
     let others: Vec<&str> = layers.iter().filter(|l| *l != chosen).map(Layer::title).collect();
     let plain = chosen.name.is_empty() && !layers.iter().any(|l| l != chosen && l.name.is_empty());

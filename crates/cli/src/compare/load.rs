@@ -12,7 +12,7 @@ use std::path::{Path, PathBuf};
 
 /// A rectangle of pixels of the display window.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub struct Region {
+pub(crate) struct Region {
     /// First column.
     pub x: usize,
     /// First row from the top.
@@ -36,14 +36,14 @@ impl Region {
     }
 
     /// Columns and rows.
-    pub fn size(&self) -> [usize; 2] {
+    pub(crate) fn size(&self) -> [usize; 2] {
         [self.width, self.height]
     }
 }
 
 /// A picture cut to the region that is compared.
 #[derive(Clone, Debug)]
-pub struct Shown {
+pub(crate) struct Shown {
     /// The file.
     pub path: PathBuf,
     /// The file's name, or the path where two files have one name.
@@ -62,7 +62,7 @@ pub struct Shown {
 
 /// Pictures of one size; the last one is the reference.
 #[derive(Clone, Debug)]
-pub struct Pictures {
+pub(crate) struct Pictures {
     /// Images in the order of the command line.
     pub images: Vec<Shown>,
     /// What they are compared with.
@@ -76,7 +76,7 @@ pub struct Pictures {
 /// Everything that keeps the pictures from being compared, a line each.
 #[derive(Debug, thiserror::Error)]
 #[error("{}", .0.join("\n"))]
-pub struct LoadError(pub Vec<String>);
+pub(crate) struct LoadError(pub Vec<String>);
 
 /// A picture as read.
 struct Raw {
@@ -87,7 +87,7 @@ struct Raw {
 
 /// Reads pictures and their reference; all that is wrong is said at once. `layer` names the channels to read instead of
 /// the picture itself.
-pub fn load(images: &[PathBuf], reference: &Path, layer: Option<&str>) -> Result<Pictures, LoadError> {
+pub(crate) fn load(images: &[PathBuf], reference: &Path, layer: Option<&str>) -> Result<Pictures, LoadError> {
     let all = images.iter().map(PathBuf::as_path).chain([reference]);
     let (mut raws, mut errors) = (Vec::new(), Vec::new());
     for path in all {

@@ -2,7 +2,7 @@
 
 /// A metric that can be asked for.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
-pub enum Metric {
+pub(crate) enum Metric {
     /// Mean squared error.
     Mse,
     /// Its root.
@@ -27,7 +27,7 @@ pub enum Metric {
 
 impl Metric {
     /// All, in the order of tables.
-    pub const ALL: [Metric; 10] = [
+    pub(crate) const ALL: [Metric; 10] = [
         Metric::Mse,
         Metric::Rmse,
         Metric::RelMse,

@@ -4,15 +4,15 @@
 //! [`metric`] (their names), [`scores`] (metrics), [`columns`] (metrics by name), [`page`] (a page for a browser, whose own parts are in `viewer/`:
 //! `index.html`, `style.css`, `pictures.js` for values and their pictures, `viewer.js` for controls).
 
-pub mod columns;
-pub mod layers;
-pub mod load;
-pub mod metric;
-pub mod page;
-pub mod scores;
+pub(crate) mod columns;
+pub(crate) mod layers;
+pub(crate) mod load;
+pub(crate) mod metric;
+pub(crate) mod page;
+pub(crate) mod scores;
 
-pub use columns::{COLUMNS, Column};
-pub use load::{Pictures, Shown, load};
-pub use metric::Metric;
-pub use page::write_page;
-pub use scores::{Compared, Scores, Settings, compare};
+pub(crate) use columns::{COLUMNS, Column};
+pub(crate) use load::{Pictures, Shown, load};
+pub(crate) use metric::Metric;
+pub(crate) use page::write_page;
+pub(crate) use scores::{Compared, Scores, Settings, compare};

@@ -25,7 +25,7 @@ const PICTURES: &str = include_str!("viewer/pictures.js");
 const VIEWER: &str = include_str!("viewer/viewer.js");
 
 /// Writes `index.html` into a folder, which is made if it is not there. Says where the page is.
-pub fn write_page(
+pub(crate) fn write_page(
     folder: &Path,
     pictures: &Pictures,
     settings: &Settings,

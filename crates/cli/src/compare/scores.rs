@@ -14,7 +14,7 @@ use strum::IntoStaticStr;
 
 /// What is computed, and how.
 #[derive(Clone, Debug, PartialEq)]
-pub struct Settings {
+pub(crate) struct Settings {
     /// Metrics to compute.
     pub metrics: BTreeSet<Metric>,
     /// Exposure (stops) of the display that LDR-ꟻLIP looks at.
@@ -44,7 +44,7 @@ impl Default for Settings {
 
 /// The metrics of an image. `None`: not selected, or not possible.
 #[derive(Clone, Debug, PartialEq)]
-pub struct Scores {
+pub(crate) struct Scores {
     /// Squared differences and counts.
     pub differences: Differences,
     /// PSNR (dB).
@@ -65,7 +65,7 @@ pub struct Scores {
 
 /// Values per pixel; NaN where a pixel takes no part.
 #[derive(Clone, Debug, Default, PartialEq)]
-pub struct Maps {
+pub(crate) struct Maps {
     /// LDR-ꟻLIP.
     pub flip: Option<Vec<f32>>,
     /// HDR-ꟻLIP.
@@ -78,7 +78,7 @@ pub struct Maps {
 
 /// What came out for a picture.
 #[derive(Clone, Debug, PartialEq)]
-pub struct Compared {
+pub(crate) struct Compared {
     /// Numbers.
     pub scores: Scores,
     /// Maps of what was computed per pixel.
@@ -102,7 +102,7 @@ pub enum Noise {
 }
 
 /// Compares each picture with the reference.
-pub fn compare(pictures: &Pictures, settings: &Settings) -> Vec<Compared> {
+pub(crate) fn compare(pictures: &Pictures, settings: &Settings) -> Vec<Compared> {
     pictures.images.iter().map(|image| compare_one(image, &pictures.reference, pictures.region, settings)).collect()
 }
 

@@ -17,7 +17,7 @@ use std::time::{Duration, Instant};
 const PATIENCE: Duration = Duration::from_secs(180);
 
 /// A browser with one open page.
-pub struct Browser {
+pub(crate) struct Browser {
     process: Child,
     input: ChildStdin,
     messages: Receiver<Value>,
@@ -30,7 +30,7 @@ pub struct Browser {
 
 impl Browser {
     /// Starts a browser whose window has this size (CSS pixels).
-    pub fn start(size: [u32; 2]) -> Browser {
+    pub(crate) fn start(size: [u32; 2]) -> Browser {
         let program = std::env::var("CHROMIUM").unwrap_or_else(|_| "chromium".to_owned());
         let profile = tempfile::tempdir().unwrap();
         // The protocol is spoken over the descriptors 3 (commands) and 4 (answers): the shell puts them there.
@@ -79,7 +79,7 @@ impl Browser {
     }
 
     /// Sends a command and waits for its answer.
-    pub fn call(&self, method: &str, params: Value) -> Value {
+    pub(crate) fn call(&self, method: &str, params: Value) -> Value {
         let id = self.next.replace(self.next.get() + 1);
         let mut message = json!({ "id": id, "method": method, "params": params });
         if !self.session.is_empty() {
@@ -118,7 +118,7 @@ impl Browser {
     }
 
     /// Opens a file and waits until `ready` (a script) is true.
-    pub fn open(&self, path: &Path, ready: &str) {
+    pub(crate) fn open(&self, path: &Path, ready: &str) {
         let url = format!("file://{}", path.display());
         let answer = self.call("Page.navigate", json!({ "url": url }));
         assert!(answer["errorText"].is_null(), "{answer}");
@@ -126,7 +126,7 @@ impl Browser {
     }
 
     /// Waits until a script is true.
-    pub fn wait_for(&self, condition: &str) {
+    pub(crate) fn wait_for(&self, condition: &str) {
         let end = Instant::now() + PATIENCE;
         while self.run(condition) != json!(true) {
             assert!(Instant::now() < end, "{condition} does not come true; {:?}", self.complaints.borrow());
@@ -135,7 +135,7 @@ impl Browser {
     }
 
     /// The value of a script.
-    pub fn run(&self, script: &str) -> Value {
+    pub(crate) fn run(&self, script: &str) -> Value {
         let params = json!({ "expression": script, "returnByValue": true, "awaitPromise": true });
         let answer = self.call("Runtime.evaluate", params);
         assert!(answer["exceptionDetails"].is_null(), "{script}: {}", answer["exceptionDetails"]);
@@ -143,7 +143,7 @@ impl Browser {
     }
 
     /// Presses, moves and releases the left button along points of the window.
-    pub fn drag(&self, points: &[[f64; 2]]) {
+    pub(crate) fn drag(&self, points: &[[f64; 2]]) {
         let event = |kind: &str, [x, y]: [f64; 2], buttons: u32| {
             let params = json!({ "type": kind, "x": x, "y": y, "button": "left", "buttons": buttons, "clickCount": 1 });
             self.call("Input.dispatchMouseEvent", params);
@@ -154,18 +154,18 @@ impl Browser {
     }
 
     /// Moves the mouse.
-    pub fn point(&self, [x, y]: [f64; 2]) {
+    pub(crate) fn point(&self, [x, y]: [f64; 2]) {
         self.call("Input.dispatchMouseEvent", json!({ "type": "mouseMoved", "x": x, "y": y }));
     }
 
     /// Turns the wheel; negative is away from the hand.
-    pub fn wheel(&self, [x, y]: [f64; 2], delta: f64) {
+    pub(crate) fn wheel(&self, [x, y]: [f64; 2], delta: f64) {
         let params = json!({ "type": "mouseWheel", "x": x, "y": y, "deltaX": 0, "deltaY": delta });
         self.call("Input.dispatchMouseEvent", params);
     }
 
     /// Presses and releases a key that types `text`.
-    pub fn key(&self, key: &str, code: &str, shift: bool) {
+    pub(crate) fn key(&self, key: &str, code: &str, shift: bool) {
         for kind in ["keyDown", "keyUp"] {
             let params = json!({ "type": kind, "key": key, "code": code, "modifiers": if shift { 8 } else { 0 } });
             self.call("Input.dispatchKeyEvent", params);
@@ -173,12 +173,12 @@ impl Browser {
     }
 
     /// Waits until the page has drawn twice.
-    pub fn settle(&self) {
+    pub(crate) fn settle(&self) {
         self.run("new Promise((f) => requestAnimationFrame(() => requestAnimationFrame(() => f(true))))");
     }
 
     /// A picture of the window, as a PNG file.
-    pub fn screenshot(&self, path: &Path) {
+    pub(crate) fn screenshot(&self, path: &Path) {
         let answer = self.call("Page.captureScreenshot", json!({ "format": "png" }));
         std::fs::write(path, STANDARD.decode(answer["data"].as_str().unwrap()).unwrap()).unwrap();
     }

@@ -11,7 +11,7 @@ const RESTART: i64 = -1;
 
 /// Faces as they come in.
 #[derive(Default)]
-pub struct Faces {
+pub(super) struct Faces {
     vertices: u64,
     triangles: Vec<[u32; 3]>,
     quads: Vec<[u32; 4]>,
@@ -21,12 +21,12 @@ pub struct Faces {
 
 impl Faces {
     /// No faces yet, of `vertices` vertices.
-    pub fn new(vertices: u64) -> Self {
+    pub(super) fn new(vertices: u64) -> Self {
         Faces { vertices, ..Faces::default() }
     }
 
     /// Reads a table of faces.
-    pub fn read<'a, N: Numbers<'a>>(&mut self, element: &Element, numbers: &mut N) -> Result<(), PlyError> {
+    pub(super) fn read<'a, N: Numbers<'a>>(&mut self, element: &Element, numbers: &mut N) -> Result<(), PlyError> {
         let Some(column) = element.indices() else {
             return numbers.skip_element(element);
         };
@@ -125,7 +125,11 @@ impl Faces {
 
     /// Reads a table of strips: of the vertices a, b, c, d, e the triangles abc, cbd, cde, so that all have one
     /// orientation. Triangles that repeat a vertex only join strips, and are left out.
-    pub fn read_strips<'a>(&mut self, element: &Element, numbers: &mut impl Numbers<'a>) -> Result<(), PlyError> {
+    pub(super) fn read_strips<'a>(
+        &mut self,
+        element: &Element,
+        numbers: &mut impl Numbers<'a>,
+    ) -> Result<(), PlyError> {
         let Some(column) = element.indices() else {
             return numbers.skip_element(element);
         };
@@ -177,7 +181,7 @@ impl Faces {
     }
 
     /// Hands all faces to the mesh, whose vertices are complete.
-    pub fn finish(mut self, mesh: &mut PlyMesh) {
+    pub(super) fn finish(mut self, mesh: &mut PlyMesh) {
         // Memory was taken for as many triangles as there are faces.
         self.triangles.shrink_to_fit();
         mesh.triangles = self.triangles;

@@ -10,7 +10,7 @@ const KNOWN: [&str; 3] = ["vertex", "face", "tristrips"];
 
 /// How numbers are written.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum Encoding {
+pub(super) enum Encoding {
     /// Decimal text.
     Ascii,
     /// Binary, low byte first.
@@ -22,7 +22,7 @@ pub enum Encoding {
 /// Type of a number.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 #[allow(missing_docs, reason = "the variants are the format's types")]
-pub enum Scalar {
+pub(super) enum Scalar {
     I8,
     U8,
     I16,
@@ -49,7 +49,7 @@ impl Scalar {
     }
 
     /// Bytes in binary files.
-    pub fn size(self) -> usize {
+    pub(super) fn size(self) -> usize {
         match self {
             Scalar::I8 | Scalar::U8 => 1,
             Scalar::I16 | Scalar::U16 => 2,
@@ -59,14 +59,14 @@ impl Scalar {
     }
 
     /// True for the types that can count.
-    pub fn is_integer(self) -> bool {
+    pub(super) fn is_integer(self) -> bool {
         !matches!(self, Scalar::F32 | Scalar::F64)
     }
 }
 
 /// What one instance of an element holds in one place.
 #[derive(Clone, Debug, PartialEq, Eq)]
-pub struct Property {
+pub(super) struct Property {
     /// Its name.
     pub name: String,
     /// Type of the number, or of the items of the list.
@@ -77,7 +77,7 @@ pub struct Property {
 
 /// A table of the file.
 #[derive(Clone, Debug, PartialEq, Eq)]
-pub struct Element {
+pub(super) struct Element {
     /// Its name.
     pub name: String,
     /// Number of rows.
@@ -90,30 +90,30 @@ pub struct Element {
 
 impl Element {
     /// Bytes of a row in binary files, without the items of lists.
-    pub fn min_stride(&self) -> usize {
+    pub(super) fn min_stride(&self) -> usize {
         self.properties.iter().map(|p| p.list.unwrap_or(p.ty).size()).sum()
     }
 
     /// True if a column is a list.
-    pub fn has_list(&self) -> bool {
+    pub(super) fn has_list(&self) -> bool {
         self.properties.iter().any(|p| p.list.is_some())
     }
 
     /// Index of the column of vertex indices.
-    pub fn indices(&self) -> Option<usize> {
+    pub(super) fn indices(&self) -> Option<usize> {
         let names = ["vertex_indices", "vertex_index"];
         self.properties.iter().position(|p| p.list.is_some() && names.contains(&p.name.as_str()))
     }
 
     /// Index of the column of a name, if it is no list.
-    pub fn scalar(&self, name: &str) -> Option<usize> {
+    pub(super) fn scalar(&self, name: &str) -> Option<usize> {
         self.properties.iter().position(|p| p.list.is_none() && p.name == name)
     }
 }
 
 /// The header.
 #[derive(Clone, Debug, PartialEq, Eq)]
-pub struct Header {
+pub(super) struct Header {
     /// How numbers are written.
     pub encoding: Encoding,
     /// The tables in the order of the file.
@@ -124,12 +124,12 @@ pub struct Header {
 
 impl Header {
     /// The table of a name.
-    pub fn element(&self, name: &str) -> Option<&Element> {
+    pub(super) fn element(&self, name: &str) -> Option<&Element> {
         self.elements.iter().find(|e| e.name == name)
     }
 
     /// Fails if the rows cannot fit into `available` bytes, so that nothing is allocated for counts that lie.
-    pub fn check_counts(&self, available: u64) -> Result<(), PlyError> {
+    pub(super) fn check_counts(&self, available: u64) -> Result<(), PlyError> {
         let mut needed = 0_u64;
         for element in &self.elements {
             let row = match self.encoding {
@@ -152,7 +152,7 @@ impl Header {
 }
 
 /// Reads the header; the stream then stands at the first row.
-pub fn read_header(stream: &mut Stream<'_>) -> Result<Header, PlyError> {
+pub(super) fn read_header(stream: &mut Stream<'_>) -> Result<Header, PlyError> {
     if read_line(stream)?.trim_end() != "ply" {
         return Err(PlyError::header(1, "is not a PLY file: it does not start with `ply`"));
     }

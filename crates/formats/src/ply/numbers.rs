@@ -10,7 +10,7 @@ const MAX_WORD: usize = 256;
 
 /// Which byte of a number comes first.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum ByteOrder {
+pub(super) enum ByteOrder {
     /// The low one.
     Little,
     /// The high one.
@@ -18,7 +18,7 @@ pub enum ByteOrder {
 }
 
 /// A source of numbers of given types. `element` is named in errors.
-pub trait Numbers<'a> {
+pub(super) trait Numbers<'a> {
     /// The order of bytes; `None` for texts.
     const ORDER: Option<ByteOrder>;
 
@@ -90,7 +90,7 @@ pub(super) use number_at;
 
 /// The number of type `ty` at the offset `at`, as a float.
 #[inline]
-pub fn float_at<const BIG: bool>(bytes: &[u8], at: usize, ty: Scalar) -> f32 {
+pub(super) fn float_at<const BIG: bool>(bytes: &[u8], at: usize, ty: Scalar) -> f32 {
     match ty {
         Scalar::F32 => number_at!(f32, BIG, bytes, at),
         Scalar::F64 => number_at!(f64, BIG, bytes, at) as f32,
@@ -120,7 +120,7 @@ fn whole(value: f64) -> i64 {
 }
 
 /// Numbers as bytes; the high one first if `BIG`.
-pub struct Binary<'s, 'a, const BIG: bool>(pub &'s mut Stream<'a>);
+pub(super) struct Binary<'s, 'a, const BIG: bool>(pub &'s mut Stream<'a>);
 
 impl<'a, const BIG: bool> Numbers<'a> for Binary<'_, 'a, BIG> {
     const ORDER: Option<ByteOrder> = Some(if BIG { ByteOrder::Big } else { ByteOrder::Little });
@@ -159,7 +159,7 @@ impl<'a, const BIG: bool> Numbers<'a> for Binary<'_, 'a, BIG> {
 }
 
 /// Numbers as words between blanks; line ends mean nothing, as in most readers.
-pub struct Ascii<'s, 'a>(pub &'s mut Stream<'a>);
+pub(super) struct Ascii<'s, 'a>(pub &'s mut Stream<'a>);
 
 impl Ascii<'_, '_> {
     /// Hands the next word to `parse`, which returns a value and the length of the word.

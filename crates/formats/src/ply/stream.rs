@@ -6,7 +6,7 @@ use std::io::{self, Read};
 /// Size of the buffer (bytes): fits the second-level cache.
 const BUFFER: usize = 1 << 18;
 /// Maximum number of bytes per request.
-pub const MAX_FILL: usize = 4096;
+pub(super) const MAX_FILL: usize = 4096;
 /// Largest factor by which deflate expands; bounds what a gzip file can hold.
 const MAX_INFLATION: u64 = 1032;
 /// Factor by which a mesh may expand before it is suspected to be a trick: memory for more is not taken in advance.
@@ -15,7 +15,7 @@ const USUAL_INFLATION: u64 = 16;
 const MAX_TAIL: usize = 1 << 24;
 
 /// A buffered reader that knows a bound of what is still to come.
-pub struct Stream<'a> {
+pub(super) struct Stream<'a> {
     reader: &'a mut dyn Read,
     buffer: Vec<u8>,
     start: usize,
@@ -34,39 +34,39 @@ pub struct Stream<'a> {
 
 impl<'a> Stream<'a> {
     /// Reads from `reader`, which yields at most `limit` bytes; what it yields beyond is not seen.
-    pub fn new(reader: &'a mut dyn Read, limit: u64) -> Self {
+    pub(super) fn new(reader: &'a mut dyn Read, limit: u64) -> Self {
         let size = (limit.min(BUFFER as u64) as usize).max(MAX_FILL);
         let buffer = vec![0; size];
         Stream { reader, buffer, start: 0, end: 0, unread: limit, origin: 0, trusted: limit, line: 1, newline: b'\n' }
     }
 
     /// Reads from a decoder of `size` bytes of deflated data.
-    pub fn inflated(reader: &'a mut dyn Read, size: u64) -> Self {
+    pub(super) fn inflated(reader: &'a mut dyn Read, size: u64) -> Self {
         let trusted = size.saturating_mul(USUAL_INFLATION);
         Stream { trusted, ..Stream::new(reader, size.saturating_mul(MAX_INFLATION)) }
     }
 
     /// Upper bound of the bytes that are still to come.
-    pub fn remaining_limit(&self) -> u64 {
+    pub(super) fn remaining_limit(&self) -> u64 {
         self.unread + (self.end - self.start) as u64
     }
 
     /// For how many of `count` items, each of at least `size` bytes, memory may be taken in advance.
-    pub fn trusted_items(&self, count: u64, size: u64) -> usize {
+    pub(super) fn trusted_items(&self, count: u64, size: u64) -> usize {
         let bytes = self.trusted.min(self.remaining_limit());
         // A text may lack the blank after its last number.
         usize::try_from(count.min((bytes + 1) / size.max(1))).unwrap_or(usize::MAX)
     }
 
     /// Offset of the next byte.
-    pub fn offset(&self) -> u64 {
+    pub(super) fn offset(&self) -> u64 {
         self.origin + self.start as u64
     }
 
     /// Makes at least `wanted` bytes available if there are so many, and returns all that are available.
     /// `wanted` must not exceed [`MAX_FILL`].
     #[inline]
-    pub fn fill(&mut self, wanted: usize) -> Result<&[u8], PlyError> {
+    pub(super) fn fill(&mut self, wanted: usize) -> Result<&[u8], PlyError> {
         if self.end - self.start < wanted {
             self.refill(wanted)?;
         }
@@ -75,7 +75,7 @@ impl<'a> Stream<'a> {
 
     /// Makes `count` bytes available, or fails with the name of the element that lacks them.
     #[inline]
-    pub fn require(&mut self, count: usize, element: &str) -> Result<&[u8], PlyError> {
+    pub(super) fn require(&mut self, count: usize, element: &str) -> Result<&[u8], PlyError> {
         if self.end - self.start < count {
             self.refill(count)?;
             if self.end - self.start < count {
@@ -88,12 +88,12 @@ impl<'a> Stream<'a> {
 
     /// Drops the first `count` available bytes.
     #[inline]
-    pub fn consume(&mut self, count: usize) {
+    pub(super) fn consume(&mut self, count: usize) {
         self.start = (self.start + count).min(self.end);
     }
 
     /// Drops `count` bytes.
-    pub fn skip(&mut self, mut count: u64, element: &str) -> Result<(), PlyError> {
+    pub(super) fn skip(&mut self, mut count: u64, element: &str) -> Result<(), PlyError> {
         while count > 0 {
             let available = self.require(1, element)?.len() as u64;
             let step = available.min(count);
@@ -104,7 +104,7 @@ impl<'a> Stream<'a> {
     }
 
     /// Reads to the end, so that a decoder compares its checksum.
-    pub fn drain(&mut self) -> Result<(), PlyError> {
+    pub(super) fn drain(&mut self) -> Result<(), PlyError> {
         let mut drained = 0;
         while drained < MAX_TAIL {
             let available = self.fill(1)?.len();

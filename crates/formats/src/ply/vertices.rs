@@ -7,7 +7,7 @@ use super::{PlyError, PlyMesh};
 use lumiris_numbers::math::{Vec2, Vec3};
 
 /// Reads all vertices.
-pub fn read<'a, N: Numbers<'a>>(element: &Element, numbers: &mut N, mesh: &mut PlyMesh) -> Result<(), PlyError> {
+pub(super) fn read<'a, N: Numbers<'a>>(element: &Element, numbers: &mut N, mesh: &mut PlyMesh) -> Result<(), PlyError> {
     let Some(columns) = Columns::new(element) else {
         let line = element.line;
         return Err(PlyError::header(line, "vertices have no properties x, y and z"));

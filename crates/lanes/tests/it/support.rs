@@ -3,7 +3,7 @@
 use lumiris_lanes::Level;
 
 /// All levels of this machine, the scalar one first.
-pub fn levels() -> Vec<Level> {
+pub(crate) fn levels() -> Vec<Level> {
     let mut levels = vec![Level::fallback(), Level::baseline()];
     #[cfg(target_arch = "x86_64")]
     {
@@ -16,10 +16,10 @@ pub fn levels() -> Vec<Level> {
 }
 
 /// Lengths with and without full vectors.
-pub const LENGTHS: [usize; 12] = [0, 1, 3, 4, 7, 8, 9, 16, 23, 32, 77, 128];
+pub(crate) const LENGTHS: [usize; 12] = [0, 1, 3, 4, 7, 8, 9, 16, 23, 32, 77, 128];
 
 /// Asserts that `run` writes the same bits at all levels.
-pub fn assert_same_bits<const N: usize>(len: usize, mut run: impl FnMut(Level, [&mut [f32]; N])) {
+pub(crate) fn assert_same_bits<const N: usize>(len: usize, mut run: impl FnMut(Level, [&mut [f32]; N])) {
     let mut first: Option<[Vec<u32>; N]> = None;
     for level in levels() {
         let mut out: [Vec<f32>; N] = std::array::from_fn(|_| vec![-7.0; len]);

@@ -12,7 +12,7 @@ use lumiris_numbers::math::ONE_MINUS_EPSILON;
 /// c_j = f/(M p), w_j = g/(M p) and `integral` = ∫g known; 0 if no proposal has weight.
 ///
 /// Biased, by (I V(g/p)/∫g − Cov(f/p, g/p))/(M ∫g) to the first order in 1/M, where I = ∫f; consistent.
-pub fn weighted(contributions: &[f32], weights: &[f32], integral: f32) -> f32 {
+pub(crate) fn weighted(contributions: &[f32], weights: &[f32], integral: f32) -> f32 {
     let sum = |values: &[f32]| values.iter().map(|&x| f64::from(x)).sum::<f64>();
     let total = sum(weights);
     if total > 0.0 { (f64::from(integral) * sum(contributions) / total) as f32 } else { 0.0 }
@@ -21,13 +21,13 @@ pub fn weighted(contributions: &[f32], weights: &[f32], integral: f32) -> f32 {
 /// Defensive mixture [Hesterberg 1995]: the density α p₀ + (1 − α) p₁ of sampling p₀ with probability `alpha` and p₁
 /// otherwise, so that f/p is at most f/(α p₀) wherever p₁ misses f. Unbiased.
 #[inline]
-pub fn defensive_pdf(alpha: f32, p0: f32, p1: f32) -> f32 {
+pub(crate) fn defensive_pdf(alpha: f32, p0: f32, p1: f32) -> f32 {
     alpha * p0 + (1.0 - alpha) * p1
 }
 
 /// Choice of the defensive mixture: whether to sample p₀, and the number `u` made uniform again for that sampling.
 #[inline]
-pub fn defensive_choice(alpha: f32, u: f32) -> (bool, f32) {
+pub(crate) fn defensive_choice(alpha: f32, u: f32) -> (bool, f32) {
     if u < alpha { (true, u / alpha) } else { (false, ((u - alpha) / (1.0 - alpha)).min(ONE_MINUS_EPSILON)) }
 }
 
@@ -38,7 +38,7 @@ pub fn defensive_choice(alpha: f32, u: f32) -> (bool, f32) {
 /// Biased in a channel by E[(1/S) Σ_j w_j v_j Σ_j c_j] − ∫f, where v is the visibility: zero if the channel is
 /// proportional to q̂ (range of one dimension), else it tends to C E_q(v) − ∫f for M → ∞, C being the unshadowed
 /// integral [Talbot 2005, Section 4.7].
-pub fn bidirectional(unshadowed: [f32; 3], visibilities: &[f32]) -> [f32; 3] {
+pub(crate) fn bidirectional(unshadowed: [f32; 3], visibilities: &[f32]) -> [f32; 3] {
     let visible = visibilities.iter().map(|&v| f64::from(v)).sum::<f64>() / visibilities.len().max(1) as f64;
     unshadowed.map(|c| (f64::from(c) * visible) as f32)
 }

@@ -8,59 +8,64 @@ use lumiris_numbers::math::luminance;
 
 /// An integral over a line or a square of f = colour · visibility; the target q̂ is the luminance of the colour.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub enum Integral {
+pub(crate) enum Integral {
     /// x in 0..1 with p = ½ + x; visible in 0.15..0.4 and 0.55..0.95.
     Line,
     /// (x, y) in the unit square with p = 1; visible inside a circle of radius 0.9 about the origin.
     Square,
 }
 
-pub const ALL: [Integral; 2] = [Integral::Line, Integral::Square];
+pub(crate) const ALL: [Integral; 2] = [Integral::Line, Integral::Square];
 
 /// Numbers of points of the quadratures, per axis.
 const LINE_POINTS: usize = 400_000;
 const SQUARE_POINTS: usize = 1_500;
 
 impl Integral {
-    pub fn sample(self, u: [f64; 2]) -> [f64; 2] {
+    pub(crate) fn sample(self, u: [f64; 2]) -> [f64; 2] {
         match self {
             Integral::Line => [(0.25 + 2.0 * u[0]).sqrt() - 0.5, 0.0],
             Integral::Square => u,
         }
     }
 
-    pub fn pdf(self, x: [f64; 2]) -> f64 {
+    pub(crate) fn pdf(self, x: [f64; 2]) -> f64 {
         match self {
             Integral::Line => 0.5 + x[0],
             Integral::Square => 1.0,
         }
     }
 
-    pub fn colour(self, [x, y]: [f64; 2]) -> [f64; 3] {
+    pub(crate) fn colour(self, [x, y]: [f64; 2]) -> [f64; 3] {
         match self {
             Integral::Line => [0.1 + 8.0 * x * (1.0 - x), 0.3 + 6.0 * x * x, 2.2 - 2.0 * x],
             Integral::Square => [0.2 + 3.0 * x * y, 0.1 + 4.0 * (x - 0.3) * (x - 0.3), 0.2 + 2.0 * y * y * y * y],
         }
     }
 
-    pub fn visibility(self, [x, y]: [f64; 2]) -> f64 {
+    pub(crate) fn visibility(self, [x, y]: [f64; 2]) -> f64 {
         match self {
             Integral::Line => f64::from(u8::from((0.15..0.4).contains(&x) || (0.55..0.95).contains(&x))),
             Integral::Square => f64::from(u8::from(x * x + y * y < 0.81)),
         }
     }
 
-    pub fn f(self, x: [f64; 2]) -> [f64; 3] {
+    pub(crate) fn f(self, x: [f64; 2]) -> [f64; 3] {
         let v = self.visibility(x);
         self.colour(x).map(|c| c * v)
     }
 
-    pub fn target(self, x: [f64; 2]) -> f64 {
+    pub(crate) fn target(self, x: [f64; 2]) -> f64 {
         luminance(self.colour(x))
     }
 
     /// Mean over uniform numbers `begin..end` of the first axis of `g(x)`, by the midpoint rule.
-    pub fn mean_between<const K: usize>(self, begin: f64, end: f64, g: impl Fn([f64; 2]) -> [f64; K]) -> [f64; K] {
+    pub(crate) fn mean_between<const K: usize>(
+        self,
+        begin: f64,
+        end: f64,
+        g: impl Fn([f64; 2]) -> [f64; K],
+    ) -> [f64; K] {
         let [nx, ny] = match self {
             Integral::Line => [LINE_POINTS, 1],
             Integral::Square => [SQUARE_POINTS, SQUARE_POINTS],
@@ -77,7 +82,7 @@ impl Integral {
     }
 
     /// ∫f and [`Moments`] of proposals that are confined to uniform numbers `begin..end` (p is the density there).
-    pub fn moments_between(self, begin: f64, end: f64) -> ([f64; 3], Moments) {
+    pub(crate) fn moments_between(self, begin: f64, end: f64) -> ([f64; 3], Moments) {
         let width = end - begin;
         let m = self.mean_between(begin, end, |x| {
             let (f, p, q_hat) = (self.f(x), self.pdf(x) / width, self.target(x));
@@ -94,14 +99,14 @@ impl Integral {
     }
 
     /// ∫f and the moments of proposals over the whole domain.
-    pub fn moments(self) -> ([f64; 3], Moments) {
+    pub(crate) fn moments(self) -> ([f64; 3], Moments) {
         self.moments_between(0.0, 1.0)
     }
 }
 
 /// M proposals of one run.
 #[derive(Default)]
-pub struct Proposals {
+pub(crate) struct Proposals {
     pub contributions: Vec<[f32; 3]>,
     pub weights: Vec<f32>,
     pub unshadowed: Vec<[f32; 3]>,
@@ -109,7 +114,7 @@ pub struct Proposals {
 }
 
 impl Proposals {
-    pub fn clear(&mut self) {
+    pub(crate) fn clear(&mut self) {
         self.contributions.clear();
         self.weights.clear();
         self.unshadowed.clear();
@@ -117,7 +122,7 @@ impl Proposals {
     }
 
     /// Adds the proposal x with factor r.
-    pub fn push(&mut self, integral: Integral, x: [f64; 2], r: f64) {
+    pub(crate) fn push(&mut self, integral: Integral, x: [f64; 2], r: f64) {
         self.contributions.push(integral.f(x).map(|f| (f * r) as f32));
         self.weights.push((integral.target(x) * r) as f32);
         self.unshadowed.push(integral.colour(x).map(|c| (c * r) as f32));
@@ -125,7 +130,7 @@ impl Proposals {
     }
 
     /// M independent proposals of density p with r = 1/(M p).
-    pub fn independent(&mut self, integral: Integral, m: usize, stream: &mut HashStream) {
+    pub(crate) fn independent(&mut self, integral: Integral, m: usize, stream: &mut HashStream) {
         self.clear();
         for _ in 0..m {
             let x = integral.sample(stream.next_2d().map(f64::from));
@@ -134,7 +139,7 @@ impl Proposals {
     }
 
     /// As [`Proposals::independent`], but in M equal strata of the first axis, in order.
-    pub fn jittered(&mut self, integral: Integral, m: usize, stream: &mut HashStream) {
+    pub(crate) fn jittered(&mut self, integral: Integral, m: usize, stream: &mut HashStream) {
         self.clear();
         for k in 0..m {
             let [u, v] = stream.next_2d().map(f64::from);
@@ -144,7 +149,7 @@ impl Proposals {
     }
 
     /// Σ scale·c.
-    pub fn estimate(&self, draws: &[Draw]) -> [f64; 3] {
+    pub(crate) fn estimate(&self, draws: &[Draw]) -> [f64; 3] {
         let mut sum = [0.0; 3];
         for d in draws {
             let c = self.contributions[d.index as usize];
@@ -155,7 +160,7 @@ impl Proposals {
 }
 
 /// Moments of `runs` estimates per channel.
-pub fn run(runs: usize, key: [u32; 3], mut estimate: impl FnMut(&mut HashStream) -> [f64; 3]) -> [Welford; 3] {
+pub(crate) fn run(runs: usize, key: [u32; 3], mut estimate: impl FnMut(&mut HashStream) -> [f64; 3]) -> [Welford; 3] {
     let mut stream = HashStream::new(key);
     let mut channels = [Welford::new(); 3];
     for _ in 0..runs {
@@ -166,6 +171,6 @@ pub fn run(runs: usize, key: [u32; 3], mut estimate: impl FnMut(&mut HashStream)
 }
 
 /// `n` uniform numbers.
-pub fn fill(u: &mut [f32], stream: &mut HashStream) {
+pub(crate) fn fill(u: &mut [f32], stream: &mut HashStream) {
     u.iter_mut().for_each(|u| *u = stream.next_f32());
 }

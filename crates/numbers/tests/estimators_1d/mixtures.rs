@@ -5,7 +5,7 @@ use lumiris_numbers::math::hash::HashStream;
 
 /// A density on 0..1.
 #[derive(Clone, Copy, Debug)]
-pub enum Density {
+pub(crate) enum Density {
     /// Constant between two ends.
     Uniform(f64, f64),
     /// 4x up to ½, then 4(1 − x): a lobe.
@@ -19,7 +19,7 @@ impl Density {
         Density::Peak(centre, width, [(-centre / width).atan(), ((1.0 - centre) / width).atan()])
     }
 
-    pub fn sample(self, u: f64) -> f64 {
+    pub(crate) fn sample(self, u: f64) -> f64 {
         match self {
             Density::Uniform(a, b) => a + (b - a) * u,
             Density::Tent if u < 0.5 => (0.5 * u).sqrt(),
@@ -28,7 +28,7 @@ impl Density {
         }
     }
 
-    pub fn pdf(self, x: f64) -> f64 {
+    pub(crate) fn pdf(self, x: f64) -> f64 {
         match self {
             Density::Uniform(a, b) => inside(x, a, b) / (b - a),
             Density::Tent => 4.0 * x.min(1.0 - x),
@@ -47,7 +47,7 @@ fn lorentz(x: f64, c: f64, w: f64) -> f64 {
 
 /// An integral and the mixture that samples it.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum Mixture {
+pub(crate) enum Mixture {
     /// A lobe and two lights; an occluder hides the end of one and most of the other.
     Table,
     /// The same; the occluder hides one of them and a little more.
@@ -75,11 +75,11 @@ pub enum Mixture {
 }
 
 /// Those that bounds of variance hold for.
-pub const PROPER: [Mixture; 7] =
+pub(crate) const PROPER: [Mixture; 7] =
     [Mixture::Table, Mixture::Occluded, Mixture::Peak, Mixture::Optimal, Mixture::Colour, Mixture::Many, Mixture::Slit];
 
 /// Those in which something is missing or too much.
-pub const DEGENERATE: [Mixture; 5] =
+pub(crate) const DEGENERATE: [Mixture; 5] =
     [Mixture::OneLight, Mixture::NoLight, Mixture::Duplicates, Mixture::Useless, Mixture::Zero];
 
 const MANY: [(f64, f64, f64); 7] = [
@@ -126,7 +126,7 @@ impl Mixture {
     }
 
     /// f by channel.
-    pub fn f(self, x: f64) -> [f64; 3] {
+    pub(crate) fn f(self, x: f64) -> [f64; 3] {
         let bsdf = 4.0 * x * (1.0 - x);
         let (a, b) = (inside(x, 0.2, 0.5), inside(x, 0.6, 0.9));
         let visible = |from, to| 1.0 - inside(x, from, to);
@@ -156,12 +156,12 @@ impl Mixture {
     }
 
     /// A channel of f without the occluder, for the integrals of lights of one power.
-    pub fn unshadowed(self, x: f64) -> f64 {
+    pub(crate) fn unshadowed(self, x: f64) -> f64 {
         8.0 * x * (1.0 - x) * (inside(x, 0.2, 0.5) + inside(x, 0.6, 0.9))
     }
 
     /// ∫f by the midpoint rule, whose points are symmetric about every step of f.
-    pub fn value(self) -> [f64; 3] {
+    pub(crate) fn value(self) -> [f64; 3] {
         const POINTS: u32 = 1_000_000;
         let mut sum = [0.0; 3];
         for k in 0..POINTS {
@@ -214,7 +214,7 @@ fn counts_of_a_mixture_are_its_shares_and_nobody_with_a_share_has_none() {
 }
 
 /// Samples of a mixture: for each component its number n_j per pass.
-pub struct Sampler {
+pub(crate) struct Sampler {
     pub mixture: Mixture,
     pub densities: Vec<Density>,
     pub counts: Vec<u32>,
@@ -232,7 +232,7 @@ pub struct Sampler {
 
 /// A sample: where, of which component, all densities there, and p_α.
 #[derive(Clone, Copy, Debug)]
-pub struct Point {
+pub(crate) struct Point {
     pub x: f64,
     pub component: usize,
     pub pdfs: [f64; MAX_COMPONENTS],
@@ -243,10 +243,10 @@ pub struct Point {
 const VALUES: usize = 3 + MAX_COMPONENTS;
 
 /// A covariance for each pair of values.
-pub type Covariances = [[f64; VALUES]; VALUES];
+pub(crate) type Covariances = [[f64; VALUES]; VALUES];
 
 impl Sampler {
-    pub fn new(mixture: Mixture, n: u32, is_stratified: bool) -> Sampler {
+    pub(crate) fn new(mixture: Mixture, n: u32, is_stratified: bool) -> Sampler {
         let (densities, alpha): (Vec<Density>, Vec<f32>) = mixture.components().into_iter().unzip();
         let mut counts = vec![0; alpha.len()];
         allot(&alpha, n, &mut counts);
@@ -256,7 +256,7 @@ impl Sampler {
     }
 
     /// All samples of a block of `passes`.
-    pub fn points(&self, passes: u32, stream: &mut HashStream, mut each: impl FnMut(&Point)) {
+    pub(crate) fn points(&self, passes: u32, stream: &mut HashStream, mut each: impl FnMut(&Point)) {
         for (component, count) in self.counts.iter().enumerate() {
             let strata = count * passes;
             for k in 0..strata {
@@ -289,7 +289,7 @@ impl Sampler {
 
     /// Covariances of the means over a block of `passes` of y, by channel, and of the columns, which follow; by quadrature
     /// over each stratum.
-    pub fn covariances(&self, passes: u32) -> Covariances {
+    pub(crate) fn covariances(&self, passes: u32) -> Covariances {
         const POINTS: u32 = 1 << 15;
         let mut covariances = Covariances::default();
         let samples = f64::from(self.counts.iter().sum::<u32>() * passes);
@@ -322,7 +322,7 @@ impl Sampler {
     }
 
     /// y = f/p_α.
-    pub fn y(&self, point: &Point) -> [f32; 3] {
+    pub(crate) fn y(&self, point: &Point) -> [f32; 3] {
         let scale = self.scale / point.mixture_pdf;
         if self.shift != 0.0 {
             let seen = 1.0 - inside(point.x, 0.4 + self.shift, 0.78 + self.shift);
@@ -332,7 +332,7 @@ impl Sampler {
     }
 
     /// Adds a block of `passes` to `sums`, whose columns are r_j.
-    pub fn add(&self, passes: u32, stream: &mut HashStream, sums: &mut [f32]) {
+    pub(crate) fn add(&self, passes: u32, stream: &mut HashStream, sums: &mut [f32]) {
         self.points(passes, stream, |point| {
             let (columns, mut there, mut count) = (self.columns(point), [(0, 0.0); MAX_COMPONENTS], 0);
             for (j, c) in columns.into_iter().enumerate().filter(|(_, c)| *c > 0.0) {
@@ -344,14 +344,14 @@ impl Sampler {
     }
 
     /// The sums of a new block in the columns of a form.
-    pub fn block(&self, form: Form, passes: u32, stream: &mut HashStream, sums: &mut [f32]) {
+    pub(crate) fn block(&self, form: Form, passes: u32, stream: &mut HashStream, sums: &mut [f32]) {
         sums.fill(0.0);
         self.add(passes, stream, sums);
         form.finish(self.equations, sums, &self.integrals);
     }
 
     /// Lengths of the blocks of the first `passes` passes.
-    pub fn blocks(passes: u32) -> impl Iterator<Item = u32> {
+    pub(crate) fn blocks(passes: u32) -> impl Iterator<Item = u32> {
         (0..passes).map(block_of).enumerate().filter(|(pass, b)| *pass == b.first as usize).map(|(_, b)| b.len)
     }
 }

@@ -7,7 +7,7 @@ use lumiris_numbers::estimators::ocv::{MAX_COMPONENTS, Matrix, NormalEquations, 
 const CONSTANT: f64 = 1e-6;
 
 /// The coefficients of one row of sums, `beta[3 j + channel]`, by a factorisation in f64 with pivots.
-pub fn solve(equations: NormalEquations, system: System, sums: &[f32]) -> Vec<f64> {
+pub(crate) fn solve(equations: NormalEquations, system: System, sums: &[f32]) -> Vec<f64> {
     let m = equations.components();
     let mut beta = vec![0.0; equations.coefficients()];
     let n = f64::from(equations.samples(sums));

@@ -6,7 +6,7 @@
 
 /// The sheets of one case.
 #[derive(Clone, Copy)]
-pub struct Case {
+pub(super) struct Case {
     /// Sheet of each edge; meaningless where the edge is not crossed.
     pub sheet: [u8; 12],
     /// Number of sheets, at most 4.
@@ -14,7 +14,7 @@ pub struct Case {
 }
 
 /// The two corners of an edge, lower first.
-pub fn edge_corners(edge: usize) -> [usize; 2] {
+pub(super) fn edge_corners(edge: usize) -> [usize; 2] {
     let (axis, j) = (edge / 4, edge % 4);
     let first = ((j & 1) << ((axis + 1) % 3)) | ((j >> 1) << ((axis + 2) % 3));
     [first, first | (1 << axis)]
@@ -22,24 +22,24 @@ pub fn edge_corners(edge: usize) -> [usize; 2] {
 
 /// The four corners of the face across `axis` on `side`: bit 0 of the place in the array is the axis a + 1, bit 1 the
 /// axis a + 2.
-pub fn face_corners(axis: usize, side: usize) -> [usize; 4] {
+pub(super) fn face_corners(axis: usize, side: usize) -> [usize; 4] {
     std::array::from_fn(|j| (side << axis) | ((j & 1) << ((axis + 1) % 3)) | ((j >> 1) << ((axis + 2) % 3)))
 }
 
 /// True if the inside corners of a face are two that are diagonal.
-pub fn is_ambiguous(config: u8, corners: [usize; 4]) -> bool {
+pub(super) fn is_ambiguous(config: u8, corners: [usize; 4]) -> bool {
     let inside = corners.map(|c| config >> c & 1 == 1);
     inside[0] == inside[3] && inside[1] == inside[2] && inside[0] != inside[1]
 }
 
 /// The edge between two corners that differ in one coordinate.
-pub fn edge_between(a: usize, b: usize) -> usize {
+pub(super) fn edge_between(a: usize, b: usize) -> usize {
     let axis = (a ^ b).trailing_zeros() as usize;
     4 * axis + ((a >> ((axis + 1) % 3) & 1) | (a >> ((axis + 2) % 3) & 1) << 1)
 }
 
 /// The cases of all configurations of inside corners.
-pub fn all() -> Box<[Case; 256]> {
+pub(super) fn all() -> Box<[Case; 256]> {
     Box::new(std::array::from_fn(|config| case(config as u8)))
 }
 

@@ -427,7 +427,7 @@ pub(super) mod tests {
     }
 
     /// Panics unless the mesh is closed, oriented and without degenerate triangles.
-    pub fn assert_closed(mesh: &TriangleMesh) {
+    pub(crate) fn assert_closed(mesh: &TriangleMesh) {
         let mut edges: BTreeMap<[u32; 2], (u32, u32)> = BTreeMap::new();
         for (i, &[a, b, c]) in mesh.indices.iter().enumerate() {
             assert!(mesh.area(i) > 0.0, "triangle {i} has no area");

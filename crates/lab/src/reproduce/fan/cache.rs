@@ -57,7 +57,7 @@ struct Outcome {
 }
 
 /// Measures it within about `time`.
-pub fn run(setup: &Setup<'_>, time: Duration) -> Result<Figure, ReproduceError> {
+pub(super) fn run(setup: &Setup<'_>, time: Duration) -> Result<Figure, ReproduceError> {
     let start = Instant::now();
     let observer = setup.observer;
     (observer.say)("Box …");

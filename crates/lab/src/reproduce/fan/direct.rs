@@ -13,7 +13,7 @@ use lumiris::settings::Split;
 use std::time::{Duration, Instant};
 
 /// A row of the paper's table.
-pub struct Case {
+pub(super) struct Case {
     pub id: &'static str,
     pub title: &'static str,
     pub intro: &'static str,
@@ -35,7 +35,7 @@ pub struct Case {
 }
 
 impl Case {
-    pub const CHECKERS: Case = Case {
+    pub(super) const CHECKERS: Case = Case {
         id: "checkers",
         title: "Checkers",
         intro: "A glossy board with a few things on it, under a large yellow light that it reflects at the left and a small blue one at the \
@@ -50,7 +50,7 @@ impl Case {
         efficient: false,
         crop: [0.0, 0.3, 0.4, 0.7],
     };
-    pub const STATUE: Case = Case {
+    pub(super) const STATUE: Case = Case {
         id: "statue",
         title: "Statue",
         intro: "A lacquered dragon among large lights, in the place of the Buddha of figure 1: tight highlights, folds that see a part of each light, \
@@ -65,7 +65,7 @@ impl Case {
         efficient: false,
         crop: [0.2, 0.12, 0.9, 0.47],
     };
-    pub const ROOM: Case = Case {
+    pub(super) const ROOM: Case = Case {
         id: "room",
         title: "Room",
         intro: "A room with three small lights and little that hides them, after figure 3: few samples do, and there is little to win.",
@@ -82,9 +82,9 @@ impl Case {
 }
 
 /// Camera rays of each of the long renderings, and their number.
-pub const LONG: (u32, u32) = (16, 4);
+pub(super) const LONG: (u32, u32) = (16, 4);
 /// Seeds of long renderings, of antialiased pictures and of curves are those of turns from here on.
-pub const LONG_TURNS: u32 = 1_000_000;
+pub(super) const LONG_TURNS: u32 = 1_000_000;
 const ANTIALIASED_TURNS: u32 = 2_000_000;
 /// Edge of the picture on which times are found out, and the least edge: usual and quick.
 const PILOT_SIZE: [u32; 2] = [96, 48];
@@ -96,11 +96,11 @@ const WANTED_TURNS: [f64; 2] = [8.0, 4.0];
 const PAIR_TURNS: u32 = 4;
 
 /// Who is shown with antialiasing, and with samples drawn in which ways.
-pub const SHOWN: [Role; 4] = [Role::Balance, Role::Progressive, Role::Correlated, Role::Ris];
-pub const SHOWN_WAYS: [usize; 2] = [0, 1];
+pub(super) const SHOWN: [Role; 4] = [Role::Balance, Role::Progressive, Role::Correlated, Role::Ris];
+pub(super) const SHOWN_WAYS: [usize; 2] = [0, 1];
 
 /// Everything that was measured for a case.
-pub struct Outcome<'a> {
+pub(super) struct Outcome<'a> {
     pub case: &'a Case,
     pub facts: (usize, usize),
     pub size: [u32; 2],
@@ -140,7 +140,7 @@ fn fixed_cost(case: &Case, quick: bool) -> f64 {
 }
 
 /// Measures a case within about `time`.
-pub fn run(setup: &Setup<'_>, case: &Case, time: Duration) -> Result<Figure, ReproduceError> {
+pub(super) fn run(setup: &Setup<'_>, case: &Case, time: Duration) -> Result<Figure, ReproduceError> {
     let start = Instant::now();
     let (observer, quick) = (setup.observer, setup.options.quick);
     (observer.say)(&format!("{} …", case.title));

@@ -18,16 +18,21 @@ const SHRINK: u32 = 2;
 const PAIR: [Role; 2] = [Role::Balance, Role::Progressive];
 
 /// Camera rays and error of progressive `ocv` over that of `mis`, for each of the ways to draw samples.
-pub struct Growth(pub [Vec<(u32, Estimate)>; FULL_WAYS]);
+pub(super) struct Growth(pub [Vec<(u32, Estimate)>; FULL_WAYS]);
 
 /// Camera rays per pixel of the whole picture that take as long.
-pub fn cost(quick: bool) -> f64 {
+pub(super) fn cost(quick: bool) -> f64 {
     let rays: u32 = RAYS[usize::from(quick)].iter().sum();
     f64::from(TURNS * rays * (PAIR.len() * FULL_WAYS) as u32 + LONG.0 * LONG.1) / f64::from(SHRINK * SHRINK)
 }
 
 /// Measures it on a smaller picture.
-pub fn measure(setup: &Setup<'_>, case: &Case, numbers: Numbers, size: [u32; 2]) -> Result<Growth, ReproduceError> {
+pub(super) fn measure(
+    setup: &Setup<'_>,
+    case: &Case,
+    numbers: Numbers,
+    size: [u32; 2],
+) -> Result<Growth, ReproduceError> {
     let small = size.map(|s| (s / SHRINK).max(8));
     let mut stage = Stage::load(&setup.scenes.join(case.file), small, setup.options.threads)?;
     let list = methods(numbers);

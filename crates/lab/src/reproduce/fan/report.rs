@@ -14,17 +14,17 @@ use super::truth::{CANDELAS, Errors, Interval, Truth};
 use serde_json::{Value, json};
 
 /// A relative bias in percent with its confidence interval.
-pub fn bias_text(b: Interval) -> String {
+pub(super) fn bias_text(b: Interval) -> String {
     format!("{:+.3} ± {:.3} %", b.value * 100.0, b.half * 100.0)
 }
 
 /// Time relative to that of a baseline, as more or less of it.
-pub fn more_time(ratio: f64) -> String {
+pub(super) fn more_time(ratio: f64) -> String {
     format!("{:+.1} %", (ratio - 1.0) * 100.0)
 }
 
 /// All numbers of a method, relative to a baseline.
-pub fn method_json(name: &str, [m, base]: [&Measured; 2], [e, base_errors]: [&Errors; 2]) -> Value {
+pub(super) fn method_json(name: &str, [m, base]: [&Measured; 2], [e, base_errors]: [&Errors; 2]) -> Value {
     let time = m.time_ratio(base);
     json!({
         "name": name, "estimator": <&str>::from(m.method.estimator), "samples": m.method.samples,
@@ -38,7 +38,7 @@ pub fn method_json(name: &str, [m, base]: [&Measured; 2], [e, base_errors]: [&Er
 }
 
 /// The row of a method in a table whose header is [`HEADER`].
-pub fn method_row(name: &str, [m, base]: [&Measured; 2], [e, base_errors]: [&Errors; 2]) -> Vec<Cell> {
+pub(super) fn method_row(name: &str, [m, base]: [&Measured; 2], [e, base_errors]: [&Errors; 2]) -> Vec<Cell> {
     let time = m.time_ratio(base);
     vec![
         Cell::text(name),
@@ -52,10 +52,10 @@ pub fn method_row(name: &str, [m, base]: [&Measured; 2], [e, base_errors]: [&Err
 }
 
 /// Columns of the tables of methods.
-pub const HEADER: [&str; 7] = ["method", "N", "error", "against mis", "time", "efficiency", "bias of the mean"];
+pub(super) const HEADER: [&str; 7] = ["method", "N", "error", "against mis", "time", "efficiency", "bias of the mean"];
 
 /// What a target asks for.
-pub struct Asked {
+pub(super) struct Asked {
     /// Errors of mis and of ocv in the paper.
     pub paper: [f64; 2],
     /// Time of ocv over that of mis in the paper.
@@ -67,7 +67,12 @@ pub struct Asked {
 }
 
 /// The row of the table at the top.
-pub fn summary(asked: &Asked, [m, base]: [&Measured; 2], [e, base_errors]: [&Errors; 2], reason: String) -> Summary {
+pub(super) fn summary(
+    asked: &Asked,
+    [m, base]: [&Measured; 2],
+    [e, base_errors]: [&Errors; 2],
+    reason: String,
+) -> Summary {
     let [mis, ocv] = asked.paper;
     let (left, time) = (e.relative(base_errors), m.time_ratio(base));
     let efficiency = e.efficiency(base_errors, time);
@@ -97,7 +102,7 @@ pub fn summary(asked: &Asked, [m, base]: [&Measured; 2], [e, base_errors]: [&Err
 }
 
 /// The section of a case.
-pub fn direct(setup: &Setup<'_>, o: &Outcome<'_>) -> Result<Figure, ReproduceError> {
+pub(super) fn direct(setup: &Setup<'_>, o: &Outcome<'_>) -> Result<Figure, ReproduceError> {
     let (triangles, lights) = o.facts;
     let n = o.numbers;
     let base = &o.measured[0];
@@ -260,7 +265,7 @@ fn pictures(setup: &Setup<'_>, o: &Outcome<'_>) -> Result<Vec<Block>, ReproduceE
 }
 
 /// Variance images of methods, weighted as in eq. (12), on one scale.
-pub fn variances(
+pub(super) fn variances(
     setup: &Setup<'_>,
     truth: &Truth,
     size: [u32; 2],

@@ -10,7 +10,7 @@ use lumiris_numbers::estimators::ocv::Form;
 
 /// Who takes part, in this order with each of the ways to draw samples.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum Role {
+pub(super) enum Role {
     /// What all are compared with: mis with the balance heuristic.
     Balance,
     Power,
@@ -31,7 +31,7 @@ pub enum Role {
 }
 
 /// All of them.
-pub const ROLES: [Role; 12] = [
+pub(super) const ROLES: [Role; 12] = [
     Role::Balance,
     Role::Power,
     Role::Progressive,
@@ -51,7 +51,7 @@ const PAIR: [Role; 2] = [Role::Balance, Role::Progressive];
 
 /// A way to draw samples and to choose lights.
 #[derive(Clone, Copy, Debug)]
-pub struct Way {
+pub(super) struct Way {
     /// Name on the page.
     pub name: &'static str,
     pub points: Points,
@@ -69,7 +69,7 @@ const fn by_tree(name: &'static str, points: Points) -> Way {
 }
 
 /// All ways.
-pub const WAYS: [Way; 6] = [
+pub(super) const WAYS: [Way; 6] = [
     alike("stratified in each estimate", Points::PerEstimate),
     alike("stratified over all rays", Points::PerPixel),
     alike("independent", Points::Independent),
@@ -79,11 +79,11 @@ pub const WAYS: [Way; 6] = [
 ];
 
 /// Number of ways in which all take part: the first ones.
-pub const FULL_WAYS: usize = 3;
+pub(super) const FULL_WAYS: usize = 3;
 
 /// Numbers of samples.
 #[derive(Clone, Copy, Debug)]
-pub struct Numbers {
+pub(super) struct Numbers {
     /// Samples per estimate.
     pub samples: u32,
     /// Those of `ocv` that take as long as `mis` with the former.
@@ -94,7 +94,7 @@ pub struct Numbers {
 
 impl Role {
     /// Name on the page.
-    pub fn name(self) -> &'static str {
+    pub(super) fn name(self) -> &'static str {
         match self {
             Role::Balance => "mis, balance heuristic",
             Role::Power => "mis, power heuristic",
@@ -112,7 +112,7 @@ impl Role {
     }
 
     /// False if the expectation may differ from the truth.
-    pub fn is_unbiased(self) -> bool {
+    pub(super) fn is_unbiased(self) -> bool {
         match self {
             Role::Regression | Role::Paper | Role::OptimalDirect | Role::Correlated => false,
             Role::Balance
@@ -127,7 +127,7 @@ impl Role {
     }
 
     /// The method, stratified over all rays, with every light as often as any other.
-    pub fn method(self, n: Numbers) -> Method {
+    pub(super) fn method(self, n: Numbers) -> Method {
         let method = match self {
             Role::Balance => Method::mis(n.samples).weighted(Heuristic::Balance),
             Role::Power => Method::mis(n.samples).weighted(Heuristic::Power),
@@ -146,7 +146,7 @@ impl Role {
     }
 
     /// Its place among all methods; `way` is one of [`WAYS`] in which it takes part.
-    pub fn place(self, way: usize) -> usize {
+    pub(super) fn place(self, way: usize) -> usize {
         let before: usize = WAYS[..way].iter().map(|w| w.roles.len()).sum();
         let own = WAYS[way].roles.iter().position(|&r| r == self);
         before + own.expect("only roles that take part are asked for")
@@ -154,7 +154,7 @@ impl Role {
 }
 
 /// All methods, in the order of [`Role::place`].
-pub fn methods(n: Numbers) -> Vec<Method> {
+pub(super) fn methods(n: Numbers) -> Vec<Method> {
     let of = |way: &Way, role: Role| {
         let method = Method { points: way.points, light_choice: way.lights, ..role.method(n) };
         let is_independent = way.points == Points::Independent;

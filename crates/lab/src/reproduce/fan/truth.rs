@@ -10,10 +10,10 @@ use lumiris_numbers::estimators::stats::Welford;
 use lumiris_numbers::math::luminance;
 
 /// Luminance (cd/m²) of a pixel whose luminance is 1: that of white on a display.
-pub const CANDELAS: f64 = 100.0;
+pub(super) const CANDELAS: f64 = 100.0;
 
 /// The true picture, as long renderings show it.
-pub struct Truth {
+pub(super) struct Truth {
     /// Mean radiance.
     pub radiance: Vec<[f32; 3]>,
     /// Mean luminance.
@@ -28,7 +28,7 @@ pub struct Truth {
 
 /// How far renderings of one method are from the truth.
 #[derive(Clone, Debug)]
-pub struct Errors {
+pub(super) struct Errors {
     /// Mean square of eq. (12), turn by turn.
     squares: Welford,
     /// Mean over the pixels of the square of their expected error, in the unit of eq. (12): what no number of turns removes.
@@ -39,7 +39,7 @@ pub struct Errors {
 
 /// A number and half the width of its 95 % confidence interval.
 #[derive(Clone, Copy, Debug)]
-pub struct Interval {
+pub(super) struct Interval {
     /// The number.
     pub value: f64,
     /// Half the width.
@@ -48,7 +48,7 @@ pub struct Interval {
 
 impl Truth {
     /// From turns of a method without bias.
-    pub fn new(long: &Measured) -> Self {
+    pub(super) fn new(long: &Measured) -> Self {
         let turns = long.turns() as f64;
         let mean = long.mean_radiance();
         let bright: Vec<f64> = mean.iter().map(|&p| luminance(p)).collect();
@@ -65,13 +65,13 @@ impl Truth {
     }
 
     /// Mean square of what the noise of this truth adds, in the unit of eq. (12).
-    pub fn noise(&self) -> f64 {
+    pub(super) fn noise(&self) -> f64 {
         let noise = |(v, t): (&f64, &f64)| v / (t * t);
         (self.variance.iter().zip(&self.threshold).map(noise).sum::<f64>() / self.variance.len().max(1) as f64).sqrt()
     }
 
     /// The same picture in the unit of eq. (12): variance over the square of the threshold.
-    pub fn weighted(&self, variances: &[f64]) -> Vec<f64> {
+    pub(super) fn weighted(&self, variances: &[f64]) -> Vec<f64> {
         variances.iter().zip(&self.threshold).map(|(v, t)| v / (t * t)).collect()
     }
 
@@ -85,7 +85,7 @@ impl Truth {
     }
 
     /// Holds the turns of a method against the truth.
-    pub fn errors(&self, m: &Measured) -> Errors {
+    pub(super) fn errors(&self, m: &Measured) -> Errors {
         let (mut squares, mut means) = (Welford::new(), Welford::new());
         for turn in m.luminances() {
             squares.add(self.square(turn.iter().map(|&v| f64::from(v))));
@@ -104,13 +104,13 @@ impl Truth {
 
 impl Errors {
     /// E of eq. (12), from the mean square.
-    pub fn error(&self) -> Estimate {
+    pub(super) fn error(&self) -> Estimate {
         let value = self.squares.mean().max(0.0).sqrt();
         Estimate { value, error: 0.5 * self.squares.standard_error() / value.max(1e-300) }
     }
 
     /// E relative to that of another method.
-    pub fn relative(&self, base: &Errors) -> Estimate {
+    pub(super) fn relative(&self, base: &Errors) -> Estimate {
         let (a, b) = (self.error(), base.error());
         if !(a.value > 0.0 && b.value > 0.0) {
             return Estimate::default();
@@ -120,7 +120,7 @@ impl Errors {
     }
 
     /// 1/(E²·time) relative to that of another method, for the ratio of their times.
-    pub fn efficiency(&self, base: &Errors, time_ratio: f64) -> Estimate {
+    pub(super) fn efficiency(&self, base: &Errors, time_ratio: f64) -> Estimate {
         let left = self.relative(base);
         let value = 1.0 / (left.value * left.value * time_ratio).max(1e-300);
         Estimate { value, error: 2.0 * value * left.error / left.value.max(1e-300) }

@@ -5,7 +5,7 @@ use lumiris_numbers::math::{Bounds3, Vec3};
 
 /// A raster over the x and y of a scene.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Plan {
+pub(super) struct Plan {
     /// The corner with the minimum x and y (m).
     low: [f64; 2],
     /// Edge of a square (m).
@@ -16,7 +16,7 @@ pub struct Plan {
 
 /// A part of the floor: minimum and maximum x and y (m).
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Area {
+pub(super) struct Area {
     /// Minimum x and y.
     pub low: [f32; 2],
     /// Greatest x and y.
@@ -25,20 +25,20 @@ pub struct Area {
 
 impl Area {
     /// True if a point is above or below it.
-    pub fn holds(&self, p: Vec3) -> bool {
+    pub(super) fn holds(&self, p: Vec3) -> bool {
         let inside = |i: usize| self.low[i] <= p[i] && p[i] < self.high[i];
         inside(0) && inside(1)
     }
 
     /// How many points are above or below it.
-    pub fn count(&self, points: &[Vec3]) -> u64 {
+    pub(super) fn count(&self, points: &[Vec3]) -> u64 {
         points.iter().filter(|&&p| self.holds(p)).count() as u64
     }
 }
 
 impl Plan {
     /// Around everything, with `longer` squares along the longer side.
-    pub fn new(bounds: &Bounds3, longer: u32) -> Self {
+    pub(super) fn new(bounds: &Bounds3, longer: u32) -> Self {
         let extent = [0, 1].map(|i| f64::from((bounds.max[i] - bounds.min[i]).max(1e-3)));
         let longer = longer.max(1);
         let edge = extent[0].max(extent[1]) * 1.0001 / f64::from(longer);
@@ -55,7 +55,7 @@ impl Plan {
     }
 
     /// Points per square metre of the floor.
-    pub fn density(&self, points: &[Vec3]) -> Vec<f64> {
+    pub(super) fn density(&self, points: &[Vec3]) -> Vec<f64> {
         let mut density = vec![0.0; (self.size[0] * self.size[1]) as usize];
         let each = 1.0 / (self.edge * self.edge);
         points.iter().filter_map(|&p| self.square(p)).for_each(|i| density[i] += each);
@@ -63,13 +63,13 @@ impl Plan {
     }
 
     /// Densities as colours.
-    pub fn picture(&self, density: &[f64], scale: &Scale) -> Picture {
+    pub(super) fn picture(&self, density: &[f64], scale: &Scale) -> Picture {
         Picture::colored(self.size, density, scale)
     }
 
     /// One scale for several pictures: from the density of a single point to that which a twentieth of the squares
     /// exceed: walls.
-    pub fn scale(&self, densities: &[&[f64]]) -> Scale {
+    pub(super) fn scale(&self, densities: &[&[f64]]) -> Scale {
         let mut sorted: Vec<f64> = densities.iter().flat_map(|d| d.iter().copied()).filter(|v| *v > 0.0).collect();
         sorted.sort_by(f64::total_cmp);
         let high = sorted.get(sorted.len().saturating_sub(1 + sorted.len() / 20)).copied().unwrap_or(1.0);

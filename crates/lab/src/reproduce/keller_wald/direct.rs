@@ -118,7 +118,7 @@ impl Outcome {
 }
 
 /// Measures both scenes within about `time`.
-pub fn run(setup: &Setup<'_>, time: Duration) -> Result<Figure, ReproduceError> {
+pub(super) fn run(setup: &Setup<'_>, time: Duration) -> Result<Figure, ReproduceError> {
     (setup.observer.say)("Direct light …");
     let few = measure(setup, "rooms.pbrt", time.mul_f64(1.0 - MANY_SHARE))?;
     let many = measure(setup, "rooms-10000.pbrt", time.mul_f64(MANY_SHARE))?;

@@ -28,7 +28,7 @@ const MOST_RAYS: [f64; 2] = [16384.0, 256.0];
 const PILOT: u64 = 50_000;
 
 /// The maps of one run of photon tracing.
-pub struct Maps {
+pub(super) struct Maps {
     /// Light that came over diffuse surfaces, or straight from lights.
     pub global: PhotonMap,
     /// Light that came over other surfaces.
@@ -43,7 +43,7 @@ pub struct Maps {
 
 impl Maps {
     /// Sorts what was traced.
-    pub fn new(traced: Traced) -> Self {
+    pub(super) fn new(traced: Traced) -> Self {
         let (rate, seconds) = (traced.arrivals_per_second(), traced.elapsed.as_secs_f64());
         Maps {
             trajectories: traced.trajectories,
@@ -55,33 +55,33 @@ impl Maps {
     }
 
     /// Photons stored.
-    pub fn stored(&self) -> usize {
+    pub(super) fn stored(&self) -> usize {
         self.global.len() + self.caustic.len()
     }
 
     /// Memory of both (bytes).
-    pub fn bytes(&self) -> u64 {
+    pub(super) fn bytes(&self) -> u64 {
         self.global.bytes() + self.caustic.bytes()
     }
 
     /// Where the photons are.
-    pub fn positions(&self) -> Vec<Vec3> {
+    pub(super) fn positions(&self) -> Vec<Vec3> {
         [&self.global, &self.caustic].into_iter().flat_map(positions).collect()
     }
 
     /// The radiance of each pixel by the `count` nearest photons of each map.
-    pub fn picture(&self, setup: &Setup<'_>, seen: &[Option<Seen>], count: u32) -> Vec<[f32; 3]> {
+    pub(super) fn picture(&self, setup: &Setup<'_>, seen: &[Option<Seen>], count: u32) -> Vec<[f32; 3]> {
         show(setup, seen, &[&self.global, &self.caustic], count)
     }
 }
 
 /// Where the photons of a map are.
-pub fn positions(map: &PhotonMap) -> impl Iterator<Item = Vec3> {
+pub(super) fn positions(map: &PhotonMap) -> impl Iterator<Item = Vec3> {
     map.photons().iter().map(Photon::p)
 }
 
 /// The radiance of each pixel by the `count` nearest photons of each of some maps.
-pub fn show(setup: &Setup<'_>, seen: &[Option<Seen>], maps: &[&PhotonMap], count: u32) -> Vec<[f32; 3]> {
+pub(super) fn show(setup: &Setup<'_>, seen: &[Option<Seen>], maps: &[&PhotonMap], count: u32) -> Vec<[f32; 3]> {
     let search = Search::Nearest { count, max_radius: MAX_RADIUS };
     let pixel = |scratch: &mut GatherScratch, seen: &Option<Seen>| {
         seen.map_or([0.0; 3], |s| {
@@ -94,7 +94,7 @@ pub fn show(setup: &Setup<'_>, seen: &[Option<Seen>], maps: &[&PhotonMap], count
 }
 
 /// Traces photons for maps.
-pub fn trace(
+pub(super) fn trace(
     setup: &Setup<'_>,
     job: &RenderJob,
     tracing: &Tracing<'_>,
@@ -108,7 +108,7 @@ pub fn trace(
 }
 
 /// Photons stored and trajectories traced in a second.
-pub fn speed(
+pub(super) fn speed(
     setup: &Setup<'_>,
     job: &RenderJob,
     tracing: &Tracing<'_>,
@@ -121,7 +121,7 @@ pub fn speed(
 }
 
 /// The picture by path tracing, for about `time`.
-pub fn path_traced(setup: &Setup<'_>, stage: &mut Stage, time: Duration) -> Result<Reference, ReproduceError> {
+pub(super) fn path_traced(setup: &Setup<'_>, stage: &mut Stage, time: Duration) -> Result<Reference, ReproduceError> {
     let observer = setup.observer;
     let method = Method::ris(16, 2).stratified().of(Transport::Path);
     let first = LONG_TURNS.start;
@@ -132,12 +132,12 @@ pub fn path_traced(setup: &Setup<'_>, stage: &mut Stage, time: Duration) -> Resu
 }
 
 /// A plan of a scene.
-pub fn plan(setup: &Setup<'_>, job: &RenderJob) -> Plan {
+pub(super) fn plan(setup: &Setup<'_>, job: &RenderJob) -> Plan {
     Plan::new(&job.world.scene.geometry.world_bounds(), PLAN_SIZE[usize::from(setup.options.quick)])
 }
 
 /// Points from above: name of the file, heading, caption, and where they are.
-pub struct Cloud {
+pub(super) struct Cloud {
     /// Name of the file.
     pub name: String,
     /// Heading.
@@ -149,7 +149,7 @@ pub struct Cloud {
 }
 
 /// Pictures of points with one scale for all. Densities are those of as many points as the last has.
-pub fn clouds(setup: &Setup<'_>, plan: &Plan, clouds: &[Cloud]) -> Result<Vec<Block>, ReproduceError> {
+pub(super) fn clouds(setup: &Setup<'_>, plan: &Plan, clouds: &[Cloud]) -> Result<Vec<Block>, ReproduceError> {
     let count = clouds.last().map_or(0, |c| c.points.len()) as f64;
     let density = |c: &Cloud| {
         let factor = count / c.points.len().max(1) as f64;
@@ -171,7 +171,7 @@ pub fn clouds(setup: &Setup<'_>, plan: &Plan, clouds: &[Cloud]) -> Result<Vec<Bl
 }
 
 /// A picture with its name, heading and caption.
-pub struct Print<'a> {
+pub(super) struct Print<'a> {
     /// Name of the file.
     pub name: String,
     /// Heading.
@@ -185,7 +185,7 @@ pub struct Print<'a> {
 }
 
 /// Pictures with one exposure for all.
-pub fn prints(setup: &Setup<'_>, exposure: f32, prints: &[Print<'_>]) -> Result<Block, ReproduceError> {
+pub(super) fn prints(setup: &Setup<'_>, exposure: f32, prints: &[Print<'_>]) -> Result<Block, ReproduceError> {
     let mut shown = Vec::new();
     for p in prints {
         let file = Picture::tone_mapped(p.size, p.radiance, exposure).write(&setup.options.out, &p.name)?;

@@ -61,7 +61,7 @@ struct Outcome {
 }
 
 /// Measures both scenes within about `time`.
-pub fn run(setup: &Setup<'_>, time: Duration) -> Result<Figure, ReproduceError> {
+pub(super) fn run(setup: &Setup<'_>, time: Duration) -> Result<Figure, ReproduceError> {
     (setup.observer.say)("Ring …");
     let outcomes = [measure(setup, &SCENES[0], time.mul_f64(0.5))?, measure(setup, &SCENES[1], time.mul_f64(0.5))?];
     figure(setup, &outcomes)

@@ -11,7 +11,7 @@ use std::f32::consts::FRAC_1_PI;
 
 /// A point of a diffuse surface.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Seen {
+pub(super) struct Seen {
     /// Where.
     pub p: Vec3,
     /// Unit normal towards the camera.
@@ -22,14 +22,14 @@ pub struct Seen {
 
 impl Seen {
     /// Reflected radiance under an irradiance.
-    pub fn radiance(&self, irradiance: Rgb) -> [f32; 3] {
+    pub(super) fn radiance(&self, irradiance: Rgb) -> [f32; 3] {
         let l = self.albedo * irradiance * FRAC_1_PI;
         [l.r, l.g, l.b]
     }
 }
 
 /// What each pixel shows, row by row; `None` where that is nothing, a light, or not diffuse alone.
-pub fn seen(world: &World) -> Vec<Option<Seen>> {
+pub(super) fn seen(world: &World) -> Vec<Option<Seen>> {
     let scene = &world.scene;
     let [width, height] = scene.film.resolution;
     let mut rays = RayBatch::default();
@@ -60,7 +60,7 @@ fn diffuse_at(world: &World, wo: Vec3, hit: &Hit) -> Option<Seen> {
 }
 
 /// What a picture should be, by long renderings.
-pub struct Reference {
+pub(super) struct Reference {
     /// Mean radiance.
     pub radiance: Vec<[f32; 3]>,
     luminance: Vec<f64>,
@@ -70,7 +70,7 @@ pub struct Reference {
 
 impl Reference {
     /// From turns of a method without bias.
-    pub fn new(long: &Measured) -> Self {
+    pub(super) fn new(long: &Measured) -> Self {
         let (mean, turns) = (long.mean_radiance(), long.turns().max(1) as f64);
         Reference {
             luminance: mean.iter().map(|&p| luminance(p)).collect(),
@@ -80,20 +80,20 @@ impl Reference {
     }
 
     /// Mean luminance over the pixels of a mask.
-    pub fn mean(&self, mask: &[bool]) -> f64 {
+    pub(super) fn mean(&self, mask: &[bool]) -> f64 {
         mean_where(mask, self.luminance.iter().copied())
     }
 
     /// Root of the mean square of the difference in luminance over the pixels of a mask, relative to the mean luminance. The
     /// reference's own noise is subtracted from each square.
-    pub fn rmse(&self, picture: &[[f32; 3]], mask: &[bool]) -> f64 {
+    pub(super) fn rmse(&self, picture: &[[f32; 3]], mask: &[bool]) -> f64 {
         let square =
             |(i, p): (usize, &[f32; 3])| (luminance(p.map(f64::from)) - self.luminance[i]).powi(2) - self.variance[i];
         mean_where(mask, picture.iter().enumerate().map(square)).max(0.0).sqrt() / self.mean(mask).max(1e-300)
     }
 
     /// Mean luminance of a picture over that of the reference, less 1, over the pixels of a mask.
-    pub fn bias(&self, picture: &[[f32; 3]], mask: &[bool]) -> f64 {
+    pub(super) fn bias(&self, picture: &[[f32; 3]], mask: &[bool]) -> f64 {
         let mean = mean_where(mask, picture.iter().map(|p| luminance(p.map(f64::from))));
         mean / self.mean(mask).max(1e-300) - 1.0
     }
@@ -101,7 +101,7 @@ impl Reference {
 
 /// Root of the mean square of the difference in luminance from another picture over the pixels of a mask, relative to the mean luminance of
 /// the other.
-pub fn relative_rmse(picture: &[[f32; 3]], other: &[[f32; 3]], mask: &[bool]) -> f64 {
+pub(super) fn relative_rmse(picture: &[[f32; 3]], other: &[[f32; 3]], mask: &[bool]) -> f64 {
     let light = |p: &[f32; 3]| luminance(p.map(f64::from));
     let square = mean_where(mask, picture.iter().zip(other).map(|(a, b)| (light(a) - light(b)).powi(2)));
     square.sqrt() / mean_where(mask, other.iter().map(light)).max(1e-300)

@@ -50,7 +50,7 @@ struct Row {
 }
 
 /// Measures it within about `time`.
-pub fn run(setup: &Setup<'_>, time: Duration) -> Result<Figure, ReproduceError> {
+pub(super) fn run(setup: &Setup<'_>, time: Duration) -> Result<Figure, ReproduceError> {
     let start = Instant::now();
     (setup.observer.say)("Slit …");
     let size = setup.size.min(SIZE[usize::from(setup.options.quick)]);

@@ -10,15 +10,15 @@ use super::super::{Observer, ReproduceError};
 use lumiris_numbers::math::luminance;
 
 /// Minimum fraction of the light that arrives in lit pixels.
-pub const LIT: f64 = 0.9;
+pub(super) const LIT: f64 = 0.9;
 /// Largest part of the light that arrives in shadowed pixels.
-pub const SHADOWED: f64 = 0.25;
+pub(super) const SHADOWED: f64 = 0.25;
 
 /// Names of the classes, in their order.
-pub const NAMES: [&str; 3] = ["lit", "penumbra", "shadow"];
+pub(super) const NAMES: [&str; 3] = ["lit", "penumbra", "shadow"];
 
 /// The class of every pixel.
-pub struct Classes {
+pub(super) struct Classes {
     /// Part of the light that arrives; NaN where there is no surface, or no light.
     pub visibility: Vec<f64>,
     /// Which pixels are lit, which in half-shadow, which in shadow.
@@ -27,7 +27,11 @@ pub struct Classes {
 
 impl Classes {
     /// Renders the picture without shadows and compares it with `reference`.
-    pub fn new(stage: &mut Stage, reference: &[[f64; 3]], observer: Observer<'_>) -> Result<Self, ReproduceError> {
+    pub(super) fn new(
+        stage: &mut Stage,
+        reference: &[[f64; 3]],
+        observer: Observer<'_>,
+    ) -> Result<Self, ReproduceError> {
         let method = Method::mis(8).stratified();
         let rendering = stage.render(&method, View::Unshadowed, 32, 0, observer)?;
         let surface = |i: usize| rendering.film.pixels[i].hits > 0;
@@ -40,7 +44,7 @@ impl Classes {
     }
 
     /// Number of pixels of each class.
-    pub fn counts(&self) -> [usize; 3] {
+    pub(super) fn counts(&self) -> [usize; 3] {
         std::array::from_fn(|k| self.masks[k].iter().filter(|&&m| m).count())
     }
 }

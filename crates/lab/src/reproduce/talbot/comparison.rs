@@ -13,7 +13,7 @@ use lumiris::settings::{Split, Strata};
 use std::time::{Duration, Instant};
 
 /// A figure that compares methods.
-pub struct Case {
+pub(super) struct Case {
     pub id: &'static str,
     pub title: &'static str,
     pub intro: &'static str,
@@ -29,7 +29,7 @@ pub struct Case {
 
 /// What is compared, and with what outcome.
 #[derive(Clone, Copy)]
-pub enum Kind {
+pub(super) enum Kind {
     /// Resampling against light sampling: reduction of variance in the paper, and to be reached here (percent), by the
     /// resampling that is judged.
     Reduction { paper: f64, target: f64, judged: Judged },
@@ -39,7 +39,7 @@ pub enum Kind {
 
 /// Which M and N a verdict is about.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum Judged {
+pub(super) enum Judged {
     /// Equal halves of the time for proposals and for samples, stratified.
     EqualHalves,
     /// Those of the paper, without stratification: where a proposal costs what a sample does, equal halves of the time are
@@ -48,7 +48,7 @@ pub enum Judged {
 }
 
 impl Case {
-    pub const PAPER_4: Case = Case {
+    pub(super) const PAPER_4: Case = Case {
         id: "paper-figure-4",
         title: "Paper, figure 4: an environment and two area lights",
         intro: "Direct light with 20 camera rays per pixel: light sampling with 20 shadow rays at each, against resampling with M/N = T2/T1.",
@@ -58,7 +58,7 @@ impl Case {
         printed: Some(Split { samples: 11, proposals: 168 }),
         kind: Kind::Reduction { paper: 70.0, target: 80.0, judged: Judged::EqualHalves },
     };
-    pub const PAPER_4_LIGHTS: Case = Case {
+    pub(super) const PAPER_4_LIGHTS: Case = Case {
         id: "paper-figure-4-lights",
         title: "Paper, figure 4 without the environment: two area lights",
         intro: "The same with the two area lights alone, where most of the variance is that of visibility.",
@@ -67,7 +67,7 @@ impl Case {
         kind: Kind::Reduction { paper: 10.0, target: 30.0, judged: Judged::EqualHalves },
         ..Case::PAPER_4
     };
-    pub const THESIS_53: Case = Case {
+    pub(super) const THESIS_53: Case = Case {
         id: "thesis-figure-5.3",
         title: "Thesis, figure 5.3: an environment alone",
         intro: "Direct light with 10 camera rays per pixel: light sampling with 100 shadow rays at each, against resampling.",
@@ -77,7 +77,7 @@ impl Case {
         printed: Some(Split { samples: 64, proposals: 229 }),
         kind: Kind::Reduction { paper: 33.0, target: 45.0, judged: Judged::Printed },
     };
-    pub const THESIS_54: Case = Case {
+    pub(super) const THESIS_54: Case = Case {
         id: "thesis-figure-5.4",
         title: "Thesis, figure 5.4: stratification",
         intro: "Resampling without any stratification, with stratified proposals, and with strata of samples on top of these. \
@@ -92,7 +92,7 @@ impl Case {
 
 /// A method with its name on the page.
 #[derive(Clone, Debug)]
-pub struct Named {
+pub(super) struct Named {
     pub name: String,
     pub method: Method,
 }
@@ -101,7 +101,7 @@ pub struct Named {
 const MANY: u32 = 96;
 
 /// Positions among the methods that [`methods`] gives.
-pub struct Roles {
+pub(super) struct Roles {
     /// What all are compared with.
     pub base: usize,
     /// What the target is about.
@@ -165,7 +165,7 @@ fn methods(case: &Case, split: Split) -> (Vec<Named>, Roles) {
 }
 
 /// Everything that was measured for a case.
-pub struct Outcome<'a> {
+pub(super) struct Outcome<'a> {
     pub case: &'a Case,
     pub stage_facts: (usize, usize),
     pub size: [u32; 2],
@@ -192,7 +192,7 @@ const QUICK_TURNS: u32 = 8;
 const WANTED_TURNS: f64 = 8.0;
 
 /// Measures a case within about `time`.
-pub fn run(setup: &Setup<'_>, case: &Case, time: Duration) -> Result<Figure, ReproduceError> {
+pub(super) fn run(setup: &Setup<'_>, case: &Case, time: Duration) -> Result<Figure, ReproduceError> {
     let start = Instant::now();
     let Observer { say, .. } = setup.observer;
     say(&format!("{} …", case.title));

@@ -119,7 +119,7 @@ impl Outcome {
 }
 
 /// Renders and measures within about `time`.
-pub fn run(setup: &Setup<'_>, time: Duration) -> Result<Figure, ReproduceError> {
+pub(super) fn run(setup: &Setup<'_>, time: Duration) -> Result<Figure, ReproduceError> {
     let start = Instant::now();
     let Observer { say, .. } = setup.observer;
     say("Paper, figure 3: proposals per sample …");

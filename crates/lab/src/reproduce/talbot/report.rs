@@ -13,7 +13,7 @@ use lumiris::settings::Split;
 use serde_json::{Value, json};
 
 /// All numbers of a method among those it was in turns with, the first of which is the baseline.
-pub fn method_json(name: &str, all: &[Measured], method: usize, classes: &Classes) -> Value {
+pub(super) fn method_json(name: &str, all: &[Measured], method: usize, classes: &Classes) -> Value {
     let (m, base) = (&all[method], &all[0]);
     let class = |k: usize| {
         let mask = Some(&classes.masks[k][..]);
@@ -37,7 +37,7 @@ pub fn method_json(name: &str, all: &[Measured], method: usize, classes: &Classe
 }
 
 /// The section of a case.
-pub fn comparison(setup: &Setup<'_>, o: &Outcome<'_>) -> Result<Figure, ReproduceError> {
+pub(super) fn comparison(setup: &Setup<'_>, o: &Outcome<'_>) -> Result<Figure, ReproduceError> {
     let Split { samples, proposals } = o.calibration.split;
     let (triangles, lights) = o.stage_facts;
     let base = &o.measured[o.roles.base];

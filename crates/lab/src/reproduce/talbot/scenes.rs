@@ -10,13 +10,13 @@ const DETAIL: [u32; 2] = [512, 128];
 
 /// A statue under a sky and two lights, and with either alone.
 #[derive(Clone, Debug)]
-pub struct Scenes {
+pub(super) struct Scenes {
     folder: PathBuf,
 }
 
 /// Which of them.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum Which {
+pub(super) enum Which {
     /// Sky.
     Environment,
     /// Two area lights.
@@ -27,7 +27,7 @@ pub enum Which {
 
 impl Scenes {
     /// Makes the scenes inside the folder of the page, unless the options name others.
-    pub fn new(options: &Options) -> Result<Self, ReproduceError> {
+    pub(super) fn new(options: &Options) -> Result<Self, ReproduceError> {
         let detail = DETAIL[usize::from(options.quick)];
         let statue = StatueOptions { detail, ..StatueOptions::default() };
         let all = TalbotOptions { statue, ..TalbotOptions::default() };
@@ -35,7 +35,7 @@ impl Scenes {
     }
 
     /// The scene file.
-    pub fn path(&self, which: Which) -> PathBuf {
+    pub(super) fn path(&self, which: Which) -> PathBuf {
         self.folder.join(match which {
             Which::Environment => "statue-env.pbrt",
             Which::Lights => "statue-lights.pbrt",

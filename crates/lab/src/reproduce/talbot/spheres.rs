@@ -71,7 +71,7 @@ fn ratio(pair: &Pair) -> f64 {
 }
 
 /// Renders and measures all spheres.
-pub fn run(setup: &Setup<'_>) -> Result<Figure, ReproduceError> {
+pub(super) fn run(setup: &Setup<'_>) -> Result<Figure, ReproduceError> {
     (setup.observer.say)("Paper, figure 5: spheres …");
     let size = setup.size.min(200);
     let spheres = spheres();
