@@ -27,17 +27,14 @@ enum Layout {
     Ascii,
 }
 
-/// A grid of 2·columns·rows triangles with a wave.
-fn grid(layout: Layout, columns: u32, rows: u32) -> Result<Vec<u8>, std::fmt::Error> {
-    let (vertices, cells) = ((columns + 1) * (rows + 1), columns * rows);
+/// The header of a grid of so many cells and vertices, whose properties have these names.
+fn header(layout: Layout, [cells, vertices]: [u32; 2], names: &[&str]) -> Result<String, std::fmt::Error> {
     let format = match layout {
         Layout::Plain | Layout::Full | Layout::Quads => "binary_little_endian",
         Layout::BigEndian => "binary_big_endian",
         Layout::Ascii => "ascii",
     };
     let faces = if matches!(layout, Layout::Quads) { cells } else { 2 * cells };
-    let names: &[&str] =
-        if matches!(layout, Layout::Full) { &["x", "y", "z", "nx", "ny", "nz", "u", "v"] } else { &["x", "y", "z"] };
     let mut head = format!("ply\nformat {format} 1.0\nelement vertex {vertices}\n");
     for name in names {
         writeln!(head, "property float {name}")?;
@@ -47,8 +44,15 @@ fn grid(layout: Layout, columns: u32, rows: u32) -> Result<Vec<u8>, std::fmt::Er
         writeln!(head, "property int face_indices")?;
     }
     head.push_str("end_header\n");
+    Ok(head)
+}
 
-    let mut out = head.into_bytes();
+/// A grid of 2·columns·rows triangles with a wave.
+fn grid(layout: Layout, columns: u32, rows: u32) -> Result<Vec<u8>, std::fmt::Error> {
+    let names: &[&str] =
+        if matches!(layout, Layout::Full) { &["x", "y", "z", "nx", "ny", "nz", "u", "v"] } else { &["x", "y", "z"] };
+    let counts = [columns * rows, (columns + 1) * (rows + 1)];
+    let mut out = header(layout, counts, names)?.into_bytes();
     let mut text = String::new();
     for (y, x) in (0..=rows).flat_map(|y| (0..=columns).map(move |x| (y, x))) {
         let wave = (x as f32 * 0.1).sin();

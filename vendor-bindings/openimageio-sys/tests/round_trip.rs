@@ -5,6 +5,21 @@ mod common;
 use common::*;
 use openimageio_sys::*;
 
+/// The metadata of both parts are those that were written.
+fn assert_metadata(input: &Input) {
+    let attributes = input.attributes(0);
+    let value = |name: &str| (attributes[name].0.as_str(), attributes[name].1.as_str());
+    assert_eq!(value("lumiris:settings"), ("string", "ris \"M=32\"\nN=4"));
+    assert_eq!(value("lumiris:samples"), ("int", "64"));
+    assert_eq!(value("oiio:subimagename"), ("string", "beauty"));
+    assert_eq!(value("compression"), ("string", "zip"));
+    assert_eq!(attributes["lumiris:world_from_camera"].0, "matrix");
+    assert_eq!(input.floats(0, "lumiris:time"), [0.1]);
+    let matrix: Vec<f32> = (0..16).map(|i| i as f32 + 0.1).collect();
+    assert_eq!(input.floats(0, "lumiris:world_from_camera"), matrix);
+    assert_eq!(input.attributes(1)["lumiris:part"].1, "second part");
+}
+
 #[test]
 fn an_exr_of_two_parts_keeps_channels_formats_and_metadata() {
     let beauty = [
@@ -59,17 +74,7 @@ fn an_exr_of_two_parts_keeps_channels_formats_and_metadata() {
         assert!((0..45).all(|pixel| second[pixel * 2 + c] == pixels[pixel * 2 + at]));
     }
 
-    let attributes = input.attributes(0);
-    let value = |name: &str| (attributes[name].0.as_str(), attributes[name].1.as_str());
-    assert_eq!(value("lumiris:settings"), ("string", "ris \"M=32\"\nN=4"));
-    assert_eq!(value("lumiris:samples"), ("int", "64"));
-    assert_eq!(value("oiio:subimagename"), ("string", "beauty"));
-    assert_eq!(value("compression"), ("string", "zip"));
-    assert_eq!(attributes["lumiris:world_from_camera"].0, "matrix");
-    assert_eq!(input.floats(0, "lumiris:time"), [0.1]);
-    let matrix: Vec<f32> = (0..16).map(|i| i as f32 + 0.1).collect();
-    assert_eq!(input.floats(0, "lumiris:world_from_camera"), matrix);
-    assert_eq!(input.attributes(1)["lumiris:part"].1, "second part");
+    assert_metadata(&input);
 }
 
 #[test]

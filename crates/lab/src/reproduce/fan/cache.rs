@@ -125,17 +125,7 @@ fn figure(setup: &Setup<'_>, o: &Outcome) -> Result<Figure, ReproduceError> {
             ),
         ]),
     ];
-    let exposure = gain(&o.truth.radiance);
-    let mut shown = Vec::new();
-    for i in [0, BEST] {
-        let picture = Picture::tone_mapped(o.size, &o.measured[i].first, exposure);
-        let file = picture.write(&setup.options.out, &format!("box-{i}"))?;
-        shown.push(Shown { file, title: o.names[i].to_owned(), caption: String::new() });
-    }
-    let picture = Picture::tone_mapped(o.size, &o.truth.radiance, exposure);
-    let file = picture.write(&setup.options.out, "box-reference")?;
-    shown.push(Shown { file, title: "reference, path tracing".to_owned(), caption: String::new() });
-    blocks.push(Block::Pictures(shown));
+    blocks.push(Block::Pictures(shown(setup, o)?));
     let list = [0, BEST].map(|i| (o.names[i], &o.measured[i]));
     blocks.extend(variances(setup, &o.truth, o.size, &list, "box-variance", "stratified over all rays")?);
     blocks.push(Block::Table(table));
@@ -158,6 +148,21 @@ fn figure(setup: &Setup<'_>, o: &Outcome) -> Result<Figure, ReproduceError> {
             "interpolation_error": systematic, "reference": { "noise": o.truth.noise() },
         }),
     })
+}
+
+/// The images of `mis`, of the best form, and of the reference.
+fn shown(setup: &Setup<'_>, o: &Outcome) -> Result<Vec<Shown>, ReproduceError> {
+    let exposure = gain(&o.truth.radiance);
+    let mut shown = Vec::new();
+    for i in [0, BEST] {
+        let picture = Picture::tone_mapped(o.size, &o.measured[i].first, exposure);
+        let file = picture.write(&setup.options.out, &format!("box-{i}"))?;
+        shown.push(Shown { file, title: o.names[i].to_owned(), caption: String::new() });
+    }
+    let picture = Picture::tone_mapped(o.size, &o.truth.radiance, exposure);
+    let file = picture.write(&setup.options.out, "box-reference")?;
+    shown.push(Shown { file, title: "reference, path tracing".to_owned(), caption: String::new() });
+    Ok(shown)
 }
 
 /// The part of the error that differs from rendering to rendering.

@@ -137,6 +137,29 @@ fn figure(
         "Figure 2: the maps shown directly, each with the number of nearest photons k that serves it best. Rows have the same number of photons."
             .to_owned(),
     ));
+    blocks.push(maps_shown(judge, size, rows)?);
+    blocks.push(Block::Table(table(rows)));
+    let mut chart = Chart::new("photons of an estimate, k", "relative error");
+    for r in rows {
+        chart = chart.with(r.name, COUNTS.iter().zip(&r.errors).map(|(&k, &e)| [f64::from(k), e]).collect());
+    }
+    blocks.push(Block::Chart(chart));
+    let json: Vec<Value> = rows.iter().map(row_json).collect();
+    Ok(Figure {
+        id: "rooms",
+        title: "Figures 1 and 2: a room among a hundred",
+        summary: summary(rows),
+        also: Vec::new(),
+        blocks,
+        numbers: json!({
+            "size": size, "importons": importance.map().len(), "maps": json,
+            "least_probability_scale": importance.scale(), "pixels": judge.mask.iter().filter(|m| **m).count(),
+        }),
+    })
+}
+
+/// The images of all maps, and the reference.
+fn maps_shown(judge: &Judge<'_>, size: [u32; 2], rows: &[Row; 4]) -> Result<Block, ReproduceError> {
     let exposure = gain(&judge.reference.radiance);
     let mut list: Vec<Print<'_>> = (rows.iter().enumerate())
         .map(|(i, r)| Print {
@@ -159,25 +182,7 @@ fn figure(
         size,
         radiance: &judge.reference.radiance,
     });
-    blocks.push(prints(setup, exposure, &list)?);
-    blocks.push(Block::Table(table(rows)));
-    let mut chart = Chart::new("photons of an estimate, k", "relative error");
-    for r in rows {
-        chart = chart.with(r.name, COUNTS.iter().zip(&r.errors).map(|(&k, &e)| [f64::from(k), e]).collect());
-    }
-    blocks.push(Block::Chart(chart));
-    let json: Vec<Value> = rows.iter().map(row_json).collect();
-    Ok(Figure {
-        id: "rooms",
-        title: "Figures 1 and 2: a room among a hundred",
-        summary: summary(rows),
-        also: Vec::new(),
-        blocks,
-        numbers: json!({
-            "size": size, "importons": importance.map().len(), "maps": json,
-            "least_probability_scale": importance.scale(), "pixels": judge.mask.iter().filter(|m| **m).count(),
-        }),
-    })
+    prints(judge.setup, exposure, &list)
 }
 
 fn summary(rows: &[Row; 4]) -> Summary {
