@@ -5,12 +5,11 @@
 #   .ci/other-debian.sh [TEST...]    `image_hashes` unless other tests of tests/it are named
 #
 # Needs root (for chroot and mounts), debootstrap, a Debian mirror, some 4 GB in $TMPDIR or /tmp, and some 10 CPU minutes.
-# DEBIAN_MIRROR names another mirror, DEBIAN_SUITE another release. The Rust toolchain is this machine's, mounted read-only: that
+# DEBIAN_MIRROR names a mirror other than that of debootstrap, DEBIAN_SUITE another release. The Rust toolchain is this machine's, mounted read-only: that
 # of Debian 13 (1.85) is too old, and with one compiler on both sides only the libraries differ. Everything is mounted in
 # a mount namespace of its own, which ends with this script; then the folder is deleted.
 set -euo pipefail
 
-MIRROR=${DEBIAN_MIRROR:-http://deb.debian.org/debian}
 PACKAGES=${PACKAGES:?is set by the Makefile: run make test-debian13}
 
 fail() { echo "other-debian.sh: $*" >&2; exit 1; }
@@ -35,7 +34,7 @@ inside() {
   local root=$1 suite=$2
   shift 2
   echo "Installing $suite into $root"
-  debootstrap --variant=minbase "$suite" "$root" "$MIRROR" >"$root.log" 2>&1 || { tail -n 20 "$root.log" >&2; fail "debootstrap failed"; }
+  debootstrap --variant=minbase "$suite" "$root" ${DEBIAN_MIRROR:+"$DEBIAN_MIRROR"} >"$root.log" 2>&1 || { tail -n 20 "$root.log" >&2; fail "debootstrap failed"; }
   mount -t proc proc "$root/proc"
   mount --rbind /dev "$root/dev"
   # shellcheck disable=SC2086 # one word for each package
