@@ -1,5 +1,6 @@
-//! Statistical assertions for tests.
+//! What tests of several crates use: statistical assertions, and integrals of known value.
 
+pub mod integrals;
 pub mod significance;
 
 use lumiris_numbers::estimators::stats::{Welford, chi_squared_test, z_test};

@@ -9,3 +9,4 @@ mod environment;
 mod lane;
 mod light;
 mod support;
+mod two_techniques;

@@ -1,11 +1,11 @@
 //! Biased baselines: the measured bias is the predicted one, and it is there.
 
 use super::baselines::{bidirectional, weighted};
-use super::integrals::{Integral, Proposals, run};
 use super::{assert_means, level};
 use lumiris_numbers::estimators::ris::with_replacement;
 use lumiris_numbers::estimators::stats::z_test;
 use lumiris_numbers::math::luminance;
+use lumiris_test_support::integrals::{Integral, Proposals, run};
 
 const RUNS: usize = 1_000_000;
 const LINE: Integral = Integral::Line;

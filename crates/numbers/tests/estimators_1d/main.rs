@@ -3,12 +3,13 @@
 //! Seeds are fixed. The hypotheses of all tests here together, less than [`HYPOTHESES`], reject a true model with
 //! probability 1 %; a run that passes once always passes.
 //!
-//! - [`integrals`]: the integrals, their quadrature, and runs of estimators on them
+//! The integrals are those of `lumiris_test_support::integrals`.
+//!
 //! - [`unbiased`]: mean and variance of every way of drawing (thesis 4.2, 4.6; paper 2)
 //! - [`law`]: the distribution of the resampled point
 //! - [`stratification`]: strata against none, and the strata of equal weights against their printed form
 //! - [`parameters`]: the optimal numbers of proposals and samples
-//! - [`techniques`]: several techniques
+//! - [`techniques`]: two techniques
 //! - [`mixtures`]: integrals that a deterministic mixture of densities samples
 //! - [`ocv`]: optimizing control variates, optimal multiple importance sampling, correlated sampling
 //! - [`oracle`]: slow versions in f64 of what ships in f32 and lanes
@@ -16,7 +17,6 @@
 
 mod baselines;
 mod biased;
-mod integrals;
 mod law;
 mod mixtures;
 mod ocv;

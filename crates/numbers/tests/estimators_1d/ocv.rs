@@ -1,6 +1,5 @@
 //! Optimizing control variates and its relatives: bias, variance, scale, and what happens where something is missing.
 
-use super::integrals::run;
 use super::mixtures::{DEGENERATE, Density, Mixture, PROPER, Sampler};
 use super::{assert_means, assert_variances, level, oracle};
 use lumiris_numbers::estimators::mis::{Heuristic, Technique};
@@ -8,21 +7,31 @@ use lumiris_numbers::estimators::ocv::{Form, System};
 use lumiris_numbers::estimators::stats::{Welford, z_test};
 use lumiris_numbers::estimators::{correlated, optimal_mis};
 use lumiris_numbers::math::hash::HashStream;
+use lumiris_test_support::integrals::run;
 
 const PROGRESSIVE: Form = Form::Progressive;
 
 /// Numbers of samples of a pass.
 const NUMBERS: [u32; 4] = [3, 8, 16, 64];
 
+/// Runs whose systems are solved at once, as the renderer does with those of a batch of points.
+const BATCH: usize = 16;
+
 /// Passes in a row, each with the coefficients of the one before: uncorrelated estimates, since each has the expectation
-/// ∫f whatever its coefficients are.
+/// ∫f whatever its coefficients are. [`BATCH`] rows of passes take turns.
 fn chain(sampler: &Sampler, runs: usize, key: u32) -> [Welford; 3] {
     let equations = sampler.equations;
-    let (mut sums, mut beta) = (vec![0.0; equations.len()], vec![0.0; equations.coefficients()]);
+    let (len, width) = (equations.len(), equations.coefficients());
+    let (mut sums, mut beta) = (vec![0.0; BATCH * len], vec![0.0; BATCH * width]);
+    let mut rows = (0..BATCH).cycle();
     run(runs, [21, key, sampler.mixture as u32], |stream| {
-        sampler.block(PROGRESSIVE, 1, stream, &mut sums);
-        let estimate = equations.estimate(&sums, &beta);
-        assert_eq!(equations.solve(PROGRESSIVE.system(), &sums, &mut beta), 0, "all samples are finite");
+        let row = rows.next().unwrap();
+        let own = &mut sums[row * len..][..len];
+        sampler.block(PROGRESSIVE, 1, stream, own);
+        let estimate = equations.estimate(own, &beta[row * width..][..width]);
+        if row == BATCH - 1 {
+            assert_eq!(equations.solve(PROGRESSIVE.system(), &sums, &mut beta), 0, "all samples are finite");
+        }
         estimate.map(f64::from)
     })
 }
@@ -87,9 +96,16 @@ fn predicted_variances(sampler: &Sampler, passes: u32, runs: usize) -> [Welford;
     })
 }
 
-/// Runs of a test, fewer where samples are many or it is no integral of the first rank.
-fn runs_of(mixture: Mixture) -> usize {
-    if mixture == Mixture::Table { 1_000_000 } else { 30_000 }
+/// Runs of a test of the mean: a million of 3 samples of [`Mixture::Table`], and as many samples in all where a run has more of
+/// them, which leaves about the same standard error; a tenth of it for other integrals.
+fn runs_of(sampler: &Sampler) -> usize {
+    let samples = if sampler.mixture == Mixture::Table { 3_000_000 } else { 300_000 };
+    samples / sampler.n as usize
+}
+
+/// Runs of a test of the variance. Means of many samples are nearly normal, and their variance is known from fewer of them.
+fn runs_of_a_variance(sampler: &Sampler) -> usize {
+    if sampler.n <= 8 { 12_000 } else { 4_000 }
 }
 
 fn each_sampler(mixtures: &[Mixture], numbers: &[u32], mut test: impl FnMut(&Sampler, &str, [f64; 3])) {
@@ -107,7 +123,7 @@ fn each_sampler(mixtures: &[Mixture], numbers: &[u32], mut test: impl FnMut(&Sam
 #[test]
 fn the_progressive_form_is_unbiased() {
     each_sampler(&PROPER, &NUMBERS, |sampler, name, value| {
-        assert_means(name, &chain(sampler, runs_of(sampler.mixture), 0), value);
+        assert_means(name, &chain(sampler, runs_of(sampler), 0), value);
     });
 }
 
@@ -125,12 +141,19 @@ fn estimates_without_lights_with_too_many_components_and_of_nothing_are_finite_a
 
 /// Estimates of a form with the coefficients of the same samples, as it makes them.
 fn form_runs(form: Form, sampler: &Sampler, runs: usize) -> [Welford; 3] {
-    let (equations, rows) = (sampler.equations, form.rows());
-    let (mut sums, mut beta) = (vec![0.0; rows * equations.len()], vec![0.0; rows * equations.coefficients()]);
+    let equations = sampler.equations;
+    let (len, width) = (form.rows() * equations.len(), form.rows() * equations.coefficients());
+    let (mut sums, mut beta) = (vec![0.0; BATCH * len], vec![0.0; BATCH * width]);
+    let mut left = 0;
     run(runs, [23, form as u32, sampler.mixture as u32], |stream| {
-        sums.chunks_exact_mut(equations.len()).for_each(|row| sampler.block(form, 1, stream, row));
-        equations.solve(form.system(), &sums, &mut beta);
-        form.estimate(equations, &sums, &beta, &sampler.integrals).map(f64::from)
+        if left == 0 {
+            sums.chunks_exact_mut(equations.len()).for_each(|row| sampler.block(form, 1, stream, row));
+            equations.solve(form.system(), &sums, &mut beta);
+            left = BATCH;
+        }
+        left -= 1;
+        form.estimate(equations, &sums[left * len..][..len], &beta[left * width..][..width], &sampler.integrals)
+            .map(f64::from)
     })
 }
 
@@ -138,7 +161,7 @@ fn form_runs(form: Form, sampler: &Sampler, runs: usize) -> [Welford; 3] {
 fn the_crossfit_form_is_unbiased() {
     // Halves of N = 8, 16, 64.
     each_sampler(&PROPER, &[4, 8, 32], |sampler, name, value| {
-        assert_means(name, &form_runs(Form::Crossfit, sampler, runs_of(sampler.mixture)), value);
+        assert_means(name, &form_runs(Form::Crossfit, sampler, runs_of(sampler) / 2), value);
     });
 }
 
@@ -161,8 +184,9 @@ fn coefficients_of_the_same_samples_are_biased_in_both_other_forms() {
 #[test]
 fn four_passes_of_independent_samples_have_at_most_the_variance_of_mis() {
     for (mixture, n) in PROPER.into_iter().flat_map(|mixture| NUMBERS.map(|n| (mixture, n))) {
-        let runs = if mixture == Mixture::Optimal { 60_000 } else { 12_000 };
-        let [mis, ocv] = variances(&Sampler::new(mixture, n, false), 4, runs);
+        let sampler = Sampler::new(mixture, n, false);
+        let runs = runs_of_a_variance(&sampler) * if mixture == Mixture::Optimal { 5 } else { 1 };
+        let [mis, ocv] = variances(&sampler, 4, runs);
         for i in 0..3 {
             assert!(ocv[i] <= 1.02 * mis[i], "{mixture:?}, N = {n}, channel {i}: {} of MIS", ocv[i] / mis[i]);
         }
@@ -178,10 +202,10 @@ fn four_passes_have_the_variance_of_their_blocks_and_coefficients() {
     // law of the estimate, with the variance within strata by quadrature.
     const PASSES: u32 = 4;
     each_sampler(&PROPER, &NUMBERS, |sampler, name, value| {
-        let predicted = predicted_variances(sampler, PASSES, 3_000);
+        let predicted = predicted_variances(sampler, PASSES, runs_of_a_variance(sampler) / 4);
         let mut squares = [Welford::new(); 3];
         let mut stream = HashStream::new([33, sampler.n, sampler.mixture as u32]);
-        for _ in 0..12_000 {
+        for _ in 0..runs_of_a_variance(sampler) {
             let [_, estimate] = passes(sampler, PASSES, &mut stream);
             (0..3).for_each(|i| squares[i].add((estimate[i] - value[i]).powi(2)));
         }
@@ -247,7 +271,7 @@ fn progressive_optimal_mis_is_unbiased() {
         let equations = sampler.equations;
         let mut sums = vec![0.0; equations.len()];
         let mut alpha = vec![0.0; equations.coefficients()];
-        let channels = run(100_000, [27, 0, sampler.mixture as u32], |stream| {
+        let channels = run(runs_of(sampler), [27, 0, sampler.mixture as u32], |stream| {
             sums.fill(0.0);
             sampler.add(1, stream, &mut sums);
             let estimate = optimal_mis::estimate(equations, &sums, &sampler.integrals, &alpha);

@@ -1,12 +1,12 @@
 //! The optimal numbers of proposals and samples.
 
-use super::integrals::{ALL, Integral, Proposals, fill, run};
 use super::level;
 use lumiris_numbers::estimators::ris::choice::{
     Costs, Moments, MomentsEstimate, Variances, clamp_ratio, counts, counts_of_sets, length, optimal_ratio,
 };
 use lumiris_numbers::estimators::ris::{strata, stratified, with_replacement};
 use lumiris_numbers::estimators::stats::{Welford, z_test};
+use lumiris_test_support::integrals::{ALL, Integral, Proposals, fill, run};
 
 const COSTS: Costs = Costs { t1: 1.0, t2: 40.0 };
 const TIME: f64 = 400.0;

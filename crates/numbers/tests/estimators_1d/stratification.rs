@@ -1,12 +1,12 @@
 //! Strata against none, and the ways to choose strata of equal weights.
 
-use super::integrals::{ALL, Integral, Proposals, fill, run};
 use lumiris_numbers::estimators::ris::choice::length;
 use lumiris_numbers::estimators::ris::{strata, stratified, with_replacement};
 use lumiris_numbers::estimators::stats::Welford;
 use lumiris_numbers::math::hash::HashStream;
+use lumiris_test_support::integrals::{ALL, Integral, Proposals, fill, run};
 
-const RUNS: usize = 300_000;
+const RUNS: usize = 100_000;
 const M: usize = 24;
 const N: usize = 6;
 

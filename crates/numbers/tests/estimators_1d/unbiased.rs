@@ -1,11 +1,11 @@
 //! Means and variances of the ways of drawing.
 
 use super::baselines::{defensive_choice, defensive_pdf};
-use super::integrals::{ALL, Integral, Proposals, fill, run};
 use super::{assert_means, assert_variances};
 use lumiris_numbers::estimators::mc;
 use lumiris_numbers::estimators::ris::{strata, stratified, systematic, with_replacement};
 use lumiris_numbers::math::hash::HashStream;
+use lumiris_test_support::integrals::{ALL, Integral, Proposals, fill, run};
 
 const RUNS: usize = 1_000_000;
 const M: usize = 12;

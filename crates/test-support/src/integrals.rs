@@ -1,4 +1,4 @@
-//! Integrals of colours with steps of visibility, and runs of estimators on them.
+//! Integrals of colours with steps of visibility, with values and variances by quadrature, and runs of estimators on them.
 
 use lumiris_numbers::estimators::ris::Draw;
 use lumiris_numbers::estimators::ris::choice::Moments;
@@ -8,64 +8,66 @@ use lumiris_numbers::math::luminance;
 
 /// An integral over a line or a square of f = colour · visibility; the target q̂ is the luminance of the colour.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub(crate) enum Integral {
+pub enum Integral {
     /// x in 0..1 with p = ½ + x; visible in 0.15..0.4 and 0.55..0.95.
     Line,
     /// (x, y) in the unit square with p = 1; visible inside a circle of radius 0.9 about the origin.
     Square,
 }
 
-pub(crate) const ALL: [Integral; 2] = [Integral::Line, Integral::Square];
+/// All integrals.
+pub const ALL: [Integral; 2] = [Integral::Line, Integral::Square];
 
 /// Numbers of points of the quadratures, per axis.
 const LINE_POINTS: usize = 400_000;
 const SQUARE_POINTS: usize = 1_500;
 
 impl Integral {
-    pub(crate) fn sample(self, u: [f64; 2]) -> [f64; 2] {
+    /// A point of density p from two uniform numbers; the second coordinate of a line is 0.
+    pub fn sample(self, u: [f64; 2]) -> [f64; 2] {
         match self {
             Integral::Line => [(0.25 + 2.0 * u[0]).sqrt() - 0.5, 0.0],
             Integral::Square => u,
         }
     }
 
-    pub(crate) fn pdf(self, x: [f64; 2]) -> f64 {
+    /// Density p at a point.
+    pub fn pdf(self, x: [f64; 2]) -> f64 {
         match self {
             Integral::Line => 0.5 + x[0],
             Integral::Square => 1.0,
         }
     }
 
-    pub(crate) fn colour(self, [x, y]: [f64; 2]) -> [f64; 3] {
+    /// The colour, by channel.
+    pub fn colour(self, [x, y]: [f64; 2]) -> [f64; 3] {
         match self {
             Integral::Line => [0.1 + 8.0 * x * (1.0 - x), 0.3 + 6.0 * x * x, 2.2 - 2.0 * x],
             Integral::Square => [0.2 + 3.0 * x * y, 0.1 + 4.0 * (x - 0.3) * (x - 0.3), 0.2 + 2.0 * y * y * y * y],
         }
     }
 
-    pub(crate) fn visibility(self, [x, y]: [f64; 2]) -> f64 {
+    /// 1 where the point is visible, else 0.
+    pub fn visibility(self, [x, y]: [f64; 2]) -> f64 {
         match self {
             Integral::Line => f64::from(u8::from((0.15..0.4).contains(&x) || (0.55..0.95).contains(&x))),
             Integral::Square => f64::from(u8::from(x * x + y * y < 0.81)),
         }
     }
 
-    pub(crate) fn f(self, x: [f64; 2]) -> [f64; 3] {
+    /// The integrand: colour times visibility, by channel.
+    pub fn f(self, x: [f64; 2]) -> [f64; 3] {
         let v = self.visibility(x);
         self.colour(x).map(|c| c * v)
     }
 
-    pub(crate) fn target(self, x: [f64; 2]) -> f64 {
+    /// The target q̂, luminance of the colour.
+    pub fn target(self, x: [f64; 2]) -> f64 {
         luminance(self.colour(x))
     }
 
     /// Mean over uniform numbers `begin..end` of the first axis of `g(x)`, by the midpoint rule.
-    pub(crate) fn mean_between<const K: usize>(
-        self,
-        begin: f64,
-        end: f64,
-        g: impl Fn([f64; 2]) -> [f64; K],
-    ) -> [f64; K] {
+    pub fn mean_between<const K: usize>(self, begin: f64, end: f64, g: impl Fn([f64; 2]) -> [f64; K]) -> [f64; K] {
         let [nx, ny] = match self {
             Integral::Line => [LINE_POINTS, 1],
             Integral::Square => [SQUARE_POINTS, SQUARE_POINTS],
@@ -82,7 +84,7 @@ impl Integral {
     }
 
     /// ∫f and [`Moments`] of proposals that are confined to uniform numbers `begin..end` (p is the density there).
-    pub(crate) fn moments_between(self, begin: f64, end: f64) -> ([f64; 3], Moments) {
+    pub fn moments_between(self, begin: f64, end: f64) -> ([f64; 3], Moments) {
         let width = end - begin;
         let m = self.mean_between(begin, end, |x| {
             let (f, p, q_hat) = (self.f(x), self.pdf(x) / width, self.target(x));
@@ -99,22 +101,27 @@ impl Integral {
     }
 
     /// ∫f and the moments of proposals over the whole domain.
-    pub(crate) fn moments(self) -> ([f64; 3], Moments) {
+    pub fn moments(self) -> ([f64; 3], Moments) {
         self.moments_between(0.0, 1.0)
     }
 }
 
 /// M proposals of one run.
 #[derive(Default)]
-pub(crate) struct Proposals {
+pub struct Proposals {
+    /// f·r by channel.
     pub contributions: Vec<[f32; 3]>,
+    /// q̂·r.
     pub weights: Vec<f32>,
+    /// Colour times r, by channel.
     pub unshadowed: Vec<[f32; 3]>,
+    /// Visibility, 0 or 1.
     pub visibilities: Vec<f32>,
 }
 
 impl Proposals {
-    pub(crate) fn clear(&mut self) {
+    /// Removes all proposals.
+    pub fn clear(&mut self) {
         self.contributions.clear();
         self.weights.clear();
         self.unshadowed.clear();
@@ -122,7 +129,7 @@ impl Proposals {
     }
 
     /// Adds the proposal x with factor r.
-    pub(crate) fn push(&mut self, integral: Integral, x: [f64; 2], r: f64) {
+    pub fn push(&mut self, integral: Integral, x: [f64; 2], r: f64) {
         self.contributions.push(integral.f(x).map(|f| (f * r) as f32));
         self.weights.push((integral.target(x) * r) as f32);
         self.unshadowed.push(integral.colour(x).map(|c| (c * r) as f32));
@@ -130,7 +137,7 @@ impl Proposals {
     }
 
     /// M independent proposals of density p with r = 1/(M p).
-    pub(crate) fn independent(&mut self, integral: Integral, m: usize, stream: &mut HashStream) {
+    pub fn independent(&mut self, integral: Integral, m: usize, stream: &mut HashStream) {
         self.clear();
         for _ in 0..m {
             let x = integral.sample(stream.next_2d().map(f64::from));
@@ -139,7 +146,7 @@ impl Proposals {
     }
 
     /// As [`Proposals::independent`], but in M equal strata of the first axis, in order.
-    pub(crate) fn jittered(&mut self, integral: Integral, m: usize, stream: &mut HashStream) {
+    pub fn jittered(&mut self, integral: Integral, m: usize, stream: &mut HashStream) {
         self.clear();
         for k in 0..m {
             let [u, v] = stream.next_2d().map(f64::from);
@@ -149,7 +156,7 @@ impl Proposals {
     }
 
     /// Σ scale·c.
-    pub(crate) fn estimate(&self, draws: &[Draw]) -> [f64; 3] {
+    pub fn estimate(&self, draws: &[Draw]) -> [f64; 3] {
         let mut sum = [0.0; 3];
         for d in draws {
             let c = self.contributions[d.index as usize];
@@ -160,7 +167,7 @@ impl Proposals {
 }
 
 /// Moments of `runs` estimates per channel.
-pub(crate) fn run(runs: usize, key: [u32; 3], mut estimate: impl FnMut(&mut HashStream) -> [f64; 3]) -> [Welford; 3] {
+pub fn run(runs: usize, key: [u32; 3], mut estimate: impl FnMut(&mut HashStream) -> [f64; 3]) -> [Welford; 3] {
     let mut stream = HashStream::new(key);
     let mut channels = [Welford::new(); 3];
     for _ in 0..runs {
@@ -170,7 +177,7 @@ pub(crate) fn run(runs: usize, key: [u32; 3], mut estimate: impl FnMut(&mut Hash
     channels
 }
 
-/// `n` uniform numbers.
-pub(crate) fn fill(u: &mut [f32], stream: &mut HashStream) {
+/// Uniform numbers in all places of `u`.
+pub fn fill(u: &mut [f32], stream: &mut HashStream) {
     u.iter_mut().for_each(|u| *u = stream.next_f32());
 }
