@@ -38,7 +38,6 @@ const NUMBERS: &[(&str, &[&str])] = &[("math", &[]), ("estimators", &["math"]), 
 /// Folders whose circles are left until their rebuilding.
 const CIRCLES_LEFT: &[&str] = &[
     "lumiris::direct",
-    "lumiris::lights",
     "lumiris::photons",
     "lumiris_lab::reproduce",
     "lumiris_lab::reproduce::fan",
