@@ -5,7 +5,7 @@
 //! it; the groups merely divide that choice in two, first a group and then a light of it, so that the number of samples
 //! per group can be fixed.
 
-use super::{LightChoice, LightCtx, LightId, LightSampler, LightSet, LightTree};
+use super::{Light, LightChoice, LightCtx, LightId, LightSampler, LightTree};
 use lumiris_numbers::math::{AliasTable, ONE_MINUS_EPSILON};
 
 /// Maximum number of groups.
@@ -45,10 +45,10 @@ struct FixedGroup {
 }
 
 impl LightGroups {
-    /// Groups the lights of a set into at most `most` (1 to [`MAX_GROUPS`]) groups.
-    pub fn new(set: &LightSet, sampler: &LightSampler, most: usize) -> Self {
+    /// Divides `lights`, which `sampler` chooses from, into at most `most` (1 to [`MAX_GROUPS`]) groups.
+    pub fn new(lights: &[Light], sampler: &LightSampler, most: usize) -> Self {
         let most = most.clamp(1, MAX_GROUPS);
-        let bounds: Vec<_> = set.lights.iter().map(super::Light::bounds).collect();
+        let bounds: Vec<_> = lights.iter().map(Light::bounds).collect();
         let own_tree;
         let tree = match sampler.tree() {
             Some(choice) => &choice.tree,
@@ -58,8 +58,8 @@ impl LightGroups {
             }
         };
         let ctx = LightCtx::at(lumiris_numbers::math::Vec3::ZERO);
-        let is_infinite = |i: usize| set.lights[i].is_infinite() && sampler.pmf(&ctx, i as LightId) > 0.0;
-        let infinite: Vec<LightId> = (0..set.lights.len()).filter(|&i| is_infinite(i)).map(|i| i as LightId).collect();
+        let is_infinite = |i: usize| lights[i].is_infinite() && sampler.pmf(&ctx, i as LightId) > 0.0;
+        let infinite: Vec<LightId> = (0..lights.len()).filter(|&i| is_infinite(i)).map(|i| i as LightId).collect();
         let has_infinite = !infinite.is_empty();
         let cut = tree.cut(most - usize::from(has_infinite && most > 1));
 
@@ -71,7 +71,7 @@ impl LightGroups {
             tree.visit_lights(place, &mut |light| lights.push(light));
             groups.push(lights);
         }
-        let mut group_of = vec![NO_GROUP; set.lights.len()];
+        let mut group_of = vec![NO_GROUP; lights.len()];
         for (g, lights) in groups.iter().enumerate() {
             lights.iter().for_each(|&l| group_of[l as usize] = g as u8);
         }
@@ -182,7 +182,7 @@ impl LightGroups {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::lights::{Light, LightHints, LightSamplerKind, LightSampling, LightSetBuilder};
+    use crate::lights::{LightHints, LightSamplerKind, LightSampling, LightSetBuilder};
     use lumiris_numbers::math::hash::HashStream;
     use lumiris_numbers::math::{Bounds3, Rgb, Vec3};
     use lumiris_test_support::assert_chi_squared;
@@ -216,7 +216,7 @@ mod tests {
             for (points, infinite) in [(4, 0), (4, 1), (30, 2), (100, 1), (0, 2), (1, 0)] {
                 for most in [1, 2, 5, 8] {
                     let set = set(kind, points, infinite);
-                    let groups = LightGroups::new(&set, &set.sampler, most);
+                    let groups = LightGroups::new(&set.lights, &set.sampler, most);
                     let ctx = LightCtx { p: Vec3::new(0.4, 0.3, 0.0), n: Vec3::Z, ns: Vec3::Z };
                     let pmfs = groups.pmfs(&set.sampler, &ctx);
                     assert!((pmfs.iter().sum::<f32>() - 1.0).abs() < 1e-5, "{kind:?} {pmfs:?}");
@@ -251,7 +251,7 @@ mod tests {
     fn few_lights_have_a_group_each_and_dark_ones_none() {
         for kind in KINDS {
             let set = set(kind, 5, 1);
-            let groups = LightGroups::new(&set, &set.sampler, 7);
+            let groups = LightGroups::new(&set.lights, &set.sampler, 7);
             assert_eq!(groups.len(), 5, "{kind:?}");
             let mut seen: Vec<_> = (0..6).map(|l| groups.group_of(l)).collect();
             assert_eq!(seen.remove(3), None);
@@ -259,6 +259,6 @@ mod tests {
             assert_eq!(seen, (0..5).map(Some).collect::<Vec<_>>());
         }
         let empty = set(LightSamplerKind::Tree, 0, 0);
-        assert!(LightGroups::new(&empty, &empty.sampler, 4).is_empty());
+        assert!(LightGroups::new(&empty.lights, &empty.sampler, 4).is_empty());
     }
 }

@@ -11,10 +11,9 @@
 //!
 //! [`LightTree`]: super::LightTree
 
-use super::groups::MAX_GROUPS;
+use super::choice::UNIT;
 use super::hints::Around;
-use super::select::{TreeChoice, UNIT};
-use super::{Light, LightChoice, LightCtx, LightHints, LightId, LightRun};
+use super::{Light, LightChoice, LightCtx, LightHints, LightId, LightRun, TreeChoice};
 use lumiris_numbers::math::{ONE_MINUS_EPSILON, cumulative};
 use std::f32::consts::PI;
 use std::sync::Arc;
@@ -172,12 +171,7 @@ impl HintedChoice {
     }
 
     /// Mixes the probabilities of the contributing lights into those of the groups by the base.
-    pub(super) fn group_pmfs(
-        &self,
-        ctx: &LightCtx,
-        group_of: impl Fn(LightId) -> Option<usize>,
-        pmfs: &mut [f32; MAX_GROUPS],
-    ) {
+    pub(super) fn group_pmfs(&self, ctx: &LightCtx, group_of: impl Fn(LightId) -> Option<usize>, pmfs: &mut [f32]) {
         let Some(known) = self.known(ctx) else { return };
         pmfs.iter_mut().for_each(|p| *p *= BASE_SHARE);
         for (i, &(light, _)) in known.around.lights.iter().enumerate() {

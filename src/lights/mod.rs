@@ -1,10 +1,11 @@
 //! Lights: their emission, the sampling of directions towards them, and the choice of one of many.
 //!
-//! Reading order: [`point`], [`spot`], [`area`], [`environment`], [`emit`], [`lanes`], [`bounds`], [`tree`], [`hints`],
-//! [`select`], [`hinted`], [`set`], [`groups`], [`sampling`], [`irradiance`].
+//! Reading order: [`point`], [`spot`], [`area`], [`environment`], [`emit`], [`lanes`], [`bounds`], [`choice`],
+//! [`tree`], [`tree_choice`], [`hints`], [`hinted`], [`select`], [`set`], [`groups`], [`sampling`], [`irradiance`].
 
 pub mod area;
 pub mod bounds;
+pub mod choice;
 pub mod emit;
 pub mod environment;
 pub mod groups;
@@ -18,6 +19,7 @@ pub mod select;
 pub mod set;
 pub mod spot;
 pub mod tree;
+pub mod tree_choice;
 
 #[cfg(test)]
 mod emit_tests;
@@ -26,6 +28,7 @@ mod light_tests;
 
 pub use area::{AreaLight, AreaShape, Emission, EmissionImage, area_lights_of};
 pub use bounds::LightBounds;
+pub use choice::{LightChoice, LightRun};
 pub use emit::EmissionSample;
 pub use environment::{EnvironmentFilter, EnvironmentMap, EnvironmentMapping};
 pub use groups::LightGroups;
@@ -34,9 +37,10 @@ pub use hints::LightHints;
 pub use irradiance::Irradiances;
 pub use lanes::LightLanes;
 pub use sampling::LightSampling;
-pub use select::{LightChoice, LightRun, LightSampler, LightSamplerKind};
+pub use select::{LightSampler, LightSamplerKind};
 pub use set::{LightSet, LightSetBuilder};
 pub use tree::LightTree;
+pub use tree_choice::TreeChoice;
 
 use lumiris_numbers::math::{Affine3A, Bounds3, Mat3, Rgb, Vec2, Vec3};
 use std::f32::consts::PI;

@@ -33,7 +33,7 @@ impl LightSampling {
     /// Chooses in the way `kind`, with at most `most` groups.
     pub fn new(set: Arc<LightSet>, kind: LightSamplerKind, most: usize) -> Self {
         let sampler = LightSampler::new(kind, &set.lights, set.scene_radius);
-        let (delta, groups) = (set.delta_sampler(kind), LightGroups::new(&set, &sampler, most));
+        let (delta, groups) = (set.delta_sampler(kind), LightGroups::new(&set.lights, &sampler, most));
         LightSampling { set, sampler, delta, groups, hints: None }
     }
 
@@ -47,7 +47,7 @@ impl LightSampling {
 
     /// Divides the lights into at most `most` groups.
     pub fn set_groups(&mut self, most: usize) {
-        self.groups = LightGroups::new(&self.set, &self.sampler, most);
+        self.groups = LightGroups::new(&self.set.lights, &self.sampler, most);
     }
 
     /// Sets the visibility cache, which is used wherever settings ask for it. Estimates remain unbiased whatever it

@@ -4,13 +4,14 @@
 //! |---|---|
 //! | uniform | the same for all lights |
 //! | power | 95 % proportional to power, 5 % uniform, so that no light starves |
-//! | tree | equal for every infinite light and for the [`LightTree`] over all others |
+//! | tree | equal for every infinite light and for the [`LightTree`](super::LightTree) over all others |
 //! | photons | nearly always one of the lights that the visibility cache finds, if any; see [`super::hinted`] |
 //!
 //! Lights without power are never chosen.
 
-use super::{HintedChoice, Light, LightCtx, LightHints, LightId, LightTree};
-use lumiris_numbers::math::{AliasTable, ONE_MINUS_EPSILON, cumulative};
+use super::choice::UNIT;
+use super::{HintedChoice, Light, LightChoice, LightCtx, LightHints, LightId, LightRun, TreeChoice};
+use lumiris_numbers::math::{AliasTable, cumulative};
 use std::sync::Arc;
 use strum::{EnumIter, EnumString, IntoStaticStr, VariantNames};
 
@@ -30,43 +31,6 @@ pub enum LightSamplerKind {
     /// By the same bound, over the lights that the visibility cache finds.
     Photons,
 }
-
-/// A chosen light.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub struct LightChoice {
-    /// The light.
-    pub light: LightId,
-    /// Probability of the choice.
-    pub pmf: f32,
-    /// The random number, remapped to be uniform in [0, 1) again.
-    pub u: f32,
-}
-
-/// Consecutive positions, of a sorted list in [0, 1), that choose the same light.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub struct LightRun {
-    /// The light.
-    pub light: LightId,
-    /// Probability of the choice.
-    pub pmf: f32,
-    /// Places in the list, end exclusive.
-    pub places: [u32; 2],
-    /// The part of [0, 1) that chooses the light.
-    pub interval: [f64; 2],
-}
-
-impl LightRun {
-    /// A position of the run, made uniform in [0, 1) again. Both are in units of 2⁻³².
-    #[inline]
-    pub fn within(&self, position: u32) -> u32 {
-        let [start, end] = self.interval;
-        // Casts saturate.
-        ((f64::from(position) * UNIT - start) / (end - start) / UNIT) as u32
-    }
-}
-
-/// 2⁻³².
-pub(super) const UNIT: f64 = 1.0 / 4_294_967_296.0;
 
 /// A fixed distribution over lights: for single choices, and in order.
 #[derive(Clone, Debug)]
@@ -100,93 +64,6 @@ impl FixedChoice {
             let (pmf, places) = (self.table.pmf(light), [first as u32, (first + count) as u32]);
             out.push(LightRun { light: light as LightId, pmf, places, interval: [start, end] });
             first += count;
-        }
-    }
-}
-
-/// A light tree, with the infinite lights beside it.
-#[derive(Clone, Debug)]
-pub struct TreeChoice {
-    /// Lights with a place.
-    pub tree: LightTree,
-    /// Infinite lights, ascending.
-    pub infinite: Vec<LightId>,
-}
-
-impl TreeChoice {
-    fn new(lights: &[Light], powers: &[f32]) -> Self {
-        let bounds: Vec<_> = lights.iter().map(Light::bounds).collect();
-        let is_chosen = |&i: &usize| lights[i].is_infinite() && powers[i] > 0.0;
-        let infinite = (0..lights.len()).filter(is_chosen).map(|i| i as LightId).collect();
-        TreeChoice { tree: LightTree::new(&bounds), infinite }
-    }
-
-    /// Probability of the infinite lights together: each has that of the whole tree. 1 where nothing in the tree can
-    /// contribute.
-    #[inline]
-    pub(super) fn infinite_probability(&self, ctx: &LightCtx) -> f32 {
-        let count = self.infinite.len();
-        if count == 0 {
-            return 0.0;
-        }
-        if self.tree.importance(ctx) > 0.0 { count as f32 / (count + 1) as f32 } else { 1.0 }
-    }
-
-    #[inline]
-    pub(super) fn sample(&self, ctx: &LightCtx, u: f32) -> Option<LightChoice> {
-        let TreeChoice { tree, infinite } = self;
-        let p_infinite = self.infinite_probability(ctx);
-        if u < p_infinite {
-            let x = u / p_infinite * infinite.len() as f32;
-            let i = (x as usize).min(infinite.len() - 1);
-            let u = (x - i as f32).clamp(0.0, ONE_MINUS_EPSILON);
-            return Some(LightChoice { light: infinite[i], pmf: p_infinite / infinite.len() as f32, u });
-        }
-        let u = ((u - p_infinite) / (1.0 - p_infinite)).min(ONE_MINUS_EPSILON);
-        let (light, pmf, u) = tree.sample(ctx, u)?;
-        Some(LightChoice { light, pmf: pmf * (1.0 - p_infinite), u })
-    }
-
-    /// Adds runs for the positions from `first` on, which lie in [`start`, 1); `share` = 1 − `start` is a factor of all
-    /// probabilities.
-    pub(super) fn runs(
-        &self,
-        ctx: &LightCtx,
-        positions: &[u32],
-        first: usize,
-        (start, share): (f64, f32),
-        out: &mut Vec<LightRun>,
-    ) {
-        let TreeChoice { tree, infinite } = self;
-        let p_infinite = self.infinite_probability(ctx);
-        let each = f64::from(p_infinite * share) / infinite.len() as f64;
-        let mut first = first;
-        for (i, &light) in infinite.iter().enumerate().filter(|_| p_infinite > 0.0) {
-            let interval = [start + each * i as f64, start + each * (i + 1) as f64];
-            let is_in = |&p: &u32| f64::from(p) * UNIT < interval[1] || p_infinite == 1.0 && i + 1 == infinite.len();
-            let count = positions[first..].partition_point(is_in);
-            if count > 0 {
-                let pmf = p_infinite * share / infinite.len() as f32;
-                out.push(LightRun { light, pmf, places: [first as u32, (first + count) as u32], interval });
-            }
-            first += count;
-        }
-        let places = [first as u32, positions.len() as u32];
-        if !tree.is_empty() && p_infinite < 1.0 {
-            let start = start + f64::from(p_infinite * share);
-            tree.runs(ctx, positions, places, (start, (1.0 - p_infinite) * share), out);
-        }
-    }
-
-    #[inline]
-    pub(super) fn pmf(&self, ctx: &LightCtx, light: LightId) -> f32 {
-        let p_infinite = self.infinite_probability(ctx);
-        if self.tree.contains(light) {
-            self.tree.pmf(ctx, light) * (1.0 - p_infinite)
-        } else if self.infinite.binary_search(&light).is_ok() {
-            p_infinite / self.infinite.len() as f32
-        } else {
-            0.0
         }
     }
 }

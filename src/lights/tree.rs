@@ -6,8 +6,7 @@
 //! to p, θi′ the minimum angle between the surface normal and a direction to the node. Both sides of the maximum are
 //! squared lengths, so the result does not depend on the unit of length.
 
-use super::select::LightRun;
-use super::{LightBounds, LightCtx, LightId};
+use super::{LightBounds, LightCtx, LightId, LightRun};
 use lumiris_numbers::math::{Bounds3, ONE_MINUS_EPSILON, Vec3, safe_sqrt, sqr};
 
 /// Slack of the cosines, for rounding: a light that can contribute never has importance 0.

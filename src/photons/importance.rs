@@ -11,7 +11,7 @@
 use super::error::PhotonError;
 use super::map::{GatherScratch, PhotonMap, Place, Search};
 use super::photon::{Origin, Photon};
-use super::trace::{BATCH, domain, trajectory_stream};
+use super::trajectory::{BATCH, domain, trajectory_stream};
 use super::walk::{Particle, WalkSettings, Walker};
 use crate::bsdfs::dielectric::Transport;
 use crate::scene::RenderJob;

@@ -9,7 +9,8 @@
 //! got there ([`Origin`]): straight from a light, scattered by a Lambertian lobe, or by any other one, which makes them
 //! caustic photons, whether the light before that was direct or not.
 //!
-//! Reading order: [`photon`], `tree`, [`map`]; [`shares`], `walk`, [`rules`], [`trace`]; [`importance`], [`error`].
+//! Reading order: [`photon`], `tree`, [`map`]; [`shares`], `trajectory`, `walk`; [`importance`], [`rules`],
+//! [`trace`]; [`error`].
 
 pub mod error;
 pub mod importance;
@@ -20,6 +21,7 @@ pub mod photon;
 pub mod rules;
 pub mod shares;
 pub mod trace;
+mod trajectory;
 mod tree;
 mod walk;
 

@@ -1,10 +1,8 @@
 //! Photon tracing: random walks from the lights in batches, put together in the order of trajectories.
 //!
-//! Trajectory t is a point of a scrambled Sobol' sequence over path space [Keller 1998, ch. 3; Burley 2020], whose
-//! numbers choose the light, where and which way the photon leaves it, and every scattering. The sequence has 2¹⁶
-//! points, so trajectories come in blocks of as many, which are scrambled independently. What is stored depends on the
-//! scene, the settings and the number of trajectories only, which is fixed before they are traced, see
-//! [`trajectories_for`].
+//! The numbers of a trajectory choose the light, where and which way the photon leaves it, and every scattering. What
+//! is stored depends on the scene, the settings and the number of trajectories only, which is fixed before they are
+//! traced, see [`trajectories_for`].
 //!
 //! Photons that the global map holds (from lights, and scattered by Lambertian surfaces) and those of caustics come
 //! from the same trajectories, see [`super::rules`].
@@ -15,20 +13,18 @@ use super::map::GatherScratch;
 use super::photon::{Origin, Photon};
 use super::rules::{self, CausticRule};
 use super::shares::LightShares;
+use super::trajectory::{BATCH, domain, trajectory_stream};
 use super::walk::{Arrival, Particle, WalkSettings, Walker};
 use crate::bsdfs::dielectric::Transport;
 use crate::scene::RenderJob;
 use lumiris_numbers::math::hash::pcg4d;
 use lumiris_numbers::math::ray::offset_origin;
 use lumiris_numbers::math::{Ray, Vec2};
-use lumiris_numbers::samplers::{SampleStream, SamplerKind};
 use rayon::prelude::*;
 use std::ops::Range;
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::time::{Duration, Instant};
 
-/// Trajectories that are traced together.
-pub(super) const BATCH: u64 = 4096;
 /// Batches between two looks at memory.
 const ROUND: u64 = 32;
 /// Trajectories of the first round of a pilot; later rounds double what is traced.
@@ -39,17 +35,8 @@ const PILOT_SHARE: u64 = 8;
 const PILOT_PHOTONS: [u64; 2] = [1024, 16_384];
 /// Seed of pilots.
 const PILOT_SEED: u32 = 0x70_69_6c_6f;
-/// log₂ of the points of a sequence.
-const SEQUENCE_BITS: u32 = 16;
 /// Bytes that a photon takes in a map, tree included.
 const BYTES: u64 = 31;
-
-/// Domains below the stream of a trajectory.
-pub(super) mod domain {
-    pub(crate) const LIGHT: u32 = 0;
-    pub(crate) const EMISSION: u32 = 1;
-    pub(crate) const TIME: u32 = 2;
-}
 
 /// How photons are traced.
 #[derive(Clone, Copy, Debug)]
@@ -367,41 +354,4 @@ impl<'a> Run<'a> {
 fn pilot_seed(seed: u32) -> u32 {
     let [pilot, ..] = pcg4d([seed, PILOT_SEED, 0, 0]);
     pilot
-}
-
-/// Random numbers of a trajectory.
-pub(super) fn trajectory_stream(seed: u32, trajectory: u64) -> SampleStream {
-    let block = trajectory >> SEQUENCE_BITS;
-    let [block_seed, key, ..] = pcg4d([seed, block as u32, (block >> 32) as u32, 0x7068_6f74]);
-    let index = (trajectory & ((1 << SEQUENCE_BITS) - 1)) as u32;
-    SampleStream::new(SamplerKind::Sobol, [0, 0], index, block_seed).domain(key)
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-
-    #[test]
-    fn trajectories_of_different_blocks_differ() {
-        let draw = |t| trajectory_stream(3, t).domain(domain::EMISSION).draw::<4>();
-        for t in [0, 1, 4464, 65_535] {
-            for block in 1..50 {
-                assert_ne!(draw(t), draw(t + block * 65_536), "{t} {block}");
-            }
-        }
-        assert_ne!(draw(70_000), draw(4464));
-        assert_ne!(draw(7), trajectory_stream(4, 7).domain(domain::EMISSION).draw::<4>());
-    }
-
-    #[test]
-    fn every_block_is_stratified() {
-        for block in 0..4_u64 {
-            let mut counts = [0; 256];
-            for t in 0..1024 {
-                let [u, v, ..] = trajectory_stream(3, block << 16 | t).domain(domain::EMISSION).draw::<4>();
-                counts[(u * 16.0) as usize * 16 + (v * 16.0) as usize] += 1;
-            }
-            assert!(counts.iter().all(|&c| c == 4), "block {block}");
-        }
-    }
 }

@@ -1,6 +1,7 @@
 //! `Film` and `PixelFilter`
 
-use super::options::{Options, Pending, positive, unknown};
+use super::checks::{positive, unknown};
+use super::descriptions::Pending;
 use crate::film::PixelBounds;
 use crate::film::filter::PixelFilter;
 use crate::import::LoadOptions;
@@ -10,117 +11,115 @@ use lumiris_formats::pbrt::directive::Name;
 use lumiris_formats::pbrt::params::{ParamSet, ParamType, Values};
 use lumiris_formats::source::Span;
 
-impl Options {
-    /// The film, and the factor that its sensor's ISO gives.
-    pub(super) fn finish_film(&self, load: &LoadOptions, d: &mut Diagnostics) -> (FilmSettings, f32) {
-        let filter = self.finish_filter(d);
-        let mut film = FilmSettings {
-            resolution: load.resolution.unwrap_or([1280, 720]),
-            bounds: PixelBounds { x0: 0, x1: 0, y0: 0, y1: 0 },
-            filter,
-            file_name: None,
-            scale: 1.0,
+/// Understands `Film` and `PixelFilter`: the film, and the factor that its sensor's ISO gives.
+pub(super) fn finish_film(
+    pending: Option<&Pending>,
+    filter: Option<&Pending>,
+    load: &LoadOptions,
+    d: &mut Diagnostics,
+) -> (FilmSettings, f32) {
+    let filter = finish_filter(filter, d);
+    let mut film = FilmSettings {
+        resolution: load.resolution.unwrap_or([1280, 720]),
+        bounds: PixelBounds { x0: 0, x1: 0, y0: 0, y1: 0 },
+        filter,
+        file_name: None,
+        scale: 1.0,
+    };
+    let mut crop = [0.0, 1.0, 0.0, 1.0];
+    let mut pixel_bounds = None;
+    let mut scale = 1.0;
+    if let Some(Pending { name, params: p }) = pending {
+        film_kind(name, d);
+        let mut size = |key: &'static str, default: u32| match p.integer(key, d) {
+            Some(n @ 1..=65_536) => n as u32,
+            Some(n) => {
+                d.error(p.span_of(key), format!("{key} must be from 1 to 65536, not {n}"));
+                default
+            }
+            None => default,
         };
-        let mut crop = [0.0, 1.0, 0.0, 1.0];
-        let mut pixel_bounds = None;
-        let mut scale = 1.0;
-        if let Some(Pending { name, params: p }) = &self.film {
-            film_kind(name, d);
-            let mut size = |key: &'static str, default: u32| match p.integer(key, d) {
-                Some(n @ 1..=65_536) => n as u32,
-                Some(n) => {
-                    d.error(p.span_of(key), format!("{key} must be from 1 to 65536, not {n}"));
-                    default
+        let from_file = [size("xresolution", 1280), size("yresolution", 720)];
+        film.resolution = load.resolution.unwrap_or(from_file);
+        film.file_name = p.string("filename", d).map(str::to_owned);
+        if let Some(v) = p.floats("cropwindow", d) {
+            match *v {
+                [x0, x1, y0, y1]
+                    if (0.0..=1.0).contains(&x0) && x0 < x1 && x1 <= 1.0 && 0.0 <= y0 && y0 < y1 && y1 <= 1.0 =>
+                {
+                    crop = [x0, x1, y0, y1];
                 }
-                None => default,
-            };
-            let from_file = [size("xresolution", 1280), size("yresolution", 720)];
-            film.resolution = load.resolution.unwrap_or(from_file);
-            film.file_name = p.string("filename", d).map(str::to_owned);
-            if let Some(v) = p.floats("cropwindow", d) {
-                match *v {
-                    [x0, x1, y0, y1]
-                        if (0.0..=1.0).contains(&x0) && x0 < x1 && x1 <= 1.0 && 0.0 <= y0 && y0 < y1 && y1 <= 1.0 =>
-                    {
-                        crop = [x0, x1, y0, y1];
-                    }
-                    _ => {
-                        d.error(
-                            p.span_of("cropwindow"),
-                            "cropwindow takes x0 x1 y0 y1 with 0 <= x0 < x1 <= 1 and 0 <= y0 < y1 <= 1",
-                        );
-                    }
+                _ => {
+                    d.error(
+                        p.span_of("cropwindow"),
+                        "cropwindow takes x0 x1 y0 y1 with 0 <= x0 < x1 <= 1 and 0 <= y0 < y1 <= 1",
+                    );
                 }
             }
-            pixel_bounds = read_pixel_bounds(p, d);
-            scale = sensor(p, d);
-            // The sensor's diagonal matters to realistic cameras; half-floats and splits of the file do not to us.
-            for key in
-                ["diagonal", "savefp16", "maxcomponentvalue", "coordinatesystem", "nbuckets", "lambdamin", "lambdamax"]
-            {
-                if p.ignore(key) && key == "maxcomponentvalue" {
-                    d.warning_once(p.span_of(key), "maxcomponentvalue is ignored: clamping would darken the picture");
-                }
-            }
-            p.report_unused(d);
         }
-        film.bounds = match (load.crop, pixel_bounds) {
-            (Some(crop), _) => crop_bounds(film.resolution, crop),
-            (None, Some(bounds)) if load.resolution.is_none() => clip(bounds, film.resolution),
-            (None, _) => crop_bounds(film.resolution, crop),
-        };
-        if film.bounds.area() == 0 {
-            let span = self.film.as_ref().map_or_else(Span::default, |f| f.name.span);
-            d.error(span, "the crop window holds no pixel");
+        pixel_bounds = read_pixel_bounds(p, d);
+        scale = sensor(p, d);
+        // The sensor's diagonal matters to realistic cameras; half-floats and splits of the file do not to us.
+        for key in
+            ["diagonal", "savefp16", "maxcomponentvalue", "coordinatesystem", "nbuckets", "lambdamin", "lambdamax"]
+        {
+            if p.ignore(key) && key == "maxcomponentvalue" {
+                d.warning_once(p.span_of(key), "maxcomponentvalue is ignored: clamping would darken the picture");
+            }
         }
-        (film, scale)
-    }
-
-    fn finish_filter(&self, d: &mut Diagnostics) -> PixelFilter {
-        let Some(Pending { name, params: p }) = &self.filter else {
-            return PixelFilter::Gaussian { rx: 1.5, ry: 1.5, sigma: 0.5 };
-        };
-        let default_radius = match name.text.as_str() {
-            "box" => 0.5,
-            "gaussian" => 1.5,
-            "sinc" => 4.0,
-            _ => 2.0,
-        };
-        let mut radius = |key: &'static str, v3: &'static str| {
-            let r = p.float(key, d).or_else(|| p.float(v3, d)).unwrap_or(default_radius);
-            if r > 0.0 && r <= 64.0 {
-                r
-            } else {
-                d.error(p.span_of(key), format!("{key} must be above 0 and at most 64"));
-                default_radius
-            }
-        };
-        let (rx, ry) = (radius("xradius", "xwidth"), radius("yradius", "ywidth"));
-        let filter = match name.text.as_str() {
-            "box" => PixelFilter::Box { rx, ry },
-            "triangle" => PixelFilter::Triangle { rx, ry },
-            "gaussian" => {
-                p.ignore("alpha");
-                PixelFilter::Gaussian { rx, ry, sigma: positive(p, "sigma", 0.5, d) }
-            }
-            "mitchell" => {
-                let third = 1.0 / 3.0;
-                PixelFilter::Mitchell {
-                    rx,
-                    ry,
-                    b: p.float("B", d).unwrap_or(third),
-                    c: p.float("C", d).unwrap_or(third),
-                }
-            }
-            "sinc" => PixelFilter::LanczosSinc { rx, ry, tau: positive(p, "tau", 3.0, d) },
-            other => {
-                unknown(other, name.span, "pixel filter", &["box", "triangle", "gaussian", "mitchell", "sinc"], d);
-                PixelFilter::Box { rx: 0.5, ry: 0.5 }
-            }
-        };
         p.report_unused(d);
-        filter
     }
+    film.bounds = match (load.crop, pixel_bounds) {
+        (Some(crop), _) => crop_bounds(film.resolution, crop),
+        (None, Some(bounds)) if load.resolution.is_none() => clip(bounds, film.resolution),
+        (None, _) => crop_bounds(film.resolution, crop),
+    };
+    if film.bounds.area() == 0 {
+        let span = pending.map_or_else(Span::default, |f| f.name.span);
+        d.error(span, "the crop window holds no pixel");
+    }
+    (film, scale)
+}
+
+fn finish_filter(pending: Option<&Pending>, d: &mut Diagnostics) -> PixelFilter {
+    let Some(Pending { name, params: p }) = pending else {
+        return PixelFilter::Gaussian { rx: 1.5, ry: 1.5, sigma: 0.5 };
+    };
+    let default_radius = match name.text.as_str() {
+        "box" => 0.5,
+        "gaussian" => 1.5,
+        "sinc" => 4.0,
+        _ => 2.0,
+    };
+    let mut radius = |key: &'static str, v3: &'static str| {
+        let r = p.float(key, d).or_else(|| p.float(v3, d)).unwrap_or(default_radius);
+        if r > 0.0 && r <= 64.0 {
+            r
+        } else {
+            d.error(p.span_of(key), format!("{key} must be above 0 and at most 64"));
+            default_radius
+        }
+    };
+    let (rx, ry) = (radius("xradius", "xwidth"), radius("yradius", "ywidth"));
+    let filter = match name.text.as_str() {
+        "box" => PixelFilter::Box { rx, ry },
+        "triangle" => PixelFilter::Triangle { rx, ry },
+        "gaussian" => {
+            p.ignore("alpha");
+            PixelFilter::Gaussian { rx, ry, sigma: positive(p, "sigma", 0.5, d) }
+        }
+        "mitchell" => {
+            let third = 1.0 / 3.0;
+            PixelFilter::Mitchell { rx, ry, b: p.float("B", d).unwrap_or(third), c: p.float("C", d).unwrap_or(third) }
+        }
+        "sinc" => PixelFilter::LanczosSinc { rx, ry, tau: positive(p, "tau", 3.0, d) },
+        other => {
+            unknown(other, name.span, "pixel filter", &["box", "triangle", "gaussian", "mitchell", "sinc"], d);
+            PixelFilter::Box { rx: 0.5, ry: 0.5 }
+        }
+    };
+    p.report_unused(d);
+    filter
 }
 
 fn film_kind(name: &Name, d: &mut Diagnostics) {

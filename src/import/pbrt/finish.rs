@@ -1,8 +1,9 @@
 //! The end of an import: all files are read in parallel, and the scene is put together in the order of its text.
 
+use super::descriptions::{AreaLightDesc, ShapeDesc};
 use super::lights::power_factor;
 use super::options::Understood;
-use super::shapes::{Made, ShapeDesc, ShapeError};
+use super::shapes::{Made, ShapeError};
 use super::state::Builder;
 use crate::geometry::{Geometry, GeometryId, GeometrySet, Group, Instance, Shape, Visibility};
 use crate::imaging::oiio::ImageError;
@@ -216,11 +217,7 @@ fn load_emission_images(paths: &[PathBuf]) -> Vec<(PathBuf, Result<EmissionImage
 }
 
 /// The emission of a shape in world space.
-fn emission_of(
-    light: &super::lights::AreaLightDesc,
-    shape: &Shape,
-    images: &HashMap<PathBuf, Arc<EmissionImage>>,
-) -> Emission {
+fn emission_of(light: &AreaLightDesc, shape: &Shape, images: &HashMap<PathBuf, Arc<EmissionImage>>) -> Emission {
     let image = light.image.as_ref().and_then(|(path, _)| images.get(path).cloned());
     let mut emission = Emission { l: light.l, two_sided: light.two_sided, image };
     if light.power > 0.0 {

@@ -1,6 +1,7 @@
 //! `LightSource`, `AreaLightSource`
 
-use super::options::unknown;
+use super::checks::unknown;
+use super::descriptions::{AreaLightDesc, EnvironmentDesc};
 use super::spectrum::SpectrumUse;
 use super::state::Builder;
 use crate::lights::spot::spot_solid_angle;
@@ -8,43 +9,9 @@ use crate::lights::{EnvironmentFilter, EnvironmentMap, EnvironmentMapping, Light
 use lumiris_formats::diagnostic::Diagnostics;
 use lumiris_formats::pbrt::directive::Name;
 use lumiris_formats::pbrt::params::{ParamSet, ParamType};
-use lumiris_formats::source::Span;
 use lumiris_numbers::math::{Affine3A, Rgb, Vec3, warp};
 use std::f32::consts::PI;
-use std::path::PathBuf;
 use std::sync::Arc;
-
-/// An area light as written; shapes that follow emit it.
-#[derive(Clone, Debug)]
-pub struct AreaLightDesc {
-    /// Radiance with the scale.
-    pub l: Rgb,
-    /// Both sides.
-    pub two_sided: bool,
-    /// Image of the radiance.
-    pub image: Option<(PathBuf, Span)>,
-    /// Total power (W) that replaces the scale, if positive.
-    pub power: f32,
-    /// The directive.
-    pub span: Span,
-}
-
-/// An environment map that waits for its image.
-#[derive(Clone, Debug)]
-pub struct EnvironmentDesc {
-    /// Image.
-    pub path: PathBuf,
-    /// Where it is named.
-    pub span: Span,
-    /// Orientation.
-    pub world_from_light: Affine3A,
-    /// Factor of the radiance.
-    pub scale: f32,
-    /// Illuminance that replaces the brightness, if positive.
-    pub illuminance: f32,
-    /// Place among the lights.
-    pub index: usize,
-}
 
 impl Builder<'_> {
     /// `LightSource "kind"`

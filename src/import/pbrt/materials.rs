@@ -1,26 +1,18 @@
 //! `Material`, `MakeNamedMaterial`
 
-use super::options::unknown;
+use super::checks::unknown;
+use super::descriptions::MaterialUse;
 use super::spectrum::{Resolved, SpectrumUse};
 use super::state::Builder;
 use crate::bsdfs::models::LobeAxis;
 use crate::import::resources::{ImageEncoding, ImageRequest};
 use crate::materials::{ConductorSpectrum, EvaluatedMaterial, Material, MaterialEntry, MaterialId, Roughness};
-use crate::textures::{Filter, FloatTexture, ImageId, RgbTexture, RgbTextureId, TextureSet, Wrap};
+use crate::textures::{Filter, FloatTexture, ImageId, RgbTexture, RgbTextureId, Wrap};
 use lumiris_formats::diagnostic::{Diagnostics, did_you_mean};
 use lumiris_formats::pbrt::directive::Name;
 use lumiris_formats::pbrt::params::{Input, ParamSet, ParamType};
 use lumiris_formats::spectra;
 use lumiris_numbers::math::Rgb;
-
-/// The material of a shape: known, or by a name that may be defined later.
-#[derive(Clone, Debug)]
-pub enum MaterialUse {
-    /// Known.
-    Id(MaterialId),
-    /// By name.
-    Named(Name),
-}
 
 /// Kinds of pbrt-v4 that are rendered, and `evaluated`.
 const KINDS: &[&str] = &[
@@ -38,14 +30,6 @@ const KINDS: &[&str] = &[
 
 /// Models of the material `evaluated`.
 const MODELS: &[&str] = &["diffuse", "orennayar", "cooktorrance", "phong", "retroreflective", "ashikhminshirley"];
-
-/// What shapes are made of where no material is given: pbrt's diffuse of reflectance 0.5.
-pub fn default_material(materials: &mut Vec<MaterialEntry>, textures: &mut TextureSet) -> MaterialId {
-    let reflectance = textures.add_rgb(RgbTexture::Constant(Rgb::splat(0.5)));
-    let material = Material::Diffuse { reflectance };
-    materials.push(MaterialEntry { name: "default".to_owned(), material, normal_map: None, displacement: None });
-    (materials.len() - 1) as MaterialId
-}
 
 impl Builder<'_> {
     /// `Material "kind"`

@@ -1,9 +1,13 @@
 //! The pbrt-v4 scene format.
 //!
-//! Reading order: [`state`] (the state machine over `lumiris_formats::pbrt`'s directives) with a file for each kind of directive:
-//! [`transform`], [`options`], [`settings`], [`film`], [`spectrum`], [`textures`], [`materials`], [`lights`], [`shapes`]; and
-//! [`finish`] (files are read, and the scene is put together).
+//! Reading order: [`descriptions`] (what a file asks for), [`state`] (the scene while its file is read), [`checks`];
+//! a file for each kind of directive: [`transform`], [`options`], [`settings`], [`film`], [`spectrum`], [`textures`],
+//! [`materials`], [`lights`], [`shapes`]; [`directives`] (the state machine over `lumiris_formats::pbrt`'s directives);
+//! and [`finish`] (files are read, and the scene is put together).
 
+pub mod checks;
+pub mod descriptions;
+pub mod directives;
 pub mod film;
 pub mod finish;
 pub mod lights;

@@ -1,29 +1,26 @@
 //! What stands before `WorldBegin`: the camera; integrator and sampler are in [`super::settings`], film and filter are in
 //! [`super::film`].
 
+use super::checks::{positive, unknown};
+use super::descriptions::Pending;
+use super::film::finish_film;
 use super::settings::{finish_integrator, finish_sampler};
 use super::transform::{Ctm, affine};
 use crate::cameras::{Camera, SphericalMapping, default_screen_window};
 use crate::import::LoadOptions;
 use crate::scene::FilmSettings;
 use crate::settings::Settings;
-use lumiris_formats::diagnostic::{Diagnostics, did_you_mean};
+use lumiris_formats::diagnostic::Diagnostics;
 use lumiris_formats::pbrt::directive::Name;
 use lumiris_formats::pbrt::params::ParamSet;
 use lumiris_formats::source::Span;
-
-/// A directive that is understood when all of them are known: the camera needs the film's size.
-pub(super) struct Pending {
-    pub name: Name,
-    pub params: ParamSet,
-}
 
 /// The options as far as they were read.
 #[derive(Default)]
 pub struct Options {
     camera: Option<(Pending, Ctm)>,
-    pub(super) film: Option<Pending>,
-    pub(super) filter: Option<Pending>,
+    film: Option<Pending>,
+    filter: Option<Pending>,
     sampler: Option<Pending>,
     integrator: Option<Pending>,
     times: Option<[f32; 2]>,
@@ -110,7 +107,7 @@ impl Options {
 
     /// Understands all options.
     pub fn finish(&self, load: &LoadOptions, d: &mut Diagnostics) -> Option<Understood> {
-        let (film, exposure_scale) = self.finish_film(load, d);
+        let (film, exposure_scale) = finish_film(self.film.as_ref(), self.filter.as_ref(), load, d);
         let mut settings = Settings::default();
         settings.sampling.seed = self.seed.unwrap_or(settings.sampling.seed);
         finish_sampler(self.sampler.as_ref(), &mut settings, d);
@@ -181,18 +178,6 @@ impl Options {
     }
 }
 
-/// A positive number, or the default after an error.
-pub(super) fn positive(p: &ParamSet, key: &'static str, default: f32, d: &mut Diagnostics) -> f32 {
-    match p.float(key, d) {
-        Some(x) if x > 0.0 && x.is_finite() => x,
-        Some(x) => {
-            d.error(p.span_of(key), format!("{key} must be positive, not {x}"));
-            default
-        }
-        None => default,
-    }
-}
-
 fn perspective(
     p: &ParamSet,
     world_from_camera: &lumiris_numbers::math::Affine3A,
@@ -240,15 +225,6 @@ fn screen_window(p: &ParamSet, [w, h]: [u32; 2], d: &mut Diagnostics) -> Option<
         }
     }
     Some(window)
-}
-
-/// An unknown name of something, with what is near.
-pub fn unknown(name: &str, span: Span, what: &str, known: &[&str], d: &mut Diagnostics) {
-    let help = match did_you_mean(name, known.iter().copied()) {
-        Some(near) => format!("did you mean `{near}`?"),
-        None => format!("one of {}", known.join(", ")),
-    };
-    d.error(span, format!("unknown {what} `{name}`")).help(help);
 }
 
 /// `MakeNamedMedium`: its form is checked; media are not rendered yet.

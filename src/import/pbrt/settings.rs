@@ -1,6 +1,7 @@
 //! `Integrator` and `Sampler`: the settings of [`crate::settings::table`], and what pbrt calls otherwise.
 
-use super::options::{Pending, unknown};
+use super::checks::unknown;
+use super::descriptions::Pending;
 use crate::settings::table::{Directive, rows};
 use crate::settings::value::{Integers, Interval, Kind, Value};
 use crate::settings::{IntegratorKind, Setting, Settings, Shrinking};

@@ -1,10 +1,9 @@
 //! `Shape`: checked when it is parsed, created once all files have been read.
 
-use super::lights::AreaLightDesc;
-use super::materials::MaterialUse;
-use super::options::unknown;
+use super::checks::unknown;
+use super::descriptions::{MeshData, PatchData, ShapeDesc, ShapeSource};
 use super::state::Builder;
-use super::transform::{Ctm, affine};
+use super::transform::affine;
 use crate::geometry::loop_subdiv::loop_subdivide;
 use crate::geometry::{BilinearMesh, Quadric, QuadricKind, Shape, TriangleMesh};
 use crate::textures::FloatTexture;
@@ -12,85 +11,9 @@ use lumiris_formats::diagnostic::Diagnostics;
 use lumiris_formats::pbrt::directive::Name;
 use lumiris_formats::pbrt::params::{Input, ParamSet, ParamType};
 use lumiris_formats::ply::{PlyError, read_ply};
-use lumiris_formats::source::Span;
 use lumiris_numbers::math::transform::{swaps_handedness, transform_normal};
 use lumiris_numbers::math::{Affine3A, Vec2, Vec3};
 use std::path::PathBuf;
-
-/// An object: what `ObjectBegin` … `ObjectEnd` define.
-#[derive(Clone, Debug)]
-pub struct ObjectDesc {
-    /// Name.
-    pub name: String,
-    /// Where it is named.
-    pub span: Span,
-}
-
-/// A placement of an object.
-#[derive(Clone, Debug)]
-pub struct InstanceDesc {
-    /// Index of the object.
-    pub object: usize,
-    /// Its transformation.
-    pub ctm: Ctm,
-}
-
-/// Where the numbers of a shape come from.
-#[derive(Clone, Debug)]
-pub enum ShapeSource {
-    /// Triangles in the file itself.
-    Mesh(MeshData),
-    /// Triangles and patches in a PLY file.
-    Ply(PathBuf),
-    /// A control mesh that is subdivided `levels` times.
-    Loop(MeshData, u32),
-    /// A sphere, disk or cylinder.
-    Quadric(QuadricKind),
-    /// Bilinear patches.
-    Bilinear(PatchData),
-}
-
-/// Arrays of a triangle mesh in object space.
-#[derive(Clone, Debug, Default)]
-pub struct MeshData {
-    positions: Vec<Vec3>,
-    indices: Vec<[u32; 3]>,
-    normals: Vec<Vec3>,
-    tangents: Vec<Vec3>,
-    uvs: Vec<Vec2>,
-}
-
-/// Arrays of a bilinear mesh in object space.
-#[derive(Clone, Debug, Default)]
-pub struct PatchData {
-    positions: Vec<Vec3>,
-    indices: Vec<[u32; 4]>,
-    normals: Vec<Vec3>,
-    uvs: Vec<Vec2>,
-}
-
-/// A shape with all that the graphics state gives it.
-#[derive(Clone, Debug)]
-pub struct ShapeDesc {
-    /// Its numbers.
-    pub source: ShapeSource,
-    /// A name for people.
-    pub name: String,
-    /// Where it stands.
-    pub span: Span,
-    /// Transformation from its own space.
-    pub ctm: Ctm,
-    /// `ReverseOrientation`.
-    pub reverse_orientation: bool,
-    /// Material.
-    pub material: MaterialUse,
-    /// Emission.
-    pub area_light: Option<AreaLightDesc>,
-    /// Cut-outs.
-    pub alpha: Option<u32>,
-    /// The object that it belongs to.
-    pub object: Option<usize>,
-}
 
 /// What making a shape has to say.
 #[derive(Debug, Default)]

@@ -74,7 +74,7 @@ impl Builder<'_> {
         match Spectrum::read(&path) {
             Ok(Ok(curve)) => return Some(Resolved::Curve(curve)),
             Ok(Err(error)) if name.contains('.') => d.missing_file(path, error, Some(span)),
-            Ok(Err(_)) => super::options::unknown(name, span, "spectrum", &Spectrum::names().collect::<Vec<_>>(), d),
+            Ok(Err(_)) => super::checks::unknown(name, span, "spectrum", &Spectrum::names().collect::<Vec<_>>(), d),
             Err(reason) => {
                 d.error(span, format!("{}: {reason}", path.display()));
             }

@@ -1,6 +1,6 @@
 //! `Texture`
 
-use super::options::unknown;
+use super::checks::unknown;
 use super::spectrum::SpectrumUse;
 use super::state::Builder;
 use super::transform::affine;
@@ -12,14 +12,6 @@ use lumiris_formats::diagnostic::{Diagnostics, did_you_mean};
 use lumiris_formats::pbrt::directive::Name;
 use lumiris_formats::pbrt::params::{Input, ParamSet, ParamType, SpectrumValue};
 use lumiris_numbers::math::{Affine3A, Rgb, Vec2, Vec3};
-use std::collections::HashMap;
-
-/// Textures by name; floats and spectra have names of their own.
-#[derive(Debug, Default)]
-pub struct TextureNames {
-    floats: HashMap<String, FloatTextureId>,
-    rgbs: HashMap<String, RgbTextureId>,
-}
 
 impl Builder<'_> {
     /// `Texture "name" "float|spectrum" "class"`

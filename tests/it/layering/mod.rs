@@ -36,15 +36,7 @@ const LAYERS: &[&[&str]] = &[
 const NUMBERS: &[(&str, &[&str])] = &[("math", &[]), ("estimators", &["math"]), ("samplers", &["math"])];
 
 /// Folders whose circles are left until their rebuilding.
-const CIRCLES_LEFT: &[&str] = &[
-    "lumiris::direct",
-    "lumiris::import::pbrt",
-    "lumiris::lights",
-    "lumiris::photons",
-    "lumiris_lab::reproduce",
-    "lumiris_lab::reproduce::fan",
-    "lumiris_lab::reproduce::talbot",
-];
+const CIRCLES_LEFT: &[&str] = &["lumiris::direct"];
 
 fn workspace() -> Vec<Crate> {
     let root = Path::new(env!("CARGO_MANIFEST_DIR"));

@@ -1,7 +1,7 @@
 //! Line charts with two logarithmic axes, as SVG.
 
-use super::page::escape;
 use super::pictures::significant;
+use minijinja::HtmlEscape;
 use std::fmt::Write;
 
 const WIDTH: f64 = 640.0;
@@ -116,6 +116,11 @@ impl Chart {
         }
         out + "</svg>"
     }
+}
+
+/// The text with everything replaced that HTML would take for its own.
+fn escape(text: &str) -> String {
+    HtmlEscape(text).to_string()
 }
 
 #[cfg(test)]

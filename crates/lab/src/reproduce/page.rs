@@ -3,7 +3,7 @@
 
 use super::chart::Chart;
 use super::pictures::Scale;
-use minijinja::{Environment, HtmlEscape, Value, context};
+use minijinja::{Environment, Value, context};
 
 /// A page: a title and blocks in order.
 #[derive(Clone, Debug)]
@@ -108,11 +108,6 @@ impl Table {
     pub fn row(&mut self, cells: impl IntoIterator<Item = Cell>) {
         self.rows.push(cells.into_iter().collect());
     }
-}
-
-/// The text with everything replaced that HTML would take for its own.
-pub fn escape(text: &str) -> String {
-    HtmlEscape(text).to_string()
 }
 
 const TEMPLATE: &str = include_str!("page.html");

@@ -7,7 +7,7 @@ use super::super::page::{Block, Shown, Table};
 use super::super::pictures::{Picture, gain, significant};
 use super::super::{ReproduceError, scaled};
 use super::Setup;
-use super::direct::LONG_TURNS;
+use super::cases::LONG_TURNS;
 use super::report::{Asked, HEADER, method_json, method_row, summary, variances};
 use super::truth::{Errors, Truth};
 use lumiris_numbers::estimators::mis::Heuristic;

@@ -2,89 +2,19 @@
 
 use super::super::calibrate::{calibrate, match_samples};
 use super::super::figure::Figure;
-use super::super::measure::{Measured, Stage, View, turns};
+use super::super::measure::{Stage, View, turns};
 use super::super::method::Method;
 use super::super::{Observer, ReproduceError, scaled};
-use super::growth::{Growth, cost as growth_cost, measure as measure_growth};
+use super::cases::{Case, LONG, LONG_TURNS, SHOWN, SHOWN_WAYS};
+use super::growth::{cost as growth_cost, measure as measure_growth};
+use super::outcome::Outcome;
 use super::roster::{Numbers, Role, methods};
-use super::truth::{Errors, Truth};
+use super::truth::Truth;
 use super::{Setup, report};
 use lumiris::settings::Split;
 use std::time::{Duration, Instant};
 
-/// A row of the paper's table.
-pub(super) struct Case {
-    pub id: &'static str,
-    pub title: &'static str,
-    pub intro: &'static str,
-    pub file: &'static str,
-    /// Width and height of the paper's picture.
-    pub shape: [u32; 2],
-    /// Camera rays per pixel, and samples at each.
-    pub spp: u32,
-    pub samples: u32,
-    /// Errors of mis and of ocv in the paper, and the time of ocv over that of mis.
-    pub paper: [f64; 2],
-    pub paper_time: f64,
-    /// Reduction of the error that is to be reached (percent).
-    pub target: f64,
-    /// True if the efficiency must not be below that of mis either.
-    pub efficient: bool,
-    /// The part of the picture that is shown larger: left, top, right, bottom, in fractions.
-    pub crop: [f64; 4],
-}
-
-impl Case {
-    pub(super) const CHECKERS: Case = Case {
-        id: "checkers",
-        title: "Checkers",
-        intro: "A glossy board with a few things on it, under a large yellow light that it reflects at the left and a small blue one at the \
-                right, after figure 2 of the paper: light samples are poor where the board mirrors the large light, BSDF samples everywhere else.",
-        file: "checkers.pbrt",
-        shape: [500, 500],
-        spp: 4,
-        samples: 64,
-        paper: [0.60, 0.48],
-        paper_time: 1.05,
-        target: 20.0,
-        efficient: false,
-        crop: [0.0, 0.3, 0.4, 0.7],
-    };
-    pub(super) const STATUE: Case = Case {
-        id: "statue",
-        title: "Statue",
-        intro: "A lacquered dragon among large lights, in the place of the Buddha of figure 1: tight highlights, folds that see a part of each light, \
-                soft shadows.",
-        file: "statue.pbrt",
-        shape: [256, 512],
-        spp: 4,
-        samples: 64,
-        paper: [0.72, 0.46],
-        paper_time: 1.07,
-        target: 36.0,
-        efficient: false,
-        crop: [0.2, 0.12, 0.9, 0.47],
-    };
-    pub(super) const ROOM: Case = Case {
-        id: "room",
-        title: "Room",
-        intro: "A room with three small lights and little that hides them, after figure 3: few samples do, and there is little to win.",
-        file: "room.pbrt",
-        shape: [480, 360],
-        spp: 2,
-        samples: 18,
-        paper: [0.75, 0.68],
-        paper_time: 1.16,
-        target: 9.0,
-        efficient: true,
-        crop: [0.3, 0.35, 0.75, 0.85],
-    };
-}
-
-/// Camera rays of each of the long renderings, and their number.
-pub(super) const LONG: (u32, u32) = (16, 4);
-/// Seeds of long renderings, of antialiased pictures and of curves are those of turns from here on.
-pub(super) const LONG_TURNS: u32 = 1_000_000;
+/// Seeds of antialiased pictures are those of turns from here on.
 const ANTIALIASED_TURNS: u32 = 2_000_000;
 /// Edge of the picture on which times are found out, and the least edge: usual and quick.
 const PILOT_SIZE: [u32; 2] = [96, 48];
@@ -94,25 +24,6 @@ const TURNS: [u32; 2] = [4, 32];
 const WANTED_TURNS: [f64; 2] = [8.0, 4.0];
 /// Turns of the antialiased pictures.
 const PAIR_TURNS: u32 = 4;
-
-/// Who is shown with antialiasing, and with samples drawn in which ways.
-pub(super) const SHOWN: [Role; 4] = [Role::Balance, Role::Progressive, Role::Correlated, Role::Ris];
-pub(super) const SHOWN_WAYS: [usize; 2] = [0, 1];
-
-/// Everything that was measured for a case.
-pub(super) struct Outcome<'a> {
-    pub case: &'a Case,
-    pub facts: (usize, usize),
-    pub size: [u32; 2],
-    pub numbers: Numbers,
-    pub measured: Vec<Measured>,
-    pub truth: Truth,
-    pub errors: Vec<Errors>,
-    /// Those of [`SHOWN`] with rays all over the pixels, for each of [`SHOWN_WAYS`].
-    pub antialiased: Vec<Vec<Measured>>,
-    pub antialiased_truth: Truth,
-    pub growth: Growth,
-}
 
 /// The long renderings of a stage.
 fn truth(stage: &mut Stage, method: Method, view: View, observer: Observer<'_>) -> Result<Truth, ReproduceError> {

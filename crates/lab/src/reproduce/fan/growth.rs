@@ -3,7 +3,7 @@
 use super::super::ReproduceError;
 use super::super::measure::{Estimate, Stage, View, turns};
 use super::Setup;
-use super::direct::{Case, LONG, LONG_TURNS};
+use super::cases::{Case, LONG, LONG_TURNS};
 use super::roster::{FULL_WAYS, Numbers, Role, methods};
 use super::truth::Truth;
 

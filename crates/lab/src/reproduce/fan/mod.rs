@@ -1,11 +1,14 @@
 //! The figures of optimizing control variates [Fan et al. 2006, Table 1].
 //!
-//! [`truth`] has the paper's measure of error, [`roster`] the methods, [`direct`] holds them against each other in direct light,
-//! [`growth`] with more camera rays, [`cache`] in irradiance caching; [`report`] writes it down.
+//! [`truth`] has the paper's measure of error, [`roster`] the methods, [`cases`] the scenes of direct light, in which
+//! [`direct`] holds methods against each other; [`growth`] does so with more camera rays, and [`cache`] in irradiance
+//! caching. [`outcome`] is what was measured in direct light; [`report`] writes it down.
 
 mod cache;
+mod cases;
 mod direct;
 mod growth;
+mod outcome;
 mod report;
 mod roster;
 mod truth;
@@ -14,7 +17,7 @@ use super::figure::{Study, write};
 use super::{Budget, Observer, Options, ReproduceError, make_folder, scenes_folder};
 use crate::procedural::fan::write_scenes;
 use crate::procedural::statue::StatueOptions;
-use direct::Case;
+use cases::Case;
 use std::path::PathBuf;
 use std::time::Duration;
 

@@ -8,7 +8,8 @@ use super::super::page::{Block, Cell, Shown, Table};
 use super::super::pictures::{HEAT, Picture, Scale, crop, gain, significant};
 use super::super::verdicts::reduced_by;
 use super::Setup;
-use super::direct::{Case, LONG, Outcome, SHOWN, SHOWN_WAYS};
+use super::cases::{Case, LONG, SHOWN, SHOWN_WAYS};
+use super::outcome::Outcome;
 use super::roster::{FULL_WAYS, Role, WAYS};
 use super::truth::{CANDELAS, Errors, Interval, Truth};
 use serde_json::{Value, json};
@@ -148,26 +149,6 @@ pub(super) fn direct(setup: &Setup<'_>, o: &Outcome<'_>) -> Result<Figure, Repro
         blocks,
         numbers: numbers(o),
     })
-}
-
-impl Outcome<'_> {
-    fn pair(&self, role: Role, way: usize) -> [&Measured; 2] {
-        [role, Role::Balance].map(|r| &self.measured[r.place(way)])
-    }
-
-    fn errors(&self, role: Role, way: usize) -> [&Errors; 2] {
-        [role, Role::Balance].map(|r| &self.errors[r.place(way)])
-    }
-
-    fn relative(&self, role: Role, way: usize) -> Estimate {
-        let [e, base] = self.errors(role, way);
-        e.relative(base)
-    }
-
-    /// Those with antialiasing, in one of [`SHOWN_WAYS`], against their own reference.
-    fn antialiased_errors(&self, shown: usize) -> Vec<Errors> {
-        self.antialiased[shown].iter().map(|m| self.antialiased_truth.errors(m)).collect()
-    }
 }
 
 /// What a row of the table says beside its result.

@@ -1,18 +1,22 @@
 //! The figures of resampled importance sampling for direct light [Talbot et al. 2005; Talbot 2005, ch. 5].
 //!
-//! [`comparison`] compares methods at equal time, [`classes`] classifies lit and shadowed pixels, [`ratio`] searches
-//! the best number of proposals per sample, [`spheres`] samples BSDFs, [`report`] writes the results.
+//! [`comparison`] compares methods at equal time: those of [`roster`] in the figures of [`cases`], for an [`outcome`].
+//! [`classes`] classifies lit and shadowed pixels, [`ratio`] searches the best number of proposals per sample,
+//! [`spheres`] samples BSDFs, [`report`] writes the results.
 
+mod cases;
 mod classes;
 mod comparison;
+mod outcome;
 mod ratio;
 mod report;
+mod roster;
 mod scenes;
 mod spheres;
 
 use super::figure::{Study, write};
 use super::{Budget, Observer, Options, ReproduceError, make_folder};
-use comparison::Case;
+use cases::Case;
 use scenes::Scenes;
 use std::path::PathBuf;
 use std::time::Duration;

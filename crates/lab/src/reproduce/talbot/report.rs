@@ -7,8 +7,10 @@ use super::super::page::{Block, Cell, Shown, Table};
 use super::super::pictures::{HEAT, Picture, Scale, gain, significant};
 use super::super::verdicts::{falls, helps_most_in_shadow, reduced_by_resampling};
 use super::Setup;
+use super::cases::Kind;
 use super::classes::{Classes, LIT, NAMES, SHADOWED};
-use super::comparison::{Kind, Outcome, Roles};
+use super::outcome::Outcome;
+use super::roster::Roles;
 use lumiris::settings::Split;
 use serde_json::{Value, json};
 

@@ -1,0 +1,47 @@
+//! What was measured for a case of direct light.
+
+use super::super::measure::{Estimate, Measured};
+use super::cases::Case;
+use super::growth::Growth;
+use super::roster::{Numbers, Role};
+use super::truth::{Errors, Truth};
+
+/// Everything that was measured for a case.
+pub(super) struct Outcome<'a> {
+    pub case: &'a Case,
+    pub facts: (usize, usize),
+    pub size: [u32; 2],
+    pub numbers: Numbers,
+    pub measured: Vec<Measured>,
+    pub truth: Truth,
+    pub errors: Vec<Errors>,
+    /// Those of [`SHOWN`](super::cases::SHOWN) with rays all over the pixels, for each of
+    /// [`SHOWN_WAYS`](super::cases::SHOWN_WAYS).
+    pub antialiased: Vec<Vec<Measured>>,
+    pub antialiased_truth: Truth,
+    pub growth: Growth,
+}
+
+impl Outcome<'_> {
+    /// A method with one of the ways to draw samples, and the baseline with the same.
+    pub(super) fn pair(&self, role: Role, way: usize) -> [&Measured; 2] {
+        [role, Role::Balance].map(|r| &self.measured[r.place(way)])
+    }
+
+    /// Their errors.
+    pub(super) fn errors(&self, role: Role, way: usize) -> [&Errors; 2] {
+        [role, Role::Balance].map(|r| &self.errors[r.place(way)])
+    }
+
+    /// The error of the one relative to that of the other.
+    pub(super) fn relative(&self, role: Role, way: usize) -> Estimate {
+        let [e, base] = self.errors(role, way);
+        e.relative(base)
+    }
+
+    /// Errors of those with antialiasing, in one of [`SHOWN_WAYS`](super::cases::SHOWN_WAYS), against their own
+    /// reference.
+    pub(super) fn antialiased_errors(&self, shown: usize) -> Vec<Errors> {
+        self.antialiased[shown].iter().map(|m| self.antialiased_truth.errors(m)).collect()
+    }
+}

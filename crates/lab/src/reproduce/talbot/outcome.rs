@@ -1,0 +1,23 @@
+//! What was measured for a case of the comparison.
+
+use super::super::calibrate::Calibration;
+use super::super::measure::Measured;
+use super::cases::Case;
+use super::classes::Classes;
+use super::roster::{Named, Roles};
+
+/// Everything that was measured for a case.
+pub(super) struct Outcome<'a> {
+    pub case: &'a Case,
+    pub stage_facts: (usize, usize),
+    pub size: [u32; 2],
+    pub calibration: Calibration,
+    pub methods: Vec<Named>,
+    pub roles: Roles,
+    pub measured: Vec<Measured>,
+    pub reference: Vec<[f64; 3]>,
+    pub classes: Classes,
+    /// The baseline, the method that is judged, and the baseline with stratified samples where there is one, with rays
+    /// all over the pixels.
+    pub antialiased: Vec<Measured>,
+}

@@ -1,0 +1,80 @@
+//! The methods that are held against each other, and which of them is which.
+
+use super::super::method::Method;
+use super::cases::{Case, Judged, Kind};
+use lumiris::settings::{Split, Strata};
+
+/// A method with its name on the page.
+#[derive(Clone, Debug)]
+pub(super) struct Named {
+    pub name: String,
+    pub method: Method,
+}
+
+/// Proposals of the rendering that shows the variance of visibility alone.
+const MANY: u32 = 96;
+
+/// Positions among the methods that [`methods`] gives.
+pub(super) struct Roles {
+    /// What all are compared with.
+    pub base: usize,
+    /// What the target is about.
+    pub judged: usize,
+    /// Resampling that is stratified in every way, with M and N for equal halves of the time.
+    pub equal_halves: usize,
+    /// Resampling without stratification.
+    pub plain: usize,
+    /// Light sampling with well distributed points, where it is there.
+    pub base_stratified: Option<usize>,
+    /// One sample of many proposals.
+    pub visibility: usize,
+}
+
+/// The methods of a case, with M and N of equal halves of the time.
+pub(super) fn methods(case: &Case, split: Split) -> (Vec<Named>, Roles) {
+    let Split { samples: n, proposals: m } = split;
+    let named = |name: &str, method: Method| Named { name: name.to_owned(), method };
+    let ris = Method::ris(m, n);
+    let plain = named("ris, no stratification", ris);
+    let points = named("ris + stratified proposals", ris.stratified());
+    let systematic =
+        named("ris + stratified proposals + systematic samples", ris.stratified().strata(Strata::Systematic));
+    let visibility = named("ris, one sample of many proposals", Method::ris(MANY, 1));
+    match case.kind {
+        Kind::Reduction { judged, .. } => {
+            let mut list = vec![
+                named("mc", Method::mc(case.samples)),
+                named("mc + stratified samples", Method::mc(case.samples).stratified()),
+                named("mis", Method::mis(case.samples)),
+                named("mis + stratified samples", Method::mis(case.samples).stratified()),
+                plain,
+                points,
+                systematic,
+                visibility,
+            ];
+            if let Some(s) = case.printed {
+                list.push(named(
+                    "ris with the paper's M and N, no stratification",
+                    Method::ris(s.proposals, s.samples),
+                ));
+            }
+            let judged = match judged {
+                Judged::EqualHalves => 6,
+                Judged::Printed => list.len() - 1,
+            };
+            (list, Roles { base: 0, judged, equal_halves: 6, plain: 4, base_stratified: Some(1), visibility: 7 })
+        }
+        Kind::Stratification => {
+            let strata = |s: Strata| ris.stratified().strata(s);
+            let list = vec![
+                plain,
+                points,
+                named("ris + stratified proposals + equal-proposals strata", strata(Strata::Proposals)),
+                named("ris + stratified proposals + equal-weights strata", strata(Strata::Weights)),
+                systematic,
+                visibility,
+            ];
+            (list, Roles { base: 0, judged: 4, equal_halves: 4, plain: 0, base_stratified: None, visibility: 5 })
+        }
+    }
+}

@@ -1,0 +1,26 @@
+//! Checks that the files of all directives share.
+
+use lumiris_formats::diagnostic::{Diagnostics, did_you_mean};
+use lumiris_formats::pbrt::params::ParamSet;
+use lumiris_formats::source::Span;
+
+/// A positive number, or the default after an error.
+pub(super) fn positive(p: &ParamSet, key: &'static str, default: f32, d: &mut Diagnostics) -> f32 {
+    match p.float(key, d) {
+        Some(x) if x > 0.0 && x.is_finite() => x,
+        Some(x) => {
+            d.error(p.span_of(key), format!("{key} must be positive, not {x}"));
+            default
+        }
+        None => default,
+    }
+}
+
+/// An unknown name of something, with what is near.
+pub fn unknown(name: &str, span: Span, what: &str, known: &[&str], d: &mut Diagnostics) {
+    let help = match did_you_mean(name, known.iter().copied()) {
+        Some(near) => format!("did you mean `{near}`?"),
+        None => format!("one of {}", known.join(", ")),
+    };
+    d.error(span, format!("unknown {what} `{name}`")).help(help);
+}

@@ -1,0 +1,132 @@
+//! Descriptions of what a file asks for, kept until all of it and the files that it names are read.
+
+use super::transform::Ctm;
+use crate::geometry::QuadricKind;
+use crate::materials::MaterialId;
+use lumiris_formats::pbrt::directive::Name;
+use lumiris_formats::pbrt::params::ParamSet;
+use lumiris_formats::source::Span;
+use lumiris_numbers::math::{Affine3A, Rgb, Vec2, Vec3};
+use std::path::PathBuf;
+
+/// A directive that is understood when all of them are known: the camera needs the film's size.
+pub(super) struct Pending {
+    pub name: Name,
+    pub params: ParamSet,
+}
+
+/// The material of a shape: known, or by a name that may be defined later.
+#[derive(Clone, Debug)]
+pub enum MaterialUse {
+    /// Known.
+    Id(MaterialId),
+    /// By name.
+    Named(Name),
+}
+
+/// An area light as written; shapes that follow emit it.
+#[derive(Clone, Debug)]
+pub struct AreaLightDesc {
+    /// Radiance with the scale.
+    pub l: Rgb,
+    /// Both sides.
+    pub two_sided: bool,
+    /// Image of the radiance.
+    pub image: Option<(PathBuf, Span)>,
+    /// Total power (W) that replaces the scale, if positive.
+    pub power: f32,
+    /// The directive.
+    pub span: Span,
+}
+
+/// An environment map that waits for its image.
+#[derive(Clone, Debug)]
+pub struct EnvironmentDesc {
+    /// Image.
+    pub path: PathBuf,
+    /// Where it is named.
+    pub span: Span,
+    /// Orientation.
+    pub world_from_light: Affine3A,
+    /// Factor of the radiance.
+    pub scale: f32,
+    /// Illuminance that replaces the brightness, if positive.
+    pub illuminance: f32,
+    /// Place among the lights.
+    pub index: usize,
+}
+
+/// An object: what `ObjectBegin` … `ObjectEnd` define.
+#[derive(Clone, Debug)]
+pub struct ObjectDesc {
+    /// Name.
+    pub name: String,
+    /// Where it is named.
+    pub span: Span,
+}
+
+/// A placement of an object.
+#[derive(Clone, Debug)]
+pub struct InstanceDesc {
+    /// Index of the object.
+    pub object: usize,
+    /// Its transformation.
+    pub ctm: Ctm,
+}
+
+/// Where the numbers of a shape come from.
+#[derive(Clone, Debug)]
+pub enum ShapeSource {
+    /// Triangles in the file itself.
+    Mesh(MeshData),
+    /// Triangles and patches in a PLY file.
+    Ply(PathBuf),
+    /// A control mesh that is subdivided `levels` times.
+    Loop(MeshData, u32),
+    /// A sphere, disk or cylinder.
+    Quadric(QuadricKind),
+    /// Bilinear patches.
+    Bilinear(PatchData),
+}
+
+/// Arrays of a triangle mesh in object space.
+#[derive(Clone, Debug, Default)]
+pub struct MeshData {
+    pub(super) positions: Vec<Vec3>,
+    pub(super) indices: Vec<[u32; 3]>,
+    pub(super) normals: Vec<Vec3>,
+    pub(super) tangents: Vec<Vec3>,
+    pub(super) uvs: Vec<Vec2>,
+}
+
+/// Arrays of a bilinear mesh in object space.
+#[derive(Clone, Debug, Default)]
+pub struct PatchData {
+    pub(super) positions: Vec<Vec3>,
+    pub(super) indices: Vec<[u32; 4]>,
+    pub(super) normals: Vec<Vec3>,
+    pub(super) uvs: Vec<Vec2>,
+}
+
+/// A shape with all that the graphics state gives it.
+#[derive(Clone, Debug)]
+pub struct ShapeDesc {
+    /// Its numbers.
+    pub source: ShapeSource,
+    /// A name for people.
+    pub name: String,
+    /// Where it stands.
+    pub span: Span,
+    /// Transformation from its own space.
+    pub ctm: Ctm,
+    /// `ReverseOrientation`.
+    pub reverse_orientation: bool,
+    /// Material.
+    pub material: MaterialUse,
+    /// Emission.
+    pub area_light: Option<AreaLightDesc>,
+    /// Cut-outs.
+    pub alpha: Option<u32>,
+    /// The object that it belongs to.
+    pub object: Option<usize>,
+}

@@ -1,0 +1,194 @@
+//! The state machine of the format: directives change the graphics state, or add objects with that state to the scene.
+
+use super::descriptions::{InstanceDesc, MaterialUse, ObjectDesc};
+use super::options::medium;
+use super::state::Builder;
+use super::transform::{Ctm, matrix_of};
+use lumiris_formats::color_space::ColorSpace;
+use lumiris_formats::diagnostic::{Diagnostics, did_you_mean};
+use lumiris_formats::pbrt::directive::{ActiveTimes, AttributeTarget, Directive, DirectiveKind, Name};
+use lumiris_formats::pbrt::params::ParamSet;
+use lumiris_formats::pbrt::parser::Visitor;
+use lumiris_formats::source::{SourceMap, Span};
+
+impl Visitor for Builder<'_> {
+    fn directive(&mut self, directive: Directive, _sources: &SourceMap, diagnostics: &mut Diagnostics) {
+        use DirectiveKind as D;
+        let Directive { kind, span, mut params } = directive;
+        match kind {
+            D::Identity
+            | D::Translate(_)
+            | D::Scale(_)
+            | D::Rotate(_)
+            | D::LookAt(_)
+            | D::Transform(_)
+            | D::ConcatTransform(_) => self.transform(&kind, span, diagnostics),
+            D::CoordinateSystem(name) => {
+                self.coordinate_systems.insert(name.text, self.state.ctm);
+            }
+            D::CoordSysTransform(name) => self.coordinate_system(&name, diagnostics),
+            D::ActiveTransform(active) => self.state.active = active,
+            D::TransformTimes(times) => self.options.transform_times(times, span, diagnostics),
+            D::TransformBegin | D::AttributeBegin => self.stack.push(self.state.clone()),
+            D::TransformEnd => {
+                if let Some(saved) = self.stack.pop() {
+                    (self.state.ctm, self.state.active) = (saved.ctm, saved.active);
+                }
+            }
+            D::AttributeEnd => self.pop(),
+            D::Attribute(target) => {
+                let list = self.state.defaults.of(target);
+                list.extend(params.iter().cloned());
+            }
+            D::Option => self.options.option(&params, diagnostics),
+            D::ColorSpace(name) => self.color_space(&name, diagnostics),
+            D::Camera(name) => {
+                self.coordinate_systems.insert("camera".to_owned(), self.state.ctm.inverse());
+                self.options.camera(name, params, self.state.ctm);
+            }
+            D::Film(name) => self.options.film(name, params),
+            D::Sampler(name) => self.options.sampler(name, params),
+            D::Integrator(name) => self.options.integrator(name, params),
+            D::PixelFilter(name) => self.options.pixel_filter(name, params),
+            // How the ray tracer is built is not the scene's business here.
+            D::Accelerator(_) => {}
+            D::MakeNamedMedium(name) => {
+                self.with_defaults(AttributeTarget::Medium, &mut params);
+                medium(&name, &params, diagnostics);
+            }
+            D::MediumInterface { inside, outside } => {
+                if !inside.text.is_empty() || !outside.text.is_empty() {
+                    diagnostics.warning_once(span, "participating media are not rendered yet: light passes freely");
+                }
+            }
+            D::WorldBegin => self.world_begin(),
+            D::WorldEnd => {}
+            D::ReverseOrientation => self.state.reverse_orientation = !self.state.reverse_orientation,
+            D::Material(name) => {
+                self.with_defaults(AttributeTarget::Material, &mut params);
+                self.material(&name, &params, diagnostics);
+            }
+            D::MakeNamedMaterial(name) => {
+                self.with_defaults(AttributeTarget::Material, &mut params);
+                self.make_named_material(name, &params, diagnostics);
+            }
+            D::NamedMaterial(name) => self.state.material = MaterialUse::Named(name),
+            D::Texture { name, value, class } => {
+                self.with_defaults(AttributeTarget::Texture, &mut params);
+                self.texture(name, &value, &class, &params, diagnostics);
+            }
+            D::LightSource(name) => {
+                self.with_defaults(AttributeTarget::Light, &mut params);
+                self.light(&name, &params, diagnostics);
+            }
+            D::AreaLightSource(name) => {
+                self.with_defaults(AttributeTarget::Light, &mut params);
+                self.state.area_light = self.area_light(&name, &params, diagnostics);
+            }
+            D::Shape(name) => {
+                self.with_defaults(AttributeTarget::Shape, &mut params);
+                self.shape(&name, params, diagnostics);
+            }
+            D::ObjectBegin(name) => self.object_begin(name, diagnostics),
+            D::ObjectEnd => {
+                self.current_object = None;
+                self.pop();
+            }
+            D::ObjectInstance(name) => self.object_instance(&name, span, diagnostics),
+        }
+    }
+}
+
+impl Builder<'_> {
+    fn transform(&mut self, kind: &DirectiveKind, span: Span, diagnostics: &mut Diagnostics) {
+        let matrix = match matrix_of(kind) {
+            Some(Ok(matrix)) => matrix,
+            Some(Err(reason)) => {
+                diagnostics.error(span, reason);
+                return;
+            }
+            None => return,
+        };
+        let sets = matches!(kind, DirectiveKind::Identity | DirectiveKind::Transform(_));
+        let mut ctm = self.state.ctm;
+        ctm.apply(self.state.active, |m| if sets { matrix } else { m * matrix });
+        if ctm.is_invertible() {
+            self.state.ctm = ctm;
+        } else {
+            diagnostics.error(span, "this transformation has no inverse");
+        }
+    }
+
+    fn coordinate_system(&mut self, name: &Name, diagnostics: &mut Diagnostics) {
+        match self.coordinate_systems.get(&name.text) {
+            Some(ctm) => self.state.ctm = *ctm,
+            None => {
+                let message = format!("unknown coordinate system `{}`", name.text);
+                let near =
+                    did_you_mean(&name.text, self.coordinate_systems.keys().map(String::as_str)).map(str::to_owned);
+                let diagnostic = diagnostics.error(name.span, message);
+                if let Some(near) = near {
+                    diagnostic.help(format!("did you mean `{near}`?"));
+                }
+            }
+        }
+    }
+
+    fn world_begin(&mut self) {
+        self.state.ctm = Ctm::IDENTITY;
+        self.state.active = ActiveTimes::All;
+        self.coordinate_systems.insert("world".to_owned(), Ctm::IDENTITY);
+    }
+
+    fn color_space(&mut self, name: &Name, diagnostics: &mut Diagnostics) {
+        match ColorSpace::from_name(&name.text) {
+            Some(space) => self.state.color_space = space,
+            None => {
+                let known = ColorSpace::NAMES.join(", ");
+                diagnostics
+                    .error(name.span, format!("unknown color space `{}`", name.text))
+                    .help(format!("one of {known}"));
+            }
+        }
+    }
+
+    fn object_begin(&mut self, name: Name, diagnostics: &mut Diagnostics) {
+        self.stack.push(self.state.clone());
+        if let Some(&first) = self.object_names.get(&name.text) {
+            let message = format!("object `{}` is defined twice", name.text);
+            diagnostics.error(name.span, message).label(self.objects[first].span, "first defined here");
+        }
+        let index = self.objects.len();
+        self.object_names.insert(name.text.clone(), index);
+        self.objects.push(ObjectDesc { name: name.text, span: name.span });
+        self.current_object = Some(index);
+    }
+
+    fn object_instance(&mut self, name: &Name, span: Span, diagnostics: &mut Diagnostics) {
+        if self.current_object.is_some() {
+            diagnostics.error(span, "an object cannot contain an instance");
+            return;
+        }
+        let Some(&object) = self.object_names.get(&name.text) else {
+            let message = format!("unknown object `{}`", name.text);
+            let near = did_you_mean(&name.text, self.object_names.keys().map(String::as_str)).map(str::to_owned);
+            let diagnostic = diagnostics.error(name.span, message);
+            if let Some(near) = near {
+                diagnostic.help(format!("did you mean `{near}`?"));
+            }
+            return;
+        };
+        self.instances.push(InstanceDesc { object, ctm: self.state.ctm });
+    }
+
+    fn pop(&mut self) {
+        // The parser checks that blocks nest; an `End` that it let through has its `Begin` on the stack.
+        if let Some(state) = self.stack.pop() {
+            self.state = state;
+        }
+    }
+
+    fn with_defaults(&mut self, target: AttributeTarget, params: &mut ParamSet) {
+        params.inherit(self.state.defaults.of(target).iter());
+    }
+}
