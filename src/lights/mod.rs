@@ -1,15 +1,13 @@
 //! Lights: their emission, the sampling of directions towards them, and the choice of one of many.
 //!
-//! Reading order: [`point`], [`spot`], [`area`], [`environment`], [`emit`], [`lanes`], [`bounds`], [`tree`], [`hints`],
-//! [`select`], [`hinted`], [`set`], [`groups`], [`sampling`], [`irradiance`].
+//! Reading order: [`point`], [`spot`], [`area`], [`environment`], [`emit`], [`lanes`], [`bounds`], [`tree`],
+//! [`visibility_cache`], [`select`], [`visibility_cache_sampler`], [`set`], [`groups`], [`sampling`], [`irradiance`].
 
 pub mod area;
 pub mod bounds;
 pub mod emit;
 pub mod environment;
 pub mod groups;
-pub mod hinted;
-pub mod hints;
 pub mod irradiance;
 pub mod lanes;
 pub mod point;
@@ -18,6 +16,8 @@ pub mod select;
 pub mod set;
 pub mod spot;
 pub mod tree;
+pub mod visibility_cache;
+pub mod visibility_cache_sampler;
 
 #[cfg(test)]
 mod emit_tests;
@@ -29,14 +29,14 @@ pub use bounds::LightBounds;
 pub use emit::EmissionSample;
 pub use environment::{EnvironmentFilter, EnvironmentMap, EnvironmentMapping};
 pub use groups::LightGroups;
-pub use hinted::HintedChoice;
-pub use hints::LightHints;
 pub use irradiance::Irradiances;
 pub use lanes::LightLanes;
 pub use sampling::LightSampling;
-pub use select::{LightChoice, LightRun, LightSampler, LightSamplerKind};
+pub use select::{LightRun, LightSampler, LightSamplerKind, SampledLight};
 pub use set::{LightSet, LightSetBuilder};
 pub use tree::LightTree;
+pub use visibility_cache::VisibilityCache;
+pub use visibility_cache_sampler::VisibilityCacheSampler;
 
 use lumiris_numbers::math::{Affine3A, Bounds3, Mat3, Rgb, Vec2, Vec3};
 use std::f32::consts::PI;

@@ -5,17 +5,17 @@
 //! | uniform | the same for all lights |
 //! | power | 95 % proportional to power, 5 % uniform, so that no light starves |
 //! | tree | equal for every infinite light and for the [`LightTree`] over all others |
-//! | photons | nearly always one of the lights that the visibility cache finds, if any; see [`super::hinted`] |
+//! | photons | nearly always one of the lights that the visibility cache finds, if any; see [`super::visibility_cache_sampler`] |
 //!
 //! Lights without power are never chosen.
 
-use super::{HintedChoice, Light, LightCtx, LightHints, LightId, LightTree};
+use super::{Light, LightCtx, LightId, LightTree, VisibilityCache, VisibilityCacheSampler};
 use lumiris_numbers::math::{AliasTable, ONE_MINUS_EPSILON, cumulative};
 use std::sync::Arc;
 use strum::{EnumIter, EnumString, IntoStaticStr, VariantNames};
 
 /// Uniform fraction of the power sampler.
-const UNIFORM_SHARE: f64 = 0.05;
+const UNIFORM_FRACTION: f64 = 0.05;
 
 /// The light sampler.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, EnumIter, EnumString, IntoStaticStr, VariantNames)]
@@ -33,7 +33,7 @@ pub enum LightSamplerKind {
 
 /// A chosen light.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub struct LightChoice {
+pub struct SampledLight {
     /// The light.
     pub light: LightId,
     /// Probability of the choice.
@@ -133,48 +133,48 @@ impl TreeChoice {
     }
 
     #[inline]
-    pub(super) fn sample(&self, ctx: &LightCtx, u: f32) -> Option<LightChoice> {
+    pub(super) fn sample(&self, ctx: &LightCtx, u: f32) -> Option<SampledLight> {
         let TreeChoice { tree, infinite } = self;
         let p_infinite = self.infinite_probability(ctx);
         if u < p_infinite {
             let x = u / p_infinite * infinite.len() as f32;
             let i = (x as usize).min(infinite.len() - 1);
             let u = (x - i as f32).clamp(0.0, ONE_MINUS_EPSILON);
-            return Some(LightChoice { light: infinite[i], pmf: p_infinite / infinite.len() as f32, u });
+            return Some(SampledLight { light: infinite[i], pmf: p_infinite / infinite.len() as f32, u });
         }
         let u = ((u - p_infinite) / (1.0 - p_infinite)).min(ONE_MINUS_EPSILON);
         let (light, pmf, u) = tree.sample(ctx, u)?;
-        Some(LightChoice { light, pmf: pmf * (1.0 - p_infinite), u })
+        Some(SampledLight { light, pmf: pmf * (1.0 - p_infinite), u })
     }
 
-    /// Adds runs for the positions from `first` on, which lie in [`start`, 1); `share` = 1 − `start` is a factor of all
-    /// probabilities.
+    /// Adds runs for the positions from `first` on, which lie in [`start`, 1); `fraction` = 1 − `start` is a factor of
+    /// all probabilities.
     pub(super) fn runs(
         &self,
         ctx: &LightCtx,
         positions: &[u32],
         first: usize,
-        (start, share): (f64, f32),
+        (start, fraction): (f64, f32),
         out: &mut Vec<LightRun>,
     ) {
         let TreeChoice { tree, infinite } = self;
         let p_infinite = self.infinite_probability(ctx);
-        let each = f64::from(p_infinite * share) / infinite.len() as f64;
+        let each = f64::from(p_infinite * fraction) / infinite.len() as f64;
         let mut first = first;
         for (i, &light) in infinite.iter().enumerate().filter(|_| p_infinite > 0.0) {
             let interval = [start + each * i as f64, start + each * (i + 1) as f64];
             let is_in = |&p: &u32| f64::from(p) * UNIT < interval[1] || p_infinite == 1.0 && i + 1 == infinite.len();
             let count = positions[first..].partition_point(is_in);
             if count > 0 {
-                let pmf = p_infinite * share / infinite.len() as f32;
+                let pmf = p_infinite * fraction / infinite.len() as f32;
                 out.push(LightRun { light, pmf, places: [first as u32, (first + count) as u32], interval });
             }
             first += count;
         }
         let places = [first as u32, positions.len() as u32];
         if !tree.is_empty() && p_infinite < 1.0 {
-            let start = start + f64::from(p_infinite * share);
-            tree.runs(ctx, positions, places, (start, (1.0 - p_infinite) * share), out);
+            let start = start + f64::from(p_infinite * fraction);
+            tree.runs(ctx, positions, places, (start, (1.0 - p_infinite) * fraction), out);
         }
     }
 
@@ -201,7 +201,7 @@ pub enum LightSampler {
     /// By the tree; infinite lights beside it.
     Tree(TreeChoice),
     /// By the visibility cache, and by the tree.
-    Photons(HintedChoice),
+    Photons(VisibilityCacheSampler),
 }
 
 impl LightSampler {
@@ -218,15 +218,15 @@ impl LightSampler {
             LightSamplerKind::Tree => LightSampler::Tree(TreeChoice::new(lights, &powers)),
             LightSamplerKind::Photons => {
                 let base = TreeChoice::new(lights, &powers);
-                LightSampler::Photons(HintedChoice::new(base, lights, scene_radius))
+                LightSampler::Photons(VisibilityCacheSampler::new(base, lights, scene_radius))
             }
         }
     }
 
     /// Sets the visibility cache of the sampler that uses it.
-    pub(super) fn set_hints(&mut self, hints: Option<Arc<LightHints>>) {
+    pub(super) fn set_visibility_cache(&mut self, visibility_cache: Option<Arc<VisibilityCache>>) {
         match self {
-            LightSampler::Photons(choice) => choice.hints = hints,
+            LightSampler::Photons(choice) => choice.visibility_cache = visibility_cache,
             LightSampler::Uniform(_) | LightSampler::Power(_) | LightSampler::Tree(_) => {}
         }
     }
@@ -242,11 +242,11 @@ impl LightSampler {
 
     /// Chooses a light by `u` in [0, 1); `None` if there is none.
     #[inline]
-    pub fn sample(&self, ctx: &LightCtx, u: f32) -> Option<LightChoice> {
+    pub fn sample(&self, ctx: &LightCtx, u: f32) -> Option<SampledLight> {
         match self {
             LightSampler::Uniform(choice) | LightSampler::Power(choice) => {
                 let s = choice.table.sample(u)?;
-                Some(LightChoice { light: s.index as LightId, pmf: s.pmf, u: s.u })
+                Some(SampledLight { light: s.index as LightId, pmf: s.pmf, u: s.u })
             }
             LightSampler::Tree(choice) => choice.sample(ctx, u),
             LightSampler::Photons(choice) => choice.sample(ctx, u),
@@ -284,7 +284,7 @@ fn power_weights(powers: &[f32]) -> Vec<f32> {
         if p <= 0.0 {
             return 0.0;
         }
-        ((1.0 - UNIFORM_SHARE) * f64::from(p) / total + UNIFORM_SHARE / count as f64) as f32
+        ((1.0 - UNIFORM_FRACTION) * f64::from(p) / total + UNIFORM_FRACTION / count as f64) as f32
     };
     powers.iter().map(|&p| weight(p)).collect()
 }

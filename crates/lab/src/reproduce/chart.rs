@@ -1,7 +1,7 @@
 //! Line charts with two logarithmic axes, as SVG.
 
+use super::images::significant;
 use super::page::escape;
-use super::pictures::significant;
 use std::fmt::Write;
 
 const WIDTH: f64 = 640.0;

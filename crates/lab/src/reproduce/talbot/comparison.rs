@@ -1,4 +1,4 @@
-//! Methods of equal time against each other: variances at equal time, and a pair of pictures of equal time.
+//! Methods of equal time against each other: variances at equal time, and a pair of images of equal time.
 
 use super::super::calibrate::{Calibration, calibrate};
 use super::super::figure::Figure;
@@ -9,7 +9,7 @@ use super::classes::Classes;
 use super::report;
 use super::scenes::Which;
 use super::{Setup, portrait};
-use lumiris::settings::{Split, Strata};
+use lumiris::settings::{SampleCounts, Strata};
 use std::time::{Duration, Instant};
 
 /// A figure that compares methods.
@@ -23,7 +23,7 @@ pub(super) struct Case {
     /// Shadow rays of the baseline at each.
     pub samples: u32,
     /// M and N of the paper.
-    pub printed: Option<Split>,
+    pub printed: Option<SampleCounts>,
     pub kind: Kind,
 }
 
@@ -55,7 +55,7 @@ impl Case {
         scene: Which::Both,
         primary: 20,
         samples: 20,
-        printed: Some(Split { samples: 11, proposals: 168 }),
+        printed: Some(SampleCounts { samples: 11, proposals: 168 }),
         kind: Kind::Reduction { paper: 70.0, target: 80.0, judged: Judged::EqualHalves },
     };
     pub(super) const PAPER_4_LIGHTS: Case = Case {
@@ -63,7 +63,7 @@ impl Case {
         title: "Paper, figure 4 without the environment: two area lights",
         intro: "The same with the two area lights alone, where most of the variance is that of visibility.",
         scene: Which::Lights,
-        printed: Some(Split { samples: 11, proposals: 168 }),
+        printed: Some(SampleCounts { samples: 11, proposals: 168 }),
         kind: Kind::Reduction { paper: 10.0, target: 30.0, judged: Judged::EqualHalves },
         ..Case::PAPER_4
     };
@@ -74,7 +74,7 @@ impl Case {
         scene: Which::Environment,
         primary: 10,
         samples: 100,
-        printed: Some(Split { samples: 64, proposals: 229 }),
+        printed: Some(SampleCounts { samples: 64, proposals: 229 }),
         kind: Kind::Reduction { paper: 33.0, target: 45.0, judged: Judged::Printed },
     };
     pub(super) const THESIS_54: Case = Case {
@@ -116,8 +116,8 @@ pub(super) struct Roles {
     pub visibility: usize,
 }
 
-fn methods(case: &Case, split: Split) -> (Vec<Named>, Roles) {
-    let Split { samples: n, proposals: m } = split;
+fn methods(case: &Case, sample_counts: SampleCounts) -> (Vec<Named>, Roles) {
+    let SampleCounts { samples: n, proposals: m } = sample_counts;
     let named = |name: &str, method: Method| Named { name: name.to_owned(), method };
     let ris = Method::ris(m, n);
     let plain = named("ris, no stratification", ris);
@@ -180,15 +180,15 @@ pub(super) struct Outcome<'a> {
     pub antialiased: Vec<Measured>,
 }
 
-/// Turns of the antialiased pictures, for their variance.
+/// Turns of the antialiased images, for their variance.
 const PAIR_TURNS: u32 = 4;
-/// Edge of the picture on which times are found out, and the least edge.
+/// Edge of the image on which times are found out, and the least edge.
 const PILOT_SIZE: u32 = 96;
-const LEAST_SIZE: u32 = 32;
+const MIN_SIZE: u32 = 32;
 /// Fewest and most turns.
 const TURNS: [u32; 2] = [4, 48];
 const QUICK_TURNS: u32 = 8;
-/// Turns that the size of the picture is chosen for.
+/// Turns that the size of the image is chosen for.
 const WANTED_TURNS: f64 = 8.0;
 
 /// Measures a case within about `time`.
@@ -203,23 +203,23 @@ pub(super) fn run(setup: &Setup<'_>, case: &Case, time: Duration) -> Result<Figu
     let pilot_size = setup.size.min(PILOT_SIZE);
     let mut stage = Stage::load(&path, portrait(pilot_size), setup.options.threads)?;
     let mut calibration = calibrate(&mut stage, &base, setup.observer)?;
-    let count = methods(case, calibration.split).0.len() as f64;
+    let count = methods(case, calibration.sample_counts).0.len() as f64;
     let cost = |c: &Calibration| c.seconds * f64::from(case.primary) * 1.1;
     let antialiased = 3.0 * f64::from(PAIR_TURNS);
     let wanted = cost(&calibration) * (WANTED_TURNS * count + antialiased);
     let fits = (time.saturating_sub(start.elapsed()).as_secs_f64() / wanted).sqrt();
-    let size = ((f64::from(pilot_size) * fits) as u32 / 8 * 8).max(LEAST_SIZE).min(setup.size);
+    let size = ((f64::from(pilot_size) * fits) as u32 / 8 * 8).max(MIN_SIZE).min(setup.size);
     if size != pilot_size {
         stage = Stage::load(&path, portrait(size), setup.options.threads)?;
         calibration = calibrate(&mut stage, &base, setup.observer)?;
     }
 
     // As many turns as fit
-    let (named, roles) = methods(case, calibration.split);
+    let (named, roles) = methods(case, calibration.sample_counts);
     let list: Vec<Method> = named.iter().map(|n| n.method).collect();
     let left = time.saturating_sub(start.elapsed()).as_secs_f64() / cost(&calibration) - antialiased;
     let count_turns = ((left / count) as u32).clamp(TURNS[0], if setup.options.quick { QUICK_TURNS } else { TURNS[1] });
-    let Split { samples, proposals } = calibration.split;
+    let SampleCounts { samples, proposals } = calibration.sample_counts;
     let [width, height] = stage.size();
     say(&format!(
         "  {width} × {height} pixels, {count_turns} turns of {count} methods, M = {proposals}, N = {samples}"
