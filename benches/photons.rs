@@ -1,12 +1,12 @@
 //! Photon maps: how fast photons are traced in a scene, and how fast maps are built and asked.
 //!
-//! `cargo bench --bench photons -- [scene.pbrt] [thousands of trajectories, default 200]`
+//! `cargo bench --bench photons -- [scene.pbrt] [thousands of paths, default 200]`
 #![allow(clippy::print_stdout, clippy::unwrap_used, missing_docs)]
 
 use lumiris::import::{LoadOptions, load};
 use lumiris::photons::{
-    GatherScratch, ImportanceSettings, Origin, Photon, PhotonMap, Place, Search, Tracing, Want, trace_importons,
-    trace_photons,
+    GatherScratch, ImportanceSettings, Origin, Photon, PhotonBudget, PhotonMap, Place, Search, Tracing,
+    trace_importons, trace_photons,
 };
 use lumiris::scene::AccelKind;
 use lumiris_numbers::math::hash::HashStream;
@@ -56,19 +56,19 @@ fn maps() {
     }
 }
 
-fn tracing(path: &Path, trajectories: u64) {
+fn tracing(path: &Path, paths: u64) {
     let loaded = load(path, &LoadOptions::default()).map_err(|d| d.to_string()).unwrap();
     let job = loaded.job(AccelKind::Embree, None).unwrap();
     for threads in [1, 2] {
         let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build().unwrap();
         pool.install(|| {
-            let traced = trace_photons(&job, &Tracing::default(), None, Want::Trajectories(trajectories)).unwrap();
+            let traced = trace_photons(&job, &Tracing::default(), None, PhotonBudget::Paths(paths)).unwrap();
             let seconds = traced.elapsed.as_secs_f64();
             println!(
-                "{} on {threads} threads: {:.0} photons/s, {:.0} trajectories/s, {:.0} rays/s; {} global, {} caustic",
+                "{} on {threads} threads: {:.0} photons/s, {:.0} photon paths/s, {:.0} rays/s; {} global, {} caustic",
                 path.display(),
                 traced.arrivals_per_second(),
-                traced.trajectories as f64 / seconds,
+                traced.paths as f64 / seconds,
                 traced.rays as f64 / seconds,
                 traced.global.len(),
                 traced.caustic.len(),
@@ -76,7 +76,7 @@ fn tracing(path: &Path, trajectories: u64) {
             let start = Instant::now();
             let importance = trace_importons(&job, &ImportanceSettings::default()).unwrap();
             println!("  importance: {} importons in {:.2} s", importance.map().len(), start.elapsed().as_secs_f64());
-            let by = trace_photons(&job, &Tracing::default(), Some(&importance), Want::Trajectories(trajectories));
+            let by = trace_photons(&job, &Tracing::default(), Some(&importance), PhotonBudget::Paths(paths));
             let by = by.unwrap();
             println!("  with it: {:.0} photons/s, {} stored", by.arrivals_per_second(), by.stored());
         });

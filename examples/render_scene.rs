@@ -14,7 +14,7 @@ use std::sync::atomic::AtomicBool;
 
 fn main() -> Result<(), Box<dyn Error>> {
     let arguments: Vec<String> = std::env::args().collect();
-    let [_, scene, picture] = arguments.as_slice() else {
+    let [_, scene, image] = arguments.as_slice() else {
         return Err("usage: render_scene SCENE.pbrt PICTURE.exr".into());
     };
 
@@ -32,7 +32,7 @@ fn main() -> Result<(), Box<dyn Error>> {
     let channels = output::channels(film, &[Aov::Variance], None);
     let (width, height) = (film.bounds.width() as usize, film.bounds.height() as usize);
     let part = Part::linear(width, height, channels.names, channels.data);
-    write_image(Path::new(picture), &[part])?;
+    write_image(Path::new(image), &[part])?;
     println!("{} camera rays in {:.2} s", rendering.stats.camera_rays, rendering.elapsed.as_secs_f64());
     Ok(())
 }

@@ -4,13 +4,13 @@
 //! is 0, and in y = f·V/p_α. The estimate is ȳ − Σ_j β_j c̄_j [Fan et al. 2006, Eq. 7]; forms differ in what β is fitted to.
 //! `optimal-mis` has its systems in the columns r_j = h_j/p_α, and the form of the paper in r_j/I_j.
 
-use super::ShadePoint;
+use super::ShadingPoint;
 use super::mixture::Columns;
 use super::propose::{Candidates, Drawn};
 use super::visibility::{Segments, is_traced};
 use crate::accel::RayBatch;
 use crate::scene::RenderJob;
-use crate::settings::{EstimatorKind, IntegratorSettings, OptimalForm, Split};
+use crate::settings::{EstimatorKind, IntegratorSettings, OptimalForm, SampleCounts};
 use lumiris_numbers::estimators::ocv::{Form, NormalEquations, System};
 use lumiris_numbers::estimators::optimal_mis;
 use lumiris_numbers::math::Rgb;
@@ -144,11 +144,11 @@ pub struct Components {
 }
 
 /// Both halves of every point's samples, as points with random numbers of their own, one after the other.
-pub(super) fn halves<'a>(points: &[ShadePoint<'a>]) -> Vec<ShadePoint<'a>> {
-    let half = |point: &ShadePoint<'a>, h: u32| {
-        let samples = (point.split.samples + 1 - h) / 2;
-        let split = Split { samples, proposals: samples };
-        ShadePoint { split, stream: point.stream.domain(HALF + h), ..*point }
+pub(super) fn halves<'a>(points: &[ShadingPoint<'a>]) -> Vec<ShadingPoint<'a>> {
+    let half = |point: &ShadingPoint<'a>, h: u32| {
+        let samples = (point.sample_counts.samples + 1 - h) / 2;
+        let sample_counts = SampleCounts { samples, proposals: samples };
+        ShadingPoint { sample_counts, stream: point.stream.domain(HALF + h), ..*point }
     };
     points.iter().flat_map(|p| [half(p, 0), half(p, 1)]).collect()
 }
@@ -160,7 +160,7 @@ impl Components {
         &mut self,
         job: &RenderJob,
         settings: &IntegratorSettings,
-        points: &[ShadePoint<'_>],
+        points: &[ShadingPoint<'_>],
         (candidates, contributions, segments): (&mut Candidates, &[Rgb], &Segments),
         fits: &mut Fits,
         out: &mut [Rgb],
@@ -253,10 +253,10 @@ impl Components {
             equations.add_sparse(&mut self.sums[c.point as usize * len..][..len], &columns[..count], y.to_array());
         }
         for (mixture, sums) in candidates.mixtures.iter().zip(self.sums.chunks_mut(len)) {
-            for (component, &count) in mixture.dark[..m].iter().enumerate().filter(|(_, count)| **count > 0) {
-                equations.add_zeros(sums, (component, mixture.dark_column(component)), count);
+            for (component, &count) in mixture.zero_valued[..m].iter().enumerate().filter(|(_, count)| **count > 0) {
+                equations.add_zeros(sums, (component, mixture.zero_column(component)), count);
             }
-            equations.add_zeros(sums, (0, 0.0), mixture.void);
+            equations.add_zeros(sums, (0, 0.0), mixture.failed);
             method.finish(equations, sums, &mixture.integrals);
         }
     }

@@ -3,32 +3,32 @@
 //! S_con samples are on 𝓛_con:
 //!
 //! * |𝓛_con| ≤ S_con: every light has one, and those that are left are given to the lights by their emission area. The sum of
-//!   the lights' estimates is the estimate. A light at infinity has the area of the disk that its photons start from; lights at a
+//!   the lights' estimates is the estimate. An infinite light has the area of the disk that its photons start from; lights at a
 //!   point and distant ones have no area, and never a second sample.
 //! * |𝓛_con| > S_con: every light makes an unshadowed contribution k_l, and these are put in order [Ward 1991]. The S_con − 1
 //!   brightest are traced. Ward estimates the sum of the rest by the visibility of those; here one of them is traced, chosen with the
 //!   probability q_l = Y(k_l)/Σ Y(k) by luminance Y, and counts k_l/q_l. Its expectation is the sum of what is seen of the rest, so
 //!   the estimate is unbiased.
-//! * |𝓛_con| > [`MOST_ORDERED`]: S_con lights are chosen in proportion to the number of their photons.
+//! * |𝓛_con| > [`MAX_ORDERED`]: S_con lights are chosen in proportion to the number of their photons.
 //!
 //! S_non samples are on the others: a light chosen uniformly of the n that have power counts n times, Eq. 1 of the paper. Without
 //! these (S_non = 0) the estimate is biased. Where nothing is known all S_con + S_non are drawn as `mc` draws them.
 
-use super::ShadePoint;
-use super::propose::{Candidate, Shares, domain, light_candidate, unshadowed_candidate};
+use super::ShadingPoint;
+use super::propose::{Candidate, SampleAllocation, domain, light_candidate, unshadowed_candidate};
 use crate::lights::{Light, LightCtx, LightId, LightSample, LightSampling, LightSet};
 use crate::scene::RenderJob;
 use lumiris_numbers::math::cumulative;
 use std::f32::consts::PI;
 
 /// Most lights that are put in order at a point.
-pub const MOST_ORDERED: usize = 64;
+pub const MAX_ORDERED: usize = 64;
 
 /// The stage's buffers.
 #[derive(Debug, Default)]
 pub struct Contributing {
     /// 𝓛_con, ascending: lights with their numbers of photons.
-    seen: Vec<(LightId, u32)>,
+    contributing: Vec<(LightId, u32)>,
     /// Samples of each.
     counts: Vec<u32>,
     /// Contributions by brightness.
@@ -39,7 +39,7 @@ pub struct Contributing {
 struct At<'a> {
     lights: &'a LightSampling,
     index: u32,
-    point: &'a ShadePoint<'a>,
+    point: &'a ShadingPoint<'a>,
     ctx: LightCtx,
 }
 
@@ -48,48 +48,49 @@ impl At<'_> {
     fn sample(&self, light: LightId, pmf: f32, n: u32, u: [f32; 2]) -> Option<Candidate> {
         let sample = self.lights.lights[light as usize].sample_li(&self.ctx, u)?;
         let drawn = (light, LightSample { pdf: sample.pdf * pmf, ..sample });
-        unshadowed_candidate(self.index, self.point, &Shares::fixed(n, 0), drawn)
+        unshadowed_candidate(self.index, self.point, &SampleAllocation::fixed(n, 0), drawn)
     }
 }
 
 impl Contributing {
-    /// Draws the light samples of a point, `rest` of them on lights that no photon came from. Returns how many were drawn.
+    /// Draws the light samples of a point, `noncontributing` of them on non-contributing lights. Returns how many were
+    /// drawn.
     pub(super) fn draw(
         &mut self,
         job: &RenderJob,
-        (index, point): (u32, &ShadePoint<'_>),
-        rest: u32,
+        (index, point): (u32, &ShadingPoint<'_>),
+        noncontributing: u32,
         records: &mut Vec<Candidate>,
     ) -> u32 {
         let lights = &job.lights;
         let ctx = point.light_ctx();
         let at = At { lights, index, point, ctx };
-        self.seen.clear();
-        self.seen.extend_from_slice(lights.around(&ctx).lights);
+        self.contributing.clear();
+        self.contributing.extend_from_slice(lights.contributing_lights(&ctx).lights);
 
-        let n = point.split.samples;
-        if self.seen.is_empty() {
-            draw_by_choice(job, &at, n + rest, records);
-            return n + rest;
+        let n = point.sample_counts.samples;
+        if self.contributing.is_empty() {
+            draw_by_choice(job, &at, n + noncontributing, records);
+            return n + noncontributing;
         }
-        let drawn = if self.seen.len() <= n as usize {
+        let drawn = if self.contributing.len() <= n as usize {
             self.draw_each(&at, n, records)
-        } else if self.seen.len() <= MOST_ORDERED {
+        } else if self.contributing.len() <= MAX_ORDERED {
             self.draw_ordered(&at, n, records)
         } else {
             self.draw_by_photons(&at, n, records)
         };
-        drawn + self.draw_rest(&at, rest, records)
+        drawn + self.draw_noncontributing(&at, noncontributing, records)
     }
 
     /// At least one sample of every light that is seen.
     fn draw_each(&mut self, at: &At<'_>, n: u32, records: &mut Vec<Candidate>) -> u32 {
-        let seen = &self.seen;
-        let areas = seen.iter().map(|&(light, _)| emission_area(at.lights, light));
-        share_out(n - seen.len() as u32, areas, &mut self.counts);
-        for (k, (&(light, _), &count)) in seen.iter().zip(&self.counts).enumerate() {
+        let contributing = &self.contributing;
+        let areas = contributing.iter().map(|&(light, _)| emission_area(at.lights, light));
+        allocate_by_area(n - contributing.len() as u32, areas, &mut self.counts);
+        for (k, (&(light, _), &count)) in contributing.iter().zip(&self.counts).enumerate() {
             for i in 0..count {
-                let u = at.point.stream.split(domain::SEEN + k as u32, count, i).draw::<2>();
+                let u = at.point.stream.split(domain::CONTRIBUTING + k as u32, count, i).draw::<2>();
                 records.extend(at.sample(light, 1.0, count, u));
             }
         }
@@ -99,8 +100,8 @@ impl Contributing {
     /// The brightest contributions, and one of the others.
     fn draw_ordered(&mut self, at: &At<'_>, n: u32, records: &mut Vec<Candidate>) -> u32 {
         self.ordered.clear();
-        for (k, &(light, _)) in self.seen.iter().enumerate() {
-            let u = at.point.stream.domain(domain::SEEN + k as u32).draw::<2>();
+        for (k, &(light, _)) in self.contributing.iter().enumerate() {
+            let u = at.point.stream.domain(domain::CONTRIBUTING + k as u32).draw::<2>();
             let candidate = at.sample(light, 1.0, 1, u);
             self.ordered.extend(candidate.map(|c| (c.f.luminance() / c.p_light, c)));
         }
@@ -120,13 +121,13 @@ impl Contributing {
         });
         let chosen = chosen.map(|(_, (brightness, c))| Candidate { n_light: brightness / total, ..*c });
         records.extend(chosen.filter(|c| c.n_light > 0.0));
-        self.seen.len() as u32
+        self.contributing.len() as u32
     }
 
     /// Lights by the number of their photons.
     fn draw_by_photons(&mut self, at: &At<'_>, n: u32, records: &mut Vec<Candidate>) -> u32 {
         // Sums up to and with each light, in place of the numbers
-        let numbers = self.seen.iter().map(|&(_, count)| count);
+        let numbers = self.contributing.iter().map(|&(_, count)| count);
         self.counts.clear();
         self.counts.extend(numbers.scan(0_u32, |sum, count| {
             *sum = sum.saturating_add(count);
@@ -135,33 +136,33 @@ impl Contributing {
         let total = self.counts.last().copied().unwrap_or(0) as f32;
         for i in 0..n {
             let [u_choice, u0, u1] = at.point.stream.split(domain::LIGHT, n, i).draw::<3>();
-            let k = cumulative::find(&self.counts, u_choice * total).min(self.seen.len() - 1);
+            let k = cumulative::find(&self.counts, u_choice * total).min(self.contributing.len() - 1);
             let pmf = cumulative::weight(&self.counts, k) / total;
-            records.extend(at.sample(self.seen[k].0, pmf, n, [u0, u1]));
+            records.extend(at.sample(self.contributing[k].0, pmf, n, [u0, u1]));
         }
         n
     }
 
-    /// Lights that no photon came from, uniformly.
-    fn draw_rest(&self, at: &At<'_>, rest: u32, records: &mut Vec<Candidate>) -> u32 {
+    /// Non-contributing lights, uniformly.
+    fn draw_noncontributing(&self, at: &At<'_>, noncontributing: u32, records: &mut Vec<Candidate>) -> u32 {
         let lit = &at.lights.lit;
-        let others = lit.len() - self.seen.len();
+        let others = lit.len() - self.contributing.len();
         if others == 0 {
             return 0;
         }
-        for i in 0..rest {
-            let [u_choice, u0, u1] = at.point.stream.split(domain::REST, rest, i).draw::<3>();
+        for i in 0..noncontributing {
+            let [u_choice, u0, u1] = at.point.stream.split(domain::NONCONTRIBUTING, noncontributing, i).draw::<3>();
             let mut place = ((f64::from(u_choice) * others as f64) as usize).min(others - 1);
             // Those that are seen are passed over
-            for &(light, _) in &self.seen {
+            for &(light, _) in &self.contributing {
                 if lit[place] < light {
                     break;
                 }
                 place += 1;
             }
-            records.extend(at.sample(lit[place], 1.0 / others as f32, rest, [u0, u1]));
+            records.extend(at.sample(lit[place], 1.0 / others as f32, noncontributing, [u0, u1]));
         }
-        rest
+        noncontributing
     }
 }
 
@@ -170,7 +171,8 @@ fn draw_by_choice(job: &RenderJob, at: &At<'_>, n: u32, records: &mut Vec<Candid
     for i in 0..n {
         let [u_choice, u0, u1] = at.point.stream.split(domain::LIGHT, n, i).draw::<3>();
         let drawn = at.lights.sample(&at.ctx, u_choice, [u0, u1]);
-        let candidate = drawn.and_then(|drawn| light_candidate(job, at.index, at.point, &Shares::fixed(n, 0), drawn));
+        let candidate =
+            drawn.and_then(|drawn| light_candidate(job, at.index, at.point, &SampleAllocation::fixed(n, 0), drawn));
         records.extend(candidate);
     }
 }
@@ -185,7 +187,7 @@ fn emission_area(lights: &LightSet, light: LightId) -> f32 {
 }
 
 /// One for each, and `extra` in proportion to the areas, rounded so that sums are off by less than one.
-fn share_out(extra: u32, areas: impl Iterator<Item = f32> + Clone, counts: &mut Vec<u32>) {
+fn allocate_by_area(extra: u32, areas: impl Iterator<Item = f32> + Clone, counts: &mut Vec<u32>) {
     let total: f64 = areas.clone().map(f64::from).sum();
     let scale = if total > 0.0 && total.is_finite() { f64::from(extra) / total } else { 0.0 };
     let (mut sum, mut given) = (0.0, 0);
@@ -204,10 +206,10 @@ mod tests {
     use super::*;
 
     #[test]
-    fn samples_are_shared_out_by_area_with_one_for_each() {
+    fn samples_are_allocated_by_area_with_one_for_each() {
         let shared = |extra, areas: &[f32]| {
             let mut counts = vec![7];
-            share_out(extra, areas.iter().copied(), &mut counts);
+            allocate_by_area(extra, areas.iter().copied(), &mut counts);
             counts
         };
         assert_eq!(shared(0, &[1.0, 5.0]), [1, 1]);

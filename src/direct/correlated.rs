@@ -8,20 +8,20 @@
 //!
 //! * **BSDF sampling.** g is summed over all lights along the ray. E(c) = 0 asks for p > 0 wherever g > 0, and a useful variance for a
 //!   bounded g/p. Both hold for BSDFs that sample a cosine or uniform lobe on the side of wo with a probability of at least
-//!   [`LEAST_WIDE_LOBE`] ([`crate::bsdfs::Bsdf::wide_lobe`]): diffuse, most coated and layered ones, and those that are only
+//!   [`MIN_WIDE_LOBE`] ([`crate::bsdfs::Bsdf::wide_lobe`]): diffuse, most coated and layered ones, and those that are only
 //!   evaluated. Mirror directions of a smooth coat are samples of g = 0. Of all others (metal, glass) the density of a peak is next to
-//!   nothing in most of the hemisphere; they have g = 0 everywhere, which leaves importance sampling. Lights that no ray can hit have
+//!   nothing in most of the hemisphere; they have g = 0 everywhere, which leaves importance sampling. Delta lights have
 //!   samples of their own, one of four and at least one, whose estimate is added; a single sample decides by itself which of both it
 //!   is.
 //! * **Light sampling.** The domain is that of points on lights: a sample has the g of its own light, and p includes the choice of
-//!   that light. It is positive wherever g is, whatever the BSDF. Lights that no ray can hit are samples of g = 0. Specular lobes have
+//!   that light. It is positive wherever g is, whatever the BSDF. Delta lights are samples of g = 0. Specular lobes have
 //!   one BSDF sample of their own in addition; BSDFs that are nothing else are sampled by the BSDF.
 //!
 //! A sample whose integrand is zero counts with its g like any other.
 
-use super::ShadePoint;
+use super::ShadingPoint;
 use super::propose::{
-    Candidate, Candidates, PendingBsdf, Shares, bsdf_candidate, domain, light_candidate, with_infinite,
+    Candidate, Candidates, PendingBsdf, SampleAllocation, bsdf_candidate, domain, light_candidate, with_infinite,
 };
 use super::visibility::{Segments, is_traced};
 use crate::accel::{Hit, RayBatch};
@@ -35,9 +35,9 @@ use std::f32::consts::FRAC_1_PI;
 use std::time::Instant;
 
 /// Least probability of a wide lobe for which BSDF samples have a control variate.
-pub const LEAST_WIDE_LOBE: f32 = 0.01;
-/// Of this many samples, one is drawn for lights that no ray can hit.
-pub const DELTA_SHARE: u32 = 4;
+pub const MIN_WIDE_LOBE: f32 = 0.01;
+/// Of this many samples, one is drawn for delta lights.
+pub const DELTA_DIVISOR: u32 = 4;
 
 /// How the samples of a point are drawn.
 #[derive(Clone, Copy, Debug)]
@@ -45,11 +45,11 @@ struct Plan {
     technique: SamplingTechnique,
     /// Samples of the combination.
     n: u32,
-    /// Those that the technique draws; one less if the only one is of a light that no ray can hit.
+    /// Those that the technique draws; one less if the only one is of a delta light.
     draws: u32,
     /// Probability that a sample of the combination is drawn by the technique.
-    share: f32,
-    /// Samples of lights that no ray can hit, and how many are expected.
+    probability: f32,
+    /// Samples of delta lights, and how many are expected.
     delta_draws: u32,
     n_delta: f32,
     /// BSDF samples for specular lobes, outside the combination.
@@ -57,20 +57,20 @@ struct Plan {
 }
 
 impl Plan {
-    fn new(job: &RenderJob, settings: &IntegratorSettings, point: &ShadePoint<'_>) -> Self {
-        let n = point.split.samples;
+    fn new(job: &RenderJob, settings: &IntegratorSettings, point: &ShadingPoint<'_>) -> Self {
+        let n = point.sample_counts.samples;
         let bsdf = &point.bsdf.bsdf;
         let technique = if bsdf.has_non_specular() { settings.correlated.technique } else { SamplingTechnique::Bsdf };
-        let all = Plan { technique, n, draws: n, share: 1.0, delta_draws: 0, n_delta: 0.0, specular_draws: 0 };
+        let all = Plan { technique, n, draws: n, probability: 1.0, delta_draws: 0, n_delta: 0.0, specular_draws: 0 };
         match technique {
             SamplingTechnique::Light => Plan { specular_draws: u32::from(n > 0 && bsdf.has_specular()), ..all },
             SamplingTechnique::Bsdf if job.lights.delta.is_none() || !bsdf.has_non_specular() || n == 0 => all,
             SamplingTechnique::Bsdf if n == 1 => {
                 let is_delta = u32::from(point.stream.domain(domain::TECHNIQUE).draw::<1>()[0] < 0.5);
-                Plan { draws: 1 - is_delta, share: 0.5, delta_draws: is_delta, n_delta: 0.5, ..all }
+                Plan { draws: 1 - is_delta, probability: 0.5, delta_draws: is_delta, n_delta: 0.5, ..all }
             }
             SamplingTechnique::Bsdf => {
-                let delta = (n / DELTA_SHARE).max(1);
+                let delta = (n / DELTA_DIVISOR).max(1);
                 Plan { n: n - delta, draws: n - delta, delta_draws: delta, n_delta: delta as f32, ..all }
             }
         }
@@ -78,12 +78,12 @@ impl Plan {
 
     /// Expected number of samples that the technique draws.
     fn n_technique(&self) -> f32 {
-        self.n as f32 * self.share
+        self.n as f32 * self.probability
     }
 
-    /// True if samples of lights that no ray can hit are samples of the combination.
+    /// True if samples of delta lights are samples of the combination.
     fn has_delta_inside(&self) -> bool {
-        self.share < 1.0
+        self.probability < 1.0
     }
 }
 
@@ -101,11 +101,11 @@ struct Estimate {
 }
 
 impl Estimate {
-    fn new(job: &RenderJob, settings: &IntegratorSettings, point: &ShadePoint<'_>) -> Self {
+    fn new(job: &RenderJob, settings: &IntegratorSettings, point: &ShadingPoint<'_>) -> Self {
         let plan = Plan::new(job, settings, point);
         let is_controlled = match plan.technique {
             SamplingTechnique::Light => true,
-            SamplingTechnique::Bsdf => point.bsdf.wide_lobe(point.wo) >= LEAST_WIDE_LOBE,
+            SamplingTechnique::Bsdf => point.bsdf.wide_lobe(point.wo) >= MIN_WIDE_LOBE,
         };
         let z = point.bsdf.frame.z;
         let n = if z.dot(point.wo) < 0.0 { -z } else { z };
@@ -128,7 +128,7 @@ impl Estimate {
         if !self.has_g(wi) {
             return self.without_g();
         }
-        (l * (self.n.dot(wi) * FRAC_1_PI / (self.plan.share * pdf)) - self.integral).to_array()
+        (l * (self.n.dot(wi) * FRAC_1_PI / (self.plan.probability * pdf)) - self.integral).to_array()
     }
 
     /// c of a sample of g = 0.
@@ -161,7 +161,7 @@ impl Correlated {
         &mut self,
         job: &RenderJob,
         settings: &IntegratorSettings,
-        points: &[ShadePoint<'_>],
+        points: &[ShadingPoint<'_>],
         candidates: &mut Candidates,
     ) {
         candidates.clear();
@@ -203,12 +203,12 @@ impl Correlated {
         }
     }
 
-    /// Samples of lights that no ray can hit.
-    fn draw_delta(&mut self, job: &RenderJob, index: usize, point: &ShadePoint<'_>, candidates: &mut Candidates) {
+    /// Samples of delta lights.
+    fn draw_delta(&mut self, job: &RenderJob, index: usize, point: &ShadingPoint<'_>, candidates: &mut Candidates) {
         let estimate = &mut self.estimates[index];
         let Plan { delta_draws, n_delta, .. } = estimate.plan;
         let Some(sampler) = job.lights.delta.as_ref().filter(|_| delta_draws > 0) else { return };
-        let shares = Shares { light_draws: delta_draws, bsdf_draws: 0, n_light: n_delta, n_bsdf: 0.0 };
+        let allocation = SampleAllocation { light_draws: delta_draws, bsdf_draws: 0, n_light: n_delta, n_bsdf: 0.0 };
         let control = estimate.plan.has_delta_inside().then_some(estimate.without_g());
         let ctx = point.light_ctx();
         candidates.proposals += u64::from(delta_draws);
@@ -218,7 +218,7 @@ impl Correlated {
             let candidate = sampler
                 .sample(&ctx, u_choice)
                 .and_then(|choice| job.lights.sample_choice(&ctx, choice, [u0, u1]))
-                .and_then(|drawn| light_candidate(job, index as u32, point, &shares, drawn));
+                .and_then(|drawn| light_candidate(job, index as u32, point, &allocation, drawn));
             match (candidate, control) {
                 (Some(candidate), control) => {
                     candidates.records.push(candidate);
@@ -231,10 +231,10 @@ impl Correlated {
     }
 
     /// Samples of the combination by light sampling.
-    fn draw_light(&mut self, job: &RenderJob, index: usize, point: &ShadePoint<'_>, candidates: &mut Candidates) {
+    fn draw_light(&mut self, job: &RenderJob, index: usize, point: &ShadingPoint<'_>, candidates: &mut Candidates) {
         let estimate = &mut self.estimates[index];
         let n = estimate.plan.draws;
-        let shares = Shares::fixed(n, 0);
+        let allocation = SampleAllocation::fixed(n, 0);
         let ctx = point.light_ctx();
         candidates.proposals += u64::from(n);
         candidates.light_proposals += u64::from(n);
@@ -248,7 +248,7 @@ impl Correlated {
                 }
                 Some(_) | None => estimate.without_g(),
             };
-            match drawn.and_then(|drawn| light_candidate(job, index as u32, point, &shares, drawn)) {
+            match drawn.and_then(|drawn| light_candidate(job, index as u32, point, &allocation, drawn)) {
                 Some(candidate) => {
                     candidates.records.push(candidate);
                     self.controls.push(Some(control));
@@ -259,7 +259,7 @@ impl Correlated {
     }
 
     /// BSDF samples, up to the question which lights they point at.
-    fn draw_bsdf(&mut self, index: usize, point: &ShadePoint<'_>, candidates: &mut Candidates) {
+    fn draw_bsdf(&mut self, index: usize, point: &ShadingPoint<'_>, candidates: &mut Candidates) {
         let estimate = &mut self.estimates[index];
         let plan = estimate.plan;
         let (n, expected) = match plan.technique {
@@ -287,13 +287,13 @@ impl Correlated {
                 pdf: s.pdf,
                 specular: s.lobe.is_specular(),
                 lobe: 0,
-                shares: Shares { light_draws: 0, bsdf_draws: n, n_light: 0.0, n_bsdf: expected },
+                allocation: SampleAllocation { light_draws: 0, bsdf_draws: n, n_light: 0.0, n_bsdf: expected },
             });
         }
     }
 
     /// Finds what BSDF samples point at: the first emitter for the integrand, and all of them for g.
-    fn follow(&mut self, job: &RenderJob, points: &[ShadePoint<'_>], candidates: &mut Candidates) {
+    fn follow(&mut self, job: &RenderJob, points: &[ShadingPoint<'_>], candidates: &mut Candidates) {
         self.found.clear();
         self.crossed.clear();
         self.crossed.resize(self.pending.len(), job.irradiances.environment());

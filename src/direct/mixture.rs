@@ -6,11 +6,11 @@
 //! expectation I_j under the mixture, exactly. For that
 //!
 //! * a light sample that another emitter hides has no density of BSDF sampling, which stops at the first emitter;
-//! * a *dark* sample, whose unshadowed integrand is zero, belongs to the component that drew it alone, as if every component had
-//!   a dark place of its own: its other densities need not be found.
+//! * a *zero-valued* sample, whose unshadowed integrand is zero, belongs to the component that drew it alone, as if
+//!   every component had a dark place of its own: its other densities need not be found.
 
-use super::ShadePoint;
-use super::propose::{Candidate, Shares};
+use super::ShadingPoint;
+use super::propose::{Candidate, SampleAllocation};
 use crate::bsdfs::MAX_LOBES;
 use crate::lights::groups::MAX_GROUPS;
 use crate::scene::RenderJob;
@@ -26,9 +26,9 @@ pub struct Mixture {
     /// I_j: lobes, then groups.
     pub integrals: Columns,
     /// Dark samples by the component that drew them.
-    pub dark: [u32; MAX_COMPONENTS],
+    pub zero_valued: [u32; MAX_COMPONENTS],
     /// Light samples for which there was no light to choose.
-    pub void: u32,
+    pub failed: u32,
     /// N.
     n: f32,
     n_light: f32,
@@ -38,23 +38,28 @@ pub struct Mixture {
 
 impl Mixture {
     /// The mixture at a point where groups are chosen with probabilities `pmfs`.
-    pub(super) fn new(job: &RenderJob, point: &ShadePoint<'_>, shares: &Shares, pmfs: &[f32; MAX_GROUPS]) -> Self {
+    pub(super) fn new(
+        job: &RenderJob,
+        point: &ShadingPoint<'_>,
+        allocation: &SampleAllocation,
+        pmfs: &[f32; MAX_GROUPS],
+    ) -> Self {
         let lobes = job.lobes();
         let mut integrals = [0.0; MAX_COMPONENTS];
-        if shares.n_bsdf > 0.0 {
+        if allocation.n_bsdf > 0.0 {
             integrals[0] = if lobes == MAX_LOBES { point.bsdf.first_lobe(point.wo) } else { 1.0 };
             if lobes == MAX_LOBES {
                 integrals[1] = 1.0 - integrals[0];
             }
         }
-        if shares.n_light > 0.0 {
+        if allocation.n_light > 0.0 {
             for (integral, pmf) in integrals[lobes..].iter_mut().zip(pmfs) {
                 *integral = *pmf;
             }
         }
-        let n = shares.n_light + shares.n_bsdf;
-        let (n_light, n_bsdf) = (shares.n_light, shares.n_bsdf);
-        Mixture { integrals, dark: [0; MAX_COMPONENTS], void: 0, n, n_light, n_bsdf, lobes }
+        let n = allocation.n_light + allocation.n_bsdf;
+        let (n_light, n_bsdf) = (allocation.n_light, allocation.n_bsdf);
+        Mixture { integrals, zero_valued: [0; MAX_COMPONENTS], failed: 0, n, n_light, n_bsdf, lobes }
     }
 
     /// The lobe that a BSDF sample of the number `uc` is drawn from.
@@ -65,7 +70,7 @@ impl Mixture {
 
     /// Density of the first lobe in the direction `wi`, where that of all lobes is `pdf`.
     #[inline]
-    pub(super) fn p_lobe(&self, point: &ShadePoint<'_>, wi: Vec3, pdf: f32) -> f32 {
+    pub(super) fn p_lobe(&self, point: &ShadingPoint<'_>, wi: Vec3, pdf: f32) -> f32 {
         if self.lobes == MAX_LOBES && pdf > 0.0 { point.bsdf.pdf_first_lobe(point.wo, wi, pdf) } else { pdf }
     }
 
@@ -102,7 +107,7 @@ impl Mixture {
 
     /// r_j of a dark sample of component j; the other columns are 0.
     #[inline]
-    pub fn dark_column(&self, component: usize) -> f32 {
+    pub fn zero_column(&self, component: usize) -> f32 {
         self.n / if component < self.lobes { self.n_bsdf } else { self.n_light }
     }
 }

@@ -24,7 +24,7 @@ use crate::accel::RayBatch;
 use crate::lights::LightCtx;
 use crate::materials::SurfaceBsdf;
 use crate::scene::RenderJob;
-use crate::settings::{EstimatorKind, IntegratorSettings, Split};
+use crate::settings::{EstimatorKind, IntegratorSettings, SampleCounts};
 pub use components::Fits;
 use components::{Components, halves};
 use correlated::Correlated;
@@ -38,7 +38,7 @@ use visibility::Segments;
 
 /// A point whose direct light is wanted.
 #[derive(Clone, Copy, Debug)]
-pub struct ShadePoint<'a> {
+pub struct ShadingPoint<'a> {
     /// The point.
     pub p: Vec3,
     /// Bound of the rounding error of `p`.
@@ -52,12 +52,12 @@ pub struct ShadePoint<'a> {
     /// Random numbers of this point; each technique takes a domain of it.
     pub stream: SampleStream,
     /// Numbers of samples and proposals.
-    pub split: Split,
+    pub sample_counts: SampleCounts,
     /// The fit that the point takes part in, where there are any.
     pub fit: u32,
 }
 
-impl ShadePoint<'_> {
+impl ShadingPoint<'_> {
     /// The origin of a ray that leaves the point towards `w`.
     #[inline]
     pub fn origin(&self, w: Vec3) -> Vec3 {
@@ -152,7 +152,7 @@ impl DirectStage {
         &mut self,
         job: &RenderJob,
         settings: &IntegratorSettings,
-        points: &[ShadePoint<'_>],
+        points: &[ShadingPoint<'_>],
         fits: &mut Fits,
         out: &mut Vec<Rgb>,
     ) {

@@ -8,7 +8,7 @@
 //!
 //! A proposal keeps q̂, r = w/(m·p) and q̂·r only. Those few that are drawn are sampled again, one at a time.
 
-use super::ShadePoint;
+use super::ShadingPoint;
 use super::propose::Candidate;
 use crate::lights::{LightId, LightLanes, LightRun};
 use crate::scene::RenderJob;
@@ -111,7 +111,7 @@ impl Proposals {
     pub fn add(
         &mut self,
         job: &RenderJob,
-        point: &ShadePoint<'_>,
+        point: &ShadingPoint<'_>,
         techniques: &Techniques,
         (light_draws, positions, phi): (u32, ProposalPoints, f32),
         bsdf_samples: &[Candidate],
@@ -126,12 +126,12 @@ impl Proposals {
             self.sample_lights(job, point, start, bsdf_start);
             self.weigh_lights(job, point, techniques, start, bsdf_start);
         }
-        let around = job.lights.around(&point.light_ctx());
+        let contributing = job.lights.contributing_lights(&point.light_ctx());
         for (i, c) in (bsdf_start..end).zip(bsdf_samples) {
             let cos = || point.bsdf.cos(c.segment.d.normalize());
             self.p_hat[i] = match techniques.target {
                 Target::Fgl => c.f.luminance(),
-                Target::Visibility => c.f.luminance() * around.visibility(c.light),
+                Target::Visibility => c.f.luminance() * contributing.visibility(c.light),
                 // The cosine of a delta is part of its weight
                 Target::Gv | Target::Gvl if c.drawn.is_delta() => c.f.luminance(),
                 Target::Gv => cos(),
@@ -161,7 +161,7 @@ impl Proposals {
     }
 
     /// Lights at the positions, and directions to them.
-    fn sample_lights(&mut self, job: &RenderJob, point: &ShadePoint<'_>, start: usize, end: usize) {
+    fn sample_lights(&mut self, job: &RenderJob, point: &ShadingPoint<'_>, start: usize, end: usize) {
         let lights = &job.lights;
         let ctx = point.light_ctx();
         lights.sampler.runs(&ctx, &self.positions, &mut self.runs);
@@ -191,7 +191,7 @@ impl Proposals {
             self.light[from..to].fill(run.light);
             self.pmf[from..to].fill(run.pmf);
 
-            // Lights at infinity overlap: a direction belongs to all of them together
+            // Infinite lights overlap: a direction belongs to all of them together
             if lights.infinite.len() > 1 && lights.infinite.contains(&run.light) {
                 for i in from..to {
                     if !(self.p_light[i] > 0.0) {
@@ -210,7 +210,7 @@ impl Proposals {
     fn weigh_lights(
         &mut self,
         job: &RenderJob,
-        point: &ShadePoint<'_>,
+        point: &ShadingPoint<'_>,
         techniques: &Techniques,
         start: usize,
         end: usize,
@@ -257,9 +257,9 @@ impl Proposals {
                 }
             }
             Target::Visibility => {
-                let around = job.lights.around(&point.light_ctx());
+                let contributing = job.lights.contributing_lights(&point.light_ctx());
                 for run in &self.runs {
-                    let visibility = around.visibility(run.light);
+                    let visibility = contributing.visibility(run.light);
                     let places = start + run.places[0] as usize..start + run.places[1] as usize;
                     self.p_hat[places.clone()].iter_mut().for_each(|p_hat| *p_hat *= visibility);
                     self.weight[places].iter_mut().for_each(|weight| *weight *= visibility);

@@ -1,6 +1,6 @@
 //! T1: candidates with their unshadowed integrand and the densities of every technique, one at a time.
 
-use super::ShadePoint;
+use super::ShadingPoint;
 use super::contributing::Contributing;
 use super::mixture::Mixture;
 use crate::accel::{Hit, RayBatch};
@@ -22,14 +22,14 @@ pub(super) mod domain {
     pub(crate) const TECHNIQUE: u32 = 2;
     /// Where the samples of groups begin and end.
     pub(crate) const GROUPS: u32 = 3;
-    /// Lights that no ray can hit, where they are sampled by themselves.
+    /// Delta lights, where they are sampled by themselves.
     pub(crate) const DELTA: u32 = 4;
-    /// Lights that no photon came from.
-    pub(crate) const REST: u32 = 5;
+    /// Non-contributing lights.
+    pub(crate) const NONCONTRIBUTING: u32 = 5;
     /// Which of the dim lights is traced.
     pub(crate) const DIM: u32 = 6;
-    /// Light number k of those that are seen uses the domain `SEEN + k`.
-    pub(crate) const SEEN: u32 = 64;
+    /// Light number k of those that are seen uses the domain `CONTRIBUTING + k`.
+    pub(crate) const CONTRIBUTING: u32 = 64;
     /// Group g uses the domain `GROUP + g`.
     pub(crate) const GROUP: u32 = 16;
 }
@@ -137,12 +137,12 @@ pub(super) struct PendingBsdf {
     pub specular: bool,
     /// The lobe that was sampled, of those that a mixture tells apart.
     pub lobe: usize,
-    pub shares: Shares,
+    pub allocation: SampleAllocation,
 }
 
 /// How many samples each technique has at a point.
 #[derive(Clone, Copy, Debug)]
-pub(super) struct Shares {
+pub(super) struct SampleAllocation {
     pub light_draws: u32,
     pub bsdf_draws: u32,
     /// Expected numbers.
@@ -150,35 +150,37 @@ pub(super) struct Shares {
     pub n_bsdf: f32,
 }
 
-impl Shares {
+impl SampleAllocation {
     /// So many of each.
     pub(super) fn fixed(light: u32, bsdf: u32) -> Self {
-        Shares { light_draws: light, bsdf_draws: bsdf, n_light: light as f32, n_bsdf: bsdf as f32 }
+        SampleAllocation { light_draws: light, bsdf_draws: bsdf, n_light: light as f32, n_bsdf: bsdf as f32 }
     }
 
     /// A single sample that chooses its technique at random, so that the expected numbers are one half each.
-    pub(super) fn one_of_both(point: &ShadePoint<'_>) -> Self {
+    pub(super) fn one_of_both(point: &ShadingPoint<'_>) -> Self {
         let light = point.stream.domain(domain::TECHNIQUE).draw::<1>()[0] < 0.5;
-        Shares { light_draws: u32::from(light), bsdf_draws: u32::from(!light), n_light: 0.5, n_bsdf: 0.5 }
+        SampleAllocation { light_draws: u32::from(light), bsdf_draws: u32::from(!light), n_light: 0.5, n_bsdf: 0.5 }
     }
 
     /// Splits the samples, or the proposals, between the techniques.
-    fn new(settings: &IntegratorSettings, point: &ShadePoint<'_>) -> Self {
-        let n = point.split.samples;
+    fn new(settings: &IntegratorSettings, point: &ShadingPoint<'_>) -> Self {
+        let n = point.sample_counts.samples;
         if !point.bsdf.bsdf.has_non_specular() {
-            return Shares::fixed(0, n);
+            return SampleAllocation::fixed(0, n);
         }
         match settings.estimator {
             EstimatorKind::Mc | EstimatorKind::Contributing => {
-                Shares::fixed(n, u32::from(point.bsdf.bsdf.has_specular()))
+                SampleAllocation::fixed(n, u32::from(point.bsdf.bsdf.has_specular()))
             }
-            EstimatorKind::Mis | EstimatorKind::Ocv | EstimatorKind::OptimalMis if n == 1 => Shares::one_of_both(point),
+            EstimatorKind::Mis | EstimatorKind::Ocv | EstimatorKind::OptimalMis if n == 1 => {
+                SampleAllocation::one_of_both(point)
+            }
             EstimatorKind::Mis | EstimatorKind::Ocv | EstimatorKind::OptimalMis => {
-                let by_bsdf = ((n as f32 * settings.bsdf_share) as u32).clamp(1, n - 1);
-                Shares::fixed(n - by_bsdf, by_bsdf)
+                let by_bsdf = ((n as f32 * settings.bsdf_fraction) as u32).clamp(1, n - 1);
+                SampleAllocation::fixed(n - by_bsdf, by_bsdf)
             }
-            EstimatorKind::Ris => super::ris::shares(point),
-            EstimatorKind::Correlated => Shares::fixed(0, n),
+            EstimatorKind::Ris => super::ris::allocation(point),
+            EstimatorKind::Correlated => SampleAllocation::fixed(0, n),
         }
     }
 }
@@ -194,7 +196,7 @@ impl Candidates {
 
     /// Draws the candidates of all points; for `ris` only those by BSDF sampling, since light samples are many and stay
     /// with [`super::ris`].
-    pub fn propose(&mut self, job: &RenderJob, settings: &IntegratorSettings, points: &[ShadePoint<'_>]) {
+    pub fn propose(&mut self, job: &RenderJob, settings: &IntegratorSettings, points: &[ShadingPoint<'_>]) {
         self.clear();
         self.pending.clear();
         self.rays.clear();
@@ -203,33 +205,32 @@ impl Candidates {
         // Light samples
         let start = Instant::now();
         for (index, point) in points.iter().enumerate() {
-            let shares = Shares::new(settings, point);
-            self.proposals += u64::from(shares.light_draws + shares.bsdf_draws);
-            self.light_proposals += u64::from(shares.light_draws);
+            let allocation = SampleAllocation::new(settings, point);
+            self.proposals += u64::from(allocation.light_draws + allocation.bsdf_draws);
+            self.light_proposals += u64::from(allocation.light_draws);
             if settings.estimator == EstimatorKind::Ris {
                 continue;
             }
             if settings.estimator == EstimatorKind::Contributing {
-                if shares.light_draws > 0 {
-                    let rest = settings.contributing.rest_samples;
-                    let drawn = self.contributing.draw(job, (index as u32, point), rest, &mut self.records);
-                    self.proposals = self.proposals + u64::from(drawn) - u64::from(shares.light_draws);
-                    self.light_proposals = self.light_proposals + u64::from(drawn) - u64::from(shares.light_draws);
+                if allocation.light_draws > 0 {
+                    let noncontributing = settings.contributing.noncontributing_samples;
+                    let drawn = self.contributing.draw(job, (index as u32, point), noncontributing, &mut self.records);
+                    self.proposals = self.proposals + u64::from(drawn) - u64::from(allocation.light_draws);
+                    self.light_proposals = self.light_proposals + u64::from(drawn) - u64::from(allocation.light_draws);
                 }
                 continue;
             }
             if has_components {
-                self.draw_groups(job, index as u32, point, &shares);
+                self.draw_groups(job, index as u32, point, &allocation);
                 continue;
             }
-            for i in 0..shares.light_draws {
-                let stream = point.stream.split(domain::LIGHT, shares.light_draws, i);
+            for i in 0..allocation.light_draws {
+                let stream = point.stream.split(domain::LIGHT, allocation.light_draws, i);
                 let [u_choice, u0, u1] = stream.draw::<3>();
                 let ctx = point.light_ctx();
-                let candidate = job
-                    .lights
-                    .sample(&ctx, u_choice, [u0, u1])
-                    .and_then(|(light, sample)| light_candidate(job, index as u32, point, &shares, (light, sample)));
+                let candidate = job.lights.sample(&ctx, u_choice, [u0, u1]).and_then(|(light, sample)| {
+                    light_candidate(job, index as u32, point, &allocation, (light, sample))
+                });
                 self.records.extend(candidate);
             }
         }
@@ -237,10 +238,10 @@ impl Candidates {
 
         // BSDF samples up to the question which emitter they point at
         for (index, point) in points.iter().enumerate() {
-            let shares = Shares::new(settings, point);
-            for i in 0..shares.bsdf_draws {
-                let stream = point.stream.split(domain::BSDF, shares.bsdf_draws, i);
-                self.draw_bsdf(index as u32, point, shares, stream);
+            let allocation = SampleAllocation::new(settings, point);
+            for i in 0..allocation.bsdf_draws {
+                let stream = point.stream.split(domain::BSDF, allocation.bsdf_draws, i);
+                self.draw_bsdf(index as u32, point, allocation, stream);
             }
         }
 
@@ -254,7 +255,7 @@ impl Candidates {
                 match &mut candidate {
                     Some(c) if pending.specular => c.p_lobe = if pending.lobe == 0 { c.p_bsdf } else { 0.0 },
                     Some(c) => c.p_lobe = mixture.p_lobe(point, pending.wi, c.p_bsdf),
-                    None => mixture.dark[pending.lobe] += 1,
+                    None => mixture.zero_valued[pending.lobe] += 1,
                 }
             }
             self.records.extend(candidate);
@@ -263,12 +264,12 @@ impl Candidates {
 
     /// Draws the light samples of a point for each group of lights by itself: of N samples as many as its probability says,
     /// a fraction decided by one random number for all groups.
-    fn draw_groups(&mut self, job: &RenderJob, index: u32, point: &ShadePoint<'_>, shares: &Shares) {
+    fn draw_groups(&mut self, job: &RenderJob, index: u32, point: &ShadingPoint<'_>, allocation: &SampleAllocation) {
         let lights = &job.lights;
         let ctx = point.light_ctx();
-        let n = shares.light_draws;
-        let pmfs = if shares.n_light > 0.0 { lights.groups.pmfs(&lights.sampler, &ctx) } else { [0.0; MAX_GROUPS] };
-        let mut mixture = Mixture::new(job, point, shares, &pmfs);
+        let n = allocation.light_draws;
+        let pmfs = if allocation.n_light > 0.0 { lights.groups.pmfs(&lights.sampler, &ctx) } else { [0.0; MAX_GROUPS] };
+        let mut mixture = Mixture::new(job, point, allocation, &pmfs);
 
         // Samples stand at (i + u)/N; those of a group lie between the sums of probabilities
         let [u] = point.stream.domain(domain::GROUPS).draw::<1>();
@@ -283,22 +284,22 @@ impl Candidates {
                 let [u0, u1, u_choice] = stream.draw::<3>();
                 let sample = lights.sample_group(&ctx, (group, pmf), u_choice, [u0, u1]);
                 let candidate = sample.and_then(|(light, sample)| {
-                    let c = light_candidate(job, index, point, shares, (light, sample))?;
+                    let c = light_candidate(job, index, point, allocation, (light, sample))?;
                     let p_lobe = mixture.p_lobe(point, sample.wi, c.p_bsdf);
                     Some(Candidate { group: group as u8, p_lobe, ..c })
                 });
                 if candidate.is_none() {
-                    mixture.dark[mixture.component(group)] += 1;
+                    mixture.zero_valued[mixture.component(group)] += 1;
                 }
                 self.records.extend(candidate);
             }
             first = end;
         }
-        mixture.void = n - first;
+        mixture.failed = n - first;
         self.mixtures.push(mixture);
     }
 
-    fn draw_bsdf(&mut self, index: u32, point: &ShadePoint<'_>, shares: Shares, stream: SampleStream) {
+    fn draw_bsdf(&mut self, index: u32, point: &ShadingPoint<'_>, allocation: SampleAllocation, stream: SampleStream) {
         let [uc, u0, u1] = stream.draw::<3>();
         let lobe = self.mixtures.get(index as usize).map_or(0, |mixture| mixture.lobe(uc));
         let sample = point.bsdf.sample(point.wo, uc, [u0, u1]);
@@ -306,7 +307,7 @@ impl Candidates {
             sample.map(|s| (s.f * s.wi.dot(point.bsdf.frame.z).abs(), s)).filter(|(f_cos, _)| !f_cos.is_black());
         let Some((f_cos, sample)) = sample else {
             if let Some(mixture) = self.mixtures.get_mut(index as usize) {
-                mixture.dark[lobe] += 1;
+                mixture.zero_valued[lobe] += 1;
             }
             return;
         };
@@ -319,7 +320,7 @@ impl Candidates {
             pdf: sample.pdf,
             specular: sample.lobe.is_specular(),
             lobe,
-            shares,
+            allocation,
         });
     }
 }
@@ -341,19 +342,19 @@ pub(super) fn with_infinite(
 pub(super) fn light_candidate(
     job: &RenderJob,
     index: u32,
-    point: &ShadePoint<'_>,
-    shares: &Shares,
+    point: &ShadingPoint<'_>,
+    allocation: &SampleAllocation,
     drawn: (LightId, LightSample),
 ) -> Option<Candidate> {
-    // Lights at infinity overlap: a direction belongs to all of them together
-    unshadowed_candidate(index, point, shares, with_infinite(job, &point.light_ctx(), drawn))
+    // Infinite lights overlap: a direction belongs to all of them together
+    unshadowed_candidate(index, point, allocation, with_infinite(job, &point.light_ctx(), drawn))
 }
 
 /// A sample of a light by itself, whose density includes the choice; `None` if its integrand is zero.
 pub(super) fn unshadowed_candidate(
     index: u32,
-    point: &ShadePoint<'_>,
-    shares: &Shares,
+    point: &ShadingPoint<'_>,
+    allocation: &SampleAllocation,
     (light, sample): (LightId, LightSample),
 ) -> Option<Candidate> {
     // Unshadowed integrand
@@ -365,7 +366,7 @@ pub(super) fn unshadowed_candidate(
 
     // A technique without samples has no weight, whatever its density
     let drawn = if sample.is_delta { Drawn::DeltaLight } else { Drawn::Light };
-    let p_bsdf = if sample.is_delta || shares.n_bsdf == 0.0 { 0.0 } else { point.bsdf.pdf(point.wo, sample.wi) };
+    let p_bsdf = if sample.is_delta || allocation.n_bsdf == 0.0 { 0.0 } else { point.bsdf.pdf(point.wo, sample.wi) };
     Some(Candidate {
         point: index,
         drawn,
@@ -374,8 +375,8 @@ pub(super) fn unshadowed_candidate(
         light,
         p_light: sample.pdf,
         p_bsdf,
-        n_light: shares.n_light,
-        n_bsdf: shares.n_bsdf,
+        n_light: allocation.n_light,
+        n_bsdf: allocation.n_bsdf,
         p_lobe: 0.0,
         group: 0,
         segment: light_segment(point, &sample),
@@ -383,7 +384,7 @@ pub(super) fn unshadowed_candidate(
 }
 
 /// The segment to a point on a light, or to infinity.
-pub(super) fn light_segment(point: &ShadePoint<'_>, sample: &LightSample) -> Ray {
+pub(super) fn light_segment(point: &ShadingPoint<'_>, sample: &LightSample) -> Ray {
     let end = sample.t.is_finite().then_some((sample.p, sample.p_error, sample.n));
     segment(point, sample.wi, end)
 }
@@ -391,7 +392,7 @@ pub(super) fn light_segment(point: &ShadePoint<'_>, sample: &LightSample) -> Ray
 /// Completes a BSDF sample with the emitter that it points at; `None` if it points at none.
 pub(super) fn bsdf_candidate(
     job: &RenderJob,
-    point: &ShadePoint<'_>,
+    point: &ShadingPoint<'_>,
     pending: &PendingBsdf,
     hit: Option<&EmitterHit>,
 ) -> Option<Candidate> {
@@ -425,8 +426,8 @@ pub(super) fn bsdf_candidate(
         light,
         p_light,
         p_bsdf: pending.pdf,
-        n_light: pending.shares.n_light,
-        n_bsdf: pending.shares.n_bsdf,
+        n_light: pending.allocation.n_light,
+        n_bsdf: pending.allocation.n_bsdf,
         p_lobe: 0.0,
         group: lights.groups.group_of(light).unwrap_or(0) as u8,
         segment,
@@ -434,7 +435,7 @@ pub(super) fn bsdf_candidate(
 }
 
 /// The segment from a point to a point on a light `(p, p_error, n)`, or to infinity.
-fn segment(point: &ShadePoint<'_>, wi: Vec3, end: Option<(Vec3, Vec3, Vec3)>) -> Ray {
+fn segment(point: &ShadingPoint<'_>, wi: Vec3, end: Option<(Vec3, Vec3, Vec3)>) -> Ray {
     let o = point.origin(wi);
     match end {
         None => Ray { o, d: wi, t_max: f32::INFINITY, time: point.time },

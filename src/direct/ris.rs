@@ -6,14 +6,15 @@
 //! the draws is the estimate that would trace them all.
 //!
 //! The target `visibility` multiplies q̂ by an estimate V̂ > 0 of the visibility of each light, from photons that came from it
-//! ([`crate::lights::hints`]): fewer samples are drawn that find something in their way, and any V̂ is unbiased.
+//! ([`crate::lights::visibility_cache`]): fewer samples are drawn that find something in their way, and any V̂ is
+//! unbiased.
 //!
 //! Targets with visibility turn the order round: proposals are traced, and N of the visible ones are shaded; light samples
 //! need no value of the BSDF before that.
 
-use super::ShadePoint;
+use super::ShadingPoint;
 use super::proposals::{PointProposals, Proposals, Techniques};
-use super::propose::{self, Candidate, Candidates, Shares};
+use super::propose::{self, Candidate, Candidates, SampleAllocation};
 use super::visibility::Segments;
 use crate::bsdfs::Bsdf;
 use crate::lights::{LightId, LightSample};
@@ -55,11 +56,11 @@ pub struct Resampler {
 /// A BSDF sample costs as much as ten light samples, which are made many at a time, and a wide BSDF says little of where the
 /// light is: it gets one proposal in sixteen, one with a peak two; but where there are few proposals for each
 /// sample, one BSDF sample for every two samples, or four if it is wide.
-pub(super) fn shares(point: &ShadePoint<'_>) -> Shares {
-    let (m, n) = (point.split.proposals, point.split.samples);
+pub(super) fn allocation(point: &ShadingPoint<'_>) -> SampleAllocation {
+    let (m, n) = (point.sample_counts.proposals, point.sample_counts.samples);
     let bsdf = &point.bsdf.bsdf;
     if !bsdf.has_non_specular() {
-        return Shares::fixed(0, n);
+        return SampleAllocation::fixed(0, n);
     }
     let (of_proposals, of_samples) = match bsdf {
         Bsdf::Diffuse(_) | Bsdf::DiffuseTransmission(_) | Bsdf::Evaluated(_) => (0.0625, 0.25),
@@ -73,7 +74,7 @@ pub(super) fn shares(point: &ShadePoint<'_>) -> Shares {
     // A power of two: so many points of a Sobol' sequence are well distributed, others less
     let by_bsdf = 1 << (by_bsdf.log2().round().max(0.0) as u32);
     let by_bsdf = if by_bsdf < m { by_bsdf } else { 1 };
-    if m == 1 { Shares::one_of_both(point) } else { Shares::fixed(m - by_bsdf, by_bsdf) }
+    if m == 1 { SampleAllocation::one_of_both(point) } else { SampleAllocation::fixed(m - by_bsdf, by_bsdf) }
 }
 
 impl Resampler {
@@ -83,7 +84,7 @@ impl Resampler {
         &mut self,
         job: &RenderJob,
         settings: &IntegratorSettings,
-        points: &[ShadePoint<'_>],
+        points: &[ShadingPoint<'_>],
         candidates: &mut Candidates,
         contributions: &mut Vec<Rgb>,
     ) {
@@ -141,22 +142,28 @@ impl Resampler {
         candidates.spare = bsdf_samples;
     }
 
-    fn propose(&mut self, job: &RenderJob, settings: &IntegratorSettings, point: &ShadePoint<'_>, bsdf: &[Candidate]) {
-        let shares = shares(point);
+    fn propose(
+        &mut self,
+        job: &RenderJob,
+        settings: &IntegratorSettings,
+        point: &ShadingPoint<'_>,
+        bsdf: &[Candidate],
+    ) {
+        let allocation = allocation(point);
         let techniques = Techniques {
-            n_light: shares.n_light,
-            n_bsdf: shares.n_bsdf,
+            n_light: allocation.n_light,
+            n_bsdf: allocation.n_bsdf,
             heuristic: settings.heuristic(),
             target: settings.ris.target,
         };
         let numbers = point.stream.domain(domain::RESAMPLE).draw::<2>();
         self.numbers.push(numbers);
-        let positions = (shares.light_draws, settings.ris.points, numbers[0]);
+        let positions = (allocation.light_draws, settings.ris.points, numbers[0]);
         self.proposals.add(job, point, &techniques, positions, bsdf);
     }
 
     /// Traces all proposals and sets the weights of those that are not visible to 0.
-    fn probe(&mut self, job: &RenderJob, points: &[ShadePoint<'_>], bsdf_samples: &[Candidate]) {
+    fn probe(&mut self, job: &RenderJob, points: &[ShadingPoint<'_>], bsdf_samples: &[Candidate]) {
         self.probes.clear();
         let mut bsdf = bsdf_samples.iter();
         let mut probed = Vec::new();
@@ -190,9 +197,9 @@ impl Resampler {
     }
 
     /// Draws N proposals of a point.
-    fn draw(&mut self, settings: &IntegratorSettings, point: &ShadePoint<'_>, range: PointProposals, u: f32) {
+    fn draw(&mut self, settings: &IntegratorSettings, point: &ShadingPoint<'_>, range: PointProposals, u: f32) {
         let weights = &self.proposals.weight[range.start..range.end];
-        let n = point.split.samples as usize;
+        let n = point.sample_counts.samples as usize;
         match settings.ris.strata {
             Strata::Systematic => systematic(weights, n as u32, u, &mut self.draws),
             Strata::None => {
@@ -215,15 +222,21 @@ impl Resampler {
     }
 
     /// A light sample, drawn again with all that a proposal leaves out.
-    fn light_sample(&self, job: &RenderJob, point: &ShadePoint<'_>, place: usize) -> Option<(LightId, LightSample)> {
+    fn light_sample(&self, job: &RenderJob, point: &ShadingPoint<'_>, place: usize) -> Option<(LightId, LightSample)> {
         let (light, pmf, u) = self.proposals.light_sample(place);
         let sample = job.lights.lights[light as usize].sample_li(&point.light_ctx(), u)?;
         Some((light, LightSample { pdf: sample.pdf * pmf, ..sample }))
     }
 
-    fn light_candidate(&self, job: &RenderJob, index: u32, point: &ShadePoint<'_>, place: usize) -> Option<Candidate> {
+    fn light_candidate(
+        &self,
+        job: &RenderJob,
+        index: u32,
+        point: &ShadingPoint<'_>,
+        place: usize,
+    ) -> Option<Candidate> {
         let sample = self.light_sample(job, point, place)?;
-        propose::light_candidate(job, index, point, &Shares::fixed(0, 0), sample)
+        propose::light_candidate(job, index, point, &SampleAllocation::fixed(0, 0), sample)
     }
 }
 

@@ -14,14 +14,15 @@
 use super::{Film, PixelBounds, PixelSample, PixelSums};
 use lumiris_numbers::math::hash::{pcg4d, unit_f32};
 
-/// Replicas that an image should have; it has more if [`LEAST_SHARE`] of its pixels are more, and fewer if its pixels are.
+/// Replicas that an image should have; it has more if [`MIN_FRACTION`] of its pixels are more, and fewer if its pixels
+/// are.
 const WANTED: f64 = 512.0;
 /// Least share of the pixels that are replicated.
-const LEAST_SHARE: f64 = 1.0 / 64.0;
+const MIN_FRACTION: f64 = 1.0 / 64.0;
 /// Most classes of pixels.
-const MOST_CLASSES: usize = 8;
+const MAX_CLASSES: usize = 8;
 /// Least number of replicas in a class: f then has a relative standard error of √(2/64) = 18 % if means are normal.
-const LEAST_OF_CLASS: usize = 64;
+const MIN_CLASS_SIZE: usize = 64;
 /// Keeps the choice of replicas apart from other hashes of pixels.
 const CHOICE: u32 = 0x72_65_70_6c;
 
@@ -57,10 +58,10 @@ impl Replica {
 /// Replicas without samples for the pixels of a tile that are estimated twice, in an image with the given bounds. They are
 /// indexed in the tile.
 pub fn replicas(image: &PixelBounds, tile: &PixelBounds) -> Vec<Replica> {
-    let share = (WANTED / image.area().max(1) as f64).max(LEAST_SHARE);
+    let fraction = (WANTED / image.area().max(1) as f64).max(MIN_FRACTION);
     let is_chosen = |i: &u32| {
         let (x, y) = (tile.x0 + i % tile.width(), tile.y0 + i / tile.width());
-        f64::from(unit_f32(pcg4d([x, y, CHOICE, 0])[0])) < share
+        f64::from(unit_f32(pcg4d([x, y, CHOICE, 0])[0])) < fraction
     };
     let none = |pixel| Replica { pixel, count: 0, radiance: [0.0; 3] };
     (0..tile.area() as u32).filter(is_chosen).map(none).collect()
@@ -75,7 +76,7 @@ struct Class {
 
 /// What a replica tells.
 #[derive(Clone, Copy)]
-struct Told {
+struct ReplicaVariance {
     /// s²/N, averaged over neighbours.
     key: f64,
     /// s²/N.
@@ -93,13 +94,14 @@ impl Film {
         }
         let sums: Vec<f64> = variances.iter().map(|v| v.iter().sum()).collect();
         let keys = self.neighbourhood_means(&sums);
-        let told = self.replicas.iter().filter_map(|replica| {
+        let measured_twice = self.replicas.iter().filter_map(|replica| {
             let i = replica.pixel as usize;
             let pixel = &self.pixels[i];
-            let told = Told { key: keys[i], independent: sums[i], measured: replica.half_square(pixel) };
-            (pixel.count == replica.count && pixel.count > 1).then_some(told)
+            let measured_twice =
+                ReplicaVariance { key: keys[i], independent: sums[i], measured: replica.half_square(pixel) };
+            (pixel.count == replica.count && pixel.count > 1).then_some(measured_twice)
         });
-        let classes = classes(told.collect());
+        let classes = classes(measured_twice.collect());
         if !classes.is_empty() {
             for (variance, key) in variances.iter_mut().zip(&keys) {
                 let class = classes.partition_point(|c| c.limit < *key).min(classes.len() - 1);
@@ -124,18 +126,18 @@ impl Film {
 }
 
 /// Classes of about equally many replicas, by rising keys; none if nothing varies.
-fn classes(mut told: Vec<Told>) -> Vec<Class> {
+fn classes(mut measured_twice: Vec<ReplicaVariance>) -> Vec<Class> {
     // Where samples are all the same, there is nothing to scale
-    told.retain(|t| t.key > 0.0 || t.measured > 0.0);
-    told.sort_by(|a, b| a.key.total_cmp(&b.key));
-    let size = told.len().div_ceil(MOST_CLASSES).max(LEAST_OF_CLASS);
+    measured_twice.retain(|t| t.key > 0.0 || t.measured > 0.0);
+    measured_twice.sort_by(|a, b| a.key.total_cmp(&b.key));
+    let size = measured_twice.len().div_ceil(MAX_CLASSES).max(MIN_CLASS_SIZE);
     let mut classes = Vec::new();
     let (mut members, mut independent, mut measured) = (0, 0.0, 0.0);
-    for (i, t) in told.iter().enumerate() {
+    for (i, t) in measured_twice.iter().enumerate() {
         members += 1;
         independent += t.independent;
         measured += t.measured;
-        let rest = &told[i + 1..];
+        let rest = &measured_twice[i + 1..];
         let is_full = members >= size && 2 * rest.len() >= size && independent > 0.0;
         if rest.is_empty() || is_full && rest[0].key > t.key {
             let factor = if independent > 0.0 { measured / independent } else { 1.0 };

@@ -2,7 +2,7 @@
 
 use std::path::PathBuf;
 
-/// Why a picture cannot be read or written.
+/// Why an image cannot be read or written.
 #[derive(Debug, thiserror::Error)]
 pub enum ImageError {
     /// OpenImageIO itself cannot be used.
@@ -14,7 +14,7 @@ pub enum ImageError {
         /// The file.
         path: PathBuf,
     },
-    /// It is no picture, a damaged one, or of a kind that is not supported.
+    /// It is no image, a damaged one, or of a kind that is not supported.
     #[error("{}: {reason}", path.display())]
     Unreadable {
         /// The file.
@@ -43,11 +43,11 @@ pub enum ImageError {
 /// What reading may cost.
 #[derive(Clone, Copy, Debug)]
 pub struct ReadLimits {
-    /// Largest decoded picture (bytes of f32).
+    /// Largest decoded image (bytes of f32).
     pub max_bytes: u64,
-    /// Largest ratio of the decoded picture to the file: a header of a few bytes can claim any size.
+    /// Largest ratio of the decoded image to the file: a header of a few bytes can claim any size.
     pub max_expansion: u64,
-    /// Pictures up to this size (bytes of f32) may expand as they like.
+    /// Images up to this size (bytes of f32) may expand as they like.
     pub free_bytes: u64,
 }
 
@@ -58,20 +58,20 @@ impl Default for ReadLimits {
 }
 
 impl ReadLimits {
-    /// The largest decoded picture of a file of `file_bytes`.
+    /// The largest decoded image of a file of `file_bytes`.
     pub(super) fn bytes_for(&self, file_bytes: u64) -> u64 {
         file_bytes.saturating_mul(self.max_expansion).max(self.free_bytes).min(self.max_bytes)
     }
 }
 
-/// Where the pixels of a part lie in the full picture.
+/// Where the pixels of a part lie in the full image.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct Window {
     /// Column and row of the first pixel of the data.
     pub origin: [i32; 2],
-    /// Column and row of the first pixel of the full picture.
+    /// Column and row of the first pixel of the full image.
     pub full_origin: [i32; 2],
-    /// Columns and rows of the full picture.
+    /// Columns and rows of the full image.
     pub full_size: [usize; 2],
 }
 

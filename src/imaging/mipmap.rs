@@ -343,8 +343,8 @@ mod tests {
             for i in -10..=10_010 {
                 let v = i as f32 / 10_000.0;
                 let distance = |byte: u8| (table[usize::from(byte)] - v).abs();
-                let least = (0..=255).map(distance).fold(f32::INFINITY, f32::min);
-                assert_eq!(distance(nearest.of(v)), least, "{encoding:?} {v}");
+                let min = (0..=255).map(distance).fold(f32::INFINITY, f32::min);
+                assert_eq!(distance(nearest.of(v)), min, "{encoding:?} {v}");
             }
         }
     }

@@ -54,7 +54,7 @@ pub enum MetaValue {
     Matrix([f32; 16]),
 }
 
-/// A picture as read.
+/// An image as read.
 #[derive(Clone, Debug)]
 pub struct ReadImage {
     /// The pixels: integers of the file are 0..1 here, and nothing is decoded.
@@ -65,13 +65,13 @@ pub struct ReadImage {
     pub metadata: BTreeMap<String, String>,
     /// Number of parts in the file.
     pub parts: usize,
-    /// Where the pixels lie in the full picture.
+    /// Where the pixels lie in the full image.
     pub window: Window,
     /// The values are stored as 16-bit floats.
     pub is_half: bool,
 }
 
-/// A picture to write: one part of a file.
+/// An image to write: one part of a file.
 #[derive(Clone, Debug)]
 pub struct Part {
     width: usize,
@@ -79,9 +79,9 @@ pub struct Part {
     channels: Vec<String>,
     data: Vec<f32>,
     metadata: Vec<(String, MetaValue)>,
-    /// Column and row of the first pixel inside the full picture.
+    /// Column and row of the first pixel inside the full image.
     origin: [usize; 2],
-    /// Size of the full picture.
+    /// Size of the full image.
     full: [usize; 2],
     storage: Storage,
     /// Storage of channels that differ from `storage`.
@@ -156,7 +156,7 @@ impl Part {
         self
     }
 
-    /// Says which part of a larger picture this is.
+    /// Says which part of a larger image this is.
     #[must_use]
     pub fn with_window(mut self, origin: [usize; 2], full: [usize; 2]) -> Self {
         (self.origin, self.full) = (origin, full);
@@ -164,7 +164,7 @@ impl Part {
     }
 }
 
-/// The shim; its threads are kept to one, since pictures are read in parallel already.
+/// The shim; its threads are kept to one, since images are read in parallel already.
 fn api() -> Result<&'static sys::Api, ImageError> {
     static CONFIGURED: OnceLock<()> = OnceLock::new();
     let api = sys::load().map_err(ImageError::Library)?;
@@ -291,12 +291,12 @@ impl Drop for Input {
     }
 }
 
-/// Reads the first part of a picture.
+/// Reads the first part of an image.
 pub fn read_image(path: &Path, limits: &ReadLimits) -> Result<ReadImage, ImageError> {
     read_part(path, 0, limits)
 }
 
-/// Reads a part of a picture, counted from 0.
+/// Reads a part of an image, counted from 0.
 pub fn read_part(path: &Path, part: usize, limits: &ReadLimits) -> Result<ReadImage, ImageError> {
     let input = Input::open(path, i32::try_from(part).unwrap_or(i32::MAX))?;
     let failed = |failure| read_failure(path, failure);
@@ -321,7 +321,7 @@ pub fn read_part(path: &Path, part: usize, limits: &ReadLimits) -> Result<ReadIm
     Ok(ReadImage { image, encoding, metadata, parts, window, is_half: spec.format == sys::OIIO_FORMAT_HALF })
 }
 
-/// Reads the headers of all parts of a picture, and no pixels.
+/// Reads the headers of all parts of an image, and no pixels.
 pub fn read_headers(path: &Path) -> Result<Vec<PartHeader>, ImageError> {
     let mut input = Input::open(path, 0)?;
     let failed = |failure| read_failure(path, failure);
@@ -371,7 +371,7 @@ impl Output {
         let name = part.name.as_deref().map(c_text).transpose()?;
         let compression = part.compression.as_deref().or(is_exr.then_some("zip")).map(c_text).transpose()?;
         let or_null = |text: &Option<CString>| text.as_ref().map_or(ptr::null(), |t| t.as_ptr());
-        let size = |n: usize| i32::try_from(n).map_err(|_| "the picture is too large".to_owned());
+        let size = |n: usize| i32::try_from(n).map_err(|_| "the image is too large".to_owned());
         let description = sys::OiioPart {
             name: or_null(&name),
             compression: or_null(&compression),
@@ -427,7 +427,7 @@ impl Output {
         for (index, part) in parts.iter().enumerate() {
             let expected = part.width.checked_mul(part.height).and_then(|n| n.checked_mul(part.channels.len()));
             if expected != Some(part.data.len()) {
-                return Err("the number of values does not fit the size of the picture".to_owned());
+                return Err("the number of values does not fit the size of the image".to_owned());
             }
             let (rows, count) = (part.height as i32, part.data.len() as u64);
             // SAFETY: `data` holds `count` floats, which is rows × width × channels by the check above.
@@ -448,7 +448,7 @@ impl Drop for Output {
     }
 }
 
-/// Writes a picture; several parts in EXR only. Either the whole file appears under its name, or none.
+/// Writes an image; several parts in EXR only. Either the whole file appears under its name, or none.
 pub fn write_image(path: &Path, parts: &[Part]) -> Result<(), ImageError> {
     // The extension chooses the format: the file on its way has the same
     write_whole(path, |file| write_to(file.path(), parts).map_err(io::Error::other))

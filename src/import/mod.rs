@@ -18,9 +18,9 @@ use std::path::Path;
 /// What a caller overrides of a scene file.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct LoadOptions {
-    /// Size of the picture (width, height).
+    /// Size of the image (width, height).
     pub resolution: Option<[u32; 2]>,
-    /// Crop window x0, x1, y0, y1 in fractions of the picture.
+    /// Crop window x0, x1, y0, y1 in fractions of the image.
     pub crop: Option<[f32; 4]>,
 }
 

@@ -6,7 +6,7 @@
 
 use super::path::{self, CameraSample, PathIntegrator, PathState, Vertex};
 use crate::bsdfs::Lambertian;
-use crate::direct::{Fits, ShadePoint};
+use crate::direct::{Fits, ShadingPoint};
 use crate::film::PixelSample;
 use crate::materials::SurfaceBsdf;
 use crate::scene::RenderJob;
@@ -50,13 +50,14 @@ pub(super) fn trace(
             break;
         }
         let vertices = paths.find_vertices(job, vertex, depth, samples, out);
-        let split = settings.split_at_vertex(vertex);
+        let sample_counts = settings.sample_counts_at_vertex(vertex);
         let shadings: Vec<Shading<'_>> =
             paths.active.iter().zip(&vertices).map(|(path, v)| shade(source, path, vertex, v)).collect();
-        let points: Vec<ShadePoint<'_>> = (vertices.iter().zip(&paths.active))
+        let points: Vec<ShadingPoint<'_>> = (vertices.iter().zip(&paths.active))
             .map(|(v, path)| {
-                let split = if vertex == 0 { samples[path.sample as usize].split } else { split };
-                v.shade_point(path.ray.time, split, samples[path.sample as usize].fit)
+                let sample_counts =
+                    if vertex == 0 { samples[path.sample as usize].sample_counts } else { sample_counts };
+                v.shading_point(path.ray.time, sample_counts, samples[path.sample as usize].fit)
             })
             .collect();
         light(paths, job, &settings.at_vertex(vertex), (&shadings, &points), fits, out);
@@ -78,15 +79,15 @@ fn light(
     paths: &mut PathIntegrator,
     job: &RenderJob,
     settings: &IntegratorSettings,
-    (shadings, points): (&[Shading<'_>], &[ShadePoint<'_>]),
+    (shadings, points): (&[Shading<'_>], &[ShadingPoint<'_>]),
     fits: &mut Fits,
     out: &mut [PixelSample],
 ) {
     for (path, shading) in paths.active.iter().zip(shadings) {
         out[path.sample as usize].radiance += path.beta * shading.known;
     }
-    let lit: Vec<ShadePoint<'_>> = (shadings.iter().zip(points))
-        .filter_map(|(shading, point)| shading.lit.map(|bsdf| ShadePoint { bsdf, ..*point }))
+    let lit: Vec<ShadingPoint<'_>> = (shadings.iter().zip(points))
+        .filter_map(|(shading, point)| shading.lit.map(|bsdf| ShadingPoint { bsdf, ..*point }))
         .collect();
     paths.direct.estimate(job, settings, &lit, fits, &mut paths.radiance);
     let lit_paths = paths.active.iter().zip(shadings).filter(|(_, shading)| shading.lit.is_some());
@@ -100,7 +101,7 @@ fn extend(
     paths: &mut PathIntegrator,
     settings: &IntegratorSettings,
     vertex: u32,
-    (vertices, shadings, points): (&[Vertex<'_>], &[Shading<'_>], &[ShadePoint<'_>]),
+    (vertices, shadings, points): (&[Vertex<'_>], &[Shading<'_>], &[ShadingPoint<'_>]),
 ) {
     paths.next.clear();
     if vertex + 1 < settings.depth() {

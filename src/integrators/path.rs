@@ -7,13 +7,13 @@
 use crate::accel::{Coherence, Hit, RayBatch};
 use crate::bsdfs::Lobe;
 use crate::cameras::CameraRay;
-use crate::direct::{DirectStage, DirectStats, Fits, ShadePoint};
+use crate::direct::{DirectStage, DirectStats, Fits, ShadingPoint};
 use crate::film::{Features, PixelSample};
 use crate::geometry::SurfaceHit;
 use crate::lights::LightHit;
 use crate::materials::SurfaceBsdf;
-use crate::scene::{Found, RenderJob};
-use crate::settings::{IntegratorSettings, Split};
+use crate::scene::{RenderJob, SurfaceInteraction};
+use crate::settings::{IntegratorSettings, SampleCounts};
 use lumiris_numbers::math::{Ray, Rgb, Vec3};
 use lumiris_numbers::samplers::SampleStream;
 use std::time::{Duration, Instant};
@@ -98,7 +98,7 @@ pub struct CameraSample {
     /// independent of are those of earlier blocks, wherever the path goes.
     pub direct: SampleStream,
     /// Samples and proposals of its first vertex.
-    pub split: Split,
+    pub sample_counts: SampleCounts,
     /// The fit of its pixel.
     pub fit: u32,
 }
@@ -163,13 +163,14 @@ impl PathIntegrator {
                 break;
             }
             let vertices = self.find_vertices(job, vertex, depth, samples, out);
-            let split = settings.split_at_vertex(vertex);
-            let points: Vec<ShadePoint<'_>> = vertices
+            let sample_counts = settings.sample_counts_at_vertex(vertex);
+            let points: Vec<ShadingPoint<'_>> = vertices
                 .iter()
                 .zip(&self.active)
                 .map(|(v, path)| {
-                    let split = if vertex == 0 { samples[path.sample as usize].split } else { split };
-                    v.shade_point(path.ray.time, split, samples[path.sample as usize].fit)
+                    let sample_counts =
+                        if vertex == 0 { samples[path.sample as usize].sample_counts } else { sample_counts };
+                    v.shading_point(path.ray.time, sample_counts, samples[path.sample as usize].fit)
                 })
                 .collect();
             self.light_points(job, &settings.at_vertex(vertex), vertex, &points, fits, out);
@@ -214,28 +215,28 @@ impl PathIntegrator {
             let start = Instant::now();
             let mut passing = Vec::new();
             for (path, hit) in self.active.iter().zip(&self.hits) {
-                let found = match hit {
+                let interaction = match hit {
                     None => {
                         if vertex == 0 && !self.only_reflected {
                             out[path.sample as usize].radiance += path.beta * job.lights.le(path.ray.d);
                         }
                         continue;
                     }
-                    Some(hit) => Found::new(job, &path.ray, (path.width, path.spread), hit),
+                    Some(hit) => SurfaceInteraction::new(job, &path.ray, (path.width, path.spread), hit),
                 };
                 if vertex == 0 && !self.only_reflected {
-                    path.add_emission(job, &found, &mut out[path.sample as usize].radiance);
+                    path.add_emission(job, &interaction, &mut out[path.sample as usize].radiance);
                 }
-                match found.scatter(job) {
+                match interaction.scatter(job) {
                     Some(bsdf) => {
                         if vertex == 0 {
                             let depth_only = self.only_reflected;
                             out[path.sample as usize].features.get_or_insert_with(|| {
                                 if depth_only {
-                                    Features { depth: path.depth(&found), ..Features::default() }
+                                    Features { depth: path.depth(&interaction), ..Features::default() }
                                 } else {
                                     let stream = samples[path.sample as usize].stream.domain(domain::VERTEX);
-                                    path.features(job, &found, &bsdf, &stream)
+                                    path.features(job, &interaction, &bsdf, &stream)
                                 }
                             });
                         }
@@ -243,11 +244,17 @@ impl PathIntegrator {
                             let sample = &samples[path.sample as usize];
                             let [stream, direct] =
                                 [sample.stream, sample.direct].map(|s| s.domain(domain::VERTEX + vertex));
-                            vertices.push(Vertex { surface: found.surface, bsdf, wo: found.wo, stream, direct });
-                            kept.push(PathState { width: found.width, passed: 0, travelled: 0.0, ..*path });
+                            vertices.push(Vertex {
+                                surface: interaction.surface,
+                                bsdf,
+                                wo: interaction.wo,
+                                stream,
+                                direct,
+                            });
+                            kept.push(PathState { width: interaction.width, passed: 0, travelled: 0.0, ..*path });
                         }
                     }
-                    None if path.passed < MAX_PASSED => passing.push(path.pass(&found)),
+                    None if path.passed < MAX_PASSED => passing.push(path.pass(&interaction)),
                     None => {}
                 }
             }
@@ -286,7 +293,7 @@ impl PathIntegrator {
         job: &RenderJob,
         settings: &IntegratorSettings,
         vertex: u32,
-        points: &[ShadePoint<'_>],
+        points: &[ShadingPoint<'_>],
         fits: &mut Fits,
         out: &mut [PixelSample],
     ) {
@@ -312,7 +319,7 @@ impl PathIntegrator {
         settings: &IntegratorSettings,
         vertex: u32,
         vertices: &[Vertex<'_>],
-        points: &[ShadePoint<'_>],
+        points: &[ShadingPoint<'_>],
     ) {
         let depth = settings.depth();
         let start = Instant::now();
@@ -336,15 +343,15 @@ pub(super) struct Vertex<'w> {
 }
 
 impl<'w> Vertex<'w> {
-    pub(super) fn shade_point(&self, time: f32, split: Split, fit: u32) -> ShadePoint<'w> {
-        ShadePoint {
+    pub(super) fn shading_point(&self, time: f32, sample_counts: SampleCounts, fit: u32) -> ShadingPoint<'w> {
+        ShadingPoint {
             p: self.surface.p,
             p_error: self.surface.p_error,
             wo: self.wo,
             bsdf: self.bsdf,
             time,
             stream: self.direct.domain(domain::DIRECT),
-            split,
+            sample_counts,
             fit,
         }
     }
@@ -354,7 +361,7 @@ impl<'w> Vertex<'w> {
 pub(super) fn extend(
     path: &PathState,
     v: &Vertex<'_>,
-    point: &ShadePoint<'_>,
+    point: &ShadingPoint<'_>,
     vertex: u32,
     settings: &IntegratorSettings,
 ) -> Option<(PathState, Lobe)> {
@@ -405,41 +412,47 @@ fn next_direction(v: &Vertex<'_>, settings: &IntegratorSettings) -> Option<Direc
 
 impl PathState {
     /// Adds what the surface that was found emits towards the camera.
-    fn add_emission(&self, job: &RenderJob, found: &Found, radiance: &mut Rgb) {
+    fn add_emission(&self, job: &RenderJob, interaction: &SurfaceInteraction, radiance: &mut Rgb) {
         let lights = &job.lights;
-        if found.hit.instance != Hit::NO_INSTANCE {
+        if interaction.hit.instance != Hit::NO_INSTANCE {
             return;
         }
-        if let Some(light) = lights.light_of(found.hit.geometry, found.hit.primitive) {
-            let s = &found.surface;
-            let hit = LightHit { t: found.hit.t, p: s.p, n: s.n, uv: s.uv };
-            *radiance += self.beta * lights.lights[light as usize].l(&hit, found.wo);
+        if let Some(light) = lights.light_of(interaction.hit.geometry, interaction.hit.primitive) {
+            let s = &interaction.surface;
+            let hit = LightHit { t: interaction.hit.t, p: s.p, n: s.n, uv: s.uv };
+            *radiance += self.beta * lights.lights[light as usize].l(&hit, interaction.wo);
         }
     }
 
-    fn features(&self, job: &RenderJob, found: &Found, bsdf: &SurfaceBsdf<'_>, stream: &SampleStream) -> Features {
+    fn features(
+        &self,
+        job: &RenderJob,
+        interaction: &SurfaceInteraction,
+        bsdf: &SurfaceBsdf<'_>,
+        stream: &SampleStream,
+    ) -> Features {
         let z = bsdf.frame.z;
         Features {
-            albedo: bsdf.albedo_estimate(found.wo, || stream.domain(domain::ALBEDO).draw::<3>()),
-            normal: if z.dot(found.wo) < 0.0 { -z } else { z },
-            depth: self.depth(found),
-            material: job.world.scene.surfaces[found.hit.geometry as usize].material,
-            object: found.hit.geometry,
+            albedo: bsdf.albedo_estimate(interaction.wo, || stream.domain(domain::ALBEDO).draw::<3>()),
+            normal: if z.dot(interaction.wo) < 0.0 { -z } else { z },
+            depth: self.depth(interaction),
+            material: job.world.scene.surfaces[interaction.hit.geometry as usize].material,
+            object: interaction.hit.geometry,
         }
     }
 
     /// Distance from the camera along the ray.
-    fn depth(&self, found: &Found) -> f32 {
-        self.travelled + found.distance
+    fn depth(&self, interaction: &SurfaceInteraction) -> f32 {
+        self.travelled + interaction.distance
     }
 
     /// The path beyond a surface that does not scatter.
-    fn pass(&self, found: &Found) -> PathState {
+    fn pass(&self, interaction: &SurfaceInteraction) -> PathState {
         PathState {
-            ray: Ray { o: found.origin(self.ray.d), ..self.ray },
-            width: found.width,
+            ray: Ray { o: interaction.origin(self.ray.d), ..self.ray },
+            width: interaction.width,
             passed: self.passed + 1,
-            travelled: self.travelled + found.distance,
+            travelled: self.travelled + interaction.distance,
             ..*self
         }
     }

@@ -4,7 +4,7 @@ use super::LightId;
 
 /// A chosen light.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub struct LightChoice {
+pub struct SampledLight {
     /// The light.
     pub light: LightId,
     /// Probability of the choice.

@@ -5,7 +5,7 @@
 //! it; the groups merely divide that choice in two, first a group and then a light of it, so that the number of samples
 //! per group can be fixed.
 
-use super::{Light, LightChoice, LightCtx, LightId, LightSampler, LightTree};
+use super::{Light, LightCtx, LightId, LightSampler, LightTree, SampledLight};
 use lumiris_numbers::math::{AliasTable, ONE_MINUS_EPSILON};
 
 /// Maximum number of groups.
@@ -45,9 +45,9 @@ struct FixedGroup {
 }
 
 impl LightGroups {
-    /// Divides `lights`, which `sampler` chooses from, into at most `most` (1 to [`MAX_GROUPS`]) groups.
-    pub fn new(lights: &[Light], sampler: &LightSampler, most: usize) -> Self {
-        let most = most.clamp(1, MAX_GROUPS);
+    /// Divides `lights`, which `sampler` chooses from, into at most `max` (1 to [`MAX_GROUPS`]) groups.
+    pub fn new(lights: &[Light], sampler: &LightSampler, max: usize) -> Self {
+        let max = max.clamp(1, MAX_GROUPS);
         let bounds: Vec<_> = lights.iter().map(Light::bounds).collect();
         let own_tree;
         let tree = match sampler.tree() {
@@ -61,7 +61,7 @@ impl LightGroups {
         let is_infinite = |i: usize| lights[i].is_infinite() && sampler.pmf(&ctx, i as LightId) > 0.0;
         let infinite: Vec<LightId> = (0..lights.len()).filter(|&i| is_infinite(i)).map(|i| i as LightId).collect();
         let has_infinite = !infinite.is_empty();
-        let cut = tree.cut(most - usize::from(has_infinite && most > 1));
+        let cut = tree.cut(max - usize::from(has_infinite && max > 1));
 
         // Lights of each group; if there is to be one group only, everything is in it
         let mut groups: Vec<Vec<LightId>> = Vec::new();
@@ -139,7 +139,7 @@ impl LightGroups {
         ctx: &LightCtx,
         (group, group_pmf): (usize, f32),
         u: f32,
-    ) -> Option<LightChoice> {
+    ) -> Option<SampledLight> {
         let of_base = |u| self.sample_base(sampler, ctx, (group, group_pmf), u);
         match sampler {
             LightSampler::Photons(choice) => {
@@ -156,24 +156,24 @@ impl LightGroups {
         ctx: &LightCtx,
         (group, group_pmf): (usize, f32),
         u: f32,
-    ) -> Option<LightChoice> {
+    ) -> Option<SampledLight> {
         match &self.choice {
             Choice::Tree(_) if self.has_infinite && group == 0 => {
                 let infinite = &sampler.tree()?.infinite;
                 let x = u * infinite.len() as f32;
                 let i = (x as usize).min(infinite.len() - 1);
                 let u = (x - i as f32).clamp(0.0, ONE_MINUS_EPSILON);
-                Some(LightChoice { light: infinite[i], pmf: group_pmf / infinite.len() as f32, u })
+                Some(SampledLight { light: infinite[i], pmf: group_pmf / infinite.len() as f32, u })
             }
             Choice::Tree(cut) => {
                 let place = *cut.get(group - usize::from(self.has_infinite))?;
                 let (light, pmf, u) = sampler.tree()?.tree.sample_below(ctx, place, u)?;
-                Some(LightChoice { light, pmf: pmf * group_pmf, u })
+                Some(SampledLight { light, pmf: pmf * group_pmf, u })
             }
             Choice::Fixed(groups) => {
                 let group = groups.get(group)?;
                 let s = group.table.sample(u)?;
-                Some(LightChoice { light: group.lights[s.index], pmf: s.pmf * group_pmf, u: s.u })
+                Some(SampledLight { light: group.lights[s.index], pmf: s.pmf * group_pmf, u: s.u })
             }
         }
     }
@@ -182,7 +182,7 @@ impl LightGroups {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::lights::{LightHints, LightSamplerKind, LightSampling, LightSetBuilder};
+    use crate::lights::{LightSamplerKind, LightSampling, LightSetBuilder, VisibilityCache};
     use lumiris_numbers::math::hash::HashStream;
     use lumiris_numbers::math::{Bounds3, Rgb, Vec3};
     use lumiris_test_support::assert_chi_squared;
@@ -206,7 +206,7 @@ mod tests {
         let step = if points > 90 { 1 } else { 3 };
         let at = Vec3::new(0.4, 0.3, 0.0);
         let photons = (0..points + infinite).step_by(step).flat_map(|l| (0..=l % 5).map(move |_| (at, Vec3::Z, l)));
-        set.set_hints(Some(LightHints::new(photons, 0.5)));
+        set.set_visibility_cache(Some(VisibilityCache::new(photons, 0.5)));
         set
     }
 
@@ -214,15 +214,15 @@ mod tests {
     fn choosing_a_group_and_then_a_light_is_choosing_a_light() {
         for kind in KINDS {
             for (points, infinite) in [(4, 0), (4, 1), (30, 2), (100, 1), (0, 2), (1, 0)] {
-                for most in [1, 2, 5, 8] {
+                for max in [1, 2, 5, 8] {
                     let set = set(kind, points, infinite);
-                    let groups = LightGroups::new(&set.lights, &set.sampler, most);
+                    let groups = LightGroups::new(&set.lights, &set.sampler, max);
                     let ctx = LightCtx { p: Vec3::new(0.4, 0.3, 0.0), n: Vec3::Z, ns: Vec3::Z };
                     let pmfs = groups.pmfs(&set.sampler, &ctx);
                     assert!((pmfs.iter().sum::<f32>() - 1.0).abs() < 1e-5, "{kind:?} {pmfs:?}");
-                    assert!(groups.len() <= most.max(usize::from(infinite > 0) + usize::from(points > 0)));
+                    assert!(groups.len() <= max.max(usize::from(infinite > 0) + usize::from(points > 0)));
 
-                    let mut s = HashStream::new([points, infinite, most as u32]);
+                    let mut s = HashStream::new([points, infinite, max as u32]);
                     let mut observed = vec![0.0; set.lights.len()];
                     let n = 20_000;
                     for _ in 0..n {

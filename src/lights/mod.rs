@@ -1,7 +1,8 @@
 //! Lights: their emission, the sampling of directions towards them, and the choice of one of many.
 //!
 //! Reading order: [`point`], [`spot`], [`area`], [`environment`], [`emit`], [`lanes`], [`bounds`], [`choice`],
-//! [`tree`], [`tree_choice`], [`hints`], [`hinted`], [`select`], [`set`], [`groups`], [`sampling`], [`irradiance`].
+//! [`tree`], [`tree_choice`], [`visibility_cache`], [`visibility_cache_sampler`], [`select`], [`set`], [`groups`],
+//! [`sampling`], [`irradiance`].
 
 pub mod area;
 pub mod bounds;
@@ -9,8 +10,6 @@ pub mod choice;
 pub mod emit;
 pub mod environment;
 pub mod groups;
-pub mod hinted;
-pub mod hints;
 pub mod irradiance;
 pub mod lanes;
 pub mod point;
@@ -20,6 +19,8 @@ pub mod set;
 pub mod spot;
 pub mod tree;
 pub mod tree_choice;
+pub mod visibility_cache;
+pub mod visibility_cache_sampler;
 
 #[cfg(test)]
 mod emit_tests;
@@ -28,12 +29,10 @@ mod light_tests;
 
 pub use area::{AreaLight, AreaShape, Emission, EmissionImage, area_lights_of};
 pub use bounds::LightBounds;
-pub use choice::{LightChoice, LightRun};
+pub use choice::{LightRun, SampledLight};
 pub use emit::EmissionSample;
 pub use environment::{EnvironmentFilter, EnvironmentMap, EnvironmentMapping};
 pub use groups::LightGroups;
-pub use hinted::HintedChoice;
-pub use hints::LightHints;
 pub use irradiance::Irradiances;
 pub use lanes::LightLanes;
 pub use sampling::LightSampling;
@@ -41,6 +40,8 @@ pub use select::{LightSampler, LightSamplerKind};
 pub use set::{LightSet, LightSetBuilder};
 pub use tree::LightTree;
 pub use tree_choice::TreeChoice;
+pub use visibility_cache::VisibilityCache;
+pub use visibility_cache_sampler::VisibilityCacheSampler;
 
 use lumiris_numbers::math::{Affine3A, Bounds3, Mat3, Rgb, Vec2, Vec3};
 use std::f32::consts::PI;

@@ -1,8 +1,8 @@
 //! The lights of a scene with a light sampler: what settings and photons make of a [`LightSet`].
 
-use super::hints::Around;
+use super::visibility_cache::ContributingLights;
 use super::{
-    LightCtx, LightGroups, LightHints, LightHit, LightId, LightSample, LightSampler, LightSamplerKind, LightSet,
+    LightCtx, LightGroups, LightHit, LightId, LightSample, LightSampler, LightSamplerKind, LightSet, VisibilityCache,
 };
 use lumiris_numbers::math::Vec3;
 use std::ops::Deref;
@@ -18,7 +18,7 @@ pub struct LightSampling {
     pub delta: Option<LightSampler>,
     /// The lights as components of a mixture.
     pub groups: LightGroups,
-    hints: Option<Arc<LightHints>>,
+    visibility_cache: Option<Arc<VisibilityCache>>,
 }
 
 impl Deref for LightSampling {
@@ -30,43 +30,45 @@ impl Deref for LightSampling {
 }
 
 impl LightSampling {
-    /// Chooses in the way `kind`, with at most `most` groups.
-    pub fn new(set: Arc<LightSet>, kind: LightSamplerKind, most: usize) -> Self {
+    /// Chooses in the way `kind`, with at most `max` groups.
+    pub fn new(set: Arc<LightSet>, kind: LightSamplerKind, max: usize) -> Self {
         let sampler = LightSampler::new(kind, &set.lights, set.scene_radius);
-        let (delta, groups) = (set.delta_sampler(kind), LightGroups::new(&set.lights, &sampler, most));
-        LightSampling { set, sampler, delta, groups, hints: None }
+        let (delta, groups) = (set.delta_sampler(kind), LightGroups::new(&set.lights, &sampler, max));
+        LightSampling { set, sampler, delta, groups, visibility_cache: None }
     }
 
     /// Changes the light sampler; the visibility cache stays.
-    pub fn choose_by(&mut self, kind: LightSamplerKind, most: usize) {
+    pub fn choose_by(&mut self, kind: LightSamplerKind, max: usize) {
         self.sampler = LightSampler::new(kind, &self.set.lights, self.set.scene_radius);
-        self.sampler.set_hints(self.hints.clone());
+        self.sampler.set_visibility_cache(self.visibility_cache.clone());
         self.delta = self.set.delta_sampler(kind);
-        self.set_groups(most);
+        self.set_groups(max);
     }
 
-    /// Divides the lights into at most `most` groups.
-    pub fn set_groups(&mut self, most: usize) {
-        self.groups = LightGroups::new(&self.set.lights, &self.sampler, most);
+    /// Divides the lights into at most `max` groups.
+    pub fn set_groups(&mut self, max: usize) {
+        self.groups = LightGroups::new(&self.set.lights, &self.sampler, max);
     }
 
     /// Sets the visibility cache, which is used wherever settings ask for it. Estimates remain unbiased whatever it
     /// contains. Lights without power and unknown ids are ignored.
-    pub fn set_hints(&mut self, hints: Option<LightHints>) {
+    pub fn set_visibility_cache(&mut self, visibility_cache: Option<VisibilityCache>) {
         let is_lit = |light: LightId| self.set.lit.binary_search(&light).is_ok();
-        self.hints = hints.map(|hints| Arc::new(hints.of_lights(is_lit)));
-        self.sampler.set_hints(self.hints.clone());
+        self.visibility_cache = visibility_cache.map(|visibility_cache| Arc::new(visibility_cache.of_lights(is_lit)));
+        self.sampler.set_visibility_cache(self.visibility_cache.clone());
     }
 
     /// The visibility cache.
-    pub fn hints(&self) -> Option<&LightHints> {
-        self.hints.as_deref()
+    pub fn visibility_cache(&self) -> Option<&VisibilityCache> {
+        self.visibility_cache.as_deref()
     }
 
     /// The contributing lights of a point; none without a visibility cache.
     #[inline]
-    pub fn around(&self, ctx: &LightCtx) -> Around<'_> {
-        self.hints.as_ref().map_or_else(Around::default, |hints| hints.around_with_sums(ctx.p, ctx.n))
+    pub fn contributing_lights(&self, ctx: &LightCtx) -> ContributingLights<'_> {
+        self.visibility_cache.as_ref().map_or_else(ContributingLights::default, |visibility_cache| {
+            visibility_cache.lookup_with_sums(ctx.p, ctx.n)
+        })
     }
 
     /// Chooses a light by `u_choice` and samples a direction to it by `u`. `pdf` of the sample includes the probability
@@ -117,11 +119,11 @@ mod tests {
         [LightSamplerKind::Uniform, LightSamplerKind::Power, LightSamplerKind::Tree, LightSamplerKind::Photons];
 
     /// The set, with photons of some lights around (0.4, 0.3, 0): more of those with a greater id.
-    fn hinted(builder: LightSetBuilder, kind: LightSamplerKind, seen: &[LightId]) -> LightSampling {
+    fn with_cache(builder: LightSetBuilder, kind: LightSamplerKind, seen: &[LightId]) -> LightSampling {
         let mut set = sampling(builder, kind, &bounds());
         let at = Vec3::new(0.4, 0.3, 0.0);
         let photons = seen.iter().flat_map(|&id| (0..=id % 7).map(move |_| (at, Vec3::Z, id)));
-        set.set_hints(Some(LightHints::new(photons, 0.5)));
+        set.set_visibility_cache(Some(VisibilityCache::new(photons, 0.5)));
         set
     }
 
@@ -154,7 +156,7 @@ mod tests {
     #[test]
     fn every_sampler_is_a_distribution_over_the_lights_that_shine() {
         for (kind, seen) in KINDS.into_iter().flat_map(|k| [(k, &[0, 2, 4][..]), (k, &[5, 900]), (k, &[])]) {
-            let set = hinted(builder(), kind, seen);
+            let set = with_cache(builder(), kind, seen);
             let mut s = HashStream::new([1, 2, 3]);
             for ns in [Vec3::ZERO, Vec3::Z] {
                 let ctx = LightCtx { p: Vec3::new(0.4, 0.3, 0.0), n: ns, ns };
@@ -185,7 +187,7 @@ mod tests {
         // Few lights are compared at the point, many by the number of their photons
         let (few, many): (Vec<LightId>, Vec<LightId>) = ((0..80).step_by(7).collect(), (2..80).collect());
         for (kind, seen) in KINDS.into_iter().flat_map(|k| [(k, &few), (k, &many)]) {
-            let set = hinted(builder.clone(), kind, seen);
+            let set = with_cache(builder.clone(), kind, seen);
             for ns in [Vec3::ZERO, Vec3::Z] {
                 let ctx = LightCtx { p: Vec3::new(0.4, 0.3, 0.0), n: ns, ns };
                 // A regular list: counts are exact up to one at each end of a run
@@ -242,7 +244,7 @@ mod tests {
         }
         for kind in KINDS {
             // Photons of the wrong lights change nothing
-            let set = hinted(builder(), kind, &[2, 4]);
+            let set = with_cache(builder(), kind, &[2, 4]);
             let mut moments = Moments::default();
             for _ in 0..200_000 {
                 let sample = set.sample(&ctx, s.next_f32(), s.next_2d());

@@ -5,18 +5,18 @@
 //! | uniform | the same for all lights |
 //! | power | 95 % proportional to power, 5 % uniform, so that no light starves |
 //! | tree | equal for every infinite light and for the [`LightTree`](super::LightTree) over all others |
-//! | photons | nearly always one of the lights that the visibility cache finds, if any; see [`super::hinted`] |
+//! | photons | nearly always one of the lights that the visibility cache finds, if any; see [`super::visibility_cache_sampler`] |
 //!
 //! Lights without power are never chosen.
 
 use super::choice::UNIT;
-use super::{HintedChoice, Light, LightChoice, LightCtx, LightHints, LightId, LightRun, TreeChoice};
+use super::{Light, LightCtx, LightId, LightRun, SampledLight, TreeChoice, VisibilityCache, VisibilityCacheSampler};
 use lumiris_numbers::math::{AliasTable, cumulative};
 use std::sync::Arc;
 use strum::{EnumIter, EnumString, IntoStaticStr, VariantNames};
 
 /// Uniform fraction of the power sampler.
-const UNIFORM_SHARE: f64 = 0.05;
+const UNIFORM_FRACTION: f64 = 0.05;
 
 /// The light sampler.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, EnumIter, EnumString, IntoStaticStr, VariantNames)]
@@ -78,7 +78,7 @@ pub enum LightSampler {
     /// By the tree; infinite lights beside it.
     Tree(TreeChoice),
     /// By the visibility cache, and by the tree.
-    Photons(HintedChoice),
+    Photons(VisibilityCacheSampler),
 }
 
 impl LightSampler {
@@ -95,15 +95,15 @@ impl LightSampler {
             LightSamplerKind::Tree => LightSampler::Tree(TreeChoice::new(lights, &powers)),
             LightSamplerKind::Photons => {
                 let base = TreeChoice::new(lights, &powers);
-                LightSampler::Photons(HintedChoice::new(base, lights, scene_radius))
+                LightSampler::Photons(VisibilityCacheSampler::new(base, lights, scene_radius))
             }
         }
     }
 
     /// Sets the visibility cache of the sampler that uses it.
-    pub(super) fn set_hints(&mut self, hints: Option<Arc<LightHints>>) {
+    pub(super) fn set_visibility_cache(&mut self, visibility_cache: Option<Arc<VisibilityCache>>) {
         match self {
-            LightSampler::Photons(choice) => choice.hints = hints,
+            LightSampler::Photons(choice) => choice.visibility_cache = visibility_cache,
             LightSampler::Uniform(_) | LightSampler::Power(_) | LightSampler::Tree(_) => {}
         }
     }
@@ -119,11 +119,11 @@ impl LightSampler {
 
     /// Chooses a light by `u` in [0, 1); `None` if there is none.
     #[inline]
-    pub fn sample(&self, ctx: &LightCtx, u: f32) -> Option<LightChoice> {
+    pub fn sample(&self, ctx: &LightCtx, u: f32) -> Option<SampledLight> {
         match self {
             LightSampler::Uniform(choice) | LightSampler::Power(choice) => {
                 let s = choice.table.sample(u)?;
-                Some(LightChoice { light: s.index as LightId, pmf: s.pmf, u: s.u })
+                Some(SampledLight { light: s.index as LightId, pmf: s.pmf, u: s.u })
             }
             LightSampler::Tree(choice) => choice.sample(ctx, u),
             LightSampler::Photons(choice) => choice.sample(ctx, u),
@@ -161,7 +161,7 @@ fn power_weights(powers: &[f32]) -> Vec<f32> {
         if p <= 0.0 {
             return 0.0;
         }
-        ((1.0 - UNIFORM_SHARE) * f64::from(p) / total + UNIFORM_SHARE / count as f64) as f32
+        ((1.0 - UNIFORM_FRACTION) * f64::from(p) / total + UNIFORM_FRACTION / count as f64) as f32
     };
     powers.iter().map(|&p| weight(p)).collect()
 }

@@ -2,7 +2,7 @@
 
 use super::area::AreaShape;
 use super::{
-    Emission, Light, LightChoice, LightCtx, LightId, LightSample, LightSampler, LightSamplerKind, area_lights_of,
+    Emission, Light, LightCtx, LightId, LightSample, LightSampler, LightSamplerKind, SampledLight, area_lights_of,
 };
 use crate::geometry::{GeometryId, Shape};
 use lumiris_numbers::math::{Bounds3, Rgb, Vec3};
@@ -135,7 +135,7 @@ impl LightSet {
     /// Samples a direction to a light that was chosen by `choice`. `pdf` of the sample includes the probability of the
     /// choice: it is per steradian, or a probability for delta lights.
     #[inline]
-    pub fn sample_choice(&self, ctx: &LightCtx, choice: LightChoice, u: [f32; 2]) -> Option<(LightId, LightSample)> {
+    pub fn sample_choice(&self, ctx: &LightCtx, choice: SampledLight, u: [f32; 2]) -> Option<(LightId, LightSample)> {
         let sample = self.lights[choice.light as usize].sample_li(ctx, u)?;
         let pdf = sample.pdf * choice.pmf;
         (pdf > 0.0 && pdf.is_finite()).then_some((choice.light, LightSample { pdf, ..sample }))

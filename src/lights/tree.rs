@@ -16,7 +16,7 @@ const MAX_HEURISTIC_DEPTH: u32 = 30;
 /// Subtrees on the stack while positions descend together: one per level.
 const MAX_DEPTH: usize = 66;
 /// Minimum probability of a child that can contribute; f32 uniforms and 1 − p do not resolve much less.
-const MIN_SHARE: f32 = 1.0 / (1 << 20) as f32;
+const MIN_PROBABILITY: f32 = 1.0 / (1 << 20) as f32;
 /// Number of split candidates per axis, plus one.
 const BUCKETS: usize = 12;
 /// Trail of lights that are not in the tree.
@@ -194,7 +194,7 @@ impl LightTree {
         let (a, b) = (left.importance(ctx), right.importance(ctx));
         let p = a / (a + b);
         if a > 0.0 && b > 0.0 && p.is_finite() {
-            p.clamp(MIN_SHARE, 1.0 - MIN_SHARE)
+            p.clamp(MIN_PROBABILITY, 1.0 - MIN_PROBABILITY)
         } else if p.is_finite() {
             p
         } else {
@@ -226,14 +226,14 @@ impl LightTree {
     }
 
     /// Chooses a light for each of the ascending `positions[places[0]..places[1]]` in units of 2⁻³², which the tree has
-    /// from `start` on with a share `share` of the probability. They descend the tree together, so that each node is
+    /// from `start` on with a share `fraction` of the probability. They descend the tree together, so that each node is
     /// evaluated once for all of them.
     pub fn runs(
         &self,
         ctx: &LightCtx,
         positions: &[u32],
         places: [u32; 2],
-        (start, share): (f64, f32),
+        (start, fraction): (f64, f32),
         out: &mut Vec<LightRun>,
     ) {
         let mut stack = [Descent::default(); MAX_DEPTH];
@@ -248,7 +248,7 @@ impl LightTree {
             let node = &self.nodes[place as usize];
             if node.is_leaf {
                 if pmf > 0.0 {
-                    out.push(LightRun { light: node.index, pmf: pmf * share, places: [first, end], interval });
+                    out.push(LightRun { light: node.index, pmf: pmf * fraction, places: [first, end], interval });
                 }
                 continue;
             }
@@ -268,12 +268,12 @@ impl LightTree {
         }
     }
 
-    /// At most `most` disjoint subtrees that hold all lights together, by their topmost nodes: of those so far, the one
-    /// whose lights are farthest apart, weighted by their intensity, is split next. None without lights, or if `most`
+    /// At most `max` disjoint subtrees that hold all lights together, by their topmost nodes: of those so far, the one
+    /// whose lights are farthest apart, weighted by their intensity, is split next. None without lights, or if `max`
     /// is 0.
-    pub fn cut(&self, most: usize) -> Vec<u32> {
-        let mut cut: Vec<u32> = if self.is_empty() || most == 0 { Vec::new() } else { vec![0] };
-        while cut.len() < most {
+    pub fn cut(&self, max: usize) -> Vec<u32> {
+        let mut cut: Vec<u32> = if self.is_empty() || max == 0 { Vec::new() } else { vec![0] };
+        while cut.len() < max {
             let spread = |&place: &u32| {
                 let node = &self.nodes[place as usize];
                 if node.is_leaf { -1.0 } else { node.intensity * node.radius_squared }

@@ -1,7 +1,7 @@
 //! The choice of a light by a [`LightTree`], with the infinite lights, which have no place in it, beside it.
 
 use super::choice::UNIT;
-use super::{Light, LightChoice, LightCtx, LightId, LightRun, LightTree};
+use super::{Light, LightCtx, LightId, LightRun, LightTree, SampledLight};
 use lumiris_numbers::math::ONE_MINUS_EPSILON;
 
 /// A light tree, with the infinite lights beside it.
@@ -34,18 +34,18 @@ impl TreeChoice {
     }
 
     #[inline]
-    pub(super) fn sample(&self, ctx: &LightCtx, u: f32) -> Option<LightChoice> {
+    pub(super) fn sample(&self, ctx: &LightCtx, u: f32) -> Option<SampledLight> {
         let TreeChoice { tree, infinite } = self;
         let p_infinite = self.infinite_probability(ctx);
         if u < p_infinite {
             let x = u / p_infinite * infinite.len() as f32;
             let i = (x as usize).min(infinite.len() - 1);
             let u = (x - i as f32).clamp(0.0, ONE_MINUS_EPSILON);
-            return Some(LightChoice { light: infinite[i], pmf: p_infinite / infinite.len() as f32, u });
+            return Some(SampledLight { light: infinite[i], pmf: p_infinite / infinite.len() as f32, u });
         }
         let u = ((u - p_infinite) / (1.0 - p_infinite)).min(ONE_MINUS_EPSILON);
         let (light, pmf, u) = tree.sample(ctx, u)?;
-        Some(LightChoice { light, pmf: pmf * (1.0 - p_infinite), u })
+        Some(SampledLight { light, pmf: pmf * (1.0 - p_infinite), u })
     }
 
     /// Adds runs for the positions from `first` on, which lie in [`start`, 1); `share` = 1 − `start` is a factor of all

@@ -9,23 +9,23 @@ pub enum PhotonError {
     /// There are lights, and all of them are black.
     #[error("the lights of the scene emit nothing, so there are no photons to trace")]
     NoEmission,
-    /// A number of trajectories, photons or importons is 0.
+    /// A number of photon paths, photons or importons is 0.
     #[error("zero photons were asked for")]
-    NothingWanted,
+    NothingRequested,
     /// The ratio q is not in (0, 1].
-    #[error("the ratio of global to caustic trajectories is {0}; it must be more than 0 and at most 1")]
+    #[error("the ratio of global to caustic paths is {0}; it must be more than 0 and at most 1")]
     InvalidRatio(f32),
     /// A limit of the deposition probability is not in (0, 1].
     #[error("the least deposition probability is {0}; it must be more than 0 and at most 1")]
     InvalidProbability(f32),
     /// No photon was stored.
     #[error(
-        "no photon was stored in {trajectories} trajectories: no light reaches a diffuse surface{}",
+        "no photon was stored in {paths} photon paths: no light reaches a diffuse surface{}",
         if *.by_importance { " that matters to the camera" } else { "" }
     )]
-    NoDeposit {
+    NothingStored {
         /// How many were traced.
-        trajectories: u64,
+        paths: u64,
         /// Whether photons arrived that had too little importance.
         by_importance: bool,
     },
@@ -33,10 +33,10 @@ pub enum PhotonError {
     #[error("the camera sees no diffuse surface, not even in mirrors, so that nothing is important to it")]
     CameraSeesNothing,
     /// The observer ended it.
-    #[error("stopped after {trajectories} trajectories, before the photon maps were done")]
+    #[error("stopped after {paths} photon paths, before the photon maps were done")]
     Stopped {
         /// How many were traced.
-        trajectories: u64,
+        paths: u64,
     },
     /// The maps do not fit.
     #[error(

@@ -1,4 +1,4 @@
-//! Where photons matter to the picture: importons, and the probability that a photon is stored [Keller and Wald 2000,
+//! Where photons matter to the image: importons, and the probability that a photon is stored [Keller and Wald 2000,
 //! §2.3].
 //!
 //! Importons are photons of importance, which the camera sends and which scatter as light does [Peter and Pietrek
@@ -10,8 +10,8 @@
 
 use super::error::PhotonError;
 use super::map::{GatherScratch, PhotonMap, Place, Search};
+use super::path::{BATCH, domain, path_stream};
 use super::photon::{Origin, Photon};
-use super::trajectory::{BATCH, domain, trajectory_stream};
 use super::walk::{Particle, WalkSettings, Walker};
 use crate::bsdfs::dielectric::Transport;
 use crate::scene::RenderJob;
@@ -23,7 +23,7 @@ const SEEDS: [u32; 2] = [0x696d_706f, 0x7465_7374];
 
 /// What becomes of photons that hardly matter.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub enum Unimportant {
+pub enum LowImportance {
     /// p(x) is at least this, in (0, 1]: unbiased.
     Floor(f32),
     /// Photons with p(x) below this are dropped: biased, light is missing.
@@ -35,8 +35,8 @@ pub enum Unimportant {
 pub struct ImportanceSettings {
     /// Importance maps of different seeds are independent.
     pub seed: u32,
-    /// Trajectories of importons.
-    pub trajectories: u64,
+    /// Importon paths.
+    pub paths: u64,
     /// Most scatterings of an importon.
     pub max_depth: u32,
     /// Camera rays that look for the least importance.
@@ -48,20 +48,20 @@ pub struct ImportanceSettings {
     /// Largest radius of a query, in radii of the scene.
     pub max_radius: f32,
     /// What becomes of photons that hardly matter.
-    pub unimportant: Unimportant,
+    pub low_importance: LowImportance,
 }
 
 impl Default for ImportanceSettings {
     fn default() -> Self {
         ImportanceSettings {
             seed: 0,
-            trajectories: 100_000,
+            paths: 100_000,
             max_depth: 4,
             test_rays: 1024,
             quantile: 0.0,
             count: 40,
             max_radius: 0.05,
-            unimportant: Unimportant::Floor(0.01),
+            low_importance: LowImportance::Floor(0.01),
         }
     }
 }
@@ -73,7 +73,7 @@ pub struct Importance {
     /// f.
     scale: f32,
     search: Search,
-    unimportant: Unimportant,
+    low_importance: LowImportance,
     rays: u64,
 }
 
@@ -81,16 +81,16 @@ impl Importance {
     /// p(x), for photons that arrive at `p` on the side of the geometric normal `n`.
     pub fn probability(&self, p: Vec3, n: Vec3, scratch: &mut GatherScratch) -> f32 {
         let important = (self.scale * density(&self.map, p, n, self.search, scratch)).min(1.0);
-        match self.unimportant {
-            Unimportant::Floor(least) => important.max(least),
-            Unimportant::CutOff(least) if important < least => 0.0,
-            Unimportant::CutOff(_) => important,
+        match self.low_importance {
+            LowImportance::Floor(min) => important.max(min),
+            LowImportance::CutOff(min) if important < min => 0.0,
+            LowImportance::CutOff(_) => important,
         }
     }
 
     /// Maps made with it have the light that they would have without it, on average.
     pub fn is_unbiased(&self) -> bool {
-        matches!(self.unimportant, Unimportant::Floor(_))
+        matches!(self.low_importance, LowImportance::Floor(_))
     }
 
     /// The importons.
@@ -116,16 +116,16 @@ fn density(map: &PhotonMap, p: Vec3, n: Vec3, search: Search, scratch: &mut Gath
 
 /// Sends importons, on all threads of the current pool.
 pub fn trace_importons(job: &RenderJob, settings: &ImportanceSettings) -> Result<Importance, PhotonError> {
-    if settings.trajectories == 0 || settings.test_rays == 0 {
-        return Err(PhotonError::NothingWanted);
+    if settings.paths == 0 || settings.test_rays == 0 {
+        return Err(PhotonError::NothingRequested);
     }
-    let (Unimportant::Floor(least) | Unimportant::CutOff(least)) = settings.unimportant;
-    if !(least > 0.0 && least <= 1.0) {
-        return Err(PhotonError::InvalidProbability(least));
+    let (LowImportance::Floor(min) | LowImportance::CutOff(min)) = settings.low_importance;
+    if !(min > 0.0 && min <= 1.0) {
+        return Err(PhotonError::InvalidProbability(min));
     }
 
     // The map
-    let (importons, mut rays) = trace(job, settings.seed ^ SEEDS[0], settings.trajectories, settings.max_depth, false);
+    let (importons, mut rays) = trace(job, settings.seed ^ SEEDS[0], settings.paths, settings.max_depth, false);
     let map = PhotonMap::new(importons);
     let search =
         Search::Nearest { count: settings.count.max(2), max_radius: settings.max_radius * job.lights.scene_radius };
@@ -138,11 +138,11 @@ pub fn trace_importons(job: &RenderJob, settings: &ImportanceSettings) -> Result
     found.retain(|&importance| importance > 0.0 && importance.is_finite());
     found.sort_by(f32::total_cmp);
     let index = (settings.quantile.clamp(0.0, 1.0) * found.len() as f32) as usize;
-    let least = found.get(index.min(found.len().saturating_sub(1))).ok_or(PhotonError::CameraSeesNothing)?;
-    Ok(Importance { scale: 1.0 / least, map, search, unimportant: settings.unimportant, rays })
+    let min = found.get(index.min(found.len().saturating_sub(1))).ok_or(PhotonError::CameraSeesNothing)?;
+    Ok(Importance { scale: 1.0 / min, map, search, low_importance: settings.low_importance, rays })
 }
 
-/// Importons where they arrive, and the number of rays; of each trajectory the first one only if `only_first`.
+/// Importons where they arrive, and the number of rays; of each photon path the first one only if `only_first`.
 fn trace(job: &RenderJob, seed: u32, count: u64, max_depth: u32, only_first: bool) -> (Vec<Photon>, u64) {
     let settings = WalkSettings { transport: Transport::Radiance, max_depth };
     let power = Rgb::splat((1.0 / count as f64) as f32);
@@ -151,10 +151,10 @@ fn trace(job: &RenderJob, seed: u32, count: u64, max_depth: u32, only_first: boo
         .with_max_len(1)
         .map_init(Walker::default, |walker, i| {
             let begin = i as u64 * BATCH;
-            let trajectories = begin..(begin + BATCH).min(count);
+            let paths = begin..(begin + BATCH).min(count);
             walker.traced = 0;
             walker.active.clear();
-            walker.active.extend((0..).zip(trajectories).map(|(i, t)| emit(job, seed, i, t, power)));
+            walker.active.extend((0..).zip(paths).map(|(i, t)| emit(job, seed, i, t, power)));
             let mut importons: Vec<(u32, Photon)> = Vec::new();
             walker.walk(job, &settings, |arrival| {
                 let (wi, n, particle) = (arrival.wi, arrival.n, arrival.particle);
@@ -178,9 +178,9 @@ fn trace(job: &RenderJob, seed: u32, count: u64, max_depth: u32, only_first: boo
     (batches.into_iter().flat_map(|(importons, _)| importons).collect(), rays)
 }
 
-/// An importon as it leaves the camera, anywhere in the picture.
-fn emit(job: &RenderJob, seed: u32, index: u32, trajectory: u64, power: Rgb) -> Particle {
-    let stream = trajectory_stream(seed, trajectory);
+/// An importon as it leaves the camera, anywhere in the image.
+fn emit(job: &RenderJob, seed: u32, index: u32, path: u64, power: Rgb) -> Particle {
+    let stream = path_stream(seed, path);
     let [x, y, lens_u, lens_v] = stream.domain(domain::EMISSION).draw::<4>();
     let [u_time] = stream.domain(domain::TIME).draw::<1>();
     let bounds = &job.world.scene.film.bounds;

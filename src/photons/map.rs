@@ -147,8 +147,8 @@ impl PhotonMap {
                 }
                 let heap = &mut scratch.nearest;
                 heap.clear();
-                let most = max_radius * max_radius;
-                let mut nearest = Nearest { at, count: count as usize, bound: most, heap };
+                let max = max_radius * max_radius;
+                let mut nearest = Nearest { at, count: count as usize, bound: max, heap };
                 self.tree.visit(at.p, &mut nearest);
                 let bound = nearest.bound;
                 let Some(farthest) = heap.peek() else { return 0.0 };

@@ -9,26 +9,26 @@
 //! got there ([`Origin`]): straight from a light, scattered by a Lambertian lobe, or by any other one, which makes them
 //! caustic photons, whether the light before that was direct or not.
 //!
-//! Reading order: [`photon`], `tree`, [`map`]; [`shares`], `trajectory`, `walk`; [`importance`], [`rules`],
+//! Reading order: [`photon`], `tree`, [`map`]; [`light_distribution`], `path`, `walk`; [`importance`], [`rules`],
 //! [`trace`]; [`error`].
 
 pub mod error;
 pub mod importance;
+pub mod light_distribution;
 pub mod map;
 #[cfg(test)]
 mod map_tests;
+mod path;
 pub mod photon;
 pub mod rules;
-pub mod shares;
 pub mod trace;
-mod trajectory;
 mod tree;
 mod walk;
 
 pub use error::PhotonError;
-pub use importance::{Importance, ImportanceSettings, Unimportant, trace_importons};
+pub use importance::{Importance, ImportanceSettings, LowImportance, trace_importons};
+pub use light_distribution::LightDistribution;
 pub use map::{GatherScratch, PhotonMap, Place, Search};
 pub use photon::{Origin, Photon};
 pub use rules::CausticRule;
-pub use shares::LightShares;
-pub use trace::{Traced, Tracing, Want, trace_photons, trajectories_for};
+pub use trace::{PhotonBudget, Traced, Tracing, path_count, trace_photons};

@@ -1,6 +1,6 @@
 //! Which photons are stored [Keller and Wald 2000, §2.3].
 //!
-//! Of trajectories more are traced than the global map needs, so that the caustic map is finer: its photons are stored
+//! Of photon paths more are traced than the global map needs, so that the caustic map is finer: its photons are stored
 //! with probability p(x), those of the global map with q·p(x), and their power is divided by it.
 
 use strum::EnumIter;
@@ -12,14 +12,14 @@ pub enum CausticRule {
     OneRule,
     /// Two: ξ₁ < q, and only then ξ₂ < p(x), which is dear.
     TwoTests,
-    /// The first ⌊qN⌋ of N trajectories fill both maps, the others the caustic map only.
+    /// The first ⌊qN⌋ of N photon paths fill both maps, the others the caustic map only.
     #[default]
-    FirstTrajectories,
+    FirstPaths,
 }
 
 impl CausticRule {
     /// Whether a photon of the global map is stored, and the factor of its power. `fills_global` is about its
-    /// trajectory; `p` is only called where the cheap tests pass.
+    /// photon path; `p` is only called where the cheap tests pass.
     #[inline]
     pub fn global(self, q: f32, fills_global: bool, xi: [f32; 2], p: impl FnOnce() -> f32) -> Option<f32> {
         match self {
@@ -37,7 +37,7 @@ impl CausticRule {
                 }
                 caustic(xi[1], p()).map(|factor| factor / q)
             }
-            CausticRule::FirstTrajectories => {
+            CausticRule::FirstPaths => {
                 if fills_global {
                     caustic(xi[0], p())
                 } else {
@@ -74,8 +74,8 @@ mod tests {
                     asked += 1;
                     p
                 });
-                // The first ⌊qN⌋ trajectories are divided by their number, not by N
-                let share = if rule == CausticRule::FirstTrajectories { 1.0 / q } else { 1.0 };
+                // The first ⌊qN⌋ photon paths are divided by their number, not by N
+                let share = if rule == CausticRule::FirstPaths { 1.0 / q } else { 1.0 };
                 power.add(f64::from(factor.unwrap_or(0.0) * share));
             }
             assert!(t_test(&power, 1.0).p_value > 1e-4, "{rule:?} {}", power.mean());

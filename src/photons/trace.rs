@@ -1,19 +1,19 @@
-//! Photon tracing: random walks from the lights in batches, put together in the order of trajectories.
+//! Photon tracing: random walks from the lights in batches, put together in the order of photon paths.
 //!
-//! The numbers of a trajectory choose the light, where and which way the photon leaves it, and every scattering. What
-//! is stored depends on the scene, the settings and the number of trajectories only, which is fixed before they are
-//! traced, see [`trajectories_for`].
+//! The numbers of a photon path choose the light, where and which way the photon leaves it, and every scattering. What
+//! is stored depends on the scene, the settings and the number of photon paths only, which is fixed before they are
+//! traced, see [`path_count`].
 //!
 //! Photons that the global map holds (from lights, and scattered by Lambertian surfaces) and those of caustics come
-//! from the same trajectories, see [`super::rules`].
+//! from the same photon paths, see [`super::rules`].
 
 use super::error::PhotonError;
 use super::importance::Importance;
+use super::light_distribution::LightDistribution;
 use super::map::GatherScratch;
+use super::path::{BATCH, domain, path_stream};
 use super::photon::{Origin, Photon};
 use super::rules::{self, CausticRule};
-use super::shares::LightShares;
-use super::trajectory::{BATCH, domain, trajectory_stream};
 use super::walk::{Arrival, Particle, WalkSettings, Walker};
 use crate::bsdfs::dielectric::Transport;
 use crate::scene::RenderJob;
@@ -27,10 +27,10 @@ use std::time::{Duration, Instant};
 
 /// Batches between two looks at memory.
 const ROUND: u64 = 32;
-/// Trajectories of the first round of a pilot; later rounds double what is traced.
-const PILOT_TRAJECTORIES: u64 = 128;
+/// Photon paths of the first round of a pilot; later rounds double what is traced.
+const PILOT_PATHS: u64 = 128;
 /// A pilot stores one part in so many of the photons that are wanted.
-const PILOT_SHARE: u64 = 8;
+const PILOT_DIVISOR: u64 = 8;
 /// Fewest photons of a pilot, and most.
 const PILOT_PHOTONS: [u64; 2] = [1024, 16_384];
 /// Seed of pilots.
@@ -47,14 +47,14 @@ pub struct Tracing<'a> {
     pub max_depth: u32,
     /// The same for photons of the global map.
     pub max_global_depth: u32,
-    /// Ratio q of trajectories that fill the global map to all, in (0, 1].
+    /// Ratio q of photon paths that fill the global map to all, in (0, 1].
     pub q: f32,
     /// How that is done.
     pub caustics: CausticRule,
-    /// Part of the trajectories that lights share evenly, whatever their powers (0..1).
+    /// Part of the photon paths that lights share evenly, whatever their powers (0..1).
     pub floor: f32,
-    /// Most trajectories of a pilot, and so of one that stores nothing and ends with an error.
-    pub most_in_pilot: u64,
+    /// Most photon paths of a pilot, and so of one that stores nothing and ends with an error.
+    pub max_in_pilot: u64,
     /// Ends it between two rounds when it becomes true.
     pub stop: Option<&'a AtomicBool>,
     /// Most memory of the maps (bytes).
@@ -70,7 +70,7 @@ impl Default for Tracing<'_> {
             q: 1.0,
             caustics: CausticRule::default(),
             floor: 0.1,
-            most_in_pilot: 1_000_000,
+            max_in_pilot: 1_000_000,
             stop: None,
             memory: None,
         }
@@ -79,30 +79,30 @@ impl Default for Tracing<'_> {
 
 /// How many photons are traced.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum Want {
-    /// N trajectories.
-    Trajectories(u64),
-    /// As many trajectories as store about so many photons, see [`trajectories_for`].
+pub enum PhotonBudget {
+    /// N photon paths.
+    Paths(u64),
+    /// As many photon paths as store about so many photons, see [`path_count`].
     Stored {
         /// Photons of the global map.
         global: u64,
-        /// Most trajectories.
-        most_trajectories: u64,
+        /// Most photon paths.
+        max_paths: u64,
     },
 }
 
 /// What was traced.
 #[derive(Clone, Debug, Default)]
 pub struct Traced {
-    /// Photons from lights and from Lambertian surfaces, in the order of trajectories.
+    /// Photons from lights and from Lambertian surfaces, in the order of photon paths.
     pub global: Vec<Photon>,
     /// Photons whose last scattering was not Lambertian.
     pub caustic: Vec<Photon>,
     /// N.
-    pub trajectories: u64,
+    pub paths: u64,
     /// Those that filled the global map.
-    pub global_trajectories: u64,
-    /// Photons that arrived at Lambertian surfaces, stored or not, on trajectories of either map.
+    pub global_paths: u64,
+    /// Photons that arrived at Lambertian surfaces, stored or not, on photon paths of either map.
     pub arrivals: u64,
     /// Rays traced.
     pub rays: u64,
@@ -133,51 +133,51 @@ pub fn trace_photons(
     job: &RenderJob,
     tracing: &Tracing<'_>,
     importance: Option<&Importance>,
-    want: Want,
+    budget: PhotonBudget,
 ) -> Result<Traced, PhotonError> {
     let start = Instant::now();
-    let count = trajectories_for(job, tracing, importance, want)?;
+    let count = path_count(job, tracing, importance, budget)?;
     let mut traced = Run::new(job, tracing, importance)?.trace(count)?;
-    let per_trajectory = |photons: &mut [Photon], count: u64| {
+    let per_path = |photons: &mut [Photon], count: u64| {
         let factor = (1.0 / count as f64) as f32;
         photons.par_iter_mut().for_each(|photon| *photon = photon.scaled(factor));
     };
-    per_trajectory(&mut traced.global, traced.global_trajectories);
-    per_trajectory(&mut traced.caustic, traced.trajectories);
+    per_path(&mut traced.global, traced.global_paths);
+    per_path(&mut traced.caustic, traced.paths);
     traced.elapsed = start.elapsed();
     Ok(traced)
 }
 
-/// The number N of trajectories that [`trace_photons`] traces. Where photons are counted, it comes from a pilot, whose
-/// random numbers are not those of any map: maps of N trajectories have the right light on average whatever N is, while
+/// The number N of photon paths that [`trace_photons`] traces. Where photons are counted, it comes from a pilot, whose
+/// random numbers are not those of any map: maps of N photon paths have the right light on average whatever N is, while
 /// the number of photons that they store varies. Were N where the last photon wanted falls, as many as wanted would be
 /// divided by a random number, and light would be too bright by about one part in as many as the photons are [Haldane
 /// 1945].
 ///
 /// The pilot stores about an eighth of the photons, at least 1024 and at most 16 384, and one N may serve many maps. An
 /// error if it stores nothing.
-pub fn trajectories_for(
+pub fn path_count(
     job: &RenderJob,
     tracing: &Tracing<'_>,
     importance: Option<&Importance>,
-    want: Want,
+    budget: PhotonBudget,
 ) -> Result<u64, PhotonError> {
-    match want {
-        Want::Trajectories(0) | Want::Stored { global: 0, .. } | Want::Stored { most_trajectories: 0, .. } => {
-            Err(PhotonError::NothingWanted)
+    match budget {
+        PhotonBudget::Paths(0) | PhotonBudget::Stored { global: 0, .. } | PhotonBudget::Stored { max_paths: 0, .. } => {
+            Err(PhotonError::NothingRequested)
         }
-        Want::Trajectories(count) => Ok(count),
-        Want::Stored { global, most_trajectories } => {
+        PhotonBudget::Paths(count) => Ok(count),
+        PhotonBudget::Stored { global, max_paths } => {
             let tracing = Tracing { seed: pilot_seed(tracing.seed), ..*tracing };
-            Run::new(job, &tracing, importance)?.pilot(global, most_trajectories)
+            Run::new(job, &tracing, importance)?.pilot(global, max_paths)
         }
     }
 }
 
-/// A photon with its trajectory.
+/// A photon with its photon path.
 type Deposit = (u64, Photon);
 
-/// What a batch stored, in the order of trajectories.
+/// What a batch stored, in the order of photon paths.
 #[derive(Default)]
 struct Batch {
     global: Vec<Deposit>,
@@ -190,7 +190,7 @@ struct Run<'a> {
     job: &'a RenderJob,
     tracing: &'a Tracing<'a>,
     importance: Option<&'a Importance>,
-    shares: LightShares,
+    light_distribution: LightDistribution,
 }
 
 impl<'a> Run<'a> {
@@ -206,27 +206,27 @@ impl<'a> Run<'a> {
         if !(tracing.q > 0.0 && tracing.q <= 1.0) {
             return Err(PhotonError::InvalidRatio(tracing.q));
         }
-        let shares = LightShares::new(lights, tracing.floor).ok_or(PhotonError::NoEmission)?;
-        Ok(Run { job, tracing, importance, shares })
+        let light_distribution = LightDistribution::new(lights, tracing.floor).ok_or(PhotonError::NoEmission)?;
+        Ok(Run { job, tracing, importance, light_distribution })
     }
 
-    /// The trajectories of the global map among `all`.
+    /// The photon paths of the global map among `all`.
     fn global_part(&self, all: u64) -> u64 {
         match self.tracing.caustics {
             CausticRule::OneRule | CausticRule::TwoTests => all,
-            CausticRule::FirstTrajectories => ((f64::from(self.tracing.q) * all as f64) as u64).max(1),
+            CausticRule::FirstPaths => ((f64::from(self.tracing.q) * all as f64) as u64).max(1),
         }
     }
 
-    /// The number of trajectories that store about `wanted` photons in the global map, by trajectories of a seed of
+    /// The number of photon paths that store about `wanted` photons in the global map, by photon paths of a seed of
     /// their own.
-    fn pilot(&self, wanted: u64, most: u64) -> Result<u64, PhotonError> {
-        let enough = (wanted / PILOT_SHARE).clamp(PILOT_PHOTONS[0], PILOT_PHOTONS[1]);
-        let limit = self.tracing.most_in_pilot.min(most);
+    fn pilot(&self, wanted: u64, max: u64) -> Result<u64, PhotonError> {
+        let enough = (wanted / PILOT_DIVISOR).clamp(PILOT_PHOTONS[0], PILOT_PHOTONS[1]);
+        let limit = self.tracing.max_in_pilot.min(max);
         let (mut traced, mut global, mut stored, mut arrivals) = (0, 0, 0, 0);
         while global < enough && traced < limit {
             self.check_stop(traced)?;
-            let end = (2 * traced).max(PILOT_TRAJECTORIES).min(traced + ROUND * BATCH).min(limit);
+            let end = (2 * traced).max(PILOT_PATHS).min(traced + ROUND * BATCH).min(limit);
             for batch in self.round(traced..end, u64::MAX) {
                 global += batch.global.len() as u64;
                 stored += (batch.global.len() + batch.caustic.len()) as u64;
@@ -235,37 +235,37 @@ impl<'a> Run<'a> {
             traced = end;
         }
         if stored == 0 {
-            return Err(PhotonError::NoDeposit { trajectories: traced, by_importance: arrivals > 0 });
+            return Err(PhotonError::NothingStored { paths: traced, by_importance: arrivals > 0 });
         }
 
         // A map of caustics alone has as many as were looked at
         let of_global = if global > 0 { wanted as f64 * traced as f64 / global as f64 } else { traced as f64 };
         let all = match self.tracing.caustics {
             CausticRule::OneRule | CausticRule::TwoTests => of_global,
-            CausticRule::FirstTrajectories => of_global / f64::from(self.tracing.q),
+            CausticRule::FirstPaths => of_global / f64::from(self.tracing.q),
         };
-        Ok((all.ceil() as u64).clamp(1, most))
+        Ok((all.ceil() as u64).clamp(1, max))
     }
 
-    fn check_stop(&self, trajectories: u64) -> Result<(), PhotonError> {
+    fn check_stop(&self, paths: u64) -> Result<(), PhotonError> {
         let is_stopped = self.tracing.stop.is_some_and(|stop| stop.load(Ordering::Relaxed));
-        if is_stopped { Err(PhotonError::Stopped { trajectories }) } else { Ok(()) }
+        if is_stopped { Err(PhotonError::Stopped { paths }) } else { Ok(()) }
     }
 
-    /// Traces `count` trajectories, round by round.
+    /// Traces `count` photon paths, round by round.
     fn trace(&self, count: u64) -> Result<Traced, PhotonError> {
-        let global_trajectories = self.global_part(count);
-        let mut traced = Traced { global_trajectories, ..Traced::default() };
-        while traced.trajectories < count {
-            self.check_stop(traced.trajectories)?;
-            let end = (traced.trajectories + ROUND * BATCH).min(count);
-            for batch in self.round(traced.trajectories..end, global_trajectories) {
+        let global_paths = self.global_part(count);
+        let mut traced = Traced { global_paths, ..Traced::default() };
+        while traced.paths < count {
+            self.check_stop(traced.paths)?;
+            let end = (traced.paths + ROUND * BATCH).min(count);
+            for batch in self.round(traced.paths..end, global_paths) {
                 traced.global.extend(batch.global.into_iter().map(|(_, photon)| photon));
                 traced.caustic.extend(batch.caustic.into_iter().map(|(_, photon)| photon));
                 traced.arrivals += batch.arrivals;
                 traced.rays += batch.rays;
             }
-            traced.trajectories = end;
+            traced.paths = end;
             if let Some(limit) = self.tracing.memory.filter(|limit| traced.stored() * BYTES > *limit) {
                 return Err(PhotonError::OutOfMemory { limit, photons: traced.stored() });
             }
@@ -273,23 +273,23 @@ impl<'a> Run<'a> {
         Ok(traced)
     }
 
-    /// Some trajectories, in parallel, in their order.
-    fn round(&self, trajectories: Range<u64>, global: u64) -> Vec<Batch> {
-        let batches = (trajectories.end - trajectories.start).div_ceil(BATCH) as usize;
+    /// Some photon paths, in parallel, in their order.
+    fn round(&self, paths: Range<u64>, global: u64) -> Vec<Batch> {
+        let batches = (paths.end - paths.start).div_ceil(BATCH) as usize;
         (0..batches)
             .into_par_iter()
             .with_max_len(1)
             .map_init(<(Walker, GatherScratch)>::default, |(walker, scratch), i| {
-                let begin = trajectories.start + i as u64 * BATCH;
-                self.batch(walker, scratch, begin..(begin + BATCH).min(trajectories.end), global)
+                let begin = paths.start + i as u64 * BATCH;
+                self.batch(walker, scratch, begin..(begin + BATCH).min(paths.end), global)
             })
             .collect()
     }
 
-    fn batch(&self, walker: &mut Walker, scratch: &mut GatherScratch, trajectories: Range<u64>, global: u64) -> Batch {
+    fn batch(&self, walker: &mut Walker, scratch: &mut GatherScratch, paths: Range<u64>, global: u64) -> Batch {
         walker.traced = 0;
         walker.active.clear();
-        walker.active.extend((0_u32..).zip(trajectories.clone()).filter_map(|(i, t)| self.emit(i, t)));
+        walker.active.extend((0_u32..).zip(paths.clone()).filter_map(|(i, t)| self.emit(i, t)));
         let settings = WalkSettings { transport: Transport::Importance, max_depth: self.tracing.max_depth };
         let mut batch = Batch::default();
         walker.walk(self.job, &settings, |arrival| {
@@ -297,21 +297,21 @@ impl<'a> Run<'a> {
                 return;
             }
             batch.arrivals += 1;
-            let trajectory = trajectories.start + u64::from(arrival.particle.index);
-            self.deposit(&mut batch, arrival, trajectory, trajectory < global, scratch);
+            let path = paths.start + u64::from(arrival.particle.index);
+            self.deposit(&mut batch, arrival, path, path < global, scratch);
         });
         batch.rays = walker.traced;
-        // From the order of vertices to that of trajectories; stable
+        // From the order of vertices to that of photon paths; stable
         batch.global.sort_by_key(|(t, _)| *t);
         batch.caustic.sort_by_key(|(t, _)| *t);
         batch
     }
 
     /// A photon as it leaves a light.
-    fn emit(&self, index: u32, trajectory: u64) -> Option<Particle> {
+    fn emit(&self, index: u32, path: u64) -> Option<Particle> {
         let scene = &self.job.world.scene;
-        let stream = trajectory_stream(self.tracing.seed, trajectory);
-        let (light, pmf) = self.shares.sample(stream.domain(domain::LIGHT).draw::<2>());
+        let stream = path_stream(self.tracing.seed, path);
+        let (light, pmf) = self.light_distribution.sample(stream.domain(domain::LIGHT).draw::<2>());
         let [p0, p1, d0, d1] = stream.domain(domain::EMISSION).draw::<4>();
         let sphere = (scene.lights.scene_centre, scene.lights.scene_radius);
         let s = scene.lights.lights[light as usize].sample_le(sphere, [p0, p1], [d0, d1])?;
@@ -328,7 +328,7 @@ impl<'a> Run<'a> {
         &self,
         batch: &mut Batch,
         arrival: &Arrival<'_>,
-        trajectory: u64,
+        path: u64,
         fills_global: bool,
         scratch: &mut GatherScratch,
     ) {
@@ -345,7 +345,7 @@ impl<'a> Run<'a> {
         };
         if let Some(factor) = factor {
             let power = particle.power * factor;
-            deposits.push((trajectory, Photon::new(arrival.p, arrival.wi, arrival.n, power, particle.origin)));
+            deposits.push((path, Photon::new(arrival.p, arrival.wi, arrival.n, power, particle.origin)));
         }
     }
 }

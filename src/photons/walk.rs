@@ -18,7 +18,7 @@ use crate::accel::{Coherence, Hit, RayBatch};
 use crate::bsdfs::dielectric::Transport;
 use crate::bsdfs::{Lambertian, Resampled};
 use crate::materials::SurfaceBsdf;
-use crate::scene::{Found, RenderJob};
+use crate::scene::{RenderJob, SurfaceInteraction};
 use lumiris_numbers::math::sphere_map::equal_area_sphere_to_square;
 use lumiris_numbers::math::{Ray, Rgb, Vec3};
 use lumiris_numbers::samplers::SampleStream;
@@ -34,7 +34,7 @@ mod domain {
     pub(super) const PART: u32 = 3;
     /// Two numbers for the deposit.
     pub(super) const DEPOSIT: u32 = 4;
-    /// Vertex k has the domain `VERTEX + k` of the trajectory.
+    /// Vertex k has the domain `VERTEX + k` of the photon path.
     pub(super) const VERTEX: u32 = 16;
 }
 
@@ -48,7 +48,7 @@ pub(super) struct Particle {
     pub(super) power: Rgb,
     /// How it came to be where it is.
     pub(super) origin: Origin,
-    /// Random numbers of its trajectory.
+    /// Random numbers of its photon path.
     pub(super) stream: SampleStream,
     passed: u32,
 }
@@ -149,23 +149,32 @@ impl Walker {
         self.passing.clear();
         for (particle, hit) in self.active.iter().zip(&self.hits) {
             let Some(hit) = hit else { continue };
-            let found = Found::new(job, &particle.ray, (0.0, 0.0), hit);
-            let Some(bsdf) = found.scatter(job) else {
+            let interaction = SurfaceInteraction::new(job, &particle.ray, (0.0, 0.0), hit);
+            let Some(bsdf) = interaction.scatter(job) else {
                 if particle.passed < MAX_PASSED {
-                    let ray = Ray { o: found.origin(particle.ray.d), ..particle.ray };
+                    let ray = Ray { o: interaction.origin(particle.ray.d), ..particle.ray };
                     self.passing.push(Particle { ray, passed: particle.passed + 1, ..*particle });
                 }
                 continue;
             };
             let stream = particle.stream.domain(domain::VERTEX + vertex);
-            let part = bsdf.lambertian(found.wo);
+            let part = bsdf.lambertian(interaction.wo);
             if let Some(part) = &part {
-                let n = if bsdf.n.dot(found.wo) < 0.0 { -bsdf.n } else { bsdf.n };
-                arrive(&Arrival { particle, p: found.surface.p, wi: found.wo, n, part, scatterings: vertex, stream });
+                let n = if bsdf.n.dot(interaction.wo) < 0.0 { -bsdf.n } else { bsdf.n };
+                arrive(&Arrival {
+                    particle,
+                    p: interaction.surface.p,
+                    wi: interaction.wo,
+                    n,
+                    part,
+                    scatterings: vertex,
+                    stream,
+                });
             }
             if vertex < settings.max_depth {
                 let proposals = job.settings().integrator.bsdf_proposals;
-                let scattering = Scattering { found: &found, bsdf: &bsdf, part: part.as_ref(), stream, proposals };
+                let scattering =
+                    Scattering { interaction: &interaction, bsdf: &bsdf, part: part.as_ref(), stream, proposals };
                 self.next.extend(scattering.scatter(particle, settings.transport));
             }
         }
@@ -180,7 +189,7 @@ fn interleave<const N: usize>(coordinates: [u32; N]) -> u32 {
 
 /// A surface that a particle leaves.
 struct Scattering<'a> {
-    found: &'a Found,
+    interaction: &'a SurfaceInteraction,
     bsdf: &'a SurfaceBsdf<'a>,
     part: Option<&'a Lambertian<'a>>,
     stream: SampleStream,
@@ -192,7 +201,7 @@ impl Scattering<'_> {
     /// The particle after the surface; `None` if it ends there.
     fn scatter(&self, particle: &Particle, transport: Transport) -> Option<Particle> {
         let drawn = self.draw()?;
-        let (wo, wi) = (self.found.wo, drawn.wi);
+        let (wo, wi) = (self.interaction.wo, drawn.wi);
         let (f, origin) = self.of_part(&drawn);
 
         // Weight
@@ -216,13 +225,13 @@ impl Scattering<'_> {
             return None;
         }
         let power = power / survival.min(1.0);
-        let ray = Ray { o: self.found.origin(wi), d: wi, ..particle.ray };
+        let ray = Ray { o: self.interaction.origin(wi), d: wi, ..particle.ray };
         Some(Particle { ray, power, origin, passed: 0, ..*particle })
     }
 
     /// A direction by the BSDF; of one that can only be evaluated, by resampling.
     fn draw(&self) -> Option<Resampled> {
-        let wo = self.found.wo;
+        let wo = self.interaction.wo;
         if self.bsdf.bsdf.is_only_evaluated() {
             let count = self.proposals.max(1);
             let proposal = |i| self.stream.split(domain::BSDF, count, i).draw::<3>();
@@ -242,7 +251,7 @@ impl Scattering<'_> {
             return (drawn.f, Origin::Caustic);
         }
         let rest = SurfaceBsdf { bsdf: rest, ..*self.bsdf };
-        let f_rest = rest.f(self.found.wo, drawn.wi);
+        let f_rest = rest.f(self.interaction.wo, drawn.wi);
         let p_rest = (f_rest.average() / drawn.f.average()).clamp(0.0, 1.0);
         if self.stream.draw_random(domain::PART) < p_rest {
             (f_rest / p_rest, Origin::Caustic)

@@ -1,7 +1,7 @@
 //! How fast the stages are, on one thread: ray queries against bare loops over Embree with the same rays, and the time
 //! per stage of a rendering.
 //!
-//! The rays are those of a rendering: whole batches, spread evenly over the picture. The renderer and the bare loop take
+//! The rays are those of a rendering: whole batches, spread evenly over the image. The renderer and the bare loop take
 //! turns, and the time of a batch is the median over the turns; so what else the machine does meanwhile matters little.
 
 use super::{BATCH_PATHS, camera_batches};

@@ -1,23 +1,23 @@
 //! How fast photons are traced, and how fast their maps are built and asked.
 
 use super::{RenderError, thread_pool};
-use crate::photons::{GatherScratch, PhotonError, PhotonMap, Place, Search, Tracing, Want, trace_photons};
+use crate::photons::{GatherScratch, PhotonBudget, PhotonError, PhotonMap, Place, Search, Tracing, trace_photons};
 use crate::scene::RenderJob;
 use lumiris_numbers::estimators::stats::median;
 use serde::Serialize;
 use std::hint::black_box;
 use std::time::Instant;
 
-/// Trajectories that are traced in a turn.
-const TRAJECTORIES: u64 = 1 << 18;
+/// Photon paths that are traced in a turn.
+const PATHS: u64 = 1 << 18;
 /// Places that the map is asked at: where its photons lie.
 const QUERIES: usize = 1 << 14;
 
 /// What was measured; times are medians over the turns.
 #[derive(Clone, Debug, Serialize)]
 pub struct PhotonReport {
-    /// Trajectories of a turn.
-    pub trajectories: u64,
+    /// Photon paths of a turn.
+    pub paths: u64,
     /// Photons that arrived at diffuse surfaces.
     pub photons: u64,
     /// Rays traced.
@@ -38,20 +38,20 @@ pub struct PhotonReport {
 pub fn measure_photons(job: &RenderJob, threads: Option<usize>, runs: u32) -> Result<PhotonReport, RenderError> {
     let one = thread_pool(Some(1))?;
     let all = thread_pool(threads)?;
-    let want = Want::Trajectories(TRAJECTORIES);
+    let budget = PhotonBudget::Paths(PATHS);
     let mut times = [Vec::new(), Vec::new()];
     let mut last = None;
     for run in 0..runs.max(1) {
         let tracing = Tracing { seed: run, ..Tracing::default() };
         for (pool, times) in [&one, &all].into_iter().zip(&mut times) {
-            let traced = pool.install(|| trace_photons(job, &tracing, None, want))?;
+            let traced = pool.install(|| trace_photons(job, &tracing, None, budget))?;
             times.push(traced.elapsed.as_secs_f64());
             last = Some(traced);
         }
     }
     let traced = last.unwrap_or_default();
     if traced.stored() == 0 {
-        return Err(PhotonError::NoDeposit { trajectories: TRAJECTORIES, by_importance: false }.into());
+        return Err(PhotonError::NothingStored { paths: PATHS, by_importance: false }.into());
     }
     let [alone, together] = times.map(median);
     let (photons, rays) = (traced.arrivals, traced.rays);
@@ -70,7 +70,7 @@ pub fn measure_photons(job: &RenderJob, threads: Option<usize>, runs: u32) -> Re
     let nearest = |count| Search::Nearest { count, max_radius };
     let queries = [("50 nearest", nearest(50)), ("200 nearest", nearest(200))];
     Ok(PhotonReport {
-        trajectories: TRAJECTORIES,
+        paths: PATHS,
         photons,
         rays,
         tracing: vec![(1, alone), (all.current_num_threads(), together)],

@@ -1,15 +1,15 @@
 //! Rendering: tiles × sample ranges on all cores, and the film that comes out.
 //!
-//! The picture is a function of the scene, its settings, the seed and the sample range. A pixel's samples are drawn
+//! The image is a function of the scene, its settings, the seed and the sample range. A pixel's samples are drawn
 //! by its coordinates and their index, traced independently of what else is in their batch, and added in the order
 //! of their index; so neither threads, nor tiles, nor passes change a bit.
 
 pub mod bench;
 pub mod bench_photons;
 pub mod crosscheck;
-pub mod hints;
 pub mod output;
 pub mod plan;
+pub mod visibility_cache;
 mod worker;
 
 use crate::direct::Fits;
@@ -36,7 +36,7 @@ use worker::{Worker, WorkerStats};
 mod domain {
     pub(super) const FILM_AND_LENS: u32 = 0;
     pub(super) const TIME: u32 = 1;
-    pub(super) const SPLIT: u32 = 2;
+    pub(super) const SAMPLE_COUNTS: u32 = 2;
 }
 
 /// Paths that are traced together: enough that stages run long, few enough that their data stays in the cache.
@@ -48,7 +48,7 @@ const BLOCK_SEED: u32 = 0x62_6c_6f_63;
 /// Makes the seed of replicas from that of the image.
 const REPLICA_SEED: u32 = 0x72_65_70_73;
 
-/// How to render; none of it changes the picture but the sample range.
+/// How to render; none of it changes the image but the sample range.
 #[derive(Clone, Copy, Debug)]
 pub struct RenderSettings {
     /// Threads; all cores if `None`.
@@ -118,7 +118,7 @@ pub struct CacheReport {
     pub lookups: LookupStats,
 }
 
-/// Why a rendering ended without a picture.
+/// Why a rendering ended without an image.
 #[derive(Debug, thiserror::Error)]
 pub enum RenderError {
     /// The system gives no threads.
@@ -156,7 +156,8 @@ pub fn thread_pool(threads: Option<usize>) -> Result<rayon::ThreadPool, ThreadEr
     pool.map_err(|source| ThreadError { threads, source })
 }
 
-/// Batches of camera samples as the renderer makes them in its first pass, spread over the picture; about `rays` together.
+/// Batches of camera samples as the renderer makes them in its first pass, spread over the image; about `rays`
+/// together.
 fn camera_batches(job: &RenderJob, tile_size: u32, rays: usize) -> Vec<Vec<CameraSample>> {
     let stop = AtomicBool::new(false);
     let spp = job.settings().sampling.spp;
@@ -317,7 +318,7 @@ impl<'a> Run<'a> {
     }
 
     /// Makes the photon maps of the pass that begins with the sample `first`, if it needs others. False if it was told to stop and
-    /// the samples so far are a picture.
+    /// the samples so far are an image.
     fn renew_maps(&mut self, maker: &mut MapMaker<'_>, first: u32) -> Result<bool, PhotonError> {
         let is_progressive = self.job.settings().integrator.photons.progressive.is_some();
         if self.maps.is_some() && !is_progressive {
@@ -334,8 +335,8 @@ impl<'a> Run<'a> {
         }
     }
 
-    /// Samples per pixel of the next pass over all tiles: 1, 1, 2, 4, …, so that there is a whole picture soon. It lies within a block
-    /// of what is fitted in blocks.
+    /// Samples per pixel of the next pass over all tiles: 1, 1, 2, 4, …, so that there is a whole image soon. It lies
+    /// within a block of what is fitted in blocks.
     fn next_pass(&self, done: u32) -> u32 {
         let length = self.samples_in_time(done).min(done.clamp(1, self.pass_length()));
         if !self.job.settings().integrator.is_progressive() {
@@ -482,17 +483,18 @@ impl<'a> Run<'a> {
         let filter = self.filter.sample([fx, fy]);
         let film = Vec2::new(pixel[0] as f32 + 0.5, pixel[1] as f32 + 0.5) + filter.offset;
         let ray = scene.camera.ray(film, [lx, ly], u_time);
-        let chosen = self.job.splits.as_ref().filter(|_| settings.integrator.ris.proposals == Proposals::Optimal);
-        let split = match chosen {
-            Some(map) => map.split(pixel, stream.domain(domain::SPLIT).draw::<2>()),
-            None => settings.integrator.split(),
+        let chosen =
+            self.job.sample_count_map.as_ref().filter(|_| settings.integrator.ris.proposals == Proposals::Optimal);
+        let sample_counts = match chosen {
+            Some(map) => map.sample_counts(pixel, stream.domain(domain::SAMPLE_COUNTS).draw::<2>()),
+            None => settings.integrator.sample_counts(),
         };
         CameraSample {
             ray,
             weight: filter.weight * ray.weight * scene.film.scale,
             stream,
             direct: stream,
-            split,
+            sample_counts,
             fit: 0,
         }
     }

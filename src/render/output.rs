@@ -1,12 +1,12 @@
-//! From the film to pictures: channels with names, metadata, and the display transform.
+//! From the film to images: channels with names, metadata, and the display transform.
 
 use crate::film::Film;
 use crate::imaging::color::linear_to_srgb;
-use crate::scene::{FilmSettings, SplitMap};
+use crate::scene::{FilmSettings, SampleCountMap};
 use crate::settings::Settings;
 use strum::{EnumString, IntoStaticStr, VariantNames};
 
-/// A group of channels beside the picture itself.
+/// A group of channels beside the image itself.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, EnumString, IntoStaticStr, VariantNames)]
 #[strum(serialize_all = "kebab-case")]
 pub enum Aov {
@@ -32,7 +32,7 @@ pub enum Aov {
 }
 
 impl Aov {
-    /// All that every picture has, in the order of the file.
+    /// All that every image has, in the order of the file.
     pub const ALL: [Aov; 7] =
         [Aov::Variance, Aov::Samples, Aov::Albedo, Aov::Normal, Aov::Depth, Aov::Material, Aov::Object];
 
@@ -60,8 +60,9 @@ pub struct Channels {
     pub data: Vec<f32>,
 }
 
-/// The picture `R G B` and the chosen AOVs, linear. `splits` is the map that [`Aov::Ratio`] shows; without one it is black.
-pub fn channels(film: &Film, aovs: &[Aov], splits: Option<&SplitMap>) -> Channels {
+/// The image `R G B` and the chosen AOVs, linear. `sample_count_map` is the map that [`Aov::Ratio`] shows; without one
+/// it is black.
+pub fn channels(film: &Film, aovs: &[Aov], sample_count_map: Option<&SampleCountMap>) -> Channels {
     let aov_names = aovs.iter().flat_map(|a| a.channels().iter().copied());
     let names: Vec<String> = ["R", "G", "B"].into_iter().chain(aov_names).map(str::to_owned).collect();
     let mut data = Vec::with_capacity(names.len() * film.pixels.len());
@@ -79,7 +80,7 @@ pub fn channels(film: &Film, aovs: &[Aov], splits: Option<&SplitMap>) -> Channel
                 Aov::Depth => data.push((pixel.depth / pixel.hits as f64) as f32),
                 Aov::Material => data.push(pixel.material as f32),
                 Aov::Object => data.push(pixel.object as f32),
-                Aov::Ratio => data.extend(splits.map_or([0.0; 5], |map| ratio_values(map, i))),
+                Aov::Ratio => data.extend(sample_count_map.map_or([0.0; 5], |map| ratio_values(map, i))),
                 Aov::Records => data.push(pixel.records as f32),
             }
         }
@@ -89,21 +90,21 @@ pub fn channels(film: &Film, aovs: &[Aov], splits: Option<&SplitMap>) -> Channel
 
 /// Colour and numbers of a pixel of the map: from red at the least ratio (1) to green at the greatest of the map,
 /// by its logarithm.
-fn ratio_values(map: &SplitMap, pixel: usize) -> [f32; 5] {
+fn ratio_values(map: &SampleCountMap, pixel: usize) -> [f32; 5] {
     let ratio = map.ratios[pixel];
-    let most = map.ratios.iter().copied().fold(1.0, f32::max).max(1.0 + f32::EPSILON);
-    let green = (ratio.ln() / most.ln()).clamp(0.0, 1.0);
+    let max = map.ratios.iter().copied().fold(1.0, f32::max).max(1.0 + f32::EPSILON);
+    let green = (ratio.ln() / max.ln()).clamp(0.0, 1.0);
     let samples = (map.time / (f64::from(ratio) * map.t1 + map.t2)) as f32;
     [1.0 - green, green, 0.0, ratio * samples, samples]
 }
 
-/// The picture for a display: `2^exposure`, then the sRGB curve, clipped to 0..1. RGB interleaved.
+/// The image for a display: `2^exposure`, then the sRGB curve, clipped to 0..1. RGB interleaved.
 pub fn display(film: &Film, exposure: f32) -> Vec<f32> {
     let gain = exposure.exp2();
     film.pixels.iter().flat_map(|p| p.mean().map(|v| linear_to_srgb((v as f32 * gain).clamp(0.0, 1.0)))).collect()
 }
 
-/// What a picture depends on, as metadata entries `lumiris:…`: its settings, and what the film is like.
+/// What an image depends on, as metadata entries `lumiris:…`: its settings, and what the film is like.
 pub fn metadata(film: &FilmSettings, settings: &Settings) -> Vec<(String, String)> {
     let b = &film.bounds;
     let film = [

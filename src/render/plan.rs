@@ -7,18 +7,18 @@
 //! * `optimal`: the same time per estimate, split in each pixel by the variances of its own light
 //!   [Talbot 2005, Eq. 4.3], which a pilot estimates from proposals that are all traced.
 //!
-//! Times differ from run to run; so the numbers chosen are part of the picture's metadata, and giving them back gives the same
-//! picture to the bit.
+//! Times differ from run to run; so the numbers chosen are part of the image's metadata, and giving them back gives the
+//! same image to the bit.
 
-use super::hints::light_hints;
+use super::visibility_cache::build_visibility_cache;
 use super::{RenderSettings, Run, ThreadError, camera_batches};
 use crate::direct::Fits;
 use crate::film::PixelBounds;
 use crate::integrators::PathIntegrator;
 use crate::integrators::path::CameraSample;
-use crate::scene::{RenderJob, SplitMap};
+use crate::scene::{RenderJob, SampleCountMap};
 use crate::settings::{
-    EstimatorKind, IntegratorKind, IntegratorSettings, Proposals, RisSettings, Split, StageTimes, Strata, Target,
+    EstimatorKind, IntegratorKind, IntegratorSettings, Proposals, RisSettings, SampleCounts, StageTimes, Strata, Target,
 };
 use lumiris_numbers::estimators::ris::choice::{Costs, MomentsEstimate, Variances, clamp_ratio, optimal_ratio};
 use lumiris_numbers::estimators::stats::median;
@@ -29,13 +29,14 @@ use std::time::Duration;
 /// Camera rays on which times are measured.
 const TIMING_RAYS: usize = 8192;
 /// Proposals and samples of the estimates that are timed: few and many.
-const TIMING: [Split; 2] = [Split { samples: 1, proposals: 8 }, Split { samples: 5, proposals: 40 }];
+const TIMING: [SampleCounts; 2] =
+    [SampleCounts { samples: 1, proposals: 8 }, SampleCounts { samples: 5, proposals: 40 }];
 /// Camera samples per pixel of the pilot, and its proposals, all of which are traced.
 const PILOT_SPP: u32 = 2;
 const PILOT_PROPOSALS: u32 = 32;
 /// Variances are averaged over this many pixels to each side.
 const PILOT_RADIUS: u32 = 2;
-/// Seed of the pilot, for which the picture's own random numbers must not be used: they would be chosen by their outcome.
+/// Seed of the pilot, for which the image's own random numbers must not be used: they would be chosen by their outcome.
 const PILOT_SEED: u32 = 0x70_69_6c_6f;
 
 /// What was found out and chosen.
@@ -44,16 +45,16 @@ pub struct Plan {
     /// Times of the stages.
     pub times: StageTimes,
     /// Samples and proposals; with `optimal` those whose time each pixel spends in its own way.
-    pub split: Split,
+    pub sample_counts: SampleCounts,
 }
 
 /// Chooses what the settings of `job` leave open, and sets it. `None` if they leave nothing open. `ratio_map` asks for the
 /// map of the best M/N even if it is not used.
 pub fn prepare(job: &mut RenderJob, threads: Option<usize>, ratio_map: bool) -> Result<Option<Plan>, ThreadError> {
     let settings = job.settings().integrator;
-    if settings.uses_light_hints() && job.lights.hints().is_none() {
-        let hints = super::thread_pool(threads)?.install(|| light_hints(job));
-        job.lights.set_hints(hints.map(|(hints, _)| hints));
+    if settings.uses_visibility_cache() && job.lights.visibility_cache().is_none() {
+        let visibility_cache = super::thread_pool(threads)?.install(|| build_visibility_cache(job));
+        job.lights.set_visibility_cache(visibility_cache.map(|(visibility_cache, _)| visibility_cache));
     }
     let is_open = !matches!(settings.ris.proposals, Proposals::Fixed(_));
     if settings.estimator != EstimatorKind::Ris || !is_open && !ratio_map {
@@ -66,27 +67,28 @@ pub fn prepare(job: &mut RenderJob, threads: Option<usize>, ratio_map: bool) -> 
 
     // Numbers
     let is_optimal = settings.ris.proposals == Proposals::Optimal;
-    let split =
-        IntegratorSettings { ris: RisSettings { stage_times: Some(times), ..settings.ris }, ..settings }.split();
+    let sample_counts =
+        IntegratorSettings { ris: RisSettings { stage_times: Some(times), ..settings.ris }, ..settings }
+            .sample_counts();
     job.change(|s| {
         s.integrator.ris.stage_times = Some(times);
-        s.integrator.samples = Some(split.samples);
+        s.integrator.samples = Some(sample_counts.samples);
         if !is_optimal {
-            s.integrator.ris.proposals = Proposals::Fixed(split.proposals);
+            s.integrator.ris.proposals = Proposals::Fixed(sample_counts.proposals);
         }
     });
-    job.splits = None;
+    job.sample_count_map = None;
     if is_optimal || ratio_map {
-        job.splits = Some(split_map(job, threads, times, split)?);
+        job.sample_count_map = Some(sample_count_map(job, threads, times, sample_counts)?);
     }
-    Ok(Some(Plan { times, split }))
+    Ok(Some(Plan { times, sample_counts }))
 }
 
 /// Fits a + M·T1 and b + N·T2 to the times of few and of many proposals and samples; `None` if there was nothing to light.
 fn measure(job: &RenderJob) -> Option<StageTimes> {
     let [few, many] = vertex_times(job)?;
-    let [m0, m1] = TIMING.map(|split| f64::from(split.proposals));
-    let [n0, n1] = TIMING.map(|split| f64::from(split.samples));
+    let [m0, m1] = TIMING.map(|sample_counts| f64::from(sample_counts.proposals));
+    let [n0, n1] = TIMING.map(|sample_counts| f64::from(sample_counts.samples));
     Some(StageTimes { t1: rounded((many[0] - few[0]) / (m1 - m0)), t2: rounded((many[1] - few[1]) / (n1 - n0)) })
 }
 
@@ -100,16 +102,16 @@ fn vertex_times(job: &RenderJob) -> Option<[[f64; 2]; 2]> {
     // The first turn fills caches
     for turn in 0..4 {
         for batch in batches.iter().flat_map(|b| b.chunks(1024)) {
-            for (split, [t1, t2]) in TIMING.into_iter().zip(&mut measured) {
+            for (sample_counts, [t1, t2]) in TIMING.into_iter().zip(&mut measured) {
                 let mut settings = job.settings().integrator;
-                settings.samples = Some(split.samples);
-                settings.ris.proposals = Proposals::Fixed(split.proposals);
+                settings.samples = Some(sample_counts.samples);
+                settings.ris.proposals = Proposals::Fixed(sample_counts.proposals);
                 samples.clear();
-                samples.extend(batch.iter().map(|s| CameraSample { split, ..*s }));
+                samples.extend(batch.iter().map(|s| CameraSample { sample_counts, ..*s }));
                 integrator.trace(job, &settings, &samples, &mut Fits::default(), &mut out);
                 let stats = integrator.take_stats();
                 let d = stats.direct;
-                let vertices = d.proposals / u64::from(split.proposals);
+                let vertices = d.proposals / u64::from(sample_counts.proposals);
                 if turn == 0 || vertices == 0 || d.segments == 0 {
                     continue;
                 }
@@ -128,23 +130,23 @@ fn rounded(nanoseconds: f64) -> f64 {
     (nanoseconds * 10.0).round().max(1.0) / 10.0
 }
 
-/// The best M/N of each pixel for the time that `split` takes.
-fn split_map(
+/// The best M/N of each pixel for the time that `sample_counts` takes.
+fn sample_count_map(
     job: &RenderJob,
     threads: Option<usize>,
     times: StageTimes,
-    split: Split,
-) -> Result<SplitMap, ThreadError> {
+    sample_counts: SampleCounts,
+) -> Result<SampleCountMap, ThreadError> {
     let pool = super::thread_pool(threads)?;
     let costs = Costs { t1: times.t1, t2: times.t2 };
-    let time = f64::from(split.samples) * costs.t2 + f64::from(split.proposals) * costs.t1;
+    let time = f64::from(sample_counts.samples) * costs.t2 + f64::from(sample_counts.proposals) * costs.t1;
     let variances = pool.install(|| pilot(job));
     let bounds = job.world.scene.film.bounds;
     let ratio = |v: &Option<Variances>| {
         let ratio = v.map_or(costs.robust_ratio(), |v| optimal_ratio(costs, v, time));
         clamp_ratio(ratio, costs, time)
     };
-    Ok(SplitMap {
+    Ok(SampleCountMap {
         bounds,
         ratios: variances.iter().map(|v| ratio(v) as f32).collect(),
         t1: costs.t1,
@@ -184,7 +186,7 @@ fn pilot(job: &RenderJob) -> Vec<Option<Variances>> {
 }
 
 fn pilot_row(job: &RenderJob, row: &PixelBounds) -> Vec<MomentsEstimate> {
-    let all = Split { samples: PILOT_PROPOSALS, proposals: PILOT_PROPOSALS };
+    let all = SampleCounts { samples: PILOT_PROPOSALS, proposals: PILOT_PROPOSALS };
     let mut settings = IntegratorSettings {
         kind: IntegratorKind::Direct,
         max_depth: 1,
@@ -204,7 +206,7 @@ fn pilot_row(job: &RenderJob, row: &PixelBounds) -> Vec<MomentsEstimate> {
         samples.clear();
         let at = [row.x0 + pixel as u32, row.y0];
         samples.extend((0..PILOT_SPP).map(|s| run.camera_sample_of_seed(at, s, PILOT_SEED)));
-        samples.iter_mut().for_each(|s| s.split = all);
+        samples.iter_mut().for_each(|s| s.sample_counts = all);
         integrator.outcomes = Some(Vec::new());
         integrator.trace(job, &settings, &samples, &mut Fits::default(), &mut out);
         let outcomes = integrator.outcomes.take().unwrap_or_default();

@@ -1,6 +1,6 @@
 //! What a rendering works on: a world, its settings, and what these prepare.
 
-use super::{SplitMap, World};
+use super::{SampleCountMap, World};
 use crate::geometry::GeometryId;
 use crate::lights::{Irradiances, LightSampling};
 use crate::settings::{IntegratorSettings, Settings};
@@ -16,7 +16,7 @@ pub struct RenderJob {
     /// Irradiances of lights that are known in closed form.
     pub irradiances: Irradiances,
     /// Samples and proposals of each pixel, if they were chosen for each by itself.
-    pub splits: Option<SplitMap>,
+    pub sample_count_map: Option<SampleCountMap>,
     lobes: usize,
 }
 
@@ -26,10 +26,10 @@ impl RenderJob {
         let i = &settings.integrator;
         let scene = &world.scene;
         let lobes = scene.materials.lobes(i.bsdf_density);
-        let lights = LightSampling::new(Arc::clone(&scene.lights), i.light_choice, most_groups(i, lobes));
+        let lights = LightSampling::new(Arc::clone(&scene.lights), i.light_sampler, max_groups(i, lobes));
         let has_alpha = |geometry: GeometryId| scene.geometry.geometries[geometry as usize].alpha.is_some();
         let irradiances = Irradiances::new(&scene.lights, has_alpha);
-        RenderJob { world, settings, lights, irradiances, splits: None, lobes }
+        RenderJob { world, settings, lights, irradiances, sample_count_map: None, lobes }
     }
 
     /// The settings.
@@ -44,11 +44,11 @@ impl RenderJob {
         change(&mut self.settings);
         let i = &self.settings.integrator;
         self.lobes = self.world.scene.materials.lobes(i.bsdf_density);
-        let most = most_groups(i, self.lobes);
-        if i.light_choice != before.light_choice {
-            self.lights.choose_by(i.light_choice, most);
+        let max = max_groups(i, self.lobes);
+        if i.light_sampler != before.light_sampler {
+            self.lights.choose_by(i.light_sampler, max);
         } else if (i.bsdf_density, i.ocv.components) != (before.bsdf_density, before.ocv.components) {
-            self.lights.set_groups(most);
+            self.lights.set_groups(max);
         }
     }
 
@@ -64,6 +64,6 @@ impl RenderJob {
 }
 
 /// Most groups of lights: as many as a mixture has components beside `lobes`.
-fn most_groups(settings: &IntegratorSettings, lobes: usize) -> usize {
-    settings.ocv.most_components().saturating_sub(lobes).max(1)
+fn max_groups(settings: &IntegratorSettings, lobes: usize) -> usize {
+    settings.ocv.max_components().saturating_sub(lobes).max(1)
 }

@@ -3,14 +3,14 @@
 //! [`Scene`] is data, as an importer makes it; [`World`] is a scene with its ray tracers; [`RenderJob`] is a world with the settings
 //! that it is rendered by, and with what they prepare.
 
-mod found;
 mod job;
-mod split_map;
+mod sample_count_map;
+mod surface_interaction;
 mod world;
 
-pub use found::Found;
 pub use job::RenderJob;
-pub use split_map::SplitMap;
+pub use sample_count_map::SampleCountMap;
+pub use surface_interaction::SurfaceInteraction;
 pub use world::{AccelKind, EmitterHit, World};
 
 use crate::cameras::Camera;
@@ -27,7 +27,7 @@ use std::sync::Arc;
 pub struct Scene {
     /// The camera.
     pub camera: Camera,
-    /// Size and filter of the picture.
+    /// Size and filter of the image.
     pub film: FilmSettings,
     /// All textures and texture images.
     pub textures: Arc<TextureSet>,
@@ -50,7 +50,7 @@ pub struct Surface {
     pub name: String,
 }
 
-/// The picture.
+/// The image.
 #[derive(Clone, Debug, PartialEq)]
 pub struct FilmSettings {
     /// Full size (width, height) in pixels.
@@ -59,7 +59,7 @@ pub struct FilmSettings {
     pub bounds: PixelBounds,
     /// Pixel filter.
     pub filter: PixelFilter,
-    /// Where the file wants the picture.
+    /// Where the file wants the image.
     pub file_name: Option<String>,
     /// Factor from radiance to pixel value (ISO and exposure of the sensor); 1 by default.
     pub scale: f32,

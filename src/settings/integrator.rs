@@ -24,9 +24,9 @@ pub struct IntegratorSettings {
     pub heuristic: Option<Heuristic>,
     /// Fraction of the samples drawn by BSDF sampling, for estimators that combine it with light sampling (0 to 1);
     /// with two or more samples, each technique gets at least one.
-    pub bsdf_share: f32,
+    pub bsdf_fraction: f32,
     /// The light sampler.
-    pub light_choice: LightSamplerKind,
+    pub light_sampler: LightSamplerKind,
     /// Settings of `ris`.
     pub ris: RisSettings,
     /// Settings of `irradiance-cache`.
@@ -64,8 +64,8 @@ impl Default for IntegratorSettings {
             estimator: EstimatorKind::Mis,
             samples: None,
             heuristic: None,
-            bsdf_share: 0.5,
-            light_choice: LightSamplerKind::Tree,
+            bsdf_fraction: 0.5,
+            light_sampler: LightSamplerKind::Tree,
             ris: RisSettings::default(),
             cache: IrradianceCacheSettings::default(),
             photons: PhotonMapSettings::default(),
@@ -120,19 +120,19 @@ impl IntegratorSettings {
         if vertex == 0 || !self.is_progressive() {
             return *self;
         }
-        IntegratorSettings { estimator: EstimatorKind::Mis, samples: Some(self.split().samples), ..*self }
+        IntegratorSettings { estimator: EstimatorKind::Mis, samples: Some(self.sample_counts().samples), ..*self }
     }
 
     /// True if direct light uses the visibility cache.
-    pub fn uses_light_hints(&self) -> bool {
-        self.light_choice == LightSamplerKind::Photons
+    pub fn uses_visibility_cache(&self) -> bool {
+        self.light_sampler == LightSamplerKind::Photons
             || self.estimator == EstimatorKind::Contributing
             || self.estimator == EstimatorKind::Ris && self.ris.target == Target::Visibility
     }
 
     /// True if non-contributing lights are left out, which is biased.
     pub fn leaves_lights_out(&self) -> bool {
-        self.estimator == EstimatorKind::Contributing && self.contributing.rest_samples == 0
+        self.estimator == EstimatorKind::Contributing && self.contributing.noncontributing_samples == 0
     }
 
     /// True if an estimate consists of two independent halves.
@@ -148,21 +148,21 @@ impl IntegratorSettings {
         }
     }
 
-    /// [`Self::split`] at a path vertex, counted from 0.
-    pub fn split_at_vertex(&self, vertex: u32) -> Split {
+    /// [`Self::sample_counts`] at a path vertex, counted from 0.
+    pub fn sample_counts_at_vertex(&self, vertex: u32) -> SampleCounts {
         match self.estimator {
-            EstimatorKind::Ris => self.split().after_bounces(vertex),
+            EstimatorKind::Ris => self.sample_counts().after_bounces(vertex),
             EstimatorKind::Mc
             | EstimatorKind::Mis
             | EstimatorKind::Ocv
             | EstimatorKind::Correlated
             | EstimatorKind::Contributing
-            | EstimatorKind::OptimalMis => self.split(),
+            | EstimatorKind::OptimalMis => self.sample_counts(),
         }
     }
 
     /// Sample and proposal counts of an estimate, unless chosen per pixel.
-    pub fn split(&self) -> Split {
+    pub fn sample_counts(&self) -> SampleCounts {
         let default = match self.estimator {
             EstimatorKind::Mc | EstimatorKind::Mis => DEFAULT_SAMPLES,
             EstimatorKind::Ris => DEFAULT_RIS_SAMPLES,
@@ -178,13 +178,13 @@ impl IntegratorSettings {
             | EstimatorKind::Ocv
             | EstimatorKind::OptimalMis
             | EstimatorKind::Correlated
-            | EstimatorKind::Contributing => Split { samples, proposals: samples },
+            | EstimatorKind::Contributing => SampleCounts { samples, proposals: samples },
             EstimatorKind::Ris => {
                 let proposals = match self.ris.proposals {
                     Proposals::Fixed(m) => m,
                     Proposals::Auto | Proposals::Optimal => (f64::from(samples) * self.ris.ratio()).round() as u32,
                 };
-                Split { samples, proposals: proposals.max(samples) }
+                SampleCounts { samples, proposals: proposals.max(samples) }
             }
         }
     }
@@ -283,7 +283,7 @@ pub struct OcvSettings {
 
 impl OcvSettings {
     /// Maximum number of components.
-    pub fn most_components(&self) -> usize {
+    pub fn max_components(&self) -> usize {
         self.components.map_or(MAX_COMPONENTS, |c| (c as usize).clamp(2, MAX_COMPONENTS))
     }
 }
@@ -327,12 +327,12 @@ pub enum CorrelatedForm {
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct ContributingSettings {
     /// Samples on non-contributing lights (S_non), in addition to those of an estimate (S_con). 0 is biased.
-    pub rest_samples: u32,
+    pub noncontributing_samples: u32,
 }
 
 impl Default for ContributingSettings {
     fn default() -> Self {
-        ContributingSettings { rest_samples: 1 }
+        ContributingSettings { noncontributing_samples: 1 }
     }
 }
 
@@ -348,21 +348,21 @@ pub enum SamplingTechnique {
 
 /// Numbers of one estimate: N samples (shadow segments) of M proposals.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub struct Split {
+pub struct SampleCounts {
     /// N.
     pub samples: u32,
     /// M ≥ N; equal to N for estimators that trace what they propose.
     pub proposals: u32,
 }
 
-impl Split {
+impl SampleCounts {
     /// Halves the counts for each bounce, down to one sample: the throughput of a path decreases, while the time per
     /// vertex does not. The ratio M/N stays the same.
     #[must_use]
-    pub fn after_bounces(self, bounces: u32) -> Split {
+    pub fn after_bounces(self, bounces: u32) -> SampleCounts {
         let samples = (self.samples >> bounces.min(31)).max(1);
         let proposals = (u64::from(self.proposals) * u64::from(samples)).div_ceil(u64::from(self.samples.max(1)));
-        Split { samples, proposals: proposals as u32 }
+        SampleCounts { samples, proposals: proposals as u32 }
     }
 }
 
@@ -372,19 +372,22 @@ mod tests {
 
     #[test]
     fn later_vertices_have_fewer_samples_of_the_same_ratio() {
-        let split = Split { samples: 5, proposals: 40 };
-        assert_eq!(split.after_bounces(0), split);
-        assert_eq!(split.after_bounces(1), Split { samples: 2, proposals: 16 });
-        assert_eq!(split.after_bounces(100), Split { samples: 1, proposals: 8 });
-        assert_eq!(Split { samples: 4, proposals: 7 }.after_bounces(1), Split { samples: 2, proposals: 4 });
+        let sample_counts = SampleCounts { samples: 5, proposals: 40 };
+        assert_eq!(sample_counts.after_bounces(0), sample_counts);
+        assert_eq!(sample_counts.after_bounces(1), SampleCounts { samples: 2, proposals: 16 });
+        assert_eq!(sample_counts.after_bounces(100), SampleCounts { samples: 1, proposals: 8 });
+        assert_eq!(
+            SampleCounts { samples: 4, proposals: 7 }.after_bounces(1),
+            SampleCounts { samples: 2, proposals: 4 }
+        );
     }
 
     #[test]
     fn there_are_never_fewer_proposals_than_samples() {
         let mut s = IntegratorSettings { estimator: EstimatorKind::Ris, samples: Some(16), ..Default::default() };
         s.ris.proposals = Proposals::Fixed(4);
-        assert_eq!(s.split(), Split { samples: 16, proposals: 16 });
+        assert_eq!(s.sample_counts(), SampleCounts { samples: 16, proposals: 16 });
         s.estimator = EstimatorKind::Mis;
-        assert_eq!(s.split(), Split { samples: 16, proposals: 16 });
+        assert_eq!(s.sample_counts(), SampleCounts { samples: 16, proposals: 16 });
     }
 }

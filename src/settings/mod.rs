@@ -1,4 +1,4 @@
-//! Settings of a picture: what is computed, how, and with which random numbers.
+//! Settings of an image: what is computed, how, and with which random numbers.
 //!
 //! [`Settings`] is plain data, which the renderer reads. [`table`] has a row for each setting, with its names, range, default, help
 //! and where it applies: command line, scene files, metadata and `lumiris info` are made from it.
@@ -14,15 +14,15 @@ pub mod value;
 
 pub use integrator::{
     Cached, ContributingSettings, CorrelatedForm, CorrelatedSettings, EstimatorKind, IntegratorKind,
-    IntegratorSettings, IrradianceCacheSettings, OcvSettings, OptimalForm, SamplingTechnique, Split,
+    IntegratorSettings, IrradianceCacheSettings, OcvSettings, OptimalForm, SampleCounts, SamplingTechnique,
 };
-pub use photon_map::{Deposition, PhotonMapSettings, Shrinking};
+pub use photon_map::{PhotonMapSettings, PhotonStorage, ProgressiveSettings};
 pub use ris::{ProposalPoints, Proposals, RisSettings, StageTimes, Strata, Target};
 pub use sampling::SamplingSettings;
 pub use table::Setting;
 pub use value::Value;
 
-/// All settings of a picture but its size and filter, which belong to the film.
+/// All settings of an image but its size and filter, which belong to the film.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct Settings {
     /// Light transport.
@@ -32,16 +32,17 @@ pub struct Settings {
 }
 
 impl Settings {
-    /// What these settings leave out of the picture, if anything.
+    /// What these settings leave out of the image, if anything.
     pub fn biases(&self) -> Vec<&'static str> {
         let i = &self.integrator;
-        let cuts_off = i.kind == IntegratorKind::PhotonMap && matches!(i.photons.deposition, Deposition::CutOff(_));
+        let cuts_off = i.kind == IntegratorKind::PhotonMap && matches!(i.photons.storage, PhotonStorage::CutOff(_));
         let lights = i.leaves_lights_out().then_some("lights that no photon came from are left out");
         let photons = cuts_off.then_some("photons where importance is low are left out");
         lights.into_iter().chain(photons).collect()
     }
 
-    /// Every setting that the picture depends on, by its name in metadata. Where the renderer is to choose, it is its choice.
+    /// Every setting that the image depends on, by its name in metadata. Where the renderer is to choose, it is its
+    /// choice.
     pub fn recorded(&self) -> impl Iterator<Item = (&'static str, Value)> {
         let rows = table::rows().filter(|row| row.is_recorded && row.applies.to(self));
         rows.filter_map(|row| Some((row.key, (row.resolved.unwrap_or(row.get))(self)?)))

@@ -5,10 +5,10 @@
 pub struct PhotonMapSettings {
     /// About how many photons the global map stores; a progressive map so many in each pass.
     pub photons: u32,
-    /// q: the fraction of the trajectories that also fill the global map; all of them fill the caustic map.
+    /// q: the fraction of the photon paths that also fill the global map; all of them fill the caustic map.
     pub caustic_ratio: f32,
     /// Which photons are stored.
-    pub deposition: Deposition,
+    pub storage: PhotonStorage,
     /// Photons of an estimate (k).
     pub nearest: u32,
     /// Final-gather rays per diffuse vertex; 0 visualises the global map directly.
@@ -16,14 +16,14 @@ pub struct PhotonMapSettings {
     /// Fraction of the final-gather rays that are guided by photons.
     pub guide: f32,
     /// New photons and smaller radii for every sample; `None` for a single map.
-    pub progressive: Option<Shrinking>,
-    /// Trajectories of the photons of the visibility cache, which any integrator can use; `None`: by the number of
+    pub progressive: Option<ProgressiveSettings>,
+    /// Photon paths of the photons of the visibility cache, which any integrator can use; `None`: by the number of
     /// lights.
-    pub light_photons: Option<u32>,
+    pub visibility_photons: Option<u32>,
     /// Maximum memory of the maps (bytes).
     pub memory: u64,
-    /// Maximum number of trajectories per map.
-    pub trajectories: u64,
+    /// Maximum number of photon paths per map.
+    pub paths: u64,
 }
 
 impl Default for PhotonMapSettings {
@@ -31,21 +31,21 @@ impl Default for PhotonMapSettings {
         PhotonMapSettings {
             photons: 200_000,
             caustic_ratio: 0.2,
-            deposition: Deposition::All,
+            storage: PhotonStorage::All,
             nearest: 50,
             gather: 4,
             guide: 0.0,
             progressive: None,
-            light_photons: None,
+            visibility_photons: None,
             memory: 4 << 30,
-            trajectories: 1 << 30,
+            paths: 1 << 30,
         }
     }
 }
 
 /// Which photons are stored [Keller and Wald 2000, §2].
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub enum Deposition {
+pub enum PhotonStorage {
     /// All.
     All,
     /// With the probability p(x) by visual importance, but at least this. Unbiased.
@@ -56,20 +56,20 @@ pub enum Deposition {
 
 /// Radii of progressive photon mapping: r²ᵢ₊₁ = r²ᵢ·(i + α)/(i + 1) [Knaus and Zwicker 2011, Eq. 15].
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Shrinking {
+pub struct ProgressiveSettings {
     /// α, above 0 and below 1: near 0, variance decreases slowly and bias fast.
     pub alpha: f32,
     /// Radius of the first pass (m); `None`: the distance of the `nearest` photons where the camera looks.
     pub radius: Option<f32>,
 }
 
-impl Default for Shrinking {
+impl Default for ProgressiveSettings {
     fn default() -> Self {
-        Shrinking { alpha: 0.5, radius: None }
+        ProgressiveSettings { alpha: 0.5, radius: None }
     }
 }
 
-impl Shrinking {
+impl ProgressiveSettings {
     /// The factor of the first radius in pass `pass`, which are counted from 0.
     pub fn factor(&self, pass: u32) -> f32 {
         let alpha = f64::from(self.alpha);
@@ -85,9 +85,9 @@ mod tests {
     #[test]
     fn areas_fall_with_the_power_alpha_less_one_of_the_passes() {
         for alpha in [0.3, 0.5, 2.0 / 3.0, 0.9] {
-            let shrinking = Shrinking { alpha, radius: None };
-            assert_eq!(shrinking.factor(0), 1.0);
-            let area = |pass| f64::from(shrinking.factor(pass)).powi(2);
+            let progressive = ProgressiveSettings { alpha, radius: None };
+            assert_eq!(progressive.factor(0), 1.0);
+            let area = |pass| f64::from(progressive.factor(pass)).powi(2);
             let slope = (area(10_000) / area(100)).ln() / 100.0_f64.ln();
             assert!((slope - f64::from(alpha - 1.0)).abs() < 2e-3, "{alpha}: {slope}");
         }

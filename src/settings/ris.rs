@@ -7,7 +7,7 @@ use strum::{EnumString, IntoStaticStr, VariantNames};
 pub const DEFAULT_RATIO: f64 = 8.0;
 /// Maximum number of proposals per sample by times alone: T1 and T2 exclude the fixed cost of a shading point, and more
 /// than eight did not pay off on any scene measured (`docs/measurements/resampling`).
-pub const MOST_RATIO: f64 = 8.0;
+pub const MAX_RATIO: f64 = 8.0;
 
 /// Resampled importance sampling [Talbot et al. 2005; Talbot 2005].
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -38,10 +38,10 @@ impl Default for RisSettings {
 
 impl RisSettings {
     /// Proposals for each sample by the times of the stages, M/N = T2/T1 [Talbot 2005, Eq. 4.4], from 1 to
-    /// [`MOST_RATIO`]; [`DEFAULT_RATIO`] without times.
+    /// [`MAX_RATIO`]; [`DEFAULT_RATIO`] without times.
     pub fn ratio(&self) -> f64 {
         let by_times = |t: StageTimes| Costs { t1: t.t1, t2: t.t2 }.robust_ratio();
-        self.stage_times.map_or(DEFAULT_RATIO, by_times).clamp(1.0, MOST_RATIO)
+        self.stage_times.map_or(DEFAULT_RATIO, by_times).clamp(1.0, MAX_RATIO)
     }
 }
 

@@ -3,7 +3,7 @@
 use lumiris_numbers::samplers::SamplerKind;
 
 /// Least width of a texture footprint, in pixels, as in pbrt-v4.
-const LEAST_FOOTPRINT: f32 = 0.125;
+const MIN_FOOTPRINT: f32 = 0.125;
 
 /// Random numbers.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -12,7 +12,7 @@ pub struct SamplingSettings {
     pub sampler: SamplerKind,
     /// Camera samples per pixel.
     pub spp: u32,
-    /// Images of different seeds are independent estimates of the same picture.
+    /// Images of different seeds are independent estimates of the same image.
     pub seed: u32,
     /// Samples per pixel that texture footprints are made for; `spp` if `None`.
     pub footprint_spp: Option<u32>,
@@ -34,7 +34,7 @@ impl SamplingSettings {
     /// [Pharr et al. 2023, §5.1.3]. The pixel filter averages over the samples.
     #[inline]
     pub fn footprint(&self) -> f32 {
-        (1.0 / (self.footprint_spp() as f32).sqrt()).max(LEAST_FOOTPRINT)
+        (1.0 / (self.footprint_spp() as f32).sqrt()).max(MIN_FOOTPRINT)
     }
 }
 

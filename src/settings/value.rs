@@ -67,50 +67,50 @@ impl fmt::Display for Value {
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Interval {
     /// The lower bound.
-    pub least: f32,
+    pub min: f32,
     /// True if it belongs to the interval.
-    pub has_least: bool,
+    pub has_min: bool,
     /// The upper bound.
-    pub most: f32,
+    pub max: f32,
     /// True if it belongs to the interval.
-    pub has_most: bool,
+    pub has_max: bool,
 }
 
 impl Interval {
     /// Above 0.
-    pub const POSITIVE: Interval = Interval { least: 0.0, has_least: false, most: f32::INFINITY, has_most: false };
+    pub const POSITIVE: Interval = Interval { min: 0.0, has_min: false, max: f32::INFINITY, has_max: false };
 
     /// Both bounds belong to it.
-    pub const fn closed(least: f32, most: f32) -> Interval {
-        Interval { least, has_least: true, most, has_most: true }
+    pub const fn closed(min: f32, max: f32) -> Interval {
+        Interval { min, has_min: true, max, has_max: true }
     }
 
     /// Neither bound belongs to it.
-    pub const fn open(least: f32, most: f32) -> Interval {
-        Interval { least, has_least: false, most, has_most: false }
+    pub const fn open(min: f32, max: f32) -> Interval {
+        Interval { min, has_min: false, max, has_max: false }
     }
 
     /// The upper bound belongs to it.
-    pub const fn above(least: f32, most: f32) -> Interval {
-        Interval { least, has_least: false, most, has_most: true }
+    pub const fn above(min: f32, max: f32) -> Interval {
+        Interval { min, has_min: false, max, has_max: true }
     }
 
     /// True if `x` lies in it; no NaN does.
     pub fn contains(&self, x: f32) -> bool {
-        let above = x > self.least || self.has_least && x == self.least;
-        above && (x < self.most || self.has_most && x == self.most)
+        let above = x > self.min || self.has_min && x == self.min;
+        above && (x < self.max || self.has_max && x == self.max)
     }
 }
 
 impl fmt::Display for Interval {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        let Interval { least, most, .. } = self;
-        match (self.has_least, self.has_most) {
+        let Interval { min, max, .. } = self;
+        match (self.has_min, self.has_max) {
             (false, false) if *self == Interval::POSITIVE => f.write_str("positive"),
-            (true, true) => write!(f, "from {least} to {most}"),
-            (true, false) => write!(f, "at least {least} and below {most}"),
-            (false, true) => write!(f, "above {least} and up to {most}"),
-            (false, false) => write!(f, "above {least} and below {most}"),
+            (true, true) => write!(f, "from {min} to {max}"),
+            (true, false) => write!(f, "at least {min} and below {max}"),
+            (false, true) => write!(f, "above {min} and up to {max}"),
+            (false, false) => write!(f, "above {min} and below {max}"),
         }
     }
 }
@@ -119,25 +119,25 @@ impl fmt::Display for Interval {
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Integers {
     /// The lower bound.
-    pub least: u64,
+    pub min: u64,
     /// The upper bound.
-    pub most: u64,
+    pub max: u64,
 }
 
 impl Integers {
     /// All numbers of 32 bits.
-    pub const ALL: Integers = Integers { least: 0, most: u32::MAX as u64 };
+    pub const ALL: Integers = Integers { min: 0, max: u32::MAX as u64 };
 
     /// True if `n` lies between the bounds.
     pub fn contains(&self, n: i64) -> bool {
-        u64::try_from(n).is_ok_and(|n| (self.least..=self.most).contains(&n))
+        u64::try_from(n).is_ok_and(|n| (self.min..=self.max).contains(&n))
     }
 }
 
 impl fmt::Display for Integers {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        let Integers { least, most } = self;
-        if *most >= u64::from(u32::MAX) { write!(f, "at least {least}") } else { write!(f, "from {least} to {most}") }
+        let Integers { min, max } = self;
+        if *max >= u64::from(u32::MAX) { write!(f, "at least {min}") } else { write!(f, "from {min} to {max}") }
     }
 }
 
@@ -297,7 +297,7 @@ mod tests {
 
     #[test]
     fn ranges_hold_their_bounds_or_not_and_say_so() {
-        let integer = Kind::Integer { range: Integers { least: 1, most: 4096 }, words: &["auto", "optimal"] };
+        let integer = Kind::Integer { range: Integers { min: 1, max: 4096 }, words: &["auto", "optimal"] };
         assert_eq!(integer.parse("optimal"), Ok(Value::Name("optimal")));
         assert_eq!((integer.parse("1"), integer.parse("4096")), (Ok(Value::Integer(1)), Ok(Value::Integer(4096))));
         for wrong in ["0", "4097", "-1", "1.5", "Auto", ""] {

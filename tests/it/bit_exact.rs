@@ -1,4 +1,4 @@
-//! A picture depends on the scene, its settings, the seed and the sample range, and on nothing else.
+//! An image depends on the scene, its settings, the seed and the sample range, and on nothing else.
 
 use lumiris::film::Film;
 use lumiris::import::{LoadOptions, load};
@@ -98,51 +98,53 @@ fn parts_of_an_image_add_up_if_their_footprints_are_those_of_the_whole() {
 }
 
 #[test]
-fn what_a_plan_chose_gives_the_same_picture_when_it_is_given() {
+fn what_a_plan_chose_gives_the_same_image_when_it_is_given() {
     for proposals in [Proposals::Auto, Proposals::Optimal] {
         // Chosen from times of this run
         let mut planned = gallery(EstimatorKind::Ris, None);
         planned.change(|s| s.integrator.ris.proposals = proposals);
         let plan = prepare(&mut planned, Some(2), false).unwrap().unwrap();
-        assert!(plan.split.proposals >= plan.split.samples && plan.times.t1 > 0.0 && plan.times.t2 > 0.0);
+        assert!(
+            plan.sample_counts.proposals >= plan.sample_counts.samples && plan.times.t1 > 0.0 && plan.times.t2 > 0.0
+        );
         let reference = film(&planned, RenderSettings::default());
 
         // Given
         let mut given = gallery(EstimatorKind::Ris, None);
-        given.change(|s| s.integrator.samples = Some(plan.split.samples));
+        given.change(|s| s.integrator.samples = Some(plan.sample_counts.samples));
         if proposals == Proposals::Optimal {
             let times = Some(plan.times);
             given.change(|s| (s.integrator.ris.proposals, s.integrator.ris.stage_times) = (proposals, times));
             prepare(&mut given, Some(1), false).unwrap();
         } else {
-            given.change(|s| s.integrator.ris.proposals = Proposals::Fixed(plan.split.proposals));
+            given.change(|s| s.integrator.ris.proposals = Proposals::Fixed(plan.sample_counts.proposals));
         }
         assert_same_bits(&reference, &film(&given, RenderSettings::default()), &format!("{proposals:?}"));
     }
 }
 
 #[test]
-fn pictures_with_photons_that_tell_of_lights_are_the_same_for_any_number_of_threads() {
+fn images_with_photons_that_tell_of_lights_are_the_same_for_any_number_of_threads() {
     for estimator in [EstimatorKind::Mis, EstimatorKind::Ris, EstimatorKind::Ocv, EstimatorKind::Contributing] {
-        let picture = |threads| {
+        let image = |threads| {
             let mut job = gallery(estimator, None);
             job.change(|s| s.integrator.ris.proposals = Proposals::Fixed(16));
             job.change(|s| s.integrator.ris.target = Target::Visibility);
-            job.change(|s| s.integrator.photons.light_photons = Some(20_000));
-            job.change(|s| s.integrator.light_choice = LightSamplerKind::Photons);
+            job.change(|s| s.integrator.photons.visibility_photons = Some(20_000));
+            job.change(|s| s.integrator.light_sampler = LightSamplerKind::Photons);
             prepare(&mut job, Some(threads), false).unwrap();
-            assert!(job.lights.hints().is_some());
+            assert!(job.lights.visibility_cache().is_some());
             film(&job, RenderSettings { threads: Some(threads), ..RenderSettings::default() })
         };
-        let reference = picture(1);
+        let reference = image(1);
         for threads in [2, 3] {
-            assert_same_bits(&reference, &picture(threads), &format!("{estimator:?}, {threads} threads"));
+            assert_same_bits(&reference, &image(threads), &format!("{estimator:?}, {threads} threads"));
         }
     }
 }
 
 #[test]
-fn seeds_give_different_pictures() {
+fn seeds_give_different_images() {
     let mut job = gallery(EstimatorKind::Mis, None);
     let a = film(&job, RenderSettings::default());
     job.change(|s| s.sampling.seed = 1);

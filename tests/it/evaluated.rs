@@ -1,4 +1,4 @@
-//! Materials that can only be evaluated, from the scene file to the picture.
+//! Materials that can only be evaluated, from the scene file to the image.
 
 use lumiris::bsdfs::ProposalDensity;
 use lumiris::import::{LoadOptions, Loaded, load};
@@ -78,14 +78,14 @@ fn integrators_take_proposals_and_density() {
     assert!(with("\"string bsdfdensity\" \"cosine\"").unwrap_err().contains("lobes, uniform"));
 }
 
-/// Means of the pictures of 12 seeds, per channel.
-fn picture_means(mut loaded: Loaded, proposals: u32, density: ProposalDensity) -> [Welford; 3] {
+/// Means of the images of 12 seeds, per channel.
+fn image_means(mut loaded: Loaded, proposals: u32, density: ProposalDensity) -> [Welford; 3] {
     loaded.settings.integrator.bsdf_proposals = proposals;
     loaded.settings.integrator.bsdf_density = density;
     let mut job = loaded.job(AccelKind::Embree, None).unwrap();
     let mut means = [Welford::default(); 3];
     for seed in 0..12 {
-        // Other seeds for other settings, so that the pictures are independent.
+        // Other seeds for other settings, so that the images are independent.
         job.change(|s| s.sampling.seed = seed + 100 * proposals + 50 * u32::from(density == ProposalDensity::Uniform));
         let settings =
             RenderSettings { threads: Some(1), spp: job.settings().sampling.spp, ..RenderSettings::default() };
@@ -111,7 +111,7 @@ fn a_closed_furnace_has_its_radiance_for_every_number_of_proposals() {
     let significance = sidak(1e-3, SETTINGS.len() * 3);
     for (proposals, density) in SETTINGS {
         let loaded = load(&path, &LoadOptions::default()).map_err(|d| d.to_string()).unwrap();
-        let means = picture_means(loaded, proposals, density);
+        let means = image_means(loaded, proposals, density);
         for (mean, rho) in means.iter().zip([0.5_f64, 0.25, 0.75]) {
             let expected = 0.5 * (1.0 - rho.powi(5)) / (1.0 - rho);
             assert!(t_test(mean, expected).p_value > significance, "{proposals} {density:?} {mean:?} {expected}");
@@ -120,7 +120,7 @@ fn a_closed_furnace_has_its_radiance_for_every_number_of_proposals() {
 }
 
 #[test]
-fn pictures_of_all_settings_have_one_mean() {
+fn images_of_all_settings_have_one_mean() {
     let text = format!(
         "{HEAD}Integrator \"path\" \"integer maxdepth\" [ 4 ]
         WorldBegin
@@ -131,7 +131,7 @@ fn pictures_of_all_settings_have_one_mean() {
         Translate 0 -0.3 1
         Shape \"sphere\" \"float radius\" [ 0.6 ]"
     );
-    let all = SETTINGS.map(|(m, density)| picture_means(load_text(&text).unwrap(), m, density));
+    let all = SETTINGS.map(|(m, density)| image_means(load_text(&text).unwrap(), m, density));
     let significance = sidak(1e-3, 9);
     for other in &all[1..] {
         for (a, b) in all[0].iter().zip(other) {
@@ -147,7 +147,7 @@ fn proposals_are_for_what_can_only_be_evaluated() {
             "{HEAD}WorldBegin\nLightSource \"infinite\"\n{material}\nTranslate 0 0 1 Shape \"disk\" \"float radius\" 3 Shape \"sphere\" \"float radius\" 0.4"
         )
     };
-    let picture = |material: &str, proposals: u32| {
+    let image = |material: &str, proposals: u32| {
         let mut loaded = load_text(&text(material)).unwrap();
         loaded.settings.integrator.bsdf_proposals = proposals;
         loaded.settings.sampling.spp = 2;
@@ -161,6 +161,6 @@ fn proposals_are_for_what_can_only_be_evaluated() {
         ("Material \"conductor\" \"float roughness\" 0.1", true),
         ("Material \"evaluated\" \"string model\" \"cooktorrance\"", false),
     ] {
-        assert_eq!(picture(material, 1) == picture(material, 9), same, "{material}");
+        assert_eq!(image(material, 1) == image(material, 9), same, "{material}");
     }
 }

@@ -2,7 +2,7 @@
 
 use lumiris::film::Film;
 use lumiris::import::{LoadOptions, load};
-use lumiris::integrators::irradiance_cache::gather::{Gatherer, Wanted};
+use lumiris::integrators::irradiance_cache::gather::{Gatherer, RecordRequest};
 use lumiris::render::output::{Aov, channels};
 use lumiris::render::{RenderSettings, Rendering, render};
 use lumiris::scene::{AccelKind, RenderJob};
@@ -118,10 +118,10 @@ fn a_room_of_all_materials_agrees_with_path_tracing() {
             s.integrator.cache.error = 0.1;
             s.integrator.cache.radius = [0.5, 10.0];
         });
-        let cached_picture = squares(&rendering(&job, RenderSettings { spp: 64, ..Default::default() }).film, 8);
-        let ratio = mean(&cached_picture) / mean(&reference);
+        let cached_image = squares(&rendering(&job, RenderSettings { spp: 64, ..Default::default() }).film, 8);
+        let ratio = mean(&cached_image) / mean(&reference);
         assert!((ratio - 1.0).abs() < 0.015, "{cached:?}: mean {ratio}");
-        for (i, (a, b)) in cached_picture.iter().zip(&reference).enumerate() {
+        for (i, (a, b)) in cached_image.iter().zip(&reference).enumerate() {
             assert!((a / b - 1.0).abs() < 0.05, "{cached:?}: square {i} has {a}, not {b}");
         }
     }
@@ -133,7 +133,7 @@ fn nearly_every_diffuse_vertex_finds_a_record_and_pixels_say_who_asked() {
     let rendering = rendering(&job, RenderSettings { spp: 8, ..Default::default() });
     let cache = rendering.cache.unwrap();
     assert!(cache.records > 100 && cache.records < 2 * 48 * 48, "{}", cache.records);
-    assert!(cache.lookups.fallbacks * 20 < cache.lookups.lookups, "{:?}", cache.lookups);
+    assert!(cache.lookups.misses * 20 < cache.lookups.lookups, "{:?}", cache.lookups);
     let names = channels(&rendering.film, &[Aov::Records], None);
     let asked: f32 = names.data.iter().skip(3).step_by(4).sum();
     assert_eq!(asked as usize, cache.records);
@@ -156,12 +156,12 @@ fn threads_tiles_and_packets_do_not_change_a_bit() {
                 s.integrator.cache.samples = 32;
             })
         };
-        let picture = |width, threads, tile_size| {
+        let image = |width, threads, tile_size| {
             let settings = RenderSettings { threads: Some(threads), tile_size, spp: 4, ..Default::default() };
             let r = rendering(&job(width), settings);
             (bits(&r.film), r.cache.unwrap().records)
         };
-        let reference = picture(None, 1, 16);
+        let reference = image(None, 1, 16);
         assert!(reference.1 > 100);
         for (width, threads, tile_size) in [
             (None, 1, 8),
@@ -172,7 +172,7 @@ fn threads_tiles_and_packets_do_not_change_a_bit() {
             (Some(4), 1, 16),
             (Some(8), 3, 8),
         ] {
-            let same = reference == picture(width, threads, tile_size);
+            let same = reference == image(width, threads, tile_size);
             assert!(same, "{cached:?}, packets of {width:?}, {threads} threads, tiles of {tile_size}");
         }
     }
@@ -180,7 +180,7 @@ fn threads_tiles_and_packets_do_not_change_a_bit() {
 
 #[test]
 fn seeds_give_different_records() {
-    let picture = |seed| {
+    let image = |seed| {
         let job = world_of(ROOM, |s| {
             with_cache(s, Cached::Indirect);
             s.integrator.cache.samples = 32;
@@ -188,8 +188,8 @@ fn seeds_give_different_records() {
         });
         bits(&rendering(&job, RenderSettings::default()).film)
     };
-    assert_eq!(picture(3), picture(3));
-    assert_ne!(picture(3), picture(4));
+    assert_eq!(image(3), image(3));
+    assert_ne!(image(3), image(4));
 }
 
 /// A change of the settings, by name, and the relative bias that it has at most.
@@ -210,9 +210,9 @@ const RECORD_ESTIMATORS: [Choice; 8] = [
 
 #[test]
 fn records_take_any_estimator() {
-    const PICTURES: u32 = 16;
+    const IMAGES: u32 = 16;
     let small_room = ROOM.replace("[ 48 ]", "[ 24 ]");
-    let picture = |seed, change: fn(&mut lumiris::settings::IntegratorSettings)| {
+    let image = |seed, change: fn(&mut lumiris::settings::IntegratorSettings)| {
         let job = world_of(&small_room, |s| {
             with_cache(s, Cached::All);
             s.integrator.cache.samples = 16;
@@ -224,12 +224,12 @@ fn records_take_any_estimator() {
         squares(&rendering(&job, RenderSettings::default()).film, 24)[0]
     };
 
-    // Pictures of the same seed have the same camera rays and the same final gathers
-    let references: Vec<f64> = (0..PICTURES).map(|seed| picture(seed, |s| s.estimator = EstimatorKind::Mis)).collect();
+    // Images of the same seed have the same camera rays and the same final gathers
+    let references: Vec<f64> = (0..IMAGES).map(|seed| image(seed, |s| s.estimator = EstimatorKind::Mis)).collect();
     let significance = sidak(1e-3, RECORD_ESTIMATORS.len());
     let mut faults = Vec::new();
     for (name, limit, change) in RECORD_ESTIMATORS {
-        let ratios: Vec<f64> = (0..).zip(&references).map(|(seed, r)| picture(seed, change) / r).collect();
+        let ratios: Vec<f64> = (0..).zip(&references).map(|(seed, r)| image(seed, change) / r).collect();
         let is_biased = |factor: f64| {
             let ratios: Welford = ratios.iter().map(|r| r * factor).collect();
             is_beyond(&ratios, 1.0, limit, significance)
@@ -248,8 +248,8 @@ fn records_take_any_estimator() {
 }
 
 /// A point of the floor of [`ROOM`], or of a scene whose floor is z = 0.
-fn wanted(p: Vec3, n: Vec3) -> Wanted {
-    Wanted {
+fn wanted(p: Vec3, n: Vec3) -> RecordRequest {
+    RecordRequest {
         p,
         p_error: Vec3::splat(1e-6),
         n,

@@ -5,7 +5,7 @@ use super::irradiance_cache::{ROOM, rendering, squares, world_of};
 use lumiris::render::output::{Aov, channels};
 use lumiris::render::{RenderSettings, render};
 use lumiris::scene::RenderJob;
-use lumiris::settings::{Deposition, IntegratorKind, PhotonMapSettings, Settings, Shrinking};
+use lumiris::settings::{IntegratorKind, PhotonMapSettings, PhotonStorage, ProgressiveSettings, Settings};
 use lumiris_numbers::estimators::stats::{Welford, sidak, t_test};
 use std::sync::atomic::AtomicBool;
 
@@ -39,8 +39,8 @@ fn a_furnace_has_its_known_radiance() {
     let forms: [fn(&mut PhotonMapSettings); 5] = [
         |_| (),
         |p| p.gather = 0,
-        |p| p.deposition = Deposition::Floor(0.05),
-        |p| p.progressive = Some(Shrinking::default()),
+        |p| p.storage = PhotonStorage::Floor(0.05),
+        |p| p.progressive = Some(ProgressiveSettings::default()),
         |p| (p.guide, p.caustic_ratio) = (0.5, 1.0),
     ];
     let significance = sidak(1e-3, forms.len() * 3);
@@ -68,16 +68,16 @@ fn a_room_of_all_materials_agrees_with_path_tracing() {
     // below the glass sphere is off by less.
     let path = world_of(ROOM, |s| s.integrator.samples = Some(4));
     let reference = squares(&rendering(&path, RenderSettings { spp: 512, ..Default::default() }).film, 8);
-    for deposition in [Deposition::All, Deposition::Floor(0.1)] {
+    for storage in [PhotonStorage::All, PhotonStorage::Floor(0.1)] {
         let job = world_of(ROOM, |s| {
             s.integrator.samples = Some(4);
-            with_photons(s, |p| (p.photons, p.deposition) = (200_000, deposition));
+            with_photons(s, |p| (p.photons, p.storage) = (200_000, storage));
         });
-        let picture = squares(&rendering(&job, RenderSettings { spp: 32, ..Default::default() }).film, 8);
-        let ratio = mean(&picture) / mean(&reference);
-        assert!((ratio - 1.0).abs() < 0.015, "{deposition:?}: mean {ratio}");
-        for (i, (a, b)) in picture.iter().zip(&reference).enumerate() {
-            assert!((a / b - 1.0).abs() < 0.06, "{deposition:?}: square {i} has {a}, not {b}");
+        let image = squares(&rendering(&job, RenderSettings { spp: 32, ..Default::default() }).film, 8);
+        let ratio = mean(&image) / mean(&reference);
+        assert!((ratio - 1.0).abs() < 0.015, "{storage:?}: mean {ratio}");
+        for (i, (a, b)) in image.iter().zip(&reference).enumerate() {
+            assert!((a / b - 1.0).abs() < 0.06, "{storage:?}: square {i} has {a}, not {b}");
         }
     }
 }
@@ -87,12 +87,12 @@ fn more_passes_bring_a_progressive_map_nearer_to_the_truth() {
     let path = world_of(ROOM, |s| s.integrator.samples = Some(4));
     let reference = squares(&rendering(&path, RenderSettings { spp: 1024, ..Default::default() }).film, 4);
     let job = world_of(ROOM, |s| {
-        with_photons(s, |p| (p.photons, p.gather, p.progressive) = (2_000, 0, Some(Shrinking::default())));
+        with_photons(s, |p| (p.photons, p.gather, p.progressive) = (2_000, 0, Some(ProgressiveSettings::default())));
     });
     let error = |spp| {
-        let picture = squares(&rendering(&job, RenderSettings { spp, ..Default::default() }).film, 4);
+        let image = squares(&rendering(&job, RenderSettings { spp, ..Default::default() }).film, 4);
         let square = |(a, b): (&f64, &f64)| (a - b) * (a - b);
-        (picture.iter().zip(&reference).map(square).sum::<f64>() / picture.len() as f64).sqrt()
+        (image.iter().zip(&reference).map(square).sum::<f64>() / image.len() as f64).sqrt()
     };
     // Slope −1/2 would be a factor 5.7 at 32 times the photons; −1/4 is the least that is accepted
     let (few, many) = (error(4), error(128));
@@ -111,8 +111,8 @@ fn maps_without_photons_are_no_light_and_no_error() {
         film.pixels.iter().map(|p| p.mean()[1]).sum::<f64>() / film.pixels.len() as f64
     };
     let path = mean(&world_of(WALL, |_| ()));
-    let shrinking = Shrinking { radius: Some(0.5), ..Default::default() };
-    for progressive in [None, Some(shrinking)] {
+    let progressive = ProgressiveSettings { radius: Some(0.5), ..Default::default() };
+    for progressive in [None, Some(progressive)] {
         let job = world_of(WALL, |s| with_photons(s, |p| (p.photons, p.progressive) = (1, progressive)));
         let photons = mean(&job);
         assert!((photons / path - 1.0).abs() < 1e-5 && path > 0.1, "{progressive:?}: {photons}, not {path}");
@@ -125,10 +125,10 @@ fn threads_tiles_and_packets_do_not_change_a_bit() {
         let film = rendering(job, RenderSettings { spp: 4, ..settings }).film;
         channels(&film, &Aov::ALL, None).data.iter().map(|v| v.to_bits()).collect::<Vec<_>>()
     };
-    for progressive in [None, Some(Shrinking::default())] {
+    for progressive in [None, Some(ProgressiveSettings::default())] {
         let job = world_of(ROOM, |s| {
             with_photons(s, |p| {
-                (p.photons, p.progressive, p.deposition) = (20_000, progressive, Deposition::Floor(0.1));
+                (p.photons, p.progressive, p.storage) = (20_000, progressive, PhotonStorage::Floor(0.1));
             });
         });
         let reference = bits(&job, RenderSettings { threads: Some(1), ..Default::default() });
@@ -140,7 +140,7 @@ fn threads_tiles_and_packets_do_not_change_a_bit() {
 }
 
 #[test]
-fn without_photons_there_is_a_message_and_no_picture() {
+fn without_photons_there_is_a_message_and_no_image() {
     let error = |text: &str, change: fn(&mut PhotonMapSettings)| {
         let job = world_of(text, |s| with_photons(s, change));
         let rendering = render(&job, &RenderSettings::default(), &AtomicBool::new(false), &|_| ());
@@ -154,6 +154,6 @@ fn without_photons_there_is_a_message_and_no_picture() {
     assert!(error(&dark, none).contains("emit nothing"), "{}", error(&dark, none));
     assert!(error(ROOM, |p| p.photons = 0).contains("zero photons"));
     assert!(error(ROOM, |p| p.memory = 100_000).contains("more than"));
-    let importance: fn(&mut PhotonMapSettings) = |p| p.deposition = Deposition::Floor(0.1);
+    let importance: fn(&mut PhotonMapSettings) = |p| p.storage = PhotonStorage::Floor(0.1);
     assert!(error(away, importance).contains("camera sees no"), "{}", error(away, importance));
 }

@@ -1,10 +1,10 @@
 //! Photons: energy, known and path-traced irradiance, caustics, importance, the same bits, and scenes without any.
 
 use super::irradiance_cache::{ROOM, world_of};
-use lumiris::integrators::irradiance_cache::gather::{Gatherer, Wanted};
+use lumiris::integrators::irradiance_cache::gather::{Gatherer, RecordRequest};
 use lumiris::photons::{
-    CausticRule, GatherScratch, Importance, ImportanceSettings, Photon, PhotonError, PhotonMap, Place, Search, Traced,
-    Tracing, Unimportant, Want, trace_importons, trace_photons, trajectories_for,
+    CausticRule, GatherScratch, Importance, ImportanceSettings, LowImportance, Photon, PhotonBudget, PhotonError,
+    PhotonMap, Place, Search, Traced, Tracing, path_count, trace_importons, trace_photons,
 };
 use lumiris::scene::RenderJob;
 use lumiris::settings::{Cached, IntegratorKind};
@@ -39,7 +39,7 @@ fn furnace(things: &str) -> String {
 }
 
 fn trace(job: &RenderJob, tracing: &Tracing<'_>, count: u64) -> Traced {
-    trace_photons(job, tracing, None, Want::Trajectories(count)).unwrap()
+    trace_photons(job, tracing, None, PhotonBudget::Paths(count)).unwrap()
 }
 
 fn both(traced: &Traced) -> Vec<Photon> {
@@ -127,8 +127,18 @@ fn a_furnace_has_its_irradiance_whatever_lossless_things_stand_in_it() {
 }
 
 /// A place whose irradiance path tracing tells.
-fn wanted(p: Vec3, n: Vec3) -> Wanted {
-    Wanted { p, p_error: Vec3::splat(1e-6), n, ns: n, time: 0.5, pixel_width: 0.0, spread: 0.0, pixel: [0, 0], key: 7 }
+fn wanted(p: Vec3, n: Vec3) -> RecordRequest {
+    RecordRequest {
+        p,
+        p_error: Vec3::splat(1e-6),
+        n,
+        ns: n,
+        time: 0.5,
+        pixel_width: 0.0,
+        spread: 0.0,
+        pixel: [0, 0],
+        key: 7,
+    }
 }
 
 /// The mean over seeds of the irradiance by path tracing, over the kernel of a density estimate of radius `radius`.
@@ -145,9 +155,9 @@ fn path_traced(job: &RenderJob, (p, n): (Vec3, Vec3), radius: f32, key: u32) -> 
             // Density 2/(πr²) (1 − d²/r²): d²/r² = 1 − √(1 − u)
             let (d, phi) = (radius * (1.0 - (1.0 - u).sqrt()).sqrt(), std::f32::consts::TAU * v);
             let p = p + frame.to_world(Vec3::new(d * phi.cos(), d * phi.sin(), 0.0));
-            Wanted { key: group * GRID * GRID + cell, ..wanted(p, n) }
+            RecordRequest { key: group * GRID * GRID + cell, ..wanted(p, n) }
         };
-        let places: Vec<Wanted> = (0..GRID * GRID).map(place).collect();
+        let places: Vec<RecordRequest> = (0..GRID * GRID).map(place).collect();
         let records = Gatherer::default().records(job, &places);
         for (c, e) in e.iter_mut().enumerate() {
             e.add(records.iter().map(|r| channels(r.light.e)[c]).sum::<f64>() / f64::from(GRID * GRID));
@@ -294,7 +304,7 @@ fn the_rules_of_caustics_give_the_same_maps() {
         let caustic = irradiances(12, &place, search, |seed| run(seed).caustic);
         (global, caustic, run(0))
     };
-    let reference = of(CausticRule::FirstTrajectories, 1.0);
+    let reference = of(CausticRule::FirstPaths, 1.0);
     for rule in CausticRule::iter() {
         let thinned = of(rule, q);
         for c in 0..3 {
@@ -303,7 +313,7 @@ fn the_rules_of_caustics_give_the_same_maps() {
                 assert!(test.p_value > SIGNIFICANCE, "{rule:?} {c}: {} {}", a[c].mean(), b[c].mean());
             }
         }
-        // The caustic map is that of all trajectories, the global one is as much smaller as q says
+        // The caustic map is that of all photon paths, the global one is as much smaller as q says
         assert_eq!(thinned.2.caustic.len(), reference.2.caustic.len(), "{rule:?}");
         let share = thinned.2.global.len() as f64 / reference.2.global.len() as f64;
         assert!((share / f64::from(q) - 1.0).abs() < 0.03, "{rule:?} {share}");
@@ -329,8 +339,8 @@ Shape "trianglemesh" "point3 P" [ 2 0 -1  2 2 -1  2 2 1  2 0 1 ] "integer indice
 Shape "trianglemesh" "point3 P" [ 0 0 -1  0 2 -1  0 2 0.7  0 0 0.7 ] "integer indices" [ 0 1 2 0 2 3 ]
 "#;
 
-fn importance(job: &RenderJob, unimportant: Unimportant) -> Importance {
-    let settings = ImportanceSettings { trajectories: 20_000, unimportant, ..ImportanceSettings::default() };
+fn importance(job: &RenderJob, low_importance: LowImportance) -> Importance {
+    let settings = ImportanceSettings { paths: 20_000, low_importance, ..ImportanceSettings::default() };
     trace_importons(job, &settings).unwrap()
 }
 
@@ -340,10 +350,10 @@ fn importance_moves_photons_to_what_is_seen_and_keeps_their_light() {
     let tracing = |seed| Tracing { seed, max_depth: 4, q: 0.5, ..Tracing::default() };
     let (count, runs) = (30_000, 20);
     let by = |importance: Option<&Importance>, seed| {
-        trace_photons(&job, &tracing(seed), importance, Want::Trajectories(count)).unwrap()
+        trace_photons(&job, &tracing(seed), importance, PhotonBudget::Paths(count)).unwrap()
     };
-    let floor = importance(&job, Unimportant::Floor(0.02));
-    assert!(floor.is_unbiased() && !importance(&job, Unimportant::CutOff(0.02)).is_unbiased());
+    let floor = importance(&job, LowImportance::Floor(0.02));
+    assert!(floor.is_unbiased() && !importance(&job, LowImportance::CutOff(0.02)).is_unbiased());
 
     // The same light in expectation, whether the place is seen or not
     let seen = Place::flat(Vec3::new(-1.0, 0.0, 0.2), Vec3::Y);
@@ -367,7 +377,7 @@ fn importance_moves_photons_to_what_is_seen_and_keeps_their_light() {
     assert!(kept(-1.0) > 0.5 && kept(1.0) < 0.4 * kept(-1.0), "{} {}", kept(-1.0), kept(1.0));
 
     // Cut off, photons are missing and none is strong
-    let cut = by(Some(&importance(&job, Unimportant::CutOff(0.2))), 0);
+    let cut = by(Some(&importance(&job, LowImportance::CutOff(0.2))), 0);
     assert!(cut.stored() < plain.stored());
     let strongest = |traced: &Traced| traced.global.iter().map(|p| p.power().r).fold(0.0, f32::max);
     assert!(strongest(&cut) < 5.1 * strongest(&plain));
@@ -379,11 +389,11 @@ fn relative_light(job: &RenderJob, k: u64, maps: u32, power: f64) -> (Welford, u
     let group = |pilot: u32| {
         let (mut light, mut empty) = (Welford::new(), 0);
         let tracing = |seed| Tracing { seed, max_depth: 60, max_global_depth: 60, ..Tracing::default() };
-        let want = Want::Stored { global: k, most_trajectories: 1 << 20 };
-        let count = trajectories_for(job, &tracing(pilot), None, want).unwrap();
+        let budget = PhotonBudget::Stored { global: k, max_paths: 1 << 20 };
+        let count = path_count(job, &tracing(pilot), None, budget).unwrap();
         for seed in 32 * pilot..32 * (pilot + 1) {
             let traced = trace(job, &tracing(seed), count);
-            assert_eq!((traced.trajectories, traced.global_trajectories), (count, count));
+            assert_eq!((traced.paths, traced.global_paths), (count, count));
             light.add(traced.global.iter().map(|p| f64::from(p.power().g)).sum::<f64>() / power);
             empty += u32::from(traced.global.is_empty());
         }
@@ -425,24 +435,24 @@ fn an_empty_map_counts_as_no_light() {
 }
 
 #[test]
-fn a_pilot_says_how_many_trajectories_store_as_many_photons_as_wanted() {
+fn a_pilot_says_how_many_paths_store_as_many_photons_as_requested() {
     let job = world_of(ROOM, |_| ());
     for rule in CausticRule::iter() {
         let tracing = Tracing { q: 0.25, caustics: rule, max_depth: 4, ..Tracing::default() };
-        let want = Want::Stored { global: 20_000, most_trajectories: 10_000_000 };
-        let traced = trace_photons(&job, &tracing, None, want).unwrap();
-        assert_eq!(trajectories_for(&job, &tracing, None, want), Ok(traced.trajectories));
+        let budget = PhotonBudget::Stored { global: 20_000, max_paths: 10_000_000 };
+        let traced = trace_photons(&job, &tracing, None, budget).unwrap();
+        assert_eq!(path_count(&job, &tracing, None, budget), Ok(traced.paths));
 
         // The pilot stores 2500 photons. A path of 1 to 5 photons at albedos of 0.4 to 0.8 makes their number vary as
         // that of 2500/5 independent ones at most: 5 standard deviations
         let off = traced.global.len() as f64 / 20_000.0 - 1.0;
         assert!(off.abs() < 5.0 * (5.0_f64 / 2500.0 + 5.0 / 20_000.0).sqrt(), "{rule:?}: {off}");
-        let again = trace(&job, &tracing, traced.trajectories);
+        let again = trace(&job, &tracing, traced.paths);
         assert_eq!((again.global, again.caustic), (traced.global, traced.caustic), "{rule:?}");
     }
-    let want = Want::Stored { global: u64::MAX, most_trajectories: 5000 };
-    let traced = trace_photons(&job, &Tracing::default(), None, want).unwrap();
-    assert_eq!((traced.trajectories, traced.global_trajectories), (5000, 5000));
+    let budget = PhotonBudget::Stored { global: u64::MAX, max_paths: 5000 };
+    let traced = trace_photons(&job, &Tracing::default(), None, budget).unwrap();
+    assert_eq!((traced.paths, traced.global_paths), (5000, 5000));
 }
 
 #[test]
@@ -451,10 +461,10 @@ fn photons_are_the_same_for_any_number_of_threads() {
     let run = |threads: usize| {
         let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build().unwrap();
         pool.install(|| {
-            let importance = importance(&job, Unimportant::Floor(0.05));
+            let importance = importance(&job, LowImportance::Floor(0.05));
             let tracing = Tracing { q: 0.3, max_depth: 5, ..Tracing::default() };
-            let want = Want::Stored { global: 30_000, most_trajectories: 1_000_000 };
-            trace_photons(&job, &tracing, Some(&importance), want).unwrap()
+            let budget = PhotonBudget::Stored { global: 30_000, max_paths: 1_000_000 };
+            trace_photons(&job, &tracing, Some(&importance), budget).unwrap()
         })
     };
     let one = run(1);
@@ -462,7 +472,7 @@ fn photons_are_the_same_for_any_number_of_threads() {
     for threads in [2, 3] {
         let other = run(threads);
         assert_eq!((&other.global, &other.caustic), (&one.global, &one.caustic), "{threads} threads");
-        assert_eq!(other.trajectories, one.trajectories);
+        assert_eq!(other.paths, one.paths);
     }
 }
 
@@ -472,8 +482,8 @@ fn what_cannot_be_traced_is_said() {
         "Shape \"trianglemesh\" \"point3 P\" [ -1 0 -1  1 0 -1  1 0 1  -1 0 1 ] \"integer indices\" [ 0 1 2 0 2 3 ]\n";
     let scene =
         |light: &str, things: &str| world_of(&format!("Camera \"perspective\"\nWorldBegin\n{light}{things}"), |_| ());
-    let some = Want::Trajectories(1000);
-    let error = |job: &RenderJob, tracing: &Tracing<'_>, want| trace_photons(job, tracing, None, want).unwrap_err();
+    let some = PhotonBudget::Paths(1000);
+    let error = |job: &RenderJob, tracing: &Tracing<'_>, budget| trace_photons(job, tracing, None, budget).unwrap_err();
     let tracing = Tracing::default();
     let lamp = "LightSource \"point\" \"point3 from\" [ 0 1 0 ]\n";
 
@@ -481,8 +491,8 @@ fn what_cannot_be_traced_is_said() {
     let black = "LightSource \"point\" \"rgb I\" [ 0 0 0 ]\n";
     assert_eq!(error(&scene(black, FLOOR), &tracing, some), PhotonError::NoEmission);
     let lit = scene(lamp, FLOOR);
-    assert_eq!(error(&lit, &tracing, Want::Trajectories(0)), PhotonError::NothingWanted);
-    assert_eq!(error(&lit, &tracing, Want::Stored { global: 0, most_trajectories: 9 }), PhotonError::NothingWanted);
+    assert_eq!(error(&lit, &tracing, PhotonBudget::Paths(0)), PhotonError::NothingRequested);
+    assert_eq!(error(&lit, &tracing, PhotonBudget::Stored { global: 0, max_paths: 9 }), PhotonError::NothingRequested);
     for q in [0.0, 1.5, f32::NAN] {
         assert!(matches!(error(&lit, &Tracing { q, ..tracing }, some), PhotonError::InvalidRatio(_)));
     }
@@ -491,14 +501,14 @@ fn what_cannot_be_traced_is_said() {
     let mirror = format!("Material \"conductor\"\n{FLOOR}");
     for things in ["", &mirror] {
         let empty = trace_photons(&scene(lamp, things), &tracing, None, some).unwrap();
-        assert_eq!((empty.stored(), empty.trajectories), (0, 1000));
-        let tracing = Tracing { most_in_pilot: 300_000, ..tracing };
-        let want = Want::Stored { global: 10, most_trajectories: u64::MAX };
-        let none = PhotonError::NoDeposit { trajectories: 300_000, by_importance: false };
-        assert_eq!(error(&scene(lamp, things), &tracing, want), none);
+        assert_eq!((empty.stored(), empty.paths), (0, 1000));
+        let tracing = Tracing { max_in_pilot: 300_000, ..tracing };
+        let budget = PhotonBudget::Stored { global: 10, max_paths: u64::MAX };
+        let none = PhotonError::NothingStored { paths: 300_000, by_importance: false };
+        assert_eq!(error(&scene(lamp, things), &tracing, budget), none);
     }
     let tight = Tracing { memory: Some(100_000), ..tracing };
-    assert!(matches!(error(&lit, &tight, Want::Trajectories(1_000_000)), PhotonError::OutOfMemory { .. }));
+    assert!(matches!(error(&lit, &tight, PhotonBudget::Paths(1_000_000)), PhotonError::OutOfMemory { .. }));
 
     // A camera that sees nothing: the floor is behind it
     let blind = trace_importons(&scene("Scale 1 1 1\n", "Translate 0 -1 -5 \n"), &ImportanceSettings::default());

@@ -323,7 +323,7 @@ pub fn conductor_rgb(eta: &Spectrum, k: &Spectrum) -> (Rgb, Rgb) {
 fn nearest_conductor(reflectances: [f64; 6]) -> (f64, f64) {
     const ETAS: i32 = 120;
     const NORMALS: i32 = 80;
-    let (mut best, mut least) = ((1.0, 0.0), f64::INFINITY);
+    let (mut best, mut min) = ((1.0, 0.0), f64::INFINITY);
     for i in 0..=ETAS {
         // η from 0.02 to 20, and the reflectance at 0° from 4 % below to 4 % above the one given.
         let eta = 0.02 * 1000f64.powf(f64::from(i) / f64::from(ETAS));
@@ -332,8 +332,8 @@ fn nearest_conductor(reflectances: [f64; 6]) -> (f64, f64) {
             let k = k_of(normal.min(0.9999), eta);
             let error = |(cos, r): (f64, f64)| (fresnel_conductor(cos, eta, k) / r - 1.0).abs();
             let largest = COSINES.into_iter().zip(reflectances).map(error).fold(0.0, f64::max);
-            if largest < least {
-                (best, least) = ((eta, k), largest);
+            if largest < min {
+                (best, min) = ((eta, k), largest);
             }
         }
     }

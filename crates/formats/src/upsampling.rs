@@ -204,7 +204,7 @@ mod tests {
         LEVELS.into_iter().flat_map(move |r| pairs().map(move |(g, b)| Rgb::new(r, g, b)))
     }
 
-    /// Relative difference of a picture by channels to one by spectra.
+    /// Relative difference of an image by channels to one by spectra.
     fn relative(by_channels: [f64; 3], by_spectra: [f64; 3]) -> [f64; 3] {
         [0, 1, 2].map(|c| by_channels[c] / by_spectra[c] - 1.0)
     }

@@ -1,4 +1,4 @@
-//! Pictures and variances of a sphere lit from far away, estimated by BSDF sampling alone [Talbot et al. 2005, Fig. 5].
+//! Images and variances of a sphere lit from far away, estimated by BSDF sampling alone [Talbot et al. 2005, Fig. 5].
 //!
 //! The sphere is seen along −z by parallel rays through the centres of the pixels. Each estimate of a pixel is
 //! f |cos θ| L(wi) W of one direction that [`lumiris::bsdfs::resample()`] draws from M proposals (N = 1), so that all variance is that
@@ -15,7 +15,7 @@ mod domain {
     pub(super) const CHOICE: u32 = 1;
 }
 
-/// Part of the picture's half-width that the sphere fills.
+/// Part of the image's half-width that the sphere fills.
 const RADIUS: f32 = 0.96;
 
 /// How a sphere is estimated.
@@ -27,7 +27,7 @@ pub struct SphereSettings {
     pub spp: u32,
     /// Width and height in pixels.
     pub size: u32,
-    /// Pictures of different seeds are independent.
+    /// Images of different seeds are independent.
     pub seed: u32,
 }
 
@@ -68,7 +68,7 @@ impl SphereStudy {
 }
 
 /// A sphere of `bsdf` under light of radiance `l(wi)` from the direction `wi`; the viewer is at +z and y is up.
-pub fn sphere_picture(bsdf: &Bsdf<'_>, l: &(dyn Fn(Vec3) -> Rgb + Sync), settings: &SphereSettings) -> SphereStudy {
+pub fn sphere_image(bsdf: &Bsdf<'_>, l: &(dyn Fn(Vec3) -> Rgb + Sync), settings: &SphereSettings) -> SphereStudy {
     let SphereSettings { size, .. } = *settings;
     let pixels: Vec<Option<[Rgb; 2]>> = (0..size * size)
         .into_par_iter()
@@ -154,7 +154,7 @@ mod tests {
 
     fn study(model: Model, density: ProposalDensity, l: fn(Vec3) -> Rgb, proposals: u32) -> SphereStudy {
         let settings = SphereSettings { proposals, spp: 64, size: 32, seed: 4 };
-        sphere_picture(&Bsdf::Evaluated(Evaluated { model, density }), &l, &settings)
+        sphere_image(&Bsdf::Evaluated(Evaluated { model, density }), &l, &settings)
     }
 
     #[test]
@@ -184,10 +184,10 @@ mod tests {
         // A cosine-free uniform density costs a Lambertian a relative variance of 4/3 − 1.
         let uniform = study(Model::Diffuse(RED), ProposalDensity::Uniform, white, 1);
         assert!((uniform.mean_variance()[0] / 0.81 - 1.0 / 3.0).abs() < 0.02, "{:?}", uniform.mean_variance());
-        // The same twice, and another picture for another seed.
+        // The same twice, and another image for another seed.
         assert_eq!(study(Model::Diffuse(RED), ProposalDensity::Lobes, white, 8).pixels, sphere.pixels);
         let bsdf = Bsdf::Evaluated(Evaluated { model: Model::Diffuse(RED), density: ProposalDensity::Lobes });
         let other = SphereSettings { proposals: 8, spp: 64, size: 32, seed: 5 };
-        assert_ne!(sphere_picture(&bsdf, &white, &other).pixels, sphere.pixels);
+        assert_ne!(sphere_image(&bsdf, &white, &other).pixels, sphere.pixels);
     }
 }

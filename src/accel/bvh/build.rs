@@ -241,7 +241,7 @@ impl Bins {
                 range = range.union(bounds[i]);
                 n += counts[i];
                 let cost = side_cost(&range, n) + right_cost[i];
-                if n > 0 && n < total && best.is_none_or(|(least, ..)| cost < least) {
+                if n > 0 && n < total && best.is_none_or(|(min, ..)| cost < min) {
                     best = Some((cost, axis, i));
                 }
             }

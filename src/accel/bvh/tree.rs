@@ -223,7 +223,7 @@ fn opened(children: &[Binary; 2]) -> Vec<&Binary> {
         for (i, slot) in slots.iter().enumerate() {
             if let BinaryKind::Inner(below) = &slot.kind {
                 let area = slot.bounds.half_area();
-                if largest.is_none_or(|(most, ..)| area > most) {
+                if largest.is_none_or(|(max, ..)| area > max) {
                     largest = Some((area, i, below));
                 }
             }

@@ -6,7 +6,7 @@
 #![allow(unsafe_code)]
 
 use super::device::Device;
-use super::kernels::{self, Ask, Mode, RayHitPacket, RayPacket, Valid};
+use super::kernels::{self, Mode, QueryKind, RayHitPacket, RayPacket, Valid};
 use super::query::{ANY_SINGLE, can_trace, load, single_ray};
 use super::scene::{self, EmbreeScene};
 use super::world::World;
@@ -72,7 +72,7 @@ impl Bare {
     }
 
     fn nearest_singly(&self, rays: &RayBatch, singles: &mut [sys::RTCRayHit]) {
-        let mode = Mode { ask: Ask::Nearest, coherent: false };
+        let mode = Mode { query: QueryKind::Nearest, coherent: false };
         let mut context = kernels::query_context(&self.world, rays, mode);
         for single in singles {
             if self.calls_back {
@@ -85,7 +85,7 @@ impl Bare {
     }
 
     fn nearest<const N: usize>(&self, rays: &RayBatch, packets: &mut [(Valid<N>, RayHitPacket<N>)], coherent: bool) {
-        let mode = Mode { ask: Ask::Nearest, coherent };
+        let mode = Mode { query: QueryKind::Nearest, coherent };
         let mut context = kernels::query_context(&self.world, rays, mode);
         for (valid, packet) in packets {
             if self.calls_back {
@@ -107,7 +107,7 @@ impl Bare {
     }
 
     fn any<const N: usize>(&self, rays: &RayBatch, packets: &mut [(Valid<N>, RayPacket<N>)], coherent: bool) {
-        let mode = Mode { ask: Ask::Any, coherent };
+        let mode = Mode { query: QueryKind::Any, coherent };
         let mut context = kernels::query_context(&self.world, rays, mode);
         for (valid, packet) in packets {
             // SAFETY: the scene is committed, the lanes in `valid` are finite, ids are indices of the batch.

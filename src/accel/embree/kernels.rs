@@ -12,7 +12,7 @@ const EXTRA_HIT_WORDS: usize = if size_of::<sys::RTCRayHit8>() == 640 { 0 } else
 
 /// The kind of query.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub(super) enum Ask {
+pub(super) enum QueryKind {
     /// Nearest hits, collected by the filter function of the query.
     First,
     /// Nearest hits as Embree determines them.
@@ -25,7 +25,7 @@ pub(super) enum Ask {
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) struct Mode {
     /// The kind of query.
-    pub ask: Ask,
+    pub query: QueryKind,
     /// Traverse packets by their common frustum.
     pub coherent: bool,
 }
@@ -113,7 +113,7 @@ fn rtc_context(mode: Mode) -> RtcContext {
     if mode.coherent {
         context.flags = sys::RTCIntersectContextFlags::RTC_INTERSECT_CONTEXT_FLAG_COHERENT;
     }
-    if mode.ask == Ask::First {
+    if mode.query == QueryKind::First {
         context.filter = Some(first_filter);
     }
     context
@@ -131,7 +131,7 @@ fn rtc_context(_mode: Mode) -> RtcContext {
 fn query_flags(mode: Mode) -> sys::RTCRayQueryFlags {
     use sys::RTCRayQueryFlags as Flags;
     let coherent = if mode.coherent { Flags::RTC_RAY_QUERY_FLAG_COHERENT.0 } else { 0 };
-    let filter = if mode.ask == Ask::First { Flags::RTC_RAY_QUERY_FLAG_INVOKE_ARGUMENT_FILTER.0 } else { 0 };
+    let filter = if mode.query == QueryKind::First { Flags::RTC_RAY_QUERY_FLAG_INVOKE_ARGUMENT_FILTER.0 } else { 0 };
     Flags(coherent | filter)
 }
 
@@ -179,7 +179,11 @@ pub(super) unsafe fn occluded1(scene: sys::RTCScene, context: *mut QueryContext<
         #[cfg(embree3)]
         sys::rtcOccluded1(scene, context.cast(), ray);
         #[cfg(embree4)]
-        sys::rtcOccluded1(scene, ray, &mut occluded_arguments(context, Mode { ask: Ask::Any, coherent: false }));
+        sys::rtcOccluded1(
+            scene,
+            ray,
+            &mut occluded_arguments(context, Mode { query: QueryKind::Any, coherent: false }),
+        );
     }
 }
 

@@ -3,7 +3,7 @@
 
 use super::EmbreeAccel;
 use super::context::{MAX_WIDTH, QueryContext};
-use super::kernels::{self, Ask, Mode, RayHitPacket, RayPacket, Valid};
+use super::kernels::{self, Mode, QueryKind, RayHitPacket, RayPacket, Valid};
 use super::world::{Refined, Reported};
 use crate::accel::{Coherence, Hit, RayBatch};
 use crate::geometry::Visibility;
@@ -12,14 +12,14 @@ use embree4_sys as sys;
 /// Maximum number of retries to leave the surface that a ray starts on.
 const MAX_RETRIES: u32 = 64;
 
-const FIRST_SINGLE: Mode = Mode { ask: Ask::First, coherent: false };
-pub(super) const ANY_SINGLE: Mode = Mode { ask: Ask::Any, coherent: false };
+const FIRST_SINGLE: Mode = Mode { query: QueryKind::First, coherent: false };
+pub(super) const ANY_SINGLE: Mode = Mode { query: QueryKind::Any, coherent: false };
 
 impl EmbreeAccel {
     pub(super) fn intersect_batch(&self, rays: &RayBatch, coherence: Coherence, hits: &mut Vec<Option<Hit>>) {
         hits.clear();
         hits.resize(rays.len(), None);
-        let mode = Mode { ask: Ask::First, coherent: coherence == Coherence::Coherent };
+        let mode = Mode { query: QueryKind::First, coherent: coherence == Coherence::Coherent };
         // Without a common frustum Embree traces the rays of a packet one by one for first hits, only slower.
         match if mode.coherent { self.width_for(coherence) } else { 1 } {
             4 => self.intersect_packets::<4>(rays, mode, hits),
@@ -31,7 +31,7 @@ impl EmbreeAccel {
     pub(super) fn occluded_batch(&self, rays: &RayBatch, coherence: Coherence, occluded: &mut Vec<bool>) {
         occluded.clear();
         occluded.reserve(rays.len());
-        let mode = Mode { ask: Ask::Any, coherent: coherence == Coherence::Coherent };
+        let mode = Mode { query: QueryKind::Any, coherent: coherence == Coherence::Coherent };
         match self.width_for(coherence) {
             4 => self.occluded_packets::<4>(rays, mode, occluded),
             8 => self.occluded_packets::<8>(rays, mode, occluded),

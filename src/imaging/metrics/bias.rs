@@ -24,7 +24,7 @@ pub enum ErrorSource {
     Spread,
 }
 
-/// Mean difference of two pictures.
+/// Mean difference of two images.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Bias {
     /// Mean of x − r over pixels and channels.

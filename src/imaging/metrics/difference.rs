@@ -18,15 +18,15 @@ pub struct Differences {
     pub mse: f64,
     /// Mean of (x − r)² / (r² + ε).
     pub relmse: f64,
-    /// Mean of (x − r)² over the mean of r²; infinite if the reference is black and the picture is not.
+    /// Mean of (x − r)² over the mean of r²; infinite if the reference is black and the image is not.
     pub nmse: f64,
-    /// Mean of each channel of the picture.
+    /// Mean of each channel of the image.
     pub mean: [f64; 3],
     /// Mean of each channel of the reference.
     pub reference_mean: [f64; 3],
     /// Pixels that took part.
     pub pixels: usize,
-    /// Pixels of the picture that are not finite.
+    /// Pixels of the image that are not finite.
     pub nonfinite: usize,
     /// Pixels of the reference that are not finite.
     pub reference_nonfinite: usize,
@@ -38,13 +38,13 @@ impl Differences {
         self.mse.sqrt()
     }
 
-    /// Peak signal-to-noise ratio (dB) for the largest value `peak`; infinite for equal pictures.
+    /// Peak signal-to-noise ratio (dB) for the largest value `peak`; infinite for equal images.
     pub fn psnr(&self, peak: f64) -> f64 {
         10.0 * (peak * peak / self.mse).log10()
     }
 }
 
-/// Compares two pictures; all means are 0 if no pixel is finite in both. Panics if the lengths differ.
+/// Compares two images; all means are 0 if no pixel is finite in both. Panics if the lengths differ.
 pub fn differences(image: &[Pixel], reference: &[Pixel], epsilon: f64) -> Differences {
     let (mut squares, mut relative, mut power) = (0.0, 0.0, 0.0);
     let (mut sum, mut reference_sum) = ([0.0; 3], [0.0; 3]);
@@ -96,7 +96,7 @@ mod tests {
     }
 
     #[test]
-    fn equal_pictures_have_no_difference_even_without_epsilon() {
+    fn equal_images_have_no_difference_even_without_epsilon() {
         let d = differences(&REFERENCE, &REFERENCE, 0.0);
         assert_eq!((d.mse, d.relmse, d.nmse, d.psnr(1.0)), (0.0, 0.0, 0.0, f64::INFINITY));
         let black = differences(&IMAGE, &[[0.0; 3]; 2], DEFAULT_EPSILON);
@@ -104,7 +104,7 @@ mod tests {
     }
 
     #[test]
-    fn brighter_pictures_scale_as_the_formulas_say() {
+    fn brighter_images_scale_as_the_formulas_say() {
         let by = |s: f32| {
             let scale = |p: &[Pixel]| p.iter().map(|p| p.map(|v| v * s)).collect::<Vec<_>>();
             differences(&scale(&IMAGE), &scale(&REFERENCE), 0.01 * f64::from(s * s))

@@ -44,7 +44,7 @@ pub fn ldr_flip(image: &[Pixel], reference: &[Pixel], size: [usize; 2], gain: f3
 /// HDR-ꟻLIP. Panics as [`ldr_flip`].
 pub fn hdr_flip(image: &[Pixel], reference: &[Pixel], size: [usize; 2], pixels_per_degree: f32) -> HdrFlip {
     let [start, stop] = exposure_range(reference);
-    // A range that is turned over, as of a picture of one colour, is one exposure seen twice.
+    // A range that is turned over, as of an image of one colour, is one exposure seen twice.
     let count = (stop - start).ceil().max(2.0) as usize;
     let at = |i: usize| start + (stop - start) * i as f64 / (count - 1) as f64;
     let of_exposure = |i: usize| {
@@ -92,7 +92,7 @@ fn exposure_range(reference: &[Pixel]) -> [f64; 2] {
     [greatest, if of_all > 0.0 { of_all } else { median(lit.iter().copied()) }].map(|l| (white / l).log2())
 }
 
-/// LDR-ꟻLIP of what `display` makes of the values. Pixels that are not finite are black in both pictures.
+/// LDR-ꟻLIP of what `display` makes of the values. Pixels that are not finite are black in both images.
 fn displayed(
     image: &[Pixel],
     reference: &[Pixel],
@@ -101,7 +101,7 @@ fn displayed(
     pixels_per_degree: f32,
 ) -> Vec<f32> {
     let pixels = size[0] * size[1];
-    assert!(image.len() == pixels && reference.len() == pixels && pixels <= MAX_PIXELS, "pictures of the size told");
+    assert!(image.len() == pixels && reference.len() == pixels && pixels <= MAX_PIXELS, "images of the size told");
     if pixels == 0 {
         return Vec::new();
     }
@@ -142,7 +142,7 @@ mod tests {
     }
 
     #[test]
-    fn equal_pictures_do_not_differ_whatever_their_size() {
+    fn equal_images_do_not_differ_whatever_their_size() {
         for size in [[0, 0], [1, 1], [1, 7], [2, 1], [40, 30]] {
             let a = scene(size, 1.0);
             assert!(ldr_flip(&a, &a, size, 1.0, PPD).iter().all(|&v| v == 0.0), "{size:?}");
@@ -173,7 +173,7 @@ mod tests {
     }
 
     #[test]
-    fn hdr_flip_sees_what_one_exposure_clips_and_is_the_same_for_scaled_pictures() {
+    fn hdr_flip_sees_what_one_exposure_clips_and_is_the_same_for_scaled_images() {
         let size = [48, 32];
         let reference: Vec<Pixel> =
             scene(size, 1.0).iter().map(|p| p.map(|v| if v > 0.5 { v * 100.0 } else { v })).collect();

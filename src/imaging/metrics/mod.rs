@@ -27,12 +27,12 @@ fn is_finite(pixel: &Pixel) -> bool {
     pixel.iter().all(|v| v.is_finite())
 }
 
-/// Pixels that are finite in both pictures, in f64, with their index. Panics if the lengths differ.
+/// Pixels that are finite in both images, in f64, with their index. Panics if the lengths differ.
 fn finite_pairs<'a>(
     image: &'a [Pixel],
     reference: &'a [Pixel],
 ) -> impl Iterator<Item = (usize, [f64; 3], [f64; 3])> + 'a {
-    assert_eq!(image.len(), reference.len(), "pictures of one size");
+    assert_eq!(image.len(), reference.len(), "images of one size");
     let finite = image.iter().zip(reference).enumerate().filter(|(_, (x, r))| is_finite(x) && is_finite(r));
     finite.map(|(i, (x, r))| (i, x.map(f64::from), r.map(f64::from)))
 }

@@ -45,23 +45,23 @@ pub fn tvi(luminance: f64) -> f64 {
     cone_threshold(log).min(rod_threshold(log))
 }
 
-/// (L − L_true) / tvi(L_true) per pixel, where a luminance of 1 in the pictures is `candelas` cd/m²; NaN where a pixel
+/// (L − L_true) / tvi(L_true) per pixel, where a luminance of 1 in the images is `candelas` cd/m²; NaN where a pixel
 /// is not finite. Panics if the lengths differ.
 pub fn perceptual_map(image: &[Pixel], reference: &[Pixel], candelas: f64) -> Vec<f32> {
-    assert_eq!(image.len(), reference.len(), "pictures of one size");
+    assert_eq!(image.len(), reference.len(), "images of one size");
     let thresholds = |(x, r): (&Pixel, &Pixel)| {
         if is_finite(x) && is_finite(r) { in_thresholds(luminance(x), luminance(r), candelas) as f32 } else { f32::NAN }
     };
     image.iter().zip(reference).map(thresholds).collect()
 }
 
-/// The error E of the module's header, where a luminance of 1 in the pictures is 1 cd/m². 0 if no pixel is finite in
-/// both pictures. Panics if the lengths differ.
+/// The error E of the module's header, where a luminance of 1 in the images is 1 cd/m². 0 if no pixel is finite in
+/// both images. Panics if the lengths differ.
 pub fn perceptual_error(image: &[Pixel], reference: &[Pixel]) -> f64 {
     perceptual_error_at(image, reference, 1.0)
 }
 
-/// [`perceptual_error`] where a luminance of 1 in the pictures is `candelas` cd/m².
+/// [`perceptual_error`] where a luminance of 1 in the images is `candelas` cd/m².
 pub fn perceptual_error_at(image: &[Pixel], reference: &[Pixel], candelas: f64) -> f64 {
     let (mut sum, mut count) = (0.0, 0_usize);
     for (i, ..) in finite_pairs(image, reference) {

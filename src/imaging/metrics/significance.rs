@@ -45,23 +45,23 @@ pub const HALF_ROUNDING: f64 = 1.0 / (1_u32 << 11) as f64;
 /// coarser of the two files.
 fn z_of(x: f64, r: f64, variance: f64, rounding: f64) -> Option<f64> {
     let difference = x - r;
-    let most = rounding * x.abs().max(r.abs());
+    let max = rounding * x.abs().max(r.abs());
     if variance > 0.0 {
-        // Rounding is uniform over ± `most`.
-        return Some(difference / (variance + most * most / 3.0).sqrt());
+        // Rounding is uniform over ± `max`.
+        return Some(difference / (variance + max * max / 3.0).sqrt());
     }
-    (difference.abs() > 2.0 * most).then_some(difference.signum() * f64::INFINITY)
+    (difference.abs() > 2.0 * max).then_some(difference.signum() * f64::INFINITY)
 }
 
 /// 1 − (1 − p)^n: the probability that the smallest of `n` independent p-values is at most `p`; 1 if there are none.
-fn least_of(p: f64, n: usize) -> f64 {
+fn p_of_minimum(p: f64, n: usize) -> f64 {
     if n == 0 {
         return 1.0;
     }
     -((-p).ln_1p() * n as f64).exp_m1()
 }
 
-/// Tests all values of a picture. `variance` holds v_x + v_r per pixel; values whose variance is not finite take no
+/// Tests all values of an image. `variance` holds v_x + v_r per pixel; values whose variance is not finite take no
 /// part. `rounding` is [`F32_ROUNDING`] or [`HALF_ROUNDING`]. Panics if the lengths differ.
 pub fn significance(image: &[Pixel], reference: &[Pixel], variance: &[Pixel], rounding: f64) -> Significance {
     assert_eq!(image.len(), variance.len(), "a variance per pixel");
@@ -88,9 +88,9 @@ pub fn significance(image: &[Pixel], reference: &[Pixel], variance: &[Pixel], ro
         values,
         beyond: beyond as f64 / values.max(1) as f64,
         max_z,
-        family_p: least_of(z_test(max_z, 0.0, 1.0).p_value, values),
+        family_p: p_of_minimum(z_test(max_z, 0.0, 1.0).p_value, values),
         mean_square: squares.iter().sum::<f64>() / finite.max(1) as f64,
-        chi_squared_p: least_of(p_channels.fold(1.0, f64::min), 3),
+        chi_squared_p: p_of_minimum(p_channels.fold(1.0, f64::min), 3),
         certain,
     }
 }

@@ -64,7 +64,7 @@ pub(super) fn finish_film(
             ["diagonal", "savefp16", "maxcomponentvalue", "coordinatesystem", "nbuckets", "lambdamin", "lambdamax"]
         {
             if p.ignore(key) && key == "maxcomponentvalue" {
-                d.warning_once(p.span_of(key), "maxcomponentvalue is ignored: clamping would darken the picture");
+                d.warning_once(p.span_of(key), "maxcomponentvalue is ignored: clamping would darken the image");
             }
         }
         p.report_unused(d);

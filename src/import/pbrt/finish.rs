@@ -2,7 +2,7 @@
 
 use super::descriptions::{AreaLightDesc, ShapeDesc};
 use super::lights::power_factor;
-use super::options::Understood;
+use super::options::ParsedOptions;
 use super::shapes::{Made, ShapeError};
 use super::state::Builder;
 use crate::geometry::{Geometry, GeometryId, GeometrySet, Group, Instance, Shape, Visibility};
@@ -35,7 +35,7 @@ struct Assembly {
 impl Builder<'_> {
     /// Reads what the text asks for and makes the scene; `None` after an error.
     pub fn finish(mut self, d: &mut Diagnostics) -> Option<(Scene, Settings)> {
-        let understood = self.options.finish(self.load_options, d);
+        let options = self.options.finish(self.load_options, d);
 
         // Read all files, whatever went wrong before: all missing ones are named in one run
         let mut shapes = std::mem::take(&mut self.shapes);
@@ -56,7 +56,7 @@ impl Builder<'_> {
         let images = self.check_emission_images(emission_images, &shapes, d);
 
         // Put the geometry together
-        let shutter = understood.as_ref().map_or([0.0, 1.0], |s| s.shutter);
+        let shutter = options.as_ref().map_or([0.0, 1.0], |s| s.shutter);
         let mut assembly = Assembly { shutter, images, ..Assembly::default() };
         assembly.set.groups.resize_with(self.objects.len(), Group::default);
         for (desc, made) in shapes.iter().zip(made) {
@@ -84,7 +84,7 @@ impl Builder<'_> {
         if d.has_errors() {
             return None;
         }
-        let Understood { camera, film, settings, .. } = understood?;
+        let ParsedOptions { camera, film, settings, .. } = options?;
 
         // Lights
         let mut lights = LightSetBuilder::default();

@@ -28,7 +28,7 @@ pub struct Options {
 }
 
 /// The options, understood.
-pub struct Understood {
+pub struct ParsedOptions {
     /// Camera.
     pub camera: Camera,
     /// Film.
@@ -39,7 +39,7 @@ pub struct Understood {
     pub shutter: [f32; 2],
 }
 
-/// The camera, the film and the rest of a picture's size.
+/// The camera, the film and the rest of an image's size.
 struct CameraFrame {
     resolution: [u32; 2],
     shutter: [f32; 2],
@@ -106,7 +106,7 @@ impl Options {
     }
 
     /// Understands all options.
-    pub fn finish(&self, load: &LoadOptions, d: &mut Diagnostics) -> Option<Understood> {
+    pub fn finish(&self, load: &LoadOptions, d: &mut Diagnostics) -> Option<ParsedOptions> {
         let (film, exposure_scale) = finish_film(self.film.as_ref(), self.filter.as_ref(), load, d);
         let mut settings = Settings::default();
         settings.sampling.seed = self.seed.unwrap_or(settings.sampling.seed);
@@ -114,7 +114,7 @@ impl Options {
         finish_integrator(self.integrator.as_ref(), &mut settings, d);
         let (camera, shutter, seconds) = self.finish_camera(film.resolution, d)?;
         let film = FilmSettings { scale: exposure_scale * seconds, ..film };
-        Some(Understood { camera, film, settings, shutter })
+        Some(ParsedOptions { camera, film, settings, shutter })
     }
 
     fn finish_camera(&self, resolution: [u32; 2], d: &mut Diagnostics) -> Option<(Camera, [f32; 2], f32)> {

@@ -4,7 +4,7 @@ use super::checks::unknown;
 use super::descriptions::Pending;
 use crate::settings::table::{Directive, rows};
 use crate::settings::value::{Integers, Interval, Kind, Value};
-use crate::settings::{IntegratorKind, Setting, Settings, Shrinking};
+use crate::settings::{IntegratorKind, ProgressiveSettings, Setting, Settings};
 use lumiris_formats::diagnostic::Diagnostics;
 use lumiris_formats::pbrt::params::{ParamSet, ParamType};
 use lumiris_numbers::samplers::SamplerKind;
@@ -40,7 +40,7 @@ pub(super) fn finish_integrator(pending: Option<&Pending>, s: &mut Settings, d: 
         "photon-map" => kind = IntegratorKind::PhotonMap,
         "sppm" => {
             kind = IntegratorKind::PhotonMap;
-            s.integrator.photons.progressive = Some(Shrinking::default());
+            s.integrator.photons.progressive = Some(ProgressiveSettings::default());
         }
         "directlighting" => {
             kind = IntegratorKind::Direct;
@@ -55,12 +55,12 @@ pub(super) fn finish_integrator(pending: Option<&Pending>, s: &mut Settings, d: 
     }
     set_name("integrator", kind.into(), s);
     parameters(Directive::Integrator, s, p, d);
-    // Trajectories there, stored photons here; −1 is the choice of the renderer
+    // Photon paths there, stored photons here; −1 is the choice of the renderer
     if let Some(n @ 1..) = p.integer("photonsperiteration", d) {
         s.integrator.photons.photons = n as u32;
     }
     if p.ignore("regularize") {
-        d.warning_once(p.span_of("regularize"), "regularize is ignored: it would bias the picture");
+        d.warning_once(p.span_of("regularize"), "regularize is ignored: it would bias the image");
     }
     IGNORED.iter().for_each(|key| {
         p.ignore(key);
@@ -82,7 +82,7 @@ pub(super) fn finish_sampler(pending: Option<&Pending>, s: &mut Settings, d: &mu
         other => unknown(other, name.span, "sampler", &["independent", "sobol", "zsobol", "halton", "stratified"], d),
     }
     if name.text == "stratified" {
-        let counts = Integers { least: 1, ..Integers::ALL };
+        let counts = Integers { min: 1, ..Integers::ALL };
         let mut count = |key| whole(key, &counts, p, d).map(|n| n as u32);
         let (x, y) = (count("xsamples").unwrap_or(4), count("ysamples").unwrap_or(4));
         s.sampling.spp = x.saturating_mul(y);
@@ -214,8 +214,8 @@ mod tests {
     use crate::import::{LoadOptions, load};
     use crate::lights::LightSamplerKind;
     use crate::settings::{
-        Cached, CorrelatedForm, Deposition, EstimatorKind, IntegratorSettings, IrradianceCacheSettings,
-        PhotonMapSettings, ProposalPoints, Proposals, SamplingTechnique, Split, Strata, Target,
+        Cached, CorrelatedForm, EstimatorKind, IntegratorSettings, IrradianceCacheSettings, PhotonMapSettings,
+        PhotonStorage, ProposalPoints, Proposals, SampleCounts, SamplingTechnique, Strata, Target,
     };
     use lumiris_numbers::estimators::mis::Heuristic;
 
@@ -237,7 +237,7 @@ mod tests {
         )
         .unwrap();
         assert_eq!((s.kind, s.estimator), (IntegratorKind::Direct, EstimatorKind::Ris));
-        assert_eq!(s.split(), Split { samples: 2, proposals: 24 });
+        assert_eq!(s.sample_counts(), SampleCounts { samples: 2, proposals: 24 });
         assert_eq!((s.ris.strata, s.ris.points), (Strata::Weights, ProposalPoints::Independent));
         assert_eq!((s.ris.target, s.heuristic(), s.bsdf_proposals), (Target::Gvl, Heuristic::Power, 9));
         for (word, proposals) in [("auto", Proposals::Auto), ("optimal", Proposals::Optimal)] {
@@ -264,22 +264,22 @@ mod tests {
     fn settings_of_photon_maps_are_read() {
         let s = settings(
             "Integrator \"photon-map\" \"integer photons\" 1000000 \"float causticratio\" 0.5 \"string importance\" \"floor\"
-             \"float leastimportance\" 0.25 \"integer nearest\" 80 \"integer gather\" 0 \"float gatherguide\" 0.5 \"integer lightphotons\" 9000",
+             \"float minimportance\" 0.25 \"integer nearest\" 80 \"integer gather\" 0 \"float gatherguide\" 0.5 \"integer visibilityphotons\" 9000",
         )
         .unwrap();
         let photons = PhotonMapSettings {
             photons: 1_000_000,
             caustic_ratio: 0.5,
-            deposition: Deposition::Floor(0.25),
+            storage: PhotonStorage::Floor(0.25),
             nearest: 80,
             gather: 0,
             guide: 0.5,
-            light_photons: Some(9000),
+            visibility_photons: Some(9000),
             ..Default::default()
         };
         assert_eq!((s.kind, s.photons), (IntegratorKind::PhotonMap, photons));
         let s = settings("Integrator \"sppm\" \"float radius\" 0.5 \"integer photonsperiteration\" -1").unwrap();
-        assert_eq!(s.photons.progressive, Some(Shrinking { radius: Some(0.5), ..Default::default() }));
+        assert_eq!(s.photons.progressive, Some(ProgressiveSettings { radius: Some(0.5), ..Default::default() }));
     }
 
     #[test]
@@ -332,19 +332,24 @@ mod tests {
     #[test]
     fn settings_of_light_by_photons_are_read() {
         let s = settings("Integrator \"path\" \"string estimator\" \"contributing\" \"integer samples\" 8").unwrap();
-        assert_eq!((s.estimator, s.contributing.rest_samples), (EstimatorKind::Contributing, 1));
-        assert!(s.uses_light_hints() && !s.leaves_lights_out() && s.split() == Split { samples: 8, proposals: 8 });
+        assert_eq!((s.estimator, s.contributing.noncontributing_samples), (EstimatorKind::Contributing, 1));
+        assert!(
+            s.uses_visibility_cache()
+                && !s.leaves_lights_out()
+                && s.sample_counts() == SampleCounts { samples: 8, proposals: 8 }
+        );
         let s =
-            settings("Integrator \"path\" \"string estimator\" \"contributing\" \"integer restsamples\" 0").unwrap();
+            settings("Integrator \"path\" \"string estimator\" \"contributing\" \"integer noncontributingsamples\" 0")
+                .unwrap();
         assert!(s.leaves_lights_out());
         let s = settings("Integrator \"path\" \"string lightsampler\" \"photons\"").unwrap();
-        assert!(s.light_choice == LightSamplerKind::Photons && s.uses_light_hints() && !s.leaves_lights_out());
+        assert!(s.light_sampler == LightSamplerKind::Photons && s.uses_visibility_cache() && !s.leaves_lights_out());
         let s = settings("Integrator \"path\" \"string target\" \"visibility\"").unwrap();
-        assert!(s.ris.target == Target::Visibility && !s.uses_light_hints(), "the target is that of ris alone");
+        assert!(s.ris.target == Target::Visibility && !s.uses_visibility_cache(), "the target is that of ris alone");
         let s = settings("Integrator \"path\" \"string estimator\" \"ris\" \"string target\" \"visibility\"").unwrap();
-        assert!(s.uses_light_hints());
-        let report = settings("Integrator \"path\" \"integer restsamples\" -1").unwrap_err();
-        assert!(report.contains("restsamples must be from 0 to 4096, not -1"), "{report}");
+        assert!(s.uses_visibility_cache());
+        let report = settings("Integrator \"path\" \"integer noncontributingsamples\" -1").unwrap_err();
+        assert!(report.contains("noncontributingsamples must be from 0 to 4096, not -1"), "{report}");
     }
 
     #[test]

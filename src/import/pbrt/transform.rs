@@ -141,7 +141,7 @@ mod tests {
         let m = look_at(&[1.0, 2.0, 3.0, 4.0, 2.0, 3.0, 0.0, 0.0, 1.0]).unwrap();
         assert!((m.transform_point3(Vec3::new(4.0, 2.0, 3.0)) - Vec3::new(0.0, 0.0, 3.0)).length() < 1e-5);
         assert!((m.transform_vector3(Vec3::Z) - Vec3::Y).length() < 1e-6);
-        // Left-handed: looking along +x with z up, the picture's right is +y.
+        // Left-handed: looking along +x with z up, the image's right is +y.
         assert!((m.transform_vector3(Vec3::Y) - Vec3::X).length() < 1e-6);
         assert!(look_at(&[0.0; 9]).is_err());
     }

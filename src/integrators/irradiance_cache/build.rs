@@ -12,7 +12,7 @@
 //! So a round sees what earlier rounds made and nothing else.
 
 use super::cache::IrradianceCache;
-use super::gather::{BATCH, Gatherer, Wanted};
+use super::gather::{BATCH, Gatherer, RecordRequest};
 use super::octree::Octree;
 use super::record::{Range, Record};
 use crate::film::{PixelBounds, PixelSample};
@@ -28,14 +28,14 @@ use std::time::{Duration, Instant};
 const COARSEST: u32 = 16;
 /// Camera samples of each pixel that ask.
 const SAMPLES: u32 = 2;
-/// Camera samples ask if no record serves them with this error: those of the picture find one with less than 1.
+/// Camera samples ask if no record serves them with this error: those of the image find one with less than 1.
 const COVERED: f32 = 0.7;
 /// A vertex that a camera ray reaches by mirrors and glass asks only if so much of its light arrives.
 const WORTHWHILE: f32 = 0.2;
 /// Camera samples that are traced together.
 const CHUNK: usize = 1024;
 /// Records that are computed before they are added; no limit to what a round adds.
-const MOST_AT_ONCE: usize = 1 << 14;
+const MAX_AT_ONCE: usize = 1 << 14;
 
 /// What making the cache took.
 #[derive(Clone, Copy, Debug, Default)]
@@ -77,10 +77,11 @@ pub fn build(
         let pixels = round.pixels(bounds);
         stats.camera_samples += pixels.len() as u64;
         let wanted = ask(job, &cache, &pixels, &|pixel| cameras(pixel, round.sample), &mut stats.paths);
-        let wanted: Vec<Wanted> = wanted.into_iter().map(|w| Wanted { key: w.key | round.sample << 16, ..w }).collect();
+        let wanted: Vec<RecordRequest> =
+            wanted.into_iter().map(|w| RecordRequest { key: w.key | round.sample << 16, ..w }).collect();
         let chosen = without_redundant(&wanted, &cache, &world_bounds);
         stats.dropped += (wanted.len() - chosen.len()) as u64;
-        for part in chosen.chunks(MOST_AT_ONCE) {
+        for part in chosen.chunks(MAX_AT_ONCE) {
             if cache.is_full() || stop.load(Ordering::Relaxed) {
                 break;
             }
@@ -94,11 +95,11 @@ pub fn build(
 /// True if no record would have any light.
 fn holds_nothing(job: &RenderJob) -> bool {
     let settings = &job.settings().integrator;
-    let least_depth = match settings.cache.cached {
+    let min_depth = match settings.cache.cached {
         Cached::Indirect => 2,
         Cached::All => 1,
     };
-    settings.max_depth < least_depth || job.lights.lights.is_empty()
+    settings.max_depth < min_depth || job.lights.lights.is_empty()
 }
 
 /// A subset of the pixels: those whose x and y are `offset` modulo `stride`.
@@ -140,8 +141,8 @@ fn ask(
     pixels: &[[u32; 2]],
     camera: &(dyn Fn([u32; 2]) -> CameraSample + Sync),
     stats: &mut PathStats,
-) -> Vec<Wanted> {
-    let parts: Vec<(Vec<Wanted>, PathStats)> = pixels
+) -> Vec<RecordRequest> {
+    let parts: Vec<(Vec<RecordRequest>, PathStats)> = pixels
         .par_chunks(CHUNK)
         .map_init(PathIntegrator::default, |paths, pixels| {
             let samples: Vec<CameraSample> = pixels.iter().map(|&pixel| camera(pixel)).collect();
@@ -158,7 +159,7 @@ fn ask_chunk(
     pixels: &[[u32; 2]],
     samples: &[CameraSample],
     paths: &mut PathIntegrator,
-) -> Vec<Wanted> {
+) -> Vec<RecordRequest> {
     let settings = &job.settings().integrator;
     let depth = settings.depth();
     let mut wanted = Vec::new();
@@ -178,7 +179,7 @@ fn ask_chunk(
                 continue;
             }
             let sides = unserved_sides(cache, v).into_iter().flatten();
-            wanted.extend(sides.map(|(side, ns)| Wanted {
+            wanted.extend(sides.map(|(side, ns)| RecordRequest {
                 p: v.surface.p,
                 p_error: v.surface.p_error,
                 n: v.bsdf.n,
@@ -190,7 +191,7 @@ fn ask_chunk(
                 key: vertex << 1 | side,
             }));
             // Mirrors and glass
-            let point = v.shade_point(state.ray.time, samples[sample].split, 0);
+            let point = v.shading_point(state.ray.time, samples[sample].sample_counts, 0);
             let next = path::extend(state, v, &point, vertex, settings);
             paths.next.extend(next.filter(|(_, lobe)| lobe.is_specular()).map(|(state, _)| state));
         }
@@ -218,9 +219,9 @@ fn pixel_width(width: f32, p: Vec3) -> f32 {
 }
 
 /// The points without those that a record of the least reach at an earlier one would serve.
-fn without_redundant(wanted: &[Wanted], cache: &IrradianceCache, bounds: &Bounds3) -> Vec<Wanted> {
+fn without_redundant(wanted: &[RecordRequest], cache: &IrradianceCache, bounds: &Bounds3) -> Vec<RecordRequest> {
     let settings = cache.settings();
-    let mut chosen: Vec<Wanted> = Vec::new();
+    let mut chosen: Vec<RecordRequest> = Vec::new();
     let mut ranges: Vec<Range> = Vec::new();
     let mut tree = Octree::new(bounds);
     for w in wanted {
@@ -237,7 +238,7 @@ fn without_redundant(wanted: &[Wanted], cache: &IrradianceCache, bounds: &Bounds
 }
 
 /// The records of the points, in their order.
-fn gather(job: &RenderJob, wanted: &[Wanted], stats: &mut PathStats) -> Vec<Record> {
+fn gather(job: &RenderJob, wanted: &[RecordRequest], stats: &mut PathStats) -> Vec<Record> {
     let parts: Vec<(Vec<Record>, PathStats)> = wanted
         .par_chunks(BATCH)
         .map_init(Gatherer::default, |gatherer, wanted| (gatherer.records(job, wanted), gatherer.take_stats()))
@@ -267,7 +268,7 @@ mod tests {
 
     #[test]
     fn a_point_beside_an_accepted_one_is_dropped() {
-        let at = |x: f32, ns: Vec3| Wanted {
+        let at = |x: f32, ns: Vec3| RecordRequest {
             p: Vec3::new(x, 0.0, 0.0),
             p_error: Vec3::ZERO,
             n: Vec3::Z,

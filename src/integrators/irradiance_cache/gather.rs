@@ -13,12 +13,12 @@ use super::record::Record;
 use crate::accel::{Hit, RayBatch};
 use crate::bsdfs::{Bsdf, Diffuse};
 use crate::cameras::CameraRay;
-use crate::direct::{DirectStage, Fits, ShadePoint};
+use crate::direct::{DirectStage, Fits, ShadingPoint};
 use crate::film::PixelSample;
 use crate::integrators::path::{CameraSample, PathIntegrator, PathStats};
 use crate::materials::SurfaceBsdf;
 use crate::scene::{EmitterHit, RenderJob};
-use crate::settings::{Cached, IntegratorKind, IntegratorSettings, Split};
+use crate::settings::{Cached, IntegratorKind, IntegratorSettings, SampleCounts};
 use lumiris_numbers::estimators::ocv::block_of;
 use lumiris_numbers::math::hash::pcg4d;
 use lumiris_numbers::math::ray::offset_origin;
@@ -39,7 +39,7 @@ mod domain {
 
 /// A point that asks for a record.
 #[derive(Clone, Copy, Debug)]
-pub struct Wanted {
+pub struct RecordRequest {
     /// The point.
     pub p: Vec3,
     /// Bound of the rounding error of `p`.
@@ -82,7 +82,7 @@ impl Gatherer {
     }
 
     /// The records of some points, in their order.
-    pub fn records(&mut self, job: &RenderJob, wanted: &[Wanted]) -> Vec<Record> {
+    pub fn records(&mut self, job: &RenderJob, wanted: &[RecordRequest]) -> Vec<Record> {
         let settings = &job.settings().integrator;
         let mut records = self.indirect(job, settings, wanted);
         if settings.cache.cached == Cached::All {
@@ -94,7 +94,7 @@ impl Gatherer {
     }
 
     /// Indirect light, and radii.
-    fn indirect(&mut self, job: &RenderJob, settings: &IntegratorSettings, wanted: &[Wanted]) -> Vec<Record> {
+    fn indirect(&mut self, job: &RenderJob, settings: &IntegratorSettings, wanted: &[RecordRequest]) -> Vec<Record> {
         // Paths through every cell; one bounce, which the record's surface makes, is theirs no more
         let cells = Cells::new(settings.cache.samples);
         let paths = IntegratorSettings {
@@ -102,7 +102,7 @@ impl Gatherer {
             max_depth: settings.max_depth.saturating_sub(1),
             ..settings.at_vertex(1)
         };
-        let split = settings.split_at_vertex(1);
+        let sample_counts = settings.sample_counts_at_vertex(1);
         self.samples.clear();
         for w in wanted {
             let frame = Frame::from_z(w.ns);
@@ -112,14 +112,14 @@ impl Gatherer {
                 let o = offset_origin(w.p, w.p_error, w.n, d);
                 let ray = Ray { o, d, t_max: f32::INFINITY, time: w.time };
                 let ray = CameraRay { ray, spread: w.spread, width0: w.pixel_width, weight: 1.0 };
-                self.samples.push(CameraSample { ray, weight: 1.0, stream, direct: stream, split, fit: 0 });
+                self.samples.push(CameraSample { ray, weight: 1.0, stream, direct: stream, sample_counts, fit: 0 });
             }
         }
         self.paths.only_reflected = true;
         self.paths.trace(job, &paths, &self.samples, &mut Fits::default(), &mut self.results);
 
         // Irradiance
-        let of_record = |(w, results): (&Wanted, &[PixelSample])| {
+        let of_record = |(w, results): (&RecordRequest, &[PixelSample])| {
             let finite = |l: Rgb| if l.is_finite() { l } else { Rgb::BLACK };
             let l: Vec<Rgb> = results.iter().map(|r| finite(r.radiance)).collect();
             let r: Vec<f32> = results.iter().map(|r| r.features.map_or(f32::INFINITY, |f| f.depth)).collect();
@@ -134,7 +134,7 @@ impl Gatherer {
     }
 
     /// Light of sources. Progressive estimators are fitted to the passes of each record: to earlier blocks of them.
-    fn sources(&mut self, job: &RenderJob, settings: &IntegratorSettings, wanted: &[Wanted]) -> Vec<Irradiance> {
+    fn sources(&mut self, job: &RenderJob, settings: &IntegratorSettings, wanted: &[RecordRequest]) -> Vec<Irradiance> {
         let passes = settings.cache.passes.max(1);
         let mut sums = vec![Irradiance::default(); wanted.len()];
         let mut fits = Fits::new(job, settings, wanted.len());
@@ -144,11 +144,11 @@ impl Gatherer {
                 self.direct.stats.ill_conditioned += fits.solve();
                 self.direct.stats.systems += wanted.len() as u64;
             }
-            let points: Vec<ShadePoint<'_>> = (0_u32..)
+            let points: Vec<ShadingPoint<'_>> = (0_u32..)
                 .zip(wanted)
                 .map(|(fit, w)| {
                     let place = if settings.is_progressive() { (block.index, pass - block.first) } else { (0, pass) };
-                    ShadePoint { fit, ..w.white_point(job, place, settings.split()) }
+                    ShadingPoint { fit, ..w.white_point(job, place, settings.sample_counts()) }
                 })
                 .collect();
             self.direct.estimate(job, settings, &points, &mut fits, &mut self.radiance);
@@ -170,7 +170,7 @@ impl Gatherer {
     fn add_gradients(
         &mut self,
         job: &RenderJob,
-        wanted: &[Wanted],
+        wanted: &[RecordRequest],
         estimates: u32,
         scale: f32,
         sums: &mut [Irradiance],
@@ -208,7 +208,7 @@ impl Gatherer {
 
 /// ∇x ln(cos θ cos θ'/r²) up to a part along the normal, d being the way from x to the light: 4d/r² − n'/(n'·d) for an emitter at
 /// its end, 3d/r² for a light that is a point.
-fn log_gradient(job: &RenderJob, w: &Wanted, d: Vec3, emitter: Option<&EmitterHit>) -> Vec3 {
+fn log_gradient(job: &RenderJob, w: &RecordRequest, d: Vec3, emitter: Option<&EmitterHit>) -> Vec3 {
     let r2 = d.length_squared();
     match emitter {
         Some(hit) if (hit.t - 1.0).abs() < 1e-3 => {
@@ -233,7 +233,7 @@ fn radius(light: &Irradiance, r: &[f32], kappa: f32) -> f32 {
     mean.min(by_gradient).min(nearest / kappa)
 }
 
-impl Wanted {
+impl RecordRequest {
     /// Random numbers of sample `index` of this record.
     fn stream(&self, job: &RenderJob, index: u32) -> SampleStream {
         self.stream_of_block(job, 0, index)
@@ -247,20 +247,25 @@ impl Wanted {
     }
 
     /// A white surface here, whose light is estimated with sample `index` of `block`.
-    fn white_point(&self, job: &RenderJob, (block, index): (u32, u32), split: Split) -> ShadePoint<'static> {
+    fn white_point(
+        &self,
+        job: &RenderJob,
+        (block, index): (u32, u32),
+        sample_counts: SampleCounts,
+    ) -> ShadingPoint<'static> {
         let bsdf = SurfaceBsdf {
             bsdf: Bsdf::Diffuse(Diffuse { reflectance: Rgb::WHITE }),
             frame: Frame::from_z(self.ns),
             n: self.n,
         };
-        ShadePoint {
+        ShadingPoint {
             p: self.p,
             p_error: self.p_error,
             wo: self.ns,
             bsdf,
             time: self.time,
             stream: self.stream_of_block(job, block, index).domain(domain::SOURCES),
-            split,
+            sample_counts,
             fit: 0,
         }
     }

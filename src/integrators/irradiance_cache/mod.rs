@@ -2,7 +2,7 @@
 //!
 //! Irradiance has two parts, E = E_sources + E_indirect [Fan et al. 2006, §5.1]. Records hold the second one
 //! ([`Cached::Indirect`], direct light being estimated at every hit) or both ([`Cached::All`]). They are computed where
-//! the camera looks, before the picture is ([`build()`]), and do not change after that.
+//! the camera looks, before the image is ([`build()`]), and do not change after that.
 //!
 //! Camera paths take the Lambertian part of a BSDF from the records, and go on with the other lobes (`diffuse.rs`).
 //!
@@ -39,14 +39,14 @@ pub struct LookupStats {
     /// Diffuse vertices of camera paths.
     pub lookups: u64,
     /// Those that no record served, which path tracing took over.
-    pub fallbacks: u64,
+    pub misses: u64,
 }
 
 impl LookupStats {
     /// Adds the counts of another worker.
     pub fn merge(&mut self, other: &LookupStats) {
         self.lookups += other.lookups;
-        self.fallbacks += other.fallbacks;
+        self.misses += other.misses;
     }
 }
 
@@ -93,7 +93,7 @@ impl Reflected for Lookup<'_> {
                 continue;
             }
             let Some(e) = self.cache.irradiance(v.surface.p, ns) else {
-                self.stats.fallbacks += 1;
+                self.stats.misses += 1;
                 return None;
             };
             known += albedo * e * FRAC_1_PI;

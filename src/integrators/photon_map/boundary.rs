@@ -18,7 +18,7 @@ use lumiris_numbers::samplers::SampleStream;
 use std::f32::consts::TAU;
 
 /// Maximum number of trials; where less of the surface is left, some bias remains.
-const MOST: u32 = 32;
+const MAX_TRIALS: u32 = 32;
 /// Minimum cosine between the normals of points on the same surface, as in photon maps.
 const MIN_NORMAL_COS: f32 = 0.8;
 /// Height of the way above the surface, in radii: photons farther than a quarter from the tangent plane do not count.
@@ -60,10 +60,10 @@ impl Boundary {
     /// The trial counts of some kernels; `out[i]` belongs to `probes[i]`.
     pub(super) fn trials(&mut self, world: &World, probes: &[Probe], out: &mut Vec<u32>) {
         out.clear();
-        out.resize(probes.len(), MOST);
+        out.resize(probes.len(), MAX_TRIALS);
         self.open.clear();
         self.open.extend(0..probes.len() as u32);
-        for trial in 1..=MOST {
+        for trial in 1..=MAX_TRIALS {
             if self.open.is_empty() {
                 break;
             }
@@ -103,7 +103,7 @@ impl Boundary {
                 out[i as usize] = trial;
             }
         }
-        self.open.retain(|&i| out[i as usize] == MOST);
+        self.open.retain(|&i| out[i as usize] == MAX_TRIALS);
     }
 }
 

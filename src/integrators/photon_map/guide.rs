@@ -15,12 +15,12 @@ const CELLS: usize = 8;
 #[derive(Clone, Debug)]
 pub struct Guide {
     histogram: Option<PiecewiseConstant2D>,
-    share: f32,
+    fraction: f32,
 }
 
 impl Guide {
     /// From directions to where photons came from, with their power. Without photons the cosine alone.
-    pub fn new(photons: impl IntoIterator<Item = (Vec3, f32)>, share: f32) -> Self {
+    pub fn new(photons: impl IntoIterator<Item = (Vec3, f32)>, fraction: f32) -> Self {
         let mut cells = [0.0; CELLS * CELLS];
         for (wi, power) in photons {
             if wi.z > 0.0 && power > 0.0 && power.is_finite() {
@@ -28,13 +28,13 @@ impl Guide {
                 cells[y * CELLS + x] += power;
             }
         }
-        let is_lit = cells.iter().any(|&power| power > 0.0) && share > 0.0;
-        Guide { histogram: is_lit.then(|| PiecewiseConstant2D::new(&cells, CELLS)), share }
+        let is_lit = cells.iter().any(|&power| power > 0.0) && fraction > 0.0;
+        Guide { histogram: is_lit.then(|| PiecewiseConstant2D::new(&cells, CELLS)), fraction }
     }
 
     /// A direction, with z > 0 but for rounding.
     pub fn sample(&self, u_choice: f32, u: [f32; 2]) -> Vec3 {
-        let by_photons = self.histogram.as_ref().filter(|_| u_choice < self.share).and_then(|h| h.sample(u));
+        let by_photons = self.histogram.as_ref().filter(|_| u_choice < self.fraction).and_then(|h| h.sample(u));
         sample_cosine_hemisphere(by_photons.map_or(u, |s| s.p.to_array()))
     }
 
@@ -45,7 +45,7 @@ impl Guide {
             None => cosine,
             Some(h) => {
                 let place = Vec2::from_array(invert_cosine_hemisphere(w));
-                cosine * (1.0 - self.share + self.share * h.pdf(place))
+                cosine * (1.0 - self.fraction + self.fraction * h.pdf(place))
             }
         }
     }

@@ -1,18 +1,18 @@
-//! The maps of a picture: what photons are traced, how they are asked for, and irradiances computed beforehand.
+//! The maps of an image: what photons are traced, how they are asked for, and irradiances computed beforehand.
 //!
 //! One map: estimates take the k nearest photons, and the final gather takes irradiances that were computed at every fourth photon
-//! of the global map, from the nearest of them [Christensen 1999]. A pilot fixes the number of trajectories of all
+//! of the global map, from the nearest of them [Christensen 1999]. A pilot fixes the number of photon paths of all
 //! maps. Progressive: each pass has photons of its own and radii that shrink, so that the mean over the passes
 //! converges while the memory of one map suffices [Knaus and Zwicker 2011].
 
 use super::boundary::{Boundary, Probe};
 use crate::integrators::path::{CameraSample, PathIntegrator};
 use crate::photons::{
-    GatherScratch, Importance, ImportanceSettings, Origin, Photon, PhotonError, PhotonMap, Place, Search, Traced,
-    Tracing, Unimportant, Want, trace_importons, trace_photons, trajectories_for,
+    GatherScratch, Importance, ImportanceSettings, LowImportance, Origin, Photon, PhotonBudget, PhotonError, PhotonMap,
+    Place, Search, Traced, Tracing, path_count, trace_importons, trace_photons,
 };
 use crate::scene::{RenderJob, World};
-use crate::settings::{Deposition, PhotonMapSettings};
+use crate::settings::{PhotonMapSettings, PhotonStorage};
 use lumiris_numbers::math::hash::pcg4d;
 use lumiris_numbers::math::{Rgb, Vec3};
 use lumiris_numbers::samplers::{SampleStream, SamplerKind};
@@ -41,8 +41,8 @@ const RADIUS_SEED: u32 = 0x72_61_64_69;
 pub struct MapStats {
     /// Maps that were made.
     pub maps: u64,
-    /// Trajectories that were traced, over all maps.
-    pub trajectories: u64,
+    /// Photon paths that were traced, over all maps.
+    pub paths: u64,
     /// Photons in the global map, over all maps.
     pub global: u64,
     /// Photons in the caustic map, over all maps.
@@ -57,7 +57,7 @@ pub struct MapStats {
     pub sorting: Duration,
 }
 
-/// Photon maps of one pass, or of a whole picture.
+/// Photon maps of one pass, or of a whole image.
 #[derive(Debug)]
 pub struct PhotonMaps {
     pub(super) global: PhotonMap,
@@ -82,7 +82,7 @@ pub(super) struct Answer {
     pub(super) reach: f32,
 }
 
-/// Makes the maps of a picture.
+/// Makes the maps of an image.
 #[derive(Debug)]
 pub struct MapMaker<'a> {
     /// Ends tracing when it becomes true.
@@ -91,9 +91,9 @@ pub struct MapMaker<'a> {
     max_depth: u32,
     seed: u32,
     importance: Option<Importance>,
-    /// Trajectories of each map: fixed before any is traced, since a number that depends on what was stored makes light
+    /// Photon paths of each map: fixed before any is traced, since a number that depends on what was stored makes light
     /// too bright.
-    trajectories: u64,
+    paths: u64,
     /// First radii of progressive maps: global, caustic.
     radii: Option<[f32; 2]>,
     /// What was made so far.
@@ -101,39 +101,39 @@ pub struct MapMaker<'a> {
 }
 
 impl<'a> MapMaker<'a> {
-    /// Traces importons, if there are to be any, and finds out how many trajectories a map takes, and the first radii
+    /// Traces importons, if there are to be any, and finds out how many photon paths a map takes, and the first radii
     /// of progressive maps: as far as the nearest photons reach from `seen`, places and normals where the camera looks.
     pub fn new(job: &RenderJob, seen: &[(Vec3, Vec3)], stop: &'a AtomicBool) -> Result<Self, PhotonError> {
         let settings = job.settings().integrator.photons;
         let (max_depth, seed) = (job.settings().integrator.max_depth, job.settings().sampling.seed);
-        let unimportant = match settings.deposition {
-            Deposition::All => None,
-            Deposition::Floor(least) => Some(Unimportant::Floor(least)),
-            Deposition::CutOff(least) => Some(Unimportant::CutOff(least)),
+        let low_importance = match settings.storage {
+            PhotonStorage::All => None,
+            PhotonStorage::Floor(min) => Some(LowImportance::Floor(min)),
+            PhotonStorage::CutOff(min) => Some(LowImportance::CutOff(min)),
         };
-        let importance = match unimportant {
+        let importance = match low_importance {
             None => None,
-            Some(unimportant) => {
+            Some(low_importance) => {
                 let settings =
-                    ImportanceSettings { seed, unimportant, quantile: QUANTILE, ..ImportanceSettings::default() };
+                    ImportanceSettings { seed, low_importance, quantile: QUANTILE, ..ImportanceSettings::default() };
                 Some(trace_importons(job, &settings)?)
             }
         };
         let (radii, stats) = (None, MapStats::default());
-        let mut maker = MapMaker { stop, settings, max_depth, seed, importance, trajectories: 0, radii, stats };
+        let mut maker = MapMaker { stop, settings, max_depth, seed, importance, paths: 0, radii, stats };
         let start = Instant::now();
-        let want = Want::Stored { global: u64::from(settings.photons), most_trajectories: settings.trajectories };
-        maker.trajectories = trajectories_for(job, &maker.tracing(seed), maker.importance.as_ref(), want)?;
+        let budget = PhotonBudget::Stored { global: u64::from(settings.photons), max_paths: settings.paths };
+        maker.paths = path_count(job, &maker.tracing(seed), maker.importance.as_ref(), budget)?;
         maker.stats.tracing = start.elapsed();
-        if let Some(shrinking) = settings.progressive {
-            maker.radii = Some(match shrinking.radius {
+        if let Some(progressive) = settings.progressive {
+            maker.radii = Some(match progressive.radius {
                 Some(radius) => [radius; 2],
                 None => {
                     let traced = maker.traced(job, [0, RADIUS_SEED])?;
                     let global = PhotonMap::new(traced.global);
                     let caustic = PhotonMap::new(traced.caustic);
-                    let most = job.lights.scene_radius;
-                    let radius = median_reach(&global, seen, settings.nearest, most).unwrap_or(0.01 * most);
+                    let max = job.lights.scene_radius;
+                    let radius = median_reach(&global, seen, settings.nearest, max).unwrap_or(0.01 * max);
                     let at_caustics = places_of(&caustic);
                     [radius, median_reach(&caustic, &at_caustics, settings.nearest, radius).unwrap_or(radius)]
                 }
@@ -164,8 +164,8 @@ impl<'a> MapMaker<'a> {
     /// Photons whose random numbers are those of a pass and a purpose.
     fn traced(&self, job: &RenderJob, [pass, purpose]: [u32; 2]) -> Result<Traced, PhotonError> {
         let [seed, ..] = pcg4d([self.seed, pass, purpose, 0]);
-        let want = Want::Trajectories(self.trajectories);
-        trace_photons(job, &self.tracing(seed), self.importance.as_ref(), want)
+        let budget = PhotonBudget::Paths(self.paths);
+        trace_photons(job, &self.tracing(seed), self.importance.as_ref(), budget)
     }
 
     /// The maps of a pass.
@@ -174,7 +174,7 @@ impl<'a> MapMaker<'a> {
         let traced = self.traced(job, [pass, PASS_SEED])?;
         let traced_at = Instant::now();
         self.stats.maps += 1;
-        self.stats.trajectories += traced.trajectories;
+        self.stats.paths += traced.paths;
         self.stats.global += traced.global.len() as u64;
         self.stats.caustic += traced.caustic.len() as u64;
         self.stats.importons = self.importance.as_ref().map_or(0, |i| i.map().len() as u64);
@@ -188,14 +188,14 @@ impl<'a> MapMaker<'a> {
     fn maps(&self, job: &RenderJob, pass: u32, traced: Traced) -> PhotonMaps {
         let nearest = self.settings.nearest;
         let (global, caustic) = (PhotonMap::new(traced.global), PhotonMap::new(traced.caustic));
-        if let (Some(shrinking), Some(radii)) = (self.settings.progressive, self.radii) {
-            let [search, caustic_search] = radii.map(|r| Search::Radius(r * shrinking.factor(pass)));
+        if let (Some(progressive), Some(radii)) = (self.settings.progressive, self.radii) {
+            let [search, caustic_search] = radii.map(|r| Search::Radius(r * progressive.factor(pass)));
             return PhotonMaps { global, caustic, records: None, search, caustic_search, nearest };
         }
-        let most = job.lights.scene_radius;
+        let max = job.lights.scene_radius;
         // Where caustics end, the nearest photons are far away and not of that place
-        let reach = median_reach(&caustic, &places_of(&caustic), nearest, most).unwrap_or(0.01 * most);
-        let search = Search::Nearest { count: nearest, max_radius: most };
+        let reach = median_reach(&caustic, &places_of(&caustic), nearest, max).unwrap_or(0.01 * max);
+        let search = Search::Nearest { count: nearest, max_radius: max };
         let caustic_search = Search::Nearest { count: nearest, max_radius: 2.0 * reach };
         let mut maps = PhotonMaps { global, caustic, records: None, search, caustic_search, nearest };
         if self.settings.gather > 0 {
@@ -225,9 +225,9 @@ impl PhotonMaps {
     pub(super) fn irradiance(&self, at: &Place, scratch: &mut GatherScratch) -> Answer {
         if let Some(records) = &self.records {
             // The nearest one: of two, the farther lies on the rim of the kernel and does not count
-            let most = Search::Nearest { count: 2, max_radius: self.max_radius() };
+            let max = Search::Nearest { count: 2, max_radius: self.max_radius() };
             let mut e = None;
-            let spacing = records.gather(at, most, scratch, |record, _| e = Some(record.power()));
+            let spacing = records.gather(at, max, scratch, |record, _| e = Some(record.power()));
             if let Some(known) = e {
                 // k photons lie in the disk that holds k/4 records
                 let reach = spacing * (self.nearest as f32 / (2 * RECORD_STRIDE) as f32).sqrt();
@@ -303,7 +303,8 @@ impl PhotonMaps {
     }
 }
 
-/// Diffuse places that the camera sees, spread over the picture, with their normals; `camera` gives the samples of a pixel.
+/// Diffuse places that the camera sees, spread over the image, with their normals; `camera` gives the samples of a
+/// pixel.
 pub fn seen(job: &RenderJob, camera: &dyn Fn([u32; 2], u32) -> CameraSample) -> Vec<(Vec3, Vec3)> {
     let b = job.world.scene.film.bounds;
     let stride = (b.area() / PROBES).max(1);
@@ -322,17 +323,18 @@ fn places_of(map: &PhotonMap) -> Vec<(Vec3, Vec3)> {
     map.photons().iter().step_by(stride).map(|photon| (photon.p(), photon.n())).collect()
 }
 
-/// The median over some places of the radius that holds `nearest` photons; `None` where fewer than half have so many within `most`.
-fn median_reach(map: &PhotonMap, places: &[(Vec3, Vec3)], nearest: u32, most: f32) -> Option<f32> {
+/// The median over some places of the radius that holds `nearest` photons; `None` where fewer than half have so many
+/// within `max`.
+fn median_reach(map: &PhotonMap, places: &[(Vec3, Vec3)], nearest: u32, max: f32) -> Option<f32> {
     let mut scratch = GatherScratch::default();
-    let search = Search::Nearest { count: nearest, max_radius: most };
+    let search = Search::Nearest { count: nearest, max_radius: max };
     let mut radii: Vec<f32> = places
         .iter()
         .map(|&(p, n)| {
             let radius = map.gather(&Place::flat(p, n), search, &mut scratch, |_, _| ());
-            if radius > 0.0 { radius } else { most }
+            if radius > 0.0 { radius } else { max }
         })
         .collect();
     radii.sort_by(f32::total_cmp);
-    radii.get(radii.len() / 2).copied().filter(|&radius| radius < most)
+    radii.get(radii.len() / 2).copied().filter(|&radius| radius < max)
 }

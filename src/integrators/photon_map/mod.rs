@@ -24,7 +24,7 @@ use super::diffuse::{self, Reflected, viewer_normal};
 use super::path::{self, CameraSample, PathIntegrator, PathState, PathStats, Vertex};
 use crate::bsdfs::{Bsdf, Diffuse, DiffuseTransmission, Lambertian};
 use crate::cameras::CameraRay;
-use crate::direct::{Fits, ShadePoint};
+use crate::direct::{Fits, ShadingPoint};
 use crate::film::PixelSample;
 use crate::materials::SurfaceBsdf;
 use crate::photons::{GatherScratch, Place, Search};
@@ -162,8 +162,8 @@ impl PhotonMapIntegrator {
                 let o = offset_origin(request.place.p, request.p_error, request.place.n, d);
                 let ray = Ray { o, d, t_max: f32::INFINITY, time: request.time };
                 let ray = CameraRay { ray, spread: request.spread, width0: request.width, weight: 1.0 };
-                let split = crate::settings::Split { samples: 1, proposals: 1 };
-                self.samples.push(CameraSample { ray, weight, stream, direct: stream, split, fit: 0 });
+                let sample_counts = crate::settings::SampleCounts { samples: 1, proposals: 1 };
+                self.samples.push(CameraSample { ray, weight, stream, direct: stream, sample_counts, fit: 0 });
             }
         }
     }
@@ -199,9 +199,9 @@ impl PhotonMapIntegrator {
 
             // Light the near ones as vertices of a path
             let at_vertex = settings.at_vertex(1);
-            let split = settings.split_at_vertex(1);
-            let points: Vec<ShadePoint<'_>> =
-                near.iter().map(|(path, v, _)| v.shade_point(path.ray.time, split, 0)).collect();
+            let sample_counts = settings.sample_counts_at_vertex(1);
+            let points: Vec<ShadingPoint<'_>> =
+                near.iter().map(|(path, v, _)| v.shading_point(path.ray.time, sample_counts, 0)).collect();
             gather.direct.estimate(job, &at_vertex, &points, &mut Fits::default(), &mut gather.radiance);
             gather.next.clear();
             for (((path, v, part), point), &radiance) in near.iter().zip(&points).zip(&gather.radiance) {
@@ -320,9 +320,9 @@ fn only_lambertian<'a>(v: &Vertex<'a>, part: &Lambertian<'_>) -> SurfaceBsdf<'a>
 }
 
 /// Directions by the photons around that the gather is about.
-fn guide(maps: &PhotonMaps, place: &Place, frame: &Frame, share: f32, scratch: &mut GatherScratch) -> Guide {
+fn guide(maps: &PhotonMaps, place: &Place, frame: &Frame, fraction: f32, scratch: &mut GatherScratch) -> Guide {
     let mut photons = Vec::new();
-    if share > 0.0 {
+    if fraction > 0.0 {
         let search = match maps.search {
             Search::Nearest { max_radius, .. } => Search::Nearest { count: GUIDES, max_radius },
             Search::Radius(radius) => Search::Radius(radius),
@@ -333,5 +333,5 @@ fn guide(maps: &PhotonMaps, place: &Place, frame: &Frame, share: f32, scratch: &
             }
         });
     }
-    Guide::new(photons, share)
+    Guide::new(photons, fraction)
 }

@@ -1,6 +1,6 @@
 //! The irradiance cache.
 
-use super::{Applies, Group, MOST_SAMPLES, Setting, choice, integer};
+use super::{Applies, Group, MAX_SAMPLES, Setting, choice, integer};
 use crate::settings::value::{Interval, Kind, Value};
 use crate::settings::{Cached, IntegratorKind};
 use strum::VariantNames;
@@ -63,7 +63,7 @@ pub(super) const IRRADIANCE_CACHE: Group = Group {
             value_name: "N",
             parameters: &["cachepasses"],
             key: "cache_passes",
-            kind: integer(1, MOST_SAMPLES),
+            kind: integer(1, MAX_SAMPLES),
             help: "Estimates of direct light at a record, with `--cached all`",
             applies: Applies::If(|s| CACHE.to(s) && s.integrator.cache.cached == Cached::All),
             get: |s| Some(Value::Integer(s.integrator.cache.passes.into())),

@@ -1,6 +1,6 @@
 //! How direct light is estimated.
 
-use super::{Applies, Group, MOST_SAMPLES, Setting, choice, integer};
+use super::{Applies, Group, MAX_SAMPLES, Setting, choice, integer};
 use crate::settings::EstimatorKind::{Contributing, Correlated, Mis, Ocv, OptimalMis, Ris};
 use crate::settings::value::{Integers, Interval, Kind, Value};
 use crate::settings::{
@@ -12,7 +12,7 @@ use lumiris_numbers::estimators::ocv::{Form, MAX_COMPONENTS};
 use strum::VariantNames;
 
 /// Samples of an estimate.
-const SAMPLES: Integers = Integers { least: 1, most: MOST_SAMPLES };
+const SAMPLES: Integers = Integers { min: 1, max: MAX_SAMPLES };
 
 /// Direct light.
 pub(super) const DIRECT: Group = Group {
@@ -37,7 +37,7 @@ pub(super) const DIRECT: Group = Group {
             help: "Samples per estimate: shadow segments per shading point, or `auto` for the estimator's own number",
             default: "auto: 2 for mc and mis, 4 for others; ris halves them with every bounce",
             get: |s| Some(s.integrator.samples.map_or(Value::Name("auto"), |n| Value::Integer(n.into()))),
-            resolved: Some(|s| Some(Value::Integer(s.integrator.split().samples.into()))),
+            resolved: Some(|s| Some(Value::Integer(s.integrator.sample_counts().samples.into()))),
             set: |s, v| {
                 s.integrator.samples = if v.name().is_some() { None } else { Some(v.count()?) };
                 Some(())
@@ -57,28 +57,28 @@ pub(super) const DIRECT: Group = Group {
             ..Setting::BASE
         },
         Setting {
-            flag: "bsdf-share",
+            flag: "bsdf-fraction",
             value_name: "SHARE",
-            parameters: &["bsdfshare"],
-            key: "bsdf_share",
+            parameters: &["bsdffraction"],
+            key: "bsdf_fraction",
             kind: Kind::Real { range: Interval::closed(0.0, 1.0), words: &[] },
             help: "Share of the samples that the BSDF draws, for mis, ocv and optimal-mis",
             applies: Applies::Estimators(&[Mis, Ocv, OptimalMis]),
-            get: |s| Some(Value::Real(s.integrator.bsdf_share)),
-            set: |s, v| v.real().map(|share| s.integrator.bsdf_share = share),
+            get: |s| Some(Value::Real(s.integrator.bsdf_fraction)),
+            set: |s, v| v.real().map(|fraction| s.integrator.bsdf_fraction = fraction),
             ..Setting::BASE
         },
         Setting {
-            flag: "rest-samples",
+            flag: "noncontributing-samples",
             value_name: "N",
-            parameters: &["restsamples"],
-            key: "rest_samples",
-            kind: integer(0, MOST_SAMPLES),
+            parameters: &["noncontributingsamples"],
+            key: "noncontributing_samples",
+            kind: integer(0, MAX_SAMPLES),
             help: "Samples of contributing on the lights that no photon came from, besides --samples on the others; 0 leaves \
                    these lights out, which is biased",
             applies: Applies::Estimators(&[Contributing]),
-            get: |s| Some(Value::Integer(s.integrator.contributing.rest_samples.into())),
-            set: |s, v| v.count().map(|n| s.integrator.contributing.rest_samples = n),
+            get: |s| Some(Value::Integer(s.integrator.contributing.noncontributing_samples.into())),
+            set: |s, v| v.count().map(|n| s.integrator.contributing.noncontributing_samples = n),
             ..Setting::BASE
         },
     ],
@@ -106,7 +106,9 @@ pub(super) const RIS: Group = Group {
             },
             resolved: Some(|s| {
                 Some(match s.integrator.ris.proposals {
-                    Proposals::Fixed(_) | Proposals::Auto => Value::Integer(s.integrator.split().proposals.into()),
+                    Proposals::Fixed(_) | Proposals::Auto => {
+                        Value::Integer(s.integrator.sample_counts().proposals.into())
+                    }
                     Proposals::Optimal => Value::Name("optimal"),
                 })
             }),
@@ -202,7 +204,7 @@ pub(super) const CONTROL_VARIATES: Group = Group {
             default: "8: as many as there can be",
             applies: Applies::Estimators(&[Ocv, OptimalMis]),
             get: |s| s.integrator.ocv.components.map(|n| Value::Integer(n.into())),
-            resolved: Some(|s| Some(Value::Integer(s.integrator.ocv.most_components() as u64))),
+            resolved: Some(|s| Some(Value::Integer(s.integrator.ocv.max_components() as u64))),
             set: |s, v| v.count().map(|n| s.integrator.ocv.components = Some(n)),
             ..Setting::BASE
         },

@@ -33,9 +33,9 @@ pub struct Setting {
     pub help: &'static str,
     /// What help says of the default; `""` for the value in [`Settings::default`].
     pub default: &'static str,
-    /// Pictures that it can change.
+    /// Images that it can change.
     pub applies: Applies,
-    /// False if it cannot change a picture at all, but only keep it from being made.
+    /// False if it cannot change an image at all, but only keep it from being made.
     pub is_recorded: bool,
     /// The value; `None` where the renderer chooses and there is no word for that.
     pub get: fn(&Settings) -> Option<Value>,
@@ -54,7 +54,7 @@ pub enum Directive {
     Sampler,
 }
 
-/// Pictures that a setting can change.
+/// Images that a setting can change.
 #[derive(Clone, Copy, Debug)]
 pub enum Applies {
     /// All.
@@ -68,7 +68,7 @@ pub enum Applies {
 }
 
 impl Applies {
-    /// True if a picture with these settings is one of them.
+    /// True if an image with these settings is one of them.
     pub fn to(&self, settings: &Settings) -> bool {
         match self {
             Applies::Always => true,
@@ -143,14 +143,14 @@ const fn choice(names: &'static [&'static str]) -> Kind {
 }
 
 /// A whole number in a range.
-const fn integer(least: u64, most: u64) -> Kind {
-    Kind::Integer { range: Integers { least, most }, words: &[] }
+const fn integer(min: u64, max: u64) -> Kind {
+    Kind::Integer { range: Integers { min, max }, words: &[] }
 }
 
 /// Most samples and proposals of an estimate.
-const MOST_SAMPLES: u64 = 4096;
+const MAX_SAMPLES: u64 = 4096;
 /// Largest number of 32 bits.
-const MOST_U32: u64 = u32::MAX as u64;
+const MAX_U32: u64 = u32::MAX as u64;
 
 impl Value {
     /// The whole number, of 32 bits.

@@ -1,8 +1,8 @@
 //! Photon maps, and photons that tell which lights are seen.
 
-use super::{Applies, Group, MOST_SAMPLES, MOST_U32, Setting, integer};
+use super::{Applies, Group, MAX_SAMPLES, MAX_U32, Setting, integer};
 use crate::settings::value::{Integers, Interval, Kind, Value};
-use crate::settings::{Deposition, IntegratorKind, Shrinking};
+use crate::settings::{IntegratorKind, PhotonStorage, ProgressiveSettings};
 
 const MAPS: Applies = Applies::Integrators(&[IntegratorKind::PhotonMap]);
 
@@ -15,7 +15,7 @@ pub(super) const PHOTONS: Group = Group {
             value_name: "N",
             parameters: &["photons"],
             key: "photons",
-            kind: integer(1, MOST_U32),
+            kind: integer(1, MAX_U32),
             help: "Approximate number of photons stored in the global map, in each pass if progressive",
             applies: MAPS,
             get: |s| Some(Value::Integer(s.integrator.photons.photons.into())),
@@ -28,7 +28,7 @@ pub(super) const PHOTONS: Group = Group {
             parameters: &["causticratio"],
             key: "caustic_ratio",
             kind: Kind::Real { range: Interval::above(0.0, 1.0), words: &[] },
-            help: "Share q of the trajectories that fill the global map too; all fill the caustic map",
+            help: "Share q of the photon paths that fill the global map too; all fill the caustic map",
             applies: MAPS,
             get: |s| Some(Value::Real(s.integrator.photons.caustic_ratio)),
             set: |s, v| v.real().map(|q| s.integrator.photons.caustic_ratio = q),
@@ -37,7 +37,7 @@ pub(super) const PHOTONS: Group = Group {
         Setting {
             flag: "importance",
             value_name: "WHICH",
-            parameters: &["importance", "leastimportance"],
+            parameters: &["importance", "minimportance"],
             key: "importance",
             kind: Kind::Graded {
                 plain: "none",
@@ -49,17 +49,17 @@ pub(super) const PHOTONS: Group = Group {
                    (biased: none where p(x) is below E)",
             applies: MAPS,
             get: |s| {
-                Some(match s.integrator.photons.deposition {
-                    Deposition::All => Value::Name("none"),
-                    Deposition::Floor(least) => Value::Graded("floor", least),
-                    Deposition::CutOff(least) => Value::Graded("cut-off", least),
+                Some(match s.integrator.photons.storage {
+                    PhotonStorage::All => Value::Name("none"),
+                    PhotonStorage::Floor(min) => Value::Graded("floor", min),
+                    PhotonStorage::CutOff(min) => Value::Graded("cut-off", min),
                 })
             },
             set: |s, v| {
-                s.integrator.photons.deposition = match v.name()? {
-                    "floor" => Deposition::Floor(v.real()?),
-                    "cut-off" => Deposition::CutOff(v.real()?),
-                    _ => Deposition::All,
+                s.integrator.photons.storage = match v.name()? {
+                    "floor" => PhotonStorage::Floor(v.real()?),
+                    "cut-off" => PhotonStorage::CutOff(v.real()?),
+                    _ => PhotonStorage::All,
                 };
                 Some(())
             },
@@ -82,7 +82,7 @@ pub(super) const PHOTONS: Group = Group {
             value_name: "G",
             parameters: &["gather"],
             key: "gather",
-            kind: integer(0, MOST_SAMPLES),
+            kind: integer(0, MAX_SAMPLES),
             help: "Rays of the final gather at a diffuse point; 0 shows the global map directly",
             applies: MAPS,
             get: |s| Some(Value::Integer(s.integrator.photons.gather.into())),
@@ -99,7 +99,7 @@ pub(super) const PHOTONS: Group = Group {
             help: "Share of these rays whose directions photons choose",
             applies: MAPS,
             get: |s| Some(Value::Real(s.integrator.photons.guide)),
-            set: |s, v| v.real().map(|share| s.integrator.photons.guide = share),
+            set: |s, v| v.real().map(|fraction| s.integrator.photons.guide = fraction),
             ..Setting::BASE
         },
         Setting {
@@ -109,14 +109,14 @@ pub(super) const PHOTONS: Group = Group {
             parameters: &["alpha"],
             key: "progressive",
             kind: Kind::Real { range: Interval::open(0.0, 1.0), words: &["off"] },
-            help: "New photons and smaller radii from sample to sample, so that the picture converges: r² falls with the power \
+            help: "New photons and smaller radii from sample to sample, so that the image converges: r² falls with the power \
                    ALPHA - 1; off for one map where the file asks for sppm",
             default: "off; ALPHA: 0.5",
             applies: MAPS,
             get: |s| Some(s.integrator.photons.progressive.map_or(Value::Name("off"), |p| Value::Real(p.alpha))),
             set: |s, v| {
                 let progressive = &mut s.integrator.photons.progressive;
-                *progressive = v.real().map(|alpha| Shrinking { alpha, ..progressive.unwrap_or_default() });
+                *progressive = v.real().map(|alpha| ProgressiveSettings { alpha, ..progressive.unwrap_or_default() });
                 Some(())
             },
             ..Setting::BASE
@@ -138,17 +138,17 @@ pub(super) const PHOTONS: Group = Group {
             ..Setting::BASE
         },
         Setting {
-            flag: "light-photons",
+            flag: "visibility-photons",
             value_name: "N",
-            parameters: &["lightphotons"],
-            key: "light_photons",
-            kind: integer(1, MOST_U32),
-            help: "Photons that tell which lights are seen, for --light-choice photons, --target visibility and --estimator \
+            parameters: &["visibilityphotons"],
+            key: "visibility_photons",
+            kind: integer(1, MAX_U32),
+            help: "Photons that tell which lights are seen, for --light-sampler photons, --target visibility and --estimator \
                    contributing",
             default: "512 for each light, at least 262144",
-            applies: Applies::If(|s| s.integrator.uses_light_hints()),
-            get: |s| s.integrator.photons.light_photons.map(|n| Value::Integer(n.into())),
-            set: |s, v| v.count().map(|n| s.integrator.photons.light_photons = Some(n)),
+            applies: Applies::If(|s| s.integrator.uses_visibility_cache()),
+            get: |s| s.integrator.photons.visibility_photons.map(|n| Value::Integer(n.into())),
+            set: |s, v| v.count().map(|n| s.integrator.photons.visibility_photons = Some(n)),
             ..Setting::BASE
         },
         Setting {
@@ -156,11 +156,11 @@ pub(super) const PHOTONS: Group = Group {
             value_name: "N",
             parameters: &["photonpaths"],
             key: "photon_paths",
-            kind: Kind::Integer { range: Integers { least: 1, most: i64::MAX as u64 }, words: &[] },
-            help: "Most trajectories for one map: with importance it can take many to store what was asked for",
+            kind: Kind::Integer { range: Integers { min: 1, max: i64::MAX as u64 }, words: &[] },
+            help: "Most photon paths for one map: with importance it can take many to store what was asked for",
             applies: MAPS,
-            get: |s| Some(Value::Integer(s.integrator.photons.trajectories)),
-            set: |s, v| v.integer().map(|n| s.integrator.photons.trajectories = n),
+            get: |s| Some(Value::Integer(s.integrator.photons.paths)),
+            set: |s, v| v.integer().map(|n| s.integrator.photons.paths = n),
             ..Setting::BASE
         },
         Setting {

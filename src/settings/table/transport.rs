@@ -1,6 +1,6 @@
 //! What is computed, and with which random numbers.
 
-use super::{Directive, Group, MOST_SAMPLES, MOST_U32, Setting, choice, integer};
+use super::{Directive, Group, MAX_SAMPLES, MAX_U32, Setting, choice, integer};
 use crate::bsdfs::ProposalDensity;
 use crate::lights::LightSamplerKind;
 use crate::settings::IntegratorKind;
@@ -40,16 +40,16 @@ pub(super) const TRANSPORT: Group = Group {
             ..Setting::BASE
         },
         Setting {
-            flag: "light-choice",
+            flag: "light-sampler",
             parameters: &["lightsampler"],
-            key: "light_choice",
+            key: "light_sampler",
             kind: Kind::Choice {
                 names: LightSamplerKind::VARIANTS,
                 synonyms: &[("bvh", "tree"), ("exhaustive", "tree"), ("spatial", "tree")],
             },
             help: "How a light is chosen; by photons, mostly among those that photons have come from",
-            get: |s| Some(Value::Name(s.integrator.light_choice.into())),
-            set: |s, v| v.named().map(|kind| s.integrator.light_choice = kind),
+            get: |s| Some(Value::Name(s.integrator.light_sampler.into())),
+            set: |s, v| v.named().map(|kind| s.integrator.light_sampler = kind),
             ..Setting::BASE
         },
         Setting {
@@ -57,7 +57,7 @@ pub(super) const TRANSPORT: Group = Group {
             value_name: "M",
             parameters: &["bsdfproposals"],
             key: "bsdf_proposals",
-            kind: integer(1, MOST_SAMPLES),
+            kind: integer(1, MAX_SAMPLES),
             help: "Directions proposed per bounce off materials that can only be evaluated",
             get: |s| Some(Value::Integer(s.integrator.bsdf_proposals.into())),
             set: |s, v| v.count().map(|n| s.integrator.bsdf_proposals = n),
@@ -96,7 +96,7 @@ pub(super) const SAMPLING: Group = Group {
             directive: Directive::Sampler,
             parameters: &["pixelsamples"],
             key: "spp",
-            kind: integer(1, MOST_U32),
+            kind: integer(1, MAX_U32),
             help: "Camera samples per pixel",
             get: |s| Some(Value::Integer(s.sampling.spp.into())),
             set: |s, v| v.count().map(|n| s.sampling.spp = n),
@@ -108,7 +108,7 @@ pub(super) const SAMPLING: Group = Group {
             directive: Directive::Sampler,
             parameters: &["footprintspp"],
             key: "footprint_spp",
-            kind: integer(1, MOST_U32),
+            kind: integer(1, MAX_U32),
             help: "Camera samples per pixel that textures and bumps are filtered for: their footprint is 1/sqrt(K) of a pixel wide, \
                    at least an eighth. An image that is rendered in parts needs the number of all its samples",
             default: "--spp",
@@ -124,7 +124,7 @@ pub(super) const SAMPLING: Group = Group {
             parameters: &["seed"],
             key: "seed",
             kind: Kind::Integer { range: Integers::ALL, words: &[] },
-            help: "Pictures of different seeds are independent",
+            help: "Images of different seeds are independent",
             get: |s| Some(Value::Integer(s.sampling.seed.into())),
             set: |s, v| v.count().map(|n| s.sampling.seed = n),
             ..Setting::BASE

@@ -1,7 +1,7 @@
 //! Forms that fit their coefficients to the samples they are applied to: biased by O(1/N).
 
 use super::Scene;
-use super::power::{Budget, POWER, moments, picture_means};
+use super::power::{Budget, POWER, image_means, moments};
 use super::rows::{BASE, Configuration};
 use lumiris::settings::{
     CorrelatedForm, CorrelatedSettings, EstimatorKind, OcvSettings, OptimalForm, SamplingTechnique,
@@ -13,7 +13,7 @@ use lumiris_test_support::significance::{detectable_deviation, is_beyond};
 /// N, samples of each estimate.
 const SAMPLES: u32 = 64;
 const SCENES: [&str; 5] = ["half-environment", "hidden-rectangle", "many-points", "rectangle", "sphere"];
-const BUDGET: Budget = Budget { edge: 4, pictures: 32 };
+const BUDGET: Budget = Budget { edge: 4, images: 32 };
 
 /// Each form with the relative bias that it has in no scene. At N = 64 they were measured, with errors up to 0.07 %, as −2.95 %
 /// (`sphere`), +0.29 % (`hidden-rectangle`), +0.31 % (`hidden-rectangle`), −1.74 % (`sphere`) and +0.01 %.
@@ -41,12 +41,12 @@ fn forms_that_fit_their_own_samples_are_biased_by_little() {
     let mut faults = Vec::new();
     for scene in SCENES.map(Scene::named) {
         for (i, (c, limit)) in (0..).zip(forms()) {
-            let pictures = picture_means(&scene.path, &c, BUDGET, 1000 * i);
+            let images = image_means(&scene.path, &c, BUDGET, 1000 * i);
             let is_biased = |factor| {
-                let mean = moments(&pictures, 0, factor);
+                let mean = moments(&images, 0, factor);
                 is_beyond(&mean, scene.answer[0], limit * scene.answer[0], significance)
             };
-            let mean = moments(&pictures, 0, 1.0);
+            let mean = moments(&images, 0, 1.0);
             let error = mean.standard_error() / scene.answer[0];
             let noticed = limit + detectable_deviation(significance, POWER, mean.count() - 1) * error;
             let found = format!(

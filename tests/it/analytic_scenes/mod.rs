@@ -22,9 +22,9 @@ use std::path::{Path, PathBuf};
 use std::sync::atomic::AtomicBool;
 
 /// What `make test` renders.
-const QUICK: Effort = Effort { goal: 2.5, least_pictures: 32 };
+const QUICK: Effort = Effort { goal: 2.5, min_images: 32 };
 /// What `make test-power` renders.
-const FULL: Effort = Effort { goal: 1.0, least_pictures: 64 };
+const FULL: Effort = Effort { goal: 1.0, min_images: 64 };
 
 /// An environment variable: the names of the scenes that are rendered, where it is not all of them. The level stays the same.
 const ONLY: &str = "POWER_SCENES";
@@ -172,12 +172,12 @@ fn rows_have_names_of_their_own() {
 #[test]
 fn direct_is_path_of_one_bounce() {
     let mut job = job(&Scene::named("furnace-closed-4").path, &BASE, 4);
-    let mut picture = |kind| {
+    let mut image = |kind| {
         job.change(|s| s.integrator.kind = kind);
         job.change(|s| s.integrator.max_depth = if kind == IntegratorKind::Path { 1 } else { 4 });
         let settings = RenderSettings { spp: 4, ..RenderSettings::default() };
         let film: Film = render(&job, &settings, &AtomicBool::new(false), &|_| ()).unwrap().film;
         film.pixels.iter().map(PixelSums::mean).collect::<Vec<_>>()
     };
-    assert_eq!(picture(IntegratorKind::Direct), picture(IntegratorKind::Path));
+    assert_eq!(image(IntegratorKind::Direct), image(IntegratorKind::Path));
 }

@@ -1,9 +1,9 @@
-//! How many pictures each row needs, what its t-test then notices, and the table that says so.
+//! How many images each row needs, what its t-test then notices, and the table that says so.
 //!
 //! The noise of a row is the relative standard deviation of one camera sample. It stands in `docs/measurements/power/rows.csv`
-//! and says how many pictures, of seeds of their own, a test needs to notice a bias. The means of the pictures are
-//! independent whatever the sampler does within a picture, and Student's t-test compares them with the answer. What a test
-//! notices is computed from the spread of its own pictures; a stale table makes it notice less, which is an error.
+//! and says how many images, of seeds of their own, a test needs to notice a bias. The means of the images are
+//! independent whatever the sampler does within an image, and Student's t-test compares them with the answer. What a
+//! test notices is computed from the spread of its own images; a stale table makes it notice less, which is an error.
 
 use super::Scene;
 use super::rows::{Configuration, SPP, configurations, job};
@@ -24,22 +24,22 @@ pub(super) const POWER: f64 = 0.99;
 const ROUNDING: f64 = 3e-5;
 /// Factor of the standard error below what the power needs: most rows then notice the bias with a power far above.
 const MARGIN: f64 = 1.2;
-/// Pictures of rows without noise.
-const EXACT_PICTURES: u32 = 8;
-/// How often a row is rendered at most, until its pictures notice the bias.
+/// Images of rows without noise.
+const EXACT_IMAGES: u32 = 8;
+/// How often a row is rendered at most, until its images notice the bias.
 const ATTEMPTS: u32 = 4;
 /// An environment variable: the noise is measured anew, and the table written.
 pub(super) const MEASURE: &str = "MEASURE_POWER";
-/// Pictures by which the noise of a row is first measured.
-const PILOT_PICTURES: u32 = 32;
+/// Images by which the noise of a row is first measured.
+const PILOT_IMAGES: u32 = 32;
 
-/// Pictures of a row.
+/// Images of a row.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Budget {
     /// Pixels along an edge.
     pub edge: u32,
-    /// Pictures, each with its own seed.
-    pub pictures: u32,
+    /// Images, each with its own seed.
+    pub images: u32,
 }
 
 /// How much is rendered.
@@ -47,8 +47,8 @@ pub(super) struct Budget {
 pub(super) struct Effort {
     /// The bias that rows have to notice, over that of their scene.
     pub goal: f64,
-    /// Fewest pictures of a row with noise; twice as many before pixels are added to them.
-    pub least_pictures: u32,
+    /// Fewest images of a row with noise; twice as many before pixels are added to them.
+    pub min_images: u32,
 }
 
 /// A scene with one of the configurations.
@@ -61,8 +61,8 @@ pub(super) struct Row<'a> {
 pub(super) struct Outcome<'a> {
     pub row: Row<'a>,
     pub budget: Budget,
-    /// Means of the pictures.
-    pub pictures: Vec<[f64; 3]>,
+    /// Means of the images.
+    pub images: Vec<[f64; 3]>,
 }
 
 /// Level of each test of the set.
@@ -70,32 +70,32 @@ pub(super) fn level(scenes: &[Scene]) -> f64 {
     sidak(SIGNIFICANCE, scenes.len() * configurations().len() * 3)
 }
 
-/// Means of pictures with seeds from `seed` on.
-pub(super) fn picture_means(path: &Path, c: &Configuration, budget: Budget, seed: u32) -> Vec<[f64; 3]> {
+/// Means of images with seeds from `seed` on.
+pub(super) fn image_means(path: &Path, c: &Configuration, budget: Budget, seed: u32) -> Vec<[f64; 3]> {
     let mut job = job(path, c, budget.edge);
     let settings = RenderSettings { threads: Some(1), spp: SPP, ..RenderSettings::default() };
-    let mut picture = |i: u32| {
+    let mut image = |i: u32| {
         job.change(|s| s.sampling.seed = seed.wrapping_add(i));
         let film = render(&job, &settings, &AtomicBool::new(false), &|_| ()).unwrap().film;
         let mean = |c: usize| film.pixels.iter().map(|p| p.mean()[c]).sum::<f64>() / film.pixels.len() as f64;
         [mean(0), mean(1), mean(2)]
     };
-    (0..budget.pictures).map(&mut picture).collect()
+    (0..budget.images).map(&mut image).collect()
 }
 
-/// Moments of a channel of pictures whose values are multiplied by `factor`.
-pub(super) fn moments(pictures: &[[f64; 3]], channel: usize, factor: f64) -> Welford {
-    pictures.iter().map(|p| p[channel] * factor).collect()
+/// Moments of a channel of images whose values are multiplied by `factor`.
+pub(super) fn moments(images: &[[f64; 3]], channel: usize, factor: f64) -> Welford {
+    images.iter().map(|p| p[channel] * factor).collect()
 }
 
 impl<'a> Row<'a> {
-    /// Pictures that notice the bias. Where they turn out to be noisier than was known, others take their place.
+    /// Images that notice the bias. Where they turn out to be noisier than was known, others take their place.
     fn render_until_noticed(self, mut noise: f64, effort: &Effort, level: f64) -> Outcome<'a> {
         let goal = self.goal(effort);
-        let mut outcome = Outcome { row: self, budget: Budget { edge: 4, pictures: 0 }, pictures: Vec::new() };
+        let mut outcome = Outcome { row: self, budget: Budget { edge: 4, images: 0 }, images: Vec::new() };
         for attempt in 0..ATTEMPTS {
             outcome.budget = outcome.row.budget(noise, effort, level);
-            outcome.pictures = outcome.row.render(outcome.budget, attempt << 24);
+            outcome.images = outcome.row.render(outcome.budget, attempt << 24);
             if outcome.detectable(level) <= goal {
                 break;
             }
@@ -122,8 +122,8 @@ impl<'a> Row<'a> {
 
     /// What the mean may be off without noise, relative.
     fn tolerance(&self) -> f64 {
-        // A picture shows so little of its scene that interpolation makes no error that counts, but for a spot whose falloff
-        // is steeper than the gradients of sources know
+        // An image shows so little of its scene that interpolation makes no error that counts, but for a spot whose
+        // falloff is steeper than the gradients of sources know
         match self.configuration.cached {
             None => ROUNDING,
             Some(Cached::All) if self.scene.name == "spot-falloff" => 5e-3,
@@ -131,39 +131,39 @@ impl<'a> Row<'a> {
         }
     }
 
-    /// Pictures that notice the bias, of a row with this noise.
+    /// Images that notice the bias, of a row with this noise.
     fn budget(&self, noise: f64, effort: &Effort, level: f64) -> Budget {
         if noise <= self.tolerance() {
-            return Budget { edge: 4, pictures: EXACT_PICTURES };
+            return Budget { edge: 4, images: EXACT_IMAGES };
         }
         let bias = effort.goal * self.scene.detects;
-        let errors = MARGIN * detectable_deviation(level, POWER, u64::from(effort.least_pictures - 1));
+        let errors = MARGIN * detectable_deviation(level, POWER, u64::from(effort.min_images - 1));
         let samples = (errors * noise * (1.0 + bias) / bias).powi(2);
-        let pictures = |edge: u32| (samples / f64::from(edge * edge * SPP)).ceil() as u32;
-        let edge = self.edges().iter().copied().find(|&edge| pictures(edge) >= 2 * effort.least_pictures).unwrap_or(4);
-        Budget { edge, pictures: pictures(edge).max(effort.least_pictures) }
+        let images = |edge: u32| (samples / f64::from(edge * edge * SPP)).ceil() as u32;
+        let edge = self.edges().iter().copied().find(|&edge| images(edge) >= 2 * effort.min_images).unwrap_or(4);
+        Budget { edge, images: images(edge).max(effort.min_images) }
     }
 
-    /// Pixels along an edge that a picture can have.
+    /// Pixels along an edge that an image can have.
     fn edges(&self) -> &[u32] {
-        // Records of irradiance serve all pixels of a picture: more of them tell nothing new
+        // Records of irradiance serve all pixels of an image: more of them tell nothing new
         if self.configuration.cached.is_some() { &[4] } else { &[16, 8, 4] }
     }
 
-    /// The noise by other pictures than those that are judged.
+    /// The noise by other images than those that are judged.
     fn pilot(&self) -> f64 {
-        let budget = Budget { edge: self.edges()[self.edges().len() / 2], pictures: PILOT_PICTURES };
+        let budget = Budget { edge: self.edges()[self.edges().len() / 2], images: PILOT_IMAGES };
         self.noise(budget, &self.render(budget, 1 << 31))
     }
 
     fn render(&self, budget: Budget, salt: u32) -> Vec<[f64; 3]> {
-        picture_means(&self.scene.path, &self.configuration, budget, self.seed().wrapping_add(salt))
+        image_means(&self.scene.path, &self.configuration, budget, self.seed().wrapping_add(salt))
     }
 
     /// Relative standard deviation of a camera sample, the largest of the channels.
-    fn noise(&self, budget: Budget, pictures: &[[f64; 3]]) -> f64 {
+    fn noise(&self, budget: Budget, images: &[[f64; 3]]) -> f64 {
         let samples = f64::from(budget.edge * budget.edge * SPP);
-        let relative = |c: usize| moments(pictures, c, 1.0).variance().sqrt() / self.scene.answer[c];
+        let relative = |c: usize| moments(images, c, 1.0).variance().sqrt() / self.scene.answer[c];
         (0..3).map(relative).fold(0.0, f64::max) * samples.sqrt()
     }
 }
@@ -172,7 +172,7 @@ impl Outcome<'_> {
     /// Whether the t-tests of the channels reject the values that were rendered, multiplied by `factor`.
     pub(super) fn rejected(&self, factor: f64, level: f64) -> [bool; 3] {
         std::array::from_fn(|c| {
-            let (values, answer) = (moments(&self.pictures, c, factor), self.row.scene.answer[c]);
+            let (values, answer) = (moments(&self.images, c, factor), self.row.scene.answer[c]);
             let is_exact = (values.mean() - answer).abs() <= self.row.tolerance() * answer.abs();
             !is_exact && t_test(&values, answer).p_value < level
         })
@@ -180,41 +180,41 @@ impl Outcome<'_> {
 
     /// Whether its answer comes with noise, and not but rounding or interpolation.
     pub(super) fn has_noise(&self) -> bool {
-        self.pictures.len() > EXACT_PICTURES as usize
+        self.images.len() > EXACT_IMAGES as usize
     }
 
     /// Camera samples.
     pub(super) fn samples(&self) -> u64 {
-        self.pictures.len() as u64 * u64::from(self.budget.edge.pow(2) * SPP)
+        self.images.len() as u64 * u64::from(self.budget.edge.pow(2) * SPP)
     }
 
     /// Mean, and its error, of each channel.
     pub(super) fn means(&self) -> [(f64, f64); 3] {
-        std::array::from_fn(|c| moments(&self.pictures, c, 1.0)).map(|w| (w.mean(), w.standard_error()))
+        std::array::from_fn(|c| moments(&self.images, c, 1.0)).map(|w| (w.mean(), w.standard_error()))
     }
 
     /// The channel with the most noise.
     pub(super) fn channel(&self) -> usize {
-        let relative = |c: &usize| moments(&self.pictures, *c, 1.0).standard_error() / self.row.scene.answer[*c];
+        let relative = |c: &usize| moments(&self.images, *c, 1.0).standard_error() / self.row.scene.answer[*c];
         (0..3).max_by(|a, b| relative(a).total_cmp(&relative(b))).unwrap()
     }
 
     /// The bias that is noticed in every channel.
     pub(super) fn detectable(&self, level: f64) -> f64 {
-        let error = moments(&self.pictures, self.channel(), 1.0).standard_error();
+        let error = moments(&self.images, self.channel(), 1.0).standard_error();
         let relative = error / self.row.scene.answer[self.channel()];
         // The mean may be within the tolerance on the other side
-        detectable_bias(relative, self.pictures.len() as u64, level, POWER) + 2.0 * self.row.tolerance()
+        detectable_bias(relative, self.images.len() as u64, level, POWER) + 2.0 * self.row.tolerance()
     }
 
     fn noise(&self) -> f64 {
-        self.row.noise(self.budget, &self.pictures)
+        self.row.noise(self.budget, &self.images)
     }
 
     /// A line of the table.
     fn line(&self, level: f64) -> String {
         let channel = self.channel();
-        let mean = moments(&self.pictures, channel, 1.0);
+        let mean = moments(&self.images, channel, 1.0);
         let truth = self.row.scene.answer[channel];
         let error = mean.standard_error();
         let (name, samples, noise) = (self.row.name(), self.samples(), self.noise());

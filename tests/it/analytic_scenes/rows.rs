@@ -1,6 +1,6 @@
 //! The rows of the table: every integrator, estimator, light choice, sampler and ray tracer.
 
-use crate::light_hints::{Hints, hints};
+use crate::visibility_cache::{CacheContents, cache_with};
 use lumiris::import::{LoadOptions, load};
 use lumiris::lights::LightSamplerKind;
 use lumiris::scene::{AccelKind, RenderJob};
@@ -26,17 +26,17 @@ pub(super) struct Configuration {
     pub ocv: OcvSettings,
     pub optimal_mis: OptimalForm,
     pub correlated: CorrelatedSettings,
-    pub bsdf_share: f32,
+    pub bsdf_fraction: f32,
     /// Of `ris`.
     pub proposals: u32,
     pub strata: Strata,
     pub points: ProposalPoints,
     pub target: Target,
-    pub light_choice: LightSamplerKind,
+    pub light_sampler: LightSamplerKind,
     /// What photons tell of the visibility of lights.
-    pub hints: Hints,
+    pub visibility_cache: CacheContents,
     /// Of `contributing`.
-    pub rest_samples: u32,
+    pub noncontributing_samples: u32,
     pub sampler: SamplerKind,
     pub accel: AccelKind,
 }
@@ -53,14 +53,14 @@ pub(super) const BASE: Configuration = Configuration {
     ocv: OcvSettings { form: Form::Progressive, components: None },
     optimal_mis: OptimalForm::Progressive,
     correlated: CorrelatedSettings { form: CorrelatedForm::Combined, technique: SamplingTechnique::Bsdf },
-    bsdf_share: 0.5,
+    bsdf_fraction: 0.5,
     proposals: 16,
     strata: Strata::Systematic,
     points: ProposalPoints::Stratified,
     target: Target::Fgl,
-    light_choice: LightSamplerKind::Tree,
-    hints: Hints::Absent,
-    rest_samples: 1,
+    light_sampler: LightSamplerKind::Tree,
+    visibility_cache: CacheContents::Absent,
+    noncontributing_samples: 1,
     sampler: SamplerKind::SobolBlueNoise,
     accel: AccelKind::Embree,
 };
@@ -75,7 +75,8 @@ fn path_configurations() -> Vec<Configuration> {
     all.extend([Heuristic::Balance, Heuristic::Maximum].map(|heuristic| Configuration { heuristic, ..base }));
     all.extend([1, 4].map(|samples| Configuration { estimator: EstimatorKind::Mc, samples, ..base }));
     all.extend(
-        [LightSamplerKind::Uniform, LightSamplerKind::Power].map(|light_choice| Configuration { light_choice, ..base }),
+        [LightSamplerKind::Uniform, LightSamplerKind::Power]
+            .map(|light_sampler| Configuration { light_sampler, ..base }),
     );
     all.extend(SAMPLERS.map(|sampler| Configuration { sampler, ..base }));
     all.push(Configuration { accel: AccelKind::Bvh, ..base });
@@ -101,33 +102,55 @@ fn cached_configurations() -> Vec<Configuration> {
 
 /// All rows of a scene.
 pub(super) fn configurations() -> Vec<Configuration> {
-    [path_configurations(), hinted_configurations(), cached_configurations()].concat()
+    [path_configurations(), visibility_cache_configurations(), cached_configurations()].concat()
 }
 
 /// Everything that asks photons which lights are seen, whatever they say.
-fn hinted_configurations() -> Vec<Configuration> {
-    use Hints::{Absent, Empty, Right, Wrong};
+fn visibility_cache_configurations() -> Vec<Configuration> {
+    use CacheContents::{Absent, Empty, Right, Wrong};
     let base = &BASE;
-    let light_choice = LightSamplerKind::Photons;
-    let mut all = [Absent, Empty, Right, Wrong].map(|hints| Configuration { hints, light_choice, ..*base }).to_vec();
+    let light_sampler = LightSamplerKind::Photons;
+    let mut all = [Absent, Empty, Right, Wrong]
+        .map(|visibility_cache| Configuration { visibility_cache, light_sampler, ..*base })
+        .to_vec();
     let ris = Configuration {
         estimator: EstimatorKind::Ris,
         heuristic: Heuristic::Balance,
         target: Target::Visibility,
         ..*base
     };
-    all.extend([Absent, Right, Wrong].map(|hints| Configuration { hints, ..ris }));
-    all.extend([Right, Wrong].map(|hints| Configuration { hints, samples: 1, light_choice, ..ris }));
-    all.push(Configuration { hints: Wrong, strata: Strata::None, points: ProposalPoints::Independent, ..ris });
-    let ocv = Configuration { estimator: EstimatorKind::Ocv, samples: 5, light_choice, ..*base };
-    all.extend([Right, Wrong].map(|hints| Configuration { hints, ..ocv }));
-    all.push(Configuration { hints: Right, estimator: EstimatorKind::OptimalMis, samples: 8, ..ocv });
+    all.extend([Absent, Right, Wrong].map(|visibility_cache| Configuration { visibility_cache, ..ris }));
+    all.extend([Right, Wrong].map(|visibility_cache| Configuration {
+        visibility_cache,
+        samples: 1,
+        light_sampler,
+        ..ris
+    }));
+    all.push(Configuration {
+        visibility_cache: Wrong,
+        strata: Strata::None,
+        points: ProposalPoints::Independent,
+        ..ris
+    });
+    let ocv = Configuration { estimator: EstimatorKind::Ocv, samples: 5, light_sampler, ..*base };
+    all.extend([Right, Wrong].map(|visibility_cache| Configuration { visibility_cache, ..ocv }));
+    all.push(Configuration { visibility_cache: Right, estimator: EstimatorKind::OptimalMis, samples: 8, ..ocv });
     let correlated = CorrelatedSettings { form: CorrelatedForm::Crossfit, technique: SamplingTechnique::Light };
-    all.push(Configuration { estimator: EstimatorKind::Correlated, correlated, hints: Right, ..ocv });
+    all.push(Configuration { estimator: EstimatorKind::Correlated, correlated, visibility_cache: Right, ..ocv });
     let contributing = Configuration { estimator: EstimatorKind::Contributing, ..*base };
-    all.extend([Absent, Empty, Right, Wrong].map(|hints| Configuration { hints, samples: 4, ..contributing }));
-    all.extend([1, 2, 3, 16].map(|samples| Configuration { hints: Right, samples, ..contributing }));
-    all.push(Configuration { hints: Wrong, samples: 2, rest_samples: 3, light_choice, ..contributing });
+    all.extend([Absent, Empty, Right, Wrong].map(|visibility_cache| Configuration {
+        visibility_cache,
+        samples: 4,
+        ..contributing
+    }));
+    all.extend([1, 2, 3, 16].map(|samples| Configuration { visibility_cache: Right, samples, ..contributing }));
+    all.push(Configuration {
+        visibility_cache: Wrong,
+        samples: 2,
+        noncontributing_samples: 3,
+        light_sampler,
+        ..contributing
+    });
     all
 }
 
@@ -140,9 +163,9 @@ fn correlated_configurations(base: &Configuration) -> Vec<Configuration> {
     let (bsdf, light) = (of(SamplingTechnique::Bsdf), of(SamplingTechnique::Light));
     let mut all = [1, 2, 3, 4, 16].map(|samples| Configuration { samples, ..bsdf }).to_vec();
     all.extend([1, 2, 5, 16].map(|samples| Configuration { samples, ..light }));
-    all.extend([LightSamplerKind::Uniform, LightSamplerKind::Power].map(|light_choice| Configuration {
+    all.extend([LightSamplerKind::Uniform, LightSamplerKind::Power].map(|light_sampler| Configuration {
         samples: 5,
-        light_choice,
+        light_sampler,
         ..light
     }));
     all.push(Configuration { samples: 4, sampler: SamplerKind::Independent, ..bsdf });
@@ -159,10 +182,10 @@ fn component_configurations(base: &Configuration) -> Vec<Configuration> {
     all.extend([2, 8].map(|samples| Configuration { samples, estimator: EstimatorKind::OptimalMis, ..base }));
     let few = OcvSettings { components: Some(3), ..base.ocv };
     all.push(Configuration { samples: 8, ocv: few, ..base });
-    all.push(Configuration { samples: 8, bsdf_share: 0.25, ..base });
-    all.extend([LightSamplerKind::Uniform, LightSamplerKind::Power].map(|light_choice| Configuration {
+    all.push(Configuration { samples: 8, bsdf_fraction: 0.25, ..base });
+    all.extend([LightSamplerKind::Uniform, LightSamplerKind::Power].map(|light_sampler| Configuration {
         samples: 5,
-        light_choice,
+        light_sampler,
         ..base
     }));
     all.push(Configuration { samples: 4, sampler: SamplerKind::Independent, ..base });
@@ -177,7 +200,8 @@ fn ris_configurations(base: &Configuration) -> Vec<Configuration> {
     all.extend([Strata::None, Strata::Proposals, Strata::Weights].map(|strata| Configuration { strata, ..base }));
     all.extend([Target::Gv, Target::Gvl].map(|target| Configuration { target, ..base }));
     all.extend(
-        [LightSamplerKind::Uniform, LightSamplerKind::Power].map(|light_choice| Configuration { light_choice, ..base }),
+        [LightSamplerKind::Uniform, LightSamplerKind::Power]
+            .map(|light_sampler| Configuration { light_sampler, ..base }),
     );
     all.push(Configuration { points: ProposalPoints::Independent, ..base });
     all.push(Configuration { heuristic: Heuristic::Power, ..base });
@@ -200,14 +224,14 @@ impl fmt::Display for Configuration {
         }
         write!(f, "{} {} N={}", name(self.estimator), name(self.sampler), self.samples)?;
         self.write_estimator(f)?;
-        if self.light_choice != BASE.light_choice {
-            write!(f, " lights={}", name(self.light_choice))?;
+        if self.light_sampler != BASE.light_sampler {
+            write!(f, " lights={}", name(self.light_sampler))?;
         }
-        match self.hints {
-            Hints::Absent => {}
-            Hints::Empty => write!(f, " hints=empty")?,
-            Hints::Right => write!(f, " hints=right")?,
-            Hints::Wrong => write!(f, " hints=wrong")?,
+        match self.visibility_cache {
+            CacheContents::Absent => {}
+            CacheContents::Empty => write!(f, " hints=empty")?,
+            CacheContents::Right => write!(f, " hints=right")?,
+            CacheContents::Wrong => write!(f, " hints=wrong")?,
         }
         if self.accel != BASE.accel {
             write!(f, " {}", name(self.accel))?;
@@ -231,7 +255,7 @@ impl Configuration {
                 )?;
             }
             EstimatorKind::Ocv => {
-                write!(f, " {} bsdf-share={}", name(self.ocv.form), self.bsdf_share)?;
+                write!(f, " {} bsdf-share={}", name(self.ocv.form), self.bsdf_fraction)?;
                 if let Some(components) = self.ocv.components {
                     write!(f, " components={components}")?;
                 }
@@ -240,13 +264,13 @@ impl Configuration {
             EstimatorKind::Correlated => {
                 write!(f, " {} {}", name(self.correlated.form), name(self.correlated.technique))?;
             }
-            EstimatorKind::Contributing => write!(f, " rest={}", self.rest_samples)?,
+            EstimatorKind::Contributing => write!(f, " rest={}", self.noncontributing_samples)?,
         }
         Ok(())
     }
 }
 
-/// The scene with these settings, as a picture of `edge` × `edge` pixels of the same rectangle.
+/// The scene with these settings, as an image of `edge` × `edge` pixels of the same rectangle.
 pub(super) fn job(path: &Path, c: &Configuration, edge: u32) -> RenderJob {
     let options = LoadOptions { resolution: Some([edge; 2]), ..LoadOptions::default() };
     let mut loaded = load(path, &options).map_err(|d| d.to_string()).unwrap();
@@ -258,13 +282,13 @@ pub(super) fn job(path: &Path, c: &Configuration, edge: u32) -> RenderJob {
     settings.ocv = c.ocv;
     settings.optimal_mis = c.optimal_mis;
     settings.correlated = c.correlated;
-    settings.bsdf_share = c.bsdf_share;
+    settings.bsdf_fraction = c.bsdf_fraction;
     settings.ris.proposals = Proposals::Fixed(c.proposals);
     settings.ris.strata = c.strata;
     settings.ris.points = c.points;
     settings.ris.target = c.target;
-    settings.light_choice = c.light_choice;
-    settings.contributing.rest_samples = c.rest_samples;
+    settings.light_sampler = c.light_sampler;
+    settings.contributing.noncontributing_samples = c.noncontributing_samples;
     if let Some(cached) = c.cached {
         settings.kind = IntegratorKind::IrradianceCache;
         settings.cache.cached = cached;
@@ -273,7 +297,7 @@ pub(super) fn job(path: &Path, c: &Configuration, edge: u32) -> RenderJob {
     }
     loaded.settings.sampling.sampler = c.sampler;
     let mut job = loaded.job(c.accel, None).unwrap();
-    let hints = hints(&job, c.hints);
-    job.lights.set_hints(hints);
+    let visibility_cache = cache_with(&job, c.visibility_cache);
+    job.lights.set_visibility_cache(visibility_cache);
     job
 }

@@ -53,12 +53,12 @@ const INTEGRATORS: [(&str, &str); 24] = [
     ("direct correlated crossfit", r#""direct" "string estimator" "correlated" "string correlated" "crossfit""#),
     (
         "direct contributing",
-        r#""direct" "string estimator" "contributing" "string lightsampler" "photons" "integer lightphotons" 3000"#,
+        r#""direct" "string estimator" "contributing" "string lightsampler" "photons" "integer visibilityphotons" 3000"#,
     ),
     (
         "direct ris by photons",
         r#""direct" "string estimator" "ris" "integer proposals" 16 "string lightsampler" "photons"
-           "string target" "visibility" "integer lightphotons" 3000"#,
+           "string target" "visibility" "integer visibilityphotons" 3000"#,
     ),
     ("path mis", r#""path" "integer maxdepth" 5"#),
     ("path ris", r#""path" "integer maxdepth" 4 "string estimator" "ris" "integer proposals" 16"#),
@@ -97,7 +97,7 @@ fn hash(film: &Film) -> u64 {
     hash.0
 }
 
-/// A picture of 64 × 64 coloured tiles of many sizes, as text.
+/// An image of 64 × 64 coloured tiles of many sizes, as text.
 fn tiles() -> String {
     let mut text = String::from("P3\n64 64\n255\n");
     for y in 0..64_u32 {

@@ -24,10 +24,10 @@ pub(super) struct SceneArgs {
     pub scene: PathBuf,
     #[command(flatten)]
     pub settings: SettingsArgs,
-    /// Size of the picture, such as 640x480 [default: the file's]
+    /// Size of the image, such as 640x480 [default: the file's]
     #[arg(long, value_name = "WxH", value_parser = parse_resolution)]
     pub resolution: Option<[u32; 2]>,
-    /// The part that is rendered, in fractions of the picture [default: the file's]
+    /// The part that is rendered, in fractions of the image [default: the file's]
     #[arg(long, value_name = "X0,X1,Y0,Y1", value_parser = parse_crop)]
     pub crop: Option<[f32; 4]>,
     /// Replace the file's pixel filter by a box of one pixel
@@ -36,13 +36,13 @@ pub(super) struct SceneArgs {
     /// Ray tracer
     #[arg(long, default_value = "embree", value_parser = named::<AccelKind>())]
     pub accel: AccelKind,
-    /// Rays per Embree packet; changes speed, not the picture [default: the processor's native width]
+    /// Rays per Embree packet; changes speed, not the image [default: the processor's native width]
     #[arg(long, value_name = "W", value_parser = parse_packet_width)]
     pub packet_width: Option<u32>,
     /// Threads [default: all cores]
     #[arg(long, value_name = "T", value_parser = clap::value_parser!(u32).range(1..=4096))]
     pub threads: Option<u32>,
-    /// Edge of a tile in pixels; changes speed, not the picture
+    /// Edge of a tile in pixels; changes speed, not the image
     #[arg(long, value_name = "PIXELS", default_value_t = 16, value_parser = clap::value_parser!(u32).range(1..=4096))]
     pub tile_size: u32,
 }
@@ -59,7 +59,7 @@ pub(super) struct RenderArgs {
     /// Stop after the pass in which this many seconds run out
     #[arg(long, value_name = "SECONDS", value_parser = parse_seconds)]
     pub time: Option<f64>,
-    /// Channels beside the picture, in EXR [default: all, and ratio with --proposals optimal]
+    /// Channels beside the image, in EXR [default: all, and ratio with --proposals optimal]
     #[arg(long, value_name = "LIST", value_delimiter = ',', value_parser = named::<Aov>())]
     pub aov: Option<Vec<Aov>>,
     /// Exposure of what a display shows (PNG and its like), in stops

@@ -39,7 +39,7 @@ pub(super) struct BenchArgs {
     /// Turns of the renderer and of the bare loop; medians are reported
     #[arg(long, value_name = "N", default_value_t = 5, value_parser = clap::value_parser!(u32).range(1..=10_000))]
     runs: u32,
-    /// Camera rays at most: batches of them are spread over the picture
+    /// Camera rays at most: batches of them are spread over the image
     #[arg(long, value_name = "K", default_value_t = 1 << 20, value_parser = clap::value_parser!(u32).range(1..))]
     rays: u32,
     /// Write the report
@@ -120,7 +120,7 @@ fn table(report: &Report) -> String {
 }
 
 fn photon_table(report: &PhotonReport) -> String {
-    let mut text = format!("{} trajectories, {} photons, {} rays\n", report.trajectories, report.photons, report.rays);
+    let mut text = format!("{} photon paths, {} photons, {} rays\n", report.paths, report.photons, report.rays);
     for (threads, seconds) in &report.tracing {
         let rate = |count: u64| count as f64 * 1e-6 / seconds.max(1e-12);
         text += &format!(
@@ -140,8 +140,8 @@ fn photon_table(report: &PhotonReport) -> String {
 }
 
 fn line(case: &RayCase) -> String {
-    let [least, most] = case.turn_ratio_range;
-    let range = format!("{:.3} ({least:.2}-{most:.2})", case.turn_ratio);
+    let [min, max] = case.turn_ratio_range;
+    let range = format!("{:.3} ({min:.2}-{max:.2})", case.turn_ratio);
     format!(
         "{:<22}{:>6}{:>10}{:>13.2}{:>13.2}{:>11.3}{range:>20}\n",
         case.name, case.width, case.rays, case.mrays, case.bare_mrays, case.ratio

@@ -2,7 +2,7 @@
 
 use super::progress;
 use crate::compare::columns::{column, shown_columns};
-use crate::compare::{Column, Compared, Metric, Pictures, Scores, Settings, compare, load, write_page};
+use crate::compare::{Column, Compared, ImageSet, Metric, Scores, Settings, compare, load, write_page};
 use anyhow::{Context, bail};
 use clap::{Args, ValueEnum};
 use lumiris::imaging::metrics::bias::Z_95;
@@ -128,26 +128,26 @@ fn limit(text: &str) -> Result<Limit, String> {
 }
 
 pub(super) fn run(args: &CompareArgs) -> anyhow::Result<ExitCode> {
-    let pictures = load(&args.images, &args.reference, args.layer.as_deref())?;
+    let set = load(&args.images, &args.reference, args.layer.as_deref())?;
     let settings = settings(args);
-    let compared = compare(&pictures, &settings);
-    for (name, remark) in remarks(&pictures, &compared) {
+    let compared = compare(&set, &settings);
+    for (name, remark) in remarks(&set, &compared) {
         progress::say(&format!("{name}: {remark}"));
     }
-    let failures = failures(args, &pictures, &compared)?;
+    let failures = failures(args, &set, &compared)?;
 
-    let report = report(args, &pictures, &settings, &compared, &failures);
+    let report = report(args, &set, &settings, &compared, &failures);
     let text = serde_json::to_string_pretty(&report)? + "\n";
     match args.json.as_deref() {
         Some(path) if path == Path::new("-") => progress::print(text.trim_end()),
         Some(path) => {
             write_text(path, &text).with_context(|| format!("cannot write {}", path.display()))?;
-            progress::print(&table(&pictures, &settings, &compared));
+            progress::print(&table(&set, &settings, &compared));
         }
-        None => progress::print(&table(&pictures, &settings, &compared)),
+        None => progress::print(&table(&set, &settings, &compared)),
     }
     if let Some(folder) = &args.html {
-        let page = write_page(folder, &pictures, &settings, &compared)
+        let page = write_page(folder, &set, &settings, &compared)
             .with_context(|| format!("cannot write the page into {}", folder.display()))?;
         progress::say(&format!("The page is in {}", page.display()));
     }
@@ -174,22 +174,22 @@ fn settings(args: &CompareArgs) -> Settings {
 }
 
 /// Remarks about the images, each with the name of an image.
-fn remarks(pictures: &Pictures, compared: &[Compared]) -> Vec<(String, String)> {
+fn remarks(set: &ImageSet, compared: &[Compared]) -> Vec<(String, String)> {
     let mut remarks = Vec::new();
-    for shown in pictures.images.iter().chain([&pictures.reference]) {
+    for shown in set.images.iter().chain([&set.reference]) {
         remarks.extend(shown.remarks.iter().map(|r| (shown.name.clone(), r.clone())));
     }
     let odd = compared.iter().map(|c| c.scores.differences.nonfinite);
     let reference_odd = compared.first().map_or(0, |c| c.scores.differences.reference_nonfinite);
-    let names = pictures.images.iter().chain([&pictures.reference]).map(|s| &s.name);
+    let names = set.images.iter().chain([&set.reference]).map(|s| &s.name);
     for (name, count) in names.zip(odd.chain([reference_odd])).filter(|(_, count)| *count > 0) {
         remarks.push((name.clone(), format!("{count} pixels are not finite and take no part")));
     }
-    let [region, display] = [pictures.region.size(), pictures.display];
+    let [region, display] = [set.region.size(), set.display];
     if region != display {
-        let r = pictures.region;
+        let r = set.region;
         let text = format!(
-            "only columns {}..{} and rows {}..{} of {}×{} are in all pictures, and only they are compared",
+            "only columns {}..{} and rows {}..{} of {}×{} are in all images, and only they are compared",
             r.x,
             r.x + r.width,
             r.y,
@@ -203,11 +203,11 @@ fn remarks(pictures: &Pictures, compared: &[Compared]) -> Vec<(String, String)> 
 }
 
 /// The violated limits, in words. A limit on a metric that cannot be computed is an error.
-fn failures(args: &CompareArgs, pictures: &Pictures, compared: &[Compared]) -> anyhow::Result<Vec<String>> {
+fn failures(args: &CompareArgs, set: &ImageSet, compared: &[Compared]) -> anyhow::Result<Vec<String>> {
     let mut failures = Vec::new();
     let above = args.fail_above.iter().map(|l| (l, "above"));
     for (limit, side) in above.chain(args.fail_below.iter().map(|l| (l, "below"))) {
-        for (image, c) in pictures.images.iter().zip(compared) {
+        for (image, c) in set.images.iter().zip(compared) {
             let Some(value) = (limit.column.value)(&c.scores) else {
                 bail!("{}: `{}` cannot be computed: the file has no variances", image.name, limit.column.key);
             };
@@ -223,12 +223,12 @@ fn failures(args: &CompareArgs, pictures: &Pictures, compared: &[Compared]) -> a
 }
 
 /// One line per image, one aligned column per metric.
-fn table(pictures: &Pictures, settings: &Settings, compared: &[Compared]) -> String {
+fn table(set: &ImageSet, settings: &Settings, compared: &[Compared]) -> String {
     let scores: Vec<&Scores> = compared.iter().map(|c| &c.scores).collect();
     let columns = shown_columns(&settings.metrics, &scores);
     let header = ["image"].into_iter().chain(columns.iter().map(|c| c.title)).map(str::to_owned);
     let mut rows: Vec<Vec<String>> = vec![header.collect()];
-    for (image, s) in pictures.images.iter().zip(&scores) {
+    for (image, s) in set.images.iter().zip(&scores) {
         let cell = |c: &&Column| (c.value)(s).map_or("–".to_owned(), c.text);
         rows.push([image.name.clone()].into_iter().chain(columns.iter().map(cell)).collect());
     }
@@ -247,28 +247,28 @@ fn table(pictures: &Pictures, settings: &Settings, compared: &[Compared]) -> Str
 /// All numbers. Infinite and undefined ones are null.
 fn report(
     args: &CompareArgs,
-    pictures: &Pictures,
+    set: &ImageSet,
     settings: &Settings,
     compared: &[Compared],
     failures: &[String],
 ) -> Value {
-    let picture = |shown: &crate::compare::Shown| {
+    let image_json = |shown: &crate::compare::Shown| {
         json!({
             "path": shown.path.display().to_string(), "layer": shown.layer,
             "has_variance": shown.variance.is_some(),
         })
     };
-    let images = pictures.images.iter().zip(compared).map(|(image, c)| {
-        let mut entry = picture(image);
+    let images = set.images.iter().zip(compared).map(|(image, c)| {
+        let mut entry = image_json(image);
         if let Value::Object(map) = &mut entry {
             numbers(map, settings, c);
         }
         entry
     });
-    let r = pictures.region;
+    let r = set.region;
     json!({
-        "reference": picture(&pictures.reference),
-        "resolution": pictures.display,
+        "reference": image_json(&set.reference),
+        "resolution": set.display,
         "region": { "x": r.x, "y": r.y, "width": r.width, "height": r.height },
         "settings": {
             "exposure": settings.exposure, "epsilon": settings.epsilon, "peak": settings.peak,

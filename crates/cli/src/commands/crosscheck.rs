@@ -18,11 +18,11 @@ use std::process::ExitCode;
 use std::sync::Arc;
 use std::sync::atomic::AtomicBool;
 
-/// Part of the pixels that may differ visibly between the two pictures: rays at edges.
+/// Part of the pixels that may differ visibly between the two images: rays at edges.
 const MAX_DIFFERENT_PIXELS: f64 = 0.005;
-/// A pixel differs visibly if it is off by more than this, relative to the larger of it and the picture's mean.
+/// A pixel differs visibly if it is off by more than this, relative to the larger of it and the image's mean.
 const PIXEL_TOLERANCE: f64 = 0.01;
-/// Allowed difference of the pictures' means, relative.
+/// Allowed difference of the images' means, relative.
 const MEAN_TOLERANCE: f64 = 1e-3;
 
 /// `lumiris crosscheck`
@@ -36,12 +36,12 @@ pub(super) struct CrosscheckArgs {
     /// Write the report
     #[arg(long, value_name = "FILE.json")]
     json: Option<PathBuf>,
-    /// Write both pictures and their difference into this folder
+    /// Write both images and their difference into this folder
     #[arg(long, value_name = "DIR")]
     images: Option<PathBuf>,
 }
 
-/// How two pictures of the same random numbers differ.
+/// How two images of the same random numbers differ.
 #[derive(Clone, Copy, Debug, Serialize)]
 struct ImageReport {
     pixels: usize,
@@ -70,13 +70,13 @@ pub(super) fn run(args: &CrosscheckArgs) -> anyhow::Result<ExitCode> {
     let report = crosscheck(&job, &*bvh, args.rays);
     progress::print(&table(&report));
 
-    // Pictures
-    let embree_picture = picture(args, &job)?;
+    // Images
+    let embree_image = image(args, &job)?;
     job.world = World::new(job.world.scene, AccelKind::Bvh, None)?;
-    let bvh_picture = picture(args, &job)?;
-    let images = compare(&embree_picture, &bvh_picture);
+    let bvh_image = image(args, &job)?;
+    let images = compare(&embree_image, &bvh_image);
     progress::print(&format!(
-        "pictures: {} of {} pixels identical to the bit, {} off by more than {} %, means differ by {:.2e}",
+        "images: {} of {} pixels identical to the bit, {} off by more than {} %, means differ by {:.2e}",
         images.identical,
         images.pixels,
         images.different,
@@ -84,7 +84,7 @@ pub(super) fn run(args: &CrosscheckArgs) -> anyhow::Result<ExitCode> {
         images.relative_mean_difference
     ));
     if let Some(folder) = &args.images {
-        write_pictures(folder, &job, &embree_picture, &bvh_picture)?;
+        write_images(folder, &job, &embree_image, &bvh_image)?;
     }
     if let Some(path) = &args.json {
         let text = serde_json::to_string_pretty(&serde_json::json!({ "rays": report, "images": images }))?;
@@ -116,7 +116,7 @@ fn table(report: &Report) -> String {
 }
 
 /// The mean of each pixel, RGB interleaved.
-fn picture(args: &CrosscheckArgs, job: &RenderJob) -> anyhow::Result<Vec<f32>> {
+fn image(args: &CrosscheckArgs, job: &RenderJob) -> anyhow::Result<Vec<f32>> {
     let settings = render_settings(&args.scene, job);
     let rendering = render(job, &settings, &AtomicBool::new(false), &|_| ())?;
     Ok(output::channels(&rendering.film, &[], None).data)
@@ -138,7 +138,7 @@ fn compare(a: &[f32], b: &[f32]) -> ImageReport {
     ImageReport { pixels: a.len() / 3, identical, different, relative_mean_difference }
 }
 
-fn write_pictures(folder: &std::path::Path, job: &RenderJob, a: &[f32], b: &[f32]) -> anyhow::Result<()> {
+fn write_images(folder: &std::path::Path, job: &RenderJob, a: &[f32], b: &[f32]) -> anyhow::Result<()> {
     std::fs::create_dir_all(folder).with_context(|| format!("cannot make {}", folder.display()))?;
     let bounds = job.world.scene.film.bounds;
     let difference: Vec<f32> = a.iter().zip(b).map(|(x, y)| (x - y).abs()).collect();

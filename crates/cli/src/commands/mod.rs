@@ -28,9 +28,9 @@ struct Cli {
 
 #[derive(Debug, Subcommand)]
 enum Command {
-    /// Render a scene to pictures
+    /// Render a scene to images
     Render(args::RenderArgs),
-    /// Compare pictures with a reference, in numbers and on a page
+    /// Compare images with a reference, in numbers and on a page
     Compare(compare::CompareArgs),
     /// Compare Embree with the pure-Rust BVH, ray by ray and image by image
     Crosscheck(crosscheck::CrosscheckArgs),
@@ -39,7 +39,7 @@ enum Command {
     Bench(bench::BenchArgs),
     /// Say what a scene holds, what it costs, and what of it was not understood
     Info(info::InfoArgs),
-    /// Render and measure the figures of a paper again, as a page with pictures
+    /// Render and measure the figures of a paper again, as a page with images
     Reproduce(reproduce::ReproduceArgs),
     /// Make a statue, a sky, or the scenes of talbot, fan and keller-wald
     Generate(generate::GenerateArgs),

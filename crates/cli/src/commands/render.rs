@@ -83,7 +83,7 @@ fn check_outputs(outputs: &[PathBuf]) -> anyhow::Result<()> {
     for path in outputs {
         let kind = extension(path);
         if kind != "exr" && !DISPLAY_TYPES.contains(&kind.as_str()) {
-            bail!("{}: the picture can be written as .exr, .{}", path.display(), DISPLAY_TYPES.join(", ."));
+            bail!("{}: the image can be written as .exr, .{}", path.display(), DISPLAY_TYPES.join(", ."));
         }
         let folder = path.parent().filter(|p| !p.as_os_str().is_empty()).unwrap_or(Path::new("."));
         if !folder.is_dir() {
@@ -108,12 +108,12 @@ fn write(args: &RenderArgs, job: &RenderJob, rendering: &Rendering, path: &Path)
         let aovs: Vec<Aov> = match &args.aov {
             Some(list) => list.clone(),
             None => {
-                let ratio = job.splits.as_ref().map(|_| Aov::Ratio);
+                let ratio = job.sample_count_map.as_ref().map(|_| Aov::Ratio);
                 let records = rendering.cache.map(|_| Aov::Records);
                 Aov::ALL.into_iter().chain(ratio).chain(records).collect()
             }
         };
-        let channels = output::channels(film, &aovs, job.splits.as_ref());
+        let channels = output::channels(film, &aovs, job.sample_count_map.as_ref());
         Part::linear(width, height, channels.names, channels.data)
     } else {
         let names = ["R", "G", "B"].map(str::to_owned).to_vec();
@@ -172,7 +172,7 @@ fn photon_stats(p: &MapStats) -> serde_json::Value {
     let seconds = p.tracing.as_secs_f64();
     json!({
         "maps": p.maps,
-        "trajectories": p.trajectories,
+        "photon_paths": p.paths,
         "global_photons": p.global,
         "caustic_photons": p.caustic,
         "importons": p.importons,
@@ -180,7 +180,7 @@ fn photon_stats(p: &MapStats) -> serde_json::Value {
         "trace_seconds": seconds,
         "sort_seconds": p.sorting.as_secs_f64(),
         "photons_per_second": (p.global + p.caustic) as f64 / seconds.max(1e-12),
-        "trajectories_per_second": p.trajectories as f64 / seconds.max(1e-12),
+        "photon_paths_per_second": p.paths as f64 / seconds.max(1e-12),
     })
 }
 
@@ -194,7 +194,7 @@ fn cache_stats(c: &CacheReport) -> serde_json::Value {
         "dropped_points": c.build.dropped,
         "build_rays": c.build.paths.camera_rays + c.build.paths.bounce_rays + c.build.paths.direct.segments,
         "lookups": c.lookups.lookups,
-        "fallbacks": c.lookups.fallbacks,
+        "misses": c.lookups.misses,
     })
 }
 
@@ -216,16 +216,16 @@ fn report(args: &RenderArgs, rendering: &Rendering, outputs: &[PathBuf]) {
             "irradiance cache: {} records in {:.1} s, {:.2} % of {} lookups found none",
             c.records,
             c.build.elapsed.as_secs_f64(),
-            100.0 * c.lookups.fallbacks as f64 / c.lookups.lookups.max(1) as f64,
+            100.0 * c.lookups.misses as f64 / c.lookups.lookups.max(1) as f64,
             c.lookups.lookups
         ));
     }
     if let Some(p) = &rendering.photons {
         progress::say(&format!(
-            "photon maps: {} global and {} caustic photons of {} trajectories in {:.1} s, {:.1} MB{}",
+            "photon maps: {} global and {} caustic photons of {} photon paths in {:.1} s, {:.1} MB{}",
             p.global,
             p.caustic,
-            p.trajectories,
+            p.paths,
             (p.tracing + p.sorting).as_secs_f64(),
             p.bytes as f64 * 1e-6,
             if p.maps > 1 { format!(", {} maps", p.maps) } else { String::new() }

@@ -8,7 +8,7 @@ use lumiris::import::{LoadOptions, Loaded, load};
 use lumiris::render::RenderSettings;
 use lumiris::render::plan::prepare;
 use lumiris::scene::RenderJob;
-use lumiris::settings::{Proposals, Split, StageTimes};
+use lumiris::settings::{Proposals, SampleCounts, StageTimes};
 use std::time::Instant;
 
 /// Seconds of what happens before the first ray.
@@ -60,7 +60,7 @@ pub(super) fn load_job(args: &SceneArgs) -> anyhow::Result<(RenderJob, SetupTime
 pub(super) fn plan(args: &SceneArgs, job: &mut RenderJob, ratio_map: bool, quiet: bool) -> anyhow::Result<()> {
     let threads = args.threads.map(|t| t as usize);
     if let (Some(plan), false) = (prepare(job, threads, ratio_map)?, quiet) {
-        let Split { samples, proposals } = plan.split;
+        let SampleCounts { samples, proposals } = plan.sample_counts;
         let StageTimes { t1, t2 } = plan.times;
         let is_optimal = job.settings().integrator.ris.proposals == Proposals::Optimal;
         let by_pixel = if is_optimal { ", split anew in each pixel" } else { "" };

@@ -19,7 +19,7 @@ pub enum Better {
     Neither,
 }
 
-/// A number that each picture has.
+/// A number that each image has.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Column {
     /// Name on the command line and in JSON.

@@ -17,18 +17,18 @@ pub(crate) struct Layer {
     pub channels: Vec<usize>,
 }
 
-/// Names that stand for the picture itself, not for a part of its light or a feature.
-const PICTURE_NAMES: [&str; 10] =
+/// Names that stand for the image itself, not for a part of its light or a feature.
+const IMAGE_NAMES: [&str; 10] =
     ["combined", "beauty", "rgb", "rgba", "color", "colour", "image", "main", "final", "default"];
 
 impl Layer {
-    /// 0 for the name that most surely means the picture.
+    /// 0 for the name that most surely means the image.
     fn rank(&self) -> u8 {
         let last = self.name.rsplit('.').next().unwrap_or_default().to_ascii_lowercase();
         match () {
             () if self.channels.len() == 1 => 3,
             () if self.name.is_empty() => 0,
-            () if PICTURE_NAMES.contains(&last.as_str()) => 1,
+            () if IMAGE_NAMES.contains(&last.as_str()) => 1,
             () => 2,
         }
     }
@@ -87,7 +87,7 @@ pub(crate) fn color_layers(parts: &[PartHeader]) -> Vec<Layer> {
     layers
 }
 
-/// The layer that is the picture, or the one called `wanted` (a single channel as well). `Err` says what there is.
+/// The layer that is the image, or the one called `wanted` (a single channel as well). `Err` says what there is.
 pub(crate) fn choose(parts: &[PartHeader], wanted: Option<&str>) -> Result<Layer, String> {
     let layers = color_layers(parts);
     let channels =
@@ -131,7 +131,7 @@ mod tests {
     }
 
     #[test]
-    fn the_picture_is_found_whatever_its_name() {
+    fn the_image_is_found_whatever_its_name() {
         let cases: [(&[&str], &str, &[usize]); 8] = [
             (&["R", "G", "B", "albedo.R", "albedo.G", "albedo.B"], "", &[0, 1, 2]),
             (&["albedo.B", "albedo.G", "albedo.R", "B", "G", "R"], "", &[5, 4, 3]),

@@ -41,7 +41,7 @@ impl Region {
     }
 }
 
-/// A picture cut to the region that is compared.
+/// An image cut to the region that is compared.
 #[derive(Clone, Debug)]
 pub(crate) struct Shown {
     /// The file.
@@ -60,9 +60,9 @@ pub(crate) struct Shown {
     pub is_half: bool,
 }
 
-/// Pictures of one size; the last one is the reference.
+/// Images of one size; the last one is the reference.
 #[derive(Clone, Debug)]
-pub(crate) struct Pictures {
+pub(crate) struct ImageSet {
     /// Images in the order of the command line.
     pub images: Vec<Shown>,
     /// What they are compared with.
@@ -73,21 +73,21 @@ pub(crate) struct Pictures {
     pub display: [usize; 2],
 }
 
-/// Everything that keeps the pictures from being compared, a line each.
+/// Everything that keeps the images from being compared, a line each.
 #[derive(Debug, thiserror::Error)]
 #[error("{}", .0.join("\n"))]
 pub(crate) struct LoadError(pub Vec<String>);
 
-/// A picture as read.
+/// An image as read.
 struct Raw {
     shown: Shown,
     region: Region,
     display: [usize; 2],
 }
 
-/// Reads pictures and their reference; all that is wrong is said at once. `layer` names the channels to read instead of
-/// the picture itself.
-pub(crate) fn load(images: &[PathBuf], reference: &Path, layer: Option<&str>) -> Result<Pictures, LoadError> {
+/// Reads images and their reference; all that is wrong is said at once. `layer` names the channels to read instead of
+/// the image itself.
+pub(crate) fn load(images: &[PathBuf], reference: &Path, layer: Option<&str>) -> Result<ImageSet, LoadError> {
     let all = images.iter().map(PathBuf::as_path).chain([reference]);
     let (mut raws, mut errors) = (Vec::new(), Vec::new());
     for path in all {
@@ -100,11 +100,11 @@ pub(crate) fn load(images: &[PathBuf], reference: &Path, layer: Option<&str>) ->
     let Some(truth) = raws.pop().filter(|_| errors.is_empty()) else { return Err(LoadError(errors)) };
     errors.extend(raws.iter().filter(|r| r.display != truth.display).map(|r| {
         let of = |raw: &Raw| format!("{} is {}×{}", raw.shown.path.display(), raw.display[0], raw.display[1]);
-        format!("{} and the reference {}: only pictures of one size can be compared", of(r), of(&truth))
+        format!("{} and the reference {}: only images of one size can be compared", of(r), of(&truth))
     }));
     let region = raws.iter().fold(truth.region, |region, r| region.intersection(r.region));
     if errors.is_empty() && region.width * region.height == 0 {
-        errors.push("there is no pixel that all pictures have: their data windows do not overlap".to_owned());
+        errors.push("there is no pixel that all images have: their data windows do not overlap".to_owned());
     }
     if !errors.is_empty() {
         return Err(LoadError(errors));
@@ -114,10 +114,10 @@ pub(crate) fn load(images: &[PathBuf], reference: &Path, layer: Option<&str>) ->
     let mut images: Vec<Shown> = raws.into_iter().map(cut).collect();
     let mut reference = truth.cut(region);
     name(images.iter_mut().chain([&mut reference]).collect());
-    Ok(Pictures { images, reference, region, display })
+    Ok(ImageSet { images, reference, region, display })
 }
 
-/// Names pictures by their files, or by their paths where two have one name.
+/// Names images by their files, or by their paths where two have one name.
 fn name(mut all: Vec<&mut Shown>) {
     let short = |path: &Path| path.file_name().unwrap_or(path.as_os_str()).to_string_lossy().into_owned();
     let names: Vec<String> = all.iter().map(|s| short(&s.path)).collect();
@@ -182,7 +182,7 @@ fn variance(read: &ReadImage) -> Option<Vec<Pixel>> {
     variance.iter().flatten().any(|v| *v > 0.0).then_some(variance)
 }
 
-/// The pixels of `part` of a picture of which `pixels` holds `whole`.
+/// The pixels of `part` of an image of which `pixels` holds `whole`.
 fn rows(pixels: &[Pixel], whole: Region, part: Region) -> Vec<Pixel> {
     let first = |row: usize| (part.y - whole.y + row) * whole.width + part.x - whole.x;
     (0..part.height).flat_map(|row| &pixels[first(row)..first(row) + part.width]).copied().collect()
@@ -232,10 +232,10 @@ mod tests {
         write_image(&path("a.exr"), &[crop(2, 1, 9, 8)]).unwrap();
         write_image(&path("b.exr"), &[crop(5, 0, 15, 6)]).unwrap();
         write_image(&path("r.exr"), &[crop(0, 0, 20, 10)]).unwrap();
-        let pictures = load(&[path("a.exr"), path("b.exr")], &path("r.exr"), None).unwrap();
-        assert_eq!(pictures.region, Region { x: 5, y: 1, width: 6, height: 5 });
-        assert_eq!(pictures.display, [20, 10]);
-        for shown in pictures.images.iter().chain([&pictures.reference]) {
+        let set = load(&[path("a.exr"), path("b.exr")], &path("r.exr"), None).unwrap();
+        assert_eq!(set.region, Region { x: 5, y: 1, width: 6, height: 5 });
+        assert_eq!(set.display, [20, 10]);
+        for shown in set.images.iter().chain([&set.reference]) {
             assert_eq!(shown.pixels.len(), 30);
             assert_eq!((shown.pixels[0], shown.pixels[29]), ([5001.0; 3], [10005.0; 3]), "{}", shown.name);
         }
@@ -257,7 +257,7 @@ mod tests {
     fn all_bad_files_and_sizes_are_said_at_once() {
         let folder = tempfile::tempdir().unwrap();
         let path = |name: &str| folder.path().join(name);
-        std::fs::write(path("broken.exr"), b"not a picture").unwrap();
+        std::fs::write(path("broken.exr"), b"not an image").unwrap();
         write_image(&path("a.exr"), &[crop(0, 0, 20, 10)]).unwrap();
         let lines = |error: LoadError| error.0;
         let bad =
@@ -282,11 +282,11 @@ mod tests {
         let (a, b) = (folder.path().join("a.exr"), folder.path().join("b.exr"));
         write_image(&a, &[Part::linear(1, 1, channels(), vec![1.0, 2.0, 3.0, 0.1, 0.2, 0.0])]).unwrap();
         write_image(&b, &[Part::linear(1, 1, channels(), vec![1.0, 2.0, 3.0, 0.0, 0.0, 0.0])]).unwrap();
-        let pictures = load(std::slice::from_ref(&a), &b, None).unwrap();
-        assert_eq!(pictures.images[0].variance, Some(vec![[0.1, 0.2, 0.0]]));
-        assert_eq!((pictures.images[0].pixels[0], pictures.reference.variance), ([1.0, 2.0, 3.0], None));
-        let pictures = load(std::slice::from_ref(&a), &a, Some("variance")).unwrap();
-        assert_eq!((pictures.images[0].pixels[0], &pictures.images[0].variance), ([0.1, 0.2, 0.0], &None));
-        assert_eq!(pictures.images[0].name, a.display().to_string(), "two of one name are told apart by their paths");
+        let set = load(std::slice::from_ref(&a), &b, None).unwrap();
+        assert_eq!(set.images[0].variance, Some(vec![[0.1, 0.2, 0.0]]));
+        assert_eq!((set.images[0].pixels[0], set.reference.variance), ([1.0, 2.0, 3.0], None));
+        let set = load(std::slice::from_ref(&a), &a, Some("variance")).unwrap();
+        assert_eq!((set.images[0].pixels[0], &set.images[0].variance), ([0.1, 0.2, 0.0], &None));
+        assert_eq!(set.images[0].name, a.display().to_string(), "two of one name are told apart by their paths");
     }
 }

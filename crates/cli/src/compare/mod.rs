@@ -1,8 +1,8 @@
 //! Images against a reference: metrics, and a page to inspect them.
 //!
-//! Reading order: [`layers`] (which channels of a file are the picture), [`mod@load`] (files to pixels of one size),
+//! Reading order: [`layers`] (which channels of a file are the image), [`mod@load`] (files to pixels of one size),
 //! [`metric`] (their names), [`scores`] (metrics), [`columns`] (metrics by name), [`page`] (a page for a browser, whose own parts are in `viewer/`:
-//! `index.html`, `style.css`, `pictures.js` for values and their pictures, `viewer.js` for controls).
+//! `index.html`, `style.css`, `images.js` for values and their images, `viewer.js` for controls).
 
 pub(crate) mod columns;
 pub(crate) mod layers;
@@ -12,7 +12,7 @@ pub(crate) mod page;
 pub(crate) mod scores;
 
 pub(crate) use columns::{COLUMNS, Column};
-pub(crate) use load::{Pictures, Shown, load};
+pub(crate) use load::{ImageSet, Shown, load};
 pub(crate) use metric::Metric;
 pub(crate) use page::write_page;
 pub(crate) use scores::{Compared, Scores, Settings, compare};

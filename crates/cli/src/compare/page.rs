@@ -6,7 +6,7 @@
 //! form.
 
 use super::columns::shown_columns;
-use super::load::{Pictures, Shown};
+use super::load::{ImageSet, Shown};
 use super::scores::{Compared, Scores, Settings};
 use base64::Engine;
 use base64::engine::general_purpose::STANDARD;
@@ -21,13 +21,13 @@ use std::path::{Path, PathBuf};
 
 const TEMPLATE: &str = include_str!("viewer/index.html");
 const STYLE: &str = include_str!("viewer/style.css");
-const PICTURES: &str = include_str!("viewer/pictures.js");
+const IMAGES: &str = include_str!("viewer/images.js");
 const VIEWER: &str = include_str!("viewer/viewer.js");
 
 /// Writes `index.html` into a folder, which is made if it is not there. Says where the page is.
 pub(crate) fn write_page(
     folder: &Path,
-    pictures: &Pictures,
+    set: &ImageSet,
     settings: &Settings,
     compared: &[Compared],
 ) -> io::Result<PathBuf> {
@@ -35,27 +35,27 @@ pub(crate) fn write_page(
     let path = folder.join("index.html");
     write_whole(&path, |file| {
         let mut out = BufWriter::new(file);
-        write(&mut out, pictures, settings, compared)?;
+        write(&mut out, set, settings, compared)?;
         out.flush()
     })?;
     Ok(path)
 }
 
 /// Writes the page as text.
-fn write(out: impl Write, pictures: &Pictures, settings: &Settings, compared: &[Compared]) -> io::Result<()> {
+fn write(out: impl Write, set: &ImageSet, settings: &Settings, compared: &[Compared]) -> io::Result<()> {
     let mut data = String::new();
     let mut images = Vec::new();
-    for (index, shown) in pictures.images.iter().enumerate() {
+    for (index, shown) in set.images.iter().enumerate() {
         images.push(image(index, shown, Some(&compared[index]), &mut data)?);
     }
-    images.push(image(pictures.images.len(), &pictures.reference, None, &mut data)?);
-    let manifest = manifest(pictures, settings, compared, images);
+    images.push(image(set.images.len(), &set.reference, None, &mut data)?);
+    let manifest = manifest(set, settings, compared, images);
     // `<` could end the element that holds it.
     let manifest = manifest.to_string().replace('<', "\\u003c");
 
-    let [style, pictures, viewer] = [STYLE, PICTURES, VIEWER].map(|text| Safe::from_safe_string(text.to_owned()));
+    let [style, images, viewer] = [STYLE, IMAGES, VIEWER].map(|text| Safe::from_safe_string(text.to_owned()));
     let [manifest, data] = [manifest, data].map(Safe::from_safe_string);
-    let context = context! { style, manifest, data, pictures, viewer };
+    let context = context! { style, manifest, data, images, viewer };
     let environment = Environment::new();
     let template = environment.template_from_named_str("index.html", TEMPLATE).map_err(io::Error::other)?;
     template.render_captured_to(context, out).map_err(io::Error::other)?;
@@ -63,7 +63,7 @@ fn write(out: impl Write, pictures: &Pictures, settings: &Settings, compared: &[
 }
 
 /// Everything but the pixels.
-fn manifest(pictures: &Pictures, settings: &Settings, compared: &[Compared], images: Vec<Value>) -> Value {
+fn manifest(set: &ImageSet, settings: &Settings, compared: &[Compared], images: Vec<Value>) -> Value {
     let scores: Vec<&Scores> = compared.iter().map(|c| &c.scores).collect();
     let columns = shown_columns(&settings.metrics, &scores);
     let described: Vec<Value> = columns
@@ -82,7 +82,7 @@ fn manifest(pictures: &Pictures, settings: &Settings, compared: &[Compared], ima
             Value::from(cells.collect::<Vec<_>>())
         })
         .collect();
-    let r = pictures.region;
+    let r = set.region;
     json!({
         "x": r.x, "y": r.y, "width": r.width, "height": r.height,
         "images": images, "columns": described, "rows": rows,
@@ -96,7 +96,7 @@ fn colors(stops: Stops) -> Value {
     json!(stops)
 }
 
-/// Appends the pixels and maps of a picture and describes them.
+/// Appends the pixels and maps of an image and describes them.
 fn image(index: usize, shown: &Shown, compared: Option<&Compared>, data: &mut String) -> io::Result<Value> {
     let mut layers = Vec::new();
     let mut add = |key: &str, values: &[f32]| -> io::Result<()> {
@@ -176,12 +176,10 @@ mod tests {
         };
         let region = Region { x: 0, y: 0, width: 2, height: 2 };
         let evil = "</script><script>alert(1)</script>.exr";
-        let pictures =
-            Pictures { images: vec![shown(evil, 0.5)], reference: shown("r.exr", 0.25), region, display: [2, 2] };
+        let set = ImageSet { images: vec![shown(evil, 0.5)], reference: shown("r.exr", 0.25), region, display: [2, 2] };
         let settings = Settings::default();
         let folder = tempfile::tempdir().unwrap();
-        let path =
-            write_page(&folder.path().join("new"), &pictures, &settings, &compare(&pictures, &settings)).unwrap();
+        let path = write_page(&folder.path().join("new"), &set, &settings, &compare(&set, &settings)).unwrap();
         let html = std::fs::read_to_string(path).unwrap();
         assert!(!html.contains("alert(1)</script>") && html.contains("\\u003c/script>"));
         assert!(

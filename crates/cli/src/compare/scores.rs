@@ -1,6 +1,6 @@
 //! The metrics of an image, as numbers and as maps.
 
-use super::load::{Pictures, Region, Shown};
+use super::load::{ImageSet, Region, Shown};
 use super::metric::Metric;
 use lumiris::imaging::metrics::difference::DEFAULT_EPSILON;
 use lumiris::imaging::metrics::perceptual::perceptual_error_at;
@@ -59,7 +59,7 @@ pub(crate) struct Scores {
     pub tvi: Option<f64>,
     /// Mean difference.
     pub bias: Option<Bias>,
-    /// Tests against the variances; `None` also if the picture has none.
+    /// Tests against the variances; `None` also if the image has none.
     pub significance: Option<Significance>,
 }
 
@@ -76,7 +76,7 @@ pub(crate) struct Maps {
     pub z: Option<Vec<f32>>,
 }
 
-/// What came out for a picture.
+/// What came out for an image.
 #[derive(Clone, Debug, PartialEq)]
 pub(crate) struct Compared {
     /// Numbers.
@@ -87,23 +87,23 @@ pub(crate) struct Compared {
     pub noise: Noise,
 }
 
-/// Which of the two pictures have variances.
+/// Which of the two images have variances.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, IntoStaticStr)]
 #[strum(serialize_all = "lowercase")]
 pub enum Noise {
     /// Both.
     Both,
-    /// The picture alone: the reference is taken as exact.
+    /// The image alone: the reference is taken as exact.
     #[strum(serialize = "image")]
     ImageOnly,
-    /// Not the picture.
+    /// Not the image.
     #[strum(serialize = "none")]
     Unknown,
 }
 
-/// Compares each picture with the reference.
-pub(crate) fn compare(pictures: &Pictures, settings: &Settings) -> Vec<Compared> {
-    pictures.images.iter().map(|image| compare_one(image, &pictures.reference, pictures.region, settings)).collect()
+/// Compares each image with the reference.
+pub(crate) fn compare(set: &ImageSet, settings: &Settings) -> Vec<Compared> {
+    set.images.iter().map(|image| compare_one(image, &set.reference, set.region, settings)).collect()
 }
 
 fn compare_one(image: &Shown, reference: &Shown, region: Region, settings: &Settings) -> Compared {
@@ -136,7 +136,7 @@ fn compare_one(image: &Shown, reference: &Shown, region: Region, settings: &Sett
     Compared { scores, maps, noise }
 }
 
-/// Variance of x − r per pixel, if that of the picture is known.
+/// Variance of x − r per pixel, if that of the image is known.
 fn variance_of_difference(image: &Shown, reference: &Shown) -> (Noise, Option<Vec<Pixel>>) {
     match (&image.variance, &reference.variance) {
         (Some(a), Some(b)) => {
@@ -164,14 +164,14 @@ mod tests {
         }
     }
 
-    fn pictures(image: Shown, reference: Shown) -> Pictures {
+    fn set(image: Shown, reference: Shown) -> ImageSet {
         let region = Region { x: 0, y: 0, width: 3, height: 2 };
-        Pictures { images: vec![image], reference, region, display: [3, 2] }
+        ImageSet { images: vec![image], reference, region, display: [3, 2] }
     }
 
     #[test]
     fn variances_of_both_add_and_one_alone_takes_the_reference_as_exact() {
-        let test = |a, b| compare(&pictures(shown(1.5, a), shown(1.0, b)), &Settings::default()).remove(0);
+        let test = |a, b| compare(&set(shown(1.5, a), shown(1.0, b)), &Settings::default()).remove(0);
         let both = test(Some(0.09), Some(0.16));
         assert!((both.scores.significance.unwrap().max_z - 1.0).abs() < 1e-6 && both.noise == Noise::Both);
         assert_eq!(<&str>::from(both.scores.bias.unwrap().source), "variances");
@@ -185,11 +185,11 @@ mod tests {
     #[test]
     fn only_what_is_asked_for_is_computed() {
         let settings = Settings { metrics: [Metric::Tvi].into(), ..Settings::default() };
-        let c = compare(&pictures(shown(0.5, Some(0.1)), shown(0.25, None)), &settings).remove(0);
+        let c = compare(&set(shown(0.5, Some(0.1)), shown(0.25, None)), &settings).remove(0);
         assert!(c.scores.tvi.unwrap() > 0.0 && c.maps.tvi.is_some());
         assert!(c.scores.flip.is_none() && c.scores.hdr_flip.is_none() && c.scores.significance.is_none());
         assert!(c.maps.flip.is_none() && c.maps.z.is_none() && c.scores.bias.is_none());
-        let none = compare(&pictures(shown(0.5, None), shown(0.5, None)), &Settings::default()).remove(0);
+        let none = compare(&set(shown(0.5, None), shown(0.5, None)), &Settings::default()).remove(0);
         assert_eq!((none.scores.flip, none.scores.hdr_flip, none.scores.tvi), (Some(0.0), Some(0.0), Some(0.0)));
     }
 }

@@ -177,7 +177,7 @@ impl Browser {
         self.run("new Promise((f) => requestAnimationFrame(() => requestAnimationFrame(() => f(true))))");
     }
 
-    /// A picture of the window, as a PNG file.
+    /// An image of the window, as a PNG file.
     pub(crate) fn screenshot(&self, path: &Path) {
         let answer = self.call("Page.captureScreenshot", json!({ "format": "png" }));
         std::fs::write(path, STANDARD.decode(answer["data"].as_str().unwrap()).unwrap()).unwrap();

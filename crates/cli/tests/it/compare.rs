@@ -26,8 +26,8 @@ fn names(names: &[&str]) -> Vec<String> {
 }
 
 /// One colour with two blocks that a display clips (2 and 4 at columns 4..8 and 12..16 of the rows 4..8) and a yellow
-/// one (columns 20..24, rows 20..24) that all pictures have.
-fn picture([r, g, b]: [f32; 3]) -> Vec<[f32; 3]> {
+/// one (columns 20..24, rows 20..24) that all images have.
+fn image([r, g, b]: [f32; 3]) -> Vec<[f32; 3]> {
     let pixel = |i: usize| match (i % SIZE[0], i / SIZE[0]) {
         (4..8, 4..8) => [2.0; 3],
         (12..16, 4..8) => [4.0; 3],
@@ -57,9 +57,9 @@ fn report(output: &Output) -> Value {
 fn a_table_and_json_say_the_same() {
     let folder = tempfile::tempdir().unwrap();
     let path = |name: &str| folder.path().join(name);
-    write_with_variance(&path("r.exr"), &picture([0.5; 3]), 0.0004);
-    write_with_variance(&path("a.exr"), &picture([0.52, 0.5, 0.48]), 0.0005);
-    write_with_variance(&path("b.exr"), &picture([0.6; 3]), 0.0005);
+    write_with_variance(&path("r.exr"), &image([0.5; 3]), 0.0004);
+    write_with_variance(&path("a.exr"), &image([0.52, 0.5, 0.48]), 0.0005);
+    write_with_variance(&path("b.exr"), &image([0.6; 3]), 0.0005);
     let args = ["compare", "a.exr", "b.exr", "r.exr", "--reference", "r.exr", "--json", "out.json"];
     let output = lumiris(&args, folder.path());
     assert!(output.status.success() && stderr(&output).is_empty(), "{}", stderr(&output));
@@ -100,8 +100,8 @@ fn a_table_and_json_say_the_same() {
 fn limits_decide_the_exit_code() {
     let folder = tempfile::tempdir().unwrap();
     let path = |name: &str| folder.path().join(name);
-    write_plain(&path("r.exr"), &picture([0.5; 3]));
-    write_plain(&path("a.exr"), &picture([0.4; 3]));
+    write_plain(&path("r.exr"), &image([0.5; 3]));
+    write_plain(&path("a.exr"), &image([0.4; 3]));
     let code = |limits: &[&str]| {
         let output =
             lumiris(&[&["compare", "a.exr", "-r", "r.exr", "--metrics", "mse"], limits].concat(), folder.path());
@@ -122,8 +122,8 @@ fn limits_decide_the_exit_code() {
 fn bad_files_are_said_at_once_and_nothing_is_written() {
     let folder = tempfile::tempdir().unwrap();
     let path = |name: &str| folder.path().join(name);
-    std::fs::write(path("text.png"), "no picture").unwrap();
-    write_plain(&path("r.exr"), &picture([0.5; 3]));
+    std::fs::write(path("text.png"), "no image").unwrap();
+    write_plain(&path("r.exr"), &image([0.5; 3]));
     let small = Part::linear(4, 3, names(&["R", "G", "B"]), vec![0.0; 36]);
     write_image(&path("small.exr"), &[small]).unwrap();
     let run = |images: &[&str]| {
@@ -140,7 +140,7 @@ fn bad_files_are_said_at_once_and_nothing_is_written() {
 }
 
 #[test]
-fn pictures_of_every_format_are_linear_when_they_are_compared() {
+fn images_of_every_format_are_linear_when_they_are_compared() {
     let folder = tempfile::tempdir().unwrap();
     let path = |name: &str| folder.path().join(name);
     let value = |i: usize| [(i % 40) as f32 / 40.0, (i / 40) as f32 / 30.0, 0.5];
@@ -162,10 +162,10 @@ fn pictures_of_every_format_are_linear_when_they_are_compared() {
     let output = lumiris(&args, folder.path());
     let out = report(&output);
     // RGBE keeps 8 bits of the largest channel, PNG 8 bits of the encoded value, the others everything.
-    for (i, most) in [(0, 2e-3), (1, 3e-3), (2, 0.0), (3, 0.0)] {
+    for (i, max) in [(0, 2e-3), (1, 3e-3), (2, 0.0), (3, 0.0)] {
         let rmse = out["images"][i]["rmse"].as_f64().unwrap();
-        assert!(rmse <= most, "{} {rmse}", out["images"][i]["path"]);
-        assert!(out["images"][i]["bias"].as_f64().unwrap().abs() <= 0.6 * most);
+        assert!(rmse <= max, "{} {rmse}", out["images"][i]["path"]);
+        assert!(out["images"][i]["bias"].as_f64().unwrap().abs() <= 0.6 * max);
     }
     assert_eq!(out["images"][3]["layer"], "ViewLayer.Combined");
 }
@@ -174,7 +174,7 @@ fn pictures_of_every_format_are_linear_when_they_are_compared() {
 fn crops_layers_and_odd_pixels_are_told_of() {
     let folder = tempfile::tempdir().unwrap();
     let path = |name: &str| folder.path().join(name);
-    let mut pixels = picture([0.25; 3]);
+    let mut pixels = image([0.25; 3]);
     pixels[45] = [f32::NAN, 1.0, 1.0];
     let data = pixels.as_flattened().to_vec();
     let part = |data: Vec<f32>| Part::linear(SIZE[0], SIZE[1], names(&["R", "G", "B"]), data);
@@ -194,7 +194,7 @@ fn crops_layers_and_odd_pixels_are_told_of() {
     assert!((a["mse"].as_f64().unwrap() - 1.75 * 1.75 * 8.0 / 47.0).abs() < 1e-9);
 }
 
-/// The page of two pictures and a reference, open in a browser.
+/// The page of two images and a reference, open in a browser.
 struct Open {
     browser: Browser,
     folder: tempfile::TempDir,
@@ -239,7 +239,7 @@ impl Open {
         [left + x * width, top + y * height]
     }
 
-    /// Where the middle of a pixel of the picture is shown, in wipe and single layout before zooming.
+    /// Where the middle of a pixel of the image is shown, in wipe and single layout before zooming.
     fn pixel_at(&self, [x, y]: [f64; 2]) -> [f64; 2] {
         let [left, top, width, height] = self.place("canvas");
         let zoom = ((width - 24.0) / SIZE[0] as f64).min((height - 24.0) / SIZE[1] as f64);
@@ -312,7 +312,7 @@ const GREEN: [f32; 3] = [0.1, 0.5, 0.1];
 const BLUE: [f32; 3] = [0.1, 0.1, 0.5];
 
 fn three() -> Open {
-    open(&[("a.exr", picture(RED)), ("b.exr", picture(GREEN)), ("r.exr", picture(BLUE))], &[])
+    open(&[("a.exr", image(RED)), ("b.exr", image(GREEN)), ("r.exr", image(BLUE))], &[])
 }
 
 #[test]
@@ -402,7 +402,7 @@ fn the_page_shows_maps_with_their_scales_and_a_table_that_sorts() {
         assert!(page.shows("legend-a"), "{view}");
         assert_eq!(page.browser.run("document.querySelectorAll('#legend-a .ticks span').length"), json!(5), "{view}");
         let [here, there] = [left, block].map(|p| page.color(p));
-        // The block is the same in both pictures; the variance alone is the same everywhere.
+        // The block is the same in both images; the variance alone is the same everywhere.
         assert_eq!(here == there, view == "variance", "{view} {here:?} {there:?}");
         seen.push((here, page.text("legend-a")));
     }
@@ -427,20 +427,20 @@ fn the_page_shows_maps_with_their_scales_and_a_table_that_sorts() {
     let (one, up) = (&out["images"][0]["tvi"], first());
     page.click(&format!("#metrics th:nth-child({index}) button"));
     let (other, down) = (&out["images"][1]["tvi"], first());
-    let least = if one.as_f64() < other.as_f64() { "a.exr" } else { "b.exr" };
-    assert!(up == json!(least) && down != up, "{one} {other} {up} {down}");
+    let min = if one.as_f64() < other.as_f64() { "a.exr" } else { "b.exr" };
+    assert!(up == json!(min) && down != up, "{one} {other} {up} {down}");
     let cell = page.browser.run(&format!("document.querySelector('#metrics td:nth-child({index})').textContent"));
-    let most = one.as_f64().unwrap().max(other.as_f64().unwrap());
+    let max = one.as_f64().unwrap().max(other.as_f64().unwrap());
     let text: f64 = cell.as_str().unwrap().parse().unwrap();
-    assert!((text / most - 1.0).abs() < 0.005, "{text} {most}");
+    assert!((text / max - 1.0).abs() < 0.005, "{text} {max}");
     page.has_no_complaint();
 }
 
 #[test]
 fn a_page_of_one_image_works_and_marks_what_is_not_finite() {
-    let mut pixels = picture(RED);
+    let mut pixels = image(RED);
     pixels[16 * 40 + 10] = [f32::NAN, 0.5, 0.5];
-    let page = open(&[("a.exr", pixels), ("r.exr", picture(BLUE))], &["--metrics", "mse", "--exposure", "-1"]);
+    let page = open(&[("a.exr", pixels), ("r.exr", image(BLUE))], &["--metrics", "mse", "--exposure", "-1"]);
     assert!(near(page.color(page.at([0.3, 0.3])), shown(RED, -1.0)));
     assert_eq!(page.color(page.pixel_at([10.0, 16.0])), [255, 0, 255]);
     page.browser.key("s", "KeyS", false);

@@ -253,8 +253,9 @@ fn assert_stratification_helps(scenes: &[&[Value]]) {
     }
 }
 
-/// The cache has few records in a picture of 16 × 16 pixels, and interpolates the edges of shadows: its errors are 74 to 87 with
-/// standard errors of up to 13, and it is 2 ± 0.3 % darker than paths. What the estimators differ by is their own.
+/// The cache has few records in an image of 16 × 16 pixels, and interpolates the edges of shadows: its errors are 74 to
+/// 87 with standard errors of up to 13, and it is 2 ± 0.3 % darker than paths. What the estimators differ by is their
+/// own.
 fn assert_box(methods: &[Value]) {
     let [of_mis, its_error] = bias(&methods[0]);
     assert!(of_mis.abs() < 0.04, "interpolation changes the mean by {of_mis}");
@@ -289,8 +290,8 @@ fn assert_verdicts_of_control_variates(id: &str, figure: &Value, methods: &[Valu
         assert_eq!(reached(row), expected, "{id}: {row}");
     }
     for (k, m) in methods.iter().enumerate().filter(|_| id != "box") {
-        let (light_choice, points) = (m["light_choice"].as_str().unwrap(), m["points"].as_str().unwrap());
-        assert_eq!(light_choice, if k < 3 * ROLES { "uniform" } else { "tree" }, "{id} {k}");
+        let (light_sampler, points) = (m["light_sampler"].as_str().unwrap(), m["points"].as_str().unwrap());
+        assert_eq!(light_sampler, if k < 3 * ROLES { "uniform" } else { "tree" }, "{id} {k}");
         let way = if k < 3 * ROLES { k / ROLES } else { (k - 3 * ROLES) / 2 };
         let ways = ["stratified in each estimate", "stratified over all rays", "independent"];
         assert_eq!(points, ways[way], "{id} {k}");

@@ -22,7 +22,7 @@ pub enum ProceduralError {
         /// Why.
         source: io::Error,
     },
-    /// A picture cannot be written.
+    /// An image cannot be written.
     #[error(transparent)]
     Image(#[from] ImageError),
 }

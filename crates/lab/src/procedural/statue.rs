@@ -77,9 +77,9 @@ impl StatueField {
             Shape::Strokes(strokes) => {
                 let distances: Vec<(u32, f32)> =
                     candidates.map(|i| (i, strokes[i as usize].distance(ball.center).0)).collect();
-                let least = distances.iter().map(|&(_, d)| d).fold(f32::INFINITY, f32::min);
-                selected.extend(distances.iter().filter(|&&(_, d)| d - reach <= least + reach).map(|&(i, _)| i));
-                least
+                let min = distances.iter().map(|&(_, d)| d).fold(f32::INFINITY, f32::min);
+                selected.extend(distances.iter().filter(|&&(_, d)| d - reach <= min + reach).map(|&(i, _)| i));
+                min
             }
         };
         let slack = reach + part.relief.amplitude();

@@ -8,7 +8,7 @@
 use super::measure::{Measured, Seconds, Stage, View, turns};
 use super::method::Method;
 use super::{Observer, ReproduceError};
-use lumiris::settings::{Split, StageTimes};
+use lumiris::settings::{SampleCounts, StageTimes};
 
 /// Turns of a measurement of times.
 const TURNS: u32 = 3;
@@ -27,7 +27,7 @@ pub struct Calibration {
     /// Direct lighting of one point by the baseline (ns).
     pub budget: f64,
     /// M and N.
-    pub split: Split,
+    pub sample_counts: SampleCounts,
     /// Wall-clock seconds of one camera ray per pixel by the baseline.
     pub seconds: f64,
 }
@@ -38,34 +38,34 @@ fn points(m: &Measured) -> f64 {
 }
 
 /// N and M for a time per point, of which half goes to samples; at least one sample, and no fewer proposals than samples.
-pub fn equal_halves(budget: f64, times: StageTimes) -> Split {
+pub fn equal_halves(budget: f64, times: StageTimes) -> SampleCounts {
     let samples = (0.5 * budget / times.t2).round().max(1.0);
     let samples = samples.min((budget / (times.t1 + times.t2)).floor().max(1.0));
-    spend_rest(budget, times, samples as u32)
+    counts_for_budget(budget, times, samples as u32)
 }
 
 /// The proposals that fit beside a number of samples.
-pub fn spend_rest(budget: f64, times: StageTimes, samples: u32) -> Split {
+pub fn counts_for_budget(budget: f64, times: StageTimes, samples: u32) -> SampleCounts {
     let proposals = ((budget - f64::from(samples) * times.t2) / times.t1).round().clamp(1.0, f64::from(MAX_PROPOSALS));
-    Split { samples, proposals: (proposals as u32).max(samples) }
+    SampleCounts { samples, proposals: (proposals as u32).max(samples) }
 }
 
 /// Measures times, and finds a split that costs what the baseline costs, within about a percent.
 pub fn calibrate(stage: &mut Stage, base: &Method, observer: Observer<'_>) -> Result<Calibration, ReproduceError> {
     // Times, and that of the baseline
     let default = StageTimes { t1: 100.0, t2: 100.0 };
-    let times = stage.stage_times(base.light_choice)?.unwrap_or(default);
-    let ris = |proposals, samples| Method::ris(proposals, samples).lights_by(base.light_choice).stratified();
+    let times = stage.stage_times(base.light_sampler)?.unwrap_or(default);
+    let ris = |proposals, samples| Method::ris(proposals, samples).lights_by(base.light_sampler).stratified();
     let guess = ris(4 * base.samples, base.samples.div_ceil(2));
     let pilot = turns(stage, &[*base, guess], View::Centres, 1, 0..TURNS, observer)?;
     let busy = pilot[0].median_seconds(|s| s.processor / s.stages().max(1e-12)).min(1.0);
     let budget = pilot[0].median_seconds(Seconds::direct) * busy * 1e9 / points(&pilot[1]);
     let seconds = pilot[0].median_seconds(|s| s.wall);
-    let mut found = Calibration { times, budget, split: equal_halves(budget, times), seconds };
+    let mut found = Calibration { times, budget, sample_counts: equal_halves(budget, times), seconds };
 
     // The split in turns with the baseline; the number of proposals changes until times match
     for step in 0..CORRECTIONS {
-        let Split { samples, proposals } = found.split;
+        let SampleCounts { samples, proposals } = found.sample_counts;
         let method = ris(proposals, samples);
         let range = (step + 1) * TURNS..(step + 2) * TURNS;
         let pair = turns(stage, &[*base, method], View::Centres, 1, range, observer)?;
@@ -76,7 +76,7 @@ pub fn calibrate(stage: &mut Stage, base: &Method, observer: Observer<'_>) -> Re
         // The excess is a part of the whole time of the baseline; a proposal takes T1 of it at every point.
         let surplus = excess * pair[0].median_seconds(|s| s.processor) * 1e9 / (points(&pair[1]) * found.times.t1);
         let corrected = (f64::from(proposals) - surplus).round().clamp(f64::from(samples), f64::from(MAX_PROPOSALS));
-        found.split.proposals = corrected as u32;
+        found.sample_counts.proposals = corrected as u32;
     }
     Ok(found)
 }
@@ -114,14 +114,20 @@ mod tests {
     fn halves_of_the_time_go_to_proposals_and_to_samples() {
         let times = StageTimes { t1: 10.0, t2: 160.0 };
         // The paper's case: 20 samples of one proposal each.
-        let split = equal_halves(20.0 * 170.0, times);
-        assert_eq!(split.samples, 11);
-        assert_eq!(split.proposals, 164);
-        let spent = |s: Split| f64::from(s.proposals) * times.t1 + f64::from(s.samples) * times.t2;
-        assert!((spent(split) - 3400.0).abs() < times.t1);
+        let sample_counts = equal_halves(20.0 * 170.0, times);
+        assert_eq!(sample_counts.samples, 11);
+        assert_eq!(sample_counts.proposals, 164);
+        let spent = |s: SampleCounts| f64::from(s.proposals) * times.t1 + f64::from(s.samples) * times.t2;
+        assert!((spent(sample_counts) - 3400.0).abs() < times.t1);
         // One sample at least; proposals as dear as samples leave M = N.
         assert_eq!(equal_halves(100.0, times).samples, 1);
-        assert_eq!(equal_halves(2000.0, StageTimes { t1: 100.0, t2: 100.0 }), Split { samples: 10, proposals: 10 });
-        assert_eq!(equal_halves(2000.0, StageTimes { t1: 100.0, t2: 10.0 }), Split { samples: 18, proposals: 18 });
+        assert_eq!(
+            equal_halves(2000.0, StageTimes { t1: 100.0, t2: 100.0 }),
+            SampleCounts { samples: 10, proposals: 10 }
+        );
+        assert_eq!(
+            equal_halves(2000.0, StageTimes { t1: 100.0, t2: 10.0 }),
+            SampleCounts { samples: 18, proposals: 18 }
+        );
     }
 }

@@ -1,6 +1,6 @@
 //! Line charts with two logarithmic axes, as SVG.
 
-use super::pictures::significant;
+use super::images::significant;
 use minijinja::HtmlEscape;
 use std::fmt::Write;
 

@@ -1,9 +1,9 @@
 //! Figures of a paper and their page: a table of the paper's results and the measured ones, the figures one after the
 //! other, and a file with all numbers.
 
+use super::images::significant;
 use super::measure::Estimate;
 use super::page::{Block, Cell, Page, Table};
-use super::pictures::significant;
 use super::{Options, ReproduceError, write_file};
 use serde_json::{Value, json};
 use std::path::PathBuf;

@@ -1,10 +1,11 @@
 //! Methods in turns on one scene: variance and time of each, in the same run.
 //!
-//! A *turn* renders the picture once with each method, each with its own seed; the order of the methods moves on by one
+//! A *turn* renders the image once with each method, each with its own seed; the order of the methods moves on by one
 //! from turn to turn, so that a machine that slows down slows all of them. The variance of a method is that of its
-//! pixel estimates over the turns (luminance; unbiased; no reference picture is needed), averaged over pixels. Its time is
-//! the processor time of the rendering over all threads, which does not count what else the machine does meanwhile; times of
-//! two methods are compared turn by turn: the median of the ratios. Camera rays pass through pixel centres, so that the variance is that of lighting and not of antialiasing.
+//! pixel estimates over the turns (luminance; unbiased; no reference image is needed), averaged over pixels. Its time
+//! is the processor time of the rendering over all threads, which does not count what else the machine does meanwhile;
+//! times of two methods are compared turn by turn: the median of the ratios. Camera rays pass through pixel centres, so
+//! that the variance is that of lighting and not of antialiasing.
 
 use super::method::Method;
 use super::{Observer, ReproduceError};
@@ -12,7 +13,7 @@ use lumiris::accel::{Accel, AccelStats, Bvh, Coherence, Hit, RayBatch};
 use lumiris::film::Film;
 use lumiris::film::filter::PixelFilter;
 use lumiris::import::{LoadOptions, load};
-use lumiris::lights::{LightHints, LightSamplerKind};
+use lumiris::lights::{LightSamplerKind, VisibilityCache};
 use lumiris::render::plan::prepare;
 use lumiris::render::{RenderError, RenderSettings, Rendering, render};
 use lumiris::scene::{AccelKind, RenderJob};
@@ -63,7 +64,7 @@ pub struct Stage {
     depth: u32,
 }
 
-/// What a picture shall show.
+/// What an image shall show.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum View {
     /// Rays through the centres of pixels.
@@ -75,7 +76,7 @@ pub enum View {
 }
 
 impl Stage {
-    /// Loads a scene for a picture of `size` (width, height) pixels.
+    /// Loads a scene for an image of `size` (width, height) pixels.
     pub fn load(path: &Path, size: [u32; 2], threads: Option<usize>) -> Result<Self, ReproduceError> {
         let options = LoadOptions { resolution: Some(size), crop: None };
         let loaded = load(path, &options).map_err(|report| ReproduceError::Scene { path: path.to_owned(), report })?;
@@ -94,11 +95,11 @@ impl Stage {
     }
 
     /// Says which lights are seen from where, until it says otherwise.
-    pub fn set_light_hints(&mut self, hints: Option<LightHints>) {
-        self.job.lights.set_hints(hints);
+    pub fn set_visibility_cache(&mut self, visibility_cache: Option<VisibilityCache>) {
+        self.job.lights.set_visibility_cache(visibility_cache);
     }
 
-    /// Size of the picture.
+    /// Size of the image.
     pub fn size(&self) -> [u32; 2] {
         self.job.world.scene.film.resolution
     }
@@ -134,7 +135,7 @@ impl Stage {
         self.shadows.store(true, Ordering::Relaxed);
         prepare(&mut self.job, self.threads, false).map_err(RenderError::from)?;
         let seconds = processor_time().saturating_sub(start).as_secs_f64();
-        let Some(map) = &mut self.job.splits else { return Ok((Vec::new(), seconds)) };
+        let Some(map) = &mut self.job.sample_count_map else { return Ok((Vec::new(), seconds)) };
         map.time = budget;
         Ok((map.ratios.clone(), seconds))
     }
@@ -151,7 +152,7 @@ impl Stage {
         self.set(method);
         let radius = if view == View::Antialiased { 0.5 } else { CENTRE };
         self.job.world.scene.film.filter = PixelFilter::Box { rx: radius, ry: radius };
-        // One footprint for short and long renderings, which estimate the same picture
+        // One footprint for short and long renderings, which estimate the same image
         self.job.change(|s| {
             (s.sampling.seed, s.sampling.spp, s.sampling.footprint_spp) = (seed, spp, Some(1));
         });
@@ -231,7 +232,7 @@ pub struct Measured {
     luminance: Vec<Vec<f32>>,
     /// Sum over the turns of the pixels' radiance.
     sum: Vec<[f64; 3]>,
-    /// The picture of the first turn.
+    /// The image of the first turn.
     pub first: Vec<[f32; 3]>,
     /// Times, turn by turn.
     pub seconds: Vec<Seconds>,
@@ -285,7 +286,7 @@ impl Measured {
         self.sum.iter().map(|p| p.map(|v| v / turns)).collect()
     }
 
-    /// Grey pictures of these luminances, rendered in no time.
+    /// Grey images of these luminances, rendered in no time.
     #[cfg(test)]
     pub fn from_luminances(method: Method, turns: Vec<Vec<f32>>) -> Self {
         let mut m = Measured::new(method);
@@ -328,7 +329,7 @@ impl Measured {
         Estimate { value: over_turns.mean(), error: over_turns.standard_error() }
     }
 
-    /// Mean luminance of the picture, and its standard error from the variances of the pixels.
+    /// Mean luminance of the image, and its standard error from the variances of the pixels.
     pub fn mean(&self) -> Estimate {
         let (turns, pixels) = (self.turns() as f64, self.sum.len().max(1) as f64);
         let value = self.sum.iter().map(|&p| luminance(p)).sum::<f64>() / (turns * pixels);
@@ -399,7 +400,7 @@ pub fn turns(
     Ok(measured)
 }
 
-/// The mean picture of all turns of all methods, each with the same weight.
+/// The mean image of all turns of all methods, each with the same weight.
 pub fn reference(all: &[Measured]) -> Vec<[f64; 3]> {
     let pixels = all.first().map_or(0, |m| m.sum.len());
     let turns: usize = all.iter().map(Measured::turns).sum();

@@ -51,7 +51,7 @@ pub struct Method {
     /// Estimator of direct light.
     pub estimator: EstimatorKind,
     /// How a light is chosen.
-    pub light_choice: LightSamplerKind,
+    pub light_sampler: LightSamplerKind,
     /// Weights of the techniques; the estimator's own if `None`.
     pub heuristic: Option<Heuristic>,
     /// How `ocv` finds its coefficients.
@@ -64,8 +64,8 @@ pub struct Method {
     pub proposals: u32,
     /// What `ris` draws samples in proportion to.
     pub target: Target,
-    /// Samples of `contributing` on the lights that no photon came from.
-    pub rest_samples: u32,
+    /// Samples of `contributing` on the non-contributing lights.
+    pub noncontributing_samples: u32,
     /// Samples over proposals, for `ris`.
     pub strata: Strata,
     /// True if `ris` shares the time of an estimate out between M and N in each pixel as [`Stage::plan_per_pixel`](super::measure::Stage::plan_per_pixel) found out.
@@ -81,14 +81,14 @@ impl Method {
         Method {
             transport: Transport::Direct,
             estimator,
-            light_choice: LightSamplerKind::Tree,
+            light_sampler: LightSamplerKind::Tree,
             heuristic: None,
             form: Form::Progressive,
             optimal: OptimalForm::Progressive,
             samples,
             proposals: samples,
             target: Target::Fgl,
-            rest_samples: 1,
+            noncontributing_samples: 1,
             strata: Strata::None,
             per_pixel: false,
             points: Points::Independent,
@@ -116,8 +116,8 @@ impl Method {
     }
 
     /// Sampling of the lights that photons came from, and of the others, with independent random numbers.
-    pub fn contributing(samples: u32, rest_samples: u32) -> Self {
-        Method { estimator: EstimatorKind::Contributing, rest_samples, ..Method::mc(samples) }
+    pub fn contributing(samples: u32, noncontributing_samples: u32) -> Self {
+        Method { estimator: EstimatorKind::Contributing, noncontributing_samples, ..Method::mc(samples) }
     }
 
     /// Resampled importance sampling with independent random numbers and draws.
@@ -131,8 +131,8 @@ impl Method {
     }
 
     /// The same with another choice of lights.
-    pub fn lights_by(self, light_choice: LightSamplerKind) -> Self {
-        Method { light_choice, ..self }
+    pub fn lights_by(self, light_sampler: LightSamplerKind) -> Self {
+        Method { light_sampler, ..self }
     }
 
     /// The same with other weights of the techniques.
@@ -165,7 +165,7 @@ impl Method {
             samples: Some(self.samples),
             heuristic: self.heuristic,
             optimal_mis: self.optimal,
-            light_choice: self.light_choice,
+            light_sampler: self.light_sampler,
             ..*i
         };
         i.ocv.form = self.form;
@@ -173,7 +173,7 @@ impl Method {
         i.ris.proposals = if self.per_pixel { Proposals::Optimal } else { Proposals::Fixed(self.proposals) };
         i.ris.strata = self.strata;
         i.ris.target = self.target;
-        i.contributing.rest_samples = self.rest_samples;
+        i.contributing.noncontributing_samples = self.noncontributing_samples;
         (settings.sampling.sampler, i.ris.points) = match self.points {
             Points::Independent => (SamplerKind::Independent, ProposalPoints::Independent),
             Points::PerEstimate => (SamplerKind::Stratified, ProposalPoints::Stratified),

@@ -1,19 +1,19 @@
-//! Figures of papers, rendered and measured again, as a page with pictures and a file with all numbers.
+//! Figures of papers, rendered and measured again, as a page with images and a file with all numbers.
 //!
 //! Reading order: [`method`] (a way to estimate light), [`measure`] (methods in turns on one scene, variances and times),
 //! [`calibrate`] (numbers of samples and proposals for equal time), [`talbot`] (resampled importance sampling), [`fan`]
 //! (optimizing control variates), [`keller_wald`] (photon maps), [`verdicts`] (when a figure counts as reached), then what a page is
-//! made of: [`figure`], [`page`], [`pictures`], [`chart`].
+//! made of: [`figure`], [`page`], [`images`], [`chart`].
 
 pub mod calibrate;
 pub mod chart;
 pub mod fan;
 pub mod figure;
+pub mod images;
 pub mod keller_wald;
 pub mod measure;
 pub mod method;
 pub mod page;
-pub mod pictures;
 pub mod talbot;
 pub mod verdicts;
 
@@ -34,7 +34,7 @@ pub struct Options {
     pub quick: bool,
     /// Threads; all cores if `None`.
     pub threads: Option<usize>,
-    /// Most pixels along an edge of a picture.
+    /// Most pixels along an edge of an image.
     pub size: Option<u32>,
     /// The command as it was typed, for the page.
     pub command: String,
@@ -73,13 +73,13 @@ pub enum ReproduceError {
     /// A ray tracer could not be built.
     #[error("cannot build a ray tracer: {0}")]
     Accel(#[from] lumiris::accel::embree::EmbreeError),
-    /// A rendering ended without a picture.
+    /// A rendering ended without an image.
     #[error(transparent)]
     Render(#[from] lumiris::render::RenderError),
     /// There is no photon map.
     #[error(transparent)]
     Photons(#[from] lumiris::photons::PhotonError),
-    /// A picture could not be written.
+    /// An image could not be written.
     #[error(transparent)]
     Image(#[from] lumiris::imaging::oiio::ImageError),
     /// A file could not be written.
@@ -95,7 +95,7 @@ pub enum ReproduceError {
     Stopped,
 }
 
-/// Width and height of a picture of a shape whose longer edge has `size` pixels.
+/// Width and height of an image of a shape whose longer edge has `size` pixels.
 fn scaled(shape: [u32; 2], size: u32) -> [u32; 2] {
     let longer = shape[0].max(shape[1]).max(1);
     shape.map(|s| (s * size / longer).max(1))

@@ -2,7 +2,7 @@
 //! are separate files beside it.
 
 use super::chart::Chart;
-use super::pictures::Scale;
+use super::images::Scale;
 use minijinja::{Environment, Value, context};
 
 /// A page: a title and blocks in order.
@@ -28,9 +28,9 @@ pub enum Block {
     Note(String),
     /// A table.
     Table(Table),
-    /// Pictures side by side.
-    Pictures(Vec<Shown>),
-    /// What the colours of pictures above mean.
+    /// Images side by side.
+    Images(Vec<Shown>),
+    /// What the colours of images above mean.
     Legend {
         /// Quantity and unit.
         title: String,
@@ -43,7 +43,7 @@ pub enum Block {
     Chart(Chart),
 }
 
-/// A picture with its caption.
+/// An image with its caption.
 #[derive(Clone, Debug)]
 pub struct Shown {
     /// File beside the page.
@@ -153,9 +153,9 @@ impl Block {
             Block::Text(text) => context! { kind => "text", text => text.as_str() },
             Block::Note(text) => context! { kind => "note", text => text.as_str() },
             Block::Table(table) => context! { kind => "table", header => table.header.clone(), rows => table.rows() },
-            Block::Pictures(list) => {
-                let pictures: Vec<Value> = list.iter().map(Shown::context).collect();
-                context! { kind => "pictures", pictures }
+            Block::Images(list) => {
+                let images: Vec<Value> = list.iter().map(Shown::context).collect();
+                context! { kind => "images", images }
             }
             Block::Legend { title, scale } => {
                 context! { kind => "legend", title => title.as_str(), background => scale.css(), ticks => scale.ticks(5) }
@@ -196,7 +196,7 @@ impl Table {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::reproduce::pictures::HEAT;
+    use crate::reproduce::images::HEAT;
 
     #[test]
     fn what_a_text_holds_never_becomes_markup() {
@@ -210,7 +210,7 @@ mod tests {
             Block::Text(evil.into()),
             Block::Note(evil.into()),
             Block::Table(table),
-            Block::Pictures(vec![shown]),
+            Block::Images(vec![shown]),
             Block::Facts(vec![(evil.into(), evil.into())]),
             Block::Legend { title: evil.into(), scale: Scale::new(HEAT, 1.0, 2.0) },
         ]);
@@ -229,7 +229,7 @@ mod tests {
         page.extend([
             Block::section("one", "One"),
             Block::Table(table),
-            Block::Pictures((0..3).map(shown).collect()),
+            Block::Images((0..3).map(shown).collect()),
             Block::Chart(Chart::new("x", "y").with("s", vec![[1.0, 2.0], [10.0, 20.0]])),
         ]);
         let html = page.html();

@@ -46,7 +46,7 @@ impl Heuristic {
     /// [`weight`](Self::weight) of expected numbers of samples x = n_a p_a > 0 and y = n_b p_b, of one sample or of lanes.
     #[inline(always)]
     pub fn weight_of_expected<N: Number>(self, x: N, y: N) -> N {
-        let (zero, half, one, most) = (x.constant(0.0), x.constant(0.5), x.constant(1.0), x.constant(f32::MAX));
+        let (zero, half, one, max) = (x.constant(0.0), x.constant(0.5), x.constant(1.0), x.constant(f32::MAX));
         // The ratio y/x, and not the products, so that neither squares overflow nor inf/inf appears
         let ratio = y / x;
         let weight = match self {
@@ -59,7 +59,7 @@ impl Heuristic {
         };
         let weight = y.if_above(zero, weight, one);
         // Infinite densities share
-        x.if_above(most, y.if_above(most, half, weight), weight)
+        x.if_above(max, y.if_above(max, half, weight), weight)
     }
 
     /// The factor w/(n·p) of f in the estimate over the samples of both techniques, of a sample that `a` drew; 0 where `a`

@@ -54,7 +54,7 @@ impl SampleStream {
     pub fn new(kind: SamplerKind, pixel: [u32; 2], sample: u32, seed: u32) -> Self {
         let (x, y) = (pixel[0] as i32, pixel[1] as i32);
         // openqmc takes the index as i32, and a frame number which it adds to the number of the pixel (16 bits): seeds that
-        // were frames as they are would give shifted copies of one picture. Multiples of the golden ratio stay apart.
+        // were frames as they are would give shifted copies of one image. Multiples of the golden ratio stay apart.
         let index = (sample & 0x7fff_ffff) as i32;
         let frame = (seed.wrapping_mul(0x9e37_79b1) >> 2) as i32;
         SampleStream(match kind {
@@ -139,7 +139,7 @@ mod tests {
     }
 
     #[test]
-    fn a_seed_does_not_shift_the_picture_of_another() {
+    fn a_seed_does_not_shift_the_image_of_another() {
         for kind in SamplerKind::iter() {
             let draw = |x, y, seed| SampleStream::new(kind, [x, y], 0, seed).domain(4).draw::<2>();
             for seed in 1..200 {

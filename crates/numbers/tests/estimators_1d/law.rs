@@ -13,7 +13,7 @@ const POINTS: usize = 200;
 /// Steps of the grid of weights that the law of their sum is on.
 const STEPS: usize = 1_200;
 /// At least the largest weight.
-const MOST: f64 = 1.3;
+const MAX_WEIGHT: f64 = 1.3;
 
 fn q_hat(theta: f64) -> f64 {
     (theta.cos() + theta.sin().powi(4)).max(0.0)
@@ -24,7 +24,7 @@ fn law_of_weight() -> Vec<f64> {
     let mut law = vec![0.0; STEPS + 1];
     let total = BINS * POINTS;
     for k in 0..total {
-        let at = q_hat(PI * (k as f64 + 0.5) / total as f64) / MOST * STEPS as f64;
+        let at = q_hat(PI * (k as f64 + 0.5) / total as f64) / MAX_WEIGHT * STEPS as f64;
         let (i, t) = (at as usize, at.fract());
         law[i] += (1.0 - t) / total as f64;
         law[i + 1] += t / total as f64;
@@ -48,7 +48,7 @@ fn exact_law(m: usize) -> Vec<f64> {
         .map(|bin| {
             let mean = |k: usize| {
                 let w = q_hat(PI * (bin as f64 + (k as f64 + 0.5) / POINTS as f64) / BINS as f64);
-                let share = |(i, p): (usize, &f64)| p * w / (w + i as f64 * MOST / STEPS as f64);
+                let share = |(i, p): (usize, &f64)| p * w / (w + i as f64 * MAX_WEIGHT / STEPS as f64);
                 if w > 0.0 { others.iter().enumerate().map(share).sum::<f64>() } else { 0.0 }
             };
             m as f64 * (0..POINTS).map(mean).sum::<f64>() / (POINTS * BINS) as f64

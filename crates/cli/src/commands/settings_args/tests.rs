@@ -28,11 +28,11 @@ fn values(kind: &Kind) -> Vec<Value> {
     let texts: Vec<String> = match kind {
         Kind::Choice { names, .. } => names.iter().map(ToString::to_string).collect(),
         Kind::Integer { range, words } => {
-            let numbers = [range.least, range.least + 3, range.most.min(i32::MAX as u64)].map(|n| n.to_string());
+            let numbers = [range.min, range.min + 3, range.max.min(i32::MAX as u64)].map(|n| n.to_string());
             words.iter().map(ToString::to_string).chain(numbers).collect()
         }
         Kind::Real { range, words } => {
-            let numbers = [0.1, 0.3, 0.7].map(|t| (range.least + t * (range.most.min(5.0) - range.least)).to_string());
+            let numbers = [0.1, 0.3, 0.7].map(|t| (range.min + t * (range.max.min(5.0) - range.min)).to_string());
             words.iter().map(ToString::to_string).chain(numbers).collect()
         }
         Kind::Pair { .. } => vec!["1.7,23.4".to_owned(), "0.25,1000".to_owned()],
@@ -44,7 +44,7 @@ fn values(kind: &Kind) -> Vec<Value> {
     texts.iter().map(|text| kind.parse(text).unwrap()).collect()
 }
 
-/// Settings of a picture that `row` can change.
+/// Settings of an image that `row` can change.
 fn where_it_applies(row: &Setting) -> Settings {
     for kind in IntegratorKind::VARIANTS {
         for estimator in EstimatorKind::VARIANTS {
@@ -57,7 +57,7 @@ fn where_it_applies(row: &Setting) -> Settings {
             }
         }
     }
-    panic!("--{} applies to no picture", row.flag)
+    panic!("--{} applies to no image", row.flag)
 }
 
 /// `settings` with the renderer's choices as if they had been asked for.
@@ -71,7 +71,7 @@ fn resolved(mut settings: Settings) -> Settings {
     settings
 }
 
-/// Every value of every setting, in a picture that it changes.
+/// Every value of every setting, in an image that it changes.
 fn cases() -> impl Iterator<Item = (&'static Setting, Settings)> {
     rows().flat_map(|row| {
         values(&row.kind).into_iter().map(move |value| {
@@ -133,7 +133,7 @@ fn metadata_written_into_a_scene_file_are_the_same_settings() {
     }
 }
 
-/// Settings as metadata have them: nothing is said of what the picture does not depend on.
+/// Settings as metadata have them: nothing is said of what the image does not depend on.
 fn at_default_where_nothing_depends_on_it(settings: Settings) -> Settings {
     let mut recorded = Settings::default();
     for row in rows().filter(|row| row.applies.to(&settings)) {
@@ -184,10 +184,10 @@ fn options_out_of_range_are_errors_that_say_what_is_expected() {
 }
 
 #[test]
-fn a_setting_applies_to_some_pictures_and_not_to_all_unless_it_says_so() {
+fn a_setting_applies_to_some_images_and_not_to_all_unless_it_says_so() {
     for row in rows() {
         let always = matches!(row.applies, Applies::Always);
-        assert!(always || !row.applies.to(&Settings::default()) || row.flag == "bsdf-share", "--{}", row.flag);
+        assert!(always || !row.applies.to(&Settings::default()) || row.flag == "bsdf-fraction", "--{}", row.flag);
         where_it_applies(row);
     }
 }

@@ -68,8 +68,8 @@ impl Building {
     /// Middle of the door that leads from a room in direction `axis` (0: +x, 1: +y), along the wall (m).
     fn door(&self, room: [u32; 2], axis: usize) -> f32 {
         let start = PITCH * room[1 - axis] as f32;
-        let most = PITCH - 2.0 * HALF_WALL - DOOR[0] - 0.6;
-        start + HALF_WALL + 0.3 + 0.5 * DOOR[0] + most * self.random(room, DOORS[axis])[0]
+        let max = PITCH - 2.0 * HALF_WALL - DOOR[0] - 0.6;
+        start + HALF_WALL + 0.3 + 0.5 * DOOR[0] + max * self.random(room, DOORS[axis])[0]
     }
 }
 

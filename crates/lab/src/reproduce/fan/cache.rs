@@ -1,10 +1,10 @@
 //! Irradiance caching: records whose light of sources is computed by `mis` or by `ocv` [Fan et al. 2006, Fig. 4].
 
 use super::super::figure::Figure;
+use super::super::images::{Image, gain, significant};
 use super::super::measure::{Measured, Stage, View, turns};
 use super::super::method::{Method, Transport};
 use super::super::page::{Block, Shown, Table};
-use super::super::pictures::{Picture, gain, significant};
 use super::super::{ReproduceError, scaled};
 use super::Setup;
 use super::cases::LONG_TURNS;
@@ -16,7 +16,7 @@ use serde_json::{Value, json};
 use std::time::{Duration, Instant};
 
 const FILE: &str = "box.pbrt";
-/// Width and height of the picture.
+/// Width and height of the image.
 const SHAPE: [u32; 2] = [400, 400];
 /// Camera rays per pixel, and samples of an estimate.
 const SPP: u32 = 9;
@@ -27,9 +27,9 @@ const ASKED: Asked = Asked { paper: [4.9, 4.0], time: 1.05, target: 18.0, effici
 const LONG: (u32, u32) = (64, 4);
 /// Fewest and most turns.
 const TURNS: [u32; 2] = [4, 16];
-/// Edge of the picture on which times are found out, and the least edge, usual and quick.
+/// Edge of the image on which times are found out, and the least edge, usual and quick.
 const PILOT_SIZE: u32 = 64;
-const LEAST_SIZE: [u32; 2] = [64, 32];
+const MIN_SIZE: [u32; 2] = [64, 32];
 /// Place of `ocv`, progressive.
 const BEST: usize = 2;
 
@@ -74,9 +74,8 @@ pub(super) fn run(setup: &Setup<'_>, time: Duration) -> Result<Figure, Reproduce
     let reference = ray * f64::from(LONG.0 * LONG.1);
     let wanted = 1.2 * (turn * f64::from(2 * TURNS[0]) + reference);
     let fits = (time.saturating_sub(start.elapsed()).as_secs_f64() / wanted).sqrt();
-    let size = ((f64::from(pilot_size) * fits) as u32 / 8 * 8)
-        .max(LEAST_SIZE[usize::from(setup.options.quick)])
-        .min(setup.size);
+    let size =
+        ((f64::from(pilot_size) * fits) as u32 / 8 * 8).max(MIN_SIZE[usize::from(setup.options.quick)]).min(setup.size);
     let grown = (f64::from(size) / f64::from(pilot_size)).powi(2);
     stage = Stage::load(&path, scaled(SHAPE, size), setup.options.threads)?;
 
@@ -106,7 +105,7 @@ fn figure(setup: &Setup<'_>, o: &Outcome) -> Result<Figure, ReproduceError> {
         ),
         Block::Facts(vec![
             (
-                "picture".to_owned(),
+                "image".to_owned(),
                 format!("{} × {} pixels, {SPP} camera rays per pixel, {SAMPLES} samples of the source", o.size[0], o.size[1]),
             ),
             ("turns".to_owned(), format!("{} of {} methods", o.measured[0].turns(), o.names.len())),
@@ -125,7 +124,7 @@ fn figure(setup: &Setup<'_>, o: &Outcome) -> Result<Figure, ReproduceError> {
             ),
         ]),
     ];
-    blocks.push(Block::Pictures(shown(setup, o)?));
+    blocks.push(Block::Images(shown(setup, o)?));
     let list = [0, BEST].map(|i| (o.names[i], &o.measured[i]));
     blocks.extend(variances(setup, &o.truth, o.size, &list, "box-variance", "stratified over all rays")?);
     blocks.push(Block::Table(table));
@@ -155,12 +154,12 @@ fn shown(setup: &Setup<'_>, o: &Outcome) -> Result<Vec<Shown>, ReproduceError> {
     let exposure = gain(&o.truth.radiance);
     let mut shown = Vec::new();
     for i in [0, BEST] {
-        let picture = Picture::tone_mapped(o.size, &o.measured[i].first, exposure);
-        let file = picture.write(&setup.options.out, &format!("box-{i}"))?;
+        let image = Image::tone_mapped(o.size, &o.measured[i].first, exposure);
+        let file = image.write(&setup.options.out, &format!("box-{i}"))?;
         shown.push(Shown { file, title: o.names[i].to_owned(), caption: String::new() });
     }
-    let picture = Picture::tone_mapped(o.size, &o.truth.radiance, exposure);
-    let file = picture.write(&setup.options.out, "box-reference")?;
+    let image = Image::tone_mapped(o.size, &o.truth.radiance, exposure);
+    let file = image.write(&setup.options.out, "box-reference")?;
     shown.push(Shown { file, title: "reference, path tracing".to_owned(), caption: String::new() });
     Ok(shown)
 }

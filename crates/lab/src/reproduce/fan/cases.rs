@@ -8,7 +8,7 @@ pub(super) struct Case {
     pub title: &'static str,
     pub intro: &'static str,
     pub file: &'static str,
-    /// Width and height of the paper's picture.
+    /// Width and height of the paper's image.
     pub shape: [u32; 2],
     /// Camera rays per pixel, and samples at each.
     pub spp: u32,
@@ -20,7 +20,7 @@ pub(super) struct Case {
     pub target: f64,
     /// True if the efficiency must not be below that of mis either.
     pub efficient: bool,
-    /// The part of the picture that is shown larger: left, top, right, bottom, in fractions.
+    /// The part of the image that is shown larger: left, top, right, bottom, in fractions.
     pub crop: [f64; 4],
 }
 

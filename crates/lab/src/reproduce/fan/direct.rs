@@ -11,18 +11,18 @@ use super::outcome::Outcome;
 use super::roster::{Numbers, Role, methods};
 use super::truth::Truth;
 use super::{Setup, report};
-use lumiris::settings::Split;
+use lumiris::settings::SampleCounts;
 use std::time::{Duration, Instant};
 
-/// Seeds of antialiased pictures are those of turns from here on.
+/// Seeds of antialiased images are those of turns from here on.
 const ANTIALIASED_TURNS: u32 = 2_000_000;
-/// Edge of the picture on which times are found out, and the least edge: usual and quick.
+/// Edge of the image on which times are found out, and the least edge: usual and quick.
 const PILOT_SIZE: [u32; 2] = [96, 48];
-const LEAST_SIZE: [u32; 2] = [64, 32];
-/// Fewest and most turns, and those that the size of the picture is chosen for; quick ones are as few as that.
+const MIN_SIZE: [u32; 2] = [64, 32];
+/// Fewest and most turns, and those that the size of the image is chosen for; quick ones are as few as that.
 const TURNS: [u32; 2] = [4, 32];
 const WANTED_TURNS: [f64; 2] = [8.0, 4.0];
-/// Turns of the antialiased pictures.
+/// Turns of the antialiased images.
 const PAIR_TURNS: u32 = 4;
 
 /// The long renderings of a stage.
@@ -36,12 +36,12 @@ fn pilot(stage: &mut Stage, case: &Case, observer: Observer<'_>) -> Result<(Numb
     let unknown = Numbers {
         samples: case.samples,
         equal_time: case.samples,
-        ris: Split { samples: case.samples, proposals: case.samples },
+        ris: SampleCounts { samples: case.samples, proposals: case.samples },
     };
     let base = Role::Balance.method(unknown);
     let calibration = calibrate(stage, &base, observer)?;
     let equal_time = match_samples(stage, &base, &Role::Progressive.method(unknown), case.spp, observer)?;
-    Ok((Numbers { equal_time, ris: calibration.split, ..unknown }, calibration.seconds))
+    Ok((Numbers { equal_time, ris: calibration.sample_counts, ..unknown }, calibration.seconds))
 }
 
 /// Camera rays per pixel for everything but the turns.
@@ -66,7 +66,7 @@ pub(super) fn run(setup: &Setup<'_>, case: &Case, time: Duration) -> Result<Figu
     let turn = count * f64::from(case.spp);
     let wanted = seconds * 1.15 * (WANTED_TURNS[usize::from(quick)] * turn + fixed);
     let fits = (time.saturating_sub(start.elapsed()).as_secs_f64() / wanted).sqrt();
-    let size = ((f64::from(pilot_size) * fits) as u32 / 8 * 8).max(LEAST_SIZE[usize::from(quick)]).min(setup.size);
+    let size = ((f64::from(pilot_size) * fits) as u32 / 8 * 8).max(MIN_SIZE[usize::from(quick)]).min(setup.size);
     if size != pilot_size {
         stage = Stage::load(&path, scaled(case.shape, size), setup.options.threads)?;
         (numbers, seconds) = pilot(&mut stage, case, observer)?;
@@ -74,13 +74,13 @@ pub(super) fn run(setup: &Setup<'_>, case: &Case, time: Duration) -> Result<Figu
 
     // As many turns as fit
     let left = time.saturating_sub(start.elapsed()).as_secs_f64() / (seconds * 1.15) - fixed;
-    let most = if quick { WANTED_TURNS[1] as u32 } else { TURNS[1] };
-    let count_turns = ((left / turn) as u32).clamp(TURNS[0], most);
+    let max = if quick { WANTED_TURNS[1] as u32 } else { TURNS[1] };
+    let count_turns = ((left / turn) as u32).clamp(TURNS[0], max);
     let [width, height] = stage.size();
     (observer.say)(&format!("  {width} × {height} pixels, {count_turns} turns of {count} methods"));
     let list = methods(numbers);
     let reference = list[Role::Balance.place(1)];
-    let true_picture = truth(&mut stage, reference, View::Centres, observer)?;
+    let true_image = truth(&mut stage, reference, View::Centres, observer)?;
     let measured = turns(&mut stage, &list, View::Centres, case.spp, 0..count_turns, observer)?;
 
     // With antialiasing
@@ -93,14 +93,14 @@ pub(super) fn run(setup: &Setup<'_>, case: &Case, time: Duration) -> Result<Figu
     let (facts, size) = (stage.facts(), stage.size());
 
     let growth = measure_growth(setup, case, numbers, size)?;
-    let errors = measured.iter().map(|m| true_picture.errors(m)).collect();
+    let errors = measured.iter().map(|m| true_image.errors(m)).collect();
     let outcome = Outcome {
         case,
         facts,
         size,
         numbers,
         measured,
-        truth: true_picture,
+        truth: true_image,
         errors,
         antialiased,
         antialiased_truth,

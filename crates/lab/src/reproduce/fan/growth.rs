@@ -12,7 +12,7 @@ const RAYS: [&[u32]; 2] = [&[1, 2, 4, 8, 16], &[1, 4, 16]];
 /// Turns of each.
 const TURNS: u32 = 4;
 const FIRST_TURN: u32 = 3_000_000;
-/// Edges are this part of those of the picture.
+/// Edges are this part of those of the image.
 const SHRINK: u32 = 2;
 /// Who takes part.
 const PAIR: [Role; 2] = [Role::Balance, Role::Progressive];
@@ -20,13 +20,13 @@ const PAIR: [Role; 2] = [Role::Balance, Role::Progressive];
 /// Camera rays and error of progressive `ocv` over that of `mis`, for each of the ways to draw samples.
 pub(super) struct Growth(pub [Vec<(u32, Estimate)>; FULL_WAYS]);
 
-/// Camera rays per pixel of the whole picture that take as long.
+/// Camera rays per pixel of the whole image that take as long.
 pub(super) fn cost(quick: bool) -> f64 {
     let rays: u32 = RAYS[usize::from(quick)].iter().sum();
     f64::from(TURNS * rays * (PAIR.len() * FULL_WAYS) as u32 + LONG.0 * LONG.1) / f64::from(SHRINK * SHRINK)
 }
 
-/// Measures it on a smaller picture.
+/// Measures it on a smaller image.
 pub(super) fn measure(
     setup: &Setup<'_>,
     case: &Case,

@@ -24,7 +24,7 @@ use std::time::Duration;
 /// Time for everything, and for the tenth of it that `quick` takes; less than is promised, for what cannot be stopped
 /// half-way.
 const TIME: [Duration; 2] = [Duration::from_secs(1080), Duration::from_secs(85)];
-/// Most pixels along an edge of a picture: usual and quick.
+/// Most pixels along an edge of an image: usual and quick.
 const SIZE: [u32; 2] = [400, 128];
 /// Cells of the grid along the statue's height: usual and quick.
 const DETAIL: [u32; 2] = [512, 128];
@@ -41,7 +41,7 @@ const STUDY: Study = Study {
          vision of Ferwerda et al. (1996) and a luminance of 1 counts as 100 cd/m², about white on a display. L_true is the mean of \
          several long renderings by mis with other seeds; its own noise is subtracted from each square. Every method is rendered several times \
          with independent seeds; ± is one standard error, from how these differ. Camera rays pass through pixel centres, so that it \
-         is the error of lighting; the picture with antialiasing, whose edges have noise of their own, is told beside it.",
+         is the error of lighting; the image with antialiasing, whose edges have noise of their own, is told beside it.",
         "Time: processor time of the whole rendering, all threads together. All methods take turns in one run, in an order that moves on \
          from turn to turn; the ratio of times is the median over the turns. Efficiency is 1/(error² × time).",
         "Half of the samples come from the BSDF and the rest from the lights, every light alike, as in the paper: ocv gives each light \
@@ -53,7 +53,7 @@ const STUDY: Study = Study {
          a pixel are one well distributed set, as mis can have them; progressive ocv cannot, since its coefficients must not \
          depend on the samples that they are used on: it has one set for each of its blocks of 1, 1, 2, 4, … rays. \
          Independent: all random numbers are.",
-        "Bias: mean luminance of the picture over that of the reference, less 1, with its 95 % confidence interval. ocv in the forms paper and \
+        "Bias: mean luminance of the image over that of the reference, less 1, with its 95 % confidence interval. ocv in the forms paper and \
          regression and direct optimal-mis are biased by design, as they fit and estimate with the same samples; all others are \
          not.",
         "ocv, progressive, cannot do anything about the first camera ray of a pixel, which is mis; with four rays a quarter of the variance is \

@@ -3,9 +3,9 @@
 use super::super::ReproduceError;
 use super::super::chart::Chart;
 use super::super::figure::{Figure, Summary, estimate_json, percent, plus_minus};
+use super::super::images::{HEAT, Image, Scale, crop, gain, significant};
 use super::super::measure::{Estimate, Measured};
 use super::super::page::{Block, Cell, Shown, Table};
-use super::super::pictures::{HEAT, Picture, Scale, crop, gain, significant};
 use super::super::verdicts::reduced_by;
 use super::Setup;
 use super::cases::{Case, LONG, SHOWN, SHOWN_WAYS};
@@ -29,7 +29,7 @@ pub(super) fn method_json(name: &str, [m, base]: [&Measured; 2], [e, base_errors
     let time = m.time_ratio(base);
     json!({
         "name": name, "estimator": <&str>::from(m.method.estimator), "samples": m.method.samples,
-        "proposals": m.method.proposals, "points": m.method.points.name(), "light_choice": <&str>::from(m.method.light_choice),
+        "proposals": m.method.proposals, "points": m.method.points.name(), "light_sampler": <&str>::from(m.method.light_sampler),
         "turns": m.turns(),
         "error": estimate_json(e.error()), "relative_error": estimate_json(e.relative(base_errors)),
         "time_ratio": time, "efficiency": estimate_json(e.efficiency(base_errors, time)),
@@ -112,7 +112,7 @@ pub(super) fn direct(setup: &Setup<'_>, o: &Outcome<'_>) -> Result<Figure, Repro
         Block::Facts(vec![
             ("scene".to_owned(), format!("{triangles} triangles, {lights} lights")),
             (
-                "picture".to_owned(),
+                "image".to_owned(),
                 format!(
                     "{} × {} pixels, {} camera rays per pixel, {} samples at each",
                     o.size[0], o.size[1], o.case.spp, n.samples
@@ -134,7 +134,7 @@ pub(super) fn direct(setup: &Setup<'_>, o: &Outcome<'_>) -> Result<Figure, Repro
             ),
         ]),
     ];
-    blocks.extend(pictures(setup, o)?);
+    blocks.extend(images(setup, o)?);
     blocks.extend(tables(o));
     blocks.push(growth(o));
     let asked =
@@ -217,26 +217,26 @@ fn growth(o: &Outcome<'_>) -> Block {
     Block::Chart(chart)
 }
 
-fn pictures(setup: &Setup<'_>, o: &Outcome<'_>) -> Result<Vec<Block>, ReproduceError> {
+fn images(setup: &Setup<'_>, o: &Outcome<'_>) -> Result<Vec<Block>, ReproduceError> {
     let (out, id) = (&setup.options.out, o.case.id);
     let exposure = gain(&o.truth.radiance);
     let (antialiased, errors) = (&o.antialiased[0], o.antialiased_errors(0));
     let (mut whole, mut crops) = (Vec::new(), Vec::new());
     for (k, role) in SHOWN.iter().enumerate() {
-        let picture = &antialiased[k].first;
-        let file = Picture::tone_mapped(o.size, picture, exposure).write(out, &format!("{id}-{k}"))?;
+        let image = &antialiased[k].first;
+        let file = Image::tone_mapped(o.size, image, exposure).write(out, &format!("{id}-{k}"))?;
         let caption =
             format!("N = {}; error with antialiasing {}", antialiased[k].method.samples, plus_minus(errors[k].error()));
         whole.push(Shown { file, title: role.name().to_owned(), caption });
-        let (size, part) = crop(o.size, picture, o.case.crop);
-        let file = Picture::tone_mapped(size, &part, exposure).write(out, &format!("{id}-crop-{k}"))?;
+        let (size, part) = crop(o.size, image, o.case.crop);
+        let file = Image::tone_mapped(size, &part, exposure).write(out, &format!("{id}-crop-{k}"))?;
         crops.push(Shown { file, title: format!("{}, a part", role.name()), caption: String::new() });
     }
     let file =
-        Picture::tone_mapped(o.size, &o.antialiased_truth.radiance, exposure).write(out, &format!("{id}-reference"))?;
+        Image::tone_mapped(o.size, &o.antialiased_truth.radiance, exposure).write(out, &format!("{id}-reference"))?;
     whole.push(Shown { file, title: "reference".to_owned(), caption: String::new() });
 
-    let mut blocks = vec![Block::Pictures(whole), Block::Pictures(crops)];
+    let mut blocks = vec![Block::Images(whole), Block::Images(crops)];
     for (way, of_way) in WAYS.iter().enumerate().take(FULL_WAYS) {
         let chosen = [Role::Balance, Role::Progressive, Role::Correlated, Role::Ris];
         let list: Vec<(&str, &Measured)> = chosen.iter().map(|r| (r.name(), &o.measured[r.place(way)])).collect();
@@ -258,13 +258,13 @@ pub(super) fn variances(
     let scale = Scale::of_values(HEAT, maps.iter().flatten());
     let mut shown = Vec::new();
     for (k, ((name, _), map)) in list.iter().zip(&maps).enumerate() {
-        let file = Picture::colored(size, map, &scale).write(&setup.options.out, &format!("{file}-{k}"))?;
+        let file = Image::colored(size, map, &scale).write(&setup.options.out, &format!("{file}-{k}"))?;
         let mean = map.iter().sum::<f64>() / map.len().max(1) as f64;
         let caption = format!("samples {way}; mean {}", significant(mean));
         shown.push(Shown { file, title: format!("variance: {name}"), caption });
     }
     let title = "variance of the pixel over tvi², in the unit of eq. (12)".to_owned();
-    Ok(vec![Block::Pictures(shown), Block::Legend { title, scale }])
+    Ok(vec![Block::Images(shown), Block::Legend { title, scale }])
 }
 
 fn numbers(o: &Outcome<'_>) -> Value {

@@ -4,7 +4,7 @@
 
 use super::super::method::{Method, Points};
 use lumiris::lights::LightSamplerKind;
-use lumiris::settings::{OptimalForm, Split, Strata};
+use lumiris::settings::{OptimalForm, SampleCounts, Strata};
 use lumiris_numbers::estimators::mis::Heuristic;
 use lumiris_numbers::estimators::ocv::Form;
 
@@ -89,7 +89,7 @@ pub(super) struct Numbers {
     /// Those of `ocv` that take as long as `mis` with the former.
     pub equal_time: u32,
     /// Those of `ris` that do.
-    pub ris: Split,
+    pub ris: SampleCounts,
 }
 
 impl Role {
@@ -156,7 +156,7 @@ impl Role {
 /// All methods, in the order of [`Role::place`].
 pub(super) fn methods(n: Numbers) -> Vec<Method> {
     let of = |way: &Way, role: Role| {
-        let method = Method { points: way.points, light_choice: way.lights, ..role.method(n) };
+        let method = Method { points: way.points, light_sampler: way.lights, ..role.method(n) };
         let is_independent = way.points == Points::Independent;
         if is_independent { method.strata(Strata::None) } else { method }
     };
@@ -169,14 +169,14 @@ mod tests {
 
     #[test]
     fn a_role_finds_its_method() {
-        let n = Numbers { samples: 64, equal_time: 60, ris: Split { samples: 16, proposals: 99 } };
+        let n = Numbers { samples: 64, equal_time: 60, ris: SampleCounts { samples: 16, proposals: 99 } };
         let all = methods(n);
         assert_eq!(all.len(), FULL_WAYS * ROLES.len() + (WAYS.len() - FULL_WAYS) * PAIR.len());
         for (k, way) in WAYS.iter().enumerate() {
             for role in way.roles {
                 let expected = role.method(n);
                 let found = all[role.place(k)];
-                assert_eq!((found.points, found.light_choice), (way.points, way.lights));
+                assert_eq!((found.points, found.light_sampler), (way.points, way.lights));
                 assert_eq!((found.estimator, found.form), (expected.estimator, expected.form));
                 assert_eq!((found.samples, found.proposals), (expected.samples, expected.proposals));
             }
@@ -185,7 +185,7 @@ mod tests {
 
     #[test]
     fn methods_of_a_way_draw_samples_alike() {
-        let n = Numbers { samples: 64, equal_time: 60, ris: Split { samples: 16, proposals: 99 } };
+        let n = Numbers { samples: 64, equal_time: 60, ris: SampleCounts { samples: 16, proposals: 99 } };
         let all = methods(n);
         for k in 0..WAYS.len() {
             let of = |role: Role| all[role.place(k)];

@@ -1,8 +1,8 @@
-//! What a picture should be, and how far renderings are from it.
+//! What an image should be, and how far renderings are from it.
 //!
 //! E = √(mean ((L − L_true)/tvi(L_true))²) [Fan et al. 2006, Eq. 12] with luminances L in cd/m², where a luminance of 1 in the
-//! picture is [`CANDELAS`]. L_true is the mean of K long renderings and has noise of its own: its variance, from how the K
-//! differ, is subtracted from each square, so that E² has the expectation that it would have with the exact L_true.
+//! image is [`CANDELAS`]. L_true is the mean of K long renderings and has noise of its own: its variance, from how the
+//! K differ, is subtracted from each square, so that E² has the expectation that it would have with the exact L_true.
 
 use super::super::measure::{Estimate, Measured};
 use lumiris::imaging::metrics::tvi;
@@ -12,7 +12,7 @@ use lumiris_numbers::math::luminance;
 /// Luminance (cd/m²) of a pixel whose luminance is 1: that of white on a display.
 pub(super) const CANDELAS: f64 = 100.0;
 
-/// The true picture, as long renderings show it.
+/// The true image, as long renderings show it.
 pub(super) struct Truth {
     /// Mean radiance.
     pub radiance: Vec<[f32; 3]>,
@@ -22,7 +22,7 @@ pub(super) struct Truth {
     variance: Vec<f64>,
     /// tvi of each pixel, in the unit of the luminance.
     threshold: Vec<f64>,
-    /// Mean luminance of the whole picture.
+    /// Mean luminance of the whole image.
     pub mean: Estimate,
 }
 
@@ -33,7 +33,7 @@ pub(super) struct Errors {
     squares: Welford,
     /// Mean over the pixels of the square of their expected error, in the unit of eq. (12): what no number of turns removes.
     pub systematic: f64,
-    /// Mean luminance of the picture over that of the truth, less 1, with half the width of its 95 % confidence interval.
+    /// Mean luminance of the image over that of the truth, less 1, with half the width of its 95 % confidence interval.
     pub bias: Interval,
 }
 
@@ -70,18 +70,18 @@ impl Truth {
         (self.variance.iter().zip(&self.threshold).map(noise).sum::<f64>() / self.variance.len().max(1) as f64).sqrt()
     }
 
-    /// The same picture in the unit of eq. (12): variance over the square of the threshold.
+    /// The same image in the unit of eq. (12): variance over the square of the threshold.
     pub(super) fn weighted(&self, variances: &[f64]) -> Vec<f64> {
         variances.iter().zip(&self.threshold).map(|(v, t)| v / (t * t)).collect()
     }
 
-    /// Mean square of eq. (12) of a picture with this luminance, without the noise of the truth.
-    fn square(&self, picture: impl Iterator<Item = f64>) -> f64 {
+    /// Mean square of eq. (12) of an image with this luminance, without the noise of the truth.
+    fn square(&self, image: impl Iterator<Item = f64>) -> f64 {
         let error = |(i, l): (usize, f64)| {
             let (difference, t) = (l - self.luminance[i], self.threshold[i]);
             (difference * difference - self.variance[i]) / (t * t)
         };
-        picture.enumerate().map(error).sum::<f64>() / self.luminance.len().max(1) as f64
+        image.enumerate().map(error).sum::<f64>() / self.luminance.len().max(1) as f64
     }
 
     /// Holds the turns of a method against the truth.
@@ -91,7 +91,7 @@ impl Truth {
             squares.add(self.square(turn.iter().map(|&v| f64::from(v))));
             means.add(turn.iter().map(|&v| f64::from(v)).sum::<f64>() / turn.len().max(1) as f64);
         }
-        // The mean picture, less what its own noise adds
+        // The mean image, less what its own noise adds
         let turns = m.turns() as f64;
         let mean = self.square(m.mean_radiance().iter().map(|&p| luminance(p)));
         let noise = self.weighted(&m.variance_map()).iter().sum::<f64>() / (turns * self.luminance.len().max(1) as f64);
@@ -147,7 +147,7 @@ mod tests {
 
     #[test]
     fn the_noise_of_the_truth_takes_no_part() {
-        // The truth is 2 with variance 8/4 of its mean; a picture of 2 is no further from it than its noise says.
+        // The truth is 2 with variance 8/4 of its mean; an image of 2 is no further from it than its noise says.
         let truth = Truth::new(&measured(&[[0.0, 0.0], [4.0, 4.0]]));
         assert!((truth.square([2.0, 2.0].into_iter()) + 4.0 / truth.threshold[0].powi(2)).abs() < 1e-6);
         let exact = Truth::new(&measured(&[[2.0, 2.0], [2.0, 2.0]]));

@@ -1,6 +1,6 @@
 //! Points of a scene seen from above: their density over each square of the floor plan. x is to the right, y upwards.
 
-use super::super::pictures::{HEAT, Picture, Scale};
+use super::super::images::{HEAT, Image, Scale};
 use lumiris_numbers::math::{Bounds3, Vec3};
 
 /// A raster over the x and y of a scene.
@@ -63,11 +63,11 @@ impl Plan {
     }
 
     /// Densities as colours.
-    pub(super) fn picture(&self, density: &[f64], scale: &Scale) -> Picture {
-        Picture::colored(self.size, density, scale)
+    pub(super) fn image(&self, density: &[f64], scale: &Scale) -> Image {
+        Image::colored(self.size, density, scale)
     }
 
-    /// One scale for several pictures: from the density of a single point to that which a twentieth of the squares
+    /// One scale for several images: from the density of a single point to that which a twentieth of the squares
     /// exceed: walls.
     pub(super) fn scale(&self, densities: &[&[f64]]) -> Scale {
         let mut sorted: Vec<f64> = densities.iter().flat_map(|d| d.iter().copied()).filter(|v| *v > 0.0).collect();

@@ -3,32 +3,32 @@
 
 use super::super::calibrate::{Calibration, calibrate};
 use super::super::figure::{Figure, Summary, estimate_json, plus_minus};
+use super::super::images::{HEAT, Image, Scale, gain, significant};
 use super::super::measure::{Estimate, Measured, Stage, View, reference, same_mean, turns};
 use super::super::method::Method;
 use super::super::page::{Block, Cell, Shown, Table};
-use super::super::pictures::{HEAT, Picture, Scale, gain, significant};
 use super::super::verdicts::hardly_perceivable;
 use super::super::{Observer, ReproduceError, scaled};
 use super::{SHAPE, Setup};
 use lumiris::lights::LightSamplerKind;
-use lumiris::render::hints::light_hints;
-use lumiris::settings::{Split, Strata, Target};
+use lumiris::render::visibility_cache::build_visibility_cache;
+use lumiris::settings::{SampleCounts, Strata, Target};
 use serde_json::{Value, json};
 use std::time::{Duration, Instant};
 
 /// Shadow rays of an estimate, and camera rays per pixel and turn.
 const SAMPLES: u32 = 4;
 const SPP: u32 = 4;
-/// Edge of the picture on which times are found out, and the least edge.
+/// Edge of the image on which times are found out, and the least edge.
 const PILOT_SIZE: u32 = 64;
-const LEAST_SIZE: u32 = 16;
+const MIN_SIZE: u32 = 16;
 /// Fewest and most turns.
 const TURNS: [u32; 2] = [4, 24];
 const QUICK_TURNS: u32 = 6;
-/// Turns that the size of the picture is chosen for.
+/// Turns that the size of the image is chosen for.
 const WANTED_TURNS: f64 = 8.0;
 /// Part of the time for the scene with more lights.
-const MANY_SHARE: f64 = 0.3;
+const MANY_FRACTION: f64 = 0.3;
 
 /// What a method is for.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -52,10 +52,10 @@ struct Named {
     method: Method,
 }
 
-fn methods(split: Split) -> Vec<Named> {
+fn methods(sample_counts: SampleCounts) -> Vec<Named> {
     let named = |name, role, method: Method| Named { name, role, method: method.stratified() };
-    let by = |light_choice| Method { light_choice, ..Method::mis(SAMPLES) };
-    let ris = Method::ris(split.proposals, split.samples).strata(Strata::Systematic);
+    let by = |light_sampler| Method { light_sampler, ..Method::mis(SAMPLES) };
+    let ris = Method::ris(sample_counts.proposals, sample_counts.samples).strata(Strata::Systematic);
     let known = Method { target: Target::Visibility, ..ris };
     vec![
         named("mis, all lights", Role::All, Method::mis(SAMPLES)),
@@ -67,7 +67,7 @@ fn methods(split: Split) -> Vec<Named> {
         named(
             "ris, target with visibility, lights by photons",
             Role::Informed,
-            Method { light_choice: LightSamplerKind::Photons, ..known },
+            Method { light_sampler: LightSamplerKind::Photons, ..known },
         ),
         named("contributing lights", Role::Informed, Method::contributing(SAMPLES, 1)),
         named("contributing lights only (biased)", Role::Biased, Method::contributing(SAMPLES, 0)),
@@ -82,7 +82,7 @@ struct Outcome {
     named: Vec<Named>,
     measured: Vec<Measured>,
     /// Photons that told which lights are seen, and the time that it took (s).
-    hints: (u64, f64),
+    visibility_cache: (u64, f64),
 }
 
 impl Outcome {
@@ -120,8 +120,8 @@ impl Outcome {
 /// Measures both scenes within about `time`.
 pub(super) fn run(setup: &Setup<'_>, time: Duration) -> Result<Figure, ReproduceError> {
     (setup.observer.say)("Direct light …");
-    let few = measure(setup, "rooms.pbrt", time.mul_f64(1.0 - MANY_SHARE))?;
-    let many = measure(setup, "rooms-10000.pbrt", time.mul_f64(MANY_SHARE))?;
+    let few = measure(setup, "rooms.pbrt", time.mul_f64(1.0 - MANY_FRACTION))?;
+    let many = measure(setup, "rooms-10000.pbrt", time.mul_f64(MANY_FRACTION))?;
     figure(setup, &few, &many)
 }
 
@@ -135,35 +135,35 @@ fn measure(setup: &Setup<'_>, file: &str, time: Duration) -> Result<Outcome, Rep
     let pilot_size = setup.size.min(PILOT_SIZE);
     let mut stage = Stage::load(&path, scaled(SHAPE, pilot_size), setup.options.threads)?;
     let mut calibration = calibrate(&mut stage, &base, setup.observer)?;
-    let count = methods(calibration.split).len() as f64;
+    let count = methods(calibration.sample_counts).len() as f64;
     let turn = |c: &Calibration| c.seconds * f64::from(SPP) * count * 1.2;
     let left = |spent: Duration| time.saturating_sub(spent).as_secs_f64();
     let fits = (left(start.elapsed()) / (turn(&calibration) * WANTED_TURNS)).sqrt();
-    let size = ((f64::from(pilot_size) * fits) as u32 / 8 * 8).max(LEAST_SIZE).min(setup.size);
+    let size = ((f64::from(pilot_size) * fits) as u32 / 8 * 8).max(MIN_SIZE).min(setup.size);
     if size != pilot_size {
         stage = Stage::load(&path, scaled(SHAPE, size), setup.options.threads)?;
         calibration = calibrate(&mut stage, &base, setup.observer)?;
     }
 
     // As many turns as fit
-    let named = methods(calibration.split);
-    let hints = tell_lights(setup, &mut stage);
+    let named = methods(calibration.sample_counts);
+    let visibility_cache = prepare_visibility_cache(setup, &mut stage);
     let list: Vec<Method> = named.iter().map(|n| n.method).collect();
-    let most = if setup.options.quick { QUICK_TURNS } else { TURNS[1] };
-    let count_turns = ((left(start.elapsed()) / turn(&calibration)) as u32).clamp(TURNS[0], most);
+    let max = if setup.options.quick { QUICK_TURNS } else { TURNS[1] };
+    let count_turns = ((left(start.elapsed()) / turn(&calibration)) as u32).clamp(TURNS[0], max);
     let (size, lights) = (stage.size(), stage.facts().1);
     say(&format!("  {lights} lights, {} × {} pixels, {count_turns} turns of {count} methods", size[0], size[1]));
     let measured = turns(&mut stage, &list, View::Centres, SPP, 0..count_turns, setup.observer)?;
-    Ok(Outcome { lights, size, calibration, named, measured, hints })
+    Ok(Outcome { lights, size, calibration, named, measured, visibility_cache })
 }
 
 /// Traces photons that come straight from lights, and lets them say which lights are seen. The answer is their number, and the
 /// time that it took (s).
-fn tell_lights(setup: &Setup<'_>, stage: &mut Stage) -> (u64, f64) {
+fn prepare_visibility_cache(setup: &Setup<'_>, stage: &mut Stage) -> (u64, f64) {
     let start = Instant::now();
-    let hints = setup.pool.install(|| light_hints(stage.job()));
-    let count = hints.as_ref().map_or(0, |(_, count)| *count as u64);
-    stage.set_light_hints(hints.map(|(hints, _)| hints));
+    let visibility_cache = setup.pool.install(|| build_visibility_cache(stage.job()));
+    let count = visibility_cache.as_ref().map_or(0, |(_, count)| *count as u64);
+    stage.set_visibility_cache(visibility_cache.map(|(visibility_cache, _)| visibility_cache));
     (count, start.elapsed().as_secs_f64())
 }
 
@@ -175,7 +175,7 @@ fn figure(setup: &Setup<'_>, few: &Outcome, many: &Outcome) -> Result<Figure, Re
     )];
     for (o, name) in [(few, "direct"), (many, "direct-many")] {
         blocks.push(facts(o));
-        blocks.extend(pictures(setup, o, name)?);
+        blocks.extend(images(setup, o, name)?);
         blocks.push(Block::Table(table(o)));
     }
     blocks.push(Block::Text("Processor time for each shadow segment, everything included:".to_owned()));
@@ -247,43 +247,42 @@ fn biased_summary(o: &Outcome) -> Summary {
 }
 
 fn facts(o: &Outcome) -> Block {
-    let Split { samples, proposals } = o.calibration.split;
+    let SampleCounts { samples, proposals } = o.calibration.sample_counts;
     Block::Facts(vec![
         ("scene".to_owned(), format!("{} lights", o.lights)),
-        ("picture".to_owned(), format!("{} × {} pixels, {SPP} camera rays per pixel", o.size[0], o.size[1])),
+        ("image".to_owned(), format!("{} × {} pixels, {SPP} camera rays per pixel", o.size[0], o.size[1])),
         ("turns".to_owned(), format!("{} of {} methods", o.measured[0].turns(), o.named.len())),
         (
             "photons".to_owned(),
             format!(
                 "{} that came straight from lights, in {} s, which no time below includes",
-                o.hints.0,
-                significant(o.hints.1)
+                o.visibility_cache.0,
+                significant(o.visibility_cache.1)
             ),
         ),
         ("ris".to_owned(), format!("M = {proposals}, N = {samples} in the time of mis with N = {SAMPLES}")),
     ])
 }
 
-/// Pictures of one turn of each method, and their variances.
-fn pictures(setup: &Setup<'_>, o: &Outcome, name: &str) -> Result<Vec<Block>, ReproduceError> {
+/// Images of one turn of each method, and their variances.
+fn images(setup: &Setup<'_>, o: &Outcome, name: &str) -> Result<Vec<Block>, ReproduceError> {
     let mean: Vec<[f32; 3]> = reference(&o.measured).iter().map(|p| p.map(|v| v as f32)).collect();
     let exposure = gain(&mean);
     let maps: Vec<Vec<f64>> = o.measured.iter().map(Measured::variance_map).collect();
     let scale = Scale::of_values(HEAT, maps.iter().flatten());
     let (mut shown, mut variances) = (Vec::new(), Vec::new());
     for (i, (named, m)) in o.named.iter().zip(&o.measured).enumerate() {
-        let file =
-            Picture::tone_mapped(o.size, &m.first, exposure).write(&setup.options.out, &format!("{name}-{i}"))?;
+        let file = Image::tone_mapped(o.size, &m.first, exposure).write(&setup.options.out, &format!("{name}-{i}"))?;
         shown.push(Shown { file, title: named.name.to_owned(), caption: String::new() });
-        let picture = Picture::colored(o.size, &maps[i], &scale);
-        let file = picture.write(&setup.options.out, &format!("{name}-variance-{i}"))?;
+        let image = Image::colored(o.size, &maps[i], &scale);
+        let file = image.write(&setup.options.out, &format!("{name}-variance-{i}"))?;
         let caption = format!("mean {}", significant(m.variance(None).value));
         variances.push(Shown { file, title: named.name.to_owned(), caption });
     }
-    let file = Picture::tone_mapped(o.size, &mean, exposure).write(&setup.options.out, &format!("{name}-mean"))?;
+    let file = Image::tone_mapped(o.size, &mean, exposure).write(&setup.options.out, &format!("{name}-mean"))?;
     shown.push(Shown { file, title: "mean of all".to_owned(), caption: String::new() });
     let legend = Block::Legend { title: "variance of a pixel (luminance²), one turn".to_owned(), scale };
-    Ok(vec![Block::Pictures(shown), Block::Pictures(variances), legend])
+    Ok(vec![Block::Images(shown), Block::Images(variances), legend])
 }
 
 fn table(o: &Outcome) -> Table {
@@ -332,7 +331,7 @@ fn outcome_json(o: &Outcome) -> Value {
     let base = &o.measured[o.place(Role::All)];
     let method = |(i, m): (usize, &Measured)| {
         json!({
-            "name": o.named[i].name, "estimator": <&str>::from(m.method.estimator), "light_choice": <&str>::from(m.method.light_choice),
+            "name": o.named[i].name, "estimator": <&str>::from(m.method.estimator), "light_sampler": <&str>::from(m.method.light_sampler),
             "samples": m.method.samples, "proposals": m.method.proposals, "turns": m.turns(),
             "variance": estimate_json(m.variance(None)), "time_ratio": m.time_ratio(base),
             "at_equal_time": estimate_json(o.against(i, Role::All)),
@@ -343,5 +342,5 @@ fn outcome_json(o: &Outcome) -> Value {
         })
     };
     let methods: Vec<Value> = o.measured.iter().enumerate().map(method).collect();
-    json!({ "lights": o.lights, "size": o.size, "camera_rays": SPP, "photons": o.hints.0, "photon_seconds": o.hints.1, "methods": methods })
+    json!({ "lights": o.lights, "size": o.size, "camera_rays": SPP, "photons": o.visibility_cache.0, "photon_seconds": o.visibility_cache.1, "methods": methods })
 }

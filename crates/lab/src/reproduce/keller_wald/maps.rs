@@ -1,15 +1,15 @@
 //! Photon maps of a scene, and what they look like: from above, and shown directly.
 
 use super::super::ReproduceError;
+use super::super::images::Image;
 use super::super::measure::{Stage, View, turns};
 use super::super::method::{Method, Transport};
 use super::super::page::{Block, Shown};
-use super::super::pictures::Picture;
 use super::Setup;
 use super::above::Plan;
 use super::seen::{Reference, Seen};
 use lumiris::photons::{
-    GatherScratch, Importance, Photon, PhotonMap, Place, Search, Traced, Tracing, Want, trace_photons,
+    GatherScratch, Importance, Photon, PhotonBudget, PhotonMap, Place, Search, Traced, Tracing, trace_photons,
 };
 use lumiris::scene::RenderJob;
 use lumiris_numbers::math::{Rgb, Vec3};
@@ -23,8 +23,8 @@ const PLAN_SIZE: [u32; 2] = [400, 240];
 /// Turns of a reference; their seeds begin here.
 const LONG_TURNS: std::ops::Range<u32> = 1_000_000..1_000_004;
 /// Most camera rays of a turn of a reference: usual and quick.
-const MOST_RAYS: [f64; 2] = [16384.0, 256.0];
-/// Trajectories that find out how fast photons are traced.
+const MAX_RAYS: [f64; 2] = [16384.0, 256.0];
+/// Photon paths that find out how fast photons are traced.
 const PILOT: u64 = 50_000;
 
 /// The maps of one run of photon tracing.
@@ -33,8 +33,8 @@ pub(super) struct Maps {
     pub global: PhotonMap,
     /// Light that came over other surfaces.
     pub caustic: PhotonMap,
-    /// Trajectories traced.
-    pub trajectories: u64,
+    /// Photon paths traced.
+    pub paths: u64,
     /// Photons that arrived at diffuse surfaces, per second.
     pub rate: f64,
     /// Time of tracing (s).
@@ -46,7 +46,7 @@ impl Maps {
     pub(super) fn new(traced: Traced) -> Self {
         let (rate, seconds) = (traced.arrivals_per_second(), traced.elapsed.as_secs_f64());
         Maps {
-            trajectories: traced.trajectories,
+            paths: traced.paths,
             global: PhotonMap::new(traced.global),
             caustic: PhotonMap::new(traced.caustic),
             rate,
@@ -70,7 +70,7 @@ impl Maps {
     }
 
     /// The radiance of each pixel by the `count` nearest photons of each map.
-    pub(super) fn picture(&self, setup: &Setup<'_>, seen: &[Option<Seen>], count: u32) -> Vec<[f32; 3]> {
+    pub(super) fn image(&self, setup: &Setup<'_>, seen: &[Option<Seen>], count: u32) -> Vec<[f32; 3]> {
         show(setup, seen, &[&self.global, &self.caustic], count)
     }
 }
@@ -99,15 +99,15 @@ pub(super) fn trace(
     job: &RenderJob,
     tracing: &Tracing<'_>,
     importance: Option<&Importance>,
-    want: Want,
+    budget: PhotonBudget,
 ) -> Result<Maps, ReproduceError> {
     if setup.observer.stop.load(std::sync::atomic::Ordering::Relaxed) {
         return Err(ReproduceError::Stopped);
     }
-    setup.pool.install(|| Ok(Maps::new(trace_photons(job, tracing, importance, want)?)))
+    setup.pool.install(|| Ok(Maps::new(trace_photons(job, tracing, importance, budget)?)))
 }
 
-/// Photons stored and trajectories traced in a second.
+/// Photons stored and photon paths traced in a second.
 pub(super) fn speed(
     setup: &Setup<'_>,
     job: &RenderJob,
@@ -115,19 +115,19 @@ pub(super) fn speed(
     importance: Option<&Importance>,
 ) -> Result<[f64; 2], ReproduceError> {
     let start = Instant::now();
-    let maps = trace(setup, job, tracing, importance, Want::Trajectories(PILOT))?;
+    let maps = trace(setup, job, tracing, importance, PhotonBudget::Paths(PILOT))?;
     let seconds = start.elapsed().as_secs_f64().max(1e-6);
-    Ok([maps.stored() as f64 / seconds, maps.trajectories as f64 / seconds])
+    Ok([maps.stored() as f64 / seconds, maps.paths as f64 / seconds])
 }
 
-/// The picture by path tracing, for about `time`.
+/// The image by path tracing, for about `time`.
 pub(super) fn path_traced(setup: &Setup<'_>, stage: &mut Stage, time: Duration) -> Result<Reference, ReproduceError> {
     let observer = setup.observer;
     let method = Method::ris(16, 2).stratified().of(Transport::Path);
     let first = LONG_TURNS.start;
     let pilot = turns(stage, &[method], View::Centres, 1, first - 1..first, observer)?;
     let each = pilot[0].median_seconds(|s| s.wall).max(1e-6) * LONG_TURNS.len() as f64;
-    let spp = (time.as_secs_f64() / each).clamp(1.0, MOST_RAYS[usize::from(setup.options.quick)]) as u32;
+    let spp = (time.as_secs_f64() / each).clamp(1.0, MAX_RAYS[usize::from(setup.options.quick)]) as u32;
     Ok(Reference::new(&turns(stage, &[method], View::Centres, spp, LONG_TURNS, observer)?[0]))
 }
 
@@ -148,7 +148,7 @@ pub(super) struct Cloud {
     pub points: Vec<Vec3>,
 }
 
-/// Pictures of points with one scale for all. Densities are those of as many points as the last has.
+/// Images of points with one scale for all. Densities are those of as many points as the last has.
 pub(super) fn clouds(setup: &Setup<'_>, plan: &Plan, clouds: &[Cloud]) -> Result<Vec<Block>, ReproduceError> {
     let count = clouds.last().map_or(0, |c| c.points.len()) as f64;
     let density = |c: &Cloud| {
@@ -159,18 +159,17 @@ pub(super) fn clouds(setup: &Setup<'_>, plan: &Plan, clouds: &[Cloud]) -> Result
     let scale = plan.scale(&densities.iter().map(|d| &d[..]).collect::<Vec<_>>());
     let mut shown = Vec::new();
     for (cloud, density) in clouds.iter().zip(&densities) {
-        let file = plan.picture(density, &scale).write(&setup.options.out, &cloud.name)?;
+        let file = plan.image(density, &scale).write(&setup.options.out, &cloud.name)?;
         shown.push(Shown { file, title: cloud.title.clone(), caption: cloud.caption.clone() });
     }
     let legend = Block::Legend {
-        title: "from above: points per square metre of the floor, as if each picture had as many as the last"
-            .to_owned(),
+        title: "from above: points per square metre of the floor, as if each image had as many as the last".to_owned(),
         scale,
     };
-    Ok(vec![Block::Pictures(shown), legend])
+    Ok(vec![Block::Images(shown), legend])
 }
 
-/// A picture with its name, heading and caption.
+/// An image with its name, heading and caption.
 pub(super) struct Print<'a> {
     /// Name of the file.
     pub name: String,
@@ -184,12 +183,12 @@ pub(super) struct Print<'a> {
     pub radiance: &'a [[f32; 3]],
 }
 
-/// Pictures with one exposure for all.
+/// Images with one exposure for all.
 pub(super) fn prints(setup: &Setup<'_>, exposure: f32, prints: &[Print<'_>]) -> Result<Block, ReproduceError> {
     let mut shown = Vec::new();
     for p in prints {
-        let file = Picture::tone_mapped(p.size, p.radiance, exposure).write(&setup.options.out, &p.name)?;
+        let file = Image::tone_mapped(p.size, p.radiance, exposure).write(&setup.options.out, &p.name)?;
         shown.push(Shown { file, title: p.title.clone(), caption: p.caption.clone() });
     }
-    Ok(Block::Pictures(shown))
+    Ok(Block::Images(shown))
 }

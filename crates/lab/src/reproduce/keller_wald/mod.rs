@@ -24,7 +24,7 @@ use std::time::Duration;
 const TIME: [Duration; 2] = [Duration::from_secs(1080), Duration::from_secs(80)];
 /// Maximum number of pixels along an edge of an image: normal and quick.
 const SIZE: [u32; 2] = [400, 128];
-/// Width and height of the pictures of rooms.
+/// Width and height of the images of rooms.
 const SHAPE: [u32; 2] = [4, 3];
 
 /// The page around the figures.
@@ -34,7 +34,7 @@ const STUDY: Study = Study {
             are others of the same kind, made from its text: 10 × 10 rooms with a light each, 50 × 50 rooms with 10,000 lights, a polished \
             ring, and a room that is lit through a slit. The numbers below are from one run on one machine.",
     notes: &[
-        "Variance: of the pixel's luminance over independent renderings, unbiased, averaged over all pixels; no reference picture takes \
+        "Variance: of the pixel's luminance over independent renderings, unbiased, averaged over all pixels; no reference image takes \
          part. Camera rays pass through pixel centres, so that it is the variance of lighting. ± is one standard error, from how the \
          renderings differ.",
         "Time: processor time of the whole rendering, all threads together. All methods take turns in one run, in an order that moves on \

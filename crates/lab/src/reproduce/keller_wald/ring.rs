@@ -1,34 +1,34 @@
-//! The caustic of a ring for three ratios q of global to caustic trajectories [Keller and Wald 2000, Fig. 3].
+//! The caustic of a ring for three ratios q of global to caustic paths [Keller and Wald 2000, Fig. 3].
 
 use super::super::figure::{Figure, Summary};
+use super::super::images::{crop, gain, significant};
 use super::super::measure::Stage;
 use super::super::page::{Block, Cell, Table};
-use super::super::pictures::{crop, gain, significant};
 use super::super::{ReproduceError, scaled};
 use super::maps::{Maps, Print, prints, show, speed, trace};
 use super::seen::{Seen, relative_rmse, seen};
 use super::{SHAPE, Setup};
-use lumiris::photons::{Tracing, Want};
+use lumiris::photons::{PhotonBudget, Tracing};
 use lumiris::scene::RenderJob;
 use serde_json::{Value, json};
 use std::time::{Duration, Instant};
 
 /// The ratios, as their reciprocals.
 const RATIOS: [u64; 3] = [1, 5, 20];
-/// Trajectories of the reference over those of the finest map, and photons of its estimates.
+/// Photon paths of the reference over those of the finest map, and photons of its estimates.
 const LONGER: u64 = 8;
 const REFERENCE_COUNT: u32 = 120;
 /// Photons of an estimate.
 const COUNT: u32 = 50;
-/// Fewest trajectories of the global map, and most: usual and quick.
-const FEWEST: f64 = 1_000.0;
-const MOST: [f64; 2] = [400_000.0, 10_000.0];
+/// Fewest photon paths of the global map, and most: usual and quick.
+const MIN_COUNT: f64 = 1_000.0;
+const MAX_COUNT: [f64; 2] = [400_000.0, 10_000.0];
 /// Most pixels along an edge: usual and quick.
 const SIZE: [u32; 2] = [320, 96];
-/// The part of the picture that is shown larger.
+/// The part of the image that is shown larger.
 const PART: [f64; 4] = [0.24, 0.3, 0.66, 0.72];
 /// Part of the time for photons.
-const PHOTON_SHARE: f64 = 0.7;
+const PHOTON_FRACTION: f64 = 0.7;
 
 /// A ratio with its maps.
 struct Row {
@@ -73,12 +73,12 @@ fn measure(setup: &Setup<'_>, scene: &'static Scene, time: Duration) -> Result<O
     let stage = Stage::load(&setup.scenes.join(scene.file), scaled(SHAPE, size), setup.options.threads)?;
     let (job, size) = (stage.job(), stage.size());
     let seen = seen(&job.world);
-    let [_, trajectories] = speed(setup, job, &Tracing::default(), None)?;
+    let [_, paths] = speed(setup, job, &Tracing::default(), None)?;
     let finest = RATIOS[RATIOS.len() - 1];
     let all = finest * LONGER + RATIOS.iter().sum::<u64>();
-    let left = time.saturating_sub(start.elapsed()).as_secs_f64() * PHOTON_SHARE;
-    let count = (left * trajectories / all as f64).clamp(FEWEST, MOST[usize::from(setup.options.quick)]) as u64;
-    (setup.observer.say)(&format!("  {}, {} × {} pixels, {count} trajectories", scene.name, size[0], size[1]));
+    let left = time.saturating_sub(start.elapsed()).as_secs_f64() * PHOTON_FRACTION;
+    let count = (left * paths / all as f64).clamp(MIN_COUNT, MAX_COUNT[usize::from(setup.options.quick)]) as u64;
+    (setup.observer.say)(&format!("  {}, {} × {} pixels, {count} photon paths", scene.name, size[0], size[1]));
 
     // The reference holds no global photons to speak of
     let long = trace_ratio(setup, job, 2, finest * LONGER, count)?;
@@ -93,22 +93,22 @@ fn measure(setup: &Setup<'_>, scene: &'static Scene, time: Duration) -> Result<O
     Ok(Outcome { scene, size, rows, reference })
 }
 
-/// Maps for q = 1/`finer`, whose global map has `count` trajectories.
+/// Maps for q = 1/`finer`, whose global map has `count` photon paths.
 fn trace_ratio(setup: &Setup<'_>, job: &RenderJob, seed: u32, finer: u64, count: u64) -> Result<Maps, ReproduceError> {
     let tracing = Tracing { seed, q: (1.0 / finer as f64) as f32, ..Tracing::default() };
-    trace(setup, job, &tracing, None, Want::Trajectories(count * finer))
+    trace(setup, job, &tracing, None, PhotonBudget::Paths(count * finer))
 }
 
 fn row(setup: &Setup<'_>, seen: &[Option<Seen>], (q, maps): (u64, Maps), error: impl Fn(&[[f32; 3]]) -> f64) -> Row {
     let caustic = show(setup, seen, &[&maps.caustic], COUNT);
-    let all = maps.picture(setup, seen, COUNT);
+    let all = maps.image(setup, seen, COUNT);
     Row { q, error: error(&caustic), maps, caustic, all }
 }
 
 fn figure(setup: &Setup<'_>, outcomes: &[Outcome; 2]) -> Result<Figure, ReproduceError> {
     let mut blocks = vec![Block::Text(format!(
-        "A polished ring on a table: both maps shown directly, and below them the caustic map alone, a part of the picture, beside that of \
-         {LONGER} times the trajectories of the finest. Only the first ⌊qN⌋ of N trajectories fill the global map, so that the caustic map \
+        "A polished ring on a table: both maps shown directly, and below them the caustic map alone, a part of the image, beside that of \
+         {LONGER} times the photon paths of the finest. Only the first ⌊qN⌋ of N photon paths fill the global map, so that the caustic map \
          becomes finer while the global map stays as it is. In the second scene nothing but a bright patch of the wall lights the ring; nobody \
          has to say that it does."
     ))];
@@ -130,8 +130,8 @@ fn figure(setup: &Setup<'_>, outcomes: &[Outcome; 2]) -> Result<Figure, Reproduc
         let parts: Vec<_> = (o.rows.iter())
             .map(|r| (format!("{}", r.q), format!("caustic, q = 1/{}", r.q), &r.caustic))
             .chain([("reference".to_owned(), "caustic, reference".to_owned(), &o.reference)])
-            .map(|(name, title, picture)| {
-                let (size, part) = crop(o.size, picture, PART);
+            .map(|(name, title, image)| {
+                let (size, part) = crop(o.size, image, PART);
                 (name, title, size, part)
             })
             .collect();
@@ -182,10 +182,10 @@ fn summary(o: &Outcome) -> Summary {
 
 fn table(o: &Outcome) -> Table {
     let mut table =
-        Table::new(&["q", "trajectories", "global photons", "caustic photons", "MB", "s", "error of the caustic"]);
+        Table::new(&["q", "photon_paths", "global photons", "caustic photons", "MB", "s", "error of the caustic"]);
     for r in &o.rows {
         let cells = [
-            r.maps.trajectories.to_string(),
+            r.maps.paths.to_string(),
             r.maps.global.len().to_string(),
             r.maps.caustic.len().to_string(),
             format!("{:.1}", r.maps.bytes() as f64 / 1e6),
@@ -200,7 +200,7 @@ fn table(o: &Outcome) -> Table {
 fn outcome_json(o: &Outcome) -> Value {
     let row = |r: &Row| {
         json!({
-            "q": 1.0 / r.q as f64, "trajectories": r.maps.trajectories, "global_photons": r.maps.global.len(),
+            "q": 1.0 / r.q as f64, "photon_paths": r.maps.paths, "global_photons": r.maps.global.len(),
             "caustic_photons": r.maps.caustic.len(), "bytes": r.maps.bytes(), "seconds": r.maps.seconds,
             "arrivals_per_second": r.maps.rate, "error": r.error,
         })

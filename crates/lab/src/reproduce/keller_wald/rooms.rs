@@ -2,16 +2,16 @@
 
 use super::super::chart::Chart;
 use super::super::figure::{Figure, Summary};
+use super::super::images::{gain, significant};
 use super::super::measure::Stage;
 use super::super::page::{Block, Cell, Table};
-use super::super::pictures::{gain, significant};
 use super::super::{ReproduceError, scaled};
 use super::above::Area;
 use super::maps::{Cloud, Maps, Print, clouds, path_traced, plan, positions, prints, speed, trace};
 use super::seen::{Reference, Seen, seen};
 use super::{SHAPE, Setup};
 use crate::procedural::keller_wald::rooms::{Building, PITCH};
-use lumiris::photons::{Importance, ImportanceSettings, Tracing, Want, trace_importons};
+use lumiris::photons::{Importance, ImportanceSettings, PhotonBudget, Tracing, trace_importons};
 use lumiris::scene::RenderJob;
 use lumiris_numbers::math::Vec3;
 use serde_json::{Value, json};
@@ -20,16 +20,16 @@ use std::time::{Duration, Instant};
 /// Photons of the larger maps over those of the smaller ones.
 const LARGER: u64 = 8;
 /// Fewest photons of the smaller maps, and most: usual and quick. The report has 6·10⁵.
-const FEWEST: f64 = 2_000.0;
-const MOST: [f64; 2] = [600_000.0, 20_000.0];
+const MIN_COUNT: f64 = 2_000.0;
+const MAX_COUNT: [f64; 2] = [600_000.0, 20_000.0];
 /// Photons of an estimate: each map is shown with the number that serves it best.
 const COUNTS: [u32; 4] = [20, 60, 200, 600];
 /// Most pixels along an edge: usual and quick.
 const SIZE: [u32; 2] = [240, 96];
 /// Parts of the time for the reference, and for the photons of the maps.
-const REFERENCE_SHARE: f64 = 0.4;
-const PHOTON_SHARE: f64 = 0.35;
-/// Trajectories of importons.
+const REFERENCE_FRACTION: f64 = 0.4;
+const PHOTON_FRACTION: f64 = 0.35;
+/// Importon paths.
 const IMPORTONS: u64 = 100_000;
 
 /// A map, and how well it shows the room.
@@ -41,7 +41,7 @@ struct Row {
     errors: Vec<f64>,
     best: usize,
     bias: f64,
-    picture: Vec<[f32; 3]>,
+    image: Vec<[f32; 3]>,
     in_room: u64,
 }
 
@@ -64,15 +64,15 @@ fn room() -> Area {
 impl Judge<'_> {
     fn row(&self, name: &'static str, importance: Option<&Importance>, photons: u64) -> Result<Row, ReproduceError> {
         let tracing = Tracing { seed: 1, ..Tracing::default() };
-        let want = Want::Stored { global: photons, most_trajectories: photons.saturating_mul(2000) };
-        let maps = trace(self.setup, self.job, &tracing, importance, want)?;
-        let pictures = COUNTS.map(|count| maps.picture(self.setup, self.seen, count));
-        let errors: Vec<f64> = pictures.iter().map(|p| self.reference.rmse(p, self.mask)).collect();
+        let budget = PhotonBudget::Stored { global: photons, max_paths: photons.saturating_mul(2000) };
+        let maps = trace(self.setup, self.job, &tracing, importance, budget)?;
+        let images = COUNTS.map(|count| maps.image(self.setup, self.seen, count));
+        let errors: Vec<f64> = images.iter().map(|p| self.reference.rmse(p, self.mask)).collect();
         let best = (0..errors.len()).min_by(|&a, &b| errors[a].total_cmp(&errors[b])).unwrap_or(0);
-        let picture = pictures.into_iter().nth(best).unwrap_or_default();
+        let image = images.into_iter().nth(best).unwrap_or_default();
         let in_room = self.room.count(&maps.positions());
-        let bias = self.reference.bias(&picture, self.mask);
-        Ok(Row { name, importance: importance.is_some(), maps, errors, best, bias, picture, in_room })
+        let bias = self.reference.bias(&image, self.mask);
+        Ok(Row { name, importance: importance.is_some(), maps, errors, best, bias, image, in_room })
     }
 }
 
@@ -88,18 +88,19 @@ pub(super) fn run(setup: &Setup<'_>, time: Duration) -> Result<Figure, Reproduce
     (setup.observer.say)("Rooms …");
     let size = setup.size.min(SIZE[usize::from(setup.options.quick)]);
     let mut stage = Stage::load(&setup.scenes.join("rooms.pbrt"), scaled(SHAPE, size), setup.options.threads)?;
-    let reference = path_traced(setup, &mut stage, time.mul_f64(REFERENCE_SHARE))?;
+    let reference = path_traced(setup, &mut stage, time.mul_f64(REFERENCE_FRACTION))?;
     let (job, size) = (stage.job(), stage.size());
     let seen = seen(&job.world);
     let mask: Vec<bool> = seen.iter().map(Option::is_some).collect();
-    let settings = ImportanceSettings { trajectories: IMPORTONS, seed: 1, ..ImportanceSettings::default() };
+    let settings = ImportanceSettings { paths: IMPORTONS, seed: 1, ..ImportanceSettings::default() };
     let importance = setup.pool.install(|| trace_importons(job, &settings))?;
 
     // As many photons as fit
     let tracing = Tracing { seed: 2, ..Tracing::default() };
     let [stored, _] = speed(setup, job, &tracing, Some(&importance))?;
-    let left = time.saturating_sub(start.elapsed()).as_secs_f64() * PHOTON_SHARE / (1.0 - REFERENCE_SHARE);
-    let photons = (left * stored / (1 + LARGER) as f64).clamp(FEWEST, MOST[usize::from(setup.options.quick)]) as u64;
+    let left = time.saturating_sub(start.elapsed()).as_secs_f64() * PHOTON_FRACTION / (1.0 - REFERENCE_FRACTION);
+    let photons =
+        (left * stored / (1 + LARGER) as f64).clamp(MIN_COUNT, MAX_COUNT[usize::from(setup.options.quick)]) as u64;
     (setup.observer.say)(&format!("  {} × {} pixels, {photons} photons and {LARGER} times as many", size[0], size[1]));
     let judge = Judge { setup, job, seen: &seen, mask: &mask, reference: &reference, room: room() };
     let rows = [
@@ -172,7 +173,7 @@ fn maps_shown(judge: &Judge<'_>, size: [u32; 2], rows: &[Row; 4]) -> Result<Bloc
                 COUNTS[r.best]
             ),
             size,
-            radiance: &r.picture,
+            radiance: &r.image,
         })
         .collect();
     list.push(Print {
@@ -200,23 +201,23 @@ fn summary(rows: &[Row; 4]) -> Summary {
         ),
         reached: factor(0) >= 3.0 || same_with_an_eighth,
         reason: format!(
-            "{} against {} photons in the room, for {}× the trajectories",
+            "{} against {} photons in the room, for {}× the photon paths",
             rows[1].in_room,
             rows[0].in_room,
-            significant(rows[1].maps.trajectories as f64 / rows[0].maps.trajectories.max(1) as f64)
+            significant(rows[1].maps.paths as f64 / rows[0].maps.paths.max(1) as f64)
         ),
     }
 }
 
 fn table(rows: &[Row; 4]) -> Table {
-    let header = ["map", "photons", "MB", "in the room", "trajectories", "10⁶ photons/s", "s", "k", "error", "mean"];
+    let header = ["map", "photons", "MB", "in the room", "photon_paths", "10⁶ photons/s", "s", "k", "error", "mean"];
     let mut table = Table::new(&header);
     for r in rows {
         let cells = [
             r.maps.stored().to_string(),
             format!("{:.1}", r.maps.bytes() as f64 / 1e6),
             r.in_room.to_string(),
-            r.maps.trajectories.to_string(),
+            r.maps.paths.to_string(),
             significant(r.maps.rate / 1e6),
             significant(r.maps.seconds),
             COUNTS[r.best].to_string(),
@@ -231,7 +232,7 @@ fn table(rows: &[Row; 4]) -> Table {
 fn row_json(r: &Row) -> Value {
     json!({
         "name": r.name, "importance": r.importance, "photons": r.maps.stored(), "bytes": r.maps.bytes(),
-        "photons_in_room": r.in_room, "trajectories": r.maps.trajectories, "arrivals_per_second": r.maps.rate,
+        "photons_in_room": r.in_room, "photon_paths": r.maps.paths, "arrivals_per_second": r.maps.rate,
         "seconds": r.maps.seconds, "nearest": COUNTS, "errors": r.errors, "error": r.error(), "bias": r.bias,
     })
 }

@@ -1,5 +1,5 @@
-//! What the camera sees of diffuse surfaces, for pictures that show a photon map directly: L = albedo·E/π at the hit of the ray
-//! through the middle of each pixel [Keller and Wald 2000, Fig. 2].
+//! What the camera sees of diffuse surfaces, for images that show a photon map directly: L = albedo·E/π at the hit of
+//! the ray through the middle of each pixel [Keller and Wald 2000, Fig. 2].
 
 use super::super::measure::Measured;
 use lumiris::accel::{Coherence, Hit, RayBatch};
@@ -59,7 +59,7 @@ fn diffuse_at(world: &World, wo: Vec3, hit: &Hit) -> Option<Seen> {
     Some(Seen { p: surface.p, n, albedo: part.reflectance })
 }
 
-/// What a picture should be, by long renderings.
+/// What an image should be, by long renderings.
 pub(super) struct Reference {
     /// Mean radiance.
     pub radiance: Vec<[f32; 3]>,
@@ -86,24 +86,24 @@ impl Reference {
 
     /// Root of the mean square of the difference in luminance over the pixels of a mask, relative to the mean luminance. The
     /// reference's own noise is subtracted from each square.
-    pub(super) fn rmse(&self, picture: &[[f32; 3]], mask: &[bool]) -> f64 {
+    pub(super) fn rmse(&self, image: &[[f32; 3]], mask: &[bool]) -> f64 {
         let square =
             |(i, p): (usize, &[f32; 3])| (luminance(p.map(f64::from)) - self.luminance[i]).powi(2) - self.variance[i];
-        mean_where(mask, picture.iter().enumerate().map(square)).max(0.0).sqrt() / self.mean(mask).max(1e-300)
+        mean_where(mask, image.iter().enumerate().map(square)).max(0.0).sqrt() / self.mean(mask).max(1e-300)
     }
 
-    /// Mean luminance of a picture over that of the reference, less 1, over the pixels of a mask.
-    pub(super) fn bias(&self, picture: &[[f32; 3]], mask: &[bool]) -> f64 {
-        let mean = mean_where(mask, picture.iter().map(|p| luminance(p.map(f64::from))));
+    /// Mean luminance of an image over that of the reference, less 1, over the pixels of a mask.
+    pub(super) fn bias(&self, image: &[[f32; 3]], mask: &[bool]) -> f64 {
+        let mean = mean_where(mask, image.iter().map(|p| luminance(p.map(f64::from))));
         mean / self.mean(mask).max(1e-300) - 1.0
     }
 }
 
-/// Root of the mean square of the difference in luminance from another picture over the pixels of a mask, relative to the mean luminance of
-/// the other.
-pub(super) fn relative_rmse(picture: &[[f32; 3]], other: &[[f32; 3]], mask: &[bool]) -> f64 {
+/// Root of the mean square of the difference in luminance from another image over the pixels of a mask, relative to the
+/// mean luminance of the other.
+pub(super) fn relative_rmse(image: &[[f32; 3]], other: &[[f32; 3]], mask: &[bool]) -> f64 {
     let light = |p: &[f32; 3]| luminance(p.map(f64::from));
-    let square = mean_where(mask, picture.iter().zip(other).map(|(a, b)| (light(a) - light(b)).powi(2)));
+    let square = mean_where(mask, image.iter().zip(other).map(|(a, b)| (light(a) - light(b)).powi(2)));
     square.sqrt() / mean_where(mask, other.iter().map(light)).max(1e-300)
 }
 
@@ -126,13 +126,13 @@ mod tests {
         let turns = vec![vec![1.0, 5.0, 0.0], vec![3.0, 5.0, 0.0]];
         let reference = Reference::new(&Measured::from_luminances(Method::mc(1), turns));
         let grey = |v: f32| [v; 3];
-        let picture = [grey(3.0), grey(5.0), grey(9.0)];
+        let image = [grey(3.0), grey(5.0), grey(9.0)];
         let mask = [true, true, false];
         // Squares (3 − 2)² − 1 and 0: the mean of two turns that differ by 2 has a variance of 1
-        assert!(reference.rmse(&picture, &mask) < 1e-3);
-        assert!((reference.rmse(&picture, &[false, false, true])).is_finite());
+        assert!(reference.rmse(&image, &mask) < 1e-3);
+        assert!((reference.rmse(&image, &[false, false, true])).is_finite());
         assert!((reference.mean(&mask) - 3.5).abs() < 1e-5);
-        assert!((reference.bias(&picture, &mask) - (4.0 / 3.5 - 1.0)).abs() < 1e-5);
+        assert!((reference.bias(&image, &mask) - (4.0 / 3.5 - 1.0)).abs() < 1e-5);
         let off = [grey(2.0 + 8.0_f32.sqrt()), grey(5.0), grey(0.0)];
         assert!((reference.rmse(&off, &mask) - (3.5_f64).sqrt() / 3.5).abs() < 1e-4);
     }

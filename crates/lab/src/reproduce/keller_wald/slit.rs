@@ -1,16 +1,16 @@
 //! A room that is lit through a slit: where importance puts photons, and what the cut-off loses [Keller and Wald 2000, Fig. 4].
 
 use super::super::figure::{Figure, Summary};
+use super::super::images::{gain, significant};
 use super::super::measure::{Estimate, Stage};
 use super::super::page::{Block, Cell, Table};
-use super::super::pictures::{gain, significant};
 use super::super::verdicts::hardly_perceivable;
 use super::super::{ReproduceError, scaled};
 use super::above::Area;
 use super::maps::{Cloud, Maps, Print, clouds, plan, positions, prints, speed, trace};
 use super::seen::{Seen, seen};
 use super::{SHAPE, Setup};
-use lumiris::photons::{Importance, ImportanceSettings, Tracing, Unimportant, Want, trace_importons};
+use lumiris::photons::{Importance, ImportanceSettings, LowImportance, PhotonBudget, Tracing, trace_importons};
 use lumiris::scene::RenderJob;
 use lumiris_numbers::estimators::stats::Welford;
 use lumiris_numbers::math::Vec3;
@@ -19,18 +19,18 @@ use serde_json::{Value, json};
 use std::time::{Duration, Instant};
 
 /// ε of the floor and of the cut-off.
-const LEAST: f32 = 0.05;
+const MIN_PROBABILITY: f32 = 0.05;
 /// Maps of each kind, with seeds of their own.
 const SEEDS: u32 = 4;
 /// Fewest photons of a map, and most: usual and quick.
-const FEWEST: f64 = 500.0;
-const MOST: [f64; 2] = [200_000.0, 10_000.0];
+const MIN_COUNT: f64 = 500.0;
+const MAX_COUNT: [f64; 2] = [200_000.0, 10_000.0];
 /// Photons of an estimate.
 const COUNT: u32 = 60;
 /// Most pixels along an edge: usual and quick.
 const SIZE: [u32; 2] = [240, 96];
 /// Part of the time for photons.
-const PHOTON_SHARE: f64 = 0.7;
+const PHOTON_FRACTION: f64 = 0.7;
 const IMPORTONS: u64 = 100_000;
 /// Part of the camera rays whose importance may be less than that of p = 1: a few see into the other room, or corners.
 const QUANTILE: f32 = 0.1;
@@ -41,11 +41,11 @@ const ROOM: Area = Area { low: [-4.1, -2.1], high: [-0.11, 2.1] };
 struct Row {
     name: &'static str,
     id: &'static str,
-    /// The map of the first seed, and its picture.
+    /// The map of the first seed, and its image.
     maps: Maps,
-    picture: Vec<[f32; 3]>,
+    image: Vec<[f32; 3]>,
     in_room: u64,
-    /// Mean luminance of the picture over seeds.
+    /// Mean luminance of the image over seeds.
     mean: Estimate,
 }
 
@@ -60,9 +60,9 @@ pub(super) fn run(setup: &Setup<'_>, time: Duration) -> Result<Figure, Reproduce
     let in_this_room = |s: Seen| Some(s).filter(|s| ROOM.holds(s.p));
     let seen: Vec<Option<Seen>> = seen(&job.world).into_iter().map(|s| s.and_then(in_this_room)).collect();
     let settings =
-        ImportanceSettings { trajectories: IMPORTONS, seed: 1, quantile: QUANTILE, ..ImportanceSettings::default() };
-    let floor = ImportanceSettings { unimportant: Unimportant::Floor(LEAST), ..settings };
-    let cut = ImportanceSettings { unimportant: Unimportant::CutOff(LEAST), ..settings };
+        ImportanceSettings { paths: IMPORTONS, seed: 1, quantile: QUANTILE, ..ImportanceSettings::default() };
+    let floor = ImportanceSettings { low_importance: LowImportance::Floor(MIN_PROBABILITY), ..settings };
+    let cut = ImportanceSettings { low_importance: LowImportance::CutOff(MIN_PROBABILITY), ..settings };
     let importance = |s: &ImportanceSettings| setup.pool.install(|| trace_importons(job, s));
     let (floor, cut) = (importance(&floor)?, importance(&cut)?);
 
@@ -70,8 +70,8 @@ pub(super) fn run(setup: &Setup<'_>, time: Duration) -> Result<Figure, Reproduce
     let [by_floor, _] = speed(setup, job, &Tracing::default(), Some(&floor))?;
     let [by_cut, _] = speed(setup, job, &Tracing::default(), Some(&cut))?;
     let each = f64::from(SEEDS) * (1.0 / by_floor.max(1.0) + 2.0 / by_cut.max(1.0));
-    let left = time.saturating_sub(start.elapsed()).as_secs_f64() * PHOTON_SHARE;
-    let photons = (left / each).clamp(FEWEST, MOST[usize::from(setup.options.quick)]) as u64;
+    let left = time.saturating_sub(start.elapsed()).as_secs_f64() * PHOTON_FRACTION;
+    let photons = (left / each).clamp(MIN_COUNT, MAX_COUNT[usize::from(setup.options.quick)]) as u64;
     (setup.observer.say)(&format!("  {} × {} pixels, {photons} photons, {SEEDS} maps of each kind", size[0], size[1]));
     let of = |name, id, importance| row(setup, (job, &seen), (name, id), importance, photons);
     let rows = [
@@ -89,20 +89,20 @@ fn row(
     importance: Option<&Importance>,
     photons: u64,
 ) -> Result<Row, ReproduceError> {
-    let want = Want::Stored { global: photons, most_trajectories: photons.saturating_mul(2000) };
+    let budget = PhotonBudget::Stored { global: photons, max_paths: photons.saturating_mul(2000) };
     let pixels = seen.iter().flatten().count().max(1) as f64;
     let mut means = Welford::new();
     let mut first = None;
     for seed in 1..=SEEDS {
-        let maps = trace(setup, job, &Tracing { seed, ..Tracing::default() }, importance, want)?;
-        let picture = maps.picture(setup, seen, COUNT);
-        means.add(picture.iter().map(|p| luminance(p.map(f64::from))).sum::<f64>() / pixels);
-        first.get_or_insert((maps, picture));
+        let maps = trace(setup, job, &Tracing { seed, ..Tracing::default() }, importance, budget)?;
+        let image = maps.image(setup, seen, COUNT);
+        means.add(image.iter().map(|p| luminance(p.map(f64::from))).sum::<f64>() / pixels);
+        first.get_or_insert((maps, image));
     }
-    let (maps, picture) = first.expect("there is a first seed");
+    let (maps, image) = first.expect("there is a first seed");
     let mean = Estimate { value: means.mean(), error: means.standard_error() };
     let in_room = ROOM.count(&maps.positions());
-    Ok(Row { name, id, maps, picture, in_room, mean })
+    Ok(Row { name, id, maps, image, in_room, mean })
 }
 
 /// Mean of a row over that of another, less 1.
@@ -124,7 +124,7 @@ fn figure(
 ) -> Result<Figure, ReproduceError> {
     let mut blocks = vec![Block::Text(format!(
         "The room on the left has the camera and no light; the one on the right has a light. From above: importons, and about the same number \
-         of photons in three maps: all that arrive, by importance with probabilities of at least ε = {LEAST}, and without those whose \
+         of photons in three maps: all that arrive, by importance with probabilities of at least ε = {MIN_PROBABILITY}, and without those whose \
          probability is below ε."
     ))];
     let cloud = |name: &str, title: &str, points: Vec<Vec3>| {
@@ -140,10 +140,10 @@ fn figure(
             title: r.name.to_owned(),
             caption: format!("{} photons in the room", r.in_room),
             size,
-            radiance: &r.picture,
+            radiance: &r.image,
         })
         .collect();
-    blocks.push(prints(setup, gain(&rows[1].picture), &list)?);
+    blocks.push(prints(setup, gain(&rows[1].image), &list)?);
     blocks.push(Block::Table(table(rows)));
 
     Ok(Figure {
@@ -153,20 +153,20 @@ fn figure(
         also: vec![("the form without bias", unbiased_summary(rows))],
         blocks,
         numbers: json!({
-            "size": size, "epsilon": LEAST, "seeds": SEEDS, "nearest": COUNT,
+            "size": size, "epsilon": MIN_PROBABILITY, "seeds": SEEDS, "nearest": COUNT,
             "maps": rows.iter().map(|r| row_json(r, &rows[1])).collect::<Vec<Value>>(),
         }),
     })
 }
 
 /// Part of a map's photons that lie in the visible room, of the standard map, with ε, and with the cut-off.
-fn shares(rows: &[Row; 3]) -> [f64; 3] {
+fn fractions(rows: &[Row; 3]) -> [f64; 3] {
     [0, 1, 2].map(|i| rows[i].in_room as f64 / rows[i].maps.stored().max(1) as f64)
 }
 
 fn summary(rows: &[Row; 3]) -> Summary {
     let loss = bias(&rows[2], &rows[1]);
-    let [standard, floor, cut] = shares(rows);
+    let [standard, floor, cut] = fractions(rows);
     Summary {
         paper: "photons “only where they are important”, “hardly perceivable” bias".to_owned(),
         target: "more photons in the visible room with each form; bias of the cut-off form below 2 %".to_owned(),
@@ -178,15 +178,12 @@ fn summary(rows: &[Row; 3]) -> Summary {
             percent(loss)
         ),
         reached: floor > standard && cut > floor && hardly_perceivable(loss),
-        reason: format!(
-            "{} trajectories for as many photons as {}",
-            rows[2].maps.trajectories, rows[0].maps.trajectories
-        ),
+        reason: format!("{} photon paths for as many photons as {}", rows[2].maps.paths, rows[0].maps.paths),
     }
 }
 
 fn unbiased_summary(rows: &[Row; 3]) -> Summary {
-    let [standard, floor, _] = shares(rows);
+    let [standard, floor, _] = fractions(rows);
     Summary {
         paper: "photons “only where they are important”".to_owned(),
         target: "more photons in the visible room".to_owned(),
@@ -198,13 +195,13 @@ fn unbiased_summary(rows: &[Row; 3]) -> Summary {
 
 fn table(rows: &[Row; 3]) -> Table {
     let header =
-        ["map", "photons", "in the visible room", "trajectories", "s", "mean luminance", "against the unbiased map"];
+        ["map", "photons", "in the visible room", "photon_paths", "s", "mean luminance", "against the unbiased map"];
     let mut table = Table::new(&header);
     for r in rows {
         let cells = [
             r.maps.stored().to_string(),
             r.in_room.to_string(),
-            r.maps.trajectories.to_string(),
+            r.maps.paths.to_string(),
             significant(r.maps.seconds),
             format!("{} ± {}", significant(r.mean.value), significant(r.mean.error)),
             percent(bias(r, &rows[1])),
@@ -217,7 +214,7 @@ fn table(rows: &[Row; 3]) -> Table {
 fn row_json(r: &Row, unbiased: &Row) -> Value {
     let b = bias(r, unbiased);
     json!({
-        "name": r.id, "photons": r.maps.stored(), "photons_in_room": r.in_room, "trajectories": r.maps.trajectories,
+        "name": r.id, "photons": r.maps.stored(), "photons_in_room": r.in_room, "photon_paths": r.maps.paths,
         "seconds": r.maps.seconds, "mean": r.mean, "bias": { "value": b.value, "standard_error": b.error },
     })
 }

@@ -1,7 +1,7 @@
 //! The cases of the comparison: figures of the paper and of the thesis that hold methods against each other.
 
 use super::scenes::Which;
-use lumiris::settings::Split;
+use lumiris::settings::SampleCounts;
 
 /// A figure that compares methods.
 pub(super) struct Case {
@@ -14,7 +14,7 @@ pub(super) struct Case {
     /// Shadow rays of the baseline at each.
     pub samples: u32,
     /// M and N of the paper.
-    pub printed: Option<Split>,
+    pub printed: Option<SampleCounts>,
     pub kind: Kind,
 }
 
@@ -46,7 +46,7 @@ impl Case {
         scene: Which::Both,
         primary: 20,
         samples: 20,
-        printed: Some(Split { samples: 11, proposals: 168 }),
+        printed: Some(SampleCounts { samples: 11, proposals: 168 }),
         kind: Kind::Reduction { paper: 70.0, target: 80.0, judged: Judged::EqualHalves },
     };
     pub(super) const PAPER_4_LIGHTS: Case = Case {
@@ -54,7 +54,7 @@ impl Case {
         title: "Paper, figure 4 without the environment: two area lights",
         intro: "The same with the two area lights alone, where most of the variance is that of visibility.",
         scene: Which::Lights,
-        printed: Some(Split { samples: 11, proposals: 168 }),
+        printed: Some(SampleCounts { samples: 11, proposals: 168 }),
         kind: Kind::Reduction { paper: 10.0, target: 30.0, judged: Judged::EqualHalves },
         ..Case::PAPER_4
     };
@@ -65,7 +65,7 @@ impl Case {
         scene: Which::Environment,
         primary: 10,
         samples: 100,
-        printed: Some(Split { samples: 64, proposals: 229 }),
+        printed: Some(SampleCounts { samples: 64, proposals: 229 }),
         kind: Kind::Reduction { paper: 33.0, target: 45.0, judged: Judged::Printed },
     };
     pub(super) const THESIS_54: Case = Case {

@@ -26,7 +26,7 @@ pub(super) struct Classes {
 }
 
 impl Classes {
-    /// Renders the picture without shadows and compares it with `reference`.
+    /// Renders the image without shadows and compares it with `reference`.
     pub(super) fn new(
         stage: &mut Stage,
         reference: &[[f64; 3]],

@@ -1,4 +1,4 @@
-//! Methods of equal time against each other: variances at equal time, and a pair of pictures of equal time.
+//! Methods of equal time against each other: variances at equal time, and a pair of images of equal time.
 
 use super::super::calibrate::{Calibration, calibrate};
 use super::super::figure::Figure;
@@ -10,18 +10,18 @@ use super::classes::Classes;
 use super::outcome::Outcome;
 use super::roster::methods;
 use super::{Setup, portrait, report};
-use lumiris::settings::Split;
+use lumiris::settings::SampleCounts;
 use std::time::{Duration, Instant};
 
-/// Turns of the antialiased pictures, for their variance.
+/// Turns of the antialiased images, for their variance.
 const PAIR_TURNS: u32 = 4;
-/// Edge of the picture on which times are found out, and the least edge.
+/// Edge of the image on which times are found out, and the least edge.
 const PILOT_SIZE: u32 = 96;
-const LEAST_SIZE: u32 = 32;
+const MIN_SIZE: u32 = 32;
 /// Fewest and most turns.
 const TURNS: [u32; 2] = [4, 48];
 const QUICK_TURNS: u32 = 8;
-/// Turns that the size of the picture is chosen for.
+/// Turns that the size of the image is chosen for.
 const WANTED_TURNS: f64 = 8.0;
 
 /// Measures a case within about `time`.
@@ -36,23 +36,23 @@ pub(super) fn run(setup: &Setup<'_>, case: &Case, time: Duration) -> Result<Figu
     let pilot_size = setup.size.min(PILOT_SIZE);
     let mut stage = Stage::load(&path, portrait(pilot_size), setup.options.threads)?;
     let mut calibration = calibrate(&mut stage, &base, setup.observer)?;
-    let count = methods(case, calibration.split).0.len() as f64;
+    let count = methods(case, calibration.sample_counts).0.len() as f64;
     let cost = |c: &Calibration| c.seconds * f64::from(case.primary) * 1.1;
     let antialiased = 3.0 * f64::from(PAIR_TURNS);
     let wanted = cost(&calibration) * (WANTED_TURNS * count + antialiased);
     let fits = (time.saturating_sub(start.elapsed()).as_secs_f64() / wanted).sqrt();
-    let size = ((f64::from(pilot_size) * fits) as u32 / 8 * 8).max(LEAST_SIZE).min(setup.size);
+    let size = ((f64::from(pilot_size) * fits) as u32 / 8 * 8).max(MIN_SIZE).min(setup.size);
     if size != pilot_size {
         stage = Stage::load(&path, portrait(size), setup.options.threads)?;
         calibration = calibrate(&mut stage, &base, setup.observer)?;
     }
 
     // As many turns as fit
-    let (named, roles) = methods(case, calibration.split);
+    let (named, roles) = methods(case, calibration.sample_counts);
     let list: Vec<Method> = named.iter().map(|n| n.method).collect();
     let left = time.saturating_sub(start.elapsed()).as_secs_f64() / cost(&calibration) - antialiased;
     let count_turns = ((left / count) as u32).clamp(TURNS[0], if setup.options.quick { QUICK_TURNS } else { TURNS[1] });
-    let Split { samples, proposals } = calibration.split;
+    let SampleCounts { samples, proposals } = calibration.sample_counts;
     let [width, height] = stage.size();
     say(&format!(
         "  {width} × {height} pixels, {count_turns} turns of {count} methods, M = {proposals}, N = {samples}"

@@ -34,8 +34,8 @@ const STUDY: Study = Study {
             of the same kind. The numbers below are from one run on one machine.",
     notes: &[
         "Variance: of the pixel's luminance over independent renderings with the camera rays of one turn each, unbiased, averaged \
-         over all pixels; no reference picture takes part. Camera rays pass through pixel centres, so that it is the variance of \
-         lighting; the pictures, and the variance below them, are with antialiasing. ± is one standard error, from how the turns differ.",
+         over all pixels; no reference image takes part. Camera rays pass through pixel centres, so that it is the variance of \
+         lighting; the images, and the variance below them, are with antialiasing. ± is one standard error, from how the turns differ.",
         "Time: processor time of the whole rendering, all threads together. All methods take \
          turns in one run, in an order that moves on from turn to turn; the ratio of times is the median over the turns. At equal time \
          means variance × time, relative to the baseline. M and N of ris are chosen so that times agree within about one percent.",
@@ -54,7 +54,7 @@ struct Setup<'a> {
     size: u32,
 }
 
-/// Width and height of a picture of the statue whose longer edge has `size` pixels.
+/// Width and height of an image of the statue whose longer edge has `size` pixels.
 fn portrait(size: u32) -> [u32; 2] {
     [(size * 3 / 4).max(1), size]
 }

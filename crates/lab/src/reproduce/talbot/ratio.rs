@@ -1,32 +1,32 @@
-//! The best number of proposals per sample: over the whole picture by a sweep at equal time, and pixel by pixel by
+//! The best number of proposals per sample: over the whole image by a sweep at equal time, and pixel by pixel by
 //! K = (T2/T1)·√((T/T2·V(f/p) − V(f/q)) / (T/T1·V(f/q) − V(f/q))) [Talbot 2005, Eq. 4.3] from measured variances
 //! [Talbot et al. 2005, Fig. 3; Talbot 2005, Fig. 5.1 and 5.2].
 
-use super::super::calibrate::{Calibration, calibrate, spend_rest};
+use super::super::calibrate::{Calibration, calibrate, counts_for_budget};
 use super::super::chart::Chart;
 use super::super::figure::{Figure, Summary, estimate_json, plus_minus};
+use super::super::images::{HEAT, Image, RED_GREEN, Scale, gain, significant};
 use super::super::measure::{Measured, Stage, View, radiance, reference, turns};
 use super::super::method::Method;
 use super::super::page::{Block, Cell, Shown, Table};
-use super::super::pictures::{HEAT, Picture, RED_GREEN, Scale, gain, significant};
 use super::super::{Observer, ReproduceError};
 use super::classes::{Classes, NAMES};
 use super::report::method_json;
 use super::scenes::Which;
 use super::{Setup, portrait};
-use lumiris::settings::{Split, StageTimes};
+use lumiris::settings::{SampleCounts, StageTimes};
 use lumiris_numbers::estimators::ris::choice::{Costs, Variances, clamp_ratio, optimal_ratio};
 use serde_json::json;
 use std::time::{Duration, Instant};
 
-/// M and N of the left picture of the thesis, which sets the time.
+/// M and N of the left image of the thesis, which sets the time.
 const BASE: u32 = 20;
 /// Numbers of samples of the sweep.
 const SAMPLES: [u32; 9] = [20, 17, 14, 10, 7, 5, 3, 2, 1];
 /// Proposals of the rendering from which the variance of visibility follows.
 const MANY: u32 = 96;
 /// Most camera rays per turn: usual and quick.
-const MOST_CAMERA_RAYS: [u32; 2] = [16, 4];
+const MAX_CAMERA_RAYS: [u32; 2] = [16, 4];
 /// Fewest and most turns.
 const TURNS: [u32; 2] = [6, 40];
 /// `auto` may have this many times the variance of the best ratio.
@@ -79,7 +79,7 @@ fn smooth(values: &[f64], size: [u32; 2]) -> Vec<f64> {
 /// Everything that was measured.
 struct Outcome {
     calibration: Calibration,
-    splits: Vec<Split>,
+    swept: Vec<SampleCounts>,
     /// Camera rays per pixel of a turn.
     spp: u32,
     /// The sweep, `auto`, the best of each pixel by the renderer's pilot, one proposal, one sample of many.
@@ -93,7 +93,7 @@ struct Outcome {
 
 impl Outcome {
     fn sweep(&self) -> &[Measured] {
-        &self.measured[..self.splits.len()]
+        &self.measured[..self.swept.len()]
     }
 
     /// Times, and the time to spend on a point (ns).
@@ -103,17 +103,17 @@ impl Outcome {
     }
 
     fn auto(&self) -> &Measured {
-        &self.measured[self.splits.len()]
+        &self.measured[self.swept.len()]
     }
 
     fn per_pixel(&self) -> &Measured {
-        &self.measured[self.splits.len() + 1]
+        &self.measured[self.swept.len() + 1]
     }
 
     /// Position in the sweep of the least variance at equal time; after the last for `auto`.
     fn best(&self, mask: Option<&[bool]>) -> usize {
         let value = |m: &Measured| m.at_equal_time(&self.measured[0], mask).value;
-        let all = &self.measured[..=self.splits.len()];
+        let all = &self.measured[..=self.swept.len()];
         (0..all.len()).min_by(|&a, &b| value(&all[a]).total_cmp(&value(&all[b]))).unwrap_or(0)
     }
 }
@@ -127,31 +127,31 @@ pub(super) fn run(setup: &Setup<'_>, time: Duration) -> Result<Figure, Reproduce
     let base = Method::ris(BASE, BASE);
     let mut stage = Stage::load(&path, portrait(setup.size), setup.options.threads)?;
     let calibration = calibrate(&mut stage, &base, setup.observer)?;
-    let mut splits: Vec<Split> = vec![Split { samples: BASE, proposals: BASE }];
+    let mut swept: Vec<SampleCounts> = vec![SampleCounts { samples: BASE, proposals: BASE }];
     for n in SAMPLES {
-        let split = spend_rest(calibration.budget, calibration.times, n);
-        if splits.iter().all(|s| s.samples != split.samples) {
-            splits.push(split);
+        let sample_counts = counts_for_budget(calibration.budget, calibration.times, n);
+        if swept.iter().all(|s| s.samples != sample_counts.samples) {
+            swept.push(sample_counts);
         }
     }
-    let of = |s: &Split| Method::ris(s.proposals, s.samples);
-    let mut methods: Vec<Method> = splits.iter().map(of).collect();
-    let per_pixel = Method { per_pixel: true, ..of(&calibration.split) };
-    methods.extend([of(&calibration.split), per_pixel, Method::ris(1, 1), Method::ris(MANY, 1)]);
+    let of = |s: &SampleCounts| Method::ris(s.proposals, s.samples);
+    let mut methods: Vec<Method> = swept.iter().map(of).collect();
+    let per_pixel = Method { per_pixel: true, ..of(&calibration.sample_counts) };
+    methods.extend([of(&calibration.sample_counts), per_pixel, Method::ris(1, 1), Method::ris(MANY, 1)]);
     let (pilot, pilot_seconds) = stage.plan_per_pixel(calibration.times, calibration.budget)?;
 
     // Turns, and camera rays per turn, that fit
     let quick = usize::from(setup.options.quick);
     let turn = calibration.seconds * 1.1 * methods.len() as f64;
     let left = time.saturating_sub(start.elapsed()).as_secs_f64() * 0.95;
-    let spp = ((left / turn / f64::from(TURNS[1])) as u32).clamp(1, MOST_CAMERA_RAYS[quick]);
+    let spp = ((left / turn / f64::from(TURNS[1])) as u32).clamp(1, MAX_CAMERA_RAYS[quick]);
     let count = ((left / (turn * f64::from(spp))) as u32).clamp(TURNS[0], TURNS[1]);
     say(&format!("  {count} turns of {} methods, {spp} camera rays each", methods.len()));
     let measured = turns(&mut stage, &methods, View::Centres, spp, 0..count, setup.observer)?;
     let classes = Classes::new(&mut stage, &reference(&measured), setup.observer)?;
     let [one, many] = [2, 1].map(|k| &measured[measured.len() - k]);
     let terms = Terms::new(one, many, spp, stage.size());
-    let outcome = Outcome { calibration, splits, spp, measured, pilot, pilot_seconds, classes, terms };
+    let outcome = Outcome { calibration, swept, spp, measured, pilot, pilot_seconds, classes, terms };
 
     let mut blocks = vec![Block::Text(format!(
         "Resampling without stratification at the time of M = N = {BASE}, for different M/N. More proposals help where the \
@@ -159,23 +159,23 @@ pub(super) fn run(setup: &Setup<'_>, time: Duration) -> Result<Figure, Reproduce
         significant(calibration.times.t1),
         significant(calibration.times.t2)
     ))];
-    blocks.extend(pictures(setup, &mut stage, &outcome)?);
+    blocks.extend(images(setup, &mut stage, &outcome)?);
     blocks.extend(tables(&outcome));
     Ok(figure(&outcome, stage.size(), blocks))
 }
 
-/// The two pictures of the thesis, and the map.
-fn pictures(setup: &Setup<'_>, stage: &mut Stage, o: &Outcome) -> Result<Vec<Block>, ReproduceError> {
+/// The two images of the thesis, and the map.
+fn images(setup: &Setup<'_>, stage: &mut Stage, o: &Outcome) -> Result<Vec<Block>, ReproduceError> {
     let size = stage.size();
     let to_f32 = |p: Vec<[f64; 3]>| -> Vec<[f32; 3]> { p.iter().map(|p| p.map(|v| v as f32)).collect() };
     let exposure = gain(&to_f32(reference(&o.measured)));
     let mut shown = Vec::new();
-    for i in [0, o.splits.len() - 1] {
-        let Split { samples, proposals } = o.splits[i];
+    for i in [0, o.swept.len() - 1] {
+        let SampleCounts { samples, proposals } = o.swept[i];
         let method = o.measured[i].method;
         let rendering = stage.render(&method, View::Antialiased, 1, 0, setup.observer)?;
-        let picture = Picture::tone_mapped(size, &to_f32(radiance(&rendering.film)), exposure);
-        let file = picture.write(&setup.options.out, &format!("figure-3-m{proposals}-n{samples}"))?;
+        let image = Image::tone_mapped(size, &to_f32(radiance(&rendering.film)), exposure);
+        let file = image.write(&setup.options.out, &format!("figure-3-m{proposals}-n{samples}"))?;
         let title = format!("M = {proposals}, N = {samples}, one camera ray");
         let caption = format!("time relative to M = N = {BASE}: {:.3}", o.measured[i].time_ratio(&o.measured[0]));
         shown.push(Shown { file, title, caption });
@@ -194,7 +194,7 @@ fn pictures(setup: &Setup<'_>, stage: &mut Stage, o: &Outcome) -> Result<Vec<Blo
     ] {
         let color = |k: &Option<f64>| k.map_or([0.0; 3], |k| scale.color(k)).map(|c| (c / 255.0) as f32);
         let colors = map.iter().flat_map(color).collect();
-        let file = Picture::from_display(size, colors).write(&setup.options.out, &format!("figure-3-{name}"))?;
+        let file = Image::from_display(size, colors).write(&setup.options.out, &format!("figure-3-{name}"))?;
         let caption = "green: more proposals; red: more samples; black: nothing lit".to_owned();
         shown.push(Shown { file, title: title.to_owned(), caption });
     }
@@ -205,17 +205,17 @@ fn pictures(setup: &Setup<'_>, stage: &mut Stage, o: &Outcome) -> Result<Vec<Blo
         [("p", "V(f/p): variance of a proposal", &p), ("q", "V(f/q): variance that visibility alone leaves", &q)]
     {
         let file =
-            Picture::colored(size, values, &heat).write(&setup.options.out, &format!("figure-3-variance-{name}"))?;
+            Image::colored(size, values, &heat).write(&setup.options.out, &format!("figure-3-variance-{name}"))?;
         shown.push(Shown { file, title: title.to_owned(), caption: String::new() });
     }
     Ok(vec![
-        Block::Pictures(shown),
+        Block::Images(shown),
         Block::Legend { title: "best M/N".to_owned(), scale },
         Block::Legend { title: "variance of one estimate (luminance)".to_owned(), scale: heat },
     ])
 }
 
-fn ratio_of(s: &Split) -> f64 {
+fn ratio_of(s: &SampleCounts) -> f64 {
     f64::from(s.proposals) / f64::from(s.samples)
 }
 
@@ -225,13 +225,17 @@ fn tables(o: &Outcome) -> Vec<Block> {
     header.extend(NAMES);
     let mut table = Table::new(&header);
     let base = &o.measured[0];
-    let auto = (o.calibration.split, o.auto());
-    let rows = o.splits.iter().copied().zip(o.sweep()).chain([auto, (o.calibration.split, o.per_pixel())]);
-    for (i, (split, m)) in rows.enumerate() {
-        let name = if i == o.splits.len() { " (auto)" } else { "" };
+    let auto = (o.calibration.sample_counts, o.auto());
+    let rows = o.swept.iter().copied().zip(o.sweep()).chain([auto, (o.calibration.sample_counts, o.per_pixel())]);
+    for (i, (sample_counts, m)) in rows.enumerate() {
+        let name = if i == o.swept.len() { " (auto)" } else { "" };
         let numbers = match m.method.per_pixel {
             true => ["per pixel".to_owned(), String::new(), String::new()],
-            false => [format!("{}{name}", split.proposals), split.samples.to_string(), significant(ratio_of(&split))],
+            false => [
+                format!("{}{name}", sample_counts.proposals),
+                sample_counts.samples.to_string(),
+                significant(ratio_of(&sample_counts)),
+            ],
         };
         let [proposals, samples, ratio] = numbers;
         let mut cells = vec![
@@ -245,14 +249,14 @@ fn tables(o: &Outcome) -> Vec<Block> {
         table.row(cells);
     }
     let curve = |mask: Option<&[bool]>| -> Vec<[f64; 2]> {
-        let point = |(s, m): (&Split, &Measured)| [ratio_of(s), m.at_equal_time(base, mask).value];
-        o.splits.iter().zip(o.sweep()).map(point).collect()
+        let point = |(s, m): (&SampleCounts, &Measured)| [ratio_of(s), m.at_equal_time(base, mask).value];
+        o.swept.iter().zip(o.sweep()).map(point).collect()
     };
     let mut chart = Chart::new("M/N", "variance at equal time").with("all pixels", curve(None));
     for (name, mask) in NAMES.iter().zip(masks) {
         chart = chart.with(name, curve(Some(mask)));
     }
-    let point = [ratio_of(&o.calibration.split), o.auto().at_equal_time(base, None).value];
+    let point = [ratio_of(&o.calibration.sample_counts), o.auto().at_equal_time(base, None).value];
     let chart = chart.with("auto, all pixels", vec![point]);
     let note = format!(
         "Per pixel: M and N by the variances that the renderer's pilot found, which took {} processor seconds once, not \
@@ -265,21 +269,21 @@ fn tables(o: &Outcome) -> Vec<Block> {
 fn figure(o: &Outcome, size: [u32; 2], blocks: Vec<Block>) -> Figure {
     let base = &o.measured[0];
     let best = o.best(None);
-    let least = o.measured[best].at_equal_time(base, None);
+    let min = o.measured[best].at_equal_time(base, None);
     let auto = o.auto().at_equal_time(base, None);
-    let excess = auto.value / least.value.max(1e-300);
+    let excess = auto.value / min.value.max(1e-300);
     let (costs, time) = o.costs();
-    let k = ratio_of(&o.calibration.split);
+    let k = ratio_of(&o.calibration.sample_counts);
     let is_surface = o.classes.visibility.iter().map(|v| !v.is_nan());
     let ratios: Vec<Option<f64>> =
         o.terms.ratios(costs, time).into_iter().zip(is_surface).map(|(k, is)| k.filter(|_| is)).collect();
     let of_auto = o.terms.predicted(costs, time, |_| k);
     let of_best = o.terms.predicted(costs, time, |i| ratios[i].unwrap_or(k));
-    let split = |i: usize| o.splits.get(i).copied().unwrap_or(o.calibration.split);
+    let sample_counts = |i: usize| o.swept.get(i).copied().unwrap_or(o.calibration.sample_counts);
     let best_of: Vec<String> = NAMES
         .iter()
         .zip(&o.classes.masks)
-        .map(|(name, mask)| format!("{name} {}", significant(ratio_of(&split(o.best(Some(mask)))))))
+        .map(|(name, mask)| format!("{name} {}", significant(ratio_of(&sample_counts(o.best(Some(mask)))))))
         .collect();
     let summary = Summary {
         paper: "map; T2/T1 is never more than 2 × the variance of the best M/N".to_owned(),
@@ -287,7 +291,7 @@ fn figure(o: &Outcome, size: [u32; 2], blocks: Vec<Block>) -> Figure {
         measured: format!(
             "auto (M/N = {}) has {excess:.2} × the variance of the best (M/N = {})",
             significant(k),
-            significant(ratio_of(&split(best)))
+            significant(ratio_of(&sample_counts(best)))
         ),
         reached: excess <= TARGET,
         reason: format!(
@@ -303,7 +307,7 @@ fn figure(o: &Outcome, size: [u32; 2], blocks: Vec<Block>) -> Figure {
     let numbers = json!({
         "size": size, "camera_rays_per_turn": o.spp, "turns": base.turns(),
         "t1_ns": costs.t1, "t2_ns": costs.t2, "budget_ns": time,
-        "auto_over_best": excess, "auto": estimate_json(auto), "best": estimate_json(least),
+        "auto_over_best": excess, "auto": estimate_json(auto), "best": estimate_json(min),
         "pilot_seconds": o.pilot_seconds, "best_per_pixel_over_auto_predicted": of_best / of_auto.max(1e-300),
         "methods": rows,
     });
@@ -319,7 +323,7 @@ fn figure(o: &Outcome, size: [u32; 2], blocks: Vec<Block>) -> Figure {
 
 impl Outcome {
     fn name(&self, i: usize) -> String {
-        let n = self.splits.len();
+        let n = self.swept.len();
         let m = self.measured[i].method;
         if m.per_pixel {
             return "per pixel".to_owned();

@@ -2,16 +2,16 @@
 
 use super::super::ReproduceError;
 use super::super::figure::{Figure, Summary, estimate_json, percent, plus_minus};
+use super::super::images::{HEAT, Image, Scale, gain, significant};
 use super::super::measure::{Estimate, Measured, Seconds, same_mean};
 use super::super::page::{Block, Cell, Shown, Table};
-use super::super::pictures::{HEAT, Picture, Scale, gain, significant};
 use super::super::verdicts::{falls, helps_most_in_shadow, reduced_by_resampling};
 use super::Setup;
 use super::cases::Kind;
 use super::classes::{Classes, LIT, NAMES, SHADOWED};
 use super::outcome::Outcome;
 use super::roster::Roles;
-use lumiris::settings::Split;
+use lumiris::settings::SampleCounts;
 use serde_json::{Value, json};
 
 /// All numbers of a method among those it was in turns with, the first of which is the baseline.
@@ -40,7 +40,7 @@ pub(super) fn method_json(name: &str, all: &[Measured], method: usize, classes: 
 
 /// The section of a case.
 pub(super) fn comparison(setup: &Setup<'_>, o: &Outcome<'_>) -> Result<Figure, ReproduceError> {
-    let Split { samples, proposals } = o.calibration.split;
+    let SampleCounts { samples, proposals } = o.calibration.sample_counts;
     let (triangles, lights) = o.stage_facts;
     let base = &o.measured[o.roles.base];
     let mut blocks = vec![
@@ -48,7 +48,7 @@ pub(super) fn comparison(setup: &Setup<'_>, o: &Outcome<'_>) -> Result<Figure, R
         Block::Facts(vec![
             ("scene".to_owned(), format!("{triangles} triangles, {lights} lights")),
             (
-                "picture".to_owned(),
+                "image".to_owned(),
                 format!("{} × {} pixels, {} camera rays per pixel", o.size[0], o.size[1], o.case.primary),
             ),
             ("turns".to_owned(), format!("{} of {} methods each", base.turns(), o.measured.len())),
@@ -60,7 +60,7 @@ pub(super) fn comparison(setup: &Setup<'_>, o: &Outcome<'_>) -> Result<Figure, R
             ),
         ]),
     ];
-    blocks.extend(pictures(setup, o)?);
+    blocks.extend(images(setup, o)?);
     blocks.extend(tables(o));
     let (summary, also) = match o.case.kind {
         Kind::Reduction { paper, target, .. } => reductions(o, [paper, target]),
@@ -186,7 +186,7 @@ fn stratification(o: &Outcome<'_>) -> Summary {
     }
 }
 
-fn pictures(setup: &Setup<'_>, o: &Outcome<'_>) -> Result<Vec<Block>, ReproduceError> {
+fn images(setup: &Setup<'_>, o: &Outcome<'_>) -> Result<Vec<Block>, ReproduceError> {
     let out = &setup.options.out;
     let id = o.case.id.replace('.', "-");
     let reference: Vec<[f32; 3]> = o.reference.iter().map(|p| p.map(|v| v as f32)).collect();
@@ -196,8 +196,9 @@ fn pictures(setup: &Setup<'_>, o: &Outcome<'_>) -> Result<Vec<Block>, ReproduceE
     let mut shown = Vec::new();
     for (k, &i) in chosen.iter().enumerate() {
         let m = &o.antialiased[k];
-        let Split { samples, proposals } = Split { samples: m.method.samples, proposals: m.method.proposals };
-        let file = Picture::tone_mapped(o.size, &m.first, exposure).write(out, &format!("{id}-{k}"))?;
+        let SampleCounts { samples, proposals } =
+            SampleCounts { samples: m.method.samples, proposals: m.method.proposals };
+        let file = Image::tone_mapped(o.size, &m.first, exposure).write(out, &format!("{id}-{k}"))?;
         let seconds = m.seconds[0].processor;
         let caption = format!(
             "M = {proposals}, N = {samples}; {} processor seconds ({:+.1} %); variance with antialiasing {}",
@@ -210,19 +211,19 @@ fn pictures(setup: &Setup<'_>, o: &Outcome<'_>) -> Result<Vec<Block>, ReproduceE
     let maps: Vec<Vec<f64>> = chosen.iter().map(|&i| o.measured[i].variance_map()).collect();
     let scale = Scale::of_values(HEAT, maps.iter().flatten());
     for (k, (&i, map)) in chosen.iter().zip(&maps).enumerate() {
-        let file = Picture::colored(o.size, map, &scale).write(out, &format!("{id}-variance-{k}"))?;
+        let file = Image::colored(o.size, map, &scale).write(out, &format!("{id}-variance-{k}"))?;
         shown.push(Shown { file, title: format!("variance: {}", o.methods[i].name), caption: String::new() });
     }
-    let file = Picture::tone_mapped(o.size, &reference, exposure).write(out, &format!("{id}-mean"))?;
+    let file = Image::tone_mapped(o.size, &reference, exposure).write(out, &format!("{id}-mean"))?;
     let title = "mean of all turns of all methods".to_owned();
     shown.push(Shown { file, title, caption: String::new() });
     let grey = |&v: &f64| if v.is_nan() { [0.0, 0.0, 0.1] } else { [v.clamp(0.0, 1.0) as f32; 3] };
     let visibility: Vec<[f32; 3]> = o.classes.visibility.iter().map(grey).collect();
-    let file = Picture::tone_mapped(o.size, &visibility, 1.0).write(out, &format!("{id}-visibility"))?;
+    let file = Image::tone_mapped(o.size, &visibility, 1.0).write(out, &format!("{id}-visibility"))?;
     let title = "part of the light that arrives".to_owned();
     shown.push(Shown { file, title, caption: String::new() });
     let title = "variance of the pixel (luminance)".to_owned();
-    Ok(vec![Block::Pictures(shown), Block::Legend { title, scale }])
+    Ok(vec![Block::Images(shown), Block::Legend { title, scale }])
 }
 
 fn tables(o: &Outcome<'_>) -> Vec<Block> {

@@ -2,7 +2,7 @@
 
 use super::super::method::Method;
 use super::cases::{Case, Judged, Kind};
-use lumiris::settings::{Split, Strata};
+use lumiris::settings::{SampleCounts, Strata};
 
 /// A method with its name on the page.
 #[derive(Clone, Debug)]
@@ -31,8 +31,8 @@ pub(super) struct Roles {
 }
 
 /// The methods of a case, with M and N of equal halves of the time.
-pub(super) fn methods(case: &Case, split: Split) -> (Vec<Named>, Roles) {
-    let Split { samples: n, proposals: m } = split;
+pub(super) fn methods(case: &Case, sample_counts: SampleCounts) -> (Vec<Named>, Roles) {
+    let SampleCounts { samples: n, proposals: m } = sample_counts;
     let named = |name: &str, method: Method| Named { name: name.to_owned(), method };
     let ris = Method::ris(m, n);
     let plain = named("ris, no stratification", ris);

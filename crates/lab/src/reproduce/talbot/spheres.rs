@@ -2,11 +2,11 @@
 //! Fig. 5]: one sample of M = 20 proposals against one of M = 1.
 
 use super::super::figure::{Figure, Summary};
+use super::super::images::{HEAT, Image, Scale, gain, significant};
 use super::super::page::{Block, Cell, Shown, Table};
-use super::super::pictures::{HEAT, Picture, Scale, gain, significant};
 use super::super::{ReproduceError, page};
 use super::Setup;
-use crate::sphere_study::{SphereSettings, SphereStudy, sphere_picture};
+use crate::sphere_study::{SphereSettings, SphereStudy, sphere_image};
 use lumiris::bsdfs::models::CookTorrance;
 use lumiris::bsdfs::{Bsdf, Evaluated, Model, ProposalDensity};
 use lumiris_numbers::math::Rgb;
@@ -18,7 +18,7 @@ use std::time::Instant;
 const TARGET: f64 = 0.2;
 /// Proposals without and with resampling.
 const PROPOSALS: [u32; 2] = [1, 20];
-/// Estimates per pixel: of the pictures, and of the variances.
+/// Estimates per pixel: of the images, and of the variances.
 const SPP: [u32; 2] = [4, 64];
 
 struct Sphere {
@@ -31,7 +31,7 @@ struct Sphere {
 
 /// One sphere without and with resampling.
 struct Pair {
-    pictures: [SphereStudy; 2],
+    images: [SphereStudy; 2],
     variances: [SphereStudy; 2],
     /// Nanoseconds of an estimate.
     times: [f64; 2],
@@ -52,7 +52,7 @@ fn spheres() -> [Sphere; 4] {
 fn study(sphere: &Sphere, size: u32) -> Pair {
     let bsdf = Bsdf::Evaluated(Evaluated { model: sphere.model, density: sphere.density });
     let render =
-        |proposals, spp, seed| sphere_picture(&bsdf, &|_| Rgb::WHITE, &SphereSettings { proposals, spp, size, seed });
+        |proposals, spp, seed| sphere_image(&bsdf, &|_| Rgb::WHITE, &SphereSettings { proposals, spp, size, seed });
     let mut times = [0.0; 2];
     let variances = [0, 1].map(|i| {
         let start = Instant::now();
@@ -61,7 +61,7 @@ fn study(sphere: &Sphere, size: u32) -> Pair {
         times[i] = start.elapsed().as_secs_f64() * 1e9 / estimates;
         study
     });
-    Pair { pictures: PROPOSALS.map(|m| render(m, SPP[0], 11 + m)), variances, times }
+    Pair { images: PROPOSALS.map(|m| render(m, SPP[0], 11 + m)), variances, times }
 }
 
 /// Variance with resampling by variance without.
@@ -86,7 +86,7 @@ pub(super) fn run(setup: &Setup<'_>) -> Result<Figure, ReproduceError> {
         Table::new(&["sphere", "variance, M = 1", "variance, M = 20", "ratio", "ns per estimate, M = 1", "M = 20"]);
     let mut numbers = Vec::new();
     for (sphere, pair) in spheres.iter().zip(&pairs) {
-        blocks.extend(pictures(setup, sphere, pair, size)?);
+        blocks.extend(images(setup, sphere, pair, size)?);
         let variances = [0, 1].map(|i| luminance(pair.variances[i].mean_variance()));
         let values = [variances[0], variances[1], ratio(pair), pair.times[0], pair.times[1]];
         table.row(std::iter::once(Cell::text(sphere.name)).chain(values.iter().map(|&v| Cell::number(significant(v)))));
@@ -129,7 +129,7 @@ fn figure(spheres: &[Sphere], pairs: &[Pair], blocks: Vec<Block>, numbers: Value
     }
 }
 
-fn pictures(setup: &Setup<'_>, sphere: &Sphere, pair: &Pair, size: u32) -> Result<Vec<Block>, ReproduceError> {
+fn images(setup: &Setup<'_>, sphere: &Sphere, pair: &Pair, size: u32) -> Result<Vec<Block>, ReproduceError> {
     let name = sphere.name.replace([' ', ','], "-").replace("--", "-").to_lowercase();
     let rgb = |s: &SphereStudy| -> Vec<[f32; 3]> { s.pixels.iter().map(|p| p.to_array()).collect() };
     let maps = [0, 1].map(|i| -> Vec<f64> {
@@ -139,16 +139,16 @@ fn pictures(setup: &Setup<'_>, sphere: &Sphere, pair: &Pair, size: u32) -> Resul
     let scale = Scale::of_values(HEAT, maps.iter().flatten());
     let mut shown: Vec<page::Shown> = Vec::new();
     for (i, m) in PROPOSALS.iter().enumerate() {
-        let picture = Picture::tone_mapped([size; 2], &rgb(&pair.pictures[i]), gain);
-        let file = picture.write(&setup.options.out, &format!("figure-5-{name}-m{m}"))?;
+        let image = Image::tone_mapped([size; 2], &rgb(&pair.images[i]), gain);
+        let file = image.write(&setup.options.out, &format!("figure-5-{name}-m{m}"))?;
         let caption = format!("{} estimates per pixel", SPP[0]);
         shown.push(Shown { file, title: format!("{}, M = {m}", sphere.name), caption });
     }
     for (i, m) in PROPOSALS.iter().enumerate() {
-        let file = Picture::colored([size; 2], &maps[i], &scale)
+        let file = Image::colored([size; 2], &maps[i], &scale)
             .write(&setup.options.out, &format!("figure-5-{name}-m{m}-variance"))?;
         shown.push(Shown { file, title: format!("variance, M = {m}"), caption: String::new() });
     }
     let title = "variance of one estimate (luminance)".to_owned();
-    Ok(vec![Block::Pictures(shown), Block::Legend { title, scale }])
+    Ok(vec![Block::Images(shown), Block::Legend { title, scale }])
 }

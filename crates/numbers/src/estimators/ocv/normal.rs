@@ -3,7 +3,7 @@
 use super::ldlt::MAX_COMPONENTS;
 
 /// Samples after which the sums stay as they are: the count would no longer be exact in f32.
-const MOST_SAMPLES: f32 = 16_777_216.0;
+const MAX_SAMPLES: f32 = 16_777_216.0;
 
 /// Where the sums over samples lie in a slice of f32: Σ c_j c_k (k ≤ j, row by row), Σ c_j y (by column, then channel),
 /// Σ c_j, Σ y, Σ y², and the number of samples.
@@ -86,7 +86,7 @@ impl NormalEquations {
     /// at the mean of the columns.
     #[inline]
     pub fn add_sparse(self, sums: &mut [f32], columns: &[(usize, f32)], y: [f32; 3]) {
-        if sums[self.count()] >= MOST_SAMPLES {
+        if sums[self.count()] >= MAX_SAMPLES {
             return;
         }
         sums[self.count()] += 1.0;
@@ -110,7 +110,7 @@ impl NormalEquations {
 
     /// Adds `count` samples of y = 0 whose columns are 0 but for column `j`.
     pub fn add_zeros(self, sums: &mut [f32], (j, c): (usize, f32), count: u32) {
-        let count = (count as f32).min(MOST_SAMPLES - sums[self.count()]);
+        let count = (count as f32).min(MAX_SAMPLES - sums[self.count()]);
         sums[self.count()] += count;
         if c.is_finite() {
             sums[j * (j + 1) / 2 + j] += count * c * c;
@@ -150,7 +150,7 @@ impl NormalEquations {
 
     /// Adds the sums of other samples.
     pub fn merge(self, sums: &mut [f32], other: &[f32]) {
-        if sums[self.count()] >= MOST_SAMPLES {
+        if sums[self.count()] >= MAX_SAMPLES {
             return;
         }
         for (sum, other) in sums[..self.len()].iter_mut().zip(&other[..self.len()]) {

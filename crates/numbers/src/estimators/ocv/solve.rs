@@ -102,8 +102,8 @@ impl F {
     }
 
     #[inline(always)]
-    fn max(self, least: f32) -> F {
-        self.zip(F::ZERO, |v, _| if v > least { v } else { least })
+    fn max(self, min: f32) -> F {
+        self.zip(F::ZERO, |v, _| if v > min { v } else { min })
     }
 
     /// `self` where `test > bound`, else 0.
@@ -251,7 +251,7 @@ fn assemble(lanes: &Lanes<'_>, system: System, per_n: F) -> (Triangle, [[F; MAX_
                 let centred = a[j][k] - mean * lanes.get(means + k);
                 let is_constant = a[j][k] * CONSTANT;
                 a[j][k] =
-                    if j == k { centred.zip(is_constant, |c, least| if c < least { 0.0 } else { c }) } else { centred };
+                    if j == k { centred.zip(is_constant, |c, min| if c < min { 0.0 } else { c }) } else { centred };
             }
             at += 1;
         }
@@ -290,9 +290,9 @@ fn factorise(m: usize, a: &Triangle, ridge: f32) -> Factors {
         for k in 0..j {
             pivot -= l[j][k] * l[j][k] * d[k];
         }
-        let least = diagonal * DEPENDENT;
-        d[j] = pivot.where_greater(pivot, least);
-        per_d[j] = (one / pivot).where_greater(pivot, least);
+        let min = diagonal * DEPENDENT;
+        d[j] = pivot.where_greater(pivot, min);
+        per_d[j] = (one / pivot).where_greater(pivot, min);
         for i in j + 1..m {
             let mut v = a[i][j];
             for k in 0..j {

@@ -72,7 +72,7 @@ pub struct Counts {
 }
 
 /// Numbers are held below this, so that they fit and stay exact.
-const MOST: f64 = 16_777_216.0;
+const MAX_COUNT: f64 = 16_777_216.0;
 
 /// Optimal K = M/N for `time` seconds, before clamping [Talbot 2005, Eq. 4.3]: infinite if V(f/q) = 0 (one sample will
 /// do), 0 if proposals should not be more than samples, K̄ if nothing varies.
@@ -100,13 +100,13 @@ pub fn counts(ratio: f64, costs: Costs, time: f64, u: [f32; 2]) -> Counts {
 
 /// K̃ = max(min(K, (T − T2)/T1), 1): at least one sample can be paid for, and no more samples than proposals.
 pub fn clamp_ratio(ratio: f64, costs: Costs, time: f64) -> f64 {
-    let most = (time - costs.t2) / costs.t1;
-    ratio.min(most).clamp(1.0, MOST)
+    let max = (time - costs.t2) / costs.t1;
+    ratio.min(max).clamp(1.0, MAX_COUNT)
 }
 
 /// ⌊x + u⌋, whose expectation over u is x; between 1 and 2²⁴.
 fn round(x: f64, u: f32) -> u32 {
-    (x + f64::from(u)).clamp(1.0, MOST) as u32
+    (x + f64::from(u)).clamp(1.0, MAX_COUNT) as u32
 }
 
 /// e1, e2 and e3 of a colour [Talbot et al. 2005, Eq. 2].
@@ -155,9 +155,9 @@ fn difference(a: [f64; 3], b: [f64; 3]) -> [f64; 3] {
 /// Size M and number N of independent sets for `time` seconds [Talbot et al. 2005, Section 4.2]: M ≥ 1, N = T/(M T1 + T2) ≥ 1,
 /// and with that N again M = (T/N − T2)/T1; rounded by `u` so that the expected values stay.
 pub fn counts_of_sets(size: f64, costs: Costs, time: f64, u: [f32; 2]) -> Counts {
-    let size = size.clamp(1.0, MOST);
-    let n = (time / (size * costs.t1 + costs.t2)).clamp(1.0, MOST);
-    let size = ((time / n - costs.t2) / costs.t1).clamp(1.0, MOST);
+    let size = size.clamp(1.0, MAX_COUNT);
+    let n = (time / (size * costs.t1 + costs.t2)).clamp(1.0, MAX_COUNT);
+    let size = ((time / n - costs.t2) / costs.t1).clamp(1.0, MAX_COUNT);
     Counts { m: round(size, u[1]), n: round(n, u[0]) }
 }
 

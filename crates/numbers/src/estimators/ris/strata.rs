@@ -74,8 +74,8 @@ mod tests {
                 equal_proposals(m, n, &mut ends);
                 assert_eq!(ends.len(), n.min(m));
                 let sizes = (0..ends.len()).map(|k| ends[k] - if k > 0 { ends[k - 1] } else { 0 });
-                let (least, most) = (sizes.clone().min().unwrap_or(0), sizes.max().unwrap_or(0));
-                assert!(most - least <= 1 && (m == 0 || n == 0 || (least > 0 && ends[ends.len() - 1] == m as u32)));
+                let (min, max) = (sizes.clone().min().unwrap_or(0), sizes.max().unwrap_or(0));
+                assert!(max - min <= 1 && (m == 0 || n == 0 || (min > 0 && ends[ends.len() - 1] == m as u32)));
             }
         }
     }

@@ -7,17 +7,17 @@ use std::path::Path;
 
 /// Values for a display, RGB interleaved, row-major from the top left.
 #[derive(Clone, Debug)]
-pub struct Picture {
+pub struct Image {
     width: usize,
     height: usize,
     data: Vec<f32>,
 }
 
-impl Picture {
+impl Image {
     /// Radiance times `gain`, through the sRGB curve.
     pub fn tone_mapped(size: [u32; 2], radiance: &[[f32; 3]], gain: f32) -> Self {
         let encode = |v: f32| linear_to_srgb((v * gain).clamp(0.0, 1.0));
-        Picture {
+        Image {
             width: size[0] as usize,
             height: size[1] as usize,
             data: radiance.iter().flat_map(|p| p.map(encode)).collect(),
@@ -26,13 +26,13 @@ impl Picture {
 
     /// Values as they are shown, RGB interleaved.
     pub fn from_display(size: [u32; 2], data: Vec<f32>) -> Self {
-        Picture { width: size[0] as usize, height: size[1] as usize, data }
+        Image { width: size[0] as usize, height: size[1] as usize, data }
     }
 
     /// Values as colours of a scale.
     pub fn colored(size: [u32; 2], values: &[f64], scale: &Scale) -> Self {
         let data = values.iter().flat_map(|&v| scale.color(v).map(|c| (c / 255.0) as f32)).collect();
-        Picture { width: size[0] as usize, height: size[1] as usize, data }
+        Image { width: size[0] as usize, height: size[1] as usize, data }
     }
 
     /// Writes `name`.png into `folder` and says what the file is called.
@@ -44,13 +44,13 @@ impl Picture {
     }
 }
 
-/// The part of a picture between left, top, right and bottom, in fractions: its size and its pixels.
-pub fn crop(size: [u32; 2], picture: &[[f32; 3]], [l, t, r, b]: [f64; 4]) -> ([u32; 2], Vec<[f32; 3]>) {
+/// The part of an image between left, top, right and bottom, in fractions: its size and its pixels.
+pub fn crop(size: [u32; 2], image: &[[f32; 3]], [l, t, r, b]: [f64; 4]) -> ([u32; 2], Vec<[f32; 3]>) {
     let [w, h] = size.map(|s| s as usize);
     let at = |f: f64, n: usize| ((f * n as f64) as usize).min(n - 1);
     let (l, t) = (at(l, w), at(t, h));
     let (r, b) = (at(r, w).max(l + 1), at(b, h).max(t + 1));
-    let pixels = (t..b).flat_map(|y| picture[y * w + l..y * w + r].iter().copied()).collect();
+    let pixels = (t..b).flat_map(|y| image[y * w + l..y * w + r].iter().copied()).collect();
     ([(r - l) as u32, (b - t) as u32], pixels)
 }
 

@@ -7,7 +7,7 @@ use super::analytic_scenes::answer;
 use lumiris::accel::{Coherence, RayBatch};
 use lumiris::film::PixelSums;
 use lumiris::import::{LoadOptions, load};
-use lumiris::lights::{LightHints, LightId, LightSamplerKind};
+use lumiris::lights::{LightId, LightSamplerKind, VisibilityCache};
 use lumiris::render::output::metadata;
 use lumiris::render::{RenderSettings, render};
 use lumiris::scene::{AccelKind, RenderJob};
@@ -21,7 +21,7 @@ use std::sync::atomic::AtomicBool;
 
 /// What photons say.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub(crate) enum Hints {
+pub(crate) enum CacheContents {
     /// Nobody asked them.
     Absent,
     /// There were none.
@@ -62,19 +62,19 @@ fn primary_photons(job: &RenderJob) -> Vec<(Vec3, Vec3, LightId)> {
 }
 
 /// Hints of a kind for a job.
-pub(crate) fn hints(job: &RenderJob, kind: Hints) -> Option<LightHints> {
+pub(crate) fn cache_with(job: &RenderJob, kind: CacheContents) -> Option<VisibilityCache> {
     let radius = job.lights.scene_radius;
     match kind {
-        Hints::Absent => None,
-        Hints::Empty => Some(LightHints::new(std::iter::empty(), 1.0)),
-        Hints::Right => Some(LightHints::adapted(&primary_photons(job), radius)),
-        Hints::Wrong => {
+        CacheContents::Absent => None,
+        CacheContents::Empty => Some(VisibilityCache::new(std::iter::empty(), 1.0)),
+        CacheContents::Right => Some(VisibilityCache::adapted(&primary_photons(job), radius)),
+        CacheContents::Wrong => {
             let mut photons = primary_photons(job);
             let choices = job.lights.lights.len() as u32 + 2;
             for (i, photon) in photons.iter_mut().enumerate() {
                 photon.2 = pcg4d([i as u32, 1, 2, 3])[0] % choices / 2;
             }
-            Some(LightHints::adapted(&photons, radius))
+            Some(VisibilityCache::adapted(&photons, radius))
         }
     }
 }
@@ -91,8 +91,8 @@ fn job(settings: impl Fn(&mut IntegratorSettings), seen: impl Fn(&RenderJob, Lig
     settings(&mut loaded.settings.integrator);
     let mut job = loaded.job(AccelKind::Embree, None).unwrap();
     let ids = (0..job.lights.lights.len() as LightId).filter(|&id| seen(&job, id));
-    let hints = LightHints::new(ids.flat_map(|id| vec![(Vec3::ZERO, Vec3::Z, id); 20]), 0.1);
-    job.lights.set_hints(Some(hints));
+    let visibility_cache = VisibilityCache::new(ids.flat_map(|id| vec![(Vec3::ZERO, Vec3::Z, id); 20]), 0.1);
+    job.lights.set_visibility_cache(Some(visibility_cache));
     job
 }
 
@@ -112,11 +112,11 @@ fn red() -> f64 {
     answer(&Path::new(env!("CARGO_MANIFEST_DIR")).join("scenes/analytic/hidden-lights.pbrt"))[0]
 }
 
-fn contributing(samples: u32, rest: u32) -> impl Fn(&mut IntegratorSettings) {
+fn contributing(samples: u32, noncontributing: u32) -> impl Fn(&mut IntegratorSettings) {
     move |s| {
         s.estimator = EstimatorKind::Contributing;
         s.samples = Some(samples);
-        s.contributing.rest_samples = rest;
+        s.contributing.noncontributing_samples = noncontributing;
     }
 }
 
@@ -134,25 +134,25 @@ fn leaving_lights_out_is_biased_where_a_light_that_is_seen_has_no_photon() {
 }
 
 #[test]
-fn a_picture_says_that_lights_were_left_out() {
-    for (rest, is_biased) in [(0, true), (1, false)] {
-        let job = job(contributing(4, rest), is_seen);
+fn a_image_says_that_lights_were_left_out() {
+    for (noncontributing, is_biased) in [(0, true), (1, false)] {
+        let job = job(contributing(4, noncontributing), is_seen);
         let entries = metadata(&job.world.scene.film, job.settings());
-        assert!(entries.contains(&("lumiris:rest_samples".to_owned(), rest.to_string())));
+        assert!(entries.contains(&("lumiris:noncontributing_samples".to_owned(), noncontributing.to_string())));
         assert_eq!(entries.iter().any(|(key, _)| key == "lumiris:biased"), is_biased);
     }
 }
 
 #[test]
-fn right_hints_lower_the_variance() {
-    let ratio = |settings: &dyn Fn(&mut IntegratorSettings), least: f64| {
+fn a_right_visibility_cache_lowers_the_variance() {
+    let ratio = |settings: &dyn Fn(&mut IntegratorSettings), min: f64| {
         let without = pixels(&mut job(settings, |_, _| false), 100).variance();
         let with = pixels(&mut job(settings, is_seen), 100).variance();
-        assert!(without > least * with, "{without} without hints, {with} with");
+        assert!(without > min * with, "{without} without hints, {with} with");
     };
     ratio(
         &|s| {
-            s.light_choice = LightSamplerKind::Photons;
+            s.light_sampler = LightSamplerKind::Photons;
             s.samples = Some(4);
         },
         1.5,

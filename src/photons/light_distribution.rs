@@ -1,21 +1,21 @@
-//! Which light a trajectory starts from: p_i = (1 − a) Φ_i/Σ Φ + a/L over the L lights that emit anything, Φ being
-//! powers and a the floor, so that no light has less than a/L of the trajectories.
+//! Which light a photon path starts from: p_i = (1 − a) Φ_i/Σ Φ + a/L over the L lights that emit anything, Φ being
+//! powers and a the floor, so that no light has less than a/L of the photon paths.
 //!
 //! The choice is by inversion, so that the numbers of a stratified sequence give each light its share to within few
-//! trajectories.
+//! photon paths.
 
 use crate::lights::{LightId, LightSet};
 use lumiris_numbers::math::cumulative;
 
-/// Shares of lights in trajectories.
+/// Shares of lights in photon paths.
 #[derive(Clone, Debug)]
-pub struct LightShares {
+pub struct LightDistribution {
     lights: Vec<LightId>,
     /// Σ p_j for j ≤ i.
     cumulative: Vec<f64>,
 }
 
-impl LightShares {
+impl LightDistribution {
     /// `floor`: a in 0..1. `None` if no light emits anything.
     pub fn new(lights: &LightSet, floor: f32) -> Option<Self> {
         let phi = |i: usize| f64::from(lights.lights[i].phi(lights.scene_radius));
@@ -34,7 +34,7 @@ impl LightShares {
                 sum
             })
             .collect();
-        Some(LightShares { lights: lit.into_iter().map(|(light, _)| light).collect(), cumulative })
+        Some(LightDistribution { lights: lit.into_iter().map(|(light, _)| light).collect(), cumulative })
     }
 
     /// A light, and its probability, by a number of twice 24 bits: `u[1]` fills the gaps between the values of `u[0]`,
@@ -76,28 +76,29 @@ mod tests {
 
     #[test]
     fn shares_are_by_power_with_a_floor_and_black_lights_have_none() {
-        let shares = LightShares::new(&points(&[3.0, 0.0, 1.0, 0.0]), 0.1).unwrap();
+        let light_distribution = LightDistribution::new(&points(&[3.0, 0.0, 1.0, 0.0]), 0.1).unwrap();
         let expected = [0.9 * 0.75 + 0.05, 0.0, 0.9 * 0.25 + 0.05, 0.0];
         for (i, e) in expected.into_iter().enumerate() {
-            assert!((shares.pmf(i as LightId) - e).abs() < 1e-6, "{i}");
+            assert!((light_distribution.pmf(i as LightId) - e).abs() < 1e-6, "{i}");
         }
-        assert!(LightShares::new(&points(&[]), 0.1).is_none());
-        assert!(LightShares::new(&points(&[0.0]), 0.1).is_none());
+        assert!(LightDistribution::new(&points(&[]), 0.1).is_none());
+        assert!(LightDistribution::new(&points(&[0.0]), 0.1).is_none());
     }
 
     #[test]
     fn a_stratified_sequence_gives_each_light_its_share() {
         let intensities: Vec<f32> = (0..1000).map(|i| 0.01 + (i % 17) as f32).collect();
-        let shares = LightShares::new(&points(&intensities), 0.05).unwrap();
+        let light_distribution = LightDistribution::new(&points(&intensities), 0.05).unwrap();
         let count = 1 << 16;
         let mut counts = vec![0.0_f64; intensities.len()];
         for i in 0..count {
-            let (light, pmf) = shares.sample(SampleStream::new(SamplerKind::Sobol, [0, 0], i, 5).draw::<2>());
-            assert_eq!(pmf, shares.pmf(light));
+            let (light, pmf) =
+                light_distribution.sample(SampleStream::new(SamplerKind::Sobol, [0, 0], i, 5).draw::<2>());
+            assert_eq!(pmf, light_distribution.pmf(light));
             counts[light as usize] += 1.0;
         }
         for (i, counted) in counts.into_iter().enumerate() {
-            let expected = f64::from(shares.pmf(i as LightId)) * f64::from(count);
+            let expected = f64::from(light_distribution.pmf(i as LightId)) * f64::from(count);
             // An interval of a (0, 1)-sequence's 2¹⁶ points: at most one more or less at each end
             assert!((counted - expected).abs() <= 2.0, "{i} {counted} {expected}");
         }

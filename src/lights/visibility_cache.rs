@@ -9,8 +9,8 @@
 //! found, and photons on the other side of a wall never.
 //!
 //! A radius is safe if a visible light almost surely has a photon within it. If μ photons are expected, none arrives
-//! with probability e^−μ; [`LightHints::adapted`] chooses the radius at which a photon has [`SECURE_COUNT`] photons of
-//! its light around it on average.
+//! with probability e^−μ; [`VisibilityCache::adapted`] chooses the radius at which a photon has [`SECURE_COUNT`]
+//! photons of its light around it on average.
 
 use super::LightId;
 use lumiris_numbers::math::{Bounds3, Vec3};
@@ -19,12 +19,12 @@ use rayon::prelude::*;
 /// Minimum cosine between a photon's normal and an axis direction for it to count on that side: cos(54.7° + 17.8°), the
 /// maximum angle between a direction and its nearest axis plus a margin.
 pub const SIDE_COS: f32 = 0.3;
-/// Mean number of photons of the same light around a photon, for [`LightHints::adapted`].
+/// Mean number of photons of the same light around a photon, for [`VisibilityCache::adapted`].
 pub const SECURE_COUNT: f64 = 64.0;
-/// Minimum and maximum radius of [`LightHints::adapted`], relative to the radius of the scene.
-const RADIUS_SHARES: [f32; 2] = [1.0 / 4096.0, 1.0 / 16.0];
-/// Value of [`Around::visibility`] for non-contributing lights.
-pub const UNSEEN: f32 = 0.04;
+/// Minimum and maximum radius of [`VisibilityCache::adapted`], relative to the radius of the scene.
+const RADIUS_RANGE: [f32; 2] = [1.0 / 4096.0, 1.0 / 16.0];
+/// Value of [`ContributingLights::visibility`] for non-contributing lights.
+pub const MIN_VISIBILITY: f32 = 0.04;
 
 /// Bits of a cube's index along each axis.
 const AXIS_BITS: u32 = 20;
@@ -41,7 +41,7 @@ struct Slot {
 
 /// The visibility cache: the lights that contribute around a point, found by photons that came straight from them.
 #[derive(Clone, Debug)]
-pub struct LightHints {
+pub struct VisibilityCache {
     origin: Vec3,
     /// 1/(2r).
     scale: f32,
@@ -56,29 +56,29 @@ pub struct LightHints {
 
 /// The contributing lights of a point.
 #[derive(Clone, Copy, Debug, Default)]
-pub struct Around<'a> {
+pub struct ContributingLights<'a> {
     /// Lights and their photon counts, ids ascending.
     pub lights: &'a [(LightId, u32)],
     /// Cumulative photon counts.
     pub sums: &'a [u32],
 }
 
-impl Around<'_> {
+impl ContributingLights<'_> {
     /// Index of a light.
     #[inline]
     pub fn place(&self, light: LightId) -> Option<usize> {
         self.lights.binary_search_by_key(&light, |&(id, _)| id).ok()
     }
 
-    /// An estimate of the visibility of a light, from [`UNSEEN`] to 1: (c + [`UNSEEN`])/(c + 1) for a light with c
-    /// photons, and 1 where the cache is empty.
+    /// An estimate of the visibility of a light, from [`MIN_VISIBILITY`] to 1: (c + [`MIN_VISIBILITY`])/(c + 1) for a
+    /// light with c photons, and 1 where the cache is empty.
     #[inline]
     pub fn visibility(&self, light: LightId) -> f32 {
         if self.lights.is_empty() {
             return 1.0;
         }
         let count = self.place(light).map_or(0.0, |i| self.lights[i].1 as f32);
-        (count + UNSEEN) / (count + 1.0)
+        (count + MIN_VISIBILITY) / (count + 1.0)
     }
 }
 
@@ -102,29 +102,29 @@ fn index_of(x: f32) -> u64 {
     (x as u64).min((1 << AXIS_BITS) - 1)
 }
 
-impl LightHints {
+impl VisibilityCache {
     /// Built from photons that came straight from lights: position, unit normal on the lit side, light. `radius` (m) is
     /// enlarged where the scene has more than 2²⁰ cubes along an axis. Photons without a finite position or without a
     /// normal are ignored.
     pub fn new(primary: impl Iterator<Item = (Vec3, Vec3, LightId)>, radius: f32) -> Self {
         let photons: Vec<_> = primary.collect();
-        LightHints::of_photons(&photons, radius)
+        VisibilityCache::of_photons(&photons, radius)
     }
 
     /// [`Self::new`] with a safe radius, bounded by `scene_radius` (m).
     pub fn adapted(primary: &[(Vec3, Vec3, LightId)], scene_radius: f32) -> Self {
-        let [min, max] = RADIUS_SHARES.map(|share| share * scene_radius);
-        let mut hints = LightHints::of_photons(primary, scene_radius / 64.0);
+        let [min, max] = RADIUS_RANGE.map(|share| share * scene_radius);
+        let mut cache = VisibilityCache::of_photons(primary, scene_radius / 64.0);
         // Photon counts on a surface grow approximately with the square of the radius
         for _ in 0..3 {
-            let ratio = (SECURE_COUNT / hints.mean_count().max(1.0)).sqrt() as f32;
-            let radius = (hints.radius * ratio.clamp(0.125, 8.0)).clamp(min, max);
-            if (radius / hints.radius - 1.0).abs() < 0.1 {
+            let ratio = (SECURE_COUNT / cache.mean_count().max(1.0)).sqrt() as f32;
+            let radius = (cache.radius * ratio.clamp(0.125, 8.0)).clamp(min, max);
+            if (radius / cache.radius - 1.0).abs() < 0.1 {
                 break;
             }
-            hints = LightHints::of_photons(primary, radius);
+            cache = VisibilityCache::of_photons(primary, radius);
         }
-        hints
+        cache
     }
 
     fn of_photons(photons: &[(Vec3, Vec3, LightId)], radius: f32) -> Self {
@@ -147,13 +147,13 @@ impl LightHints {
         let items = merged(items);
         let cubes = (0..8_u64).map(|i| key_of([i & 1, i >> 1 & 1, i >> 2], 0));
         let spread = cubes.flat_map(|step| items.iter().map(move |&(key, light, count)| (key + step, light, count)));
-        LightHints::from_sorted(origin, radius, &merged(spread.collect()))
+        VisibilityCache::from_sorted(origin, radius, &merged(spread.collect()))
     }
 
     fn from_sorted(origin: Vec3, radius: f32, items: &[(u64, LightId, u32)]) -> Self {
         let cells = items.chunk_by(|a, b| a.0 == b.0);
         let slots = (2 * cells.clone().count()).next_power_of_two();
-        let mut hints = LightHints {
+        let mut cache = VisibilityCache {
             origin,
             scale: 0.5 / radius,
             radius,
@@ -162,16 +162,16 @@ impl LightHints {
             sums: Vec::with_capacity(items.len()),
         };
         for cell in cells {
-            let slot = hints.find(cell[0].0);
-            hints.slots[slot] = Slot { key: cell[0].0, first: hints.entries.len() as u32, len: cell.len() as u32 };
+            let slot = cache.find(cell[0].0);
+            cache.slots[slot] = Slot { key: cell[0].0, first: cache.entries.len() as u32, len: cell.len() as u32 };
             let mut sum = 0_u32;
             for &(_, light, count) in cell {
                 sum = sum.saturating_add(count);
-                hints.entries.push((light, count));
-                hints.sums.push(sum);
+                cache.entries.push((light, count));
+                cache.sums.push(sum);
             }
         }
-        hints
+        cache
     }
 
     /// The slot of a key, or the empty one where it would be.
@@ -198,7 +198,7 @@ impl LightHints {
         let mut items: Vec<_> = self.slots.iter().flat_map(items_of).collect();
         items.retain(|&(_, light, _)| is_light(light));
         items.sort_unstable();
-        LightHints::from_sorted(self.origin, self.radius, &items)
+        VisibilityCache::from_sorted(self.origin, self.radius, &items)
     }
 
     /// The radius r (m) within which photons are always found.
@@ -220,20 +220,20 @@ impl LightHints {
     /// 𝓛_con of the point `p` on the side of the unit normal `n`, with photon counts; ids ascend. Empty where no photon
     /// was found, and for a zero normal.
     #[inline]
-    pub fn around(&self, p: Vec3, n: Vec3) -> &[(LightId, u32)] {
-        self.around_with_sums(p, n).lights
+    pub fn lookup(&self, p: Vec3, n: Vec3) -> &[(LightId, u32)] {
+        self.lookup_with_sums(p, n).lights
     }
 
-    /// [`Self::around`] with cumulative counts.
+    /// [`Self::lookup`] with cumulative counts.
     #[inline]
-    pub fn around_with_sums(&self, p: Vec3, n: Vec3) -> Around<'_> {
+    pub fn lookup_with_sums(&self, p: Vec3, n: Vec3) -> ContributingLights<'_> {
         if n == Vec3::ZERO {
-            return Around::default();
+            return ContributingLights::default();
         }
         let place = ((p - self.origin) * self.scale).to_array().map(index_of);
         let Slot { first, len, .. } = self.slots[self.find(key_of(place, side_of(n)))];
         let range = first as usize..(first + len) as usize;
-        Around { lights: &self.entries[range.clone()], sums: &self.sums[range] }
+        ContributingLights { lights: &self.entries[range.clone()], sums: &self.sums[range] }
     }
 
     /// Mean over all photons of the number of photons of the same light found at their position.
@@ -278,56 +278,56 @@ mod tests {
     fn every_photon_within_the_radius_on_the_same_side_is_found() {
         let photons = random_photons(20_000, 50);
         let radius = 0.1;
-        let hints = LightHints::new(photons.iter().copied(), radius);
+        let cache = VisibilityCache::new(photons.iter().copied(), radius);
         let mut s = HashStream::new([6, 6, 6]);
         let mut found = 0;
         for _ in 0..2000 {
             let [x, y] = s.next_2d();
             let (p, n) = (Vec3::new(x, y, s.next_f32()) * 4.4 - 1.2, sample_uniform_sphere(s.next_2d()));
-            let around = hints.around(p, n);
-            assert!(around.windows(2).all(|w| w[0].0 < w[1].0));
-            let near = |most: f32, turn: f32| {
+            let contributing = cache.lookup(p, n);
+            assert!(contributing.windows(2).all(|w| w[0].0 < w[1].0));
+            let near = |max: f32, turn: f32| {
                 let is_near =
-                    move |&&(q, m, _): &&(Vec3, Vec3, LightId)| (p - q).abs().max_element() <= most && n.dot(m) >= turn;
+                    move |&&(q, m, _): &&(Vec3, Vec3, LightId)| (p - q).abs().max_element() <= max && n.dot(m) >= turn;
                 photons.iter().filter(is_near)
             };
             for (_, _, light) in near(radius * 0.999, 17.0_f32.to_radians().cos()) {
-                assert!(around.iter().any(|(id, _)| id == light));
+                assert!(contributing.iter().any(|(id, _)| id == light));
                 found += 1;
             }
             // No photon is found beyond three radii or from the other side, and each only once.
-            for &(light, count) in around {
-                let most = near(radius * 3.001, -0.61).filter(|(_, _, id)| *id == light).count();
-                assert!(count as usize <= most, "{light} {count} {most}");
+            for &(light, count) in contributing {
+                let max = near(radius * 3.001, -0.61).filter(|(_, _, id)| *id == light).count();
+                assert!(count as usize <= max, "{light} {count} {max}");
             }
         }
         assert!(found > 20);
     }
 
     #[test]
-    fn both_sides_of_a_wall_have_hints_of_their_own() {
+    fn both_sides_of_a_wall_have_contributing_lights_of_their_own() {
         let at = |x: f32, y: f32| Vec3::new(x, y, 1.0);
         let photons = (0..100).flat_map(|i| {
             let p = at((i % 10) as f32 * 0.1, (i / 10) as f32 * 0.1);
             [(p, Vec3::Z, 3), (p, Vec3::NEG_Z, 7), (p + Vec3::Z * 5.0, Vec3::Z, 9)]
         });
-        let hints = LightHints::new(photons, 0.15);
-        let lights = |p, n| hints.around(p, n).iter().map(|(id, _)| *id).collect::<Vec<_>>();
+        let cache = VisibilityCache::new(photons, 0.15);
+        let lights = |p, n| cache.lookup(p, n).iter().map(|(id, _)| *id).collect::<Vec<_>>();
         assert_eq!(lights(at(0.5, 0.5), Vec3::Z), [3]);
         assert_eq!(lights(at(0.5, 0.5), Vec3::NEG_Z), [7]);
         assert!(lights(at(0.5, 0.5), Vec3::X).is_empty());
         assert!(lights(at(0.5, 0.5), Vec3::ZERO).is_empty());
         assert!(lights(at(50.0, 0.5), Vec3::Z).is_empty());
         assert!(lights(at(-50.0, f32::NAN), Vec3::Z).is_empty());
-        assert!(hints.bytes() > 0 && hints.radius() == 0.15);
-        let around = hints.around_with_sums(at(0.5, 0.5), Vec3::Z);
-        assert_eq!(around.sums.last().copied(), Some(around.lights[0].1));
-        assert!(around.visibility(3) > 0.9 && around.visibility(8) == UNSEEN);
+        assert!(cache.bytes() > 0 && cache.radius() == 0.15);
+        let contributing = cache.lookup_with_sums(at(0.5, 0.5), Vec3::Z);
+        assert_eq!(contributing.sums.last().copied(), Some(contributing.lights[0].1));
+        assert!(contributing.visibility(3) > 0.9 && contributing.visibility(8) == MIN_VISIBILITY);
 
-        let some = hints.clone().of_lights(|light| light != 3);
-        assert_eq!(some.around(at(0.5, 0.5), Vec3::NEG_Z), hints.around(at(0.5, 0.5), Vec3::NEG_Z));
-        assert!(some.around(at(0.5, 0.5), Vec3::Z).is_empty());
-        assert_eq!(Around::default().visibility(8), 1.0);
+        let some = cache.clone().of_lights(|light| light != 3);
+        assert_eq!(some.lookup(at(0.5, 0.5), Vec3::NEG_Z), cache.lookup(at(0.5, 0.5), Vec3::NEG_Z));
+        assert!(some.lookup(at(0.5, 0.5), Vec3::Z).is_empty());
+        assert_eq!(ContributingLights::default().visibility(8), 1.0);
     }
 
     #[test]
@@ -341,28 +341,28 @@ mod tests {
                     (Vec3::new(x, y, 0.0), Vec3::Z, u32::from(x > 5.0) + 2 * u32::from(y > 5.0))
                 })
                 .collect();
-            let hints = LightHints::adapted(&photons, 7.1);
+            let cache = VisibilityCache::adapted(&photons, 7.1);
             assert!(
-                (SECURE_COUNT / 2.0..2.0 * SECURE_COUNT).contains(&hints.mean_count()),
+                (SECURE_COUNT / 2.0..2.0 * SECURE_COUNT).contains(&cache.mean_count()),
                 "{} {}",
-                hints.radius(),
-                hints.mean_count()
+                cache.radius(),
+                cache.mean_count()
             );
-            let again = LightHints::new(photons.iter().rev().copied(), hints.radius());
-            assert_eq!(hints.entries, again.entries, "hints do not depend on the order of photons");
+            let again = VisibilityCache::new(photons.iter().rev().copied(), cache.radius());
+            assert_eq!(cache.entries, again.entries, "hints do not depend on the order of photons");
         }
     }
 
     #[test]
     fn no_photons_and_photons_in_one_place_are_handled() {
-        let none = LightHints::new(std::iter::empty(), 1.0);
-        assert!(none.is_empty() && none.around(Vec3::ZERO, Vec3::Z).is_empty() && none.mean_count() == 0.0);
-        assert!(LightHints::adapted(&[], 1.0).is_empty());
+        let none = VisibilityCache::new(std::iter::empty(), 1.0);
+        assert!(none.is_empty() && none.lookup(Vec3::ZERO, Vec3::Z).is_empty() && none.mean_count() == 0.0);
+        assert!(VisibilityCache::adapted(&[], 1.0).is_empty());
         let same = [(Vec3::ONE, Vec3::Z, 1), (Vec3::splat(f32::NAN), Vec3::Z, 2), (Vec3::ONE, Vec3::ZERO, 3)];
-        assert_eq!(LightHints::new(same.into_iter(), 0.0).around(Vec3::ONE, Vec3::Z), [(1, 1)]);
+        assert_eq!(VisibilityCache::new(same.into_iter(), 0.0).lookup(Vec3::ONE, Vec3::Z), [(1, 1)]);
         let far = [(Vec3::ZERO, Vec3::Z, 1), (Vec3::splat(1e9), Vec3::Z, 2)];
-        let hints = LightHints::new(far.into_iter(), 1e-3);
-        assert_eq!(hints.around(Vec3::splat(1e9), Vec3::Z), [(2, 1)]);
-        assert_eq!(hints.around(Vec3::ZERO, Vec3::Z), [(1, 1)]);
+        let cache = VisibilityCache::new(far.into_iter(), 1e-3);
+        assert_eq!(cache.lookup(Vec3::splat(1e9), Vec3::Z), [(2, 1)]);
+        assert_eq!(cache.lookup(Vec3::ZERO, Vec3::Z), [(1, 1)]);
     }
 }

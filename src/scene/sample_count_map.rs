@@ -1,12 +1,12 @@
 //! The best numbers of samples and proposals, pixel by pixel.
 
 use crate::film::PixelBounds;
-use crate::settings::Split;
+use crate::settings::SampleCounts;
 use lumiris_numbers::estimators::ris::choice::{Costs, counts};
 
 /// M/N of every pixel, for the same time in all [Talbot 2005, §4.3; Talbot et al. 2005, Fig. 3].
 #[derive(Clone, Debug, PartialEq)]
-pub struct SplitMap {
+pub struct SampleCountMap {
     /// The pixels.
     pub bounds: PixelBounds,
     /// M/N, row by row, at least 1.
@@ -19,7 +19,7 @@ pub struct SplitMap {
     pub time: f64,
 }
 
-impl SplitMap {
+impl SampleCountMap {
     /// M/N of a pixel.
     pub fn ratio(&self, [x, y]: [u32; 2]) -> f32 {
         let row = (y - self.bounds.y0) as usize * self.bounds.width() as usize;
@@ -27,9 +27,9 @@ impl SplitMap {
     }
 
     /// Numbers for one estimate in a pixel, rounded up or down by `u` so that their expectations are right.
-    pub fn split(&self, pixel: [u32; 2], u: [f32; 2]) -> Split {
+    pub fn sample_counts(&self, pixel: [u32; 2], u: [f32; 2]) -> SampleCounts {
         let costs = Costs { t1: self.t1, t2: self.t2 };
         let counts = counts(f64::from(self.ratio(pixel)), costs, self.time, u);
-        Split { samples: counts.n, proposals: counts.m }
+        SampleCounts { samples: counts.n, proposals: counts.m }
     }
 }

@@ -6,50 +6,50 @@
 //! estimates are unbiased whatever the cache holds. Where the cache is empty, δ = 1.
 //!
 //! w_l is the tree's bound of the light's contribution at the point, cos θ′·cos θi′·I/d², or the irradiance of an
-//! infinite light [lm/m² by luminance, both up to a common factor]. Beyond [`MOST_WEIGHED`] lights w_l is the number of
+//! infinite light [lm/m² by luminance, both up to a common factor]. Beyond [`MAX_WEIGHTED`] lights w_l is the number of
 //! their photons instead, so that sampling takes logarithmic time.
 //!
 //! [`LightTree`]: super::LightTree
 
 use super::choice::UNIT;
-use super::hints::Around;
-use super::{Light, LightChoice, LightCtx, LightHints, LightId, LightRun, TreeChoice};
+use super::visibility_cache::ContributingLights;
+use super::{Light, LightCtx, LightId, LightRun, SampledLight, TreeChoice, VisibilityCache};
 use lumiris_numbers::math::{ONE_MINUS_EPSILON, cumulative};
 use std::f32::consts::PI;
 use std::sync::Arc;
 
 /// δ: probability of sampling the base instead of the contributing lights.
-pub const BASE_SHARE: f32 = 0.1;
+pub const BASE_FRACTION: f32 = 0.1;
 /// Maximum number of lights whose contributions are compared at the point.
-pub const MOST_WEIGHED: usize = 64;
+pub const MAX_WEIGHTED: usize = 64;
 
 /// Samples the contributing lights of the visibility cache, if there are any.
 #[derive(Clone, Debug)]
-pub struct HintedChoice {
+pub struct VisibilityCacheSampler {
     pub(super) base: TreeChoice,
     /// For each infinite light, the luminance of the irradiance on a surface facing it; 0 for others.
     irradiances: Vec<f32>,
-    pub(super) hints: Option<Arc<LightHints>>,
+    pub(super) visibility_cache: Option<Arc<VisibilityCache>>,
 }
 
 /// The contributing lights of a point, with their weights.
 struct Known<'a> {
-    around: Around<'a>,
+    contributing: ContributingLights<'a>,
     /// Cumulative weights; not used where photon counts are the weights.
-    sums: [f32; MOST_WEIGHED],
+    sums: [f32; MAX_WEIGHTED],
     total: f32,
 }
 
 impl Known<'_> {
     fn is_counted(&self) -> bool {
-        self.around.lights.len() > MOST_WEIGHED
+        self.contributing.lights.len() > MAX_WEIGHTED
     }
 
     /// Sum of the weights of the lights before index `i`.
     #[inline]
     fn sum_before(&self, i: usize) -> f32 {
         if self.is_counted() {
-            cumulative::sum_before(self.around.sums, i)
+            cumulative::sum_before(self.contributing.sums, i)
         } else {
             cumulative::sum_before(&self.sums, i)
         }
@@ -63,16 +63,16 @@ impl Known<'_> {
 
     #[inline]
     fn pmf(&self, light: LightId) -> f32 {
-        self.around.place(light).map_or(0.0, |i| self.pmf_at(i))
+        self.contributing.place(light).map_or(0.0, |i| self.pmf_at(i))
     }
 
     /// Chooses an index by `u` in [0, 1), and remaps `u` to be uniform again.
     #[inline]
     fn choose(&self, u: f32) -> (usize, f32) {
         let x = u * self.total;
-        let count = self.around.lights.len();
+        let count = self.contributing.lights.len();
         let place = if self.is_counted() {
-            cumulative::find(self.around.sums, x)
+            cumulative::find(self.contributing.sums, x)
         } else {
             cumulative::find(&self.sums[..count], x)
         };
@@ -84,7 +84,7 @@ impl Known<'_> {
     }
 }
 
-impl HintedChoice {
+impl VisibilityCacheSampler {
     pub(super) fn new(base: TreeChoice, lights: &[Light], scene_radius: f32) -> Self {
         let disk = PI * scene_radius * scene_radius;
         let irradiance = |light: &Light| match light {
@@ -93,18 +93,18 @@ impl HintedChoice {
             Light::InfiniteConstant { .. } | Light::InfiniteImage { .. } => light.phi(scene_radius) / (4.0 * disk),
             Light::Point { .. } | Light::Spot { .. } | Light::Area(_) => 0.0,
         };
-        HintedChoice { base, irradiances: lights.iter().map(irradiance).collect(), hints: None }
+        VisibilityCacheSampler { base, irradiances: lights.iter().map(irradiance).collect(), visibility_cache: None }
     }
 
     /// The contributing lights; `None` if none of them has a weight.
     #[inline]
     fn known(&self, ctx: &LightCtx) -> Option<Known<'_>> {
-        let around = self.hints.as_ref()?.around_with_sums(ctx.p, ctx.n);
-        let mut known = Known { around, sums: [0.0; MOST_WEIGHED], total: 0.0 };
+        let contributing = self.visibility_cache.as_ref()?.lookup_with_sums(ctx.p, ctx.n);
+        let mut known = Known { contributing, sums: [0.0; MAX_WEIGHTED], total: 0.0 };
         if known.is_counted() {
-            known.total = around.sums.last().map_or(0.0, |&sum| sum as f32);
+            known.total = contributing.sums.last().map_or(0.0, |&sum| sum as f32);
         } else {
-            for (sum, &(light, _)) in known.sums.iter_mut().zip(around.lights) {
+            for (sum, &(light, _)) in known.sums.iter_mut().zip(contributing.lights) {
                 known.total += self.weight(ctx, light);
                 *sum = known.total;
             }
@@ -122,16 +122,16 @@ impl HintedChoice {
     }
 
     #[inline]
-    pub(super) fn sample(&self, ctx: &LightCtx, u: f32) -> Option<LightChoice> {
+    pub(super) fn sample(&self, ctx: &LightCtx, u: f32) -> Option<SampledLight> {
         let Some(known) = self.known(ctx) else { return self.base.sample(ctx, u) };
-        if u < BASE_SHARE {
-            let choice = self.base.sample(ctx, (u / BASE_SHARE).min(ONE_MINUS_EPSILON))?;
+        if u < BASE_FRACTION {
+            let choice = self.base.sample(ctx, (u / BASE_FRACTION).min(ONE_MINUS_EPSILON))?;
             let pmf = mixed(known.pmf(choice.light), choice.pmf);
-            return Some(LightChoice { pmf, ..choice });
+            return Some(SampledLight { pmf, ..choice });
         }
-        let (place, u) = known.choose((u - BASE_SHARE) / (1.0 - BASE_SHARE));
-        let light = known.around.lights[place].0;
-        Some(LightChoice { light, pmf: mixed(known.pmf_at(place), self.base.pmf(ctx, light)), u })
+        let (place, u) = known.choose((u - BASE_FRACTION) / (1.0 - BASE_FRACTION));
+        let light = known.contributing.lights[place].0;
+        Some(SampledLight { light, pmf: mixed(known.pmf_at(place), self.base.pmf(ctx, light)), u })
     }
 
     #[inline]
@@ -146,11 +146,11 @@ impl HintedChoice {
             self.base.runs(ctx, positions, 0, (0.0, 1.0), out);
             return;
         };
-        let share = f64::from(1.0 - BASE_SHARE);
-        let end_of = |i: usize| share * f64::from(known.sum_before(i + 1)) / f64::from(known.total);
-        let count = known.around.lights.len();
+        let fraction = f64::from(1.0 - BASE_FRACTION);
+        let end_of = |i: usize| fraction * f64::from(known.sum_before(i + 1)) / f64::from(known.total);
+        let count = known.contributing.lights.len();
         let mut first = 0;
-        while first < positions.len() && f64::from(positions[first]) * UNIT < share {
+        while first < positions.len() && f64::from(positions[first]) * UNIT < fraction {
             let x = f64::from(positions[first]) * UNIT;
             let place = cumulative::find_computed(count, end_of, x);
             if place == count {
@@ -158,25 +158,25 @@ impl HintedChoice {
             }
             let interval = [if place > 0 { end_of(place - 1) } else { 0.0 }, end_of(place)];
             let last = first + positions[first..].partition_point(|&p| f64::from(p) * UNIT < interval[1]);
-            let light = known.around.lights[place].0;
+            let light = known.contributing.lights[place].0;
             let pmf = mixed(known.pmf_at(place), self.base.pmf(ctx, light));
             out.push(LightRun { light, pmf, places: [first as u32, last as u32], interval });
             first = last;
         }
         let of_base = out.len();
-        self.base.runs(ctx, positions, first, (share, BASE_SHARE), out);
+        self.base.runs(ctx, positions, first, (fraction, BASE_FRACTION), out);
         for run in &mut out[of_base..] {
-            run.pmf += (1.0 - BASE_SHARE) * known.pmf(run.light);
+            run.pmf += (1.0 - BASE_FRACTION) * known.pmf(run.light);
         }
     }
 
     /// Mixes the probabilities of the contributing lights into those of the groups by the base.
     pub(super) fn group_pmfs(&self, ctx: &LightCtx, group_of: impl Fn(LightId) -> Option<usize>, pmfs: &mut [f32]) {
         let Some(known) = self.known(ctx) else { return };
-        pmfs.iter_mut().for_each(|p| *p *= BASE_SHARE);
-        for (i, &(light, _)) in known.around.lights.iter().enumerate() {
+        pmfs.iter_mut().for_each(|p| *p *= BASE_FRACTION);
+        for (i, &(light, _)) in known.contributing.lights.iter().enumerate() {
             if let Some(group) = group_of(light) {
-                pmfs[group] += (1.0 - BASE_SHARE) * known.pmf_at(i);
+                pmfs[group] += (1.0 - BASE_FRACTION) * known.pmf_at(i);
             }
         }
     }
@@ -189,17 +189,17 @@ impl HintedChoice {
         is_in: impl Fn(LightId) -> bool,
         group_pmf: f32,
         u: f32,
-        base: impl Fn(f32) -> Option<LightChoice>,
-    ) -> Option<LightChoice> {
+        base: impl Fn(f32) -> Option<SampledLight>,
+    ) -> Option<SampledLight> {
         let Some(known) = self.known(ctx) else { return base(u) };
-        let places = || (0..known.around.lights.len()).filter(|&i| is_in(known.around.lights[i].0));
+        let places = || (0..known.contributing.lights.len()).filter(|&i| is_in(known.contributing.lights[i].0));
         let p_known = places().map(|i| known.pmf_at(i)).sum::<f32>();
-        let share = ((1.0 - BASE_SHARE) * p_known / group_pmf).min(1.0);
-        if u >= share {
-            let choice = base(((u - share) / (1.0 - share)).min(ONE_MINUS_EPSILON))?;
-            return Some(LightChoice { pmf: self.pmf(ctx, choice.light), ..choice });
+        let fraction = ((1.0 - BASE_FRACTION) * p_known / group_pmf).min(1.0);
+        if u >= fraction {
+            let choice = base(((u - fraction) / (1.0 - fraction)).min(ONE_MINUS_EPSILON))?;
+            return Some(SampledLight { pmf: self.pmf(ctx, choice.light), ..choice });
         }
-        let mut x = u / share * p_known;
+        let mut x = u / fraction * p_known;
         let mut chosen = None;
         for i in places().filter(|&i| known.pmf_at(i) > 0.0) {
             let p = known.pmf_at(i);
@@ -210,13 +210,13 @@ impl HintedChoice {
             x -= p;
         }
         let (place, u) = chosen?;
-        let light = known.around.lights[place].0;
-        Some(LightChoice { light, pmf: mixed(known.pmf_at(place), self.base.pmf(ctx, light)), u })
+        let light = known.contributing.lights[place].0;
+        Some(SampledLight { light, pmf: mixed(known.pmf_at(place), self.base.pmf(ctx, light)), u })
     }
 }
 
 /// The probability of a choice with the probability `known` among the contributing lights and `base` by the base.
 #[inline]
 fn mixed(known: f32, base: f32) -> f32 {
-    (1.0 - BASE_SHARE) * known + BASE_SHARE * base
+    (1.0 - BASE_FRACTION) * known + BASE_FRACTION * base
 }

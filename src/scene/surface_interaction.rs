@@ -10,7 +10,7 @@ use lumiris_numbers::math::{Ray, Vec2, Vec3};
 
 /// A hit with its surface.
 #[derive(Clone, Copy, Debug)]
-pub struct Found {
+pub struct SurfaceInteraction {
     /// What was hit.
     pub hit: Hit,
     /// The point on the surface.
@@ -24,7 +24,7 @@ pub struct Found {
     context: TextureContext,
 }
 
-impl Found {
+impl SurfaceInteraction {
     /// The first hit of `ray`. A pixel is `width` wide at its origin, and `spread` wider per unit length.
     pub fn new(job: &RenderJob, ray: &Ray, (width, spread): (f32, f32), hit: &Hit) -> Self {
         let surface = job.world.scene.geometry.surface_hit(hit.geometry, hit.primitive, hit.instance, hit.uv, ray.time);
@@ -37,7 +37,7 @@ impl Found {
         };
         let uv_width = Vec2::new(extent(surface.dpdu), extent(surface.dpdv));
         let context = TextureContext { uv: surface.uv, uv_width, p: surface.p, n: surface.n };
-        Found { hit: *hit, surface, wo: -ray.d.normalize(), width, distance, context }
+        SurfaceInteraction { hit: *hit, surface, wo: -ray.d.normalize(), width, distance, context }
     }
 
     /// The scattering at the hit; `None` where rays pass.
