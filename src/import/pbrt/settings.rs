@@ -111,9 +111,16 @@ fn parameters(directive: Directive, s: &mut Settings, p: &ParamSet, d: &mut Diag
     }
 }
 
+/// The name under which a file has parameter `i` of a setting: an old one if the present one is absent.
+fn spelling(row: &Setting, i: usize, p: &ParamSet) -> Option<&'static str> {
+    let &name = row.parameters.get(i)?;
+    let is_old = |&&(new, old): &&(&str, &str)| new == name && p.type_of(name).is_none() && p.type_of(old).is_some();
+    Some(row.old_parameters.iter().find(is_old).map_or(name, |&(_, old)| old))
+}
+
 /// The value that parameters give a setting; `current` has what is not written of it.
 fn read(row: &Setting, current: &Settings, p: &ParamSet, d: &mut Diagnostics) -> Option<Value> {
-    let &key = row.parameters.first()?;
+    let key = spelling(row, 0, p)?;
     let is_text = p.type_of(key) == Some(ParamType::String);
     match row.kind {
         Kind::Choice { names, synonyms } => {
@@ -132,7 +139,7 @@ fn read(row: &Setting, current: &Settings, p: &ParamSet, d: &mut Diagnostics) ->
         Kind::Real { range, .. } => within(key, &range, p, d).map(Value::Real),
         Kind::Pair { .. } => pair(row, current, p, d),
         Kind::Graded { plain, graded, range, default } => {
-            let grade = row.parameters.get(1).and_then(|key| within(key, &range, p, d)).unwrap_or(default);
+            let grade = spelling(row, 1, p).and_then(|key| within(key, &range, p, d)).unwrap_or(default);
             let names: Vec<&'static str> = [plain].into_iter().chain(graded.iter().copied()).collect();
             let name = named(key, &names, p, d)?;
             Some(if name == plain { Value::Name(plain) } else { Value::Graded(name, grade) })

@@ -58,8 +58,10 @@ pub(super) const DIRECT: Group = Group {
         },
         Setting {
             flag: "bsdf-fraction",
-            value_name: "SHARE",
+            aliases: &["bsdf-share"],
+            value_name: "FRACTION",
             parameters: &["bsdffraction"],
+            old_parameters: &[("bsdffraction", "bsdfshare")],
             key: "bsdf_fraction",
             kind: Kind::Real { range: Interval::closed(0.0, 1.0), words: &[] },
             help: "Share of the samples that the BSDF draws, for mis, ocv and optimal-mis",
@@ -70,8 +72,10 @@ pub(super) const DIRECT: Group = Group {
         },
         Setting {
             flag: "noncontributing-samples",
+            aliases: &["rest-samples"],
             value_name: "N",
             parameters: &["noncontributingsamples"],
+            old_parameters: &[("noncontributingsamples", "restsamples")],
             key: "noncontributing_samples",
             kind: integer(0, MAX_SAMPLES),
             help: "Samples of contributing on the lights that no photon came from, besides --samples on the others; 0 leaves \

@@ -15,7 +15,7 @@ use super::{EstimatorKind, IntegratorKind, Settings};
 pub struct Setting {
     /// Name on the command line, without `--`.
     pub flag: &'static str,
-    /// Names on the command line that it had before.
+    /// Names that it had on the command line before, which are still accepted.
     pub aliases: &'static [&'static str],
     /// What stands for the value in help.
     pub value_name: &'static str,
@@ -25,6 +25,8 @@ pub struct Setting {
     pub directive: Directive,
     /// Parameters of the directive that make up the value; none if it is the name of the directive itself.
     pub parameters: &'static [&'static str],
+    /// Names that parameters had before, which are still read: the present name and the old one.
+    pub old_parameters: &'static [(&'static str, &'static str)],
     /// Name in metadata.
     pub key: &'static str,
     /// Values.
@@ -125,6 +127,7 @@ impl Setting {
         bare: None,
         directive: Directive::Integrator,
         parameters: &[],
+        old_parameters: &[],
         key: "",
         kind: Kind::Bytes,
         help: "",
@@ -177,8 +180,9 @@ mod tests {
         for row in rows() {
             let all = row.aliases.iter().chain([&row.flag]);
             assert!(all.copied().all(|flag| !flag.is_empty() && flags.insert(flag)), "--{}", row.flag);
-            let all = row.parameters.iter();
+            let all = row.parameters.iter().chain(row.old_parameters.iter().map(|(_, old)| old));
             assert!(all.copied().all(|name| parameters.insert((row.directive as u8, name))), "{}", row.flag);
+            assert!(row.old_parameters.iter().all(|(name, _)| row.parameters.contains(name)), "{}", row.flag);
             assert!(!row.key.is_empty() && keys.insert(row.key), "{}", row.flag);
         }
     }

@@ -38,6 +38,7 @@ pub(super) const PHOTONS: Group = Group {
             flag: "importance",
             value_name: "WHICH",
             parameters: &["importance", "minimportance"],
+            old_parameters: &[("minimportance", "leastimportance")],
             key: "importance",
             kind: Kind::Graded {
                 plain: "none",
@@ -139,8 +140,10 @@ pub(super) const PHOTONS: Group = Group {
         },
         Setting {
             flag: "visibility-photons",
+            aliases: &["light-photons"],
             value_name: "N",
             parameters: &["visibilityphotons"],
+            old_parameters: &[("visibilityphotons", "lightphotons")],
             key: "visibility_photons",
             kind: integer(1, MAX_U32),
             help: "Photons that tell which lights are seen, for --light-sampler photons, --target visibility and --estimator \

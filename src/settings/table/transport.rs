@@ -41,6 +41,7 @@ pub(super) const TRANSPORT: Group = Group {
         },
         Setting {
             flag: "light-sampler",
+            aliases: &["light-choice"],
             parameters: &["lightsampler"],
             key: "light_sampler",
             kind: Kind::Choice {

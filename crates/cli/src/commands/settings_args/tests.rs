@@ -1,4 +1,5 @@
-//! What the table promises: metadata, given back on the command line or in a scene file, are the settings that they came from.
+//! What the table promises: metadata, given back on the command line or in a scene file, are the settings that they
+//! came from.
 
 use super::*;
 use lumiris::import::{LoadOptions, load};
@@ -131,6 +132,30 @@ fn metadata_written_into_a_scene_file_are_the_same_settings() {
         let again = settings_of_scene(&head);
         assert_eq!(again, at_default_where_nothing_depends_on_it(settings), "--{}: {head}", row.flag);
     }
+}
+
+#[test]
+fn old_names_mean_what_they_meant() {
+    let mut names = 0;
+    for (row, settings) in cases() {
+        let Some(value) = (row.get)(&settings) else { continue };
+        for alias in row.aliases {
+            let [old, new] = [alias, &row.flag].map(|flag| settings_of(&[format!("--{flag}={value}")]).unwrap());
+            assert_eq!(old, new, "--{alias}={value}");
+            names += 1;
+        }
+        for (name, old) in row.old_parameters {
+            let present = parameters(row, value);
+            let head = |text: &str| match row.directive {
+                Directive::Integrator => format!("Integrator \"path\" {text}"),
+                Directive::Sampler => format!("Sampler \"zsobol\" {text}"),
+            };
+            let former = present.replace(&format!(" {name}\""), &format!(" {old}\""));
+            assert_eq!(settings_of_scene(&head(&former)), settings_of_scene(&head(&present)), "{former}");
+            names += usize::from(former != present);
+        }
+    }
+    assert!(names > 20, "{names}");
 }
 
 /// Settings as metadata have them: nothing is said of what the image does not depend on.
