@@ -10,13 +10,13 @@ pub enum PhotonError {
     #[error("the lights of the scene emit nothing, so there are no photons to trace")]
     NoEmission,
     /// A number of photon paths, photons or importons is 0.
-    #[error("zero photons were asked for")]
+    #[error("the number of photons requested is zero")]
     NothingRequested,
     /// The ratio q is not in (0, 1].
-    #[error("the ratio of global to caustic paths is {0}; it must be more than 0 and at most 1")]
+    #[error("the ratio of global to caustic photon paths is {0}; it must be above 0 and at most 1")]
     InvalidRatio(f32),
-    /// A limit of the deposition probability is not in (0, 1].
-    #[error("the least deposition probability is {0}; it must be more than 0 and at most 1")]
+    /// The minimum probability of storage is not in (0, 1].
+    #[error("the minimum probability of storing a photon is {0}; it must be above 0 and at most 1")]
     InvalidProbability(f32),
     /// No photon was stored.
     #[error(
@@ -30,10 +30,10 @@ pub enum PhotonError {
         by_importance: bool,
     },
     /// No importon was stored.
-    #[error("the camera sees no diffuse surface, not even in mirrors, so that nothing is important to it")]
+    #[error("the camera sees no diffuse surface, directly or in mirrors, so visual importance is zero everywhere")]
     CameraSeesNothing,
     /// The observer ended it.
-    #[error("stopped after {paths} photon paths, before the photon maps were done")]
+    #[error("stopped after {paths} photon paths, before the photon maps were complete")]
     Stopped {
         /// How many were traced.
         paths: u64,

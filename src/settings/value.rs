@@ -1,4 +1,4 @@
-//! Values of settings: what they may be, and how they are written.
+//! Values of settings: their kinds and ranges, and how they are written.
 
 use std::fmt;
 
@@ -63,7 +63,7 @@ impl fmt::Display for Value {
     }
 }
 
-/// Numbers between two bounds. The upper one may be infinite, which no number then reaches.
+/// Numbers between two bounds. The upper bound may be infinite, and is then not included.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Interval {
     /// The lower bound.
@@ -115,7 +115,7 @@ impl fmt::Display for Interval {
     }
 }
 
-/// Whole numbers between two bounds that belong to it. A bound that is that of the type goes without saying.
+/// Whole numbers between two bounds, both included. The bound of the type itself is not written.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Integers {
     /// The lower bound.
@@ -144,11 +144,11 @@ impl fmt::Display for Integers {
 /// Values that a setting can have.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum Kind {
-    /// One of `names`. Scene files may also write a synonym, which pbrt has and which means one of the names.
+    /// One of `names`. Scene files may also use pbrt's synonyms for them.
     Choice {
-        /// What is written.
+        /// Names that are written.
         names: &'static [&'static str],
-        /// What is read too, with its meaning.
+        /// Names that are read as well, with their meaning.
         synonyms: &'static [(&'static str, &'static str)],
     },
     /// A whole number, or a word in place of one.
@@ -165,7 +165,7 @@ pub enum Kind {
         /// The words.
         words: &'static [&'static str],
     },
-    /// Two numbers with a comma between them.
+    /// Two numbers separated by a comma.
     Pair {
         /// The range of both.
         range: Interval,
@@ -174,9 +174,9 @@ pub enum Kind {
         /// Their unit.
         unit: &'static str,
     },
-    /// A name that stands alone, or one of those that take a number after a colon.
+    /// A name on its own, or one of those followed by a colon and a number.
     Graded {
-        /// The name that stands alone.
+        /// The name without a number.
         plain: &'static str,
         /// The others.
         graded: &'static [&'static str],
@@ -185,7 +185,7 @@ pub enum Kind {
         /// The number where none is written.
         default: f32,
     },
-    /// A number of bytes, with a unit if need be.
+    /// A number of bytes, optionally with a unit.
     Bytes,
 }
 
@@ -219,7 +219,7 @@ impl Kind {
     }
 }
 
-/// What is expected.
+/// The expected values, for messages.
 impl fmt::Display for Kind {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         match self {
@@ -228,8 +228,8 @@ impl fmt::Display for Kind {
             Kind::Real { range, words } if *range == Interval::POSITIVE => write!(f, "a positive number{}", or(words)),
             Kind::Real { range, words } => write!(f, "a number {range}{}", or(words)),
             Kind::Pair { range, ascends, unit } => {
-                let order = if *ascends { ", the least one first" } else { "" };
-                write!(f, "two {range} numbers of {unit} with a comma between them{order}")
+                let order = if *ascends { ", the smaller one first" } else { "" };
+                write!(f, "two {range} numbers of {unit} separated by a comma{order}")
             }
             Kind::Graded { plain, graded, range, .. } => {
                 let graded: Vec<String> = graded.iter().map(|name| format!("{name}:E")).collect();

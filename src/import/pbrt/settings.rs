@@ -1,4 +1,4 @@
-//! `Integrator` and `Sampler`: the settings of [`crate::settings::table`], and what pbrt calls otherwise.
+//! `Integrator` and `Sampler`: the settings of [`crate::settings::table`], and pbrt's other names for them.
 
 use super::checks::unknown;
 use super::descriptions::Pending;
@@ -9,7 +9,7 @@ use lumiris_formats::diagnostic::Diagnostics;
 use lumiris_formats::pbrt::params::{ParamSet, ParamType};
 use lumiris_numbers::samplers::SamplerKind;
 
-/// Parameters of pbrt's integrators that mean nothing here.
+/// Parameters of pbrt's integrators that have no effect here.
 const IGNORED: [&str; 16] = [
     "iterations",
     "imagewritefrequency",
@@ -29,7 +29,7 @@ const IGNORED: [&str; 16] = [
     "seed",
 ];
 
-/// Understands `Integrator`.
+/// Reads `Integrator`.
 pub(super) fn finish_integrator(pending: Option<&Pending>, s: &mut Settings, d: &mut Diagnostics) {
     let Some(Pending { name, params: p }) = pending else { return };
     let mut kind = IntegratorKind::Path;
@@ -55,7 +55,7 @@ pub(super) fn finish_integrator(pending: Option<&Pending>, s: &mut Settings, d: 
     }
     set_name("integrator", kind.into(), s);
     parameters(Directive::Integrator, s, p, d);
-    // Photon paths there, stored photons here; −1 is the choice of the renderer
+    // pbrt counts photon paths, the setting stored photons; −1 leaves the choice to the renderer
     if let Some(n @ 1..) = p.integer("photonsperiteration", d) {
         s.integrator.photons.photons = n as u32;
     }
@@ -68,7 +68,7 @@ pub(super) fn finish_integrator(pending: Option<&Pending>, s: &mut Settings, d: 
     p.report_unused(d);
 }
 
-/// Understands `Sampler`.
+/// Reads `Sampler`.
 pub(super) fn finish_sampler(pending: Option<&Pending>, s: &mut Settings, d: &mut Diagnostics) {
     let Some(Pending { name, params: p }) = pending else { return };
     match name.text.as_str() {
@@ -90,12 +90,12 @@ pub(super) fn finish_sampler(pending: Option<&Pending>, s: &mut Settings, d: &mu
         p.ignore("dimensions");
     }
     parameters(Directive::Sampler, s, p, d);
-    // How the numbers are randomised is the sampler's own business here.
+    // Randomisation is part of the sampler here.
     p.ignore("randomization");
     p.report_unused(d);
 }
 
-/// Sets a setting of the table by a name that is known.
+/// Sets a setting of the table to a known name.
 fn set_name(flag: &str, name: &'static str, s: &mut Settings) {
     rows().filter(|row| row.flag == flag).for_each(|row| {
         (row.set)(s, Value::Name(name));
@@ -118,7 +118,7 @@ fn spelling(row: &Setting, i: usize, p: &ParamSet) -> Option<&'static str> {
     Some(row.old_parameters.iter().find(is_old).map_or(name, |&(_, old)| old))
 }
 
-/// The value that parameters give a setting; `current` has what is not written of it.
+/// The value of a setting from its parameters; what they leave out is taken from `current`.
 fn read(row: &Setting, current: &Settings, p: &ParamSet, d: &mut Diagnostics) -> Option<Value> {
     let key = spelling(row, 0, p)?;
     let is_text = p.type_of(key) == Some(ParamType::String);
@@ -151,7 +151,7 @@ fn read(row: &Setting, current: &Settings, p: &ParamSet, d: &mut Diagnostics) ->
     }
 }
 
-/// Two numbers, in one parameter or each in its own. A greatest one that is not written is no smaller than the least.
+/// Two numbers, in one parameter or in one each. A maximum that is not given is at least the minimum.
 fn pair(row: &Setting, current: &Settings, p: &ParamSet, d: &mut Diagnostics) -> Option<Value> {
     let Kind::Pair { range, ascends, unit } = row.kind else { return None };
     let (written, name) = match *row.parameters {
@@ -179,7 +179,7 @@ fn pair(row: &Setting, current: &Settings, p: &ParamSet, d: &mut Diagnostics) ->
     }
     let ([first, second], (key, names)) = (written, name);
     let message = format!("{names} must be {range}, and not {first} and {second}");
-    let order = if ascends { "; the least one first" } else { "" };
+    let order = if ascends { "; the smaller one first" } else { "" };
     d.error(p.span_of(key), message).help(format!("{unit}{order}"));
     None
 }
@@ -310,7 +310,7 @@ mod tests {
             ("\"string cached\" \"most\"", "one of indirect, all"),
             ("\"float cacheerror\" 1", "cacheerror must be above 0 and below 1, not 1"),
             ("\"float cacheminradius\" 0", "must be positive, and not 0 and 20"),
-            ("\"float cacheminradius\" 9 \"float cachemaxradius\" 8", "the least one first"),
+            ("\"float cacheminradius\" 9 \"float cachemaxradius\" 8", "the smaller one first"),
             ("\"integer cachesamples\" 4", "cachesamples must be from 8 to 65536, not 4"),
             ("\"integer cachepasses\" 0", "cachepasses must be from 1 to 4096, not 0"),
         ] {

@@ -23,7 +23,7 @@ pub(super) const DIRECT: Group = Group {
             parameters: &["estimator"],
             key: "estimator",
             kind: choice(EstimatorKind::VARIANTS),
-            help: "Estimator of direct light at each vertex of a path",
+            help: "Estimator of direct light at path vertices",
             get: |s| Some(Value::Name(s.integrator.estimator.into())),
             set: |s, v| v.named().map(|kind| s.integrator.estimator = kind),
             ..Setting::BASE
@@ -34,8 +34,8 @@ pub(super) const DIRECT: Group = Group {
             parameters: &["samples"],
             key: "samples",
             kind: Kind::Integer { range: SAMPLES, words: &["auto"] },
-            help: "Samples per estimate: shadow segments per shading point, or `auto` for the estimator's own number",
-            default: "auto: 2 for mc and mis, 4 for others; ris halves them with every bounce",
+            help: "Samples per estimate (N): shadow rays per shading point, or `auto` for the estimator's default",
+            default: "auto: 2 for mc and mis, 4 for the others; ris halves it at every bounce",
             get: |s| Some(s.integrator.samples.map_or(Value::Name("auto"), |n| Value::Integer(n.into()))),
             resolved: Some(|s| Some(Value::Integer(s.integrator.sample_counts().samples.into()))),
             set: |s, v| {
@@ -49,7 +49,7 @@ pub(super) const DIRECT: Group = Group {
             parameters: &["heuristic"],
             key: "heuristic",
             kind: choice(Heuristic::VARIANTS),
-            help: "Weights of the techniques",
+            help: "MIS heuristic, which weights the techniques",
             default: "power; balance for ris, ocv and optimal-mis",
             get: |s| s.integrator.heuristic.map(|h| Value::Name(h.into())),
             resolved: Some(|s| Some(Value::Name(s.integrator.heuristic().into()))),
@@ -64,7 +64,7 @@ pub(super) const DIRECT: Group = Group {
             old_parameters: &[("bsdffraction", "bsdfshare")],
             key: "bsdf_fraction",
             kind: Kind::Real { range: Interval::closed(0.0, 1.0), words: &[] },
-            help: "Share of the samples that the BSDF draws, for mis, ocv and optimal-mis",
+            help: "Fraction of the samples drawn by BSDF sampling, for mis, ocv and optimal-mis",
             applies: Applies::Estimators(&[Mis, Ocv, OptimalMis]),
             get: |s| Some(Value::Real(s.integrator.bsdf_fraction)),
             set: |s, v| v.real().map(|fraction| s.integrator.bsdf_fraction = fraction),
@@ -78,8 +78,8 @@ pub(super) const DIRECT: Group = Group {
             old_parameters: &[("noncontributingsamples", "restsamples")],
             key: "noncontributing_samples",
             kind: integer(0, MAX_SAMPLES),
-            help: "Samples of contributing on the lights that no photon came from, besides --samples on the others; 0 leaves \
-                   these lights out, which is biased",
+            help: "Samples of contributing on non-contributing lights, in addition to --samples on the contributing \
+                   ones; 0 leaves these lights out, which is biased",
             applies: Applies::Estimators(&[Contributing]),
             get: |s| Some(Value::Integer(s.integrator.contributing.noncontributing_samples.into())),
             set: |s, v| v.count().map(|n| s.integrator.contributing.noncontributing_samples = n),
@@ -98,8 +98,8 @@ pub(super) const RIS: Group = Group {
             parameters: &["proposals"],
             key: "proposals",
             kind: Kind::Integer { range: SAMPLES, words: &["auto", "optimal"] },
-            help: "Proposals per estimate: a number, `auto` (by the measured times of stages) or `optimal` (per pixel, by times \
-                   and variances)",
+            help: "Proposals per estimate (M): a number, `auto` (from the measured times of the stages) or `optimal` \
+                   (per pixel, from times and variances)",
             applies: Applies::Estimators(&[Ris]),
             get: |s| {
                 Some(match s.integrator.ris.proposals {
@@ -131,7 +131,8 @@ pub(super) const RIS: Group = Group {
             parameters: &["strata"],
             key: "strata",
             kind: choice(Strata::VARIANTS),
-            help: "How samples are drawn from the proposals",
+            help: "How samples are drawn from the proposals: independently, stratified by the number or by the weight \
+                   of the proposals, or by systematic resampling",
             applies: Applies::Estimators(&[Ris]),
             get: |s| Some(Value::Name(s.integrator.ris.strata.into())),
             set: |s, v| v.named().map(|strata| s.integrator.ris.strata = strata),
@@ -142,7 +143,7 @@ pub(super) const RIS: Group = Group {
             parameters: &["proposalpoints"],
             key: "proposal_points",
             kind: choice(ProposalPoints::VARIANTS),
-            help: "How proposals lie on the lights",
+            help: "Distribution of the proposals over the lights",
             applies: Applies::Estimators(&[Ris]),
             get: |s| Some(Value::Name(s.integrator.ris.points.into())),
             set: |s, v| v.named().map(|points| s.integrator.ris.points = points),
@@ -153,8 +154,8 @@ pub(super) const RIS: Group = Group {
             parameters: &["target"],
             key: "target",
             kind: choice(Target::VARIANTS),
-            help: "What samples are drawn in proportion to: f*G*L, with visibility V where shading is dearer than rays, or \
-                   (visibility) f*G*L with an estimate of V by photons",
+            help: "Target density of resampling: f*G*L; with visibility V, where shading is more expensive than \
+                   tracing rays; or (visibility) f*G*L with V estimated by the visibility cache",
             applies: Applies::Estimators(&[Ris]),
             get: |s| Some(Value::Name(s.integrator.ris.target.into())),
             set: |s, v| v.named().map(|target| s.integrator.ris.target = target),
@@ -166,8 +167,8 @@ pub(super) const RIS: Group = Group {
             parameters: &["stagetimes"],
             key: "stage_times",
             kind: Kind::Pair { range: Interval::POSITIVE, ascends: false, unit: "nanoseconds" },
-            help: "Time of a proposal and of a sample (ns), from which `auto` and `optimal` choose",
-            default: "measured on this scene",
+            help: "Times of a proposal and of a sample (ns), from which `auto` and `optimal` choose",
+            default: "measured on the scene",
             applies: Applies::Estimators(&[Ris]),
             get: |s| s.integrator.ris.stage_times.map(|t| Value::Pair([t.t1 as f32, t.t2 as f32])),
             set: |s, v| {
@@ -191,8 +192,8 @@ pub(super) const CONTROL_VARIATES: Group = Group {
             parameters: &["ocv"],
             key: "ocv",
             kind: choice(Form::VARIANTS),
-            help: "How ocv finds the coefficients of its control variates: from earlier samples of the pixel, from the other half \
-                   of the samples, or (biased) from the same samples",
+            help: "How ocv fits the coefficients of its control variates: to earlier samples of the pixel, to the \
+                   other half of the samples, or (biased) to the same samples",
             applies: Applies::Estimators(&[Ocv]),
             get: |s| Some(Value::Name(s.integrator.ocv.form.into())),
             set: |s, v| v.named().map(|form| s.integrator.ocv.form = form),
@@ -204,8 +205,8 @@ pub(super) const CONTROL_VARIATES: Group = Group {
             parameters: &["components"],
             key: "components",
             kind: integer(2, MAX_COMPONENTS as u64),
-            help: "Most components of the mixture of ocv and optimal-mis: lobes of BSDFs and groups of lights",
-            default: "8: as many as there can be",
+            help: "Maximum number of components of the mixture of ocv and optimal-mis: BSDF lobes and groups of lights",
+            default: "8, the maximum",
             applies: Applies::Estimators(&[Ocv, OptimalMis]),
             get: |s| s.integrator.ocv.components.map(|n| Value::Integer(n.into())),
             resolved: Some(|s| Some(Value::Integer(s.integrator.ocv.max_components() as u64))),
@@ -218,7 +219,8 @@ pub(super) const CONTROL_VARIATES: Group = Group {
             parameters: &["optimalmis"],
             key: "optimal_mis",
             kind: choice(OptimalForm::VARIANTS),
-            help: "How optimal-mis finds its weights: from earlier samples of the pixel, or (biased) from the same samples",
+            help: "How optimal-mis determines its weights: from earlier samples of the pixel, or (biased) from the \
+                   same samples",
             applies: Applies::Estimators(&[OptimalMis]),
             get: |s| Some(Value::Name(s.integrator.optimal_mis.into())),
             set: |s, v| v.named().map(|form| s.integrator.optimal_mis = form),
@@ -230,7 +232,8 @@ pub(super) const CONTROL_VARIATES: Group = Group {
             parameters: &["correlated"],
             key: "correlated",
             kind: choice(CorrelatedForm::VARIANTS),
-            help: "How correlated weighs its two estimates: from the same samples (biased), or from the other half of them",
+            help: "How correlated weights its two estimates: from the same samples (biased), or from the other half \
+                   of them",
             applies: Applies::Estimators(&[Correlated]),
             get: |s| Some(Value::Name(s.integrator.correlated.form.into())),
             set: |s, v| v.named().map(|form| s.integrator.correlated.form = form),
@@ -241,7 +244,7 @@ pub(super) const CONTROL_VARIATES: Group = Group {
             parameters: &["technique"],
             key: "technique",
             kind: choice(SamplingTechnique::VARIANTS),
-            help: "What draws the samples of correlated",
+            help: "Sampling technique of correlated",
             applies: Applies::Estimators(&[Correlated]),
             get: |s| Some(Value::Name(s.integrator.correlated.technique.into())),
             set: |s, v| v.named().map(|technique| s.integrator.correlated.technique = technique),

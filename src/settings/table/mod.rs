@@ -1,4 +1,4 @@
-//! The table of settings: one row for each, in groups as the help of the command line has them.
+//! The table of settings: one row each, grouped as in the help of the command line.
 //!
 //! A new setting is a field of [`Settings`] and a row here.
 
@@ -17,9 +17,9 @@ pub struct Setting {
     pub flag: &'static str,
     /// Names that it had on the command line before, which are still accepted.
     pub aliases: &'static [&'static str],
-    /// What stands for the value in help.
+    /// Placeholder of the value in help.
     pub value_name: &'static str,
-    /// Value that the name alone stands for on the command line, if it may stand alone.
+    /// Value of the option if none is given, where that is allowed.
     pub bare: Option<&'static str>,
     /// Directive of scene files whose parameter it is.
     pub directive: Directive,
@@ -33,21 +33,21 @@ pub struct Setting {
     pub kind: Kind,
     /// A sentence or two for the command line.
     pub help: &'static str,
-    /// What help says of the default; `""` for the value in [`Settings::default`].
+    /// The default as help states it; `""` for the value in [`Settings::default`].
     pub default: &'static str,
-    /// Images that it can change.
+    /// Images that it affects.
     pub applies: Applies,
-    /// False if it cannot change an image at all, but only keep it from being made.
+    /// False if it cannot affect an image, but only prevent it from being rendered.
     pub is_recorded: bool,
-    /// The value; `None` where the renderer chooses and there is no word for that.
+    /// The value; `None` where it is the renderer's choice and there is no word for that.
     pub get: fn(&Settings) -> Option<Value>,
-    /// The value with the renderer's choice, where that is known from the settings alone.
+    /// The value with the renderer's choice, where that follows from the settings alone.
     pub resolved: Option<fn(&Settings) -> Option<Value>>,
-    /// Sets a value of `kind`. `None` if it is of another kind.
+    /// Sets a value of `kind`; `None` if it is of another kind.
     pub set: fn(&mut Settings, Value) -> Option<()>,
 }
 
-/// Where scene files have a setting.
+/// The directive of scene files to which a setting belongs.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Directive {
     /// `Integrator`
@@ -56,7 +56,7 @@ pub enum Directive {
     Sampler,
 }
 
-/// Images that a setting can change.
+/// Images that a setting affects.
 #[derive(Clone, Copy, Debug)]
 pub enum Applies {
     /// All.
@@ -70,7 +70,7 @@ pub enum Applies {
 }
 
 impl Applies {
-    /// True if an image with these settings is one of them.
+    /// True if it affects an image with these settings.
     pub fn to(&self, settings: &Settings) -> bool {
         match self {
             Applies::Always => true,
@@ -90,7 +90,7 @@ pub struct Group {
     pub rows: &'static [Setting],
 }
 
-/// All settings. Those that others depend on come first: values are set in this order.
+/// All settings. Values are set in this order, so those that others depend on come first.
 pub const GROUPS: &[Group] = &[
     transport::TRANSPORT,
     transport::SAMPLING,
@@ -113,13 +113,13 @@ impl Setting {
         (self.set)(settings, value).ok_or_else(|| format!("expected {}", self.kind))
     }
 
-    /// What help says of the default.
+    /// The default as help states it.
     pub fn default_text(&self) -> String {
         let value = || (self.get)(&Settings::default()).map_or_else(String::new, |value| value.to_string());
         if self.default.is_empty() { value() } else { self.default.to_owned() }
     }
 
-    /// What rows leave out.
+    /// Defaults of the fields that rows leave out.
     const BASE: Setting = Setting {
         flag: "",
         aliases: &[],
@@ -150,7 +150,7 @@ const fn integer(min: u64, max: u64) -> Kind {
     Kind::Integer { range: Integers { min, max }, words: &[] }
 }
 
-/// Most samples and proposals of an estimate.
+/// Maximum number of samples and proposals per estimate.
 const MAX_SAMPLES: u64 = 4096;
 /// Largest number of 32 bits.
 const MAX_U32: u64 = u32::MAX as u64;
@@ -196,7 +196,7 @@ mod tests {
                 row.set_text(&mut settings, &value.to_string()).unwrap();
                 assert_eq!(settings, Settings::default(), "{}", row.flag);
             }
-            assert!(!row.default_text().is_empty(), "{}: help says nothing of the default", row.flag);
+            assert!(!row.default_text().is_empty(), "{}: help does not state the default", row.flag);
             assert!(!row.help.is_empty() && !row.help.ends_with('.'), "{}: {}", row.flag, row.help);
         }
         assert_eq!(Settings::default().changed().count(), 0);

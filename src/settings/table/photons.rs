@@ -1,4 +1,4 @@
-//! Photon maps, and photons that tell which lights are seen.
+//! Photon maps, and the photons of the visibility cache.
 
 use super::{Applies, Group, MAX_SAMPLES, MAX_U32, Setting, integer};
 use crate::settings::value::{Integers, Interval, Kind, Value};
@@ -8,7 +8,7 @@ const MAPS: Applies = Applies::Integrators(&[IntegratorKind::PhotonMap]);
 
 /// Photons.
 pub(super) const PHOTONS: Group = Group {
-    title: "Photon maps (--integrator photon-map)",
+    title: "Photon maps (--integrator photon-map) and the visibility cache",
     rows: &[
         Setting {
             flag: "photons",
@@ -16,7 +16,7 @@ pub(super) const PHOTONS: Group = Group {
             parameters: &["photons"],
             key: "photons",
             kind: integer(1, MAX_U32),
-            help: "Approximate number of photons stored in the global map, in each pass if progressive",
+            help: "Approximate number of photons stored in the global map; of a progressive map, in each pass",
             applies: MAPS,
             get: |s| Some(Value::Integer(s.integrator.photons.photons.into())),
             set: |s, v| v.count().map(|n| s.integrator.photons.photons = n),
@@ -28,7 +28,7 @@ pub(super) const PHOTONS: Group = Group {
             parameters: &["causticratio"],
             key: "caustic_ratio",
             kind: Kind::Real { range: Interval::above(0.0, 1.0), words: &[] },
-            help: "Share q of the photon paths that fill the global map too; all fill the caustic map",
+            help: "Fraction q of the photon paths that also fill the global map; all of them fill the caustic map",
             applies: MAPS,
             get: |s| Some(Value::Real(s.integrator.photons.caustic_ratio)),
             set: |s, v| v.real().map(|q| s.integrator.photons.caustic_ratio = q),
@@ -46,8 +46,8 @@ pub(super) const PHOTONS: Group = Group {
                 range: Interval::above(0.0, 1.0),
                 default: 0.01,
             },
-            help: "Store photons by visual importance: none, floor:E (with the probability p(x), at least E), or cut-off:E \
-                   (biased: none where p(x) is below E)",
+            help: "Store photons by visual importance: none; floor:E (with the probability p(x), but at least E); or \
+                   cut-off:E (biased: not at all where p(x) is below E)",
             applies: MAPS,
             get: |s| {
                 Some(match s.integrator.photons.storage {
@@ -72,7 +72,7 @@ pub(super) const PHOTONS: Group = Group {
             parameters: &["nearest"],
             key: "nearest",
             kind: integer(2, 100_000),
-            help: "Photons of an estimate",
+            help: "Photons per density estimate",
             applies: MAPS,
             get: |s| Some(Value::Integer(s.integrator.photons.nearest.into())),
             set: |s, v| v.count().map(|n| s.integrator.photons.nearest = n),
@@ -84,7 +84,7 @@ pub(super) const PHOTONS: Group = Group {
             parameters: &["gather"],
             key: "gather",
             kind: integer(0, MAX_SAMPLES),
-            help: "Rays of the final gather at a diffuse point; 0 shows the global map directly",
+            help: "Final-gather rays per diffuse vertex; 0 visualises the global map directly",
             applies: MAPS,
             get: |s| Some(Value::Integer(s.integrator.photons.gather.into())),
             set: |s, v| v.count().map(|n| s.integrator.photons.gather = n),
@@ -92,12 +92,12 @@ pub(super) const PHOTONS: Group = Group {
         },
         Setting {
             flag: "gather-guide",
-            value_name: "SHARE",
+            value_name: "FRACTION",
             parameters: &["gatherguide"],
             key: "gather_guide",
             // Not all: there may be no photons from where light comes
             kind: Kind::Real { range: Interval::closed(0.0, 0.95), words: &[] },
-            help: "Share of these rays whose directions photons choose",
+            help: "Fraction of the final-gather rays that are guided by photons",
             applies: MAPS,
             get: |s| Some(Value::Real(s.integrator.photons.guide)),
             set: |s, v| v.real().map(|fraction| s.integrator.photons.guide = fraction),
@@ -110,8 +110,9 @@ pub(super) const PHOTONS: Group = Group {
             parameters: &["alpha"],
             key: "progressive",
             kind: Kind::Real { range: Interval::open(0.0, 1.0), words: &["off"] },
-            help: "New photons and smaller radii from sample to sample, so that the image converges: r² falls with the power \
-                   ALPHA - 1; off for one map where the file asks for sppm",
+            help: "Progressive photon mapping: new photons and smaller radii in every pass, so that the image \
+                   converges. r² decreases as the power ALPHA - 1 of the number of passes; `off` overrides a file \
+                   that asks for sppm",
             default: "off; ALPHA: 0.5",
             applies: MAPS,
             get: |s| Some(s.integrator.photons.progressive.map_or(Value::Name("off"), |p| Value::Real(p.alpha))),
@@ -128,8 +129,8 @@ pub(super) const PHOTONS: Group = Group {
             parameters: &["radius"],
             key: "photon_radius",
             kind: Kind::Real { range: Interval::POSITIVE, words: &[] },
-            help: "First radius of a progressive map, which it asks for",
-            default: "how far the nearest K photons reach where the camera looks",
+            help: "Initial radius of progressive photon mapping, which this option switches on",
+            default: "the distance of the K nearest photons where the camera looks",
             applies: MAPS,
             get: |s| s.integrator.photons.progressive.and_then(|p| p.radius).map(Value::Real),
             set: |s, v| {
@@ -146,9 +147,9 @@ pub(super) const PHOTONS: Group = Group {
             old_parameters: &[("visibilityphotons", "lightphotons")],
             key: "visibility_photons",
             kind: integer(1, MAX_U32),
-            help: "Photons that tell which lights are seen, for --light-sampler photons, --target visibility and --estimator \
-                   contributing",
-            default: "512 for each light, at least 262144",
+            help: "Photon paths traced for the visibility cache, which --light-sampler photons, --target visibility \
+                   and --estimator contributing use",
+            default: "512 per light, at least 262144",
             applies: Applies::If(|s| s.integrator.uses_visibility_cache()),
             get: |s| s.integrator.photons.visibility_photons.map(|n| Value::Integer(n.into())),
             set: |s, v| v.count().map(|n| s.integrator.photons.visibility_photons = Some(n)),
@@ -160,7 +161,8 @@ pub(super) const PHOTONS: Group = Group {
             parameters: &["photonpaths"],
             key: "photon_paths",
             kind: Kind::Integer { range: Integers { min: 1, max: i64::MAX as u64 }, words: &[] },
-            help: "Most photon paths for one map: with importance it can take many to store what was asked for",
+            help: "Maximum number of photon paths per map: storage by importance can take many to store the photons \
+                   requested",
             applies: MAPS,
             get: |s| Some(Value::Integer(s.integrator.photons.paths)),
             set: |s, v| v.integer().map(|n| s.integrator.photons.paths = n),
@@ -172,7 +174,7 @@ pub(super) const PHOTONS: Group = Group {
             parameters: &["memory"],
             key: "memory",
             kind: Kind::Bytes,
-            help: "Most memory of the maps, such as 800M or 4G",
+            help: "Maximum memory of the photon maps, such as 800M or 4G",
             default: "4G",
             applies: MAPS,
             is_recorded: false,

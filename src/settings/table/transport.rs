@@ -16,7 +16,7 @@ pub(super) const TRANSPORT: Group = Group {
             flag: "integrator",
             key: "integrator",
             kind: choice(IntegratorKind::VARIANTS),
-            help: "What is computed",
+            help: "Light transport algorithm",
             get: |s| Some(Value::Name(s.integrator.kind.into())),
             set: |s, v| {
                 s.integrator.kind = v.named()?;
@@ -34,7 +34,7 @@ pub(super) const TRANSPORT: Group = Group {
             parameters: &["maxdepth"],
             key: "max_depth",
             kind: integer(0, 10_000),
-            help: "Bounces of light, but for `direct`",
+            help: "Maximum number of bounces; `direct` has at most one",
             get: |s| Some(Value::Integer(s.integrator.max_depth.into())),
             set: |s, v| v.count().map(|n| s.integrator.max_depth = n),
             ..Setting::BASE
@@ -48,7 +48,8 @@ pub(super) const TRANSPORT: Group = Group {
                 names: LightSamplerKind::VARIANTS,
                 synonyms: &[("bvh", "tree"), ("exhaustive", "tree"), ("spatial", "tree")],
             },
-            help: "How a light is chosen; by photons, mostly among those that photons have come from",
+            help: "How lights are chosen: uniformly, by power, by a light tree, or mostly among the contributing \
+                   lights that the visibility cache finds (photons)",
             get: |s| Some(Value::Name(s.integrator.light_sampler.into())),
             set: |s, v| v.named().map(|kind| s.integrator.light_sampler = kind),
             ..Setting::BASE
@@ -59,7 +60,7 @@ pub(super) const TRANSPORT: Group = Group {
             parameters: &["bsdfproposals"],
             key: "bsdf_proposals",
             kind: integer(1, MAX_SAMPLES),
-            help: "Directions proposed per bounce off materials that can only be evaluated",
+            help: "Proposals per bounce off materials whose BSDF can only be evaluated, not sampled",
             get: |s| Some(Value::Integer(s.integrator.bsdf_proposals.into())),
             set: |s, v| v.count().map(|n| s.integrator.bsdf_proposals = n),
             ..Setting::BASE
@@ -69,7 +70,7 @@ pub(super) const TRANSPORT: Group = Group {
             parameters: &["bsdfdensity"],
             key: "bsdf_density",
             kind: choice(ProposalDensity::VARIANTS),
-            help: "What proposes directions for such materials",
+            help: "Sampling density of these proposals",
             get: |s| Some(Value::Name(s.integrator.bsdf_density.into())),
             set: |s, v| v.named().map(|density| s.integrator.bsdf_density = density),
             ..Setting::BASE
@@ -86,7 +87,7 @@ pub(super) const SAMPLING: Group = Group {
             directive: Directive::Sampler,
             key: "sampler",
             kind: choice(SamplerKind::VARIANTS),
-            help: "Random sequence",
+            help: "Sample sequence",
             get: |s| Some(Value::Name(s.sampling.sampler.into())),
             set: |s, v| v.named().map(|kind| s.sampling.sampler = kind),
             ..Setting::BASE
@@ -110,8 +111,8 @@ pub(super) const SAMPLING: Group = Group {
             parameters: &["footprintspp"],
             key: "footprint_spp",
             kind: integer(1, MAX_U32),
-            help: "Camera samples per pixel that textures and bumps are filtered for: their footprint is 1/sqrt(K) of a pixel wide, \
-                   at least an eighth. An image that is rendered in parts needs the number of all its samples",
+            help: "Camera samples per pixel that texture filtering assumes: the footprint is 1/sqrt(K) of a pixel \
+                   wide, at least an eighth. For an image that is rendered in parts, give the total of all parts",
             default: "--spp",
             get: |s| s.sampling.footprint_spp.map(|n| Value::Integer(n.into())),
             resolved: Some(|s| Some(Value::Integer(s.sampling.footprint_spp().into()))),
@@ -125,7 +126,7 @@ pub(super) const SAMPLING: Group = Group {
             parameters: &["seed"],
             key: "seed",
             kind: Kind::Integer { range: Integers::ALL, words: &[] },
-            help: "Images of different seeds are independent",
+            help: "Random seed; images with different seeds are independent",
             get: |s| Some(Value::Integer(s.sampling.seed.into())),
             set: |s, v| v.count().map(|n| s.sampling.seed = n),
             ..Setting::BASE

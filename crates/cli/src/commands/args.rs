@@ -17,7 +17,7 @@ where
     PossibleValuesParser::new(T::VARIANTS).try_map(|name| name.parse::<T>())
 }
 
-/// What a scene file says and the command line overrides.
+/// The scene, and options that override its settings.
 #[derive(Args, Clone, Debug)]
 pub(super) struct SceneArgs {
     /// Scene file (.pbrt or .pbrt.gz)
@@ -27,22 +27,22 @@ pub(super) struct SceneArgs {
     /// Size of the image, such as 640x480 [default: the file's]
     #[arg(long, value_name = "WxH", value_parser = parse_resolution)]
     pub resolution: Option<[u32; 2]>,
-    /// The part that is rendered, in fractions of the image [default: the file's]
+    /// Crop window, in fractions of the image [default: the file's]
     #[arg(long, value_name = "X0,X1,Y0,Y1", value_parser = parse_crop)]
     pub crop: Option<[f32; 4]>,
-    /// Replace the file's pixel filter by a box of one pixel
+    /// Use a box filter of one pixel instead of the file's pixel filter
     #[arg(long)]
     pub box_filter: bool,
     /// Ray tracer
     #[arg(long, default_value = "embree", value_parser = named::<AccelKind>())]
     pub accel: AccelKind,
-    /// Rays per Embree packet; changes speed, not the image [default: the processor's native width]
+    /// Rays per Embree packet; affects speed only, not the image [default: the processor's native width]
     #[arg(long, value_name = "W", value_parser = parse_packet_width)]
     pub packet_width: Option<u32>,
     /// Threads [default: all cores]
     #[arg(long, value_name = "T", value_parser = clap::value_parser!(u32).range(1..=4096))]
     pub threads: Option<u32>,
-    /// Edge of a tile in pixels; changes speed, not the image
+    /// Tile size in pixels; affects speed only, not the image
     #[arg(long, value_name = "PIXELS", default_value_t = 16, value_parser = clap::value_parser!(u32).range(1..=4096))]
     pub tile_size: u32,
 }
@@ -52,23 +52,23 @@ pub(super) struct SceneArgs {
 pub(super) struct RenderArgs {
     #[command(flatten)]
     pub scene: SceneArgs,
-    /// Where to write; may be given several times. EXR holds everything; PNG, JPEG, TIFF and TGA what a display shows
+    /// Output image; may be given several times. EXR stores all channels; PNG, JPEG, TIFF and TGA the tone-mapped image
     /// [default: the name in the file, or SCENE.exr]
     #[arg(short, long, value_name = "FILE")]
     pub output: Vec<PathBuf>,
-    /// Stop after the pass in which this many seconds run out
+    /// Stop after the first pass that ends later than this many seconds
     #[arg(long, value_name = "SECONDS", value_parser = parse_seconds)]
     pub time: Option<f64>,
-    /// Channels beside the image, in EXR [default: all, and ratio with --proposals optimal]
+    /// AOVs: additional channels of EXR files [default: all, and ratio with --proposals optimal]
     #[arg(long, value_name = "LIST", value_delimiter = ',', value_parser = named::<Aov>())]
     pub aov: Option<Vec<Aov>>,
-    /// Exposure of what a display shows (PNG and its like), in stops
+    /// Exposure of PNG, JPEG, TIFF and TGA images, in stops
     #[arg(long, value_name = "STOPS", default_value_t = 0.0, allow_negative_numbers = true)]
     pub exposure: f32,
-    /// Write seconds and counts of every stage
+    /// Write times and counts of every stage
     #[arg(long, value_name = "FILE.json")]
     pub stats: Option<PathBuf>,
-    /// No progress, only warnings and errors
+    /// Print no progress, only warnings and errors
     #[arg(short, long)]
     pub quiet: bool,
 }

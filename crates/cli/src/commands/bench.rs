@@ -16,13 +16,13 @@ use std::process::ExitCode;
 /// What to measure.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
 enum Subject {
-    /// Proposals, and the time of every stage
+    /// Proposals, and the times of all stages
     T1,
     /// Shadow segments against a bare Embree loop
     T2,
     /// First hits against a bare Embree loop
     Intersect,
-    /// Photon tracing, and maps of photons
+    /// Photon tracing and photon maps
     Photons,
     /// Everything
     All,
@@ -31,18 +31,18 @@ enum Subject {
 /// `lumiris bench`
 #[derive(Args, Clone, Debug)]
 pub(super) struct BenchArgs {
-    /// What is measured
+    /// What to measure
     #[arg(default_value = "all")]
     subject: Subject,
     #[command(flatten)]
     scene: SceneArgs,
-    /// Turns of the renderer and of the bare loop; medians are reported
+    /// Runs of the renderer and of the bare Embree loop, alternating; medians are reported
     #[arg(long, value_name = "N", default_value_t = 5, value_parser = clap::value_parser!(u32).range(1..=10_000))]
     runs: u32,
-    /// Camera rays at most: batches of them are spread over the image
+    /// Maximum number of camera rays, in batches spread over the image
     #[arg(long, value_name = "K", default_value_t = 1 << 20, value_parser = clap::value_parser!(u32).range(1..))]
     rays: u32,
-    /// Write the report
+    /// Write the report as JSON
     #[arg(long, value_name = "FILE.json")]
     json: Option<PathBuf>,
 }
@@ -81,7 +81,7 @@ pub(super) fn run(args: &BenchArgs) -> anyhow::Result<ExitCode> {
     Ok(ExitCode::SUCCESS)
 }
 
-/// Measures photons, and prints what was found; a scene without photons has everything else, if that is asked for.
+/// Measures photon tracing and prints the results; `all` skips it for a scene without photons.
 fn photons(args: &BenchArgs, job: &RenderJob) -> anyhow::Result<Option<PhotonReport>> {
     match measure_photons(job, args.scene.threads.map(|t| t as usize), args.runs) {
         Ok(report) => {

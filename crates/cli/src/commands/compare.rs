@@ -17,7 +17,7 @@ pub(super) struct CompareArgs {
     /// Images: EXR, HDR, PFM, PNG, or anything that OpenImageIO reads
     #[arg(required = true, value_name = "IMAGE")]
     images: Vec<PathBuf>,
-    /// What they are compared with
+    /// Reference image
     #[arg(short, long, value_name = "IMAGE")]
     reference: PathBuf,
     /// Metrics to compute [default: all]
@@ -44,7 +44,7 @@ pub(super) struct CompareArgs {
     /// Write an HTML page with the images and difference maps into this folder (index.html)
     #[arg(long, value_name = "DIR")]
     html: Option<PathBuf>,
-    /// Write all numbers; `-` prints them instead of the table
+    /// Write all numbers as JSON; `-` prints them instead of the table
     #[arg(long, value_name = "FILE")]
     json: Option<PathBuf>,
     /// Exit with code 1 if a metric of any image is above this (in magnitude), such as `relmse=0.02`
@@ -115,7 +115,7 @@ fn not_negative(text: &str) -> Result<f64, String> {
     number(text).and_then(|v| if v >= 0.0 { Ok(v) } else { Err("must not be negative".to_owned()) })
 }
 
-/// Filters of ꟻLIP cover a fraction of a degree: a few pixels to a few hundred.
+/// The filters of ꟻLIP cover a fraction of a degree, which must be a few pixels to a few hundred.
 fn pixels_per_degree(text: &str) -> Result<f64, String> {
     number(text).and_then(|v| if (1.0..=1000.0).contains(&v) { Ok(v) } else { Err("must be in 1..1000".to_owned()) })
 }
@@ -155,7 +155,7 @@ pub(super) fn run(args: &CompareArgs) -> anyhow::Result<ExitCode> {
     Ok(if failures.is_empty() { ExitCode::SUCCESS } else { ExitCode::from(1) })
 }
 
-/// Selected metrics, and those that limits need.
+/// Selected metrics, and those that limits refer to.
 fn settings(args: &CompareArgs) -> Settings {
     let limits = args.fail_above.iter().chain(&args.fail_below);
     let mut metrics: Vec<Metric> = args.metrics.iter().map(|m| m.metric()).collect();
@@ -173,7 +173,7 @@ fn settings(args: &CompareArgs) -> Settings {
     }
 }
 
-/// Remarks about the images, each with the name of an image.
+/// Remarks on the images, each with the name of its image.
 fn remarks(set: &ImageSet, compared: &[Compared]) -> Vec<(String, String)> {
     let mut remarks = Vec::new();
     for shown in set.images.iter().chain([&set.reference]) {

@@ -18,11 +18,11 @@ use std::process::ExitCode;
 use std::sync::Arc;
 use std::sync::atomic::AtomicBool;
 
-/// Part of the pixels that may differ visibly between the two images: rays at edges.
+/// Fraction of the pixels that may differ visibly between the two images: rays at edges.
 const MAX_DIFFERENT_PIXELS: f64 = 0.005;
 /// A pixel differs visibly if it is off by more than this, relative to the larger of it and the image's mean.
 const PIXEL_TOLERANCE: f64 = 0.01;
-/// Allowed difference of the images' means, relative.
+/// Allowed relative difference of the images' means.
 const MEAN_TOLERANCE: f64 = 1e-3;
 
 /// `lumiris crosscheck`
@@ -33,7 +33,7 @@ pub(super) struct CrosscheckArgs {
     /// Rays of each family
     #[arg(long, value_name = "K", default_value_t = 1_000_000)]
     rays: u32,
-    /// Write the report
+    /// Write the report as JSON
     #[arg(long, value_name = "FILE.json")]
     json: Option<PathBuf>,
     /// Write both images and their difference into this folder
@@ -41,7 +41,7 @@ pub(super) struct CrosscheckArgs {
     images: Option<PathBuf>,
 }
 
-/// How two images of the same random numbers differ.
+/// Differences between two images rendered with the same random numbers.
 #[derive(Clone, Copy, Debug, Serialize)]
 struct ImageReport {
     pixels: usize,
@@ -76,7 +76,7 @@ pub(super) fn run(args: &CrosscheckArgs) -> anyhow::Result<ExitCode> {
     let bvh_image = image(args, &job)?;
     let images = compare(&embree_image, &bvh_image);
     progress::print(&format!(
-        "images: {} of {} pixels identical to the bit, {} off by more than {} %, means differ by {:.2e}",
+        "images: {} of {} pixels bit-identical, {} off by more than {} %, means differ by {:.2e}",
         images.identical,
         images.pixels,
         images.different,
@@ -139,7 +139,7 @@ fn compare(a: &[f32], b: &[f32]) -> ImageReport {
 }
 
 fn write_images(folder: &std::path::Path, job: &RenderJob, a: &[f32], b: &[f32]) -> anyhow::Result<()> {
-    std::fs::create_dir_all(folder).with_context(|| format!("cannot make {}", folder.display()))?;
+    std::fs::create_dir_all(folder).with_context(|| format!("cannot create {}", folder.display()))?;
     let bounds = job.world.scene.film.bounds;
     let difference: Vec<f32> = a.iter().zip(b).map(|(x, y)| (x - y).abs()).collect();
     for (name, data) in [("embree", a), ("bvh", b), ("difference", &difference)] {

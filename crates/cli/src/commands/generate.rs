@@ -20,15 +20,15 @@ pub(super) struct GenerateArgs {
 
 #[derive(Clone, Debug, Subcommand)]
 enum What {
-    /// A finely carved statue, as a PLY mesh
+    /// A finely carved statue (PLY mesh)
     Statue(StatueArgs),
-    /// An environment map of sun, sky and clouds, as an EXR image for `LightSource "infinite"`
+    /// An environment map of sun, sky and clouds (EXR image for `LightSource "infinite"`)
     Sky(SkyArgs),
-    /// The scenes of scenes/talbot with their statue and sky
+    /// The scenes of scenes/talbot, with their statue and sky
     Talbot(TalbotArgs),
-    /// The scenes of scenes/fan with their statue
+    /// The scenes of scenes/fan, with their statue
     Fan(FanArgs),
-    /// The scenes of scenes/keller-wald, and rooms with 10,000 lights
+    /// The scenes of scenes/keller-wald, and a version of the rooms with 10,000 lights
     KellerWald(KellerWaldArgs),
 }
 
@@ -40,7 +40,7 @@ struct StatueArgs {
     /// Grid cells along the height (8 to 4096); the number of triangles grows with the square
     #[arg(long, value_name = "N", default_value_t = DEFAULT_DETAIL)]
     detail: u32,
-    /// Leave out the vertex normals
+    /// Omit the vertex normals
     #[arg(long)]
     flat: bool,
 }
@@ -51,7 +51,7 @@ struct SkyArgs {
     /// File to write (.exr)
     #[arg(short, long, value_name = "FILE", default_value = "sky.exr")]
     output: PathBuf,
-    /// Texels on each side
+    /// Width and height in texels
     #[arg(long, value_name = "N", default_value_t = 1024)]
     resolution: usize,
     /// Height of the sun above the horizon (degrees, 0 to 90)
@@ -60,22 +60,22 @@ struct SkyArgs {
     /// Direction of the sun, from +x towards +y (degrees)
     #[arg(long, value_name = "DEGREES", default_value_t = 225.0)]
     azimuth: f32,
-    /// Haze: 0 none, 1 a clear day, 10 very hazy
+    /// Haze: 0 for none, 1 for a clear day, 10 for a very hazy one
     #[arg(long, value_name = "AMOUNT", default_value_t = 1.5)]
     haze: f32,
-    /// Size of the sun relative to the real one; its energy stays the same
+    /// Diameter of the sun relative to the real one; its power stays the same
     #[arg(long, value_name = "FACTOR", default_value_t = 1.0)]
     sun_size: f32,
     /// Reflectance of the ground below the horizon
     #[arg(long, value_name = "ALBEDO", default_value_t = 0.25)]
     ground: f32,
     /// Fraction of the sky covered by clouds (0 to 1)
-    #[arg(long, value_name = "PART", default_value_t = 0.0)]
+    #[arg(long, value_name = "FRACTION", default_value_t = 0.0)]
     clouds: f32,
-    /// Irradiance of a horizontal surface (luminance)
+    /// Irradiance on a horizontal surface (luminance)
     #[arg(long, value_name = "E", default_value_t = std::f32::consts::PI)]
     irradiance: f32,
-    /// Which clouds
+    /// Random seed of the clouds
     #[arg(long, value_name = "N", default_value_t = 1)]
     seed: u32,
 }
@@ -104,7 +104,7 @@ struct TalbotArgs {
     /// Grid cells along the height of the statue (8 to 4096)
     #[arg(long, value_name = "N", default_value_t = DEFAULT_DETAIL)]
     detail: u32,
-    /// Texels of the sky on each side
+    /// Width and height of the sky in texels
     #[arg(long, value_name = "N", default_value_t = 1024)]
     resolution: usize,
 }

@@ -37,7 +37,7 @@ pub(super) fn run(args: &InfoArgs) -> anyhow::Result<ExitCode> {
     Ok(ExitCode::SUCCESS)
 }
 
-/// Everything that is worth knowing of a scene, as JSON.
+/// Contents, memory and settings of a scene, as JSON.
 fn facts(job: &RenderJob) -> Value {
     let scene = &job.world.scene;
     let set = &scene.geometry;

@@ -1,7 +1,7 @@
 //! The command line: one file per subcommand.
 //!
-//! Exit codes: 0 success, 130 a rendering that Ctrl-C ended and that was written, 1 the command ran and says no
-//! (`crosscheck` found a disagreement, `compare` a number beyond a limit), 2 bad usage, 3 bad input or failed output.
+//! Exit codes: 0 success, 1 a check failed (`crosscheck` found a disagreement, `compare` a number beyond a limit),
+//! 2 wrong usage, 3 bad input or failed output, 130 a rendering stopped by Ctrl-C, which was written nevertheless.
 
 mod args;
 mod bench;
@@ -28,24 +28,24 @@ struct Cli {
 
 #[derive(Debug, Subcommand)]
 enum Command {
-    /// Render a scene to images
+    /// Render a scene
     Render(args::RenderArgs),
-    /// Compare images with a reference, in numbers and on a page
+    /// Compare images with a reference, by metrics and on an HTML page
     Compare(compare::CompareArgs),
     /// Compare Embree with the pure-Rust BVH, ray by ray and image by image
     Crosscheck(crosscheck::CrosscheckArgs),
     /// Measure the stages of the renderer
     #[command(allow_missing_positional = true)]
     Bench(bench::BenchArgs),
-    /// Say what a scene holds, what it costs, and what of it was not understood
+    /// List the contents, memory and unsupported features of a scene
     Info(info::InfoArgs),
-    /// Render and measure the figures of a paper again, as a page with images
+    /// Reproduce the figures of a paper by rendering and measuring, as an HTML page
     Reproduce(reproduce::ReproduceArgs),
-    /// Make a statue, a sky, or the scenes of talbot, fan and keller-wald
+    /// Generate a statue, a sky, or the scenes of talbot, fan and keller-wald
     Generate(generate::GenerateArgs),
 }
 
-/// Parses the command line, runs, and says how it went.
+/// Parses the command line, runs the command, and returns the exit code.
 pub(crate) fn run() -> ExitCode {
     let cli = Cli::parse();
     let result = match &cli.command {

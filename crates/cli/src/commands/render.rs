@@ -17,9 +17,9 @@ use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::time::Duration;
 
-/// File types that hold what a display shows.
+/// File types for display-referred images.
 const DISPLAY_TYPES: [&str; 6] = ["png", "jpg", "jpeg", "tif", "tiff", "tga"];
-/// Exit code of a rendering that Ctrl-C ended, as shells have it.
+/// Exit code of a rendering that was stopped by Ctrl-C, as in shells.
 pub(super) const INTERRUPTED: u8 = 130;
 
 pub(super) fn run(args: &RenderArgs) -> anyhow::Result<ExitCode> {
@@ -51,7 +51,7 @@ pub(super) fn run(args: &RenderArgs) -> anyhow::Result<ExitCode> {
     Ok(if interrupted { ExitCode::from(INTERRUPTED) } else { ExitCode::SUCCESS })
 }
 
-/// Ctrl-C sets `stop`, which ends a rendering in good order; a second one ends the program.
+/// Ctrl-C sets `stop`, which ends a rendering in an orderly way; a second one ends the program.
 pub(super) fn stop_at_ctrl_c(stop: &Arc<AtomicBool>) -> anyhow::Result<()> {
     let handler = Arc::clone(stop);
     ctrlc::set_handler(move || {
@@ -78,16 +78,16 @@ fn extension(path: &Path) -> String {
     path.extension().unwrap_or_default().to_string_lossy().to_lowercase()
 }
 
-/// Refuses what cannot be written before an hour is spent on rendering it.
+/// Rejects outputs that cannot be written, before time is spent on rendering.
 fn check_outputs(outputs: &[PathBuf]) -> anyhow::Result<()> {
     for path in outputs {
         let kind = extension(path);
         if kind != "exr" && !DISPLAY_TYPES.contains(&kind.as_str()) {
-            bail!("{}: the image can be written as .exr, .{}", path.display(), DISPLAY_TYPES.join(", ."));
+            bail!("{}: the output format must be .exr, .{}", path.display(), DISPLAY_TYPES.join(", ."));
         }
         let folder = path.parent().filter(|p| !p.as_os_str().is_empty()).unwrap_or(Path::new("."));
         if !folder.is_dir() {
-            bail!("{}: there is no folder {}", path.display(), folder.display());
+            bail!("{}: folder {} does not exist", path.display(), folder.display());
         }
     }
     Ok(())
@@ -213,7 +213,7 @@ fn report(args: &RenderArgs, rendering: &Rendering, outputs: &[PathBuf]) {
     ));
     if let Some(c) = &rendering.cache {
         progress::say(&format!(
-            "irradiance cache: {} records in {:.1} s, {:.2} % of {} lookups found none",
+            "irradiance cache: {} records in {:.1} s, {:.2} % cache misses in {} lookups",
             c.records,
             c.build.elapsed.as_secs_f64(),
             100.0 * c.lookups.misses as f64 / c.lookups.lookups.max(1) as f64,
@@ -222,7 +222,7 @@ fn report(args: &RenderArgs, rendering: &Rendering, outputs: &[PathBuf]) {
     }
     if let Some(p) = &rendering.photons {
         progress::say(&format!(
-            "photon maps: {} global and {} caustic photons of {} photon paths in {:.1} s, {:.1} MB{}",
+            "photon maps: {} global and {} caustic photons from {} photon paths in {:.1} s, {:.1} MB{}",
             p.global,
             p.caustic,
             p.paths,
@@ -233,6 +233,6 @@ fn report(args: &RenderArgs, rendering: &Rendering, outputs: &[PathBuf]) {
     }
     let invalid: u64 = rendering.film.pixels.iter().map(|p| p.invalid).sum();
     if invalid > 0 {
-        progress::say(&format!("warning: {invalid} samples were not finite and count as black"));
+        progress::say(&format!("warning: {invalid} samples were not finite and were counted as black"));
     }
 }

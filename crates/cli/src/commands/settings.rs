@@ -1,4 +1,4 @@
-//! From typed options to what a rendering works on.
+//! From command-line options to a render job.
 
 use super::args::SceneArgs;
 use super::progress;
@@ -11,7 +11,7 @@ use lumiris::scene::RenderJob;
 use lumiris::settings::{Proposals, SampleCounts, StageTimes};
 use std::time::Instant;
 
-/// Seconds of what happens before the first ray.
+/// Times before the first ray is traced (s).
 #[derive(Clone, Copy, Debug)]
 pub(super) struct SetupTimes {
     /// Reading files.
@@ -20,7 +20,7 @@ pub(super) struct SetupTimes {
     pub build: f64,
 }
 
-/// Loads the scene and applies the options; says what there is to warn of.
+/// Loads the scene and applies the options; prints warnings.
 fn load_scene(args: &SceneArgs) -> anyhow::Result<Loaded> {
     let options = LoadOptions { resolution: args.resolution, crop: args.crop };
     let mut loaded = match load(&args.scene, &options) {
@@ -39,7 +39,7 @@ fn load_scene(args: &SceneArgs) -> anyhow::Result<Loaded> {
         loaded.scene.film.filter = PixelFilter::Box { rx: 0.5, ry: 0.5 };
     }
     if loaded.settings.integrator.leaves_lights_out() {
-        progress::say("warning: without samples on the lights that no photon came from, direct light is biased");
+        progress::say("warning: without samples on non-contributing lights, direct light is biased");
     }
     Ok(loaded)
 }
@@ -56,14 +56,14 @@ pub(super) fn load_job(args: &SceneArgs) -> anyhow::Result<(RenderJob, SetupTime
     Ok((job, SetupTimes { load, build: start.elapsed().as_secs_f64() }))
 }
 
-/// Chooses the numbers of samples and proposals that are still open, and says what it chose unless `quiet`.
+/// Chooses the sample counts that are still open, and prints them unless `quiet`.
 pub(super) fn plan(args: &SceneArgs, job: &mut RenderJob, ratio_map: bool, quiet: bool) -> anyhow::Result<()> {
     let threads = args.threads.map(|t| t as usize);
     if let (Some(plan), false) = (prepare(job, threads, ratio_map)?, quiet) {
         let SampleCounts { samples, proposals } = plan.sample_counts;
         let StageTimes { t1, t2 } = plan.times;
         let is_optimal = job.settings().integrator.ris.proposals == Proposals::Optimal;
-        let by_pixel = if is_optimal { ", split anew in each pixel" } else { "" };
+        let by_pixel = if is_optimal { ", chosen anew in each pixel" } else { "" };
         progress::say(&format!(
             "ris: {samples} of {proposals} proposals are traced{by_pixel} (a proposal takes {t1} ns, a sample {t2} ns)"
         ));
@@ -71,7 +71,7 @@ pub(super) fn plan(args: &SceneArgs, job: &mut RenderJob, ratio_map: bool, quiet
     Ok(())
 }
 
-/// How the options say to render.
+/// Render settings from the options.
 pub(super) fn render_settings(args: &SceneArgs, job: &RenderJob) -> RenderSettings {
     RenderSettings {
         threads: args.threads.map(|t| t as usize),

@@ -6,17 +6,17 @@ use lumiris::settings::Settings;
 use lumiris::settings::table::{GROUPS, Setting, rows};
 use lumiris::settings::value::{Integers, Kind, Value};
 
-/// The settings that were typed, in the order of the table.
+/// The settings given as options, in the order of the table.
 #[derive(Clone, Debug, Default)]
 pub(super) struct SettingsArgs {
     typed: Vec<(&'static Setting, Value)>,
 }
 
 impl SettingsArgs {
-    /// Puts them in.
+    /// Applies them.
     pub(super) fn apply(&self, settings: &mut Settings) {
         for (row, value) in &self.typed {
-            (row.set)(settings, *value).expect("the parser of a setting lets through what its kind is");
+            (row.set)(settings, *value).expect("the parser of a setting accepts only values of its kind");
         }
     }
 }
@@ -57,13 +57,13 @@ fn option(row: &'static Setting) -> Arg {
     }
 }
 
-/// What the option does, its range, and its default.
+/// The help of an option, with its range and its default.
 fn help(row: &Setting) -> String {
     let range = match row.kind {
         Kind::Integer { range: Integers::ALL, .. } => String::new(),
         Kind::Integer { range, .. } => format!("{range}; "),
         Kind::Real { range, .. } => format!("{range}; "),
-        // They are listed, or part of the sentence
+        // These are listed, or part of the sentence
         Kind::Choice { .. } | Kind::Pair { .. } | Kind::Graded { .. } | Kind::Bytes => String::new(),
     };
     format!("{} [{range}default: the file's, or {}]", row.help, row.default_text())

@@ -94,7 +94,7 @@ fn numbers_that_ris_chose_give_the_same_image_when_they_are_given() {
         (stderr(&output), read_image(&folder.path().join(name), &ReadLimits::default()).unwrap())
     };
     let (said, chosen) = render("chosen.exr", &["--estimator", "ris", "--proposals", "optimal"]);
-    assert!(said.contains("ris: 4 of ") && said.contains("split anew in each pixel"), "{said}");
+    assert!(said.contains("ris: 4 of ") && said.contains("chosen anew in each pixel"), "{said}");
     assert!(chosen.image.channels.iter().any(|c| c == "ratio.proposals"), "{:?}", chosen.image.channels);
 
     let value = |key: &str| chosen.metadata[&format!("lumiris:{key}")].clone();

@@ -1,5 +1,5 @@
-//! What the table promises: metadata, given back on the command line or in a scene file, are the settings that they
-//! came from.
+//! What the table promises: metadata given back on the command line or in a scene file yield the settings they came
+//! from.
 
 use super::*;
 use lumiris::import::{LoadOptions, load};
@@ -45,7 +45,7 @@ fn values(kind: &Kind) -> Vec<Value> {
     texts.iter().map(|text| kind.parse(text).unwrap()).collect()
 }
 
-/// Settings of an image that `row` can change.
+/// Settings of an image that `row` affects.
 fn where_it_applies(row: &Setting) -> Settings {
     for kind in IntegratorKind::VARIANTS {
         for estimator in EstimatorKind::VARIANTS {
@@ -61,7 +61,7 @@ fn where_it_applies(row: &Setting) -> Settings {
     panic!("--{} applies to no image", row.flag)
 }
 
-/// `settings` with the renderer's choices as if they had been asked for.
+/// `settings` with the renderer's choices made explicit.
 fn resolved(mut settings: Settings) -> Settings {
     for row in rows() {
         if let Some(value) = row.resolved.filter(|_| row.applies.to(&settings)).and_then(|resolved| resolved(&settings))
@@ -72,7 +72,7 @@ fn resolved(mut settings: Settings) -> Settings {
     settings
 }
 
-/// Every value of every setting, in an image that it changes.
+/// Every value of every setting, in an image that it affects.
 fn cases() -> impl Iterator<Item = (&'static Setting, Settings)> {
     rows().flat_map(|row| {
         values(&row.kind).into_iter().map(move |value| {
@@ -158,7 +158,7 @@ fn old_names_mean_what_they_meant() {
     assert!(names > 20, "{names}");
 }
 
-/// Settings as metadata have them: nothing is said of what the image does not depend on.
+/// Settings as recorded in metadata: those that the image does not depend on are at their defaults.
 fn at_default_where_nothing_depends_on_it(settings: Settings) -> Settings {
     let mut recorded = Settings::default();
     for row in rows().filter(|row| row.applies.to(&settings)) {
@@ -196,7 +196,7 @@ fn options_out_of_range_are_errors_that_say_what_is_expected() {
     for (option, message) in [
         ("--samples=0", "expected a whole number from 1 to 4096, or auto"),
         ("--progressive=1", "expected a number above 0 and below 1, or off"),
-        ("--cache-radius=5,2", "two positive numbers of pixels with a comma between them, the least one first"),
+        ("--cache-radius=5,2", "two positive numbers of pixels separated by a comma, the smaller one first"),
         ("--stage-times=1", "expected two positive numbers of nanoseconds"),
         ("--importance=floor:2", "expected none, floor:E or cut-off:E, E being above 0 and up to 1"),
         ("--estimator=magic", "possible values: mc, mis, ris"),
