@@ -1,8 +1,8 @@
-# `make run` sets up a fresh Debian machine and renders a picture; `make test` sets it up and runs every test.
+# `make run` sets up a fresh Debian machine and renders an image; `make test` sets it up and runs all tests.
 
 CARGO ?= $(shell command -v cargo || echo $(HOME)/.cargo/bin/cargo)
 PACKAGES = build-essential pkg-config libembree-dev libopenimageio-dev
-# What the tests need besides: a browser for the pages that `compare` writes.
+# Additional packages of the tests: a browser for the pages that `compare` writes.
 TEST_PACKAGES = chromium
 SCENE = scenes/demo/gallery.pbrt
 
@@ -11,28 +11,31 @@ SCENE = scenes/demo/gallery.pbrt
 run: setup
 	$(CARGO) build --release
 	target/release/lumiris render $(SCENE) -o gallery.png -o gallery.exr
-	@echo "The picture is in gallery.png and gallery.exr."
+	@echo "The image is in gallery.png and gallery.exr."
 
 test: setup
 	@.ci/setup.sh $(TEST_PACKAGES)
 	$(CARGO) test --workspace --doc
 	$(CARGO) test --workspace --lib --bins --tests
 
-# Scenes with known answers at full power: as many samples as find a bias of 2 % (of 0.5 % in quiet scenes), the injection of
-# that bias, and the table of what each row finds. `make test` does the same with a sixth of the samples or less.
+# Analytic scenes at full power: enough samples to detect a bias of 2 % (0.5 % in scenes with little noise), the
+# injection of that bias, and the table of what each row detects. `make test` does the same with a sixth of the samples
+# or less.
 test-power: setup
 	$(CARGO) test -p lumiris --test it -- --ignored --nocapture known_answer_at_full_power
 
-# The same; counts the samples of each row anew, and writes docs/measurements/power/rows.csv, by which both tests go.
+# The same; determines the number of samples of each row anew, and writes docs/measurements/power/rows.csv, which both
+# targets use.
 measure-power: setup
 	MEASURE_POWER=1 $(CARGO) test -p lumiris --test it -- --ignored --nocapture known_answer_at_full_power
 
-# Builds in a fresh Debian 13 (on Debian 13: a fresh Debian 12) and compares images with the committed hashes; needs root.
+# Builds in a fresh Debian 13 (on Debian 13: a fresh Debian 12) and compares images with the committed hashes; needs
+# root.
 test-debian13: setup
 	@.ci/setup.sh debootstrap
 	@PACKAGES="$(PACKAGES)" .ci/other-debian.sh
 
-# Installs what is missing; does nothing, and needs no rights, where everything is there.
+# Installs missing packages; if there are none, does nothing and needs no privileges.
 setup:
 	@.ci/setup.sh $(PACKAGES)
 
@@ -43,7 +46,8 @@ lint: setup
 doc: setup
 	RUSTDOCFLAGS="-D warnings -A rustdoc::private-intra-doc-links" $(CARGO) doc --workspace --no-deps --document-private-items
 
-# The committed Embree bindings are what bindgen makes of the installed headers, and headers that none fits are told.
+# Checks that the committed Embree bindings are what bindgen makes of the installed headers, and that headers which none
+# of them fits are reported.
 bindings: setup
 	@.ci/setup.sh libclang-dev
 	$(CARGO) test --package embree4-sys --features generate-bindings
