@@ -1,8 +1,8 @@
-//! Estimates that measure samples against the components of their mixture: `ocv` and `optimal-mis`.
+//! Estimators that use the densities of the components of their mixture at each sample: `ocv` and `optimal-mis`.
 //!
-//! After T2, the samples of a point become sums of normal equations in the columns c_j = h_j/p_α − I_j, whose expectation
-//! is 0, and in y = f·V/p_α. The estimate is ȳ − Σ_j β_j c̄_j [Fan et al. 2006, Eq. 7]; forms differ in what β is fitted to.
-//! `optimal-mis` has its systems in the columns r_j = h_j/p_α, and the form of the paper in r_j/I_j.
+//! After T2, the samples of a point are accumulated into normal equations in the columns c_j = h_j/p_α − I_j, whose
+//! expectation is 0, and y = f·V/p_α. The estimate is ȳ − Σ_j β_j c̄_j [Fan et al. 2006, Eq. 7]; the forms differ in
+//! what β is fitted to. The systems of `optimal-mis` have the columns r_j = h_j/p_α, that of the paper's form r_j/I_j.
 
 use super::ShadingPoint;
 use super::mixture::Columns;
@@ -15,10 +15,10 @@ use lumiris_numbers::estimators::ocv::{Form, NormalEquations, System};
 use lumiris_numbers::estimators::optimal_mis;
 use lumiris_numbers::math::Rgb;
 
-/// Domain below the stream of a shading point: half h of its samples uses `HALF + h`.
+/// Random-number domain of a shading point: half h of its samples uses `HALF + h`.
 const HALF: u32 = 32;
 
-/// What columns a system is of, and how it is solved.
+/// The columns of a system, and how it is solved.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 enum Method {
     /// c_j = r_j − I_j.
@@ -40,7 +40,7 @@ impl Method {
         }
     }
 
-    /// The system that is solved for each row of sums.
+    /// The system solved for each row of sums.
     fn system(self) -> Option<System> {
         match self {
             Method::Ocv(form @ (Form::Paper | Form::Regression | Form::Crossfit)) => Some(form.system()),
@@ -48,7 +48,7 @@ impl Method {
         }
     }
 
-    /// How many rows of sums an estimate has.
+    /// Number of rows of sums per estimate.
     fn rows(self) -> usize {
         match self {
             Method::Ocv(form) => form.rows(),
@@ -56,7 +56,7 @@ impl Method {
         }
     }
 
-    /// Makes sums of the method's columns of those of r_j.
+    /// Converts sums over r_j to sums over the method's columns.
     fn finish(self, equations: NormalEquations, sums: &mut [f32], integrals: &Columns) {
         match self {
             Method::Ocv(form) => form.finish(equations, sums, integrals),
@@ -65,10 +65,10 @@ impl Method {
     }
 }
 
-/// Fits that estimates take part in: sums so far, and coefficients for those to come.
+/// Fits shared by estimates: the sums so far, and coefficients for later estimates.
 ///
-/// An estimate uses the coefficients of its fit and adds its samples to the sums; [`Self::solve`] begins a new block with
-/// coefficients that are fitted to all sums. What is estimated after that must be independent of what was before.
+/// An estimate uses the coefficients of its fit and adds its samples to the sums; [`Self::solve`] begins a new block
+/// with coefficients fitted to all sums. Later estimates must be independent of earlier ones.
 #[derive(Clone, Debug)]
 pub struct Fits {
     equations: NormalEquations,
@@ -98,19 +98,20 @@ impl Fits {
         }
     }
 
-    /// True if there are none: estimates are then those without coefficients.
+    /// True if there are none: estimates then use no coefficients.
     pub fn is_empty(&self) -> bool {
         self.sums.is_empty()
     }
 
-    /// Begins a block. Returns the number of fits whose system is ill-conditioned; without a solution, estimates are those of MIS.
+    /// Begins a block. Returns the number of fits whose system is ill-conditioned; without a solution, estimates are
+    /// those of MIS.
     pub fn solve(&mut self) -> u64 {
         if !self.is_optimal {
             return self.equations.solve(Form::Progressive.system(), &self.sums, &mut self.beta) as u64;
         }
         let betas = self.beta.chunks_mut(self.equations.coefficients().max(1));
         let fits = self.sums.chunks(self.equations.len()).zip(betas);
-        // Pixels that met no surface have nothing to solve
+        // Pixels without a surface have nothing to solve
         let lit = fits.filter(|(sums, _)| self.equations.samples(sums) > 0.0);
         lit.map(|(sums, beta)| u64::from(optimal_mis::coefficients(self.equations, sums, beta) != Ok(0))).sum()
     }
@@ -135,15 +136,15 @@ pub struct Components {
     is_hidden: Vec<bool>,
     sums: Vec<f32>,
     beta: Vec<f32>,
-    /// Systems that were to be solved.
+    /// Systems solved or found to have no solution.
     pub systems: u64,
-    /// Those without solution, whose estimates are those of MIS, and those whose columns were dropped.
+    /// Those without a solution, for which the MIS estimate is used, and those with dropped columns.
     pub ill_conditioned: u64,
-    /// Rays traced among emitters to find out what hides behind one.
+    /// Rays traced against emitters to find light samples hidden by another emitter.
     pub emitter_rays: u64,
 }
 
-/// Both halves of every point's samples, as points with random numbers of their own, one after the other.
+/// Both halves of every point's samples, one after the other, as points with separate random numbers.
 pub(super) fn halves<'a>(points: &[ShadingPoint<'a>]) -> Vec<ShadingPoint<'a>> {
     let half = |point: &ShadingPoint<'a>, h: u32| {
         let samples = (point.sample_counts.samples + 1 - h) / 2;
@@ -154,8 +155,8 @@ pub(super) fn halves<'a>(points: &[ShadingPoint<'a>]) -> Vec<ShadingPoint<'a>> {
 }
 
 impl Components {
-    /// The estimates of all points from their traced candidates; `out[i]` belongs to `points[i]`, or to both halves of a point,
-    /// `points[2i]` and `points[2i + 1]`, where the form has halves.
+    /// The estimates of all points from their traced candidates; `out[i]` belongs to `points[i]`, or to both halves of
+    /// a point, `points[2i]` and `points[2i + 1]`, where the form has halves.
     pub(super) fn resolve(
         &mut self,
         job: &RenderJob,
@@ -171,7 +172,7 @@ impl Components {
         let method = Method::new(settings);
         self.gather(equations, method, candidates, contributions);
 
-        // β of the forms that have it from these samples
+        // β of the forms that fit it to these samples
         let (len, width) = (equations.len(), equations.coefficients());
         self.beta.clear();
         if let Some(system) = method.system() {
@@ -213,7 +214,8 @@ impl Components {
         }
     }
 
-    /// Finds which samples are free, and takes the density of BSDF sampling from those that an emitter hides.
+    /// Determines which samples are unoccluded, and sets the density of BSDF sampling to zero for those hidden by an
+    /// emitter.
     fn find_hidden(
         &mut self,
         job: &RenderJob,

@@ -1,18 +1,20 @@
-//! Direct light by the lights that photons say are seen, 𝓛_con, and by all others [Keller and Wald 2000, §3].
+//! Direct light sampled separately from the contributing lights 𝓛_con, which the visibility cache finds, and from all
+//! others [Keller and Wald 2000, §3].
 //!
-//! S_con samples are on 𝓛_con:
+//! S_con samples are taken on 𝓛_con:
 //!
-//! * |𝓛_con| ≤ S_con: every light has one, and those that are left are given to the lights by their emission area. The sum of
-//!   the lights' estimates is the estimate. An infinite light has the area of the disk that its photons start from; lights at a
-//!   point and distant ones have no area, and never a second sample.
-//! * |𝓛_con| > S_con: every light makes an unshadowed contribution k_l, and these are put in order [Ward 1991]. The S_con − 1
-//!   brightest are traced. Ward estimates the sum of the rest by the visibility of those; here one of them is traced, chosen with the
-//!   probability q_l = Y(k_l)/Σ Y(k) by luminance Y, and counts k_l/q_l. Its expectation is the sum of what is seen of the rest, so
-//!   the estimate is unbiased.
-//! * |𝓛_con| > [`MAX_ORDERED`]: S_con lights are chosen in proportion to the number of their photons.
+//! * |𝓛_con| ≤ S_con: every light gets one sample, and the remaining ones are allocated by emission area. The estimate
+//!   is the sum of the lights' estimates. The area of an infinite light is that of the disk from which its photons
+//!   start; point, spot and distant lights have no area and never get a second sample.
+//! * |𝓛_con| > S_con: the unshadowed contributions k_l of all these lights are sorted [Ward 1991]. The S_con − 1
+//!   largest are traced. Ward estimates the sum of the others from the visibility of those traced; here one of the
+//!   others is traced, chosen with probability q_l = Y(k_l)/Σ Y(k) by luminance Y, and counts k_l/q_l. Its expectation
+//!   is the sum of their shadowed contributions, so the estimate is unbiased.
+//! * |𝓛_con| > [`MAX_ORDERED`]: S_con lights are chosen in proportion to their numbers of photons.
 //!
-//! S_non samples are on the others: a light chosen uniformly of the n that have power counts n times, Eq. 1 of the paper. Without
-//! these (S_non = 0) the estimate is biased. Where nothing is known all S_con + S_non are drawn as `mc` draws them.
+//! S_non samples are taken on the non-contributing lights: a light chosen uniformly among the n that emit counts n
+//! times [Eq. 1 of the paper]. Without these samples (S_non = 0) the estimate is biased. Where the cache is empty, all
+//! S_con + S_non samples are drawn as by `mc`.
 
 use super::ShadingPoint;
 use super::propose::{Candidate, SampleAllocation, domain, light_candidate, unshadowed_candidate};
@@ -21,21 +23,21 @@ use crate::scene::RenderJob;
 use lumiris_numbers::math::cumulative;
 use std::f32::consts::PI;
 
-/// Most lights that are put in order at a point.
+/// Maximum number of lights that are sorted at a point.
 pub const MAX_ORDERED: usize = 64;
 
 /// The stage's buffers.
 #[derive(Debug, Default)]
 pub struct Contributing {
-    /// 𝓛_con, ascending: lights with their numbers of photons.
+    /// 𝓛_con: lights and their photon counts, ids ascending.
     contributing: Vec<(LightId, u32)>,
-    /// Samples of each.
+    /// Samples per light.
     counts: Vec<u32>,
-    /// Contributions by brightness.
+    /// Contributions sorted by luminance.
     ordered: Vec<(f32, Candidate)>,
 }
 
-/// A point with the lights that are sampled from it.
+/// A point and the lights that are sampled from it.
 struct At<'a> {
     lights: &'a LightSampling,
     index: u32,
@@ -44,7 +46,7 @@ struct At<'a> {
 }
 
 impl At<'_> {
-    /// A sample of one light that is chosen with the probability `pmf`, of `n` that are drawn in this way.
+    /// A sample of a light chosen with probability `pmf`, one of `n` drawn in this way.
     fn sample(&self, light: LightId, pmf: f32, n: u32, u: [f32; 2]) -> Option<Candidate> {
         let sample = self.lights.lights[light as usize].sample_li(&self.ctx, u)?;
         let drawn = (light, LightSample { pdf: sample.pdf * pmf, ..sample });
@@ -53,8 +55,7 @@ impl At<'_> {
 }
 
 impl Contributing {
-    /// Draws the light samples of a point, `noncontributing` of them on non-contributing lights. Returns how many were
-    /// drawn.
+    /// Draws the light samples of a point, `noncontributing` of them on non-contributing lights. Returns their number.
     pub(super) fn draw(
         &mut self,
         job: &RenderJob,
@@ -83,7 +84,7 @@ impl Contributing {
         drawn + self.draw_noncontributing(&at, noncontributing, records)
     }
 
-    /// At least one sample of every light that is seen.
+    /// At least one sample of every contributing light.
     fn draw_each(&mut self, at: &At<'_>, n: u32, records: &mut Vec<Candidate>) -> u32 {
         let contributing = &self.contributing;
         let areas = contributing.iter().map(|&(light, _)| emission_area(at.lights, light));
@@ -97,7 +98,7 @@ impl Contributing {
         self.counts.iter().sum()
     }
 
-    /// The brightest contributions, and one of the others.
+    /// The largest contributions, and one of the others.
     fn draw_ordered(&mut self, at: &At<'_>, n: u32, records: &mut Vec<Candidate>) -> u32 {
         self.ordered.clear();
         for (k, &(light, _)) in self.contributing.iter().enumerate() {
@@ -105,13 +106,13 @@ impl Contributing {
             let candidate = at.sample(light, 1.0, 1, u);
             self.ordered.extend(candidate.map(|c| (c.f.luminance() / c.p_light, c)));
         }
-        // The sort is stable: equal ones stay in the order of their lights
+        // The sort is stable: equal contributions stay in the order of their lights
         self.ordered.sort_by(|a, b| b.0.total_cmp(&a.0));
         let sure = self.ordered.len().min(n as usize - 1);
         let (brightest, dim) = self.ordered.split_at(sure);
         records.extend(brightest.iter().map(|(_, c)| *c));
 
-        // One of the rest, with the probability of its brightness
+        // One of the others, in proportion to its luminance
         let total: f32 = dim.iter().map(|(brightness, _)| brightness).sum();
         let [u] = at.point.stream.domain(domain::DIM).draw::<1>();
         let mut x = u * total;
@@ -124,9 +125,9 @@ impl Contributing {
         self.contributing.len() as u32
     }
 
-    /// Lights by the number of their photons.
+    /// Lights chosen in proportion to their numbers of photons.
     fn draw_by_photons(&mut self, at: &At<'_>, n: u32, records: &mut Vec<Candidate>) -> u32 {
-        // Sums up to and with each light, in place of the numbers
+        // Cumulative photon counts
         let numbers = self.contributing.iter().map(|&(_, count)| count);
         self.counts.clear();
         self.counts.extend(numbers.scan(0_u32, |sum, count| {
@@ -143,7 +144,7 @@ impl Contributing {
         n
     }
 
-    /// Non-contributing lights, uniformly.
+    /// Samples of non-contributing lights, chosen uniformly.
     fn draw_noncontributing(&self, at: &At<'_>, noncontributing: u32, records: &mut Vec<Candidate>) -> u32 {
         let lit = &at.lights.lit;
         let others = lit.len() - self.contributing.len();
@@ -153,7 +154,7 @@ impl Contributing {
         for i in 0..noncontributing {
             let [u_choice, u0, u1] = at.point.stream.split(domain::NONCONTRIBUTING, noncontributing, i).draw::<3>();
             let mut place = ((f64::from(u_choice) * others as f64) as usize).min(others - 1);
-            // Those that are seen are passed over
+            // Skip the contributing lights
             for &(light, _) in &self.contributing {
                 if lit[place] < light {
                     break;
@@ -166,7 +167,7 @@ impl Contributing {
     }
 }
 
-/// Samples of lights as `mc` draws them.
+/// Light samples drawn as by `mc`.
 fn draw_by_choice(job: &RenderJob, at: &At<'_>, n: u32, records: &mut Vec<Candidate>) {
     for i in 0..n {
         let [u_choice, u0, u1] = at.point.stream.split(domain::LIGHT, n, i).draw::<3>();
@@ -177,7 +178,7 @@ fn draw_by_choice(job: &RenderJob, at: &At<'_>, n: u32, records: &mut Vec<Candid
     }
 }
 
-/// Emission area of a light (m²); 0 if more than one sample of it is of no use.
+/// Emission area of a light (m²); 0 if a second sample of it would be useless.
 fn emission_area(lights: &LightSet, light: LightId) -> f32 {
     match &lights.lights[light as usize] {
         Light::Point { .. } | Light::Spot { .. } | Light::Distant { .. } => 0.0,
@@ -186,7 +187,8 @@ fn emission_area(lights: &LightSet, light: LightId) -> f32 {
     }
 }
 
-/// One for each, and `extra` in proportion to the areas, rounded so that sums are off by less than one.
+/// One sample per light plus `extra` in proportion to the areas, rounded so that cumulative counts are off by less than
+/// one.
 fn allocate_by_area(extra: u32, areas: impl Iterator<Item = f32> + Clone, counts: &mut Vec<u32>) {
     let total: f64 = areas.clone().map(f64::from).sum();
     let scale = if total > 0.0 && total.is_finite() { f64::from(extra) / total } else { 0.0 };

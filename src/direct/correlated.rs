@@ -1,23 +1,24 @@
-//! Combined correlated and importance sampling [Szécsi, Sbert and Szirmay-Kalos 2004]: all N samples of a point come from one
-//! technique, of density p, and are also samples of a control variate g whose integral G is known.
+//! Combined correlated and importance sampling [Szécsi, Sbert and Szirmay-Kalos 2004]: all N samples of a point are
+//! drawn by one technique with density p, and are also samples of a control variate g whose integral G is known.
 //!
-//! g(wi) = (1/π) Σ L̄ cos θ over the lights that wi crosses, G = E/π: what a Lambertian surface of albedo 1 would reflect to wo if nothing
-//! were in the way, not even another light, and every light had its mean radiance L̄. θ is the angle to the shading normal on the
-//! side of wo, and g = 0 on the other side. [`crate::lights::irradiance`] tells which lights take part; the others are in no g.
-//! The estimate is ȳ − λ c̄ with y = f·V/p and c = g/p − G, see [`lumiris_numbers::estimators::correlated`].
+//! g(wi) = (1/π) Σ L̄ cos θ over the lights that the ray towards wi crosses, G = E/π: the radiance that a Lambertian
+//! surface of albedo 1 would reflect to wo if all lights were unoccluded, even by one another, and had their mean
+//! radiance L̄ everywhere. θ is measured from the shading normal on the side of wo, and g = 0 on the other side.
+//! [`crate::lights::irradiance`] decides which lights take part; the others do not contribute to g. The estimate is ȳ −
+//! λ c̄ with y = f·V/p and c = g/p − G, see [`lumiris_numbers::estimators::correlated`].
 //!
-//! * **BSDF sampling.** g is summed over all lights along the ray. E(c) = 0 asks for p > 0 wherever g > 0, and a useful variance for a
-//!   bounded g/p. Both hold for BSDFs that sample a cosine or uniform lobe on the side of wo with a probability of at least
-//!   [`MIN_WIDE_LOBE`] ([`crate::bsdfs::Bsdf::wide_lobe`]): diffuse, most coated and layered ones, and those that are only
-//!   evaluated. Mirror directions of a smooth coat are samples of g = 0. Of all others (metal, glass) the density of a peak is next to
-//!   nothing in most of the hemisphere; they have g = 0 everywhere, which leaves importance sampling. Delta lights have
-//!   samples of their own, one of four and at least one, whose estimate is added; a single sample decides by itself which of both it
-//!   is.
-//! * **Light sampling.** The domain is that of points on lights: a sample has the g of its own light, and p includes the choice of
-//!   that light. It is positive wherever g is, whatever the BSDF. Delta lights are samples of g = 0. Specular lobes have
-//!   one BSDF sample of their own in addition; BSDFs that are nothing else are sampled by the BSDF.
+//! * **BSDF sampling.** g is summed over all lights along the ray. E(c) = 0 requires p > 0 wherever g > 0, and a useful
+//!   variance requires a bounded g/p. Both hold for BSDFs that sample a cosine or uniform lobe on the side of wo with a
+//!   probability of at least [`MIN_WIDE_LOBE`] ([`crate::bsdfs::Bsdf::wide_lobe`]): diffuse, most coated and layered
+//!   ones, and those that can only be evaluated. Mirror directions of a smooth coat are samples with g = 0. All other
+//!   BSDFs (metal, glass) have a negligible density over most of the hemisphere; for them g = 0 everywhere, which
+//!   leaves importance sampling. Delta lights have separate samples, one in four and at least one, whose estimate is
+//!   added; a single sample chooses at random which of the two it is.
+//! * **Light sampling.** The domain is the set of points on lights: a sample has the g of its own light, and p includes
+//!   the choice of that light. It is positive wherever g is, whatever the BSDF. Delta lights are samples with g = 0.
+//!   Specular lobes get one additional BSDF sample; BSDFs with specular lobes only are sampled by the BSDF.
 //!
-//! A sample whose integrand is zero counts with its g like any other.
+//! Zero-valued samples count with their g like any others.
 
 use super::ShadingPoint;
 use super::propose::{
@@ -34,9 +35,9 @@ use lumiris_numbers::math::{Ray, Rgb, Vec3};
 use std::f32::consts::FRAC_1_PI;
 use std::time::Instant;
 
-/// Least probability of a wide lobe for which BSDF samples have a control variate.
+/// Minimum probability of a wide lobe for which BSDF samples have a control variate.
 pub const MIN_WIDE_LOBE: f32 = 0.01;
-/// Of this many samples, one is drawn for delta lights.
+/// One in this many samples is drawn for delta lights.
 pub const DELTA_DIVISOR: u32 = 4;
 
 /// How the samples of a point are drawn.
@@ -45,7 +46,7 @@ struct Plan {
     technique: SamplingTechnique,
     /// Samples of the combination.
     n: u32,
-    /// Those that the technique draws; one less if the only one is of a delta light.
+    /// Samples drawn by the technique; one less if the only one is of a delta light.
     draws: u32,
     /// Probability that a sample of the combination is drawn by the technique.
     probability: f32,
@@ -87,7 +88,7 @@ impl Plan {
     }
 }
 
-/// The estimate of a point in the making.
+/// The estimate of a point while it is computed.
 #[derive(Clone, Copy, Debug)]
 struct Estimate {
     plan: Plan,
@@ -96,7 +97,7 @@ struct Estimate {
     /// Shading normal on the side of wo.
     n: Vec3,
     sums: [f32; SUMS],
-    /// Estimate of what is outside the combination.
+    /// Estimate of the light outside the combination.
     outside: Rgb,
 }
 
@@ -118,7 +119,7 @@ impl Estimate {
         Estimate { plan, integral, n, sums: [0.0; SUMS], outside: Rgb::BLACK }
     }
 
-    /// True if the direction `wi` has a g.
+    /// True if g can be positive in the direction `wi`.
     fn has_g(&self, wi: Vec3) -> bool {
         !self.integral.is_black() && self.n.dot(wi) > 0.0
     }
@@ -131,7 +132,7 @@ impl Estimate {
         (l * (self.n.dot(wi) * FRAC_1_PI / (self.plan.probability * pdf)) - self.integral).to_array()
     }
 
-    /// c of a sample of g = 0.
+    /// c of a sample with g = 0.
     fn without_g(&self) -> [f32; 3] {
         (self.integral * -1.0).to_array()
     }
@@ -156,7 +157,7 @@ pub struct Correlated {
 }
 
 impl Correlated {
-    /// Draws the samples of all points. Those whose integrand is zero are counted, the others become candidates.
+    /// Draws the samples of all points. Zero-valued ones are counted, the others become candidates.
     pub(super) fn propose(
         &mut self,
         job: &RenderJob,
@@ -258,7 +259,7 @@ impl Correlated {
         }
     }
 
-    /// BSDF samples, up to the question which lights they point at.
+    /// BSDF samples, before it is known which lights they point at.
     fn draw_bsdf(&mut self, index: usize, point: &ShadingPoint<'_>, candidates: &mut Candidates) {
         let estimate = &mut self.estimates[index];
         let plan = estimate.plan;
@@ -328,7 +329,7 @@ impl Correlated {
                     let at = (point.p, estimate.n);
                     self.crossed[i as usize] += job.irradiances.l(lights, light, at, pending.wi, surface.n);
                 }
-                // Behind a light that nothing can hide there is none that shines here
+                // Nothing behind an emitter that cannot be hidden contributes here
                 if job.world.emitters_hide() {
                     let o = offset_origin(surface.p, surface.p_error, surface.n, pending.wi);
                     self.next_rays.push(&Ray { o, d: pending.wi, t_max: f32::INFINITY, time: point.time });
@@ -340,8 +341,8 @@ impl Correlated {
         }
     }
 
-    /// The estimates of all points from their traced candidates; `out[i]` belongs to `points[i]`, or to both halves of a point,
-    /// `points[2i]` and `points[2i + 1]`, where the form has halves.
+    /// The estimates of all points from their traced candidates; `out[i]` belongs to `points[i]`, or to both halves of
+    /// a point, `points[2i]` and `points[2i + 1]`, where the form has halves.
     pub(super) fn resolve(
         &mut self,
         form: CorrelatedForm,
@@ -369,7 +370,8 @@ impl Correlated {
                     Rgb::from_array(correlated::combined(&e.sums)) + e.outside
                 }
                 CorrelatedForm::Crossfit => {
-                    // What is outside has the weights of the halves too: where one of them is a single sample, nothing is outside of that
+                    // What is outside has the weights of the halves too: where one of them is a single sample, nothing
+                    // is outside of that
                     let [a, b] = [&self.estimates[2 * i], &self.estimates[2 * i + 1]];
                     let [n, m] = [a, b].map(|e| e.plan.n as f32);
                     let outside = (a.outside * n + b.outside * m) / (n + m).max(1.0);

@@ -1,13 +1,14 @@
-//! The mixture of densities that a point's samples are drawn from, and what each sample says of its components.
+//! The mixture of densities from which a point's samples are drawn, and the densities of its components at each sample.
 //!
-//! A sample is a direction together with the point on an emitter that it means, or with none. Its components are the lobes
-//! of the BSDF and the groups of lights, with densities h_j whose integrals I_j are known: the probabilities of a lobe or of
-//! a group within its technique. So p_α = (n_L/N) Σ_groups h_j + (n_B/N) Σ_lobes h_j, and the columns r_j = h_j/p_α have the
-//! expectation I_j under the mixture, exactly. For that
+//! A sample is a direction together with the point on an emitter that it refers to, or with none. The components are
+//! the lobes of the BSDF and the groups of lights, with densities h_j whose integrals I_j are known: the probability of
+//! a lobe or of a group within its technique. So p_α = (n_L/N) Σ_groups h_j + (n_B/N) Σ_lobes h_j, and the columns r_j
+//! = h_j/p_α have expectation I_j under the mixture, exactly. This requires that
 //!
-//! * a light sample that another emitter hides has no density of BSDF sampling, which stops at the first emitter;
-//! * a *zero-valued* sample, whose unshadowed integrand is zero, belongs to the component that drew it alone, as if
-//!   every component had a dark place of its own: its other densities need not be found.
+//! * the density of BSDF sampling, which stops at the first emitter, is zero for a light sample that another emitter
+//!   hides;
+//! * a *zero-valued* sample, whose unshadowed integrand is zero, belongs only to the component that drew it, as if
+//!   every component had one such location of its own: its other densities need not be computed.
 
 use super::ShadingPoint;
 use super::propose::{Candidate, SampleAllocation};
@@ -20,14 +21,14 @@ use lumiris_numbers::math::Vec3;
 /// The columns of a sample.
 pub type Columns = [f32; MAX_COMPONENTS];
 
-/// What the samples of a point have in common.
+/// What the samples of a point have in common: the mixture, and counts of samples without contribution.
 #[derive(Clone, Copy, Debug)]
 pub struct Mixture {
     /// I_j: lobes, then groups.
     pub integrals: Columns,
-    /// Dark samples by the component that drew them.
+    /// Zero-valued samples by the component that drew them.
     pub zero_valued: [u32; MAX_COMPONENTS],
-    /// Light samples for which there was no light to choose.
+    /// Failed light samples, for which there was no light to choose.
     pub failed: u32,
     /// N.
     n: f32,
@@ -62,19 +63,19 @@ impl Mixture {
         Mixture { integrals, zero_valued: [0; MAX_COMPONENTS], failed: 0, n, n_light, n_bsdf, lobes }
     }
 
-    /// The lobe that a BSDF sample of the number `uc` is drawn from.
+    /// The lobe from which a BSDF sample with random number `uc` is drawn.
     #[inline]
     pub fn lobe(&self, uc: f32) -> usize {
         usize::from(self.lobes == MAX_LOBES && uc >= self.integrals[0])
     }
 
-    /// Density of the first lobe in the direction `wi`, where that of all lobes is `pdf`.
+    /// Density of the first lobe in the direction `wi`, given that of all lobes, `pdf`.
     #[inline]
     pub(super) fn p_lobe(&self, point: &ShadingPoint<'_>, wi: Vec3, pdf: f32) -> f32 {
         if self.lobes == MAX_LOBES && pdf > 0.0 { point.bsdf.pdf_first_lobe(point.wo, wi, pdf) } else { pdf }
     }
 
-    /// The component that a group of lights is.
+    /// The component of a group of lights.
     #[inline]
     pub fn component(&self, group: usize) -> usize {
         self.lobes + group
@@ -86,8 +87,8 @@ impl Mixture {
         self.n
     }
 
-    /// r_j of a sample, by component, of those that are not 0; none if its densities cannot be divided. How many there are,
-    /// and they.
+    /// r_j of a sample, by component, of those that are not 0; none if its densities cannot be divided. How many there
+    /// are, and they.
     #[inline]
     pub fn columns(&self, c: &Candidate) -> (usize, [(usize, f32); MAX_LOBES + 1]) {
         let scale = self.n / (c.n_light * c.p_light + c.n_bsdf * c.p_bsdf);
@@ -105,7 +106,7 @@ impl Mixture {
         (count, columns)
     }
 
-    /// r_j of a dark sample of component j; the other columns are 0.
+    /// r_j of a zero-valued sample of component j; the other columns are 0.
     #[inline]
     pub fn zero_column(&self, component: usize) -> f32 {
         self.n / if component < self.lobes { self.n_bsdf } else { self.n_light }

@@ -5,10 +5,10 @@
 //! ```
 //!
 //! * **T1** ([`propose`]): light and BSDF samples with their unshadowed integrand f = f_s·|cos θ|·L and the densities
-//!   of every technique. It traces nothing but rays among emitters, and knows nothing of visibility.
+//!   of every technique. It traces rays against emitters only, and does not know visibility.
 //! * **select** ([`select`]): an estimator turns f and densities into contributions, and drops those that are zero.
 //! * **T2** ([`visibility`]): shadow segments in packets.
-//! * **resolve**: the sum of the contributions whose segment is free.
+//! * **resolve**: the sum of the contributions whose segments are unoccluded.
 
 pub mod components;
 pub mod contributing;
@@ -36,7 +36,7 @@ use ris::Resampler;
 use std::time::{Duration, Instant};
 use visibility::Segments;
 
-/// A point whose direct light is wanted.
+/// A point at which direct light is estimated.
 #[derive(Clone, Copy, Debug)]
 pub struct ShadingPoint<'a> {
     /// The point.
@@ -49,11 +49,11 @@ pub struct ShadingPoint<'a> {
     pub bsdf: SurfaceBsdf<'a>,
     /// Time in 0..1.
     pub time: f32,
-    /// Random numbers of this point; each technique takes a domain of it.
+    /// Random numbers of this point; each technique uses its own domain.
     pub stream: SampleStream,
-    /// Numbers of samples and proposals.
+    /// Sample and proposal counts.
     pub sample_counts: SampleCounts,
-    /// The fit that the point takes part in, where there are any.
+    /// Index of the point's fit, if there are fits.
     pub fit: u32,
 }
 
@@ -64,7 +64,7 @@ impl ShadingPoint<'_> {
         offset_origin(self.p, self.p_error, self.bsdf.n, w)
     }
 
-    /// The point as lights see it.
+    /// The context for sampling lights.
     #[inline]
     pub fn light_ctx(&self) -> LightCtx {
         let n = self.bsdf.n;
@@ -77,31 +77,31 @@ impl ShadingPoint<'_> {
     }
 }
 
-/// How often and how long each stage ran.
+/// Counts and times of the stages.
 #[derive(Clone, Copy, Debug, Default)]
 pub struct DirectStats {
     /// Candidates drawn by T1.
     pub proposals: u64,
     /// Those of them that are light samples.
     pub light_proposals: u64,
-    /// Rays traced among emitters.
+    /// Rays traced against emitters.
     pub emitter_rays: u64,
     /// Shadow segments traced by T2.
     pub segments: u64,
     /// Time in T1.
     pub t1: Duration,
-    /// The part of it in light samples.
+    /// Its part for light samples.
     pub t1_light: Duration,
     /// Time in select and resolve.
     pub select: Duration,
     /// Time in T2.
     pub t2: Duration,
-    /// Time in normal equations and their solutions, which is a part of `select`.
+    /// Time for normal equations and their solutions, which is part of `select`.
     pub solve: Duration,
-    /// Systems that were solved, or found to have no solution.
+    /// Systems solved or found to have no solution.
     pub systems: u64,
-    /// Those without solution, whose estimates are those of MIS, and those whose columns depend on one another, so that some were
-    /// dropped.
+    /// Those without a solution, for which the MIS estimate is used, and those with linearly dependent columns, some of
+    /// which were dropped.
     pub ill_conditioned: u64,
 }
 
@@ -141,13 +141,13 @@ impl DirectStage {
         self.segments.rays()
     }
 
-    /// The samples of the last batch, in the order of their points: point, what it adds if visible, whether it is.
+    /// The samples of the last batch, in the order of their points: point, contribution if visible, visibility.
     pub fn outcomes(&self) -> impl Iterator<Item = (u32, Rgb, bool)> {
         self.segments.outcomes()
     }
 
-    /// Estimates ∫ f_s L_direct |cos θ| dω for each point; `out[i]` belongs to `points[i]`. Estimators that are progressive use
-    /// the points' `fits` and add to them.
+    /// Estimates ∫ f_s L_direct |cos θ| dω for each point; `out[i]` belongs to `points[i]`. Estimators that are
+    /// progressive use the points' `fits` and add to them.
     pub fn estimate(
         &mut self,
         job: &RenderJob,

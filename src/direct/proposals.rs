@@ -1,12 +1,12 @@
-//! T1 of resampling: many light samples of a shading point at once, as structure of arrays, with the target and the weight
-//! of each.
+//! T1 of resampling: many light samples of a shading point at once, as a structure of arrays, with the target and the
+//! weight of each.
 //!
-//! Proposals lie along one curve that passes all lights one after the other and fills each of them: positions in [0, 1)
-//! choose a light by inversion, and what remains of them is a place on a Hilbert curve over the light's sample space.
-//! So stratified positions are stratified over the lights and over each light [He and Owen 2016], and proposals
-//! that follow each other are neighbours on a light, as strata of samples want them [Talbot 2005, §4.5.2, heuristic 2].
+//! Proposals lie along one curve that visits all lights in turn and fills each of them: positions in [0, 1) choose a
+//! light by inversion, and what remains of a position is a point on a Hilbert curve over the light's sample space.
+//! Stratified positions are thus stratified over the lights and over each light [He and Owen 2016], and consecutive
+//! proposals are neighbours on a light, as stratified resampling requires [Talbot 2005, §4.5.2, heuristic 2].
 //!
-//! A proposal keeps q̂, r = w/(m·p) and q̂·r only. Those few that are drawn are sampled again, one at a time.
+//! A proposal keeps only q̂, r = w/(m·p) and q̂·r. The few that are drawn are sampled again, one at a time.
 
 use super::ShadingPoint;
 use super::propose::Candidate;
@@ -34,7 +34,7 @@ pub struct Proposals {
     f_cos: [Vec<f32>; 3],
     p_light: Vec<f32>,
     p_bsdf: Vec<f32>,
-    /// The target of each.
+    /// Their targets.
     pub p_hat: Vec<f32>,
     /// Of each, the factor r of its f in the estimate over all proposals; 1/(M·p) for a single technique.
     pub r: Vec<f32>,
@@ -45,7 +45,7 @@ pub struct Proposals {
     runs: Vec<LightRun>,
 }
 
-/// Where the proposals of a point are: light samples, then BSDF samples.
+/// The range of a point's proposals: light samples, then BSDF samples.
 #[derive(Clone, Copy, Debug)]
 pub struct PointProposals {
     /// First proposal.
@@ -56,7 +56,7 @@ pub struct PointProposals {
     pub end: usize,
 }
 
-/// How many proposals of each technique a point has, and by what they are weighted.
+/// Expected numbers of proposals per technique at a point, and how they are weighted.
 #[derive(Clone, Copy, Debug)]
 pub struct Techniques {
     /// Expected number of light samples.
@@ -80,17 +80,17 @@ impl Proposals {
         self.points.last().map_or(0, |p| p.end)
     }
 
-    /// The points whose proposals these are.
+    /// The points to which the proposals belong.
     pub fn points(&self) -> &[PointProposals] {
         &self.points
     }
 
-    /// Light and place on it, as it was sampled: id, probability of the choice, random numbers.
+    /// Light and sample on it: id, probability of the choice, random numbers.
     pub fn light_sample(&self, proposal: usize) -> (LightId, f32, [f32; 2]) {
         (self.light[proposal], self.pmf[proposal], [self.u[0][proposal], self.u[1][proposal]])
     }
 
-    /// Makes room for `len` proposals; what was there before stays.
+    /// Makes room for `len` proposals, keeping existing ones.
     fn grow(&mut self, len: usize) {
         if self.light.len() < len {
             let len = len.next_power_of_two();
@@ -215,7 +215,7 @@ impl Proposals {
         start: usize,
         end: usize,
     ) {
-        // What has no sample keeps a direction that can be evaluated
+        // Failed samples keep a direction that can be evaluated
         let wi = self.wi.each_ref().map(|a| &a[start..end]);
         let f_cos = self.f_cos.each_mut().map(|a| &mut a[start..end]);
         match techniques.target {

@@ -1,4 +1,4 @@
-//! T1: candidates with their unshadowed integrand and the densities of every technique, one at a time.
+//! T1: candidates with their unshadowed integrands and the densities of all techniques, one at a time.
 
 use super::ShadingPoint;
 use super::contributing::Contributing;
@@ -15,26 +15,26 @@ use lumiris_numbers::math::{Ray, Rgb, Vec3};
 use lumiris_numbers::samplers::SampleStream;
 use std::time::{Duration, Instant};
 
-/// Domains below the stream of a shading point.
+/// Random-number domains of a shading point.
 pub(super) mod domain {
     pub(crate) const LIGHT: u32 = 0;
     pub(crate) const BSDF: u32 = 1;
     pub(crate) const TECHNIQUE: u32 = 2;
-    /// Where the samples of groups begin and end.
+    /// Allocation of samples to groups.
     pub(crate) const GROUPS: u32 = 3;
-    /// Delta lights, where they are sampled by themselves.
+    /// Delta lights, where they are sampled separately.
     pub(crate) const DELTA: u32 = 4;
     /// Non-contributing lights.
     pub(crate) const NONCONTRIBUTING: u32 = 5;
-    /// Which of the dim lights is traced.
+    /// Choice among the weaker contributing lights.
     pub(crate) const DIM: u32 = 6;
-    /// Light number k of those that are seen uses the domain `CONTRIBUTING + k`.
+    /// Contributing light number k uses the domain `CONTRIBUTING + k`.
     pub(crate) const CONTRIBUTING: u32 = 64;
     /// Group g uses the domain `GROUP + g`.
     pub(crate) const GROUP: u32 = 16;
 }
 
-/// Rounding of an expected number of samples that is meant to be whole.
+/// Tolerance for an expected number of samples that should be whole.
 const COUNT_ROUNDING: f32 = 1e-3;
 
 /// Which technique drew a candidate.
@@ -85,7 +85,7 @@ pub struct Candidate {
     pub p_lobe: f32,
     /// Group of the light; kept for estimators with components. Without meaning where `p_light` is 0.
     pub group: u8,
-    /// What must be free for the candidate to count.
+    /// The segment that must be unoccluded for the candidate to count.
     pub segment: Ray,
 }
 
@@ -107,17 +107,17 @@ impl Candidate {
 /// All candidates of a batch, in the order of their shading points.
 #[derive(Debug, Default)]
 pub struct Candidates {
-    /// Those whose integrand is not zero.
+    /// Those with a non-zero integrand.
     pub records: Vec<Candidate>,
-    /// Of each point, what its samples have in common, for estimators with components.
+    /// The mixture of each point, for estimators with components.
     pub mixtures: Vec<Mixture>,
-    /// How many were drawn, zeros included.
+    /// Samples drawn, including zero-valued and failed ones.
     pub proposals: u64,
-    /// How many of them were light samples.
+    /// Light samples among them.
     pub light_proposals: u64,
-    /// How many rays were traced among emitters.
+    /// Rays traced against emitters.
     pub emitter_rays: u64,
-    /// Time in light samples.
+    /// Time for light samples.
     pub light_time: Duration,
     pub(super) spare: Vec<Candidate>,
     contributing: Contributing,
@@ -127,7 +127,7 @@ pub struct Candidates {
     emitter_hits: Vec<Option<EmitterHit>>,
 }
 
-/// A BSDF sample that waits for the emitter it points at.
+/// A BSDF sample whose emitter has not been determined yet.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct PendingBsdf {
     pub point: u32,
@@ -135,12 +135,12 @@ pub(super) struct PendingBsdf {
     pub f_cos: Rgb,
     pub pdf: f32,
     pub specular: bool,
-    /// The lobe that was sampled, of those that a mixture tells apart.
+    /// The sampled lobe, as a component of the mixture.
     pub lobe: usize,
     pub allocation: SampleAllocation,
 }
 
-/// How many samples each technique has at a point.
+/// The number of samples per technique at a point.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct SampleAllocation {
     pub light_draws: u32,
@@ -151,18 +151,18 @@ pub(super) struct SampleAllocation {
 }
 
 impl SampleAllocation {
-    /// So many of each.
+    /// Fixed numbers of samples.
     pub(super) fn fixed(light: u32, bsdf: u32) -> Self {
         SampleAllocation { light_draws: light, bsdf_draws: bsdf, n_light: light as f32, n_bsdf: bsdf as f32 }
     }
 
-    /// A single sample that chooses its technique at random, so that the expected numbers are one half each.
+    /// A single sample that chooses its technique at random: the expected numbers are one half each.
     pub(super) fn one_of_both(point: &ShadingPoint<'_>) -> Self {
         let light = point.stream.domain(domain::TECHNIQUE).draw::<1>()[0] < 0.5;
         SampleAllocation { light_draws: u32::from(light), bsdf_draws: u32::from(!light), n_light: 0.5, n_bsdf: 0.5 }
     }
 
-    /// Splits the samples, or the proposals, between the techniques.
+    /// Allocates the samples, or the proposals, to the techniques.
     fn new(settings: &IntegratorSettings, point: &ShadingPoint<'_>) -> Self {
         let n = point.sample_counts.samples;
         if !point.bsdf.bsdf.has_non_specular() {
@@ -194,8 +194,8 @@ impl Candidates {
         self.light_time = Duration::ZERO;
     }
 
-    /// Draws the candidates of all points; for `ris` only those by BSDF sampling, since light samples are many and stay
-    /// with [`super::ris`].
+    /// Draws the candidates of all points; for `ris` only those by BSDF sampling, since [`super::ris`] makes the many
+    /// light samples itself.
     pub fn propose(&mut self, job: &RenderJob, settings: &IntegratorSettings, points: &[ShadingPoint<'_>]) {
         self.clear();
         self.pending.clear();
@@ -262,8 +262,8 @@ impl Candidates {
         }
     }
 
-    /// Draws the light samples of a point for each group of lights by itself: of N samples as many as its probability says,
-    /// a fraction decided by one random number for all groups.
+    /// Draws the light samples of a point separately for each group of lights, N times its probability, rounded by one
+    /// random number for all groups.
     fn draw_groups(&mut self, job: &RenderJob, index: u32, point: &ShadingPoint<'_>, allocation: &SampleAllocation) {
         let lights = &job.lights;
         let ctx = point.light_ctx();
@@ -277,7 +277,7 @@ impl Candidates {
         for (group, &pmf) in pmfs[..lights.groups.len()].iter().enumerate().filter(|(_, pmf)| **pmf > 0.0) {
             sum += f64::from(pmf) * f64::from(n);
             let end = ((sum - f64::from(u)).ceil() as u32).clamp(first, n);
-            // A count that does not change with u, so that samples of a pixel are points of one set
+            // A count that does not depend on u, so that the samples of a pixel are points of one set
             let count = ((pmf * n as f32 - COUNT_ROUNDING).ceil() as u32).max(end - first);
             for i in 0..end - first {
                 let stream = point.stream.split(domain::GROUP + group as u32, count, i);
@@ -325,7 +325,8 @@ impl Candidates {
     }
 }
 
-/// A sample of a light; of one at infinity, with the radiance of all that overlap it and the density to choose any of them.
+/// A light sample; for an infinite light, with the radiance of all infinite lights and the density of choosing any of
+/// them.
 pub(super) fn with_infinite(
     job: &RenderJob,
     ctx: &LightCtx,
@@ -410,7 +411,7 @@ pub(super) fn bsdf_candidate(
         }
         None => {
             let pdf = if pending.specular { 0.0 } else { lights.pdf_infinite(&ctx, pending.wi) };
-            // Of those at infinity one that can be chosen, if there is one, so that it has a group
+            // An infinite light that can be chosen, if there is one, so that it has a group
             let has_group = |&&l: &&LightId| lights.groups.group_of(l).is_some();
             let light = lights.infinite.iter().find(has_group).or(lights.infinite.first());
             (lights.le(pending.wi), light.copied(), pdf, segment(point, pending.wi, None))

@@ -1,16 +1,16 @@
 //! Resampled importance sampling of direct light [Talbot et al. 2005; Talbot 2005].
 //!
-//! T1 makes M proposals of every point by light and BSDF sampling, weighted by multiple importance sampling into one
-//! set [Talbot 2005, §4.6.1] whose target q̂ is the luminance of f·G·L. N of them are drawn in proportion to q̂·r, and only
-//! these are evaluated in colour and traced. Unbiased for any M ≥ N ≥ 1: given the proposals, the expectation over
-//! the draws is the estimate that would trace them all.
+//! T1 makes M proposals per point by light and BSDF sampling, which multiple importance sampling weights into one set
+//! [Talbot 2005, §4.6.1] with the luminance of f·G·L as target q̂. N of them are drawn in proportion to q̂·r, and only
+//! these are evaluated in colour and traced. This is unbiased for any M ≥ N ≥ 1: given the proposals, the expectation
+//! over the draws is the estimate that would trace all of them.
 //!
-//! The target `visibility` multiplies q̂ by an estimate V̂ > 0 of the visibility of each light, from photons that came from it
-//! ([`crate::lights::visibility_cache`]): fewer samples are drawn that find something in their way, and any V̂ is
-//! unbiased.
+//! The target `visibility` multiplies q̂ by an estimate V̂ > 0 of the visibility of each light, from the visibility
+//! cache ([`crate::lights::visibility_cache`]): fewer occluded samples are drawn, and the estimate is unbiased for any
+//! V̂.
 //!
-//! Targets with visibility turn the order round: proposals are traced, and N of the visible ones are shaded; light samples
-//! need no value of the BSDF before that.
+//! Targets with visibility reverse the order: proposals are traced, and N of the visible ones are shaded; light samples
+//! do not need the BSDF before that.
 
 use super::ShadingPoint;
 use super::proposals::{PointProposals, Proposals, Techniques};
@@ -25,13 +25,13 @@ use lumiris_numbers::math::Rgb;
 use lumiris_numbers::math::hash::{pcg4d, unit_f32};
 use std::time::{Duration, Instant};
 
-/// Domains below the stream of a shading point, beside those of [`super::propose`].
+/// Random-number domains of a shading point, in addition to those of [`super::propose`].
 mod domain {
     pub(super) const RESAMPLE: u32 = 8;
     pub(super) const STRATA: u32 = 9;
 }
 
-/// Proposals that are made before samples are drawn from them: few enough to stay in the cache.
+/// Proposals that are generated before samples are drawn from them: few enough to stay in the processor's cache.
 const CHUNK: usize = 2048;
 
 /// The stage's buffers.
@@ -42,10 +42,10 @@ pub struct Resampler {
     ends: Vec<u32>,
     u: Vec<f32>,
     probes: Segments,
-    /// Per point of the chunk, the numbers for the places of proposals and for the draws: well distributed over the samples
-    /// of a pixel.
+    /// Per point of the chunk, the numbers for the places of proposals and for the draws: well distributed over the
+    /// samples of a pixel.
     numbers: Vec<[f32; 2]>,
-    /// Time in making proposals and their targets.
+    /// Time for proposals and their targets.
     pub t1: Duration,
     /// Segments traced for targets with visibility.
     pub probed: u64,
@@ -53,8 +53,8 @@ pub struct Resampler {
 
 /// The proposals of a point by light and by BSDF sampling: M together, unless the BSDF is all specular.
 ///
-/// A BSDF sample costs as much as ten light samples, which are made many at a time, and a wide BSDF says little of where the
-/// light is: it gets one proposal in sixteen, one with a peak two; but where there are few proposals for each
+/// A BSDF sample costs as much as ten light samples, which are made many at a time, and a wide BSDF says little of
+/// where the light is: it gets one proposal in sixteen, one with a peak two; but where there are few proposals for each
 /// sample, one BSDF sample for every two samples, or four if it is wide.
 pub(super) fn allocation(point: &ShadingPoint<'_>) -> SampleAllocation {
     let (m, n) = (point.sample_counts.proposals, point.sample_counts.samples);
@@ -71,15 +71,15 @@ pub(super) fn allocation(point: &ShadingPoint<'_>) -> SampleAllocation {
         | Bsdf::Layered(_) => (0.125, 0.5),
     };
     let by_bsdf = (m as f32 * of_proposals).max(n as f32 * of_samples);
-    // A power of two: so many points of a Sobol' sequence are well distributed, others less
+    // A power of two, for which the points of a Sobol' sequence are best distributed
     let by_bsdf = 1 << (by_bsdf.log2().round().max(0.0) as u32);
     let by_bsdf = if by_bsdf < m { by_bsdf } else { 1 };
     if m == 1 { SampleAllocation::one_of_both(point) } else { SampleAllocation::fixed(m - by_bsdf, by_bsdf) }
 }
 
 impl Resampler {
-    /// Draws the samples of all points: `out` gets one candidate for each, `contributions` what it adds if its segment is
-    /// free. `bsdf_samples` are sorted by point.
+    /// Draws the samples of all points: `out` gets one candidate for each, `contributions` what it adds if its segment
+    /// is free. `bsdf_samples` are sorted by point.
     pub(super) fn run(
         &mut self,
         job: &RenderJob,
@@ -221,7 +221,7 @@ impl Resampler {
         }
     }
 
-    /// A light sample, drawn again with all that a proposal leaves out.
+    /// A light sample, drawn again with everything that a proposal omits.
     fn light_sample(&self, job: &RenderJob, point: &ShadingPoint<'_>, place: usize) -> Option<(LightId, LightSample)> {
         let (light, pmf, u) = self.proposals.light_sample(place);
         let sample = job.lights.lights[light as usize].sample_li(&point.light_ctx(), u)?;

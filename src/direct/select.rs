@@ -1,11 +1,12 @@
-//! From candidates to contributions where all are traced: what `mc`, `mis` and the estimators that build on them make of f and the densities.
+//! From candidates to contributions where all are traced: the contributions that `mc`, `mis` and the estimators based
+//! on them compute from f and the densities.
 
 use super::propose::{Candidates, Drawn};
 use crate::settings::{EstimatorKind, IntegratorSettings};
 use lumiris_numbers::estimators::mc;
 use lumiris_numbers::math::Rgb;
 
-/// `out[i]` becomes the contribution of candidate `i` if its segment is free; zeros need no segment.
+/// `out[i]` becomes the contribution of candidate `i` if its segment is unoccluded; zero contributions need no segment.
 pub fn contributions(settings: &IntegratorSettings, candidates: &Candidates, out: &mut Vec<Rgb>) {
     let heuristic = settings.heuristic();
     out.clear();
