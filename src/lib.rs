@@ -1,7 +1,7 @@
 //! Lumiris: an offline CPU renderer for lighting integrals that are hard to sample.
 //!
-//! Arithmetic without scenes is in the crate `lumiris_numbers`, reading of files in `lumiris_formats`. The code here is layered; a
-//! module imports only from layers above it in this list (`tests/it/layering.rs` holds it):
+//! Numerics without scenes are in the crate `lumiris_numbers`, file parsers in `lumiris_formats`. The code here is
+//! layered; a module imports only from layers above it in this list (checked by `tests/it/layering`):
 //!
 //! | layer | modules |
 //! |---|---|

@@ -1,29 +1,30 @@
 //! The variance of pixel means for any sampler, from pixels that are estimated twice.
 //!
-//! The mean of N independent samples has the variance s²/N, where s² is the variance of the samples. Points of a net are
-//! spread more evenly, and their mean varies less. By how much cannot be told from one net: its error is what lies between
-//! its points. So some pixels, the *replicas*, are estimated a second time, with as many samples of an independent scramble.
-//! Of two such means A and B, (A − B)²/2 is an unbiased estimate of their variance, and a class of pixels has the variances
+//! The mean of N independent samples has the variance s²/N, where s² is the variance of the samples. Points of a net
+//! are distributed more evenly, and their mean varies less. How much less cannot be determined from a single net. So
+//! some pixels, the *replicas*, are estimated a second time, with as many samples and an independent scrambling. Of two
+//! such means A and B, (A − B)²/2 is an unbiased estimate of their variance, and a class of pixels is assigned the
+//! variances
 //!
 //! V = f s²/N, with f = Σ (A − B)²/2 / Σ s²/N over the replicas of the class.
 //!
-//! f depends on what is seen: strata gain much at edges and in soft shadows, and little in light that many bounces
-//! bring. Classes are intervals of the mean of s²/N over the 3 × 3 pixels around, which has less noise than a pixel's own
-//! value. Whatever the classes, the sum of V over the image is that of the replicas, scaled to all pixels.
+//! f depends on what is seen: stratification gains much at edges and in soft shadows, and little for light of many
+//! bounces. Classes are intervals of the mean of s²/N over the surrounding 3 × 3 pixels, which is less noisy than a
+//! pixel's own value. Whatever the classes, the sum of V over the image is that of the replicas, scaled to all pixels.
 
 use super::{Film, PixelBounds, PixelSample, PixelSums};
 use lumiris_numbers::math::hash::{pcg4d, unit_f32};
 
-/// Replicas that an image should have; it has more if [`MIN_FRACTION`] of its pixels are more, and fewer if its pixels
-/// are.
+/// Number of replicas per image: more if [`MIN_FRACTION`] of the pixels are more, and fewer only if the image has fewer
+/// pixels.
 const WANTED: f64 = 512.0;
-/// Least share of the pixels that are replicated.
+/// Minimum fraction of the pixels that are replicated.
 const MIN_FRACTION: f64 = 1.0 / 64.0;
-/// Most classes of pixels.
+/// Maximum number of classes of pixels.
 const MAX_CLASSES: usize = 8;
-/// Least number of replicas in a class: f then has a relative standard error of √(2/64) = 18 % if means are normal.
+/// Minimum number of replicas in a class: f then has a relative standard error of √(2/64) = 18 % if means are normal.
 const MIN_CLASS_SIZE: usize = 64;
-/// Keeps the choice of replicas apart from other hashes of pixels.
+/// Distinguishes the choice of replicas from other hashes of pixels.
 const CHOICE: u32 = 0x72_65_70_6c;
 
 /// The second estimate of a pixel.
@@ -55,8 +56,8 @@ impl Replica {
     }
 }
 
-/// Replicas without samples for the pixels of a tile that are estimated twice, in an image with the given bounds. They are
-/// indexed in the tile.
+/// Replicas, without samples, for the pixels of a tile that are estimated twice, in an image with the given bounds.
+/// Their indices are those of the tile.
 pub fn replicas(image: &PixelBounds, tile: &PixelBounds) -> Vec<Replica> {
     let fraction = (WANTED / image.area().max(1) as f64).max(MIN_FRACTION);
     let is_chosen = |i: &u32| {
@@ -67,14 +68,14 @@ pub fn replicas(image: &PixelBounds, tile: &PixelBounds) -> Vec<Replica> {
     (0..tile.area() as u32).filter(is_chosen).map(none).collect()
 }
 
-/// Pixels whose s²/N, averaged over their neighbours, is up to `limit` and above that of the class before.
+/// Pixels whose s²/N, averaged over their neighbours, is at most `limit` and above that of the previous class.
 struct Class {
     limit: f64,
     /// f.
     factor: f64,
 }
 
-/// What a replica tells.
+/// The variances estimated at a replica.
 #[derive(Clone, Copy)]
 struct ReplicaVariance {
     /// s²/N, averaged over neighbours.
@@ -111,7 +112,7 @@ impl Film {
         variances
     }
 
-    /// Mean of `values` over the 3 × 3 pixels around each pixel, as far as there are any.
+    /// Mean of `values` over the 3 × 3 pixels around each pixel, clipped to the image.
     fn neighbourhood_means(&self, values: &[f64]) -> Vec<f64> {
         let (width, height) = (self.bounds.width() as usize, self.bounds.height() as usize);
         let around = |i: usize, len: usize| i.saturating_sub(1)..(i + 2).min(len);
@@ -127,7 +128,7 @@ impl Film {
 
 /// Classes of about equally many replicas, by rising keys; none if nothing varies.
 fn classes(mut measured_twice: Vec<ReplicaVariance>) -> Vec<Class> {
-    // Where samples are all the same, there is nothing to scale
+    // Where all samples are equal, there is nothing to scale
     measured_twice.retain(|t| t.key > 0.0 || t.measured > 0.0);
     measured_twice.sort_by(|a, b| a.key.total_cmp(&b.key));
     let size = measured_twice.len().div_ceil(MAX_CLASSES).max(MIN_CLASS_SIZE);
@@ -152,8 +153,8 @@ fn classes(mut measured_twice: Vec<ReplicaVariance>) -> Vec<Class> {
 mod tests {
     use super::*;
 
-    /// A film of 64 × 64 pixels and as many replicas, means of two samples each. Means are 1 ± σ, and s²/N is `independent`;
-    /// both are given for the column of a pixel.
+    /// A film of 64 × 64 pixels and as many replicas, means of two samples each. Means are 1 ± σ, and s²/N is
+    /// `independent`; both are given for the column of a pixel.
     fn film(sigma: impl Fn(u32) -> f64, independent: impl Fn(u32) -> f64) -> Film {
         let bounds = PixelBounds { x0: 0, x1: 64, y0: 0, y1: 64 };
         let mut film = Film::new([64, 64], bounds);

@@ -1,7 +1,8 @@
-//! Scene files to scenes: what directives mean ([`pbrt`]), and the images and meshes that they name ([`resources`]).
+//! From scene files to scenes: the meaning of directives ([`pbrt`]), and the images and meshes that they name
+//! ([`resources`]).
 //!
-//! The files themselves are read by the crate `lumiris_formats`. User input never panics. What is wrong with it is collected, with
-//! places, in [`Diagnostics`].
+//! The files themselves are parsed by the crate `lumiris_formats`. User input never panics: problems are collected,
+//! with their source locations, in [`Diagnostics`].
 
 pub mod pbrt;
 pub mod resources;
@@ -15,7 +16,7 @@ use lumiris_formats::source::SourceMap;
 use pbrt::state::Builder;
 use std::path::Path;
 
-/// What a caller overrides of a scene file.
+/// What overrides a scene file.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct LoadOptions {
     /// Size of the image (width, height).
@@ -24,25 +25,25 @@ pub struct LoadOptions {
     pub crop: Option<[f32; 4]>,
 }
 
-/// A scene, and what its author may want to know.
+/// A scene, its settings, and warnings.
 #[derive(Debug)]
 pub struct Loaded {
     /// The scene.
     pub scene: Scene,
-    /// How the file asks to render it.
+    /// The file's settings.
     pub settings: Settings,
     /// Warnings.
     pub warnings: Report,
 }
 
 impl Loaded {
-    /// Builds the ray tracers, and prepares what the settings ask for; see [`World::new`].
+    /// Builds the ray tracers, and prepares what the settings require; see [`World::new`].
     pub fn job(self, kind: AccelKind, packet_width: Option<u32>) -> Result<RenderJob, EmbreeError> {
         Ok(RenderJob::new(World::new(self.scene, kind, packet_width)?, self.settings))
     }
 }
 
-/// Loads a scene file. `Err` holds all errors that were found, and the warnings.
+/// Loads a scene file. `Err` holds all errors and the warnings.
 pub fn load(path: &Path, options: &LoadOptions) -> Result<Loaded, Box<Report>> {
     let mut sources = SourceMap::new();
     let mut diagnostics = Diagnostics::new();

@@ -1,8 +1,10 @@
-//! Camera paths that take what Lambertian parts of BSDFs reflect from elsewhere: from records of irradiance, from photons.
+//! Camera paths that take the light reflected by the Lambertian parts of BSDFs from elsewhere: from irradiance records
+//! or from photons.
 //!
-//! At each vertex the Lambertian part ([`crate::bsdfs::Bsdf::lambertian`]) has its light from there, and the path goes on with the
-//! other lobes: mirrors, glass, coats, metals, up to the next vertex, which does the same. A vertex that is not served, and one
-//! without such a part, goes on as in `path`. So no light is counted twice or lost.
+//! At each vertex, the light reflected by the Lambertian part ([`crate::bsdfs::Bsdf::lambertian`]) is looked up, and
+//! the path continues with the other lobes (mirrors, glass, coats, metals) to the next vertex, which does the same. A
+//! vertex where the lookup misses, or without such a part, continues as in `path`. So no light is counted twice or
+//! lost.
 
 use super::path::{self, CameraSample, PathIntegrator, PathState, Vertex};
 use crate::bsdfs::Lambertian;
@@ -13,27 +15,28 @@ use crate::scene::RenderJob;
 use crate::settings::IntegratorSettings;
 use lumiris_numbers::math::{Rgb, Vec3};
 
-/// Where the light comes from that Lambertian parts reflect.
+/// A source of the light reflected by Lambertian parts.
 pub(super) trait Reflected {
-    /// Radiance that the Lambertian part of a vertex, the `vertex`-th of its path from 0, reflects to the viewer; `None` if that is
-    /// not known.
+    /// Radiance that the Lambertian part of a vertex, the `vertex`-th of its path from 0, reflects to the viewer;
+    /// `None` if it is not available.
     fn reflected(&mut self, path: &PathState, vertex: u32, v: &Vertex<'_>, part: &Lambertian<'_>) -> Option<Rgb>;
 
-    /// True if that includes light that comes straight from sources.
+    /// True if that includes direct light.
     fn has_sources(&self) -> bool;
 }
 
-/// What a vertex does with its light.
+/// How the light of a vertex is computed.
 struct Shading<'w> {
-    /// Radiance that needs no more samples.
+    /// Radiance that is known.
     known: Rgb,
-    /// What direct light is estimated for; `None` if that is known.
+    /// BSDF for which direct light is estimated; `None` if it is known.
     lit: Option<SurfaceBsdf<'w>>,
-    /// What the path goes on by; `None` if it ends.
+    /// BSDF by which the path continues; `None` if it ends.
     next: Option<SurfaceBsdf<'w>>,
 }
 
-/// Estimates the radiance of each camera sample; `out[i]` belongs to `samples[i]`. `fits` are those of the samples' pixels.
+/// Estimates the radiance of each camera sample; `out[i]` belongs to `samples[i]`. `fits` are those of the samples'
+/// pixels.
 pub(super) fn trace(
     paths: &mut PathIntegrator,
     job: &RenderJob,
@@ -65,7 +68,7 @@ pub(super) fn trace(
     }
 }
 
-/// Asks the source.
+/// Queries the source.
 fn shade<'w>(source: &mut dyn Reflected, path: &PathState, vertex: u32, v: &Vertex<'w>) -> Shading<'w> {
     let by_path = Shading { known: Rgb::BLACK, lit: Some(v.bsdf), next: Some(v.bsdf) };
     let Some(part) = v.bsdf.lambertian(v.wo) else { return by_path };
@@ -74,7 +77,7 @@ fn shade<'w>(source: &mut dyn Reflected, path: &PathState, vertex: u32, v: &Vert
     Shading { known, lit: if source.has_sources() { rest } else { Some(v.bsdf) }, next: rest }
 }
 
-/// Adds what is known, and estimates of the direct light that is not.
+/// Adds the known radiance, and estimates direct light where it is not known.
 fn light(
     paths: &mut PathIntegrator,
     job: &RenderJob,
@@ -96,7 +99,7 @@ fn light(
     }
 }
 
-/// Goes on with the paths that have a lobe to go on by.
+/// Continues the paths that have a lobe left.
 fn extend(
     paths: &mut PathIntegrator,
     settings: &IntegratorSettings,

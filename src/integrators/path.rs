@@ -18,7 +18,7 @@ use lumiris_numbers::math::{Ray, Rgb, Vec3};
 use lumiris_numbers::samplers::SampleStream;
 use std::time::{Duration, Instant};
 
-/// Domains below the stream of a path vertex.
+/// Random-number domains of a path vertex.
 mod domain {
     pub(super) const DIRECT: u32 = 0;
     pub(super) const BSDF: u32 = 1;
@@ -32,7 +32,7 @@ mod domain {
 /// Surfaces without scattering that a path may pass between two vertices.
 const MAX_PASSED: u32 = 64;
 
-/// How often and how long.
+/// Counts and times.
 #[derive(Clone, Copy, Debug, Default)]
 pub struct PathStats {
     /// Camera rays.
@@ -61,7 +61,7 @@ impl PathStats {
     }
 }
 
-/// Copies of what was traced, batch by batch, for measurements.
+/// Copies of the rays traced, batch by batch, for measurements.
 #[derive(Clone, Debug, Default)]
 pub struct Recording {
     /// Camera rays up to their first surface.
@@ -74,14 +74,14 @@ pub struct Recording {
     pub bounce_segments: Vec<RayBatch>,
 }
 
-/// What a sample of direct light at a first vertex came to.
+/// The result of a direct-light sample at a first vertex.
 #[derive(Clone, Copy, Debug)]
 pub struct Outcome {
     /// Index of the camera sample.
     pub sample: u32,
-    /// What it adds if it is visible.
+    /// Its contribution if visible.
     pub unshadowed: Rgb,
-    /// What it adds.
+    /// Its contribution.
     pub contribution: Rgb,
 }
 
@@ -94,16 +94,16 @@ pub struct CameraSample {
     pub weight: f32,
     /// Its random numbers.
     pub stream: SampleStream,
-    /// The random numbers of direct light, which progressive estimators draw anew for every block of samples: what they are
-    /// independent of are those of earlier blocks, wherever the path goes.
+    /// Random numbers of direct light, which progressive estimators draw anew for every block of samples: they are
+    /// independent of those of earlier blocks, wherever the path goes.
     pub direct: SampleStream,
-    /// Samples and proposals of its first vertex.
+    /// Sample counts at its first vertex.
     pub sample_counts: SampleCounts,
     /// The fit of its pixel.
     pub fit: u32,
 }
 
-/// A path on its way.
+/// The state of a path.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct PathState {
     /// Index of the camera sample.
@@ -131,11 +131,11 @@ pub struct PathIntegrator {
     pub(super) radiance: Vec<Rgb>,
     pub(super) direct: DirectStage,
     pub(super) stats: PathStats,
-    /// Leaves out what is emitted towards the camera, and of the features all but the depth.
+    /// Omits emission towards the camera, and all features except the depth.
     pub(super) only_reflected: bool,
-    /// Where copies of what is traced go, if they are wanted.
+    /// Copies of what is traced, if requested.
     pub recording: Option<Recording>,
-    /// Where the samples of direct light at first vertices go, if they are wanted.
+    /// Samples of direct light at first vertices, if requested.
     pub outcomes: Option<Vec<Outcome>>,
 }
 
@@ -146,8 +146,8 @@ impl PathIntegrator {
         PathStats { direct, ..std::mem::take(&mut self.stats) }
     }
 
-    /// Estimates the radiance of each camera sample; `out[i]` belongs to `samples[i]`. `fits` are those of the samples' pixels;
-    /// they may be none.
+    /// Estimates the radiance of each camera sample; `out[i]` belongs to `samples[i]`. `fits` are those of the samples'
+    /// pixels; they may be none.
     pub fn trace(
         &mut self,
         job: &RenderJob,
@@ -179,7 +179,7 @@ impl PathIntegrator {
         }
     }
 
-    /// Makes the camera rays the active paths.
+    /// Starts paths with the camera rays.
     pub(super) fn start(&mut self, samples: &[CameraSample], out: &mut Vec<PixelSample>) {
         out.clear();
         out.resize(samples.len(), PixelSample::default());
@@ -385,7 +385,7 @@ pub(super) fn extend(
     Some((PathState { ray, beta, eta_scale, ..*path }, lobe))
 }
 
-/// Where a path goes on.
+/// How a path continues.
 struct Direction {
     wi: Vec3,
     /// Factor of the throughput.
@@ -411,7 +411,7 @@ fn next_direction(v: &Vertex<'_>, settings: &IntegratorSettings) -> Option<Direc
 }
 
 impl PathState {
-    /// Adds what the surface that was found emits towards the camera.
+    /// Adds the emission of a surface towards the camera.
     fn add_emission(&self, job: &RenderJob, interaction: &SurfaceInteraction, radiance: &mut Rgb) {
         let lights = &job.lights;
         if interaction.hit.instance != Hit::NO_INSTANCE {

@@ -1,4 +1,4 @@
-//! The lights of a scene with a light sampler: what settings and photons make of a [`LightSet`].
+//! The lights of a scene with a light sampler, groups, and the visibility cache.
 
 use super::visibility_cache::ContributingLights;
 use super::{
@@ -78,7 +78,8 @@ impl LightSampling {
         self.set.sample_choice(ctx, self.sampler.sample(ctx, u_choice)?, u)
     }
 
-    /// Samples a direction to a light of one group, whose probability is `group_pmf`; otherwise as [`sample`](Self::sample).
+    /// Samples a direction to a light of one group, whose probability is `group_pmf`; otherwise as
+    /// [`sample`](Self::sample).
     #[inline]
     pub fn sample_group(
         &self,

@@ -83,7 +83,7 @@ pub enum LightSampler {
 
 impl LightSampler {
     /// A sampler of `lights`, indexed as they are; `scene_radius` weighs infinite lights against others. That by
-    /// photons has no hints yet.
+    /// photons has no visibility cache yet.
     pub fn new(kind: LightSamplerKind, lights: &[Light], scene_radius: f32) -> Self {
         let powers: Vec<f32> = lights.iter().map(|light| light.phi(scene_radius)).collect();
         match kind {

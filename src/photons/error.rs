@@ -9,7 +9,7 @@ pub enum PhotonError {
     /// There are lights, and all of them are black.
     #[error("the lights of the scene emit nothing, so there are no photons to trace")]
     NoEmission,
-    /// A number of photon paths, photons or importons is 0.
+    /// A number of paths, photons or importons is 0.
     #[error("the number of photons requested is zero")]
     NothingRequested,
     /// The ratio q is not in (0, 1].

@@ -1,12 +1,11 @@
-//! Where photons matter to the image: importons, and the probability that a photon is stored [Keller and Wald 2000,
-//! §2.3].
+//! Visual importance: importons, and the probability with which a photon is stored [Keller and Wald 2000, §2.3].
 //!
-//! Importons are photons of importance, which the camera sends and which scatter as light does [Peter and Pietrek
-//! 1998]. With the density I(x) of their importance, p(x) = min(1, f·I(x)), where 1/f is the least I that test rays
-//! from the camera find: so p = 1 wherever the camera looks, and the photons there keep their power.
+//! Importons are particles of importance, which are emitted by the camera and scattered like light [Peter and Pietrek
+//! 1998]. With I(x) the density of their importance, p(x) = min(1, f·I(x)), where 1/f is the minimum of I that test
+//! rays from the camera find: so p = 1 wherever the camera looks, and the photons there keep their power.
 //!
-//! Where p is small, powers Φ/p are large and rare. Either p is at least ε, which keeps the expectation of every map,
-//! or photons with p < ε are dropped, which makes light that they carry be missing.
+//! Where p is small, photons with the power Φ/p are rare and large. Either p is at least ε, which preserves the
+//! expectation of every map, or photons with p < ε are dropped, and the light that they carry is missing.
 
 use super::error::PhotonError;
 use super::map::{GatherScratch, PhotonMap, Place, Search};
@@ -18,10 +17,10 @@ use crate::scene::RenderJob;
 use lumiris_numbers::math::{Rgb, Vec2, Vec3};
 use rayon::prelude::*;
 
-/// Seeds of importons and of test rays are those of photons with this.
+/// XORed with the seed of photons to give the seeds of importons and of test rays.
 const SEEDS: [u32; 2] = [0x696d_706f, 0x7465_7374];
 
-/// What becomes of photons that hardly matter.
+/// Treatment of photons with low importance.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum LowImportance {
     /// p(x) is at least this, in (0, 1]: unbiased.
@@ -30,24 +29,24 @@ pub enum LowImportance {
     CutOff(f32),
 }
 
-/// How importance is found.
+/// Settings of importon tracing.
 #[derive(Clone, Copy, Debug)]
 pub struct ImportanceSettings {
     /// Importance maps of different seeds are independent.
     pub seed: u32,
     /// Importon paths.
     pub paths: u64,
-    /// Most scatterings of an importon.
+    /// Maximum number of scattering events of an importon.
     pub max_depth: u32,
-    /// Camera rays that look for the least importance.
+    /// Camera rays that determine the minimum importance.
     pub test_rays: u64,
-    /// The part of test rays whose importance may be below 1/f; 0 takes their minimum.
+    /// Fraction of the test rays whose importance may be below 1/f; 0 takes the minimum.
     pub quantile: f32,
-    /// Importons of a query.
+    /// Importons per query.
     pub count: u32,
-    /// Largest radius of a query, in radii of the scene.
+    /// Maximum radius of a query, relative to the radius of the scene.
     pub max_radius: f32,
-    /// What becomes of photons that hardly matter.
+    /// Treatment of photons with low importance.
     pub low_importance: LowImportance,
 }
 
@@ -66,7 +65,7 @@ impl Default for ImportanceSettings {
     }
 }
 
-/// The probability of deposition.
+/// The probability p(x) of storing a photon.
 #[derive(Clone, Debug)]
 pub struct Importance {
     map: PhotonMap,
@@ -88,7 +87,7 @@ impl Importance {
         }
     }
 
-    /// Maps made with it have the light that they would have without it, on average.
+    /// True if maps built with it have the right expectation.
     pub fn is_unbiased(&self) -> bool {
         matches!(self.low_importance, LowImportance::Floor(_))
     }
@@ -103,7 +102,7 @@ impl Importance {
         self.scale
     }
 
-    /// Rays that importons and tests took.
+    /// Rays traced for importons and tests.
     pub fn rays(&self) -> u64 {
         self.rays
     }
@@ -114,7 +113,7 @@ fn density(map: &PhotonMap, p: Vec3, n: Vec3, search: Search, scratch: &mut Gath
     map.irradiance(&Place::flat(p, n), search, scratch).average()
 }
 
-/// Sends importons, on all threads of the current pool.
+/// Traces importons on all threads of the current pool.
 pub fn trace_importons(job: &RenderJob, settings: &ImportanceSettings) -> Result<Importance, PhotonError> {
     if settings.paths == 0 || settings.test_rays == 0 {
         return Err(PhotonError::NothingRequested);
@@ -130,7 +129,7 @@ pub fn trace_importons(job: &RenderJob, settings: &ImportanceSettings) -> Result
     let search =
         Search::Nearest { count: settings.count.max(2), max_radius: settings.max_radius * job.lights.scene_radius };
 
-    // The scale, by what the camera sees at first
+    // The scale, from the first diffuse surfaces that the camera sees
     let (seen, test_rays) = trace(job, settings.seed ^ SEEDS[1], settings.test_rays, settings.max_depth, true);
     rays += test_rays;
     let of_place = |scratch: &mut GatherScratch, seen: &Photon| density(&map, seen.p(), seen.n(), search, scratch);
@@ -142,7 +141,7 @@ pub fn trace_importons(job: &RenderJob, settings: &ImportanceSettings) -> Result
     Ok(Importance { scale: 1.0 / min, map, search, low_importance: settings.low_importance, rays })
 }
 
-/// Importons where they arrive, and the number of rays; of each photon path the first one only if `only_first`.
+/// Importons where they arrive, and the number of rays; only the first one of each path if `only_first`.
 fn trace(job: &RenderJob, seed: u32, count: u64, max_depth: u32, only_first: bool) -> (Vec<Photon>, u64) {
     let settings = WalkSettings { transport: Transport::Radiance, max_depth };
     let power = Rgb::splat((1.0 / count as f64) as f32);

@@ -1,13 +1,13 @@
-//! Which light a photon path starts from: p_i = (1 − a) Φ_i/Σ Φ + a/L over the L lights that emit anything, Φ being
-//! powers and a the floor, so that no light has less than a/L of the photon paths.
+//! The distribution of photon paths over lights: p_i = (1 − a) Φ_i/Σ Φ + a/L over the L lights that emit anything,
+//! where Φ are their powers and a is the floor, so that no light has less than a/L of the paths.
 //!
-//! The choice is by inversion, so that the numbers of a stratified sequence give each light its share to within few
-//! photon paths.
+//! Lights are chosen by inversion, so that stratified random numbers give each light its expected number of paths up to
+//! a few.
 
 use crate::lights::{LightId, LightSet};
 use lumiris_numbers::math::cumulative;
 
-/// Shares of lights in photon paths.
+/// Probabilities of the lights.
 #[derive(Clone, Debug)]
 pub struct LightDistribution {
     lights: Vec<LightId>,
@@ -37,8 +37,8 @@ impl LightDistribution {
         Some(LightDistribution { lights: lit.into_iter().map(|(light, _)| light).collect(), cumulative })
     }
 
-    /// A light, and its probability, by a number of twice 24 bits: `u[1]` fills the gaps between the values of `u[0]`,
-    /// which are wider than the shares of many lights.
+    /// A light and its probability, by a number of twice 24 bits: `u[1]` fills the gaps between the values of `u[0]`,
+    /// which exceed the probabilities where there are many lights.
     #[inline]
     pub fn sample(&self, u: [f32; 2]) -> (LightId, f32) {
         const STEPS: f64 = 16_777_216.0;

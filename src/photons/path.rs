@@ -11,7 +11,7 @@ pub(super) const BATCH: u64 = 4096;
 /// log₂ of the points of a sequence.
 const SEQUENCE_BITS: u32 = 16;
 
-/// Domains below the stream of a photon path.
+/// Random-number domains of a photon path.
 pub(super) mod domain {
     pub(crate) const LIGHT: u32 = 0;
     pub(crate) const EMISSION: u32 = 1;

@@ -1,18 +1,18 @@
 //! Which photons are stored [Keller and Wald 2000, §2.3].
 //!
-//! Of photon paths more are traced than the global map needs, so that the caustic map is finer: its photons are stored
-//! with probability p(x), those of the global map with q·p(x), and their power is divided by it.
+//! More photon paths are traced than the global map needs, so that the caustic map is finer: caustic photons are stored
+//! with probability p(x), those of the global map with q·p(x), and their powers are divided by it.
 
 use strum::EnumIter;
 
-/// How the global map is thinned by the ratio q. All give the same maps on average.
+/// How the global map is thinned by the ratio q. All rules give the same maps on average.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, EnumIter)]
 pub enum CausticRule {
-    /// One number: ξ < q·p(x).
+    /// One random number: ξ < q·p(x).
     OneRule,
-    /// Two: ξ₁ < q, and only then ξ₂ < p(x), which is dear.
+    /// Two random numbers: ξ₁ < q, and only then ξ₂ < p(x), which is expensive.
     TwoTests,
-    /// The first ⌊qN⌋ of N photon paths fill both maps, the others the caustic map only.
+    /// The first ⌊qN⌋ of N photon paths fill both maps, the others only the caustic map.
     #[default]
     FirstPaths,
 }

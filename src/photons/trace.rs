@@ -25,13 +25,13 @@ use std::ops::Range;
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::time::{Duration, Instant};
 
-/// Batches between two looks at memory.
+/// Batches between two checks of the memory limit.
 const ROUND: u64 = 32;
-/// Photon paths of the first round of a pilot; later rounds double what is traced.
+/// Photon paths of the first round of a pilot; each later round doubles the number traced.
 const PILOT_PATHS: u64 = 128;
-/// A pilot stores one part in so many of the photons that are wanted.
+/// A pilot stores the requested number of photons divided by this.
 const PILOT_DIVISOR: u64 = 8;
-/// Fewest photons of a pilot, and most.
+/// Minimum and maximum number of photons of a pilot.
 const PILOT_PHOTONS: [u64; 2] = [1024, 16_384];
 /// Seed of pilots.
 const PILOT_SEED: u32 = 0x70_69_6c_6f;
@@ -43,21 +43,21 @@ const BYTES: u64 = 31;
 pub struct Tracing<'a> {
     /// Maps of different seeds are independent.
     pub seed: u32,
-    /// Most scatterings of a photon before it is stored; 0 stores photons straight from lights only.
+    /// Maximum number of scattering events before a photon is stored; 0 stores only photons straight from lights.
     pub max_depth: u32,
     /// The same for photons of the global map.
     pub max_global_depth: u32,
-    /// Ratio q of photon paths that fill the global map to all, in (0, 1].
+    /// Fraction q of the photon paths that fill the global map, in (0, 1].
     pub q: f32,
-    /// How that is done.
+    /// How the global map is thinned to it.
     pub caustics: CausticRule,
-    /// Part of the photon paths that lights share evenly, whatever their powers (0..1).
+    /// Fraction of the photon paths distributed evenly over the lights, whatever their powers (0..1).
     pub floor: f32,
-    /// Most photon paths of a pilot, and so of one that stores nothing and ends with an error.
+    /// Maximum number of photon paths of a pilot; if nothing is stored by then, it is an error.
     pub max_in_pilot: u64,
-    /// Ends it between two rounds when it becomes true.
+    /// Ends tracing between two rounds when it becomes true.
     pub stop: Option<&'a AtomicBool>,
-    /// Most memory of the maps (bytes).
+    /// Maximum memory of the maps (bytes).
     pub memory: Option<u64>,
 }
 
@@ -82,11 +82,11 @@ impl Default for Tracing<'_> {
 pub enum PhotonBudget {
     /// N photon paths.
     Paths(u64),
-    /// As many photon paths as store about so many photons, see [`path_count`].
+    /// As many photon paths as store about a given number of photons, see [`path_count`].
     Stored {
         /// Photons of the global map.
         global: u64,
-        /// Most photon paths.
+        /// Maximum number of photon paths.
         max_paths: u64,
     },
 }
@@ -100,7 +100,7 @@ pub struct Traced {
     pub caustic: Vec<Photon>,
     /// N.
     pub paths: u64,
-    /// Those that filled the global map.
+    /// Photon paths that filled the global map.
     pub global_paths: u64,
     /// Photons that arrived at Lambertian surfaces, stored or not, on photon paths of either map.
     pub arrivals: u64,
@@ -148,14 +148,13 @@ pub fn trace_photons(
     Ok(traced)
 }
 
-/// The number N of photon paths that [`trace_photons`] traces. Where photons are counted, it comes from a pilot, whose
-/// random numbers are not those of any map: maps of N photon paths have the right light on average whatever N is, while
-/// the number of photons that they store varies. Were N where the last photon wanted falls, as many as wanted would be
-/// divided by a random number, and light would be too bright by about one part in as many as the photons are [Haldane
-/// 1945].
+/// The number N of photon paths that [`trace_photons`] traces. If a number of photons is requested, a pilot determines
+/// N with random numbers that no map uses: maps of N photon paths have the right expectation whatever N is, while the
+/// number of photons that they store varies. If tracing ended with the last photon requested instead, powers would be
+/// divided by a random number of paths, and n photons would be too bright by about one part in n [Haldane 1945].
 ///
-/// The pilot stores about an eighth of the photons, at least 1024 and at most 16 384, and one N may serve many maps. An
-/// error if it stores nothing.
+/// The pilot stores about an eighth of the photons, at least 1024 and at most 16 384; the same N can be used for many
+/// maps. It is an error if the pilot stores nothing.
 pub fn path_count(
     job: &RenderJob,
     tracing: &Tracing<'_>,
@@ -174,7 +173,7 @@ pub fn path_count(
     }
 }
 
-/// A photon with its photon path.
+/// A photon with the index of its path.
 type Deposit = (u64, Photon);
 
 /// What a batch stored, in the order of photon paths.
@@ -218,8 +217,7 @@ impl<'a> Run<'a> {
         }
     }
 
-    /// The number of photon paths that store about `wanted` photons in the global map, by photon paths of a seed of
-    /// their own.
+    /// The number of photon paths that store about `wanted` photons in the global map, from paths with a separate seed.
     fn pilot(&self, wanted: u64, max: u64) -> Result<u64, PhotonError> {
         let enough = (wanted / PILOT_DIVISOR).clamp(PILOT_PHOTONS[0], PILOT_PHOTONS[1]);
         let limit = self.tracing.max_in_pilot.min(max);
@@ -238,7 +236,7 @@ impl<'a> Run<'a> {
             return Err(PhotonError::NothingStored { paths: traced, by_importance: arrivals > 0 });
         }
 
-        // A map of caustics alone has as many as were looked at
+        // Where only caustics are stored, the number of paths of the pilot
         let of_global = if global > 0 { wanted as f64 * traced as f64 / global as f64 } else { traced as f64 };
         let all = match self.tracing.caustics {
             CausticRule::OneRule | CausticRule::TwoTests => of_global,
@@ -273,7 +271,7 @@ impl<'a> Run<'a> {
         Ok(traced)
     }
 
-    /// Some photon paths, in parallel, in their order.
+    /// Traces a range of photon paths in parallel; the results are in their order.
     fn round(&self, paths: Range<u64>, global: u64) -> Vec<Batch> {
         let batches = (paths.end - paths.start).div_ceil(BATCH) as usize;
         (0..batches)
@@ -323,7 +321,7 @@ impl<'a> Run<'a> {
         Some(Particle::new(index, ray, s.power / pmf, Origin::Primary(light), stream))
     }
 
-    /// Stores an arrival, or not.
+    /// Decides whether an arrival is stored, and stores it.
     fn deposit(
         &self,
         batch: &mut Batch,

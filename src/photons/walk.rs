@@ -1,17 +1,18 @@
-//! Random walks of particles, a batch at a time: of photons from lights, and of importons from the camera.
+//! Random walks of particles, a batch at a time: photons from lights, and importons from the camera.
 //!
 //! At each surface a particle is scattered by its BSDF and survives with the probability by which its power would
-//! shrink, so that powers stay about equal [Arvo and Kirk 1990]. Photons carry flux, importons importance; their
+//! decrease, so that powers stay about equal [Arvo and Kirk 1990]. Photons carry flux, importons importance; their
 //! weights differ by the adjoint [Veach 1997, §5.3.2]:
 //!
-//! * importons, as camera paths: f |wi·ns|/p
-//! * photons: f η² |wo·ns| |wi·n|/(|wo·n| p), f being that of radiance, which is scaled by 1/η² where light is refracted
+//! * importons, like camera paths: f |wi·ns|/p
+//! * photons: f η² |wo·ns| |wi·n|/(|wo·n| p), f being that of radiance, which is scaled by 1/η² where light is
+//!   refracted
 //!
-//! with the shading normal ns and the geometric normal n, and `wo` to where the particle comes from.
+//! with the shading normal ns and the geometric normal n, and `wo` pointing to where the particle comes from.
 //!
-//! What a scattering was is told apart by what it is *of*: the Lambertian part of the BSDF, or the rest. Where both
-//! scatter into the direction that was sampled, one of them is chosen in proportion to its f, and the weight is that of
-//! the chosen one over its probability.
+//! A scattering event belongs either to the Lambertian part of the BSDF or to the other lobes. Where both scatter into
+//! the sampled direction, one of them is chosen in proportion to its f, and the weight is that of the chosen one over
+//! its probability.
 
 use super::photon::Origin;
 use crate::accel::{Coherence, Hit, RayBatch};
@@ -26,13 +27,13 @@ use lumiris_numbers::samplers::SampleStream;
 /// Surfaces without scattering that a particle may pass between two vertices.
 const MAX_PASSED: u32 = 64;
 
-/// Domains below the stream of a vertex.
+/// Random-number domains of a vertex.
 mod domain {
     pub(super) const BSDF: u32 = 0;
     pub(super) const RESAMPLE: u32 = 1;
     pub(super) const ROULETTE: u32 = 2;
     pub(super) const PART: u32 = 3;
-    /// Two numbers for the deposit.
+    /// Two numbers that decide on storage.
     pub(super) const DEPOSIT: u32 = 4;
     /// Vertex k has the domain `VERTEX + k` of the photon path.
     pub(super) const VERTEX: u32 = 16;
@@ -46,7 +47,7 @@ pub(super) struct Particle {
     pub(super) ray: Ray,
     /// What it carries.
     pub(super) power: Rgb,
-    /// How it came to be where it is.
+    /// Its last scattering event.
     pub(super) origin: Origin,
     /// Random numbers of its photon path.
     pub(super) stream: SampleStream,
@@ -68,7 +69,7 @@ pub(super) struct Arrival<'a> {
     /// Geometric normal on the side of `wi`.
     pub(super) n: Vec3,
     pub(super) part: &'a Lambertian<'a>,
-    /// How often it was scattered before.
+    /// Number of scattering events before.
     pub(super) scatterings: u32,
     stream: SampleStream,
 }
@@ -81,11 +82,11 @@ impl Arrival<'_> {
     }
 }
 
-/// How particles walk.
+/// Settings of a random walk.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct WalkSettings {
     pub(super) transport: Transport,
-    /// Most scatterings before an arrival.
+    /// Maximum number of scattering events before an arrival.
     pub(super) max_depth: u32,
 }
 
@@ -103,7 +104,7 @@ pub(super) struct Walker {
 }
 
 impl Walker {
-    /// Lets the active particles walk until all are gone, and tells of their arrivals at Lambertian surfaces: vertex by
+    /// Traces the active particles until all have ended, and reports their arrivals at Lambertian surfaces: vertex by
     /// vertex, not particle by particle.
     pub(super) fn walk(&mut self, job: &RenderJob, settings: &WalkSettings, mut arrive: impl FnMut(&Arrival<'_>)) {
         self.sort(job);
@@ -119,7 +120,7 @@ impl Walker {
         self.active.clear();
     }
 
-    /// Makes neighbours of particles that start alike: from one light, in like directions, near each other.
+    /// Sorts the particles so that neighbours start alike: at the same light, in similar directions, close together.
     fn sort(&mut self, job: &RenderJob) {
         let lights = &job.lights;
         let key = |particle: &Particle| {

@@ -32,9 +32,9 @@ pub struct BenchSettings {
     pub t1: bool,
     /// Shadow segments.
     pub t2: bool,
-    /// Turns of each loop.
+    /// Runs of each loop.
     pub runs: u32,
-    /// Most camera rays.
+    /// Maximum number of camera rays.
     pub rays: usize,
     /// Rays per packet; the processor's own width if not given.
     pub packet_width: Option<u32>,
@@ -62,7 +62,7 @@ pub struct Report {
 /// A query, by the renderer and by the bare loop.
 #[derive(Clone, Debug, Serialize)]
 pub struct RayCase {
-    /// What rays.
+    /// Kind of rays.
     pub name: &'static str,
     /// Rays per packet.
     pub width: u32,
@@ -76,7 +76,7 @@ pub struct RayCase {
     pub mrays: f64,
     /// Millions of rays per second of the bare loop, by the medians of its batches.
     pub bare_mrays: f64,
-    /// The renderer's speed by that of the bare loop.
+    /// The renderer's speed relative to the bare loop.
     pub ratio: f64,
     /// Median over the turns of the ratio of a whole turn of each.
     pub turn_ratio: f64,
@@ -159,7 +159,7 @@ fn record(job: &RenderJob, batches: &[Vec<CameraSample>]) -> Recording {
     integrator.recording.take().unwrap_or_default()
 }
 
-/// Renders the batches some times.
+/// Renders the batches several times.
 fn stages(job: &RenderJob, batches: &[Vec<CameraSample>], runs: u32) -> (Vec<Stage>, Option<Proposals>) {
     let mut integrator = PathIntegrator::default();
     let mut out = Vec::new();

@@ -45,10 +45,10 @@ const BATCH_PATHS: usize = 4096;
 /// Seed of the blocks of progressive estimators.
 const BLOCK_SEED: u32 = 0x62_6c_6f_63;
 
-/// Makes the seed of replicas from that of the image.
+/// Combined with the seed of the image to give that of replicas.
 const REPLICA_SEED: u32 = 0x72_65_70_73;
 
-/// How to render; none of it changes the image but the sample range.
+/// How to render. Only the sample range affects the image.
 #[derive(Clone, Copy, Debug)]
 pub struct RenderSettings {
     /// Threads; all cores if `None`.
@@ -59,9 +59,9 @@ pub struct RenderSettings {
     pub first_sample: u32,
     /// Samples per pixel from there on.
     pub spp: u32,
-    /// Stops after the pass in which this runs out.
+    /// Stops after the first pass that ends later than this.
     pub time_limit: Option<Duration>,
-    /// Estimates some pixels twice where that tells the variance of their means; see [`crate::film::replicas`].
+    /// Estimates some pixels twice, which gives the variance of pixel means; see [`crate::film::replicas`].
     pub with_replicas: bool,
 }
 
@@ -71,12 +71,12 @@ impl Default for RenderSettings {
     }
 }
 
-/// What an observer learns after every tile.
+/// Progress reported after every tile.
 #[derive(Clone, Copy, Debug)]
 pub struct Progress {
     /// Camera samples done.
     pub samples_done: u64,
-    /// Camera samples asked for.
+    /// Camera samples requested.
     pub samples_total: u64,
     /// Rays of all kinds traced so far.
     pub rays: u64,
@@ -105,23 +105,23 @@ pub struct Rendering {
     pub threads: usize,
 }
 
-/// What became of an irradiance cache.
+/// Statistics of an irradiance cache.
 #[derive(Clone, Copy, Debug)]
 pub struct CacheReport {
     /// Records.
     pub records: usize,
-    /// Bytes that they take.
+    /// Their memory (bytes).
     pub bytes: usize,
-    /// How it was made; the counts of its rays are also part of the rendering's.
+    /// How it was built; its ray counts are also included in those of the rendering.
     pub build: BuildStats,
-    /// How often it was asked, and how often in vain.
+    /// Lookups and cache misses.
     pub lookups: LookupStats,
 }
 
 /// Why a rendering ended without an image.
 #[derive(Debug, thiserror::Error)]
 pub enum RenderError {
-    /// The system gives no threads.
+    /// The threads could not be started.
     #[error(transparent)]
     Threads(#[from] ThreadError),
     /// There are no photon maps.
@@ -317,8 +317,8 @@ impl<'a> Run<'a> {
         MapMaker::new(self.job, &seen, self.stop).map(Some)
     }
 
-    /// Makes the photon maps of the pass that begins with the sample `first`, if it needs others. False if it was told to stop and
-    /// the samples so far are an image.
+    /// Makes the photon maps of the pass that begins with the sample `first`, if it needs others. False if it was told
+    /// to stop and the samples so far are an image.
     fn renew_maps(&mut self, maker: &mut MapMaker<'_>, first: u32) -> Result<bool, PhotonError> {
         let is_progressive = self.job.settings().integrator.photons.progressive.is_some();
         if self.maps.is_some() && !is_progressive {

@@ -27,7 +27,7 @@ pub enum Aov {
     /// The best M/N of `ris`: as a colour `ratio.R/G/B`, green where more proposals and red where more samples are best
     /// [Talbot et al. 2005, Fig. 3], and as numbers `ratio.proposals` and `ratio.samples`.
     Ratio,
-    /// Records of the irradiance cache that the pixel asked for, `records`.
+    /// Records of the irradiance cache that were computed for the pixel, `records`.
     Records,
 }
 
@@ -88,8 +88,8 @@ pub fn channels(film: &Film, aovs: &[Aov], sample_count_map: Option<&SampleCount
     Channels { names, data }
 }
 
-/// Colour and numbers of a pixel of the map: from red at the least ratio (1) to green at the greatest of the map,
-/// by its logarithm.
+/// Colour and numbers of a pixel of the map: from red at the minimum ratio (1) to green at the maximum of the map,
+/// logarithmically.
 fn ratio_values(map: &SampleCountMap, pixel: usize) -> [f32; 5] {
     let ratio = map.ratios[pixel];
     let max = map.ratios.iter().copied().fold(1.0, f32::max).max(1.0 + f32::EPSILON);
@@ -104,7 +104,7 @@ pub fn display(film: &Film, exposure: f32) -> Vec<f32> {
     film.pixels.iter().flat_map(|p| p.mean().map(|v| linear_to_srgb((v as f32 * gain).clamp(0.0, 1.0)))).collect()
 }
 
-/// What an image depends on, as metadata entries `lumiris:…`: its settings, and what the film is like.
+/// Everything that an image depends on, as metadata entries `lumiris:…`: its settings and the film.
 pub fn metadata(film: &FilmSettings, settings: &Settings) -> Vec<(String, String)> {
     let b = &film.bounds;
     let film = [

@@ -1,14 +1,14 @@
-//! What settings leave open until the scene is there: photons that tell which lights are seen, and of `ris` the number of proposals M
-//! for N samples.
+//! Completes what the settings leave open until the scene is loaded: the visibility cache, and the number of proposals
+//! M for N samples of `ris`.
 //!
 //! T1, the time of a proposal, and T2, that of a sample, are measured on a few thousand camera rays. Then
 //!
 //! * `auto`: M/N = T2/T1, so that both stages take the same time [Talbot 2005, Eq. 4.4].
-//! * `optimal`: the same time per estimate, split in each pixel by the variances of its own light
-//!   [Talbot 2005, Eq. 4.3], which a pilot estimates from proposals that are all traced.
+//! * `optimal`: the same time per estimate, but M and N chosen in each pixel by the variances of its own light [Talbot
+//!   2005, Eq. 4.3], which a pilot estimates from proposals that are all traced.
 //!
-//! Times differ from run to run; so the numbers chosen are part of the image's metadata, and giving them back gives the
-//! same image to the bit.
+//! Times vary from run to run; so the chosen counts are recorded in the image's metadata, and rendering with them gives
+//! the same image to the bit.
 
 use super::visibility_cache::build_visibility_cache;
 use super::{RenderSettings, Run, ThreadError, camera_batches};
@@ -28,28 +28,28 @@ use std::time::Duration;
 
 /// Camera rays on which times are measured.
 const TIMING_RAYS: usize = 8192;
-/// Proposals and samples of the estimates that are timed: few and many.
+/// Sample counts of the estimates that are timed: few and many.
 const TIMING: [SampleCounts; 2] =
     [SampleCounts { samples: 1, proposals: 8 }, SampleCounts { samples: 5, proposals: 40 }];
-/// Camera samples per pixel of the pilot, and its proposals, all of which are traced.
+/// Camera samples per pixel of the pilot, and its proposals per estimate, all of which are traced.
 const PILOT_SPP: u32 = 2;
 const PILOT_PROPOSALS: u32 = 32;
 /// Variances are averaged over this many pixels to each side.
 const PILOT_RADIUS: u32 = 2;
-/// Seed of the pilot, for which the image's own random numbers must not be used: they would be chosen by their outcome.
+/// Seed of the pilot. It must not use the random numbers of the image, whose samples would then depend on the choice.
 const PILOT_SEED: u32 = 0x70_69_6c_6f;
 
-/// What was found out and chosen.
+/// The measured times and the chosen counts.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Plan {
     /// Times of the stages.
     pub times: StageTimes,
-    /// Samples and proposals; with `optimal` those whose time each pixel spends in its own way.
+    /// Sample counts; with `optimal` those that define the time of an estimate.
     pub sample_counts: SampleCounts,
 }
 
-/// Chooses what the settings of `job` leave open, and sets it. `None` if they leave nothing open. `ratio_map` asks for the
-/// map of the best M/N even if it is not used.
+/// Completes what the settings of `job` leave open; `None` if that is nothing. `ratio_map` requests the map of the best
+/// M/N even if it is not used.
 pub fn prepare(job: &mut RenderJob, threads: Option<usize>, ratio_map: bool) -> Result<Option<Plan>, ThreadError> {
     let settings = job.settings().integrator;
     if settings.uses_visibility_cache() && job.lights.visibility_cache().is_none() {
@@ -84,7 +84,8 @@ pub fn prepare(job: &mut RenderJob, threads: Option<usize>, ratio_map: bool) -> 
     Ok(Some(Plan { times, sample_counts }))
 }
 
-/// Fits a + M·T1 and b + N·T2 to the times of few and of many proposals and samples; `None` if there was nothing to light.
+/// Fits a + M·T1 and b + N·T2 to the times of few and of many proposals and samples; `None` if there was nothing to
+/// light.
 fn measure(job: &RenderJob) -> Option<StageTimes> {
     let [few, many] = vertex_times(job)?;
     let [m0, m1] = TIMING.map(|sample_counts| f64::from(sample_counts.proposals));
@@ -92,8 +93,8 @@ fn measure(job: &RenderJob) -> Option<StageTimes> {
     Some(StageTimes { t1: rounded((many[0] - few[0]) / (m1 - m0)), t2: rounded((many[1] - few[1]) / (n1 - n0)) })
 }
 
-/// Nanoseconds per vertex of both stages for each split of [`TIMING`], which take turns on this thread: medians over batches of
-/// camera rays. `None` if nothing was lit.
+/// Nanoseconds per vertex of both stages for each entry of [`TIMING`], which alternate on this thread: medians over
+/// batches of camera rays. `None` if there was nothing to light.
 fn vertex_times(job: &RenderJob) -> Option<[[f64; 2]; 2]> {
     let batches = camera_batches(job, RenderSettings::default().tile_size, TIMING_RAYS);
     let mut integrator = PathIntegrator::default();
@@ -125,12 +126,12 @@ fn vertex_times(job: &RenderJob) -> Option<[[f64; 2]; 2]> {
     is_lit.then(|| measured.map(|stages| stages.map(median)))
 }
 
-/// A time in tenths of nanoseconds, at least one: what is printed is what was used.
+/// A time rounded to tenths of nanoseconds, at least one: the printed times are those used.
 fn rounded(nanoseconds: f64) -> f64 {
     (nanoseconds * 10.0).round().max(1.0) / 10.0
 }
 
-/// The best M/N of each pixel for the time that `sample_counts` takes.
+/// The best M/N of each pixel for the time of an estimate with `sample_counts`.
 fn sample_count_map(
     job: &RenderJob,
     threads: Option<usize>,
@@ -155,7 +156,7 @@ fn sample_count_map(
     })
 }
 
-/// V(f/p) and V(f/q) around each pixel, row by row; `None` where nothing is lit.
+/// V(f/p) and V(f/q) around each pixel, row by row; `None` where there is nothing to light.
 fn pilot(job: &RenderJob) -> Vec<Option<Variances>> {
     // Moments of each pixel
     let bounds = job.world.scene.film.bounds;
@@ -214,7 +215,7 @@ fn pilot_row(job: &RenderJob, row: &PixelBounds) -> Vec<MomentsEstimate> {
         for o in &outcomes {
             sum.add(o.contribution.to_array().map(|c| f64::from(c) * m), f64::from(o.unshadowed.luminance()) * m);
         }
-        // Proposals without light are proposals too
+        // Zero-valued proposals count as well
         let lit = out.iter().filter(|r| r.features.is_some()).count() * PILOT_PROPOSALS as usize;
         (outcomes.len()..lit).for_each(|_| sum.add([0.0; 3], 0.0));
     }

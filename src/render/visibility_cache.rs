@@ -1,19 +1,18 @@
-//! What photons tell of the visibility of lights, traced before the image where its settings ask for it
-//! [Keller and Wald 2000, §3].
+//! Builds the visibility cache before rendering, where the settings ask for it [Keller and Wald 2000, §3].
 
 use crate::lights::VisibilityCache;
 use crate::photons::{PhotonBudget, Tracing, trace_photons};
 use crate::scene::RenderJob;
 
-/// Photon paths for each light, and their least and greatest number.
+/// Photon paths per light, and the minimum and maximum number of them all.
 const PER_LIGHT: u64 = 512;
 const PATHS: [u64; 2] = [1 << 18, 1 << 23];
-/// Share of the photon paths that all lights have evenly: a weak light next to a surface matters as a strong one far
-/// away does.
+/// Fraction of the photon paths distributed evenly over the lights: a weak light next to a surface matters as much as a
+/// strong one far away.
 const UNIFORM_FRACTION: f32 = 0.5;
 
-/// Traces photons straight from lights, on all threads of the current pool, and lets them tell which lights are seen; with their number.
-/// `None` for a scene that no photon arrives in: estimates do without.
+/// Traces photons straight from lights on all threads of the current pool, and builds the cache from them; returned
+/// with their number. `None` if no photon arrives at a surface: estimates then do without a cache.
 pub fn build_visibility_cache(job: &RenderJob) -> Option<(VisibilityCache, usize)> {
     let lights = &job.lights;
     let fitting = (PER_LIGHT * lights.lights.len() as u64).clamp(PATHS[0], PATHS[1]);

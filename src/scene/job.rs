@@ -11,17 +11,17 @@ pub struct RenderJob {
     /// Geometry, materials, lights, and ray tracers.
     pub world: World,
     settings: Settings,
-    /// The lights, as settings and photons choose among them.
+    /// The lights, with the light sampler and the visibility cache.
     pub lights: LightSampling,
     /// Irradiances of lights that are known in closed form.
     pub irradiances: Irradiances,
-    /// Samples and proposals of each pixel, if they were chosen for each by itself.
+    /// Sample counts of each pixel, if they are chosen per pixel.
     pub sample_count_map: Option<SampleCountMap>,
     lobes: usize,
 }
 
 impl RenderJob {
-    /// Prepares what does not need rays.
+    /// Prepares everything that needs no rays.
     pub fn new(world: World, settings: Settings) -> Self {
         let i = &settings.integrator;
         let scene = &world.scene;
@@ -38,7 +38,7 @@ impl RenderJob {
         &self.settings
     }
 
-    /// Changes the settings, and what depends on them. What photons and pilots told stays.
+    /// Changes the settings, and what depends on them. The results of photons and pilots are kept.
     pub fn change(&mut self, change: impl FnOnce(&mut Settings)) {
         let before = self.settings.integrator;
         change(&mut self.settings);
@@ -52,7 +52,7 @@ impl RenderJob {
         }
     }
 
-    /// Number of components that BSDFs are in a mixture with the groups of lights: the lobes of those that have most.
+    /// Number of components of BSDFs in a mixture: the maximum number of lobes of any BSDF.
     pub fn lobes(&self) -> usize {
         self.lobes
     }
@@ -63,7 +63,7 @@ impl RenderJob {
     }
 }
 
-/// Most groups of lights: as many as a mixture has components beside `lobes`.
+/// Maximum number of groups of lights: the components of a mixture other than `lobes`.
 fn max_groups(settings: &IntegratorSettings, lobes: usize) -> usize {
     settings.ocv.max_components().saturating_sub(lobes).max(1)
 }

@@ -1,7 +1,7 @@
 //! A scene owns everything that is rendered, in vectors; what refers to something holds its index.
 //!
-//! [`Scene`] is data, as an importer makes it; [`World`] is a scene with its ray tracers; [`RenderJob`] is a world with the settings
-//! that it is rendered by, and with what they prepare.
+//! [`Scene`] is data, as an importer makes it; [`World`] is a scene with its ray tracers; [`RenderJob`] is a world with
+//! the settings that it is rendered by, and with what they prepare.
 
 mod job;
 mod sample_count_map;
@@ -41,12 +41,12 @@ pub struct Scene {
     pub lights: Arc<LightSet>,
 }
 
-/// What a geometry is made of.
+/// Surface properties of a geometry.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Surface {
     /// Its material.
     pub material: MaterialId,
-    /// A name for people: the file or shape that it came from.
+    /// A readable name: the file or shape that it came from.
     pub name: String,
 }
 
@@ -59,7 +59,7 @@ pub struct FilmSettings {
     pub bounds: PixelBounds,
     /// Pixel filter.
     pub filter: PixelFilter,
-    /// Where the file wants the image.
+    /// Output file given in the scene file.
     pub file_name: Option<String>,
     /// Factor from radiance to pixel value (ISO and exposure of the sensor); 1 by default.
     pub scale: f32,

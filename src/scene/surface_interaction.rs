@@ -1,4 +1,4 @@
-//! What a ray found: a hit with what shading needs of it.
+//! A surface interaction: a hit with what shading needs of it.
 
 use super::RenderJob;
 use crate::accel::Hit;
@@ -8,7 +8,7 @@ use crate::textures::TextureContext;
 use lumiris_numbers::math::ray::offset_origin;
 use lumiris_numbers::math::{Ray, Vec2, Vec3};
 
-/// A hit with its surface.
+/// A ray's hit on a surface, with its differential geometry and texture footprint.
 #[derive(Clone, Copy, Debug)]
 pub struct SurfaceInteraction {
     /// What was hit.
@@ -19,7 +19,7 @@ pub struct SurfaceInteraction {
     pub wo: Vec3,
     /// Width of a pixel at the hit (m).
     pub width: f32,
-    /// Distance that the ray went (m).
+    /// Distance along the ray (m).
     pub distance: f32,
     context: TextureContext,
 }
@@ -40,7 +40,7 @@ impl SurfaceInteraction {
         SurfaceInteraction { hit: *hit, surface, wo: -ray.d.normalize(), width, distance, context }
     }
 
-    /// The scattering at the hit; `None` where rays pass.
+    /// The BSDF at the hit; `None` where rays pass through.
     pub fn scatter<'j>(&self, job: &'j RenderJob) -> Option<SurfaceBsdf<'j>> {
         let scene = &job.world.scene;
         let material = scene.surfaces[self.hit.geometry as usize].material;

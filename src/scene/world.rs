@@ -24,7 +24,7 @@ pub enum AccelKind {
 
 /// A scene and two ray tracers: over everything, and over emitters only.
 ///
-/// The second one answers what a BSDF sample would hit if nothing were in the way, so that proposing candidates
+/// The second one determines what a BSDF sample would hit if nothing else were in the way, so that proposing candidates
 /// needs no visibility.
 pub struct World {
     /// The scene.
@@ -38,7 +38,7 @@ pub struct World {
     emitters_hide: bool,
 }
 
-/// The emitter that a ray meets first among emitters.
+/// The first emitter that a ray hits.
 #[derive(Clone, Copy, Debug)]
 pub struct EmitterHit {
     /// Geometry of the scene.
@@ -49,7 +49,7 @@ pub struct EmitterHit {
     pub uv: [f32; 2],
     /// Ray parameter.
     pub t: f32,
-    /// The light that this primitive is, if it emits.
+    /// The light of this primitive, if it emits.
     pub light: Option<LightId>,
 }
 
@@ -93,12 +93,12 @@ impl World {
         Ok(World { scene, accel, emitters, emitter_geometry, emitters_hide })
     }
 
-    /// True if an emitter can be in the way to another.
+    /// True if an emitter can hide another.
     pub fn emitters_hide(&self) -> bool {
         self.emitters_hide
     }
 
-    /// For each segment, whether an emitter is in the way.
+    /// For each segment, whether an emitter occludes it.
     pub fn occluded_by_emitters(&self, segments: &RayBatch, out: &mut Vec<bool>) {
         match &self.emitters {
             Some(emitters) => emitters.occluded(segments, Coherence::Incoherent, out),
@@ -109,7 +109,7 @@ impl World {
         }
     }
 
-    /// What each ray would meet first if only emitters were there.
+    /// What each ray would hit first if there were only emitters.
     pub fn intersect_emitters(
         &self,
         rays: &RayBatch,

@@ -258,8 +258,8 @@ pub enum EstimatorKind {
 }
 
 impl EstimatorKind {
-    /// True if samples are drawn for each group of lights by itself, and are measured against the density of each component of
-    /// the mixture.
+    /// True if samples are drawn separately for each group of lights, and the density of each component of the mixture
+    /// is evaluated at each sample.
     pub fn has_components(self) -> bool {
         match self {
             EstimatorKind::Mc
@@ -323,7 +323,7 @@ pub enum CorrelatedForm {
     Crossfit,
 }
 
-/// Direct light by the lights that photons say are seen [Keller and Wald 2000, §3].
+/// Direct light with separate samples on contributing and non-contributing lights [Keller and Wald 2000, §3].
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct ContributingSettings {
     /// Samples on non-contributing lights (S_non), in addition to those of an estimate (S_con). 0 is biased.
@@ -336,7 +336,7 @@ impl Default for ContributingSettings {
     }
 }
 
-/// A technique that draws directions of light.
+/// A technique for sampling directions.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, EnumString, IntoStaticStr, VariantNames)]
 #[strum(serialize_all = "kebab-case")]
 pub enum SamplingTechnique {
@@ -346,7 +346,7 @@ pub enum SamplingTechnique {
     Light,
 }
 
-/// Numbers of one estimate: N samples (shadow segments) of M proposals.
+/// Sample counts of one estimate: N samples (shadow segments), resampled from M proposals.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct SampleCounts {
     /// N.

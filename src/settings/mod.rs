@@ -1,7 +1,7 @@
 //! Settings of an image: what is computed, how, and with which random numbers.
 //!
-//! [`Settings`] is plain data, which the renderer reads. [`table`] has a row for each setting, with its names, range, default, help
-//! and where it applies: command line, scene files, metadata and `lumiris info` are made from it.
+//! [`Settings`] is plain data, which the renderer reads. [`table`] has a row for each setting, with its names, range,
+//! default, help and where it applies; command line, scene-file parameters, metadata and `lumiris info` follow from it.
 //!
 //! Reading order: [`integrator`], [`ris`], [`photon_map`], [`sampling`], [`value`], [`table`].
 
@@ -22,7 +22,7 @@ pub use sampling::SamplingSettings;
 pub use table::Setting;
 pub use value::Value;
 
-/// All settings of an image but its size and filter, which belong to the film.
+/// All settings of an image, except its size and filter, which belong to the film.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct Settings {
     /// Light transport.
@@ -32,11 +32,11 @@ pub struct Settings {
 }
 
 impl Settings {
-    /// What these settings leave out of the image, if anything.
+    /// The biases of these settings: light that is left out of the image.
     pub fn biases(&self) -> Vec<&'static str> {
         let i = &self.integrator;
         let cuts_off = i.kind == IntegratorKind::PhotonMap && matches!(i.photons.storage, PhotonStorage::CutOff(_));
-        let lights = i.leaves_lights_out().then_some("lights that no photon came from are left out");
+        let lights = i.leaves_lights_out().then_some("non-contributing lights are left out");
         let photons = cuts_off.then_some("photons where importance is low are left out");
         lights.into_iter().chain(photons).collect()
     }

@@ -3,13 +3,13 @@
 /// Photon maps [Jensen 1996; Keller and Wald 2000].
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct PhotonMapSettings {
-    /// About how many photons the global map stores; a progressive map so many in each pass.
+    /// Approximate number of photons in the global map; of a progressive map, in each pass.
     pub photons: u32,
     /// q: the fraction of the photon paths that also fill the global map; all of them fill the caustic map.
     pub caustic_ratio: f32,
     /// Which photons are stored.
     pub storage: PhotonStorage,
-    /// Photons of an estimate (k).
+    /// Photons per estimate (k).
     pub nearest: u32,
     /// Final-gather rays per diffuse vertex; 0 visualises the global map directly.
     pub gather: u32,
@@ -17,8 +17,7 @@ pub struct PhotonMapSettings {
     pub guide: f32,
     /// New photons and smaller radii for every sample; `None` for a single map.
     pub progressive: Option<ProgressiveSettings>,
-    /// Photon paths of the photons of the visibility cache, which any integrator can use; `None`: by the number of
-    /// lights.
+    /// Photon paths of the visibility cache, which any integrator can use; `None`: by the number of lights.
     pub visibility_photons: Option<u32>,
     /// Maximum memory of the maps (bytes).
     pub memory: u64,
@@ -48,13 +47,13 @@ impl Default for PhotonMapSettings {
 pub enum PhotonStorage {
     /// All.
     All,
-    /// With the probability p(x) by visual importance, but at least this. Unbiased.
+    /// With probability p(x) by visual importance, but at least this. Unbiased.
     Floor(f32),
-    /// With the probability p(x), none where it is below this. Biased.
+    /// With probability p(x), but none where it is below this. Biased.
     CutOff(f32),
 }
 
-/// Radii of progressive photon mapping: r²ᵢ₊₁ = r²ᵢ·(i + α)/(i + 1) [Knaus and Zwicker 2011, Eq. 15].
+/// Settings of progressive photon mapping. Radii: r²ᵢ₊₁ = r²ᵢ·(i + α)/(i + 1) [Knaus and Zwicker 2011, Eq. 15].
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct ProgressiveSettings {
     /// α, above 0 and below 1: near 0, variance decreases slowly and bias fast.
@@ -70,7 +69,7 @@ impl Default for ProgressiveSettings {
 }
 
 impl ProgressiveSettings {
-    /// The factor of the first radius in pass `pass`, which are counted from 0.
+    /// The ratio of the radius in pass `pass`, counted from 0, to the first radius.
     pub fn factor(&self, pass: u32) -> f32 {
         let alpha = f64::from(self.alpha);
         let squares = (1..=pass).map(|i| (f64::from(i) - 1.0 + alpha) / f64::from(i));

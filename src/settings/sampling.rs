@@ -2,19 +2,19 @@
 
 use lumiris_numbers::samplers::SamplerKind;
 
-/// Least width of a texture footprint, in pixels, as in pbrt-v4.
+/// Minimum width of a texture footprint, in pixels, as in pbrt-v4.
 const MIN_FOOTPRINT: f32 = 0.125;
 
 /// Random numbers.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct SamplingSettings {
-    /// Which sequence.
+    /// The sequence.
     pub sampler: SamplerKind,
     /// Camera samples per pixel.
     pub spp: u32,
     /// Images of different seeds are independent estimates of the same image.
     pub seed: u32,
-    /// Samples per pixel that texture footprints are made for; `spp` if `None`.
+    /// Samples per pixel that texture footprints are computed for; `spp` if `None`.
     pub footprint_spp: Option<u32>,
 }
 
@@ -25,7 +25,7 @@ impl Default for SamplingSettings {
 }
 
 impl SamplingSettings {
-    /// Samples per pixel that texture footprints are made for.
+    /// Samples per pixel that texture footprints are computed for.
     pub fn footprint_spp(&self) -> u32 {
         self.footprint_spp.unwrap_or(self.spp).max(1)
     }
@@ -50,7 +50,7 @@ mod tests {
             s.footprint_spp = Some(spp);
             assert_eq!((s.footprint_spp(), s.footprint()), (spp, width), "{spp}");
         }
-        // Asked for no samples at all
+        // Zero samples requested
         assert_eq!(SamplingSettings { spp: 0, footprint_spp: None, ..s }.footprint(), 1.0);
     }
 }

@@ -16,7 +16,7 @@ pub(super) fn positive(p: &ParamSet, key: &'static str, default: f32, d: &mut Di
     }
 }
 
-/// An unknown name of something, with what is near.
+/// An error about an unknown name, with similar names.
 pub fn unknown(name: &str, span: Span, what: &str, known: &[&str], d: &mut Diagnostics) {
     let help = match did_you_mean(name, known.iter().copied()) {
         Some(near) => format!("did you mean `{near}`?"),

@@ -9,7 +9,7 @@ use lumiris_formats::source::Span;
 use lumiris_numbers::math::{Affine3A, Rgb, Vec2, Vec3};
 use std::path::PathBuf;
 
-/// A directive that is understood when all of them are known: the camera needs the film's size.
+/// A directive that is evaluated once all of them have been read: the camera needs the film's size.
 pub(super) struct Pending {
     pub name: Name,
     pub params: ParamSet,

@@ -1,4 +1,4 @@
-//! The end of an import: all files are read in parallel, and the scene is put together in the order of its text.
+//! The end of an import: reads all files in parallel, and assembles the scene in the order of its text.
 
 use super::descriptions::{AreaLightDesc, ShapeDesc};
 use super::lights::power_factor;
@@ -19,12 +19,12 @@ use std::collections::HashMap;
 use std::path::PathBuf;
 use std::sync::Arc;
 
-/// Geometry while it is put together.
+/// Geometry while it is assembled.
 #[derive(Default)]
 struct Assembly {
     set: GeometrySet,
     surfaces: Vec<Surface>,
-    /// What emits, with its light's description.
+    /// Emitters, with the descriptions of their lights.
     emitters: Vec<(GeometryId, Emission)>,
     /// Opening and closing of the shutter as fractions of the motion.
     shutter: [f32; 2],
@@ -33,7 +33,7 @@ struct Assembly {
 }
 
 impl Builder<'_> {
-    /// Reads what the text asks for and makes the scene; `None` after an error.
+    /// Reads the files that the text names and builds the scene; `None` after an error.
     pub fn finish(mut self, d: &mut Diagnostics) -> Option<(Scene, Settings)> {
         let options = self.options.finish(self.load_options, d);
 
@@ -55,7 +55,7 @@ impl Builder<'_> {
         self.add_environments(images, d);
         let images = self.check_emission_images(emission_images, &shapes, d);
 
-        // Put the geometry together
+        // Assemble the geometry
         let shutter = options.as_ref().map_or([0.0, 1.0], |s| s.shutter);
         let mut assembly = Assembly { shutter, images, ..Assembly::default() };
         assembly.set.groups.resize_with(self.objects.len(), Group::default);

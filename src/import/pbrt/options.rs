@@ -1,4 +1,4 @@
-//! What stands before `WorldBegin`: the camera; integrator and sampler are in [`super::settings`], film and filter are in
+//! Directives before `WorldBegin`: the camera; integrator and sampler are in [`super::settings`], film and filter in
 //! [`super::film`].
 
 use super::checks::{positive, unknown};
@@ -27,7 +27,7 @@ pub struct Options {
     seed: Option<u32>,
 }
 
-/// The options, understood.
+/// The options, parsed.
 pub struct ParsedOptions {
     /// Camera.
     pub camera: Camera,
@@ -105,7 +105,7 @@ impl Options {
         params.report_unused(d);
     }
 
-    /// Understands all options.
+    /// Parses all options.
     pub fn finish(&self, load: &LoadOptions, d: &mut Diagnostics) -> Option<ParsedOptions> {
         let (film, exposure_scale) = finish_film(self.film.as_ref(), self.filter.as_ref(), load, d);
         let mut settings = Settings::default();

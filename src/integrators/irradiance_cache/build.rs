@@ -1,15 +1,15 @@
-//! Makes the cache, the same for any number of threads.
+//! Builds the cache, with the same result for any number of threads.
 //!
-//! Camera samples ask in rounds, of coarser subsets of the pixels first: 16 pixels apart, then those between, and so on; the
-//! second camera sample of every pixel after the first of all. In a round
+//! Camera samples request records in rounds, coarser subsets of the pixels first: every 16th pixel, then those between,
+//! and so on; the second camera sample of every pixel follows after the first of all. In a round
 //!
-//! 1. all its camera samples, and what they see in mirrors and through glass, are traced in parallel; those whose diffuse
-//!    surface no record of earlier rounds serves, ask for one;
-//! 2. one after the other, a point is dropped that a record at an accepted point would serve, however small its reach;
+//! 1. all camera samples, and what they see through mirrors and glass, are traced in parallel; those whose diffuse
+//!    surface has no usable record from earlier rounds request one;
+//! 2. sequentially, requests are dropped that a record at an accepted point would serve, however small its radius;
 //! 3. the records of the others are computed in parallel;
-//! 4. one after the other, in the order of pixels, they are added.
+//! 4. sequentially, in the order of the pixels, they are added.
 //!
-//! So a round sees what earlier rounds made and nothing else.
+//! So a round depends only on earlier rounds.
 
 use super::cache::IrradianceCache;
 use super::gather::{BATCH, Gatherer, RecordRequest};
@@ -24,27 +24,27 @@ use rayon::prelude::*;
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::time::{Duration, Instant};
 
-/// Distance of the pixels of the first round.
+/// Pixel distance of the first round.
 const COARSEST: u32 = 16;
-/// Camera samples of each pixel that ask.
+/// Camera samples per pixel that request records.
 const SAMPLES: u32 = 2;
-/// Camera samples ask if no record serves them with this error: those of the image find one with less than 1.
+/// Maximum error of a record for which no other is requested; rendering accepts errors up to 1.
 const COVERED: f32 = 0.7;
-/// A vertex that a camera ray reaches by mirrors and glass asks only if so much of its light arrives.
+/// Minimum throughput at which a vertex seen through mirrors and glass requests a record.
 const WORTHWHILE: f32 = 0.2;
-/// Camera samples that are traced together.
+/// Camera samples traced together.
 const CHUNK: usize = 1024;
-/// Records that are computed before they are added; no limit to what a round adds.
+/// Records that are computed before they are added; the number of records per round is not limited.
 const MAX_AT_ONCE: usize = 1 << 14;
 
-/// What making the cache took.
+/// Statistics of building the cache.
 #[derive(Clone, Copy, Debug, Default)]
 pub struct BuildStats {
     /// Rounds.
     pub rounds: u32,
-    /// Points that asked for a record and were served by another one of their round.
+    /// Requests that were served by another record of their round.
     pub dropped: u64,
-    /// Camera samples that asked.
+    /// Camera samples traced.
     pub camera_samples: u64,
     /// Counts and times of tracing, summed over threads.
     pub paths: PathStats,
@@ -52,10 +52,10 @@ pub struct BuildStats {
     pub elapsed: Duration,
 }
 
-/// Where the samples of the camera come from: pixel and index.
+/// Camera samples by pixel and index.
 pub type Cameras<'a> = &'a (dyn Fn([u32; 2], u32) -> CameraSample + Sync);
 
-/// Makes the cache of what the camera sees inside `bounds`. `stop` ends it early.
+/// Builds the cache for what the camera sees inside `bounds`. `stop` ends it early.
 pub fn build(
     job: &RenderJob,
     bounds: PixelBounds,
@@ -92,7 +92,7 @@ pub fn build(
     (cache, stats)
 }
 
-/// True if no record would have any light.
+/// True if no record could hold any light.
 fn holds_nothing(job: &RenderJob) -> bool {
     let settings = &job.settings().integrator;
     let min_depth = match settings.cache.cached {
@@ -134,7 +134,7 @@ impl Round {
     }
 }
 
-/// The points that the camera samples of some pixels ask for, in the order of pixels.
+/// The records requested by the camera samples of some pixels, in the order of the pixels.
 fn ask(
     job: &RenderJob,
     cache: &IrradianceCache,
@@ -202,8 +202,8 @@ fn ask_chunk(
     wanted
 }
 
-/// The sides of a diffuse surface, 0 that of the viewer and 1 the other, that reflect or transmit light and that no record
-/// serves, with their normals.
+/// The sides of a diffuse surface, 0 that of the viewer and 1 the other, that reflect or transmit light and have no
+/// usable record, with their normals.
 fn unserved_sides(cache: &IrradianceCache, v: &path::Vertex<'_>) -> [Option<(u32, Vec3)>; 2] {
     let Some(part) = v.bsdf.lambertian(v.wo) else { return [None; 2] };
     let ns = super::viewer_normal(v);
@@ -218,7 +218,7 @@ fn pixel_width(width: f32, p: Vec3) -> f32 {
     width.max(1e-6 * p.abs().max_element()).max(1e-30)
 }
 
-/// The points without those that a record of the least reach at an earlier one would serve.
+/// The requests without those that a record of minimum radius at an earlier one would serve.
 fn without_redundant(wanted: &[RecordRequest], cache: &IrradianceCache, bounds: &Bounds3) -> Vec<RecordRequest> {
     let settings = cache.settings();
     let mut chosen: Vec<RecordRequest> = Vec::new();
@@ -237,7 +237,7 @@ fn without_redundant(wanted: &[RecordRequest], cache: &IrradianceCache, bounds: 
     chosen
 }
 
-/// The records of the points, in their order.
+/// The records requested, in their order.
 fn gather(job: &RenderJob, wanted: &[RecordRequest], stats: &mut PathStats) -> Vec<Record> {
     let parts: Vec<(Vec<Record>, PathStats)> = wanted
         .par_chunks(BATCH)

@@ -1,4 +1,4 @@
-//! The records, and the structures that find them.
+//! The records, and the octrees that find them.
 
 use super::gradients::Irradiance;
 use super::octree::Octree;
@@ -6,10 +6,10 @@ use super::record::{Range, Record};
 use crate::settings::IrradianceCacheSettings;
 use lumiris_numbers::math::{Bounds3, Rgb, Vec3};
 
-/// Most records: about 400 MB with the trees.
+/// Maximum number of records: about 400 MB with the trees.
 pub const MAX_RECORDS: usize = 1 << 20;
 
-/// Records of a scene. What it answers depends on the records and on the order in which they were added.
+/// The records of a scene. Lookups depend on the records and on the order in which they were added.
 #[derive(Clone, Debug)]
 pub struct IrradianceCache {
     settings: IrradianceCacheSettings,
@@ -22,7 +22,7 @@ pub struct IrradianceCache {
 }
 
 impl IrradianceCache {
-    /// No records yet.
+    /// An empty cache.
     pub fn new(settings: IrradianceCacheSettings, bounds: &Bounds3) -> Self {
         IrradianceCache {
             settings,
@@ -38,7 +38,7 @@ impl IrradianceCache {
         &self.records
     }
 
-    /// The settings that it was made with.
+    /// The settings that it was built with.
     pub fn settings(&self) -> &IrradianceCacheSettings {
         &self.settings
     }
@@ -53,7 +53,7 @@ impl IrradianceCache {
         self.records.len() * (size_of::<Record>() + size_of::<Range>()) + self.reaches.bytes() + self.radii.bytes()
     }
 
-    /// Irradiance at a point with the normal `n`, by all records that serve it; `None` if there are none.
+    /// Irradiance at a point with the normal `n`, from all usable records; `None` if there are none.
     #[inline]
     pub fn irradiance(&self, p: Vec3, n: Vec3) -> Option<Rgb> {
         let (mut sum, mut weights) = (Rgb::BLACK, 0.0);
@@ -68,7 +68,7 @@ impl IrradianceCache {
         (weights > 0.0).then(|| sum / weights)
     }
 
-    /// True if a record serves the point with an error of at most `error`.
+    /// True if the point has a record with an error of at most `error`.
     #[inline]
     pub fn serves(&self, p: Vec3, n: Vec3, error: f32) -> bool {
         let mut found = false;
@@ -78,8 +78,9 @@ impl IrradianceCache {
         found
     }
 
-    /// Adds a record, unless it is full. Radii are clamped so that R_i ≤ R_j + |x_i − x_j| for all pairs: where one record sees
-    /// something near, its neighbours, which may have missed it, do not reach beyond [Křivánek et al. 2006].
+    /// Adds a record, unless the cache is full. Radii are clamped so that R_i ≤ R_j + |x_i − x_j| for all pairs: where
+    /// one record sees something near, its neighbours, which may have missed it, do not extend beyond [Křivánek et al.
+    /// 2006].
     pub fn insert(&mut self, mut record: Record) {
         if self.is_full() {
             return;
@@ -111,7 +112,7 @@ impl IrradianceCache {
     }
 }
 
-/// Gradients from few samples are noisy: what they change within the range of a record is kept to the value itself.
+/// Gradients from few samples are noisy: their change within the radius of a record is clamped to the value itself.
 fn limit_gradients(light: &mut Irradiance, reach: f32, error: f32) {
     // √(1 − cos α) = κ at α ≈ √2 κ
     let turn = std::f32::consts::SQRT_2 * error;

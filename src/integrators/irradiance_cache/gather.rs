@@ -1,12 +1,12 @@
-//! Computes records: indirect light by path tracing over a stratified hemisphere, light of sources by the stage of direct
-//! light on a white Lambertian surface, whose radiance is E/π.
+//! Computes records: indirect light by path tracing over a stratified hemisphere, direct light by estimating it on a
+//! white Lambertian surface, whose radiance is E/π.
 //!
-//! A path from a record leaves out what its first hit emits, since that is light of sources. Its random numbers are those of
-//! the pixel that asks for the record, so that a record does not depend on which other records there are.
+//! A path from a record omits what its first hit emits, since that is direct light. Its random numbers are those of the
+//! pixel that requests the record, so that a record does not depend on other records.
 //!
-//! E of sources has gradients from the samples themselves: with the weights that make Σ c_i an estimate of E, Σ c_i ∇ln g_i
-//! is one of its gradient, g = cos θ cos θ'/r² being what changes with the point. Visibility is taken as it is: how shadows
-//! move is left out, which only smaller reaches make good.
+//! The gradient of direct irradiance comes from the samples themselves: with the weights that make Σ c_i an estimate of
+//! E, Σ c_i ∇ln g_i is an estimate of its gradient, g = cos θ cos θ'/r² being the factor that changes with the point.
+//! Visibility is treated as constant: the movement of shadows is ignored, which only smaller radii can make up for.
 
 use super::gradients::{Cells, Irradiance};
 use super::record::Record;
@@ -26,18 +26,18 @@ use lumiris_numbers::math::{Frame, Ray, Rgb, Vec3};
 use lumiris_numbers::samplers::SampleStream;
 use std::f32::consts::PI;
 
-/// Records that are computed together.
+/// Records computed together.
 pub const BATCH: usize = 16;
-/// Cosines below this count as this in gradients, which they divide.
+/// Lower bound of the cosines that gradients are divided by.
 const MIN_COS: f32 = 0.05;
 
-/// Domains below the stream of a record.
+/// Random-number domains of a record.
 mod domain {
     pub(super) const CELL: u32 = 0;
     pub(super) const SOURCES: u32 = 1;
 }
 
-/// A point that asks for a record.
+/// A point at which a record is requested.
 #[derive(Clone, Copy, Debug)]
 pub struct RecordRequest {
     /// The point.
@@ -46,7 +46,7 @@ pub struct RecordRequest {
     pub p_error: Vec3,
     /// Geometric normal, unit.
     pub n: Vec3,
-    /// Shading normal on the side whose irradiance is wanted, unit.
+    /// Shading normal on the side of the irradiance, unit.
     pub ns: Vec3,
     /// Time in 0..1.
     pub time: f32,
@@ -54,9 +54,9 @@ pub struct RecordRequest {
     pub pixel_width: f32,
     /// How that grows with distance.
     pub spread: f32,
-    /// The pixel that asks.
+    /// The pixel that requests it.
     pub pixel: [u32; 2],
-    /// Tells the records apart for which a pixel may ask.
+    /// Distinguishes the records that a pixel may request.
     pub key: u32,
 }
 
@@ -133,7 +133,7 @@ impl Gatherer {
         wanted.iter().zip(self.results.chunks(cells.count() as usize)).map(of_record).collect()
     }
 
-    /// Light of sources. Progressive estimators are fitted to the passes of each record: to earlier blocks of them.
+    /// Direct light. Progressive estimators are fitted to the earlier passes of each record, in blocks.
     fn sources(&mut self, job: &RenderJob, settings: &IntegratorSettings, wanted: &[RecordRequest]) -> Vec<Irradiance> {
         let passes = settings.cache.passes.max(1);
         let mut sums = vec![Irradiance::default(); wanted.len()];
@@ -166,7 +166,7 @@ impl Gatherer {
         sums
     }
 
-    /// Adds the gradients that the samples of the last estimates have, `estimates` of each point, times `scale`.
+    /// Adds the gradients of the samples of the last estimates, `estimates` per point, times `scale`.
     fn add_gradients(
         &mut self,
         job: &RenderJob,
@@ -206,8 +206,8 @@ impl Gatherer {
     }
 }
 
-/// ∇x ln(cos θ cos θ'/r²) up to a part along the normal, d being the way from x to the light: 4d/r² − n'/(n'·d) for an emitter at
-/// its end, 3d/r² for a light that is a point.
+/// ∇x ln(cos θ cos θ'/r²) up to a part along the normal, d being the way from x to the light: 4d/r² − n'/(n'·d) for an
+/// emitter at its end, 3d/r² for a light that is a point.
 fn log_gradient(job: &RenderJob, w: &RecordRequest, d: Vec3, emitter: Option<&EmitterHit>) -> Vec3 {
     let r2 = d.length_squared();
     match emitter {
@@ -220,8 +220,8 @@ fn log_gradient(job: &RenderJob, w: &RecordRequest, d: Vec3, emitter: Option<&Em
     }
 }
 
-/// R: the harmonic mean of the distances [Ward et al. 1988], but no more than E/|∇t E| [Křivánek et al. 2006], nor so much that
-/// κR passes the nearest surface: what lies behind that is another place.
+/// R: the harmonic mean of the distances [Ward et al. 1988], but no more than E/|∇t E| [Křivánek et al. 2006], nor so
+/// much that κR passes the nearest surface: what lies behind that is another place.
 fn radius(light: &Irradiance, r: &[f32], kappa: f32) -> f32 {
     let inverse: f32 = r.iter().map(|r| 1.0 / r).sum();
     let mean = r.len() as f32 / inverse;
@@ -246,7 +246,7 @@ impl RecordRequest {
         SampleStream::new(sampling.sampler, self.pixel, index, seed)
     }
 
-    /// A white surface here, whose light is estimated with sample `index` of `block`.
+    /// A white surface at the point, for which light is estimated with sample `index` of `block`.
     fn white_point(
         &self,
         job: &RenderJob,

@@ -1,14 +1,15 @@
 //! Irradiance caching [Ward et al. 1988]: the light that diffuse surfaces reflect is interpolated between records.
 //!
-//! Irradiance has two parts, E = E_sources + E_indirect [Fan et al. 2006, §5.1]. Records hold the second one
-//! ([`Cached::Indirect`], direct light being estimated at every hit) or both ([`Cached::All`]). They are computed where
-//! the camera looks, before the image is ([`build()`]), and do not change after that.
+//! Irradiance has two parts, E = E_sources + E_indirect [Fan et al. 2006, §5.1]. Records hold either the second one
+//! ([`Cached::Indirect`]; direct light is estimated at every hit) or both ([`Cached::All`]). They are computed where
+//! the camera looks, before rendering ([`build()`]), and do not change after that.
 //!
-//! Camera paths take the Lambertian part of a BSDF from the records, and go on with the other lobes (`diffuse.rs`).
+//! Camera paths take the light reflected by the Lambertian part of a BSDF from the records, and continue with the other
+//! lobes (`diffuse.rs`).
 //!
-//! Biased: irradiance is interpolated, the base below a coat is taken for Lambertian, and the light of a record counts its
-//! bounces from the record, whatever mirrors lie before it; records at different times of the shutter are not told apart.
-//! Where nothing is interpolated, the answer is that of `path`.
+//! Biased: irradiance is interpolated, the base below a coat is treated as Lambertian, and the bounces of a record's
+//! light are counted from the record, whatever mirrors precede it; records at different shutter times are not
+//! distinguished. Where nothing is interpolated, the result is that of `path`.
 //!
 //! Reading order: [`gradients`], [`record`], [`octree`], [`cache`], [`gather`], [`mod@build`]; this file renders.
 
@@ -33,12 +34,12 @@ use crate::settings::Cached;
 use lumiris_numbers::math::Rgb;
 use std::f32::consts::FRAC_1_PI;
 
-/// How often vertices were served.
+/// Lookups and cache misses.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct LookupStats {
     /// Diffuse vertices of camera paths.
     pub lookups: u64,
-    /// Those that no record served, which path tracing took over.
+    /// Cache misses: lookups without a usable record, where path tracing takes over.
     pub misses: u64,
 }
 
@@ -63,7 +64,8 @@ impl CacheIntegrator {
         (self.paths.take_stats(), std::mem::take(&mut self.lookups))
     }
 
-    /// Estimates the radiance of each camera sample; `out[i]` belongs to `samples[i]`. `fits` are those of the samples' pixels.
+    /// Estimates the radiance of each camera sample; `out[i]` belongs to `samples[i]`. `fits` are those of the samples'
+    /// pixels.
     pub fn trace(
         &mut self,
         job: &RenderJob,
@@ -77,7 +79,7 @@ impl CacheIntegrator {
     }
 }
 
-/// Asks the cache, and counts.
+/// Queries the cache and counts lookups and misses.
 struct Lookup<'a> {
     cache: &'a IrradianceCache,
     stats: &'a mut LookupStats,

@@ -1,17 +1,18 @@
-//! Records and what they say of points nearby.
+//! Records, and extrapolation from them to nearby points.
 //!
-//! A record i serves the point x with normal n if its error [Ward et al. 1988]
+//! A record i can be used at the point x with normal n if its error [Ward et al. 1988]
 //!
 //! ε_i(x, n) = |x − x_i| / a_i + √(1 − n·n_i) / κ
 //!
-//! is below 1, where a_i = κR_i kept to some pixels; the weight 1 − ε_i falls to 0 where that ends, so that nothing jumps.
+//! is below 1, where a_i is κR_i, clamped to a range in pixels; the weight 1 − ε_i falls to 0 there, so that the
+//! interpolation is continuous.
 
 use super::gradients::Irradiance;
 use crate::settings::IrradianceCacheSettings;
 use lumiris_numbers::math::{Rgb, Vec3};
 
-/// How far a point may lie behind the tangent plane that it shares with a record, over a_i: what lies deeper is hidden from light
-/// that the record sees [Ward et al. 1988].
+/// Maximum distance of a point behind the tangent plane of a record, relative to a_i: points further behind are hidden
+/// from light that the record sees [Ward et al. 1988].
 const BEHIND: f32 = 0.05;
 
 /// Irradiance of a point.
@@ -21,18 +22,18 @@ pub struct Record {
     pub p: Vec3,
     /// Shading normal on the side of the light, unit.
     pub n: Vec3,
-    /// What arrives.
+    /// Irradiance.
     pub light: Irradiance,
-    /// R: mean distance of what the point sees, and what limits it.
+    /// R: mean distance of the surfaces that the point sees, after clamping.
     pub radius: f32,
     /// Width of a pixel on the surface.
     pub pixel_width: f32,
-    /// The pixel that asked for it.
+    /// The pixel that requested it.
     pub pixel: [u32; 2],
 }
 
 impl Record {
-    /// a: distance up to which the record serves.
+    /// a: distance up to which the record is used.
     #[inline]
     pub fn reach(&self, settings: &IrradianceCacheSettings) -> f32 {
         let [min, max] = settings.radius;
@@ -48,7 +49,7 @@ impl Record {
     }
 }
 
-/// What of a record decides whether it serves a point.
+/// What determines where a record is used.
 #[derive(Clone, Copy, Debug)]
 pub struct Range {
     /// Its point.

@@ -1,9 +1,9 @@
-//! The maps of an image: what photons are traced, how they are asked for, and irradiances computed beforehand.
+//! The photon maps of an image: which photons are traced, how they are queried, and precomputed irradiance.
 //!
-//! One map: estimates take the k nearest photons, and the final gather takes irradiances that were computed at every fourth photon
-//! of the global map, from the nearest of them [Christensen 1999]. A pilot fixes the number of photon paths of all
-//! maps. Progressive: each pass has photons of its own and radii that shrink, so that the mean over the passes
-//! converges while the memory of one map suffices [Knaus and Zwicker 2011].
+//! Without `progressive`, estimates use the k nearest photons, and the final gather uses irradiance precomputed at
+//! every fourth photon of the global map, at the nearest of these [Christensen 1999]. A pilot fixes the number of
+//! photon paths of all maps. Progressive: each pass has new photons and smaller radii, so that the mean over the passes
+//! converges in the memory of one map [Knaus and Zwicker 2011].
 
 use super::boundary::{Boundary, Probe};
 use crate::integrators::path::{CameraSample, PathIntegrator};
@@ -20,15 +20,15 @@ use rayon::prelude::*;
 use std::sync::atomic::AtomicBool;
 use std::time::{Duration, Instant};
 
-/// One of so many photons of the global map gets an irradiance.
+/// Irradiance is precomputed at one in this many photons of the global map.
 const RECORD_STRIDE: usize = 4;
 /// Photons per thread and step when irradiances are computed.
 const CHUNK: usize = 1024;
-/// Photons that radii are measured at.
+/// Number of photons at which radii are measured.
 const PROBES: usize = 512;
-/// Part of the seen places where p(x) may be below 1. With none, a dim corner that is hardly seen makes everything else certain.
+/// Fraction of the visible points where p(x) may be below 1. With 0, one dim corner would set p = 1 everywhere else.
 const QUANTILE: f32 = 0.1;
-/// Numbers of trials, of which irradiances that were computed beforehand take the mean.
+/// Number of trials whose mean precomputed irradiance uses.
 const TRIES: u32 = 4;
 /// Seed of these trials.
 const RECORD_SEED: u32 = 0x65_64_67_65;
@@ -36,12 +36,12 @@ const RECORD_SEED: u32 = 0x65_64_67_65;
 const PASS_SEED: u32 = 0x70_68_6f_74;
 const RADIUS_SEED: u32 = 0x72_61_64_69;
 
-/// What maps took.
+/// Statistics of the maps.
 #[derive(Clone, Copy, Debug, Default)]
 pub struct MapStats {
-    /// Maps that were made.
+    /// Number of maps.
     pub maps: u64,
-    /// Photon paths that were traced, over all maps.
+    /// Photon paths traced, over all maps.
     pub paths: u64,
     /// Photons in the global map, over all maps.
     pub global: u64,
@@ -49,11 +49,11 @@ pub struct MapStats {
     pub caustic: u64,
     /// Importons of the last map.
     pub importons: u64,
-    /// Most bytes that the maps of one pass took.
+    /// Maximum memory of the maps of one pass (bytes).
     pub bytes: u64,
     /// Time of tracing.
     pub tracing: Duration,
-    /// Time of sorting, and of irradiances.
+    /// Time of sorting, and of precomputing irradiance.
     pub sorting: Duration,
 }
 
@@ -62,7 +62,7 @@ pub struct MapStats {
 pub struct PhotonMaps {
     pub(super) global: PhotonMap,
     pub(super) caustic: PhotonMap,
-    /// Irradiances where photons of the global map are, in place of power.
+    /// Irradiance at photons of the global map, stored in place of their power.
     records: Option<PhotonMap>,
     pub(super) search: Search,
     pub(super) caustic_search: Search,
@@ -72,17 +72,17 @@ pub struct PhotonMaps {
 /// Irradiance (W/m²) in three parts.
 #[derive(Clone, Copy, Debug, Default)]
 pub(super) struct Answer {
-    /// What was computed beforehand.
+    /// Precomputed.
     pub(super) known: Rgb,
     /// By photons of the global map, and the radius of the kernel.
     pub(super) global: (Rgb, f32),
     /// By photons of caustics, and the radius of the kernel.
     pub(super) caustic: (Rgb, f32),
-    /// How far away the photons are.
+    /// Distance of the photons.
     pub(super) reach: f32,
 }
 
-/// Makes the maps of an image.
+/// Builds the maps of an image.
 #[derive(Debug)]
 pub struct MapMaker<'a> {
     /// Ends tracing when it becomes true.
@@ -91,12 +91,12 @@ pub struct MapMaker<'a> {
     max_depth: u32,
     seed: u32,
     importance: Option<Importance>,
-    /// Photon paths of each map: fixed before any is traced, since a number that depends on what was stored makes light
-    /// too bright.
+    /// Photon paths per map: fixed before any is traced, since a number that depends on what was stored would bias the
+    /// light.
     paths: u64,
     /// First radii of progressive maps: global, caustic.
     radii: Option<[f32; 2]>,
-    /// What was made so far.
+    /// Statistics so far.
     pub stats: MapStats,
 }
 
@@ -151,7 +151,8 @@ impl<'a> MapMaker<'a> {
         let s = &self.settings;
         Tracing {
             seed,
-            // A photon that was scattered n times is light of n + 1 bounces where it lies, and of n + 2 where a gather sees it
+            // A photon that was scattered n times is light of n + 1 bounces where it lies, and of n + 2 where a gather
+            // sees it
             max_depth: self.max_depth.saturating_sub(1),
             max_global_depth: self.max_depth.saturating_sub(1 + u32::from(s.gather > 0)),
             q: s.caustic_ratio,
@@ -161,7 +162,7 @@ impl<'a> MapMaker<'a> {
         }
     }
 
-    /// Photons whose random numbers are those of a pass and a purpose.
+    /// Traces photons with the random numbers of a pass.
     fn traced(&self, job: &RenderJob, [pass, purpose]: [u32; 2]) -> Result<Traced, PhotonError> {
         let [seed, ..] = pcg4d([self.seed, pass, purpose, 0]);
         let budget = PhotonBudget::Paths(self.paths);
@@ -206,7 +207,7 @@ impl<'a> MapMaker<'a> {
 }
 
 impl PhotonMaps {
-    /// Bytes that the maps take.
+    /// Memory of the maps (bytes).
     pub fn bytes(&self) -> u64 {
         self.global.bytes() + self.caustic.bytes() + self.records.as_ref().map_or(0, PhotonMap::bytes)
     }
@@ -271,7 +272,7 @@ impl PhotonMaps {
         (e, radius)
     }
 
-    /// Irradiances at every fourth photon, as photons whose power they are.
+    /// Irradiance at every fourth photon, as photons with the irradiance in place of their power.
     fn irradiances(&self, world: &World) -> Vec<Photon> {
         let chosen: Vec<&Photon> = self.global.photons().iter().step_by(RECORD_STRIDE).collect();
         let of_chunk = |(c, chunk): (usize, &[&Photon])| {
@@ -303,7 +304,7 @@ impl PhotonMaps {
     }
 }
 
-/// Diffuse places that the camera sees, spread over the image, with their normals; `camera` gives the samples of a
+/// Diffuse points that the camera sees, spread over the image, with their normals; `camera` gives the samples of a
 /// pixel.
 pub fn seen(job: &RenderJob, camera: &dyn Fn([u32; 2], u32) -> CameraSample) -> Vec<(Vec3, Vec3)> {
     let b = job.world.scene.film.bounds;

@@ -1,16 +1,17 @@
-//! Photon mapping [Jensen 1996] with what [Keller and Wald 2000] made of it.
+//! Photon mapping [Jensen 1996] with the extensions of [Keller and Wald 2000].
 //!
-//! Light straight from sources is estimated at every vertex, by any estimator; specular and glossy lobes are followed by paths
-//! (`diffuse.rs`). What Lambertian parts reflect besides comes from photons: from the caustic map, where the light's last
-//! scattering before was by another lobe, and else by a final gather, whose rays ask the maps what Lambertian surfaces
-//! reflect where they arrive. So each path of light counts once: its last scattering before the vertex was by a Lambertian lobe,
-//! which the gather sees, or not, which the caustic map holds.
+//! Direct light is estimated at every vertex, by any estimator; specular and glossy lobes are followed by paths
+//! (`diffuse.rs`). The remaining light reflected by Lambertian parts comes from photons: from the caustic map, if the
+//! last scattering of the light was by another lobe, and otherwise by a final gather, whose rays look up in the maps
+//! what Lambertian surfaces reflect where they arrive. So each light path counts once: its last scattering before the
+//! vertex was either by a Lambertian lobe, which the gather covers, or not, which the caustic map covers.
 //!
-//! Where a ray of the gather is shorter than the photons reach that would be asked for at its end, the density there says
-//! little about the corner between both surfaces: the ray goes on as a path, with direct light and another ray.
+//! Where a gather ray is shorter than the search radius of the photons at its end, the density estimate there says
+//! little about the corner between the two surfaces: the ray continues as a path, with direct light and another ray.
 //!
-//! Biased by the density estimate, the base below a coat being taken for Lambertian besides; with `progressive` consistent.
-//! Numbers of bounces count from the vertex that asks, whatever mirrors lie before it.
+//! Biased by density estimation, and because the base below a coat is treated as Lambertian; with `progressive`,
+//! density estimation is consistent. Bounces are counted from the vertex that looks up the maps, whatever mirrors
+//! precede it.
 //!
 //! Reading order: [`maps`], `boundary`, [`mod@guide`]; this file renders.
 
@@ -37,12 +38,12 @@ use lumiris_numbers::math::{Frame, Ray, Rgb, Vec3};
 use lumiris_numbers::samplers::SampleStream;
 use std::f32::consts::FRAC_1_PI;
 
-/// Domain of the final gather below the stream of a vertex.
+/// Random-number domain of the final gather at a vertex.
 const GATHER: u32 = 4;
-/// Domains of the trials of kernels there, one for each side.
+/// Random-number domains of the kernel trials there, one per side.
 const CAUSTIC: u32 = 5;
 const GLOBAL: u32 = 7;
-/// Photons that choose directions.
+/// Photons that guide the directions of a gather.
 const GUIDES: u32 = 32;
 
 /// Renders with photon maps; holds the buffers of one worker.
@@ -60,7 +61,7 @@ pub struct PhotonMapIntegrator {
     trials: Vec<u32>,
 }
 
-/// Radiance that waits for the correction of its kernel.
+/// Radiance whose kernel has yet to be corrected for boundary bias.
 #[derive(Clone, Copy, Debug)]
 struct Pending {
     /// Index of the camera sample, or of the ray of a gather.
@@ -69,12 +70,12 @@ struct Pending {
     probe: Probe,
 }
 
-/// A place that asks for a final gather.
+/// A point at which a final gather is requested.
 #[derive(Clone, Copy, Debug)]
 struct GatherRequest {
     /// Index of the camera sample.
     sample: u32,
-    /// What radiance that arrives with the density of the cosine is worth: throughput times albedo.
+    /// Weight of radiance sampled with the cosine density: throughput times albedo.
     beta: Rgb,
     /// The vertex of its path, from 0.
     vertex: u32,
@@ -99,7 +100,8 @@ impl PhotonMapIntegrator {
         stats
     }
 
-    /// Estimates the radiance of each camera sample; `out[i]` belongs to `samples[i]`. `fits` are those of the samples' pixels.
+    /// Estimates the radiance of each camera sample; `out[i]` belongs to `samples[i]`. `fits` are those of the samples'
+    /// pixels.
     pub fn trace(
         &mut self,
         job: &RenderJob,
@@ -132,7 +134,7 @@ impl PhotonMapIntegrator {
         }
     }
 
-    /// Adds what waits, times the numbers of trials of its kernels.
+    /// Adds the pending radiance, times the numbers of trials of its kernels.
     fn correct(&mut self, job: &RenderJob, out: &mut [PixelSample]) {
         self.probes.clear();
         self.probes.extend(self.pending.iter().map(|p| p.probe));
@@ -143,7 +145,7 @@ impl PhotonMapIntegrator {
         self.pending.clear();
     }
 
-    /// The rays of all gathers.
+    /// Generates the rays of all gathers.
     fn start_gather(&mut self, maps: &PhotonMaps, settings: &PhotonMapSettings) {
         self.samples.clear();
         let count = settings.gather;
@@ -156,7 +158,7 @@ impl PhotonMapIntegrator {
                 let w = guide.sample(u_choice, [u0, u1]);
                 let pdf = guide.pdf(w);
                 let d = frame.to_world(w);
-                // Below the surface itself there is nothing to see
+                // Directions below the surface contribute nothing
                 let is_above = w.z > 0.0 && pdf > 0.0 && d.dot(request.place.n) > 0.0;
                 let weight = if is_above { w.z * FRAC_1_PI / (pdf * count as f32) } else { 0.0 };
                 let o = offset_origin(request.place.p, request.p_error, request.place.n, d);
@@ -168,7 +170,7 @@ impl PhotonMapIntegrator {
         }
     }
 
-    /// What the rays of all gathers bring.
+    /// Traces the rays of all gathers and adds what they see.
     fn finish_gather(&mut self, job: &RenderJob, maps: &PhotonMaps) {
         let settings = &job.settings().integrator;
         let depth = settings.depth();
@@ -183,7 +185,7 @@ impl PhotonMapIntegrator {
             }
             let vertices = gather.find_vertices(job, vertex, depth, &self.samples, &mut self.results);
 
-            // Ask the maps, but where what they would answer comes from too near
+            // Look up the maps, except where a ray is shorter than their search radius
             let mut near = Vec::new();
             for (path, v) in gather.active.iter().zip(&vertices) {
                 let Some(part) = v.bsdf.lambertian(v.wo) else { continue };
@@ -197,7 +199,7 @@ impl PhotonMapIntegrator {
                 }
             }
 
-            // Light the near ones as vertices of a path
+            // Treat these as vertices of a path
             let at_vertex = settings.at_vertex(1);
             let sample_counts = settings.sample_counts_at_vertex(1);
             let points: Vec<ShadingPoint<'_>> =
@@ -222,7 +224,7 @@ impl PhotonMapIntegrator {
     }
 }
 
-/// Takes caustics from the map, and notes who wants a gather.
+/// Takes caustics from the map, and collects the requests for gathers.
 struct Lookup<'a> {
     maps: &'a PhotonMaps,
     settings: &'a PhotonMapSettings,
@@ -275,7 +277,7 @@ fn sides(v: &Vertex<'_>, part: &Lambertian<'_>) -> impl Iterator<Item = (Rgb, Pl
     both.into_iter().filter(|(albedo, _)| !albedo.is_black())
 }
 
-/// Puts light that the side of a vertex reflects on the list of what waits: of irradiance `e`, by a kernel of `radius`.
+/// Adds light reflected by the side of a vertex to the pending radiance: irradiance `e`, by a kernel of `radius`.
 fn wait(
     (path, v, key): (&PathState, &Vertex<'_>, u32),
     (albedo, place): (Rgb, Place),
@@ -288,8 +290,8 @@ fn wait(
     }
 }
 
-/// What the Lambertian part of a vertex reflects by all photons, as far as it needs no correction, and how far away these are; the rest
-/// waits.
+/// Radiance that the Lambertian part of a vertex reflects by all photons, as far as it needs no correction, and the
+/// distance of these photons; what needs correction is left pending.
 fn reflected(
     maps: &PhotonMaps,
     path: &PathState,
@@ -319,7 +321,7 @@ fn only_lambertian<'a>(v: &Vertex<'a>, part: &Lambertian<'_>) -> SurfaceBsdf<'a>
     SurfaceBsdf { bsdf, ..v.bsdf }
 }
 
-/// Directions by the photons around that the gather is about.
+/// Guide from the photons around a vertex.
 fn guide(maps: &PhotonMaps, place: &Place, frame: &Frame, fraction: f32, scratch: &mut GatherScratch) -> Guide {
     let mut photons = Vec::new();
     if fraction > 0.0 {
