@@ -1,4 +1,4 @@
-//! Photon maps: how fast photons are traced in a scene, and how fast maps are built and asked.
+//! Photon maps: how fast photons are traced in a scene, and how fast maps are built and queried.
 //!
 //! `cargo bench --bench photons -- [scene.pbrt] [thousands of paths, default 200]`
 #![allow(clippy::print_stdout, clippy::unwrap_used, missing_docs)]

@@ -1,8 +1,8 @@
 //! The film: f64 sums per pixel, from which means, variances and AOVs are read.
 //!
 //! Pixel filters work by importance sampling: a sample belongs to one pixel, and its weight is the sign of the
-//! filter ([`filter`]). So films of disjoint sample ranges add up, and so do their [`replicas`], from which the variance of a
-//! pixel's mean is told.
+//! filter ([`filter`]). So films of disjoint sample ranges can be added, and so can their [`replicas`], which give the
+//! variance of pixel means.
 
 pub mod filter;
 pub mod replicas;

@@ -349,7 +349,7 @@ mod tests {
                 cache.mean_count()
             );
             let again = VisibilityCache::new(photons.iter().rev().copied(), cache.radius());
-            assert_eq!(cache.entries, again.entries, "hints do not depend on the order of photons");
+            assert_eq!(cache.entries, again.entries, "the cache does not depend on the order of photons");
         }
     }
 

@@ -1,11 +1,11 @@
-//! Photon tracing: random walks from the lights in batches, put together in the order of photon paths.
+//! Photon tracing: random walks from the lights in batches, assembled in the order of the photon paths.
 //!
-//! The numbers of a photon path choose the light, where and which way the photon leaves it, and every scattering. What
-//! is stored depends on the scene, the settings and the number of photon paths only, which is fixed before they are
-//! traced, see [`path_count`].
+//! The random numbers of a photon path determine the light, where and in which direction the photon leaves it, and
+//! every scattering event. What is stored depends only on the scene, the settings and the number of photon paths, which
+//! is fixed before they are traced, see [`path_count`].
 //!
-//! Photons that the global map holds (from lights, and scattered by Lambertian surfaces) and those of caustics come
-//! from the same photon paths, see [`super::rules`].
+//! The photons of the global map (from lights, and scattered by Lambertian surfaces) and those of caustics come from
+//! the same photon paths, see [`super::rules`].
 
 use super::error::PhotonError;
 use super::importance::Importance;

@@ -1,7 +1,8 @@
-//! Direct light by photons that tell which lights are seen [Keller and Wald 2000, §3]: what they say changes the noise, and
-//! nothing else, unless lights are left out on request.
+//! Direct light with the visibility cache [Keller and Wald 2000, §3]: its contents affect the noise only, unless lights
+//! are left out on request.
 //!
-//! That every estimator gives the known answer with hints absent, empty, right and wrong is in [`super::analytic_scenes`].
+//! That every estimator gives the known answer with the cache absent, empty, right and wrong is tested in
+//! [`super::analytic_scenes`].
 
 use super::analytic_scenes::answer;
 use lumiris::accel::{Coherence, RayBatch};
@@ -19,16 +20,16 @@ use lumiris_numbers::math::{Ray, Vec3};
 use std::path::Path;
 use std::sync::atomic::AtomicBool;
 
-/// What photons say.
+/// Contents of a visibility cache.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(crate) enum CacheContents {
-    /// Nobody asked them.
+    /// No cache.
     Absent,
-    /// There were none.
+    /// A cache without photons.
     Empty,
-    /// Where each light shines.
+    /// The lights that photons show to be visible.
     Right,
-    /// The same of other lights, chosen at random, and of lights that there are not.
+    /// The same photons with other lights, chosen at random, some of which do not exist.
     Wrong,
 }
 
@@ -61,7 +62,7 @@ fn primary_photons(job: &RenderJob) -> Vec<(Vec3, Vec3, LightId)> {
     hits.iter().enumerate().filter_map(photon).collect()
 }
 
-/// Hints of a kind for a job.
+/// A visibility cache with given contents for a job.
 pub(crate) fn cache_with(job: &RenderJob, kind: CacheContents) -> Option<VisibilityCache> {
     let radius = job.lights.scene_radius;
     match kind {
@@ -148,7 +149,7 @@ fn a_right_visibility_cache_lowers_the_variance() {
     let ratio = |settings: &dyn Fn(&mut IntegratorSettings), min: f64| {
         let without = pixels(&mut job(settings, |_, _| false), 100).variance();
         let with = pixels(&mut job(settings, is_seen), 100).variance();
-        assert!(without > min * with, "{without} without hints, {with} with");
+        assert!(without > min * with, "{without} without a cache, {with} with one");
     };
     ratio(
         &|s| {

@@ -1,10 +1,11 @@
-//! Files: pbrt-v4 text to checked directives, PLY files to meshes, measured spectra to colours; writing as a whole or not at all.
+//! File formats: pbrt-v4 text to checked directives, PLY files to meshes, measured spectra to colours; and atomic
+//! writing of files.
 //!
 //! User input never panics. Errors are collected with their positions in [`diagnostic::Diagnostics`]. The meaning of
 //! directives is not decided here: the renderer builds its scene from them.
 //!
-//! Reading order: [`source`], [`diagnostic`], [`number`], [`pbrt`], [`ply`], [`spectra`], [`upsampling`], [`color_space`],
-//! [`output`].
+//! Reading order: [`source`], [`diagnostic`], [`number`], [`pbrt`], [`ply`], [`spectra`], [`upsampling`],
+//! [`color_space`], [`output`].
 
 pub mod color_space;
 pub mod diagnostic;

@@ -1,12 +1,12 @@
-//! Writing of files: either the whole file appears under its name, or what was there before stays.
+//! Atomic writing of files: either the whole file appears under its name, or the old one stays.
 
 use std::fs::File;
 use std::io::{self, Write};
 use std::path::Path;
 use tempfile::{Builder, NamedTempFile};
 
-/// Writes a file. `write` gets another one beside it with the same extension, which takes the name when all of it is on the disk,
-/// and is removed if anything fails.
+/// Writes a file. `write` gets another one beside it with the same extension, which takes the name when all of it is on
+/// the disk, and is removed if anything fails.
 pub fn write_whole(path: &Path, write: impl FnOnce(&mut NamedTempFile) -> io::Result<()>) -> io::Result<()> {
     let folder = path.parent().filter(|folder| !folder.as_os_str().is_empty()).unwrap_or(Path::new("."));
     let suffix = path.extension().map_or_else(String::new, |extension| format!(".{}", extension.to_string_lossy()));
@@ -16,8 +16,8 @@ pub fn write_whole(path: &Path, write: impl FnOnce(&mut NamedTempFile) -> io::Re
     builder.permissions(std::os::unix::fs::PermissionsExt::from_mode(0o666));
     let mut partial = builder.tempfile_in(folder)?;
     write(&mut partial)?;
-    // On the disk before it takes the name, lest a crash leaves an empty file in place of a good one. It is opened anew, for whoever
-    // wrote it by its name may have made it anew.
+    // On the disk before it takes the name, lest a crash leaves an empty file in place of a good one. It is opened
+    // anew, for whoever wrote it by its name may have made it anew.
     File::open(partial.path())?.sync_all()?;
     partial.persist(path)?;
     Ok(())

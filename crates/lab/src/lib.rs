@@ -1,4 +1,4 @@
-//! The laboratory: figures of papers, rendered and measured again, and the scenes for them.
+//! Experiments: figures of papers, reproduced by rendering and measuring, and the scenes for them.
 //!
 //! [`procedural`] generates content (a statue, skies, adjacent rooms), [`sphere_study`] estimates a sphere by BSDF
 //! sampling alone, and [`reproduce`] measures figures and writes them as a page.

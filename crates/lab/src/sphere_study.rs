@@ -1,8 +1,8 @@
 //! Images and variances of a sphere lit from far away, estimated by BSDF sampling alone [Talbot et al. 2005, Fig. 5].
 //!
-//! The sphere is seen along −z by parallel rays through the centres of the pixels. Each estimate of a pixel is
-//! f |cos θ| L(wi) W of one direction that [`lumiris::bsdfs::resample()`] draws from M proposals (N = 1), so that all variance is that
-//! of direction sampling. Nothing is traced: light comes from infinity and nothing hides it.
+//! The sphere is seen along −z by parallel rays through the centres of the pixels. Each estimate of a pixel is f |cos
+//! θ| L(wi) W for one direction that [`lumiris::bsdfs::resample()`] draws from M proposals (N = 1), so that all
+//! variance is that of direction sampling. Nothing is traced: light comes from infinity and is unoccluded.
 
 use lumiris::bsdfs::{Bsdf, resample};
 use lumiris_numbers::math::{Frame, Rgb, Vec3};

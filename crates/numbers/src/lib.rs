@@ -1,4 +1,4 @@
-//! The arithmetic of Lumiris: numbers in, numbers out. Nothing here knows of scenes, rays or files, and nothing is foreign code.
+//! The numerics of Lumiris: numbers in, numbers out. Nothing here depends on scenes, rays, files, or foreign code.
 //!
 //! | module | what it holds |
 //! |---|---|

@@ -1,7 +1,8 @@
-//! What a t-test would notice: critical values, and the bias that is found with a given power.
+//! The power of t-tests: critical values, and the bias that is detected with a given power.
 //!
 //! A test of level α rejects where the mean is t_α standard errors or more from the answer; a mean that is off by
-//! (t_α + t_β) standard errors is then rejected with probability 1 − β, t_β being the quantile of Student's distribution.
+//! (t_α + t_β) standard errors is then rejected with probability 1 − β, t_β being the quantile of Student's
+//! distribution.
 
 use lumiris_numbers::estimators::stats::Welford;
 use statrs::function::beta::beta_reg;
@@ -27,8 +28,8 @@ pub fn detectable_deviation(significance: f64, power: f64, dof: u64) -> f64 {
     critical_t(significance, dof) + critical_t(2.0 * (1.0 - power), dof)
 }
 
-/// b so that `count` values with a mean of this relative standard error are rejected with probability `power` once all of
-/// them, and so their noise, are multiplied by 1 + b.
+/// b so that `count` values with a mean of this relative standard error are rejected with probability `power` once all
+/// of them, and so their noise, are multiplied by 1 + b.
 pub fn detectable_bias(relative_error: f64, count: u64, significance: f64, power: f64) -> f64 {
     if relative_error == 0.0 {
         return 0.0;

@@ -1,4 +1,4 @@
-//! How far an image is from its reference: numbers for the whole, maps for the pixels.
+//! Metrics of the difference between an image and its reference: numbers for the whole, maps for the pixels.
 //!
 //! Images are linear Rec.709 radiance, row-major from the top left. **Pixels that are not finite in either image are
 //! excluded from all means**; [`Differences`] counts them, maps are NaN there, and ꟻLIP sees black in both images.

@@ -3,7 +3,7 @@
 //! Reading order: [`descriptions`] (what a file asks for), [`state`] (the scene while its file is read), [`checks`];
 //! a file for each kind of directive: [`transform`], [`options`], [`settings`], [`film`], [`spectrum`], [`textures`],
 //! [`materials`], [`lights`], [`shapes`]; [`directives`] (the state machine over `lumiris_formats::pbrt`'s directives);
-//! and [`finish`] (files are read, and the scene is put together).
+//! and [`finish`] (reads files and assembles the scene).
 
 pub mod checks;
 pub mod descriptions;

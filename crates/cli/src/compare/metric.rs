@@ -1,4 +1,4 @@
-//! The metrics that can be asked for.
+//! The available metrics.
 
 /// A metric that can be asked for.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]

@@ -1,8 +1,8 @@
-//! Images against a reference: metrics, and a page to inspect them.
+//! Comparison of images with a reference: metrics, and a page to inspect them.
 //!
 //! Reading order: [`layers`] (which channels of a file are the image), [`mod@load`] (files to pixels of one size),
-//! [`metric`] (their names), [`scores`] (metrics), [`columns`] (metrics by name), [`page`] (a page for a browser, whose own parts are in `viewer/`:
-//! `index.html`, `style.css`, `images.js` for values and their images, `viewer.js` for controls).
+//! [`metric`] (names of metrics), [`scores`] (metrics), [`columns`] (metrics by name), [`page`] (an HTML page, whose
+//! parts are in `viewer/`: `index.html`, `style.css`, `images.js` for values and images, `viewer.js` for controls).
 
 pub(crate) mod columns;
 pub(crate) mod layers;

@@ -1,9 +1,9 @@
-//! Numbers of samples and proposals for equal time.
+//! Sample counts for equal time.
 //!
-//! A rendering costs c + P·(M·T1 + N·T2), where P counts shading points. T1 is what a proposal and its weight cost, T2 a
-//! sample: to draw it, to evaluate it, to trace it; the renderer measures both for its own choice. The split is
-//! N = B/(2·T2), M = B/(2·T1) for a time of B per point: M/N = T2/T1 [Talbot 2005, Eq. 4.4]. Then M is corrected until
-//! renderings take as long as those of the baseline.
+//! A rendering costs c + P·(M·T1 + N·T2), where P is the number of shading points. T1 is the cost of a proposal and its
+//! weight, T2 that of drawing, evaluating and tracing a sample; the renderer measures both for its own choice. The
+//! counts are N = B/(2·T2), M = B/(2·T1) for a time of B per point: M/N = T2/T1 [Talbot 2005, Eq. 4.4]. Then M is
+//! corrected until renderings take as long as those of the baseline.
 
 use super::measure::{Measured, Seconds, Stage, View, turns};
 use super::method::Method;
@@ -19,7 +19,7 @@ const MATCH: f64 = 0.01;
 /// Most proposals: the buffers of a batch grow with them.
 const MAX_PROPOSALS: u32 = 1024;
 
-/// Times of the stages, and a split that costs as much as the baseline.
+/// Times of the stages, and sample counts that cost as much as the baseline.
 #[derive(Clone, Copy, Debug)]
 pub struct Calibration {
     /// T1 and T2 (ns), by the renderer's own measurement.
@@ -37,7 +37,8 @@ fn points(m: &Measured) -> f64 {
     (m.proposals as f64 / f64::from(m.method.proposals) / m.turns().max(1) as f64).max(1.0)
 }
 
-/// N and M for a time per point, of which half goes to samples; at least one sample, and no fewer proposals than samples.
+/// N and M for a time per point, of which half goes to samples; at least one sample, and no fewer proposals than
+/// samples.
 pub fn equal_halves(budget: f64, times: StageTimes) -> SampleCounts {
     let samples = (0.5 * budget / times.t2).round().max(1.0);
     let samples = samples.min((budget / (times.t1 + times.t2)).floor().max(1.0));
@@ -50,7 +51,7 @@ pub fn counts_for_budget(budget: f64, times: StageTimes, samples: u32) -> Sample
     SampleCounts { samples, proposals: (proposals as u32).max(samples) }
 }
 
-/// Measures times, and finds a split that costs what the baseline costs, within about a percent.
+/// Measures times, and finds sample counts that cost as much as the baseline, within about a percent.
 pub fn calibrate(stage: &mut Stage, base: &Method, observer: Observer<'_>) -> Result<Calibration, ReproduceError> {
     // Times, and that of the baseline
     let default = StageTimes { t1: 100.0, t2: 100.0 };
@@ -63,7 +64,7 @@ pub fn calibrate(stage: &mut Stage, base: &Method, observer: Observer<'_>) -> Re
     let seconds = pilot[0].median_seconds(|s| s.wall);
     let mut found = Calibration { times, budget, sample_counts: equal_halves(budget, times), seconds };
 
-    // The split in turns with the baseline; the number of proposals changes until times match
+    // Alternates with the baseline; the number of proposals changes until times match
     for step in 0..CORRECTIONS {
         let SampleCounts { samples, proposals } = found.sample_counts;
         let method = ris(proposals, samples);

@@ -1,11 +1,11 @@
-//! Methods in turns on one scene: variance and time of each, in the same run.
+//! Alternating measurement of methods on one scene: variance and time of each, in the same run.
 //!
-//! A *turn* renders the image once with each method, each with its own seed; the order of the methods moves on by one
+//! A *turn* renders the image once with each method, each with its own seed; the order of the methods rotates by one
 //! from turn to turn, so that a machine that slows down slows all of them. The variance of a method is that of its
 //! pixel estimates over the turns (luminance; unbiased; no reference image is needed), averaged over pixels. Its time
-//! is the processor time of the rendering over all threads, which does not count what else the machine does meanwhile;
-//! times of two methods are compared turn by turn: the median of the ratios. Camera rays pass through pixel centres, so
-//! that the variance is that of lighting and not of antialiasing.
+//! is the processor time of the rendering over all threads, which excludes other load on the machine; times of two
+//! methods are compared turn by turn, by the median of the ratios. Camera rays pass through pixel centres, so that the
+//! variance is that of lighting and not of antialiasing.
 
 use super::method::Method;
 use super::{Observer, ReproduceError};
@@ -114,8 +114,8 @@ impl Stage {
         self.job.change(|settings| method.apply(settings, self.depth));
     }
 
-    /// T1 and T2 as the renderer measures them for its own choice, with lights chosen in this way; `None` if nothing in the
-    /// image is lit.
+    /// T1 and T2 as the renderer measures them for its own choice, with lights chosen in this way; `None` if nothing in
+    /// the image is lit.
     pub fn stage_times(&mut self, lights: LightSamplerKind) -> Result<Option<StageTimes>, ReproduceError> {
         self.set(&Method::ris(1, 1).lights_by(lights).stratified().strata(Strata::Systematic));
         self.job.change(|s| (s.integrator.ris.proposals, s.integrator.ris.stage_times) = (Proposals::Auto, None));
@@ -123,7 +123,7 @@ impl Stage {
         Ok(prepare(&mut self.job, self.threads, false).map_err(RenderError::from)?.map(|plan| plan.times))
     }
 
-    /// Finds out how each pixel best shares the time of an estimate out between proposals and samples, by the renderer's own
+    /// Finds the best allocation of an estimate's time to proposals and samples in each pixel, by the renderer's own
     /// pilot. The answer is M/N of every pixel, and the processor time that it took (s).
     pub fn plan_per_pixel(&mut self, times: StageTimes, budget: f64) -> Result<(Vec<f32>, f64), ReproduceError> {
         let start = processor_time();

@@ -1,4 +1,4 @@
-//! What takes turns: ways to estimate direct light.
+//! Methods to compare: ways to estimate direct light.
 
 use lumiris::lights::LightSamplerKind;
 use lumiris::settings::{
@@ -25,8 +25,8 @@ pub enum Transport {
 pub enum Points {
     /// All are independent.
     Independent,
-    /// Samples of an estimate, or the proposals of `ris`, are well distributed over the lights; camera rays have nothing to do
-    /// with each other.
+    /// Samples of an estimate, or the proposals of `ris`, are well distributed over the lights; camera rays have
+    /// nothing to do with each other.
     PerEstimate,
     /// They are well distributed over the camera rays of the pixel, too.
     PerPixel,
@@ -43,7 +43,7 @@ impl Points {
     }
 }
 
-/// A way to estimate direct light.
+/// A method: an estimator of direct light with its settings.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Method {
     /// Light that is computed.
@@ -68,7 +68,8 @@ pub struct Method {
     pub noncontributing_samples: u32,
     /// Samples over proposals, for `ris`.
     pub strata: Strata,
-    /// True if `ris` shares the time of an estimate out between M and N in each pixel as [`Stage::plan_per_pixel`](super::measure::Stage::plan_per_pixel) found out.
+    /// True if `ris` chooses M and N in each pixel as [`Stage::plan_per_pixel`](super::measure::Stage::plan_per_pixel)
+    /// found.
     pub per_pixel: bool,
     /// How random numbers are distributed.
     pub points: Points,

@@ -1,9 +1,9 @@
-//! Figures of papers, rendered and measured again, as a page with images and a file with all numbers.
+//! Figures of papers, reproduced by rendering and measuring, as a page with images and a JSON file with all numbers.
 //!
-//! Reading order: [`method`] (a way to estimate light), [`measure`] (methods in turns on one scene, variances and times),
-//! [`calibrate`] (numbers of samples and proposals for equal time), [`talbot`] (resampled importance sampling), [`fan`]
-//! (optimizing control variates), [`keller_wald`] (photon maps), [`verdicts`] (when a figure counts as reached), then what a page is
-//! made of: [`figure`], [`page`], [`images`], [`chart`].
+//! Reading order: [`method`] (an estimator of light), [`measure`] (alternating methods on one scene, variances and
+//! times), [`calibrate`] (sample counts for equal time), [`talbot`] (resampled importance sampling), [`fan`]
+//! (optimizing control variates), [`keller_wald`] (photon maps), [`verdicts`] (when a figure counts as reproduced);
+//! then the parts of a page: [`figure`], [`page`], [`images`], [`chart`].
 
 pub mod calibrate;
 pub mod chart;

@@ -1,4 +1,4 @@
-//! When a figure counts as reached: from what was measured, and nothing else.
+//! When a figure counts as reproduced, judged by the measurements alone.
 
 use super::measure::Estimate;
 
@@ -13,7 +13,8 @@ pub fn reduced_by(left: Estimate, percent: f64) -> bool {
     left.value > 0.0 && (1.0 - left.value) * 100.0 >= percent
 }
 
-/// The same for resampling of `proposals` to `samples`: with as many of both nothing is resampled, and nothing is reached.
+/// The same for resampling of `proposals` to `samples`: with as many of both nothing is resampled, and nothing is
+/// reached.
 pub fn reduced_by_resampling([proposals, samples]: [u32; 2], left: Estimate, percent: f64) -> bool {
     proposals > samples && reduced_by(left, percent)
 }

@@ -1,10 +1,11 @@
-//! Combined correlated and importance sampling [Szécsi, Sbert and Szirmay-Kalos 2004]: two estimates from the same N samples
-//! of one density p, combined linearly.
+//! Combined correlated and importance sampling [Szécsi, Sbert and Szirmay-Kalos 2004]: two estimates from the same N
+//! samples of one density p, combined linearly.
 //!
-//! With y = f/p, a function g of known integral G and the control c = g/p − G, whose expectation is 0, they are importance
-//! sampling ȳ and correlated sampling ȳ − c̄. Their combination (1 − λ) ȳ + λ (ȳ − c̄) = ȳ − λ c̄ has the variance
-//! (V(y) − 2λ Cov(c, y) + λ² V(c))/N, which is least, V(y)(1 − ρ²)/N, for λ = Cov(c, y)/V(c), ρ being their correlation.
-//! λ is estimated for each channel: from the same samples (bias O(1/N)), or from the other half of them (none).
+//! With y = f/p, a function g of known integral G and the control c = g/p − G, whose expectation is 0, these are
+//! importance sampling ȳ and correlated sampling ȳ − c̄. Their combination (1 − λ) ȳ + λ (ȳ − c̄) = ȳ − λ c̄ has the
+//! variance (V(y) − 2λ Cov(c, y) + λ² V(c))/N, whose minimum V(y)(1 − ρ²)/N is at λ = Cov(c, y)/V(c), where ρ is their
+//! correlation. λ is estimated per channel: from the same samples (bias O(1/N)), or from the other half of them
+//! (unbiased).
 
 use super::mc;
 
@@ -14,7 +15,8 @@ pub const SUMS: usize = 13;
 /// Part of Σ c² below which the variance of the control is rounding, and λ = 0.
 const CONSTANT: f64 = 1e-6;
 
-/// Adds a sample of control g/p − G and value f/p. One that is not finite is counted as a sample of value and control 0.
+/// Adds a sample of control g/p − G and value f/p. One that is not finite is counted as a sample of value and control
+/// 0.
 #[inline]
 pub fn add(sums: &mut [f32; SUMS], control: [f32; 3], y: [f32; 3]) {
     sums[0] += 1.0;
@@ -54,7 +56,8 @@ pub fn combined(sums: &[f32; SUMS]) -> [f32; 3] {
     estimate(sums, weight(sums))
 }
 
-/// The estimate of each of two independent halves with λ of the other, and the mean of both by numbers of samples. Unbiased.
+/// The estimate of each of two independent halves with λ of the other, and the mean of both by numbers of samples.
+/// Unbiased.
 pub fn crossfit(halves: [&[f32; SUMS]; 2]) -> [f32; 3] {
     mc::pooled(halves.map(|sums| sums[0]), [0, 1].map(|k| estimate(halves[k], weight(halves[1 - k]))))
 }

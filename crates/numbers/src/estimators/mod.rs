@@ -1,4 +1,4 @@
-//! Estimators of ∫ f: slices and numbers in, numbers out. Nothing here knows of rays, lights or scenes.
+//! Estimators of ∫ f: slices and numbers in, numbers out, independent of rays, lights and scenes.
 //!
 //! | module | estimate | bias |
 //! |---|---|---|
@@ -6,10 +6,10 @@
 //! | [`mis`] | Σᵢ (1/nᵢ) Σⱼ wᵢ f/pᵢ, weights that sum to one | none |
 //! | [`ris`] | Σ scale·f r over N proposals drawn from M | none |
 //! | [`ocv`] | ȳ − Σ βⱼ c̄ⱼ, β fitted: optimizing control variates | by form: none where β is independent of the samples |
-//! | [`correlated`] | ȳ − λ c̄, one density, one control | O(1/N), or none with λ of other samples |
-//! | [`optimal_mis`] | Σ αⱼ + (1/N) Σ (f − Σ αⱼ pⱼ)/p_α, optimal weights | O(1/N), or none with α of other samples |
+//! | [`correlated`] | ȳ − λ c̄, one density, one control | O(1/N), or none with λ from other samples |
+//! | [`optimal_mis`] | Σ αⱼ + (1/N) Σ (f − Σ αⱼ pⱼ)/p_α, optimal weights | O(1/N), or none with α from other samples |
 //!
-//! [`stats`] has running moments and the tests (t, z, χ²) that hold estimators to these claims.
+//! [`stats`] has running moments and the tests (t, z, χ²) that check these claims.
 
 pub mod correlated;
 pub mod mc;

@@ -1,4 +1,4 @@
-//! Stateless random numbers: `u(pixel, sample, domain)`, the same whoever asks and in whatever order.
+//! Stateless random numbers: `u(pixel, sample, domain)`, independent of the order in which they are drawn.
 //!
 //! A [`SampleStream`] is a small value. The root stream of a (pixel, sample) pair is split into *domains*, one for
 //! each decision (lens, light choice, BSDF, …); each domain gives up to four numbers that are well distributed
@@ -12,13 +12,14 @@ use crate::math::hash::{pcg4d, unit_f32};
 use openqmc::{SobolBnSampler, SobolSampler};
 use strum::{EnumIter, EnumString, IntoStaticStr, VariantNames};
 
-/// Which sequence.
+/// The sequence.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, EnumIter, EnumString, IntoStaticStr, VariantNames)]
 #[strum(serialize_all = "kebab-case")]
 pub enum SamplerKind {
     /// Independent uniform numbers.
     Independent,
-    /// The points of each sample and decision an Owen-scrambled Sobol' net by themselves, samples independent of each other.
+    /// The points of each sample and decision an Owen-scrambled Sobol' net by themselves, samples independent of each
+    /// other.
     Stratified,
     /// Owen-scrambled Sobol', pixels independent of each other.
     Sobol,
@@ -53,8 +54,9 @@ impl SampleStream {
     /// The root stream of sample `sample` (< 2³¹) of a pixel. Streams of different seeds are independent.
     pub fn new(kind: SamplerKind, pixel: [u32; 2], sample: u32, seed: u32) -> Self {
         let (x, y) = (pixel[0] as i32, pixel[1] as i32);
-        // openqmc takes the index as i32, and a frame number which it adds to the number of the pixel (16 bits): seeds that
-        // were frames as they are would give shifted copies of one image. Multiples of the golden ratio stay apart.
+        // openqmc takes the index as i32, and a frame number which it adds to the number of the pixel (16 bits): seeds
+        // that were frames as they are would give shifted copies of one image. Multiples of the golden ratio stay
+        // apart.
         let index = (sample & 0x7fff_ffff) as i32;
         let frame = (seed.wrapping_mul(0x9e37_79b1) >> 2) as i32;
         SampleStream(match kind {

@@ -1,4 +1,4 @@
-//! Irradiance caching: records whose light of sources is computed by `mis` or by `ocv` [Fan et al. 2006, Fig. 4].
+//! Irradiance caching: records whose direct light is estimated by `mis` or by `ocv` [Fan et al. 2006, Fig. 4].
 
 use super::super::figure::Figure;
 use super::super::images::{Image, gain, significant};

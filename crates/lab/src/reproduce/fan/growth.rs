@@ -1,4 +1,5 @@
-//! The error of progressive `ocv` relative to `mis` as camera rays become more: its coefficients are those of earlier rays.
+//! The error of progressive `ocv` relative to `mis` as the number of camera rays grows: its coefficients come from
+//! earlier rays.
 
 use super::super::ReproduceError;
 use super::super::measure::{Estimate, Stage, View, turns};

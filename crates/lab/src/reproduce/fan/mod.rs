@@ -1,8 +1,8 @@
 //! The figures of optimizing control variates [Fan et al. 2006, Table 1].
 //!
-//! [`truth`] has the paper's measure of error, [`roster`] the methods, [`cases`] the scenes of direct light, in which
-//! [`direct`] holds methods against each other; [`growth`] does so with more camera rays, and [`cache`] in irradiance
-//! caching. [`outcome`] is what was measured in direct light; [`report`] writes it down.
+//! [`truth`] computes the paper's measure of error, [`roster`] lists the methods, [`cases`] the scenes of direct light,
+//! in which [`direct`] compares them; [`growth`] does so with more camera rays, and [`cache`] in irradiance caching.
+//! [`outcome`] holds the measurements of direct light; [`report`] writes the results.
 
 mod cache;
 mod cases;

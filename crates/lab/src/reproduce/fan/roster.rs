@@ -1,6 +1,6 @@
-//! The methods that are held against each other, with three ways to draw samples: stratified in each estimate by itself, as
-//! the paper has them; stratified over all camera rays of a pixel; independent. Every light is chosen as often as any other,
-//! as in the paper; `mis` and progressive `ocv` also choose lights by the light tree, as the renderer does by default.
+//! The methods that are compared, with three ways to draw samples: stratified in each estimate separately, as in the
+//! paper; stratified over all camera rays of a pixel; independent. Every light is chosen with equal probability, as in
+//! the paper; `mis` and progressive `ocv` also choose lights by the light tree, as the renderer does by default.
 
 use super::super::method::{Method, Points};
 use lumiris::lights::LightSamplerKind;

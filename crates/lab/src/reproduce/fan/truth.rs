@@ -1,8 +1,9 @@
-//! What an image should be, and how far renderings are from it.
+//! The reference image, and the errors of renderings.
 //!
-//! E = √(mean ((L − L_true)/tvi(L_true))²) [Fan et al. 2006, Eq. 12] with luminances L in cd/m², where a luminance of 1 in the
-//! image is [`CANDELAS`]. L_true is the mean of K long renderings and has noise of its own: its variance, from how the
-//! K differ, is subtracted from each square, so that E² has the expectation that it would have with the exact L_true.
+//! E = √(mean ((L − L_true)/tvi(L_true))²) [Fan et al. 2006, Eq. 12] with luminances L in cd/m², where a luminance of 1
+//! in the image is [`CANDELAS`]. L_true is the mean of K long renderings and has noise of its own: its variance, from
+//! the differences of the K, is subtracted from each square, so that E² has the expectation that it would have with the
+//! exact L_true.
 
 use super::super::measure::{Estimate, Measured};
 use lumiris::imaging::metrics::tvi;
@@ -31,7 +32,8 @@ pub(super) struct Truth {
 pub(super) struct Errors {
     /// Mean square of eq. (12), turn by turn.
     squares: Welford,
-    /// Mean over the pixels of the square of their expected error, in the unit of eq. (12): what no number of turns removes.
+    /// Mean over the pixels of the square of their expected error, in the unit of eq. (12): what no number of turns
+    /// removes.
     pub systematic: f64,
     /// Mean luminance of the image over that of the truth, less 1, with half the width of its 95 % confidence interval.
     pub bias: Interval,
@@ -127,8 +129,8 @@ impl Errors {
     }
 }
 
-/// The factor of a standard error with `freedom` degrees of freedom for a 95 % confidence interval: Student's distribution
-/// by the expansion of Cornish and Fisher.
+/// The factor of a standard error with `freedom` degrees of freedom for a 95 % confidence interval: Student's
+/// distribution by the expansion of Cornish and Fisher.
 fn student(freedom: usize) -> f64 {
     let (z, n) = (1.959_964_f64, freedom.max(1) as f64);
     z + (z.powi(3) + z) / (4.0 * n)

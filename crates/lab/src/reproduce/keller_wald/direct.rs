@@ -1,5 +1,5 @@
-//! Direct light among many lights that are mostly hidden [Keller and Wald 2000, Fig. 5]: variance at equal time in the rooms with
-//! 100 lights, and what a sample costs among 10,000.
+//! Direct light from many, mostly hidden lights [Keller and Wald 2000, Fig. 5]: variance at equal time in the rooms
+//! with 100 lights, and the cost of a sample among 10,000.
 
 use super::super::calibrate::{Calibration, calibrate};
 use super::super::figure::{Figure, Summary, estimate_json, plus_minus};
@@ -157,8 +157,8 @@ fn measure(setup: &Setup<'_>, file: &str, time: Duration) -> Result<Outcome, Rep
     Ok(Outcome { lights, size, calibration, named, measured, visibility_cache })
 }
 
-/// Traces photons that come straight from lights, and lets them say which lights are seen. The answer is their number, and the
-/// time that it took (s).
+/// Traces photons that come straight from lights, and lets them say which lights are seen. The answer is their number,
+/// and the time that it took (s).
 fn prepare_visibility_cache(setup: &Setup<'_>, stage: &mut Stage) -> (u64, f64) {
     let start = Instant::now();
     let visibility_cache = setup.pool.install(|| build_visibility_cache(stage.job()));
@@ -242,7 +242,7 @@ fn biased_summary(o: &Outcome) -> Summary {
         ),
         reached: left.value < o.against(o.best(), Role::All).value
             && hardly_perceivable(Estimate { value: value - 1.0, error }),
-        reason: "lights of which no photon arrived around a point are left out there".to_owned(),
+        reason: "lights of which no photon arrived near a point are left out there".to_owned(),
     }
 }
 

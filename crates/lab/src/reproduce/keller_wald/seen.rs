@@ -1,5 +1,5 @@
-//! What the camera sees of diffuse surfaces, for images that show a photon map directly: L = albedo·E/π at the hit of
-//! the ray through the middle of each pixel [Keller and Wald 2000, Fig. 2].
+//! The diffuse surfaces that the camera sees, for images that visualise a photon map directly: L = albedo·E/π at the
+//! hit of the ray through the centre of each pixel [Keller and Wald 2000, Fig. 2].
 
 use super::super::measure::Measured;
 use lumiris::accel::{Coherence, Hit, RayBatch};
@@ -84,8 +84,8 @@ impl Reference {
         mean_where(mask, self.luminance.iter().copied())
     }
 
-    /// Root of the mean square of the difference in luminance over the pixels of a mask, relative to the mean luminance. The
-    /// reference's own noise is subtracted from each square.
+    /// Root of the mean square of the difference in luminance over the pixels of a mask, relative to the mean
+    /// luminance. The reference's own noise is subtracted from each square.
     pub(super) fn rmse(&self, image: &[[f32; 3]], mask: &[bool]) -> f64 {
         let square =
             |(i, p): (usize, &[f32; 3])| (luminance(p.map(f64::from)) - self.luminance[i]).powi(2) - self.variance[i];

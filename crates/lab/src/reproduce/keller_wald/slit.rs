@@ -1,4 +1,5 @@
-//! A room that is lit through a slit: where importance puts photons, and what the cut-off loses [Keller and Wald 2000, Fig. 4].
+//! A room lit through a slit: where importance stores photons, and what the cut-off loses [Keller and Wald 2000, Fig.
+//! 4].
 
 use super::super::figure::{Figure, Summary};
 use super::super::images::{gain, significant};

@@ -1,4 +1,4 @@
-//! Methods of equal time against each other: variances at equal time, and a pair of images of equal time.
+//! Comparison of methods at equal time: variances, and a pair of images.
 
 use super::super::calibrate::{Calibration, calibrate};
 use super::super::figure::Figure;

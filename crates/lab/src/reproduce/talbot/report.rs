@@ -1,4 +1,4 @@
-//! From measurements to sections of the page and to numbers.
+//! From measurements to sections of the page and to JSON.
 
 use super::super::ReproduceError;
 use super::super::figure::{Figure, Summary, estimate_json, percent, plus_minus};

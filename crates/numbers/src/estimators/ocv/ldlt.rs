@@ -4,15 +4,17 @@
 //! that, the columns that remain depend on the others as far as rounding of the sums can tell: they are dropped (their
 //! unknowns are 0), which leaves a solution of the system if there is one.
 
-/// Most components of one system.
+/// Maximum number of components of a system.
 pub const MAX_COMPONENTS: usize = 8;
 
-/// A system that has no usable solution: something in it is not finite. The estimate is then that of β = 0, which is MIS.
+/// A system that has no usable solution: something in it is not finite. The estimate is then that of β = 0, which is
+/// MIS.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, thiserror::Error)]
 #[error("the normal equations are ill-conditioned")]
 pub struct IllConditioned;
 
-/// Part of its diagonal below which a pivot is rounding: a column is dropped. The sums are f32 with about 2⁻²⁴ √n of error.
+/// Part of its diagonal below which a pivot is rounding: a column is dropped. The sums are f32 with about 2⁻²⁴ √n of
+/// error.
 pub const DEPENDENT: f64 = 1e-5;
 
 /// A square matrix of the size of the largest system.

@@ -1,4 +1,4 @@
-//! How many proposals M for how many samples N: least variance in a given time.
+//! Sample counts: the numbers of proposals M and samples N of least variance in a given time.
 //!
 //! Symbols: T time to spend; T1 time of a proposal, T2 of a sample (tracing its ray); K = M/N;
 //! V(f/p) = [`Variances::proposals`], V(f/q) = [`Variances::samples`] with q = q̂/∫q̂.
@@ -10,14 +10,14 @@
 //!
 //! and K̄ = T2/T1 (thesis 4.4), equal time for proposals and samples, at most doubles the variance without knowing any,
 //! if V(f/q) ≤ V(f/p); if the target is worse than p and M is small, it can be more (2.4 times was seen).
-//! N independent sets of M proposals cost N (M T1 + T2) and have variance [(e3 − e2)/M + (e2 − e1)]/N (paper 2), least at
-//! M = √[ |e3 − e2| T2 / (|e2 − e1| T1) ] (paper 3), with
+//! N independent sets of M proposals cost N (M T1 + T2) and have variance [(e3 − e2)/M + (e2 − e1)]/N (paper 2), least
+//! at M = √[ |e3 − e2| T2 / (|e2 − e1| T1) ] (paper 3), with
 //!
 //! e1 = E(f/p)²,  e2 = E(f²/(q̂p)) E(q̂/p),  e3 = E(f²/p²);  V(f/p) = e3 − e1,  V(f/q) = e2 − e1.
 //!
-//! A colour has three variances; the length of the vector (l² norm) stands for them, as in the paper. That is exact for one
-//! channel. For three it is near: lengths of sums are shorter than sums of lengths, most of all in (paper 3), where a
-//! channel that q̂ fits worse than p does has e3 < e2.
+//! A colour has three variances; the length of the vector (l² norm) stands for them, as in the paper. That is exact for
+//! one channel. For three it is near: lengths of sums are shorter than sums of lengths, most of all in (paper 3), where
+//! a channel that q̂ fits worse than p does has e3 < e2.
 
 /// Time of a proposal and of a sample (s). Only their ratio to each other and to the time to spend matters.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -90,8 +90,9 @@ pub fn optimal_ratio(costs: Costs, variances: Variances, time: f64) -> f64 {
 /// M and N for a ratio K = M/N and `time` seconds [Talbot 2005, Section 4.3]:
 /// K̃ = max(min(K, (T − T2)/T1), 1), N = ⌊T/(K̃ T1 + T2) + u₀⌋, M = ⌊N K̃ + u₁⌋.
 ///
-/// The expectations are N = T/(K̃ T1 + T2) and M = K̃ N, so the expected time is T, unless T < T1 + T2: one of each is made
-/// then. The thesis uses one random number for both roundings, which are then dependent; two keep both expectations.
+/// The expectations are N = T/(K̃ T1 + T2) and M = K̃ N, so the expected time is T, unless T < T1 + T2: one of each is
+/// made then. The thesis uses one random number for both roundings, which are then dependent; two keep both
+/// expectations.
 pub fn counts(ratio: f64, costs: Costs, time: f64, u: [f32; 2]) -> Counts {
     let ratio = clamp_ratio(ratio, costs, time);
     let n = round(time / (ratio * costs.t1 + costs.t2), u[0]);
@@ -132,9 +133,9 @@ impl Moments {
         std::array::from_fn(|i| (by_m[i] / m + by_n[i]) / n)
     }
 
-    /// Optimal M of independent sets, before clamping [Talbot et al. 2005, Eq. 3]: infinite if V(f/q) = 0, K̄ if nothing
-    /// varies, and 1 if a second proposal makes the variance longer, which the length |e3 − e2| does not tell (q̂ fits f
-    /// worse than p does).
+    /// Optimal M of independent sets, before clamping [Talbot et al. 2005, Eq. 3]: infinite if V(f/q) = 0, K̄ if
+    /// nothing varies, and 1 if a second proposal makes the variance longer, which the length |e3 − e2| does not tell
+    /// (q̂ fits f worse than p does).
     pub fn optimal_set_size(&self, costs: Costs) -> f64 {
         // Half of −d|V|²/dM at M = 1.
         let (by_m, variance) = (difference(self.e3, self.e2), difference(self.e3, self.e1));
@@ -152,8 +153,8 @@ fn difference(a: [f64; 3], b: [f64; 3]) -> [f64; 3] {
     std::array::from_fn(|i| a[i] - b[i])
 }
 
-/// Size M and number N of independent sets for `time` seconds [Talbot et al. 2005, Section 4.2]: M ≥ 1, N = T/(M T1 + T2) ≥ 1,
-/// and with that N again M = (T/N − T2)/T1; rounded by `u` so that the expected values stay.
+/// Size M and number N of independent sets for `time` seconds [Talbot et al. 2005, Section 4.2]: M ≥ 1, N = T/(M T1 +
+/// T2) ≥ 1, and with that N again M = (T/N − T2)/T1; rounded by `u` so that the expected values stay.
 pub fn counts_of_sets(size: f64, costs: Costs, time: f64, u: [f32; 2]) -> Counts {
     let size = size.clamp(1.0, MAX_COUNT);
     let n = (time / (size * costs.t1 + costs.t2)).clamp(1.0, MAX_COUNT);
@@ -179,8 +180,8 @@ impl MomentsEstimate {
         MomentsEstimate { count: 0, f: [0.0; 3], f2: [0.0; 3], a: [0.0; 3], w: 0.0 }
     }
 
-    /// Adds one proposal by f/p = c_j M (per channel) and q̂/p = w_j M. Where the weight is 0, f must be 0 (it could never be
-    /// drawn); it counts as 0 then.
+    /// Adds one proposal by f/p = c_j M (per channel) and q̂/p = w_j M. Where the weight is 0, f must be 0 (it could
+    /// never be drawn); it counts as 0 then.
     pub fn add(&mut self, f_over_p: [f64; 3], q_hat_over_p: f64) {
         self.count += 1;
         if !(q_hat_over_p > 0.0) {
