@@ -1,7 +1,7 @@
-// The pictures and everything that is computed from their values: maps, ranges, and pixels for the screen.
-/* exported openPictures */
+// The images and everything that is computed from their values: maps, ranges, and pixels for the screen.
+/* exported openImages */
 "use strict";
-const openPictures = async (manifest) => {
+const openImages = async (manifest) => {
   const clamp = (v, low, high) => Math.min(Math.max(v, low), high);
   const { width, height, images } = manifest;
   const reference = images.length - 1;
@@ -114,8 +114,8 @@ const openPictures = async (manifest) => {
   const odd = [255, 0, 255];
 
   function paint(image, view, exposure) {
-    const picture = new ImageData(width, height);
-    const out = picture.data;
+    const imageData = new ImageData(width, height);
+    const out = imageData.data;
     const n = width * height;
     if (!view.values) {
       const v = images[image].values.color;
@@ -131,7 +131,7 @@ const openPictures = async (manifest) => {
         }
         out[4 * i + 3] = 255;
       }
-      return picture;
+      return imageData;
     }
     const map = mapOf(image, view);
     const [lut, at, high] = [colors[view.scale], place[view.scale], highOf(view)];
@@ -145,7 +145,7 @@ const openPictures = async (manifest) => {
       }
       out[4 * i + 3] = 255;
     }
-    return picture;
+    return imageData;
   }
 
   const surfaces = new Map();

@@ -1,5 +1,5 @@
 // What the page shows and how it answers to the mouse, the keyboard and its controls.
-/* global openPictures */
+/* global openImages */
 "use strict";
 (async () => {
   const $ = (id) => document.getElementById(id);
@@ -16,7 +16,7 @@
 
   const manifest = JSON.parse($("manifest").textContent);
   const { width, height, images } = manifest;
-  const { reference, views, mapOf, highOf, valueAt, surface } = await openPictures(manifest);
+  const { reference, views, mapOf, highOf, valueAt, surface } = await openImages(manifest);
   const viewOf = (key) => views.find((view) => view.key === key);
   $("loading").remove();
 
