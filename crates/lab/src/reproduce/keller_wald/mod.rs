@@ -29,23 +29,25 @@ const SHAPE: [u32; 2] = [4, 3];
 
 /// The page around the figures.
 const STUDY: Study = Study {
-    title: "Importance sampling for photon maps: the figures of Keller and Wald (2000), measured again",
-    intro: "Each figure of the report “Efficient Importance Sampling Techniques for the Photon Map”. Its scenes are not published; these \
-            are others of the same kind, made from its text: 10 × 10 rooms with a light each, 50 × 50 rooms with 10,000 lights, a polished \
-            ring, and a room that is lit through a slit. The numbers below are from one run on one machine.",
+    title: "Importance sampling for photon maps: the figures of Keller and Wald (2000), reproduced",
+    intro: "Each figure of the report “Efficient Importance Sampling Techniques for the Photon Map”. Its scenes are \
+            not published; similar ones were made from its text: 10 × 10 rooms with one light each, 50 × 50 rooms with \
+            10,000 lights, a polished ring, and a room lit through a slit. The numbers below are from one run on one \
+            machine.",
     notes: &[
-        "Variance: of the pixel's luminance over independent renderings, unbiased, averaged over all pixels; no reference image takes \
-         part. Camera rays pass through pixel centres, so that it is the variance of lighting. ± is one standard error, from how the \
-         renderings differ.",
-        "Time: processor time of the whole rendering, all threads together. All methods take turns in one run, in an order that moves on \
-         from turn to turn; the ratio of times is the median over the turns. At equal time means variance × time, relative to \
-         another method.",
-        "Figures 1 to 4 show maps directly, as the report does: the radiance of a diffuse surface is albedo × irradiance / π, and the \
-         irradiance is the density of the power of the nearest photons by the kernel of Epanechnikov, direct light included. Pixels that show lights \
-         or metal take no part. Error: root of the mean square of the difference in luminance from a reference, over the mean luminance; the \
-         reference's own noise is subtracted.",
-        "“Same mean, p” is the probability that the mean luminance differs from that of all other methods at least as much as it does if \
-         all have the same expectation.",
+        "Variance: of the pixel's luminance over independent renderings, unbiased, averaged over all pixels; no \
+         reference image is used. Camera rays pass through pixel centres, so that the variance is that of lighting. ± \
+         is one standard error, from how the renderings differ.",
+        "Time: processor time of the whole rendering, all threads together. All methods alternate in one run, in an \
+         order that rotates from turn to turn; the ratio of times is the median over the turns. At equal time means \
+         variance × time, relative to another method.",
+        "Figures 1 to 4 show maps directly, as the report does: the radiance of a diffuse surface is albedo × \
+         irradiance / π, and the irradiance is the density of the power of the nearest photons with the Epanechnikov \
+         kernel, direct light included. Pixels that show lights or metal are excluded. Error: root mean square of the \
+         difference in luminance from a reference, relative to the mean luminance; the reference's own noise is \
+         subtracted.",
+        "“Same mean, p” is the probability of a difference from the mean luminance of all other methods at least as \
+         large as the observed one, if all have the same expectation.",
     ],
     numbers: "keller-wald.json",
 };

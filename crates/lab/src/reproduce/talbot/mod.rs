@@ -29,19 +29,21 @@ const SIZE: [u32; 2] = [400, 160];
 
 /// The page around the figures.
 const STUDY: Study = Study {
-    title: "Resampled importance sampling: the figures of Talbot, Cline and Egbert (2005), measured again",
-    intro: "Each figure of the paper “Importance Resampling for Global Illumination” and of Talbot's thesis, with other scenes \
-            of the same kind. The numbers below are from one run on one machine.",
+    title: "Resampled importance sampling: the figures of Talbot, Cline and Egbert (2005), reproduced",
+    intro: "Each figure of the paper “Importance Resampling for Global Illumination” and of Talbot's thesis, with \
+            similar scenes. The numbers below are from one run on one machine.",
     notes: &[
-        "Variance: of the pixel's luminance over independent renderings with the camera rays of one turn each, unbiased, averaged \
-         over all pixels; no reference image takes part. Camera rays pass through pixel centres, so that it is the variance of \
-         lighting; the images, and the variance below them, are with antialiasing. ± is one standard error, from how the turns differ.",
-        "Time: processor time of the whole rendering, all threads together. All methods take \
-         turns in one run, in an order that moves on from turn to turn; the ratio of times is the median over the turns. At equal time \
-         means variance × time, relative to the baseline. M and N of ris are chosen so that times agree within about one percent.",
-        "“Same mean, p” is the probability that the mean luminance differs from that of all other methods at least as much as it does if \
-         all have the same expectation; all are unbiased, so about one in a hundred should be below 0.01. “No stratification” means independent \
-         random numbers throughout.",
+        "Variance: of the pixel's luminance over independent renderings with the camera rays of one turn each, \
+         unbiased, averaged over all pixels; no reference image is used. Camera rays pass through pixel centres, so \
+         that the variance is that of lighting; the images, and the variance below them, are with antialiasing. ± is \
+         one standard error, from how the turns differ.",
+        "Time: processor time of the whole rendering, all threads together. All methods alternate in one run, in an \
+         order that rotates from turn to turn; the ratio of times is the median over the turns. At equal time means \
+         variance × time, relative to the baseline. M and N of ris are chosen so that times agree within about one \
+         percent.",
+        "“Same mean, p” is the probability of a difference from the mean luminance of all other methods at least as \
+         large as the observed one, if all have the same expectation; all are unbiased, so about one in a hundred \
+         should be below 0.01. “No stratification” means independent random numbers throughout.",
     ],
     numbers: "talbot.json",
 };
