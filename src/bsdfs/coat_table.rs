@@ -138,8 +138,8 @@ impl CoatTable {
         [below[0] + (above[0] - below[0]) * row_t, below[1] + (above[1] - below[1]) * row_t]
     }
 
-    /// T and R at equal steps of √cos θ from 0 to 1, of the rows about `row`, and the place between them; `None` if they
-    /// depend on the azimuth.
+    /// T and R at equal steps of √cos θ from 0 to 1, of the rows about `row`, and the place between them; `None` if
+    /// they depend on the azimuth.
     pub(super) fn directional_rows(&self, row: f32) -> Option<([&[[f32; 2]]; 2], f32)> {
         match self.axis {
             Axis::Azimuth => None,

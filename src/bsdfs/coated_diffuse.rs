@@ -62,8 +62,8 @@ impl<'a> CoatedDiffuse<'a> {
         Rgb::splat(r) + self.base * (PI * self.mean_transmittance * t)
     }
 
-    /// Albedo of the base seen from `wo`, under light that arrives evenly from all directions: what the base reflects is
-    /// Lambertian but for the factor T(wi), of which this has the mean.
+    /// Albedo of the base seen from `wo`, under light that arrives evenly from all directions: what the base reflects
+    /// is Lambertian but for the factor T(wi), of which this has the mean.
     pub(super) fn base_albedo(&self, wo: Vec3) -> Rgb {
         self.base * (PI * self.mean_transmittance * self.directional(if wo.z < 0.0 { -wo } else { wo })[0])
     }

@@ -1,8 +1,8 @@
 //! Reflection and refraction at a dielectric interface, smooth or with GGX microfacets [Walter et al. 2007].
 //!
 //! Reflection: f = D F G / (4 cos θo cos θi), half vector m = wo + wi. Transmission: m = wo + η'wi,
-//! f = D (1 − F) G |wo·m wi·m| / (|cos θo cos θi| (wi·m + wo·m/η')²), times 1/η'² for radiance, where η' is the index of
-//! the side of `wi` relative to the side of `wo`. One scattering event only, as pbrt-v4.
+//! f = D (1 − F) G |wo·m wi·m| / (|cos θo cos θi| (wi·m + wo·m/η')²), times 1/η'² for radiance, where η' is the index
+//! of the side of `wi` relative to the side of `wo`. One scattering event only, as pbrt-v4.
 
 use super::fresnel::{fr_dielectric, reflect, refract};
 use super::{BsdfSample, Lobe, TrowbridgeReitz};

@@ -55,7 +55,8 @@ pub fn fr_complex(cos_i: f32, eta: f32, k: f32) -> f32 {
     let t2 = 2.0 * a * cos_i;
     let t3 = cos2 * a2_plus_b2 + sqr(sin2);
     let t4 = t2 * sin2;
-    // Only at grazing incidence on no interface at all (η = 1, k = 0) do the sums vanish; reflect all as the limit does.
+    // Only at grazing incidence on no interface at all (η = 1, k = 0) do the sums vanish; reflect all as the limit
+    // does.
     if t1 + t2 <= 0.0 || t3 + t4 <= 0.0 {
         return 1.0;
     }

@@ -1,6 +1,6 @@
 //! Scattering at surfaces. Local frame: n = +z; `wo` to the viewer, `wi` to the light, both unit and away from the
-//! surface. The models are those of pbrt-v4 [Pharr et al. 2023, ch. 9 and 14]; f of transmission is for radiance, that is
-//! scaled by 1/η².
+//! surface. The models are those of pbrt-v4 [Pharr et al. 2023, ch. 9 and 14]; f of transmission is for radiance, that
+//! is scaled by 1/η².
 //!
 //! Reading order: [`fresnel`], [`microfacet`], [`diffuse`], [`diffuse_transmission`], [`conductor`], [`dielectric`],
 //! [`thin_dielectric`], [`coat_table`], [`coated_diffuse`], [`layered`]; then what can only be evaluated: [`models`],
@@ -186,8 +186,9 @@ impl<'a> Bsdf<'a> {
         if pdf.is_finite() { pdf } else { 0.0 }
     }
 
-    /// Probability that [`Self::sample`] samples the first of at most two lobes, which it does if `uc` is less: the interface of a
-    /// coat, the reflection of a diffuse transmitter, the cosine lobe of a proposal density. 1 for BSDFs of one lobe.
+    /// Probability that [`Self::sample`] samples the first of at most two lobes, which it does if `uc` is less: the
+    /// interface of a coat, the reflection of a diffuse transmitter, the cosine lobe of a proposal density. 1 for BSDFs
+    /// of one lobe.
     #[inline]
     pub fn first_lobe(&self, wo: Vec3) -> f32 {
         match self {
@@ -254,8 +255,9 @@ impl<'a> Bsdf<'a> {
         }
     }
 
-    /// Probability of a lobe of [`Self::sample`] whose density is that of the cosine or uniform, on the side of `wo`: |cos θi|/pdf is at
-    /// most 2π over this everywhere there, and directions are found that no f tells of. 0 for BSDFs without such a lobe.
+    /// Probability of a lobe of [`Self::sample`] whose density is that of the cosine or uniform, on the side of `wo`:
+    /// |cos θi|/pdf is at most 2π over this everywhere there, and directions are found that no f tells of. 0 for BSDFs
+    /// without such a lobe.
     pub fn wide_lobe(&self, wo: Vec3) -> f32 {
         match self {
             Bsdf::Diffuse(_) => 1.0,
@@ -271,8 +273,8 @@ impl<'a> Bsdf<'a> {
         self.sample_direction(wo, uc, u).filter(|s| s.f.is_finite() && !s.f.is_black())
     }
 
-    /// As [`Self::sample`], but also directions that carry no light: `None` only where the density has a defect. So the directions of
-    /// non-specular samples are distributed by [`Self::pdf`].
+    /// As [`Self::sample`], but also directions that carry no light: `None` only where the density has a defect. So the
+    /// directions of non-specular samples are distributed by [`Self::pdf`].
     #[inline]
     pub fn sample_direction(&self, wo: Vec3, uc: f32, u: [f32; 2]) -> Option<BsdfSample> {
         if wo.z == 0.0 {
@@ -331,8 +333,9 @@ impl<'a> Bsdf<'a> {
         }
     }
 
-    /// The Lambertian part as seen from `wo`; `None` if there is none. Exact but for the base below a coat, whose dependence
-    /// on the direction of the light (the coat's transmittance) is replaced by its mean: exact under even light.
+    /// The Lambertian part as seen from `wo`; `None` if there is none. Exact but for the base below a coat, whose
+    /// dependence on the direction of the light (the coat's transmittance) is replaced by its mean: exact under even
+    /// light.
     pub fn lambertian(&self, wo: Vec3) -> Option<Lambertian<'a>> {
         let of = |reflectance, transmittance, rest| Some(Lambertian { reflectance, transmittance, rest });
         match self {
@@ -348,9 +351,10 @@ impl<'a> Bsdf<'a> {
         }
     }
 
-    /// Fraction of uniform light that reaches `wo`, for the albedo image: exact for the Lambertian and coated ones, otherwise
-    /// the unbiased estimate f |cos θ|/pdf of one sample, drawn by the numbers that `u` gives. One is enough: an image has a
-    /// sample of its own for each camera sample, and many for each would cost more than all light transport.
+    /// Fraction of uniform light that reaches `wo`, for the albedo image: exact for the Lambertian and coated ones,
+    /// otherwise the unbiased estimate f |cos θ|/pdf of one sample, drawn by the numbers that `u` gives. One is enough:
+    /// an image has a sample of its own for each camera sample, and many for each would cost more than all light
+    /// transport.
     pub fn albedo_estimate(&self, wo: Vec3, u: impl FnOnce() -> [f32; 3]) -> Rgb {
         match self {
             Bsdf::Diffuse(b) => b.reflectance,

@@ -27,7 +27,8 @@ impl Scale {
         Scale { stops, low, high }
     }
 
-    /// A scale for values of many orders: its top is the value that one in a thousand exceeds, and it spans four decades.
+    /// A scale for values of many orders: its top is the value that one in a thousand exceeds, and it spans four
+    /// decades.
     pub fn of_values<'a>(stops: Stops, values: impl IntoIterator<Item = &'a f64>) -> Self {
         let mut sorted: Vec<f64> = values.into_iter().copied().filter(|v| *v > 0.0 && v.is_finite()).collect();
         sorted.sort_by(f64::total_cmp);

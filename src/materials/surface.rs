@@ -92,7 +92,8 @@ impl<'a> SurfaceBsdf<'a> {
         Some(sample)
     }
 
-    /// A direction by the same density, in world space, whether it carries light or not, see [`Bsdf::sample_direction`].
+    /// A direction by the same density, in world space, whether it carries light or not, see
+    /// [`Bsdf::sample_direction`].
     #[inline]
     pub fn sample_direction(&self, wo: Vec3, uc: f32, u: [f32; 2]) -> Option<BsdfSample> {
         let mut sample = self.bsdf.sample_direction(self.frame.to_local(wo), uc, u)?;

@@ -1,11 +1,11 @@
 //! Two ray tracers, the same rays: where do they disagree, and why?
 //!
 //! Five families of rays go through both: camera rays, shadow segments towards the lights, random chords of the scene's
-//! bounds, rays that graze the surfaces that camera rays met, and rays aimed at edges and vertices of triangles. An answer
-//! is *equal* if both name the same primitive and their t differ by at most [`T_TOLERANCE_ULPS`] units in the last place
-//! of the largest number involved. A different answer is *explained* if the nearer primitive is tied in t with the
-//! other one's, or if the ray, in f64 arithmetic, passes one of its edges within [`EDGE_ULPS`] units in the last place.
-//! What remains is a disagreement.
+//! bounds, rays that graze the surfaces that camera rays met, and rays aimed at edges and vertices of triangles. An
+//! answer is *equal* if both name the same primitive and their t differ by at most [`T_TOLERANCE_ULPS`] units in the
+//! last place of the largest number involved. A different answer is *explained* if the nearer primitive is tied in t
+//! with the other one's, or if the ray, in f64 arithmetic, passes one of its edges within [`EDGE_ULPS`] units in the
+//! last place. What remains is a disagreement.
 
 use crate::accel::{Accel, Coherence, Hit, RayBatch};
 use crate::geometry::Shape;
@@ -317,7 +317,8 @@ impl Checker<'_> {
 
     fn is_marginal(&self, ray: &Ray, hit: &Hit) -> bool {
         let Shape::Mesh(mesh) = &self.scene.geometry.geometries[hit.geometry as usize].shape else {
-            // The tracers share the code that meets curved shapes; what differs is the ray after an instance's transform.
+            // The tracers share the code that meets curved shapes; what differs is the ray after an instance's
+            // transform.
             return hit.instance != Hit::NO_INSTANCE;
         };
         let (mut o, mut d) = (ray.o.as_dvec3(), ray.d.as_dvec3());
@@ -330,8 +331,8 @@ impl Checker<'_> {
             let columns = inverse.matrix3;
             stretch = columns.x_axis.length().max(columns.y_axis.length()).max(columns.z_axis.length());
         }
-        // Distances between the ray's line and the lines of the edges, from signed volumes. A ray that grazes the triangle
-        // is near to its edges as well.
+        // Distances between the ray's line and the lines of the edges, from signed volumes. A ray that grazes the
+        // triangle is near to its edges as well.
         let [a, b, c] = mesh.triangle(hit.primitive as usize).map(|p| p.as_dvec3() - o);
         let distance = |p: DVec3, q: DVec3| (d.dot(p.cross(q)) / d.cross(q - p).length()).abs();
         let nearest = [distance(a, b), distance(b, c), distance(c, a)].into_iter().fold(f64::INFINITY, f64::min);

@@ -23,7 +23,8 @@ pub type ImageId = u32;
 pub struct TextureContext {
     /// Texture coordinates.
     pub uv: Vec2,
-    /// Width of the filter in uv, per axis: the extent on the surface of what a camera sample stands for. 0 is a point lookup.
+    /// Width of the filter in uv, per axis: the extent on the surface of what a camera sample stands for. 0 is a point
+    /// lookup.
     pub uv_width: Vec2,
     /// World-space point.
     pub p: Vec3,

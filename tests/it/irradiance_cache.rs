@@ -1,4 +1,5 @@
-//! The irradiance cache: known answers, agreement with `path`, the same bits, gradients, walls, and scenes with nothing in them.
+//! The irradiance cache: known answers, agreement with `path`, the same bits, gradients, walls, and scenes with nothing
+//! in them.
 
 use lumiris::film::Film;
 use lumiris::import::{LoadOptions, load};
@@ -195,8 +196,8 @@ fn seeds_give_different_records() {
 /// A change of the settings, by name, and the relative bias that it has at most.
 type Choice = (&'static str, f64, fn(&mut lumiris::settings::IntegratorSettings));
 
-/// Those that fit their coefficients to the eight samples of an estimate are biased: −6 % and −9 % were measured of those with a
-/// limit, ± 0.2 %.
+/// Those that fit their coefficients to the eight samples of an estimate are biased: −6 % and −9 % were measured of
+/// those with a limit, ± 0.2 %.
 const RECORD_ESTIMATORS: [Choice; 8] = [
     ("mc", 0.0, |s| s.estimator = EstimatorKind::Mc),
     ("ris", 0.0, |s| s.estimator = EstimatorKind::Ris),
@@ -262,7 +263,8 @@ fn wanted(p: Vec3, n: Vec3) -> RecordRequest {
     }
 }
 
-/// Gradients of the irradiance at `p` against differences of the irradiance at `p ± h t`, relative to the length of the former.
+/// Gradients of the irradiance at `p` against differences of the irradiance at `p ± h t`, relative to the length of the
+/// former.
 fn assert_gradients(job: &RenderJob, p: Vec3, n: Vec3, h: f32, tolerance: f32) {
     let mut gatherer = Gatherer::default();
     let mut at = |p: Vec3, n: Vec3| gatherer.records(job, &[wanted(p, n)])[0].light;
@@ -313,8 +315,8 @@ fn gradients_of_indirect_light_are_finite_differences() {
 
 #[test]
 fn light_does_not_leak_through_a_thin_wall() {
-    // Two rooms with one floor z = 0 and a wall at x = 0 of no thickness; light in the one at x > 0 only. The camera looks
-    // down from below the ceilings.
+    // Two rooms with one floor z = 0 and a wall at x = 0 of no thickness; light in the one at x > 0 only. The camera
+    // looks down from below the ceilings.
     const ROOMS: &str = r#"
 LookAt 0 0 0.5  0 0 0  0 1 0
 Camera "orthographic" "float screenwindow" [ -0.5 0.5 -0.5 0.5 ]

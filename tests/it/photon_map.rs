@@ -1,5 +1,5 @@
-//! The photon-map integrator: known answers, agreement with `path`, convergence of the progressive form, the same bits, and scenes
-//! without light.
+//! The photon-map integrator: known answers, agreement with `path`, convergence of the progressive form, the same bits,
+//! and scenes without light.
 
 use super::irradiance_cache::{ROOM, rendering, squares, world_of};
 use lumiris::render::output::{Aov, channels};
@@ -34,8 +34,8 @@ fn mean(values: &[f64]) -> f64 {
 
 #[test]
 fn a_furnace_has_its_known_radiance() {
-    // Where irradiance is the same everywhere and surfaces are nearly flat, a density estimate is without bias. Means over
-    // seeds; 0.2 % is left to the curvature of what a disk of photons covers.
+    // Where irradiance is the same everywhere and surfaces are nearly flat, a density estimate is without bias. Means
+    // over seeds; 0.2 % is left to the curvature of what a disk of photons covers.
     let forms: [fn(&mut PhotonMapSettings); 5] = [
         |_| (),
         |p| p.gather = 0,
@@ -64,8 +64,8 @@ fn a_furnace_has_its_known_radiance() {
 
 #[test]
 fn a_room_of_all_materials_agrees_with_path_tracing() {
-    // Light counted twice or lost at a coat, in a mirror or through glass is 4 % and more; the density of photons in corners and
-    // below the glass sphere is off by less.
+    // Light counted twice or lost at a coat, in a mirror or through glass is 4 % and more; the density of photons in
+    // corners and below the glass sphere is off by less.
     let path = world_of(ROOM, |s| s.integrator.samples = Some(4));
     let reference = squares(&rendering(&path, RenderSettings { spp: 512, ..Default::default() }).film, 8);
     for storage in [PhotonStorage::All, PhotonStorage::Floor(0.1)] {
@@ -101,7 +101,8 @@ fn more_passes_bring_a_progressive_map_nearer_to_the_truth() {
 
 #[test]
 fn maps_without_photons_are_no_light_and_no_error() {
-    // A sixth of the light falls on the only wall, so that many a map of one photon is empty; a wall alone has direct light only
+    // A sixth of the light falls on the only wall, so that many a map of one photon is empty; a wall alone has direct
+    // light only
     const WALL: &str = "Camera \"perspective\" \"float fov\" [ 60 ]\n\
         Film \"rgb\" \"integer xresolution\" [ 8 ] \"integer yresolution\" [ 8 ]\nWorldBegin\n\
         LightSource \"point\" \"rgb I\" [ 3 3 3 ]\nShape \"trianglemesh\"\n\

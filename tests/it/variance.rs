@@ -114,8 +114,8 @@ fn variances_are_those_between_seeds_for_every_sampler_and_number_of_samples() {
                 let s = study(&mut job, spp, 32);
                 let what =
                     format!("{}, {}, {spp} samples: {} ± {}", case.scene, <&str>::from(sampler), s.stated, s.error);
-                // Of 32 seeds with 144 pixels and replicas each, both errors are about √(2/144/32) = 2 %, and more where
-                // variances differ between pixels: 20 % are more than three of them.
+                // Of 32 seeds with 144 pixels and replicas each, both errors are about √(2/144/32) = 2 %, and more
+                // where variances differ between pixels: 20 % are more than three of them.
                 assert!(s.error < 0.06, "{what}");
                 assert!((s.stated - 1.0).abs() < 0.2, "{what}");
                 // The formula for independent samples would not do

@@ -1,8 +1,9 @@
 //! The weights of proposals of two techniques [Talbot 2005, Section 4.6.1]: q̂ = Y(f·cos θ·L), r = w/(m p), and q̂·r.
 //!
-//! With m_i proposals of density p_i of each technique, r_j = w_i(x_j)/(m_i p_i(x_j)), one target q̂ and one drawing, c_j = f r_j and
-//! w_j = q̂ r_j are as for a single technique. The thesis prints the weight as w_i q̂/p_i without 1/m_i, for an estimate that divides
-//! by M afterwards; that is right only if all m_i are equal to M, and off by m_i/M otherwise.
+//! With m_i proposals of density p_i of each technique, r_j = w_i(x_j)/(m_i p_i(x_j)), one target q̂ and one drawing,
+//! c_j = f r_j and w_j = q̂ r_j are as for a single technique. The thesis prints the weight as w_i q̂/p_i without
+//! 1/m_i, for an estimate that divides by M afterwards; that is right only if all m_i are equal to M, and off by m_i/M
+//! otherwise.
 
 use super::lane::{F, LANES, Vec3s, Wide, begin, load, or_zero, padded, store};
 use fearless_simd::{Level, Simd, dispatch, prelude::*};

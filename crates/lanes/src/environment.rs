@@ -1,7 +1,8 @@
 //! Directions importance sampled from an image of radiance over the sphere.
 //!
-//! The running integrals are inverted lane by lane, since that is a matter of cache lines; directions and densities are in
-//! lanes; a texel is one load of four floats. The maps of the square to the sphere are those of [`lumiris_numbers::math::sphere_map`].
+//! The running integrals are inverted lane by lane, since that is a matter of cache lines; directions and densities are
+//! in lanes; a texel is one load of four floats. The maps of the square to the sphere are those of
+//! [`lumiris_numbers::math::sphere_map`].
 
 use super::lane::{F, I, LANES, Vec3s, begin, load, or_zero, safe_sqrt, sin_cos_quadrant, sin_cos_turns, store};
 use super::light::LightLanes;

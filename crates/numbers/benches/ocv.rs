@@ -1,5 +1,5 @@
-//! Nanoseconds per shading point of optimizing control variates: sums over its samples, and the system, of many points at a
-//! time and of one.
+//! Nanoseconds per shading point of optimizing control variates: sums over its samples, and the system, of many points
+//! at a time and of one.
 //!
 //! `cargo bench --bench ocv`
 #![allow(clippy::print_stdout, missing_docs)]

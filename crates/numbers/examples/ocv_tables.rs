@@ -34,7 +34,8 @@ fn moments<const K: usize>(runs: usize, key: u32, mut run: impl FnMut(&mut HashS
     welford
 }
 
-/// The first channel of the estimate of a form with the coefficients that `system` gives of the same `rows` of sums of r_j.
+/// The first channel of the estimate of a form with the coefficients that `system` gives of the same `rows` of sums of
+/// r_j.
 fn estimate(form: Form, system: System, sampler: &Sampler, rows: &[f32]) -> f32 {
     let equations = sampler.equations;
     let (mut sums, mut beta) = (rows.to_vec(), vec![0.0; form.rows() * equations.coefficients()]);

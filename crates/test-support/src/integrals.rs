@@ -1,4 +1,5 @@
-//! Integrals of colours with steps of visibility, with values and variances by quadrature, and runs of estimators on them.
+//! Integrals of colours with steps of visibility, with values and variances by quadrature, and runs of estimators on
+//! them.
 
 use lumiris_numbers::estimators::ris::Draw;
 use lumiris_numbers::estimators::ris::choice::Moments;

@@ -146,8 +146,8 @@ impl Builder<'_> {
         }
     }
 
-    /// `Material "evaluated" "string model" "…"`, whose value alone is used: directions are proposed by a density that is
-    /// the same for all, and resampled. Parameters of the models, all of them textures too:
+    /// `Material "evaluated" "string model" "…"`, whose value alone is used: directions are proposed by a density that
+    /// is the same for all, and resampled. Parameters of the models, all of them textures too:
     ///
     /// | model | parameters |
     /// |---|---|
@@ -327,8 +327,8 @@ impl Builder<'_> {
         let eta = input(self, eta_name, "metal-Cu-eta");
         let k = input(self, k_name, "metal-Cu-k");
         if let (Some(eta), Some(k)) = (eta, k) {
-            // Both curves together make the colour that a spectral renderer shows; the Fresnel equations per channel of a
-            // colour do not.
+            // Both curves together make the colour that a spectral renderer shows; the Fresnel equations per channel of
+            // a colour do not.
             let (eta, k) = spectra::conductor_rgb(&eta.unbounded_curve(), &k.unbounded_curve());
             let (eta, k) =
                 (self.textures.add_rgb(RgbTexture::Constant(eta)), self.textures.add_rgb(RgbTexture::Constant(k)));

@@ -15,8 +15,8 @@ const SAMPLES: u32 = 64;
 const SCENES: [&str; 5] = ["half-environment", "hidden-rectangle", "many-points", "rectangle", "sphere"];
 const BUDGET: Budget = Budget { edge: 4, images: 32 };
 
-/// Each form with the relative bias that it has in no scene. At N = 64 they were measured, with errors up to 0.07 %, as −2.95 %
-/// (`sphere`), +0.29 % (`hidden-rectangle`), +0.31 % (`hidden-rectangle`), −1.74 % (`sphere`) and +0.01 %.
+/// Each form with the relative bias that it has in no scene. At N = 64 they were measured, with errors up to 0.07 %, as
+/// −2.95 % (`sphere`), +0.29 % (`hidden-rectangle`), +0.31 % (`hidden-rectangle`), −1.74 % (`sphere`) and +0.01 %.
 fn forms() -> [(Configuration, f64); 5] {
     let base = Configuration { samples: SAMPLES, ..BASE };
     let ocv = |form| Configuration { estimator: EstimatorKind::Ocv, ocv: OcvSettings { form, ..base.ocv }, ..base };

@@ -1,12 +1,12 @@
 //! Scenes whose answer is known: every one with every integrator, estimator, light choice, sampler and ray tracer.
 //!
-//! The answer stands in the scene file beside its derivation, with the bias that every row of the scene has to notice at the
-//! level of the whole set (Šidák-corrected) with a power of 0.99. `make test-power` renders as much as that needs, `make test`
-//! as much as notices a bias [`QUICK`]`.goal` times as large. Both then multiply what they rendered by a wrong factor, which the
-//! same tests have to reject. Seeds are fixed.
+//! The answer stands in the scene file beside its derivation, with the bias that every row of the scene has to notice
+//! at the level of the whole set (Šidák-corrected) with a power of 0.99. `make test-power` renders as much as that
+//! needs, `make test` as much as notices a bias [`QUICK`]`.goal` times as large. Both then multiply what they rendered
+//! by a wrong factor, which the same tests have to reject. Seeds are fixed.
 //!
-//! In reading order: [`rows`] (the configurations), [`power`] (how much is rendered, and what its t-test notices), [`biased`]
-//! (forms that are biased, and by how much).
+//! In reading order: [`rows`] (the configurations), [`power`] (how much is rendered, and what its t-test notices),
+//! [`biased`] (forms that are biased, and by how much).
 
 mod biased;
 mod power;
@@ -26,7 +26,8 @@ const QUICK: Effort = Effort { goal: 2.5, min_images: 32 };
 /// What `make test-power` renders.
 const FULL: Effort = Effort { goal: 1.0, min_images: 64 };
 
-/// An environment variable: the names of the scenes that are rendered, where it is not all of them. The level stays the same.
+/// An environment variable: the names of the scenes that are rendered, where it is not all of them. The level stays the
+/// same.
 const ONLY: &str = "POWER_SCENES";
 
 /// A scene of `scenes/analytic`.

@@ -1,9 +1,10 @@
 //! How many images each row needs, what its t-test then notices, and the table that says so.
 //!
-//! The noise of a row is the relative standard deviation of one camera sample. It stands in `docs/measurements/power/rows.csv`
-//! and says how many images, of seeds of their own, a test needs to notice a bias. The means of the images are
-//! independent whatever the sampler does within an image, and Student's t-test compares them with the answer. What a
-//! test notices is computed from the spread of its own images; a stale table makes it notice less, which is an error.
+//! The noise of a row is the relative standard deviation of one camera sample. It stands in
+//! `docs/measurements/power/rows.csv` and says how many images, of seeds of their own, a test needs to notice a bias.
+//! The means of the images are independent whatever the sampler does within an image, and Student's t-test compares
+//! them with the answer. What a test notices is computed from the spread of its own images; a stale table makes it
+//! notice less, which is an error.
 
 use super::Scene;
 use super::rows::{Configuration, SPP, configurations, job};

@@ -1,8 +1,9 @@
-//! Images that must not change by a bit: a list of scenes × integrators × estimators × samplers, each with the hash of its raw film.
+//! Images that must not change by a bit: a list of scenes × integrators × estimators × samplers, each with the hash of
+//! its raw film.
 //!
 //! The list is `list.txt`. A change that is meant to change images writes it anew,
-//! `LUMIRIS_BLESS=1 cargo test --test it image_hashes`, and says which rows and why. The rows hold for every machine, Embree and
-//! operating system: what they depend on is arithmetic that IEEE 754 defines.
+//! `LUMIRIS_BLESS=1 cargo test --test it image_hashes`, and says which rows and why. The rows hold for every machine,
+//! Embree and operating system: what they depend on is arithmetic that IEEE 754 defines.
 
 use lumiris::film::Film;
 use lumiris::import::{LoadOptions, load};
@@ -13,8 +14,8 @@ use std::fmt::Write;
 use std::path::{Path, PathBuf};
 use std::sync::atomic::AtomicBool;
 
-/// Scenes: a name, the file, width and height. Those of `scenes/analytic` are open, and lose nearly all photons: they have no rows
-/// with photons.
+/// Scenes: a name, the file, width and height. Those of `scenes/analytic` are open, and lose nearly all photons: they
+/// have no rows with photons.
 const SCENES: [(&str, &str, [u32; 2]); 5] = [
     ("gallery", "scenes/demo/gallery.pbrt", [40, 24]),
     ("materials", "tests/it/image_hashes/materials.pbrt", [48, 32]),

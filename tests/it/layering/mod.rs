@@ -1,7 +1,7 @@
 //! What may import what: crates, the renderer's modules by layer, and no circles inside a folder.
 //!
-//! [`imports`] reads the sources. A folder's `mod.rs` is its interface: it declares and re-exports the files of the folder, and they
-//! use what it defines; that alone is no circle.
+//! [`imports`] reads the sources. A folder's `mod.rs` is its interface: it declares and re-exports the files of the
+//! folder, and they use what it defines; that alone is no circle.
 
 mod imports;
 

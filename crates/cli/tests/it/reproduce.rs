@@ -214,8 +214,8 @@ fn bias(m: &Value) -> [f64; 2] {
     [number(&m["bias"], "value"), number(&m["bias"], "half_width_95") / STUDENT]
 }
 
-/// Means are those of the reference within six standard errors, pooled over the methods of a way, since each is from four
-/// turns: 0.2 to 1 % of the mean. The same bound finds the form `paper`, which loses 3 to 10 %.
+/// Means are those of the reference within six standard errors, pooled over the methods of a way, since each is from
+/// four turns: 0.2 to 1 % of the mean. The same bound finds the form `paper`, which loses 3 to 10 %.
 fn assert_biases(id: &str, methods: &[Value]) {
     let pooled = UNBIASED.iter().map(|&i| bias(&methods[i])[1].powi(2)).sum::<f64>() / UNBIASED.len() as f64;
     let bound = 6.0 * pooled.sqrt();
@@ -226,8 +226,8 @@ fn assert_biases(id: &str, methods: &[Value]) {
     assert!(bias(&methods[PAPER])[0] < -bound, "{id}: {bound} does not find the bias of paper");
 }
 
-/// No method without bias has twice the error of `mis` with independent samples: what was measured is below 1.3 times, and six
-/// standard errors are for chance.
+/// No method without bias has twice the error of `mis` with independent samples: what was measured is below 1.3 times,
+/// and six standard errors are for chance.
 fn assert_errors(id: &str, methods: &[Value]) {
     let [independent, _] = estimate(&methods[2 * ROLES], "error");
     for way in 0..3 {
@@ -240,8 +240,8 @@ fn assert_errors(id: &str, methods: &[Value]) {
     }
 }
 
-/// Stratified samples have less error than independent ones, by any way to stratify them: 0.45 to 0.7 times in the geometric
-/// mean of three scenes, each of which has an error of a tenth or two.
+/// Stratified samples have less error than independent ones, by any way to stratify them: 0.45 to 0.7 times in the
+/// geometric mean of three scenes, each of which has an error of a tenth or two.
 fn assert_stratification_helps(scenes: &[&[Value]]) {
     for stratified in [0, ROLES] {
         let ratio = |methods: &&[Value]| {
@@ -375,7 +375,8 @@ fn assert_verdicts_of_photon_maps(figures: &Value) {
         assert_eq!(reached(row), errors.windows(2).all(|pair| pair[1] < pair[0]), "{errors:?}");
     }
 
-    // The cut-off loses a third of the light or more, by far more than its noise: nobody would call that hardly perceivable
+    // The cut-off loses a third of the light or more, by far more than its noise: nobody would call that hardly
+    // perceivable
     let [loss, error] = estimate(&figures["slit"]["numbers"]["maps"][2], "bias");
     assert!(loss + 3.0 * error < -0.1, "{loss} ± {error}");
     assert!(!reached(&figures["slit"]["summary"]));

@@ -56,8 +56,8 @@ impl Arguments<'_> {
         }
     }
 
-    /// An affine matrix, column after column. pbrt divides points by w, so a last row 0 0 0 w is made 0 0 0 1; any other
-    /// would be a projection.
+    /// An affine matrix, column after column. pbrt divides points by w, so a last row 0 0 0 w is made 0 0 0 1; any
+    /// other would be a projection.
     pub fn matrix(&mut self, lexer: &mut Lexer<'_>, keyword: &str) -> Result<[f32; 16], Reported> {
         let start = self.peek(lexer)?.map_or(lexer.position(), |t| t.span.start as usize);
         let m: [f32; 16] = self.numbers(lexer, keyword)?;

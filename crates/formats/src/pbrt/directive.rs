@@ -38,8 +38,8 @@ pub enum AttributeTarget {
     Texture,
 }
 
-/// A directive without its parameter list. Matrices are in the order of the file, which is columns of `to_from · point` one
-/// after another, and have the last row 0 0 0 1.
+/// A directive without its parameter list. Matrices are in the order of the file, which is columns of `to_from · point`
+/// one after another, and have the last row 0 0 0 1.
 #[derive(Clone, Debug, PartialEq)]
 #[allow(missing_docs, reason = "the variants are pbrt's directives")]
 pub enum DirectiveKind {

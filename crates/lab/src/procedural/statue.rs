@@ -29,8 +29,8 @@ impl Default for StatueOptions {
     }
 }
 
-/// The mesh of the statue: closed, of one piece, z up, on the plane z = 0, [`dragon::HEIGHT`] high. `Err` with a message if the
-/// options are out of range.
+/// The mesh of the statue: closed, of one piece, z up, on the plane z = 0, [`dragon::HEIGHT`] high. `Err` with a
+/// message if the options are out of range.
 pub fn statue(options: &StatueOptions) -> Result<TriangleMesh, String> {
     if !(8..=4096).contains(&options.detail) {
         return Err(format!("the detail of the statue must be 8 to 4096, not {}", options.detail));

@@ -30,9 +30,9 @@ pub struct Technique {
     pub p: f32,
 }
 
-/// Part of the larger of two densities from which on the maximum heuristic takes the smaller for equal to it: the same density,
-/// computed on the way of one technique and of the other, differs by rounding. Nothing but the two values decides, and not which
-/// of them is whose, so that both techniques agree on what is a tie.
+/// Part of the larger of two densities from which on the maximum heuristic takes the smaller for equal to it: the same
+/// density, computed on the way of one technique and of the other, differs by rounding. Nothing but the two values
+/// decides, and not which of them is whose, so that both techniques agree on what is a tie.
 const TIE: f32 = 0.999;
 
 impl Heuristic {
@@ -43,7 +43,8 @@ impl Heuristic {
         if x > 0.0 { self.weight_of_expected(x, y) } else { 0.0 }
     }
 
-    /// [`weight`](Self::weight) of expected numbers of samples x = n_a p_a > 0 and y = n_b p_b, of one sample or of lanes.
+    /// [`weight`](Self::weight) of expected numbers of samples x = n_a p_a > 0 and y = n_b p_b, of one sample or of
+    /// lanes.
     #[inline(always)]
     pub fn weight_of_expected<N: Number>(self, x: N, y: N) -> N {
         let (zero, half, one, max) = (x.constant(0.0), x.constant(0.5), x.constant(1.0), x.constant(f32::MAX));
@@ -62,8 +63,8 @@ impl Heuristic {
         x.if_above(max, y.if_above(max, half, weight), weight)
     }
 
-    /// The factor w/(n·p) of f in the estimate over the samples of both techniques, of a sample that `a` drew; 0 where `a`
-    /// cannot have drawn it.
+    /// The factor w/(n·p) of f in the estimate over the samples of both techniques, of a sample that `a` drew; 0 where
+    /// `a` cannot have drawn it.
     #[inline]
     pub fn factor(self, a: Technique, b: Technique) -> f32 {
         self.weight(a, b) * mc::weight(a.n, a.p)

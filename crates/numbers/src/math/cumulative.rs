@@ -1,8 +1,8 @@
 //! Choice by inversion from the running sums of weights: S_i = w_0 + … + w_i.
 //!
-//! The sums of a table may be normalised or not, and are kept in whatever type suits their owner: f64 where many weights
-//! are summed, f32 for a few at a point, whole numbers where things are counted. A table is a slice, so that it can be a
-//! part of a longer one.
+//! The sums of a table may be normalised or not, and are kept in whatever type suits their owner: f64 where many
+//! weights are summed, f32 for a few at a point, whole numbers where things are counted. A table is a slice, so that it
+//! can be a part of a longer one.
 
 /// A running sum.
 pub trait RunningSum: Copy {
@@ -40,7 +40,8 @@ impl RunningSum for u32 {
     }
 }
 
-/// The first place whose sum is more than `x`, so that places without weight are never found; `sums.len()` if there is none.
+/// The first place whose sum is more than `x`, so that places without weight are never found; `sums.len()` if there is
+/// none.
 #[inline]
 pub fn find<S: RunningSum>(sums: &[S], x: S::Number) -> usize {
     sums.partition_point(|sum| sum.number() <= x)

@@ -1,9 +1,11 @@
 //! Piecewise-constant densities over [0, 1] and [0, 1]², sampled by inversion [Pharr et al. 2023, §A.4.7, §A.5.6].
 //!
-//! Sums are in f64; the tables are f32. A bin of value 0 is never sampled, a function that is 0 everywhere has no samples.
+//! Sums are in f64; the tables are f32. A bin of value 0 is never sampled, a function that is 0 everywhere has no
+//! samples.
 //!
-//! Where to look in a running integral is told by a guide [Chen and Asau 1974]: for each of G equal parts of [0, 1), the bin
-//! of its beginning. From there bins are passed eight at a time, on average ⌈n/8G⌉ times whatever the values are.
+//! Where to look in a running integral is told by a guide [Chen and Asau 1974]: for each of G equal parts of [0, 1),
+//! the bin of its beginning. From there bins are passed eight at a time, on average ⌈n/8G⌉ times whatever the values
+//! are.
 
 use super::{ONE_MINUS_EPSILON, Vec2};
 
@@ -296,7 +298,8 @@ impl PiecewiseConstant2D {
             .then(|| Vec2::new(place_in_bin(bins[0], u[0], self.width), place_in_bin(bins[1], u[1], self.height)))
     }
 
-    /// The point of marginal cumulative probability `u[1]` in y and conditional `u[0]` in x; `None` if the function is 0.
+    /// The point of marginal cumulative probability `u[1]` in y and conditional `u[0]` in x; `None` if the function is
+    /// 0.
     #[inline]
     pub fn sample(&self, u: [f32; 2]) -> Option<Sample2D> {
         let (bins, u) = self.bins(u);

@@ -2,8 +2,8 @@
 
 use std::ops::{Add, Div, Mul};
 
-/// A number of one sample or of a vector of them: what a single sample and a kernel both need is written once over it. NaN
-/// compares as false.
+/// A number of one sample or of a vector of them: what a single sample and a kernel both need is written once over it.
+/// NaN compares as false.
 pub trait Number: Copy + Add<Output = Self> + Mul<Output = Self> + Div<Output = Self> {
     /// `v`, in all lanes.
     fn constant(self, v: f32) -> Self;

@@ -8,8 +8,8 @@
 
 use lumiris_numbers::math::ONE_MINUS_EPSILON;
 
-/// Weighted importance sampling [Powell and Swann 1966; Bekaert et al. 2000]: ∫g · Σ c_j / Σ w_j of all M proposals, with
-/// c_j = f/(M p), w_j = g/(M p) and `integral` = ∫g known; 0 if no proposal has weight.
+/// Weighted importance sampling [Powell and Swann 1966; Bekaert et al. 2000]: ∫g · Σ c_j / Σ w_j of all M proposals,
+/// with c_j = f/(M p), w_j = g/(M p) and `integral` = ∫g known; 0 if no proposal has weight.
 ///
 /// Biased, by (I V(g/p)/∫g − Cov(f/p, g/p))/(M ∫g) to the first order in 1/M, where I = ∫f; consistent.
 pub(crate) fn weighted(contributions: &[f32], weights: &[f32], integral: f32) -> f32 {

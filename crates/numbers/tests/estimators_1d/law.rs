@@ -1,4 +1,5 @@
-//! The distribution of the resampled point [Talbot et al. 2005, Figure 1]: p uniform in 0..π, q̂ = max(0, cos θ + sin⁴ θ).
+//! The distribution of the resampled point [Talbot et al. 2005, Figure 1]: p uniform in 0..π, q̂ = max(0, cos θ + sin⁴
+//! θ).
 
 use super::level;
 use lumiris_numbers::estimators::ris::{Draw, stratified, systematic, with_replacement};

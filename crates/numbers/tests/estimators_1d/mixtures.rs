@@ -10,7 +10,8 @@ pub(crate) enum Density {
     Uniform(f64, f64),
     /// 4x up to ½, then 4(1 − x): a lobe.
     Tent,
-    /// 1/(w(1 + ((x − c)/w)²)) for x in 0..1, normalised: centre, width, and the angles atan((0 − c)/w), atan((1 − c)/w).
+    /// 1/(w(1 + ((x − c)/w)²)) for x in 0..1, normalised: centre, width, and the angles atan((0 − c)/w), atan((1 −
+    /// c)/w).
     Peak(f64, f64, [f64; 2]),
 }
 
@@ -172,11 +173,12 @@ impl Mixture {
     }
 }
 
-/// Numbers of samples n_j of a deterministic mixture of weights `alpha`: Σ n_j = `n`, and each is as near to n α_j as whole
-/// numbers can be, but at least 1 where α_j > 0, if `n` suffices for that; else those of the largest α_j have one each.
+/// Numbers of samples n_j of a deterministic mixture of weights `alpha`: Σ n_j = `n`, and each is as near to n α_j as
+/// whole numbers can be, but at least 1 where α_j > 0, if `n` suffices for that; else those of the largest α_j have one
+/// each.
 ///
-/// The mixture is that of the weights n_j/n, which are α_j only if all n α_j are whole: densities must be weighted by what is
-/// returned here, or the estimate is biased. Equal claims are settled in favour of the earlier component.
+/// The mixture is that of the weights n_j/n, which are α_j only if all n α_j are whole: densities must be weighted by
+/// what is returned here, or the estimate is biased. Equal claims are settled in favour of the earlier component.
 fn allot(alpha: &[f32], n: u32, counts: &mut [u32]) {
     let counts = &mut counts[..alpha.len()];
     counts.fill(0);
@@ -287,8 +289,8 @@ impl Sampler {
         columns
     }
 
-    /// Covariances of the means over a block of `passes` of y, by channel, and of the columns, which follow; by quadrature
-    /// over each stratum.
+    /// Covariances of the means over a block of `passes` of y, by channel, and of the columns, which follow; by
+    /// quadrature over each stratum.
     pub(crate) fn covariances(&self, passes: u32) -> Covariances {
         const POINTS: u32 = 1 << 15;
         let mut covariances = Covariances::default();

@@ -17,8 +17,8 @@ const NUMBERS: [u32; 4] = [3, 8, 16, 64];
 /// Runs whose systems are solved at once, as the renderer does with those of a batch of points.
 const BATCH: usize = 16;
 
-/// Passes in a row, each with the coefficients of the one before: uncorrelated estimates, since each has the expectation
-/// ∫f whatever its coefficients are. [`BATCH`] rows of passes take turns.
+/// Passes in a row, each with the coefficients of the one before: uncorrelated estimates, since each has the
+/// expectation ∫f whatever its coefficients are. [`BATCH`] rows of passes take turns.
 fn chain(sampler: &Sampler, runs: usize, key: u32) -> [Welford; 3] {
     let equations = sampler.equations;
     let (len, width) = (equations.len(), equations.coefficients());
@@ -66,8 +66,9 @@ fn variances(sampler: &Sampler, count: u32, runs: usize) -> [[f64; 3]; 2] {
     welford.map(|form| form.map(|w| w.variance()))
 }
 
-/// Variance of the progressive form of [`passes`] by channel, from that of a block with given coefficients, which is known, over
-/// coefficients that are fitted as there: Var(ȳ − Σ β_j c̄_j) of each block, since blocks are not correlated.
+/// Variance of the progressive form of [`passes`] by channel, from that of a block with given coefficients, which is
+/// known, over coefficients that are fitted as there: Var(ȳ − Σ β_j c̄_j) of each block, since blocks are not
+/// correlated.
 fn predicted_variances(sampler: &Sampler, passes: u32, runs: usize) -> [Welford; 3] {
     let equations = sampler.equations;
     let blocks: Vec<_> = Sampler::blocks(passes).map(|len| (len, sampler.covariances(len))).collect();
@@ -96,14 +97,15 @@ fn predicted_variances(sampler: &Sampler, passes: u32, runs: usize) -> [Welford;
     })
 }
 
-/// Runs of a test of the mean: a million of 3 samples of [`Mixture::Table`], and as many samples in all where a run has more of
-/// them, which leaves about the same standard error; a tenth of it for other integrals.
+/// Runs of a test of the mean: a million of 3 samples of [`Mixture::Table`], and as many samples in all where a run has
+/// more of them, which leaves about the same standard error; a tenth of it for other integrals.
 fn runs_of(sampler: &Sampler) -> usize {
     let samples = if sampler.mixture == Mixture::Table { 3_000_000 } else { 300_000 };
     samples / sampler.n as usize
 }
 
-/// Runs of a test of the variance. Means of many samples are nearly normal, and their variance is known from fewer of them.
+/// Runs of a test of the variance. Means of many samples are nearly normal, and their variance is known from fewer of
+/// them.
 fn runs_of_a_variance(sampler: &Sampler) -> usize {
     if sampler.n <= 8 { 12_000 } else { 4_000 }
 }
@@ -198,8 +200,8 @@ fn four_passes_of_independent_samples_have_at_most_the_variance_of_mis() {
 
 #[test]
 fn four_passes_have_the_variance_of_their_blocks_and_coefficients() {
-    // Strata leave little variance, and coefficients that were fitted to the samples one by one may multiply it: what holds is the
-    // law of the estimate, with the variance within strata by quadrature.
+    // Strata leave little variance, and coefficients that were fitted to the samples one by one may multiply it: what
+    // holds is the law of the estimate, with the variance within strata by quadrature.
     const PASSES: u32 = 4;
     each_sampler(&PROPER, &NUMBERS, |sampler, name, value| {
         let predicted = predicted_variances(sampler, PASSES, runs_of_a_variance(sampler) / 4);

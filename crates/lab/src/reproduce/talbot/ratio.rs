@@ -36,8 +36,8 @@ const TARGET: f64 = 2.0;
 struct Terms(Vec<Variances>);
 
 impl Terms {
-    /// From the variances with M = N = 1, and with N = 1 of [`MANY`] proposals: V = V(f/p)/M + (1 − 1/M)·V(f/q). Averaged over
-    /// 3 × 3 pixels, since each is from few turns.
+    /// From the variances with M = N = 1, and with N = 1 of [`MANY`] proposals: V = V(f/p)/M + (1 − 1/M)·V(f/q).
+    /// Averaged over 3 × 3 pixels, since each is from few turns.
     fn new(one: &Measured, many: &Measured, spp: u32, size: [u32; 2]) -> Self {
         let scaled = |m: &Measured| -> Vec<f64> { m.variance_map().iter().map(|v| v * f64::from(spp)).collect() };
         let (p, many) = (smooth(&scaled(one), size), smooth(&scaled(many), size));

@@ -22,7 +22,8 @@ pub enum Form {
 }
 
 impl Form {
-    /// How many rows of sums the samples of an estimate are: each half of them has its own in the form that fits β to the other.
+    /// How many rows of sums the samples of an estimate are: each half of them has its own in the form that fits β to
+    /// the other.
     pub fn rows(self) -> usize {
         match self {
             Form::Crossfit => 2,
@@ -53,10 +54,11 @@ impl Form {
         }
     }
 
-    /// The estimate of the samples of [`rows`](Self::rows) rows of `sums` with the coefficients `beta` of the systems of these
-    /// rows; in the progressive form, with those that were fitted to earlier samples.
+    /// The estimate of the samples of [`rows`](Self::rows) rows of `sums` with the coefficients `beta` of the systems
+    /// of these rows; in the progressive form, with those that were fitted to earlier samples.
     ///
-    /// A system without solution has coefficients of 0; the estimate, or the half of it that they are for, is then that of MIS.
+    /// A system without solution has coefficients of 0; the estimate, or the half of it that they are for, is then that
+    /// of MIS.
     pub fn estimate(self, equations: NormalEquations, sums: &[f32], beta: &[f32], integrals: &[f32]) -> [f32; 3] {
         match self {
             Form::Paper => with_intercept(equations, sums, beta, integrals),
@@ -71,8 +73,8 @@ impl Form {
     }
 }
 
-/// β₀ + Σ β_j of the components that are there [Fan et al. 2006, Eq. 10]; the last unknown is β₀. The mean of y if there is no
-/// solution.
+/// β₀ + Σ β_j of the components that are there [Fan et al. 2006, Eq. 10]; the last unknown is β₀. The mean of y if
+/// there is no solution.
 fn with_intercept(equations: NormalEquations, sums: &[f32], beta: &[f32], integrals: &[f32]) -> [f32; 3] {
     let last = equations.components().saturating_sub(1);
     if beta.iter().all(|b| *b == 0.0) {

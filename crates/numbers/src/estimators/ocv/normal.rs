@@ -82,8 +82,8 @@ impl NormalEquations {
         f64::from(sums[self.values() + 3 + channel])
     }
 
-    /// Adds a sample whose columns are 0 but for `columns`, by their indices, which ascend. One that is not finite is counted as y = 0
-    /// at the mean of the columns.
+    /// Adds a sample whose columns are 0 but for `columns`, by their indices, which ascend. One that is not finite is
+    /// counted as y = 0 at the mean of the columns.
     #[inline]
     pub fn add_sparse(self, sums: &mut [f32], columns: &[(usize, f32)], y: [f32; 3]) {
         if sums[self.count()] >= MAX_SAMPLES {

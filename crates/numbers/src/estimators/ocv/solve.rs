@@ -2,8 +2,8 @@
 //!
 //! The factorisation is LDLᵀ without pivots. A column whose pivot is rounding is dropped.
 //!
-//! Lanes are arrays, of whose loops the compiler makes vector code: the loops over columns are too many to be unrolled for every
-//! level of a dispatch.
+//! Lanes are arrays, of whose loops the compiler makes vector code: the loops over columns are too many to be unrolled
+//! for every level of a dispatch.
 
 use super::ldlt::MAX_COMPONENTS;
 use super::normal::NormalEquations;
@@ -29,9 +29,11 @@ pub enum Matrix {
     Intercept,
 }
 
-/// The system whose solution β is, and how it is held back where samples are few: β = 0 is MIS, and so is every multiple of α.
+/// The system whose solution β is, and how it is held back where samples are few: β = 0 is MIS, and so is every
+/// multiple of α.
 ///
-/// The columns c_j are dimensionless and of order one, so that the ridge is a number of samples, and scaling f scales β.
+/// The columns c_j are dimensionless and of order one, so that the ridge is a number of samples, and scaling f scales
+/// β.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct System {
     /// The matrix.
@@ -39,8 +41,8 @@ pub struct System {
     /// λ of λ Σ β_j², in samples whose columns have a mean square of one.
     pub ridge: f32,
     /// κ of the factor max(0, 1 − κ σ² p/T) of each channel [James and Stein 1961]: T is what β explains of the sum of
-    /// squares of y, p = tr (C + λ1)⁻¹C the number of effective coefficients, and σ² what is not explained, by degree of
-    /// freedom n − 1 − p; 0 if fewer than half a degree is left. κ = 0 is no factor.
+    /// squares of y, p = tr (C + λ1)⁻¹C the number of effective coefficients, and σ² what is not explained, by degree
+    /// of freedom n − 1 − p; 0 if fewer than half a degree is left. κ = 0 is no factor.
     pub shrink: f32,
 }
 
@@ -51,8 +53,8 @@ impl System {
     /// For β that is applied to the samples it was fitted to.
     pub const SAME_SAMPLES: System = System { matrix: Matrix::SampleMeans, ridge: 1.0, shrink: 0.0 };
 
-    /// For β that is applied to other samples. Chosen by measurement, see `docs/measurements/ocv`: the smallest that keeps the
-    /// first four passes within 2 % of MIS where nothing is to be gained.
+    /// For β that is applied to other samples. Chosen by measurement, see `docs/measurements/ocv`: the smallest that
+    /// keeps the first four passes within 2 % of MIS where nothing is to be gained.
     pub const OTHER_SAMPLES: System = System { matrix: Matrix::KnownMeans, ridge: 4.0, shrink: 1.0 };
 
     /// Equation (11) of the paper, λ = 1. The penalty draws the intercept, which is most of the estimate, to 0 as well.
@@ -60,9 +62,9 @@ impl System {
 }
 
 impl NormalEquations {
-    /// Solves the system of each row of `sums` and writes `beta[coefficients·row + 3 j + channel]`, 0 where a solution is not
-    /// finite. Returns the number of ill-conditioned systems: those without a finite solution, and those that dropped a column
-    /// which is not 0 in all samples.
+    /// Solves the system of each row of `sums` and writes `beta[coefficients·row + 3 j + channel]`, 0 where a solution
+    /// is not finite. Returns the number of ill-conditioned systems: those without a finite solution, and those that
+    /// dropped a column which is not 0 in all samples.
     pub fn solve(self, system: System, sums: &[f32], beta: &mut [f32]) -> usize {
         let (len, width) = (self.len(), self.coefficients());
         if width == 0 {

@@ -6,8 +6,8 @@
 //! | [`systematic`] | N w_j/S | S/(N w_j) | ⌊N w_j/S⌋ or ⌈N w_j/S⌉ times | [Kitagawa 1996] |
 //! | [`stratified`] | w_j/S_k | S_k/w_j | once | thesis (4.5); paper (1) |
 //!
-//! S is the sum of all weights, S_k that of stratum k. A weight that is not positive and finite counts as 0; such a proposal
-//! is never drawn, and nothing is drawn if there is no other. Uniform numbers outside 0..1 are clamped.
+//! S is the sum of all weights, S_k that of stratum k. A weight that is not positive and finite counts as 0; such a
+//! proposal is never drawn, and nothing is drawn if there is no other. Uniform numbers outside 0..1 are clamped.
 //!
 //! Weights are summed in f32 within blocks of eight and in f64 across blocks, always in the same order: equal arguments
 //! give equal bits, and a probability is off by about 1e-7 of its block's, which is the step of a uniform f32.
@@ -72,7 +72,8 @@ fn block_sum<const LARGE: bool>(w: &Block) -> f64 {
     f64::from((sum[0] + sum[2]) + (sum[1] + sum[3]))
 }
 
-/// Index within the block of the proposal in whose part of the cumulative weight `threshold` falls. The block has weight.
+/// Index within the block of the proposal in whose part of the cumulative weight `threshold` falls. The block has
+/// weight.
 #[inline(always)]
 fn search_block<const LARGE: bool>(w: &Block, threshold: f32) -> usize {
     // Prefix sums that never fall: pairs, then fours, then eight.
@@ -131,8 +132,8 @@ fn unscaled<const LARGE: bool>(sum: f64) -> f64 {
     if LARGE { sum / f64::from(DOWN) } else { sum }
 }
 
-/// The draw of proposal `index`, whose weight is `weight`, when `sum_per_draw` is S/N. The scale is kept finite; what it
-/// multiplies is of the order of the weight.
+/// The draw of proposal `index`, whose weight is `weight`, when `sum_per_draw` is S/N. The scale is kept finite; what
+/// it multiplies is of the order of the weight.
 #[inline(always)]
 fn draw(index: usize, weight: f32, sum_per_draw: f64) -> Draw {
     Draw { index: index as u32, scale: (sum_per_draw / f64::from(weight)).min(f64::from(f32::MAX)) as f32 }
@@ -195,8 +196,8 @@ fn invert<const LARGE: bool>(weights: &[f32], blocks: &Blocks<'_>, sum: f64, u: 
     }
 }
 
-/// N draws by one uniform number: the proposals in which the thresholds (k+u)S/N of the cumulative weight fall, k < N, in
-/// rising order; scale = S/(N w_j) [Kitagawa 1996]. A proposal can come several times, if w_j > S/N. O(M + N).
+/// N draws by one uniform number: the proposals in which the thresholds (k+u)S/N of the cumulative weight fall, k < N,
+/// in rising order; scale = S/(N w_j) [Kitagawa 1996]. A proposal can come several times, if w_j > S/N. O(M + N).
 ///
 /// The N draws spread evenly over the proposals in their order. If neighbours are alike, the variance is below that of
 /// [`with_replacement`]; there is no formula for it, and no guarantee, as the draws are not independent.
@@ -206,12 +207,12 @@ pub fn systematic(weights: &[f32], n: u32, u: f32, out: &mut Vec<Draw>) {
 }
 
 /// One draw per stratum of consecutive proposals; scale = S_k/w_j, exactly 1 for a stratum of one proposal
-/// [Talbot 2005, Eq. 4.5]. `ends[k]` is the end (exclusive) of stratum k, and `u[k]` its uniform number; a stratum without
-/// weight draws nothing. O(M).
+/// [Talbot 2005, Eq. 4.5]. `ends[k]` is the end (exclusive) of stratum k, and `u[k]` its uniform number; a stratum
+/// without weight draws nothing. O(M).
 ///
-/// With M strata the estimate is that of plain Monte Carlo, bit for bit if the sum is formed in the same order. Proposals
-/// after the last end are in no stratum, and their part of the integral would be missing. With strata of equal numbers of
-/// independent proposals this is one draw from each of n independent sets [Talbot et al. 2005, Eq. 1].
+/// With M strata the estimate is that of plain Monte Carlo, bit for bit if the sum is formed in the same order.
+/// Proposals after the last end are in no stratum, and their part of the integral would be missing. With strata of
+/// equal numbers of independent proposals this is one draw from each of n independent sets [Talbot et al. 2005, Eq. 1].
 pub fn stratified(weights: &[f32], ends: &[u32], u: &[f32], out: &mut Vec<Draw>) {
     out.clear();
     let mut begin = 0;
@@ -387,8 +388,8 @@ mod tests {
     }
 
     proptest! {
-        /// Over a grid of u, each proposal comes N w/S times in the mean and ⌊⌋ or ⌈⌉ of that each time, and the scale is
-        /// one over it.
+        /// Over a grid of u, each proposal comes N w/S times in the mean and ⌊⌋ or ⌈⌉ of that each time, and the scale
+        /// is one over it.
         #[test]
         fn systematic_draws_each_proposal_as_often_as_its_weight_says(weights in weights(), n in 1_u32..20) {
             const GRID: u32 = 2048;
@@ -417,7 +418,8 @@ mod tests {
             }
         }
 
-        /// Inversion: a grid of u draws each proposal in proportion to its weight, also with more than one block per cell.
+        /// Inversion: a grid of u draws each proposal in proportion to its weight, also with more than one block per
+        /// cell.
         #[test]
         fn inversion_draws_each_proposal_in_proportion(weights in weights(), repeat in 1_usize..30) {
             const GRID: usize = 8192;

@@ -1,5 +1,6 @@
-//! One of a stream of weighted things whose number is not known before, in one pass [Chao 1982]: thing j takes the place of what
-//! is kept with the probability w_j/(w_0 + … + w_j), so that each is kept in the end with its part of the whole weight.
+//! One of a stream of weighted things whose number is not known before, in one pass [Chao 1982]: thing j takes the
+//! place of what is kept with the probability w_j/(w_0 + … + w_j), so that each is kept in the end with its part of the
+//! whole weight.
 
 /// What is kept of a stream.
 #[derive(Clone, Copy, Debug)]
