@@ -23,13 +23,14 @@ fn chain(sampler: &Sampler, runs: usize, key: u32) -> [Welford; 3] {
     let equations = sampler.equations;
     let (len, width) = (equations.len(), equations.coefficients());
     let (mut sums, mut beta) = (vec![0.0; BATCH * len], vec![0.0; BATCH * width]);
-    let mut rows = (0..BATCH).cycle();
+    let mut next = 0;
     run(runs, [21, key, sampler.mixture as u32], |stream| {
-        let row = rows.next().unwrap();
+        let row = next;
+        next = (next + 1) % BATCH;
         let own = &mut sums[row * len..][..len];
         sampler.block(PROGRESSIVE, 1, stream, own);
         let estimate = equations.estimate(own, &beta[row * width..][..width]);
-        if row == BATCH - 1 {
+        if next == 0 {
             assert_eq!(equations.solve(PROGRESSIVE.system(), &sums, &mut beta), 0, "all samples are finite");
         }
         estimate.map(f64::from)
