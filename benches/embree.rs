@@ -10,9 +10,9 @@ use lumiris::accel::embree::{EmbreeAccel, EmbreeError};
 use lumiris::accel::{Accel, Coherence, Hit, RayBatch};
 use lumiris::geometry::{Geometry, GeometrySet, Group, Shape, TriangleMesh, Visibility};
 use lumiris::render::bench::{Pair, RayCase};
-use lumiris_numbers::math::hash::HashStream;
 use lumiris_numbers::math::ray::offset_origin;
 use lumiris_numbers::math::{Frame, Ray, Vec3, warp};
+use lumiris_test_support::random::{RngExt, pcg32};
 use std::f32::consts::{PI, TAU};
 use std::sync::Arc;
 
@@ -57,14 +57,14 @@ fn camera_rays() -> RayBatch {
 
 /// From each hit eight rays: to points of an area light, or cosine-distributed.
 fn secondary_rays(set: &GeometrySet, rays: &RayBatch, hits: &[Option<Hit>], light: bool) -> RayBatch {
-    let mut stream = HashStream::new([1, 2, 3]);
+    let mut stream = pcg32([1, 2, 3]);
     let mut result = RayBatch::default();
     for (i, hit) in hits.iter().enumerate().filter(|(i, _)| i % 8 == 0) {
         let Some(hit) = hit else { continue };
         let surface = set.surface_hit(hit.geometry, hit.primitive, hit.instance, hit.uv, 0.0);
         let side = if surface.n.dot(rays.get(i).d) > 0.0 { -surface.n } else { surface.n };
         for k in 0..8 {
-            let u = stream.next_2d();
+            let u = stream.random::<[f32; 2]>();
             let target = Vec3::new(3.0, -1.0 + (k % 4) as f32 * 0.25 + u[0] * 0.25, 2.0 + (k / 4) as f32 * 0.5);
             let bounce = Frame::from_z(side).to_world(warp::sample_cosine_hemisphere(u));
             let d = if light { target - surface.p } else { bounce };

@@ -9,8 +9,8 @@ use lumiris::photons::{
     trace_importons, trace_photons,
 };
 use lumiris::scene::AccelKind;
-use lumiris_numbers::math::hash::HashStream;
 use lumiris_numbers::math::{Rgb, Vec3};
+use lumiris_test_support::random::{RngExt, pcg32};
 use std::path::Path;
 use std::time::Instant;
 
@@ -19,9 +19,9 @@ const QUERIES: usize = 50_000;
 
 /// Photons on a plane, or on the six faces of a box.
 fn photons(faces: usize) -> Vec<Photon> {
-    let mut stream = HashStream::new([1, 2, faces as u32]);
+    let mut stream = pcg32([1, 2, faces as u32]);
     let photon = |i: usize| {
-        let [u, v] = stream.next_2d();
+        let [u, v] = stream.random::<[f32; 2]>();
         let (axis, side) = (i % faces / 2, (i % 2) as f32 * (faces / 6) as f32);
         let mut n = Vec3::ZERO;
         n[axis] = if side == 0.0 { 1.0 } else { -1.0 };

@@ -14,9 +14,10 @@ use lumiris::materials::surface::SurfaceBsdf;
 use lumiris_lanes::combine::{Proposals, Weights, combine};
 use lumiris_lanes::curve::{hilbert_points, hilbert_points_scalar, strata, strata_scalar};
 use lumiris_numbers::estimators::mis::Heuristic;
-use lumiris_numbers::math::hash::{HashStream, pcg4d};
+use lumiris_numbers::math::hash::pcg4d;
 use lumiris_numbers::math::warp::sample_uniform_sphere;
 use lumiris_numbers::math::{Affine3A, Frame, Rgb, Vec3};
+use lumiris_test_support::random::{RngExt, pcg32};
 use std::hint::black_box;
 use std::sync::Arc;
 use std::time::Instant;
@@ -72,12 +73,12 @@ fn numbers(m: usize) -> Vec<[Vec<f32>; 2]> {
 
 /// A map with a sky of soft gradients, some noise and a small sun.
 fn sky(size: [usize; 2], mapping: EnvironmentMapping, filter: EnvironmentFilter) -> Light {
-    let mut stream = HashStream::new([1, 2, 3]);
+    let mut stream = pcg32([1, 2, 3]);
     let texels = (0..size[0] * size[1])
         .map(|i| {
             let (x, y) = ((i % size[0]) as f32 / size[0] as f32, (i / size[0]) as f32 / size[1] as f32);
             let sun = ((x - 0.3).powi(2) + (y - 0.4).powi(2)) < 1e-4;
-            let l = (1.5 + (x * 9.0).sin() * (y * 7.0).cos()) * (0.5 + stream.next_f32());
+            let l = (1.5 + (x * 9.0).sin() * (y * 7.0).cos()) * (0.5 + stream.random::<f32>());
             Rgb::splat(if sun { 2000.0 } else { l })
         })
         .collect();
@@ -185,8 +186,8 @@ fn bsdfs() {
         let surface = SurfaceBsdf { bsdf, frame, n: frame.z };
         let wo = frame.to_world(Vec3::new(0.6, 0.0, 0.8));
         for m in SIZES {
-            let mut stream = HashStream::new([3, 1, 4]);
-            let w: Vec<Vec3> = (0..m).map(|_| sample_uniform_sphere(stream.next_2d())).collect();
+            let mut stream = pcg32([3, 1, 4]);
+            let w: Vec<Vec3> = (0..m).map(|_| sample_uniform_sphere(stream.random::<[f32; 2]>())).collect();
             let wi: Vec<Vec<f32>> = (0..3).map(|c| w.iter().map(|w| w[c]).collect()).collect();
             let wi = [&wi[0][..], &wi[1], &wi[2]];
             let mut v = vec![vec![0.0; m]; 4];

@@ -5,9 +5,9 @@
 
 use lumiris::accel::{Accel, Bvh, Coherence, Hit, RayBatch};
 use lumiris::geometry::{Geometry, GeometrySet, Group, Shape, TriangleMesh, Visibility};
-use lumiris_numbers::math::hash::HashStream;
 use lumiris_numbers::math::ray::offset_origin;
 use lumiris_numbers::math::{Frame, Ray, Vec3, warp};
+use lumiris_test_support::random::{RngExt, pcg32};
 use std::f32::consts::{PI, TAU};
 use std::sync::Arc;
 use std::time::Instant;
@@ -46,14 +46,14 @@ fn camera_rays(count: usize) -> RayBatch {
 
 /// Cosine-distributed rays from the hits, outward and inward by turns.
 fn bounce_rays(set: &GeometrySet, rays: &RayBatch, hits: &[Option<Hit>]) -> RayBatch {
-    let mut stream = HashStream::new([1, 2, 3]);
+    let mut stream = pcg32([1, 2, 3]);
     let mut bounces = RayBatch::default();
     for (i, hit) in hits.iter().enumerate() {
         let Some(hit) = hit else { continue };
         let surface = set.surface_hit(hit.geometry, hit.primitive, hit.instance, hit.uv, 0.0);
         let side = if surface.n.dot(rays.get(i).d) > 0.0 { surface.n } else { -surface.n };
         let side = if i % 2 == 0 { side } else { -side };
-        let d = Frame::from_z(side).to_world(warp::sample_cosine_hemisphere(stream.next_2d()));
+        let d = Frame::from_z(side).to_world(warp::sample_cosine_hemisphere(stream.random::<[f32; 2]>()));
         let o = offset_origin(surface.p, surface.p_error, surface.n, d);
         bounces.push(&Ray { o, d, t_max: f32::INFINITY, time: 0.0 });
     }

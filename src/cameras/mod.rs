@@ -219,9 +219,9 @@ impl Camera {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use lumiris_numbers::math::hash::HashStream;
     use lumiris_numbers::math::warp::invert_uniform_disk_concentric;
     use lumiris_test_support::assert_chi_squared;
+    use lumiris_test_support::random::{RngExt, pcg32};
 
     const PINHOLE: Lens = Lens { radius: 0.0, focal_distance: 1e6 };
 
@@ -271,7 +271,7 @@ mod tests {
 
     #[test]
     fn spreads_are_the_angles_of_pixels() {
-        let mut stream = HashStream::new([4, 4, 4]);
+        let mut stream = pcg32([4, 4, 4]);
         let spherical = |mapping| Camera::spherical(Affine3A::IDENTITY, [200, 100], mapping);
         for camera in [
             perspective(Affine3A::IDENTITY, 100.0, PINHOLE),
@@ -279,7 +279,7 @@ mod tests {
             spherical(SphericalMapping::EqualArea),
         ] {
             for _ in 0..100 {
-                let u = stream.next_2d();
+                let u = stream.random::<[f32; 2]>();
                 let p = Vec2::new(10.0 + u[0] * 75.0, 5.0 + u[1] * 40.0);
                 let d = |x, y| camera.ray(p + Vec2::new(x, y), [0.5; 2], 0.5).ray.d.as_dvec3();
                 let h = 0.25;
@@ -304,7 +304,7 @@ mod tests {
             (perspective(placement, 50.0, lens), perspective(placement, 50.0, PINHOLE)),
             (ortho, orthographic(placement, default_screen_window(2.0), PINHOLE)),
         ] {
-            let mut stream = HashStream::new([5, 4, 4]);
+            let mut stream = pcg32([5, 4, 4]);
             let mut observed = vec![0.0; 64];
             for i in 0..20_000 {
                 let p = Vec2::new(i as f32 * 0.01, 30.0);
@@ -312,7 +312,7 @@ mod tests {
                     let (o, d) = (inverse.transform_point3(ray.o), inverse.transform_vector3(ray.d));
                     o + d * ((4.0 - o.z) / d.z)
                 };
-                let ray = camera.ray(p, stream.next_2d(), 0.5).ray;
+                let ray = camera.ray(p, stream.random::<[f32; 2]>(), 0.5).ray;
                 let center = pinhole.ray(p, [0.5; 2], 0.5).ray;
                 assert!((at_focus(&ray) - at_focus(&center)).length() < 1e-4);
                 let on_lens = inverse.transform_point3(ray.o) - inverse.transform_point3(center.o);
@@ -328,10 +328,10 @@ mod tests {
     #[test]
     fn lens_points_are_uniform_in_rings_and_sectors() {
         let camera = perspective(Affine3A::IDENTITY, 50.0, Lens { radius: 2.0, focal_distance: 4.0 });
-        let mut stream = HashStream::new([6, 4, 4]);
+        let mut stream = pcg32([6, 4, 4]);
         let mut observed = vec![0.0; 80];
         for _ in 0..40_000 {
-            let o = camera.ray(Vec2::new(100.0, 50.0), stream.next_2d(), 0.5).ray.o / 2.0;
+            let o = camera.ray(Vec2::new(100.0, 50.0), stream.random::<[f32; 2]>(), 0.5).ray.o / 2.0;
             let ring = ((o.length_squared() * 5.0) as usize).min(4);
             let sector = ((lumiris_numbers::math::warp::azimuth(o) / (2.0 * PI) * 16.0) as usize).min(15);
             observed[ring * 16 + sector] += 1.0;

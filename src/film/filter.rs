@@ -201,7 +201,7 @@ impl FilterSampler {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use lumiris_numbers::math::hash::HashStream;
+    use lumiris_test_support::random::{RngExt, pcg32};
     use lumiris_test_support::{Moments, assert_chi_squared};
 
     const FILTERS: [PixelFilter; 7] = [
@@ -237,12 +237,12 @@ mod tests {
             let total: f64 = cells.iter().map(|c| c[0]).sum();
             let magnitude: f64 = cells.iter().map(|c| c[1]).sum();
             let (sampler, r) = (filter.sampler(), filter.radius());
-            let mut stream = HashStream::new([k as u32, 8, 8]);
+            let mut stream = pcg32([k as u32, 8, 8]);
             let count = 100_000;
             let mut observed = vec![0.0; N * N];
             let mut weights = Moments::default();
             for _ in 0..count {
-                let s = sampler.sample(stream.next_2d());
+                let s = sampler.sample(stream.random::<[f32; 2]>());
                 assert!(s.offset.abs().cmple(r).all());
                 let f = filter.evaluate(s.offset);
                 assert!(f == 0.0 || f.signum() == s.weight.signum() || f.abs() < 0.02, "{filter:?} {s:?} {f}");
@@ -271,10 +271,10 @@ mod tests {
                 exact += f * x * x;
             }
             let sampler = filter.sampler();
-            let mut stream = HashStream::new([k as u32, 9, 9]);
+            let mut stream = pcg32([k as u32, 9, 9]);
             let mut moments = Moments::default();
             for _ in 0..200_000 {
-                let s = sampler.sample(stream.next_2d());
+                let s = sampler.sample(stream.random::<[f32; 2]>());
                 moments.add(f64::from(s.weight * s.offset.x * s.offset.x));
             }
             // 0.004 of the squared radius for the steps of the table.

@@ -157,15 +157,15 @@ pub(super) fn solve_quadratic(a: f64, b: f64, c: f64) -> Option<[f64; 2]> {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use lumiris_numbers::math::hash::HashStream;
     use lumiris_numbers::math::ray::offset_origin;
+    use lumiris_test_support::random::{Pcg32, RngExt, pcg32};
 
     fn patch(corners: [Vec3; 4]) -> BilinearMesh {
         BilinearMesh { positions: corners.to_vec(), indices: vec![[0, 1, 2, 3]], ..BilinearMesh::default() }
     }
 
-    fn random_point(s: &mut HashStream) -> Vec3 {
-        Vec3::new(s.next_f32(), s.next_f32(), s.next_f32()) * 2.0 - 1.0
+    fn random_point(s: &mut Pcg32) -> Vec3 {
+        Vec3::new(s.random::<f32>(), s.random::<f32>(), s.random::<f32>()) * 2.0 - 1.0
     }
 
     /// Hits of a fine grid of triangles on the patch, in f64.
@@ -195,7 +195,7 @@ mod tests {
 
     #[test]
     fn hits_agree_with_a_fine_tessellation() {
-        let mut s = HashStream::new([8, 0, 0]);
+        let mut s = pcg32([8, 0, 0]);
         let (mut both, mut differ) = (0, 0);
         for _ in 0..400 {
             let mesh = patch(std::array::from_fn(|_| random_point(&mut s)));
@@ -218,7 +218,7 @@ mod tests {
 
     #[test]
     fn rays_that_leave_a_planar_patch_do_not_meet_it_again() {
-        let mut s = HashStream::new([9, 0, 0]);
+        let mut s = pcg32([9, 0, 0]);
         for k in 0..100_000 {
             // A parallelogram anywhere, every fourth in a coordinate plane.
             let (c, mut e, mut f) = (random_point(&mut s) * 100.0, random_point(&mut s), random_point(&mut s));
@@ -226,7 +226,7 @@ mod tests {
                 (e.y, f.y) = (0.0, 0.0);
             }
             let mesh = patch([c, c + e, c + f, c + e + f]);
-            let hit = mesh.surface_hit(0, s.next_2d());
+            let hit = mesh.surface_hit(0, s.random::<[f32; 2]>());
             let w = random_point(&mut s).normalize_or(Vec3::Y);
             // The rounded corners are not quite coplanar: leave out rays within the patch's own twist.
             if hit.n.dot(w).abs() < 1e-3 {

@@ -136,9 +136,9 @@ fn partial_derivatives([p0, p1, p2]: [Vec3; 3], [uv0, uv1, uv2]: [Vec2; 3]) -> (
 mod tests {
     use super::*;
     use crate::geometry::triangle::{RayPrecomputed, intersect_triangle};
-    use lumiris_numbers::math::hash::HashStream;
     use lumiris_numbers::math::ray::offset_origin;
     use lumiris_numbers::math::{Affine3A, Ray};
+    use lumiris_test_support::random::{RngExt, pcg32};
 
     fn triangle() -> TriangleMesh {
         let positions = vec![Vec3::new(1.0, 0.0, 2.0), Vec3::new(3.0, 0.0, 2.0), Vec3::new(1.0, 2.0, 2.0)];
@@ -187,8 +187,8 @@ mod tests {
 
     #[test]
     fn rays_that_leave_a_triangle_do_not_meet_it_again() {
-        let mut s = HashStream::new([12, 0, 0]);
-        let mut random = || Vec3::new(s.next_f32(), s.next_f32(), s.next_f32()) * 2.0 - 1.0;
+        let mut s = pcg32([12, 0, 0]);
+        let mut random = || Vec3::new(s.random::<f32>(), s.random::<f32>(), s.random::<f32>()) * 2.0 - 1.0;
         for k in 0..200_000 {
             let (center, scale) = (random() * 300.0, [0.01, 1.0, 50.0][k % 3]);
             let mut corners = [random(), random(), random()].map(|p| center + p * scale);

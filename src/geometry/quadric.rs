@@ -263,8 +263,8 @@ fn sphere_roots(o: DVec3, d: DVec3, radius: f64) -> Option<[f64; 2]> {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use lumiris_numbers::math::hash::HashStream;
     use lumiris_numbers::math::ray::offset_origin;
+    use lumiris_test_support::random::{Pcg32, RngExt, pcg32};
     use std::f32::consts::TAU as TAU32;
 
     fn kinds() -> [QuadricKind; 6] {
@@ -283,15 +283,15 @@ mod tests {
         Quadric { kind, group_from_local, local_from_group, flip_normal: swaps_handedness(&group_from_local) }
     }
 
-    fn random_point(s: &mut HashStream) -> Vec3 {
-        Vec3::new(s.next_f32(), s.next_f32(), s.next_f32()) * 2.0 - 1.0
+    fn random_point(s: &mut Pcg32) -> Vec3 {
+        Vec3::new(s.random::<f32>(), s.random::<f32>(), s.random::<f32>()) * 2.0 - 1.0
     }
 
-    fn random_placement(s: &mut HashStream) -> Affine3A {
+    fn random_placement(s: &mut Pcg32) -> Affine3A {
         let axis = random_point(s).normalize_or(Vec3::X);
-        let rotation = glam::Quat::from_axis_angle(axis, s.next_f32() * 6.0);
-        let mirror = if s.next_f32() < 0.5 { -1.0 } else { 1.0 };
-        let scale = Vec3::new(mirror, 0.5 + s.next_f32(), 1.0) * (0.1 + 3.0 * s.next_f32());
+        let rotation = glam::Quat::from_axis_angle(axis, s.random::<f32>() * 6.0);
+        let mirror = if s.random::<f32>() < 0.5 { -1.0 } else { 1.0 };
+        let scale = Vec3::new(mirror, 0.5 + s.random::<f32>(), 1.0) * (0.1 + 3.0 * s.random::<f32>());
         Affine3A::from_scale_rotation_translation(scale, rotation, random_point(s) * 50.0)
     }
 
@@ -336,7 +336,7 @@ mod tests {
 
     #[test]
     fn hits_agree_with_a_march_along_the_ray() {
-        let mut s = HashStream::new([3, 0, 0]);
+        let mut s = pcg32([3, 0, 0]);
         let (mut both, mut differ) = (0, 0);
         for k in 0..600 {
             let quadric = placed(kinds()[k % 6], random_placement(&mut s));
@@ -360,10 +360,10 @@ mod tests {
 
     #[test]
     fn normals_are_outward_and_perpendicular_to_the_derivatives() {
-        let mut s = HashStream::new([4, 0, 0]);
+        let mut s = pcg32([4, 0, 0]);
         for k in 0..600 {
             let mut quadric = placed(kinds()[k % 6], random_placement(&mut s));
-            let uv = s.next_2d();
+            let uv = s.random::<[f32; 2]>();
             let hit = quadric.surface_hit(uv);
             let outside = quadric.local_from_group.transform_vector3(hit.n);
             let local = quadric.local_from_group.transform_point3(hit.p);
@@ -393,10 +393,10 @@ mod tests {
 
     #[test]
     fn rays_that_leave_do_not_meet_their_origin_again() {
-        let mut s = HashStream::new([7, 0, 0]);
+        let mut s = pcg32([7, 0, 0]);
         for k in 0..120_000 {
             let quadric = placed(kinds()[k % 6], random_placement(&mut s));
-            let hit = quadric.surface_hit(s.next_2d());
+            let hit = quadric.surface_hit(s.random::<[f32; 2]>());
             let mut w = random_point(&mut s).normalize_or(Vec3::Y);
             if k % 3 == 0 {
                 // Grazing rays are the hard ones.

@@ -110,10 +110,10 @@ fn plane_parameter(ray: &Ray, [p0, p1, p2]: [Vec3; 3]) -> Option<f32> {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use lumiris_numbers::math::hash::HashStream;
+    use lumiris_test_support::random::{Pcg32, RngExt, pcg32};
 
-    fn random_point(s: &mut HashStream) -> Vec3 {
-        Vec3::new(s.next_f32(), s.next_f32(), s.next_f32()) * 2.0 - 1.0
+    fn random_point(s: &mut Pcg32) -> Vec3 {
+        Vec3::new(s.random::<f32>(), s.random::<f32>(), s.random::<f32>()) * 2.0 - 1.0
     }
 
     /// Möller–Trumbore in f64.
@@ -130,12 +130,12 @@ mod tests {
 
     #[test]
     fn hits_agree_with_f64() {
-        let mut s = HashStream::new([5, 0, 0]);
+        let mut s = pcg32([5, 0, 0]);
         let mut found = 0;
         for _ in 0..100_000 {
             let triangle = [random_point(&mut s), random_point(&mut s), random_point(&mut s)];
             let o = random_point(&mut s) * 2.0;
-            let d = (random_point(&mut s) * 0.5 - o) * (0.1 + s.next_f32());
+            let d = (random_point(&mut s) * 0.5 - o) * (0.1 + s.random::<f32>());
             let ray = Ray { o, d, t_max: f32::INFINITY, time: 0.0 };
             let hit = RayPrecomputed::new(&ray).and_then(|r| intersect_triangle(&r, triangle, ray.t_max));
             match (hit, reference(&ray, triangle)) {
@@ -161,19 +161,19 @@ mod tests {
 
     #[test]
     fn rays_through_shared_edges_and_vertices_hit_a_neighbour() {
-        let mut s = HashStream::new([6, 0, 0]);
+        let mut s = pcg32([6, 0, 0]);
         for i in 0..100_000 {
             // A fan of triangles about a vertex; the ray aims at a point of an inner edge as well as f32 can.
             let hub = random_point(&mut s);
             let rim: Vec<Vec3> = (0..6)
                 .map(|k| {
                     let (sin, cos) = (k as f32 * std::f32::consts::TAU / 6.0).sin_cos();
-                    hub + Vec3::new(cos, sin, 0.3 * s.next_f32())
+                    hub + Vec3::new(cos, sin, 0.3 * s.random::<f32>())
                 })
                 .collect();
-            let along = if i % 4 == 0 { 0.0 } else { s.next_f32() * 0.9 };
+            let along = if i % 4 == 0 { 0.0 } else { s.random::<f32>() * 0.9 };
             let target = hub + (rim[i % 6] - hub) * along;
-            let o = hub + Vec3::new(s.next_f32() - 0.5, s.next_f32() - 0.5, 3.0);
+            let o = hub + Vec3::new(s.random::<f32>() - 0.5, s.random::<f32>() - 0.5, 3.0);
             let ray = Ray { o, d: target - o, t_max: f32::INFINITY, time: 0.0 };
             let pre = RayPrecomputed::new(&ray).unwrap();
             let hit =

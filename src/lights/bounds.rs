@@ -120,15 +120,16 @@ pub(super) fn union_cones(a: (Vec3, f32), b: (Vec3, f32)) -> (Vec3, f32) {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use lumiris_numbers::math::hash::HashStream;
     use lumiris_numbers::math::warp::{sample_uniform_cone, sample_uniform_sphere};
     use lumiris_numbers::math::{Frame, ONE_MINUS_EPSILON};
+    use lumiris_test_support::random::{RngExt, pcg32};
 
     #[test]
     fn the_union_of_cones_holds_both() {
-        let mut stream = HashStream::new([1, 1, 2]);
+        let mut stream = pcg32([1, 1, 2]);
         for i in 0..20_000 {
-            let mut cone = || (sample_uniform_sphere(stream.next_2d()), 1.0 - 2.0 * stream.next_f32().powi(3));
+            let mut cone =
+                || (sample_uniform_sphere(stream.random::<[f32; 2]>()), 1.0 - 2.0 * stream.random::<f32>().powi(3));
             let a = cone();
             let b = match i % 6 {
                 0 => (a.0, cone().1),
@@ -140,7 +141,7 @@ mod tests {
             let (axis, cos) = union_cones(a, b);
             assert!(axis.is_finite() && (axis.length() - 1.0).abs() < 1e-5 && cos.is_finite());
             for c in [a, b] {
-                let edge = sample_uniform_cone([ONE_MINUS_EPSILON, stream.next_f32()], 1.0 - c.1);
+                let edge = sample_uniform_cone([ONE_MINUS_EPSILON, stream.random::<f32>()], 1.0 - c.1);
                 let w = Frame::from_z(c.0).to_world(edge);
                 assert!(w.dot(axis) >= cos - 2e-6, "{a:?} {b:?} -> {axis} {cos}");
             }

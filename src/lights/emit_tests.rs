@@ -9,9 +9,9 @@ use super::{
     area_lights_of,
 };
 use crate::geometry::{BilinearMesh, Quadric, QuadricKind, Shape, TriangleMesh};
-use lumiris_numbers::math::hash::HashStream;
 use lumiris_numbers::math::warp::azimuth;
 use lumiris_numbers::math::{Affine3A, Frame, Rgb, Vec3};
+use lumiris_test_support::random::{Pcg32, RngExt, pcg32};
 use lumiris_test_support::{Moments, assert_chi_squared};
 use std::f32::consts::TAU;
 use std::sync::Arc;
@@ -86,8 +86,8 @@ fn lights() -> Vec<(&'static str, Light)> {
     ]
 }
 
-fn stream_of(name: &str, salt: u32) -> HashStream {
-    HashStream::new([name.len() as u32, name.as_bytes()[0].into(), salt])
+fn stream_of(name: &str, salt: u32) -> Pcg32 {
+    pcg32([name.len() as u32, name.as_bytes()[0].into(), salt])
 }
 
 #[test]
@@ -100,7 +100,7 @@ fn the_mean_power_of_every_light_is_its_flux() {
         let mut stream = stream_of(name, 1);
         let mut power = Moments::default();
         for _ in 0..100_000 {
-            let s = light.sample_le(SCENE, stream.next_2d(), stream.next_2d());
+            let s = light.sample_le(SCENE, stream.random::<[f32; 2]>(), stream.random::<[f32; 2]>());
             power.add(s.map_or(0.0, |s| f64::from(s.power.luminance())));
         }
         // Areas of curved surfaces and integrals of images are sums over cells.
@@ -128,12 +128,13 @@ fn photons_deposit_the_irradiance_that_direct_light_has() {
             let mut differences = [Moments::default(); 3];
             let mut sum = 0.0;
             for _ in 0..200_000 {
-                let photon =
-                    light.sample_le(SCENE, stream.next_2d(), stream.next_2d()).map_or(Rgb::BLACK, |s| deposit(&s, n));
-                let [x, y] = stream.next_2d().map(|u| (2.0 * u - 1.0) * HALF);
+                let photon = light
+                    .sample_le(SCENE, stream.random::<[f32; 2]>(), stream.random::<[f32; 2]>())
+                    .map_or(Rgb::BLACK, |s| deposit(&s, n));
+                let [x, y] = stream.random::<[f32; 2]>().map(|u| (2.0 * u - 1.0) * HALF);
                 let ctx = LightCtx { p: Vec3::new(x, y, 0.0), n, ns: n };
                 let li = light
-                    .sample_li(&ctx, stream.next_2d())
+                    .sample_li(&ctx, stream.random::<[f32; 2]>())
                     .map_or(Rgb::BLACK, |s| s.li * (s.wi.dot(n).max(0.0) / s.pdf));
                 sum += f64::from(li.luminance()) / 200_000.0;
                 for (c, moments) in differences.iter_mut().enumerate() {
@@ -164,8 +165,10 @@ fn assert_uniform(places: impl Iterator<Item = [f32; 2]>) {
 const COUNT: usize = 100_000;
 
 fn emitted(light: &Light, salt: u32) -> Vec<EmissionSample> {
-    let mut stream = HashStream::new([salt, 31, 7]);
-    (0..COUNT).map(|_| light.sample_le(SCENE, stream.next_2d(), stream.next_2d()).unwrap()).collect()
+    let mut stream = pcg32([salt, 31, 7]);
+    (0..COUNT)
+        .map(|_| light.sample_le(SCENE, stream.random::<[f32; 2]>(), stream.random::<[f32; 2]>()).unwrap())
+        .collect()
 }
 
 /// Positions by area over the surface, directions by the cosine about the normal.

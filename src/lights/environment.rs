@@ -293,8 +293,8 @@ impl EnvironmentMap {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use lumiris_numbers::math::hash::HashStream;
     use lumiris_numbers::math::warp::sample_uniform_sphere;
+    use lumiris_test_support::random::{RngExt, pcg32};
     use lumiris_test_support::{Moments, assert_chi_squared};
 
     fn one_bright(mapping: EnvironmentMapping, size: [usize; 2], at: usize) -> EnvironmentMap {
@@ -305,8 +305,8 @@ mod tests {
 
     fn random_map(mapping: EnvironmentMapping, filter: EnvironmentFilter) -> EnvironmentMap {
         let size = if mapping == EnvironmentMapping::EqualArea { [8, 8] } else { [10, 5] };
-        let mut stream = HashStream::new([11, 12, 13]);
-        let mut texel = || stream.next_f32().powi(8) * 20.0;
+        let mut stream = pcg32([11, 12, 13]);
+        let mut texel = || stream.random::<f32>().powi(8) * 20.0;
         let texels = (0..size[0] * size[1]).map(|_| Rgb::new(texel(), texel(), texel())).collect();
         EnvironmentMap::new(texels, size, mapping, filter).unwrap()
     }
@@ -319,10 +319,10 @@ mod tests {
             let size = if mapping == EnvironmentMapping::EqualArea { [4, 4] } else { [6, 3] };
             for at in 0..size[0] * size[1] {
                 let map = one_bright(mapping, size, at);
-                let mut stream = HashStream::new([at as u32, 1, 2]);
+                let mut stream = pcg32([at as u32, 1, 2]);
                 let mut integral = Moments::default();
                 for _ in 0..20_000 {
-                    let w = sample_uniform_sphere(stream.next_2d());
+                    let w = sample_uniform_sphere(stream.random::<[f32; 2]>());
                     let (le, pdf) = (map.le(w), map.pdf(w));
                     assert!(le.is_black() || pdf > 0.0, "{mapping:?} {at} {w}");
                     integral.add(f64::from(pdf) * 4.0 * PI);
@@ -348,11 +348,11 @@ mod tests {
         const ROWS: usize = 20;
         const COLUMNS: usize = 40;
         let count = 200_000;
-        let mut stream = HashStream::new([21, 22, 23]);
+        let mut stream = pcg32([21, 22, 23]);
         let mut observed = vec![0.0; ROWS * COLUMNS];
         let mut disagreements = 0;
         for _ in 0..count {
-            let s = map.sample(stream.next_2d()).unwrap();
+            let s = map.sample(stream.random::<[f32; 2]>()).unwrap();
             // Rounding may carry a direction at an edge into the next texel.
             disagreements += u32::from((map.pdf(s.w) - s.pdf).abs() > 1e-3 * s.pdf);
             let row = ((s.w.z + 1.0) * 0.5 * ROWS as f32).clamp(0.0, ROWS as f32 - 1.0) as usize;
@@ -387,12 +387,14 @@ mod tests {
         for mapping in MAPPINGS {
             for filter in [EnvironmentFilter::Nearest, EnvironmentFilter::Bilinear] {
                 let map = random_map(mapping, filter);
-                let mut stream = HashStream::new([31, 32, 33]);
+                let mut stream = pcg32([31, 32, 33]);
                 let (mut sampled, mut uniform) = (Moments::default(), Moments::default());
                 for _ in 0..100_000 {
-                    let s = map.sample(stream.next_2d()).unwrap();
+                    let s = map.sample(stream.random::<[f32; 2]>()).unwrap();
                     sampled.add(f64::from(s.le.luminance() / s.pdf));
-                    uniform.add(f64::from(map.le(sample_uniform_sphere(stream.next_2d())).luminance()) * 4.0 * PI);
+                    uniform.add(
+                        f64::from(map.le(sample_uniform_sphere(stream.random::<[f32; 2]>())).luminance()) * 4.0 * PI,
+                    );
                 }
                 // Smoothing does not commute with the solid angle of rows, so bilinear latitude-longitude maps are
                 // only near.
@@ -408,9 +410,9 @@ mod tests {
     fn lookups_are_continuous_across_seams_and_constant_maps_are_uniform() {
         for mapping in MAPPINGS {
             let map = random_map(mapping, EnvironmentFilter::Bilinear);
-            let mut stream = HashStream::new([41, 42, 43]);
+            let mut stream = pcg32([41, 42, 43]);
             for _ in 0..20_000 {
-                let w = sample_uniform_sphere(stream.next_2d());
+                let w = sample_uniform_sphere(stream.random::<[f32; 2]>());
                 // Towards the seams: the equator's planes x = 0 and y = 0, and the lower pole.
                 // At its poles a latitude-longitude image has a value for each meridian.
                 if w.y.abs() > 0.9 || (mapping == EnvironmentMapping::LatLong && w.x.abs() < 0.1) {

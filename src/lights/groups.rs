@@ -183,9 +183,9 @@ impl LightGroups {
 mod tests {
     use super::*;
     use crate::lights::{LightSamplerKind, LightSampling, LightSetBuilder, VisibilityCache};
-    use lumiris_numbers::math::hash::HashStream;
     use lumiris_numbers::math::{Bounds3, Rgb, Vec3};
     use lumiris_test_support::assert_chi_squared;
+    use lumiris_test_support::random::{RngExt, pcg32};
     use std::sync::Arc;
 
     const KINDS: [LightSamplerKind; 4] =
@@ -222,17 +222,18 @@ mod tests {
                     assert!((pmfs.iter().sum::<f32>() - 1.0).abs() < 1e-5, "{kind:?} {pmfs:?}");
                     assert!(groups.len() <= max.max(usize::from(infinite > 0) + usize::from(points > 0)));
 
-                    let mut s = HashStream::new([points, infinite, max as u32]);
+                    let mut s = pcg32([points, infinite, max as u32]);
                     let mut observed = vec![0.0; set.lights.len()];
                     let n = 20_000;
                     for _ in 0..n {
-                        let mut u = s.next_f32() * pmfs.iter().sum::<f32>();
+                        let mut u = s.random::<f32>() * pmfs.iter().sum::<f32>();
                         let pick = |p: &f32| {
                             u -= p;
                             u < 0.0
                         };
                         let group = pmfs.iter().position(pick).unwrap_or(0);
-                        let choice = groups.sample(&set.sampler, &ctx, (group, pmfs[group]), s.next_f32()).unwrap();
+                        let choice =
+                            groups.sample(&set.sampler, &ctx, (group, pmfs[group]), s.random::<f32>()).unwrap();
                         assert_eq!(groups.group_of(choice.light), Some(group));
                         let pmf = set.sampler.pmf(&ctx, choice.light);
                         assert!((choice.pmf / pmf - 1.0).abs() < 1e-4, "{kind:?} {} {pmf}", choice.pmf);

@@ -184,10 +184,10 @@ mod tests {
     use crate::lights::{
         Emission, EmissionImage, LightCtx, LightHit, LightSamplerKind, LightSampling, LightSetBuilder,
     };
-    use lumiris_numbers::math::hash::HashStream;
     use lumiris_numbers::math::warp::sample_uniform_sphere;
     use lumiris_numbers::math::{Affine3A, Bounds3, Vec2};
     use lumiris_test_support::Moments;
+    use lumiris_test_support::random::{Pcg32, RngExt, pcg32};
     use std::sync::Arc;
 
     const POINTS: u32 = 40;
@@ -235,13 +235,13 @@ mod tests {
 
     /// E and the integral of L̄ cos θ by samples of the light, at random points and normals. The latter must be the
     /// former wherever the light takes part.
-    fn assert_integrates(set: &Arc<LightSet>, stream: &mut HashStream) -> u32 {
+    fn assert_integrates(set: &Arc<LightSet>, stream: &mut Pcg32) -> u32 {
         let known = Irradiances::new(set, |_| false);
         let sampling = LightSampling::new(Arc::clone(set), LightSamplerKind::Tree, 1);
         let mut lit = 0;
         for _ in 0..POINTS {
-            let [p, n] = [2.0, 1.0].map(|r| sample_uniform_sphere(stream.next_2d()) * r);
-            let p = p * stream.next_f32() + Vec3::splat(0.2);
+            let [p, n] = [2.0, 1.0].map(|r| sample_uniform_sphere(stream.random::<[f32; 2]>()) * r);
+            let p = p * stream.random::<f32>() + Vec3::splat(0.2);
             // Samples uniform in area hardly find what is brightest from next to it
             if is_near(set, p) {
                 continue;
@@ -252,7 +252,7 @@ mod tests {
             let count = if e > 0.0 && e < 1e-3 { 400_000 } else { 4000 };
             let mut moments = Moments::default();
             for _ in 0..count {
-                let sample = sampling.sample(&ctx, stream.next_f32(), stream.next_2d());
+                let sample = sampling.sample(&ctx, stream.random::<f32>(), stream.random::<[f32; 2]>());
                 moments.add(sample.map_or(0.0, |(light, s)| {
                     let l = if set.infinite.contains(&light) {
                         known.environment()
@@ -270,7 +270,7 @@ mod tests {
 
     #[test]
     fn irradiance_is_the_integral_of_radiance_and_cosine_above_the_horizon() {
-        let mut stream = HashStream::new([1, 8, 4]);
+        let mut stream = pcg32([1, 8, 4]);
         for shape in shapes() {
             for two_sided in [false, true] {
                 let emission = Emission { l: Rgb::new(1.0, 3.0, 2.0), two_sided, image: None };

@@ -57,8 +57,8 @@ mod tests {
     use super::*;
     use crate::geometry::{Quadric, QuadricKind, Shape, TriangleMesh};
     use crate::lights::{Emission, EnvironmentFilter, EnvironmentMap, EnvironmentMapping, area_lights_of};
-    use lumiris_numbers::math::hash::HashStream;
     use lumiris_numbers::math::{Affine3A, Rgb, Vec3};
+    use lumiris_test_support::random::{Pcg32, RngExt, pcg32};
     use std::sync::Arc;
 
     type Lanes = ([Vec<f32>; 3], [Vec<f32>; 3], Vec<f32>);
@@ -73,12 +73,12 @@ mod tests {
 
     /// Directions and radiances within `tolerance`, densities within `tolerance` relatively; a lane may lack a sample
     /// that its single call has only where that is on an edge.
-    fn assert_like_singles(light: &Light, ctx: &LightCtx, stream: &mut HashStream, tolerance: f32) {
+    fn assert_like_singles(light: &Light, ctx: &LightCtx, stream: &mut Pcg32, tolerance: f32) {
         let what = light.kind_name();
         for n in [1, 5, 8, 31, 32, 33, 100] {
             let mut u = [vec![0.0; n], vec![0.0; n]];
             for i in 0..n {
-                let [a, b] = stream.next_2d();
+                let [a, b] = stream.random::<[f32; 2]>();
                 (u[0][i], u[1][i]) = (a, b);
             }
             let u = [&u[0][..], &u[1][..]];
@@ -110,15 +110,15 @@ mod tests {
 
     fn random_map(mapping: EnvironmentMapping, filter: EnvironmentFilter) -> EnvironmentMap {
         let size = if mapping == EnvironmentMapping::EqualArea { [32, 32] } else { [40, 17] };
-        let mut stream = HashStream::new([11, 12, 13]);
-        let mut texel = || stream.next_f32().powi(8) * 20.0;
+        let mut stream = pcg32([11, 12, 13]);
+        let mut texel = || stream.random::<f32>().powi(8) * 20.0;
         let texels = (0..size[0] * size[1]).map(|_| Rgb::new(texel(), texel(), texel())).collect();
         EnvironmentMap::new(texels, size, mapping, filter).unwrap()
     }
 
     #[test]
     fn lanes_of_infinite_and_delta_lights_are_single_samples() {
-        let mut stream = HashStream::new([3, 3, 3]);
+        let mut stream = pcg32([3, 3, 3]);
         let rotation = Affine3A::from_rotation_x(0.7) * Affine3A::from_rotation_y(2.0);
         for mapping in [EnvironmentMapping::EqualArea, EnvironmentMapping::LatLong] {
             for filter in [EnvironmentFilter::Nearest, EnvironmentFilter::Bilinear] {
@@ -154,7 +154,7 @@ mod tests {
             Shape::Quadric(Quadric { kind, group_from_local: placement, local_from_group, flip_normal: false })
         };
         let (radius, phi_max) = (0.5, std::f32::consts::TAU);
-        let mut stream = HashStream::new([7, 7, 7]);
+        let mut stream = pcg32([7, 7, 7]);
         for shape in [
             mesh(&quad, &[[0, 1, 2], [0, 2, 3]]),
             mesh(&quad, &[[2, 1, 0], [0, 3, 2]]),
@@ -168,8 +168,8 @@ mod tests {
                 for area in area_lights_of(&shape, &emission).lights {
                     let light = Light::Area(area);
                     for _ in 0..20 {
-                        let [x, y] = stream.next_2d();
-                        let [z, far] = stream.next_2d();
+                        let [x, y] = stream.random::<[f32; 2]>();
+                        let [z, far] = stream.random::<[f32; 2]>();
                         let scale = if far < 0.2 { 300.0 } else { 6.0 };
                         let p = (Vec3::new(x, y, z) - 0.5) * scale;
                         assert_like_singles(&light, &LightCtx::at(p), &mut stream, 2e-5);

@@ -3,9 +3,9 @@
 use super::area::AreaShape;
 use super::{AreaLight, Emission, Light, LightCtx, LightHit, area_lights_of};
 use crate::geometry::{BilinearMesh, Quadric, QuadricKind, Shape, TriangleMesh};
-use lumiris_numbers::math::hash::HashStream;
 use lumiris_numbers::math::warp::{invert_uniform_triangle, sample_uniform_triangle};
 use lumiris_numbers::math::{Affine3A, Mat3, Quat, Rgb, Vec2, Vec3};
+use lumiris_test_support::random::{RngExt, pcg32};
 use lumiris_test_support::{Moments, assert_chi_squared};
 use std::f64::consts::PI;
 
@@ -142,11 +142,11 @@ impl Surface {
         let expected = self.cell_probabilities(from, 24);
         let total: f64 = expected.iter().sum();
         assert!((total - 1.0).abs() < 0.01, "{name} from {from}: the density integrates to {total}");
-        let mut stream = HashStream::new([name.len() as u32, from.x.to_bits(), from.z.to_bits()]);
+        let mut stream = pcg32([name.len() as u32, from.x.to_bits(), from.z.to_bits()]);
         let count = 100_000;
         let mut observed = vec![0.0; CELLS * CELLS];
         for _ in 0..count {
-            let s = self.light.sample_li(&LightCtx::at(from), stream.next_2d()).unwrap();
+            let s = self.light.sample_li(&LightCtx::at(from), stream.random::<[f32; 2]>()).unwrap();
             assert!((s.wi.length() - 1.0).abs() < 1e-5 && s.pdf > 0.0 && s.pdf.is_finite());
             let along = from + s.wi * s.t;
             assert!((along - s.p).length() <= 2e-5 * (s.t + s.p.length()), "{name}: {along} {}", s.p);
@@ -263,11 +263,11 @@ fn disks_cylinders_and_patches_follow_their_density() {
 
 /// Irradiance at `p` with normal `n` of a light of radiance 1, by its sampler.
 fn estimated_irradiance(light: &AreaLight, p: Vec3, n: Vec3) -> Moments {
-    let mut stream = HashStream::new([p.x.to_bits(), p.y.to_bits(), 77]);
+    let mut stream = pcg32([p.x.to_bits(), p.y.to_bits(), 77]);
     let mut moments = Moments::default();
     for _ in 0..200_000 {
         let value = light
-            .sample_li(&LightCtx { p, n, ns: n }, stream.next_2d())
+            .sample_li(&LightCtx { p, n, ns: n }, stream.random::<[f32; 2]>())
             .map_or(0.0, |s| f64::from(s.li.r) * f64::from(s.wi.dot(n).max(0.0)) / f64::from(s.pdf));
         moments.add(value);
     }
@@ -391,9 +391,9 @@ fn emission_images_are_looked_up_at_the_sampled_point() {
     for shape in [Shape::Bilinear(flat), Shape::Bilinear(bent), Shape::Mesh(mesh)] {
         let lights = area_lights_of(&shape, &emission).lights;
         assert_eq!(lights.len(), 1, "two textured triangles with matching coordinates are one rectangle");
-        let mut stream = HashStream::new([5, 6, 7]);
+        let mut stream = pcg32([5, 6, 7]);
         for _ in 0..1000 {
-            let s = lights[0].sample_li(&LightCtx::at(Vec3::new(0.3, 0.4, 2.0)), stream.next_2d()).unwrap();
+            let s = lights[0].sample_li(&LightCtx::at(Vec3::new(0.3, 0.4, 2.0)), stream.random::<[f32; 2]>()).unwrap();
             let uv = Vec2::new(s.p.x / 2.0, s.p.y);
             let hit = LightHit { t: s.t, p: s.p, n: s.n, uv };
             let l = lights[0].l(&hit, -s.wi);
@@ -422,9 +422,9 @@ fn delta_and_infinite_lights_are_consistent() {
     );
     let turn = Affine3A::from_mat3(Mat3::from_rotation_x(1.0) * Mat3::from_diagonal(Vec3::new(-3.0, 3.0, 3.0)));
     let light = Light::infinite_image(std::sync::Arc::new(map.unwrap()), &turn, 0.5);
-    let mut stream = HashStream::new([3, 3, 3]);
+    let mut stream = pcg32([3, 3, 3]);
     for _ in 0..1000 {
-        let s = light.sample_li(&LightCtx::at(Vec3::ONE), stream.next_2d()).unwrap();
+        let s = light.sample_li(&LightCtx::at(Vec3::ONE), stream.random::<[f32; 2]>()).unwrap();
         let le = light.le(s.wi);
         let pdf = light.pdf_li(&LightCtx::at(Vec3::ONE), s.wi, &LightHit::INFINITE);
         assert!((le.r - s.li.r).abs() < 1e-3 * (1.0 + le.r) && pdf > 0.0);

@@ -111,8 +111,8 @@ mod tests {
     use super::*;
     use crate::geometry::{Shape, TriangleMesh};
     use crate::lights::{Emission, EnvironmentFilter, EnvironmentMap, EnvironmentMapping, Light, LightSetBuilder};
-    use lumiris_numbers::math::hash::HashStream;
     use lumiris_numbers::math::{Affine3A, Bounds3, Rgb};
+    use lumiris_test_support::random::{RngExt, pcg32};
     use lumiris_test_support::{Moments, assert_chi_squared};
     use std::sync::Arc;
 
@@ -158,7 +158,7 @@ mod tests {
     fn every_sampler_is_a_distribution_over_the_lights_that_shine() {
         for (kind, seen) in KINDS.into_iter().flat_map(|k| [(k, &[0, 2, 4][..]), (k, &[5, 900]), (k, &[])]) {
             let set = with_cache(builder(), kind, seen);
-            let mut s = HashStream::new([1, 2, 3]);
+            let mut s = pcg32([1, 2, 3]);
             for ns in [Vec3::ZERO, Vec3::Z] {
                 let ctx = LightCtx { p: Vec3::new(0.4, 0.3, 0.0), n: ns, ns };
                 let pmf: Vec<f64> = (0..6).map(|i| f64::from(set.sampler.pmf(&ctx, i))).collect();
@@ -167,7 +167,7 @@ mod tests {
                 let count = 50_000;
                 let mut observed = vec![0.0; 6];
                 for _ in 0..count {
-                    let choice = set.sampler.sample(&ctx, s.next_f32()).unwrap();
+                    let choice = set.sampler.sample(&ctx, s.random::<f32>()).unwrap();
                     assert!((0.0..1.0).contains(&choice.u));
                     assert_eq!(choice.pmf, set.sampler.pmf(&ctx, choice.light));
                     observed[choice.light as usize] += 1.0;
@@ -233,13 +233,13 @@ mod tests {
         let (p, n) = (Vec3::new(0.4, 0.3, 0.0), Vec3::Z);
         let ctx = LightCtx { p, n, ns: n };
         let reference = sampling(builder(), LightSamplerKind::Uniform, &bounds());
-        let mut s = HashStream::new([4, 2, 3]);
+        let mut s = pcg32([4, 2, 3]);
         let mut exact = 0.0;
         for light in &reference.lights {
             let n_samples = 200_000;
             for _ in 0..n_samples {
                 exact += light
-                    .sample_li(&ctx, s.next_2d())
+                    .sample_li(&ctx, s.random::<[f32; 2]>())
                     .map_or(0.0, |s| f64::from(s.li.g * s.wi.dot(n).max(0.0) / s.pdf) / f64::from(n_samples));
             }
         }
@@ -248,7 +248,7 @@ mod tests {
             let set = with_cache(builder(), kind, &[2, 4]);
             let mut moments = Moments::default();
             for _ in 0..200_000 {
-                let sample = set.sample(&ctx, s.next_f32(), s.next_2d());
+                let sample = set.sample(&ctx, s.random::<f32>(), s.random::<[f32; 2]>());
                 moments.add(sample.map_or(0.0, |(light, s)| {
                     if !s.is_delta {
                         let hit = LightHit { t: s.t, p: s.p, n: s.n, uv: lumiris_numbers::math::Vec2::ZERO };

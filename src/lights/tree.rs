@@ -415,28 +415,28 @@ mod tests {
     use crate::geometry::{Shape, TriangleMesh};
     use crate::lights::{Emission, Light, area_lights_of};
     use lumiris_numbers::math::Rgb;
-    use lumiris_numbers::math::hash::HashStream;
     use lumiris_numbers::math::warp::sample_uniform_sphere;
     use lumiris_test_support::assert_chi_squared;
+    use lumiris_test_support::random::{Pcg32, RngExt, pcg32};
 
     /// Lights of all kinds in the cube 0..scale, about half of them in small clusters.
     fn random_lights(count: usize, scale: f32, key: u32) -> Vec<Light> {
-        let mut s = HashStream::new([key, 17, 0]);
+        let mut s = pcg32([key, 17, 0]);
         (0..count)
             .map(|i| {
-                let mut vector = || Vec3::new(s.next_f32(), s.next_f32(), s.next_f32());
+                let mut vector = || Vec3::new(s.random::<f32>(), s.random::<f32>(), s.random::<f32>());
                 let p = if i % 2 == 0 { vector() } else { vector() * 0.02 + 0.5 } * scale;
-                let l = Rgb::splat(s.next_f32().powi(4) * 10.0 + 0.01);
-                let axis = sample_uniform_sphere(s.next_2d());
+                let l = Rgb::splat(s.random::<f32>().powi(4) * 10.0 + 0.01);
+                let axis = sample_uniform_sphere(s.random::<[f32; 2]>());
                 match i % 5 {
                     0 => Light::Point { p, intensity: l * scale * scale },
                     1 => {
-                        let (a, b) = (s.next_f32(), s.next_f32());
+                        let (a, b) = (s.random::<f32>(), s.random::<f32>());
                         let (cos_total, cos_falloff_start) = (a.min(b) * 2.0 - 1.0, a.max(b) * 2.0 - 1.0);
                         Light::Spot { p, axis, cos_total, cos_falloff_start, intensity: l * scale * scale }
                     }
                     k => {
-                        let mut edge = || sample_uniform_sphere(s.next_2d()) * scale * 0.01;
+                        let mut edge = || sample_uniform_sphere(s.random::<[f32; 2]>()) * scale * 0.01;
                         let mesh = TriangleMesh::new(vec![p, p + edge(), p + edge()], vec![[0, 1, 2]]).unwrap();
                         let emission = Emission { l, two_sided: k == 2, image: None };
                         Light::Area(area_lights_of(&Shape::Mesh(mesh), &emission).lights.remove(0))
@@ -450,17 +450,17 @@ mod tests {
         LightTree::new(&lights.iter().map(Light::bounds).collect::<Vec<_>>())
     }
 
-    fn random_ctx(s: &mut HashStream, scale: f32) -> LightCtx {
-        let p = (Vec3::new(s.next_f32(), s.next_f32(), s.next_f32()) * 1.6 - 0.3) * scale;
-        let n = sample_uniform_sphere(s.next_2d());
-        if s.next_f32() < 0.2 { LightCtx::at(p) } else { LightCtx { p, n, ns: n } }
+    fn random_ctx(s: &mut Pcg32, scale: f32) -> LightCtx {
+        let p = (Vec3::new(s.random::<f32>(), s.random::<f32>(), s.random::<f32>()) * 1.6 - 0.3) * scale;
+        let n = sample_uniform_sphere(s.random::<[f32; 2]>());
+        if s.random::<f32>() < 0.2 { LightCtx::at(p) } else { LightCtx { p, n, ns: n } }
     }
 
     #[test]
     fn probabilities_add_up_to_one_everywhere() {
         for (count, key) in [(1, 1), (2, 2), (7, 3), (300, 4)] {
             let tree = tree_of(&random_lights(count, 1.0, key));
-            let mut s = HashStream::new([key, 1, 1]);
+            let mut s = pcg32([key, 1, 1]);
             for _ in 0..200 {
                 let ctx = random_ctx(&mut s, 1.0);
                 let sum: f64 = (0..count as u32).map(|i| f64::from(tree.pmf(&ctx, i))).sum();
@@ -473,13 +473,13 @@ mod tests {
     fn choices_follow_the_probabilities_and_remapped_numbers_are_uniform() {
         let lights = random_lights(40, 1.0, 9);
         let tree = tree_of(&lights);
-        let mut s = HashStream::new([5, 1, 1]);
+        let mut s = pcg32([5, 1, 1]);
         for _ in 0..5 {
             let ctx = random_ctx(&mut s, 1.0);
             let count = 100_000;
             let mut observed = vec![0.0; lights.len() * 4];
             for _ in 0..count {
-                let (light, pmf, u) = tree.sample(&ctx, s.next_f32()).unwrap();
+                let (light, pmf, u) = tree.sample(&ctx, s.random::<f32>()).unwrap();
                 assert_eq!(pmf, tree.pmf(&ctx, light));
                 observed[light as usize * 4 + (u * 4.0) as usize] += 1.0;
             }
@@ -495,13 +495,13 @@ mod tests {
         for scale in [1e-3, 1.0, 1e3] {
             let lights = random_lights(150, scale, 21);
             let tree = tree_of(&lights);
-            let mut s = HashStream::new([6, 1, 1]);
+            let mut s = pcg32([6, 1, 1]);
             let mut contributions = 0;
             for _ in 0..400 {
                 let ctx = random_ctx(&mut s, scale);
                 for (i, light) in lights.iter().enumerate() {
                     let contributes = (0..4).any(|_| {
-                        let sample = light.sample_li(&ctx, s.next_2d());
+                        let sample = light.sample_li(&ctx, s.random::<[f32; 2]>());
                         sample.is_some_and(|s| !s.li.is_black() && (ctx.ns == Vec3::ZERO || s.wi.dot(ctx.ns) != 0.0))
                     });
                     contributions += u32::from(contributes);
@@ -517,7 +517,7 @@ mod tests {
         let reference = tree_of(&random_lights(60, 1.0, 33));
         for scale in [1.0 / 1024.0, 1024.0, 1e-3, 1e3] {
             let scaled = tree_of(&random_lights(60, scale, 33));
-            let (mut a, mut b) = (HashStream::new([7, 1, 1]), HashStream::new([7, 1, 1]));
+            let (mut a, mut b) = (pcg32([7, 1, 1]), pcg32([7, 1, 1]));
             // Powers of two are exact.
             let tolerance = if scale.log2().fract() == 0.0 { 0.0 } else { 1e-3 };
             for _ in 0..100 {
@@ -576,10 +576,10 @@ mod tests {
     fn a_hundred_thousand_lights_make_a_full_tree() {
         let tree = tree_of(&random_lights(100_000, 1.0, 55));
         assert_eq!(tree.nodes.len(), 199_999);
-        let mut s = HashStream::new([8, 1, 1]);
+        let mut s = pcg32([8, 1, 1]);
         let ctx = random_ctx(&mut s, 1.0);
         for _ in 0..100_000 {
-            let (light, pmf, _) = tree.sample(&ctx, s.next_f32()).unwrap();
+            let (light, pmf, _) = tree.sample(&ctx, s.random::<f32>()).unwrap();
             assert!(pmf > 0.0 && light < 100_000);
         }
     }

@@ -261,15 +261,15 @@ fn merged(mut items: Vec<(u64, LightId, u32)>) -> Vec<(u64, LightId, u32)> {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use lumiris_numbers::math::hash::HashStream;
     use lumiris_numbers::math::warp::sample_uniform_sphere;
+    use lumiris_test_support::random::{RngExt, pcg32};
 
     fn random_photons(count: usize, lights: u32) -> Vec<(Vec3, Vec3, LightId)> {
-        let mut s = HashStream::new([5, 5, 5]);
+        let mut s = pcg32([5, 5, 5]);
         let photon = |_| {
-            let [x, y] = s.next_2d();
-            let p = Vec3::new(x, y, s.next_f32()) * 4.0 - 1.0;
-            (p, sample_uniform_sphere(s.next_2d()), (s.next_f32() * lights as f32) as LightId)
+            let [x, y] = s.random::<[f32; 2]>();
+            let p = Vec3::new(x, y, s.random::<f32>()) * 4.0 - 1.0;
+            (p, sample_uniform_sphere(s.random::<[f32; 2]>()), (s.random::<f32>() * lights as f32) as LightId)
         };
         (0..count).map(photon).collect()
     }
@@ -279,11 +279,12 @@ mod tests {
         let photons = random_photons(20_000, 50);
         let radius = 0.1;
         let cache = VisibilityCache::new(photons.iter().copied(), radius);
-        let mut s = HashStream::new([6, 6, 6]);
+        let mut s = pcg32([6, 6, 6]);
         let mut found = 0;
         for _ in 0..2000 {
-            let [x, y] = s.next_2d();
-            let (p, n) = (Vec3::new(x, y, s.next_f32()) * 4.4 - 1.2, sample_uniform_sphere(s.next_2d()));
+            let [x, y] = s.random::<[f32; 2]>();
+            let (p, n) =
+                (Vec3::new(x, y, s.random::<f32>()) * 4.4 - 1.2, sample_uniform_sphere(s.random::<[f32; 2]>()));
             let contributing = cache.lookup(p, n);
             assert!(contributing.windows(2).all(|w| w[0].0 < w[1].0));
             let near = |max: f32, turn: f32| {
@@ -332,12 +333,12 @@ mod tests {
 
     #[test]
     fn the_adapted_radius_gives_photons_enough_company() {
-        let mut s = HashStream::new([7, 7, 7]);
+        let mut s = pcg32([7, 7, 7]);
         for count in [3_000, 100_000] {
             // Four lights on a square of 10 m, each seen in its own quarter
             let photons: Vec<_> = (0..count)
                 .map(|_| {
-                    let [x, y] = s.next_2d().map(|u| u * 10.0);
+                    let [x, y] = s.random::<[f32; 2]>().map(|u| u * 10.0);
                     (Vec3::new(x, y, 0.0), Vec3::Z, u32::from(x > 5.0) + 2 * u32::from(y > 5.0))
                 })
                 .collect();

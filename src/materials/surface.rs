@@ -145,8 +145,8 @@ mod tests {
     use crate::bsdfs::{
         CoatTable, CoatedDiffuse, Conductor, Dielectric, Diffuse, DiffuseTransmission, ThinDielectric, TrowbridgeReitz,
     };
-    use lumiris_numbers::math::hash::HashStream;
     use lumiris_numbers::math::warp::sample_uniform_sphere;
+    use lumiris_test_support::random::{RngExt, pcg32};
 
     /// Near equal, relative to the value and to 1e-3.
     fn assert_near(a: f32, b: f32, what: &dyn std::fmt::Debug) {
@@ -181,14 +181,14 @@ mod tests {
         ];
         bsdfs.extend(tables.iter().map(|(t, d)| Bsdf::CoatedDiffuse(CoatedDiffuse::new(t, *d, rgb, 10))));
 
-        let mut stream = HashStream::new([5, 1, 5]);
+        let mut stream = pcg32([5, 1, 5]);
         for bsdf in bsdfs {
             for n in [1, 8, 13, 32, 100] {
                 for _ in 0..8 {
-                    let frame = Frame::from_z(sample_uniform_sphere(stream.next_2d()));
+                    let frame = Frame::from_z(sample_uniform_sphere(stream.random::<[f32; 2]>()));
                     let surface = SurfaceBsdf { bsdf, frame, n: frame.z };
-                    let wo = sample_uniform_sphere(stream.next_2d());
-                    let w: Vec<Vec3> = (0..n).map(|_| sample_uniform_sphere(stream.next_2d())).collect();
+                    let wo = sample_uniform_sphere(stream.random::<[f32; 2]>());
+                    let w: Vec<Vec3> = (0..n).map(|_| sample_uniform_sphere(stream.random::<[f32; 2]>())).collect();
                     let wi: [Vec<f32>; 3] = std::array::from_fn(|c| w.iter().map(|w| w[c]).collect());
                     let run = |each: bool| {
                         let mut v: [Vec<f32>; 4] = std::array::from_fn(|_| vec![-1.0; n]);

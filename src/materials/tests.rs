@@ -2,8 +2,8 @@ use super::*;
 use crate::bsdfs::Lobe;
 use crate::imaging::{ColorEncoding, Filter, Image, MipMap, Wrap};
 use crate::textures::{FloatTexture, ImageTexture, Mapping2d, RgbTexture};
-use lumiris_numbers::math::hash::HashStream;
 use lumiris_numbers::math::{Vec2, warp};
+use lumiris_test_support::random::{RngExt, pcg32};
 use std::f32::consts::FRAC_1_PI;
 
 /// A hit on a plane whose normal is `n`, with ∂p/∂u and ∂p/∂v of lengths 2 and 3.
@@ -155,11 +155,11 @@ fn mixtures_choose_by_amount_and_always_alike() {
     let itself = bench.material(Material::Mix { materials: [6, 6], amount });
     assert_eq!(itself, 6);
     let set = bench.set();
-    let (mut counts, mut s, n) = ([0.0; 2], HashStream::new([1, 2, 3]), 100_000);
+    let (mut counts, mut s, n) = ([0.0; 2], pcg32([1, 2, 3]), 100_000);
     for _ in 0..n {
         let mut hit = hit(UP);
-        hit.p = Vec3::new(s.next_f32(), s.next_f32(), s.next_f32());
-        let (ctx, wo) = (context(&hit), warp::sample_uniform_sphere(s.next_2d()));
+        hit.p = Vec3::new(s.random::<f32>(), s.random::<f32>(), s.random::<f32>());
+        let (ctx, wo) = (context(&hit), warp::sample_uniform_sphere(s.random::<[f32; 2]>()));
         let chosen = set.resolve(mix, &bench.textures, &ctx, wo);
         assert_eq!(chosen, set.resolve(mix, &bench.textures, &ctx, wo));
         counts[0] += f64::from(u8::from(chosen == Some(b)));

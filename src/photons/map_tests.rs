@@ -1,24 +1,24 @@
 use super::{GatherScratch, Origin, Photon, PhotonMap, Place, Search};
 use lumiris_numbers::estimators::stats::{Welford, t_test};
-use lumiris_numbers::math::hash::HashStream;
 use lumiris_numbers::math::warp::{sample_cosine_hemisphere, sample_uniform_sphere};
 use lumiris_numbers::math::{Frame, Rgb, Vec3};
+use lumiris_test_support::random::{Pcg32, RngExt, pcg32};
 use std::time::{Duration, Instant};
 
 /// Photons of constant density on the square |x|, |z| ≤ 1 of the plane y = height, by a Poisson process of `mean`
 /// photons, which together carry 4 W: an irradiance of 1 W/m² on average.
-fn plane(mean: f64, height: f32, n: Vec3, stream: &mut HashStream) -> Vec<Photon> {
+fn plane(mean: f64, height: f32, n: Vec3, stream: &mut Pcg32) -> Vec<Photon> {
     // Sum of exponential gaps
     let mut photons = Vec::new();
     let mut t = 0.0;
     loop {
-        t -= (1.0 - f64::from(stream.next_f32())).ln();
+        t -= (1.0 - f64::from(stream.random::<f32>())).ln();
         if t > mean {
             return photons;
         }
-        let [u, v] = stream.next_2d();
+        let [u, v] = stream.random::<[f32; 2]>();
         let p = Vec3::new(2.0 * u - 1.0, height, 2.0 * v - 1.0);
-        let wi = Frame::from_z(n).to_world(sample_cosine_hemisphere(stream.next_2d()));
+        let wi = Frame::from_z(n).to_world(sample_cosine_hemisphere(stream.random::<[f32; 2]>()));
         photons.push(Photon::new(p, wi, n, Rgb::splat((4.0 / mean) as f32), Origin::Diffuse));
     }
 }
@@ -37,7 +37,7 @@ fn searches() -> [Search; 5] {
 #[test]
 fn the_irradiance_of_even_photons_is_exact_on_average() {
     for (i, search) in searches().into_iter().enumerate() {
-        let mut stream = HashStream::new([1, i as u32, 77]);
+        let mut stream = pcg32([1, i as u32, 77]);
         let mut estimates = Welford::default();
         for _ in 0..3000 {
             let map = PhotonMap::new(plane(400.0, 0.0, Vec3::Y, &mut stream));
@@ -52,7 +52,7 @@ fn the_irradiance_of_even_photons_is_exact_on_average() {
 
 #[test]
 fn a_thin_wall_that_is_lit_on_one_side_is_black_on_the_other() {
-    let mut stream = HashStream::new([1, 2, 78]);
+    let mut stream = pcg32([1, 2, 78]);
     let photons = plane(4000.0, 0.0, Vec3::Y, &mut stream);
     let map = PhotonMap::new(photons);
     let mut scratch = GatherScratch::default();
@@ -91,7 +91,7 @@ fn photons_off_the_tangent_plane_and_of_other_normals_do_not_count() {
 #[test]
 fn irradiance_is_about_the_shading_normal() {
     // Even light from the hemisphere of y: about a normal tilted by θ, E/E_flat = (1 + cos θ)/2
-    let mut stream = HashStream::new([1, 4, 79]);
+    let mut stream = pcg32([1, 4, 79]);
     let map = PhotonMap::new(plane(400_000.0, 0.0, Vec3::Y, &mut stream));
     let ns = Vec3::new(0.6, 0.8, 0.0);
     let at = Place { p: Vec3::ZERO, n: Vec3::Y, ns };
@@ -102,10 +102,10 @@ fn irradiance_is_about_the_shading_normal() {
 
 #[test]
 fn searches_find_what_a_scan_finds() {
-    let mut stream = HashStream::new([1, 5, 80]);
+    let mut stream = pcg32([1, 5, 80]);
     let photons: Vec<Photon> = (0..5000)
         .map(|i| {
-            let on_sphere = sample_uniform_sphere(stream.next_2d());
+            let on_sphere = sample_uniform_sphere(stream.random::<[f32; 2]>());
             let p = if i % 2 == 0 { on_sphere } else { Vec3::new(on_sphere.x, 0.25, 0.5) };
             Photon::new(p, Vec3::Y, Vec3::Y, Rgb::splat(1.0 + i as f32), Origin::Diffuse)
         })
@@ -114,7 +114,7 @@ fn searches_find_what_a_scan_finds() {
     assert_eq!(map.len(), 5000);
     let mut scratch = GatherScratch::default();
     for i in 0..200 {
-        let q = photons[i * 13].p() + sample_uniform_sphere(stream.next_2d()) * (0.01 * (i % 3) as f32);
+        let q = photons[i * 13].p() + sample_uniform_sphere(stream.random::<[f32; 2]>()) * (0.01 * (i % 3) as f32);
         let at = Place::flat(q, Vec3::Y);
         let mut distances: Vec<f32> =
             photons.iter().map(|p| (p.p() - q).length_squared().max(16.0 * (p.p() - q).y.powi(2))).collect();
@@ -131,7 +131,7 @@ fn searches_find_what_a_scan_finds() {
 
 #[test]
 fn nearest_photons_and_a_radius_agree() {
-    let mut stream = HashStream::new([1, 6, 81]);
+    let mut stream = pcg32([1, 6, 81]);
     let map = PhotonMap::new(plane(200_000.0, 0.0, Vec3::Y, &mut stream));
     let mut scratch = GatherScratch::default();
     for i in 0..20 {
@@ -146,7 +146,7 @@ fn nearest_photons_and_a_radius_agree() {
 
 #[test]
 fn a_million_photons_on_a_plane_are_sorted_fast_and_found() {
-    let mut stream = HashStream::new([1, 7, 82]);
+    let mut stream = pcg32([1, 7, 82]);
     let photons = plane(1e6, 0.0, Vec3::Y, &mut stream);
     let start = Instant::now();
     let map = PhotonMap::new(photons);
@@ -181,7 +181,7 @@ fn photons_at_one_point_and_no_photons_do_no_harm() {
 
 #[test]
 fn a_map_does_not_depend_on_the_number_of_threads() {
-    let mut stream = HashStream::new([1, 9, 84]);
+    let mut stream = pcg32([1, 9, 84]);
     let photons = plane(100_000.0, 0.0, Vec3::Y, &mut stream);
     let build = |threads| {
         let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build().unwrap();

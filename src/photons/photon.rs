@@ -166,19 +166,22 @@ fn unpack_power(exponent: u32, mantissas: [u32; 3]) -> Rgb {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use lumiris_numbers::math::hash::HashStream;
     use lumiris_numbers::math::octahedral::MAX_ERROR;
     use lumiris_numbers::math::warp::sample_uniform_sphere;
+    use lumiris_test_support::random::{RngExt, pcg32};
 
     #[test]
     fn a_photon_comes_back_as_it_was() {
-        let mut stream = HashStream::new([2, 8, 1]);
+        let mut stream = pcg32([2, 8, 1]);
         for i in 0..20_000 {
-            let p = sample_uniform_sphere(stream.next_2d()) * 1e3 * stream.next_f32();
-            let (wi, n) = (sample_uniform_sphere(stream.next_2d()), sample_uniform_sphere(stream.next_2d()));
-            let size = 2.0_f32.powf(240.0 * stream.next_f32() - 120.0);
-            let power = Rgb::new(stream.next_f32(), stream.next_f32(), stream.next_f32()) * size;
-            let light = (stream.next_f32() * NO_LIGHT as f32) as u32;
+            let p = sample_uniform_sphere(stream.random::<[f32; 2]>()) * 1e3 * stream.random::<f32>();
+            let (wi, n) = (
+                sample_uniform_sphere(stream.random::<[f32; 2]>()),
+                sample_uniform_sphere(stream.random::<[f32; 2]>()),
+            );
+            let size = 2.0_f32.powf(240.0 * stream.random::<f32>() - 120.0);
+            let power = Rgb::new(stream.random::<f32>(), stream.random::<f32>(), stream.random::<f32>()) * size;
+            let light = (stream.random::<f32>() * NO_LIGHT as f32) as u32;
             let origin = [Origin::Primary(light.min(NO_LIGHT - 1)), Origin::Diffuse, Origin::Caustic][i % 3];
             let photon = Photon::new(p, wi, n, power, origin);
             assert_eq!(photon.p(), p);
@@ -199,10 +202,10 @@ mod tests {
 
     #[test]
     fn rounding_of_power_has_no_drift() {
-        let mut stream = HashStream::new([2, 8, 2]);
+        let mut stream = pcg32([2, 8, 2]);
         let (mut sum, mut expected) = (0.0_f64, 0.0_f64);
         for _ in 0..100_000 {
-            let power = Rgb::new(1.0 + stream.next_f32(), stream.next_f32(), stream.next_f32());
+            let power = Rgb::new(1.0 + stream.random::<f32>(), stream.random::<f32>(), stream.random::<f32>());
             let back = Photon::new(Vec3::ZERO, Vec3::Z, Vec3::Z, power, Origin::Diffuse).power();
             sum += f64::from(back.average());
             expected += f64::from(power.average());

@@ -58,17 +58,17 @@ pub fn caustic(xi: f32, p: f32) -> Option<f32> {
 mod tests {
     use super::*;
     use lumiris_numbers::estimators::stats::{Welford, t_test};
-    use lumiris_numbers::math::hash::HashStream;
+    use lumiris_test_support::random::{RngExt, pcg32};
     use strum::IntoEnumIterator;
 
     #[test]
     fn all_rules_keep_the_power_on_average_and_ask_for_p_no_more_than_they_must() {
         let (q, p, count) = (0.25_f32, 0.4_f32, 100_000);
         for rule in CausticRule::iter() {
-            let mut stream = HashStream::new([4, 4, rule as u32]);
+            let mut stream = pcg32([4, 4, rule as u32]);
             let (mut power, mut asked) = (Welford::default(), 0);
             for i in 0..count {
-                let xi = stream.next_2d();
+                let xi = stream.random::<[f32; 2]>();
                 let is_first = (i as f32) < q * count as f32;
                 let factor = rule.global(q, is_first, xi, || {
                     asked += 1;

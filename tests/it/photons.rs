@@ -9,8 +9,8 @@ use lumiris::photons::{
 use lumiris::scene::RenderJob;
 use lumiris::settings::{Cached, IntegratorKind};
 use lumiris_numbers::estimators::stats::{Welford, sidak, t_test, two_sample_z_test};
-use lumiris_numbers::math::hash::HashStream;
 use lumiris_numbers::math::{Frame, Rgb, Vec3};
+use lumiris_test_support::random::{RngExt, pcg32};
 use rayon::prelude::*;
 use std::f64::consts::PI;
 use strum::IntoEnumIterator;
@@ -146,11 +146,11 @@ fn path_traced(job: &RenderJob, (p, n): (Vec3, Vec3), radius: f32, key: u32) -> 
     // Each group is a grid of strata over the kernel
     const GROUPS: u32 = 24;
     const GRID: u32 = 8;
-    let (frame, mut stream) = (Frame::from_z(n), HashStream::new([3, 1, key]));
+    let (frame, mut stream) = (Frame::from_z(n), pcg32([3, 1, key]));
     let mut e = [Welford::default(); 3];
     for group in 0..GROUPS {
         let place = |cell: u32| {
-            let [u, v] = stream.next_2d();
+            let [u, v] = stream.random::<[f32; 2]>();
             let (u, v) = (((cell % GRID) as f32 + u) / GRID as f32, ((cell / GRID) as f32 + v) / GRID as f32);
             // Density 2/(πr²) (1 − d²/r²): d²/r² = 1 − √(1 − u)
             let (d, phi) = (radius * (1.0 - (1.0 - u).sqrt()).sqrt(), std::f32::consts::TAU * v);

@@ -14,9 +14,10 @@ use lumiris::render::{RenderSettings, render};
 use lumiris::scene::{AccelKind, RenderJob};
 use lumiris::settings::{EstimatorKind, IntegratorSettings, Proposals, Target};
 use lumiris_numbers::estimators::stats::{Welford, t_test};
-use lumiris_numbers::math::hash::{HashStream, pcg4d};
+use lumiris_numbers::math::hash::pcg4d;
 use lumiris_numbers::math::ray::offset_origin;
 use lumiris_numbers::math::{Ray, Vec3};
+use lumiris_test_support::random::{RngExt, pcg32};
 use std::path::Path;
 use std::sync::atomic::AtomicBool;
 
@@ -41,10 +42,10 @@ fn primary_photons(job: &RenderJob) -> Vec<(Vec3, Vec3, LightId)> {
     let lights = &job.lights;
     let (mut rays, mut ids) = (RayBatch::default(), Vec::new());
     for (id, light) in (0..).zip(&lights.lights) {
-        let mut stream = HashStream::new([id, 99, 3]);
+        let mut stream = pcg32([id, 99, 3]);
         for _ in 0..PHOTONS {
             let scene = (lights.scene_centre, lights.scene_radius);
-            if let Some(s) = light.sample_le(scene, stream.next_2d(), stream.next_2d()) {
+            if let Some(s) = light.sample_le(scene, stream.random::<[f32; 2]>(), stream.random::<[f32; 2]>()) {
                 let o = if s.n == Vec3::ZERO { s.p } else { offset_origin(s.p, s.p_error, s.n, s.d) };
                 rays.push(&Ray { o, d: s.d, t_max: f32::INFINITY, time: 0.0 });
                 ids.push(id);

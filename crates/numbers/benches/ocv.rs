@@ -5,7 +5,7 @@
 #![allow(clippy::print_stdout, missing_docs)]
 
 use lumiris_numbers::estimators::ocv::{Form, NormalEquations};
-use lumiris_numbers::math::hash::HashStream;
+use lumiris_test_support::random::{RngExt, pcg32};
 use std::hint::black_box;
 use std::time::Instant;
 
@@ -27,9 +27,9 @@ fn main() {
     for m in [3, 5, 8] {
         for n in [8, 64] {
             let equations = NormalEquations::new(m);
-            let mut stream = HashStream::new([m as u32, n as u32, 1]);
-            let samples: Vec<[f32; 3]> = (0..n).map(|_| [0; 3].map(|_| stream.next_f32())).collect();
-            let columns: Vec<(usize, f32)> = (0..m * n).map(|i| (i % m, 2.0 * stream.next_f32() - 1.0)).collect();
+            let mut stream = pcg32([m as u32, n as u32, 1]);
+            let samples: Vec<[f32; 3]> = (0..n).map(|_| [0; 3].map(|_| stream.random::<f32>())).collect();
+            let columns: Vec<(usize, f32)> = (0..m * n).map(|i| (i % m, 2.0 * stream.random::<f32>() - 1.0)).collect();
             let mut sums = vec![0.0; POINTS * equations.len()];
             let add = time(|| {
                 for row in sums.chunks_exact_mut(equations.len()) {

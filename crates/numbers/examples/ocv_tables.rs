@@ -11,7 +11,7 @@ mod mixtures;
 use lumiris_numbers::estimators::ocv::{Form, Matrix, System};
 use lumiris_numbers::estimators::optimal_mis;
 use lumiris_numbers::estimators::stats::Welford;
-use lumiris_numbers::math::hash::HashStream;
+use lumiris_test_support::random::{Pcg32, pcg32};
 use mixtures::{Mixture, PROPER, Sampler};
 
 fn main() {
@@ -26,8 +26,8 @@ fn main() {
 }
 
 /// Moments of several estimates from each of `runs`, of their first channel.
-fn moments<const K: usize>(runs: usize, key: u32, mut run: impl FnMut(&mut HashStream) -> [f32; K]) -> [Welford; K] {
-    let (mut stream, mut welford) = (HashStream::new([40, key, 0]), [Welford::new(); K]);
+fn moments<const K: usize>(runs: usize, key: u32, mut run: impl FnMut(&mut Pcg32) -> [f32; K]) -> [Welford; K] {
+    let (mut stream, mut welford) = (pcg32([40, key, 0]), [Welford::new(); K]);
     for _ in 0..runs {
         welford.iter_mut().zip(run(&mut stream)).for_each(|(w, e)| w.add(f64::from(e)));
     }
@@ -93,7 +93,7 @@ fn forms() {
 }
 
 /// Estimates of MIS and of the progressive form over the first `passes`, with one system.
-fn progressive(sampler: &Sampler, passes: u32, system: System, stream: &mut HashStream) -> [[f32; 3]; 2] {
+fn progressive(sampler: &Sampler, passes: u32, system: System, stream: &mut Pcg32) -> [[f32; 3]; 2] {
     let equations = sampler.equations;
     let (mut all, mut sums) = (vec![0.0; equations.len()], vec![0.0; equations.len()]);
     let (mut beta, mut total) = (vec![0.0; equations.coefficients()], [[0.0; 3]; 2]);

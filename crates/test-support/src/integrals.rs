@@ -1,10 +1,10 @@
 //! Integrals of colours with steps of visibility, with values and variances by quadrature, and runs of estimators on
 //! them.
 
+use crate::random::{Pcg32, RngExt, pcg32};
 use lumiris_numbers::estimators::ris::Draw;
 use lumiris_numbers::estimators::ris::choice::Moments;
 use lumiris_numbers::estimators::stats::Welford;
-use lumiris_numbers::math::hash::HashStream;
 use lumiris_numbers::math::luminance;
 
 /// An integral over a line or a square of f = colour · visibility; the target q̂ is the luminance of the colour.
@@ -138,19 +138,19 @@ impl Proposals {
     }
 
     /// M independent proposals of density p with r = 1/(M p).
-    pub fn independent(&mut self, integral: Integral, m: usize, stream: &mut HashStream) {
+    pub fn independent(&mut self, integral: Integral, m: usize, stream: &mut Pcg32) {
         self.clear();
         for _ in 0..m {
-            let x = integral.sample(stream.next_2d().map(f64::from));
+            let x = integral.sample(stream.random::<[f32; 2]>().map(f64::from));
             self.push(integral, x, 1.0 / (m as f64 * integral.pdf(x)));
         }
     }
 
     /// As [`Proposals::independent`], but in M equal strata of the first axis, in order.
-    pub fn jittered(&mut self, integral: Integral, m: usize, stream: &mut HashStream) {
+    pub fn jittered(&mut self, integral: Integral, m: usize, stream: &mut Pcg32) {
         self.clear();
         for k in 0..m {
-            let [u, v] = stream.next_2d().map(f64::from);
+            let [u, v] = stream.random::<[f32; 2]>().map(f64::from);
             let x = integral.sample([(k as f64 + u) / m as f64, v]);
             self.push(integral, x, 1.0 / (m as f64 * integral.pdf(x)));
         }
@@ -168,8 +168,8 @@ impl Proposals {
 }
 
 /// Moments of `runs` estimates per channel.
-pub fn run(runs: usize, key: [u32; 3], mut estimate: impl FnMut(&mut HashStream) -> [f64; 3]) -> [Welford; 3] {
-    let mut stream = HashStream::new(key);
+pub fn run(runs: usize, key: [u32; 3], mut estimate: impl FnMut(&mut Pcg32) -> [f64; 3]) -> [Welford; 3] {
+    let mut stream = pcg32(key);
     let mut channels = [Welford::new(); 3];
     for _ in 0..runs {
         let e = estimate(&mut stream);
@@ -179,6 +179,6 @@ pub fn run(runs: usize, key: [u32; 3], mut estimate: impl FnMut(&mut HashStream)
 }
 
 /// Uniform numbers in all places of `u`.
-pub fn fill(u: &mut [f32], stream: &mut HashStream) {
-    u.iter_mut().for_each(|u| *u = stream.next_f32());
+pub fn fill(u: &mut [f32], stream: &mut Pcg32) {
+    u.iter_mut().for_each(|u| *u = stream.random::<f32>());
 }

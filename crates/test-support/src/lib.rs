@@ -1,6 +1,7 @@
 //! What tests of several crates use: statistical assertions, and integrals of known value.
 
 pub mod integrals;
+pub mod random;
 pub mod significance;
 
 use lumiris_numbers::estimators::stats::{Welford, chi_squared_test, z_test};

@@ -47,8 +47,8 @@ pub fn is_beyond(samples: &Welford, expected: f64, limit: f64, significance: f64
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::random::{Pcg32, RngExt, pcg32};
     use lumiris_numbers::estimators::stats::t_test;
-    use lumiris_numbers::math::hash::HashStream;
 
     #[test]
     fn critical_values_are_those_of_printed_tables() {
@@ -58,8 +58,8 @@ mod tests {
     }
 
     /// Normal numbers [Box and Muller 1958].
-    fn normal(stream: &mut HashStream) -> f64 {
-        let [u, v] = stream.next_2d().map(f64::from);
+    fn normal(stream: &mut Pcg32) -> f64 {
+        let [u, v] = stream.random::<[f32; 2]>().map(f64::from);
         (-2.0 * (1.0 - u).ln()).sqrt() * (std::f64::consts::TAU * v).cos()
     }
 
@@ -69,7 +69,7 @@ mod tests {
         let (significance, power) = (1e-5, 0.99);
         let mut found = 0;
         for run in 0..RUNS {
-            let mut stream = HashStream::new([run as u32, 5, 71]);
+            let mut stream = pcg32([run as u32, 5, 71]);
             let values: Vec<f64> = (0..32).map(|_| 1.0 + 0.05 * normal(&mut stream)).collect();
             let right: Welford = values.iter().copied().collect();
             let bias = detectable_bias(right.standard_error(), 32, significance, power);

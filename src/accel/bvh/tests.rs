@@ -3,8 +3,8 @@
 use super::*;
 use crate::geometry::triangle::{RayPrecomputed, intersect_triangle};
 use crate::geometry::{BilinearMesh, GeometryId, Instance, Quadric, QuadricKind, TriangleMesh, loop_subdivide};
-use lumiris_numbers::math::hash::HashStream;
 use lumiris_numbers::math::{Quat, Ray, Vec2};
+use lumiris_test_support::random::{Pcg32, RngExt, pcg32};
 
 struct Stripes;
 
@@ -19,11 +19,11 @@ impl AlphaSource for Stripes {
     }
 }
 
-fn random_point(s: &mut HashStream) -> Vec3 {
-    Vec3::new(s.next_f32(), s.next_f32(), s.next_f32()) * 2.0 - 1.0
+fn random_point(s: &mut Pcg32) -> Vec3 {
+    Vec3::new(s.random::<f32>(), s.random::<f32>(), s.random::<f32>()) * 2.0 - 1.0
 }
 
-fn soup(s: &mut HashStream, triangles: u32, size: f32) -> Shape {
+fn soup(s: &mut Pcg32, triangles: u32, size: f32) -> Shape {
     let mut positions = Vec::new();
     for _ in 0..triangles {
         let center = random_point(s);
@@ -32,14 +32,14 @@ fn soup(s: &mut HashStream, triangles: u32, size: f32) -> Shape {
     Shape::Mesh(TriangleMesh::new(positions, (0..triangles).map(|i| [3 * i, 3 * i + 1, 3 * i + 2]).collect()).unwrap())
 }
 
-fn random_placement(s: &mut HashStream) -> Affine3A {
-    let rotation = Quat::from_axis_angle(random_point(s).normalize_or(Vec3::X), s.next_f32() * 6.0);
+fn random_placement(s: &mut Pcg32) -> Affine3A {
+    let rotation = Quat::from_axis_angle(random_point(s).normalize_or(Vec3::X), s.random::<f32>() * 6.0);
     let scale = Vec3::splat(0.3) + random_point(s).abs();
     Affine3A::from_scale_rotation_translation(scale, rotation, random_point(s) * 3.0)
 }
 
-fn random_quadric(s: &mut HashStream, kind: u32) -> Shape {
-    let (radius, phi_max) = (0.3, 1.0 + 5.0 * s.next_f32());
+fn random_quadric(s: &mut Pcg32, kind: u32) -> Shape {
+    let (radius, phi_max) = (0.3, 1.0 + 5.0 * s.random::<f32>());
     let kind = match kind % 3 {
         0 => QuadricKind::Sphere { radius, z_min: -0.3, z_max: 0.2, phi_max },
         1 => QuadricKind::Disk { height: 0.1, radius, inner_radius: 0.05, phi_max },
@@ -50,7 +50,7 @@ fn random_quadric(s: &mut HashStream, kind: u32) -> Shape {
     Shape::Quadric(Quadric { kind, group_from_local, local_from_group, flip_normal: false })
 }
 
-fn random_patches(s: &mut HashStream, count: u32) -> Shape {
+fn random_patches(s: &mut Pcg32, count: u32) -> Shape {
     let mut positions = Vec::new();
     for _ in 0..count {
         let center = random_point(s);
@@ -62,7 +62,7 @@ fn random_patches(s: &mut HashStream, count: u32) -> Shape {
 
 /// Two groups of everything, some of it cut out or hidden from some rays, in the root and in instances that may move.
 fn mixed_scene(seed: u32) -> Arc<GeometrySet> {
-    let mut s = HashStream::new([seed, 77, 0]);
+    let mut s = pcg32([seed, 77, 0]);
     let mut geometries = Vec::new();
     for k in 0..24_u32 {
         let shape = match k % 4 {
@@ -88,7 +88,7 @@ fn mixed_scene(seed: u32) -> Arc<GeometrySet> {
 }
 
 fn random_rays(count: usize, seed: u32) -> RayBatch {
-    let mut s = HashStream::new([seed, 5, 5]);
+    let mut s = pcg32([seed, 5, 5]);
     let mut rays = RayBatch::default();
     for k in 0..count {
         let o = random_point(&mut s) * 5.0;
@@ -97,8 +97,8 @@ fn random_rays(count: usize, seed: u32) -> RayBatch {
             // Rays along an axis.
             d = Vec3::ZERO.with_x(if k % 20 == 0 { 1.0 } else { -1.0 });
         }
-        let t_max = if k % 3 == 0 { s.next_f32() * 1.5 } else { f32::INFINITY };
-        rays.push(&Ray { o, d, t_max, time: s.next_f32() });
+        let t_max = if k % 3 == 0 { s.random::<f32>() * 1.5 } else { f32::INFINITY };
+        rays.push(&Ray { o, d, t_max, time: s.random::<f32>() });
     }
     rays
 }
@@ -194,7 +194,7 @@ fn answers_equal_brute_force_on_mixed_scenes() {
 
 #[test]
 fn answers_equal_brute_force_on_soups_of_any_size() {
-    let mut s = HashStream::new([1, 1, 1]);
+    let mut s = pcg32([1, 1, 1]);
     let mut shapes = vec![soup(&mut s, 3000, 0.1), soup(&mut s, 5, 3.0)];
     // Far from the origin, and flat in a coordinate plane.
     let Shape::Mesh(far) = soup(&mut s, 200, 0.5) else { unreachable!() };
@@ -216,7 +216,7 @@ fn answers_equal_brute_force_on_soups_of_any_size() {
 
 #[test]
 fn alpha_stops_rays_with_its_probability() {
-    let mut s = HashStream::new([2, 1, 1]);
+    let mut s = pcg32([2, 1, 1]);
     let square = |z: f32| {
         let p = [(-1.0, -1.0), (1.0, -1.0), (-1.0, 1.0), (1.0, 1.0)].map(|(x, y)| Vec3::new(x, y, z)).to_vec();
         let shape = Shape::Mesh(TriangleMesh::new(p, vec![[0, 1, 2], [1, 3, 2]]).unwrap());
@@ -242,7 +242,7 @@ fn alpha_stops_rays_with_its_probability() {
 
 #[test]
 fn equal_hits_go_to_the_smallest_ids() {
-    let mut s = HashStream::new([3, 1, 1]);
+    let mut s = pcg32([3, 1, 1]);
     let Shape::Mesh(mesh) = soup(&mut s, 60, 0.5) else { unreachable!() };
     let mut doubled = mesh.clone();
     doubled.indices.extend_from_within(..);
@@ -255,7 +255,7 @@ fn equal_hits_go_to_the_smallest_ids() {
 
 #[test]
 fn degenerate_geometry_and_rays_are_harmless() {
-    let mut s = HashStream::new([4, 1, 1]);
+    let mut s = pcg32([4, 1, 1]);
     let Shape::Mesh(mesh) = soup(&mut s, 400, 0.4) else { unreachable!() };
     let good = root_only(vec![Shape::Mesh(mesh.clone())]);
     // The same with bad triangles behind: NaN, infinite, collapsed to lines and points, all at one place.
@@ -295,7 +295,7 @@ fn empty_scenes_and_single_primitives_work() {
     let rays = random_rays(500, 3);
     let empty = Arc::new(GeometrySet::default());
     assert_eq!(assert_exact(&empty, None, &rays), (0, 0));
-    let mut s = HashStream::new([5, 1, 1]);
+    let mut s = pcg32([5, 1, 1]);
     for shape in [soup(&mut s, 1, 3.0), random_quadric(&mut s, 0), random_patches(&mut s, 1)] {
         assert_exact(&root_only(vec![shape]), None, &rays);
     }
@@ -306,7 +306,7 @@ fn empty_scenes_and_single_primitives_work() {
 
 #[test]
 fn the_tree_does_not_depend_on_the_number_of_threads() {
-    let mut s = HashStream::new([6, 1, 1]);
+    let mut s = pcg32([6, 1, 1]);
     let Shape::Mesh(mesh) = soup(&mut s, 150_000, 0.01) else { unreachable!() };
     let set = root_only(vec![Shape::Mesh(mesh), random_quadric(&mut s, 1)]);
     let build = |threads: usize| {
@@ -331,15 +331,15 @@ fn closed_mesh() -> TriangleMesh {
 #[test]
 fn rays_through_edges_and_vertices_of_a_closed_mesh_never_leak() {
     let mesh = closed_mesh();
-    let mut s = HashStream::new([7, 1, 1]);
+    let mut s = pcg32([7, 1, 1]);
     for (shift, scale) in [(Vec3::ZERO, 1.0), (Vec3::new(300.0, -20.0, 1e4), 1.0), (Vec3::splat(0.1), 1e-3)] {
         let place = |p: Vec3| p * scale + shift;
         let placed = mesh.positions().iter().map(|&p| place(p)).collect();
         let placed = TriangleMesh::new(placed, mesh.indices.clone()).unwrap();
         let mut rays = RayBatch::default();
         for k in 0..200_000 {
-            let [a, b, c] = placed.triangle((s.next_f32() * placed.triangle_count() as f32) as usize);
-            let u = s.next_f32();
+            let [a, b, c] = placed.triangle((s.random::<f32>() * placed.triangle_count() as f32) as usize);
+            let u = s.random::<f32>();
             let target = match k % 4 {
                 0 => a,
                 1 => a + (b - a) * u,

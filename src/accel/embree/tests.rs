@@ -3,9 +3,9 @@
 use super::*;
 use crate::accel::Bvh;
 use crate::geometry::{BilinearMesh, Geometry, Group, Instance, Quadric, QuadricKind, Shape, TriangleMesh, Visibility};
-use lumiris_numbers::math::hash::HashStream;
 use lumiris_numbers::math::ray::offset_origin;
 use lumiris_numbers::math::{Affine3A, Frame, Quat, Ray, Vec2, Vec3, warp};
+use lumiris_test_support::random::{Pcg32, RngExt, pcg32};
 
 use std::ffi::CStr;
 
@@ -25,8 +25,8 @@ impl AlphaSource for Stripes {
     }
 }
 
-fn random_point(s: &mut HashStream) -> Vec3 {
-    Vec3::new(s.next_f32(), s.next_f32(), s.next_f32()) * 2.0 - 1.0
+fn random_point(s: &mut Pcg32) -> Vec3 {
+    Vec3::new(s.random::<f32>(), s.random::<f32>(), s.random::<f32>()) * 2.0 - 1.0
 }
 
 fn opaque(shape: Shape) -> Geometry {
@@ -43,7 +43,7 @@ fn separate_triangles(corners: Vec<Vec3>) -> TriangleMesh {
     TriangleMesh::new(corners, (0..count).map(|i| [3 * i, 3 * i + 1, 3 * i + 2]).collect()).unwrap()
 }
 
-fn soup(s: &mut HashStream, triangles: u32, size: f32) -> TriangleMesh {
+fn soup(s: &mut Pcg32, triangles: u32, size: f32) -> TriangleMesh {
     let mut corners = Vec::new();
     for _ in 0..triangles {
         let center = random_point(s);
@@ -53,7 +53,7 @@ fn soup(s: &mut HashStream, triangles: u32, size: f32) -> TriangleMesh {
 }
 
 /// Triangles that lie on each other in a few planes, some of them along the axes.
-fn coplanar(s: &mut HashStream, triangles: u32) -> TriangleMesh {
+fn coplanar(s: &mut Pcg32, triangles: u32) -> TriangleMesh {
     let mut corners = Vec::new();
     for k in 0..triangles {
         let plane = (k % 8) as f32;
@@ -83,14 +83,14 @@ fn rippled_sphere(n: u32) -> TriangleMesh {
     TriangleMesh::new(positions, (0..n).flat_map(|j| (0..n).flat_map(move |i| quad(i, j))).collect()).unwrap()
 }
 
-fn random_placement(s: &mut HashStream) -> Affine3A {
-    let rotation = Quat::from_axis_angle(random_point(s).normalize_or(Vec3::X), s.next_f32() * 6.0);
+fn random_placement(s: &mut Pcg32) -> Affine3A {
+    let rotation = Quat::from_axis_angle(random_point(s).normalize_or(Vec3::X), s.random::<f32>() * 6.0);
     let scale = Vec3::splat(0.3) + random_point(s).abs() * 0.5;
     Affine3A::from_scale_rotation_translation(scale, rotation, random_point(s) * 2.0)
 }
 
-fn random_quadric(s: &mut HashStream, kind: u32) -> Shape {
-    let (radius, phi_max) = (0.3, 1.0 + 5.0 * s.next_f32());
+fn random_quadric(s: &mut Pcg32, kind: u32) -> Shape {
+    let (radius, phi_max) = (0.3, 1.0 + 5.0 * s.random::<f32>());
     let kind = match kind % 3 {
         0 => QuadricKind::Sphere { radius, z_min: -0.3, z_max: 0.2, phi_max },
         1 => QuadricKind::Disk { height: 0.1, radius, inner_radius: 0.05, phi_max },
@@ -101,7 +101,7 @@ fn random_quadric(s: &mut HashStream, kind: u32) -> Shape {
     Shape::Quadric(Quadric { kind, group_from_local, local_from_group, flip_normal: false })
 }
 
-fn random_patches(s: &mut HashStream, count: u32) -> Shape {
+fn random_patches(s: &mut Pcg32, count: u32) -> Shape {
     let mut positions = Vec::new();
     for _ in 0..count {
         let center = random_point(s);
@@ -113,7 +113,7 @@ fn random_patches(s: &mut HashStream, count: u32) -> Shape {
 
 /// All kinds of shapes, some cut out or hidden from some rays, in the root and in instances with up to `samples` times.
 fn mixed_scene(seed: u32, samples: usize) -> Arc<GeometrySet> {
-    let mut s = HashStream::new([seed, 77, 0]);
+    let mut s = pcg32([seed, 77, 0]);
     let mut geometries = Vec::new();
     for k in 0..24_u32 {
         let shape = match k % 4 {
@@ -139,7 +139,7 @@ fn mixed_scene(seed: u32, samples: usize) -> Arc<GeometrySet> {
 }
 
 fn random_rays(count: usize, seed: u32) -> RayBatch {
-    let mut s = HashStream::new([seed, 5, 5]);
+    let mut s = pcg32([seed, 5, 5]);
     let mut rays = RayBatch::default();
     for k in 0..count {
         let o = random_point(&mut s) * 3.0;
@@ -147,8 +147,8 @@ fn random_rays(count: usize, seed: u32) -> RayBatch {
         if k % 10 == 0 {
             d = Vec3::ZERO.with_x(if k % 20 == 0 { 1.0 } else { -1.0 });
         }
-        let t_max = if k % 3 == 0 { s.next_f32() * 1.5 } else { f32::INFINITY };
-        rays.push(&Ray { o, d, t_max, time: s.next_f32() });
+        let t_max = if k % 3 == 0 { s.random::<f32>() * 1.5 } else { f32::INFINITY };
+        rays.push(&Ray { o, d, t_max, time: s.random::<f32>() });
     }
     rays
 }
@@ -168,15 +168,15 @@ fn camera_rays(side: usize) -> RayBatch {
 
 /// Rays at edges (or vertices) of the mesh from a few points; 16 in a row start at one point.
 fn aimed_rays(mesh: &TriangleMesh, count: usize, seed: u32, vertices: bool) -> RayBatch {
-    let mut s = HashStream::new([seed, 6, 6]);
+    let mut s = pcg32([seed, 6, 6]);
     let (mut rays, mut o) = (RayBatch::default(), Vec3::ZERO);
     for k in 0..count {
         if k % 16 == 0 {
             o = random_point(&mut s) * 2.0 + Vec3::Z * 1.5;
         }
-        let triangle = (s.next_f32() * mesh.triangle_count() as f32) as usize % mesh.triangle_count();
+        let triangle = (s.random::<f32>() * mesh.triangle_count() as f32) as usize % mesh.triangle_count();
         let [a, b, _] = mesh.triangle(triangle);
-        let w = if vertices { 0.0 } else { s.next_f32() };
+        let w = if vertices { 0.0 } else { s.random::<f32>() };
         let d = (a + (b - a) * w - o).normalize();
         rays.push(&Ray { o, d, t_max: f32::INFINITY, time: 0.5 });
     }
@@ -185,12 +185,17 @@ fn aimed_rays(mesh: &TriangleMesh, count: usize, seed: u32, vertices: bool) -> R
 
 /// Rays almost along the planes z = const.
 fn grazing_rays(count: usize, seed: u32) -> RayBatch {
-    let mut s = HashStream::new([seed, 7, 7]);
+    let mut s = pcg32([seed, 7, 7]);
     let mut rays = RayBatch::default();
     for _ in 0..count {
-        let (sin, cos) = (s.next_f32() * std::f32::consts::TAU).sin_cos();
+        let (sin, cos) = (s.random::<f32>() * std::f32::consts::TAU).sin_cos();
         let o = random_point(&mut s) * Vec3::new(1.0, 1.0, 0.3);
-        rays.push(&Ray { o, d: Vec3::new(cos, sin, (s.next_f32() - 0.5) * 0.02), t_max: f32::INFINITY, time: 0.1 });
+        rays.push(&Ray {
+            o,
+            d: Vec3::new(cos, sin, (s.random::<f32>() - 0.5) * 0.02),
+            t_max: f32::INFINITY,
+            time: 0.1,
+        });
     }
     rays
 }
@@ -253,7 +258,7 @@ fn ray_kinds(mesh: &TriangleMesh, count: usize) -> Vec<RayBatch> {
 
 /// Asserts the same of many scenes, with `count` rays of each kind.
 fn assert_widths_agree_everywhere(count: usize, config: &CStr) {
-    let mut s = HashStream::new([1, 2, 3]);
+    let mut s = pcg32([1, 2, 3]);
     let meshes = [
         ("soup", soup(&mut s, 20_000, 0.1)),
         ("crossing triangles", soup(&mut s, 300, 1.5)),
@@ -318,7 +323,7 @@ fn reference_hit(ray: &Ray, [p0, p1, p2]: [Vec3; 3]) -> Option<[f64; 3]> {
 
 #[test]
 fn answers_agree_with_brute_force_in_f64() {
-    let mut s = HashStream::new([4, 0, 1]);
+    let mut s = pcg32([4, 0, 1]);
     let mesh = soup(&mut s, 300, 0.4);
     let set = only_root(vec![Shape::Mesh(mesh.clone())]);
     let accel = embree(&set, 8);
@@ -347,7 +352,7 @@ fn answers_agree_with_brute_force_in_f64() {
 
 #[test]
 fn rays_that_leave_a_surface_do_not_meet_it_again() {
-    let mut s = HashStream::new([12, 0, 0]);
+    let mut s = pcg32([12, 0, 0]);
     let mut tested = 0;
     for k in 0..60 {
         let (center, scale) = (random_point(&mut s) * 300.0, [0.01, 1.0, 50.0, 2000.0][k % 4]);
@@ -356,11 +361,11 @@ fn rays_that_leave_a_surface_do_not_meet_it_again() {
         let accel = embree(&set, 8);
         let mut rays = RayBatch::default();
         for _ in 0..20_000 {
-            let u = s.next_2d();
+            let u = s.random::<[f32; 2]>();
             let uv = if u[0] + u[1] > 1.0 { [1.0 - u[0], 1.0 - u[1]] } else { u };
             let hit = set.surface_hit(0, 0, Hit::NO_INSTANCE, uv, 0.0);
-            let side = if s.next_f32() < 0.5 { hit.n } else { -hit.n };
-            let d = Frame::from_z(side).to_world(warp::sample_cosine_hemisphere(s.next_2d()));
+            let side = if s.random::<f32>() < 0.5 { hit.n } else { -hit.n };
+            let d = Frame::from_z(side).to_world(warp::sample_cosine_hemisphere(s.random::<[f32; 2]>()));
             if hit.n.dot(d).abs() > 1e-4 {
                 rays.push(&Ray { o: offset_origin(hit.p, hit.p_error, hit.n, d), d, t_max: f32::INFINITY, time: 0.0 });
             }
@@ -490,7 +495,7 @@ fn a_panic_in_an_alpha_source_comes_out_of_the_query() {
 
 #[test]
 fn many_instances_build_fast_and_small() {
-    let mut s = HashStream::new([3, 3, 3]);
+    let mut s = pcg32([3, 3, 3]);
     let instances = (0..25_250).map(|_| Instance { group: 0, world_from_group: vec![random_placement(&mut s)] });
     let set = GeometrySet {
         geometries: vec![opaque(Shape::Mesh(rippled_sphere(122)))],

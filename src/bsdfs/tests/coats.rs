@@ -14,9 +14,9 @@ fn walk_moments(layered: &Layered, wo: Vec3, wi: Vec3, n: u32) -> Welford {
     // Means of 64 walks are nearly normal and cost one evaluation each.
     let batch = Layered { samples: 64, ..*layered };
     let mut w = Welford::new();
-    let mut s = HashStream::new([4, 4, 4]);
+    let mut s = pcg32([4, 4, 4]);
     for _ in 0..n / 64 {
-        let jitter = Vec3::new(s.next_f32() - 0.5, s.next_f32() - 0.5, s.next_f32() - 0.5) * 2e-6;
+        let jitter = Vec3::new(s.random::<f32>() - 0.5, s.random::<f32>() - 0.5, s.random::<f32>() - 0.5) * 2e-6;
         w.add(f64::from(batch.f(wo, wi + jitter).r));
     }
     w
@@ -62,10 +62,10 @@ fn the_closed_form_is_the_mean_of_the_walk() {
 
 /// The walk as light makes it: enters, has up to `max_depth` events in the layer, and leaves. The weight of the path,
 /// and where it left.
-fn analog_walk(l: &Layered, wo: Vec3, s: &mut HashStream) -> Option<(Vec3, Rgb, bool)> {
+fn analog_walk(l: &Layered, wo: Vec3, s: &mut Pcg32) -> Option<(Vec3, Rgb, bool)> {
     let weight = |x: &BsdfSample| x.f * (x.wi.z.abs() / x.pdf);
     let all = dielectric::Select::All;
-    let mut x = l.top.sample_select(wo, s.next_f32(), s.next_2d(), Transport::Radiance, all)?;
+    let mut x = l.top.sample_select(wo, s.random::<f32>(), s.random::<[f32; 2]>(), Transport::Radiance, all)?;
     let mut beta = weight(&x);
     let mut specular = x.lobe.is_specular();
     if !x.lobe.is_transmission() {
@@ -73,13 +73,13 @@ fn analog_walk(l: &Layered, wo: Vec3, s: &mut HashStream) -> Option<(Vec3, Rgb, 
     }
     let (mut w, mut z) = (x.wi, l.thickness);
     for _ in 0..=l.max_depth {
-        let free = if l.albedo.is_black() { f32::INFINITY } else { -(1.0 - s.next_f32()).ln() };
+        let free = if l.albedo.is_black() { f32::INFINITY } else { -(1.0 - s.random::<f32>()).ln() };
         let boundary = if w.z > 0.0 { l.thickness } else { 0.0 };
         let distance = (boundary - z) / w.z;
         if free < distance {
             z += free * w.z;
             // Henyey-Greenstein about the direction of travel, in its usual form.
-            let (g, u) = (l.g, s.next_2d());
+            let (g, u) = (l.g, s.random::<[f32; 2]>());
             let cos = (1.0 + g * g - sqr((1.0 - g * g) / (1.0 - g + 2.0 * g * u[0]))) / (2.0 * g);
             w = lumiris_numbers::math::Frame::from_z(w).to_world(warp::direction(cos, TAU * u[1]));
             beta *= l.albedo;
@@ -92,11 +92,11 @@ fn analog_walk(l: &Layered, wo: Vec3, s: &mut HashStream) -> Option<(Vec3, Rgb, 
         z = boundary;
         x = if z == 0.0 {
             match &l.base {
-                Base::Diffuse(b) => b.sample(-w, s.next_2d())?,
-                Base::Conductor(b) => b.sample(-w, s.next_2d())?,
+                Base::Diffuse(b) => b.sample(-w, s.random::<[f32; 2]>())?,
+                Base::Conductor(b) => b.sample(-w, s.random::<[f32; 2]>())?,
             }
         } else {
-            l.top.sample_select(-w, s.next_f32(), s.next_2d(), Transport::Radiance, all)?
+            l.top.sample_select(-w, s.random::<f32>(), s.random::<[f32; 2]>(), Transport::Radiance, all)?
         };
         beta *= weight(&x);
         specular &= x.lobe.is_specular();
@@ -117,7 +117,7 @@ fn albedos_of_the_closed_form_and_of_analog_walks_agree_to_half_a_percent() {
         let closed = CoatedDiffuse::new(&table, distribution, Rgb::splat(rho), 10);
         let walk = over_lambert(Dielectric { eta: 1.5, distribution }, rho, 10);
         for cos in [0.1, 0.5, 1.0] {
-            let (wo, mut s) = (warp::direction(cos, 0.5), HashStream::new([8, 8, 8]));
+            let (wo, mut s) = (warp::direction(cos, 0.5), pcg32([8, 8, 8]));
             let w: Welford = (0..400_000)
                 .map(|_| analog_walk(&walk, wo, &mut s).map_or(0.0, |(_, beta, _)| f64::from(beta.r)))
                 .collect();
@@ -142,7 +142,7 @@ fn layered_sampling_reproduces_the_analog_walk_in_three_bands() {
         for &wo in &wos {
             let band = |wi: Vec3, specular: bool| if specular { 3 } else { ((wi.z.abs() * 3.0) as usize).min(2) };
             let (mut a, mut b) = ([Welford::new(); 4], [Welford::new(); 4]);
-            let (mut s, mut t) = (HashStream::new([6, 1, 8]), HashStream::new([6, 2, 8]));
+            let (mut s, mut t) = (pcg32([6, 1, 8]), pcg32([6, 2, 8]));
             for _ in 0..300_000 {
                 let mut values = [0.0; 4];
                 if let Some((wi, beta, specular)) = analog_walk(l, wo.abs(), &mut s) {
@@ -150,7 +150,7 @@ fn layered_sampling_reproduces_the_analog_walk_in_three_bands() {
                 }
                 a.iter_mut().zip(values).for_each(|(w, v)| w.add(v));
                 let mut values = [0.0; 4];
-                if let Some(x) = l.sample(wo, t.next_f32(), t.next_2d()) {
+                if let Some(x) = l.sample(wo, t.random::<f32>(), t.random::<[f32; 2]>()) {
                     assert!(x.wi.z * wo.z > 0.0);
                     values[band(x.wi, x.lobe.is_specular())] = f64::from(x.f.g * x.wi.z.abs() / x.pdf);
                 }

@@ -55,9 +55,9 @@ fn expected(pdf: &dyn Fn(Vec3) -> f32) -> Vec<f64> {
 
 fn histogram(sample: &dyn Fn(f32, [f32; 2]) -> Option<BsdfSample>, seed: u32) -> Vec<f64> {
     let mut counts = vec![0.0; THETAS * PHIS + 1];
-    let mut s = HashStream::new([seed, 11, 22]);
+    let mut s = pcg32([seed, 11, 22]);
     for _ in 0..SAMPLES {
-        let bin = match sample(s.next_f32(), s.next_2d()) {
+        let bin = match sample(s.random::<f32>(), s.random::<[f32; 2]>()) {
             Some(x) if !x.lobe.is_specular() => {
                 let theta = f64::from(x.wi.truncate().length()).atan2(f64::from(x.wi.z));
                 let i = (theta / std::f64::consts::PI * THETAS as f64) as usize;
@@ -111,11 +111,12 @@ fn the_first_lobe_is_sampled_in_proportion_to_its_part_of_the_density() {
         for wo in [warp::direction(0.85, 0.6), warp::direction(-0.6, 4.0)] {
             let share = b.first_lobe(wo);
             assert!((0.0..=1.0).contains(&share), "{name}: {share}");
-            let mut stream = HashStream::new([i as u32, 3, 7]);
+            let mut stream = pcg32([i as u32, 3, 7]);
             let mut difference = lumiris_numbers::estimators::stats::Welford::new();
             for _ in 0..100_000 {
-                let uc = stream.next_f32();
-                let Some(s) = b.sample_direction(wo, uc, stream.next_2d()).filter(|s| !s.lobe.is_specular()) else {
+                let uc = stream.random::<f32>();
+                let Some(s) = b.sample_direction(wo, uc, stream.random::<[f32; 2]>()).filter(|s| !s.lobe.is_specular())
+                else {
                     continue;
                 };
                 let part = b.pdf_first_lobe(wo, s.wi, s.pdf);
@@ -157,10 +158,10 @@ fn wide_lobes_find_every_direction_of_their_side() {
                 continue;
             }
             tested += 1;
-            let mut stream = HashStream::new([i as u32, 9, 1]);
+            let mut stream = pcg32([i as u32, 9, 1]);
             let mut mean = lumiris_numbers::estimators::stats::Welford::new();
             for _ in 0..20_000 {
-                let sample = b.sample_direction(wo, stream.next_f32(), stream.next_2d());
+                let sample = b.sample_direction(wo, stream.random::<f32>(), stream.random::<[f32; 2]>());
                 let sample = sample.filter(|s| !s.lobe.is_specular() && s.wi.z * wo.z > 0.0);
                 let quotient = sample.map_or(0.0, |s| s.wi.z.abs() / s.pdf);
                 assert!(quotient <= 1.001 * TAU / wide, "{name}: {quotient}");

@@ -71,10 +71,13 @@ fn moments(bsdf: &Bsdf<'_>, wo: Vec3, proposals: u32, n: u32, seed: u32) -> [Wel
 
 #[test]
 fn models_are_reciprocal_and_one_sided() {
-    let mut s = HashStream::new([6, 1, 4]);
+    let mut s = pcg32([6, 1, 4]);
     for (name, model) in models() {
         for _ in 0..5000 {
-            let (wo, wi) = (warp::sample_uniform_sphere(s.next_2d()), warp::sample_uniform_sphere(s.next_2d()));
+            let (wo, wi) = (
+                warp::sample_uniform_sphere(s.random::<[f32; 2]>()),
+                warp::sample_uniform_sphere(s.random::<[f32; 2]>()),
+            );
             let (a, b) = (model.f(wo, wi), model.f(wi, wo));
             assert!((a.r - b.r).abs() <= 1e-4 * a.r.max(b.r) + 1e-6, "{name} {wo} {wi} {a:?} {b:?}");
             assert!(wo.z * wi.z > 0.0 || a.is_black(), "{name} {wo} {wi}");
@@ -169,9 +172,9 @@ fn resampling_is_unbiased_for_every_bsdf() {
                 | Bsdf::CoatedDiffuse(_)
                 | Bsdf::Layered(_) => {
                     let mut sums = [Welford::new(); 3];
-                    let mut s = HashStream::new([seed, 77, 3]);
+                    let mut s = pcg32([seed, 77, 3]);
                     for _ in 0..100_000 {
-                        let value = match bsdf.sample(wo, s.next_f32(), s.next_2d()) {
+                        let value = match bsdf.sample(wo, s.random::<f32>(), s.random::<[f32; 2]>()) {
                             Some(x) => x.f * light(x.wi) * (x.wi.z.abs() / x.pdf),
                             None => Rgb::BLACK,
                         };
@@ -201,10 +204,10 @@ fn resampling_is_unbiased_for_every_bsdf() {
 fn one_proposal_is_plain_importance_sampling() {
     let tables = tables();
     for (name, bsdf) in zoo(&tables) {
-        let mut s = HashStream::new([2, 7, 1]);
+        let mut s = pcg32([2, 7, 1]);
         for _ in 0..500 {
-            let wo = warp::sample_uniform_sphere(s.next_2d());
-            let (uc, u, choice) = (s.next_f32(), s.next_2d(), s.next_f32());
+            let wo = warp::sample_uniform_sphere(s.random::<[f32; 2]>());
+            let (uc, u, choice) = (s.random::<f32>(), s.random::<[f32; 2]>(), s.random::<f32>());
             let plain = bsdf.sample(wo, uc, u);
             let drawn = resample(&bsdf, wo, 1, |_| [uc, u[0], u[1]], choice);
             assert_eq!(plain.is_some(), drawn.is_some(), "{name} {wo}");
@@ -225,14 +228,14 @@ fn resampled_directions_follow_the_target_in_the_limit() {
     let expected = quadrature(&bsdf, wo, |wi| Rgb::splat(wi.x + 1.0))[0] / norm - 1.0;
     let mut mean = Welford::new();
     let mut proposals = Welford::new();
-    let mut s = HashStream::new([9, 9, 2]);
+    let mut s = pcg32([9, 9, 2]);
     for i in 0..4000 {
         let proposal = |j: u32| {
             let u = pcg4d([i, j, 3, 9]).map(unit_f32);
             [u[0], u[1], u[2]]
         };
-        mean.add(f64::from(resample(&bsdf, wo, 500, proposal, s.next_f32()).unwrap().wi.x));
-        if let Some(x) = bsdf.sample(wo, s.next_f32(), s.next_2d()) {
+        mean.add(f64::from(resample(&bsdf, wo, 500, proposal, s.random::<f32>()).unwrap().wi.x));
+        if let Some(x) = bsdf.sample(wo, s.random::<f32>(), s.random::<[f32; 2]>()) {
             proposals.add(f64::from(x.wi.x));
         }
     }

@@ -5,9 +5,9 @@ mod densities;
 mod evaluated;
 
 use super::*;
-use lumiris_numbers::math::hash::HashStream;
 use lumiris_numbers::math::{safe_sqrt, sqr, warp};
 use lumiris_test_support::Moments;
+use lumiris_test_support::random::{Pcg32, RngExt, pcg32};
 use std::f32::consts::{PI, TAU};
 use strum::IntoEnumIterator;
 
@@ -89,11 +89,11 @@ fn a_bsdf_is_small_enough_for_batches() {
 #[test]
 fn nothing_is_ever_nan_negative_or_infinite() {
     let tables = tables();
-    let mut s = HashStream::new([7, 7, 7]);
+    let mut s = pcg32([7, 7, 7]);
     for (name, b) in zoo(&tables) {
         for i in 0..20_000 {
             let mut direction = || {
-                let w = warp::sample_uniform_sphere(s.next_2d());
+                let w = warp::sample_uniform_sphere(s.random::<[f32; 2]>());
                 // Every third direction grazes, down to denormal cosines, and some lie on an axis or in the plane.
                 let z = match i % 6 {
                     0 => w.z * 10.0_f32.powi(-(1 + (i / 6) % 44)),
@@ -107,14 +107,15 @@ fn nothing_is_ever_nan_negative_or_infinite() {
             let (f, pdf) = (b.f(wo, wi), b.pdf(wo, wi));
             assert!(f.is_finite() && f.to_array().iter().all(|&c| c >= 0.0), "{name} {wo} {wi} {f:?}");
             assert!(pdf.is_finite() && pdf >= 0.0, "{name} {wo} {wi} {pdf}");
-            let sample = b.sample(wo, s.next_f32(), if i % 3 == 0 { [0.0, 1.0 - 6e-8] } else { s.next_2d() });
+            let sample =
+                b.sample(wo, s.random::<f32>(), if i % 3 == 0 { [0.0, 1.0 - 6e-8] } else { s.random::<[f32; 2]>() });
             if let Some(x) = sample {
                 assert!(x.pdf > 0.0 && x.pdf.is_finite() && x.f.is_finite(), "{name} {wo} {x:?}");
                 assert!((x.wi.length() - 1.0).abs() < 1e-4 && x.wi.z != 0.0, "{name} {wo} {x:?}");
                 assert_eq!(x.lobe.is_transmission(), x.wi.z * wo.z < 0.0, "{name} {wo} {x:?}");
             }
-            let u = s.next_2d();
-            assert!(b.albedo_estimate(wo, || [s.next_f32(), u[0], u[1]]).is_finite());
+            let u = s.random::<[f32; 2]>();
+            assert!(b.albedo_estimate(wo, || [s.random::<f32>(), u[0], u[1]]).is_finite());
         }
     }
 }
@@ -122,7 +123,7 @@ fn nothing_is_ever_nan_negative_or_infinite() {
 #[test]
 fn albedo_estimates_average_to_the_integral_of_f_times_the_cosine() {
     let tables = tables();
-    let mut s = HashStream::new([4, 8, 15]);
+    let mut s = pcg32([4, 8, 15]);
     // Wide lobes only, which directions that are uniform on the sphere meet often
     let wide = ["gold 0.4 0.1", "glass 0.3", "glass 0.6 0.2", "layered 5"];
     let is_wide = |name: &str| wide.contains(&name) || name.starts_with("evaluated");
@@ -133,8 +134,8 @@ fn albedo_estimates_average_to_the_integral_of_f_times_the_cosine() {
             // The difference of two estimates with independent numbers has the mean 0.
             let mut difference = Moments::default();
             for _ in 0..60_000 {
-                let (u, v) = (s.next_2d(), s.next_2d());
-                let estimate = b.albedo_estimate(wo, || [s.next_f32(), u[0], u[1]]).g;
+                let (u, v) = (s.random::<[f32; 2]>(), s.random::<[f32; 2]>());
+                let estimate = b.albedo_estimate(wo, || [s.random::<f32>(), u[0], u[1]]).g;
                 let wi = warp::sample_uniform_sphere(v);
                 difference.add(f64::from(estimate - b.f(wo, wi).g * wi.z.abs() * 2.0 * TAU));
             }
@@ -146,13 +147,16 @@ fn albedo_estimates_average_to_the_integral_of_f_times_the_cosine() {
 #[test]
 fn scattering_is_reciprocal() {
     let tables = tables();
-    let mut s = HashStream::new([1, 7, 9]);
+    let mut s = pcg32([1, 7, 9]);
     for (name, b) in zoo(&tables) {
         if matches!(b, Bsdf::Layered(_)) {
             continue; // Noisy; its mean is compared with analog walks instead.
         }
         for _ in 0..2000 {
-            let (wo, wi) = (warp::sample_uniform_sphere(s.next_2d()), warp::sample_uniform_sphere(s.next_2d()));
+            let (wo, wi) = (
+                warp::sample_uniform_sphere(s.random::<[f32; 2]>()),
+                warp::sample_uniform_sphere(s.random::<[f32; 2]>()),
+            );
             if wo.z.abs().min(wi.z.abs()) < 0.05 {
                 continue;
             }
@@ -173,10 +177,10 @@ fn no_bsdf_creates_energy() {
     for (name, b) in zoo(&tables) {
         for cos in [0.02, 0.3, 0.7, 1.0, -0.1, -0.9] {
             let wo = warp::direction(cos, 0.4);
-            let (mut s, mut sum) = (HashStream::new([3, 2, 1]), 0.0_f64);
+            let (mut s, mut sum) = (pcg32([3, 2, 1]), 0.0_f64);
             let n = 40_000;
             for _ in 0..n {
-                if let Some(x) = b.sample(wo, s.next_f32(), s.next_2d()) {
+                if let Some(x) = b.sample(wo, s.random::<f32>(), s.random::<[f32; 2]>()) {
                     // Radiance that is transmitted is scaled by the square of the index.
                     sum += f64::from(x.f.max_component() * x.wi.z.abs() / x.pdf * sqr(x.eta));
                 }
@@ -190,10 +194,10 @@ fn no_bsdf_creates_energy() {
 fn samples_agree_with_f_and_pdf() {
     let tables = tables();
     for (name, b) in zoo(&tables) {
-        let mut s = HashStream::new([3, 2, 5]);
+        let mut s = pcg32([3, 2, 5]);
         for _ in 0..20_000 {
-            let wo = warp::direction(s.next_f32() * 1.9 - 0.95, TAU * s.next_f32());
-            let Some(x) = b.sample(wo, s.next_f32(), s.next_2d()) else { continue };
+            let wo = warp::direction(s.random::<f32>() * 1.9 - 0.95, TAU * s.random::<f32>());
+            let Some(x) = b.sample(wo, s.random::<f32>(), s.random::<[f32; 2]>()) else { continue };
             if x.lobe.is_specular() {
                 assert!(b.has_specular(), "{name}");
                 continue;
@@ -211,9 +215,9 @@ fn samples_agree_with_f_and_pdf() {
 fn furnaces_have_their_known_albedo() {
     let up = warp::direction(0.6, 1.0);
     let mean = |b: &Bsdf<'_>, wo: Vec3| {
-        let (mut s, mut sum) = (HashStream::new([5, 5, 5]), 0.0_f64);
+        let (mut s, mut sum) = (pcg32([5, 5, 5]), 0.0_f64);
         for _ in 0..200_000 {
-            if let Some(x) = b.sample(wo, s.next_f32(), s.next_2d()) {
+            if let Some(x) = b.sample(wo, s.random::<f32>(), s.random::<[f32; 2]>()) {
                 sum += f64::from(x.f.g * x.wi.z.abs() / x.pdf * sqr(x.eta));
             }
         }

@@ -129,8 +129,8 @@ fn limit_gradients(light: &mut Irradiance, reach: f32, error: f32) {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use lumiris_numbers::math::hash::HashStream;
     use lumiris_numbers::math::warp::sample_uniform_sphere;
+    use lumiris_test_support::random::{RngExt, pcg32};
 
     fn unit_box() -> Bounds3 {
         Bounds3 { min: Vec3::ZERO, max: Vec3::ONE }
@@ -145,11 +145,11 @@ mod tests {
     fn radii_obey_the_triangle_inequality() {
         let settings = IrradianceCacheSettings { radius: [0.0, 1000.0], ..Default::default() };
         let mut cache = IrradianceCache::new(settings, &unit_box());
-        let mut s = HashStream::new([5, 6, 7]);
+        let mut s = pcg32([5, 6, 7]);
         let mut asked = Vec::new();
         for _ in 0..400 {
-            let p = Vec3::new(s.next_f32(), s.next_f32(), 0.1 * s.next_f32());
-            let radius = if s.next_f32() < 0.05 { 0.01 } else { 2.0 * s.next_f32() };
+            let p = Vec3::new(s.random::<f32>(), s.random::<f32>(), 0.1 * s.random::<f32>());
+            let radius = if s.random::<f32>() < 0.05 { 0.01 } else { 2.0 * s.random::<f32>() };
             asked.push(radius);
             cache.insert(record(p, radius, 1.0));
         }
@@ -171,15 +171,15 @@ mod tests {
     #[test]
     fn interpolation_is_what_a_search_of_all_records_gives() {
         let mut cache = IrradianceCache::new(IrradianceCacheSettings::default(), &unit_box());
-        let mut s = HashStream::new([9, 6, 7]);
+        let mut s = pcg32([9, 6, 7]);
         for _ in 0..300 {
-            let n = (Vec3::Z + sample_uniform_sphere(s.next_2d()) * 0.1).normalize();
-            let p = Vec3::new(s.next_f32(), s.next_f32(), 0.0);
-            cache.insert(Record { n, ..record(p, s.next_f32(), s.next_f32()) });
+            let n = (Vec3::Z + sample_uniform_sphere(s.random::<[f32; 2]>()) * 0.1).normalize();
+            let p = Vec3::new(s.random::<f32>(), s.random::<f32>(), 0.0);
+            cache.insert(Record { n, ..record(p, s.random::<f32>(), s.random::<f32>()) });
         }
         let mut found = 0;
         for _ in 0..1000 {
-            let (x, n) = (Vec3::new(s.next_f32(), s.next_f32(), 0.0), Vec3::Z);
+            let (x, n) = (Vec3::new(s.random::<f32>(), s.random::<f32>(), 0.0), Vec3::Z);
             let (mut sum, mut weights) = (0.0_f64, 0.0_f64);
             for r in cache.records() {
                 let reach = r.reach(cache.settings());

@@ -146,24 +146,24 @@ impl Octree {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use lumiris_numbers::math::hash::HashStream;
+    use lumiris_test_support::random::{Pcg32, RngExt, pcg32};
 
-    fn random_point(s: &mut HashStream) -> Vec3 {
+    fn random_point(s: &mut Pcg32) -> Vec3 {
         // Some outside of the box
-        Vec3::new(s.next_f32(), s.next_f32(), s.next_f32()) * 3.0 - 1.5
+        Vec3::new(s.random::<f32>(), s.random::<f32>(), s.random::<f32>()) * 3.0 - 1.5
     }
 
     #[test]
     fn queries_find_every_ball() {
-        let mut s = HashStream::new([3, 1, 4]);
+        let mut s = pcg32([3, 1, 4]);
         let mut tree = Octree::new(&Bounds3 { min: Vec3::splat(-1.0), max: Vec3::splat(1.0) });
         let balls: Vec<(Vec3, f32)> =
-            (0..500).map(|_| (random_point(&mut s), 0.5 * s.next_f32().powi(4) + 1e-9)).collect();
+            (0..500).map(|_| (random_point(&mut s), 0.5 * s.random::<f32>().powi(4) + 1e-9)).collect();
         for (i, &(p, r)) in balls.iter().enumerate() {
             tree.insert(i as u32, p, r);
         }
         for _ in 0..500 {
-            let (p, radius) = (random_point(&mut s), 0.3 * s.next_f32());
+            let (p, radius) = (random_point(&mut s), 0.3 * s.random::<f32>());
             let mut at = Vec::new();
             tree.at_point(p, |id| at.push(id));
             let mut near = Vec::new();

@@ -133,7 +133,7 @@ fn quadratic_roots(a: f64, b: f64, c: f64) -> [f64; 2] {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use lumiris_numbers::math::hash::HashStream;
+    use lumiris_test_support::random::{RngExt, pcg32};
 
     #[test]
     fn points_invert_to_their_parameters() {
@@ -144,11 +144,11 @@ mod tests {
             [v(5.0, 0.0, 0.0), v(6.0, 0.0, 0.0), v(5.3, 1.0, 0.0), v(6.3, 1.0, 0.0)],
             [v(0.0, 0.0, 0.0), v(1.0, 0.0, 0.0), v(0.3, 1.0, 0.0), v(0.6, 1.0, 0.0)],
         ];
-        let mut stream = HashStream::new([8, 8, 8]);
+        let mut stream = pcg32([8, 8, 8]);
         for corners in patches {
             let patch = PatchLight::new(corners, false, [Vec2::ZERO; 4]);
             for _ in 0..1000 {
-                let [a, b] = stream.next_2d();
+                let [a, b] = stream.random::<[f32; 2]>();
                 let uv = patch.invert(patch.point(a, b));
                 assert!((uv - Vec2::new(a, b)).length() < 1e-4, "{corners:?} {a} {b} {uv}");
             }

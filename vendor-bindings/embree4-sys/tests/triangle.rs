@@ -92,8 +92,10 @@ fn a_ray_through_the_triangle_hits_it() {
     assert_eq!(found.hit.geomID, 0);
     assert_eq!(found.hit.primID, 0);
     assert_eq!(found.hit.instID, [RTC_INVALID_GEOMETRY_ID]);
-    assert_eq!(found.ray.tfar, 1.0);
-    assert_eq!((found.hit.u, found.hit.v), (0.25, 0.5));
+    // Embree divides by a reciprocal whose last bit is the processor's own.
+    for (value, expected) in [(found.ray.tfar, 1.0), (found.hit.u, 0.25), (found.hit.v, 0.5)] {
+        assert!((value - expected).abs() <= 2.0 * f32::EPSILON * expected, "{value} {expected}");
+    }
     assert_eq!((found.hit.Ng_x, found.hit.Ng_y, found.hit.Ng_z), (0.0, 0.0, 1.0));
 }
 

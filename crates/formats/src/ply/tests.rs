@@ -1,7 +1,7 @@
 use super::*;
 use flate2::{Compression, write::GzEncoder};
 use header::Scalar::{self, *};
-use lumiris_numbers::math::hash::HashStream;
+use lumiris_test_support::random::{Pcg32, RngExt, pcg32};
 use std::io::Write as _;
 
 const FORMATS: [&str; 3] = ["ascii", "binary_little_endian", "binary_big_endian"];
@@ -122,8 +122,8 @@ fn replaced(from: &str, to: &str) -> Vec<u8> {
     text.replace(from, to).into_bytes()
 }
 
-fn below(hash: &mut HashStream, count: usize) -> usize {
-    (f64::from(hash.next_f32()) * count as f64) as usize
+fn below(random: &mut Pcg32, count: usize) -> usize {
+    random.random_range(0..count)
 }
 
 fn compressed(bytes: &[u8]) -> Vec<u8> {
@@ -311,10 +311,10 @@ fn strips_keep_their_orientation_and_restart() {
 
 #[test]
 fn blocks_of_triangles_and_other_faces_mix_in_any_way() {
-    let mut hash = HashStream::new([7, 0, 0]);
+    let mut random = pcg32([7, 0, 0]);
     for format in FORMATS {
         let kinds: Vec<usize> =
-            (0..60_000).map(|i| if i % 20_000 < 15_000 { 3 } else { below(&mut hash, 6) }).collect();
+            (0..60_000).map(|i| if i % 20_000 < 15_000 { 3 } else { below(&mut random, 6) }).collect();
         let head = format!("element face {}\nproperty list uchar uint vertex_indices\nproperty uchar tag", kinds.len());
         let bytes = with_faces(format, &head, |w| {
             for (i, &kind) in kinds.iter().enumerate() {
@@ -549,12 +549,12 @@ fn damaged_files_never_panic() {
     });
     let mut samples: Vec<Vec<u8>> = FORMATS.map(sample).into();
     samples.extend([compressed(&sample("binary_little_endian")), compressed(&sample("ascii")), strips]);
-    let mut hash = HashStream::new([20, 0, 0]);
+    let mut random = pcg32([20, 0, 0]);
     let mut accepted = 0;
     for round in 0..24_000 {
         let mut bytes = samples[round % samples.len()].clone();
-        for _ in 0..=below(&mut hash, 4) {
-            let bit = below(&mut hash, 8 * bytes.len());
+        for _ in 0..=below(&mut random, 4) {
+            let bit = below(&mut random, 8 * bytes.len());
             bytes[bit / 8] ^= 1 << (bit % 8);
         }
         if let Ok(mesh) = parse_ply(&bytes) {

@@ -75,14 +75,14 @@ pub fn smoothstep(a: f32, b: f32, x: f32) -> f32 {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use lumiris_numbers::math::hash::HashStream;
+    use lumiris_test_support::random::{RngExt, pcg32};
 
     #[test]
     fn noise_is_bounded_continuous_and_of_mean_zero() {
-        let mut stream = HashStream::new([4, 5, 6]);
+        let mut stream = pcg32([4, 5, 6]);
         let (mut sum, mut squares) = (0.0, 0.0);
         for _ in 0..20_000 {
-            let p = Vec3::new(stream.next_f32(), stream.next_f32(), stream.next_f32()) * 60.0 - 30.0;
+            let p = Vec3::new(stream.random::<f32>(), stream.random::<f32>(), stream.random::<f32>()) * 60.0 - 30.0;
             let n = noise(p, 7);
             assert!(n.abs() <= 1.0 && ridged(p, 4, 1).abs() <= 1.0 && fractal(p, 4, 1).abs() <= 1.0);
             assert!((noise(p + Vec3::splat(1e-4), 7) - n).abs() < 2e-3);

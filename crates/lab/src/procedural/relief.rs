@@ -251,7 +251,7 @@ fn shaft(spot: &Spot) -> f32 {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use lumiris_numbers::math::hash::HashStream;
+    use lumiris_test_support::random::{RngExt, pcg32};
 
     #[test]
     fn carvings_keep_their_bounds_and_have_no_seam() {
@@ -264,12 +264,12 @@ mod tests {
             Relief::Shaft,
             Relief::Rock { height: 0.05 },
         ];
-        let mut stream = HashStream::new([1, 2, 3]);
+        let mut stream = pcg32([1, 2, 3]);
         for relief in all {
             let (mut low, mut high) = (f32::INFINITY, f32::NEG_INFINITY);
             for _ in 0..1500 {
-                let [z, u] = stream.next_2d();
-                let p = Vec3::new(stream.next_f32(), stream.next_f32(), z);
+                let [z, u] = stream.random::<[f32; 2]>();
+                let p = Vec3::new(stream.random::<f32>(), stream.random::<f32>(), z);
                 let spot = Spot { p, angle: TAU * u - PI, along: z, radius: 0.7 };
                 let h = relief.height(&spot);
                 assert!(h.abs() <= relief.amplitude(), "{relief:?} {h}");

@@ -130,7 +130,7 @@ impl Field for StatueField {
 mod tests {
     use super::super::nets::tests::assert_closed;
     use super::*;
-    use lumiris_numbers::math::hash::HashStream;
+    use lumiris_test_support::random::{RngExt, pcg32};
 
     fn small(threads: usize) -> TriangleMesh {
         let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build().unwrap();
@@ -167,9 +167,9 @@ mod tests {
     fn what_a_ball_leaves_out_changes_no_bit_and_its_sign_is_right() {
         let field = StatueField { parts: dragon::parts() };
         let everything = field.near(None, Ball { center: Vec3::ZERO, radius: 100.0 });
-        let mut stream = HashStream::new([8, 1, 5]);
+        let mut stream = pcg32([8, 1, 5]);
         let mut random = |low: Vec3, high: Vec3| {
-            low + (high - low) * Vec3::new(stream.next_f32(), stream.next_f32(), stream.next_f32())
+            low + (high - low) * Vec3::new(stream.random::<f32>(), stream.random::<f32>(), stream.random::<f32>())
         };
         let mut signs = [0; 3];
         for i in 0..1200 {

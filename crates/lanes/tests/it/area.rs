@@ -4,8 +4,8 @@ use super::support::{LENGTHS, assert_same_bits};
 use fearless_simd::{Simd, dispatch, f64x4, prelude::*};
 use lumiris_lanes::LightLanes;
 use lumiris_lanes::area::*;
-use lumiris_numbers::math::hash::HashStream;
 use lumiris_numbers::math::{Vec2, Vec3};
+use lumiris_test_support::random::{RngExt, pcg32};
 use std::f64::consts::TAU;
 
 #[test]
@@ -24,7 +24,7 @@ fn lanes_are_the_same_at_all_levels() {
         let sin2_max = one_minus_cos * (2.0 - one_minus_cos);
         Surface::Cone { center: axis * 2.0, radius: 0.5, axis, one_minus_cos, sin2_max, reversed: false }
     };
-    let mut stream = HashStream::new([4, 4, 4]);
+    let mut stream = pcg32([4, 4, 4]);
     for surface in [
         Surface::SphericalRectangle(rectangle, spherical),
         Surface::Rectangle(rectangle),
@@ -34,7 +34,8 @@ fn lanes_are_the_same_at_all_levels() {
     ] {
         let sampler = AreaSampler { from: Vec3::ZERO, surface, l: [1.0, 2.0, 3.0], two_sided: false };
         for n in LENGTHS {
-            let (u0, u1): (Vec<f32>, Vec<f32>) = (0..n).map(|_| (stream.next_f32(), stream.next_f32())).unzip();
+            let (u0, u1): (Vec<f32>, Vec<f32>) =
+                (0..n).map(|_| (stream.random::<f32>(), stream.random::<f32>())).unzip();
             assert_same_bits::<7>(n, |level, [x, y, z, r, g, b, pdf]| {
                 sampler.sample(level, [&u0, &u1], &mut LightLanes { wi: [x, y, z], li: [r, g, b], pdf });
                 assert!(pdf.iter().all(|&p| p >= 0.0 && p.is_finite()));

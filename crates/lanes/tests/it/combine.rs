@@ -4,13 +4,13 @@ use super::support::{LENGTHS, assert_same_bits, levels};
 use lumiris_lanes::combine::*;
 use lumiris_numbers::estimators::mis::{Heuristic, Technique};
 use lumiris_numbers::math::Rgb;
-use lumiris_numbers::math::hash::HashStream;
+use lumiris_test_support::random::{Pcg32, RngExt, pcg32};
 
-fn numbers(stream: &mut HashStream, n: usize) -> Vec<f32> {
+fn numbers(stream: &mut Pcg32, n: usize) -> Vec<f32> {
     let special = [0.0, f32::INFINITY, f32::NAN, -1.0, 1e-38, 3e38];
     (0..n)
         .map(|_| {
-            let [a, b] = stream.next_2d();
+            let [a, b] = stream.random::<[f32; 2]>();
             if a < 0.2 { special[(b * 6.0) as usize] } else { b * 10.0 }
         })
         .collect()
@@ -18,7 +18,7 @@ fn numbers(stream: &mut HashStream, n: usize) -> Vec<f32> {
 
 #[test]
 fn weights_are_those_of_single_samples_to_the_bit_at_all_levels() {
-    let mut stream = HashStream::new([5, 6, 7]);
+    let mut stream = pcg32([5, 6, 7]);
     for heuristic in [Heuristic::Balance, Heuristic::Power, Heuristic::Maximum] {
         for n in LENGTHS {
             let v: [Vec<f32>; 8] = std::array::from_fn(|_| numbers(&mut stream, n));

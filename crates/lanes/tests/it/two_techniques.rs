@@ -4,8 +4,8 @@ use lumiris_lanes::combine;
 use lumiris_numbers::estimators::mis::Heuristic;
 use lumiris_numbers::estimators::ris::systematic;
 use lumiris_numbers::estimators::stats::{Welford, sidak, z_test};
-use lumiris_numbers::math::hash::HashStream;
 use lumiris_test_support::integrals::{Integral, run};
+use lumiris_test_support::random::{Pcg32, RngExt};
 
 const RUNS: usize = 500_000;
 const HEURISTICS: [Heuristic; 3] = [Heuristic::Balance, Heuristic::Power, Heuristic::Maximum];
@@ -43,12 +43,12 @@ struct Table {
 
 impl Table {
     /// Draws the proposals of both techniques.
-    fn draw(&mut self, stream: &mut HashStream) {
+    fn draw(&mut self, stream: &mut Pcg32) {
         self.x.clear();
         self.colour.iter_mut().chain(&mut self.p).for_each(Vec::clear);
         for (i, &m) in NUMBERS.iter().enumerate() {
             for _ in 0..m {
-                let x = sample(i, f64::from(stream.next_f32()));
+                let x = sample(i, f64::from(stream.random::<f32>()));
                 self.x.push(x);
                 self.colour.iter_mut().zip(LINE.colour(x)).for_each(|(column, c)| column.push(c as f32));
                 self.p.iter_mut().zip(densities(x)).for_each(|(column, p)| column.push(p));
@@ -87,7 +87,7 @@ fn estimates(heuristic: Heuristic, key: u32, m: [f32; 2]) -> [Welford; 3] {
     run(RUNS, [key, heuristic as u32, 0], |stream| {
         table.draw(stream);
         table.weigh(heuristic, m);
-        systematic(&table.weight, 2, stream.next_f32(), &mut draws);
+        systematic(&table.weight, 2, stream.random::<f32>(), &mut draws);
         let mut sum = [0.0; 3];
         for draw in &draws {
             let i = draw.index as usize;

@@ -65,12 +65,12 @@ pub fn crossfit(halves: [&[f32; SUMS]; 2]) -> [f32; 3] {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::math::hash::HashStream;
+    use lumiris_test_support::random::{RngExt, pcg32};
 
     fn filled(n: usize, channel: impl Fn(f32) -> [f32; 3]) -> [f32; SUMS] {
-        let (mut sums, mut stream) = ([0.0; SUMS], HashStream::new([3, 2, 1]));
+        let (mut sums, mut stream) = ([0.0; SUMS], pcg32([3, 2, 1]));
         for _ in 0..n {
-            let c = stream.next_f32() - 0.5;
+            let c = stream.random::<f32>() - 0.5;
             add(&mut sums, [c, 2.0 * c, 0.0], channel(c));
         }
         sums

@@ -92,15 +92,15 @@ pub fn direct(equations: NormalEquations, sums: &[f32], integrals: &[f32]) -> Ou
 mod tests {
     use super::*;
     use crate::estimators::ocv::{Form, System};
-    use crate::math::hash::HashStream;
+    use lumiris_test_support::random::{RngExt, pcg32};
 
     /// Sums of r_j of samples of three techniques, where Σ r_j/3 = 1.
     fn sums(n: usize) -> (NormalEquations, Vec<f32>) {
         let equations = NormalEquations::new(3);
-        let (mut sums, mut stream) = (vec![0.0; equations.len()], HashStream::new([1, 5, 9]));
+        let (mut sums, mut stream) = (vec![0.0; equations.len()], pcg32([1, 5, 9]));
         for _ in 0..n {
-            let [a, b] = stream.next_2d();
-            let y = [a * a, 1.0 + b, a * b + stream.next_f32()];
+            let [a, b] = stream.random::<[f32; 2]>();
+            let y = [a * a, 1.0 + b, a * b + stream.random::<f32>()];
             equations.add_sparse(&mut sums, &[(0, a), (1, b), (2, 3.0 - a - b)], y);
         }
         (equations, sums)
@@ -132,9 +132,9 @@ mod tests {
     fn techniques_that_are_alike_are_counted_and_those_that_are_not_there_are_not() {
         let equations = NormalEquations::new(3);
         let ill_conditioned = |third: fn(f32) -> f32| {
-            let (mut sums, mut stream) = (vec![0.0; equations.len()], HashStream::new([1, 5, 9]));
+            let (mut sums, mut stream) = (vec![0.0; equations.len()], pcg32([1, 5, 9]));
             for _ in 0..40 {
-                let u = stream.next_f32();
+                let u = stream.random::<f32>();
                 equations.add_sparse(&mut sums, &[(0, u), (1, 2.0 - u), (2, third(u))], [1.0 + u, u, 1.0]);
             }
             let outcome = direct(equations, &sums, &[1.0; 3]);

@@ -104,8 +104,8 @@ impl AliasTable {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::math::hash::HashStream;
     use lumiris_test_support::assert_chi_squared;
+    use lumiris_test_support::random::{RngExt, pcg32};
 
     #[test]
     fn frequencies_follow_the_weights_and_remapped_numbers_are_uniform() {
@@ -114,11 +114,11 @@ mod tests {
         for (case, weights) in cases.into_iter().enumerate() {
             let table = AliasTable::new(weights);
             let total: f64 = weights.iter().map(|&w| f64::from(w)).sum();
-            let mut stream = HashStream::new([7, case as u32, 0]);
+            let mut stream = pcg32([7, case as u32, 0]);
             let count = 200_000;
             let mut observed = vec![0.0; weights.len() * 8];
             for _ in 0..count {
-                let s = table.sample(stream.next_f32()).unwrap();
+                let s = table.sample(stream.random::<f32>()).unwrap();
                 assert_eq!(s.pmf, table.pmf(s.index));
                 assert!(s.pmf > 0.0 && (0.0..1.0).contains(&s.u));
                 observed[s.index * 8 + (s.u * 8.0) as usize] += 1.0;

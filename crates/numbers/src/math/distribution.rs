@@ -337,8 +337,8 @@ impl PiecewiseConstant2D {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::math::hash::HashStream;
     use lumiris_test_support::assert_chi_squared;
+    use lumiris_test_support::random::{RngExt, pcg32};
 
     #[test]
     fn samples_in_1d_follow_the_density_and_invert() {
@@ -346,9 +346,9 @@ mod tests {
         let d = PiecewiseConstant1D::new(&values);
         assert!((d.integral() - 8.5 / 7.0).abs() < 1e-6);
         let mut observed = vec![0.0; 70];
-        let mut stream = HashStream::new([1, 5, 0]);
+        let mut stream = pcg32([1, 5, 0]);
         for _ in 0..100_000 {
-            let u = stream.next_f32();
+            let u = stream.random::<f32>();
             let s = d.sample(u).unwrap();
             assert_eq!(s.pdf, d.pdf(s.x));
             assert!(s.pdf > 0.0 && (d.invert(s.x).unwrap() - u).abs() < 2e-6);
@@ -363,9 +363,9 @@ mod tests {
         let values = [0.0, 1.0, 2.0, 0.0, 0.0, 0.0, 4.0, 0.0, 0.5, 0.0, 0.0, 0.0];
         let d = PiecewiseConstant2D::new(&values, 3);
         let mut observed = vec![0.0; 12];
-        let mut stream = HashStream::new([2, 5, 0]);
+        let mut stream = pcg32([2, 5, 0]);
         for _ in 0..100_000 {
-            let u = stream.next_2d();
+            let u = stream.random::<[f32; 2]>();
             let s = d.sample(u).unwrap();
             assert_eq!(s.pdf, d.pdf(s.p));
             let v = d.invert(s.p).unwrap();

@@ -46,8 +46,8 @@ pub fn unpack_unit(bits: u32) -> Vec3 {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::math::hash::HashStream;
     use crate::math::warp::sample_uniform_sphere;
+    use lumiris_test_support::random::{RngExt, pcg32};
 
     #[test]
     fn axes_come_back_as_they_were() {
@@ -58,11 +58,11 @@ mod tests {
 
     #[test]
     fn the_error_is_bounded_and_without_drift() {
-        let mut stream = HashStream::new([2, 8, 0]);
+        let mut stream = pcg32([2, 8, 0]);
         let (mut worst, mut drift) = (0.0_f32, glam::DVec3::ZERO);
         let count = 200_000;
         for i in 0..count {
-            let mut v = sample_uniform_sphere(stream.next_2d());
+            let mut v = sample_uniform_sphere(stream.random::<[f32; 2]>());
             if i % 4 == 0 {
                 v.z *= 1e-4;
                 v = v.normalize();

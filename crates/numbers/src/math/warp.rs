@@ -176,6 +176,7 @@ pub fn azimuth(w: Vec3) -> f32 {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use lumiris_test_support::random::{RngExt, pcg32};
 
     fn grid() -> impl Iterator<Item = [f32; 2]> {
         (0..17).flat_map(|i| (0..17).map(move |j| [(i as f32 + 0.43) / 17.0, (j as f32 + 0.71) / 17.0]))
@@ -207,8 +208,8 @@ mod tests {
 
     /// Uniform numbers, two at a time.
     fn numbers() -> impl Iterator<Item = [f32; 2]> {
-        let mut stream = crate::math::hash::HashStream::new([17, 4, 99]);
-        (0..SAMPLES).map(move |_| stream.next_2d())
+        let mut stream = pcg32([17, 4, 99]);
+        (0..SAMPLES).map(move |_| stream.random::<[f32; 2]>())
     }
 
     /// χ² over the cells of a square of parameters, with the density integrated over each cell. Five such tests at

@@ -4,7 +4,7 @@
 use super::level;
 use lumiris_numbers::estimators::ris::{Draw, stratified, systematic, with_replacement};
 use lumiris_numbers::estimators::stats::chi_squared_test;
-use lumiris_numbers::math::hash::HashStream;
+use lumiris_test_support::random::{RngExt, pcg32};
 use std::f64::consts::PI;
 
 const BINS: usize = 48;
@@ -85,12 +85,12 @@ fn the_resampled_point_has_the_exact_law_for_1_2_and_8_proposals() {
 
         let expected: Vec<f64> = law.iter().map(|p| p * RUNS as f64).collect();
         for (k, (name, draw)) in ways.iter().enumerate() {
-            let mut stream = HashStream::new([5, m as u32, k as u32]);
+            let mut stream = pcg32([5, m as u32, k as u32]);
             let (mut counts, mut draws, mut weights) = (vec![0.0; BINS + 1], Vec::new(), vec![0.0; m]);
             for _ in 0..RUNS {
-                let theta: Vec<f64> = (0..m).map(|_| PI * f64::from(stream.next_f32())).collect();
+                let theta: Vec<f64> = (0..m).map(|_| PI * f64::from(stream.random::<f32>())).collect();
                 weights.iter_mut().zip(&theta).for_each(|(w, &t)| *w = q_hat(t) as f32);
-                draw(&weights, stream.next_f32(), &mut draws);
+                draw(&weights, stream.random::<f32>(), &mut draws);
                 let bin = draws.first().map_or(BINS, |d| (theta[d.index as usize] / PI * BINS as f64) as usize);
                 counts[bin] += 1.0;
             }

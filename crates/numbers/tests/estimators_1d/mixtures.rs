@@ -1,7 +1,7 @@
 //! Integrals on 0..1 that a deterministic mixture of several densities samples, and blocks of passes over them.
 
 use lumiris_numbers::estimators::ocv::{Form, MAX_COMPONENTS, NormalEquations, block_of};
-use lumiris_numbers::math::hash::HashStream;
+use lumiris_test_support::random::{Pcg32, RngExt};
 
 /// A density on 0..1.
 #[derive(Clone, Copy, Debug)]
@@ -258,11 +258,11 @@ impl Sampler {
     }
 
     /// All samples of a block of `passes`.
-    pub(crate) fn points(&self, passes: u32, stream: &mut HashStream, mut each: impl FnMut(&Point)) {
+    pub(crate) fn points(&self, passes: u32, stream: &mut Pcg32, mut each: impl FnMut(&Point)) {
         for (component, count) in self.counts.iter().enumerate() {
             let strata = count * passes;
             for k in 0..strata {
-                let u = f64::from(stream.next_f32());
+                let u = f64::from(stream.random::<f32>());
                 let u = if self.is_stratified { (f64::from(k) + u) / f64::from(strata) } else { u };
                 each(&self.point(component, u));
             }
@@ -334,7 +334,7 @@ impl Sampler {
     }
 
     /// Adds a block of `passes` to `sums`, whose columns are r_j.
-    pub(crate) fn add(&self, passes: u32, stream: &mut HashStream, sums: &mut [f32]) {
+    pub(crate) fn add(&self, passes: u32, stream: &mut Pcg32, sums: &mut [f32]) {
         self.points(passes, stream, |point| {
             let (columns, mut there, mut count) = (self.columns(point), [(0, 0.0); MAX_COMPONENTS], 0);
             for (j, c) in columns.into_iter().enumerate().filter(|(_, c)| *c > 0.0) {
@@ -346,7 +346,7 @@ impl Sampler {
     }
 
     /// The sums of a new block in the columns of a form.
-    pub(crate) fn block(&self, form: Form, passes: u32, stream: &mut HashStream, sums: &mut [f32]) {
+    pub(crate) fn block(&self, form: Form, passes: u32, stream: &mut Pcg32, sums: &mut [f32]) {
         sums.fill(0.0);
         self.add(passes, stream, sums);
         form.finish(self.equations, sums, &self.integrals);

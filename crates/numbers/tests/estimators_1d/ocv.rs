@@ -6,8 +6,8 @@ use lumiris_numbers::estimators::mis::{Heuristic, Technique};
 use lumiris_numbers::estimators::ocv::{Form, System};
 use lumiris_numbers::estimators::stats::{Welford, z_test};
 use lumiris_numbers::estimators::{correlated, optimal_mis};
-use lumiris_numbers::math::hash::HashStream;
 use lumiris_test_support::integrals::run;
+use lumiris_test_support::random::{Pcg32, RngExt, pcg32};
 
 const PROGRESSIVE: Form = Form::Progressive;
 
@@ -38,7 +38,7 @@ fn chain(sampler: &Sampler, runs: usize, key: u32) -> [Welford; 3] {
 }
 
 /// Estimates of the first `passes` passes: MIS, and the progressive form.
-fn passes(sampler: &Sampler, passes: u32, stream: &mut HashStream) -> [[f64; 3]; 2] {
+fn passes(sampler: &Sampler, passes: u32, stream: &mut Pcg32) -> [[f64; 3]; 2] {
     let equations = sampler.equations;
     let (mut all, mut sums) = (vec![0.0; equations.len()], vec![0.0; equations.len()]);
     let mut beta = vec![0.0; equations.coefficients()];
@@ -58,7 +58,7 @@ fn passes(sampler: &Sampler, passes: u32, stream: &mut HashStream) -> [[f64; 3];
 /// Variances of both of [`passes`], by channel.
 fn variances(sampler: &Sampler, count: u32, runs: usize) -> [[f64; 3]; 2] {
     let mut welford = [[Welford::new(); 3]; 2];
-    let mut stream = HashStream::new([22, count, sampler.mixture as u32]);
+    let mut stream = pcg32([22, count, sampler.mixture as u32]);
     for _ in 0..runs {
         for (welford, estimate) in welford.iter_mut().zip(passes(sampler, count, &mut stream)) {
             welford.iter_mut().zip(estimate).for_each(|(w, e)| w.add(e));
@@ -207,7 +207,7 @@ fn four_passes_have_the_variance_of_their_blocks_and_coefficients() {
     each_sampler(&PROPER, &NUMBERS, |sampler, name, value| {
         let predicted = predicted_variances(sampler, PASSES, runs_of_a_variance(sampler) / 4);
         let mut squares = [Welford::new(); 3];
-        let mut stream = HashStream::new([33, sampler.n, sampler.mixture as u32]);
+        let mut stream = pcg32([33, sampler.n, sampler.mixture as u32]);
         for _ in 0..runs_of_a_variance(sampler) {
             let [_, estimate] = passes(sampler, PASSES, &mut stream);
             (0..3).for_each(|i| squares[i].add((estimate[i] - value[i]).powi(2)));
@@ -226,7 +226,7 @@ fn ratio_after(sampler: &Sampler, passes: u32, runs: usize) -> f64 {
     let equations = sampler.equations;
     let (mut all, mut sums) = (vec![0.0; equations.len()], vec![0.0; equations.len()]);
     let mut beta = vec![0.0; equations.coefficients()];
-    let mut stream = HashStream::new([25, passes, sampler.mixture as u32]);
+    let mut stream = pcg32([25, passes, sampler.mixture as u32]);
     let (mut mis, mut ocv) = (Welford::new(), Welford::new());
     for _ in 0..runs {
         all.fill(0.0);
@@ -257,7 +257,7 @@ fn after_four_passes_the_variance_is_three_quarters_of_that_of_mis() {
 fn scaling_the_integrand_scales_the_estimate() {
     let estimates = |scale: f64| {
         let sampler = Sampler { scale, ..Sampler::new(Mixture::Colour, 8, true) };
-        let mut stream = HashStream::new([26, 0, 0]);
+        let mut stream = pcg32([26, 0, 0]);
         (0..200).map(|_| passes(&sampler, 16, &mut stream)[1]).collect::<Vec<_>>()
     };
     let one = estimates(1.0);
@@ -325,10 +325,10 @@ fn correlated_sampling_has_the_variance_of_theory_and_no_bias_where_halves_are_f
     let (variance, lambda) = (yy - y * y - (gy - g * y).powi(2) / (gg - g * g), (gy - g * y) / (gg - g * g));
 
     const HALF: u32 = 32;
-    let fill = |stream: &mut HashStream, sums: &mut [f32; correlated::SUMS]| {
+    let fill = |stream: &mut Pcg32, sums: &mut [f32; correlated::SUMS]| {
         sums.fill(0.0);
         for _ in 0..HALF {
-            let x = density.sample(f64::from(stream.next_f32()));
+            let x = density.sample(f64::from(stream.random::<f32>()));
             let p = density.pdf(x);
             let control = (unshadowed(x) / p - g) as f32;
             correlated::add(sums, [control, 0.5 * control, control], mixture.f(x).map(|f| (f / p) as f32));
@@ -360,7 +360,7 @@ fn solutions_in_lanes_are_those_of_the_oracle() {
             for n in [3, 8, 64] {
                 let sampler = Sampler::new(mixture, n, true);
                 let form = if system == System::PAPER { Form::Paper } else { PROGRESSIVE };
-                let (equations, mut stream) = (sampler.equations, HashStream::new([30, n, 0]));
+                let (equations, mut stream) = (sampler.equations, pcg32([30, n, 0]));
                 let mut rows = vec![0.0; 21 * equations.len()];
                 rows.chunks_exact_mut(equations.len()).for_each(|row| sampler.block(form, 1, &mut stream, row));
                 let width = equations.coefficients();

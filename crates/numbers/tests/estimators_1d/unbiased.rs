@@ -4,8 +4,8 @@ use super::baselines::{defensive_choice, defensive_pdf};
 use super::{assert_means, assert_variances};
 use lumiris_numbers::estimators::mc;
 use lumiris_numbers::estimators::ris::{strata, stratified, systematic, with_replacement};
-use lumiris_numbers::math::hash::HashStream;
 use lumiris_test_support::integrals::{ALL, Integral, Proposals, fill, run};
+use lumiris_test_support::random::{Pcg32, RngExt};
 
 const RUNS: usize = 1_000_000;
 const M: usize = 12;
@@ -68,7 +68,7 @@ fn stratified_draws_have_the_variance_of_thesis_equation_4_6() {
             p.clear();
             for (k, &m) in SIZES.iter().enumerate() {
                 for _ in 0..m {
-                    let [a, b] = stream.next_2d().map(f64::from);
+                    let [a, b] = stream.random::<[f32; 2]>().map(f64::from);
                     let x = integral.sample([(k as f64 + a) / 4.0, b]);
                     p.push(integral, x, 1.0 / (f64::from(m) * 4.0 * integral.pdf(x)));
                 }
@@ -83,23 +83,23 @@ fn stratified_draws_have_the_variance_of_thesis_equation_4_6() {
 }
 
 /// One estimate of `integral` by some way of drawing.
-type Estimate = fn(Integral, &mut HashStream, &mut Proposals) -> [f64; 3];
+type Estimate = fn(Integral, &mut Pcg32, &mut Proposals) -> [f64; 3];
 
-fn systematic_estimate(integral: Integral, stream: &mut HashStream, p: &mut Proposals) -> [f64; 3] {
+fn systematic_estimate(integral: Integral, stream: &mut Pcg32, p: &mut Proposals) -> [f64; 3] {
     let mut draws = Vec::new();
     p.independent(integral, M, stream);
-    systematic(&p.weights, N as u32, stream.next_f32(), &mut draws);
+    systematic(&p.weights, N as u32, stream.random::<f32>(), &mut draws);
     p.estimate(&draws)
 }
 
-fn jittered_systematic_estimate(integral: Integral, stream: &mut HashStream, p: &mut Proposals) -> [f64; 3] {
+fn jittered_systematic_estimate(integral: Integral, stream: &mut Pcg32, p: &mut Proposals) -> [f64; 3] {
     let mut draws = Vec::new();
     p.jittered(integral, M, stream);
-    systematic(&p.weights, N as u32, stream.next_f32(), &mut draws);
+    systematic(&p.weights, N as u32, stream.random::<f32>(), &mut draws);
     p.estimate(&draws)
 }
 
-fn equal_weights_estimate(integral: Integral, stream: &mut HashStream, p: &mut Proposals) -> [f64; 3] {
+fn equal_weights_estimate(integral: Integral, stream: &mut Pcg32, p: &mut Proposals) -> [f64; 3] {
     let (mut draws, mut ends, mut u) = (Vec::new(), Vec::new(), [0.0; 2 * N]);
     p.independent(integral, M, stream);
     fill(&mut u, stream);
@@ -108,23 +108,23 @@ fn equal_weights_estimate(integral: Integral, stream: &mut HashStream, p: &mut P
     p.estimate(&draws)
 }
 
-fn single_draw_estimate(integral: Integral, stream: &mut HashStream, p: &mut Proposals) -> [f64; 3] {
+fn single_draw_estimate(integral: Integral, stream: &mut Pcg32, p: &mut Proposals) -> [f64; 3] {
     let mut draws = Vec::new();
     p.independent(integral, 2, stream);
-    with_replacement(&p.weights, &[stream.next_f32()], &mut draws);
+    with_replacement(&p.weights, &[stream.random::<f32>()], &mut draws);
     p.estimate(&draws)
 }
 
-fn plain_estimate(integral: Integral, stream: &mut HashStream, _: &mut Proposals) -> [f64; 3] {
-    let x = integral.sample(stream.next_2d().map(f64::from));
+fn plain_estimate(integral: Integral, stream: &mut Pcg32, _: &mut Proposals) -> [f64; 3] {
+    let x = integral.sample(stream.random::<[f32; 2]>().map(f64::from));
     let weight = f64::from(mc::weight(1.0, integral.pdf(x) as f32));
     integral.f(x).map(|f| f * weight)
 }
 
-fn defensive_estimate(integral: Integral, stream: &mut HashStream, _: &mut Proposals) -> [f64; 3] {
+fn defensive_estimate(integral: Integral, stream: &mut Pcg32, _: &mut Proposals) -> [f64; 3] {
     // p₁ = 2 on the lower half of the first axis misses half of f; p₀ = p.
     const ALPHA: f32 = 0.3;
-    let [u, v] = stream.next_2d();
+    let [u, v] = stream.random::<[f32; 2]>();
     let (safe, u) = defensive_choice(ALPHA, u);
     let u = [f64::from(u), f64::from(v)];
     let x = if safe { integral.sample(u) } else { [0.5 * u[0], integral.sample(u)[1]] };

@@ -87,17 +87,17 @@ fn with_intercept(equations: NormalEquations, sums: &[f32], beta: &[f32], integr
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::math::hash::HashStream;
+    use lumiris_test_support::random::{RngExt, pcg32};
 
     const INTEGRALS: [f32; 3] = [1.0; 3];
 
     /// Sums of `n` samples of y = 3 + 2 c₀ − c₁ + `noise` in the columns r_j = 1 + c_j, where Σ c_j = 0.
     fn sums(n: usize, noise: f32) -> (NormalEquations, Vec<f32>) {
         let equations = NormalEquations::new(3);
-        let (mut sums, mut stream) = (vec![0.0; equations.len()], HashStream::new([4, 5, 6]));
+        let (mut sums, mut stream) = (vec![0.0; equations.len()], pcg32([4, 5, 6]));
         for _ in 0..n {
-            let [a, b] = stream.next_2d().map(|u| 2.0 * u - 1.0);
-            let y = 3.0 + 2.0 * a - b + noise * (stream.next_f32() - 0.5);
+            let [a, b] = stream.random::<[f32; 2]>().map(|u| 2.0 * u - 1.0);
+            let y = 3.0 + 2.0 * a - b + noise * (stream.random::<f32>() - 0.5);
             equations.add_sparse(&mut sums, &[(0, 1.0 + a), (1, 1.0 + b), (2, 1.0 - a - b)], [y, 2.0 * y, 0.0]);
         }
         (equations, sums)

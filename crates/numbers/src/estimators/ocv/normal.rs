@@ -183,7 +183,7 @@ impl NormalEquations {
 mod tests {
     use super::super::solve::System;
     use super::*;
-    use crate::math::hash::HashStream;
+    use lumiris_test_support::random::{RngExt, pcg32};
 
     fn all(columns: &[f32]) -> Vec<(usize, f32)> {
         columns.iter().copied().enumerate().collect()
@@ -191,9 +191,9 @@ mod tests {
 
     fn filled(m: usize, n: usize, y: impl Fn(&[f32]) -> [f32; 3]) -> (NormalEquations, Vec<f32>) {
         let equations = NormalEquations::new(m);
-        let (mut sums, mut stream) = (vec![0.0; equations.len()], HashStream::new([7, 8, 9]));
+        let (mut sums, mut stream) = (vec![0.0; equations.len()], pcg32([7, 8, 9]));
         for _ in 0..n {
-            let columns: Vec<f32> = (0..m).map(|_| stream.next_f32() - 0.5).collect();
+            let columns: Vec<f32> = (0..m).map(|_| stream.random::<f32>() - 0.5).collect();
             equations.add_sparse(&mut sums, &all(&columns), y(&columns));
         }
         (equations, sums)
@@ -242,14 +242,14 @@ mod tests {
         let equations = NormalEquations::new(4);
         let integrals = [0.3, 0.7, 0.25, 1e-3];
         let (mut dense, mut sparse) = (vec![0.0; equations.len()], vec![0.0; equations.len()]);
-        let mut stream = HashStream::new([8, 8, 8]);
+        let mut stream = pcg32([8, 8, 8]);
         let centred = |columns: &[(usize, f32)]| {
             let mut c = integrals.map(|i: f32| -i);
             columns.iter().for_each(|&(j, r)| c[j] += r);
             all(&c)
         };
         for i in 0..50 {
-            let [a, b] = stream.next_2d();
+            let [a, b] = stream.random::<[f32; 2]>();
             let columns = [(0, a), (1, b), (2 + i % 2, 2.0 - a - b)];
             let y = [a + b, a * a, f32::from(u8::from(i % 3 == 0))];
             equations.add_sparse(&mut sparse, &columns, y);

@@ -357,7 +357,7 @@ impl Factors {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::math::hash::HashStream;
+    use lumiris_test_support::random::{RngExt, pcg32};
 
     /// Numbers of points with and without full lanes.
     const LENGTHS: [usize; 8] = [0, 1, 3, 7, 8, 9, 23, 32];
@@ -366,12 +366,12 @@ mod tests {
     /// Rows of sums of `n` samples each, whose columns `column` changes.
     fn rows(m: usize, points: usize, n: usize, column: fn(&mut [f32], f32)) -> (NormalEquations, Vec<f32>) {
         let equations = NormalEquations::new(m);
-        let (mut sums, mut stream) = (vec![0.0; points * equations.len()], HashStream::new([m as u32, n as u32, 3]));
+        let (mut sums, mut stream) = (vec![0.0; points * equations.len()], pcg32([m as u32, n as u32, 3]));
         for row in sums.chunks_exact_mut(equations.len()) {
             for _ in 0..n {
-                let mut c: Vec<f32> = (0..m).map(|_| 2.0 * stream.next_f32() - 1.0).collect();
-                let y: [f32; 3] = std::array::from_fn(|i| 1.0 + c[i % m] + stream.next_f32());
-                column(&mut c, stream.next_f32());
+                let mut c: Vec<f32> = (0..m).map(|_| 2.0 * stream.random::<f32>() - 1.0).collect();
+                let y: [f32; 3] = std::array::from_fn(|i| 1.0 + c[i % m] + stream.random::<f32>());
+                column(&mut c, stream.random::<f32>());
                 equations.add_sparse(row, &c.into_iter().enumerate().collect::<Vec<_>>(), y);
             }
         }

@@ -1,0 +1,12 @@
+//! Random streams of tests, by a generator of fixed definition: a test sees the same numbers on every machine and with
+//! every version of the renderer, whose own numbers are the renderer's subject.
+
+pub use rand::RngExt;
+pub use rand_pcg::Pcg32;
+
+use rand::SeedableRng;
+
+/// The stream of a key; equal keys give equal numbers.
+pub fn pcg32(key: [u32; 3]) -> Pcg32 {
+    Pcg32::seed_from_u64(key.iter().fold(0, |seed: u64, &k| (seed ^ u64::from(k)).wrapping_mul(0x9e37_79b9_7f4a_7c15)))
+}
