@@ -364,15 +364,16 @@ mod tests {
         let expected: Vec<f64> = (0..ROWS * COLUMNS)
             .map(|cell| {
                 let (row, column) = (cell / COLUMNS, cell % COLUMNS);
+                // By the angle from the pole, where a density over rows of an image grows like 1/sin θ
+                let [low, high] = [row + 1, row].map(|r| (2.0 * r as f32 / ROWS as f32 - 1.0).acos());
                 let mut sum = 0.0;
                 for i in 0..sub * sub {
-                    let y = (row as f32 + ((i / sub) as f32 + 0.5) / sub as f32) / ROWS as f32;
+                    let theta = low + (high - low) * ((i / sub) as f32 + 0.5) / sub as f32;
                     let x = (column as f32 + ((i % sub) as f32 + 0.5) / sub as f32) / COLUMNS as f32;
-                    sum += f64::from(
-                        map.pdf(lumiris_numbers::math::warp::direction(2.0 * y - 1.0, std::f32::consts::TAU * x)),
-                    );
+                    let w = lumiris_numbers::math::warp::direction(theta.cos(), std::f32::consts::TAU * x);
+                    sum += f64::from(map.pdf(w) * theta.sin());
                 }
-                sum / (sub * sub) as f64 * 4.0 * PI / (ROWS * COLUMNS) as f64 * f64::from(count)
+                sum * f64::from(high - low) * 2.0 * PI / (sub * sub * COLUMNS) as f64 * f64::from(count)
             })
             .collect();
         let total: f64 = expected.iter().sum::<f64>() / f64::from(count);

@@ -153,7 +153,7 @@ fn without_photons_there_is_a_message_and_no_image() {
     let none: fn(&mut PhotonMapSettings) = |_| ();
     assert!(error(&no_light, none).contains("no light"), "{}", error(&no_light, none));
     assert!(error(&dark, none).contains("emit nothing"), "{}", error(&dark, none));
-    assert!(error(ROOM, |p| p.photons = 0).contains("zero photons"));
+    assert!(error(ROOM, |p| p.photons = 0).contains("requested is zero"));
     assert!(error(ROOM, |p| p.memory = 100_000).contains("more than"));
     let importance: fn(&mut PhotonMapSettings) = |p| p.storage = PhotonStorage::Floor(0.1);
     assert!(error(away, importance).contains("camera sees no"), "{}", error(away, importance));

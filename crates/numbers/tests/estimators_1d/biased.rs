@@ -6,6 +6,7 @@ use lumiris_numbers::estimators::ris::with_replacement;
 use lumiris_numbers::estimators::stats::z_test;
 use lumiris_numbers::math::luminance;
 use lumiris_test_support::integrals::{Integral, Proposals, run};
+use lumiris_test_support::random::RngExt;
 
 const RUNS: usize = 1_000_000;
 const LINE: Integral = Integral::Line;
@@ -94,7 +95,7 @@ fn bidirectional_importance_sampling_is_biased_in_colour_as_predicted_and_unbias
         let (mut p, mut draws) = (Proposals::default(), Vec::new());
         let channels = run(RUNS, [15, u32::from(grey), 0], |stream| {
             p.independent(LINE, 2, stream);
-            with_replacement(&p.weights, &stream.next_2d(), &mut draws);
+            with_replacement(&p.weights, &stream.random::<[f32; 2]>(), &mut draws);
             let seen: Vec<f32> = draws.iter().map(|d| p.visibilities[d.index as usize]).collect();
             let unshadowed = std::array::from_fn(|i| {
                 (0..2).map(|j| if grey { p.weights[j] } else { p.unshadowed[j][i] }).sum::<f32>()

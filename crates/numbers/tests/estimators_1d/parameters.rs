@@ -7,6 +7,7 @@ use lumiris_numbers::estimators::ris::choice::{
 use lumiris_numbers::estimators::ris::{strata, stratified, with_replacement};
 use lumiris_numbers::estimators::stats::{Welford, z_test};
 use lumiris_test_support::integrals::{ALL, Integral, Proposals, fill, run};
+use lumiris_test_support::random::RngExt;
 
 const COSTS: Costs = Costs { t1: 1.0, t2: 40.0 };
 const TIME: f64 = 400.0;
@@ -15,7 +16,7 @@ const TIME: f64 = 400.0;
 fn measured(integral: Integral, ratio: f64, key: u32) -> f64 {
     let (mut p, mut draws, mut u) = (Proposals::default(), Vec::new(), Vec::new());
     let channels = run(80_000, [8, integral as u32, key], |stream| {
-        let c = counts(ratio, COSTS, TIME, stream.next_2d());
+        let c = counts(ratio, COSTS, TIME, stream.random::<[f32; 2]>());
         p.independent(integral, c.m as usize, stream);
         u.resize(c.n as usize, 0.0);
         fill(&mut u, stream);
@@ -101,7 +102,7 @@ fn the_optimal_set_size_beats_a_quarter_and_four_times_when_measured() {
     let [best, quarter, four] = [size, size / 4.0, size * 4.0].map(|size| {
         let (mut p, mut draws, mut ends, mut u) = (Proposals::default(), Vec::new(), Vec::new(), Vec::new());
         let channels = run(40_000, [9, 0, (size * 100.0) as u32], |stream| {
-            let c = counts_of_sets(size, COSTS, TIME, stream.next_2d());
+            let c = counts_of_sets(size, COSTS, TIME, stream.random::<[f32; 2]>());
             p.independent(Integral::Line, (c.m * c.n) as usize, stream);
             u.resize(c.n as usize, 0.0);
             fill(&mut u, stream);

@@ -4,6 +4,7 @@ use super::assert_means;
 use lumiris_numbers::estimators::mis::{Heuristic, Technique};
 use lumiris_numbers::estimators::ris::with_replacement;
 use lumiris_test_support::integrals::{Integral, fill, run};
+use lumiris_test_support::random::RngExt;
 
 const RUNS: usize = 500_000;
 const HEURISTICS: [Heuristic; 3] = [Heuristic::Balance, Heuristic::Power, Heuristic::Maximum];
@@ -23,7 +24,7 @@ fn mis_on_samples_is_unbiased() {
             let mut sum = [0.0; 3];
             for (k, (m, n)) in SETS.into_iter().enumerate() {
                 points.clear();
-                points.extend((0..m).map(|_| propose(k, f64::from(stream.next_f32()))));
+                points.extend((0..m).map(|_| propose(k, f64::from(stream.random::<f32>()))));
                 let pdf = |x: [f64; 2]| pdfs(x)[k] * m as f64;
                 weights.clear();
                 weights.extend(points.iter().map(|&x| (targets(x)[k] / pdf(x)) as f32));
