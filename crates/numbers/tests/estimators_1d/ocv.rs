@@ -98,17 +98,17 @@ fn predicted_variances(sampler: &Sampler, passes: u32, runs: usize) -> [Welford;
     })
 }
 
-/// Runs of a test of the mean: a million of 3 samples of [`Mixture::Table`], and as many samples in all where a run has
+/// Runs of a test of the mean: 600,000 of 3 samples of [`Mixture::Table`], and as many samples in all where a run has
 /// more of them, which leaves about the same standard error; a tenth of it for other integrals.
 fn runs_of(sampler: &Sampler) -> usize {
-    let samples = if sampler.mixture == Mixture::Table { 3_000_000 } else { 300_000 };
+    let samples = if sampler.mixture == Mixture::Table { 1_800_000 } else { 180_000 };
     samples / sampler.n as usize
 }
 
 /// Runs of a test of the variance. Means of many samples are nearly normal, and their variance is known from fewer of
 /// them.
 fn runs_of_a_variance(sampler: &Sampler) -> usize {
-    if sampler.n <= 8 { 12_000 } else { 4_000 }
+    if sampler.n <= 8 { 10_000 } else { 3_400 }
 }
 
 fn each_sampler(mixtures: &[Mixture], numbers: &[u32], mut test: impl FnMut(&Sampler, &str, [f64; 3])) {
