@@ -12,3 +12,19 @@ pub fn pooled(n: [f32; 2], [a, b]: [[f32; 3]; 2]) -> [f32; 3] {
     let sum = n[0] + n[1];
     if sum > 0.0 { [0, 1, 2].map(|i| (n[0] * a[i] + n[1] * b[i]) / sum) } else { [0.0; 3] }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn weights_and_pools_have_known_values() {
+        assert_eq!(
+            (weight(4.0, 0.5), weight(4.0, 0.0), weight(4.0, -1.0), weight(4.0, f32::NAN)),
+            (0.5, 0.0, 0.0, 0.0)
+        );
+        let [a, b] = [[1.0, 2.0, 3.0], [5.0, 10.0, -1.0]];
+        assert_eq!(pooled([3.0, 1.0], [a, b]), [2.0, 4.0, 2.0]);
+        assert_eq!((pooled([2.0, 0.0], [a, b]), pooled([0.0, 0.0], [a, b])), (a, [0.0; 3]));
+    }
+}

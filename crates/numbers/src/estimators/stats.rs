@@ -263,4 +263,46 @@ mod tests {
         assert!((sidak(0.01, 1) - 0.01).abs() < 1e-15);
         assert!((1.0 - (1.0 - sidak(0.01, 40)).powi(40) - 0.01).abs() < 1e-12);
     }
+
+    #[test]
+    fn welford_has_the_moments_of_few_values() {
+        let of = |values: &[f64]| values.iter().copied().collect::<Welford>();
+        let [none, one, two, four] = [&[][..], &[3.0], &[3.0, 7.0], &[1.0, 2.0, 3.0, 6.0]].map(of);
+        assert_eq!((none.count(), none.mean(), none.variance(), none.standard_error()), (0, 0.0, 0.0, 0.0));
+        assert_eq!((one.count(), one.mean(), one.variance(), one.standard_error()), (1, 3.0, 0.0, 0.0));
+        assert_eq!((two.count(), two.mean(), two.variance(), two.standard_error()), (2, 5.0, 8.0, 2.0));
+        assert_eq!((four.mean(), four.variance()), (3.0, 14.0 / 3.0));
+        let mut merged = two;
+        merged.merge(&none);
+        assert_eq!(merged, two);
+        let mut merged = none;
+        merged.merge(&two);
+        assert_eq!((merged.count(), merged.mean(), merged.variance()), (2, 5.0, 8.0));
+    }
+
+    #[test]
+    fn tests_of_means_say_nothing_without_samples_and_everything_without_noise() {
+        let of = |values: &[f64]| values.iter().copied().collect::<Welford>();
+        assert_eq!(t_test(&of(&[3.0]), 9.0), MeanTest { statistic: 0.0, p_value: 1.0 });
+        assert_eq!(t_test(&of(&[3.0, 3.0]), 3.0).p_value, 1.0);
+        assert_eq!(t_test(&of(&[3.0, 3.0]), 9.0), MeanTest { statistic: f64::NEG_INFINITY, p_value: 0.0 });
+        // Two values, one degree of freedom: Cauchy, so that p = 1/2 at t = 1
+        let cauchy = t_test(&of(&[3.0, 7.0]), 3.0);
+        assert!((cauchy.statistic - 1.0).abs() < 1e-12 && (cauchy.p_value - 0.5).abs() < 1e-9, "{cauchy:?}");
+        // Standard errors 3 and 4 have 5 between them
+        let (a, b) = (of(&[-3.0, 3.0]), of(&[6.0, 14.0]));
+        let both = two_sample_z_test(&a, &b);
+        assert!((both.statistic + 2.0).abs() < 1e-12 && (both.p_value - 0.0455).abs() < 1e-4, "{both:?}");
+    }
+
+    #[test]
+    fn pools_hold_what_they_must_and_the_statistic_is_their_sum() {
+        // The two small bins make one pool of 6, at exactly the minimum a bin stands alone
+        let chi = chi_squared_test(&[6.0, 3.0, 1.0, 20.0], &[5.0, 4.0, 2.0, 16.0], 0.3);
+        assert_eq!(chi.dof, 2);
+        assert!((chi.statistic - (4.0 / 6.0 + 1.0 / 5.0 + 1.0)).abs() < 1e-12, "{chi:?}");
+        assert!(!chi.rejected && chi_squared_test(&[6.0, 3.0, 1.0, 40.0], &[5.0, 4.0, 2.0, 16.0], 0.3).rejected);
+        // What expects nothing and has nothing counts for nothing
+        assert_eq!(chi_squared_test(&[0.0], &[0.0], 0.5).statistic, 0.0);
+    }
 }

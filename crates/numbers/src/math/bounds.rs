@@ -99,3 +99,47 @@ impl Bounds3 {
         Vec3::new(pick(0, self.min.x, self.max.x), pick(1, self.min.y, self.max.y), pick(2, self.min.z, self.max.z))
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    const BOX: Bounds3 = Bounds3 { min: Vec3::new(-1.0, 2.0, 3.0), max: Vec3::new(1.0, 5.0, 10.0) };
+
+    #[test]
+    fn a_box_has_its_centre_edges_area_and_sphere() {
+        assert_eq!(Bounds3::from_points([BOX.max, BOX.min, Vec3::new(0.0, 3.0, 4.0)]), BOX);
+        assert_eq!((BOX.center(), BOX.diagonal()), (Vec3::new(0.0, 3.5, 6.5), Vec3::new(2.0, 3.0, 7.0)));
+        assert_eq!(BOX.half_area(), 2.0 * 3.0 + 3.0 * 7.0 + 7.0 * 2.0);
+        assert_eq!(BOX.bounding_sphere(), (BOX.center(), 0.5 * 62.0_f32.sqrt()));
+        assert_eq!(Bounds3::default(), Bounds3::EMPTY);
+        assert!(Bounds3::EMPTY.is_empty() && !BOX.is_empty());
+        assert_eq!((Bounds3::EMPTY.half_area(), Bounds3::EMPTY.bounding_sphere()), (0.0, (Vec3::ZERO, 0.0)));
+        let point = Bounds3::from_points([Vec3::X]);
+        assert!(!point.is_empty() && point.half_area() == 0.0);
+    }
+
+    #[test]
+    fn a_box_contains_its_boundary_and_nothing_outside() {
+        assert!(BOX.contains(BOX.min) && BOX.contains(BOX.max) && BOX.contains(BOX.center()));
+        for axis in [Vec3::X, Vec3::Y, Vec3::Z] {
+            assert!(!BOX.contains(BOX.max + axis) && !BOX.contains(BOX.min - axis));
+            let wider = BOX.union_point(BOX.max + axis);
+            assert_eq!((wider.min, wider.max), (BOX.min, BOX.max + axis));
+            assert_eq!(BOX.union(Bounds3::from_points([BOX.min - axis])).min, BOX.min - axis);
+        }
+        assert_eq!(BOX.union(Bounds3::EMPTY), BOX);
+    }
+
+    #[test]
+    fn corners_are_numbered_by_bits_and_transformed_together() {
+        let corners: Vec<Vec3> = (0..8).map(|i| BOX.corner(i)).collect();
+        assert_eq!((corners[0], corners[7]), (BOX.min, BOX.max));
+        assert_eq!(corners[1], Vec3::new(1.0, 2.0, 3.0));
+        assert_eq!(corners[2], Vec3::new(-1.0, 5.0, 3.0));
+        assert_eq!(corners[4], Vec3::new(-1.0, 2.0, 10.0));
+        let turned = BOX.transformed(&Affine3A::from_mat3(glam::Mat3::from_cols(Vec3::Y, -Vec3::X, Vec3::Z)));
+        assert_eq!((turned.min, turned.max), (Vec3::new(-5.0, -1.0, 3.0), Vec3::new(-2.0, 1.0, 10.0)));
+        assert!(Bounds3::EMPTY.transformed(&Affine3A::IDENTITY).is_empty());
+    }
+}

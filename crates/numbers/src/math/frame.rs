@@ -66,4 +66,24 @@ mod tests {
             }
         }
     }
+
+    #[test]
+    fn directions_go_to_the_frame_and_back() {
+        let z = Vec3::new(0.3, -0.8, 0.2).normalize();
+        for f in [Frame::from_z(z), Frame::from_z(-z), Frame::from_xz(Vec3::new(0.1, 2.0, 0.7), z)] {
+            let v = Vec3::new(0.7, -0.2, 1.9);
+            assert!((f.to_world(f.to_local(v)) - v).length() < 1e-6);
+            assert!((f.to_world(v) - (f.x * 0.7 - f.y * 0.2 + f.z * 1.9)).length() < 1e-6);
+            assert!((f.to_local(f.x) - Vec3::X).length() < 1e-6 && (f.to_local(f.y) - Vec3::Y).length() < 1e-6);
+        }
+    }
+
+    #[test]
+    fn the_tangent_is_as_near_as_can_be() {
+        let f = Frame::from_xz(Vec3::new(3.0, 0.0, 4.0), Vec3::Z);
+        assert_eq!((f.x, f.y, f.z), (Vec3::X, Vec3::Y, Vec3::Z));
+        for bad in [Vec3::ZERO, Vec3::Z * 5.0, Vec3::splat(f32::NAN)] {
+            assert_eq!(Frame::from_xz(bad, Vec3::Z), Frame::from_z(Vec3::Z));
+        }
+    }
 }

@@ -51,3 +51,19 @@ pub const fn gamma(n: u32) -> f32 {
     let n_eps = n as f32 * (f32::EPSILON * 0.5);
     n_eps / (1.0 - n_eps)
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn helpers_have_the_values_of_their_definitions() {
+        assert_eq!((sqr(-3.0), safe_sqrt(9.0), safe_sqrt(-1e-9)), (9.0, 3.0, 0.0));
+        assert!(ONE_MINUS_EPSILON < 1.0 && ONE_MINUS_EPSILON.next_up() == 1.0);
+        // γ₃ = 3·2⁻²⁴/(1 − 3·2⁻²⁴), which rounds to the f32 above 3·2⁻²⁴ for many operations
+        let exact = |n: f64| n * 0.5_f64.powi(24) / (1.0 - n * 0.5_f64.powi(24));
+        for n in [1, 3, 7, 4_000_000] {
+            assert!((f64::from(gamma(n)) / exact(f64::from(n)) - 1.0).abs() < 1e-6, "{n}");
+        }
+    }
+}

@@ -55,3 +55,18 @@ impl Number for f32 {
         if self.is_finite() { self } else { 0.0 }
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn one_sample_is_a_number() {
+        assert_eq!(7.0_f32.constant(2.5), 2.5);
+        assert_eq!((2.0_f32.lesser(3.0), 2.0_f32.greater(3.0)), (2.0, 3.0));
+        for (a, above, at_least) in [(0.5, 4.0, 4.0), (1.0, 4.0, 3.0), (2.0, 3.0, 3.0), (f32::NAN, 4.0, 4.0)] {
+            assert_eq!((a.if_above(1.0, 3.0, 4.0), a.if_at_least(1.0, 3.0, 4.0)), (above, at_least), "{a}");
+        }
+        assert_eq!([2.0, f32::INFINITY, f32::NAN].map(Number::or_zero_if_not_finite), [2.0, 0.0, 0.0]);
+    }
+}

@@ -60,4 +60,31 @@ mod tests {
         assert!((offset_origin(p, e, n, n) - p).dot(n) > 0.0);
         assert!((offset_origin(p, e, n, -n) - p).dot(n) < 0.0);
     }
+
+    #[test]
+    fn a_point_of_a_ray_is_its_origin_and_so_many_directions() {
+        let ray = Ray { o: Vec3::new(1.0, 2.0, 3.0), d: Vec3::new(0.0, 2.0, -1.0), t_max: 9.0, time: 0.0 };
+        assert_eq!(ray.at(3.0), Vec3::new(1.0, 8.0, 0.0));
+    }
+
+    #[test]
+    fn an_offset_is_the_projected_error_rounded_outward() {
+        let (p, e) = (Vec3::new(1.0, -2.0, 4.0), Vec3::new(1e-3, 2e-3, 4e-3));
+        for axis in [Vec3::X, Vec3::Y, Vec3::Z, -Vec3::X, -Vec3::Y, -Vec3::Z] {
+            for (w, side) in [(axis, 1.0), (-axis, -1.0)] {
+                let moved = offset_origin(p, e, axis, w) - p;
+                let exact = e * axis * side * axis.abs();
+                assert!((moved - exact).abs().max_element() < 1e-6, "{axis} {w}: {moved} {exact}");
+                // Axes that it does not move along keep their bits
+                assert_eq!(moved * (Vec3::ONE - axis.abs()), Vec3::ZERO);
+            }
+        }
+        // An error far below the spacing of floats still moves to the next one
+        let tiny = Vec3::splat(1e-20);
+        assert_eq!(offset_origin(p, tiny, Vec3::X, Vec3::X).x, 1.0_f32.next_up());
+        assert_eq!(offset_origin(p, tiny, Vec3::X, -Vec3::X).x, 1.0_f32.next_down());
+        assert_eq!(offset_origin(p, Vec3::ZERO, Vec3::X, Vec3::X), p);
+        // On the plane, the side of the normal
+        assert!(offset_origin(p, e, Vec3::X, Vec3::Y).x > p.x);
+    }
 }

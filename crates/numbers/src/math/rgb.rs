@@ -221,4 +221,47 @@ mod tests {
     fn luminance_of_white_is_one() {
         assert!((Rgb::WHITE.luminance() - 1.0).abs() < 1e-6);
     }
+
+    #[test]
+    fn arithmetic_is_by_components() {
+        let (a, b) = (Rgb::new(1.0, 4.0, 9.0), Rgb::new(2.0, 8.0, 3.0));
+        assert_eq!(a + b, Rgb::new(3.0, 12.0, 12.0));
+        assert_eq!(a - b, Rgb::new(-1.0, -4.0, 6.0));
+        assert_eq!(a * b, Rgb::new(2.0, 32.0, 27.0));
+        assert_eq!(a / b, Rgb::new(0.5, 0.5, 3.0));
+        assert_eq!((a * 2.0, 2.0 * a, a / 2.0), (a + a, a + a, Rgb::new(0.5, 2.0, 4.5)));
+        let mut sum = a;
+        sum += b;
+        sum *= b;
+        sum *= 0.5;
+        assert_eq!(sum, Rgb::new(3.0, 48.0, 18.0));
+        assert_eq!([a, b, b].into_iter().sum::<Rgb>(), Rgb::new(5.0, 20.0, 15.0));
+        assert_eq!((a[0], a[1], a[2]), (1.0, 4.0, 9.0));
+        assert_eq!((a.to_array(), Rgb::from_array([1.0, 4.0, 9.0])), ([1.0, 4.0, 9.0], a));
+    }
+
+    #[test]
+    fn functions_of_a_colour_have_known_values() {
+        let a = Rgb::new(1.0, 4.0, 9.0);
+        assert_eq!((a.sqrt(), Rgb::splat(1.0).exp()), (Rgb::new(1.0, 2.0, 3.0), Rgb::splat(1.0_f32.exp())));
+        assert_eq!((a.clamp(2.0, 5.0), a.map(|c| c + 1.0)), (Rgb::new(2.0, 4.0, 5.0), Rgb::new(2.0, 5.0, 10.0)));
+        assert_eq!(a.lerp(Rgb::WHITE, 0.25), Rgb::new(1.0, 3.25, 7.0));
+        assert!((a.average() - 14.0 / 3.0).abs() < 1e-6);
+        for turned in [a, Rgb::new(9.0, 1.0, 4.0), Rgb::new(4.0, 9.0, 1.0)] {
+            assert_eq!(turned.max_component(), 9.0);
+        }
+        // A known luminance, by different weights
+        let y = 0.212_671 + 4.0 * 0.715_160 + 9.0 * 0.072_169;
+        assert!((a.luminance() - y as f32).abs() < 1e-6 && (luminance([1.0, 4.0, 9.0]) - y).abs() < 1e-12);
+    }
+
+    #[test]
+    fn black_and_finite_ask_every_component() {
+        assert!(Rgb::BLACK.is_black() && Rgb::WHITE.is_finite());
+        for axis in [[1.0, 0.0, 0.0], [0.0, 1.0, 0.0], [0.0, 0.0, 1.0]].map(Rgb::from_array) {
+            assert!(!axis.is_black());
+            assert!(!axis.map(|c| if c == 1.0 { f32::INFINITY } else { c }).is_finite());
+            assert!(!axis.map(|c| if c == 1.0 { f32::NAN } else { c }).is_finite());
+        }
+    }
 }

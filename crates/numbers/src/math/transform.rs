@@ -39,4 +39,14 @@ mod tests {
         assert!(n2.dot(m.transform_vector3(n)) > 0.0);
         assert!(swaps_handedness(&m));
     }
+
+    #[test]
+    fn blends_are_linear_and_handedness_is_kept_without_a_mirror() {
+        let a =
+            Affine3A::from_scale_rotation_translation(Vec3::splat(2.0), glam::Quat::IDENTITY, Vec3::new(0.0, 4.0, 8.0));
+        let blend = lerp_affine(&Affine3A::IDENTITY, &a, 0.25);
+        assert_eq!(blend.transform_point3(Vec3::new(1.0, 2.0, 4.0)), Vec3::new(1.25, 3.5, 7.0));
+        assert!(!swaps_handedness(&a));
+        assert_eq!(transform_normal(&Affine3A::from_scale(Vec3::ZERO), Vec3::X), Vec3::ZERO);
+    }
 }

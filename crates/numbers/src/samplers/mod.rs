@@ -185,4 +185,29 @@ mod tests {
             assert!(counts.iter().all(|&c| c == 1), "{kind:?}: each of the 64 intervals holds one of 64 points");
         }
     }
+
+    #[test]
+    fn numbers_of_roulette_are_uniform_and_differ_between_domains() {
+        for kind in SamplerKind::iter() {
+            let (mut sum, mut squares) = (0.0_f64, 0.0_f64);
+            let n = 64 * 64 * 4;
+            for i in 0..n {
+                let stream = SampleStream::new(kind, [i % 64, i / 64 % 64], i / 4096, 7).domain(11);
+                let u = stream.draw_random(3);
+                assert!((0.0..1.0).contains(&u) && u != stream.draw_random(4));
+                sum += f64::from(u);
+                squares += f64::from(u * u);
+            }
+            // σ of the means: 0.289/√n = 0.00226 and 0.298/√n = 0.00233; four of them
+            let (mean, square) = (sum / f64::from(n), squares / f64::from(n));
+            assert!((mean - 0.5).abs() < 0.009 && (square - 1.0 / 3.0).abs() < 0.0094, "{kind:?} {mean} {square}");
+        }
+    }
+
+    #[test]
+    fn samplers_say_whether_their_samples_are_independent() {
+        let independent = |kind: SamplerKind| kind.has_independent_samples();
+        assert!(independent(SamplerKind::Independent) && independent(SamplerKind::Stratified));
+        assert!(!independent(SamplerKind::Sobol) && !independent(SamplerKind::SobolBlueNoise));
+    }
 }
