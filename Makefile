@@ -18,7 +18,7 @@ test: setup
 	$(CARGO) test --workspace --doc
 	$(CARGO) test --workspace --lib --bins --tests
 
-# Analytic scenes at full power: enough samples to detect a bias of 2 % (0.5 % in scenes with little noise), the
+# Analytic scenes at full power: enough samples to detect a bias of 2 % (0.5 or 1 % where there is little noise), the
 # injection of that bias, and the table of what each row detects. `make test` does the same with a sixth of the samples
 # or less.
 test-power: setup
