@@ -65,6 +65,7 @@ pub(super) fn trace(
             .collect();
         light(paths, job, &settings.at_vertex(vertex), (&shadings, &points), fits, out);
         extend(paths, settings, vertex, (&vertices, &shadings, &points));
+        paths.recycle(vertices);
     }
 }
 

@@ -126,8 +126,13 @@ pub(super) struct PathState {
 pub struct PathIntegrator {
     pub(super) active: Vec<PathState>,
     pub(super) next: Vec<PathState>,
+    kept: Vec<PathState>,
+    passing: Vec<PathState>,
     rays: RayBatch,
     hits: Vec<Option<Hit>>,
+    /// Memory of the vertices and shading points of earlier batches.
+    spare_vertices: Vec<Vertex<'static>>,
+    spare_points: Vec<ShadingPoint<'static>>,
     pub(super) radiance: Vec<Rgb>,
     pub(super) direct: DirectStage,
     pub(super) stats: PathStats,
@@ -164,18 +169,17 @@ impl PathIntegrator {
             }
             let vertices = self.find_vertices(job, vertex, depth, samples, out);
             let sample_counts = settings.sample_counts_at_vertex(vertex);
-            let points: Vec<ShadingPoint<'_>> = vertices
-                .iter()
-                .zip(&self.active)
-                .map(|(v, path)| {
-                    let sample_counts =
-                        if vertex == 0 { samples[path.sample as usize].sample_counts } else { sample_counts };
-                    v.shading_point(path.ray.time, sample_counts, samples[path.sample as usize].fit)
-                })
-                .collect();
+            let mut points: Vec<ShadingPoint<'_>> = emptied(std::mem::take(&mut self.spare_points));
+            points.extend(vertices.iter().zip(&self.active).map(|(v, path)| {
+                let sample_counts =
+                    if vertex == 0 { samples[path.sample as usize].sample_counts } else { sample_counts };
+                v.shading_point(path.ray.time, sample_counts, samples[path.sample as usize].fit)
+            }));
             self.light_points(job, &settings.at_vertex(vertex), vertex, &points, fits, out);
             self.extend_paths(settings, vertex, &vertices, &points);
             std::mem::swap(&mut self.active, &mut self.next);
+            self.spare_points = emptied(points);
+            self.recycle(vertices);
         }
     }
 
@@ -196,6 +200,11 @@ impl PathIntegrator {
         }));
     }
 
+    /// Keeps the memory of vertices that are done with for those of the next batch.
+    pub(super) fn recycle(&mut self, vertices: Vec<Vertex<'_>>) {
+        self.spare_vertices = emptied(vertices);
+    }
+
     /// Traces the active paths to their next vertex, adds what they see at the first one, and keeps those that hit
     /// something that scatters. The answer's items belong to the paths that `self.active` then holds.
     pub(super) fn find_vertices<'w>(
@@ -206,14 +215,14 @@ impl PathIntegrator {
         samples: &[CameraSample],
         out: &mut [PixelSample],
     ) -> Vec<Vertex<'w>> {
-        let mut vertices = Vec::with_capacity(self.active.len());
-        let mut kept = Vec::with_capacity(self.active.len());
+        let mut vertices: Vec<Vertex<'w>> = emptied(std::mem::take(&mut self.spare_vertices));
+        self.kept.clear();
         let mut coherence = if vertex == 0 { Coherence::Coherent } else { Coherence::Incoherent };
         while !self.active.is_empty() {
             self.trace_active(job, vertex, coherence);
             coherence = Coherence::Incoherent;
             let start = Instant::now();
-            let mut passing = Vec::new();
+            self.passing.clear();
             for (path, hit) in self.active.iter().zip(&self.hits) {
                 let interaction = match hit {
                     None => {
@@ -251,17 +260,17 @@ impl PathIntegrator {
                                 stream,
                                 direct,
                             });
-                            kept.push(PathState { width: interaction.width, passed: 0, travelled: 0.0, ..*path });
+                            self.kept.push(PathState { width: interaction.width, passed: 0, travelled: 0.0, ..*path });
                         }
                     }
-                    None if path.passed < MAX_PASSED => passing.push(path.pass(&interaction)),
+                    None if path.passed < MAX_PASSED => self.passing.push(path.pass(&interaction)),
                     None => {}
                 }
             }
-            self.active = passing;
+            std::mem::swap(&mut self.active, &mut self.passing);
             self.stats.shade_time += start.elapsed();
         }
-        self.active = kept;
+        std::mem::swap(&mut self.active, &mut self.kept);
         vertices
     }
 
@@ -330,6 +339,13 @@ impl PathIntegrator {
         }
         self.stats.shade_time += start.elapsed();
     }
+}
+
+/// An empty vector in the memory of `old`, whose items have the same layout and may borrow from something else.
+fn emptied<T, U>(mut old: Vec<T>) -> Vec<U> {
+    const { assert!(size_of::<T>() == size_of::<U>() && align_of::<T>() == align_of::<U>()) };
+    old.clear();
+    old.into_iter().map(|_| unreachable!("the vector is empty")).collect()
 }
 
 /// A vertex that scatters.

@@ -29,6 +29,7 @@ use lumiris_numbers::math::hash::pcg4d;
 use lumiris_numbers::samplers::SampleStream;
 use rayon::prelude::*;
 use std::sync::atomic::{AtomicBool, AtomicU64, Ordering};
+use std::sync::{Mutex, MutexGuard, PoisonError};
 use std::time::{Duration, Instant};
 use worker::{Worker, WorkerStats};
 
@@ -209,6 +210,8 @@ struct Run<'a> {
     start: Instant,
     samples_done: AtomicU64,
     rays: AtomicU64,
+    /// Workers without a tile, whose buffers are large enough already.
+    idle: Mutex<Vec<Worker>>,
 }
 
 impl<'a> Run<'a> {
@@ -230,6 +233,7 @@ impl<'a> Run<'a> {
             start: Instant::now(),
             samples_done: AtomicU64::new(0),
             rays: AtomicU64::new(0),
+            idle: Mutex::default(),
         }
     }
 
@@ -369,11 +373,13 @@ impl<'a> Run<'a> {
         tiles
             .par_iter_mut()
             .with_max_len(1)
-            .map_init(Worker::default, |worker, tile| {
+            .map(|tile| {
                 if self.stop.load(Ordering::Relaxed) {
                     return WorkerStats::default();
                 }
-                let stats = self.render_tile(worker, tile, samples.clone());
+                let mut worker = self.idle().pop().unwrap_or_default();
+                let stats = self.render_tile(&mut worker, tile, samples.clone());
+                self.idle().push(worker);
                 let (paths, direct) = (&stats.paths, &stats.paths.direct);
                 let rays = paths.camera_rays + paths.bounce_rays + direct.emitter_rays + direct.segments;
                 let done = tile.bounds.area() as u64 * u64::from(samples.end - samples.start);
@@ -390,6 +396,10 @@ impl<'a> Run<'a> {
                 a.merge(&b);
                 a
             })
+    }
+
+    fn idle(&self) -> MutexGuard<'_, Vec<Worker>> {
+        self.idle.lock().unwrap_or_else(PoisonError::into_inner)
     }
 
     /// Adds the samples of a range to one tile, in batches of whole pixels.

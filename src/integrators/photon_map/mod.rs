@@ -217,6 +217,7 @@ impl PhotonMapIntegrator {
                 }
             }
             std::mem::swap(&mut gather.active, &mut gather.next);
+            gather.recycle(vertices);
         }
         let mut results = std::mem::take(&mut self.results);
         self.correct(job, &mut results);

@@ -345,6 +345,7 @@ mod tests {
         let values = [0.0, 1.0, 0.5, 0.0, 0.0, 7.0, 0.0];
         let d = PiecewiseConstant1D::new(&values);
         assert!((d.integral() - 8.5 / 7.0).abs() < 1e-6);
+        assert!(d.len() == 7 && !d.is_empty());
         let mut observed = vec![0.0; 70];
         let mut stream = pcg32([1, 5, 0]);
         for _ in 0..100_000 {
@@ -362,6 +363,9 @@ mod tests {
     fn samples_in_2d_follow_the_density_and_invert() {
         let values = [0.0, 1.0, 2.0, 0.0, 0.0, 0.0, 4.0, 0.0, 0.5, 0.0, 0.0, 0.0];
         let d = PiecewiseConstant2D::new(&values, 3);
+        // Densities are values over their mean, 0.625
+        assert_eq!(d.pdf_of_cell([2, 0]), 3.2);
+        assert_eq!((d.pdf(Vec2::new(0.1, 0.6)), d.pdf(Vec2::new(0.1, 0.1))), (6.4, 0.0));
         let mut observed = vec![0.0; 12];
         let mut stream = pcg32([2, 5, 0]);
         for _ in 0..100_000 {
