@@ -165,6 +165,10 @@ impl SampleAllocation {
     /// Allocates the samples, or the proposals, to the techniques.
     fn new(settings: &IntegratorSettings, point: &ShadingPoint<'_>) -> Self {
         let n = point.sample_counts.samples;
+        if point.bsdf_by_path {
+            let light = if point.bsdf.bsdf.has_non_specular() { n.saturating_sub(1) } else { 0 };
+            return SampleAllocation { bsdf_draws: 0, ..SampleAllocation::fixed(light, 1) };
+        }
         if !point.bsdf.bsdf.has_non_specular() {
             return SampleAllocation::fixed(0, n);
         }
@@ -176,7 +180,7 @@ impl SampleAllocation {
                 SampleAllocation::one_of_both(point)
             }
             EstimatorKind::Mis | EstimatorKind::Ocv | EstimatorKind::OptimalMis => {
-                let by_bsdf = ((n as f32 * settings.bsdf_fraction) as u32).clamp(1, n - 1);
+                let by_bsdf = settings.bsdf_samples(n);
                 SampleAllocation::fixed(n - by_bsdf, by_bsdf)
             }
             EstimatorKind::Ris => super::ris::allocation(point),

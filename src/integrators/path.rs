@@ -2,7 +2,12 @@
 //!
 //! The radiance along a camera ray is L_e(x₁) + Σ_k β_k L_direct(x_k), where β_k = Π f_s |cos θ|/p is the throughput up
 //! to the k-th vertex and L_direct is what [`DirectStage`] estimates there, from all light that reaches
-//! the vertex straight from an emitter. So emission is added at the camera ray's hit only, and never twice.
+//! the vertex straight from an emitter. So emission is added at the camera ray's hit, and never twice.
+//!
+//! Where `mis` has one BSDF sample and the path goes on, the sample's direction is that of the next segment, which finds
+//! the emitter itself: what is missing in the estimate at x_k, the emission that x_{k+1} sends back weighted against
+//! light sampling at x_k, is added there ([`BsdfTechnique`]). One ray instead of three, and one BSDF sample instead of
+//! two.
 
 use crate::accel::{Coherence, Hit, RayBatch};
 use crate::bsdfs::Lobe;
@@ -10,10 +15,11 @@ use crate::cameras::CameraRay;
 use crate::direct::{DirectStage, DirectStats, Fits, ShadingPoint};
 use crate::film::{Features, PixelSample};
 use crate::geometry::SurfaceHit;
-use crate::lights::LightHit;
+use crate::lights::{LightCtx, LightHit};
 use crate::materials::SurfaceBsdf;
 use crate::scene::{RenderJob, SurfaceInteraction};
 use crate::settings::{IntegratorSettings, SampleCounts};
+use lumiris_numbers::estimators::mis::{Heuristic, Technique};
 use lumiris_numbers::math::{Ray, Rgb, Vec3};
 use lumiris_numbers::samplers::SampleStream;
 use std::time::{Duration, Instant};
@@ -119,6 +125,30 @@ pub(super) struct PathState {
     passed: u32,
     /// Distance travelled through such surfaces.
     travelled: f32,
+    /// The technique that drew the direction, if the segment looks for emitters.
+    technique: Option<BsdfTechnique>,
+}
+
+/// BSDF sampling at the last vertex, as multiple importance sampling weights it against light sampling there.
+#[derive(Clone, Copy, Debug)]
+struct BsdfTechnique {
+    /// Where light sampling stood.
+    ctx: LightCtx,
+    /// Number of light samples.
+    n_light: f32,
+    /// Density of the direction; `None` for a specular lobe, which no other technique samples.
+    pdf: Option<f32>,
+    heuristic: Heuristic,
+}
+
+impl BsdfTechnique {
+    /// The weight of what it found, where light sampling has the density `p_light`.
+    fn weight(&self, p_light: impl FnOnce(&LightCtx) -> f32) -> f32 {
+        self.pdf.map_or(1.0, |p| {
+            let light = Technique { n: self.n_light, p: p_light(&self.ctx) };
+            self.heuristic.weight(Technique { n: 1.0, p }, light)
+        })
+    }
 }
 
 /// Traces paths; holds the buffers of one worker.
@@ -169,13 +199,19 @@ impl PathIntegrator {
             }
             let vertices = self.find_vertices(job, vertex, depth, samples, out);
             let sample_counts = settings.sample_counts_at_vertex(vertex);
+            let at_vertex = settings.at_vertex(vertex);
+            // Outcomes are those of all samples of a first vertex
+            let may_continue = vertex + 1 < depth && (vertex > 0 || self.outcomes.is_none());
             let mut points: Vec<ShadingPoint<'_>> = emptied(std::mem::take(&mut self.spare_points));
             points.extend(vertices.iter().zip(&self.active).map(|(v, path)| {
-                let sample_counts =
-                    if vertex == 0 { samples[path.sample as usize].sample_counts } else { sample_counts };
-                v.shading_point(path.ray.time, sample_counts, samples[path.sample as usize].fit)
+                let sample = &samples[path.sample as usize];
+                let sample_counts = if vertex == 0 { sample.sample_counts } else { sample_counts };
+                let bsdf_by_path = may_continue
+                    && at_vertex.has_one_bsdf_sample(sample_counts.samples)
+                    && !v.bsdf.bsdf.is_only_evaluated();
+                ShadingPoint { bsdf_by_path, ..v.shading_point(path.ray.time, sample_counts, sample.fit) }
             }));
-            self.light_points(job, &settings.at_vertex(vertex), vertex, &points, fits, out);
+            self.light_points(job, &at_vertex, vertex, &points, fits, out);
             self.extend_paths(settings, vertex, &vertices, &points);
             std::mem::swap(&mut self.active, &mut self.next);
             self.spare_points = emptied(points);
@@ -197,6 +233,7 @@ impl PathIntegrator {
             spread: s.ray.spread,
             passed: 0,
             travelled: 0.0,
+            technique: None,
         }));
     }
 
@@ -224,17 +261,26 @@ impl PathIntegrator {
             let start = Instant::now();
             self.passing.clear();
             for (path, hit) in self.active.iter().zip(&self.hits) {
+                let looks_for_emitters = path.technique.is_some() || vertex == 0 && !self.only_reflected;
                 let interaction = match hit {
                     None => {
-                        if vertex == 0 && !self.only_reflected {
-                            out[path.sample as usize].radiance += path.beta * job.lights.le(path.ray.d);
+                        if looks_for_emitters {
+                            out[path.sample as usize].radiance += path.emission_at_infinity(job);
                         }
                         continue;
                     }
                     Some(hit) => SurfaceInteraction::new(job, &path.ray, (path.width, path.spread), hit),
                 };
-                if vertex == 0 && !self.only_reflected {
-                    path.add_emission(job, &interaction, &mut out[path.sample as usize].radiance);
+                if looks_for_emitters {
+                    out[path.sample as usize].radiance += path.emission(job, &interaction);
+                }
+                let mut path = *path;
+                if path.technique.is_some() && path.passed == 0 {
+                    let stream = || samples[path.sample as usize].stream.domain(domain::VERTEX + vertex - 1);
+                    match survive(path.beta, path.eta_scale, vertex, &job.settings().integrator, stream) {
+                        Some(beta) => path.beta = beta,
+                        None => continue,
+                    }
                 }
                 match interaction.scatter(job) {
                     Some(bsdf) => {
@@ -260,7 +306,7 @@ impl PathIntegrator {
                                 stream,
                                 direct,
                             });
-                            self.kept.push(PathState { width: interaction.width, passed: 0, travelled: 0.0, ..*path });
+                            self.kept.push(PathState { width: interaction.width, passed: 0, travelled: 0.0, ..path });
                         }
                     }
                     None if path.passed < MAX_PASSED => self.passing.push(path.pass(&interaction)),
@@ -335,7 +381,12 @@ impl PathIntegrator {
         self.next.clear();
         if vertex + 1 < depth {
             let paths = self.active.iter().zip(vertices).zip(points);
-            self.next.extend(paths.filter_map(|((path, v), point)| Some(extend(path, v, point, vertex, settings)?.0)));
+            self.next.extend(paths.filter_map(|((path, v), point)| {
+                if point.bsdf_by_path {
+                    return extend_to_emitter(path, v, point, &settings.at_vertex(vertex));
+                }
+                Some(extend(path, v, point, vertex, settings)?.0)
+            }));
         }
         self.stats.shade_time += start.elapsed();
     }
@@ -369,6 +420,7 @@ impl<'w> Vertex<'w> {
             stream: self.direct.domain(domain::DIRECT),
             sample_counts,
             fit,
+            bsdf_by_path: false,
         }
     }
 }
@@ -381,24 +433,56 @@ pub(super) fn extend(
     vertex: u32,
     settings: &IntegratorSettings,
 ) -> Option<(PathState, Lobe)> {
-    let Direction { wi, weight, eta, lobe } = next_direction(v, settings)?;
-    let mut beta = path.beta * weight;
+    let direction = next_direction(v, settings)?;
+    let mut next = scattered(path, point, &direction)?;
+    next.beta = survive(next.beta, next.eta_scale, vertex + 1, settings, || v.stream)?;
+    Some((next, direction.lobe))
+}
+
+/// The next path segment by BSDF sampling, which looks for the emitter of the sample as well. Roulette decides when it
+/// has been found; `None` if the direction carries no light.
+fn extend_to_emitter(
+    path: &PathState,
+    v: &Vertex<'_>,
+    point: &ShadingPoint<'_>,
+    settings: &IntegratorSettings,
+) -> Option<PathState> {
+    let direction = next_direction(v, settings)?;
+    let next = scattered(path, point, &direction)?;
+    let n_light = if v.bsdf.bsdf.has_non_specular() { point.sample_counts.samples.saturating_sub(1) } else { 0 };
+    let technique = BsdfTechnique {
+        ctx: point.light_ctx(),
+        n_light: n_light as f32,
+        pdf: direction.pdf.filter(|_| !direction.lobe.is_specular()),
+        heuristic: settings.heuristic(),
+    };
+    Some(PathState { technique: Some(technique), ..next })
+}
+
+/// The path beyond a point in a direction; `None` if it carries nothing.
+fn scattered(path: &PathState, point: &ShadingPoint<'_>, direction: &Direction) -> Option<PathState> {
+    let Direction { wi, weight, eta, .. } = *direction;
+    let beta = path.beta * weight;
     let eta_scale = path.eta_scale * eta * eta;
-    if beta.is_black() || !beta.is_finite() {
-        return None;
-    }
-
-    // Russian roulette, from the second bounce on, on what the path carries without the scaling of refraction
-    let survival = (beta * eta_scale).map(f32::abs).max_component();
-    if survival < 1.0 && vertex >= 1 {
-        if v.stream.draw_random(domain::ROULETTE) >= survival {
-            return None;
-        }
-        beta = beta / survival;
-    }
-
     let ray = Ray { o: point.origin(wi), d: wi, t_max: f32::INFINITY, time: path.ray.time };
-    Some((PathState { ray, beta, eta_scale, ..*path }, lobe))
+    let carries = !beta.is_black() && beta.is_finite();
+    carries.then_some(PathState { ray, beta, eta_scale, technique: None, ..*path })
+}
+
+/// Russian roulette before bounce `bounce` on what the path carries without the scaling of refraction: the throughput of
+/// a path that goes on. `stream` is that of the vertex that it left.
+fn survive(
+    beta: Rgb,
+    eta_scale: f32,
+    bounce: u32,
+    settings: &IntegratorSettings,
+    stream: impl FnOnce() -> SampleStream,
+) -> Option<Rgb> {
+    let survival = (beta * eta_scale).map(f32::abs).max_component();
+    if !settings.has_roulette(bounce) || !(survival < 1.0) {
+        return Some(beta);
+    }
+    (stream().draw_random(domain::ROULETTE) < survival).then(|| beta / survival)
 }
 
 /// How a path continues.
@@ -409,6 +493,8 @@ struct Direction {
     /// Relative index of refraction.
     eta: f32,
     lobe: Lobe,
+    /// Density of the direction; `None` if it was resampled.
+    pdf: Option<f32>,
 }
 
 /// A direction by BSDF sampling; of a BSDF that can only be evaluated, by resampling M proposals.
@@ -418,25 +504,45 @@ fn next_direction(v: &Vertex<'_>, settings: &IntegratorSettings) -> Option<Direc
         let proposal = |i| v.stream.split(domain::BSDF, count, i).draw::<3>();
         let [u_choice] = v.stream.domain(domain::RESAMPLE).draw::<1>();
         let r = v.bsdf.resample(v.wo, count, proposal, u_choice)?;
-        return Some(Direction { wi: r.wi, weight: r.f * (v.bsdf.cos(r.wi) * r.weight), eta: r.eta, lobe: r.lobe });
+        return Some(Direction {
+            wi: r.wi,
+            weight: r.f * (v.bsdf.cos(r.wi) * r.weight),
+            eta: r.eta,
+            lobe: r.lobe,
+            pdf: None,
+        });
     }
     let [uc, u0, u1] = v.stream.domain(domain::BSDF).draw::<3>();
     let sample = v.bsdf.sample(v.wo, uc, [u0, u1])?;
     let weight = sample.f * (sample.wi.dot(v.bsdf.frame.z).abs() / sample.pdf);
-    Some(Direction { wi: sample.wi, weight, eta: sample.eta, lobe: sample.lobe })
+    Some(Direction { wi: sample.wi, weight, eta: sample.eta, lobe: sample.lobe, pdf: Some(sample.pdf) })
 }
 
 impl PathState {
-    /// Adds the emission of a surface towards the camera.
-    fn add_emission(&self, job: &RenderJob, interaction: &SurfaceInteraction, radiance: &mut Rgb) {
+    /// What the path carries of the emission of a surface, with the weight of the technique that found it.
+    fn emission(&self, job: &RenderJob, interaction: &SurfaceInteraction) -> Rgb {
         let lights = &job.lights;
         if interaction.hit.instance != Hit::NO_INSTANCE {
-            return;
+            return Rgb::BLACK;
         }
-        if let Some(light) = lights.light_of(interaction.hit.geometry, interaction.hit.primitive) {
-            let s = &interaction.surface;
-            let hit = LightHit { t: interaction.hit.t, p: s.p, n: s.n, uv: s.uv };
-            *radiance += self.beta * lights.lights[light as usize].l(&hit, interaction.wo);
+        let Some(light) = lights.light_of(interaction.hit.geometry, interaction.hit.primitive) else {
+            return Rgb::BLACK;
+        };
+        let s = &interaction.surface;
+        let hit = LightHit { t: self.depth(interaction), p: s.p, n: s.n, uv: s.uv };
+        let l = self.beta * lights.lights[light as usize].l(&hit, interaction.wo);
+        match &self.technique {
+            Some(technique) if !l.is_black() => l * technique.weight(|ctx| lights.pdf(ctx, light, self.ray.d, &hit)),
+            _ => l,
+        }
+    }
+
+    /// The same of the infinite lights.
+    fn emission_at_infinity(&self, job: &RenderJob) -> Rgb {
+        let l = self.beta * job.lights.le(self.ray.d);
+        match &self.technique {
+            Some(technique) if !l.is_black() => l * technique.weight(|ctx| job.lights.pdf_infinite(ctx, self.ray.d)),
+            _ => l,
         }
     }
 

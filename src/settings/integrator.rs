@@ -15,6 +15,8 @@ pub struct IntegratorSettings {
     pub kind: IntegratorKind,
     /// Maximum number of bounces; 1 is direct light. In records of `irradiance-cache` they are counted from the record.
     pub max_depth: u32,
+    /// The bounce from which on paths end by Russian roulette on their throughput; `None`: they go on to `max_depth`.
+    pub roulette_depth: Option<u32>,
     /// Direct-light estimator at each path vertex.
     pub estimator: EstimatorKind,
     /// Samples per estimate (N): shadow segments per shading point. `None` is the default of the estimator:
@@ -61,6 +63,7 @@ impl Default for IntegratorSettings {
         IntegratorSettings {
             kind: IntegratorKind::Path,
             max_depth: 5,
+            roulette_depth: Some(2),
             estimator: EstimatorKind::Mis,
             samples: None,
             heuristic: None,
@@ -111,6 +114,21 @@ impl IntegratorSettings {
             EstimatorKind::Ocv => self.ocv.form == Form::Progressive,
             EstimatorKind::OptimalMis => self.optimal_mis == OptimalForm::Progressive,
         }
+    }
+
+    /// Number of BSDF samples among `n` ≥ 2 samples of light and BSDF sampling.
+    pub fn bsdf_samples(&self, n: u32) -> u32 {
+        ((n as f32 * self.bsdf_fraction) as u32).clamp(1, n - 1)
+    }
+
+    /// True if an estimate of `n` samples has one of BSDF sampling, which the path can continue by.
+    pub fn has_one_bsdf_sample(&self, n: u32) -> bool {
+        self.estimator == EstimatorKind::Mis && n >= 2 && self.bsdf_samples(n) == 1
+    }
+
+    /// True if the throughput of a path decides whether it takes the bounce of this number, counted from 1.
+    pub fn has_roulette(&self, bounce: u32) -> bool {
+        self.roulette_depth.is_some_and(|first| bounce >= first)
     }
 
     /// Settings of direct light at a path vertex, counted from 0. Progressive estimators are fitted to the first

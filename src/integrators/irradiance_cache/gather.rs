@@ -259,6 +259,7 @@ impl RecordRequest {
             n: self.n,
         };
         ShadingPoint {
+            bsdf_by_path: false,
             p: self.p,
             p_error: self.p_error,
             wo: self.ns,

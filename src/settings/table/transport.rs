@@ -40,6 +40,21 @@ pub(super) const TRANSPORT: Group = Group {
             ..Setting::BASE
         },
         Setting {
+            flag: "roulette-depth",
+            value_name: "D",
+            parameters: &["roulettedepth"],
+            key: "roulette_depth",
+            kind: Kind::Integer { range: Integers { min: 1, max: 10_000 }, words: &["off"] },
+            help: "First bounce that Russian roulette may end a path before, or `off`: fewer and noisier paths in less \
+                   time, or all of them up to the maximum number of bounces",
+            get: |s| Some(s.integrator.roulette_depth.map_or(Value::Name("off"), |n| Value::Integer(n.into()))),
+            set: |s, v| {
+                s.integrator.roulette_depth = if v.name().is_some() { None } else { Some(v.count()?) };
+                Some(())
+            },
+            ..Setting::BASE
+        },
+        Setting {
             flag: "light-sampler",
             aliases: &["light-choice"],
             parameters: &["lightsampler"],

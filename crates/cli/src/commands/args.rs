@@ -56,7 +56,7 @@ pub(super) struct RenderArgs {
     /// [default: the name in the file, or SCENE.exr]
     #[arg(short, long, value_name = "FILE")]
     pub output: Vec<PathBuf>,
-    /// Stop after the first pass that ends later than this many seconds
+    /// Stop after the first pass that ends later than this many seconds, if not all samples per pixel are done before
     #[arg(long, value_name = "SECONDS", value_parser = parse_seconds)]
     pub time: Option<f64>,
     /// AOVs: additional channels of EXR files [default: all, and ratio with --proposals optimal]
