@@ -6,6 +6,8 @@
 pub mod alpha;
 pub mod bvh;
 pub mod embree;
+#[cfg(test)]
+mod scenes_for_tests;
 
 pub use alpha::{AlphaSource, AlphaTest};
 pub use bvh::Bvh;

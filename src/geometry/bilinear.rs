@@ -157,15 +157,12 @@ pub(super) fn solve_quadratic(a: f64, b: f64, c: f64) -> Option<[f64; 2]> {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::geometry::reference_for_tests::random_point;
     use lumiris_numbers::math::ray::offset_origin;
-    use lumiris_test_support::random::{Pcg32, RngExt, pcg32};
+    use lumiris_test_support::random::{RngExt, pcg32};
 
     fn patch(corners: [Vec3; 4]) -> BilinearMesh {
         BilinearMesh { positions: corners.to_vec(), indices: vec![[0, 1, 2, 3]], ..BilinearMesh::default() }
-    }
-
-    fn random_point(s: &mut Pcg32) -> Vec3 {
-        Vec3::new(s.random::<f32>(), s.random::<f32>(), s.random::<f32>()) * 2.0 - 1.0
     }
 
     /// Hits of a fine grid of triangles on the patch, in f64.

@@ -7,6 +7,8 @@ pub mod hit;
 pub mod loop_subdiv;
 pub mod mesh;
 pub mod quadric;
+#[cfg(test)]
+pub(crate) mod reference_for_tests;
 pub mod set;
 pub mod triangle;
 

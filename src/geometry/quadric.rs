@@ -263,6 +263,7 @@ fn sphere_roots(o: DVec3, d: DVec3, radius: f64) -> Option<[f64; 2]> {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::geometry::reference_for_tests::random_point;
     use lumiris_numbers::math::ray::offset_origin;
     use lumiris_test_support::random::{Pcg32, RngExt, pcg32};
     use std::f32::consts::TAU as TAU32;
@@ -281,10 +282,6 @@ mod tests {
     fn placed(kind: QuadricKind, group_from_local: Affine3A) -> Quadric {
         let local_from_group = group_from_local.inverse();
         Quadric { kind, group_from_local, local_from_group, flip_normal: swaps_handedness(&group_from_local) }
-    }
-
-    fn random_point(s: &mut Pcg32) -> Vec3 {
-        Vec3::new(s.random::<f32>(), s.random::<f32>(), s.random::<f32>()) * 2.0 - 1.0
     }
 
     fn random_placement(s: &mut Pcg32) -> Affine3A {

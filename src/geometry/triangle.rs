@@ -110,23 +110,8 @@ fn plane_parameter(ray: &Ray, [p0, p1, p2]: [Vec3; 3]) -> Option<f32> {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use lumiris_test_support::random::{Pcg32, RngExt, pcg32};
-
-    fn random_point(s: &mut Pcg32) -> Vec3 {
-        Vec3::new(s.random::<f32>(), s.random::<f32>(), s.random::<f32>()) * 2.0 - 1.0
-    }
-
-    /// Möller–Trumbore in f64.
-    fn reference(ray: &Ray, [p0, p1, p2]: [Vec3; 3]) -> Option<[f64; 3]> {
-        let (p0, p1, p2) = (p0.as_dvec3(), p1.as_dvec3(), p2.as_dvec3());
-        let (o, d) = (ray.o.as_dvec3(), ray.d.as_dvec3());
-        let (e1, e2) = (p1 - p0, p2 - p0);
-        let q = d.cross(e2);
-        let det = e1.dot(q);
-        let s = o - p0;
-        let (b1, b2, t) = (s.dot(q) / det, d.dot(s.cross(e1)) / det, e2.dot(s.cross(e1)) / det);
-        (b1 >= 0.0 && b2 >= 0.0 && b1 + b2 <= 1.0 && t > 0.0 && t < f64::from(ray.t_max)).then_some([t, b1, b2])
-    }
+    use crate::geometry::reference_for_tests::{random_point, triangle_hit};
+    use lumiris_test_support::random::{RngExt, pcg32};
 
     #[test]
     fn hits_agree_with_f64() {
@@ -138,7 +123,7 @@ mod tests {
             let d = (random_point(&mut s) * 0.5 - o) * (0.1 + s.random::<f32>());
             let ray = Ray { o, d, t_max: f32::INFINITY, time: 0.0 };
             let hit = RayPrecomputed::new(&ray).and_then(|r| intersect_triangle(&r, triangle, ray.t_max));
-            match (hit, reference(&ray, triangle)) {
+            match (hit, triangle_hit(&ray, triangle)) {
                 (Some(hit), Some([t, b1, b2])) => {
                     found += 1;
                     // Compare points, not parameters: grazing rays have ill-conditioned weights.

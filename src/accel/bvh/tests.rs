@@ -1,107 +1,14 @@
 //! Comparison with brute force. Both use the same exact intersections, so results must agree bit for bit.
 
 use super::*;
+use crate::accel::scenes_for_tests::{
+    Stripes, mixed_scene, random_patches, random_quadric, random_rays, separate_triangles, soup,
+};
+use crate::geometry::reference_for_tests::random_point;
 use crate::geometry::triangle::{RayPrecomputed, intersect_triangle};
-use crate::geometry::{BilinearMesh, GeometryId, Instance, Quadric, QuadricKind, TriangleMesh, loop_subdivide};
-use lumiris_numbers::math::{Quat, Ray, Vec2};
-use lumiris_test_support::random::{Pcg32, RngExt, pcg32};
-
-struct Stripes;
-
-impl AlphaSource for Stripes {
-    fn alpha(&self, texture: u32, uv: Vec2, p: Vec3) -> f32 {
-        match texture {
-            0 => 0.0,
-            1 => 0.4,
-            2 => ((uv.x * 8.0) as i32 % 2) as f32,
-            _ => (p.x * 4.0).sin() * 0.5 + 0.5,
-        }
-    }
-}
-
-fn random_point(s: &mut Pcg32) -> Vec3 {
-    Vec3::new(s.random::<f32>(), s.random::<f32>(), s.random::<f32>()) * 2.0 - 1.0
-}
-
-fn soup(s: &mut Pcg32, triangles: u32, size: f32) -> Shape {
-    let mut positions = Vec::new();
-    for _ in 0..triangles {
-        let center = random_point(s);
-        positions.extend((0..3).map(|_| center + random_point(s) * size));
-    }
-    Shape::Mesh(TriangleMesh::new(positions, (0..triangles).map(|i| [3 * i, 3 * i + 1, 3 * i + 2]).collect()).unwrap())
-}
-
-fn random_placement(s: &mut Pcg32) -> Affine3A {
-    let rotation = Quat::from_axis_angle(random_point(s).normalize_or(Vec3::X), s.random::<f32>() * 6.0);
-    let scale = Vec3::splat(0.3) + random_point(s).abs();
-    Affine3A::from_scale_rotation_translation(scale, rotation, random_point(s) * 3.0)
-}
-
-fn random_quadric(s: &mut Pcg32, kind: u32) -> Shape {
-    let (radius, phi_max) = (0.3, 1.0 + 5.0 * s.random::<f32>());
-    let kind = match kind % 3 {
-        0 => QuadricKind::Sphere { radius, z_min: -0.3, z_max: 0.2, phi_max },
-        1 => QuadricKind::Disk { height: 0.1, radius, inner_radius: 0.05, phi_max },
-        _ => QuadricKind::Cylinder { radius, z_min: -0.5, z_max: 0.5, phi_max },
-    };
-    let group_from_local = random_placement(s);
-    let local_from_group = group_from_local.inverse();
-    Shape::Quadric(Quadric { kind, group_from_local, local_from_group, flip_normal: false })
-}
-
-fn random_patches(s: &mut Pcg32, count: u32) -> Shape {
-    let mut positions = Vec::new();
-    for _ in 0..count {
-        let center = random_point(s);
-        positions.extend((0..4).map(|_| center + random_point(s) * 0.4));
-    }
-    let indices = (0..count).map(|i| [4 * i, 4 * i + 1, 4 * i + 2, 4 * i + 3]).collect();
-    Shape::Bilinear(BilinearMesh { positions, indices, ..BilinearMesh::default() })
-}
-
-/// Two groups of everything, some of it cut out or hidden from some rays, in the root and in instances that may move.
-fn mixed_scene(seed: u32) -> Arc<GeometrySet> {
-    let mut s = pcg32([seed, 77, 0]);
-    let mut geometries = Vec::new();
-    for k in 0..24_u32 {
-        let shape = match k % 4 {
-            0 | 1 => soup(&mut s, 1 + 40 * (k % 5), 0.2),
-            2 => random_quadric(&mut s, k / 4),
-            _ => random_patches(&mut s, 1 + k % 5),
-        };
-        let visibility = Visibility([3, 3, 1, 2, 0][k as usize * 7 % 5]);
-        let alpha = [None, None, Some(0), Some(1), Some(2), Some(3)][k as usize * 5 % 6];
-        geometries.push(Geometry { shape, alpha, visibility });
-    }
-    let groups =
-        vec![Group { geometries: (8..16).collect() }, Group { geometries: (16..24).collect() }, Group::default()];
-    let instances = (0..9_u32)
-        .map(|k| {
-            let samples = [1, 1, 2, 3][k as usize % 4];
-            let first = random_placement(&mut s);
-            let moved = |i: usize| Affine3A::from_translation(Vec3::X * i as f32 * 0.4) * first;
-            Instance { group: k % 3, world_from_group: (0..samples).map(moved).collect() }
-        })
-        .collect();
-    Arc::new(GeometrySet { geometries, groups, root: Group { geometries: (0..8).collect() }, instances })
-}
-
-fn random_rays(count: usize, seed: u32) -> RayBatch {
-    let mut s = pcg32([seed, 5, 5]);
-    let mut rays = RayBatch::default();
-    for k in 0..count {
-        let o = random_point(&mut s) * 5.0;
-        let mut d = random_point(&mut s) * 2.0 - o;
-        if k % 10 == 0 {
-            // Rays along an axis.
-            d = Vec3::ZERO.with_x(if k % 20 == 0 { 1.0 } else { -1.0 });
-        }
-        let t_max = if k % 3 == 0 { s.random::<f32>() * 1.5 } else { f32::INFINITY };
-        rays.push(&Ray { o, d, t_max, time: s.random::<f32>() });
-    }
-    rays
-}
+use crate::geometry::{BilinearMesh, GeometryId, Instance, TriangleMesh, loop_subdivide};
+use lumiris_numbers::math::Ray;
+use lumiris_test_support::random::{RngExt, pcg32};
 
 /// All hits of a geometry in the space of its group.
 fn all_hits(set: &GeometrySet, id: GeometryId, ray: &Ray, instance: u32, hits: &mut Vec<Hit>) {
@@ -183,7 +90,7 @@ fn root_only(shapes: Vec<Shape>) -> Arc<GeometrySet> {
 #[test]
 fn answers_equal_brute_force_on_mixed_scenes() {
     for seed in 0..4 {
-        let set = mixed_scene(seed);
+        let set = mixed_scene(seed, 3);
         let rays = random_rays(4000, seed);
         let (opaque_hits, opaque_occluded) = assert_exact(&set, None, &rays);
         let (hits, occluded) = assert_exact(&set, Some(Arc::new(Stripes)), &rays);
@@ -195,9 +102,9 @@ fn answers_equal_brute_force_on_mixed_scenes() {
 #[test]
 fn answers_equal_brute_force_on_soups_of_any_size() {
     let mut s = pcg32([1, 1, 1]);
-    let mut shapes = vec![soup(&mut s, 3000, 0.1), soup(&mut s, 5, 3.0)];
+    let mut shapes = vec![Shape::Mesh(soup(&mut s, 3000, 0.1)), Shape::Mesh(soup(&mut s, 5, 3.0))];
     // Far from the origin, and flat in a coordinate plane.
-    let Shape::Mesh(far) = soup(&mut s, 200, 0.5) else { unreachable!() };
+    let far = soup(&mut s, 200, 0.5);
     let moved = far.positions().iter().map(|p| *p + Vec3::new(0.0, 500.0, 0.0)).collect();
     shapes.push(Shape::Mesh(TriangleMesh::new(moved, far.indices.clone()).unwrap()));
     let flat = far.positions().iter().map(|p| p.with_y(0.25)).collect();
@@ -243,7 +150,7 @@ fn alpha_stops_rays_with_its_probability() {
 #[test]
 fn equal_hits_go_to_the_smallest_ids() {
     let mut s = pcg32([3, 1, 1]);
-    let Shape::Mesh(mesh) = soup(&mut s, 60, 0.5) else { unreachable!() };
+    let mesh = soup(&mut s, 60, 0.5);
     let mut doubled = mesh.clone();
     doubled.indices.extend_from_within(..);
     let set = root_only(vec![Shape::Mesh(doubled), Shape::Mesh(mesh)]);
@@ -256,7 +163,7 @@ fn equal_hits_go_to_the_smallest_ids() {
 #[test]
 fn degenerate_geometry_and_rays_are_harmless() {
     let mut s = pcg32([4, 1, 1]);
-    let Shape::Mesh(mesh) = soup(&mut s, 400, 0.4) else { unreachable!() };
+    let mesh = soup(&mut s, 400, 0.4);
     let good = root_only(vec![Shape::Mesh(mesh.clone())]);
     // The same with bad triangles behind: NaN, infinite, collapsed to lines and points, all at one place.
     let mut positions = mesh.positions().to_vec();
@@ -296,10 +203,12 @@ fn empty_scenes_and_single_primitives_work() {
     let empty = Arc::new(GeometrySet::default());
     assert_eq!(assert_exact(&empty, None, &rays), (0, 0));
     let mut s = pcg32([5, 1, 1]);
-    for shape in [soup(&mut s, 1, 3.0), random_quadric(&mut s, 0), random_patches(&mut s, 1)] {
+    for shape in [Shape::Mesh(soup(&mut s, 1, 3.0)), random_quadric(&mut s, 0), random_patches(&mut s, 1)] {
         assert_exact(&root_only(vec![shape]), None, &rays);
     }
-    assert!(assert_exact(&root_only(vec![soup(&mut s, 1, 8.0)]), None, &rays).0 > 0);
+    let large =
+        separate_triangles(vec![Vec3::new(-4.0, -4.0, 0.1), Vec3::new(4.0, -4.0, 0.2), Vec3::new(0.0, 5.0, -0.3)]);
+    assert!(assert_exact(&root_only(vec![Shape::Mesh(large)]), None, &rays).0 > 0);
     let all_bad = TriangleMesh::new(vec![Vec3::NAN; 3], vec![[0, 1, 2]; 9]).unwrap();
     assert_eq!(assert_exact(&root_only(vec![Shape::Mesh(all_bad)]), None, &rays), (0, 0));
 }
@@ -307,7 +216,7 @@ fn empty_scenes_and_single_primitives_work() {
 #[test]
 fn the_tree_does_not_depend_on_the_number_of_threads() {
     let mut s = pcg32([6, 1, 1]);
-    let Shape::Mesh(mesh) = soup(&mut s, 150_000, 0.01) else { unreachable!() };
+    let mesh = soup(&mut s, 150_000, 0.01);
     let set = root_only(vec![Shape::Mesh(mesh), random_quadric(&mut s, 1)]);
     let build = |threads: usize| {
         let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build().unwrap();

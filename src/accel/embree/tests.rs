@@ -2,32 +2,19 @@
 
 use super::*;
 use crate::accel::Bvh;
-use crate::geometry::{BilinearMesh, Geometry, Group, Instance, Quadric, QuadricKind, Shape, TriangleMesh, Visibility};
+use crate::accel::scenes_for_tests::{
+    Stripes, mixed_scene, random_placement, random_rays, rippled_sphere, separate_triangles, soup,
+};
+use crate::geometry::reference_for_tests::{random_point, triangle_hit};
+use crate::geometry::{Geometry, Group, Instance, Shape, TriangleMesh, Visibility};
 use lumiris_numbers::math::ray::offset_origin;
-use lumiris_numbers::math::{Affine3A, Frame, Quat, Ray, Vec2, Vec3, warp};
+use lumiris_numbers::math::{Affine3A, Frame, Ray, Vec2, Vec3, warp};
 use lumiris_test_support::random::{Pcg32, RngExt, pcg32};
 
 use std::ffi::CStr;
 
 const WIDTHS: [u32; 3] = [1, 4, 8];
 const COHERENCES: [Coherence; 3] = [Coherence::Coherent, Coherence::Packets, Coherence::Incoherent];
-
-struct Stripes;
-
-impl AlphaSource for Stripes {
-    fn alpha(&self, texture: u32, uv: Vec2, p: Vec3) -> f32 {
-        match texture {
-            0 => 0.0,
-            1 => 0.4,
-            2 => ((uv.x * 8.0) as i32 % 2) as f32,
-            _ => (p.x * 4.0).sin() * 0.5 + 0.5,
-        }
-    }
-}
-
-fn random_point(s: &mut Pcg32) -> Vec3 {
-    Vec3::new(s.random::<f32>(), s.random::<f32>(), s.random::<f32>()) * 2.0 - 1.0
-}
 
 fn opaque(shape: Shape) -> Geometry {
     Geometry { shape, alpha: None, visibility: Visibility::ALL }
@@ -36,20 +23,6 @@ fn opaque(shape: Shape) -> Geometry {
 fn only_root(shapes: Vec<Shape>) -> Arc<GeometrySet> {
     let root = Group { geometries: (0..shapes.len() as u32).collect() };
     Arc::new(GeometrySet { geometries: shapes.into_iter().map(opaque).collect(), root, ..GeometrySet::default() })
-}
-
-fn separate_triangles(corners: Vec<Vec3>) -> TriangleMesh {
-    let count = corners.len() as u32 / 3;
-    TriangleMesh::new(corners, (0..count).map(|i| [3 * i, 3 * i + 1, 3 * i + 2]).collect()).unwrap()
-}
-
-fn soup(s: &mut Pcg32, triangles: u32, size: f32) -> TriangleMesh {
-    let mut corners = Vec::new();
-    for _ in 0..triangles {
-        let center = random_point(s);
-        corners.extend((0..3).map(|_| center + random_point(s) * size));
-    }
-    separate_triangles(corners)
 }
 
 /// Triangles that lie on each other in a few planes, some of them along the axes.
@@ -65,92 +38,6 @@ fn coplanar(s: &mut Pcg32, triangles: u32) -> TriangleMesh {
         }
     }
     separate_triangles(corners)
-}
-
-/// A closed surface of about 2·n² triangles with shared vertices.
-fn rippled_sphere(n: u32) -> TriangleMesh {
-    use std::f32::consts::{PI, TAU};
-    let point = |i: u32, j: u32| {
-        let (theta, phi) = (PI * j as f32 / n as f32, TAU * (i % n) as f32 / n as f32);
-        let d = Vec3::new(theta.sin() * phi.cos(), theta.sin() * phi.sin(), theta.cos());
-        d * (1.0 + 0.05 * (d.x * 17.0).sin() * (d.y * 13.0).cos())
-    };
-    let positions = (0..=n).flat_map(|j| (0..n).map(move |i| point(i, j))).collect();
-    let quad = |i: u32, j: u32| {
-        let (a, b) = (j * n + i, j * n + (i + 1) % n);
-        [[a, a + n, b + n], [a, b + n, b]]
-    };
-    TriangleMesh::new(positions, (0..n).flat_map(|j| (0..n).flat_map(move |i| quad(i, j))).collect()).unwrap()
-}
-
-fn random_placement(s: &mut Pcg32) -> Affine3A {
-    let rotation = Quat::from_axis_angle(random_point(s).normalize_or(Vec3::X), s.random::<f32>() * 6.0);
-    let scale = Vec3::splat(0.3) + random_point(s).abs() * 0.5;
-    Affine3A::from_scale_rotation_translation(scale, rotation, random_point(s) * 2.0)
-}
-
-fn random_quadric(s: &mut Pcg32, kind: u32) -> Shape {
-    let (radius, phi_max) = (0.3, 1.0 + 5.0 * s.random::<f32>());
-    let kind = match kind % 3 {
-        0 => QuadricKind::Sphere { radius, z_min: -0.3, z_max: 0.2, phi_max },
-        1 => QuadricKind::Disk { height: 0.1, radius, inner_radius: 0.05, phi_max },
-        _ => QuadricKind::Cylinder { radius, z_min: -0.5, z_max: 0.5, phi_max },
-    };
-    let group_from_local = random_placement(s);
-    let local_from_group = group_from_local.inverse();
-    Shape::Quadric(Quadric { kind, group_from_local, local_from_group, flip_normal: false })
-}
-
-fn random_patches(s: &mut Pcg32, count: u32) -> Shape {
-    let mut positions = Vec::new();
-    for _ in 0..count {
-        let center = random_point(s);
-        positions.extend((0..4).map(|_| center + random_point(s) * 0.4));
-    }
-    let indices = (0..count).map(|i| [4 * i, 4 * i + 1, 4 * i + 2, 4 * i + 3]).collect();
-    Shape::Bilinear(BilinearMesh { positions, indices, ..BilinearMesh::default() })
-}
-
-/// All kinds of shapes, some cut out or hidden from some rays, in the root and in instances with up to `samples` times.
-fn mixed_scene(seed: u32, samples: usize) -> Arc<GeometrySet> {
-    let mut s = pcg32([seed, 77, 0]);
-    let mut geometries = Vec::new();
-    for k in 0..24_u32 {
-        let shape = match k % 4 {
-            0 => Shape::Mesh(soup(&mut s, 1 + 40 * (k % 5), 0.2)),
-            1 => Shape::Mesh(rippled_sphere(8 + k)),
-            2 => random_quadric(&mut s, k / 4),
-            _ => random_patches(&mut s, 1 + k % 5),
-        };
-        let visibility = Visibility([3, 3, 1, 2, 0][k as usize * 7 % 5]);
-        let alpha = [None, None, Some(0), Some(1), Some(2), Some(3)][k as usize * 5 % 6];
-        geometries.push(Geometry { shape, alpha, visibility });
-    }
-    let groups =
-        vec![Group { geometries: (8..16).collect() }, Group { geometries: (16..24).collect() }, Group::default()];
-    let instances = (0..9_u32)
-        .map(|k| {
-            let first = random_placement(&mut s);
-            let moved = |i: usize| Affine3A::from_translation(Vec3::X * i as f32 * 0.4) * first;
-            Instance { group: k % 3, world_from_group: (0..1 + k as usize % samples).map(moved).collect() }
-        })
-        .collect();
-    Arc::new(GeometrySet { geometries, groups, root: Group { geometries: (0..8).collect() }, instances })
-}
-
-fn random_rays(count: usize, seed: u32) -> RayBatch {
-    let mut s = pcg32([seed, 5, 5]);
-    let mut rays = RayBatch::default();
-    for k in 0..count {
-        let o = random_point(&mut s) * 3.0;
-        let mut d = random_point(&mut s) * 2.0 - o;
-        if k % 10 == 0 {
-            d = Vec3::ZERO.with_x(if k % 20 == 0 { 1.0 } else { -1.0 });
-        }
-        let t_max = if k % 3 == 0 { s.random::<f32>() * 1.5 } else { f32::INFINITY };
-        rays.push(&Ray { o, d, t_max, time: s.random::<f32>() });
-    }
-    rays
 }
 
 /// Rays of a camera at (0.05, 0.02, 2.3), in tiles of 4 by 4 pixels.
@@ -309,18 +196,6 @@ fn answers_agree_with_the_rust_tracer() {
     }
 }
 
-/// Möller–Trumbore in f64.
-fn reference_hit(ray: &Ray, [p0, p1, p2]: [Vec3; 3]) -> Option<[f64; 3]> {
-    let [p0, p1, p2] = [p0, p1, p2].map(Vec3::as_dvec3);
-    let (o, d) = (ray.o.as_dvec3(), ray.d.as_dvec3());
-    let (e1, e2) = (p1 - p0, p2 - p0);
-    let q = d.cross(e2);
-    let det = e1.dot(q);
-    let s = o - p0;
-    let (b1, b2, t) = (s.dot(q) / det, d.dot(s.cross(e1)) / det, e2.dot(s.cross(e1)) / det);
-    (b1 >= 0.0 && b2 >= 0.0 && b1 + b2 <= 1.0 && t > 0.0 && t < f64::from(ray.t_max)).then_some([t, b1, b2])
-}
-
 #[test]
 fn answers_agree_with_brute_force_in_f64() {
     let mut s = pcg32([4, 0, 1]);
@@ -332,7 +207,7 @@ fn answers_agree_with_brute_force_in_f64() {
     let (mut hit_count, mut unclear) = (0, 0);
     for (i, (hit, &shadow)) in hits.iter().zip(&shadows).enumerate() {
         let ray = rays.get(i);
-        let all = (0..mesh.triangle_count()).filter_map(|k| reference_hit(&ray, mesh.triangle(k)).map(|h| (k, h)));
+        let all = (0..mesh.triangle_count()).filter_map(|k| triangle_hit(&ray, mesh.triangle(k)).map(|h| (k, h)));
         let first = all.min_by(|a, b| a.1[0].total_cmp(&b.1[0]));
         assert_eq!(hit.is_some(), shadow);
         match (hit, first) {
