@@ -168,6 +168,8 @@ pub struct PathIntegrator {
     pub(super) stats: PathStats,
     /// Omits emission towards the camera, and all features except the depth.
     pub(super) only_reflected: bool,
+    /// Omits all features.
+    pub omits_features: bool,
     /// Copies of what is traced, if requested.
     pub recording: Option<Recording>,
     /// Samples of direct light at first vertices, if requested.
@@ -284,7 +286,7 @@ impl PathIntegrator {
                 }
                 match interaction.scatter(job) {
                     Some(bsdf) => {
-                        if vertex == 0 {
+                        if vertex == 0 && !self.omits_features {
                             let depth_only = self.only_reflected;
                             out[path.sample as usize].features.get_or_insert_with(|| {
                                 if depth_only {

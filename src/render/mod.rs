@@ -64,11 +64,21 @@ pub struct RenderSettings {
     pub time_limit: Option<Duration>,
     /// Estimates some pixels twice, which gives the variance of pixel means; see [`crate::film::replicas`].
     pub with_replicas: bool,
+    /// Whether the film holds features of the first surfaces: albedo, normal, depth, material and object.
+    pub with_features: bool,
 }
 
 impl Default for RenderSettings {
     fn default() -> Self {
-        RenderSettings { threads: None, tile_size: 16, first_sample: 0, spp: 1, time_limit: None, with_replicas: false }
+        RenderSettings {
+            threads: None,
+            tile_size: 16,
+            first_sample: 0,
+            spp: 1,
+            time_limit: None,
+            with_replicas: false,
+            with_features: true,
+        }
     }
 }
 
@@ -377,7 +387,7 @@ impl<'a> Run<'a> {
                 if self.stop.load(Ordering::Relaxed) {
                     return WorkerStats::default();
                 }
-                let mut worker = self.idle().pop().unwrap_or_default();
+                let mut worker = self.idle().pop().unwrap_or_else(|| Worker::new(self.settings.with_features));
                 let stats = self.render_tile(&mut worker, tile, samples.clone());
                 self.idle().push(worker);
                 let (paths, direct) = (&stats.paths, &stats.paths.direct);

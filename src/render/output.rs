@@ -36,6 +36,14 @@ impl Aov {
     pub const ALL: [Aov; 7] =
         [Aov::Variance, Aov::Samples, Aov::Albedo, Aov::Normal, Aov::Depth, Aov::Material, Aov::Object];
 
+    /// True if it shows a feature of the first surfaces.
+    pub fn is_feature(self) -> bool {
+        match self {
+            Aov::Albedo | Aov::Normal | Aov::Depth | Aov::Material | Aov::Object => true,
+            Aov::Variance | Aov::Samples | Aov::Ratio | Aov::Records => false,
+        }
+    }
+
     fn channels(self) -> &'static [&'static str] {
         match self {
             Aov::Variance => &["variance.R", "variance.G", "variance.B"],

@@ -33,6 +33,15 @@ pub(super) struct Worker {
 }
 
 impl Worker {
+    /// A worker that determines the features of first surfaces, or does not.
+    pub(super) fn new(with_features: bool) -> Self {
+        let mut worker = Worker::default();
+        worker.integrator.omits_features = !with_features;
+        worker.with_cache.omit_features(!with_features);
+        worker.with_photons.omit_features(!with_features);
+        worker
+    }
+
     /// Traces `samples` into `results`.
     pub(super) fn trace(
         &mut self,

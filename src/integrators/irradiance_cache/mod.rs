@@ -59,6 +59,11 @@ pub struct CacheIntegrator {
 }
 
 impl CacheIntegrator {
+    /// Whether features of first surfaces are left out.
+    pub fn omit_features(&mut self, omit: bool) {
+        self.paths.omits_features = omit;
+    }
+
     /// The counts and times since the last call.
     pub fn take_stats(&mut self) -> (PathStats, LookupStats) {
         (self.paths.take_stats(), std::mem::take(&mut self.lookups))

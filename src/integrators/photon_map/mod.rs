@@ -89,6 +89,11 @@ struct GatherRequest {
 }
 
 impl PhotonMapIntegrator {
+    /// Whether features of first surfaces are left out.
+    pub fn omit_features(&mut self, omit: bool) {
+        self.paths.omits_features = omit;
+    }
+
     /// The counts and times since the last call.
     pub fn take_stats(&mut self) -> PathStats {
         let mut stats = self.paths.take_stats();

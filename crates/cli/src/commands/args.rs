@@ -17,6 +17,12 @@ where
     PossibleValuesParser::new(T::VARIANTS).try_map(|name| name.parse::<T>())
 }
 
+/// An AOV, or none.
+fn aov() -> impl TypedValueParser<Value = Option<Aov>> {
+    let names = Aov::VARIANTS.iter().copied().chain(["none"]);
+    PossibleValuesParser::new(names).try_map(|name| if name == "none" { Ok(None) } else { name.parse().map(Some) })
+}
+
 /// The scene, and options that override its settings.
 #[derive(Args, Clone, Debug)]
 pub(super) struct SceneArgs {
@@ -59,9 +65,10 @@ pub(super) struct RenderArgs {
     /// Stop after the first pass that ends later than this many seconds, if not all samples per pixel are done before
     #[arg(long, value_name = "SECONDS", value_parser = parse_seconds)]
     pub time: Option<f64>,
-    /// AOVs: additional channels of EXR files [default: all, and ratio with --proposals optimal]
-    #[arg(long, value_name = "LIST", value_delimiter = ',', value_parser = named::<Aov>())]
-    pub aov: Option<Vec<Aov>>,
+    /// AOVs: additional channels of EXR files, or `none`, which saves the time for them [default: all, and ratio with
+    /// --proposals optimal]
+    #[arg(long, value_name = "LIST", value_delimiter = ',', value_parser = aov())]
+    pub aov: Option<Vec<Option<Aov>>>,
     /// Exposure of PNG, JPEG, TIFF and TGA images, in stops
     #[arg(long, value_name = "STOPS", default_value_t = 0.0, allow_negative_numbers = true)]
     pub exposure: f32,

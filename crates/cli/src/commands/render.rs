@@ -25,7 +25,8 @@ pub(super) const INTERRUPTED: u8 = 130;
 pub(super) fn run(args: &RenderArgs) -> anyhow::Result<ExitCode> {
     check_outputs(&args.output)?;
     let (mut job, setup) = load_job(&args.scene)?;
-    let asks_for_ratio = args.aov.iter().flatten().any(|a| *a == Aov::Ratio);
+    let asked = asked_aovs(args)?;
+    let asks_for_ratio = asked.as_ref().is_some_and(|list| list.contains(&Aov::Ratio));
     plan(&args.scene, &mut job, asks_for_ratio, args.quiet)?;
     let outputs = outputs(args, &job);
     check_outputs(&outputs)?;
@@ -35,12 +36,18 @@ pub(super) fn run(args: &RenderArgs) -> anyhow::Result<ExitCode> {
 
     let bar = Bar::new(args.quiet);
     let time_limit = args.time.map(Duration::from_secs_f64);
-    let settings = RenderSettings { time_limit, with_replicas: true, ..render_settings(&args.scene, &job) };
+    let needs = |is_shown: fn(&Aov) -> bool| asked.as_ref().is_none_or(|list| list.iter().any(is_shown));
+    let settings = RenderSettings {
+        time_limit,
+        with_replicas: needs(|aov| *aov == Aov::Variance),
+        with_features: needs(|aov| aov.is_feature()),
+        ..render_settings(&args.scene, &job)
+    };
     let rendering = render(&job, &settings, &stop, &|p| bar.update(p))?;
     bar.finish();
 
     for path in &outputs {
-        write(args, &job, &rendering, path)?;
+        write(args, &job, &rendering, asked.as_deref(), path)?;
     }
     if let Some(path) = &args.stats {
         let text = serde_json::to_string_pretty(&stats(args, &job, &rendering, setup))?;
@@ -93,7 +100,21 @@ fn check_outputs(outputs: &[PathBuf]) -> anyhow::Result<()> {
     Ok(())
 }
 
-fn write(args: &RenderArgs, job: &RenderJob, rendering: &Rendering, path: &Path) -> anyhow::Result<()> {
+/// The AOVs that are asked for; `None` is the default.
+fn asked_aovs(args: &RenderArgs) -> anyhow::Result<Option<Vec<Aov>>> {
+    let Some(list) = &args.aov else { return Ok(None) };
+    let aovs: Vec<Aov> = list.iter().copied().flatten().collect();
+    anyhow::ensure!(aovs.is_empty() || aovs.len() == list.len(), "--aov none cannot stand beside other AOVs");
+    Ok(Some(aovs))
+}
+
+fn write(
+    args: &RenderArgs,
+    job: &RenderJob,
+    rendering: &Rendering,
+    asked: Option<&[Aov]>,
+    path: &Path,
+) -> anyhow::Result<()> {
     let film = &rendering.film;
     let (width, height) = (film.bounds.width() as usize, film.bounds.height() as usize);
     let mut metadata = output::metadata(&job.world.scene.film, job.settings());
@@ -105,8 +126,8 @@ fn write(args: &RenderArgs, job: &RenderJob, rendering: &Rendering, path: &Path)
     metadata.push(("lumiris:samples_done".to_owned(), range));
     metadata.push(("lumiris:seconds".to_owned(), format!("{:.3}", rendering.elapsed.as_secs_f64())));
     let part = if extension(path) == "exr" {
-        let aovs: Vec<Aov> = match &args.aov {
-            Some(list) => list.clone(),
+        let aovs: Vec<Aov> = match asked {
+            Some(list) => list.to_vec(),
             None => {
                 let ratio = job.sample_count_map.as_ref().map(|_| Aov::Ratio);
                 let records = rendering.cache.map(|_| Aov::Records);

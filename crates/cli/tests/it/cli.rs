@@ -56,6 +56,33 @@ fn render_writes_every_image_and_the_statistics() {
 }
 
 #[test]
+fn images_without_aovs_have_the_same_pixels_and_no_other_channels() {
+    let folder = tempfile::tempdir().unwrap();
+    for integrator in ["path", "irradiance-cache", "photon-map"] {
+        let image = |aovs: &[&str]| {
+            let path = scene("demo/gallery.pbrt");
+            let mut args = vec!["render", &path, "--spp", "2", "--resolution", "32x18", "-o", "a.exr", "-q"];
+            args.extend(["--integrator", integrator, "--photons", "1000", "--gather", "4", "--cache-samples", "16"]);
+            args.extend(aovs);
+            let output = lumiris(&args, folder.path());
+            assert!(output.status.success(), "{}", stderr(&output));
+            read_image(&folder.path().join("a.exr"), &ReadLimits::default()).unwrap().image
+        };
+        let (all, none, depth) = (image(&[]), image(&["--aov", "none"]), image(&["--aov", "depth"]));
+        assert_eq!(none.channels, ["R", "G", "B"]);
+        let beauty = |data: &[f32], channels: usize| -> Vec<u32> {
+            data.chunks_exact(channels).flat_map(|p| [p[0], p[1], p[2]].map(f32::to_bits)).collect()
+        };
+        assert_eq!(beauty(&none.data, 3), beauty(&all.data, all.channels.len()), "{integrator}");
+        assert_eq!(depth.channels, ["R", "G", "B", "depth.Z"]);
+        assert!(depth.data.chunks_exact(4).all(|p| p[3] > 0.0));
+    }
+    let path = scene("demo/gallery.pbrt");
+    let output = lumiris(&["render", &path, "--aov", "none,depth", "-o", "b.exr"], folder.path());
+    assert!(!output.status.success() && stderr(&output).contains("--aov none"), "{}", stderr(&output));
+}
+
+#[test]
 fn an_irradiance_cache_is_part_of_image_and_statistics() {
     let folder = tempfile::tempdir().unwrap();
     let path = scene("demo/gallery.pbrt");
