@@ -63,7 +63,7 @@ impl Default for IntegratorSettings {
         IntegratorSettings {
             kind: IntegratorKind::Path,
             max_depth: 5,
-            roulette_depth: Some(2),
+            roulette_depth: Some(4),
             estimator: EstimatorKind::Mis,
             samples: None,
             heuristic: None,
