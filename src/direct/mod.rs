@@ -61,6 +61,12 @@ pub struct ShadingPoint<'a> {
 }
 
 impl ShadingPoint<'_> {
+    /// Number of light samples beside a BSDF sample that the path takes: all others, but none where every lobe is
+    /// specular.
+    pub fn light_samples_beside_path(&self) -> u32 {
+        if self.bsdf.bsdf.has_non_specular() { self.sample_counts.samples.saturating_sub(1) } else { 0 }
+    }
+
     /// The origin of a ray that leaves the point towards `w`.
     #[inline]
     pub fn origin(&self, w: Vec3) -> Vec3 {

@@ -166,8 +166,7 @@ impl SampleAllocation {
     fn new(settings: &IntegratorSettings, point: &ShadingPoint<'_>) -> Self {
         let n = point.sample_counts.samples;
         if point.bsdf_by_path {
-            let light = if point.bsdf.bsdf.has_non_specular() { n.saturating_sub(1) } else { 0 };
-            return SampleAllocation { bsdf_draws: 0, ..SampleAllocation::fixed(light, 1) };
+            return SampleAllocation { bsdf_draws: 0, ..SampleAllocation::fixed(point.light_samples_beside_path(), 1) };
         }
         if !point.bsdf.bsdf.has_non_specular() {
             return SampleAllocation::fixed(0, n);

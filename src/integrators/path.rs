@@ -139,6 +139,8 @@ struct BsdfTechnique {
     /// Density of the direction; `None` for a specular lobe, which no other technique samples.
     pdf: Option<f32>,
     heuristic: Heuristic,
+    /// Throughput of the path beyond the first surface, if roulette lets it go on.
+    survivor: Option<Rgb>,
 }
 
 impl BsdfTechnique {
@@ -277,12 +279,9 @@ impl PathIntegrator {
                     out[path.sample as usize].radiance += path.emission(job, &interaction);
                 }
                 let mut path = *path;
-                if path.technique.is_some() && path.passed == 0 {
-                    let stream = || samples[path.sample as usize].stream.domain(domain::VERTEX + vertex - 1);
-                    match survive(path.beta, path.eta_scale, vertex, &job.settings().integrator, stream) {
-                        Some(beta) => path.beta = beta,
-                        None => continue,
-                    }
+                if let Some(technique) = path.technique.filter(|_| path.passed == 0) {
+                    let Some(beta) = technique.survivor else { continue };
+                    path.beta = beta;
                 }
                 match interaction.scatter(job) {
                     Some(bsdf) => {
@@ -385,7 +384,7 @@ impl PathIntegrator {
             let paths = self.active.iter().zip(vertices).zip(points);
             self.next.extend(paths.filter_map(|((path, v), point)| {
                 if point.bsdf_by_path {
-                    return extend_to_emitter(path, v, point, &settings.at_vertex(vertex));
+                    return extend_to_emitter(path, v, point, vertex, &settings.at_vertex(vertex));
                 }
                 Some(extend(path, v, point, vertex, settings)?.0)
             }));
@@ -437,26 +436,28 @@ pub(super) fn extend(
 ) -> Option<(PathState, Lobe)> {
     let direction = next_direction(v, settings)?;
     let mut next = scattered(path, point, &direction)?;
-    next.beta = survive(next.beta, next.eta_scale, vertex + 1, settings, || v.stream)?;
+    next.beta = survive(&next, v, vertex + 1, settings)?;
     Some((next, direction.lobe))
 }
 
-/// The next path segment by BSDF sampling, which looks for the emitter of the sample as well. Roulette decides when it
-/// has been found; `None` if the direction carries no light.
+/// The next path segment by BSDF sampling, which looks for the emitter of the sample as well. Roulette ends it only behind
+/// that; `None` if the direction carries no light.
 fn extend_to_emitter(
     path: &PathState,
     v: &Vertex<'_>,
     point: &ShadingPoint<'_>,
+    vertex: u32,
     settings: &IntegratorSettings,
 ) -> Option<PathState> {
     let direction = next_direction(v, settings)?;
     let next = scattered(path, point, &direction)?;
-    let n_light = if v.bsdf.bsdf.has_non_specular() { point.sample_counts.samples.saturating_sub(1) } else { 0 };
+    debug_assert!(direction.pdf.is_some(), "a resampled direction has no weight against light sampling");
     let technique = BsdfTechnique {
         ctx: point.light_ctx(),
-        n_light: n_light as f32,
+        n_light: point.light_samples_beside_path() as f32,
         pdf: direction.pdf.filter(|_| !direction.lobe.is_specular()),
         heuristic: settings.heuristic(),
+        survivor: survive(&next, v, vertex + 1, settings),
     };
     Some(PathState { technique: Some(technique), ..next })
 }
@@ -471,20 +472,14 @@ fn scattered(path: &PathState, point: &ShadingPoint<'_>, direction: &Direction) 
     carries.then_some(PathState { ray, beta, eta_scale, technique: None, ..*path })
 }
 
-/// Russian roulette before bounce `bounce` on what the path carries without the scaling of refraction: the throughput of
-/// a path that goes on. `stream` is that of the vertex that it left.
-fn survive(
-    beta: Rgb,
-    eta_scale: f32,
-    bounce: u32,
-    settings: &IntegratorSettings,
-    stream: impl FnOnce() -> SampleStream,
-) -> Option<Rgb> {
-    let survival = (beta * eta_scale).map(f32::abs).max_component();
+/// Russian roulette before bounce `bounce` on what the path that left `v` carries without the scaling of refraction: the
+/// throughput of a path that goes on.
+fn survive(path: &PathState, v: &Vertex<'_>, bounce: u32, settings: &IntegratorSettings) -> Option<Rgb> {
+    let survival = (path.beta * path.eta_scale).map(f32::abs).max_component();
     if !settings.has_roulette(bounce) || !(survival < 1.0) {
-        return Some(beta);
+        return Some(path.beta);
     }
-    (stream().draw_random(domain::ROULETTE) < survival).then(|| beta / survival)
+    (v.stream.draw_random(domain::ROULETTE) < survival).then(|| path.beta / survival)
 }
 
 /// How a path continues.

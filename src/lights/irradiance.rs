@@ -248,10 +248,7 @@ mod tests {
             }
             let ctx = LightCtx { p, n, ns: n };
             let e = f64::from(known.irradiance(set, p, n).g);
-            // A corner just above the horizon is found by few samples, or by none
-            if e > 0.0 && e < 1e-6 {
-                continue;
-            }
+            // A corner just above the horizon is found by few samples
             let count = if e > 0.0 && e < 1e-3 { 400_000 } else { 4000 };
             let mut moments = Moments::default();
             for _ in 0..count {
@@ -265,7 +262,8 @@ mod tests {
                     f64::from(l.g * n.dot(s.wi).max(0.0) / s.pdf)
                 }));
             }
-            moments.assert_mean(e, 1e-5, 1e-4);
+            // Or by none: what is below their resolution counts as 0
+            moments.assert_mean(if e < 1e-6 { 0.0 } else { e }, 1e-5, 1e-4);
             lit += u32::from(e > 0.0);
         }
         lit

@@ -45,6 +45,11 @@ enum Command {
     Generate(generate::GenerateArgs),
 }
 
+/// Options that contradict each other.
+#[derive(Debug, thiserror::Error)]
+#[error("{0}")]
+struct UsageError(String);
+
 /// Parses the command line, runs the command, and returns the exit code.
 pub(crate) fn run() -> ExitCode {
     let cli = Cli::parse();
@@ -61,7 +66,7 @@ pub(crate) fn run() -> ExitCode {
         Ok(code) => code,
         Err(error) => {
             progress::say(&format!("lumiris: {error:#}"));
-            ExitCode::from(3)
+            ExitCode::from(if error.is::<UsageError>() { 2 } else { 3 })
         }
     }
 }

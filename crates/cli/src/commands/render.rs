@@ -1,5 +1,6 @@
 //! `lumiris render`
 
+use super::UsageError;
 use super::args::RenderArgs;
 use super::progress::{self, Bar};
 use super::settings::{SetupTimes, load_job, plan, render_settings};
@@ -104,7 +105,9 @@ fn check_outputs(outputs: &[PathBuf]) -> anyhow::Result<()> {
 fn asked_aovs(args: &RenderArgs) -> anyhow::Result<Option<Vec<Aov>>> {
     let Some(list) = &args.aov else { return Ok(None) };
     let aovs: Vec<Aov> = list.iter().copied().flatten().collect();
-    anyhow::ensure!(aovs.is_empty() || aovs.len() == list.len(), "--aov none cannot stand beside other AOVs");
+    if !aovs.is_empty() && aovs.len() < list.len() {
+        return Err(UsageError("--aov none cannot stand beside other AOVs".to_owned()).into());
+    }
     Ok(Some(aovs))
 }
 
