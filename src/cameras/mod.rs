@@ -4,6 +4,7 @@
 //! coordinates have their origin at the upper left, one unit per pixel, y down. The screen window `[x0, x1, y0, y1]` is
 //! the part of the screen covered by the film; by default it spans −1..1 on the shorter axis.
 
+use lumiris_lanes::camera::Pinhole;
 use lumiris_numbers::math::sphere_map::{equal_area_square_to_sphere, lat_long_to_sphere, wrap_equal_area_square};
 use lumiris_numbers::math::warp::sample_uniform_disk_concentric;
 use lumiris_numbers::math::{Affine3A, Ray, Vec2, Vec3};
@@ -176,6 +177,26 @@ impl Camera {
         self
     }
 
+    /// What makes many rays at once, if the camera has no lens, and the point that they come from.
+    pub fn pinhole(&self) -> Option<(Pinhole, Vec3)> {
+        let Camera::Perspective { base, screen_window, tan_half_fov, lens } = self else { return None };
+        let pinhole = Pinhole {
+            world_from_camera: base.world_from_camera.matrix3.into(),
+            resolution: base.resolution,
+            screen_window: *screen_window,
+            tan_half_fov: *tan_half_fov,
+            pixel_area: base.pixel_area(screen_window),
+        };
+        (lens.radius <= 0.0).then(|| (pinhole, base.world_from_camera.transform_point3(Vec3::ZERO)))
+    }
+
+    /// Time of the number `time_u` in 0..1.
+    pub fn time(&self, time_u: f32) -> f32 {
+        let (Camera::Perspective { base, .. } | Camera::Orthographic { base, .. } | Camera::Spherical { base, .. }) =
+            self;
+        base.shutter[0] + time_u * (base.shutter[1] - base.shutter[0])
+    }
+
     /// The ray of the raster point `film_xy`, through the point `u_lens` of the lens, at `time_u` of the shutter
     /// interval.
     #[inline]
@@ -219,6 +240,7 @@ impl Camera {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use lumiris_lanes::camera::PinholeRays;
     use lumiris_numbers::math::warp::invert_uniform_disk_concentric;
     use lumiris_test_support::assert_chi_squared;
     use lumiris_test_support::random::{RngExt, pcg32};
@@ -255,6 +277,26 @@ mod tests {
         // An off-centre window.
         let shifted = Camera::perspective(Affine3A::IDENTITY, 90.0, [0.0, 1.0, 0.0, 1.0], [10, 10], 0.0, 1e6);
         near(shifted.ray(Vec2::new(0.0, 10.0), [0.5; 2], 0.0).ray.d, Vec3::Z);
+    }
+
+    #[test]
+    fn many_rays_of_a_pinhole_are_single_rays() {
+        let placement =
+            Affine3A::from_rotation_translation(lumiris_numbers::math::Quat::from_rotation_y(0.7), Vec3::ONE);
+        let camera = Camera::perspective(placement, 50.0, [-1.5, 2.0, -1.0, 0.9], [200, 100], 0.0, 1e6);
+        let (pinhole, o) = camera.pinhole().unwrap();
+        let (x, y): (Vec<f32>, Vec<f32>) = (0..64).map(|i| (i as f32 * 3.3 - 1.0, i as f32 * 1.7)).unzip();
+        let (mut d, mut spread) = ([0, 1, 2].map(|_| vec![0.0; 64]), vec![0.0; 64]);
+        let mut rays = PinholeRays { d: d.each_mut().map(|d| &mut d[..]), spread: &mut spread };
+        pinhole.rays(lumiris_lanes::level(), [&x, &y], &mut rays);
+        for i in 0..64 {
+            let single = camera.ray(Vec2::new(x[i], y[i]), [0.5; 2], 0.0);
+            near(Vec3::new(d[0][i], d[1][i], d[2][i]), single.ray.d);
+            assert!(o == single.ray.o && (spread[i] - single.spread).abs() < 1e-6 * single.spread);
+        }
+        let lens = Lens { radius: 0.3, focal_distance: 4.0 };
+        assert!(perspective(placement, 50.0, lens).pinhole().is_none());
+        assert!(orthographic(placement, [-2.0, 2.0, -1.0, 1.0], PINHOLE).pinhole().is_none());
     }
 
     #[test]

@@ -27,7 +27,7 @@ use super::propose::{
 use super::visibility::{Segments, is_traced};
 use crate::accel::{Hit, RayBatch};
 use crate::lights::{LightId, LightSample};
-use crate::scene::{EmitterHit, RenderJob};
+use crate::scene::{EmitterHit, EmitterScratch, RenderJob};
 use crate::settings::{CorrelatedForm, IntegratorSettings, SamplingTechnique};
 use lumiris_numbers::estimators::correlated::{self, SUMS};
 use lumiris_numbers::math::ray::offset_origin;
@@ -152,7 +152,7 @@ pub struct Correlated {
     ray_of: Vec<u32>,
     next_rays: RayBatch,
     next_ray_of: Vec<u32>,
-    hits: Vec<Option<Hit>>,
+    hits: EmitterScratch,
     emitter_hits: Vec<Option<EmitterHit>>,
 }
 

@@ -76,13 +76,7 @@ impl ShadingPoint<'_> {
     /// The context for sampling lights.
     #[inline]
     pub fn light_ctx(&self) -> LightCtx {
-        let n = self.bsdf.n;
-        let n = match (self.bsdf.bsdf.transmits(), n.dot(self.wo) < 0.0) {
-            (true, _) => Vec3::ZERO,
-            (false, true) => -n,
-            (false, false) => n,
-        };
-        LightCtx { p: self.p, n, ns: self.bsdf.frame.z }
+        LightCtx { p: self.p, n: self.bsdf.lit_normal(self.wo), ns: self.bsdf.frame.z }
     }
 }
 

@@ -6,15 +6,18 @@
 //! Stratified positions are thus stratified over the lights and over each light [He and Owen 2016], and consecutive
 //! proposals are neighbours on a light, as stratified resampling requires [Talbot 2005, §4.5.2, heuristic 2].
 //!
-//! A proposal keeps only q̂, r = w/(m·p) and q̂·r. The few that are drawn are sampled again, one at a time.
+//! All light samples of a chunk of points are made together, sorted by light, and kept: those that are drawn need no
+//! second sampling.
 
 use super::ShadingPoint;
 use super::propose::Candidate;
-use crate::lights::{LightId, LightLanes, LightRun};
+use crate::lights::many::{LightSamples, NO_LIGHT, Scratch};
+use crate::lights::{LightId, LightRun, LightSample};
 use crate::scene::RenderJob;
 use crate::settings::{ProposalPoints, Target};
-use lumiris_lanes::combine;
-use lumiris_lanes::curve;
+use lumiris_lanes::columns::{Column, Columns3, padded};
+use lumiris_lanes::lane::LANES;
+use lumiris_lanes::{combine, curve};
 use lumiris_numbers::estimators::mis::Heuristic;
 use lumiris_numbers::estimators::ris::weight;
 use lumiris_numbers::math::hash::pcg4d;
@@ -26,13 +29,14 @@ const POSITIONS: u32 = 0x517c_c1b7;
 #[derive(Debug, Default)]
 pub struct Proposals {
     points: Vec<PointProposals>,
-    light: Vec<LightId>,
-    pmf: Vec<f32>,
-    u: [Vec<f32>; 2],
-    wi: [Vec<f32>; 3],
-    li: [Vec<f32>; 3],
+    /// Light and probability of the choice; none for BSDF samples.
+    chosen: Vec<(LightId, f32)>,
+    u: [Column; 2],
+    /// Positions of the shading points.
+    p: Columns3,
+    samples: LightSamples,
+    scratch: Scratch,
     f_cos: [Vec<f32>; 3],
-    p_light: Vec<f32>,
     p_bsdf: Vec<f32>,
     /// Their targets.
     pub p_hat: Vec<f32>,
@@ -85,29 +89,26 @@ impl Proposals {
         &self.points
     }
 
-    /// Light and sample on it: id, probability of the choice, random numbers.
-    pub fn light_sample(&self, proposal: usize) -> (LightId, f32, [f32; 2]) {
-        (self.light[proposal], self.pmf[proposal], [self.u[0][proposal], self.u[1][proposal]])
+    /// A proposal by light sampling.
+    pub fn light_sample(&self, proposal: usize) -> Option<(LightId, LightSample)> {
+        let sample = self.samples.get(proposal, self.p.vec3(proposal))?;
+        Some((self.chosen[proposal].0, sample))
     }
 
     /// Makes room for `len` proposals, keeping existing ones.
     fn grow(&mut self, len: usize) {
-        if self.light.len() < len {
-            let len = len.next_power_of_two();
-            self.light.resize(len, 0);
-            self.arrays().for_each(|array| array.resize(len, 0.0));
+        self.chosen.resize(len, (NO_LIGHT, 0.0));
+        if self.r.len() < len {
+            let len = len.next_power_of_two().max(LANES);
+            self.p.reserve(len);
+            self.samples.reserve(len);
+            let scalars = [&mut self.p_bsdf, &mut self.p_hat, &mut self.r, &mut self.weight];
+            scalars.into_iter().chain(&mut self.u).chain(&mut self.f_cos).for_each(|array| array.resize(len, 0.0));
         }
     }
 
-    fn arrays(&mut self) -> impl Iterator<Item = &mut Vec<f32>> {
-        let scalars =
-            [&mut self.pmf, &mut self.p_light, &mut self.p_bsdf, &mut self.p_hat, &mut self.r, &mut self.weight];
-        let vectors = self.u.iter_mut().chain(&mut self.wi).chain(&mut self.li).chain(&mut self.f_cos);
-        scalars.into_iter().chain(vectors)
-    }
-
-    /// Adds a point with `light_draws` light samples and the given BSDF samples. `phi` is a uniform number, well
-    /// distributed over the samples of a pixel.
+    /// Adds a point with `light_draws` light samples, which [`evaluate`](Self::evaluate) completes, and the given BSDF
+    /// samples. `phi` is a uniform number, well distributed over the samples of a pixel.
     pub fn add(
         &mut self,
         job: &RenderJob,
@@ -121,10 +122,10 @@ impl Proposals {
         let end = bsdf_start + bsdf_samples.len();
         self.grow(end);
         self.points.push(PointProposals { start, bsdf_start, end });
+        self.chosen[start..end].fill((NO_LIGHT, 0.0));
         if light_draws > 0 {
             self.place(positions, phi, light_draws);
-            self.sample_lights(job, point, start, bsdf_start);
-            self.weigh_lights(job, point, techniques, start, bsdf_start);
+            self.choose_lights(job, point, start, bsdf_start);
         }
         let contributing = job.lights.contributing_lights(&point.light_ctx());
         for (i, c) in (bsdf_start..end).zip(bsdf_samples) {
@@ -160,48 +161,38 @@ impl Proposals {
         }
     }
 
-    /// Lights at the positions, and directions to them.
-    fn sample_lights(&mut self, job: &RenderJob, point: &ShadingPoint<'_>, start: usize, end: usize) {
-        let lights = &job.lights;
-        let ctx = point.light_ctx();
-        lights.sampler.runs(&ctx, &self.positions, &mut self.runs);
-        self.p_light[start..end].fill(0.0);
-
+    /// Lights at the positions, and places on them.
+    fn choose_lights(&mut self, job: &RenderJob, point: &ShadingPoint<'_>, start: usize, end: usize) {
+        job.lights.sampler.runs(&point.light_ctx(), &self.positions, &mut self.runs);
         for run in &self.runs {
             let [first, last] = run.places.map(|p| p as usize);
             let (from, to) = (start + first, start + last);
             for position in &mut self.positions[first..last] {
                 *position = run.within(*position);
             }
-            let [u0, u1] = &mut self.u;
-            curve::hilbert_points(
-                &self.positions[first..last],
-                &self.jitter[first..last],
-                &mut u0[from..to],
-                &mut u1[from..to],
-            );
-            let mut lanes = LightLanes {
-                wi: self.wi.each_mut().map(|a| &mut a[from..to]),
-                li: self.li.each_mut().map(|a| &mut a[from..to]),
-                pdf: &mut self.p_light[from..to],
-            };
-            let light = &lights.lights[run.light as usize];
-            light.sample_li_lanes(&ctx, [&u0[from..to], &u1[from..to]], &mut lanes);
-            lanes.pdf.iter_mut().for_each(|pdf| *pdf *= run.pmf);
-            self.light[from..to].fill(run.light);
-            self.pmf[from..to].fill(run.pmf);
+            self.chosen[from..to].fill((run.light, run.pmf));
+        }
+        let [u0, u1] = &mut self.u;
+        curve::hilbert_points(&self.positions, &self.jitter, &mut u0[start..end], &mut u1[start..end]);
+        (start..end).for_each(|i| self.p.set(i, point.p));
+    }
 
-            // Infinite lights overlap: a direction belongs to all of them together
-            if lights.infinite.len() > 1 && lights.infinite.contains(&run.light) {
-                for i in from..to {
-                    if !(self.p_light[i] > 0.0) {
-                        continue;
-                    }
-                    let wi = self.wi.each_ref().map(|a| a[i]).into();
-                    let li = lights.le(wi);
-                    self.li.iter_mut().enumerate().for_each(|(c, a)| a[i] = li[c]);
-                    self.p_light[i] = lights.pdf_infinite(&ctx, wi);
-                }
+    /// Directions, targets and weights of the light samples of all `points`, which were added in this order.
+    pub fn evaluate(
+        &mut self,
+        job: &RenderJob,
+        points: &[ShadingPoint<'_>],
+        techniques: impl Fn(&ShadingPoint<'_>) -> Techniques,
+    ) {
+        let n = self.count();
+        self.samples.reserve(padded(n));
+        let [u0, u1] = &self.u;
+        job.lights.sample_chosen(&self.chosen[..n], &self.p, [u0, u1], &mut self.scratch, &mut self.samples);
+        for (index, point) in points.iter().enumerate() {
+            let PointProposals { start, bsdf_start: end, .. } = self.points[index];
+            if end > start {
+                job.lights.unite_infinite(start..end, |_| point.light_ctx(), &mut self.samples);
+                self.weigh_lights(job, point, &techniques(point), start, end);
             }
         }
     }
@@ -216,7 +207,8 @@ impl Proposals {
         end: usize,
     ) {
         // Failed samples keep a direction that can be evaluated
-        let wi = self.wi.each_ref().map(|a| &a[start..end]);
+        let LightSamples { wi, li, pdf, is_delta, .. } = &self.samples;
+        let [wi, li] = [wi, li].map(|c| c.get(end).map(|c| &c[start..]));
         let f_cos = self.f_cos.each_mut().map(|a| &mut a[start..end]);
         match techniques.target {
             Target::Fgl | Target::Visibility => {
@@ -224,19 +216,19 @@ impl Proposals {
             }
             Target::Gv | Target::Gvl => {
                 for i in start..end {
-                    let wi = self.wi.each_ref().map(|a| a[i]).into();
+                    let wi = self.samples.wi.vec3(i);
                     self.p_bsdf[i] = point.bsdf.pdf(point.wo, wi);
                     self.f_cos.iter_mut().for_each(|a| a[i] = point.bsdf.cos(wi));
                 }
             }
         }
-        for run in self.runs.iter().filter(|run| job.lights.lights[run.light as usize].is_delta()) {
-            self.p_bsdf[start + run.places[0] as usize..start + run.places[1] as usize].fill(0.0);
+        for (p_bsdf, is_delta) in self.p_bsdf[start..end].iter_mut().zip(&is_delta[start..end]) {
+            *p_bsdf = if *is_delta { 0.0 } else { *p_bsdf };
         }
         let proposals = combine::Proposals {
             f_cos: self.f_cos.each_ref().map(|a| &a[start..end]),
-            li: self.li.each_ref().map(|a| &a[start..end]),
-            p: &self.p_light[start..end],
+            li,
+            p: &pdf[start..end],
             p_other: &self.p_bsdf[start..end],
             m: techniques.n_light,
             m_other: techniques.n_bsdf,
@@ -258,11 +250,14 @@ impl Proposals {
             }
             Target::Visibility => {
                 let contributing = job.lights.contributing_lights(&point.light_ctx());
-                for run in &self.runs {
-                    let visibility = contributing.visibility(run.light);
-                    let places = start + run.places[0] as usize..start + run.places[1] as usize;
-                    self.p_hat[places.clone()].iter_mut().for_each(|p_hat| *p_hat *= visibility);
-                    self.weight[places].iter_mut().for_each(|weight| *weight *= visibility);
+                let mut of = (NO_LIGHT, 0.0);
+                for i in start..end {
+                    let light = self.chosen[i].0;
+                    if of.0 != light {
+                        of = (light, contributing.visibility(light));
+                    }
+                    self.p_hat[i] *= of.1;
+                    self.weight[i] *= of.1;
                 }
             }
         }

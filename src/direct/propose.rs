@@ -6,7 +6,7 @@ use super::mixture::Mixture;
 use crate::accel::{Hit, RayBatch};
 use crate::lights::groups::MAX_GROUPS;
 use crate::lights::{LightCtx, LightHit, LightId, LightSample};
-use crate::scene::{EmitterHit, RenderJob};
+use crate::scene::{EmitterHit, EmitterScratch, RenderJob};
 use crate::settings::{EstimatorKind, IntegratorSettings};
 use lumiris_numbers::estimators::mc;
 use lumiris_numbers::estimators::mis::{Heuristic, Technique};
@@ -16,7 +16,7 @@ use lumiris_numbers::samplers::SampleStream;
 use std::time::{Duration, Instant};
 
 /// Random-number domains of a shading point.
-pub(super) mod domain {
+pub(crate) mod domain {
     pub(crate) const LIGHT: u32 = 0;
     pub(crate) const BSDF: u32 = 1;
     pub(crate) const TECHNIQUE: u32 = 2;
@@ -123,7 +123,7 @@ pub struct Candidates {
     contributing: Contributing,
     pending: Vec<PendingBsdf>,
     rays: RayBatch,
-    hits: Vec<Option<Hit>>,
+    hits: EmitterScratch,
     emitter_hits: Vec<Option<EmitterHit>>,
 }
 
@@ -337,7 +337,7 @@ pub(super) fn with_infinite(
 ) -> (LightId, LightSample) {
     let lights = &job.lights;
     if lights.infinite.len() > 1 && lights.infinite.contains(&light) {
-        (sample.li, sample.pdf) = (lights.le(sample.wi), lights.pdf_infinite(ctx, sample.wi));
+        (sample.li, sample.pdf) = lights.infinite_in_direction(ctx, sample.wi);
     }
     (light, sample)
 }
@@ -401,40 +401,64 @@ pub(super) fn bsdf_candidate(
     hit: Option<&EmitterHit>,
 ) -> Option<Candidate> {
     let lights = &job.lights;
-    let ctx = point.light_ctx();
-    let (li, light, p_light, segment) = match hit {
-        Some(hit) => {
-            let light = hit.light?;
-            let surface =
-                job.world.scene.geometry.surface_hit(hit.geometry, hit.primitive, Hit::NO_INSTANCE, hit.uv, point.time);
-            let light_hit = LightHit { t: hit.t, p: surface.p, n: surface.n, uv: surface.uv };
-            let li = lights.lights[light as usize].l(&light_hit, -pending.wi);
-            let pdf = if pending.specular { 0.0 } else { lights.pdf(&ctx, light, pending.wi, &light_hit) };
-            (li, Some(light), pdf, segment(point, pending.wi, Some((surface.p, surface.p_error, surface.n))))
-        }
+    let found = emitter_in_direction(job, &point.light_ctx(), pending.wi, hit, point.time)?;
+    let light = match hit {
+        Some(hit) => hit.light,
         None => {
-            let pdf = if pending.specular { 0.0 } else { lights.pdf_infinite(&ctx, pending.wi) };
             // An infinite light that can be chosen, if there is one, so that it has a group
             let has_group = |&&l: &&LightId| lights.groups.group_of(l).is_some();
-            let light = lights.infinite.iter().find(has_group).or(lights.infinite.first());
-            (lights.le(pending.wi), light.copied(), pdf, segment(point, pending.wi, None))
+            lights.infinite.iter().find(has_group).or(lights.infinite.first()).copied()
         }
     };
-    let f = pending.f_cos * li;
+    let f = pending.f_cos * found.li;
     let light = light.filter(|_| !f.is_black())?;
     Some(Candidate {
         point: pending.point,
         drawn: if pending.specular { Drawn::DeltaBsdf } else { Drawn::Bsdf },
         f,
-        li,
+        li: found.li,
         light,
-        p_light,
+        p_light: if pending.specular { 0.0 } else { found.p_light },
         p_bsdf: pending.pdf,
         n_light: pending.allocation.n_light,
         n_bsdf: pending.allocation.n_bsdf,
         p_lobe: 0.0,
         group: lights.groups.group_of(light).unwrap_or(0) as u8,
-        segment,
+        segment: segment(point, pending.wi, found.end),
+    })
+}
+
+/// What a direction of BSDF sampling points at.
+pub(crate) struct EmitterInDirection {
+    /// Radiance.
+    pub(crate) li: Rgb,
+    /// Density of light sampling (1/sr).
+    pub(crate) p_light: f32,
+    /// The point on the light, the bound of its error, and its normal; `None` at infinity.
+    pub(crate) end: Option<(Vec3, Vec3, Vec3)>,
+}
+
+/// What the direction `wi` points at, whose ray among the emitters has met `hit`; `None` if that is dark.
+pub(crate) fn emitter_in_direction(
+    job: &RenderJob,
+    ctx: &LightCtx,
+    wi: Vec3,
+    hit: Option<&EmitterHit>,
+    time: f32,
+) -> Option<EmitterInDirection> {
+    let lights = &job.lights;
+    let Some(hit) = hit else {
+        let (li, p_light) = lights.infinite_in_direction(ctx, wi);
+        return (!li.is_black()).then_some(EmitterInDirection { li, p_light, end: None });
+    };
+    let light = hit.light?;
+    let surface = job.world.scene.geometry.surface_hit(hit.geometry, hit.primitive, Hit::NO_INSTANCE, hit.uv, time);
+    let light_hit = LightHit { t: hit.t, p: surface.p, n: surface.n, uv: surface.uv };
+    let li = lights.lights[light as usize].l(&light_hit, -wi);
+    (!li.is_black()).then(|| EmitterInDirection {
+        li,
+        p_light: lights.pdf(ctx, light, wi, &light_hit),
+        end: Some((surface.p, surface.p_error, surface.n)),
     })
 }
 

@@ -17,7 +17,6 @@ use super::proposals::{PointProposals, Proposals, Techniques};
 use super::propose::{self, Candidate, Candidates, SampleAllocation};
 use super::visibility::Segments;
 use crate::bsdfs::Bsdf;
-use crate::lights::{LightId, LightSample};
 use crate::scene::RenderJob;
 use crate::settings::{IntegratorSettings, Strata};
 use lumiris_numbers::estimators::ris::{Draw, strata, stratified, systematic, with_replacement};
@@ -77,6 +76,12 @@ pub(super) fn allocation(point: &ShadingPoint<'_>) -> SampleAllocation {
     if m == 1 { SampleAllocation::one_of_both(point) } else { SampleAllocation::fixed(m - by_bsdf, by_bsdf) }
 }
 
+/// How the proposals of a point are weighted.
+fn techniques(settings: &IntegratorSettings, point: &ShadingPoint<'_>) -> Techniques {
+    let SampleAllocation { n_light, n_bsdf, .. } = allocation(point);
+    Techniques { n_light, n_bsdf, heuristic: settings.heuristic(), target: settings.ris.target }
+}
+
 impl Resampler {
     /// Draws the samples of all points: `out` gets one candidate for each, `contributions` what it adds if its segment
     /// is free. `bsdf_samples` are sorted by point.
@@ -113,6 +118,7 @@ impl Resampler {
             }
             let chunk = &points[first_point..first];
             let bsdf_of_chunk = &bsdf_samples[first_sample..next];
+            self.proposals.evaluate(job, chunk, |point| techniques(settings, point));
             if settings.ris.target.has_visibility() {
                 self.probe(job, chunk, bsdf_of_chunk);
             }
@@ -128,7 +134,11 @@ impl Resampler {
                 for draw in &self.draws {
                     let place = range.start + draw.index as usize;
                     let evaluated = if place < range.bsdf_start {
-                        self.light_candidate(job, (first_point + i) as u32, point, place)
+                        let index = (first_point + i) as u32;
+                        let sample = self.proposals.light_sample(place);
+                        sample.and_then(|s| {
+                            propose::unshadowed_candidate(index, point, &SampleAllocation::fixed(0, 0), s)
+                        })
                     } else {
                         Some(own[place - range.bsdf_start])
                     };
@@ -149,17 +159,10 @@ impl Resampler {
         point: &ShadingPoint<'_>,
         bsdf: &[Candidate],
     ) {
-        let allocation = allocation(point);
-        let techniques = Techniques {
-            n_light: allocation.n_light,
-            n_bsdf: allocation.n_bsdf,
-            heuristic: settings.heuristic(),
-            target: settings.ris.target,
-        };
         let numbers = point.stream.domain(domain::RESAMPLE).draw::<2>();
         self.numbers.push(numbers);
-        let positions = (allocation.light_draws, settings.ris.points, numbers[0]);
-        self.proposals.add(job, point, &techniques, positions, bsdf);
+        let positions = (allocation(point).light_draws, settings.ris.points, numbers[0]);
+        self.proposals.add(job, point, &techniques(settings, point), positions, bsdf);
     }
 
     /// Traces all proposals and sets the weights of those that are not visible to 0.
@@ -176,7 +179,7 @@ impl Resampler {
                 }
                 let segment = match by_bsdf {
                     Some(candidate) => Some(candidate.segment),
-                    None => self.light_sample(job, point, place).map(|(_, s)| propose::light_segment(point, &s)),
+                    None => self.proposals.light_sample(place).map(|(_, s)| propose::light_segment(point, &s)),
                 };
                 match segment {
                     Some(segment) => {
@@ -219,24 +222,6 @@ impl Resampler {
                 stratified(weights, &self.ends, &self.u, &mut self.draws);
             }
         }
-    }
-
-    /// A light sample, drawn again with everything that a proposal omits.
-    fn light_sample(&self, job: &RenderJob, point: &ShadingPoint<'_>, place: usize) -> Option<(LightId, LightSample)> {
-        let (light, pmf, u) = self.proposals.light_sample(place);
-        let sample = job.lights.lights[light as usize].sample_li(&point.light_ctx(), u)?;
-        Some((light, LightSample { pdf: sample.pdf * pmf, ..sample }))
-    }
-
-    fn light_candidate(
-        &self,
-        job: &RenderJob,
-        index: u32,
-        point: &ShadingPoint<'_>,
-        place: usize,
-    ) -> Option<Candidate> {
-        let sample = self.light_sample(job, point, place)?;
-        propose::light_candidate(job, index, point, &SampleAllocation::fixed(0, 0), sample)
     }
 }
 

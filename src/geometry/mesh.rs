@@ -53,7 +53,13 @@ impl TriangleMesh {
     /// The corners of triangle `i`.
     #[inline]
     pub fn triangle(&self, i: usize) -> [Vec3; 3] {
-        self.indices[i].map(|v| self.padded_positions[v as usize])
+        self.corners(self.indices[i])
+    }
+
+    /// The positions of three vertices.
+    #[inline]
+    pub fn corners(&self, vertices: [u32; 3]) -> [Vec3; 3] {
+        vertices.map(|v| self.padded_positions[v as usize])
     }
 
     /// Area of triangle `i`.

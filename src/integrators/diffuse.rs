@@ -6,7 +6,8 @@
 //! vertex where the lookup misses, or without such a part, continues as in `path`. So no light is counted twice or
 //! lost.
 
-use super::path::{self, CameraSample, PathIntegrator, PathState, Vertex};
+use super::path::{self, CameraSample, PathIntegrator, Vertex};
+use super::segment::PathState;
 use crate::bsdfs::Lambertian;
 use crate::direct::{Fits, ShadingPoint};
 use crate::film::PixelSample;
@@ -52,7 +53,7 @@ pub(super) fn trace(
         if paths.active.is_empty() {
             break;
         }
-        let vertices = paths.find_vertices(job, vertex, depth, samples, out);
+        let vertices = paths.find_vertices(job, vertex, depth, samples, out, None);
         let sample_counts = settings.sample_counts_at_vertex(vertex);
         let shadings: Vec<Shading<'_>> =
             paths.active.iter().zip(&vertices).map(|(path, v)| shade(source, path, vertex, v)).collect();

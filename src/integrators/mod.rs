@@ -4,6 +4,8 @@ mod diffuse;
 pub mod irradiance_cache;
 pub mod path;
 pub mod photon_map;
+mod segment;
+mod wavefront;
 
 pub use irradiance_cache::{CacheIntegrator, IrradianceCache};
 pub use path::{PathIntegrator, PathStats};

@@ -9,63 +9,24 @@
 //! light sampling at x_k, is added there ([`BsdfTechnique`]). One ray instead of three, and one BSDF sample instead of
 //! two.
 
+use super::segment::{BsdfTechnique, Direction, PathState, domain, emptied, sampled_direction, scattered, survive};
+pub use super::segment::{CameraSample, PathStats};
+use super::wavefront::{Batch, Buffers, Estimate, Output};
 use crate::accel::{Coherence, Hit, RayBatch};
 use crate::bsdfs::Lobe;
-use crate::cameras::CameraRay;
-use crate::direct::{DirectStage, DirectStats, Fits, ShadingPoint};
+use crate::direct::{DirectStage, Fits, ShadingPoint};
 use crate::film::{Features, PixelSample};
 use crate::geometry::SurfaceHit;
-use crate::lights::{LightCtx, LightHit};
+use crate::lights::LightHit;
 use crate::materials::SurfaceBsdf;
 use crate::scene::{RenderJob, SurfaceInteraction};
 use crate::settings::{IntegratorSettings, SampleCounts};
-use lumiris_numbers::estimators::mis::{Heuristic, Technique};
 use lumiris_numbers::math::{Ray, Rgb, Vec3};
 use lumiris_numbers::samplers::SampleStream;
-use std::time::{Duration, Instant};
-
-/// Random-number domains of a path vertex.
-mod domain {
-    pub(super) const DIRECT: u32 = 0;
-    pub(super) const BSDF: u32 = 1;
-    pub(super) const ROULETTE: u32 = 2;
-    pub(super) const RESAMPLE: u32 = 3;
-    pub(super) const ALBEDO: u32 = 4;
-    /// Vertex k uses the domain `VERTEX + k` of the camera sample.
-    pub(super) const VERTEX: u32 = 16;
-}
+use std::time::Instant;
 
 /// Surfaces without scattering that a path may pass between two vertices.
 const MAX_PASSED: u32 = 64;
-
-/// Counts and times.
-#[derive(Clone, Copy, Debug, Default)]
-pub struct PathStats {
-    /// Camera rays.
-    pub camera_rays: u64,
-    /// Rays of later path segments.
-    pub bounce_rays: u64,
-    /// Time in tracing camera rays.
-    pub camera_time: Duration,
-    /// Time in tracing later segments.
-    pub bounce_time: Duration,
-    /// Time in hits, textures and materials.
-    pub shade_time: Duration,
-    /// Direct lighting.
-    pub direct: DirectStats,
-}
-
-impl PathStats {
-    /// Adds the counts of another worker.
-    pub fn merge(&mut self, other: &PathStats) {
-        self.camera_rays += other.camera_rays;
-        self.bounce_rays += other.bounce_rays;
-        self.camera_time += other.camera_time;
-        self.bounce_time += other.bounce_time;
-        self.shade_time += other.shade_time;
-        self.direct.merge(&other.direct);
-    }
-}
 
 /// Copies of the rays traced, batch by batch, for measurements.
 #[derive(Clone, Debug, Default)]
@@ -80,6 +41,13 @@ pub struct Recording {
     pub bounce_segments: Vec<RayBatch>,
 }
 
+impl Recording {
+    /// The shadow segments of a vertex, counted from 0.
+    fn segments_at(&mut self, vertex: u32) -> &mut Vec<RayBatch> {
+        if vertex == 0 { &mut self.segments } else { &mut self.bounce_segments }
+    }
+}
+
 /// The result of a direct-light sample at a first vertex.
 #[derive(Clone, Copy, Debug)]
 pub struct Outcome {
@@ -89,68 +57,6 @@ pub struct Outcome {
     pub unshadowed: Rgb,
     /// Its contribution.
     pub contribution: Rgb,
-}
-
-/// A camera sample to be traced.
-#[derive(Clone, Copy, Debug)]
-pub struct CameraSample {
-    /// Its ray.
-    pub ray: CameraRay,
-    /// Weight of the pixel filter times that of the camera.
-    pub weight: f32,
-    /// Its random numbers.
-    pub stream: SampleStream,
-    /// Random numbers of direct light, which progressive estimators draw anew for every block of samples: they are
-    /// independent of those of earlier blocks, wherever the path goes.
-    pub direct: SampleStream,
-    /// Sample counts at its first vertex.
-    pub sample_counts: SampleCounts,
-    /// The fit of its pixel.
-    pub fit: u32,
-}
-
-/// The state of a path.
-#[derive(Clone, Copy, Debug)]
-pub(super) struct PathState {
-    /// Index of the camera sample.
-    pub(super) sample: u32,
-    pub(super) ray: Ray,
-    pub(super) beta: Rgb,
-    /// Squared relative index of refraction along the path, which roulette takes out of β.
-    eta_scale: f32,
-    /// Width of a pixel at the ray's origin, and its growth per unit length.
-    pub(super) width: f32,
-    pub(super) spread: f32,
-    /// Surfaces without scattering passed since the last vertex.
-    passed: u32,
-    /// Distance travelled through such surfaces.
-    travelled: f32,
-    /// The technique that drew the direction, if the segment looks for emitters.
-    technique: Option<BsdfTechnique>,
-}
-
-/// BSDF sampling at the last vertex, as multiple importance sampling weights it against light sampling there.
-#[derive(Clone, Copy, Debug)]
-struct BsdfTechnique {
-    /// Where light sampling stood.
-    ctx: LightCtx,
-    /// Number of light samples.
-    n_light: f32,
-    /// Density of the direction; `None` for a specular lobe, which no other technique samples.
-    pdf: Option<f32>,
-    heuristic: Heuristic,
-    /// Throughput of the path beyond the first surface, if roulette lets it go on.
-    survivor: Option<Rgb>,
-}
-
-impl BsdfTechnique {
-    /// The weight of what it found, where light sampling has the density `p_light`.
-    fn weight(&self, p_light: impl FnOnce(&LightCtx) -> f32) -> f32 {
-        self.pdf.map_or(1.0, |p| {
-            let light = Technique { n: self.n_light, p: p_light(&self.ctx) };
-            self.heuristic.weight(Technique { n: 1.0, p }, light)
-        })
-    }
 }
 
 /// Traces paths; holds the buffers of one worker.
@@ -167,6 +73,7 @@ pub struct PathIntegrator {
     spare_points: Vec<ShadingPoint<'static>>,
     pub(super) radiance: Vec<Rgb>,
     pub(super) direct: DirectStage,
+    buffers: Option<Box<Buffers>>,
     pub(super) stats: PathStats,
     /// Omits emission towards the camera, and all features except the depth.
     pub(super) only_reflected: bool,
@@ -201,7 +108,11 @@ impl PathIntegrator {
             if self.active.is_empty() {
                 break;
             }
-            let vertices = self.find_vertices(job, vertex, depth, samples, out);
+            let estimate = Estimate::new(settings, vertex).filter(|_| self.outcomes.is_none());
+            let buffers = std::mem::take(&mut self.buffers);
+            let count = self.active.len();
+            let mut batch = estimate.map(|e| Batch::new(buffers.unwrap_or_default(), e, count));
+            let vertices = self.find_vertices(job, vertex, depth, samples, out, batch.as_mut());
             let sample_counts = settings.sample_counts_at_vertex(vertex);
             let at_vertex = settings.at_vertex(vertex);
             // Outcomes are those of all samples of a first vertex
@@ -217,6 +128,12 @@ impl PathIntegrator {
             }));
             self.light_points(job, &at_vertex, vertex, &points, fits, out);
             self.extend_paths(settings, vertex, &vertices, &points);
+            if let Some(mut batch) = batch {
+                let segments = self.recording.as_mut().map(|r| r.segments_at(vertex));
+                let (next, stats, direct) = (&mut self.next, &mut self.stats, &mut self.direct.stats);
+                batch.shade(job, &mut Output { samples: out, next, stats, direct, segments });
+                self.buffers = Some(batch.into_buffers());
+            }
             std::mem::swap(&mut self.active, &mut self.next);
             self.spare_points = emptied(points);
             self.recycle(vertices);
@@ -255,6 +172,7 @@ impl PathIntegrator {
         depth: u32,
         samples: &[CameraSample],
         out: &mut [PixelSample],
+        mut batch: Option<&mut Batch<'w>>,
     ) -> Vec<Vertex<'w>> {
         let mut vertices: Vec<Vertex<'w>> = emptied(std::mem::take(&mut self.spare_vertices));
         self.kept.clear();
@@ -273,16 +191,28 @@ impl PathIntegrator {
                         }
                         continue;
                     }
-                    Some(hit) => SurfaceInteraction::new(job, &path.ray, (path.width, path.spread), hit),
+                    Some(hit) => {
+                        if let (Some(batch), Some(rho)) = (&mut batch, job.plain_reflectance(hit)) {
+                            let Some(path) = path.beyond_emitter() else { continue };
+                            let distance = hit.t * path.ray.d.length();
+                            if vertex == 0 && !self.omits_features {
+                                let features = &mut out[path.sample as usize].features;
+                                features.get_or_insert_with(|| path.plain_features(job, hit, distance, rho));
+                            }
+                            if vertex < depth {
+                                let width = path.width + path.spread * distance;
+                                let path = PathState { width, passed: 0, travelled: 0.0, ..path };
+                                batch.push_hit(job, path, hit, rho, &samples[path.sample as usize]);
+                            }
+                            continue;
+                        }
+                        SurfaceInteraction::new(job, &path.ray, (path.width, path.spread), hit)
+                    }
                 };
                 if looks_for_emitters {
                     out[path.sample as usize].radiance += path.emission(job, &interaction);
                 }
-                let mut path = *path;
-                if let Some(technique) = path.technique.filter(|_| path.passed == 0) {
-                    let Some(beta) = technique.survivor else { continue };
-                    path.beta = beta;
-                }
+                let Some(path) = path.beyond_emitter() else { continue };
                 match interaction.scatter(job) {
                     Some(bsdf) => {
                         if vertex == 0 && !self.omits_features {
@@ -298,6 +228,10 @@ impl PathIntegrator {
                         }
                         if vertex < depth {
                             let sample = &samples[path.sample as usize];
+                            let path = PathState { width: interaction.width, passed: 0, travelled: 0.0, ..path };
+                            if batch.as_mut().is_some_and(|b| b.push_vertex(path, &interaction, &bsdf, sample)) {
+                                continue;
+                            }
                             let [stream, direct] =
                                 [sample.stream, sample.direct].map(|s| s.domain(domain::VERTEX + vertex));
                             vertices.push(Vertex {
@@ -307,7 +241,7 @@ impl PathIntegrator {
                                 stream,
                                 direct,
                             });
-                            self.kept.push(PathState { width: interaction.width, passed: 0, travelled: 0.0, ..path });
+                            self.kept.push(path);
                         }
                     }
                     None if path.passed < MAX_PASSED => self.passing.push(path.pass(&interaction)),
@@ -355,8 +289,7 @@ impl PathIntegrator {
     ) {
         self.direct.estimate(job, settings, points, fits, &mut self.radiance);
         if let Some(r) = &mut self.recording {
-            let batches = if vertex == 0 { &mut r.segments } else { &mut r.bounce_segments };
-            batches.push(self.direct.segments().clone());
+            r.segments_at(vertex).push(self.direct.segments().clone());
         }
         if let Some(outcomes) = self.outcomes.as_mut().filter(|_| vertex == 0) {
             outcomes.extend(self.direct.outcomes().map(|(point, unshadowed, is_free)| {
@@ -391,13 +324,6 @@ impl PathIntegrator {
         }
         self.stats.shade_time += start.elapsed();
     }
-}
-
-/// An empty vector in the memory of `old`, whose items have the same layout and may borrow from something else.
-fn emptied<T, U>(mut old: Vec<T>) -> Vec<U> {
-    const { assert!(size_of::<T>() == size_of::<U>() && align_of::<T>() == align_of::<U>()) };
-    old.clear();
-    old.into_iter().map(|_| unreachable!("the vector is empty")).collect()
 }
 
 /// A vertex that scatters.
@@ -435,8 +361,8 @@ pub(super) fn extend(
     settings: &IntegratorSettings,
 ) -> Option<(PathState, Lobe)> {
     let direction = next_direction(v, settings)?;
-    let mut next = scattered(path, point, &direction)?;
-    next.beta = survive(&next, v, vertex + 1, settings)?;
+    let mut next = scattered(path, point.origin(direction.wi), &direction)?;
+    next.beta = survive(&next, &v.stream, vertex + 1, settings)?;
     Some((next, direction.lobe))
 }
 
@@ -450,48 +376,16 @@ fn extend_to_emitter(
     settings: &IntegratorSettings,
 ) -> Option<PathState> {
     let direction = next_direction(v, settings)?;
-    let next = scattered(path, point, &direction)?;
+    let next = scattered(path, point.origin(direction.wi), &direction)?;
     debug_assert!(direction.pdf.is_some(), "a resampled direction has no weight against light sampling");
     let technique = BsdfTechnique {
         ctx: point.light_ctx(),
         n_light: point.light_samples_beside_path() as f32,
         pdf: direction.pdf.filter(|_| !direction.lobe.is_specular()),
         heuristic: settings.heuristic(),
-        survivor: survive(&next, v, vertex + 1, settings),
+        survivor: survive(&next, &v.stream, vertex + 1, settings),
     };
     Some(PathState { technique: Some(technique), ..next })
-}
-
-/// The path beyond a point in a direction; `None` if it carries nothing.
-fn scattered(path: &PathState, point: &ShadingPoint<'_>, direction: &Direction) -> Option<PathState> {
-    let Direction { wi, weight, eta, .. } = *direction;
-    let beta = path.beta * weight;
-    let eta_scale = path.eta_scale * eta * eta;
-    let ray = Ray { o: point.origin(wi), d: wi, t_max: f32::INFINITY, time: path.ray.time };
-    let carries = !beta.is_black() && beta.is_finite();
-    carries.then_some(PathState { ray, beta, eta_scale, technique: None, ..*path })
-}
-
-/// Russian roulette before bounce `bounce` on what the path that left `v` carries without the scaling of refraction: the
-/// throughput of a path that goes on.
-fn survive(path: &PathState, v: &Vertex<'_>, bounce: u32, settings: &IntegratorSettings) -> Option<Rgb> {
-    let survival = (path.beta * path.eta_scale).map(f32::abs).max_component();
-    if !settings.has_roulette(bounce) || !(survival < 1.0) {
-        return Some(path.beta);
-    }
-    (v.stream.draw_random(domain::ROULETTE) < survival).then(|| path.beta / survival)
-}
-
-/// How a path continues.
-struct Direction {
-    wi: Vec3,
-    /// Factor of the throughput.
-    weight: Rgb,
-    /// Relative index of refraction.
-    eta: f32,
-    lobe: Lobe,
-    /// Density of the direction; `None` if it was resampled.
-    pdf: Option<f32>,
 }
 
 /// A direction by BSDF sampling; of a BSDF that can only be evaluated, by resampling M proposals.
@@ -509,10 +403,7 @@ fn next_direction(v: &Vertex<'_>, settings: &IntegratorSettings) -> Option<Direc
             pdf: None,
         });
     }
-    let [uc, u0, u1] = v.stream.domain(domain::BSDF).draw::<3>();
-    let sample = v.bsdf.sample(v.wo, uc, [u0, u1])?;
-    let weight = sample.f * (sample.wi.dot(v.bsdf.frame.z).abs() / sample.pdf);
-    Some(Direction { wi: sample.wi, weight, eta: sample.eta, lobe: sample.lobe, pdf: Some(sample.pdf) })
+    sampled_direction(&v.bsdf, v.wo, v.stream.domain(domain::BSDF).draw::<3>())
 }
 
 impl PathState {
@@ -536,10 +427,33 @@ impl PathState {
 
     /// The same of the infinite lights.
     fn emission_at_infinity(&self, job: &RenderJob) -> Rgb {
-        let l = self.beta * job.lights.le(self.ray.d);
         match &self.technique {
-            Some(technique) if !l.is_black() => l * technique.weight(|ctx| job.lights.pdf_infinite(ctx, self.ray.d)),
-            _ => l,
+            Some(technique) => {
+                let (le, p_light) = job.lights.infinite_in_direction(&technique.ctx, self.ray.d);
+                let l = self.beta * le;
+                if l.is_black() { l } else { l * technique.weight(|_| p_light) }
+            }
+            None => self.beta * job.lights.le(self.ray.d),
+        }
+    }
+
+    /// The path beyond what its last segment has hit, if roulette lets it go on.
+    #[inline]
+    fn beyond_emitter(&self) -> Option<PathState> {
+        match self.technique.filter(|_| self.passed == 0) {
+            Some(technique) => Some(PathState { beta: technique.survivor?, ..*self }),
+            None => Some(*self),
+        }
+    }
+
+    /// Features of a hit of a mesh that reflects `rho`, without the normal.
+    fn plain_features(&self, job: &RenderJob, hit: &Hit, distance: f32, rho: Rgb) -> Features {
+        Features {
+            albedo: rho,
+            normal: Vec3::ZERO,
+            depth: self.travelled + distance,
+            material: job.world.scene.surfaces[hit.geometry as usize].material,
+            object: hit.geometry,
         }
     }
 

@@ -197,11 +197,24 @@ impl EnvironmentMap {
     /// Density of [`sample`](Self::sample) per steradian.
     #[inline]
     pub fn pdf(&self, w: Vec3) -> f32 {
+        self.pdf_at(w, self.to_square(w))
+    }
+
+    /// [`le`](Self::le) and [`pdf`](Self::pdf).
+    #[inline]
+    pub fn le_and_pdf(&self, w: Vec3) -> (Rgb, f32) {
+        let p = self.to_square(w);
+        (self.lookup(p), self.pdf_at(w, p))
+    }
+
+    /// Density at the direction `w`, whose place in the square is `p`.
+    #[inline]
+    fn pdf_at(&self, w: Vec3, p: Vec2) -> f32 {
         let density = match self.mapping {
             EnvironmentMapping::EqualArea => pdf_equal_area_square_to_sphere(),
             EnvironmentMapping::LatLong => pdf_lat_long_to_sphere(w),
         };
-        let pdf = self.texels[self.nearest(self.to_square(w))][3] * density;
+        let pdf = self.texels[self.nearest(p)][3] * density;
         if pdf.is_finite() { pdf } else { 0.0 }
     }
 

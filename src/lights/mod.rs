@@ -2,7 +2,7 @@
 //!
 //! Reading order: [`point`], [`spot`], [`area`], [`environment`], [`emit`], [`lanes`], [`bounds`], [`choice`],
 //! [`tree`], [`tree_choice`], [`visibility_cache`], [`visibility_cache_sampler`], [`select`], [`set`], [`groups`],
-//! [`sampling`], [`irradiance`].
+//! [`sampling`], [`many`], [`irradiance`].
 
 pub mod area;
 pub mod bounds;
@@ -12,6 +12,7 @@ pub mod environment;
 pub mod groups;
 pub mod irradiance;
 pub mod lanes;
+pub mod many;
 pub mod point;
 pub mod sampling;
 pub mod select;
@@ -250,6 +251,22 @@ impl Light {
             Light::InfiniteConstant { l } => *l,
             Light::InfiniteImage { map, world_from_light, scale } => map.le(world_from_light.transpose() * w) * *scale,
             Light::Point { .. } | Light::Spot { .. } | Light::Distant { .. } | Light::Area(_) => Rgb::BLACK,
+        }
+    }
+
+    /// [`le`](Self::le) of an infinite light and [`pdf_li`](Self::pdf_li) in the direction `w`.
+    #[inline]
+    pub fn le_and_pdf(&self, w: Vec3) -> (Rgb, f32) {
+        match self {
+            Light::InfiniteImage { map, world_from_light, scale } => {
+                let (le, pdf) = map.le_and_pdf(world_from_light.transpose() * w);
+                (le * *scale, pdf)
+            }
+            Light::Point { .. }
+            | Light::Spot { .. }
+            | Light::Distant { .. }
+            | Light::Area(_)
+            | Light::InfiniteConstant { .. } => (self.le(w), self.pdf_li(&LightCtx::at(w), w, &LightHit::INFINITE)),
         }
     }
 

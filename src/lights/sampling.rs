@@ -4,7 +4,7 @@ use super::visibility_cache::ContributingLights;
 use super::{
     LightCtx, LightGroups, LightHit, LightId, LightSample, LightSampler, LightSamplerKind, LightSet, VisibilityCache,
 };
-use lumiris_numbers::math::Vec3;
+use lumiris_numbers::math::{Rgb, Vec3};
 use std::ops::Deref;
 use std::sync::Arc;
 
@@ -99,6 +99,16 @@ impl LightSampling {
         if pdf > 0.0 { pdf * self.sampler.pmf(ctx, light) } else { 0.0 }
     }
 
+    /// Radiance that all infinite lights send from the direction `wi`, and [`pdf_infinite`](Self::pdf_infinite).
+    #[inline]
+    pub fn infinite_in_direction(&self, ctx: &LightCtx, wi: Vec3) -> (Rgb, f32) {
+        self.set.infinite.iter().fold((Rgb::BLACK, 0.0), |(sum, density), &i| {
+            let (le, pdf) = self.set.lights[i as usize].le_and_pdf(wi);
+            let pdf = if pdf > 0.0 { pdf * self.sampler.pmf(ctx, i) } else { 0.0 };
+            (sum + le, density + pdf)
+        })
+    }
+
     /// Density per steradian of [`sample`](Self::sample) to choose any infinite light and the direction `wi`.
     #[inline]
     pub fn pdf_infinite(&self, ctx: &LightCtx, wi: Vec3) -> f32 {
@@ -111,7 +121,7 @@ mod tests {
     use super::*;
     use crate::geometry::{Shape, TriangleMesh};
     use crate::lights::{Emission, EnvironmentFilter, EnvironmentMap, EnvironmentMapping, Light, LightSetBuilder};
-    use lumiris_numbers::math::{Affine3A, Bounds3, Rgb};
+    use lumiris_numbers::math::{Affine3A, Bounds3};
     use lumiris_test_support::random::{RngExt, pcg32};
     use lumiris_test_support::{Moments, assert_chi_squared};
     use std::sync::Arc;
@@ -273,6 +283,7 @@ mod tests {
         let ctx = LightCtx::at(Vec3::ZERO);
         let each: f32 = [3, 5].iter().map(|&i| set.pdf(&ctx, i, w, &LightHit::INFINITE)).sum();
         assert!(each > 0.0 && set.pdf_infinite(&ctx, w) == each);
+        assert_eq!(set.infinite_in_direction(&ctx, w), (set.le(w), each));
     }
 
     #[test]

@@ -53,6 +53,15 @@ impl FixedChoice {
         FixedChoice { table, cumulative }
     }
 
+    /// The only one that is chosen, if there is one.
+    pub(super) fn only(&self) -> Option<LightId> {
+        let mut chosen = (0..self.table.len()).filter(|&i| self.table.pmf(i) > 0.0);
+        match (chosen.next(), chosen.next()) {
+            (Some(light), None) => Some(light as LightId),
+            _ => None,
+        }
+    }
+
     fn runs(&self, positions: &[u32], out: &mut Vec<LightRun>) {
         let mut first = 0;
         while let Some(&position) = positions.get(first) {

@@ -323,6 +323,11 @@ impl LightTree {
         if self.is_empty() { None } else { self.sample_below(ctx, 0, u) }
     }
 
+    /// The light of a tree of one light.
+    pub fn only_light(&self) -> Option<LightId> {
+        if let [leaf] = &self.nodes[..] { Some(leaf.index) } else { None }
+    }
+
     /// Probability that [`sample`](Self::sample) chooses `light`.
     #[inline]
     pub fn pmf(&self, ctx: &LightCtx, light: LightId) -> f32 {

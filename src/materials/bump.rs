@@ -1,6 +1,6 @@
 //! Shading frames, optionally perturbed by a normal map or a displacement texture [Blinn 1978].
 
-use super::MaterialEntry;
+use super::{Material, MaterialEntry};
 use crate::geometry::SurfaceHit;
 use crate::textures::{FloatTextureId, ImageId, TextureContext, TextureSet};
 use lumiris_numbers::math::{Frame, Vec2, Vec3};
@@ -13,6 +13,8 @@ pub fn shading_frame(entry: &MaterialEntry, textures: &TextureSet, hit: &Surface
     match (entry.normal_map, entry.displacement) {
         (Some(map), _) => normal_mapped(map, textures, hit, ctx),
         (None, Some(displacement)) => displaced(displacement, textures, hit, ctx),
+        // Lambertian reflection needs no tangent, and the lanes do without
+        (None, None) if matches!(entry.material, Material::Diffuse { .. }) => Frame::from_z(hit.ns),
         (None, None) => Frame::from_xz(hit.dpdus, hit.ns),
     }
 }

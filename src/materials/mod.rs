@@ -238,6 +238,16 @@ impl MaterialSet {
         None
     }
 
+    /// The reflectance of a material that is Lambertian, the same everywhere, and does not bend normals.
+    pub fn plain_reflectance(&self, id: MaterialId, textures: &TextureSet) -> Option<Rgb> {
+        let MaterialEntry { material: Material::Diffuse { reflectance }, normal_map: None, displacement: None, .. } =
+            self.entries[id as usize]
+        else {
+            return None;
+        };
+        textures.constant_rgb(reflectance).map(|c| c.clamp(0.0, 1.0))
+    }
+
     /// The scattering at a hit seen from the world-space direction `wo`; `None` where rays pass. `id` and its textures
     /// are of the sets that the materials were made with.
     pub fn bsdf(

@@ -120,6 +120,16 @@ impl<'a> SurfaceBsdf<'a> {
         Some(drawn)
     }
 
+    /// The geometric normal on the side that light must come from to reach `wo`; zero if it may come from both.
+    #[inline]
+    pub fn lit_normal(&self, wo: Vec3) -> Vec3 {
+        match (self.bsdf.transmits(), self.n.dot(wo) < 0.0) {
+            (true, _) => Vec3::ZERO,
+            (false, true) => -self.n,
+            (false, false) => self.n,
+        }
+    }
+
     /// |cos θ| of a world-space direction about the shading normal.
     #[inline]
     pub fn cos(&self, w: Vec3) -> f32 {

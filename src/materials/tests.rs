@@ -2,7 +2,7 @@ use super::*;
 use crate::bsdfs::Lobe;
 use crate::imaging::{ColorEncoding, Filter, Image, MipMap, Wrap};
 use crate::textures::{FloatTexture, ImageTexture, Mapping2d, RgbTexture};
-use lumiris_numbers::math::{Vec2, warp};
+use lumiris_numbers::math::{Frame, Vec2, warp};
 use lumiris_test_support::random::{RngExt, pcg32};
 use std::f32::consts::FRAC_1_PI;
 
@@ -97,10 +97,13 @@ fn a_diffuse_material_clamps_its_texture_and_works_in_world_space() {
 fn shading_frames_follow_the_tangent() {
     let mut bench = Bench::new();
     let reflectance = bench.rgb(0.5, 0.5, 0.5);
-    let id = bench.material(Material::Diffuse { reflectance });
+    let glass = bench.material(Material::ThinDielectric { eta: 1.5 });
+    let chalk = bench.material(Material::Diffuse { reflectance });
     let (set, hit) = (bench.set(), hit(UP));
-    let s = set.bsdf(id, &bench.textures, &hit, &context(&hit), UP).unwrap();
-    assert!((s.frame.x - hit.dpdus.normalize()).length() < 1e-6 && (s.frame.z - UP).length() < 1e-6);
+    let frame = |id| set.bsdf(id, &bench.textures, &hit, &context(&hit), UP).unwrap().frame;
+    assert!((frame(glass).x - hit.dpdus.normalize()).length() < 1e-6 && (frame(glass).z - UP).length() < 1e-6);
+    // Lambertian reflection has no preferred direction
+    assert_eq!(frame(chalk), Frame::from_z(hit.ns));
 }
 
 #[test]

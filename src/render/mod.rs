@@ -5,7 +5,9 @@
 //! of their index; so neither threads, nor tiles, nor passes change a bit.
 
 pub mod bench;
+pub mod bench_frame;
 pub mod bench_photons;
+mod camera_samples;
 pub mod crosscheck;
 pub mod output;
 pub mod plan;
@@ -13,7 +15,6 @@ pub mod visibility_cache;
 mod worker;
 
 use crate::direct::Fits;
-use crate::film::filter::FilterSampler;
 use crate::film::replicas::{Replica, replicas};
 use crate::film::{Film, PixelBounds, PixelSums};
 use crate::integrators::PathStats;
@@ -22,29 +23,18 @@ use crate::integrators::path::CameraSample;
 use crate::integrators::photon_map::{self, MapMaker, MapStats, PhotonMaps};
 use crate::photons::PhotonError;
 use crate::scene::RenderJob;
-use crate::settings::{IntegratorKind, Proposals};
+use crate::settings::IntegratorKind;
+use camera_samples::CameraSampler;
 use lumiris_numbers::estimators::ocv::block_of;
-use lumiris_numbers::math::Vec2;
 use lumiris_numbers::math::hash::pcg4d;
-use lumiris_numbers::samplers::SampleStream;
 use rayon::prelude::*;
 use std::sync::atomic::{AtomicBool, AtomicU64, Ordering};
 use std::sync::{Mutex, MutexGuard, PoisonError};
 use std::time::{Duration, Instant};
 use worker::{Worker, WorkerStats};
 
-/// Domains of a camera sample.
-mod domain {
-    pub(super) const FILM_AND_LENS: u32 = 0;
-    pub(super) const TIME: u32 = 1;
-    pub(super) const SAMPLE_COUNTS: u32 = 2;
-}
-
 /// Paths that are traced together: enough that stages run long, few enough that their data stays in the cache.
 const BATCH_PATHS: usize = 4096;
-
-/// Seed of the blocks of progressive estimators.
-const BLOCK_SEED: u32 = 0x62_6c_6f_63;
 
 /// Combined with the seed of the image to give that of replicas.
 const REPLICA_SEED: u32 = 0x72_65_70_73;
@@ -167,32 +157,42 @@ pub fn thread_pool(threads: Option<usize>) -> Result<rayon::ThreadPool, ThreadEr
     pool.map_err(|source| ThreadError { threads, source })
 }
 
-/// Batches of camera samples as the renderer makes them in its first pass, spread over the image; about `rays`
-/// together.
-fn camera_batches(job: &RenderJob, tile_size: u32, rays: usize) -> Vec<Vec<CameraSample>> {
-    let stop = AtomicBool::new(false);
-    let spp = job.settings().sampling.spp;
-    let settings = RenderSettings { tile_size, spp, ..RenderSettings::default() };
-    let run = Run::new(job, &settings, &stop, &|_| ());
-    let per_pixel = spp.min(run.pass_length()).max(1);
+/// Pixels of a tile.
+type TilePart = (PixelBounds, std::ops::Range<usize>);
+
+/// The pixels of batches as the renderer makes them in its first pass, spread over the image, about `rays` camera
+/// samples together; and the range of samples of each.
+fn batch_parts(run: &Run<'_>, rays: usize) -> (Vec<TilePart>, std::ops::Range<u32>) {
+    let per_pixel = run.settings.spp.min(run.pass_length()).max(1);
     let pixels_per_batch = (BATCH_PATHS / per_pixel as usize).max(1);
-    let tiles = job.world.scene.film.bounds.tiles(tile_size);
+    let tiles = run.job.world.scene.film.bounds.tiles(run.settings.tile_size);
     let parts: Vec<_> = tiles
         .iter()
         .flat_map(|tile| {
             let area = tile.area();
-            (0..area).step_by(pixels_per_batch).map(move |p| (tile, p..area.min(p + pixels_per_batch)))
+            (0..area).step_by(pixels_per_batch).map(move |p| (*tile, p..area.min(p + pixels_per_batch)))
         })
         .collect();
 
     // Every k-th batch
     let all: usize = parts.iter().map(|(_, pixels)| pixels.len() * per_pixel as usize).sum();
     let stride = all.div_ceil(rays.max(1)).max(1);
-    let chosen = parts.iter().step_by(stride).map(|(tile, pixels)| {
-        let mut samples = Vec::new();
-        run.camera_samples(tile, pixels.clone(), 0..per_pixel, &mut samples);
-        samples.iter_mut().for_each(|s| s.fit -= pixels.start as u32);
-        samples
+    (parts.into_iter().step_by(stride).collect(), 0..per_pixel)
+}
+
+/// Batches of camera samples as the renderer makes them in its first pass, spread over the image; about `rays`
+/// together.
+fn camera_batches(job: &RenderJob, tile_size: u32, rays: usize) -> Vec<Vec<CameraSample>> {
+    let stop = AtomicBool::new(false);
+    let settings = RenderSettings { tile_size, spp: job.settings().sampling.spp, ..RenderSettings::default() };
+    let run = Run::new(job, &settings, &stop, &|_| ());
+    let (parts, samples) = batch_parts(&run, rays);
+    let mut scratch = camera_samples::Scratch::default();
+    let chosen = parts.iter().map(|(tile, pixels)| {
+        let mut batch = Vec::new();
+        run.camera_samples(tile, pixels.clone(), &samples, &mut scratch, &mut batch);
+        batch.iter_mut().for_each(|s| s.fit -= pixels.start as u32);
+        batch
     });
     chosen.collect()
 }
@@ -211,9 +211,7 @@ struct Run<'a> {
     settings: &'a RenderSettings,
     stop: &'a AtomicBool,
     observe: &'a (dyn Fn(&Progress) + Sync),
-    filter: FilterSampler,
-    /// False if the time of a ray does not matter.
-    has_motion: bool,
+    camera: CameraSampler<'a>,
     cache: Option<IrradianceCache>,
     /// Photon maps of the pass under way.
     maps: Option<PhotonMaps>,
@@ -236,8 +234,7 @@ impl<'a> Run<'a> {
             settings,
             stop,
             observe,
-            filter: job.world.scene.film.filter.sampler(),
-            has_motion: job.world.scene.geometry.has_motion(),
+            camera: CameraSampler::new(job, settings.first_sample),
             cache: None,
             maps: None,
             start: Instant::now(),
@@ -315,7 +312,7 @@ impl<'a> Run<'a> {
         }
         let bounds = self.job.world.scene.film.bounds;
         let seed = self.job.settings().sampling.seed;
-        let camera = |pixel, sample| self.camera_sample_of_seed(pixel, sample, seed);
+        let camera = |pixel, sample| self.camera.sample_of_seed(pixel, sample, seed);
         let (cache, stats) = irradiance_cache::build(self.job, bounds, &camera, self.stop);
         self.cache = Some(cache);
         Some(stats)
@@ -327,7 +324,7 @@ impl<'a> Run<'a> {
             return Ok(None);
         }
         let seed = self.job.settings().sampling.seed;
-        let seen = photon_map::maps::seen(self.job, &|pixel, sample| self.camera_sample_of_seed(pixel, sample, seed));
+        let seen = photon_map::maps::seen(self.job, &|pixel, sample| self.camera.sample_of_seed(pixel, sample, seed));
         MapMaker::new(self.job, &seen, self.stop).map(Some)
     }
 
@@ -428,7 +425,8 @@ impl<'a> Run<'a> {
         let solve = start.elapsed();
         for (batch, sums) in tile.sums.chunks_mut(pixels_per_batch).enumerate() {
             let first = batch * pixels_per_batch;
-            self.camera_samples(&bounds, first..first + sums.len(), samples.clone(), &mut worker.samples);
+            let pixels = first..first + sums.len();
+            self.camera_samples(&bounds, pixels, &samples, &mut worker.scratch, &mut worker.samples);
             worker.trace(self.job, (self.cache.as_ref(), self.maps.as_ref()), &mut tile.fits);
             for (pixel, results) in sums.iter_mut().zip(worker.results.chunks(per_pixel)) {
                 results.iter().for_each(|r| pixel.add(r));
@@ -453,11 +451,8 @@ impl<'a> Run<'a> {
         let mut fits = tile.bounds.area() as u32..;
         for replicas in tile.replicas.chunks_mut((BATCH_PATHS / per_pixel).max(1)) {
             worker.samples.clear();
-            for (replica, fit) in replicas.iter().zip(&mut fits) {
-                let pixel = position(&tile.bounds, replica.pixel);
-                let of_pixel = samples.clone().map(|s| CameraSample { fit, ..self.camera_sample(pixel, s, seed) });
-                worker.samples.extend(of_pixel);
-            }
+            let pixels = replicas.iter().zip(&mut fits).map(|(r, fit)| (fit, position(&tile.bounds, r.pixel)));
+            self.camera.samples(pixels, &samples, seed, &mut worker.scratch, &mut worker.samples);
             worker.trace(self.job, (self.cache.as_ref(), self.maps.as_ref()), &mut tile.fits);
             for (replica, results) in replicas.iter_mut().zip(worker.results.chunks(per_pixel)) {
                 results.iter().for_each(|r| replica.add(r));
@@ -470,53 +465,13 @@ impl<'a> Run<'a> {
         &self,
         tile: &PixelBounds,
         pixels: std::ops::Range<usize>,
-        samples: std::ops::Range<u32>,
+        samples: &std::ops::Range<u32>,
+        scratch: &mut camera_samples::Scratch,
         out: &mut Vec<CameraSample>,
     ) {
         out.clear();
-        let seed = self.job.settings().sampling.seed;
-        for index in pixels {
-            let index = index as u32;
-            let pixel = position(tile, index);
-            out.extend(samples.clone().map(|s| CameraSample { fit: index, ..self.camera_sample(pixel, s, seed) }));
-        }
-    }
-
-    /// The direct light of a progressive estimator is drawn block by block, each with a seed of its own.
-    fn camera_sample(&self, pixel: [u32; 2], sample: u32, seed: u32) -> CameraSample {
-        if !self.job.settings().integrator.is_progressive() {
-            return self.camera_sample_of_seed(pixel, sample, seed);
-        }
-        let first = self.settings.first_sample;
-        let block = block_of(sample - first);
-        let block_seed = pcg4d([seed, first, block.index, BLOCK_SEED])[0];
-        let kind = self.job.settings().sampling.sampler;
-        let direct = SampleStream::new(kind, pixel, sample - first - block.first, block_seed);
-        CameraSample { direct, ..self.camera_sample_of_seed(pixel, sample, seed) }
-    }
-
-    fn camera_sample_of_seed(&self, pixel: [u32; 2], sample: u32, seed: u32) -> CameraSample {
-        let (scene, settings) = (&self.job.world.scene, self.job.settings());
-        let stream = SampleStream::new(settings.sampling.sampler, pixel, sample, seed);
-        let [fx, fy, lx, ly] = stream.domain(domain::FILM_AND_LENS).draw::<4>();
-        let [u_time] = if self.has_motion { stream.domain(domain::TIME).draw::<1>() } else { [0.0] };
-        let filter = self.filter.sample([fx, fy]);
-        let film = Vec2::new(pixel[0] as f32 + 0.5, pixel[1] as f32 + 0.5) + filter.offset;
-        let ray = scene.camera.ray(film, [lx, ly], u_time);
-        let chosen =
-            self.job.sample_count_map.as_ref().filter(|_| settings.integrator.ris.proposals == Proposals::Optimal);
-        let sample_counts = match chosen {
-            Some(map) => map.sample_counts(pixel, stream.domain(domain::SAMPLE_COUNTS).draw::<2>()),
-            None => settings.integrator.sample_counts(),
-        };
-        CameraSample {
-            ray,
-            weight: filter.weight * ray.weight * scene.film.scale,
-            stream,
-            direct: stream,
-            sample_counts,
-            fit: 0,
-        }
+        let pixels = pixels.map(|index| (index as u32, position(tile, index as u32)));
+        self.camera.samples(pixels, samples, self.job.settings().sampling.seed, scratch, out);
     }
 }
 

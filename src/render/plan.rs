@@ -206,7 +206,7 @@ fn pilot_row(job: &RenderJob, row: &PixelBounds) -> Vec<MomentsEstimate> {
     for (pixel, sum) in sums.iter_mut().enumerate() {
         samples.clear();
         let at = [row.x0 + pixel as u32, row.y0];
-        samples.extend((0..PILOT_SPP).map(|s| run.camera_sample_of_seed(at, s, PILOT_SEED)));
+        samples.extend((0..PILOT_SPP).map(|s| run.camera.sample_of_seed(at, s, PILOT_SEED)));
         samples.iter_mut().for_each(|s| s.sample_counts = all);
         integrator.outcomes = Some(Vec::new());
         integrator.trace(job, &settings, &samples, &mut Fits::default(), &mut out);

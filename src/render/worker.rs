@@ -1,9 +1,10 @@
 //! What one thread holds: an integrator of each kind, with its buffers and counts.
 
+use super::camera_samples;
 use crate::direct::Fits;
 use crate::film::PixelSample;
 use crate::integrators::irradiance_cache::{IrradianceCache, LookupStats};
-use crate::integrators::path::CameraSample;
+use crate::integrators::path::{CameraSample, Recording};
 use crate::integrators::photon_map::PhotonMaps;
 use crate::integrators::{CacheIntegrator, PathIntegrator, PathStats, PhotonMapIntegrator};
 use crate::scene::RenderJob;
@@ -29,6 +30,7 @@ pub(super) struct Worker {
     with_cache: CacheIntegrator,
     with_photons: PhotonMapIntegrator,
     pub(super) samples: Vec<CameraSample>,
+    pub(super) scratch: camera_samples::Scratch,
     pub(super) results: Vec<PixelSample>,
 }
 
@@ -55,6 +57,16 @@ impl Worker {
             (None, Some(maps)) => self.with_photons.trace(job, maps, samples, fits, results),
             (None, None) => self.integrator.trace(job, &job.settings().integrator, samples, fits, results),
         }
+    }
+
+    /// Records the rays of paths from now on, or does not.
+    pub(super) fn record(&mut self, on: bool) {
+        self.integrator.recording = on.then(Recording::default);
+    }
+
+    /// The rays that were recorded.
+    pub(super) fn take_recording(&mut self) -> Recording {
+        self.integrator.recording.take().unwrap_or_default()
     }
 
     pub(super) fn take_stats(&mut self) -> WorkerStats {

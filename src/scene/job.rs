@@ -1,9 +1,11 @@
 //! What a rendering works on: a world, its settings, and what these prepare.
 
-use super::{SampleCountMap, World};
-use crate::geometry::GeometryId;
+use super::{SampleCountMap, Scene, World};
+use crate::accel::Hit;
+use crate::geometry::{GeometryId, Shape};
 use crate::lights::{Irradiances, LightSampling};
 use crate::settings::{IntegratorSettings, Settings};
+use lumiris_numbers::math::Rgb;
 use std::sync::Arc;
 
 /// A world with the settings that it is rendered by.
@@ -18,6 +20,8 @@ pub struct RenderJob {
     /// Sample counts of each pixel, if they are chosen per pixel.
     pub sample_count_map: Option<SampleCountMap>,
     lobes: usize,
+    /// Reflectance of the geometries that are nothing but meshes of one Lambertian reflectance.
+    plain: Vec<Option<Rgb>>,
 }
 
 impl RenderJob {
@@ -29,7 +33,14 @@ impl RenderJob {
         let lights = LightSampling::new(Arc::clone(&scene.lights), i.light_sampler, max_groups(i, lobes));
         let has_alpha = |geometry: GeometryId| scene.geometry.geometries[geometry as usize].alpha.is_some();
         let irradiances = Irradiances::new(&scene.lights, has_alpha);
-        RenderJob { world, settings, lights, irradiances, sample_count_map: None, lobes }
+        let plain = (0..scene.geometry.geometries.len() as GeometryId).map(|g| plain_reflectance(scene, g)).collect();
+        RenderJob { world, settings, lights, irradiances, sample_count_map: None, lobes, plain }
+    }
+
+    /// The reflectance at a hit of a mesh in world space that does not emit and reflects the same everywhere.
+    #[inline]
+    pub fn plain_reflectance(&self, hit: &Hit) -> Option<Rgb> {
+        if hit.instance == Hit::NO_INSTANCE { self.plain[hit.geometry as usize] } else { None }
     }
 
     /// The settings.
@@ -61,6 +72,13 @@ impl RenderJob {
     pub fn components(&self) -> usize {
         self.lobes + self.lights.groups.len()
     }
+}
+
+/// See [`RenderJob::plain_reflectance`].
+fn plain_reflectance(scene: &Scene, geometry: GeometryId) -> Option<Rgb> {
+    let is_mesh = matches!(scene.geometry.geometries[geometry as usize].shape, Shape::Mesh(_));
+    let reflectance = scene.materials.plain_reflectance(scene.surfaces[geometry as usize].material, &scene.textures)?;
+    (is_mesh && !scene.lights.emits(geometry)).then_some(reflectance)
 }
 
 /// Maximum number of groups of lights: the components of a mixture other than `lobes`.

@@ -11,7 +11,7 @@ mod world;
 pub use job::RenderJob;
 pub use sample_count_map::SampleCountMap;
 pub use surface_interaction::SurfaceInteraction;
-pub use world::{AccelKind, EmitterHit, World};
+pub use world::{AccelKind, EmitterHit, EmitterScratch, World};
 
 use crate::cameras::Camera;
 use crate::film::PixelBounds;

@@ -4,9 +4,11 @@ use super::Scene;
 use crate::accel::bvh::Bvh;
 use crate::accel::embree::{EmbreeAccel, EmbreeError};
 use crate::accel::{Accel, AlphaSource, Coherence, Hit, RayBatch};
-use crate::geometry::{GeometryId, GeometrySet, Group};
+use crate::geometry::{Geometry, GeometryId, GeometrySet, Group, Shape, Visibility};
 use crate::lights::LightId;
 use crate::textures::{TextureContext, TextureSet};
+use lumiris_lanes::level;
+use lumiris_lanes::triangles::{self, FirstHits};
 use lumiris_numbers::math::{Vec2, Vec3};
 use std::sync::Arc;
 use strum::{EnumString, IntoStaticStr, VariantNames};
@@ -34,8 +36,47 @@ pub struct World {
     /// Emitters only; geometry ids are indices into `emitter_geometry`.
     emitters: Option<Box<dyn Accel>>,
     emitter_geometry: Vec<GeometryId>,
+    /// The emitters, if they are few triangles without cut-outs.
+    few_emitters: Option<FewTriangles>,
     /// False if no emitter can hide another.
     emitters_hide: bool,
+}
+
+/// Number of triangles up to which a ray is tested with each of them: faster than a tree for it.
+const MAX_FEW: usize = 32;
+
+/// Triangles with their geometries and primitives.
+#[derive(Default)]
+struct FewTriangles {
+    corners: Vec<[Vec3; 3]>,
+    places: Vec<(GeometryId, u32)>,
+}
+
+impl FewTriangles {
+    /// The triangles of all `ids`, if they are nothing else and few.
+    fn new(geometry: &GeometrySet, ids: &[GeometryId]) -> Option<Self> {
+        let mut few = FewTriangles::default();
+        for &id in ids {
+            let Geometry { shape: Shape::Mesh(mesh), alpha: None, visibility } = &geometry.geometries[id as usize]
+            else {
+                return None;
+            };
+            if *visibility != Visibility::ALL || few.corners.len() + mesh.triangle_count() > MAX_FEW {
+                return None;
+            }
+            few.corners.extend((0..mesh.triangle_count()).map(|i| mesh.triangle(i)));
+            few.places.extend((0..mesh.triangle_count() as u32).map(|i| (id, i)));
+        }
+        Some(few)
+    }
+}
+
+/// Memory of [`World::intersect_emitters`].
+#[derive(Debug, Default)]
+pub struct EmitterScratch {
+    hits: Vec<Option<Hit>>,
+    /// Parameter, two weights, and index of the triangle.
+    columns: [Vec<f32>; 4],
 }
 
 /// The first emitter that a ray hits.
@@ -90,7 +131,8 @@ impl World {
             Some(build(kind, &Arc::new(set), &scene.textures, packet_width)?)
         };
         let emitters_hide = scene.lights.may_hide_each_other();
-        Ok(World { scene, accel, emitters, emitter_geometry, emitters_hide })
+        let few_emitters = FewTriangles::new(&scene.geometry, &emitter_geometry);
+        Ok(World { scene, accel, emitters, emitter_geometry, few_emitters, emitters_hide })
     }
 
     /// True if an emitter can hide another.
@@ -110,23 +152,43 @@ impl World {
     }
 
     /// What each ray would hit first if there were only emitters.
-    pub fn intersect_emitters(
-        &self,
-        rays: &RayBatch,
-        scratch: &mut Vec<Option<Hit>>,
-        out: &mut Vec<Option<EmitterHit>>,
-    ) {
+    pub fn intersect_emitters(&self, rays: &RayBatch, scratch: &mut EmitterScratch, out: &mut Vec<Option<EmitterHit>>) {
         out.clear();
+        if let Some(few) = &self.few_emitters {
+            return self.intersect_few(few, rays, scratch, out);
+        }
         let Some(emitters) = &self.emitters else {
             out.resize(rays.len(), None);
             return;
         };
-        emitters.intersect(rays, Coherence::Incoherent, scratch);
-        out.extend(scratch.iter().map(|hit| {
+        emitters.intersect(rays, Coherence::Incoherent, &mut scratch.hits);
+        out.extend(scratch.hits.iter().map(|hit| {
             hit.map(|h| {
                 let geometry = self.emitter_geometry[h.geometry as usize];
                 let light = self.scene.lights.light_of(geometry, h.primitive);
                 EmitterHit { geometry, primitive: h.primitive, uv: h.uv, t: h.t, light }
+            })
+        }));
+    }
+
+    fn intersect_few(
+        &self,
+        few: &FewTriangles,
+        rays: &RayBatch,
+        scratch: &mut EmitterScratch,
+        out: &mut Vec<Option<EmitterHit>>,
+    ) {
+        let n = rays.len();
+        scratch.columns.iter_mut().for_each(|c| c.resize(n, 0.0));
+        let [t, b1, b2, triangle] = &mut scratch.columns;
+        let (o, d) = ([&rays.ox[..], &rays.oy, &rays.oz], [&rays.dx[..], &rays.dy, &rays.dz]);
+        triangles::first_hits(level(), &few.corners, o, d, &mut FirstHits { t, b: [b1, b2], triangle });
+        out.extend((0..n).map(|i| {
+            let t = t[i];
+            (t < rays.t_max[i]).then(|| {
+                let (geometry, primitive) = few.places[triangle[i] as usize];
+                let light = self.scene.lights.light_of(geometry, primitive);
+                EmitterHit { geometry, primitive, uv: [b1[i], b2[i]], t, light }
             })
         }));
     }

@@ -8,6 +8,7 @@ use lumiris::render::plan::prepare;
 use lumiris::render::{RenderSettings, render};
 use lumiris::scene::{AccelKind, RenderJob};
 use lumiris::settings::{EstimatorKind, Proposals, Target};
+use lumiris_lanes::Level;
 use std::path::Path;
 use std::sync::atomic::AtomicBool;
 
@@ -45,6 +46,21 @@ fn threads_and_tiles_do_not_change_a_bit() {
                 let what = format!("{estimator:?}, {threads} threads, tiles of {tile_size}");
                 assert_same_bits(&reference, &film(&job, settings), &what);
             }
+        }
+    }
+}
+
+#[test]
+fn the_instruction_set_of_the_lanes_does_not_change_a_bit() {
+    for estimator in ESTIMATORS {
+        let job = gallery(estimator, None);
+        let reference = film(&job, RenderSettings::default());
+        for level in [Level::fallback()].into_iter().chain(lumiris_lanes::levels()) {
+            // Of the whole process: what other tests render at this time has the same bits as well
+            lumiris_lanes::set_level(Some(level));
+            let other = film(&job, RenderSettings::default());
+            lumiris_lanes::set_level(None);
+            assert_same_bits(&reference, &other, &format!("{estimator:?}, {level:?}"));
         }
     }
 }

@@ -13,3 +13,4 @@ mod photon_map;
 mod photons;
 mod variance;
 mod visibility_cache;
+mod wavefront;

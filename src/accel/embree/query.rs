@@ -20,8 +20,7 @@ impl EmbreeAccel {
         hits.clear();
         hits.resize(rays.len(), None);
         let mode = Mode { query: QueryKind::First, coherent: coherence == Coherence::Coherent };
-        // Without a common frustum Embree traces the rays of a packet one by one for first hits, only slower.
-        match if mode.coherent { self.width_for(coherence) } else { 1 } {
+        match self.width() {
             4 => self.intersect_packets::<4>(rays, mode, hits),
             8 => self.intersect_packets::<8>(rays, mode, hits),
             _ => self.intersect_singly(rays, hits),
@@ -32,15 +31,17 @@ impl EmbreeAccel {
         occluded.clear();
         occluded.reserve(rays.len());
         let mode = Mode { query: QueryKind::Any, coherent: coherence == Coherence::Coherent };
-        match self.width_for(coherence) {
+        let width = if coherence == Coherence::Incoherent { 1 } else { self.width() };
+        match width {
             4 => self.occluded_packets::<4>(rays, mode, occluded),
             8 => self.occluded_packets::<8>(rays, mode, occluded),
             _ => self.occluded_singly(rays, occluded),
         }
     }
 
-    fn width_for(&self, coherence: Coherence) -> usize {
-        if coherence == Coherence::Incoherent || self.has_motion { 1 } else { self.width }
+    /// Rays per packet. Where instances move, each ray has a time of its own.
+    fn width(&self) -> usize {
+        if self.has_motion { 1 } else { self.width }
     }
 
     fn intersect_singly(&self, rays: &RayBatch, hits: &mut [Option<Hit>]) {

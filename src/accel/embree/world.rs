@@ -3,7 +3,7 @@
 use super::lanes::{LaneHits, Lanes, RayRows};
 use crate::accel::{Hit, RayBatch};
 use crate::geometry::triangle::{RayPrecomputed, intersect_triangle};
-use crate::geometry::{GeometryId, GeometrySet, Group, Shape};
+use crate::geometry::{GeometryId, GeometrySet, Group, Shape, TriangleMesh};
 use lumiris_numbers::math::{Affine3A, Ray, Vec3};
 use std::sync::Arc;
 
@@ -144,8 +144,9 @@ impl World {
         if let Some(exact) = self.refine_same(rays, &rows, base, first) {
             return exact;
         }
-        let mut lanes = Lanes::<N>::EMPTY;
+        // The indices of all lanes, then their corners: each of the two is a cache miss, and those of lanes overlap
         let (mut geometries, mut instances, mut t_max) = ([0; N], [Hit::NO_INSTANCE; N], [f32::NEG_INFINITY; N]);
+        let mut corners: [Option<(&TriangleMesh, [u32; 3])>; N] = [None; N];
         for (lane, reported) in first.iter().enumerate().take(N) {
             if reported.geometry == u32::MAX {
                 continue;
@@ -153,15 +154,21 @@ impl World {
             let instance = self.instance(reported.instance);
             let geometry = self.geometry(reported.geometry, instance);
             if let Shape::Mesh(mesh) = &self.set.geometries[geometry as usize].shape {
-                let ray = if instance == Hit::NO_INSTANCE {
-                    rows.get(lane)
-                } else {
-                    let ray = self.group_ray(&rays.get(base + lane), instance);
-                    (ray.o, ray.d)
-                };
-                lanes.set(lane, ray, mesh.triangle(reported.primitive as usize));
+                corners[lane] = Some((mesh, mesh.indices[reported.primitive as usize]));
                 (geometries[lane], instances[lane], t_max[lane]) = (geometry, instance, rays.t_max[base + lane]);
             }
+        }
+        let triangles = corners.map(|c| c.map(|(mesh, vertices)| mesh.corners(vertices)));
+        let mut lanes = Lanes::<N>::EMPTY;
+        for (lane, triangle) in triangles.into_iter().enumerate() {
+            let Some(triangle) = triangle else { continue };
+            let ray = if instances[lane] == Hit::NO_INSTANCE {
+                rows.get(lane)
+            } else {
+                let ray = self.group_ray(&rays.get(base + lane), instances[lane]);
+                (ray.o, ray.d)
+            };
+            lanes.set(lane, ray, triangle);
         }
         Exact::new(lanes.intersect(), t_max, geometries, instances)
     }

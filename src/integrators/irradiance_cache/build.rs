@@ -170,7 +170,7 @@ fn ask_chunk(
         if paths.active.is_empty() {
             break;
         }
-        let vertices = paths.find_vertices(job, vertex, depth, samples, &mut out);
+        let vertices = paths.find_vertices(job, vertex, depth, samples, &mut out, None);
         paths.next.clear();
         for (state, v) in paths.active.iter().zip(&vertices) {
             let sample = state.sample as usize;

@@ -17,7 +17,7 @@ use crate::direct::{DirectStage, Fits, ShadingPoint};
 use crate::film::PixelSample;
 use crate::integrators::path::{CameraSample, PathIntegrator, PathStats};
 use crate::materials::SurfaceBsdf;
-use crate::scene::{EmitterHit, RenderJob};
+use crate::scene::{EmitterHit, EmitterScratch, RenderJob};
 use crate::settings::{Cached, IntegratorKind, IntegratorSettings, SampleCounts};
 use lumiris_numbers::estimators::ocv::block_of;
 use lumiris_numbers::math::hash::pcg4d;
@@ -69,7 +69,7 @@ pub struct Gatherer {
     results: Vec<PixelSample>,
     radiance: Vec<Rgb>,
     rays: RayBatch,
-    hits: Vec<Option<Hit>>,
+    hits: EmitterScratch,
     emitters: Vec<Option<EmitterHit>>,
 }
 

@@ -25,7 +25,8 @@ pub use cache::IrradianceCache;
 pub use record::Record;
 
 use super::diffuse::{self, Reflected, viewer_normal};
-use super::path::{CameraSample, PathIntegrator, PathState, PathStats, Vertex};
+use super::path::{CameraSample, PathIntegrator, PathStats, Vertex};
+use super::segment::PathState;
 use crate::bsdfs::Lambertian;
 use crate::direct::Fits;
 use crate::film::PixelSample;

@@ -313,7 +313,7 @@ pub fn seen(job: &RenderJob, camera: &dyn Fn([u32; 2], u32) -> CameraSample) -> 
     let samples: Vec<CameraSample> = pixels.map(|pixel| camera(pixel, 0)).collect();
     let (mut paths, mut results) = (PathIntegrator::default(), Vec::new());
     paths.start(&samples, &mut results);
-    let vertices = paths.find_vertices(job, 0, 1, &samples, &mut results);
+    let vertices = paths.find_vertices(job, 0, 1, &samples, &mut results, None);
     let diffuse = vertices.iter().filter(|v| v.bsdf.lambertian(v.wo).is_some());
     diffuse.map(|v| (v.surface.p, if v.surface.n.dot(v.wo) < 0.0 { -v.surface.n } else { v.surface.n })).collect()
 }

@@ -22,7 +22,8 @@ pub mod maps;
 pub use maps::{MapMaker, MapStats, PhotonMaps};
 
 use super::diffuse::{self, Reflected, viewer_normal};
-use super::path::{self, CameraSample, PathIntegrator, PathState, PathStats, Vertex};
+use super::path::{self, CameraSample, PathIntegrator, PathStats, Vertex};
+use super::segment::PathState;
 use crate::bsdfs::{Bsdf, Diffuse, DiffuseTransmission, Lambertian};
 use crate::cameras::CameraRay;
 use crate::direct::{Fits, ShadingPoint};
@@ -188,7 +189,7 @@ impl PhotonMapIntegrator {
             if gather.active.is_empty() {
                 break;
             }
-            let vertices = gather.find_vertices(job, vertex, depth, &self.samples, &mut self.results);
+            let vertices = gather.find_vertices(job, vertex, depth, &self.samples, &mut self.results, None);
 
             // Look up the maps, except where a ray is shorter than their search radius
             let mut near = Vec::new();

@@ -11,17 +11,11 @@
 //! by the same function, so they always agree.
 
 use super::{ShapePoint, ShapeSample, pdf_by_area};
+use lumiris_lanes::area::many::MAX_EXTENT;
+use lumiris_lanes::area::spherical::{MIN_HEIGHT, MIN_SOLID_ANGLE};
 use lumiris_lanes::area::{self, SphericalRectangle, Surface};
 use lumiris_numbers::math::{Bounds3, Vec2, Vec3, gamma};
 use std::f64::consts::TAU;
-
-/// Largest diagonal, by the distance of the centre, that is sampled by area.
-pub const MAX_EXTENT: f32 = 0.5;
-/// Smallest solid angle that is sampled by solid angle, in steradians: of what is nearly edge-on, angles in f64 keep
-/// their digits down to here.
-pub const MIN_SOLID_ANGLE: f64 = 1e-4;
-/// Smallest distance from the plane, in diagonals of the rectangle, that is sampled by solid angle.
-pub const MIN_HEIGHT: f64 = 1e-5;
 
 /// A rectangle that emits.
 #[derive(Clone, Debug)]

@@ -6,6 +6,7 @@ use super::settings::{load_job, plan};
 use anyhow::{Context, bail};
 use clap::{Args, ValueEnum};
 use lumiris::render::bench::{BenchSettings, RayCase, Report, measure};
+use lumiris::render::bench_frame::{FrameReport, measure_frame};
 use lumiris::render::bench_photons::{PhotonReport, measure_photons};
 use lumiris::scene::{AccelKind, RenderJob};
 use lumiris_formats::output::write_text;
@@ -24,6 +25,8 @@ enum Subject {
     Intersect,
     /// Photon tracing and photon maps
     Photons,
+    /// A whole frame, and the share of a bare Embree loop over its rays
+    Frame,
     /// Everything
     All,
 }
@@ -63,14 +66,16 @@ pub(super) fn run(args: &BenchArgs) -> anyhow::Result<ExitCode> {
         packet_width: args.scene.packet_width,
         tile_size: args.scene.tile_size,
     };
+    let frame = if asked(Subject::Frame) { Some(frame(args, &job)?) } else { None };
     let photons = if asked(Subject::Photons) { photons(args, &job)? } else { None };
     let report = measure(job, &settings)?;
-    if args.subject != Subject::Photons {
+    if settings.intersect || settings.t1 || settings.t2 {
         progress::print(&table(&report));
     }
     if let Some(path) = &args.json {
         let mut value = serde_json::to_value(&report)?;
         let name = args.scene.scene.display().to_string();
+        value["frame"] = serde_json::to_value(&frame)?;
         value["photons"] = serde_json::to_value(&photons)?;
         value["scene"] = json!(name);
         value["seconds"] = json!({ "load": times.load, "build": times.build });
@@ -79,6 +84,27 @@ pub(super) fn run(args: &BenchArgs) -> anyhow::Result<ExitCode> {
             .with_context(|| format!("cannot write {}", path.display()))?;
     }
     Ok(ExitCode::SUCCESS)
+}
+
+/// Measures a frame and prints the results.
+fn frame(args: &BenchArgs, job: &RenderJob) -> anyhow::Result<FrameReport> {
+    let report = measure_frame(job, args.scene.tile_size, args.rays as usize, args.runs)?;
+    let mut text =
+        format!("{} camera samples, one thread\n{:<22}{:>10}\n", report.camera_samples, "ns per camera sample", "");
+    let mut line = |name: &str, value: f64| text += &format!("{name:<22}{value:>10.1}\n");
+    line("all", report.ns_per_camera_sample);
+    for stage in &report.stages {
+        line(stage.name, stage.ns_per_camera_sample);
+    }
+    line("bare tracing", report.bare_trace_ns_per_camera_sample);
+    text += &format!("{:<22}{:>10.3}\n", "share of bare tracing", report.tracing_share);
+    text += &format!("{:<22}{:>10}{:>10}{:>10}\n", "bare rays", "each", "width", "ns/ray");
+    for rays in &report.rays {
+        text +=
+            &format!("{:<22}{:>10.3}{:>10}{:>10.1}\n", rays.name, rays.per_camera_sample, rays.width, rays.ns_per_ray);
+    }
+    progress::print(text.trim_end());
+    Ok(report)
 }
 
 /// Measures photon tracing and prints the results; `all` skips it for a scene without photons.

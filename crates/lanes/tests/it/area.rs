@@ -3,6 +3,8 @@
 use super::support::{LENGTHS, assert_same_bits};
 use fearless_simd::{Simd, dispatch, f64x4, prelude::*};
 use lumiris_lanes::LightLanes;
+use lumiris_lanes::area::many::{PointsOnLight, sample_rectangle, sample_triangle};
+use lumiris_lanes::area::spherical::{atan2, sin_cos_turns_f64};
 use lumiris_lanes::area::*;
 use lumiris_numbers::math::{Vec2, Vec3};
 use lumiris_test_support::random::{RngExt, pcg32};
@@ -40,6 +42,50 @@ fn lanes_are_the_same_at_all_levels() {
                 sampler.sample(level, [&u0, &u1], &mut LightLanes { wi: [x, y, z], li: [r, g, b], pdf });
                 assert!(pdf.iter().all(|&p| p >= 0.0 && p.is_finite()));
             });
+        }
+    }
+}
+
+#[test]
+fn many_points_are_the_same_at_all_levels() {
+    let (ex, ey, n) = (Vec3::X, Vec3::Z, Vec3::NEG_Y);
+    let rectangle = Rectangle { corner: Vec3::new(-1.0, 2.0, -1.0), ex, ey, size: Vec2::new(2.0, 3.0), n };
+    let corners = [Vec3::new(0.0, 3.0, 1.0), Vec3::new(2.0, 3.0, 0.0), Vec3::new(1.0, 2.0, 2.0)];
+    let mut stream = pcg32([4, 4, 5]);
+    for len in [0, 8, 64] {
+        // Near, far, edge-on, and on the rectangle
+        let scale = |i: usize| [0.5, 3.0, 100.0][i % 3];
+        let from: [Vec<f32>; 3] =
+            [0, 1, 2].map(|_| (0..len).map(|i| (stream.random::<f32>() - 0.4) * scale(i)).collect());
+        let from = [&from[0][..], &from[1], &from[2]];
+        let u: [Vec<f32>; 2] = [0, 1].map(|_| (0..len).map(|_| stream.random::<f32>()).collect());
+        let u = [&u[0][..], &u[1]];
+        assert_same_bits::<10>(len, |level, [wx, wy, wz, x, y, z, ex, ey, ez, pdf]| {
+            let mut out = PointsOnLight { wi: [wx, wy, wz], p: [x, y, z], p_error: [ex, ey, ez], pdf };
+            sample_rectangle(level, &rectangle, 1e-6, from, u, &mut out);
+            assert!(out.pdf.iter().all(|&p| p >= 0.0 && p.is_finite()));
+        });
+        assert_same_bits::<10>(len, |level, [wx, wy, wz, x, y, z, ex, ey, ez, pdf]| {
+            let mut out = PointsOnLight { wi: [wx, wy, wz], p: [x, y, z], p_error: [ex, ey, ez], pdf };
+            sample_triangle(level, (corners, Vec3::Y, 1.5), from, u, &mut out);
+        });
+    }
+}
+
+#[test]
+fn arguments_of_complex_numbers_are_accurate() {
+    #[inline(always)]
+    fn run<S: Simd>(simd: S, y: &[f64; 4], x: &[f64; 4]) -> [f64; 4] {
+        atan2(f64x4::load_array(simd, *y), f64x4::load_array(simd, *x)).to_array()
+    }
+    for i in 0..2000 {
+        let angles = [0.0, 0.25, 0.5, 0.75].map(|part| (f64::from(i) / 1000.0 - 1.0 + part / 1000.0) * 0.5 * TAU);
+        let (y, x) = (angles.map(|a| 3.0 * a.sin()), angles.map(|a| 3.0 * a.cos()));
+        for level in super::support::levels() {
+            let found = dispatch!(level, simd => run(simd, &y, &x));
+            for k in 0..4 {
+                assert!((found[k] - y[k].atan2(x[k])).abs() < 4e-15, "{} {}", angles[k], found[k]);
+            }
         }
     }
 }

@@ -8,5 +8,8 @@ mod curve;
 mod environment;
 mod lane;
 mod light;
+mod sampler;
 mod support;
+mod triangles;
 mod two_techniques;
+mod vertex;

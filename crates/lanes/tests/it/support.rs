@@ -4,15 +4,7 @@ use lumiris_lanes::Level;
 
 /// All levels of this machine, the scalar one first.
 pub(crate) fn levels() -> Vec<Level> {
-    let mut levels = vec![Level::fallback(), Level::baseline()];
-    #[cfg(target_arch = "x86_64")]
-    {
-        let best = Level::new();
-        levels.extend(best.as_sse4_2().map(Level::Sse4_2));
-        levels.extend(best.as_avx2().map(Level::Avx2));
-        levels.extend(best.as_avx512().map(Level::Avx512));
-    }
-    levels
+    [Level::fallback()].into_iter().chain(lumiris_lanes::levels()).collect()
 }
 
 /// Lengths with and without full vectors.

@@ -9,7 +9,10 @@
 
 use crate::math::ONE_MINUS_EPSILON;
 use crate::math::hash::{pcg4d, unit_f32};
-use openqmc::{SobolBnSampler, SobolSampler};
+use openqmc::bntables::{self, table_value};
+use openqmc::float::uint_to_float;
+use openqmc::owen::shuffled_scrambled_sobol;
+use openqmc::{State64Bit, pcg};
 use strum::{EnumIter, EnumString, IntoStaticStr, VariantNames};
 
 /// The sequence.
@@ -46,8 +49,38 @@ pub struct SampleStream(Kind);
 #[derive(Clone, Copy, Debug)]
 enum Kind {
     Independent { key: [u32; 3] },
-    Sobol(SobolSampler),
-    SobolBlueNoise(SobolBnSampler),
+    Sobol(State64Bit),
+    SobolBlueNoise(State64Bit),
+}
+
+/// A point of an Owen-scrambled Sobol' sequence in four dimensions.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct NetPoint {
+    /// Its index.
+    pub index: u32,
+    /// Seed of the scramble.
+    pub seed: u32,
+}
+
+impl NetPoint {
+    /// The first coordinates.
+    #[inline]
+    fn coordinates<const N: usize>(self) -> [f32; N] {
+        shuffled_scrambled_sobol::<N>(self.index, self.seed).map(uint_to_float)
+    }
+}
+
+#[inline]
+fn sobol_point(s: &State64Bit) -> NetPoint {
+    NetPoint { index: u32::from(s.sample_id), seed: pcg::output(s.pattern_id) }
+}
+
+/// Index and seed are such that neighbouring pixels have errors of opposite signs.
+#[inline]
+fn blue_noise_point(s: &State64Bit) -> NetPoint {
+    let (keys, ranks) = (bntables::sobol::key_table(), bntables::sobol::rank_table());
+    let t = table_value::<8, 8, 0>(s.pixel_id, pcg::output(s.pattern_id) as u16, keys, ranks);
+    NetPoint { index: u32::from(s.sample_id) ^ t.rank, seed: t.key }
 }
 
 impl SampleStream {
@@ -66,10 +99,10 @@ impl SampleStream {
             }
             SamplerKind::Stratified => {
                 let [frame, ..] = pcg4d([pixel[0], pixel[1], sample, seed]);
-                Kind::Sobol(SobolSampler::new(x, y, (frame >> 2) as i32, 0))
+                Kind::Sobol(State64Bit::new(x, y, (frame >> 2) as i32, 0).pixel_decorrelate())
             }
-            SamplerKind::Sobol => Kind::Sobol(SobolSampler::new(x, y, frame, index)),
-            SamplerKind::SobolBlueNoise => Kind::SobolBlueNoise(SobolBnSampler::new(x, y, frame, index)),
+            SamplerKind::Sobol => Kind::Sobol(State64Bit::new(x, y, frame, index).pixel_decorrelate()),
+            SamplerKind::SobolBlueNoise => Kind::SobolBlueNoise(State64Bit::new(x, y, frame, index)),
         })
     }
 
@@ -104,8 +137,8 @@ impl SampleStream {
                 let h = pcg4d([key[0], key[1], key[2], 0x5bd1_e995]);
                 std::array::from_fn(|i| unit_f32(h[i]))
             }
-            Kind::Sobol(s) => s.draw_sample_f32::<N>(),
-            Kind::SobolBlueNoise(s) => s.draw_sample_f32::<N>(),
+            Kind::Sobol(s) => sobol_point(s).coordinates(),
+            Kind::SobolBlueNoise(s) => blue_noise_point(s).coordinates(),
         };
         for x in &mut u {
             *x = x.min(ONE_MINUS_EPSILON);
@@ -113,16 +146,26 @@ impl SampleStream {
         u
     }
 
+    /// The point whose coordinates [`draw`](Self::draw) gives; `None` if the numbers are independent.
+    #[inline]
+    pub fn net_point(&self) -> Option<NetPoint> {
+        match &self.0 {
+            Kind::Independent { .. } => None,
+            Kind::Sobol(s) => Some(sobol_point(s)),
+            Kind::SobolBlueNoise(s) => Some(blue_noise_point(s)),
+        }
+    }
+
     /// One number in [0, 1) of a sub-domain where stratification gains nothing (roulette).
     #[inline]
     pub fn draw_random(&self, key: u32) -> f32 {
         let domain = self.domain(key);
-        let u: [f32; 1] = match &domain.0 {
-            Kind::Independent { .. } => domain.draw(),
-            Kind::Sobol(s) => s.draw_rnd_f32::<1>(),
-            Kind::SobolBlueNoise(s) => s.draw_rnd_f32::<1>(),
+        let u = match &domain.0 {
+            Kind::Independent { .. } => domain.draw::<1>()[0],
+            Kind::Sobol(s) => uint_to_float(s.draw_rnd::<1>()[0]),
+            Kind::SobolBlueNoise(s) => uint_to_float(s.pixel_decorrelate().draw_rnd::<1>()[0]),
         };
-        u[0].min(ONE_MINUS_EPSILON)
+        u.min(ONE_MINUS_EPSILON)
     }
 }
 

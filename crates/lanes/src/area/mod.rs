@@ -1,11 +1,17 @@
 //! Directions from one point to a surface of constant emission, many at once. The formulas are those of the modules of
 //! `lights::area`; whatever depends on the point alone is computed once.
 
+//!
+//! [`many`] has directions from many points to one surface.
+
+pub mod many;
+pub mod spherical;
+
 use super::lane::{F, LANES, Vec3s, begin, load, or_zero, safe_sqrt, sin_cos_turns, store};
 use super::light::LightLanes;
-use fearless_simd::{Level, Simd, dispatch, f64x4, mask64x4, prelude::*};
+use fearless_simd::{Level, Simd, dispatch, prelude::*};
 use lumiris_numbers::math::{Frame, Vec2, Vec3, warp};
-use std::f64::consts::TAU;
+use spherical::SphericalSetup;
 
 /// A rectangle.
 #[derive(Clone, Copy, Debug)]
@@ -94,7 +100,8 @@ impl AreaSampler {
     fn sample_lanes<S: Simd>(&self, simd: S, u: [&[f32]; 2], out: &mut LightLanes<'_>) {
         match &self.surface {
             Surface::SphericalRectangle(rectangle, spherical) => {
-                self.spherical_rectangle(simd, rectangle, &SphericalSetup::new(spherical), u, out);
+                let pdf = (1.0 / spherical.solid_angle) as f32;
+                self.spherical_rectangle(simd, rectangle, (&SphericalSetup::splat(simd, spherical), pdf), u, out);
             }
             Surface::Rectangle(rectangle) => self.rectangle(simd, rectangle, u, out),
             Surface::Triangle(p, n, area) => self.triangle(simd, p, (*n, *area), u, out),
@@ -136,11 +143,11 @@ impl AreaSampler {
         &self,
         simd: S,
         rectangle: &Rectangle,
-        setup: &SphericalSetup,
+        (setup, pdf): (&SphericalSetup<S>, f32),
         u: [&[f32]; 2],
         out: &mut LightLanes<'_>,
     ) {
-        let (n, pdf) = (Vec3s::splat(simd, rectangle.n), (1.0 / setup.solid_angle) as f32);
+        let n = Vec3s::splat(simd, rectangle.n);
         for i in (0..out.pdf.len()).step_by(LANES) {
             let i = begin(i, out.pdf.len());
             let (u0, u1) = (load(simd, u[0], i).widen(), load(simd, u[1], i).widen());
@@ -172,11 +179,7 @@ impl AreaSampler {
         let n = Vec3s::splat(simd, n);
         for i in (0..out.pdf.len()).step_by(LANES) {
             let i = begin(i, out.pdf.len());
-            let (u0, u1) = (load(simd, u[0], i), load(simd, u[1], i));
-            let is_left = u0.simd_lt(u1);
-            let half = is_left.select(u0, u1) * 0.5;
-            let (b0, b1) = (is_left.select(half, u0 - half), is_left.select(u1 - half, half));
-            let b = Vec3s { x: b0, y: b1, z: F::splat(simd, 1.0) - b0 - b1 };
+            let b = barycentric(load(simd, u[0], i), load(simd, u[1], i));
             self.finish(b.combine(corners[0], corners[1], corners[2]), n, 1.0 / area, true, (i, out));
         }
     }
@@ -217,95 +220,11 @@ impl Rectangle {
     }
 }
 
-/// What the samples of a spherical rectangle have in common.
-struct SphericalSetup {
-    x: [f64; 2],
-    y: [f64; 2],
-    z0: f64,
-    solid_angle: f64,
-    /// S/2π.
-    turns: f64,
-    /// cos and −sin of g2 + g3.
-    rotation: (f64, f64),
-    /// z of the normals of the planes through the edges y0 and y1.
-    b: [f64; 2],
-    /// 1 − b0².
-    k: f64,
-}
-
-impl SphericalSetup {
-    fn new(s: &SphericalRectangle) -> Self {
-        let (z2, y) = (s.z0 * s.z0, s.y);
-        let scale = 1.0 / (s.g23.0 * s.g23.0 + s.g23.1 * s.g23.1).sqrt();
-        SphericalSetup {
-            x: s.x,
-            y,
-            z0: s.z0,
-            solid_angle: s.solid_angle,
-            turns: s.solid_angle / TAU,
-            rotation: (s.g23.0 * scale, -s.g23.1 * scale),
-            b: [-y[0] / (y[0] * y[0] + z2).sqrt(), y[1] / (y[1] * y[1] + z2).sqrt()],
-            k: z2 / (y[0] * y[0] + z2),
-        }
-    }
-
-    /// The distances from the corner along the edges.
-    #[inline(always)]
-    fn place<S: Simd>(&self, u0: f64x4<S>, u1: f64x4<S>) -> (f64x4<S>, f64x4<S>) {
-        let simd = u0.token();
-        let one = f64x4::splat(simd, 1.0);
-        // cos and sin of u·S − (g2 + g3).
-        let (sin_us, cos_us) = sin_cos_turns_f64(u0 * self.turns);
-        let cos = cos_us * self.rotation.0 - sin_us * self.rotation.1;
-        let sin = cos_us * self.rotation.1 + sin_us * self.rotation.0;
-        // With fu = f/sin, x = −z0·sgn(fu)/√(fu² + b0² − 1).
-        let f = cos * self.b[0] - self.b[1];
-        let under_root = (f * f - sin * sin * self.k).max(1e-300);
-        let x = sin * f64x4::splat(simd, -self.z0).copysign(f) / under_root.sqrt();
-        let x = x.max(self.x[0]).min(self.x[1]);
-
-        let d2 = x * x + self.z0 * self.z0;
-        let (r0, r1) = ((d2 + self.y[0] * self.y[0]).sqrt(), (d2 + self.y[1] * self.y[1]).sqrt());
-        let scale = one / (r0 * r1);
-        let (h0, h1) = (r1 * scale * self.y[0], r0 * scale * self.y[1]);
-        let h = h0 + u1 * (h1 - h0);
-        let y = h * (d2 / (one - h * h).max(1e-300)).sqrt();
-        let y = y.max(self.y[0]).min(self.y[1]);
-        (x - self.x[0], y - self.y[0])
-    }
-}
-
-/// sin 2πt and cos 2πt for |t| < 2²⁰, by the series about the nearest quarter turn; errors below 2⁻⁴⁵.
+/// Barycentric weights uniform over a triangle [Heitz 2019].
 #[inline(always)]
-pub fn sin_cos_turns_f64<S: Simd>(t: f64x4<S>) -> (f64x4<S>, f64x4<S>) {
-    let simd = t.token();
-    let quarters = (t * 4.0).round_ties_even();
-    let x = (t - quarters * 0.25) * TAU;
-    let x2 = x * x;
-    let sin = (((((x2 * (1.0 / 6_227_020_800.0) - 1.0 / 39_916_800.0) * x2 + 1.0 / 362_880.0) * x2 - 1.0 / 5040.0)
-        * x2
-        + 1.0 / 120.0)
-        * x2
-        - 1.0 / 6.0)
-        * x2
-        * x
-        + x;
-    let cos = ((((((x2 * (-1.0 / 87_178_291_200.0) + 1.0 / 479_001_600.0) * x2 - 1.0 / 3_628_800.0) * x2
-        + 1.0 / 40_320.0)
-        * x2
-        - 1.0 / 720.0)
-        * x2
-        + 1.0 / 24.0)
-        * x2
-        - 0.5)
-        * x2
-        + 1.0;
-    // Of the quarters modulo 4, which are exact.
-    let k = quarters - (quarters * 0.25).floor() * 4.0;
-    let (one, two, three) = (f64x4::splat(simd, 1.0), f64x4::splat(simd, 2.0), f64x4::splat(simd, 3.0));
-    let (is_1, is_2, is_3): (mask64x4<S>, mask64x4<S>, mask64x4<S>) =
-        (k.simd_eq(one), k.simd_eq(two), k.simd_eq(three));
-    let is_odd = is_1 | is_3;
-    let (s, c) = (is_odd.select(cos, sin), is_odd.select(sin, cos));
-    ((is_2 | is_3).select(-s, s), (is_1 | is_2).select(-c, c))
+fn barycentric<S: Simd>(u0: F<S>, u1: F<S>) -> Vec3s<S> {
+    let is_left = u0.simd_lt(u1);
+    let half = is_left.select(u0, u1) * 0.5;
+    let (b0, b1) = (is_left.select(half, u0 - half), is_left.select(u1 - half, half));
+    Vec3s { x: b0, y: b1, z: F::splat(u0.token(), 1.0) - b0 - b1 }
 }

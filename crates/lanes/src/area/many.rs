@@ -1,0 +1,135 @@
+//! Directions from many points to one surface. The formulas are those of the modules of `lights::area`.
+
+use super::spherical::SphericalSetup;
+use super::{Rectangle, barycentric};
+use crate::lane::{F, LANES, M, Vec3s, load, or_zero, store};
+use fearless_simd::{Level, Simd, dispatch, f64x4, prelude::*};
+use lumiris_numbers::math::{Vec3, gamma};
+
+/// Largest diagonal, by the distance of the centre, that is sampled by area.
+pub const MAX_EXTENT: f32 = 0.5;
+
+/// Directions from many points to one surface.
+#[derive(Debug)]
+pub struct PointsOnLight<'a> {
+    /// Unit directions.
+    pub wi: [&'a mut [f32]; 3],
+    /// Points of the surface.
+    pub p: [&'a mut [f32]; 3],
+    /// Bounds of their rounding errors.
+    pub p_error: [&'a mut [f32]; 3],
+    /// Densities per steradian; 0 where there is no sample.
+    pub pdf: &'a mut [f32],
+}
+
+/// A direction from each of the points `from` to a rectangle, whose corners are off by `flatness_error`: uniform in
+/// solid angle where that is accurate and large, else uniform in area. Slices have one length, a multiple of
+/// [`LANES`].
+pub fn sample_rectangle(
+    level: Level,
+    rectangle: &Rectangle,
+    flatness_error: f32,
+    from: [&[f32]; 3],
+    u: [&[f32]; 2],
+    out: &mut PointsOnLight<'_>,
+) {
+    dispatch!(level, simd => sample_rectangle_lanes(simd, (rectangle, flatness_error), from, u, out));
+}
+
+#[inline(always)]
+fn sample_rectangle_lanes<S: Simd>(
+    simd: S,
+    (rectangle, flatness_error): (&Rectangle, f32),
+    from: [&[f32]; 3],
+    u: [&[f32]; 2],
+    out: &mut PointsOnLight<'_>,
+) {
+    let zero = F::splat(simd, 0.0);
+    let (n, size) = (Vec3s::splat(simd, rectangle.n), rectangle.size);
+    let center = rectangle.corner + rectangle.ex * (0.5 * size.x) + rectangle.ey * (0.5 * size.y);
+    let (corner, ex, ey) = (rectangle.corner, rectangle.ex, rectangle.ey);
+    for i in (0..out.pdf.len()).step_by(LANES) {
+        let from = Vec3s::load(simd, from, i);
+        let (u0, u1) = (load(simd, u[0], i), load(simd, u[1], i));
+        let (s, t, density, is_spherical) = spherical_place(rectangle, center, from, (u0, u1));
+        let (s, t) = (is_spherical.select(s, u0 * size.x), is_spherical.select(t, u1 * size.y));
+        let p = rectangle.point(s, t);
+        let d = p.minus(from);
+        let t2 = d.dot(d);
+        let inverse = F::splat(simd, 1.0) / t2.sqrt();
+        let wi = d.times(inverse);
+        let by_area = t2 * (1.0 / (size.x * size.y)) / n.dot(wi).abs();
+        let pdf = is_spherical.select(density, by_area);
+        let is_sample = pdf.simd_gt(zero) & pdf.is_finite() & inverse.is_finite();
+        store(or_zero(is_sample, pdf), out.pdf, i);
+        wi.store(&mut out.wi, i);
+        p.store(&mut out.p, i);
+        let (s, t) = (s.abs(), t.abs());
+        let error = Vec3s {
+            x: (s * ex.x.abs() + t * ey.x.abs() + corner.x.abs()) * gamma(6) + flatness_error,
+            y: (s * ex.y.abs() + t * ey.y.abs() + corner.y.abs()) * gamma(6) + flatness_error,
+            z: (s * ex.z.abs() + t * ey.z.abs() + corner.z.abs()) * gamma(6) + flatness_error,
+        };
+        error.store(&mut out.p_error, i);
+    }
+}
+
+/// Places on the edges uniform in solid angle, the density, and where that is to be used.
+#[inline(always)]
+fn spherical_place<S: Simd>(
+    rectangle: &Rectangle,
+    center: Vec3,
+    from: Vec3s<S>,
+    (u0, u1): (F<S>, F<S>),
+) -> (F<S>, F<S>, F<S>, M<S>) {
+    let simd = u0.token();
+    let (x, y, z) = (from.x.widen(), from.y.widen(), from.z.widen());
+    let low = SphericalSetup::seen(rectangle, [x.0, y.0, z.0]);
+    let high = SphericalSetup::seen(rectangle, [x.1, y.1, z.1]);
+    let (u0, u1) = (u0.widen(), u1.widen());
+    let (at_low, at_high) = (low.place(u0.0, u1.0), high.place(u0.1, u1.1));
+    let one = f64x4::splat(simd, 1.0);
+    let zero = f64x4::splat(simd, 0.0);
+    let density = low.is_accurate(rectangle).select(one / low.solid_angle, zero);
+    let density = density.narrow(high.is_accurate(rectangle).select(one / high.solid_angle, zero));
+    let d = Vec3s::splat(simd, center).minus(from);
+    let is_near = (d.dot(d) * (MAX_EXTENT * MAX_EXTENT)).simd_le(F::splat(simd, rectangle.size.length_squared()));
+    let is_spherical = is_near & density.simd_gt(F::splat(simd, 0.0));
+    (at_low.0.narrow(at_high.0), at_low.1.narrow(at_high.1), density, is_spherical)
+}
+
+/// A point from each of the points `from` on a triangle of corners `p`, unit normal and area, uniform in area; as
+/// [`sample_rectangle`].
+pub fn sample_triangle(
+    level: Level,
+    triangle: ([Vec3; 3], Vec3, f32),
+    from: [&[f32]; 3],
+    u: [&[f32]; 2],
+    out: &mut PointsOnLight<'_>,
+) {
+    dispatch!(level, simd => sample_triangle_lanes(simd, triangle, from, u, out));
+}
+
+#[inline(always)]
+fn sample_triangle_lanes<S: Simd>(
+    simd: S,
+    (corners, n, area): ([Vec3; 3], Vec3, f32),
+    from: [&[f32]; 3],
+    u: [&[f32]; 2],
+    out: &mut PointsOnLight<'_>,
+) {
+    let n = Vec3s::splat(simd, n);
+    for i in (0..out.pdf.len()).step_by(LANES) {
+        let b = barycentric(load(simd, u[0], i), load(simd, u[1], i));
+        let p = b.combine(corners[0], corners[1], corners[2]);
+        let d = p.minus(Vec3s::load(simd, from, i));
+        let t2 = d.dot(d);
+        let wi = d.times(F::splat(simd, 1.0) / t2.sqrt());
+        let pdf = t2 * (1.0 / area) / n.dot(wi).abs();
+        store(or_zero(pdf.simd_gt(F::splat(simd, 0.0)) & pdf.is_finite(), pdf), out.pdf, i);
+        wi.store(&mut out.wi, i);
+        p.store(&mut out.p, i);
+        let error = b.combine(corners[0].abs(), corners[1].abs(), corners[2].abs());
+        error.times(F::splat(simd, gamma(6))).store(&mut out.p_error, i);
+    }
+}

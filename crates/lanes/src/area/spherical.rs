@@ -1,0 +1,193 @@
+//! Spherical rectangles [Ureña, Fajardo and King 2013], as `lights::area::rectangle` describes them, from four points at
+//! once.
+
+use super::{Rectangle, SphericalRectangle};
+use fearless_simd::{Simd, f64x4, mask64x4, prelude::*};
+use lumiris_numbers::math::DVec3;
+use std::f64::consts::{FRAC_PI_2, FRAC_PI_4, FRAC_PI_8, PI, TAU};
+
+/// Smallest solid angle that is sampled by solid angle, in steradians: of what is nearly edge-on, angles in f64 keep
+/// their digits down to here.
+pub const MIN_SOLID_ANGLE: f64 = 1e-4;
+/// Smallest distance from the plane, in diagonals of the rectangle, that is sampled by solid angle.
+pub const MIN_HEIGHT: f64 = 1e-5;
+
+/// Four points as they see a rectangle, and what their samples need.
+#[derive(Clone, Copy)]
+pub(super) struct SphericalSetup<S: Simd> {
+    x: [f64x4<S>; 2],
+    y: [f64x4<S>; 2],
+    z0: f64x4<S>,
+    pub(super) solid_angle: f64x4<S>,
+    /// cos and −sin of g2 + g3.
+    rotation: (f64x4<S>, f64x4<S>),
+    /// z of the normals of the planes through the edges y0 and y1.
+    b: [f64x4<S>; 2],
+    /// 1 − b0².
+    k: f64x4<S>,
+}
+
+impl<S: Simd> SphericalSetup<S> {
+    /// The same point in all lanes.
+    #[inline(always)]
+    pub(super) fn splat(simd: S, s: &SphericalRectangle) -> Self {
+        let x = [f64x4::splat(simd, s.x[0]), f64x4::splat(simd, s.x[1])];
+        let y = [f64x4::splat(simd, s.y[0]), f64x4::splat(simd, s.y[1])];
+        let g23 = (f64x4::splat(simd, s.g23.0), f64x4::splat(simd, s.g23.1));
+        Self::new(x, y, f64x4::splat(simd, s.z0), g23, f64x4::splat(simd, s.solid_angle))
+    }
+
+    #[inline(always)]
+    fn new(x: [f64x4<S>; 2], y: [f64x4<S>; 2], z0: f64x4<S>, g23: (f64x4<S>, f64x4<S>), solid_angle: f64x4<S>) -> Self {
+        let z2 = z0 * z0;
+        let scale = f64x4::splat(z0.token(), 1.0) / (g23.0 * g23.0 + g23.1 * g23.1).sqrt();
+        let (below, above) = (y[0] * y[0] + z2, y[1] * y[1] + z2);
+        let b = [-y[0] / below.sqrt(), y[1] / above.sqrt()];
+        SphericalSetup { x, y, z0, solid_angle, rotation: (g23.0 * scale, -(g23.1 * scale)), b, k: z2 / below }
+    }
+
+    /// As the points `from` see `rectangle`.
+    #[inline(always)]
+    pub(super) fn seen(rectangle: &Rectangle, from: [f64x4<S>; 3]) -> Self {
+        let (corner, ex, ey) = (rectangle.corner.as_dvec3(), rectangle.ex.as_dvec3(), rectangle.ey.as_dvec3());
+        let d = [-from[0] + corner.x, -from[1] + corner.y, -from[2] + corner.z];
+        let (x0, y0, z0) = (dot(d, ex), dot(d, ey), -dot(d, ex.cross(ey)).abs());
+        let x = [x0, x0 + f64::from(rectangle.size.x)];
+        let y = [y0, y0 + f64::from(rectangle.size.y)];
+        let (xx, yy, zz) = ([x[0] * x[0], x[1] * x[1]], [y[0] * y[0], y[1] * y[1]], z0 * z0);
+        // e^{ig} up to a positive factor of the inner angles, and their products in pairs
+        let g0 = (x[1] * y[0], -(z0 * (xx[1] + yy[0] + zz).sqrt()));
+        let g1 = (-(x[1] * y[1]), -(z0 * (xx[1] + yy[1] + zz).sqrt()));
+        let g2 = (x[0] * y[1], -(z0 * (xx[0] + yy[1] + zz).sqrt()));
+        let g3 = (-(x[0] * y[0]), -(z0 * (xx[0] + yy[0] + zz).sqrt()));
+        let (g01, g23) = (product(g0, g1), product(g2, g3));
+        Self::new(x, y, z0, g23, angle(product(g01, g23)))
+    }
+
+    /// The distances from the corner along the edges.
+    #[inline(always)]
+    pub(super) fn place(&self, u0: f64x4<S>, u1: f64x4<S>) -> (f64x4<S>, f64x4<S>) {
+        let simd = u0.token();
+        let one = f64x4::splat(simd, 1.0);
+        // cos and sin of u·S − (g2 + g3).
+        let (sin_us, cos_us) = sin_cos_turns_f64(u0 * (self.solid_angle * (1.0 / TAU)));
+        let cos = cos_us * self.rotation.0 - sin_us * self.rotation.1;
+        let sin = cos_us * self.rotation.1 + sin_us * self.rotation.0;
+        // With fu = f/sin, x = −z0·sgn(fu)/√(fu² + b0² − 1).
+        let f = cos * self.b[0] - self.b[1];
+        let under_root = (f * f - sin * sin * self.k).max(1e-300);
+        let x = sin * (-self.z0).copysign(f) / under_root.sqrt();
+        let x = x.max(self.x[0]).min(self.x[1]);
+
+        let d2 = x * x + self.z0 * self.z0;
+        let (r0, r1) = ((d2 + self.y[0] * self.y[0]).sqrt(), (d2 + self.y[1] * self.y[1]).sqrt());
+        let scale = one / (r0 * r1);
+        let (h0, h1) = (r1 * scale * self.y[0], r0 * scale * self.y[1]);
+        let h = h0 + u1 * (h1 - h0);
+        let y = h * (d2 / (one - h * h).max(1e-300)).sqrt();
+        let y = y.max(self.y[0]).min(self.y[1]);
+        (x - self.x[0], y - self.y[0])
+    }
+
+    /// True where the rectangle is neither edge-on nor so small that its angles lose their digits.
+    #[inline(always)]
+    pub(super) fn is_accurate(&self, rectangle: &Rectangle) -> mask64x4<S> {
+        let simd = self.z0.token();
+        let (width, height) = (f64::from(rectangle.size.x), f64::from(rectangle.size.y));
+        let nearest = f64x4::splat(simd, MIN_HEIGHT * MIN_HEIGHT * (width * width + height * height));
+        (self.z0 * self.z0).simd_gt(nearest) & self.solid_angle.simd_ge(f64x4::splat(simd, MIN_SOLID_ANGLE))
+    }
+}
+
+#[inline(always)]
+fn dot<S: Simd>(v: [f64x4<S>; 3], w: DVec3) -> f64x4<S> {
+    v[0] * w.x + v[1] * w.y + v[2] * w.z
+}
+
+#[inline(always)]
+fn product<S: Simd>(a: (f64x4<S>, f64x4<S>), b: (f64x4<S>, f64x4<S>)) -> (f64x4<S>, f64x4<S>) {
+    (a.0 * b.0 - a.1 * b.1, a.0 * b.1 + a.1 * b.0)
+}
+
+/// The argument of a complex number in [0, 2π); of one slightly below the positive axis, 0.
+#[inline(always)]
+fn angle<S: Simd>((x, y): (f64x4<S>, f64x4<S>)) -> f64x4<S> {
+    let simd = x.token();
+    let zero = f64x4::splat(simd, 0.0);
+    let a = atan2(y, x);
+    a.simd_lt(f64x4::splat(simd, -1e-6)).select(a + TAU, a.max(zero))
+}
+
+/// The argument of x + iy in [−π, π]; errors below 2⁻⁴⁸. NaN at 0.
+#[inline(always)]
+pub fn atan2<S: Simd>(y: f64x4<S>, x: f64x4<S>) -> f64x4<S> {
+    let simd = x.token();
+    let zero = f64x4::splat(simd, 0.0);
+    let is_steep = y.abs().simd_gt(x.abs());
+    let (large, small) = (is_steep.select(y.abs(), x.abs()), is_steep.select(x.abs(), y.abs()));
+    // The difference to the nearest multiple of π/8, by the tangent of a difference
+    let is_third = small.simd_gt(large * TAN_3_PI_16);
+    let is_second = small.simd_gt(large * TAN_PI_16);
+    let tangent = is_third.select(f64x4::splat(simd, 1.0), is_second.select(f64x4::splat(simd, TAN_PI_8), zero));
+    let base = is_third.select(f64x4::splat(simd, FRAC_PI_4), is_second.select(f64x4::splat(simd, FRAC_PI_8), zero));
+    let r = (small - large * tangent) / (large + small * tangent);
+    let r2 = r * r;
+    let series = ((((((((r2 * (-1.0 / 19.0) + 1.0 / 17.0) * r2 - 1.0 / 15.0) * r2 + 1.0 / 13.0) * r2 - 1.0 / 11.0)
+        * r2
+        + 1.0 / 9.0)
+        * r2
+        - 1.0 / 7.0)
+        * r2
+        + 1.0 / 5.0)
+        * r2
+        - 1.0 / 3.0)
+        * r2
+        * r
+        + r;
+    let a = base + series;
+    let a = is_steep.select(-a + FRAC_PI_2, a);
+    let a = x.simd_lt(zero).select(-a + PI, a);
+    a.copysign(y)
+}
+
+/// tan π/16.
+const TAN_PI_16: f64 = 0.198_912_367_379_658;
+/// tan π/8.
+const TAN_PI_8: f64 = 0.414_213_562_373_095_03;
+/// tan 3π/16.
+const TAN_3_PI_16: f64 = 0.668_178_637_919_298_9;
+
+/// sin 2πt and cos 2πt for |t| < 2²⁰, by the series about the nearest quarter turn; errors below 2⁻⁴⁵.
+#[inline(always)]
+pub fn sin_cos_turns_f64<S: Simd>(t: f64x4<S>) -> (f64x4<S>, f64x4<S>) {
+    let simd = t.token();
+    let quarters = (t * 4.0).round_ties_even();
+    let x = (t - quarters * 0.25) * TAU;
+    let x2 = x * x;
+    let sin = (((((x2 * (1.0 / 6_227_020_800.0) - 1.0 / 39_916_800.0) * x2 + 1.0 / 362_880.0) * x2 - 1.0 / 5040.0)
+        * x2
+        + 1.0 / 120.0)
+        * x2
+        - 1.0 / 6.0)
+        * x2
+        * x
+        + x;
+    let cos = ((((((x2 * (-1.0 / 87_178_291_200.0) + 1.0 / 479_001_600.0) * x2 - 1.0 / 3_628_800.0) * x2
+        + 1.0 / 40_320.0)
+        * x2
+        - 1.0 / 720.0)
+        * x2
+        + 1.0 / 24.0)
+        * x2
+        - 0.5)
+        * x2
+        + 1.0;
+    // Of the quarters modulo 4, which are exact.
+    let k = quarters - (quarters * 0.25).floor() * 4.0;
+    let (one, two, three) = (f64x4::splat(simd, 1.0), f64x4::splat(simd, 2.0), f64x4::splat(simd, 3.0));
+    let (is_1, is_2, is_3): (mask64x4<S>, mask64x4<S>, mask64x4<S>) =
+        (k.simd_eq(one), k.simd_eq(two), k.simd_eq(three));
+    let is_odd = is_1 | is_3;
+    let (s, c) = (is_odd.select(cos, sin), is_odd.select(sin, cos));
+    ((is_2 | is_3).select(-s, s), (is_1 | is_2).select(-c, c))
+}

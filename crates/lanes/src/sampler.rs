@@ -1,0 +1,119 @@
+//! The numbers of many sample streams at once: the coordinates of Owen-scrambled Sobol' points [Burley 2020], as
+//! [`SampleStream::draw`] gives them, to the bit.
+//!
+//! A point's index is shuffled and each coordinate scrambled by the hash of Laine and Karras, which flips each digit by
+//! those before it. The first coordinate is the index with its digits reversed, the second is that multiplied by
+//! Pascal's triangle modulo 2, which is five steps on the digits; the others are products with the columns of their
+//! matrices [Joe and Kuo 2008]. An index has 16 digits.
+
+use fearless_simd::{Level, dispatch};
+use lumiris_numbers::math::ONE_MINUS_EPSILON;
+use lumiris_numbers::samplers::SampleStream;
+
+/// Points that are worked on together.
+const CHUNK: usize = 64;
+
+/// Columns of the matrices of the third and the fourth coordinate, by the digits of the index, lowest first.
+const COLUMNS: [[u32; 16]; 2] = [
+    [
+        0xaa09, 0x7706, 0x3903, 0x1601, 0x09aa, 0x0677, 0x0339, 0x0116, 0x00a3, 0x0071, 0x003a, 0x0017, 0x0009, 0x0006,
+        0x0003, 0x0001,
+    ],
+    [
+        0xa0c3, 0x4041, 0x302d, 0x101e, 0x0b67, 0x079a, 0x02a4, 0x011b, 0x00c9, 0x0045, 0x002e, 0x001f, 0x000a, 0x0004,
+        0x0003, 0x0001,
+    ],
+];
+
+/// Draws N ≤ 4 numbers of each stream: `out[d][i]` is the d-th of stream `i`. All slices have the same length.
+pub fn draw<const N: usize>(level: Level, streams: &[SampleStream], mut out: [&mut [f32]; N]) {
+    let (mut index, mut seed) = ([0; CHUNK], [0; CHUNK]);
+    for (chunk, streams) in streams.chunks(CHUNK).enumerate() {
+        let first = chunk * CHUNK;
+        let mut are_nets = true;
+        for (lane, stream) in streams.iter().enumerate() {
+            match stream.net_point() {
+                Some(point) => (index[lane], seed[lane]) = (point.index, point.seed),
+                None => are_nets = false,
+            }
+        }
+        if are_nets {
+            let mut u = [[0.0; CHUNK]; N];
+            dispatch!(level, _simd => coordinates(&index, &seed, &mut u));
+            for (out, u) in out.iter_mut().zip(&u) {
+                out[first..first + streams.len()].copy_from_slice(&u[..streams.len()]);
+            }
+        } else {
+            for (lane, stream) in streams.iter().enumerate() {
+                for (out, u) in out.iter_mut().zip(stream.draw::<N>()) {
+                    out[first + lane] = u;
+                }
+            }
+        }
+    }
+}
+
+#[inline(always)]
+fn coordinates<const N: usize>(index: &[u32; CHUNK], seed: &[u32; CHUNK], out: &mut [[f32; CHUNK]; N]) {
+    let mut shuffled = [0; CHUNK];
+    for i in 0..CHUNK {
+        shuffled[i] = permuted(index[i].reverse_bits(), seed[i]) >> 16;
+    }
+    for (d, out) in out.iter_mut().enumerate() {
+        let mut digits = [0; CHUNK];
+        match d {
+            0 => {
+                for i in 0..CHUNK {
+                    digits[i] = reversed(shuffled[i]);
+                }
+            }
+            1 => {
+                for i in 0..CHUNK {
+                    digits[i] = by_pascal(reversed(shuffled[i]));
+                }
+            }
+            _ => {
+                for (k, column) in COLUMNS[d - 2].iter().enumerate() {
+                    for i in 0..CHUNK {
+                        digits[i] ^= (shuffled[i] >> k & 1).wrapping_neg() & column;
+                    }
+                }
+            }
+        }
+        for i in 0..CHUNK {
+            out[i] = unit(permuted(digits[i], seed[i].rotate_right(8 * d as u32)).reverse_bits());
+        }
+    }
+}
+
+/// The hash of Laine and Karras: a digit depends on lower ones alone.
+#[inline(always)]
+const fn permuted(mut x: u32, seed: u32) -> u32 {
+    x ^= x.wrapping_mul(0x3d20_adea);
+    x = x.wrapping_add(seed);
+    x = x.wrapping_mul(seed >> 16 | 1);
+    x ^= x.wrapping_mul(0x0552_6c56);
+    x ^ x.wrapping_mul(0x53a2_2864)
+}
+
+/// 16 digits in reverse.
+#[inline(always)]
+const fn reversed(x: u32) -> u32 {
+    x.reverse_bits() >> 16
+}
+
+/// 16 digits, the first one highest, multiplied by Pascal's triangle modulo 2.
+#[inline(always)]
+const fn by_pascal(x: u32) -> u32 {
+    let x = x ^ x >> 1 & 0x5555;
+    let x = x ^ x >> 2 & 0x3333;
+    let x = x ^ x >> 4 & 0x0f0f;
+    x ^ x >> 8 & 0x00ff
+}
+
+/// x/2³², rounded so that it stays below 1.
+#[inline(always)]
+fn unit(x: u32) -> f32 {
+    let u = (x & !(x >> 24)) as f32 * (1.0 / 4_294_967_296.0);
+    if u < ONE_MINUS_EPSILON { u } else { ONE_MINUS_EPSILON }
+}

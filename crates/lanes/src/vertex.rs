@@ -1,0 +1,344 @@
+//! Vertices of many paths at once, in columns: the point that a ray met on a triangle, Lambertian reflection, the
+//! weights of light samples, and shadow segments.
+//!
+//! The formulas are those of the modules `geometry::mesh`, `bsdfs::diffuse` and `direct::propose` for single vertices.
+//! Columns have one length, a multiple of [`LANES`].
+
+use super::lane::{F, I, LANES, M, Vec3s, Wide, load, or_zero, safe_sqrt, sin_cos_eighth, store};
+use fearless_simd::{Level, Simd, dispatch, f64x4, prelude::*};
+use lumiris_numbers::estimators::mis::Heuristic;
+use lumiris_numbers::math::gamma;
+use lumiris_numbers::math::ray::SEGMENT_END;
+use std::f32::consts::{FRAC_1_PI, FRAC_PI_4};
+
+/// Three columns of a vector or of a colour.
+pub type Columns3<'a> = [&'a [f32]; 3];
+
+/// Three columns to be written.
+pub type ColumnsMut3<'a> = [&'a mut [f32]; 3];
+
+/// Hits of triangles.
+#[derive(Clone, Copy, Debug)]
+pub struct TriangleHits<'a> {
+    /// The corners.
+    pub corners: [Columns3<'a>; 3],
+    /// Shading normals of the corners; zero where there are none.
+    pub normals: [Columns3<'a>; 3],
+    /// Weights of corners 1 and 2.
+    pub b: [&'a [f32]; 2],
+    /// 1, or −1 where the normal is the reverse of (p1 − p0) × (p2 − p0).
+    pub orientation: &'a [f32],
+    /// Directions of the rays.
+    pub d: Columns3<'a>,
+}
+
+/// Points of surfaces.
+#[derive(Debug)]
+pub struct Points<'a> {
+    /// The points.
+    pub p: ColumnsMut3<'a>,
+    /// Bounds of their rounding errors.
+    pub p_error: ColumnsMut3<'a>,
+    /// Geometric normals.
+    pub n: ColumnsMut3<'a>,
+    /// Geometric normals on the side of `wo`.
+    pub facing: ColumnsMut3<'a>,
+    /// Shading normals.
+    pub ns: ColumnsMut3<'a>,
+    /// Unit directions to where the rays came from.
+    pub wo: ColumnsMut3<'a>,
+}
+
+/// Determines the points that rays have met.
+pub fn points(level: Level, hits: &TriangleHits<'_>, out: &mut Points<'_>) {
+    dispatch!(level, simd => points_lanes(simd, hits, out));
+}
+
+#[inline(always)]
+fn points_lanes<S: Simd>(simd: S, hits: &TriangleHits<'_>, out: &mut Points<'_>) {
+    for i in (0..hits.orientation.len()).step_by(LANES) {
+        let corners = load_three(simd, hits.corners, i);
+        let (b1, b2) = (load(simd, hits.b[0], i), load(simd, hits.b[1], i));
+        let one = F::splat(simd, 1.0);
+        let b0 = one - b1 - b2;
+
+        // In f64, which keeps the normals of slivers
+        let (low, high) = (halves(corners, b1, b2, true), halves(corners, b1, b2, false));
+        let p = Vec3s { x: low.0[0].narrow(high.0[0]), y: low.0[1].narrow(high.0[1]), z: low.0[2].narrow(high.0[2]) };
+        let n = Vec3s { x: low.1[0].narrow(high.1[0]), y: low.1[1].narrow(high.1[1]), z: low.1[2].narrow(high.1[2]) };
+        let n = n.times(load(simd, hits.orientation, i));
+
+        let terms = [absolute(corners[0].times(b0)), absolute(corners[1].times(b1)), absolute(corners[2].times(b2))];
+        let error = terms[0].plus(terms[1]).plus(terms[2]).times(F::splat(simd, gamma(7)));
+
+        let normals = load_three(simd, hits.normals, i);
+        let blend = normals[0].times(b0).plus(normals[1].times(b1)).plus(normals[2].times(b2));
+        let inverse = one / blend.dot(blend).sqrt();
+        let has_normal = inverse.is_finite();
+        let ns = either(has_normal, blend.times(inverse), n);
+        let zero = F::splat(simd, 0.0);
+        let n = either(n.dot(ns).simd_lt(zero), n.times(-one), n);
+
+        let d = Vec3s::load(simd, hits.d, i);
+        let wo = d.times(-(one / d.dot(d).sqrt()));
+        p.store(&mut out.p, i);
+        error.store(&mut out.p_error, i);
+        n.store(&mut out.n, i);
+        either(n.dot(wo).simd_lt(zero), n.times(-one), n).store(&mut out.facing, i);
+        ns.store(&mut out.ns, i);
+        wo.store(&mut out.wo, i);
+    }
+}
+
+#[inline(always)]
+fn load_three<S: Simd>(simd: S, from: [Columns3<'_>; 3], i: usize) -> [Vec3s<S>; 3] {
+    [Vec3s::load(simd, from[0], i), Vec3s::load(simd, from[1], i), Vec3s::load(simd, from[2], i)]
+}
+
+#[inline(always)]
+fn absolute<S: Simd>(v: Vec3s<S>) -> Vec3s<S> {
+    Vec3s { x: v.x.abs(), y: v.y.abs(), z: v.z.abs() }
+}
+
+/// `a` where `first`, else `b`.
+#[inline(always)]
+fn either<S: Simd>(first: M<S>, a: Vec3s<S>, b: Vec3s<S>) -> Vec3s<S> {
+    Vec3s { x: first.select(a.x, b.x), y: first.select(a.y, b.y), z: first.select(a.z, b.z) }
+}
+
+#[inline(always)]
+fn half<S: Simd>(x: F<S>, is_low: bool) -> f64x4<S> {
+    let (low, high) = x.widen();
+    if is_low { low } else { high }
+}
+
+#[inline(always)]
+fn half_of<S: Simd>(v: Vec3s<S>, is_low: bool) -> [f64x4<S>; 3] {
+    [half(v.x, is_low), half(v.y, is_low), half(v.z, is_low)]
+}
+
+/// The point and the unit normal of four triangles.
+#[inline(always)]
+fn halves<S: Simd>(corners: [Vec3s<S>; 3], b1: F<S>, b2: F<S>, is_low: bool) -> ([f64x4<S>; 3], [f64x4<S>; 3]) {
+    let (b1, b2) = (half(b1, is_low), half(b2, is_low));
+    let [p0, p1, p2] = [half_of(corners[0], is_low), half_of(corners[1], is_low), half_of(corners[2], is_low)];
+    let e1 = [p1[0] - p0[0], p1[1] - p0[1], p1[2] - p0[2]];
+    let e2 = [p2[0] - p0[0], p2[1] - p0[1], p2[2] - p0[2]];
+    let p = [p0[0] + e1[0] * b1 + e2[0] * b2, p0[1] + e1[1] * b1 + e2[1] * b2, p0[2] + e1[2] * b1 + e2[2] * b2];
+    let c = [e1[1] * e2[2] - e2[1] * e1[2], e1[2] * e2[0] - e2[2] * e1[0], e1[0] * e2[1] - e2[0] * e1[1]];
+    let length = (c[0] * c[0] + c[1] * c[1] + c[2] * c[2]).sqrt();
+    let (zero, one) = (f64x4::splat(b1.token(), 0.0), f64x4::splat(b1.token(), 1.0));
+    let inverse = length.simd_gt(zero).select(one / length, zero);
+    (p, [c[0] * inverse, c[1] * inverse, c[2] * inverse])
+}
+
+/// What Lambertian vertices have in common.
+#[derive(Clone, Copy, Debug)]
+pub struct Lambertian<'a> {
+    /// Reflectance.
+    pub rho: Columns3<'a>,
+    /// Shading normals.
+    pub ns: Columns3<'a>,
+    /// Unit directions to the viewer.
+    pub wo: Columns3<'a>,
+}
+
+/// f·|cos θ| (1/sr) and the density of sampling by the cosine (1/sr) for the directions `wi`.
+pub fn evaluate_lambertian(
+    level: Level,
+    at: &Lambertian<'_>,
+    wi: Columns3<'_>,
+    f_cos: &mut ColumnsMut3<'_>,
+    pdf: &mut [f32],
+) {
+    dispatch!(level, simd => evaluate_lanes(simd, at, wi, f_cos, pdf));
+}
+
+#[inline(always)]
+fn evaluate_lanes<S: Simd>(
+    simd: S,
+    at: &Lambertian<'_>,
+    wi: Columns3<'_>,
+    f_cos: &mut ColumnsMut3<'_>,
+    pdf: &mut [f32],
+) {
+    for i in (0..pdf.len()).step_by(LANES) {
+        let ns = Vec3s::load(simd, at.ns, i);
+        let (cos_i, cos_o) = (ns.dot(Vec3s::load(simd, wi, i)), ns.dot(Vec3s::load(simd, at.wo, i)));
+        let is_same_side = (cos_i * cos_o).simd_gt(F::splat(simd, 0.0));
+        let density = or_zero(is_same_side, cos_i.abs() * FRAC_1_PI);
+        store(density, pdf, i);
+        Vec3s::load(simd, at.rho, i).times(density).store(f_cos, i);
+    }
+}
+
+/// Directions by the cosine on the side of `wo`, with their densities (1/sr); 0 where there is none.
+pub fn sample_lambertian(level: Level, at: &Lambertian<'_>, u: [&[f32]; 2], wi: &mut ColumnsMut3<'_>, pdf: &mut [f32]) {
+    dispatch!(level, simd => sample_lanes(simd, at, u, wi, pdf));
+}
+
+#[inline(always)]
+fn sample_lanes<S: Simd>(simd: S, at: &Lambertian<'_>, u: [&[f32]; 2], wi: &mut ColumnsMut3<'_>, pdf: &mut [f32]) {
+    let (zero, one) = (F::splat(simd, 0.0), F::splat(simd, 1.0));
+    for i in (0..pdf.len()).step_by(LANES) {
+        let (x, y) = (load(simd, u[0], i) * 2.0 - 1.0, load(simd, u[1], i) * 2.0 - 1.0);
+        let (dx, dy) = concentric_disk(x, y);
+        let z = safe_sqrt(one - dx * dx - dy * dy);
+        let ns = Vec3s::load(simd, at.ns, i);
+        let cos_o = ns.dot(Vec3s::load(simd, at.wo, i));
+        let (tx, ty) = tangents(ns);
+        let w = tx.times(dx).plus(ty.times(dy)).plus(ns.times(z.copysign(cos_o)));
+        store(or_zero(cos_o.simd_ne(zero), z * FRAC_1_PI), pdf, i);
+        w.store(wi, i);
+    }
+}
+
+/// The disk under the square −1..1 [Shirley and Chiu 1997].
+#[inline(always)]
+fn concentric_disk<S: Simd>(x: F<S>, y: F<S>) -> (F<S>, F<S>) {
+    let zero = F::splat(x.token(), 0.0);
+    let is_x = x.abs().simd_gt(y.abs());
+    let (radius, other) = (is_x.select(x, y), is_x.select(y, x));
+    let ratio = or_zero(radius.simd_ne(zero), other / radius);
+    let (sin, cos) = sin_cos_eighth(ratio * FRAC_PI_4);
+    (radius * is_x.select(cos, sin), radius * is_x.select(sin, cos))
+}
+
+/// Two directions that make a frame with the unit vector `z` [Duff et al. 2017].
+#[inline(always)]
+fn tangents<S: Simd>(z: Vec3s<S>) -> (Vec3s<S>, Vec3s<S>) {
+    let one = F::splat(z.x.token(), 1.0);
+    let sign = one.copysign(z.z);
+    let a = -(one / (sign + z.z));
+    let b = z.x * z.y * a;
+    let x = Vec3s { x: one + sign * z.x * z.x * a, y: sign * b, z: -(sign * z.x) };
+    (x, Vec3s { x: b, y: sign + z.y * z.y * a, z: -z.y })
+}
+
+/// Samples of one technique, and the density of another one at them.
+#[derive(Clone, Copy, Debug)]
+pub struct Samples<'a> {
+    /// f·|cos θ| (1/sr).
+    pub f_cos: Columns3<'a>,
+    /// Radiance.
+    pub li: Columns3<'a>,
+    /// Density of the technique; 0 where there is no sample.
+    pub p: &'a [f32],
+    /// Density of the other one.
+    pub p_other: &'a [f32],
+    /// Number of samples of the technique.
+    pub n: f32,
+    /// Number of samples of the other one.
+    pub n_other: f32,
+    /// How both are weighted.
+    pub heuristic: Heuristic,
+}
+
+/// The contributions f·|cos θ|·L·w/(n·p) of samples that are unoccluded; 0 where they are not finite.
+pub fn weigh(level: Level, samples: &Samples<'_>, out: &mut ColumnsMut3<'_>) {
+    dispatch!(level, simd => weigh_lanes(simd, samples, out));
+}
+
+#[inline(always)]
+fn weigh_lanes<S: Simd>(simd: S, samples: &Samples<'_>, out: &mut ColumnsMut3<'_>) {
+    let zero = F::splat(simd, 0.0);
+    for i in (0..samples.p.len()).step_by(LANES) {
+        let x = load(simd, samples.p, i) * samples.n;
+        let y = load(simd, samples.p_other, i) * samples.n_other;
+        let factor = samples.heuristic.weight_of_expected(Wide(x), Wide(y)).0 / x;
+        let (f, l) = (Vec3s::load(simd, samples.f_cos, i), Vec3s::load(simd, samples.li, i));
+        let c = Vec3s { x: f.x * l.x * factor, y: f.y * l.y * factor, z: f.z * l.z * factor };
+        let is_finite = c.x.is_finite() & c.y.is_finite() & c.z.is_finite();
+        let keep = x.simd_gt(zero) & is_finite;
+        Vec3s { x: or_zero(keep, c.x), y: or_zero(keep, c.y), z: or_zero(keep, c.z) }.store(out, i);
+    }
+}
+
+/// Surface points with the bounds of their errors and their normals.
+#[derive(Clone, Copy, Debug)]
+pub struct Ends<'a> {
+    /// The points.
+    pub p: Columns3<'a>,
+    /// Bounds of their rounding errors.
+    pub p_error: Columns3<'a>,
+    /// Geometric normals; zero where there is no surface.
+    pub n: Columns3<'a>,
+}
+
+/// Rays.
+#[derive(Debug)]
+pub struct Rays<'a> {
+    /// Origins.
+    pub o: ColumnsMut3<'a>,
+    /// Directions.
+    pub d: ColumnsMut3<'a>,
+    /// Ends of their open intervals.
+    pub t_max: &'a mut [f32],
+}
+
+/// Shadow segments from surfaces to points of lights: in the directions `wi` without end where `is_far` is not 0.
+pub fn segments(level: Level, from: &Ends<'_>, wi: Columns3<'_>, to: &Ends<'_>, is_far: &[f32], out: &mut Rays<'_>) {
+    dispatch!(level, simd => segments_lanes(simd, from, wi, to, is_far, out));
+}
+
+#[inline(always)]
+fn segments_lanes<S: Simd>(
+    simd: S,
+    from: &Ends<'_>,
+    wi: Columns3<'_>,
+    to: &Ends<'_>,
+    is_far: &[f32],
+    out: &mut Rays<'_>,
+) {
+    for i in (0..is_far.len()).step_by(LANES) {
+        let wi = Vec3s::load(simd, wi, i);
+        let o = offset_origins(end(simd, from, i), wi);
+        let light = end(simd, to, i);
+        let is_far = load(simd, is_far, i).simd_ne(F::splat(simd, 0.0));
+        let d = offset_origins(light, o.minus(light.0)).minus(o);
+        o.store(&mut out.o, i);
+        either(is_far, wi, d).store(&mut out.d, i);
+        store(is_far.select(F::splat(simd, f32::INFINITY), F::splat(simd, SEGMENT_END)), out.t_max, i);
+    }
+}
+
+/// Origins of rays that leave surfaces in the directions `w`.
+pub fn origins(level: Level, from: &Ends<'_>, w: Columns3<'_>, out: &mut ColumnsMut3<'_>) {
+    dispatch!(level, simd => origins_lanes(simd, from, w, out));
+}
+
+#[inline(always)]
+fn origins_lanes<S: Simd>(simd: S, from: &Ends<'_>, w: Columns3<'_>, out: &mut ColumnsMut3<'_>) {
+    for i in (0..w[0].len()).step_by(LANES) {
+        offset_origins(end(simd, from, i), Vec3s::load(simd, w, i)).store(out, i);
+    }
+}
+
+#[inline(always)]
+fn end<S: Simd>(simd: S, at: &Ends<'_>, i: usize) -> (Vec3s<S>, Vec3s<S>, Vec3s<S>) {
+    (Vec3s::load(simd, at.p, i), Vec3s::load(simd, at.p_error, i), Vec3s::load(simd, at.n, i))
+}
+
+/// As [`lumiris_numbers::math::ray::offset_origin`].
+#[inline(always)]
+fn offset_origins<S: Simd>((p, error, n): (Vec3s<S>, Vec3s<S>, Vec3s<S>), w: Vec3s<S>) -> Vec3s<S> {
+    let zero = F::splat(p.x.token(), 0.0);
+    let distance = absolute(n).dot(error);
+    let offset = n.times(w.dot(n).simd_lt(zero).select(-distance, distance));
+    Vec3s { x: moved(p.x, offset.x), y: moved(p.y, offset.y), z: moved(p.z, offset.z) }
+}
+
+/// p + offset, rounded away from p.
+#[inline(always)]
+fn moved<S: Simd>(p: F<S>, offset: F<S>) -> F<S> {
+    let simd = p.token();
+    let (zero, one) = (F::splat(simd, 0.0), F::splat(simd, 1.0));
+    let sum = p + offset;
+    // The next number in the direction of the offset, as the next larger one of what is turned to it
+    let sign = one.copysign(offset);
+    let turned = sum * sign + 0.0;
+    let bits = turned.bitcast::<I<S>>();
+    let one_bit = I::splat(simd, 1);
+    let next = turned.simd_lt(zero).select(bits - one_bit, bits + one_bit);
+    offset.simd_ne(zero).select(next.bitcast::<F<S>>() * sign, sum)
+}

@@ -1,0 +1,170 @@
+//! Tests of `lumiris_lanes::vertex`.
+
+use super::support::assert_same_bits;
+use lumiris_lanes::vertex::*;
+use lumiris_lanes::{Level, level};
+use lumiris_numbers::estimators::mis::{Heuristic, Technique};
+use lumiris_numbers::math::ray::{SEGMENT_END, offset_origin};
+use lumiris_numbers::math::warp::sample_uniform_sphere;
+use lumiris_numbers::math::{Rgb, Vec3};
+use lumiris_test_support::assert_chi_squared;
+use lumiris_test_support::random::{Pcg32, RngExt, pcg32};
+use std::f32::consts::FRAC_1_PI;
+
+const N: usize = 64;
+
+type Three = [Vec<f32>; 3];
+
+fn numbers(stream: &mut Pcg32, scale: f32) -> Vec<f32> {
+    (0..N).map(|_| (stream.random::<f32>() * 2.0 - 1.0) * scale).collect()
+}
+
+fn vectors(stream: &mut Pcg32, scale: f32) -> Three {
+    [0, 1, 2].map(|_| numbers(stream, scale))
+}
+
+fn directions(stream: &mut Pcg32) -> Three {
+    let w: Vec<Vec3> = (0..N).map(|_| sample_uniform_sphere(stream.random::<[f32; 2]>())).collect();
+    [0, 1, 2].map(|c| w.iter().map(|w| w[c]).collect())
+}
+
+fn slices(v: &Three) -> Columns3<'_> {
+    [&v[0], &v[1], &v[2]]
+}
+
+fn at(v: &Three, i: usize) -> Vec3 {
+    Vec3::new(v[0][i], v[1][i], v[2][i])
+}
+
+#[test]
+fn kernels_are_the_same_at_all_levels() {
+    let stream = &mut pcg32([8, 1, 1]);
+    let (corners, normals) = ([0, 1, 2].map(|_| vectors(stream, 4.0)), [0, 1, 2].map(|_| vectors(stream, 1.0)));
+    let (b, d) = ([numbers(stream, 0.5), numbers(stream, 0.5)], directions(stream));
+    let hits = TriangleHits {
+        corners: [slices(&corners[0]), slices(&corners[1]), slices(&corners[2])],
+        normals: [slices(&normals[0]), slices(&normals[1]), slices(&normals[2])],
+        b: [&b[0], &b[1]],
+        orientation: &[1.0; N],
+        d: slices(&d),
+    };
+    assert_same_bits::<18>(N, |level, [a, b, c, d, e, f, g, h, i, j, k, l, m, n, o, p, q, r]| {
+        let mut out =
+            Points { p: [a, b, c], p_error: [d, e, f], n: [g, h, i], facing: [j, k, l], ns: [m, n, o], wo: [p, q, r] };
+        points(level, &hits, &mut out);
+    });
+
+    let (rho, ns, wo, wi) = (vectors(stream, 1.0), directions(stream), directions(stream), directions(stream));
+    let lambertian = Lambertian { rho: slices(&rho), ns: slices(&ns), wo: slices(&wo) };
+    assert_same_bits::<4>(N, |level, [r, g, b, pdf]| {
+        evaluate_lambertian(level, &lambertian, slices(&wi), &mut [r, g, b], pdf);
+    });
+    let u = [numbers(stream, 0.4), numbers(stream, 0.4)].map(|u| u.iter().map(|u| u + 0.5).collect::<Vec<_>>());
+    assert_same_bits::<4>(N, |level, [x, y, z, pdf]| {
+        sample_lambertian(level, &lambertian, [&u[0], &u[1]], &mut [x, y, z], pdf);
+    });
+
+    let (p, p_error) = (vectors(stream, 9.0), vectors(stream, 1e-6).map(|v| v.iter().map(|x| x.abs()).collect()));
+    let from = Ends { p: slices(&p), p_error: slices(&p_error), n: slices(&ns) };
+    let to = Ends { p: slices(&corners[0]), p_error: slices(&p_error), n: slices(&wo) };
+    let is_far: Vec<f32> = (0..N).map(|i| if i % 3 == 0 { 1.0 } else { 0.0 }).collect();
+    assert_same_bits::<7>(N, |level, [ox, oy, oz, dx, dy, dz, t_max]| {
+        segments(level, &from, slices(&wi), &to, &is_far, &mut Rays { o: [ox, oy, oz], d: [dx, dy, dz], t_max });
+    });
+}
+
+#[test]
+fn segments_are_those_of_single_points() {
+    let stream = &mut pcg32([8, 1, 2]);
+    let (mut p, q, wi) = (vectors(stream, 9.0), vectors(stream, 9.0), directions(stream));
+    let (n, n_light) = (directions(stream), directions(stream));
+    let error: Three = vectors(stream, 1e-6).map(|v| v.iter().map(|x| x.abs()).collect());
+    // On a plane through the origin
+    p[1][..8].fill(0.0);
+    p[2][8..16].fill(-0.0);
+    let from = Ends { p: slices(&p), p_error: slices(&error), n: slices(&n) };
+    let to = Ends { p: slices(&q), p_error: slices(&error), n: slices(&n_light) };
+    let is_far: Vec<f32> = (0..N).map(|i| if i % 3 == 0 { 1.0 } else { 0.0 }).collect();
+    let (mut o, mut d, mut t_max) = ([0, 1, 2].map(|_| vec![0.0; N]), [0, 1, 2].map(|_| vec![0.0; N]), vec![0.0; N]);
+    let ([ox, oy, oz], [dx, dy, dz]) = (&mut o, &mut d);
+    let mut rays = Rays { o: [ox, oy, oz], d: [dx, dy, dz], t_max: &mut t_max };
+    segments(level(), &from, slices(&wi), &to, &is_far, &mut rays);
+    for i in 0..N {
+        let origin = offset_origin(at(&p, i), at(&error, i), at(&n, i), at(&wi, i));
+        assert_eq!(at(&o, i), origin);
+        if is_far[i] > 0.0 {
+            assert_eq!((at(&d, i), t_max[i]), (at(&wi, i), f32::INFINITY));
+        } else {
+            let end = offset_origin(at(&q, i), at(&error, i), at(&n_light, i), origin - at(&q, i));
+            assert_eq!((at(&d, i), t_max[i]), (end - origin, SEGMENT_END));
+        }
+    }
+}
+
+#[test]
+fn contributions_are_weighted_as_single_samples() {
+    let stream = &mut pcg32([8, 1, 3]);
+    let (f_cos, li) = (vectors(stream, 1.0), vectors(stream, 5.0));
+    let [mut p, p_other] = [0, 1].map(|_| numbers(stream, 3.0).iter().map(|p| p.abs()).collect::<Vec<f32>>());
+    p[5] = 0.0;
+    for heuristic in [Heuristic::Balance, Heuristic::Power, Heuristic::Maximum] {
+        let samples = Samples {
+            f_cos: slices(&f_cos),
+            li: slices(&li),
+            p: &p,
+            p_other: &p_other,
+            n: 3.0,
+            n_other: 1.0,
+            heuristic,
+        };
+        let mut c: Three = [0, 1, 2].map(|_| vec![-1.0; N]);
+        weigh(level(), &samples, &mut c.each_mut().map(|c| &mut c[..]));
+        for i in 0..N {
+            let factor = heuristic.factor(Technique { n: 3.0, p: p[i] }, Technique { n: 1.0, p: p_other[i] });
+            let expected = at(&f_cos, i) * at(&li, i) * factor;
+            assert!((at(&c, i) - expected).length() <= 1e-5 * expected.length(), "{i} {heuristic:?}");
+        }
+    }
+}
+
+#[test]
+fn lambertian_directions_follow_the_cosine_on_the_side_of_wo() {
+    let stream = &mut pcg32([8, 1, 4]);
+    let mut observed = vec![0.0; 64];
+    let rounds = 2000;
+    for _ in 0..rounds {
+        let (ns, wo) = (directions(stream), directions(stream));
+        let rho: Three = [0, 1, 2].map(|c| vec![0.2 + 0.3 * c as f32; N]);
+        let lambertian = Lambertian { rho: slices(&rho), ns: slices(&ns), wo: slices(&wo) };
+        let u = [0, 1].map(|_| (0..N).map(|_| stream.random::<f32>()).collect::<Vec<f32>>());
+        let (mut wi, mut pdf): (Three, _) = ([0, 1, 2].map(|_| vec![0.0; N]), vec![0.0; N]);
+        let best = level();
+        sample_lambertian(best, &lambertian, [&u[0], &u[1]], &mut wi.each_mut().map(|w| &mut w[..]), &mut pdf);
+        let (mut f_cos, mut density): (Three, _) = ([0, 1, 2].map(|_| vec![0.0; N]), vec![0.0; N]);
+        evaluate_lambertian(best, &lambertian, slices(&wi), &mut f_cos.each_mut().map(|f| &mut f[..]), &mut density);
+        for i in 0..N {
+            let (n, w) = (at(&ns, i) * at(&ns, i).dot(at(&wo, i)).signum(), at(&wi, i));
+            let cos = n.dot(w);
+            assert!(cos >= 0.0 && (w.length() - 1.0).abs() < 1e-5 && (pdf[i] - cos * FRAC_1_PI).abs() < 1e-5);
+            assert!((density[i] - pdf[i]).abs() < 1e-5);
+            let f = Rgb::new(0.2, 0.5, 0.8) * (cos * FRAC_1_PI);
+            assert!((Rgb::new(f_cos[0][i], f_cos[1][i], f_cos[2][i]) - f).map(f32::abs).max_component() < 1e-5);
+            // cos² is uniform; so is the azimuth about n
+            let frame = lumiris_numbers::math::Frame::from_z(n);
+            let azimuth = lumiris_numbers::math::warp::azimuth(frame.to_local(w)) / std::f32::consts::TAU;
+            let cell = |x: f32| ((x * 8.0) as usize).min(7);
+            observed[cell(cos * cos) * 8 + cell(azimuth)] += 1.0;
+        }
+    }
+    let expected = (rounds * N) as f64 / 64.0;
+    assert_chi_squared(&observed, &[expected; 64], 1e-5);
+    // Seen from the horizon there is no direction
+    let edge: Three = [vec![1.0; N], vec![0.0; N], vec![0.0; N]];
+    let normal: Three = [vec![0.0; N], vec![0.0; N], vec![1.0; N]];
+    let lambertian = Lambertian { rho: slices(&edge), ns: slices(&normal), wo: slices(&edge) };
+    let (half, mut pdf) = (vec![0.5; N], vec![1.0; N]);
+    let mut wi: Three = [0, 1, 2].map(|_| vec![0.0; N]);
+    let out = &mut wi.each_mut().map(|w| &mut w[..]);
+    sample_lambertian(Level::fallback(), &lambertian, [&half, &half], out, &mut pdf);
+    assert!(pdf.iter().all(|&p| p == 0.0));
+}

@@ -1,0 +1,167 @@
+//! A path on its way: its state between two vertices, and the ways in which it goes on.
+
+use crate::bsdfs::Lobe;
+use crate::cameras::CameraRay;
+use crate::direct::DirectStats;
+use crate::lights::LightCtx;
+use crate::materials::SurfaceBsdf;
+use crate::settings::{IntegratorSettings, SampleCounts};
+use lumiris_numbers::estimators::mis::{Heuristic, Technique};
+use lumiris_numbers::math::{Ray, Rgb, Vec3};
+use lumiris_numbers::samplers::SampleStream;
+use std::time::Duration;
+
+/// Random-number domains of a path vertex.
+pub(super) mod domain {
+    pub(crate) const DIRECT: u32 = 0;
+    pub(crate) const BSDF: u32 = 1;
+    pub(crate) const ROULETTE: u32 = 2;
+    pub(crate) const RESAMPLE: u32 = 3;
+    pub(crate) const ALBEDO: u32 = 4;
+    /// Vertex k uses the domain `VERTEX + k` of the camera sample.
+    pub(crate) const VERTEX: u32 = 16;
+}
+
+/// Counts and times.
+#[derive(Clone, Copy, Debug, Default)]
+pub struct PathStats {
+    /// Camera rays.
+    pub camera_rays: u64,
+    /// Rays of later path segments.
+    pub bounce_rays: u64,
+    /// Time in tracing camera rays.
+    pub camera_time: Duration,
+    /// Time in tracing later segments.
+    pub bounce_time: Duration,
+    /// Time in hits, textures and materials.
+    pub shade_time: Duration,
+    /// Direct lighting.
+    pub direct: DirectStats,
+}
+
+impl PathStats {
+    /// Adds the counts of another worker.
+    pub fn merge(&mut self, other: &PathStats) {
+        self.camera_rays += other.camera_rays;
+        self.bounce_rays += other.bounce_rays;
+        self.camera_time += other.camera_time;
+        self.bounce_time += other.bounce_time;
+        self.shade_time += other.shade_time;
+        self.direct.merge(&other.direct);
+    }
+}
+
+/// A camera sample to be traced.
+#[derive(Clone, Copy, Debug)]
+pub struct CameraSample {
+    /// Its ray.
+    pub ray: CameraRay,
+    /// Weight of the pixel filter times that of the camera.
+    pub weight: f32,
+    /// Its random numbers.
+    pub stream: SampleStream,
+    /// Random numbers of direct light, which progressive estimators draw anew for every block of samples: they are
+    /// independent of those of earlier blocks, wherever the path goes.
+    pub direct: SampleStream,
+    /// Sample counts at its first vertex.
+    pub sample_counts: SampleCounts,
+    /// The fit of its pixel.
+    pub fit: u32,
+}
+
+/// The state of a path.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct PathState {
+    /// Index of the camera sample.
+    pub(super) sample: u32,
+    pub(super) ray: Ray,
+    pub(super) beta: Rgb,
+    /// Squared relative index of refraction along the path, which roulette takes out of β.
+    pub(super) eta_scale: f32,
+    /// Width of a pixel at the ray's origin, and its growth per unit length.
+    pub(super) width: f32,
+    pub(super) spread: f32,
+    /// Surfaces without scattering passed since the last vertex.
+    pub(super) passed: u32,
+    /// Distance travelled through such surfaces.
+    pub(super) travelled: f32,
+    /// The technique that drew the direction, if the segment looks for emitters.
+    pub(super) technique: Option<BsdfTechnique>,
+}
+
+/// BSDF sampling at the last vertex, as multiple importance sampling weights it against light sampling there.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct BsdfTechnique {
+    /// Where light sampling stood.
+    pub(super) ctx: LightCtx,
+    /// Number of light samples.
+    pub(super) n_light: f32,
+    /// Density of the direction; `None` for a specular lobe, which no other technique samples.
+    pub(super) pdf: Option<f32>,
+    pub(super) heuristic: Heuristic,
+    /// Throughput of the path beyond the first surface, if roulette lets it go on.
+    pub(super) survivor: Option<Rgb>,
+}
+
+impl BsdfTechnique {
+    /// The weight of what it found, where light sampling has the density `p_light`.
+    pub(super) fn weight(&self, p_light: impl FnOnce(&LightCtx) -> f32) -> f32 {
+        self.pdf.map_or(1.0, |p| {
+            let light = Technique { n: self.n_light, p: p_light(&self.ctx) };
+            self.heuristic.weight(Technique { n: 1.0, p }, light)
+        })
+    }
+}
+
+/// The path from the origin `o` on in a direction; `None` if it carries nothing.
+#[inline]
+pub(super) fn scattered(path: &PathState, o: Vec3, direction: &Direction) -> Option<PathState> {
+    let Direction { wi, weight, eta, .. } = *direction;
+    let beta = path.beta * weight;
+    let eta_scale = path.eta_scale * eta * eta;
+    let ray = Ray { o, d: wi, t_max: f32::INFINITY, time: path.ray.time };
+    let carries = !beta.is_black() && beta.is_finite();
+    carries.then_some(PathState { ray, beta, eta_scale, technique: None, ..*path })
+}
+
+/// Russian roulette before bounce `bounce` on what the path that left the vertex of `stream` carries without the scaling
+/// of refraction: the throughput of a path that goes on.
+#[inline]
+pub(super) fn survive(
+    path: &PathState,
+    stream: &SampleStream,
+    bounce: u32,
+    settings: &IntegratorSettings,
+) -> Option<Rgb> {
+    let survival = (path.beta * path.eta_scale).map(f32::abs).max_component();
+    if !settings.has_roulette(bounce) || !(survival < 1.0) {
+        return Some(path.beta);
+    }
+    (stream.draw_random(domain::ROULETTE) < survival).then(|| path.beta / survival)
+}
+
+/// How a path continues.
+pub(super) struct Direction {
+    pub(super) wi: Vec3,
+    /// Factor of the throughput.
+    pub(super) weight: Rgb,
+    /// Relative index of refraction.
+    pub(super) eta: f32,
+    pub(super) lobe: Lobe,
+    /// Density of the direction; `None` if it was resampled.
+    pub(super) pdf: Option<f32>,
+}
+
+/// A direction by BSDF sampling.
+pub(super) fn sampled_direction(bsdf: &SurfaceBsdf<'_>, wo: Vec3, [uc, u0, u1]: [f32; 3]) -> Option<Direction> {
+    let sample = bsdf.sample(wo, uc, [u0, u1])?;
+    let weight = sample.f * (bsdf.cos(sample.wi) / sample.pdf);
+    Some(Direction { wi: sample.wi, weight, eta: sample.eta, lobe: sample.lobe, pdf: Some(sample.pdf) })
+}
+
+/// An empty vector in the memory of `old`, whose items have the same layout and may borrow from something else.
+pub(super) fn emptied<T, U>(mut old: Vec<T>) -> Vec<U> {
+    const { assert!(size_of::<T>() == size_of::<U>() && align_of::<T>() == align_of::<U>()) };
+    old.clear();
+    old.into_iter().map(|_| unreachable!("the vector is empty")).collect()
+}

@@ -1,0 +1,162 @@
+//! Camera samples: places on the film with their rays and random numbers.
+
+use crate::film::filter::FilterSampler;
+use crate::integrators::path::CameraSample;
+use crate::scene::RenderJob;
+use crate::settings::{Proposals, SampleCounts};
+use lumiris_lanes::camera::{Pinhole, PinholeRays};
+use lumiris_lanes::columns::{Column, Columns3, padded, reserve};
+use lumiris_lanes::{level, sampler};
+use lumiris_numbers::estimators::ocv::block_of;
+use lumiris_numbers::math::hash::pcg4d;
+use lumiris_numbers::math::{Ray, Vec2, Vec3};
+use lumiris_numbers::samplers::SampleStream;
+use std::ops::Range;
+
+/// Domains of a camera sample.
+mod domain {
+    pub(super) const FILM_AND_LENS: u32 = 0;
+    pub(super) const TIME: u32 = 1;
+    pub(super) const SAMPLE_COUNTS: u32 = 2;
+}
+
+/// Seed of the blocks of progressive estimators.
+const BLOCK_SEED: u32 = 0x62_6c_6f_63;
+
+/// Makes camera samples.
+pub(super) struct CameraSampler<'a> {
+    job: &'a RenderJob,
+    /// The first sample of the rendering.
+    first_sample: u32,
+    filter: FilterSampler,
+    /// False if the time of a ray does not matter.
+    has_motion: bool,
+    /// What makes many rays at once.
+    pinhole: Option<(Pinhole, Vec3)>,
+}
+
+/// Memory for many samples at once.
+#[derive(Debug, Default)]
+pub(super) struct Scratch {
+    pixels: Vec<(u32, [u32; 2], u32)>,
+    drawn: Vec<SampleStream>,
+    u: [Column; 2],
+    weight: Column,
+    d: Columns3,
+    spread: Column,
+}
+
+impl<'a> CameraSampler<'a> {
+    pub(super) fn new(job: &'a RenderJob, first_sample: u32) -> Self {
+        let (scene, has_motion) = (&job.world.scene, job.world.scene.geometry.has_motion());
+        let pinhole = if has_motion { None } else { scene.camera.pinhole() };
+        CameraSampler { job, first_sample, filter: scene.film.filter.sampler(), has_motion, pinhole }
+    }
+
+    /// Appends the samples of a range of some pixels, which are given with the fits of their samples.
+    pub(super) fn samples(
+        &self,
+        pixels: impl Iterator<Item = (u32, [u32; 2])>,
+        samples: &Range<u32>,
+        seed: u32,
+        scratch: &mut Scratch,
+        out: &mut Vec<CameraSample>,
+    ) {
+        let of_pixel = |(fit, pixel)| samples.clone().map(move |sample| (fit, pixel, sample));
+        let Some((pinhole, o)) = &self.pinhole else {
+            let each = |(fit, pixel, sample)| CameraSample { fit, ..self.sample(pixel, sample, seed) };
+            out.extend(pixels.flat_map(of_pixel).map(each));
+            return;
+        };
+        let Scratch { pixels: places, drawn, u: [x, y], weight, d, spread } = scratch;
+        places.clear();
+        places.extend(pixels.flat_map(of_pixel));
+        let kind = self.job.settings().sampling.sampler;
+        let n = places.len();
+        let first = out.len();
+        drawn.clear();
+        let camera = &self.job.world.scene.camera;
+        let sample_counts = self.job.settings().integrator.sample_counts();
+        let time = camera.time(0.0);
+        out.extend(places.iter().map(|&(fit, pixel, sample)| {
+            let stream = SampleStream::new(kind, pixel, sample, seed);
+            drawn.push(stream.domain(domain::FILM_AND_LENS));
+            let ray = crate::cameras::CameraRay {
+                ray: Ray { o: *o, d: Vec3::ZERO, t_max: f32::INFINITY, time },
+                spread: 0.0,
+                width0: 0.0,
+                weight: 1.0,
+            };
+            let direct = self.direct_stream(pixel, sample, seed).unwrap_or(stream);
+            let sample_counts = self.chosen_counts(pixel, &stream).unwrap_or(sample_counts);
+            CameraSample { ray, weight: 0.0, stream, direct, sample_counts, fit }
+        }));
+
+        let len = padded(n);
+        reserve(&mut [x, y, weight, spread], len);
+        d.reserve(len);
+        sampler::draw(level(), drawn, [&mut x[..n], &mut y[..n]]);
+        for (i, &(_, pixel, _)) in places.iter().enumerate() {
+            let filter = self.filter.sample([x[i], y[i]]);
+            let film = center(pixel) + filter.offset;
+            (x[i], y[i], weight[i]) = (film.x, film.y, filter.weight);
+        }
+        let mut rays = PinholeRays { d: d.get_mut(len), spread: &mut spread[..len] };
+        pinhole.rays(level(), [&x[..len], &y[..len]], &mut rays);
+        let scale = self.job.world.scene.film.scale;
+        for (i, sample) in out[first..].iter_mut().enumerate() {
+            sample.ray.ray.d = d.vec3(i);
+            sample.ray.spread = spread[i];
+            sample.weight = weight[i] * scale;
+        }
+    }
+
+    /// One sample. The direct light of a progressive estimator is drawn block by block, each with a seed of its own.
+    pub(super) fn sample(&self, pixel: [u32; 2], sample: u32, seed: u32) -> CameraSample {
+        let of_seed = self.sample_of_seed(pixel, sample, seed);
+        CameraSample { direct: self.direct_stream(pixel, sample, seed).unwrap_or(of_seed.stream), ..of_seed }
+    }
+
+    /// One sample, whose direct light belongs to no block.
+    pub(super) fn sample_of_seed(&self, pixel: [u32; 2], sample: u32, seed: u32) -> CameraSample {
+        let (scene, settings) = (&self.job.world.scene, self.job.settings());
+        let stream = SampleStream::new(settings.sampling.sampler, pixel, sample, seed);
+        let [fx, fy, lx, ly] = stream.domain(domain::FILM_AND_LENS).draw::<4>();
+        let [u_time] = if self.has_motion { stream.domain(domain::TIME).draw::<1>() } else { [0.0] };
+        let filter = self.filter.sample([fx, fy]);
+        let ray = scene.camera.ray(center(pixel) + filter.offset, [lx, ly], u_time);
+        CameraSample {
+            ray,
+            weight: filter.weight * ray.weight * scene.film.scale,
+            stream,
+            direct: stream,
+            sample_counts: self.chosen_counts(pixel, &stream).unwrap_or_else(|| settings.integrator.sample_counts()),
+            fit: 0,
+        }
+    }
+
+    /// The random numbers of direct light, if they are those of a block.
+    #[inline]
+    fn direct_stream(&self, pixel: [u32; 2], sample: u32, seed: u32) -> Option<SampleStream> {
+        let settings = self.job.settings();
+        settings.integrator.is_progressive().then(|| {
+            let block = block_of(sample - self.first_sample);
+            let block_seed = pcg4d([seed, self.first_sample, block.index, BLOCK_SEED])[0];
+            let index = sample - self.first_sample - block.first;
+            SampleStream::new(settings.sampling.sampler, pixel, index, block_seed)
+        })
+    }
+
+    /// Sample counts, if they are chosen per pixel.
+    #[inline]
+    fn chosen_counts(&self, pixel: [u32; 2], stream: &SampleStream) -> Option<SampleCounts> {
+        let map = self.job.sample_count_map.as_ref()?;
+        let is_chosen = self.job.settings().integrator.ris.proposals == Proposals::Optimal;
+        is_chosen.then(|| map.sample_counts(pixel, stream.domain(domain::SAMPLE_COUNTS).draw::<2>()))
+    }
+}
+
+/// The centre of a pixel.
+fn center(pixel: [u32; 2]) -> Vec2 {
+    Vec2::new(pixel[0] as f32 + 0.5, pixel[1] as f32 + 0.5)
+}

@@ -1,0 +1,85 @@
+//! Vertices side by side are the vertices one by one: the same random numbers give the same radiance.
+
+use lumiris::direct::Fits;
+use lumiris::film::PixelSample;
+use lumiris::import::{LoadOptions, load};
+use lumiris::integrators::PathIntegrator;
+use lumiris::integrators::path::CameraSample;
+use lumiris::scene::{AccelKind, RenderJob};
+use lumiris::settings::{EstimatorKind, IntegratorKind};
+use lumiris_numbers::math::Vec2;
+use lumiris_numbers::samplers::{SampleStream, SamplerKind};
+use std::path::Path;
+
+/// Many materials and lights, a box, and an environment.
+const SCENES: [&str; 3] = ["scenes/demo/gallery.pbrt", "scenes/fan/box.pbrt", "scenes/analytic/half-environment.pbrt"];
+
+const RESOLUTION: [u32; 2] = [64, 36];
+
+fn job(scene: &str, kind: IntegratorKind, estimator: EstimatorKind, samples: u32) -> RenderJob {
+    let path = Path::new(env!("CARGO_MANIFEST_DIR")).join(scene);
+    let options = LoadOptions { resolution: Some(RESOLUTION), ..LoadOptions::default() };
+    let mut loaded = load(&path, &options).map_err(|d| d.to_string()).unwrap();
+    let integrator = &mut loaded.settings.integrator;
+    (integrator.kind, integrator.estimator, integrator.samples) = (kind, estimator, Some(samples));
+    loaded.job(AccelKind::Embree, None).unwrap()
+}
+
+fn camera_samples(job: &RenderJob) -> Vec<CameraSample> {
+    let pixels = (0..RESOLUTION[1]).flat_map(|y| (0..RESOLUTION[0]).map(move |x| [x, y]));
+    let sample = |pixel: [u32; 2]| {
+        let stream = SampleStream::new(SamplerKind::Sobol, pixel, 0, 3);
+        let film = Vec2::new(pixel[0] as f32 + 0.5, pixel[1] as f32 + 0.5);
+        let ray = job.world.scene.camera.ray(film, [0.5; 2], 0.0);
+        let sample_counts = job.settings().integrator.sample_counts();
+        CameraSample { ray, weight: 1.0, stream, direct: stream, sample_counts, fit: 0 }
+    };
+    pixels.map(sample).collect()
+}
+
+/// Traces side by side, or by the stages of direct light, which list what samples contribute.
+fn traced(job: &RenderJob, samples: &[CameraSample], side_by_side: bool) -> Vec<PixelSample> {
+    let mut integrator = PathIntegrator::default();
+    integrator.outcomes = (!side_by_side).then(Vec::new);
+    let mut out = Vec::new();
+    integrator.trace(job, &job.settings().integrator, samples, &mut Fits::default(), &mut out);
+    out
+}
+
+fn assert_same_radiance(scene: &str, kind: IntegratorKind, estimator: EstimatorKind, samples: u32, part: f64) {
+    let job = job(scene, kind, estimator, samples);
+    let samples = camera_samples(&job);
+    let (a, b) = (traced(&job, &samples, true), traced(&job, &samples, false));
+    let what = format!("{scene} {kind:?} {estimator:?} {}", samples[0].sample_counts.samples);
+    let mut lit = 0;
+    let mut different = 0;
+    for (a, b) in a.iter().zip(&b) {
+        let (x, y) = (a.radiance.luminance(), b.radiance.luminance());
+        lit += usize::from(y > 0.0);
+        different += usize::from(!((x - y).abs() <= 1e-3 * (y.abs() + 1e-3)));
+        let (f, g) = (a.features.unwrap_or_default(), b.features.unwrap_or_default());
+        assert_eq!((f.material, f.object), (g.material, g.object), "{what}");
+        assert!((f.normal - g.normal).length() < 1e-4 && (f.depth - g.depth).abs() <= 1e-4 * g.depth, "{what}");
+        assert!((f.albedo - g.albedo).map(f32::abs).max_component() < 1e-4, "{what}");
+    }
+    // Rounding may decide whether a segment is occluded, and where a path goes on
+    let allowed = ((1.0 - part) * samples.len() as f64) as usize;
+    assert!(lit > samples.len() / 4 && different <= allowed, "{what}: {different} of {lit}");
+}
+
+#[test]
+fn direct_light_is_that_of_the_stages() {
+    for scene in SCENES {
+        for (estimator, samples) in [(EstimatorKind::Mc, 3), (EstimatorKind::Mis, 2), (EstimatorKind::Mis, 7)] {
+            assert_same_radiance(scene, IntegratorKind::Direct, estimator, samples, 0.99);
+        }
+    }
+}
+
+#[test]
+fn paths_go_the_same_ways() {
+    for scene in SCENES {
+        assert_same_radiance(scene, IntegratorKind::Path, EstimatorKind::Mc, 2, 0.96);
+        assert_same_radiance(scene, IntegratorKind::Path, EstimatorKind::Mis, 4, 0.96);
+    }
+}
