@@ -71,6 +71,23 @@ impl RayBatch {
         self.time.push(ray.time);
     }
 
+    /// Replaces all rays.
+    #[inline]
+    pub fn set<'r>(&mut self, rays: impl ExactSizeIterator<Item = &'r Ray>) {
+        let n = rays.len();
+        let RayBatch { ox, oy, oz, dx, dy, dz, t_max, time } = self;
+        let mut columns = [ox, oy, oz, dx, dy, dz, t_max, time].map(|column| {
+            column.resize(n, 0.0);
+            &mut column[..n]
+        });
+        for (i, ray) in rays.enumerate().take(n) {
+            let values = [ray.o.x, ray.o.y, ray.o.z, ray.d.x, ray.d.y, ray.d.z, ray.t_max, ray.time];
+            for (column, value) in columns.iter_mut().zip(values) {
+                column[i] = value;
+            }
+        }
+    }
+
     /// Ray `i`.
     #[inline]
     pub fn get(&self, i: usize) -> Ray {

@@ -109,9 +109,8 @@ impl PathIntegrator {
                 break;
             }
             let estimate = Estimate::new(settings, vertex).filter(|_| self.outcomes.is_none());
-            let buffers = std::mem::take(&mut self.buffers);
             let count = self.active.len();
-            let mut batch = estimate.map(|e| Batch::new(buffers.unwrap_or_default(), e, count));
+            let mut batch = estimate.map(|e| Batch::new(self.buffers.take().unwrap_or_default(), e, count));
             let vertices = self.find_vertices(job, vertex, depth, samples, out, batch.as_mut());
             let sample_counts = settings.sample_counts_at_vertex(vertex);
             let at_vertex = settings.at_vertex(vertex);
@@ -257,10 +256,7 @@ impl PathIntegrator {
 
     /// First hits of the active paths.
     fn trace_active(&mut self, job: &RenderJob, vertex: u32, coherence: Coherence) {
-        self.rays.clear();
-        for path in &self.active {
-            self.rays.push(&path.ray);
-        }
+        self.rays.set(self.active.iter().map(|path| &path.ray));
         if let Some(r) = &mut self.recording {
             let batches = if coherence == Coherence::Coherent { &mut r.camera } else { &mut r.bounces };
             batches.push(self.rays.clone());

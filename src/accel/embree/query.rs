@@ -199,12 +199,24 @@ pub(super) fn load<const N: usize>(packet: &mut RayPacket<N>, rays: &RayBatch, b
             lanes[..count].copy_from_slice(&values[base..base + count]);
         }
     }
+    // As `can_trace`, row by row
+    let (mut zero, mut has_direction) = ([0.0; N], [false; N]);
+    for row in packet.o.iter().chain(&packet.d) {
+        for lane in 0..N {
+            zero[lane] += row[lane] * 0.0;
+        }
+    }
+    for row in &packet.d {
+        for lane in 0..N {
+            has_direction[lane] |= row[lane] != 0.0;
+        }
+    }
     let mut valid = Valid([0; N]);
     for lane in 0..N {
         packet.time[lane] = unit_time(packet.time[lane]);
         packet.id[lane] = (base + lane) as u32;
-        let (o, d) = (packet.o.map(|row| row[lane]), packet.d.map(|row| row[lane]));
-        valid.0[lane] = -i32::from(can_trace(o, d, packet.tfar[lane]) & (lane < count));
+        let can_trace = (zero[lane] == 0.0) & (packet.tfar[lane] > 0.0) & has_direction[lane];
+        valid.0[lane] = -i32::from(can_trace & (lane < count));
     }
     if valid.0 != [-1; N] {
         // Where the processor has no packets of this width, Embree 3.13 traces all lanes, `valid` or not.

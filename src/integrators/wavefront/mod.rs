@@ -338,19 +338,7 @@ impl<'w> Batch<'w> {
         for (p, is_delta) in samples.p_bsdf.iter_mut().zip(&samples.light.is_delta) {
             *p = if *is_delta { 0.0 } else { *p };
         }
-        let [n_light, n_bsdf] = self.estimate.n();
-        let heuristic = self.estimate.settings.heuristic();
-        let (p, p_other) = (&samples.light.pdf[..len], &samples.p_bsdf[..len]);
-        let weighted = Samples {
-            f_cos: samples.f_cos.get(len),
-            li: samples.light.li.get(len),
-            p,
-            p_other,
-            n: n_light,
-            n_other: n_bsdf,
-            heuristic,
-        };
-        kernels::weigh(level(), &weighted, &mut samples.c.get_mut(len));
+        self.buffers.weigh(n, &self.estimate, true);
     }
 
     /// BSDF sample `k` of each vertex and the emitter in its direction: contributions and segments. Returns the number of
@@ -402,20 +390,9 @@ impl<'w> Batch<'w> {
                 samples.light.n.set(i, n);
             }
         }
-        let [n_light, n_bsdf] = self.estimate.n();
-        let heuristic = self.estimate.settings.heuristic();
-        let (p, p_other) = (&samples.p_bsdf[..len], &samples.light.pdf[..len]);
-        let weighted = Samples {
-            f_cos: samples.f_cos.get(len),
-            li: samples.light.li.get(len),
-            p,
-            p_other,
-            n: n_bsdf,
-            n_other: n_light,
-            heuristic,
-        };
-        kernels::weigh(level(), &weighted, &mut samples.c.get_mut(len));
-        index.len() as u64
+        let count = index.len() as u64;
+        self.buffers.weigh(n, &self.estimate, false);
+        count
     }
 
     /// Traces the segments of the samples that contribute, and adds the contributions of those that are unoccluded.
@@ -555,6 +532,18 @@ impl Buffers {
         let u = [&u[1][..len], &u[2][..len]];
         let at = self.surface.lambertian(len);
         kernels::sample_lambertian(level(), &at, u, &mut light.wi.get_mut(len), &mut p_bsdf[..len]);
+    }
+
+    /// Contributions of the samples of light or of BSDF sampling.
+    fn weigh(&mut self, n: usize, estimate: &Estimate, by_light: bool) {
+        let len = padded(n);
+        let SampleColumns { light, f_cos, p_bsdf, c, .. } = &mut self.samples;
+        let [n_light, n_bsdf] = estimate.n();
+        let (of_light, of_bsdf) = ((&light.pdf[..len], n_light), (&p_bsdf[..len], n_bsdf));
+        let ((p, n), (p_other, n_other)) = if by_light { (of_light, of_bsdf) } else { (of_bsdf, of_light) };
+        let (f_cos, li, heuristic) = (f_cos.get(len), light.li.get(len), estimate.settings.heuristic());
+        let samples = Samples { f_cos, li, p, p_other, n, n_other, heuristic };
+        kernels::weigh(level(), &samples, &mut c.get_mut(len));
     }
 
     /// The segments of the samples that contribute.
