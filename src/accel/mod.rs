@@ -128,7 +128,7 @@ pub enum Coherence {
     Coherent,
     /// Neighbours share an origin or an end (shadow segments of a shading point): packets without frustum culling.
     Packets,
-    /// Nothing (bounces): single rays.
+    /// Nothing (bounces): first hits in packets without frustum culling, occlusion by single rays.
     Incoherent,
 }
 

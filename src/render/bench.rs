@@ -232,7 +232,7 @@ impl Pair {
         Ok(cases.into_iter().flatten().collect())
     }
 
-    /// First hits of batches of rays, in packets of the tracer's width if they are coherent; `None` without rays.
+    /// First hits of batches of rays, in packets of the tracer's width; `None` without rays.
     pub fn intersect(
         &self,
         name: &'static str,
@@ -240,7 +240,7 @@ impl Pair {
         coherence: Coherence,
     ) -> Result<Option<RayCase>, EmbreeError> {
         let coherent = coherence == Coherence::Coherent;
-        let width = if coherent { self.accel.packet_width() } else { 1 };
+        let width = self.accel.packet_width();
         let mut hits = Vec::new();
         let ours = |rays: &RayBatch| {
             let time = time(|| self.accel.intersect(rays, coherence, &mut hits));

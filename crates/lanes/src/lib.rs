@@ -8,9 +8,8 @@
 //!
 //! In kernels there are no closures and no `map` over arrays: their code would be compiled without the vectors.
 //!
-//! Reading order: [`lane`], [`columns`], [`curve`], [`sampler`], [`light`], [`area`], [`environment`], [`bsdf`], [`combine`],
-//! [`camera`], [`triangles`],
-//! [`vertex`].
+//! Reading order: [`lane`], [`columns`], [`curve`], [`sampler`], [`light`], [`area`], [`environment`], [`bsdf`],
+//! [`combine`], [`camera`], [`triangles`], [`vertex`].
 
 pub mod area;
 pub mod bsdf;

@@ -103,6 +103,11 @@ impl Single<'_> {
     }
 }
 
+/// Vertices that the kernels of Lambertian reflection leave out.
+fn others<'s, 'w>(singles: &'s [Single<'w>]) -> impl Iterator<Item = &'s Single<'w>> {
+    singles.iter().filter(|single| !single.is_lambertian())
+}
+
 /// The vertices of a batch of paths, which have the same index along their paths.
 pub(super) struct Batch<'w> {
     estimate: Estimate,
@@ -327,7 +332,7 @@ impl<'w> Batch<'w> {
         let at = surface.lambertian(len);
         let (wi, p_bsdf) = (samples.light.wi.get(len), &mut samples.p_bsdf[..len]);
         kernels::evaluate_lambertian(level(), &at, wi, &mut samples.f_cos.get_mut(len), p_bsdf);
-        for single in self.singles.iter().filter(|s| !s.is_lambertian()) {
+        for single in others(&self.singles) {
             let i = single.index as usize;
             if samples.light.pdf[i] > 0.0 {
                 let wi = samples.light.wi.vec3(i);
@@ -353,7 +358,7 @@ impl<'w> Batch<'w> {
             samples.f_cos.set_rgb(i, surface.rho.rgb(i) * samples.p_bsdf[i]);
             samples.light.is_delta[i] = false;
         }
-        for single in self.singles.iter().filter(|s| !s.is_lambertian()) {
+        for single in others(&self.singles) {
             let i = single.index as usize;
             let u = samples.u.each_ref().map(|u| u[i]);
             let drawn = single.bsdf.sample(single.wo, u[0], [u[1], u[2]]);
@@ -426,12 +431,8 @@ impl<'w> Batch<'w> {
         self.buffers.sample_lambertian(len);
         let Estimate { counts, settings, vertex, .. } = &self.estimate;
         let Buffers { paths, streams, surface, samples, .. } = &mut *self.buffers;
-        for single in &self.singles {
-            // Lambertian ones are like all others
-            if !single.is_lambertian() {
-                samples.p_bsdf[single.index as usize] = 0.0;
-            }
-        }
+        // Those follow below
+        others(&self.singles).for_each(|single| samples.p_bsdf[single.index as usize] = 0.0);
         surface.origins(samples, len);
         let follow = |i: usize, direction: &Direction, o: Vec3, n_light: u32| {
             let next = scattered(&paths[i], o, direction)?;
@@ -454,7 +455,7 @@ impl<'w> Batch<'w> {
             };
             next.extend(follow(i, &direction, samples.o.vec3(i), counts.light));
         }
-        for single in self.singles.iter().filter(|s| !s.is_lambertian()) {
+        for single in others(&self.singles) {
             let (i, bsdf) = (single.index as usize, &single.bsdf);
             let u = samples.u.each_ref().map(|u| u[i]);
             let Some(direction) = sampled_direction(bsdf, single.wo, u) else { continue };
