@@ -7,8 +7,7 @@
 use lumiris::bsdfs::{
     Bsdf, CoatTable, CoatedDiffuse, Conductor, Dielectric, Diffuse, DiffuseTransmission, TrowbridgeReitz,
 };
-use lumiris::geometry::{Quadric, QuadricKind, Shape, TriangleMesh};
-use lumiris::lights::{Emission, EnvironmentFilter, EnvironmentMap, EnvironmentMapping, area_lights_of};
+use lumiris::lights::{EnvironmentFilter, EnvironmentMap, EnvironmentMapping};
 use lumiris::lights::{Light, LightCtx, LightLanes};
 use lumiris::materials::surface::SurfaceBsdf;
 use lumiris_lanes::combine::{Proposals, Weights, combine};
@@ -86,29 +85,6 @@ fn sky(size: [usize; 2], mapping: EnvironmentMapping, filter: EnvironmentFilter)
     Light::infinite_image(Arc::new(map), &Affine3A::from_rotation_x(0.5), 1.0)
 }
 
-fn quad(triangles: &[[u32; 3]]) -> Shape {
-    let p =
-        [Vec3::new(-1.0, 2.0, -1.0), Vec3::new(2.0, 2.0, -1.0), Vec3::new(2.0, 2.0, 1.0), Vec3::new(-1.0, 2.0, 1.0)];
-    Shape::Mesh(TriangleMesh::new(p.to_vec(), triangles.to_vec()).expect("indices are in range"))
-}
-
-fn far_quad() -> Shape {
-    let p = [Vec3::ZERO, Vec3::X, Vec3::new(1.0, 0.0, 1.0), Vec3::Z].map(|p| p + Vec3::Y * 300.0);
-    Shape::Mesh(TriangleMesh::new(p.to_vec(), vec![[0, 1, 2], [0, 2, 3]]).expect("indices are in range"))
-}
-
-fn sphere() -> Shape {
-    let placement = Affine3A::from_translation(Vec3::Y * 4.0);
-    let kind = QuadricKind::Sphere { radius: 0.5, z_min: -0.5, z_max: 0.5, phi_max: std::f32::consts::TAU };
-    let local_from_group = placement.inverse();
-    Shape::Quadric(Quadric { kind, group_from_local: placement, local_from_group, flip_normal: false })
-}
-
-fn area(shape: &Shape) -> Light {
-    let emission = Emission { two_sided: true, ..Emission::constant(Rgb::new(1.0, 2.0, 3.0)) };
-    Light::Area(area_lights_of(shape, &emission).lights.remove(0))
-}
-
 type Make = Box<dyn Fn() -> Light>;
 
 fn lights() -> Vec<(&'static str, Make)> {
@@ -120,10 +96,6 @@ fn lights() -> Vec<(&'static str, Make)> {
         ("environment 1024² bilinear", Box::new(move || sky([1024, 1024], EnvironmentMapping::EqualArea, bilinear))),
         ("environment 2048×1024 bilinear", Box::new(move || sky([2048, 1024], EnvironmentMapping::LatLong, bilinear))),
         ("environment 4096×2048 bilinear", Box::new(move || sky([4096, 2048], EnvironmentMapping::LatLong, bilinear))),
-        ("rectangle", Box::new(|| area(&quad(&[[0, 2, 1], [0, 3, 2]])))),
-        ("rectangle by area", Box::new(|| area(&far_quad()))),
-        ("triangle", Box::new(|| area(&quad(&[[0, 2, 1]])))),
-        ("sphere", Box::new(|| area(&sphere()))),
         ("constant environment", Box::new(move || Light::InfiniteConstant { l })),
         ("point light", Box::new(move || Light::Point { p: Vec3::Y * 3.0, intensity: l })),
     ]

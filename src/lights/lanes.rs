@@ -1,11 +1,9 @@
-//! Many samples of one light from one point, as a structure of arrays.
+//! Many samples of one light, as a structure of arrays: kernels for infinite lights. [`super::many`] has those of area
+//! lights, whose points differ.
 
 use super::{Light, LightCtx};
 
 pub use lumiris_lanes::LightLanes;
-
-/// Number of samples of an area light from which on lanes are faster than single samples.
-const FEW: usize = 3;
 
 impl Light {
     /// [`sample_li`](Self::sample_li) for each pair of numbers `u[0][i]`, `u[1][i]`. The results are those of single
@@ -26,13 +24,7 @@ impl Light {
                 }
                 out.fill(s.li.to_array(), s.pdf);
             }
-            Light::Area(area) if area.is_dark_from(ctx.p) => out.pdf.fill(0.0),
-            Light::Area(area) => match area.lanes(ctx) {
-                Some(sampler) if out.pdf.len() >= FEW || sampler.has_setup() => {
-                    sampler.sample(lumiris_lanes::level(), u, out)
-                }
-                _ => self.sample_li_each(ctx, u, out),
-            },
+            Light::Area(_) => self.sample_li_each(ctx, u, out),
         }
     }
 
@@ -55,8 +47,7 @@ impl Light {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::geometry::{Quadric, QuadricKind, Shape, TriangleMesh};
-    use crate::lights::{Emission, EnvironmentFilter, EnvironmentMap, EnvironmentMapping, area_lights_of};
+    use crate::lights::{EnvironmentFilter, EnvironmentMap, EnvironmentMapping};
     use lumiris_numbers::math::{Affine3A, Rgb, Vec3};
     use lumiris_test_support::random::{Pcg32, RngExt, pcg32};
     use std::sync::Arc;
@@ -140,44 +131,6 @@ mod tests {
         ] {
             for at in [Vec3::ZERO, p, Vec3::new(-5.0, 1.0, 9.0)] {
                 assert_like_singles(&light, &LightCtx::at(at), &mut stream, 1e-5);
-            }
-        }
-    }
-
-    #[test]
-    fn lanes_of_area_lights_are_single_samples() {
-        let mesh = |p: &[Vec3], t: &[[u32; 3]]| Shape::Mesh(TriangleMesh::new(p.to_vec(), t.to_vec()).unwrap());
-        let quad = [Vec3::ZERO, Vec3::X * 2.0, Vec3::new(2.0, 0.0, 3.0), Vec3::Z * 3.0];
-        let quadric = |kind| {
-            let placement = Affine3A::from_translation(Vec3::new(1.0, 2.0, 0.5));
-            let local_from_group = placement.inverse();
-            Shape::Quadric(Quadric { kind, group_from_local: placement, local_from_group, flip_normal: false })
-        };
-        let (radius, phi_max) = (0.5, std::f32::consts::TAU);
-        let mut stream = pcg32([7, 7, 7]);
-        for shape in [
-            mesh(&quad, &[[0, 1, 2], [0, 2, 3]]),
-            mesh(&quad, &[[2, 1, 0], [0, 3, 2]]),
-            mesh(&quad, &[[0, 1, 2]]),
-            quadric(QuadricKind::Sphere { radius, z_min: -radius, z_max: radius, phi_max }),
-            quadric(QuadricKind::Sphere { radius, z_min: 0.0, z_max: radius, phi_max }),
-            quadric(QuadricKind::Disk { height: 0.0, radius, inner_radius: 0.0, phi_max }),
-        ] {
-            for two_sided in [false, true] {
-                let emission = Emission { l: Rgb::new(1.0, 2.0, 3.0), two_sided, image: None };
-                for area in area_lights_of(&shape, &emission).lights {
-                    let light = Light::Area(area);
-                    for _ in 0..20 {
-                        let [x, y] = stream.random::<[f32; 2]>();
-                        let [z, far] = stream.random::<[f32; 2]>();
-                        let scale = if far < 0.2 { 300.0 } else { 6.0 };
-                        let p = (Vec3::new(x, y, z) - 0.5) * scale;
-                        assert_like_singles(&light, &LightCtx::at(p), &mut stream, 2e-5);
-                    }
-                    for p in [Vec3::new(1.0, 2.1, 0.5), Vec3::new(1.0, 1e-4, 1.0), Vec3::new(-2.0, 0.0, -2.0)] {
-                        assert_like_singles(&light, &LightCtx::at(p), &mut stream, 2e-5);
-                    }
-                }
             }
         }
     }

@@ -25,7 +25,6 @@ pub use rectangle::RectangleLight;
 pub use triangle::TriangleLight;
 
 use super::{LightBounds, LightCtx, LightHit, LightSample};
-use lumiris_lanes::area::{AreaSampler, Surface};
 use lumiris_numbers::math::{Rgb, Vec2, Vec3};
 use std::f32::consts::PI;
 
@@ -131,22 +130,6 @@ impl AreaLight {
     pub(super) fn radiance(&self, p: Vec3) -> Rgb {
         let uv = if self.emission.image.is_some() { self.uv(p) } else { Vec2::ZERO };
         self.emission.radiance(uv)
-    }
-
-    /// What samples many directions at once from `ctx`; `None` where they are sampled one by one: patches, quadrics but
-    /// spheres from outside, and images. The light is not dark from there.
-    pub(super) fn lanes(&self, ctx: &LightCtx) -> Option<AreaSampler> {
-        if self.emission.image.is_some() {
-            return None;
-        }
-        let surface = match &self.shape {
-            AreaShape::Triangle(t) => Surface::Triangle(t.p, t.n, t.area),
-            AreaShape::Rectangle(rectangle) => rectangle.lanes(ctx.p),
-            AreaShape::Quadric(quadric) => quadric.lanes(ctx.p)?,
-            AreaShape::Patch(_) => return None,
-        };
-        let (l, two_sided) = (self.emission.l.to_array(), self.emission.two_sided);
-        Some(AreaSampler { from: ctx.p, surface, l, two_sided })
     }
 
     /// Density per steradian of [`sample_li`](Self::sample_li) at the point `hit`. Of a surface that a ray can cross

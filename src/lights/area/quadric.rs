@@ -6,7 +6,6 @@
 
 use super::{ShapePoint, ShapeSample, pdf_by_area};
 use crate::geometry::{Quadric, QuadricKind};
-use lumiris_lanes::area::Surface;
 use lumiris_numbers::math::warp::{
     azimuth, direction, pdf_uniform_cone, sample_uniform_cone, sample_uniform_disk_concentric,
 };
@@ -145,14 +144,6 @@ impl QuadricLight {
             (Some(cone), Some(sphere)) => self.sample_cone(from, u, sphere, cone),
             _ => ShapeSample::by_area(from, self.sample_point(u)),
         }
-    }
-
-    /// How many samples at once are taken from `from`; `None` if one by one.
-    pub(super) fn lanes(&self, from: Vec3) -> Option<Surface> {
-        let (one_minus_cos, axis, sin2_max) = self.cone(from)?;
-        let (center, radius) = self.sphere?;
-        let is_sampled = pdf_uniform_cone(one_minus_cos).is_finite();
-        is_sampled.then_some(Surface::Cone { center, radius, axis, one_minus_cos, sin2_max, reversed: self.reversed })
     }
 
     fn sample_cone(

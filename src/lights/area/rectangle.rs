@@ -13,7 +13,6 @@
 use super::{ShapePoint, ShapeSample, pdf_by_area};
 use lumiris_lanes::area::many::MAX_EXTENT;
 use lumiris_lanes::area::spherical::{MIN_HEIGHT, MIN_SOLID_ANGLE};
-use lumiris_lanes::area::{self, SphericalRectangle, Surface};
 use lumiris_numbers::math::{Bounds3, Vec2, Vec3, gamma};
 use std::f64::consts::TAU;
 
@@ -34,6 +33,20 @@ pub struct RectangleLight {
     pub flatness_error: f32,
     /// Texture coordinates at the corner and at the far ends of the two edges.
     pub uvs: [Vec2; 3],
+}
+
+/// A rectangle as seen from a point: [x0, x1] × [y0, y1] × {z0} in the frame of its edges, z0 < 0.
+struct SphericalRectangle {
+    /// Extent along the first edge.
+    x: [f64; 2],
+    /// Extent along the second edge.
+    y: [f64; 2],
+    /// Minus the distance of the plane.
+    z0: f64,
+    /// Solid angle.
+    solid_angle: f64,
+    /// e^{i(g2 + g3)} of the inner angles.
+    g23: (f64, f64),
 }
 
 /// The argument of a product of complex numbers, in [0, 2π); a negative zero of rounding is 0.
@@ -138,16 +151,6 @@ impl RectangleLight {
         match spherical_rectangle(self, from) {
             Some(spherical) => (1.0 / spherical.solid_angle) as f32,
             None => pdf_by_area(from, p, self.n, 1.0 / self.area()),
-        }
-    }
-
-    /// How many samples at once are taken from `from`.
-    pub(super) fn lanes(&self, from: Vec3) -> Surface {
-        let RectangleLight { corner, ex, ey, size, n, .. } = *self;
-        let rectangle = area::Rectangle { corner, ex, ey, size, n };
-        match spherical_rectangle(self, from) {
-            Some(spherical) => Surface::SphericalRectangle(rectangle, spherical),
-            None => Surface::Rectangle(rectangle),
         }
     }
 

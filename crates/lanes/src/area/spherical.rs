@@ -1,7 +1,7 @@
 //! Spherical rectangles [Ureña, Fajardo and King 2013], as `lights::area::rectangle` describes them, from four points at
 //! once.
 
-use super::{Rectangle, SphericalRectangle};
+use super::Rectangle;
 use fearless_simd::{Simd, f64x4, mask64x4, prelude::*};
 use lumiris_numbers::math::DVec3;
 use std::f64::consts::{FRAC_PI_2, FRAC_PI_4, FRAC_PI_8, PI, TAU};
@@ -28,15 +28,6 @@ pub(super) struct SphericalSetup<S: Simd> {
 }
 
 impl<S: Simd> SphericalSetup<S> {
-    /// The same point in all lanes.
-    #[inline(always)]
-    pub(super) fn splat(simd: S, s: &SphericalRectangle) -> Self {
-        let x = [f64x4::splat(simd, s.x[0]), f64x4::splat(simd, s.x[1])];
-        let y = [f64x4::splat(simd, s.y[0]), f64x4::splat(simd, s.y[1])];
-        let g23 = (f64x4::splat(simd, s.g23.0), f64x4::splat(simd, s.g23.1));
-        Self::new(x, y, f64x4::splat(simd, s.z0), g23, f64x4::splat(simd, s.solid_angle))
-    }
-
     #[inline(always)]
     fn new(x: [f64x4<S>; 2], y: [f64x4<S>; 2], z0: f64x4<S>, g23: (f64x4<S>, f64x4<S>), solid_angle: f64x4<S>) -> Self {
         let z2 = z0 * z0;

@@ -1,50 +1,13 @@
 //! Tests of `lumiris_lanes::area`.
 
-use super::support::{LENGTHS, assert_same_bits};
+use super::support::assert_same_bits;
 use fearless_simd::{Simd, dispatch, f64x4, prelude::*};
-use lumiris_lanes::LightLanes;
+use lumiris_lanes::area::Rectangle;
 use lumiris_lanes::area::many::{PointsOnLight, sample_rectangle, sample_triangle};
 use lumiris_lanes::area::spherical::{atan2, sin_cos_turns_f64};
-use lumiris_lanes::area::*;
 use lumiris_numbers::math::{Vec2, Vec3};
 use lumiris_test_support::random::{RngExt, pcg32};
 use std::f64::consts::TAU;
-
-#[test]
-fn lanes_are_the_same_at_all_levels() {
-    let rectangle = Rectangle {
-        corner: Vec3::new(-1.0, 2.0, -1.0),
-        ex: Vec3::X,
-        ey: Vec3::Z,
-        size: Vec2::new(2.0, 3.0),
-        n: Vec3::NEG_Y,
-    };
-    let spherical = SphericalRectangle { x: [-1.0, 1.0], y: [-1.0, 2.0], z0: -2.0, solid_angle: 1.1, g23: (-0.3, 0.9) };
-    let corners = [Vec3::new(0.0, 3.0, 1.0), Vec3::new(2.0, 3.0, 0.0), Vec3::new(1.0, 2.0, 2.0)];
-    let axis = Vec3::new(0.6, 0.0, 0.8);
-    let cone = |one_minus_cos: f32| {
-        let sin2_max = one_minus_cos * (2.0 - one_minus_cos);
-        Surface::Cone { center: axis * 2.0, radius: 0.5, axis, one_minus_cos, sin2_max, reversed: false }
-    };
-    let mut stream = pcg32([4, 4, 4]);
-    for surface in [
-        Surface::SphericalRectangle(rectangle, spherical),
-        Surface::Rectangle(rectangle),
-        Surface::Triangle(corners, Vec3::Y, 1.5),
-        cone(0.03),
-        cone(1e-6),
-    ] {
-        let sampler = AreaSampler { from: Vec3::ZERO, surface, l: [1.0, 2.0, 3.0], two_sided: false };
-        for n in LENGTHS {
-            let (u0, u1): (Vec<f32>, Vec<f32>) =
-                (0..n).map(|_| (stream.random::<f32>(), stream.random::<f32>())).unzip();
-            assert_same_bits::<7>(n, |level, [x, y, z, r, g, b, pdf]| {
-                sampler.sample(level, [&u0, &u1], &mut LightLanes { wi: [x, y, z], li: [r, g, b], pdf });
-                assert!(pdf.iter().all(|&p| p >= 0.0 && p.is_finite()));
-            });
-        }
-    }
-}
 
 #[test]
 fn many_points_are_the_same_at_all_levels() {
