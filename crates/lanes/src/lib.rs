@@ -9,7 +9,7 @@
 //! In kernels there are no closures and no `map` over arrays: their code would be compiled without the vectors.
 //!
 //! Reading order: [`lane`], [`columns`], [`curve`], [`sampler`], [`light`], [`area`], [`environment`], [`bsdf`],
-//! [`combine`], [`camera`], [`triangles`], [`vertex`].
+//! [`combine`], [`camera`], [`hits`], [`triangles`], [`vertex`].
 
 pub mod area;
 pub mod bsdf;
@@ -18,6 +18,7 @@ pub mod columns;
 pub mod combine;
 pub mod curve;
 pub mod environment;
+pub mod hits;
 pub mod lane;
 pub mod light;
 pub mod sampler;

@@ -76,7 +76,7 @@ impl Bare {
         let mut context = kernels::query_context(&self.world, rays, mode);
         for single in singles {
             if self.calls_back {
-                context.begin(single.ray.id as usize);
+                context.begin(single.ray.id as usize, 1);
             }
             // SAFETY: the scene is committed, the ray is finite and its id an index of the batch.
             unsafe { kernels::intersect1(self.root.raw(), &mut context, mode, single) };
@@ -89,7 +89,7 @@ impl Bare {
         let mut context = kernels::query_context(&self.world, rays, mode);
         for (valid, packet) in packets {
             if self.calls_back {
-                context.begin(packet.rays.id[0] as usize);
+                context.begin(packet.rays.id[0] as usize, N);
             }
             // SAFETY: the scene is committed, the lanes in `valid` are finite, ids are indices of the batch.
             unsafe { kernels::intersect_packet(self.root.raw(), &mut context, mode, valid, packet) };

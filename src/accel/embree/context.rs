@@ -3,11 +3,9 @@
 use super::world::{Reported, World};
 use crate::accel::RayBatch;
 use embree4_sys as sys;
+use lumiris_lanes::hits::BLOCK;
 use std::any::Any;
 use std::panic::{AssertUnwindSafe, catch_unwind};
-
-/// The largest packet.
-pub(super) const MAX_WIDTH: usize = 8;
 
 /// Hits whose parameters differ by less than this fraction are compared exactly: much more than what Embree's
 /// parameter is off, but for rays at less than some 0.1° to a triangle.
@@ -27,28 +25,28 @@ pub(super) struct QueryContext<'a> {
     pub world: &'a World,
     /// The batch; a ray's `id` is its index in it.
     pub rays: &'a RayBatch,
-    /// Index of the packet's first ray.
+    /// Index of the block's first ray.
     pub base: u32,
-    /// The smallest parameter reported for each lane.
-    pub best_t: [f32; MAX_WIDTH],
-    /// The hit of each lane.
-    pub first: [Reported; MAX_WIDTH],
+    /// The smallest parameter reported for each ray of the block.
+    pub best_t: [f32; BLOCK],
+    /// The hit of each ray of the block.
+    pub first: [Reported; BLOCK],
     /// The payload of a panic in a callback, resumed when Embree has returned.
     pub panic: Option<Box<dyn Any + Send>>,
 }
 
 impl<'a> QueryContext<'a> {
     pub(super) fn new(rtc: RtcContext, world: &'a World, rays: &'a RayBatch) -> Self {
-        let (best_t, first) = ([f32::INFINITY; MAX_WIDTH], [Reported::NONE; MAX_WIDTH]);
+        let (best_t, first) = ([f32::INFINITY; BLOCK], [Reported::NONE; BLOCK]);
         QueryContext { rtc, world, rays, base: 0, best_t, first, panic: None }
     }
 
-    /// Forgets the last packet.
+    /// Begins with a block of at most [`BLOCK`] rays.
     #[inline]
-    pub(super) fn begin(&mut self, base: usize) {
+    pub(super) fn begin(&mut self, base: usize, count: usize) {
         self.base = base as u32;
-        self.best_t = [f32::INFINITY; MAX_WIDTH];
-        for first in &mut self.first {
+        self.best_t[..count].fill(f32::INFINITY);
+        for first in &mut self.first[..count] {
             first.geometry = u32::MAX;
         }
     }
@@ -57,7 +55,7 @@ impl<'a> QueryContext<'a> {
     /// slightly beyond the hit, so that ties are found whichever of the hits comes first.
     #[inline]
     pub(super) fn offer(&mut self, id: u32, hit: Reported) -> Option<f32> {
-        let lane = (id - self.base) as usize % MAX_WIDTH;
+        let lane = (id - self.base) as usize % BLOCK;
         let best = self.best_t[lane];
         if hit.t < best * (1.0 - TIE) {
             self.best_t[lane] = hit.t;

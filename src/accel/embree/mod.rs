@@ -44,8 +44,8 @@ pub mod bare;
 mod callbacks;
 mod context;
 mod device;
+mod exact;
 mod kernels;
-mod lanes;
 mod query;
 mod scene;
 #[cfg(test)]

@@ -2,12 +2,15 @@
 #![allow(unsafe_code)]
 
 use super::EmbreeAccel;
-use super::context::{MAX_WIDTH, QueryContext};
+use super::context::QueryContext;
+use super::exact::ExactHits;
 use super::kernels::{self, Mode, QueryKind, RayHitPacket, RayPacket, Valid};
 use super::world::{Refined, Reported};
 use crate::accel::{Coherence, Hit, RayBatch};
 use crate::geometry::Visibility;
 use embree4_sys as sys;
+use lumiris_lanes::hits::BLOCK;
+use std::ops::Range;
 
 /// Maximum number of retries to leave the surface that a ray starts on.
 const MAX_RETRIES: u32 = 64;
@@ -45,29 +48,47 @@ impl EmbreeAccel {
     }
 
     fn intersect_singly(&self, rays: &RayBatch, hits: &mut [Option<Hit>]) {
-        let mut context = kernels::query_context(&self.world, rays, FIRST_SINGLE);
-        for base in (0..rays.len()).step_by(MAX_WIDTH) {
-            // Each ray is a lane of its own, so that the exact hits are computed side by side.
-            context.begin(base);
-            for i in base..rays.len().min(base + MAX_WIDTH) {
-                self.trace_one(&mut context, i, kernels::T_NEAR);
-            }
-            self.finish::<MAX_WIDTH>(&mut context, base, hits);
-        }
-        context.finish();
+        self.intersect_blocks(rays, FIRST_SINGLE, hits, |context, block| {
+            block.for_each(|i| self.trace_one(context, i, kernels::T_NEAR));
+        });
     }
 
     fn intersect_packets<const N: usize>(&self, rays: &RayBatch, mode: Mode, hits: &mut [Option<Hit>]) {
         let mut packet = RayHitPacket::<N>::new(Visibility::PATH.0);
+        self.intersect_blocks(rays, mode, hits, |context, block| {
+            for base in block.step_by(N) {
+                let valid = load(&mut packet.rays, rays, base);
+                packet.geometry = [sys::RTC_INVALID_GEOMETRY_ID; N];
+                packet.instance = [sys::RTC_INVALID_GEOMETRY_ID; N];
+                // SAFETY: the scene is committed, the lanes in `valid` are finite, ids are indices of the batch.
+                unsafe { kernels::intersect_packet(self.root.raw(), context, mode, &valid, &mut packet) };
+            }
+        });
+    }
+
+    /// Traces rays block by block: `trace` leaves what Embree reports of a block in the context.
+    fn intersect_blocks(
+        &self,
+        rays: &RayBatch,
+        mode: Mode,
+        hits: &mut [Option<Hit>],
+        mut trace: impl FnMut(&mut QueryContext<'_>, Range<usize>),
+    ) {
         let mut context = kernels::query_context(&self.world, rays, mode);
-        for base in (0..rays.len()).step_by(N) {
-            let valid = load(&mut packet.rays, rays, base);
-            packet.geometry = [sys::RTC_INVALID_GEOMETRY_ID; N];
-            packet.instance = [sys::RTC_INVALID_GEOMETRY_ID; N];
-            context.begin(base);
-            // SAFETY: the scene is committed, the lanes in `valid` are finite, ids are indices of the batch.
-            unsafe { kernels::intersect_packet(self.root.raw(), &mut context, mode, &valid, &mut packet) };
-            self.finish::<N>(&mut context, base, hits);
+        let mut exact = ExactHits::default();
+        for base in (0..rays.len()).step_by(BLOCK) {
+            let count = BLOCK.min(rays.len() - base);
+            context.begin(base, count);
+            trace(&mut context, base..base + count);
+            let reported = &context.first[..count];
+            exact.find(&self.world, rays, base, reported);
+            for ((lane, first), slot) in reported.iter().enumerate().zip(&mut hits[base..]) {
+                if let Some(hit) = exact.hit(lane, first.primitive) {
+                    *slot = Some(hit);
+                } else if first.geometry != u32::MAX {
+                    *slot = self.refine_one(rays, base + lane, *first);
+                }
+            }
         }
         context.finish();
     }
@@ -88,21 +109,6 @@ impl EmbreeAccel {
         unsafe { kernels::intersect1(self.root.raw(), context, FIRST_SINGLE, &mut query) };
     }
 
-    /// Converts the hits collected for N rays to exact hits.
-    #[inline]
-    fn finish<const N: usize>(&self, context: &mut QueryContext<'_>, base: usize, hits: &mut [Option<Hit>]) {
-        let count = N.min(context.rays.len() - base);
-        let exact = self.world.refine_lanes::<N>(context.rays, base, &context.first);
-        for (lane, first) in context.first.iter().enumerate().take(count) {
-            let slot = &mut hits[base + lane];
-            if let Some(hit) = exact.hit(lane, first.primitive) {
-                *slot = Some(hit);
-            } else if first.geometry != u32::MAX {
-                *slot = self.refine_one(context.rays, base + lane, *first);
-            }
-        }
-    }
-
     /// The exact hit of ray `i`, for which Embree reported `first`. If that is the surface that the ray left, the ray
     /// is continued behind it.
     #[cold]
@@ -114,7 +120,7 @@ impl EmbreeAccel {
             if exact != Refined::Behind {
                 break;
             }
-            context.begin(i);
+            context.begin(i, 1);
             self.trace_one(&mut context, i, first.t.next_up().max(kernels::T_NEAR));
             first = context.first[0];
             if first.geometry == u32::MAX {

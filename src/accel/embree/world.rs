@@ -1,9 +1,8 @@
 //! Maps Embree's ids to those of the scene, and Embree's hits to exact ones.
 
-use super::lanes::{LaneHits, Lanes, RayRows};
-use crate::accel::{Hit, RayBatch};
+use crate::accel::Hit;
 use crate::geometry::triangle::{RayPrecomputed, intersect_triangle};
-use crate::geometry::{GeometryId, GeometrySet, Group, Shape, TriangleMesh};
+use crate::geometry::{GeometryId, GeometrySet, Group, Shape};
 use lumiris_numbers::math::{Affine3A, Ray, Vec3};
 use std::sync::Arc;
 
@@ -46,32 +45,6 @@ pub(super) struct World {
     pub instances: Vec<u32>,
     /// Per instance that does not move.
     group_from_world: Vec<Option<Affine3A>>,
-}
-
-/// Exact hits side by side.
-#[derive(Clone, Copy, Debug)]
-pub(super) struct Exact<const N: usize> {
-    hits: LaneHits<N>,
-    geometries: [GeometryId; N],
-    instances: [u32; N],
-}
-
-impl<const N: usize> Exact<N> {
-    #[inline]
-    fn new(mut hits: LaneHits<N>, t_max: [f32; N], geometries: [GeometryId; N], instances: [u32; N]) -> Self {
-        for ((plain, t), t_max) in hits.plain.iter_mut().zip(&hits.t).zip(&t_max) {
-            *plain &= t < t_max;
-        }
-        Exact { hits, geometries, instances }
-    }
-
-    /// The hit of a lane, on the primitive that was reported; `None` where [`World::refine`] must decide.
-    #[inline]
-    pub(super) fn hit(&self, lane: usize, primitive: u32) -> Option<Hit> {
-        let LaneHits { t, b1, b2, plain } = &self.hits;
-        let (geometry, instance) = (self.geometries[lane], self.instances[lane]);
-        plain[lane].then(|| Hit { t: t[lane], uv: [b1[lane], b2[lane]], geometry, primitive, instance })
-    }
 }
 
 impl Reported {
@@ -117,7 +90,7 @@ impl World {
 
     /// The geometry of a `geomID` in `instance`.
     #[inline]
-    fn geometry(&self, geom_id: u32, instance: u32) -> GeometryId {
+    pub(super) fn geometry(&self, geom_id: u32, instance: u32) -> GeometryId {
         if instance == Hit::NO_INSTANCE {
             return self.root[geom_id as usize];
         }
@@ -134,66 +107,6 @@ impl World {
         let group_from_world = self.group_from_world[instance]
             .unwrap_or_else(|| self.set.instances[instance].world_from_group_at(world.time).inverse());
         Ray { o: group_from_world.transform_point3(world.o), d: group_from_world.transform_vector3(world.d), ..*world }
-    }
-
-    /// The exact hits of the N rays from `base` on, whose reported hits are in `first`; not `plain` where there is none
-    /// or [`Self::refine`] must decide.
-    #[inline]
-    pub(super) fn refine_lanes<const N: usize>(&self, rays: &RayBatch, base: usize, first: &[Reported]) -> Exact<N> {
-        let rows = RayRows::<N>::load(rays, base);
-        if let Some(exact) = self.refine_same(rays, &rows, base, first) {
-            return exact;
-        }
-        // The indices of all lanes, then their corners: each of the two is a cache miss, and those of lanes overlap
-        let (mut geometries, mut instances, mut t_max) = ([0; N], [Hit::NO_INSTANCE; N], [f32::NEG_INFINITY; N]);
-        let mut corners: [Option<(&TriangleMesh, [u32; 3])>; N] = [None; N];
-        for (lane, reported) in first.iter().enumerate().take(N) {
-            if reported.geometry == u32::MAX {
-                continue;
-            }
-            let instance = self.instance(reported.instance);
-            let geometry = self.geometry(reported.geometry, instance);
-            if let Shape::Mesh(mesh) = &self.set.geometries[geometry as usize].shape {
-                corners[lane] = Some((mesh, mesh.indices[reported.primitive as usize]));
-                (geometries[lane], instances[lane], t_max[lane]) = (geometry, instance, rays.t_max[base + lane]);
-            }
-        }
-        let triangles = corners.map(|c| c.map(|(mesh, vertices)| mesh.corners(vertices)));
-        let mut lanes = Lanes::<N>::EMPTY;
-        for (lane, triangle) in triangles.into_iter().enumerate() {
-            let Some(triangle) = triangle else { continue };
-            let ray = if instances[lane] == Hit::NO_INSTANCE {
-                rows.get(lane)
-            } else {
-                let ray = self.group_ray(&rays.get(base + lane), instances[lane]);
-                (ray.o, ray.d)
-            };
-            lanes.set(lane, ray, triangle);
-        }
-        Exact::new(lanes.intersect(), t_max, geometries, instances)
-    }
-
-    /// As [`Self::refine_lanes`] where all rays hit one triangle that is not placed, as camera rays of a pixel often
-    /// do. `None` where this does not hold.
-    #[inline]
-    fn refine_same<const N: usize>(
-        &self,
-        rays: &RayBatch,
-        rows: &RayRows<N>,
-        base: usize,
-        first: &[Reported],
-    ) -> Option<Exact<N>> {
-        let first = first.first_chunk::<N>()?;
-        let Reported { geometry: geom_id, primitive, instance, .. } = first[0];
-        let same = |r: &Reported| (r.geometry == geom_id) & (r.primitive == primitive) & (r.instance == instance);
-        if geom_id == u32::MAX || instance != u32::MAX || !first.iter().all(same) {
-            return None;
-        }
-        let t_max = *rays.t_max[base..].first_chunk::<N>()?;
-        let geometry = self.root[geom_id as usize];
-        let Shape::Mesh(mesh) = &self.set.geometries[geometry as usize].shape else { return None };
-        let lanes = Lanes::of_one_triangle(rows, mesh.triangle(primitive as usize))?;
-        Some(Exact::new(lanes.intersect(), t_max, [geometry; N], [Hit::NO_INSTANCE; N]))
     }
 
     /// The exact hit of `world_ray`: the same arithmetic for any kernel, packet width and processor.
