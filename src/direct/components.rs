@@ -4,19 +4,16 @@
 //! expectation is 0, and y = f·V/p_α. The estimate is ȳ − Σ_j β_j c̄_j [Fan et al. 2006, Eq. 7]; the forms differ in
 //! what β is fitted to. The systems of `optimal-mis` have the columns r_j = h_j/p_α, that of the paper's form r_j/I_j.
 
-use super::ShadingPoint;
 use super::mixture::Columns;
+use super::point::ShadingPoint;
 use super::propose::{Candidates, Drawn};
-use super::visibility::{Segments, is_traced};
+use super::shadow_segments::{Segments, is_traced};
 use crate::accel::RayBatch;
 use crate::scene::RenderJob;
-use crate::settings::{EstimatorKind, IntegratorSettings, OptimalForm, SampleCounts};
+use crate::settings::{EstimatorKind, IntegratorSettings, OptimalForm};
 use lumiris_numbers::estimators::ocv::{Form, NormalEquations, System};
 use lumiris_numbers::estimators::optimal_mis;
 use lumiris_numbers::math::Rgb;
-
-/// Random-number domain of a shading point: half h of its samples uses `HALF + h`.
-const HALF: u32 = 32;
 
 /// The columns of a system, and how it is solved.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -142,16 +139,6 @@ pub struct Components {
     pub ill_conditioned: u64,
     /// Rays traced against emitters to find light samples hidden by another emitter.
     pub emitter_rays: u64,
-}
-
-/// Both halves of every point's samples, one after the other, as points with separate random numbers.
-pub(super) fn halves<'a>(points: &[ShadingPoint<'a>]) -> Vec<ShadingPoint<'a>> {
-    let half = |point: &ShadingPoint<'a>, h: u32| {
-        let samples = (point.sample_counts.samples + 1 - h) / 2;
-        let sample_counts = SampleCounts { samples, proposals: samples };
-        ShadingPoint { sample_counts, stream: point.stream.domain(HALF + h), ..*point }
-    };
-    points.iter().flat_map(|p| [half(p, 0), half(p, 1)]).collect()
 }
 
 impl Components {

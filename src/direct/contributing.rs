@@ -16,8 +16,9 @@
 //! times [Eq. 1 of the paper]. Without these samples (S_non = 0) the estimate is biased. Where the cache is empty, all
 //! S_con + S_non samples are drawn as by `mc`.
 
-use super::ShadingPoint;
-use super::propose::{Candidate, SampleAllocation, domain, light_candidate, unshadowed_candidate};
+use super::domain;
+use super::point::ShadingPoint;
+use super::propose::{Candidate, SampleAllocation, light_candidate, unshadowed_candidate};
 use crate::lights::{Light, LightCtx, LightId, LightSample, LightSampling, LightSet};
 use crate::scene::RenderJob;
 use lumiris_numbers::math::cumulative;

@@ -20,11 +20,12 @@
 //!
 //! Zero-valued samples count with their g like any others.
 
-use super::ShadingPoint;
+use super::domain;
+use super::point::ShadingPoint;
 use super::propose::{
-    Candidate, Candidates, PendingBsdf, SampleAllocation, bsdf_candidate, domain, light_candidate, with_infinite,
+    Candidate, Candidates, PendingBsdf, SampleAllocation, bsdf_candidate, light_candidate, with_infinite,
 };
-use super::visibility::{Segments, is_traced};
+use super::shadow_segments::{Segments, is_traced};
 use crate::accel::{Hit, RayBatch};
 use crate::lights::{LightId, LightSample};
 use crate::scene::{EmitterHit, EmitterScratch, RenderJob};
@@ -280,7 +281,7 @@ impl Correlated {
                 continue;
             };
             let f_cos = s.f * s.wi.dot(point.bsdf.frame.z).abs();
-            self.rays.push(&Ray { o: point.origin(s.wi), d: s.wi, t_max: f32::INFINITY, time: point.time });
+            self.rays.push(&point.ray(s.wi));
             self.pending.push(PendingBsdf {
                 point: index as u32,
                 wi: s.wi,

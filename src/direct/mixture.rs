@@ -10,7 +10,7 @@
 //! * a *zero-valued* sample, whose unshadowed integrand is zero, belongs only to the component that drew it, as if
 //!   every component had one such location of its own: its other densities need not be computed.
 
-use super::ShadingPoint;
+use super::point::ShadingPoint;
 use super::propose::{Candidate, SampleAllocation};
 use crate::bsdfs::MAX_LOBES;
 use crate::lights::groups::MAX_GROUPS;

@@ -1,8 +1,9 @@
 //! T1: candidates with their unshadowed integrands and the densities of all techniques, one at a time.
 
-use super::ShadingPoint;
 use super::contributing::Contributing;
+use super::domain;
 use super::mixture::Mixture;
+use super::point::ShadingPoint;
 use crate::accel::{Hit, RayBatch};
 use crate::lights::groups::MAX_GROUPS;
 use crate::lights::{LightCtx, LightHit, LightId, LightSample};
@@ -10,29 +11,9 @@ use crate::scene::{EmitterHit, EmitterScratch, RenderJob};
 use crate::settings::{EstimatorKind, IntegratorSettings};
 use lumiris_numbers::estimators::mc;
 use lumiris_numbers::estimators::mis::{Heuristic, Technique};
-use lumiris_numbers::math::ray::{SEGMENT_END, offset_origin};
 use lumiris_numbers::math::{Ray, Rgb, Vec3};
 use lumiris_numbers::samplers::SampleStream;
 use std::time::{Duration, Instant};
-
-/// Random-number domains of a shading point.
-pub(crate) mod domain {
-    pub(crate) const LIGHT: u32 = 0;
-    pub(crate) const BSDF: u32 = 1;
-    pub(crate) const TECHNIQUE: u32 = 2;
-    /// Allocation of samples to groups.
-    pub(crate) const GROUPS: u32 = 3;
-    /// Delta lights, where they are sampled separately.
-    pub(crate) const DELTA: u32 = 4;
-    /// Non-contributing lights.
-    pub(crate) const NONCONTRIBUTING: u32 = 5;
-    /// Choice among the weaker contributing lights.
-    pub(crate) const DIM: u32 = 6;
-    /// Contributing light number k uses the domain `CONTRIBUTING + k`.
-    pub(crate) const CONTRIBUTING: u32 = 64;
-    /// Group g uses the domain `GROUP + g`.
-    pub(crate) const GROUP: u32 = 16;
-}
 
 /// Tolerance for an expected number of samples that should be whole.
 const COUNT_ROUNDING: f32 = 1e-3;
@@ -314,8 +295,7 @@ impl Candidates {
             }
             return;
         };
-        let ray = Ray { o: point.origin(sample.wi), d: sample.wi, t_max: f32::INFINITY, time: point.time };
-        self.rays.push(&ray);
+        self.rays.push(&point.ray(sample.wi));
         self.pending.push(PendingBsdf {
             point: index,
             wi: sample.wi,
@@ -383,14 +363,8 @@ pub(super) fn unshadowed_candidate(
         n_bsdf: allocation.n_bsdf,
         p_lobe: 0.0,
         group: 0,
-        segment: light_segment(point, &sample),
+        segment: point.light_segment(&sample),
     })
-}
-
-/// The segment to a point on a light, or to infinity.
-pub(super) fn light_segment(point: &ShadingPoint<'_>, sample: &LightSample) -> Ray {
-    let end = sample.t.is_finite().then_some((sample.p, sample.p_error, sample.n));
-    segment(point, sample.wi, end)
 }
 
 /// Completes a BSDF sample with the emitter that it points at; `None` if it points at none.
@@ -424,7 +398,7 @@ pub(super) fn bsdf_candidate(
         n_bsdf: pending.allocation.n_bsdf,
         p_lobe: 0.0,
         group: lights.groups.group_of(light).unwrap_or(0) as u8,
-        segment: segment(point, pending.wi, found.end),
+        segment: point.segment(pending.wi, found.end),
     })
 }
 
@@ -460,16 +434,4 @@ pub(crate) fn emitter_in_direction(
         p_light: lights.pdf(ctx, light, wi, &light_hit),
         end: Some((surface.p, surface.p_error, surface.n)),
     })
-}
-
-/// The segment from a point to a point on a light `(p, p_error, n)`, or to infinity.
-fn segment(point: &ShadingPoint<'_>, wi: Vec3, end: Option<(Vec3, Vec3, Vec3)>) -> Ray {
-    let o = point.origin(wi);
-    match end {
-        None => Ray { o, d: wi, t_max: f32::INFINITY, time: point.time },
-        Some((p, p_error, n)) => {
-            let end = offset_origin(p, p_error, n, o - p);
-            Ray { o, d: end - o, t_max: SEGMENT_END, time: point.time }
-        }
-    }
 }

@@ -12,10 +12,11 @@
 //! Targets with visibility reverse the order: proposals are traced, and N of the visible ones are shaded; light samples
 //! do not need the BSDF before that.
 
-use super::ShadingPoint;
-use super::proposals::{PointProposals, Proposals, Techniques};
+use super::domain;
+use super::point::ShadingPoint;
+use super::proposal_columns::{PointProposals, ProposalColumns, Techniques};
 use super::propose::{self, Candidate, Candidates, SampleAllocation};
-use super::visibility::Segments;
+use super::shadow_segments::Segments;
 use crate::bsdfs::Bsdf;
 use crate::scene::RenderJob;
 use crate::settings::{IntegratorSettings, Strata};
@@ -24,19 +25,13 @@ use lumiris_numbers::math::Rgb;
 use lumiris_numbers::math::hash::{pcg4d, unit_f32};
 use std::time::{Duration, Instant};
 
-/// Random-number domains of a shading point, in addition to those of [`super::propose`].
-mod domain {
-    pub(super) const RESAMPLE: u32 = 8;
-    pub(super) const STRATA: u32 = 9;
-}
-
 /// Proposals that are generated before samples are drawn from them: few enough to stay in the processor's cache.
 const CHUNK: usize = 2048;
 
 /// The stage's buffers.
 #[derive(Debug, Default)]
 pub struct Resampler {
-    proposals: Proposals,
+    proposals: ProposalColumns,
     draws: Vec<Draw>,
     ends: Vec<u32>,
     u: Vec<f32>,
@@ -179,7 +174,7 @@ impl Resampler {
                 }
                 let segment = match by_bsdf {
                     Some(candidate) => Some(candidate.segment),
-                    None => self.proposals.light_sample(place).map(|(_, s)| propose::light_segment(point, &s)),
+                    None => self.proposals.light_sample(place).map(|(_, s)| point.light_segment(&s)),
                 };
                 match segment {
                     Some(segment) => {

@@ -16,8 +16,7 @@ use super::segment::{
 };
 use crate::accel::{Coherence, Hit, RayBatch};
 use crate::bsdfs::{Bsdf, Diffuse, Lobe};
-use crate::direct::DirectStats;
-use crate::direct::propose;
+use crate::direct::{self, DirectStats, propose};
 use crate::film::PixelSample;
 use crate::geometry::Shape;
 use crate::lights::many::{LightSamples, LitPoints, Scratch};
@@ -324,7 +323,7 @@ impl<'w> Batch<'w> {
     /// Light sample `k` of each vertex: contributions and segments.
     fn sample_lights(&mut self, job: &RenderJob, k: u32) {
         let n = self.buffers.paths.len();
-        self.buffers.draw(Stream::Direct(propose::domain::LIGHT, self.estimate.counts.light, k));
+        self.buffers.draw(Stream::Direct(direct::domain::LIGHT, self.estimate.counts.light, k));
         let Buffers { surface, samples, scratch, .. } = &mut *self.buffers;
         job.lights.sample_many(n, surface.lit_points(), &samples.u, scratch, &mut samples.light);
 
@@ -351,7 +350,7 @@ impl<'w> Batch<'w> {
     fn sample_bsdfs(&mut self, job: &RenderJob, k: u32) -> u64 {
         let n = self.buffers.paths.len();
         let len = padded(n);
-        self.buffers.draw(Stream::Direct(propose::domain::BSDF, self.estimate.counts.bsdf, k));
+        self.buffers.draw(Stream::Direct(direct::domain::BSDF, self.estimate.counts.bsdf, k));
         self.buffers.sample_lambertian(len);
         let Buffers { paths, surface, samples, emitter_rays, .. } = &mut *self.buffers;
         for i in 0..n {

@@ -9,7 +9,7 @@
 //! All light samples of a chunk of points are made together, sorted by light, and kept: those that are drawn need no
 //! second sampling.
 
-use super::ShadingPoint;
+use super::point::ShadingPoint;
 use super::propose::Candidate;
 use crate::lights::many::{LightSamples, NO_LIGHT, Scratch};
 use crate::lights::{LightId, LightRun, LightSample};
@@ -27,7 +27,7 @@ const POSITIONS: u32 = 0x517c_c1b7;
 
 /// Proposals of several shading points.
 #[derive(Debug, Default)]
-pub struct Proposals {
+pub struct ProposalColumns {
     points: Vec<PointProposals>,
     /// Light and probability of the choice; none for BSDF samples.
     chosen: Vec<(LightId, f32)>,
@@ -73,7 +73,7 @@ pub struct Techniques {
     pub target: Target,
 }
 
-impl Proposals {
+impl ProposalColumns {
     /// Removes all.
     pub fn clear(&mut self) {
         self.points.clear();

@@ -1,0 +1,26 @@
+//! The domains of random numbers of a shading point: what is drawn from different ones is independent.
+
+/// Light samples.
+pub(crate) const LIGHT: u32 = 0;
+/// BSDF samples.
+pub(crate) const BSDF: u32 = 1;
+/// Choice of the technique of a single sample.
+pub(super) const TECHNIQUE: u32 = 2;
+/// Allocation of samples to groups of lights.
+pub(super) const GROUPS: u32 = 3;
+/// Delta lights, where they are sampled separately.
+pub(super) const DELTA: u32 = 4;
+/// Non-contributing lights.
+pub(super) const NONCONTRIBUTING: u32 = 5;
+/// Choice among the weaker contributing lights.
+pub(super) const DIM: u32 = 6;
+/// Positions of proposals, and the draws from them.
+pub(super) const RESAMPLE: u32 = 8;
+/// Bounds of strata of proposals.
+pub(super) const STRATA: u32 = 9;
+/// Group g of the lights uses the domain `GROUP + g`.
+pub(super) const GROUP: u32 = 16;
+/// Half h of the samples uses the domain `HALF + h`.
+pub(super) const HALF: u32 = 32;
+/// Contributing light number k uses the domain `CONTRIBUTING + k`.
+pub(super) const CONTRIBUTING: u32 = 64;

@@ -1,0 +1,87 @@
+//! A point at which direct light is estimated, and the rays that leave it.
+
+use super::domain;
+use crate::lights::{LightCtx, LightSample};
+use crate::materials::SurfaceBsdf;
+use crate::settings::SampleCounts;
+use lumiris_numbers::math::ray::{SEGMENT_END, offset_origin};
+use lumiris_numbers::math::{Ray, Vec3};
+use lumiris_numbers::samplers::SampleStream;
+
+/// A point at which direct light is estimated.
+#[derive(Clone, Copy, Debug)]
+pub struct ShadingPoint<'a> {
+    /// The point.
+    pub p: Vec3,
+    /// Bound of the rounding error of `p`.
+    pub p_error: Vec3,
+    /// Direction to the viewer, unit.
+    pub wo: Vec3,
+    /// Scattering at the point, with the frame and the geometric normal.
+    pub bsdf: SurfaceBsdf<'a>,
+    /// Time in 0..1.
+    pub time: f32,
+    /// Random numbers of this point; each technique uses its own domain.
+    pub stream: SampleStream,
+    /// Sample and proposal counts.
+    pub sample_counts: SampleCounts,
+    /// Index of the point's fit, if there are fits.
+    pub fit: u32,
+    /// The path goes on in the direction of the only BSDF sample, and its next segment finds the emitter: the sample
+    /// counts in the weights of the others, and is not drawn here.
+    pub bsdf_by_path: bool,
+}
+
+impl ShadingPoint<'_> {
+    /// Number of light samples beside a BSDF sample that the path takes: all others, but none where every lobe is
+    /// specular.
+    pub fn light_samples_beside_path(&self) -> u32 {
+        if self.bsdf.bsdf.has_non_specular() { self.sample_counts.samples.saturating_sub(1) } else { 0 }
+    }
+
+    /// The context for sampling lights.
+    #[inline]
+    pub fn light_ctx(&self) -> LightCtx {
+        LightCtx { p: self.p, n: self.bsdf.lit_normal(self.wo), ns: self.bsdf.frame.z }
+    }
+
+    /// The origin of a ray that leaves the point towards `w`.
+    #[inline]
+    pub fn origin(&self, w: Vec3) -> Vec3 {
+        offset_origin(self.p, self.p_error, self.bsdf.n, w)
+    }
+
+    /// The ray that leaves the point towards `w`.
+    #[inline]
+    pub fn ray(&self, w: Vec3) -> Ray {
+        Ray { o: self.origin(w), d: w, t_max: f32::INFINITY, time: self.time }
+    }
+
+    /// The segment to a point on a light `(p, p_error, n)`, or to infinity.
+    pub(super) fn segment(&self, wi: Vec3, end: Option<(Vec3, Vec3, Vec3)>) -> Ray {
+        let ray = self.ray(wi);
+        match end {
+            None => ray,
+            Some((p, p_error, n)) => {
+                let end = offset_origin(p, p_error, n, ray.o - p);
+                Ray { d: end - ray.o, t_max: SEGMENT_END, ..ray }
+            }
+        }
+    }
+
+    /// The segment to a point on a light, or to infinity.
+    pub(super) fn light_segment(&self, sample: &LightSample) -> Ray {
+        let end = sample.t.is_finite().then_some((sample.p, sample.p_error, sample.n));
+        self.segment(sample.wi, end)
+    }
+}
+
+/// Both halves of every point's samples, one after the other, as points with separate random numbers.
+pub(super) fn halves<'a>(points: &[ShadingPoint<'a>]) -> Vec<ShadingPoint<'a>> {
+    let half = |point: &ShadingPoint<'a>, h: u32| {
+        let samples = (point.sample_counts.samples + 1 - h) / 2;
+        let sample_counts = SampleCounts { samples, proposals: samples };
+        ShadingPoint { sample_counts, stream: point.stream.domain(domain::HALF + h), ..*point }
+    };
+    points.iter().flat_map(|p| [half(p, 0), half(p, 1)]).collect()
+}

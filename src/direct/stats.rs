@@ -1,0 +1,48 @@
+//! Counts and times of the stages.
+
+use std::time::Duration;
+
+/// Counts and times of the stages.
+#[derive(Clone, Copy, Debug, Default)]
+pub struct DirectStats {
+    /// Candidates drawn by T1.
+    pub proposals: u64,
+    /// Those of them that are light samples.
+    pub light_proposals: u64,
+    /// Rays traced against emitters.
+    pub emitter_rays: u64,
+    /// Shadow segments traced by T2.
+    pub segments: u64,
+    /// Time in T1.
+    pub t1: Duration,
+    /// Its part for light samples.
+    pub t1_light: Duration,
+    /// Time in select and resolve.
+    pub select: Duration,
+    /// Time in T2.
+    pub t2: Duration,
+    /// Time for normal equations and their solutions, which is part of `select`.
+    pub solve: Duration,
+    /// Systems solved or found to have no solution.
+    pub systems: u64,
+    /// Those without a solution, for which the MIS estimate is used, and those with linearly dependent columns, some of
+    /// which were dropped.
+    pub ill_conditioned: u64,
+}
+
+impl DirectStats {
+    /// Adds the counts of another worker.
+    pub fn merge(&mut self, other: &DirectStats) {
+        self.proposals += other.proposals;
+        self.light_proposals += other.light_proposals;
+        self.emitter_rays += other.emitter_rays;
+        self.segments += other.segments;
+        self.t1 += other.t1;
+        self.t1_light += other.t1_light;
+        self.select += other.select;
+        self.t2 += other.t2;
+        self.solve += other.solve;
+        self.systems += other.systems;
+        self.ill_conditioned += other.ill_conditioned;
+    }
+}
