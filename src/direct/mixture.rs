@@ -10,13 +10,18 @@
 //! * a *zero-valued* sample, whose unshadowed integrand is zero, belongs only to the component that drew it, as if
 //!   every component had one such location of its own: its other densities need not be computed.
 
+use super::candidates::{Candidate, SampleAllocation};
+use super::domain;
+use super::light_samples::light_candidate;
 use super::point::ShadingPoint;
-use super::propose::{Candidate, SampleAllocation};
 use crate::bsdfs::MAX_LOBES;
 use crate::lights::groups::MAX_GROUPS;
 use crate::scene::RenderJob;
 use lumiris_numbers::estimators::ocv::MAX_COMPONENTS;
 use lumiris_numbers::math::Vec3;
+
+/// Tolerance for an expected number of samples that should be whole.
+const COUNT_ROUNDING: f32 = 1e-3;
 
 /// The columns of a sample.
 pub type Columns = [f32; MAX_COMPONENTS];
@@ -39,12 +44,7 @@ pub struct Mixture {
 
 impl Mixture {
     /// The mixture at a point where groups are chosen with probabilities `pmfs`.
-    pub(super) fn new(
-        job: &RenderJob,
-        point: &ShadingPoint<'_>,
-        allocation: &SampleAllocation,
-        pmfs: &[f32; MAX_GROUPS],
-    ) -> Self {
+    fn new(job: &RenderJob, point: &ShadingPoint<'_>, allocation: &SampleAllocation, pmfs: &[f32; MAX_GROUPS]) -> Self {
         let lobes = job.lobes();
         let mut integrals = [0.0; MAX_COMPONENTS];
         if allocation.n_bsdf > 0.0 {
@@ -111,4 +111,46 @@ impl Mixture {
     pub fn zero_column(&self, component: usize) -> f32 {
         self.n / if component < self.lobes { self.n_bsdf } else { self.n_light }
     }
+}
+
+/// Draws the light samples of a point separately for each group of lights, N times its probability, rounded by one
+/// random number for all groups. Returns the mixture at the point.
+pub(super) fn draw_groups(
+    job: &RenderJob,
+    (index, point): (u32, &ShadingPoint<'_>),
+    allocation: &SampleAllocation,
+    records: &mut Vec<Candidate>,
+) -> Mixture {
+    let lights = &job.lights;
+    let ctx = point.light_ctx();
+    let n = allocation.light_draws;
+    let pmfs = if allocation.n_light > 0.0 { lights.groups.pmfs(&lights.sampler, &ctx) } else { [0.0; MAX_GROUPS] };
+    let mut mixture = Mixture::new(job, point, allocation, &pmfs);
+
+    // Samples stand at (i + u)/N; those of a group lie between the sums of probabilities
+    let [u] = point.stream.domain(domain::GROUPS).draw::<1>();
+    let (mut first, mut sum) = (0, 0.0);
+    for (group, &pmf) in pmfs[..lights.groups.len()].iter().enumerate().filter(|(_, pmf)| **pmf > 0.0) {
+        sum += f64::from(pmf) * f64::from(n);
+        let end = ((sum - f64::from(u)).ceil() as u32).clamp(first, n);
+        // A count that does not depend on u, so that the samples of a pixel are points of one set
+        let count = ((pmf * n as f32 - COUNT_ROUNDING).ceil() as u32).max(end - first);
+        for i in 0..end - first {
+            let stream = point.stream.split(domain::GROUP + group as u32, count, i);
+            let [u0, u1, u_choice] = stream.draw::<3>();
+            let sample = lights.sample_group(&ctx, (group, pmf), u_choice, [u0, u1]);
+            let candidate = sample.and_then(|(light, sample)| {
+                let c = light_candidate(job, (index, point), allocation, (light, sample))?;
+                let p_lobe = mixture.p_lobe(point, sample.wi, c.p_bsdf);
+                Some(Candidate { group: group as u8, p_lobe, ..c })
+            });
+            if candidate.is_none() {
+                mixture.zero_valued[mixture.component(group)] += 1;
+            }
+            records.extend(candidate);
+        }
+        first = end;
+    }
+    mixture.failed = n - first;
+    mixture
 }

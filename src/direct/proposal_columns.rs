@@ -9,8 +9,8 @@
 //! All light samples of a chunk of points are made together, sorted by light, and kept: those that are drawn need no
 //! second sampling.
 
+use super::candidates::Candidate;
 use super::point::ShadingPoint;
-use super::propose::Candidate;
 use crate::lights::many::{LightSamples, NO_LIGHT, Scratch};
 use crate::lights::{LightId, LightRun, LightSample};
 use crate::scene::RenderJob;

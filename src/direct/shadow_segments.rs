@@ -1,12 +1,12 @@
 //! T2: shadow segments, packed in the order of their shading points, and the resulting visibility bits.
 
-use super::propose::Candidates;
+use super::candidates::Candidates;
 use crate::accel::{Accel, Coherence, RayBatch};
 use lumiris_numbers::math::{Ray, Rgb};
 
 /// True if a candidate with this contribution needs a segment: it is finite and not zero.
 #[inline]
-pub(super) fn is_traced(contribution: &Rgb) -> bool {
+fn is_traced(contribution: &Rgb) -> bool {
     !contribution.is_black() && contribution.is_finite()
 }
 
@@ -46,9 +46,9 @@ impl Segments {
 
     /// Takes the segments of all candidates whose contribution is finite and not zero, in candidate order:
     /// those of one shading point, which share their origin, stay together.
-    pub fn gather(&mut self, candidates: &Candidates, contributions: &[Rgb]) {
+    pub fn gather(&mut self, candidates: &Candidates) {
         self.clear();
-        for (candidate, &contribution) in candidates.records.iter().zip(contributions) {
+        for (candidate, &contribution) in candidates.records.iter().zip(&candidates.contributions) {
             if is_traced(&contribution) {
                 self.push(&candidate.segment, candidate.point, contribution);
             }
@@ -74,6 +74,12 @@ impl Segments {
     /// For each segment, whether it is occluded.
     pub fn occluded(&self) -> &[bool] {
         &self.occluded
+    }
+
+    /// For each candidate, whether its segment was traced and is unoccluded.
+    pub fn are_free(&self, contributions: &[Rgb]) -> impl Iterator<Item = bool> {
+        let mut occluded = self.occluded.iter();
+        contributions.iter().map(move |contribution| is_traced(contribution) && occluded.next() == Some(&false))
     }
 
     /// Point, contribution if unoccluded, and visibility of each segment.

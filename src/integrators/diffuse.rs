@@ -9,7 +9,7 @@
 use super::path::{self, CameraSample, PathIntegrator, Vertex};
 use super::segment::PathState;
 use crate::bsdfs::Lambertian;
-use crate::direct::{Fits, ShadingPoint};
+use crate::direct::{Estimator, Fits, ShadingPoint};
 use crate::film::PixelSample;
 use crate::materials::SurfaceBsdf;
 use crate::scene::RenderJob;
@@ -54,7 +54,8 @@ pub(super) fn trace(
             break;
         }
         let vertices = paths.find_vertices(job, vertex, depth, samples, out, None);
-        let sample_counts = settings.sample_counts_at_vertex(vertex);
+        let estimator = Estimator::at_vertex(settings, vertex);
+        let sample_counts = estimator.sample_counts();
         let shadings: Vec<Shading<'_>> =
             paths.active.iter().zip(&vertices).map(|(path, v)| shade(source, path, vertex, v)).collect();
         let points: Vec<ShadingPoint<'_>> = (vertices.iter().zip(&paths.active))
@@ -64,7 +65,7 @@ pub(super) fn trace(
                 v.shading_point(path.ray.time, sample_counts, samples[path.sample as usize].fit)
             })
             .collect();
-        light(paths, job, &settings.at_vertex(vertex), (&shadings, &points), fits, out);
+        light(paths, job, &estimator, (&shadings, &points), fits, out);
         extend(paths, settings, vertex, (&vertices, &shadings, &points));
         paths.recycle(vertices);
     }
@@ -83,7 +84,7 @@ fn shade<'w>(source: &mut dyn Reflected, path: &PathState, vertex: u32, v: &Vert
 fn light(
     paths: &mut PathIntegrator,
     job: &RenderJob,
-    settings: &IntegratorSettings,
+    estimator: &Estimator,
     (shadings, points): (&[Shading<'_>], &[ShadingPoint<'_>]),
     fits: &mut Fits,
     out: &mut [PixelSample],
@@ -94,7 +95,7 @@ fn light(
     let lit: Vec<ShadingPoint<'_>> = (shadings.iter().zip(points))
         .filter_map(|(shading, point)| shading.lit.map(|bsdf| ShadingPoint { bsdf, ..*point }))
         .collect();
-    paths.direct.estimate(job, settings, &lit, fits, &mut paths.radiance);
+    paths.direct.estimate(job, estimator, &lit, fits, &mut paths.radiance);
     let lit_paths = paths.active.iter().zip(shadings).filter(|(_, shading)| shading.lit.is_some());
     for ((path, _), &radiance) in lit_paths.zip(&paths.radiance) {
         out[path.sample as usize].radiance += path.beta * radiance;

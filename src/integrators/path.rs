@@ -14,7 +14,8 @@ pub use super::segment::{CameraSample, PathStats};
 use super::wavefront::{Batch, Buffers, Estimate, Output};
 use crate::accel::{Coherence, Hit, RayBatch};
 use crate::bsdfs::Lobe;
-use crate::direct::{DirectStage, Fits, ShadingPoint};
+use crate::direct::estimators::mis::Mis;
+use crate::direct::{DirectStage, Estimator, Fits, ShadingPoint};
 use crate::film::{Features, PixelSample};
 use crate::geometry::SurfaceHit;
 use crate::lights::LightHit;
@@ -112,8 +113,8 @@ impl PathIntegrator {
             let count = self.active.len();
             let mut batch = estimate.map(|e| Batch::new(self.buffers.take().unwrap_or_default(), e, count));
             let vertices = self.find_vertices(job, vertex, depth, samples, out, batch.as_mut());
-            let sample_counts = settings.sample_counts_at_vertex(vertex);
-            let at_vertex = settings.at_vertex(vertex);
+            let estimator = Estimator::at_vertex(settings, vertex);
+            let sample_counts = estimator.sample_counts();
             // Outcomes are those of all samples of a first vertex
             let may_continue = vertex + 1 < depth && (vertex > 0 || self.outcomes.is_none());
             let mut points: Vec<ShadingPoint<'_>> = emptied(std::mem::take(&mut self.spare_points));
@@ -121,12 +122,12 @@ impl PathIntegrator {
                 let sample = &samples[path.sample as usize];
                 let sample_counts = if vertex == 0 { sample.sample_counts } else { sample_counts };
                 let bsdf_by_path = may_continue
-                    && at_vertex.has_one_bsdf_sample(sample_counts.samples)
+                    && matches!(estimator, Estimator::Mis(mis) if mis.has_one_bsdf_sample(sample_counts.samples))
                     && !v.bsdf.bsdf.is_only_evaluated();
                 ShadingPoint { bsdf_by_path, ..v.shading_point(path.ray.time, sample_counts, sample.fit) }
             }));
-            self.light_points(job, &at_vertex, vertex, &points, fits, out);
-            self.extend_paths(settings, vertex, &vertices, &points);
+            self.light_points(job, &estimator, vertex, &points, fits, out);
+            self.extend_paths((settings, &estimator), vertex, &vertices, &points);
             if let Some(mut batch) = batch {
                 let segments = self.recording.as_mut().map(|r| r.segments_at(vertex));
                 let (next, stats, direct) = (&mut self.next, &mut self.stats, &mut self.direct.stats);
@@ -277,13 +278,13 @@ impl PathIntegrator {
     fn light_points(
         &mut self,
         job: &RenderJob,
-        settings: &IntegratorSettings,
+        estimator: &Estimator,
         vertex: u32,
         points: &[ShadingPoint<'_>],
         fits: &mut Fits,
         out: &mut [PixelSample],
     ) {
-        self.direct.estimate(job, settings, points, fits, &mut self.radiance);
+        self.direct.estimate(job, estimator, points, fits, &mut self.radiance);
         if let Some(r) = &mut self.recording {
             r.segments_at(vertex).push(self.direct.segments().clone());
         }
@@ -301,7 +302,7 @@ impl PathIntegrator {
     /// Fills `self.next` with the paths that go on.
     fn extend_paths(
         &mut self,
-        settings: &IntegratorSettings,
+        (settings, estimator): (&IntegratorSettings, &Estimator),
         vertex: u32,
         vertices: &[Vertex<'_>],
         points: &[ShadingPoint<'_>],
@@ -312,8 +313,8 @@ impl PathIntegrator {
         if vertex + 1 < depth {
             let paths = self.active.iter().zip(vertices).zip(points);
             self.next.extend(paths.filter_map(|((path, v), point)| {
-                if point.bsdf_by_path {
-                    return extend_to_emitter(path, v, point, vertex, &settings.at_vertex(vertex));
+                if let (true, Estimator::Mis(mis)) = (point.bsdf_by_path, estimator) {
+                    return extend_to_emitter(path, v, point, vertex, (settings, mis));
                 }
                 Some(extend(path, v, point, vertex, settings)?.0)
             }));
@@ -369,7 +370,7 @@ fn extend_to_emitter(
     v: &Vertex<'_>,
     point: &ShadingPoint<'_>,
     vertex: u32,
-    settings: &IntegratorSettings,
+    (settings, mis): (&IntegratorSettings, &Mis),
 ) -> Option<PathState> {
     let direction = next_direction(v, settings)?;
     let next = scattered(path, point.origin(direction.wi), &direction)?;
@@ -378,7 +379,7 @@ fn extend_to_emitter(
         ctx: point.light_ctx(),
         n_light: point.light_samples_beside_path() as f32,
         pdf: direction.pdf.filter(|_| !direction.lobe.is_specular()),
-        heuristic: settings.heuristic(),
+        heuristic: mis.heuristic,
         survivor: survive(&next, &v.stream, vertex + 1, settings),
     };
     Some(PathState { technique: Some(technique), ..next })

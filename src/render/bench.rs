@@ -8,7 +8,7 @@ use super::{BATCH_PATHS, camera_batches};
 use crate::accel::embree::bare::{Bare, Packed};
 use crate::accel::embree::{EmbreeAccel, EmbreeError};
 use crate::accel::{Accel, AlphaSource, Coherence, RayBatch};
-use crate::direct::Fits;
+use crate::direct::{Estimator, Fits};
 use crate::integrators::path::{CameraSample, Recording};
 use crate::integrators::{PathIntegrator, PathStats};
 use crate::scene::RenderJob;
@@ -164,7 +164,7 @@ fn stages(job: &RenderJob, batches: &[Vec<CameraSample>], runs: u32) -> (Vec<Sta
     let mut integrator = PathIntegrator::default();
     let mut out = Vec::new();
     let fits = batches.iter().flatten().map(|s| s.fit + 1).max().unwrap_or(0) as usize;
-    let mut fits = Fits::new(job, &job.settings().integrator, fits);
+    let mut fits = Estimator::at_vertex(&job.settings().integrator, 0).fits(job, fits);
     let mut one_run = || {
         let start = Instant::now();
         for samples in batches {

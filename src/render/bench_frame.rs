@@ -11,7 +11,7 @@ use crate::accel::AlphaSource;
 use crate::accel::RayBatch;
 use crate::accel::embree::EmbreeError;
 use crate::accel::embree::bare::{Bare, Packed};
-use crate::direct::Fits;
+use crate::direct::Estimator;
 use crate::film::{PixelBounds, PixelSums};
 use crate::integrators::PathStats;
 use crate::integrators::path::Recording;
@@ -194,7 +194,7 @@ fn frame(run: &Run<'_>, worker: &mut Worker, parts: &[(PixelBounds, Range<usize>
     for (tile, pixels) in parts {
         run.camera_samples(tile, pixels.clone(), samples, &mut worker.scratch, &mut worker.samples);
         worker.samples.iter_mut().for_each(|s| s.fit -= pixels.start as u32);
-        let mut fits = Fits::new(run.job, &run.job.settings().integrator, pixels.len());
+        let mut fits = Estimator::at_vertex(&run.job.settings().integrator, 0).fits(run.job, pixels.len());
         worker.trace(run.job, (None, None), &mut fits);
         let mut sums = vec![PixelSums::default(); pixels.len()];
         for (pixel, results) in sums.iter_mut().zip(worker.results.chunks(samples.len())) {

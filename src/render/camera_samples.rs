@@ -1,5 +1,6 @@
 //! Camera samples: places on the film with their rays and random numbers.
 
+use crate::direct::Estimator;
 use crate::film::filter::FilterSampler;
 use crate::integrators::path::CameraSample;
 use crate::scene::RenderJob;
@@ -139,7 +140,7 @@ impl<'a> CameraSampler<'a> {
     #[inline]
     fn direct_stream(&self, pixel: [u32; 2], sample: u32, seed: u32) -> Option<SampleStream> {
         let settings = self.job.settings();
-        settings.integrator.is_progressive().then(|| {
+        Estimator::at_vertex(&settings.integrator, 0).is_progressive().then(|| {
             let block = block_of(sample - self.first_sample);
             let block_seed = pcg4d([seed, self.first_sample, block.index, BLOCK_SEED])[0];
             let index = sample - self.first_sample - block.first;

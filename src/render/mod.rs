@@ -14,7 +14,7 @@ pub mod plan;
 pub mod visibility_cache;
 mod worker;
 
-use crate::direct::Fits;
+use crate::direct::{Estimator, Fits};
 use crate::film::replicas::{Replica, replicas};
 use crate::film::{Film, PixelBounds, PixelSums};
 use crate::integrators::PathStats;
@@ -293,7 +293,7 @@ impl<'a> Run<'a> {
         let is_told = !settings.sampling.sampler.has_independent_samples() && !shares_maps;
         let wants_replicas = self.settings.with_replicas && is_told;
         let replicas = if wants_replicas { replicas(&scene.film.bounds, &bounds) } else { Vec::new() };
-        let fits = Fits::new(self.job, integrator, bounds.area() + replicas.len());
+        let fits = Estimator::at_vertex(integrator, 0).fits(self.job, bounds.area() + replicas.len());
         Tile { bounds, sums: vec![PixelSums::default(); bounds.area()], replicas, fits }
     }
 
@@ -350,7 +350,7 @@ impl<'a> Run<'a> {
     /// within a block of what is fitted in blocks.
     fn next_pass(&self, done: u32) -> u32 {
         let length = self.samples_in_time(done).min(done.clamp(1, self.pass_length()));
-        if !self.job.settings().integrator.is_progressive() {
+        if !Estimator::at_vertex(&self.job.settings().integrator, 0).is_progressive() {
             return length;
         }
         let block = block_of(done);
@@ -418,7 +418,8 @@ impl<'a> Run<'a> {
         let settings = &self.job.settings().integrator;
         let done = samples.start - self.settings.first_sample;
         let start = Instant::now();
-        let begins_block = settings.is_progressive() && done > 0 && block_of(done).first == done;
+        let begins_block =
+            Estimator::at_vertex(settings, 0).is_progressive() && done > 0 && block_of(done).first == done;
         if begins_block {
             ill_conditioned = tile.fits.solve();
         }

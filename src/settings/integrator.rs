@@ -1,7 +1,10 @@
 //! Light transport: the integrator, and how direct light is estimated.
+//!
+//! Settings of other estimators than the chosen one are kept: options may come in any order. What the chosen one needs,
+//! `direct::Estimator` takes from here.
 
 use super::photon_map::PhotonMapSettings;
-use super::ris::{Proposals, RisSettings, Target};
+use super::ris::{RisSettings, Target};
 use crate::bsdfs::ProposalDensity;
 use crate::lights::LightSamplerKind;
 use lumiris_numbers::estimators::mis::Heuristic;
@@ -19,8 +22,8 @@ pub struct IntegratorSettings {
     pub roulette_depth: Option<u32>,
     /// Direct-light estimator at each path vertex.
     pub estimator: EstimatorKind,
-    /// Samples per estimate (N): shadow segments per shading point. `None` is the default of the estimator:
-    /// [`DEFAULT_SAMPLES`], or [`DEFAULT_RIS_SAMPLES`].
+    /// Samples per estimate (N): shadow segments per shading point. `None` is the default of the estimator,
+    /// [`EstimatorKind::default_samples`].
     pub samples: Option<u32>,
     /// Weights of the techniques; see [`Self::heuristic`].
     pub heuristic: Option<Heuristic>,
@@ -49,14 +52,6 @@ pub struct IntegratorSettings {
     /// Density of these proposals.
     pub bsdf_density: ProposalDensity,
 }
-
-/// Default number of samples per estimate of `mc` and `mis`.
-pub const DEFAULT_SAMPLES: u32 = 2;
-/// Default number of samples per estimate of `ris`: the fixed cost of a shading point justifies more than one sample,
-/// and powers of two are well distributed.
-pub const DEFAULT_RIS_SAMPLES: u32 = 4;
-/// Default number of samples per estimate of `ocv`, `optimal-mis`, `correlated` and `contributing`.
-pub const DEFAULT_OCV_SAMPLES: u32 = 4;
 
 impl Default for IntegratorSettings {
     fn default() -> Self {
@@ -91,54 +86,14 @@ impl IntegratorSettings {
         }
     }
 
-    /// MIS heuristic of `mis`, and of the techniques that propose for `ris`. Resampling has minimal variance if the
-    /// proposals have, which the balance heuristic approximates; the power heuristic is better where all samples are
-    /// traced.
+    /// MIS heuristic.
     pub fn heuristic(&self) -> Heuristic {
-        self.heuristic.unwrap_or(match self.estimator {
-            EstimatorKind::Mc | EstimatorKind::Mis | EstimatorKind::Correlated | EstimatorKind::Contributing => {
-                Heuristic::Power
-            }
-            EstimatorKind::Ris | EstimatorKind::Ocv | EstimatorKind::OptimalMis => Heuristic::Balance,
-        })
-    }
-
-    /// True if an estimate uses coefficients fitted to earlier samples of its pixel.
-    pub fn is_progressive(&self) -> bool {
-        match self.estimator {
-            EstimatorKind::Mc
-            | EstimatorKind::Mis
-            | EstimatorKind::Ris
-            | EstimatorKind::Correlated
-            | EstimatorKind::Contributing => false,
-            EstimatorKind::Ocv => self.ocv.form == Form::Progressive,
-            EstimatorKind::OptimalMis => self.optimal_mis == OptimalForm::Progressive,
-        }
-    }
-
-    /// Number of BSDF samples among `n` ≥ 2 samples of light and BSDF sampling.
-    pub fn bsdf_samples(&self, n: u32) -> u32 {
-        ((n as f32 * self.bsdf_fraction) as u32).clamp(1, n - 1)
-    }
-
-    /// True if an estimate of `n` samples has one of BSDF sampling, which the path can continue by.
-    pub fn has_one_bsdf_sample(&self, n: u32) -> bool {
-        self.estimator == EstimatorKind::Mis && n >= 2 && self.bsdf_samples(n) == 1
+        self.heuristic.unwrap_or(self.estimator.default_heuristic())
     }
 
     /// True if the throughput of a path decides whether it takes the bounce of this number, counted from 1.
     pub fn has_roulette(&self, bounce: u32) -> bool {
         self.roulette_depth.is_some_and(|first| bounce >= first)
-    }
-
-    /// Settings of direct light at a path vertex, counted from 0. Progressive estimators are fitted to the first
-    /// vertices of a pixel, which are close together; at later ones, which lie anywhere, `mis` is used.
-    #[must_use]
-    pub fn at_vertex(&self, vertex: u32) -> IntegratorSettings {
-        if vertex == 0 || !self.is_progressive() {
-            return *self;
-        }
-        IntegratorSettings { estimator: EstimatorKind::Mis, samples: Some(self.sample_counts().samples), ..*self }
     }
 
     /// True if direct light uses the visibility cache.
@@ -153,58 +108,11 @@ impl IntegratorSettings {
         self.estimator == EstimatorKind::Contributing && self.contributing.noncontributing_samples == 0
     }
 
-    /// True if an estimate consists of two independent halves.
-    pub fn has_halves(&self) -> bool {
-        match self.estimator {
-            EstimatorKind::Mc
-            | EstimatorKind::Mis
-            | EstimatorKind::Ris
-            | EstimatorKind::OptimalMis
-            | EstimatorKind::Contributing => false,
-            EstimatorKind::Ocv => self.ocv.form == Form::Crossfit,
-            EstimatorKind::Correlated => self.correlated.form == CorrelatedForm::Crossfit,
-        }
-    }
-
-    /// [`Self::sample_counts`] at a path vertex, counted from 0.
-    pub fn sample_counts_at_vertex(&self, vertex: u32) -> SampleCounts {
-        match self.estimator {
-            EstimatorKind::Ris => self.sample_counts().after_bounces(vertex),
-            EstimatorKind::Mc
-            | EstimatorKind::Mis
-            | EstimatorKind::Ocv
-            | EstimatorKind::Correlated
-            | EstimatorKind::Contributing
-            | EstimatorKind::OptimalMis => self.sample_counts(),
-        }
-    }
-
     /// Sample and proposal counts of an estimate, unless chosen per pixel.
     pub fn sample_counts(&self) -> SampleCounts {
-        let default = match self.estimator {
-            EstimatorKind::Mc | EstimatorKind::Mis => DEFAULT_SAMPLES,
-            EstimatorKind::Ris => DEFAULT_RIS_SAMPLES,
-            EstimatorKind::Ocv
-            | EstimatorKind::OptimalMis
-            | EstimatorKind::Correlated
-            | EstimatorKind::Contributing => DEFAULT_OCV_SAMPLES,
-        };
-        let samples = self.samples.unwrap_or(default).max(1);
-        match self.estimator {
-            EstimatorKind::Mc
-            | EstimatorKind::Mis
-            | EstimatorKind::Ocv
-            | EstimatorKind::OptimalMis
-            | EstimatorKind::Correlated
-            | EstimatorKind::Contributing => SampleCounts { samples, proposals: samples },
-            EstimatorKind::Ris => {
-                let proposals = match self.ris.proposals {
-                    Proposals::Fixed(m) => m,
-                    Proposals::Auto | Proposals::Optimal => (f64::from(samples) * self.ris.ratio()).round() as u32,
-                };
-                SampleCounts { samples, proposals: proposals.max(samples) }
-            }
-        }
+        let samples = self.samples.unwrap_or(self.estimator.default_samples()).max(1);
+        let proposals = if self.estimator == EstimatorKind::Ris { self.ris.proposals_for(samples) } else { samples };
+        SampleCounts { samples, proposals: proposals.max(samples) }
     }
 }
 
@@ -276,16 +184,28 @@ pub enum EstimatorKind {
 }
 
 impl EstimatorKind {
-    /// True if samples are drawn separately for each group of lights, and the density of each component of the mixture
-    /// is evaluated at each sample.
-    pub fn has_components(self) -> bool {
+    /// Default number of samples per estimate. With `ris` the fixed cost of a shading point justifies more than two, and
+    /// powers of two are well distributed.
+    pub fn default_samples(self) -> u32 {
         match self {
-            EstimatorKind::Mc
-            | EstimatorKind::Mis
-            | EstimatorKind::Ris
+            EstimatorKind::Mc | EstimatorKind::Mis => 2,
+            EstimatorKind::Ris
+            | EstimatorKind::Ocv
+            | EstimatorKind::OptimalMis
             | EstimatorKind::Correlated
-            | EstimatorKind::Contributing => false,
-            EstimatorKind::Ocv | EstimatorKind::OptimalMis => true,
+            | EstimatorKind::Contributing => 4,
+        }
+    }
+
+    /// Default MIS heuristic of `mis`, and of the techniques that propose for `ris`. Resampling has minimal variance if
+    /// the proposals have, which the balance heuristic approximates; the power heuristic is better where all samples
+    /// are traced.
+    pub fn default_heuristic(self) -> Heuristic {
+        match self {
+            EstimatorKind::Ris | EstimatorKind::Ocv | EstimatorKind::OptimalMis => Heuristic::Balance,
+            EstimatorKind::Mc | EstimatorKind::Mis | EstimatorKind::Correlated | EstimatorKind::Contributing => {
+                Heuristic::Power
+            }
         }
     }
 }
@@ -387,6 +307,7 @@ impl SampleCounts {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::settings::Proposals;
 
     #[test]
     fn later_vertices_have_fewer_samples_of_the_same_ratio() {

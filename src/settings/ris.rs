@@ -37,6 +37,14 @@ impl Default for RisSettings {
 }
 
 impl RisSettings {
+    /// Proposals for a number of samples.
+    pub fn proposals_for(&self, samples: u32) -> u32 {
+        match self.proposals {
+            Proposals::Fixed(m) => m,
+            Proposals::Auto | Proposals::Optimal => (f64::from(samples) * self.ratio()).round() as u32,
+        }
+    }
+
     /// Proposals for each sample by the times of the stages, M/N = T2/T1 [Talbot 2005, Eq. 4.4], from 1 to
     /// [`MAX_RATIO`]; [`DEFAULT_RATIO`] without times.
     pub fn ratio(&self) -> f64 {

@@ -13,7 +13,7 @@ use super::record::Record;
 use crate::accel::{Hit, RayBatch};
 use crate::bsdfs::{Bsdf, Diffuse};
 use crate::cameras::CameraRay;
-use crate::direct::{DirectStage, Fits, ShadingPoint};
+use crate::direct::{DirectStage, Estimator, Fits, ShadingPoint};
 use crate::film::PixelSample;
 use crate::integrators::path::{CameraSample, PathIntegrator, PathStats};
 use crate::materials::SurfaceBsdf;
@@ -100,9 +100,9 @@ impl Gatherer {
         let paths = IntegratorSettings {
             kind: IntegratorKind::Path,
             max_depth: settings.max_depth.saturating_sub(1),
-            ..settings.at_vertex(1)
+            ..Estimator::without_fits(settings)
         };
-        let sample_counts = settings.sample_counts_at_vertex(1);
+        let sample_counts = Estimator::at_vertex(settings, 1).sample_counts();
         self.samples.clear();
         for w in wanted {
             let frame = Frame::from_z(w.ns);
@@ -137,27 +137,28 @@ impl Gatherer {
     fn sources(&mut self, job: &RenderJob, settings: &IntegratorSettings, wanted: &[RecordRequest]) -> Vec<Irradiance> {
         let passes = settings.cache.passes.max(1);
         let mut sums = vec![Irradiance::default(); wanted.len()];
-        let mut fits = Fits::new(job, settings, wanted.len());
+        let estimator = Estimator::at_vertex(settings, 0);
+        let mut fits = estimator.fits(job, wanted.len());
         for pass in 0..passes {
             let block = block_of(pass);
-            if settings.is_progressive() && pass > 0 && block.first == pass {
+            if estimator.is_progressive() && pass > 0 && block.first == pass {
                 self.direct.stats.ill_conditioned += fits.solve();
                 self.direct.stats.systems += wanted.len() as u64;
             }
             let points: Vec<ShadingPoint<'_>> = (0_u32..)
                 .zip(wanted)
                 .map(|(fit, w)| {
-                    let place = if settings.is_progressive() { (block.index, pass - block.first) } else { (0, pass) };
-                    ShadingPoint { fit, ..w.white_point(job, place, settings.sample_counts()) }
+                    let place = if estimator.is_progressive() { (block.index, pass - block.first) } else { (0, pass) };
+                    ShadingPoint { fit, ..w.white_point(job, place, estimator.sample_counts()) }
                 })
                 .collect();
-            self.direct.estimate(job, settings, &points, &mut fits, &mut self.radiance);
+            self.direct.estimate(job, &estimator, &points, &mut fits, &mut self.radiance);
             for (sum, &l) in sums.iter_mut().zip(&self.radiance) {
                 // E = π L of a white surface
                 sum.e += l * (PI / passes as f32);
             }
             // Both halves of a crossfit are estimates
-            let halves = 1 + u32::from(settings.has_halves());
+            let halves = 1 + u32::from(estimator.has_halves());
             self.add_gradients(job, wanted, halves, PI / (passes * halves) as f32, &mut sums);
         }
         for sum in sums.iter_mut().filter(|s| !s.is_finite()) {

@@ -26,7 +26,7 @@ use super::path::{self, CameraSample, PathIntegrator, PathStats, Vertex};
 use super::segment::PathState;
 use crate::bsdfs::{Bsdf, Diffuse, DiffuseTransmission, Lambertian};
 use crate::cameras::CameraRay;
-use crate::direct::{Fits, ShadingPoint};
+use crate::direct::{Estimator, Fits, ShadingPoint};
 use crate::film::PixelSample;
 use crate::materials::SurfaceBsdf;
 use crate::photons::{GatherScratch, Place, Search};
@@ -206,11 +206,11 @@ impl PhotonMapIntegrator {
             }
 
             // Treat these as vertices of a path
-            let at_vertex = settings.at_vertex(1);
-            let sample_counts = settings.sample_counts_at_vertex(1);
+            let estimator = Estimator::at_vertex(settings, 1);
+            let sample_counts = estimator.sample_counts();
             let points: Vec<ShadingPoint<'_>> =
                 near.iter().map(|(path, v, _)| v.shading_point(path.ray.time, sample_counts, 0)).collect();
-            gather.direct.estimate(job, &at_vertex, &points, &mut Fits::default(), &mut gather.radiance);
+            gather.direct.estimate(job, &estimator, &points, &mut Fits::default(), &mut gather.radiance);
             gather.next.clear();
             for (((path, v, part), point), &radiance) in near.iter().zip(&points).zip(&gather.radiance) {
                 self.results[path.sample as usize].radiance += path.beta * radiance;

@@ -16,16 +16,17 @@ use super::segment::{
 };
 use crate::accel::{Coherence, Hit, RayBatch};
 use crate::bsdfs::{Bsdf, Diffuse, Lobe};
-use crate::direct::{self, DirectStats, propose};
+use crate::direct::{self, DirectStats, Estimator};
 use crate::film::PixelSample;
 use crate::geometry::Shape;
 use crate::lights::many::{LightSamples, LitPoints, Scratch};
 use crate::materials::SurfaceBsdf;
 use crate::scene::{EmitterHit, EmitterScratch, RenderJob, SurfaceInteraction};
-use crate::settings::{EstimatorKind, IntegratorSettings};
+use crate::settings::IntegratorSettings;
 use lumiris_lanes::columns::{Column, Columns3, padded, reserve};
 use lumiris_lanes::vertex::{self as kernels, Ends, Lambertian, Points, Rays, Samples, TriangleHits};
 use lumiris_lanes::{level, sampler};
+use lumiris_numbers::estimators::mis::Heuristic;
 use lumiris_numbers::math::ray::offset_origin;
 use lumiris_numbers::math::{Ray, Rgb, Vec3};
 use lumiris_numbers::samplers::SampleStream;
@@ -44,6 +45,8 @@ struct Counts {
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Estimate {
     counts: Counts,
+    /// Weights of the techniques.
+    heuristic: Heuristic,
     settings: IntegratorSettings,
     /// Index of the vertex along the path.
     vertex: u32,
@@ -55,22 +58,17 @@ impl Estimate {
     /// The estimates at vertex `vertex`, if they can be made side by side.
     pub(super) fn new(settings: &IntegratorSettings, vertex: u32) -> Option<Self> {
         let continues = vertex + 1 < settings.depth();
-        let settings = settings.at_vertex(vertex);
-        let n = settings.sample_counts_at_vertex(vertex).samples;
-        let counts = match settings.estimator {
-            EstimatorKind::Mc => Counts { light: n, bsdf: 0, by_path: false },
-            EstimatorKind::Mis if n >= 2 => {
-                let bsdf = settings.bsdf_samples(n);
-                Counts { light: n - bsdf, bsdf, by_path: continues && settings.has_one_bsdf_sample(n) }
+        let (counts, heuristic) = match Estimator::at_vertex(settings, vertex) {
+            // A single technique has the weight 1 by any heuristic
+            Estimator::Mc(mc) => (Counts { light: mc.samples, bsdf: 0, by_path: false }, Heuristic::Balance),
+            Estimator::Mis(mis) if mis.samples >= 2 => {
+                let (n, bsdf) = (mis.samples, mis.bsdf_samples(mis.samples));
+                let by_path = continues && mis.has_one_bsdf_sample(n);
+                (Counts { light: n - bsdf, bsdf, by_path }, mis.heuristic)
             }
-            EstimatorKind::Mis
-            | EstimatorKind::Ris
-            | EstimatorKind::Ocv
-            | EstimatorKind::OptimalMis
-            | EstimatorKind::Correlated
-            | EstimatorKind::Contributing => return None,
+            _ => return None,
         };
-        Some(Estimate { counts, settings, vertex, continues })
+        Some(Estimate { counts, heuristic, settings: *settings, vertex, continues })
     }
 
     /// True if vertices of this BSDF have as many samples of each technique as all others.
@@ -381,7 +379,7 @@ impl<'w> Batch<'w> {
         for (&i, hit) in index.iter().zip(&*emitter_hits) {
             let i = i as usize;
             let (ctx, wi) = (surface.lit_points().get(i), samples.light.wi.vec3(i));
-            let Some(found) = propose::emitter_in_direction(job, &ctx, wi, hit.as_ref(), paths[i].ray.time) else {
+            let Some(found) = direct::emitter_in_direction(job, &ctx, wi, hit.as_ref(), paths[i].ray.time) else {
                 samples.p_bsdf[i] = 0.0;
                 continue;
             };
@@ -428,7 +426,7 @@ impl<'w> Batch<'w> {
         let len = padded(n);
         self.buffers.draw(Stream::Vertex(domain::BSDF));
         self.buffers.sample_lambertian(len);
-        let Estimate { counts, settings, vertex, .. } = &self.estimate;
+        let Estimate { counts, heuristic, settings, vertex, .. } = &self.estimate;
         let Buffers { paths, streams, surface, samples, .. } = &mut *self.buffers;
         // Those follow below
         others(&self.singles).for_each(|single| samples.p_bsdf[single.index as usize] = 0.0);
@@ -440,8 +438,8 @@ impl<'w> Batch<'w> {
                 return Some(PathState { beta: survivor?, ..next });
             }
             let pdf = direction.pdf.filter(|_| !direction.lobe.is_specular());
-            let (ctx, heuristic) = (surface.lit_points().get(i), settings.heuristic());
-            let technique = BsdfTechnique { ctx, n_light: n_light as f32, pdf, heuristic, survivor };
+            let ctx = surface.lit_points().get(i);
+            let technique = BsdfTechnique { ctx, n_light: n_light as f32, pdf, heuristic: *heuristic, survivor };
             Some(PathState { technique: Some(technique), ..next })
         };
         for i in (0..n).filter(|&i| samples.p_bsdf[i] > 0.0) {
@@ -541,7 +539,7 @@ impl Buffers {
         let [n_light, n_bsdf] = estimate.n();
         let (of_light, of_bsdf) = ((&light.pdf[..len], n_light), (&p_bsdf[..len], n_bsdf));
         let ((p, n), (p_other, n_other)) = if by_light { (of_light, of_bsdf) } else { (of_bsdf, of_light) };
-        let (f_cos, li, heuristic) = (f_cos.get(len), light.li.get(len), estimate.settings.heuristic());
+        let (f_cos, li, heuristic) = (f_cos.get(len), light.li.get(len), estimate.heuristic);
         let samples = Samples { f_cos, li, p, p_other, n, n_other, heuristic };
         kernels::weigh(level(), &samples, &mut c.get_mut(len));
     }

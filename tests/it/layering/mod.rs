@@ -35,9 +35,6 @@ const LAYERS: &[&[&str]] = &[
 /// Modules of the arithmetic and what each may import.
 const NUMBERS: &[(&str, &[&str])] = &[("math", &[]), ("estimators", &["math"]), ("samplers", &["math"])];
 
-/// Folders whose circles are left until their rebuilding.
-const CIRCLES_LEFT: &[&str] = &["lumiris::direct"];
-
 fn workspace() -> Vec<Crate> {
     let root = Path::new(env!("CARGO_MANIFEST_DIR"));
     CRATES.iter().map(|(folder, name, _)| Crate::read(name, &root.join(folder).join("src"))).collect()
@@ -117,21 +114,15 @@ fn reachable<'a>(graph: &'a BTreeMap<String, BTreeSet<String>>, start: &str) -> 
 
 #[test]
 fn files_of_a_folder_do_not_import_each_other_in_circles() {
-    let (mut circles, mut left) = (Vec::new(), BTreeSet::new());
+    let mut circles = Vec::new();
     for krate in workspace() {
         for (folder, graph) in graphs(&krate) {
             let in_circle = |node: &&String| reachable(&graph, node).contains(node.as_str());
             let members: Vec<&str> = graph.keys().filter(in_circle).map(String::as_str).collect();
-            if members.is_empty() {
-                continue;
-            }
-            if CIRCLES_LEFT.contains(&folder.as_str()) {
-                left.insert(folder);
-            } else {
+            if !members.is_empty() {
                 circles.push(format!("{folder}: {}", members.join(", ")));
             }
         }
     }
     assert!(circles.is_empty(), "circles:\n{}", circles.join("\n"));
-    assert_eq!(left.len(), CIRCLES_LEFT.len(), "a folder of the list has no circles any more: take it off");
 }

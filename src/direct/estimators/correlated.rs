@@ -20,16 +20,16 @@
 //!
 //! Zero-valued samples count with their g like any others.
 
-use super::domain;
-use super::point::ShadingPoint;
-use super::propose::{
-    Candidate, Candidates, PendingBsdf, SampleAllocation, bsdf_candidate, light_candidate, with_infinite,
-};
-use super::shadow_segments::{Segments, is_traced};
 use crate::accel::{Hit, RayBatch};
+use crate::direct::bsdf_samples::{PendingBsdf, bsdf_candidate};
+use crate::direct::candidates::{Candidate, Candidates, SampleAllocation};
+use crate::direct::domain;
+use crate::direct::light_samples::{light_candidate, with_infinite};
+use crate::direct::point::ShadingPoint;
+use crate::direct::shadow_segments::Segments;
 use crate::lights::{LightId, LightSample};
 use crate::scene::{EmitterHit, EmitterScratch, RenderJob};
-use crate::settings::{CorrelatedForm, IntegratorSettings, SamplingTechnique};
+use crate::settings::{CorrelatedForm, SamplingTechnique};
 use lumiris_numbers::estimators::correlated::{self, SUMS};
 use lumiris_numbers::math::ray::offset_origin;
 use lumiris_numbers::math::{Ray, Rgb, Vec3};
@@ -40,6 +40,17 @@ use std::time::Instant;
 pub const MIN_WIDE_LOBE: f32 = 0.01;
 /// One in this many samples is drawn for delta lights.
 pub const DELTA_DIVISOR: u32 = 4;
+
+/// Samples of one technique, which are samples of a control variate as well.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Correlated {
+    /// Samples (N).
+    pub samples: u32,
+    /// How the weight of the two estimates is determined.
+    pub form: CorrelatedForm,
+    /// What draws the samples.
+    pub technique: SamplingTechnique,
+}
 
 /// How the samples of a point are drawn.
 #[derive(Clone, Copy, Debug)]
@@ -59,10 +70,10 @@ struct Plan {
 }
 
 impl Plan {
-    fn new(job: &RenderJob, settings: &IntegratorSettings, point: &ShadingPoint<'_>) -> Self {
+    fn new(job: &RenderJob, technique: SamplingTechnique, point: &ShadingPoint<'_>) -> Self {
         let n = point.sample_counts.samples;
         let bsdf = &point.bsdf.bsdf;
-        let technique = if bsdf.has_non_specular() { settings.correlated.technique } else { SamplingTechnique::Bsdf };
+        let technique = if bsdf.has_non_specular() { technique } else { SamplingTechnique::Bsdf };
         let all = Plan { technique, n, draws: n, probability: 1.0, delta_draws: 0, n_delta: 0.0, specular_draws: 0 };
         match technique {
             SamplingTechnique::Light => Plan { specular_draws: u32::from(n > 0 && bsdf.has_specular()), ..all },
@@ -103,8 +114,8 @@ struct Estimate {
 }
 
 impl Estimate {
-    fn new(job: &RenderJob, settings: &IntegratorSettings, point: &ShadingPoint<'_>) -> Self {
-        let plan = Plan::new(job, settings, point);
+    fn new(job: &RenderJob, technique: SamplingTechnique, point: &ShadingPoint<'_>) -> Self {
+        let plan = Plan::new(job, technique, point);
         let is_controlled = match plan.technique {
             SamplingTechnique::Light => true,
             SamplingTechnique::Bsdf => point.bsdf.wide_lobe(point.wo) >= MIN_WIDE_LOBE,
@@ -139,9 +150,9 @@ impl Estimate {
     }
 }
 
-/// The stage's buffers.
+/// The estimates of a batch.
 #[derive(Debug, Default)]
-pub struct Correlated {
+pub(super) struct Buffers {
     estimates: Vec<Estimate>,
     /// c of each candidate; `None` outside the combination.
     controls: Vec<Option<[f32; 3]>>,
@@ -158,69 +169,91 @@ pub struct Correlated {
 }
 
 impl Correlated {
-    /// Draws the samples of all points. Zero-valued ones are counted, the others become candidates.
+    /// Zero-valued samples are counted, the others become candidates.
     pub(super) fn propose(
-        &mut self,
+        &self,
         job: &RenderJob,
-        settings: &IntegratorSettings,
         points: &[ShadingPoint<'_>],
+        b: &mut Buffers,
         candidates: &mut Candidates,
     ) {
-        candidates.clear();
-        self.controls.clear();
-        self.pending.clear();
-        self.estimates.clear();
-        self.estimates.extend(points.iter().map(|point| Estimate::new(job, settings, point)));
+        b.controls.clear();
+        b.pending.clear();
+        b.estimates.clear();
+        b.estimates.extend(points.iter().map(|point| Estimate::new(job, self.technique, point)));
 
         let start = Instant::now();
         for (index, point) in points.iter().enumerate() {
-            self.draw_delta(job, index, point, candidates);
-            if self.estimates[index].plan.technique == SamplingTechnique::Light {
-                self.draw_light(job, index, point, candidates);
+            b.draw_delta(job, (index, point), candidates);
+            if b.estimates[index].plan.technique == SamplingTechnique::Light {
+                b.draw_light(job, (index, point), candidates);
             }
         }
-        candidates.light_time = start.elapsed();
+        candidates.stats.t1_light += start.elapsed();
 
-        self.rays.clear();
+        b.rays.clear();
         for (index, point) in points.iter().enumerate() {
-            self.draw_bsdf(index, point, candidates);
+            b.draw_bsdf((index, point), candidates);
         }
-        self.follow(job, points, candidates);
-        for (pending, (crossed, found)) in self.pending.iter().zip(self.crossed.iter().zip(&self.found)) {
-            let estimate = &mut self.estimates[pending.point as usize];
-            let control = if pending.specular {
-                estimate.without_g()
-            } else {
-                estimate.control(*crossed, pending.wi, pending.pdf)
-            };
-            let is_inside = estimate.plan.technique == SamplingTechnique::Bsdf;
-            match found {
-                Some(candidate) => {
-                    candidates.records.push(*candidate);
-                    self.controls.push(is_inside.then_some(control));
-                }
-                None if is_inside => correlated::add(&mut estimate.sums, control, [0.0; 3]),
-                None => {}
-            }
-        }
+        b.follow(job, points, candidates);
+        b.add_bsdf(candidates);
     }
 
+    pub(super) fn select(candidates: &mut Candidates) {
+        candidates.weigh(Candidate::own_factor);
+    }
+
+    /// `out[i]` belongs to `points[i]`, or to both halves of a point, `points[2i]` and `points[2i + 1]`, where the form
+    /// has halves.
+    pub(super) fn resolve(&self, candidates: &Candidates, segments: &Segments, b: &mut Buffers, out: &mut [Rgb]) {
+        let are_free = segments.are_free(&candidates.contributions);
+        let traced = candidates.records.iter().zip(&candidates.contributions).zip(are_free);
+        for (((c, contribution), is_free), control) in traced.zip(&b.controls) {
+            let value = if is_free { *contribution } else { Rgb::BLACK };
+            let estimate = &mut b.estimates[c.point as usize];
+            match control {
+                Some(control) => {
+                    correlated::add(&mut estimate.sums, *control, (value * estimate.plan.n as f32).to_array());
+                }
+                None => estimate.outside += value,
+            }
+        }
+        for (i, out) in out.iter_mut().enumerate() {
+            *out = match self.form {
+                CorrelatedForm::Combined => {
+                    let e = &b.estimates[i];
+                    Rgb::from_array(correlated::combined(&e.sums)) + e.outside
+                }
+                CorrelatedForm::Crossfit => {
+                    // What is outside has the weights of the halves too: where one of them is a single sample, nothing
+                    // is outside of that
+                    let [a, b] = [&b.estimates[2 * i], &b.estimates[2 * i + 1]];
+                    let [n, m] = [a, b].map(|e| e.plan.n as f32);
+                    let outside = (a.outside * n + b.outside * m) / (n + m).max(1.0);
+                    Rgb::from_array(correlated::crossfit([&a.sums, &b.sums])) + outside
+                }
+            };
+        }
+    }
+}
+
+impl Buffers {
     /// Samples of delta lights.
-    fn draw_delta(&mut self, job: &RenderJob, index: usize, point: &ShadingPoint<'_>, candidates: &mut Candidates) {
+    fn draw_delta(&mut self, job: &RenderJob, (index, point): (usize, &ShadingPoint<'_>), candidates: &mut Candidates) {
         let estimate = &mut self.estimates[index];
         let Plan { delta_draws, n_delta, .. } = estimate.plan;
         let Some(sampler) = job.lights.delta.as_ref().filter(|_| delta_draws > 0) else { return };
         let allocation = SampleAllocation { light_draws: delta_draws, bsdf_draws: 0, n_light: n_delta, n_bsdf: 0.0 };
         let control = estimate.plan.has_delta_inside().then_some(estimate.without_g());
         let ctx = point.light_ctx();
-        candidates.proposals += u64::from(delta_draws);
-        candidates.light_proposals += u64::from(delta_draws);
+        candidates.stats.proposals += u64::from(delta_draws);
+        candidates.stats.light_proposals += u64::from(delta_draws);
         for i in 0..delta_draws {
             let [u_choice, u0, u1] = point.stream.split(domain::DELTA, delta_draws, i).draw::<3>();
             let candidate = sampler
                 .sample(&ctx, u_choice)
                 .and_then(|choice| job.lights.sample_choice(&ctx, choice, [u0, u1]))
-                .and_then(|drawn| light_candidate(job, index as u32, point, &allocation, drawn));
+                .and_then(|drawn| light_candidate(job, (index as u32, point), &allocation, drawn));
             match (candidate, control) {
                 (Some(candidate), control) => {
                     candidates.records.push(candidate);
@@ -233,13 +266,13 @@ impl Correlated {
     }
 
     /// Samples of the combination by light sampling.
-    fn draw_light(&mut self, job: &RenderJob, index: usize, point: &ShadingPoint<'_>, candidates: &mut Candidates) {
+    fn draw_light(&mut self, job: &RenderJob, (index, point): (usize, &ShadingPoint<'_>), candidates: &mut Candidates) {
         let estimate = &mut self.estimates[index];
         let n = estimate.plan.draws;
         let allocation = SampleAllocation::fixed(n, 0);
         let ctx = point.light_ctx();
-        candidates.proposals += u64::from(n);
-        candidates.light_proposals += u64::from(n);
+        candidates.stats.proposals += u64::from(n);
+        candidates.stats.light_proposals += u64::from(n);
         for i in 0..n {
             let [u_choice, u0, u1] = point.stream.split(domain::LIGHT, n, i).draw::<3>();
             let drawn = job.lights.sample(&ctx, u_choice, [u0, u1]);
@@ -250,7 +283,7 @@ impl Correlated {
                 }
                 Some(_) | None => estimate.without_g(),
             };
-            match drawn.and_then(|drawn| light_candidate(job, index as u32, point, &allocation, drawn)) {
+            match drawn.and_then(|drawn| light_candidate(job, (index as u32, point), &allocation, drawn)) {
                 Some(candidate) => {
                     candidates.records.push(candidate);
                     self.controls.push(Some(control));
@@ -261,14 +294,14 @@ impl Correlated {
     }
 
     /// BSDF samples, before it is known which lights they point at.
-    fn draw_bsdf(&mut self, index: usize, point: &ShadingPoint<'_>, candidates: &mut Candidates) {
+    fn draw_bsdf(&mut self, (index, point): (usize, &ShadingPoint<'_>), candidates: &mut Candidates) {
         let estimate = &mut self.estimates[index];
         let plan = estimate.plan;
         let (n, expected) = match plan.technique {
             SamplingTechnique::Bsdf => (plan.draws, plan.n_technique()),
             SamplingTechnique::Light => (plan.specular_draws, plan.specular_draws as f32),
         };
-        candidates.proposals += u64::from(n);
+        candidates.stats.proposals += u64::from(n);
         for i in 0..n {
             let [uc, u0, u1] = point.stream.split(domain::BSDF, n, i).draw::<3>();
             let is_inside = plan.technique == SamplingTechnique::Bsdf;
@@ -307,7 +340,7 @@ impl Correlated {
             if self.rays.is_empty() {
                 break;
             }
-            candidates.emitter_rays += self.rays.len() as u64;
+            candidates.stats.emitter_rays += self.rays.len() as u64;
             job.world.intersect_emitters(&self.rays, &mut self.hits, &mut self.emitter_hits);
             self.next_rays.clear();
             self.next_ray_of.clear();
@@ -342,43 +375,24 @@ impl Correlated {
         }
     }
 
-    /// The estimates of all points from their traced candidates; `out[i]` belongs to `points[i]`, or to both halves of
-    /// a point, `points[2i]` and `points[2i + 1]`, where the form has halves.
-    pub(super) fn resolve(
-        &mut self,
-        form: CorrelatedForm,
-        candidates: &Candidates,
-        contributions: &[Rgb],
-        segments: &Segments,
-        out: &mut [Rgb],
-    ) {
-        let mut occluded = segments.occluded().iter();
-        for ((c, contribution), control) in candidates.records.iter().zip(contributions).zip(&self.controls) {
-            let is_free = is_traced(contribution) && occluded.next() == Some(&false);
-            let value = if is_free { *contribution } else { Rgb::BLACK };
-            let estimate = &mut self.estimates[c.point as usize];
-            match control {
-                Some(control) => {
-                    correlated::add(&mut estimate.sums, *control, (value * estimate.plan.n as f32).to_array());
-                }
-                None => estimate.outside += value,
-            }
-        }
-        for (i, out) in out.iter_mut().enumerate() {
-            *out = match form {
-                CorrelatedForm::Combined => {
-                    let e = &self.estimates[i];
-                    Rgb::from_array(correlated::combined(&e.sums)) + e.outside
-                }
-                CorrelatedForm::Crossfit => {
-                    // What is outside has the weights of the halves too: where one of them is a single sample, nothing
-                    // is outside of that
-                    let [a, b] = [&self.estimates[2 * i], &self.estimates[2 * i + 1]];
-                    let [n, m] = [a, b].map(|e| e.plan.n as f32);
-                    let outside = (a.outside * n + b.outside * m) / (n + m).max(1.0);
-                    Rgb::from_array(correlated::crossfit([&a.sums, &b.sums])) + outside
-                }
+    /// Adds BSDF samples by what they point at.
+    fn add_bsdf(&mut self, candidates: &mut Candidates) {
+        for (pending, (crossed, found)) in self.pending.iter().zip(self.crossed.iter().zip(&self.found)) {
+            let estimate = &mut self.estimates[pending.point as usize];
+            let control = if pending.specular {
+                estimate.without_g()
+            } else {
+                estimate.control(*crossed, pending.wi, pending.pdf)
             };
+            let is_inside = estimate.plan.technique == SamplingTechnique::Bsdf;
+            match found {
+                Some(candidate) => {
+                    candidates.records.push(*candidate);
+                    self.controls.push(is_inside.then_some(control));
+                }
+                None if is_inside => correlated::add(&mut estimate.sums, control, [0.0; 3]),
+                None => {}
+            }
         }
     }
 }

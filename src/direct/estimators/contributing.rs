@@ -16,9 +16,12 @@
 //! times [Eq. 1 of the paper]. Without these samples (S_non = 0) the estimate is biased. Where the cache is empty, all
 //! S_con + S_non samples are drawn as by `mc`.
 
-use super::domain;
-use super::point::ShadingPoint;
-use super::propose::{Candidate, SampleAllocation, light_candidate, unshadowed_candidate};
+use super::mc;
+use crate::direct::bsdf_samples::BsdfSamples;
+use crate::direct::candidates::{Candidate, Candidates, SampleAllocation};
+use crate::direct::domain;
+use crate::direct::light_samples::{self, unshadowed_candidate};
+use crate::direct::point::ShadingPoint;
 use crate::lights::{Light, LightCtx, LightId, LightSample, LightSampling, LightSet};
 use crate::scene::RenderJob;
 use lumiris_numbers::math::cumulative;
@@ -27,9 +30,33 @@ use std::f32::consts::PI;
 /// Maximum number of lights that are sorted at a point.
 pub const MAX_ORDERED: usize = 64;
 
-/// The stage's buffers.
-#[derive(Debug, Default)]
+/// Light sampling, separately of contributing and of non-contributing lights.
+#[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Contributing {
+    /// Samples on contributing lights (S_con).
+    pub samples: u32,
+    /// Samples on non-contributing lights (S_non).
+    pub noncontributing_samples: u32,
+}
+
+impl Contributing {
+    pub(super) fn propose(
+        &self,
+        job: &RenderJob,
+        points: &[ShadingPoint<'_>],
+        (bsdf, buffers): (&mut BsdfSamples, &mut Buffers),
+        candidates: &mut Candidates,
+    ) {
+        candidates.draw_lights(points, mc::allocation, |at, allocation, records| {
+            if allocation.light_draws == 0 { 0 } else { buffers.draw(job, at, self.noncontributing_samples, records) }
+        });
+        bsdf.propose(job, points, mc::allocation, &mut [], candidates);
+    }
+}
+
+/// What is kept from point to point, to save allocations.
+#[derive(Debug, Default)]
+pub(super) struct Buffers {
     /// 𝓛_con: lights and their photon counts, ids ascending.
     contributing: Vec<(LightId, u32)>,
     /// Samples per light.
@@ -51,13 +78,13 @@ impl At<'_> {
     fn sample(&self, light: LightId, pmf: f32, n: u32, u: [f32; 2]) -> Option<Candidate> {
         let sample = self.lights.lights[light as usize].sample_li(&self.ctx, u)?;
         let drawn = (light, LightSample { pdf: sample.pdf * pmf, ..sample });
-        unshadowed_candidate(self.index, self.point, &SampleAllocation::fixed(n, 0), drawn)
+        unshadowed_candidate((self.index, self.point), &SampleAllocation::fixed(n, 0), drawn)
     }
 }
 
-impl Contributing {
+impl Buffers {
     /// Draws the light samples of a point, `noncontributing` of them on non-contributing lights. Returns their number.
-    pub(super) fn draw(
+    fn draw(
         &mut self,
         job: &RenderJob,
         (index, point): (u32, &ShadingPoint<'_>),
@@ -72,8 +99,7 @@ impl Contributing {
 
         let n = point.sample_counts.samples;
         if self.contributing.is_empty() {
-            draw_by_choice(job, &at, n + noncontributing, records);
-            return n + noncontributing;
+            return light_samples::draw(job, (index, point), &SampleAllocation::fixed(n + noncontributing, 0), records);
         }
         let drawn = if self.contributing.len() <= n as usize {
             self.draw_each(&at, n, records)
@@ -165,17 +191,6 @@ impl Contributing {
             records.extend(at.sample(lit[place], 1.0 / others as f32, noncontributing, [u0, u1]));
         }
         noncontributing
-    }
-}
-
-/// Light samples drawn as by `mc`.
-fn draw_by_choice(job: &RenderJob, at: &At<'_>, n: u32, records: &mut Vec<Candidate>) {
-    for i in 0..n {
-        let [u_choice, u0, u1] = at.point.stream.split(domain::LIGHT, n, i).draw::<3>();
-        let drawn = at.lights.sample(&at.ctx, u_choice, [u0, u1]);
-        let candidate =
-            drawn.and_then(|drawn| light_candidate(job, at.index, at.point, &SampleAllocation::fixed(n, 0), drawn));
-        records.extend(candidate);
     }
 }
 

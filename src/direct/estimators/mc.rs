@@ -1,0 +1,47 @@
+//! `mc`: light sampling alone. Specular lobes, whose directions no light sample has, get one BSDF sample.
+
+use crate::direct::bsdf_samples::BsdfSamples;
+use crate::direct::candidates::{Candidates, Drawn, SampleAllocation};
+use crate::direct::light_samples;
+use crate::direct::point::ShadingPoint;
+use crate::scene::RenderJob;
+
+/// Light sampling.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Mc {
+    /// Light samples (N).
+    pub samples: u32,
+}
+
+impl Mc {
+    pub(super) fn propose(
+        &self,
+        job: &RenderJob,
+        points: &[ShadingPoint<'_>],
+        bsdf: &mut BsdfSamples,
+        candidates: &mut Candidates,
+    ) {
+        candidates.draw_lights(points, allocation, |at, allocation, records| {
+            light_samples::draw(job, at, allocation, records)
+        });
+        bsdf.propose(job, points, allocation, &mut [], candidates);
+    }
+}
+
+/// All samples are light samples, unless every lobe is specular.
+pub(super) fn allocation(point: &ShadingPoint<'_>) -> SampleAllocation {
+    let (n, bsdf) = (point.sample_counts.samples, &point.bsdf.bsdf);
+    if bsdf.has_non_specular() {
+        SampleAllocation::fixed(n, u32::from(bsdf.has_specular()))
+    } else {
+        SampleAllocation::fixed(0, n)
+    }
+}
+
+/// A BSDF sample counts for specular lobes only.
+pub(super) fn select(candidates: &mut Candidates) {
+    candidates.weigh(|c| match c.drawn {
+        Drawn::Bsdf => 0.0,
+        Drawn::Light | Drawn::DeltaLight | Drawn::DeltaBsdf => c.own_factor(),
+    });
+}

@@ -1,0 +1,70 @@
+//! `mis`: light and BSDF samples, combined by multiple importance sampling [Veach and Guibas 1995].
+
+use crate::direct::bsdf_samples::BsdfSamples;
+use crate::direct::candidates::{Candidates, SampleAllocation};
+use crate::direct::light_samples;
+use crate::direct::point::ShadingPoint;
+use crate::scene::RenderJob;
+use crate::settings::IntegratorSettings;
+use lumiris_numbers::estimators::mis::Heuristic;
+
+/// Light and BSDF sampling.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Mis {
+    /// Samples of both techniques (N).
+    pub samples: u32,
+    /// Weights of the techniques.
+    pub heuristic: Heuristic,
+    /// Fraction of the samples that are BSDF samples.
+    pub bsdf_fraction: f32,
+}
+
+impl Mis {
+    pub(super) fn new(settings: &IntegratorSettings) -> Self {
+        let IntegratorSettings { bsdf_fraction, .. } = *settings;
+        Mis { samples: settings.sample_counts().samples, heuristic: settings.heuristic(), bsdf_fraction }
+    }
+
+    /// Number of BSDF samples among `n` ≥ 2 samples.
+    pub fn bsdf_samples(&self, n: u32) -> u32 {
+        ((n as f32 * self.bsdf_fraction) as u32).clamp(1, n - 1)
+    }
+
+    /// True if an estimate of `n` samples has one of BSDF sampling, which the path can continue by.
+    pub fn has_one_bsdf_sample(&self, n: u32) -> bool {
+        n >= 2 && self.bsdf_samples(n) == 1
+    }
+
+    /// Allocates the samples of a point to the techniques.
+    pub(super) fn allocation(&self, point: &ShadingPoint<'_>) -> SampleAllocation {
+        let n = point.sample_counts.samples;
+        if point.bsdf_by_path {
+            return SampleAllocation { bsdf_draws: 0, ..SampleAllocation::fixed(point.light_samples_beside_path(), 1) };
+        }
+        if !point.bsdf.bsdf.has_non_specular() {
+            return SampleAllocation::fixed(0, n);
+        }
+        if n == 1 {
+            return SampleAllocation::one_of_both(point);
+        }
+        let by_bsdf = self.bsdf_samples(n);
+        SampleAllocation::fixed(n - by_bsdf, by_bsdf)
+    }
+
+    pub(super) fn propose(
+        &self,
+        job: &RenderJob,
+        points: &[ShadingPoint<'_>],
+        bsdf: &mut BsdfSamples,
+        candidates: &mut Candidates,
+    ) {
+        let allocate = |point: &ShadingPoint<'_>| self.allocation(point);
+        candidates
+            .draw_lights(points, allocate, |at, allocation, records| light_samples::draw(job, at, allocation, records));
+        bsdf.propose(job, points, allocate, &mut [], candidates);
+    }
+
+    pub(super) fn select(&self, candidates: &mut Candidates) {
+        candidates.weigh(|c| c.factor(self.heuristic));
+    }
+}

@@ -1,0 +1,220 @@
+//! The estimators of direct light: each is a value with its settings, and a file with what it does in each stage.
+//!
+//! | file | propose (T1) | select | resolve |
+//! |---|---|---|---|
+//! | [`mc`] | light samples | 1/(n·p) | sum |
+//! | [`mis`] | light and BSDF samples | weights of a heuristic | sum |
+//! | [`ris`] | many of both, in chunks | draws from each chunk | sum |
+//! | [`ocv`] | those of `mis`, by groups of lights | those of `mis` | control variates |
+//! | [`optimal_mis`] | those of `mis`, by groups of lights | those of `mis` | optimal weights |
+//! | [`correlated`] | samples of one technique | 1/(n·p) | two estimates combined |
+//! | [`contributing`] | light samples, separately by what the visibility cache finds | 1/(n·p) | sum |
+
+pub mod contributing;
+pub mod correlated;
+pub mod mc;
+pub mod mis;
+pub mod ocv;
+pub mod optimal_mis;
+pub mod ris;
+
+use super::bsdf_samples::BsdfSamples;
+use super::candidates::Candidates;
+use super::components::Components;
+use super::fits::Fits;
+use super::point::ShadingPoint;
+use super::shadow_segments::Segments;
+use crate::scene::RenderJob;
+use crate::settings::{
+    ContributingSettings, CorrelatedForm, CorrelatedSettings, EstimatorKind, IntegratorSettings, OptimalForm,
+    SampleCounts,
+};
+use contributing::Contributing;
+use correlated::Correlated;
+use lumiris_numbers::estimators::ocv::Form;
+use lumiris_numbers::math::Rgb;
+use mc::Mc;
+use mis::Mis;
+use ocv::Ocv;
+use optimal_mis::OptimalMis;
+use ris::Ris;
+use std::time::Instant;
+
+/// An estimator of direct light with its settings.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub enum Estimator {
+    /// Light sampling only (and the specular lobes of BSDFs).
+    Mc(Mc),
+    /// Light and BSDF sampling, combined by multiple importance sampling.
+    Mis(Mis),
+    /// Resampled importance sampling.
+    Ris(Ris),
+    /// Optimizing control variates.
+    Ocv(Ocv),
+    /// Optimal weights of multiple importance sampling.
+    OptimalMis(OptimalMis),
+    /// Importance sampling by one technique, combined with correlated sampling.
+    Correlated(Correlated),
+    /// Light sampling, separately of contributing and of all other lights.
+    Contributing(Contributing),
+}
+
+/// The candidates and segments of a batch, and what estimators keep from batch to batch.
+#[derive(Debug, Default)]
+pub(super) struct Batch {
+    pub(super) candidates: Candidates,
+    pub(super) segments: Segments,
+    bsdf: BsdfSamples,
+    ris: ris::Buffers,
+    components: Components,
+    correlated: correlated::Buffers,
+    contributing: contributing::Buffers,
+}
+
+impl Estimator {
+    /// The estimator at a path vertex, counted from 0.
+    pub fn at_vertex(settings: &IntegratorSettings, vertex: u32) -> Self {
+        let estimator = Self::new(settings, vertex);
+        if vertex > 0 && estimator.is_progressive() {
+            Self::new(&Self::without_fits(settings), vertex)
+        } else {
+            estimator
+        }
+    }
+
+    /// The settings with an estimator for later vertices. Progressive estimators are fitted to the first vertices of a
+    /// pixel, which are close together; at later ones, which lie anywhere, `mis` is used.
+    #[must_use]
+    pub fn without_fits(settings: &IntegratorSettings) -> IntegratorSettings {
+        let estimator = Self::new(settings, 0);
+        if !estimator.is_progressive() {
+            return *settings;
+        }
+        let samples = Some(estimator.sample_counts().samples);
+        IntegratorSettings { estimator: EstimatorKind::Mis, samples, ..*settings }
+    }
+
+    fn new(settings: &IntegratorSettings, vertex: u32) -> Self {
+        let samples = settings.sample_counts().samples;
+        match settings.estimator {
+            EstimatorKind::Mc => Estimator::Mc(Mc { samples }),
+            EstimatorKind::Mis => Estimator::Mis(Mis::new(settings)),
+            EstimatorKind::Ris => Estimator::Ris(Ris::at_vertex(settings, vertex)),
+            EstimatorKind::Ocv => Estimator::Ocv(Ocv { mis: Mis::new(settings), form: settings.ocv.form }),
+            EstimatorKind::OptimalMis => {
+                Estimator::OptimalMis(OptimalMis { mis: Mis::new(settings), form: settings.optimal_mis })
+            }
+            EstimatorKind::Correlated => {
+                let CorrelatedSettings { form, technique } = settings.correlated;
+                Estimator::Correlated(Correlated { samples, form, technique })
+            }
+            EstimatorKind::Contributing => {
+                let ContributingSettings { noncontributing_samples } = settings.contributing;
+                Estimator::Contributing(Contributing { samples, noncontributing_samples })
+            }
+        }
+    }
+
+    /// Sample and proposal counts of an estimate, unless chosen per pixel.
+    pub fn sample_counts(&self) -> SampleCounts {
+        match self {
+            Estimator::Ris(ris) => ris.sample_counts,
+            Estimator::Mc(Mc { samples })
+            | Estimator::Mis(Mis { samples, .. })
+            | Estimator::Ocv(Ocv { mis: Mis { samples, .. }, .. })
+            | Estimator::OptimalMis(OptimalMis { mis: Mis { samples, .. }, .. })
+            | Estimator::Correlated(Correlated { samples, .. })
+            | Estimator::Contributing(Contributing { samples, .. }) => {
+                SampleCounts { samples: *samples, proposals: *samples }
+            }
+        }
+    }
+
+    /// True if an estimate uses coefficients fitted to earlier samples of its pixel.
+    pub fn is_progressive(&self) -> bool {
+        match self {
+            Estimator::Ocv(ocv) => ocv.form == Form::Progressive,
+            Estimator::OptimalMis(optimal) => optimal.form == OptimalForm::Progressive,
+            _ => false,
+        }
+    }
+
+    /// True if an estimate consists of two independent halves.
+    pub fn has_halves(&self) -> bool {
+        match self {
+            Estimator::Ocv(ocv) => ocv.form == Form::Crossfit,
+            Estimator::Correlated(correlated) => correlated.form == CorrelatedForm::Crossfit,
+            _ => false,
+        }
+    }
+
+    /// True if only what is visible has been selected, so that segments need not be traced.
+    pub(super) fn selects_visible(&self) -> bool {
+        matches!(self, Estimator::Ris(ris) if ris.target.has_visibility())
+    }
+
+    /// `count` fits without samples; none if estimates do not use fits.
+    pub fn fits(&self, job: &RenderJob, count: usize) -> Fits {
+        match self {
+            Estimator::Ocv(_) if self.is_progressive() => Ocv::fits(job, count),
+            Estimator::OptimalMis(_) if self.is_progressive() => OptimalMis::fits(job, count),
+            _ => Fits::default(),
+        }
+    }
+
+    /// T1: candidates with their unshadowed integrands and the densities of all techniques.
+    pub(super) fn propose(&self, job: &RenderJob, points: &[ShadingPoint<'_>], batch: &mut Batch) {
+        let Batch { candidates, bsdf, .. } = batch;
+        candidates.clear();
+        match self {
+            Estimator::Mc(mc) => mc.propose(job, points, bsdf, candidates),
+            Estimator::Mis(mis) => mis.propose(job, points, bsdf, candidates),
+            Estimator::Ris(ris) => ris.propose_and_draw(job, points, (bsdf, &mut batch.ris), candidates),
+            Estimator::Ocv(Ocv { mis, .. }) | Estimator::OptimalMis(OptimalMis { mis, .. }) => {
+                batch.components.propose(job, points, |point| mis.allocation(point), bsdf, candidates);
+            }
+            Estimator::Correlated(c) => c.propose(job, points, &mut batch.correlated, candidates),
+            Estimator::Contributing(c) => c.propose(job, points, (bsdf, &mut batch.contributing), candidates),
+        }
+    }
+
+    /// Select: what each candidate contributes if its segment is unoccluded.
+    pub(super) fn select(&self, candidates: &mut Candidates) {
+        match self {
+            Estimator::Mc(_) | Estimator::Contributing(_) => mc::select(candidates),
+            Estimator::Mis(mis) | Estimator::Ocv(Ocv { mis, .. }) | Estimator::OptimalMis(OptimalMis { mis, .. }) => {
+                mis.select(candidates)
+            }
+            Estimator::Correlated(_) => Correlated::select(candidates),
+            // Drawn from each chunk of proposals
+            Estimator::Ris(_) => {}
+        }
+    }
+
+    /// Resolve: the estimates from the traced candidates. `out` has as many zeros as there are estimates.
+    pub(super) fn resolve(
+        &self,
+        job: &RenderJob,
+        points: &[ShadingPoint<'_>],
+        batch: &mut Batch,
+        fits: &mut Fits,
+        out: &mut [Rgb],
+    ) {
+        let Batch { candidates, segments, components, correlated, .. } = batch;
+        let start = Instant::now();
+        match self {
+            Estimator::Mc(_) | Estimator::Mis(_) | Estimator::Ris(_) | Estimator::Contributing(_) => {
+                segments.resolve(out);
+            }
+            Estimator::Ocv(ocv) => {
+                ocv.resolve(job, points, (candidates, segments, components), fits, out);
+                candidates.stats.solve += start.elapsed();
+            }
+            Estimator::OptimalMis(optimal) => {
+                optimal.resolve(job, points, (candidates, segments, components), fits, out);
+                candidates.stats.solve += start.elapsed();
+            }
+            Estimator::Correlated(c) => c.resolve(candidates, segments, correlated, out),
+        }
+    }
+}

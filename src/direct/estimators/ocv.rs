@@ -1,0 +1,76 @@
+//! `ocv`: optimizing control variates [Fan et al. 2006].
+//!
+//! After T2, the samples of a point are accumulated into normal equations in the columns c_j = h_j/p_α − I_j, whose
+//! expectation is 0, and y = f·V/p_α. The estimate is ȳ − Σ_j β_j c̄_j [Eq. 7 of the paper]; the forms differ in what β
+//! is fitted to.
+
+use super::mis::Mis;
+use crate::direct::candidates::Candidates;
+use crate::direct::components::Components;
+use crate::direct::fits::Fits;
+use crate::direct::point::ShadingPoint;
+use crate::direct::shadow_segments::Segments;
+use crate::scene::RenderJob;
+use lumiris_numbers::estimators::ocv::{Form, NormalEquations};
+use lumiris_numbers::math::Rgb;
+
+/// Control variates for the samples of `mis`.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Ocv {
+    /// The samples.
+    pub mis: Mis,
+    /// How the coefficients are determined.
+    pub form: Form,
+}
+
+impl Ocv {
+    pub(super) fn fits(job: &RenderJob, count: usize) -> Fits {
+        let solve = |equations: NormalEquations, sums: &[f32], beta: &mut [f32]| {
+            equations.solve(Form::Progressive.system(), sums, beta) as u64
+        };
+        Fits::new(NormalEquations::new(job.components()), solve, count)
+    }
+
+    /// `out[i]` belongs to `points[i]`, or to both halves of a point, `points[2i]` and `points[2i + 1]`, where the form
+    /// has halves.
+    pub(super) fn resolve(
+        &self,
+        job: &RenderJob,
+        points: &[ShadingPoint<'_>],
+        (candidates, segments, components): (&mut Candidates, &Segments, &mut Components),
+        fits: &mut Fits,
+        out: &mut [Rgb],
+    ) {
+        let equations = components.sum(job, candidates, segments);
+        let Components { mixtures, sums, beta, .. } = components;
+        let (form, len, width) = (self.form, equations.len(), equations.coefficients());
+        for (mixture, sums) in mixtures.iter().zip(sums.chunks_mut(len)) {
+            form.finish(equations, sums, &mixture.integrals);
+        }
+
+        // β of the forms that fit it to these samples
+        if form != Form::Progressive {
+            let systems = sums.len() / len;
+            beta.clear();
+            beta.resize(systems * width, 0.0);
+            candidates.stats.systems += systems as u64;
+            candidates.stats.ill_conditioned += equations.solve(form.system(), sums, beta) as u64;
+        }
+
+        let rows = form.rows();
+        for (i, (out, sums)) in out.iter_mut().zip(sums.chunks(rows * len)).enumerate() {
+            let integrals = &mixtures[i * rows].integrals;
+            let estimate = match form {
+                Form::Progressive => match fits.beta(points[i].fit) {
+                    Some(beta) => form.estimate(equations, sums, beta, integrals),
+                    None => equations.mean(sums),
+                },
+                Form::Paper | Form::Regression | Form::Crossfit => {
+                    form.estimate(equations, sums, &beta[i * rows * width..][..rows * width], integrals)
+                }
+            };
+            fits.add(points[i].fit, sums);
+            *out = Rgb::from_array(estimate);
+        }
+    }
+}

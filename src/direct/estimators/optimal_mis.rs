@@ -1,0 +1,66 @@
+//! `optimal-mis`: the weights of multiple importance sampling that have least variance [Kondapaneni et al. 2019].
+//!
+//! The systems have the columns r_j = h_j/p_α, those of the paper's form r_j/I_j.
+
+use super::mis::Mis;
+use crate::direct::candidates::Candidates;
+use crate::direct::components::Components;
+use crate::direct::fits::Fits;
+use crate::direct::point::ShadingPoint;
+use crate::direct::shadow_segments::Segments;
+use crate::scene::RenderJob;
+use crate::settings::OptimalForm;
+use lumiris_numbers::estimators::ocv::NormalEquations;
+use lumiris_numbers::estimators::optimal_mis;
+use lumiris_numbers::math::Rgb;
+
+/// Optimal weights for the samples of `mis`.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct OptimalMis {
+    /// The samples.
+    pub mis: Mis,
+    /// How the weights are determined.
+    pub form: OptimalForm,
+}
+
+impl OptimalMis {
+    pub(super) fn fits(job: &RenderJob, count: usize) -> Fits {
+        Fits::new(NormalEquations::new(job.components()), solve, count)
+    }
+
+    pub(super) fn resolve(
+        &self,
+        job: &RenderJob,
+        points: &[ShadingPoint<'_>],
+        (candidates, segments, components): (&mut Candidates, &Segments, &mut Components),
+        fits: &mut Fits,
+        out: &mut [Rgb],
+    ) {
+        let equations = components.sum(job, candidates, segments);
+        let sums = components.sums.chunks(equations.len());
+        for (((out, point), sums), mixture) in out.iter_mut().zip(points).zip(sums).zip(&components.mixtures) {
+            let estimate = match (self.form, fits.beta(point.fit)) {
+                (OptimalForm::Progressive, None) => equations.mean(sums),
+                (OptimalForm::Progressive, Some(beta)) => {
+                    optimal_mis::estimate(equations, sums, &mixture.integrals, beta)
+                }
+                (OptimalForm::Direct, _) => {
+                    let outcome = optimal_mis::direct(equations, sums, &mixture.integrals);
+                    candidates.stats.systems += 1;
+                    candidates.stats.ill_conditioned += u64::from(outcome.is_ill_conditioned);
+                    outcome.estimate
+                }
+            };
+            fits.add(point.fit, sums);
+            *out = Rgb::from_array(estimate);
+        }
+    }
+}
+
+/// The coefficients of all fits.
+fn solve(equations: NormalEquations, sums: &[f32], beta: &mut [f32]) -> u64 {
+    let fits = sums.chunks(equations.len()).zip(beta.chunks_mut(equations.coefficients().max(1)));
+    // Pixels without a surface have nothing to solve
+    let lit = fits.filter(|(sums, _)| equations.samples(sums) > 0.0);
+    lit.map(|(sums, beta)| u64::from(optimal_mis::coefficients(equations, sums, beta) != Ok(0))).sum()
+}

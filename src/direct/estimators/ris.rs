@@ -1,0 +1,262 @@
+//! Resampled importance sampling of direct light [Talbot et al. 2005; Talbot 2005].
+//!
+//! T1 makes M proposals per point by light and BSDF sampling, which multiple importance sampling weights into one set
+//! [Talbot 2005, §4.6.1] with the luminance of f·G·L as target q̂. N of them are drawn in proportion to q̂·r, and only
+//! these are evaluated in colour and traced. This is unbiased for any M ≥ N ≥ 1: given the proposals, the expectation
+//! over the draws is the estimate that would trace all of them.
+//!
+//! The target `visibility` multiplies q̂ by an estimate V̂ > 0 of the visibility of each light, from the visibility
+//! cache ([`crate::lights::visibility_cache`]): fewer occluded samples are drawn, and the estimate is unbiased for any
+//! V̂.
+//!
+//! Targets with visibility reverse the order: proposals are traced, and N of the visible ones are shaded; light samples
+//! do not need the BSDF before that.
+
+use crate::bsdfs::Bsdf;
+use crate::direct::bsdf_samples::BsdfSamples;
+use crate::direct::candidates::{Candidate, Candidates, SampleAllocation};
+use crate::direct::domain;
+use crate::direct::light_samples::unshadowed_candidate;
+use crate::direct::point::ShadingPoint;
+use crate::direct::proposal_columns::{PointProposals, ProposalColumns, Techniques};
+use crate::direct::shadow_segments::Segments;
+use crate::scene::RenderJob;
+use crate::settings::{IntegratorSettings, ProposalPoints, RisSettings, SampleCounts, Strata, Target};
+use lumiris_numbers::estimators::mis::Heuristic;
+use lumiris_numbers::estimators::ris::{Draw, strata, stratified, systematic, with_replacement};
+use lumiris_numbers::math::Rgb;
+use lumiris_numbers::math::hash::{pcg4d, unit_f32};
+use std::time::Instant;
+
+/// Proposals that are generated before samples are drawn from them: few enough to stay in the processor's cache.
+const CHUNK: usize = 2048;
+
+/// Resampling of light and BSDF samples.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Ris {
+    /// Samples (N) and proposals (M).
+    pub sample_counts: SampleCounts,
+    /// Weights of the techniques that propose.
+    pub heuristic: Heuristic,
+    /// Distribution of the proposals over the lights.
+    pub points: ProposalPoints,
+    /// The target density.
+    pub target: Target,
+    /// How samples are drawn from the proposals.
+    pub strata: Strata,
+}
+
+impl Ris {
+    /// Resampling at a path vertex, counted from 0: later ones have fewer samples.
+    pub(super) fn at_vertex(settings: &IntegratorSettings, vertex: u32) -> Self {
+        let RisSettings { points, target, strata, .. } = settings.ris;
+        let sample_counts = settings.sample_counts().after_bounces(vertex);
+        Ris { sample_counts, heuristic: settings.heuristic(), points, target, strata }
+    }
+
+    /// How the proposals of a point are weighted.
+    fn techniques(&self, point: &ShadingPoint<'_>) -> Techniques {
+        let SampleAllocation { n_light, n_bsdf, .. } = allocation(point);
+        Techniques { n_light, n_bsdf, heuristic: self.heuristic, target: self.target }
+    }
+
+    /// T1 and select by turns: makes the proposals of a chunk of points and draws the samples of these points from
+    /// them. Only the samples drawn become candidates, with their contributions.
+    pub(super) fn propose_and_draw(
+        &self,
+        job: &RenderJob,
+        points: &[ShadingPoint<'_>],
+        (bsdf, b): (&mut BsdfSamples, &mut Buffers),
+        candidates: &mut Candidates,
+    ) {
+        // BSDF samples of all points; light samples, which are counted here, are made in chunks
+        candidates.draw_lights(points, allocation, |_, allocation, _| allocation.light_draws);
+        bsdf.propose(job, points, allocation, &mut [], candidates);
+        let bsdf_samples = std::mem::replace(&mut candidates.records, std::mem::take(&mut b.bsdf_samples));
+        candidates.records.clear();
+
+        let (mut first_point, mut rest) = (0, &bsdf_samples[..]);
+        while first_point < points.len() {
+            let start = Instant::now();
+            let bsdf_of_chunk = self.propose_chunk(job, (first_point, points), &mut rest, b);
+            let chunk = &points[first_point..][..b.proposals.points().len()];
+            if self.target.has_visibility() {
+                candidates.stats.segments += b.probe(job, chunk, bsdf_of_chunk);
+            }
+            let proposed = Instant::now();
+            self.draw_chunk((first_point, chunk), bsdf_of_chunk, b, candidates);
+            candidates.stats.t1_light += proposed - start;
+            candidates.stats.select += proposed.elapsed();
+            first_point += chunk.len();
+        }
+        b.bsdf_samples = bsdf_samples;
+    }
+
+    /// T1: makes the proposals of some points from `first_point` on. Takes their BSDF samples from `rest`, which are
+    /// sorted by point, and returns them.
+    fn propose_chunk<'s>(
+        &self,
+        job: &RenderJob,
+        (first_point, points): (usize, &[ShadingPoint<'_>]),
+        rest: &mut &'s [Candidate],
+        b: &mut Buffers,
+    ) -> &'s [Candidate] {
+        b.proposals.clear();
+        b.numbers.clear();
+        let (mut first, mut next) = (first_point, 0);
+        while first < points.len() && (b.proposals.count() < CHUNK || first == first_point) {
+            let point = &points[first];
+            let begin = next;
+            while next < rest.len() && rest[next].point == first as u32 {
+                next += 1;
+            }
+            let numbers = point.stream.domain(domain::RESAMPLE).draw::<2>();
+            b.numbers.push(numbers);
+            let positions = (allocation(point).light_draws, self.points, numbers[0]);
+            b.proposals.add(job, point, &self.techniques(point), positions, &rest[begin..next]);
+            first += 1;
+        }
+        b.proposals.evaluate(job, &points[first_point..first], |point| self.techniques(point));
+        let (bsdf_of_chunk, others) = rest.split_at(next);
+        *rest = others;
+        bsdf_of_chunk
+    }
+
+    /// Select: draws the samples of the points of a chunk.
+    fn draw_chunk(
+        &self,
+        (first_point, chunk): (usize, &[ShadingPoint<'_>]),
+        mut bsdf: &[Candidate],
+        b: &mut Buffers,
+        candidates: &mut Candidates,
+    ) {
+        for (i, point) in chunk.iter().enumerate() {
+            let range = b.proposals.points()[i];
+            self.draw(point, range, b.numbers[i][1], b);
+            let (own, rest) = bsdf.split_at(range.end - range.bsdf_start);
+            bsdf = rest;
+            for draw in &b.draws {
+                let place = range.start + draw.index as usize;
+                let evaluated = if place < range.bsdf_start {
+                    let at = ((first_point + i) as u32, point);
+                    let sample = b.proposals.light_sample(place);
+                    sample.and_then(|s| unshadowed_candidate(at, &SampleAllocation::fixed(0, 0), s))
+                } else {
+                    Some(own[place - range.bsdf_start])
+                };
+                if let Some(candidate) = evaluated {
+                    candidates.contributions.push(candidate.f * (b.proposals.r[place] * draw.scale));
+                    candidates.records.push(candidate);
+                }
+            }
+        }
+    }
+
+    /// Draws N proposals of a point.
+    fn draw(&self, point: &ShadingPoint<'_>, range: PointProposals, u: f32, b: &mut Buffers) {
+        let weights = &b.proposals.weight[range.start..range.end];
+        let n = point.sample_counts.samples as usize;
+        match self.strata {
+            Strata::Systematic => systematic(weights, n as u32, u, &mut b.draws),
+            Strata::None => {
+                independent_numbers(u, n, &mut b.u);
+                with_replacement(weights, &b.u, &mut b.draws);
+            }
+            Strata::Proposals => {
+                strata::equal_proposals(weights.len(), n, &mut b.ends);
+                independent_numbers(u, b.ends.len(), &mut b.u);
+                stratified(weights, &b.ends, &b.u, &mut b.draws);
+            }
+            Strata::Weights => {
+                let [bounds] = point.stream.domain(domain::STRATA).draw::<1>();
+                independent_numbers(bounds, n, &mut b.u);
+                strata::equal_weights(weights, n, &b.u, &mut b.ends);
+                independent_numbers(u, b.ends.len(), &mut b.u);
+                stratified(weights, &b.ends, &b.u, &mut b.draws);
+            }
+        }
+    }
+}
+
+/// The proposals of a point by light and by BSDF sampling: M together, unless the BSDF is all specular.
+///
+/// A BSDF sample costs as much as ten light samples, which are made many at a time, and a wide BSDF says little of
+/// where the light is: it gets one proposal in sixteen, one with a peak two; but where there are few proposals for each
+/// sample, one BSDF sample for every two samples, or four if it is wide.
+fn allocation(point: &ShadingPoint<'_>) -> SampleAllocation {
+    let (m, n) = (point.sample_counts.proposals, point.sample_counts.samples);
+    let bsdf = &point.bsdf.bsdf;
+    if !bsdf.has_non_specular() {
+        return SampleAllocation::fixed(0, n);
+    }
+    let (of_proposals, of_samples) = match bsdf {
+        Bsdf::Diffuse(_) | Bsdf::DiffuseTransmission(_) | Bsdf::Evaluated(_) => (0.0625, 0.25),
+        Bsdf::CoatedDiffuse(_)
+        | Bsdf::Conductor(_)
+        | Bsdf::Dielectric(_)
+        | Bsdf::ThinDielectric(_)
+        | Bsdf::Layered(_) => (0.125, 0.5),
+    };
+    let by_bsdf = (m as f32 * of_proposals).max(n as f32 * of_samples);
+    // A power of two, for which the points of a Sobol' sequence are best distributed
+    let by_bsdf = 1 << (by_bsdf.log2().round().max(0.0) as u32);
+    let by_bsdf = if by_bsdf < m { by_bsdf } else { 1 };
+    if m == 1 { SampleAllocation::one_of_both(point) } else { SampleAllocation::fixed(m - by_bsdf, by_bsdf) }
+}
+
+/// What is kept from batch to batch.
+#[derive(Debug, Default)]
+pub(super) struct Buffers {
+    bsdf_samples: Vec<Candidate>,
+    proposals: ProposalColumns,
+    draws: Vec<Draw>,
+    ends: Vec<u32>,
+    u: Vec<f32>,
+    probes: Segments,
+    /// Per point of the chunk, the numbers for the places of proposals and for the draws: well distributed over the
+    /// samples of a pixel.
+    numbers: Vec<[f32; 2]>,
+}
+
+impl Buffers {
+    /// Traces all proposals and sets the weights of those that are not visible to 0. Returns the number of segments.
+    fn probe(&mut self, job: &RenderJob, points: &[ShadingPoint<'_>], bsdf_samples: &[Candidate]) -> u64 {
+        self.probes.clear();
+        let mut bsdf = bsdf_samples.iter();
+        let mut probed = Vec::new();
+        for (i, point) in points.iter().enumerate() {
+            let range = self.proposals.points()[i];
+            for place in range.start..range.end {
+                let by_bsdf = if place >= range.bsdf_start { bsdf.next() } else { None };
+                if !(self.proposals.weight[place] > 0.0) {
+                    continue;
+                }
+                let segment = match by_bsdf {
+                    Some(candidate) => Some(candidate.segment),
+                    None => self.proposals.light_sample(place).map(|(_, s)| point.light_segment(&s)),
+                };
+                match segment {
+                    Some(segment) => {
+                        self.probes.push(&segment, i as u32, Rgb::BLACK);
+                        probed.push(place);
+                    }
+                    None => self.proposals.weight[place] = 0.0,
+                }
+            }
+        }
+        self.probes.trace(&*job.world.accel);
+        for (&place, &occluded) in probed.iter().zip(self.probes.occluded()) {
+            if occluded {
+                self.proposals.weight[place] = 0.0;
+            }
+        }
+        probed.len() as u64
+    }
+}
+
+/// `count` independent numbers, the first of which is `u` itself.
+fn independent_numbers(u: f32, count: usize, out: &mut Vec<f32>) {
+    out.clear();
+    let other = |i: usize| unit_f32(pcg4d([u.to_bits(), i as u32, 0x9e37_79b9, 1])[0]);
+    out.extend((0..count).map(|i| if i == 0 { u } else { other(i) }));
+}

@@ -1,0 +1,80 @@
+//! T1 by light sampling, one sample at a time.
+
+use super::candidates::{Candidate, Drawn, SampleAllocation};
+use super::domain;
+use super::point::ShadingPoint;
+use crate::lights::{LightCtx, LightId, LightSample};
+use crate::scene::RenderJob;
+
+/// Draws the light samples of a point, each of a light chosen by the light sampler. Returns their number.
+pub(super) fn draw(
+    job: &RenderJob,
+    (index, point): (u32, &ShadingPoint<'_>),
+    allocation: &SampleAllocation,
+    records: &mut Vec<Candidate>,
+) -> u32 {
+    let n = allocation.light_draws;
+    for i in 0..n {
+        let [u_choice, u0, u1] = point.stream.split(domain::LIGHT, n, i).draw::<3>();
+        let drawn = job.lights.sample(&point.light_ctx(), u_choice, [u0, u1]);
+        records.extend(drawn.and_then(|drawn| light_candidate(job, (index, point), allocation, drawn)));
+    }
+    n
+}
+
+/// A light sample; for an infinite light, with the radiance of all infinite lights and the density of choosing any of
+/// them.
+pub(super) fn with_infinite(
+    job: &RenderJob,
+    ctx: &LightCtx,
+    (light, mut sample): (LightId, LightSample),
+) -> (LightId, LightSample) {
+    let lights = &job.lights;
+    if lights.infinite.len() > 1 && lights.infinite.contains(&light) {
+        (sample.li, sample.pdf) = lights.infinite_in_direction(ctx, sample.wi);
+    }
+    (light, sample)
+}
+
+/// A sample of a light, whose density includes the choice; `None` if its integrand is zero.
+pub(super) fn light_candidate(
+    job: &RenderJob,
+    (index, point): (u32, &ShadingPoint<'_>),
+    allocation: &SampleAllocation,
+    drawn: (LightId, LightSample),
+) -> Option<Candidate> {
+    // Infinite lights overlap: a direction belongs to all of them together
+    unshadowed_candidate((index, point), allocation, with_infinite(job, &point.light_ctx(), drawn))
+}
+
+/// A sample of a light by itself, whose density includes the choice; `None` if its integrand is zero.
+pub(super) fn unshadowed_candidate(
+    (index, point): (u32, &ShadingPoint<'_>),
+    allocation: &SampleAllocation,
+    (light, sample): (LightId, LightSample),
+) -> Option<Candidate> {
+    // Unshadowed integrand
+    let f_cos = point.bsdf.f(point.wo, sample.wi) * sample.wi.dot(point.bsdf.frame.z).abs();
+    let f = f_cos * sample.li;
+    if f.is_black() || !(sample.pdf > 0.0) {
+        return None;
+    }
+
+    // A technique without samples has no weight, whatever its density
+    let drawn = if sample.is_delta { Drawn::DeltaLight } else { Drawn::Light };
+    let p_bsdf = if sample.is_delta || allocation.n_bsdf == 0.0 { 0.0 } else { point.bsdf.pdf(point.wo, sample.wi) };
+    Some(Candidate {
+        point: index,
+        drawn,
+        f,
+        li: sample.li,
+        light,
+        p_light: sample.pdf,
+        p_bsdf,
+        n_light: allocation.n_light,
+        n_bsdf: allocation.n_bsdf,
+        p_lobe: 0.0,
+        group: 0,
+        segment: point.light_segment(&sample),
+    })
+}
