@@ -1,7 +1,7 @@
 //! Lights: their emission, the sampling of directions towards them, and the choice of one of many.
 //!
 //! Reading order: [`point`], [`spot`], [`area`], [`environment`], [`emit`], [`lanes`], [`bounds`], [`choice`],
-//! [`tree`], [`tree_choice`], [`visibility_cache`], [`visibility_cache_sampler`], [`select`], [`set`], [`groups`],
+//! [`tree`], [`tree_choice`], [`visibility_cache`], [`visibility_cache_sampler`], [`light_sampler`], [`set`], [`groups`],
 //! [`sampling`], [`many`], [`irradiance`].
 
 pub mod area;
@@ -12,10 +12,10 @@ pub mod environment;
 pub mod groups;
 pub mod irradiance;
 pub mod lanes;
+pub mod light_sampler;
 pub mod many;
 pub mod point;
 pub mod sampling;
-pub mod select;
 pub mod set;
 pub mod spot;
 pub mod tree;
@@ -36,8 +36,8 @@ pub use environment::{EnvironmentFilter, EnvironmentMap, EnvironmentMapping};
 pub use groups::LightGroups;
 pub use irradiance::Irradiances;
 pub use lanes::LightLanes;
+pub use light_sampler::{LightSampler, LightSamplerKind};
 pub use sampling::LightSampling;
-pub use select::{LightSampler, LightSamplerKind};
 pub use set::{LightSet, LightSetBuilder};
 pub use tree::LightTree;
 pub use tree_choice::TreeChoice;
