@@ -147,18 +147,29 @@ pub(crate) struct EmitterInDirection {
 }
 
 /// What the direction `wi` points at, whose ray among the emitters has met `hit`; `None` if that is dark.
-pub(crate) fn emitter_in_direction(
+fn emitter_in_direction(
     job: &RenderJob,
     ctx: &LightCtx,
     wi: Vec3,
     hit: Option<&EmitterHit>,
     time: f32,
 ) -> Option<EmitterInDirection> {
-    let lights = &job.lights;
     let Some(hit) = hit else {
-        let (li, p_light) = lights.infinite_in_direction(ctx, wi);
+        let (li, p_light) = job.lights.infinite_in_direction(ctx, wi);
         return (!li.is_black()).then_some(EmitterInDirection { li, p_light, end: None });
     };
+    emitter_at(job, ctx, wi, hit, time)
+}
+
+/// What the direction `wi` points at by meeting `hit`; `None` if that is dark.
+pub(crate) fn emitter_at(
+    job: &RenderJob,
+    ctx: &LightCtx,
+    wi: Vec3,
+    hit: &EmitterHit,
+    time: f32,
+) -> Option<EmitterInDirection> {
+    let lights = &job.lights;
     let light = hit.light?;
     let surface = job.world.scene.geometry.surface_hit(hit.geometry, hit.primitive, Hit::NO_INSTANCE, hit.uv, time);
     let light_hit = LightHit { t: hit.t, p: surface.p, n: surface.n, uv: surface.uv };

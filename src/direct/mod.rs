@@ -37,7 +37,7 @@ pub mod stats;
 
 use crate::accel::RayBatch;
 use crate::scene::RenderJob;
-pub(crate) use bsdf_samples::emitter_in_direction;
+pub(crate) use bsdf_samples::emitter_at;
 use estimators::Batch;
 pub use estimators::Estimator;
 pub use fits::Fits;

@@ -18,7 +18,7 @@ use crate::direct::estimators::mis::Mis;
 use crate::direct::{DirectStage, Estimator, Fits, ShadingPoint};
 use crate::film::{Features, PixelSample};
 use crate::geometry::SurfaceHit;
-use crate::lights::LightHit;
+use crate::lights::{LightCtx, LightHit};
 use crate::materials::SurfaceBsdf;
 use crate::scene::{RenderJob, SurfaceInteraction};
 use crate::settings::{IntegratorSettings, SampleCounts};
@@ -67,6 +67,8 @@ pub struct PathIntegrator {
     pub(super) next: Vec<PathState>,
     kept: Vec<PathState>,
     passing: Vec<PathState>,
+    /// Indices of active paths that meet nothing and look for emitters.
+    escaped: Vec<u32>,
     rays: RayBatch,
     hits: Vec<Option<Hit>>,
     /// Memory of the vertices and shading points of earlier batches.
@@ -182,12 +184,13 @@ impl PathIntegrator {
             coherence = Coherence::Incoherent;
             let start = Instant::now();
             self.passing.clear();
-            for (path, hit) in self.active.iter().zip(&self.hits) {
+            self.escaped.clear();
+            for (k, (path, hit)) in self.active.iter().zip(&self.hits).enumerate() {
                 let looks_for_emitters = path.technique.is_some() || vertex == 0 && !self.only_reflected;
                 let interaction = match hit {
                     None => {
                         if looks_for_emitters {
-                            out[path.sample as usize].radiance += path.emission_at_infinity(job);
+                            self.escaped.push(k as u32);
                         }
                         continue;
                     }
@@ -248,11 +251,38 @@ impl PathIntegrator {
                     None => {}
                 }
             }
+            self.add_infinite(job, out);
             std::mem::swap(&mut self.active, &mut self.passing);
             self.stats.shade_time += start.elapsed();
         }
         std::mem::swap(&mut self.active, &mut self.kept);
         vertices
+    }
+
+    /// Adds what the escaped paths carry of infinite lights, with the weight of the technique that found it.
+    fn add_infinite(&mut self, job: &RenderJob, out: &mut [PixelSample]) {
+        let (lights, active) = (&job.lights, &self.active);
+        self.escaped.retain(|&k| {
+            let path = &active[k as usize];
+            if path.technique.is_none() {
+                out[path.sample as usize].radiance += path.beta * lights.le(path.ray.d);
+            }
+            path.technique.is_some()
+        });
+        let escaped = &self.escaped;
+        let path = |i: usize| &active[escaped[i] as usize];
+        let ctx = |i: usize| path(i).technique.map_or(LightCtx::at(Vec3::ZERO), |technique| technique.ctx);
+        lights.infinite_in_directions(
+            escaped.len(),
+            |i| (ctx(i), path(i).ray.d),
+            |i, le, p_light| {
+                let path = path(i);
+                let l = path.beta * le;
+                let weight =
+                    path.technique.filter(|_| !l.is_black()).map_or(1.0, |technique| technique.weight(|_| p_light));
+                out[path.sample as usize].radiance += l * weight;
+            },
+        );
     }
 
     /// First hits of the active paths.
@@ -419,18 +449,6 @@ impl PathState {
         match &self.technique {
             Some(technique) if !l.is_black() => l * technique.weight(|ctx| lights.pdf(ctx, light, self.ray.d, &hit)),
             _ => l,
-        }
-    }
-
-    /// The same of the infinite lights.
-    fn emission_at_infinity(&self, job: &RenderJob) -> Rgb {
-        match &self.technique {
-            Some(technique) => {
-                let (le, p_light) = job.lights.infinite_in_direction(&technique.ctx, self.ray.d);
-                let l = self.beta * le;
-                if l.is_black() { l } else { l * technique.weight(|_| p_light) }
-            }
-            None => self.beta * job.lights.le(self.ray.d),
         }
     }
 

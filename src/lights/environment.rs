@@ -15,6 +15,9 @@ use lumiris_numbers::math::sphere_map::{
 use lumiris_numbers::math::{Mat3, PiecewiseConstant2D, Rgb, Vec2, Vec3};
 use std::f64::consts::PI;
 
+/// Directions that are looked up together.
+const CHUNK: usize = 64;
+
 /// How the unit square covers the sphere; z is up in the space of the light.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum EnvironmentMapping {
@@ -205,6 +208,26 @@ impl EnvironmentMap {
     pub fn le_and_pdf(&self, w: Vec3) -> (Rgb, f32) {
         let p = self.to_square(w);
         (self.lookup(p), self.pdf_at(w, p))
+    }
+
+    /// [`le_and_pdf`](Self::le_and_pdf) of `n` directions. Texels far apart are cache misses, which overlap where nothing
+    /// else is between them.
+    pub fn le_and_pdf_many(&self, n: usize, w: impl Fn(usize) -> Vec3, mut out: impl FnMut(usize, Rgb, f32)) {
+        let mut places = [(Vec3::ZERO, Vec2::ZERO); CHUNK];
+        let mut found = [(Rgb::BLACK, 0.0); CHUNK];
+        for start in (0..n).step_by(CHUNK) {
+            let count = CHUNK.min(n - start);
+            for (i, place) in places[..count].iter_mut().enumerate() {
+                let w = w(start + i);
+                *place = (w, self.to_square(w));
+            }
+            for ((w, p), found) in places[..count].iter().zip(&mut found) {
+                *found = (self.lookup(*p), self.pdf_at(*w, *p));
+            }
+            for (i, (le, pdf)) in found[..count].iter().enumerate() {
+                out(start + i, *le, *pdf);
+            }
+        }
     }
 
     /// Density at the direction `w`, whose place in the square is `p`.

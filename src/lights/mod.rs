@@ -270,6 +270,19 @@ impl Light {
         }
     }
 
+    /// [`le_and_pdf`](Self::le_and_pdf) of `n` directions.
+    pub fn le_and_pdf_many(&self, n: usize, w: impl Fn(usize) -> Vec3, mut out: impl FnMut(usize, Rgb, f32)) {
+        if let Light::InfiniteImage { map, world_from_light, scale } = self {
+            let to_light = world_from_light.transpose();
+            map.le_and_pdf_many(n, |i| to_light * w(i), |i, le, pdf| out(i, le * *scale, pdf));
+        } else {
+            for i in 0..n {
+                let (le, pdf) = self.le_and_pdf(w(i));
+                out(i, le, pdf);
+            }
+        }
+    }
+
     /// Luminance of the emitted power. Of an infinite light, the power that reaches a disk of the scene's radius from
     /// all directions.
     pub fn phi(&self, scene_radius: f32) -> f32 {

@@ -109,6 +109,31 @@ impl LightSampling {
         })
     }
 
+    /// [`infinite_in_direction`](Self::infinite_in_direction) for `n` points and directions.
+    pub fn infinite_in_directions(
+        &self,
+        n: usize,
+        at: impl Fn(usize) -> (LightCtx, Vec3),
+        mut out: impl FnMut(usize, Rgb, f32),
+    ) {
+        if let [light] = self.set.infinite[..] {
+            self.set.lights[light as usize].le_and_pdf_many(
+                n,
+                |i| at(i).1,
+                |i, le, pdf| {
+                    let pdf = if pdf > 0.0 { pdf * self.sampler.pmf(&at(i).0, light) } else { 0.0 };
+                    out(i, le, pdf);
+                },
+            );
+        } else {
+            for i in 0..n {
+                let (ctx, wi) = at(i);
+                let (le, pdf) = self.infinite_in_direction(&ctx, wi);
+                out(i, le, pdf);
+            }
+        }
+    }
+
     /// Density per steradian of [`sample`](Self::sample) to choose any infinite light and the direction `wi`.
     #[inline]
     pub fn pdf_infinite(&self, ctx: &LightCtx, wi: Vec3) -> f32 {

@@ -189,6 +189,8 @@ struct EmitterRays {
     rays: RayBatch,
     scratch: EmitterScratch,
     emitter_hits: Vec<Option<EmitterHit>>,
+    /// Those of them that meet nothing.
+    far: Vec<u32>,
 }
 
 /// What the paths and their counts are added to.
@@ -374,24 +376,42 @@ impl<'w> Batch<'w> {
             emitter_rays.rays.push(&Ray { o, d, t_max: f32::INFINITY, time: paths[i].ray.time });
             emitter_rays.index.push(i as u32);
         }
-        let EmitterRays { index, rays, scratch, emitter_hits } = emitter_rays;
+        let EmitterRays { index, rays, scratch, emitter_hits, far } = emitter_rays;
         job.world.intersect_emitters(rays, scratch, emitter_hits);
-        for (&i, hit) in index.iter().zip(&*emitter_hits) {
-            let i = i as usize;
+        far.clear();
+        for (&place, hit) in index.iter().zip(&*emitter_hits) {
+            let i = place as usize;
+            let Some(hit) = hit else {
+                far.push(place);
+                continue;
+            };
             let (ctx, wi) = (surface.lit_points().get(i), samples.light.wi.vec3(i));
-            let Some(found) = direct::emitter_in_direction(job, &ctx, wi, hit.as_ref(), paths[i].ray.time) else {
+            let Some(found) = direct::emitter_at(job, &ctx, wi, hit, paths[i].ray.time) else {
                 samples.p_bsdf[i] = 0.0;
                 continue;
             };
             samples.light.li.set_rgb(i, found.li);
             samples.light.pdf[i] = if samples.light.is_delta[i] { 0.0 } else { found.p_light };
-            samples.light.is_far[i] = if found.end.is_some() { 0.0 } else { 1.0 };
+            samples.light.is_far[i] = 0.0;
             if let Some((p, p_error, n)) = found.end {
                 samples.light.p.set(i, p);
                 samples.light.p_error.set(i, p_error);
                 samples.light.n.set(i, n);
             }
         }
+        let SampleColumns { light: LightSamples { wi, li, pdf, is_far, is_delta, .. }, p_bsdf, .. } = samples;
+        let (at, directions) = (surface.lit_points(), wi);
+        job.lights.infinite_in_directions(
+            far.len(),
+            |k| (at.get(far[k] as usize), directions.vec3(far[k] as usize)),
+            |k, le, p_light| {
+                let i = far[k] as usize;
+                p_bsdf[i] = if le.is_black() { 0.0 } else { p_bsdf[i] };
+                li.set_rgb(i, le);
+                pdf[i] = if is_delta[i] { 0.0 } else { p_light };
+                is_far[i] = 1.0;
+            },
+        );
         let count = index.len() as u64;
         self.buffers.weigh(n, &self.estimate, false);
         count
