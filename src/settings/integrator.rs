@@ -28,8 +28,8 @@ pub struct IntegratorSettings {
     /// Weights of the techniques; see [`Self::heuristic`].
     pub heuristic: Option<Heuristic>,
     /// Fraction of the samples drawn by BSDF sampling, for estimators that combine it with light sampling (0 to 1);
-    /// with two or more samples, each technique gets at least one.
-    pub bsdf_fraction: f32,
+    /// with two or more samples, each technique gets at least one. See [`Self::bsdf_fraction`].
+    pub bsdf_fraction: Option<f32>,
     /// The light sampler.
     pub light_sampler: LightSamplerKind,
     /// Settings of `ris`.
@@ -62,7 +62,7 @@ impl Default for IntegratorSettings {
             estimator: EstimatorKind::Mis,
             samples: None,
             heuristic: None,
-            bsdf_fraction: 0.5,
+            bsdf_fraction: None,
             light_sampler: LightSamplerKind::Tree,
             ris: RisSettings::default(),
             cache: IrradianceCacheSettings::default(),
@@ -91,6 +91,12 @@ impl IntegratorSettings {
         self.heuristic.unwrap_or(self.estimator.default_heuristic())
     }
 
+    /// Fraction of the samples drawn by BSDF sampling. That of `mis` lets a path continue by its only BSDF sample, which
+    /// costs no ray of its own; control variates need samples of all components.
+    pub fn bsdf_fraction(&self) -> f32 {
+        self.bsdf_fraction.unwrap_or(if self.estimator == EstimatorKind::Mis { 0.25 } else { 0.5 })
+    }
+
     /// True if the throughput of a path decides whether it takes the bounce of this number, counted from 1.
     pub fn has_roulette(&self, bounce: u32) -> bool {
         self.roulette_depth.is_some_and(|first| bounce >= first)
@@ -108,9 +114,24 @@ impl IntegratorSettings {
         self.estimator == EstimatorKind::Contributing && self.contributing.noncontributing_samples == 0
     }
 
+    /// Default number of samples per estimate. What is fixed in the cost of a shading point justifies four: with
+    /// `ris` anywhere, with `mis` where a camera sample has one. Powers of two are well distributed.
+    fn default_samples(&self) -> u32 {
+        match self.estimator {
+            EstimatorKind::Mc => 2,
+            EstimatorKind::Mis if self.depth() > 1 => 2,
+            EstimatorKind::Mis
+            | EstimatorKind::Ris
+            | EstimatorKind::Ocv
+            | EstimatorKind::OptimalMis
+            | EstimatorKind::Correlated
+            | EstimatorKind::Contributing => 4,
+        }
+    }
+
     /// Sample and proposal counts of an estimate, unless chosen per pixel.
     pub fn sample_counts(&self) -> SampleCounts {
-        let samples = self.samples.unwrap_or(self.estimator.default_samples()).max(1);
+        let samples = self.samples.unwrap_or_else(|| self.default_samples()).max(1);
         let proposals = if self.estimator == EstimatorKind::Ris { self.ris.proposals_for(samples) } else { samples };
         SampleCounts { samples, proposals: proposals.max(samples) }
     }
@@ -184,19 +205,6 @@ pub enum EstimatorKind {
 }
 
 impl EstimatorKind {
-    /// Default number of samples per estimate. With `ris` the fixed cost of a shading point justifies more than two, and
-    /// powers of two are well distributed.
-    pub fn default_samples(self) -> u32 {
-        match self {
-            EstimatorKind::Mc | EstimatorKind::Mis => 2,
-            EstimatorKind::Ris
-            | EstimatorKind::Ocv
-            | EstimatorKind::OptimalMis
-            | EstimatorKind::Correlated
-            | EstimatorKind::Contributing => 4,
-        }
-    }
-
     /// Default MIS heuristic of `mis`, and of the techniques that propose for `ris`. Resampling has minimal variance if
     /// the proposals have, which the balance heuristic approximates; the power heuristic is better where all samples
     /// are traced.

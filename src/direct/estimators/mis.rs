@@ -21,8 +21,8 @@ pub struct Mis {
 
 impl Mis {
     pub(super) fn new(settings: &IntegratorSettings) -> Self {
-        let IntegratorSettings { bsdf_fraction, .. } = *settings;
-        Mis { samples: settings.sample_counts().samples, heuristic: settings.heuristic(), bsdf_fraction }
+        let (samples, bsdf_fraction) = (settings.sample_counts().samples, settings.bsdf_fraction());
+        Mis { samples, heuristic: settings.heuristic(), bsdf_fraction }
     }
 
     /// Number of BSDF samples among `n` ≥ 2 samples.

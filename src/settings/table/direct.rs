@@ -35,7 +35,7 @@ pub(super) const DIRECT: Group = Group {
             key: "samples",
             kind: Kind::Integer { range: SAMPLES, words: &["auto"] },
             help: "Samples per estimate (N): shadow rays per shading point, or `auto` for the estimator's default",
-            default: "auto: 2 for mc and mis, 4 for the others; ris halves it at every bounce",
+            default: "auto: 2 for mc, and for mis unless light is direct; otherwise 4; ris halves it at every bounce",
             get: |s| Some(s.integrator.samples.map_or(Value::Name("auto"), |n| Value::Integer(n.into()))),
             resolved: Some(|s| Some(Value::Integer(s.integrator.sample_counts().samples.into()))),
             set: |s, v| {
@@ -66,8 +66,10 @@ pub(super) const DIRECT: Group = Group {
             kind: Kind::Real { range: Interval::closed(0.0, 1.0), words: &[] },
             help: "Fraction of the samples drawn by BSDF sampling, for mis, ocv and optimal-mis",
             applies: Applies::Estimators(&[Mis, Ocv, OptimalMis]),
-            get: |s| Some(Value::Real(s.integrator.bsdf_fraction)),
-            set: |s, v| v.real().map(|fraction| s.integrator.bsdf_fraction = fraction),
+            default: "0.25 for mis, 0.5 for ocv and optimal-mis",
+            get: |s| s.integrator.bsdf_fraction.map(Value::Real),
+            resolved: Some(|s| Some(Value::Real(s.integrator.bsdf_fraction()))),
+            set: |s, v| v.real().map(|fraction| s.integrator.bsdf_fraction = Some(fraction)),
             ..Setting::BASE
         },
         Setting {

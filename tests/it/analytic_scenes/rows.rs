@@ -282,7 +282,7 @@ pub(super) fn job(path: &Path, c: &Configuration, edge: u32) -> RenderJob {
     settings.ocv = c.ocv;
     settings.optimal_mis = c.optimal_mis;
     settings.correlated = c.correlated;
-    settings.bsdf_fraction = c.bsdf_fraction;
+    settings.bsdf_fraction = Some(c.bsdf_fraction);
     settings.ris.proposals = Proposals::Fixed(c.proposals);
     settings.ris.strata = c.strata;
     settings.ris.points = c.points;
