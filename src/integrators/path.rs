@@ -196,16 +196,15 @@ impl PathIntegrator {
                     }
                     Some(hit) => {
                         if let (Some(batch), Some(rho)) = (&mut batch, job.plain_reflectance(hit)) {
-                            let Some(path) = path.beyond_emitter() else { continue };
+                            let Some(beta) = path.beta_beyond_emitter() else { continue };
                             let distance = hit.t * path.ray.d.length();
                             if vertex == 0 && !self.omits_features {
                                 let features = &mut out[path.sample as usize].features;
                                 features.get_or_insert_with(|| path.plain_features(job, hit, distance, rho));
                             }
                             if vertex < depth {
-                                let width = path.width + path.spread * distance;
-                                let path = PathState { width, passed: 0, travelled: 0.0, ..path };
-                                batch.push_hit(job, path, hit, rho, &samples[path.sample as usize]);
+                                let carried = path.carried(beta, path.width + path.spread * distance);
+                                batch.push_hit(job, (&carried, path.ray.d), hit, rho, &samples[path.sample as usize]);
                             }
                             continue;
                         }
@@ -215,7 +214,7 @@ impl PathIntegrator {
                 if looks_for_emitters {
                     out[path.sample as usize].radiance += path.emission(job, &interaction);
                 }
-                let Some(path) = path.beyond_emitter() else { continue };
+                let Some(beta) = path.beta_beyond_emitter() else { continue };
                 match interaction.scatter(job) {
                     Some(bsdf) => {
                         if vertex == 0 && !self.omits_features {
@@ -231,8 +230,9 @@ impl PathIntegrator {
                         }
                         if vertex < depth {
                             let sample = &samples[path.sample as usize];
-                            let path = PathState { width: interaction.width, passed: 0, travelled: 0.0, ..path };
-                            if batch.as_mut().is_some_and(|b| b.push_vertex(path, &interaction, &bsdf, sample)) {
+                            let width = interaction.width;
+                            let carried = path.carried(beta, width);
+                            if batch.as_mut().is_some_and(|b| b.push_vertex(&carried, &interaction, &bsdf, sample)) {
                                 continue;
                             }
                             let [stream, direct] =
@@ -244,10 +244,17 @@ impl PathIntegrator {
                                 stream,
                                 direct,
                             });
-                            self.kept.push(path);
+                            self.kept.push(PathState {
+                                beta,
+                                width,
+                                passed: 0,
+                                travelled: 0.0,
+                                technique: None,
+                                ..*path
+                            });
                         }
                     }
-                    None if path.passed < MAX_PASSED => self.passing.push(path.pass(&interaction)),
+                    None if path.passed < MAX_PASSED => self.passing.push(path.pass(beta, &interaction)),
                     None => {}
                 }
             }
@@ -388,7 +395,7 @@ pub(super) fn extend(
     settings: &IntegratorSettings,
 ) -> Option<(PathState, Lobe)> {
     let direction = next_direction(v, settings)?;
-    let mut next = scattered(path, point.origin(direction.wi), &direction)?;
+    let mut next = scattered(&path.carried(path.beta, path.width), point.origin(direction.wi), &direction)?;
     next.beta = survive(&next, &v.stream, vertex + 1, settings)?;
     Some((next, direction.lobe))
 }
@@ -403,7 +410,7 @@ fn extend_to_emitter(
     (settings, mis): (&IntegratorSettings, &Mis),
 ) -> Option<PathState> {
     let direction = next_direction(v, settings)?;
-    let next = scattered(path, point.origin(direction.wi), &direction)?;
+    let next = scattered(&path.carried(path.beta, path.width), point.origin(direction.wi), &direction)?;
     debug_assert!(direction.pdf.is_some(), "a resampled direction has no weight against light sampling");
     let technique = BsdfTechnique {
         ctx: point.light_ctx(),
@@ -452,12 +459,12 @@ impl PathState {
         }
     }
 
-    /// The path beyond what its last segment has hit, if roulette lets it go on.
+    /// The throughput beyond what the last segment has hit; `None` if roulette ends the path there.
     #[inline]
-    fn beyond_emitter(&self) -> Option<PathState> {
-        match self.technique.filter(|_| self.passed == 0) {
-            Some(technique) => Some(PathState { beta: technique.survivor?, ..*self }),
-            None => Some(*self),
+    fn beta_beyond_emitter(&self) -> Option<Rgb> {
+        match &self.technique {
+            Some(technique) if self.passed == 0 => technique.survivor,
+            _ => Some(self.beta),
         }
     }
 
@@ -494,9 +501,10 @@ impl PathState {
         self.travelled + interaction.distance
     }
 
-    /// The path beyond a surface that does not scatter.
-    fn pass(&self, interaction: &SurfaceInteraction) -> PathState {
+    /// The path beyond a surface that does not scatter, with the throughput `beta`.
+    fn pass(&self, beta: Rgb, interaction: &SurfaceInteraction) -> PathState {
         PathState {
+            beta,
             ray: Ray { o: interaction.origin(self.ray.d), ..self.ray },
             width: interaction.width,
             passed: self.passed + 1,

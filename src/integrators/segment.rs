@@ -89,6 +89,28 @@ pub(super) struct PathState {
     pub(super) technique: Option<BsdfTechnique>,
 }
 
+/// What a path keeps at a vertex of what it brought there.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Carried {
+    /// Index of the camera sample.
+    pub(super) sample: u32,
+    pub(super) beta: Rgb,
+    pub(super) eta_scale: f32,
+    /// Width of a pixel at the vertex, and its growth per unit length.
+    pub(super) width: f32,
+    pub(super) spread: f32,
+    pub(super) time: f32,
+}
+
+impl PathState {
+    /// At a vertex with the throughput `beta`, where a pixel has the given width.
+    #[inline]
+    pub(super) fn carried(&self, beta: Rgb, width: f32) -> Carried {
+        let PathState { sample, eta_scale, spread, ray: Ray { time, .. }, .. } = *self;
+        Carried { sample, beta, eta_scale, width, spread, time }
+    }
+}
+
 /// BSDF sampling at the last vertex, as multiple importance sampling weights it against light sampling there.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct BsdfTechnique {
@@ -115,13 +137,15 @@ impl BsdfTechnique {
 
 /// The path from the origin `o` on in a direction; `None` if it carries nothing.
 #[inline]
-pub(super) fn scattered(path: &PathState, o: Vec3, direction: &Direction) -> Option<PathState> {
+pub(super) fn scattered(path: &Carried, o: Vec3, direction: &Direction) -> Option<PathState> {
     let Direction { wi, weight, eta, .. } = *direction;
+    let Carried { sample, width, spread, time, .. } = *path;
     let beta = path.beta * weight;
     let eta_scale = path.eta_scale * eta * eta;
-    let ray = Ray { o, d: wi, t_max: f32::INFINITY, time: path.ray.time };
+    let ray = Ray { o, d: wi, t_max: f32::INFINITY, time };
+    let (passed, travelled, technique) = (0, 0.0, None);
     let carries = !beta.is_black() && beta.is_finite();
-    carries.then_some(PathState { ray, beta, eta_scale, technique: None, ..*path })
+    carries.then_some(PathState { sample, ray, beta, eta_scale, width, spread, passed, travelled, technique })
 }
 
 /// Russian roulette before bounce `bounce` on what the path that left the vertex of `stream` carries without the scaling

@@ -1,7 +1,7 @@
 //! Vertices of many paths at once, in columns: the point that a ray met on a triangle, Lambertian reflection, the
 //! weights of light samples, and shadow segments.
 //!
-//! The formulas are those of the modules `geometry::mesh`, `bsdfs::diffuse` and `direct::propose` for single vertices.
+//! The formulas are those of the modules `geometry::mesh`, `bsdfs::diffuse` and `direct` for single vertices.
 //! Columns have one length, a multiple of [`LANES`].
 
 use super::lane::{F, I, LANES, M, Vec3s, Wide, load, or_zero, safe_sqrt, sin_cos_eighth, store};
@@ -17,19 +17,19 @@ pub type Columns3<'a> = [&'a [f32]; 3];
 /// Three columns to be written.
 pub type ColumnsMut3<'a> = [&'a mut [f32]; 3];
 
-/// Hits of triangles.
-#[derive(Clone, Copy, Debug)]
-pub struct TriangleHits<'a> {
+/// Hits of [`LANES`] triangles: `[axis][lane]` of vectors.
+#[derive(Clone, Copy, Debug, Default)]
+pub struct TriangleHits {
     /// The corners.
-    pub corners: [Columns3<'a>; 3],
+    pub corners: [[[f32; LANES]; 3]; 3],
     /// Shading normals of the corners; zero where there are none.
-    pub normals: [Columns3<'a>; 3],
+    pub normals: [[[f32; LANES]; 3]; 3],
     /// Weights of corners 1 and 2.
-    pub b: [&'a [f32]; 2],
+    pub b: [[f32; LANES]; 2],
     /// 1, or −1 where the normal is the reverse of (p1 − p0) × (p2 − p0).
-    pub orientation: &'a [f32],
+    pub orientation: [f32; LANES],
     /// Directions of the rays.
-    pub d: Columns3<'a>,
+    pub d: [[f32; LANES]; 3],
 }
 
 /// Points of surfaces.
@@ -50,15 +50,16 @@ pub struct Points<'a> {
 }
 
 /// Determines the points that rays have met.
-pub fn points(level: Level, hits: &TriangleHits<'_>, out: &mut Points<'_>) {
+pub fn points(level: Level, hits: &[TriangleHits], out: &mut Points<'_>) {
     dispatch!(level, simd => points_lanes(simd, hits, out));
 }
 
 #[inline(always)]
-fn points_lanes<S: Simd>(simd: S, hits: &TriangleHits<'_>, out: &mut Points<'_>) {
-    for i in (0..hits.orientation.len()).step_by(LANES) {
-        let corners = load_three(simd, hits.corners, i);
-        let (b1, b2) = (load(simd, hits.b[0], i), load(simd, hits.b[1], i));
+fn points_lanes<S: Simd>(simd: S, hits: &[TriangleHits], out: &mut Points<'_>) {
+    for (block, hits) in hits.iter().enumerate() {
+        let i = block * LANES;
+        let corners = load_three(simd, &hits.corners);
+        let (b1, b2) = (load(simd, &hits.b[0], 0), load(simd, &hits.b[1], 0));
         let one = F::splat(simd, 1.0);
         let b0 = one - b1 - b2;
 
@@ -66,12 +67,12 @@ fn points_lanes<S: Simd>(simd: S, hits: &TriangleHits<'_>, out: &mut Points<'_>)
         let (low, high) = (halves(corners, b1, b2, true), halves(corners, b1, b2, false));
         let p = Vec3s { x: low.0[0].narrow(high.0[0]), y: low.0[1].narrow(high.0[1]), z: low.0[2].narrow(high.0[2]) };
         let n = Vec3s { x: low.1[0].narrow(high.1[0]), y: low.1[1].narrow(high.1[1]), z: low.1[2].narrow(high.1[2]) };
-        let n = n.times(load(simd, hits.orientation, i));
+        let n = n.times(load(simd, &hits.orientation, 0));
 
         let terms = [absolute(corners[0].times(b0)), absolute(corners[1].times(b1)), absolute(corners[2].times(b2))];
         let error = terms[0].plus(terms[1]).plus(terms[2]).times(F::splat(simd, gamma(7)));
 
-        let normals = load_three(simd, hits.normals, i);
+        let normals = load_three(simd, &hits.normals);
         let blend = normals[0].times(b0).plus(normals[1].times(b1)).plus(normals[2].times(b2));
         let inverse = one / blend.dot(blend).sqrt();
         let has_normal = inverse.is_finite();
@@ -79,7 +80,7 @@ fn points_lanes<S: Simd>(simd: S, hits: &TriangleHits<'_>, out: &mut Points<'_>)
         let zero = F::splat(simd, 0.0);
         let n = either(n.dot(ns).simd_lt(zero), n.times(-one), n);
 
-        let d = Vec3s::load(simd, hits.d, i);
+        let d = load_rows(simd, &hits.d);
         let wo = d.times(-(one / d.dot(d).sqrt()));
         p.store(&mut out.p, i);
         error.store(&mut out.p_error, i);
@@ -91,8 +92,13 @@ fn points_lanes<S: Simd>(simd: S, hits: &TriangleHits<'_>, out: &mut Points<'_>)
 }
 
 #[inline(always)]
-fn load_three<S: Simd>(simd: S, from: [Columns3<'_>; 3], i: usize) -> [Vec3s<S>; 3] {
-    [Vec3s::load(simd, from[0], i), Vec3s::load(simd, from[1], i), Vec3s::load(simd, from[2], i)]
+fn load_rows<S: Simd>(simd: S, rows: &[[f32; LANES]; 3]) -> Vec3s<S> {
+    Vec3s { x: load(simd, &rows[0], 0), y: load(simd, &rows[1], 0), z: load(simd, &rows[2], 0) }
+}
+
+#[inline(always)]
+fn load_three<S: Simd>(simd: S, from: &[[[f32; LANES]; 3]; 3]) -> [Vec3s<S>; 3] {
+    [load_rows(simd, &from[0]), load_rows(simd, &from[1]), load_rows(simd, &from[2])]
 }
 
 #[inline(always)]

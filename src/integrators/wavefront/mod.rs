@@ -11,8 +11,8 @@
 //! another form than that of its neighbours (resampled or purely specular BSDFs) is left to [`crate::direct`].
 
 use super::segment::{
-    BsdfTechnique, CameraSample, Direction, PathState, PathStats, domain, emptied, sampled_direction, scattered,
-    survive,
+    BsdfTechnique, CameraSample, Carried, Direction, PathState, PathStats, domain, emptied, sampled_direction,
+    scattered, survive,
 };
 use crate::accel::{Coherence, Hit, RayBatch};
 use crate::bsdfs::{Bsdf, Diffuse, Lobe};
@@ -24,6 +24,7 @@ use crate::materials::SurfaceBsdf;
 use crate::scene::{EmitterHit, EmitterScratch, RenderJob, SurfaceInteraction};
 use crate::settings::IntegratorSettings;
 use lumiris_lanes::columns::{Column, Columns3, padded, reserve};
+use lumiris_lanes::lane::LANES;
 use lumiris_lanes::vertex::{self as kernels, Ends, Lambertian, Points, Rays, Samples, TriangleHits};
 use lumiris_lanes::{level, sampler};
 use lumiris_numbers::estimators::mis::Heuristic;
@@ -115,11 +116,12 @@ pub(super) struct Batch<'w> {
 /// What the next batch needs as well.
 #[derive(Debug, Default)]
 pub(super) struct Buffers {
-    paths: Vec<PathState>,
+    paths: Vec<Carried>,
     /// Random numbers of the vertices, and of their direct light.
     streams: Vec<SampleStream>,
     direct: Vec<SampleStream>,
-    hits: Hits,
+    /// What determines points, so many at a time as lanes.
+    hits: Vec<TriangleHits>,
     surface: Surface,
     /// Direct light.
     radiance: Columns3,
@@ -129,16 +131,6 @@ pub(super) struct Buffers {
     traced: Traced,
     emitter_rays: EmitterRays,
     spare_singles: Vec<Single<'static>>,
-}
-
-/// What determines points.
-#[derive(Debug, Default)]
-struct Hits {
-    corners: [Columns3; 3],
-    normals: [Columns3; 3],
-    b: [Column; 2],
-    orientation: Column,
-    d: Columns3,
 }
 
 /// Points of surfaces, and Lambertian reflection there.
@@ -219,19 +211,31 @@ impl<'w> Batch<'w> {
 
     /// Adds the vertex where `path` has hit a mesh in world space that reflects `rho` everywhere.
     #[inline]
-    pub(super) fn push_hit(&mut self, job: &RenderJob, path: PathState, hit: &Hit, rho: Rgb, sample: &CameraSample) {
+    pub(super) fn push_hit(
+        &mut self,
+        job: &RenderJob,
+        (path, d): (&Carried, Vec3),
+        hit: &Hit,
+        rho: Rgb,
+        sample: &CameraSample,
+    ) {
         let Shape::Mesh(mesh) = &job.world.scene.geometry.geometries[hit.geometry as usize].shape else { return };
         let i = self.buffers.paths.len();
-        let Hits { corners, normals, b, orientation, d } = &mut self.buffers.hits;
-        for (columns, p) in corners.iter_mut().zip(mesh.triangle(hit.primitive as usize)) {
-            columns.set(i, p);
+        let (hits, k) = (&mut self.buffers.hits[i / LANES], i % LANES);
+        let vertices = mesh.indices[hit.primitive as usize];
+        for (rows, p) in hits.corners.iter_mut().zip(mesh.corners(vertices)) {
+            set_lane(rows, k, p);
         }
-        for (columns, v) in normals.iter_mut().zip(mesh.indices[hit.primitive as usize]) {
-            columns.set(i, mesh.normals.get(v as usize).copied().unwrap_or(Vec3::ZERO));
+        if mesh.normals.is_empty() {
+            hits.normals.iter_mut().for_each(|rows| set_lane(rows, k, Vec3::ZERO));
+        } else {
+            for (rows, v) in hits.normals.iter_mut().zip(vertices) {
+                set_lane(rows, k, mesh.normals[v as usize]);
+            }
         }
-        [b[0][i], b[1][i]] = hit.uv;
-        orientation[i] = if mesh.flip_normal { -1.0 } else { 1.0 };
-        d.set(i, path.ray.d);
+        [hits.b[0][k], hits.b[1][k]] = hit.uv;
+        hits.orientation[k] = if mesh.flip_normal { -1.0 } else { 1.0 };
+        set_lane(&mut hits.d, k, d);
         self.buffers.surface.rho.set_rgb(i, rho);
         self.push(path, sample);
     }
@@ -240,7 +244,7 @@ impl<'w> Batch<'w> {
     #[inline]
     pub(super) fn push_vertex(
         &mut self,
-        path: PathState,
+        path: &Carried,
         interaction: &SurfaceInteraction,
         bsdf: &SurfaceBsdf<'w>,
         sample: &CameraSample,
@@ -255,9 +259,9 @@ impl<'w> Batch<'w> {
     }
 
     #[inline]
-    fn push(&mut self, path: PathState, sample: &CameraSample) {
+    fn push(&mut self, path: &Carried, sample: &CameraSample) {
         let key = domain::VERTEX + self.estimate.vertex;
-        self.buffers.paths.push(path);
+        self.buffers.paths.push(*path);
         self.buffers.streams.push(sample.stream.domain(key));
         self.buffers.direct.push(sample.direct.domain(key).domain(domain::DIRECT));
     }
@@ -373,7 +377,7 @@ impl<'w> Batch<'w> {
         emitter_rays.rays.clear();
         for i in (0..n).filter(|&i| samples.p_bsdf[i] > 0.0) {
             let (o, d) = (samples.o.vec3(i), samples.light.wi.vec3(i));
-            emitter_rays.rays.push(&Ray { o, d, t_max: f32::INFINITY, time: paths[i].ray.time });
+            emitter_rays.rays.push(&Ray { o, d, t_max: f32::INFINITY, time: paths[i].time });
             emitter_rays.index.push(i as u32);
         }
         let EmitterRays { index, rays, scratch, emitter_hits, far } = emitter_rays;
@@ -386,7 +390,7 @@ impl<'w> Batch<'w> {
                 continue;
             };
             let (ctx, wi) = (surface.lit_points().get(i), samples.light.wi.vec3(i));
-            let Some(found) = direct::emitter_at(job, &ctx, wi, hit, paths[i].ray.time) else {
+            let Some(found) = direct::emitter_at(job, &ctx, wi, hit, paths[i].time) else {
                 samples.p_bsdf[i] = 0.0;
                 continue;
             };
@@ -483,6 +487,12 @@ impl<'w> Batch<'w> {
     }
 }
 
+/// Sets a vector of a lane.
+#[inline]
+fn set_lane(rows: &mut [[f32; LANES]; 3], k: usize, v: Vec3) {
+    (rows[0][k], rows[1][k], rows[2][k]) = v.into();
+}
+
 /// Which random numbers of a vertex.
 enum Stream {
     /// A domain of the vertex.
@@ -496,31 +506,25 @@ impl Buffers {
         self.paths.clear();
         self.streams.clear();
         self.direct.clear();
-        let Hits { corners, normals, b: [b1, b2], orientation, d } = &mut self.hits;
-        corners.iter_mut().chain(normals).chain([d, &mut self.radiance]).for_each(|c| c.reserve(len));
+        if self.hits.len() < len / LANES {
+            self.hits.resize(len / LANES, TriangleHits::default());
+        }
+        self.radiance.reserve(len);
         let Surface { p, p_error, n, lit, ns, wo, rho } = &mut self.surface;
         [p, p_error, n, lit, ns, wo, rho].into_iter().for_each(|c| c.reserve(len));
         let SampleColumns { u: [u0, u1, u2], light, f_cos, p_bsdf, c, o, d, t_max } = &mut self.samples;
         light.reserve(len);
         [f_cos, c, o, d].into_iter().for_each(|c| c.reserve(len));
-        reserve(&mut [b1, b2, orientation, u0, u1, u2, p_bsdf, t_max], len);
+        reserve(&mut [u0, u1, u2, p_bsdf, t_max], len);
         self.radiance.get_mut(len).into_iter().for_each(|c| c.fill(0.0));
     }
 
     /// The points of hits.
     fn find_points(&mut self, n: usize) {
         let len = padded(n);
-        let Hits { corners, normals, b, orientation, d } = &self.hits;
-        let hits = TriangleHits {
-            corners: corners.each_ref().map(|c| c.get(len)),
-            normals: normals.each_ref().map(|c| c.get(len)),
-            b: b.each_ref().map(|b| &b[..len]),
-            orientation: &orientation[..len],
-            d: d.get(len),
-        };
         let Surface { p, p_error, n, lit, ns, wo, .. } = &mut self.surface;
         let [p, p_error, n, facing, ns, wo] = [p, p_error, n, lit, ns, wo].map(|c| c.get_mut(len));
-        kernels::points(level(), &hits, &mut Points { p, p_error, n, facing, ns, wo });
+        kernels::points(level(), &self.hits[..len / LANES], &mut Points { p, p_error, n, facing, ns, wo });
     }
 
     /// The shading normals as features of the camera samples that have features.
@@ -590,7 +594,7 @@ impl Buffers {
         for (to, from) in columns {
             to.extend(index.iter().map(|&i| from[i as usize]));
         }
-        rays.time.extend(index.iter().map(|&i| self.paths[i as usize].ray.time));
+        rays.time.extend(index.iter().map(|&i| self.paths[i as usize].time));
     }
 }
 

@@ -1,6 +1,7 @@
 //! Tests of `lumiris_lanes::vertex`.
 
 use super::support::assert_same_bits;
+use lumiris_lanes::lane::LANES;
 use lumiris_lanes::vertex::*;
 use lumiris_lanes::{Level, level};
 use lumiris_numbers::estimators::mis::{Heuristic, Technique};
@@ -41,13 +42,17 @@ fn kernels_are_the_same_at_all_levels() {
     let stream = &mut pcg32([8, 1, 1]);
     let (corners, normals) = ([0, 1, 2].map(|_| vectors(stream, 4.0)), [0, 1, 2].map(|_| vectors(stream, 1.0)));
     let (b, d) = ([numbers(stream, 0.5), numbers(stream, 0.5)], directions(stream));
-    let hits = TriangleHits {
-        corners: [slices(&corners[0]), slices(&corners[1]), slices(&corners[2])],
-        normals: [slices(&normals[0]), slices(&normals[1]), slices(&normals[2])],
-        b: [&b[0], &b[1]],
-        orientation: &[1.0; N],
-        d: slices(&d),
-    };
+    let lanes = |from: &[f32], block: usize| -> [f32; LANES] { std::array::from_fn(|k| from[block * LANES + k]) };
+    let rows = |from: &Three, block: usize| from.each_ref().map(|column| lanes(column, block));
+    let hits: Vec<TriangleHits> = (0..N / LANES)
+        .map(|block| TriangleHits {
+            corners: corners.each_ref().map(|p| rows(p, block)),
+            normals: normals.each_ref().map(|n| rows(n, block)),
+            b: b.each_ref().map(|b| lanes(b, block)),
+            orientation: [1.0; LANES],
+            d: rows(&d, block),
+        })
+        .collect();
     assert_same_bits::<18>(N, |level, [a, b, c, d, e, f, g, h, i, j, k, l, m, n, o, p, q, r]| {
         let mut out =
             Points { p: [a, b, c], p_error: [d, e, f], n: [g, h, i], facing: [j, k, l], ns: [m, n, o], wo: [p, q, r] };
