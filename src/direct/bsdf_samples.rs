@@ -1,12 +1,10 @@
-//! T1 by BSDF sampling: directions, and the emitters that they point at.
+//! T1 by BSDF sampling, one sample at a time: a direction, and the emitter that it points at.
 
-use super::candidates::{Candidate, Candidates, Drawn, SampleAllocation};
-use super::domain;
-use super::mixture::Mixture;
+use super::candidates::{Candidate, Drawn, SampleAllocation};
 use super::point::ShadingPoint;
-use crate::accel::{Hit, RayBatch};
+use crate::accel::Hit;
 use crate::lights::{LightCtx, LightHit, LightId};
-use crate::scene::{EmitterHit, EmitterScratch, RenderJob};
+use crate::scene::{EmitterHit, RenderJob};
 use lumiris_numbers::math::{Rgb, Vec3};
 
 /// A BSDF sample whose emitter has not been determined yet.
@@ -22,83 +20,17 @@ pub(super) struct PendingBsdf {
     pub allocation: SampleAllocation,
 }
 
-/// The BSDF samples of a batch.
-#[derive(Debug, Default)]
-pub(super) struct BsdfSamples {
-    pending: Vec<PendingBsdf>,
-    rays: RayBatch,
-    hits: EmitterScratch,
-    emitter_hits: Vec<Option<EmitterHit>>,
-}
-
-impl BsdfSamples {
-    /// Draws the BSDF samples of all points; those that point at an emitter become candidates. `mixtures` are those of
-    /// the points, or none.
-    pub(super) fn propose(
-        &mut self,
-        job: &RenderJob,
-        points: &[ShadingPoint<'_>],
-        allocate: impl Fn(&ShadingPoint<'_>) -> SampleAllocation,
-        mixtures: &mut [Mixture],
-        candidates: &mut Candidates,
-    ) {
-        // Samples up to the question which emitter they point at
-        self.pending.clear();
-        self.rays.clear();
-        for (index, point) in points.iter().enumerate() {
-            let allocation = allocate(point);
-            for i in 0..allocation.bsdf_draws {
-                let u = point.stream.split(domain::BSDF, allocation.bsdf_draws, i).draw::<3>();
-                self.draw((index as u32, point), allocation, u, mixtures.get_mut(index));
-            }
-        }
-
-        // The emitters
-        candidates.stats.emitter_rays += self.rays.len() as u64;
-        job.world.intersect_emitters(&self.rays, &mut self.hits, &mut self.emitter_hits);
-        for (pending, hit) in self.pending.iter().zip(&self.emitter_hits) {
-            let point = &points[pending.point as usize];
-            let mut candidate = bsdf_candidate(job, point, pending, hit.as_ref());
-            if let Some(mixture) = mixtures.get_mut(pending.point as usize) {
-                match &mut candidate {
-                    Some(c) if pending.specular => c.p_lobe = if pending.lobe == 0 { c.p_bsdf } else { 0.0 },
-                    Some(c) => c.p_lobe = mixture.p_lobe(point, pending.wi, c.p_bsdf),
-                    None => mixture.zero_valued[pending.lobe] += 1,
-                }
-            }
-            candidates.records.extend(candidate);
-        }
-    }
-
-    /// Draws a sample. A zero-valued one is only counted.
-    fn draw(
-        &mut self,
-        (index, point): (u32, &ShadingPoint<'_>),
-        allocation: SampleAllocation,
-        [uc, u0, u1]: [f32; 3],
-        mixture: Option<&mut Mixture>,
-    ) {
-        let lobe = mixture.as_ref().map_or(0, |mixture| mixture.lobe(uc));
-        let sample = point.bsdf.sample(point.wo, uc, [u0, u1]);
-        let sample =
-            sample.map(|s| (s.f * s.wi.dot(point.bsdf.frame.z).abs(), s)).filter(|(f_cos, _)| !f_cos.is_black());
-        let Some((f_cos, sample)) = sample else {
-            if let Some(mixture) = mixture {
-                mixture.zero_valued[lobe] += 1;
-            }
-            return;
-        };
-        self.rays.push(&point.ray(sample.wi));
-        self.pending.push(PendingBsdf {
-            point: index,
-            wi: sample.wi,
-            f_cos,
-            pdf: sample.pdf,
-            specular: sample.lobe.is_specular(),
-            lobe,
-            allocation,
-        });
-    }
+/// Draws a BSDF sample up to the question which emitter it points at; `None` if its value is zero.
+pub(super) fn draw(
+    (index, point): (u32, &ShadingPoint<'_>),
+    allocation: SampleAllocation,
+    [uc, u0, u1]: [f32; 3],
+    lobe: usize,
+) -> Option<PendingBsdf> {
+    let s = point.bsdf.sample(point.wo, uc, [u0, u1])?;
+    let f_cos = s.f * s.wi.dot(point.bsdf.frame.z).abs();
+    let specular = s.lobe.is_specular();
+    (!f_cos.is_black()).then_some(PendingBsdf { point: index, wi: s.wi, f_cos, pdf: s.pdf, specular, lobe, allocation })
 }
 
 /// Completes a BSDF sample with the emitter that it points at; `None` if it points at none.

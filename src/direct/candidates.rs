@@ -7,7 +7,6 @@ use crate::lights::LightId;
 use lumiris_numbers::estimators::mc;
 use lumiris_numbers::estimators::mis::{Heuristic, Technique};
 use lumiris_numbers::math::{Ray, Rgb};
-use std::time::Instant;
 
 /// Which technique drew a candidate.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -124,24 +123,6 @@ impl Candidates {
         self.records.clear();
         self.contributions.clear();
         self.stats = DirectStats::default();
-    }
-
-    /// Draws the light samples of all points, those of a point with `draw`, which adds the candidates and answers how
-    /// many samples it drew. Counts the samples of both techniques.
-    pub(super) fn draw_lights(
-        &mut self,
-        points: &[ShadingPoint<'_>],
-        allocate: impl Fn(&ShadingPoint<'_>) -> SampleAllocation,
-        mut draw: impl FnMut((u32, &ShadingPoint<'_>), &SampleAllocation, &mut Vec<Candidate>) -> u32,
-    ) {
-        let start = Instant::now();
-        for (index, point) in (0..).zip(points) {
-            let allocation = allocate(point);
-            let drawn = draw((index, point), &allocation, &mut self.records);
-            self.stats.proposals += u64::from(drawn + allocation.bsdf_draws);
-            self.stats.light_proposals += u64::from(drawn);
-        }
-        self.stats.t1_light += start.elapsed();
     }
 
     /// Select where all candidates are traced: the contribution of each is f times its factor.

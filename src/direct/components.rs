@@ -1,11 +1,11 @@
 //! What `ocv` and `optimal-mis` have in common: samples drawn from a mixture of densities, the density of each
 //! component of it at each sample, and sums of normal equations over them.
 
-use super::bsdf_samples::BsdfSamples;
 use super::candidates::{Candidates, Drawn, SampleAllocation};
 use super::mixture::{Mixture, draw_groups};
 use super::point::ShadingPoint;
 use super::shadow_segments::Segments;
+use super::t1::T1;
 use crate::accel::RayBatch;
 use crate::scene::RenderJob;
 use lumiris_numbers::estimators::ocv::NormalEquations;
@@ -28,20 +28,13 @@ pub(super) struct Components {
 
 impl Components {
     /// T1: light samples separately for each group of lights, and BSDF samples.
-    pub(super) fn propose(
-        &mut self,
-        job: &RenderJob,
-        points: &[ShadingPoint<'_>],
-        allocate: impl Fn(&ShadingPoint<'_>) -> SampleAllocation,
-        bsdf: &mut BsdfSamples,
-        candidates: &mut Candidates,
-    ) {
+    pub(super) fn propose(&mut self, t1: &mut T1<'_>, allocate: impl Fn(&ShadingPoint<'_>) -> SampleAllocation) {
         self.mixtures.clear();
-        candidates.draw_lights(points, &allocate, |at, allocation, records| {
+        t1.draw_lights(&allocate, |job, at, allocation, records| {
             self.mixtures.push(draw_groups(job, at, allocation, records));
             allocation.light_draws
         });
-        bsdf.propose(job, points, allocate, &mut self.mixtures, candidates);
+        t1.draw_bsdf(allocate, &mut self.mixtures);
     }
 
     /// Adds up the normal equations of each point from its traced candidates.
@@ -54,7 +47,7 @@ impl Components {
         let traced = candidates.records.iter().zip(&candidates.contributions).zip(&self.is_free);
         for ((c, contribution), &is_free) in traced {
             let mixture = &self.mixtures[c.point as usize];
-            let y = if is_free { *contribution * mixture.samples() } else { Rgb::BLACK };
+            let y = if is_free { *contribution * mixture.n } else { Rgb::BLACK };
             let (count, columns) = mixture.columns(c);
             equations.add_sparse(&mut self.sums[c.point as usize * len..][..len], &columns[..count], y.to_array());
         }

@@ -30,11 +30,6 @@ impl Fits {
         Fits { equations, solver, sums, beta }
     }
 
-    /// True if there are none: estimates then use no coefficients.
-    pub fn is_empty(&self) -> bool {
-        self.sums.is_empty()
-    }
-
     /// Begins a block. Returns the number of fits whose system is ill-conditioned; without a solution, estimates are
     /// those of MIS.
     pub fn solve(&mut self) -> u64 {
@@ -44,12 +39,12 @@ impl Fits {
     /// The coefficients of a fit; `None` if there are no fits.
     pub(super) fn beta(&self, fit: u32) -> Option<&[f32]> {
         let len = self.equations.coefficients();
-        (!self.is_empty()).then(|| &self.beta[fit as usize * len..][..len])
+        (!self.sums.is_empty()).then(|| &self.beta[fit as usize * len..][..len])
     }
 
     /// Adds the sums of an estimate to those of its fit, if there are fits.
     pub(super) fn add(&mut self, fit: u32, sums: &[f32]) {
-        if !self.is_empty() {
+        if !self.sums.is_empty() {
             let len = self.equations.len();
             self.equations.merge(&mut self.sums[fit as usize * len..][..len], sums);
         }

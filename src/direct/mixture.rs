@@ -36,7 +36,7 @@ pub struct Mixture {
     /// Failed light samples, for which there was no light to choose.
     pub failed: u32,
     /// N.
-    n: f32,
+    pub n: f32,
     n_light: f32,
     n_bsdf: f32,
     lobes: usize,
@@ -79,12 +79,6 @@ impl Mixture {
     #[inline]
     pub fn component(&self, group: usize) -> usize {
         self.lobes + group
-    }
-
-    /// N.
-    #[inline]
-    pub fn samples(&self) -> f32 {
-        self.n
     }
 
     /// r_j of a sample, by component, of those that are not 0; none if its densities cannot be divided. How many there

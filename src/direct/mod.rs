@@ -16,8 +16,8 @@
 //! | file | |
 //! |---|---|
 //! | [`point`], [`domain`] | shading points, and the domains of their random numbers |
-//! | [`candidates`] | candidates, their counts and their contributions |
-//! | [`light_samples`], [`bsdf_samples`] | T1 by light sampling and by BSDF sampling |
+//! | [`candidates`], [`stats`] | candidates, their contributions, counts and times |
+//! | [`light_samples`], [`bsdf_samples`], [`t1`] | T1 by light sampling and by BSDF sampling |
 //! | [`mixture`], [`components`], [`fits`] | samples with the densities of the components of their mixture, the normal equations of their estimates, and coefficients for later ones |
 //! | [`proposal_columns`] | the many light samples of resampling, in columns |
 //! | [`shadow_segments`] | T2 |
@@ -34,6 +34,7 @@ pub mod point;
 pub mod proposal_columns;
 pub mod shadow_segments;
 pub mod stats;
+mod t1;
 
 use crate::accel::RayBatch;
 use crate::scene::RenderJob;
@@ -98,7 +99,7 @@ impl DirectStage {
             batch.segments.set_free();
         } else {
             batch.segments.trace(&*job.world.accel);
-            batch.candidates.stats.segments += batch.segments.len() as u64;
+            batch.candidates.stats.segments += batch.segments.rays().len() as u64;
         }
         let traced = Instant::now();
 

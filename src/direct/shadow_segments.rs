@@ -20,16 +20,6 @@ pub struct Segments {
 }
 
 impl Segments {
-    /// Number of segments.
-    pub fn len(&self) -> usize {
-        self.rays.len()
-    }
-
-    /// True if there is nothing to trace.
-    pub fn is_empty(&self) -> bool {
-        self.rays.is_empty()
-    }
-
     /// Removes all.
     pub fn clear(&mut self) {
         self.rays.clear();

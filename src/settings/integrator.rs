@@ -211,9 +211,7 @@ impl EstimatorKind {
     pub fn default_heuristic(self) -> Heuristic {
         match self {
             EstimatorKind::Ris | EstimatorKind::Ocv | EstimatorKind::OptimalMis => Heuristic::Balance,
-            EstimatorKind::Mc | EstimatorKind::Mis | EstimatorKind::Correlated | EstimatorKind::Contributing => {
-                Heuristic::Power
-            }
+            _ => Heuristic::Power,
         }
     }
 }

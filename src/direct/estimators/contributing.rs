@@ -17,11 +17,11 @@
 //! S_con + S_non samples are drawn as by `mc`.
 
 use super::mc;
-use crate::direct::bsdf_samples::BsdfSamples;
-use crate::direct::candidates::{Candidate, Candidates, SampleAllocation};
+use crate::direct::candidates::{Candidate, SampleAllocation};
 use crate::direct::domain;
 use crate::direct::light_samples::{self, unshadowed_candidate};
 use crate::direct::point::ShadingPoint;
+use crate::direct::t1::T1;
 use crate::lights::{Light, LightCtx, LightId, LightSample, LightSampling, LightSet};
 use crate::scene::RenderJob;
 use lumiris_numbers::math::cumulative;
@@ -40,17 +40,10 @@ pub struct Contributing {
 }
 
 impl Contributing {
-    pub(super) fn propose(
-        &self,
-        job: &RenderJob,
-        points: &[ShadingPoint<'_>],
-        (bsdf, buffers): (&mut BsdfSamples, &mut Buffers),
-        candidates: &mut Candidates,
-    ) {
-        candidates.draw_lights(points, mc::allocation, |at, allocation, records| {
+    pub(super) fn propose(&self, t1: &mut T1<'_>, buffers: &mut Buffers) {
+        t1.propose(mc::allocation, |job, at, allocation, records| {
             if allocation.light_draws == 0 { 0 } else { buffers.draw(job, at, self.noncontributing_samples, records) }
         });
-        bsdf.propose(job, points, mc::allocation, &mut [], candidates);
     }
 }
 

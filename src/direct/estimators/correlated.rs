@@ -27,6 +27,7 @@ use crate::direct::domain;
 use crate::direct::light_samples::{light_candidate, with_infinite};
 use crate::direct::point::ShadingPoint;
 use crate::direct::shadow_segments::Segments;
+use crate::direct::t1::T1;
 use crate::lights::{LightId, LightSample};
 use crate::scene::{EmitterHit, EmitterScratch, RenderJob};
 use crate::settings::{CorrelatedForm, SamplingTechnique};
@@ -170,15 +171,11 @@ pub(super) struct Buffers {
 
 impl Correlated {
     /// Zero-valued samples are counted, the others become candidates.
-    pub(super) fn propose(
-        &self,
-        job: &RenderJob,
-        points: &[ShadingPoint<'_>],
-        b: &mut Buffers,
-        candidates: &mut Candidates,
-    ) {
+    pub(super) fn propose(&self, t1: &mut T1<'_>, b: &mut Buffers) {
+        let T1 { job, points, candidates, .. } = t1;
         b.controls.clear();
         b.pending.clear();
+        b.rays.clear();
         b.estimates.clear();
         b.estimates.extend(points.iter().map(|point| Estimate::new(job, self.technique, point)));
 
@@ -191,7 +188,6 @@ impl Correlated {
         }
         candidates.stats.t1_light += start.elapsed();
 
-        b.rays.clear();
         for (index, point) in points.iter().enumerate() {
             b.draw_bsdf((index, point), candidates);
         }
@@ -240,7 +236,7 @@ impl Correlated {
 impl Buffers {
     /// Samples of delta lights.
     fn draw_delta(&mut self, job: &RenderJob, (index, point): (usize, &ShadingPoint<'_>), candidates: &mut Candidates) {
-        let estimate = &mut self.estimates[index];
+        let estimate = self.estimates[index];
         let Plan { delta_draws, n_delta, .. } = estimate.plan;
         let Some(sampler) = job.lights.delta.as_ref().filter(|_| delta_draws > 0) else { return };
         let allocation = SampleAllocation { light_draws: delta_draws, bsdf_draws: 0, n_light: n_delta, n_bsdf: 0.0 };
@@ -254,20 +250,13 @@ impl Buffers {
                 .sample(&ctx, u_choice)
                 .and_then(|choice| job.lights.sample_choice(&ctx, choice, [u0, u1]))
                 .and_then(|drawn| light_candidate(job, (index as u32, point), &allocation, drawn));
-            match (candidate, control) {
-                (Some(candidate), control) => {
-                    candidates.records.push(candidate);
-                    self.controls.push(control);
-                }
-                (None, Some(control)) => correlated::add(&mut estimate.sums, control, [0.0; 3]),
-                (None, None) => {}
-            }
+            self.add(index, candidate, control, candidates);
         }
     }
 
     /// Samples of the combination by light sampling.
     fn draw_light(&mut self, job: &RenderJob, (index, point): (usize, &ShadingPoint<'_>), candidates: &mut Candidates) {
-        let estimate = &mut self.estimates[index];
+        let estimate = self.estimates[index];
         let n = estimate.plan.draws;
         let allocation = SampleAllocation::fixed(n, 0);
         let ctx = point.light_ctx();
@@ -279,23 +268,18 @@ impl Buffers {
             let drawn = drawn.map(|drawn| with_infinite(job, &ctx, drawn));
             let control = match &drawn {
                 Some((light, s)) if !s.is_delta => {
-                    estimate.control(sampled_l(job, estimate, point.p, *light, s), s.wi, s.pdf)
+                    estimate.control(sampled_l(job, &estimate, point.p, *light, s), s.wi, s.pdf)
                 }
                 Some(_) | None => estimate.without_g(),
             };
-            match drawn.and_then(|drawn| light_candidate(job, (index as u32, point), &allocation, drawn)) {
-                Some(candidate) => {
-                    candidates.records.push(candidate);
-                    self.controls.push(Some(control));
-                }
-                None => correlated::add(&mut estimate.sums, control, [0.0; 3]),
-            }
+            let candidate = drawn.and_then(|drawn| light_candidate(job, (index as u32, point), &allocation, drawn));
+            self.add(index, candidate, Some(control), candidates);
         }
     }
 
     /// BSDF samples, before it is known which lights they point at.
     fn draw_bsdf(&mut self, (index, point): (usize, &ShadingPoint<'_>), candidates: &mut Candidates) {
-        let estimate = &mut self.estimates[index];
+        let estimate = self.estimates[index];
         let plan = estimate.plan;
         let (n, expected) = match plan.technique {
             SamplingTechnique::Bsdf => (plan.draws, plan.n_technique()),
@@ -307,10 +291,7 @@ impl Buffers {
             let is_inside = plan.technique == SamplingTechnique::Bsdf;
             let sample = point.bsdf.sample_direction(point.wo, uc, [u0, u1]);
             let Some(s) = sample.filter(|s| is_inside || s.lobe.is_specular()) else {
-                if is_inside {
-                    let control = estimate.without_g();
-                    correlated::add(&mut estimate.sums, control, [0.0; 3]);
-                }
+                self.add(index, None, is_inside.then_some(estimate.without_g()), candidates);
                 continue;
             };
             let f_cos = s.f * s.wi.dot(point.bsdf.frame.z).abs();
@@ -377,22 +358,34 @@ impl Buffers {
 
     /// Adds BSDF samples by what they point at.
     fn add_bsdf(&mut self, candidates: &mut Candidates) {
-        for (pending, (crossed, found)) in self.pending.iter().zip(self.crossed.iter().zip(&self.found)) {
-            let estimate = &mut self.estimates[pending.point as usize];
+        for i in 0..self.pending.len() {
+            let pending = &self.pending[i];
+            let (index, estimate) = (pending.point as usize, &self.estimates[pending.point as usize]);
             let control = if pending.specular {
                 estimate.without_g()
             } else {
-                estimate.control(*crossed, pending.wi, pending.pdf)
+                estimate.control(self.crossed[i], pending.wi, pending.pdf)
             };
             let is_inside = estimate.plan.technique == SamplingTechnique::Bsdf;
-            match found {
-                Some(candidate) => {
-                    candidates.records.push(*candidate);
-                    self.controls.push(is_inside.then_some(control));
-                }
-                None if is_inside => correlated::add(&mut estimate.sums, control, [0.0; 3]),
-                None => {}
+            self.add(index, self.found[i], is_inside.then_some(control), candidates);
+        }
+    }
+
+    /// Adds a sample of a point, zero-valued if it is no candidate, with its c; `None` outside the combination.
+    fn add(
+        &mut self,
+        index: usize,
+        candidate: Option<Candidate>,
+        control: Option<[f32; 3]>,
+        candidates: &mut Candidates,
+    ) {
+        match (candidate, control) {
+            (Some(candidate), control) => {
+                candidates.records.push(candidate);
+                self.controls.push(control);
             }
+            (None, Some(control)) => correlated::add(&mut self.estimates[index].sums, control, [0.0; 3]),
+            (None, None) => {}
         }
     }
 }

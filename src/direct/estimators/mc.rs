@@ -1,10 +1,9 @@
 //! `mc`: light sampling alone. Specular lobes, whose directions no light sample has, get one BSDF sample.
 
-use crate::direct::bsdf_samples::BsdfSamples;
 use crate::direct::candidates::{Candidates, Drawn, SampleAllocation};
 use crate::direct::light_samples;
 use crate::direct::point::ShadingPoint;
-use crate::scene::RenderJob;
+use crate::direct::t1::T1;
 
 /// Light sampling.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -14,17 +13,8 @@ pub struct Mc {
 }
 
 impl Mc {
-    pub(super) fn propose(
-        &self,
-        job: &RenderJob,
-        points: &[ShadingPoint<'_>],
-        bsdf: &mut BsdfSamples,
-        candidates: &mut Candidates,
-    ) {
-        candidates.draw_lights(points, allocation, |at, allocation, records| {
-            light_samples::draw(job, at, allocation, records)
-        });
-        bsdf.propose(job, points, allocation, &mut [], candidates);
+    pub(super) fn propose(&self, t1: &mut T1<'_>) {
+        t1.propose(allocation, light_samples::draw);
     }
 }
 

@@ -1,10 +1,9 @@
 //! `mis`: light and BSDF samples, combined by multiple importance sampling [Veach and Guibas 1995].
 
-use crate::direct::bsdf_samples::BsdfSamples;
 use crate::direct::candidates::{Candidates, SampleAllocation};
 use crate::direct::light_samples;
 use crate::direct::point::ShadingPoint;
-use crate::scene::RenderJob;
+use crate::direct::t1::T1;
 use crate::settings::IntegratorSettings;
 use lumiris_numbers::estimators::mis::Heuristic;
 
@@ -51,17 +50,8 @@ impl Mis {
         SampleAllocation::fixed(n - by_bsdf, by_bsdf)
     }
 
-    pub(super) fn propose(
-        &self,
-        job: &RenderJob,
-        points: &[ShadingPoint<'_>],
-        bsdf: &mut BsdfSamples,
-        candidates: &mut Candidates,
-    ) {
-        let allocate = |point: &ShadingPoint<'_>| self.allocation(point);
-        candidates
-            .draw_lights(points, allocate, |at, allocation, records| light_samples::draw(job, at, allocation, records));
-        bsdf.propose(job, points, allocate, &mut [], candidates);
+    pub(super) fn propose(&self, t1: &mut T1<'_>) {
+        t1.propose(|point| self.allocation(point), light_samples::draw);
     }
 
     pub(super) fn select(&self, candidates: &mut Candidates) {

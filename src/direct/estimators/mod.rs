@@ -18,12 +18,12 @@ pub mod ocv;
 pub mod optimal_mis;
 pub mod ris;
 
-use super::bsdf_samples::BsdfSamples;
 use super::candidates::Candidates;
 use super::components::Components;
 use super::fits::Fits;
 use super::point::ShadingPoint;
 use super::shadow_segments::Segments;
+use super::t1::{BsdfBuffers, T1};
 use crate::scene::RenderJob;
 use crate::settings::{
     ContributingSettings, CorrelatedForm, CorrelatedSettings, EstimatorKind, IntegratorSettings, OptimalForm,
@@ -31,7 +31,7 @@ use crate::settings::{
 };
 use contributing::Contributing;
 use correlated::Correlated;
-use lumiris_numbers::estimators::ocv::Form;
+use lumiris_numbers::estimators::ocv::{Form, NormalEquations};
 use lumiris_numbers::math::Rgb;
 use mc::Mc;
 use mis::Mis;
@@ -64,7 +64,7 @@ pub enum Estimator {
 pub(super) struct Batch {
     pub(super) candidates: Candidates,
     pub(super) segments: Segments,
-    bsdf: BsdfSamples,
+    bsdf: BsdfBuffers,
     ris: ris::Buffers,
     components: Components,
     correlated: correlated::Buffers,
@@ -74,12 +74,7 @@ pub(super) struct Batch {
 impl Estimator {
     /// The estimator at a path vertex, counted from 0.
     pub fn at_vertex(settings: &IntegratorSettings, vertex: u32) -> Self {
-        let estimator = Self::new(settings, vertex);
-        if vertex > 0 && estimator.is_progressive() {
-            Self::new(&Self::without_fits(settings), vertex)
-        } else {
-            estimator
-        }
+        if vertex == 0 { Self::new(settings, 0) } else { Self::new(&Self::without_fits(settings), vertex) }
     }
 
     /// The settings with an estimator for later vertices. Progressive estimators are fitted to the first vertices of a
@@ -155,26 +150,28 @@ impl Estimator {
 
     /// `count` fits without samples; none if estimates do not use fits.
     pub fn fits(&self, job: &RenderJob, count: usize) -> Fits {
-        match self {
-            Estimator::Ocv(_) if self.is_progressive() => Ocv::fits(job, count),
-            Estimator::OptimalMis(_) if self.is_progressive() => OptimalMis::fits(job, count),
-            _ => Fits::default(),
-        }
+        let solver = match self {
+            Estimator::Ocv(_) if self.is_progressive() => ocv::solve,
+            Estimator::OptimalMis(_) if self.is_progressive() => optimal_mis::solve,
+            _ => return Fits::default(),
+        };
+        Fits::new(NormalEquations::new(job.components()), solver, count)
     }
 
     /// T1: candidates with their unshadowed integrands and the densities of all techniques.
     pub(super) fn propose(&self, job: &RenderJob, points: &[ShadingPoint<'_>], batch: &mut Batch) {
         let Batch { candidates, bsdf, .. } = batch;
         candidates.clear();
+        let t1 = &mut T1 { job, points, bsdf, candidates };
         match self {
-            Estimator::Mc(mc) => mc.propose(job, points, bsdf, candidates),
-            Estimator::Mis(mis) => mis.propose(job, points, bsdf, candidates),
-            Estimator::Ris(ris) => ris.propose_and_draw(job, points, (bsdf, &mut batch.ris), candidates),
+            Estimator::Mc(mc) => mc.propose(t1),
+            Estimator::Mis(mis) => mis.propose(t1),
+            Estimator::Ris(ris) => ris.propose_and_draw(t1, &mut batch.ris),
             Estimator::Ocv(Ocv { mis, .. }) | Estimator::OptimalMis(OptimalMis { mis, .. }) => {
-                batch.components.propose(job, points, |point| mis.allocation(point), bsdf, candidates);
+                batch.components.propose(t1, |point| mis.allocation(point));
             }
-            Estimator::Correlated(c) => c.propose(job, points, &mut batch.correlated, candidates),
-            Estimator::Contributing(c) => c.propose(job, points, (bsdf, &mut batch.contributing), candidates),
+            Estimator::Correlated(c) => c.propose(t1, &mut batch.correlated),
+            Estimator::Contributing(c) => c.propose(t1, &mut batch.contributing),
         }
     }
 

@@ -24,13 +24,6 @@ pub struct Ocv {
 }
 
 impl Ocv {
-    pub(super) fn fits(job: &RenderJob, count: usize) -> Fits {
-        let solve = |equations: NormalEquations, sums: &[f32], beta: &mut [f32]| {
-            equations.solve(Form::Progressive.system(), sums, beta) as u64
-        };
-        Fits::new(NormalEquations::new(job.components()), solve, count)
-    }
-
     /// `out[i]` belongs to `points[i]`, or to both halves of a point, `points[2i]` and `points[2i + 1]`, where the form
     /// has halves.
     pub(super) fn resolve(
@@ -73,4 +66,9 @@ impl Ocv {
             *out = Rgb::from_array(estimate);
         }
     }
+}
+
+/// Fits the coefficients of all fits to their sums. Returns how many systems are ill-conditioned.
+pub(super) fn solve(equations: NormalEquations, sums: &[f32], beta: &mut [f32]) -> u64 {
+    equations.solve(Form::Progressive.system(), sums, beta) as u64
 }

@@ -24,10 +24,6 @@ pub struct OptimalMis {
 }
 
 impl OptimalMis {
-    pub(super) fn fits(job: &RenderJob, count: usize) -> Fits {
-        Fits::new(NormalEquations::new(job.components()), solve, count)
-    }
-
     pub(super) fn resolve(
         &self,
         job: &RenderJob,
@@ -57,8 +53,8 @@ impl OptimalMis {
     }
 }
 
-/// The coefficients of all fits.
-fn solve(equations: NormalEquations, sums: &[f32], beta: &mut [f32]) -> u64 {
+/// Fits the coefficients of all fits to their sums. Returns how many systems are ill-conditioned.
+pub(super) fn solve(equations: NormalEquations, sums: &[f32], beta: &mut [f32]) -> u64 {
     let fits = sums.chunks(equations.len()).zip(beta.chunks_mut(equations.coefficients().max(1)));
     // Pixels without a surface have nothing to solve
     let lit = fits.filter(|(sums, _)| equations.samples(sums) > 0.0);

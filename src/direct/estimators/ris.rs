@@ -13,13 +13,13 @@
 //! do not need the BSDF before that.
 
 use crate::bsdfs::Bsdf;
-use crate::direct::bsdf_samples::BsdfSamples;
 use crate::direct::candidates::{Candidate, Candidates, SampleAllocation};
 use crate::direct::domain;
 use crate::direct::light_samples::unshadowed_candidate;
 use crate::direct::point::ShadingPoint;
 use crate::direct::proposal_columns::{PointProposals, ProposalColumns, Techniques};
 use crate::direct::shadow_segments::Segments;
+use crate::direct::t1::T1;
 use crate::scene::RenderJob;
 use crate::settings::{IntegratorSettings, ProposalPoints, RisSettings, SampleCounts, Strata, Target};
 use lumiris_numbers::estimators::mis::Heuristic;
@@ -62,75 +62,55 @@ impl Ris {
 
     /// T1 and select by turns: makes the proposals of a chunk of points and draws the samples of these points from
     /// them. Only the samples drawn become candidates, with their contributions.
-    pub(super) fn propose_and_draw(
-        &self,
-        job: &RenderJob,
-        points: &[ShadingPoint<'_>],
-        (bsdf, b): (&mut BsdfSamples, &mut Buffers),
-        candidates: &mut Candidates,
-    ) {
+    pub(super) fn propose_and_draw(&self, t1: &mut T1<'_>, b: &mut Buffers) {
         // BSDF samples of all points; light samples, which are counted here, are made in chunks
-        candidates.draw_lights(points, allocation, |_, allocation, _| allocation.light_draws);
-        bsdf.propose(job, points, allocation, &mut [], candidates);
+        t1.propose(allocation, |_, _, allocation, _| allocation.light_draws);
+        let T1 { job, points, candidates, .. } = t1;
         let bsdf_samples = std::mem::replace(&mut candidates.records, std::mem::take(&mut b.bsdf_samples));
         candidates.records.clear();
 
-        let (mut first_point, mut rest) = (0, &bsdf_samples[..]);
-        while first_point < points.len() {
+        let mut rest = Chunk { first: 0, points, bsdf: &bsdf_samples };
+        while !rest.points.is_empty() {
             let start = Instant::now();
-            let bsdf_of_chunk = self.propose_chunk(job, (first_point, points), &mut rest, b);
-            let chunk = &points[first_point..][..b.proposals.points().len()];
+            let chunk = self.propose_chunk(job, &mut rest, b);
             if self.target.has_visibility() {
-                candidates.stats.segments += b.probe(job, chunk, bsdf_of_chunk);
+                candidates.stats.segments += b.probe(job, &chunk);
             }
             let proposed = Instant::now();
-            self.draw_chunk((first_point, chunk), bsdf_of_chunk, b, candidates);
+            self.draw_chunk(&chunk, b, candidates);
             candidates.stats.t1_light += proposed - start;
             candidates.stats.select += proposed.elapsed();
-            first_point += chunk.len();
         }
         b.bsdf_samples = bsdf_samples;
     }
 
-    /// T1: makes the proposals of some points from `first_point` on. Takes their BSDF samples from `rest`, which are
-    /// sorted by point, and returns them.
-    fn propose_chunk<'s>(
-        &self,
-        job: &RenderJob,
-        (first_point, points): (usize, &[ShadingPoint<'_>]),
-        rest: &mut &'s [Candidate],
-        b: &mut Buffers,
-    ) -> &'s [Candidate] {
+    /// T1: takes a chunk from the points that are left, and makes its proposals.
+    fn propose_chunk<'a>(&self, job: &RenderJob, rest: &mut Chunk<'a>, b: &mut Buffers) -> Chunk<'a> {
         b.proposals.clear();
         b.numbers.clear();
-        let (mut first, mut next) = (first_point, 0);
-        while first < points.len() && (b.proposals.count() < CHUNK || first == first_point) {
-            let point = &points[first];
+        let Chunk { first, points, bsdf } = *rest;
+        let (mut count, mut next) = (0, 0);
+        while count < points.len() && (b.proposals.count() < CHUNK || count == 0) {
+            let point = &points[count];
             let begin = next;
-            while next < rest.len() && rest[next].point == first as u32 {
+            while next < bsdf.len() && bsdf[next].point == (first + count) as u32 {
                 next += 1;
             }
             let numbers = point.stream.domain(domain::RESAMPLE).draw::<2>();
             b.numbers.push(numbers);
             let positions = (allocation(point).light_draws, self.points, numbers[0]);
-            b.proposals.add(job, point, &self.techniques(point), positions, &rest[begin..next]);
-            first += 1;
+            b.proposals.add(job, point, &self.techniques(point), positions, &bsdf[begin..next]);
+            count += 1;
         }
-        b.proposals.evaluate(job, &points[first_point..first], |point| self.techniques(point));
-        let (bsdf_of_chunk, others) = rest.split_at(next);
-        *rest = others;
-        bsdf_of_chunk
+        b.proposals.evaluate(job, &points[..count], |point| self.techniques(point));
+        *rest = Chunk { first: first + count, points: &points[count..], bsdf: &bsdf[next..] };
+        Chunk { first, points: &points[..count], bsdf: &bsdf[..next] }
     }
 
     /// Select: draws the samples of the points of a chunk.
-    fn draw_chunk(
-        &self,
-        (first_point, chunk): (usize, &[ShadingPoint<'_>]),
-        mut bsdf: &[Candidate],
-        b: &mut Buffers,
-        candidates: &mut Candidates,
-    ) {
-        for (i, point) in chunk.iter().enumerate() {
+    fn draw_chunk(&self, chunk: &Chunk<'_>, b: &mut Buffers, candidates: &mut Candidates) {
+        let mut bsdf = chunk.bsdf;
+        for (i, point) in chunk.points.iter().enumerate() {
             let range = b.proposals.points()[i];
             self.draw(point, range, b.numbers[i][1], b);
             let (own, rest) = bsdf.split_at(range.end - range.bsdf_start);
@@ -138,7 +118,7 @@ impl Ris {
             for draw in &b.draws {
                 let place = range.start + draw.index as usize;
                 let evaluated = if place < range.bsdf_start {
-                    let at = ((first_point + i) as u32, point);
+                    let at = ((chunk.first + i) as u32, point);
                     let sample = b.proposals.light_sample(place);
                     sample.and_then(|s| unshadowed_candidate(at, &SampleAllocation::fixed(0, 0), s))
                 } else {
@@ -204,6 +184,16 @@ fn allocation(point: &ShadingPoint<'_>) -> SampleAllocation {
     if m == 1 { SampleAllocation::one_of_both(point) } else { SampleAllocation::fixed(m - by_bsdf, by_bsdf) }
 }
 
+/// Consecutive points of a batch.
+#[derive(Clone, Copy, Debug)]
+struct Chunk<'a> {
+    /// Index of the first point.
+    first: usize,
+    points: &'a [ShadingPoint<'a>],
+    /// BSDF samples of these points, in their order.
+    bsdf: &'a [Candidate],
+}
+
 /// What is kept from batch to batch.
 #[derive(Debug, Default)]
 pub(super) struct Buffers {
@@ -220,11 +210,11 @@ pub(super) struct Buffers {
 
 impl Buffers {
     /// Traces all proposals and sets the weights of those that are not visible to 0. Returns the number of segments.
-    fn probe(&mut self, job: &RenderJob, points: &[ShadingPoint<'_>], bsdf_samples: &[Candidate]) -> u64 {
+    fn probe(&mut self, job: &RenderJob, chunk: &Chunk<'_>) -> u64 {
         self.probes.clear();
-        let mut bsdf = bsdf_samples.iter();
+        let mut bsdf = chunk.bsdf.iter();
         let mut probed = Vec::new();
-        for (i, point) in points.iter().enumerate() {
+        for (i, point) in chunk.points.iter().enumerate() {
             let range = self.proposals.points()[i];
             for place in range.start..range.end {
                 let by_bsdf = if place >= range.bsdf_start { bsdf.next() } else { None };
