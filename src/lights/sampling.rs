@@ -125,6 +125,8 @@ impl LightSampling {
                     out(i, le, pdf);
                 },
             );
+        } else if self.set.infinite.is_empty() {
+            (0..n).for_each(|i| out(i, Rgb::BLACK, 0.0));
         } else {
             for i in 0..n {
                 let (ctx, wi) = at(i);

@@ -1,5 +1,6 @@
 //! Camera samples: places on the film with their rays and random numbers.
 
+use crate::cameras::CameraRay;
 use crate::direct::Estimator;
 use crate::film::filter::FilterSampler;
 use crate::integrators::path::CameraSample;
@@ -39,7 +40,9 @@ pub(super) struct CameraSampler<'a> {
 /// Memory for many samples at once.
 #[derive(Debug, Default)]
 pub(super) struct Scratch {
-    pixels: Vec<(u32, [u32; 2], u32)>,
+    /// Fit, pixel and index of each sample.
+    places: Vec<(u32, [u32; 2], u32)>,
+    streams: Vec<SampleStream>,
     drawn: Vec<SampleStream>,
     u: [Column; 2],
     weight: Column,
@@ -63,53 +66,53 @@ impl<'a> CameraSampler<'a> {
         scratch: &mut Scratch,
         out: &mut Vec<CameraSample>,
     ) {
-        let of_pixel = |(fit, pixel)| samples.clone().map(move |sample| (fit, pixel, sample));
         let Some((pinhole, o)) = &self.pinhole else {
-            let each = |(fit, pixel, sample)| CameraSample { fit, ..self.sample(pixel, sample, seed) };
-            out.extend(pixels.flat_map(of_pixel).map(each));
+            for (fit, pixel) in pixels {
+                out.extend(samples.clone().map(|sample| CameraSample { fit, ..self.sample(pixel, sample, seed) }));
+            }
             return;
         };
-        let Scratch { pixels: places, drawn, u: [x, y], weight, d, spread } = scratch;
-        places.clear();
-        places.extend(pixels.flat_map(of_pixel));
+        let Scratch { places, streams, drawn, u: [x, y], weight, d, spread } = scratch;
         let kind = self.job.settings().sampling.sampler;
-        let n = places.len();
-        let first = out.len();
+        places.clear();
+        streams.clear();
         drawn.clear();
-        let camera = &self.job.world.scene.camera;
-        let sample_counts = self.job.settings().integrator.sample_counts();
-        let time = camera.time(0.0);
-        out.extend(places.iter().map(|&(fit, pixel, sample)| {
-            let stream = SampleStream::new(kind, pixel, sample, seed);
-            drawn.push(stream.domain(domain::FILM_AND_LENS));
-            let ray = crate::cameras::CameraRay {
-                ray: Ray { o: *o, d: Vec3::ZERO, t_max: f32::INFINITY, time },
-                spread: 0.0,
-                width0: 0.0,
-                weight: 1.0,
-            };
-            let direct = self.direct_stream(pixel, sample, seed).unwrap_or(stream);
-            let sample_counts = self.chosen_counts(pixel, &stream).unwrap_or(sample_counts);
-            CameraSample { ray, weight: 0.0, stream, direct, sample_counts, fit }
-        }));
+        for (fit, pixel) in pixels {
+            for sample in samples.clone() {
+                let stream = SampleStream::new(kind, pixel, sample, seed);
+                places.push((fit, pixel, sample));
+                streams.push(stream);
+                drawn.push(stream.domain(domain::FILM_AND_LENS));
+            }
+        }
 
+        let n = places.len();
         let len = padded(n);
         reserve(&mut [x, y, weight, spread], len);
         d.reserve(len);
         sampler::draw(level(), drawn, [&mut x[..n], &mut y[..n]]);
-        for (i, &(_, pixel, _)) in places.iter().enumerate() {
-            let filter = self.filter.sample([x[i], y[i]]);
-            let film = center(pixel) + filter.offset;
-            (x[i], y[i], weight[i]) = (film.x, film.y, filter.weight);
+        for (((_, pixel, _), weight), (x, y)) in places.iter().zip(&mut *weight).zip(x.iter_mut().zip(&mut *y)) {
+            let filter = self.filter.sample([*x, *y]);
+            let film = center(*pixel) + filter.offset;
+            (*x, *y, *weight) = (film.x, film.y, filter.weight);
         }
         let mut rays = PinholeRays { d: d.get_mut(len), spread: &mut spread[..len] };
         pinhole.rays(level(), [&x[..len], &y[..len]], &mut rays);
-        let scale = self.job.world.scene.film.scale;
-        for (i, sample) in out[first..].iter_mut().enumerate() {
-            sample.ray.ray.d = d.vec3(i);
-            sample.ray.spread = spread[i];
-            sample.weight = weight[i] * scale;
-        }
+
+        let scene = &self.job.world.scene;
+        let (time, scale) = (scene.camera.time(0.0), scene.film.scale);
+        let sample_counts = self.job.settings().integrator.sample_counts();
+        out.extend(places.iter().zip(&*streams).enumerate().map(|(i, (&(fit, pixel, sample), &stream))| {
+            let ray = Ray { o: *o, d: d.vec3(i), t_max: f32::INFINITY, time };
+            CameraSample {
+                ray: CameraRay { ray, spread: spread[i], width0: 0.0, weight: 1.0 },
+                weight: weight[i] * scale,
+                stream,
+                direct: self.direct_stream(pixel, sample, seed).unwrap_or(stream),
+                sample_counts: self.chosen_counts(pixel, &stream).unwrap_or(sample_counts),
+                fit,
+            }
+        }));
     }
 
     /// One sample. The direct light of a progressive estimator is drawn block by block, each with a seed of its own.

@@ -36,6 +36,10 @@ use worker::{Worker, WorkerStats};
 /// Paths that are traced together: enough that stages run long, few enough that their data stays in the cache.
 const BATCH_PATHS: usize = 4096;
 
+/// Time between two determinations of the noise for those who observe the progress: it takes as long as a few samples
+/// per pixel.
+const NOISE_INTERVAL: Duration = Duration::from_secs(1);
+
 /// Combined with the seed of the image to give that of replicas.
 const REPLICA_SEED: u32 = 0x72_65_70_73;
 
@@ -83,7 +87,7 @@ pub struct Progress {
     pub rays: u64,
     /// Time since the start.
     pub elapsed: Duration,
-    /// Mean relative standard error of the pixels after the last whole pass, if there was one.
+    /// Mean relative standard error of the pixels after the last pass for which it was determined, if there was one.
     pub noise: Option<f64>,
 }
 
@@ -253,7 +257,7 @@ impl<'a> Run<'a> {
 
         let end = self.settings.first_sample + self.settings.spp;
         let mut stats = WorkerStats::default();
-        let mut noise = None;
+        let (mut noise, mut observed) = (None, self.start);
         let mut first = self.settings.first_sample;
         while first < end && !self.stopped() {
             let mut length = self.next_pass(first - self.settings.first_sample);
@@ -267,7 +271,10 @@ impl<'a> Run<'a> {
             let samples = first..(first + length).min(end);
             stats.merge(&self.pass(&mut tiles, samples.clone(), noise));
             first = samples.end;
-            noise = Some(self.film(&tiles).relative_noise());
+            if observed.elapsed() >= NOISE_INTERVAL {
+                noise = Some(self.film(&tiles).relative_noise());
+                observed = Instant::now();
+            }
         }
 
         let mut film = self.film(&tiles);
