@@ -38,7 +38,7 @@ mod t1;
 
 use crate::accel::RayBatch;
 use crate::scene::RenderJob;
-pub(crate) use bsdf_samples::emitter_at;
+pub(crate) use bsdf_samples::{EmitterInDirection, emitter_at};
 use estimators::Batch;
 pub use estimators::Estimator;
 pub use fits::Fits;

@@ -69,6 +69,13 @@ impl FewTriangles {
         }
         Some(few)
     }
+
+    /// First hits of rays without end.
+    fn intersect(&self, o: [&[f32]; 3], d: [&[f32]; 3], scratch: &mut EmitterScratch) {
+        scratch.columns.iter_mut().for_each(|c| c.resize(o[0].len(), 0.0));
+        let [t, b1, b2, triangle] = &mut scratch.columns;
+        triangles::first_hits(level(), &self.corners, o, d, &mut FirstHits { t, b: [b1, b2], triangle });
+    }
 }
 
 /// Memory of [`World::intersect_emitters`].
@@ -178,18 +185,32 @@ impl World {
         scratch: &mut EmitterScratch,
         out: &mut Vec<Option<EmitterHit>>,
     ) {
-        let n = rays.len();
-        scratch.columns.iter_mut().for_each(|c| c.resize(n, 0.0));
-        let [t, b1, b2, triangle] = &mut scratch.columns;
         let (o, d) = ([&rays.ox[..], &rays.oy, &rays.oz], [&rays.dx[..], &rays.dy, &rays.dz]);
-        triangles::first_hits(level(), &few.corners, o, d, &mut FirstHits { t, b: [b1, b2], triangle });
-        out.extend((0..n).map(|i| {
-            let t = t[i];
-            (t < rays.t_max[i]).then(|| {
-                let (geometry, primitive) = few.places[triangle[i] as usize];
-                let light = self.scene.lights.light_of(geometry, primitive);
-                EmitterHit { geometry, primitive, uv: [b1[i], b2[i]], t, light }
-            })
-        }));
+        few.intersect(o, d, scratch);
+        out.extend((0..rays.len()).map(|i| self.few_hit(few, scratch, i).filter(|hit| hit.t < rays.t_max[i])));
+    }
+
+    /// [`intersect_emitters`](Self::intersect_emitters) for the rays from `o` in the directions `d` without end, where
+    /// emitters are few: a function of the index of a ray. `None` elsewhere.
+    pub fn intersect_few_emitters<'a>(
+        &'a self,
+        o: [&[f32]; 3],
+        d: [&[f32]; 3],
+        scratch: &'a mut EmitterScratch,
+    ) -> Option<impl Fn(usize) -> Option<EmitterHit> + use<'a>> {
+        let few = self.few_emitters.as_ref()?;
+        few.intersect(o, d, scratch);
+        let scratch = &*scratch;
+        Some(move |i| self.few_hit(few, scratch, i))
+    }
+
+    #[inline]
+    fn few_hit(&self, few: &FewTriangles, scratch: &EmitterScratch, i: usize) -> Option<EmitterHit> {
+        let [t, b1, b2, triangle] = &scratch.columns;
+        (t[i] < f32::INFINITY).then(|| {
+            let (geometry, primitive) = few.places[triangle[i] as usize];
+            let light = self.scene.lights.light_of(geometry, primitive);
+            EmitterHit { geometry, primitive, uv: [b1[i], b2[i]], t: t[i], light }
+        })
     }
 }

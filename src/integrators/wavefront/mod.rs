@@ -16,7 +16,7 @@ use super::segment::{
 };
 use crate::accel::{Coherence, Hit, RayBatch};
 use crate::bsdfs::{Bsdf, Diffuse, Lobe};
-use crate::direct::{self, DirectStats, Estimator};
+use crate::direct::{self, DirectStats, EmitterInDirection, Estimator};
 use crate::film::PixelSample;
 use crate::geometry::Shape;
 use crate::lights::many::{LightSamples, LitPoints, Scratch};
@@ -357,10 +357,12 @@ impl<'w> Batch<'w> {
         self.buffers.draw(Stream::Direct(direct::domain::BSDF, self.estimate.counts.bsdf, k));
         self.buffers.sample_lambertian(len);
         let Buffers { paths, surface, samples, emitter_rays, .. } = &mut *self.buffers;
-        for i in 0..n {
-            samples.f_cos.set_rgb(i, surface.rho.rgb(i) * samples.p_bsdf[i]);
-            samples.light.is_delta[i] = false;
+        for (f_cos, rho) in samples.f_cos.get_mut(n).into_iter().zip(surface.rho.get(n)) {
+            for ((f_cos, rho), pdf) in f_cos.iter_mut().zip(rho).zip(&samples.p_bsdf) {
+                *f_cos = rho * pdf;
+            }
         }
+        samples.light.is_delta[..n].fill(false);
         for single in others(&self.singles) {
             let i = single.index as usize;
             let u = samples.u.each_ref().map(|u| u[i]);
@@ -373,35 +375,29 @@ impl<'w> Batch<'w> {
         }
         surface.origins(samples, len);
 
-        emitter_rays.index.clear();
-        emitter_rays.rays.clear();
-        for i in (0..n).filter(|&i| samples.p_bsdf[i] > 0.0) {
-            let (o, d) = (samples.o.vec3(i), samples.light.wi.vec3(i));
-            emitter_rays.rays.push(&Ray { o, d, t_max: f32::INFINITY, time: paths[i].time });
-            emitter_rays.index.push(i as u32);
-        }
         let EmitterRays { index, rays, scratch, emitter_hits, far } = emitter_rays;
-        job.world.intersect_emitters(rays, scratch, emitter_hits);
+        index.clear();
+        index.extend((0..n as u32).filter(|&i| samples.p_bsdf[i as usize] > 0.0));
         far.clear();
-        for (&place, hit) in index.iter().zip(&*emitter_hits) {
-            let i = place as usize;
-            let Some(hit) = hit else {
-                far.push(place);
-                continue;
-            };
+        let mut add = |samples: &mut SampleColumns, i: usize, hit: Option<EmitterHit>| {
+            let Some(hit) = hit else { return far.push(i as u32) };
             let (ctx, wi) = (surface.lit_points().get(i), samples.light.wi.vec3(i));
-            let Some(found) = direct::emitter_at(job, &ctx, wi, hit, paths[i].time) else {
-                samples.p_bsdf[i] = 0.0;
-                continue;
-            };
-            samples.light.li.set_rgb(i, found.li);
-            samples.light.pdf[i] = if samples.light.is_delta[i] { 0.0 } else { found.p_light };
-            samples.light.is_far[i] = 0.0;
-            if let Some((p, p_error, n)) = found.end {
-                samples.light.p.set(i, p);
-                samples.light.p_error.set(i, p_error);
-                samples.light.n.set(i, n);
+            match direct::emitter_at(job, &ctx, wi, &hit, paths[i].time) {
+                Some(found) => set_emitter(&mut samples.light, i, &found),
+                None => samples.p_bsdf[i] = 0.0,
             }
+        };
+        let (o, d) = (samples.o.get(len), samples.light.wi.get(len));
+        if let Some(hit) = job.world.intersect_few_emitters(o, d, scratch) {
+            index.iter().for_each(|&i| add(samples, i as usize, hit(i as usize)));
+        } else {
+            rays.clear();
+            for i in index.iter().map(|&i| i as usize) {
+                let (o, d) = (samples.o.vec3(i), samples.light.wi.vec3(i));
+                rays.push(&Ray { o, d, t_max: f32::INFINITY, time: paths[i].time });
+            }
+            job.world.intersect_emitters(rays, scratch, emitter_hits);
+            index.iter().zip(&*emitter_hits).for_each(|(&i, hit)| add(samples, i as usize, *hit));
         }
         let SampleColumns { light: LightSamples { wi, li, pdf, is_far, is_delta, .. }, p_bsdf, .. } = samples;
         let (at, directions) = (surface.lit_points(), wi);
@@ -484,6 +480,18 @@ impl<'w> Batch<'w> {
             let n_light = if bsdf.bsdf.has_non_specular() { counts.light } else { 0 };
             next.extend(follow(i, &direction, o, n_light));
         }
+    }
+}
+
+/// What BSDF sample `i` points at.
+fn set_emitter(samples: &mut LightSamples, i: usize, found: &EmitterInDirection) {
+    samples.li.set_rgb(i, found.li);
+    samples.pdf[i] = if samples.is_delta[i] { 0.0 } else { found.p_light };
+    samples.is_far[i] = if found.end.is_some() { 0.0 } else { 1.0 };
+    if let Some((p, p_error, n)) = found.end {
+        samples.p.set(i, p);
+        samples.p_error.set(i, p_error);
+        samples.n.set(i, n);
     }
 }
 
