@@ -222,9 +222,9 @@ impl Pair {
     }
 
     fn segments(&self, recording: &Recording) -> Result<Vec<RayCase>, EmbreeError> {
-        let native = self.accel.packet_width();
+        let native = self.accel.packet_width(Coherence::Packets);
         let mut cases = vec![self.occluded("shadow segments", &recording.segments, native)?];
-        for width in [1, 4, 8].into_iter().filter(|&w| w != native) {
+        for width in [1, 4, 8, 16].into_iter().filter(|&w| w != native) {
             cases.push(self.occluded("shadow segments", &recording.segments, width)?);
         }
         cases.push(self.occluded("shuffled segments", &shuffled(&recording.segments), native)?);
@@ -240,7 +240,7 @@ impl Pair {
         coherence: Coherence,
     ) -> Result<Option<RayCase>, EmbreeError> {
         let coherent = coherence == Coherence::Coherent;
-        let width = self.accel.packet_width();
+        let width = self.accel.packet_width(coherence);
         let mut hits = Vec::new();
         let ours = |rays: &RayBatch| {
             let time = time(|| self.accel.intersect(rays, coherence, &mut hits));

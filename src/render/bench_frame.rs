@@ -96,7 +96,7 @@ impl Kind<'_> {
     /// Chooses the width and the flag of the shortest time.
     fn calibrate(&mut self, bare: &Bare) -> Result<(), EmbreeError> {
         let mut best = (Duration::MAX, self.width, self.coherent);
-        for (width, coherent) in [(1, false), (4, false), (8, false), (4, true), (8, true)] {
+        for (width, coherent) in [(1, false), (4, false), (8, false), (16, false), (4, true), (8, true), (16, true)] {
             (self.width, self.coherent) = (width, coherent);
             let time = self.time(bare)?.min(self.time(bare)?);
             if time < best.0 {

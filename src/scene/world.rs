@@ -121,7 +121,7 @@ fn build(
 }
 
 impl World {
-    /// Builds the ray tracers. `packet_width` overrides the device's native width (1, 4 or 8); images do
+    /// Builds the ray tracers. `packet_width` overrides the device's native width (1, 4, 8 or 16); images do
     /// not depend on it.
     pub fn new(scene: Scene, kind: AccelKind, packet_width: Option<u32>) -> Result<World, EmbreeError> {
         let accel = build(kind, &scene.geometry, &scene.textures, packet_width)?;

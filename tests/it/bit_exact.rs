@@ -69,7 +69,7 @@ fn the_instruction_set_of_the_lanes_does_not_change_a_bit() {
 fn packet_width_does_not_change_a_bit() {
     for estimator in ESTIMATORS {
         let reference = film(&gallery(estimator, Some(1)), RenderSettings::default());
-        for width in [4, 8] {
+        for width in [4, 8, 16] {
             let other = film(&gallery(estimator, Some(width)), RenderSettings::default());
             assert_same_bits(&reference, &other, &format!("{estimator:?}, packets of {width}"));
         }

@@ -36,9 +36,11 @@ enum Packets {
     First1(Vec<sys::RTCRayHit>),
     First4(Vec<(Valid<4>, RayHitPacket<4>)>),
     First8(Vec<(Valid<8>, RayHitPacket<8>)>),
+    First16(Vec<(Valid<16>, RayHitPacket<16>)>),
     Any1(Vec<sys::RTCRay>),
     Any4(Vec<(Valid<4>, RayPacket<4>)>),
     Any8(Vec<(Valid<8>, RayPacket<8>)>),
+    Any16(Vec<(Valid<16>, RayPacket<16>)>),
 }
 
 impl Bare {
@@ -65,9 +67,11 @@ impl Bare {
             Packets::First1(singles) => self.nearest_singly(rays, singles),
             Packets::First4(packets) => self.nearest(rays, packets, coherent),
             Packets::First8(packets) => self.nearest(rays, packets, coherent),
+            Packets::First16(packets) => self.nearest(rays, packets, coherent),
             Packets::Any1(singles) => self.any_singly(rays, singles),
             Packets::Any4(packets) => self.any(rays, packets, coherent),
             Packets::Any8(packets) => self.any(rays, packets, coherent),
+            Packets::Any16(packets) => self.any(rays, packets, coherent),
         }
     }
 
@@ -118,11 +122,12 @@ impl Bare {
 }
 
 impl<'a> Packed<'a> {
-    /// Rays whose nearest hits are queried, in packets of `width`: 1, 4 or 8.
+    /// Rays whose nearest hits are queried, in packets of `width`: 1, 4, 8 or 16.
     pub fn first(rays: &'a RayBatch, width: u32) -> Result<Packed<'a>, EmbreeError> {
         let packets = match checked_width(width)? {
             4 => Packets::First4(pack_first(rays)),
             8 => Packets::First8(pack_first(rays)),
+            16 => Packets::First16(pack_first(rays)),
             _ => {
                 let hit = sys::RTCHit {
                     geomID: sys::RTC_INVALID_GEOMETRY_ID,
@@ -136,11 +141,12 @@ impl<'a> Packed<'a> {
         Ok(Packed { rays, packets })
     }
 
-    /// Segments that may be occluded, in packets of `width`: 1, 4 or 8.
+    /// Segments that may be occluded, in packets of `width`: 1, 4, 8 or 16.
     pub fn any(rays: &'a RayBatch, width: u32) -> Result<Packed<'a>, EmbreeError> {
         let packets = match checked_width(width)? {
             4 => Packets::Any4(pack_any(rays)),
             8 => Packets::Any8(pack_any(rays)),
+            16 => Packets::Any16(pack_any(rays)),
             _ => Packets::Any1(traceable(rays, Visibility::SHADOW).collect()),
         };
         Ok(Packed { rays, packets })
@@ -162,9 +168,11 @@ impl<'a> Packed<'a> {
             Packets::First1(rays) => rays.iter().filter(|r| r.hit.geomID != sys::RTC_INVALID_GEOMETRY_ID).count(),
             Packets::First4(packets) => first(packets),
             Packets::First8(packets) => first(packets),
+            Packets::First16(packets) => first(packets),
             Packets::Any1(rays) => rays.iter().filter(|r| r.tfar < 0.0).count(),
             Packets::Any4(packets) => any(packets),
             Packets::Any8(packets) => any(packets),
+            Packets::Any16(packets) => any(packets),
         }
     }
 }

@@ -31,7 +31,7 @@ pub(super) struct Mode {
 }
 
 /// N rays.
-#[repr(C, align(32))]
+#[repr(C, align(64))]
 #[derive(Clone, Copy, Debug)]
 pub(super) struct RayPacket<const N: usize> {
     pub o: [[f32; N]; 3],
@@ -45,7 +45,7 @@ pub(super) struct RayPacket<const N: usize> {
 }
 
 /// N rays and their hits.
-#[repr(C, align(32))]
+#[repr(C, align(64))]
 #[derive(Clone, Copy, Debug)]
 pub(super) struct RayHitPacket<const N: usize> {
     pub rays: RayPacket<N>,
@@ -59,7 +59,7 @@ pub(super) struct RayHitPacket<const N: usize> {
 }
 
 /// −1 where a lane holds a ray.
-#[repr(C, align(32))]
+#[repr(C, align(64))]
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Valid<const N: usize>(pub [i32; N]);
 
@@ -67,10 +67,14 @@ const _: () = {
     assert!(size_of::<RayPacket<4>>() == size_of::<sys::RTCRay4>());
     assert!(size_of::<RayPacket<8>>() == size_of::<sys::RTCRay8>());
     assert!(size_of::<RayHitPacket<4>>() >= size_of::<sys::RTCRayHit4>());
-    assert!(size_of::<RayHitPacket<8>>() == size_of::<sys::RTCRayHit8>());
-    assert!(align_of::<RayPacket<8>>() >= align_of::<sys::RTCRayHit8>());
+    assert!(size_of::<RayPacket<16>>() == size_of::<sys::RTCRay16>());
+    assert!(size_of::<RayHitPacket<8>>() >= size_of::<sys::RTCRayHit8>());
+    assert!(size_of::<RayHitPacket<16>>() == size_of::<sys::RTCRayHit16>());
+    assert!(align_of::<RayPacket<16>>() >= align_of::<sys::RTCRayHit16>());
     assert!(std::mem::offset_of!(RayHitPacket<4>, ng) == std::mem::offset_of!(sys::RTCRayHit4, hit));
     assert!(std::mem::offset_of!(RayHitPacket<8>, ng) == std::mem::offset_of!(sys::RTCRayHit8, hit));
+    assert!(std::mem::offset_of!(RayHitPacket<16>, ng) == std::mem::offset_of!(sys::RTCRayHit16, hit));
+    assert!(std::mem::offset_of!(RayPacket<16>, tfar) == std::mem::offset_of!(sys::RTCRay16, tfar));
     assert!(std::mem::offset_of!(RayPacket<8>, tfar) == std::mem::offset_of!(sys::RTCRay8, tfar));
 };
 
@@ -187,7 +191,7 @@ pub(super) unsafe fn occluded1(scene: sys::RTCScene, context: *mut QueryContext<
     }
 }
 
-/// N is 4 or 8; the context was made with `mode`.
+/// N is 4, 8 or 16; the context was made with `mode`.
 ///
 /// # Safety
 /// As [`intersect1`], for the lanes that `valid` names.
@@ -200,24 +204,26 @@ pub(super) unsafe fn intersect_packet<const N: usize>(
     valid: &Valid<N>,
     rays: &mut RayHitPacket<N>,
 ) {
-    const { assert!(N == 4 || N == 8) };
+    const { assert!(N == 4 || N == 8 || N == 16) };
     let (valid, rays): (*const i32, *mut RayHitPacket<N>) = (valid.0.as_ptr(), rays);
     // SAFETY: by the caller; the layouts are those of the header by the assertions above.
     unsafe {
         #[cfg(embree3)]
         match N {
             4 => sys::rtcIntersect4(valid, scene, context.cast(), rays.cast()),
-            _ => sys::rtcIntersect8(valid, scene, context.cast(), rays.cast()),
+            8 => sys::rtcIntersect8(valid, scene, context.cast(), rays.cast()),
+            _ => sys::rtcIntersect16(valid, scene, context.cast(), rays.cast()),
         }
         #[cfg(embree4)]
         match N {
             4 => sys::rtcIntersect4(valid, scene, rays.cast(), &mut intersect_arguments(context, mode)),
-            _ => sys::rtcIntersect8(valid, scene, rays.cast(), &mut intersect_arguments(context, mode)),
+            8 => sys::rtcIntersect8(valid, scene, rays.cast(), &mut intersect_arguments(context, mode)),
+            _ => sys::rtcIntersect16(valid, scene, rays.cast(), &mut intersect_arguments(context, mode)),
         }
     }
 }
 
-/// N is 4 or 8; the context was made with `mode`.
+/// N is 4, 8 or 16; the context was made with `mode`.
 ///
 /// # Safety
 /// As [`intersect1`], for the lanes that `valid` names.
@@ -230,19 +236,21 @@ pub(super) unsafe fn occluded_packet<const N: usize>(
     valid: &Valid<N>,
     rays: &mut RayPacket<N>,
 ) {
-    const { assert!(N == 4 || N == 8) };
+    const { assert!(N == 4 || N == 8 || N == 16) };
     let (valid, rays): (*const i32, *mut RayPacket<N>) = (valid.0.as_ptr(), rays);
     // SAFETY: by the caller; the layouts are those of the header by the assertions above.
     unsafe {
         #[cfg(embree3)]
         match N {
             4 => sys::rtcOccluded4(valid, scene, context.cast(), rays.cast()),
-            _ => sys::rtcOccluded8(valid, scene, context.cast(), rays.cast()),
+            8 => sys::rtcOccluded8(valid, scene, context.cast(), rays.cast()),
+            _ => sys::rtcOccluded16(valid, scene, context.cast(), rays.cast()),
         }
         #[cfg(embree4)]
         match N {
             4 => sys::rtcOccluded4(valid, scene, rays.cast(), &mut occluded_arguments(context, mode)),
-            _ => sys::rtcOccluded8(valid, scene, rays.cast(), &mut occluded_arguments(context, mode)),
+            8 => sys::rtcOccluded8(valid, scene, rays.cast(), &mut occluded_arguments(context, mode)),
+            _ => sys::rtcOccluded16(valid, scene, rays.cast(), &mut occluded_arguments(context, mode)),
         }
     }
 }

@@ -126,7 +126,7 @@ pub enum EmbreeError {
     #[error("this build of Embree has no {0}")]
     Unsupported(&'static str),
     /// Unsupported packet width.
-    #[error("packets of {0} rays are not supported: 1, 4 or 8")]
+    #[error("packets of {0} rays are not supported: 1, 4, 8 or 16")]
     PacketWidth(u32),
     /// A shape has more primitives than 32 bits count.
     #[error("a shape has more than 4294967295 primitives")]
@@ -136,7 +136,7 @@ pub enum EmbreeError {
 /// Options of a tracer.
 #[derive(Clone, Debug, Default, PartialEq, Eq)]
 pub struct EmbreeOptions {
-    /// Rays per packet: 1, 4 or 8; the processor's own width if not given.
+    /// Rays per packet: 1, 4, 8 or 16; what the processor is fastest with if not given.
     pub packet_width: Option<u32>,
     /// Maximum memory of Embree (bytes).
     pub memory_limit: Option<u64>,
@@ -144,18 +144,26 @@ pub struct EmbreeOptions {
     pub config: CString,
 }
 
+/// Rays per packet.
+#[derive(Clone, Copy, Debug)]
+struct Widths {
+    /// Of rays with something in common.
+    coherent: usize,
+    /// Of rays without: those of wide packets part soon, and are traced one after the other.
+    incoherent: usize,
+}
+
 /// Embree's data structures for a scene.
 pub struct EmbreeAccel {
     root: Arc<EmbreeScene>,
     world: Arc<World>,
-    /// Rays per packet.
-    width: usize,
+    widths: Widths,
     has_motion: bool,
     stats: AccelStats,
 }
 
 impl EmbreeAccel {
-    /// Builds on all cores. Without `alpha`, cut-outs are opaque. `packet_width` is 1, 4 or 8.
+    /// Builds on all cores. Without `alpha`, cut-outs are opaque. `packet_width` is 1, 4, 8 or 16.
     pub fn new(
         geometry: Arc<GeometrySet>,
         alpha: Option<Arc<dyn AlphaSource>>,
@@ -172,7 +180,7 @@ impl EmbreeAccel {
     ) -> Result<EmbreeAccel, EmbreeError> {
         let start = Instant::now();
         let device = Arc::new(Device::new(&options.config, options.memory_limit)?);
-        let width = packet_width(&device, options.packet_width)?;
+        let widths = packet_widths(&device, options.packet_width)?;
         let set = Arc::clone(&geometry);
         let world = Arc::new(World::new(geometry, |i| scene::can_place(&set.instances[i as usize])));
         let builder = Builder { device: &device, world: &world, alpha, query_filter: true };
@@ -181,18 +189,21 @@ impl EmbreeAccel {
         let has_motion = set.has_motion();
         let (bytes, peak_bytes) = device.memory();
         let stats = AccelStats { bytes, peak_bytes, build_seconds: start.elapsed().as_secs_f64() };
-        Ok(EmbreeAccel { root, world, width, has_motion, stats })
+        Ok(EmbreeAccel { root, world, widths, has_motion, stats })
     }
 
-    /// Rays per packet.
-    pub fn packet_width(&self) -> u32 {
-        self.width as u32
+    /// Rays per packet. Where instances move, each ray has a time of its own, and is traced alone.
+    pub fn packet_width(&self, coherence: Coherence) -> u32 {
+        let Widths { coherent, incoherent } = self.widths;
+        let width = if coherence == Coherence::Incoherent { incoherent } else { coherent };
+        if self.has_motion { 1 } else { width as u32 }
     }
 
-    /// The same structures, traced with packets of another width: 1, 4 or 8.
+    /// The same structures, traced with packets of another width: 1, 4, 8 or 16.
     pub fn with_packet_width(&self, width: u32) -> Result<EmbreeAccel, EmbreeError> {
         let width = checked_width(width)?;
-        Ok(EmbreeAccel { root: Arc::clone(&self.root), world: Arc::clone(&self.world), width, ..*self })
+        let widths = Widths { coherent: width, incoherent: width };
+        Ok(EmbreeAccel { root: Arc::clone(&self.root), world: Arc::clone(&self.world), widths, ..*self })
     }
 }
 
@@ -258,8 +269,8 @@ impl Builder<'_> {
     }
 }
 
-/// The requested width, or the widest that pays off.
-fn packet_width(device: &Device, asked: Option<u32>) -> Result<usize, EmbreeError> {
+/// The requested width, or the widest that pay off.
+fn packet_widths(device: &Device, asked: Option<u32>) -> Result<Widths, EmbreeError> {
     if !device.has(Property::RTC_DEVICE_PROPERTY_RAY_MASK_SUPPORTED) {
         return Err(EmbreeError::Unsupported("ray masks"));
     }
@@ -269,16 +280,22 @@ fn packet_width(device: &Device, asked: Option<u32>) -> Result<usize, EmbreeErro
     if !device.has(Property::RTC_DEVICE_PROPERTY_USER_GEOMETRY_SUPPORTED) {
         return Err(EmbreeError::Unsupported("user geometry"));
     }
-    match asked {
-        Some(width) => checked_width(width),
-        None if device.has(Property::RTC_DEVICE_PROPERTY_NATIVE_RAY8_SUPPORTED) => Ok(8),
-        None => Ok(4),
+    if let Some(width) = asked {
+        let width = checked_width(width)?;
+        return Ok(Widths { coherent: width, incoherent: width });
     }
+    let is_native = |width: &(Property, usize)| device.has(width.0);
+    let wide = [
+        (Property::RTC_DEVICE_PROPERTY_NATIVE_RAY16_SUPPORTED, 16),
+        (Property::RTC_DEVICE_PROPERTY_NATIVE_RAY8_SUPPORTED, 8),
+    ];
+    let coherent = wide.into_iter().find(is_native).map_or(4, |(_, width)| width);
+    Ok(Widths { coherent, incoherent: coherent.min(8) })
 }
 
 fn checked_width(width: u32) -> Result<usize, EmbreeError> {
     match width {
-        1 | 4 | 8 => Ok(width as usize),
+        1 | 4 | 8 | 16 => Ok(width as usize),
         _ => Err(EmbreeError::PacketWidth(width)),
     }
 }

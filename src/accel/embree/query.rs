@@ -23,9 +23,10 @@ impl EmbreeAccel {
         hits.clear();
         hits.resize(rays.len(), None);
         let mode = Mode { query: QueryKind::First, coherent: coherence == Coherence::Coherent };
-        match self.width() {
+        match self.packet_width(coherence) {
             4 => self.intersect_packets::<4>(rays, mode, hits),
             8 => self.intersect_packets::<8>(rays, mode, hits),
+            16 => self.intersect_packets::<16>(rays, mode, hits),
             _ => self.intersect_singly(rays, hits),
         }
     }
@@ -34,17 +35,13 @@ impl EmbreeAccel {
         occluded.clear();
         occluded.reserve(rays.len());
         let mode = Mode { query: QueryKind::Any, coherent: coherence == Coherence::Coherent };
-        let width = if coherence == Coherence::Incoherent { 1 } else { self.width() };
+        let width = if coherence == Coherence::Incoherent { 1 } else { self.packet_width(coherence) };
         match width {
             4 => self.occluded_packets::<4>(rays, mode, occluded),
             8 => self.occluded_packets::<8>(rays, mode, occluded),
+            16 => self.occluded_packets::<16>(rays, mode, occluded),
             _ => self.occluded_singly(rays, occluded),
         }
-    }
-
-    /// Rays per packet. Where instances move, each ray has a time of its own.
-    fn width(&self) -> usize {
-        if self.has_motion { 1 } else { self.width }
     }
 
     fn intersect_singly(&self, rays: &RayBatch, hits: &mut [Option<Hit>]) {

@@ -13,7 +13,7 @@ use lumiris_test_support::random::{Pcg32, RngExt, pcg32};
 
 use std::ffi::CStr;
 
-const WIDTHS: [u32; 3] = [1, 4, 8];
+const WIDTHS: [u32; 4] = [1, 4, 8, 16];
 const COHERENCES: [Coherence; 3] = [Coherence::Coherent, Coherence::Packets, Coherence::Incoherent];
 
 fn opaque(shape: Shape) -> Geometry {
@@ -124,10 +124,15 @@ fn assert_widths_agree(name: &str, set: &Arc<GeometrySet>, batches: &[RayBatch],
             let other = intersect(accel, rays, coherence);
             let differing = (0..rays.len()).find(|&i| bits(&first[i]) != bits(&other[i]));
             let what = differing.map(|i| format!("{:?} {:?} {:?}", rays.get(i), first[i], other[i]));
-            assert_eq!(what, None, "{name}, batch {b}, width {}, {coherence:?}", accel.width);
+            assert_eq!(what, None, "{name}, batch {b}, width {}, {coherence:?}", accel.packet_width(coherence));
             let other = occluded(accel, rays, coherence);
             let differ = first_occluded.iter().zip(&other).filter(|(a, b)| a != b).count();
-            assert_eq!(differ, 0, "{name}, batch {b}, occlusion, width {}, {coherence:?}", accel.width);
+            assert_eq!(
+                differ,
+                0,
+                "{name}, batch {b}, occlusion, width {}, {coherence:?}",
+                accel.packet_width(coherence)
+            );
         }
     }
 }
@@ -343,7 +348,7 @@ fn a_misaligned_buffer_is_an_error_that_says_so() {
 
 #[test]
 fn unknown_packet_widths_are_refused() {
-    for width in [0, 2, 16] {
+    for width in [0, 2, 32] {
         let error = EmbreeAccel::new(Arc::default(), None, Some(width)).err().unwrap();
         assert_eq!(error, EmbreeError::PacketWidth(width));
     }

@@ -108,7 +108,8 @@ fn parse_packet_width(text: &str) -> Result<u32, String> {
         "1" => Ok(1),
         "4" => Ok(4),
         "8" => Ok(8),
-        _ => Err("expected 1, 4 or 8".to_owned()),
+        "16" => Ok(16),
+        _ => Err("expected 1, 4, 8 or 16".to_owned()),
     }
 }
 
