@@ -9,7 +9,7 @@
 //! light sampling at x_k, is added there ([`BsdfTechnique`]). One ray instead of three, and one BSDF sample instead of
 //! two.
 
-use super::segment::{BsdfTechnique, Direction, PathState, domain, emptied, sampled_direction, scattered, survive};
+use super::segment::{BsdfTechnique, Direction, PathState, domain, emptied, sampled_direction, survive};
 pub use super::segment::{CameraSample, PathStats};
 use super::wavefront::{Batch, Buffers, Estimate, Output};
 use crate::accel::{Coherence, Hit, RayBatch};
@@ -395,8 +395,10 @@ pub(super) fn extend(
     settings: &IntegratorSettings,
 ) -> Option<(PathState, Lobe)> {
     let direction = next_direction(v, settings)?;
-    let mut next = scattered(&path.carried(path.beta, path.width), point.origin(direction.wi), &direction)?;
-    next.beta = survive(&next, &v.stream, vertex + 1, settings)?;
+    let carried = path.carried(path.beta, path.width);
+    let (beta, eta_scale) = carried.beyond(&direction)?;
+    let beta = survive(beta, eta_scale, &v.stream, vertex + 1, settings)?;
+    let next = carried.segment(point.origin(direction.wi), direction.wi, beta, eta_scale);
     Some((next, direction.lobe))
 }
 
@@ -410,15 +412,17 @@ fn extend_to_emitter(
     (settings, mis): (&IntegratorSettings, &Mis),
 ) -> Option<PathState> {
     let direction = next_direction(v, settings)?;
-    let next = scattered(&path.carried(path.beta, path.width), point.origin(direction.wi), &direction)?;
+    let carried = path.carried(path.beta, path.width);
+    let (beta, eta_scale) = carried.beyond(&direction)?;
     debug_assert!(direction.pdf.is_some(), "a resampled direction has no weight against light sampling");
     let technique = BsdfTechnique {
         ctx: point.light_ctx(),
         n_light: point.light_samples_beside_path() as f32,
         pdf: direction.pdf.filter(|_| !direction.lobe.is_specular()),
         heuristic: mis.heuristic,
-        survivor: survive(&next, &v.stream, vertex + 1, settings),
+        survivor: survive(beta, eta_scale, &v.stream, vertex + 1, settings),
     };
+    let next = carried.segment(point.origin(direction.wi), direction.wi, beta, eta_scale);
     Some(PathState { technique: Some(technique), ..next })
 }
 

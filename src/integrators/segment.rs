@@ -135,33 +135,39 @@ impl BsdfTechnique {
     }
 }
 
-/// The path from the origin `o` on in a direction; `None` if it carries nothing.
-#[inline]
-pub(super) fn scattered(path: &Carried, o: Vec3, direction: &Direction) -> Option<PathState> {
-    let Direction { wi, weight, eta, .. } = *direction;
-    let Carried { sample, width, spread, time, .. } = *path;
-    let beta = path.beta * weight;
-    let eta_scale = path.eta_scale * eta * eta;
-    let ray = Ray { o, d: wi, t_max: f32::INFINITY, time };
-    let (passed, travelled, technique) = (0, 0.0, None);
-    let carries = !beta.is_black() && beta.is_finite();
-    carries.then_some(PathState { sample, ray, beta, eta_scale, width, spread, passed, travelled, technique })
+impl Carried {
+    /// Throughput and squared relative index of refraction of the path in a direction; `None` if it carries nothing.
+    #[inline]
+    pub(super) fn beyond(&self, direction: &Direction) -> Option<(Rgb, f32)> {
+        let beta = self.beta * direction.weight;
+        let eta_scale = self.eta_scale * direction.eta * direction.eta;
+        (!beta.is_black() && beta.is_finite()).then_some((beta, eta_scale))
+    }
+
+    /// The path from the origin `o` on in the direction `wi`, with what [`Self::beyond`] says.
+    #[inline]
+    pub(super) fn segment(&self, o: Vec3, wi: Vec3, beta: Rgb, eta_scale: f32) -> PathState {
+        let Carried { sample, width, spread, time, .. } = *self;
+        let ray = Ray { o, d: wi, t_max: f32::INFINITY, time };
+        PathState { sample, ray, beta, eta_scale, width, spread, passed: 0, travelled: 0.0, technique: None }
+    }
 }
 
-/// Russian roulette before bounce `bounce` on what the path that left the vertex of `stream` carries without the scaling
-/// of refraction: the throughput of a path that goes on.
+/// Russian roulette before bounce `bounce` on what the path that left the vertex of `stream` carries, its throughput
+/// `beta` without the scaling of refraction: the throughput of a path that goes on.
 #[inline]
 pub(super) fn survive(
-    path: &PathState,
+    beta: Rgb,
+    eta_scale: f32,
     stream: &SampleStream,
     bounce: u32,
     settings: &IntegratorSettings,
 ) -> Option<Rgb> {
-    let survival = (path.beta * path.eta_scale).map(f32::abs).max_component();
+    let survival = (beta * eta_scale).map(f32::abs).max_component();
     if !settings.has_roulette(bounce) || !(survival < 1.0) {
-        return Some(path.beta);
+        return Some(beta);
     }
-    (stream.draw_random(domain::ROULETTE) < survival).then(|| path.beta / survival)
+    (stream.draw_random(domain::ROULETTE) < survival).then(|| beta / survival)
 }
 
 /// How a path continues.

@@ -11,8 +11,7 @@
 //! another form than that of its neighbours (resampled or purely specular BSDFs) is left to [`crate::direct`].
 
 use super::segment::{
-    BsdfTechnique, CameraSample, Carried, Direction, PathState, PathStats, domain, emptied, sampled_direction,
-    scattered, survive,
+    BsdfTechnique, CameraSample, Carried, Direction, PathState, PathStats, domain, emptied, sampled_direction, survive,
 };
 use crate::accel::{Coherence, Hit, RayBatch};
 use crate::bsdfs::{Bsdf, Diffuse, Lobe};
@@ -451,16 +450,18 @@ impl<'w> Batch<'w> {
         // Those follow below
         others(&self.singles).for_each(|single| samples.p_bsdf[single.index as usize] = 0.0);
         surface.origins(samples, len);
-        let follow = |i: usize, direction: &Direction, o: Vec3, n_light: u32| {
-            let next = scattered(&paths[i], o, direction)?;
-            let survivor = survive(&next, &streams[i], vertex + 1, settings);
-            if !counts.by_path {
-                return Some(PathState { beta: survivor?, ..next });
+        let mut follow = |i: usize, direction: &Direction, o: Vec3, n_light: u32| {
+            let Some((beta, eta_scale)) = paths[i].beyond(direction) else { return };
+            let survivor = survive(beta, eta_scale, &streams[i], vertex + 1, settings);
+            if counts.by_path {
+                let pdf = direction.pdf.filter(|_| !direction.lobe.is_specular());
+                let (ctx, heuristic) = (surface.lit_points().get(i), *heuristic);
+                let technique = BsdfTechnique { ctx, n_light: n_light as f32, pdf, heuristic, survivor };
+                let segment = paths[i].segment(o, direction.wi, beta, eta_scale);
+                next.push(PathState { technique: Some(technique), ..segment });
+            } else if let Some(beta) = survivor {
+                next.push(paths[i].segment(o, direction.wi, beta, eta_scale));
             }
-            let pdf = direction.pdf.filter(|_| !direction.lobe.is_specular());
-            let ctx = surface.lit_points().get(i);
-            let technique = BsdfTechnique { ctx, n_light: n_light as f32, pdf, heuristic: *heuristic, survivor };
-            Some(PathState { technique: Some(technique), ..next })
         };
         for i in (0..n).filter(|&i| samples.p_bsdf[i] > 0.0) {
             let direction = Direction {
@@ -470,7 +471,7 @@ impl<'w> Batch<'w> {
                 lobe: Lobe::DIFFUSE | Lobe::REFLECTION,
                 pdf: Some(samples.p_bsdf[i]),
             };
-            next.extend(follow(i, &direction, samples.o.vec3(i), counts.light));
+            follow(i, &direction, samples.o.vec3(i), counts.light);
         }
         for single in others(&self.singles) {
             let (i, bsdf) = (single.index as usize, &single.bsdf);
@@ -478,7 +479,7 @@ impl<'w> Batch<'w> {
             let Some(direction) = sampled_direction(bsdf, single.wo, u) else { continue };
             let o = offset_origin(single.p, single.p_error, bsdf.n, direction.wi);
             let n_light = if bsdf.bsdf.has_non_specular() { counts.light } else { 0 };
-            next.extend(follow(i, &direction, o, n_light));
+            follow(i, &direction, o, n_light);
         }
     }
 }
