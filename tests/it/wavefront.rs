@@ -22,6 +22,8 @@ fn job(scene: &str, kind: IntegratorKind, estimator: EstimatorKind, samples: u32
     let mut loaded = load(&path, &options).map_err(|d| d.to_string()).unwrap();
     let integrator = &mut loaded.settings.integrator;
     (integrator.kind, integrator.estimator, integrator.samples) = (kind, estimator, Some(samples));
+    // Only in columns is a lone BSDF sample of a first vertex that of the path
+    integrator.bsdf_fraction = Some(0.5);
     loaded.job(AccelKind::Embree, None).unwrap()
 }
 

@@ -10,7 +10,7 @@ use super::kernels::{self, Mode, QueryKind, RayHitPacket, RayPacket, Valid};
 use super::query::{ANY_SINGLE, can_trace, load, single_ray};
 use super::scene::{self, EmbreeScene};
 use super::world::World;
-use super::{Builder, EmbreeError, checked_width};
+use super::{Builder, EmbreeError, checked_width, has_only_triangles};
 use crate::accel::{AlphaSource, RayBatch};
 use crate::geometry::{GeometrySet, Shape, Visibility};
 use embree4_sys as sys;
@@ -23,6 +23,7 @@ pub struct Bare {
     world: Arc<World>,
     /// Whether callbacks report hits, for which the context must be prepared.
     calls_back: bool,
+    has_only_triangles: bool,
     build_time: Duration,
 }
 
@@ -48,11 +49,12 @@ impl Bare {
     pub fn new(set: Arc<GeometrySet>, alpha: Option<Arc<dyn AlphaSource>>) -> Result<Bare, EmbreeError> {
         let start = Instant::now();
         let device = Arc::new(Device::new(c"", None)?);
+        let has_only_triangles = has_only_triangles(&set);
         let calls_back = set.geometries.iter().any(|g| !matches!(g.shape, Shape::Mesh(_)));
         let of_world = Arc::clone(&set);
         let world = Arc::new(World::new(set, |i| scene::can_place(&of_world.instances[i as usize])));
         let root = Builder { device: &device, world: &world, alpha, query_filter: false }.root()?;
-        Ok(Bare { root, world, calls_back, build_time: start.elapsed() })
+        Ok(Bare { root, world, calls_back, has_only_triangles, build_time: start.elapsed() })
     }
 
     /// Wall-clock time of the build.
@@ -60,18 +62,18 @@ impl Bare {
         self.build_time
     }
 
-    /// Traces packed rays. `coherent` lets packets be traversed by their common frustum.
+    /// Traces packed rays. `coherent` lets packets be traversed by their common frustum, where Embree can do so.
     pub fn trace(&self, packed: &mut Packed<'_>, coherent: bool) {
         let rays = packed.rays;
         match &mut packed.packets {
             Packets::First1(singles) => self.nearest_singly(rays, singles),
             Packets::First4(packets) => self.nearest(rays, packets, coherent),
             Packets::First8(packets) => self.nearest(rays, packets, coherent),
-            Packets::First16(packets) => self.nearest(rays, packets, coherent),
+            Packets::First16(packets) => self.nearest(rays, packets, coherent && self.has_only_triangles),
             Packets::Any1(singles) => self.any_singly(rays, singles),
             Packets::Any4(packets) => self.any(rays, packets, coherent),
             Packets::Any8(packets) => self.any(rays, packets, coherent),
-            Packets::Any16(packets) => self.any(rays, packets, coherent),
+            Packets::Any16(packets) => self.any(rays, packets, false),
         }
     }
 

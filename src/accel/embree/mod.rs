@@ -53,7 +53,7 @@ mod tests;
 mod world;
 
 use super::{Accel, AccelStats, AlphaSource, AlphaTest, Coherence, Hit, RayBatch};
-use crate::geometry::{GeometryId, GeometrySet};
+use crate::geometry::{GeometryId, GeometrySet, Shape};
 use callbacks::GeometryContext;
 use device::Device;
 use embree4_sys::{RTCDeviceProperty as Property, RTCError};
@@ -147,10 +147,24 @@ pub struct EmbreeOptions {
 /// Rays per packet.
 #[derive(Clone, Copy, Debug)]
 struct Widths {
-    /// Of rays with something in common.
+    /// Of rays with similar origins and directions.
     coherent: usize,
+    /// Of rays with a common origin or end.
+    packets: usize,
     /// Of rays without: those of wide packets part soon, and are traced one after the other.
     incoherent: usize,
+}
+
+impl Widths {
+    fn all(width: usize) -> Self {
+        Widths { coherent: width, packets: width, incoherent: width }
+    }
+}
+
+/// True if nothing is placed and all is triangles. Elsewhere Embree 3.13.5 may not return from coherent queries
+/// for packets of 16 (seen of occlusion).
+fn has_only_triangles(set: &GeometrySet) -> bool {
+    set.instances.is_empty() && set.geometries.iter().all(|g| matches!(g.shape, Shape::Mesh(_)))
 }
 
 /// Embree's data structures for a scene.
@@ -158,6 +172,7 @@ pub struct EmbreeAccel {
     root: Arc<EmbreeScene>,
     world: Arc<World>,
     widths: Widths,
+    has_only_triangles: bool,
     has_motion: bool,
     stats: AccelStats,
 }
@@ -180,29 +195,32 @@ impl EmbreeAccel {
     ) -> Result<EmbreeAccel, EmbreeError> {
         let start = Instant::now();
         let device = Arc::new(Device::new(&options.config, options.memory_limit)?);
-        let widths = packet_widths(&device, options.packet_width)?;
+        let widths = packet_widths(&device, options.packet_width, has_only_triangles(&geometry))?;
         let set = Arc::clone(&geometry);
         let world = Arc::new(World::new(geometry, |i| scene::can_place(&set.instances[i as usize])));
         let builder = Builder { device: &device, world: &world, alpha, query_filter: true };
         let root = Arc::new(builder.root()?);
 
-        let has_motion = set.has_motion();
+        let (has_motion, has_only_triangles) = (set.has_motion(), has_only_triangles(&set));
         let (bytes, peak_bytes) = device.memory();
         let stats = AccelStats { bytes, peak_bytes, build_seconds: start.elapsed().as_secs_f64() };
-        Ok(EmbreeAccel { root, world, widths, has_motion, stats })
+        Ok(EmbreeAccel { root, world, widths, has_only_triangles, has_motion, stats })
     }
 
     /// Rays per packet. Where instances move, each ray has a time of its own, and is traced alone.
     pub fn packet_width(&self, coherence: Coherence) -> u32 {
-        let Widths { coherent, incoherent } = self.widths;
-        let width = if coherence == Coherence::Incoherent { incoherent } else { coherent };
+        let width = match coherence {
+            Coherence::Coherent => self.widths.coherent,
+            Coherence::Packets => self.widths.packets,
+            Coherence::Incoherent => self.widths.incoherent,
+        };
         if self.has_motion { 1 } else { width as u32 }
     }
 
     /// The same structures, traced with packets of another width: 1, 4, 8 or 16.
     pub fn with_packet_width(&self, width: u32) -> Result<EmbreeAccel, EmbreeError> {
         let width = checked_width(width)?;
-        let widths = Widths { coherent: width, incoherent: width };
+        let widths = Widths::all(width);
         Ok(EmbreeAccel { root: Arc::clone(&self.root), world: Arc::clone(&self.world), widths, ..*self })
     }
 }
@@ -270,7 +288,7 @@ impl Builder<'_> {
 }
 
 /// The requested width, or the widest that pay off.
-fn packet_widths(device: &Device, asked: Option<u32>) -> Result<Widths, EmbreeError> {
+fn packet_widths(device: &Device, asked: Option<u32>, is_plain: bool) -> Result<Widths, EmbreeError> {
     if !device.has(Property::RTC_DEVICE_PROPERTY_RAY_MASK_SUPPORTED) {
         return Err(EmbreeError::Unsupported("ray masks"));
     }
@@ -282,15 +300,16 @@ fn packet_widths(device: &Device, asked: Option<u32>) -> Result<Widths, EmbreeEr
     }
     if let Some(width) = asked {
         let width = checked_width(width)?;
-        return Ok(Widths { coherent: width, incoherent: width });
+        return Ok(Widths::all(width));
     }
     let is_native = |width: &(Property, usize)| device.has(width.0);
     let wide = [
         (Property::RTC_DEVICE_PROPERTY_NATIVE_RAY16_SUPPORTED, 16),
         (Property::RTC_DEVICE_PROPERTY_NATIVE_RAY8_SUPPORTED, 8),
     ];
-    let coherent = wide.into_iter().find(is_native).map_or(4, |(_, width)| width);
-    Ok(Widths { coherent, incoherent: coherent.min(8) })
+    let packets = wide.into_iter().find(is_native).map_or(4, |(_, width)| width);
+    let narrow = packets.min(8);
+    Ok(Widths { coherent: if is_plain { packets } else { narrow }, packets, incoherent: narrow })
 }
 
 fn checked_width(width: u32) -> Result<usize, EmbreeError> {

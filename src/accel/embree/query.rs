@@ -22,7 +22,7 @@ impl EmbreeAccel {
     pub(super) fn intersect_batch(&self, rays: &RayBatch, coherence: Coherence, hits: &mut Vec<Option<Hit>>) {
         hits.clear();
         hits.resize(rays.len(), None);
-        let mode = Mode { query: QueryKind::First, coherent: coherence == Coherence::Coherent };
+        let mode = Mode { query: QueryKind::First, coherent: self.is_coherent(coherence) };
         match self.packet_width(coherence) {
             4 => self.intersect_packets::<4>(rays, mode, hits),
             8 => self.intersect_packets::<8>(rays, mode, hits),
@@ -34,14 +34,19 @@ impl EmbreeAccel {
     pub(super) fn occluded_batch(&self, rays: &RayBatch, coherence: Coherence, occluded: &mut Vec<bool>) {
         occluded.clear();
         occluded.reserve(rays.len());
-        let mode = Mode { query: QueryKind::Any, coherent: coherence == Coherence::Coherent };
         let width = if coherence == Coherence::Incoherent { 1 } else { self.packet_width(coherence) };
+        let mode = Mode { query: QueryKind::Any, coherent: self.is_coherent(coherence) && width < 16 };
         match width {
             4 => self.occluded_packets::<4>(rays, mode, occluded),
             8 => self.occluded_packets::<8>(rays, mode, occluded),
             16 => self.occluded_packets::<16>(rays, mode, occluded),
             _ => self.occluded_singly(rays, occluded),
         }
+    }
+
+    /// Whether packets may be traversed by their common frustum.
+    fn is_coherent(&self, coherence: Coherence) -> bool {
+        coherence == Coherence::Coherent && (self.packet_width(coherence) < 16 || self.has_only_triangles)
     }
 
     fn intersect_singly(&self, rays: &RayBatch, hits: &mut [Option<Hit>]) {
