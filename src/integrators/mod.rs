@@ -1,12 +1,82 @@
 //! Light transport: from camera rays to radiance.
+//!
+//! An [`Integrator`] is what all threads share while an image is rendered: it prepares what samples need, makes a
+//! [`Tracer`] for each thread, and reports. Reading order: `segment` is a path between two vertices, `vertices` finds
+//! the next ones, and [`path`] is the loop over them; `wavefront` has the vertices of `mc` and `mis` side by side.
+//! [`irradiance_cache`] and [`photon_map`] replace the light that Lambertian parts reflect (`diffuse`).
 
 mod diffuse;
 pub mod irradiance_cache;
 pub mod path;
 pub mod photon_map;
 mod segment;
+mod vertices;
 mod wavefront;
 
-pub use irradiance_cache::{CacheIntegrator, IrradianceCache};
-pub use path::{PathIntegrator, PathStats};
-pub use photon_map::PhotonMapIntegrator;
+pub use irradiance_cache::{CacheIntegrator, CacheReport, IrradianceCache};
+pub use path::{CameraSample, PathIntegrator, PathStats, PathTracer};
+pub use photon_map::{MapStats, PhotonMapIntegrator};
+
+use crate::direct::Fits;
+use crate::film::{Film, PixelSample};
+use crate::photons::PhotonError;
+use crate::scene::RenderJob;
+use crate::settings::IntegratorKind;
+use std::sync::atomic::AtomicBool;
+
+/// A way to render an image: what all threads share.
+pub trait Integrator: Sync {
+    /// Prepares the samples from index `first` on. The answer is how many samples per pixel that serves; 0 if it was told
+    /// to stop, and the samples so far are an image.
+    fn prepare(&mut self, _first: u32) -> Result<u32, PhotonError> {
+        Ok(u32::MAX)
+    }
+
+    /// What one thread traces samples with, using what is prepared.
+    fn tracer(&self, with_features: bool) -> Box<dyn Tracer + '_>;
+
+    /// True if pixels share random numbers, so that their variance cannot be told from a few of them.
+    fn shares_noise(&self) -> bool {
+        false
+    }
+
+    /// Statistics of the image, with those of all tracers. What is counted by pixel is added to the film.
+    fn statistics(&self, paths: PathStats, film: &mut Film) -> Statistics;
+}
+
+/// What one thread traces samples with: buffers and counts.
+pub trait Tracer: Send {
+    /// Estimates the radiance of each camera sample; `out[i]` belongs to `samples[i]`. `fits` are those of the samples'
+    /// pixels.
+    fn trace(&mut self, job: &RenderJob, samples: &[CameraSample], fits: &mut Fits, out: &mut Vec<PixelSample>);
+
+    /// The counts and times since the last call.
+    fn take_stats(&mut self) -> PathStats;
+}
+
+/// Camera samples by pixel and index.
+pub type Cameras<'a> = &'a (dyn Fn([u32; 2], u32) -> CameraSample + Sync);
+
+/// The integrator that the settings ask for. It looks at the scene with `cameras`; `stop` ends its preparations early.
+pub fn integrator<'a>(
+    job: &'a RenderJob,
+    cameras: Cameras<'_>,
+    stop: &'a AtomicBool,
+) -> Result<Box<dyn Integrator + 'a>, PhotonError> {
+    Ok(match job.settings().integrator.kind {
+        IntegratorKind::Direct | IntegratorKind::Path => Box::new(PathIntegrator),
+        IntegratorKind::IrradianceCache => Box::new(CacheIntegrator::new(job, cameras, stop)),
+        IntegratorKind::PhotonMap => Box::new(PhotonMapIntegrator::new(job, cameras, stop)?),
+    })
+}
+
+/// Statistics of an image.
+#[derive(Clone, Copy, Debug, Default)]
+pub struct Statistics {
+    /// Counts and times, summed over threads.
+    pub paths: PathStats,
+    /// The irradiance cache, if there is one.
+    pub cache: Option<CacheReport>,
+    /// The photon maps, if there are any.
+    pub photons: Option<MapStats>,
+}

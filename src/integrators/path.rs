@@ -6,47 +6,58 @@
 //!
 //! Where `mis` has one BSDF sample and the path goes on, the sample's direction is that of the next segment, which finds
 //! the emitter itself: what is missing in the estimate at x_k, the emission that x_{k+1} sends back weighted against
-//! light sampling at x_k, is added there ([`BsdfTechnique`]). One ray instead of three, and one BSDF sample instead of
+//! light sampling at x_k, is added there (`BsdfTechnique`). One ray instead of three, and one BSDF sample instead of
 //! two.
+//!
+//! All integrators follow their paths through the one loop here; [`AtVertices`] is what they do differently.
 
-use super::segment::{BsdfTechnique, Direction, PathState, domain, emptied, sampled_direction, survive};
 pub use super::segment::{CameraSample, PathStats};
+use super::segment::{PathState, Vertex, emptied, extend, extend_to_emitter};
+pub use super::vertices::Recording;
+use super::vertices::{Stage, VertexSearch};
 use super::wavefront::{Batch, Buffers, Estimate, Output};
-use crate::accel::{Coherence, Hit, RayBatch};
-use crate::bsdfs::Lobe;
-use crate::direct::estimators::mis::Mis;
+use super::{Integrator, Statistics, Tracer};
 use crate::direct::{DirectStage, Estimator, Fits, ShadingPoint};
-use crate::film::{Features, PixelSample};
-use crate::geometry::SurfaceHit;
-use crate::lights::{LightCtx, LightHit};
+use crate::film::{Film, PixelSample};
 use crate::materials::SurfaceBsdf;
-use crate::scene::{RenderJob, SurfaceInteraction};
-use crate::settings::{IntegratorSettings, SampleCounts};
-use lumiris_numbers::math::{Ray, Rgb, Vec3};
-use lumiris_numbers::samplers::SampleStream;
+use crate::scene::RenderJob;
+use crate::settings::IntegratorSettings;
+use lumiris_numbers::math::Rgb;
 use std::time::Instant;
 
-/// Surfaces without scattering that a path may pass between two vertices.
-const MAX_PASSED: u32 = 64;
+/// Path tracing: nothing is prepared.
+#[derive(Clone, Copy, Debug, Default)]
+pub struct PathIntegrator;
 
-/// Copies of the rays traced, batch by batch, for measurements.
-#[derive(Clone, Debug, Default)]
-pub struct Recording {
-    /// Camera rays up to their first surface.
-    pub camera: Vec<RayBatch>,
-    /// All other path segments.
-    pub bounces: Vec<RayBatch>,
-    /// Shadow segments of first vertices.
-    pub segments: Vec<RayBatch>,
-    /// Shadow segments of later vertices.
-    pub bounce_segments: Vec<RayBatch>,
+impl Integrator for PathIntegrator {
+    fn tracer(&self, with_features: bool) -> Box<dyn Tracer + '_> {
+        Box::new(PathTracer::new(with_features))
+    }
+
+    fn statistics(&self, paths: PathStats, _: &mut Film) -> Statistics {
+        Statistics { paths, ..Statistics::default() }
+    }
 }
 
-impl Recording {
-    /// The shadow segments of a vertex, counted from 0.
-    fn segments_at(&mut self, vertex: u32) -> &mut Vec<RayBatch> {
-        if vertex == 0 { &mut self.segments } else { &mut self.bounce_segments }
-    }
+/// The vertices of a batch of paths.
+pub(super) struct Found<'a, 'w> {
+    /// Their index along the paths, from 0.
+    pub(super) vertex: u32,
+    pub(super) paths: &'a [PathState],
+    pub(super) vertices: &'a [Vertex<'w>],
+}
+
+/// What an integrator does at vertices where it is not path tracing: it adds to the samples what is known of the light
+/// that is reflected there, and says of each vertex what remains to be done. Called once per batch.
+pub(super) type AtVertices<'s> = dyn for<'w> FnMut(&Found<'_, 'w>, &mut [PixelSample]) -> Vec<Shading<'w>> + 's;
+
+/// What remains to be done at a vertex; by default nothing.
+#[derive(Clone, Copy, Debug, Default)]
+pub(super) struct Shading<'w> {
+    /// BSDF for which direct light is estimated.
+    pub(super) lit: Option<SurfaceBsdf<'w>>,
+    /// BSDF by which the path continues.
+    pub(super) next: Option<SurfaceBsdf<'w>>,
 }
 
 /// The result of a direct-light sample at a first vertex.
@@ -62,37 +73,51 @@ pub struct Outcome {
 
 /// Traces paths; holds the buffers of one worker.
 #[derive(Debug, Default)]
-pub struct PathIntegrator {
-    pub(super) active: Vec<PathState>,
-    pub(super) next: Vec<PathState>,
-    kept: Vec<PathState>,
-    passing: Vec<PathState>,
-    /// Indices of active paths that meet nothing and look for emitters.
-    escaped: Vec<u32>,
-    rays: RayBatch,
-    hits: Vec<Option<Hit>>,
-    /// Memory of the vertices and shading points of earlier batches.
-    spare_vertices: Vec<Vertex<'static>>,
+pub struct PathTracer {
+    pub(super) search: VertexSearch,
+    next: Vec<PathState>,
+    /// Memory of the shading points of earlier batches.
     spare_points: Vec<ShadingPoint<'static>>,
-    pub(super) radiance: Vec<Rgb>,
-    pub(super) direct: DirectStage,
+    radiance: Vec<Rgb>,
+    direct: DirectStage,
     buffers: Option<Box<Buffers>>,
-    pub(super) stats: PathStats,
-    /// Omits emission towards the camera, and all features except the depth.
-    pub(super) only_reflected: bool,
-    /// Omits all features.
-    pub omits_features: bool,
-    /// Copies of what is traced, if requested.
-    pub recording: Option<Recording>,
+    /// The vertex whose estimator all have, if not each its own.
+    pub(super) estimator_of: Option<u32>,
+    /// Paths go on by specular lobes only.
+    pub(super) only_specular: bool,
     /// Samples of direct light at first vertices, if requested.
     pub outcomes: Option<Vec<Outcome>>,
 }
 
-impl PathIntegrator {
-    /// The counts and times since the last call.
-    pub fn take_stats(&mut self) -> PathStats {
-        let direct = std::mem::take(&mut self.direct.stats);
-        PathStats { direct, ..std::mem::take(&mut self.stats) }
+/// The vertices of a batch of paths, as the loop passes them on.
+struct Step<'s, 'w> {
+    settings: &'s IntegratorSettings,
+    estimator: Estimator,
+    /// Index along the paths.
+    vertex: u32,
+    /// Paths go on from here.
+    continues: bool,
+    vertices: Vec<Vertex<'w>>,
+    /// Of each vertex, if the integrator decides that.
+    shadings: Option<Vec<Shading<'w>>>,
+}
+
+impl PathTracer {
+    /// With or without features of first surfaces.
+    pub fn new(with_features: bool) -> Self {
+        let mut tracer = PathTracer::default();
+        tracer.search.omits_features = !with_features;
+        tracer
+    }
+
+    /// Copies the rays that are traced from now on, for measurements.
+    pub fn record(&mut self) {
+        self.search.recording = Some(Recording::default());
+    }
+
+    /// The rays that were recorded; no more are.
+    pub fn take_recording(&mut self) -> Recording {
+        self.search.recording.take().unwrap_or_default()
     }
 
     /// Estimates the radiance of each camera sample; `out[i]` belongs to `samples[i]`. `fits` are those of the samples'
@@ -105,415 +130,128 @@ impl PathIntegrator {
         fits: &mut Fits,
         out: &mut Vec<PixelSample>,
     ) {
-        self.start(samples, out);
+        self.search.start(samples, out);
+        self.follow((job, settings), None, samples, fits, out);
+    }
+
+    /// Follows the paths that were started, vertex by vertex; `own` is what the integrator does there itself.
+    pub(super) fn follow(
+        &mut self,
+        (job, settings): (&RenderJob, &IntegratorSettings),
+        mut own: Option<&mut AtVertices<'_>>,
+        samples: &[CameraSample],
+        fits: &mut Fits,
+        out: &mut [PixelSample],
+    ) {
         let depth = settings.depth();
         for vertex in 0..=depth {
-            if self.active.is_empty() {
+            let count = self.search.active.len();
+            if count == 0 {
                 break;
             }
-            let estimate = Estimate::new(settings, vertex).filter(|_| self.outcomes.is_none());
-            let count = self.active.len();
+            let is_plain = own.is_none() && self.outcomes.is_none();
+            let estimate = Estimate::new(settings, vertex).filter(|_| is_plain);
             let mut batch = estimate.map(|e| Batch::new(self.buffers.take().unwrap_or_default(), e, count));
-            let vertices = self.find_vertices(job, vertex, depth, samples, out, batch.as_mut());
-            let estimator = Estimator::at_vertex(settings, vertex);
-            let sample_counts = estimator.sample_counts();
-            // Outcomes are those of all samples of a first vertex
-            let may_continue = vertex + 1 < depth && (vertex > 0 || self.outcomes.is_none());
-            let mut points: Vec<ShadingPoint<'_>> = emptied(std::mem::take(&mut self.spare_points));
-            points.extend(vertices.iter().zip(&self.active).map(|(v, path)| {
-                let sample = &samples[path.sample as usize];
-                let sample_counts = if vertex == 0 { sample.sample_counts } else { sample_counts };
-                let bsdf_by_path = may_continue
-                    && matches!(estimator, Estimator::Mis(mis) if mis.has_one_bsdf_sample(sample_counts.samples))
-                    && !v.bsdf.bsdf.is_only_evaluated();
-                ShadingPoint { bsdf_by_path, ..v.shading_point(path.ray.time, sample_counts, sample.fit) }
-            }));
-            self.light_points(job, &estimator, vertex, &points, fits, out);
-            self.extend_paths((settings, &estimator), vertex, &vertices, &points);
+            let stage = Stage { job, vertex, depth, samples, out: &mut *out, batch: batch.as_mut() };
+            let vertices = self.search.find(stage);
+            let found = Found { vertex, paths: &self.search.active, vertices: &vertices };
+            let shadings = own.as_mut().map(|own| own(&found, out));
+            let estimator = Estimator::at_vertex(settings, self.estimator_of.unwrap_or(vertex));
+            let step = Step { settings, estimator, vertex, continues: vertex + 1 < depth, vertices, shadings };
+            let points = self.points(&step, samples);
+            self.light_points(job, &step, &points, fits, out);
+            self.extend_paths(&step, &points);
             if let Some(mut batch) = batch {
-                let segments = self.recording.as_mut().map(|r| r.segments_at(vertex));
-                let (next, stats, direct) = (&mut self.next, &mut self.stats, &mut self.direct.stats);
-                batch.shade(job, &mut Output { samples: out, next, stats, direct, segments });
+                let (stats, direct) = (&mut self.search.stats, &mut self.direct.stats);
+                let segments = self.search.recording.as_mut().map(|r| r.segments_at(vertex));
+                batch.shade(job, &mut Output { samples: out, next: &mut self.next, stats, direct, segments });
                 self.buffers = Some(batch.into_buffers());
             }
-            std::mem::swap(&mut self.active, &mut self.next);
+            std::mem::swap(&mut self.search.active, &mut self.next);
             self.spare_points = emptied(points);
-            self.recycle(vertices);
+            self.search.recycle(step.vertices);
         }
     }
 
-    /// Starts paths with the camera rays.
-    pub(super) fn start(&mut self, samples: &[CameraSample], out: &mut Vec<PixelSample>) {
-        out.clear();
-        out.resize(samples.len(), PixelSample::default());
-        self.active.clear();
-        self.active.extend(samples.iter().enumerate().map(|(i, s)| PathState {
-            sample: i as u32,
-            ray: s.ray.ray,
-            beta: Rgb::splat(s.weight),
-            eta_scale: 1.0,
-            width: s.ray.width0,
-            spread: s.ray.spread,
-            passed: 0,
-            travelled: 0.0,
-            technique: None,
-        }));
-    }
-
-    /// Keeps the memory of vertices that are done with for those of the next batch.
-    pub(super) fn recycle(&mut self, vertices: Vec<Vertex<'_>>) {
-        self.spare_vertices = emptied(vertices);
-    }
-
-    /// Traces the active paths to their next vertex, adds what they see at the first one, and keeps those that hit
-    /// something that scatters. The answer's items belong to the paths that `self.active` then holds.
-    pub(super) fn find_vertices<'w>(
-        &mut self,
-        job: &'w RenderJob,
-        vertex: u32,
-        depth: u32,
-        samples: &[CameraSample],
-        out: &mut [PixelSample],
-        mut batch: Option<&mut Batch<'w>>,
-    ) -> Vec<Vertex<'w>> {
-        let mut vertices: Vec<Vertex<'w>> = emptied(std::mem::take(&mut self.spare_vertices));
-        self.kept.clear();
-        let mut coherence = if vertex == 0 { Coherence::Coherent } else { Coherence::Incoherent };
-        while !self.active.is_empty() {
-            self.trace_active(job, vertex, coherence);
-            coherence = Coherence::Incoherent;
-            let start = Instant::now();
-            self.passing.clear();
-            self.escaped.clear();
-            for (k, (path, hit)) in self.active.iter().zip(&self.hits).enumerate() {
-                let looks_for_emitters = path.technique.is_some() || vertex == 0 && !self.only_reflected;
-                let interaction = match hit {
-                    None => {
-                        if looks_for_emitters {
-                            self.escaped.push(k as u32);
-                        }
-                        continue;
-                    }
-                    Some(hit) => {
-                        if let (Some(batch), Some(rho)) = (&mut batch, job.plain_reflectance(hit)) {
-                            let Some(beta) = path.beta_beyond_emitter() else { continue };
-                            let distance = hit.t * path.ray.d.length();
-                            if vertex == 0 && !self.omits_features {
-                                let features = &mut out[path.sample as usize].features;
-                                features.get_or_insert_with(|| path.plain_features(job, hit, distance, rho));
-                            }
-                            if vertex < depth {
-                                let carried = path.carried(beta, path.width + path.spread * distance);
-                                batch.push_hit(job, (&carried, path.ray.d), hit, rho, &samples[path.sample as usize]);
-                            }
-                            continue;
-                        }
-                        SurfaceInteraction::new(job, &path.ray, (path.width, path.spread), hit)
-                    }
-                };
-                if looks_for_emitters {
-                    out[path.sample as usize].radiance += path.emission(job, &interaction);
-                }
-                let Some(beta) = path.beta_beyond_emitter() else { continue };
-                match interaction.scatter(job) {
-                    Some(bsdf) => {
-                        if vertex == 0 && !self.omits_features {
-                            let depth_only = self.only_reflected;
-                            out[path.sample as usize].features.get_or_insert_with(|| {
-                                if depth_only {
-                                    Features { depth: path.depth(&interaction), ..Features::default() }
-                                } else {
-                                    let stream = samples[path.sample as usize].stream.domain(domain::VERTEX);
-                                    path.features(job, &interaction, &bsdf, &stream)
-                                }
-                            });
-                        }
-                        if vertex < depth {
-                            let sample = &samples[path.sample as usize];
-                            let width = interaction.width;
-                            let carried = path.carried(beta, width);
-                            if batch.as_mut().is_some_and(|b| b.push_vertex(&carried, &interaction, &bsdf, sample)) {
-                                continue;
-                            }
-                            let [stream, direct] =
-                                [sample.stream, sample.direct].map(|s| s.domain(domain::VERTEX + vertex));
-                            vertices.push(Vertex {
-                                surface: interaction.surface,
-                                bsdf,
-                                wo: interaction.wo,
-                                stream,
-                                direct,
-                            });
-                            self.kept.push(PathState {
-                                beta,
-                                width,
-                                passed: 0,
-                                travelled: 0.0,
-                                technique: None,
-                                ..*path
-                            });
-                        }
-                    }
-                    None if path.passed < MAX_PASSED => self.passing.push(path.pass(beta, &interaction)),
-                    None => {}
-                }
+    /// The points whose direct light is estimated.
+    fn points<'w>(&mut self, step: &Step<'_, 'w>, samples: &[CameraSample]) -> Vec<ShadingPoint<'w>> {
+        let sample_counts = step.estimator.sample_counts();
+        // Outcomes are those of all samples of a first vertex
+        let may_continue = step.continues && step.shadings.is_none() && (step.vertex > 0 || self.outcomes.is_none());
+        let point = |(v, path): (&Vertex<'w>, &PathState)| {
+            let sample = &samples[path.sample as usize];
+            let sample_counts = if step.vertex == 0 { sample.sample_counts } else { sample_counts };
+            let bsdf_by_path = may_continue
+                && matches!(step.estimator, Estimator::Mis(mis) if mis.has_one_bsdf_sample(sample_counts.samples))
+                && !v.bsdf.bsdf.is_only_evaluated();
+            ShadingPoint { bsdf_by_path, ..v.shading_point(path.ray.time, sample_counts, sample.fit) }
+        };
+        let mut points: Vec<ShadingPoint<'_>> = emptied(std::mem::take(&mut self.spare_points));
+        let all = step.vertices.iter().zip(&self.search.active).map(point);
+        match &step.shadings {
+            None => points.extend(all),
+            Some(shadings) => {
+                points.extend(all.zip(shadings).filter_map(|(point, s)| Some(ShadingPoint { bsdf: s.lit?, ..point })))
             }
-            self.add_infinite(job, out);
-            std::mem::swap(&mut self.active, &mut self.passing);
-            self.stats.shade_time += start.elapsed();
         }
-        std::mem::swap(&mut self.active, &mut self.kept);
-        vertices
-    }
-
-    /// Adds what the escaped paths carry of infinite lights, with the weight of the technique that found it.
-    fn add_infinite(&mut self, job: &RenderJob, out: &mut [PixelSample]) {
-        let (lights, active) = (&job.lights, &self.active);
-        self.escaped.retain(|&k| {
-            let path = &active[k as usize];
-            if path.technique.is_none() {
-                out[path.sample as usize].radiance += path.beta * lights.le(path.ray.d);
-            }
-            path.technique.is_some()
-        });
-        let escaped = &self.escaped;
-        let path = |i: usize| &active[escaped[i] as usize];
-        let ctx = |i: usize| path(i).technique.map_or(LightCtx::at(Vec3::ZERO), |technique| technique.ctx);
-        lights.infinite_in_directions(
-            escaped.len(),
-            |i| (ctx(i), path(i).ray.d),
-            |i, le, p_light| {
-                let path = path(i);
-                let l = path.beta * le;
-                let weight =
-                    path.technique.filter(|_| !l.is_black()).map_or(1.0, |technique| technique.weight(|_| p_light));
-                out[path.sample as usize].radiance += l * weight;
-            },
-        );
-    }
-
-    /// First hits of the active paths.
-    fn trace_active(&mut self, job: &RenderJob, vertex: u32, coherence: Coherence) {
-        self.rays.set(self.active.iter().map(|path| &path.ray));
-        if let Some(r) = &mut self.recording {
-            let batches = if coherence == Coherence::Coherent { &mut r.camera } else { &mut r.bounces };
-            batches.push(self.rays.clone());
-        }
-        let start = Instant::now();
-        job.world.accel.intersect(&self.rays, coherence, &mut self.hits);
-        let (count, time) = (self.rays.len() as u64, start.elapsed());
-        if vertex == 0 {
-            self.stats.camera_rays += count;
-            self.stats.camera_time += time;
-        } else {
-            self.stats.bounce_rays += count;
-            self.stats.bounce_time += time;
-        }
+        points
     }
 
     /// Adds the direct light of the vertices of the active paths.
     fn light_points(
         &mut self,
         job: &RenderJob,
-        estimator: &Estimator,
-        vertex: u32,
+        step: &Step<'_, '_>,
         points: &[ShadingPoint<'_>],
         fits: &mut Fits,
         out: &mut [PixelSample],
     ) {
-        self.direct.estimate(job, estimator, points, fits, &mut self.radiance);
-        if let Some(r) = &mut self.recording {
-            r.segments_at(vertex).push(self.direct.segments().clone());
+        self.direct.estimate(job, &step.estimator, points, fits, &mut self.radiance);
+        let active = &self.search.active;
+        if let Some(r) = &mut self.search.recording {
+            r.segments_at(step.vertex).push(self.direct.segments().clone());
         }
-        if let Some(outcomes) = self.outcomes.as_mut().filter(|_| vertex == 0) {
+        if let Some(outcomes) = self.outcomes.as_mut().filter(|_| step.vertex == 0) {
             outcomes.extend(self.direct.outcomes().map(|(point, unshadowed, is_free)| {
                 let contribution = if is_free { unshadowed } else { Rgb::BLACK };
-                Outcome { sample: self.active[point as usize].sample, unshadowed, contribution }
+                Outcome { sample: active[point as usize].sample, unshadowed, contribution }
             }));
         }
-        for (path, &radiance) in self.active.iter().zip(&self.radiance) {
+        let is_lit = |i: usize| step.shadings.as_ref().is_none_or(|shadings| shadings[i].lit.is_some());
+        let lit = active.iter().enumerate().filter(|&(i, _)| is_lit(i));
+        for ((_, path), &radiance) in lit.zip(&self.radiance) {
             out[path.sample as usize].radiance += path.beta * radiance;
         }
     }
 
     /// Fills `self.next` with the paths that go on.
-    fn extend_paths(
-        &mut self,
-        (settings, estimator): (&IntegratorSettings, &Estimator),
-        vertex: u32,
-        vertices: &[Vertex<'_>],
-        points: &[ShadingPoint<'_>],
-    ) {
-        let depth = settings.depth();
+    fn extend_paths(&mut self, step: &Step<'_, '_>, points: &[ShadingPoint<'_>]) {
         let start = Instant::now();
         self.next.clear();
-        if vertex + 1 < depth {
-            let paths = self.active.iter().zip(vertices).zip(points);
-            self.next.extend(paths.filter_map(|((path, v), point)| {
-                if let (true, Estimator::Mis(mis)) = (point.bsdf_by_path, estimator) {
-                    return extend_to_emitter(path, v, point, vertex, (settings, mis));
-                }
-                Some(extend(path, v, point, vertex, settings)?.0)
-            }));
+        let Step { settings, vertex, .. } = *step;
+        let paths = self.search.active.iter().zip(&step.vertices);
+        match &step.shadings {
+            _ if !step.continues => {}
+            None => self.next.extend(paths.zip(points).filter_map(|((path, v), point)| match &step.estimator {
+                Estimator::Mis(mis) if point.bsdf_by_path => extend_to_emitter(path, v, point, vertex, (settings, mis)),
+                _ => Some(extend(path, v, vertex, settings)?.0),
+            })),
+            Some(shadings) => self.next.extend(paths.zip(shadings).filter_map(|((path, v), s)| {
+                let (next, lobe) = extend(path, &Vertex { bsdf: s.next?, ..*v }, vertex, settings)?;
+                (!self.only_specular || lobe.is_specular()).then_some(next)
+            })),
         }
-        self.stats.shade_time += start.elapsed();
+        self.search.stats.shade_time += start.elapsed();
     }
 }
 
-/// A vertex that scatters.
-#[derive(Clone, Copy, Debug)]
-pub(super) struct Vertex<'w> {
-    pub(super) surface: SurfaceHit,
-    pub(super) bsdf: SurfaceBsdf<'w>,
-    pub(super) wo: Vec3,
-    pub(super) stream: SampleStream,
-    pub(super) direct: SampleStream,
-}
-
-impl<'w> Vertex<'w> {
-    pub(super) fn shading_point(&self, time: f32, sample_counts: SampleCounts, fit: u32) -> ShadingPoint<'w> {
-        ShadingPoint {
-            p: self.surface.p,
-            p_error: self.surface.p_error,
-            wo: self.wo,
-            bsdf: self.bsdf,
-            time,
-            stream: self.direct.domain(domain::DIRECT),
-            sample_counts,
-            fit,
-            bsdf_by_path: false,
-        }
-    }
-}
-
-/// The next path segment by BSDF sampling and Russian roulette, with the lobe that it took; `None` if the path ends.
-pub(super) fn extend(
-    path: &PathState,
-    v: &Vertex<'_>,
-    point: &ShadingPoint<'_>,
-    vertex: u32,
-    settings: &IntegratorSettings,
-) -> Option<(PathState, Lobe)> {
-    let direction = next_direction(v, settings)?;
-    let carried = path.carried(path.beta, path.width);
-    let (beta, eta_scale) = carried.beyond(&direction)?;
-    let beta = survive(beta, eta_scale, &v.stream, vertex + 1, settings)?;
-    let next = carried.segment(point.origin(direction.wi), direction.wi, beta, eta_scale);
-    Some((next, direction.lobe))
-}
-
-/// The next path segment by BSDF sampling, which looks for the emitter of the sample as well. Roulette ends it only behind
-/// that; `None` if the direction carries no light.
-fn extend_to_emitter(
-    path: &PathState,
-    v: &Vertex<'_>,
-    point: &ShadingPoint<'_>,
-    vertex: u32,
-    (settings, mis): (&IntegratorSettings, &Mis),
-) -> Option<PathState> {
-    let direction = next_direction(v, settings)?;
-    let carried = path.carried(path.beta, path.width);
-    let (beta, eta_scale) = carried.beyond(&direction)?;
-    debug_assert!(direction.pdf.is_some(), "a resampled direction has no weight against light sampling");
-    let technique = BsdfTechnique {
-        ctx: point.light_ctx(),
-        n_light: point.light_samples_beside_path() as f32,
-        pdf: direction.pdf.filter(|_| !direction.lobe.is_specular()),
-        heuristic: mis.heuristic,
-        survivor: survive(beta, eta_scale, &v.stream, vertex + 1, settings),
-    };
-    let next = carried.segment(point.origin(direction.wi), direction.wi, beta, eta_scale);
-    Some(PathState { technique: Some(technique), ..next })
-}
-
-/// A direction by BSDF sampling; of a BSDF that can only be evaluated, by resampling M proposals.
-fn next_direction(v: &Vertex<'_>, settings: &IntegratorSettings) -> Option<Direction> {
-    if v.bsdf.bsdf.is_only_evaluated() {
-        let count = settings.bsdf_proposals.max(1);
-        let proposal = |i| v.stream.split(domain::BSDF, count, i).draw::<3>();
-        let [u_choice] = v.stream.domain(domain::RESAMPLE).draw::<1>();
-        let r = v.bsdf.resample(v.wo, count, proposal, u_choice)?;
-        return Some(Direction {
-            wi: r.wi,
-            weight: r.f * (v.bsdf.cos(r.wi) * r.weight),
-            eta: r.eta,
-            lobe: r.lobe,
-            pdf: None,
-        });
-    }
-    sampled_direction(&v.bsdf, v.wo, v.stream.domain(domain::BSDF).draw::<3>())
-}
-
-impl PathState {
-    /// What the path carries of the emission of a surface, with the weight of the technique that found it.
-    fn emission(&self, job: &RenderJob, interaction: &SurfaceInteraction) -> Rgb {
-        let lights = &job.lights;
-        if interaction.hit.instance != Hit::NO_INSTANCE {
-            return Rgb::BLACK;
-        }
-        let Some(light) = lights.light_of(interaction.hit.geometry, interaction.hit.primitive) else {
-            return Rgb::BLACK;
-        };
-        let s = &interaction.surface;
-        let hit = LightHit { t: self.depth(interaction), p: s.p, n: s.n, uv: s.uv };
-        let l = self.beta * lights.lights[light as usize].l(&hit, interaction.wo);
-        match &self.technique {
-            Some(technique) if !l.is_black() => l * technique.weight(|ctx| lights.pdf(ctx, light, self.ray.d, &hit)),
-            _ => l,
-        }
+impl Tracer for PathTracer {
+    fn trace(&mut self, job: &RenderJob, samples: &[CameraSample], fits: &mut Fits, out: &mut Vec<PixelSample>) {
+        PathTracer::trace(self, job, &job.settings().integrator, samples, fits, out);
     }
 
-    /// The throughput beyond what the last segment has hit; `None` if roulette ends the path there.
-    #[inline]
-    fn beta_beyond_emitter(&self) -> Option<Rgb> {
-        match &self.technique {
-            Some(technique) if self.passed == 0 => technique.survivor,
-            _ => Some(self.beta),
-        }
-    }
-
-    /// Features of a hit of a mesh that reflects `rho`, without the normal.
-    fn plain_features(&self, job: &RenderJob, hit: &Hit, distance: f32, rho: Rgb) -> Features {
-        Features {
-            albedo: rho,
-            normal: Vec3::ZERO,
-            depth: self.travelled + distance,
-            material: job.world.scene.surfaces[hit.geometry as usize].material,
-            object: hit.geometry,
-        }
-    }
-
-    fn features(
-        &self,
-        job: &RenderJob,
-        interaction: &SurfaceInteraction,
-        bsdf: &SurfaceBsdf<'_>,
-        stream: &SampleStream,
-    ) -> Features {
-        let z = bsdf.frame.z;
-        Features {
-            albedo: bsdf.albedo_estimate(interaction.wo, || stream.domain(domain::ALBEDO).draw::<3>()),
-            normal: if z.dot(interaction.wo) < 0.0 { -z } else { z },
-            depth: self.depth(interaction),
-            material: job.world.scene.surfaces[interaction.hit.geometry as usize].material,
-            object: interaction.hit.geometry,
-        }
-    }
-
-    /// Distance from the camera along the ray.
-    fn depth(&self, interaction: &SurfaceInteraction) -> f32 {
-        self.travelled + interaction.distance
-    }
-
-    /// The path beyond a surface that does not scatter, with the throughput `beta`.
-    fn pass(&self, beta: Rgb, interaction: &SurfaceInteraction) -> PathState {
-        PathState {
-            beta,
-            ray: Ray { o: interaction.origin(self.ray.d), ..self.ray },
-            width: interaction.width,
-            passed: self.passed + 1,
-            travelled: self.travelled + interaction.distance,
-            ..*self
-        }
+    fn take_stats(&mut self) -> PathStats {
+        let direct = std::mem::take(&mut self.direct.stats);
+        PathStats { direct, ..std::mem::take(&mut self.search.stats) }
     }
 }

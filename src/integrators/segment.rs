@@ -1,12 +1,18 @@
 //! A path on its way: its state between two vertices, and the ways in which it goes on.
 
+use crate::accel::Hit;
 use crate::bsdfs::Lobe;
 use crate::cameras::CameraRay;
-use crate::direct::DirectStats;
-use crate::lights::LightCtx;
+use crate::direct::estimators::mis::Mis;
+use crate::direct::{DirectStats, ShadingPoint};
+use crate::film::Features;
+use crate::geometry::SurfaceHit;
+use crate::lights::{LightCtx, LightHit};
 use crate::materials::SurfaceBsdf;
+use crate::scene::{RenderJob, SurfaceInteraction};
 use crate::settings::{IntegratorSettings, SampleCounts};
 use lumiris_numbers::estimators::mis::{Heuristic, Technique};
+use lumiris_numbers::math::ray::offset_origin;
 use lumiris_numbers::math::{Ray, Rgb, Vec3};
 use lumiris_numbers::samplers::SampleStream;
 use std::time::Duration;
@@ -37,6 +43,17 @@ pub struct PathStats {
     pub shade_time: Duration,
     /// Direct lighting.
     pub direct: DirectStats,
+    /// Lookups in an irradiance cache.
+    pub lookups: LookupStats,
+}
+
+/// Lookups and cache misses.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub struct LookupStats {
+    /// Diffuse vertices of camera paths.
+    pub lookups: u64,
+    /// Cache misses: lookups without a usable record, where path tracing takes over.
+    pub misses: u64,
 }
 
 impl PathStats {
@@ -48,6 +65,8 @@ impl PathStats {
         self.bounce_time += other.bounce_time;
         self.shade_time += other.shade_time;
         self.direct.merge(&other.direct);
+        self.lookups.lookups += other.lookups.lookups;
+        self.lookups.misses += other.lookups.misses;
     }
 }
 
@@ -108,6 +127,78 @@ impl PathState {
     pub(super) fn carried(&self, beta: Rgb, width: f32) -> Carried {
         let PathState { sample, eta_scale, spread, ray: Ray { time, .. }, .. } = *self;
         Carried { sample, beta, eta_scale, width, spread, time }
+    }
+
+    /// What the path carries of the emission of a surface, with the weight of the technique that found it.
+    pub(super) fn emission(&self, job: &RenderJob, interaction: &SurfaceInteraction) -> Rgb {
+        let lights = &job.lights;
+        if interaction.hit.instance != Hit::NO_INSTANCE {
+            return Rgb::BLACK;
+        }
+        let Some(light) = lights.light_of(interaction.hit.geometry, interaction.hit.primitive) else {
+            return Rgb::BLACK;
+        };
+        let s = &interaction.surface;
+        let hit = LightHit { t: self.depth(interaction), p: s.p, n: s.n, uv: s.uv };
+        let l = self.beta * lights.lights[light as usize].l(&hit, interaction.wo);
+        match &self.technique {
+            Some(technique) if !l.is_black() => l * technique.weight(|ctx| lights.pdf(ctx, light, self.ray.d, &hit)),
+            _ => l,
+        }
+    }
+
+    /// The throughput beyond what the last segment has hit; `None` if roulette ends the path there.
+    #[inline]
+    pub(super) fn beta_beyond_emitter(&self) -> Option<Rgb> {
+        match &self.technique {
+            Some(technique) if self.passed == 0 => technique.survivor,
+            _ => Some(self.beta),
+        }
+    }
+
+    /// Features of a hit of a mesh that reflects `rho`, without the normal.
+    pub(super) fn plain_features(&self, job: &RenderJob, hit: &Hit, distance: f32, rho: Rgb) -> Features {
+        Features {
+            albedo: rho,
+            normal: Vec3::ZERO,
+            depth: self.travelled + distance,
+            material: job.world.scene.surfaces[hit.geometry as usize].material,
+            object: hit.geometry,
+        }
+    }
+
+    pub(super) fn features(
+        &self,
+        job: &RenderJob,
+        interaction: &SurfaceInteraction,
+        bsdf: &SurfaceBsdf<'_>,
+        stream: &SampleStream,
+    ) -> Features {
+        let z = bsdf.frame.z;
+        Features {
+            albedo: bsdf.albedo_estimate(interaction.wo, || stream.domain(domain::ALBEDO).draw::<3>()),
+            normal: if z.dot(interaction.wo) < 0.0 { -z } else { z },
+            depth: self.depth(interaction),
+            material: job.world.scene.surfaces[interaction.hit.geometry as usize].material,
+            object: interaction.hit.geometry,
+        }
+    }
+
+    /// Distance from the camera along the ray.
+    pub(super) fn depth(&self, interaction: &SurfaceInteraction) -> f32 {
+        self.travelled + interaction.distance
+    }
+
+    /// The path beyond a surface that does not scatter, with the throughput `beta`.
+    pub(super) fn pass(&self, beta: Rgb, interaction: &SurfaceInteraction) -> PathState {
+        PathState {
+            beta,
+            ray: Ray { o: interaction.origin(self.ray.d), ..self.ray },
+            width: interaction.width,
+            passed: self.passed + 1,
+            travelled: self.travelled + interaction.distance,
+            ..*self
+        }
     }
 }
 
@@ -187,6 +278,99 @@ pub(super) fn sampled_direction(bsdf: &SurfaceBsdf<'_>, wo: Vec3, [uc, u0, u1]: 
     let sample = bsdf.sample(wo, uc, [u0, u1])?;
     let weight = sample.f * (bsdf.cos(sample.wi) / sample.pdf);
     Some(Direction { wi: sample.wi, weight, eta: sample.eta, lobe: sample.lobe, pdf: Some(sample.pdf) })
+}
+
+/// A vertex that scatters.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Vertex<'w> {
+    pub(super) surface: SurfaceHit,
+    pub(super) bsdf: SurfaceBsdf<'w>,
+    pub(super) wo: Vec3,
+    pub(super) stream: SampleStream,
+    pub(super) direct: SampleStream,
+}
+
+impl<'w> Vertex<'w> {
+    /// Origin of a ray that leaves the vertex in direction `w`.
+    fn origin(&self, w: Vec3) -> Vec3 {
+        offset_origin(self.surface.p, self.surface.p_error, self.bsdf.n, w)
+    }
+
+    /// The shading normal on the side of the viewer.
+    pub(super) fn viewer_normal(&self) -> Vec3 {
+        let z = self.bsdf.frame.z;
+        if z.dot(self.wo) < 0.0 { -z } else { z }
+    }
+
+    pub(super) fn shading_point(&self, time: f32, sample_counts: SampleCounts, fit: u32) -> ShadingPoint<'w> {
+        ShadingPoint {
+            p: self.surface.p,
+            p_error: self.surface.p_error,
+            wo: self.wo,
+            bsdf: self.bsdf,
+            time,
+            stream: self.direct.domain(domain::DIRECT),
+            sample_counts,
+            fit,
+            bsdf_by_path: false,
+        }
+    }
+}
+
+/// The next path segment by BSDF sampling and Russian roulette, with the lobe that it took; `None` if the path ends.
+pub(super) fn extend(
+    path: &PathState,
+    v: &Vertex<'_>,
+    vertex: u32,
+    settings: &IntegratorSettings,
+) -> Option<(PathState, Lobe)> {
+    let direction = next_direction(v, settings)?;
+    let carried = path.carried(path.beta, path.width);
+    let (beta, eta_scale) = carried.beyond(&direction)?;
+    let beta = survive(beta, eta_scale, &v.stream, vertex + 1, settings)?;
+    Some((carried.segment(v.origin(direction.wi), direction.wi, beta, eta_scale), direction.lobe))
+}
+
+/// The next path segment by BSDF sampling, which looks for the emitter of the sample as well. Roulette ends it only behind
+/// that; `None` if the direction carries no light.
+pub(super) fn extend_to_emitter(
+    path: &PathState,
+    v: &Vertex<'_>,
+    point: &ShadingPoint<'_>,
+    vertex: u32,
+    (settings, mis): (&IntegratorSettings, &Mis),
+) -> Option<PathState> {
+    let direction = next_direction(v, settings)?;
+    let carried = path.carried(path.beta, path.width);
+    let (beta, eta_scale) = carried.beyond(&direction)?;
+    debug_assert!(direction.pdf.is_some(), "a resampled direction has no weight against light sampling");
+    let technique = BsdfTechnique {
+        ctx: point.light_ctx(),
+        n_light: point.light_samples_beside_path() as f32,
+        pdf: direction.pdf.filter(|_| !direction.lobe.is_specular()),
+        heuristic: mis.heuristic,
+        survivor: survive(beta, eta_scale, &v.stream, vertex + 1, settings),
+    };
+    let next = carried.segment(v.origin(direction.wi), direction.wi, beta, eta_scale);
+    Some(PathState { technique: Some(technique), ..next })
+}
+
+/// A direction by BSDF sampling; of a BSDF that can only be evaluated, by resampling M proposals.
+fn next_direction(v: &Vertex<'_>, settings: &IntegratorSettings) -> Option<Direction> {
+    if v.bsdf.bsdf.is_only_evaluated() {
+        let count = settings.bsdf_proposals.max(1);
+        let proposal = |i| v.stream.split(domain::BSDF, count, i).draw::<3>();
+        let [u_choice] = v.stream.domain(domain::RESAMPLE).draw::<1>();
+        let r = v.bsdf.resample(v.wo, count, proposal, u_choice)?;
+        return Some(Direction {
+            wi: r.wi,
+            weight: r.f * (v.bsdf.cos(r.wi) * r.weight),
+            eta: r.eta,
+            lobe: r.lobe,
+            pdf: None,
+        });
+    }
+    sampled_direction(&v.bsdf, v.wo, v.stream.domain(domain::BSDF).draw::<3>())
 }
 
 /// An empty vector in the memory of `old`, whose items have the same layout and may borrow from something else.

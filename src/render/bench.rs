@@ -10,7 +10,7 @@ use crate::accel::embree::{EmbreeAccel, EmbreeError};
 use crate::accel::{Accel, AlphaSource, Coherence, RayBatch};
 use crate::direct::{Estimator, Fits};
 use crate::integrators::path::{CameraSample, Recording};
-use crate::integrators::{PathIntegrator, PathStats};
+use crate::integrators::{PathStats, PathTracer, Tracer};
 use crate::scene::RenderJob;
 use crate::settings::IntegratorKind;
 use lumiris_numbers::estimators::stats::median;
@@ -150,28 +150,28 @@ pub fn measure(mut job: RenderJob, settings: &BenchSettings) -> Result<Report, E
 }
 
 fn record(job: &RenderJob, batches: &[Vec<CameraSample>]) -> Recording {
-    let mut integrator = PathIntegrator::default();
-    integrator.recording = Some(Recording::default());
+    let mut tracer = PathTracer::default();
+    tracer.record();
     let (mut fits, mut out) = (Fits::default(), Vec::new());
     for samples in batches {
-        integrator.trace(job, &job.settings().integrator, samples, &mut fits, &mut out);
+        tracer.trace(job, &job.settings().integrator, samples, &mut fits, &mut out);
     }
-    integrator.recording.take().unwrap_or_default()
+    tracer.take_recording()
 }
 
 /// Renders the batches several times.
 fn stages(job: &RenderJob, batches: &[Vec<CameraSample>], runs: u32) -> (Vec<Stage>, Option<Proposals>) {
-    let mut integrator = PathIntegrator::default();
+    let mut tracer = PathTracer::default();
     let mut out = Vec::new();
     let fits = batches.iter().flatten().map(|s| s.fit + 1).max().unwrap_or(0) as usize;
     let mut fits = Estimator::at_vertex(&job.settings().integrator, 0).fits(job, fits);
     let mut one_run = || {
         let start = Instant::now();
         for samples in batches {
-            integrator.trace(job, &job.settings().integrator, samples, &mut fits, &mut out);
+            tracer.trace(job, &job.settings().integrator, samples, &mut fits, &mut out);
             black_box(&out);
         }
-        (start.elapsed(), integrator.take_stats())
+        (start.elapsed(), tracer.take_stats())
     };
     one_run();
     let runs: Vec<(Duration, PathStats)> = (0..runs.max(1)).map(|_| one_run()).collect();

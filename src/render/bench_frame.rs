@@ -13,8 +13,8 @@ use crate::accel::embree::EmbreeError;
 use crate::accel::embree::bare::{Bare, Packed};
 use crate::direct::Estimator;
 use crate::film::{PixelBounds, PixelSums};
-use crate::integrators::PathStats;
 use crate::integrators::path::Recording;
+use crate::integrators::{PathStats, PathTracer, Tracer};
 use crate::scene::RenderJob;
 use lumiris_numbers::estimators::stats::median;
 use serde::Serialize;
@@ -116,12 +116,11 @@ pub fn measure_frame(job: &RenderJob, tile_size: u32, rays: usize, turns: u32) -
     let (parts, samples) = batch_parts(&run, rays);
     let camera_samples = parts.iter().map(|(_, pixels)| pixels.len() * samples.len()).sum::<usize>();
 
-    let mut worker = Worker::new(true);
-    worker.record(true);
+    let mut worker = Worker::new(PathTracer::default());
+    worker.tracer.record();
     frame(&run, &mut worker, &parts, &samples);
-    let recording = worker.take_recording();
-    worker.record(false);
-    worker.take_stats();
+    let recording = worker.tracer.take_recording();
+    worker.tracer.take_stats();
 
     let (geometry, textures) = (Arc::clone(&job.world.scene.geometry), Arc::clone(&job.world.scene.textures));
     let bare = Bare::new(geometry, Some(textures as Arc<dyn AlphaSource>))?;
@@ -137,7 +136,7 @@ pub fn measure_frame(job: &RenderJob, tile_size: u32, rays: usize, turns: u32) -
         let start = Instant::now();
         frame(&run, &mut worker, &parts, &samples);
         let ours = start.elapsed();
-        stats.push(worker.take_stats().paths);
+        stats.push(worker.tracer.take_stats());
         let mut sum = Duration::ZERO;
         for (kind, times) in kinds.iter().zip(&mut of_kinds) {
             let time = kind.time(&bare)?;
@@ -190,12 +189,12 @@ fn kinds(recording: &Recording) -> Vec<Kind<'_>> {
 }
 
 /// Renders the parts, from camera samples to sums of pixels.
-fn frame(run: &Run<'_>, worker: &mut Worker, parts: &[(PixelBounds, Range<usize>)], samples: &Range<u32>) {
+fn frame(run: &Run<'_>, worker: &mut Worker<PathTracer>, parts: &[(PixelBounds, Range<usize>)], samples: &Range<u32>) {
     for (tile, pixels) in parts {
         run.camera_samples(tile, pixels.clone(), samples, &mut worker.scratch, &mut worker.samples);
         worker.samples.iter_mut().for_each(|s| s.fit -= pixels.start as u32);
         let mut fits = Estimator::at_vertex(&run.job.settings().integrator, 0).fits(run.job, pixels.len());
-        worker.trace(run.job, (None, None), &mut fits);
+        worker.tracer.trace(run.job, &run.job.settings().integrator, &worker.samples, &mut fits, &mut worker.results);
         let mut sums = vec![PixelSums::default(); pixels.len()];
         for (pixel, results) in sums.iter_mut().zip(worker.results.chunks(samples.len())) {
             results.iter().for_each(|r| pixel.add(r));

@@ -17,21 +17,18 @@ mod worker;
 use crate::direct::{Estimator, Fits};
 use crate::film::replicas::{Replica, replicas};
 use crate::film::{Film, PixelBounds, PixelSums};
-use crate::integrators::PathStats;
-use crate::integrators::irradiance_cache::{self, BuildStats, IrradianceCache, LookupStats};
+pub use crate::integrators::CacheReport;
 use crate::integrators::path::CameraSample;
-use crate::integrators::photon_map::{self, MapMaker, MapStats, PhotonMaps};
+use crate::integrators::{MapStats, PathStats, Statistics, integrator};
 use crate::photons::PhotonError;
 use crate::scene::RenderJob;
-use crate::settings::IntegratorKind;
 use camera_samples::CameraSampler;
 use lumiris_numbers::estimators::ocv::block_of;
 use lumiris_numbers::math::hash::pcg4d;
 use rayon::prelude::*;
 use std::sync::atomic::{AtomicBool, AtomicU64, Ordering};
-use std::sync::{Mutex, MutexGuard, PoisonError};
 use std::time::{Duration, Instant};
-use worker::{Worker, WorkerStats};
+use worker::{AnyWorker, Workers};
 
 /// Paths that are traced together: enough that stages run long, few enough that their data stays in the cache.
 const BATCH_PATHS: usize = 4096;
@@ -110,26 +107,13 @@ pub struct Rendering {
     pub threads: usize,
 }
 
-/// Statistics of an irradiance cache.
-#[derive(Clone, Copy, Debug)]
-pub struct CacheReport {
-    /// Records.
-    pub records: usize,
-    /// Their memory (bytes).
-    pub bytes: usize,
-    /// How it was built; its ray counts are also included in those of the rendering.
-    pub build: BuildStats,
-    /// Lookups and cache misses.
-    pub lookups: LookupStats,
-}
-
 /// Why a rendering ended without an image.
 #[derive(Debug, thiserror::Error)]
 pub enum RenderError {
     /// The threads could not be started.
     #[error(transparent)]
     Threads(#[from] ThreadError),
-    /// There are no photon maps.
+    /// The integrator could not prepare its photon maps.
     #[error(transparent)]
     Photons(#[from] PhotonError),
 }
@@ -216,14 +200,9 @@ struct Run<'a> {
     stop: &'a AtomicBool,
     observe: &'a (dyn Fn(&Progress) + Sync),
     camera: CameraSampler<'a>,
-    cache: Option<IrradianceCache>,
-    /// Photon maps of the pass under way.
-    maps: Option<PhotonMaps>,
     start: Instant,
     samples_done: AtomicU64,
     rays: AtomicU64,
-    /// Workers without a tile, whose buffers are large enough already.
-    idle: Mutex<Vec<Worker>>,
 }
 
 impl<'a> Run<'a> {
@@ -239,67 +218,56 @@ impl<'a> Run<'a> {
             stop,
             observe,
             camera: CameraSampler::new(job, settings.first_sample),
-            cache: None,
-            maps: None,
             start: Instant::now(),
             samples_done: AtomicU64::new(0),
             rays: AtomicU64::new(0),
-            idle: Mutex::default(),
         }
     }
 
-    fn run(mut self, threads: usize) -> Result<Rendering, RenderError> {
+    fn run(self, threads: usize) -> Result<Rendering, RenderError> {
         let bounds = self.job.world.scene.film.bounds;
-        let build = self.build_cache();
-        let mut maker = self.map_maker()?;
-        let integrator = &self.job.settings().integrator;
-        let mut tiles: Vec<Tile> = bounds.tiles(self.settings.tile_size).into_iter().map(|b| self.tile(b)).collect();
+        let seed = self.job.settings().sampling.seed;
+        let cameras = |pixel, sample| self.camera.sample_of_seed(pixel, sample, seed);
+        let mut integrator = integrator(self.job, &cameras, self.stop)?;
+        let wants_replicas = self.wants_replicas() && !integrator.shares_noise();
+        let tiles = bounds.tiles(self.settings.tile_size);
+        let mut tiles: Vec<Tile> = tiles.into_iter().map(|b| self.tile(b, wants_replicas)).collect();
 
         let end = self.settings.first_sample + self.settings.spp;
-        let mut stats = WorkerStats::default();
         let (mut noise, mut observed) = (None, self.start);
+        let mut stats = PathStats::default();
         let mut first = self.settings.first_sample;
         while first < end && !self.stopped() {
-            let mut length = self.next_pass(first - self.settings.first_sample);
-            if let Some(maker) = &mut maker {
-                // A progressive map serves one sample of each pixel
-                length = if integrator.photons.progressive.is_some() { 1 } else { length };
-                if !self.renew_maps(maker, first)? {
-                    break;
+            let served = end.min(first.saturating_add(integrator.prepare(first)?));
+            let workers = Workers::new(&*integrator, self.settings.with_features);
+            while first < served && !self.stopped() {
+                let length = self.next_pass(first - self.settings.first_sample);
+                let samples = first..(first + length).min(served);
+                stats.merge(&self.pass(&workers, &mut tiles, samples.clone(), noise));
+                first = samples.end;
+                if observed.elapsed() >= NOISE_INTERVAL {
+                    noise = Some(self.film(&tiles).relative_noise());
+                    observed = Instant::now();
                 }
-            }
-            let samples = first..(first + length).min(end);
-            stats.merge(&self.pass(&mut tiles, samples.clone(), noise));
-            first = samples.end;
-            if observed.elapsed() >= NOISE_INTERVAL {
-                noise = Some(self.film(&tiles).relative_noise());
-                observed = Instant::now();
             }
         }
 
         let mut film = self.film(&tiles);
-        let cache = self.cache.as_ref().zip(build).map(|(cache, build)| {
-            stats.paths.merge(&build.paths);
-            for [x, y] in cache.records().iter().map(|r| r.pixel) {
-                let index = film.index(x, y);
-                film.pixels[index].records += 1;
-            }
-            CacheReport { records: cache.records().len(), bytes: cache.bytes(), build, lookups: stats.lookups }
-        });
+        let Statistics { paths: stats, cache, photons } = integrator.statistics(stats, &mut film);
         let complete = film.pixels.iter().all(|p| p.count == u64::from(self.settings.spp));
-        let photons = maker.map(|m| m.stats);
-        Ok(Rendering { film, stats: stats.paths, cache, photons, elapsed: self.start.elapsed(), complete, threads })
+        Ok(Rendering { film, stats, cache, photons, elapsed: self.start.elapsed(), complete, threads })
+    }
+
+    /// True if replicas are requested and tell anything.
+    fn wants_replicas(&self) -> bool {
+        self.settings.with_replicas && !self.job.settings().sampling.sampler.has_independent_samples()
     }
 
     /// A tile without samples.
-    fn tile(&self, bounds: PixelBounds) -> Tile {
-        let (scene, settings) = (&self.job.world.scene, self.job.settings());
-        // Samples of a progressive photon map vary with their maps, which pixels and replicas share
-        let integrator = &settings.integrator;
-        let shares_maps = integrator.kind == IntegratorKind::PhotonMap && integrator.photons.progressive.is_some();
-        let is_told = !settings.sampling.sampler.has_independent_samples() && !shares_maps;
-        let wants_replicas = self.settings.with_replicas && is_told;
-        let replicas = if wants_replicas { replicas(&scene.film.bounds, &bounds) } else { Vec::new() };
+    fn tile(&self, bounds: PixelBounds, wants_replicas: bool) -> Tile {
+        let all = &self.job.world.scene.film.bounds;
+        let replicas = if wants_replicas { replicas(all, &bounds) } else { Vec::new() };
+        let integrator = &self.job.settings().integrator;
         let fits = Estimator::at_vertex(integrator, 0).fits(self.job, bounds.area() + replicas.len());
         Tile { bounds, sums: vec![PixelSums::default(); bounds.area()], replicas, fits }
     }
@@ -310,47 +278,6 @@ impl<'a> Run<'a> {
         tiles.iter().for_each(|t| film.set_tile(&t.bounds, &t.sums, &t.replicas));
         film.replicas.sort_unstable_by_key(|r| r.pixel);
         film
-    }
-
-    /// Makes the irradiance cache, if the integrator has one.
-    fn build_cache(&mut self) -> Option<BuildStats> {
-        if self.job.settings().integrator.kind != IntegratorKind::IrradianceCache {
-            return None;
-        }
-        let bounds = self.job.world.scene.film.bounds;
-        let seed = self.job.settings().sampling.seed;
-        let camera = |pixel, sample| self.camera.sample_of_seed(pixel, sample, seed);
-        let (cache, stats) = irradiance_cache::build(self.job, bounds, &camera, self.stop);
-        self.cache = Some(cache);
-        Some(stats)
-    }
-
-    /// What makes the photon maps, if the integrator has any.
-    fn map_maker(&self) -> Result<Option<MapMaker<'a>>, PhotonError> {
-        if self.job.settings().integrator.kind != IntegratorKind::PhotonMap {
-            return Ok(None);
-        }
-        let seed = self.job.settings().sampling.seed;
-        let seen = photon_map::maps::seen(self.job, &|pixel, sample| self.camera.sample_of_seed(pixel, sample, seed));
-        MapMaker::new(self.job, &seen, self.stop).map(Some)
-    }
-
-    /// Makes the photon maps of the pass that begins with the sample `first`, if it needs others. False if it was told
-    /// to stop and the samples so far are an image.
-    fn renew_maps(&mut self, maker: &mut MapMaker<'_>, first: u32) -> Result<bool, PhotonError> {
-        let is_progressive = self.job.settings().integrator.photons.progressive.is_some();
-        if self.maps.is_some() && !is_progressive {
-            return Ok(true);
-        }
-        self.maps = None;
-        match maker.make(self.job, first) {
-            Ok(maps) => {
-                self.maps = Some(maps);
-                Ok(true)
-            }
-            Err(PhotonError::Stopped { .. }) if first > self.settings.first_sample => Ok(false),
-            Err(error) => Err(error),
-        }
     }
 
     /// Samples per pixel of the next pass over all tiles: 1, 1, 2, 4, …, so that there is a whole image soon. It lies
@@ -383,19 +310,22 @@ impl<'a> Run<'a> {
     }
 
     /// Adds the samples of a range to every tile.
-    fn pass(&self, tiles: &mut [Tile], samples: std::ops::Range<u32>, noise: Option<f64>) -> WorkerStats {
+    fn pass(
+        &self,
+        workers: &Workers<'_>,
+        tiles: &mut [Tile],
+        samples: std::ops::Range<u32>,
+        noise: Option<f64>,
+    ) -> PathStats {
         tiles
             .par_iter_mut()
             .with_max_len(1)
             .map(|tile| {
                 if self.stop.load(Ordering::Relaxed) {
-                    return WorkerStats::default();
+                    return PathStats::default();
                 }
-                let mut worker = self.idle().pop().unwrap_or_else(|| Worker::new(self.settings.with_features));
-                let stats = self.render_tile(&mut worker, tile, samples.clone());
-                self.idle().push(worker);
-                let (paths, direct) = (&stats.paths, &stats.paths.direct);
-                let rays = paths.camera_rays + paths.bounce_rays + direct.emitter_rays + direct.segments;
+                let stats = workers.with_one(|worker| self.render_tile(worker, tile, samples.clone()));
+                let rays = stats.camera_rays + stats.bounce_rays + stats.direct.emitter_rays + stats.direct.segments;
                 let done = tile.bounds.area() as u64 * u64::from(samples.end - samples.start);
                 (self.observe)(&Progress {
                     samples_done: self.samples_done.fetch_add(done, Ordering::Relaxed) + done,
@@ -406,18 +336,14 @@ impl<'a> Run<'a> {
                 });
                 stats
             })
-            .reduce(WorkerStats::default, |mut a, b| {
+            .reduce(PathStats::default, |mut a, b| {
                 a.merge(&b);
                 a
             })
     }
 
-    fn idle(&self) -> MutexGuard<'_, Vec<Worker>> {
-        self.idle.lock().unwrap_or_else(PoisonError::into_inner)
-    }
-
     /// Adds the samples of a range to one tile, in batches of whole pixels.
-    fn render_tile(&self, worker: &mut Worker, tile: &mut Tile, samples: std::ops::Range<u32>) -> WorkerStats {
+    fn render_tile(&self, worker: &mut AnyWorker<'_>, tile: &mut Tile, samples: std::ops::Range<u32>) -> PathStats {
         let per_pixel = samples.len().max(1);
         let pixels_per_batch = (BATCH_PATHS / per_pixel).max(1);
         let bounds = tile.bounds;
@@ -435,15 +361,15 @@ impl<'a> Run<'a> {
             let first = batch * pixels_per_batch;
             let pixels = first..first + sums.len();
             self.camera_samples(&bounds, pixels, &samples, &mut worker.scratch, &mut worker.samples);
-            worker.trace(self.job, (self.cache.as_ref(), self.maps.as_ref()), &mut tile.fits);
+            worker.tracer.trace(self.job, &worker.samples, &mut tile.fits, &mut worker.results);
             for (pixel, results) in sums.iter_mut().zip(worker.results.chunks(per_pixel)) {
                 results.iter().for_each(|r| pixel.add(r));
             }
         }
         self.render_replicas(worker, tile, samples);
-        let mut stats = worker.take_stats();
+        let mut stats = worker.tracer.take_stats();
         if begins_block {
-            let direct = &mut stats.paths.direct;
+            let direct = &mut stats.direct;
             direct.systems += (tile.sums.len() + tile.replicas.len()) as u64;
             direct.ill_conditioned += ill_conditioned;
             direct.solve += solve;
@@ -453,7 +379,7 @@ impl<'a> Run<'a> {
     }
 
     /// Adds the samples of a range to the replicas of a tile.
-    fn render_replicas(&self, worker: &mut Worker, tile: &mut Tile, samples: std::ops::Range<u32>) {
+    fn render_replicas(&self, worker: &mut AnyWorker<'_>, tile: &mut Tile, samples: std::ops::Range<u32>) {
         let per_pixel = samples.len().max(1);
         let seed = pcg4d([self.job.settings().sampling.seed, REPLICA_SEED, 0, 0])[0];
         let mut fits = tile.bounds.area() as u32..;
@@ -461,7 +387,7 @@ impl<'a> Run<'a> {
             worker.samples.clear();
             let pixels = replicas.iter().zip(&mut fits).map(|(r, fit)| (fit, position(&tile.bounds, r.pixel)));
             self.camera.samples(pixels, &samples, seed, &mut worker.scratch, &mut worker.samples);
-            worker.trace(self.job, (self.cache.as_ref(), self.maps.as_ref()), &mut tile.fits);
+            worker.tracer.trace(self.job, &worker.samples, &mut tile.fits, &mut worker.results);
             for (replica, results) in replicas.iter_mut().zip(worker.results.chunks(per_pixel)) {
                 results.iter().for_each(|r| replica.add(r));
             }

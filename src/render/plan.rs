@@ -14,8 +14,8 @@ use super::visibility_cache::build_visibility_cache;
 use super::{RenderSettings, Run, ThreadError, camera_batches};
 use crate::direct::Fits;
 use crate::film::PixelBounds;
-use crate::integrators::PathIntegrator;
 use crate::integrators::path::CameraSample;
+use crate::integrators::{PathTracer, Tracer};
 use crate::scene::{RenderJob, SampleCountMap};
 use crate::settings::{
     EstimatorKind, IntegratorKind, IntegratorSettings, Proposals, RisSettings, SampleCounts, StageTimes, Strata, Target,
@@ -97,7 +97,7 @@ fn measure(job: &RenderJob) -> Option<StageTimes> {
 /// batches of camera rays. `None` if there was nothing to light.
 fn vertex_times(job: &RenderJob) -> Option<[[f64; 2]; 2]> {
     let batches = camera_batches(job, RenderSettings::default().tile_size, TIMING_RAYS);
-    let mut integrator = PathIntegrator::default();
+    let mut tracer = PathTracer::default();
     let (mut samples, mut out) = (Vec::new(), Vec::new());
     let mut measured: [[Vec<f64>; 2]; 2] = Default::default();
     // The first turn fills caches
@@ -109,8 +109,8 @@ fn vertex_times(job: &RenderJob) -> Option<[[f64; 2]; 2]> {
                 settings.ris.proposals = Proposals::Fixed(sample_counts.proposals);
                 samples.clear();
                 samples.extend(batch.iter().map(|s| CameraSample { sample_counts, ..*s }));
-                integrator.trace(job, &settings, &samples, &mut Fits::default(), &mut out);
-                let stats = integrator.take_stats();
+                tracer.trace(job, &settings, &samples, &mut Fits::default(), &mut out);
+                let stats = tracer.take_stats();
                 let d = stats.direct;
                 let vertices = d.proposals / u64::from(sample_counts.proposals);
                 if turn == 0 || vertices == 0 || d.segments == 0 {
@@ -200,7 +200,7 @@ fn pilot_row(job: &RenderJob, row: &PixelBounds) -> Vec<MomentsEstimate> {
 
     let (stop, render) = (AtomicBool::new(false), RenderSettings::default());
     let run = Run::new(job, &render, &stop, &|_| ());
-    let mut integrator = PathIntegrator::default();
+    let mut tracer = PathTracer::default();
     let (mut samples, mut out) = (Vec::<CameraSample>::new(), Vec::new());
     let mut sums = vec![MomentsEstimate::new(); row.area()];
     for (pixel, sum) in sums.iter_mut().enumerate() {
@@ -208,9 +208,9 @@ fn pilot_row(job: &RenderJob, row: &PixelBounds) -> Vec<MomentsEstimate> {
         let at = [row.x0 + pixel as u32, row.y0];
         samples.extend((0..PILOT_SPP).map(|s| run.camera.sample_of_seed(at, s, PILOT_SEED)));
         samples.iter_mut().for_each(|s| s.sample_counts = all);
-        integrator.outcomes = Some(Vec::new());
-        integrator.trace(job, &settings, &samples, &mut Fits::default(), &mut out);
-        let outcomes = integrator.outcomes.take().unwrap_or_default();
+        tracer.outcomes = Some(Vec::new());
+        tracer.trace(job, &settings, &samples, &mut Fits::default(), &mut out);
+        let outcomes = tracer.outcomes.take().unwrap_or_default();
         let m = f64::from(PILOT_PROPOSALS);
         for o in &outcomes {
             sum.add(o.contribution.to_array().map(|c| f64::from(c) * m), f64::from(o.unshadowed.luminance()) * m);

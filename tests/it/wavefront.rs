@@ -3,7 +3,7 @@
 use lumiris::direct::Fits;
 use lumiris::film::PixelSample;
 use lumiris::import::{LoadOptions, load};
-use lumiris::integrators::PathIntegrator;
+use lumiris::integrators::PathTracer;
 use lumiris::integrators::path::CameraSample;
 use lumiris::scene::{AccelKind, RenderJob};
 use lumiris::settings::{EstimatorKind, IntegratorKind};
@@ -41,10 +41,10 @@ fn camera_samples(job: &RenderJob) -> Vec<CameraSample> {
 
 /// Traces side by side, or by the stages of direct light, which list what samples contribute.
 fn traced(job: &RenderJob, samples: &[CameraSample], side_by_side: bool) -> Vec<PixelSample> {
-    let mut integrator = PathIntegrator::default();
-    integrator.outcomes = (!side_by_side).then(Vec::new);
+    let mut tracer = PathTracer::default();
+    tracer.outcomes = (!side_by_side).then(Vec::new);
     let mut out = Vec::new();
-    integrator.trace(job, &job.settings().integrator, samples, &mut Fits::default(), &mut out);
+    tracer.trace(job, &job.settings().integrator, samples, &mut Fits::default(), &mut out);
     out
 }
 

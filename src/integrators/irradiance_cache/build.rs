@@ -15,8 +15,11 @@ use super::cache::IrradianceCache;
 use super::gather::{BATCH, Gatherer, RecordRequest};
 use super::octree::Octree;
 use super::record::{Range, Record};
-use crate::film::{PixelBounds, PixelSample};
-use crate::integrators::path::{self, CameraSample, PathIntegrator, PathStats};
+use crate::direct::Fits;
+use crate::film::PixelBounds;
+use crate::integrators::path::{AtVertices, CameraSample, PathStats, PathTracer, Shading};
+use crate::integrators::segment::{PathState, Vertex};
+use crate::integrators::{Cameras, Tracer};
 use crate::scene::RenderJob;
 use crate::settings::Cached;
 use lumiris_numbers::math::{Bounds3, Vec3};
@@ -51,9 +54,6 @@ pub struct BuildStats {
     /// Wall-clock time.
     pub elapsed: Duration,
 }
-
-/// Camera samples by pixel and index.
-pub type Cameras<'a> = &'a (dyn Fn([u32; 2], u32) -> CameraSample + Sync);
 
 /// Builds the cache for what the camera sees inside `bounds`. `stop` ends it early.
 pub fn build(
@@ -144,7 +144,7 @@ fn ask(
 ) -> Vec<RecordRequest> {
     let parts: Vec<(Vec<RecordRequest>, PathStats)> = pixels
         .par_chunks(CHUNK)
-        .map_init(PathIntegrator::default, |paths, pixels| {
+        .map_init(PathTracer::default, |paths, pixels| {
             let samples: Vec<CameraSample> = pixels.iter().map(|&pixel| camera(pixel)).collect();
             (ask_chunk(job, cache, pixels, &samples, paths), paths.take_stats())
         })
@@ -153,60 +153,50 @@ fn ask(
     parts.into_iter().flat_map(|(wanted, _)| wanted).collect()
 }
 
+/// Requests records where camera paths find none, and follows these through mirrors and glass.
 fn ask_chunk(
     job: &RenderJob,
     cache: &IrradianceCache,
     pixels: &[[u32; 2]],
     samples: &[CameraSample],
-    paths: &mut PathIntegrator,
+    paths: &mut PathTracer,
 ) -> Vec<RecordRequest> {
-    let settings = &job.settings().integrator;
-    let depth = settings.depth();
-    let mut wanted = Vec::new();
-    let mut out: Vec<PixelSample> = Vec::new();
-    paths.only_reflected = true;
-    paths.start(samples, &mut out);
-    for vertex in 0..depth {
-        if paths.active.is_empty() {
-            break;
-        }
-        let vertices = paths.find_vertices(job, vertex, depth, samples, &mut out, None);
-        paths.next.clear();
-        for (state, v) in paths.active.iter().zip(&vertices) {
-            let sample = state.sample as usize;
-            let weight = samples[sample].weight.abs();
-            if state.beta.map(f32::abs).max_component() < WORTHWHILE * weight {
-                continue;
-            }
-            let sides = unserved_sides(cache, v).into_iter().flatten();
-            wanted.extend(sides.map(|(side, ns)| RecordRequest {
-                p: v.surface.p,
-                p_error: v.surface.p_error,
-                n: v.bsdf.n,
-                ns,
-                time: state.ray.time,
-                pixel_width: pixel_width(state.width, v.surface.p),
-                spread: state.spread,
-                pixel: pixels[sample],
-                key: vertex << 1 | side,
-            }));
-            // Mirrors and glass
-            let point = v.shading_point(state.ray.time, samples[sample].sample_counts, 0);
-            let next = path::extend(state, v, &point, vertex, settings);
-            paths.next.extend(next.filter(|(_, lobe)| lobe.is_specular()).map(|(state, _)| state));
-        }
-        std::mem::swap(&mut paths.active, &mut paths.next);
-    }
+    let (mut wanted, mut out) = (Vec::new(), Vec::new());
+    let mut ask = |vertex: u32, path: &PathState, v: &Vertex<'_>| {
+        let sample = path.sample as usize;
+        let min = WORTHWHILE * samples[sample].weight.abs();
+        let is_worthwhile = !(path.beta.map(f32::abs).max_component() < min);
+        let sides = unserved_sides(cache, v).into_iter().flatten().filter(|_| is_worthwhile);
+        wanted.extend(sides.map(|(side, ns)| RecordRequest {
+            p: v.surface.p,
+            p_error: v.surface.p_error,
+            n: v.bsdf.n,
+            ns,
+            time: path.ray.time,
+            pixel_width: pixel_width(path.width, v.surface.p),
+            spread: path.spread,
+            pixel: pixels[sample],
+            key: vertex << 1 | side,
+        }));
+        is_worthwhile
+    };
+    let own: &mut AtVertices<'_> = &mut |found, _| {
+        let all = found.paths.iter().zip(found.vertices);
+        all.map(|(path, v)| Shading { lit: None, next: ask(found.vertex, path, v).then_some(v.bsdf) }).collect()
+    };
+    (paths.search.only_reflected, paths.only_specular) = (true, true);
+    paths.search.start(samples, &mut out);
+    paths.follow((job, &job.settings().integrator), Some(own), samples, &mut Fits::default(), &mut out);
     // Paths went on vertex by vertex
-    wanted.sort_by_key(|w| [w.pixel[1], w.pixel[0]]);
+    wanted.sort_by_key(|w: &RecordRequest| [w.pixel[1], w.pixel[0]]);
     wanted
 }
 
 /// The sides of a diffuse surface, 0 that of the viewer and 1 the other, that reflect or transmit light and have no
 /// usable record, with their normals.
-fn unserved_sides(cache: &IrradianceCache, v: &path::Vertex<'_>) -> [Option<(u32, Vec3)>; 2] {
+fn unserved_sides(cache: &IrradianceCache, v: &Vertex<'_>) -> [Option<(u32, Vec3)>; 2] {
     let Some(part) = v.bsdf.lambertian(v.wo) else { return [None; 2] };
-    let ns = super::viewer_normal(v);
+    let ns = v.viewer_normal();
     [(0, part.reflectance, ns), (1, part.transmittance, -ns)].map(|(side, albedo, ns)| {
         let asks = !albedo.is_black() && !cache.serves(v.surface.p, ns, COVERED);
         asks.then_some((side, ns))

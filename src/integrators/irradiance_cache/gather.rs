@@ -15,7 +15,8 @@ use crate::bsdfs::{Bsdf, Diffuse};
 use crate::cameras::CameraRay;
 use crate::direct::{DirectStage, Estimator, Fits, ShadingPoint};
 use crate::film::PixelSample;
-use crate::integrators::path::{CameraSample, PathIntegrator, PathStats};
+use crate::integrators::Tracer;
+use crate::integrators::path::{CameraSample, PathStats, PathTracer};
 use crate::materials::SurfaceBsdf;
 use crate::scene::{EmitterHit, EmitterScratch, RenderJob};
 use crate::settings::{Cached, IntegratorKind, IntegratorSettings, SampleCounts};
@@ -63,7 +64,7 @@ pub struct RecordRequest {
 /// Computes records; holds the buffers of one worker.
 #[derive(Default)]
 pub struct Gatherer {
-    paths: PathIntegrator,
+    paths: PathTracer,
     direct: DirectStage,
     samples: Vec<CameraSample>,
     results: Vec<PixelSample>,
@@ -115,7 +116,7 @@ impl Gatherer {
                 self.samples.push(CameraSample { ray, weight: 1.0, stream, direct: stream, sample_counts, fit: 0 });
             }
         }
-        self.paths.only_reflected = true;
+        self.paths.search.only_reflected = true;
         self.paths.trace(job, &paths, &self.samples, &mut Fits::default(), &mut self.results);
 
         // Irradiance

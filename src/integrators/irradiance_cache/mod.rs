@@ -24,92 +24,97 @@ pub use build::{BuildStats, build};
 pub use cache::IrradianceCache;
 pub use record::Record;
 
-use super::diffuse::{self, Reflected, viewer_normal};
-use super::path::{CameraSample, PathIntegrator, PathStats, Vertex};
-use super::segment::PathState;
+use super::path::{AtVertices, PathStats, PathTracer};
+pub use super::segment::LookupStats;
+use super::segment::{CameraSample, Vertex};
+use super::{Cameras, Integrator, Statistics, Tracer, diffuse};
 use crate::bsdfs::Lambertian;
 use crate::direct::Fits;
-use crate::film::PixelSample;
+use crate::film::{Film, PixelSample};
 use crate::scene::RenderJob;
 use crate::settings::Cached;
 use lumiris_numbers::math::Rgb;
 use std::f32::consts::FRAC_1_PI;
+use std::sync::atomic::AtomicBool;
 
-/// Lookups and cache misses.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
-pub struct LookupStats {
-    /// Diffuse vertices of camera paths.
-    pub lookups: u64,
-    /// Cache misses: lookups without a usable record, where path tracing takes over.
-    pub misses: u64,
+/// Statistics of an irradiance cache.
+#[derive(Clone, Copy, Debug)]
+pub struct CacheReport {
+    /// Records.
+    pub records: usize,
+    /// Their memory (bytes).
+    pub bytes: usize,
+    /// How it was built; its ray counts are also included in those of the rendering.
+    pub build: BuildStats,
+    /// Lookups and cache misses.
+    pub lookups: LookupStats,
 }
 
-impl LookupStats {
-    /// Adds the counts of another worker.
-    pub fn merge(&mut self, other: &LookupStats) {
-        self.lookups += other.lookups;
-        self.misses += other.misses;
-    }
-}
-
-/// Renders with a cache; holds the buffers of one worker.
-#[derive(Debug, Default)]
+/// Renders with a cache.
+#[derive(Debug)]
 pub struct CacheIntegrator {
-    paths: PathIntegrator,
-    lookups: LookupStats,
+    cache: IrradianceCache,
+    build: BuildStats,
 }
 
 impl CacheIntegrator {
-    /// Whether features of first surfaces are left out.
-    pub fn omit_features(&mut self, omit: bool) {
-        self.paths.omits_features = omit;
-    }
-
-    /// The counts and times since the last call.
-    pub fn take_stats(&mut self) -> (PathStats, LookupStats) {
-        (self.paths.take_stats(), std::mem::take(&mut self.lookups))
-    }
-
-    /// Estimates the radiance of each camera sample; `out[i]` belongs to `samples[i]`. `fits` are those of the samples'
-    /// pixels.
-    pub fn trace(
-        &mut self,
-        job: &RenderJob,
-        cache: &IrradianceCache,
-        samples: &[CameraSample],
-        fits: &mut Fits,
-        out: &mut Vec<PixelSample>,
-    ) {
-        let mut lookup = Lookup { cache, stats: &mut self.lookups };
-        diffuse::trace(&mut self.paths, job, &mut lookup, samples, fits, out);
+    /// Builds the cache.
+    pub fn new(job: &RenderJob, cameras: Cameras<'_>, stop: &AtomicBool) -> Self {
+        let (cache, build) = build(job, job.world.scene.film.bounds, cameras, stop);
+        CacheIntegrator { cache, build }
     }
 }
 
-/// Queries the cache and counts lookups and misses.
-struct Lookup<'a> {
-    cache: &'a IrradianceCache,
-    stats: &'a mut LookupStats,
-}
+impl Integrator for CacheIntegrator {
+    fn tracer(&self, with_features: bool) -> Box<dyn Tracer + '_> {
+        let (paths, lookups) = (PathTracer::new(with_features), LookupStats::default());
+        Box::new(CacheTracer { cache: &self.cache, paths, lookups })
+    }
 
-impl Reflected for Lookup<'_> {
-    fn reflected(&mut self, _: &PathState, _: u32, v: &Vertex<'_>, part: &Lambertian<'_>) -> Option<Rgb> {
-        self.stats.lookups += 1;
-        let ns = viewer_normal(v);
-        let mut known = Rgb::BLACK;
-        for (albedo, ns) in [(part.reflectance, ns), (part.transmittance, -ns)] {
-            if albedo.is_black() {
-                continue;
-            }
-            let Some(e) = self.cache.irradiance(v.surface.p, ns) else {
-                self.stats.misses += 1;
-                return None;
-            };
-            known += albedo * e * FRAC_1_PI;
+    fn statistics(&self, mut paths: PathStats, film: &mut Film) -> Statistics {
+        paths.merge(&self.build.paths);
+        for [x, y] in self.cache.records().iter().map(|r| r.pixel) {
+            let index = film.index(x, y);
+            film.pixels[index].records += 1;
         }
-        Some(known)
+        let (records, bytes) = (self.cache.records().len(), self.cache.bytes());
+        let cache = Some(CacheReport { records, bytes, build: self.build, lookups: paths.lookups });
+        Statistics { paths, cache, photons: None }
+    }
+}
+
+/// Traces with a cache.
+struct CacheTracer<'c> {
+    cache: &'c IrradianceCache,
+    paths: PathTracer,
+    lookups: LookupStats,
+}
+
+impl Tracer for CacheTracer<'_> {
+    fn trace(&mut self, job: &RenderJob, samples: &[CameraSample], fits: &mut Fits, out: &mut Vec<PixelSample>) {
+        let includes_direct = self.cache.settings().cached == Cached::All;
+        let mut look_up = |v: &Vertex<'_>, part: &Lambertian<'_>| {
+            let known = reflected(self.cache, v, part);
+            self.lookups.lookups += 1;
+            self.lookups.misses += u64::from(known.is_none());
+            known
+        };
+        self.paths.search.start(samples, out);
+        let own: &mut AtVertices<'_> =
+            &mut |found, out| diffuse::shade(found, includes_direct, out, |_, v, part| look_up(v, part));
+        self.paths.follow((job, &job.settings().integrator), Some(own), samples, fits, out);
     }
 
-    fn has_sources(&self) -> bool {
-        self.cache.settings().cached == Cached::All
+    fn take_stats(&mut self) -> PathStats {
+        PathStats { lookups: std::mem::take(&mut self.lookups), ..self.paths.take_stats() }
     }
+}
+
+/// Radiance that the Lambertian part of a vertex reflects to the viewer; `None` without records.
+fn reflected(cache: &IrradianceCache, v: &Vertex<'_>, part: &Lambertian<'_>) -> Option<Rgb> {
+    let ns = v.viewer_normal();
+    let sides = [(part.reflectance, ns), (part.transmittance, -ns)];
+    sides.into_iter().filter(|(albedo, _)| !albedo.is_black()).try_fold(Rgb::BLACK, |known, (albedo, ns)| {
+        Some(known + albedo * cache.irradiance(v.surface.p, ns)? * FRAC_1_PI)
+    })
 }

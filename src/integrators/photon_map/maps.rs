@@ -6,7 +6,9 @@
 //! converges in the memory of one map [Knaus and Zwicker 2011].
 
 use super::boundary::{Boundary, Probe};
-use crate::integrators::path::{CameraSample, PathIntegrator};
+use crate::integrators::Cameras;
+use crate::integrators::path::CameraSample;
+use crate::integrators::vertices::{Stage, VertexSearch};
 use crate::photons::{
     GatherScratch, Importance, ImportanceSettings, LowImportance, Origin, Photon, PhotonBudget, PhotonError, PhotonMap,
     Place, Search, Traced, Tracing, path_count, trace_importons, trace_photons,
@@ -304,16 +306,16 @@ impl PhotonMaps {
     }
 }
 
-/// Diffuse points that the camera sees, spread over the image, with their normals; `camera` gives the samples of a
-/// pixel.
-pub fn seen(job: &RenderJob, camera: &dyn Fn([u32; 2], u32) -> CameraSample) -> Vec<(Vec3, Vec3)> {
+/// Diffuse points that the camera sees, spread over the image, with their normals.
+pub fn seen(job: &RenderJob, cameras: Cameras<'_>) -> Vec<(Vec3, Vec3)> {
     let b = job.world.scene.film.bounds;
     let stride = (b.area() / PROBES).max(1);
     let pixels = (0..b.area() as u32).step_by(stride).map(|i| [b.x0 + i % b.width(), b.y0 + i / b.width()]);
-    let samples: Vec<CameraSample> = pixels.map(|pixel| camera(pixel, 0)).collect();
-    let (mut paths, mut results) = (PathIntegrator::default(), Vec::new());
-    paths.start(&samples, &mut results);
-    let vertices = paths.find_vertices(job, 0, 1, &samples, &mut results, None);
+    let samples: Vec<CameraSample> = pixels.map(|pixel| cameras(pixel, 0)).collect();
+    let (mut search, mut results) = (VertexSearch::default(), Vec::new());
+    search.start(&samples, &mut results);
+    let stage = Stage { job, vertex: 0, depth: 1, samples: &samples, out: &mut results, batch: None };
+    let vertices = search.find(stage);
     let diffuse = vertices.iter().filter(|v| v.bsdf.lambertian(v.wo).is_some());
     diffuse.map(|v| (v.surface.p, if v.surface.n.dot(v.wo) < 0.0 { -v.surface.n } else { v.surface.n })).collect()
 }

@@ -21,23 +21,24 @@ pub mod maps;
 
 pub use maps::{MapMaker, MapStats, PhotonMaps};
 
-use super::diffuse::{self, Reflected, viewer_normal};
-use super::path::{self, CameraSample, PathIntegrator, PathStats, Vertex};
-use super::segment::PathState;
+use super::path::{AtVertices, Found, PathStats, PathTracer, Shading};
+use super::segment::{CameraSample, PathState, Vertex};
+use super::{Cameras, Integrator, Statistics, Tracer, diffuse};
 use crate::bsdfs::{Bsdf, Diffuse, DiffuseTransmission, Lambertian};
 use crate::cameras::CameraRay;
-use crate::direct::{Estimator, Fits, ShadingPoint};
-use crate::film::PixelSample;
+use crate::direct::{Estimator, Fits};
+use crate::film::{Film, PixelSample};
 use crate::materials::SurfaceBsdf;
-use crate::photons::{GatherScratch, Place, Search};
+use crate::photons::{GatherScratch, PhotonError, Place, Search};
 use crate::scene::RenderJob;
-use crate::settings::PhotonMapSettings;
+use crate::settings::{IntegratorSettings, PhotonMapSettings};
 use boundary::{Boundary, Probe};
 use guide::Guide;
 use lumiris_numbers::math::ray::offset_origin;
 use lumiris_numbers::math::{Frame, Ray, Rgb, Vec3};
 use lumiris_numbers::samplers::SampleStream;
 use std::f32::consts::FRAC_1_PI;
+use std::sync::atomic::AtomicBool;
 
 /// Random-number domain of the final gather at a vertex.
 const GATHER: u32 = 4;
@@ -47,17 +48,74 @@ const GLOBAL: u32 = 7;
 /// Photons that guide the directions of a gather.
 const GUIDES: u32 = 32;
 
-/// Renders with photon maps; holds the buffers of one worker.
-#[derive(Debug, Default)]
-pub struct PhotonMapIntegrator {
-    paths: PathIntegrator,
-    gather: PathIntegrator,
-    scratch: GatherScratch,
-    requests: Vec<GatherRequest>,
+/// Renders with photon maps.
+pub struct PhotonMapIntegrator<'a> {
+    job: &'a RenderJob,
+    maker: MapMaker<'a>,
+    /// Of the samples under way.
+    maps: Option<PhotonMaps>,
+}
+
+impl<'a> PhotonMapIntegrator<'a> {
+    /// Prepares what all maps have in common.
+    pub fn new(job: &'a RenderJob, cameras: Cameras<'_>, stop: &'a AtomicBool) -> Result<Self, PhotonError> {
+        let maker = MapMaker::new(job, &maps::seen(job, cameras), stop)?;
+        Ok(PhotonMapIntegrator { job, maker, maps: None })
+    }
+}
+
+impl Integrator for PhotonMapIntegrator<'_> {
+    /// Progressive maps serve one sample of each pixel.
+    fn prepare(&mut self, first: u32) -> Result<u32, PhotonError> {
+        self.maps = None;
+        match self.maker.make(self.job, first) {
+            Ok(maps) => self.maps = Some(maps),
+            Err(PhotonError::Stopped { .. }) if self.maker.stats.maps > 0 => return Ok(0),
+            Err(error) => return Err(error),
+        }
+        Ok(if self.shares_noise() { 1 } else { u32::MAX })
+    }
+
+    fn tracer(&self, with_features: bool) -> Box<dyn Tracer + '_> {
+        let maps = self.maps.as_ref().expect("maps are prepared before samples are traced");
+        Box::new(PhotonMapTracer {
+            maps,
+            paths: PathTracer::new(with_features),
+            gather: PathTracer::default(),
+            lookups: Lookups::default(),
+            samples: Vec::new(),
+            results: Vec::new(),
+        })
+    }
+
+    /// Samples of progressive maps vary with their maps.
+    fn shares_noise(&self) -> bool {
+        self.job.settings().integrator.photons.progressive.is_some()
+    }
+
+    fn statistics(&self, paths: PathStats, _: &mut Film) -> Statistics {
+        Statistics { paths, cache: None, photons: Some(self.maker.stats) }
+    }
+}
+
+/// Traces with photon maps.
+struct PhotonMapTracer<'m> {
+    maps: &'m PhotonMaps,
+    paths: PathTracer,
+    gather: PathTracer,
+    lookups: Lookups,
+    /// Rays of gathers, and what they see.
     samples: Vec<CameraSample>,
     results: Vec<PixelSample>,
-    boundary: Boundary,
+}
+
+/// What is looked up in the maps, and what remains to be done about it.
+#[derive(Debug, Default)]
+struct Lookups {
+    scratch: GatherScratch,
+    requests: Vec<GatherRequest>,
     pending: Vec<Pending>,
+    boundary: Boundary,
     probes: Vec<Probe>,
     trials: Vec<u32>,
 }
@@ -89,14 +147,35 @@ struct GatherRequest {
     spread: f32,
 }
 
-impl PhotonMapIntegrator {
-    /// Whether features of first surfaces are left out.
-    pub fn omit_features(&mut self, omit: bool) {
-        self.paths.omits_features = omit;
+impl Tracer for PhotonMapTracer<'_> {
+    fn trace(&mut self, job: &RenderJob, samples: &[CameraSample], fits: &mut Fits, out: &mut Vec<PixelSample>) {
+        let settings = &job.settings().integrator;
+        let (maps, lookups) = (self.maps, &mut self.lookups);
+        lookups.requests.clear();
+        let own: &mut AtVertices<'_> = &mut |found, out| {
+            diffuse::shade(found, false, out, |path, v, part| {
+                if found.vertex + 1 < settings.depth() {
+                    lookups.look_up(maps, &settings.photons, (path, found.vertex), v, part);
+                }
+                // Added later
+                Some(Rgb::BLACK)
+            })
+        };
+        self.paths.search.start(samples, out);
+        self.paths.follow((job, settings), Some(own), samples, fits, out);
+        self.lookups.correct(job, out);
+
+        self.start_gather(settings);
+        self.finish_gather(job, settings);
+        let rays_of_request = self.results.chunks(settings.photons.gather.max(1) as usize);
+        for (request, rays) in self.lookups.requests.iter().zip(rays_of_request) {
+            for ray in rays {
+                out[request.sample as usize].radiance += request.beta * ray.radiance;
+            }
+        }
     }
 
-    /// The counts and times since the last call.
-    pub fn take_stats(&mut self) -> PathStats {
+    fn take_stats(&mut self) -> PathStats {
         let mut stats = self.paths.take_stats();
         let mut gather = self.gather.take_stats();
         // Rays of the gather are no camera rays
@@ -105,59 +184,17 @@ impl PhotonMapIntegrator {
         stats.merge(&gather);
         stats
     }
+}
 
-    /// Estimates the radiance of each camera sample; `out[i]` belongs to `samples[i]`. `fits` are those of the samples'
-    /// pixels.
-    pub fn trace(
-        &mut self,
-        job: &RenderJob,
-        maps: &PhotonMaps,
-        samples: &[CameraSample],
-        fits: &mut Fits,
-        out: &mut Vec<PixelSample>,
-    ) {
-        self.requests.clear();
-        self.pending.clear();
-        let settings = &job.settings().integrator;
-        let mut lookup = Lookup {
-            maps,
-            settings: &settings.photons,
-            depth: settings.depth(),
-            samples,
-            scratch: &mut self.scratch,
-            requests: &mut self.requests,
-            pending: &mut self.pending,
-        };
-        diffuse::trace(&mut self.paths, job, &mut lookup, samples, fits, out);
-        self.correct(job, out);
-        self.start_gather(maps, &settings.photons);
-        self.finish_gather(job, maps);
-        let rays_of_request = self.results.chunks(settings.photons.gather.max(1) as usize);
-        for (request, rays) in self.requests.iter().zip(rays_of_request) {
-            for ray in rays {
-                out[request.sample as usize].radiance += request.beta * ray.radiance;
-            }
-        }
-    }
-
-    /// Adds the pending radiance, times the numbers of trials of its kernels.
-    fn correct(&mut self, job: &RenderJob, out: &mut [PixelSample]) {
-        self.probes.clear();
-        self.probes.extend(self.pending.iter().map(|p| p.probe));
-        self.boundary.trials(&job.world, &self.probes, &mut self.trials);
-        for (pending, &trials) in self.pending.iter().zip(&self.trials) {
-            out[pending.owner as usize].radiance += pending.radiance * trials as f32;
-        }
-        self.pending.clear();
-    }
-
+impl PhotonMapTracer<'_> {
     /// Generates the rays of all gathers.
-    fn start_gather(&mut self, maps: &PhotonMaps, settings: &PhotonMapSettings) {
+    fn start_gather(&mut self, settings: &IntegratorSettings) {
         self.samples.clear();
-        let count = settings.gather;
-        for request in &self.requests {
+        let sample_counts = Estimator::at_vertex(settings, 1).sample_counts();
+        let PhotonMapSettings { gather: count, guide: fraction, .. } = settings.photons;
+        for request in &self.lookups.requests {
             let frame = Frame::from_z(request.place.ns);
-            let guide = guide(maps, &request.place, &frame, settings.guide, &mut self.scratch);
+            let guide = guide(self.maps, &request.place, &frame, fraction, &mut self.lookups.scratch);
             for i in 0..count {
                 let stream = request.stream.split(GATHER, count, i);
                 let [u_choice, u0, u1] = stream.draw::<3>();
@@ -170,115 +207,100 @@ impl PhotonMapIntegrator {
                 let o = offset_origin(request.place.p, request.p_error, request.place.n, d);
                 let ray = Ray { o, d, t_max: f32::INFINITY, time: request.time };
                 let ray = CameraRay { ray, spread: request.spread, width0: request.width, weight: 1.0 };
-                let sample_counts = crate::settings::SampleCounts { samples: 1, proposals: 1 };
                 self.samples.push(CameraSample { ray, weight, stream, direct: stream, sample_counts, fit: 0 });
             }
         }
     }
 
     /// Traces the rays of all gathers and adds what they see.
-    fn finish_gather(&mut self, job: &RenderJob, maps: &PhotonMaps) {
-        let settings = &job.settings().integrator;
-        let depth = settings.depth();
-        let (gather, scratch) = (&mut self.gather, &mut self.scratch);
-        let rays_per_request = settings.photons.gather.max(1);
-        gather.only_reflected = true;
-        gather.start(&self.samples, &mut self.results);
-        gather.active.retain(|path| !path.beta.is_black());
-        for vertex in 0..depth {
-            if gather.active.is_empty() {
-                break;
-            }
-            let vertices = gather.find_vertices(job, vertex, depth, &self.samples, &mut self.results, None);
-
-            // Look up the maps, except where a ray is shorter than their search radius
-            let mut near = Vec::new();
-            for (path, v) in gather.active.iter().zip(&vertices) {
-                let Some(part) = v.bsdf.lambertian(v.wo) else { continue };
-                let first = self.pending.len();
-                let (radiance, reach) = reflected(maps, path, v, &part, (&mut *scratch, &mut self.pending));
-                if v.surface.p.distance(path.ray.o) < reach {
-                    self.pending.truncate(first);
-                    near.push((*path, Vertex { bsdf: only_lambertian(v, &part), ..*v }, part));
-                } else {
-                    self.results[path.sample as usize].radiance += path.beta * radiance;
-                }
-            }
-
-            // Treat these as vertices of a path
-            let estimator = Estimator::at_vertex(settings, 1);
-            let sample_counts = estimator.sample_counts();
-            let points: Vec<ShadingPoint<'_>> =
-                near.iter().map(|(path, v, _)| v.shading_point(path.ray.time, sample_counts, 0)).collect();
-            gather.direct.estimate(job, &estimator, &points, &mut Fits::default(), &mut gather.radiance);
-            gather.next.clear();
-            for (((path, v, part), point), &radiance) in near.iter().zip(&points).zip(&gather.radiance) {
-                self.results[path.sample as usize].radiance += path.beta * radiance;
-                for (i, side) in (0..).zip(sides(v, part)) {
-                    wait((path, v, CAUSTIC + i), side, maps.caustics(&side.1, scratch), &mut self.pending);
-                }
-                let before = self.requests[(path.sample / rays_per_request) as usize].vertex;
-                if before + vertex + 2 < depth {
-                    gather.next.extend(path::extend(path, v, point, vertex, settings).map(|(next, _)| next));
-                }
-            }
-            std::mem::swap(&mut gather.active, &mut gather.next);
-            gather.recycle(vertices);
-        }
-        let mut results = std::mem::take(&mut self.results);
-        self.correct(job, &mut results);
-        self.results = results;
+    fn finish_gather(&mut self, job: &RenderJob, settings: &IntegratorSettings) {
+        let (maps, lookups) = (self.maps, &mut self.lookups);
+        (self.gather.search.only_reflected, self.gather.estimator_of) = (true, Some(1));
+        self.gather.search.start(&self.samples, &mut self.results);
+        self.gather.search.active.retain(|path| !path.beta.is_black());
+        let own: &mut AtVertices<'_> = &mut |found, out| lookups.arrive(maps, settings, found, out);
+        let (samples, fits) = (&self.samples, &mut Fits::default());
+        self.gather.follow((job, settings), Some(own), samples, fits, &mut self.results);
+        self.lookups.correct(job, &mut self.results);
     }
 }
 
-/// Takes caustics from the map, and collects the requests for gathers.
-struct Lookup<'a> {
-    maps: &'a PhotonMaps,
-    settings: &'a PhotonMapSettings,
-    depth: u32,
-    samples: &'a [CameraSample],
-    scratch: &'a mut GatherScratch,
-    requests: &'a mut Vec<GatherRequest>,
-    pending: &'a mut Vec<Pending>,
-}
-
-impl Reflected for Lookup<'_> {
-    fn reflected(&mut self, path: &PathState, vertex: u32, v: &Vertex<'_>, part: &Lambertian<'_>) -> Option<Rgb> {
-        if vertex + 1 >= self.depth {
-            return Some(Rgb::BLACK);
-        }
-        let (maps, scratch) = (self.maps, &mut *self.scratch);
+impl Lookups {
+    /// Takes caustics from the map, and the rest as well or requests a gather.
+    fn look_up(
+        &mut self,
+        maps: &PhotonMaps,
+        settings: &PhotonMapSettings,
+        (path, vertex): (&PathState, u32),
+        v: &Vertex<'_>,
+        part: &Lambertian<'_>,
+    ) {
         for (i, side) in (0..).zip(sides(v, part)) {
-            wait((path, v, CAUSTIC + i), side, maps.caustics(&side.1, scratch), self.pending);
-            if self.settings.gather == 0 {
-                wait((path, v, GLOBAL + i), side, maps.indirect(&side.1, scratch), self.pending);
+            let (albedo, place) = side;
+            wait((path, v, CAUSTIC + i), side, maps.caustics(&place, &mut self.scratch), &mut self.pending);
+            if settings.gather == 0 {
+                wait((path, v, GLOBAL + i), side, maps.indirect(&place, &mut self.scratch), &mut self.pending);
+                continue;
             }
+            self.requests.push(GatherRequest {
+                sample: path.sample,
+                beta: path.beta * albedo,
+                vertex,
+                place,
+                p_error: v.surface.p_error,
+                time: path.ray.time,
+                stream: v.stream,
+                width: path.width,
+                spread: path.spread,
+            });
         }
-        if self.settings.gather == 0 {
-            return Some(Rgb::BLACK);
-        }
-        self.requests.extend(sides(v, part).map(|(albedo, place)| GatherRequest {
-            sample: path.sample,
-            beta: path.beta * albedo,
-            vertex,
-            place,
-            p_error: v.surface.p_error,
-            time: path.ray.time,
-            stream: v.stream,
-            width: path.width,
-            spread: self.samples[path.sample as usize].ray.spread,
-        }));
-        Some(Rgb::BLACK)
     }
 
-    fn has_sources(&self) -> bool {
-        false
+    /// Looks up the maps where the rays of gathers arrive. A ray that is shorter than their search radius goes on as a
+    /// path that the Lambertian part scatters.
+    fn arrive<'w>(
+        &mut self,
+        maps: &PhotonMaps,
+        settings: &IntegratorSettings,
+        found: &Found<'_, 'w>,
+        out: &mut [PixelSample],
+    ) -> Vec<Shading<'w>> {
+        let rays_per_request = settings.photons.gather.max(1);
+        let shading = |(path, v): (&PathState, &Vertex<'w>)| {
+            let Some(part) = v.bsdf.lambertian(v.wo) else { return Shading::default() };
+            let first = self.pending.len();
+            let (radiance, reach) = reflected(maps, path, v, &part, (&mut self.scratch, &mut self.pending));
+            let is_near = v.surface.p.distance(path.ray.o) < reach;
+            if !is_near {
+                out[path.sample as usize].radiance += path.beta * radiance;
+                return Shading::default();
+            }
+            self.pending.truncate(first);
+            for (i, side) in (0..).zip(sides(v, &part)) {
+                wait((path, v, CAUSTIC + i), side, maps.caustics(&side.1, &mut self.scratch), &mut self.pending);
+            }
+            let lit = Some(only_lambertian(v, &part));
+            let before = self.requests[(path.sample / rays_per_request) as usize].vertex;
+            Shading { lit, next: lit.filter(|_| before + found.vertex + 2 < settings.depth()) }
+        };
+        found.paths.iter().zip(found.vertices).map(shading).collect()
+    }
+
+    /// Adds the pending radiance, times the numbers of trials of its kernels.
+    fn correct(&mut self, job: &RenderJob, out: &mut [PixelSample]) {
+        self.probes.clear();
+        self.probes.extend(self.pending.iter().map(|p| p.probe));
+        self.boundary.trials(&job.world, &self.probes, &mut self.trials);
+        for (pending, &trials) in self.pending.iter().zip(&self.trials) {
+            out[pending.owner as usize].radiance += pending.radiance * trials as f32;
+        }
+        self.pending.clear();
     }
 }
 
 /// The sides of a vertex that reflect to the viewer, with their albedos.
 fn sides(v: &Vertex<'_>, part: &Lambertian<'_>) -> impl Iterator<Item = (Rgb, Place)> {
-    let (n, ns, p) = (v.surface.n, viewer_normal(v), v.surface.p);
+    let (n, ns, p) = (v.surface.n, v.viewer_normal(), v.surface.p);
     let n = if n.dot(v.wo) < 0.0 { -n } else { n };
     let both = [(part.reflectance, Place { p, n, ns }), (part.transmittance, Place { p, n: -n, ns: -ns })];
     both.into_iter().filter(|(albedo, _)| !albedo.is_black())

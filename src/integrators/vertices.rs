@@ -1,0 +1,229 @@
+//! From rays to vertices: paths are traced to the next surface that scatters, and carry what they see of emitters on the
+//! way.
+
+use super::segment::{CameraSample, PathState, PathStats, Vertex, domain, emptied};
+use super::wavefront::Batch;
+use crate::accel::{Coherence, Hit, RayBatch};
+use crate::film::{Features, PixelSample};
+use crate::lights::LightCtx;
+use crate::scene::{RenderJob, SurfaceInteraction};
+use lumiris_numbers::math::{Rgb, Vec3};
+use std::time::Instant;
+
+/// Surfaces without scattering that a path may pass between two vertices.
+const MAX_PASSED: u32 = 64;
+
+/// Copies of the rays traced, batch by batch, for measurements.
+#[derive(Clone, Debug, Default)]
+pub struct Recording {
+    /// Camera rays up to their first surface.
+    pub camera: Vec<RayBatch>,
+    /// All other path segments.
+    pub bounces: Vec<RayBatch>,
+    /// Shadow segments of first vertices.
+    pub segments: Vec<RayBatch>,
+    /// Shadow segments of later vertices.
+    pub bounce_segments: Vec<RayBatch>,
+}
+
+impl Recording {
+    /// The shadow segments of a vertex, counted from 0.
+    pub(super) fn segments_at(&mut self, vertex: u32) -> &mut Vec<RayBatch> {
+        if vertex == 0 { &mut self.segments } else { &mut self.bounce_segments }
+    }
+}
+
+/// A batch of paths whose next vertices are found.
+pub(super) struct Stage<'a, 'w> {
+    pub(super) job: &'w RenderJob,
+    /// Index of the vertices along their paths, and the maximum number of these.
+    pub(super) vertex: u32,
+    pub(super) depth: u32,
+    pub(super) samples: &'a [CameraSample],
+    /// Takes what the paths see.
+    pub(super) out: &'a mut [PixelSample],
+    /// Takes the vertices that it can.
+    pub(super) batch: Option<&'a mut Batch<'w>>,
+}
+
+/// Paths on their way to the next vertex.
+#[derive(Debug, Default)]
+pub(super) struct VertexSearch {
+    pub(super) active: Vec<PathState>,
+    kept: Vec<PathState>,
+    passing: Vec<PathState>,
+    /// Indices of active paths that meet nothing and look for emitters.
+    escaped: Vec<u32>,
+    rays: RayBatch,
+    hits: Vec<Option<Hit>>,
+    /// Memory of the vertices of earlier batches.
+    spare: Vec<Vertex<'static>>,
+    /// Counts and times.
+    pub(super) stats: PathStats,
+    /// Omits emission towards the camera, and all features except the depth.
+    pub(super) only_reflected: bool,
+    /// Omits all features.
+    pub(super) omits_features: bool,
+    /// Copies of what is traced, if requested.
+    pub(super) recording: Option<Recording>,
+}
+
+impl VertexSearch {
+    /// Starts paths with the camera rays.
+    pub(super) fn start(&mut self, samples: &[CameraSample], out: &mut Vec<PixelSample>) {
+        out.clear();
+        out.resize(samples.len(), PixelSample::default());
+        self.active.clear();
+        self.active.extend(samples.iter().enumerate().map(|(i, s)| PathState {
+            sample: i as u32,
+            ray: s.ray.ray,
+            beta: Rgb::splat(s.weight),
+            eta_scale: 1.0,
+            width: s.ray.width0,
+            spread: s.ray.spread,
+            passed: 0,
+            travelled: 0.0,
+            technique: None,
+        }));
+    }
+
+    /// Keeps the memory of vertices that are done with for those of the next batch.
+    pub(super) fn recycle(&mut self, vertices: Vec<Vertex<'_>>) {
+        self.spare = emptied(vertices);
+    }
+
+    /// Traces the active paths to their next vertex, adds what they see at the first one, and keeps those that hit
+    /// something that scatters. The answer's items belong to the paths that `self.active` then holds; those that the
+    /// batch takes are not among them.
+    pub(super) fn find<'w>(&mut self, mut at: Stage<'_, 'w>) -> Vec<Vertex<'w>> {
+        let mut vertices: Vec<Vertex<'w>> = emptied(std::mem::take(&mut self.spare));
+        self.kept.clear();
+        let mut coherence = if at.vertex == 0 { Coherence::Coherent } else { Coherence::Incoherent };
+        while !self.active.is_empty() {
+            self.trace(at.job, at.vertex, coherence);
+            coherence = Coherence::Incoherent;
+            let start = Instant::now();
+            self.passing.clear();
+            self.escaped.clear();
+            let (active, hits) = (std::mem::take(&mut self.active), std::mem::take(&mut self.hits));
+            for (k, (path, hit)) in active.iter().zip(&hits).enumerate() {
+                match hit {
+                    Some(hit) if self.take_plain(&mut at, path, hit) => {}
+                    Some(hit) => vertices.extend(self.take(&mut at, path, hit)),
+                    None if self.looks_for_emitters(at.vertex, path) => self.escaped.push(k as u32),
+                    None => {}
+                }
+            }
+            (self.active, self.hits) = (active, hits);
+            self.add_infinite(at.job, at.out);
+            std::mem::swap(&mut self.active, &mut self.passing);
+            self.stats.shade_time += start.elapsed();
+        }
+        std::mem::swap(&mut self.active, &mut self.kept);
+        vertices
+    }
+
+    #[inline]
+    fn looks_for_emitters(&self, vertex: u32, path: &PathState) -> bool {
+        path.technique.is_some() || vertex == 0 && !self.only_reflected
+    }
+
+    /// Takes a hit of a mesh that reflects the same everywhere, whose point is found together with others; false if
+    /// this is none.
+    #[inline]
+    fn take_plain(&self, at: &mut Stage<'_, '_>, path: &PathState, hit: &Hit) -> bool {
+        let Some(batch) = &mut at.batch else { return false };
+        let Some(rho) = at.job.plain_reflectance(hit) else { return false };
+        let Some(beta) = path.beta_beyond_emitter() else { return true };
+        let distance = hit.t * path.ray.d.length();
+        if at.vertex == 0 && !self.omits_features {
+            let features = &mut at.out[path.sample as usize].features;
+            features.get_or_insert_with(|| path.plain_features(at.job, hit, distance, rho));
+        }
+        if at.vertex < at.depth {
+            let carried = path.carried(beta, path.width + path.spread * distance);
+            batch.push_hit(at.job, (&carried, path.ray.d), hit, rho, &at.samples[path.sample as usize]);
+        }
+        true
+    }
+
+    /// Takes any other hit; the answer is its vertex, if the path goes on from one that the batch does not take.
+    #[inline]
+    fn take<'w>(&mut self, at: &mut Stage<'_, 'w>, path: &PathState, hit: &Hit) -> Option<Vertex<'w>> {
+        let interaction = SurfaceInteraction::new(at.job, &path.ray, (path.width, path.spread), hit);
+        let (sample, out) = (&at.samples[path.sample as usize], &mut at.out[path.sample as usize]);
+        if self.looks_for_emitters(at.vertex, path) {
+            out.radiance += path.emission(at.job, &interaction);
+        }
+        let beta = path.beta_beyond_emitter()?;
+        let Some(bsdf) = interaction.scatter(at.job) else {
+            if path.passed < MAX_PASSED {
+                self.passing.push(path.pass(beta, &interaction));
+            }
+            return None;
+        };
+        if at.vertex == 0 && !self.omits_features {
+            out.features.get_or_insert_with(|| {
+                if self.only_reflected {
+                    Features { depth: path.depth(&interaction), ..Features::default() }
+                } else {
+                    path.features(at.job, &interaction, &bsdf, &sample.stream.domain(domain::VERTEX))
+                }
+            });
+        }
+        let width = interaction.width;
+        let is_taken =
+            |batch: &mut &mut Batch<'w>| batch.push_vertex(&path.carried(beta, width), &interaction, &bsdf, sample);
+        if at.vertex >= at.depth || at.batch.as_mut().is_some_and(is_taken) {
+            return None;
+        }
+        let [stream, direct] = [sample.stream, sample.direct].map(|s| s.domain(domain::VERTEX + at.vertex));
+        self.kept.push(PathState { beta, width, passed: 0, travelled: 0.0, technique: None, ..*path });
+        Some(Vertex { surface: interaction.surface, bsdf, wo: interaction.wo, stream, direct })
+    }
+
+    /// Adds what the escaped paths carry of infinite lights, with the weight of the technique that found it.
+    fn add_infinite(&mut self, job: &RenderJob, out: &mut [PixelSample]) {
+        let (lights, active) = (&job.lights, &self.active);
+        self.escaped.retain(|&k| {
+            let path = &active[k as usize];
+            if path.technique.is_none() {
+                out[path.sample as usize].radiance += path.beta * lights.le(path.ray.d);
+            }
+            path.technique.is_some()
+        });
+        let escaped = &self.escaped;
+        let path = |i: usize| &active[escaped[i] as usize];
+        let ctx = |i: usize| path(i).technique.map_or(LightCtx::at(Vec3::ZERO), |technique| technique.ctx);
+        lights.infinite_in_directions(
+            escaped.len(),
+            |i| (ctx(i), path(i).ray.d),
+            |i, le, p_light| {
+                let path = path(i);
+                let l = path.beta * le;
+                let weight =
+                    path.technique.filter(|_| !l.is_black()).map_or(1.0, |technique| technique.weight(|_| p_light));
+                out[path.sample as usize].radiance += l * weight;
+            },
+        );
+    }
+
+    /// First hits of the active paths.
+    fn trace(&mut self, job: &RenderJob, vertex: u32, coherence: Coherence) {
+        self.rays.set(self.active.iter().map(|path| &path.ray));
+        if let Some(r) = &mut self.recording {
+            let batches = if coherence == Coherence::Coherent { &mut r.camera } else { &mut r.bounces };
+            batches.push(self.rays.clone());
+        }
+        let start = Instant::now();
+        job.world.accel.intersect(&self.rays, coherence, &mut self.hits);
+        let (count, time) = (self.rays.len() as u64, start.elapsed());
+        if vertex == 0 {
+            self.stats.camera_rays += count;
+            self.stats.camera_time += time;
+        } else {
+            self.stats.bounce_rays += count;
+            self.stats.bounce_time += time;
+        }
+    }
+}
