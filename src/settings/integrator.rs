@@ -23,7 +23,7 @@ pub struct IntegratorSettings {
     /// Direct-light estimator at each path vertex.
     pub estimator: EstimatorKind,
     /// Samples per estimate (N): shadow segments per shading point. `None` is the default of the estimator,
-    /// [`EstimatorKind::default_samples`].
+    /// [`Self::sample_counts`].
     pub samples: Option<u32>,
     /// Weights of the techniques; see [`Self::heuristic`].
     pub heuristic: Option<Heuristic>,

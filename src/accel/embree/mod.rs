@@ -1,7 +1,7 @@
 //! Ray tracing by Embree, 3.13 or 4.x.
 //!
 //! Reading order: [`device`] (errors, memory), [`scene`] (geometries, instances), [`world`] (ids and exact hits),
-//! [`lanes`] (several exact hits at once), [`context`] (what the callbacks of a query share), [`callbacks`] (first
+//! [`exact`] (exact hits of a block of rays), [`context`] (what the callbacks of a query share), [`callbacks`] (first
 //! hits, cut-outs, quadrics, patches), [`kernels`] (the two families' functions), [`query`] (batches), [`bare`] (Embree
 //! by itself, to compare with).
 //!
