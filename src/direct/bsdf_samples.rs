@@ -33,15 +33,15 @@ pub(super) fn draw(
     (!f_cos.is_black()).then_some(PendingBsdf { point: index, wi: s.wi, f_cos, pdf: s.pdf, specular, lobe, allocation })
 }
 
-/// Completes a BSDF sample with the emitter that it points at; `None` if it points at none.
+/// Completes a BSDF sample with the emitter that it has found; `None` if it points at none.
 pub(super) fn bsdf_candidate(
     job: &RenderJob,
     point: &ShadingPoint<'_>,
     pending: &PendingBsdf,
-    hit: Option<&EmitterHit>,
+    (hit, found): (Option<&EmitterHit>, Option<EmitterInDirection>),
 ) -> Option<Candidate> {
     let lights = &job.lights;
-    let found = emitter_in_direction(job, &point.light_ctx(), pending.wi, hit, point.time)?;
+    let found = found?;
     let light = match hit {
         Some(hit) => hit.light,
         None => {
@@ -69,6 +69,7 @@ pub(super) fn bsdf_candidate(
 }
 
 /// What a direction of BSDF sampling points at.
+#[derive(Clone, Copy, Debug)]
 pub(crate) struct EmitterInDirection {
     /// Radiance.
     pub(crate) li: Rgb,
@@ -78,19 +79,30 @@ pub(crate) struct EmitterInDirection {
     pub(crate) end: Option<(Vec3, Vec3, Vec3)>,
 }
 
-/// What the direction `wi` points at, whose ray among the emitters has met `hit`; `None` if that is dark.
-fn emitter_in_direction(
+/// What the samples of some points point at, whose rays among the emitters have met `hits`; `None` where that is dark.
+/// `far` is memory.
+pub(super) fn find_emitters(
     job: &RenderJob,
-    ctx: &LightCtx,
-    wi: Vec3,
-    hit: Option<&EmitterHit>,
-    time: f32,
-) -> Option<EmitterInDirection> {
-    let Some(hit) = hit else {
-        let (li, p_light) = job.lights.infinite_in_direction(ctx, wi);
-        return (!li.is_black()).then_some(EmitterInDirection { li, p_light, end: None });
-    };
-    emitter_at(job, ctx, wi, hit, time)
+    points: &[ShadingPoint<'_>],
+    (pending, hits): (&[PendingBsdf], &[Option<EmitterHit>]),
+    far: &mut Vec<u32>,
+    out: &mut Vec<Option<EmitterInDirection>>,
+) {
+    let ctx = |sample: &PendingBsdf| points[sample.point as usize].light_ctx();
+    far.clear();
+    far.extend((0_u32..).zip(hits).filter(|(_, hit)| hit.is_none()).map(|(i, _)| i));
+    out.clear();
+    out.extend(pending.iter().zip(hits).map(|(sample, hit)| {
+        emitter_at(job, &ctx(sample), sample.wi, hit.as_ref()?, points[sample.point as usize].time)
+    }));
+    let sample = |k: usize| &pending[far[k] as usize];
+    job.lights.infinite_in_directions(
+        far.len(),
+        |k| (ctx(sample(k)), sample(k).wi),
+        |k, li, p_light| {
+            out[far[k] as usize] = (!li.is_black()).then_some(EmitterInDirection { li, p_light, end: None });
+        },
+    );
 }
 
 /// What the direction `wi` points at by meeting `hit`; `None` if that is dark.

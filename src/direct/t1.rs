@@ -1,6 +1,6 @@
 //! T1: the samples of both techniques at all points of a batch.
 
-use super::bsdf_samples::{self, PendingBsdf, bsdf_candidate};
+use super::bsdf_samples::{self, EmitterInDirection, PendingBsdf, bsdf_candidate, find_emitters};
 use super::candidates::{Candidate, Candidates, SampleAllocation};
 use super::domain;
 use super::mixture::Mixture;
@@ -24,6 +24,8 @@ pub(super) struct BsdfBuffers {
     rays: RayBatch,
     hits: EmitterScratch,
     emitter_hits: Vec<Option<EmitterHit>>,
+    far: Vec<u32>,
+    found: Vec<Option<EmitterInDirection>>,
 }
 
 impl T1<'_> {
@@ -63,7 +65,7 @@ impl T1<'_> {
         mixtures: &mut [Mixture],
     ) {
         // Directions
-        let BsdfBuffers { pending, rays, hits, emitter_hits } = &mut *self.bsdf;
+        let BsdfBuffers { pending, rays, hits, emitter_hits, far, found } = &mut *self.bsdf;
         pending.clear();
         rays.clear();
         for (index, point) in self.points.iter().enumerate() {
@@ -84,9 +86,10 @@ impl T1<'_> {
         // The emitters that they point at
         self.candidates.stats.emitter_rays += rays.len() as u64;
         self.job.world.intersect_emitters(rays, hits, emitter_hits);
-        for (pending, hit) in pending.iter().zip(emitter_hits) {
+        find_emitters(self.job, self.points, (pending, emitter_hits), far, found);
+        for ((pending, hit), found) in pending.iter().zip(emitter_hits).zip(found) {
             let point = &self.points[pending.point as usize];
-            let mut candidate = bsdf_candidate(self.job, point, pending, hit.as_ref());
+            let mut candidate = bsdf_candidate(self.job, point, pending, (hit.as_ref(), *found));
             if let Some(mixture) = mixtures.get_mut(pending.point as usize) {
                 match &mut candidate {
                     Some(c) if pending.specular => c.p_lobe = if pending.lobe == 0 { c.p_bsdf } else { 0.0 },

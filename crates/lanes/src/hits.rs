@@ -1,7 +1,8 @@
 //! Exact hits of rays with triangles, one pair per lane: the watertight test of [Woop et al. 2013] without its rare
 //! branches, which are those of `geometry::triangle` in the renderer.
 
-use super::lane::{F, LANES, M, Vec3s, load, store};
+use super::lane::{F, LANES, Vec3s, load, store};
+use super::triangles::Axes;
 use fearless_simd::{Level, Simd, dispatch, prelude::*};
 use lumiris_numbers::math::gamma;
 
@@ -55,15 +56,12 @@ pub fn exact(level: Level, pairs: &Pairs, count: usize, out: &mut Hits) {
 fn exact_lanes<S: Simd>(simd: S, pairs: &Pairs, count: usize, out: &mut Hits) {
     for i in (0..count.min(BLOCK)).step_by(LANES) {
         let (o, d) = (rows(simd, &pairs.o, i), rows(simd, &pairs.d, i));
-        // The axes of each ray in the order x, y, z: the last is the direction's largest
-        let (x, y, z) = (d.x.abs(), d.y.abs(), d.z.abs());
-        let is_x = x.simd_gt(y) & x.simd_gt(z);
-        let is_y = y.simd_gt(z);
-        let d = ordered(is_x, is_y, d);
+        let axes = Axes::new(d);
+        let d = axes.ordered(d);
         let shear = Vec3s { x: d.x / d.z, y: d.y / d.z, z: F::splat(simd, 1.0) / d.z };
-        let a = sheared(shear, ordered(is_x, is_y, rows(simd, &pairs.corners[0], i).minus(o)));
-        let b = sheared(shear, ordered(is_x, is_y, rows(simd, &pairs.corners[1], i).minus(o)));
-        let c = sheared(shear, ordered(is_x, is_y, rows(simd, &pairs.corners[2], i).minus(o)));
+        let a = sheared(shear, axes.ordered(rows(simd, &pairs.corners[0], i).minus(o)));
+        let b = sheared(shear, axes.ordered(rows(simd, &pairs.corners[1], i).minus(o)));
+        let c = sheared(shear, axes.ordered(rows(simd, &pairs.corners[2], i).minus(o)));
 
         let (u, v, w) = (c.x * b.y - c.y * b.x, a.x * c.y - a.y * c.x, b.x * a.y - b.y * a.x);
         let inv_det = F::splat(simd, 1.0) / (u + v + w);
@@ -84,17 +82,6 @@ fn exact_lanes<S: Simd>(simd: S, pairs: &Pairs, count: usize, out: &mut Hits) {
 #[inline(always)]
 fn rows<S: Simd>(simd: S, from: &[[f32; BLOCK]; 3], i: usize) -> Vec3s<S> {
     Vec3s { x: load(simd, &from[0], i), y: load(simd, &from[1], i), z: load(simd, &from[2], i) }
-}
-
-/// The components so that the axis that `is_x`, else `is_y`, else neither names is the last, and the others follow it
-/// cyclically.
-#[inline(always)]
-fn ordered<S: Simd>(is_x: M<S>, is_y: M<S>, v: Vec3s<S>) -> Vec3s<S> {
-    Vec3s {
-        x: is_x.select(v.y, is_y.select(v.z, v.x)),
-        y: is_x.select(v.z, is_y.select(v.x, v.y)),
-        z: is_x.select(v.x, is_y.select(v.y, v.z)),
-    }
 }
 
 #[inline(always)]

@@ -81,14 +81,14 @@ fn first_hits_lanes<S: Simd>(
 
 /// Which component of a direction is largest.
 #[derive(Clone, Copy)]
-struct Axes<S: Simd> {
+pub(crate) struct Axes<S: Simd> {
     is_x: M<S>,
     is_y: M<S>,
 }
 
 impl<S: Simd> Axes<S> {
     #[inline(always)]
-    fn new(d: Vec3s<S>) -> Self {
+    pub(crate) fn new(d: Vec3s<S>) -> Self {
         let (x, y, z) = (d.x.abs(), d.y.abs(), d.z.abs());
         let is_x = x.simd_gt(y) & x.simd_gt(z);
         Axes { is_x, is_y: !is_x & y.simd_gt(z) }
@@ -96,7 +96,7 @@ impl<S: Simd> Axes<S> {
 
     /// The components in an order of which the last is the largest of the direction.
     #[inline(always)]
-    fn ordered(self, v: Vec3s<S>) -> Vec3s<S> {
+    pub(crate) fn ordered(self, v: Vec3s<S>) -> Vec3s<S> {
         Vec3s {
             x: self.is_x.select(v.y, self.is_y.select(v.z, v.x)),
             y: self.is_x.select(v.z, self.is_y.select(v.x, v.y)),

@@ -21,7 +21,7 @@
 //! Zero-valued samples count with their g like any others.
 
 use crate::accel::{Hit, RayBatch};
-use crate::direct::bsdf_samples::{PendingBsdf, bsdf_candidate};
+use crate::direct::bsdf_samples::{EmitterInDirection, PendingBsdf, bsdf_candidate, find_emitters};
 use crate::direct::candidates::{Candidate, Candidates, SampleAllocation};
 use crate::direct::domain;
 use crate::direct::light_samples::{light_candidate, with_infinite};
@@ -167,6 +167,8 @@ pub(super) struct Buffers {
     next_ray_of: Vec<u32>,
     hits: EmitterScratch,
     emitter_hits: Vec<Option<EmitterHit>>,
+    far: Vec<u32>,
+    emitters: Vec<Option<EmitterInDirection>>,
 }
 
 impl Correlated {
@@ -323,13 +325,17 @@ impl Buffers {
             }
             candidates.stats.emitter_rays += self.rays.len() as u64;
             job.world.intersect_emitters(&self.rays, &mut self.hits, &mut self.emitter_hits);
+            if crossing == 0 {
+                find_emitters(job, points, (&self.pending, &self.emitter_hits), &mut self.far, &mut self.emitters);
+            }
             self.next_rays.clear();
             self.next_ray_of.clear();
             for (&i, hit) in self.ray_of.iter().zip(&self.emitter_hits) {
                 let pending = &self.pending[i as usize];
                 let point = &points[pending.point as usize];
                 if crossing == 0 {
-                    self.found.push(bsdf_candidate(job, point, pending, hit.as_ref()));
+                    let found = (hit.as_ref(), self.emitters[i as usize]);
+                    self.found.push(bsdf_candidate(job, point, pending, found));
                 }
                 let estimate = &self.estimates[pending.point as usize];
                 let Some(hit) = hit.filter(|_| !pending.specular && estimate.has_g(pending.wi)) else { continue };
