@@ -19,6 +19,8 @@ const MAX_DEPTH: usize = 66;
 const MIN_PROBABILITY: f32 = 1.0 / (1 << 20) as f32;
 /// Number of split candidates per axis, plus one.
 const BUCKETS: usize = 12;
+/// Lights above which the parts of a subtree, and the axes of a split, are worked on at once.
+const MANY: usize = 4096;
 /// Trail of lights that are not in the tree.
 const NO_TRAIL: u64 = u64::MAX;
 
@@ -137,29 +139,25 @@ impl LightTree {
         let mut tree =
             LightTree { nodes: Vec::new(), trails: vec![NO_TRAIL; bounds.len()], leaves: vec![0; bounds.len()] };
         if !items.is_empty() {
-            tree.nodes.reserve_exact(2 * items.len() - 1);
-            tree.build(&mut items, 0, 0);
+            tree.nodes = vec![Node::new(&LightBounds::EMPTY, true, 0); 2 * items.len() - 1];
+            build(&mut tree.nodes, 0, &mut items, 0);
+            tree.find_leaves();
         }
         tree
     }
 
-    fn build(&mut self, items: &mut [Item], depth: u32, trail: u64) -> LightBounds {
-        if let [item] = items {
-            self.nodes.push(Node::new(&item.bounds, true, item.id));
-            self.trails[item.id as usize] = trail;
-            self.leaves[item.id as usize] = self.nodes.len() as u32 - 1;
-            return item.bounds;
+    /// Fills in where lights are in the tree.
+    fn find_leaves(&mut self) {
+        let mut stack = vec![(0, 0, 0)];
+        while let Some((place, depth, trail)) = stack.pop() {
+            let node = &self.nodes[place as usize];
+            if node.is_leaf {
+                self.trails[node.index as usize] = trail;
+                self.leaves[node.index as usize] = place;
+            } else {
+                stack.extend([(place + 1, depth + 1, trail), (node.index, depth + 1, trail | 1 << depth)]);
+            }
         }
-        let place = self.nodes.len();
-        self.nodes.push(Node::new(&items[0].bounds, false, 0));
-        let middle = if depth < MAX_HEURISTIC_DEPTH { split(items) } else { items.len() / 2 };
-        let (left_items, right_items) = items.split_at_mut(middle);
-        let left = self.build(left_items, depth + 1, trail);
-        let right_index = self.nodes.len() as u32;
-        let right = self.build(right_items, depth + 1, trail | 1 << depth);
-        let bounds = left.union(&right);
-        self.nodes[place] = Node::new(&bounds, false, right_index);
-        bounds
     }
 
     /// True if it holds no light.
@@ -355,26 +353,47 @@ fn bucket(center: f32, min: f32, extent: f32) -> usize {
     (((center - min) / extent * BUCKETS as f32) as usize).min(BUCKETS - 1)
 }
 
+/// Builds the subtree over `items` into `nodes`, 2n − 1 of them for n items, the first of which has the index `first`.
+fn build(nodes: &mut [Node], first: u32, items: &mut [Item], depth: u32) -> LightBounds {
+    if let [item] = items {
+        nodes[0] = Node::new(&item.bounds, true, item.id);
+        return item.bounds;
+    }
+    let is_large = items.len() > MANY;
+    let middle = if depth < MAX_HEURISTIC_DEPTH { split(items) } else { items.len() / 2 };
+    let (left_items, right_items) = items.split_at_mut(middle);
+    let (left_nodes, right_nodes) = nodes[1..].split_at_mut(2 * middle - 1);
+    let right_index = first + 2 * middle as u32;
+    let mut left = || build(left_nodes, first + 1, left_items, depth + 1);
+    let mut right = || build(right_nodes, right_index, right_items, depth + 1);
+    let (left, right) = if is_large { rayon::join(left, right) } else { (left(), right()) };
+    let bounds = left.union(&right);
+    nodes[0] = Node::new(&bounds, false, right_index);
+    bounds
+}
+
 /// Reorders at least two items and returns where to split them; neither part is empty.
 fn split(items: &mut [Item]) -> usize {
     let centers = Bounds3::from_points(items.iter().map(|i| i.center));
     let all = items.iter().fold(Bounds3::EMPTY, |b, i| b.union(i.bounds.bounds));
     let (diagonal, longest) = (all.diagonal(), all.diagonal().max_element());
-    let mut best: Option<(f32, usize, usize)> = None;
-    for axis in 0..3 {
+    let cut = |axis: usize| {
         let (min, extent) = (centers.min[axis], centers.max[axis] - centers.min[axis]);
         if extent <= 0.0 || !extent.is_finite() {
-            continue;
+            return None;
         }
         // Long thin parts are worse: regularise by the aspect.
         let stretch = longest / diagonal[axis];
-        if let Some((cost, cut)) = best_cut(items, axis, min, extent) {
-            let cost = cost * stretch;
-            if best.is_none_or(|(c, ..)| cost < c) {
-                best = Some((cost, axis, cut));
-            }
-        }
-    }
+        best_cut(items, axis, min, extent).map(|(cost, cut)| (cost * stretch, axis, cut))
+    };
+    let cuts = if items.len() > MANY {
+        let (x, (y, z)) = rayon::join(|| cut(0), || rayon::join(|| cut(1), || cut(2)));
+        [x, y, z]
+    } else {
+        [cut(0), cut(1), cut(2)]
+    };
+    let cheaper = |best: (f32, usize, usize), other: (f32, usize, usize)| if other.0 < best.0 { other } else { best };
+    let best = cuts.into_iter().flatten().reduce(cheaper);
     let Some((_, axis, cut)) = best else { return items.len() / 2 };
 
     let (min, extent) = (centers.min[axis], centers.max[axis] - centers.min[axis]);
