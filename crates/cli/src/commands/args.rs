@@ -42,7 +42,8 @@ pub(super) struct SceneArgs {
     /// Ray tracer
     #[arg(long, default_value = "embree", value_parser = named::<AccelKind>())]
     pub accel: AccelKind,
-    /// Rays per Embree packet; affects speed only, not the image [default: the processor's native width]
+    /// Rays per Embree packet: 1, 4, 8 or 16; affects speed only, not the image [default: what the processor is fastest
+    /// with]
     #[arg(long, value_name = "W", value_parser = parse_packet_width)]
     pub packet_width: Option<u32>,
     /// Threads [default: all cores]
