@@ -9,27 +9,36 @@
 //! Lambertian reflection, weights, segments, and the random numbers. What is particular to few is done one by one, and
 //! written into the same columns: other shapes, textured reflectance, and all other BSDFs. A vertex whose estimate has
 //! another form than that of its neighbours (resampled or purely specular BSDFs) is left to [`crate::direct`].
+//!
+//! Reading order: [`columns`], [`emitters`] (what BSDF samples point at), [`buffers`] (kernels over the columns); this file
+//! goes through the steps.
+
+mod buffers;
+mod columns;
+mod emitters;
+
+pub(super) use buffers::Buffers;
+use buffers::Stream;
+use columns::{Single, Surface, others};
 
 use super::segment::{
     BsdfTechnique, CameraSample, Carried, Direction, PathState, PathStats, domain, emptied, sampled_direction, survive,
 };
 use crate::accel::{Coherence, Hit, RayBatch};
 use crate::bsdfs::{Bsdf, Diffuse, Lobe};
-use crate::direct::{self, DirectStats, EmitterInDirection, Estimator};
+use crate::direct::{self, DirectStats, Estimator};
 use crate::film::PixelSample;
 use crate::geometry::Shape;
-use crate::lights::many::{LightSamples, LitPoints, Scratch};
 use crate::materials::SurfaceBsdf;
-use crate::scene::{EmitterHit, EmitterScratch, RenderJob, SurfaceInteraction};
+use crate::scene::{RenderJob, SurfaceInteraction};
 use crate::settings::IntegratorSettings;
-use lumiris_lanes::columns::{Column, Columns3, padded, reserve};
+use lumiris_lanes::columns::padded;
 use lumiris_lanes::lane::LANES;
-use lumiris_lanes::vertex::{self as kernels, Ends, Lambertian, Points, Rays, Samples, TriangleHits};
-use lumiris_lanes::{level, sampler};
+use lumiris_lanes::level;
+use lumiris_lanes::vertex as kernels;
 use lumiris_numbers::estimators::mis::Heuristic;
 use lumiris_numbers::math::ray::offset_origin;
-use lumiris_numbers::math::{Ray, Rgb, Vec3};
-use lumiris_numbers::samplers::SampleStream;
+use lumiris_numbers::math::{Rgb, Vec3};
 use std::time::{Duration, Instant};
 
 /// The samples of an estimate.
@@ -83,105 +92,11 @@ impl Estimate {
     }
 }
 
-/// A vertex that the kernels do not determine.
-#[derive(Clone, Copy, Debug)]
-struct Single<'w> {
-    /// Its place in the columns.
-    index: u32,
-    p: Vec3,
-    p_error: Vec3,
-    wo: Vec3,
-    bsdf: SurfaceBsdf<'w>,
-}
-
-impl Single<'_> {
-    fn is_lambertian(&self) -> bool {
-        matches!(self.bsdf.bsdf, Bsdf::Diffuse(_))
-    }
-}
-
-/// Vertices that the kernels of Lambertian reflection leave out.
-fn others<'s, 'w>(singles: &'s [Single<'w>]) -> impl Iterator<Item = &'s Single<'w>> {
-    singles.iter().filter(|single| !single.is_lambertian())
-}
-
 /// The vertices of a batch of paths, which have the same index along their paths.
 pub(super) struct Batch<'w> {
     estimate: Estimate,
     singles: Vec<Single<'w>>,
     buffers: Box<Buffers>,
-}
-
-/// What the next batch needs as well.
-#[derive(Debug, Default)]
-pub(super) struct Buffers {
-    paths: Vec<Carried>,
-    /// Random numbers of the vertices, and of their direct light.
-    streams: Vec<SampleStream>,
-    direct: Vec<SampleStream>,
-    /// What determines points, so many at a time as lanes.
-    hits: Vec<TriangleHits>,
-    surface: Surface,
-    /// Direct light.
-    radiance: Columns3,
-    samples: SampleColumns,
-    drawn: Vec<SampleStream>,
-    scratch: Scratch,
-    traced: Traced,
-    emitter_rays: EmitterRays,
-    spare_singles: Vec<Single<'static>>,
-}
-
-/// Points of surfaces, and Lambertian reflection there.
-#[derive(Debug, Default)]
-struct Surface {
-    p: Columns3,
-    p_error: Columns3,
-    n: Columns3,
-    /// The normal on the side that is lit; zero if both are.
-    lit: Columns3,
-    ns: Columns3,
-    wo: Columns3,
-    rho: Columns3,
-}
-
-/// Samples of one technique, one for each vertex.
-#[derive(Debug, Default)]
-struct SampleColumns {
-    u: [Column; 3],
-    /// Directions and the light that comes along them, with the density of light sampling.
-    light: LightSamples,
-    f_cos: Columns3,
-    /// Density of BSDF sampling. That of the technique is 0 where there is no sample, that of the other one where only
-    /// this one can draw it.
-    p_bsdf: Column,
-    /// Contributions.
-    c: Columns3,
-    /// Rays.
-    o: Columns3,
-    d: Columns3,
-    t_max: Column,
-}
-
-/// Segments of the samples that contribute.
-#[derive(Debug, Default)]
-struct Traced {
-    /// Places of their vertices.
-    index: Vec<u32>,
-    rays: RayBatch,
-    occluded: Vec<bool>,
-}
-
-/// Directions of BSDF sampling among the emitters.
-#[derive(Debug, Default)]
-struct EmitterRays {
-    /// Places of their vertices.
-    index: Vec<u32>,
-    rays: RayBatch,
-    scratch: EmitterScratch,
-    emitter_hits: Vec<Option<EmitterHit>>,
-    /// Those of them that meet nothing.
-    far: Vec<u32>,
 }
 
 /// What the paths and their counts are added to.
@@ -345,7 +260,7 @@ impl<'w> Batch<'w> {
         for (p, is_delta) in samples.p_bsdf.iter_mut().zip(&samples.light.is_delta) {
             *p = if *is_delta { 0.0 } else { *p };
         }
-        self.buffers.weigh(n, &self.estimate, true);
+        self.buffers.weigh(n, self.estimate.n(), self.estimate.heuristic, true);
     }
 
     /// BSDF sample `k` of each vertex and the emitter in its direction: contributions and segments. Returns the number of
@@ -374,45 +289,8 @@ impl<'w> Batch<'w> {
         }
         surface.origins(samples, len);
 
-        let EmitterRays { index, rays, scratch, emitter_hits, far } = emitter_rays;
-        index.clear();
-        index.extend((0..n as u32).filter(|&i| samples.p_bsdf[i as usize] > 0.0));
-        far.clear();
-        let mut add = |samples: &mut SampleColumns, i: usize, hit: Option<EmitterHit>| {
-            let Some(hit) = hit else { return far.push(i as u32) };
-            let (ctx, wi) = (surface.lit_points().get(i), samples.light.wi.vec3(i));
-            match direct::emitter_at(job, &ctx, wi, &hit, paths[i].time) {
-                Some(found) => set_emitter(&mut samples.light, i, &found),
-                None => samples.p_bsdf[i] = 0.0,
-            }
-        };
-        let (o, d) = (samples.o.get(len), samples.light.wi.get(len));
-        if let Some(hit) = job.world.intersect_few_emitters(o, d, scratch) {
-            index.iter().for_each(|&i| add(samples, i as usize, hit(i as usize)));
-        } else {
-            rays.clear();
-            for i in index.iter().map(|&i| i as usize) {
-                let (o, d) = (samples.o.vec3(i), samples.light.wi.vec3(i));
-                rays.push(&Ray { o, d, t_max: f32::INFINITY, time: paths[i].time });
-            }
-            job.world.intersect_emitters(rays, scratch, emitter_hits);
-            index.iter().zip(&*emitter_hits).for_each(|(&i, hit)| add(samples, i as usize, *hit));
-        }
-        let SampleColumns { light: LightSamples { wi, li, pdf, is_far, is_delta, .. }, p_bsdf, .. } = samples;
-        let (at, directions) = (surface.lit_points(), wi);
-        job.lights.infinite_in_directions(
-            far.len(),
-            |k| (at.get(far[k] as usize), directions.vec3(far[k] as usize)),
-            |k, le, p_light| {
-                let i = far[k] as usize;
-                p_bsdf[i] = if le.is_black() { 0.0 } else { p_bsdf[i] };
-                li.set_rgb(i, le);
-                pdf[i] = if is_delta[i] { 0.0 } else { p_light };
-                is_far[i] = 1.0;
-            },
-        );
-        let count = index.len() as u64;
-        self.buffers.weigh(n, &self.estimate, false);
+        let count = emitter_rays.find(job, paths, surface, samples);
+        self.buffers.weigh(n, self.estimate.n(), self.estimate.heuristic, false);
         count
     }
 
@@ -484,144 +362,8 @@ impl<'w> Batch<'w> {
     }
 }
 
-/// What BSDF sample `i` points at.
-fn set_emitter(samples: &mut LightSamples, i: usize, found: &EmitterInDirection) {
-    samples.li.set_rgb(i, found.li);
-    samples.pdf[i] = if samples.is_delta[i] { 0.0 } else { found.p_light };
-    samples.is_far[i] = if found.end.is_some() { 0.0 } else { 1.0 };
-    if let Some((p, p_error, n)) = found.end {
-        samples.p.set(i, p);
-        samples.p_error.set(i, p_error);
-        samples.n.set(i, n);
-    }
-}
-
 /// Sets a vector of a lane.
 #[inline]
 fn set_lane(rows: &mut [[f32; LANES]; 3], k: usize, v: Vec3) {
     (rows[0][k], rows[1][k], rows[2][k]) = v.into();
-}
-
-/// Which random numbers of a vertex.
-enum Stream {
-    /// A domain of the vertex.
-    Vertex(u32),
-    /// Point k of n of a domain of its direct light: (domain, n, k).
-    Direct(u32, u32, u32),
-}
-
-impl Buffers {
-    fn begin(&mut self, len: usize) {
-        self.paths.clear();
-        self.streams.clear();
-        self.direct.clear();
-        if self.hits.len() < len / LANES {
-            self.hits.resize(len / LANES, TriangleHits::default());
-        }
-        self.radiance.reserve(len);
-        let Surface { p, p_error, n, lit, ns, wo, rho } = &mut self.surface;
-        [p, p_error, n, lit, ns, wo, rho].into_iter().for_each(|c| c.reserve(len));
-        let SampleColumns { u: [u0, u1, u2], light, f_cos, p_bsdf, c, o, d, t_max } = &mut self.samples;
-        light.reserve(len);
-        [f_cos, c, o, d].into_iter().for_each(|c| c.reserve(len));
-        reserve(&mut [u0, u1, u2, p_bsdf, t_max], len);
-        self.radiance.get_mut(len).into_iter().for_each(|c| c.fill(0.0));
-    }
-
-    /// The points of hits.
-    fn find_points(&mut self, n: usize) {
-        let len = padded(n);
-        let Surface { p, p_error, n, lit, ns, wo, .. } = &mut self.surface;
-        let [p, p_error, n, facing, ns, wo] = [p, p_error, n, lit, ns, wo].map(|c| c.get_mut(len));
-        kernels::points(level(), &self.hits[..len / LANES], &mut Points { p, p_error, n, facing, ns, wo });
-    }
-
-    /// The shading normals as features of the camera samples that have features.
-    fn set_normals(&self, samples: &mut [PixelSample]) {
-        for (i, path) in self.paths.iter().enumerate() {
-            if let Some(features) = &mut samples[path.sample as usize].features {
-                let (z, wo) = (self.surface.ns.vec3(i), self.surface.wo.vec3(i));
-                features.normal = if z.dot(wo) < 0.0 { -z } else { z };
-            }
-        }
-    }
-
-    /// Draws three numbers for each vertex.
-    fn draw(&mut self, stream: Stream) {
-        self.drawn.clear();
-        match stream {
-            Stream::Vertex(key) => self.drawn.extend(self.streams.iter().map(|s| s.domain(key))),
-            Stream::Direct(key, n, k) => self.drawn.extend(self.direct.iter().map(|s| s.split(key, n, k))),
-        }
-        let n = self.drawn.len();
-        sampler::draw(level(), &self.drawn, self.samples.u.each_mut().map(|u| &mut u[..n]));
-    }
-
-    /// Directions by the cosine.
-    fn sample_lambertian(&mut self, len: usize) {
-        let SampleColumns { u, light, p_bsdf, .. } = &mut self.samples;
-        let u = [&u[1][..len], &u[2][..len]];
-        let at = self.surface.lambertian(len);
-        kernels::sample_lambertian(level(), &at, u, &mut light.wi.get_mut(len), &mut p_bsdf[..len]);
-    }
-
-    /// Contributions of the samples of light or of BSDF sampling.
-    fn weigh(&mut self, n: usize, estimate: &Estimate, by_light: bool) {
-        let len = padded(n);
-        let SampleColumns { light, f_cos, p_bsdf, c, .. } = &mut self.samples;
-        let [n_light, n_bsdf] = estimate.n();
-        let (of_light, of_bsdf) = ((&light.pdf[..len], n_light), (&p_bsdf[..len], n_bsdf));
-        let ((p, n), (p_other, n_other)) = if by_light { (of_light, of_bsdf) } else { (of_bsdf, of_light) };
-        let (f_cos, li, heuristic) = (f_cos.get(len), light.li.get(len), estimate.heuristic);
-        let samples = Samples { f_cos, li, p, p_other, n, n_other, heuristic };
-        kernels::weigh(level(), &samples, &mut c.get_mut(len));
-    }
-
-    /// The segments of the samples that contribute.
-    fn make_segments(&mut self, n: usize) {
-        let len = padded(n);
-        let SampleColumns { light, c, o, d, t_max, .. } = &mut self.samples;
-        let from = self.surface.ends(len);
-        let to = Ends { p: light.p.get(len), p_error: light.p_error.get(len), n: light.n.get(len) };
-        let mut rays = Rays { o: o.get_mut(len), d: d.get_mut(len), t_max: &mut t_max[..len] };
-        kernels::segments(level(), &from, light.wi.get(len), &to, &light.is_far[..len], &mut rays);
-
-        let Traced { index, rays, .. } = &mut self.traced;
-        index.clear();
-        index.extend((0..n as u32).filter(|&i| !c.rgb(i as usize).is_black()));
-        rays.clear();
-        let ([ox, oy, oz], [dx, dy, dz]) = (o.get(len), d.get(len));
-        let columns = [
-            (&mut rays.ox, ox),
-            (&mut rays.oy, oy),
-            (&mut rays.oz, oz),
-            (&mut rays.dx, dx),
-            (&mut rays.dy, dy),
-            (&mut rays.dz, dz),
-            (&mut rays.t_max, &t_max[..len]),
-        ];
-        for (to, from) in columns {
-            to.extend(index.iter().map(|&i| from[i as usize]));
-        }
-        rays.time.extend(index.iter().map(|&i| self.paths[i as usize].time));
-    }
-}
-
-impl Surface {
-    fn lit_points(&self) -> LitPoints<'_> {
-        LitPoints { p: &self.p, n: &self.lit, ns: &self.ns }
-    }
-
-    fn lambertian(&self, len: usize) -> Lambertian<'_> {
-        Lambertian { rho: self.rho.get(len), ns: self.ns.get(len), wo: self.wo.get(len) }
-    }
-
-    fn ends(&self, len: usize) -> Ends<'_> {
-        Ends { p: self.p.get(len), p_error: self.p_error.get(len), n: self.n.get(len) }
-    }
-
-    /// Origins of rays in the directions of the samples.
-    fn origins(&self, samples: &mut SampleColumns, len: usize) {
-        kernels::origins(level(), &self.ends(len), samples.light.wi.get(len), &mut samples.o.get_mut(len));
-    }
 }

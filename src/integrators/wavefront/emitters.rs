@@ -1,0 +1,86 @@
+//! What BSDF samples point at.
+
+use super::columns::{SampleColumns, Surface};
+use crate::accel::RayBatch;
+use crate::direct::{self, EmitterInDirection};
+use crate::integrators::segment::Carried;
+use crate::lights::many::LightSamples;
+use crate::scene::{EmitterHit, EmitterScratch, RenderJob};
+use lumiris_lanes::columns::padded;
+use lumiris_numbers::math::Ray;
+
+/// Directions of BSDF sampling among the emitters.
+#[derive(Debug, Default)]
+pub(super) struct EmitterRays {
+    /// Places of their vertices.
+    pub(super) index: Vec<u32>,
+    pub(super) rays: RayBatch,
+    pub(super) scratch: EmitterScratch,
+    pub(super) emitter_hits: Vec<Option<EmitterHit>>,
+    /// Those of them that meet nothing.
+    pub(super) far: Vec<u32>,
+}
+
+impl EmitterRays {
+    /// Looks up what the BSDF samples of the vertices of `paths` point at; those that point at nothing get the density 0.
+    /// Returns the number of rays among the emitters.
+    pub(super) fn find(
+        &mut self,
+        job: &RenderJob,
+        paths: &[Carried],
+        surface: &Surface,
+        samples: &mut SampleColumns,
+    ) -> u64 {
+        let (n, len) = (paths.len(), padded(paths.len()));
+        let EmitterRays { index, rays, scratch, emitter_hits, far } = self;
+        index.clear();
+        index.extend((0..n as u32).filter(|&i| samples.p_bsdf[i as usize] > 0.0));
+        far.clear();
+        let mut add = |samples: &mut SampleColumns, i: usize, hit: Option<EmitterHit>| {
+            let Some(hit) = hit else { return far.push(i as u32) };
+            let (ctx, wi) = (surface.lit_points().get(i), samples.light.wi.vec3(i));
+            match direct::emitter_at(job, &ctx, wi, &hit, paths[i].time) {
+                Some(found) => set_emitter(&mut samples.light, i, &found),
+                None => samples.p_bsdf[i] = 0.0,
+            }
+        };
+        let (o, d) = (samples.o.get(len), samples.light.wi.get(len));
+        if let Some(hit) = job.world.intersect_few_emitters(o, d, scratch) {
+            index.iter().for_each(|&i| add(samples, i as usize, hit(i as usize)));
+        } else {
+            rays.clear();
+            for i in index.iter().map(|&i| i as usize) {
+                let (o, d) = (samples.o.vec3(i), samples.light.wi.vec3(i));
+                rays.push(&Ray { o, d, t_max: f32::INFINITY, time: paths[i].time });
+            }
+            job.world.intersect_emitters(rays, scratch, emitter_hits);
+            index.iter().zip(&*emitter_hits).for_each(|(&i, hit)| add(samples, i as usize, *hit));
+        }
+        let SampleColumns { light: LightSamples { wi, li, pdf, is_far, is_delta, .. }, p_bsdf, .. } = samples;
+        let (at, directions) = (surface.lit_points(), wi);
+        job.lights.infinite_in_directions(
+            far.len(),
+            |k| (at.get(far[k] as usize), directions.vec3(far[k] as usize)),
+            |k, le, p_light| {
+                let i = far[k] as usize;
+                p_bsdf[i] = if le.is_black() { 0.0 } else { p_bsdf[i] };
+                li.set_rgb(i, le);
+                pdf[i] = if is_delta[i] { 0.0 } else { p_light };
+                is_far[i] = 1.0;
+            },
+        );
+        index.len() as u64
+    }
+}
+
+/// What BSDF sample `i` points at.
+pub(super) fn set_emitter(samples: &mut LightSamples, i: usize, found: &EmitterInDirection) {
+    samples.li.set_rgb(i, found.li);
+    samples.pdf[i] = if samples.is_delta[i] { 0.0 } else { found.p_light };
+    samples.is_far[i] = if found.end.is_some() { 0.0 } else { 1.0 };
+    if let Some((p, p_error, n)) = found.end {
+        samples.p.set(i, p);
+        samples.p_error.set(i, p_error);
+        samples.n.set(i, n);
+    }
+}
