@@ -16,14 +16,13 @@ const SCENES: [&str; 3] = ["scenes/demo/gallery.pbrt", "scenes/fan/box.pbrt", "s
 
 const RESOLUTION: [u32; 2] = [64, 36];
 
-fn job(scene: &str, kind: IntegratorKind, estimator: EstimatorKind, samples: u32) -> RenderJob {
+fn job(scene: &str, kind: IntegratorKind, estimator: EstimatorKind, samples: u32, bsdf_fraction: f32) -> RenderJob {
     let path = Path::new(env!("CARGO_MANIFEST_DIR")).join(scene);
     let options = LoadOptions { resolution: Some(RESOLUTION), ..LoadOptions::default() };
     let mut loaded = load(&path, &options).map_err(|d| d.to_string()).unwrap();
     let integrator = &mut loaded.settings.integrator;
     (integrator.kind, integrator.estimator, integrator.samples) = (kind, estimator, Some(samples));
-    // Only in columns is a lone BSDF sample of a first vertex that of the path
-    integrator.bsdf_fraction = Some(0.5);
+    integrator.bsdf_fraction = Some(bsdf_fraction);
     loaded.job(AccelKind::Embree, None).unwrap()
 }
 
@@ -48,8 +47,13 @@ fn traced(job: &RenderJob, samples: &[CameraSample], side_by_side: bool) -> Vec<
     out
 }
 
-fn assert_same_radiance(scene: &str, kind: IntegratorKind, estimator: EstimatorKind, samples: u32, part: f64) {
-    let job = job(scene, kind, estimator, samples);
+fn assert_same_radiance(
+    scene: &str,
+    kind: IntegratorKind,
+    (estimator, samples, bsdf_fraction): (EstimatorKind, u32, f32),
+    part: f64,
+) {
+    let job = job(scene, kind, estimator, samples, bsdf_fraction);
     let samples = camera_samples(&job);
     let (a, b) = (traced(&job, &samples, true), traced(&job, &samples, false));
     let what = format!("{scene} {kind:?} {estimator:?} {}", samples[0].sample_counts.samples);
@@ -72,16 +76,19 @@ fn assert_same_radiance(scene: &str, kind: IntegratorKind, estimator: EstimatorK
 #[test]
 fn direct_light_is_that_of_the_stages() {
     for scene in SCENES {
-        for (estimator, samples) in [(EstimatorKind::Mc, 3), (EstimatorKind::Mis, 2), (EstimatorKind::Mis, 7)] {
-            assert_same_radiance(scene, IntegratorKind::Direct, estimator, samples, 0.99);
+        for (samples, bsdf_fraction) in [(2, 0.5), (7, 0.5), (4, 0.25), (8, 0.25)] {
+            let estimator = (EstimatorKind::Mis, samples, bsdf_fraction);
+            assert_same_radiance(scene, IntegratorKind::Direct, estimator, 0.99);
         }
+        assert_same_radiance(scene, IntegratorKind::Direct, (EstimatorKind::Mc, 3, 0.0), 0.99);
     }
 }
 
 #[test]
 fn paths_go_the_same_ways() {
     for scene in SCENES {
-        assert_same_radiance(scene, IntegratorKind::Path, EstimatorKind::Mc, 2, 0.96);
-        assert_same_radiance(scene, IntegratorKind::Path, EstimatorKind::Mis, 4, 0.96);
+        assert_same_radiance(scene, IntegratorKind::Path, (EstimatorKind::Mc, 2, 0.0), 0.96);
+        // Only in columns is a lone BSDF sample of a first vertex that of the path
+        assert_same_radiance(scene, IntegratorKind::Path, (EstimatorKind::Mis, 4, 0.5), 0.96);
     }
 }
