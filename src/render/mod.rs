@@ -9,6 +9,7 @@ pub mod bench_frame;
 pub mod bench_photons;
 mod camera_samples;
 pub mod crosscheck;
+pub mod efficiency;
 pub mod output;
 pub mod plan;
 pub mod visibility_cache;

@@ -37,6 +37,16 @@ impl RenderJob {
         RenderJob { world, settings, lights, irradiances, sample_count_map: None, lobes, plain }
     }
 
+    /// Prepares everything for other settings, as [`Self::new`] does; results of photons and pilots are dropped.
+    pub fn reset(&mut self, settings: Settings) {
+        let i = &settings.integrator;
+        self.settings = settings;
+        self.lobes = self.world.scene.materials.lobes(i.bsdf_density);
+        self.lights =
+            LightSampling::new(Arc::clone(&self.world.scene.lights), i.light_sampler, max_groups(i, self.lobes));
+        self.sample_count_map = None;
+    }
+
     /// The reflectance at a hit of a mesh in world space that does not emit and reflects the same everywhere.
     #[inline]
     pub fn plain_reflectance(&self, hit: &Hit) -> Option<Rgb> {

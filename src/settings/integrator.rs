@@ -86,6 +86,18 @@ impl IntegratorSettings {
         }
     }
 
+    /// The same with another integrator, as if it had been asked for by name: `direct` has one bounce, and others as many
+    /// as by default if there was only one.
+    #[must_use]
+    pub fn of_kind(self, kind: IntegratorKind) -> Self {
+        let max_depth = match kind {
+            IntegratorKind::Direct => 1,
+            _ if self.kind == IntegratorKind::Direct => IntegratorSettings::default().max_depth,
+            _ => self.max_depth,
+        };
+        IntegratorSettings { kind, max_depth, ..self }
+    }
+
     /// MIS heuristic.
     pub fn heuristic(&self) -> Heuristic {
         self.heuristic.unwrap_or(self.estimator.default_heuristic())

@@ -10,7 +10,7 @@ use std::str::FromStr;
 use strum::VariantNames;
 
 /// A parser of the names of an enumeration.
-fn named<T>() -> impl TypedValueParser<Value = T>
+pub(super) fn named<T>() -> impl TypedValueParser<Value = T>
 where
     T: VariantNames + FromStr<Err = strum::ParseError> + Clone + Send + Sync + 'static,
 {

@@ -1,6 +1,7 @@
 //! `lumiris bench`
 
 use super::args::SceneArgs;
+use super::bench_efficiency::{EfficiencyArgs, efficiency};
 use super::progress;
 use super::settings::{load_job, plan};
 use anyhow::{Context, bail};
@@ -27,8 +28,10 @@ enum Subject {
     Photons,
     /// A whole frame, and the share of a bare Embree loop over its rays
     Frame,
-    /// Everything
+    /// Everything so far
     All,
+    /// Efficiency of settings: 1/(error × CPU time)
+    Efficiency,
 }
 
 /// `lumiris bench`
@@ -38,7 +41,9 @@ pub(super) struct BenchArgs {
     #[arg(default_value = "all")]
     subject: Subject,
     #[command(flatten)]
-    scene: SceneArgs,
+    pub(super) scene: SceneArgs,
+    #[command(flatten)]
+    pub(super) efficiency: EfficiencyArgs,
     /// Runs of the renderer and of the bare Embree loop, alternating; medians are reported
     #[arg(long, value_name = "N", default_value_t = 5, value_parser = clap::value_parser!(u32).range(1..=10_000))]
     runs: u32,
@@ -51,6 +56,14 @@ pub(super) struct BenchArgs {
 }
 
 pub(super) fn run(args: &BenchArgs) -> anyhow::Result<ExitCode> {
+    if args.subject == Subject::Efficiency {
+        let tables = efficiency(args)?;
+        if let Some(path) = &args.json {
+            write_text(path, &serde_json::to_string_pretty(&tables)?)
+                .with_context(|| format!("cannot write {}", path.display()))?;
+        }
+        return Ok(ExitCode::SUCCESS);
+    }
     if args.scene.accel != AccelKind::Embree {
         bail!("bench measures Embree; leave out --accel");
     }

@@ -5,6 +5,7 @@
 
 mod args;
 mod bench;
+mod bench_efficiency;
 mod compare;
 mod crosscheck;
 mod generate;

@@ -13,6 +13,13 @@ pub(super) struct SettingsArgs {
 }
 
 impl SettingsArgs {
+    /// Parses options outside the command line of the program.
+    pub(super) fn parse<'a>(words: impl Iterator<Item = &'a str>) -> Result<Self, String> {
+        let command = Self::augment_args(Command::new("settings").no_binary_name(true).disable_help_flag(true));
+        let matches = command.try_get_matches_from(words.map(str::to_owned)).map_err(|e| e.to_string())?;
+        Self::from_arg_matches(&matches).map_err(|e| e.to_string())
+    }
+
     /// Applies them.
     pub(super) fn apply(&self, settings: &mut Settings) {
         for (row, value) in &self.typed {

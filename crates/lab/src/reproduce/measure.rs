@@ -14,13 +14,13 @@ use lumiris::film::Film;
 use lumiris::film::filter::PixelFilter;
 use lumiris::import::{LoadOptions, load};
 use lumiris::lights::{LightSamplerKind, VisibilityCache};
+use lumiris::render::efficiency::processor_time;
 use lumiris::render::plan::prepare;
 use lumiris::render::{RenderError, RenderSettings, Rendering, render};
 use lumiris::scene::{AccelKind, RenderJob};
 use lumiris::settings::{Proposals, StageTimes, Strata};
 use lumiris_numbers::estimators::stats::{Welford, median, z_test};
 use lumiris_numbers::math::luminance;
-use rustix::time::{ClockId, clock_gettime};
 use serde::Serialize;
 use std::path::Path;
 use std::sync::Arc;
@@ -206,12 +206,6 @@ impl Seconds {
     pub fn stages(&self) -> f64 {
         self.camera + self.shade + self.direct()
     }
-}
-
-/// Processor time of this process so far, of threads that have ended too.
-fn processor_time() -> Duration {
-    let t = clock_gettime(ClockId::ProcessCPUTime);
-    Duration::new(u64::try_from(t.tv_sec).unwrap_or(0), u32::try_from(t.tv_nsec).unwrap_or(0))
 }
 
 /// A number and its standard error.
