@@ -57,18 +57,17 @@ impl<'a> CameraSampler<'a> {
         CameraSampler { job, first_sample, filter: scene.film.filter.sampler(), has_motion, pinhole }
     }
 
-    /// Appends the samples of a range of some pixels, which are given with the fits of their samples.
+    /// Appends samples of some pixels, each with a range of its own and given with the fits of its samples.
     pub(super) fn samples(
         &self,
-        pixels: impl Iterator<Item = (u32, [u32; 2])>,
-        samples: &Range<u32>,
+        pixels: impl Iterator<Item = (u32, [u32; 2], Range<u32>)>,
         seed: u32,
         scratch: &mut Scratch,
         out: &mut Vec<CameraSample>,
     ) {
         let Some((pinhole, o)) = &self.pinhole else {
-            for (fit, pixel) in pixels {
-                out.extend(samples.clone().map(|sample| CameraSample { fit, ..self.sample(pixel, sample, seed) }));
+            for (fit, pixel, samples) in pixels {
+                out.extend(samples.map(|sample| CameraSample { fit, ..self.sample(pixel, sample, seed) }));
             }
             return;
         };
@@ -77,8 +76,8 @@ impl<'a> CameraSampler<'a> {
         places.clear();
         streams.clear();
         drawn.clear();
-        for (fit, pixel) in pixels {
-            for sample in samples.clone() {
+        for (fit, pixel, samples) in pixels {
+            for sample in samples {
                 let stream = SampleStream::new(kind, pixel, sample, seed);
                 places.push((fit, pixel, sample));
                 streams.push(stream);

@@ -8,12 +8,13 @@
 //! Intervals are those of ±2 standard errors: of errors by the spread between blocks of the image, with the covariance of
 //! the two that are compared, and of CPU times by the spread between seeds.
 
-use super::plan::prepare;
+use super::plan::{Plan, prepare};
 use super::{RenderError, RenderSettings, render};
-use crate::film::PixelBounds;
+use crate::film::{PixelBounds, PixelSums};
 use crate::imaging::metrics::difference::DEFAULT_EPSILON;
+use crate::lights::LightSamplerKind;
 use crate::scene::RenderJob;
-use crate::settings::Settings;
+use crate::settings::{EstimatorKind, IntegratorKind, Settings};
 use lumiris_numbers::estimators::stats::Welford;
 use lumiris_numbers::math::luminance;
 use rustix::time::{ClockId, clock_gettime};
@@ -97,10 +98,10 @@ pub fn measure_efficiency(
             let mut settings = case.settings;
             settings.sampling.seed = settings.sampling.seed.wrapping_add(seed);
             let start = processor_time();
-            let image = image(job, settings, render_settings)?;
+            let (image, plan) = image(job, settings, render_settings)?;
             measured.cpu.push((processor_time() - start).as_secs_f64());
             measured.images.push(image);
-            measured.chosen = chosen(&settings, job.settings());
+            measured.chosen = plan.chosen;
         }
     }
 
@@ -130,21 +131,14 @@ fn image(
     job: &mut RenderJob,
     settings: Settings,
     render_settings: &RenderSettings,
-) -> Result<Vec<[f64; 3]>, RenderError> {
+) -> Result<(Vec<[f64; 3]>, Plan), RenderError> {
     job.reset(settings);
-    prepare(job, render_settings.threads, false)?;
-    let spp = job.settings().sampling.spp;
+    let plan = prepare(job, render_settings.threads, false)?;
+    let spp = job.pixel_samples.as_ref().map_or(job.settings().sampling.spp, |of_pixels| of_pixels.spp);
     let render_settings =
         RenderSettings { spp, with_features: false, with_replicas: false, time_limit: None, ..*render_settings };
     let rendering = render(job, &render_settings, &AtomicBool::new(false), &|_| ())?;
-    Ok(rendering.film.pixels.iter().map(|p| p.mean()).collect())
-}
-
-/// The settings that differ, by their names in metadata.
-fn chosen(before: &Settings, after: &Settings) -> Vec<(&'static str, String)> {
-    let before: Vec<_> = before.recorded().collect();
-    let after = after.recorded().filter(|entry| !before.contains(entry));
-    after.map(|(key, value)| (key, value.to_string())).collect()
+    Ok((rendering.film.pixels.iter().map(PixelSums::mean).collect(), plan))
 }
 
 /// What emits, as the camera sees it.
@@ -154,12 +148,12 @@ fn emission(
     render_settings: &RenderSettings,
 ) -> Result<Vec<[f64; 3]>, RenderError> {
     let mut settings = *settings;
-    settings.integrator.kind = crate::settings::IntegratorKind::Path;
+    settings.integrator.kind = IntegratorKind::Path;
     settings.integrator.max_depth = 0;
-    settings.integrator.estimator = crate::settings::EstimatorKind::Mis;
-    settings.integrator.light_sampler = crate::lights::LightSamplerKind::Power;
+    settings.integrator.estimator = EstimatorKind::Mis;
+    settings.integrator.light_sampler = LightSamplerKind::Power;
     settings.sampling.spp = EDGE_SPP;
-    image(job, settings, render_settings)
+    Ok(image(job, settings, render_settings)?.0)
 }
 
 fn pooled_mean(measured: &[Measured], area: usize) -> Vec<[f64; 3]> {

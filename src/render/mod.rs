@@ -4,13 +4,17 @@
 //! by its coordinates and their index, traced independently of what else is in their batch, and added in the order
 //! of their index; so neither threads, nor tiles, nor passes change a bit.
 
+pub mod allocation;
+pub mod auto;
 pub mod bench;
 pub mod bench_frame;
 pub mod bench_photons;
 mod camera_samples;
 pub mod crosscheck;
 pub mod efficiency;
+pub mod noise;
 pub mod output;
+mod pilot_samples;
 pub mod plan;
 pub mod visibility_cache;
 mod worker;
@@ -77,7 +81,7 @@ impl Default for RenderSettings {
 /// Progress reported after every tile.
 #[derive(Clone, Copy, Debug)]
 pub struct Progress {
-    /// Camera samples done.
+    /// Camera samples done, as if every pixel had the same number.
     pub samples_done: u64,
     /// Camera samples requested.
     pub samples_total: u64,
@@ -255,7 +259,7 @@ impl<'a> Run<'a> {
 
         let mut film = self.film(&tiles);
         let Statistics { paths: stats, cache, photons } = integrator.statistics(stats, &mut film);
-        let complete = film.pixels.iter().all(|p| p.count == u64::from(self.settings.spp));
+        let complete = film.pixels.iter().enumerate().all(|(i, p)| p.count == self.samples_wanted(i));
         Ok(Rendering { film, stats, cache, photons, elapsed: self.start.elapsed(), complete, threads })
     }
 
@@ -345,8 +349,6 @@ impl<'a> Run<'a> {
 
     /// Adds the samples of a range to one tile, in batches of whole pixels.
     fn render_tile(&self, worker: &mut AnyWorker<'_>, tile: &mut Tile, samples: std::ops::Range<u32>) -> PathStats {
-        let per_pixel = samples.len().max(1);
-        let pixels_per_batch = (BATCH_PATHS / per_pixel).max(1);
         let bounds = tile.bounds;
         let mut ill_conditioned = 0;
         let settings = &self.job.settings().integrator;
@@ -358,13 +360,16 @@ impl<'a> Run<'a> {
             ill_conditioned = tile.fits.solve();
         }
         let solve = start.elapsed();
-        for (batch, sums) in tile.sums.chunks_mut(pixels_per_batch).enumerate() {
-            let first = batch * pixels_per_batch;
-            let pixels = first..first + sums.len();
-            self.camera_samples(&bounds, pixels, &samples, &mut worker.scratch, &mut worker.samples);
+        let mut first = 0;
+        while first < tile.sums.len() {
+            let pixels = self.batch_of_pixels(&bounds, first, &samples);
+            first = pixels.end;
+            self.camera_samples(&bounds, pixels.clone(), &samples, &mut worker.scratch, &mut worker.samples);
             worker.tracer.trace(self.job, &worker.samples, &mut tile.fits, &mut worker.results);
-            for (pixel, results) in sums.iter_mut().zip(worker.results.chunks(per_pixel)) {
-                results.iter().for_each(|r| pixel.add(r));
+            let mut results = worker.results.iter();
+            for index in pixels {
+                let count = self.samples_of(position(&bounds, index as u32), &samples).len();
+                results.by_ref().take(count).for_each(|r| tile.sums[index].add(r));
             }
         }
         self.render_replicas(worker, tile, samples);
@@ -379,34 +384,70 @@ impl<'a> Run<'a> {
         stats
     }
 
-    /// Adds the samples of a range to the replicas of a tile.
-    fn render_replicas(&self, worker: &mut AnyWorker<'_>, tile: &mut Tile, samples: std::ops::Range<u32>) {
-        let per_pixel = samples.len().max(1);
+    /// The pixels of a tile from index `first` on that have a batch of samples in a pass; at least one pixel.
+    fn batch_of_pixels(&self, tile: &PixelBounds, first: usize, pass: &std::ops::Range<u32>) -> std::ops::Range<usize> {
+        let (mut end, mut paths) = (first, 0);
+        while end < tile.area() {
+            paths += self.samples_of(position(tile, end as u32), pass).len();
+            if paths > BATCH_PATHS && end > first {
+                break;
+            }
+            end += 1;
+        }
+        first..end
+    }
+
+    /// Adds the samples of a pass to the replicas of a tile.
+    fn render_replicas(&self, worker: &mut AnyWorker<'_>, tile: &mut Tile, pass: std::ops::Range<u32>) {
         let seed = pcg4d([self.job.settings().sampling.seed, REPLICA_SEED, 0, 0])[0];
+        let samples_of = |r: &Replica| self.samples_of(position(&tile.bounds, r.pixel), &pass);
         let mut fits = tile.bounds.area() as u32..;
-        for replicas in tile.replicas.chunks_mut((BATCH_PATHS / per_pixel).max(1)) {
+        let longest = tile.replicas.iter().map(|r| samples_of(r).len()).max().unwrap_or(0);
+        for replicas in tile.replicas.chunks_mut((BATCH_PATHS / longest.max(1)).max(1)) {
             worker.samples.clear();
-            let pixels = replicas.iter().zip(&mut fits).map(|(r, fit)| (fit, position(&tile.bounds, r.pixel)));
-            self.camera.samples(pixels, &samples, seed, &mut worker.scratch, &mut worker.samples);
+            let pixels = replicas.iter().zip(&mut fits);
+            let pixels = pixels.map(|(r, fit)| (fit, position(&tile.bounds, r.pixel), samples_of(r)));
+            self.camera.samples(pixels, seed, &mut worker.scratch, &mut worker.samples);
             worker.tracer.trace(self.job, &worker.samples, &mut tile.fits, &mut worker.results);
-            for (replica, results) in replicas.iter_mut().zip(worker.results.chunks(per_pixel)) {
-                results.iter().for_each(|r| replica.add(r));
+            let mut results = worker.results.iter();
+            for replica in replicas {
+                results.by_ref().take(samples_of(replica).len()).for_each(|r| replica.add(r));
             }
         }
     }
 
-    /// The camera samples of some pixels of a tile, which are counted row by row.
+    /// The camera samples of some pixels of a tile, which are counted row by row, in a pass.
     fn camera_samples(
         &self,
         tile: &PixelBounds,
         pixels: std::ops::Range<usize>,
-        samples: &std::ops::Range<u32>,
+        pass: &std::ops::Range<u32>,
         scratch: &mut camera_samples::Scratch,
         out: &mut Vec<CameraSample>,
     ) {
         out.clear();
-        let pixels = pixels.map(|index| (index as u32, position(tile, index as u32)));
-        self.camera.samples(pixels, samples, self.job.settings().sampling.seed, scratch, out);
+        let pixels = pixels.map(|index| {
+            let pixel = position(tile, index as u32);
+            (index as u32, pixel, self.samples_of(pixel, pass))
+        });
+        self.camera.samples(pixels, self.job.settings().sampling.seed, scratch, out);
+    }
+
+    /// The samples that a pass has of a pixel.
+    #[inline]
+    fn samples_of(&self, pixel: [u32; 2], pass: &std::ops::Range<u32>) -> std::ops::Range<u32> {
+        let Some(of_pixels) = &self.job.pixel_samples else { return pass.clone() };
+        let first = self.settings.first_sample;
+        let [start, end] = [pass.start, pass.end].map(|i| first + of_pixels.until(pixel, i - first));
+        start..end
+    }
+
+    /// The number of samples of a pixel of the film by the end.
+    fn samples_wanted(&self, index: usize) -> u64 {
+        let bounds = &self.job.world.scene.film.bounds;
+        let pixel = position(bounds, index as u32);
+        let first = self.settings.first_sample;
+        self.samples_of(pixel, &(first..first + self.settings.spp)).len() as u64
     }
 }
 

@@ -10,6 +10,8 @@
 //! Times vary from run to run; so the chosen counts are recorded in the image's metadata, and rendering with them gives
 //! the same image to the bit.
 
+use super::allocation::allocate;
+use super::auto::{AutoChoice, choose};
 use super::visibility_cache::build_visibility_cache;
 use super::{RenderSettings, Run, ThreadError, camera_batches};
 use crate::direct::Fits;
@@ -18,7 +20,8 @@ use crate::integrators::path::CameraSample;
 use crate::integrators::{PathTracer, Tracer};
 use crate::scene::{RenderJob, SampleCountMap};
 use crate::settings::{
-    EstimatorKind, IntegratorKind, IntegratorSettings, Proposals, RisSettings, SampleCounts, StageTimes, Strata, Target,
+    Allocation, EstimatorKind, IntegratorKind, IntegratorSettings, Proposals, RisSettings, SampleCounts, Settings,
+    StageTimes, Strata, Target,
 };
 use lumiris_numbers::estimators::ris::choice::{Costs, MomentsEstimate, Variances, clamp_ratio, optimal_ratio};
 use lumiris_numbers::estimators::stats::median;
@@ -39,23 +42,60 @@ const PILOT_RADIUS: u32 = 2;
 /// Seed of the pilot. It must not use the random numbers of the image, whose samples would then depend on the choice.
 const PILOT_SEED: u32 = 0x70_69_6c_6f;
 
+/// What was chosen for an image, as far as its settings left it open.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub struct Plan {
+    /// What the estimator `auto` is.
+    pub auto: Option<AutoChoice>,
+    /// M and N of `ris`.
+    pub ris: Option<RisChoice>,
+    /// The settings that were chosen, by their names in metadata: with these, rendering gives the same image to the bit.
+    pub chosen: Vec<(&'static str, String)>,
+}
+
 /// The measured times and the chosen counts.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Plan {
+pub struct RisChoice {
     /// Times of the stages.
     pub times: StageTimes,
     /// Sample counts; with `optimal` those that define the time of an estimate.
     pub sample_counts: SampleCounts,
 }
 
-/// Completes what the settings of `job` leave open; `None` if that is nothing. `ratio_map` requests the map of the best
-/// M/N even if it is not used.
-pub fn prepare(job: &mut RenderJob, threads: Option<usize>, ratio_map: bool) -> Result<Option<Plan>, ThreadError> {
+/// Completes what the settings of `job` leave open. `ratio_map` requests the map of the best M/N even if it is not used.
+pub fn prepare(job: &mut RenderJob, threads: Option<usize>, ratio_map: bool) -> Result<Plan, ThreadError> {
+    let pool = super::thread_pool(threads)?;
+    let before = *job.settings();
+    let is_auto = job.settings().integrator.estimator == EstimatorKind::Auto;
+    if job.settings().sampling.allocation == Allocation::Auto {
+        let allocation = if is_auto { Allocation::Adaptive } else { Allocation::Uniform };
+        job.change(|s| s.sampling.allocation = allocation);
+    }
+    let auto = pool.install(|| choose(job));
     let settings = job.settings().integrator;
     if settings.uses_visibility_cache() && job.lights.visibility_cache().is_none() {
-        let visibility_cache = super::thread_pool(threads)?.install(|| build_visibility_cache(job));
+        let visibility_cache = pool.install(|| build_visibility_cache(job));
         job.lights.set_visibility_cache(visibility_cache.map(|(visibility_cache, _)| visibility_cache));
     }
+    let ris = choose_proposals(job, threads, ratio_map)?;
+    job.pixel_samples = pool.install(|| allocate(job));
+    Ok(Plan { auto, ris, chosen: chosen(&before, job.settings()) })
+}
+
+/// The settings that differ.
+fn chosen(before: &Settings, after: &Settings) -> Vec<(&'static str, String)> {
+    let before: Vec<_> = before.recorded().collect();
+    let after = after.recorded().filter(|entry| !before.contains(entry));
+    after.map(|(key, value)| (key, value.to_string())).collect()
+}
+
+/// Chooses M and N of `ris`, if they are open.
+fn choose_proposals(
+    job: &mut RenderJob,
+    threads: Option<usize>,
+    ratio_map: bool,
+) -> Result<Option<RisChoice>, ThreadError> {
+    let settings = job.settings().integrator;
     let is_open = !matches!(settings.ris.proposals, Proposals::Fixed(_));
     if settings.estimator != EstimatorKind::Ris || !is_open && !ratio_map {
         return Ok(None);
@@ -81,7 +121,7 @@ pub fn prepare(job: &mut RenderJob, threads: Option<usize>, ratio_map: bool) -> 
     if is_optimal || ratio_map {
         job.sample_count_map = Some(sample_count_map(job, threads, times, sample_counts)?);
     }
-    Ok(Some(Plan { times, sample_counts }))
+    Ok(Some(RisChoice { times, sample_counts }))
 }
 
 /// Fits a + M·T1 and b + N·T2 to the times of few and of many proposals and samples; `None` if there was nothing to

@@ -1,6 +1,6 @@
 //! What a rendering works on: a world, its settings, and what these prepare.
 
-use super::{SampleCountMap, Scene, World};
+use super::{PixelSamples, SampleCountMap, Scene, World};
 use crate::accel::Hit;
 use crate::geometry::{GeometryId, Shape};
 use crate::lights::{Irradiances, LightSampling};
@@ -19,6 +19,8 @@ pub struct RenderJob {
     pub irradiances: Irradiances,
     /// Sample counts of each pixel, if they are chosen per pixel.
     pub sample_count_map: Option<SampleCountMap>,
+    /// Camera samples of each pixel, if their numbers differ.
+    pub pixel_samples: Option<PixelSamples>,
     lobes: usize,
     /// Reflectance of the geometries that are nothing but meshes of one Lambertian reflectance.
     plain: Vec<Option<Rgb>>,
@@ -34,7 +36,7 @@ impl RenderJob {
         let has_alpha = |geometry: GeometryId| scene.geometry.geometries[geometry as usize].alpha.is_some();
         let irradiances = Irradiances::new(&scene.lights, has_alpha);
         let plain = (0..scene.geometry.geometries.len() as GeometryId).map(|g| plain_reflectance(scene, g)).collect();
-        RenderJob { world, settings, lights, irradiances, sample_count_map: None, lobes, plain }
+        RenderJob { world, settings, lights, irradiances, sample_count_map: None, pixel_samples: None, lobes, plain }
     }
 
     /// Prepares everything for other settings, as [`Self::new`] does; results of photons and pilots are dropped.
@@ -45,6 +47,7 @@ impl RenderJob {
         self.lights =
             LightSampling::new(Arc::clone(&self.world.scene.lights), i.light_sampler, max_groups(i, self.lobes));
         self.sample_count_map = None;
+        self.pixel_samples = None;
     }
 
     /// The reflectance at a hit of a mesh in world space that does not emit and reflects the same everywhere.

@@ -4,11 +4,13 @@
 //! the settings that it is rendered by, and with what they prepare.
 
 mod job;
+mod pixel_samples;
 mod sample_count_map;
 mod surface_interaction;
 mod world;
 
 pub use job::RenderJob;
+pub use pixel_samples::PixelSamples;
 pub use sample_count_map::SampleCountMap;
 pub use surface_interaction::SurfaceInteraction;
 pub use world::{AccelKind, EmitterHit, EmitterScratch, World};

@@ -25,6 +25,9 @@ pub struct IntegratorSettings {
     /// Samples per estimate (N): shadow segments per shading point. `None` is the default of the estimator,
     /// [`Self::sample_counts`].
     pub samples: Option<u32>,
+    /// Samples per estimate at later vertices of a path than the first. `None`: as many as at the first; `ris` halves them
+    /// at every bounce.
+    pub later_samples: Option<u32>,
     /// Weights of the techniques; see [`Self::heuristic`].
     pub heuristic: Option<Heuristic>,
     /// Fraction of the samples drawn by BSDF sampling, for estimators that combine it with light sampling (0 to 1);
@@ -61,6 +64,7 @@ impl Default for IntegratorSettings {
             roulette_depth: Some(4),
             estimator: EstimatorKind::Mis,
             samples: None,
+            later_samples: None,
             heuristic: None,
             bsdf_fraction: None,
             light_sampler: LightSamplerKind::Tree,
@@ -106,7 +110,10 @@ impl IntegratorSettings {
     /// Fraction of the samples drawn by BSDF sampling. That of `mis` lets a path continue by its only BSDF sample, which
     /// costs no ray of its own; control variates need samples of all components.
     pub fn bsdf_fraction(&self) -> f32 {
-        self.bsdf_fraction.unwrap_or(if self.estimator == EstimatorKind::Mis { 0.25 } else { 0.5 })
+        self.bsdf_fraction.unwrap_or(match self.estimator {
+            EstimatorKind::Auto | EstimatorKind::Mis => 0.25,
+            _ => 0.5,
+        })
     }
 
     /// True if the throughput of a path decides whether it takes the bounce of this number, counted from 1.
@@ -131,8 +138,9 @@ impl IntegratorSettings {
     fn default_samples(&self) -> u32 {
         match self.estimator {
             EstimatorKind::Mc => 2,
-            EstimatorKind::Mis if self.depth() > 1 => 2,
-            EstimatorKind::Mis
+            EstimatorKind::Auto | EstimatorKind::Mis if self.depth() > 1 => 2,
+            EstimatorKind::Auto
+            | EstimatorKind::Mis
             | EstimatorKind::Ris
             | EstimatorKind::Ocv
             | EstimatorKind::OptimalMis
@@ -146,6 +154,16 @@ impl IntegratorSettings {
         let samples = self.samples.unwrap_or_else(|| self.default_samples()).max(1);
         let proposals = if self.estimator == EstimatorKind::Ris { self.ris.proposals_for(samples) } else { samples };
         SampleCounts { samples, proposals: proposals.max(samples) }
+    }
+
+    /// Sample and proposal counts of an estimate at a path vertex, counted from 0, unless chosen per pixel.
+    pub fn sample_counts_at(&self, vertex: u32) -> SampleCounts {
+        let first = self.sample_counts();
+        match self.later_samples.filter(|_| vertex > 0) {
+            Some(samples) => first.of_ratio(samples.max(1)),
+            None if self.estimator == EstimatorKind::Ris => first.after_bounces(vertex),
+            None => first,
+        }
     }
 }
 
@@ -199,6 +217,8 @@ pub enum Cached {
 #[derive(Clone, Copy, Debug, PartialEq, Eq, EnumString, IntoStaticStr, VariantNames)]
 #[strum(serialize_all = "kebab-case")]
 pub enum EstimatorKind {
+    /// What a pilot finds to be the most efficient; `mis` where the image is too small for a pilot.
+    Auto,
     /// Light sampling only (and the specular lobes of BSDFs).
     Mc,
     /// Light and BSDF sampling, combined by multiple importance sampling.
@@ -316,7 +336,11 @@ impl SampleCounts {
     /// vertex does not. The ratio M/N stays the same.
     #[must_use]
     pub fn after_bounces(self, bounces: u32) -> SampleCounts {
-        let samples = (self.samples >> bounces.min(31)).max(1);
+        self.of_ratio((self.samples >> bounces.min(31)).max(1))
+    }
+
+    /// This many samples, with as many proposals for each.
+    fn of_ratio(self, samples: u32) -> SampleCounts {
         let proposals = (u64::from(self.proposals) * u64::from(samples)).div_ceil(u64::from(self.samples.max(1)));
         SampleCounts { samples, proposals: proposals as u32 }
     }

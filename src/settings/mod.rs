@@ -18,7 +18,7 @@ pub use integrator::{
 };
 pub use photon_map::{PhotonMapSettings, PhotonStorage, ProgressiveSettings};
 pub use ris::{ProposalPoints, Proposals, RisSettings, StageTimes, Strata, Target};
-pub use sampling::SamplingSettings;
+pub use sampling::{Allocation, SamplingSettings};
 pub use table::Setting;
 pub use value::Value;
 

@@ -1,12 +1,13 @@
 //! Random numbers, samples per pixel, and the footprints of textures that follow from them.
 
 use lumiris_numbers::samplers::SamplerKind;
+use strum::{EnumString, IntoStaticStr, VariantNames};
 
 /// Minimum width of a texture footprint, in pixels, as in pbrt-v4.
 const MIN_FOOTPRINT: f32 = 0.125;
 
 /// Random numbers.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[derive(Clone, Copy, Debug, PartialEq)]
 pub struct SamplingSettings {
     /// The sequence.
     pub sampler: SamplerKind,
@@ -16,11 +17,35 @@ pub struct SamplingSettings {
     pub seed: u32,
     /// Samples per pixel that texture footprints are computed for; `spp` if `None`.
     pub footprint_spp: Option<u32>,
+    /// How camera samples are distributed over the pixels.
+    pub allocation: Allocation,
+    /// Relative standard error that every block of the image is to have; `spp` is then the maximum number of samples.
+    pub noise: Option<f32>,
+}
+
+/// Distribution of the camera samples over the pixels.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, EnumString, IntoStaticStr, VariantNames)]
+#[strum(serialize_all = "kebab-case")]
+pub enum Allocation {
+    /// Adaptive with the estimator `auto`, otherwise uniform.
+    #[default]
+    Auto,
+    /// The same number for every pixel.
+    Uniform,
+    /// More where a pilot finds more noise for the time.
+    Adaptive,
 }
 
 impl Default for SamplingSettings {
     fn default() -> Self {
-        SamplingSettings { sampler: SamplerKind::default(), spp: 16, seed: 0, footprint_spp: None }
+        SamplingSettings {
+            sampler: SamplerKind::default(),
+            spp: 16,
+            seed: 0,
+            footprint_spp: None,
+            allocation: Allocation::Auto,
+            noise: None,
+        }
     }
 }
 
@@ -44,7 +69,7 @@ mod tests {
 
     #[test]
     fn footprints_are_as_wide_as_samples_lie_apart() {
-        let mut s = SamplingSettings { sampler: SamplerKind::Sobol, spp: 16, seed: 0, footprint_spp: None };
+        let mut s = SamplingSettings { sampler: SamplerKind::Sobol, ..SamplingSettings::default() };
         assert_eq!((s.footprint_spp(), s.footprint()), (16, 0.25));
         for (spp, width) in [(1, 1.0), (2, 0.5_f32.sqrt()), (4, 0.5), (64, 0.125), (65, 0.125), (u32::MAX, 0.125)] {
             s.footprint_spp = Some(spp);

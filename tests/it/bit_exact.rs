@@ -119,7 +119,7 @@ fn what_a_plan_chose_gives_the_same_image_when_it_is_given() {
         // Chosen from times of this run
         let mut planned = gallery(EstimatorKind::Ris, None);
         planned.change(|s| s.integrator.ris.proposals = proposals);
-        let plan = prepare(&mut planned, Some(2), false).unwrap().unwrap();
+        let plan = prepare(&mut planned, Some(2), false).unwrap().ris.unwrap();
         assert!(
             plan.sample_counts.proposals >= plan.sample_counts.samples && plan.times.t1 > 0.0 && plan.times.t2 > 0.0
         );

@@ -19,8 +19,9 @@ pub struct Mis {
 }
 
 impl Mis {
-    pub(super) fn new(settings: &IntegratorSettings) -> Self {
-        let (samples, bsdf_fraction) = (settings.sample_counts().samples, settings.bsdf_fraction());
+    /// At a path vertex, counted from 0.
+    pub(super) fn at_vertex(settings: &IntegratorSettings, vertex: u32) -> Self {
+        let (samples, bsdf_fraction) = (settings.sample_counts_at(vertex).samples, settings.bsdf_fraction());
         Mis { samples, heuristic: settings.heuristic(), bsdf_fraction }
     }
 

@@ -85,19 +85,21 @@ impl Estimator {
         if !estimator.is_progressive() {
             return *settings;
         }
-        let samples = Some(estimator.sample_counts().samples);
+        let samples = Some(settings.sample_counts_at(1).samples);
         IntegratorSettings { estimator: EstimatorKind::Mis, samples, ..*settings }
     }
 
     fn new(settings: &IntegratorSettings, vertex: u32) -> Self {
-        let samples = settings.sample_counts().samples;
+        let samples = settings.sample_counts_at(vertex).samples;
         match settings.estimator {
             EstimatorKind::Mc => Estimator::Mc(Mc { samples }),
-            EstimatorKind::Mis => Estimator::Mis(Mis::new(settings)),
+            EstimatorKind::Auto | EstimatorKind::Mis => Estimator::Mis(Mis::at_vertex(settings, vertex)),
             EstimatorKind::Ris => Estimator::Ris(Ris::at_vertex(settings, vertex)),
-            EstimatorKind::Ocv => Estimator::Ocv(Ocv { mis: Mis::new(settings), form: settings.ocv.form }),
+            EstimatorKind::Ocv => {
+                Estimator::Ocv(Ocv { mis: Mis::at_vertex(settings, vertex), form: settings.ocv.form })
+            }
             EstimatorKind::OptimalMis => {
-                Estimator::OptimalMis(OptimalMis { mis: Mis::new(settings), form: settings.optimal_mis })
+                Estimator::OptimalMis(OptimalMis { mis: Mis::at_vertex(settings, vertex), form: settings.optimal_mis })
             }
             EstimatorKind::Correlated => {
                 let CorrelatedSettings { form, technique } = settings.correlated;

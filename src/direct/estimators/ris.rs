@@ -50,7 +50,7 @@ impl Ris {
     /// Resampling at a path vertex, counted from 0: later ones have fewer samples.
     pub(super) fn at_vertex(settings: &IntegratorSettings, vertex: u32) -> Self {
         let RisSettings { points, target, strata, .. } = settings.ris;
-        let sample_counts = settings.sample_counts().after_bounces(vertex);
+        let sample_counts = settings.sample_counts_at(vertex);
         Ris { sample_counts, heuristic: settings.heuristic(), points, target, strata }
     }
 

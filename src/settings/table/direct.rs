@@ -23,7 +23,7 @@ pub(super) const DIRECT: Group = Group {
             parameters: &["estimator"],
             key: "estimator",
             kind: choice(EstimatorKind::VARIANTS),
-            help: "Estimator of direct light at path vertices",
+            help: "Estimator of direct light at path vertices, or `auto`: what a pilot finds to be the most efficient",
             get: |s| Some(Value::Name(s.integrator.estimator.into())),
             set: |s, v| v.named().map(|kind| s.integrator.estimator = kind),
             ..Setting::BASE
@@ -40,6 +40,22 @@ pub(super) const DIRECT: Group = Group {
             resolved: Some(|s| Some(Value::Integer(s.integrator.sample_counts().samples.into()))),
             set: |s, v| {
                 s.integrator.samples = if v.name().is_some() { None } else { Some(v.count()?) };
+                Some(())
+            },
+            ..Setting::BASE
+        },
+        Setting {
+            flag: "later-samples",
+            value_name: "N",
+            parameters: &["latersamples"],
+            key: "later_samples",
+            kind: Kind::Integer { range: SAMPLES, words: &["auto"] },
+            help: "Samples per estimate at later vertices of a path than the first",
+            default: "auto: as many as at the first; ris halves them at every bounce",
+            applies: Applies::If(|s| s.integrator.depth() > 1),
+            get: |s| Some(s.integrator.later_samples.map_or(Value::Name("auto"), |n| Value::Integer(n.into()))),
+            set: |s, v| {
+                s.integrator.later_samples = if v.name().is_some() { None } else { Some(v.count()?) };
                 Some(())
             },
             ..Setting::BASE

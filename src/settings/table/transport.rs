@@ -3,8 +3,8 @@
 use super::{Directive, Group, MAX_SAMPLES, MAX_U32, Setting, choice, integer};
 use crate::bsdfs::ProposalDensity;
 use crate::lights::LightSamplerKind;
-use crate::settings::IntegratorKind;
-use crate::settings::value::{Integers, Kind, Value};
+use crate::settings::value::{Integers, Interval, Kind, Value};
+use crate::settings::{Allocation, IntegratorKind};
 use lumiris_numbers::samplers::SamplerKind;
 use strum::VariantNames;
 
@@ -117,6 +117,38 @@ pub(super) const SAMPLING: Group = Group {
             help: "Camera samples per pixel",
             get: |s| Some(Value::Integer(s.sampling.spp.into())),
             set: |s, v| v.count().map(|n| s.sampling.spp = n),
+            ..Setting::BASE
+        },
+        Setting {
+            flag: "allocation",
+            directive: Directive::Sampler,
+            parameters: &["allocation"],
+            key: "allocation",
+            kind: choice(Allocation::VARIANTS),
+            help: "Distribution of the camera samples over the pixels: as many in each, or more where a pilot finds more \
+                   noise, so that --spp is their mean. Adaptive numbers are for the integrators direct and path, from 8 \
+                   samples per pixel on",
+            default: "auto: adaptive with --estimator auto, otherwise uniform",
+            get: |s| Some(Value::Name(s.sampling.allocation.into())),
+            set: |s, v| v.named().map(|allocation| s.sampling.allocation = allocation),
+            ..Setting::BASE
+        },
+        Setting {
+            flag: "noise",
+            value_name: "X",
+            directive: Directive::Sampler,
+            parameters: &["noise"],
+            key: "noise",
+            kind: Kind::Real { range: Interval::POSITIVE, words: &["off"] },
+            help: "Standard error that every block of 16 x 16 pixels is to have, relative to its mean luminance plus 0.01, \
+                   such as 0.02. A pilot finds how many samples that takes; --spp is the maximum, 4096 if it is not given \
+                   as an option. For the integrators direct and path",
+            default: "off",
+            get: |s| Some(s.sampling.noise.map_or(Value::Name("off"), Value::Real)),
+            set: |s, v| {
+                s.sampling.noise = if v.name().is_some() { None } else { Some(v.real()?) };
+                Some(())
+            },
             ..Setting::BASE
         },
         Setting {

@@ -243,7 +243,7 @@ impl fmt::Display for Configuration {
 impl Configuration {
     fn write_estimator(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         match self.estimator {
-            EstimatorKind::Mc => {}
+            EstimatorKind::Auto | EstimatorKind::Mc => {}
             EstimatorKind::Mis => write!(f, " {}", name(self.heuristic))?,
             EstimatorKind::Ris => {
                 let (strata, points, target) = (name(self.strata), name(self.points), name(self.target));

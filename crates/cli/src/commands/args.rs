@@ -30,6 +30,9 @@ pub(super) struct SceneArgs {
     pub scene: PathBuf,
     #[command(flatten)]
     pub settings: SettingsArgs,
+    /// Choices of a plan that `lumiris plan` has stored; options override them
+    #[arg(long, value_name = "FILE")]
+    pub plan: Option<PathBuf>,
     /// Size of the image, such as 640x480 [default: the file's]
     #[arg(long, value_name = "WxH", value_parser = parse_resolution)]
     pub resolution: Option<[u32; 2]>,

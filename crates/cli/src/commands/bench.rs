@@ -41,9 +41,9 @@ pub(super) struct BenchArgs {
     #[arg(default_value = "all")]
     subject: Subject,
     #[command(flatten)]
-    pub(super) scene: SceneArgs,
+    scene: SceneArgs,
     #[command(flatten)]
-    pub(super) efficiency: EfficiencyArgs,
+    efficiency: EfficiencyArgs,
     /// Runs of the renderer and of the bare Embree loop, alternating; medians are reported
     #[arg(long, value_name = "N", default_value_t = 5, value_parser = clap::value_parser!(u32).range(1..=10_000))]
     runs: u32,
@@ -57,7 +57,7 @@ pub(super) struct BenchArgs {
 
 pub(super) fn run(args: &BenchArgs) -> anyhow::Result<ExitCode> {
     if args.subject == Subject::Efficiency {
-        let tables = efficiency(args)?;
+        let tables = efficiency(&args.scene, &args.efficiency)?;
         if let Some(path) = &args.json {
             write_text(path, &serde_json::to_string_pretty(&tables)?)
                 .with_context(|| format!("cannot write {}", path.display()))?;

@@ -1,6 +1,6 @@
 //! `lumiris bench efficiency`: scenes × settings, as one table.
 
-use super::bench::BenchArgs;
+use super::args::SceneArgs;
 use super::progress;
 use super::settings::{load_job, render_settings};
 use super::settings_args::SettingsArgs;
@@ -68,11 +68,10 @@ fn default_cases(base: &Settings) -> Vec<Case> {
 }
 
 /// Measures all scenes and prints a table of each; the answer is what goes into the JSON file.
-pub(super) fn efficiency(args: &BenchArgs) -> anyhow::Result<Value> {
-    let own = &args.efficiency;
+pub(super) fn efficiency(scene_args: &SceneArgs, own: &EfficiencyArgs) -> anyhow::Result<Value> {
     let mut tables = Vec::new();
-    for path in std::iter::once(&args.scene.scene).chain(&own.more_scenes) {
-        let mut scene = args.scene.clone();
+    for path in std::iter::once(&scene_args.scene).chain(&own.more_scenes) {
+        let mut scene = scene_args.clone();
         scene.scene.clone_from(path);
         let (mut job, _) = load_job(&scene)?;
         let base = *job.settings();

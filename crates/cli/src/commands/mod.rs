@@ -10,6 +10,8 @@ mod compare;
 mod crosscheck;
 mod generate;
 mod info;
+mod plan;
+mod plan_file;
 mod progress;
 mod render;
 mod reproduce;
@@ -31,6 +33,8 @@ struct Cli {
 enum Command {
     /// Render a scene
     Render(args::RenderArgs),
+    /// Measure what the settings of a scene leave open, and store the choices for render --plan
+    Plan(plan::PlanArgs),
     /// Compare images with a reference, by metrics and on an HTML page
     Compare(compare::CompareArgs),
     /// Compare Embree with the pure-Rust BVH, ray by ray and image by image
@@ -56,6 +60,7 @@ pub(crate) fn run() -> ExitCode {
     let cli = Cli::parse();
     let result = match &cli.command {
         Command::Render(args) => render::run(args),
+        Command::Plan(args) => plan::run(args),
         Command::Compare(args) => compare::run(args),
         Command::Crosscheck(args) => crosscheck::run(args),
         Command::Bench(args) => bench::run(args),

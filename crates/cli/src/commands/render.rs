@@ -2,6 +2,7 @@
 
 use super::UsageError;
 use super::args::RenderArgs;
+use super::plan_file::PlanFile;
 use super::progress::{self, Bar};
 use super::settings::{SetupTimes, load_job, plan, render_settings};
 use anyhow::{Context, bail};
@@ -28,7 +29,7 @@ pub(super) fn run(args: &RenderArgs) -> anyhow::Result<ExitCode> {
     let (mut job, setup) = load_job(&args.scene)?;
     let asked = asked_aovs(args)?;
     let asks_for_ratio = asked.as_ref().is_some_and(|list| list.contains(&Aov::Ratio));
-    plan(&args.scene, &mut job, asks_for_ratio, args.quiet)?;
+    let plan = plan(&args.scene, &mut job, asks_for_ratio, args.quiet)?;
     let outputs = outputs(args, &job);
     check_outputs(&outputs)?;
 
@@ -48,7 +49,7 @@ pub(super) fn run(args: &RenderArgs) -> anyhow::Result<ExitCode> {
     bar.finish();
 
     for path in &outputs {
-        write(args, &job, &rendering, asked.as_deref(), path)?;
+        write(args, (&job, &plan), &rendering, asked.as_deref(), path)?;
     }
     if let Some(path) = &args.stats {
         let text = serde_json::to_string_pretty(&stats(args, &job, &rendering, setup))?;
@@ -113,7 +114,7 @@ fn asked_aovs(args: &RenderArgs) -> anyhow::Result<Option<Vec<Aov>>> {
 
 fn write(
     args: &RenderArgs,
-    job: &RenderJob,
+    (job, plan): (&RenderJob, &PlanFile),
     rendering: &Rendering,
     asked: Option<&[Aov]>,
     path: &Path,
@@ -123,6 +124,9 @@ fn write(
     let mut metadata = output::metadata(&job.world.scene.film, job.settings());
     metadata.push(("lumiris:scene".to_owned(), args.scene.scene.display().to_string()));
     metadata.push(("lumiris:accel".to_owned(), <&str>::from(args.scene.accel).to_owned()));
+    if !plan.settings.is_empty() {
+        metadata.push(("lumiris:plan".to_owned(), plan.text()?));
+    }
     metadata.push(("lumiris:complete".to_owned(), rendering.complete.to_string()));
     let done = || film.pixels.iter().map(|p| p.count);
     let range = format!("{} to {} per pixel", done().min().unwrap_or(0), done().max().unwrap_or(0));

@@ -1,15 +1,24 @@
 //! From command-line options to a render job.
 
+use super::UsageError;
 use super::args::SceneArgs;
+use super::plan_file::PlanFile;
 use super::progress;
 use anyhow::{Context, bail};
 use lumiris::film::filter::PixelFilter;
 use lumiris::import::{LoadOptions, Loaded, load};
 use lumiris::render::RenderSettings;
+use lumiris::render::allocation::allows_adaptive;
 use lumiris::render::plan::prepare;
 use lumiris::scene::RenderJob;
-use lumiris::settings::{Proposals, SampleCounts, StageTimes};
+use lumiris::settings::table::rows;
+use lumiris::settings::{Proposals, SampleCounts, Settings, StageTimes};
+use std::fs::read_to_string;
+use std::path::Path;
 use std::time::Instant;
+
+/// Maximum number of samples per pixel with `--noise`, if none is given.
+const MAX_SPP_FOR_NOISE: u32 = 4096;
 
 /// Times before the first ray is traced (s).
 #[derive(Clone, Copy, Debug)]
@@ -34,7 +43,21 @@ fn load_scene(args: &SceneArgs) -> anyhow::Result<Loaded> {
     if !warnings.is_empty() {
         progress::say(warnings.trim_end());
     }
+    if let Some(path) = &args.plan {
+        apply_plan(path, &mut loaded.settings)?;
+    }
     args.settings.apply(&mut loaded.settings);
+    let sampling = &mut loaded.settings.sampling;
+    if sampling.noise.is_some() {
+        if !args.settings.has("spp") {
+            sampling.spp = MAX_SPP_FOR_NOISE;
+        }
+        if !allows_adaptive(&loaded.settings) {
+            let needs =
+                "--noise needs the integrator direct or path, and an estimator that does not fit blocks of samples";
+            return Err(UsageError(needs.to_owned()).into());
+        }
+    }
     if args.box_filter {
         loaded.scene.film.filter = PixelFilter::Box { rx: 0.5, ry: 0.5 };
     }
@@ -56,19 +79,41 @@ pub(super) fn load_job(args: &SceneArgs) -> anyhow::Result<(RenderJob, SetupTime
     Ok((job, SetupTimes { load, build: start.elapsed().as_secs_f64() }))
 }
 
-/// Chooses the sample counts that are still open, and prints them unless `quiet`.
-pub(super) fn plan(args: &SceneArgs, job: &mut RenderJob, ratio_map: bool, quiet: bool) -> anyhow::Result<()> {
-    let threads = args.threads.map(|t| t as usize);
-    if let (Some(plan), false) = (prepare(job, threads, ratio_map)?, quiet) {
-        let SampleCounts { samples, proposals } = plan.sample_counts;
-        let StageTimes { t1, t2 } = plan.times;
+/// Applies the choices of a plan file, which options may override.
+fn apply_plan(path: &Path, settings: &mut Settings) -> anyhow::Result<()> {
+    let text = read_to_string(path).with_context(|| format!("cannot read {}", path.display()))?;
+    let file: PlanFile = serde_json::from_str(&text).with_context(|| format!("{} is no plan", path.display()))?;
+    for (key, value) in &file.settings {
+        let row = rows().find(|row| row.key == key);
+        let row = row.with_context(|| format!("{}: there is no setting `{key}`", path.display()))?;
+        if let Err(expected) = row.set_text(settings, value) {
+            bail!("{}: `{key}`: {expected}, but found `{value}`", path.display());
+        }
+    }
+    Ok(())
+}
+
+/// Chooses what the settings leave open, and prints it unless `quiet`.
+pub(super) fn plan(args: &SceneArgs, job: &mut RenderJob, ratio_map: bool, quiet: bool) -> anyhow::Result<PlanFile> {
+    let plan = prepare(job, args.threads.map(|t| t as usize), ratio_map)?;
+    if let (Some(auto), false) = (&plan.auto, quiet) {
+        progress::say(&format!("auto: {}", auto.chosen));
+    }
+    if let (Some(ris), false) = (plan.ris, quiet) {
+        let SampleCounts { samples, proposals } = ris.sample_counts;
+        let StageTimes { t1, t2 } = ris.times;
         let is_optimal = job.settings().integrator.ris.proposals == Proposals::Optimal;
         let by_pixel = if is_optimal { ", chosen anew in each pixel" } else { "" };
         progress::say(&format!(
             "ris: {samples} of {proposals} proposals are traced{by_pixel} (a proposal takes {t1} ns, a sample {t2} ns)"
         ));
     }
-    Ok(())
+    if let (Some(of_pixels), false) = (&job.pixel_samples, quiet) {
+        let range = of_pixels.counts.iter().min().zip(of_pixels.counts.iter().max());
+        let (min, max) = range.unwrap_or((&0, &0));
+        progress::say(&format!("adaptive: {min} to {max} samples per pixel"));
+    }
+    PlanFile::new(&args.scene, &plan)
 }
 
 /// Render settings from the options.
@@ -76,7 +121,7 @@ pub(super) fn render_settings(args: &SceneArgs, job: &RenderJob) -> RenderSettin
     RenderSettings {
         threads: args.threads.map(|t| t as usize),
         tile_size: args.tile_size,
-        spp: job.settings().sampling.spp,
+        spp: job.pixel_samples.as_ref().map_or(job.settings().sampling.spp, |of_pixels| of_pixels.spp),
         ..RenderSettings::default()
     }
 }

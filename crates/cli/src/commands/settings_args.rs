@@ -13,6 +13,11 @@ pub(super) struct SettingsArgs {
 }
 
 impl SettingsArgs {
+    /// True if the option of this name is given.
+    pub(super) fn has(&self, flag: &str) -> bool {
+        self.typed.iter().any(|(row, _)| row.flag == flag)
+    }
+
     /// Parses options outside the command line of the program.
     pub(super) fn parse<'a>(words: impl Iterator<Item = &'a str>) -> Result<Self, String> {
         let command = Self::augment_args(Command::new("settings").no_binary_name(true).disable_help_flag(true));

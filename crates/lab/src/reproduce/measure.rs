@@ -120,7 +120,7 @@ impl Stage {
         self.set(&Method::ris(1, 1).lights_by(lights).stratified().strata(Strata::Systematic));
         self.job.change(|s| (s.integrator.ris.proposals, s.integrator.ris.stage_times) = (Proposals::Auto, None));
         self.shadows.store(true, Ordering::Relaxed);
-        Ok(prepare(&mut self.job, self.threads, false).map_err(RenderError::from)?.map(|plan| plan.times))
+        Ok(prepare(&mut self.job, self.threads, false).map_err(RenderError::from)?.ris.map(|ris| ris.times))
     }
 
     /// Finds the best allocation of an estimate's time to proposals and samples in each pixel, by the renderer's own

@@ -12,6 +12,7 @@
 //! [`stats`] has running moments and the tests (t, z, χ²) that check these claims.
 
 pub mod correlated;
+pub mod efficiency;
 pub mod mc;
 pub mod mis;
 pub mod ocv;

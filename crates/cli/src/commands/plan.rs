@@ -1,0 +1,54 @@
+//! `lumiris plan`: what a rendering leaves to measurements, as a file.
+
+use super::args::SceneArgs;
+use super::progress;
+use super::settings::{load_job, plan};
+use anyhow::Context;
+use clap::Args;
+use lumiris::render::auto::{AutoChoice, Trial};
+use lumiris_formats::output::write_text;
+use std::path::PathBuf;
+use std::process::ExitCode;
+
+/// `lumiris plan`
+#[derive(Args, Clone, Debug)]
+pub(super) struct PlanArgs {
+    #[command(flatten)]
+    scene: SceneArgs,
+    /// The plan (JSON), for `render --plan`
+    #[arg(short, long, value_name = "FILE")]
+    output: PathBuf,
+}
+
+pub(super) fn run(args: &PlanArgs) -> anyhow::Result<ExitCode> {
+    let (mut job, _) = load_job(&args.scene)?;
+    let file = plan(&args.scene, &mut job, false, true)?;
+    if let Ok(auto) = serde_json::from_value::<AutoChoice>(file.auto.clone()) {
+        progress::print(&table(&auto));
+    }
+    for (key, value) in &file.settings {
+        progress::print(&format!("{key} = {value}"));
+    }
+    write_text(&args.output, &serde_json::to_string_pretty(&file)?)
+        .with_context(|| format!("cannot write {}", args.output.display()))?;
+    Ok(ExitCode::SUCCESS)
+}
+
+/// The pilot's measurements.
+fn table(auto: &AutoChoice) -> String {
+    let [a, first, later] = auto.cost;
+    let [v, v_first, v_later] = auto.variance;
+    let mut text = format!(
+        "time of a camera sample (ns): {a:.0} + {first:.0} per light sample at the first vertex + {later:.0} per light sample at later ones\n\
+         relative variance: {v:.4} + {v_first:.4}/n at the first vertex + {v_later:.4}/n at later ones\n\n\
+         {:<52}{:>10}{:>12}{:>12}\n",
+        format!("{} pixels in each round", auto.pixels),
+        "ns",
+        "variance",
+        "efficiency"
+    );
+    for Trial { name, nanoseconds, variance, efficiency } in auto.trials.iter().flatten() {
+        text += &format!("{name:<52}{nanoseconds:>10.0}{variance:>12.4}{efficiency:>12.2}\n");
+    }
+    text + &format!("chosen: {}", auto.chosen)
+}

@@ -1,0 +1,129 @@
+//! How many samples are most efficient: a model of cost and variance of a path by its numbers of samples.
+//!
+//! A camera sample costs a + Σ_k b_k n_k, where n_k samples are drawn at vertices of kind k (first and later ones), and has
+//! the variance A + Σ_k B_k/n_k: A is that of the camera sample and the path, B_k/n_k what samples of lights and their
+//! visibility add. Efficiency is the inverse of the product. With one kind it is greatest for n² = (a B)/(A b), as in the
+//! choice of M and N of resampling [Talbot 2005, §4.3].
+
+/// Kinds of vertices: the first of a path, and all later ones.
+pub const KINDS: usize = 2;
+
+/// What was measured with some numbers of samples.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Measured {
+    /// n_k.
+    pub samples: [f64; KINDS],
+    /// Cost of a camera sample.
+    pub cost: f64,
+    /// Variance of a camera sample.
+    pub variance: f64,
+}
+
+/// Cost a + Σ b_k n_k and variance A + Σ B_k/n_k of a camera sample.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct Model {
+    /// a, then b_k.
+    pub cost: [f64; 1 + KINDS],
+    /// A, then B_k.
+    pub variance: [f64; 1 + KINDS],
+}
+
+impl Model {
+    /// The model through `base`, and through one measurement for each kind that has more samples of this kind only; `None`
+    /// for kinds that do not occur, which then have no part. What noise makes negative is taken as 0.
+    pub fn fit(base: &Measured, more: [Option<Measured>; KINDS]) -> Model {
+        let mut model = Model { cost: [base.cost, 0.0, 0.0], variance: [base.variance, 0.0, 0.0] };
+        for (k, more) in more.iter().enumerate() {
+            let Some(more) = more else { continue };
+            let (n0, n1) = (base.samples[k], more.samples[k]);
+            let b = ((more.cost - base.cost) / (n1 - n0)).max(0.0);
+            let v = ((base.variance - more.variance) / (1.0 / n0 - 1.0 / n1)).max(0.0);
+            model.cost[1 + k] = b;
+            model.variance[1 + k] = v;
+            model.cost[0] -= b * n0;
+            model.variance[0] -= v / n0;
+        }
+        // What a camera sample costs, and how it varies, without any light sample is not nothing
+        model.cost[0] = model.cost[0].max(FLOOR * base.cost);
+        model.variance[0] = model.variance[0].max(FLOOR * base.variance);
+        model
+    }
+
+    /// Cost of a camera sample.
+    pub fn cost(&self, samples: [f64; KINDS]) -> f64 {
+        self.cost[0] + samples.iter().zip(&self.cost[1..]).map(|(n, b)| n * b).sum::<f64>()
+    }
+
+    /// Variance of a camera sample.
+    pub fn variance(&self, samples: [f64; KINDS]) -> f64 {
+        self.variance[0] + samples.iter().zip(&self.variance[1..]).map(|(n, v)| v / n).sum::<f64>()
+    }
+
+    /// 1/(variance × cost).
+    pub fn efficiency(&self, samples: [f64; KINDS]) -> f64 {
+        1.0 / (self.variance(samples) * self.cost(samples))
+    }
+
+    /// The most efficient numbers among `choices` of each kind. At equal efficiency the first choices are taken.
+    pub fn best(&self, choices: [&[u32]; KINDS]) -> [u32; KINDS] {
+        let mut best = ([1; KINDS], f64::NEG_INFINITY);
+        for &first in choices[0] {
+            for &later in choices[1] {
+                let efficiency = self.efficiency([first, later].map(f64::from));
+                if efficiency > best.1 {
+                    best = ([first, later], efficiency);
+                }
+            }
+        }
+        best.0
+    }
+}
+
+/// Smallest share of what was measured that remains without light samples: a model that noise leaves with less would ask
+/// for numbers beyond all measure.
+const FLOOR: f64 = 0.02;
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    const TRUTH: Model = Model { cost: [100.0, 10.0, 40.0], variance: [2.0, 5.0, 0.5] };
+
+    fn measured(samples: [f64; KINDS]) -> Measured {
+        Measured { samples, cost: TRUTH.cost(samples), variance: TRUTH.variance(samples) }
+    }
+
+    #[test]
+    fn a_model_is_recovered_from_three_measurements() {
+        let model = Model::fit(&measured([1.0, 1.0]), [[7.0, 1.0], [1.0, 7.0]].map(|n| Some(measured(n))));
+        for (found, truth) in model.cost.iter().chain(&model.variance).zip(TRUTH.cost.iter().chain(&TRUTH.variance)) {
+            assert!((found / truth - 1.0).abs() < 1e-12, "{model:?}");
+        }
+    }
+
+    #[test]
+    fn the_best_numbers_are_those_of_the_closed_form() {
+        let direct = Model { cost: [90.0, 10.0, 0.0], variance: [1.0, 16.0, 0.0] };
+        // n² = (90 · 16)/(1 · 10) = 144
+        let choices: Vec<u32> = (1..=64).collect();
+        assert_eq!(direct.best([&choices, &[1]]), [12, 1]);
+        let found = TRUTH.best([&choices, &choices]);
+        let best = TRUTH.efficiency(found.map(f64::from));
+        for first in &choices {
+            for later in &choices {
+                assert!(TRUTH.efficiency([*first, *later].map(f64::from)) <= best);
+            }
+        }
+    }
+
+    #[test]
+    fn noise_gives_no_negative_parts() {
+        let base = Measured { samples: [1.0, 1.0], cost: 10.0, variance: 1.0 };
+        let worse = Measured { samples: [7.0, 1.0], cost: 9.0, variance: 1.2 };
+        let all = Measured { samples: [1.0, 7.0], cost: 100.0, variance: 0.01 };
+        let model = Model::fit(&base, [Some(worse), Some(all)]);
+        assert_eq!((model.cost[1], model.variance[1]), (0.0, 0.0));
+        assert!(model.cost[0] > 0.0 && model.variance[0] > 0.0, "{model:?}");
+        assert_eq!(Model::fit(&base, [None, None]).cost([5.0, 5.0]), 10.0);
+    }
+}

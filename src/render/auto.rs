@@ -1,0 +1,370 @@
+//! The estimator `auto`: what is the most efficient for this image, by a pilot.
+//!
+//! Blocks of pixels spread over the image are rendered with several settings, each with two independent seeds. Half the
+//! squared difference of the two is the variance, relative to the squared mean, and the time of the thread is the cost. From
+//! few and from many samples at first and at later vertices follows a model of both ([`Model`]), and from that the best
+//! numbers. What is best by the model then takes part in a second round on other blocks, together with what differs in more
+//! than numbers, and the most efficient there is chosen.
+//!
+//! Times differ from run to run, so the choice is made once, becomes part of the settings, and is recorded with them:
+//! rendering with these settings gives the same image to the bit. All candidates are unbiased, and the pilot has random
+//! numbers of its own; so the choice adds no bias.
+
+use super::worker::Worker;
+use super::{RenderSettings, Run, position};
+use crate::film::PixelBounds;
+use crate::imaging::metrics::difference::DEFAULT_EPSILON;
+use crate::integrators::PathTracer;
+use crate::integrators::path::CameraSample;
+use crate::scene::RenderJob;
+use crate::settings::{EstimatorKind, IntegratorKind, IntegratorSettings, Proposals, Settings};
+use lumiris_numbers::estimators::efficiency::{Measured, Model};
+use lumiris_numbers::math::hash::{pcg4d, unit_f32};
+use rayon::prelude::*;
+use rustix::time::{ClockId, clock_gettime};
+use serde::{Deserialize, Serialize};
+use std::sync::atomic::AtomicBool;
+
+/// Edge of a block of pixels that are rendered together.
+const BLOCK: u32 = 2;
+/// Samples of a pixel and seed: with fewer, what the net of samples gains would not be seen.
+const SPP: u32 = 8;
+/// Blocks that a thread renders at a time.
+const CHUNK: usize = 64;
+/// Blocks of a round at most: variances are then known to some percent.
+const MAX_BLOCKS: usize = 4096;
+/// Fewest blocks of a round for which a choice is more than chance.
+const MIN_BLOCKS: usize = 48;
+/// Time of both rounds, as a fraction of that of the image.
+const FRACTION: f64 = 0.03;
+/// Time of both rounds over that of rendering their pixels once, with the same number of samples and seeds: in direct light,
+/// and in paths.
+const TRIALS: [f64; 2] = [10.0, 16.0];
+/// Combined with the seed of the image and the number of the round.
+const SEED: u32 = 0x61_75_74_6f;
+/// By how much a choice must be more efficient than what takes its place without a pilot.
+const MIN_GAIN: f64 = 1.03;
+
+/// Numbers of samples that are compared where light is direct: a quarter are BSDF samples.
+const DIRECT: [u32; 9] = [2, 4, 8, 12, 16, 24, 32, 48, 64];
+/// In paths, one is the BSDF sample by which the path goes on: numbers at first vertices, and at later ones.
+const FIRST: [u32; 11] = [2, 3, 4, 6, 8, 10, 12, 16, 24, 32, 48];
+const LATER: [u32; 8] = [2, 3, 4, 5, 6, 8, 12, 16];
+/// Samples from which the model is fitted: few and many, in direct light and in paths.
+const FIT_DIRECT: [u32; 2] = [4, 16];
+const FIT_PATH: [u32; 2] = [2, 8];
+
+/// Settings that took part, and what was measured of them.
+#[derive(Clone, Debug, PartialEq, Deserialize, Serialize)]
+pub struct Trial {
+    /// What they are.
+    pub name: String,
+    /// Processor time of a camera sample (ns).
+    pub nanoseconds: f64,
+    /// Relative variance of a camera sample, at [`SPP`] samples per pixel.
+    pub variance: f64,
+    /// 1/(variance × time), relative to the first trial of the round.
+    pub efficiency: f64,
+}
+
+/// What the pilot measured and chose.
+#[derive(Clone, Debug, PartialEq, Deserialize, Serialize)]
+pub struct AutoChoice {
+    /// Pixels of a round.
+    pub pixels: usize,
+    /// The model: time a, b_first, b_later of a camera sample (ns), per light sample.
+    pub cost: [f64; 3],
+    /// The model: relative variance A, B_first, B_later.
+    pub variance: [f64; 3],
+    /// The trials of both rounds.
+    pub trials: [Vec<Trial>; 2],
+    /// The chosen one of the second round.
+    pub chosen: String,
+}
+
+/// Chooses, where the settings of `job` ask for it, and changes them; `None` if they do not, or if the image is too small
+/// for a pilot. On the threads of the current pool.
+pub(super) fn choose(job: &mut RenderJob) -> Option<AutoChoice> {
+    if job.settings().integrator.estimator != EstimatorKind::Auto {
+        return None;
+    }
+    let pilot = Pilot::new(job);
+    let choice = pilot.map(|pilot| pilot.choose(job));
+    let settings = choice.as_ref().map_or(without_pilot(&job.settings().integrator), |(_, settings)| *settings);
+    job.change(|s| s.integrator = settings);
+    choice.map(|(choice, _)| choice)
+}
+
+/// The settings where nothing can be measured.
+fn without_pilot(settings: &IntegratorSettings) -> IntegratorSettings {
+    IntegratorSettings { estimator: EstimatorKind::Mis, ..*settings }
+}
+
+/// `mis` with these numbers of samples, where they are open.
+fn with_samples(settings: &IntegratorSettings, [first, later]: [u32; 2]) -> IntegratorSettings {
+    let base = without_pilot(settings);
+    IntegratorSettings {
+        samples: base.samples.or(Some(first)),
+        later_samples: if base.depth() > 1 { base.later_samples.or(Some(later)) } else { base.later_samples },
+        // One BSDF sample of any number of samples
+        bsdf_fraction: if base.depth() > 1 { base.bsdf_fraction.or(Some(0.0)) } else { base.bsdf_fraction },
+        ..base
+    }
+}
+
+/// `ris` with its default numbers, where they are open.
+fn resampled(settings: &IntegratorSettings) -> IntegratorSettings {
+    let mut ris = IntegratorSettings { estimator: EstimatorKind::Ris, ..*settings };
+    let counts = ris.sample_counts();
+    ris.samples = Some(counts.samples);
+    ris.ris.proposals = Proposals::Fixed(counts.proposals);
+    ris
+}
+
+/// Where a round measures.
+struct Pilot {
+    /// Blocks of both rounds.
+    blocks: [Vec<PixelBounds>; 2],
+    seed: u32,
+}
+
+/// A candidate.
+struct Candidate {
+    name: String,
+    settings: IntegratorSettings,
+}
+
+impl Pilot {
+    /// `None` if the image is too small, or its integrator has no estimates at path vertices alone.
+    fn new(job: &RenderJob) -> Option<Self> {
+        let Settings { integrator, sampling } = job.settings();
+        let bounds = job.world.scene.film.bounds;
+        let samples = bounds.area() as f64 * f64::from(sampling.spp) * FRACTION;
+        let per_block = f64::from(2 * SPP * BLOCK * BLOCK) * TRIALS[usize::from(integrator.depth() > 1)];
+        let count = ((samples / per_block) as usize).min(MAX_BLOCKS);
+        let is_measurable = matches!(integrator.kind, IntegratorKind::Direct | IntegratorKind::Path);
+        (is_measurable && count >= MIN_BLOCKS)
+            .then(|| Pilot { blocks: [0, 1].map(|round| blocks(&bounds, count, round)), seed: sampling.seed })
+    }
+
+    fn choose(&self, job: &RenderJob) -> (AutoChoice, IntegratorSettings) {
+        let base = &job.settings().integrator;
+        // First round: the model
+        let has_later = base.depth() > 1;
+        let [few, many] = if has_later { FIT_PATH } else { FIT_DIRECT };
+        let mut numbers = vec![[few, few], [many, few]];
+        if has_later {
+            numbers.push([few, many]);
+        }
+        let candidates: Vec<Candidate> = numbers.iter().map(|&n| Candidate::named(with_samples(base, n))).collect();
+        let trials = self.round(job, &candidates, 0);
+        let of_light = |n: u32| if has_later { n - 1 } else { n };
+        let measured = |i: usize| Measured {
+            samples: numbers[i].map(|n| f64::from(of_light(n))),
+            cost: trials[i].nanoseconds,
+            variance: trials[i].variance,
+        };
+        let model = Model::fit(&measured(0), [Some(measured(1)), has_later.then(|| measured(2))]);
+        let light = |numbers: &[u32]| numbers.iter().map(|&n| of_light(n)).collect::<Vec<_>>();
+        let choices = if has_later { [light(&FIRST), light(&LATER)] } else { [light(&DIRECT), vec![few]] };
+        let best = model.best(choices.each_ref().map(Vec::as_slice)).map(|n| if has_later { n + 1 } else { n });
+
+        // Second round: the best by the model, and what else there is
+        let candidates = Candidate::of_second_round(base, best);
+        let second = self.round(job, &candidates, 1);
+        let chosen = most_efficient(&second);
+        let choice = AutoChoice {
+            pixels: self.blocks[0].iter().map(PixelBounds::area).sum(),
+            cost: model.cost,
+            variance: model.variance,
+            chosen: second[chosen].name.clone(),
+            trials: [trials, second],
+        };
+        (choice, candidates[chosen].settings)
+    }
+
+    /// Measures all candidates on the blocks of a round.
+    fn round(&self, job: &RenderJob, candidates: &[Candidate], round: usize) -> Vec<Trial> {
+        let (render, stop) = (RenderSettings::default(), AtomicBool::new(false));
+        let run = Run::new(job, &render, &stop, &|_| ());
+        let seeds = [0, 1].map(|k| pcg4d([self.seed, SEED, round as u32, k])[0]);
+        let chunks: Vec<_> = self.blocks[round].chunks(CHUNK).enumerate().collect();
+        let measured: Vec<Vec<[f64; 2]>> =
+            chunks.into_par_iter().map(|(i, blocks)| measure(&run, blocks, candidates, seeds, i)).collect();
+        let samples = self.blocks[round].iter().map(PixelBounds::area).sum::<usize>() as f64 * f64::from(2 * SPP);
+        let sum = |k: usize, of: usize| measured.iter().map(|chunk| chunk[k][of]).sum::<f64>();
+        // The variance of the mean of a pixel, times its samples
+        let numbers = |k: usize| (sum(k, 0) / samples, sum(k, 1) / samples * f64::from(2 * SPP * SPP));
+        let efficiency = |(ns, variance): (f64, f64)| if variance > 0.0 { 1.0 / (ns * variance) } else { 0.0 };
+        let base = efficiency(numbers(0));
+        let trial = |(k, candidate): (usize, &Candidate)| {
+            let (nanoseconds, variance) = numbers(k);
+            let relative = if base > 0.0 { efficiency((nanoseconds, variance)) / base } else { 1.0 };
+            Trial { name: candidate.name.clone(), nanoseconds, variance, efficiency: relative }
+        };
+        candidates.iter().enumerate().map(trial).collect()
+    }
+}
+
+impl Candidate {
+    fn named(settings: IntegratorSettings) -> Self {
+        let kind = <&str>::from(settings.estimator);
+        let numbers = [0, 1].map(|vertex| settings.sample_counts_at(vertex).samples);
+        let mut name = format!("{kind} {}", numbers[0]);
+        if settings.depth() > 1 {
+            name += &format!(", {} later", numbers[1]);
+            let roulette = settings.roulette_depth.map_or("off".to_owned(), |n| n.to_string());
+            name += &format!(", roulette {roulette}");
+        }
+        if settings.estimator == EstimatorKind::Ris {
+            name += &format!(" of {}", settings.sample_counts().proposals);
+        }
+        if settings.estimator == EstimatorKind::Mis {
+            name += &format!(", BSDF fraction {}", settings.bsdf_fraction());
+        }
+        Candidate { name, settings }
+    }
+
+    /// What is done without a pilot, the best numbers of `mis`, and these with another setting each. None twice.
+    fn of_second_round(base: &IntegratorSettings, best: [u32; 2]) -> Vec<Self> {
+        let chosen = with_samples(base, best);
+        let mut all = vec![without_pilot(base), chosen];
+        if chosen.bsdf_fraction != base.bsdf_fraction && best[0].max(best[1]) > 4 {
+            all.push(IntegratorSettings { bsdf_fraction: None, ..chosen });
+        }
+        if base.depth() > 1 && base.roulette_depth.is_some_and(|first| first < base.depth()) {
+            all.push(IntegratorSettings { roulette_depth: None, ..chosen });
+        }
+        all.push(resampled(base));
+        let mut candidates: Vec<Candidate> = Vec::new();
+        for settings in all {
+            if candidates.iter().all(|c| c.settings != settings) {
+                candidates.push(Candidate::named(settings));
+            }
+        }
+        candidates
+    }
+}
+
+/// The index of the most efficient trial; the first one unless another is better by [`MIN_GAIN`].
+fn most_efficient(trials: &[Trial]) -> usize {
+    let best = (0..trials.len()).max_by(|&a, &b| trials[a].efficiency.total_cmp(&trials[b].efficiency)).unwrap_or(0);
+    if trials[best].efficiency >= MIN_GAIN * trials[0].efficiency { best } else { 0 }
+}
+
+/// Blocks of pixels, one in each cell of a grid, at a place that depends on the round.
+fn blocks(bounds: &PixelBounds, count: usize, round: u32) -> Vec<PixelBounds> {
+    let (width, height) = (bounds.width().max(BLOCK), bounds.height().max(BLOCK));
+    let aspect = f64::from(width) / f64::from(height);
+    let columns = ((count as f64 * aspect).sqrt().round() as u32).clamp(1, width / BLOCK);
+    let rows = (count as u32 / columns).clamp(1, height / BLOCK);
+    let place = |k: u32, cells: u32, size: u32, u: f32| {
+        let [start, end] = [k, k + 1].map(|k| u64::from(k) * u64::from(size) / u64::from(cells)).map(|x| x as u32);
+        start + ((end - start - BLOCK.min(end - start)) as f32 * u) as u32
+    };
+    let block = |row: u32, column: u32| {
+        let h = pcg4d([row, column, SEED, round]);
+        let (x, y) = (place(column, columns, width, unit_f32(h[0])), place(row, rows, height, unit_f32(h[1])));
+        let (x0, y0) = (bounds.x0 + x, bounds.y0 + y);
+        PixelBounds { x0, y0, x1: (x0 + BLOCK).min(bounds.x1), y1: (y0 + BLOCK).min(bounds.y1) }
+    };
+    (0..rows).flat_map(|row| (0..columns).map(move |column| block(row, column))).collect()
+}
+
+/// Renders some blocks with each candidate and seed: of each candidate, processor time (ns), and the sum over pixels of the
+/// relative variance of a pixel's mean. The `turn` decides which candidate is first.
+fn measure(
+    run: &Run<'_>,
+    blocks: &[PixelBounds],
+    candidates: &[Candidate],
+    seeds: [u32; 2],
+    turn: usize,
+) -> Vec<[f64; 2]> {
+    let mut worker = Worker::new(PathTracer::new(false));
+    let pixels: Vec<[u32; 2]> = blocks.iter().flat_map(|b| (0..b.area() as u32).map(move |i| position(b, i))).collect();
+    let mut times = vec![0.0; candidates.len()];
+    let mut images = vec![[(); 2].map(|()| Vec::<[f64; 3]>::new()); candidates.len()];
+    for k in 0..candidates.len() {
+        let k = (k + turn) % candidates.len();
+        let settings = &candidates[k].settings;
+        let sample_counts = settings.sample_counts();
+        let start = thread_nanoseconds();
+        for (image, seed) in images[k].iter_mut().zip(seeds) {
+            worker.samples.clear();
+            let samples = pixels.iter().map(|&pixel| (0, pixel, 0..SPP));
+            run.camera.samples(samples, seed, &mut worker.scratch, &mut worker.samples);
+            worker.samples.iter_mut().for_each(|s| *s = CameraSample { sample_counts, direct: s.stream, ..*s });
+            let out = &mut worker.results;
+            worker.tracer.trace(run.job, settings, &worker.samples, &mut Default::default(), out);
+            image.extend(out.chunks(SPP as usize).map(|samples| {
+                let sum = |c: usize| samples.iter().map(|s| f64::from(s.radiance.to_array()[c])).sum::<f64>();
+                [0, 1, 2].map(|c| sum(c) / f64::from(SPP))
+            }));
+        }
+        times[k] = thread_nanoseconds() - start;
+    }
+    let all = || images.iter().flatten();
+    let count = all().count() as f64;
+    let variance = |[a, b]: &[Vec<[f64; 3]>; 2]| {
+        let of_pixel = |i: usize| {
+            let of_channel = |c: usize| {
+                let mean = all().map(|image| image[i][c]).sum::<f64>() / count;
+                0.5 * (a[i][c] - b[i][c]).powi(2) / (mean * mean + DEFAULT_EPSILON)
+            };
+            Some((0..3).map(of_channel).sum::<f64>()).filter(|v| v.is_finite()).unwrap_or(0.0)
+        };
+        (0..pixels.len()).map(of_pixel).sum::<f64>()
+    };
+    times.into_iter().zip(&images).map(|(time, images)| [time, variance(images)]).collect()
+}
+
+/// Processor time of this thread (ns).
+fn thread_nanoseconds() -> f64 {
+    let t = clock_gettime(ClockId::ThreadCPUTime);
+    t.tv_sec as f64 * 1e9 + t.tv_nsec as f64
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn blocks_lie_inside_the_image_and_apart() {
+        let bounds = PixelBounds { x0: 10, x1: 210, y0: 5, y1: 105 };
+        for round in 0..2 {
+            let blocks = blocks(&bounds, 100, round);
+            assert!((80..=120).contains(&blocks.len()), "{}", blocks.len());
+            let mut seen = std::collections::HashSet::new();
+            for b in &blocks {
+                assert!(b.x0 >= bounds.x0 && b.x1 <= bounds.x1 && b.y0 >= bounds.y0 && b.y1 <= bounds.y1);
+                assert_eq!(b.area(), 4);
+                assert!((0..4).all(|i| seen.insert(position(b, i))), "blocks overlap");
+            }
+        }
+        assert_ne!(blocks(&bounds, 100, 0), blocks(&bounds, 100, 1));
+        let tiny = blocks(&PixelBounds { x0: 0, x1: 2, y0: 0, y1: 1 }, 100, 0);
+        assert_eq!(tiny, [PixelBounds { x0: 0, x1: 2, y0: 0, y1: 1 }]);
+    }
+
+    #[test]
+    fn what_the_user_has_set_stays() {
+        let base = IntegratorSettings { samples: Some(5), bsdf_fraction: Some(0.3), ..IntegratorSettings::default() };
+        for candidate in Candidate::of_second_round(&base, [16, 3]) {
+            let s = candidate.settings;
+            assert_eq!((s.samples, s.bsdf_fraction), (Some(5), Some(0.3)), "{}", candidate.name);
+        }
+        let open = IntegratorSettings::default();
+        let candidates = Candidate::of_second_round(&open, [16, 3]);
+        let chosen = &candidates[1].settings;
+        assert_eq!([0, 1].map(|vertex| chosen.sample_counts_at(vertex).samples), [16, 3]);
+        let names: std::collections::HashSet<&str> = candidates.iter().map(|c| c.name.as_str()).collect();
+        assert_eq!(names.len(), candidates.len(), "{names:?}");
+    }
+
+    #[test]
+    fn a_gain_within_the_noise_changes_nothing() {
+        let trial = |efficiency| Trial { name: String::new(), nanoseconds: 1.0, variance: 1.0, efficiency };
+        assert_eq!(most_efficient(&[trial(1.0), trial(1.02)]), 0);
+        assert_eq!(most_efficient(&[trial(1.0), trial(1.2), trial(1.1)]), 1);
+    }
+}

@@ -1,0 +1,184 @@
+//! Camera samples where they are needed: the numbers are independent of the samples that they count, and of threads.
+
+use lumiris::film::{Film, PixelSums};
+use lumiris::import::{LoadOptions, load};
+use lumiris::lights::LightSamplerKind;
+use lumiris::render::plan::prepare;
+use lumiris::render::{RenderSettings, render};
+use lumiris::scene::{AccelKind, PixelSamples, RenderJob};
+use lumiris::settings::{Allocation, EstimatorKind, IntegratorKind, Settings};
+use lumiris_numbers::estimators::stats::{Welford, z_test};
+use lumiris_numbers::math::luminance;
+use std::path::Path;
+use std::sync::atomic::AtomicBool;
+
+fn gallery(change: impl FnOnce(&mut Settings)) -> RenderJob {
+    let path = Path::new(env!("CARGO_MANIFEST_DIR")).join("scenes/demo/gallery.pbrt");
+    let options = LoadOptions { resolution: Some([96, 54]), ..LoadOptions::default() };
+    let mut loaded = load(&path, &options).map_err(|d| d.to_string()).unwrap();
+    loaded.settings.sampling.spp = 16;
+    loaded.settings.integrator.kind = IntegratorKind::Direct;
+    loaded.settings.integrator.estimator = EstimatorKind::Mis;
+    change(&mut loaded.settings);
+    loaded.job(AccelKind::Embree, None).unwrap()
+}
+
+/// The film, with the numbers of samples that were decided on.
+fn rendered(job: &mut RenderJob, threads: usize, tile_size: u32) -> (Film, PixelSamples) {
+    prepare(job, Some(threads), false).unwrap();
+    let samples = job.pixel_samples.clone().expect("numbers that differ");
+    let settings = RenderSettings {
+        threads: Some(threads),
+        tile_size,
+        spp: samples.spp,
+        with_replicas: true,
+        ..Default::default()
+    };
+    let rendering = render(job, &settings, &AtomicBool::new(false), &|_| ()).unwrap();
+    assert!(rendering.complete);
+    (rendering.film, samples)
+}
+
+#[test]
+fn adaptive_images_have_the_samples_they_ask_for_and_do_not_depend_on_threads_or_tiles() {
+    for noise in [None, Some(0.2)] {
+        let job = || {
+            let mut job = lottery(48, ("spot\" \"float coneangle\" 8", 4.0), 4);
+            job.change(|s| {
+                s.sampling.allocation = Allocation::Adaptive;
+                s.sampling.noise = noise;
+                s.sampling.spp = if noise.is_some() { 400 } else { 64 };
+            });
+            job
+        };
+        let (film, samples) = rendered(&mut job(), 1, 16);
+        let (min, max) = (samples.counts.iter().min().unwrap(), samples.counts.iter().max().unwrap());
+        assert!(max > &(2 * min), "{min} to {max}");
+        assert!(film.pixels.iter().zip(&samples.counts).all(|(p, &n)| p.count == u64::from(n)));
+        assert!(film.replicas.iter().all(|r| r.count == film.pixels[r.pixel as usize].count));
+        if noise.is_none() {
+            let mean = samples.total() as f64 / film.pixels.len() as f64;
+            assert!((32.0..128.0).contains(&mean), "the time is that of 64: {mean}");
+        }
+        let bits = |film: &Film| film.pixels.iter().map(|p| p.radiance.map(f64::to_bits)).collect::<Vec<_>>();
+        for (threads, tile_size) in [(3, 16), (2, 7)] {
+            let (other, again) = rendered(&mut job(), threads, tile_size);
+            assert_eq!(samples, again);
+            assert!(bits(&film) == bits(&other), "{threads} threads, tiles of {tile_size}");
+        }
+    }
+}
+
+#[test]
+fn integrators_that_share_noise_and_estimators_that_fit_blocks_have_uniform_numbers() {
+    let changes: [fn(&mut Settings); 3] = [
+        |s| s.integrator.kind = IntegratorKind::IrradianceCache,
+        |s| s.integrator.estimator = EstimatorKind::OptimalMis,
+        |s| s.sampling.spp = 4,
+    ];
+    for change in changes {
+        let mut job = gallery(|s| {
+            s.sampling.allocation = Allocation::Adaptive;
+            change(s);
+        });
+        prepare(&mut job, Some(2), false).unwrap();
+        assert_eq!(job.pixel_samples, None);
+    }
+}
+
+/// A floor below some lights, of which one has a kind and a power of its own: chosen uniformly, it is rare. An image of
+/// `size` × `size` pixels.
+fn lottery(size: u32, other: (&str, f64), lights: u32) -> RenderJob {
+    let mut text = r#"
+LookAt 0 2 0  0 0 0  0 0 1
+Camera "perspective" "float fov" 40
+Film "rgb" "integer xresolution" SIZE "integer yresolution" SIZE
+Integrator "direct" "string estimator" "mc" "integer samples" 1
+Sampler "independent"
+WorldBegin
+Material "diffuse" "rgb reflectance" [ 0.5 0.5 0.5 ]
+Shape "bilinearmesh" "point3 P" [ -2 0 -2  2 0 -2  -2 0 2  2 0 2 ]
+"#
+    .replace("SIZE", &size.to_string());
+    for i in 0..lights {
+        let (kind, power) = if i == lights / 2 { other } else { ("point\"", 1.0) };
+        text += &format!(
+            "LightSource \"{kind} \"rgb I\" [ 1 1 1 ] \"float scale\" {power} \"point3 from\" [ {0} 3 {1} ]{2}\n",
+            0.1 * f64::from(i % 8),
+            0.1 * f64::from(i / 8),
+            if kind.starts_with("spot") { " \"point3 to\" [ 0 0 0 ]" } else { "" }
+        );
+    }
+    let folder = tempfile::tempdir().unwrap();
+    let path = folder.path().join("lottery.pbrt");
+    std::fs::write(&path, text).unwrap();
+    let mut loaded = load(&path, &LoadOptions::default()).map_err(|d| d.to_string()).unwrap();
+    loaded.settings.integrator.light_sampler = LightSamplerKind::Uniform;
+    loaded.job(AccelKind::Embree, None).unwrap()
+}
+
+fn mean(pixels: &[PixelSums]) -> f64 {
+    pixels.iter().map(|p| luminance(p.mean())).sum::<f64>() / pixels.len() as f64
+}
+
+/// Samples from `first` on of the whole image.
+fn part(job: &RenderJob, first_sample: u32, spp: u32) -> Film {
+    let settings = RenderSettings { threads: Some(1), first_sample, spp, ..Default::default() };
+    render(job, &settings, &AtomicBool::new(false), &|_| ()).unwrap().film
+}
+
+/// What must not be done: samples until their own noise is below the threshold.
+fn stopped_by_its_own_samples(job: &RenderJob, threshold: f64, limit: u32) -> f64 {
+    let mut film = part(job, 0, 2);
+    loop {
+        let count = film.pixels[0].count as u32;
+        let own = film.pixels.iter().map(|p| luminance(p.variance_of_mean())).sum::<f64>() / film.pixels.len() as f64;
+        if own.sqrt() / (mean(&film.pixels) + 0.01) < threshold || count >= limit {
+            return mean(&film.pixels);
+        }
+        for (sum, more) in film.pixels.iter_mut().zip(&part(job, count, count).pixels) {
+            sum.count += more.count;
+            for c in 0..3 {
+                sum.radiance[c] += more.radiance[c];
+                sum.radiance_squared[c] += more.radiance_squared[c];
+            }
+        }
+    }
+}
+
+#[test]
+fn numbers_of_samples_add_no_bias() {
+    const RUNS: u32 = 2000;
+    const THRESHOLD: f32 = 0.9;
+    let mut job = lottery(4, ("point\"", 400.0), 64);
+    job.change(|s| s.sampling.spp = 256);
+    // The truth: the same lights by their power, which has hardly any variance
+    let mut exact = lottery(4, ("point\"", 400.0), 64);
+    exact.change(|s| s.integrator.light_sampler = LightSamplerKind::Power);
+    let truth = mean(&part(&exact, 0, 4096).pixels);
+
+    let (mut noise, mut adaptive, mut wrong) = (Welford::default(), Welford::default(), Welford::default());
+    let mut numbers = std::collections::BTreeSet::new();
+    for seed in 0..RUNS {
+        job.change(|s| {
+            (s.sampling.seed, s.sampling.noise, s.sampling.spp) = (seed, Some(THRESHOLD), 256);
+        });
+        let (film, samples) = rendered(&mut job, 1, 16);
+        numbers.extend(samples.counts);
+        noise.add(mean(&film.pixels));
+
+        job.change(|s| (s.sampling.noise, s.sampling.allocation, s.sampling.spp) = (None, Allocation::Adaptive, 16));
+        prepare(&mut job, Some(1), false).unwrap();
+        adaptive.add(mean(&part(&job, 0, 16).pixels));
+        job.pixel_samples = None;
+        if seed < RUNS / 4 {
+            wrong.add(stopped_by_its_own_samples(&job, f64::from(THRESHOLD), 256));
+        }
+    }
+    assert!(numbers.len() > 4, "the numbers vary: {numbers:?}");
+    let z = |of: &Welford| z_test(of.mean(), truth, of.standard_error()).statistic;
+    assert!(z(&noise).abs() < 3.0, "--noise: {} instead of {truth}, z = {}", noise.mean(), z(&noise));
+    assert!(z(&adaptive).abs() < 3.0, "adaptive: {} instead of {truth}, z = {}", adaptive.mean(), z(&adaptive));
+    // A quarter of the runs suffices to find the bias of samples that decide on their own number
+    assert!(z(&wrong) < -5.0, "{} instead of {truth}, z = {}", wrong.mean(), z(&wrong));
+}
