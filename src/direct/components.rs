@@ -2,7 +2,7 @@
 //! component of it at each sample, and sums of normal equations over them.
 
 use super::candidates::{Candidates, Drawn, SampleAllocation};
-use super::mixture::{Mixture, draw_groups};
+use super::mixture::{Mixture, draw_groups, draw_together};
 use super::point::ShadingPoint;
 use super::shadow_segments::Segments;
 use super::t1::T1;
@@ -32,6 +32,20 @@ impl Components {
         self.mixtures.clear();
         t1.draw_lights(&allocate, |job, at, allocation, records| {
             self.mixtures.push(draw_groups(job, at, allocation, records));
+            allocation.light_draws
+        });
+        t1.draw_bsdf(allocate, &mut self.mixtures);
+    }
+
+    /// T1: light and BSDF samples as `mis` draws them.
+    pub(super) fn propose_together(
+        &mut self,
+        t1: &mut T1<'_>,
+        allocate: impl Fn(&ShadingPoint<'_>) -> SampleAllocation,
+    ) {
+        self.mixtures.clear();
+        t1.draw_lights(&allocate, |job, at, allocation, records| {
+            self.mixtures.push(draw_together(job, at, allocation, records));
             allocation.light_draws
         });
         t1.draw_bsdf(allocate, &mut self.mixtures);

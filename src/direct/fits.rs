@@ -1,4 +1,4 @@
-//! Coefficients that progressive estimators fit to earlier estimates.
+//! What estimators keep of a pixel: coefficients fitted to its earlier estimates, or the sums of its control variates.
 
 use lumiris_numbers::estimators::ocv::NormalEquations;
 
@@ -15,6 +15,24 @@ pub struct Fits {
     solver: Solver,
     sums: Vec<f32>,
     beta: Vec<f32>,
+    controls: Controls,
+}
+
+/// Sums over all estimates of a pixel: of their values, by channel, and of their control variates, which have the
+/// expectation 0. Both are weighted as samples of the film are.
+#[derive(Clone, Debug, Default)]
+struct Controls {
+    components: usize,
+    sums: Vec<f64>,
+    /// Those of the batch that is being traced, by camera sample.
+    batch: Vec<f32>,
+}
+
+impl Controls {
+    fn row(&self, index: usize) -> std::ops::Range<usize> {
+        let len = 3 + self.components;
+        index * len..(index + 1) * len
+    }
 }
 
 impl Default for Fits {
@@ -27,7 +45,54 @@ impl Fits {
     /// `count` fits without samples.
     pub(super) fn new(equations: NormalEquations, solver: Solver, count: usize) -> Self {
         let [sums, beta] = [equations.len(), equations.coefficients()].map(|len| vec![0.0; count * len]);
-        Fits { equations, solver, sums, beta }
+        Fits { equations, solver, sums, beta, controls: Controls::default() }
+    }
+
+    /// Sums of values and of `components` control variates without estimates, of `count` pixels.
+    pub(super) fn of_pixels(components: usize, count: usize) -> Self {
+        let controls = Controls { components, sums: vec![0.0; count * (3 + components)], batch: Vec::new() };
+        Fits { controls, ..Fits::default() }
+    }
+
+    /// Begins a batch of camera samples.
+    pub(crate) fn begin_batch(&mut self, samples: usize) {
+        if !self.controls.sums.is_empty() {
+            self.controls.batch.clear();
+            self.controls.batch.resize(samples * (3 + self.controls.components), 0.0);
+        }
+    }
+
+    /// Sets the value of the estimate of a camera sample of the batch and its controls, if there are sums of controls.
+    pub(crate) fn set_controls(&mut self, sample: u32, value: [f32; 3], controls: &[f32]) {
+        if !self.controls.batch.is_empty() && value.iter().chain(controls).all(|v| v.is_finite()) {
+            let row = self.controls.row(sample as usize);
+            self.controls.batch[row].iter_mut().zip(value.iter().chain(controls)).for_each(|(to, v)| *to = *v);
+        }
+    }
+
+    /// Adds the estimates of the batch to the sums of their pixels, in the order of the camera samples, which are given
+    /// by fit and weight.
+    pub(crate) fn end_batch(&mut self, samples: impl Iterator<Item = (u32, f32)>) {
+        if self.controls.batch.is_empty() {
+            return;
+        }
+        for (i, (fit, weight)) in samples.enumerate() {
+            let (from, to) = (self.controls.row(i), self.controls.row(fit as usize));
+            for (sum, v) in self.controls.sums[to].iter_mut().zip(&self.controls.batch[from]) {
+                *sum += f64::from(weight) * f64::from(*v);
+            }
+        }
+    }
+
+    /// Number of control variates that are summed.
+    pub fn controls(&self) -> usize {
+        self.controls.components
+    }
+
+    /// Σ of the values of a pixel, by channel, and of its control variates.
+    pub fn sums_of_controls(&self, fit: u32) -> ([f64; 3], &[f64]) {
+        let sums = &self.controls.sums[self.controls.row(fit as usize)];
+        ([sums[0], sums[1], sums[2]], &sums[3..])
     }
 
     /// Begins a block. Returns the number of fits whose system is ill-conditioned; without a solution, estimates are

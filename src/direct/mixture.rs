@@ -107,6 +107,39 @@ impl Mixture {
     }
 }
 
+/// Draws the light samples of a point as `mis` does, each of a light chosen by the light sampler. Returns the mixture at
+/// the point.
+pub(super) fn draw_together(
+    job: &RenderJob,
+    (index, point): (u32, &ShadingPoint<'_>),
+    allocation: &SampleAllocation,
+    records: &mut Vec<Candidate>,
+) -> Mixture {
+    let lights = &job.lights;
+    let ctx = point.light_ctx();
+    let n = allocation.light_draws;
+    let pmfs = if allocation.n_light > 0.0 { lights.groups.pmfs(&lights.sampler, &ctx) } else { [0.0; MAX_GROUPS] };
+    let mut mixture = Mixture::new(job, point, allocation, &pmfs);
+    for i in 0..n {
+        let [u_choice, u0, u1] = point.stream.split(domain::LIGHT, n, i).draw::<3>();
+        let choice = lights.sampler.sample(&ctx, u_choice);
+        let Some((choice, group)) = choice.and_then(|c| Some((c, lights.groups.group_of(c.light)?))) else {
+            mixture.failed += 1;
+            continue;
+        };
+        let candidate = lights.sample_choice(&ctx, choice, [u0, u1]).and_then(|(light, sample)| {
+            let c = light_candidate(job, (index, point), allocation, (light, sample))?;
+            let p_lobe = mixture.p_lobe(point, sample.wi, c.p_bsdf);
+            Some(Candidate { group: group as u8, p_lobe, ..c })
+        });
+        if candidate.is_none() {
+            mixture.zero_valued[mixture.component(group)] += 1;
+        }
+        records.extend(candidate);
+    }
+    mixture
+}
+
 /// Draws the light samples of a point separately for each group of lights, N times its probability, rounded by one
 /// random number for all groups. Returns the mixture at the point.
 pub(super) fn draw_groups(

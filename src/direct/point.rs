@@ -27,6 +27,8 @@ pub struct ShadingPoint<'a> {
     pub sample_counts: SampleCounts,
     /// Index of the point's fit, if there are fits.
     pub fit: u32,
+    /// Index of the camera sample in its batch.
+    pub sample: u32,
     /// The path goes on in the direction of the only BSDF sample, and its next segment finds the emitter: the sample
     /// counts in the weights of the others, and is not drawn here.
     pub bsdf_by_path: bool,

@@ -144,6 +144,7 @@ impl PathTracer {
         out: &mut [PixelSample],
     ) {
         let depth = settings.depth();
+        fits.begin_batch(samples.len());
         for vertex in 0..=depth {
             let count = self.search.active.len();
             if count == 0 {
@@ -164,13 +165,14 @@ impl PathTracer {
             if let Some(mut batch) = batch {
                 let (stats, direct) = (&mut self.search.stats, &mut self.direct.stats);
                 let segments = self.search.recording.as_mut().map(|r| r.segments_at(vertex));
-                batch.shade(job, &mut Output { samples: out, next: &mut self.next, stats, direct, segments });
+                batch.shade(job, &mut Output { samples: out, fits, next: &mut self.next, stats, direct, segments });
                 self.buffers = Some(batch.into_buffers());
             }
             std::mem::swap(&mut self.search.active, &mut self.next);
             self.spare_points = emptied(points);
             self.search.recycle(step.vertices);
         }
+        fits.end_batch(samples.iter().map(|s| (s.fit, s.weight)));
     }
 
     /// The points whose direct light is estimated.
@@ -184,7 +186,11 @@ impl PathTracer {
             let bsdf_by_path = may_continue
                 && matches!(step.estimator, Estimator::Mis(mis) if mis.has_one_bsdf_sample(sample_counts.samples))
                 && !v.bsdf.bsdf.is_only_evaluated();
-            ShadingPoint { bsdf_by_path, ..v.shading_point(path.ray.time, sample_counts, sample.fit) }
+            ShadingPoint {
+                bsdf_by_path,
+                sample: path.sample,
+                ..v.shading_point(path.ray.time, sample_counts, sample.fit)
+            }
         };
         let mut points: Vec<ShadingPoint<'_>> = emptied(std::mem::take(&mut self.spare_points));
         let all = step.vertices.iter().zip(&self.search.active).map(point);

@@ -312,6 +312,7 @@ impl<'w> Vertex<'w> {
             stream: self.direct.domain(domain::DIRECT),
             sample_counts,
             fit,
+            sample: 0,
             bsdf_by_path: false,
         }
     }

@@ -108,6 +108,13 @@ pub struct Scratch {
     samples: LightSamples,
 }
 
+impl Scratch {
+    /// The light that point `i` chose in the last [`LightSampling::sample_many`], where there is more than one.
+    pub fn chosen(&self, i: usize) -> LightId {
+        self.chosen[i].0
+    }
+}
+
 impl LightSampling {
     /// Samples a direction to a light for each of the `n` points `at`: the light by `u[0]`, the direction by `u[1]` and
     /// `u[2]`. The results are those of [`sample`](Self::sample) up to rounding; of infinite lights, radiance and
@@ -301,7 +308,7 @@ impl AreaLight {
 
 impl LightSampler {
     /// The light that is always chosen, if there is one.
-    fn only_light(&self) -> Option<LightId> {
+    pub fn only_light(&self) -> Option<LightId> {
         match self {
             LightSampler::Uniform(choice) | LightSampler::Power(choice) => choice.only(),
             LightSampler::Tree(choice) => match (choice.infinite.as_slice(), choice.tree.only_light()) {

@@ -12,7 +12,7 @@ use lumiris_lanes::{level, sampler};
 use lumiris_numbers::estimators::ocv::block_of;
 use lumiris_numbers::math::hash::pcg4d;
 use lumiris_numbers::math::{Ray, Vec2, Vec3};
-use lumiris_numbers::samplers::SampleStream;
+use lumiris_numbers::samplers::{SampleStream, SamplerKind};
 use std::ops::Range;
 
 /// Domains of a camera sample.
@@ -142,6 +142,10 @@ impl<'a> CameraSampler<'a> {
     #[inline]
     fn direct_stream(&self, pixel: [u32; 2], sample: u32, seed: u32) -> Option<SampleStream> {
         let settings = self.job.settings();
+        let estimator = Estimator::at_vertex(&settings.integrator, 0);
+        if estimator.is_over_pixels() && settings.sampling.sampler == SamplerKind::SobolBlueNoise {
+            return Some(SampleStream::new(SamplerKind::Sobol, pixel, sample, seed));
+        }
         Estimator::at_vertex(&settings.integrator, 0).is_progressive().then(|| {
             let block = block_of(sample - self.first_sample);
             let block_seed = pcg4d([seed, self.first_sample, block.index, BLOCK_SEED])[0];

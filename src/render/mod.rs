@@ -10,6 +10,7 @@ pub mod bench;
 pub mod bench_frame;
 pub mod bench_photons;
 mod camera_samples;
+mod control_variates;
 pub mod crosscheck;
 pub mod efficiency;
 pub mod noise;
@@ -244,7 +245,7 @@ impl<'a> Run<'a> {
         let mut first = self.settings.first_sample;
         while first < end && !self.stopped() {
             let served = end.min(first.saturating_add(integrator.prepare(first)?));
-            let workers = Workers::new(&*integrator, self.settings.with_features);
+            let workers = Workers::new(&*integrator, self.settings.with_features || self.is_over_pixels());
             while first < served && !self.stopped() {
                 let length = self.next_pass(first - self.settings.first_sample);
                 let samples = first..(first + length).min(served);
@@ -258,6 +259,7 @@ impl<'a> Run<'a> {
         }
 
         let mut film = self.film(&tiles);
+        control_variates::correct(&mut film, &tiles, position);
         let Statistics { paths: stats, cache, photons } = integrator.statistics(stats, &mut film);
         let complete = film.pixels.iter().enumerate().all(|(i, p)| p.count == self.samples_wanted(i));
         Ok(Rendering { film, stats, cache, photons, elapsed: self.start.elapsed(), complete, threads })
@@ -265,7 +267,13 @@ impl<'a> Run<'a> {
 
     /// True if replicas are requested and tell anything.
     fn wants_replicas(&self) -> bool {
-        self.settings.with_replicas && !self.job.settings().sampling.sampler.has_independent_samples()
+        let has_independent_samples = self.job.settings().sampling.sampler.has_independent_samples();
+        self.settings.with_replicas && (!has_independent_samples || self.is_over_pixels())
+    }
+
+    /// True if pixels are corrected by what is fitted to others, which needs the features of all.
+    fn is_over_pixels(&self) -> bool {
+        Estimator::at_vertex(&self.job.settings().integrator, 0).is_over_pixels()
     }
 
     /// A tile without samples.

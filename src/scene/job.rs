@@ -2,6 +2,7 @@
 
 use super::{PixelSamples, SampleCountMap, Scene, World};
 use crate::accel::Hit;
+use crate::bsdfs::MAX_LOBES;
 use crate::geometry::{GeometryId, Shape};
 use crate::lights::{Irradiances, LightSampling};
 use crate::settings::{IntegratorSettings, Settings};
@@ -84,6 +85,17 @@ impl RenderJob {
     /// Number of components of a mixture: lobes, then groups of lights.
     pub fn components(&self) -> usize {
         self.lobes + self.lights.groups.len()
+    }
+
+    /// True if BSDFs may have two lobes.
+    pub fn has_two_lobes(&self) -> bool {
+        self.lobes == MAX_LOBES
+    }
+
+    /// Number of control variates over pixels: groups of lights, then the first of two lobes. The column of the last
+    /// lobe depends on these.
+    pub fn controls(&self) -> usize {
+        self.lights.groups.len() + usize::from(self.has_two_lobes())
     }
 }
 

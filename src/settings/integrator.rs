@@ -104,16 +104,27 @@ impl IntegratorSettings {
 
     /// MIS heuristic.
     pub fn heuristic(&self) -> Heuristic {
-        self.heuristic.unwrap_or(self.estimator.default_heuristic())
+        let like = if self.is_like_mis() { EstimatorKind::Mis } else { self.estimator };
+        self.heuristic.unwrap_or(like.default_heuristic())
     }
 
     /// Fraction of the samples drawn by BSDF sampling. That of `mis` lets a path continue by its only BSDF sample, which
-    /// costs no ray of its own; control variates need samples of all components.
+    /// costs no ray of its own; control variates need samples of all components, unless they correct those of `mis`.
     pub fn bsdf_fraction(&self) -> f32 {
-        self.bsdf_fraction.unwrap_or(match self.estimator {
-            EstimatorKind::Auto | EstimatorKind::Mis => 0.25,
-            _ => 0.5,
-        })
+        self.bsdf_fraction.unwrap_or(if self.is_like_mis() { 0.25 } else { 0.5 })
+    }
+
+    /// True if samples are drawn and weighted as `mis` does.
+    fn is_like_mis(&self) -> bool {
+        match self.estimator {
+            EstimatorKind::Auto | EstimatorKind::Mis => true,
+            EstimatorKind::Ocv => self.ocv.form == Form::Pixels,
+            EstimatorKind::Mc
+            | EstimatorKind::Ris
+            | EstimatorKind::OptimalMis
+            | EstimatorKind::Correlated
+            | EstimatorKind::Contributing => false,
+        }
     }
 
     /// True if the throughput of a path decides whether it takes the bounce of this number, counted from 1.

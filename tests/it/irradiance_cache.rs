@@ -198,10 +198,11 @@ type Choice = (&'static str, f64, fn(&mut lumiris::settings::IntegratorSettings)
 
 /// Those that fit their coefficients to the eight samples of an estimate are biased: −6 % and −9 % were measured of
 /// those with a limit, ± 0.2 %.
-const RECORD_ESTIMATORS: [Choice; 8] = [
+const RECORD_ESTIMATORS: [Choice; 9] = [
     ("mc", 0.0, |s| s.estimator = EstimatorKind::Mc),
     ("ris", 0.0, |s| s.estimator = EstimatorKind::Ris),
-    ("ocv, progressive", 0.0, |s| s.estimator = EstimatorKind::Ocv),
+    ("ocv, pixels", 0.0, |s| s.estimator = EstimatorKind::Ocv),
+    ("ocv, progressive", 0.0, |s| (s.estimator, s.ocv.form) = (EstimatorKind::Ocv, Form::Progressive)),
     ("ocv, crossfit", 0.0, |s| (s.estimator, s.ocv.form) = (EstimatorKind::Ocv, Form::Crossfit)),
     ("ocv, regression", 0.005, |s| (s.estimator, s.ocv.form) = (EstimatorKind::Ocv, Form::Regression)),
     ("ocv, paper", 0.08, |s| (s.estimator, s.ocv.form) = (EstimatorKind::Ocv, Form::Paper)),

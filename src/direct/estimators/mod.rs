@@ -82,7 +82,7 @@ impl Estimator {
     #[must_use]
     pub fn without_fits(settings: &IntegratorSettings) -> IntegratorSettings {
         let estimator = Self::new(settings, 0);
-        if !estimator.is_progressive() {
+        if !estimator.is_progressive() && !estimator.is_over_pixels() {
             return *settings;
         }
         let samples = Some(settings.sample_counts_at(1).samples);
@@ -136,6 +136,11 @@ impl Estimator {
         }
     }
 
+    /// True if the estimates of a pixel are corrected by what was fitted to other pixels.
+    pub fn is_over_pixels(&self) -> bool {
+        matches!(self, Estimator::Ocv(ocv) if ocv.form == Form::Pixels)
+    }
+
     /// True if an estimate consists of two independent halves.
     pub fn has_halves(&self) -> bool {
         match self {
@@ -153,6 +158,7 @@ impl Estimator {
     /// `count` fits without samples; none if estimates do not use fits.
     pub fn fits(&self, job: &RenderJob, count: usize) -> Fits {
         let solver = match self {
+            Estimator::Ocv(_) if self.is_over_pixels() => return Fits::of_pixels(job.controls(), count),
             Estimator::Ocv(_) if self.is_progressive() => ocv::solve,
             Estimator::OptimalMis(_) if self.is_progressive() => optimal_mis::solve,
             _ => return Fits::default(),
@@ -169,6 +175,9 @@ impl Estimator {
             Estimator::Mc(mc) => mc.propose(t1),
             Estimator::Mis(mis) => mis.propose(t1),
             Estimator::Ris(ris) => ris.propose_and_draw(t1, &mut batch.ris),
+            Estimator::Ocv(Ocv { mis, form: Form::Pixels }) => {
+                batch.components.propose_together(t1, |point| mis.allocation(point));
+            }
             Estimator::Ocv(Ocv { mis, .. }) | Estimator::OptimalMis(OptimalMis { mis, .. }) => {
                 batch.components.propose(t1, |point| mis.allocation(point));
             }

@@ -11,7 +11,7 @@ use crate::direct::fits::Fits;
 use crate::direct::point::ShadingPoint;
 use crate::direct::shadow_segments::Segments;
 use crate::scene::RenderJob;
-use lumiris_numbers::estimators::ocv::{Form, NormalEquations};
+use lumiris_numbers::estimators::ocv::{Form, MAX_COMPONENTS, NormalEquations};
 use lumiris_numbers::math::Rgb;
 
 /// Control variates for the samples of `mis`.
@@ -42,7 +42,7 @@ impl Ocv {
         }
 
         // β of the forms that fit it to these samples
-        if form != Form::Progressive {
+        if !matches!(form, Form::Progressive | Form::Pixels) {
             let systems = sums.len() / len;
             beta.clear();
             beta.resize(systems * width, 0.0);
@@ -58,14 +58,31 @@ impl Ocv {
                     Some(beta) => form.estimate(equations, sums, beta, integrals),
                     None => equations.mean(sums),
                 },
+                Form::Pixels => {
+                    let (value, mut controls) = (equations.mean(sums), means_of_columns(equations, sums));
+                    // Groups, then the first lobe
+                    controls[..equations.components()].rotate_left(job.lobes());
+                    fits.set_controls(points[i].sample, value, &controls[..job.controls()]);
+                    value
+                }
                 Form::Paper | Form::Regression | Form::Crossfit => {
                     form.estimate(equations, sums, &beta[i * rows * width..][..rows * width], integrals)
                 }
             };
-            fits.add(points[i].fit, sums);
+            if form == Form::Progressive {
+                fits.add(points[i].fit, sums);
+            }
             *out = Rgb::from_array(estimate);
         }
     }
+}
+
+/// c̄_j; 0 without samples.
+fn means_of_columns(equations: NormalEquations, sums: &[f32]) -> [f32; MAX_COMPONENTS] {
+    let n = f64::from(equations.samples(sums)).max(1.0);
+    std::array::from_fn(
+        |j| if j < equations.components() { (equations.sum_of_column(sums, j) / n) as f32 } else { 0.0 },
+    )
 }
 
 /// Fits the coefficients of all fits to their sums. Returns how many systems are ill-conditioned.

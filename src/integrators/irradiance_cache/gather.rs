@@ -270,6 +270,7 @@ impl RecordRequest {
             stream: self.stream_of_block(job, block, index).domain(domain::SOURCES),
             sample_counts,
             fit: 0,
+            sample: 0,
         }
     }
 }

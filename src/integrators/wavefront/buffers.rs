@@ -1,8 +1,8 @@
 //! What a worker keeps from batch to batch, and the kernels over it.
 
-use super::columns::{SampleColumns, Single, Surface};
+use super::columns::{SampleColumns, Single, Surface, Traced};
+use super::controls::Controls;
 use super::emitters::EmitterRays;
-use crate::accel::RayBatch;
 use crate::film::PixelSample;
 use crate::integrators::segment::Carried;
 use crate::lights::many::Scratch;
@@ -30,16 +30,8 @@ pub(in crate::integrators) struct Buffers {
     pub(super) scratch: Scratch,
     pub(super) traced: Traced,
     pub(super) emitter_rays: EmitterRays,
+    pub(super) controls: Controls,
     pub(super) spare_singles: Vec<Single<'static>>,
-}
-
-/// Segments of the samples that contribute.
-#[derive(Debug, Default)]
-pub(super) struct Traced {
-    /// Places of their vertices.
-    pub(super) index: Vec<u32>,
-    pub(super) rays: RayBatch,
-    pub(super) occluded: Vec<bool>,
 }
 
 /// Which random numbers of a vertex.

@@ -1,5 +1,6 @@
 //! Columns of vertices and of their samples.
 
+use crate::accel::RayBatch;
 use crate::bsdfs::Bsdf;
 use crate::lights::many::{LightSamples, LitPoints};
 use crate::materials::SurfaceBsdf;
@@ -56,6 +57,15 @@ pub(super) struct SampleColumns {
     pub(super) o: Columns3,
     pub(super) d: Columns3,
     pub(super) t_max: Column,
+}
+
+/// Segments of the samples that contribute.
+#[derive(Debug, Default)]
+pub(super) struct Traced {
+    /// Places of their vertices.
+    pub(super) index: Vec<u32>,
+    pub(super) rays: RayBatch,
+    pub(super) occluded: Vec<bool>,
 }
 
 /// A vertex that the kernels do not determine.

@@ -4,6 +4,7 @@ use super::columns::{SampleColumns, Surface};
 use crate::accel::RayBatch;
 use crate::direct::{self, EmitterInDirection};
 use crate::integrators::segment::Carried;
+use crate::lights::LightId;
 use crate::lights::many::LightSamples;
 use crate::scene::{EmitterHit, EmitterScratch, RenderJob};
 use lumiris_lanes::columns::padded;
@@ -17,6 +18,8 @@ pub(super) struct EmitterRays {
     pub(super) rays: RayBatch,
     pub(super) scratch: EmitterScratch,
     pub(super) emitter_hits: Vec<Option<EmitterHit>>,
+    /// The light that each sample points at, if there is one that is no infinite light.
+    pub(super) lights: Vec<Option<LightId>>,
     /// Those of them that meet nothing.
     pub(super) far: Vec<u32>,
 }
@@ -32,12 +35,15 @@ impl EmitterRays {
         samples: &mut SampleColumns,
     ) -> u64 {
         let (n, len) = (paths.len(), padded(paths.len()));
-        let EmitterRays { index, rays, scratch, emitter_hits, far } = self;
+        let EmitterRays { index, rays, scratch, emitter_hits, lights, far } = self;
+        lights.clear();
+        lights.resize(n, None);
         index.clear();
         index.extend((0..n as u32).filter(|&i| samples.p_bsdf[i as usize] > 0.0));
         far.clear();
         let mut add = |samples: &mut SampleColumns, i: usize, hit: Option<EmitterHit>| {
             let Some(hit) = hit else { return far.push(i as u32) };
+            lights[i] = hit.light;
             let (ctx, wi) = (surface.lit_points().get(i), samples.light.wi.vec3(i));
             match direct::emitter_at(job, &ctx, wi, &hit, paths[i].time) {
                 Some(found) => set_emitter(&mut samples.light, i, &found),

@@ -10,11 +10,12 @@
 //! written into the same columns: other shapes, textured reflectance, and all other BSDFs. A vertex whose estimate has
 //! another form than that of its neighbours (resampled or purely specular BSDFs) is left to [`crate::direct`].
 //!
-//! Reading order: [`columns`], [`emitters`] (what BSDF samples point at), [`buffers`] (kernels over the columns); this file
-//! goes through the steps.
+//! Reading order: [`columns`], [`emitters`] (what BSDF samples point at), [`controls`] (control variates, for `ocv`),
+//! [`buffers`] (kernels over the columns); this file goes through the steps.
 
 mod buffers;
 mod columns;
+mod controls;
 mod emitters;
 
 pub(super) use buffers::Buffers;
@@ -26,7 +27,8 @@ use super::segment::{
 };
 use crate::accel::{Coherence, Hit, RayBatch};
 use crate::bsdfs::{Bsdf, Diffuse, Lobe};
-use crate::direct::{self, DirectStats, Estimator};
+use crate::direct::estimators::ocv::Ocv;
+use crate::direct::{self, DirectStats, Estimator, Fits};
 use crate::film::PixelSample;
 use crate::geometry::Shape;
 use crate::materials::SurfaceBsdf;
@@ -37,6 +39,7 @@ use lumiris_lanes::lane::LANES;
 use lumiris_lanes::level;
 use lumiris_lanes::vertex as kernels;
 use lumiris_numbers::estimators::mis::Heuristic;
+use lumiris_numbers::estimators::ocv::Form;
 use lumiris_numbers::math::ray::offset_origin;
 use lumiris_numbers::math::{Rgb, Vec3};
 use std::time::{Duration, Instant};
@@ -61,13 +64,16 @@ pub(super) struct Estimate {
     vertex: u32,
     /// The path goes on.
     continues: bool,
+    /// Control variates are determined as well.
+    has_controls: bool,
 }
 
 impl Estimate {
     /// The estimates at vertex `vertex`, if they can be made side by side.
     pub(super) fn new(settings: &IntegratorSettings, vertex: u32) -> Option<Self> {
         let continues = vertex + 1 < settings.depth();
-        let (counts, heuristic) = match Estimator::at_vertex(settings, vertex) {
+        let estimator = Estimator::at_vertex(settings, vertex);
+        let (counts, heuristic) = match estimator {
             // A single technique has the weight 1 by any heuristic
             Estimator::Mc(mc) => (Counts { light: mc.samples, bsdf: 0, by_path: false }, Heuristic::Balance),
             Estimator::Mis(mis) if mis.samples >= 2 => {
@@ -75,9 +81,14 @@ impl Estimate {
                 let by_path = continues && mis.has_one_bsdf_sample(n);
                 (Counts { light: n - bsdf, bsdf, by_path }, mis.heuristic)
             }
+            Estimator::Ocv(Ocv { mis, form: Form::Pixels }) if mis.samples >= 2 => {
+                let (n, bsdf) = (mis.samples, mis.bsdf_samples(mis.samples));
+                (Counts { light: n - bsdf, bsdf, by_path: false }, mis.heuristic)
+            }
             _ => return None,
         };
-        Some(Estimate { counts, heuristic, settings: *settings, vertex, continues })
+        let has_controls = estimator.is_over_pixels();
+        Some(Estimate { counts, heuristic, settings: *settings, vertex, continues, has_controls })
     }
 
     /// True if vertices of this BSDF have as many samples of each technique as all others.
@@ -102,6 +113,7 @@ pub(super) struct Batch<'w> {
 /// What the paths and their counts are added to.
 pub(super) struct Output<'a> {
     pub(super) samples: &'a mut [PixelSample],
+    pub(super) fits: &'a mut Fits,
     pub(super) next: &'a mut Vec<PathState>,
     pub(super) stats: &'a mut PathStats,
     pub(super) direct: &'a mut DirectStats,
@@ -193,6 +205,9 @@ impl<'w> Batch<'w> {
         if self.estimate.vertex == 0 {
             self.buffers.set_normals(out.samples);
         }
+        if self.estimate.has_controls {
+            self.buffers.controls.begin(job, n, (&self.buffers.surface, &self.singles));
+        }
         out.stats.shade_time += start.elapsed();
 
         for k in 0..light {
@@ -200,24 +215,44 @@ impl<'w> Batch<'w> {
             self.sample_lights(job, k);
             let t1 = self.trace(job, out, start);
             out.direct.t1_light += t1;
+            self.add_controls(job, true);
         }
         let bsdf = if by_path { 0 } else { bsdf };
         for k in 0..bsdf {
             let start = Instant::now();
             out.direct.emitter_rays += self.sample_bsdfs(job, k);
             self.trace(job, out, start);
+            self.add_controls(job, false);
         }
         out.direct.proposals += (n as u64) * u64::from(light + bsdf);
         out.direct.light_proposals += (n as u64) * u64::from(light);
 
         let start = Instant::now();
         for (i, path) in self.buffers.paths.iter().enumerate() {
-            out.samples[path.sample as usize].radiance += path.beta * self.buffers.radiance.rgb(i);
+            let radiance = self.buffers.radiance.rgb(i);
+            out.samples[path.sample as usize].radiance += path.beta * radiance;
+            if self.estimate.has_controls {
+                let controls = &self.buffers.controls.of(i)[..job.controls()];
+                out.fits.set_controls(path.sample, radiance.to_array(), controls);
+            }
         }
         if self.estimate.continues {
             self.extend(out.next);
         }
         out.stats.shade_time += start.elapsed();
+    }
+
+    /// Adds the last sample of each vertex to its control variates, if there are any.
+    fn add_controls(&mut self, job: &RenderJob, by_light: bool) {
+        if !self.estimate.has_controls {
+            return;
+        }
+        let Buffers { controls, samples, traced, scratch, emitter_rays, .. } = &mut *self.buffers;
+        if by_light {
+            controls.add_light_samples(job, self.estimate.n(), (samples, traced, scratch), &self.singles);
+        } else {
+            controls.add_bsdf_samples(job, self.estimate.n(), (samples, emitter_rays), &self.singles);
+        }
     }
 
     /// Writes the singles into the columns.

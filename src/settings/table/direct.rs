@@ -66,7 +66,7 @@ pub(super) const DIRECT: Group = Group {
             key: "heuristic",
             kind: choice(Heuristic::VARIANTS),
             help: "MIS heuristic, which weights the techniques",
-            default: "power; balance for ris, ocv and optimal-mis",
+            default: "power; balance for ris, optimal-mis, and ocv unless over pixels",
             get: |s| s.integrator.heuristic.map(|h| Value::Name(h.into())),
             resolved: Some(|s| Some(Value::Name(s.integrator.heuristic().into()))),
             set: |s, v| v.named().map(|heuristic| s.integrator.heuristic = Some(heuristic)),
@@ -82,7 +82,7 @@ pub(super) const DIRECT: Group = Group {
             kind: Kind::Real { range: Interval::closed(0.0, 1.0), words: &[] },
             help: "Fraction of the samples drawn by BSDF sampling, for mis, ocv and optimal-mis",
             applies: Applies::Estimators(&[Mis, Ocv, OptimalMis]),
-            default: "0.25 for mis, 0.5 for ocv and optimal-mis",
+            default: "0.25 for mis and ocv over pixels, else 0.5",
             get: |s| s.integrator.bsdf_fraction.map(Value::Real),
             resolved: Some(|s| Some(Value::Real(s.integrator.bsdf_fraction()))),
             set: |s, v| v.real().map(|fraction| s.integrator.bsdf_fraction = Some(fraction)),
@@ -210,8 +210,8 @@ pub(super) const CONTROL_VARIATES: Group = Group {
             parameters: &["ocv"],
             key: "ocv",
             kind: choice(Form::VARIANTS),
-            help: "How ocv fits the coefficients of its control variates: to earlier samples of the pixel, to the \
-                   other half of the samples, or (biased) to the same samples",
+            help: "What ocv fits the coefficients of its control variates to: the surrounding pixels, earlier samples of \
+                   the pixel, the other half of the samples, or (biased) the same samples",
             applies: Applies::Estimators(&[Ocv]),
             get: |s| Some(Value::Name(s.integrator.ocv.form.into())),
             set: |s, v| v.named().map(|form| s.integrator.ocv.form = form),

@@ -179,6 +179,9 @@ fn component_configurations(base: &Configuration) -> Vec<Configuration> {
     let mut all = [1, 2, 3, 16].map(|samples| Configuration { samples, ..base }).to_vec();
     let crossfit = OcvSettings { form: Form::Crossfit, ..base.ocv };
     all.extend([2, 5, 16].map(|samples| Configuration { samples, ocv: crossfit, ..base }));
+    let pixels = OcvSettings { form: Form::Pixels, ..base.ocv };
+    all.extend([1, 2, 5].map(|samples| Configuration { samples, ocv: pixels, ..base }));
+    all.push(Configuration { samples: 4, ocv: pixels, sampler: SamplerKind::Independent, ..base });
     all.extend([2, 8].map(|samples| Configuration { samples, estimator: EstimatorKind::OptimalMis, ..base }));
     let few = OcvSettings { components: Some(3), ..base.ocv };
     all.push(Configuration { samples: 8, ocv: few, ..base });

@@ -25,7 +25,7 @@ const SCENES: [(&str, &str, [u32; 2]); 5] = [
 ];
 
 /// Integrators: a name and the directive, as in a scene file.
-const INTEGRATORS: [(&str, &str); 24] = [
+const INTEGRATORS: [(&str, &str); 25] = [
     ("direct mc", r#""direct" "string estimator" "mc" "integer samples" 2"#),
     ("direct mis", r#""direct""#),
     ("direct mis balance by power", r#""direct" "string heuristic" "balance" "string lightsampler" "power""#),
@@ -44,7 +44,7 @@ const INTEGRATORS: [(&str, &str); 24] = [
         r#""direct" "string estimator" "ris" "integer proposals" 16 "string strata" "none"
            "string proposalpoints" "independent" "string target" "gvl""#,
     ),
-    ("direct ocv progressive", r#""direct" "string estimator" "ocv" "integer samples" 4"#),
+    ("direct ocv progressive", r#""direct" "string estimator" "ocv" "integer samples" 4 "string ocv" "progressive""#),
     ("direct ocv crossfit", r#""direct" "string estimator" "ocv" "integer samples" 8 "string ocv" "crossfit""#),
     ("direct ocv regression", r#""direct" "string estimator" "ocv" "integer samples" 8 "string ocv" "regression""#),
     ("direct ocv paper", r#""direct" "string estimator" "ocv" "integer samples" 8 "string ocv" "paper""#),
@@ -67,6 +67,7 @@ const INTEGRATORS: [(&str, &str); 24] = [
     ("irradiance-cache", r#""irradiance-cache" "integer maxdepth" 3 "integer cachesamples" 64"#),
     ("photon-map", r#""photon-map" "integer maxdepth" 4 "integer photons" 2000 "integer gather" 8"#),
     ("photon-map progressive", r#""photon-map" "integer maxdepth" 4 "integer photons" 500 "float radius" 0.2"#),
+    ("direct ocv pixels", r#""direct" "string estimator" "ocv" "integer samples" 4"#),
 ];
 
 /// Samplers, which take turns over the integrators.

@@ -22,6 +22,7 @@ mod mixtures;
 mod ocv;
 mod oracle;
 mod parameters;
+mod pixels;
 mod stratification;
 mod techniques;
 mod unbiased;

@@ -17,8 +17,11 @@ pub enum Form {
     /// Equation (7), β from the other of two independently randomised halves. Unbiased.
     Crossfit,
     /// Equation (7), β from earlier blocks of passes of the same pixel ([`block_of`](super::block_of)). Unbiased.
-    #[default]
     Progressive,
+    /// Equation (7) for the means of a pixel over all its samples, β from those of other pixels ([`super::pixels`]).
+    /// Unbiased if pixels are independent.
+    #[default]
+    Pixels,
 }
 
 impl Form {
@@ -27,7 +30,7 @@ impl Form {
     pub fn rows(self) -> usize {
         match self {
             Form::Crossfit => 2,
-            Form::Paper | Form::Regression | Form::Progressive => 1,
+            Form::Paper | Form::Regression | Form::Progressive | Form::Pixels => 1,
         }
     }
 
@@ -36,7 +39,7 @@ impl Form {
         match self {
             Form::Paper => System::PAPER,
             Form::Regression => System::SAME_SAMPLES,
-            Form::Crossfit | Form::Progressive => System::OTHER_SAMPLES,
+            Form::Crossfit | Form::Progressive | Form::Pixels => System::OTHER_SAMPLES,
         }
     }
 
@@ -50,7 +53,7 @@ impl Form {
                 }
                 equations.scale(sums, &scales);
             }
-            Form::Regression | Form::Crossfit | Form::Progressive => equations.centre(sums, integrals),
+            Form::Regression | Form::Crossfit | Form::Progressive | Form::Pixels => equations.centre(sums, integrals),
         }
     }
 
@@ -62,7 +65,7 @@ impl Form {
     pub fn estimate(self, equations: NormalEquations, sums: &[f32], beta: &[f32], integrals: &[f32]) -> [f32; 3] {
         match self {
             Form::Paper => with_intercept(equations, sums, beta, integrals),
-            Form::Regression | Form::Progressive => equations.estimate(sums, beta),
+            Form::Regression | Form::Progressive | Form::Pixels => equations.estimate(sums, beta),
             Form::Crossfit => {
                 let [a, b] = [0, 1].map(|half| &sums[half * equations.len()..][..equations.len()]);
                 let (beta_of_a, beta_of_b) = beta.split_at(equations.coefficients());

@@ -8,7 +8,7 @@
 //! Î = ȳ − Σ_j β_j c̄_j.
 //!
 //! β = 0 is multiple importance sampling with the balance heuristic. Any β that is independent of the samples leaves
-//! the estimate unbiased; the best one is that of the regression of y on the columns. There are four ways to obtain it
+//! the estimate unbiased; the best one is that of the regression of y on the columns. There are five ways to obtain it
 //! ([`Form`]), which differ in bias. Since Σ α_j c_j = 0, one column depends on the others.
 //!
 //! The densities of the columns are normalised, so that a ridge means the same for all: a component whose integral I_j
@@ -22,12 +22,14 @@
 //! | [`solve`] | β from the sums of many points at once |
 //! | [`forms`] | the forms: which system, of which columns, and what is made of β |
 //! | [`ldlt`] | one small symmetric system in f64, with pivots, for [`super::optimal_mis`] |
+//! | [`pixels`] | β of a pixel from other pixels |
 //! | [`block`] | the blocks of passes of the progressive form |
 
 pub mod block;
 pub mod forms;
 pub mod ldlt;
 pub mod normal;
+pub mod pixels;
 pub mod solve;
 
 pub use block::{Block, block_of};
