@@ -67,12 +67,13 @@ pub(super) fn allocate(job: &RenderJob) -> Option<PixelSamples> {
     (pilot.gain(spp) >= MIN_GAIN).then_some(PixelSamples { bounds: pilot.bounds, spp, counts })
 }
 
-/// True if pixels may have different numbers of samples: they share nothing, are not fitted in blocks of samples, and have
+/// True if pixels may have different numbers of samples: they share nothing, are fitted neither to others nor in blocks, and have
 /// enough samples for a pilot.
 pub fn allows_adaptive(settings: &Settings) -> bool {
     let i = &settings.integrator;
     matches!(i.kind, IntegratorKind::Direct | IntegratorKind::Path)
         && !Estimator::at_vertex(i, 0).is_progressive()
+        && !Estimator::at_vertex(i, 0).is_over_pixels()
         && settings.sampling.spp >= MIN_SPP
 }
 
