@@ -12,8 +12,8 @@ pub(super) const GROUPS: u32 = 3;
 pub(super) const DELTA: u32 = 4;
 /// Non-contributing lights.
 pub(super) const NONCONTRIBUTING: u32 = 5;
-/// Choice among the weaker contributing lights.
-pub(super) const DIM: u32 = 6;
+/// Numbers of samples of the contributing lights.
+pub(super) const COUNTS: u32 = 6;
 /// Positions of proposals, and the draws from them.
 pub(super) const RESAMPLE: u32 = 8;
 /// Bounds of strata of proposals.

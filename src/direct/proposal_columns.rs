@@ -127,12 +127,13 @@ impl ProposalColumns {
             self.place(positions, phi, light_draws);
             self.choose_lights(job, point, start, bsdf_start);
         }
-        let contributing = job.lights.contributing_lights(&point.light_ctx());
+        let ctx = point.light_ctx();
+        let contributing = job.lights.contributing_lights(&ctx);
         for (i, c) in (bsdf_start..end).zip(bsdf_samples) {
             let cos = || point.bsdf.cos(c.segment.d.normalize());
             self.p_hat[i] = match techniques.target {
                 Target::Fgl => c.f.luminance(),
-                Target::Visibility => c.f.luminance() * contributing.visibility(c.light),
+                Target::Visibility => c.f.luminance() * job.lights.visibility(&ctx, &contributing, c.light).sqrt(),
                 // The cosine of a delta is part of its weight
                 Target::Gv | Target::Gvl if c.drawn.is_delta() => c.f.luminance(),
                 Target::Gv => cos(),
@@ -249,12 +250,13 @@ impl ProposalColumns {
                 }
             }
             Target::Visibility => {
-                let contributing = job.lights.contributing_lights(&point.light_ctx());
+                let ctx = point.light_ctx();
+                let contributing = job.lights.contributing_lights(&ctx);
                 let mut of = (NO_LIGHT, 0.0);
                 for i in start..end {
                     let light = self.chosen[i].0;
                     if of.0 != light {
-                        of = (light, contributing.visibility(light));
+                        of = (light, job.lights.visibility(&ctx, &contributing, light).sqrt());
                     }
                     self.p_hat[i] *= of.1;
                     self.weight[i] *= of.1;

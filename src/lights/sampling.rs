@@ -2,7 +2,8 @@
 
 use super::visibility_cache::ContributingLights;
 use super::{
-    LightCtx, LightGroups, LightHit, LightId, LightSample, LightSampler, LightSamplerKind, LightSet, VisibilityCache,
+    LearnedVisibility, LightCtx, LightGroups, LightHit, LightId, LightSample, LightSampler, LightSamplerKind, LightSet,
+    TreeChoice, VisibilityCache,
 };
 use lumiris_numbers::math::{Rgb, Vec3};
 use std::ops::Deref;
@@ -19,6 +20,8 @@ pub struct LightSampling {
     /// The lights as components of a mixture.
     pub groups: LightGroups,
     visibility_cache: Option<Arc<VisibilityCache>>,
+    /// What the visibility cache tells.
+    learned: Option<LearnedVisibility>,
 }
 
 impl Deref for LightSampling {
@@ -34,7 +37,7 @@ impl LightSampling {
     pub fn new(set: Arc<LightSet>, kind: LightSamplerKind, max: usize) -> Self {
         let sampler = LightSampler::new(kind, &set.lights, set.scene_radius);
         let (delta, groups) = (set.delta_sampler(kind), LightGroups::new(&set.lights, &sampler, max));
-        LightSampling { set, sampler, delta, groups, visibility_cache: None }
+        LightSampling { set, sampler, delta, groups, visibility_cache: None, learned: None }
     }
 
     /// Changes the light sampler; the visibility cache stays.
@@ -56,6 +59,32 @@ impl LightSampling {
         let is_lit = |light: LightId| self.set.lit.binary_search(&light).is_ok();
         self.visibility_cache = visibility_cache.map(|visibility_cache| Arc::new(visibility_cache.of_lights(is_lit)));
         self.sampler.set_visibility_cache(self.visibility_cache.clone());
+        let LightSet { lights, scene_radius, .. } = &*self.set;
+        let cache = self.visibility_cache.as_ref().filter(|cache| !cache.is_empty());
+        self.learned = cache.map(|cache| LearnedVisibility::new(self.tree_choice(), lights, *scene_radius, cache));
+    }
+
+    /// The choice by the light tree, whatever the light sampler is.
+    pub fn tree_choice(&self) -> TreeChoice {
+        let choice = self.sampler.tree().cloned();
+        choice.unwrap_or_else(|| TreeChoice::of_lights(&self.set.lights, self.set.scene_radius))
+    }
+
+    /// What photons tell of the visibility of lights; `None` without photons.
+    #[inline]
+    pub fn learned_visibility(&self) -> Option<&LearnedVisibility> {
+        self.learned.as_ref()
+    }
+
+    /// V̂ of a light by its photons, of which `contributing` has the counts at the point; 1 where there are none at all.
+    #[inline]
+    pub fn visibility(&self, ctx: &LightCtx, contributing: &ContributingLights<'_>, light: LightId) -> f32 {
+        match &self.learned {
+            Some(learned) if !contributing.lights.is_empty() => {
+                learned.visibility(light, learned.importance(ctx, light), contributing.count(light))
+            }
+            Some(_) | None => 1.0,
+        }
     }
 
     /// The visibility cache.

@@ -188,8 +188,16 @@ impl LightTree {
     /// probabilities of all leaves add up to 1 everywhere.
     #[inline]
     fn left_probability(&self, ctx: &LightCtx, place: usize) -> f32 {
-        let (left, right) = (&self.nodes[place + 1], &self.nodes[self.nodes[place].index as usize]);
-        let (a, b) = (left.importance(ctx), right.importance(ctx));
+        self.left_probability_by(ctx, place, |_, importance| importance)
+    }
+
+    /// [`Self::left_probability`] with importances changed by `adjust(node, importance)`, which keeps positive ones
+    /// positive.
+    #[inline]
+    fn left_probability_by(&self, ctx: &LightCtx, place: usize, adjust: impl Fn(usize, f32) -> f32) -> f32 {
+        let right_place = self.nodes[place].index as usize;
+        let (left, right) = (&self.nodes[place + 1], &self.nodes[right_place]);
+        let (a, b) = (adjust(place + 1, left.importance(ctx)), adjust(right_place, right.importance(ctx)));
         let p = a / (a + b);
         if a > 0.0 && b > 0.0 && p.is_finite() {
             p.clamp(MIN_PROBABILITY, 1.0 - MIN_PROBABILITY)
@@ -204,10 +212,23 @@ impl LightTree {
     /// remapped to be uniform again.
     #[inline]
     pub fn sample_below(&self, ctx: &LightCtx, place: u32, u: f32) -> Option<(LightId, f32, f32)> {
+        self.sample_below_by(ctx, place, u, |_, importance| importance)
+    }
+
+    /// [`Self::sample_below`] with importances changed by `adjust(node, importance)`, which keeps positive ones
+    /// positive.
+    #[inline]
+    fn sample_below_by(
+        &self,
+        ctx: &LightCtx,
+        place: u32,
+        u: f32,
+        adjust: impl Fn(usize, f32) -> f32,
+    ) -> Option<(LightId, f32, f32)> {
         let (mut place, mut pmf, mut u) = (place as usize, 1.0, u);
         let mut node = &self.nodes[place];
         while !node.is_leaf {
-            let p = self.left_probability(ctx, place);
+            let p = self.left_probability_by(ctx, place, &adjust);
             if u < p {
                 u /= p;
                 pmf *= p;
@@ -319,6 +340,23 @@ impl LightTree {
     #[inline]
     pub fn sample(&self, ctx: &LightCtx, u: f32) -> Option<(LightId, f32, f32)> {
         if self.is_empty() { None } else { self.sample_below(ctx, 0, u) }
+    }
+
+    /// [`Self::sample`] with importances changed by `adjust(node, importance)`, which keeps positive ones positive.
+    /// Nodes are numbered as in [`Self::sums`].
+    #[inline]
+    pub fn sample_by(&self, ctx: &LightCtx, u: f32, adjust: impl Fn(usize, f32) -> f32) -> Option<(LightId, f32, f32)> {
+        if self.is_empty() { None } else { self.sample_below_by(ctx, 0, u, adjust) }
+    }
+
+    /// For each node, the sum of `of` over the lights below it.
+    pub fn sums(&self, of: impl Fn(LightId) -> f32) -> Vec<f32> {
+        let mut sums = vec![0.0; self.nodes.len()];
+        // Children follow their parents
+        for (place, node) in self.nodes.iter().enumerate().rev() {
+            sums[place] = if node.is_leaf { of(node.index) } else { sums[place + 1] + sums[node.index as usize] };
+        }
+        sums
     }
 
     /// The light of a tree of one light.

@@ -3,23 +3,30 @@
 use super::choice::UNIT;
 use super::{Light, LightCtx, LightId, LightRun, LightTree, SampledLight};
 use lumiris_numbers::math::ONE_MINUS_EPSILON;
+use std::sync::Arc;
 
 /// A light tree, with the infinite lights beside it.
 #[derive(Clone, Debug)]
 pub struct TreeChoice {
     /// Lights with a place.
-    pub tree: LightTree,
+    pub tree: Arc<LightTree>,
     /// Infinite lights, ascending.
     pub infinite: Vec<LightId>,
 }
 
 impl TreeChoice {
+    /// A choice among `lights` in a scene of radius `scene_radius` (m).
+    pub(super) fn of_lights(lights: &[Light], scene_radius: f32) -> Self {
+        let powers: Vec<f32> = lights.iter().map(|light| light.phi(scene_radius)).collect();
+        Self::new(lights, &powers)
+    }
+
     /// A choice among `lights` of the given `powers`.
     pub(super) fn new(lights: &[Light], powers: &[f32]) -> Self {
         let bounds: Vec<_> = lights.iter().map(Light::bounds).collect();
         let is_chosen = |&i: &usize| lights[i].is_infinite() && powers[i] > 0.0;
         let infinite = (0..lights.len()).filter(is_chosen).map(|i| i as LightId).collect();
-        TreeChoice { tree: LightTree::new(&bounds), infinite }
+        TreeChoice { tree: Arc::new(LightTree::new(&bounds)), infinite }
     }
 
     /// Probability of the infinite lights together: each has that of the whole tree. 1 where nothing in the tree can
@@ -33,8 +40,9 @@ impl TreeChoice {
         if self.tree.importance(ctx) > 0.0 { count as f32 / (count + 1) as f32 } else { 1.0 }
     }
 
+    /// Chooses a light by `u` in [0, 1); `None` if there is none.
     #[inline]
-    pub(super) fn sample(&self, ctx: &LightCtx, u: f32) -> Option<SampledLight> {
+    pub fn sample(&self, ctx: &LightCtx, u: f32) -> Option<SampledLight> {
         let TreeChoice { tree, infinite } = self;
         let p_infinite = self.infinite_probability(ctx);
         if u < p_infinite {

@@ -20,11 +20,9 @@ use rayon::prelude::*;
 /// maximum angle between a direction and its nearest axis plus a margin.
 pub const SIDE_COS: f32 = 0.3;
 /// Mean number of photons of the same light around a photon, for [`VisibilityCache::adapted`].
-pub const SECURE_COUNT: f64 = 64.0;
+pub const SECURE_COUNT: f64 = 128.0;
 /// Minimum and maximum radius of [`VisibilityCache::adapted`], relative to the radius of the scene.
 const RADIUS_RANGE: [f32; 2] = [1.0 / 4096.0, 1.0 / 16.0];
-/// Value of [`ContributingLights::visibility`] for non-contributing lights.
-pub const MIN_VISIBILITY: f32 = 0.04;
 
 /// Bits of a cube's index along each axis.
 const AXIS_BITS: u32 = 20;
@@ -52,6 +50,8 @@ pub struct VisibilityCache {
     entries: Vec<(LightId, u32)>,
     /// Cumulative photon counts of each cube.
     sums: Vec<u32>,
+    /// Lights and their numbers of photon paths; ids ascend.
+    paths: Vec<(LightId, f32)>,
 }
 
 /// The contributing lights of a point.
@@ -70,15 +70,10 @@ impl ContributingLights<'_> {
         self.lights.binary_search_by_key(&light, |&(id, _)| id).ok()
     }
 
-    /// An estimate of the visibility of a light, from [`MIN_VISIBILITY`] to 1: (c + [`MIN_VISIBILITY`])/(c + 1) for a
-    /// light with c photons, and 1 where the cache is empty.
+    /// Number of photons of a light.
     #[inline]
-    pub fn visibility(&self, light: LightId) -> f32 {
-        if self.lights.is_empty() {
-            return 1.0;
-        }
-        let count = self.place(light).map_or(0.0, |i| self.lights[i].1 as f32);
-        (count + MIN_VISIBILITY) / (count + 1.0)
+    pub fn count(&self, light: LightId) -> u32 {
+        self.place(light).map_or(0, |i| self.lights[i].1)
     }
 }
 
@@ -113,11 +108,24 @@ impl VisibilityCache {
 
     /// [`Self::new`] with a safe radius, bounded by `scene_radius` (m).
     pub fn adapted(primary: &[(Vec3, Vec3, LightId)], scene_radius: f32) -> Self {
+        Self::adapted_by(primary, scene_radius, Self::mean_count)
+    }
+
+    /// [`Self::adapted`] to the points where it will be used: position and unit normal.
+    pub fn adapted_to(points: &[(Vec3, Vec3)], primary: &[(Vec3, Vec3, LightId)], scene_radius: f32) -> Self {
+        Self::adapted_by(primary, scene_radius, |cache| cache.mean_count_at(points))
+    }
+
+    fn adapted_by(
+        primary: &[(Vec3, Vec3, LightId)],
+        scene_radius: f32,
+        mean_count: impl Fn(&VisibilityCache) -> f64,
+    ) -> Self {
         let [min, max] = RADIUS_RANGE.map(|share| share * scene_radius);
         let mut cache = VisibilityCache::of_photons(primary, scene_radius / 64.0);
         // Photon counts on a surface grow approximately with the square of the radius
         for _ in 0..3 {
-            let ratio = (SECURE_COUNT / cache.mean_count().max(1.0)).sqrt() as f32;
+            let ratio = (SECURE_COUNT / mean_count(&cache).max(1.0)).sqrt() as f32;
             let radius = (cache.radius * ratio.clamp(0.125, 8.0)).clamp(min, max);
             if (radius / cache.radius - 1.0).abs() < 0.1 {
                 break;
@@ -144,10 +152,20 @@ impl VisibilityCache {
             let sides = (0..6).filter(|&side| (if side & 1 == 0 { n[side / 2] } else { -n[side / 2] }) >= SIDE_COS);
             items.extend(sides.map(|side| (key_of(lowest, side as u64), light, 1)));
         }
+        let mut ids: Vec<LightId> = photons().map(|&(.., light)| light).collect();
+        ids.par_sort_unstable();
+        let paths = ids.chunk_by(|a, b| a == b).map(|same| (same[0], same.len() as f32)).collect();
         let items = merged(items);
         let cubes = (0..8_u64).map(|i| key_of([i & 1, i >> 1 & 1, i >> 2], 0));
         let spread = cubes.flat_map(|step| items.iter().map(move |&(key, light, count)| (key + step, light, count)));
-        VisibilityCache::from_sorted(origin, radius, &merged(spread.collect()))
+        VisibilityCache { paths, ..VisibilityCache::from_sorted(origin, radius, &merged(spread.collect())) }
+    }
+
+    /// The same, where some photon paths did not arrive at a surface: with the number of photon paths of each light, ids
+    /// ascending.
+    #[must_use]
+    pub fn with_paths(self, paths: impl Iterator<Item = (LightId, f32)>) -> Self {
+        VisibilityCache { paths: paths.collect(), ..self }
     }
 
     fn from_sorted(origin: Vec3, radius: f32, items: &[(u64, LightId, u32)]) -> Self {
@@ -160,6 +178,7 @@ impl VisibilityCache {
             slots: vec![Slot { key: EMPTY, first: 0, len: 0 }; slots],
             entries: Vec::with_capacity(items.len()),
             sums: Vec::with_capacity(items.len()),
+            paths: Vec::new(),
         };
         for cell in cells {
             let slot = cache.find(cell[0].0);
@@ -198,7 +217,18 @@ impl VisibilityCache {
         let mut items: Vec<_> = self.slots.iter().flat_map(items_of).collect();
         items.retain(|&(_, light, _)| is_light(light));
         items.sort_unstable();
-        VisibilityCache::from_sorted(self.origin, self.radius, &items)
+        VisibilityCache { paths: self.paths, ..VisibilityCache::from_sorted(self.origin, self.radius, &items) }
+    }
+
+    /// Area (m²) of a plane surface in which photons are found from one point: they come from within r around a cube of
+    /// edge 2r.
+    pub fn area(&self) -> f32 {
+        16.0 * self.radius * self.radius
+    }
+
+    /// Number of photon paths of a light; unless they are known, that of its photons.
+    pub fn paths(&self, light: LightId) -> f32 {
+        self.paths.binary_search_by_key(&light, |&(id, _)| id).map_or(0.0, |i| self.paths[i].1)
     }
 
     /// The radius r (m) within which photons are always found.
@@ -234,6 +264,20 @@ impl VisibilityCache {
         let Slot { first, len, .. } = self.slots[self.find(key_of(place, side_of(n)))];
         let range = first as usize..(first + len) as usize;
         ContributingLights { lights: &self.entries[range.clone()], sums: &self.sums[range] }
+    }
+
+    /// Mean over points with photons of the number of photons found there of the same light as a photon found there.
+    fn mean_count_at(&self, points: &[(Vec3, Vec3)]) -> f64 {
+        let (mut sum, mut lit) = (0.0, 0);
+        for &(p, n) in points {
+            let counts = || self.lookup(p, n).iter().map(|&(_, count)| f64::from(count));
+            let photons = counts().sum::<f64>();
+            if photons > 0.0 {
+                sum += counts().map(|c| c * c).sum::<f64>() / photons;
+                lit += 1;
+            }
+        }
+        if lit > 0 { sum / f64::from(lit) } else { 0.0 }
     }
 
     /// Mean over all photons of the number of photons of the same light found at their position.
@@ -323,12 +367,12 @@ mod tests {
         assert!(cache.bytes() > 0 && cache.radius() == 0.15);
         let contributing = cache.lookup_with_sums(at(0.5, 0.5), Vec3::Z);
         assert_eq!(contributing.sums.last().copied(), Some(contributing.lights[0].1));
-        assert!(contributing.visibility(3) > 0.9 && contributing.visibility(8) == MIN_VISIBILITY);
+        assert!(contributing.count(3) > 0 && contributing.count(8) == 0 && cache.paths(9) == 100.0);
 
         let some = cache.clone().of_lights(|light| light != 3);
         assert_eq!(some.lookup(at(0.5, 0.5), Vec3::NEG_Z), cache.lookup(at(0.5, 0.5), Vec3::NEG_Z));
         assert!(some.lookup(at(0.5, 0.5), Vec3::Z).is_empty());
-        assert_eq!(ContributingLights::default().visibility(8), 1.0);
+        assert_eq!((some.paths(7), some.paths(11)), (100.0, 0.0));
     }
 
     #[test]

@@ -12,10 +12,10 @@
 //! [`LightTree`]: super::LightTree
 
 use super::choice::UNIT;
+use super::learned_visibility::facing_irradiance;
 use super::visibility_cache::ContributingLights;
 use super::{Light, LightCtx, LightId, LightRun, SampledLight, TreeChoice, VisibilityCache};
 use lumiris_numbers::math::{ONE_MINUS_EPSILON, cumulative};
-use std::f32::consts::PI;
 use std::sync::Arc;
 
 /// δ: probability of sampling the base instead of the contributing lights.
@@ -86,14 +86,8 @@ impl Known<'_> {
 
 impl VisibilityCacheSampler {
     pub(super) fn new(base: TreeChoice, lights: &[Light], scene_radius: f32) -> Self {
-        let disk = PI * scene_radius * scene_radius;
-        let irradiance = |light: &Light| match light {
-            Light::Distant { .. } => light.phi(scene_radius) / disk,
-            // π times the mean radiance
-            Light::InfiniteConstant { .. } | Light::InfiniteImage { .. } => light.phi(scene_radius) / (4.0 * disk),
-            Light::Point { .. } | Light::Spot { .. } | Light::Area(_) => 0.0,
-        };
-        VisibilityCacheSampler { base, irradiances: lights.iter().map(irradiance).collect(), visibility_cache: None }
+        let irradiances = lights.iter().map(|light| facing_irradiance(light, scene_radius)).collect();
+        VisibilityCacheSampler { base, irradiances, visibility_cache: None }
     }
 
     /// The contributing lights; `None` if none of them has a weight.

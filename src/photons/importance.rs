@@ -141,6 +141,11 @@ pub fn trace_importons(job: &RenderJob, settings: &ImportanceSettings) -> Result
     Ok(Importance { scale: 1.0 / min, map, search, low_importance: settings.low_importance, rays })
 }
 
+/// Importons where they arrive: `paths` paths of at most `max_depth` scattering events.
+pub fn importons(job: &RenderJob, seed: u32, paths: u64, max_depth: u32) -> Vec<Photon> {
+    trace(job, seed ^ SEEDS[0], paths, max_depth, false).0
+}
+
 /// Importons where they arrive, and the number of rays; only the first one of each path if `only_first`.
 fn trace(job: &RenderJob, seed: u32, count: u64, max_depth: u32, only_first: bool) -> (Vec<Photon>, u64) {
     let settings = WalkSettings { transport: Transport::Radiance, max_depth };

@@ -18,9 +18,12 @@ pub struct LightDistribution {
 impl LightDistribution {
     /// `floor`: a in 0..1. `None` if no light emits anything.
     pub fn new(lights: &LightSet, floor: f32) -> Option<Self> {
-        let phi = |i: usize| f64::from(lights.lights[i].phi(lights.scene_radius));
-        let lit: Vec<(LightId, f64)> =
-            (0..lights.lights.len()).map(|i| (i as LightId, phi(i))).filter(|(_, phi)| *phi > 0.0).collect();
+        Self::by_weights(lights, floor, |light| lights.lights[light as usize].phi(lights.scene_radius))
+    }
+
+    /// The same with weights instead of powers; `None` if those of all lights that emit anything are 0.
+    pub fn by_weights(lights: &LightSet, floor: f32, weight: impl Fn(LightId) -> f32) -> Option<Self> {
+        let lit: Vec<(LightId, f64)> = lights.lit.iter().map(|&light| (light, f64::from(weight(light)))).collect();
         let total: f64 = lit.iter().map(|(_, phi)| phi).sum();
         if !(total > 0.0 && total.is_finite()) {
             return None;

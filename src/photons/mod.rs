@@ -26,7 +26,7 @@ mod tree;
 mod walk;
 
 pub use error::PhotonError;
-pub use importance::{Importance, ImportanceSettings, LowImportance, trace_importons};
+pub use importance::{Importance, ImportanceSettings, LowImportance, importons, trace_importons};
 pub use light_distribution::LightDistribution;
 pub use map::{GatherScratch, PhotonMap, Place, Search};
 pub use photon::{Origin, Photon};

@@ -16,6 +16,7 @@ use super::photon::{Origin, Photon};
 use super::rules::{self, CausticRule};
 use super::walk::{Arrival, Particle, WalkSettings, Walker};
 use crate::bsdfs::dielectric::Transport;
+use crate::lights::LightSet;
 use crate::scene::RenderJob;
 use lumiris_numbers::math::hash::pcg4d;
 use lumiris_numbers::math::ray::offset_origin;
@@ -53,6 +54,8 @@ pub struct Tracing<'a> {
     pub caustics: CausticRule,
     /// Fraction of the photon paths distributed evenly over the lights, whatever their powers (0..1).
     pub floor: f32,
+    /// Weights that the lights have instead of their powers.
+    pub light_weights: Option<&'a [f32]>,
     /// Maximum number of photon paths of a pilot; if nothing is stored by then, it is an error.
     pub max_in_pilot: u64,
     /// Ends tracing between two rounds when it becomes true.
@@ -70,9 +73,20 @@ impl Default for Tracing<'_> {
             q: 1.0,
             caustics: CausticRule::default(),
             floor: 0.1,
+            light_weights: None,
             max_in_pilot: 1_000_000,
             stop: None,
             memory: None,
+        }
+    }
+}
+
+impl Tracing<'_> {
+    /// How the photon paths are distributed over the lights; `None` if none of them emits anything.
+    pub fn light_distribution(&self, lights: &LightSet) -> Option<LightDistribution> {
+        match self.light_weights {
+            None => LightDistribution::new(lights, self.floor),
+            Some(weights) => LightDistribution::by_weights(lights, self.floor, |light| weights[light as usize]),
         }
     }
 }
@@ -205,7 +219,7 @@ impl<'a> Run<'a> {
         if !(tracing.q > 0.0 && tracing.q <= 1.0) {
             return Err(PhotonError::InvalidRatio(tracing.q));
         }
-        let light_distribution = LightDistribution::new(lights, tracing.floor).ok_or(PhotonError::NoEmission)?;
+        let light_distribution = tracing.light_distribution(lights).ok_or(PhotonError::NoEmission)?;
         Ok(Run { job, tracing, importance, light_distribution })
     }
 

@@ -319,7 +319,7 @@ pub struct ContributingSettings {
 
 impl Default for ContributingSettings {
     fn default() -> Self {
-        ContributingSettings { noncontributing_samples: 1 }
+        ContributingSettings { noncontributing_samples: 2 }
     }
 }
 

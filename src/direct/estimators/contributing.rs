@@ -1,20 +1,21 @@
 //! Direct light sampled separately from the contributing lights 𝓛_con, which the visibility cache finds, and from all
 //! others [Keller and Wald 2000, §3].
 //!
-//! S_con samples are taken on 𝓛_con:
+//! S_con samples are taken on 𝓛_con in proportion to w_l = E_l·√V̂_l, the density of least variance: E_l is the light's
+//! irradiance without shadows, V̂_l its visibility as photons tell it ([`crate::lights::learned_visibility`]). With
+//! m_l = S_con·w_l/Σ w, light l gets ⌊m_l⌋ or ⌈m_l⌉ samples by systematic resampling. If m_l ≥ 1, it counts their mean;
+//! otherwise it has a sample with probability m_l, which counts 1/m_l times. Where there are more than
+//! [`MAX_WEIGHTED`] such lights, S_con of them are chosen in proportion to their numbers of photons.
 //!
-//! * |𝓛_con| ≤ S_con: every light gets one sample, and the remaining ones are allocated by emission area. The estimate
-//!   is the sum of the lights' estimates. The area of an infinite light is that of the disk from which its photons
-//!   start; point, spot and distant lights have no area and never get a second sample.
-//! * |𝓛_con| > S_con: the unshadowed contributions k_l of all these lights are sorted [Ward 1991]. The S_con − 1
-//!   largest are traced. Ward estimates the sum of the others from the visibility of those traced; here one of the
-//!   others is traced, chosen with probability q_l = Y(k_l)/Σ Y(k) by luminance Y, and counts k_l/q_l. Its expectation
-//!   is the sum of their shadowed contributions, so the estimate is unbiased.
-//! * |𝓛_con| > [`MAX_ORDERED`]: S_con lights are chosen in proportion to their numbers of photons.
+//! S_non samples are taken on the non-contributing lights, which a descent of the light tree chooses nearly in proportion
+//! to E_l·√V̂_l, where V̂_l is that of a light without photons: lights of which many photons were expected get few of these
+//! samples. A contributing light that is chosen counts 0. A sample of the light l, chosen with probability p_l, survives
+//! Russian roulette with probability q_l = min(1, [`SURVIVAL`]·(E_l·√V̂_l/p_l)/Σ E·V̂), by what is expected of it relative to
+//! the contributing lights, and counts 1/(p_l·q_l) times. So every sum has the right expectation whatever the photons
+//! tell; without these samples (S_non = 0) the estimate is biased.
 //!
-//! S_non samples are taken on the non-contributing lights: a light chosen uniformly among the n that emit counts n
-//! times [Eq. 1 of the paper]. Without these samples (S_non = 0) the estimate is biased. Where the cache is empty, all
-//! S_con + S_non samples are drawn as by `mc`.
+//! Where no light contributes, all S_con + S_non samples are taken on non-contributing lights, without roulette. Without
+//! a visibility cache, or one that is empty, they are drawn as by `mc`.
 
 use super::mc;
 use crate::direct::candidates::{Candidate, SampleAllocation};
@@ -22,13 +23,15 @@ use crate::direct::domain;
 use crate::direct::light_samples::{self, unshadowed_candidate};
 use crate::direct::point::ShadingPoint;
 use crate::direct::t1::T1;
-use crate::lights::{Light, LightCtx, LightId, LightSample, LightSampling, LightSet};
+use crate::lights::visibility_cache::ContributingLights;
+use crate::lights::{LearnedVisibility, LightCtx, LightId, LightSample, LightSampling, SampledLight};
 use crate::scene::RenderJob;
 use lumiris_numbers::math::cumulative;
-use std::f32::consts::PI;
 
-/// Maximum number of lights that are sorted at a point.
-pub const MAX_ORDERED: usize = 64;
+/// Maximum number of contributing lights whose weights are compared at a point.
+pub const MAX_WEIGHTED: usize = 64;
+/// Survival probability of a sample of non-contributing lights, per part of the expected contribution of the others.
+const SURVIVAL: f32 = 3.0;
 
 /// Light sampling, separately of contributing and of non-contributing lights.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -50,20 +53,19 @@ impl Contributing {
 /// What is kept from point to point, to save allocations.
 #[derive(Debug, Default)]
 pub(super) struct Buffers {
-    /// 𝓛_con: lights and their photon counts, ids ascending.
-    contributing: Vec<(LightId, u32)>,
-    /// Samples per light.
-    counts: Vec<u32>,
-    /// Contributions sorted by luminance.
-    ordered: Vec<(f32, Candidate)>,
+    /// Weights of the contributing lights.
+    weights: Vec<f32>,
 }
 
 /// A point and the lights that are sampled from it.
 struct At<'a> {
     lights: &'a LightSampling,
+    learned: &'a LearnedVisibility,
     index: u32,
     point: &'a ShadingPoint<'a>,
     ctx: LightCtx,
+    /// 𝓛_con with photon counts.
+    seen: ContributingLights<'a>,
 }
 
 impl At<'_> {
@@ -76,7 +78,7 @@ impl At<'_> {
 }
 
 impl Buffers {
-    /// Draws the light samples of a point, `noncontributing` of them on non-contributing lights. Returns their number.
+    /// Draws the light samples of a point. Returns their number.
     fn draw(
         &mut self,
         job: &RenderJob,
@@ -84,153 +86,96 @@ impl Buffers {
         noncontributing: u32,
         records: &mut Vec<Candidate>,
     ) -> u32 {
-        let lights = &job.lights;
-        let ctx = point.light_ctx();
-        let at = At { lights, index, point, ctx };
-        self.contributing.clear();
-        self.contributing.extend_from_slice(lights.contributing_lights(&ctx).lights);
-
         let n = point.sample_counts.samples;
-        if self.contributing.is_empty() {
+        let lights = &job.lights;
+        let Some(learned) = lights.learned_visibility() else {
             return light_samples::draw(job, (index, point), &SampleAllocation::fixed(n + noncontributing, 0), records);
-        }
-        let drawn = if self.contributing.len() <= n as usize {
-            self.draw_each(&at, n, records)
-        } else if self.contributing.len() <= MAX_ORDERED {
-            self.draw_ordered(&at, n, records)
-        } else {
-            self.draw_by_photons(&at, n, records)
         };
-        drawn + self.draw_noncontributing(&at, noncontributing, records)
+        let ctx = point.light_ctx();
+        let at = At { lights, learned, index, point, ctx, seen: lights.contributing_lights(&ctx) };
+        let expected = match at.seen.lights.len() {
+            0 => return at.draw_unseen(n + noncontributing, f32::INFINITY, records),
+            1..=MAX_WEIGHTED => self.draw_weighted(&at, n, records),
+            _ => Some(at.draw_by_photons(n, records)),
+        };
+        match expected {
+            Some(expected) => n + at.draw_unseen(noncontributing, SURVIVAL / expected, records),
+            None => light_samples::draw(job, (index, point), &SampleAllocation::fixed(n + noncontributing, 0), records),
+        }
     }
 
-    /// At least one sample of every contributing light.
-    fn draw_each(&mut self, at: &At<'_>, n: u32, records: &mut Vec<Candidate>) -> u32 {
-        let contributing = &self.contributing;
-        let areas = contributing.iter().map(|&(light, _)| emission_area(at.lights, light));
-        allocate_by_area(n - contributing.len() as u32, areas, &mut self.counts);
-        for (k, (&(light, _), &count)) in contributing.iter().zip(&self.counts).enumerate() {
+    /// Samples of the contributing lights, in proportion to E·√V̂. Returns Σ E·V̂; `None`, and no samples, if it
+    /// is not known.
+    fn draw_weighted(&mut self, at: &At<'_>, n: u32, records: &mut Vec<Candidate>) -> Option<f32> {
+        // Weights
+        self.weights.clear();
+        let (mut sum, mut expected) = (0.0, 0.0);
+        for &(light, count) in at.seen.lights {
+            let importance = at.learned.importance(&at.ctx, light);
+            let visibility = at.learned.visibility(light, importance, count);
+            let weight = importance * visibility.sqrt();
+            sum += weight;
+            expected += importance * visibility;
+            self.weights.push(weight);
+        }
+        if !(sum > 0.0 && sum.is_finite() && expected > 0.0) {
+            return None;
+        }
+
+        // Samples
+        let [offset] = at.point.stream.domain(domain::COUNTS).draw::<1>();
+        let scale = n as f32 / sum;
+        let (mut upto, mut given) = (offset, 0);
+        for (k, (&(light, _), &weight)) in at.seen.lights.iter().zip(&self.weights).enumerate() {
+            let wanted = weight * scale;
+            upto += wanted;
+            // At least one sample where one or more are wanted, whatever rounding does
+            let count = (upto as u32).saturating_sub(given).max(u32::from(wanted >= 1.0));
+            given = upto as u32;
             for i in 0..count {
                 let u = at.point.stream.split(domain::CONTRIBUTING + k as u32, count, i).draw::<2>();
-                records.extend(at.sample(light, 1.0, count, u));
+                records.extend(at.sample(light, wanted.min(1.0), if wanted >= 1.0 { count } else { 1 }, u));
             }
         }
-        self.counts.iter().sum()
+        Some(expected)
     }
+}
 
-    /// The largest contributions, and one of the others.
-    fn draw_ordered(&mut self, at: &At<'_>, n: u32, records: &mut Vec<Candidate>) -> u32 {
-        self.ordered.clear();
-        for (k, &(light, _)) in self.contributing.iter().enumerate() {
-            let u = at.point.stream.domain(domain::CONTRIBUTING + k as u32).draw::<2>();
-            let candidate = at.sample(light, 1.0, 1, u);
-            self.ordered.extend(candidate.map(|c| (c.f.luminance() / c.p_light, c)));
-        }
-        // The sort is stable: equal contributions stay in the order of their lights
-        self.ordered.sort_by(|a, b| b.0.total_cmp(&a.0));
-        let sure = self.ordered.len().min(n as usize - 1);
-        let (brightest, dim) = self.ordered.split_at(sure);
-        records.extend(brightest.iter().map(|(_, c)| *c));
-
-        // One of the others, in proportion to its luminance
-        let total: f32 = dim.iter().map(|(brightness, _)| brightness).sum();
-        let [u] = at.point.stream.domain(domain::DIM).draw::<1>();
-        let mut x = u * total;
-        let chosen = dim.iter().enumerate().find(|(i, (brightness, _))| {
-            x -= brightness;
-            x < 0.0 || i + 1 == dim.len()
-        });
-        let chosen = chosen.map(|(_, (brightness, c))| Candidate { n_light: brightness / total, ..*c });
-        records.extend(chosen.filter(|c| c.n_light > 0.0));
-        self.contributing.len() as u32
-    }
-
-    /// Lights chosen in proportion to their numbers of photons.
-    fn draw_by_photons(&mut self, at: &At<'_>, n: u32, records: &mut Vec<Candidate>) -> u32 {
-        // Cumulative photon counts
-        let numbers = self.contributing.iter().map(|&(_, count)| count);
-        self.counts.clear();
-        self.counts.extend(numbers.scan(0_u32, |sum, count| {
-            *sum = sum.saturating_add(count);
-            Some(*sum)
-        }));
-        let total = self.counts.last().copied().unwrap_or(0) as f32;
+impl At<'_> {
+    /// Contributing lights chosen in proportion to their numbers of photons. Returns the irradiance of all photons.
+    fn draw_by_photons(&self, n: u32, records: &mut Vec<Candidate>) -> f32 {
+        let ContributingLights { lights, sums } = self.seen;
+        let Some(&total) = sums.last() else { return 0.0 };
         for i in 0..n {
-            let [u_choice, u0, u1] = at.point.stream.split(domain::LIGHT, n, i).draw::<3>();
-            let k = cumulative::find(&self.counts, u_choice * total).min(self.contributing.len() - 1);
-            let pmf = cumulative::weight(&self.counts, k) / total;
-            records.extend(at.sample(self.contributing[k].0, pmf, n, [u0, u1]));
+            let [u_choice, u0, u1] = self.point.stream.split(domain::LIGHT, n, i).draw::<3>();
+            let k = cumulative::find(sums, u_choice * total as f32).min(lights.len() - 1);
+            let pmf = cumulative::weight(sums, k) / total as f32;
+            records.extend(self.sample(lights[k].0, pmf, n, [u0, u1]));
         }
-        n
+        lights.iter().map(|&(light, count)| self.learned.irradiance_of(light, count)).sum()
     }
 
-    /// Samples of non-contributing lights, chosen uniformly.
-    fn draw_noncontributing(&self, at: &At<'_>, noncontributing: u32, records: &mut Vec<Candidate>) -> u32 {
-        let lit = &at.lights.lit;
-        let others = lit.len() - self.contributing.len();
-        if others == 0 {
+    /// Samples of non-contributing lights, of which as many survive as their expected contribution times `scale` says.
+    /// Returns how many.
+    fn draw_unseen(&self, n: u32, scale: f32, records: &mut Vec<Candidate>) -> u32 {
+        if self.seen.lights.len() == self.lights.lit.len() {
             return 0;
         }
-        for i in 0..noncontributing {
-            let [u_choice, u0, u1] = at.point.stream.split(domain::NONCONTRIBUTING, noncontributing, i).draw::<3>();
-            let mut place = ((f64::from(u_choice) * others as f64) as usize).min(others - 1);
-            // Skip the contributing lights
-            for &(light, _) in &self.contributing {
-                if lit[place] < light {
-                    break;
-                }
-                place += 1;
+        let mut drawn = 0;
+        for i in 0..n {
+            let [u_choice, u_survival, u0, u1] = self.point.stream.split(domain::NONCONTRIBUTING, n, i).draw::<4>();
+            let Some(unseen) = self.learned.sample_unseen(&self.ctx, &self.seen, u_choice) else { continue };
+            let SampledLight { light, pmf, .. } = unseen.choice;
+            // Contributing lights have their own samples
+            if self.seen.place(light).is_some() || !(unseen.importance > 0.0) {
+                continue;
             }
-            records.extend(at.sample(lit[place], 1.0 / others as f32, noncontributing, [u0, u1]));
+            let survival = (unseen.importance * unseen.visibility.sqrt() / pmf * scale).min(1.0);
+            if u_survival < survival {
+                drawn += 1;
+                records.extend(self.sample(light, pmf * survival, n, [u0, u1]));
+            }
         }
-        noncontributing
-    }
-}
-
-/// Emission area of a light (m²); 0 if a second sample of it would be useless.
-fn emission_area(lights: &LightSet, light: LightId) -> f32 {
-    match &lights.lights[light as usize] {
-        Light::Point { .. } | Light::Spot { .. } | Light::Distant { .. } => 0.0,
-        Light::Area(area) => area.area(),
-        Light::InfiniteConstant { .. } | Light::InfiniteImage { .. } => PI * lights.scene_radius * lights.scene_radius,
-    }
-}
-
-/// One sample per light plus `extra` in proportion to the areas, rounded so that cumulative counts are off by less than
-/// one.
-fn allocate_by_area(extra: u32, areas: impl Iterator<Item = f32> + Clone, counts: &mut Vec<u32>) {
-    let total: f64 = areas.clone().map(f64::from).sum();
-    let scale = if total > 0.0 && total.is_finite() { f64::from(extra) / total } else { 0.0 };
-    let (mut sum, mut given) = (0.0, 0);
-    counts.clear();
-    counts.extend(areas.map(|area| {
-        sum += f64::from(area) * scale;
-        let upto = (sum.round() as u32).min(extra);
-        let count = 1 + upto - given;
-        given = upto;
-        count
-    }));
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-
-    #[test]
-    fn samples_are_allocated_by_area_with_one_for_each() {
-        let shared = |extra, areas: &[f32]| {
-            let mut counts = vec![7];
-            allocate_by_area(extra, areas.iter().copied(), &mut counts);
-            counts
-        };
-        assert_eq!(shared(0, &[1.0, 5.0]), [1, 1]);
-        assert_eq!(shared(6, &[1.0, 2.0, 3.0]), [2, 3, 4]);
-        assert_eq!(shared(6, &[0.0, 0.0]), [1, 1]);
-        assert_eq!(shared(5, &[0.0, 2.0, 0.0]), [1, 6, 1]);
-        for extra in 0..40 {
-            let counts = shared(extra, &[0.3, 0.0, 2.7, 1.1, 1.1, 0.2]);
-            assert_eq!(counts.iter().sum::<u32>(), extra + 6);
-            assert!(counts.iter().all(|&c| c > 0) && counts[1] == 1);
-        }
+        drawn
     }
 }

@@ -5,9 +5,9 @@
 //! these are evaluated in colour and traced. This is unbiased for any M ≥ N ≥ 1: given the proposals, the expectation
 //! over the draws is the estimate that would trace all of them.
 //!
-//! The target `visibility` multiplies q̂ by an estimate V̂ > 0 of the visibility of each light, from the visibility
-//! cache ([`crate::lights::visibility_cache`]): fewer occluded samples are drawn, and the estimate is unbiased for any
-//! V̂.
+//! The target `visibility` multiplies q̂ by √V̂, where V̂ > 0 is an estimate of the visibility of each light by its
+//! photons ([`crate::lights::learned_visibility`]): if V is 1 with probability V̂ and 0 otherwise, the density of least variance
+//! is proportional to q̂·√V̂. Fewer occluded samples are drawn, and the estimate is unbiased for any V̂.
 //!
 //! Targets with visibility reverse the order: proposals are traced, and N of the visible ones are shaded; light samples
 //! do not need the BSDF before that.

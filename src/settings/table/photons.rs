@@ -149,7 +149,7 @@ pub(super) const PHOTONS: Group = Group {
             kind: integer(1, MAX_U32),
             help: "Photon paths traced for the visibility cache, which --light-sampler photons, --target visibility \
                    and --estimator contributing use",
-            default: "512 per light, at least 262144",
+            default: "262144",
             applies: Applies::If(|s| s.integrator.uses_visibility_cache()),
             get: |s| s.integrator.photons.visibility_photons.map(|n| Value::Integer(n.into())),
             set: |s, v| v.count().map(|n| s.integrator.photons.visibility_photons = Some(n)),

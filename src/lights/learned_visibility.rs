@@ -1,0 +1,240 @@
+//! What photons tell of the visibility of lights: an estimate V̂ of it, and the choice of a light that the visibility
+//! cache has not found.
+//!
+//! If a light is visible around a point, μ = E·A·N/Φ of its photons are expected there: E is the irradiance without
+//! shadows [lm/m² by luminance, up to a factor that all have in common], A the area in which photons are found, N the
+//! number of photon paths that start at the light, and Φ its power. The number that arrives is Poisson distributed with
+//! the mean V·μ. With a gamma distribution of mean v₀ and shape a as the prior of V, the posterior mean is
+//!
+//! > V̂ = (c + a)/(μ + a/v₀)
+//!
+//! for c photons. So V̂ is near 0 for a light of which many photons were expected and none came, and v₀ for one that is
+//! too far away, or has too few photon paths, for its photons to tell anything.
+//!
+//! The density of light samples that has the least variance is proportional to E·√V̂, as the second moment of a sample
+//! is E²·V̂/p. [`LearnedVisibility::sample_unseen`] chooses lights without photons in this way: of a node of the light
+//! tree, Φ/(A·N) is the sum over its lights.
+
+use super::tree_choice::TreeChoice;
+use super::visibility_cache::{ContributingLights, VisibilityCache};
+use super::{Light, LightCtx, LightId, SampledLight};
+use lumiris_numbers::math::ONE_MINUS_EPSILON;
+use std::f32::consts::PI;
+
+/// v₀ and a of the prior of V.
+const PRIOR_MEAN: f32 = 0.5;
+const PRIOR_SHAPE: f32 = 1.0;
+/// Minimum of V̂, which bounds the weight of a sample.
+pub const MIN_VISIBILITY: f32 = 1e-4;
+/// Minimum number of photon paths of a light, for those that got none.
+const MIN_PATHS: f32 = 0.5;
+
+/// The visibility of lights as photons tell it.
+#[derive(Clone, Debug)]
+pub struct LearnedVisibility {
+    choice: TreeChoice,
+    /// For each infinite light, the luminance of the irradiance on a surface facing it; 0 for others.
+    irradiances: Vec<f32>,
+    /// Φ/(A·N) of each light: the irradiance for which one photon is expected.
+    of_one_photon: Vec<f32>,
+    /// Sums of these over the lights below each node of the tree.
+    of_nodes: Vec<f32>,
+}
+
+/// A light that the visibility cache has not found at a point.
+#[derive(Clone, Copy, Debug)]
+pub struct UnseenLight {
+    /// The light.
+    pub choice: SampledLight,
+    /// E, up to a factor that all lights have in common.
+    pub importance: f32,
+    /// V̂ of a light without photons.
+    pub visibility: f32,
+}
+
+/// V̂ for a light of irradiance `importance` with `count` photons, one of which stands for `of_one_photon`.
+#[inline]
+fn estimate(importance: f32, of_one_photon: f32, count: f32) -> f32 {
+    let v = (count + PRIOR_SHAPE) * of_one_photon / (importance + PRIOR_SHAPE / PRIOR_MEAN * of_one_photon);
+    v.clamp(MIN_VISIBILITY, 1.0)
+}
+
+/// Luminance of the irradiance on a surface that faces an infinite light; 0 for others.
+pub(super) fn facing_irradiance(light: &Light, scene_radius: f32) -> f32 {
+    let disk = PI * scene_radius * scene_radius;
+    match light {
+        Light::Distant { .. } => light.phi(scene_radius) / disk,
+        // π times the mean radiance
+        Light::InfiniteConstant { .. } | Light::InfiniteImage { .. } => light.phi(scene_radius) / (4.0 * disk),
+        Light::Point { .. } | Light::Spot { .. } | Light::Area(_) => 0.0,
+    }
+}
+
+impl LearnedVisibility {
+    /// What `cache` tells of `lights`, the tree over which is that of `choice`.
+    pub(super) fn new(choice: TreeChoice, lights: &[Light], scene_radius: f32, cache: &VisibilityCache) -> Self {
+        let of_one_photon: Vec<f32> = (0..)
+            .zip(lights)
+            .map(|(id, light)| light.phi(scene_radius) / (cache.area() * cache.paths(id).max(MIN_PATHS)))
+            .map(|irradiance| irradiance.clamp(f32::MIN_POSITIVE, 1e30))
+            .collect();
+        let of_nodes = choice.tree.sums(|light| of_one_photon[light as usize]);
+        let irradiances = lights.iter().map(|light| facing_irradiance(light, scene_radius)).collect();
+        LearnedVisibility { choice, irradiances, of_one_photon, of_nodes }
+    }
+
+    /// E of a light, or a bound of it, up to a factor that all lights have in common; 0 if it cannot contribute.
+    #[inline]
+    pub fn importance(&self, ctx: &LightCtx, light: LightId) -> f32 {
+        if self.choice.tree.contains(light) {
+            self.choice.tree.light_importance(ctx, light)
+        } else {
+            self.irradiances[light as usize]
+        }
+    }
+
+    /// V̂ of a light by its E and its number of photons, from [`MIN_VISIBILITY`] to 1.
+    #[inline]
+    pub fn visibility(&self, light: LightId, importance: f32, count: u32) -> f32 {
+        estimate(importance, self.of_one_photon[light as usize], count as f32)
+    }
+
+    /// The irradiance of `count` photons of a light.
+    #[inline]
+    pub fn irradiance_of(&self, light: LightId, count: u32) -> f32 {
+        count as f32 * self.of_one_photon[light as usize]
+    }
+
+    /// Chooses a light by `u` in [0, 1), nearly in proportion to E·√V̂ for lights without photons; every light that can
+    /// contribute and is not in `seen` has a positive probability. Lights in `seen` may be chosen too. `None` if there
+    /// is no light.
+    #[inline]
+    pub fn sample_unseen(&self, ctx: &LightCtx, seen: &ContributingLights<'_>, u: f32) -> Option<UnseenLight> {
+        let TreeChoice { tree, infinite } = &self.choice;
+
+        // Infinite lights, each with the probability of the whole tree
+        let unseen = || infinite.iter().filter(|&&light| seen.place(light).is_none());
+        let count = unseen().count();
+        let p_infinite = match count {
+            0 => 0.0,
+            _ if tree.importance(ctx) > 0.0 => count as f32 / (count + 1) as f32,
+            _ => 1.0,
+        };
+        if u < p_infinite {
+            let x = u / p_infinite * count as f32;
+            let i = (x as usize).min(count - 1);
+            let u = (x - i as f32).clamp(0.0, ONE_MINUS_EPSILON);
+            let light = *unseen().nth(i)?;
+            return Some(self.unseen(ctx, SampledLight { light, pmf: p_infinite / count as f32, u }));
+        }
+
+        // Those in the tree
+        let u = ((u - p_infinite) / (1.0 - p_infinite)).min(ONE_MINUS_EPSILON);
+        let by_visibility = |node: usize, e: f32| e * estimate(e, self.of_nodes[node], 0.0).sqrt();
+        let (light, pmf, u) = tree.sample_by(ctx, u, by_visibility)?;
+        Some(self.unseen(ctx, SampledLight { light, pmf: pmf * (1.0 - p_infinite), u }))
+    }
+
+    #[inline]
+    fn unseen(&self, ctx: &LightCtx, choice: SampledLight) -> UnseenLight {
+        let importance = self.importance(ctx, choice.light);
+        UnseenLight { choice, importance, visibility: self.visibility(choice.light, importance, 0) }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use lumiris_numbers::math::{Rgb, Vec3};
+    use lumiris_test_support::random::{RngExt, pcg32};
+
+    const RADIUS: f32 = 20.0;
+    const AT: Vec3 = Vec3::new(0.5, 0.5, 0.0);
+
+    /// Lamps in a row above the floor, and two infinite lights.
+    fn lamps() -> Vec<Light> {
+        let lamp = |i: i32| Light::Point { p: Vec3::new(i as f32, 0.3, 2.0), intensity: Rgb::splat(1.0 + i as f32) };
+        let mut lights: Vec<Light> = (0..12).map(lamp).collect();
+        lights.push(Light::InfiniteConstant { l: Rgb::splat(0.1) });
+        lights.push(Light::Distant { wi_world: Vec3::Z, l: Rgb::splat(0.2) });
+        lights
+    }
+
+    /// A cache with `count` photons of each light of `seen` at the point, and as many photon paths of all as `paths`.
+    fn cache(seen: &[LightId], count: usize, paths: f32) -> VisibilityCache {
+        let photons = seen.iter().flat_map(|&light| vec![(AT, Vec3::Z, light); count]);
+        VisibilityCache::new(photons, 0.2).with_paths((0..14).map(|light| (light, paths)))
+    }
+
+    fn learned(cache: &VisibilityCache) -> LearnedVisibility {
+        let lights = lamps();
+        LearnedVisibility::new(TreeChoice::of_lights(&lights, RADIUS), &lights, RADIUS, cache)
+    }
+
+    #[test]
+    fn visibility_is_the_ratio_of_photons_to_those_expected_and_the_prior_without_any() {
+        // A lamp above a floor: the irradiance I/h² is that of N·A/(4π h²) photons.
+        let lights = [Light::Point { p: AT + Vec3::Z * 3.0, intensity: Rgb::splat(7.0) }];
+        let ctx = LightCtx { p: AT, n: Vec3::Z, ns: Vec3::Z };
+        let of = |paths: f32| {
+            let cache = VisibilityCache::new(std::iter::once((AT, Vec3::Z, 0)), 0.1);
+            let cache = cache.with_paths(std::iter::once((0, paths)));
+            let learned = LearnedVisibility::new(TreeChoice::of_lights(&lights, RADIUS), &lights, RADIUS, &cache);
+            let importance = learned.importance(&ctx, 0);
+            move |count| learned.visibility(0, importance, count)
+        };
+        let many = 4.0 * PI * 9.0 / (16.0 * 0.01) * 1000.0;
+        for (count, expected) in [(0, 0.001), (250, 0.25), (1000, 1.0), (2000, 1.0)] {
+            let v = of(many)(count);
+            assert!((v - expected).abs() < 2e-3, "{count} photons: {v}");
+        }
+        assert!((of(1e-3 * many)(0) - PRIOR_SHAPE / (1.0 + PRIOR_SHAPE / PRIOR_MEAN)).abs() < 1e-3);
+        assert!((of(1e-9 * many)(0) - PRIOR_MEAN).abs() < 0.01 && of(0.0)(0) > 0.4);
+        assert_eq!(of(1e12 * many)(0), MIN_VISIBILITY);
+    }
+
+    #[test]
+    fn every_light_that_is_not_seen_is_chosen_with_the_probability_given() {
+        for (seen, count, paths) in
+            [(&[0, 3, 12][..], 5, 1e4), (&[12, 13], 1, 100.0), (&[1], 3, 0.0), (&[2, 5], 9, 1e12)]
+        {
+            let cache = cache(seen, count, paths);
+            let learned = learned(&cache);
+            let ctx = LightCtx { p: AT, n: Vec3::Z, ns: Vec3::Z };
+            let contributing = cache.lookup_with_sums(AT, Vec3::Z);
+            assert_eq!(contributing.lights.len(), seen.len());
+
+            // The mean of 1/pmf over the draws of a light is 1
+            let draws = 200_000;
+            let mut s = pcg32([3, 1, 4]);
+            let (mut means, mut squares) = ([0.0_f64; 14], [0.0_f64; 14]);
+            for _ in 0..draws {
+                let unseen = learned.sample_unseen(&ctx, &contributing, s.random::<f32>()).unwrap();
+                let SampledLight { light, pmf, u } = unseen.choice;
+                assert!((0.0..1.0).contains(&u) && pmf > 0.0);
+                assert_eq!(unseen.importance, learned.importance(&ctx, light));
+                means[light as usize] += f64::from(1.0 / pmf) / f64::from(draws);
+                squares[light as usize] += f64::from(1.0 / pmf).powi(2) / f64::from(draws);
+            }
+            for light in (0..14).filter(|light| !seen.contains(light)) {
+                let (mean, square) = (means[light as usize], squares[light as usize]);
+                let sigma = ((square - mean * mean) / f64::from(draws)).sqrt();
+                assert!((mean - 1.0).abs() < 4.5 * sigma + 1e-4, "{seen:?}, light {light}: {mean} ± {sigma}");
+            }
+        }
+    }
+
+    #[test]
+    fn lights_whose_photons_were_expected_and_did_not_come_are_chosen_less() {
+        let ctx = LightCtx { p: AT, n: Vec3::Z, ns: Vec3::Z };
+        let share_of_near = |paths: f32| {
+            let cache = cache(&[5], 1, paths);
+            let learned = learned(&cache);
+            let contributing = cache.lookup_with_sums(AT, Vec3::Z);
+            let near = |i: u32| learned.sample_unseen(&ctx, &contributing, (i as f32 + 0.5) / 4096.0).unwrap();
+            (0..4096).filter(|&i| near(i).choice.light < 3).count()
+        };
+        let [few, many] = [1.0, 1e6].map(share_of_near);
+        assert!(few > many + 100, "{few} {many}");
+    }
+}
