@@ -3,12 +3,16 @@
 //! An [`Integrator`] is what all threads share while an image is rendered: it prepares what samples need, makes a
 //! [`Tracer`] for each thread, and reports. Reading order: `segment` is a path between two vertices, `vertices` finds
 //! the next ones, and [`path`] is the loop over them; `wavefront` has the vertices of `mc` and `mis` side by side.
+//! `roulette` decides which paths end and split where they arrive (`arrivals`), by what `pilot` paths found.
 //! [`irradiance_cache`] and [`photon_map`] replace the light that Lambertian parts reflect (`diffuse`).
 
+mod arrivals;
 mod diffuse;
 pub mod irradiance_cache;
 pub mod path;
 pub mod photon_map;
+mod pilot;
+mod roulette;
 mod segment;
 mod vertices;
 mod wavefront;
@@ -16,12 +20,13 @@ mod wavefront;
 pub use irradiance_cache::{CacheIntegrator, CacheReport, IrradianceCache};
 pub use path::{CameraSample, PathIntegrator, PathStats, PathTracer};
 pub use photon_map::{MapStats, PhotonMapIntegrator};
+pub use pilot::GuidedIntegrator;
 
 use crate::direct::Fits;
 use crate::film::{Film, PixelSample};
 use crate::photons::PhotonError;
 use crate::scene::RenderJob;
-use crate::settings::IntegratorKind;
+use crate::settings::{IntegratorKind, RouletteKind};
 use std::sync::atomic::AtomicBool;
 
 /// A way to render an image: what all threads share.
@@ -64,6 +69,9 @@ pub fn integrator<'a>(
     stop: &'a AtomicBool,
 ) -> Result<Box<dyn Integrator + 'a>, PhotonError> {
     Ok(match job.settings().integrator.kind {
+        IntegratorKind::Path if job.settings().integrator.roulette != RouletteKind::Throughput => {
+            Box::new(GuidedIntegrator::new(job))
+        }
         IntegratorKind::Direct | IntegratorKind::Path => Box::new(PathIntegrator),
         IntegratorKind::IrradianceCache => Box::new(CacheIntegrator::new(job, cameras, stop)),
         IntegratorKind::PhotonMap => Box::new(PhotonMapIntegrator::new(job, cameras, stop)?),

@@ -152,7 +152,8 @@ impl PathTracer {
             }
             let is_plain = own.is_none() && self.outcomes.is_none();
             let estimate = Estimate::new(settings, vertex).filter(|_| is_plain);
-            let mut batch = estimate.map(|e| Batch::new(self.buffers.take().unwrap_or_default(), e, count));
+            let room = count * self.search.arrivals.max_paths() as usize;
+            let mut batch = estimate.map(|e| Batch::new(self.buffers.take().unwrap_or_default(), e, room));
             let stage = Stage { job, vertex, depth, samples, out: &mut *out, batch: batch.as_mut() };
             let vertices = self.search.find(stage);
             let found = Found { vertex, paths: &self.search.active, vertices: &vertices };

@@ -26,6 +26,9 @@ pub(super) mod domain {
     pub(crate) const ALBEDO: u32 = 4;
     /// Vertex k uses the domain `VERTEX + k` of the camera sample.
     pub(crate) const VERTEX: u32 = 16;
+    /// Paths that are `count` at vertex k use points of the domain `SPLIT + 16 k + count` in place of that of the path
+    /// which they were until then.
+    pub(crate) const SPLIT: u32 = 1 << 20;
 }
 
 /// Counts and times.
@@ -86,6 +89,8 @@ pub struct CameraSample {
     pub sample_counts: SampleCounts,
     /// The fit of its pixel.
     pub fit: u32,
+    /// Its pixel; any, where none is the sample's.
+    pub pixel: [u32; 2],
 }
 
 /// The state of a path.
@@ -93,6 +98,8 @@ pub struct CameraSample {
 pub(super) struct PathState {
     /// Index of the camera sample.
     pub(super) sample: u32,
+    /// Number of its random numbers, if it is one of several paths of the sample; 0 are those of the sample.
+    pub(super) branch: u32,
     pub(super) ray: Ray,
     pub(super) beta: Rgb,
     /// Squared relative index of refraction along the path, which roulette takes out of β.
@@ -113,6 +120,8 @@ pub(super) struct PathState {
 pub(super) struct Carried {
     /// Index of the camera sample.
     pub(super) sample: u32,
+    /// See [`PathState`].
+    pub(super) branch: u32,
     pub(super) beta: Rgb,
     pub(super) eta_scale: f32,
     /// Width of a pixel at the vertex, and its growth per unit length.
@@ -125,8 +134,8 @@ impl PathState {
     /// At a vertex with the throughput `beta`, where a pixel has the given width.
     #[inline]
     pub(super) fn carried(&self, beta: Rgb, width: f32) -> Carried {
-        let PathState { sample, eta_scale, spread, ray: Ray { time, .. }, .. } = *self;
-        Carried { sample, beta, eta_scale, width, spread, time }
+        let PathState { sample, branch, eta_scale, spread, ray: Ray { time, .. }, .. } = *self;
+        Carried { sample, branch, beta, eta_scale, width, spread, time }
     }
 
     /// What the path carries of the emission of a surface, with the weight of the technique that found it.
@@ -238,9 +247,9 @@ impl Carried {
     /// The path from the origin `o` on in the direction `wi`, with what [`Self::beyond`] says.
     #[inline]
     pub(super) fn segment(&self, o: Vec3, wi: Vec3, beta: Rgb, eta_scale: f32) -> PathState {
-        let Carried { sample, width, spread, time, .. } = *self;
+        let Carried { sample, branch, width, spread, time, .. } = *self;
         let ray = Ray { o, d: wi, t_max: f32::INFINITY, time };
-        PathState { sample, ray, beta, eta_scale, width, spread, passed: 0, travelled: 0.0, technique: None }
+        PathState { sample, branch, ray, beta, eta_scale, width, spread, passed: 0, travelled: 0.0, technique: None }
     }
 }
 

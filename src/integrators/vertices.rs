@@ -1,10 +1,12 @@
 //! From rays to vertices: paths are traced to the next surface that scatters, and carry what they see of emitters on the
 //! way.
 
-use super::segment::{CameraSample, PathState, PathStats, Vertex, domain, emptied};
+use super::arrivals::Arrivals;
+use super::segment::{CameraSample, Carried, PathState, PathStats, Vertex, domain, emptied};
 use super::wavefront::Batch;
 use crate::accel::{Coherence, Hit, RayBatch};
 use crate::film::{Features, PixelSample};
+use crate::geometry::Shape;
 use crate::lights::LightCtx;
 use crate::scene::{RenderJob, SurfaceInteraction};
 use lumiris_numbers::math::{Rgb, Vec3};
@@ -64,6 +66,8 @@ pub(super) struct VertexSearch {
     pub(super) only_reflected: bool,
     /// Omits all features.
     pub(super) omits_features: bool,
+    /// What is done about paths that arrive at vertices.
+    pub(super) arrivals: Arrivals,
     /// Copies of what is traced, if requested.
     pub(super) recording: Option<Recording>,
 }
@@ -73,9 +77,11 @@ impl VertexSearch {
     pub(super) fn start(&mut self, samples: &[CameraSample], out: &mut Vec<PixelSample>) {
         out.clear();
         out.resize(samples.len(), PixelSample::default());
+        self.arrivals.start();
         self.active.clear();
         self.active.extend(samples.iter().enumerate().map(|(i, s)| PathState {
             sample: i as u32,
+            branch: 0,
             ray: s.ray.ray,
             beta: Rgb::splat(s.weight),
             eta_scale: 1.0,
@@ -109,7 +115,7 @@ impl VertexSearch {
             for (k, (path, hit)) in active.iter().zip(&hits).enumerate() {
                 match hit {
                     Some(hit) if self.take_plain(&mut at, path, hit) => {}
-                    Some(hit) => vertices.extend(self.take(&mut at, path, hit)),
+                    Some(hit) => self.take(&mut at, path, hit, &mut vertices),
                     None if self.looks_for_emitters(at.vertex, path) => self.escaped.push(k as u32),
                     None => {}
                 }
@@ -131,7 +137,7 @@ impl VertexSearch {
     /// Takes a hit of a mesh that reflects the same everywhere, whose point is found together with others; false if
     /// this is none.
     #[inline]
-    fn take_plain(&self, at: &mut Stage<'_, '_>, path: &PathState, hit: &Hit) -> bool {
+    fn take_plain(&mut self, at: &mut Stage<'_, '_>, path: &PathState, hit: &Hit) -> bool {
         let Some(batch) = &mut at.batch else { return false };
         let Some(rho) = at.job.plain_reflectance(hit) else { return false };
         let Some(beta) = path.beta_beyond_emitter() else { return true };
@@ -141,26 +147,34 @@ impl VertexSearch {
             features.get_or_insert_with(|| path.plain_features(at.job, hit, distance, rho));
         }
         if at.vertex < at.depth {
-            let carried = path.carried(beta, path.width + path.spread * distance);
-            batch.push_hit(at.job, (&carried, path.ray.d), hit, rho, &at.samples[path.sample as usize]);
+            let mut carried = path.carried(beta, path.width + path.spread * distance);
+            let (sample, d) = (&at.samples[path.sample as usize], path.ray.d);
+            let place = || (path.ray.at(hit.t), facing_normal(at.job, hit, d));
+            let found = at.out[path.sample as usize].radiance;
+            let (arrivals, branch) = (&mut self.arrivals, carried.branch);
+            let count = arrivals.arrive((sample, found), at.vertex, &mut carried, place);
+            for index in 0..count {
+                carried.branch = arrivals.branch(sample, branch, at.vertex, (count, index));
+                batch.push_hit(at.job, (&carried, d), hit, rho, arrivals.streams(sample, carried.branch));
+            }
         }
         true
     }
 
-    /// Takes any other hit; the answer is its vertex, if the path goes on from one that the batch does not take.
+    /// Takes any other hit, and adds its vertex, if the path goes on from one that the batch does not take.
     #[inline]
-    fn take<'w>(&mut self, at: &mut Stage<'_, 'w>, path: &PathState, hit: &Hit) -> Option<Vertex<'w>> {
+    fn take<'w>(&mut self, at: &mut Stage<'_, 'w>, path: &PathState, hit: &Hit, vertices: &mut Vec<Vertex<'w>>) {
         let interaction = SurfaceInteraction::new(at.job, &path.ray, (path.width, path.spread), hit);
         let (sample, out) = (&at.samples[path.sample as usize], &mut at.out[path.sample as usize]);
         if self.looks_for_emitters(at.vertex, path) {
             out.radiance += path.emission(at.job, &interaction);
         }
-        let beta = path.beta_beyond_emitter()?;
+        let Some(beta) = path.beta_beyond_emitter() else { return };
         let Some(bsdf) = interaction.scatter(at.job) else {
             if path.passed < MAX_PASSED {
                 self.passing.push(path.pass(beta, &interaction));
             }
-            return None;
+            return;
         };
         if at.vertex == 0 && !self.omits_features {
             out.features.get_or_insert_with(|| {
@@ -172,14 +186,26 @@ impl VertexSearch {
             });
         }
         let width = interaction.width;
-        let is_taken =
-            |batch: &mut &mut Batch<'w>| batch.push_vertex(&path.carried(beta, width), &interaction, &bsdf, sample);
-        if at.vertex >= at.depth || at.batch.as_mut().is_some_and(is_taken) {
-            return None;
+        if at.vertex >= at.depth {
+            return;
         }
-        let [stream, direct] = [sample.stream, sample.direct].map(|s| s.domain(domain::VERTEX + at.vertex));
-        self.kept.push(PathState { beta, width, passed: 0, travelled: 0.0, technique: None, ..*path });
-        Some(Vertex { surface: interaction.surface, bsdf, wo: interaction.wo, stream, direct })
+        let mut carried = path.carried(beta, width);
+        let (surface, wo) = (interaction.surface, interaction.wo);
+        let place = || (surface.p, if surface.n.dot(wo) < 0.0 { -surface.n } else { surface.n });
+        let count = self.arrivals.arrive((sample, out.radiance), at.vertex, &mut carried, place);
+        let parent = carried.branch;
+        for index in 0..count {
+            carried.branch = self.arrivals.branch(sample, parent, at.vertex, (count, index));
+            let streams = self.arrivals.streams(sample, carried.branch);
+            let is_taken = |batch: &mut &mut Batch<'w>| batch.push_vertex(&carried, &interaction, &bsdf, streams);
+            if at.batch.as_mut().is_some_and(is_taken) {
+                continue;
+            }
+            let [stream, direct] = streams.map(|s| s.domain(domain::VERTEX + at.vertex));
+            let Carried { beta, branch, .. } = carried;
+            self.kept.push(PathState { branch, beta, width, passed: 0, travelled: 0.0, technique: None, ..*path });
+            vertices.push(Vertex { surface, bsdf, wo, stream, direct });
+        }
     }
 
     /// Adds what the escaped paths carry of infinite lights, with the weight of the technique that found it.
@@ -226,4 +252,12 @@ impl VertexSearch {
             self.stats.bounce_time += time;
         }
     }
+}
+
+/// The geometric normal at a hit of a mesh in world space by a ray of direction `d`, on the side that it comes from.
+fn facing_normal(job: &RenderJob, hit: &Hit, d: Vec3) -> Vec3 {
+    let Shape::Mesh(mesh) = &job.world.scene.geometry.geometries[hit.geometry as usize].shape else { return -d };
+    let [a, b, c] = mesh.triangle(hit.primitive as usize);
+    let n = (b - a).cross(c - a).normalize_or(-d);
+    if n.dot(d) > 0.0 { -n } else { n }
 }

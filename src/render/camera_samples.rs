@@ -110,6 +110,7 @@ impl<'a> CameraSampler<'a> {
                 direct: self.direct_stream(pixel, sample, seed).unwrap_or(stream),
                 sample_counts: self.chosen_counts(pixel, &stream).unwrap_or(sample_counts),
                 fit,
+                pixel,
             }
         }));
     }
@@ -135,6 +136,7 @@ impl<'a> CameraSampler<'a> {
             direct: stream,
             sample_counts: self.chosen_counts(pixel, &stream).unwrap_or_else(|| settings.integrator.sample_counts()),
             fit: 0,
+            pixel,
         }
     }
 

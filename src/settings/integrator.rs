@@ -20,6 +20,8 @@ pub struct IntegratorSettings {
     pub max_depth: u32,
     /// The bounce from which on paths end by Russian roulette on their throughput; `None`: they go on to `max_depth`.
     pub roulette_depth: Option<u32>,
+    /// What decides by roulette whether a path goes on, and as how many paths.
+    pub roulette: RouletteKind,
     /// Direct-light estimator at each path vertex.
     pub estimator: EstimatorKind,
     /// Samples per estimate (N): shadow segments per shading point. `None` is the default of the estimator,
@@ -62,6 +64,7 @@ impl Default for IntegratorSettings {
             kind: IntegratorKind::Path,
             max_depth: 5,
             roulette_depth: Some(4),
+            roulette: RouletteKind::Throughput,
             estimator: EstimatorKind::Mis,
             samples: None,
             later_samples: None,
@@ -190,6 +193,19 @@ pub enum IntegratorKind {
     IrradianceCache,
     /// Paths, with the light reflected by diffuse surfaces from photon maps [Jensen 1996; Keller and Wald 2000].
     PhotonMap,
+}
+
+/// What decides whether a path ends by roulette.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, EnumString, IntoStaticStr, VariantNames)]
+#[strum(serialize_all = "kebab-case")]
+pub enum RouletteKind {
+    /// Its throughput, from `roulette_depth` on.
+    Throughput,
+    /// What it is expected to contribute, relative to its pixel; it may split as well [Vorba and Křivánek 2016].
+    Adjoint,
+    /// The variance and the cost of what lies beyond its vertex, relative to those of the image; it may split as well
+    /// [Rath et al. 2022].
+    Efficiency,
 }
 
 /// Irradiance caching [Ward et al. 1988; Ward and Heckbert 1992; Křivánek et al. 2008].

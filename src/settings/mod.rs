@@ -14,7 +14,8 @@ pub mod value;
 
 pub use integrator::{
     Cached, ContributingSettings, CorrelatedForm, CorrelatedSettings, EstimatorKind, IntegratorKind,
-    IntegratorSettings, IrradianceCacheSettings, OcvSettings, OptimalForm, SampleCounts, SamplingTechnique,
+    IntegratorSettings, IrradianceCacheSettings, OcvSettings, OptimalForm, RouletteKind, SampleCounts,
+    SamplingTechnique,
 };
 pub use photon_map::{PhotonMapSettings, PhotonStorage, ProgressiveSettings};
 pub use ris::{ProposalPoints, Proposals, RisSettings, StageTimes, Strata, Target};

@@ -11,6 +11,7 @@ mod layering;
 mod mutations;
 mod photon_map;
 mod photons;
+mod roulette;
 mod sample_allocation;
 mod variance;
 mod visibility_cache;

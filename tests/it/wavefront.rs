@@ -3,10 +3,10 @@
 use lumiris::direct::Fits;
 use lumiris::film::PixelSample;
 use lumiris::import::{LoadOptions, load};
-use lumiris::integrators::PathTracer;
 use lumiris::integrators::path::CameraSample;
+use lumiris::integrators::{GuidedIntegrator, PathTracer};
 use lumiris::scene::{AccelKind, RenderJob};
-use lumiris::settings::{EstimatorKind, IntegratorKind};
+use lumiris::settings::{EstimatorKind, IntegratorKind, RouletteKind};
 use lumiris_numbers::math::Vec2;
 use lumiris_numbers::samplers::{SampleStream, SamplerKind};
 use std::path::Path;
@@ -33,17 +33,20 @@ fn camera_samples(job: &RenderJob) -> Vec<CameraSample> {
         let film = Vec2::new(pixel[0] as f32 + 0.5, pixel[1] as f32 + 0.5);
         let ray = job.world.scene.camera.ray(film, [0.5; 2], 0.0);
         let sample_counts = job.settings().integrator.sample_counts();
-        CameraSample { ray, weight: 1.0, stream, direct: stream, sample_counts, fit: 0 }
+        CameraSample { ray, weight: 1.0, stream, direct: stream, sample_counts, fit: 0, pixel }
     };
     pixels.map(sample).collect()
 }
 
 /// Traces side by side, or by the stages of direct light, which list what samples contribute.
 fn traced(job: &RenderJob, samples: &[CameraSample], side_by_side: bool) -> Vec<PixelSample> {
-    let mut tracer = PathTracer::default();
-    tracer.outcomes = (!side_by_side).then(Vec::new);
     let mut out = Vec::new();
-    tracer.trace(job, &job.settings().integrator, samples, &mut Fits::default(), &mut out);
+    let is_guided = job.settings().integrator.roulette != RouletteKind::Throughput;
+    let guided = is_guided.then(|| GuidedIntegrator::new(job));
+    let mut tracer = guided.as_ref().map_or_else(PathTracer::default, |guided| guided.path_tracer(true));
+    let settings = guided.as_ref().map_or(&job.settings().integrator, GuidedIntegrator::settings);
+    tracer.outcomes = (!side_by_side).then(Vec::new);
+    tracer.trace(job, settings, samples, &mut Fits::default(), &mut out);
     out
 }
 
@@ -54,9 +57,14 @@ fn assert_same_radiance(
     part: f64,
 ) {
     let job = job(scene, kind, estimator, samples, bsdf_fraction);
-    let samples = camera_samples(&job);
-    let (a, b) = (traced(&job, &samples, true), traced(&job, &samples, false));
-    let what = format!("{scene} {kind:?} {estimator:?} {}", samples[0].sample_counts.samples);
+    assert_same_radiance_of(&job, scene, part);
+}
+
+fn assert_same_radiance_of(job: &RenderJob, scene: &str, part: f64) {
+    let samples = camera_samples(job);
+    let (a, b) = (traced(job, &samples, true), traced(job, &samples, false));
+    let i = &job.settings().integrator;
+    let what = format!("{scene} {:?} {:?} {:?} {}", i.kind, i.estimator, i.roulette, samples[0].sample_counts.samples);
     let mut lit = 0;
     let mut different = 0;
     for (a, b) in a.iter().zip(&b) {
@@ -90,5 +98,16 @@ fn paths_go_the_same_ways() {
         assert_same_radiance(scene, IntegratorKind::Path, (EstimatorKind::Mc, 2, 0.0), 0.96);
         // Only in columns is a lone BSDF sample of a first vertex that of the path
         assert_same_radiance(scene, IntegratorKind::Path, (EstimatorKind::Mis, 4, 0.5), 0.96);
+    }
+}
+
+#[test]
+fn paths_end_and_split_the_same_ways() {
+    for scene in SCENES {
+        for (estimator, samples) in [(EstimatorKind::Mc, 2), (EstimatorKind::Mis, 4)] {
+            let mut job = job(scene, IntegratorKind::Path, estimator, samples, 0.5);
+            job.change(|s| s.integrator.roulette = RouletteKind::Efficiency);
+            assert_same_radiance_of(&job, scene, 0.96);
+        }
     }
 }

@@ -113,7 +113,15 @@ impl Gatherer {
                 let o = offset_origin(w.p, w.p_error, w.n, d);
                 let ray = Ray { o, d, t_max: f32::INFINITY, time: w.time };
                 let ray = CameraRay { ray, spread: w.spread, width0: w.pixel_width, weight: 1.0 };
-                self.samples.push(CameraSample { ray, weight: 1.0, stream, direct: stream, sample_counts, fit: 0 });
+                self.samples.push(CameraSample {
+                    ray,
+                    weight: 1.0,
+                    stream,
+                    direct: stream,
+                    sample_counts,
+                    fit: 0,
+                    pixel: [0; 2],
+                });
             }
         }
         self.paths.search.only_reflected = true;

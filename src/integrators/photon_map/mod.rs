@@ -207,7 +207,15 @@ impl PhotonMapTracer<'_> {
                 let o = offset_origin(request.place.p, request.p_error, request.place.n, d);
                 let ray = Ray { o, d, t_max: f32::INFINITY, time: request.time };
                 let ray = CameraRay { ray, spread: request.spread, width0: request.width, weight: 1.0 };
-                self.samples.push(CameraSample { ray, weight, stream, direct: stream, sample_counts, fit: 0 });
+                self.samples.push(CameraSample {
+                    ray,
+                    weight,
+                    stream,
+                    direct: stream,
+                    sample_counts,
+                    fit: 0,
+                    pixel: [0; 2],
+                });
             }
         }
     }

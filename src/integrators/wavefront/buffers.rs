@@ -57,7 +57,6 @@ impl Buffers {
         light.reserve(len);
         [f_cos, c, o, d].into_iter().for_each(|c| c.reserve(len));
         reserve(&mut [u0, u1, u2, p_bsdf, t_max], len);
-        self.radiance.get_mut(len).into_iter().for_each(|c| c.fill(0.0));
     }
 
     /// The points of hits.

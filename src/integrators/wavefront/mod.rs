@@ -23,7 +23,7 @@ use buffers::Stream;
 use columns::{Single, Surface, others};
 
 use super::segment::{
-    BsdfTechnique, CameraSample, Carried, Direction, PathState, PathStats, domain, emptied, sampled_direction, survive,
+    BsdfTechnique, Carried, Direction, PathState, PathStats, domain, emptied, sampled_direction, survive,
 };
 use crate::accel::{Coherence, Hit, RayBatch};
 use crate::bsdfs::{Bsdf, Diffuse, Lobe};
@@ -42,6 +42,7 @@ use lumiris_numbers::estimators::mis::Heuristic;
 use lumiris_numbers::estimators::ocv::Form;
 use lumiris_numbers::math::ray::offset_origin;
 use lumiris_numbers::math::{Rgb, Vec3};
+use lumiris_numbers::samplers::SampleStream;
 use std::time::{Duration, Instant};
 
 /// The samples of an estimate.
@@ -143,7 +144,7 @@ impl<'w> Batch<'w> {
         (path, d): (&Carried, Vec3),
         hit: &Hit,
         rho: Rgb,
-        sample: &CameraSample,
+        streams: [SampleStream; 2],
     ) {
         let Shape::Mesh(mesh) = &job.world.scene.geometry.geometries[hit.geometry as usize].shape else { return };
         let i = self.buffers.paths.len();
@@ -163,7 +164,7 @@ impl<'w> Batch<'w> {
         hits.orientation[k] = if mesh.flip_normal { -1.0 } else { 1.0 };
         set_lane(&mut hits.d, k, d);
         self.buffers.surface.rho.set_rgb(i, rho);
-        self.push(path, sample);
+        self.push(path, streams);
     }
 
     /// Adds any other vertex; false if it needs an estimate of another form.
@@ -173,23 +174,23 @@ impl<'w> Batch<'w> {
         path: &Carried,
         interaction: &SurfaceInteraction,
         bsdf: &SurfaceBsdf<'w>,
-        sample: &CameraSample,
+        streams: [SampleStream; 2],
     ) -> bool {
         if !self.estimate.takes(&bsdf.bsdf) {
             return false;
         }
         let (index, s) = (self.buffers.paths.len() as u32, &interaction.surface);
         self.singles.push(Single { index, p: s.p, p_error: s.p_error, wo: interaction.wo, bsdf: *bsdf });
-        self.push(path, sample);
+        self.push(path, streams);
         true
     }
 
     #[inline]
-    fn push(&mut self, path: &Carried, sample: &CameraSample) {
+    fn push(&mut self, path: &Carried, [stream, direct]: [SampleStream; 2]) {
         let key = domain::VERTEX + self.estimate.vertex;
         self.buffers.paths.push(*path);
-        self.buffers.streams.push(sample.stream.domain(key));
-        self.buffers.direct.push(sample.direct.domain(key).domain(domain::DIRECT));
+        self.buffers.streams.push(stream.domain(key));
+        self.buffers.direct.push(direct.domain(key).domain(domain::DIRECT));
     }
 
     /// Adds the direct light of all vertices, and the next segments of their paths.
@@ -199,6 +200,7 @@ impl<'w> Batch<'w> {
         if n == 0 {
             return;
         }
+        self.buffers.radiance.get_mut(padded(n)).into_iter().for_each(|c| c.fill(0.0));
         let start = Instant::now();
         self.buffers.find_points(n);
         self.set_singles();

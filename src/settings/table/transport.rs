@@ -1,10 +1,10 @@
 //! What is computed, and with which random numbers.
 
-use super::{Directive, Group, MAX_SAMPLES, MAX_U32, Setting, choice, integer};
+use super::{Applies, Directive, Group, MAX_SAMPLES, MAX_U32, Setting, choice, integer};
 use crate::bsdfs::ProposalDensity;
 use crate::lights::LightSamplerKind;
 use crate::settings::value::{Integers, Interval, Kind, Value};
-use crate::settings::{Allocation, IntegratorKind};
+use crate::settings::{Allocation, IntegratorKind, RouletteKind};
 use lumiris_numbers::samplers::SamplerKind;
 use strum::VariantNames;
 
@@ -52,6 +52,19 @@ pub(super) const TRANSPORT: Group = Group {
                 s.integrator.roulette_depth = if v.name().is_some() { None } else { Some(v.count()?) };
                 Some(())
             },
+            ..Setting::BASE
+        },
+        Setting {
+            flag: "roulette",
+            parameters: &["roulette"],
+            key: "roulette",
+            kind: choice(RouletteKind::VARIANTS),
+            help: "What decides whether a path ends by Russian roulette: its throughput, what it is expected to \
+                   contribute to its pixel, or the variance and the cost of what lies ahead; by the latter two, paths \
+                   split as well, and pilot paths are traced first",
+            applies: Applies::Integrators(&[IntegratorKind::Path]),
+            get: |s| Some(Value::Name(s.integrator.roulette.into())),
+            set: |s, v| v.named().map(|kind| s.integrator.roulette = kind),
             ..Setting::BASE
         },
         Setting {
