@@ -10,8 +10,9 @@
 //! rendering with these settings gives the same image to the bit. All candidates are unbiased, and the pilot has random
 //! numbers of its own; so the choice adds no bias.
 
+use super::visibility_cache::build_visibility_cache;
 use super::worker::Worker;
-use super::{RenderSettings, Run, position};
+use super::{RenderSettings, Run, position, processor_time};
 use crate::film::PixelBounds;
 use crate::imaging::metrics::difference::DEFAULT_EPSILON;
 use crate::integrators::PathTracer;
@@ -21,7 +22,6 @@ use crate::settings::{EstimatorKind, IntegratorKind, IntegratorSettings, Proposa
 use lumiris_numbers::estimators::efficiency::{Measured, Model};
 use lumiris_numbers::math::hash::{pcg4d, unit_f32};
 use rayon::prelude::*;
-use rustix::time::{ClockId, clock_gettime};
 use serde::{Deserialize, Serialize};
 use std::sync::atomic::AtomicBool;
 
@@ -44,6 +44,11 @@ const TRIALS: [f64; 2] = [10.0, 16.0];
 const SEED: u32 = 0x61_75_74_6f;
 /// By how much a choice must be more efficient than what takes its place without a pilot.
 const MIN_GAIN: f64 = 1.03;
+
+/// Lights from which on photons may tell which of them contribute.
+const MANY_LIGHTS: usize = 16;
+/// Time of an image beside which that of the photons is small (ns).
+const LONG: f64 = 5e9;
 
 /// Numbers of samples that are compared where light is direct: a quarter are BSDF samples.
 const DIRECT: [u32; 9] = [2, 4, 8, 12, 16, 24, 32, 48, 64];
@@ -88,8 +93,7 @@ pub(super) fn choose(job: &mut RenderJob) -> Option<AutoChoice> {
     if job.settings().integrator.estimator != EstimatorKind::Auto {
         return None;
     }
-    let pilot = Pilot::new(job);
-    let choice = pilot.map(|pilot| pilot.choose(job));
+    let choice = Pilot::new(job).map(|pilot| pilot.choose(job));
     let settings = choice.as_ref().map_or(without_pilot(&job.settings().integrator), |(_, settings)| *settings);
     job.change(|s| s.integrator = settings);
     choice.map(|(choice, _)| choice)
@@ -132,6 +136,8 @@ struct Pilot {
 struct Candidate {
     name: String,
     settings: IntegratorSettings,
+    /// Time of its preparations per camera sample of the image (ns).
+    preparation: f64,
 }
 
 impl Pilot {
@@ -147,8 +153,8 @@ impl Pilot {
             .then(|| Pilot { blocks: [0, 1].map(|round| blocks(&bounds, count, round)), seed: sampling.seed })
     }
 
-    fn choose(&self, job: &RenderJob) -> (AutoChoice, IntegratorSettings) {
-        let base = &job.settings().integrator;
+    fn choose(&self, job: &mut RenderJob) -> (AutoChoice, IntegratorSettings) {
+        let base = &{ job.settings().integrator };
         // First round: the model
         let has_later = base.depth() > 1;
         let [few, many] = if has_later { FIT_PATH } else { FIT_DIRECT };
@@ -170,9 +176,13 @@ impl Pilot {
         let best = model.best(choices.each_ref().map(Vec::as_slice)).map(|n| if has_later { n + 1 } else { n });
 
         // Second round: the best by the model, and what else there is
-        let candidates = Candidate::of_second_round(base, best);
+        let mut candidates = Candidate::of_second_round(base, best);
+        candidates.extend(with_photons(job, trials[0].nanoseconds));
         let second = self.round(job, &candidates, 1);
         let chosen = most_efficient(&second);
+        if !candidates[chosen].settings.uses_visibility_cache() {
+            job.lights.set_visibility_cache(None);
+        }
         let choice = AutoChoice {
             pixels: self.blocks[0].iter().map(PixelBounds::area).sum(),
             cost: model.cost,
@@ -196,9 +206,10 @@ impl Pilot {
         // The variance of the mean of a pixel, times its samples
         let numbers = |k: usize| (sum(k, 0) / samples, sum(k, 1) / samples * f64::from(2 * SPP * SPP));
         let efficiency = |(ns, variance): (f64, f64)| if variance > 0.0 { 1.0 / (ns * variance) } else { 0.0 };
-        let base = efficiency(numbers(0));
+        let base = efficiency((numbers(0).0 + candidates[0].preparation, numbers(0).1));
         let trial = |(k, candidate): (usize, &Candidate)| {
             let (nanoseconds, variance) = numbers(k);
+            let nanoseconds = nanoseconds + candidate.preparation;
             let relative = if base > 0.0 { efficiency((nanoseconds, variance)) / base } else { 1.0 };
             Trial { name: candidate.name.clone(), nanoseconds, variance, efficiency: relative }
         };
@@ -222,7 +233,7 @@ impl Candidate {
         if settings.estimator == EstimatorKind::Mis {
             name += &format!(", BSDF fraction {}", settings.bsdf_fraction());
         }
-        Candidate { name, settings }
+        Candidate { name, settings, preparation: 0.0 }
     }
 
     /// What is done without a pilot, the best numbers of `mis`, and these with another setting each. None twice.
@@ -244,6 +255,32 @@ impl Candidate {
         }
         candidates
     }
+}
+
+/// Candidates that know by photons which lights contribute at a place, if there are many lights and a camera sample takes
+/// so long that the photons, which are traced for them, take little of the image's time.
+fn with_photons(job: &mut RenderJob, nanoseconds: f64) -> Vec<Candidate> {
+    let Settings { integrator: base, sampling } = *job.settings();
+    let samples = job.world.scene.film.bounds.area() as f64 * f64::from(sampling.spp);
+    if job.lights.lights.len() < MANY_LIGHTS || samples * nanoseconds < LONG {
+        return Vec::new();
+    }
+    let start = processor_time::of_process();
+    let cache = build_visibility_cache(job);
+    let preparation = (processor_time::of_process() - start).as_secs_f64() * 1e9 / samples;
+    job.lights.set_visibility_cache(cache.map(|(cache, _)| cache));
+    let contributing = |n: u32| {
+        let later = (base.depth() > 1).then_some((n / 2).max(1));
+        let settings = IntegratorSettings {
+            estimator: EstimatorKind::Contributing,
+            samples: base.samples.or(Some(n)),
+            later_samples: base.later_samples.or(later),
+            ..base
+        };
+        Candidate { preparation, ..Candidate::named(settings) }
+    };
+    let numbers: &[u32] = if base.samples.is_some() { &[4] } else { &[2, 4, 8] };
+    numbers.iter().map(|&n| contributing(n)).collect()
 }
 
 /// The index of the most efficient trial; the first one unless another is better by [`MIN_GAIN`].
@@ -288,7 +325,7 @@ fn measure(
         let k = (k + turn) % candidates.len();
         let settings = &candidates[k].settings;
         let sample_counts = settings.sample_counts();
-        let start = thread_nanoseconds();
+        let start = processor_time::of_thread();
         for (image, seed) in images[k].iter_mut().zip(seeds) {
             worker.samples.clear();
             let samples = pixels.iter().map(|&pixel| (0, pixel, 0..SPP));
@@ -301,7 +338,7 @@ fn measure(
                 [0, 1, 2].map(|c| sum(c) / f64::from(SPP))
             }));
         }
-        times[k] = thread_nanoseconds() - start;
+        times[k] = (processor_time::of_thread() - start).as_secs_f64() * 1e9;
     }
     let all = || images.iter().flatten();
     let count = all().count() as f64;
@@ -316,12 +353,6 @@ fn measure(
         (0..pixels.len()).map(of_pixel).sum::<f64>()
     };
     times.into_iter().zip(&images).map(|(time, images)| [time, variance(images)]).collect()
-}
-
-/// Processor time of this thread (ns).
-fn thread_nanoseconds() -> f64 {
-    let t = clock_gettime(ClockId::ThreadCPUTime);
-    t.tv_sec as f64 * 1e9 + t.tv_nsec as f64
 }
 
 #[cfg(test)]

@@ -9,7 +9,7 @@
 //! the two that are compared, and of CPU times by the spread between seeds.
 
 use super::plan::{Plan, prepare};
-use super::{RenderError, RenderSettings, render};
+use super::{RenderError, RenderSettings, processor_time, render};
 use crate::film::{PixelBounds, PixelSums};
 use crate::imaging::metrics::difference::DEFAULT_EPSILON;
 use crate::lights::LightSamplerKind;
@@ -17,10 +17,8 @@ use crate::scene::RenderJob;
 use crate::settings::{EstimatorKind, IntegratorKind, Settings};
 use lumiris_numbers::estimators::stats::Welford;
 use lumiris_numbers::math::luminance;
-use rustix::time::{ClockId, clock_gettime};
 use serde::Serialize;
 use std::sync::atomic::AtomicBool;
-use std::time::Duration;
 
 /// Blocks of the image along each axis, between which the error varies.
 const BLOCKS: u32 = 16;
@@ -75,12 +73,6 @@ struct Measured {
     chosen: Vec<(&'static str, String)>,
 }
 
-/// Processor time of this process so far, of threads that have ended too.
-pub fn processor_time() -> Duration {
-    let t = clock_gettime(ClockId::ProcessCPUTime);
-    Duration::new(u64::try_from(t.tv_sec).unwrap_or(0), u32::try_from(t.tv_nsec).unwrap_or(0))
-}
-
 /// Measures the cases with `seeds` seeds each, at least two. `observe` is told before each rendering.
 pub fn measure_efficiency(
     job: &mut RenderJob,
@@ -97,9 +89,9 @@ pub fn measure_efficiency(
             observe(&case.name, seed);
             let mut settings = case.settings;
             settings.sampling.seed = settings.sampling.seed.wrapping_add(seed);
-            let start = processor_time();
+            let start = processor_time::of_process();
             let (image, plan) = image(job, settings, render_settings)?;
-            measured.cpu.push((processor_time() - start).as_secs_f64());
+            measured.cpu.push((processor_time::of_process() - start).as_secs_f64());
             measured.images.push(image);
             measured.chosen = plan.chosen;
         }

@@ -17,6 +17,7 @@ pub mod noise;
 pub mod output;
 mod pilot_samples;
 pub mod plan;
+pub mod processor_time;
 pub mod visibility_cache;
 mod worker;
 

@@ -66,12 +66,11 @@ pub struct RisChoice {
 pub fn prepare(job: &mut RenderJob, threads: Option<usize>, ratio_map: bool) -> Result<Plan, ThreadError> {
     let pool = super::thread_pool(threads)?;
     let before = *job.settings();
-    let is_auto = job.settings().integrator.estimator == EstimatorKind::Auto;
+    let auto = pool.install(|| choose(job));
     if job.settings().sampling.allocation == Allocation::Auto {
-        let allocation = if is_auto { Allocation::Adaptive } else { Allocation::Uniform };
+        let allocation = if auto.is_some() { Allocation::Adaptive } else { Allocation::Uniform };
         job.change(|s| s.sampling.allocation = allocation);
     }
-    let auto = pool.install(|| choose(job));
     let settings = job.settings().integrator;
     if settings.uses_visibility_cache() && job.lights.visibility_cache().is_none() {
         let visibility_cache = pool.install(|| build_visibility_cache(job));

@@ -65,7 +65,7 @@ impl Default for IntegratorSettings {
             max_depth: 5,
             roulette_depth: Some(4),
             roulette: RouletteKind::Throughput,
-            estimator: EstimatorKind::Mis,
+            estimator: EstimatorKind::Auto,
             samples: None,
             later_samples: None,
             heuristic: None,

@@ -14,8 +14,8 @@ use lumiris::film::Film;
 use lumiris::film::filter::PixelFilter;
 use lumiris::import::{LoadOptions, load};
 use lumiris::lights::{LightSamplerKind, VisibilityCache};
-use lumiris::render::efficiency::processor_time;
 use lumiris::render::plan::prepare;
+use lumiris::render::processor_time;
 use lumiris::render::{RenderError, RenderSettings, Rendering, render};
 use lumiris::scene::{AccelKind, RenderJob};
 use lumiris::settings::{Proposals, StageTimes, Strata};
@@ -126,7 +126,7 @@ impl Stage {
     /// Finds the best allocation of an estimate's time to proposals and samples in each pixel, by the renderer's own
     /// pilot. The answer is M/N of every pixel, and the processor time that it took (s).
     pub fn plan_per_pixel(&mut self, times: StageTimes, budget: f64) -> Result<(Vec<f32>, f64), ReproduceError> {
-        let start = processor_time();
+        let start = processor_time::of_process();
         // The pilot asks for a number of samples; half of the time is for proposals
         let samples = (0.5 * budget / times.t2).round().max(1.0) as u32;
         self.set(&Method { per_pixel: true, ..Method::ris(samples, samples) });
@@ -134,7 +134,7 @@ impl Stage {
         self.job.change(|s| s.integrator.ris.stage_times = Some(times));
         self.shadows.store(true, Ordering::Relaxed);
         prepare(&mut self.job, self.threads, false).map_err(RenderError::from)?;
-        let seconds = processor_time().saturating_sub(start).as_secs_f64();
+        let seconds = processor_time::of_process().saturating_sub(start).as_secs_f64();
         let Some(map) = &mut self.job.sample_count_map else { return Ok((Vec::new(), seconds)) };
         map.time = budget;
         Ok((map.ratios.clone(), seconds))
@@ -386,9 +386,9 @@ pub fn turns(
             let i = (k + turn) % count;
             let seed = 1 + turn * count + i;
             let m = &mut measured[i as usize];
-            let start = processor_time();
+            let start = processor_time::of_process();
             let rendering = stage.render(&m.method, view, spp, seed, observer)?;
-            m.add(&rendering, processor_time().saturating_sub(start));
+            m.add(&rendering, processor_time::of_process().saturating_sub(start));
         }
     }
     Ok(measured)

@@ -1,0 +1,19 @@
+//! Processor time: what other programs do does not count.
+
+use rustix::time::{ClockId, clock_gettime};
+use std::time::Duration;
+
+fn time(clock: ClockId) -> Duration {
+    let t = clock_gettime(clock);
+    Duration::new(u64::try_from(t.tv_sec).unwrap_or(0), u32::try_from(t.tv_nsec).unwrap_or(0))
+}
+
+/// Of this process so far, of threads that have ended too.
+pub fn of_process() -> Duration {
+    time(ClockId::ProcessCPUTime)
+}
+
+/// Of this thread so far.
+pub fn of_thread() -> Duration {
+    time(ClockId::ThreadCPUTime)
+}
