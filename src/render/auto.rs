@@ -1,8 +1,10 @@
 //! The estimator `auto`: what is the most efficient for this image, by a pilot.
 //!
-//! Blocks of pixels spread over the image are rendered with several settings, each with two independent seeds. Half the
-//! squared difference of the two is the variance, relative to the squared mean, and the time of the thread is the cost. From
-//! few and from many samples at first and at later vertices follows a model of both ([`Model`]), and from that the best
+//! Blocks of pixels spread over the image are rendered with several settings, each with two independent seeds. The
+//! difference of the two tells the standard deviation, relative to the mean, and the time of the thread is the cost. The
+//! mean of the standard deviation over pixels is what counts, and not that of the variance: with samples allocated in
+//! proportion to it, the error for a given time is its square; and the few pixels of most variance, such as those at edges
+//! of visible lights, do not decide for all others. From few and from many samples at first and at later vertices follows a model of both ([`Model`]), and from that the best
 //! numbers. What is best by the model then takes part in a second round on other blocks, together with what differs in more
 //! than numbers, and the most efficient there is chosen.
 //!
@@ -23,6 +25,7 @@ use lumiris_numbers::estimators::efficiency::{Measured, Model};
 use lumiris_numbers::math::hash::{pcg4d, unit_f32};
 use rayon::prelude::*;
 use serde::{Deserialize, Serialize};
+use std::f64::consts::PI;
 use std::sync::atomic::AtomicBool;
 
 /// Edge of a block of pixels that are rendered together.
@@ -66,7 +69,7 @@ pub struct Trial {
     pub name: String,
     /// Processor time of a camera sample (ns).
     pub nanoseconds: f64,
-    /// Relative variance of a camera sample, at [`SPP`] samples per pixel.
+    /// Squared mean over pixels of the relative standard deviation of a camera sample, at [`SPP`] samples per pixel.
     pub variance: f64,
     /// 1/(variance × time), relative to the first trial of the round.
     pub efficiency: f64,
@@ -203,8 +206,8 @@ impl Pilot {
             chunks.into_par_iter().map(|(i, blocks)| measure(&run, blocks, candidates, seeds, i)).collect();
         let samples = self.blocks[round].iter().map(PixelBounds::area).sum::<usize>() as f64 * f64::from(2 * SPP);
         let sum = |k: usize, of: usize| measured.iter().map(|chunk| chunk[k][of]).sum::<f64>();
-        // The variance of the mean of a pixel, times its samples
-        let numbers = |k: usize| (sum(k, 0) / samples, sum(k, 1) / samples * f64::from(2 * SPP * SPP));
+        let pixels = samples / f64::from(2 * SPP);
+        let numbers = |k: usize| (sum(k, 0) / samples, variance(sum(k, 1) / pixels));
         let efficiency = |(ns, variance): (f64, f64)| if variance > 0.0 { 1.0 / (ns * variance) } else { 0.0 };
         let base = efficiency((numbers(0).0 + candidates[0].preparation, numbers(0).1));
         let trial = |(k, candidate): (usize, &Candidate)| {
@@ -308,8 +311,14 @@ fn blocks(bounds: &PixelBounds, count: usize, round: u32) -> Vec<PixelBounds> {
     (0..rows).flat_map(|row| (0..columns).map(move |column| block(row, column))).collect()
 }
 
+/// The squared standard deviation of a camera sample, from the mean absolute difference of two means of [`SPP`] samples:
+/// that is 2σ/√π for normal numbers of standard deviation σ.
+fn variance(difference: f64) -> f64 {
+    0.25 * PI * difference * difference * f64::from(SPP)
+}
+
 /// Renders some blocks with each candidate and seed: of each candidate, processor time (ns), and the sum over pixels of the
-/// relative variance of a pixel's mean. The `turn` decides which candidate is first.
+/// relative difference of the two means, averaged over channels. The `turn` decides which candidate is first.
 fn measure(
     run: &Run<'_>,
     blocks: &[PixelBounds],
@@ -342,17 +351,17 @@ fn measure(
     }
     let all = || images.iter().flatten();
     let count = all().count() as f64;
-    let variance = |[a, b]: &[Vec<[f64; 3]>; 2]| {
+    let difference = |[a, b]: &[Vec<[f64; 3]>; 2]| {
         let of_pixel = |i: usize| {
             let of_channel = |c: usize| {
                 let mean = all().map(|image| image[i][c]).sum::<f64>() / count;
-                0.5 * (a[i][c] - b[i][c]).powi(2) / (mean * mean + DEFAULT_EPSILON)
+                (a[i][c] - b[i][c]).abs() / (3.0 * (mean * mean + DEFAULT_EPSILON).sqrt())
             };
             Some((0..3).map(of_channel).sum::<f64>()).filter(|v| v.is_finite()).unwrap_or(0.0)
         };
         (0..pixels.len()).map(of_pixel).sum::<f64>()
     };
-    times.into_iter().zip(&images).map(|(time, images)| [time, variance(images)]).collect()
+    times.into_iter().zip(&images).map(|(time, images)| [time, difference(images)]).collect()
 }
 
 #[cfg(test)]
@@ -390,6 +399,16 @@ mod tests {
         assert_eq!([0, 1].map(|vertex| chosen.sample_counts_at(vertex).samples), [16, 3]);
         let names: std::collections::HashSet<&str> = candidates.iter().map(|c| c.name.as_str()).collect();
         assert_eq!(names.len(), candidates.len(), "{names:?}");
+    }
+
+    #[test]
+    fn the_difference_of_two_means_tells_the_variance_of_a_sample() {
+        use lumiris_test_support::random::{RngExt, pcg32};
+        let mut s = pcg32([1, 7, 2]);
+        // Means of uniform numbers, of variance 1/12
+        let mut mean = || (0..SPP).map(|_| f64::from(s.random::<f32>())).sum::<f64>() / f64::from(SPP);
+        let differences = (0..20_000).map(|_| (mean() - mean()).abs()).sum::<f64>() / 20_000.0;
+        assert!((variance(differences) * 12.0 - 1.0).abs() < 0.03, "{}", variance(differences));
     }
 
     #[test]
