@@ -1,11 +1,12 @@
 //! The estimator `auto`: what is the most efficient for this image, by a pilot.
 //!
-//! Blocks of pixels spread over the image are rendered with several settings, each with two independent seeds. The
-//! difference of the two tells the standard deviation, relative to the mean, and the time of the thread is the cost. The
-//! mean of the standard deviation over pixels is what counts, and not that of the variance: with samples allocated in
-//! proportion to it, the error for a given time is its square; and the few pixels of most variance, such as those at edges
-//! of visible lights, do not decide for all others. From few and from many samples at first and at later vertices follows a model of both ([`Model`]), and from that the best
-//! numbers. What is best by the model then takes part in a second round on other blocks, together with what differs in more
+//! Pixels spread over the image are rendered with several settings, each with two independent seeds. The
+//! difference of the two tells the standard deviation σ, relative to the mean, and the time of the thread is the cost. In
+//! paths, whose pixels mostly have as many samples each, the error is the mean of σ². Where light is direct and samples are
+//! allocated in proportion to σ, it would be the square of the mean of σ, were these numbers known; what counts there is the
+//! geometric mean of both. The former is that of few pixels, such as those at edges of visible lights, the latter that of
+//! all others. From few and from many samples at first and at later vertices follows a model of both ([`Model`]), and from that the best
+//! numbers. What is best by the model then takes part in a second round on other pixels, together with what differs in more
 //! than numbers, and the most efficient there is chosen.
 //!
 //! Times differ from run to run, so the choice is made once, becomes part of the settings, and is recorded with them:
@@ -14,7 +15,7 @@
 
 use super::visibility_cache::build_visibility_cache;
 use super::worker::Worker;
-use super::{RenderSettings, Run, position, processor_time};
+use super::{RenderSettings, Run, processor_time};
 use crate::film::PixelBounds;
 use crate::imaging::metrics::difference::DEFAULT_EPSILON;
 use crate::integrators::PathTracer;
@@ -28,16 +29,14 @@ use serde::{Deserialize, Serialize};
 use std::f64::consts::PI;
 use std::sync::atomic::AtomicBool;
 
-/// Edge of a block of pixels that are rendered together.
-const BLOCK: u32 = 2;
-/// Samples of a pixel and seed: with fewer, what the net of samples gains would not be seen.
-const SPP: u32 = 8;
-/// Blocks that a thread renders at a time.
+/// Most samples of a pixel and seed. With fewer than the image has, what their net gains would not be seen.
+const MAX_SPP: u32 = 32;
+/// Pixels that a thread renders at a time.
 const CHUNK: usize = 64;
-/// Blocks of a round at most: variances are then known to some percent.
-const MAX_BLOCKS: usize = 4096;
-/// Fewest blocks of a round for which a choice is more than chance.
-const MIN_BLOCKS: usize = 48;
+/// Most pixels of a round: deviations are then known to a percent or two.
+const MAX_PIXELS: usize = 4096;
+/// Fewest pixels of a round for which a choice is more than chance.
+const MIN_PIXELS: usize = 64;
 /// Time of both rounds, as a fraction of that of the image.
 const FRACTION: f64 = 0.03;
 /// Time of both rounds over that of rendering their pixels once, with the same number of samples and seeds: in direct light,
@@ -69,7 +68,8 @@ pub struct Trial {
     pub name: String,
     /// Processor time of a camera sample (ns).
     pub nanoseconds: f64,
-    /// Squared mean over pixels of the relative standard deviation of a camera sample, at [`SPP`] samples per pixel.
+    /// Relative variance of a camera sample, from as many samples per pixel as the pilot had: its mean over pixels; in direct
+    /// light the geometric mean of that and of the squared mean of the standard deviation.
     pub variance: f64,
     /// 1/(variance × time), relative to the first trial of the round.
     pub efficiency: f64,
@@ -80,6 +80,8 @@ pub struct Trial {
 pub struct AutoChoice {
     /// Pixels of a round.
     pub pixels: usize,
+    /// Samples of each and seed.
+    pub spp: u32,
     /// The model: time a, b_first, b_later of a camera sample (ns), per light sample.
     pub cost: [f64; 3],
     /// The model: relative variance A, B_first, B_later.
@@ -88,6 +90,8 @@ pub struct AutoChoice {
     pub trials: [Vec<Trial>; 2],
     /// The chosen one of the second round.
     pub chosen: String,
+    /// Processor time of the pilot (s).
+    pub seconds: f64,
 }
 
 /// Chooses, where the settings of `job` ask for it, and changes them; `None` if they do not, or if the image is too small
@@ -130,8 +134,10 @@ fn resampled(settings: &IntegratorSettings) -> IntegratorSettings {
 
 /// Where a round measures.
 struct Pilot {
-    /// Blocks of both rounds.
-    blocks: [Vec<PixelBounds>; 2],
+    /// Pixels of both rounds.
+    pixels: [Vec<[u32; 2]>; 2],
+    /// Samples of each and seed.
+    spp: u32,
     seed: u32,
 }
 
@@ -148,15 +154,20 @@ impl Pilot {
     fn new(job: &RenderJob) -> Option<Self> {
         let Settings { integrator, sampling } = job.settings();
         let bounds = job.world.scene.film.bounds;
+        let spp = 1 << sampling.spp.clamp(1, MAX_SPP).ilog2();
         let samples = bounds.area() as f64 * f64::from(sampling.spp) * FRACTION;
-        let per_block = f64::from(2 * SPP * BLOCK * BLOCK) * TRIALS[usize::from(integrator.depth() > 1)];
-        let count = ((samples / per_block) as usize).min(MAX_BLOCKS);
+        let per_pixel = f64::from(2 * spp) * TRIALS[usize::from(integrator.depth() > 1)];
+        let count = ((samples / per_pixel) as usize).min(MAX_PIXELS);
         let is_measurable = matches!(integrator.kind, IntegratorKind::Direct | IntegratorKind::Path);
-        (is_measurable && count >= MIN_BLOCKS)
-            .then(|| Pilot { blocks: [0, 1].map(|round| blocks(&bounds, count, round)), seed: sampling.seed })
+        (is_measurable && count >= MIN_PIXELS).then(|| Pilot {
+            pixels: [0, 1].map(|round| pixels(&bounds, count, round)),
+            spp,
+            seed: sampling.seed,
+        })
     }
 
     fn choose(&self, job: &mut RenderJob) -> (AutoChoice, IntegratorSettings) {
+        let start = processor_time::of_process();
         let base = &{ job.settings().integrator };
         // First round: the model
         let has_later = base.depth() > 1;
@@ -187,27 +198,32 @@ impl Pilot {
             job.lights.set_visibility_cache(None);
         }
         let choice = AutoChoice {
-            pixels: self.blocks[0].iter().map(PixelBounds::area).sum(),
+            pixels: self.pixels[0].len(),
+            spp: self.spp,
             cost: model.cost,
             variance: model.variance,
             chosen: second[chosen].name.clone(),
+            seconds: (processor_time::of_process() - start).as_secs_f64(),
             trials: [trials, second],
         };
         (choice, candidates[chosen].settings)
     }
 
-    /// Measures all candidates on the blocks of a round.
+    /// Measures all candidates on the pixels of a round.
     fn round(&self, job: &RenderJob, candidates: &[Candidate], round: usize) -> Vec<Trial> {
         let (render, stop) = (RenderSettings::default(), AtomicBool::new(false));
         let run = Run::new(job, &render, &stop, &|_| ());
         let seeds = [0, 1].map(|k| pcg4d([self.seed, SEED, round as u32, k])[0]);
-        let chunks: Vec<_> = self.blocks[round].chunks(CHUNK).enumerate().collect();
-        let measured: Vec<Vec<[f64; 2]>> =
-            chunks.into_par_iter().map(|(i, blocks)| measure(&run, blocks, candidates, seeds, i)).collect();
-        let samples = self.blocks[round].iter().map(PixelBounds::area).sum::<usize>() as f64 * f64::from(2 * SPP);
+        let chunks: Vec<_> = self.pixels[round].chunks(CHUNK).enumerate().collect();
+        let measured: Vec<Vec<[f64; 3]>> =
+            chunks.into_par_iter().map(|(i, pixels)| measure(&run, (pixels, self.spp), candidates, seeds, i)).collect();
+        let pixels = self.pixels[round].len() as f64;
+        let samples = pixels * f64::from(2 * self.spp);
         let sum = |k: usize, of: usize| measured.iter().map(|chunk| chunk[k][of]).sum::<f64>();
-        let pixels = samples / f64::from(2 * SPP);
-        let numbers = |k: usize| (sum(k, 0) / samples, variance(sum(k, 1) / pixels));
+        let is_direct = job.settings().integrator.depth() <= 1;
+        let numbers = |k: usize| {
+            (sum(k, 0) / samples, variance([sum(k, 1), sum(k, 2)].map(|d| d / pixels), is_direct) * f64::from(self.spp))
+        };
         let efficiency = |(ns, variance): (f64, f64)| if variance > 0.0 { 1.0 / (ns * variance) } else { 0.0 };
         let base = efficiency((numbers(0).0 + candidates[0].preparation, numbers(0).1));
         let trial = |(k, candidate): (usize, &Candidate)| {
@@ -292,42 +308,41 @@ fn most_efficient(trials: &[Trial]) -> usize {
     if trials[best].efficiency >= MIN_GAIN * trials[0].efficiency { best } else { 0 }
 }
 
-/// Blocks of pixels, one in each cell of a grid, at a place that depends on the round.
-fn blocks(bounds: &PixelBounds, count: usize, round: u32) -> Vec<PixelBounds> {
-    let (width, height) = (bounds.width().max(BLOCK), bounds.height().max(BLOCK));
+/// Pixels, one in each cell of a grid, at a place that depends on the round.
+fn pixels(bounds: &PixelBounds, count: usize, round: u32) -> Vec<[u32; 2]> {
+    let (width, height) = (bounds.width(), bounds.height());
     let aspect = f64::from(width) / f64::from(height);
-    let columns = ((count as f64 * aspect).sqrt().round() as u32).clamp(1, width / BLOCK);
-    let rows = (count as u32 / columns).clamp(1, height / BLOCK);
+    let columns = ((count as f64 * aspect).sqrt().round() as u32).clamp(1, width);
+    let rows = (count as u32 / columns).clamp(1, height);
     let place = |k: u32, cells: u32, size: u32, u: f32| {
         let [start, end] = [k, k + 1].map(|k| u64::from(k) * u64::from(size) / u64::from(cells)).map(|x| x as u32);
-        start + ((end - start - BLOCK.min(end - start)) as f32 * u) as u32
+        (start + ((end - start) as f32 * u) as u32).min(end - 1)
     };
-    let block = |row: u32, column: u32| {
+    let pixel = |row: u32, column: u32| {
         let h = pcg4d([row, column, SEED, round]);
         let (x, y) = (place(column, columns, width, unit_f32(h[0])), place(row, rows, height, unit_f32(h[1])));
-        let (x0, y0) = (bounds.x0 + x, bounds.y0 + y);
-        PixelBounds { x0, y0, x1: (x0 + BLOCK).min(bounds.x1), y1: (y0 + BLOCK).min(bounds.y1) }
+        [bounds.x0 + x, bounds.y0 + y]
     };
-    (0..rows).flat_map(|row| (0..columns).map(move |column| block(row, column))).collect()
+    (0..rows).flat_map(|row| (0..columns).map(move |column| pixel(row, column))).collect()
 }
 
-/// The squared standard deviation of a camera sample, from the mean absolute difference of two means of [`SPP`] samples:
-/// that is 2σ/√π for normal numbers of standard deviation σ.
-fn variance(difference: f64) -> f64 {
-    0.25 * PI * difference * difference * f64::from(SPP)
+/// The variance of a mean, from the mean absolute and the mean squared difference of two of them: for normal numbers of
+/// standard deviation σ these are 2σ/√π and 2σ². In direct light both count.
+fn variance([absolute, squared]: [f64; 2], is_direct: bool) -> f64 {
+    let of_squares = 0.5 * squared;
+    if is_direct { (0.25 * PI * absolute * absolute * of_squares).sqrt() } else { of_squares }
 }
 
-/// Renders some blocks with each candidate and seed: of each candidate, processor time (ns), and the sum over pixels of the
-/// relative difference of the two means, averaged over channels. The `turn` decides which candidate is first.
+/// Renders some pixels with each candidate and seed: of each candidate, processor time (ns), and the sums over pixels of the
+/// relative difference of the two means and of its square, averaged over channels. The `turn` decides which candidate is first.
 fn measure(
     run: &Run<'_>,
-    blocks: &[PixelBounds],
+    (pixels, spp): (&[[u32; 2]], u32),
     candidates: &[Candidate],
     seeds: [u32; 2],
     turn: usize,
-) -> Vec<[f64; 2]> {
+) -> Vec<[f64; 3]> {
     let mut worker = Worker::new(PathTracer::new(false));
-    let pixels: Vec<[u32; 2]> = blocks.iter().flat_map(|b| (0..b.area() as u32).map(move |i| position(b, i))).collect();
     let mut times = vec![0.0; candidates.len()];
     let mut images = vec![[(); 2].map(|()| Vec::<[f64; 3]>::new()); candidates.len()];
     for k in 0..candidates.len() {
@@ -337,31 +352,37 @@ fn measure(
         let start = processor_time::of_thread();
         for (image, seed) in images[k].iter_mut().zip(seeds) {
             worker.samples.clear();
-            let samples = pixels.iter().map(|&pixel| (0, pixel, 0..SPP));
+            let samples = pixels.iter().map(|&pixel| (0, pixel, 0..spp));
             run.camera.samples(samples, seed, &mut worker.scratch, &mut worker.samples);
             worker.samples.iter_mut().for_each(|s| *s = CameraSample { sample_counts, direct: s.stream, ..*s });
             let out = &mut worker.results;
             worker.tracer.trace(run.job, settings, &worker.samples, &mut Default::default(), out);
-            image.extend(out.chunks(SPP as usize).map(|samples| {
+            image.extend(out.chunks(spp as usize).map(|samples| {
                 let sum = |c: usize| samples.iter().map(|s| f64::from(s.radiance.to_array()[c])).sum::<f64>();
-                [0, 1, 2].map(|c| sum(c) / f64::from(SPP))
+                [0, 1, 2].map(|c| sum(c) / f64::from(spp))
             }));
         }
         times[k] = (processor_time::of_thread() - start).as_secs_f64() * 1e9;
     }
     let all = || images.iter().flatten();
     let count = all().count() as f64;
-    let difference = |[a, b]: &[Vec<[f64; 3]>; 2]| {
-        let of_pixel = |i: usize| {
-            let of_channel = |c: usize| {
-                let mean = all().map(|image| image[i][c]).sum::<f64>() / count;
-                (a[i][c] - b[i][c]).abs() / (3.0 * (mean * mean + DEFAULT_EPSILON).sqrt())
-            };
-            Some((0..3).map(of_channel).sum::<f64>()).filter(|v| v.is_finite()).unwrap_or(0.0)
-        };
-        (0..pixels.len()).map(of_pixel).sum::<f64>()
+    let differences = |[a, b]: &[Vec<[f64; 3]>; 2]| {
+        let mut sums = [0.0; 2];
+        for (i, c) in (0..pixels.len()).flat_map(|i| (0..3).map(move |c| (i, c))) {
+            let mean = all().map(|image| image[i][c]).sum::<f64>() / count;
+            let d = (a[i][c] - b[i][c]).abs() / (mean * mean + DEFAULT_EPSILON).sqrt();
+            if d.is_finite() {
+                sums[0] += d / 3.0;
+                sums[1] += d * d / 3.0;
+            }
+        }
+        sums
     };
-    times.into_iter().zip(&images).map(|(time, images)| [time, difference(images)]).collect()
+    let result = |(time, images)| {
+        let [absolute, squared] = differences(images);
+        [time, absolute, squared]
+    };
+    times.into_iter().zip(&images).map(result).collect()
 }
 
 #[cfg(test)]
@@ -369,21 +390,17 @@ mod tests {
     use super::*;
 
     #[test]
-    fn blocks_lie_inside_the_image_and_apart() {
+    fn pixels_lie_inside_the_image_and_apart() {
         let bounds = PixelBounds { x0: 10, x1: 210, y0: 5, y1: 105 };
         for round in 0..2 {
-            let blocks = blocks(&bounds, 100, round);
-            assert!((80..=120).contains(&blocks.len()), "{}", blocks.len());
-            let mut seen = std::collections::HashSet::new();
-            for b in &blocks {
-                assert!(b.x0 >= bounds.x0 && b.x1 <= bounds.x1 && b.y0 >= bounds.y0 && b.y1 <= bounds.y1);
-                assert_eq!(b.area(), 4);
-                assert!((0..4).all(|i| seen.insert(position(b, i))), "blocks overlap");
-            }
+            let pixels = pixels(&bounds, 300, round);
+            assert!((270..=330).contains(&pixels.len()), "{}", pixels.len());
+            assert!(pixels.iter().all(|[x, y]| (10..210).contains(x) && (5..105).contains(y)));
+            let different: std::collections::HashSet<_> = pixels.iter().collect();
+            assert_eq!(different.len(), pixels.len());
         }
-        assert_ne!(blocks(&bounds, 100, 0), blocks(&bounds, 100, 1));
-        let tiny = blocks(&PixelBounds { x0: 0, x1: 2, y0: 0, y1: 1 }, 100, 0);
-        assert_eq!(tiny, [PixelBounds { x0: 0, x1: 2, y0: 0, y1: 1 }]);
+        assert_ne!(pixels(&bounds, 300, 0), pixels(&bounds, 300, 1));
+        assert_eq!(pixels(&PixelBounds { x0: 0, x1: 2, y0: 0, y1: 1 }, 100, 0), [[0, 0], [1, 0]]);
     }
 
     #[test]
@@ -406,9 +423,16 @@ mod tests {
         use lumiris_test_support::random::{RngExt, pcg32};
         let mut s = pcg32([1, 7, 2]);
         // Means of uniform numbers, of variance 1/12
-        let mut mean = || (0..SPP).map(|_| f64::from(s.random::<f32>())).sum::<f64>() / f64::from(SPP);
-        let differences = (0..20_000).map(|_| (mean() - mean()).abs()).sum::<f64>() / 20_000.0;
-        assert!((variance(differences) * 12.0 - 1.0).abs() < 0.03, "{}", variance(differences));
+        let mut mean = || (0..8).map(|_| f64::from(s.random::<f32>())).sum::<f64>() / 8.0;
+        let mut sums = [0.0; 2];
+        for d in (0..20_000).map(|_| (mean() - mean()).abs() / 20_000.0) {
+            sums[0] += d;
+            sums[1] += d * d * 20_000.0;
+        }
+        for is_direct in [false, true] {
+            let variance = 8.0 * variance(sums, is_direct);
+            assert!((variance * 12.0 - 1.0).abs() < 0.03, "{variance}");
+        }
     }
 
     #[test]

@@ -1,6 +1,7 @@
 //! Efficiency of several settings on one scene: 1/(error × CPU time).
 //!
-//! Every setting renders the image with several seeds; settings take turns. CPU time is that of all threads, and includes
+//! Every setting renders the image with several seeds; settings take turns. What they leave to a pilot is chosen for the
+//! first seed. CPU time is that of all threads, and includes
 //! whatever the settings need before the first sample: light trees, photons, pilots. Unbiased images differ from the truth
 //! by their variance only, so the error of an image is the variance between its seeds, per pixel and channel; the mean
 //! over all settings and seeds says how bright a pixel is, for the relative error.
@@ -67,7 +68,12 @@ pub struct Row {
 }
 
 /// The images of a case.
+#[derive(Default)]
 struct Measured {
+    /// What its settings are with the choices made for the first seed.
+    planned: Option<Settings>,
+    /// Processor time of these choices (s).
+    pilot: f64,
     cpu: Vec<f64>,
     images: Vec<Vec<[f64; 3]>>,
     chosen: Vec<(&'static str, String)>,
@@ -82,18 +88,25 @@ pub fn measure_efficiency(
     observe: &mut dyn FnMut(&str, u32),
 ) -> Result<Vec<Row>, RenderError> {
     let seeds = seeds.max(2);
-    let mut measured: Vec<Measured> =
-        cases.iter().map(|_| Measured { cpu: Vec::new(), images: Vec::new(), chosen: Vec::new() }).collect();
+    let mut measured: Vec<Measured> = cases.iter().map(|_| Measured::default()).collect();
     for seed in 0..seeds {
         for (case, measured) in cases.iter().zip(&mut measured) {
             observe(&case.name, seed);
-            let mut settings = case.settings;
-            settings.sampling.seed = settings.sampling.seed.wrapping_add(seed);
+            let mut settings = measured.planned.unwrap_or(case.settings);
+            settings.sampling.seed = case.settings.sampling.seed.wrapping_add(seed);
             let start = processor_time::of_process();
             let (image, plan) = image(job, settings, render_settings)?;
-            measured.cpu.push((processor_time::of_process() - start).as_secs_f64());
+            let cpu = (processor_time::of_process() - start).as_secs_f64();
+            if measured.planned.is_none() {
+                // What the pilot chose for one seed is used for all, and each image has its time
+                measured.pilot = plan.auto.map_or(0.0, |auto| auto.seconds);
+                measured.chosen = plan.chosen;
+                measured.planned = Some(*job.settings());
+                measured.cpu.push(cpu);
+            } else {
+                measured.cpu.push(cpu + measured.pilot);
+            }
             measured.images.push(image);
-            measured.chosen = plan.chosen;
         }
     }
 

@@ -339,7 +339,7 @@ mod tests {
     #[test]
     fn settings_of_light_by_photons_are_read() {
         let s = settings("Integrator \"path\" \"string estimator\" \"contributing\" \"integer samples\" 8").unwrap();
-        assert_eq!((s.estimator, s.contributing.noncontributing_samples), (EstimatorKind::Contributing, 1));
+        assert_eq!((s.estimator, s.contributing.noncontributing_samples), (EstimatorKind::Contributing, 2));
         assert!(
             s.uses_visibility_cache()
                 && !s.leaves_lights_out()
@@ -366,7 +366,7 @@ mod tests {
             ("\"integer proposals\" 0", "proposals must be from 1 to 4096, not 0"),
             ("\"string strata\" \"some\"", "one of none, proposals, weights, systematic"),
             ("\"string target\" \"l\"", "one of fgl, gv, gvl"),
-            ("\"string estimator\" \"rys\"", "one of mc, mis, ris, ocv, optimal-mis, correlated"),
+            ("\"string estimator\" \"rys\"", "one of auto, mc, mis, ris, ocv, optimal-mis, correlated"),
         ] {
             let report = settings(&format!("Integrator \"path\" {parameter}")).unwrap_err();
             assert!(report.contains(message), "{parameter}: {report}");

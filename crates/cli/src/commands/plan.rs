@@ -42,7 +42,7 @@ fn table(auto: &AutoChoice) -> String {
         "time of a camera sample (ns): {a:.0} + {first:.0} per light sample at the first vertex + {later:.0} per light sample at later ones\n\
          relative variance: {v:.4} + {v_first:.4}/n at the first vertex + {v_later:.4}/n at later ones\n\n\
          {:<52}{:>10}{:>12}{:>12}\n",
-        format!("{} pixels in each round", auto.pixels),
+        format!("{} pixels of 2 × {} samples in each round", auto.pixels, auto.spp),
         "ns",
         "variance",
         "efficiency"

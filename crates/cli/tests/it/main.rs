@@ -4,4 +4,5 @@
 mod browser;
 mod cli;
 mod compare;
+mod plan;
 mod reproduce;
