@@ -1,6 +1,6 @@
 //! Russian roulette and splitting by what lies beyond a vertex.
 //!
-//! A path that arrives at a vertex with the throughput β goes on as n paths of the throughput β/E[n] or β/n. How many is
+//! A path that arrives at a vertex with the throughput β goes on as n paths of the throughput β/E(n) or β/n. How many is
 //! decided by what pilot paths found there ([`tree`]) and in the path's pixel ([`pixels`]):
 //!
 //! * `efficiency` [Rath et al. 2022]: maximises 1/(V C), V being the relative variance of a pixel and C its cost, by
