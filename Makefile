@@ -10,7 +10,7 @@ SCENE = scenes/demo/gallery.pbrt
 
 run: setup
 	$(CARGO) build --release
-	target/release/lumiris render $(SCENE) -o gallery.png -o gallery.exr
+	target/release/lumiris render $(SCENE) --spp 16 -o gallery.png -o gallery.exr
 	@echo "The image is in gallery.png and gallery.exr."
 
 test: setup
