@@ -1,13 +1,14 @@
 //! The estimator `auto`: what is the most efficient for this image, by a pilot.
 //!
-//! Pixels spread over the image are rendered with several settings, each with two independent seeds. The
-//! difference of the two tells the standard deviation σ, relative to the mean, and the time of the thread is the cost. In
-//! paths, whose pixels mostly have as many samples each, the error is the mean of σ². Where light is direct and samples are
-//! allocated in proportion to σ, it would be the square of the mean of σ, were these numbers known; what counts there is the
-//! geometric mean of both. The former is that of few pixels, such as those at edges of visible lights, the latter that of
-//! all others. From few and from many samples at first and at later vertices follows a model of both ([`Model`]), and from that the best
-//! numbers. What is best by the model then takes part in a second round on other pixels, together with what differs in more
-//! than numbers, and the most efficient there is chosen.
+//! Pixels spread over the image are rendered with several settings, each with two independent seeds. The difference of
+//! the two tells the standard deviation σ, relative to the mean, and the time of the thread is the cost. In paths, whose
+//! pixels mostly have as many samples each, the error is the mean of σ². Where light is direct and samples are allocated in
+//! proportion to σ, it would be the square of the mean of σ, were these numbers known; what counts there is the geometric
+//! mean of both. The former is that of few pixels, such as those at edges of visible lights, the latter that of all others.
+//!
+//! From few and from many samples at first and at later vertices follows a model of both ([`Model`]), and from that the
+//! best numbers. What is best by the model then takes part in a second round on other pixels, together with what differs
+//! in more than numbers, and the most efficient there is chosen.
 //!
 //! Times differ from run to run, so the choice is made once, becomes part of the settings, and is recorded with them:
 //! rendering with these settings gives the same image to the bit. All candidates are unbiased, and the pilot has random
@@ -168,7 +169,8 @@ impl Pilot {
 
     fn choose(&self, job: &mut RenderJob) -> (AutoChoice, IntegratorSettings) {
         let start = processor_time::of_process();
-        let base = &{ job.settings().integrator };
+        let base = job.settings().integrator;
+        let base = &base;
         // First round: the model
         let has_later = base.depth() > 1;
         let [few, many] = if has_later { FIT_PATH } else { FIT_DIRECT };

@@ -93,8 +93,8 @@ fn job(settings: impl Fn(&mut IntegratorSettings), seen: impl Fn(&RenderJob, Lig
     settings(&mut loaded.settings.integrator);
     let mut job = loaded.job(AccelKind::Embree, None).unwrap();
     let ids = (0..job.lights.lights.len() as LightId).filter(|&id| seen(&job, id));
-    // About as many as arrive within the radius, of this many paths of each light
-    let paths = (0..job.lights.lights.len() as LightId).map(|id| (id, 4000.0));
+    // So few paths that more photons arrive than are expected: lights with photons are known to be visible
+    let paths = (0..job.lights.lights.len() as LightId).map(|id| (id, 1000.0));
     let visibility_cache = VisibilityCache::new(ids.flat_map(|id| vec![(Vec3::ZERO, Vec3::Z, id); 20]), 0.1);
     let visibility_cache = visibility_cache.with_paths(paths);
     job.lights.set_visibility_cache(Some(visibility_cache));
@@ -185,8 +185,7 @@ fn brighter_lights_first_leave_little_noise_and_no_bias() {
     let [one, eight, twenty, sixty] = estimates.map(|e| e.variance());
     assert!(one > 2.0 * eight && eight > 2.0 * twenty && twenty > sixty, "{one} {eight} {twenty} {sixty}");
 
-    // Where all are seen, one of them in proportion to what is expected of it has a few times the variance of all: much
-    // less than the ninth part of the samples would have, were lights chosen alike.
+    // Where all are seen, one of them in proportion to its brightness is worth as much as all.
     let [one, all] = [1, 9].map(|samples| pixels(&mut job(contributing(samples, 0), is_seen), 100).variance());
-    assert!(one < 10.0 * all, "{one} {all}");
+    assert!(one < 2.0 * all, "{one} {all}");
 }

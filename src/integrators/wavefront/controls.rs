@@ -1,8 +1,9 @@
 //! Control variates of the estimates of a batch: what each component of the mixture has of the samples, less its share.
 //!
 //! The means of r_j = h_j/p_α over the samples of a vertex, as in [`crate::direct::mixture`], for the groups of lights,
-//! and for the first of two lobes where the BSDF may have two: the other column of the BSDF depends on these. As there, a sample without a contribution belongs to the group that drew
-//! it, and the density of BSDF sampling is 0 for a light sample that another emitter hides.
+//! and for the first of two lobes where the BSDF may have two: the other column of the BSDF depends on these. As there, a
+//! sample without a contribution belongs to the group that drew it, and the density of BSDF sampling is 0 for a light
+//! sample that another emitter hides.
 
 use super::columns::{SampleColumns, Single, Surface, Traced, others};
 use super::emitters::EmitterRays;
