@@ -10,7 +10,8 @@
 //! Lights without power are never chosen.
 
 use super::choice::UNIT;
-use super::{Light, LightCtx, LightId, LightRun, SampledLight, TreeChoice, VisibilityCache, VisibilityCacheSampler};
+use super::{Light, LightCtx, LightId, LightRun, SampledLight, TreeChoice, Turns};
+use super::{VisibilityCache, VisibilityCacheSampler};
 use lumiris_numbers::math::{AliasTable, cumulative};
 use std::sync::Arc;
 use strum::{EnumIter, EnumString, IntoStaticStr, VariantNames};
@@ -136,6 +137,15 @@ impl LightSampler {
             }
             LightSampler::Tree(choice) => choice.sample(ctx, u),
             LightSampler::Photons(choice) => choice.sample(ctx, u),
+        }
+    }
+
+    /// [`Self::sample`], where the point's `turns` hold what is known of it.
+    #[inline]
+    pub fn sample_again(&self, ctx: &LightCtx, u: f32, turns: &mut Turns) -> Option<SampledLight> {
+        match self {
+            LightSampler::Tree(choice) => choice.sample_again(ctx, u, turns),
+            _ => self.sample(ctx, u),
         }
     }
 

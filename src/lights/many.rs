@@ -3,7 +3,8 @@
 //! Points that chose the same light are sampled together: rectangles, triangles and infinite lights by kernels, whatever
 //! has none one by one. How many points there are changes no bit: a light that has a kernel is always sampled by it.
 
-use super::{AreaLight, AreaShape, Light, LightCtx, LightId, LightLanes, LightSample, LightSampler, LightSampling};
+use super::{AreaLight, AreaShape, Light, LightCtx, LightId, LightLanes};
+use super::{LightSample, LightSampler, LightSampling, Turns};
 use lumiris_lanes::area::{Rectangle, many};
 use lumiris_lanes::columns::{Column, Columns3, padded, reserve};
 use lumiris_lanes::level;
@@ -100,6 +101,8 @@ impl LightSamples {
 pub struct Scratch {
     /// The light that each point chose, and the probability.
     chosen: Vec<(LightId, f32)>,
+    /// What earlier choices at the points have determined.
+    turns: Vec<Turns>,
     /// Points sorted by light.
     order: Vec<u32>,
     begins: Vec<u32>,
@@ -109,6 +112,14 @@ pub struct Scratch {
 }
 
 impl Scratch {
+    /// Prepares for samples of `lights` at `n` points, one after another at each.
+    pub fn begin(&mut self, lights: &LightSampling, n: usize) {
+        self.turns.clear();
+        if lights.sampler.only_light().is_none() {
+            self.turns.resize(n, Turns::NONE);
+        }
+    }
+
     /// The light that point `i` chose in the last [`LightSampling::sample_many`], where there is more than one.
     pub fn chosen(&self, i: usize) -> LightId {
         self.chosen[i].0
@@ -118,7 +129,7 @@ impl Scratch {
 impl LightSampling {
     /// Samples a direction to a light for each of the `n` points `at`: the light by `u[0]`, the direction by `u[1]` and
     /// `u[2]`. The results are those of [`sample`](Self::sample) up to rounding; of infinite lights, radiance and
-    /// density are those of all together. `out` has whole vectors.
+    /// density are those of all together. `out` has whole vectors. `scratch` has begun with these points.
     pub fn sample_many(
         &self,
         n: usize,
@@ -133,7 +144,8 @@ impl LightSampling {
         } else {
             let mut chosen = std::mem::take(&mut scratch.chosen);
             chosen.clear();
-            chosen.extend((0..n).map(|i| match self.sampler.sample(&at.get(i), u[0][i]) {
+            let turns = scratch.turns[..n].iter_mut().enumerate();
+            chosen.extend(turns.map(|(i, turns)| match self.sampler.sample_again(&at.get(i), u[0][i], turns) {
                 Some(choice) => (choice.light, choice.pmf),
                 None => (NO_LIGHT, 0.0),
             }));
@@ -376,13 +388,21 @@ mod tests {
             p.set(i, Vec3::new(stream.random::<f32>(), stream.random::<f32>(), stream.random::<f32>()) * 2.0 - 1.0);
             n.set(i, Vec3::Z);
             ns.set(i, Vec3::Z);
-            u.iter_mut().for_each(|u| u[i] = stream.random::<f32>());
         }
         let at = LitPoints { p: &p, n: &n, ns: &ns };
         let (mut scratch, mut out) = (Scratch::default(), LightSamples::default());
         out.reserve(len);
-        lights.sample_many(N, at, &u, &mut scratch, &mut out);
+        scratch.begin(&lights, N);
+        // Choices after the first one know what that has determined
+        for _ in 0..3 {
+            u.iter_mut().for_each(|u| u[..N].fill_with(|| stream.random::<f32>()));
+            lights.sample_many(N, at, &u, &mut scratch, &mut out);
+            assert_same(&lights, at, &u, &out);
+        }
+    }
 
+    /// Expects of `out` what the lights give one by one.
+    fn assert_same(lights: &LightSampling, at: LitPoints<'_>, u: &[Column; 3], out: &LightSamples) {
         let mut drawn = 0;
         for i in 0..N {
             let ctx = at.get(i);

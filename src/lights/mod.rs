@@ -20,7 +20,10 @@ pub mod sampling;
 pub mod set;
 pub mod spot;
 pub mod tree;
+mod tree_build;
 pub mod tree_choice;
+mod tree_node;
+pub mod turns;
 pub mod visibility_cache;
 pub mod visibility_cache_sampler;
 
@@ -43,6 +46,7 @@ pub use sampling::LightSampling;
 pub use set::{LightSet, LightSetBuilder};
 pub use tree::LightTree;
 pub use tree_choice::TreeChoice;
+pub use turns::Turns;
 pub use visibility_cache::VisibilityCache;
 pub use visibility_cache_sampler::VisibilityCacheSampler;
 

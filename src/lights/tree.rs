@@ -6,101 +6,18 @@
 //! to p, θi′ the minimum angle between the surface normal and a direction to the node. Both sides of the maximum are
 //! squared lengths, so the result does not depend on the unit of length.
 
+use super::tree_build::{Item, build};
+use super::tree_node::Node;
+use super::turns::Turns;
 use super::{LightBounds, LightCtx, LightId, LightRun};
-use lumiris_numbers::math::{Bounds3, ONE_MINUS_EPSILON, Vec3, safe_sqrt, sqr};
+use lumiris_numbers::math::ONE_MINUS_EPSILON;
 
-/// Slack of the cosines, for rounding: a light that can contribute never has importance 0.
-const COSINE_SLACK: f32 = 1e-3;
-/// Beyond this depth lights are split in halves, so that the trail of any leaf fits 64 bits.
-const MAX_HEURISTIC_DEPTH: u32 = 30;
 /// Subtrees on the stack while positions descend together: one per level.
 const MAX_DEPTH: usize = 66;
 /// Minimum probability of a child that can contribute; f32 uniforms and 1 − p do not resolve much less.
 const MIN_PROBABILITY: f32 = 1.0 / (1 << 20) as f32;
-/// Number of split candidates per axis, plus one.
-const BUCKETS: usize = 12;
-/// Lights above which the parts of a subtree, and the axes of a split, are worked on at once.
-const MANY: usize = 4096;
 /// Trail of lights that are not in the tree.
 const NO_TRAIL: u64 = u64::MAX;
-
-#[derive(Clone, Copy, Debug)]
-struct Node {
-    center: Vec3,
-    radius_squared: f32,
-    axis: Vec3,
-    cos_theta_o: f32,
-    sin_theta_o: f32,
-    cos_theta_e: f32,
-    intensity: f32,
-    two_sided: bool,
-    is_leaf: bool,
-    /// The light of a leaf, or the right child; the left child follows its parent.
-    index: u32,
-}
-
-/// cos(max(0, a − b)).
-#[inline]
-fn cos_of_difference(sin_a: f32, cos_a: f32, sin_b: f32, cos_b: f32) -> f32 {
-    if cos_a > cos_b { 1.0 } else { cos_a * cos_b + sin_a * sin_b }
-}
-
-/// sin(max(0, a − b)).
-#[inline]
-fn sin_of_difference(sin_a: f32, cos_a: f32, sin_b: f32, cos_b: f32) -> f32 {
-    if cos_a > cos_b { 0.0 } else { sin_a * cos_b - cos_a * sin_b }
-}
-
-impl Node {
-    fn new(b: &LightBounds, is_leaf: bool, index: u32) -> Self {
-        let center = b.bounds.center();
-        let radius = (b.bounds.max - center).length() + 4.0 * f32::EPSILON * center.abs().max_element();
-        Node {
-            center,
-            radius_squared: sqr(radius),
-            axis: b.axis,
-            cos_theta_o: b.cos_theta_o,
-            sin_theta_o: safe_sqrt(1.0 - sqr(b.cos_theta_o)),
-            cos_theta_e: b.cos_theta_e,
-            intensity: b.intensity,
-            two_sided: b.two_sided,
-            is_leaf,
-            index,
-        }
-    }
-
-    #[inline]
-    fn importance(&self, ctx: &LightCtx) -> f32 {
-        let d = self.center - ctx.p;
-        let d2 = d.length_squared();
-        if d2 <= self.radius_squared {
-            return if self.radius_squared > 0.0 { self.intensity / self.radius_squared } else { 0.0 };
-        }
-        let wi = d / d2.sqrt();
-        let sin2_b = self.radius_squared / d2;
-        let (sin_b, cos_b) = (sin2_b.sqrt(), safe_sqrt(1.0 - sin2_b));
-
-        // Angle between the axis and the direction to p, less the cone of normals, less the node's extent.
-        let cos_axis = -wi.dot(self.axis);
-        let cos_w = if self.two_sided { cos_axis.abs() } else { cos_axis };
-        let sin_w = safe_sqrt(1.0 - sqr(cos_w));
-        let cos_x = cos_of_difference(sin_w, cos_w, self.sin_theta_o, self.cos_theta_o);
-        let sin_x = sin_of_difference(sin_w, cos_w, self.sin_theta_o, self.cos_theta_o);
-        let cos_light = cos_of_difference(sin_x, cos_x, sin_b, cos_b);
-        if cos_light < self.cos_theta_e - COSINE_SLACK {
-            return 0.0;
-        }
-        let importance = self.intensity * cos_light.max(COSINE_SLACK) / d2;
-        if ctx.ns == Vec3::ZERO {
-            return importance;
-        }
-
-        // The surface may transmit, so light from its back counts too.
-        let cos_i = wi.dot(ctx.ns).abs().min(1.0);
-        let sin_i = safe_sqrt(1.0 - sqr(cos_i));
-        importance * cos_of_difference(sin_i, cos_i, sin_b, cos_b).max(COSINE_SLACK)
-    }
-}
 
 /// The hierarchy.
 #[derive(Clone, Debug, Default)]
@@ -119,12 +36,6 @@ struct Descent {
     pmf: f32,
     places: [u32; 2],
     interval: [f64; 2],
-}
-
-struct Item {
-    id: LightId,
-    bounds: LightBounds,
-    center: Vec3,
 }
 
 impl LightTree {
@@ -225,11 +136,28 @@ impl LightTree {
         u: f32,
         adjust: impl Fn(usize, f32) -> f32,
     ) -> Option<(LightId, f32, f32)> {
-        let (mut place, mut pmf, mut u) = (place as usize, 1.0, u);
+        self.descend(place, u, |place, _| self.left_probability_by(ctx, place, &adjust))
+    }
+
+    /// [`Self::sample`], where the point's `turns` hold what is known of it.
+    #[inline]
+    pub fn sample_again(&self, ctx: &LightCtx, u: f32, turns: &mut Turns) -> Option<(LightId, f32, f32)> {
+        if self.is_empty() {
+            return None;
+        }
+        self.descend(0, u, |place, number| turns.probability(number, || self.left_probability(ctx, place)))
+    }
+
+    /// Goes down from a node: `left(node, number)` is the probability to turn left there, where the children of the node
+    /// of number n have the numbers 2n and 2n + 1 below [`Turns::COUNT`], and the first one has 1.
+    #[inline]
+    fn descend(&self, place: u32, u: f32, mut left: impl FnMut(usize, usize) -> f32) -> Option<(LightId, f32, f32)> {
+        let (mut place, mut number, mut pmf, mut u) = (place as usize, 1, 1.0, u);
         let mut node = &self.nodes[place];
         while !node.is_leaf {
-            let p = self.left_probability_by(ctx, place, &adjust);
-            if u < p {
+            let p = left(place, number);
+            let turns_left = u < p;
+            if turns_left {
                 u /= p;
                 pmf *= p;
                 place += 1;
@@ -237,6 +165,9 @@ impl LightTree {
                 u = (u - p) / (1.0 - p);
                 pmf *= 1.0 - p;
                 place = node.index as usize;
+            }
+            if number < Turns::COUNT {
+                number = 2 * number + usize::from(!turns_left);
             }
             u = u.min(ONE_MINUS_EPSILON);
             node = &self.nodes[place];
@@ -386,98 +317,13 @@ impl LightTree {
     }
 }
 
-#[inline]
-fn bucket(center: f32, min: f32, extent: f32) -> usize {
-    (((center - min) / extent * BUCKETS as f32) as usize).min(BUCKETS - 1)
-}
-
-/// Builds the subtree over `items` into `nodes`, 2n − 1 of them for n items, the first of which has the index `first`.
-fn build(nodes: &mut [Node], first: u32, items: &mut [Item], depth: u32) -> LightBounds {
-    if let [item] = items {
-        nodes[0] = Node::new(&item.bounds, true, item.id);
-        return item.bounds;
-    }
-    let is_large = items.len() > MANY;
-    let middle = if depth < MAX_HEURISTIC_DEPTH { split(items) } else { items.len() / 2 };
-    let (left_items, right_items) = items.split_at_mut(middle);
-    let (left_nodes, right_nodes) = nodes[1..].split_at_mut(2 * middle - 1);
-    let right_index = first + 2 * middle as u32;
-    let mut left = || build(left_nodes, first + 1, left_items, depth + 1);
-    let mut right = || build(right_nodes, right_index, right_items, depth + 1);
-    let (left, right) = if is_large { rayon::join(left, right) } else { (left(), right()) };
-    let bounds = left.union(&right);
-    nodes[0] = Node::new(&bounds, false, right_index);
-    bounds
-}
-
-/// Reorders at least two items and returns where to split them; neither part is empty.
-fn split(items: &mut [Item]) -> usize {
-    let centers = Bounds3::from_points(items.iter().map(|i| i.center));
-    let all = items.iter().fold(Bounds3::EMPTY, |b, i| b.union(i.bounds.bounds));
-    let (diagonal, longest) = (all.diagonal(), all.diagonal().max_element());
-    let cut = |axis: usize| {
-        let (min, extent) = (centers.min[axis], centers.max[axis] - centers.min[axis]);
-        if extent <= 0.0 || !extent.is_finite() {
-            return None;
-        }
-        // Long thin parts are worse: regularise by the aspect.
-        let stretch = longest / diagonal[axis];
-        best_cut(items, axis, min, extent).map(|(cost, cut)| (cost * stretch, axis, cut))
-    };
-    let cuts = if items.len() > MANY {
-        let (x, (y, z)) = rayon::join(|| cut(0), || rayon::join(|| cut(1), || cut(2)));
-        [x, y, z]
-    } else {
-        [cut(0), cut(1), cut(2)]
-    };
-    let cheaper = |best: (f32, usize, usize), other: (f32, usize, usize)| if other.0 < best.0 { other } else { best };
-    let best = cuts.into_iter().flatten().reduce(cheaper);
-    let Some((_, axis, cut)) = best else { return items.len() / 2 };
-
-    let (min, extent) = (centers.min[axis], centers.max[axis] - centers.min[axis]);
-    let mut middle = 0;
-    for i in 0..items.len() {
-        if bucket(items[i].center[axis], min, extent) < cut {
-            items.swap(i, middle);
-            middle += 1;
-        }
-    }
-    middle
-}
-
-/// The minimum cost of a split along an axis, and the first bucket right of it.
-fn best_cut(items: &[Item], axis: usize, min: f32, extent: f32) -> Option<(f32, usize)> {
-    let mut buckets = [LightBounds::EMPTY; BUCKETS];
-    for item in items {
-        let b = &mut buckets[bucket(item.center[axis], min, extent)];
-        *b = b.union(&item.bounds);
-    }
-    // Costs of what is right of each cut, from the end; then left ones from the start.
-    let mut right_costs = [0.0; BUCKETS];
-    let mut right = LightBounds::EMPTY;
-    for i in (1..BUCKETS).rev() {
-        right = right.union(&buckets[i]);
-        right_costs[i] = if right.intensity > 0.0 { right.cost() } else { f32::INFINITY };
-    }
-    let mut left = LightBounds::EMPTY;
-    let mut best: Option<(f32, usize)> = None;
-    for cut in 1..BUCKETS {
-        left = left.union(&buckets[cut - 1]);
-        let cost = left.cost() + right_costs[cut];
-        if left.intensity > 0.0 && right_costs[cut] < f32::INFINITY && best.is_none_or(|(c, _)| cost < c) {
-            best = Some((cost, cut));
-        }
-    }
-    best
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;
     use crate::geometry::{Shape, TriangleMesh};
     use crate::lights::{Emission, Light, area_lights_of};
-    use lumiris_numbers::math::Rgb;
     use lumiris_numbers::math::warp::sample_uniform_sphere;
+    use lumiris_numbers::math::{Rgb, Vec3};
     use lumiris_test_support::assert_chi_squared;
     use lumiris_test_support::random::{Pcg32, RngExt, pcg32};
 

@@ -1,7 +1,7 @@
 //! The choice of a light by a [`LightTree`], with the infinite lights, which have no place in it, beside it.
 
 use super::choice::UNIT;
-use super::{Light, LightCtx, LightId, LightRun, LightTree, SampledLight};
+use super::{Light, LightCtx, LightId, LightRun, LightTree, SampledLight, Turns};
 use lumiris_numbers::math::ONE_MINUS_EPSILON;
 use std::sync::Arc;
 
@@ -43,8 +43,25 @@ impl TreeChoice {
     /// Chooses a light by `u` in [0, 1); `None` if there is none.
     #[inline]
     pub fn sample(&self, ctx: &LightCtx, u: f32) -> Option<SampledLight> {
-        let TreeChoice { tree, infinite } = self;
-        let p_infinite = self.infinite_probability(ctx);
+        self.choose(u, self.infinite_probability(ctx), |u| self.tree.sample(ctx, u))
+    }
+
+    /// [`Self::sample`], where the point's `turns` hold what is known of it.
+    #[inline]
+    pub fn sample_again(&self, ctx: &LightCtx, u: f32, turns: &mut Turns) -> Option<SampledLight> {
+        let p_infinite = turns.probability(Turns::BESIDE, || self.infinite_probability(ctx));
+        self.choose(u, p_infinite, |u| self.tree.sample_again(ctx, u, turns))
+    }
+
+    /// Chooses an infinite light, which all together have the probability `p_infinite`, or one by `of_tree(u)`.
+    #[inline]
+    fn choose(
+        &self,
+        u: f32,
+        p_infinite: f32,
+        of_tree: impl FnOnce(f32) -> Option<(LightId, f32, f32)>,
+    ) -> Option<SampledLight> {
+        let infinite = &self.infinite;
         if u < p_infinite {
             let x = u / p_infinite * infinite.len() as f32;
             let i = (x as usize).min(infinite.len() - 1);
@@ -52,7 +69,7 @@ impl TreeChoice {
             return Some(SampledLight { light: infinite[i], pmf: p_infinite / infinite.len() as f32, u });
         }
         let u = ((u - p_infinite) / (1.0 - p_infinite)).min(ONE_MINUS_EPSILON);
-        let (light, pmf, u) = tree.sample(ctx, u)?;
+        let (light, pmf, u) = of_tree(u)?;
         Some(SampledLight { light, pmf: pmf * (1.0 - p_infinite), u })
     }
 

@@ -8,12 +8,16 @@
 //!
 //! From few and from many samples at first and at later vertices follows a model of both ([`Model`]), and from that the
 //! best numbers. What is best by the model then takes part in a second round on other pixels, together with what differs
-//! in more than numbers, and the most efficient there is chosen.
+//! in more than numbers. There a candidate takes the place of the one before it only if it is more efficient by more than
+//! the pilot's noise, which the jackknife tells: all candidates have the same pixels, so that the difference of two of
+//! them is known better than either.
 //!
 //! Times differ from run to run, so the choice is made once, becomes part of the settings, and is recorded with them:
 //! rendering with these settings gives the same image to the bit. All candidates are unbiased, and the pilot has random
 //! numbers of its own; so the choice adds no bias.
 
+pub use super::auto_round::Trial;
+use super::auto_round::{Candidate, Difference, Round};
 use super::visibility_cache::build_visibility_cache;
 use super::worker::Worker;
 use super::{RenderSettings, Run, processor_time};
@@ -23,11 +27,9 @@ use crate::integrators::PathTracer;
 use crate::integrators::path::CameraSample;
 use crate::scene::RenderJob;
 use crate::settings::{EstimatorKind, IntegratorKind, IntegratorSettings, Proposals, Settings};
-use lumiris_numbers::estimators::efficiency::{Measured, Model};
 use lumiris_numbers::math::hash::{pcg4d, unit_f32};
 use rayon::prelude::*;
 use serde::{Deserialize, Serialize};
-use std::f64::consts::PI;
 use std::sync::atomic::AtomicBool;
 
 /// Most samples of a pixel and seed. With fewer than the image has, what their net gains would not be seen.
@@ -45,8 +47,8 @@ const FRACTION: f64 = 0.03;
 const TRIALS: [f64; 2] = [10.0, 16.0];
 /// Combined with the seed of the image and the number of the round.
 const SEED: u32 = 0x61_75_74_6f;
-/// By how much a choice must be more efficient than what takes its place without a pilot.
-const MIN_GAIN: f64 = 1.03;
+/// Share of the greatest efficiency, by the model, with which fewer samples will do.
+const NEARLY: f64 = 0.95;
 
 /// Lights from which on photons may tell which of them contribute.
 const MANY_LIGHTS: usize = 16;
@@ -61,20 +63,6 @@ const LATER: [u32; 8] = [2, 3, 4, 5, 6, 8, 12, 16];
 /// Samples from which the model is fitted: few and many, in direct light and in paths.
 const FIT_DIRECT: [u32; 2] = [4, 16];
 const FIT_PATH: [u32; 2] = [2, 8];
-
-/// Settings that took part, and what was measured of them.
-#[derive(Clone, Debug, PartialEq, Deserialize, Serialize)]
-pub struct Trial {
-    /// What they are.
-    pub name: String,
-    /// Processor time of a camera sample (ns).
-    pub nanoseconds: f64,
-    /// Relative variance of a camera sample, from as many samples per pixel as the pilot had: its mean over pixels; in direct
-    /// light the geometric mean of that and of the squared mean of the standard deviation.
-    pub variance: f64,
-    /// 1/(variance × time), relative to the first trial of the round.
-    pub efficiency: f64,
-}
 
 /// What the pilot measured and chose.
 #[derive(Clone, Debug, PartialEq, Deserialize, Serialize)]
@@ -142,14 +130,6 @@ struct Pilot {
     seed: u32,
 }
 
-/// A candidate.
-struct Candidate {
-    name: String,
-    settings: IntegratorSettings,
-    /// Time of its preparations per camera sample of the image (ns).
-    preparation: f64,
-}
-
 impl Pilot {
     /// `None` if the image is too small, or its integrator has no estimates at path vertices alone.
     fn new(job: &RenderJob) -> Option<Self> {
@@ -179,23 +159,23 @@ impl Pilot {
             numbers.push([few, many]);
         }
         let candidates: Vec<Candidate> = numbers.iter().map(|&n| Candidate::named(with_samples(base, n))).collect();
-        let trials = self.round(job, &candidates, 0);
+        let first = self.round(job, &candidates, 0);
         let of_light = |n: u32| if has_later { n - 1 } else { n };
-        let measured = |i: usize| Measured {
-            samples: numbers[i].map(|n| f64::from(of_light(n))),
-            cost: trials[i].nanoseconds,
-            variance: trials[i].variance,
-        };
-        let model = Model::fit(&measured(0), [Some(measured(1)), has_later.then(|| measured(2))]);
+        let numbers: Vec<[f64; 2]> = numbers.iter().map(|n| n.map(|n| f64::from(of_light(n)))).collect();
+        let model = first.models(&numbers).remove(0);
         let light = |numbers: &[u32]| numbers.iter().map(|&n| of_light(n)).collect::<Vec<_>>();
         let choices = if has_later { [light(&FIRST), light(&LATER)] } else { [light(&DIRECT), vec![few]] };
-        let best = model.best(choices.each_ref().map(Vec::as_slice)).map(|n| if has_later { n + 1 } else { n });
+        let best = model.best(choices.each_ref().map(Vec::as_slice), NEARLY);
+        let predicted = first.predicted(&numbers, best.map(f64::from));
+        let best = best.map(|n| if has_later { n + 1 } else { n });
+        let trials = first.trials(&candidates);
 
         // Second round: the best by the model, and what else there is
-        let mut candidates = Candidate::of_second_round(base, best);
+        let mut candidates = second_round(base, best);
         candidates.extend(with_photons(job, trials[0].nanoseconds));
         let second = self.round(job, &candidates, 1);
-        let chosen = most_efficient(&second);
+        let chosen = second.choose(&candidates, predicted);
+        let second = second.trials(&candidates);
         if !candidates[chosen].settings.uses_visibility_cache() {
             job.lights.set_visibility_cache(None);
         }
@@ -212,70 +192,42 @@ impl Pilot {
     }
 
     /// Measures all candidates on the pixels of a round.
-    fn round(&self, job: &RenderJob, candidates: &[Candidate], round: usize) -> Vec<Trial> {
+    fn round(&self, job: &RenderJob, candidates: &[Candidate], round: usize) -> Round {
         let (render, stop) = (RenderSettings::default(), AtomicBool::new(false));
         let run = Run::new(job, &render, &stop, &|_| ());
         let seeds = [0, 1].map(|k| pcg4d([self.seed, SEED, round as u32, k])[0]);
         let chunks: Vec<_> = self.pixels[round].chunks(CHUNK).enumerate().collect();
-        let measured: Vec<Vec<[f64; 3]>> =
+        let measured: Vec<Vec<(f64, Vec<Difference>)>> =
             chunks.into_par_iter().map(|(i, pixels)| measure(&run, (pixels, self.spp), candidates, seeds, i)).collect();
-        let pixels = self.pixels[round].len() as f64;
-        let samples = pixels * f64::from(2 * self.spp);
-        let sum = |k: usize, of: usize| measured.iter().map(|chunk| chunk[k][of]).sum::<f64>();
+        let samples = self.pixels[round].len() as f64 * f64::from(2 * self.spp);
+        let of = |k: usize| {
+            let nanoseconds = measured.iter().map(|chunk| chunk[k].0).sum::<f64>() / samples;
+            let differences = measured.iter().flat_map(|chunk| &chunk[k].1).copied().collect();
+            (nanoseconds + candidates[k].preparation, differences)
+        };
         let is_direct = job.settings().integrator.depth() <= 1;
-        let numbers = |k: usize| {
-            (sum(k, 0) / samples, variance([sum(k, 1), sum(k, 2)].map(|d| d / pixels), is_direct) * f64::from(self.spp))
-        };
-        let efficiency = |(ns, variance): (f64, f64)| if variance > 0.0 { 1.0 / (ns * variance) } else { 0.0 };
-        let base = efficiency((numbers(0).0 + candidates[0].preparation, numbers(0).1));
-        let trial = |(k, candidate): (usize, &Candidate)| {
-            let (nanoseconds, variance) = numbers(k);
-            let nanoseconds = nanoseconds + candidate.preparation;
-            let relative = if base > 0.0 { efficiency((nanoseconds, variance)) / base } else { 1.0 };
-            Trial { name: candidate.name.clone(), nanoseconds, variance, efficiency: relative }
-        };
-        candidates.iter().enumerate().map(trial).collect()
+        Round { measured: (0..candidates.len()).map(of).collect(), spp: self.spp, is_direct }
     }
 }
 
-impl Candidate {
-    fn named(settings: IntegratorSettings) -> Self {
-        let kind = <&str>::from(settings.estimator);
-        let numbers = [0, 1].map(|vertex| settings.sample_counts_at(vertex).samples);
-        let mut name = format!("{kind} {}", numbers[0]);
-        if settings.depth() > 1 {
-            name += &format!(", {} later", numbers[1]);
-            let roulette = settings.roulette_depth.map_or("off".to_owned(), |n| n.to_string());
-            name += &format!(", roulette {roulette}");
-        }
-        if settings.estimator == EstimatorKind::Ris {
-            name += &format!(" of {}", settings.sample_counts().proposals);
-        }
-        if settings.estimator == EstimatorKind::Mis {
-            name += &format!(", BSDF fraction {}", settings.bsdf_fraction());
-        }
-        Candidate { name, settings, preparation: 0.0 }
+/// What is done without a pilot, the best numbers of `mis`, and these with another setting each. None twice.
+fn second_round(base: &IntegratorSettings, best: [u32; 2]) -> Vec<Candidate> {
+    let chosen = with_samples(base, best);
+    let mut all = vec![without_pilot(base), chosen];
+    if chosen.bsdf_fraction != base.bsdf_fraction && best[0].max(best[1]) > 4 {
+        all.push(IntegratorSettings { bsdf_fraction: None, ..chosen });
     }
-
-    /// What is done without a pilot, the best numbers of `mis`, and these with another setting each. None twice.
-    fn of_second_round(base: &IntegratorSettings, best: [u32; 2]) -> Vec<Self> {
-        let chosen = with_samples(base, best);
-        let mut all = vec![without_pilot(base), chosen];
-        if chosen.bsdf_fraction != base.bsdf_fraction && best[0].max(best[1]) > 4 {
-            all.push(IntegratorSettings { bsdf_fraction: None, ..chosen });
-        }
-        if base.depth() > 1 && base.roulette_depth.is_some_and(|first| first < base.depth()) {
-            all.push(IntegratorSettings { roulette_depth: None, ..chosen });
-        }
-        all.push(resampled(base));
-        let mut candidates: Vec<Candidate> = Vec::new();
-        for settings in all {
-            if candidates.iter().all(|c| c.settings != settings) {
-                candidates.push(Candidate::named(settings));
-            }
-        }
-        candidates
+    if base.depth() > 1 && base.roulette_depth.is_some_and(|first| first < base.depth()) {
+        all.push(IntegratorSettings { roulette_depth: None, ..chosen });
     }
+    all.push(resampled(base));
+    let mut candidates: Vec<Candidate> = Vec::new();
+    for settings in all {
+        if candidates.iter().all(|c| c.settings != settings) {
+            candidates.push(Candidate::named(settings));
+        }
+    }
+    candidates
 }
 
 /// Candidates that know by photons which lights contribute at a place, if there are many lights and a camera sample takes
@@ -304,12 +256,6 @@ fn with_photons(job: &mut RenderJob, nanoseconds: f64) -> Vec<Candidate> {
     numbers.iter().map(|&n| contributing(n)).collect()
 }
 
-/// The index of the most efficient trial; the first one unless another is better by [`MIN_GAIN`].
-fn most_efficient(trials: &[Trial]) -> usize {
-    let best = (0..trials.len()).max_by(|&a, &b| trials[a].efficiency.total_cmp(&trials[b].efficiency)).unwrap_or(0);
-    if trials[best].efficiency >= MIN_GAIN * trials[0].efficiency { best } else { 0 }
-}
-
 /// Pixels, one in each cell of a grid, at a place that depends on the round.
 fn pixels(bounds: &PixelBounds, count: usize, round: u32) -> Vec<[u32; 2]> {
     let (width, height) = (bounds.width(), bounds.height());
@@ -328,22 +274,15 @@ fn pixels(bounds: &PixelBounds, count: usize, round: u32) -> Vec<[u32; 2]> {
     (0..rows).flat_map(|row| (0..columns).map(move |column| pixel(row, column))).collect()
 }
 
-/// The variance of a mean, from the mean absolute and the mean squared difference of two of them: for normal numbers of
-/// standard deviation σ these are 2σ/√π and 2σ². In direct light both count.
-fn variance([absolute, squared]: [f64; 2], is_direct: bool) -> f64 {
-    let of_squares = 0.5 * squared;
-    if is_direct { (0.25 * PI * absolute * absolute * of_squares).sqrt() } else { of_squares }
-}
-
-/// Renders some pixels with each candidate and seed: of each candidate, processor time (ns), and the sums over pixels of the
-/// relative difference of the two means and of its square, averaged over channels. The `turn` decides which candidate is first.
+/// Renders some pixels with each candidate and seed: of each candidate, processor time (ns), and the difference of the two
+/// means of each pixel. The `turn` decides which candidate is first.
 fn measure(
     run: &Run<'_>,
     (pixels, spp): (&[[u32; 2]], u32),
     candidates: &[Candidate],
     seeds: [u32; 2],
     turn: usize,
-) -> Vec<[f64; 3]> {
+) -> Vec<(f64, Vec<Difference>)> {
     let mut worker = Worker::new(PathTracer::new(false));
     let mut times = vec![0.0; candidates.len()];
     let mut images = vec![[(); 2].map(|()| Vec::<[f64; 3]>::new()); candidates.len()];
@@ -368,23 +307,17 @@ fn measure(
     }
     let all = || images.iter().flatten();
     let count = all().count() as f64;
-    let differences = |[a, b]: &[Vec<[f64; 3]>; 2]| {
-        let mut sums = [0.0; 2];
-        for (i, c) in (0..pixels.len()).flat_map(|i| (0..3).map(move |c| (i, c))) {
+    let difference = |[a, b]: &[Vec<[f64; 3]>; 2], i: usize| {
+        let of_channel = |c: usize| {
             let mean = all().map(|image| image[i][c]).sum::<f64>() / count;
             let d = (a[i][c] - b[i][c]).abs() / (mean * mean + DEFAULT_EPSILON).sqrt();
-            if d.is_finite() {
-                sums[0] += d / 3.0;
-                sums[1] += d * d / 3.0;
-            }
-        }
-        sums
+            if d.is_finite() { d } else { 0.0 }
+        };
+        let channels = [0, 1, 2].map(of_channel);
+        [channels.iter().sum::<f64>() / 3.0, channels.iter().map(|d| d * d).sum::<f64>() / 3.0]
     };
-    let result = |(time, images)| {
-        let [absolute, squared] = differences(images);
-        [time, absolute, squared]
-    };
-    times.into_iter().zip(&images).map(result).collect()
+    let of_candidate = |images| (0..pixels.len()).map(|i| difference(images, i)).collect();
+    times.into_iter().zip(&images).map(|(time, images)| (time, of_candidate(images))).collect()
 }
 
 #[cfg(test)]
@@ -408,39 +341,15 @@ mod tests {
     #[test]
     fn what_the_user_has_set_stays() {
         let base = IntegratorSettings { samples: Some(5), bsdf_fraction: Some(0.3), ..IntegratorSettings::default() };
-        for candidate in Candidate::of_second_round(&base, [16, 3]) {
+        for candidate in second_round(&base, [16, 3]) {
             let s = candidate.settings;
             assert_eq!((s.samples, s.bsdf_fraction), (Some(5), Some(0.3)), "{}", candidate.name);
         }
         let open = IntegratorSettings::default();
-        let candidates = Candidate::of_second_round(&open, [16, 3]);
+        let candidates = second_round(&open, [16, 3]);
         let chosen = &candidates[1].settings;
         assert_eq!([0, 1].map(|vertex| chosen.sample_counts_at(vertex).samples), [16, 3]);
         let names: std::collections::HashSet<&str> = candidates.iter().map(|c| c.name.as_str()).collect();
         assert_eq!(names.len(), candidates.len(), "{names:?}");
-    }
-
-    #[test]
-    fn the_difference_of_two_means_tells_the_variance_of_a_sample() {
-        use lumiris_test_support::random::{RngExt, pcg32};
-        let mut s = pcg32([1, 7, 2]);
-        // Means of uniform numbers, of variance 1/12
-        let mut mean = || (0..8).map(|_| f64::from(s.random::<f32>())).sum::<f64>() / 8.0;
-        let mut sums = [0.0; 2];
-        for d in (0..20_000).map(|_| (mean() - mean()).abs() / 20_000.0) {
-            sums[0] += d;
-            sums[1] += d * d * 20_000.0;
-        }
-        for is_direct in [false, true] {
-            let variance = 8.0 * variance(sums, is_direct);
-            assert!((variance * 12.0 - 1.0).abs() < 0.03, "{variance}");
-        }
-    }
-
-    #[test]
-    fn a_gain_within_the_noise_changes_nothing() {
-        let trial = |efficiency| Trial { name: String::new(), nanoseconds: 1.0, variance: 1.0, efficiency };
-        assert_eq!(most_efficient(&[trial(1.0), trial(1.02)]), 0);
-        assert_eq!(most_efficient(&[trial(1.0), trial(1.2), trial(1.1)]), 1);
     }
 }

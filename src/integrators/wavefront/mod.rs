@@ -207,6 +207,7 @@ impl<'w> Batch<'w> {
         if self.estimate.vertex == 0 {
             self.buffers.set_normals(out.samples);
         }
+        self.buffers.scratch.begin(&job.lights, n);
         if self.estimate.has_controls {
             self.buffers.controls.begin(job, n, (&self.buffers.surface, &self.singles));
         }

@@ -41,14 +41,16 @@ fn table(auto: &AutoChoice) -> String {
     let mut text = format!(
         "time of a camera sample (ns): {a:.0} + {first:.0} per light sample at the first vertex + {later:.0} per light sample at later ones\n\
          relative variance: {v:.4} + {v_first:.4}/n at the first vertex + {v_later:.4}/n at later ones\n\n\
-         {:<52}{:>10}{:>12}{:>12}\n",
+         {:<52}{:>10}{:>12}{:>12}{:>8}\n",
         format!("{} pixels of 2 × {} samples in each round", auto.pixels, auto.spp),
         "ns",
         "variance",
-        "efficiency"
+        "efficiency",
+        "±"
     );
-    for Trial { name, nanoseconds, variance, efficiency } in auto.trials.iter().flatten() {
-        text += &format!("{name:<52}{nanoseconds:>10.0}{variance:>12.4}{efficiency:>12.2}\n");
+    for Trial { name, nanoseconds, variance, efficiency, error } in auto.trials.iter().flatten() {
+        let error = efficiency * error;
+        text += &format!("{name:<52}{nanoseconds:>10.0}{variance:>12.4}{efficiency:>12.2}{error:>8.2}\n");
     }
     text + &format!("chosen: {}", auto.chosen)
 }

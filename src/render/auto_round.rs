@@ -1,0 +1,227 @@
+//! What a round of the pilot of `--estimator auto` measured of its candidates, and what follows from that.
+
+use crate::settings::{EstimatorKind, IntegratorSettings};
+use lumiris_numbers::estimators::efficiency::{Measured, Model};
+use serde::{Deserialize, Serialize};
+use std::f64::consts::PI;
+
+/// By how much a choice must be more efficient than the one before it.
+const MIN_GAIN: f64 = 1.03;
+/// Standard errors by which it must be: with other numbers of samples, where neither is safer than the other, and with another
+/// estimator, whose error may be that of few pixels which the pilot does not see.
+const MIN_ERRORS: [f64; 2] = [0.5, 2.0];
+/// Relative standard error of a measured time.
+const TIME_ERROR: f64 = 0.02;
+/// Groups of pixels that the jackknife leaves out.
+const GROUPS: usize = 32;
+
+/// Settings that took part, and what was measured of them.
+#[derive(Clone, Debug, PartialEq, Deserialize, Serialize)]
+pub struct Trial {
+    /// What they are.
+    pub name: String,
+    /// Processor time of a camera sample (ns).
+    pub nanoseconds: f64,
+    /// Relative variance of a camera sample, from as many samples per pixel as the pilot had: its mean over pixels; in direct
+    /// light the geometric mean of that and of the squared mean of the standard deviation.
+    pub variance: f64,
+    /// 1/(variance × time), relative to the first trial of the round.
+    pub efficiency: f64,
+    /// Standard error of the logarithm of that.
+    #[serde(default)]
+    pub error: f64,
+}
+
+/// A candidate.
+pub(super) struct Candidate {
+    pub(super) name: String,
+    pub(super) settings: IntegratorSettings,
+    /// Time of its preparations per camera sample of the image (ns).
+    pub(super) preparation: f64,
+}
+
+impl Candidate {
+    pub(super) fn named(settings: IntegratorSettings) -> Self {
+        let kind = <&str>::from(settings.estimator);
+        let numbers = [0, 1].map(|vertex| settings.sample_counts_at(vertex).samples);
+        let mut name = format!("{kind} {}", numbers[0]);
+        if settings.depth() > 1 {
+            name += &format!(", {} later", numbers[1]);
+            let roulette = settings.roulette_depth.map_or("off".to_owned(), |n| n.to_string());
+            name += &format!(", roulette {roulette}");
+        }
+        if settings.estimator == EstimatorKind::Ris {
+            name += &format!(" of {}", settings.sample_counts().proposals);
+        }
+        if settings.estimator == EstimatorKind::Mis {
+            name += &format!(", BSDF fraction {}", settings.bsdf_fraction());
+        }
+        Candidate { name, settings, preparation: 0.0 }
+    }
+}
+
+/// Relative difference of the two means of a pixel, absolute and squared, averaged over channels.
+pub(super) type Difference = [f64; 2];
+
+/// What was measured of each candidate: the time of a camera sample (ns), and the differences of all pixels.
+pub(super) struct Round {
+    pub(super) measured: Vec<(f64, Vec<Difference>)>,
+    /// Samples of a pixel and seed.
+    pub(super) spp: u32,
+    pub(super) is_direct: bool,
+}
+
+impl Round {
+    /// Variances of a camera sample by a candidate: with all pixels, and without each of the groups.
+    fn variances(&self, k: usize) -> Vec<f64> {
+        let differences = &self.measured[k].1;
+        let groups = GROUPS.min(differences.len());
+        let mut sums = vec![[0.0; 3]; groups];
+        for (i, d) in differences.iter().enumerate() {
+            let sum = &mut sums[i % groups];
+            *sum = [sum[0] + d[0], sum[1] + d[1], sum[2] + 1.0];
+        }
+        let total = sums.iter().fold([0.0; 3], |a, b| [0, 1, 2].map(|j| a[j] + b[j]));
+        let of = |sum: [f64; 3]| variance([sum[0] / sum[2], sum[1] / sum[2]], self.is_direct) * f64::from(self.spp);
+        let without = |group: &[f64; 3]| of([0, 1, 2].map(|j| total[j] - group[j]));
+        std::iter::once(of(total)).chain(sums.iter().map(without)).collect()
+    }
+
+    /// The logarithm of the efficiency of candidate `k` relative to `base`, and its standard error; no gain where either
+    /// has no noise to be compared.
+    fn gain(&self, k: usize, base: usize) -> (f64, f64) {
+        let [of_k, of_base] = [k, base].map(|k| self.variances(k));
+        let gains: Vec<f64> = of_k.iter().zip(&of_base).map(|(v, v_base)| (v_base / v).ln()).collect();
+        if k == base {
+            return (0.0, 0.0);
+        }
+        let (gain, error) = jackknife(&gains);
+        let times = (self.measured[base].0 / self.measured[k].0).ln();
+        if gain.is_finite() && times.is_finite() { (gain + times, error) } else { (0.0, 0.0) }
+    }
+
+    /// The models by candidates of which the first has the `numbers` that the others have more of: by all pixels, and
+    /// without each of the groups.
+    pub(super) fn models(&self, numbers: &[[f64; 2]]) -> Vec<Model> {
+        let variances: Vec<Vec<f64>> = (0..numbers.len()).map(|k| self.variances(k)).collect();
+        let of = |i: usize| {
+            let measured =
+                |k: usize| Measured { samples: numbers[k], cost: self.measured[k].0, variance: variances[k][i] };
+            Model::fit(&measured(0), [Some(measured(1)), (numbers.len() > 2).then(|| measured(2))])
+        };
+        (0..variances[0].len()).map(of).collect()
+    }
+
+    /// The logarithm of the efficiency with the numbers `best`, relative to the first candidate, by the model, and its
+    /// standard error.
+    pub(super) fn predicted(&self, numbers: &[[f64; 2]], best: [f64; 2]) -> (f64, f64) {
+        let gain = |model: &Model| (model.efficiency(best) / model.efficiency(numbers[0])).ln();
+        jackknife(&self.models(numbers).iter().map(gain).collect::<Vec<_>>())
+    }
+
+    /// The index of the candidate to be taken. The first one stands for no choice at all; of the second one, the gain over
+    /// that is `predicted` by the pixels of another round.
+    pub(super) fn choose(&self, candidates: &[Candidate], predicted: (f64, f64)) -> usize {
+        (1..candidates.len()).fold(0, |chosen, k| {
+            let is_other = candidates[k].settings.estimator != candidates[chosen].settings.estimator;
+            let measured = self.gain(k, chosen);
+            let is_predicted = (chosen, k) == (0, 1) && !is_other;
+            let (gain, error) = if is_predicted { united(measured, predicted) } else { measured };
+            if gain > MIN_GAIN.ln().max(MIN_ERRORS[usize::from(is_other)] * error) { k } else { chosen }
+        })
+    }
+
+    pub(super) fn trials(&self, candidates: &[Candidate]) -> Vec<Trial> {
+        let trial = |(k, candidate): (usize, &Candidate)| {
+            let (gain, error) = self.gain(k, 0);
+            let (nanoseconds, variance) = (self.measured[k].0, self.variances(k)[0]);
+            Trial { name: candidate.name.clone(), nanoseconds, variance, efficiency: gain.exp(), error }
+        };
+        candidates.iter().enumerate().map(trial).collect()
+    }
+}
+
+/// A value, and its standard error, which includes that of two times, from what it is with all pixels and without each of
+/// the groups.
+fn jackknife(values: &[f64]) -> (f64, f64) {
+    let groups = &values[1..];
+    let n = groups.len() as f64;
+    let mean = groups.iter().sum::<f64>() / n;
+    let squares = groups.iter().map(|x| (x - mean).powi(2)).sum::<f64>();
+    let error = ((n - 1.0) / n * squares + 2.0 * TIME_ERROR * TIME_ERROR).sqrt();
+    if values.iter().all(|x| x.is_finite()) { (values[0], error) } else { (0.0, f64::INFINITY) }
+}
+
+/// Two independent values with their standard errors, weighted by these.
+fn united((a, a_error): (f64, f64), (b, b_error): (f64, f64)) -> (f64, f64) {
+    let [w_a, w_b] = [a_error, b_error].map(|e| 1.0 / (e * e));
+    let united = ((a * w_a + b * w_b) / (w_a + w_b), 1.0 / (w_a + w_b).sqrt());
+    if united.0.is_finite() { united } else { (a, a_error) }
+}
+
+/// The variance of a mean, from the mean absolute and the mean squared difference of two of them: for normal numbers of
+/// standard deviation σ these are 2σ/√π and 2σ². In direct light both count.
+fn variance([absolute, squared]: [f64; 2], is_direct: bool) -> f64 {
+    let of_squares = 0.5 * squared;
+    if is_direct { (0.25 * PI * absolute * absolute * of_squares).sqrt() } else { of_squares }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn the_difference_of_two_means_tells_the_variance_of_a_sample() {
+        use lumiris_test_support::random::{RngExt, pcg32};
+        let mut s = pcg32([1, 7, 2]);
+        // Means of uniform numbers, of variance 1/12
+        let mut mean = || (0..8).map(|_| f64::from(s.random::<f32>())).sum::<f64>() / 8.0;
+        let mut sums = [0.0; 2];
+        for d in (0..20_000).map(|_| (mean() - mean()).abs() / 20_000.0) {
+            sums[0] += d;
+            sums[1] += d * d * 20_000.0;
+        }
+        for is_direct in [false, true] {
+            let variance = 8.0 * variance(sums, is_direct);
+            assert!((variance * 12.0 - 1.0).abs() < 0.03, "{variance}");
+        }
+    }
+
+    /// Rounds of two candidates, where the second has the variance 1/`gain` in all pixels but a share of `rare`, in which it
+    /// has 100 times the first one's.
+    fn rounds(kinds: [EstimatorKind; 2], pixels: usize, (gain, rare): (f64, f64)) -> f64 {
+        use lumiris_test_support::random::{RngExt, pcg32};
+        let mut s = pcg32([1, 7, 4]);
+        let candidate = |estimator| Candidate::named(IntegratorSettings { estimator, ..IntegratorSettings::default() });
+        let candidates = kinds.map(candidate);
+        let mut chosen = 0;
+        for _ in 0..1000 {
+            let mut measured = vec![(1.0, Vec::new()), (1.0, Vec::new())];
+            for _ in 0..pixels {
+                let is_rare = f64::from(s.random::<f32>()) < rare;
+                for (variance, (_, differences)) in
+                    [1.0, if is_rare { 100.0 } else { 1.0 / gain }].into_iter().zip(&mut measured)
+                {
+                    // Normal by the sum of uniform numbers
+                    let normal = (0..12).map(|_| f64::from(s.random::<f32>())).sum::<f64>() - 6.0;
+                    let d = (2.0 * variance).sqrt() * normal.abs();
+                    differences.push([d, d * d]);
+                }
+            }
+            chosen += Round { measured, spp: 1, is_direct: false }.choose(&candidates, (0.0, f64::INFINITY));
+        }
+        f64::from(chosen as u32) / 1000.0
+    }
+
+    #[test]
+    fn a_gain_within_the_noise_changes_nothing() {
+        use EstimatorKind::{Mis, Ris};
+        // As good: chosen as often as a normal number exceeds half its standard error, and twice that
+        let [numbers, estimator] = [[Mis, Mis], [Mis, Ris]].map(|kinds| rounds(kinds, 256, (1.0, 0.0)));
+        assert!((0.22..0.40).contains(&numbers), "{numbers}");
+        assert!((0.005..0.05).contains(&estimator), "{estimator}");
+        // Half the variance is found, and worse in few pixels is seen
+        assert!(rounds([Mis, Ris], 256, (2.0, 0.0)) > 0.95);
+        assert!(rounds([Mis, Ris], 256, (2.0, 0.03)) < 0.02);
+    }
+}
