@@ -19,7 +19,9 @@ use lumiris_lanes::columns::{Column, Columns3, padded};
 use lumiris_lanes::lane::LANES;
 use lumiris_lanes::{combine, curve};
 use lumiris_numbers::estimators::mis::Heuristic;
+use lumiris_numbers::estimators::ris::control::{Known, doubt};
 use lumiris_numbers::estimators::ris::weight;
+use lumiris_numbers::math::Rgb;
 use lumiris_numbers::math::hash::pcg4d;
 
 /// Seed of the positions.
@@ -44,6 +46,8 @@ pub struct ProposalColumns {
     pub r: Vec<f32>,
     /// The weight p_hat·r of each.
     pub weight: Vec<f32>,
+    /// V̂ of each, where it is a control variate.
+    pub visibility: Vec<f32>,
     positions: Vec<u32>,
     jitter: Vec<u32>,
     runs: Vec<LightRun>,
@@ -95,6 +99,21 @@ impl ProposalColumns {
         Some((self.chosen[proposal].0, sample))
     }
 
+    /// Σ c·V̂ over the proposals of a point, of which `bsdf_samples` are those by BSDF sampling.
+    pub fn known(&self, range: PointProposals, bsdf_samples: &[Candidate]) -> Known {
+        let PointProposals { start, bsdf_start, end } = range;
+        let mut known = Known::default();
+        // What has no weight is never drawn, and has no part in either sum
+        for i in (start..bsdf_start).filter(|&i| self.weight[i] > 0.0) {
+            let f_cos = self.f_cos.each_ref().map(|a| a[i]);
+            known.propose(Rgb::from_array(f_cos) * self.samples.li.rgb(i) * self.r[i], self.visibility[i]);
+        }
+        for (i, c) in (bsdf_start..end).zip(bsdf_samples).filter(|(i, _)| self.weight[*i] > 0.0) {
+            known.propose(c.f * self.r[i], self.visibility[i]);
+        }
+        known
+    }
+
     /// Makes room for `len` proposals, keeping existing ones.
     fn grow(&mut self, len: usize) {
         self.chosen.resize(len, (NO_LIGHT, 0.0));
@@ -102,7 +121,7 @@ impl ProposalColumns {
             let len = len.next_power_of_two().max(LANES);
             self.p.reserve(len);
             self.samples.reserve(len);
-            let scalars = [&mut self.p_bsdf, &mut self.p_hat, &mut self.r, &mut self.weight];
+            let scalars = [&mut self.p_bsdf, &mut self.p_hat, &mut self.r, &mut self.weight, &mut self.visibility];
             scalars.into_iter().chain(&mut self.u).chain(&mut self.f_cos).for_each(|array| array.resize(len, 0.0));
         }
     }
@@ -133,7 +152,10 @@ impl ProposalColumns {
             let cos = || point.bsdf.cos(c.segment.d.normalize());
             self.p_hat[i] = match techniques.target {
                 Target::Fgl => c.f.luminance(),
-                Target::Visibility => c.f.luminance() * job.lights.visibility(&ctx, &contributing, c.light).sqrt(),
+                Target::Visibility | Target::VisibilityControl => {
+                    self.visibility[i] = job.lights.visibility(&ctx, &contributing, c.light);
+                    c.f.luminance() * factor(techniques.target, self.visibility[i])
+                }
                 // The cosine of a delta is part of its weight
                 Target::Gv | Target::Gvl if c.drawn.is_delta() => c.f.luminance(),
                 Target::Gv => cos(),
@@ -212,7 +234,7 @@ impl ProposalColumns {
         let [wi, li] = [wi, li].map(|c| c.get(end).map(|c| &c[start..]));
         let f_cos = self.f_cos.each_mut().map(|a| &mut a[start..end]);
         match techniques.target {
-            Target::Fgl | Target::Visibility => {
+            Target::Fgl | Target::Visibility | Target::VisibilityControl => {
                 point.bsdf.eval_lanes(point.wo, wi, f_cos, &mut self.p_bsdf[start..end])
             }
             Target::Gv | Target::Gvl => {
@@ -249,19 +271,27 @@ impl ProposalColumns {
                     self.weight[i] = weight(self.p_hat[i], self.r[i]);
                 }
             }
-            Target::Visibility => {
+            Target::Visibility | Target::VisibilityControl => {
                 let ctx = point.light_ctx();
                 let contributing = job.lights.contributing_lights(&ctx);
-                let mut of = (NO_LIGHT, 0.0);
+                let mut of = (NO_LIGHT, 0.0, 0.0);
                 for i in start..end {
                     let light = self.chosen[i].0;
                     if of.0 != light {
-                        of = (light, job.lights.visibility(&ctx, &contributing, light).sqrt());
+                        let v = job.lights.visibility(&ctx, &contributing, light);
+                        of = (light, v, factor(techniques.target, v));
                     }
-                    self.p_hat[i] *= of.1;
-                    self.weight[i] *= of.1;
+                    self.visibility[i] = of.1;
+                    self.p_hat[i] *= of.2;
+                    self.weight[i] *= of.2;
                 }
             }
         }
     }
+}
+
+/// The factor of the target where visibility is estimated as `v`.
+#[inline]
+fn factor(target: Target, v: f32) -> f32 {
+    if target == Target::VisibilityControl { doubt(v) } else { v.sqrt() }
 }

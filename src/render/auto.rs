@@ -26,7 +26,9 @@ use crate::imaging::metrics::difference::DEFAULT_EPSILON;
 use crate::integrators::PathTracer;
 use crate::integrators::path::CameraSample;
 use crate::scene::RenderJob;
-use crate::settings::{EstimatorKind, IntegratorKind, IntegratorSettings, Proposals, Settings};
+use crate::settings::{
+    EstimatorKind, IntegratorKind, IntegratorSettings, Proposals, RisSettings, Settings, StageTimes,
+};
 use lumiris_numbers::math::hash::{pcg4d, unit_f32};
 use rayon::prelude::*;
 use serde::{Deserialize, Serialize};
@@ -63,6 +65,9 @@ const LATER: [u32; 8] = [2, 3, 4, 5, 6, 8, 12, 16];
 /// Samples from which the model is fitted: few and many, in direct light and in paths.
 const FIT_DIRECT: [u32; 2] = [4, 16];
 const FIT_PATH: [u32; 2] = [2, 8];
+/// M/N from which the model of resampling is fitted, and among which it chooses.
+const FIT_RATIOS: [u32; 2] = [2, 16];
+const RATIOS: [u32; 8] = [1, 2, 3, 4, 6, 8, 12, 16];
 
 /// What the pilot measured and chose.
 #[derive(Clone, Debug, PartialEq, Deserialize, Serialize)]
@@ -119,6 +124,28 @@ fn resampled(settings: &IntegratorSettings) -> IntegratorSettings {
     ris.samples = Some(counts.samples);
     ris.ris.proposals = Proposals::Fixed(counts.proposals);
     ris
+}
+
+/// M/N of `ris`, and the times from which it follows: of a proposal, and of everything else for each sample. It is the most
+/// efficient ratio by a model of what few and many proposals take and leave of the variance, where T2/T1 leaves out what
+/// each camera sample costs anyway [Talbot 2005, §4.3]. `None` if the image is too small for a pilot. On the threads of the
+/// current pool.
+pub(super) fn proposals(job: &RenderJob) -> Option<(u32, StageTimes)> {
+    let pilot = Pilot::new(job)?;
+    let base = job.settings().integrator;
+    let samples = base.sample_counts().samples;
+    let with_ratio = |ratio: u32| {
+        let proposals = Proposals::Fixed(samples * ratio);
+        let ris = RisSettings { proposals, ..base.ris };
+        Candidate::named(IntegratorSettings { samples: Some(samples), ris, ..base })
+    };
+    let round = pilot.round(job, &FIT_RATIOS.map(with_ratio), 0);
+    let ratios = FIT_RATIOS.map(|ratio| [f64::from(ratio), 1.0]);
+    let model = round.models(&ratios).remove(0);
+    let [ratio, _] = model.best([&RATIOS, &[1]], NEARLY);
+    let of_sample = |nanoseconds: f64| (nanoseconds / f64::from(samples) * 10.0).round().max(1.0) / 10.0;
+    let times = StageTimes { t1: of_sample(model.cost[1]), t2: of_sample(model.cost[0]) };
+    Some((samples * ratio, times))
 }
 
 /// Where a round measures.

@@ -1,9 +1,9 @@
 //! Completes what the settings leave open until the scene is loaded: the visibility cache, and the number of proposals
 //! M for N samples of `ris`.
 //!
-//! T1, the time of a proposal, and T2, that of a sample, are measured on a few thousand camera rays. Then
-//!
-//! * `auto`: M/N = T2/T1, so that both stages take the same time [Talbot 2005, Eq. 4.4].
+//! * `auto`: M/N is the most efficient by a model of time and variance, fitted to a pilot of the image ([`super::auto`]).
+//!   Where the image is too small for one, M/N = T2/T1, so that both stages take the same time [Talbot 2005, Eq. 4.4]: T1, the
+//!   time of a proposal, and T2, that of a sample, are measured on a few thousand camera rays.
 //! * `optimal`: the same time per estimate, but M and N chosen in each pixel by the variances of its own light [Talbot
 //!   2005, Eq. 4.3], which a pilot estimates from proposals that are all traced.
 //!
@@ -11,7 +11,7 @@
 //! the same image to the bit.
 
 use super::allocation::allocate;
-use super::auto::{AutoChoice, choose};
+use super::auto::{self, AutoChoice};
 use super::visibility_cache::build_visibility_cache;
 use super::{RenderSettings, Run, ThreadError, camera_batches};
 use crate::direct::Fits;
@@ -66,7 +66,7 @@ pub struct RisChoice {
 pub fn prepare(job: &mut RenderJob, threads: Option<usize>, ratio_map: bool) -> Result<Plan, ThreadError> {
     let pool = super::thread_pool(threads)?;
     let before = *job.settings();
-    let auto = pool.install(|| choose(job));
+    let auto = pool.install(|| auto::choose(job));
     if job.settings().sampling.allocation == Allocation::Auto {
         let allocation = if auto.is_some() { Allocation::Adaptive } else { Allocation::Uniform };
         job.change(|s| s.sampling.allocation = allocation);
@@ -100,15 +100,18 @@ fn choose_proposals(
         return Ok(None);
     }
 
-    // Times; without light they do not matter
-    let default = StageTimes { t1: 1.0, t2: 1.0 };
-    let times = settings.ris.stage_times.or_else(|| measure(job)).unwrap_or(default);
+    // By a pilot, or times alone; without light they do not matter
+    let is_open = settings.ris.proposals == Proposals::Auto && settings.ris.stage_times.is_none();
+    let pool = super::thread_pool(threads)?;
+    let by_pilot = if is_open { pool.install(|| auto::proposals(job)) } else { None };
+    let times = by_pilot.map(|(_, times)| times).or(settings.ris.stage_times).or_else(|| measure(job));
+    let times = times.unwrap_or(StageTimes { t1: 1.0, t2: 1.0 });
 
     // Numbers
     let is_optimal = settings.ris.proposals == Proposals::Optimal;
-    let sample_counts =
-        IntegratorSettings { ris: RisSettings { stage_times: Some(times), ..settings.ris }, ..settings }
-            .sample_counts();
+    let by_times = IntegratorSettings { ris: RisSettings { stage_times: Some(times), ..settings.ris }, ..settings }
+        .sample_counts();
+    let sample_counts = by_pilot.map_or(by_times, |(proposals, _)| SampleCounts { proposals, ..by_times });
     job.change(|s| {
         s.integrator.ris.stage_times = Some(times);
         s.integrator.samples = Some(sample_counts.samples);

@@ -4,7 +4,7 @@
 //! `direct::Estimator` takes from here.
 
 use super::photon_map::PhotonMapSettings;
-use super::ris::{RisSettings, Target};
+use super::ris::RisSettings;
 use crate::bsdfs::ProposalDensity;
 use crate::lights::LightSamplerKind;
 use lumiris_numbers::estimators::mis::Heuristic;
@@ -139,7 +139,7 @@ impl IntegratorSettings {
     pub fn uses_visibility_cache(&self) -> bool {
         self.light_sampler == LightSamplerKind::Photons
             || self.estimator == EstimatorKind::Contributing
-            || self.estimator == EstimatorKind::Ris && self.ris.target == Target::Visibility
+            || self.estimator == EstimatorKind::Ris && self.ris.target.uses_visibility_cache()
     }
 
     /// True if non-contributing lights are left out, which is biased.

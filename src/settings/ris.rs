@@ -67,7 +67,7 @@ pub struct StageTimes {
 pub enum Proposals {
     /// This many.
     Fixed(u32),
-    /// M/N = T2/T1 [Talbot 2005, Eq. 4.4].
+    /// By a pilot of the image; M/N = T2/T1 [Talbot 2005, Eq. 4.4] by given times, or if the image is too small.
     Auto,
     /// Per pixel, from variances and times [Talbot 2005, Eq. 4.3].
     Optimal,
@@ -109,14 +109,21 @@ pub enum Target {
     Gvl,
     /// Luminance of f·G·L times an estimate of V for each light, from the visibility cache. Proposals are not traced.
     Visibility,
+    /// As `visibility`, with the estimate as a control variate: samples are drawn where it is in doubt.
+    VisibilityControl,
 }
 
 impl Target {
     /// True if proposals are traced before they are resampled.
     pub fn has_visibility(self) -> bool {
         match self {
-            Target::Fgl | Target::Visibility => false,
+            Target::Fgl | Target::Visibility | Target::VisibilityControl => false,
             Target::Gv | Target::Gvl => true,
         }
+    }
+
+    /// True if the visibility cache takes part.
+    pub fn uses_visibility_cache(self) -> bool {
+        matches!(self, Target::Visibility | Target::VisibilityControl)
     }
 }

@@ -208,11 +208,13 @@ impl Estimator {
         fits: &mut Fits,
         out: &mut [Rgb],
     ) {
-        let Batch { candidates, segments, components, correlated, .. } = batch;
+        let Batch { candidates, segments, components, correlated, ris, .. } = batch;
         let start = Instant::now();
         match self {
-            Estimator::Mc(_) | Estimator::Mis(_) | Estimator::Ris(_) | Estimator::Contributing(_) => {
+            Estimator::Mc(_) | Estimator::Mis(_) | Estimator::Contributing(_) => segments.resolve(out),
+            Estimator::Ris(_) => {
                 segments.resolve(out);
+                out.iter_mut().zip(&ris.known).for_each(|(out, &known)| *out += known);
             }
             Estimator::Ocv(ocv) => {
                 ocv.resolve(job, points, (candidates, segments, components), fits, out);

@@ -9,6 +9,10 @@
 //! photons ([`crate::lights::learned_visibility`]): if V is 1 with probability V̂ and 0 otherwise, the density of least variance
 //! is proportional to q̂·√V̂. Fewer occluded samples are drawn, and the estimate is unbiased for any V̂.
 //!
+//! With the target `visibility-control`, V̂ is a control variate as well: what is known of the light, Σ c_j V̂_j over all
+//! proposals, is added without a ray, and samples are drawn where V̂ is in doubt, for the difference
+//! ([`lumiris_numbers::estimators::ris::control`]).
+//!
 //! Targets with visibility reverse the order: proposals are traced, and N of the visible ones are shaded; light samples
 //! do not need the BSDF before that.
 
@@ -54,6 +58,11 @@ impl Ris {
         Ris { sample_counts, heuristic: settings.heuristic(), points, target, strata }
     }
 
+    /// True if an estimate of visibility is a control variate.
+    fn has_control(&self) -> bool {
+        self.target == Target::VisibilityControl
+    }
+
     /// How the proposals of a point are weighted.
     fn techniques(&self, point: &ShadingPoint<'_>) -> Techniques {
         let SampleAllocation { n_light, n_bsdf, .. } = allocation(point);
@@ -68,6 +77,7 @@ impl Ris {
         let T1 { job, points, candidates, .. } = t1;
         let bsdf_samples = std::mem::replace(&mut candidates.records, std::mem::take(&mut b.bsdf_samples));
         candidates.records.clear();
+        b.known.clear();
 
         let mut rest = Chunk { first: 0, points, bsdf: &bsdf_samples };
         while !rest.points.is_empty() {
@@ -115,6 +125,7 @@ impl Ris {
             self.draw(point, range, b.numbers[i][1], b);
             let (own, rest) = bsdf.split_at(range.end - range.bsdf_start);
             bsdf = rest;
+            let mut known = self.has_control().then(|| b.proposals.known(range, own));
             for draw in &b.draws {
                 let place = range.start + draw.index as usize;
                 let evaluated = if place < range.bsdf_start {
@@ -125,10 +136,15 @@ impl Ris {
                     Some(own[place - range.bsdf_start])
                 };
                 if let Some(candidate) = evaluated {
-                    candidates.contributions.push(candidate.f * (b.proposals.r[place] * draw.scale));
+                    let contribution = candidate.f * (b.proposals.r[place] * draw.scale);
+                    if let Some(known) = known.as_mut().filter(|_| contribution.is_finite()) {
+                        known.draw(contribution, b.proposals.visibility[place]);
+                    }
+                    candidates.contributions.push(contribution);
                     candidates.records.push(candidate);
                 }
             }
+            b.known.extend(known.map(|known| known.sum()));
         }
     }
 
@@ -203,6 +219,8 @@ pub(super) struct Buffers {
     ends: Vec<u32>,
     u: Vec<f32>,
     probes: Segments,
+    /// Per point, what is known of its light without visibility, if that is a control variate.
+    pub(super) known: Vec<Rgb>,
     /// Per point of the chunk, the numbers for the places of proposals and for the draws: well distributed over the
     /// samples of a pixel.
     numbers: Vec<[f32; 2]>,

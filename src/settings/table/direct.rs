@@ -116,8 +116,8 @@ pub(super) const RIS: Group = Group {
             parameters: &["proposals"],
             key: "proposals",
             kind: Kind::Integer { range: SAMPLES, words: &["auto", "optimal"] },
-            help: "Proposals per estimate (M): a number, `auto` (from the measured times of the stages) or `optimal` \
-                   (per pixel, from times and variances)",
+            help: "Proposals per estimate (M): a number, `auto` (by a pilot; of a small image by the measured times of \
+                   the stages) or `optimal` (per pixel, from times and variances)",
             applies: Applies::Estimators(&[Ris]),
             get: |s| {
                 Some(match s.integrator.ris.proposals {
@@ -173,7 +173,8 @@ pub(super) const RIS: Group = Group {
             key: "target",
             kind: choice(Target::VARIANTS),
             help: "Target density of resampling: f*G*L; with visibility V, where shading is more expensive than \
-                   tracing rays; or (visibility) f*G*L with V estimated by the visibility cache",
+                   tracing rays; f*G*L with V estimated by the visibility cache (visibility), which may be a \
+                   control variate as well (visibility-control)",
             applies: Applies::Estimators(&[Ris]),
             get: |s| Some(Value::Name(s.integrator.ris.target.into())),
             set: |s, v| v.named().map(|target| s.integrator.ris.target = target),

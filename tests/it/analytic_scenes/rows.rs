@@ -132,6 +132,9 @@ fn visibility_cache_configurations() -> Vec<Configuration> {
         points: ProposalPoints::Independent,
         ..ris
     });
+    let control = Configuration { target: Target::VisibilityControl, ..ris };
+    all.extend([Absent, Right, Wrong].map(|visibility_cache| Configuration { visibility_cache, ..control }));
+    all.push(Configuration { visibility_cache: Wrong, strata: Strata::None, ..control });
     let ocv = Configuration { estimator: EstimatorKind::Ocv, samples: 5, light_sampler, ..*base };
     all.extend([Right, Wrong].map(|visibility_cache| Configuration { visibility_cache, ..ocv }));
     all.push(Configuration { visibility_cache: Right, estimator: EstimatorKind::OptimalMis, samples: 8, ..ocv });

@@ -3,7 +3,10 @@
 use super::baselines::{defensive_choice, defensive_pdf};
 use super::{assert_means, assert_variances};
 use lumiris_numbers::estimators::mc;
+use lumiris_numbers::estimators::ris::control::{Known, doubt};
 use lumiris_numbers::estimators::ris::{strata, stratified, systematic, with_replacement};
+use lumiris_numbers::estimators::stats::Welford;
+use lumiris_numbers::math::Rgb;
 use lumiris_test_support::integrals::{ALL, Integral, Proposals, fill, run};
 use lumiris_test_support::random::{Pcg32, RngExt};
 
@@ -149,6 +152,84 @@ fn every_other_way_of_drawing_is_unbiased() {
             let mut p = Proposals::default();
             let channels = run(RUNS, [4, integral as u32, k as u32], |stream| estimate(integral, stream, &mut p));
             assert_means(name, &channels, value);
+        }
+    }
+}
+
+/// Estimates V̂ of the visibility at a point.
+type Guess = fn(Integral, [f64; 2]) -> f64;
+
+fn nearly_right(integral: Integral, x: [f64; 2]) -> f64 {
+    0.9 * integral.visibility(x) + 0.05
+}
+
+/// Right where it is sure, in doubt elsewhere.
+fn blurred(integral: Integral, [x, y]: [f64; 2]) -> f64 {
+    (-4..=4).map(|k| integral.visibility([(x + 0.01 * f64::from(k)).clamp(0.0, 1.0), y])).sum::<f64>() / 9.0
+}
+
+fn constant(_: Integral, _: [f64; 2]) -> f64 {
+    0.3
+}
+
+fn opposite(integral: Integral, x: [f64; 2]) -> f64 {
+    1.0 - integral.visibility(x)
+}
+
+/// Runs of `n` draws of the proposals with V̂ by `guess` as a control variate; without one, with the weights of the unshadowed
+/// colour.
+fn controlled_runs(integral: Integral, n: usize, guess: Option<Guess>, runs: usize) -> [Welford; 3] {
+    let (mut p, mut draws) = (Proposals::default(), Vec::new());
+    run(runs, [4, integral as u32, n as u32], |stream| {
+        p.clear();
+        let mut guesses = Vec::new();
+        for _ in 0..M {
+            let x = integral.sample(stream.random::<[f32; 2]>().map(f64::from));
+            p.push(integral, x, 1.0 / (M as f64 * integral.pdf(x)));
+            guesses.push(guess.map_or(0.0, |guess| guess(integral, x) as f32));
+        }
+        let mut known = Known::default();
+        if guess.is_some() {
+            p.weights.iter_mut().zip(&guesses).for_each(|(w, &v)| *w *= doubt(v));
+            p.unshadowed.iter().zip(&guesses).for_each(|(&c, &v)| known.propose(Rgb::from_array(c), v));
+        }
+        systematic(&p.weights, n as u32, stream.random::<f32>(), &mut draws);
+        for draw in &draws {
+            let j = draw.index as usize;
+            known.draw(Rgb::from_array(p.unshadowed[j]) * draw.scale, guesses[j]);
+        }
+        let (seen, known) = (p.estimate(&draws), known.sum().to_array());
+        [0, 1, 2].map(|c| seen[c] + f64::from(known[c]))
+    })
+}
+
+#[test]
+fn visibility_as_a_control_variate_is_unbiased_whatever_it_is() {
+    for integral in ALL {
+        let (value, _) = integral.moments();
+        for (name, guess) in [
+            ("nearly right", nearly_right as Guess),
+            ("blurred", blurred),
+            ("constant", constant),
+            ("opposite", opposite),
+        ] {
+            for n in [1, N] {
+                let channels = controlled_runs(integral, n, Some(guess), RUNS);
+                assert_means(&format!("{name}, N = {n}"), &channels, value);
+            }
+        }
+    }
+}
+
+#[test]
+fn visibility_that_is_known_leaves_the_noise_of_the_proposals() {
+    for integral in ALL {
+        let variances = |guess| controlled_runs(integral, 1, guess, 100_000).map(|w| w.variance());
+        let plain = variances(None);
+        for (guess, most) in [(nearly_right as Guess, 0.5), (blurred, 0.7)] {
+            for (v, plain) in variances(Some(guess)).iter().zip(plain) {
+                assert!(*v < most * plain, "{integral:?}: {v} {plain}");
+            }
         }
     }
 }

@@ -18,9 +18,11 @@
 //! | [`draw`] | N of M by weight: with replacement, systematic, one per stratum or set | thesis (4.1), (4.5); paper (1) |
 //! | [`reservoir`] | one of a stream | [Chao 1982] |
 //! | [`strata`] | the strata: equal counts or equal weights | thesis 4.5.2.1, 4.5.2.2 |
+//! | [`control`] | what is known of visibility as a control variate | |
 //! | [`choice`] | how many proposals for how many samples | thesis (4.3), (4.4); paper (2), (3) |
 
 pub mod choice;
+pub mod control;
 pub mod draw;
 pub mod reservoir;
 pub mod strata;
