@@ -1,5 +1,6 @@
 //! Options that several subcommands share, as typed.
 
+use super::parts::PartArgs;
 use super::settings_args::SettingsArgs;
 use clap::Args;
 use clap::builder::{PossibleValuesParser, TypedValueParser};
@@ -62,7 +63,8 @@ pub(super) struct SceneArgs {
 pub(super) struct RenderArgs {
     #[command(flatten)]
     pub scene: SceneArgs,
-    /// Output image; may be given several times. EXR stores all channels; PNG, JPEG, TIFF and TGA the tone-mapped image
+    /// Output image; may be given several times. EXR stores all channels; PNG, JPEG, TIFF and TGA the tone-mapped image; .part
+    /// what `lumiris merge` needs
     /// [default: the name in the file, or SCENE.exr]
     #[arg(short, long, value_name = "FILE")]
     pub output: Vec<PathBuf>,
@@ -82,9 +84,11 @@ pub(super) struct RenderArgs {
     /// Print no progress, only warnings and errors
     #[arg(short, long)]
     pub quiet: bool,
+    #[command(flatten)]
+    pub parts: PartArgs,
 }
 
-fn parse_resolution(text: &str) -> Result<[u32; 2], String> {
+pub(super) fn parse_resolution(text: &str) -> Result<[u32; 2], String> {
     let (w, h) = text.split_once(['x', 'X']).ok_or("expected WIDTHxHEIGHT, such as 640x480")?;
     let parse = |s: &str| match s.trim().parse::<u32>() {
         Ok(n @ 1..=65_536) => Ok(n),
@@ -93,7 +97,7 @@ fn parse_resolution(text: &str) -> Result<[u32; 2], String> {
     Ok([parse(w)?, parse(h)?])
 }
 
-fn parse_crop(text: &str) -> Result<[f32; 4], String> {
+pub(super) fn parse_crop(text: &str) -> Result<[f32; 4], String> {
     let values: Vec<f32> = text
         .split(',')
         .map(|s| s.trim().parse().map_err(|_| format!("`{s}` is not a number")))

@@ -18,6 +18,12 @@ impl SettingsArgs {
         self.typed.iter().any(|(row, _)| row.flag == flag)
     }
 
+    /// The whole number that an option of this name gives.
+    pub(super) fn count(&self, flag: &str) -> Option<u32> {
+        let (_, value) = self.typed.iter().find(|(row, _)| row.flag == flag)?;
+        value.integer().and_then(|n| u32::try_from(n).ok())
+    }
+
     /// Parses options outside the command line of the program.
     pub(super) fn parse<'a>(words: impl Iterator<Item = &'a str>) -> Result<Self, String> {
         let command = Self::augment_args(Command::new("settings").no_binary_name(true).disable_help_flag(true));
