@@ -78,12 +78,17 @@ pub(super) fn film(resolution: [u32; 2], bounds: PixelBounds, tiles: &[Tile]) ->
     film
 }
 
-/// The film of tiles whose sums are needed no more: the memory of each is free when its pixels are in the film.
-pub(super) fn film_of_last(resolution: [u32; 2], bounds: PixelBounds, tiles: &mut [Tile]) -> Film {
+/// The film of tiles whose sums are needed no more: the memory of each is free when its pixels are in the film. Tiles
+/// without control variates are removed. From the last one on, since allocators return what was allocated last.
+pub(super) fn film_of_last(resolution: [u32; 2], bounds: PixelBounds, tiles: &mut Vec<Tile>) -> Film {
     let mut film = Film::new(resolution, bounds);
-    for tile in tiles {
+    for tile in tiles.iter_mut().rev() {
         film.set_tile(&tile.bounds, &std::mem::take(&mut tile.sums), &tile.replicas);
+        if tile.fits.controls() == 0 {
+            (tile.fits, tile.replicas) = (Fits::default(), Vec::new());
+        }
     }
+    tiles.retain(|tile| tile.fits.controls() > 0);
     film.replicas.sort_unstable_by_key(|r| r.pixel);
     film
 }

@@ -67,7 +67,7 @@ pub fn merge(paths: &[PathBuf], allows_missing: bool) -> Result<Merged, PartErro
             return Err(PartError::damaged(&part.path, "it does not have the pixels that its header says"));
         }
     }
-    let mut tiles = [whole];
+    let mut tiles = vec![whole];
     let mut film = film_of_last(first.header.resolution, bounds, &mut tiles);
     control_variates::correct(&mut film, &tiles, position);
     Ok(Merged { film, header: first.header.clone(), missing, samples })

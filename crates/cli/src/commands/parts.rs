@@ -303,9 +303,9 @@ fn extent(args: &RenderArgs, settings: &mut RenderSettings, stored: Option<&Stor
         }
         (settings.skip, settings.spp, settings.share) = before;
         if let Some(more) = args.scene.settings.count("spp").filter(|n| *n != header.samples.end) {
-            let is_whole = header.samples.start == 0 && header.samples.end >= header.spp;
+            let is_first = header.samples.start == 0;
             let done = stored.tiles.iter().map(|t| t.done).max().unwrap_or(0);
-            if !is_whole || more < done {
+            if !is_first || more < done {
                 let path = stored.path.display();
                 return usage(format!(
                     "{path} cannot go on to {more} samples: it has {done}, of {} to {}",

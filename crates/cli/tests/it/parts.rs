@@ -4,10 +4,25 @@ use lumiris::imaging::oiio::{ReadImage, ReadLimits, read_image};
 use std::path::Path;
 use std::process::{Command, Output};
 
-pub(crate) fn lumiris(args: &str, folder: &Path) -> Output {
+/// The program with arguments in one text, where the last of equal options counts and GALLERY is a scene.
+pub(crate) fn command(args: &str, folder: &Path) -> Command {
     let gallery = Path::new(env!("CARGO_MANIFEST_DIR")).join("../../scenes/demo/gallery.pbrt");
-    let words = args.split_whitespace().map(|word| word.replace("GALLERY", &gallery.display().to_string()));
-    Command::new(env!("CARGO_BIN_EXE_lumiris")).args(words).current_dir(folder).output().unwrap()
+    let mut words: Vec<String> = Vec::new();
+    for word in args.split_whitespace() {
+        let is_option = word.starts_with("--");
+        if let Some(at) = words.iter().position(|before| is_option && before == word) {
+            let next = words[at + 1..].iter().position(|w| w.starts_with('-')).map_or(words.len(), |n| at + 1 + n);
+            words.drain(at..next);
+        }
+        words.push(word.replace("GALLERY", &gallery.display().to_string()));
+    }
+    let mut command = Command::new(env!("CARGO_BIN_EXE_lumiris"));
+    command.args(words).current_dir(folder);
+    command
+}
+
+pub(crate) fn lumiris(args: &str, folder: &Path) -> Output {
+    command(args, folder).output().unwrap()
 }
 
 pub(crate) fn stderr(output: &Output) -> String {
@@ -139,7 +154,7 @@ fn what_a_plan_has_chosen_is_the_same_for_all_parts() {
     refuse(&format!("render {auto} --part 1/2 -o 1.part"), folder, 2, &words);
     refuse(&format!("render {auto} --estimator ris --part 1/2 -o 1.part"), folder, 2, &words);
     run(&format!("plan {auto} --estimator ris -o plan.json"), folder);
-    let planned = format!("render {auto} --plan plan.json -q");
+    let planned = format!("render {auto} --estimator ris --plan plan.json -q");
     run(&format!("{planned} -o single.exr"), folder);
     (1..3).for_each(|i| run(&format!("{planned} --part {i}/2 -o {i}.part"), folder));
     run("merge 2.part 1.part -o merged.exr", folder);
@@ -153,7 +168,7 @@ fn what_cannot_be_divided_is_refused_with_the_reason() {
     let render = format!("{IMAGE} --integrator direct --estimator mis");
     for (options, words) in [
         ("--part 1/2 --time 1 -o a.part", ["--time", "parts"]),
-        ("--part 1/2 --noise 0.1 -o a.part", ["--noise", "--spp"]),
+        ("--part 1/2 --noise 0.1 --spp 16 -o a.part", ["--noise", "--spp"]),
         ("--part 1/2 --estimator ocv --ocv progressive -o a.part", ["progressive", "--part-by tiles"]),
         ("--samples-to 3 --estimator optimal-mis --optimal-mis progressive -o a.part", ["progressive", "tiles"]),
         ("--part 1/2 -o a.exr", ["lumiris merge", ".part"]),
