@@ -24,7 +24,7 @@ const END: u8 = b'E';
 /// Pixels of a chunk of tiles, about.
 const CHUNK_PIXELS: usize = 1 << 14;
 /// Chunks that are made at the same time, which limits the memory that they take.
-const CHUNKS_AT_ONCE: usize = 64;
+const CHUNKS_AT_ONCE: usize = 16;
 
 /// Writes a file of sums under a name beside `path`, which is then renamed: `path` is never half of a file.
 pub fn write_film(path: &Path, header: &FilmHeader, tiles: &Tiles) -> Result<(), PartError> {

@@ -1,7 +1,7 @@
 //! `lumiris merge`: parts of an image become the image.
 
 use super::UsageError;
-use super::parts::{AOV_NOTE, SCENE_NOTE, SECONDS_NOTE};
+use super::parts::{AOV_NOTE, PLAN_NOTE, SCENE_NOTE, SECONDS_NOTE};
 use super::progress;
 use super::render::{check_outputs, write_image};
 use clap::Args;
@@ -85,7 +85,7 @@ fn metadata(merged: &Merged, seconds: f64) -> Vec<(String, String)> {
     let mut metadata: Vec<(String, String)> = settings.collect();
     let mut add = |key: &str, value: String| metadata.push((format!("lumiris:{key}"), value));
     add("scene", merged.header.note(SCENE_NOTE).unwrap_or_default().to_owned());
-    if let Some(plan) = merged.header.note("plan") {
+    if let Some(plan) = merged.header.note(PLAN_NOTE) {
         add("plan", plan.to_owned());
     }
     add("complete", merged.missing.is_empty().to_string());

@@ -27,6 +27,8 @@ const CHECKPOINT_SECONDS: f64 = 60.0;
 pub(super) const AOV_NOTE: &str = "aov";
 /// Note of the path of the scene.
 pub(super) const SCENE_NOTE: &str = "scene";
+/// Note of the plan that was made for it.
+pub(super) const PLAN_NOTE: &str = "plan";
 /// Note of the time that it took.
 pub(super) const SECONDS_NOTE: &str = "seconds";
 
@@ -241,7 +243,7 @@ impl FilmFile {
         let fingerprint = files.fingerprint();
         let fingerprint = fingerprint.map_err(|(path, e)| anyhow::anyhow!("cannot read {}: {e}", path.display()))?;
         let described = (described(args, job, settings), notes(args, plan)?);
-        let header = FilmHeader::new(job, settings, spp, fingerprint, described);
+        let mut header = FilmHeader::new(job, settings, spp, fingerprint, described);
         if let Some(stored) = &stored {
             let mut differences = stored.header.differences_of_settings(&header);
             if stored.header.spp != header.spp {
@@ -251,6 +253,9 @@ impl FilmFile {
                 let path = stored.path.display();
                 bail!("{path} is of another scene or of other settings:\n  {}", differences.join("\n  "));
             }
+            // What was measured then is not measured again
+            let plan = stored.header.note(PLAN_NOTE).filter(|_| header.note(PLAN_NOTE).is_none());
+            header.notes.extend(plan.map(|text| (PLAN_NOTE.to_owned(), text.to_owned())));
         }
         let checkpoints = args.parts.checkpoint.as_ref().map(|(path, seconds)| {
             Checkpoints::new(path.clone(), Duration::from_secs_f64(*seconds), header.clone(), progress::say)
@@ -346,7 +351,7 @@ fn notes(args: &RenderArgs, plan: &PlanFile) -> anyhow::Result<Vec<(String, Stri
     notes.extend(resolution.map(|[w, h]| ("resolution", format!("{w}x{h}"))));
     notes.extend(crop.map(|c| ("crop", c.map(|v| v.to_string()).join(","))));
     notes.extend(box_filter.then(|| ("box_filter", "true".to_owned())));
-    notes.extend((!plan.settings.is_empty()).then(|| plan.text()).transpose()?.map(|text| ("plan", text)));
+    notes.extend((!plan.settings.is_empty()).then(|| plan.text()).transpose()?.map(|text| (PLAN_NOTE, text)));
     let name = |aov: &Option<Aov>| aov.map_or("none", <&str>::from);
     notes.extend(args.aov.as_ref().map(|list| (AOV_NOTE, list.iter().map(name).collect::<Vec<_>>().join(","))));
     Ok(notes.into_iter().map(|(key, value)| (key.to_owned(), value)).collect())
