@@ -1,22 +1,13 @@
 //! Options that several subcommands share, as typed.
 
-use super::parts::PartArgs;
-use super::settings_args::SettingsArgs;
+use super::part_args::PartArgs;
+use super::settings_args::{SettingsArgs, named};
 use clap::Args;
 use clap::builder::{PossibleValuesParser, TypedValueParser};
 use lumiris::render::output::Aov;
 use lumiris::scene::AccelKind;
 use std::path::PathBuf;
-use std::str::FromStr;
 use strum::VariantNames;
-
-/// A parser of the names of an enumeration.
-pub(super) fn named<T>() -> impl TypedValueParser<Value = T>
-where
-    T: VariantNames + FromStr<Err = strum::ParseError> + Clone + Send + Sync + 'static,
-{
-    PossibleValuesParser::new(T::VARIANTS).try_map(|name| name.parse::<T>())
-}
 
 /// An AOV, or none.
 fn aov() -> impl TypedValueParser<Value = Option<Aov>> {

@@ -1,9 +1,10 @@
 //! `lumiris merge`: parts of an image become the image.
 
 use super::UsageError;
-use super::parts::{AOV_NOTE, PLAN_NOTE, SCENE_NOTE, SECONDS_NOTE};
+use super::part_args::{PART_TYPE, extension};
 use super::progress;
 use super::render::{check_outputs, write_image};
+use super::stored::{AOV_NOTE, PLAN_NOTE, SCENE_NOTE, SECONDS_NOTE};
 use clap::Args;
 use lumiris::render::output::Aov;
 use lumiris::render::parts::FilmReader;
@@ -33,7 +34,7 @@ pub(super) struct MergeArgs {
 
 pub(super) fn run(args: &MergeArgs) -> anyhow::Result<ExitCode> {
     check_outputs(&args.output)?;
-    if let Some(path) = args.output.iter().find(|path| super::render::extension(path) == super::parts::PART_TYPE) {
+    if let Some(path) = args.output.iter().find(|path| extension(path) == PART_TYPE) {
         return Err(UsageError(format!("{}: parts are merged to an image, such as image.exr", path.display())).into());
     }
     if let Some(path) = repeated(&args.parts) {

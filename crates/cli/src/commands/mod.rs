@@ -11,6 +11,7 @@ mod crosscheck;
 mod generate;
 mod info;
 mod merge;
+mod part_args;
 mod parts;
 mod plan;
 mod plan_file;
@@ -19,6 +20,7 @@ mod render;
 mod reproduce;
 mod settings;
 mod settings_args;
+mod stored;
 
 use clap::{Parser, Subcommand};
 use std::process::ExitCode;

@@ -1,167 +1,21 @@
-//! Parts of images, checkpoints, and going on from them: options of `render`, and what becomes of them.
+//! Parts of images and checkpoints: which samples of which pixels are rendered, and where their sums are stored.
 
 use super::UsageError;
 use super::args::{RenderArgs, SceneArgs};
+use super::part_args::{PART_TYPE, extension};
 use super::plan_file::PlanFile;
 use super::progress;
-use super::render::extension;
+use super::stored::{AOV_NOTE, PLAN_NOTE, SCENE_NOTE, SECONDS_NOTE, Stored};
 use anyhow::{Context, bail};
-use clap::Args;
 use lumiris::import::fingerprint::SceneFiles;
 use lumiris::render::output::{self, Aov};
-use lumiris::render::parts::{Checkpoints, FilmHeader, FilmReader, StoredTile, write_film};
+use lumiris::render::parts::{Checkpoints, FilmHeader, StoredTile, write_film};
 use lumiris::render::plan::follows_from_times;
 use lumiris::render::{Continuation, RenderSettings, Rendering, TileShare, depends_on_earlier_samples};
-use lumiris::scene::{AccelKind, RenderJob};
+use lumiris::scene::RenderJob;
 use lumiris::settings::Settings;
-use lumiris::settings::table::rows;
-use std::path::{Path, PathBuf};
+use std::path::Path;
 use std::time::Duration;
-use strum::{EnumString, IntoStaticStr, VariantNames};
-
-/// File type of parts.
-pub(super) const PART_TYPE: &str = "part";
-/// Time between checkpoints, if none is given (s).
-const CHECKPOINT_SECONDS: f64 = 60.0;
-/// Note of the layers that the image is to have.
-pub(super) const AOV_NOTE: &str = "aov";
-/// Note of the path of the scene.
-pub(super) const SCENE_NOTE: &str = "scene";
-/// Note of the plan that was made for it.
-pub(super) const PLAN_NOTE: &str = "plan";
-/// Note of the time that it took.
-pub(super) const SECONDS_NOTE: &str = "seconds";
-
-/// What a part has of the image.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, EnumString, IntoStaticStr, VariantNames)]
-#[strum(serialize_all = "kebab-case")]
-pub(super) enum PartBy {
-    /// A share of the samples of every pixel.
-    #[default]
-    Samples,
-    /// All samples of a share of the pixels.
-    Tiles,
-}
-
-/// Options of parts and checkpoints.
-#[derive(Args, Clone, Debug)]
-#[command(next_help_heading = "Parts and checkpoints")]
-pub(super) struct PartArgs {
-    /// Render the I-th of N parts of the image, for `lumiris merge`; the output is FILE.part
-    #[arg(long, value_name = "I/N", value_parser = parse_part)]
-    pub part: Option<[u32; 2]>,
-    /// What a part has: `samples`, a share of the samples of every pixel, or `tiles`, all samples of a share of the pixels
-    /// [default: samples]
-    #[arg(long, value_name = "WHAT", requires = "part", value_parser = super::args::named::<PartBy>())]
-    pub part_by: Option<PartBy>,
-    /// First sample of every pixel, by its index [default: 0]
-    #[arg(long, value_name = "A")]
-    pub samples_from: Option<u32>,
-    /// Index after the last sample of every pixel; may be more than --spp, by which footprints and pilots go [default:
-    /// --spp]
-    #[arg(long, value_name = "B", value_parser = clap::value_parser!(u32).range(1..))]
-    pub samples_to: Option<u32>,
-    /// Store everything that is needed to go on, every so many seconds [default: 60] and in the end
-    #[arg(long, value_name = "FILE[,SECONDS]", value_parser = parse_checkpoint)]
-    pub checkpoint: Option<(PathBuf, f64)>,
-    /// Go on from a checkpoint or an unfinished part, with its settings; --spp may ask for more samples. If --checkpoint
-    /// names the same file and there is none yet, start
-    #[arg(long, value_name = "FILE")]
-    pub resume: Option<PathBuf>,
-}
-
-impl PartArgs {
-    /// True if it is not the whole image that is asked for.
-    fn is_partial(&self) -> bool {
-        self.part.is_some() || self.samples_from.is_some() || self.samples_to.is_some()
-    }
-
-    fn is_by_tiles(&self) -> bool {
-        self.part_by == Some(PartBy::Tiles)
-    }
-}
-
-fn parse_part(text: &str) -> Result<[u32; 2], String> {
-    let parsed = text.split_once('/').and_then(|(i, n)| Some([i.trim().parse().ok()?, n.trim().parse().ok()?]));
-    match parsed {
-        Some([i, n]) if 1 <= i && i <= n => Ok([i, n]),
-        _ => Err("expected I/N with 1 <= I <= N, such as 3/8".to_owned()),
-    }
-}
-
-fn parse_checkpoint(text: &str) -> Result<(PathBuf, f64), String> {
-    let with_seconds = text.rsplit_once(',').and_then(|(path, seconds)| Some((path, seconds.trim().parse().ok()?)));
-    match with_seconds {
-        Some((path, seconds)) if seconds > 0.0 && f64::is_finite(seconds) && !path.is_empty() => {
-            Ok((PathBuf::from(path), seconds))
-        }
-        Some(_) => Err("expected FILE or FILE,SECONDS with a positive number of seconds".to_owned()),
-        None => Ok((PathBuf::from(text), CHECKPOINT_SECONDS)),
-    }
-}
-
-/// The sums that a rendering goes on from.
-pub(super) struct Stored {
-    path: PathBuf,
-    pub(super) header: FilmHeader,
-    tiles: Vec<StoredTile>,
-}
-
-impl Stored {
-    /// Those of `--resume`, if there are any.
-    pub(super) fn read(args: &PartArgs) -> anyhow::Result<Option<Stored>> {
-        let Some(path) = &args.resume else { return Ok(None) };
-        let is_begun_here = args.checkpoint.as_ref().is_some_and(|(checkpoint, _)| checkpoint == path);
-        if is_begun_here && !path.exists() {
-            return Ok(None);
-        }
-        let reader = FilmReader::open(path)?;
-        let header = reader.header().clone();
-        Ok(Some(Stored { path: path.clone(), header, tiles: reader.all_tiles()? }))
-    }
-
-    /// The options by which it was rendered, where none are given now.
-    pub(super) fn complete(&self, args: &mut RenderArgs) -> anyhow::Result<()> {
-        let note = |name| self.header.note(name).filter(|text| !text.is_empty());
-        let scene = &mut args.scene;
-        let option = |name: &str| anyhow::anyhow!("{}: the stored {name} means nothing", self.path.display());
-        if let (None, Some(text)) = (scene.resolution, note("resolution")) {
-            scene.resolution = Some(super::args::parse_resolution(text).map_err(|_| option("resolution"))?);
-        }
-        if let (None, Some(text)) = (scene.crop, note("crop")) {
-            scene.crop = Some(super::args::parse_crop(text).map_err(|_| option("crop window"))?);
-        }
-        if let (AccelKind::Embree, Some(accel)) = (scene.accel, self.header.setting("lumiris:accel")) {
-            scene.accel = accel.parse().map_err(|_| option("ray tracer"))?;
-        }
-        scene.box_filter |= note("box_filter").is_some();
-        if let (None, Some(list)) = (&args.aov, note(AOV_NOTE)) {
-            let named = |name: &str| if name == "none" { Ok(None) } else { name.parse::<Aov>().map(Some) };
-            args.aov =
-                Some(list.split(',').map(named).collect::<Result<_, _>>().map_err(|_| option("list of layers"))?);
-        }
-        Ok(())
-    }
-
-    /// Applies its settings, in the order of the table. What it does not have does not apply.
-    pub(super) fn apply(&self, settings: &mut Settings) -> anyhow::Result<()> {
-        for row in rows() {
-            if let Some(value) = self.header.setting(&format!("lumiris:{}", row.key)) {
-                let set = row.set_text(settings, value);
-                set.map_err(|e| {
-                    anyhow::anyhow!("{}: `{}`: expected {e}, not `{value}`", self.path.display(), row.key)
-                })?;
-            }
-        }
-        Ok(())
-    }
-
-    /// The samples per pixel by which it was prepared.
-    pub(super) fn spp(&self) -> anyhow::Result<u32> {
-        let spp = self.header.setting("lumiris:spp").and_then(|text| text.parse().ok());
-        spp.with_context(|| format!("{}: there is no number of samples", self.path.display()))
-    }
-}
 
 /// Rejects options that contradict each other.
 pub(super) fn check(args: &RenderArgs) -> anyhow::Result<()> {

@@ -2,10 +2,12 @@
 
 use super::UsageError;
 use super::args::RenderArgs;
-use super::parts::{self, FilmFile, PART_TYPE, Stored};
+use super::part_args::{PART_TYPE, extension};
+use super::parts::{self, FilmFile};
 use super::plan_file::PlanFile;
 use super::progress::{self, Bar};
 use super::settings::{SetupTimes, load_job_of, plan, render_settings};
+use super::stored::Stored;
 use anyhow::{Context, bail};
 use lumiris::film::Film;
 use lumiris::imaging::oiio::{self, Part};
@@ -96,10 +98,6 @@ fn outputs(args: &RenderArgs, job: &RenderJob) -> Vec<PathBuf> {
         let stem = name.trim_end_matches(".gz").trim_end_matches(".pbrt").to_owned();
         PathBuf::from(stem + ".exr")
     })]
-}
-
-pub(super) fn extension(path: &Path) -> String {
-    path.extension().unwrap_or_default().to_string_lossy().to_lowercase()
 }
 
 /// Rejects outputs that cannot be written, before time is spent on rendering.

@@ -2,9 +2,9 @@
 
 use super::UsageError;
 use super::args::SceneArgs;
-use super::parts::Stored;
 use super::plan_file::PlanFile;
 use super::progress;
+use super::stored::Stored;
 use anyhow::{Context, bail};
 use lumiris::film::filter::PixelFilter;
 use lumiris::import::fingerprint::SceneFiles;
