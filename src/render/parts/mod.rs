@@ -2,7 +2,7 @@
 //! goes on.
 //!
 //! Both are one format ([`file`]): the exact sums of some samples of some pixels, tile by tile ([`stored_tile`]), with
-//! the settings that they belong to ([`header`]). [`checkpoint`] stores them while an image is rendered; [`merge`] adds
+//! the settings that they belong to ([`header`]). [`checkpoint`] stores them while an image is rendered; [`mod@merge`] adds
 //! them up.
 
 pub mod checkpoint;

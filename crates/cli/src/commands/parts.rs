@@ -31,9 +31,6 @@ pub(super) fn check(args: &RenderArgs) -> anyhow::Result<()> {
     if parts.is_partial() && args.time.is_some() {
         return usage("parts of an image cannot be limited by --time: their samples would not be known");
     }
-    if parts.resume.is_some() && args.scene.plan.is_some() {
-        return usage("--resume goes on with the plan of its file: leave --plan out");
-    }
     for path in parts.checkpoint.iter().map(|(path, _)| path) {
         let folder = path.parent().filter(|p| !p.as_os_str().is_empty()).unwrap_or(Path::new("."));
         if !folder.is_dir() {

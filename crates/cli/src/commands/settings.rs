@@ -45,11 +45,12 @@ fn load_scene(args: &SceneArgs, stored: Option<&Stored>) -> anyhow::Result<Loade
     if !warnings.is_empty() {
         progress::say(warnings.trim_end());
     }
-    if let Some(path) = &args.plan {
-        apply_plan(path, &mut loaded.settings)?;
-    }
+    // What is given now comes later, so that differences from what is stored are found
     if let Some(stored) = stored {
         stored.apply(&mut loaded.settings)?;
+    }
+    if let Some(path) = &args.plan {
+        apply_plan(path, &mut loaded.settings)?;
     }
     args.settings.apply(&mut loaded.settings);
     let sampling = &mut loaded.settings.sampling;

@@ -159,6 +159,17 @@ fn what_a_plan_has_chosen_is_the_same_for_all_parts() {
     (1..3).for_each(|i| run(&format!("{planned} --part {i}/2 -o {i}.part"), folder));
     run("merge 2.part 1.part -o merged.exr", folder);
     assert_same("single.exr", "merged.exr", folder, "by a plan");
+
+    // The same command starts and goes on; another plan is another image
+    for _ in 0..2 {
+        run(&format!("{planned} --checkpoint c.film --resume c.film -o resumed.exr"), folder);
+        assert_same("single.exr", "resumed.exr", folder, "by a plan, resumed");
+    }
+    let plan = std::fs::read_to_string(folder.join("plan.json")).unwrap();
+    let (at, rest) = plan.split_once("\"proposals\": \"").unwrap();
+    let (_, rest) = rest.split_once('"').unwrap();
+    std::fs::write(folder.join("plan.json"), format!("{at}\"proposals\": \"3\"{rest}")).unwrap();
+    refuse(&format!("{planned} --resume c.film -o other.exr"), folder, 3, &["c.film", "proposals: 3, not"]);
 }
 
 #[test]
