@@ -192,7 +192,7 @@ mod tests {
         let mut whole = PixelAccumulator::default();
         (0..).zip(&samples).for_each(|(i, sample)| whole.add(i, sample));
         assert!(whole.hits > 20 && whole.material == whole.first_hit + 1 && whole.first_hit > 3);
-        for parts in [vec![0..64], vec![32..64, 0..32], vec![60..64, 5..60, 0..2, 2..5]] {
+        for parts in [vec![0..1, 1..64], vec![32..64, 0..32], vec![60..64, 5..60, 0..2, 2..5]] {
             let mut merged = PixelAccumulator::default();
             parts.into_iter().for_each(|range| merged.merge(&part(range)));
             assert_eq!(merged, whole);

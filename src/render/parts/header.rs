@@ -8,6 +8,9 @@ use crate::scene::RenderJob;
 use std::ops::Range;
 use std::str::FromStr;
 
+/// Texts by name.
+type Entries = Vec<(String, String)>;
+
 /// The header of a file of sums.
 #[derive(Clone, Debug, PartialEq)]
 pub struct FilmHeader {
@@ -30,9 +33,9 @@ pub struct FilmHeader {
     /// Tells the scene from others.
     pub fingerprint: u64,
     /// What the image depends on, by name: equal in all parts of an image.
-    pub settings: Vec<(String, String)>,
+    pub settings: Entries,
     /// What may differ.
-    pub notes: Vec<(String, String)>,
+    pub notes: Entries,
 }
 
 impl FilmHeader {
@@ -43,7 +46,7 @@ impl FilmHeader {
         render: &RenderSettings,
         spp: u32,
         fingerprint: u64,
-        (settings, notes): (Vec<(String, String)>, Vec<(String, String)>),
+        [settings, notes]: [Entries; 2],
     ) -> Self {
         let film = &job.world.scene.film;
         let estimator = Estimator::at_vertex(&job.settings().integrator, 0);

@@ -93,7 +93,7 @@ impl FilmFile {
         }
         let fingerprint = files.fingerprint();
         let fingerprint = fingerprint.map_err(|(path, e)| anyhow::anyhow!("cannot read {}: {e}", path.display()))?;
-        let described = (described(args, job, settings), notes(args, plan)?);
+        let described = [described(args, job, settings), notes(args, plan)?];
         let mut header = FilmHeader::new(job, settings, spp, fingerprint, described);
         if let Some(stored) = &stored {
             let mut differences = stored.header.differences_of_settings(&header);
