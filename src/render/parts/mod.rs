@@ -1,7 +1,7 @@
 //! Films in files: parts of an image, which are merged to the bits of the whole, and checkpoints, from which a rendering
 //! goes on.
 //!
-//! Both are one format ([`file`]): the exact sums of some samples of some pixels, tile by tile ([`stored_tile`]), with
+//! Both are one format ([`mod@file`]): the exact sums of some samples of some pixels, tile by tile ([`stored_tile`]), with
 //! the settings that they belong to ([`header`]). [`checkpoint`] stores them while an image is rendered; [`mod@merge`] adds
 //! them up.
 
