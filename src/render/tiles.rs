@@ -79,7 +79,7 @@ pub(super) fn film(resolution: [u32; 2], bounds: PixelBounds, tiles: &[Tile]) ->
 }
 
 /// The film of tiles whose sums are needed no more: the memory of each is free when its pixels are in the film. Tiles
-/// without control variates are removed. From the last one on, since allocators return what was allocated last.
+/// without control variates are removed.
 pub(super) fn film_of_last(resolution: [u32; 2], bounds: PixelBounds, tiles: &mut Vec<Tile>) -> Film {
     let mut film = Film::new(resolution, bounds);
     for tile in tiles.iter_mut().rev() {
