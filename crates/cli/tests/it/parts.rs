@@ -168,8 +168,8 @@ fn what_a_plan_has_chosen_is_the_same_for_all_parts() {
     let plan = std::fs::read_to_string(folder.join("plan.json")).unwrap();
     let (at, rest) = plan.split_once("\"proposals\": \"").unwrap();
     let (_, rest) = rest.split_once('"').unwrap();
-    std::fs::write(folder.join("plan.json"), format!("{at}\"proposals\": \"3\"{rest}")).unwrap();
-    refuse(&format!("{planned} --resume c.film -o other.exr"), folder, 3, &["c.film", "proposals: 3, not"]);
+    std::fs::write(folder.join("plan.json"), format!("{at}\"proposals\": \"640\"{rest}")).unwrap();
+    refuse(&format!("{planned} --resume c.film -o other.exr"), folder, 3, &["c.film", "proposals: 640, not"]);
 }
 
 #[test]
