@@ -1,5 +1,6 @@
 //! What estimators keep of a pixel: coefficients fitted to its earlier estimates, or the sums of its control variates.
 
+use crate::film::exact::FixedSum;
 use lumiris_numbers::estimators::ocv::NormalEquations;
 
 /// Solves the systems of all fits from their sums. Returns how many are ill-conditioned.
@@ -23,7 +24,7 @@ pub struct Fits {
 #[derive(Clone, Debug, Default)]
 struct Controls {
     components: usize,
-    sums: Vec<f64>,
+    sums: Vec<FixedSum>,
     /// Those of the batch that is being traced, by camera sample.
     batch: Vec<f32>,
 }
@@ -49,8 +50,9 @@ impl Fits {
     }
 
     /// Sums of values and of `components` control variates without estimates, of `count` pixels.
-    pub(super) fn of_pixels(components: usize, count: usize) -> Self {
-        let controls = Controls { components, sums: vec![0.0; count * (3 + components)], batch: Vec::new() };
+    pub fn of_pixels(components: usize, count: usize) -> Self {
+        let sums = vec![FixedSum::default(); count * (3 + components)];
+        let controls = Controls { components, sums, batch: Vec::new() };
         Fits { controls, ..Fits::default() }
     }
 
@@ -70,8 +72,7 @@ impl Fits {
         }
     }
 
-    /// Adds the estimates of the batch to the sums of their pixels, in the order of the camera samples, which are given
-    /// by fit and weight.
+    /// Adds the estimates of the batch to the sums of their pixels. The camera samples are given by fit and weight.
     pub(crate) fn end_batch(&mut self, samples: impl Iterator<Item = (u32, f32)>) {
         if self.controls.batch.is_empty() {
             return;
@@ -79,7 +80,7 @@ impl Fits {
         for (i, (fit, weight)) in samples.enumerate() {
             let (from, to) = (self.controls.row(i), self.controls.row(fit as usize));
             for (sum, v) in self.controls.sums[to].iter_mut().zip(&self.controls.batch[from]) {
-                *sum += f64::from(weight) * f64::from(*v);
+                sum.add_product(weight, *v);
             }
         }
     }
@@ -90,9 +91,35 @@ impl Fits {
     }
 
     /// Σ of the values of a pixel, by channel, and of its control variates.
-    pub fn sums_of_controls(&self, fit: u32) -> ([f64; 3], &[f64]) {
+    pub fn sums_of_controls(&self, fit: u32) -> ([f64; 3], impl Iterator<Item = f64> + '_) {
         let sums = &self.controls.sums[self.controls.row(fit as usize)];
-        ([sums[0], sums[1], sums[2]], &sums[3..])
+        ([0, 1, 2].map(|c| sums[c].value()), sums[3..].iter().map(FixedSum::value))
+    }
+
+    /// The sums of values and control variates of all pixels; none if they are not summed.
+    pub fn exact_sums(&self) -> &[FixedSum] {
+        &self.controls.sums
+    }
+
+    /// Adds sums of values and control variates to those of a pixel. False if these are not as many.
+    pub fn merge_sums(&mut self, fit: u32, sums: &[FixedSum]) -> bool {
+        let row = self.controls.row(fit as usize);
+        let own = self.controls.sums.get_mut(row).filter(|own| own.len() == sums.len());
+        own.map(|own| own.iter_mut().zip(sums).for_each(|(a, b)| a.merge(b))).is_some()
+    }
+
+    /// What later estimates follow from: the sums of all fits, and their coefficients.
+    pub fn memory(&self) -> [&[f32]; 2] {
+        [&self.sums, &self.beta]
+    }
+
+    /// Goes on with what [`Self::memory`] was. False if that belongs to other fits.
+    pub fn restore(&mut self, [sums, beta]: [Vec<f32>; 2]) -> bool {
+        let fits = sums.len() == self.sums.len() && beta.len() == self.beta.len();
+        if fits {
+            (self.sums, self.beta) = (sums, beta);
+        }
+        fits
     }
 
     /// Begins a block. Returns the number of fits whose system is ill-conditioned; without a solution, estimates are

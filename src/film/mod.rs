@@ -1,14 +1,18 @@
-//! The film: f64 sums per pixel, from which means, variances and AOVs are read.
+//! The film: sums per pixel, from which means, variances and AOVs are read.
 //!
 //! Pixel filters work by importance sampling: a sample belongs to one pixel, and its weight is the sign of the
-//! filter ([`filter`]). So films of disjoint sample ranges can be added, and so can their [`replicas`], which give the
-//! variance of pixel means.
+//! filter ([`filter`]). Samples are added to exact sums ([`exact`], [`accumulator`]), so that the film is the same
+//! however they are ordered and split. [`replicas`] give the variance of pixel means; [`encoding`] stores sums in files.
 
+pub mod accumulator;
+pub mod encoding;
+pub mod exact;
 pub mod filter;
 pub mod replicas;
 
+use accumulator::PixelAccumulator;
 use lumiris_numbers::math::{Rgb, Vec3, luminance};
-use replicas::Replica;
+use replicas::{Replica, ReplicaAccumulator};
 
 /// What one camera sample says of its pixel.
 #[derive(Clone, Copy, Debug, Default)]
@@ -34,7 +38,7 @@ pub struct Features {
     pub object: u32,
 }
 
-/// Sums over the samples of a pixel.
+/// Sums over the samples of a pixel, as numbers.
 #[derive(Clone, Copy, Debug, Default)]
 pub struct PixelSums {
     /// Number of samples.
@@ -51,41 +55,17 @@ pub struct PixelSums {
     pub normal: [f64; 3],
     /// Σ depth of the samples that met a surface.
     pub depth: f64,
-    /// Material of the first sample that met a surface, plus one; 0 if none did.
+    /// Material of the first sample that met a surface, by its index, plus one; 0 if none did.
     pub material: u32,
     /// Geometry of that sample, plus one; 0 if none did.
     pub object: u32,
-    /// Samples whose radiance was NaN or infinite; they count as black.
+    /// Samples whose radiance was not finite, or beyond [`exact::LIMIT`]; they count as black.
     pub invalid: u64,
     /// Records of the irradiance cache that this pixel asked for.
     pub records: u32,
 }
 
 impl PixelSums {
-    /// Adds a sample. The order of additions is part of the result: a pixel's samples are added by index.
-    pub fn add(&mut self, sample: &PixelSample) {
-        self.count += 1;
-        if sample.radiance.is_finite() {
-            for (c, value) in sample.radiance.to_array().into_iter().map(f64::from).enumerate() {
-                self.radiance[c] += value;
-                self.radiance_squared[c] += value * value;
-            }
-        } else {
-            self.invalid += 1;
-        }
-        let Some(features) = &sample.features else { return };
-        for c in 0..3 {
-            self.albedo[c] += f64::from(features.albedo[c]);
-            self.normal[c] += f64::from(features.normal[c]);
-        }
-        self.depth += f64::from(features.depth);
-        if self.hits == 0 {
-            self.material = features.material + 1;
-            self.object = features.object + 1;
-        }
-        self.hits += 1;
-    }
-
     /// Mean radiance; black without samples.
     pub fn mean(&self) -> [f64; 3] {
         self.radiance.map(|s| s / self.count.max(1) as f64)
@@ -172,14 +152,15 @@ impl Film {
     }
 
     /// Sets the part of an empty film that `tile` covers; pixels of replicas are indexed in the tile.
-    pub fn set_tile(&mut self, tile: &PixelBounds, sums: &[PixelSums], replicas: &[Replica]) {
+    pub fn set_tile(&mut self, tile: &PixelBounds, sums: &[PixelAccumulator], replicas: &[ReplicaAccumulator]) {
         for (row, y) in (tile.y0..tile.y1).enumerate() {
             let (start, width) = (self.index(tile.x0, y), tile.width() as usize);
-            self.pixels[start..start + width].copy_from_slice(&sums[row * width..(row + 1) * width]);
+            let pixels = self.pixels[start..start + width].iter_mut();
+            pixels.zip(&sums[row * width..]).for_each(|(pixel, sums)| *pixel = sums.sums());
         }
         let width = tile.width().max(1);
-        let pixel = |r: &Replica| self.index(tile.x0 + r.pixel % width, tile.y0 + r.pixel / width) as u32;
-        let moved: Vec<Replica> = replicas.iter().map(|r| Replica { pixel: pixel(r), ..*r }).collect();
+        let pixel = |r: &ReplicaAccumulator| self.index(tile.x0 + r.pixel % width, tile.y0 + r.pixel / width) as u32;
+        let moved: Vec<Replica> = replicas.iter().map(|r| r.replica(pixel(r))).collect();
         self.replicas.extend(moved);
     }
 
@@ -217,33 +198,5 @@ mod tests {
             assert_eq!(counts.iter().sum::<i32>() as usize, bounds.area());
             assert!(counts.iter().all(|&c| c <= 1));
         }
-    }
-
-    #[test]
-    fn sums_do_not_drift_at_high_sample_counts() {
-        // 0.1 as f32, 10⁷ times: an f32 sum would be off by percents.
-        let sample = PixelSample { radiance: Rgb::splat(0.1), features: None };
-        let mut sums = PixelSums::default();
-        for _ in 0..10_000_000 {
-            sums.add(&sample);
-        }
-        assert!((sums.mean()[0] - f64::from(0.1_f32)).abs() < 1e-9);
-    }
-
-    #[test]
-    fn variance_of_mean_is_that_of_the_samples_over_n() {
-        let mut sums = PixelSums::default();
-        for v in [1.0, 2.0, 3.0, 6.0] {
-            sums.add(&PixelSample { radiance: Rgb::splat(v), features: None });
-        }
-        // Sample variance 14/3, divided by 4.
-        assert!((sums.variance_of_mean()[1] - 14.0 / 12.0).abs() < 1e-12);
-    }
-
-    #[test]
-    fn a_sample_that_is_not_finite_is_counted_and_not_added() {
-        let mut sums = PixelSums::default();
-        sums.add(&PixelSample { radiance: Rgb::new(f32::NAN, 1.0, 1.0), features: None });
-        assert_eq!((sums.count, sums.invalid, sums.mean()), (1, 1, [0.0; 3]));
     }
 }

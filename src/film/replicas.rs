@@ -12,7 +12,8 @@
 //! bounces. Classes are intervals of the mean of s²/N over the surrounding 3 × 3 pixels, which is less noisy than a
 //! pixel's own value. Whatever the classes, the sum of V over the image is that of the replicas, scaled to all pixels.
 
-use super::{Film, PixelBounds, PixelSample, PixelSums};
+use super::accumulator::RadianceAccumulator;
+use super::{Film, PixelBounds, PixelSums};
 use lumiris_numbers::math::hash::{pcg4d, unit_f32};
 
 /// Number of replicas per image: more if [`MIN_FRACTION`] of the pixels are more, and fewer only if the image has fewer
@@ -27,10 +28,26 @@ const MIN_CLASS_SIZE: usize = 64;
 /// Distinguishes the choice of replicas from other hashes of pixels.
 const CHOICE: u32 = 0x72_65_70_6c;
 
+/// Exact sums of the second estimate of a pixel.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub struct ReplicaAccumulator {
+    /// Index of the pixel in the tile.
+    pub pixel: u32,
+    /// Samples and Σ radiance.
+    pub sums: RadianceAccumulator,
+}
+
+impl ReplicaAccumulator {
+    /// The sums as numbers, of a pixel with the given index in the film.
+    pub fn replica(&self, pixel: u32) -> Replica {
+        Replica { pixel, count: self.sums.count.into(), radiance: self.sums.values() }
+    }
+}
+
 /// The second estimate of a pixel.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Replica {
-    /// Index of the pixel in the film or tile.
+    /// Index of the pixel in the film.
     pub pixel: u32,
     /// Number of samples.
     pub count: u64,
@@ -39,16 +56,6 @@ pub struct Replica {
 }
 
 impl Replica {
-    /// Adds a sample, as [`PixelSums::add`] does.
-    pub fn add(&mut self, sample: &PixelSample) {
-        self.count += 1;
-        if sample.radiance.is_finite() {
-            for (sum, value) in self.radiance.iter_mut().zip(sample.radiance.to_array()) {
-                *sum += f64::from(value);
-            }
-        }
-    }
-
     /// Σ (A − B)²/2 over channels.
     fn half_square(&self, pixel: &PixelSums) -> f64 {
         let difference = |c: usize| (pixel.radiance[c] - self.radiance[c]) / self.count as f64;
@@ -58,13 +65,13 @@ impl Replica {
 
 /// Replicas, without samples, for the pixels of a tile that are estimated twice, in an image with the given bounds.
 /// Their indices are those of the tile.
-pub fn replicas(image: &PixelBounds, tile: &PixelBounds) -> Vec<Replica> {
+pub fn replicas(image: &PixelBounds, tile: &PixelBounds) -> Vec<ReplicaAccumulator> {
     let fraction = (WANTED / image.area().max(1) as f64).max(MIN_FRACTION);
     let is_chosen = |i: &u32| {
         let (x, y) = (tile.x0 + i % tile.width(), tile.y0 + i / tile.width());
         f64::from(unit_f32(pcg4d([x, y, CHOICE, 0])[0])) < fraction
     };
-    let none = |pixel| Replica { pixel, count: 0, radiance: [0.0; 3] };
+    let none = |pixel| ReplicaAccumulator { pixel, ..ReplicaAccumulator::default() };
     (0..tile.area() as u32).filter(is_chosen).map(none).collect()
 }
 
@@ -206,8 +213,9 @@ mod tests {
     #[test]
     fn replicas_are_the_same_pixels_for_all_tiles_and_few_in_large_images() {
         let image = PixelBounds { x0: 10, x1: 410, y0: 7, y1: 307 };
-        let position =
-            |tile: &PixelBounds, r: &Replica| [tile.x0 + r.pixel % tile.width(), tile.y0 + r.pixel / tile.width()];
+        let position = |tile: &PixelBounds, r: &ReplicaAccumulator| {
+            [tile.x0 + r.pixel % tile.width(), tile.y0 + r.pixel / tile.width()]
+        };
         let mut whole: Vec<_> = replicas(&image, &image).iter().map(|r| position(&image, r)).collect();
         let tiles = image.tiles(13);
         let mut parts: Vec<_> =

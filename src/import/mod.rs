@@ -1,15 +1,17 @@
 //! From scene files to scenes: the meaning of directives ([`pbrt`]), and the images and meshes that they name
-//! ([`resources`]).
+//! ([`resources`]). A [`fingerprint`] tells a scene from others.
 //!
 //! The files themselves are parsed by the crate `lumiris_formats`. User input never panics: problems are collected,
 //! with their source locations, in [`Diagnostics`].
 
+pub mod fingerprint;
 pub mod pbrt;
 pub mod resources;
 
 use crate::accel::embree::EmbreeError;
 use crate::scene::{AccelKind, RenderJob, Scene, World};
 use crate::settings::Settings;
+use fingerprint::SceneFiles;
 use lumiris_formats::diagnostic::{Diagnostics, Report};
 use lumiris_formats::pbrt::parser::parse_file;
 use lumiris_formats::source::SourceMap;
@@ -34,6 +36,8 @@ pub struct Loaded {
     pub settings: Settings,
     /// Warnings.
     pub warnings: Report,
+    /// The files that it was read from.
+    pub files: SceneFiles,
 }
 
 impl Loaded {
@@ -50,11 +54,12 @@ pub fn load(path: &Path, options: &LoadOptions) -> Result<Loaded, Box<Report>> {
     let folder = path.parent().map(Path::to_path_buf).unwrap_or_default();
     let mut builder = Builder::new(folder, options);
     parse_file(path, &mut sources, &mut diagnostics, &mut builder);
+    let files = SceneFiles::new(&sources, builder.files());
     let finished = builder.finish(&mut diagnostics);
     let failed = diagnostics.has_errors();
     let report = diagnostics.finish(&sources);
     match finished {
-        Some((scene, settings)) if !failed => Ok(Loaded { scene, settings, warnings: report }),
+        Some((scene, settings)) if !failed => Ok(Loaded { scene, settings, warnings: report, files }),
         _ => Err(Box::new(report)),
     }
 }

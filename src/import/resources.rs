@@ -57,6 +57,11 @@ impl Resources {
         id
     }
 
+    /// The files, in the order of the images.
+    pub fn paths(&self) -> impl Iterator<Item = &Path> {
+        self.requests.iter().map(|(request, _)| request.path.as_path())
+    }
+
     /// Reads all images, in the order of their ids; errors go to `d`.
     pub fn load(&self, d: &mut Diagnostics) -> Vec<MipMap> {
         let loaded: Vec<Result<MipMap, ImageError>> = self.requests.par_iter().map(|(r, _)| load_map(r)).collect();

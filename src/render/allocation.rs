@@ -16,6 +16,7 @@ use super::pilot_samples::trace_pixels;
 use super::worker::Worker;
 use super::{RenderSettings, Run, position};
 use crate::direct::Estimator;
+use crate::film::accumulator::PixelAccumulator;
 use crate::film::{PixelBounds, PixelSums};
 use crate::imaging::metrics::difference::DEFAULT_EPSILON;
 use crate::integrators::{PathStats, PathTracer, Tracer};
@@ -172,14 +173,14 @@ impl<'a> Pilot<'a> {
 /// The pilot's samples in a tile, and their mean cost.
 fn pilot_tile(run: &Run<'_>, tile: &PixelBounds, (spp, fraction, seed): (u32, f32, u32)) -> (Vec<PixelSums>, f64) {
     let mut worker = Worker::new(PathTracer::new(false));
-    let mut sums = vec![PixelSums::default(); tile.area()];
+    let mut sums = vec![PixelAccumulator::default(); tile.area()];
     let is_chosen = |i: &u32| {
         let [x, y] = position(tile, *i);
         unit_f32(pcg4d([x, y, PILOT_SEED, 1])[0]) < fraction
     };
     let chosen: Vec<u32> = (0..tile.area() as u32).filter(is_chosen).collect();
-    trace_pixels(run, &mut worker, (tile, &chosen), 0..spp, seed, |i, sample| sums[i as usize].add(sample));
-    (sums, cost(&worker.tracer.take_stats()))
+    trace_pixels(run, &mut worker, (tile, &chosen), 0..spp, seed, |i, sample| sums[i as usize].add(0, sample));
+    (sums.iter().map(PixelAccumulator::sums).collect(), cost(&worker.tracer.take_stats()))
 }
 
 /// Mean cost of a camera sample; that of one which hits nothing is 1.

@@ -12,7 +12,8 @@ use crate::accel::RayBatch;
 use crate::accel::embree::EmbreeError;
 use crate::accel::embree::bare::{Bare, Packed};
 use crate::direct::Estimator;
-use crate::film::{PixelBounds, PixelSums};
+use crate::film::PixelBounds;
+use crate::film::accumulator::PixelAccumulator;
 use crate::integrators::path::Recording;
 use crate::integrators::{PathStats, PathTracer, Tracer};
 use crate::scene::RenderJob;
@@ -195,9 +196,9 @@ fn frame(run: &Run<'_>, worker: &mut Worker<PathTracer>, parts: &[(PixelBounds, 
         worker.samples.iter_mut().for_each(|s| s.fit -= pixels.start as u32);
         let mut fits = Estimator::at_vertex(&run.job.settings().integrator, 0).fits(run.job, pixels.len());
         worker.tracer.trace(run.job, &run.job.settings().integrator, &worker.samples, &mut fits, &mut worker.results);
-        let mut sums = vec![PixelSums::default(); pixels.len()];
+        let mut sums = vec![PixelAccumulator::default(); pixels.len()];
         for (pixel, results) in sums.iter_mut().zip(worker.results.chunks(samples.len())) {
-            results.iter().for_each(|r| pixel.add(r));
+            samples.clone().zip(results).for_each(|(index, r)| pixel.add(index, r));
         }
         black_box(&sums);
     }

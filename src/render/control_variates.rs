@@ -4,7 +4,7 @@
 //! A replica is corrected by the coefficients of its pixel, which depend on neither of both estimates: so the two remain
 //! independent but for β, and their difference gives the variance of the corrected pixel.
 
-use super::Tile;
+use super::tiles::Tile;
 use crate::film::{Film, PixelBounds, PixelSums};
 use lumiris_numbers::estimators::ocv::pixels::{Memory, Picture, Pixel, correction};
 use rayon::prelude::*;
@@ -30,7 +30,7 @@ pub(super) fn correct(film: &mut Film, tiles: &[Tile], position: impl Fn(&PixelB
             }
         }
         for (fit, replica) in (tile.bounds.area() as u32..).zip(&tile.replicas) {
-            of_replicas.insert(place(replica.pixel) as u32, tile.fits.sums_of_controls(fit).1.to_vec());
+            of_replicas.insert(place(replica.pixel) as u32, tile.fits.sums_of_controls(fit).1.collect());
         }
     }
 

@@ -130,14 +130,13 @@ pub fn metadata(film: &FilmSettings, settings: &Settings) -> Vec<(String, String
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::film::{PixelBounds, PixelSample};
-    use lumiris_numbers::math::Rgb;
+    use crate::film::{PixelBounds, PixelSums};
 
     #[test]
     fn channel_count_matches_names_for_every_aov() {
         let bounds = PixelBounds { x0: 0, x1: 2, y0: 0, y1: 1 };
         let mut film = Film::new([2, 1], bounds);
-        film.pixels[0].add(&PixelSample { radiance: Rgb::new(1.0, 2.0, 4.0), features: None });
+        film.pixels[0] = PixelSums { count: 1, radiance: [1.0, 2.0, 4.0], ..PixelSums::default() };
         let c = channels(&film, &Aov::ALL, None);
         assert_eq!(c.data.len(), c.names.len() * 2);
         let depth = c.names.iter().position(|n| n == "depth.Z").unwrap();
@@ -148,7 +147,7 @@ mod tests {
     #[test]
     fn display_clips_and_brightens() {
         let mut film = Film::new([1, 1], PixelBounds { x0: 0, x1: 1, y0: 0, y1: 1 });
-        film.pixels[0].add(&PixelSample { radiance: Rgb::new(0.25, 0.5, 4.0), features: None });
+        film.pixels[0] = PixelSums { count: 1, radiance: [0.25, 0.5, 4.0], ..PixelSums::default() };
         let d = display(&film, 1.0);
         assert!((d[0] - linear_to_srgb(0.5)).abs() < 1e-6 && (d[1] - 1.0).abs() < 1e-6 && (d[2] - 1.0).abs() < 1e-6);
     }

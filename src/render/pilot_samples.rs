@@ -3,17 +3,20 @@
 use super::worker::Worker;
 use super::{BATCH_PATHS, Run, position};
 use crate::direct::Fits;
-use crate::film::{PixelBounds, PixelSample, PixelSums};
+use crate::film::accumulator::RadianceAccumulator;
+use crate::film::{PixelBounds, PixelSample};
 use crate::integrators::{PathTracer, Tracer};
 use std::ops::Range;
 
 /// The sums of some samples of the pixels of a tile, with random numbers of a seed.
 pub(super) fn pilot_images(run: &Run<'_>, tile: &PixelBounds, samples: Range<u32>, seed: u32) -> Vec<[f64; 3]> {
-    let mut sums = vec![PixelSums::default(); tile.area()];
+    let mut sums = vec![RadianceAccumulator::default(); tile.area()];
     let all: Vec<u32> = (0..tile.area() as u32).collect();
     let mut worker = Worker::new(PathTracer::new(false));
-    trace_pixels(run, &mut worker, (tile, &all), samples, seed, |i, sample| sums[i as usize].add(sample));
-    sums.iter().map(|s| s.radiance).collect()
+    trace_pixels(run, &mut worker, (tile, &all), samples, seed, |i, sample| {
+        sums[i as usize].add(sample.radiance);
+    });
+    sums.iter().map(RadianceAccumulator::values).collect()
 }
 
 /// Traces samples of some pixels of a tile, and passes them on with the indices of their pixels.

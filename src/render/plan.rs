@@ -81,6 +81,13 @@ pub fn prepare(job: &mut RenderJob, threads: Option<usize>, ratio_map: bool) -> 
     Ok(Plan { auto, ris, chosen: chosen(&before, job.settings()) })
 }
 
+/// True if [`prepare`] makes choices that follow from measured times.
+pub fn follows_from_times(settings: &Settings) -> bool {
+    let i = &settings.integrator;
+    let is_open = !matches!(i.ris.proposals, Proposals::Fixed(_)) && i.ris.stage_times.is_none();
+    i.estimator == EstimatorKind::Auto || i.estimator == EstimatorKind::Ris && is_open
+}
+
 /// The settings that differ.
 fn chosen(before: &Settings, after: &Settings) -> Vec<(&'static str, String)> {
     let before: Vec<_> = before.recorded().collect();

@@ -23,6 +23,16 @@ pub fn write_whole(path: &Path, write: impl FnOnce(&mut NamedTempFile) -> io::Re
     Ok(())
 }
 
+/// Gives a file its name when all of it is on the disk, and waits until the disk knows the name, where that can be.
+pub fn sync_and_rename(partial: &Path, path: &Path) -> io::Result<()> {
+    File::open(partial)?.sync_all()?;
+    std::fs::rename(partial, path)?;
+    let folder = path.parent().filter(|folder| !folder.as_os_str().is_empty()).unwrap_or(Path::new("."));
+    // Some file systems refuse that for folders
+    let _ = File::open(folder).and_then(|folder| folder.sync_all());
+    Ok(())
+}
+
 /// Writes a text, as [`write_whole`]; what is no file (a pipe, a terminal) gets it directly.
 pub fn write_text(path: &Path, text: &str) -> io::Result<()> {
     match path.metadata() {

@@ -89,6 +89,11 @@ impl SourceMap {
         self.files.get(file as usize).map_or_else(Default::default, |f| Arc::clone(&f.bytes))
     }
 
+    /// The bytes of all files, in the order in which they were added.
+    pub fn texts(&self) -> impl Iterator<Item = &[u8]> {
+        self.files.iter().map(|file| file.bytes.as_slice())
+    }
+
     /// The name of a file.
     pub fn name(&self, file: FileId) -> &str {
         self.files.get(file as usize).map_or("?", |f| &f.name)

@@ -72,7 +72,10 @@ impl Builder<'_> {
         }
         let path = self.folder.join(name);
         match Spectrum::read(&path) {
-            Ok(Ok(curve)) => return Some(Resolved::Curve(curve)),
+            Ok(Ok(curve)) => {
+                self.spectrum_files.borrow_mut().push(path);
+                return Some(Resolved::Curve(curve));
+            }
             Ok(Err(error)) if name.contains('.') => d.missing_file(path, error, Some(span)),
             Ok(Err(_)) => super::checks::unknown(name, span, "spectrum", &Spectrum::names().collect::<Vec<_>>(), d),
             Err(reason) => {

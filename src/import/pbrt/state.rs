@@ -1,6 +1,8 @@
 //! What the directives so far have made: the graphics state, and the scene while its file is read.
 
-use super::descriptions::{AreaLightDesc, EnvironmentDesc, InstanceDesc, MaterialUse, ObjectDesc, ShapeDesc};
+use super::descriptions::{
+    AreaLightDesc, EnvironmentDesc, InstanceDesc, MaterialUse, ObjectDesc, ShapeDesc, ShapeSource,
+};
 use super::options::Options;
 use super::transform::{Ctm, affine};
 use crate::import::LoadOptions;
@@ -14,8 +16,9 @@ use lumiris_formats::pbrt::directive::{ActiveTimes, AttributeTarget};
 use lumiris_formats::pbrt::params::Param;
 use lumiris_formats::source::Span;
 use lumiris_numbers::math::{Affine3A, Rgb};
+use std::cell::RefCell;
 use std::collections::HashMap;
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 
 /// What a block saves and restores.
 #[derive(Clone)]
@@ -106,6 +109,8 @@ pub struct Builder<'a> {
     pub instances: Vec<InstanceDesc>,
     /// Images to be read.
     pub resources: Resources,
+    /// Files of spectra that were read.
+    pub(super) spectrum_files: RefCell<Vec<PathBuf>>,
 }
 
 impl<'a> Builder<'a> {
@@ -142,7 +147,22 @@ impl<'a> Builder<'a> {
             current_object: None,
             instances: Vec::new(),
             resources: Resources::default(),
+            spectrum_files: RefCell::default(),
         }
+    }
+
+    /// The files that the text names: spectra, meshes and images.
+    pub fn files(&self) -> Vec<PathBuf> {
+        let mesh = |shape: &ShapeDesc| match &shape.source {
+            ShapeSource::Ply(path) => Some(path.clone()),
+            _ => None,
+        };
+        let mut files = self.spectrum_files.borrow().clone();
+        files.extend(self.shapes.iter().filter_map(mesh));
+        files.extend(self.environments.iter().map(|e| e.path.clone()));
+        files.extend(self.emission_images.iter().cloned());
+        files.extend(self.resources.paths().map(Path::to_path_buf));
+        files
     }
 
     /// The current transformation of something that cannot move; a motion is reported and left out.

@@ -65,10 +65,10 @@ impl<'a> PhotonMapIntegrator<'a> {
 }
 
 impl Integrator for PhotonMapIntegrator<'_> {
-    /// Progressive maps serve one sample of each pixel.
+    /// Progressive maps serve one sample of each pixel. One map of all samples is the same, whichever is the first.
     fn prepare(&mut self, first: u32) -> Result<u32, PhotonError> {
         self.maps = None;
-        match self.maker.make(self.job, first) {
+        match self.maker.make(self.job, if self.shares_noise() { first } else { 0 }) {
             Ok(maps) => self.maps = Some(maps),
             Err(PhotonError::Stopped { .. }) if self.maker.stats.maps > 0 => return Ok(0),
             Err(error) => return Err(error),

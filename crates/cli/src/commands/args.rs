@@ -1,21 +1,13 @@
 //! Options that several subcommands share, as typed.
 
-use super::settings_args::SettingsArgs;
+use super::part_args::PartArgs;
+use super::settings_args::{SettingsArgs, named};
 use clap::Args;
 use clap::builder::{PossibleValuesParser, TypedValueParser};
 use lumiris::render::output::Aov;
 use lumiris::scene::AccelKind;
 use std::path::PathBuf;
-use std::str::FromStr;
 use strum::VariantNames;
-
-/// A parser of the names of an enumeration.
-pub(super) fn named<T>() -> impl TypedValueParser<Value = T>
-where
-    T: VariantNames + FromStr<Err = strum::ParseError> + Clone + Send + Sync + 'static,
-{
-    PossibleValuesParser::new(T::VARIANTS).try_map(|name| name.parse::<T>())
-}
 
 /// An AOV, or none.
 fn aov() -> impl TypedValueParser<Value = Option<Aov>> {
@@ -62,7 +54,8 @@ pub(super) struct SceneArgs {
 pub(super) struct RenderArgs {
     #[command(flatten)]
     pub scene: SceneArgs,
-    /// Output image; may be given several times. EXR stores all channels; PNG, JPEG, TIFF and TGA the tone-mapped image
+    /// Output image; may be given several times. EXR stores all channels; PNG, JPEG, TIFF and TGA the tone-mapped image; .part
+    /// what `lumiris merge` needs
     /// [default: the name in the file, or SCENE.exr]
     #[arg(short, long, value_name = "FILE")]
     pub output: Vec<PathBuf>,
@@ -82,9 +75,11 @@ pub(super) struct RenderArgs {
     /// Print no progress, only warnings and errors
     #[arg(short, long)]
     pub quiet: bool,
+    #[command(flatten)]
+    pub parts: PartArgs,
 }
 
-fn parse_resolution(text: &str) -> Result<[u32; 2], String> {
+pub(super) fn parse_resolution(text: &str) -> Result<[u32; 2], String> {
     let (w, h) = text.split_once(['x', 'X']).ok_or("expected WIDTHxHEIGHT, such as 640x480")?;
     let parse = |s: &str| match s.trim().parse::<u32>() {
         Ok(n @ 1..=65_536) => Ok(n),
@@ -93,7 +88,7 @@ fn parse_resolution(text: &str) -> Result<[u32; 2], String> {
     Ok([parse(w)?, parse(h)?])
 }
 
-fn parse_crop(text: &str) -> Result<[f32; 4], String> {
+pub(super) fn parse_crop(text: &str) -> Result<[f32; 4], String> {
     let values: Vec<f32> = text
         .split(',')
         .map(|s| s.trim().parse().map_err(|_| format!("`{s}` is not a number")))

@@ -10,6 +10,9 @@ mod compare;
 mod crosscheck;
 mod generate;
 mod info;
+mod merge;
+mod part_args;
+mod parts;
 mod plan;
 mod plan_file;
 mod progress;
@@ -17,6 +20,7 @@ mod render;
 mod reproduce;
 mod settings;
 mod settings_args;
+mod stored;
 
 use clap::{Parser, Subcommand};
 use std::process::ExitCode;
@@ -35,6 +39,8 @@ enum Command {
     Render(args::RenderArgs),
     /// Measure what the settings of a scene leave open, and store the choices for render --plan
     Plan(plan::PlanArgs),
+    /// Merge parts of an image, rendered with render --part, to the image
+    Merge(merge::MergeArgs),
     /// Compare images with a reference, by metrics and on an HTML page
     Compare(compare::CompareArgs),
     /// Compare Embree with the pure-Rust BVH, ray by ray and image by image
@@ -61,6 +67,7 @@ pub(crate) fn run() -> ExitCode {
     let result = match &cli.command {
         Command::Render(args) => render::run(args),
         Command::Plan(args) => plan::run(args),
+        Command::Merge(args) => merge::run(args),
         Command::Compare(args) => compare::run(args),
         Command::Crosscheck(args) => crosscheck::run(args),
         Command::Bench(args) => bench::run(args),

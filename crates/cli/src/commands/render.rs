@@ -2,15 +2,19 @@
 
 use super::UsageError;
 use super::args::RenderArgs;
+use super::part_args::{PART_TYPE, extension};
+use super::parts::{self, FilmFile};
 use super::plan_file::PlanFile;
 use super::progress::{self, Bar};
-use super::settings::{SetupTimes, load_job, plan, render_settings};
+use super::settings::{SetupTimes, load_job_of, plan, render_settings};
+use super::stored::Stored;
 use anyhow::{Context, bail};
+use lumiris::film::Film;
 use lumiris::imaging::oiio::{self, Part};
 use lumiris::integrators::photon_map::MapStats;
 use lumiris::render::output::{self, Aov};
-use lumiris::render::{CacheReport, RenderSettings, Rendering, render};
-use lumiris::scene::RenderJob;
+use lumiris::render::{CacheReport, Continuation, RenderSettings, Rendering, go_on};
+use lumiris::scene::{RenderJob, SampleCountMap};
 use lumiris_formats::output::write_text;
 use serde_json::json;
 use std::path::{Path, PathBuf};
@@ -26,7 +30,13 @@ pub(super) const INTERRUPTED: u8 = 130;
 
 pub(super) fn run(args: &RenderArgs) -> anyhow::Result<ExitCode> {
     check_outputs(&args.output)?;
-    let (mut job, setup) = load_job(&args.scene)?;
+    parts::check(args)?;
+    let stored = Stored::read(&args.parts)?;
+    let mut args = args.clone();
+    stored.as_ref().map_or(Ok(()), |stored| stored.complete(&mut args))?;
+    let args = &args;
+    let (mut job, setup, files) = load_job_of(&args.scene, stored.as_ref())?;
+    parts::check_settings(args, job.settings())?;
     let asked = asked_aovs(args)?;
     let asks_for_ratio = asked.as_ref().is_some_and(|list| list.contains(&Aov::Ratio));
     let plan = plan(&args.scene, &mut job, asks_for_ratio, args.quiet)?;
@@ -39,20 +49,27 @@ pub(super) fn run(args: &RenderArgs) -> anyhow::Result<ExitCode> {
     let bar = Bar::new(args.quiet);
     let time_limit = args.time.map(Duration::from_secs_f64);
     let needs = |is_shown: fn(&Aov) -> bool| asked.as_ref().is_none_or(|list| list.iter().any(is_shown));
-    let settings = RenderSettings {
+    let mut settings = RenderSettings {
         time_limit,
         with_replicas: needs(|aov| *aov == Aov::Variance),
         with_features: needs(|aov| aov.is_feature()),
         ..render_settings(&args.scene, &job)
     };
-    let rendering = render(&job, &settings, &stop, &|p| bar.update(p))?;
+    let mut film_file = FilmFile::new(args, (&job, &plan, &files), &mut settings, stored)?;
+    let continuation = film_file.as_mut().map_or_else(Continuation::default, FilmFile::continuation);
+    let rendering = go_on(&job, &settings, &stop, &|p| bar.update(p), continuation)?;
     bar.finish();
 
     for path in &outputs {
-        write(args, (&job, &plan), &rendering, asked.as_deref(), path)?;
+        match &mut film_file {
+            Some(film_file) if extension(path) == PART_TYPE => film_file.write(path, &rendering)?,
+            _ => write(args, (&job, &plan), &rendering, asked.as_deref(), path)?,
+        }
     }
     if let Some(path) = &args.stats {
-        let text = serde_json::to_string_pretty(&stats(args, &job, &rendering, setup))?;
+        let mut stats = stats(args, &job, &rendering, setup);
+        stats["checkpoints"] = film_file.map_or(serde_json::Value::Null, |f| f.stats());
+        let text = serde_json::to_string_pretty(&stats)?;
         write_text(path, &text).with_context(|| format!("cannot write {}", path.display()))?;
     }
     report(args, &rendering, &outputs);
@@ -83,15 +100,11 @@ fn outputs(args: &RenderArgs, job: &RenderJob) -> Vec<PathBuf> {
     })]
 }
 
-fn extension(path: &Path) -> String {
-    path.extension().unwrap_or_default().to_string_lossy().to_lowercase()
-}
-
 /// Rejects outputs that cannot be written, before time is spent on rendering.
-fn check_outputs(outputs: &[PathBuf]) -> anyhow::Result<()> {
+pub(super) fn check_outputs(outputs: &[PathBuf]) -> anyhow::Result<()> {
     for path in outputs {
         let kind = extension(path);
-        if kind != "exr" && !DISPLAY_TYPES.contains(&kind.as_str()) {
+        if kind != "exr" && kind != PART_TYPE && !DISPLAY_TYPES.contains(&kind.as_str()) {
             bail!("{}: the output format must be .exr, .{}", path.display(), DISPLAY_TYPES.join(", ."));
         }
         let folder = path.parent().filter(|p| !p.as_os_str().is_empty()).unwrap_or(Path::new("."));
@@ -120,7 +133,6 @@ fn write(
     path: &Path,
 ) -> anyhow::Result<()> {
     let film = &rendering.film;
-    let (width, height) = (film.bounds.width() as usize, film.bounds.height() as usize);
     let mut metadata = output::metadata(&job.world.scene.film, job.settings());
     metadata.push(("lumiris:scene".to_owned(), args.scene.scene.display().to_string()));
     metadata.push(("lumiris:accel".to_owned(), <&str>::from(args.scene.accel).to_owned()));
@@ -132,20 +144,32 @@ fn write(
     let range = format!("{} to {} per pixel", done().min().unwrap_or(0), done().max().unwrap_or(0));
     metadata.push(("lumiris:samples_done".to_owned(), range));
     metadata.push(("lumiris:seconds".to_owned(), format!("{:.3}", rendering.elapsed.as_secs_f64())));
+    let aovs: Vec<Aov> = match asked {
+        Some(list) => list.to_vec(),
+        None => {
+            let ratio = job.sample_count_map.as_ref().map(|_| Aov::Ratio);
+            let records = rendering.cache.map(|_| Aov::Records);
+            Aov::ALL.into_iter().chain(ratio).chain(records).collect()
+        }
+    };
+    write_image(path, film, (&aovs, job.sample_count_map.as_ref()), args.exposure, metadata)
+}
+
+/// Writes an image: all channels or a tone-mapped one, as its name says.
+pub(super) fn write_image(
+    path: &Path,
+    film: &Film,
+    (aovs, sample_count_map): (&[Aov], Option<&SampleCountMap>),
+    exposure: f32,
+    metadata: Vec<(String, String)>,
+) -> anyhow::Result<()> {
+    let (width, height) = (film.bounds.width() as usize, film.bounds.height() as usize);
     let part = if extension(path) == "exr" {
-        let aovs: Vec<Aov> = match asked {
-            Some(list) => list.to_vec(),
-            None => {
-                let ratio = job.sample_count_map.as_ref().map(|_| Aov::Ratio);
-                let records = rendering.cache.map(|_| Aov::Records);
-                Aov::ALL.into_iter().chain(ratio).chain(records).collect()
-            }
-        };
-        let channels = output::channels(film, &aovs, job.sample_count_map.as_ref());
+        let channels = output::channels(film, aovs, sample_count_map);
         Part::linear(width, height, channels.names, channels.data)
     } else {
         let names = ["R", "G", "B"].map(str::to_owned).to_vec();
-        Part::display(width, height, names, output::display(film, args.exposure))
+        Part::display(width, height, names, output::display(film, exposure))
     };
     let full = [film.resolution[0] as usize, film.resolution[1] as usize];
     let part = part.with_metadata(metadata).with_window([film.bounds.x0 as usize, film.bounds.y0 as usize], full);
@@ -231,7 +255,7 @@ fn report(args: &RenderArgs, rendering: &Rendering, outputs: &[PathBuf]) {
         return;
     }
     let names: Vec<String> = outputs.iter().map(|p| p.display().to_string()).collect();
-    let spp = rendering.film.pixels.iter().map(|p| p.count).min().unwrap_or(0);
+    let spp = rendering.film.pixels.iter().map(|p| p.count).filter(|n| *n > 0).min().unwrap_or(0);
     let partial = if rendering.complete { "" } else { " (stopped early)" };
     progress::say(&format!(
         "{} after {:.1} s, {spp} samples per pixel{partial}, noise {:.2} %",
@@ -261,6 +285,6 @@ fn report(args: &RenderArgs, rendering: &Rendering, outputs: &[PathBuf]) {
     }
     let invalid: u64 = rendering.film.pixels.iter().map(|p| p.invalid).sum();
     if invalid > 0 {
-        progress::say(&format!("warning: {invalid} samples were not finite and were counted as black"));
+        progress::say(&format!("warning: {invalid} samples were not finite, or too bright, and were counted as black"));
     }
 }

@@ -4,8 +4,10 @@ use super::UsageError;
 use super::args::SceneArgs;
 use super::plan_file::PlanFile;
 use super::progress;
+use super::stored::Stored;
 use anyhow::{Context, bail};
 use lumiris::film::filter::PixelFilter;
+use lumiris::import::fingerprint::SceneFiles;
 use lumiris::import::{LoadOptions, Loaded, load};
 use lumiris::render::RenderSettings;
 use lumiris::render::allocation::allows_adaptive;
@@ -29,8 +31,8 @@ pub(super) struct SetupTimes {
     pub build: f64,
 }
 
-/// Loads the scene and applies the options; prints warnings.
-fn load_scene(args: &SceneArgs) -> anyhow::Result<Loaded> {
+/// Loads the scene and applies the options, after the settings of what is stored; prints warnings.
+fn load_scene(args: &SceneArgs, stored: Option<&Stored>) -> anyhow::Result<Loaded> {
     let options = LoadOptions { resolution: args.resolution, crop: args.crop };
     let mut loaded = match load(&args.scene, &options) {
         Ok(loaded) => loaded,
@@ -42,6 +44,10 @@ fn load_scene(args: &SceneArgs) -> anyhow::Result<Loaded> {
     let warnings = loaded.warnings.to_string();
     if !warnings.is_empty() {
         progress::say(warnings.trim_end());
+    }
+    // What is given now comes later, so that differences from what is stored are found
+    if let Some(stored) = stored {
+        stored.apply(&mut loaded.settings)?;
     }
     if let Some(path) = &args.plan {
         apply_plan(path, &mut loaded.settings)?;
@@ -58,6 +64,10 @@ fn load_scene(args: &SceneArgs) -> anyhow::Result<Loaded> {
             return Err(UsageError(needs.to_owned()).into());
         }
     }
+    // More samples belong to what the first ones were prepared for
+    if let Some(stored) = stored {
+        loaded.settings.sampling.spp = stored.spp()?;
+    }
     if args.box_filter {
         loaded.scene.film.filter = PixelFilter::Box { rx: 0.5, ry: 0.5 };
     }
@@ -69,14 +79,23 @@ fn load_scene(args: &SceneArgs) -> anyhow::Result<Loaded> {
 
 /// Loads the scene and builds its ray tracers.
 pub(super) fn load_job(args: &SceneArgs) -> anyhow::Result<(RenderJob, SetupTimes)> {
+    load_job_of(args, None).map(|(job, times, _)| (job, times))
+}
+
+/// The same, with the settings of what is stored; also returns the files of the scene.
+pub(super) fn load_job_of(
+    args: &SceneArgs,
+    stored: Option<&Stored>,
+) -> anyhow::Result<(RenderJob, SetupTimes, SceneFiles)> {
     let start = Instant::now();
-    let loaded = load_scene(args)?;
+    let mut loaded = load_scene(args, stored)?;
+    let files = std::mem::take(&mut loaded.files);
     let load = start.elapsed().as_secs_f64();
     let start = Instant::now();
     let job = loaded
         .job(args.accel, args.packet_width)
         .with_context(|| format!("cannot build the ray tracer of {}", args.scene.display()))?;
-    Ok((job, SetupTimes { load, build: start.elapsed().as_secs_f64() }))
+    Ok((job, SetupTimes { load, build: start.elapsed().as_secs_f64() }, files))
 }
 
 /// Applies the choices of a plan file, which options may override.

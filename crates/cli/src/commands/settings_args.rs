@@ -5,6 +5,8 @@ use clap::{Arg, ArgMatches, Args, Command, FromArgMatches};
 use lumiris::settings::Settings;
 use lumiris::settings::table::{GROUPS, Setting, rows};
 use lumiris::settings::value::{Integers, Kind, Value};
+use std::str::FromStr;
+use strum::VariantNames;
 
 /// The settings given as options, in the order of the table.
 #[derive(Clone, Debug, Default)]
@@ -16,6 +18,12 @@ impl SettingsArgs {
     /// True if the option of this name is given.
     pub(super) fn has(&self, flag: &str) -> bool {
         self.typed.iter().any(|(row, _)| row.flag == flag)
+    }
+
+    /// The whole number that an option of this name gives.
+    pub(super) fn count(&self, flag: &str) -> Option<u32> {
+        let (_, value) = self.typed.iter().find(|(row, _)| row.flag == flag)?;
+        value.integer().and_then(|n| u32::try_from(n).ok())
     }
 
     /// Parses options outside the command line of the program.
@@ -57,6 +65,14 @@ impl FromArgMatches for SettingsArgs {
         self.typed.extend(rows().filter_map(typed));
         Ok(())
     }
+}
+
+/// A parser of the names of an enumeration.
+pub(super) fn named<T>() -> impl TypedValueParser<Value = T>
+where
+    T: VariantNames + FromStr<Err = strum::ParseError> + Clone + Send + Sync + 'static,
+{
+    PossibleValuesParser::new(T::VARIANTS).try_map(|name| name.parse::<T>())
 }
 
 /// The option of a setting.

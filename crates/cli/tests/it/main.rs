@@ -2,7 +2,9 @@
 #![allow(clippy::unwrap_used)]
 
 mod browser;
+mod checkpoints;
 mod cli;
 mod compare;
+mod parts;
 mod plan;
 mod reproduce;

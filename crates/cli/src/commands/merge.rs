@@ -1,0 +1,101 @@
+//! `lumiris merge`: parts of an image become the image.
+
+use super::UsageError;
+use super::part_args::{PART_TYPE, extension};
+use super::progress;
+use super::render::{check_outputs, write_image};
+use super::stored::{AOV_NOTE, PLAN_NOTE, SCENE_NOTE, SECONDS_NOTE};
+use clap::Args;
+use lumiris::render::output::Aov;
+use lumiris::render::parts::FilmReader;
+use lumiris::render::parts::merge::{Merged, merge, repeated};
+use std::path::PathBuf;
+use std::process::ExitCode;
+
+/// `lumiris merge`
+#[derive(Args, Clone, Debug)]
+pub(super) struct MergeArgs {
+    /// Parts that `lumiris render --part` has rendered, in any order; finished checkpoints are parts, too
+    #[arg(required = true, value_name = "PART")]
+    parts: Vec<PathBuf>,
+    /// Output image; may be given several times, as for `render`
+    #[arg(short, long, value_name = "FILE", required = true)]
+    output: Vec<PathBuf>,
+    /// Merge what there is if parts are missing, and say so in the metadata
+    #[arg(long)]
+    allow_missing: bool,
+    /// Exposure of PNG, JPEG, TIFF and TGA images, in stops
+    #[arg(long, value_name = "STOPS", default_value_t = 0.0, allow_negative_numbers = true)]
+    exposure: f32,
+    /// Print only warnings and errors
+    #[arg(short, long)]
+    quiet: bool,
+}
+
+pub(super) fn run(args: &MergeArgs) -> anyhow::Result<ExitCode> {
+    check_outputs(&args.output)?;
+    if let Some(path) = args.output.iter().find(|path| extension(path) == PART_TYPE) {
+        return Err(UsageError(format!("{}: parts are merged to an image, such as image.exr", path.display())).into());
+    }
+    if let Some(path) = repeated(&args.parts) {
+        return Err(UsageError(format!("{} is given twice", path.display())).into());
+    }
+    let seconds = seconds(args)?;
+    let merged = merge(&args.parts, args.allow_missing)?;
+    let aovs = aovs(&merged);
+    for path in &args.output {
+        write_image(path, &merged.film, (&aovs, None), args.exposure, metadata(&merged, seconds))?;
+    }
+    merged.missing.iter().for_each(|what| progress::say(&format!("warning: {what}: missing")));
+    let invalid: u64 = merged.film.pixels.iter().map(|p| p.invalid).sum();
+    if invalid > 0 {
+        progress::say(&format!("warning: {invalid} samples were not finite, or too bright, and were counted as black"));
+    }
+    if !args.quiet {
+        let names: Vec<String> = args.output.iter().map(|path| path.display().to_string()).collect();
+        let noise = merged.film.relative_noise() * 100.0;
+        progress::say(&format!("{} from {} parts, noise {noise:.2} %", names.join(", "), args.parts.len()));
+    }
+    Ok(ExitCode::SUCCESS)
+}
+
+/// Time that all parts took together (s).
+fn seconds(args: &MergeArgs) -> anyhow::Result<f64> {
+    let mut sum = 0.0;
+    for path in &args.parts {
+        let reader = FilmReader::open(path)?;
+        sum += reader.header().note(SECONDS_NOTE).and_then(|text| text.parse::<f64>().ok()).unwrap_or(0.0);
+    }
+    Ok(sum)
+}
+
+/// The layers that the parts were rendered for.
+fn aovs(merged: &Merged) -> Vec<Aov> {
+    match merged.header.note(AOV_NOTE) {
+        Some(list) => list.split(',').filter_map(|name| name.parse().ok()).filter(|aov| *aov != Aov::Ratio).collect(),
+        None => {
+            let has_records = merged.film.pixels.iter().any(|p| p.records > 0);
+            Aov::ALL.into_iter().chain(has_records.then_some(Aov::Records)).collect()
+        }
+    }
+}
+
+/// Metadata as of an image that is rendered at once.
+fn metadata(merged: &Merged, seconds: f64) -> Vec<(String, String)> {
+    let settings = merged.header.settings.iter().filter(|(key, _)| key.starts_with("lumiris:")).cloned();
+    let mut metadata: Vec<(String, String)> = settings.collect();
+    let mut add = |key: &str, value: String| metadata.push((format!("lumiris:{key}"), value));
+    add("scene", merged.header.note(SCENE_NOTE).unwrap_or_default().to_owned());
+    if let Some(plan) = merged.header.note(PLAN_NOTE) {
+        add("plan", plan.to_owned());
+    }
+    add("complete", merged.missing.is_empty().to_string());
+    let counts = || merged.film.pixels.iter().map(|p| p.count);
+    let (min, max) = (counts().min().unwrap_or(0), counts().max().unwrap_or(0));
+    add("samples_done", format!("{min} to {max} per pixel"));
+    add("seconds", format!("{seconds:.3}"));
+    if !merged.missing.is_empty() {
+        add("missing", merged.missing.join("; "));
+    }
+    metadata
+}

@@ -1,0 +1,83 @@
+//! Options of parts and checkpoints.
+
+use super::settings_args::named;
+use clap::Args;
+use std::path::{Path, PathBuf};
+use strum::{EnumString, IntoStaticStr, VariantNames};
+
+/// File type of parts.
+pub(super) const PART_TYPE: &str = "part";
+/// Time between checkpoints, if none is given (s).
+const CHECKPOINT_SECONDS: f64 = 60.0;
+/// What a part has of the image.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, EnumString, IntoStaticStr, VariantNames)]
+#[strum(serialize_all = "kebab-case")]
+pub(super) enum PartBy {
+    /// A share of the samples of every pixel.
+    #[default]
+    Samples,
+    /// All samples of a share of the pixels.
+    Tiles,
+}
+
+/// Options of parts and checkpoints.
+#[derive(Args, Clone, Debug)]
+#[command(next_help_heading = "Parts and checkpoints")]
+pub(super) struct PartArgs {
+    /// Render the I-th of N parts of the image, for `lumiris merge`; the output is FILE.part
+    #[arg(long, value_name = "I/N", value_parser = parse_part)]
+    pub part: Option<[u32; 2]>,
+    /// What a part has: `samples`, a share of the samples of every pixel, or `tiles`, all samples of a share of the pixels
+    /// [default: samples]
+    #[arg(long, value_name = "WHAT", requires = "part", value_parser = named::<PartBy>())]
+    pub part_by: Option<PartBy>,
+    /// First sample of every pixel, by its index [default: 0]
+    #[arg(long, value_name = "A")]
+    pub samples_from: Option<u32>,
+    /// Index after the last sample of every pixel; may be more than --spp, by which footprints and pilots go [default:
+    /// --spp]
+    #[arg(long, value_name = "B", value_parser = clap::value_parser!(u32).range(1..))]
+    pub samples_to: Option<u32>,
+    /// Store everything that is needed to go on, every so many seconds [default: 60] and in the end
+    #[arg(long, value_name = "FILE[,SECONDS]", value_parser = parse_checkpoint)]
+    pub checkpoint: Option<(PathBuf, f64)>,
+    /// Go on from a checkpoint or an unfinished part, with its settings; --spp may ask for more samples. If --checkpoint
+    /// names the same file and there is none yet, start
+    #[arg(long, value_name = "FILE")]
+    pub resume: Option<PathBuf>,
+}
+
+impl PartArgs {
+    /// True if it is not the whole image that is asked for.
+    pub(super) fn is_partial(&self) -> bool {
+        self.part.is_some() || self.samples_from.is_some() || self.samples_to.is_some()
+    }
+
+    pub(super) fn is_by_tiles(&self) -> bool {
+        self.part_by == Some(PartBy::Tiles)
+    }
+}
+
+fn parse_part(text: &str) -> Result<[u32; 2], String> {
+    let parsed = text.split_once('/').and_then(|(i, n)| Some([i.trim().parse().ok()?, n.trim().parse().ok()?]));
+    match parsed {
+        Some([i, n]) if 1 <= i && i <= n => Ok([i, n]),
+        _ => Err("expected I/N with 1 <= I <= N, such as 3/8".to_owned()),
+    }
+}
+
+fn parse_checkpoint(text: &str) -> Result<(PathBuf, f64), String> {
+    let with_seconds = text.rsplit_once(',').and_then(|(path, seconds)| Some((path, seconds.trim().parse().ok()?)));
+    match with_seconds {
+        Some((path, seconds)) if seconds > 0.0 && f64::is_finite(seconds) && !path.is_empty() => {
+            Ok((PathBuf::from(path), seconds))
+        }
+        Some(_) => Err("expected FILE or FILE,SECONDS with a positive number of seconds".to_owned()),
+        None => Ok((PathBuf::from(text), CHECKPOINT_SECONDS)),
+    }
+}
+
+/// The type of a file, as its name says.
+pub(super) fn extension(path: &Path) -> String {
+    path.extension().unwrap_or_default().to_string_lossy().to_lowercase()
+}

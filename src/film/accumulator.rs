@@ -1,0 +1,202 @@
+//! What the renderer adds the samples of a pixel to: exact sums, so that neither the order of the samples nor how they
+//! are split over passes, processes and machines changes a bit. [`super::PixelSums`] is what is read from them.
+
+use super::exact::{FixedSum, LIMIT, SquareSum, UnitSum};
+use super::{PixelSample, PixelSums};
+use lumiris_numbers::math::Rgb;
+
+/// Exact sums of radiance.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub struct RadianceAccumulator {
+    /// Number of samples.
+    pub count: u32,
+    /// Samples whose radiance was not finite, or beyond [`LIMIT`]; they count as black.
+    pub invalid: u32,
+    /// Σ radiance.
+    pub radiance: [FixedSum; 3],
+}
+
+impl RadianceAccumulator {
+    /// Adds a sample; false if it is invalid.
+    #[inline(always)]
+    pub fn add(&mut self, radiance: Rgb) -> bool {
+        self.count = self.count.wrapping_add(1);
+        let channels = radiance.to_array();
+        // NaN is not below the limit
+        let is_valid = channels.iter().all(|value| value.abs() < LIMIT);
+        if is_valid {
+            self.radiance.iter_mut().zip(channels).for_each(|(sum, value)| sum.add(value));
+        } else {
+            self.invalid += 1;
+        }
+        is_valid
+    }
+
+    /// Adds other samples.
+    pub fn merge(&mut self, other: &RadianceAccumulator) {
+        self.count = self.count.wrapping_add(other.count);
+        self.invalid = self.invalid.wrapping_add(other.invalid);
+        self.radiance.iter_mut().zip(&other.radiance).for_each(|(a, b)| a.merge(b));
+    }
+
+    /// Σ radiance.
+    pub fn values(&self) -> [f64; 3] {
+        self.radiance.each_ref().map(FixedSum::value)
+    }
+}
+
+/// Exact sums over the samples of a pixel: 216 bytes.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub struct PixelAccumulator {
+    /// Samples and Σ radiance.
+    pub radiance: RadianceAccumulator,
+    /// Σ radiance², per channel.
+    pub squares: [SquareSum; 3],
+    /// Σ albedo.
+    pub albedo: [UnitSum; 3],
+    /// Σ normal.
+    pub normal: [UnitSum; 3],
+    /// Σ depth of the samples that met a surface.
+    pub depth: FixedSum,
+    /// Number of samples that met a surface.
+    pub hits: u32,
+    /// Lowest index of these; 0 if there are none.
+    pub first_hit: u32,
+    /// Material of that sample, plus one; 0 if there is none.
+    pub material: u32,
+    /// Geometry of that sample, plus one; 0 if there is none.
+    pub object: u32,
+    /// Records of the irradiance cache that this pixel asked for.
+    pub records: u32,
+}
+
+impl PixelAccumulator {
+    /// Adds the sample with the given index.
+    #[inline]
+    pub fn add(&mut self, index: u32, sample: &PixelSample) {
+        if self.radiance.add(sample.radiance) {
+            self.squares.iter_mut().zip(sample.radiance.to_array()).for_each(|(sum, value)| sum.add_square(value));
+        }
+        let Some(features) = &sample.features else { return };
+        for c in 0..3 {
+            self.albedo[c].add(features.albedo[c]);
+            self.normal[c].add(features.normal[c]);
+        }
+        if features.depth.abs() < LIMIT {
+            self.depth.add(features.depth);
+        }
+        self.first(1, index, features.material + 1, features.object + 1);
+    }
+
+    /// Adds other samples. Records are those of the whole image, which all parts have.
+    pub fn merge(&mut self, other: &PixelAccumulator) {
+        self.radiance.merge(&other.radiance);
+        for c in 0..3 {
+            self.squares[c].merge(&other.squares[c]);
+            self.albedo[c].merge(&other.albedo[c]);
+            self.normal[c].merge(&other.normal[c]);
+        }
+        self.depth.merge(&other.depth);
+        self.records = self.records.max(other.records);
+        if other.hits > 0 {
+            self.first(other.hits, other.first_hit, other.material, other.object);
+        }
+    }
+
+    /// Counts samples that met a surface, of which the first is given.
+    #[inline(always)]
+    fn first(&mut self, hits: u32, index: u32, material: u32, object: u32) {
+        if self.hits == 0 || index < self.first_hit {
+            (self.first_hit, self.material, self.object) = (index, material, object);
+        }
+        self.hits = self.hits.wrapping_add(hits);
+    }
+
+    /// The sums as numbers.
+    pub fn sums(&self) -> PixelSums {
+        PixelSums {
+            count: self.radiance.count.into(),
+            radiance: self.radiance.values(),
+            radiance_squared: self.squares.each_ref().map(SquareSum::value),
+            hits: self.hits.into(),
+            albedo: self.albedo.each_ref().map(UnitSum::value),
+            normal: self.normal.each_ref().map(UnitSum::value),
+            depth: self.depth.value(),
+            material: self.material,
+            object: self.object,
+            invalid: self.radiance.invalid.into(),
+            records: self.records,
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::film::Features;
+    use lumiris_numbers::math::Vec3;
+    use lumiris_test_support::random::{RngExt, pcg32};
+
+    #[test]
+    fn sums_do_not_drift_at_high_sample_counts() {
+        // 0.1 as f32, 10⁷ times: an f32 sum would be off by percents.
+        let sample = PixelSample { radiance: Rgb::splat(0.1), features: None };
+        let mut sums = PixelAccumulator::default();
+        (0..10_000_000).for_each(|i| sums.add(i, &sample));
+        assert_eq!(sums.sums().mean()[0], f64::from(0.1_f32));
+        assert!(sums.sums().variance_of_mean()[0] < 1e-22, "all samples are equal");
+    }
+
+    #[test]
+    fn variance_of_mean_is_that_of_the_samples_over_n() {
+        let mut sums = PixelAccumulator::default();
+        for (i, v) in [1.0, 2.0, 3.0, 6.0].into_iter().enumerate() {
+            sums.add(i as u32, &PixelSample { radiance: Rgb::splat(v), features: None });
+        }
+        // Sample variance 14/3, divided by 4.
+        assert!((sums.sums().variance_of_mean()[1] - 14.0 / 12.0).abs() < 1e-12);
+    }
+
+    #[test]
+    fn a_sample_that_is_not_finite_or_too_bright_is_counted_and_not_added() {
+        for value in [f32::NAN, f32::INFINITY, LIMIT, -LIMIT, f32::MAX] {
+            let mut sums = PixelAccumulator::default();
+            sums.add(0, &PixelSample { radiance: Rgb::new(value, 1.0, 1.0), features: None });
+            let sums = sums.sums();
+            assert_eq!((sums.count, sums.invalid, sums.mean(), sums.radiance_squared), (1, 1, [0.0; 3], [0.0; 3]));
+        }
+    }
+
+    #[test]
+    fn the_parts_of_a_pixel_add_up_in_any_order() {
+        let mut s = pcg32([7, 7, 7]);
+        let samples: Vec<PixelSample> = (0..64)
+            .map(|i| {
+                let [a, b, c] = s.random::<[f32; 3]>();
+                let features = Features {
+                    albedo: Rgb::new(a, b, c),
+                    normal: Vec3::new(a - 0.5, b, c),
+                    depth: 100.0 * a,
+                    material: i,
+                    object: 2 * i,
+                };
+                let radiance = Rgb::new(a, 1e6 * b * b * b, 1e-4 * c);
+                PixelSample { radiance, features: (i > 3 && b < 0.7).then_some(features) }
+            })
+            .collect();
+        let part = |range: std::ops::Range<usize>| {
+            let mut sums = PixelAccumulator::default();
+            range.rev().for_each(|i| sums.add(i as u32, &samples[i]));
+            sums
+        };
+        let mut whole = PixelAccumulator::default();
+        (0..).zip(&samples).for_each(|(i, sample)| whole.add(i, sample));
+        assert!(whole.hits > 20 && whole.material == whole.first_hit + 1 && whole.first_hit > 3);
+        for parts in [vec![0..1, 1..64], vec![32..64, 0..32], vec![60..64, 5..60, 0..2, 2..5]] {
+            let mut merged = PixelAccumulator::default();
+            parts.into_iter().for_each(|range| merged.merge(&part(range)));
+            assert_eq!(merged, whole);
+        }
+        assert_eq!(size_of::<PixelAccumulator>(), 216);
+    }
+}

@@ -1,0 +1,125 @@
+//! Stores the sums of a rendering from time to time.
+//!
+//! All threads encode and write while the rendering pauses; another thread then waits until the disk has it all, and
+//! renames the file. So there is always one whole checkpoint after the first, and what writing costs the rendering is
+//! known: if that is more than a hundredth of the time between two, checkpoints become rarer.
+
+use super::file::{partial_path, write_tiles};
+use super::header::FilmHeader;
+use crate::render::tiles::Tile;
+use lumiris_formats::output::sync_and_rename;
+use std::io;
+use std::path::PathBuf;
+use std::thread::JoinHandle;
+use std::time::{Duration, Instant};
+
+/// Time between two checkpoints, at least, by the time that writing one takes.
+const REST: u32 = 100;
+
+/// Stores checkpoints of one rendering.
+pub struct Checkpoints {
+    path: PathBuf,
+    interval: Duration,
+    header: FilmHeader,
+    warn: Box<dyn Fn(&str) + Send + Sync>,
+    due: Instant,
+    /// The checkpoint that is on its way to the disk.
+    under_way: Option<JoinHandle<io::Result<()>>>,
+    /// Time for which the rendering waited.
+    pub waited: Duration,
+    /// Checkpoints that are on the disk.
+    pub stored: u32,
+    has_warned: bool,
+}
+
+impl Checkpoints {
+    /// Checkpoints at a path, every `interval` from now on. Why one could not be written is told to `warn`, once.
+    pub fn new(
+        path: PathBuf,
+        interval: Duration,
+        header: FilmHeader,
+        warn: impl Fn(&str) + Send + Sync + 'static,
+    ) -> Self {
+        let due = Instant::now() + interval;
+        Checkpoints {
+            path,
+            interval,
+            header,
+            warn: Box::new(warn),
+            due,
+            under_way: None,
+            waited: Duration::ZERO,
+            stored: 0,
+            has_warned: false,
+        }
+    }
+
+    /// When the next one is due.
+    pub(in crate::render) fn due(&self) -> Instant {
+        self.due
+    }
+
+    /// Stores the sums so far, unless the disk is still busy with the ones before.
+    pub(in crate::render) fn store(&mut self, tiles: &[Tile]) {
+        let start = Instant::now();
+        let is_busy = self.under_way.as_ref().is_some_and(|thread| !thread.is_finished());
+        if !is_busy {
+            self.await_disk();
+            self.write(tiles);
+        }
+        let waited = start.elapsed();
+        self.waited += waited;
+        self.due = Instant::now() + self.interval.max(waited * REST);
+    }
+
+    /// Stores the sums in the end, and waits for the disk.
+    pub(in crate::render) fn finish(&mut self, tiles: &[Tile]) {
+        self.await_disk();
+        self.write(tiles);
+        self.await_disk();
+    }
+
+    fn write(&mut self, tiles: &[Tile]) {
+        let (partial, path) = (partial_path(&self.path), self.path.clone());
+        self.header.is_finished = tiles.iter().all(|t| t.done >= self.header.samples.end);
+        match write_tiles(&partial, &self.header, tiles) {
+            Ok(()) => {
+                let to_disk = move || sync_and_rename(&partial, &path);
+                match std::thread::Builder::new().name("checkpoint".to_owned()).spawn(to_disk) {
+                    Ok(thread) => self.under_way = Some(thread),
+                    Err(error) => self.report(Err(error)),
+                }
+            }
+            Err(error) => self.report(Err(error)),
+        }
+    }
+
+    /// Waits until the checkpoint that is under way is on the disk.
+    fn await_disk(&mut self) {
+        if let Some(thread) = self.under_way.take() {
+            let written = thread.join().unwrap_or_else(|_| Err(io::Error::other("its thread ended early")));
+            self.report(written);
+        }
+    }
+
+    fn report(&mut self, written: io::Result<()>) {
+        match written {
+            Ok(()) => self.stored += 1,
+            Err(error) => {
+                // What is left of it would keep a full disk full
+                let _ = std::fs::remove_file(partial_path(&self.path));
+                if !std::mem::replace(&mut self.has_warned, true) {
+                    let stays = if self.stored > 0 { "; the last one stays" } else { "" };
+                    let path = self.path.display();
+                    (self.warn)(&format!("warning: the checkpoint {path} cannot be written: {error}{stays}"));
+                }
+            }
+        }
+    }
+}
+
+impl Drop for Checkpoints {
+    fn drop(&mut self) {
+        self.await_disk();
+    }
+}

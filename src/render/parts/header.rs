@@ -1,0 +1,256 @@
+//! What the sums of a file belong to: scene, settings, samples and pixels.
+
+use crate::direct::Estimator;
+use crate::film::PixelBounds;
+use crate::render::RenderSettings;
+use crate::render::tiles::{TileShare, has_replicas};
+use crate::scene::RenderJob;
+use std::ops::Range;
+use std::str::FromStr;
+
+/// Texts by name.
+type Entries = Vec<(String, String)>;
+
+/// The header of a file of sums.
+#[derive(Clone, Debug, PartialEq)]
+pub struct FilmHeader {
+    /// Size of the full image.
+    pub resolution: [u32; 2],
+    /// The crop window.
+    pub bounds: PixelBounds,
+    /// Indices of the samples of each pixel.
+    pub samples: Range<u32>,
+    /// Samples per pixel of the whole image.
+    pub spp: u32,
+    /// The pixels; all if `None`.
+    pub share: Option<TileShare>,
+    /// True if there are all these samples of all these pixels.
+    pub is_finished: bool,
+    /// True if some pixels are estimated twice.
+    pub has_replicas: bool,
+    /// Number of control variates that are summed.
+    pub controls: u32,
+    /// Tells the scene from others.
+    pub fingerprint: u64,
+    /// What the image depends on, by name: equal in all parts of an image.
+    pub settings: Entries,
+    /// What may differ.
+    pub notes: Entries,
+}
+
+impl FilmHeader {
+    /// The header of the sums of a rendering that is prepared for `spp` samples per pixel; `settings` and `notes` are
+    /// given.
+    pub fn new(
+        job: &RenderJob,
+        render: &RenderSettings,
+        spp: u32,
+        fingerprint: u64,
+        [settings, notes]: [Entries; 2],
+    ) -> Self {
+        let film = &job.world.scene.film;
+        let estimator = Estimator::at_vertex(&job.settings().integrator, 0);
+        let end = render.first_sample + render.spp;
+        FilmHeader {
+            resolution: film.resolution,
+            bounds: film.bounds,
+            samples: (render.first_sample + render.skip).min(end)..end,
+            spp,
+            share: render.share,
+            is_finished: false,
+            has_replicas: has_replicas(job, render),
+            controls: if estimator.is_over_pixels() { job.controls() as u32 } else { 0 },
+            fingerprint,
+            settings,
+            notes,
+        }
+    }
+
+    /// A note.
+    pub fn note(&self, name: &str) -> Option<&str> {
+        self.notes.iter().find(|(key, _)| key == name).map(|(_, value)| value.as_str())
+    }
+
+    /// A setting.
+    pub fn setting(&self, name: &str) -> Option<&str> {
+        self.settings.iter().find(|(key, _)| key == name).map(|(_, value)| value.as_str())
+    }
+
+    /// What keeps this and `other` from being parts of one image, a line each: what is here, and what is there.
+    pub fn differences(&self, other: &FilmHeader) -> Vec<String> {
+        let mut lines = self.differences_of_settings(other);
+        if self.spp != other.spp {
+            lines.push(format!("samples per pixel: {}, not {}", other.spp, self.spp));
+        }
+        if (self.has_replicas, self.controls) != (other.has_replicas, other.controls) {
+            lines.push("one of them holds the sums for a variance layer, the other does not".to_owned());
+        }
+        lines
+    }
+
+    /// The same, where numbers of samples may differ.
+    pub fn differences_of_settings(&self, other: &FilmHeader) -> Vec<String> {
+        let mut lines = Vec::new();
+        for (key, value) in &self.settings {
+            match other.setting(key) {
+                Some(theirs) if theirs == value => {}
+                Some(theirs) => lines.push(format!("{}: {theirs}, not {value}", short(key))),
+                None => lines.push(format!("{}: none, not {value}", short(key))),
+            }
+        }
+        let added = other.settings.iter().filter(|(key, _)| self.setting(key).is_none());
+        lines.extend(added.map(|(key, value)| format!("{}: {value}, which was not set", short(key))));
+        if lines.is_empty() && (self.resolution, self.bounds) != (other.resolution, other.bounds) {
+            lines.push("the size of the image".to_owned());
+        }
+        if self.fingerprint != other.fingerprint {
+            lines.push("the scene: its files are not the same".to_owned());
+        }
+        lines
+    }
+
+    /// As text, a line for each entry.
+    pub(super) fn text(&self) -> String {
+        let b = &self.bounds;
+        let share = self.share.map_or_else(|| "all".to_owned(), |s| format!("{}/{}", s.index, s.count));
+        let own = [
+            ("resolution", format!("{} {}", self.resolution[0], self.resolution[1])),
+            ("bounds", format!("{} {} {} {}", b.x0, b.x1, b.y0, b.y1)),
+            ("samples", format!("{} {}", self.samples.start, self.samples.end)),
+            ("spp", self.spp.to_string()),
+            ("share", share),
+            ("finished", self.is_finished.to_string()),
+            ("replicas", self.has_replicas.to_string()),
+            ("controls", self.controls.to_string()),
+            ("fingerprint", format!("{:016x}", self.fingerprint)),
+        ];
+        let mut text: String = own.iter().map(|(key, value)| line("", key, value)).collect();
+        text.extend(self.settings.iter().map(|(key, value)| line("setting ", key, value)));
+        text.extend(self.notes.iter().map(|(key, value)| line("note ", key, value)));
+        text
+    }
+
+    /// From text; `None` if an entry is missing or means nothing.
+    pub(super) fn parse(text: &str) -> Option<Self> {
+        let entries: Vec<(&str, String)> =
+            text.lines().map(|l| l.split_once('=').map(|(k, v)| (k, unescaped(v)))).collect::<Option<_>>()?;
+        let own = |name: &str| entries.iter().find(|(key, _)| *key == name).map(|(_, value)| value.as_str());
+        let [w, h] = numbers(own("resolution")?)?;
+        let [x0, x1, y0, y1] = numbers(own("bounds")?)?;
+        let [start, end] = numbers(own("samples")?)?;
+        let share = match own("share")? {
+            "all" => None,
+            text => {
+                let [index, count] = numbers(&text.replace('/', " "))?;
+                Some(Some(TileShare { index, count }).filter(|share| index < share.count)?)
+            }
+        };
+        let is_inside = x0 < x1 && x1 <= w && y0 < y1 && y1 <= h && w.max(h) <= 1 << 16;
+        let named = |prefix: &str| {
+            let of_kind = entries.iter().filter_map(|(key, value)| Some((key.strip_prefix(prefix)?, value)));
+            of_kind.map(|(key, value)| (key.to_owned(), value.clone())).collect()
+        };
+        (is_inside && start <= end).then_some(FilmHeader {
+            resolution: [w, h],
+            bounds: PixelBounds { x0, x1, y0, y1 },
+            samples: start..end,
+            spp: own("spp")?.parse().ok()?,
+            share,
+            is_finished: own("finished")?.parse().ok()?,
+            has_replicas: own("replicas")?.parse().ok()?,
+            controls: own("controls")?.parse().ok().filter(|n| *n <= 1 << 16)?,
+            fingerprint: u64::from_str_radix(own("fingerprint")?, 16).ok()?,
+            settings: named("setting "),
+            notes: named("note "),
+        })
+    }
+}
+
+/// A name without the prefix of metadata.
+fn short(key: &str) -> &str {
+    key.strip_prefix("lumiris:").unwrap_or(key)
+}
+
+fn line(kind: &str, key: &str, value: &str) -> String {
+    let escaped = value.replace('\\', "\\\\").replace('\n', "\\n").replace('\r', "\\r");
+    format!("{kind}{key}={escaped}\n")
+}
+
+fn unescaped(text: &str) -> String {
+    let mut out = String::with_capacity(text.len());
+    let mut characters = text.chars();
+    while let Some(c) = characters.next() {
+        match c {
+            '\\' => match characters.next() {
+                Some('n') => out.push('\n'),
+                Some('r') => out.push('\r'),
+                Some(other) => out.push(other),
+                None => {}
+            },
+            other => out.push(other),
+        }
+    }
+    out
+}
+
+/// Numbers, of which there are N.
+fn numbers<const N: usize>(text: &str) -> Option<[u32; N]> {
+    let values: Vec<u32> = text.split(' ').map(u32::from_str).collect::<Result<_, _>>().ok()?;
+    values.try_into().ok()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn header() -> FilmHeader {
+        FilmHeader {
+            resolution: [64, 48],
+            bounds: PixelBounds { x0: 3, x1: 64, y0: 0, y1: 40 },
+            samples: 8..16,
+            spp: 32,
+            share: Some(TileShare { index: 2, count: 5 }),
+            is_finished: true,
+            has_replicas: false,
+            controls: 7,
+            fingerprint: 0xfedc_ba98_7654_3210,
+            settings: vec![
+                ("lumiris:seed".to_owned(), "3".to_owned()),
+                ("lumiris:filter".to_owned(), "a = b".to_owned()),
+            ],
+            notes: vec![("scene".to_owned(), "back\\slash\nand \\n".to_owned())],
+        }
+    }
+
+    #[test]
+    fn what_is_written_is_read() {
+        assert_eq!(FilmHeader::parse(&header().text()), Some(header()));
+        let whole = FilmHeader { share: None, ..header() };
+        assert_eq!(FilmHeader::parse(&whole.text()), Some(whole));
+    }
+
+    #[test]
+    fn headers_that_mean_nothing_are_refused() {
+        let text = header().text();
+        for (from, to) in
+            [("64 48", "64"), ("3 64 0 40", "3 65 0 40"), ("2/5", "5/5"), ("8 16", "17 16"), ("spp=", "x=")]
+        {
+            assert!(text.contains(from));
+            assert_eq!(FilmHeader::parse(&text.replace(from, to)), None, "{to}");
+        }
+        assert_eq!(FilmHeader::parse(""), None);
+    }
+
+    #[test]
+    fn differences_are_named() {
+        assert!(header().differences(&header()).is_empty());
+        let mut other = header();
+        (other.fingerprint, other.spp, other.settings[0].1) = (1, 64, "4".to_owned());
+        other.settings.push(("lumiris:aperture".to_owned(), "2".to_owned()));
+        let lines = header().differences(&other).join("; ");
+        for part in ["seed: 4, not 3", "aperture: 2, which was not set", "the scene", "samples per pixel: 64, not 32"] {
+            assert!(lines.contains(part), "{part} in {lines}");
+        }
+        assert!(!header().differences_of_settings(&other).join("").contains("samples per pixel"));
+    }
+}

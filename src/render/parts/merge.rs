@@ -1,0 +1,227 @@
+//! Adds up the parts of an image. The sums are exact, so the result has the bits of the image rendered at once.
+//!
+//! First all headers are read: do the parts belong together, and is there every sample of every pixel, once? Then the
+//! parts are read one after the other, some tiles at a time, into the sums of the whole image.
+
+use super::error::PartError;
+use super::file::{FilmReader, pixels_of};
+use super::header::FilmHeader;
+use super::stored_tile::StoredTile;
+use crate::direct::Fits;
+use crate::film::accumulator::PixelAccumulator;
+use crate::film::replicas::replicas;
+use crate::film::{Film, PixelBounds};
+use crate::render::control_variates;
+use crate::render::tiles::{SHARE_TILE, Tile, film_of_last, position};
+use std::collections::BTreeMap;
+use std::ops::Range;
+use std::path::{Path, PathBuf};
+
+/// Most lines of a message about many parts.
+const MAX_LINES: usize = 8;
+
+/// The image that parts make.
+#[derive(Debug)]
+pub struct Merged {
+    /// The film.
+    pub film: Film,
+    /// The header of the first part.
+    pub header: FilmHeader,
+    /// What is missing, if that is allowed.
+    pub missing: Vec<String>,
+    /// Indices of the samples that a whole image has.
+    pub samples: Range<u32>,
+}
+
+/// Merges parts, in any order.
+pub fn merge(paths: &[PathBuf], allows_missing: bool) -> Result<Merged, PartError> {
+    let readers = paths.iter().map(|path| FilmReader::open(path)).collect::<Result<Vec<_>, _>>()?;
+    let parts: Vec<Part> =
+        readers.iter().map(|r| Part { path: r.path().to_owned(), header: r.header().clone() }).collect();
+    // Open again when it is their turn: there may be more parts than a process can have files
+    drop(readers);
+    let first = parts.first().ok_or_else(|| PartError::Parts("there are no parts to merge".to_owned()))?;
+    check_kinship(&parts)?;
+    let samples = samples_of_all(&parts);
+    let mut missing = coverage(&parts, &samples)?;
+    missing.extend(parts.iter().filter(|p| !p.header.is_finished).map(|p| {
+        format!("the rest of {}, which is not finished (render it to the end with --resume)", p.path.display())
+    }));
+    if !missing.is_empty() && !allows_missing {
+        let message = format!("parts are missing:\n{}\n--allow-missing merges what there is", listed(&missing));
+        return Err(PartError::Parts(message));
+    }
+
+    let bounds = first.header.bounds;
+    let mut whole = empty(&first.header);
+    for part in &parts {
+        let mut reader = FilmReader::open(&part.path)?;
+        let mut pixels = 0;
+        while let Some(tiles) = reader.tiles()? {
+            for tile in &tiles {
+                pixels += tile.bounds.area();
+                add(&mut whole, tile, part)?;
+            }
+        }
+        if pixels != pixels_of(&part.header) {
+            return Err(PartError::damaged(&part.path, "it does not have the pixels that its header says"));
+        }
+    }
+    let mut tiles = vec![whole];
+    let mut film = film_of_last(first.header.resolution, bounds, &mut tiles);
+    control_variates::correct(&mut film, &tiles, position);
+    Ok(Merged { film, header: first.header.clone(), missing, samples })
+}
+
+/// A part that is not read yet.
+struct Part {
+    path: PathBuf,
+    header: FilmHeader,
+}
+
+/// The lines of a message, of which only the first ones are shown.
+fn listed(lines: &[String]) -> String {
+    let mut text: Vec<String> = lines.iter().take(MAX_LINES).map(|line| format!("  {line}")).collect();
+    if lines.len() > MAX_LINES {
+        text.push(format!("  and {} more", lines.len() - MAX_LINES));
+    }
+    text.join("\n")
+}
+
+/// Fails if a part is of another image than the first one.
+fn check_kinship(parts: &[Part]) -> Result<(), PartError> {
+    for part in &parts[1..] {
+        let differences = parts[0].header.differences(&part.header);
+        if !differences.is_empty() {
+            let (path, first) = (part.path.display(), parts[0].path.display());
+            let message = format!("{path} is no part of the image of {first}:\n{}", listed(&differences));
+            return Err(PartError::Parts(message));
+        }
+    }
+    Ok(())
+}
+
+/// The samples of the whole image: those asked for, or more where parts have more.
+fn samples_of_all(parts: &[Part]) -> Range<u32> {
+    0..parts.iter().map(|p| p.header.samples.end.max(p.header.spp)).max().unwrap_or(0)
+}
+
+/// What is missing. Fails if there are samples that two parts have.
+fn coverage(parts: &[Part], samples: &Range<u32>) -> Result<Vec<String>, PartError> {
+    let bounds = parts[0].header.bounds;
+    let count = if parts.iter().any(|p| p.header.share.is_some()) {
+        (bounds.width().div_ceil(SHARE_TILE) * bounds.height().div_ceil(SHARE_TILE)) as usize
+    } else {
+        1
+    };
+    let mut of_tile: Vec<&Part> = Vec::with_capacity(parts.len());
+    let mut by_start: Vec<&Part> = parts.iter().collect();
+    by_start.sort_by_key(|p| (p.header.samples.start, p.header.samples.end));
+    let mut gaps = BTreeMap::<(u32, u32), Vec<usize>>::new();
+    for tile in 0..count {
+        of_tile.clear();
+        of_tile.extend(by_start.iter().copied().filter(|p| p.header.share.is_none_or(|share| share.has(tile))));
+        let mut next = samples.start;
+        let mut before: Option<&Part> = None;
+        for &part in &of_tile {
+            let range = &part.header.samples;
+            if let Some(before) = before.filter(|_| range.start < next && !range.is_empty()) {
+                return Err(double(before, part));
+            }
+            if range.start > next {
+                gaps.entry((next, range.start)).or_default().push(tile);
+            }
+            (next, before) = (next.max(range.end), Some(part));
+        }
+        if next < samples.end {
+            gaps.entry((next, samples.end)).or_default().push(tile);
+        }
+    }
+    Ok(gaps.iter().flat_map(|(&(from, to), tiles)| gap(parts, from..to, tiles, count)).collect())
+}
+
+/// The error of two parts with the same samples.
+fn double(a: &Part, b: &Part) -> PartError {
+    let (x, y) = (&a.header.samples, &b.header.samples);
+    let (from, to) = (x.start.max(y.start), x.end.min(y.end));
+    let (a, b) = (a.path.display(), b.path.display());
+    PartError::Parts(format!("{a} and {b} both have the samples {from} to {to} of the same pixels"))
+}
+
+/// Names the samples that are missing in some of the tiles.
+fn gap(parts: &[Part], samples: Range<u32>, tiles: &[usize], count: usize) -> Vec<String> {
+    let Range { start, end } = samples;
+    let what = format!("samples {start} to {end}");
+    if tiles.len() == count {
+        return vec![format!("{what} of all pixels")];
+    }
+    // Whole shares, where all parts are such
+    let shares: Vec<u32> = parts.iter().filter_map(|p| p.header.share.map(|s| s.count)).collect();
+    let of = shares.first().copied().filter(|n| shares.iter().all(|other| other == n));
+    if let Some(of) = of {
+        let share = |index: u32| (0..count).filter(move |tile| tile % of as usize == index as usize);
+        let is_whole = |index: &u32| share(*index).all(|tile| tiles.binary_search(&tile).is_ok());
+        let whole: Vec<u32> = (0..of).filter(|index| share(*index).next().is_some()).filter(is_whole).collect();
+        if whole.iter().map(|&index| share(index).count()).sum::<usize>() == tiles.len() {
+            return whole.iter().map(|index| format!("{what} of part {}/{of} by tiles", index + 1)).collect();
+        }
+    }
+    vec![format!("{what} of {} of {count} tiles of {SHARE_TILE} pixels", tiles.len())]
+}
+
+/// A tile of the size of the image, without samples.
+fn empty(header: &FilmHeader) -> Tile {
+    let bounds = header.bounds;
+    let replicas = if header.has_replicas { replicas(&bounds, &bounds) } else { Vec::new() };
+    let fits = match header.controls as usize {
+        0 => Fits::default(),
+        controls => Fits::of_pixels(controls, bounds.area() + replicas.len()),
+    };
+    Tile { bounds, done: 0, sums: vec![PixelAccumulator::default(); bounds.area()], replicas, fits }
+}
+
+/// Adds a stored tile to the image.
+fn add(whole: &mut Tile, tile: &StoredTile, part: &Part) -> Result<(), PartError> {
+    let damaged = |reason| PartError::damaged(&part.path, reason);
+    if part.header.is_finished && tile.done < part.header.samples.end {
+        return Err(damaged("a tile lacks samples that its header says are there"));
+    }
+    let rows = tile.bounds.area() + tile.replicas.len();
+    let row = tile.controls.len() / rows;
+    if row * rows != tile.controls.len()
+        || row != whole.fits.exact_sums().len() / (whole.sums.len() + whole.replicas.len())
+    {
+        return Err(damaged("it does not have the control variates that its header says"));
+    }
+    let index = |i: u32| index_in(&whole.bounds, position(&tile.bounds, i));
+    let controls = |fit: usize| &tile.controls[fit * row..][..row];
+    for (i, sums) in tile.sums.iter().enumerate() {
+        let at = index(i as u32);
+        whole.sums[at].merge(sums);
+        if row > 0 {
+            whole.fits.merge_sums(at as u32, controls(i));
+        }
+    }
+    for (i, replica) in tile.replicas.iter().enumerate() {
+        let at = index(replica.pixel) as u32;
+        let at = whole.replicas.binary_search_by_key(&at, |r| r.pixel);
+        let at = at.map_err(|_| damaged("it has a second estimate of a pixel that should have one"))?;
+        whole.replicas[at].sums.merge(&replica.sums);
+        if row > 0 {
+            whole.fits.merge_sums((whole.sums.len() + at) as u32, controls(tile.bounds.area() + i));
+        }
+    }
+    Ok(())
+}
+
+/// Index of a pixel inside some bounds, row by row.
+fn index_in(bounds: &PixelBounds, [x, y]: [u32; 2]) -> usize {
+    (y - bounds.y0) as usize * bounds.width() as usize + (x - bounds.x0) as usize
+}
+
+/// The first of several paths that are the same file; `None` if there is none.
+pub fn repeated(paths: &[PathBuf]) -> Option<&Path> {
+    let identity = |path: &PathBuf| path.canonicalize().unwrap_or_else(|_| path.clone());
+    let mut seen = std::collections::HashSet::new();
+    paths.iter().find(|path| !seen.insert(identity(path))).map(PathBuf::as_path)
+}

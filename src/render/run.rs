@@ -1,0 +1,383 @@
+//! A rendering under way: passes over all tiles, which pause for checkpoints.
+
+use super::camera_samples::{self, CameraSampler};
+use super::control_variates;
+use super::parts::{Checkpoints, PartError, StoredTile};
+use super::tiles::{Tile, Tiles, bounds_of_tiles, film, film_of_last, has_replicas, position};
+use super::worker::{AnyWorker, Workers};
+use super::{BATCH_PATHS, Continuation, Progress, RenderError, RenderSettings, Rendering};
+use crate::direct::Estimator;
+use crate::film::accumulator::PixelAccumulator;
+use crate::film::replicas::{ReplicaAccumulator, replicas};
+use crate::film::{Film, PixelBounds};
+use crate::integrators::path::CameraSample;
+use crate::integrators::{PathStats, Statistics, integrator};
+use crate::scene::{FilmSettings, RenderJob};
+use lumiris_numbers::estimators::ocv::block_of;
+use lumiris_numbers::math::hash::pcg4d;
+use rayon::prelude::*;
+use std::sync::atomic::{AtomicBool, AtomicU64, Ordering};
+use std::time::{Duration, Instant};
+
+/// Time between two determinations of the noise for those who observe the progress: it takes as long as a few samples
+/// per pixel.
+const NOISE_INTERVAL: Duration = Duration::from_secs(1);
+
+/// Combined with the seed of the image to give that of replicas.
+const REPLICA_SEED: u32 = 0x72_65_70_73;
+
+/// Pixels of a tile.
+pub(super) type TilePart = (PixelBounds, std::ops::Range<usize>);
+
+/// The pixels of batches as the renderer makes them in its first pass, spread over the image, about `rays` camera
+/// samples together; and the range of samples of each.
+pub(super) fn batch_parts(run: &Run<'_>, rays: usize) -> (Vec<TilePart>, std::ops::Range<u32>) {
+    let per_pixel = run.settings.spp.min(run.pass_length()).max(1);
+    let pixels_per_batch = (BATCH_PATHS / per_pixel as usize).max(1);
+    let tiles = run.job.world.scene.film.bounds.tiles(run.settings.tile_size);
+    let parts: Vec<_> = tiles
+        .iter()
+        .flat_map(|tile| {
+            let area = tile.area();
+            (0..area).step_by(pixels_per_batch).map(move |p| (*tile, p..area.min(p + pixels_per_batch)))
+        })
+        .collect();
+
+    // Every k-th batch
+    let all: usize = parts.iter().map(|(_, pixels)| pixels.len() * per_pixel as usize).sum();
+    let stride = all.div_ceil(rays.max(1)).max(1);
+    (parts.into_iter().step_by(stride).collect(), 0..per_pixel)
+}
+
+/// Batches of camera samples as the renderer makes them in its first pass, spread over the image; about `rays`
+/// together.
+pub(super) fn camera_batches(job: &RenderJob, tile_size: u32, rays: usize) -> Vec<Vec<CameraSample>> {
+    let stop = AtomicBool::new(false);
+    let settings = RenderSettings { tile_size, spp: job.settings().sampling.spp, ..RenderSettings::default() };
+    let run = Run::new(job, &settings, &stop, &|_| ());
+    let (parts, samples) = batch_parts(&run, rays);
+    let mut scratch = camera_samples::Scratch::default();
+    let chosen = parts.iter().map(|(tile, pixels)| {
+        let mut batch = Vec::new();
+        run.camera_samples(tile, pixels.clone(), &samples, &mut scratch, &mut batch);
+        batch.iter_mut().for_each(|s| s.fit -= pixels.start as u32);
+        batch
+    });
+    chosen.collect()
+}
+
+/// A rendering under way.
+pub(super) struct Run<'a> {
+    pub(super) job: &'a RenderJob,
+    settings: &'a RenderSettings,
+    stop: &'a AtomicBool,
+    observe: &'a (dyn Fn(&Progress) + Sync),
+    pub(super) camera: CameraSampler<'a>,
+    start: Instant,
+    samples_done: AtomicU64,
+    rays: AtomicU64,
+}
+
+impl<'a> Run<'a> {
+    pub(super) fn new(
+        job: &'a RenderJob,
+        settings: &'a RenderSettings,
+        stop: &'a AtomicBool,
+        observe: &'a (dyn Fn(&Progress) + Sync),
+    ) -> Self {
+        Run {
+            job,
+            settings,
+            stop,
+            observe,
+            camera: CameraSampler::new(job, settings.first_sample),
+            start: Instant::now(),
+            samples_done: AtomicU64::new(0),
+            rays: AtomicU64::new(0),
+        }
+    }
+
+    pub(super) fn run(self, threads: usize, continuation: Continuation<'_>) -> Result<Rendering, RenderError> {
+        let Continuation { stored, mut checkpoints, keeps_sums } = continuation;
+        let seed = self.job.settings().sampling.seed;
+        let cameras = |pixel, sample| self.camera.sample_of_seed(pixel, sample, seed);
+        let mut integrator = integrator(self.job, &cameras, self.stop)?;
+        let mut tiles = self.tiles(stored)?;
+
+        let end = self.end();
+        let begin = tiles.iter().map(|t| t.done).min().unwrap_or(end);
+        let (mut first, mut noise, mut observed) = (begin, None, self.start);
+        let mut stats = PathStats::default();
+        while first < end && !self.stopped() {
+            let served = end.min(first.saturating_add(integrator.prepare(first)?));
+            let workers = Workers::new(&*integrator, self.settings.with_features || self.is_over_pixels());
+            while first < served && !self.stopped() {
+                let length = self.next_pass(first - self.settings.first_sample, first - begin);
+                let samples = first..(first + length).min(served);
+                stats.merge(&self.whole_pass(&workers, &mut tiles, samples.clone(), noise, &mut checkpoints));
+                first = samples.end;
+                if observed.elapsed() >= NOISE_INTERVAL {
+                    noise = Some(self.film(&tiles).relative_noise());
+                    observed = Instant::now();
+                }
+            }
+        }
+
+        let complete = tiles.iter().all(|t| t.done >= end);
+        let keeps_sums = keeps_sums || checkpoints.is_some();
+        let FilmSettings { resolution, bounds, .. } = self.job.world.scene.film;
+        let mut film = if keeps_sums { self.film(&tiles) } else { film_of_last(resolution, bounds, &mut tiles) };
+        control_variates::correct(&mut film, &tiles, position);
+        let Statistics { paths: stats, cache, photons } = integrator.statistics(stats, &mut film);
+        if keeps_sums {
+            keep_records(&film, &mut tiles);
+        }
+        if let Some(checkpoints) = checkpoints {
+            checkpoints.finish(&tiles);
+        }
+        let sums = keeps_sums.then_some(Tiles(tiles));
+        Ok(Rendering { film, stats, cache, photons, elapsed: self.start.elapsed(), complete, threads, sums })
+    }
+
+    /// The index of the sample after the last one.
+    fn end(&self) -> u32 {
+        self.settings.first_sample + self.settings.spp
+    }
+
+    /// The tiles, with what is stored of them.
+    fn tiles(&self, stored: Option<Vec<StoredTile>>) -> Result<Vec<Tile>, PartError> {
+        let wants_replicas = has_replicas(self.job, self.settings);
+        let bounds = self.job.world.scene.film.bounds;
+        let tiles = match stored {
+            Some(stored) => stored.into_iter().map(|s| s.restore(|b| self.tile(b, wants_replicas))).collect(),
+            None => {
+                let bounds = bounds_of_tiles(&bounds, self.settings.tile_size, self.settings.share);
+                Ok(bounds.into_iter().map(|b| self.tile(b, wants_replicas)).collect::<Vec<_>>())
+            }
+        }?;
+        let done = |t: &Tile| t.bounds.area() as u64 * u64::from(t.done - self.begin());
+        self.samples_done.store(tiles.iter().map(done).sum(), Ordering::Relaxed);
+        Ok(tiles)
+    }
+
+    /// The index of the first sample that is not left to others.
+    fn begin(&self) -> u32 {
+        self.settings.first_sample + self.settings.skip.min(self.settings.spp)
+    }
+
+    /// A pass, which pauses where a checkpoint is due.
+    fn whole_pass(
+        &self,
+        workers: &Workers<'_>,
+        tiles: &mut [Tile],
+        samples: std::ops::Range<u32>,
+        noise: Option<f64>,
+        checkpoints: &mut Option<&mut Checkpoints>,
+    ) -> PathStats {
+        let mut stats = PathStats::default();
+        loop {
+            let pause = checkpoints.as_ref().map(|c| c.due());
+            stats.merge(&self.pass(workers, tiles, samples.clone(), (noise, pause)));
+            match checkpoints {
+                Some(checkpoints) if checkpoints.due() <= Instant::now() => checkpoints.store(tiles),
+                _ => {}
+            }
+            if self.stop.load(Ordering::Relaxed) || tiles.iter().all(|t| t.done >= samples.end) {
+                return stats;
+            }
+        }
+    }
+
+    /// True if pixels are corrected by what is fitted to others, which needs the features of all.
+    fn is_over_pixels(&self) -> bool {
+        Estimator::at_vertex(&self.job.settings().integrator, 0).is_over_pixels()
+    }
+
+    /// A tile without samples.
+    fn tile(&self, bounds: PixelBounds, wants_replicas: bool) -> Tile {
+        let all = &self.job.world.scene.film.bounds;
+        let replicas = if wants_replicas { replicas(all, &bounds) } else { Vec::new() };
+        let integrator = &self.job.settings().integrator;
+        let fits = Estimator::at_vertex(integrator, 0).fits(self.job, bounds.area() + replicas.len());
+        Tile { bounds, done: self.begin(), sums: vec![PixelAccumulator::default(); bounds.area()], replicas, fits }
+    }
+
+    /// The film of all tiles.
+    fn film(&self, tiles: &[Tile]) -> Film {
+        let FilmSettings { resolution, bounds, .. } = self.job.world.scene.film;
+        film(resolution, bounds, tiles)
+    }
+
+    /// Samples per pixel of the next pass over all tiles: 1, 1, 2, 4, …, so that there is a whole image soon. It lies
+    /// within a block of what is fitted in blocks. `done` samples per pixel are rendered, `now` of them by this run.
+    fn next_pass(&self, done: u32, now: u32) -> u32 {
+        let length = self.samples_in_time(now).min(done.clamp(1, self.pass_length()));
+        if !Estimator::at_vertex(&self.job.settings().integrator, 0).is_progressive() {
+            return length;
+        }
+        let block = block_of(done);
+        length.min(block.first + block.len - done)
+    }
+
+    /// Samples per pixel of the longest pass.
+    fn pass_length(&self) -> u32 {
+        (BATCH_PATHS as u32 / self.settings.tile_size.max(1).pow(2)).clamp(1, 64)
+    }
+
+    /// Samples per pixel that fit into the time that is left, at the speed so far; at least one.
+    fn samples_in_time(&self, done: u32) -> u32 {
+        let Some(limit) = self.settings.time_limit.filter(|_| done > 0) else { return u32::MAX };
+        let elapsed = self.start.elapsed();
+        let left = limit.saturating_sub(elapsed).as_secs_f64();
+        ((left * f64::from(done) / elapsed.as_secs_f64().max(1e-9)) as u32).max(1)
+    }
+
+    fn stopped(&self) -> bool {
+        let late = self.settings.time_limit.is_some_and(|limit| self.start.elapsed() >= limit);
+        late || self.stop.load(Ordering::Relaxed)
+    }
+
+    /// Adds the samples of a range to every tile, as far as it does not have them; begins none after `pause`.
+    fn pass(
+        &self,
+        workers: &Workers<'_>,
+        tiles: &mut [Tile],
+        samples: std::ops::Range<u32>,
+        (noise, pause): (Option<f64>, Option<Instant>),
+    ) -> PathStats {
+        let total = tiles.iter().map(|t| t.bounds.area() as u64).sum::<u64>() * u64::from(self.end() - self.begin());
+        tiles
+            .par_iter_mut()
+            .with_max_len(1)
+            .map(|tile| {
+                let samples = tile.done.max(samples.start)..samples.end;
+                let pauses = pause.is_some_and(|pause| Instant::now() >= pause);
+                if samples.is_empty() || pauses || self.stop.load(Ordering::Relaxed) {
+                    return PathStats::default();
+                }
+                let stats = workers.with_one(|worker| self.render_tile(worker, tile, samples.clone()));
+                tile.done = samples.end;
+                let rays = stats.camera_rays + stats.bounce_rays + stats.direct.emitter_rays + stats.direct.segments;
+                let done = tile.bounds.area() as u64 * u64::from(samples.end - samples.start);
+                (self.observe)(&Progress {
+                    samples_done: self.samples_done.fetch_add(done, Ordering::Relaxed) + done,
+                    samples_total: total,
+                    rays: self.rays.fetch_add(rays, Ordering::Relaxed) + rays,
+                    elapsed: self.start.elapsed(),
+                    noise,
+                });
+                stats
+            })
+            .reduce(PathStats::default, |mut a, b| {
+                a.merge(&b);
+                a
+            })
+    }
+
+    /// Adds the samples of a range to one tile, in batches of whole pixels.
+    fn render_tile(&self, worker: &mut AnyWorker<'_>, tile: &mut Tile, samples: std::ops::Range<u32>) -> PathStats {
+        let bounds = tile.bounds;
+        let mut ill_conditioned = 0;
+        let settings = &self.job.settings().integrator;
+        let done = samples.start - self.settings.first_sample;
+        let start = Instant::now();
+        let begins_block =
+            Estimator::at_vertex(settings, 0).is_progressive() && done > 0 && block_of(done).first == done;
+        if begins_block {
+            ill_conditioned = tile.fits.solve();
+        }
+        let solve = start.elapsed();
+        let mut first = 0;
+        while first < tile.sums.len() {
+            let pixels = self.batch_of_pixels(&bounds, first, &samples);
+            first = pixels.end;
+            self.camera_samples(&bounds, pixels.clone(), &samples, &mut worker.scratch, &mut worker.samples);
+            worker.tracer.trace(self.job, &worker.samples, &mut tile.fits, &mut worker.results);
+            let mut results = worker.results.iter();
+            for index in pixels {
+                let samples = self.samples_of(position(&bounds, index as u32), &samples);
+                samples.zip(results.by_ref()).for_each(|(i, r)| tile.sums[index].add(i, r));
+            }
+        }
+        self.render_replicas(worker, tile, samples);
+        let mut stats = worker.tracer.take_stats();
+        if begins_block {
+            let direct = &mut stats.direct;
+            direct.systems += (tile.sums.len() + tile.replicas.len()) as u64;
+            direct.ill_conditioned += ill_conditioned;
+            direct.solve += solve;
+            direct.select += solve;
+        }
+        stats
+    }
+
+    /// The pixels of a tile from index `first` on that have a batch of samples in a pass; at least one pixel.
+    fn batch_of_pixels(&self, tile: &PixelBounds, first: usize, pass: &std::ops::Range<u32>) -> std::ops::Range<usize> {
+        let (mut end, mut paths) = (first, 0);
+        while end < tile.area() {
+            paths += self.samples_of(position(tile, end as u32), pass).len();
+            if paths > BATCH_PATHS && end > first {
+                break;
+            }
+            end += 1;
+        }
+        first..end
+    }
+
+    /// Adds the samples of a pass to the replicas of a tile.
+    fn render_replicas(&self, worker: &mut AnyWorker<'_>, tile: &mut Tile, pass: std::ops::Range<u32>) {
+        let seed = pcg4d([self.job.settings().sampling.seed, REPLICA_SEED, 0, 0])[0];
+        let samples_of = |r: &ReplicaAccumulator| self.samples_of(position(&tile.bounds, r.pixel), &pass);
+        let mut fits = tile.bounds.area() as u32..;
+        let longest = tile.replicas.iter().map(|r| samples_of(r).len()).max().unwrap_or(0);
+        for replicas in tile.replicas.chunks_mut((BATCH_PATHS / longest.max(1)).max(1)) {
+            worker.samples.clear();
+            let pixels = replicas.iter().zip(&mut fits);
+            let pixels = pixels.map(|(r, fit)| (fit, position(&tile.bounds, r.pixel), samples_of(r)));
+            self.camera.samples(pixels, seed, &mut worker.scratch, &mut worker.samples);
+            worker.tracer.trace(self.job, &worker.samples, &mut tile.fits, &mut worker.results);
+            let mut results = worker.results.iter();
+            for replica in replicas {
+                for result in results.by_ref().take(samples_of(replica).len()) {
+                    replica.sums.add(result.radiance);
+                }
+            }
+        }
+    }
+
+    /// The camera samples of some pixels of a tile, which are counted row by row, in a pass.
+    pub(super) fn camera_samples(
+        &self,
+        tile: &PixelBounds,
+        pixels: std::ops::Range<usize>,
+        pass: &std::ops::Range<u32>,
+        scratch: &mut camera_samples::Scratch,
+        out: &mut Vec<CameraSample>,
+    ) {
+        out.clear();
+        let pixels = pixels.map(|index| {
+            let pixel = position(tile, index as u32);
+            (index as u32, pixel, self.samples_of(pixel, pass))
+        });
+        self.camera.samples(pixels, self.job.settings().sampling.seed, scratch, out);
+    }
+
+    /// The samples that a pass has of a pixel.
+    #[inline]
+    fn samples_of(&self, pixel: [u32; 2], pass: &std::ops::Range<u32>) -> std::ops::Range<u32> {
+        let Some(of_pixels) = &self.job.pixel_samples else { return pass.clone() };
+        let first = self.settings.first_sample;
+        let [start, end] = [pass.start, pass.end].map(|i| first + of_pixels.until(pixel, i - first));
+        start..end
+    }
+}
+
+/// Stores the records of each pixel, which the film has got in the end, with its sums.
+fn keep_records(film: &Film, tiles: &mut [Tile]) {
+    for tile in tiles {
+        for (i, sums) in (0..).zip(&mut tile.sums) {
+            let [x, y] = position(&tile.bounds, i);
+            sums.records = film.pixels[film.index(x, y)].records;
+        }
+    }
+}

@@ -1,0 +1,121 @@
+//! Tiles: the pixels that are rendered together, with their exact sums; and which of them a part of an image has.
+
+use super::RenderSettings;
+use crate::direct::{Estimator, Fits};
+use crate::film::accumulator::PixelAccumulator;
+use crate::film::replicas::ReplicaAccumulator;
+use crate::film::{Film, PixelBounds};
+use crate::scene::RenderJob;
+use crate::settings::IntegratorKind;
+
+/// Edge of the tiles that are dealt out to parts (pixels).
+pub(super) const SHARE_TILE: u32 = 16;
+
+/// The pixels of one of several parts: tiles that are dealt out in turn, row by row, so that every part has some of all
+/// regions.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct TileShare {
+    /// Which part, from 0.
+    pub index: u32,
+    /// Number of parts.
+    pub count: u32,
+}
+
+impl TileShare {
+    /// True if it has the tile of this index.
+    pub fn has(&self, tile: usize) -> bool {
+        tile % self.count.max(1) as usize == self.index as usize
+    }
+
+    /// Its tiles.
+    pub fn tiles(&self, image: &PixelBounds) -> impl Iterator<Item = PixelBounds> + use<> {
+        let share = *self;
+        image.tiles(SHARE_TILE).into_iter().enumerate().filter(move |(i, _)| share.has(*i)).map(|(_, tile)| tile)
+    }
+}
+
+/// A tile with the sums of its pixels.
+#[derive(Debug)]
+pub(super) struct Tile {
+    pub(super) bounds: PixelBounds,
+    /// Index of the next sample of its pixels.
+    pub(super) done: u32,
+    /// Sums of its pixels, row by row.
+    pub(super) sums: Vec<PixelAccumulator>,
+    pub(super) replicas: Vec<ReplicaAccumulator>,
+    /// Those of its pixels one after the other, then those of its replicas.
+    pub(super) fits: Fits,
+}
+
+/// Tiles that cover an image, or a part of it.
+#[derive(Debug)]
+pub struct Tiles(pub(super) Vec<Tile>);
+
+/// Tiles of at most the given size that cover the image, or the share of it.
+pub(super) fn bounds_of_tiles(image: &PixelBounds, size: u32, share: Option<TileShare>) -> Vec<PixelBounds> {
+    match share {
+        None => image.tiles(size),
+        Some(share) => share.tiles(image).flat_map(|tile| tile.tiles(size)).collect(),
+    }
+}
+
+/// True if some pixels are estimated twice: that is requested, and tells anything. Samples that share photon maps vary
+/// together.
+pub(super) fn has_replicas(job: &RenderJob, render: &RenderSettings) -> bool {
+    let settings = job.settings();
+    let shares_noise =
+        settings.integrator.kind == IntegratorKind::PhotonMap && settings.integrator.photons.progressive.is_some();
+    let is_over_pixels = Estimator::at_vertex(&settings.integrator, 0).is_over_pixels();
+    let is_useful = !settings.sampling.sampler.has_independent_samples() || is_over_pixels;
+    render.with_replicas && is_useful && !shares_noise
+}
+
+/// The film of tiles.
+pub(super) fn film(resolution: [u32; 2], bounds: PixelBounds, tiles: &[Tile]) -> Film {
+    let mut film = Film::new(resolution, bounds);
+    tiles.iter().for_each(|t| film.set_tile(&t.bounds, &t.sums, &t.replicas));
+    film.replicas.sort_unstable_by_key(|r| r.pixel);
+    film
+}
+
+/// The film of tiles whose sums are needed no more: the memory of each is free when its pixels are in the film. Tiles
+/// without control variates are removed.
+pub(super) fn film_of_last(resolution: [u32; 2], bounds: PixelBounds, tiles: &mut Vec<Tile>) -> Film {
+    let mut film = Film::new(resolution, bounds);
+    for tile in tiles.iter_mut().rev() {
+        film.set_tile(&tile.bounds, &std::mem::take(&mut tile.sums), &tile.replicas);
+        if tile.fits.controls() == 0 {
+            (tile.fits, tile.replicas) = (Fits::default(), Vec::new());
+        }
+    }
+    tiles.retain(|tile| tile.fits.controls() > 0);
+    film.replicas.sort_unstable_by_key(|r| r.pixel);
+    film
+}
+
+/// Coordinates of the pixel of a tile with the given index, row by row.
+pub(super) fn position(tile: &PixelBounds, index: u32) -> [u32; 2] {
+    [tile.x0 + index % tile.width(), tile.y0 + index / tile.width()]
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn shares_have_each_pixel_once_whatever_the_size_of_tiles() {
+        let image = PixelBounds { x0: 3, x1: 203, y0: 5, y1: 77 };
+        for (count, size) in [(1, 16), (3, 16), (5, 7), (7, 64), (200, 1)] {
+            let mut covered = vec![0; 203 * 77];
+            for index in 0..count {
+                for tile in bounds_of_tiles(&image, size, Some(TileShare { index, count })) {
+                    (0..tile.area() as u32).map(|i| position(&tile, i)).for_each(|[x, y]| {
+                        covered[(y * 203 + x) as usize] += 1;
+                    });
+                }
+            }
+            assert_eq!(covered.iter().sum::<usize>(), image.area());
+            assert!(covered.iter().all(|&n| n <= 1));
+        }
+    }
+}
