@@ -321,6 +321,13 @@ pub fn read_part(path: &Path, part: usize, limits: &ReadLimits) -> Result<ReadIm
     Ok(ReadImage { image, encoding, metadata, parts, window, is_half: spec.format == sys::OIIO_FORMAT_HALF })
 }
 
+/// Reads the metadata of the first part of an image, as text by name, and no pixels.
+pub fn read_metadata(path: &Path) -> Result<BTreeMap<String, String>, ImageError> {
+    let input = Input::open(path, 0)?;
+    let spec = input.spec().map_err(|failure| read_failure(path, failure))?;
+    Ok(input.metadata(spec.attributes))
+}
+
 /// Reads the headers of all parts of an image, and no pixels.
 pub fn read_headers(path: &Path) -> Result<Vec<PartHeader>, ImageError> {
     let mut input = Input::open(path, 0)?;

@@ -1,5 +1,6 @@
 //! Options that several subcommands share, as typed.
 
+use super::frame_list::{FrameList, parse_frames};
 use super::settings_args::SettingsArgs;
 use clap::Args;
 use clap::builder::{PossibleValuesParser, TypedValueParser};
@@ -66,6 +67,12 @@ pub(super) struct RenderArgs {
     /// [default: the name in the file, or SCENE.exr]
     #[arg(short, long, value_name = "FILE")]
     pub output: Vec<PathBuf>,
+    /// Frames of an animation, such as 1-48, 1-48:2 or 5,10-20: `####` in SCENE and FILE becomes the number of the frame
+    #[arg(long, value_name = "LIST", value_parser = parse_frames, requires = "output")]
+    pub frames: Option<FrameList>,
+    /// With --frames: leave out those whose images are there, and were not cut short by Ctrl-C
+    #[arg(long, requires = "frames")]
+    pub skip_existing: bool,
     /// Stop after the first pass that ends later than this many seconds, if not all samples per pixel are done before
     #[arg(long, value_name = "SECONDS", value_parser = parse_seconds)]
     pub time: Option<f64>,

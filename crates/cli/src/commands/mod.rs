@@ -8,22 +8,27 @@ mod bench;
 mod bench_efficiency;
 mod compare;
 mod crosscheck;
+mod frame_list;
+mod frames;
 mod generate;
 mod info;
+mod pictures;
 mod plan;
 mod plan_file;
 mod progress;
 mod render;
 mod reproduce;
+mod rescue;
 mod settings;
 mod settings_args;
+mod shell;
 
-use clap::{Parser, Subcommand};
+use clap::{CommandFactory, Parser, Subcommand};
 use std::process::ExitCode;
 
 /// Offline CPU renderer for lighting integrals that are hard to sample.
 #[derive(Debug, Parser)]
-#[command(name = "lumiris", version, about, max_term_width = 110)]
+#[command(name = "lumiris", version, max_term_width = 110)]
 struct Cli {
     #[command(subcommand)]
     command: Command,
@@ -48,6 +53,10 @@ enum Command {
     Reproduce(reproduce::ReproduceArgs),
     /// Generate a statue, a sky, or the scenes of talbot, fan and keller-wald
     Generate(generate::GenerateArgs),
+    /// Print the completions of a shell
+    Completions(shell::CompletionsArgs),
+    /// Write manual pages
+    Man(shell::ManArgs),
 }
 
 /// Options that contradict each other.
@@ -59,7 +68,10 @@ struct UsageError(String);
 pub(crate) fn run() -> ExitCode {
     let cli = Cli::parse();
     let result = match &cli.command {
-        Command::Render(args) => render::run(args),
+        Command::Render(args) => match &args.frames {
+            Some(list) => frames::run(args, list),
+            None => render::run(args),
+        },
         Command::Plan(args) => plan::run(args),
         Command::Compare(args) => compare::run(args),
         Command::Crosscheck(args) => crosscheck::run(args),
@@ -67,6 +79,8 @@ pub(crate) fn run() -> ExitCode {
         Command::Info(args) => info::run(args),
         Command::Reproduce(args) => reproduce::run(args),
         Command::Generate(args) => generate::run(args),
+        Command::Completions(args) => shell::completions(args, Cli::command()),
+        Command::Man(args) => shell::man(args, Cli::command()),
     };
     match result {
         Ok(code) => code,

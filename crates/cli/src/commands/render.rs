@@ -2,11 +2,12 @@
 
 use super::UsageError;
 use super::args::RenderArgs;
-use super::plan_file::PlanFile;
+use super::pictures::{Made, check_outputs, write_pictures};
 use super::progress::{self, Bar};
-use super::settings::{SetupTimes, load_job, plan, render_settings};
+use super::rescue::write_or_rescue;
+use super::settings::{SetupTimes, load_job_with, plan, render_settings};
 use anyhow::{Context, bail};
-use lumiris::imaging::oiio::{self, Part};
+use lumiris::import::cache::FileCache;
 use lumiris::integrators::photon_map::MapStats;
 use lumiris::render::output::{self, Aov};
 use lumiris::render::{CacheReport, RenderSettings, Rendering, render};
@@ -19,45 +20,103 @@ use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::time::Duration;
 
-/// File types for display-referred images.
-const DISPLAY_TYPES: [&str; 6] = ["png", "jpg", "jpeg", "tif", "tiff", "tga"];
 /// Exit code of a rendering that was stopped by Ctrl-C, as in shells.
 pub(super) const INTERRUPTED: u8 = 130;
 
+/// What the renderings of one run of the program have in common.
+pub(super) struct Session {
+    /// True once Ctrl-C was pressed.
+    pub stop: Arc<AtomicBool>,
+    /// Meshes and images that scenes share.
+    pub files: FileCache,
+}
+
+/// A picture that was rendered.
+pub(super) struct Rendered {
+    /// Statistics.
+    pub stats: serde_json::Value,
+    /// Wall-clock time of the rendering (s).
+    pub seconds: f64,
+    /// Mean relative standard error of the pixels.
+    pub noise: f64,
+    /// True if every pixel has all its samples.
+    pub complete: bool,
+    /// Why files could not be written where they should be, and where they are instead.
+    pub misplaced: Vec<String>,
+}
+
 pub(super) fn run(args: &RenderArgs) -> anyhow::Result<ExitCode> {
+    let session = Session::start(FileCache::default())?;
+    let mut rendered = render_one(args, &session)?;
+    if let Some(path) = &args.stats {
+        rendered.misplaced.extend(write_stats(path, &rendered.stats).err().map(|e| format!("{e:#}")));
+    }
+    if !rendered.misplaced.is_empty() {
+        bail!(rendered.misplaced.join("\nlumiris: "));
+    }
+    Ok(if session.is_stopped() { ExitCode::from(INTERRUPTED) } else { ExitCode::SUCCESS })
+}
+
+impl Session {
+    /// From here on Ctrl-C ends renderings in an orderly way.
+    pub(super) fn start(files: FileCache) -> anyhow::Result<Self> {
+        let stop = Arc::new(AtomicBool::new(false));
+        stop_at_ctrl_c(&stop)?;
+        Ok(Session { stop, files })
+    }
+
+    /// True once Ctrl-C was pressed.
+    pub(super) fn is_stopped(&self) -> bool {
+        self.stop.load(Ordering::Relaxed)
+    }
+}
+
+/// Renders a picture and writes it. What could not be written is no error here, but part of the result.
+pub(super) fn render_one(args: &RenderArgs, session: &Session) -> anyhow::Result<Rendered> {
     check_outputs(&args.output)?;
-    let (mut job, setup) = load_job(&args.scene)?;
     let asked = asked_aovs(args)?;
+    let (mut job, setup) = load_job_with(&args.scene, &session.files)?;
     let asks_for_ratio = asked.as_ref().is_some_and(|list| list.contains(&Aov::Ratio));
     let plan = plan(&args.scene, &mut job, asks_for_ratio, args.quiet)?;
     let outputs = outputs(args, &job);
-    check_outputs(&outputs)?;
-
-    let stop = Arc::new(AtomicBool::new(false));
-    stop_at_ctrl_c(&stop)?;
+    if args.output.is_empty() {
+        check_outputs(&outputs)?;
+    }
 
     let bar = Bar::new(args.quiet);
-    let time_limit = args.time.map(Duration::from_secs_f64);
     let needs = |is_shown: fn(&Aov) -> bool| asked.as_ref().is_none_or(|list| list.iter().any(is_shown));
     let settings = RenderSettings {
-        time_limit,
+        time_limit: args.time.map(Duration::from_secs_f64),
         with_replicas: needs(|aov| *aov == Aov::Variance),
         with_features: needs(|aov| aov.is_feature()),
         ..render_settings(&args.scene, &job)
     };
-    let rendering = render(&job, &settings, &stop, &|p| bar.update(p))?;
+    let rendering = render(&job, &settings, &session.stop, &|p| bar.update(p))?;
     bar.finish();
 
-    for path in &outputs {
-        write(args, (&job, &plan), &rendering, asked.as_deref(), path)?;
-    }
-    if let Some(path) = &args.stats {
-        let text = serde_json::to_string_pretty(&stats(args, &job, &rendering, setup))?;
-        write_text(path, &text).with_context(|| format!("cannot write {}", path.display()))?;
-    }
-    report(args, &rendering, &outputs);
-    let interrupted = stop.load(Ordering::Relaxed);
-    Ok(if interrupted { ExitCode::from(INTERRUPTED) } else { ExitCode::SUCCESS })
+    let made = Made {
+        args,
+        job: &job,
+        plan: &plan,
+        rendering: &rendering,
+        asked: asked.as_deref(),
+        is_interrupted: session.is_stopped(),
+    };
+    let (written, misplaced) = write_pictures(&made, &outputs);
+    report(args, &rendering, &written);
+    Ok(Rendered {
+        stats: stats(args, &job, &rendering, setup),
+        seconds: rendering.elapsed.as_secs_f64(),
+        noise: rendering.film.relative_noise(),
+        complete: rendering.complete,
+        misplaced,
+    })
+}
+
+/// Writes statistics.
+pub(super) fn write_stats(path: &Path, stats: &serde_json::Value) -> anyhow::Result<()> {
+    let text = serde_json::to_string_pretty(stats)?;
+    write_or_rescue(path, |path| write_text(path, &text).with_context(|| format!("cannot write {}", path.display())))
 }
 
 /// Ctrl-C sets `stop`, which ends a rendering in an orderly way; a second one ends the program.
@@ -83,74 +142,14 @@ fn outputs(args: &RenderArgs, job: &RenderJob) -> Vec<PathBuf> {
     })]
 }
 
-fn extension(path: &Path) -> String {
-    path.extension().unwrap_or_default().to_string_lossy().to_lowercase()
-}
-
-/// Rejects outputs that cannot be written, before time is spent on rendering.
-fn check_outputs(outputs: &[PathBuf]) -> anyhow::Result<()> {
-    for path in outputs {
-        let kind = extension(path);
-        if kind != "exr" && !DISPLAY_TYPES.contains(&kind.as_str()) {
-            bail!("{}: the output format must be .exr, .{}", path.display(), DISPLAY_TYPES.join(", ."));
-        }
-        let folder = path.parent().filter(|p| !p.as_os_str().is_empty()).unwrap_or(Path::new("."));
-        if !folder.is_dir() {
-            bail!("{}: folder {} does not exist", path.display(), folder.display());
-        }
-    }
-    Ok(())
-}
-
 /// The AOVs that are asked for; `None` is the default.
-fn asked_aovs(args: &RenderArgs) -> anyhow::Result<Option<Vec<Aov>>> {
+pub(super) fn asked_aovs(args: &RenderArgs) -> anyhow::Result<Option<Vec<Aov>>> {
     let Some(list) = &args.aov else { return Ok(None) };
     let aovs: Vec<Aov> = list.iter().copied().flatten().collect();
     if !aovs.is_empty() && aovs.len() < list.len() {
         return Err(UsageError("--aov none cannot stand beside other AOVs".to_owned()).into());
     }
     Ok(Some(aovs))
-}
-
-fn write(
-    args: &RenderArgs,
-    (job, plan): (&RenderJob, &PlanFile),
-    rendering: &Rendering,
-    asked: Option<&[Aov]>,
-    path: &Path,
-) -> anyhow::Result<()> {
-    let film = &rendering.film;
-    let (width, height) = (film.bounds.width() as usize, film.bounds.height() as usize);
-    let mut metadata = output::metadata(&job.world.scene.film, job.settings());
-    metadata.push(("lumiris:scene".to_owned(), args.scene.scene.display().to_string()));
-    metadata.push(("lumiris:accel".to_owned(), <&str>::from(args.scene.accel).to_owned()));
-    if !plan.settings.is_empty() {
-        metadata.push(("lumiris:plan".to_owned(), plan.text()?));
-    }
-    metadata.push(("lumiris:complete".to_owned(), rendering.complete.to_string()));
-    let done = || film.pixels.iter().map(|p| p.count);
-    let range = format!("{} to {} per pixel", done().min().unwrap_or(0), done().max().unwrap_or(0));
-    metadata.push(("lumiris:samples_done".to_owned(), range));
-    metadata.push(("lumiris:seconds".to_owned(), format!("{:.3}", rendering.elapsed.as_secs_f64())));
-    let part = if extension(path) == "exr" {
-        let aovs: Vec<Aov> = match asked {
-            Some(list) => list.to_vec(),
-            None => {
-                let ratio = job.sample_count_map.as_ref().map(|_| Aov::Ratio);
-                let records = rendering.cache.map(|_| Aov::Records);
-                Aov::ALL.into_iter().chain(ratio).chain(records).collect()
-            }
-        };
-        let channels = output::channels(film, &aovs, job.sample_count_map.as_ref());
-        Part::linear(width, height, channels.names, channels.data)
-    } else {
-        let names = ["R", "G", "B"].map(str::to_owned).to_vec();
-        Part::display(width, height, names, output::display(film, args.exposure))
-    };
-    let full = [film.resolution[0] as usize, film.resolution[1] as usize];
-    let part = part.with_metadata(metadata).with_window([film.bounds.x0 as usize, film.bounds.y0 as usize], full);
-    oiio::write_image(path, &[part])?;
-    Ok(())
 }
 
 fn stats(args: &RenderArgs, job: &RenderJob, rendering: &Rendering, setup: SetupTimes) -> serde_json::Value {
@@ -231,11 +230,11 @@ fn report(args: &RenderArgs, rendering: &Rendering, outputs: &[PathBuf]) {
         return;
     }
     let names: Vec<String> = outputs.iter().map(|p| p.display().to_string()).collect();
+    let names = if names.is_empty() { "rendered".to_owned() } else { names.join(", ") };
     let spp = rendering.film.pixels.iter().map(|p| p.count).min().unwrap_or(0);
     let partial = if rendering.complete { "" } else { " (stopped early)" };
     progress::say(&format!(
-        "{} after {:.1} s, {spp} samples per pixel{partial}, noise {:.2} %",
-        names.join(", "),
+        "{names} after {:.1} s, {spp} samples per pixel{partial}, noise {:.2} %",
         rendering.elapsed.as_secs_f64(),
         rendering.film.relative_noise() * 100.0
     ));

@@ -6,7 +6,8 @@ use super::plan_file::PlanFile;
 use super::progress;
 use anyhow::{Context, bail};
 use lumiris::film::filter::PixelFilter;
-use lumiris::import::{LoadOptions, Loaded, load};
+use lumiris::import::cache::FileCache;
+use lumiris::import::{LoadOptions, Loaded, load_with};
 use lumiris::render::RenderSettings;
 use lumiris::render::allocation::allows_adaptive;
 use lumiris::render::plan::prepare;
@@ -30,9 +31,9 @@ pub(super) struct SetupTimes {
 }
 
 /// Loads the scene and applies the options; prints warnings.
-fn load_scene(args: &SceneArgs) -> anyhow::Result<Loaded> {
+fn load_scene(args: &SceneArgs, files: &FileCache) -> anyhow::Result<Loaded> {
     let options = LoadOptions { resolution: args.resolution, crop: args.crop };
-    let mut loaded = match load(&args.scene, &options) {
+    let mut loaded = match load_with(&args.scene, &options, files) {
         Ok(loaded) => loaded,
         Err(diagnostics) => {
             progress::say(diagnostics.to_string().trim_end());
@@ -69,8 +70,13 @@ fn load_scene(args: &SceneArgs) -> anyhow::Result<Loaded> {
 
 /// Loads the scene and builds its ray tracers.
 pub(super) fn load_job(args: &SceneArgs) -> anyhow::Result<(RenderJob, SetupTimes)> {
+    load_job_with(args, &FileCache::default())
+}
+
+/// Loads the scene, but what `files` has of its files, and builds its ray tracers.
+pub(super) fn load_job_with(args: &SceneArgs, files: &FileCache) -> anyhow::Result<(RenderJob, SetupTimes)> {
     let start = Instant::now();
-    let loaded = load_scene(args)?;
+    let loaded = load_scene(args, files)?;
     let load = start.elapsed().as_secs_f64();
     let start = Instant::now();
     let job = loaded

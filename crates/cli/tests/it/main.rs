@@ -4,5 +4,8 @@
 mod browser;
 mod cli;
 mod compare;
+mod frames;
+mod lost_output;
 mod plan;
 mod reproduce;
+mod shell;
