@@ -12,6 +12,7 @@ pub mod bench_photons;
 mod camera_samples;
 mod control_variates;
 pub mod crosscheck;
+pub mod cryptomatte;
 pub mod efficiency;
 pub mod noise;
 pub mod output;

@@ -1,22 +1,16 @@
 //! Options that several subcommands share, as typed.
 
+use super::exr::ExrArgs;
 use super::frame_list::{FrameList, parse_frames};
+use super::look::LookArgs;
+use super::named::named;
 use super::settings_args::SettingsArgs;
 use clap::Args;
 use clap::builder::{PossibleValuesParser, TypedValueParser};
 use lumiris::render::output::Aov;
 use lumiris::scene::AccelKind;
 use std::path::PathBuf;
-use std::str::FromStr;
 use strum::VariantNames;
-
-/// A parser of the names of an enumeration.
-pub(super) fn named<T>() -> impl TypedValueParser<Value = T>
-where
-    T: VariantNames + FromStr<Err = strum::ParseError> + Clone + Send + Sync + 'static,
-{
-    PossibleValuesParser::new(T::VARIANTS).try_map(|name| name.parse::<T>())
-}
 
 /// An AOV, or none.
 fn aov() -> impl TypedValueParser<Value = Option<Aov>> {
@@ -80,9 +74,10 @@ pub(super) struct RenderArgs {
     /// --proposals optimal]
     #[arg(long, value_name = "LIST", value_delimiter = ',', value_parser = aov())]
     pub aov: Option<Vec<Option<Aov>>>,
-    /// Exposure of PNG, JPEG, TIFF and TGA images, in stops
-    #[arg(long, value_name = "STOPS", default_value_t = 0.0, allow_negative_numbers = true)]
-    pub exposure: f32,
+    #[command(flatten)]
+    pub look: LookArgs,
+    #[command(flatten)]
+    pub exr: ExrArgs,
     /// Write times and counts of every stage
     #[arg(long, value_name = "FILE.json")]
     pub stats: Option<PathBuf>,

@@ -25,7 +25,7 @@ pub(super) struct EfficiencyArgs {
     #[arg(long, value_name = "SCENE", num_args = 1..)]
     more_scenes: Vec<PathBuf>,
     /// Integrators, one after the other [default: --integrator]
-    #[arg(long, value_name = "LIST", value_delimiter = ',', value_parser = super::args::named::<IntegratorKind>())]
+    #[arg(long, value_name = "LIST", value_delimiter = ',', value_parser = super::named::named::<IntegratorKind>())]
     integrators: Vec<IntegratorKind>,
     /// Seeds of each setting
     #[arg(long, value_name = "N", default_value_t = 2, value_parser = clap::value_parser!(u32).range(2..=1000))]

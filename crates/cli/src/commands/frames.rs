@@ -8,7 +8,7 @@ use super::args::RenderArgs;
 use super::frame_list::{FrameList, has_number, numbered};
 use super::pictures::are_complete;
 use super::progress;
-use super::render::{INTERRUPTED, Rendered, Session, asked_aovs, render_one, write_stats};
+use super::render::{INTERRUPTED, Rendered, Session, check, render_one, write_stats};
 use lumiris::import::cache::{FileCache, FileCounts};
 use serde_json::json;
 use std::process::ExitCode;
@@ -33,7 +33,7 @@ struct Frame {
 
 pub(super) fn run(args: &RenderArgs, list: &FrameList) -> anyhow::Result<ExitCode> {
     check_names(args)?;
-    asked_aovs(args)?;
+    check(args)?;
     let session = Session::start(FileCache::keeping())?;
     let mut frames = Vec::with_capacity(list.0.len());
     for (index, &number) in list.0.iter().enumerate() {

@@ -1,11 +1,14 @@
 //! The image files of a rendering.
 
 use super::args::RenderArgs;
+use super::exr::ExrImage;
 use super::plan_file::PlanFile;
+use super::progress;
 use super::rescue::write_or_rescue;
 use anyhow::{Context, bail};
 use lumiris::imaging::oiio::{self, Part};
 use lumiris::render::Rendering;
+use lumiris::render::cryptomatte::Layer;
 use lumiris::render::output::{self, Aov};
 use lumiris::scene::RenderJob;
 use std::path::{Path, PathBuf};
@@ -27,6 +30,8 @@ pub(super) struct Made<'a> {
     pub rendering: &'a Rendering,
     /// AOVs that were asked for.
     pub asked: Option<&'a [Aov]>,
+    /// Cryptomattes that were asked for.
+    pub cryptomattes: Vec<Layer>,
     /// True if Ctrl-C ended it.
     pub is_interrupted: bool,
 }
@@ -35,7 +40,8 @@ fn extension(path: &Path) -> String {
     path.extension().unwrap_or_default().to_string_lossy().to_lowercase()
 }
 
-fn is_exr(path: &Path) -> bool {
+/// True if the name is that of an EXR file.
+pub(super) fn is_exr(path: &Path) -> bool {
     extension(path) == "exr"
 }
 
@@ -84,18 +90,33 @@ pub(super) fn write_pictures(made: &Made<'_>, outputs: &[PathBuf]) -> (Vec<PathB
 impl Made<'_> {
     /// Writes one image.
     fn write(&self, path: &Path) -> anyhow::Result<()> {
+        if is_exr(path) {
+            return self.write_exr(path);
+        }
         let film = &self.rendering.film;
+        let displayed = self.args.look.apply(self.rendering)?;
         let (width, height) = (film.bounds.width() as usize, film.bounds.height() as usize);
-        let part = if is_exr(path) {
-            let channels = output::channels(film, &self.aovs(), self.job.sample_count_map.as_ref());
-            Part::linear(width, height, channels.names, channels.data)
-        } else {
-            let names = ["R", "G", "B"].map(str::to_owned).to_vec();
-            Part::display(width, height, names, output::display(film, self.args.exposure))
-        };
+        let names = ["R", "G", "B"].map(str::to_owned).to_vec();
         let full = [film.resolution[0] as usize, film.resolution[1] as usize];
         let origin = [film.bounds.x0 as usize, film.bounds.y0 as usize];
-        oiio::write_image(path, &[part.with_metadata(self.metadata()?).with_window(origin, full)])?;
+        let part = Part::display(width, height, names, displayed.pixels).with_window(origin, full);
+        let part = part.with_metadata(self.metadata()?).with_metadata(displayed.metadata);
+        oiio::write_image(path, &[part])?;
+        Ok(())
+    }
+
+    fn write_exr(&self, path: &Path) -> anyhow::Result<()> {
+        let (parts, warning) = self.args.exr.parts(ExrImage {
+            rendering: self.rendering,
+            scene: &self.job.world.scene,
+            channels: output::channels(&self.rendering.film, &self.aovs(), self.job.sample_count_map.as_ref()),
+            cryptomattes: &self.cryptomattes,
+            metadata: self.metadata()?,
+        });
+        if let Some(warning) = warning {
+            progress::say(&format!("{}: {warning}", path.display()));
+        }
+        oiio::write_image(path, &parts)?;
         Ok(())
     }
 

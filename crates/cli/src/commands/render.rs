@@ -2,13 +2,14 @@
 
 use super::UsageError;
 use super::args::RenderArgs;
-use super::pictures::{Made, check_outputs, write_pictures};
+use super::pictures::{Made, check_outputs, is_exr, write_pictures};
 use super::progress::{self, Bar};
 use super::rescue::write_or_rescue;
 use super::settings::{SetupTimes, load_job_with, plan, render_settings};
 use anyhow::{Context, bail};
 use lumiris::import::cache::FileCache;
 use lumiris::integrators::photon_map::MapStats;
+use lumiris::render::cryptomatte::cryptomattes;
 use lumiris::render::output::{self, Aov};
 use lumiris::render::{CacheReport, RenderSettings, Rendering, render};
 use lumiris::scene::RenderJob;
@@ -74,7 +75,7 @@ impl Session {
 /// Renders a picture and writes it. What could not be written is no error here, but part of the result.
 pub(super) fn render_one(args: &RenderArgs, session: &Session) -> anyhow::Result<Rendered> {
     check_outputs(&args.output)?;
-    let asked = asked_aovs(args)?;
+    let asked = check(args)?;
     let (mut job, setup) = load_job_with(&args.scene, &session.files)?;
     let asks_for_ratio = asked.as_ref().is_some_and(|list| list.contains(&Aov::Ratio));
     let plan = plan(&args.scene, &mut job, asks_for_ratio, args.quiet)?;
@@ -94,12 +95,17 @@ pub(super) fn render_one(args: &RenderArgs, session: &Session) -> anyhow::Result
     let rendering = render(&job, &settings, &session.stop, &|p| bar.update(p))?;
     bar.finish();
 
+    // Only EXR files hold them
+    let has_exr = outputs.iter().any(|path| is_exr(path));
+    let kinds = if has_exr { &args.exr.cryptomatte[..] } else { &[] };
+    let cryptomattes = cryptomattes(&job, &settings, &rendering.film, kinds)?;
     let made = Made {
         args,
         job: &job,
         plan: &plan,
         rendering: &rendering,
         asked: asked.as_deref(),
+        cryptomattes,
         is_interrupted: session.is_stopped(),
     };
     let (written, misplaced) = write_pictures(&made, &outputs);
@@ -142,8 +148,15 @@ fn outputs(args: &RenderArgs, job: &RenderJob) -> Vec<PathBuf> {
     })]
 }
 
+/// Refuses options that cannot be, and returns the AOVs that are asked for.
+pub(super) fn check(args: &RenderArgs) -> anyhow::Result<Option<Vec<Aov>>> {
+    args.look.check()?;
+    args.exr.check()?;
+    asked_aovs(args)
+}
+
 /// The AOVs that are asked for; `None` is the default.
-pub(super) fn asked_aovs(args: &RenderArgs) -> anyhow::Result<Option<Vec<Aov>>> {
+fn asked_aovs(args: &RenderArgs) -> anyhow::Result<Option<Vec<Aov>>> {
     let Some(list) = &args.aov else { return Ok(None) };
     let aovs: Vec<Aov> = list.iter().copied().flatten().collect();
     if !aovs.is_empty() && aovs.len() < list.len() {

@@ -5,6 +5,7 @@ mod browser;
 mod cli;
 mod compare;
 mod frames;
+mod looks;
 mod lost_output;
 mod plan;
 mod reproduce;
