@@ -141,9 +141,23 @@ pub fn render(
     stop: &AtomicBool,
     observe: &(dyn Fn(&Progress) + Sync),
 ) -> Result<Rendering, RenderError> {
+    render_watched(job, settings, stop, observe, None)
+}
+
+/// Gets the film of a tile that has new samples; called from worker threads.
+pub type TileObserver<'a> = dyn Fn(&Film) + Sync + 'a;
+
+/// [`render`], with somebody who watches the tiles.
+pub fn render_watched(
+    job: &RenderJob,
+    settings: &RenderSettings,
+    stop: &AtomicBool,
+    observe: &(dyn Fn(&Progress) + Sync),
+    watch: Option<&TileObserver<'_>>,
+) -> Result<Rendering, RenderError> {
     let pool = thread_pool(settings.threads)?;
     let threads = pool.current_num_threads();
-    pool.install(|| Run::new(job, settings, stop, observe).run(threads))
+    pool.install(|| Run { watch, ..Run::new(job, settings, stop, observe) }.run(threads))
 }
 
 /// Threads, all cores if their number is not given.
@@ -207,6 +221,7 @@ struct Run<'a> {
     settings: &'a RenderSettings,
     stop: &'a AtomicBool,
     observe: &'a (dyn Fn(&Progress) + Sync),
+    watch: Option<&'a TileObserver<'a>>,
     camera: CameraSampler<'a>,
     start: Instant,
     samples_done: AtomicU64,
@@ -225,6 +240,7 @@ impl<'a> Run<'a> {
             settings,
             stop,
             observe,
+            watch: None,
             camera: CameraSampler::new(job, settings.first_sample),
             start: Instant::now(),
             samples_done: AtomicU64::new(0),
@@ -295,6 +311,13 @@ impl<'a> Run<'a> {
         film
     }
 
+    /// The film of one tile.
+    fn film_of(&self, tile: &Tile) -> Film {
+        let mut film = Film::new(self.job.world.scene.film.resolution, tile.bounds);
+        film.set_tile(&tile.bounds, &tile.sums, &[]);
+        film
+    }
+
     /// Samples per pixel of the next pass over all tiles: 1, 1, 2, 4, …, so that there is a whole image soon. It lies
     /// within a block of what is fitted in blocks.
     fn next_pass(&self, done: u32) -> u32 {
@@ -340,6 +363,9 @@ impl<'a> Run<'a> {
                     return PathStats::default();
                 }
                 let stats = workers.with_one(|worker| self.render_tile(worker, tile, samples.clone()));
+                if let Some(watch) = self.watch {
+                    watch(&self.film_of(tile));
+                }
                 let rays = stats.camera_rays + stats.bounce_rays + stats.direct.emitter_rays + stats.direct.segments;
                 let done = tile.bounds.area() as u64 * u64::from(samples.end - samples.start);
                 (self.observe)(&Progress {

@@ -5,6 +5,7 @@ use super::frame_list::{FrameList, parse_frames};
 use super::look::LookArgs;
 use super::named::named;
 use super::settings_args::SettingsArgs;
+use super::watch_args::WatchArgs;
 use clap::Args;
 use clap::builder::{PossibleValuesParser, TypedValueParser};
 use lumiris::render::output::Aov;
@@ -78,6 +79,8 @@ pub(super) struct RenderArgs {
     pub look: LookArgs,
     #[command(flatten)]
     pub exr: ExrArgs,
+    #[command(flatten)]
+    pub watch: WatchArgs,
     /// Write times and counts of every stage
     #[arg(long, value_name = "FILE.json")]
     pub stats: Option<PathBuf>,

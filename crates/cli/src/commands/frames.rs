@@ -34,7 +34,7 @@ struct Frame {
 pub(super) fn run(args: &RenderArgs, list: &FrameList) -> anyhow::Result<ExitCode> {
     check_names(args)?;
     check(args)?;
-    let session = Session::start(FileCache::keeping())?;
+    let session = Session::start(args, FileCache::keeping())?;
     let mut frames = Vec::with_capacity(list.0.len());
     for (index, &number) in list.0.iter().enumerate() {
         let outcome = if session.is_stopped() {

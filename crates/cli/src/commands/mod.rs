@@ -25,6 +25,7 @@ mod rescue;
 mod settings;
 mod settings_args;
 mod shell;
+mod watch_args;
 
 use clap::{CommandFactory, Parser, Subcommand};
 use std::process::ExitCode;

@@ -6,12 +6,13 @@ use super::pictures::{Made, check_outputs, is_exr, write_pictures};
 use super::progress::{self, Bar};
 use super::rescue::write_or_rescue;
 use super::settings::{SetupTimes, load_job_with, plan, render_settings};
+use crate::watch::{self, Watch};
 use anyhow::{Context, bail};
 use lumiris::import::cache::FileCache;
 use lumiris::integrators::photon_map::MapStats;
 use lumiris::render::cryptomatte::cryptomattes;
 use lumiris::render::output::{self, Aov};
-use lumiris::render::{CacheReport, RenderSettings, Rendering, render};
+use lumiris::render::{CacheReport, Progress, RenderSettings, Rendering, render, render_watched};
 use lumiris::scene::RenderJob;
 use lumiris_formats::output::write_text;
 use serde_json::json;
@@ -30,6 +31,8 @@ pub(super) struct Session {
     pub stop: Arc<AtomicBool>,
     /// Meshes and images that scenes share.
     pub files: FileCache,
+    /// Those who watch.
+    watch: Watch,
 }
 
 /// A picture that was rendered.
@@ -47,7 +50,7 @@ pub(super) struct Rendered {
 }
 
 pub(super) fn run(args: &RenderArgs) -> anyhow::Result<ExitCode> {
-    let session = Session::start(FileCache::default())?;
+    let session = Session::start(args, FileCache::default())?;
     let mut rendered = render_one(args, &session)?;
     if let Some(path) = &args.stats {
         rendered.misplaced.extend(write_stats(path, &rendered.stats).err().map(|e| format!("{e:#}")));
@@ -59,11 +62,15 @@ pub(super) fn run(args: &RenderArgs) -> anyhow::Result<ExitCode> {
 }
 
 impl Session {
-    /// From here on Ctrl-C ends renderings in an orderly way.
-    pub(super) fn start(files: FileCache) -> anyhow::Result<Self> {
+    /// From here on Ctrl-C ends renderings in an orderly way, and they can be watched.
+    pub(super) fn start(args: &RenderArgs, files: FileCache) -> anyhow::Result<Self> {
+        let watch = Watch::start(&args.watch.places()?, progress::say)?;
+        if let Some(address) = watch.page {
+            progress::say(&format!("the image can be watched at http://{address}/"));
+        }
         let stop = Arc::new(AtomicBool::new(false));
         stop_at_ctrl_c(&stop)?;
-        Ok(Session { stop, files })
+        Ok(Session { stop, files, watch })
     }
 
     /// True once Ctrl-C was pressed.
@@ -92,7 +99,7 @@ pub(super) fn render_one(args: &RenderArgs, session: &Session) -> anyhow::Result
         with_features: needs(|aov| aov.is_feature()),
         ..render_settings(&args.scene, &job)
     };
-    let rendering = render(&job, &settings, &session.stop, &|p| bar.update(p))?;
+    let rendering = render_shown((&job, &settings), session, &name_of(args), &bar)?;
     bar.finish();
 
     // Only EXR files hold them
@@ -117,6 +124,29 @@ pub(super) fn render_one(args: &RenderArgs, session: &Session) -> anyhow::Result
         complete: rendering.complete,
         misplaced,
     })
+}
+
+/// Renders, for those who watch as well.
+fn render_shown(
+    (job, settings): (&RenderJob, &RenderSettings),
+    session: &Session,
+    name: &str,
+    bar: &Bar,
+) -> anyhow::Result<Rendering> {
+    let canvas = session.watch.begin(name, &job.world.scene.film, settings.with_features);
+    let observe = |progress: &Progress| {
+        bar.update(progress);
+        watch::observe(canvas.as_ref(), progress);
+    };
+    let Some(shown) = &canvas else { return Ok(render(job, settings, &session.stop, &observe)?) };
+    let rendering = render_watched(job, settings, &session.stop, &observe, Some(&|tile| shown.set_tile(tile)))?;
+    shown.finish(&rendering.film, settings.tile_size);
+    Ok(rendering)
+}
+
+/// What an image is called by those who watch: the name of its scene, without folders.
+fn name_of(args: &RenderArgs) -> String {
+    args.scene.scene.file_name().unwrap_or_default().to_string_lossy().into_owned()
 }
 
 /// Writes statistics.

@@ -10,3 +10,4 @@ mod lost_output;
 mod plan;
 mod reproduce;
 mod shell;
+mod watch;
