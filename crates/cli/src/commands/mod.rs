@@ -41,7 +41,7 @@ struct Cli {
 #[derive(Debug, Subcommand)]
 enum Command {
     /// Render a scene
-    Render(args::RenderArgs),
+    Render(Box<args::RenderArgs>),
     /// Measure what the settings of a scene leave open, and store the choices for render --plan
     Plan(plan::PlanArgs),
     /// Compare images with a reference, by metrics and on an HTML page
