@@ -136,7 +136,7 @@ mod tests {
     fn bright_colours_run_to_white_where_srgb_clips_them() {
         let red = [50.0, 0.5, 0.5];
         let [clipped, agx] = [ViewTransform::Srgb, ViewTransform::Agx].map(|view| view.apply(red));
-        assert!(clipped[0] == 1.0 && clipped[1] < 0.75, "{clipped:?}");
+        assert!(clipped[0] > 0.999 && clipped[1] < 0.75, "{clipped:?}");
         assert!(agx[1] > 0.75 && agx[0] > agx[1], "{agx:?}");
     }
 
