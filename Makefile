@@ -2,16 +2,38 @@
 
 CARGO ?= $(shell command -v cargo || echo $(HOME)/.cargo/bin/cargo)
 PACKAGES = build-essential pkg-config libembree-dev libopenimageio-dev
-# Additional packages of the tests: a browser for the pages that `compare` writes.
-TEST_PACKAGES = chromium
+# Additional packages of the tests: a browser for the program's pages, and shells for its completions.
+TEST_PACKAGES = chromium fish zsh
 SCENE = scenes/demo/gallery.pbrt
 
-.PHONY: run test test-power measure-power test-debian13 setup lint doc bindings clean
+# Where `make install` puts things: below PREFIX, which a package may have below DESTDIR.
+PREFIX ?= /usr/local
+BINARY = target/release/lumiris
+SHARE = $(DESTDIR)$(PREFIX)/share
+
+.PHONY: run build install uninstall test test-power measure-power test-debian13 setup lint doc bindings clean
 
 run: setup
 	$(CARGO) build --release
-	target/release/lumiris render $(SCENE) --spp 16 -o gallery.png -o gallery.exr
+	$(BINARY) render $(SCENE) --spp 16 -o gallery.png -o gallery.exr
 	@echo "The image is in gallery.png and gallery.exr."
+
+build: setup
+	$(CARGO) build --release
+
+# The program, its completions and its manual pages: `make install PREFIX=$HOME/.local`.
+install: build
+	install -D -m 755 $(BINARY) $(DESTDIR)$(PREFIX)/bin/lumiris
+	install -d $(SHARE)/bash-completion/completions $(SHARE)/zsh/site-functions $(SHARE)/fish/vendor_completions.d
+	$(BINARY) completions bash > $(SHARE)/bash-completion/completions/lumiris
+	$(BINARY) completions zsh > $(SHARE)/zsh/site-functions/_lumiris
+	$(BINARY) completions fish > $(SHARE)/fish/vendor_completions.d/lumiris.fish
+	$(BINARY) man --output $(SHARE)/man/man1
+
+uninstall:
+	rm -f $(DESTDIR)$(PREFIX)/bin/lumiris $(SHARE)/bash-completion/completions/lumiris \
+	  $(SHARE)/zsh/site-functions/_lumiris $(SHARE)/fish/vendor_completions.d/lumiris.fish \
+	  $(SHARE)/man/man1/lumiris.1 $(SHARE)/man/man1/lumiris-*.1
 
 test: setup
 	@.ci/setup.sh $(TEST_PACKAGES)

@@ -4,6 +4,8 @@
 //! coordinates have their origin at the upper left, one unit per pixel, y down. The screen window `[x0, x1, y0, y1]` is
 //! the part of the screen covered by the film; by default it spans −1..1 on the shorter axis.
 
+mod matrices;
+
 use lumiris_lanes::camera::Pinhole;
 use lumiris_numbers::math::sphere_map::{equal_area_square_to_sphere, lat_long_to_sphere, wrap_equal_area_square};
 use lumiris_numbers::math::warp::sample_uniform_disk_concentric;

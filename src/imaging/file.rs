@@ -8,6 +8,9 @@ pub enum ImageError {
     /// OpenImageIO itself cannot be used.
     #[error("OpenImageIO cannot be loaded: {0}")]
     Library(String),
+    /// A colour transform that OpenColorIO does not have.
+    #[error("OpenColorIO: {0}")]
+    Color(String),
     /// There is no such file.
     #[error("{}: no such file", path.display())]
     NotFound {

@@ -1,6 +1,6 @@
 //! Images: pixels with named channels, their encodings, pyramids for filtered lookups, and metrics of their difference.
 //!
-//! Reading order: [`color`], [`mipmap`], [`mod@file`], [`oiio`], [`metrics`], [`heat`].
+//! Reading order: [`color`], [`view_transform`], [`mipmap`], [`mod@file`], [`oiio`], [`metrics`], [`heat`].
 
 pub mod color;
 pub mod file;
@@ -8,9 +8,11 @@ pub mod heat;
 pub mod metrics;
 pub mod mipmap;
 pub mod oiio;
+pub mod view_transform;
 
 pub use color::ColorEncoding;
 pub use mipmap::{Filter, MipMap, Wrap};
+pub use view_transform::ViewTransform;
 
 /// Pixels with named channels.
 #[derive(Clone, Debug, Default, PartialEq)]

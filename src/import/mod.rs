@@ -1,16 +1,20 @@
 //! From scene files to scenes: the meaning of directives ([`pbrt`]), and the images and meshes that they name
-//! ([`resources`]). A [`fingerprint`] tells a scene from others.
+//! ([`resources`], [`images`]), which the scenes of an animation share ([`cache`]). A [`fingerprint`] tells a scene from
+//! others.
 //!
 //! The files themselves are parsed by the crate `lumiris_formats`. User input never panics: problems are collected,
 //! with their source locations, in [`Diagnostics`].
 
+pub mod cache;
 pub mod fingerprint;
+pub mod images;
 pub mod pbrt;
 pub mod resources;
 
 use crate::accel::embree::EmbreeError;
 use crate::scene::{AccelKind, RenderJob, Scene, World};
 use crate::settings::Settings;
+use cache::FileCache;
 use fingerprint::SceneFiles;
 use lumiris_formats::diagnostic::{Diagnostics, Report};
 use lumiris_formats::pbrt::parser::parse_file;
@@ -49,17 +53,22 @@ impl Loaded {
 
 /// Loads a scene file. `Err` holds all errors and the warnings.
 pub fn load(path: &Path, options: &LoadOptions) -> Result<Loaded, Box<Report>> {
+    load_with(path, options, &FileCache::default())
+}
+
+/// Loads a scene file; meshes and images that `files` has are not read again.
+pub fn load_with(path: &Path, options: &LoadOptions, files: &FileCache) -> Result<Loaded, Box<Report>> {
     let mut sources = SourceMap::new();
     let mut diagnostics = Diagnostics::new();
     let folder = path.parent().map(Path::to_path_buf).unwrap_or_default();
     let mut builder = Builder::new(folder, options);
     parse_file(path, &mut sources, &mut diagnostics, &mut builder);
-    let files = SceneFiles::new(&sources, builder.files());
-    let finished = builder.finish(&mut diagnostics);
+    let scene_files = SceneFiles::new(&sources, builder.files());
+    let finished = builder.finish(files, &mut diagnostics);
     let failed = diagnostics.has_errors();
     let report = diagnostics.finish(&sources);
     match finished {
-        Some((scene, settings)) if !failed => Ok(Loaded { scene, settings, warnings: report, files }),
+        Some((scene, settings)) if !failed => Ok(Loaded { scene, settings, warnings: report, files: scene_files }),
         _ => Err(Box::new(report)),
     }
 }

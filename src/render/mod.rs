@@ -13,6 +13,7 @@ pub mod bench_photons;
 mod camera_samples;
 mod control_variates;
 pub mod crosscheck;
+pub mod cryptomatte;
 pub mod efficiency;
 pub mod noise;
 pub mod output;
@@ -118,7 +119,10 @@ pub struct Rendering {
     pub sums: Option<Tiles>,
 }
 
-/// What a rendering goes on from, and where its sums are stored.
+/// Gets the film of a tile that has new samples; called from worker threads.
+pub type TileObserver<'a> = dyn Fn(&Film) + Sync + 'a;
+
+/// What a rendering goes on from, where its sums are stored, and who watches it.
 #[derive(Default)]
 pub struct Continuation<'a> {
     /// The sums of an earlier rendering by the same settings. Their tiles are those of the rendering.
@@ -127,6 +131,8 @@ pub struct Continuation<'a> {
     pub checkpoints: Option<&'a mut Checkpoints>,
     /// Whether the exact sums are part of the result.
     pub keeps_sums: bool,
+    /// Gets tiles on the way.
+    pub watch: Option<&'a TileObserver<'a>>,
 }
 
 /// Why a rendering ended without an image.

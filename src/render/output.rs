@@ -1,7 +1,6 @@
-//! From the film to images: channels with names, metadata, and the display transform.
+//! From the film to images: channels with names, and metadata.
 
 use crate::film::Film;
-use crate::imaging::color::linear_to_srgb;
 use crate::scene::{FilmSettings, SampleCountMap};
 use crate::settings::Settings;
 use strum::{EnumString, IntoStaticStr, VariantNames};
@@ -106,10 +105,10 @@ fn ratio_values(map: &SampleCountMap, pixel: usize) -> [f32; 5] {
     [1.0 - green, green, 0.0, ratio * samples, samples]
 }
 
-/// The image for a display: `2^exposure`, then the sRGB curve, clipped to 0..1. RGB interleaved.
-pub fn display(film: &Film, exposure: f32) -> Vec<f32> {
+/// Mean radiance of all pixels times `2^exposure`, linear RGB, interleaved.
+pub fn exposed(film: &Film, exposure: f32) -> Vec<f32> {
     let gain = exposure.exp2();
-    film.pixels.iter().flat_map(|p| p.mean().map(|v| linear_to_srgb((v as f32 * gain).clamp(0.0, 1.0)))).collect()
+    film.pixels.iter().flat_map(|p| p.mean().map(|v| v as f32 * gain)).collect()
 }
 
 /// Everything that an image depends on, as metadata entries `lumiris:…`: its settings and the film.
@@ -145,10 +144,9 @@ mod tests {
     }
 
     #[test]
-    fn display_clips_and_brightens() {
+    fn exposure_counts_in_stops() {
         let mut film = Film::new([1, 1], PixelBounds { x0: 0, x1: 1, y0: 0, y1: 1 });
         film.pixels[0] = PixelSums { count: 1, radiance: [0.25, 0.5, 4.0], ..PixelSums::default() };
-        let d = display(&film, 1.0);
-        assert!((d[0] - linear_to_srgb(0.5)).abs() < 1e-6 && (d[1] - 1.0).abs() < 1e-6 && (d[2] - 1.0).abs() < 1e-6);
+        assert_eq!(exposed(&film, 1.0), [0.5, 1.0, 8.0]);
     }
 }

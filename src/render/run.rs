@@ -5,7 +5,7 @@ use super::control_variates;
 use super::parts::{Checkpoints, PartError, StoredTile};
 use super::tiles::{Tile, Tiles, bounds_of_tiles, film, film_of_last, has_replicas, position};
 use super::worker::{AnyWorker, Workers};
-use super::{BATCH_PATHS, Continuation, Progress, RenderError, RenderSettings, Rendering};
+use super::{BATCH_PATHS, Continuation, Progress, RenderError, RenderSettings, Rendering, TileObserver};
 use crate::direct::Estimator;
 use crate::film::accumulator::PixelAccumulator;
 use crate::film::replicas::{ReplicaAccumulator, replicas};
@@ -98,7 +98,7 @@ impl<'a> Run<'a> {
     }
 
     pub(super) fn run(self, threads: usize, continuation: Continuation<'_>) -> Result<Rendering, RenderError> {
-        let Continuation { stored, mut checkpoints, keeps_sums } = continuation;
+        let Continuation { stored, mut checkpoints, keeps_sums, watch } = continuation;
         let seed = self.job.settings().sampling.seed;
         let cameras = |pixel, sample| self.camera.sample_of_seed(pixel, sample, seed);
         let mut integrator = integrator(self.job, &cameras, self.stop)?;
@@ -114,7 +114,8 @@ impl<'a> Run<'a> {
             while first < served && !self.stopped() {
                 let length = self.next_pass(first - self.settings.first_sample, first - begin);
                 let samples = first..(first + length).min(served);
-                stats.merge(&self.whole_pass(&workers, &mut tiles, samples.clone(), noise, &mut checkpoints));
+                let watched = (noise, watch);
+                stats.merge(&self.whole_pass(&workers, &mut tiles, samples.clone(), watched, &mut checkpoints));
                 first = samples.end;
                 if observed.elapsed() >= NOISE_INTERVAL {
                     noise = Some(self.film(&tiles).relative_noise());
@@ -171,13 +172,13 @@ impl<'a> Run<'a> {
         workers: &Workers<'_>,
         tiles: &mut [Tile],
         samples: std::ops::Range<u32>,
-        noise: Option<f64>,
+        (noise, watch): (Option<f64>, Option<&TileObserver<'_>>),
         checkpoints: &mut Option<&mut Checkpoints>,
     ) -> PathStats {
         let mut stats = PathStats::default();
         loop {
             let pause = checkpoints.as_ref().map(|c| c.due());
-            stats.merge(&self.pass(workers, tiles, samples.clone(), (noise, pause)));
+            stats.merge(&self.pass(workers, tiles, samples.clone(), (noise, watch, pause)));
             match checkpoints {
                 Some(checkpoints) if checkpoints.due() <= Instant::now() => checkpoints.store(tiles),
                 _ => {}
@@ -206,6 +207,13 @@ impl<'a> Run<'a> {
     fn film(&self, tiles: &[Tile]) -> Film {
         let FilmSettings { resolution, bounds, .. } = self.job.world.scene.film;
         film(resolution, bounds, tiles)
+    }
+
+    /// The film of one tile.
+    fn film_of(&self, tile: &Tile) -> Film {
+        let mut film = Film::new(self.job.world.scene.film.resolution, tile.bounds);
+        film.set_tile(&tile.bounds, &tile.sums, &[]);
+        film
     }
 
     /// Samples per pixel of the next pass over all tiles: 1, 1, 2, 4, …, so that there is a whole image soon. It lies
@@ -243,7 +251,7 @@ impl<'a> Run<'a> {
         workers: &Workers<'_>,
         tiles: &mut [Tile],
         samples: std::ops::Range<u32>,
-        (noise, pause): (Option<f64>, Option<Instant>),
+        (noise, watch, pause): (Option<f64>, Option<&TileObserver<'_>>, Option<Instant>),
     ) -> PathStats {
         let total = tiles.iter().map(|t| t.bounds.area() as u64).sum::<u64>() * u64::from(self.end() - self.begin());
         tiles
@@ -257,6 +265,9 @@ impl<'a> Run<'a> {
                 }
                 let stats = workers.with_one(|worker| self.render_tile(worker, tile, samples.clone()));
                 tile.done = samples.end;
+                if let Some(watch) = watch {
+                    watch(&self.film_of(tile));
+                }
                 let rays = stats.camera_rays + stats.bounce_rays + stats.direct.emitter_rays + stats.direct.segments;
                 let done = tile.bounds.area() as u64 * u64::from(samples.end - samples.start);
                 (self.observe)(&Progress {

@@ -10,6 +10,7 @@ pub use mapping::{CheckerboardMapping, Mapping2d};
 
 use crate::imaging::MipMap;
 use lumiris_numbers::math::{Rgb, Vec2, Vec3};
+use std::sync::Arc;
 
 /// Index into [`TextureSet::floats`].
 pub type FloatTextureId = u32;
@@ -139,7 +140,7 @@ pub struct TextureSet {
     /// RGB textures; add with [`Self::add_rgb`].
     pub rgbs: Vec<RgbTexture>,
     /// Images.
-    pub images: Vec<MipMap>,
+    pub images: Vec<Arc<MipMap>>,
 }
 
 impl TextureSet {
@@ -183,7 +184,7 @@ impl TextureSet {
 
     /// Adds an image.
     pub fn add_image(&mut self, image: MipMap) -> ImageId {
-        self.images.push(image);
+        self.images.push(Arc::new(image));
         (self.images.len() - 1) as ImageId
     }
 

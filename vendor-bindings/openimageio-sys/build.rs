@@ -36,7 +36,7 @@ fn fail(reason: &str) -> ! {
 fn build_shim(library: &pkg_config::Library) -> Result<PathBuf, String> {
     let mut build = cc::Build::new();
     build.cpp(true).std("c++17").pic(true).opt_level(2).debug(false).warnings(false);
-    build.flag_if_supported("-fvisibility=hidden").files(["shim/reading.cpp", "shim/writing.cpp"]);
+    build.flag_if_supported("-fvisibility=hidden").files(["shim/color.cpp", "shim/reading.cpp", "shim/writing.cpp"]);
     build.includes(&library.include_paths);
     for (name, value) in &library.defines {
         build.define(name, value.as_deref());

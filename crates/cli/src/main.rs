@@ -2,6 +2,7 @@
 
 mod commands;
 mod compare;
+mod watch;
 
 use std::process::ExitCode;
 

@@ -7,7 +7,7 @@ use lumiris_formats::pbrt::directive::Name;
 use lumiris_formats::pbrt::params::ParamSet;
 use lumiris_formats::source::Span;
 use lumiris_numbers::math::{Affine3A, Rgb, Vec2, Vec3};
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 
 /// A directive that is evaluated once all of them have been read: the camera needs the film's size.
 pub(super) struct Pending {
@@ -87,6 +87,16 @@ pub enum ShapeSource {
     Quadric(QuadricKind),
     /// Bilinear patches.
     Bilinear(PatchData),
+}
+
+impl ShapeSource {
+    /// The file that holds it.
+    pub(super) fn file(&self) -> Option<&Path> {
+        match self {
+            ShapeSource::Ply(path) => Some(path),
+            ShapeSource::Mesh(_) | ShapeSource::Loop(..) | ShapeSource::Quadric(_) | ShapeSource::Bilinear(_) => None,
+        }
+    }
 }
 
 /// Arrays of a triangle mesh in object space.

@@ -7,16 +7,19 @@ use super::shapes::{Made, ShapeError};
 use super::state::Builder;
 use crate::geometry::{Geometry, GeometryId, GeometrySet, Group, Instance, Shape, Visibility};
 use crate::imaging::oiio::ImageError;
-use crate::import::resources::{load_rgb, report};
+use crate::import::cache::FileCache;
+use crate::import::images::RgbImage;
+use crate::import::resources::report;
 use crate::lights::{Emission, EmissionImage, LightSetBuilder, area_lights_of};
 use crate::materials::{Material, MaterialId, MaterialSet};
 use crate::scene::{Scene, Surface};
 use crate::settings::Settings;
 use lumiris_formats::diagnostic::Diagnostics;
+use lumiris_formats::ply::PlyMesh;
 use lumiris_numbers::math::Rgb;
 use rayon::prelude::*;
-use std::collections::HashMap;
-use std::path::PathBuf;
+use std::collections::{BTreeSet, HashMap};
+use std::path::{Path, PathBuf};
 use std::sync::Arc;
 
 /// Geometry while it is assembled.
@@ -34,7 +37,7 @@ struct Assembly {
 
 impl Builder<'_> {
     /// Reads the files that the text names and builds the scene; `None` after an error.
-    pub fn finish(mut self, d: &mut Diagnostics) -> Option<(Scene, Settings)> {
+    pub fn finish(mut self, files: &FileCache, d: &mut Diagnostics) -> Option<(Scene, Settings)> {
         let options = self.options.finish(self.load_options, d);
 
         // Read all files, whatever went wrong before: all missing ones are named in one run
@@ -43,10 +46,13 @@ impl Builder<'_> {
         let emission_paths = self.emission_image_paths();
         // Images first: while one thread loads the library that reads them, the others have meshes and coats to work on
         let ((images, emission_images, texture_images), (made, materials)) = rayon::join(
-            || (load_images(&environment_paths), load_emission_images(&emission_paths), self.resources.load(d)),
+            || {
+                let emission_images = load_emission_images(&emission_paths, files);
+                (load_images(&environment_paths, files), emission_images, self.resources.load(files, d))
+            },
             || {
                 rayon::join(
-                    || shapes.par_iter_mut().map(ShapeDesc::make).collect::<Vec<_>>(),
+                    || make_shapes(&mut shapes, files),
                     || MaterialSet::new(self.materials.clone(), &self.textures),
                 )
             },
@@ -155,7 +161,8 @@ impl Builder<'_> {
     fn add_environments(&mut self, images: Vec<LoadedImage>, d: &mut Diagnostics) {
         for (desc, image) in self.environments.iter().zip(images) {
             match image {
-                Ok((texels, size)) => {
+                Ok(image) => {
+                    let (texels, size) = Arc::unwrap_or_clone(image);
                     if let Some(light) = desc.light(texels, size, d) {
                         self.lights[desc.index] = light;
                     }
@@ -196,11 +203,22 @@ impl Builder<'_> {
     }
 }
 
-/// Linear texels, rows from the top, and the size.
-type LoadedImage = Result<(Vec<Rgb>, [usize; 2]), ImageError>;
+type LoadedImage = Result<Arc<RgbImage>, ImageError>;
 
-fn load_images(paths: &[PathBuf]) -> Vec<LoadedImage> {
-    paths.par_iter().map(|path| load_rgb(path)).collect()
+fn load_images(paths: &[PathBuf], files: &FileCache) -> Vec<LoadedImage> {
+    paths.par_iter().map(|path| files.rgb(path)).collect()
+}
+
+/// Makes all shapes. Where meshes are kept for other scenes, each file is read once; elsewhere a mesh is placed as soon
+/// as it has been read, so that there is one copy of it.
+fn make_shapes(shapes: &mut [ShapeDesc], files: &FileCache) -> Vec<Result<Made, ShapeError>> {
+    let paths: BTreeSet<&Path> = shapes.iter().filter(|_| files.keeps()).filter_map(|s| s.source.file()).collect();
+    let paths: Vec<PathBuf> = paths.into_iter().map(Path::to_path_buf).collect();
+    // What cannot be read is reported by the shapes that need it
+    let meshes = paths.into_par_iter().filter_map(|path| files.mesh(&path).ok().map(|mesh| (path, mesh)));
+    let meshes: HashMap<PathBuf, Arc<PlyMesh>> = meshes.collect();
+    let mesh = |path: &Path| meshes.get(path).map_or_else(|| files.mesh(path), |mesh| Ok(Arc::clone(mesh)));
+    shapes.par_iter_mut().map(|shape| shape.make(&mesh)).collect()
 }
 
 enum EmissionError {
@@ -208,9 +226,9 @@ enum EmissionError {
     Size(String),
 }
 
-fn load_emission_images(paths: &[PathBuf]) -> Vec<(PathBuf, Result<EmissionImage, EmissionError>)> {
+fn load_emission_images(paths: &[PathBuf], files: &FileCache) -> Vec<(PathBuf, Result<EmissionImage, EmissionError>)> {
     let load = |path: &PathBuf| {
-        let (texels, size) = load_rgb(path).map_err(EmissionError::Image)?;
+        let (texels, size) = Arc::unwrap_or_clone(files.rgb(path).map_err(EmissionError::Image)?);
         EmissionImage::new(size[0], size[1], texels).map_err(EmissionError::Size)
     };
     paths.par_iter().map(|path| (path.clone(), load(path))).collect()

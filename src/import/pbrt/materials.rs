@@ -5,7 +5,7 @@ use super::descriptions::MaterialUse;
 use super::spectrum::{Resolved, SpectrumUse};
 use super::state::Builder;
 use crate::bsdfs::models::LobeAxis;
-use crate::import::resources::{ImageEncoding, ImageRequest};
+use crate::import::images::{ImageEncoding, ImageRequest};
 use crate::materials::{ConductorSpectrum, EvaluatedMaterial, Material, MaterialEntry, MaterialId, Roughness};
 use crate::textures::{Filter, FloatTexture, ImageId, RgbTexture, RgbTextureId, Wrap};
 use lumiris_formats::diagnostic::{Diagnostics, did_you_mean};

@@ -10,10 +10,11 @@ use crate::textures::FloatTexture;
 use lumiris_formats::diagnostic::Diagnostics;
 use lumiris_formats::pbrt::directive::Name;
 use lumiris_formats::pbrt::params::{Input, ParamSet, ParamType};
-use lumiris_formats::ply::{PlyError, read_ply};
+use lumiris_formats::ply::{PlyError, PlyMesh};
 use lumiris_numbers::math::transform::{swaps_handedness, transform_normal};
 use lumiris_numbers::math::{Affine3A, Vec2, Vec3};
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
+use std::sync::Arc;
 
 /// What making a shape has to say.
 #[derive(Debug, Default)]
@@ -252,8 +253,8 @@ impl ShapeDesc {
         if self.ctm.is_moving() { Affine3A::IDENTITY } else { affine(&self.ctm.start) }
     }
 
-    /// Makes the shapes in the space of their group. Takes the arrays out of `self`.
-    pub fn make(&mut self) -> Result<Made, ShapeError> {
+    /// Makes the shapes in the space of their group; `mesh` reads a PLY file. Takes the arrays out of `self`.
+    pub fn make(&mut self, mesh: &dyn Fn(&Path) -> Result<Arc<PlyMesh>, PlyError>) -> Result<Made, ShapeError> {
         let m = self.group_from_object();
         // pbrt flips where the transformation of the shape mirrors, moving or not.
         let reverse = self.reverse_orientation;
@@ -288,10 +289,11 @@ impl ShapeDesc {
             }
             ShapeSource::Bilinear(data) => made.shapes.push(patches(data, &placement).map_err(wrong)?),
             ShapeSource::Ply(path) => {
-                let ply = read_ply(&path).map_err(|error| match error {
+                let ply = mesh(&path).map_err(|error| match error {
                     PlyError::Io { source, .. } => ShapeError::Missing(path.clone(), source.to_string()),
                     other => ShapeError::Wrong(format!("{}: {other}", path.display())),
                 })?;
+                let ply = Arc::unwrap_or_clone(ply);
                 made.warnings = ply.warnings.iter().map(|w| format!("{}: {w}", path.display())).collect();
                 if !ply.quads.is_empty() {
                     let data = PatchData {

@@ -4,7 +4,7 @@ use super::checks::unknown;
 use super::spectrum::SpectrumUse;
 use super::state::Builder;
 use super::transform::affine;
-use crate::import::resources::{ImageEncoding, ImageRequest};
+use crate::import::images::{ImageEncoding, ImageRequest};
 use crate::textures::{
     CheckerboardMapping, Filter, FloatTexture, FloatTextureId, ImageTexture, Mapping2d, RgbTexture, RgbTextureId, Wrap,
 };

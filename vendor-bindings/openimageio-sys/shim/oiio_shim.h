@@ -15,7 +15,7 @@
 #include <stddef.h>
 #include <stdint.h>
 
-#define OIIO_SHIM_ABI 1
+#define OIIO_SHIM_ABI 2
 
 #if defined(_WIN32)
 #define OIIO_SHIM_API __declspec(dllexport)
@@ -99,6 +99,16 @@ OIIO_SHIM_API const char* oiio_shim_version(void);
 OIIO_SHIM_API const char* oiio_shim_extensions(void);
 /* Sets a global attribute: "threads", "exr_threads", "limits:imagesize_MB", "limits:channels". */
 OIIO_SHIM_API int32_t oiio_shim_set_int(const char* name, int32_t value, char* error, size_t error_size);
+
+/* ---- colour ---- */
+
+/* Turns `count` floats, RGB triples of the colour space `input`, into the colours of a display by the OpenColorIO
+   configuration that $OCIO names. Empty `display` and `view` are the configuration's defaults, empty `looks` those of the
+   view. `chosen` gets "display\nview". OIIO_UNSUPPORTED if the configuration cannot be read, or has no such names, or
+   OpenImageIO was built without OpenColorIO; the pixels then are undefined. */
+OIIO_SHIM_API int32_t oiio_shim_ocio_display(const char* input, const char* display, const char* view,
+                                             const char* looks, float* pixels, uint64_t count, char* chosen,
+                                             size_t chosen_size, char* error, size_t error_size);
 
 /* ---- reading ---- */
 

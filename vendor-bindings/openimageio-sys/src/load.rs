@@ -52,6 +52,14 @@ api! {
     /// Sets a global attribute: `threads`, `exr_threads`, `limits:imagesize_MB`, `limits:channels`.
     fn set_int(name: *const c_char, value: i32, error: *mut c_char, error_size: usize) -> i32;
 
+    /// Turns RGB triples of a colour space into the colours of a display, by the configuration that
+    /// `$OCIO` names. `chosen` gets the display and the view, one per line.
+    fn ocio_display(
+        input: *const c_char, display: *const c_char, view: *const c_char, looks: *const c_char,
+        pixels: *mut f32, count: u64, chosen: *mut c_char, chosen_size: usize,
+        error: *mut c_char, error_size: usize,
+    ) -> i32;
+
     /// Opens a file for reading. `unassociated_alpha` 1: colours as stored, not multiplied by alpha.
     fn input_open(
         path: *const c_char, unassociated_alpha: i32, input: *mut *mut OiioInput,

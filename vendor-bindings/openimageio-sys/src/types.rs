@@ -4,7 +4,7 @@ use std::ffi::{c_char, c_void};
 use std::mem::size_of;
 
 /// Version of the interface; the shim tells its own by `Api::abi`.
-pub const OIIO_SHIM_ABI: i32 = 1;
+pub const OIIO_SHIM_ABI: i32 = 2;
 
 /// Success.
 pub const OIIO_OK: i32 = 0;

@@ -163,3 +163,29 @@ fn flipped_bytes_are_an_error_or_pixels_but_never_a_crash() {
         }
     }
 }
+
+#[test]
+fn colours_that_are_no_triples_and_names_that_are_null_are_the_callers_fault() {
+    let (mut pixels, mut chosen) = ([0.5_f32; 4], [0 as std::ffi::c_char; 16]);
+    let (empty, data) = (c(""), pixels.as_mut_ptr());
+    // SAFETY: the name ends in a zero byte or is null, `data` holds four floats, `chosen` 16 bytes.
+    let mut display = |name: *const std::ffi::c_char, count| unsafe {
+        let name_of_all = empty.as_ptr();
+        check(|e, n| {
+            (api().ocio_display)(
+                name,
+                name_of_all,
+                name_of_all,
+                name_of_all,
+                data,
+                count,
+                chosen.as_mut_ptr(),
+                16,
+                e,
+                n,
+            )
+        })
+    };
+    assert_eq!(display(empty.as_ptr(), 4).unwrap_err().0, OIIO_INVALID_ARGUMENT);
+    assert_eq!(display(std::ptr::null(), 3).unwrap_err().0, OIIO_INVALID_ARGUMENT);
+}

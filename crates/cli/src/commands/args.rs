@@ -1,7 +1,12 @@
 //! Options that several subcommands share, as typed.
 
+use super::exr::ExrArgs;
+use super::frame_list::{FrameList, parse_frames};
+use super::look::LookArgs;
+use super::named::named;
 use super::part_args::PartArgs;
-use super::settings_args::{SettingsArgs, named};
+use super::settings_args::SettingsArgs;
+use super::watch_args::WatchArgs;
 use clap::Args;
 use clap::builder::{PossibleValuesParser, TypedValueParser};
 use lumiris::render::output::Aov;
@@ -59,6 +64,12 @@ pub(super) struct RenderArgs {
     /// [default: the name in the file, or SCENE.exr]
     #[arg(short, long, value_name = "FILE")]
     pub output: Vec<PathBuf>,
+    /// Frames of an animation, such as 1-48, 1-48:2 or 5,10-20: `####` in SCENE and FILE becomes the number of the frame
+    #[arg(long, value_name = "LIST", value_parser = parse_frames, requires = "output")]
+    pub frames: Option<FrameList>,
+    /// With --frames: leave out those whose images are there, and were not cut short by Ctrl-C
+    #[arg(long, requires = "frames")]
+    pub skip_existing: bool,
     /// Stop after the first pass that ends later than this many seconds, if not all samples per pixel are done before
     #[arg(long, value_name = "SECONDS", value_parser = parse_seconds)]
     pub time: Option<f64>,
@@ -66,9 +77,12 @@ pub(super) struct RenderArgs {
     /// --proposals optimal]
     #[arg(long, value_name = "LIST", value_delimiter = ',', value_parser = aov())]
     pub aov: Option<Vec<Option<Aov>>>,
-    /// Exposure of PNG, JPEG, TIFF and TGA images, in stops
-    #[arg(long, value_name = "STOPS", default_value_t = 0.0, allow_negative_numbers = true)]
-    pub exposure: f32,
+    #[command(flatten)]
+    pub look: LookArgs,
+    #[command(flatten)]
+    pub exr: ExrArgs,
+    #[command(flatten)]
+    pub watch: WatchArgs,
     /// Write times and counts of every stage
     #[arg(long, value_name = "FILE.json")]
     pub stats: Option<PathBuf>,

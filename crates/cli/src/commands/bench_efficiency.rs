@@ -1,9 +1,10 @@
 //! `lumiris bench efficiency`: scenes × settings, as one table.
 
 use super::args::SceneArgs;
+use super::named::named;
 use super::progress;
 use super::settings::{load_job, render_settings};
-use super::settings_args::{SettingsArgs, named};
+use super::settings_args::SettingsArgs;
 use anyhow::Context;
 use clap::Args;
 use lumiris::lights::LightSamplerKind;

@@ -1,10 +1,13 @@
 //! `lumiris merge`: parts of an image become the image.
 
 use super::UsageError;
-use super::part_args::{PART_TYPE, extension};
+use super::exr::{CameraMatrices, ExrArgs};
+use super::look::LookArgs;
+use super::part_args::is_part;
+use super::pictures::{Picture, check_outputs, write_all};
 use super::progress;
-use super::render::{check_outputs, write_image};
 use super::stored::{AOV_NOTE, PLAN_NOTE, SCENE_NOTE, SECONDS_NOTE};
+use anyhow::bail;
 use clap::Args;
 use lumiris::render::output::Aov;
 use lumiris::render::parts::FilmReader;
@@ -24,9 +27,10 @@ pub(super) struct MergeArgs {
     /// Merge what there is if parts are missing, and say so in the metadata
     #[arg(long)]
     allow_missing: bool,
-    /// Exposure of PNG, JPEG, TIFF and TGA images, in stops
-    #[arg(long, value_name = "STOPS", default_value_t = 0.0, allow_negative_numbers = true)]
-    exposure: f32,
+    #[command(flatten)]
+    look: LookArgs,
+    #[command(flatten)]
+    exr: ExrArgs,
     /// Print only warnings and errors
     #[arg(short, long)]
     quiet: bool,
@@ -34,27 +38,43 @@ pub(super) struct MergeArgs {
 
 pub(super) fn run(args: &MergeArgs) -> anyhow::Result<ExitCode> {
     check_outputs(&args.output)?;
-    if let Some(path) = args.output.iter().find(|path| extension(path) == PART_TYPE) {
+    if let Some(path) = args.output.iter().find(|path| is_part(path)) {
         return Err(UsageError(format!("{}: parts are merged to an image, such as image.exr", path.display())).into());
     }
     if let Some(path) = repeated(&args.parts) {
         return Err(UsageError(format!("{} is given twice", path.display())).into());
     }
+    args.look.check()?;
+    args.exr.check()?;
+    if !args.exr.cryptomatte.is_empty() {
+        return Err(UsageError("--cryptomatte needs the scene: render the whole image with it".to_owned()).into());
+    }
     let seconds = seconds(args)?;
     let merged = merge(&args.parts, args.allow_missing)?;
-    let aovs = aovs(&merged);
-    for path in &args.output {
-        write_image(path, &merged.film, (&aovs, None), args.exposure, metadata(&merged, seconds))?;
-    }
+    let picture = Picture {
+        film: &merged.film,
+        look: &args.look,
+        exr: &args.exr,
+        aovs: aovs(&merged),
+        sample_count_map: None,
+        cryptomattes: &[],
+        camera: CameraMatrices::from_notes(|name| merged.header.note(name)),
+        seconds,
+        metadata: metadata(&merged, seconds),
+    };
+    let (written, misplaced) = write_all(&picture, &args.output);
     merged.missing.iter().for_each(|what| progress::say(&format!("warning: {what}: missing")));
     let invalid: u64 = merged.film.pixels.iter().map(|p| p.invalid).sum();
     if invalid > 0 {
         progress::say(&format!("warning: {invalid} samples were not finite, or too bright, and were counted as black"));
     }
     if !args.quiet {
-        let names: Vec<String> = args.output.iter().map(|path| path.display().to_string()).collect();
+        let names: Vec<String> = written.iter().map(|path| path.display().to_string()).collect();
         let noise = merged.film.relative_noise() * 100.0;
         progress::say(&format!("{} from {} parts, noise {noise:.2} %", names.join(", "), args.parts.len()));
+    }
+    if !misplaced.is_empty() {
+        bail!(misplaced.join("\nlumiris: "));
     }
     Ok(ExitCode::SUCCESS)
 }

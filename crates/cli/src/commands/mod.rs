@@ -8,26 +8,35 @@ mod bench;
 mod bench_efficiency;
 mod compare;
 mod crosscheck;
+mod exr;
+mod frame_list;
+mod frames;
 mod generate;
 mod info;
+mod look;
 mod merge;
+mod named;
 mod part_args;
 mod parts;
+mod pictures;
 mod plan;
 mod plan_file;
 mod progress;
 mod render;
 mod reproduce;
+mod rescue;
 mod settings;
 mod settings_args;
+mod shell;
 mod stored;
+mod watch_args;
 
-use clap::{Parser, Subcommand};
+use clap::{CommandFactory, Parser, Subcommand};
 use std::process::ExitCode;
 
 /// Offline CPU renderer for lighting integrals that are hard to sample.
 #[derive(Debug, Parser)]
-#[command(name = "lumiris", version, about, max_term_width = 110)]
+#[command(name = "lumiris", version, max_term_width = 110)]
 struct Cli {
     #[command(subcommand)]
     command: Command,
@@ -36,7 +45,7 @@ struct Cli {
 #[derive(Debug, Subcommand)]
 enum Command {
     /// Render a scene
-    Render(args::RenderArgs),
+    Render(Box<args::RenderArgs>),
     /// Measure what the settings of a scene leave open, and store the choices for render --plan
     Plan(plan::PlanArgs),
     /// Merge parts of an image, rendered with render --part, to the image
@@ -54,6 +63,10 @@ enum Command {
     Reproduce(reproduce::ReproduceArgs),
     /// Generate a statue, a sky, or the scenes of talbot, fan and keller-wald
     Generate(generate::GenerateArgs),
+    /// Print the completions of a shell
+    Completions(shell::CompletionsArgs),
+    /// Write manual pages
+    Man(shell::ManArgs),
 }
 
 /// Options that contradict each other.
@@ -65,7 +78,10 @@ struct UsageError(String);
 pub(crate) fn run() -> ExitCode {
     let cli = Cli::parse();
     let result = match &cli.command {
-        Command::Render(args) => render::run(args),
+        Command::Render(args) => match &args.frames {
+            Some(list) => frames::run(args, list),
+            None => render::run(args),
+        },
         Command::Plan(args) => plan::run(args),
         Command::Merge(args) => merge::run(args),
         Command::Compare(args) => compare::run(args),
@@ -74,6 +90,8 @@ pub(crate) fn run() -> ExitCode {
         Command::Info(args) => info::run(args),
         Command::Reproduce(args) => reproduce::run(args),
         Command::Generate(args) => generate::run(args),
+        Command::Completions(args) => shell::completions(args, Cli::command()),
+        Command::Man(args) => shell::man(args, Cli::command()),
     };
     match result {
         Ok(code) => code,

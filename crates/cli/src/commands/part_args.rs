@@ -1,6 +1,6 @@
 //! Options of parts and checkpoints.
 
-use super::settings_args::named;
+use super::named::named;
 use clap::Args;
 use std::path::{Path, PathBuf};
 use strum::{EnumString, IntoStaticStr, VariantNames};
@@ -75,6 +75,11 @@ fn parse_checkpoint(text: &str) -> Result<(PathBuf, f64), String> {
         Some(_) => Err("expected FILE or FILE,SECONDS with a positive number of seconds".to_owned()),
         None => Ok((PathBuf::from(text), CHECKPOINT_SECONDS)),
     }
+}
+
+/// True if the name is that of a part.
+pub(super) fn is_part(path: &Path) -> bool {
+    extension(path) == PART_TYPE
 }
 
 /// The type of a file, as its name says.

@@ -2,7 +2,8 @@
 
 use super::UsageError;
 use super::args::{RenderArgs, SceneArgs};
-use super::part_args::{PART_TYPE, extension};
+use super::exr::CameraMatrices;
+use super::part_args::is_part;
 use super::plan_file::PlanFile;
 use super::progress;
 use super::stored::{AOV_NOTE, PLAN_NOTE, SCENE_NOTE, SECONDS_NOTE, Stored};
@@ -21,7 +22,7 @@ use std::time::Duration;
 pub(super) fn check(args: &RenderArgs) -> anyhow::Result<()> {
     let usage = |text: &str| Err(UsageError(text.to_owned()).into());
     let parts = &args.parts;
-    let has_part_file = args.output.iter().any(|path| extension(path) == PART_TYPE);
+    let has_part_file = args.output.iter().any(|path| is_part(path));
     if parts.part.is_some() && !parts.is_by_tiles() && (parts.samples_from.is_some() || parts.samples_to.is_some()) {
         return usage("--part is a share of the samples: it cannot stand beside --samples-from and --samples-to");
     }
@@ -30,6 +31,13 @@ pub(super) fn check(args: &RenderArgs) -> anyhow::Result<()> {
     }
     if parts.is_partial() && args.time.is_some() {
         return usage("parts of an image cannot be limited by --time: their samples would not be known");
+    }
+    let is_stored = parts.is_partial() || parts.checkpoint.is_some() || parts.resume.is_some();
+    if args.frames.is_some() && (is_stored || has_part_file) {
+        return usage("--frames cannot stand beside parts and checkpoints: render each frame by a command of its own");
+    }
+    if parts.is_partial() && !args.exr.cryptomatte.is_empty() {
+        return usage("--cryptomatte needs the whole image, not a part");
     }
     for path in parts.checkpoint.iter().map(|(path, _)| path) {
         let folder = path.parent().filter(|p| !p.as_os_str().is_empty()).unwrap_or(Path::new("."));
@@ -87,13 +95,13 @@ impl FilmFile {
     ) -> anyhow::Result<Option<FilmFile>> {
         let spp = settings.spp;
         extent(args, settings, stored.as_ref())?;
-        let keeps_sums = args.output.iter().any(|path| extension(path) == PART_TYPE);
+        let keeps_sums = args.output.iter().any(|path| is_part(path));
         if !keeps_sums && stored.is_none() && args.parts.checkpoint.is_none() {
             return Ok(None);
         }
         let fingerprint = files.fingerprint();
         let fingerprint = fingerprint.map_err(|(path, e)| anyhow::anyhow!("cannot read {}: {e}", path.display()))?;
-        let described = [described(args, job, settings), notes(args, plan)?];
+        let described = [described(args, job, settings), notes(args, plan, job)?];
         let mut header = FilmHeader::new(job, settings, spp, fingerprint, described);
         if let Some(stored) = &stored {
             let mut differences = stored.header.differences_of_settings(&header);
@@ -117,13 +125,17 @@ impl FilmFile {
     /// What the rendering goes on from.
     pub(super) fn continuation(&mut self) -> Continuation<'_> {
         let (stored, checkpoints) = (self.stored.take(), self.checkpoints.as_mut());
-        Continuation { stored, checkpoints, keeps_sums: self.keeps_sums }
+        Continuation { stored, checkpoints, keeps_sums: self.keeps_sums, watch: None }
+    }
+
+    /// Notes how the rendering ended.
+    pub(super) fn end(&mut self, rendering: &Rendering) {
+        self.header.is_finished = rendering.complete;
+        self.header.notes.push((SECONDS_NOTE.to_owned(), rendering.elapsed.as_secs_f64().to_string()));
     }
 
     /// Writes a part.
-    pub(super) fn write(&mut self, path: &Path, rendering: &Rendering) -> anyhow::Result<()> {
-        self.header.is_finished = rendering.complete;
-        self.header.notes.push((SECONDS_NOTE.to_owned(), rendering.elapsed.as_secs_f64().to_string()));
+    pub(super) fn write(&self, path: &Path, rendering: &Rendering) -> anyhow::Result<()> {
         let sums = rendering.sums.as_ref().context("the sums of the image were not kept")?;
         Ok(write_film(path, &self.header, sums)?)
     }
@@ -196,7 +208,7 @@ fn described(args: &RenderArgs, job: &RenderJob, settings: &RenderSettings) -> V
 }
 
 /// What may differ between parts, and what going on needs.
-fn notes(args: &RenderArgs, plan: &PlanFile) -> anyhow::Result<Vec<(String, String)>> {
+fn notes(args: &RenderArgs, plan: &PlanFile, job: &RenderJob) -> anyhow::Result<Vec<(String, String)>> {
     let SceneArgs { scene, resolution, crop, box_filter, .. } = &args.scene;
     let mut notes = vec![(SCENE_NOTE, scene.display().to_string())];
     notes.extend(resolution.map(|[w, h]| ("resolution", format!("{w}x{h}"))));
@@ -205,5 +217,7 @@ fn notes(args: &RenderArgs, plan: &PlanFile) -> anyhow::Result<Vec<(String, Stri
     notes.extend((!plan.settings.is_empty()).then(|| plan.text()).transpose()?.map(|text| (PLAN_NOTE, text)));
     let name = |aov: &Option<Aov>| aov.map_or("none", <&str>::from);
     notes.extend(args.aov.as_ref().map(|list| (AOV_NOTE, list.iter().map(name).collect::<Vec<_>>().join(","))));
-    Ok(notes.into_iter().map(|(key, value)| (key.to_owned(), value)).collect())
+    let mut notes: Vec<_> = notes.into_iter().map(|(key, value)| (key.to_owned(), value)).collect();
+    notes.extend(CameraMatrices::of(&job.world.scene.camera).notes());
+    Ok(notes)
 }

@@ -4,9 +4,10 @@
 use indicatif::{ProgressBar, ProgressDrawTarget, ProgressStyle};
 use lumiris::render::Progress;
 
-/// Prints a line to standard error.
+/// Prints a line to standard error; that nobody reads it is no reason to lose a rendering.
 pub(super) fn say(text: &str) {
-    eprintln!("{text}");
+    use std::io::Write;
+    let _ = writeln!(std::io::stderr().lock(), "{text}");
 }
 
 /// Prints a line to standard output; a closed pipe is not an error.

@@ -2,19 +2,22 @@
 
 use super::UsageError;
 use super::args::RenderArgs;
-use super::part_args::{PART_TYPE, extension};
+use super::part_args::is_part;
 use super::parts::{self, FilmFile};
-use super::plan_file::PlanFile;
+use super::pictures::{Made, check_outputs, is_exr, write_pictures};
 use super::progress::{self, Bar};
+use super::rescue::write_or_rescue;
 use super::settings::{SetupTimes, load_job_of, plan, render_settings};
 use super::stored::Stored;
+use crate::watch::{self, Watch};
 use anyhow::{Context, bail};
 use lumiris::film::Film;
-use lumiris::imaging::oiio::{self, Part};
+use lumiris::import::cache::FileCache;
 use lumiris::integrators::photon_map::MapStats;
+use lumiris::render::cryptomatte::cryptomattes;
 use lumiris::render::output::{self, Aov};
-use lumiris::render::{CacheReport, Continuation, RenderSettings, Rendering, go_on};
-use lumiris::scene::{RenderJob, SampleCountMap};
+use lumiris::render::{CacheReport, Continuation, Progress, RenderSettings, Rendering, go_on};
+use lumiris::scene::RenderJob;
 use lumiris_formats::output::write_text;
 use serde_json::json;
 use std::path::{Path, PathBuf};
@@ -23,58 +26,158 @@ use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::time::Duration;
 
-/// File types for display-referred images.
-const DISPLAY_TYPES: [&str; 6] = ["png", "jpg", "jpeg", "tif", "tiff", "tga"];
 /// Exit code of a rendering that was stopped by Ctrl-C, as in shells.
 pub(super) const INTERRUPTED: u8 = 130;
 
+/// What the renderings of one run of the program have in common.
+pub(super) struct Session {
+    /// True once Ctrl-C was pressed.
+    pub stop: Arc<AtomicBool>,
+    /// Meshes and images that scenes share.
+    pub files: FileCache,
+    /// Those who watch.
+    watch: Watch,
+}
+
+/// A picture that was rendered.
+pub(super) struct Rendered {
+    /// Statistics.
+    pub stats: serde_json::Value,
+    /// Wall-clock time of the rendering (s).
+    pub seconds: f64,
+    /// Mean relative standard error of the pixels.
+    pub noise: f64,
+    /// True if every pixel has all its samples.
+    pub complete: bool,
+    /// Why files could not be written where they should be, and where they are instead.
+    pub misplaced: Vec<String>,
+}
+
 pub(super) fn run(args: &RenderArgs) -> anyhow::Result<ExitCode> {
+    let session = Session::start(args, FileCache::default())?;
+    let mut rendered = render_one(args, &session)?;
+    if let Some(path) = &args.stats {
+        rendered.misplaced.extend(write_stats(path, &rendered.stats).err().map(|e| format!("{e:#}")));
+    }
+    if !rendered.misplaced.is_empty() {
+        bail!(rendered.misplaced.join("\nlumiris: "));
+    }
+    Ok(if session.is_stopped() { ExitCode::from(INTERRUPTED) } else { ExitCode::SUCCESS })
+}
+
+impl Session {
+    /// From here on Ctrl-C ends renderings in an orderly way, and they can be watched.
+    pub(super) fn start(args: &RenderArgs, files: FileCache) -> anyhow::Result<Self> {
+        let watch = Watch::start(&args.watch.places()?, progress::say)?;
+        if let Some(address) = watch.page {
+            progress::say(&format!("the image can be watched at http://{address}/"));
+        }
+        let stop = Arc::new(AtomicBool::new(false));
+        stop_at_ctrl_c(&stop)?;
+        Ok(Session { stop, files, watch })
+    }
+
+    /// True once Ctrl-C was pressed.
+    pub(super) fn is_stopped(&self) -> bool {
+        self.stop.load(Ordering::Relaxed)
+    }
+}
+
+/// Renders a picture and writes it. What could not be written is no error here, but part of the result.
+pub(super) fn render_one(args: &RenderArgs, session: &Session) -> anyhow::Result<Rendered> {
     check_outputs(&args.output)?;
-    parts::check(args)?;
     let stored = Stored::read(&args.parts)?;
     let mut args = args.clone();
     stored.as_ref().map_or(Ok(()), |stored| stored.complete(&mut args))?;
     let args = &args;
-    let (mut job, setup, files) = load_job_of(&args.scene, stored.as_ref())?;
+    let asked = check(args)?;
+    let (mut job, setup, files) = load_job_of(&args.scene, &session.files, stored.as_ref())?;
     parts::check_settings(args, job.settings())?;
-    let asked = asked_aovs(args)?;
     let asks_for_ratio = asked.as_ref().is_some_and(|list| list.contains(&Aov::Ratio));
     let plan = plan(&args.scene, &mut job, asks_for_ratio, args.quiet)?;
     let outputs = outputs(args, &job);
-    check_outputs(&outputs)?;
-
-    let stop = Arc::new(AtomicBool::new(false));
-    stop_at_ctrl_c(&stop)?;
+    if args.output.is_empty() {
+        check_outputs(&outputs)?;
+    }
 
     let bar = Bar::new(args.quiet);
-    let time_limit = args.time.map(Duration::from_secs_f64);
     let needs = |is_shown: fn(&Aov) -> bool| asked.as_ref().is_none_or(|list| list.iter().any(is_shown));
     let mut settings = RenderSettings {
-        time_limit,
+        time_limit: args.time.map(Duration::from_secs_f64),
         with_replicas: needs(|aov| *aov == Aov::Variance),
         with_features: needs(|aov| aov.is_feature()),
         ..render_settings(&args.scene, &job)
     };
     let mut film_file = FilmFile::new(args, (&job, &plan, &files), &mut settings, stored)?;
     let continuation = film_file.as_mut().map_or_else(Continuation::default, FilmFile::continuation);
-    let rendering = go_on(&job, &settings, &stop, &|p| bar.update(p), continuation)?;
+    let rendering = render_shown((&job, &settings), session, (&name_of(args), &bar), continuation)?;
     bar.finish();
 
-    for path in &outputs {
-        match &mut film_file {
-            Some(film_file) if extension(path) == PART_TYPE => film_file.write(path, &rendering)?,
-            _ => write(args, (&job, &plan), &rendering, asked.as_deref(), path)?,
+    // Only EXR files hold them
+    let has_exr = outputs.iter().any(|path| is_exr(path));
+    let kinds = if has_exr { &args.exr.cryptomatte[..] } else { &[] };
+    let cryptomattes = cryptomattes(&job, &settings, &rendering.film, kinds)?;
+    let made = Made {
+        args,
+        job: &job,
+        plan: &plan,
+        rendering: &rendering,
+        asked: asked.as_deref(),
+        cryptomattes,
+        is_interrupted: session.is_stopped(),
+    };
+    let (part_files, images): (Vec<PathBuf>, Vec<PathBuf>) = outputs.into_iter().partition(|path| is_part(path));
+    let (mut written, mut misplaced) = write_pictures(&made, &images)?;
+    if let Some(film_file) = film_file.as_mut().filter(|_| !part_files.is_empty()) {
+        film_file.end(&rendering);
+        for path in part_files {
+            match write_or_rescue(&path, |path| film_file.write(path, &rendering)) {
+                Ok(()) => written.push(path),
+                Err(error) => misplaced.push(format!("{error:#}")),
+            }
         }
     }
-    if let Some(path) = &args.stats {
-        let mut stats = stats(args, &job, &rendering, setup);
-        stats["checkpoints"] = film_file.map_or(serde_json::Value::Null, |f| f.stats());
-        let text = serde_json::to_string_pretty(&stats)?;
-        write_text(path, &text).with_context(|| format!("cannot write {}", path.display()))?;
-    }
-    report(args, &rendering, &outputs);
-    let interrupted = stop.load(Ordering::Relaxed);
-    Ok(if interrupted { ExitCode::from(INTERRUPTED) } else { ExitCode::SUCCESS })
+    report(args, &rendering, &written);
+    let mut stats = stats(args, &job, &rendering, setup);
+    stats["checkpoints"] = film_file.map_or(serde_json::Value::Null, |f| f.stats());
+    Ok(Rendered {
+        stats,
+        seconds: rendering.elapsed.as_secs_f64(),
+        noise: rendering.film.relative_noise(),
+        complete: rendering.complete,
+        misplaced,
+    })
+}
+
+/// Renders, for those who watch as well.
+fn render_shown(
+    (job, settings): (&RenderJob, &RenderSettings),
+    session: &Session,
+    (name, bar): (&str, &Bar),
+    continuation: Continuation<'_>,
+) -> anyhow::Result<Rendering> {
+    let canvas = session.watch.begin(name, &job.world.scene.film, settings.with_features);
+    let observe = |progress: &Progress| {
+        bar.update(progress);
+        watch::observe(canvas.as_ref(), progress);
+    };
+    let Some(shown) = &canvas else { return Ok(go_on(job, settings, &session.stop, &observe, continuation)?) };
+    let set_tile = |tile: &Film| shown.set_tile(tile);
+    let watched = Continuation { watch: Some(&set_tile), ..continuation };
+    let rendering = go_on(job, settings, &session.stop, &observe, watched)?;
+    shown.finish(&rendering.film, settings.tile_size);
+    Ok(rendering)
+}
+
+/// What an image is called by those who watch: the name of its scene, without folders.
+fn name_of(args: &RenderArgs) -> String {
+    args.scene.scene.file_name().unwrap_or_default().to_string_lossy().into_owned()
+}
+
+/// Writes statistics.
+pub(super) fn write_stats(path: &Path, stats: &serde_json::Value) -> anyhow::Result<()> {
+    let text = serde_json::to_string_pretty(stats)?;
+    write_or_rescue(path, |path| write_text(path, &text).with_context(|| format!("cannot write {}", path.display())))
 }
 
 /// Ctrl-C sets `stop`, which ends a rendering in an orderly way; a second one ends the program.
@@ -100,19 +203,12 @@ fn outputs(args: &RenderArgs, job: &RenderJob) -> Vec<PathBuf> {
     })]
 }
 
-/// Rejects outputs that cannot be written, before time is spent on rendering.
-pub(super) fn check_outputs(outputs: &[PathBuf]) -> anyhow::Result<()> {
-    for path in outputs {
-        let kind = extension(path);
-        if kind != "exr" && kind != PART_TYPE && !DISPLAY_TYPES.contains(&kind.as_str()) {
-            bail!("{}: the output format must be .exr, .{}", path.display(), DISPLAY_TYPES.join(", ."));
-        }
-        let folder = path.parent().filter(|p| !p.as_os_str().is_empty()).unwrap_or(Path::new("."));
-        if !folder.is_dir() {
-            bail!("{}: folder {} does not exist", path.display(), folder.display());
-        }
-    }
-    Ok(())
+/// Refuses options that cannot be, and returns the AOVs that are asked for.
+pub(super) fn check(args: &RenderArgs) -> anyhow::Result<Option<Vec<Aov>>> {
+    args.look.check()?;
+    args.exr.check()?;
+    parts::check(args)?;
+    asked_aovs(args)
 }
 
 /// The AOVs that are asked for; `None` is the default.
@@ -123,58 +219,6 @@ fn asked_aovs(args: &RenderArgs) -> anyhow::Result<Option<Vec<Aov>>> {
         return Err(UsageError("--aov none cannot stand beside other AOVs".to_owned()).into());
     }
     Ok(Some(aovs))
-}
-
-fn write(
-    args: &RenderArgs,
-    (job, plan): (&RenderJob, &PlanFile),
-    rendering: &Rendering,
-    asked: Option<&[Aov]>,
-    path: &Path,
-) -> anyhow::Result<()> {
-    let film = &rendering.film;
-    let mut metadata = output::metadata(&job.world.scene.film, job.settings());
-    metadata.push(("lumiris:scene".to_owned(), args.scene.scene.display().to_string()));
-    metadata.push(("lumiris:accel".to_owned(), <&str>::from(args.scene.accel).to_owned()));
-    if !plan.settings.is_empty() {
-        metadata.push(("lumiris:plan".to_owned(), plan.text()?));
-    }
-    metadata.push(("lumiris:complete".to_owned(), rendering.complete.to_string()));
-    let done = || film.pixels.iter().map(|p| p.count);
-    let range = format!("{} to {} per pixel", done().min().unwrap_or(0), done().max().unwrap_or(0));
-    metadata.push(("lumiris:samples_done".to_owned(), range));
-    metadata.push(("lumiris:seconds".to_owned(), format!("{:.3}", rendering.elapsed.as_secs_f64())));
-    let aovs: Vec<Aov> = match asked {
-        Some(list) => list.to_vec(),
-        None => {
-            let ratio = job.sample_count_map.as_ref().map(|_| Aov::Ratio);
-            let records = rendering.cache.map(|_| Aov::Records);
-            Aov::ALL.into_iter().chain(ratio).chain(records).collect()
-        }
-    };
-    write_image(path, film, (&aovs, job.sample_count_map.as_ref()), args.exposure, metadata)
-}
-
-/// Writes an image: all channels or a tone-mapped one, as its name says.
-pub(super) fn write_image(
-    path: &Path,
-    film: &Film,
-    (aovs, sample_count_map): (&[Aov], Option<&SampleCountMap>),
-    exposure: f32,
-    metadata: Vec<(String, String)>,
-) -> anyhow::Result<()> {
-    let (width, height) = (film.bounds.width() as usize, film.bounds.height() as usize);
-    let part = if extension(path) == "exr" {
-        let channels = output::channels(film, aovs, sample_count_map);
-        Part::linear(width, height, channels.names, channels.data)
-    } else {
-        let names = ["R", "G", "B"].map(str::to_owned).to_vec();
-        Part::display(width, height, names, output::display(film, exposure))
-    };
-    let full = [film.resolution[0] as usize, film.resolution[1] as usize];
-    let part = part.with_metadata(metadata).with_window([film.bounds.x0 as usize, film.bounds.y0 as usize], full);
-    oiio::write_image(path, &[part])?;
-    Ok(())
 }
 
 fn stats(args: &RenderArgs, job: &RenderJob, rendering: &Rendering, setup: SetupTimes) -> serde_json::Value {
@@ -255,11 +299,11 @@ fn report(args: &RenderArgs, rendering: &Rendering, outputs: &[PathBuf]) {
         return;
     }
     let names: Vec<String> = outputs.iter().map(|p| p.display().to_string()).collect();
+    let names = if names.is_empty() { "rendered".to_owned() } else { names.join(", ") };
     let spp = rendering.film.pixels.iter().map(|p| p.count).filter(|n| *n > 0).min().unwrap_or(0);
     let partial = if rendering.complete { "" } else { " (stopped early)" };
     progress::say(&format!(
-        "{} after {:.1} s, {spp} samples per pixel{partial}, noise {:.2} %",
-        names.join(", "),
+        "{names} after {:.1} s, {spp} samples per pixel{partial}, noise {:.2} %",
         rendering.elapsed.as_secs_f64(),
         rendering.film.relative_noise() * 100.0
     ));

@@ -7,8 +7,9 @@ use super::progress;
 use super::stored::Stored;
 use anyhow::{Context, bail};
 use lumiris::film::filter::PixelFilter;
+use lumiris::import::cache::FileCache;
 use lumiris::import::fingerprint::SceneFiles;
-use lumiris::import::{LoadOptions, Loaded, load};
+use lumiris::import::{LoadOptions, Loaded, load_with};
 use lumiris::render::RenderSettings;
 use lumiris::render::allocation::allows_adaptive;
 use lumiris::render::plan::prepare;
@@ -31,10 +32,11 @@ pub(super) struct SetupTimes {
     pub build: f64,
 }
 
-/// Loads the scene and applies the options, after the settings of what is stored; prints warnings.
-fn load_scene(args: &SceneArgs, stored: Option<&Stored>) -> anyhow::Result<Loaded> {
+/// Loads the scene, but what `files` has of its files, and applies the options, after the settings of what is stored; prints
+/// warnings.
+fn load_scene(args: &SceneArgs, files: &FileCache, stored: Option<&Stored>) -> anyhow::Result<Loaded> {
     let options = LoadOptions { resolution: args.resolution, crop: args.crop };
-    let mut loaded = match load(&args.scene, &options) {
+    let mut loaded = match load_with(&args.scene, &options, files) {
         Ok(loaded) => loaded,
         Err(diagnostics) => {
             progress::say(diagnostics.to_string().trim_end());
@@ -79,16 +81,17 @@ fn load_scene(args: &SceneArgs, stored: Option<&Stored>) -> anyhow::Result<Loade
 
 /// Loads the scene and builds its ray tracers.
 pub(super) fn load_job(args: &SceneArgs) -> anyhow::Result<(RenderJob, SetupTimes)> {
-    load_job_of(args, None).map(|(job, times, _)| (job, times))
+    load_job_of(args, &FileCache::default(), None).map(|(job, times, _)| (job, times))
 }
 
-/// The same, with the settings of what is stored; also returns the files of the scene.
+/// The same with the settings of what is stored, and without reading what `files` has; also returns the files of the scene.
 pub(super) fn load_job_of(
     args: &SceneArgs,
+    files: &FileCache,
     stored: Option<&Stored>,
 ) -> anyhow::Result<(RenderJob, SetupTimes, SceneFiles)> {
     let start = Instant::now();
-    let mut loaded = load_scene(args, stored)?;
+    let mut loaded = load_scene(args, files, stored)?;
     let files = std::mem::take(&mut loaded.files);
     let load = start.elapsed().as_secs_f64();
     let start = Instant::now();

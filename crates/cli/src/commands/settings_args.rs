@@ -5,8 +5,6 @@ use clap::{Arg, ArgMatches, Args, Command, FromArgMatches};
 use lumiris::settings::Settings;
 use lumiris::settings::table::{GROUPS, Setting, rows};
 use lumiris::settings::value::{Integers, Kind, Value};
-use std::str::FromStr;
-use strum::VariantNames;
 
 /// The settings given as options, in the order of the table.
 #[derive(Clone, Debug, Default)]
@@ -65,14 +63,6 @@ impl FromArgMatches for SettingsArgs {
         self.typed.extend(rows().filter_map(typed));
         Ok(())
     }
-}
-
-/// A parser of the names of an enumeration.
-pub(super) fn named<T>() -> impl TypedValueParser<Value = T>
-where
-    T: VariantNames + FromStr<Err = strum::ParseError> + Clone + Send + Sync + 'static,
-{
-    PossibleValuesParser::new(T::VARIANTS).try_map(|name| name.parse::<T>())
 }
 
 /// The option of a setting.

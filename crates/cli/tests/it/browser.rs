@@ -119,7 +119,11 @@ impl Browser {
 
     /// Opens a file and waits until `ready` (a script) is true.
     pub(crate) fn open(&self, path: &Path, ready: &str) {
-        let url = format!("file://{}", path.display());
+        self.open_url(&format!("file://{}", path.display()), ready);
+    }
+
+    /// Opens a page and waits until `ready` (a script) is true.
+    pub(crate) fn open_url(&self, url: &str, ready: &str) {
         let answer = self.call("Page.navigate", json!({ "url": url }));
         assert!(answer["errorText"].is_null(), "{answer}");
         self.wait_for(ready);

@@ -1,0 +1,140 @@
+//! `lumiris render --frames`: the frames of an animation, one after the other.
+//!
+//! What frames share is read once (see [`FileCache`]). A frame that fails does not stop the others; a table at the end
+//! says what became of each.
+
+use super::UsageError;
+use super::args::RenderArgs;
+use super::frame_list::{FrameList, has_number, numbered};
+use super::pictures::are_complete;
+use super::progress;
+use super::render::{INTERRUPTED, Rendered, Session, check, render_one, write_stats};
+use lumiris::import::cache::{FileCache, FileCounts};
+use serde_json::json;
+use std::process::ExitCode;
+
+/// What became of a frame.
+enum Outcome {
+    /// It was rendered and written.
+    Done(Rendered),
+    /// Its images were there.
+    Skipped,
+    /// It could not be loaded, rendered or written.
+    Failed(String, Option<Rendered>),
+    /// Ctrl-C came before.
+    NotRendered,
+}
+
+struct Frame {
+    number: u32,
+    outcome: Outcome,
+    files: FileCounts,
+}
+
+pub(super) fn run(args: &RenderArgs, list: &FrameList) -> anyhow::Result<ExitCode> {
+    check_names(args)?;
+    check(args)?;
+    let session = Session::start(args, FileCache::keeping())?;
+    let mut frames = Vec::with_capacity(list.0.len());
+    for (index, &number) in list.0.iter().enumerate() {
+        let outcome = if session.is_stopped() {
+            Outcome::NotRendered
+        } else {
+            if !args.quiet {
+                progress::say(&format!("frame {number} ({} of {})", index + 1, list.0.len()));
+            }
+            render_frame(&of_frame(args, number), &session)
+        };
+        let files = session.files.end_scene();
+        frames.push(Frame { number, outcome, files });
+    }
+
+    // The table, without what went well if the program is to be quiet
+    let failed = frames.iter().filter(|f| matches!(f.outcome, Outcome::Failed(..))).count();
+    let shown = frames.iter().filter(|f| !args.quiet || matches!(f.outcome, Outcome::Failed(..)));
+    let rows: Vec<String> = shown.map(row).collect();
+    if !rows.is_empty() {
+        progress::say(&format!("{HEADER}\n{}", rows.join("\n")));
+    }
+    if let Some(path) = &args.stats {
+        write_stats(path, &stats(&frames))?;
+    }
+    if failed > 0 {
+        progress::say(&format!("lumiris: {failed} of {} frames failed", frames.len()));
+        return Ok(ExitCode::from(3));
+    }
+    Ok(if session.is_stopped() { ExitCode::from(INTERRUPTED) } else { ExitCode::SUCCESS })
+}
+
+/// Scene and images must have a place for the number: all frames would be the same, or overwrite each other.
+fn check_names(args: &RenderArgs) -> Result<(), UsageError> {
+    let names = args.output.iter().chain([&args.scene.scene]);
+    match names.into_iter().find(|path| !has_number(path)) {
+        Some(path) => Err(UsageError(format!("--frames: {} has no #### for the number of the frame", path.display()))),
+        None => Ok(()),
+    }
+}
+
+/// The options of one frame.
+fn of_frame(args: &RenderArgs, frame: u32) -> RenderArgs {
+    let mut args = args.clone();
+    args.scene.scene = numbered(&args.scene.scene, frame);
+    args.output.iter_mut().for_each(|path| *path = numbered(path, frame));
+    (args.frames, args.stats) = (None, None);
+    args
+}
+
+fn render_frame(args: &RenderArgs, session: &Session) -> Outcome {
+    if args.skip_existing && are_complete(&args.output) {
+        return Outcome::Skipped;
+    }
+    match render_one(args, session) {
+        Ok(rendered) if rendered.misplaced.is_empty() => Outcome::Done(rendered),
+        Ok(rendered) => Outcome::Failed(rendered.misplaced.join("; "), Some(rendered)),
+        Err(error) => {
+            let reason = format!("{error:#}");
+            progress::say(&format!("lumiris: {reason}"));
+            Outcome::Failed(reason, None)
+        }
+    }
+}
+
+const HEADER: &str = "   frame   seconds   noise  files read, shared";
+
+fn row(frame: &Frame) -> String {
+    let Frame { number, outcome, files } = frame;
+    let rendered = |rendered: &Rendered, note: &str| {
+        let files = format!("{}, {}", files.read, files.shared);
+        format!("{number:>8}{:>10.1}{:>7.2} %  {files:<18}{note}", rendered.seconds, rendered.noise * 100.0)
+    };
+    let other = |text: &str| format!("{number:>8}  {text}");
+    match outcome {
+        Outcome::Done(made) => rendered(made, if made.complete { "" } else { "  stopped early" }).trim_end().to_owned(),
+        Outcome::Skipped => other("is there already"),
+        Outcome::Failed(reason, Some(made)) => rendered(made, &format!("  failed: {}", one_line(reason))),
+        Outcome::Failed(reason, None) => other(&format!("failed: {}", one_line(reason))),
+        Outcome::NotRendered => other("not rendered: stopped by Ctrl-C"),
+    }
+}
+
+fn one_line(text: &str) -> String {
+    text.split_whitespace().collect::<Vec<_>>().join(" ")
+}
+
+/// What `--stats` stores of all frames.
+fn stats(frames: &[Frame]) -> serde_json::Value {
+    let of_frame = |frame: &Frame| {
+        let (result, reason, rendered) = match &frame.outcome {
+            Outcome::Done(rendered) => ("done", None, Some(rendered)),
+            Outcome::Skipped => ("skipped", None, None),
+            Outcome::Failed(reason, rendered) => ("failed", Some(reason), rendered.as_ref()),
+            Outcome::NotRendered => ("not rendered", None, None),
+        };
+        json!({
+            "frame": frame.number, "result": result, "reason": reason,
+            "files": { "read": frame.files.read, "shared": frame.files.shared },
+            "stats": rendered.map(|r| &r.stats),
+        })
+    };
+    json!({ "frames": frames.iter().map(of_frame).collect::<Vec<_>>() })
+}

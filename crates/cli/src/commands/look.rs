@@ -1,0 +1,151 @@
+//! From light to the colours of a display: exposure and view transform of PNG, JPEG, TIFF and TGA images.
+
+use super::UsageError;
+use anyhow::Context;
+use clap::Args;
+use clap::builder::{PossibleValuesParser, TypedValueParser};
+use lumiris::film::Film;
+use lumiris::imaging::ViewTransform;
+use lumiris::imaging::oiio::{OcioView, ocio_display};
+use lumiris::imaging::view_transform::auto_exposure;
+use lumiris::render::output::exposed;
+use strum::VariantNames;
+
+/// Names that configurations have for linear light with the primaries of Rec.709, which is what images hold.
+const LINEAR_REC709: [&str; 7] = [
+    "lin_rec709",
+    "lin_srgb",
+    "Linear Rec.709 (sRGB)",
+    "Linear Rec.709",
+    "Utility - Linear - Rec.709",
+    "Utility - Linear - sRGB",
+    "lnf",
+];
+
+/// Exposure of images for a display.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub(super) enum Exposure {
+    /// As many stops.
+    Stops(f32),
+    /// From the image.
+    Auto,
+}
+
+/// A view transform.
+#[derive(Clone, Copy, Debug, PartialEq)]
+enum View {
+    /// One of the renderer's.
+    Curve(ViewTransform),
+    /// That of an OpenColorIO configuration.
+    Ocio,
+}
+
+/// Options of images for a display.
+#[derive(Args, Clone, Debug)]
+#[command(next_help_heading = "PNG, JPEG, TIFF and TGA")]
+pub(super) struct LookArgs {
+    /// Exposure in stops, or `auto`: the geometric mean of the luminance becomes middle grey
+    #[arg(long, value_name = "STOPS", default_value = "0", allow_negative_numbers = true, value_parser = parse_exposure)]
+    exposure: Exposure,
+    /// View transform: `ocio` is that of the OpenColorIO configuration that the environment variable OCIO names
+    #[arg(long, value_name = "NAME", default_value = "srgb", value_parser = view())]
+    view_transform: View,
+    /// Display of the configuration [default: the configuration's]
+    #[arg(long, value_name = "NAME")]
+    ocio_display: Option<String>,
+    /// View of the display [default: the display's]
+    #[arg(long, value_name = "NAME")]
+    ocio_view: Option<String>,
+    /// Looks instead of those of the view
+    #[arg(long, value_name = "NAMES")]
+    ocio_looks: Option<String>,
+    /// The configuration's name of linear light with the primaries of Rec.709 [default: the one of the usual names that
+    /// it has]
+    #[arg(long, value_name = "NAME")]
+    ocio_input: Option<String>,
+}
+
+/// Colours for a display, and what they depend on.
+pub(super) struct Displayed {
+    /// RGB, interleaved, 0..1.
+    pub pixels: Vec<f32>,
+    /// Exposure and view transform, as metadata.
+    pub metadata: Vec<(String, String)>,
+}
+
+fn parse_exposure(text: &str) -> Result<Exposure, String> {
+    match text.parse::<f32>() {
+        _ if text == "auto" => Ok(Exposure::Auto),
+        Ok(stops) if stops.is_finite() => Ok(Exposure::Stops(stops)),
+        _ => Err("expected a number of stops, or `auto`".to_owned()),
+    }
+}
+
+fn view() -> impl TypedValueParser<Value = View> {
+    let names = ViewTransform::VARIANTS.iter().copied().chain(["ocio"]);
+    PossibleValuesParser::new(names)
+        .try_map(|name| if name == "ocio" { Ok(View::Ocio) } else { name.parse().map(View::Curve) })
+}
+
+impl LookArgs {
+    /// Refuses what cannot be, before time is spent on rendering.
+    pub(super) fn check(&self) -> anyhow::Result<()> {
+        let is_ocio = self.view_transform == View::Ocio;
+        let of_ocio = [&self.ocio_display, &self.ocio_view, &self.ocio_looks, &self.ocio_input];
+        if !is_ocio && of_ocio.iter().any(|option| option.is_some()) {
+            return Err(UsageError("--ocio-… needs --view-transform ocio".to_owned()).into());
+        }
+        if is_ocio {
+            if std::env::var_os("OCIO").is_none_or(|path| path.is_empty()) {
+                let help = "--view-transform ocio: the environment variable OCIO names no configuration";
+                return Err(UsageError(help.to_owned()).into());
+            }
+            self.ocio(&mut [0.18; 3])?;
+        }
+        Ok(())
+    }
+
+    /// The exposure of an image (stops).
+    fn stops(&self, film: &Film) -> f32 {
+        match self.exposure {
+            Exposure::Stops(stops) => stops,
+            Exposure::Auto => auto_exposure(film.pixels.iter().map(|pixel| pixel.mean().map(|v| v as f32))),
+        }
+    }
+
+    /// The colours of an image.
+    pub(super) fn apply(&self, film: &Film) -> anyhow::Result<Displayed> {
+        let stops = self.stops(film);
+        let mut pixels = exposed(film, stops);
+        let view = match self.view_transform {
+            View::Curve(curve) => {
+                for rgb in pixels.as_chunks_mut::<3>().0 {
+                    *rgb = curve.apply(*rgb);
+                }
+                <&str>::from(curve).to_owned()
+            }
+            View::Ocio => self.ocio(&mut pixels)?,
+        };
+        let entry = |key: &str, value: String| (format!("lumiris:{key}"), value);
+        Ok(Displayed { pixels, metadata: vec![entry("exposure", stops.to_string()), entry("view_transform", view)] })
+    }
+
+    /// Applies the configuration; returns its names.
+    fn ocio(&self, pixels: &mut [f32]) -> anyhow::Result<String> {
+        let or_empty = |name: &Option<String>| name.clone().unwrap_or_default();
+        let (display, view, looks) =
+            (or_empty(&self.ocio_display), or_empty(&self.ocio_view), or_empty(&self.ocio_looks));
+        let by = |input: &str, pixels: &mut [f32]| {
+            ocio_display(pixels, &OcioView { input, display: &display, view: &view, looks: &looks })
+        };
+        let input = match &self.ocio_input {
+            Some(name) => name.as_str(),
+            None => *LINEAR_REC709.iter().find(|name| by(name, &mut [0.18; 3]).is_ok()).unwrap_or(&LINEAR_REC709[0]),
+        };
+        let [display, view] = by(input, pixels).with_context(|| {
+            format!("--view-transform ocio, with the colour space {input} (--ocio-input names another)")
+        })?;
+        let looks = if looks.is_empty() { looks } else { format!(", {looks}") };
+        Ok(format!("ocio: {input} to {display}, {view}{looks}"))
+    }
+}

@@ -1,0 +1,198 @@
+//! The image files of a rendering.
+
+use super::args::RenderArgs;
+use super::exr::{CameraMatrices, ExrArgs, ExrImage};
+use super::look::LookArgs;
+use super::part_args::{extension, is_part};
+use super::plan_file::PlanFile;
+use super::progress;
+use super::rescue::write_or_rescue;
+use anyhow::{Context, bail};
+use lumiris::film::Film;
+use lumiris::imaging::oiio::{self, Part};
+use lumiris::render::Rendering;
+use lumiris::render::cryptomatte::Layer;
+use lumiris::render::output::{self, Aov};
+use lumiris::scene::{RenderJob, SampleCountMap};
+use std::path::{Path, PathBuf};
+
+/// File types for display-referred images.
+const DISPLAY_TYPES: [&str; 6] = ["png", "jpg", "jpeg", "tif", "tiff", "tga"];
+/// Metadata of an image that Ctrl-C has cut short.
+const INTERRUPTED_KEY: &str = "lumiris:interrupted";
+
+/// A rendering with all that its files tell of it.
+pub(super) struct Made<'a> {
+    /// The options.
+    pub args: &'a RenderArgs,
+    /// What was rendered.
+    pub job: &'a RenderJob,
+    /// What its settings left to measurements.
+    pub plan: &'a PlanFile,
+    /// The film.
+    pub rendering: &'a Rendering,
+    /// AOVs that were asked for.
+    pub asked: Option<&'a [Aov]>,
+    /// Cryptomattes that were asked for.
+    pub cryptomattes: Vec<Layer>,
+    /// True if Ctrl-C ended it.
+    pub is_interrupted: bool,
+}
+
+/// True if the name is that of an EXR file.
+pub(super) fn is_exr(path: &Path) -> bool {
+    extension(path) == "exr"
+}
+
+/// Rejects outputs that cannot be written, before time is spent on rendering.
+pub(super) fn check_outputs(outputs: &[PathBuf]) -> anyhow::Result<()> {
+    for path in outputs {
+        if !is_exr(path) && !is_part(path) && !DISPLAY_TYPES.contains(&extension(path).as_str()) {
+            bail!("{}: the output format must be .exr, .{}", path.display(), DISPLAY_TYPES.join(", ."));
+        }
+        let folder = path.parent().filter(|p| !p.as_os_str().is_empty()).unwrap_or(Path::new("."));
+        if !folder.is_dir() {
+            bail!("{}: folder {} does not exist", path.display(), folder.display());
+        }
+        if path.is_dir() {
+            bail!("{} is a folder", path.display());
+        }
+        // As the image itself will be written; the file is gone at once
+        tempfile::Builder::new()
+            .prefix(".partial-")
+            .tempfile_in(folder)
+            .with_context(|| format!("{}: nothing can be written to {}", path.display(), folder.display()))?;
+    }
+    Ok(())
+}
+
+/// True if all these images are there, and none of them was cut short by Ctrl-C. (Images appear under their names when
+/// they are whole; only EXR and PNG tell of Ctrl-C.)
+pub(super) fn are_complete(outputs: &[PathBuf]) -> bool {
+    outputs.iter().all(|path| {
+        path.is_file() && oiio::read_metadata(path).is_ok_and(|metadata| !metadata.contains_key(INTERRUPTED_KEY))
+    })
+}
+
+/// Writes all images: those that were, and what went wrong with the others.
+pub(super) fn write_pictures(made: &Made<'_>, outputs: &[PathBuf]) -> anyhow::Result<(Vec<PathBuf>, Vec<String>)> {
+    Ok(write_all(&made.picture()?, outputs))
+}
+
+/// The same of any image.
+pub(super) fn write_all(picture: &Picture<'_>, outputs: &[PathBuf]) -> (Vec<PathBuf>, Vec<String>) {
+    let (mut written, mut misplaced) = (Vec::new(), Vec::new());
+    for path in outputs {
+        match write_or_rescue(path, |path| picture.write(path)) {
+            Ok(()) => written.push(path.clone()),
+            Err(error) => misplaced.push(format!("{error:#}")),
+        }
+    }
+    (written, misplaced)
+}
+
+/// An image, and how it is written.
+pub(super) struct Picture<'a> {
+    /// The film.
+    pub film: &'a Film,
+    /// Options of images for a display.
+    pub look: &'a LookArgs,
+    /// Options of EXR files.
+    pub exr: &'a ExrArgs,
+    /// AOVs of EXR files, and the map that one of them shows.
+    pub aovs: Vec<Aov>,
+    pub sample_count_map: Option<&'a SampleCountMap>,
+    /// Cryptomattes.
+    pub cryptomattes: &'a [Layer],
+    /// Where the camera stood.
+    pub camera: CameraMatrices,
+    /// Wall-clock time of the rendering (s).
+    pub seconds: f64,
+    /// What the image depends on, and how it came about.
+    pub metadata: Vec<(String, String)>,
+}
+
+impl Picture<'_> {
+    /// Writes it: all channels, or colours for a display, as the name of the file says.
+    pub(super) fn write(&self, path: &Path) -> anyhow::Result<()> {
+        if is_exr(path) {
+            return self.write_exr(path);
+        }
+        let film = self.film;
+        let displayed = self.look.apply(film)?;
+        let (width, height) = (film.bounds.width() as usize, film.bounds.height() as usize);
+        let names = ["R", "G", "B"].map(str::to_owned).to_vec();
+        let full = [film.resolution[0] as usize, film.resolution[1] as usize];
+        let origin = [film.bounds.x0 as usize, film.bounds.y0 as usize];
+        let part = Part::display(width, height, names, displayed.pixels).with_window(origin, full);
+        let part = part.with_metadata(self.metadata.clone()).with_metadata(displayed.metadata);
+        oiio::write_image(path, &[part])?;
+        Ok(())
+    }
+
+    fn write_exr(&self, path: &Path) -> anyhow::Result<()> {
+        let (parts, warning) = self.exr.parts(ExrImage {
+            film: self.film,
+            camera: &self.camera,
+            seconds: self.seconds,
+            channels: output::channels(self.film, &self.aovs, self.sample_count_map),
+            cryptomattes: self.cryptomattes,
+            metadata: self.metadata.clone(),
+        });
+        if let Some(warning) = warning {
+            progress::say(&format!("{}: {warning}", path.display()));
+        }
+        oiio::write_image(path, &parts)?;
+        Ok(())
+    }
+}
+
+impl Made<'_> {
+    /// The image.
+    fn picture(&self) -> anyhow::Result<Picture<'_>> {
+        Ok(Picture {
+            film: &self.rendering.film,
+            look: &self.args.look,
+            exr: &self.args.exr,
+            aovs: self.aovs(),
+            sample_count_map: self.job.sample_count_map.as_ref(),
+            cryptomattes: &self.cryptomattes,
+            camera: CameraMatrices::of(&self.job.world.scene.camera),
+            seconds: self.rendering.elapsed.as_secs_f64(),
+            metadata: self.metadata()?,
+        })
+    }
+
+    /// The AOVs of EXR files.
+    fn aovs(&self) -> Vec<Aov> {
+        if let Some(list) = self.asked {
+            return list.to_vec();
+        }
+        let ratio = self.job.sample_count_map.as_ref().map(|_| Aov::Ratio);
+        let records = self.rendering.cache.map(|_| Aov::Records);
+        Aov::ALL.into_iter().chain(ratio).chain(records).collect()
+    }
+
+    /// What the image depends on, and how it came about.
+    fn metadata(&self) -> anyhow::Result<Vec<(String, String)>> {
+        let Made { args, job, rendering, .. } = self;
+        let mut metadata = output::metadata(&job.world.scene.film, job.settings());
+        let mut add = |key: &str, value: String| metadata.push((key.to_owned(), value));
+        add("lumiris:scene", args.scene.scene.display().to_string());
+        add("lumiris:accel", <&str>::from(args.scene.accel).to_owned());
+        if !self.plan.settings.is_empty() {
+            add("lumiris:plan", self.plan.text()?);
+        }
+        add("lumiris:complete", rendering.complete.to_string());
+        if self.is_interrupted {
+            add(INTERRUPTED_KEY, "true".to_owned());
+        }
+        let done = || rendering.film.pixels.iter().map(|p| p.count);
+        add(
+            "lumiris:samples_done",
+            format!("{} to {} per pixel", done().min().unwrap_or(0), done().max().unwrap_or(0)),
+        );
+        add("lumiris:seconds", format!("{:.3}", rendering.elapsed.as_secs_f64()));
+        Ok(metadata)
+    }
+}

@@ -1,0 +1,104 @@
+//! Watching an image while it converges: in tev ([`tev`]), and on a page in the browser ([`server`]).
+//!
+//! Threads that render leave their tiles in a [`Canvas`](canvas::Canvas), which takes a copy of some kilobytes; those
+//! that send them on do so from there, some times a second, and only what has changed.
+
+mod canvas;
+mod server;
+mod tev;
+
+use anyhow::Context;
+use canvas::Canvas;
+use lumiris::render::Progress;
+use lumiris::scene::FilmSettings;
+use server::Server;
+use std::net::SocketAddr;
+use std::sync::atomic::{AtomicBool, Ordering};
+use std::sync::{Arc, Mutex, PoisonError};
+use std::thread::JoinHandle;
+use tev::Tev;
+
+/// Where images may be watched.
+#[derive(Clone, Debug, Default)]
+pub(crate) struct Places {
+    /// Address of a tev.
+    pub tev: Option<String>,
+    /// Address that the page is served on.
+    pub view: Option<SocketAddr>,
+    /// Whether others than this machine may see the page.
+    pub insecure: bool,
+}
+
+/// What all threads know.
+#[derive(Debug, Default)]
+struct Shared {
+    /// The image that is being rendered, if one has begun.
+    canvas: Mutex<Option<Arc<Canvas>>>,
+    is_closing: AtomicBool,
+}
+
+impl Shared {
+    fn canvas(&self) -> Option<Arc<Canvas>> {
+        self.canvas.lock().unwrap_or_else(PoisonError::into_inner).clone()
+    }
+
+    fn is_closing(&self) -> bool {
+        self.is_closing.load(Ordering::Acquire)
+    }
+}
+
+/// Those who watch; they see the last state of the last image before this is dropped.
+#[derive(Debug, Default)]
+pub(crate) struct Watch {
+    shared: Arc<Shared>,
+    threads: Vec<JoinHandle<()>>,
+    /// Address of the page.
+    pub page: Option<SocketAddr>,
+}
+
+impl Watch {
+    /// Connects with tev and opens the page, if there are to be. `warn` is told when tev goes away later.
+    pub(crate) fn start(places: &Places, warn: fn(&str)) -> anyhow::Result<Self> {
+        let mut watch = Watch::default();
+        if let Some(address) = &places.tev {
+            let tev = Tev::connect(address).with_context(|| format!("--tev: there is no tev at {address}"))?;
+            let shared = Arc::clone(&watch.shared);
+            watch.threads.push(std::thread::spawn(move || tev.run(&shared, warn)));
+        }
+        if let Some(address) = places.view {
+            let server = Server::open(address, places.insecure)
+                .with_context(|| format!("--view: nothing can be served on {address}"))?;
+            watch.page = Some(server.address());
+            let shared = Arc::clone(&watch.shared);
+            watch.threads.push(std::thread::spawn(move || server.run(&shared)));
+        }
+        Ok(watch)
+    }
+
+    /// Begins an image; `None` if nobody watches.
+    pub(crate) fn begin(&self, name: &str, film: &FilmSettings, has_features: bool) -> Option<Arc<Canvas>> {
+        if self.threads.is_empty() {
+            return None;
+        }
+        let canvas = Arc::new(Canvas::new(name, film.bounds, has_features));
+        *self.shared.canvas.lock().unwrap_or_else(PoisonError::into_inner) = Some(Arc::clone(&canvas));
+        Some(canvas)
+    }
+}
+
+impl Drop for Watch {
+    fn drop(&mut self) {
+        self.shared.is_closing.store(true, Ordering::Release);
+        for thread in self.threads.drain(..) {
+            // A thread that failed has shown nothing more: the image is not its concern
+            let _ = thread.join();
+        }
+    }
+}
+
+/// Progress of an image that somebody may watch.
+pub(crate) fn observe(canvas: Option<&Arc<Canvas>>, progress: &Progress) {
+    if let Some(canvas) = canvas {
+        canvas.set_progress(progress);
+    }
+}

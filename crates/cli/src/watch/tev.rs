@@ -1,0 +1,93 @@
+//! Sending tiles to tev.
+
+use super::Shared;
+use super::canvas::Canvas;
+use std::io;
+use std::net::{TcpStream, ToSocketAddrs};
+use std::sync::Arc;
+use std::time::Duration;
+use tev_client::{PacketCreateImage, PacketUpdateImage, TevClient};
+
+/// Time between two looks at the canvas.
+const INTERVAL: Duration = Duration::from_millis(200);
+/// How long tev may take to answer, or to accept what is sent.
+const PATIENCE: Duration = Duration::from_secs(5);
+
+/// A connection with tev.
+pub(super) struct Tev(TevClient);
+
+impl Tev {
+    /// Connects with the first address that answers.
+    pub(super) fn connect(address: &str) -> io::Result<Self> {
+        let mut error = io::Error::other("no such host");
+        for address in address.to_socket_addrs()? {
+            match TcpStream::connect_timeout(&address, PATIENCE) {
+                Ok(stream) => {
+                    stream.set_write_timeout(Some(PATIENCE))?;
+                    stream.set_nodelay(true)?;
+                    return Ok(Tev(TevClient::wrap(stream)));
+                }
+                Err(e) => error = e,
+            }
+        }
+        Err(error)
+    }
+
+    /// Sends what changes until the end. Without tev the image is rendered all the same.
+    pub(super) fn run(mut self, shared: &Shared, warn: fn(&str)) {
+        let mut shown: Option<(Arc<Canvas>, u64)> = None;
+        loop {
+            let is_closing = shared.is_closing();
+            if let Err(error) = self.show(shared, &mut shown) {
+                return warn(&format!("warning: tev is gone ({error}); the image is rendered without it"));
+            }
+            if is_closing {
+                return;
+            }
+            std::thread::sleep(INTERVAL);
+        }
+    }
+
+    /// Sends what is new of the image that was shown last, and of the present one.
+    fn show(&mut self, shared: &Shared, shown: &mut Option<(Arc<Canvas>, u64)>) -> io::Result<()> {
+        if let Some((canvas, version)) = shown {
+            *version = self.update(canvas, *version)?;
+        }
+        let Some(present) = shared.canvas() else { return Ok(()) };
+        if shown.as_ref().is_some_and(|(canvas, _)| Arc::ptr_eq(canvas, &present)) {
+            return Ok(());
+        }
+        self.0.send(PacketCreateImage {
+            image_name: &present.name,
+            grab_focus: true,
+            width: present.size[0],
+            height: present.size[1],
+            channel_names: &present.channels,
+        })?;
+        let version = self.update(&present, 0)?;
+        *shown = Some((present, version));
+        Ok(())
+    }
+
+    fn update(&mut self, canvas: &Canvas, since: u64) -> io::Result<u64> {
+        let (version, tiles) = canvas.changed_since(since);
+        let offsets: Vec<u64> = (0..canvas.channels.len() as u64).collect();
+        let strides = vec![canvas.channels.len() as u64; canvas.channels.len()];
+        for tile in tiles {
+            let [x, y, width, height] = tile.place;
+            self.0.send(PacketUpdateImage {
+                image_name: &canvas.name,
+                grab_focus: false,
+                channel_names: &canvas.channels,
+                channel_offsets: &offsets,
+                channel_strides: &strides,
+                x,
+                y,
+                width,
+                height,
+                data: &tile.data,
+            })?;
+        }
+        Ok(version)
+    }
+}

@@ -1,0 +1,175 @@
+//! Animations: `lumiris render --frames`.
+
+use lumiris::imaging::Image;
+use lumiris::imaging::oiio::{Part, ReadLimits, read_image, write_image};
+use std::path::Path;
+use std::process::{Command, Output};
+
+const QUAD: &str = "ply\nformat ascii 1.0\nelement vertex 4\nproperty float x\nproperty float y\nproperty float z\n\
+                    element face 2\nproperty list uchar int vertex_indices\nend_header\n\
+                    -1 -1 0\n1 -1 0\n1 1 0\n-1 1 0\n3 0 1 2\n3 0 2 3\n";
+
+fn lumiris(folder: &Path, args: &str) -> Output {
+    Command::new(env!("CARGO_BIN_EXE_lumiris")).args(args.split_whitespace()).current_dir(folder).output().unwrap()
+}
+
+fn stderr(output: &Output) -> String {
+    String::from_utf8_lossy(&output.stderr).into_owned()
+}
+
+/// A frame: a quadrilateral under a sky, both from files, that moves from frame to frame.
+fn frame(number: u32, mesh: &str) -> String {
+    format!(
+        "LookAt 0 0 {} 0 0 0 0 1 0\nCamera \"perspective\"\nSampler \"independent\" \"integer pixelsamples\" [ 2 ]\n\
+         Film \"rgb\" \"integer xresolution\" [ 24 ] \"integer yresolution\" [ 16 ]\nWorldBegin\n\
+         LightSource \"infinite\" \"string filename\" \"sky.exr\"\n\
+         Texture \"t\" \"spectrum\" \"imagemap\" \"string filename\" \"t.png\"\n\
+         Material \"diffuse\" \"texture reflectance\" \"t\"\n\
+         Shape \"plymesh\" \"string filename\" \"{mesh}\"\nShape \"plymesh\" \"string filename\" \"floor.ply\"\n\
+         Translate 0 0 -1\nShape \"plymesh\" \"string filename\" \"floor.ply\"\n",
+        3 + number
+    )
+}
+
+/// Frames 1 to 4 with the meshes `floor.ply` and, from the third on, `new.ply`.
+fn animation() -> tempfile::TempDir {
+    let folder = tempfile::tempdir().unwrap();
+    let path = |name: &str| folder.path().join(name);
+    for name in ["floor.ply", "old.ply"] {
+        std::fs::write(path(name), QUAD).unwrap();
+    }
+    std::fs::write(path("new.ply"), QUAD.replace("1 1 0", "1 2 0")).unwrap();
+    let names = || ["R", "G", "B"].map(str::to_owned).to_vec();
+    let texels: Vec<f32> = (0..48).map(|i| (i % 7) as f32 / 7.0).collect();
+    write_image(&path("t.png"), &[Part::display(4, 4, names(), texels.clone())]).unwrap();
+    write_image(&path("sky.exr"), &[Part::linear(4, 4, names(), texels)]).unwrap();
+    for number in 1..=4 {
+        let text = frame(number, if number < 3 { "old.ply" } else { "new.ply" });
+        std::fs::write(path(&format!("shot.{number:04}.pbrt")), text).unwrap();
+    }
+    folder
+}
+
+fn image(path: &Path) -> Image {
+    read_image(path, &ReadLimits::default()).unwrap().image
+}
+
+fn bits(image: &Image) -> Vec<u32> {
+    image.data.iter().map(|v| v.to_bits()).collect()
+}
+
+fn stats(path: &Path) -> Vec<serde_json::Value> {
+    let stats: serde_json::Value = serde_json::from_str(&std::fs::read_to_string(path).unwrap()).unwrap();
+    stats["frames"].as_array().unwrap().clone()
+}
+
+#[test]
+fn frames_read_each_file_once_and_have_the_pixels_of_single_renderings() {
+    let folder = animation();
+    let path = |name: &str| folder.path().join(name);
+    let output = lumiris(folder.path(), "render shot.####.pbrt --frames 1-4 -o f.##.exr -o f.##.png --stats s.json");
+    assert!(output.status.success(), "{}", stderr(&output));
+
+    // Sky, texture, floor (twice) and a mesh; only the last is another one in the third frame
+    let expected = [(4, 0), (0, 4), (1, 3), (0, 4)];
+    for (frame, (read, shared)) in stats(&path("s.json")).iter().zip(expected) {
+        let counts = (frame["files"]["read"].as_u64().unwrap(), frame["files"]["shared"].as_u64().unwrap());
+        assert_eq!((counts, frame["result"].as_str().unwrap()), ((read, shared), "done"), "{frame}");
+        assert!(frame["stats"]["counts"]["camera_rays"].as_u64().unwrap() > 0);
+    }
+    let table = stderr(&output);
+    assert!(table.contains("files read, shared") && table.contains("1, 3"), "{table}");
+
+    let mut pictures = std::collections::HashSet::new();
+    for number in 1..=4 {
+        let one = format!("render shot.{number:04}.pbrt -o one.exr -q");
+        assert!(lumiris(folder.path(), &one).status.success());
+        let (of_frames, alone) = (image(&path(&format!("f.{number:02}.exr"))), image(&path("one.exr")));
+        assert_eq!(bits(&of_frames), bits(&alone), "frame {number}");
+        assert!(path(&format!("f.{number:02}.png")).exists());
+        pictures.insert(bits(&of_frames));
+    }
+    assert_eq!(pictures.len(), 4);
+}
+
+#[test]
+fn a_frame_that_fails_does_not_stop_the_others_and_the_table_says_why() {
+    let folder = animation();
+    let path = |name: &str| folder.path().join(name);
+    let wrong = frame(2, "old.ply").replace("Translate", "Shape \"sphere\" \"float radios\" [ 1 ] Translate");
+    std::fs::write(path("shot.0002.pbrt"), wrong).unwrap();
+    std::fs::remove_file(path("shot.0003.pbrt")).unwrap();
+    std::fs::create_dir(path("f.4.exr")).unwrap();
+    let output = lumiris(folder.path(), "render shot.####.pbrt --frames 1-5 -o f.#.exr --stats s.json -q");
+    assert_eq!(output.status.code(), Some(3));
+    let text = stderr(&output);
+    assert!(text.contains("shot.0002.pbrt:") && text.contains("radios"), "{text}");
+    assert!(text.contains("4 of 5 frames failed"), "{text}");
+    let row = |frame: &str| text.lines().find(|l| l.trim_start().starts_with(&format!("{frame}  failed:")));
+    assert!(row("1").is_none() && row("2").is_some(), "{text}");
+    assert!(row("4").is_some_and(|row| row.contains("f.4.exr is a folder")), "{text}");
+    let results: Vec<_> = stats(&path("s.json")).iter().map(|f| f["result"].as_str().unwrap().to_owned()).collect();
+    assert_eq!(results, ["done", "failed", "failed", "failed", "failed"]);
+    assert!(path("f.1.exr").exists() && !path("f.2.exr").exists());
+}
+
+#[test]
+fn existing_images_are_left_alone_unless_they_are_incomplete() {
+    let folder = animation();
+    let path = |name: &str| folder.path().join(name);
+    let all = "render shot.####.pbrt --frames 1-4 -o f.#.exr -o f.#.png --stats s.json --skip-existing -q";
+    let results = || {
+        let output = lumiris(folder.path(), all);
+        assert!(output.status.success(), "{}", stderr(&output));
+        stats(&path("s.json")).iter().map(|f| f["result"].as_str().unwrap().to_owned()).collect::<Vec<_>>()
+    };
+    assert_eq!(results(), ["done"; 4]);
+    assert_eq!(results(), ["skipped"; 4]);
+
+    // One of two is missing; one is no image; one was cut short by Ctrl-C
+    std::fs::remove_file(path("f.1.png")).unwrap();
+    std::fs::write(path("f.2.exr"), "half of").unwrap();
+    let names = ["R", "G", "B"].map(str::to_owned).to_vec();
+    let part = Part::display(1, 1, names, vec![0.0; 3]);
+    let interrupted = vec![("lumiris:interrupted".to_owned(), "true".to_owned())];
+    write_image(&path("f.3.png"), &[part.with_metadata(interrupted)]).unwrap();
+    assert_eq!(results(), ["done", "done", "done", "skipped"]);
+    assert_eq!(image(&path("f.3.png")).width, 24);
+    assert_eq!(results(), ["skipped"; 4]);
+}
+
+#[test]
+fn ctrl_c_ends_a_sequence_and_its_frame_is_rendered_again() {
+    let folder = animation();
+    let args = "render shot.####.pbrt --frames 1-2 -o f.#.exr --spp 1000000000 --stats s.json -q";
+    let mut child = Command::new(env!("CARGO_BIN_EXE_lumiris"))
+        .args(args.split_whitespace())
+        .current_dir(folder.path())
+        .spawn()
+        .unwrap();
+    // Long enough for the scene to be read, even on a busy machine
+    std::thread::sleep(std::time::Duration::from_secs(4));
+    assert!(Command::new("kill").args(["-INT", &child.id().to_string()]).status().unwrap().success());
+    assert_eq!(child.wait().unwrap().code(), Some(130));
+    let found = stats(&folder.path().join("s.json"));
+    assert_eq!((&found[0]["result"], &found[1]["result"]), (&"done".into(), &"not rendered".into()));
+    assert_eq!(found[0]["stats"]["complete"], false);
+    let again = "render shot.####.pbrt --frames 1 -o f.#.exr --spp 1 --stats s.json -q --skip-existing";
+    assert!(lumiris(folder.path(), again).status.success());
+    assert_eq!(stats(&folder.path().join("s.json"))[0]["result"], "done");
+}
+
+#[test]
+fn names_without_a_place_for_the_number_are_usage_errors() {
+    let folder = animation();
+    for args in [
+        "render shot.####.pbrt --frames 1-2 -o f.exr",
+        "render shot.0001.pbrt --frames 1-2 -o f.#.exr",
+        "render shot.####.pbrt --frames 1-2",
+        "render shot.####.pbrt --frames 2-1 -o f.#.exr",
+        "render shot.####.pbrt --frames 1 -o f.#.exr --aov none,depth",
+        "render shot.0001.pbrt --skip-existing -o f.exr",
+    ] {
+        assert_eq!(lumiris(folder.path(), args).status.code(), Some(2), "{args}");
+    }
+}

@@ -1,0 +1,305 @@
+//! Watching an image while it converges: a tev that the test plays, and the page over HTTP and in the browser.
+
+use crate::browser::Browser;
+use lumiris::imaging::oiio::{ReadLimits, read_image};
+use serde_json::Value;
+use std::io::{BufRead, BufReader, Read, Write};
+use std::net::{TcpListener, TcpStream};
+use std::path::Path;
+use std::process::{Child, Command, Stdio};
+
+const SCENE: &str = "LookAt 0 0 -4 0 0 0 0 1 0\nCamera \"perspective\" \"float fov\" [ 50 ]\n\
+                     Film \"rgb\" \"integer xresolution\" [ 50 ] \"integer yresolution\" [ 36 ]\n\
+                     Sampler \"independent\" \"integer pixelsamples\" [ 8 ]\nWorldBegin\n\
+                     LightSource \"infinite\" \"rgb L\" [ 0.4 0.2 0.1 ]\nShape \"sphere\"\n";
+
+fn folder() -> tempfile::TempDir {
+    let folder = tempfile::tempdir().unwrap();
+    std::fs::write(folder.path().join("scene.pbrt"), SCENE).unwrap();
+    folder
+}
+
+fn lumiris(folder: &Path, args: &str) -> Child {
+    let mut command = Command::new(env!("CARGO_BIN_EXE_lumiris"));
+    command.args(["render", "scene.pbrt"]).args(args.split_whitespace()).current_dir(folder);
+    command.stderr(Stdio::piped()).spawn().unwrap()
+}
+
+/// Reads the messages of tev's protocol, as its documentation describes them.
+struct Message<'a>(&'a [u8]);
+
+impl Message<'_> {
+    fn bytes<const N: usize>(&mut self) -> [u8; N] {
+        let (head, rest) = self.0.split_first_chunk().unwrap();
+        self.0 = rest;
+        *head
+    }
+
+    fn byte(&mut self) -> u8 {
+        self.bytes::<1>()[0]
+    }
+
+    fn u32(&mut self) -> usize {
+        u32::from_le_bytes(self.bytes()) as usize
+    }
+
+    fn u64(&mut self) -> usize {
+        u64::from_le_bytes(self.bytes()) as usize
+    }
+
+    fn text(&mut self) -> String {
+        let end = self.0.iter().position(|b| *b == 0).unwrap();
+        let text = String::from_utf8(self.0[..end].to_vec()).unwrap();
+        self.0 = &self.0[end + 1..];
+        text
+    }
+}
+
+/// An image as tev has it.
+#[derive(Default)]
+struct Shown {
+    name: String,
+    size: [usize; 2],
+    channels: Vec<String>,
+    data: Vec<f32>,
+    updates: usize,
+}
+
+impl Shown {
+    fn take(&mut self, bytes: &[u8]) {
+        let mut message = Message(bytes);
+        match message.byte() {
+            4 => {
+                message.byte();
+                self.name = message.text();
+                self.size = [message.u32(), message.u32()];
+                let count = message.u32();
+                self.channels = (0..count).map(|_| message.text()).collect();
+                self.data = vec![f32::NAN; self.size[0] * self.size[1] * count];
+            }
+            6 => {
+                message.byte();
+                assert_eq!(message.text(), self.name);
+                let count = message.u32();
+                let names: Vec<String> = (0..count).map(|_| message.text()).collect();
+                assert_eq!(names, self.channels);
+                let [x, y, width, height] = [0; 4].map(|_| message.u32());
+                let [offsets, strides] = [0; 2].map(|_| (0..count).map(|_| message.u64()).collect::<Vec<_>>());
+                let values: Vec<f32> =
+                    message.0.chunks_exact(4).map(|b| f32::from_le_bytes(b.try_into().unwrap())).collect();
+                for pixel in 0..width * height {
+                    let place = (y + pixel / width) * self.size[0] + x + pixel % width;
+                    for c in 0..count {
+                        self.data[place * count + c] = values[offsets[c] + pixel * strides[c]];
+                    }
+                }
+                self.updates += 1;
+            }
+            other => panic!("message {other}"),
+        }
+    }
+}
+
+#[test]
+fn tev_has_the_final_image_to_the_bit() {
+    let folder = folder();
+    let tev = TcpListener::bind("127.0.0.1:0").unwrap();
+    let args = format!("-q -o a.exr --crop 0.1,1,0,0.9 --tev={}", tev.local_addr().unwrap());
+    let child = lumiris(folder.path(), &args);
+    let (mut stream, _) = tev.accept().unwrap();
+    let mut bytes = Vec::new();
+    stream.read_to_end(&mut bytes).unwrap();
+    let output = child.wait_with_output().unwrap();
+    assert!(output.status.success(), "{}", String::from_utf8_lossy(&output.stderr));
+
+    let (mut shown, mut rest) = (Shown::default(), &bytes[..]);
+    while !rest.is_empty() {
+        let length = u32::from_le_bytes(rest[..4].try_into().unwrap()) as usize;
+        shown.take(&rest[4..length]);
+        rest = &rest[length..];
+    }
+    let image = read_image(&folder.path().join("a.exr"), &ReadLimits::default()).unwrap().image;
+    assert_eq!((shown.name.as_str(), shown.size), ("scene.pbrt", [image.width, image.height]));
+    assert!(shown.updates >= 6, "{}", shown.updates);
+    for (c, name) in shown.channels.iter().enumerate() {
+        let of_file = image.channel(name).unwrap();
+        for pixel in 0..image.width * image.height {
+            let (a, b) =
+                (shown.data[pixel * shown.channels.len() + c], image.data[pixel * image.channels.len() + of_file]);
+            assert_eq!(a.to_bits(), b.to_bits(), "{name} of pixel {pixel}: {a} {b}");
+        }
+    }
+    for name in ["R", "albedo.G", "normal.Z", "depth.Z", "samples"] {
+        assert!(shown.channels.iter().any(|channel| channel == name), "{name} in {:?}", shown.channels);
+    }
+}
+
+#[test]
+fn without_tev_nothing_is_rendered_and_when_it_goes_the_image_is() {
+    let folder = folder();
+    let tev = TcpListener::bind("127.0.0.1:0").unwrap();
+    let args = format!("-q -o a.exr --spp 64 --tev={}", tev.local_addr().unwrap());
+    let child = lumiris(folder.path(), &args);
+    drop(tev.accept().unwrap());
+    let output = child.wait_with_output().unwrap();
+    assert!(output.status.success(), "{}", String::from_utf8_lossy(&output.stderr));
+    assert!(folder.path().join("a.exr").exists());
+
+    drop(tev);
+    let output = lumiris(folder.path(), &args.replace("a.exr", "b.exr")).wait_with_output().unwrap();
+    let text = String::from_utf8_lossy(&output.stderr);
+    assert!(output.status.code() == Some(3) && text.contains("--tev: there is no tev at 127.0.0.1:"), "{text}");
+    assert!(!folder.path().join("b.exr").exists());
+}
+
+/// A rendering without end, and the address of its page.
+struct Endless {
+    child: Child,
+    address: String,
+}
+
+impl Endless {
+    fn start(folder: &Path) -> Endless {
+        let mut child = lumiris(folder, "-o a.exr --spp 1000000000 --estimator mis --view=0");
+        let lines = BufReader::new(child.stderr.take().unwrap()).lines();
+        let said = lines
+            .map(Result::unwrap)
+            .find_map(|l| Some(l.split_once("at http://")?.1.trim_end_matches('/').to_owned()));
+        Endless { child, address: said.unwrap() }
+    }
+
+    /// Status and body of an answer.
+    fn ask(&self, method: &str, path: &str, host: &str) -> (u16, Vec<u8>) {
+        let mut stream = TcpStream::connect(&self.address).unwrap();
+        write!(stream, "{method} {path} HTTP/1.1\r\nHost: {host}\r\nConnection: close\r\n\r\n").unwrap();
+        let mut answer = Vec::new();
+        stream.read_to_end(&mut answer).unwrap();
+        let head = answer.windows(4).position(|w| w == b"\r\n\r\n").unwrap();
+        let text = String::from_utf8_lossy(&answer[..head]).into_owned();
+        (text.split(' ').nth(1).unwrap().parse().unwrap(), answer[head + 4..].to_vec())
+    }
+
+    fn get(&self, path: &str) -> (u16, Vec<u8>) {
+        self.ask("GET", path, &self.address)
+    }
+
+    /// The state, once a tile is done.
+    fn state(&self) -> Value {
+        loop {
+            let state: Value = serde_json::from_slice(&self.get("/state").1).unwrap();
+            if state["done"].as_u64().is_some_and(|done| done > 0) {
+                return state;
+            }
+            std::thread::sleep(std::time::Duration::from_millis(50));
+        }
+    }
+
+    fn stop(mut self) -> Option<i32> {
+        assert!(Command::new("kill").args(["-INT", &self.child.id().to_string()]).status().unwrap().success());
+        self.child.wait().unwrap().code()
+    }
+}
+
+#[test]
+fn the_server_knows_the_page_its_data_and_nothing_else() {
+    let folder = folder();
+    let view = Endless::start(folder.path());
+    let state = view.state();
+    assert_eq!((&state["name"], &state["width"], &state["height"]), (&"scene.pbrt".into(), &50.into(), &36.into()));
+    assert_eq!(state["layers"][0], serde_json::json!({ "name": "beauty", "channels": 3 }));
+    assert_eq!(state["finished"], false);
+
+    // Tiles: all at first, and then those that changed since
+    let number = |bytes: &[u8], at: usize| u32::from_le_bytes(bytes[at..at + 4].try_into().unwrap());
+    let tiles = format!("/tiles?image={}&layer=0&since=0", state["image"]);
+    let (status, bytes) = view.get(&tiles);
+    assert_eq!(status, 200);
+    assert_eq!([8, 12, 16, 20].map(|at| number(&bytes, at)), [0, 0, 16, 16]);
+    let corner = [24, 28, 32].map(|at| f32::from_bits(number(&bytes, at)));
+    assert_eq!(corner, [0.4, 0.2, 0.1], "the sky");
+    for wrong in [
+        "/tiles",
+        "/tiles?image=7&layer=0&since=0",
+        "/tiles?image=0&layer=99&since=0",
+        "/tiles?image=0&layer=-1&since=0",
+    ] {
+        assert!([400, 404].contains(&view.get(wrong).0), "{wrong}");
+    }
+
+    for path in
+        ["/etc/passwd", "/../../../../etc/passwd", "//etc/passwd", "/scene.pbrt", "/%2e%2e/scene.pbrt", "/a.exr"]
+    {
+        let (status, body) = view.get(path);
+        assert!(status == 404 || status == 400, "{path}: {status}");
+        assert!(body.len() < 100, "{path}: {}", String::from_utf8_lossy(&body));
+    }
+    assert_eq!(view.ask("POST", "/state", &view.address).0, 405);
+    // A page of another site, under whose name this address is
+    let port = view.address.rsplit_once(':').unwrap().1;
+    assert_eq!(view.ask("GET", "/state", &format!("evil.example:{port}")).0, 403);
+    assert_eq!(view.ask("GET", "/state", &format!("localhost:{port}")).0, 200);
+    let (_, page) = view.get("/");
+    let page = String::from_utf8(page).unwrap();
+    assert!(!page.contains("http:") && !page.contains("https:") && !page.contains("/*s"), "{page}");
+    assert_eq!(view.stop(), Some(130));
+    assert!(folder.path().join("a.exr").exists());
+}
+
+#[test]
+fn the_page_is_for_this_machine_unless_the_user_insists() {
+    let folder = folder();
+    for wrong in ["--view=0.0.0.0:0", "--view=192.168.1.7", "--view=[::]:0", "--view=nowhere", "--view-insecure"] {
+        let output = lumiris(folder.path(), &format!("-o a.exr {wrong}")).wait_with_output().unwrap();
+        assert_eq!(output.status.code(), Some(2), "{wrong}: {}", String::from_utf8_lossy(&output.stderr));
+    }
+    let output = lumiris(folder.path(), "-q -o a.exr --view=0.0.0.0:0 --view-insecure").wait_with_output().unwrap();
+    assert!(output.status.success(), "{}", String::from_utf8_lossy(&output.stderr));
+}
+
+#[test]
+fn the_page_shows_the_image_while_it_converges() {
+    let folder = folder();
+    let view = Endless::start(folder.path());
+    let browser = Browser::start([900, 640]);
+    browser.open_url(&format!("http://{}/", view.address), "state !== null && version !== '0'");
+    browser.wait_for("/%.*elapsed.*left/.test(document.getElementById('status').textContent)");
+    assert_eq!(browser.run("document.title"), "scene.pbrt");
+    assert_eq!(browser.run("[picture.width, picture.height]"), serde_json::json!([50, 36]));
+    // The corner is sky
+    let corner = "[...context.getImageData(0, 0, 1, 1).data]";
+    let srgb = |v: f32| (lumiris::imaging::color::linear_to_srgb(v) * 255.0).round();
+    let near = |found: Value, expected: [f32; 3]| {
+        let found: Vec<f32> = found.as_array().unwrap().iter().map(|v| v.as_f64().unwrap() as f32).collect();
+        assert!(expected.iter().zip(&found).all(|(e, f)| (srgb(*e) - f).abs() <= 1.0), "{found:?} {expected:?}");
+    };
+    browser.wait_for("context.getImageData(0, 0, 1, 1).data[0] > 0");
+    near(browser.run(corner), [0.4, 0.2, 0.1]);
+    browser.run("exposure.value = 1; exposure.oninput()");
+    near(browser.run(corner), [0.8, 0.4, 0.2]);
+
+    // It goes on
+    browser.run("window.before = version");
+    browser.wait_for("version !== window.before");
+
+    // The wheel enlarges what is under the mouse, and shows its numbers
+    let before = browser.run("view.scale").as_f64().unwrap();
+    browser.point([450.0, 320.0]);
+    browser.wheel([450.0, 320.0], -240.0);
+    browser.wait_for(&format!("view.scale > {}", before * 1.5));
+    browser.point([451.0, 321.0]);
+    browser.wait_for("/^\\d+, \\d+: /.test(document.getElementById('value').textContent)");
+
+    browser.run("layerChoice.value = 2; layerChoice.onchange()");
+    browser.wait_for("state.layers[layerChoice.value].name === 'normal' && pixels.some((v) => v !== 0)");
+    browser.run("document.getElementById('fit').click()");
+    browser.settle();
+    if let Ok(path) = std::env::var("LUMIRIS_SCREENSHOT") {
+        browser.screenshot(Path::new(&path));
+    }
+    assert_eq!(view.stop(), Some(130));
+    browser.wait_for("/finished/.test(document.getElementById('status').textContent)");
+    let complaints = browser.complaints.borrow();
+    // The end of the program, and that this test reads pixels
+    let expected = ["ERR_CONNECTION", "willReadFrequently"];
+    assert!(complaints.iter().all(|c| expected.iter().any(|e| c.contains(e))), "{complaints:?}");
+}

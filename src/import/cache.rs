@@ -1,0 +1,206 @@
+//! Meshes and images that one scene after the other uses, such as the frames of an animation.
+//!
+//! A file is the same as before if its name, its size and the time of its last change are. What a scene has not used is
+//! dropped when the next one has been loaded ([`FileCache::end_scene`]), so that memory holds what two scenes need at
+//! most. Text of scene files is not kept: it is what differs.
+
+use super::images::{ImageEncoding, ImageRequest, RgbImage, load_map, load_rgb};
+use crate::imaging::oiio::ImageError;
+use crate::imaging::{Filter, MipMap, Wrap};
+use lumiris_formats::ply::{PlyError, PlyMesh, read_ply};
+use std::collections::HashMap;
+use std::path::{Path, PathBuf};
+use std::sync::atomic::{AtomicU64, Ordering};
+use std::sync::{Arc, Mutex, PoisonError};
+use std::time::SystemTime;
+
+/// What tells a file from what it was before.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+struct Stamp {
+    bytes: u64,
+    modified: SystemTime,
+}
+
+impl Stamp {
+    /// `None` if there is no such file, or no time of its last change.
+    fn of(path: &Path) -> Option<Self> {
+        let metadata = path.metadata().ok()?;
+        Some(Stamp { bytes: metadata.len(), modified: metadata.modified().ok()? })
+    }
+}
+
+/// The content of a file, understood in the way that `how` says.
+#[derive(Debug)]
+struct Entry<H, T> {
+    stamp: Stamp,
+    how: H,
+    content: Arc<T>,
+    is_used: bool,
+}
+
+/// Contents of one kind, by file.
+#[derive(Debug)]
+struct Shelf<H, T>(Mutex<HashMap<PathBuf, Vec<Entry<H, T>>>>);
+
+impl<H, T> Default for Shelf<H, T> {
+    fn default() -> Self {
+        Shelf(Mutex::default())
+    }
+}
+
+impl<H: PartialEq, T> Shelf<H, T> {
+    /// What is there of this file as it is now.
+    fn find(&self, path: &Path, stamp: Stamp, how: &H) -> Option<Arc<T>> {
+        let mut shelf = self.0.lock().unwrap_or_else(PoisonError::into_inner);
+        let entry = shelf.get_mut(path)?.iter_mut().find(|entry| entry.stamp == stamp && entry.how == *how)?;
+        entry.is_used = true;
+        Some(Arc::clone(&entry.content))
+    }
+
+    fn put(&self, path: &Path, stamp: Stamp, how: H, content: &Arc<T>) {
+        let mut shelf = self.0.lock().unwrap_or_else(PoisonError::into_inner);
+        let entries = shelf.entry(path.to_owned()).or_default();
+        // Of an older state of the file, or read by two threads at once
+        entries.retain(|entry| entry.stamp == stamp && entry.how != how);
+        entries.push(Entry { stamp, how, content: Arc::clone(content), is_used: true });
+    }
+
+    /// Drops what was not used since this was called last.
+    fn drop_unused(&self) {
+        let mut shelf = self.0.lock().unwrap_or_else(PoisonError::into_inner);
+        shelf.retain(|_, entries| {
+            entries.retain_mut(|entry| std::mem::take(&mut entry.is_used));
+            !entries.is_empty()
+        });
+    }
+}
+
+/// How many files were read, and how many were there already.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub struct FileCounts {
+    /// Read from disk.
+    pub read: u64,
+    /// Shared with the scene before.
+    pub shared: u64,
+}
+
+/// Contents of meshes and images by file.
+#[derive(Debug, Default)]
+pub struct FileCache {
+    /// False if nothing is kept.
+    keeps: bool,
+    meshes: Shelf<(), PlyMesh>,
+    maps: Shelf<(ImageEncoding, Wrap, Filter), MipMap>,
+    images: Shelf<(), RgbImage>,
+    read: AtomicU64,
+    shared: AtomicU64,
+}
+
+impl FileCache {
+    /// A cache for several scenes.
+    pub fn keeping() -> Self {
+        FileCache { keeps: true, ..FileCache::default() }
+    }
+
+    /// True if contents are kept: a scene then gets copies of meshes.
+    pub fn keeps(&self) -> bool {
+        self.keeps
+    }
+
+    /// The mesh of a PLY file.
+    pub fn mesh(&self, path: &Path) -> Result<Arc<PlyMesh>, PlyError> {
+        self.get(&self.meshes, path, (), || read_ply(path))
+    }
+
+    /// The pyramid of an image for textures.
+    pub fn map(&self, request: &ImageRequest) -> Result<Arc<MipMap>, ImageError> {
+        let how = (request.encoding, request.wrap, request.filter);
+        self.get(&self.maps, &request.path, how, || load_map(request))
+    }
+
+    /// An image as linear RGB.
+    pub fn rgb(&self, path: &Path) -> Result<Arc<RgbImage>, ImageError> {
+        self.get(&self.images, path, (), || load_rgb(path))
+    }
+
+    /// Ends a scene: drops what it did not use, and says how many files it read and shared.
+    pub fn end_scene(&self) -> FileCounts {
+        self.meshes.drop_unused();
+        self.maps.drop_unused();
+        self.images.drop_unused();
+        FileCounts { read: self.read.swap(0, Ordering::Relaxed), shared: self.shared.swap(0, Ordering::Relaxed) }
+    }
+
+    fn get<H: PartialEq, T, E>(
+        &self,
+        shelf: &Shelf<H, T>,
+        path: &Path,
+        how: H,
+        read: impl FnOnce() -> Result<T, E>,
+    ) -> Result<Arc<T>, E> {
+        // As it is before it is read: a change meanwhile makes it another file
+        let stamp = if self.keeps { Stamp::of(path) } else { None };
+        if let Some(found) = stamp.and_then(|stamp| shelf.find(path, stamp, &how)) {
+            self.shared.fetch_add(1, Ordering::Relaxed);
+            return Ok(found);
+        }
+        // Not under the lock: reading uses all threads
+        let content = Arc::new(read()?);
+        self.read.fetch_add(1, Ordering::Relaxed);
+        if let Some(stamp) = stamp {
+            shelf.put(path, stamp, how, &content);
+        }
+        Ok(content)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    const TRIANGLE: &str = "ply\nformat ascii 1.0\nelement vertex 3\nproperty float x\nproperty float y\nproperty float z\n\
+                            element face 1\nproperty list uchar int vertex_indices\nend_header\n0 0 0\n1 0 0\n0 1 0\n3 0 1 2\n";
+
+    #[test]
+    fn a_file_is_read_again_when_it_changed_and_forgotten_when_a_scene_did_without_it() {
+        let folder = tempfile::tempdir().unwrap();
+        let path = folder.path().join("a.ply");
+        std::fs::write(&path, TRIANGLE).unwrap();
+        let cache = FileCache::keeping();
+        let first = cache.mesh(&path).unwrap();
+        assert_eq!(cache.end_scene(), FileCounts { read: 1, shared: 0 });
+        assert!(Arc::ptr_eq(&first, &cache.mesh(&path).unwrap()));
+        assert_eq!(cache.end_scene(), FileCounts { read: 0, shared: 1 });
+
+        // Another size, and the same size at another time
+        std::fs::write(&path, TRIANGLE.replace("1 0 0", "2.5 0 0")).unwrap();
+        assert_eq!(cache.mesh(&path).unwrap().positions[1].x, 2.5);
+        std::fs::write(&path, TRIANGLE.replace("1 0 0", "4.5 0 0")).unwrap();
+        let later = SystemTime::now() + std::time::Duration::from_secs(7);
+        std::fs::File::options().write(true).open(&path).unwrap().set_modified(later).unwrap();
+        assert_eq!(cache.mesh(&path).unwrap().positions[1].x, 4.5);
+        assert_eq!(cache.end_scene(), FileCounts { read: 2, shared: 0 });
+        assert_eq!(cache.meshes.0.lock().unwrap()[&path].len(), 1, "the older states are gone");
+
+        assert_eq!(cache.end_scene(), FileCounts::default());
+        assert!(cache.meshes.0.lock().unwrap().is_empty());
+        cache.mesh(&path).unwrap();
+        assert_eq!(cache.end_scene(), FileCounts { read: 1, shared: 0 });
+    }
+
+    #[test]
+    fn a_file_that_cannot_be_read_is_tried_anew_and_without_keeping_nothing_is_shared() {
+        let folder = tempfile::tempdir().unwrap();
+        let path = folder.path().join("a.ply");
+        let cache = FileCache::keeping();
+        assert!(cache.mesh(&path).is_err());
+        std::fs::write(&path, TRIANGLE).unwrap();
+        assert!(cache.mesh(&path).is_ok());
+
+        let cache = FileCache::default();
+        let mesh = cache.mesh(&path).unwrap();
+        assert!(!Arc::ptr_eq(&mesh, &cache.mesh(&path).unwrap()));
+        assert_eq!(Arc::strong_count(&mesh), 1);
+        assert_eq!(cache.end_scene(), FileCounts { read: 2, shared: 0 });
+    }
+}

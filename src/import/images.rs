@@ -1,0 +1,63 @@
+//! Image files as scenes ask for them, and how they are read.
+
+use crate::imaging::oiio::{self, ImageError, ReadLimits};
+use crate::imaging::{ColorChannels, ColorEncoding, Filter, MipMap, Wrap};
+use lumiris_numbers::math::Rgb;
+use std::path::{Path, PathBuf};
+
+/// Linear texels, rows from the top, and the size of the image.
+pub type RgbImage = (Vec<Rgb>, [usize; 2]);
+
+/// How the numbers of an image mean light.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub enum ImageEncoding {
+    /// sRGB for integers, linear for floats.
+    Auto,
+    /// sRGB curve.
+    Srgb,
+    /// As they are.
+    Linear,
+    /// A power.
+    Gamma(f32),
+}
+
+/// An image as textures ask for it.
+#[derive(Clone, Debug, PartialEq)]
+pub struct ImageRequest {
+    /// File.
+    pub path: PathBuf,
+    /// Meaning of its numbers.
+    pub encoding: ImageEncoding,
+    /// Outside of 0..1.
+    pub wrap: Wrap,
+    /// Between texels.
+    pub filter: Filter,
+}
+
+/// Reads an image as textures ask for it.
+pub fn load_map(request: &ImageRequest) -> Result<MipMap, ImageError> {
+    let read = oiio::read_image(&request.path, &ReadLimits::default())?;
+    let encoding = match request.encoding {
+        // Floats are light already, whatever the scene says: pbrt-v4 decodes integers only.
+        _ if read.encoding == ColorEncoding::Linear => ColorEncoding::Linear,
+        ImageEncoding::Auto => read.encoding,
+        ImageEncoding::Srgb => ColorEncoding::Srgb,
+        ImageEncoding::Linear => ColorEncoding::Linear,
+        ImageEncoding::Gamma(gamma) => ColorEncoding::Gamma(gamma),
+    };
+    Ok(MipMap::new(&read.image, request.wrap, request.filter, encoding))
+}
+
+/// Reads an image as linear RGB, rows from the top, with its size.
+pub fn load_rgb(path: &Path) -> Result<RgbImage, ImageError> {
+    let read = oiio::read_image(path, &ReadLimits::default())?;
+    let image = &read.image;
+    let channels = match image.color_channels() {
+        Some(ColorChannels::Rgb(rgb)) => rgb,
+        Some(ColorChannels::Grey(y)) => [y; 3],
+        None => return Err(ImageError::Unreadable { path: path.to_owned(), reason: "has no channels".to_owned() }),
+    };
+    let pixels = image.data.chunks_exact(image.channels.len());
+    let texels = pixels.map(|p| Rgb::from_array(channels.map(|c| read.encoding.to_linear(p[c]))));
+    Ok((texels.collect(), [image.width, image.height]))
+}

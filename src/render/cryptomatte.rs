@@ -1,0 +1,295 @@
+//! Cryptomatte: which objects and materials a pixel shows, and how much of it each covers [Friedman and Jones 2015;
+//! Cryptomatte specification 1.2].
+//!
+//! Coverage is that of the very samples that the image consists of: their camera rays are traced once more, for the first
+//! surface alone, and count with the weights of the pixel filter. So neither integrators nor the film know of it, and an
+//! image without these layers takes no time for them.
+//!
+//! An id is the 32-bit MurmurHash3 of a name, as the float of the same bits. A pixel has the [`RANKS`] ids that cover
+//! most of it, two in each group of four channels.
+
+use super::output::Channels;
+use super::{BATCH_PATHS, RenderSettings, ThreadError, position, thread_pool};
+use crate::accel::{Coherence, Hit, RayBatch};
+use crate::film::{Film, PixelBounds};
+use crate::render::camera_samples::{CameraSampler, Scratch};
+use crate::scene::{RenderJob, Scene};
+use rayon::prelude::*;
+use std::collections::{BTreeMap, HashSet};
+use std::io::Cursor;
+use strum::{EnumString, IntoStaticStr, VariantNames};
+
+/// Ids per pixel.
+pub const RANKS: usize = 6;
+
+/// What gets an id.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, EnumString, IntoStaticStr, VariantNames)]
+#[strum(serialize_all = "kebab-case")]
+pub enum Cryptomatte {
+    /// Shapes, and instances of shapes.
+    Object,
+    /// Materials.
+    Material,
+}
+
+/// Channels and metadata of one Cryptomatte.
+#[derive(Clone, Debug)]
+pub struct Layer {
+    /// Its name, `CryptoObject` or `CryptoMaterial`.
+    pub name: &'static str,
+    /// Values: `CryptoObject00.R` is the first id and `.G` its coverage, `.B` and `.A` are the second.
+    pub channels: Channels,
+    /// Entries `cryptomatte/…`, with the names of all ids.
+    pub metadata: Vec<(String, String)>,
+}
+
+/// 32-bit MurmurHash3 of a name.
+pub fn hash(name: &str) -> u32 {
+    // Reading from memory cannot fail
+    murmur3::murmur3_32(&mut Cursor::new(name), 0).unwrap_or_default()
+}
+
+/// The float of a hash: its bits, with another exponent where they are no normal number.
+pub fn id(hash: u32) -> f32 {
+    let exponent = (hash >> 23 & 0xff).clamp(1, 254);
+    f32::from_bits(hash & 0x807f_ffff | exponent << 23)
+}
+
+impl Cryptomatte {
+    /// The name of its layer.
+    pub fn layer(self) -> &'static str {
+        match self {
+            Cryptomatte::Object => "CryptoObject",
+            Cryptomatte::Material => "CryptoMaterial",
+        }
+    }
+
+    /// What is told apart: geometry and instance, or material.
+    fn key(self, scene: &Scene, hit: &Hit) -> Key {
+        match self {
+            Cryptomatte::Object => (hit.geometry, hit.instance),
+            Cryptomatte::Material => (scene.surfaces[hit.geometry as usize].material, Hit::NO_INSTANCE),
+        }
+    }
+
+    /// Names by the first part of keys.
+    fn names(self, scene: &Scene) -> Vec<String> {
+        match self {
+            Cryptomatte::Object => unique(scene.surfaces.iter().map(|s| s.name.as_str())),
+            Cryptomatte::Material => unique(scene.materials.entries().iter().map(|m| m.name.as_str())),
+        }
+    }
+
+    fn finish(self, data: Vec<f32>, hashes: &BTreeMap<String, u32>) -> Layer {
+        let names =
+            (0..RANKS / 2).flat_map(|group| ["R", "G", "B", "A"].map(|c| format!("{}{group:02}.{c}", self.layer())));
+        let channels = Channels { names: names.collect(), data };
+        Layer { name: self.layer(), channels, metadata: self.metadata(hashes) }
+    }
+
+    /// The entries that readers look for. The manifest is JSON, in the order of names.
+    fn metadata(self, hashes: &BTreeMap<String, u32>) -> Vec<(String, String)> {
+        let names: Vec<String> =
+            hashes.iter().map(|(name, hash)| format!("{}:\"{hash:08x}\"", json_text(name))).collect();
+        let key = format!("{:08x}", hash(self.layer()));
+        let entry = |name: &str, value: String| (format!("cryptomatte/{}/{name}", &key[..7]), value);
+        vec![
+            entry("name", self.layer().to_owned()),
+            entry("hash", "MurmurHash3_32".to_owned()),
+            entry("conversion", "uint32_to_float32".to_owned()),
+            entry("manifest", format!("{{{}}}", names.join(","))),
+        ]
+    }
+}
+
+/// See [`Cryptomatte::key`].
+type Key = (u32, u32);
+
+/// The same names, numbered where several are equal.
+fn unique<'a>(names: impl Iterator<Item = &'a str>) -> Vec<String> {
+    let mut taken = HashSet::new();
+    let mut next = BTreeMap::new();
+    let number = |name: &'a str| {
+        let mut unique = name.to_owned();
+        while !taken.insert(unique.clone()) {
+            let n = next.entry(name).and_modify(|n| *n += 1).or_insert(1_u32);
+            unique = format!("{name}.{n}");
+        }
+        unique
+    };
+    names.map(number).collect()
+}
+
+/// The Cryptomattes of a rendering.
+pub fn cryptomattes(
+    job: &RenderJob,
+    settings: &RenderSettings,
+    film: &Film,
+    kinds: &[Cryptomatte],
+) -> Result<Vec<Layer>, ThreadError> {
+    let pool = thread_pool(settings.threads)?;
+    let tiles = film.bounds.tiles(settings.tile_size);
+    let camera = CameraSampler::new(job, settings.first_sample);
+    let names: Vec<Vec<String>> = kinds.iter().map(|kind| kind.names(&job.world.scene)).collect();
+    let tracer = Tracer { job, film, camera, first: settings.first_sample, kinds, names: &names };
+    let of_tiles: Vec<Vec<TileLayer>> =
+        pool.install(|| tiles.par_iter().with_max_len(1).map(|tile| tracer.tile(tile)).collect());
+
+    let mut layers: Vec<(Vec<f32>, BTreeMap<String, u32>)> =
+        kinds.iter().map(|_| (vec![0.0; film.pixels.len() * STRIDE], BTreeMap::new())).collect();
+    for (tile, of_tile) in tiles.iter().zip(of_tiles) {
+        for ((data, hashes), part) in layers.iter_mut().zip(of_tile) {
+            hashes.extend(part.hashes.into_values());
+            for (y, row) in (tile.y0..tile.y1).zip(part.data.chunks_exact(tile.width() as usize * STRIDE)) {
+                let start = film.index(tile.x0, y) * STRIDE;
+                data[start..start + row.len()].copy_from_slice(row);
+            }
+        }
+    }
+    Ok(kinds.iter().zip(layers).map(|(kind, (data, hashes))| kind.finish(data, &hashes)).collect())
+}
+
+/// Channels of a Cryptomatte.
+const STRIDE: usize = 2 * RANKS;
+
+/// The keys that a pixel shows, with their coverage.
+type Ranked = Vec<(Key, f32)>;
+
+/// One kind in one tile.
+#[derive(Default)]
+struct TileLayer {
+    /// Channels of its pixels, row by row.
+    data: Vec<f32>,
+    /// Names and hashes of what is there.
+    hashes: BTreeMap<Key, (String, u32)>,
+}
+
+struct Tracer<'a> {
+    job: &'a RenderJob,
+    film: &'a Film,
+    camera: CameraSampler<'a>,
+    first: u32,
+    kinds: &'a [Cryptomatte],
+    /// Names of each kind.
+    names: &'a [Vec<String>],
+}
+
+impl Tracer<'_> {
+    /// All kinds in a tile.
+    fn tile(&self, tile: &PixelBounds) -> Vec<TileLayer> {
+        let mut pixels = vec![vec![Ranked::new(); tile.area()]; self.kinds.len()];
+        self.trace(tile, &mut pixels);
+        let layers = pixels.into_iter().zip(self.names).map(|(pixels, names)| {
+            let mut layer = TileLayer { data: vec![0.0; tile.area() * STRIDE], ..TileLayer::default() };
+            for (mut ranked, data) in pixels.into_iter().zip(layer.data.chunks_exact_mut(STRIDE)) {
+                rank(&mut ranked);
+                for ((key, coverage), data) in ranked.iter().zip(data.chunks_exact_mut(2)) {
+                    let (_, hash) = layer.hashes.entry(*key).or_insert_with(|| {
+                        let name = name_of(names, *key);
+                        let hash = hash(&name);
+                        (name, hash)
+                    });
+                    data.copy_from_slice(&[id(*hash), *coverage]);
+                }
+            }
+            layer
+        });
+        layers.collect()
+    }
+
+    /// Adds what the camera samples of a tile meet to the keys of its pixels.
+    fn trace(&self, tile: &PixelBounds, pixels: &mut [Vec<Ranked>]) {
+        let scene = &self.job.world.scene;
+        let seed = self.job.settings().sampling.seed;
+        let count = |index: u32| {
+            let [x, y] = position(tile, index);
+            self.film.pixels[self.film.index(x, y)].count as u32
+        };
+        // Ranges of samples, none longer than a batch
+        let mut ranges = (0..tile.area() as u32).flat_map(|index| {
+            let (first, count) = (self.first, count(index));
+            let begins = (0..count).step_by(BATCH_PATHS);
+            begins.map(move |begin| (index, first + begin..first + count.min(begin + BATCH_PATHS as u32)))
+        });
+        let (mut scratch, mut samples) = (Scratch::default(), Vec::new());
+        let (mut rays, mut hits) = (RayBatch::default(), Vec::new());
+        let mut next = ranges.next();
+        while next.is_some() {
+            samples.clear();
+            while let Some((index, range)) = next.take_if(|(_, r)| samples.len() + r.len() <= BATCH_PATHS) {
+                let pixel = position(tile, index);
+                self.camera.samples(std::iter::once((index, pixel, range)), seed, &mut scratch, &mut samples);
+                next = ranges.next();
+            }
+            rays.set(samples.iter().map(|s| &s.ray.ray));
+            self.job.world.accel.intersect(&rays, Coherence::Coherent, &mut hits);
+            for (sample, hit) in samples.iter().zip(&hits) {
+                let Some(hit) = hit else { continue };
+                let weight = sample.weight / (scene.film.scale * count(sample.fit) as f32);
+                for (pixels, kind) in pixels.iter_mut().zip(self.kinds) {
+                    add(&mut pixels[sample.fit as usize], kind.key(scene, hit), weight);
+                }
+            }
+        }
+    }
+}
+
+fn add(ranked: &mut Ranked, key: Key, weight: f32) {
+    match ranked.iter_mut().find(|(k, _)| *k == key) {
+        Some((_, coverage)) => *coverage += weight,
+        None => ranked.push((key, weight)),
+    }
+}
+
+/// Keeps what covers most. Filters with negative lobes may leave less than nothing.
+fn rank(ranked: &mut Ranked) {
+    ranked.retain(|(_, coverage)| *coverage > 0.0);
+    ranked.sort_unstable_by(|a, b| b.1.total_cmp(&a.1).then(a.0.cmp(&b.0)));
+    ranked.truncate(RANKS);
+}
+
+fn name_of(names: &[String], (index, instance): Key) -> String {
+    let name = &names[index as usize];
+    if instance == Hit::NO_INSTANCE { name.clone() } else { format!("{name}@{instance}") }
+}
+
+/// A string of JSON.
+fn json_text(text: &str) -> String {
+    let mut json = String::from("\"");
+    for c in text.chars() {
+        match c {
+            '"' | '\\' => json.extend(['\\', c]),
+            c if c < ' ' => json += &format!("\\u{:04x}", u32::from(c)),
+            c => json.push(c),
+        }
+    }
+    json + "\""
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// Figures of the specification's reference code.
+    #[test]
+    fn ids_are_those_of_the_specification() {
+        for (name, expected) in [
+            ("hello", 6.070_562_7e-17),
+            ("cube", -4.084_619_1e15),
+            ("sphere", 2.790_186e15),
+            ("plane", 3.665_576_2e-11),
+        ] {
+            assert_eq!(id(hash(name)), expected, "{name}");
+        }
+        for hash in [0, 0x7f80_0000, 0xffff_ffff, 0x8000_0001, 0x0012_3456] {
+            assert!(id(hash).is_normal(), "{hash:08x}");
+            assert_eq!(id(hash).to_bits() & 0x807f_ffff, hash & 0x807f_ffff);
+        }
+    }
+
+    #[test]
+    fn equal_names_are_numbered() {
+        assert_eq!(unique(["a", "b", "a", "a.1", "a"].into_iter()), ["a", "b", "a.1", "a.1.1", "a.2"]);
+        assert_eq!(json_text("a\"b\\c\n"), "\"a\\\"b\\\\c\\u000a\"");
+    }
+}
