@@ -158,6 +158,14 @@ struct Endless {
     address: String,
 }
 
+/// A test that fails leaves no rendering behind.
+impl Drop for Endless {
+    fn drop(&mut self) {
+        let _ = self.child.kill();
+        let _ = self.child.wait();
+    }
+}
+
 impl Endless {
     fn start(folder: &Path) -> Endless {
         let mut child = lumiris(folder, "-o a.exr --spp 1000000000 --estimator mis --view=0");
@@ -261,7 +269,10 @@ fn the_page_shows_the_image_while_it_converges() {
     let folder = folder();
     let view = Endless::start(folder.path());
     let browser = Browser::start([900, 640]);
-    browser.open_url(&format!("http://{}/", view.address), "state !== null && version !== '0'");
+    browser.open_url(
+        &format!("http://{}/", view.address),
+        "typeof state !== 'undefined' && state !== null && version !== '0'",
+    );
     browser.wait_for("/%.*elapsed.*left/.test(document.getElementById('status').textContent)");
     assert_eq!(browser.run("document.title"), "scene.pbrt");
     assert_eq!(browser.run("[picture.width, picture.height]"), serde_json::json!([50, 36]));
