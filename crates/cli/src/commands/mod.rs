@@ -8,6 +8,8 @@ mod bench;
 mod bench_efficiency;
 mod compare;
 mod crosscheck;
+mod farm;
+mod farm_scripts;
 mod generate;
 mod info;
 mod merge;
@@ -18,6 +20,7 @@ mod plan_file;
 mod progress;
 mod render;
 mod reproduce;
+mod scene_options;
 mod settings;
 mod settings_args;
 mod stored;
@@ -41,6 +44,8 @@ enum Command {
     Plan(plan::PlanArgs),
     /// Merge parts of an image, rendered with render --part, to the image
     Merge(merge::MergeArgs),
+    /// Render the parts of an image on the nodes of a cluster
+    Farm(farm::FarmArgs),
     /// Compare images with a reference, by metrics and on an HTML page
     Compare(compare::CompareArgs),
     /// Compare Embree with the pure-Rust BVH, ray by ray and image by image
@@ -68,6 +73,7 @@ pub(crate) fn run() -> ExitCode {
         Command::Render(args) => render::run(args),
         Command::Plan(args) => plan::run(args),
         Command::Merge(args) => merge::run(args),
+        Command::Farm(args) => farm::run(args),
         Command::Compare(args) => compare::run(args),
         Command::Crosscheck(args) => crosscheck::run(args),
         Command::Bench(args) => bench::run(args),

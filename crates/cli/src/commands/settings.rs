@@ -32,7 +32,7 @@ pub(super) struct SetupTimes {
 }
 
 /// Loads the scene and applies the options, after the settings of what is stored; prints warnings.
-fn load_scene(args: &SceneArgs, stored: Option<&Stored>) -> anyhow::Result<Loaded> {
+pub(super) fn load_scene(args: &SceneArgs, stored: Option<&Stored>) -> anyhow::Result<Loaded> {
     let options = LoadOptions { resolution: args.resolution, crop: args.crop };
     let mut loaded = match load(&args.scene, &options) {
         Ok(loaded) => loaded,
