@@ -40,8 +40,8 @@ while [ -n "$interrupted" ]; do
 done
 
 if [ "$code" -eq 0 ]; then
-  # Only what is complete has the name of a part
-  mv "$folder/$i.unfinished.part" "$folder/$i.part" || exit 3
+  # Only what is complete has the name of a part. A node that seemed lost may have rendered it meanwhile: the same bits
+  mv "$folder/$i.unfinished.part" "$folder/$i.part" || [ -e "$folder/$i.part" ] || exit 3
   rm -f "$folder/$i.film"
   echo "part $i of $parts is rendered"
   exit 0
