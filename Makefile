@@ -4,6 +4,7 @@ CARGO ?= $(shell command -v cargo || echo $(HOME)/.cargo/bin/cargo)
 PACKAGES = build-essential pkg-config libembree-dev libopenimageio-dev
 # Additional packages of the tests: a browser for the program's pages, and shells for its completions.
 TEST_PACKAGES = chromium fish zsh
+FARM_PACKAGES = slurm-wlm munge
 SCENE = scenes/demo/gallery.pbrt
 
 # Where `make install` puts things: below PREFIX, which a package may have below DESTDIR.
@@ -11,7 +12,7 @@ PREFIX ?= /usr/local
 BINARY = target/release/lumiris
 SHARE = $(DESTDIR)$(PREFIX)/share
 
-.PHONY: run build install uninstall test test-power measure-power test-debian13 setup lint doc bindings clean
+.PHONY: run build install uninstall test test-farm test-power measure-power test-debian13 setup lint doc bindings clean
 
 run: setup
 	$(CARGO) build --release
@@ -39,6 +40,11 @@ test: setup
 	@.ci/setup.sh $(TEST_PACKAGES)
 	$(CARGO) test --workspace --doc
 	$(CARGO) test --workspace --lib --bins --tests
+
+# Renders on a Slurm cluster of two nodes that this machine plays: picture, requeued tasks, a node that goes down.
+test-farm: setup
+	@.ci/setup.sh $(FARM_PACKAGES)
+	$(CARGO) test -p lumiris-cli --test it -- --include-ignored --test-threads 1 farm::
 
 # Analytic scenes at full power: enough samples to detect a bias of 2 % (0.5 or 1 % where there is little noise), the
 # injection of that bias, and the table of what each row detects. `make test` does the same with a sixth of the samples

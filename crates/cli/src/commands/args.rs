@@ -15,7 +15,7 @@ use std::path::PathBuf;
 use strum::VariantNames;
 
 /// An AOV, or none.
-fn aov() -> impl TypedValueParser<Value = Option<Aov>> {
+pub(super) fn aov() -> impl TypedValueParser<Value = Option<Aov>> {
     let names = Aov::VARIANTS.iter().copied().chain(["none"]);
     PossibleValuesParser::new(names).try_map(|name| if name == "none" { Ok(None) } else { name.parse().map(Some) })
 }

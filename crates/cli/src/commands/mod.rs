@@ -9,6 +9,8 @@ mod bench_efficiency;
 mod compare;
 mod crosscheck;
 mod exr;
+mod farm;
+mod farm_scripts;
 mod frame_list;
 mod frames;
 mod generate;
@@ -25,6 +27,7 @@ mod progress;
 mod render;
 mod reproduce;
 mod rescue;
+mod scene_options;
 mod settings;
 mod settings_args;
 mod shell;
@@ -50,6 +53,8 @@ enum Command {
     Plan(plan::PlanArgs),
     /// Merge parts of an image, rendered with render --part, to the image
     Merge(merge::MergeArgs),
+    /// Render the parts of an image on the nodes of a cluster
+    Farm(farm::FarmArgs),
     /// Compare images with a reference, by metrics and on an HTML page
     Compare(compare::CompareArgs),
     /// Compare Embree with the pure-Rust BVH, ray by ray and image by image
@@ -84,6 +89,7 @@ pub(crate) fn run() -> ExitCode {
         },
         Command::Plan(args) => plan::run(args),
         Command::Merge(args) => merge::run(args),
+        Command::Farm(args) => farm::run(args),
         Command::Compare(args) => compare::run(args),
         Command::Crosscheck(args) => crosscheck::run(args),
         Command::Bench(args) => bench::run(args),

@@ -51,12 +51,9 @@ pub(super) fn check(args: &RenderArgs) -> anyhow::Result<()> {
     Ok(())
 }
 
-/// Rejects settings by which an image cannot be rendered in parts. Before a plan is made.
-pub(super) fn check_settings(args: &RenderArgs, settings: &Settings) -> anyhow::Result<()> {
+/// Rejects settings by which an image cannot be divided.
+pub(super) fn check_division(args: &RenderArgs, settings: &Settings) -> anyhow::Result<()> {
     let usage = |text: String| Err(UsageError(text).into());
-    if !args.parts.is_partial() {
-        return Ok(());
-    }
     if settings.sampling.noise.is_some() {
         return usage("parts of an image cannot be limited by --noise: give a number of samples, --spp".to_owned());
     }
@@ -66,6 +63,16 @@ pub(super) fn check_settings(args: &RenderArgs, settings: &Settings) -> anyhow::
         let reason = "with a progressive estimator, samples depend on earlier ones of their pixel";
         return usage(format!("{reason}: divide the image with --part-by tiles"));
     }
+    Ok(())
+}
+
+/// Rejects settings by which an image cannot be rendered in parts. Before a plan is made.
+pub(super) fn check_settings(args: &RenderArgs, settings: &Settings) -> anyhow::Result<()> {
+    let usage = |text: String| Err(UsageError(text).into());
+    if !args.parts.is_partial() {
+        return Ok(());
+    }
+    check_division(args, settings)?;
     if follows_from_times(settings) {
         let scene = args.scene.scene.display();
         return usage(format!(

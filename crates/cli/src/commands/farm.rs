@@ -1,0 +1,220 @@
+//! `lumiris farm`: an image rendered in parts by the nodes of a cluster.
+
+use super::UsageError;
+use super::args::{RenderArgs, aov};
+use super::farm_scripts::{Job, quoted};
+use super::named::named;
+use super::part_args::{PART_TYPE, PartBy, extension};
+use super::parts;
+use super::pictures::check_outputs;
+use super::progress;
+use super::scene_options::SceneOptions;
+use super::settings::load_scene;
+use anyhow::{Context, bail};
+use clap::{Args, FromArgMatches, Subcommand};
+use lumiris::import::cache::FileCache;
+use lumiris::render::output::Aov;
+use lumiris::render::plan::follows_from_times;
+use lumiris::settings::{Allocation, EstimatorKind};
+use lumiris_formats::output::write_text;
+use std::fs;
+use std::io::ErrorKind;
+use std::path::{Path, PathBuf, absolute};
+use std::process::{Command, ExitCode, Stdio};
+
+/// `lumiris farm`
+#[derive(Args, Clone, Debug)]
+pub(super) struct FarmArgs {
+    #[command(subcommand)]
+    queue: Queue,
+}
+
+#[derive(Clone, Debug, Subcommand)]
+enum Queue {
+    /// Write, and submit, the jobs of a Slurm cluster that render the parts of an image and merge them
+    Slurm(Box<SlurmArgs>),
+}
+
+/// `lumiris farm slurm`
+#[derive(Args, Clone, Debug)]
+struct SlurmArgs {
+    #[command(flatten)]
+    scene: SceneOptions,
+    /// Number of parts, each of which is a task of an array job
+    #[arg(long = "parts", value_name = "N", value_parser = clap::value_parser!(u32).range(1..=1_000_000))]
+    count: u32,
+    /// What a part has: `samples`, a share of the samples of every pixel, or `tiles`, all samples of a share of the pixels
+    #[arg(long, value_name = "WHAT", default_value = "samples", value_parser = named::<PartBy>())]
+    part_by: PartBy,
+    /// Output image of the merge; may be given several times
+    #[arg(short, long, value_name = "FILE", required = true)]
+    output: Vec<PathBuf>,
+    /// AOVs: additional channels of EXR files, or `none` [default: all]
+    #[arg(long, value_name = "LIST", value_delimiter = ',', value_parser = aov())]
+    aov: Option<Vec<Option<Aov>>>,
+    /// Exposure of PNG, JPEG, TIFF and TGA images, in stops
+    #[arg(long, value_name = "STOPS", default_value_t = 0.0, allow_negative_numbers = true)]
+    exposure: f32,
+    /// Time between the checkpoints of a part
+    #[arg(long, value_name = "SECONDS", default_value_t = 60, value_parser = clap::value_parser!(u32).range(1..))]
+    checkpoint_seconds: u32,
+    /// An option of sbatch for all jobs, such as --sbatch=--partition=render; may be given several times
+    #[arg(long, value_name = "OPTION", allow_hyphen_values = true)]
+    sbatch: Vec<String>,
+    /// Folder of scripts, parts and logs, on a file system that all nodes share [default: the first output, .farm]
+    #[arg(long, value_name = "DIR")]
+    dir: Option<PathBuf>,
+    /// The program on the nodes [default: this one, by its path]
+    #[arg(long, value_name = "FILE")]
+    program: Option<PathBuf>,
+    /// Submit the jobs, and print their ids
+    #[arg(long)]
+    submit: bool,
+}
+
+pub(super) fn run(args: &FarmArgs) -> anyhow::Result<ExitCode> {
+    let Queue::Slurm(args) = &args.queue;
+    check_outputs(&args.output)?;
+    if let Some(path) = args.output.iter().find(|path| extension(path) == PART_TYPE) {
+        return Err(UsageError(format!("{}: parts are merged to an image, such as image.exr", path.display())).into());
+    }
+    let needs_plan = check(args)?;
+    let folder = args.dir.clone().unwrap_or_else(|| args.output[0].with_extension("farm"));
+    let folder = absolute(&folder).with_context(|| format!("cannot find {}", folder.display()))?;
+    let job = job(args, &folder, needs_plan)?;
+    write_folder(args, &folder, &job)?;
+    if args.submit {
+        submit(&folder)?;
+    } else {
+        let script = quoted(&text(&folder.join("submit.sh"))?);
+        progress::print(&format!("{} is ready; this submits it:\n{script}", folder.display()));
+    }
+    Ok(ExitCode::SUCCESS)
+}
+
+/// Rejects what cannot be rendered in parts, before anything is written; true if a plan must be made.
+fn check(args: &SlurmArgs) -> anyhow::Result<bool> {
+    let mut words = part_options(args, None);
+    words.extend(["--part".to_owned(), format!("1/{}", args.count), "-o".to_owned(), "1.part".to_owned()]);
+    words.extend(["--".to_owned(), text(&args.scene.args.scene)?]);
+    let command = RenderArgs::augment_args(clap::Command::new("render").no_binary_name(true));
+    let matches = command.try_get_matches_from(words).map_err(|e| UsageError(e.to_string()))?;
+    let mut render = RenderArgs::from_arg_matches(&matches).map_err(|e| UsageError(e.to_string()))?;
+    render.scene.plan.clone_from(&args.scene.args.plan);
+
+    let settings = load_scene(&render.scene, &FileCache::default(), None)?.settings;
+    let needs_plan = follows_from_times(&settings) && render.scene.plan.is_none();
+    parts::check_division(&render, &settings)?;
+    if !needs_plan {
+        parts::check_settings(&render, &settings)?;
+    }
+    // With other estimators and allocations, what a pilot finds decides how many samples there are
+    let is_uniform = match settings.sampling.allocation {
+        Allocation::Uniform => true,
+        Allocation::Auto => settings.integrator.estimator != EstimatorKind::Auto,
+        Allocation::Adaptive => false,
+    };
+    let (spp, count) = (settings.sampling.spp, args.count);
+    if is_uniform && args.part_by == PartBy::Samples && spp < count {
+        let message = format!("{spp} samples per pixel cannot be {count} parts: divide with --part-by tiles");
+        return Err(UsageError(message).into());
+    }
+    Ok(needs_plan)
+}
+
+/// Options of `lumiris render`, the same for all parts.
+fn part_options(args: &SlurmArgs, plan: Option<String>) -> Vec<String> {
+    let mut words = args.scene.words_without(&["plan"]);
+    words.extend(plan.map(|path| format!("--plan={path}")));
+    let names = args.aov.iter().map(|list| {
+        let names: Vec<&str> = list.iter().map(|aov| aov.map_or("none", <&str>::from)).collect();
+        format!("--aov={}", names.join(","))
+    });
+    words.extend(names);
+    words.push(format!("--part-by={}", <&str>::from(args.part_by)));
+    words
+}
+
+fn job(args: &SlurmArgs, folder: &Path, needs_plan: bool) -> anyhow::Result<Job> {
+    let from = std::env::current_dir().context("there is no current folder")?;
+    let program = match &args.program {
+        Some(path) => path.clone(),
+        None => std::env::current_exe().context("this program has no path: give --program")?,
+    };
+    let has_plan = needs_plan || args.scene.args.plan.is_some();
+    let plan = if has_plan { Some(text(&folder.join("plan.json"))?) } else { None };
+    let mut merge = vec![format!("--exposure={}", args.exposure)];
+    for path in &args.output {
+        merge.push(format!("--output={}", text(&absolute(path)?)?));
+    }
+    Ok(Job {
+        lumiris: text(&program)?,
+        from: text(&from)?,
+        folder: text(folder)?,
+        scene: text(&args.scene.args.scene)?,
+        parts: args.count,
+        seconds: f64::from(args.checkpoint_seconds),
+        needs_plan,
+        has_threads: args.scene.args.threads.is_some(),
+        options: [args.scene.words_without(&["plan"]), part_options(args, plan), merge, args.sbatch.clone()],
+    })
+}
+
+/// A path as scripts need it.
+fn text(path: &Path) -> anyhow::Result<String> {
+    Ok(path.to_str().with_context(|| format!("{}: the name is not in UTF-8", path.display()))?.to_owned())
+}
+
+/// Writes scripts and plan. A folder that exists must be empty, or of the same rendering, which then goes on.
+fn write_folder(args: &SlurmArgs, folder: &Path, job: &Job) -> anyhow::Result<()> {
+    let shown = folder.display();
+    let scripts = job.scripts();
+    match fs::create_dir(folder) {
+        Ok(()) => (),
+        Err(e) if e.kind() == ErrorKind::AlreadyExists => {
+            let entries = fs::read_dir(folder).with_context(|| format!("{shown} exists, and is no folder"))?;
+            let is_empty = entries.count() == 0;
+            let is_same = |name| fs::read_to_string(folder.join(name)).ok().as_ref() == text_of(&scripts, name);
+            if !is_empty && !is_same("part.sh") {
+                bail!("{shown} has files that are not of this rendering: remove it, or give another --dir");
+            }
+        }
+        Err(e) => return Err(e).with_context(|| format!("cannot make the folder {shown}")),
+    }
+    if let Some(path) = &args.scene.args.plan {
+        let text = fs::read_to_string(path).with_context(|| format!("cannot read {}", path.display()))?;
+        let copy = folder.join("plan.json");
+        if fs::read_to_string(&copy).is_ok_and(|before| before != text) {
+            bail!("{} is of another plan: remove {shown}, or give another --dir", copy.display());
+        }
+        write_text(&copy, &text).with_context(|| format!("cannot write {}", copy.display()))?;
+    }
+    for (name, text) in scripts {
+        let path = folder.join(name);
+        write_text(&path, &text).with_context(|| format!("cannot write {}", path.display()))?;
+        #[cfg(unix)]
+        fs::set_permissions(&path, std::os::unix::fs::PermissionsExt::from_mode(0o755))
+            .with_context(|| format!("cannot make {} a program", path.display()))?;
+    }
+    Ok(())
+}
+
+fn text_of<'a>(scripts: &'a [(&str, String)], name: &str) -> Option<&'a String> {
+    scripts.iter().find(|(other, _)| *other == name).map(|(_, text)| text)
+}
+
+/// Submits the jobs.
+fn submit(folder: &Path) -> anyhow::Result<()> {
+    let script = folder.join("submit.sh");
+    let run = Command::new("bash").arg(&script).stdin(Stdio::null()).output();
+    let output = run.with_context(|| format!("cannot run {}", script.display()))?;
+    let (out, err) = (String::from_utf8_lossy(&output.stdout), String::from_utf8_lossy(&output.stderr));
+    if !output.status.success() {
+        bail!("the jobs could not be submitted:\n{}", err.trim_end());
+    }
+    if !err.is_empty() {
+        progress::say(err.trim_end());
+    }
+    progress::print(out.trim_end());
+    Ok(())
+}

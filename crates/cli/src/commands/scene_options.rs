@@ -1,0 +1,64 @@
+//! The scene and its options, also as they were typed, for command lines that are written into scripts.
+
+use super::args::SceneArgs;
+use clap::parser::ValueSource;
+use clap::{Arg, ArgMatches, Args, Command, FromArgMatches};
+
+/// The scene and its options.
+#[derive(Clone, Debug)]
+pub(super) struct SceneOptions {
+    /// As parsed.
+    pub(super) args: SceneArgs,
+    /// As typed: names without dashes, and values if they have any.
+    typed: Vec<(String, Option<String>)>,
+}
+
+impl SceneOptions {
+    /// The options as words of a command line, but for those named.
+    pub(super) fn words_without(&self, omitted: &[&str]) -> Vec<String> {
+        let kept = self.typed.iter().filter(|(name, _)| !omitted.contains(&name.as_str()));
+        kept.map(|(name, value)| match value {
+            // One word, so that values may start with a dash
+            Some(value) => format!("--{name}={value}"),
+            None => format!("--{name}"),
+        })
+        .collect()
+    }
+}
+
+/// An option as it was typed; `None` if it was not.
+fn typed(arg: &Arg, matches: &ArgMatches) -> Option<Result<Vec<(String, Option<String>)>, clap::Error>> {
+    let (id, name) = (arg.get_id().as_str(), arg.get_long()?);
+    if matches.value_source(id) != Some(ValueSource::CommandLine) {
+        return None;
+    }
+    if !arg.get_action().takes_values() {
+        return Some(Ok(vec![(name.to_owned(), None)]));
+    }
+    let not_text = || clap::Error::raw(clap::error::ErrorKind::InvalidUtf8, format!("--{name}: not in UTF-8\n"));
+    let values = matches.get_raw(id)?.map(|value| Some((name.to_owned(), Some(value.to_str()?.to_owned()))));
+    Some(values.collect::<Option<Vec<_>>>().ok_or_else(not_text))
+}
+
+impl Args for SceneOptions {
+    fn augment_args(command: Command) -> Command {
+        SceneArgs::augment_args(command)
+    }
+
+    fn augment_args_for_update(command: Command) -> Command {
+        SceneArgs::augment_args_for_update(command)
+    }
+}
+
+impl FromArgMatches for SceneOptions {
+    fn from_arg_matches(matches: &ArgMatches) -> Result<Self, clap::Error> {
+        let known = SceneArgs::augment_args(Command::new("scene"));
+        let lists: Vec<_> = known.get_arguments().filter_map(|arg| typed(arg, matches)).collect::<Result<_, _>>()?;
+        Ok(SceneOptions { args: SceneArgs::from_arg_matches(matches)?, typed: lists.concat() })
+    }
+
+    fn update_from_arg_matches(&mut self, matches: &ArgMatches) -> Result<(), clap::Error> {
+        *self = Self::from_arg_matches(matches)?;
+        Ok(())
+    }
+}
