@@ -11,7 +11,7 @@ PREFIX ?= /usr/local
 BINARY = target/release/lumiris
 SHARE = $(DESTDIR)$(PREFIX)/share
 
-.PHONY: run build install uninstall test test-power measure-power test-debian13 setup lint doc bindings clean
+.PHONY: run build install uninstall test test-denoise test-power measure-power test-debian13 setup lint doc bindings clean
 
 run: setup
 	$(CARGO) build --release
@@ -39,6 +39,13 @@ test: setup
 	@.ci/setup.sh $(TEST_PACKAGES)
 	$(CARGO) test --workspace --doc
 	$(CARGO) test --workspace --lib --bins --tests
+
+# What needs Open Image Denoise: that of LUMIRIS_OIDN, or else one that is fetched once.
+test-denoise: setup
+	@[ -n "$$LUMIRIS_OIDN" ] || .ci/setup.sh python3-venv
+	library=$${LUMIRIS_OIDN:-$$(.ci/open-image-denoise.sh)} && export LUMIRIS_OIDN="$$library" && \
+	  $(CARGO) test -p lumiris --lib -- --include-ignored imaging::oidn:: && \
+	  $(CARGO) test -p lumiris-cli --test it -- --include-ignored denoise::
 
 # Analytic scenes at full power: enough samples to detect a bias of 2 % (0.5 or 1 % where there is little noise), the
 # injection of that bias, and the table of what each row detects. `make test` does the same with a sixth of the samples

@@ -8,6 +8,8 @@ mod bench;
 mod bench_efficiency;
 mod compare;
 mod crosscheck;
+mod denoise;
+mod denoise_args;
 mod exr;
 mod frame_list;
 mod frames;
@@ -50,6 +52,8 @@ enum Command {
     Plan(plan::PlanArgs),
     /// Merge parts of an image, rendered with render --part, to the image
     Merge(merge::MergeArgs),
+    /// Denoise an image with its layers by Open Image Denoise
+    Denoise(denoise::DenoiseFileArgs),
     /// Compare images with a reference, by metrics and on an HTML page
     Compare(compare::CompareArgs),
     /// Compare Embree with the pure-Rust BVH, ray by ray and image by image
@@ -84,6 +88,7 @@ pub(crate) fn run() -> ExitCode {
         },
         Command::Plan(args) => plan::run(args),
         Command::Merge(args) => merge::run(args),
+        Command::Denoise(args) => denoise::run(args),
         Command::Compare(args) => compare::run(args),
         Command::Crosscheck(args) => crosscheck::run(args),
         Command::Bench(args) => bench::run(args),

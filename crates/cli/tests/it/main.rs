@@ -5,6 +5,7 @@ mod browser;
 mod checkpoints;
 mod cli;
 mod compare;
+mod denoise;
 mod frames;
 mod looks;
 mod lost_output;
