@@ -39,7 +39,12 @@ impl DenoiseArgs {
 pub(super) fn open(library: Option<&Path>, threads: Option<u32>) -> anyhow::Result<Denoiser> {
     let of_environment = std::env::var_os(LIBRARY_VARIABLE).filter(|path| !path.is_empty()).map(PathBuf::from);
     let library = library.or(of_environment.as_deref());
-    Denoiser::open(library, threads.map(|n| n as usize)).map_err(|error| {
+    // The dynamic loader does not look for mere names in the current folder
+    let library = library.map(|path| match std::path::absolute(path) {
+        Ok(absolute) if absolute.is_file() => absolute,
+        _ => path.to_owned(),
+    });
+    Denoiser::open(library.as_deref(), threads.map(|n| n as usize)).map_err(|error| {
         let hint = format!("by --oidn-library or the environment variable {LIBRARY_VARIABLE}");
         match error {
             DenoiseError::Library(_) => anyhow::anyhow!("{error} {hint}"),

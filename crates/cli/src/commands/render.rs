@@ -72,6 +72,9 @@ pub(super) fn run(args: &RenderArgs) -> anyhow::Result<ExitCode> {
 impl Session {
     /// From here on Ctrl-C ends renderings in an orderly way, and they can be watched.
     pub(super) fn start(args: &RenderArgs, files: FileCache) -> anyhow::Result<Self> {
+        if !args.output.is_empty() {
+            check_denoise(args, &args.output)?;
+        }
         let denoiser = args.denoise.open(args.scene.threads)?;
         let watch = Watch::start(&args.watch.places()?, progress::say)?;
         if let Some(address) = watch.page {
@@ -238,9 +241,6 @@ pub(super) fn check(args: &RenderArgs) -> anyhow::Result<Option<Vec<Aov>>> {
     args.look.check()?;
     args.exr.check()?;
     parts::check(args)?;
-    if !args.output.is_empty() {
-        check_denoise(args, &args.output)?;
-    }
     asked_aovs(args)
 }
 
