@@ -12,7 +12,7 @@ PREFIX ?= /usr/local
 BINARY = target/release/lumiris
 SHARE = $(DESTDIR)$(PREFIX)/share
 
-.PHONY: run build install uninstall test test-farm test-power measure-power test-debian13 setup lint doc bindings clean
+.PHONY: run build install uninstall test test-farm test-denoise test-power measure-power test-debian13 setup lint doc bindings clean
 
 run: setup
 	$(CARGO) build --release
@@ -45,6 +45,15 @@ test: setup
 test-farm: setup
 	@.ci/setup.sh $(FARM_PACKAGES)
 	$(CARGO) test -p lumiris-cli --test it -- --include-ignored --test-threads 1 farm::
+
+# What needs Open Image Denoise: that of LUMIRIS_OIDN, or else one that is fetched once. Skipped where there is none to fetch.
+test-denoise: setup
+	@[ -n "$$LUMIRIS_OIDN" ] || .ci/setup.sh python3-venv
+	@library=$${LUMIRIS_OIDN:-$$(.ci/open-image-denoise.sh)} || library=; \
+	if [ -z "$$library" ]; then echo "Open Image Denoise could not be fetched: what needs it is not tested."; exit 0; fi; \
+	export LUMIRIS_OIDN="$$library" && \
+	  $(CARGO) test -p lumiris --lib -- --include-ignored imaging::oidn:: && \
+	  $(CARGO) test -p lumiris-cli --test it -- --include-ignored denoise::
 
 # Analytic scenes at full power: enough samples to detect a bias of 2 % (0.5 or 1 % where there is little noise), the
 # injection of that bias, and the table of what each row detects. `make test` does the same with a sixth of the samples

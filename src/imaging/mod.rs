@@ -1,12 +1,15 @@
 //! Images: pixels with named channels, their encodings, pyramids for filtered lookups, and metrics of their difference.
 //!
-//! Reading order: [`color`], [`view_transform`], [`mipmap`], [`mod@file`], [`oiio`], [`metrics`], [`heat`].
+//! Reading order: [`color`], [`view_transform`], [`mipmap`], [`mod@file`], [`oiio`], [`file_parts`], [`oidn`],
+//! [`metrics`], [`heat`].
 
 pub mod color;
 pub mod file;
+pub mod file_parts;
 pub mod heat;
 pub mod metrics;
 pub mod mipmap;
+pub mod oidn;
 pub mod oiio;
 pub mod view_transform;
 

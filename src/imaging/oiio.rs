@@ -39,6 +39,15 @@ impl Storage {
             Storage::Float => sys::OIIO_FORMAT_FLOAT,
         }
     }
+
+    /// What holds the values of a format: a float, where it is none of the others.
+    fn of_format(format: i32) -> Self {
+        match format {
+            sys::OIIO_FORMAT_U8 => Storage::Bytes,
+            sys::OIIO_FORMAT_HALF => Storage::Half,
+            _ => Storage::Float,
+        }
+    }
 }
 
 /// A value of metadata.
@@ -205,14 +214,14 @@ fn c_path(path: &Path) -> Result<CString, String> {
 }
 
 /// A file open for reading.
-struct Input {
+pub(super) struct Input {
     api: &'static sys::Api,
     handle: *mut sys::OiioInput,
     part: i32,
 }
 
 impl Input {
-    fn open(path: &Path, part: i32) -> Result<Self, ImageError> {
+    pub(super) fn open(path: &Path, part: i32) -> Result<Self, ImageError> {
         let unreadable = |reason: String| ImageError::Unreadable { path: path.to_owned(), reason };
         match path.metadata() {
             Ok(metadata) if metadata.is_dir() => return Err(unreadable("is a folder".to_owned())),
@@ -246,31 +255,65 @@ impl Input {
         Ok(spec)
     }
 
-    fn channel(&self, index: i32) -> Result<String, (i32, String)> {
+    fn channel(&self, index: i32) -> Result<(String, Storage), (i32, String)> {
         let (mut name, mut format) = (ptr::null(), 0);
         // SAFETY: as above; the name is copied while the handle is live.
         call(|e, n| unsafe { (self.api.input_channel)(self.handle, self.part, index, &mut name, &mut format, e, n) })?;
-        Ok(text(name))
+        Ok((text(name), Storage::of_format(format)))
     }
 
     fn channels(&self, count: i32) -> Result<Vec<String>, (i32, String)> {
-        (0..count).map(|i| self.channel(i)).collect()
+        (0..count).map(|i| self.channel(i).map(|(name, _)| name)).collect()
+    }
+
+    /// How the channels of the part are stored.
+    pub(super) fn storage(&self) -> Result<Vec<Storage>, (i32, String)> {
+        (0..self.spec()?.nchannels).map(|i| self.channel(i).map(|(_, storage)| storage)).collect()
+    }
+
+    /// The metadata of the part whose types [`MetaValue`] has.
+    pub(super) fn values(&self) -> Result<Vec<(String, MetaValue)>, (i32, String)> {
+        let value = |a: &sys::OiioAttribute| {
+            let bytes: &[u8] = if a.data.is_null() {
+                &[]
+            } else {
+                // SAFETY: the shim says that so many bytes are there; they are copied while the handle is live.
+                unsafe { std::slice::from_raw_parts(a.data.cast(), a.bytes) }
+            };
+            let words: Vec<[u8; 4]> = bytes.as_chunks().0.to_vec();
+            match (text(a.r#type).as_str(), &words[..]) {
+                ("string", _) => Some(MetaValue::Text(text(a.value))),
+                ("int", [word]) => Some(MetaValue::Integer(i32::from_ne_bytes(*word))),
+                ("float", [word]) => Some(MetaValue::Number(f32::from_ne_bytes(*word))),
+                ("matrix", words) => {
+                    let rows: Vec<f32> = words.iter().map(|word| f32::from_ne_bytes(*word)).collect();
+                    rows.try_into().ok().map(MetaValue::Matrix)
+                }
+                _ => None,
+            }
+        };
+        let entries =
+            (0..self.spec()?.attributes).filter_map(|i| self.attribute(i, |a| Some((text(a.name), value(a)?))));
+        Ok(entries.collect())
     }
 
     fn metadata(&self, count: i32) -> BTreeMap<String, String> {
-        let entry = |index| {
-            let mut a = sys::OiioAttribute {
-                name: ptr::null(),
-                r#type: ptr::null(),
-                value: ptr::null(),
-                data: ptr::null(),
-                bytes: 0,
-            };
-            // SAFETY: as above; the texts are copied while the handle is live.
-            call(|e, n| unsafe { (self.api.input_attribute)(self.handle, self.part, index, &mut a, e, n) }).ok()?;
-            Some((text(a.name), text(a.value)))
-        };
+        let entry = |index| self.attribute(index, |a| Some((text(a.name), text(a.value))));
         (0..count).filter_map(entry).collect()
+    }
+
+    /// What `read` makes of an entry of metadata.
+    fn attribute<T>(&self, index: i32, read: impl FnOnce(&sys::OiioAttribute) -> Option<T>) -> Option<T> {
+        let mut a = sys::OiioAttribute {
+            name: ptr::null(),
+            r#type: ptr::null(),
+            value: ptr::null(),
+            data: ptr::null(),
+            bytes: 0,
+        };
+        // SAFETY: as above; `read` copies what it needs while the handle is live.
+        call(|e, n| unsafe { (self.api.input_attribute)(self.handle, self.part, index, &mut a, e, n) }).ok()?;
+        read(&a)
     }
 
     fn pixels(&self, max_bytes: u64) -> Result<Vec<f32>, (i32, String)> {
@@ -344,7 +387,7 @@ pub fn read_headers(path: &Path) -> Result<Vec<PartHeader>, ImageError> {
     Ok(headers)
 }
 
-fn read_failure(path: &Path, (code, reason): (i32, String)) -> ImageError {
+pub(super) fn read_failure(path: &Path, (code, reason): (i32, String)) -> ImageError {
     let path = path.to_owned();
     match code {
         sys::OIIO_TOO_LARGE => ImageError::TooLarge { path, reason },

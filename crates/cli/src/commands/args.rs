@@ -1,5 +1,6 @@
 //! Options that several subcommands share, as typed.
 
+use super::denoise_args::DenoiseArgs;
 use super::exr::ExrArgs;
 use super::frame_list::{FrameList, parse_frames};
 use super::look::LookArgs;
@@ -81,6 +82,8 @@ pub(super) struct RenderArgs {
     pub look: LookArgs,
     #[command(flatten)]
     pub exr: ExrArgs,
+    #[command(flatten)]
+    pub denoise: DenoiseArgs,
     #[command(flatten)]
     pub watch: WatchArgs,
     /// Write times and counts of every stage

@@ -25,7 +25,20 @@ const COMPRESSIONS: [(&str, bool); 10] = [
     ("dwab", false),
 ];
 /// Layers that 16 bits suffice for; of others the numbers count, or they are too small.
-const COLORS: [&str; 9] = ["R", "G", "B", "albedo.R", "albedo.G", "albedo.B", "normal.X", "normal.Y", "normal.Z"];
+const COLORS: [&str; 12] = [
+    "R",
+    "G",
+    "B",
+    "albedo.R",
+    "albedo.G",
+    "albedo.B",
+    "normal.X",
+    "normal.Y",
+    "normal.Z",
+    "denoised.R",
+    "denoised.G",
+    "denoised.B",
+];
 /// Largest number that 16 bits hold.
 const MAX_HALF: f32 = 65_504.0;
 
@@ -49,7 +62,7 @@ enum ExrParts {
 #[derive(Args, Clone, Debug)]
 #[command(next_help_heading = "EXR")]
 pub(super) struct ExrArgs {
-    /// Floats of the image, albedo and normal; all other channels are always `float`
+    /// Floats of the image, denoised or not, albedo and normal; all other channels are always `float`
     #[arg(long, value_name = "TYPE", default_value = "float", value_parser = named::<ExrType>())]
     exr_type: ExrType,
     /// Compression; Cryptomatte layers, which bear no loss, have `zip` where it is pxr24, b44, b44a, dwaa or dwab

@@ -106,17 +106,23 @@ impl LookArgs {
     }
 
     /// The exposure of an image (stops).
-    fn stops(&self, film: &Film) -> f32 {
+    fn stops(&self, radiance: &[f32]) -> f32 {
         match self.exposure {
             Exposure::Stops(stops) => stops,
-            Exposure::Auto => auto_exposure(film.pixels.iter().map(|pixel| pixel.mean().map(|v| v as f32))),
+            Exposure::Auto => auto_exposure(radiance.as_chunks::<3>().0.iter().copied()),
         }
     }
 
-    /// The colours of an image.
+    /// The colours of a film.
     pub(super) fn apply(&self, film: &Film) -> anyhow::Result<Displayed> {
-        let stops = self.stops(film);
-        let mut pixels = exposed(film, stops);
+        self.apply_to(exposed(film, 0.0))
+    }
+
+    /// The colours of an image: RGB, interleaved.
+    pub(super) fn apply_to(&self, mut pixels: Vec<f32>) -> anyhow::Result<Displayed> {
+        let stops = self.stops(&pixels);
+        let gain = stops.exp2();
+        pixels.iter_mut().for_each(|v| *v *= gain);
         let view = match self.view_transform {
             View::Curve(curve) => {
                 for rgb in pixels.as_chunks_mut::<3>().0 {

@@ -58,6 +58,7 @@ pub(super) fn run(args: &MergeArgs) -> anyhow::Result<ExitCode> {
         aovs: aovs(&merged),
         sample_count_map: None,
         cryptomattes: &[],
+        denoised: None,
         camera: CameraMatrices::from_notes(|name| merged.header.note(name)),
         seconds,
         metadata: metadata(&merged, seconds),

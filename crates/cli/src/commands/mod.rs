@@ -8,6 +8,8 @@ mod bench;
 mod bench_efficiency;
 mod compare;
 mod crosscheck;
+mod denoise;
+mod denoise_args;
 mod exr;
 mod farm;
 mod farm_scripts;
@@ -55,6 +57,8 @@ enum Command {
     Merge(merge::MergeArgs),
     /// Render the parts of an image on the nodes of a cluster
     Farm(farm::FarmArgs),
+    /// Denoise an image with its layers by Open Image Denoise
+    Denoise(denoise::DenoiseFileArgs),
     /// Compare images with a reference, by metrics and on an HTML page
     Compare(compare::CompareArgs),
     /// Compare Embree with the pure-Rust BVH, ray by ray and image by image
@@ -89,6 +93,7 @@ pub(crate) fn run() -> ExitCode {
         },
         Command::Plan(args) => plan::run(args),
         Command::Merge(args) => merge::run(args),
+        Command::Denoise(args) => denoise::run(args),
         Command::Farm(args) => farm::run(args),
         Command::Compare(args) => compare::run(args),
         Command::Crosscheck(args) => crosscheck::run(args),

@@ -1,8 +1,9 @@
 //! The image files of a rendering.
 
 use super::args::RenderArgs;
+use super::denoise_args::Denoised;
 use super::exr::{CameraMatrices, ExrArgs, ExrImage};
-use super::look::LookArgs;
+use super::look::{Displayed, LookArgs};
 use super::part_args::{extension, is_part};
 use super::plan_file::PlanFile;
 use super::progress;
@@ -35,6 +36,8 @@ pub(super) struct Made<'a> {
     pub asked: Option<&'a [Aov]>,
     /// Cryptomattes that were asked for.
     pub cryptomattes: Vec<Layer>,
+    /// The image without noise, if it was asked for.
+    pub denoised: Option<Denoised>,
     /// True if Ctrl-C ended it.
     pub is_interrupted: bool,
 }
@@ -104,6 +107,8 @@ pub(super) struct Picture<'a> {
     pub sample_count_map: Option<&'a SampleCountMap>,
     /// Cryptomattes.
     pub cryptomattes: &'a [Layer],
+    /// The image without noise, which images for a display show.
+    pub denoised: Option<&'a Denoised>,
     /// Where the camera stood.
     pub camera: CameraMatrices,
     /// Wall-clock time of the rendering (s).
@@ -119,25 +124,30 @@ impl Picture<'_> {
             return self.write_exr(path);
         }
         let film = self.film;
-        let displayed = self.look.apply(film)?;
-        let (width, height) = (film.bounds.width() as usize, film.bounds.height() as usize);
-        let names = ["R", "G", "B"].map(str::to_owned).to_vec();
+        let displayed = match self.denoised {
+            Some(denoised) => self.look.apply_to(denoised.pixels.clone())?,
+            None => self.look.apply(film)?,
+        };
+        let size = [film.bounds.width() as usize, film.bounds.height() as usize];
         let full = [film.resolution[0] as usize, film.resolution[1] as usize];
         let origin = [film.bounds.x0 as usize, film.bounds.y0 as usize];
-        let part = Part::display(width, height, names, displayed.pixels).with_window(origin, full);
-        let part = part.with_metadata(self.metadata.clone()).with_metadata(displayed.metadata);
-        oiio::write_image(path, &[part])?;
-        Ok(())
+        let of_denoised = self.denoised.map(Denoised::metadata_shown).unwrap_or_default();
+        write_display(path, (size, origin, full), displayed, [self.metadata.clone(), of_denoised].concat())
     }
 
     fn write_exr(&self, path: &Path) -> anyhow::Result<()> {
+        let mut channels = output::channels(self.film, &self.aovs, self.sample_count_map);
+        if let Some(denoised) = self.denoised {
+            denoised.append_to(&mut channels);
+        }
+        let of_denoised = self.denoised.map(Denoised::metadata).unwrap_or_default();
         let (parts, warning) = self.exr.parts(ExrImage {
             film: self.film,
             camera: &self.camera,
             seconds: self.seconds,
-            channels: output::channels(self.film, &self.aovs, self.sample_count_map),
+            channels,
             cryptomattes: self.cryptomattes,
-            metadata: self.metadata.clone(),
+            metadata: [self.metadata.clone(), of_denoised].concat(),
         });
         if let Some(warning) = warning {
             progress::say(&format!("{}: {warning}", path.display()));
@@ -145,6 +155,19 @@ impl Picture<'_> {
         oiio::write_image(path, &parts)?;
         Ok(())
     }
+}
+
+/// Writes an image for a display: its size, the place of its first pixel in the full image, and the size of that.
+pub(super) fn write_display(
+    path: &Path,
+    (size, origin, full): ([usize; 2], [usize; 2], [usize; 2]),
+    displayed: Displayed,
+    metadata: Vec<(String, String)>,
+) -> anyhow::Result<()> {
+    let names = ["R", "G", "B"].map(str::to_owned).to_vec();
+    let part = Part::display(size[0], size[1], names, displayed.pixels).with_window(origin, full);
+    oiio::write_image(path, &[part.with_metadata(metadata).with_metadata(displayed.metadata)])?;
+    Ok(())
 }
 
 impl Made<'_> {
@@ -157,6 +180,7 @@ impl Made<'_> {
             aovs: self.aovs(),
             sample_count_map: self.job.sample_count_map.as_ref(),
             cryptomattes: &self.cryptomattes,
+            denoised: self.denoised.as_ref(),
             camera: CameraMatrices::of(&self.job.world.scene.camera),
             seconds: self.rendering.elapsed.as_secs_f64(),
             metadata: self.metadata()?,

@@ -2,6 +2,7 @@
 
 use super::UsageError;
 use super::args::RenderArgs;
+use super::denoise_args::Denoised;
 use super::part_args::is_part;
 use super::parts::{self, FilmFile};
 use super::pictures::{Made, check_outputs, is_exr, write_pictures};
@@ -12,6 +13,7 @@ use super::stored::Stored;
 use crate::watch::{self, Watch};
 use anyhow::{Context, bail};
 use lumiris::film::Film;
+use lumiris::imaging::oidn::Denoiser;
 use lumiris::import::cache::FileCache;
 use lumiris::integrators::photon_map::MapStats;
 use lumiris::render::cryptomatte::cryptomattes;
@@ -35,6 +37,8 @@ pub(super) struct Session {
     pub stop: Arc<AtomicBool>,
     /// Meshes and images that scenes share.
     pub files: FileCache,
+    /// What denoises images, if they are to be.
+    denoiser: Option<Denoiser>,
     /// Those who watch.
     watch: Watch,
 }
@@ -68,13 +72,17 @@ pub(super) fn run(args: &RenderArgs) -> anyhow::Result<ExitCode> {
 impl Session {
     /// From here on Ctrl-C ends renderings in an orderly way, and they can be watched.
     pub(super) fn start(args: &RenderArgs, files: FileCache) -> anyhow::Result<Self> {
+        if !args.output.is_empty() {
+            check_denoise(args, &args.output)?;
+        }
+        let denoiser = args.denoise.open(args.scene.threads)?;
         let watch = Watch::start(&args.watch.places()?, progress::say)?;
         if let Some(address) = watch.page {
             progress::say(&format!("the image can be watched at http://{address}/"));
         }
         let stop = Arc::new(AtomicBool::new(false));
         stop_at_ctrl_c(&stop)?;
-        Ok(Session { stop, files, watch })
+        Ok(Session { stop, files, denoiser, watch })
     }
 
     /// True once Ctrl-C was pressed.
@@ -99,13 +107,14 @@ pub(super) fn render_one(args: &RenderArgs, session: &Session) -> anyhow::Result
     if args.output.is_empty() {
         check_outputs(&outputs)?;
     }
+    check_denoise(args, &outputs)?;
 
     let bar = Bar::new(args.quiet);
     let needs = |is_shown: fn(&Aov) -> bool| asked.as_ref().is_none_or(|list| list.iter().any(is_shown));
     let mut settings = RenderSettings {
         time_limit: args.time.map(Duration::from_secs_f64),
         with_replicas: needs(|aov| *aov == Aov::Variance),
-        with_features: needs(|aov| aov.is_feature()),
+        with_features: args.denoise.denoise || needs(|aov| aov.is_feature()),
         ..render_settings(&args.scene, &job)
     };
     let mut film_file = FilmFile::new(args, (&job, &plan, &files), &mut settings, stored)?;
@@ -117,6 +126,7 @@ pub(super) fn render_one(args: &RenderArgs, session: &Session) -> anyhow::Result
     let has_exr = outputs.iter().any(|path| is_exr(path));
     let kinds = if has_exr { &args.exr.cryptomatte[..] } else { &[] };
     let cryptomattes = cryptomattes(&job, &settings, &rendering.film, kinds)?;
+    let (denoised, not_denoised) = denoise(session, &rendering.film);
     let made = Made {
         args,
         job: &job,
@@ -124,10 +134,12 @@ pub(super) fn render_one(args: &RenderArgs, session: &Session) -> anyhow::Result
         rendering: &rendering,
         asked: asked.as_deref(),
         cryptomattes,
+        denoised,
         is_interrupted: session.is_stopped(),
     };
     let (part_files, images): (Vec<PathBuf>, Vec<PathBuf>) = outputs.into_iter().partition(|path| is_part(path));
     let (mut written, mut misplaced) = write_pictures(&made, &images)?;
+    misplaced.extend(not_denoised);
     if let Some(film_file) = film_file.as_mut().filter(|_| !part_files.is_empty()) {
         film_file.end(&rendering);
         for path in part_files {
@@ -147,6 +159,27 @@ pub(super) fn render_one(args: &RenderArgs, session: &Session) -> anyhow::Result
         complete: rendering.complete,
         misplaced,
     })
+}
+
+/// The image without noise, if it is asked for; or why there is none, which is no reason to lose the image.
+fn denoise(session: &Session, film: &Film) -> (Option<Denoised>, Option<String>) {
+    match session.denoiser.as_ref().map(|denoiser| Denoised::of_film(denoiser, film)) {
+        Some(Ok(denoised)) => (Some(denoised), None),
+        Some(Err(error)) => (None, Some(format!("{error}; the image is written as it is"))),
+        None => (None, None),
+    }
+}
+
+/// Refuses to denoise what is no whole image, and to show a denoised image without keeping the other.
+fn check_denoise(args: &RenderArgs, outputs: &[PathBuf]) -> anyhow::Result<()> {
+    let usage = |text: &str| Err(UsageError(text.to_owned()).into());
+    if args.denoise.denoise && args.parts.part.is_some() {
+        return usage("--denoise needs the whole image: merge the parts, then use `lumiris denoise`");
+    }
+    if args.denoise.denoise && !outputs.iter().any(|path| is_exr(path)) {
+        return usage("--denoise needs an EXR file among the outputs, which keeps the image as it was rendered");
+    }
+    Ok(())
 }
 
 /// Renders, for those who watch as well.

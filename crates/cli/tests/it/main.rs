@@ -5,6 +5,7 @@ mod browser;
 mod checkpoints;
 mod cli;
 mod compare;
+mod denoise;
 mod farm;
 mod frames;
 mod looks;

@@ -1,0 +1,175 @@
+//! `lumiris denoise`: an image file gets the layer `denoised`.
+
+use super::UsageError;
+use super::denoise_args::{DENOISED, DENOISED_KEY, Denoised, open};
+use super::look::LookArgs;
+use super::part_args::is_part;
+use super::pictures::{check_outputs, is_exr, write_display};
+use super::progress;
+use super::rescue::write_or_rescue;
+use anyhow::{Context, bail};
+use clap::Args;
+use lumiris::imaging::file_parts::{FilePart, read_file_parts};
+use lumiris::imaging::oidn::NoisyImage;
+use lumiris::imaging::oiio::{MetaValue, ReadLimits, Storage, write_image};
+use std::path::PathBuf;
+use std::process::ExitCode;
+
+/// Name of the layer, and of its part in files of several parts.
+const LAYER: &str = "denoised";
+
+/// `lumiris denoise`
+#[derive(Args, Clone, Debug)]
+pub(super) struct DenoiseFileArgs {
+    /// EXR file with the image, and its albedo and normal, as `render` writes it
+    input: PathBuf,
+    /// Output image; may be given several times: EXR has all layers of the input, and the layer `denoised`; PNG, JPEG, TIFF
+    /// and TGA show the denoised image
+    #[arg(short, long, value_name = "FILE", required = true)]
+    output: Vec<PathBuf>,
+    /// Library of Open Image Denoise 2 [default: the environment variable LUMIRIS_OIDN, or the system's]
+    #[arg(long, value_name = "PATH")]
+    oidn_library: Option<PathBuf>,
+    /// Threads [default: all cores]
+    #[arg(long, value_name = "T", value_parser = clap::value_parser!(u32).range(1..=4096))]
+    threads: Option<u32>,
+    #[command(flatten)]
+    look: LookArgs,
+    /// Print only warnings and errors
+    #[arg(short, long)]
+    quiet: bool,
+}
+
+pub(super) fn run(args: &DenoiseFileArgs) -> anyhow::Result<ExitCode> {
+    check_outputs(&args.output)?;
+    if let Some(path) = args.output.iter().find(|path| is_part(path)) {
+        return Err(UsageError(format!("{}: a denoised image is no part of another", path.display())).into());
+    }
+    args.look.check()?;
+    if !is_exr(&args.input) {
+        let path = args.input.display();
+        return Err(UsageError(format!("{path}: only EXR files hold what is denoised: linear light and layers")).into());
+    }
+    let denoiser = open(args.oidn_library.as_deref(), args.threads)?;
+
+    // Denoise the image of the first part that has one
+    let mut parts = read_file_parts(&args.input, &ReadLimits::default())?;
+    drop_earlier_result(&mut parts);
+    let main = main_part(&parts).with_context(|| format!("{}: has no channels R, G and B", args.input.display()))?;
+    let image = noisy_image(&parts, main, |text| progress::say(&format!("{}: {text}", args.input.display())));
+    let denoised = Denoised::new(&denoiser, image)?;
+
+    let mut misplaced = Vec::new();
+    let mut written = Vec::new();
+    for path in &args.output {
+        let write = |path: &std::path::Path| {
+            if is_exr(path) {
+                let parts = with_layer(parts.clone(), main, &denoised);
+                let parts: Vec<_> = parts.into_iter().map(FilePart::into_part).collect();
+                return Ok(write_image(path, &parts)?);
+            }
+            let part = &parts[main];
+            let size = [part.image.width, part.image.height];
+            let shown = args.look.apply_to(denoised.pixels.clone())?;
+            let metadata = [texts(&parts), denoised.metadata_shown()].concat();
+            write_display(path, (size, part.origin, part.full), shown, metadata)
+        };
+        match write_or_rescue(path, write) {
+            Ok(()) => written.push(path.display().to_string()),
+            Err(error) => misplaced.push(format!("{error:#}")),
+        }
+    }
+    if !args.quiet && !written.is_empty() {
+        progress::say(&format!("{}: {}", written.join(", "), denoised.about));
+    }
+    if !misplaced.is_empty() {
+        bail!(misplaced.join("\nlumiris: "));
+    }
+    Ok(ExitCode::SUCCESS)
+}
+
+/// Leaves out what an earlier run has added.
+fn drop_earlier_result(parts: &mut Vec<FilePart>) {
+    for part in parts.iter_mut() {
+        part.retain_channels(|name| !DENOISED.contains(&name));
+        part.metadata.retain(|(name, _)| name != DENOISED_KEY);
+    }
+    parts.retain(|part| !part.image.channels.is_empty());
+}
+
+/// The first part with an image.
+fn main_part(parts: &[FilePart]) -> Option<usize> {
+    parts.iter().position(|part| ["R", "G", "B"].iter().all(|name| part.image.channel(name).is_some()))
+}
+
+/// Three channels of a part, side by side.
+fn layer(part: &FilePart, channels: [usize; 3]) -> Vec<f32> {
+    let stride = part.image.channels.len();
+    part.image.data.chunks_exact(stride).flat_map(|pixel| channels.map(|c| pixel[c])).collect()
+}
+
+/// The image and its guides, where they have its size; warns of those that are missing.
+fn noisy_image(parts: &[FilePart], main: usize, warn: impl Fn(&str)) -> NoisyImage {
+    let part = &parts[main];
+    let is_beside = |other: &&FilePart| {
+        let size = |p: &FilePart| (p.image.width, p.image.height, p.origin);
+        size(other) == size(part)
+    };
+    let guide = |names: [&str; 3]| {
+        let find = |part: &FilePart| {
+            let [a, b, c] = names.map(|name| position(part, name));
+            Some(layer(part, [a?, b?, c?]))
+        };
+        parts.iter().filter(is_beside).find_map(find)
+    };
+    let albedo = guide(["albedo.R", "albedo.G", "albedo.B"]);
+    let normal = guide(["normal.X", "normal.Y", "normal.Z"]);
+    match (&albedo, &normal) {
+        (Some(_), Some(_)) => {}
+        (Some(_), None) => warn("warning: has no layer normal: denoised by colour and albedo"),
+        (None, Some(_)) => {
+            warn("warning: has no layer albedo, without which normals are of no use: denoised by colour")
+        }
+        (None, None) => warn("warning: has neither albedo nor normal: denoised by colour, which loses detail"),
+    }
+    let rgb = ["R", "G", "B"].map(|name| part.image.channel(name).unwrap_or(0));
+    let normal = normal.filter(|_| albedo.is_some());
+    let (width, height) = (part.image.width, part.image.height);
+    NoisyImage { width, height, color: layer(part, rgb), albedo, normal }
+}
+
+/// Position of a channel of this name, whatever precedes it, as other programs name theirs: `Albedo.R`,
+/// `ViewLayer.Denoising Albedo.R`.
+fn position(part: &FilePart, name: &str) -> Option<usize> {
+    let names = &part.image.channels;
+    let is_named = |channel: &str| {
+        let channel = channel.to_lowercase();
+        channel.strip_suffix(&name.to_lowercase()).is_some_and(|rest| rest.is_empty() || rest.ends_with(['.', ' ']))
+    };
+    part.image.channel(name).or_else(|| names.iter().position(|channel| is_named(channel)))
+}
+
+/// The file with the layer: a part of its own, where layers are parts.
+fn with_layer(mut parts: Vec<FilePart>, main: usize, denoised: &Denoised) -> Vec<FilePart> {
+    let red = parts[main].image.channel("R").unwrap_or(0);
+    let storage = parts[main].storage.get(red).copied().unwrap_or(Storage::Float);
+    let layer = parts[main].beside(LAYER, &DENOISED, denoised.pixels.clone(), storage);
+    if parts.len() > 1 {
+        parts.push(layer);
+    } else {
+        parts[main].append(layer);
+    }
+    let entries = denoised.metadata().into_iter().map(|(key, value)| (key, MetaValue::Text(value)));
+    parts[0].metadata.extend(entries);
+    parts
+}
+
+/// What the file says of its settings.
+fn texts(parts: &[FilePart]) -> Vec<(String, String)> {
+    let entries = parts.iter().take(1).flat_map(|part| &part.metadata);
+    let entries = entries.filter_map(|(name, value)| match value {
+        MetaValue::Text(text) if name.starts_with("lumiris:") => Some((name.clone(), text.clone())),
+        _ => None,
+    });
+    entries.collect()
+}
