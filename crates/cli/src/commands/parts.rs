@@ -177,7 +177,9 @@ fn extent(args: &RenderArgs, settings: &mut RenderSettings, stored: Option<&Stor
             return usage(format!("{} is of another part of the image", stored.path.display()));
         }
         (settings.skip, settings.spp, settings.share) = before;
-        if let Some(more) = args.scene.settings.count("spp").filter(|n| *n != header.samples.end) {
+        // The samples of a part follow from those of the whole image, which --spp names
+        let is_more = |n: &u32| !parts.is_partial() && *n != header.samples.end;
+        if let Some(more) = args.scene.settings.count("spp").filter(is_more) {
             let is_first = header.samples.start == 0;
             let done = stored.tiles.iter().map(|t| t.done).max().unwrap_or(0);
             if !is_first || more < done {
