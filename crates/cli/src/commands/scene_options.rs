@@ -10,7 +10,7 @@ pub(super) struct SceneOptions {
     /// As parsed.
     pub(super) args: SceneArgs,
     /// As typed: names without dashes, and values if they have any.
-    typed: Vec<(String, Option<String>)>,
+    typed: Typed,
 }
 
 impl SceneOptions {
@@ -26,8 +26,11 @@ impl SceneOptions {
     }
 }
 
+/// Names and values of options.
+type Typed = Vec<(String, Option<String>)>;
+
 /// An option as it was typed; `None` if it was not.
-fn typed(arg: &Arg, matches: &ArgMatches) -> Option<Result<Vec<(String, Option<String>)>, clap::Error>> {
+fn typed(arg: &Arg, matches: &ArgMatches) -> Option<Result<Typed, clap::Error>> {
     let (id, name) = (arg.get_id().as_str(), arg.get_long()?);
     if matches.value_source(id) != Some(ValueSource::CommandLine) {
         return None;
