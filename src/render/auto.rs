@@ -6,7 +6,7 @@
 //! proportion to σ, it would be the square of the mean of σ, were these numbers known; what counts there is the geometric
 //! mean of both. The former is that of few pixels, such as those at edges of visible lights, the latter that of all others.
 //!
-//! From few and from many samples at first and at later vertices follows a model of both ([`Model`]), and from that the
+//! From few and from many samples at first and at later vertices follows a model of both ([`lumiris_numbers::estimators::efficiency::Model`]), and from that the
 //! best numbers. What is best by the model then takes part in a second round on other pixels, together with what differs
 //! in more than numbers. There a candidate takes the place of the one before it only if it is more efficient by more than
 //! the pilot's noise, which the jackknife tells: all candidates have the same pixels, so that the difference of two of
