@@ -88,11 +88,13 @@ pub fn follows_from_times(settings: &Settings) -> bool {
     i.estimator == EstimatorKind::Auto || i.estimator == EstimatorKind::Ris && is_open
 }
 
-/// The settings that differ.
+/// The settings that differ, and the number of proposals wherever it was open, even if it is what is recorded without times: it
+/// would be measured again.
 fn chosen(before: &Settings, after: &Settings) -> Vec<(&'static str, String)> {
+    let was_open = before.integrator.ris.proposals != after.integrator.ris.proposals;
     let before: Vec<_> = before.recorded().collect();
-    let after = after.recorded().filter(|entry| !before.contains(entry));
-    after.map(|(key, value)| (key, value.to_string())).collect()
+    let is_chosen = |entry: &(&str, _)| !before.contains(entry) || was_open && entry.0 == "proposals";
+    after.recorded().filter(is_chosen).map(|(key, value)| (key, value.to_string())).collect()
 }
 
 /// Chooses M and N of `ris`, if they are open.
