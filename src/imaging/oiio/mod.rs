@@ -1,0 +1,24 @@
+//! Image files, by OpenImageIO: the safe layer over the shim.
+//!
+//! OpenImageIO is loaded when the first image is read or written. Reading refuses images whose header requests more
+//! memory than the caller allows; writing goes to a temporary file beside the target, which is renamed at the end, so
+//! that a failure never leaves a partial image under the name. Equal images give equal files: a date is written only if
+//! the caller gives one (`DateTime`), since OpenImageIO would fill in the current time.
+//!
+//! Reading order: [`part`] (what is written), [`shim`] (calls and strings), [`read`], [`write`], [`ocio`].
+
+mod ocio;
+mod part;
+mod read;
+mod shim;
+mod write;
+
+#[cfg(test)]
+mod image_tests;
+
+pub use super::file::{ImageError, PartHeader, ReadLimits, Window};
+pub use ocio::{OcioView, ocio_display};
+pub use part::{MetaValue, Part, Storage};
+pub(super) use read::{Input, read_failure};
+pub use read::{ReadImage, read_headers, read_image, read_metadata, read_part};
+pub use write::write_image;

@@ -1,0 +1,39 @@
+//! Colours for a display, by OpenColorIO.
+#![allow(unsafe_code)]
+
+use super::shim::{api, c_text, call, text};
+use crate::imaging::file::ImageError;
+use std::ffi::c_char;
+
+/// A view of an OpenColorIO configuration.
+#[derive(Clone, Copy, Debug)]
+pub struct OcioView<'a> {
+    /// Colour space of the pixels.
+    pub input: &'a str,
+    /// Display; the configuration's default if it is empty.
+    pub display: &'a str,
+    /// View; the display's default if it is empty.
+    pub view: &'a str,
+    /// Looks; the view's own if it is empty.
+    pub looks: &'a str,
+}
+
+/// Turns RGB triples into the colours of a display, by the configuration that the environment variable OCIO names.
+/// Returns display and view.
+pub fn ocio_display(pixels: &mut [f32], view: &OcioView<'_>) -> Result<[String; 2], ImageError> {
+    let api = api()?;
+    let [input, display, name, looks] =
+        [view.input, view.display, view.view, view.looks].map(|text| c_text(text).map_err(ImageError::Color));
+    let (input, display, name, looks) = (input?, display?, name?, looks?);
+    let mut chosen = [0 as c_char; 512];
+    let (data, count, chosen_size) = (pixels.as_mut_ptr(), pixels.len() as u64, chosen.len());
+    // SAFETY: the names end in a zero byte, `data` holds `count` floats, and `chosen` as many bytes as it says.
+    call(|e, n| unsafe {
+        let [input, display, name, looks] = [&input, &display, &name, &looks].map(|text| text.as_ptr());
+        (api.ocio_display)(input, display, name, looks, data, count, chosen.as_mut_ptr(), chosen_size, e, n)
+    })
+    .map_err(|(_, message)| ImageError::Color(message))?;
+    let chosen = text(chosen.as_ptr());
+    let (display, view) = chosen.split_once('\n').unwrap_or((&chosen, ""));
+    Ok([display.to_owned(), view.to_owned()])
+}

@@ -1,0 +1,211 @@
+//! Reading of image files.
+#![allow(unsafe_code)]
+
+use super::part::{MetaValue, Storage};
+use super::shim::{api, c_path, call, text};
+use crate::imaging::file::{ImageError, PartHeader, ReadLimits, Window};
+use crate::imaging::{ColorEncoding, Image};
+use openimageio_sys as sys;
+use std::collections::BTreeMap;
+use std::path::Path;
+use std::ptr;
+
+/// An image as read.
+#[derive(Clone, Debug)]
+pub struct ReadImage {
+    /// The pixels: integers of the file are 0..1 here, and nothing is decoded.
+    pub image: Image,
+    /// The usual encoding of such a file: sRGB for 8-bit and 16-bit integers, linear for everything else.
+    pub encoding: ColorEncoding,
+    /// Metadata by name, as text.
+    pub metadata: BTreeMap<String, String>,
+    /// Number of parts in the file.
+    pub parts: usize,
+    /// Where the pixels lie in the full image.
+    pub window: Window,
+    /// The values are stored as 16-bit floats.
+    pub is_half: bool,
+}
+
+/// A file open for reading.
+pub(in crate::imaging) struct Input {
+    api: &'static sys::Api,
+    handle: *mut sys::OiioInput,
+    part: i32,
+}
+
+impl Input {
+    pub(in crate::imaging) fn open(path: &Path, part: i32) -> Result<Self, ImageError> {
+        let unreadable = |reason: String| ImageError::Unreadable { path: path.to_owned(), reason };
+        match path.metadata() {
+            Ok(metadata) if metadata.is_dir() => return Err(unreadable("is a folder".to_owned())),
+            Ok(_) => {}
+            Err(error) if error.kind() == std::io::ErrorKind::NotFound => {
+                return Err(ImageError::NotFound { path: path.to_owned() });
+            }
+            Err(error) => return Err(unreadable(error.to_string())),
+        }
+        let api = api()?;
+        let name = c_path(path).map_err(unreadable)?;
+        let mut handle = ptr::null_mut();
+        // SAFETY: the name ends in a zero byte, and `handle` is only written. Alpha stays unassociated: colours of
+        // textures must not be multiplied by it in 8 bits.
+        call(|e, n| unsafe { (api.input_open)(name.as_ptr(), 1, &mut handle, e, n) })
+            .map_err(|(_, m)| unreadable(m))?;
+        Ok(Input { api, handle, part })
+    }
+
+    fn parts(&self) -> Result<usize, (i32, String)> {
+        let mut count = 0;
+        // SAFETY: the handle is live until drop, here and below.
+        call(|e, n| unsafe { (self.api.input_subimages)(self.handle, &mut count, e, n) })?;
+        Ok(usize::try_from(count).unwrap_or(0))
+    }
+
+    fn spec(&self) -> Result<sys::OiioSpec, (i32, String)> {
+        let mut spec = sys::OiioSpec::default();
+        // SAFETY: as above.
+        call(|e, n| unsafe { (self.api.input_spec)(self.handle, self.part, &mut spec, e, n) })?;
+        Ok(spec)
+    }
+
+    fn channel(&self, index: i32) -> Result<(String, Storage), (i32, String)> {
+        let (mut name, mut format) = (ptr::null(), 0);
+        // SAFETY: as above; the name is copied while the handle is live.
+        call(|e, n| unsafe { (self.api.input_channel)(self.handle, self.part, index, &mut name, &mut format, e, n) })?;
+        Ok((text(name), Storage::of_format(format)))
+    }
+
+    fn channels(&self, count: i32) -> Result<Vec<String>, (i32, String)> {
+        (0..count).map(|i| self.channel(i).map(|(name, _)| name)).collect()
+    }
+
+    /// How the channels of the part are stored.
+    pub(in crate::imaging) fn storage(&self) -> Result<Vec<Storage>, (i32, String)> {
+        (0..self.spec()?.nchannels).map(|i| self.channel(i).map(|(_, storage)| storage)).collect()
+    }
+
+    /// The metadata of the part whose types [`MetaValue`] has.
+    pub(in crate::imaging) fn values(&self) -> Result<Vec<(String, MetaValue)>, (i32, String)> {
+        let value = |a: &sys::OiioAttribute| {
+            let bytes: &[u8] = if a.data.is_null() {
+                &[]
+            } else {
+                // SAFETY: the shim says that so many bytes are there; they are copied while the handle is live.
+                unsafe { std::slice::from_raw_parts(a.data.cast(), a.bytes) }
+            };
+            let words: Vec<[u8; 4]> = bytes.as_chunks().0.to_vec();
+            match (text(a.r#type).as_str(), &words[..]) {
+                ("string", _) => Some(MetaValue::Text(text(a.value))),
+                ("int", [word]) => Some(MetaValue::Integer(i32::from_ne_bytes(*word))),
+                ("float", [word]) => Some(MetaValue::Number(f32::from_ne_bytes(*word))),
+                ("matrix", words) => {
+                    let rows: Vec<f32> = words.iter().map(|word| f32::from_ne_bytes(*word)).collect();
+                    rows.try_into().ok().map(MetaValue::Matrix)
+                }
+                _ => None,
+            }
+        };
+        let entries =
+            (0..self.spec()?.attributes).filter_map(|i| self.attribute(i, |a| Some((text(a.name), value(a)?))));
+        Ok(entries.collect())
+    }
+
+    fn metadata(&self, count: i32) -> BTreeMap<String, String> {
+        let entry = |index| self.attribute(index, |a| Some((text(a.name), text(a.value))));
+        (0..count).filter_map(entry).collect()
+    }
+
+    /// What `read` makes of an entry of metadata.
+    fn attribute<T>(&self, index: i32, read: impl FnOnce(&sys::OiioAttribute) -> Option<T>) -> Option<T> {
+        let mut a = sys::OiioAttribute {
+            name: ptr::null(),
+            r#type: ptr::null(),
+            value: ptr::null(),
+            data: ptr::null(),
+            bytes: 0,
+        };
+        // SAFETY: as above; `read` copies what it needs while the handle is live.
+        call(|e, n| unsafe { (self.api.input_attribute)(self.handle, self.part, index, &mut a, e, n) }).ok()?;
+        read(&a)
+    }
+
+    fn pixels(&self, max_bytes: u64) -> Result<Vec<f32>, (i32, String)> {
+        let mut count = 0;
+        // SAFETY: as above.
+        call(|e, n| unsafe { (self.api.input_float_count)(self.handle, self.part, max_bytes, &mut count, e, n) })?;
+        let mut pixels = vec![0.0; count as usize];
+        // SAFETY: `pixels` holds `count` floats.
+        call(|e, n| unsafe { (self.api.input_read)(self.handle, self.part, pixels.as_mut_ptr(), count, e, n) })?;
+        Ok(pixels)
+    }
+}
+
+impl Drop for Input {
+    fn drop(&mut self) {
+        // SAFETY: the handle is live and closed once.
+        unsafe { (self.api.input_close)(self.handle) };
+    }
+}
+
+/// Reads the first part of an image.
+pub fn read_image(path: &Path, limits: &ReadLimits) -> Result<ReadImage, ImageError> {
+    read_part(path, 0, limits)
+}
+
+/// Reads a part of an image, counted from 0.
+pub fn read_part(path: &Path, part: usize, limits: &ReadLimits) -> Result<ReadImage, ImageError> {
+    let input = Input::open(path, i32::try_from(part).unwrap_or(i32::MAX))?;
+    let failed = |failure| read_failure(path, failure);
+    let parts = input.parts().map_err(failed)?;
+    if part >= parts {
+        return Err(failed((sys::OIIO_INVALID_ARGUMENT, format!("has {parts} parts, none of number {part}"))));
+    }
+    let spec = input.spec().map_err(failed)?;
+    let data = input.pixels(limits.bytes_for(path.metadata().map_or(0, |m| m.len()))).map_err(failed)?;
+    let channels = input.channels(spec.nchannels).map_err(failed)?;
+    let metadata = input.metadata(spec.attributes);
+    let is_integer = matches!(spec.format, sys::OIIO_FORMAT_U8 | sys::OIIO_FORMAT_U16);
+    let encoding = if is_integer { ColorEncoding::Srgb } else { ColorEncoding::Linear };
+    // The header was checked against the pixels by the shim: the sizes are positive.
+    let image = Image { width: spec.width as usize, height: spec.height as usize, channels, data };
+    let size = |n: i32| usize::try_from(n).unwrap_or(0);
+    let window = Window {
+        origin: [spec.x, spec.y],
+        full_origin: [spec.full_x, spec.full_y],
+        full_size: [size(spec.full_width), size(spec.full_height)],
+    };
+    Ok(ReadImage { image, encoding, metadata, parts, window, is_half: spec.format == sys::OIIO_FORMAT_HALF })
+}
+
+/// Reads the metadata of the first part of an image, as text by name, and no pixels.
+pub fn read_metadata(path: &Path) -> Result<BTreeMap<String, String>, ImageError> {
+    let input = Input::open(path, 0)?;
+    let spec = input.spec().map_err(|failure| read_failure(path, failure))?;
+    Ok(input.metadata(spec.attributes))
+}
+
+/// Reads the headers of all parts of an image, and no pixels.
+pub fn read_headers(path: &Path) -> Result<Vec<PartHeader>, ImageError> {
+    let mut input = Input::open(path, 0)?;
+    let failed = |failure| read_failure(path, failure);
+    let parts = input.parts().map_err(failed)?;
+    let mut headers = Vec::with_capacity(parts);
+    for part in 0..parts {
+        input.part = i32::try_from(part).unwrap_or(i32::MAX);
+        let spec = input.spec().map_err(failed)?;
+        let channels = input.channels(spec.nchannels).map_err(failed)?;
+        let name = input.metadata(spec.attributes).remove("oiio:subimagename").unwrap_or_default();
+        headers.push(PartHeader { name, channels });
+    }
+    Ok(headers)
+}
+
+/// The error of a file that was not read.
+pub(in crate::imaging) fn read_failure(path: &Path, (code, reason): (i32, String)) -> ImageError {
+    let path = path.to_owned();
+    match code {
+        sys::OIIO_TOO_LARGE => ImageError::TooLarge { path, reason },
+        _ => ImageError::Unreadable { path, reason },
+    }
+}

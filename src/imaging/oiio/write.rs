@@ -1,0 +1,134 @@
+//! Writing of image files.
+#![allow(unsafe_code)]
+
+use super::part::{MetaValue, Part};
+use super::shim::{api, c_path, c_text, call};
+use crate::imaging::file::ImageError;
+use lumiris_formats::output::write_whole;
+use openimageio_sys as sys;
+use std::ffi::{CString, c_char};
+use std::io;
+use std::path::Path;
+use std::ptr;
+
+/// What stands for a date where there is none.
+pub(super) const NO_DATE: &str = "1970:01:01 00:00:00";
+
+/// A file being written.
+struct Output {
+    api: &'static sys::Api,
+    handle: *mut sys::OiioOutput,
+}
+
+impl Output {
+    fn create(path: &Path) -> Result<Self, String> {
+        let api = api().map_err(|e| e.to_string())?;
+        let name = c_path(path)?;
+        let mut handle = ptr::null_mut();
+        // SAFETY: the name ends in a zero byte, and `handle` is only written.
+        call(|e, n| unsafe { (api.output_create)(name.as_ptr(), &mut handle, e, n) }).map_err(|(_, m)| m)?;
+        Ok(Output { api, handle })
+    }
+
+    fn add_part(&mut self, index: i32, part: &Part, is_exr: bool) -> Result<(), String> {
+        let names = part.channels.iter().map(|c| c_text(c)).collect::<Result<Vec<_>, _>>()?;
+        let pointers: Vec<*const c_char> = names.iter().map(|n| n.as_ptr()).collect();
+        let mut formats = vec![part.storage.format(); names.len()];
+        for &(channel, storage) in &part.channel_storage {
+            formats[channel] = storage.format();
+        }
+        let name = part.name.as_deref().map(c_text).transpose()?;
+        let compression = part.compression.as_deref().or(is_exr.then_some("zip")).map(c_text).transpose()?;
+        let or_null = |text: &Option<CString>| text.as_ref().map_or(ptr::null(), |t| t.as_ptr());
+        let size = |n: usize| i32::try_from(n).map_err(|_| "the image is too large".to_owned());
+        let description = sys::OiioPart {
+            name: or_null(&name),
+            compression: or_null(&compression),
+            width: size(part.width)?,
+            height: size(part.height)?,
+            x: size(part.origin[0])?,
+            y: size(part.origin[1])?,
+            full_x: 0,
+            full_y: 0,
+            full_width: size(part.full[0])?,
+            full_height: size(part.full[1])?,
+            nchannels: size(names.len())?,
+            channel_names: pointers.as_ptr(),
+            channel_formats: formats.as_ptr(),
+        };
+        // SAFETY: the handle is live until drop, here and below; names and formats outlive the call.
+        call(|e, n| unsafe { (self.api.output_add_part)(self.handle, &description, e, n) }).map_err(|(_, m)| m)?;
+
+        if !part.metadata.iter().any(|(name, _)| name == "DateTime") {
+            self.set(index, "DateTime", &MetaValue::Text(NO_DATE.to_owned()))?;
+        }
+        part.metadata.iter().try_for_each(|(name, value)| self.set(index, name, value))
+    }
+
+    /// Sets metadata of a part.
+    fn set(&mut self, part: i32, name: &str, value: &MetaValue) -> Result<(), String> {
+        let (api, handle, name) = (self.api, self.handle, c_text(name)?);
+        let result = match value {
+            MetaValue::Text(text) => {
+                let text = c_text(text)?;
+                // SAFETY: the handle is live, name and text end in a zero byte; so below.
+                call(|e, n| unsafe { (api.output_set_string)(handle, part, name.as_ptr(), text.as_ptr(), e, n) })
+            }
+            MetaValue::Integer(value) => {
+                // SAFETY: as above.
+                call(|e, n| unsafe { (api.output_set_int)(handle, part, name.as_ptr(), *value, e, n) })
+            }
+            MetaValue::Number(value) => {
+                // SAFETY: as above.
+                call(|e, n| unsafe { (api.output_set_float)(handle, part, name.as_ptr(), *value, e, n) })
+            }
+            MetaValue::Matrix(rows) => {
+                // SAFETY: as above; the matrix has 16 floats.
+                call(|e, n| unsafe { (api.output_set_matrix)(handle, part, name.as_ptr(), rows.as_ptr(), e, n) })
+            }
+        };
+        result.map_err(|(_, message)| message)
+    }
+
+    fn write(&mut self, parts: &[Part]) -> Result<(), String> {
+        // SAFETY: as above.
+        call(|e, n| unsafe { (self.api.output_open)(self.handle, e, n) }).map_err(|(_, m)| m)?;
+        for (index, part) in parts.iter().enumerate() {
+            let expected = part.width.checked_mul(part.height).and_then(|n| n.checked_mul(part.channels.len()));
+            if expected != Some(part.data.len()) {
+                return Err("the number of values does not fit the size of the image".to_owned());
+            }
+            let (rows, count) = (part.height as i32, part.data.len() as u64);
+            // SAFETY: `data` holds `count` floats, which is rows × width × channels by the check above.
+            call(|e, n| unsafe {
+                (self.api.output_write)(self.handle, index as i32, 0, rows, part.data.as_ptr(), count, e, n)
+            })
+            .map_err(|(_, m)| m)?;
+        }
+        // SAFETY: as above; what was written is flushed, and a full disk shows here.
+        call(|e, n| unsafe { (self.api.output_close)(self.handle, e, n) }).map_err(|(_, m)| m)
+    }
+}
+
+impl Drop for Output {
+    fn drop(&mut self) {
+        // SAFETY: the handle is live and freed once.
+        unsafe { (self.api.output_free)(self.handle) };
+    }
+}
+
+/// Writes an image; several parts in EXR only. Either the whole file appears under its name, or none.
+pub fn write_image(path: &Path, parts: &[Part]) -> Result<(), ImageError> {
+    // The extension chooses the format: the file on its way has the same
+    write_whole(path, |file| write_to(file.path(), parts).map_err(io::Error::other))
+        .map_err(|e| ImageError::Write { path: path.to_owned(), reason: e.to_string() })
+}
+
+fn write_to(path: &Path, parts: &[Part]) -> Result<(), String> {
+    let mut output = Output::create(path)?;
+    let is_exr = path.extension().is_some_and(|e| e.eq_ignore_ascii_case("exr"));
+    for (index, part) in (0_i32..).zip(parts) {
+        output.add_part(index, part, is_exr)?;
+    }
+    output.write(parts)
+}
