@@ -23,7 +23,6 @@ use crate::integrators::{PathStats, PathTracer, Tracer};
 use crate::scene::{PixelSamples, RenderJob};
 use crate::settings::{Allocation, IntegratorKind, Settings};
 use lumiris_numbers::math::hash::{pcg4d, unit_f32};
-use lumiris_numbers::math::luminance;
 use rayon::prelude::*;
 use std::sync::atomic::AtomicBool;
 
@@ -41,8 +40,6 @@ const COST_TILE: u32 = 16;
 const RADIUS: usize = 2;
 /// Fewest and most samples of a pixel, relative to the mean.
 const RANGE: [f64; 2] = [0.25, 8.0];
-/// Ratio of a pixel's brightness to that of a neighbour from which on the latter has at least the mean number of samples.
-const CONTRAST: f64 = 16.0;
 /// One in this many tiles is sampled first.
 const SCOUTS: u32 = 4;
 /// Pixels from which on a part of the image tells whether there is anything to gain.
@@ -67,7 +64,7 @@ pub(super) fn allocate(job: &RenderJob) -> Option<PixelSamples> {
         return None;
     }
     pilot.measure(|tile| tile % SCOUTS != 0);
-    let counts = counts(&pilot.weights(|_| true), &pilot.costs, &pilot.fewest(), spp);
+    let counts = counts(&pilot.weights(|_| true), &pilot.costs, spp);
     (pilot.gain(spp) >= MIN_GAIN).then_some(PixelSamples { bounds: pilot.bounds, spp, counts })
 }
 
@@ -161,25 +158,11 @@ impl<'a> Pilot<'a> {
         (0..area).into_par_iter().map(smooth).collect()
     }
 
-    /// Fewest samples of each pixel, relative to the mean. Beside much brighter pixels, such as those of a lamp, it is 1: a
-    /// sliver of the lamp may lie in the pixel, which the few samples of a pilot do not see.
-    fn fewest(&self) -> Vec<f64> {
-        let brightness = |i: usize| {
-            let p = &self.sums[i];
-            if p.count > 0 { luminance(p.mean()) } else { 0.0 }
-        };
-        let fewest = |i: usize| {
-            let brightest = self.around(i, 1).map(brightness).fold(0.0, f64::max);
-            if brightest > CONTRAST * brightness(i) { 1.0 } else { RANGE[0] }
-        };
-        (0..self.bounds.area()).into_par_iter().map(fewest).collect()
-    }
-
     /// By how much the numbers lower the error: that of half of the pixels, with numbers that follow from the other half.
     fn gain(&self, spp: u32) -> f64 {
         let width = self.bounds.width() as usize;
         let is_even = |i: usize| (i % width + i / width).is_multiple_of(2);
-        let counts = counts(&self.weights(is_even), &self.costs, &self.fewest(), spp);
+        let counts = counts(&self.weights(is_even), &self.costs, spp);
         let odd = (0..counts.len()).filter(|&i| !is_even(i));
         let known = odd.filter_map(|i| Some((self.relative_variance(i)?, f64::from(counts[i]))));
         let (uniform, adaptive) = known.fold((0.0, 0.0), |(u, a), (v, n)| (u + v / f64::from(spp), a + v / n));
@@ -206,14 +189,11 @@ fn cost(stats: &PathStats) -> f64 {
     work as f64 / stats.camera_rays.max(1) as f64
 }
 
-/// Numbers of samples n ∝ √(v/c), of the same cost as `spp` everywhere, between `fewest` and the end of [`RANGE`] times `spp`.
-fn counts(weights: &[f64], costs: &[f64], fewest: &[f64], spp: u32) -> Vec<u32> {
+/// Numbers of samples n ∝ √(v/c), limited to [`RANGE`], of the same cost as `spp` everywhere.
+fn counts(weights: &[f64], costs: &[f64], spp: u32) -> Vec<u32> {
     let wanted: Vec<f64> = weights.iter().zip(costs).map(|(v, c)| (v / c.max(1.0)).sqrt()).collect();
-    let limit = |n: f64, fewest: f64| n.clamp(fewest, RANGE[1]);
-    let cost_of = |factor: f64| {
-        let pixels = wanted.iter().zip(fewest).zip(costs);
-        pixels.map(|((w, fewest), c)| limit(factor * w, *fewest) * c).sum::<f64>()
-    };
+    let limit = |n: f64| n.clamp(RANGE[0], RANGE[1]);
+    let cost_of = |factor: f64| wanted.iter().zip(costs).map(|(w, c)| limit(factor * w) * c).sum::<f64>();
     let all = costs.iter().sum::<f64>();
     // Bisection of the logarithm; costs rise with the factor
     let (mut low, mut high) = (-60.0_f64, 60.0_f64);
@@ -224,8 +204,8 @@ fn counts(weights: &[f64], costs: &[f64], fewest: &[f64], spp: u32) -> Vec<u32> 
     let factor = low.exp2();
     // Where nothing varies, all pixels have the mean
     let is_open = |w: &f64| *w > 0.0 && factor.is_finite();
-    let count = |(w, fewest): (&f64, &f64)| if is_open(w) { limit(factor * w, *fewest) } else { *fewest };
-    wanted.iter().zip(fewest).map(|pixel| ((count(pixel) * f64::from(spp)).round() as u32).max(1)).collect()
+    let count = |w: &f64| if is_open(w) { limit(factor * w) } else { RANGE[0] };
+    wanted.iter().map(|w| ((count(w) * f64::from(spp)).round() as u32).max(1)).collect()
 }
 
 #[cfg(test)]
@@ -237,7 +217,7 @@ mod tests {
         // Two in three pixels have a sixteenth of the variance of the others, and one of these costs four times as much
         let weights: Vec<f64> = (0..300).map(|i| if i % 3 == 0 { 16.0 } else { 1.0 }).collect();
         let costs: Vec<f64> = (0..300).map(|i| if i % 3 == 1 { 4.0 } else { 1.0 }).collect();
-        let counts = counts(&weights, &costs, &[RANGE[0]; 300], 64);
+        let counts = counts(&weights, &costs, 64);
         assert!((f64::from(counts[0]) / f64::from(counts[2]) - 4.0).abs() < 0.1, "{:?}", &counts[..3]);
         assert!((f64::from(counts[2]) / f64::from(counts[1]) - 2.0).abs() < 0.1, "{:?}", &counts[..3]);
         let time: f64 = counts.iter().zip(&costs).map(|(&n, c)| f64::from(n) * c).sum();
@@ -248,12 +228,10 @@ mod tests {
     #[test]
     fn no_pixel_has_less_than_a_quarter_or_more_than_eight_times_the_mean() {
         let weights: Vec<f64> = (0..1000).map(|i| if i == 5 { 1e12 } else { f64::from(i % 2) * 1e-9 }).collect();
-        let mut fewest = [RANGE[0]; 1000];
-        fewest[20] = 1.0;
-        let counts = counts(&weights, &[1.0; 1000], &fewest, 16);
-        assert_eq!((counts[5], counts[0], counts[20]), (128, 4, 16));
+        let counts = counts(&weights, &[1.0; 1000], 16);
+        assert_eq!((counts[5], counts[0]), (128, 4));
         assert!(counts.iter().all(|n| (4..=128).contains(n)));
-        let still = super::counts(&[0.0; 4], &[1.0; 4], &[RANGE[0]; 4], 16);
+        let still = super::counts(&[0.0; 4], &[1.0; 4], 16);
         assert!(still.iter().all(|n| *n >= 1), "nothing varies: {still:?}");
     }
 }
