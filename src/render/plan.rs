@@ -19,6 +19,7 @@ use crate::film::PixelBounds;
 use crate::integrators::path::CameraSample;
 use crate::integrators::{PathTracer, Tracer};
 use crate::scene::{RenderJob, SampleCountMap};
+use crate::settings::table::rows;
 use crate::settings::{
     Allocation, EstimatorKind, IntegratorKind, IntegratorSettings, Proposals, RisSettings, SampleCounts, Settings,
     StageTimes, Strata, Target,
@@ -88,12 +89,12 @@ pub fn follows_from_times(settings: &Settings) -> bool {
     i.estimator == EstimatorKind::Auto || i.estimator == EstimatorKind::Ris && is_open
 }
 
-/// The settings that differ, and the number of proposals wherever it was open, even if it is what is recorded without times: it
-/// would be measured again.
+/// The settings that differ, either as they are set or by what is recorded of them: where something was open and the choice is
+/// what is recorded of open settings, too, it would be measured again.
 fn chosen(before: &Settings, after: &Settings) -> Vec<(&'static str, String)> {
-    let was_open = before.integrator.ris.proposals != after.integrator.ris.proposals;
-    let before: Vec<_> = before.recorded().collect();
-    let is_chosen = |entry: &(&str, _)| !before.contains(entry) || was_open && entry.0 == "proposals";
+    let recorded: Vec<_> = before.recorded().collect();
+    let is_set = |key: &str| rows().any(|row| row.key == key && (row.get)(before) != (row.get)(after));
+    let is_chosen = |entry: &(&str, _)| !recorded.contains(entry) || is_set(entry.0);
     after.recorded().filter(is_chosen).map(|(key, value)| (key, value.to_string())).collect()
 }
 
@@ -271,4 +272,22 @@ fn pilot_row(job: &RenderJob, row: &PixelBounds) -> Vec<MomentsEstimate> {
         (outcomes.len()..lit).for_each(|_| sum.add([0.0; 3], 0.0));
     }
     sums
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_choice_that_is_the_default_is_a_choice() {
+        let mut open = Settings::default();
+        open.integrator.estimator = EstimatorKind::Ris;
+        let mut after = open;
+        let counts = open.integrator.sample_counts();
+        after.integrator.ris.proposals = Proposals::Fixed(counts.proposals);
+        assert_eq!(chosen(&open, &after), [("proposals", counts.proposals.to_string())]);
+        after.integrator.ris.proposals = Proposals::Fixed(counts.proposals + 1);
+        assert_eq!(chosen(&open, &after), [("proposals", (counts.proposals + 1).to_string())]);
+        assert_eq!(chosen(&after, &after), []);
+    }
 }
