@@ -1,15 +1,18 @@
 //! `lumiris farm`: an image rendered in parts by the nodes of a cluster.
 
 use super::UsageError;
-use super::args::{RenderArgs, aov};
+use super::args::{RenderArgs, SceneArgs, aov};
+use super::exr::ExrArgs;
 use super::farm_scripts::{Job, quoted};
+use super::look::LookArgs;
+use super::merge::check_look;
 use super::named::named;
 use super::part_args::{PART_TYPE, PartBy, extension};
 use super::parts;
 use super::pictures::check_outputs;
 use super::progress;
-use super::scene_options::SceneOptions;
 use super::settings::load_scene;
+use super::typed_options::AsTyped;
 use anyhow::{Context, bail};
 use clap::{Args, FromArgMatches, Subcommand};
 use lumiris::import::cache::FileCache;
@@ -39,7 +42,7 @@ enum Queue {
 #[derive(Args, Clone, Debug)]
 struct SlurmArgs {
     #[command(flatten)]
-    scene: SceneOptions,
+    scene: AsTyped<SceneArgs>,
     /// Number of parts, each of which is a task of an array job
     #[arg(long = "parts", value_name = "N", value_parser = clap::value_parser!(u32).range(1..=1_000_000))]
     count: u32,
@@ -52,9 +55,10 @@ struct SlurmArgs {
     /// AOVs: additional channels of EXR files, or `none` [default: all]
     #[arg(long, value_name = "LIST", value_delimiter = ',', value_parser = aov())]
     aov: Option<Vec<Option<Aov>>>,
-    /// Exposure of PNG, JPEG, TIFF and TGA images, in stops
-    #[arg(long, value_name = "STOPS", default_value_t = 0.0, allow_negative_numbers = true)]
-    exposure: f32,
+    #[command(flatten)]
+    look: AsTyped<LookArgs>,
+    #[command(flatten)]
+    exr: AsTyped<ExrArgs>,
     /// Time between the checkpoints of a part
     #[arg(long, value_name = "SECONDS", default_value_t = 60, value_parser = clap::value_parser!(u32).range(1..))]
     checkpoint_seconds: u32,
@@ -78,6 +82,7 @@ pub(super) fn run(args: &FarmArgs) -> anyhow::Result<ExitCode> {
     if let Some(path) = args.output.iter().find(|path| extension(path) == PART_TYPE) {
         return Err(UsageError(format!("{}: parts are merged to an image, such as image.exr", path.display())).into());
     }
+    check_look(&args.look.args, &args.exr.args)?;
     let needs_plan = check(args)?;
     let folder = args.dir.clone().unwrap_or_else(|| args.output[0].with_extension("farm"));
     let folder = absolute(&folder).with_context(|| format!("cannot find {}", folder.display()))?;
@@ -143,7 +148,7 @@ fn job(args: &SlurmArgs, folder: &Path, needs_plan: bool) -> anyhow::Result<Job>
     };
     let has_plan = needs_plan || args.scene.args.plan.is_some();
     let plan = if has_plan { Some(text(&folder.join("plan.json"))?) } else { None };
-    let mut merge = vec![format!("--exposure={}", args.exposure)];
+    let mut merge = [args.look.words_without(&[]), args.exr.words_without(&[])].concat();
     for path in &args.output {
         merge.push(format!("--output={}", text(&absolute(path)?)?));
     }

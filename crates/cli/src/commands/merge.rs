@@ -4,7 +4,7 @@ use super::UsageError;
 use super::exr::{CameraMatrices, ExrArgs};
 use super::look::LookArgs;
 use super::part_args::is_part;
-use super::pictures::{Picture, check_outputs, write_all};
+use super::pictures::{Picture, Written, check_outputs, write_all};
 use super::progress;
 use super::stored::{AOV_NOTE, PLAN_NOTE, SCENE_NOTE, SECONDS_NOTE};
 use anyhow::bail;
@@ -44,11 +44,7 @@ pub(super) fn run(args: &MergeArgs) -> anyhow::Result<ExitCode> {
     if let Some(path) = repeated(&args.parts) {
         return Err(UsageError(format!("{} is given twice", path.display())).into());
     }
-    args.look.check()?;
-    args.exr.check()?;
-    if !args.exr.cryptomatte.is_empty() {
-        return Err(UsageError("--cryptomatte needs the scene: render the whole image with it".to_owned()).into());
-    }
+    check_look(&args.look, &args.exr)?;
     let seconds = seconds(args)?;
     let merged = merge(&args.parts, args.allow_missing)?;
     let picture = Picture {
@@ -63,14 +59,14 @@ pub(super) fn run(args: &MergeArgs) -> anyhow::Result<ExitCode> {
         seconds,
         metadata: metadata(&merged, seconds),
     };
-    let (written, misplaced) = write_all(&picture, &args.output);
+    let Written { paths, misplaced } = write_all(&picture, &args.output);
     merged.missing.iter().for_each(|what| progress::say(&format!("warning: {what}: missing")));
     let invalid: u64 = merged.film.pixels.iter().map(|p| p.invalid).sum();
     if invalid > 0 {
         progress::say(&format!("warning: {invalid} samples were not finite, or too bright, and were counted as black"));
     }
     if !args.quiet {
-        let names: Vec<String> = written.iter().map(|path| path.display().to_string()).collect();
+        let names: Vec<String> = paths.iter().map(|path| path.display().to_string()).collect();
         let noise = merged.film.relative_noise() * 100.0;
         progress::say(&format!("{} from {} parts, noise {noise:.2} %", names.join(", "), args.parts.len()));
     }
@@ -78,6 +74,16 @@ pub(super) fn run(args: &MergeArgs) -> anyhow::Result<ExitCode> {
         bail!(misplaced.join("\nlumiris: "));
     }
     Ok(ExitCode::SUCCESS)
+}
+
+/// Refuses what an image from parts cannot be.
+pub(super) fn check_look(look: &LookArgs, exr: &ExrArgs) -> anyhow::Result<()> {
+    look.check()?;
+    exr.check()?;
+    if !exr.cryptomatte.is_empty() {
+        return Err(UsageError("--cryptomatte needs the scene: render the whole image with it".to_owned()).into());
+    }
+    Ok(())
 }
 
 /// Time that all parts took together (s).

@@ -29,11 +29,11 @@ mod progress;
 mod render;
 mod reproduce;
 mod rescue;
-mod scene_options;
 mod settings;
 mod settings_args;
 mod shell;
 mod stored;
+mod typed_options;
 mod watch_args;
 
 use clap::{CommandFactory, Parser, Subcommand};

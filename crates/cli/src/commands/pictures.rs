@@ -77,21 +77,35 @@ pub(super) fn are_complete(outputs: &[PathBuf]) -> bool {
     })
 }
 
-/// Writes all images: those that were, and what went wrong with the others.
-pub(super) fn write_pictures(made: &Made<'_>, outputs: &[PathBuf]) -> anyhow::Result<(Vec<PathBuf>, Vec<String>)> {
+/// Files that were written, and what went wrong with the others.
+#[derive(Debug, Default)]
+pub(super) struct Written {
+    /// Files in their place.
+    pub paths: Vec<PathBuf>,
+    /// Why files could not be written where they should be, and where they are instead.
+    pub misplaced: Vec<String>,
+}
+
+impl Written {
+    /// Writes a file.
+    pub(super) fn write(&mut self, path: PathBuf, write: impl Fn(&Path) -> anyhow::Result<()>) {
+        match write_or_rescue(&path, write) {
+            Ok(()) => self.paths.push(path),
+            Err(error) => self.misplaced.push(format!("{error:#}")),
+        }
+    }
+}
+
+/// Writes all images of a rendering.
+pub(super) fn write_pictures(made: &Made<'_>, outputs: &[PathBuf]) -> anyhow::Result<Written> {
     Ok(write_all(&made.picture()?, outputs))
 }
 
-/// The same of any image.
-pub(super) fn write_all(picture: &Picture<'_>, outputs: &[PathBuf]) -> (Vec<PathBuf>, Vec<String>) {
-    let (mut written, mut misplaced) = (Vec::new(), Vec::new());
-    for path in outputs {
-        match write_or_rescue(path, |path| picture.write(path)) {
-            Ok(()) => written.push(path.clone()),
-            Err(error) => misplaced.push(format!("{error:#}")),
-        }
-    }
-    (written, misplaced)
+/// Writes an image to all files.
+pub(super) fn write_all(picture: &Picture<'_>, outputs: &[PathBuf]) -> Written {
+    let mut written = Written::default();
+    outputs.iter().for_each(|path| written.write(path.clone(), |path| picture.write(path)));
+    written
 }
 
 /// An image, and how it is written.

@@ -5,7 +5,8 @@ use super::args::RenderArgs;
 use super::denoise_args::Denoised;
 use super::part_args::is_part;
 use super::parts::{self, FilmFile};
-use super::pictures::{Made, check_outputs, is_exr, write_pictures};
+use super::pictures::{Made, Written, check_outputs, is_exr, write_pictures};
+use super::plan_file::PlanFile;
 use super::progress::{self, Bar};
 use super::rescue::write_or_rescue;
 use super::settings::{SetupTimes, load_job_of, plan, render_settings};
@@ -122,34 +123,8 @@ pub(super) fn render_one(args: &RenderArgs, session: &Session) -> anyhow::Result
     let rendering = render_shown((&job, &settings), session, (&name_of(args), &bar), continuation)?;
     bar.finish();
 
-    // Only EXR files hold them
-    let has_exr = outputs.iter().any(|path| is_exr(path));
-    let kinds = if has_exr { &args.exr.cryptomatte[..] } else { &[] };
-    let cryptomattes = cryptomattes(&job, &settings, &rendering.film, kinds)?;
-    let (denoised, not_denoised) = denoise(session, &rendering.film);
-    let made = Made {
-        args,
-        job: &job,
-        plan: &plan,
-        rendering: &rendering,
-        asked: asked.as_deref(),
-        cryptomattes,
-        denoised,
-        is_interrupted: session.is_stopped(),
-    };
-    let (part_files, images): (Vec<PathBuf>, Vec<PathBuf>) = outputs.into_iter().partition(|path| is_part(path));
-    let (mut written, mut misplaced) = write_pictures(&made, &images)?;
-    misplaced.extend(not_denoised);
-    if let Some(film_file) = film_file.as_mut().filter(|_| !part_files.is_empty()) {
-        film_file.end(&rendering);
-        for path in part_files {
-            match write_or_rescue(&path, |path| film_file.write(path, &rendering)) {
-                Ok(()) => written.push(path),
-                Err(error) => misplaced.push(format!("{error:#}")),
-            }
-        }
-    }
-    report(args, &rendering, &written);
+    let written = write_results(args, (&job, &plan, &rendering), (session, &settings), (film_file.as_mut(), outputs))?;
+    report(args, &rendering, &written.paths);
     let mut stats = stats(args, &job, &rendering, setup);
     stats["checkpoints"] = film_file.map_or(serde_json::Value::Null, |f| f.stats());
     Ok(Rendered {
@@ -157,8 +132,34 @@ pub(super) fn render_one(args: &RenderArgs, session: &Session) -> anyhow::Result
         seconds: rendering.elapsed.as_secs_f64(),
         noise: rendering.film.relative_noise(),
         complete: rendering.complete,
-        misplaced,
+        misplaced: written.misplaced,
     })
+}
+
+/// Writes the images and parts of a rendering.
+fn write_results(
+    args: &RenderArgs,
+    (job, plan, rendering): (&RenderJob, &PlanFile, &Rendering),
+    (session, settings): (&Session, &RenderSettings),
+    (film_file, outputs): (Option<&mut FilmFile>, Vec<PathBuf>),
+) -> anyhow::Result<Written> {
+    // Only EXR files hold them
+    let has_exr = outputs.iter().any(|path| is_exr(path));
+    let kinds = if has_exr { &args.exr.cryptomatte[..] } else { &[] };
+    let cryptomattes = cryptomattes(job, settings, &rendering.film, kinds)?;
+    let (denoised, not_denoised) = denoise(session, &rendering.film);
+    let asked = asked_aovs(args)?;
+    let asked = asked.as_deref();
+    let is_interrupted = session.is_stopped();
+    let made = Made { args, job, plan, rendering, asked, cryptomattes, denoised, is_interrupted };
+    let (part_files, images): (Vec<PathBuf>, Vec<PathBuf>) = outputs.into_iter().partition(|path| is_part(path));
+    let mut written = write_pictures(&made, &images)?;
+    written.misplaced.extend(not_denoised);
+    if let Some(film_file) = film_file.filter(|_| !part_files.is_empty()) {
+        film_file.end(rendering);
+        part_files.into_iter().for_each(|path| written.write(path, |path| film_file.write(path, rendering)));
+    }
+    Ok(written)
 }
 
 /// The image without noise, if it is asked for; or why there is none, which is no reason to lose the image.

@@ -1,6 +1,7 @@
 //! Checkpoints: a rendering that is killed goes on, and ends with the bits of one that was not.
 
-use super::parts::{METHODS, assert_same, command, image, lumiris, run, stderr};
+use super::parts::{METHODS, assert_same, command, image, lumiris, run};
+use super::program::stderr;
 use lumiris::render::parts::FilmReader;
 use std::path::Path;
 use std::process::{Child, Command, Stdio};
@@ -286,6 +287,11 @@ fn a_part_that_is_interrupted_is_no_part_until_it_is_finished() {
     assert_eq!(image_complete("some.exr", folder), "false");
     run("render GALLERY --resume 1.part -q -o 1.part", folder);
     run("merge 1.part 2.part -q -o merged.exr", folder);
+    // The command by which it began goes on, too: the samples of a part follow from those of the image
+    let part = format!("{image} --part 1/2");
+    run(&format!("{part} --resume c.film -o again.part"), folder);
+    run("merge again.part 2.part -q -o again.exr", folder);
+    assert_same("merged.exr", "again.exr", folder, "a part resumed by its own command");
     assert_eq!(image_complete("merged.exr", folder), "true");
     run(&format!("{image} -o whole.exr"), folder);
     assert_same("whole.exr", "merged.exr", folder, "an interrupted part");

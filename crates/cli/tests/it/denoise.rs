@@ -2,11 +2,10 @@
 //!
 //! Tests that need the library are run by `make test-denoise`, which names it in LUMIRIS_OIDN.
 
-use lumiris::imaging::oiio::{
-    Part, ReadImage, ReadLimits, read_headers, read_image, read_metadata, read_part, write_image,
-};
+use super::program::{command, folder_with, read, stderr};
+use lumiris::imaging::oiio::{Part, ReadImage, ReadLimits, read_headers, read_metadata, read_part, write_image};
 use std::path::Path;
-use std::process::{Command, Output};
+use std::process::Output;
 
 const SCENE: &str = "Film \"rgb\" \"integer xresolution\" [ 64 ] \"integer yresolution\" [ 48 ]\n\
                      PixelFilter \"box\"\nCamera \"perspective\"\nSampler \"independent\" \"integer pixelsamples\" [ 4 ]\n\
@@ -14,15 +13,7 @@ const SCENE: &str = "Film \"rgb\" \"integer xresolution\" [ 64 ] \"integer yreso
                      Material \"diffuse\" \"rgb reflectance\" [ 0.8 0.4 0.2 ]\nShape \"sphere\"\n";
 
 fn folder() -> tempfile::TempDir {
-    let folder = tempfile::tempdir().unwrap();
-    std::fs::write(folder.path().join("scene.pbrt"), SCENE).unwrap();
-    folder
-}
-
-fn command(folder: &Path, args: &str) -> Command {
-    let mut command = Command::new(env!("CARGO_BIN_EXE_lumiris"));
-    command.args(args.split_whitespace()).current_dir(folder);
-    command
+    folder_with(SCENE)
 }
 
 /// Exit code and messages, with the library that LUMIRIS_OIDN names.
@@ -31,17 +22,13 @@ fn run(folder: &Path, args: &str) -> (Option<i32>, String) {
 }
 
 fn said(output: &Output) -> (Option<i32>, String) {
-    (output.status.code(), String::from_utf8_lossy(&output.stderr).into_owned())
+    (output.status.code(), stderr(output))
 }
 
 fn succeed(folder: &Path, args: &str) -> String {
     let (code, text) = run(folder, args);
     assert_eq!(code, Some(0), "{args}: {text}");
     text
-}
-
-fn read(folder: &Path, name: &str) -> ReadImage {
-    read_image(&folder.join(name), &ReadLimits::default()).unwrap()
 }
 
 fn bits(image: &ReadImage, names: [&str; 3]) -> Vec<u32> {

@@ -1,5 +1,6 @@
 //! Animations: `lumiris render --frames`.
 
+use super::program::{command, stderr};
 use lumiris::imaging::Image;
 use lumiris::imaging::oiio::{Part, ReadLimits, read_image, write_image};
 use std::path::Path;
@@ -10,11 +11,7 @@ const QUAD: &str = "ply\nformat ascii 1.0\nelement vertex 4\nproperty float x\np
                     -1 -1 0\n1 -1 0\n1 1 0\n-1 1 0\n3 0 1 2\n3 0 2 3\n";
 
 fn lumiris(folder: &Path, args: &str) -> Output {
-    Command::new(env!("CARGO_BIN_EXE_lumiris")).args(args.split_whitespace()).current_dir(folder).output().unwrap()
-}
-
-fn stderr(output: &Output) -> String {
-    String::from_utf8_lossy(&output.stderr).into_owned()
+    command(folder, args).output().unwrap()
 }
 
 /// A frame: a quadrilateral under a sky, both from files, that moves from frame to frame.

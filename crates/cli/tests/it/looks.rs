@@ -1,24 +1,22 @@
 //! What becomes of a film: exposure and view transforms, and layers, storage and attributes of EXR files.
 
-use lumiris::imaging::oiio::{ReadImage, ReadLimits, read_headers, read_image, read_part};
+use super::program::{self, folder_with, read, stderr};
+use lumiris::imaging::oiio::{ReadImage, ReadLimits, read_headers, read_part};
 use lumiris::render::cryptomatte::{hash, id};
 use std::path::Path;
 use std::process::{Command, Output};
 
+/// The program without a configuration of OpenColorIO.
 fn command(folder: &Path, args: &str) -> Command {
-    let mut command = Command::new(env!("CARGO_BIN_EXE_lumiris"));
-    command.args(args.split_whitespace()).current_dir(folder).env_remove("OCIO");
+    let mut command = program::command(folder, args);
+    command.env_remove("OCIO");
     command
 }
 
 fn render(folder: &Path, args: &str) -> Output {
     let output = command(folder, &format!("render scene.pbrt -q {args}")).output().unwrap();
-    assert!(output.status.success(), "{args}: {}", String::from_utf8_lossy(&output.stderr));
+    assert!(output.status.success(), "{args}: {}", stderr(&output));
     output
-}
-
-fn read(folder: &Path, name: &str) -> ReadImage {
-    read_image(&folder.join(name), &ReadLimits::default()).unwrap()
 }
 
 /// The bytes of the first pixel.
@@ -28,11 +26,10 @@ fn first(image: &ReadImage) -> [u8; 3] {
 
 /// A sky of one colour, and a configuration that halves colours or turns their channels around.
 fn sky() -> tempfile::TempDir {
-    let folder = tempfile::tempdir().unwrap();
     let scene = "Film \"rgb\" \"integer xresolution\" [ 8 ] \"integer yresolution\" [ 6 ]\n\
                  Sampler \"independent\" \"integer pixelsamples\" [ 1 ]\nWorldBegin\n\
                  LightSource \"infinite\" \"rgb L\" [ 0.2 0.4 0.6 ]\n";
-    std::fs::write(folder.path().join("scene.pbrt"), scene).unwrap();
+    let folder = folder_with(scene);
     let config = "ocio_profile_version: 2\nroles: {default: raw}\nfile_rules:\n  - !<Rule> {name: Default, colorspace: raw}\n\
                   displays:\n  Screen:\n    - !<View> {name: Half, colorspace: half}\n    - !<View> {name: Turned, colorspace: turned}\n\
                   colorspaces:\n  - !<ColorSpace> {name: raw, isdata: true}\n  - !<ColorSpace> {name: Linear Rec.709 (sRGB)}\n\

@@ -12,6 +12,7 @@ mod looks;
 mod lost_output;
 mod parts;
 mod plan;
+mod program;
 mod reproduce;
 mod shell;
 mod watch;

@@ -1,6 +1,7 @@
 //! Parts of images: merged, they have the bits of the image rendered at once; what does not belong together is refused.
 
-use lumiris::imaging::oiio::{ReadImage, ReadLimits, read_image};
+use super::program::{self, stderr};
+use lumiris::imaging::oiio::ReadImage;
 use std::path::Path;
 use std::process::{Command, Output};
 
@@ -16,17 +17,13 @@ pub(crate) fn command(args: &str, folder: &Path) -> Command {
         }
         words.push(word.replace("GALLERY", &gallery.display().to_string()));
     }
-    let mut command = Command::new(env!("CARGO_BIN_EXE_lumiris"));
-    command.args(words).current_dir(folder);
+    let mut command = program::command(folder, "");
+    command.args(words);
     command
 }
 
 pub(crate) fn lumiris(args: &str, folder: &Path) -> Output {
     command(args, folder).output().unwrap()
-}
-
-pub(crate) fn stderr(output: &Output) -> String {
-    String::from_utf8_lossy(&output.stderr).into_owned()
 }
 
 /// Runs the program, which must succeed.
@@ -47,7 +44,7 @@ fn refuse(args: &str, folder: &Path, code: i32, words: &[&str]) {
 }
 
 pub(crate) fn image(name: &str, folder: &Path) -> ReadImage {
-    read_image(&folder.join(name), &ReadLimits::default()).unwrap()
+    program::read(folder, name)
 }
 
 /// Channels and the bits of all values.

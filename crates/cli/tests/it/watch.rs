@@ -1,6 +1,7 @@
 //! Watching an image while it converges: a tev that the test plays, and the page over HTTP and in the browser.
 
 use crate::browser::Browser;
+use crate::program::{command, folder_with};
 use lumiris::imaging::oiio::{ReadLimits, read_image};
 use serde_json::Value;
 use std::io::{BufRead, BufReader, Read, Write};
@@ -14,15 +15,11 @@ const SCENE: &str = "LookAt 0 0 -4 0 0 0 0 1 0\nCamera \"perspective\" \"float f
                      LightSource \"infinite\" \"rgb L\" [ 0.4 0.2 0.1 ]\nShape \"sphere\"\n";
 
 fn folder() -> tempfile::TempDir {
-    let folder = tempfile::tempdir().unwrap();
-    std::fs::write(folder.path().join("scene.pbrt"), SCENE).unwrap();
-    folder
+    folder_with(SCENE)
 }
 
 fn lumiris(folder: &Path, args: &str) -> Child {
-    let mut command = Command::new(env!("CARGO_BIN_EXE_lumiris"));
-    command.args(["render", "scene.pbrt"]).args(args.split_whitespace()).current_dir(folder);
-    command.stderr(Stdio::piped()).spawn().unwrap()
+    command(folder, &format!("render scene.pbrt {args}")).stderr(Stdio::piped()).spawn().unwrap()
 }
 
 /// Reads the messages of tev's protocol, as its documentation describes them.

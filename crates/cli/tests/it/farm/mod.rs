@@ -1,7 +1,8 @@
 //! `lumiris farm slurm`: its jobs give the bits of the image rendered at once. In a cluster of two nodes that this machine
 //! plays (`make test-farm`), and with an `sbatch` that runs jobs on the spot.
 
-use crate::parts::{assert_same, command, run, stderr};
+use crate::parts::{assert_same, command, run};
+use crate::program::{read, stderr};
 use std::fs;
 use std::os::unix::fs::PermissionsExt;
 use std::path::{Path, PathBuf};
@@ -79,13 +80,15 @@ fn jobs_render_the_bits_of_the_image_at_once_in_any_folder_and_do_nothing_again(
 #[test]
 fn values_with_dashes_and_bare_options_reach_the_parts() {
     let (_root, folder) = queue();
-    let options = "--estimator mis --part-by tiles --box-filter --crop 0,0.5,0,1 --seed 5 --aov none";
+    let options =
+        "--estimator mis --part-by tiles --box-filter --crop 0,0.5,0,1 --seed 5 --aov none --exr-compression piz";
     assert_success(&farm(&format!("{FARM} {options} --submit --dir d"), &folder).output().unwrap());
     run(
         "render GALLERY --resolution 40x36 --spp 7 -q --estimator mis --box-filter --crop 0,0.5,0,1 --seed 5 --aov none -o w.exr",
         &folder,
     );
     assert_same("image.exr", "w.exr", &folder, "with options");
+    assert_eq!(read(&folder, "image.exr").metadata["compression"], "piz");
     assert!(!folder.join("d/plan.json").exists());
 }
 

@@ -1,19 +1,18 @@
-//! The scene and its options, also as they were typed, for command lines that are written into scripts.
+//! Options also as they were typed, for command lines that are written into scripts.
 
-use super::args::SceneArgs;
 use clap::parser::ValueSource;
 use clap::{Arg, ArgMatches, Args, Command, FromArgMatches};
 
-/// The scene and its options.
+/// A group of options.
 #[derive(Clone, Debug)]
-pub(super) struct SceneOptions {
+pub(super) struct AsTyped<A> {
     /// As parsed.
-    pub(super) args: SceneArgs,
+    pub(super) args: A,
     /// As typed: names without dashes, and values if they have any.
     typed: Typed,
 }
 
-impl SceneOptions {
+impl<A> AsTyped<A> {
     /// The options as words of a command line, but for those named.
     pub(super) fn words_without(&self, omitted: &[&str]) -> Vec<String> {
         let kept = self.typed.iter().filter(|(name, _)| !omitted.contains(&name.as_str()));
@@ -43,21 +42,21 @@ fn typed(arg: &Arg, matches: &ArgMatches) -> Option<Result<Typed, clap::Error>> 
     Some(values.collect::<Option<Vec<_>>>().ok_or_else(not_text))
 }
 
-impl Args for SceneOptions {
+impl<A: Args> Args for AsTyped<A> {
     fn augment_args(command: Command) -> Command {
-        SceneArgs::augment_args(command)
+        A::augment_args(command)
     }
 
     fn augment_args_for_update(command: Command) -> Command {
-        SceneArgs::augment_args_for_update(command)
+        A::augment_args_for_update(command)
     }
 }
 
-impl FromArgMatches for SceneOptions {
+impl<A: Args> FromArgMatches for AsTyped<A> {
     fn from_arg_matches(matches: &ArgMatches) -> Result<Self, clap::Error> {
-        let known = SceneArgs::augment_args(Command::new("scene"));
+        let known = A::augment_args(Command::new("options"));
         let lists: Vec<_> = known.get_arguments().filter_map(|arg| typed(arg, matches)).collect::<Result<_, _>>()?;
-        Ok(SceneOptions { args: SceneArgs::from_arg_matches(matches)?, typed: lists.concat() })
+        Ok(AsTyped { args: A::from_arg_matches(matches)?, typed: lists.concat() })
     }
 
     fn update_from_arg_matches(&mut self, matches: &ArgMatches) -> Result<(), clap::Error> {
