@@ -5,7 +5,7 @@
 //! that a failure never leaves a partial image under the name. Equal images give equal files: a date is written only if
 //! the caller gives one (`DateTime`), since OpenImageIO would fill in the current time.
 //!
-//! Reading order: [`part`] (what is written), [`shim`] (calls and strings), [`read`], [`write`], [`ocio`].
+//! Reading order: [`part`] (what is written), [`shim`] (calls and strings), [`read`], [`mod@write`], [`ocio`].
 
 mod ocio;
 mod part;
