@@ -162,7 +162,8 @@ impl PathTracer {
     ) {
         let depth = settings.depth();
         fits.begin_batch(samples.len());
-        if self.groups != Groups::None && settings.path_reuse > 1 && own.is_none() && self.outcomes.is_none() {
+        let edge = settings.path_reuse.unwrap_or(1);
+        if self.groups != Groups::None && edge > 1 && own.is_none() && self.outcomes.is_none() {
             self.reuse = Some(self.spare_reuse.take().unwrap_or_default());
         }
         if let Some(reuse) = &mut self.reuse {
@@ -200,7 +201,7 @@ impl PathTracer {
         }
         if let Some(mut reuse) = self.reuse.take() {
             let start = Instant::now();
-            self.direct.stats.segments += reuse.resolve(job, (self.groups, settings.path_reuse), samples, out);
+            self.direct.stats.segments += reuse.resolve(job, (self.groups, edge), samples, out);
             self.direct.stats.t2 += start.elapsed();
             self.spare_reuse = Some(reuse);
         }

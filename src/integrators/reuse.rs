@@ -32,7 +32,7 @@ const SEED: u32 = 0x72_65_75_73;
 
 /// The edge of the blocks of pixels that share paths; 1 if none do.
 pub fn edge(job: &RenderJob) -> u32 {
-    if obstacle(job).is_none() { job.settings().integrator.path_reuse } else { 1 }
+    if obstacle(job).is_none() { job.settings().integrator.path_reuse.unwrap_or(1) } else { 1 }
 }
 
 /// Why pixels of this image cannot share paths.

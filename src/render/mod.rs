@@ -6,6 +6,7 @@
 
 pub mod allocation;
 pub mod auto;
+mod auto_reuse;
 mod auto_round;
 pub mod bench;
 pub mod bench_frame;

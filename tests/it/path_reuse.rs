@@ -18,7 +18,7 @@ fn job(scene: &Path, resolution: [u32; 2], path_reuse: u32) -> RenderJob {
     let options = LoadOptions { resolution: Some(resolution), ..LoadOptions::default() };
     let mut loaded = load(scene, &options).map_err(|d| d.to_string()).unwrap();
     let integrator = &mut loaded.settings.integrator;
-    (integrator.estimator, integrator.path_reuse) = (EstimatorKind::Mis, path_reuse);
+    (integrator.estimator, integrator.path_reuse) = (EstimatorKind::Mis, Some(path_reuse));
     loaded.job(AccelKind::Embree, None).unwrap()
 }
 
@@ -130,7 +130,7 @@ fn threads_tiles_packets_and_passes_do_not_change_a_bit() {
     let image = |packet_width, settings: RenderSettings| {
         let options = LoadOptions { resolution: Some([70, 45]), ..LoadOptions::default() };
         let mut loaded = load(&scene("demo/gallery"), &options).map_err(|d| d.to_string()).unwrap();
-        (loaded.settings.integrator.estimator, loaded.settings.integrator.path_reuse) = (EstimatorKind::Mis, 3);
+        (loaded.settings.integrator.estimator, loaded.settings.integrator.path_reuse) = (EstimatorKind::Mis, Some(3));
         let job = loaded.job(AccelKind::Embree, packet_width).unwrap();
         let film = film(&job, RenderSettings { spp: 5, ..settings });
         film.pixels.iter().flat_map(|p| p.mean().map(f64::to_bits)).collect::<Vec<_>>()
@@ -153,7 +153,7 @@ fn images_whose_pixels_cannot_share_paths_are_those_without() {
     job.change(|s| s.integrator.roulette = RouletteKind::Throughput);
     job.change(|s| s.integrator.kind = IntegratorKind::Direct);
     let direct = film(&job, RenderSettings { spp: 2, ..RenderSettings::default() });
-    job.change(|s| s.integrator.path_reuse = 1);
+    job.change(|s| s.integrator.path_reuse = Some(1));
     let alone = film(&job, RenderSettings { spp: 2, ..RenderSettings::default() });
     assert!(direct.pixels.iter().zip(&alone.pixels).all(|(a, b)| a.mean() == b.mean()));
 }
