@@ -206,9 +206,7 @@ impl Made<'_> {
         if let Some(list) = self.asked {
             return list.to_vec();
         }
-        let ratio = self.job.sample_count_map.as_ref().map(|_| Aov::Ratio);
-        let records = self.rendering.cache.map(|_| Aov::Records);
-        Aov::ALL.into_iter().chain(ratio).chain(records).collect()
+        output::default_aovs(self.job.sample_count_map.is_some(), self.rendering.cache.is_some())
     }
 
     /// What the image depends on, and how it came about.
