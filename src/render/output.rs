@@ -1,5 +1,6 @@
 //! From the film to images: channels with names, and metadata.
 
+use super::Rendering;
 use crate::film::{Film, PixelSums};
 use crate::imaging::{IMAGE_LAYER, Image};
 use crate::scene::{FilmSettings, SampleCountMap};
@@ -152,6 +153,18 @@ fn ratio_values(map: &SampleCountMap, pixel: usize) -> [f32; 5] {
 pub fn exposed(film: &Film, exposure: f32) -> Vec<f32> {
     let gain = exposure.exp2();
     film.pixels.iter().flat_map(|p| p.mean().map(|v| v as f32 * gain)).collect()
+}
+
+/// How far a rendering came, as metadata entries.
+pub fn progress_metadata(rendering: &Rendering) -> Vec<(String, String)> {
+    let done = || rendering.film.pixels.iter().map(|p| p.count);
+    let (min, max) = (done().min().unwrap_or(0), done().max().unwrap_or(0));
+    let entries = [
+        ("complete", rendering.complete.to_string()),
+        ("samples_done", format!("{min} to {max} per pixel")),
+        ("seconds", format!("{:.3}", rendering.elapsed.as_secs_f64())),
+    ];
+    entries.map(|(key, value)| (format!("lumiris:{key}"), value)).to_vec()
 }
 
 /// Everything that an image depends on, as metadata entries `lumiris:…`: its settings and the film.
