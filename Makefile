@@ -66,7 +66,7 @@ test-python: setup
 	  PATH="$(dir $(CARGO)):$$PATH" "$$environment/bin/maturin" build --quiet --profile dev --locked \
 	    --manifest-path python/Cargo.toml --out target/python/wheels && \
 	  "$$environment/bin/pip" install --quiet --disable-pip-version-check --force-reinstall --no-deps target/python/wheels/*.whl && \
-	  cd python && LUMIRIS=../target/debug/lumiris "$$environment/bin/python" -m pytest -q && \
+	  cd python && LUMIRIS=../target/debug/lumiris "$$environment/bin/pytest" -q && \
 	  "$$environment/bin/python" -m mypy lumiris tests
 
 # Analytic scenes at full power: enough samples to detect a bias of 2 % (0.5 or 1 % where there is little noise), the

@@ -3,8 +3,8 @@
 //! Numbers cross the boundary in NumPy arrays. What Rust has computed becomes an array as it is: the array owns the
 //! memory, nothing is copied. What takes long runs without the GIL.
 //!
-//! Reading order: [`settings`] (keyword arguments), [`images`] (arrays and files), [`render`] with what its callback sees
-//! ([`progress`]), [`compare`], [`estimators`].
+//! Reading order: `settings` (keyword arguments), `images` (arrays and files), `render` with what its callback sees
+//! (`progress`), `compare`, `estimators`.
 #![cfg(feature = "module")]
 
 mod compare;
