@@ -39,7 +39,7 @@ uninstall:
 test: setup
 	@.ci/setup.sh $(TEST_PACKAGES)
 	$(CARGO) test --workspace --doc
-	$(CARGO) test --workspace --lib --bins --tests
+	$(CARGO) test --workspace --no-fail-fast --lib --bins --tests
 
 # Renders on a Slurm cluster of two nodes that this machine plays: picture, requeued tasks, a node that goes down.
 test-farm: setup
