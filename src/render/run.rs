@@ -3,7 +3,7 @@
 use super::camera_samples::{self, CameraSampler};
 use super::control_variates;
 use super::parts::{Checkpoints, PartError, StoredTile};
-use super::tiles::{Tile, Tiles, bounds_of_tiles, film, film_of_last, has_replicas, position};
+use super::tiles::{Tile, Tiles, bounds_of_tiles, film, film_of_last, position, replica_edge};
 use super::worker::{AnyWorker, Workers};
 use super::{BATCH_PATHS, Continuation, Progress, RenderError, RenderSettings, Rendering, TileObserver};
 use crate::direct::Estimator;
@@ -11,7 +11,7 @@ use crate::film::accumulator::PixelAccumulator;
 use crate::film::replicas::{ReplicaAccumulator, replicas};
 use crate::film::{Film, PixelBounds};
 use crate::integrators::path::CameraSample;
-use crate::integrators::{PathStats, Statistics, integrator};
+use crate::integrators::{PathStats, Statistics, integrator, reuse};
 use crate::scene::{FilmSettings, RenderJob};
 use lumiris_numbers::estimators::ocv::block_of;
 use lumiris_numbers::math::hash::pcg4d;
@@ -34,7 +34,7 @@ pub(super) type TilePart = (PixelBounds, std::ops::Range<usize>);
 pub(super) fn batch_parts(run: &Run<'_>, rays: usize) -> (Vec<TilePart>, std::ops::Range<u32>) {
     let per_pixel = run.settings.spp.min(run.pass_length()).max(1);
     let pixels_per_batch = (BATCH_PATHS / per_pixel as usize).max(1);
-    let tiles = run.job.world.scene.film.bounds.tiles(run.settings.tile_size);
+    let tiles = run.job.world.scene.film.bounds.tiles(run.tile_size);
     let parts: Vec<_> = tiles
         .iter()
         .flat_map(|tile| {
@@ -70,6 +70,8 @@ pub(super) fn camera_batches(job: &RenderJob, tile_size: u32, rays: usize) -> Ve
 pub(super) struct Run<'a> {
     pub(super) job: &'a RenderJob,
     settings: &'a RenderSettings,
+    /// Edge of tiles: of whole cells where pixels share paths.
+    tile_size: u32,
     stop: &'a AtomicBool,
     observe: &'a (dyn Fn(&Progress) + Sync),
     pub(super) camera: CameraSampler<'a>,
@@ -89,6 +91,7 @@ impl<'a> Run<'a> {
         Run {
             job,
             settings,
+            tile_size: if reuse::edge(job) > 1 { reuse::CELL } else { settings.tile_size },
             stop,
             observe,
             camera: CameraSampler::new(job, settings.first_sample),
@@ -170,13 +173,13 @@ impl<'a> Run<'a> {
 
     /// The tiles, with what is stored of them.
     fn tiles(&self, stored: Option<Vec<StoredTile>>) -> Result<Vec<Tile>, PartError> {
-        let wants_replicas = has_replicas(self.job, self.settings);
+        let replica_edge = replica_edge(self.job, self.settings);
         let bounds = self.job.world.scene.film.bounds;
         let tiles = match stored {
-            Some(stored) => stored.into_iter().map(|s| s.restore(|b| self.tile(b, wants_replicas))).collect(),
+            Some(stored) => stored.into_iter().map(|s| s.restore(|b| self.tile(b, replica_edge))).collect(),
             None => {
-                let bounds = bounds_of_tiles(&bounds, self.settings.tile_size, self.settings.share);
-                Ok(bounds.into_iter().map(|b| self.tile(b, wants_replicas)).collect::<Vec<_>>())
+                let bounds = bounds_of_tiles(&bounds, self.tile_size, self.settings.share);
+                Ok(bounds.into_iter().map(|b| self.tile(b, replica_edge)).collect::<Vec<_>>())
             }
         }?;
         let done = |t: &Tile| t.bounds.area() as u64 * u64::from(t.done - self.begin());
@@ -218,9 +221,9 @@ impl<'a> Run<'a> {
     }
 
     /// A tile without samples.
-    fn tile(&self, bounds: PixelBounds, wants_replicas: bool) -> Tile {
+    fn tile(&self, bounds: PixelBounds, replica_edge: Option<u32>) -> Tile {
         let all = &self.job.world.scene.film.bounds;
-        let replicas = if wants_replicas { replicas(all, &bounds) } else { Vec::new() };
+        let replicas = replica_edge.map_or(Vec::new(), |edge| replicas(all, &bounds, edge));
         let integrator = &self.job.settings().integrator;
         let fits = Estimator::at_vertex(integrator, 0).fits(self.job, bounds.area() + replicas.len());
         Tile { bounds, done: self.begin(), sums: vec![PixelAccumulator::default(); bounds.area()], replicas, fits }
@@ -252,7 +255,7 @@ impl<'a> Run<'a> {
 
     /// Samples per pixel of the longest pass.
     fn pass_length(&self) -> u32 {
-        (BATCH_PATHS as u32 / self.settings.tile_size.max(1).pow(2)).clamp(1, 64)
+        (BATCH_PATHS as u32 / self.tile_size.max(1).pow(2)).clamp(1, 64)
     }
 
     /// Samples per pixel that fit into the time that is left, at the speed so far; at least one.

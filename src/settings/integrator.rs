@@ -22,6 +22,8 @@ pub struct IntegratorSettings {
     pub roulette_depth: Option<u32>,
     /// What decides by roulette whether a path goes on, and as how many paths.
     pub roulette: RouletteKind,
+    /// Edge of the blocks of pixels that share what their paths find beyond the second vertex; 1: none do.
+    pub path_reuse: u32,
     /// Direct-light estimator at each path vertex.
     pub estimator: EstimatorKind,
     /// Samples per estimate (N): shadow segments per shading point. `None` is the default of the estimator,
@@ -65,6 +67,7 @@ impl Default for IntegratorSettings {
             max_depth: 5,
             roulette_depth: Some(4),
             roulette: RouletteKind::Throughput,
+            path_reuse: 1,
             estimator: EstimatorKind::Auto,
             samples: None,
             later_samples: None,

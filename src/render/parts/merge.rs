@@ -172,7 +172,7 @@ fn gap(parts: &[Part], samples: Range<u32>, tiles: &[usize], count: usize) -> Ve
 /// A tile of the size of the image, without samples.
 fn empty(header: &FilmHeader) -> Tile {
     let bounds = header.bounds;
-    let replicas = if header.has_replicas { replicas(&bounds, &bounds) } else { Vec::new() };
+    let replicas = header.replica_edge.map_or(Vec::new(), |edge| replicas(&bounds, &bounds, edge));
     let fits = match header.controls as usize {
         0 => Fits::default(),
         controls => Fits::of_pixels(controls, bounds.area() + replicas.len()),

@@ -68,6 +68,18 @@ pub(super) const TRANSPORT: Group = Group {
             ..Setting::BASE
         },
         Setting {
+            flag: "path-reuse",
+            value_name: "E",
+            parameters: &["pathreuse"],
+            key: "path_reuse",
+            kind: integer(1, 16),
+            help: "Blocks of E × E pixels share what their paths find beyond the second vertex; 1: none do",
+            applies: Applies::Integrators(&[IntegratorKind::Path]),
+            get: |s| Some(Value::Integer(s.integrator.path_reuse.into())),
+            set: |s, v| v.count().map(|n| s.integrator.path_reuse = n),
+            ..Setting::BASE
+        },
+        Setting {
             flag: "light-sampler",
             aliases: &["light-choice"],
             parameters: &["lightsampler"],
