@@ -16,7 +16,7 @@ use crate::scene::{FilmSettings, RenderJob};
 use lumiris_numbers::estimators::ocv::block_of;
 use lumiris_numbers::math::hash::pcg4d;
 use rayon::prelude::*;
-use std::sync::atomic::{AtomicBool, AtomicU64, Ordering};
+use std::sync::atomic::{AtomicBool, AtomicU32, AtomicU64, Ordering};
 use std::time::{Duration, Instant};
 
 /// Time between two determinations of the noise for those who observe the progress: it takes as long as a few samples
@@ -78,6 +78,7 @@ pub(super) struct Run<'a> {
     start: Instant,
     samples_done: AtomicU64,
     rays: AtomicU64,
+    passes: AtomicU32,
 }
 
 impl<'a> Run<'a> {
@@ -97,11 +98,12 @@ impl<'a> Run<'a> {
             start: Instant::now(),
             samples_done: AtomicU64::new(0),
             rays: AtomicU64::new(0),
+            passes: AtomicU32::new(0),
         }
     }
 
     pub(super) fn run(self, threads: usize, continuation: Continuation<'_>) -> Result<Rendering, RenderError> {
-        let Continuation { stored, mut checkpoints, keeps_sums, watch } = continuation;
+        let Continuation { stored, mut checkpoints, keeps_sums, watch, passes } = continuation;
         let seed = self.job.settings().sampling.seed;
         let cameras = |pixel, sample| self.camera.sample_of_seed(pixel, sample, seed);
         let mut integrator = integrator(self.job, &cameras, self.stop)?;
@@ -120,6 +122,10 @@ impl<'a> Run<'a> {
                 let watched = (noise, watch);
                 stats.merge(&self.whole_pass(&workers, &mut tiles, samples.clone(), watched, &mut checkpoints));
                 first = samples.end;
+                self.passes.fetch_add(1, Ordering::Relaxed);
+                if let (Some(passes), false) = (passes, self.stop.load(Ordering::Relaxed)) {
+                    passes(&self.progress(self.samples_total(&tiles), noise));
+                }
                 if observed.elapsed() >= NOISE_INTERVAL {
                     noise = Some(self.film(&tiles).relative_noise());
                     observed = Instant::now();
@@ -141,6 +147,23 @@ impl<'a> Run<'a> {
         }
         let sums = keeps_sums.then_some(Tiles(tiles));
         Ok(Rendering { film, stats, cache, photons, elapsed: self.start.elapsed(), complete, threads, sums })
+    }
+
+    /// Camera samples of all tiles, as if every pixel had the same number.
+    fn samples_total(&self, tiles: &[Tile]) -> u64 {
+        tiles.iter().map(|t| t.bounds.area() as u64).sum::<u64>() * u64::from(self.end() - self.begin())
+    }
+
+    /// What is done by now.
+    fn progress(&self, samples_total: u64, noise: Option<f64>) -> Progress {
+        Progress {
+            samples_done: self.samples_done.load(Ordering::Relaxed),
+            samples_total,
+            rays: self.rays.load(Ordering::Relaxed),
+            elapsed: self.start.elapsed(),
+            passes: self.passes.load(Ordering::Relaxed),
+            noise,
+        }
     }
 
     /// The index of the sample after the last one.
@@ -256,7 +279,7 @@ impl<'a> Run<'a> {
         samples: std::ops::Range<u32>,
         (noise, watch, pause): (Option<f64>, Option<&TileObserver<'_>>, Option<Instant>),
     ) -> PathStats {
-        let total = tiles.iter().map(|t| t.bounds.area() as u64).sum::<u64>() * u64::from(self.end() - self.begin());
+        let total = self.samples_total(tiles);
         tiles
             .par_iter_mut()
             .with_max_len(1)
@@ -273,13 +296,9 @@ impl<'a> Run<'a> {
                 }
                 let rays = stats.camera_rays + stats.bounce_rays + stats.direct.emitter_rays + stats.direct.segments;
                 let done = tile.bounds.area() as u64 * u64::from(samples.end - samples.start);
-                (self.observe)(&Progress {
-                    samples_done: self.samples_done.fetch_add(done, Ordering::Relaxed) + done,
-                    samples_total: total,
-                    rays: self.rays.fetch_add(rays, Ordering::Relaxed) + rays,
-                    elapsed: self.start.elapsed(),
-                    noise,
-                });
+                self.samples_done.fetch_add(done, Ordering::Relaxed);
+                self.rays.fetch_add(rays, Ordering::Relaxed);
+                (self.observe)(&self.progress(total, noise));
                 stats
             })
             .reduce(PathStats::default, |mut a, b| {
