@@ -9,7 +9,7 @@ class Settings(TypedDict, total=False):
     max_depth: Optional[int]
     roulette_depth: Optional[Union[int, Literal["off"], bool]]
     roulette: Optional[Literal["throughput", "adjoint", "efficiency"]]
-    path_reuse: Optional[int]
+    path_reuse: Optional[Union[int, Literal["auto"]]]
     light_sampler: Optional[Literal["uniform", "power", "tree", "photons"]]
     bsdf_proposals: Optional[int]
     bsdf_density: Optional[Literal["lobes", "uniform"]]
