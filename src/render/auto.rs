@@ -18,8 +18,8 @@
 //! rendering with these settings gives the same image to the bit. All candidates are unbiased, and the pilot has random
 //! numbers of its own; so the choice adds no bias.
 
-pub use super::auto_round::Trial;
 use super::auto_reuse;
+pub use super::auto_round::Trial;
 use super::auto_round::{Candidate, Difference, Round};
 use super::visibility_cache::build_visibility_cache;
 use super::worker::Worker;
@@ -27,8 +27,8 @@ use super::{RenderSettings, Run, processor_time};
 use crate::film::PixelBounds;
 use crate::imaging::metrics::difference::DEFAULT_EPSILON;
 use crate::integrators::PathTracer;
-use crate::integrators::reuse::{self, Groups};
 use crate::integrators::path::CameraSample;
+use crate::integrators::reuse::{self, Groups};
 use crate::scene::RenderJob;
 use crate::settings::{
     Allocation, EstimatorKind, IntegratorKind, IntegratorSettings, Proposals, RisSettings, Settings, StageTimes,
@@ -229,12 +229,7 @@ impl Pilot {
     }
 
     /// Third round: whether pixels share paths, and the numbers of samples if they do.
-    fn share(
-        &self,
-        job: &RenderJob,
-        chosen: &IntegratorSettings,
-        model: &Model,
-    ) -> (Vec<Trial>, IntegratorSettings) {
+    fn share(&self, job: &RenderJob, chosen: &IntegratorSettings, model: &Model) -> (Vec<Trial>, IntegratorSettings) {
         let Settings { integrator: base, sampling } = *job.settings();
         let is_open = base.path_reuse.is_none() && sampling.allocation == Allocation::Auto;
         if !is_open || reuse::obstacle(job).is_some() || self.pixels[2].is_empty() {

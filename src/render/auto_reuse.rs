@@ -87,7 +87,8 @@ mod tests {
 
     #[test]
     fn nothing_is_shared_where_nothing_is_gained() {
-        let differences = |scale: f64| (0..64).map(|i| 1.0 + 0.1 * f64::from(i % 7)).map(|d| [d, scale * d * d]).collect();
+        let differences =
+            |scale: f64| (0..64).map(|i| 1.0 + 0.1 * f64::from(i % 7)).map(|d| [d, scale * d * d]).collect();
         let round = |gain: f64| Round {
             measured: vec![(100.0, differences(1.0)), (110.0, differences(gain))],
             spp: 4,

@@ -78,7 +78,8 @@ impl Round {
     /// The round whose pixels are blocks of so many that stand one after the other: they are not independent.
     pub(super) fn by_blocks(mut self, size: usize) -> Round {
         for (_, differences) in &mut self.measured {
-            let mean = |block: &[Difference]| [0, 1].map(|j| block.iter().map(|d| d[j]).sum::<f64>() / block.len() as f64);
+            let mean =
+                |block: &[Difference]| [0, 1].map(|j| block.iter().map(|d| d[j]).sum::<f64>() / block.len() as f64);
             *differences = differences.chunks(size).map(mean).collect();
         }
         self
