@@ -252,23 +252,19 @@ impl Reuse {
 impl Groups {
     /// The group of sample `index` of a pixel, counted from the corner of the image.
     fn of(self, edge: u32, [x, y]: [u32; 2], index: u32) -> u64 {
-        let cell = match self {
+        let (cell, block) = match self {
             Groups::None => return 0,
-            Groups::Cells => [x / CELL, y / CELL],
-            Groups::Grid => [x / edge, y / edge],
+            Groups::Grid => ([x / edge, y / edge], [0; 2]),
+            Groups::Cells => {
+                let cell = [x / CELL, y / CELL];
+                let [dx, dy, ..] = pcg4d([cell[0], cell[1], index, SEED]);
+                let block = |p: u32, d: u32| (p % CELL + d % edge) / edge;
+                (cell, [block(x, dx), block(y, dy)])
+            }
         };
-        let [dx, dy] = if self == Groups::Cells {
-            let [dx, dy, ..] = pcg4d([cell[0], cell[1], index, SEED]);
-            [dx % edge, dy % edge].map(u64::from)
-        } else {
-            [0; 2]
-        };
-        // Blocks of a cell: at most CELL + 1 of them in a row
-        let block = |p: u32, d: u64| (u64::from(p % CELL) + d) / u64::from(edge);
-        let [bx, by] = if self == Groups::Cells { [block(x, dx), block(y, dy)] } else { [0; 2] };
-        // The cells of a batch are few, and near each other
-        let cell = u64::from(cell[1] & 0x7ff) << 11 | u64::from(cell[0] & 0x7ff);
-        u64::from(index) << 32 | cell << 10 | by << 5 | bx
+        // A batch has few cells, near each other, and at most CELL blocks in a row of one
+        let ([cell_x, cell_y], [block_x, block_y]) = (cell.map(|c| u64::from(c & 0x7ff)), block.map(u64::from));
+        u64::from(index) << 32 | cell_y << 21 | cell_x << 10 | block_y << 5 | block_x
     }
 }
 

@@ -46,12 +46,14 @@ const CHUNK: usize = 64;
 /// Most pixels of a round: deviations are then known to a percent or two.
 const MAX_PIXELS: usize = 4096;
 /// Fewest pixels of a round for which a choice is more than chance.
-const MIN_PIXELS: usize = 64;
-/// Time of both rounds, as a fraction of that of the image.
-const FRACTION: f64 = 0.03;
+const MIN_PIXELS: usize = 128;
+/// Pixels of a round with which numbers of samples are known well enough in most images.
+const ENOUGH_PIXELS: usize = 256;
+/// Time of all rounds, as a fraction of that of the image: what is wanted, and the most where that is not enough.
+const FRACTIONS: [f64; 2] = [0.03, 0.08];
 /// Time of all rounds over that of rendering the pixels of one once, with the same number of samples and seeds: in direct
 /// light, and in paths.
-const TRIALS: [f64; 2] = [10.0, 18.0];
+const TRIALS: [f64; 2] = [10.0, 20.0];
 /// Combined with the seed of the image and the number of the round.
 const SEED: u32 = 0x61_75_74_6f;
 /// Share of the greatest efficiency, by the model, with which fewer samples will do.
@@ -171,12 +173,13 @@ impl Pilot {
         let Settings { integrator, sampling } = job.settings();
         let bounds = job.world.scene.film.bounds;
         let spp = 1 << sampling.spp.clamp(1, MAX_SPP).ilog2();
-        let samples = bounds.area() as f64 * f64::from(sampling.spp) * FRACTION;
+        let samples = bounds.area() as f64 * f64::from(sampling.spp);
         let per_pixel = f64::from(2 * spp) * TRIALS[usize::from(integrator.depth() > 1)];
-        let count = ((samples / per_pixel) as usize).min(MAX_PIXELS);
+        let [wanted, most] = FRACTIONS.map(|fraction| (samples * fraction / per_pixel) as usize);
+        let count = wanted.max(most.min(ENOUGH_PIXELS)).min(MAX_PIXELS);
         let is_measurable = matches!(integrator.kind, IntegratorKind::Direct | IntegratorKind::Path);
         (is_measurable && count >= MIN_PIXELS).then(|| Pilot {
-            pixels: [pixels(&bounds, count, 0), pixels(&bounds, count, 1), blocks(&bounds, count)],
+            pixels: [pixels(&bounds, count, 0), pixels(&bounds, count, 1), blocks(&bounds, 2 * count)],
             spp,
             seed: sampling.seed,
         })
@@ -238,11 +241,17 @@ impl Pilot {
         let candidates = auto_reuse::candidates(chosen);
         let round = self.round(job, &candidates, 2).by_blocks((auto_reuse::EDGE * auto_reuse::EDGE) as usize);
         let trials = round.trials(&candidates);
-        let Some(gain) = auto_reuse::best(&round, NEARLY) else { return (trials, *chosen) };
+        let Some(gain) = auto_reuse::best(&round) else { return (trials, *chosen) };
         let mut settings = IntegratorSettings { path_reuse: Some(gain.edge), ..*chosen };
         if chosen.estimator == EstimatorKind::Mis {
-            let light = |numbers: &[u32]| numbers.iter().map(|&n| n - 1).collect::<Vec<_>>();
-            let best = auto_reuse::model(model, &gain).best([&light(&FIRST), &light(&LATER)], NEARLY);
+            // What is left of the variance is more that of first vertices; no further than what was measured goes
+            let [first, later] = [0, 1].map(|vertex| chosen.sample_counts_at(vertex).samples);
+            let light = |numbers: &[u32], range: [u32; 2]| {
+                let in_range = numbers.iter().filter(|n| (range[0]..=range[1]).contains(n));
+                in_range.map(|&n| n - 1).collect::<Vec<_>>()
+            };
+            let choices = [light(&FIRST, [first, 2 * first]), light(&LATER, [2, later])];
+            let best = auto_reuse::model(model, &gain).best(choices.each_ref().map(Vec::as_slice), NEARLY);
             let numbers = with_samples(&base, best.map(|n| n + 1));
             (settings.samples, settings.later_samples) = (numbers.samples, numbers.later_samples);
         }

@@ -16,6 +16,8 @@ const MIN_COST: f64 = 0.005;
 /// Standard errors by which the gain must exceed nothing.
 const MIN_ERRORS: f64 = 1.0;
 const MIN_GAIN: f64 = 1.03;
+/// Share of the greatest efficiency with which smaller blocks will do.
+const NEARLY: f64 = 0.98;
 
 /// What sharing costs and gains.
 #[derive(Clone, Copy, Debug)]
@@ -42,7 +44,7 @@ fn shared(edge: u32, [cost, more]: [f64; 2], [variance, less]: [f64; 2]) -> [f64
 }
 
 /// The edge that is most efficient by a round of both candidates, if that is more than chance.
-pub(super) fn best(round: &Round, nearly: f64) -> Option<Gain> {
+pub(super) fn best(round: &Round) -> Option<Gain> {
     let costs = [round.measured[0].0, round.measured[1].0];
     let variances = [round.variances(0), round.variances(1)];
     let gains = |edge: u32| -> Vec<f64> {
@@ -50,7 +52,7 @@ pub(super) fn best(round: &Round, nearly: f64) -> Option<Gain> {
         both.map(|(&all, &less)| -shared(edge, costs, [all, less]).iter().map(|x| x.ln()).sum::<f64>()).collect()
     };
     let greatest = EDGES.iter().map(|&edge| gains(edge)[0]).fold(0.0, f64::max);
-    let edge = EDGES.into_iter().find(|&edge| gains(edge)[0] >= greatest + nearly.ln())?;
+    let edge = EDGES.into_iter().find(|&edge| gains(edge)[0] >= greatest + NEARLY.ln())?;
     let (gain, error) = jackknife(&gains(edge));
     let [cost, variance] = shared(edge, costs, [variances[0][0], variances[1][0]]);
     (edge > 1 && gain > MIN_GAIN.ln().max(MIN_ERRORS * error)).then_some(Gain {
@@ -94,8 +96,8 @@ mod tests {
             spp: 4,
             is_direct: false,
         };
-        assert!(best(&round(1.0), 1.0).is_none() && best(&round(1.2), 1.0).is_none());
-        let found = best(&round(0.3), 1.0).unwrap();
+        assert!(best(&round(1.0)).is_none() && best(&round(1.2)).is_none());
+        let found = best(&round(0.3)).unwrap();
         assert!(found.edge >= 3 && found.cost > 0.0 && found.variance > 0.0, "{found:?}");
     }
 }
