@@ -18,7 +18,7 @@ use super::vertices::{Stage, VertexSearch};
 use super::wavefront::{Batch, Buffers, Estimate, Output};
 use super::{Integrator, Statistics, Tracer};
 use crate::direct::{DirectStage, Estimator, Fits, ShadingPoint};
-use crate::film::{Film, PixelSample};
+use crate::film::PixelSample;
 use crate::materials::SurfaceBsdf;
 use crate::scene::RenderJob;
 use crate::settings::IntegratorSettings;
@@ -34,7 +34,7 @@ impl Integrator for PathIntegrator {
         Box::new(PathTracer::new(with_features))
     }
 
-    fn statistics(&self, paths: PathStats, _: &mut Film) -> Statistics {
+    fn statistics(&self, paths: PathStats) -> Statistics {
         Statistics { paths, ..Statistics::default() }
     }
 }
