@@ -153,7 +153,7 @@ macro_rules! packer {
             let rest = |s: &PixelAccumulator| value(s).wrapping_sub(least) as $unsigned >> zeros;
             match width {
                 0 => {}
-                ..=8 => sums.iter().for_each(|s| {
+                1..=8 => sums.iter().for_each(|s| {
                     out[at..at + 8].copy_from_slice(&(rest(s) as u64).to_le_bytes());
                     at += width;
                 }),
@@ -271,7 +271,7 @@ impl Reader<'_> {
         let value = |rest: u128| least.wrapping_add((rest << zeros) as i128);
         match width {
             0 => (0..count).for_each(|i| set(i, least)),
-            ..=8 => {
+            1..=8 => {
                 let mask = u64::MAX >> (64 - 8 * width);
                 (0..count).for_each(|i| set(i, value((self.word(start + i * width) & mask).into())));
             }
