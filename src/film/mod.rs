@@ -228,6 +228,11 @@ impl Film {
         self.len() == 0
     }
 
+    /// Its tiles, by rows and columns.
+    pub fn tiles(&self) -> &[FilmTile] {
+        &self.tiles
+    }
+
     /// Second estimates of some pixels, by their index.
     pub fn replicas(&self) -> &[Replica] {
         &self.replicas

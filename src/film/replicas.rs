@@ -65,12 +65,13 @@ impl Replica {
     }
 }
 
-/// Replicas, without samples, for the pixels of a tile that are estimated twice, in an image with the given bounds.
-/// Their indices are those of the tile.
-pub fn replicas(image: &PixelBounds, tile: &PixelBounds) -> Vec<ReplicaAccumulator> {
+/// Replicas, without samples, for the pixels of a tile that are estimated twice, in an image with the given bounds: whole
+/// blocks of `edge` × `edge` pixels. Their indices are those of the tile.
+pub fn replicas(image: &PixelBounds, tile: &PixelBounds, edge: u32) -> Vec<ReplicaAccumulator> {
     let fraction = (WANTED / image.area().max(1) as f64).max(MIN_FRACTION);
     let is_chosen = |i: &u32| {
         let (x, y) = (tile.x0 + i % tile.width(), tile.y0 + i / tile.width());
+        let (x, y) = if edge > 1 { ((x - image.x0) / edge, (y - image.y0) / edge) } else { (x, y) };
         f64::from(unit_f32(pcg4d([x, y, CHOICE, 0])[0])) < fraction
     };
     let none = |pixel| ReplicaAccumulator { pixel, ..ReplicaAccumulator::default() };
@@ -298,16 +299,16 @@ mod tests {
         let position = |tile: &PixelBounds, r: &ReplicaAccumulator| {
             [tile.x0 + r.pixel % tile.width(), tile.y0 + r.pixel / tile.width()]
         };
-        let mut whole: Vec<_> = replicas(&image, &image).iter().map(|r| position(&image, r)).collect();
+        let mut whole: Vec<_> = replicas(&image, &image, 1).iter().map(|r| position(&image, r)).collect();
         let tiles = image.tiles(13);
         let mut parts: Vec<_> =
-            tiles.iter().flat_map(|t| replicas(&image, t).into_iter().map(|r| position(t, &r))).collect();
+            tiles.iter().flat_map(|t| replicas(&image, t, 1).into_iter().map(|r| position(t, &r))).collect();
         whole.sort_unstable();
         parts.sort_unstable();
         assert_eq!(whole, parts);
         // 120,000/64 = 1875 with a standard deviation of 43
         assert!((whole.len() as f64 - 1875.0).abs() < 4.0 * 43.0, "{}", whole.len());
         let small = PixelBounds { x0: 0, x1: 20, y0: 0, y1: 20 };
-        assert_eq!(replicas(&small, &small).len(), 400);
+        assert_eq!(replicas(&small, &small, 1).len(), 400);
     }
 }

@@ -4,7 +4,7 @@
 //! [`Tracer`] for each thread, and reports. Reading order: `segment` is a path between two vertices, `vertices` finds
 //! the next ones, and [`path`] is the loop over them; `wavefront` has the vertices of `mc` and `mis` side by side.
 //! `roulette` decides which paths end and split where they arrive (`arrivals`), by what `pilot` paths found.
-//! [`irradiance_cache`] and [`photon_map`] replace the light that Lambertian parts reflect (`diffuse`).
+//! Pixels that are neighbours may share paths ([`reuse`]). [`irradiance_cache`] and [`photon_map`] replace the light that Lambertian parts reflect (`diffuse`).
 
 mod arrivals;
 mod diffuse;
@@ -12,6 +12,7 @@ pub mod irradiance_cache;
 pub mod path;
 pub mod photon_map;
 mod pilot;
+pub mod reuse;
 mod roulette;
 mod segment;
 mod vertices;
@@ -72,7 +73,7 @@ pub fn integrator<'a>(
         IntegratorKind::Path if job.settings().integrator.roulette != RouletteKind::Throughput => {
             Box::new(GuidedIntegrator::new(job))
         }
-        IntegratorKind::Direct | IntegratorKind::Path => Box::new(PathIntegrator),
+        IntegratorKind::Direct | IntegratorKind::Path => Box::new(PathIntegrator::new(job)),
         IntegratorKind::IrradianceCache => Box::new(CacheIntegrator::new(job, cameras, stop)),
         IntegratorKind::PhotonMap => Box::new(PhotonMapIntegrator::new(job, cameras, stop)?),
     })

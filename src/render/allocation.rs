@@ -46,6 +46,8 @@ const SCOUTS: u32 = 4;
 const MIN_SCOUTED: usize = 256 * (COST_TILE * COST_TILE) as usize;
 /// Factor of the error below which numbers remain uniform.
 const MIN_GAIN: f64 = 1.05;
+/// Maximum number of samples per pixel for a standard error that is asked for, if none is given.
+const MAX_SPP_FOR_NOISE: u32 = 4096;
 
 /// The camera samples of each pixel, if the settings ask for different numbers and allow them.
 pub(super) fn allocate(job: &RenderJob) -> Option<PixelSamples> {
@@ -66,6 +68,19 @@ pub(super) fn allocate(job: &RenderJob) -> Option<PixelSamples> {
     pilot.measure(|tile| tile % SCOUTS != 0);
     let counts = counts(&pilot.weights(|_| true), &pilot.costs, spp);
     (pilot.gain(spp) >= MIN_GAIN).then_some(PixelSamples { bounds: pilot.bounds, spp, counts })
+}
+
+/// Completes settings that ask for a standard error: its maximum number of samples per pixel, unless `has_spp`. `Err` says what it
+/// needs.
+pub fn complete_for_noise(settings: &mut Settings, has_spp: bool) -> Result<(), &'static str> {
+    if settings.sampling.noise.is_none() {
+        return Ok(());
+    }
+    if !has_spp {
+        settings.sampling.spp = MAX_SPP_FOR_NOISE;
+    }
+    let needs = "needs the integrator direct or path, and an estimator that does not fit blocks of samples";
+    if allows_adaptive(settings) { Ok(()) } else { Err(needs) }
 }
 
 /// True if pixels may have different numbers of samples: they share nothing, are fitted neither to others nor in blocks, and have

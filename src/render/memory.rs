@@ -1,11 +1,11 @@
 //! Memory that an image takes, predicted before it is rendered.
 //!
 //! A packed pixel takes the bits in which it differs from its neighbours, which only its samples tell. The figures here
-//! are those of measured scenes, rounded up (docs/measurements/memory.md); a sum needs one more binary digit for twice as
-//! many samples.
+//! are those of one scene at 1 sample, rounded up (docs/measurements/memory.md). How they grow with samples is an estimate: a
+//! sum needs one more binary digit for twice as many.
 
 use super::cryptomatte::Cryptomatte;
-use super::tiles::has_replicas;
+use super::tiles::replica_edge;
 use super::{RenderSettings, thread_pool};
 use crate::direct::Estimator;
 use crate::film::BAND;
@@ -91,7 +91,7 @@ fn of_sums(job: &RenderJob, render: &RenderSettings) -> f64 {
     if render.with_features {
         bytes += grown(FEATURES, DIGITS[1]);
     }
-    if has_replicas(job, render) {
+    if replica_edge(job, render).is_some() {
         bytes += REPLICAS;
     }
     let estimator = Estimator::at_vertex(&job.settings().integrator, 0);

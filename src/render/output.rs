@@ -1,6 +1,8 @@
 //! From the film to images: channels with names, and metadata.
 
+use super::Rendering;
 use crate::film::{BAND, Film};
+use crate::imaging::{IMAGE_LAYER, Image};
 use crate::scene::{FilmSettings, SampleCountMap};
 use crate::settings::Settings;
 use rayon::prelude::*;
@@ -61,6 +63,9 @@ impl Aov {
     }
 }
 
+/// Channels of the image itself.
+const COLOUR: [&str; 3] = ["R", "G", "B"];
+
 /// Named channels, interleaved, row-major from the top left of the crop window.
 #[derive(Clone, Debug)]
 pub struct Channels {
@@ -90,7 +95,7 @@ impl<'a> Layers<'a> {
 
     /// Names of the channels.
     pub fn names(&self) -> Vec<String> {
-        let image = if self.has_image { &["R", "G", "B"][..] } else { &[] };
+        let image = if self.has_image { &COLOUR[..] } else { &[] };
         let aovs = self.aovs.iter().flat_map(|a| a.channels());
         image.iter().chain(aovs).map(|&name| name.to_owned()).collect()
     }
@@ -146,6 +151,27 @@ pub fn channels(film: &Film, aovs: &[Aov], sample_count_map: Option<&SampleCount
     Channels { names: layers.names(), data: layers.rows(film.bounds.y0..film.bounds.y1) }
 }
 
+/// The same values, with an image of its own for each AOV; by their names, the image itself first.
+pub fn layers(film: &Film, aovs: &[Aov], sample_count_map: Option<&SampleCountMap>) -> Vec<(&'static str, Image)> {
+    let image = |has_image: bool, aovs: &[Aov]| {
+        let layers = Layers::new(film, has_image, aovs, sample_count_map);
+        Image {
+            width: film.bounds.width() as usize,
+            height: film.bounds.height() as usize,
+            channels: layers.names(),
+            data: layers.rows_in_parallel(film.bounds.y0..film.bounds.y1),
+        }
+    };
+    let of_aovs = aovs.iter().map(|&aov| (aov.into(), image(false, &[aov])));
+    [(IMAGE_LAYER, image(true, &[]))].into_iter().chain(of_aovs).collect()
+}
+
+/// The AOVs that an image has unless others are asked for.
+pub fn default_aovs(has_ratio: bool, has_records: bool) -> Vec<Aov> {
+    let more = has_ratio.then_some(Aov::Ratio).into_iter().chain(has_records.then_some(Aov::Records));
+    Aov::ALL.into_iter().chain(more).collect()
+}
+
 /// Colour and numbers of a pixel of the map: from red at the minimum ratio (1) to green at the maximum of the map,
 /// logarithmically.
 fn ratio_values((map, max): (&SampleCountMap, f32), pixel: usize) -> [f32; 5] {
@@ -153,6 +179,17 @@ fn ratio_values((map, max): (&SampleCountMap, f32), pixel: usize) -> [f32; 5] {
     let green = (ratio.ln() / max.ln()).clamp(0.0, 1.0);
     let samples = (map.time / (f64::from(ratio) * map.t1 + map.t2)) as f32;
     [1.0 - green, green, 0.0, ratio * samples, samples]
+}
+
+/// How far a rendering came, as metadata entries.
+pub fn progress_metadata(rendering: &Rendering) -> Vec<(String, String)> {
+    let [least, most] = rendering.film.summary().samples;
+    let entries = [
+        ("complete", rendering.complete.to_string()),
+        ("samples_done", format!("{least} to {most} per pixel")),
+        ("seconds", format!("{:.3}", rendering.elapsed.as_secs_f64())),
+    ];
+    entries.map(|(key, value)| (format!("lumiris:{key}"), value)).to_vec()
 }
 
 /// Everything that an image depends on, as metadata entries `lumiris:…`: its settings and the film.
@@ -202,5 +239,22 @@ mod tests {
         let layers = Layers::new(&film, true, &[Aov::Samples], None);
         assert_eq!([layers.rows(9..10), layers.rows(10..11)].concat(), whole.data);
         assert_eq!(Layers::new(&film, false, &[Aov::Samples], None).rows(10..11), [0.0, 1.0, 0.0]);
+    }
+
+    #[test]
+    fn layers_have_the_values_of_the_channels() {
+        let film = film();
+        let aovs = [Aov::Depth, Aov::Albedo, Aov::Samples, Aov::Variance];
+        let all = channels(&film, &aovs, None);
+        let (width, mut names) = (film.bounds.width() as usize, Vec::new());
+        for (name, image) in layers(&film, &aovs, None) {
+            for (c, channel) in image.channels.iter().enumerate() {
+                let position = all.names.iter().position(|n| n == channel).unwrap();
+                let value = |i: usize| all.data[i * all.names.len() + position].to_bits();
+                (0..film.len()).for_each(|i| assert_eq!(image.get(i % width, i / width, c).to_bits(), value(i)));
+            }
+            names.push(name);
+        }
+        assert_eq!(names, ["beauty", "depth", "albedo", "samples", "variance"]);
     }
 }

@@ -17,7 +17,7 @@ use super::{RenderSettings, Run, ThreadError, camera_batches};
 use crate::direct::Fits;
 use crate::film::PixelBounds;
 use crate::integrators::path::CameraSample;
-use crate::integrators::{PathTracer, Tracer};
+use crate::integrators::{PathTracer, Tracer, reuse};
 use crate::scene::{RenderJob, SampleCountMap};
 use crate::settings::table::rows;
 use crate::settings::{
@@ -69,7 +69,8 @@ pub fn prepare(job: &mut RenderJob, threads: Option<usize>, ratio_map: bool) -> 
     let before = *job.settings();
     let auto = pool.install(|| auto::choose(job));
     if job.settings().sampling.allocation == Allocation::Auto {
-        let allocation = if auto.is_some() { Allocation::Adaptive } else { Allocation::Uniform };
+        let is_adaptive = auto.is_some() && reuse::edge(job) == 1;
+        let allocation = if is_adaptive { Allocation::Adaptive } else { Allocation::Uniform };
         job.change(|s| s.sampling.allocation = allocation);
     }
     let settings = job.settings().integrator;

@@ -3,7 +3,7 @@
 use super::camera_samples::{self, CameraSampler};
 use super::control_variates;
 use super::parts::{Checkpoints, PartError, StoredTile};
-use super::tiles::{Tile, Tiles, bounds_of_tiles, film, has_replicas, position};
+use super::tiles::{Tile, Tiles, bounds_of_tiles, film, position, replica_edge};
 use super::worker::{AnyWorker, Workers};
 use super::{BATCH_PATHS, Continuation, Progress, RenderError, RenderSettings, Rendering, TileObserver};
 use crate::direct::Estimator;
@@ -12,14 +12,14 @@ use crate::film::packed::PackedSums;
 use crate::film::replicas::{ReplicaAccumulator, replicas};
 use crate::film::{Film, FilmTile, PixelBounds};
 use crate::integrators::path::CameraSample;
-use crate::integrators::{PathStats, Statistics, integrator};
+use crate::integrators::{PathStats, Statistics, integrator, reuse};
 use crate::scene::{FilmSettings, RenderJob};
 use lumiris_numbers::estimators::ocv::block_of;
 use lumiris_numbers::math::hash::pcg4d;
 use rayon::prelude::*;
 use std::collections::BTreeMap;
 use std::sync::Arc;
-use std::sync::atomic::{AtomicBool, AtomicU64, Ordering};
+use std::sync::atomic::{AtomicBool, AtomicU32, AtomicU64, Ordering};
 use std::time::{Duration, Instant};
 
 /// Time between two determinations of the noise for those who observe the progress: it takes as long as a few samples
@@ -39,7 +39,7 @@ pub(super) type TilePart = (PixelBounds, std::ops::Range<usize>);
 pub(super) fn batch_parts(run: &Run<'_>, rays: usize) -> (Vec<TilePart>, std::ops::Range<u32>) {
     let per_pixel = run.settings.spp.min(run.pass_length()).max(1);
     let pixels_per_batch = (BATCH_PATHS / per_pixel as usize).max(1);
-    let tiles = run.job.world.scene.film.bounds.tiles(run.settings.tile_size);
+    let tiles = run.job.world.scene.film.bounds.tiles(run.tile_size);
     let parts: Vec<_> = tiles
         .iter()
         .flat_map(|tile| {
@@ -75,12 +75,15 @@ pub(super) fn camera_batches(job: &RenderJob, tile_size: u32, rays: usize) -> Ve
 pub(super) struct Run<'a> {
     pub(super) job: &'a RenderJob,
     settings: &'a RenderSettings,
+    /// Edge of tiles: of whole cells where pixels share paths.
+    tile_size: u32,
     stop: &'a AtomicBool,
     observe: &'a (dyn Fn(&Progress) + Sync),
     pub(super) camera: CameraSampler<'a>,
     start: Instant,
     samples_done: AtomicU64,
     rays: AtomicU64,
+    passes: AtomicU32,
 }
 
 impl<'a> Run<'a> {
@@ -93,17 +96,19 @@ impl<'a> Run<'a> {
         Run {
             job,
             settings,
+            tile_size: if reuse::edge(job) > 1 { reuse::CELL } else { settings.tile_size },
             stop,
             observe,
             camera: CameraSampler::new(job, settings.first_sample),
             start: Instant::now(),
             samples_done: AtomicU64::new(0),
             rays: AtomicU64::new(0),
+            passes: AtomicU32::new(0),
         }
     }
 
     pub(super) fn run(self, threads: usize, continuation: Continuation<'_>) -> Result<Rendering, RenderError> {
-        let Continuation { stored, mut checkpoints, keeps_sums, watch } = continuation;
+        let Continuation { stored, mut checkpoints, keeps_sums, watch, passes } = continuation;
         let seed = self.job.settings().sampling.seed;
         let cameras = |pixel, sample| self.camera.sample_of_seed(pixel, sample, seed);
         let mut integrator = integrator(self.job, &cameras, self.stop)?;
@@ -122,6 +127,10 @@ impl<'a> Run<'a> {
                 let watched = (noise, watch);
                 stats.merge(&self.whole_pass(&workers, &mut tiles, samples.clone(), watched, &mut checkpoints));
                 first = samples.end;
+                self.passes.fetch_add(1, Ordering::Relaxed);
+                if let (Some(passes), false) = (passes, self.stop.load(Ordering::Relaxed)) {
+                    passes(&self.progress(self.samples_total(&tiles), noise));
+                }
                 let now = Instant::now();
                 if now >= observed && first < end {
                     noise = Some(self.film(&tiles).summary().relative_noise);
@@ -143,6 +152,23 @@ impl<'a> Run<'a> {
         Ok(Rendering { film, stats, cache, photons, elapsed: self.start.elapsed(), complete, threads, sums })
     }
 
+    /// Camera samples of all tiles, as if every pixel had the same number.
+    fn samples_total(&self, tiles: &[Tile]) -> u64 {
+        tiles.iter().map(|t| t.bounds.area() as u64).sum::<u64>() * u64::from(self.end() - self.begin())
+    }
+
+    /// What is done by now.
+    fn progress(&self, samples_total: u64, noise: Option<f64>) -> Progress {
+        Progress {
+            samples_done: self.samples_done.load(Ordering::Relaxed),
+            samples_total,
+            rays: self.rays.load(Ordering::Relaxed),
+            elapsed: self.start.elapsed(),
+            passes: self.passes.load(Ordering::Relaxed),
+            noise,
+        }
+    }
+
     /// The index of the sample after the last one.
     fn end(&self) -> u32 {
         self.settings.first_sample + self.settings.spp
@@ -150,13 +176,13 @@ impl<'a> Run<'a> {
 
     /// The tiles, with what is stored of them.
     fn tiles(&self, stored: Option<Vec<StoredTile>>) -> Result<Vec<Tile>, PartError> {
-        let wants_replicas = has_replicas(self.job, self.settings);
+        let replica_edge = replica_edge(self.job, self.settings);
         let bounds = self.job.world.scene.film.bounds;
         let tiles = match stored {
-            Some(stored) => stored.into_iter().map(|s| s.restore(|b| self.tile(b, wants_replicas))).collect(),
+            Some(stored) => stored.into_iter().map(|s| s.restore(|b| self.tile(b, replica_edge))).collect(),
             None => {
-                let bounds = bounds_of_tiles(&bounds, self.settings.tile_size, self.settings.share);
-                Ok(bounds.into_iter().map(|b| self.tile(b, wants_replicas)).collect::<Vec<_>>())
+                let bounds = bounds_of_tiles(&bounds, self.tile_size, self.settings.share);
+                Ok(bounds.into_iter().map(|b| self.tile(b, replica_edge)).collect::<Vec<_>>())
             }
         }?;
         let done = |t: &Tile| t.bounds.area() as u64 * u64::from(t.done - self.begin());
@@ -198,9 +224,9 @@ impl<'a> Run<'a> {
     }
 
     /// A tile without samples.
-    fn tile(&self, bounds: PixelBounds, wants_replicas: bool) -> Tile {
+    fn tile(&self, bounds: PixelBounds, replica_edge: Option<u32>) -> Tile {
         let all = &self.job.world.scene.film.bounds;
-        let replicas = if wants_replicas { replicas(all, &bounds) } else { Vec::new() };
+        let replicas = replica_edge.map_or(Vec::new(), |edge| replicas(all, &bounds, edge));
         let integrator = &self.job.settings().integrator;
         let fits = Estimator::at_vertex(integrator, 0).fits(self.job, bounds.area() + replicas.len());
         Tile { bounds, done: self.begin(), sums: Arc::new(PackedSums::new(bounds.area())), replicas, fits }
@@ -231,7 +257,7 @@ impl<'a> Run<'a> {
 
     /// Samples per pixel of the longest pass.
     fn pass_length(&self) -> u32 {
-        (BATCH_PATHS as u32 / self.settings.tile_size.max(1).pow(2)).clamp(1, 64)
+        (BATCH_PATHS as u32 / self.tile_size.max(1).pow(2)).clamp(1, 64)
     }
 
     /// Samples per pixel that fit into the time that is left, at the speed so far; at least one.
@@ -255,7 +281,7 @@ impl<'a> Run<'a> {
         samples: std::ops::Range<u32>,
         (noise, watch, pause): (Option<f64>, Option<&TileObserver<'_>>, Option<Instant>),
     ) -> PathStats {
-        let total = tiles.iter().map(|t| t.bounds.area() as u64).sum::<u64>() * u64::from(self.end() - self.begin());
+        let total = self.samples_total(tiles);
         tiles
             .par_iter_mut()
             .with_max_len(1)
@@ -272,13 +298,9 @@ impl<'a> Run<'a> {
                 }
                 let rays = stats.camera_rays + stats.bounce_rays + stats.direct.emitter_rays + stats.direct.segments;
                 let done = tile.bounds.area() as u64 * u64::from(samples.end - samples.start);
-                (self.observe)(&Progress {
-                    samples_done: self.samples_done.fetch_add(done, Ordering::Relaxed) + done,
-                    samples_total: total,
-                    rays: self.rays.fetch_add(rays, Ordering::Relaxed) + rays,
-                    elapsed: self.start.elapsed(),
-                    noise,
-                });
+                self.samples_done.fetch_add(done, Ordering::Relaxed);
+                self.rays.fetch_add(rays, Ordering::Relaxed);
+                (self.observe)(&self.progress(total, noise));
                 stats
             })
             .reduce(PathStats::default, |mut a, b| {

@@ -6,6 +6,7 @@ use crate::film::accumulator::PixelAccumulator;
 use crate::film::packed::PackedSums;
 use crate::film::replicas::ReplicaAccumulator;
 use crate::film::{Film, FilmTile, PixelBounds};
+use crate::integrators::reuse;
 use crate::scene::RenderJob;
 use crate::settings::IntegratorKind;
 use std::sync::Arc;
@@ -74,15 +75,16 @@ pub(super) fn bounds_of_tiles(image: &PixelBounds, size: u32, share: Option<Tile
     }
 }
 
-/// True if some pixels are estimated twice: that is requested, and tells anything. Samples that share photon maps vary
-/// together.
-pub(super) fn has_replicas(job: &RenderJob, render: &RenderSettings) -> bool {
+/// The edge of the blocks of pixels that are estimated twice; `None` if none are: that is not requested, or does not tell
+/// anything. Samples that share photon maps vary together. Where pixels share paths, blocks are half a cell.
+pub(super) fn replica_edge(job: &RenderJob, render: &RenderSettings) -> Option<u32> {
     let settings = job.settings();
     let shares_noise =
         settings.integrator.kind == IntegratorKind::PhotonMap && settings.integrator.photons.progressive.is_some();
     let is_over_pixels = Estimator::at_vertex(&settings.integrator, 0).is_over_pixels();
     let is_useful = !settings.sampling.sampler.has_independent_samples() || is_over_pixels;
-    render.with_replicas && is_useful && !shares_noise
+    let edge = if reuse::edge(job) > 1 { reuse::CELL / 2 } else { 1 };
+    (render.with_replicas && is_useful && !shares_noise).then_some(edge)
 }
 
 /// The film of tiles, which shares their sums.

@@ -213,6 +213,7 @@ impl PhotonMapTracer<'_> {
                     stream,
                     direct: stream,
                     sample_counts,
+                    index: 0,
                     fit: 0,
                     pixel: [0; 2],
                 });

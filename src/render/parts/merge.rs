@@ -182,7 +182,7 @@ impl Whole {
     fn empty(header: &FilmHeader) -> Self {
         let image = header.bounds;
         let tile = |bounds: PixelBounds| {
-            let replicas = if header.has_replicas { replicas(&image, &bounds) } else { Vec::new() };
+            let replicas = header.replica_edge.map_or(Vec::new(), |edge| replicas(&image, &bounds, edge));
             let fits = match header.controls as usize {
                 0 => Fits::default(),
                 controls => Fits::of_pixels(controls, bounds.area() + replicas.len()),

@@ -257,9 +257,7 @@ impl Made<'_> {
         if let Some(list) = self.asked {
             return list.to_vec();
         }
-        let ratio = self.job.sample_count_map.as_ref().map(|_| Aov::Ratio);
-        let records = self.rendering.cache.map(|_| Aov::Records);
-        Aov::ALL.into_iter().chain(ratio).chain(records).collect()
+        output::default_aovs(self.job.sample_count_map.is_some(), self.rendering.cache.is_some())
     }
 
     /// What the image depends on, and how it came about.
@@ -272,13 +270,10 @@ impl Made<'_> {
         if !self.plan.settings.is_empty() {
             add("lumiris:plan", self.plan.text()?);
         }
-        add("lumiris:complete", rendering.complete.to_string());
         if self.is_interrupted {
             add(INTERRUPTED_KEY, "true".to_owned());
         }
-        let [least, most] = rendering.film.summary().samples;
-        add("lumiris:samples_done", format!("{least} to {most} per pixel"));
-        add("lumiris:seconds", format!("{:.3}", rendering.elapsed.as_secs_f64()));
+        metadata.extend(output::progress_metadata(rendering));
         Ok(metadata)
     }
 }

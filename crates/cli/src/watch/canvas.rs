@@ -1,20 +1,12 @@
 //! The pixels of an image as they are by now.
 
 use lumiris::film::{Film, PixelBounds};
+use lumiris::imaging::{Layer, layers};
 use lumiris::render::Progress;
 use lumiris::render::output::{Aov, Layers, channels};
 use std::collections::BTreeMap;
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::sync::{Mutex, MutexGuard, PoisonError};
-
-/// Adjacent channels that are shown together.
-#[derive(Clone, Debug, PartialEq, Eq)]
-pub(crate) struct Layer {
-    /// What precedes the point in their names; `beauty` for the image.
-    pub name: String,
-    /// Their indices.
-    pub channels: std::ops::Range<usize>,
-}
 
 /// The pixels of a tile.
 #[derive(Clone, Debug)]
@@ -124,21 +116,6 @@ impl Canvas {
         let state = self.state();
         (state.version, state.tiles.values().filter(|tile| tile.version > version).cloned().collect())
     }
-}
-
-fn layers(channels: &[String]) -> Vec<Layer> {
-    let mut layers: Vec<Layer> = Vec::new();
-    for (index, channel) in channels.iter().enumerate() {
-        let name = match channel.as_str() {
-            "R" | "G" | "B" => "beauty",
-            other => other.split('.').next().unwrap_or(other),
-        };
-        match layers.last_mut() {
-            Some(layer) if layer.name == name => layer.channels.end = index + 1,
-            _ => layers.push(Layer { name: name.to_owned(), channels: index..index + 1 }),
-        }
-    }
-    layers
 }
 
 #[cfg(test)]
