@@ -1,35 +1,41 @@
 //! What a callback sees of a rendering under way.
 
 use crate::images::array;
-use lumiris::film::{Film, PixelBounds};
+use lumiris::film::{Film, FilmTile, PixelBounds};
 use lumiris::imaging::Image;
 use lumiris::render::Progress;
 use lumiris::render::output::{Aov, layers};
 use numpy::PyArray3;
 use pyo3::prelude::*;
 use pyo3::types::PyDict;
+use std::collections::BTreeMap;
 use std::sync::{Arc, Mutex, PoisonError};
 
 /// The pixels of an image as they are by now.
 pub(crate) struct Canvas {
-    film: Mutex<Film>,
+    resolution: [u32; 2],
+    bounds: PixelBounds,
+    /// By left and top.
+    tiles: Mutex<BTreeMap<[u32; 2], FilmTile>>,
     aovs: Vec<Aov>,
 }
 
 impl Canvas {
     pub(crate) fn new(resolution: [u32; 2], bounds: PixelBounds, has_features: bool) -> Self {
         let features = [Aov::Albedo, Aov::Normal, Aov::Depth].into_iter().filter(|_| has_features);
-        Canvas { film: Mutex::new(Film::new(resolution, bounds)), aovs: features.chain([Aov::Samples]).collect() }
+        Canvas { resolution, bounds, tiles: Mutex::default(), aovs: features.chain([Aov::Samples]).collect() }
     }
 
-    /// Takes the film of a tile.
-    pub(crate) fn set_tile(&self, tile: &Film) {
-        let mut film = self.film.lock().unwrap_or_else(PoisonError::into_inner);
-        let width = tile.bounds.width() as usize;
-        for (row, y) in (tile.bounds.y0..tile.bounds.y1).enumerate() {
-            let start = film.index(tile.bounds.x0, y);
-            film.pixels[start..start + width].copy_from_slice(&tile.pixels[row * width..][..width]);
-        }
+    /// Takes the film of a tile, whose sums it shares.
+    pub(crate) fn set_tile(&self, film: &Film) {
+        let mut tiles = self.tiles.lock().unwrap_or_else(PoisonError::into_inner);
+        tiles.extend(film.tiles().iter().map(|tile| ([tile.bounds.x0, tile.bounds.y0], tile.clone())));
+    }
+
+    /// The film of all tiles that there are.
+    fn film(&self) -> Film {
+        let tiles = self.tiles.lock().unwrap_or_else(PoisonError::into_inner).values().cloned().collect();
+        Film::new(self.resolution, self.bounds, tiles, Vec::new())
     }
 }
 
@@ -111,6 +117,6 @@ impl PassProgress {
 
 impl PassProgress {
     fn images(&self, py: Python<'_>, aovs: &[Aov]) -> Vec<(&'static str, Image)> {
-        py.detach(|| layers(&self.canvas.film.lock().unwrap_or_else(PoisonError::into_inner), aovs, None))
+        py.detach(|| layers(&self.canvas.film(), aovs, None))
     }
 }

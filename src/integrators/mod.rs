@@ -24,7 +24,7 @@ pub use photon_map::{MapStats, PhotonMapIntegrator};
 pub use pilot::GuidedIntegrator;
 
 use crate::direct::Fits;
-use crate::film::{Film, PixelSample};
+use crate::film::PixelSample;
 use crate::photons::PhotonError;
 use crate::scene::RenderJob;
 use crate::settings::{IntegratorKind, RouletteKind};
@@ -46,8 +46,8 @@ pub trait Integrator: Sync {
         false
     }
 
-    /// Statistics of the image, with those of all tracers. What is counted by pixel is added to the film.
-    fn statistics(&self, paths: PathStats, film: &mut Film) -> Statistics;
+    /// Statistics of the image, with those of all tracers.
+    fn statistics(&self, paths: PathStats) -> Statistics;
 }
 
 /// What one thread traces samples with: buffers and counts.
@@ -80,7 +80,7 @@ pub fn integrator<'a>(
 }
 
 /// Statistics of an image.
-#[derive(Clone, Copy, Debug, Default)]
+#[derive(Clone, Debug, Default)]
 pub struct Statistics {
     /// Counts and times, summed over threads.
     pub paths: PathStats,
@@ -88,4 +88,6 @@ pub struct Statistics {
     pub cache: Option<CacheReport>,
     /// The photon maps, if there are any.
     pub photons: Option<MapStats>,
+    /// Pixels that asked for the records of the cache, by their coordinates: one entry for each record.
+    pub records: Vec<[u32; 2]>,
 }

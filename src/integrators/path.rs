@@ -20,7 +20,7 @@ use super::wavefront::{Batch, Buffers, Estimate, Output};
 use super::{Integrator, Statistics, Tracer};
 use crate::bsdfs::{Bsdf, Diffuse};
 use crate::direct::{DirectStage, Estimator, Fits, ShadingPoint};
-use crate::film::{Film, PixelSample};
+use crate::film::PixelSample;
 use crate::materials::SurfaceBsdf;
 use crate::scene::RenderJob;
 use crate::settings::IntegratorSettings;
@@ -46,7 +46,7 @@ impl Integrator for PathIntegrator {
         Box::new(PathTracer { groups: self.groups, ..PathTracer::new(with_features) })
     }
 
-    fn statistics(&self, paths: PathStats, _: &mut Film) -> Statistics {
+    fn statistics(&self, paths: PathStats) -> Statistics {
         Statistics { paths, ..Statistics::default() }
     }
 }

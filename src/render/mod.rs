@@ -16,6 +16,7 @@ mod control_variates;
 pub mod crosscheck;
 pub mod cryptomatte;
 pub mod efficiency;
+pub mod memory;
 pub mod noise;
 pub mod output;
 pub mod parts;

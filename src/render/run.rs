@@ -3,25 +3,30 @@
 use super::camera_samples::{self, CameraSampler};
 use super::control_variates;
 use super::parts::{Checkpoints, PartError, StoredTile};
-use super::tiles::{Tile, Tiles, bounds_of_tiles, film, film_of_last, position, replica_edge};
+use super::tiles::{Tile, Tiles, bounds_of_tiles, film, position, replica_edge};
 use super::worker::{AnyWorker, Workers};
 use super::{BATCH_PATHS, Continuation, Progress, RenderError, RenderSettings, Rendering, TileObserver};
 use crate::direct::Estimator;
 use crate::film::accumulator::PixelAccumulator;
+use crate::film::packed::PackedSums;
 use crate::film::replicas::{ReplicaAccumulator, replicas};
-use crate::film::{Film, PixelBounds};
+use crate::film::{Film, FilmTile, PixelBounds};
 use crate::integrators::path::CameraSample;
 use crate::integrators::{PathStats, Statistics, integrator, reuse};
 use crate::scene::{FilmSettings, RenderJob};
 use lumiris_numbers::estimators::ocv::block_of;
 use lumiris_numbers::math::hash::pcg4d;
 use rayon::prelude::*;
+use std::collections::BTreeMap;
+use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, AtomicU32, AtomicU64, Ordering};
 use std::time::{Duration, Instant};
 
 /// Time between two determinations of the noise for those who observe the progress: it takes as long as a few samples
 /// per pixel.
 const NOISE_INTERVAL: Duration = Duration::from_secs(1);
+/// The same by the time that one of them takes.
+const NOISE_REST: u32 = 50;
 
 /// Combined with the seed of the image to give that of replicas.
 const REPLICA_SEED: u32 = 0x72_65_70_73;
@@ -111,7 +116,7 @@ impl<'a> Run<'a> {
 
         let end = self.end();
         let begin = tiles.iter().map(|t| t.done).min().unwrap_or(end);
-        let (mut first, mut noise, mut observed) = (begin, None, self.start);
+        let (mut first, mut noise, mut observed) = (begin, None, self.start + NOISE_INTERVAL);
         let mut stats = PathStats::default();
         while first < end && !self.stopped() {
             let served = end.min(first.saturating_add(integrator.prepare(first)?));
@@ -126,22 +131,20 @@ impl<'a> Run<'a> {
                 if let (Some(passes), false) = (passes, self.stop.load(Ordering::Relaxed)) {
                     passes(&self.progress(self.samples_total(&tiles), noise));
                 }
-                if observed.elapsed() >= NOISE_INTERVAL {
-                    noise = Some(self.film(&tiles).relative_noise());
-                    observed = Instant::now();
+                let now = Instant::now();
+                if now >= observed && first < end {
+                    noise = Some(self.film(&tiles).summary().relative_noise);
+                    observed = Instant::now() + NOISE_INTERVAL.max(now.elapsed() * NOISE_REST);
                 }
             }
         }
 
         let complete = tiles.iter().all(|t| t.done >= end);
         let keeps_sums = keeps_sums || checkpoints.is_some();
-        let FilmSettings { resolution, bounds, .. } = self.job.world.scene.film;
-        let mut film = if keeps_sums { self.film(&tiles) } else { film_of_last(resolution, bounds, &mut tiles) };
+        let Statistics { paths: stats, cache, photons, records } = integrator.statistics(stats);
+        add_records(&records, &mut tiles);
+        let mut film = self.film(&tiles);
         control_variates::correct(&mut film, &tiles, position);
-        let Statistics { paths: stats, cache, photons } = integrator.statistics(stats, &mut film);
-        if keeps_sums {
-            keep_records(&film, &mut tiles);
-        }
         if let Some(checkpoints) = checkpoints {
             checkpoints.finish(&tiles);
         }
@@ -226,7 +229,7 @@ impl<'a> Run<'a> {
         let replicas = replica_edge.map_or(Vec::new(), |edge| replicas(all, &bounds, edge));
         let integrator = &self.job.settings().integrator;
         let fits = Estimator::at_vertex(integrator, 0).fits(self.job, bounds.area() + replicas.len());
-        Tile { bounds, done: self.begin(), sums: vec![PixelAccumulator::default(); bounds.area()], replicas, fits }
+        Tile { bounds, done: self.begin(), sums: Arc::new(PackedSums::new(bounds.area())), replicas, fits }
     }
 
     /// The film of all tiles.
@@ -237,9 +240,8 @@ impl<'a> Run<'a> {
 
     /// The film of one tile.
     fn film_of(&self, tile: &Tile) -> Film {
-        let mut film = Film::new(self.job.world.scene.film.resolution, tile.bounds);
-        film.set_tile(&tile.bounds, &tile.sums, &[]);
-        film
+        let pixels = FilmTile { bounds: tile.bounds, sums: Arc::clone(&tile.sums) };
+        Film::new(self.job.world.scene.film.resolution, tile.bounds, vec![pixels], Vec::new())
     }
 
     /// Samples per pixel of the next pass over all tiles: 1, 1, 2, 4, …, so that there is a whole image soon. It lies
@@ -320,8 +322,10 @@ impl<'a> Run<'a> {
             ill_conditioned = tile.fits.solve();
         }
         let solve = start.elapsed();
+        worker.sums.resize(bounds.area(), PixelAccumulator::default());
+        tile.sums.read(0..bounds.area(), &mut worker.sums);
         let mut first = 0;
-        while first < tile.sums.len() {
+        while first < bounds.area() {
             let pixels = self.batch_of_pixels(&bounds, first, &samples);
             first = pixels.end;
             self.camera_samples(&bounds, pixels.clone(), &samples, &mut worker.scratch, &mut worker.samples);
@@ -329,9 +333,10 @@ impl<'a> Run<'a> {
             let mut results = worker.results.iter();
             for index in pixels {
                 let samples = self.samples_of(position(&bounds, index as u32), &samples);
-                samples.zip(results.by_ref()).for_each(|(i, r)| tile.sums[index].add(i, r));
+                samples.zip(results.by_ref()).for_each(|(i, r)| worker.sums[index].add(i, r));
             }
         }
+        tile.set_sums(&worker.sums, &mut worker.packing);
         self.render_replicas(worker, tile, samples);
         let mut stats = worker.tracer.take_stats();
         if begins_block {
@@ -405,12 +410,21 @@ impl<'a> Run<'a> {
     }
 }
 
-/// Stores the records of each pixel, which the film has got in the end, with its sums.
-fn keep_records(film: &Film, tiles: &mut [Tile]) {
-    for tile in tiles {
-        for (i, sums) in (0..).zip(&mut tile.sums) {
-            let [x, y] = position(&tile.bounds, i);
-            sums.records = film.pixels[film.index(x, y)].records;
+/// Adds the records of a cache, given by their pixels, to the sums of these.
+fn add_records(records: &[[u32; 2]], tiles: &mut [Tile]) {
+    let mut of_rows = BTreeMap::<u32, Vec<u32>>::new();
+    records.iter().for_each(|&[x, y]| of_rows.entry(y).or_default().push(x));
+    let add = |tile: &mut Tile| {
+        let PixelBounds { x0, x1, y0, y1 } = tile.bounds;
+        let inside = of_rows.range(y0..y1).flat_map(|(y, row)| row.iter().map(move |x| [*x, *y]));
+        let mut inside = inside.filter(|[x, _]| (x0..x1).contains(x)).peekable();
+        if inside.peek().is_some() {
+            let mut sums = tile.sums.unpacked();
+            inside.for_each(|[x, y]| sums[((y - y0) * (x1 - x0) + x - x0) as usize].records += 1);
+            tile.set_sums(&sums, &mut Vec::new());
         }
+    };
+    if !records.is_empty() {
+        tiles.par_iter_mut().for_each(add);
     }
 }

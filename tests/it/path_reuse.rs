@@ -33,7 +33,7 @@ fn region_means(job: &mut RenderJob, seeds: std::ops::Range<u32>, [columns, rows
         let film = film(job, RenderSettings { spp: 8, ..RenderSettings::default() });
         let (width, height) = (film.bounds.width() as usize, film.bounds.height() as usize);
         let mut sums = vec![[0.0; 4]; columns * rows];
-        for (i, pixel) in film.pixels.iter().enumerate() {
+        for (i, pixel) in film.pixels().iter().enumerate() {
             let sum = &mut sums[i / width * rows / height * columns + i % width * columns / width];
             let [r, g, b] = pixel.mean();
             *sum = [sum[0] + r, sum[1] + g, sum[2] + b, sum[3] + 1.0];
@@ -119,7 +119,7 @@ fn shared_paths_leave_a_part_of_the_variance() {
         };
         let (a, b) = (image(1), image(2));
         let relative = |(a, b): (f64, f64)| (a - b).powi(2) / (0.25 * (a + b).powi(2) + 0.01);
-        a.pixels.iter().zip(&b.pixels).map(|(a, b)| relative((a.mean()[0], b.mean()[0]))).sum::<f64>()
+        a.pixels().iter().zip(&b.pixels()).map(|(a, b)| relative((a.mean()[0], b.mean()[0]))).sum::<f64>()
     };
     let [alone, two, four] = [1, 2, 4].map(noise);
     assert!(two < 0.65 * alone && four < 0.4 * alone, "{alone} {two} {four}");
@@ -133,7 +133,7 @@ fn threads_tiles_packets_and_passes_do_not_change_a_bit() {
         (loaded.settings.integrator.estimator, loaded.settings.integrator.path_reuse) = (EstimatorKind::Mis, Some(3));
         let job = loaded.job(AccelKind::Embree, packet_width).unwrap();
         let film = film(&job, RenderSettings { spp: 5, ..settings });
-        film.pixels.iter().flat_map(|p| p.mean().map(f64::to_bits)).collect::<Vec<_>>()
+        film.pixels().iter().flat_map(|p| p.mean().map(f64::to_bits)).collect::<Vec<_>>()
     };
     let settings = RenderSettings { threads: Some(1), ..RenderSettings::default() };
     let reference = image(None, settings);
@@ -155,5 +155,5 @@ fn images_whose_pixels_cannot_share_paths_are_those_without() {
     let direct = film(&job, RenderSettings { spp: 2, ..RenderSettings::default() });
     job.change(|s| s.integrator.path_reuse = Some(1));
     let alone = film(&job, RenderSettings { spp: 2, ..RenderSettings::default() });
-    assert!(direct.pixels.iter().zip(&alone.pixels).all(|(a, b)| a.mean() == b.mean()));
+    assert!(direct.pixels().iter().zip(&alone.pixels()).all(|(a, b)| a.mean() == b.mean()));
 }
