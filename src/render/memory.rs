@@ -1,8 +1,8 @@
 //! Memory that an image takes, predicted before it is rendered.
 //!
 //! A packed pixel takes the bits in which it differs from its neighbours, which only its samples tell. The figures here
-//! are those of one scene at 1 sample, rounded up (docs/measurements/memory.md). How they grow with samples is an estimate: a
-//! sum needs one more binary digit for twice as many.
+//! are those of one scene at 1 sample, rounded up (docs/measurements/memory.md). How they grow with samples is
+//! an estimate: a sum needs one more binary digit for twice as many.
 
 use super::cryptomatte::Cryptomatte;
 use super::tiles::replica_edge;
