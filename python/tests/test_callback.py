@@ -101,7 +101,9 @@ def test_renderings_run_side_by_side() -> None:
 @pytest.mark.parametrize("callback", ["None", "lambda progress: None"])
 def test_control_c_ends_the_rendering(scene_file: pathlib.Path, callback: str) -> None:
     script = f"""
-import lumiris, threading
+import lumiris, signal, threading
+# As at a terminal: shells let programs in the background ignore the signal
+signal.signal(signal.SIGINT, signal.default_int_handler)
 # Says that the rendering is on its way
 threading.Timer(0.5, lambda: print("started", flush=True)).start()
 try:
