@@ -106,6 +106,10 @@ pub(super) fn render_one(args: &RenderArgs, session: &Session) -> anyhow::Result
     parts::check_settings(args, job.settings())?;
     check_memory(args, &job, asked.as_deref())?;
     let asks_for_ratio = asked.as_ref().is_some_and(|list| list.contains(&Aov::Ratio));
+    if args.denoise.denoise && job.settings().integrator.path_reuse.is_none() {
+        // A denoiser takes noise that is correlated between pixels for detail
+        job.change(|s| s.integrator.path_reuse = Some(1));
+    }
     let plan = plan(&args.scene, &mut job, asks_for_ratio, args.quiet)?;
     let outputs = outputs(args, &job);
     if args.output.is_empty() {
