@@ -1,7 +1,7 @@
 //! Paths that pixels share: known answers, the light of every region, and bits.
 
 use crate::analytic_scenes::answer;
-use lumiris::film::Film;
+use lumiris::film::{Film, PixelSums};
 use lumiris::import::{LoadOptions, load};
 use lumiris::integrators::reuse;
 use lumiris::render::{RenderSettings, render};
@@ -26,19 +26,12 @@ fn film(job: &RenderJob, settings: RenderSettings) -> Film {
     render(job, &settings, &AtomicBool::new(false), &|_| ()).unwrap().film
 }
 
-/// Means of `columns` × `rows` regions of images of different seeds, which are independent: by image, region and channel.
-fn region_means(job: &mut RenderJob, seeds: std::ops::Range<u32>, [columns, rows]: [usize; 2]) -> Vec<Vec<[f64; 3]>> {
+/// Images of different seeds, which are independent: channels of the means of all pixels.
+fn pixel_means(job: &mut RenderJob, seeds: std::ops::Range<u32>, spp: u32) -> Vec<Vec<f64>> {
     let image = |seed| {
         job.change(|s| s.sampling.seed = seed);
-        let film = film(job, RenderSettings { spp: 8, ..RenderSettings::default() });
-        let (width, height) = (film.bounds.width() as usize, film.bounds.height() as usize);
-        let mut sums = vec![[0.0; 4]; columns * rows];
-        for (i, pixel) in film.pixels().iter().enumerate() {
-            let sum = &mut sums[i / width * rows / height * columns + i % width * columns / width];
-            let [r, g, b] = pixel.mean();
-            *sum = [sum[0] + r, sum[1] + g, sum[2] + b, sum[3] + 1.0];
-        }
-        sums.iter().map(|s| [0, 1, 2].map(|c| s[c] / s[3])).collect()
+        let film = film(job, RenderSettings { spp, ..RenderSettings::default() });
+        film.pixels().iter().flat_map(PixelSums::mean).collect()
     };
     seeds.map(image).collect()
 }
@@ -50,8 +43,10 @@ fn mean_of(values: impl Iterator<Item = f64> + Clone) -> (f64, f64) {
     (mean, values.map(|v| (v - mean).powi(2)).sum::<f64>() / (n - 1.0) / n)
 }
 
-/// 2 scenes × 3 edges × 3 estimators × 3 channels: with 31 degrees of freedom a t of 5.2 has a level of 10⁻⁵, so all
-/// together 10⁻³. A bias of 8 standard errors, which is at most 2 %, is found with a probability above 0.99.
+/// No light is lost, and none is counted twice, in columns and in stages: where all surfaces reflect the same, a block keeps
+/// its sum whatever the weights. 2 scenes × 3 edges × 3 estimators × 3 channels: with 31 degrees of freedom a t of 5.2 has a
+/// level of 10⁻⁵, so all together 10⁻³. A bias of 8 standard errors, which is at most 2 %, is found with a probability above
+/// 0.99.
 #[test]
 fn known_answers_remain_where_pixels_share_paths() {
     for name in ["furnace-closed-4", "furnace-box-3"] {
@@ -61,9 +56,10 @@ fn known_answers_remain_where_pixels_share_paths() {
             let mut job = job(&path, [20, 18], edge);
             for estimator in [EstimatorKind::Mis, EstimatorKind::Ris, EstimatorKind::Mc] {
                 job.change(|s| s.integrator.estimator = estimator);
-                let images = region_means(&mut job, 0..32, [1, 1]);
+                let images = pixel_means(&mut job, 0..32, 8);
                 for c in 0..3 {
-                    let (mean, variance) = mean_of(images.iter().map(|image| image[0][c]));
+                    let channel = |image: &Vec<f64>| image.iter().skip(c).step_by(3).sum::<f64>() / (20.0 * 18.0);
+                    let (mean, variance) = mean_of(images.iter().map(channel));
                     // Rounding, where there is no noise
                     let error = variance.sqrt() + 1e-6 * answer[c];
                     let what = format!("{name}, blocks of {edge}, {estimator:?}: {mean} ± {error}, not {}", answer[c]);
@@ -75,54 +71,60 @@ fn known_answers_remain_where_pixels_share_paths() {
     }
 }
 
-/// Regions of images with textures, curved surfaces with normals of their own, glass, metal, corners and occluders: those
-/// with shared paths have the mean of those without. 4 × 3 regions × 3 channels in two scenes, at a level of 10⁻⁵ each. A
-/// bias of 8 standard errors, which is at most 10 % and 4 % in half of the regions, would be found.
+/// Weights are right: images of few pixels, where a block has first vertices far apart, that face each other, reflect
+/// differently, and hide from each other. A wrong weight moves light from pixel to pixel there, though the sum of a block may
+/// stay. Each channel of each of 192 pixels has the mean that it has without sharing, at a level of 10⁻⁶ each (|z| of 4.9).
+/// The box has the power: half of its values would notice 8 %, and without one of the cosines, the distance, the occlusion
+/// of a pair or of the others, or with the reflectance of another pixel, 31 to 250 values differ. The gallery has textures, normals of their own,
+/// glass and metal, and notices 30 %.
 #[test]
-fn every_region_has_the_light_that_it_has_without_sharing() {
-    for (name, seeds, limit) in [("demo/gallery", 40, 0.1), ("fan/box", 80, 0.04)] {
-        let path = scene(name);
+fn every_pixel_has_the_light_that_it_has_without_sharing() {
+    for (name, seeds, detects) in [("fan/box", 48, 0.08), ("demo/gallery", 32, 0.3)] {
         let [alone, shared] = [(1, 0..seeds), (4, 1000..1000 + seeds)].map(|(edge, seeds)| {
-            let mut job = job(&path, [64, 48], edge);
+            let mut job = job(&scene(name), [16, 12], edge);
             job.change(|s| (s.integrator.kind, s.integrator.max_depth) = (IntegratorKind::Path, 5));
             job.change(|s| s.integrator.samples = Some(6));
             assert_eq!(reuse::edge(&job), edge);
-            region_means(&mut job, seeds, [4, 3])
+            pixel_means(&mut job, seeds, 128)
         });
         let mut limits = Vec::new();
-        for region in 0..12 {
-            for c in 0..3 {
-                let of = |images: &[Vec<[f64; 3]>]| mean_of(images.iter().map(|image| image[region][c]));
-                let ((a, v_a), (b, v_b)) = (of(&alone), of(&shared));
-                let error = (v_a + v_b).sqrt();
-                let what = format!("{name}, region {region}, channel {c}: {b} with and {a} without, ± {error}");
-                assert!((a - b).abs() < 4.9 * error, "{what}");
-                limits.push(8.0 * error / a);
+        let mut wrong = Vec::new();
+        for k in 0..alone[0].len() {
+            let of = |images: &[Vec<f64>]| mean_of(images.iter().map(|image| image[k]));
+            let ((a, v_a), (b, v_b)) = (of(&alone), of(&shared));
+            let error = (v_a + v_b).sqrt();
+            if (a - b).abs() > 4.9 * error {
+                wrong.push(format!("pixel {}, channel {}: {b} with and {a} without, ± {error}", k / 3, k % 3));
             }
+            limits.push(8.0 * error / a);
         }
+        assert!(wrong.is_empty(), "{name}: {} values, such as {}", wrong.len(), wrong[0]);
         limits.sort_by(f64::total_cmp);
-        assert!(limits[limits.len() / 2] < limit, "too much noise in {name}: {limits:?}");
+        let median = limits[limits.len() / 2];
+        assert!(median < detects, "{name} notices {median}");
     }
 }
 
-/// Errors relative to brightness, which pixels at the edge of the light do not dominate; of 1024 pixels, of which some tens
-/// are independent where blocks are large.
+/// Blocks of 2 × 2 and 4 × 4 pixels leave less than 1/1.5 and 1/2.5 of the variance: the error is relative to brightness, which
+/// pixels at the edge of the light do not dominate, and the gains of independent pairs of images tell their standard error.
 #[test]
 fn shared_paths_leave_a_part_of_the_variance() {
-    let noise = |edge| {
+    let pairs = |edge| {
         let mut job = job(&scene("fan/box"), [32, 32], edge);
         job.change(|s| (s.integrator.kind, s.integrator.max_depth) = (IntegratorKind::Path, 5));
         job.change(|s| s.integrator.samples = Some(12));
-        let mut image = |seed| {
-            job.change(|s| s.sampling.seed = seed);
-            film(&job, RenderSettings { spp: 4, ..RenderSettings::default() })
-        };
-        let (a, b) = (image(1), image(2));
-        let relative = |(a, b): (f64, f64)| (a - b).powi(2) / (0.25 * (a + b).powi(2) + 0.01);
-        a.pixels().iter().zip(&b.pixels()).map(|(a, b)| relative((a.mean()[0], b.mean()[0]))).sum::<f64>()
+        let images = pixel_means(&mut job, 0..16, 4);
+        let relative = |(a, b): (&f64, &f64)| (a - b).powi(2) / (0.25 * (a + b).powi(2) + 0.01);
+        let error = |pair: &[Vec<f64>]| pair[0].iter().zip(&pair[1]).map(relative).sum::<f64>();
+        images.chunks(2).map(error).collect::<Vec<_>>()
     };
-    let [alone, two, four] = [1, 2, 4].map(noise);
-    assert!(two < 0.65 * alone && four < 0.4 * alone, "{alone} {two} {four}");
+    let alone = pairs(1);
+    for (edge, least) in [(2, 1.5_f64), (4, 2.5)] {
+        let gains: Vec<f64> = alone.iter().zip(pairs(edge)).map(|(alone, shared)| (alone / shared).ln()).collect();
+        let (gain, variance) = mean_of(gains.iter().copied());
+        let what = format!("blocks of {edge}: variance by {} ± {:.0} %", gain.exp(), 100.0 * variance.sqrt());
+        assert!(gain - 4.0 * variance.sqrt() > least.ln(), "{what}");
+    }
 }
 
 #[test]
