@@ -4,7 +4,7 @@ use crate::images::array;
 use lumiris::film::{Film, FilmTile, PixelBounds};
 use lumiris::imaging::Image;
 use lumiris::render::Progress;
-use lumiris::render::output::{Aov, layers};
+use lumiris::render::output::{Aov, layers, live_aovs};
 use numpy::PyArray3;
 use pyo3::prelude::*;
 use pyo3::types::PyDict;
@@ -22,8 +22,7 @@ pub(crate) struct Canvas {
 
 impl Canvas {
     pub(crate) fn new(resolution: [u32; 2], bounds: PixelBounds, has_features: bool) -> Self {
-        let features = [Aov::Albedo, Aov::Normal, Aov::Depth].into_iter().filter(|_| has_features);
-        Canvas { resolution, bounds, tiles: Mutex::default(), aovs: features.chain([Aov::Samples]).collect() }
+        Canvas { resolution, bounds, tiles: Mutex::default(), aovs: live_aovs(has_features) }
     }
 
     /// Takes the film of a tile, whose sums it shares.

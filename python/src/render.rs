@@ -193,6 +193,7 @@ impl Request {
         let asks_for_ratio = self.aov.as_ref().is_some_and(|list| list.contains(&Aov::Ratio));
         let plan = prepare(&mut job, self.render.threads, asks_for_ratio).map_err(|error| other(&error))?;
         goes_on()?;
+        warnings.extend(plan.warnings);
 
         let spp = job.pixel_samples.as_ref().map_or(job.settings().sampling.spp, |of_pixels| of_pixels.spp);
         let settings = RenderSettings { spp, ..self.render };

@@ -160,6 +160,8 @@ def test_warnings_of_scenes_are_warnings() -> None:
         lumiris.render(SCENE + "WorldEnd", **TINY)
     with pytest.warns(lumiris.SceneWarning, match="biased"):
         lumiris.render(SCENE, **TINY, estimator="contributing", noncontributing_samples=0)
+    with pytest.warns(lumiris.SceneWarning, match="pixels do not share paths: paths of one bounce"):
+        lumiris.render(SCENE, **TINY, integrator="direct", path_reuse=4)
 
 
 def test_a_plan_gives_the_image_that_it_came_from() -> None:

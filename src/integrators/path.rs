@@ -43,7 +43,7 @@ impl PathIntegrator {
 
 impl Integrator for PathIntegrator {
     fn tracer(&self, with_features: bool) -> Box<dyn Tracer + '_> {
-        Box::new(PathTracer { groups: self.groups, ..PathTracer::new(with_features) })
+        Box::new(PathTracer::sharing(self.groups, with_features))
     }
 
     fn statistics(&self, paths: PathStats) -> Statistics {
@@ -93,11 +93,8 @@ pub struct PathTracer {
     radiance: Vec<Rgb>,
     direct: DirectStage,
     buffers: Option<Box<Buffers>>,
-    /// Which samples of a batch share paths.
-    pub(crate) groups: Groups,
-    /// What they share, while a batch is traced that does.
-    reuse: Option<Box<Reuse>>,
-    spare_reuse: Option<Box<Reuse>>,
+    /// Paths that samples of a batch share.
+    reuse: Reuse,
     /// The vertex whose estimator all have, if not each its own.
     pub(super) estimator_of: Option<u32>,
     /// Paths go on by specular lobes only.
@@ -125,6 +122,11 @@ impl PathTracer {
         let mut tracer = PathTracer::default();
         tracer.search.omits_features = !with_features;
         tracer
+    }
+
+    /// The same, where these samples of a batch share paths if the settings say so.
+    pub fn sharing(groups: Groups, with_features: bool) -> Self {
+        PathTracer { reuse: Reuse::of(groups), ..PathTracer::new(with_features) }
     }
 
     /// Copies the rays that are traced from now on, for measurements.
@@ -162,19 +164,13 @@ impl PathTracer {
     ) {
         let depth = settings.depth();
         fits.begin_batch(samples.len());
-        let edge = settings.path_reuse.unwrap_or(1);
-        if self.groups != Groups::None && edge > 1 && own.is_none() && self.outcomes.is_none() {
-            self.reuse = Some(self.spare_reuse.take().unwrap_or_default());
-        }
-        if let Some(reuse) = &mut self.reuse {
-            reuse.begin(samples.len());
-        }
+        let is_plain = own.is_none() && self.outcomes.is_none();
+        self.reuse.begin(settings.path_reuse.filter(|_| is_plain), samples.len());
         for vertex in 0..=depth {
             let count = self.search.active.len();
             if count == 0 {
                 break;
             }
-            let is_plain = own.is_none() && self.outcomes.is_none();
             let estimate = Estimate::new(settings, vertex).filter(|_| is_plain);
             let room = count * self.search.arrivals.max_paths() as usize;
             let mut batch = estimate.map(|e| Batch::new(self.buffers.take().unwrap_or_default(), e, room));
@@ -191,7 +187,7 @@ impl PathTracer {
             if let Some(mut batch) = batch {
                 let (stats, direct) = (&mut self.search.stats, &mut self.direct.stats);
                 let segments = self.search.recording.as_mut().map(|r| r.segments_at(vertex));
-                let (samples, next, reuse) = (&mut *out, &mut self.next, self.reuse.as_deref_mut());
+                let (samples, next, reuse) = (&mut *out, &mut self.next, self.reuse.active());
                 batch.shade(job, &mut Output { samples, fits, next, stats, direct, segments, reuse });
                 self.buffers = Some(batch.into_buffers());
             }
@@ -199,11 +195,10 @@ impl PathTracer {
             self.spare_points = emptied(points);
             self.search.recycle(step.vertices);
         }
-        if let Some(mut reuse) = self.reuse.take() {
+        if let Some(reuse) = self.reuse.active() {
             let start = Instant::now();
-            self.direct.stats.segments += reuse.resolve(job, (self.groups, edge), samples, out);
+            self.direct.stats.segments += reuse.resolve(job, samples, out);
             self.direct.stats.t2 += start.elapsed();
-            self.spare_reuse = Some(reuse);
         }
         fits.end_batch(samples.iter().map(|s| (s.fit, s.weight)));
     }
@@ -238,7 +233,7 @@ impl PathTracer {
 
     /// Lets the paths at Lambertian vertices that are not in columns be shared.
     fn share(&mut self, step: &Step<'_, '_>, out: &mut [PixelSample]) {
-        let Some(reuse) = &mut self.reuse else { return };
+        let Some(reuse) = self.reuse.active() else { return };
         for (path, v) in self.search.active.iter_mut().zip(&step.vertices) {
             let Bsdf::Diffuse(Diffuse { reflectance }) = v.bsdf.bsdf else { continue };
             let at = Place::new((v.surface.p, v.surface.p_error), (v.bsdf.n, v.bsdf.frame.z), v.wo);

@@ -39,16 +39,15 @@ pub fn edge(job: &RenderJob) -> u32 {
 pub fn obstacle(job: &RenderJob) -> Option<&'static str> {
     let settings = &job.settings().integrator;
     let geometry = &job.world.scene.geometry;
-    let all: [(&str, &dyn Fn() -> bool); 5] = [
-        ("paths of one bounce have nothing to share", &|| settings.depth() < 2),
-        ("only the integrator path has paths of its own for each pixel", &|| settings.kind != IntegratorKind::Path),
-        ("they split", &|| settings.roulette != RouletteKind::Throughput),
-        ("pixels have different numbers of samples", &|| job.pixel_samples.is_some()),
-        ("what a ray meets varies with time or is cut out at random", &|| {
-            geometry.has_motion() || geometry.geometries.iter().any(|g| g.alpha.is_some())
-        }),
+    let is_cut_out = geometry.geometries.iter().any(|g| g.alpha.is_some());
+    let reasons = [
+        (settings.depth() < 2, "paths of one bounce have nothing to share"),
+        (settings.kind != IntegratorKind::Path, "only the integrator path has paths of its own for each pixel"),
+        (settings.roulette != RouletteKind::Throughput, "they split"),
+        (job.pixel_samples.is_some(), "pixels have different numbers of samples"),
+        (geometry.has_motion() || is_cut_out, "what a ray meets varies with time or is cut out at random"),
     ];
-    all.iter().find(|(_, holds)| holds()).map(|(reason, _)| *reason)
+    reasons.into_iter().find(|(holds, _)| *holds).map(|(_, reason)| reason)
 }
 
 /// Which samples of a batch are a group.
@@ -63,7 +62,7 @@ pub enum Groups {
     Grid,
 }
 
-/// A Lambertian vertex: its point, the bound of that's rounding error, and the geometric and the shading normal on the side
+/// A Lambertian vertex: its point, the bound of its rounding error, and the geometric and the shading normal on the side
 /// of the viewer.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Place {
@@ -112,6 +111,9 @@ struct Pair {
 /// The paths of a batch that are shared.
 #[derive(Debug, Default)]
 pub(super) struct Reuse {
+    groups: Groups,
+    /// Edge of the blocks; 1 or 0 if the batch shares nothing.
+    edge: u32,
     /// Group and index of each sample, sorted.
     order: Vec<(u64, u32)>,
     first: Vec<Option<First>>,
@@ -124,13 +126,25 @@ pub(super) struct Reuse {
 }
 
 impl Reuse {
-    /// Begins a batch of so many samples.
-    pub(super) fn begin(&mut self, count: usize) {
+    pub(super) fn of(groups: Groups) -> Self {
+        Reuse { groups, ..Reuse::default() }
+    }
+
+    /// Begins a batch of so many samples, which share paths in blocks of the given edge, or do not.
+    pub(super) fn begin(&mut self, edge: Option<u32>, count: usize) {
+        self.edge = edge.filter(|_| self.groups != Groups::None).unwrap_or(1);
+        let count = if self.edge > 1 { count } else { 0 };
         self.first.clear();
         self.first.resize(count, None);
         self.second.clear();
         self.second.resize(count, None);
         self.shared = 0;
+    }
+
+    /// Itself, if the batch shares paths.
+    #[inline]
+    pub(super) fn active(&mut self) -> Option<&mut Self> {
+        (self.edge > 1).then_some(self)
     }
 
     /// The path of a sample has arrived at a Lambertian vertex that reflects `rho`; `is_next` if it has passed no surface
@@ -162,17 +176,11 @@ impl Reuse {
     }
 
     /// Gives each sample its part of what the paths of its group have found; returns the number of segments.
-    pub(super) fn resolve(
-        &mut self,
-        job: &RenderJob,
-        (groups, edge): (Groups, u32),
-        samples: &[CameraSample],
-        out: &mut [PixelSample],
-    ) -> u64 {
+    pub(super) fn resolve(&mut self, job: &RenderJob, samples: &[CameraSample], out: &mut [PixelSample]) -> u64 {
         if self.shared == 0 {
             return 0;
         }
-        let origin = job.world.scene.film.bounds;
+        let (origin, groups, edge) = (job.world.scene.film.bounds, self.groups, self.edge);
         let group = |s: &CameraSample| groups.of(edge, [s.pixel[0] - origin.x0, s.pixel[1] - origin.y0], s.index);
         self.order.clear();
         self.order.extend(samples.iter().map(group).zip(0_u32..));

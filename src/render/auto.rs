@@ -364,8 +364,8 @@ fn measure(
     seeds: [u32; 2],
     turn: usize,
 ) -> Vec<(f64, Vec<Difference>)> {
-    let mut worker = Worker::new(PathTracer::new(false));
-    worker.tracer.groups = if reuse::obstacle(run.job).is_none() { Groups::Grid } else { Groups::None };
+    let groups = if reuse::obstacle(run.job).is_none() { Groups::Grid } else { Groups::None };
+    let mut worker = Worker::new(PathTracer::sharing(groups, false));
     let mut times = vec![0.0; candidates.len()];
     let mut images = vec![[(); 2].map(|()| Vec::<[f64; 3]>::new()); candidates.len()];
     for k in 0..candidates.len() {

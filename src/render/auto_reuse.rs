@@ -88,6 +88,18 @@ mod tests {
     }
 
     #[test]
+    fn the_model_of_shared_paths_has_what_is_left_of_the_variance() {
+        // 6 of 8 are shared, 2 of these are of light at later vertices, and 1 is of light at the first
+        let of_one = Model { cost: [9.0, 1.0, 1.0], variance: [5.0, 1.0, 2.0] };
+        let gain = Gain { edge: 2, cost: 3.0, variance: 6.0 * 0.75 };
+        let shared = model(&of_one, &gain);
+        assert!((shared.variance([1.0, 1.0]) - (8.0 - 4.5)).abs() < 1e-12, "{shared:?}");
+        assert!((shared.cost([1.0, 1.0]) - (11.0 + 3.0)).abs() < 1e-12);
+        // Light samples at later vertices count for four pixels
+        assert_eq!(shared.variance[2], 0.5);
+    }
+
+    #[test]
     fn nothing_is_shared_where_nothing_is_gained() {
         let differences =
             |scale: f64| (0..64).map(|i| 1.0 + 0.1 * f64::from(i % 7)).map(|d| [d, scale * d * d]).collect();

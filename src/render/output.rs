@@ -166,6 +166,12 @@ pub fn layers(film: &Film, aovs: &[Aov], sample_count_map: Option<&SampleCountMa
     [(IMAGE_LAYER, image(true, &[]))].into_iter().chain(of_aovs).collect()
 }
 
+/// The AOVs of an image under way.
+pub fn live_aovs(has_features: bool) -> Vec<Aov> {
+    let features = [Aov::Albedo, Aov::Normal, Aov::Depth].into_iter().filter(|_| has_features);
+    features.chain([Aov::Samples]).collect()
+}
+
 /// The AOVs that an image has unless others are asked for.
 pub fn default_aovs(has_ratio: bool, has_records: bool) -> Vec<Aov> {
     let more = has_ratio.then_some(Aov::Ratio).into_iter().chain(has_records.then_some(Aov::Records));

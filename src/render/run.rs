@@ -3,7 +3,7 @@
 use super::camera_samples::{self, CameraSampler};
 use super::control_variates;
 use super::parts::{Checkpoints, PartError, StoredTile};
-use super::tiles::{Tile, Tiles, bounds_of_tiles, film, position, replica_edge};
+use super::tiles::{SHARE_TILE, Tile, Tiles, bounds_of_tiles, film, position, replica_edge};
 use super::worker::{AnyWorker, Workers};
 use super::{BATCH_PATHS, Continuation, Progress, RenderError, RenderSettings, Rendering, TileObserver};
 use crate::direct::Estimator;
@@ -27,6 +27,9 @@ use std::time::{Duration, Instant};
 const NOISE_INTERVAL: Duration = Duration::from_secs(1);
 /// The same by the time that one of them takes.
 const NOISE_REST: u32 = 50;
+
+// All samples of a cell are in one batch, and cells in one part of an image
+const _: () = assert!(BATCH_PATHS >= reuse::CELL.pow(2) as usize && SHARE_TILE.is_multiple_of(reuse::CELL));
 
 /// Combined with the seed of the image to give that of replicas.
 const REPLICA_SEED: u32 = 0x72_65_70_73;

@@ -2,6 +2,8 @@
 
 use anyhow::bail;
 use lumiris::render::memory::Prediction;
+use lumiris::settings::Value;
+use lumiris::settings::value::Kind;
 use std::fs;
 use std::path::{Path, PathBuf};
 
@@ -14,34 +16,22 @@ pub(super) enum MemoryLimit {
     Off,
 }
 
-/// Units of sizes.
-const UNITS: [(&str, f64); 8] = [
-    ("TiB", 1_099_511_627_776.0),
-    ("GiB", 1_073_741_824.0),
-    ("MiB", 1_048_576.0),
-    ("KiB", 1024.0),
-    ("TB", 1e12),
-    ("GB", 1e9),
-    ("MB", 1e6),
-    ("KB", 1e3),
-];
-
-/// Understands `24GB`, `500MiB` or `off`.
+/// Understands sizes as settings do, and `off`.
 pub(super) fn parse_limit(text: &str) -> Result<MemoryLimit, String> {
     if text == "off" {
         return Ok(MemoryLimit::Off);
     }
-    let unit = UNITS.iter().find_map(|(unit, bytes)| Some((text.strip_suffix(unit)?, *bytes)));
-    match unit.and_then(|(number, bytes)| Some(number.trim().parse::<f64>().ok()? * bytes)) {
-        Some(bytes) if bytes.is_finite() && bytes > 0.0 => Ok(MemoryLimit::Bytes(bytes as u64)),
-        _ => Err("expected a size such as 24GB or 500MiB, or `off`".to_owned()),
+    match Kind::Bytes.parse(text) {
+        Ok(Value::Integer(bytes)) => Ok(MemoryLimit::Bytes(bytes)),
+        Ok(_) => Err("expected a number of bytes".to_owned()),
+        Err(expected) => Err(format!("{expected}, or off")),
     }
 }
 
 /// Bytes as text.
 pub(super) fn size(bytes: u64) -> String {
-    let (unit, of_unit) = if bytes < 1_000_000_000 { ("MB", 1e6) } else { ("GB", 1e9) };
-    format!("{:.1} {unit}", bytes as f64 / of_unit)
+    let (unit, shift) = if bytes < 1 << 30 { ("MiB", 20) } else { ("GiB", 30) };
+    format!("{:.1} {unit}", bytes as f64 / f64::from(1 << shift))
 }
 
 /// Refuses an image that does not fit.
@@ -117,20 +107,20 @@ mod tests {
 
     #[test]
     fn sizes_have_units() {
-        assert_eq!(parse_limit("24GB"), Ok(MemoryLimit::Bytes(24_000_000_000)));
-        assert_eq!(parse_limit("1.5 MiB"), Ok(MemoryLimit::Bytes(1_572_864)));
+        assert_eq!(parse_limit("24GB"), Ok(MemoryLimit::Bytes(24 << 30)));
+        assert_eq!(parse_limit("1.5 MiB"), Ok(MemoryLimit::Bytes(3 << 19)));
         assert_eq!(parse_limit("off"), Ok(MemoryLimit::Off));
-        for text in ["24", "GB", "-1GB", "x MB", "1GBs", ""] {
+        for text in ["GB", "-1GB", "x MB", "1GBs", ""] {
             assert!(parse_limit(text).is_err(), "{text}");
         }
-        assert_eq!([size(1_500_000), size(23_400_000_000)], ["1.5 MB", "23.4 GB"]);
+        assert_eq!([size(3 << 19), size(47 << 29)], ["1.5 MiB", "23.5 GiB"]);
     }
 
     #[test]
     fn what_does_not_fit_is_refused_with_its_bytes() {
         let prediction = Prediction { film: 1 << 40, output: 5, fixed: 7 };
         let error = check(Some(MemoryLimit::Bytes(1 << 40)), &prediction).unwrap_err().to_string();
-        assert!(error.contains("1099.5 GB for the film") && error.contains("--memory-limit allows"), "{error}");
+        assert!(error.contains("1024.0 GiB for the film") && error.contains("--memory-limit allows"), "{error}");
         assert!(check(Some(MemoryLimit::Off), &prediction).is_ok());
         let tiny = Prediction { film: 1, output: 1, fixed: 1 };
         assert!(check(Some(MemoryLimit::Bytes(1 << 40)), &tiny).is_ok());

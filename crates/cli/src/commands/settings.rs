@@ -10,7 +10,6 @@ use lumiris::film::filter::PixelFilter;
 use lumiris::import::cache::FileCache;
 use lumiris::import::fingerprint::SceneFiles;
 use lumiris::import::{LoadOptions, Loaded, load_with};
-use lumiris::integrators::reuse;
 use lumiris::render::RenderSettings;
 use lumiris::render::allocation::complete_for_noise;
 use lumiris::render::plan::prepare;
@@ -124,10 +123,7 @@ pub(super) fn plan(args: &SceneArgs, job: &mut RenderJob, ratio_map: bool, quiet
         let (min, max) = range.unwrap_or((&0, &0));
         progress::say(&format!("adaptive: {min} to {max} samples per pixel"));
     }
-    let shares_paths = job.settings().integrator.path_reuse.is_some_and(|edge| edge > 1);
-    if let Some(reason) = reuse::obstacle(job).filter(|_| shares_paths) {
-        progress::say(&format!("warning: pixels do not share paths: {reason}"));
-    }
+    plan.warnings.iter().for_each(|warning| progress::say(&format!("warning: {warning}")));
     PlanFile::new(&args.scene, &plan)
 }
 

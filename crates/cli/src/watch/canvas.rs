@@ -3,7 +3,7 @@
 use lumiris::film::{Film, PixelBounds};
 use lumiris::imaging::{Layer, layers};
 use lumiris::render::Progress;
-use lumiris::render::output::{Aov, Layers, channels};
+use lumiris::render::output::{Aov, Layers, channels, live_aovs};
 use std::collections::BTreeMap;
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::sync::{Mutex, MutexGuard, PoisonError};
@@ -46,8 +46,7 @@ pub(crate) struct Canvas {
 
 impl Canvas {
     pub(super) fn new(name: &str, bounds: PixelBounds, has_features: bool) -> Self {
-        let features = [Aov::Albedo, Aov::Normal, Aov::Depth].into_iter().filter(|_| has_features);
-        let aovs: Vec<Aov> = features.chain([Aov::Samples]).collect();
+        let aovs = live_aovs(has_features);
         let empty = Film::new([0, 0], PixelBounds { x0: 0, x1: 0, y0: 0, y1: 0 }, Vec::new(), Vec::new());
         let channels = Layers::new(&empty, true, &aovs, None).names();
         let layers = layers(&channels);

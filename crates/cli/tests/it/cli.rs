@@ -164,7 +164,7 @@ fn an_image_that_does_not_fit_is_refused_before_rendering_with_its_bytes() {
         let number = message.split("bytes)").next().and_then(|text| text.rsplit('(').next()).unwrap_or_default();
         let bytes: u64 = number.trim().parse().unwrap_or_else(|_| panic!("no bytes: {message}"));
         // At least the radiance of every pixel
-        let (least, limit) = if args[3] == "64x64" { (100_000_000, "10.0 MB") } else { (44 << 32, "24.0 GB") };
+        let (least, limit) = if args[3] == "64x64" { (100_000_000, "10.0 MiB") } else { (44 << 32, "24.0 GiB") };
         assert!(bytes > least && message.contains(&format!("{limit} that --memory-limit allows")), "{message}");
         assert!(!folder.path().join("a.exr").exists());
     }
