@@ -123,7 +123,9 @@ impl<'a> Pilot<'a> {
         let run = Run::new(self.job, &render, &stop, &|_| ());
         let mut tiles = self.bounds.tiles(COST_TILE);
         tiles.retain(|t| is_chosen((t.x0 - self.bounds.x0) / COST_TILE + 2 * ((t.y0 - self.bounds.y0) / COST_TILE)));
-        let measured: Vec<_> = tiles.par_iter().map(|tile| pilot_tile(&run, tile, self.sampling)).collect();
+        let worker = || Worker::new(PathTracer::new(false));
+        let of_tile = |worker: &mut _, tile: &_| pilot_tile(&run, worker, tile, self.sampling);
+        let measured: Vec<_> = tiles.par_iter().map_init(worker, of_tile).collect();
         for (tile, (sums, cost)) in tiles.iter().zip(measured) {
             for (i, sums) in sums.into_iter().enumerate() {
                 let [x, y] = position(tile, i as u32);
@@ -186,15 +188,19 @@ impl<'a> Pilot<'a> {
 }
 
 /// The pilot's samples in a tile, and their mean cost.
-fn pilot_tile(run: &Run<'_>, tile: &PixelBounds, (spp, fraction, seed): (u32, f32, u32)) -> (Vec<PixelSums>, f64) {
-    let mut worker = Worker::new(PathTracer::new(false));
+fn pilot_tile(
+    run: &Run<'_>,
+    worker: &mut Worker<PathTracer>,
+    tile: &PixelBounds,
+    (spp, fraction, seed): (u32, f32, u32),
+) -> (Vec<PixelSums>, f64) {
     let mut sums = vec![PixelAccumulator::default(); tile.area()];
     let is_chosen = |i: &u32| {
         let [x, y] = position(tile, *i);
         unit_f32(pcg4d([x, y, PILOT_SEED, 1])[0]) < fraction
     };
     let chosen: Vec<u32> = (0..tile.area() as u32).filter(is_chosen).collect();
-    trace_pixels(run, &mut worker, (tile, &chosen), 0..spp, seed, |i, sample| sums[i as usize].add(0, sample));
+    trace_pixels(run, worker, (tile, &chosen), 0..spp, seed, |i, sample| sums[i as usize].add(0, sample));
     (sums.iter().map(PixelAccumulator::sums).collect(), cost(&worker.tracer.take_stats()))
 }
 

@@ -35,6 +35,20 @@ pub(super) struct CameraSampler<'a> {
     has_motion: bool,
     /// What makes many rays at once.
     pinhole: Option<(Pinhole, Vec3)>,
+    direct: DirectNumbers,
+    /// Sample counts, unless chosen per pixel.
+    sample_counts: SampleCounts,
+}
+
+/// The random numbers of direct light.
+#[derive(Clone, Copy, Debug)]
+enum DirectNumbers {
+    /// Those of the camera sample.
+    Same,
+    /// Of this kind: estimators over pixels need those of a pixel to be independent of its neighbours'.
+    Kind(SamplerKind),
+    /// Those of a block of samples.
+    Blocks,
 }
 
 /// Memory for many samples at once.
@@ -54,7 +68,17 @@ impl<'a> CameraSampler<'a> {
     pub(super) fn new(job: &'a RenderJob, first_sample: u32) -> Self {
         let (scene, has_motion) = (&job.world.scene, job.world.scene.geometry.has_motion());
         let pinhole = if has_motion { None } else { scene.camera.pinhole() };
-        CameraSampler { job, first_sample, filter: scene.film.filter.sampler(), has_motion, pinhole }
+        let settings = job.settings();
+        let estimator = Estimator::at_vertex(&settings.integrator, 0);
+        let direct = if estimator.is_over_pixels() && settings.sampling.sampler == SamplerKind::SobolBlueNoise {
+            DirectNumbers::Kind(SamplerKind::Sobol)
+        } else if estimator.is_progressive() {
+            DirectNumbers::Blocks
+        } else {
+            DirectNumbers::Same
+        };
+        let (filter, sample_counts) = (scene.film.filter.sampler(), settings.integrator.sample_counts());
+        CameraSampler { job, first_sample, filter, has_motion, pinhole, direct, sample_counts }
     }
 
     /// Appends samples of some pixels, each with a range of its own and given with the fits of its samples.
@@ -100,7 +124,6 @@ impl<'a> CameraSampler<'a> {
 
         let scene = &self.job.world.scene;
         let (time, scale) = (scene.camera.time(0.0), scene.film.scale);
-        let sample_counts = self.job.settings().integrator.sample_counts();
         out.extend(places.iter().zip(&*streams).enumerate().map(|(i, (&(fit, pixel, sample), &stream))| {
             let ray = Ray { o: *o, d: d.vec3(i), t_max: f32::INFINITY, time };
             CameraSample {
@@ -108,7 +131,7 @@ impl<'a> CameraSampler<'a> {
                 weight: weight[i] * scale,
                 stream,
                 direct: self.direct_stream(pixel, sample, seed).unwrap_or(stream),
-                sample_counts: self.chosen_counts(pixel, &stream).unwrap_or(sample_counts),
+                sample_counts: self.chosen_counts(pixel, &stream).unwrap_or(self.sample_counts),
                 index: sample,
                 fit,
                 pixel,
@@ -135,7 +158,7 @@ impl<'a> CameraSampler<'a> {
             weight: filter.weight * ray.weight * scene.film.scale,
             stream,
             direct: stream,
-            sample_counts: self.chosen_counts(pixel, &stream).unwrap_or_else(|| settings.integrator.sample_counts()),
+            sample_counts: self.chosen_counts(pixel, &stream).unwrap_or(self.sample_counts),
             index: sample,
             fit: 0,
             pixel,
@@ -145,17 +168,16 @@ impl<'a> CameraSampler<'a> {
     /// The random numbers of direct light, if they are those of a block.
     #[inline]
     fn direct_stream(&self, pixel: [u32; 2], sample: u32, seed: u32) -> Option<SampleStream> {
-        let settings = self.job.settings();
-        let estimator = Estimator::at_vertex(&settings.integrator, 0);
-        if estimator.is_over_pixels() && settings.sampling.sampler == SamplerKind::SobolBlueNoise {
-            return Some(SampleStream::new(SamplerKind::Sobol, pixel, sample, seed));
+        match self.direct {
+            DirectNumbers::Same => None,
+            DirectNumbers::Kind(kind) => Some(SampleStream::new(kind, pixel, sample, seed)),
+            DirectNumbers::Blocks => {
+                let block = block_of(sample - self.first_sample);
+                let block_seed = pcg4d([seed, self.first_sample, block.index, BLOCK_SEED])[0];
+                let index = sample - self.first_sample - block.first;
+                Some(SampleStream::new(self.job.settings().sampling.sampler, pixel, index, block_seed))
+            }
         }
-        Estimator::at_vertex(&settings.integrator, 0).is_progressive().then(|| {
-            let block = block_of(sample - self.first_sample);
-            let block_seed = pcg4d([seed, self.first_sample, block.index, BLOCK_SEED])[0];
-            let index = sample - self.first_sample - block.first;
-            SampleStream::new(settings.sampling.sampler, pixel, index, block_seed)
-        })
     }
 
     /// Sample counts, if they are chosen per pixel.

@@ -1,6 +1,6 @@
 //! Vectors of lanes: loads and stores with padding, directions by component, and elementary functions.
 
-use fearless_simd::{Simd, prelude::*};
+use fearless_simd::{Simd, SimdCombine, SimdSplit, f64x8, prelude::*};
 use lumiris_numbers::math::number::Number;
 use lumiris_numbers::math::{Frame, Mat3, Vec3};
 use std::f32::consts::{FRAC_PI_2, TAU};
@@ -15,6 +15,20 @@ pub type M<S> = fearless_simd::mask32x8<S>;
 
 /// Number of lanes.
 pub const LANES: usize = 8;
+
+/// The lanes as f64.
+#[inline(always)]
+pub fn widened<S: Simd>(x: F<S>) -> f64x8<S> {
+    let (low, high) = x.widen();
+    low.combine(high)
+}
+
+/// The lanes rounded to f32.
+#[inline(always)]
+pub fn narrowed<S: Simd>(x: f64x8<S>) -> F<S> {
+    let (low, high) = x.split();
+    low.narrow(high)
+}
 
 /// Where a vector of `n` ≥ [`LANES`] numbers begins that covers number `i`: the last one overlaps the one before.
 #[inline(always)]

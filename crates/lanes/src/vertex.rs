@@ -4,8 +4,10 @@
 //! The formulas are those of the modules `geometry::mesh`, `bsdfs::diffuse` and `direct` for single vertices.
 //! Columns have one length, a multiple of [`LANES`].
 
-use super::lane::{F, I, LANES, M, Vec3s, Wide, load, or_zero, safe_sqrt, sin_cos_eighth, store};
-use fearless_simd::{Level, Simd, dispatch, f64x4, prelude::*};
+use super::lane::{
+    F, I, LANES, M, Vec3s, Wide, load, narrowed, or_zero, safe_sqrt, sin_cos_eighth, store, widened,
+};
+use fearless_simd::{Level, Simd, dispatch, f64x8, prelude::*};
 use lumiris_numbers::estimators::mis::Heuristic;
 use lumiris_numbers::math::gamma;
 use lumiris_numbers::math::ray::SEGMENT_END;
@@ -64,9 +66,7 @@ fn points_lanes<S: Simd>(simd: S, hits: &[TriangleHits], out: &mut Points<'_>) {
         let b0 = one - b1 - b2;
 
         // In f64, which keeps the normals of slivers
-        let (low, high) = (halves(corners, b1, b2, true), halves(corners, b1, b2, false));
-        let p = Vec3s { x: low.0[0].narrow(high.0[0]), y: low.0[1].narrow(high.0[1]), z: low.0[2].narrow(high.0[2]) };
-        let n = Vec3s { x: low.1[0].narrow(high.1[0]), y: low.1[1].narrow(high.1[1]), z: low.1[2].narrow(high.1[2]) };
+        let (p, n) = point_and_normal(corners, b1, b2);
         let n = n.times(load(simd, &hits.orientation, 0));
 
         let terms = [absolute(corners[0].times(b0)), absolute(corners[1].times(b1)), absolute(corners[2].times(b2))];
@@ -112,30 +112,23 @@ fn either<S: Simd>(first: M<S>, a: Vec3s<S>, b: Vec3s<S>) -> Vec3s<S> {
     Vec3s { x: first.select(a.x, b.x), y: first.select(a.y, b.y), z: first.select(a.z, b.z) }
 }
 
+/// The points and the unit normals of triangles.
 #[inline(always)]
-fn half<S: Simd>(x: F<S>, is_low: bool) -> f64x4<S> {
-    let (low, high) = x.widen();
-    if is_low { low } else { high }
-}
-
-#[inline(always)]
-fn half_of<S: Simd>(v: Vec3s<S>, is_low: bool) -> [f64x4<S>; 3] {
-    [half(v.x, is_low), half(v.y, is_low), half(v.z, is_low)]
-}
-
-/// The point and the unit normal of four triangles.
-#[inline(always)]
-fn halves<S: Simd>(corners: [Vec3s<S>; 3], b1: F<S>, b2: F<S>, is_low: bool) -> ([f64x4<S>; 3], [f64x4<S>; 3]) {
-    let (b1, b2) = (half(b1, is_low), half(b2, is_low));
-    let [p0, p1, p2] = [half_of(corners[0], is_low), half_of(corners[1], is_low), half_of(corners[2], is_low)];
+fn point_and_normal<S: Simd>(corners: [Vec3s<S>; 3], b1: F<S>, b2: F<S>) -> (Vec3s<S>, Vec3s<S>) {
+    let (b1, b2) = (widened(b1), widened(b2));
+    let [p0, p1, p2] = corners.map(|v| [widened(v.x), widened(v.y), widened(v.z)]);
     let e1 = [p1[0] - p0[0], p1[1] - p0[1], p1[2] - p0[2]];
     let e2 = [p2[0] - p0[0], p2[1] - p0[1], p2[2] - p0[2]];
     let p = [p0[0] + e1[0] * b1 + e2[0] * b2, p0[1] + e1[1] * b1 + e2[1] * b2, p0[2] + e1[2] * b1 + e2[2] * b2];
     let c = [e1[1] * e2[2] - e2[1] * e1[2], e1[2] * e2[0] - e2[2] * e1[0], e1[0] * e2[1] - e2[0] * e1[1]];
     let length = (c[0] * c[0] + c[1] * c[1] + c[2] * c[2]).sqrt();
-    let (zero, one) = (f64x4::splat(b1.token(), 0.0), f64x4::splat(b1.token(), 1.0));
+    let (zero, one) = (f64x8::splat(b1.token(), 0.0), f64x8::splat(b1.token(), 1.0));
     let inverse = length.simd_gt(zero).select(one / length, zero);
-    (p, [c[0] * inverse, c[1] * inverse, c[2] * inverse])
+    let n = [c[0] * inverse, c[1] * inverse, c[2] * inverse];
+    (
+        Vec3s { x: narrowed(p[0]), y: narrowed(p[1]), z: narrowed(p[2]) },
+        Vec3s { x: narrowed(n[0]), y: narrowed(n[1]), z: narrowed(n[2]) },
+    )
 }
 
 /// What Lambertian vertices have in common.

@@ -2,8 +2,8 @@
 
 use super::spherical::SphericalSetup;
 use super::{Rectangle, barycentric};
-use crate::lane::{F, LANES, M, Vec3s, load, or_zero, store};
-use fearless_simd::{Level, Simd, dispatch, f64x4, prelude::*};
+use crate::lane::{F, LANES, M, Vec3s, load, narrowed, or_zero, store, widened};
+use fearless_simd::{Level, Simd, dispatch, f64x8, prelude::*};
 use lumiris_numbers::math::{Vec3, gamma};
 
 /// Largest diagonal, by the distance of the centre, that is sampled by area.
@@ -83,19 +83,14 @@ fn spherical_place<S: Simd>(
     (u0, u1): (F<S>, F<S>),
 ) -> (F<S>, F<S>, F<S>, M<S>) {
     let simd = u0.token();
-    let (x, y, z) = (from.x.widen(), from.y.widen(), from.z.widen());
-    let low = SphericalSetup::seen(rectangle, [x.0, y.0, z.0]);
-    let high = SphericalSetup::seen(rectangle, [x.1, y.1, z.1]);
-    let (u0, u1) = (u0.widen(), u1.widen());
-    let (at_low, at_high) = (low.place(u0.0, u1.0), high.place(u0.1, u1.1));
-    let one = f64x4::splat(simd, 1.0);
-    let zero = f64x4::splat(simd, 0.0);
-    let density = low.is_accurate(rectangle).select(one / low.solid_angle, zero);
-    let density = density.narrow(high.is_accurate(rectangle).select(one / high.solid_angle, zero));
+    let seen = SphericalSetup::seen(rectangle, [widened(from.x), widened(from.y), widened(from.z)]);
+    let (s, t) = seen.place(widened(u0), widened(u1));
+    let density = f64x8::splat(simd, 1.0) / seen.solid_angle;
+    let density = narrowed(seen.is_accurate(rectangle).select(density, f64x8::splat(simd, 0.0)));
     let d = Vec3s::splat(simd, center).minus(from);
     let is_near = (d.dot(d) * (MAX_EXTENT * MAX_EXTENT)).simd_le(F::splat(simd, rectangle.size.length_squared()));
     let is_spherical = is_near & density.simd_gt(F::splat(simd, 0.0));
-    (at_low.0.narrow(at_high.0), at_low.1.narrow(at_high.1), density, is_spherical)
+    (narrowed(s), narrowed(t), density, is_spherical)
 }
 
 /// A point from each of the points `from` on a triangle of corners `p`, unit normal and area, uniform in area; as

@@ -1,8 +1,8 @@
-//! Spherical rectangles [Ureña, Fajardo and King 2013], as `lights::area::rectangle` describes them, from four points at
+//! Spherical rectangles [Ureña, Fajardo and King 2013], as `lights::area::rectangle` describes them, from many points at
 //! once.
 
 use super::Rectangle;
-use fearless_simd::{Simd, f64x4, mask64x4, prelude::*};
+use fearless_simd::{Simd, f64x8, mask64x8, prelude::*};
 use lumiris_numbers::math::DVec3;
 use std::f64::consts::{FRAC_PI_2, FRAC_PI_4, FRAC_PI_8, PI, TAU};
 
@@ -12,26 +12,26 @@ pub const MIN_SOLID_ANGLE: f64 = 1e-4;
 /// Smallest distance from the plane, in diagonals of the rectangle, that is sampled by solid angle.
 pub const MIN_HEIGHT: f64 = 1e-5;
 
-/// Four points as they see a rectangle, and what their samples need.
+/// Points as they see a rectangle, and what their samples need.
 #[derive(Clone, Copy)]
 pub(super) struct SphericalSetup<S: Simd> {
-    x: [f64x4<S>; 2],
-    y: [f64x4<S>; 2],
-    z0: f64x4<S>,
-    pub(super) solid_angle: f64x4<S>,
+    x: [f64x8<S>; 2],
+    y: [f64x8<S>; 2],
+    z0: f64x8<S>,
+    pub(super) solid_angle: f64x8<S>,
     /// cos and −sin of g2 + g3.
-    rotation: (f64x4<S>, f64x4<S>),
+    rotation: (f64x8<S>, f64x8<S>),
     /// z of the normals of the planes through the edges y0 and y1.
-    b: [f64x4<S>; 2],
+    b: [f64x8<S>; 2],
     /// 1 − b0².
-    k: f64x4<S>,
+    k: f64x8<S>,
 }
 
 impl<S: Simd> SphericalSetup<S> {
     #[inline(always)]
-    fn new(x: [f64x4<S>; 2], y: [f64x4<S>; 2], z0: f64x4<S>, g23: (f64x4<S>, f64x4<S>), solid_angle: f64x4<S>) -> Self {
+    fn new(x: [f64x8<S>; 2], y: [f64x8<S>; 2], z0: f64x8<S>, g23: (f64x8<S>, f64x8<S>), solid_angle: f64x8<S>) -> Self {
         let z2 = z0 * z0;
-        let scale = f64x4::splat(z0.token(), 1.0) / (g23.0 * g23.0 + g23.1 * g23.1).sqrt();
+        let scale = f64x8::splat(z0.token(), 1.0) / (g23.0 * g23.0 + g23.1 * g23.1).sqrt();
         let (below, above) = (y[0] * y[0] + z2, y[1] * y[1] + z2);
         let b = [-y[0] / below.sqrt(), y[1] / above.sqrt()];
         SphericalSetup { x, y, z0, solid_angle, rotation: (g23.0 * scale, -(g23.1 * scale)), b, k: z2 / below }
@@ -39,7 +39,7 @@ impl<S: Simd> SphericalSetup<S> {
 
     /// As the points `from` see `rectangle`.
     #[inline(always)]
-    pub(super) fn seen(rectangle: &Rectangle, from: [f64x4<S>; 3]) -> Self {
+    pub(super) fn seen(rectangle: &Rectangle, from: [f64x8<S>; 3]) -> Self {
         let (corner, ex, ey) = (rectangle.corner.as_dvec3(), rectangle.ex.as_dvec3(), rectangle.ey.as_dvec3());
         let d = [-from[0] + corner.x, -from[1] + corner.y, -from[2] + corner.z];
         let (x0, y0, z0) = (dot(d, ex), dot(d, ey), -dot(d, ex.cross(ey)).abs());
@@ -57,9 +57,9 @@ impl<S: Simd> SphericalSetup<S> {
 
     /// The distances from the corner along the edges.
     #[inline(always)]
-    pub(super) fn place(&self, u0: f64x4<S>, u1: f64x4<S>) -> (f64x4<S>, f64x4<S>) {
+    pub(super) fn place(&self, u0: f64x8<S>, u1: f64x8<S>) -> (f64x8<S>, f64x8<S>) {
         let simd = u0.token();
-        let one = f64x4::splat(simd, 1.0);
+        let one = f64x8::splat(simd, 1.0);
         // cos and sin of u·S − (g2 + g3).
         let (sin_us, cos_us) = sin_cos_turns_f64(u0 * (self.solid_angle * (1.0 / TAU)));
         let cos = cos_us * self.rotation.0 - sin_us * self.rotation.1;
@@ -82,45 +82,45 @@ impl<S: Simd> SphericalSetup<S> {
 
     /// True where the rectangle is neither edge-on nor so small that its angles lose their digits.
     #[inline(always)]
-    pub(super) fn is_accurate(&self, rectangle: &Rectangle) -> mask64x4<S> {
+    pub(super) fn is_accurate(&self, rectangle: &Rectangle) -> mask64x8<S> {
         let simd = self.z0.token();
         let (width, height) = (f64::from(rectangle.size.x), f64::from(rectangle.size.y));
-        let nearest = f64x4::splat(simd, MIN_HEIGHT * MIN_HEIGHT * (width * width + height * height));
-        (self.z0 * self.z0).simd_gt(nearest) & self.solid_angle.simd_ge(f64x4::splat(simd, MIN_SOLID_ANGLE))
+        let nearest = f64x8::splat(simd, MIN_HEIGHT * MIN_HEIGHT * (width * width + height * height));
+        (self.z0 * self.z0).simd_gt(nearest) & self.solid_angle.simd_ge(f64x8::splat(simd, MIN_SOLID_ANGLE))
     }
 }
 
 #[inline(always)]
-fn dot<S: Simd>(v: [f64x4<S>; 3], w: DVec3) -> f64x4<S> {
+fn dot<S: Simd>(v: [f64x8<S>; 3], w: DVec3) -> f64x8<S> {
     v[0] * w.x + v[1] * w.y + v[2] * w.z
 }
 
 #[inline(always)]
-fn product<S: Simd>(a: (f64x4<S>, f64x4<S>), b: (f64x4<S>, f64x4<S>)) -> (f64x4<S>, f64x4<S>) {
+fn product<S: Simd>(a: (f64x8<S>, f64x8<S>), b: (f64x8<S>, f64x8<S>)) -> (f64x8<S>, f64x8<S>) {
     (a.0 * b.0 - a.1 * b.1, a.0 * b.1 + a.1 * b.0)
 }
 
 /// The argument of a complex number in [0, 2π); of one slightly below the positive axis, 0.
 #[inline(always)]
-fn angle<S: Simd>((x, y): (f64x4<S>, f64x4<S>)) -> f64x4<S> {
+fn angle<S: Simd>((x, y): (f64x8<S>, f64x8<S>)) -> f64x8<S> {
     let simd = x.token();
-    let zero = f64x4::splat(simd, 0.0);
+    let zero = f64x8::splat(simd, 0.0);
     let a = atan2(y, x);
-    a.simd_lt(f64x4::splat(simd, -1e-6)).select(a + TAU, a.max(zero))
+    a.simd_lt(f64x8::splat(simd, -1e-6)).select(a + TAU, a.max(zero))
 }
 
 /// The argument of x + iy in [−π, π]; errors below 2⁻⁴⁸. NaN at 0.
 #[inline(always)]
-pub fn atan2<S: Simd>(y: f64x4<S>, x: f64x4<S>) -> f64x4<S> {
+pub fn atan2<S: Simd>(y: f64x8<S>, x: f64x8<S>) -> f64x8<S> {
     let simd = x.token();
-    let zero = f64x4::splat(simd, 0.0);
+    let zero = f64x8::splat(simd, 0.0);
     let is_steep = y.abs().simd_gt(x.abs());
     let (large, small) = (is_steep.select(y.abs(), x.abs()), is_steep.select(x.abs(), y.abs()));
     // The difference to the nearest multiple of π/8, by the tangent of a difference
     let is_third = small.simd_gt(large * TAN_3_PI_16);
     let is_second = small.simd_gt(large * TAN_PI_16);
-    let tangent = is_third.select(f64x4::splat(simd, 1.0), is_second.select(f64x4::splat(simd, TAN_PI_8), zero));
-    let base = is_third.select(f64x4::splat(simd, FRAC_PI_4), is_second.select(f64x4::splat(simd, FRAC_PI_8), zero));
+    let tangent = is_third.select(f64x8::splat(simd, 1.0), is_second.select(f64x8::splat(simd, TAN_PI_8), zero));
+    let base = is_third.select(f64x8::splat(simd, FRAC_PI_4), is_second.select(f64x8::splat(simd, FRAC_PI_8), zero));
     let r = (small - large * tangent) / (large + small * tangent);
     let r2 = r * r;
     let series = ((((((((r2 * (-1.0 / 19.0) + 1.0 / 17.0) * r2 - 1.0 / 15.0) * r2 + 1.0 / 13.0) * r2 - 1.0 / 11.0)
@@ -150,7 +150,7 @@ const TAN_3_PI_16: f64 = 0.668_178_637_919_298_9;
 
 /// sin 2πt and cos 2πt for |t| < 2²⁰, by the series about the nearest quarter turn; errors below 2⁻⁴⁵.
 #[inline(always)]
-pub fn sin_cos_turns_f64<S: Simd>(t: f64x4<S>) -> (f64x4<S>, f64x4<S>) {
+pub fn sin_cos_turns_f64<S: Simd>(t: f64x8<S>) -> (f64x8<S>, f64x8<S>) {
     let simd = t.token();
     let quarters = (t * 4.0).round_ties_even();
     let x = (t - quarters * 0.25) * TAU;
@@ -175,8 +175,8 @@ pub fn sin_cos_turns_f64<S: Simd>(t: f64x4<S>) -> (f64x4<S>, f64x4<S>) {
         + 1.0;
     // Of the quarters modulo 4, which are exact.
     let k = quarters - (quarters * 0.25).floor() * 4.0;
-    let (one, two, three) = (f64x4::splat(simd, 1.0), f64x4::splat(simd, 2.0), f64x4::splat(simd, 3.0));
-    let (is_1, is_2, is_3): (mask64x4<S>, mask64x4<S>, mask64x4<S>) =
+    let (one, two, three) = (f64x8::splat(simd, 1.0), f64x8::splat(simd, 2.0), f64x8::splat(simd, 3.0));
+    let (is_1, is_2, is_3): (mask64x8<S>, mask64x8<S>, mask64x8<S>) =
         (k.simd_eq(one), k.simd_eq(two), k.simd_eq(three));
     let is_odd = is_1 | is_3;
     let (s, c) = (is_odd.select(cos, sin), is_odd.select(sin, cos));

@@ -1,12 +1,13 @@
 //! Tests of `lumiris_lanes::area`.
 
 use super::support::assert_same_bits;
-use fearless_simd::{Simd, dispatch, f64x4, prelude::*};
+use fearless_simd::{Simd, dispatch, f64x8, prelude::*};
 use lumiris_lanes::area::Rectangle;
 use lumiris_lanes::area::many::{PointsOnLight, sample_rectangle, sample_triangle};
 use lumiris_lanes::area::spherical::{atan2, sin_cos_turns_f64};
 use lumiris_numbers::math::{Vec2, Vec3};
 use lumiris_test_support::random::{RngExt, pcg32};
+use std::array::from_fn;
 use std::f64::consts::TAU;
 
 #[test]
@@ -38,15 +39,15 @@ fn many_points_are_the_same_at_all_levels() {
 #[test]
 fn arguments_of_complex_numbers_are_accurate() {
     #[inline(always)]
-    fn run<S: Simd>(simd: S, y: &[f64; 4], x: &[f64; 4]) -> [f64; 4] {
-        atan2(f64x4::load_array(simd, *y), f64x4::load_array(simd, *x)).to_array()
+    fn run<S: Simd>(simd: S, y: &[f64; 8], x: &[f64; 8]) -> [f64; 8] {
+        atan2(f64x8::load_array(simd, *y), f64x8::load_array(simd, *x)).to_array()
     }
     for i in 0..2000 {
-        let angles = [0.0, 0.25, 0.5, 0.75].map(|part| (f64::from(i) / 1000.0 - 1.0 + part / 1000.0) * 0.5 * TAU);
+        let angles: [f64; 8] = from_fn(|part| (f64::from(i) / 1000.0 - 1.0 + part as f64 / 8000.0) * 0.5 * TAU);
         let (y, x) = (angles.map(|a| 3.0 * a.sin()), angles.map(|a| 3.0 * a.cos()));
         for level in super::support::levels() {
             let found = dispatch!(level, simd => run(simd, &y, &x));
-            for k in 0..4 {
+            for k in 0..8 {
                 assert!((found[k] - y[k].atan2(x[k])).abs() < 4e-15, "{} {}", angles[k], found[k]);
             }
         }
@@ -56,15 +57,15 @@ fn arguments_of_complex_numbers_are_accurate() {
 #[test]
 fn sines_of_f64_are_accurate() {
     #[inline(always)]
-    fn run<S: Simd>(simd: S, t: &[f64; 4]) -> [[f64; 4]; 2] {
-        let (s, c) = sin_cos_turns_f64(f64x4::load_array(simd, *t));
+    fn run<S: Simd>(simd: S, t: &[f64; 8]) -> [[f64; 8]; 2] {
+        let (s, c) = sin_cos_turns_f64(f64x8::load_array(simd, *t));
         [s.to_array(), c.to_array()]
     }
     for i in -300..1000 {
-        let t = [0.0, 0.1, 0.2, 0.3].map(|x| x * 0.01 + f64::from(i) / 777.0);
+        let t: [f64; 8] = from_fn(|k| k as f64 * 0.001 + f64::from(i) / 777.0);
         for level in super::support::levels() {
             let [s, c] = dispatch!(level, simd => run(simd, &t));
-            for k in 0..4 {
+            for k in 0..8 {
                 let (sin, cos) = (t[k] * TAU).sin_cos();
                 assert!((s[k] - sin).abs() < 1e-13 && (c[k] - cos).abs() < 1e-13, "{}", t[k]);
             }
