@@ -115,7 +115,7 @@ impl PassProgress {
 }
 
 impl PassProgress {
-    fn images(&self, py: Python<'_>, aovs: &[Aov]) -> Vec<(&'static str, Image)> {
+    fn images(&self, py: Python<'_>, aovs: &[Aov]) -> Vec<(String, Image)> {
         py.detach(|| layers(&self.canvas.film(), aovs, None))
     }
 }

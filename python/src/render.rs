@@ -200,11 +200,11 @@ impl Request {
         let rendering = observed(&job, &settings, stop, latest, events).map_err(|error| other(&error))?;
         let aovs = self.aov.clone();
         let has = (job.sample_count_map.is_some(), rendering.cache.is_some());
-        let aovs = aovs.unwrap_or_else(|| output::default_aovs(has.0, has.1));
+        let aovs = aovs.unwrap_or_else(|| output::default_aovs(&rendering.film, has.0, has.1));
         let layers = output::layers(&rendering.film, &aovs, job.sample_count_map.as_ref());
         let Film { bounds, resolution, .. } = &rendering.film;
         Ok(Done {
-            layers: layers.into_iter().map(|(name, image)| (name.to_owned(), image)).collect(),
+            layers,
             metadata: self.metadata(&job, &rendering),
             place: ([bounds.x0 as usize, bounds.y0 as usize], resolution.map(|n| n as usize)),
             plan: plan.chosen,

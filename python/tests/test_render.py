@@ -164,6 +164,15 @@ def test_warnings_of_scenes_are_warnings() -> None:
         lumiris.render(SCENE, **TINY, integrator="direct", path_reuse=4)
 
 
+def test_light_groups_are_layers_that_add_up_to_the_image() -> None:
+    scene = SCENE + 'LightSource "infinite" "rgb L" [2 3 1] "string lightgroup" "rim"'
+    image = lumiris.render(scene, **TINY, estimator="mis")
+    names = [name for name in image if name.startswith("light_")]
+    assert sorted(names) == ["light_other", "light_rim"] and image["light_rim"].max() > 0
+    assert np.allclose(image["light_other"] + image["light_rim"], image["beauty"], rtol=1e-5, atol=1e-7)
+    assert not any(name.startswith("light_") for name in lumiris.render(scene, **TINY, estimator="mis", light_groups="none"))
+
+
 def test_a_plan_gives_the_image_that_it_came_from() -> None:
     options: Dict[str, Any] = {"spp": 4, "estimator": "ris", "resolution": (16, 16)}
     first = lumiris.render(SCENE, **options)

@@ -37,12 +37,13 @@ pub mod stats;
 mod t1;
 
 use crate::accel::RayBatch;
+use crate::lights::LightId;
 use crate::scene::RenderJob;
 pub(crate) use bsdf_samples::{EmitterInDirection, emitter_at};
 use estimators::Batch;
 pub use estimators::Estimator;
 pub use fits::Fits;
-use lumiris_numbers::math::Rgb;
+use lumiris_numbers::math::{Rgb, Vec3};
 pub use point::ShadingPoint;
 use point::halves;
 pub use stats::DirectStats;
@@ -65,6 +66,12 @@ impl DirectStage {
     /// The samples of the last batch, in the order of their points: point, contribution if visible, visibility.
     pub fn outcomes(&self) -> impl Iterator<Item = (u32, Rgb, bool)> {
         self.batch.segments.outcomes()
+    }
+
+    /// Point, light with the direction to it, and contribution of the samples of the last batch that are visible, for
+    /// estimators that add these up.
+    pub fn visible(&self) -> impl Iterator<Item = (u32, (LightId, Vec3), Rgb)> {
+        self.batch.segments.visible()
     }
 
     /// Estimates ∫ f_s L_direct |cos θ| dω for each point; `out[i]` belongs to `points[i]`. Estimators that are

@@ -2,7 +2,8 @@
 
 use super::candidates::Candidates;
 use crate::accel::{Accel, Coherence, RayBatch};
-use lumiris_numbers::math::{Ray, Rgb};
+use crate::lights::LightId;
+use lumiris_numbers::math::{Ray, Rgb, Vec3};
 
 /// True if a candidate with this contribution needs a segment: it is finite and not zero.
 #[inline]
@@ -16,6 +17,7 @@ pub struct Segments {
     rays: RayBatch,
     contributions: Vec<Rgb>,
     points: Vec<u32>,
+    lights: Vec<LightId>,
     occluded: Vec<bool>,
 }
 
@@ -25,13 +27,15 @@ impl Segments {
         self.rays.clear();
         self.contributions.clear();
         self.points.clear();
+        self.lights.clear();
     }
 
-    /// Adds a segment with its point and its contribution if unoccluded.
-    pub fn push(&mut self, segment: &Ray, point: u32, contribution: Rgb) {
+    /// Adds a segment from a point to a light, with the contribution if it is unoccluded.
+    pub fn push(&mut self, segment: &Ray, (point, light): (u32, LightId), contribution: Rgb) {
         self.rays.push(segment);
         self.contributions.push(contribution);
         self.points.push(point);
+        self.lights.push(light);
     }
 
     /// Takes the segments of all candidates whose contribution is finite and not zero, in candidate order:
@@ -40,7 +44,7 @@ impl Segments {
         self.clear();
         for (candidate, &contribution) in candidates.records.iter().zip(&candidates.contributions) {
             if is_traced(&contribution) {
-                self.push(&candidate.segment, candidate.point, contribution);
+                self.push(&candidate.segment, (candidate.point, candidate.light), contribution);
             }
         }
     }
@@ -76,6 +80,14 @@ impl Segments {
     pub fn outcomes(&self) -> impl Iterator<Item = (u32, Rgb, bool)> {
         let segments = self.points.iter().zip(&self.contributions).zip(&self.occluded);
         segments.map(|((&point, &contribution), &occluded)| (point, contribution, !occluded))
+    }
+
+    /// Point, light with the direction to it, and contribution of each segment that is unoccluded.
+    pub fn visible(&self) -> impl Iterator<Item = (u32, (LightId, Vec3), Rgb)> {
+        let free = self.outcomes().enumerate().filter(|(_, (_, _, is_free))| *is_free);
+        free.map(|(i, (point, contribution, _))| {
+            (point, (self.lights[i], self.rays.get(i).d.normalize_or_zero()), contribution)
+        })
     }
 
     /// Adds the contributions of the unoccluded segments to their points, in order.

@@ -167,6 +167,8 @@ pub struct Film {
     replicas: Vec<Replica>,
     /// What is subtracted from the mean of each pixel; empty if nothing is.
     corrections: Vec<[f32; 3]>,
+    /// The light of each group of lights, if these have layers.
+    light_layers: Vec<(String, Film)>,
     variance_scale: OnceLock<VarianceScale>,
     summary: OnceLock<Summary>,
 }
@@ -198,7 +200,19 @@ impl Film {
         tiles.sort_unstable_by_key(|t| (t.bounds.y0, t.bounds.x0));
         replicas.sort_unstable_by_key(|r| r.pixel);
         let (variance_scale, summary) = Default::default();
-        Film { resolution, bounds, tiles, replicas, corrections: Vec::new(), variance_scale, summary }
+        let (corrections, light_layers) = Default::default();
+        Film { resolution, bounds, tiles, replicas, corrections, light_layers, variance_scale, summary }
+    }
+
+    /// With layers by groups of lights.
+    #[must_use]
+    pub fn with_light_layers(self, light_layers: Vec<(String, Film)>) -> Self {
+        Film { light_layers, ..self }
+    }
+
+    /// The light of each group of lights, by their names; together they are the image.
+    pub fn light_layers(&self) -> &[(String, Film)] {
+        &self.light_layers
     }
 
     /// A film of a single tile.
@@ -241,7 +255,8 @@ impl Film {
     /// Bytes of memory.
     pub fn bytes(&self) -> usize {
         let tiles: usize = self.tiles.iter().map(|t| t.sums.bytes() + size_of_val(t)).sum();
-        tiles + size_of_val(&self.replicas[..]) + size_of_val(&self.corrections[..])
+        let layers: usize = self.light_layers.iter().map(|(_, film)| film.bytes()).sum();
+        tiles + layers + size_of_val(&self.replicas[..]) + size_of_val(&self.corrections[..])
     }
 
     /// All pixels, row by row: 144 bytes each, which is much for large images.

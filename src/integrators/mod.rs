@@ -9,6 +9,7 @@
 mod arrivals;
 mod diffuse;
 pub mod irradiance_cache;
+pub mod light_layers;
 pub mod path;
 pub mod photon_map;
 mod pilot;
@@ -28,6 +29,7 @@ use crate::film::PixelSample;
 use crate::photons::PhotonError;
 use crate::scene::RenderJob;
 use crate::settings::{IntegratorKind, RouletteKind};
+use lumiris_numbers::math::Rgb;
 use std::sync::atomic::AtomicBool;
 
 /// A way to render an image: what all threads share.
@@ -55,6 +57,14 @@ pub trait Tracer: Send {
     /// Estimates the radiance of each camera sample; `out[i]` belongs to `samples[i]`. `fits` are those of the samples'
     /// pixels.
     fn trace(&mut self, job: &RenderJob, samples: &[CameraSample], fits: &mut Fits, out: &mut Vec<PixelSample>);
+
+    /// Keeps the light of so many layers by lights from now on, if it can; see [`light_layers`].
+    fn keep_light_layers(&mut self, _count: usize) {}
+
+    /// The light of the layers of the last batch: by sample, then by layer; nothing if none are kept.
+    fn light_layers(&self) -> &[Rgb] {
+        &[]
+    }
 
     /// The counts and times since the last call.
     fn take_stats(&mut self) -> PathStats;

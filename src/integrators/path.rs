@@ -188,7 +188,8 @@ impl PathTracer {
                 let (stats, direct) = (&mut self.search.stats, &mut self.direct.stats);
                 let segments = self.search.recording.as_mut().map(|r| r.segments_at(vertex));
                 let (samples, next, reuse) = (&mut *out, &mut self.next, self.reuse.active());
-                batch.shade(job, &mut Output { samples, fits, next, stats, direct, segments, reuse });
+                let layers = &mut self.search.layers;
+                batch.shade(job, &mut Output { samples, fits, next, stats, direct, segments, reuse, layers });
                 self.buffers = Some(batch.into_buffers());
             }
             std::mem::swap(&mut self.search.active, &mut self.next);
@@ -263,9 +264,17 @@ impl PathTracer {
             }));
         }
         let is_lit = |i: usize| step.shadings.as_ref().is_none_or(|shadings| shadings[i].lit.is_some());
-        let lit = active.iter().enumerate().filter(|&(i, _)| is_lit(i));
-        for ((_, path), &radiance) in lit.zip(&self.radiance) {
+        let lit = active.iter().enumerate().filter(|&(i, _)| is_lit(i)).map(|(_, path)| path);
+        for (path, &radiance) in lit.clone().zip(&self.radiance) {
             out[path.sample as usize].radiance += path.beta * radiance;
+        }
+        let layers = &mut self.search.layers;
+        if layers.are_kept() {
+            let lit: Vec<&PathState> = lit.collect();
+            for (point, light, contribution) in self.direct.visible() {
+                let path = lit[point as usize];
+                layers.add(&job.lights, path.sample, light, path.beta * contribution);
+            }
         }
     }
 
@@ -293,6 +302,14 @@ impl PathTracer {
 impl Tracer for PathTracer {
     fn trace(&mut self, job: &RenderJob, samples: &[CameraSample], fits: &mut Fits, out: &mut Vec<PixelSample>) {
         PathTracer::trace(self, job, &job.settings().integrator, samples, fits, out);
+    }
+
+    fn keep_light_layers(&mut self, count: usize) {
+        self.search.layers.layers = count;
+    }
+
+    fn light_layers(&self) -> &[Rgb] {
+        self.search.layers.sums()
     }
 
     fn take_stats(&mut self) -> PathStats {

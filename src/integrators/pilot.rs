@@ -96,6 +96,14 @@ impl Tracer for GuidedTracer<'_> {
         self.paths.trace(job, self.settings, samples, fits, out);
     }
 
+    fn keep_light_layers(&mut self, count: usize) {
+        self.paths.keep_light_layers(count);
+    }
+
+    fn light_layers(&self) -> &[Rgb] {
+        self.paths.light_layers()
+    }
+
     fn take_stats(&mut self) -> PathStats {
         self.paths.take_stats()
     }

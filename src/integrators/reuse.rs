@@ -16,6 +16,7 @@
 //! two pixels is never the same for all samples. Groups end at [cells](CELL), which are always rendered together: so
 //! images do not depend on tiles.
 
+use super::light_layers;
 use super::segment::CameraSample;
 use crate::accel::{Accel, Coherence, RayBatch};
 use crate::film::PixelSample;
@@ -45,6 +46,7 @@ pub fn obstacle(job: &RenderJob) -> Option<&'static str> {
         (settings.kind != IntegratorKind::Path, "only the integrator path has paths of its own for each pixel"),
         (settings.roulette != RouletteKind::Throughput, "they split"),
         (job.pixel_samples.is_some(), "pixels have different numbers of samples"),
+        (light_layers::count(job) > 0, "light groups have layers (--light-groups none: they have not)"),
         (geometry.has_motion() || is_cut_out, "what a ray meets varies with time or is cut out at random"),
     ];
     reasons.into_iter().find(|(holds, _)| *holds).map(|(_, reason)| reason)

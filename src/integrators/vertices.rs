@@ -2,6 +2,7 @@
 //! way.
 
 use super::arrivals::Arrivals;
+use super::light_layers::LayerSums;
 use super::segment::{CameraSample, Carried, PathState, PathStats, Vertex, domain, emptied};
 use super::wavefront::Batch;
 use crate::accel::{Coherence, Hit, RayBatch};
@@ -68,6 +69,8 @@ pub(super) struct VertexSearch {
     pub(super) omits_features: bool,
     /// What is done about paths that arrive at vertices.
     pub(super) arrivals: Arrivals,
+    /// What is of each light group.
+    pub(super) layers: LayerSums,
     /// Copies of what is traced, if requested.
     pub(super) recording: Option<Recording>,
 }
@@ -77,6 +80,7 @@ impl VertexSearch {
     pub(super) fn start(&mut self, samples: &[CameraSample], out: &mut Vec<PixelSample>) {
         out.clear();
         out.resize(samples.len(), PixelSample::default());
+        self.layers.begin(samples.len());
         self.arrivals.start();
         self.active.clear();
         self.active.extend(samples.iter().enumerate().map(|(i, s)| PathState {
@@ -167,7 +171,9 @@ impl VertexSearch {
         let interaction = SurfaceInteraction::new(at.job, &path.ray, (path.width, path.spread), hit);
         let (sample, out) = (&at.samples[path.sample as usize], &mut at.out[path.sample as usize]);
         if self.looks_for_emitters(at.vertex, path) {
-            out.radiance += path.emission(at.job, &interaction);
+            let emission = path.emission(at.job, &interaction);
+            out.radiance += emission;
+            self.layers.add_emission(at.job, path.sample, &interaction.hit, emission);
         }
         let Some(beta) = path.beta_beyond_emitter() else { return };
         let Some(bsdf) = interaction.scatter(at.job) else {
@@ -210,11 +216,13 @@ impl VertexSearch {
 
     /// Adds what the escaped paths carry of infinite lights, with the weight of the technique that found it.
     fn add_infinite(&mut self, job: &RenderJob, out: &mut [PixelSample]) {
-        let (lights, active) = (&job.lights, &self.active);
+        let (lights, active, layers) = (&job.lights, &self.active, &mut self.layers);
         self.escaped.retain(|&k| {
             let path = &active[k as usize];
             if path.technique.is_none() {
-                out[path.sample as usize].radiance += path.beta * lights.le(path.ray.d);
+                let l = path.beta * lights.le(path.ray.d);
+                out[path.sample as usize].radiance += l;
+                layers.add_infinite(lights, path.sample, path.ray.d, l);
             }
             path.technique.is_some()
         });
@@ -230,6 +238,7 @@ impl VertexSearch {
                 let weight =
                     path.technique.filter(|_| !l.is_black()).map_or(1.0, |technique| technique.weight(|_| p_light));
                 out[path.sample as usize].radiance += l * weight;
+                layers.add_infinite(lights, path.sample, path.ray.d, l * weight);
             },
         );
     }

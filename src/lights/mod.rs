@@ -2,7 +2,7 @@
 //!
 //! Reading order: [`point`], [`spot`], [`area`], [`environment`], [`emit`], [`lanes`], [`bounds`], [`choice`],
 //! [`tree`], [`tree_choice`], [`visibility_cache`], [`learned_visibility`], [`visibility_cache_sampler`],
-//! [`light_sampler`], [`set`], [`groups`], [`sampling`], [`many`], [`irradiance`].
+//! [`light_sampler`], [`layers`], [`set`], [`groups`], [`sampling`], [`many`], [`irradiance`].
 
 pub mod area;
 pub mod bounds;
@@ -12,6 +12,7 @@ pub mod environment;
 pub mod groups;
 pub mod irradiance;
 pub mod lanes;
+pub mod layers;
 pub mod learned_visibility;
 pub mod light_sampler;
 pub mod many;
@@ -40,6 +41,7 @@ pub use environment::{EnvironmentFilter, EnvironmentMap, EnvironmentMapping};
 pub use groups::LightGroups;
 pub use irradiance::Irradiances;
 pub use lanes::LightLanes;
+pub use layers::LightLayers;
 pub use learned_visibility::LearnedVisibility;
 pub use light_sampler::{LightSampler, LightSamplerKind};
 pub use sampling::LightSampling;

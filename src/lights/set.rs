@@ -2,10 +2,12 @@
 
 use super::area::AreaShape;
 use super::{
-    Emission, Light, LightCtx, LightId, LightSample, LightSampler, LightSamplerKind, SampledLight, area_lights_of,
+    Emission, Light, LightCtx, LightId, LightLayers, LightSample, LightSampler, LightSamplerKind, SampledLight,
+    area_lights_of,
 };
 use crate::geometry::{GeometryId, Shape};
 use lumiris_numbers::math::{Bounds3, Rgb, Vec3};
+use std::sync::Arc;
 
 /// Lights of the primitives of one geometry: one for all, or one for each.
 #[derive(Clone, Debug)]
@@ -20,12 +22,22 @@ struct EmittingGeometry {
 pub struct LightSetBuilder {
     lights: Vec<Light>,
     emitting: Vec<EmittingGeometry>,
+    /// The group of the lights that are added next, and those of all so far.
+    group: Option<Arc<str>>,
+    groups: Vec<Option<Arc<str>>>,
 }
 
 impl LightSetBuilder {
+    /// Lets the lights that are added from now on belong to a group, which has a layer of its own in the image.
+    pub fn in_group(&mut self, group: Option<Arc<str>>) -> &mut Self {
+        self.group = group;
+        self
+    }
+
     /// Adds a light that is not an area light.
     pub fn add(&mut self, light: Light) -> LightId {
         self.lights.push(light);
+        self.groups.resize(self.lights.len(), self.group.clone());
         (self.lights.len() - 1) as LightId
     }
 
@@ -34,6 +46,7 @@ impl LightSetBuilder {
         let area = area_lights_of(shape, emission);
         let first_light = self.lights.len() as LightId;
         self.lights.extend(area.lights.into_iter().map(Light::Area));
+        self.groups.resize(self.lights.len(), self.group.clone());
         self.emitting.push(EmittingGeometry { geometry, first_light, light_of_primitive: area.light_of_primitive });
     }
 
@@ -51,6 +64,7 @@ impl LightSetBuilder {
             lights: self.lights,
             infinite,
             lit,
+            layers: LightLayers::new(&self.groups),
             emitting: self.emitting,
             scene_centre: if center.is_finite() { center } else { Vec3::ZERO },
             scene_radius,
@@ -67,6 +81,8 @@ pub struct LightSet {
     pub infinite: Vec<LightId>,
     /// Lights with power, ascending.
     pub lit: Vec<LightId>,
+    /// Layers of the image by groups of lights.
+    pub layers: LightLayers,
     /// Sorted by geometry.
     emitting: Vec<EmittingGeometry>,
     /// Centre of the scene's bounding sphere; the origin for an empty scene.

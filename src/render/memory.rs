@@ -10,6 +10,7 @@ use super::{RenderSettings, thread_pool};
 use crate::direct::Estimator;
 use crate::film::BAND;
 use crate::imaging::oiio::ROWS_AT_ONCE;
+use crate::integrators::light_layers;
 use crate::scene::RenderJob;
 
 /// Bytes of a pixel with one sample: radiance and its squares, counts.
@@ -94,6 +95,7 @@ fn of_sums(job: &RenderJob, render: &RenderSettings) -> f64 {
     if replica_edge(job, render).is_some() {
         bytes += REPLICAS;
     }
+    bytes += light_layers::count(job) as f64 * grown(IMAGE, DIGITS[0]);
     let estimator = Estimator::at_vertex(&job.settings().integrator, 0);
     let fits = estimator.fits(job, 1);
     bytes += (fits.exact_sums().len() * CONTROL + fits.memory().map(size_of_val).iter().sum::<usize>()) as f64;

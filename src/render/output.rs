@@ -1,7 +1,7 @@
 //! From the film to images: channels with names, and metadata.
 
 use super::Rendering;
-use crate::film::{BAND, Film};
+use crate::film::{BAND, Film, PixelSums};
 use crate::imaging::{IMAGE_LAYER, Image};
 use crate::scene::{FilmSettings, SampleCountMap};
 use crate::settings::Settings;
@@ -32,6 +32,8 @@ pub enum Aov {
     Ratio,
     /// Records of the irradiance cache that were computed for the pixel, `records`.
     Records,
+    /// The light of each group of lights, `light_NAME.R/G/B`; together they are the image.
+    LightGroups,
 }
 
 impl Aov {
@@ -43,13 +45,13 @@ impl Aov {
     pub fn is_feature(self) -> bool {
         match self {
             Aov::Albedo | Aov::Normal | Aov::Depth | Aov::Material | Aov::Object => true,
-            Aov::Variance | Aov::Samples | Aov::Ratio | Aov::Records => false,
+            Aov::Variance | Aov::Samples | Aov::Ratio | Aov::Records | Aov::LightGroups => false,
         }
     }
 
-    /// Names of its channels.
-    pub fn channels(self) -> &'static [&'static str] {
-        match self {
+    /// Names of its channels in the image of a film.
+    fn channels(self, film: &Film) -> Vec<String> {
+        let names: &[&str] = match self {
             Aov::Variance => &["variance.R", "variance.G", "variance.B"],
             Aov::Samples => &["samples"],
             Aov::Albedo => &["albedo.R", "albedo.G", "albedo.B"],
@@ -59,8 +61,18 @@ impl Aov {
             Aov::Object => &["object"],
             Aov::Ratio => &["ratio.R", "ratio.G", "ratio.B", "ratio.proposals", "ratio.samples"],
             Aov::Records => &["records"],
-        }
+            Aov::LightGroups => {
+                let of_layer = |name: &String| COLOUR.map(|channel| format!("{}.{channel}", light_layer_name(name)));
+                return film.light_layers().iter().flat_map(|(name, _)| of_layer(name)).collect();
+            }
+        };
+        names.iter().map(|&name| name.to_owned()).collect()
     }
+}
+
+/// Name of the layer of a group of lights.
+fn light_layer_name(group: &str) -> String {
+    format!("light_{group}")
 }
 
 /// Channels of the image itself.
@@ -96,8 +108,8 @@ impl<'a> Layers<'a> {
     /// Names of the channels.
     pub fn names(&self) -> Vec<String> {
         let image = if self.has_image { &COLOUR[..] } else { &[] };
-        let aovs = self.aovs.iter().flat_map(|a| a.channels());
-        image.iter().chain(aovs).map(|&name| name.to_owned()).collect()
+        let aovs = self.aovs.iter().flat_map(|a| a.channels(self.film));
+        image.iter().map(|&name| name.to_owned()).chain(aovs).collect()
     }
 
     /// The values of some rows as [`Self::rows`] makes them, by several threads.
@@ -117,6 +129,7 @@ impl<'a> Layers<'a> {
         } else {
             self.film.read_rows(rows.clone(), &mut pixels);
         }
+        let light_layers = self.rows_of_light_layers(rows.clone());
         let first = self.film.index(self.film.bounds.x0, rows.start);
         let mut data = Vec::with_capacity(stride * pixels.len());
         for (i, pixel) in pixels.iter().enumerate() {
@@ -138,10 +151,24 @@ impl<'a> Layers<'a> {
                         data.extend(self.sample_count_map.map_or([0.0; 5], |map| ratio_values(map, first + i)));
                     }
                     Aov::Records => data.push(pixel.records as f32),
+                    Aov::LightGroups => {
+                        data.extend(light_layers.iter().flat_map(|pixels| pixels[i].mean().map(|v| v as f32)));
+                    }
                 }
             }
         }
         data
+    }
+
+    /// The layers by groups of lights, if they are among the AOVs.
+    fn rows_of_light_layers(&self, rows: Range<u32>) -> Vec<Vec<PixelSums>> {
+        let layers = if self.aovs.contains(&Aov::LightGroups) { self.film.light_layers() } else { &[] };
+        let pixels = |film: &Film| {
+            let mut pixels = Vec::new();
+            film.read_rows(rows.clone(), &mut pixels);
+            pixels
+        };
+        layers.iter().map(|(_, film)| pixels(film)).collect()
     }
 }
 
@@ -151,9 +178,9 @@ pub fn channels(film: &Film, aovs: &[Aov], sample_count_map: Option<&SampleCount
     Channels { names: layers.names(), data: layers.rows(film.bounds.y0..film.bounds.y1) }
 }
 
-/// The same values, with an image of its own for each AOV; by their names, the image itself first.
-pub fn layers(film: &Film, aovs: &[Aov], sample_count_map: Option<&SampleCountMap>) -> Vec<(&'static str, Image)> {
-    let image = |has_image: bool, aovs: &[Aov]| {
+/// The same values, with an image of its own for each AOV and each group of lights; by their names, the image itself first.
+pub fn layers(film: &Film, aovs: &[Aov], sample_count_map: Option<&SampleCountMap>) -> Vec<(String, Image)> {
+    let image = |film: &Film, has_image: bool, aovs: &[Aov]| {
         let layers = Layers::new(film, has_image, aovs, sample_count_map);
         Image {
             width: film.bounds.width() as usize,
@@ -162,8 +189,15 @@ pub fn layers(film: &Film, aovs: &[Aov], sample_count_map: Option<&SampleCountMa
             data: layers.rows_in_parallel(film.bounds.y0..film.bounds.y1),
         }
     };
-    let of_aovs = aovs.iter().map(|&aov| (aov.into(), image(false, &[aov])));
-    [(IMAGE_LAYER, image(true, &[]))].into_iter().chain(of_aovs).collect()
+    let of_aov = |&aov: &Aov| match aov {
+        Aov::LightGroups => {
+            let layer = |(name, film): &(String, Film)| (light_layer_name(name), image(film, true, &[]));
+            film.light_layers().iter().map(layer).collect()
+        }
+        _ => vec![(<&str>::from(aov).to_owned(), image(film, false, &[aov]))],
+    };
+    let whole = (IMAGE_LAYER.to_owned(), image(film, true, &[]));
+    std::iter::once(whole).chain(aovs.iter().flat_map(of_aov)).collect()
 }
 
 /// The AOVs of an image under way.
@@ -172,10 +206,11 @@ pub fn live_aovs(has_features: bool) -> Vec<Aov> {
     features.chain([Aov::Samples]).collect()
 }
 
-/// The AOVs that an image has unless others are asked for.
-pub fn default_aovs(has_ratio: bool, has_records: bool) -> Vec<Aov> {
-    let more = has_ratio.then_some(Aov::Ratio).into_iter().chain(has_records.then_some(Aov::Records));
-    Aov::ALL.into_iter().chain(more).collect()
+/// The AOVs that the image of a film has unless others are asked for.
+pub fn default_aovs(film: &Film, has_ratio: bool, has_records: bool) -> Vec<Aov> {
+    let has_groups = !film.light_layers().is_empty();
+    let more = [(has_ratio, Aov::Ratio), (has_records, Aov::Records), (has_groups, Aov::LightGroups)];
+    Aov::ALL.into_iter().chain(more.into_iter().filter_map(|(has, aov)| has.then_some(aov))).collect()
 }
 
 /// Colour and numbers of a pixel of the map: from red at the minimum ratio (1) to green at the maximum of the map,

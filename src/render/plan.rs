@@ -17,7 +17,7 @@ use super::{RenderSettings, Run, ThreadError, camera_batches};
 use crate::direct::Fits;
 use crate::film::PixelBounds;
 use crate::integrators::path::CameraSample;
-use crate::integrators::{PathTracer, Tracer, reuse};
+use crate::integrators::{PathTracer, Tracer, light_layers, reuse};
 use crate::scene::{RenderJob, SampleCountMap};
 use crate::settings::table::rows;
 use crate::settings::{
@@ -84,7 +84,10 @@ pub fn prepare(job: &mut RenderJob, threads: Option<usize>, ratio_map: bool) -> 
     job.pixel_samples = pool.install(|| allocate(job));
     let shares_paths = job.settings().integrator.path_reuse.is_some_and(|edge| edge > 1);
     let obstacle = reuse::obstacle(job).filter(|_| shares_paths);
-    let warnings = obstacle.map(|reason| format!("pixels do not share paths: {reason}")).into_iter().collect();
+    let unshared = obstacle.map(|reason| format!("pixels do not share paths: {reason}"));
+    let obstacle = light_layers::obstacle(job).filter(|_| light_layers::is_wanted(job));
+    let without_layers = obstacle.map(|reason| format!("light groups have no layers: {reason}"));
+    let warnings = unshared.into_iter().chain(without_layers).collect();
     Ok(Plan { auto, ris, chosen: chosen(&before, job.settings()), warnings })
 }
 

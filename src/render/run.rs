@@ -3,16 +3,15 @@
 use super::camera_samples::{self, CameraSampler};
 use super::control_variates;
 use super::parts::{Checkpoints, PartError, StoredTile};
-use super::tiles::{SHARE_TILE, Tile, Tiles, bounds_of_tiles, film, position, replica_edge};
+use super::tiles::{SHARE_TILE, Tile, Tiles, bounds_of_tiles, empty_layers, film, position, replica_edge};
 use super::worker::{AnyWorker, Workers};
 use super::{BATCH_PATHS, Continuation, Progress, RenderError, RenderSettings, Rendering, TileObserver};
 use crate::direct::Estimator;
-use crate::film::accumulator::PixelAccumulator;
 use crate::film::packed::PackedSums;
 use crate::film::replicas::{ReplicaAccumulator, replicas};
 use crate::film::{Film, FilmTile, PixelBounds};
 use crate::integrators::path::CameraSample;
-use crate::integrators::{PathStats, Statistics, integrator, reuse};
+use crate::integrators::{PathStats, Statistics, integrator, light_layers, reuse};
 use crate::scene::{FilmSettings, RenderJob};
 use lumiris_numbers::estimators::ocv::block_of;
 use lumiris_numbers::math::hash::pcg4d;
@@ -123,7 +122,8 @@ impl<'a> Run<'a> {
         let mut stats = PathStats::default();
         while first < end && !self.stopped() {
             let served = end.min(first.saturating_add(integrator.prepare(first)?));
-            let workers = Workers::new(&*integrator, self.settings.with_features || self.is_over_pixels());
+            let with_features = self.settings.with_features || self.is_over_pixels();
+            let workers = Workers::new(&*integrator, with_features, light_layers::count(self.job));
             while first < served && !self.stopped() {
                 let length = self.next_pass(first - self.settings.first_sample, first - begin);
                 let samples = first..(first + length).min(served);
@@ -232,13 +232,14 @@ impl<'a> Run<'a> {
         let replicas = replica_edge.map_or(Vec::new(), |edge| replicas(all, &bounds, edge));
         let integrator = &self.job.settings().integrator;
         let fits = Estimator::at_vertex(integrator, 0).fits(self.job, bounds.area() + replicas.len());
-        Tile { bounds, done: self.begin(), sums: Arc::new(PackedSums::new(bounds.area())), replicas, fits }
+        let layers = empty_layers(light_layers::count(self.job), bounds.area());
+        Tile { bounds, done: self.begin(), sums: Arc::new(PackedSums::new(bounds.area())), layers, replicas, fits }
     }
 
     /// The film of all tiles.
     fn film(&self, tiles: &[Tile]) -> Film {
         let FilmSettings { resolution, bounds, .. } = self.job.world.scene.film;
-        film(resolution, bounds, tiles)
+        film(resolution, bounds, tiles, light_layers::names(self.job))
     }
 
     /// The film of one tile.
@@ -325,21 +326,16 @@ impl<'a> Run<'a> {
             ill_conditioned = tile.fits.solve();
         }
         let solve = start.elapsed();
-        worker.sums.resize(bounds.area(), PixelAccumulator::default());
-        tile.sums.read(0..bounds.area(), &mut worker.sums);
+        worker.read(tile);
         let mut first = 0;
         while first < bounds.area() {
             let pixels = self.batch_of_pixels(&bounds, first, &samples);
             first = pixels.end;
             self.camera_samples(&bounds, pixels.clone(), &samples, &mut worker.scratch, &mut worker.samples);
             worker.tracer.trace(self.job, &worker.samples, &mut tile.fits, &mut worker.results);
-            let mut results = worker.results.iter();
-            for index in pixels {
-                let samples = self.samples_of(position(&bounds, index as u32), &samples);
-                samples.zip(results.by_ref()).for_each(|(i, r)| worker.sums[index].add(i, r));
-            }
+            worker.add(pixels.map(|index| (index, self.samples_of(position(&bounds, index as u32), &samples))));
         }
-        tile.set_sums(&worker.sums, &mut worker.packing);
+        worker.write(tile);
         self.render_replicas(worker, tile, samples);
         let mut stats = worker.tracer.take_stats();
         if begins_block {

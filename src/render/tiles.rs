@@ -45,6 +45,8 @@ pub(super) struct Tile {
     pub(super) done: u32,
     /// Sums of its pixels, row by row; films share them.
     pub(super) sums: Arc<PackedSums>,
+    /// The same of the layers by lights.
+    pub(super) layers: Vec<Arc<PackedSums>>,
     pub(super) replicas: Vec<ReplicaAccumulator>,
     /// Those of its pixels one after the other, then those of its replicas.
     pub(super) fits: Fits,
@@ -53,14 +55,28 @@ pub(super) struct Tile {
 impl Tile {
     /// Replaces the sums of its pixels; `scratch` is memory that calls share.
     pub(super) fn set_sums(&mut self, sums: &[PixelAccumulator], scratch: &mut Vec<u8>) {
-        // Those that a film has are left to it
-        if Arc::get_mut(&mut self.sums).is_none() {
-            self.sums = Arc::new(PackedSums::new(sums.len()));
-        }
-        if let Some(packed) = Arc::get_mut(&mut self.sums) {
-            packed.set(sums, scratch);
-        }
+        set(&mut self.sums, sums, scratch);
     }
+
+    /// The same of a layer by lights.
+    pub(super) fn set_layer(&mut self, layer: usize, sums: &[PixelAccumulator], scratch: &mut Vec<u8>) {
+        set(&mut self.layers[layer], sums, scratch);
+    }
+}
+
+fn set(packed: &mut Arc<PackedSums>, sums: &[PixelAccumulator], scratch: &mut Vec<u8>) {
+    // Those that a film has are left to it
+    if Arc::get_mut(packed).is_none() {
+        *packed = Arc::new(PackedSums::new(sums.len()));
+    }
+    if let Some(packed) = Arc::get_mut(packed) {
+        packed.set(sums, scratch);
+    }
+}
+
+/// Layers of a tile without samples.
+pub(super) fn empty_layers(count: usize, pixels: usize) -> Vec<Arc<PackedSums>> {
+    (0..count).map(|_| Arc::new(PackedSums::new(pixels))).collect()
 }
 
 /// Tiles that cover an image, or a part of it.
@@ -87,8 +103,8 @@ pub(super) fn replica_edge(job: &RenderJob, render: &RenderSettings) -> Option<u
     (render.with_replicas && is_useful && !shares_noise).then_some(edge)
 }
 
-/// The film of tiles, which shares their sums.
-pub(super) fn film(resolution: [u32; 2], bounds: PixelBounds, tiles: &[Tile]) -> Film {
+/// The film of tiles, which shares their sums; `layers` are the names of those by lights.
+pub(super) fn film(resolution: [u32; 2], bounds: PixelBounds, tiles: &[Tile], layers: &[String]) -> Film {
     let width = bounds.width();
     let index = |tile: &Tile, pixel: u32| {
         let [x, y] = position(&tile.bounds, pixel);
@@ -96,8 +112,13 @@ pub(super) fn film(resolution: [u32; 2], bounds: PixelBounds, tiles: &[Tile]) ->
     };
     let replicas = tiles.iter().flat_map(|t| t.replicas.iter().map(move |r| r.replica(index(t, r.pixel))));
     let replicas = replicas.collect();
+    let of_layer = |i: usize| {
+        let tiles = tiles.iter().map(|t| FilmTile { bounds: t.bounds, sums: Arc::clone(&t.layers[i]) });
+        Film::new(resolution, bounds, tiles.collect(), Vec::new())
+    };
+    let layers = layers.iter().enumerate().map(|(i, name)| (name.clone(), of_layer(i))).collect();
     let tiles = tiles.iter().map(|t| FilmTile { bounds: t.bounds, sums: Arc::clone(&t.sums) });
-    Film::new(resolution, bounds, tiles.collect(), replicas)
+    Film::new(resolution, bounds, tiles.collect(), replicas).with_light_layers(layers)
 }
 
 /// Coordinates of the pixel of a tile with the given index, row by row.

@@ -1,10 +1,12 @@
 //! What the threads of a rendering hold: a tracer each, with the memory of a batch.
 
 use super::camera_samples::Scratch;
+use super::tiles::Tile;
 use crate::film::PixelSample;
 use crate::film::accumulator::PixelAccumulator;
 use crate::integrators::path::CameraSample;
 use crate::integrators::{Integrator, Tracer};
+use std::ops::Range;
 use std::sync::{Mutex, MutexGuard, PoisonError};
 
 /// Buffers of one thread.
@@ -15,6 +17,8 @@ pub(super) struct Worker<T> {
     pub(super) results: Vec<PixelSample>,
     /// The sums of a tile, while samples are added to them.
     pub(super) sums: Vec<PixelAccumulator>,
+    /// The same of the layers by lights.
+    layers: Vec<Vec<PixelAccumulator>>,
     /// Memory to pack them.
     pub(super) packing: Vec<u8>,
 }
@@ -22,7 +26,45 @@ pub(super) struct Worker<T> {
 impl<T> Worker<T> {
     pub(super) fn new(tracer: T) -> Self {
         let (samples, scratch, results) = Default::default();
-        Worker { tracer, samples, scratch, results, sums: Vec::new(), packing: Vec::new() }
+        Worker { tracer, samples, scratch, results, sums: Vec::new(), layers: Vec::new(), packing: Vec::new() }
+    }
+}
+
+impl AnyWorker<'_> {
+    /// Takes the sums of a tile.
+    pub(super) fn read(&mut self, tile: &Tile) {
+        let area = tile.bounds.area();
+        self.layers.resize_with(tile.layers.len(), Vec::new);
+        let layers = self.layers.iter_mut().zip(&tile.layers);
+        for (sums, packed) in layers.chain([(&mut self.sums, &tile.sums)]) {
+            sums.resize(area, PixelAccumulator::default());
+            packed.read(0..area, sums);
+        }
+    }
+
+    /// Adds the results to the sums of their pixels, which are given in order with the indices of their samples.
+    pub(super) fn add(&mut self, pixels: impl Iterator<Item = (usize, Range<u32>)>) {
+        let Worker { tracer, results, sums, layers, .. } = self;
+        let count = layers.len();
+        let of_layers = tracer.light_layers();
+        let mut results = results.iter().enumerate();
+        for (pixel, samples) in pixels {
+            for (i, (k, result)) in samples.zip(results.by_ref()) {
+                sums[pixel].add(i, result);
+                // Its own layers are `count` numbers
+                for (sums, &radiance) in layers.iter_mut().zip(&of_layers[k * count..]) {
+                    sums[pixel].add(i, &PixelSample { radiance, features: None });
+                }
+            }
+        }
+    }
+
+    /// Returns the sums of a tile.
+    pub(super) fn write(&mut self, tile: &mut Tile) {
+        tile.set_sums(&self.sums, &mut self.packing);
+        for (layer, sums) in self.layers.iter().enumerate() {
+            tile.set_layer(layer, sums, &mut self.packing);
+        }
     }
 }
 
@@ -33,19 +75,25 @@ pub(super) type AnyWorker<'a> = Worker<Box<dyn Tracer + 'a>>;
 pub(super) struct Workers<'a> {
     integrator: &'a dyn Integrator,
     with_features: bool,
+    /// Number of layers by lights.
+    light_layers: usize,
     /// Those without a tile, whose buffers are large enough already.
     idle: Mutex<Vec<AnyWorker<'a>>>,
 }
 
 impl<'a> Workers<'a> {
-    pub(super) fn new(integrator: &'a dyn Integrator, with_features: bool) -> Self {
-        Workers { integrator, with_features, idle: Mutex::default() }
+    pub(super) fn new(integrator: &'a dyn Integrator, with_features: bool, light_layers: usize) -> Self {
+        Workers { integrator, with_features, light_layers, idle: Mutex::default() }
     }
 
     /// Lets one of them work.
     pub(super) fn with_one<R>(&self, work: impl FnOnce(&mut AnyWorker<'a>) -> R) -> R {
         let idle = self.idle().pop();
-        let mut worker = idle.unwrap_or_else(|| Worker::new(self.integrator.tracer(self.with_features)));
+        let mut worker = idle.unwrap_or_else(|| {
+            let mut tracer = self.integrator.tracer(self.with_features);
+            tracer.keep_light_layers(self.light_layers);
+            Worker::new(tracer)
+        });
         let result = work(&mut worker);
         self.idle().push(worker);
         result

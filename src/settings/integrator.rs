@@ -25,6 +25,8 @@ pub struct IntegratorSettings {
     /// Edge of the blocks of pixels that share paths from their second diffuse vertex on; 1: none do. `None`: what `auto`
     /// chooses, or 1.
     pub path_reuse: Option<u32>,
+    /// Lights that name groups have layers of their own in the image.
+    pub light_groups: bool,
     /// Direct-light estimator at each path vertex.
     pub estimator: EstimatorKind,
     /// Samples per estimate (N): shadow segments per shading point. `None` is the default of the estimator,
@@ -69,6 +71,7 @@ impl Default for IntegratorSettings {
             roulette_depth: Some(4),
             roulette: RouletteKind::Throughput,
             path_reuse: None,
+            light_groups: true,
             estimator: EstimatorKind::Auto,
             samples: None,
             later_samples: None,

@@ -8,6 +8,7 @@ mod evaluated;
 mod image_hashes;
 mod irradiance_cache;
 mod layering;
+mod light_groups;
 mod mutations;
 mod path_reuse;
 mod photon_map;

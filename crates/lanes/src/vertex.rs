@@ -4,9 +4,7 @@
 //! The formulas are those of the modules `geometry::mesh`, `bsdfs::diffuse` and `direct` for single vertices.
 //! Columns have one length, a multiple of [`LANES`].
 
-use super::lane::{
-    F, I, LANES, M, Vec3s, Wide, load, narrowed, or_zero, safe_sqrt, sin_cos_eighth, store, widened,
-};
+use super::lane::{F, I, LANES, M, Vec3s, Wide, load, narrowed, or_zero, safe_sqrt, sin_cos_eighth, store, widened};
 use fearless_simd::{Level, Simd, dispatch, f64x8, prelude::*};
 use lumiris_numbers::estimators::mis::Heuristic;
 use lumiris_numbers::math::gamma;

@@ -59,7 +59,7 @@ impl Ris {
     }
 
     /// True if an estimate of visibility is a control variate.
-    fn has_control(&self) -> bool {
+    pub fn has_control(&self) -> bool {
         self.target == Target::VisibilityControl
     }
 
@@ -240,12 +240,12 @@ impl Buffers {
                     continue;
                 }
                 let segment = match by_bsdf {
-                    Some(candidate) => Some(candidate.segment),
-                    None => self.proposals.light_sample(place).map(|(_, s)| point.light_segment(&s)),
+                    Some(candidate) => Some((candidate.light, candidate.segment)),
+                    None => self.proposals.light_sample(place).map(|(light, s)| (light, point.light_segment(&s))),
                 };
                 match segment {
-                    Some(segment) => {
-                        self.probes.push(&segment, i as u32, Rgb::BLACK);
+                    Some((light, segment)) => {
+                        self.probes.push(&segment, (i as u32, light), Rgb::BLACK);
                         probed.push(place);
                     }
                     None => self.proposals.weight[place] = 0.0,

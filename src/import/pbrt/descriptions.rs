@@ -8,6 +8,7 @@ use lumiris_formats::pbrt::params::ParamSet;
 use lumiris_formats::source::Span;
 use lumiris_numbers::math::{Affine3A, Rgb, Vec2, Vec3};
 use std::path::{Path, PathBuf};
+use std::sync::Arc;
 
 /// A directive that is evaluated once all of them have been read: the camera needs the film's size.
 pub(super) struct Pending {
@@ -35,6 +36,8 @@ pub struct AreaLightDesc {
     pub image: Option<(PathBuf, Span)>,
     /// Total power (W) that replaces the scale, if positive.
     pub power: f32,
+    /// Light group.
+    pub group: Option<Arc<str>>,
     /// The directive.
     pub span: Span,
 }

@@ -27,8 +27,8 @@ use std::sync::Arc;
 struct Assembly {
     set: GeometrySet,
     surfaces: Vec<Surface>,
-    /// Emitters, with the descriptions of their lights.
-    emitters: Vec<(GeometryId, Emission)>,
+    /// Emitters, with the descriptions of their lights and their groups.
+    emitters: Vec<(GeometryId, Emission, Option<Arc<str>>)>,
     /// Opening and closing of the shutter as fractions of the motion.
     shutter: [f32; 2],
     /// Images that area lights emit.
@@ -94,11 +94,15 @@ impl Builder<'_> {
 
         // Lights
         let mut lights = LightSetBuilder::default();
-        self.lights.into_iter().for_each(|light| {
-            lights.add(light);
-        });
-        for (geometry, emission) in &assembly.emitters {
-            lights.add_area(*geometry, &assembly.set.geometries[*geometry as usize].shape, emission);
+        for (light, group) in self.lights.into_iter().zip(self.light_groups) {
+            lights.in_group(group).add(light);
+        }
+        for (geometry, emission, group) in &assembly.emitters {
+            lights.in_group(group.clone()).add_area(
+                *geometry,
+                &assembly.set.geometries[*geometry as usize].shape,
+                emission,
+            );
         }
         let lights = lights.build(&assembly.set.world_bounds());
         let scene = Scene {
@@ -132,13 +136,13 @@ impl Builder<'_> {
                     d.warning_once(light.span, "moving area lights are not rendered yet: the shape is dark");
                     None
                 }
-                (None, false) => Some(emission_of(light, &shape, &assembly.images)),
+                (None, false) => Some((emission_of(light, &shape, &assembly.images), light.group.clone())),
             });
             if passes && emission.is_none() {
                 // Nothing scatters here, and media are not rendered: rays need not stop.
                 continue;
             }
-            assembly.emitters.extend(emission.map(|e| (id, e)));
+            assembly.emitters.extend(emission.map(|(emission, group)| (id, emission, group)));
             assembly.set.geometries.push(Geometry { shape, alpha: desc.alpha, visibility: Visibility::ALL });
             assembly.surfaces.push(Surface { material, name: desc.name.clone() });
             ids.push(id);

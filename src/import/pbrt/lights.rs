@@ -4,6 +4,7 @@ use super::checks::unknown;
 use super::descriptions::{AreaLightDesc, EnvironmentDesc};
 use super::spectrum::SpectrumUse;
 use super::state::Builder;
+use crate::lights::layers::fault_of_name;
 use crate::lights::spot::spot_solid_angle;
 use crate::lights::{EnvironmentFilter, EnvironmentMap, EnvironmentMapping, Light};
 use lumiris_formats::diagnostic::Diagnostics;
@@ -37,8 +38,10 @@ impl Builder<'_> {
         };
         p.ignore("nsamples");
         p.ignore("samples");
+        let group = light_group(p, d);
         p.report_unused(d);
         self.lights.extend(light);
+        self.light_groups.resize(self.lights.len(), group);
     }
 
     fn emitted(&self, p: &ParamSet, name: &'static str, d: &mut Diagnostics) -> Rgb {
@@ -144,9 +147,22 @@ impl Builder<'_> {
         }
         p.ignore("nsamples");
         p.ignore("samples");
+        let group = light_group(p, d);
         p.report_unused(d);
         self.emission_images.extend(image.as_ref().map(|(path, _)| path.clone()));
-        Some(AreaLightDesc { l: color.unwrap_or(Rgb::WHITE) * scale, two_sided, image, power, span: p.span })
+        Some(AreaLightDesc { l: color.unwrap_or(Rgb::WHITE) * scale, two_sided, image, power, group, span: p.span })
+    }
+}
+
+/// `lightgroup`: the layer of the image that the light has.
+fn light_group(p: &ParamSet, d: &mut Diagnostics) -> Option<Arc<str>> {
+    let name = p.string("lightgroup", d)?;
+    match fault_of_name(name) {
+        Some(reason) => {
+            d.error(p.span_of("lightgroup"), reason);
+            None
+        }
+        None => Some(name.into()),
     }
 }
 

@@ -19,6 +19,7 @@ use lumiris_numbers::math::{Affine3A, Rgb};
 use std::cell::RefCell;
 use std::collections::HashMap;
 use std::path::{Path, PathBuf};
+use std::sync::Arc;
 
 /// What a block saves and restores.
 #[derive(Clone)]
@@ -93,6 +94,8 @@ pub struct Builder<'a> {
     pub named_materials: HashMap<String, u32>,
     /// Lights that are no surfaces.
     pub lights: Vec<Light>,
+    /// Their groups.
+    pub light_groups: Vec<Option<Arc<str>>>,
     /// Environment maps that wait for their image.
     pub environments: Vec<EnvironmentDesc>,
     /// Images that area lights emit.
@@ -139,6 +142,7 @@ impl<'a> Builder<'a> {
             materials,
             named_materials: HashMap::new(),
             lights: Vec::new(),
+            light_groups: Vec::new(),
             environments: Vec::new(),
             emission_images: Vec::new(),
             shapes: Vec::new(),

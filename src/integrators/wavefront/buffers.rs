@@ -4,8 +4,10 @@ use super::columns::{SampleColumns, Single, Surface, Traced};
 use super::controls::Controls;
 use super::emitters::EmitterRays;
 use crate::film::PixelSample;
+use crate::integrators::light_layers::LayerSums;
 use crate::integrators::segment::Carried;
 use crate::lights::many::Scratch;
+use crate::scene::RenderJob;
 use lumiris_lanes::columns::{Columns3, padded, reserve};
 use lumiris_lanes::lane::LANES;
 use lumiris_lanes::vertex::{self as kernels, Ends, Points, Rays, Samples, TriangleHits};
@@ -105,6 +107,21 @@ impl Buffers {
         let (f_cos, li) = (f_cos.get(len), light.li.get(len));
         let samples = Samples { f_cos, li, p, p_other, n, n_other, heuristic };
         kernels::weigh(level(), &samples, &mut c.get_mut(len));
+    }
+
+    /// Adds the contributions of the last samples that are unoccluded to the layers of their lights.
+    pub(super) fn add_to_layers(&self, job: &RenderJob, by_light: bool, layers: &mut LayerSums) {
+        let only = job.lights.sampler.only_light();
+        let visible = self.traced.index.iter().zip(&self.traced.occluded).filter(|(_, occluded)| !**occluded);
+        for i in visible.map(|(&i, _)| i as usize) {
+            let (path, wi) = (&self.paths[i], self.samples.light.wi.vec3(i));
+            let contribution = path.beta * self.samples.c.rgb(i);
+            let drawn = || Some(only.unwrap_or_else(|| self.scratch.chosen(i)));
+            match if by_light { drawn() } else { self.emitter_rays.lights[i] } {
+                Some(light) => layers.add(&job.lights, path.sample, (light, wi), contribution),
+                None => layers.add_infinite(&job.lights, path.sample, wi, contribution),
+            }
+        }
     }
 
     /// The segments of the samples that contribute.

@@ -22,6 +22,7 @@ pub(super) use buffers::Buffers;
 use buffers::Stream;
 use columns::{Single, Surface, others};
 
+use super::light_layers::LayerSums;
 use super::reuse::{Place, Reuse};
 use super::segment::{
     BsdfTechnique, Carried, Direction, PathState, PathStats, domain, emptied, sampled_direction, survive,
@@ -123,6 +124,8 @@ pub(super) struct Output<'a> {
     pub(super) segments: Option<&'a mut Vec<RayBatch>>,
     /// Takes the vertices of paths that pixels share, if they do.
     pub(super) reuse: Option<&'a mut Reuse>,
+    /// Takes what is of each light group, if that is kept.
+    pub(super) layers: &'a mut LayerSums,
 }
 
 impl<'w> Batch<'w> {
@@ -220,7 +223,7 @@ impl<'w> Batch<'w> {
         for k in 0..light {
             let start = Instant::now();
             self.sample_lights(job, k);
-            let t1 = self.trace(job, out, start);
+            let t1 = self.trace(job, out, (true, start));
             out.direct.t1_light += t1;
             self.add_controls(job, true);
         }
@@ -228,7 +231,7 @@ impl<'w> Batch<'w> {
         for k in 0..bsdf {
             let start = Instant::now();
             out.direct.emitter_rays += self.sample_bsdfs(job, k);
-            self.trace(job, out, start);
+            self.trace(job, out, (false, start));
             self.add_controls(job, false);
         }
         out.direct.proposals += (n as u64) * u64::from(light + bsdf);
@@ -352,9 +355,9 @@ impl<'w> Batch<'w> {
         count
     }
 
-    /// Traces the segments of the samples that contribute, and adds the contributions of those that are unoccluded.
-    /// Returns the time since `start`, when sampling began, until tracing began.
-    fn trace(&mut self, job: &RenderJob, out: &mut Output<'_>, start: Instant) -> Duration {
+    /// Traces the segments of the samples that contribute, of light or of BSDF sampling, and adds the contributions of those
+    /// that are unoccluded. Returns the time since `start`, when sampling began, until tracing began.
+    fn trace(&mut self, job: &RenderJob, out: &mut Output<'_>, (by_light, start): (bool, Instant)) -> Duration {
         let n = self.buffers.paths.len();
         self.buffers.make_segments(n);
         let Buffers { samples, traced, radiance, .. } = &mut *self.buffers;
@@ -365,6 +368,10 @@ impl<'w> Batch<'w> {
             let i = i as usize;
             radiance.set_rgb(i, radiance.rgb(i) + samples.c.rgb(i));
         }
+        if out.layers.are_kept() {
+            self.buffers.add_to_layers(job, by_light, out.layers);
+        }
+        let traced = &self.buffers.traced;
         if let Some(segments) = &mut out.segments {
             segments.push(traced.rays.clone());
         }

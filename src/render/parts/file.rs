@@ -16,7 +16,7 @@ use std::path::{Path, PathBuf};
 /// What files begin with.
 const MAGIC: &[u8; 8] = b"LUMIFILM";
 /// Version of the format.
-const VERSION: u32 = 1;
+const VERSION: u32 = 2;
 /// Letters of chunks.
 const HEADER: u8 = b'H';
 const TILES: u8 = b'T';

@@ -2,6 +2,7 @@
 
 use crate::direct::Estimator;
 use crate::film::PixelBounds;
+use crate::integrators::light_layers;
 use crate::render::RenderSettings;
 use crate::render::tiles::{TileShare, replica_edge};
 use crate::scene::RenderJob;
@@ -30,6 +31,8 @@ pub struct FilmHeader {
     pub replica_edge: Option<u32>,
     /// Number of control variates that are summed.
     pub controls: u32,
+    /// Names of the layers by lights.
+    pub light_layers: Vec<String>,
     /// Tells the scene from others.
     pub fingerprint: u64,
     /// What the image depends on, by name: equal in all parts of an image.
@@ -60,6 +63,7 @@ impl FilmHeader {
             is_finished: false,
             replica_edge: replica_edge(job, render),
             controls: if estimator.is_over_pixels() { job.controls() as u32 } else { 0 },
+            light_layers: light_layers::names(job).to_vec(),
             fingerprint,
             settings,
             notes,
@@ -84,6 +88,10 @@ impl FilmHeader {
         }
         if (self.replica_edge, self.controls) != (other.replica_edge, other.controls) {
             lines.push("one of them holds the sums for a variance layer, the other does not".to_owned());
+        }
+        if self.light_layers != other.light_layers {
+            let [here, there] = [other, self].map(|header| header.light_layers.join(", "));
+            lines.push(format!("light groups: {here}; not {there}"));
         }
         lines
     }
@@ -122,6 +130,7 @@ impl FilmHeader {
             ("finished", self.is_finished.to_string()),
             ("replicas", self.replica_edge.unwrap_or(0).to_string()),
             ("controls", self.controls.to_string()),
+            ("light_layers", self.light_layers.join(",")),
             ("fingerprint", format!("{:016x}", self.fingerprint)),
         ];
         let mut text: String = own.iter().map(|(key, value)| line("", key, value)).collect();
@@ -159,6 +168,7 @@ impl FilmHeader {
             is_finished: own("finished")?.parse().ok()?,
             replica_edge: Some(own("replicas")?.parse().ok()?).filter(|&edge| edge > 0),
             controls: own("controls")?.parse().ok().filter(|n| *n <= 1 << 16)?,
+            light_layers: own("light_layers")?.split(',').filter(|name| !name.is_empty()).map(str::to_owned).collect(),
             fingerprint: u64::from_str_radix(own("fingerprint")?, 16).ok()?,
             settings: named("setting "),
             notes: named("note "),
@@ -213,6 +223,7 @@ mod tests {
             is_finished: true,
             replica_edge: None,
             controls: 7,
+            light_layers: vec!["key".to_owned(), "other".to_owned()],
             fingerprint: 0xfedc_ba98_7654_3210,
             settings: vec![
                 ("lumiris:seed".to_owned(), "3".to_owned()),

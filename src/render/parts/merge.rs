@@ -13,7 +13,7 @@ use crate::film::packed::PackedSums;
 use crate::film::replicas::replicas;
 use crate::film::{Film, PixelBounds};
 use crate::render::control_variates;
-use crate::render::tiles::{SHARE_TILE, Tile, film, position};
+use crate::render::tiles::{SHARE_TILE, Tile, empty_layers, film, position};
 use std::collections::BTreeMap;
 use std::ops::Range;
 use std::path::{Path, PathBuf};
@@ -69,7 +69,7 @@ pub fn merge(paths: &[PathBuf], allows_missing: bool) -> Result<Merged, PartErro
             return Err(PartError::damaged(&part.path, "it does not have the pixels that its header says"));
         }
     }
-    let mut film = film(first.header.resolution, bounds, &whole.tiles);
+    let mut film = film(first.header.resolution, bounds, &whole.tiles, &first.header.light_layers);
     control_variates::correct(&mut film, &whole.tiles, position);
     Ok(Merged { film, header: first.header.clone(), missing, samples })
 }
@@ -187,7 +187,8 @@ impl Whole {
                 0 => Fits::default(),
                 controls => Fits::of_pixels(controls, bounds.area() + replicas.len()),
             };
-            Tile { bounds, done: 0, sums: Arc::new(PackedSums::new(bounds.area())), replicas, fits }
+            let layers = empty_layers(header.light_layers.len(), bounds.area());
+            Tile { bounds, done: 0, sums: Arc::new(PackedSums::new(bounds.area())), layers, replicas, fits }
         };
         Whole { bounds: image, tiles: image.tiles(SHARE_TILE).into_iter().map(tile).collect(), packing: Vec::new() }
     }
@@ -204,7 +205,11 @@ impl Whole {
         if row * rows != stored.controls.len() || row != expected {
             return Err(damaged("it does not have the control variates that its header says"));
         }
+        if stored.layers.len() != part.header.light_layers.len() {
+            return Err(damaged("it does not have the light groups that its header says"));
+        }
         let sums = stored.sums.unpacked();
+        let layers: Vec<_> = stored.layers.iter().map(PackedSums::unpacked).collect();
         let columns = self.bounds.width().div_ceil(SHARE_TILE) as usize;
         let cells = |from: u32, to: u32, origin: u32| {
             (((from - origin) / SHARE_TILE) as usize)..((to - origin).div_ceil(SHARE_TILE) as usize)
@@ -213,6 +218,7 @@ impl Whole {
             for x in cells(stored.bounds.x0, stored.bounds.x1, self.bounds.x0) {
                 let tile = &mut self.tiles[y * columns + x];
                 add_to(tile, (stored, &sums, row), &mut self.packing).map_err(damaged)?;
+                add_layers_to(tile, (&stored.bounds, &layers), &mut self.packing);
             }
         }
         Ok(())
@@ -226,11 +232,7 @@ fn add_to(
     packing: &mut Vec<u8>,
 ) -> Result<(), &'static str> {
     let bounds = tile.bounds;
-    let index = |i: u32| {
-        let [x, y] = position(&stored.bounds, i);
-        let is_inside = (bounds.x0..bounds.x1).contains(&x) && (bounds.y0..bounds.y1).contains(&y);
-        is_inside.then(|| ((y - bounds.y0) * bounds.width() + x - bounds.x0) as usize)
-    };
+    let index = |i: u32| index_in(&bounds, &stored.bounds, i);
     let controls = |fit: usize| &stored.controls[fit * row..][..row];
     let mut merged = tile.sums.unpacked();
     for (i, sums) in sums.iter().enumerate() {
@@ -251,6 +253,27 @@ fn add_to(
         }
     }
     Ok(())
+}
+
+/// Adds what the layers of a tile and stored ones have in common.
+fn add_layers_to(tile: &mut Tile, (from, layers): (&PixelBounds, &[Vec<PixelAccumulator>]), packing: &mut Vec<u8>) {
+    let bounds = tile.bounds;
+    for (layer, sums) in layers.iter().enumerate() {
+        let mut merged = tile.layers[layer].unpacked();
+        for (i, sums) in (0..).zip(sums) {
+            if let Some(at) = index_in(&bounds, from, i) {
+                merged[at].merge(sums);
+            }
+        }
+        tile.set_layer(layer, &merged, packing);
+    }
+}
+
+/// The index in the tile `to` of the pixel with index `i` of the tile `from`; `None` if it is outside.
+fn index_in(to: &PixelBounds, from: &PixelBounds, i: u32) -> Option<usize> {
+    let [x, y] = position(from, i);
+    let is_inside = (to.x0..to.x1).contains(&x) && (to.y0..to.y1).contains(&y);
+    is_inside.then(|| ((y - to.y0) * to.width() + x - to.x0) as usize)
 }
 
 /// The first of several paths that are the same file; `None` if there is none.

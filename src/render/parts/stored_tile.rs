@@ -7,6 +7,7 @@ use crate::film::exact::FixedSum;
 use crate::film::packed::PackedSums;
 use crate::film::replicas::ReplicaAccumulator;
 use crate::render::tiles::Tile;
+use std::sync::Arc;
 
 /// The sums of a tile, as they were stored.
 #[derive(Debug)]
@@ -16,6 +17,8 @@ pub struct StoredTile {
     /// Index of the next sample of its pixels.
     pub done: u32,
     pub(super) sums: PackedSums,
+    /// The same of the layers by lights.
+    pub(super) layers: Vec<PackedSums>,
     pub(super) replicas: Vec<ReplicaAccumulator>,
     /// Sums of values and control variates, of the pixels and then of the replicas.
     pub(super) controls: Vec<FixedSum>,
@@ -39,6 +42,10 @@ impl StoredTile {
             tile.fits.merge_sums(fit, sums);
         });
         (tile.replicas, tile.done) = (self.replicas, self.done);
+        if tile.layers.len() != self.layers.len() {
+            return Err(PartError::Sums("there are not as many light groups"));
+        }
+        tile.layers = self.layers.into_iter().map(Arc::new).collect();
         let mut sums = self.sums.unpacked();
         sums.iter_mut().for_each(|sums| sums.records = 0);
         tile.set_sums(&sums, &mut Vec::new());
@@ -49,21 +56,24 @@ impl StoredTile {
     pub(super) fn read(decoder: &mut Decoder<'_>, image: &PixelBounds) -> Option<Self> {
         let mut word = || decoder.word();
         let (bounds, done) = (PixelBounds { x0: word()?, x1: word()?, y0: word()?, y1: word()? }, word()?);
-        let (replicas, controls) = (word()? as usize, word()? as usize);
+        let (layers, replicas, controls) = (word()? as usize, word()? as usize, word()? as usize);
         let is_inside =
             image.x0 <= bounds.x0 && bounds.x1 <= image.x1 && image.y0 <= bounds.y0 && bounds.y1 <= image.y1;
         if !is_inside || bounds.area() == 0 {
             return None;
         }
         // As many as there are bytes for, whatever the numbers say
-        let sums = (0..bounds.area()).map(|_| decoder.pixel()).collect::<Option<Vec<_>>>()?;
-        let sums = PackedSums::of(&sums);
+        let mut pixels =
+            || Some(PackedSums::of(&(0..bounds.area()).map(|_| decoder.pixel()).collect::<Option<Vec<_>>>()?));
+        let sums = pixels()?;
+        let layers = (0..layers).map(|_| pixels()).collect::<Option<_>>()?;
         let replicas: Vec<_> = (0..replicas).map(|_| decoder.replica()).collect::<Option<_>>()?;
         if replicas.iter().any(|r| r.pixel as usize >= bounds.area()) {
             return None;
         }
         let controls = (0..controls).map(|_| decoder.fixed()).collect::<Option<_>>()?;
-        Some(StoredTile { bounds, done, sums, replicas, controls, memory: [decoder.floats()?, decoder.floats()?] })
+        let memory = [decoder.floats()?, decoder.floats()?];
+        Some(StoredTile { bounds, done, sums, layers, replicas, controls, memory })
     }
 }
 
@@ -72,9 +82,12 @@ pub(super) fn write(tile: &Tile, encoder: &mut Encoder) {
     let b = &tile.bounds;
     let controls = tile.fits.exact_sums();
     [b.x0, b.x1, b.y0, b.y1, tile.done].into_iter().for_each(|n| encoder.word(n));
+    encoder.word(tile.layers.len() as u32);
     encoder.word(tile.replicas.len() as u32);
     encoder.word(controls.len() as u32);
-    tile.sums.unpacked().iter().for_each(|sums| encoder.pixel(sums));
+    for sums in std::iter::once(&tile.sums).chain(&tile.layers) {
+        sums.unpacked().iter().for_each(|sums| encoder.pixel(sums));
+    }
     tile.replicas.iter().for_each(|replica| encoder.replica(replica));
     controls.iter().for_each(|sum| encoder.fixed(sum));
     tile.fits.memory().into_iter().for_each(|values| encoder.floats(values));

@@ -86,6 +86,18 @@ pub(super) const TRANSPORT: Group = Group {
             ..Setting::BASE
         },
         Setting {
+            flag: "light-groups",
+            value_name: "KIND",
+            parameters: &["lightgroups"],
+            key: "light_groups",
+            kind: Kind::Choice { names: &["layers", "none"], synonyms: &[] },
+            help: "What lights that name a group (\"string lightgroup\") have: a layer of the image for each group, light_NAME.R, \
+                   .G and .B, which add up to the image, or nothing",
+            get: |s| Some(Value::Name(if s.integrator.light_groups { "layers" } else { "none" })),
+            set: |s, v| v.name().map(|name| s.integrator.light_groups = name == "layers"),
+            ..Setting::BASE
+        },
+        Setting {
             flag: "light-sampler",
             aliases: &["light-choice"],
             parameters: &["lightsampler"],

@@ -9,7 +9,7 @@ use super::progress;
 use super::stored::{AOV_NOTE, PLAN_NOTE, SCENE_NOTE, SECONDS_NOTE};
 use anyhow::bail;
 use clap::Args;
-use lumiris::render::output::Aov;
+use lumiris::render::output::{Aov, default_aovs};
 use lumiris::render::parts::FilmReader;
 use lumiris::render::parts::merge::{Merged, merge, repeated};
 use std::path::PathBuf;
@@ -101,10 +101,7 @@ fn seconds(args: &MergeArgs) -> anyhow::Result<f64> {
 fn aovs(merged: &Merged) -> Vec<Aov> {
     match merged.header.note(AOV_NOTE) {
         Some(list) => list.split(',').filter_map(|name| name.parse().ok()).filter(|aov| *aov != Aov::Ratio).collect(),
-        None => {
-            let has_records = merged.film.summary().has_records;
-            Aov::ALL.into_iter().chain(has_records.then_some(Aov::Records)).collect()
-        }
+        None => default_aovs(&merged.film, false, merged.film.summary().has_records),
     }
 }
 

@@ -257,7 +257,8 @@ impl Made<'_> {
         if let Some(list) = self.asked {
             return list.to_vec();
         }
-        output::default_aovs(self.job.sample_count_map.is_some(), self.rendering.cache.is_some())
+        let has = (self.job.sample_count_map.is_some(), self.rendering.cache.is_some());
+        output::default_aovs(&self.rendering.film, has.0, has.1)
     }
 
     /// What the image depends on, and how it came about.

@@ -129,6 +129,38 @@ fn merged_parts_have_the_bits_of_the_single_image_whatever_the_method_and_the_sp
 }
 
 #[test]
+fn layers_of_light_groups_are_those_of_the_single_image() {
+    let folder = tempfile::tempdir().unwrap();
+    let folder = folder.path();
+    let scene = Path::new(env!("CARGO_MANIFEST_DIR")).join("../../scenes/demo/light-groups.pbrt");
+    let render = format!("render {} --resolution 40x36 --spp 7 --estimator mis -q", scene.display());
+    run(&format!("{render} -o single.exr"), folder);
+    let single = image("single.exr", folder);
+    for group in ["sky", "other", "rim", "key"] {
+        for channel in ["R", "G", "B"] {
+            let name = format!("light_{group}.{channel}");
+            let place = single.image.channels.iter().position(|c| *c == name).unwrap();
+            assert!(single.image.data.iter().skip(place).step_by(single.image.channels.len()).any(|v| *v > 0.0));
+        }
+    }
+    for (by, other) in [("", " --part-by tiles --tile-size 5"), (" --part-by tiles", "")] {
+        (1..4).for_each(|i| run(&format!("{render} --part {i}/3{by} -o {i}.part"), folder));
+        run("merge 2.part 3.part 1.part -q -o merged.exr", folder);
+        assert_same("single.exr", "merged.exr", folder, by);
+        run(&format!("{render} --light-groups none --part 1/3{other} -o 1.part"), folder);
+        refuse("merge 2.part 3.part 1.part -o none.exr", folder, 3, &["light_groups: none, not layers"]);
+    }
+    run(&format!("{render} --spp 3 --checkpoint c.film -o some.exr"), folder);
+    run(&format!("{render} --resume c.film --threads 1 -o resumed.exr"), folder);
+    assert_same("single.exr", "resumed.exr", folder, "resumed");
+
+    // What cannot have layers says so, and is rendered without
+    let output = lumiris(&format!("{render} --integrator irradiance-cache --cache-samples 8 -o cache.exr"), folder);
+    assert!(output.status.success() && stderr(&output).contains("light groups have no layers"), "{}", stderr(&output));
+    assert!(!image("cache.exr", folder).image.channels.iter().any(|name| name.starts_with("light_")));
+}
+
+#[test]
 fn more_samples_than_first_asked_for_are_one_more_part() {
     let folder = tempfile::tempdir().unwrap();
     let folder = folder.path();

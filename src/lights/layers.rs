@@ -1,0 +1,77 @@
+//! Light groups: lights whose light has a layer of its own in the image.
+
+use super::LightId;
+use std::sync::Arc;
+
+/// The group of lights that name none, where others do.
+pub const OTHERS: &str = "other";
+
+/// Layers of an image by lights, each of which belongs to one; none if no light names a group.
+#[derive(Clone, Debug, Default, PartialEq, Eq)]
+pub struct LightLayers {
+    names: Vec<String>,
+    /// By light; empty without layers.
+    of_light: Vec<u32>,
+}
+
+impl LightLayers {
+    /// From the groups that the lights name, by light.
+    pub fn new(groups: &[Option<Arc<str>>]) -> Self {
+        let mut layers = LightLayers::default();
+        if groups.iter().all(Option::is_none) {
+            return layers;
+        }
+        for group in groups {
+            let name = group.as_deref().unwrap_or(OTHERS);
+            let place = layers.names.iter().position(|other| other == name).unwrap_or_else(|| {
+                layers.names.push(name.to_owned());
+                layers.names.len() - 1
+            });
+            layers.of_light.push(place as u32);
+        }
+        layers
+    }
+
+    /// Their names, in the order of their first lights.
+    pub fn names(&self) -> &[String] {
+        &self.names
+    }
+
+    /// The layer of a light, where there are any.
+    #[inline]
+    pub fn of(&self, light: LightId) -> usize {
+        self.of_light[light as usize] as usize
+    }
+}
+
+/// Why a text cannot be the name of a group; `None` if it can. It becomes a part of the names of channels.
+pub fn fault_of_name(name: &str) -> Option<String> {
+    let is_allowed = |c: char| c.is_alphanumeric() || matches!(c, '_' | '-');
+    match name.chars().find(|&c| !is_allowed(c)) {
+        _ if name.is_empty() => Some("the name of a light group is empty".to_owned()),
+        Some(c) => Some(format!("the name of a light group has letters, digits, `_` and `-`, and no `{c}`")),
+        None => None,
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn lights_without_a_group_are_together_where_others_have_one() {
+        let [key, rim]: [Option<Arc<str>>; 2] = ["key", "rim"].map(|name| Some(name.into()));
+        let layers = LightLayers::new(&[None, key.clone(), rim, key, None]);
+        assert_eq!(layers.names(), ["other", "key", "rim"]);
+        assert_eq!([0, 1, 2, 3, 4].map(|light| layers.of(light)), [0, 1, 2, 1, 0]);
+        assert_eq!(LightLayers::new(&[None, None]), LightLayers::default());
+    }
+
+    #[test]
+    fn names_are_parts_of_names_of_channels() {
+        assert_eq!(fault_of_name("Key_2-ü"), None);
+        for name in ["", "a.b", "a b", "a,b"] {
+            assert!(fault_of_name(name).is_some(), "{name}");
+        }
+    }
+}
