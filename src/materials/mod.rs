@@ -16,7 +16,7 @@ use crate::bsdfs::{
     ProposalDensity, ThinDielectric, TrowbridgeReitz,
 };
 use crate::geometry::SurfaceHit;
-use crate::textures::{FloatTextureId, ImageId, RgbTextureId, TextureContext, TextureSet};
+use crate::textures::{FloatTextureId, ImageId, ImageTexture, Mapping2d, RgbTextureId, TextureContext, TextureSet};
 use lumiris_numbers::math::hash::{hash_floats, unit_f32};
 use lumiris_numbers::math::{Rgb, Vec3};
 use rayon::prelude::*;
@@ -147,6 +147,26 @@ impl Material {
     }
 }
 
+/// A tangent-space normal map.
+#[derive(Clone, Copy, Debug)]
+pub struct NormalMap {
+    /// The image, stored linear.
+    pub image: ImageTexture,
+    /// Factor of the tangential components.
+    pub strength: f32,
+    /// True if the second axis of tangent space is that of ∂p/∂v, where texture coordinates are mirrored; else it is at the
+    /// left of the first, as in pbrt-v4.
+    pub is_along_v: bool,
+}
+
+impl NormalMap {
+    /// The map as pbrt-v4 reads it.
+    pub fn unscaled(image: ImageId) -> Self {
+        let image = ImageTexture { image, mapping: Mapping2d::default(), scale: 1.0, invert: false };
+        NormalMap { image, strength: 1.0, is_along_v: false }
+    }
+}
+
 /// A material with its name and its maps.
 #[derive(Clone, Debug)]
 pub struct MaterialEntry {
@@ -155,7 +175,7 @@ pub struct MaterialEntry {
     /// The material.
     pub material: Material,
     /// Tangent-space normal map, stored linear; it goes before displacement.
-    pub normal_map: Option<ImageId>,
+    pub normal_map: Option<NormalMap>,
     /// Displacement along the normal, which bends the normal only (scene units).
     pub displacement: Option<FloatTextureId>,
 }

@@ -5,9 +5,9 @@ use super::descriptions::MaterialUse;
 use super::spectrum::{Resolved, SpectrumUse};
 use super::state::Builder;
 use crate::bsdfs::models::LobeAxis;
-use crate::import::images::{ImageEncoding, ImageRequest};
-use crate::materials::{ConductorSpectrum, EvaluatedMaterial, Material, MaterialEntry, MaterialId, Roughness};
-use crate::textures::{Filter, FloatTexture, ImageId, RgbTexture, RgbTextureId, Wrap};
+use crate::import::images::{ImageChannels, ImageEncoding, ImageRequest};
+use crate::materials::{ConductorSpectrum, EvaluatedMaterial, Material, MaterialEntry, MaterialId, NormalMap, Roughness};
+use crate::textures::{Filter, FloatTexture, RgbTexture, RgbTextureId, Wrap};
 use lumiris_formats::diagnostic::{Diagnostics, did_you_mean};
 use lumiris_formats::pbrt::directive::Name;
 use lumiris_formats::pbrt::params::{Input, ParamSet, ParamType};
@@ -81,15 +81,16 @@ impl Builder<'_> {
         MaterialEntry { name, material, normal_map: self.normal_map(p, d), displacement }
     }
 
-    fn normal_map(&mut self, p: &ParamSet, d: &mut Diagnostics) -> Option<ImageId> {
+    fn normal_map(&mut self, p: &ParamSet, d: &mut Diagnostics) -> Option<NormalMap> {
         let name = p.string("normalmap", d)?;
         let request = ImageRequest {
             path: self.folder.join(name),
+            channels: ImageChannels::Color,
             encoding: ImageEncoding::Linear,
             wrap: Wrap::Repeat,
             filter: Filter::Bilinear,
         };
-        Some(self.resources.image(request, p.span_of("normalmap")))
+        Some(NormalMap::unscaled(self.resources.image(request, p.span_of("normalmap"))))
     }
 
     fn scattering_material(&mut self, kind: &str, place: &Name, p: &ParamSet, d: &mut Diagnostics) -> Material {
