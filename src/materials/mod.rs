@@ -1,14 +1,16 @@
 //! Materials: evaluate textures at a hit and build the BSDF in its shading frame. Semantics are pbrt-v4's.
 //!
-//! Reading order: this file, [`evaluated`], [`bump`], [`surface`].
+//! Reading order: this file, [`evaluated`], [`principled`], [`bump`], [`surface`].
 
 pub mod bump;
 pub mod evaluated;
+pub mod principled;
 pub mod surface;
 #[cfg(test)]
 mod tests;
 
 pub use evaluated::EvaluatedMaterial;
+pub use principled::PrincipledMaterial;
 pub use surface::SurfaceBsdf;
 
 use crate::bsdfs::{
@@ -127,6 +129,8 @@ pub enum Material {
         /// Walks per evaluation.
         samples: u32,
     },
+    /// Metal, glossy diffuse or glass under a coat.
+    Principled(PrincipledMaterial),
     /// Reflection that can only be evaluated.
     Evaluated(EvaluatedMaterial),
     /// One of two materials at each point, the second with probability `amount`.
@@ -223,7 +227,8 @@ impl MaterialSet {
     /// for those that can only be evaluated.
     pub fn lobes(&self, density: ProposalDensity) -> usize {
         let has_two = |material: &Material| match material {
-            Material::CoatedDiffuse { .. }
+            Material::Principled(_)
+            | Material::CoatedDiffuse { .. }
             | Material::CoatedConductor { .. }
             | Material::DiffuseTransmission { .. } => true,
             Material::Evaluated(_) => density == ProposalDensity::Lobes,
@@ -337,6 +342,7 @@ impl MaterialSet {
                     samples: samples.max(1),
                 })
             }
+            Material::Principled(material) => Bsdf::Principled(material.bsdf(t)),
             Material::Evaluated(material) => {
                 Bsdf::Evaluated(Evaluated { model: material.model(t), density: ProposalDensity::default() })
             }

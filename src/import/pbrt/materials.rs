@@ -14,7 +14,7 @@ use lumiris_formats::pbrt::params::{Input, ParamSet, ParamType};
 use lumiris_formats::spectra;
 use lumiris_numbers::math::Rgb;
 
-/// Kinds of pbrt-v4 that are rendered, and `evaluated`.
+/// Kinds of pbrt-v4 that are rendered, `principled` and `evaluated`.
 const KINDS: &[&str] = &[
     "diffuse",
     "conductor",
@@ -25,6 +25,7 @@ const KINDS: &[&str] = &[
     "coatedconductor",
     "mix",
     "interface",
+    "principled",
     "evaluated",
 ];
 
@@ -142,6 +143,7 @@ impl Builder<'_> {
                 max_depth: count(p, "maxdepth", 10, d),
                 samples: count(p, "nsamples", 1, d),
             },
+            "principled" => self.principled(p, d),
             "evaluated" => self.evaluated(place, p, d),
             _ => self.other_material(kind, place, p, d),
         }
@@ -262,7 +264,7 @@ impl Builder<'_> {
         material
     }
 
-    fn albedo(&mut self, p: &ParamSet, name: &'static str, default: Rgb, d: &mut Diagnostics) -> RgbTextureId {
+    pub(super) fn albedo(&mut self, p: &ParamSet, name: &'static str, default: Rgb, d: &mut Diagnostics) -> RgbTextureId {
         self.rgb_param(p, name, default, SpectrumUse::Albedo, d)
     }
 
@@ -277,7 +279,7 @@ impl Builder<'_> {
     }
 
     /// An index of refraction: a number, or a spectrum of which the sodium line counts.
-    fn ior(&mut self, p: &ParamSet, name: &'static str, d: &mut Diagnostics) -> f32 {
+    pub(super) fn ior(&mut self, p: &ParamSet, name: &'static str, d: &mut Diagnostics) -> f32 {
         let eta = match p.type_of(name) {
             None => {
                 p.ignore(name);
