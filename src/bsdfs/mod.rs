@@ -309,9 +309,11 @@ impl<'a> Bsdf<'a> {
     #[inline]
     pub fn has_non_specular(&self) -> bool {
         match self {
-            Bsdf::Diffuse(_) | Bsdf::DiffuseTransmission(_) | Bsdf::CoatedDiffuse(_) | Bsdf::Principled(_) | Bsdf::Evaluated(_) => {
-                true
-            }
+            Bsdf::Diffuse(_)
+            | Bsdf::DiffuseTransmission(_)
+            | Bsdf::CoatedDiffuse(_)
+            | Bsdf::Principled(_)
+            | Bsdf::Evaluated(_) => true,
             Bsdf::Conductor(b) => !b.distribution.is_smooth(),
             Bsdf::Dielectric(b) => !b.is_specular(),
             Bsdf::ThinDielectric(_) => false,

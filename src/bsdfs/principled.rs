@@ -57,10 +57,7 @@ pub struct Principled {
 
 /// Facets that are smooth made as rough as what counts as rough.
 pub fn rough(distribution: TrowbridgeReitz) -> TrowbridgeReitz {
-    TrowbridgeReitz {
-        alpha_x: distribution.alpha_x.max(SMOOTH_ALPHA),
-        alpha_y: distribution.alpha_y.max(SMOOTH_ALPHA),
-    }
+    TrowbridgeReitz { alpha_x: distribution.alpha_x.max(SMOOTH_ALPHA), alpha_y: distribution.alpha_y.max(SMOOTH_ALPHA) }
 }
 
 /// Schlick's reflectance with its multiple scattering.
@@ -151,7 +148,9 @@ impl Principled {
 
     fn solid(&self) -> Option<Dielectric> {
         match self.interior {
-            Interior::Solid(eta) if self.transmission > 0.0 => Some(Dielectric { eta, distribution: self.distribution }),
+            Interior::Solid(eta) if self.transmission > 0.0 => {
+                Some(Dielectric { eta, distribution: self.distribution })
+            }
             Interior::Solid(_) | Interior::Thin => None,
         }
     }
@@ -315,7 +314,13 @@ impl Principled {
             _ => (place(warp::sample_cosine_hemisphere(u), 1.0)?, Lobe::DIFFUSE | Lobe::REFLECTION),
         };
         let eta = match (lobe.is_transmission(), self.interior) {
-            (true, Interior::Solid(eta)) => if wo.z > 0.0 { eta } else { 1.0 / eta },
+            (true, Interior::Solid(eta)) => {
+                if wo.z > 0.0 {
+                    eta
+                } else {
+                    1.0 / eta
+                }
+            }
             (true, Interior::Thin) | (false, _) => 1.0,
         };
         Some(BsdfSample { f: self.f(wo, wi), wi, pdf: self.pdf_by(&choice, wo, wi), lobe, eta })

@@ -1,4 +1,4 @@
-//! From scene files to scenes: the meaning of directives ([`pbrt`]), and the images and meshes that they name
+//! From scene files to scenes: the meaning of pbrt's directives ([`pbrt`]) and of glTF ([`gltf`]), and the images and meshes that they name
 //! ([`resources`], [`images`]), which the scenes of an animation share ([`cache`]). A [`fingerprint`] tells a scene from
 //! others.
 //!
@@ -7,6 +7,7 @@
 
 pub mod cache;
 pub mod fingerprint;
+pub mod gltf;
 pub mod images;
 pub mod pbrt;
 pub mod resources;
@@ -20,15 +21,19 @@ use lumiris_formats::diagnostic::{Diagnostics, Report};
 use lumiris_formats::pbrt::parser::parse_file;
 use lumiris_formats::source::SourceMap;
 use pbrt::state::Builder;
-use std::path::Path;
+use std::path::{Path, PathBuf};
 
 /// What overrides a scene file.
-#[derive(Clone, Copy, Debug, Default, PartialEq)]
+#[derive(Clone, Debug, Default, PartialEq)]
 pub struct LoadOptions {
     /// Size of the image (width, height).
     pub resolution: Option<[u32; 2]>,
     /// Crop window x0, x1, y0, y1 in fractions of the image.
     pub crop: Option<[f32; 4]>,
+    /// Image of the environment of a glTF scene.
+    pub environment: Option<PathBuf>,
+    /// True if a glTF scene is framed, whatever its cameras.
+    pub camera_auto: bool,
 }
 
 /// A scene, its settings, and warnings.
@@ -58,6 +63,10 @@ pub fn load(path: &Path, options: &LoadOptions) -> Result<Loaded, Box<Report>> {
 
 /// Loads a scene file; meshes and images that `files` has are not read again.
 pub fn load_with(path: &Path, options: &LoadOptions, files: &FileCache) -> Result<Loaded, Box<Report>> {
+    let is_gltf = |e: &std::ffi::OsStr| e.eq_ignore_ascii_case("gltf") || e.eq_ignore_ascii_case("glb");
+    if path.extension().is_some_and(is_gltf) {
+        return gltf::load(path, options, files);
+    }
     let mut sources = SourceMap::new();
     let mut diagnostics = Diagnostics::new();
     let folder = path.parent().map(Path::to_path_buf).unwrap_or_default();

@@ -11,7 +11,17 @@ fn hit(n: Vec3) -> SurfaceHit {
     let frame = lumiris_numbers::math::Frame::from_xz(Vec3::new(1.0, 0.2, 0.1), n);
     let (dpdu, dpdv) = (frame.x * 2.0, frame.y * 3.0);
     let p = Vec3::new(1.0, 2.0, 3.0);
-    SurfaceHit { p, p_error: Vec3::ZERO, n, ns: n, dpdu, dpdv, dpdus: dpdu, uv: Vec2::new(0.4, 0.6), vertex: Default::default() }
+    SurfaceHit {
+        p,
+        p_error: Vec3::ZERO,
+        n,
+        ns: n,
+        dpdu,
+        dpdv,
+        dpdus: dpdu,
+        uv: Vec2::new(0.4, 0.6),
+        vertex: Default::default(),
+    }
 }
 
 fn context(hit: &SurfaceHit) -> TextureContext {

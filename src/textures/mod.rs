@@ -324,7 +324,14 @@ mod tests {
     use crate::imaging::{ColorEncoding, Image};
 
     fn at(u: f32, v: f32) -> TextureContext {
-        TextureContext { uv: Vec2::new(u, v), uv_width: Vec2::ZERO, uv1: Vec2::ZERO, color: [0.5; 4], p: Vec3::ZERO, n: Vec3::new(0.6, 0.0, 0.8) }
+        TextureContext {
+            uv: Vec2::new(u, v),
+            uv_width: Vec2::ZERO,
+            uv1: Vec2::ZERO,
+            color: [0.5; 4],
+            p: Vec3::ZERO,
+            n: Vec3::new(0.6, 0.0, 0.8),
+        }
     }
 
     /// A 2×2 image, red below, green above, blue on the right.

@@ -6,7 +6,9 @@ use super::spectrum::{Resolved, SpectrumUse};
 use super::state::Builder;
 use crate::bsdfs::models::LobeAxis;
 use crate::import::images::{ImageChannels, ImageEncoding, ImageRequest};
-use crate::materials::{ConductorSpectrum, EvaluatedMaterial, Material, MaterialEntry, MaterialId, NormalMap, Roughness};
+use crate::materials::{
+    ConductorSpectrum, EvaluatedMaterial, Material, MaterialEntry, MaterialId, NormalMap, Roughness,
+};
 use crate::textures::{Filter, FloatTexture, RgbTexture, RgbTextureId, Wrap};
 use lumiris_formats::diagnostic::{Diagnostics, did_you_mean};
 use lumiris_formats::pbrt::directive::Name;
@@ -264,7 +266,13 @@ impl Builder<'_> {
         material
     }
 
-    pub(super) fn albedo(&mut self, p: &ParamSet, name: &'static str, default: Rgb, d: &mut Diagnostics) -> RgbTextureId {
+    pub(super) fn albedo(
+        &mut self,
+        p: &ParamSet,
+        name: &'static str,
+        default: Rgb,
+        d: &mut Diagnostics,
+    ) -> RgbTextureId {
         self.rgb_param(p, name, default, SpectrumUse::Albedo, d)
     }
 

@@ -187,7 +187,8 @@ impl Builder<'_> {
             d.error(p.span, "an image texture needs a `string filename`");
             return None;
         };
-        let request = ImageRequest { path: self.folder.join(name), channels: ImageChannels::Color, encoding, wrap, filter };
+        let request =
+            ImageRequest { path: self.folder.join(name), channels: ImageChannels::Color, encoding, wrap, filter };
         let image = self.resources.image(request, p.span_of("filename"));
         Some(ImageTexture { image, mapping, scale, invert })
     }

@@ -1,0 +1,154 @@
+//! Accessors: arrays of numbers in buffers, dense or sparse.
+
+use super::document::error;
+use super::{Document, GltfError, Place};
+
+/// Greatest number of elements of an accessor without bytes of its own, which are zeros.
+const MAX_ZEROS: usize = 1 << 24;
+
+/// Type of a component.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+enum Component {
+    I8,
+    U8,
+    I16,
+    U16,
+    U32,
+    F32,
+}
+
+impl Component {
+    fn of(code: usize) -> Option<Self> {
+        Some(match code {
+            5120 => Component::I8,
+            5121 => Component::U8,
+            5122 => Component::I16,
+            5123 => Component::U16,
+            5125 => Component::U32,
+            5126 => Component::F32,
+            _ => return None,
+        })
+    }
+
+    fn bytes(self) -> usize {
+        match self {
+            Component::I8 | Component::U8 => 1,
+            Component::I16 | Component::U16 => 2,
+            Component::U32 | Component::F32 => 4,
+        }
+    }
+
+    /// The value, and the divisor that makes an integer at most 1.
+    fn read(self, b: &[u8]) -> (f64, f64) {
+        match self {
+            Component::I8 => (f64::from(b[0] as i8), 127.0),
+            Component::U8 => (f64::from(b[0]), 255.0),
+            Component::I16 => (f64::from(i16::from_le_bytes([b[0], b[1]])), 32767.0),
+            Component::U16 => (f64::from(u16::from_le_bytes([b[0], b[1]])), 65535.0),
+            Component::U32 => (f64::from(u32::from_le_bytes([b[0], b[1], b[2], b[3]])), f64::from(u32::MAX)),
+            Component::F32 => (f64::from(f32::from_le_bytes([b[0], b[1], b[2], b[3]])), 1.0),
+        }
+    }
+}
+
+/// Numbers of an accessor, component by component.
+#[derive(Clone, Debug, Default)]
+pub struct Numbers {
+    /// Components of an element.
+    pub width: usize,
+    /// All components.
+    pub values: Vec<f64>,
+}
+
+impl Numbers {
+    /// Elements of `N` components; what an element lacks is `fill`.
+    pub fn elements<const N: usize>(&self, fill: f32) -> Vec<[f32; N]> {
+        let element = |e: &[f64]| std::array::from_fn(|i| e.get(i).map_or(fill, |&v| v as f32));
+        self.values.chunks_exact(self.width.max(1)).map(element).collect()
+    }
+}
+
+fn width_of(kind: &str) -> Option<usize> {
+    Some(match kind {
+        "SCALAR" => 1,
+        "VEC2" => 2,
+        "VEC3" => 3,
+        "VEC4" | "MAT2" => 4,
+        "MAT3" => 9,
+        "MAT4" => 16,
+        _ => return None,
+    })
+}
+
+/// `count` elements of some bytes.
+struct Layout {
+    component: Component,
+    width: usize,
+    count: usize,
+    normalized: bool,
+}
+
+impl Document {
+    /// The numbers of an accessor; normalised integers are −1..1.
+    pub fn accessor(&self, index: usize) -> Result<Numbers, GltfError> {
+        let place = self.root().key("accessors").item(index);
+        let component = place.key("componentType").index().and_then(Component::of);
+        let width = place.key("type").text().and_then(width_of);
+        let (Some(component), Some(width), Some(count)) = (component, width, place.key("count").index()) else {
+            return Err(error(&place, "has no valid type or count"));
+        };
+        let layout = Layout { component, width, count, normalized: place.key("normalized").is_true() };
+        let mut values = match place.key("bufferView").index() {
+            Some(_) => self.read(&place, &layout)?,
+            None if count > MAX_ZEROS => return Err(error(&place, format!("{count} elements have no bytes"))),
+            None => vec![0.0; count * width],
+        };
+        let sparse = place.key("sparse");
+        if sparse.exists() {
+            self.replace(&sparse, &layout, &mut values)?;
+        }
+        Ok(Numbers { width, values })
+    }
+
+    fn read(&self, place: &Place<'_>, layout: &Layout) -> Result<Vec<f64>, GltfError> {
+        let Some(view) = place.key("bufferView").index() else { return Err(error(place, "has no buffer view")) };
+        let bytes = self.view(view)?;
+        let size = layout.component.bytes() * layout.width;
+        let stride = self.root().key("bufferViews").item(view).key("byteStride").index().unwrap_or(size).max(1);
+        let offset = place.key("byteOffset").index().unwrap_or(0);
+        let length = layout.count.checked_sub(1).map_or(Some(0), |n| n.checked_mul(stride)?.checked_add(size));
+        let end = length.and_then(|length| offset.checked_add(length)).filter(|&end| end <= bytes.len());
+        if end.is_none() || stride < layout.component.bytes() {
+            let (count, have) = (layout.count, bytes.len());
+            let message = format!("{count} elements from byte {offset} on are not in the buffer view of {have} bytes");
+            return Err(error(place, message));
+        }
+        let mut values = Vec::with_capacity(layout.count * layout.width);
+        for i in 0..layout.count {
+            for c in 0..layout.width {
+                let at = offset + i * stride + c * layout.component.bytes();
+                let (value, divisor) = layout.component.read(&bytes[at..]);
+                values.push(if layout.normalized { (value / divisor).max(-1.0) } else { value });
+            }
+        }
+        Ok(values)
+    }
+
+    fn replace(&self, sparse: &Place<'_>, layout: &Layout, values: &mut [f64]) -> Result<(), GltfError> {
+        let count = sparse.key("count").index().unwrap_or(0);
+        let place = sparse.key("indices");
+        let Some(component) = place.key("componentType").index().and_then(Component::of) else {
+            return Err(error(&place, "has no valid type"));
+        };
+        let indices = self.read(&place, &Layout { component, width: 1, count, normalized: false })?;
+        let new = self.read(&sparse.key("values"), &Layout { count, ..*layout })?;
+        for (index, element) in indices.iter().zip(new.chunks_exact(layout.width)) {
+            let at = *index as usize * layout.width;
+            match values.get_mut(at..at + layout.width) {
+                Some(old) => old.copy_from_slice(element),
+                None => return Err(error(&place, format!("element {index} is not there"))),
+            }
+        }
+        Ok(())
+    }
+}
