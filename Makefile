@@ -12,7 +12,7 @@ PREFIX ?= /usr/local
 BINARY = target/release/lumiris
 SHARE = $(DESTDIR)$(PREFIX)/share
 
-.PHONY: run build install uninstall test test-farm test-denoise test-power measure-power test-debian13 setup lint doc bindings clean
+.PHONY: run build install uninstall test test-farm test-denoise test-python test-power measure-power test-debian13 setup lint doc bindings clean
 
 run: setup
 	$(CARGO) build --release
@@ -39,7 +39,7 @@ uninstall:
 test: setup
 	@.ci/setup.sh $(TEST_PACKAGES)
 	$(CARGO) test --workspace --doc
-	$(CARGO) test --workspace --lib --bins --tests
+	$(CARGO) test --workspace --no-fail-fast --lib --bins --tests
 
 # Renders on a Slurm cluster of two nodes that this machine plays: picture, requeued tasks, a node that goes down.
 test-farm: setup
@@ -54,6 +54,20 @@ test-denoise: setup
 	export LUMIRIS_OIDN="$$library" && \
 	  $(CARGO) test -p lumiris --lib -- --include-ignored imaging::oidn:: && \
 	  $(CARGO) test -p lumiris-cli --test it -- --include-ignored denoise::
+
+# The Python module: builds its wheel as tests are built, installs it in an environment of its own, and tests it there.
+# Skipped where what that takes cannot be fetched.
+test-python: setup
+	@.ci/setup.sh python3-venv
+	@environment=$$(.ci/python-environment.sh) || environment=; \
+	if [ -z "$$environment" ]; then echo "maturin, NumPy and pytest could not be fetched: the Python module is not tested."; exit 0; fi; \
+	rm -rf target/python/wheels && \
+	  $(CARGO) build -p lumiris-cli && \
+	  PATH="$(dir $(CARGO)):$$PATH" "$$environment/bin/maturin" build --quiet --profile dev --locked \
+	    --manifest-path python/Cargo.toml --out target/python/wheels && \
+	  "$$environment/bin/pip" install --quiet --disable-pip-version-check --force-reinstall --no-deps target/python/wheels/*.whl && \
+	  cd python && LUMIRIS=../target/debug/lumiris "$$environment/bin/pytest" -q && \
+	  "$$environment/bin/python" -m mypy lumiris tests
 
 # Analytic scenes at full power: enough samples to detect a bias of 2 % (0.5 or 1 % where there is little noise), the
 # injection of that bias, and the table of what each row detects. `make test` does the same with a sixth of the samples
@@ -79,6 +93,7 @@ setup:
 lint: setup
 	$(CARGO) fmt --all --check
 	$(CARGO) clippy --workspace --all-targets -- -D warnings
+	$(CARGO) clippy -p lumiris-python --features module -- -D warnings
 
 doc: setup
 	RUSTDOCFLAGS="-D warnings -A rustdoc::private-intra-doc-links" $(CARGO) doc --workspace --no-deps --document-private-items

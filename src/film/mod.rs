@@ -2,17 +2,23 @@
 //!
 //! Pixel filters work by importance sampling: a sample belongs to one pixel, and its weight is the sign of the
 //! filter ([`filter`]). Samples are added to exact sums ([`exact`], [`accumulator`]), so that the film is the same
-//! however they are ordered and split. [`replicas`] give the variance of pixel means; [`encoding`] stores sums in files.
+//! however they are ordered and split. [`packed`] keeps those of a tile in few bytes, [`encoding`] stores them in files;
+//! [`replicas`] give the variance of pixel means.
 
 pub mod accumulator;
 pub mod encoding;
 pub mod exact;
 pub mod filter;
+pub mod packed;
 pub mod replicas;
 
 use accumulator::PixelAccumulator;
 use lumiris_numbers::math::{Rgb, Vec3, luminance};
-use replicas::{Replica, ReplicaAccumulator};
+use packed::PackedSums;
+use rayon::prelude::*;
+use replicas::{Replica, VarianceScale};
+use std::ops::Range;
+use std::sync::{Arc, OnceLock};
 
 /// What one camera sample says of its pixel.
 #[derive(Clone, Copy, Debug, Default)]
@@ -71,8 +77,8 @@ impl PixelSums {
         self.radiance.map(|s| s / self.count.max(1) as f64)
     }
 
-    /// Variance of the mean per channel if the samples are independent, from their spread; see [`Film::variances`] for
-    /// others. 0 with fewer than two samples.
+    /// Variance of the mean per channel if the samples are independent, from their spread; see
+    /// [`Film::read_rows_with_variances`] for others. 0 with fewer than two samples.
     pub fn variance_of_mean(&self) -> [f64; 3] {
         if self.count < 2 {
             return [0.0; 3];
@@ -82,6 +88,16 @@ impl PixelSums {
             let mean = self.radiance[c] / n;
             ((self.radiance_squared[c] / n - mean * mean).max(0.0)) / (n - 1.0)
         })
+    }
+
+    /// Subtracts `off` from the mean. The spread of its samples remains.
+    fn subtract(&mut self, off: [f32; 3]) {
+        let count = self.count.max(1) as f64;
+        for ((sum, squares), off) in self.radiance.iter_mut().zip(&mut self.radiance_squared).zip(off) {
+            let before = *sum;
+            *sum -= count * f64::from(off);
+            *squares += (*sum * *sum - before * before) / count;
+        }
     }
 }
 
@@ -127,55 +143,215 @@ impl PixelBounds {
     }
 }
 
-/// The sums of all pixels inside the crop window.
+/// A tile of a film: its pixels, row by row.
+#[derive(Clone, Debug)]
+pub struct FilmTile {
+    /// Which pixels.
+    pub bounds: PixelBounds,
+    /// Their sums.
+    pub sums: Arc<PackedSums>,
+}
+
+/// The sums of all pixels inside the crop window. They remain packed, and are read some rows at a time; pixels that no
+/// tile has are without samples.
 #[derive(Clone, Debug)]
 pub struct Film {
     /// Size of the full image (width, height).
     pub resolution: [u32; 2],
     /// The part that is rendered.
     pub bounds: PixelBounds,
-    /// Sums, row-major inside `bounds`.
-    pub pixels: Vec<PixelSums>,
-    /// Second estimates of some pixels, which are not part of the image; none if samples are independent.
-    pub replicas: Vec<Replica>,
+    /// By rows and columns. Tiles of the same rows begin and end with them.
+    tiles: Vec<FilmTile>,
+    /// Second estimates of some pixels, by their index, which are not part of the image; none if samples are
+    /// independent.
+    replicas: Vec<Replica>,
+    /// What is subtracted from the mean of each pixel; empty if nothing is.
+    corrections: Vec<[f32; 3]>,
+    variance_scale: OnceLock<VarianceScale>,
+    summary: OnceLock<Summary>,
+}
+
+/// What a film is like on the whole.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Summary {
+    /// Least and greatest number of samples of a pixel.
+    pub samples: [u64; 2],
+    /// Least number of samples of a pixel that has any.
+    pub least_samples: Option<u64>,
+    /// Samples that count as black; see [`PixelSums::invalid`].
+    pub invalid: u64,
+    /// Mean over pixels of the relative standard error of the luminance of the mean: the noise that a progress bar
+    /// shows. Pixels without light do not count.
+    pub relative_noise: f64,
+    /// True if there are records of an irradiance cache.
+    pub has_records: bool,
 }
 
 impl Film {
-    /// An empty film.
-    pub fn new(resolution: [u32; 2], bounds: PixelBounds) -> Self {
-        Film { resolution, bounds, pixels: vec![PixelSums::default(); bounds.area()], replicas: Vec::new() }
+    /// A film of tiles, each pixel in one of them at most, and of replicas.
+    pub fn new(
+        resolution: [u32; 2],
+        bounds: PixelBounds,
+        mut tiles: Vec<FilmTile>,
+        mut replicas: Vec<Replica>,
+    ) -> Self {
+        tiles.sort_unstable_by_key(|t| (t.bounds.y0, t.bounds.x0));
+        replicas.sort_unstable_by_key(|r| r.pixel);
+        let (variance_scale, summary) = Default::default();
+        Film { resolution, bounds, tiles, replicas, corrections: Vec::new(), variance_scale, summary }
     }
 
-    /// Index of a pixel inside `pixels`.
+    /// A film of a single tile.
+    pub fn of_pixels(resolution: [u32; 2], bounds: PixelBounds, pixels: &[PixelAccumulator]) -> Self {
+        Film::new(resolution, bounds, vec![FilmTile { bounds, sums: Arc::new(PackedSums::of(pixels)) }], Vec::new())
+    }
+
+    /// Subtracts something from the mean of each pixel, and leaves the spread of its samples; the replicas are given as
+    /// they are then.
+    pub fn correct(&mut self, corrections: Vec<[f32; 3]>, replicas: Vec<Replica>) {
+        (self.corrections, self.replicas) = (corrections, replicas);
+        (self.variance_scale, self.summary) = Default::default();
+    }
+
+    /// Index of a pixel, row by row.
     pub fn index(&self, x: u32, y: u32) -> usize {
         (y - self.bounds.y0) as usize * self.bounds.width() as usize + (x - self.bounds.x0) as usize
     }
 
-    /// Sets the part of an empty film that `tile` covers; pixels of replicas are indexed in the tile.
-    pub fn set_tile(&mut self, tile: &PixelBounds, sums: &[PixelAccumulator], replicas: &[ReplicaAccumulator]) {
-        for (row, y) in (tile.y0..tile.y1).enumerate() {
-            let (start, width) = (self.index(tile.x0, y), tile.width() as usize);
-            let pixels = self.pixels[start..start + width].iter_mut();
-            pixels.zip(&sums[row * width..]).for_each(|(pixel, sums)| *pixel = sums.sums());
-        }
-        let width = tile.width().max(1);
-        let pixel = |r: &ReplicaAccumulator| self.index(tile.x0 + r.pixel % width, tile.y0 + r.pixel / width) as u32;
-        let moved: Vec<Replica> = replicas.iter().map(|r| r.replica(pixel(r))).collect();
-        self.replicas.extend(moved);
+    /// Number of pixels.
+    pub fn len(&self) -> usize {
+        self.bounds.area()
     }
 
-    /// Mean over pixels of the relative standard error of the luminance of the mean: the noise that a progress bar
-    /// shows. Pixels without light do not count.
-    pub fn relative_noise(&self) -> f64 {
-        let (mut sum, mut count) = (0.0, 0_u64);
-        for (pixel, variance) in self.pixels.iter().zip(self.variances()) {
-            let mean = luminance(pixel.mean());
-            if mean > 0.0 && pixel.count > 1 {
-                sum += luminance(variance).sqrt() / mean;
-                count += 1;
+    /// True if there are no pixels.
+    pub fn is_empty(&self) -> bool {
+        self.len() == 0
+    }
+
+    /// Its tiles, by rows and columns.
+    pub fn tiles(&self) -> &[FilmTile] {
+        &self.tiles
+    }
+
+    /// Second estimates of some pixels, by their index.
+    pub fn replicas(&self) -> &[Replica] {
+        &self.replicas
+    }
+
+    /// Bytes of memory.
+    pub fn bytes(&self) -> usize {
+        let tiles: usize = self.tiles.iter().map(|t| t.sums.bytes() + size_of_val(t)).sum();
+        tiles + size_of_val(&self.replicas[..]) + size_of_val(&self.corrections[..])
+    }
+
+    /// All pixels, row by row: 144 bytes each, which is much for large images.
+    pub fn pixels(&self) -> Vec<PixelSums> {
+        let mut all = Vec::new();
+        self.read_rows(self.bounds.y0..self.bounds.y1, &mut all);
+        all
+    }
+
+    /// Some rows of a film, a few at a time: those that are read together.
+    pub fn bands(&self) -> impl IndexedParallelIterator<Item = Range<u32>> + use<> {
+        let PixelBounds { y0, y1, .. } = self.bounds;
+        let count = y1.saturating_sub(y0).div_ceil(BAND);
+        let band = move |i: u32| y0 + i * BAND..y1.min(y0 + (i + 1) * BAND);
+        (0..count).into_par_iter().map(band).with_max_len(1)
+    }
+
+    /// Reads the pixels of some rows, given by their coordinates.
+    pub fn read_rows(&self, rows: Range<u32>, out: &mut Vec<PixelSums>) {
+        self.read(&PixelBounds { y0: rows.start, y1: rows.end, ..self.bounds }, out);
+    }
+
+    /// Reads the pixels of a rectangle inside the film, row by row.
+    pub fn read(&self, pixels: &PixelBounds, out: &mut Vec<PixelSums>) {
+        out.clear();
+        out.resize(pixels.area(), PixelSums::default());
+        let first = self.tiles.partition_point(|t| t.bounds.y1 <= pixels.y0);
+        let mut sums = Vec::new();
+        for FilmTile { bounds, sums: packed } in self.tiles[first..].iter().take_while(|t| t.bounds.y0 < pixels.y1) {
+            let [left, right] = [bounds.x0.max(pixels.x0), bounds.x1.min(pixels.x1)];
+            if left >= right {
+                continue;
+            }
+            let (top, bottom, len) = (bounds.y0.max(pixels.y0), bounds.y1.min(pixels.y1), bounds.width() as usize);
+            let start = (top - bounds.y0) as usize * len;
+            sums.resize((bottom - top) as usize * len, PixelAccumulator::default());
+            packed.read(start..start + sums.len(), &mut sums);
+            for (y, row) in (top..bottom).zip(sums.chunks_exact(len)) {
+                let at = (y - pixels.y0) as usize * pixels.width() as usize + (left - pixels.x0) as usize;
+                let row = &row[(left - bounds.x0) as usize..(right - bounds.x0) as usize];
+                out[at..at + row.len()].iter_mut().zip(row).for_each(|(pixel, sums)| *pixel = sums.sums());
             }
         }
-        if count == 0 { f64::INFINITY } else { sum / count as f64 }
+        if !self.corrections.is_empty() && !out.is_empty() {
+            for (y, row) in (pixels.y0..).zip(out.chunks_exact_mut(pixels.width() as usize)) {
+                let corrections = &self.corrections[self.index(pixels.x0, y)..];
+                row.iter_mut().zip(corrections).for_each(|(pixel, off)| pixel.subtract(*off));
+            }
+        }
+    }
+
+    /// What it is like on the whole.
+    pub fn summary(&self) -> &Summary {
+        self.summary.get_or_init(|| {
+            let bands = self.bands().map_init(Default::default, |(pixels, variances), rows| {
+                self.read_rows_with_variances(rows, pixels, variances);
+                let width = self.bounds.width().max(1) as usize;
+                let rows = pixels.chunks(width).zip(variances.chunks(width));
+                rows.map(|(pixels, variances)| RowSummary::new(pixels, variances)).collect::<Vec<_>>()
+            });
+            RowSummary::of_all(&bands.collect::<Vec<_>>().concat())
+        })
+    }
+}
+
+/// Rows that are read together where a film is read from top to bottom.
+pub const BAND: u32 = 16;
+
+/// What a row is like, so that the whole does not depend on how rows are read.
+#[derive(Clone)]
+struct RowSummary {
+    samples: [u64; 2],
+    least_samples: Option<u64>,
+    invalid: u64,
+    /// Σ of relative standard errors, and of how many pixels.
+    noise: (f64, u64),
+    has_records: bool,
+}
+
+impl RowSummary {
+    fn new(pixels: &[PixelSums], variances: &[[f64; 3]]) -> Self {
+        let counts = || pixels.iter().map(|p| p.count);
+        let mut noise = (0.0, 0);
+        for (pixel, variance) in pixels.iter().zip(variances) {
+            let mean = luminance(pixel.mean());
+            if mean > 0.0 && pixel.count > 1 {
+                noise = (noise.0 + luminance(*variance).sqrt() / mean, noise.1 + 1);
+            }
+        }
+        RowSummary {
+            samples: [counts().min().unwrap_or(0), counts().max().unwrap_or(0)],
+            least_samples: counts().filter(|n| *n > 0).min(),
+            invalid: pixels.iter().map(|p| p.invalid).sum(),
+            noise,
+            has_records: pixels.iter().any(|p| p.records > 0),
+        }
+    }
+
+    fn of_all(rows: &[RowSummary]) -> Summary {
+        let noise = rows.iter().fold((0.0, 0), |sum, row| (sum.0 + row.noise.0, sum.1 + row.noise.1));
+        Summary {
+            samples: [
+                rows.iter().map(|row| row.samples[0]).min().unwrap_or(0),
+                rows.iter().map(|row| row.samples[1]).max().unwrap_or(0),
+            ],
+            least_samples: rows.iter().filter_map(|row| row.least_samples).min(),
+            invalid: rows.iter().map(|row| row.invalid).sum(),
+            relative_noise: if noise.1 == 0 { f64::INFINITY } else { noise.0 / noise.1 as f64 },
+            has_records: rows.iter().any(|row| row.has_records),
+        }
     }
 }
 

@@ -15,6 +15,8 @@
 use super::accumulator::RadianceAccumulator;
 use super::{Film, PixelBounds, PixelSums};
 use lumiris_numbers::math::hash::{pcg4d, unit_f32};
+use rayon::prelude::*;
+use std::ops::Range;
 
 /// Number of replicas per image: more if [`MIN_FRACTION`] of the pixels are more, and fewer only if the image has fewer
 /// pixels.
@@ -63,12 +65,13 @@ impl Replica {
     }
 }
 
-/// Replicas, without samples, for the pixels of a tile that are estimated twice, in an image with the given bounds.
-/// Their indices are those of the tile.
-pub fn replicas(image: &PixelBounds, tile: &PixelBounds) -> Vec<ReplicaAccumulator> {
+/// Replicas, without samples, for the pixels of a tile that are estimated twice, in an image with the given bounds: whole
+/// blocks of `edge` × `edge` pixels. Their indices are those of the tile.
+pub fn replicas(image: &PixelBounds, tile: &PixelBounds, edge: u32) -> Vec<ReplicaAccumulator> {
     let fraction = (WANTED / image.area().max(1) as f64).max(MIN_FRACTION);
     let is_chosen = |i: &u32| {
         let (x, y) = (tile.x0 + i % tile.width(), tile.y0 + i / tile.width());
+        let (x, y) = if edge > 1 { ((x - image.x0) / edge, (y - image.y0) / edge) } else { (x, y) };
         f64::from(unit_f32(pcg4d([x, y, CHOICE, 0])[0])) < fraction
     };
     let none = |pixel| ReplicaAccumulator { pixel, ..ReplicaAccumulator::default() };
@@ -76,6 +79,7 @@ pub fn replicas(image: &PixelBounds, tile: &PixelBounds) -> Vec<ReplicaAccumulat
 }
 
 /// Pixels whose s²/N, averaged over their neighbours, is at most `limit` and above that of the previous class.
+#[derive(Clone, Debug)]
 struct Class {
     limit: f64,
     /// f.
@@ -93,43 +97,100 @@ struct ReplicaVariance {
     measured: f64,
 }
 
+/// What the variances of independent samples are multiplied by, from the replicas of a film.
+#[derive(Clone, Debug, Default)]
+pub struct VarianceScale {
+    /// By rising limits. Without any, variances remain as they are.
+    classes: Vec<Class>,
+}
+
 impl Film {
-    /// Estimated variance of each pixel's mean per channel. Without replicas it is that of independent samples.
+    /// Reads some rows as [`Film::read_rows`], and the estimated variance of each pixel's mean per channel. Without
+    /// replicas it is that of independent samples.
+    pub fn read_rows_with_variances(
+        &self,
+        rows: Range<u32>,
+        pixels: &mut Vec<PixelSums>,
+        variances: &mut Vec<[f64; 3]>,
+    ) {
+        variances.clear();
+        let classes = &self.variance_scale().classes;
+        if classes.is_empty() {
+            self.read_rows(rows, pixels);
+            variances.extend(pixels.iter().map(PixelSums::variance_of_mean));
+            return;
+        }
+        let surroundings = self.read_surroundings(&rows, pixels);
+        pixels.drain(..surroundings.before);
+        pixels.truncate(rows.len() * surroundings.width);
+        for (i, pixel) in pixels.iter().enumerate() {
+            let key = surroundings.mean(surroundings.before + i);
+            let class = classes.partition_point(|c| c.limit < key).min(classes.len() - 1);
+            variances.push(pixel.variance_of_mean().map(|v| v * classes[class].factor));
+        }
+    }
+
+    /// Estimated variance of each pixel's mean per channel: 24 bytes each, which is much for large images.
     pub fn variances(&self) -> Vec<[f64; 3]> {
-        let mut variances: Vec<[f64; 3]> = self.pixels.iter().map(PixelSums::variance_of_mean).collect();
-        if self.replicas.is_empty() {
-            return variances;
-        }
-        let sums: Vec<f64> = variances.iter().map(|v| v.iter().sum()).collect();
-        let keys = self.neighbourhood_means(&sums);
-        let measured_twice = self.replicas.iter().filter_map(|replica| {
-            let i = replica.pixel as usize;
-            let pixel = &self.pixels[i];
-            let measured_twice =
-                ReplicaVariance { key: keys[i], independent: sums[i], measured: replica.half_square(pixel) };
-            (pixel.count == replica.count && pixel.count > 1).then_some(measured_twice)
-        });
-        let classes = classes(measured_twice.collect());
-        if !classes.is_empty() {
-            for (variance, key) in variances.iter_mut().zip(&keys) {
-                let class = classes.partition_point(|c| c.limit < *key).min(classes.len() - 1);
-                variance.iter_mut().for_each(|v| *v *= classes[class].factor);
-            }
-        }
+        let mut variances = Vec::new();
+        self.read_rows_with_variances(self.bounds.y0..self.bounds.y1, &mut Vec::new(), &mut variances);
         variances
     }
 
-    /// Mean of `values` over the 3 × 3 pixels around each pixel, clipped to the image.
-    fn neighbourhood_means(&self, values: &[f64]) -> Vec<f64> {
-        let (width, height) = (self.bounds.width() as usize, self.bounds.height() as usize);
+    fn variance_scale(&self) -> &VarianceScale {
+        self.variance_scale.get_or_init(|| {
+            if self.replicas.is_empty() {
+                return VarianceScale::default();
+            }
+            let bands = self.bands().map_init(Vec::new, |pixels, rows| self.measured_twice(rows, pixels));
+            VarianceScale { classes: classes(bands.collect::<Vec<_>>().concat()) }
+        })
+    }
+
+    /// The variances estimated at the replicas of some rows.
+    fn measured_twice(&self, rows: Range<u32>, pixels: &mut Vec<PixelSums>) -> Vec<ReplicaVariance> {
+        let first = self.index(self.bounds.x0, rows.start);
+        let end = first + rows.len() * self.bounds.width() as usize;
+        let index = |at: usize| self.replicas.partition_point(|r| (r.pixel as usize) < at);
+        let replicas = &self.replicas[index(first)..index(end)];
+        let surroundings = self.read_surroundings(&rows, pixels);
+        let measured = replicas.iter().filter_map(|replica| {
+            let i = surroundings.before + replica.pixel as usize - first;
+            let (pixel, key) = (&pixels[i], surroundings.mean(i));
+            let variance =
+                ReplicaVariance { key, independent: surroundings.values[i], measured: replica.half_square(pixel) };
+            (pixel.count == replica.count && pixel.count > 1).then_some(variance)
+        });
+        measured.collect()
+    }
+
+    /// Reads some rows and those above and below, as far as the image has any.
+    fn read_surroundings(&self, rows: &Range<u32>, pixels: &mut Vec<PixelSums>) -> Surroundings {
+        let around = rows.start.saturating_sub(1).max(self.bounds.y0)..(rows.end + 1).min(self.bounds.y1);
+        let width = self.bounds.width() as usize;
+        let before = (rows.start - around.start) as usize * width;
+        self.read_rows(around, pixels);
+        Surroundings { width, before, values: pixels.iter().map(|p| p.variance_of_mean().iter().sum()).collect() }
+    }
+}
+
+/// s²/N of the pixels of some rows, and of one row above and below, as far as the image has them.
+struct Surroundings {
+    width: usize,
+    /// Number of pixels of the row above.
+    before: usize,
+    values: Vec<f64>,
+}
+
+impl Surroundings {
+    /// Mean over the 3 × 3 pixels around a pixel, clipped to the image.
+    fn mean(&self, i: usize) -> f64 {
         let around = |i: usize, len: usize| i.saturating_sub(1)..(i + 2).min(len);
-        let mean = |i: usize| {
-            let (columns, rows) = (around(i % width, width), around(i / width, height));
-            let count = columns.len() * rows.len();
-            let sum: f64 = rows.map(|y| values[y * width..][columns.clone()].iter().sum::<f64>()).sum();
-            sum / count as f64
-        };
-        (0..values.len()).map(mean).collect()
+        let (columns, rows) =
+            (around(i % self.width, self.width), around(i / self.width, self.values.len() / self.width));
+        let count = columns.len() * rows.len();
+        let sum: f64 = rows.map(|y| self.values[y * self.width..][columns.clone()].iter().sum::<f64>()).sum();
+        sum / count as f64
     }
 }
 
@@ -159,41 +220,63 @@ fn classes(mut measured_twice: Vec<ReplicaVariance>) -> Vec<Class> {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::film::accumulator::PixelAccumulator;
+    use crate::film::packed::PackedSums;
+    use crate::film::{FilmTile, PixelSample};
+    use lumiris_numbers::math::Rgb;
+    use std::sync::Arc;
 
     /// A film of 64 × 64 pixels and as many replicas, means of two samples each. Means are 1 ± σ, and s²/N is
     /// `independent`; both are given for the column of a pixel.
     fn film(sigma: impl Fn(u32) -> f64, independent: impl Fn(u32) -> f64) -> Film {
         let bounds = PixelBounds { x0: 0, x1: 64, y0: 0, y1: 64 };
-        let mut film = Film::new([64, 64], bounds);
-        for i in 0..4096_u32 {
+        let mut replicas = Vec::new();
+        let mut pixel = |i: u32| {
             let bits = pcg4d([i, 3, 1, 4]);
             let mean = |bit: u32| 1.0 + if bit & 1 == 0 { sigma(i % 64) } else { -sigma(i % 64) };
             let (a, b) = (mean(bits[0]), mean(bits[1]));
-            film.replicas.push(Replica { pixel: i, count: 2, radiance: [2.0 * b; 3] });
-            // s²/N = Σ x²/N − mean² for two samples
-            let squares = 2.0 * (a * a + independent(i % 64));
-            film.pixels[i as usize] =
-                PixelSums { count: 2, radiance: [2.0 * a; 3], radiance_squared: [squares; 3], ..PixelSums::default() };
-        }
-        film
+            replicas.push(Replica { pixel: i, count: 2, radiance: [2.0 * b; 3] });
+            // s²/N is a quarter of the squared difference of two samples
+            let half = independent(i % 64).sqrt();
+            let mut sums = PixelAccumulator::default();
+            for (index, value) in [(0, a - half), (1, a + half)] {
+                sums.add(index, &PixelSample { radiance: Rgb::splat(value as f32), features: None });
+            }
+            sums
+        };
+        let pixels: Vec<PixelAccumulator> = (0..4096).map(&mut pixel).collect();
+        let tile = FilmTile { bounds, sums: Arc::new(PackedSums::of(&pixels)) };
+        Film::new([64, 64], bounds, vec![tile], replicas)
     }
 
     #[test]
     fn variances_are_those_that_replicas_show() {
-        let mut film = film(|_| 0.1, |_| 0.05);
+        let film = film(|_| 0.1, |_| 0.05);
         let mean = film.variances().iter().map(|v| v[1]).sum::<f64>() / 4096.0;
         // (A − B)²/2 is 0 or 2σ²: its mean over 4096 replicas has the standard error σ²/64.
         assert!((mean / 0.01 - 1.0).abs() < 4.0 / 64.0, "{mean}");
-        film.replicas.clear();
-        assert!(film.variances().iter().all(|v| (v[1] - 0.05).abs() < 1e-12), "as if independent");
+        let film = Film::new(film.resolution, film.bounds, film.tiles, Vec::new());
+        assert!(film.variances().iter().all(|v| (v[1] - 0.05).abs() < 1e-6), "as if independent");
+    }
+
+    #[test]
+    fn rows_that_are_read_apart_have_the_variances_of_the_whole() {
+        let film = film(|x| 0.01 * f64::from(x % 7), |x| 0.02 * f64::from(x % 5));
+        let (all, mut some) = (film.variances(), Vec::new());
+        for rows in [0..1, 1..17, 17..63, 63..64] {
+            let mut variances = Vec::new();
+            film.read_rows_with_variances(rows, &mut Vec::new(), &mut variances);
+            some.extend(variances);
+        }
+        assert!(some == all);
     }
 
     #[test]
     fn parts_of_an_image_that_gain_unlike_are_told_apart() {
-        // s²/N is 4 on the left and 1 on the right; the variances are 1 and 0.01.
-        let film = film(|x| if x < 32 { 1.0 } else { 0.1 }, |x| if x < 32 { 4.0 } else { 1.0 });
+        // s²/N is 4 on the left and 1 on the right; the variances are 1 and 1/64. All of them are f32 numbers.
+        let film = film(|x| if x < 32 { 1.0 } else { 0.125 }, |x| if x < 32 { 4.0 } else { 1.0 });
         let variances = film.variances();
-        for (columns, expected) in [(0..31, 1.0), (33..64, 0.01)] {
+        for (columns, expected) in [(0..31, 1.0), (33..64, 1.0 / 64.0)] {
             let inside = |i: &usize| columns.contains(&(i % 64));
             let values: Vec<f64> = (0..4096).filter(inside).map(|i| variances[i][0]).collect();
             let mean = values.iter().sum::<f64>() / values.len() as f64;
@@ -216,16 +299,16 @@ mod tests {
         let position = |tile: &PixelBounds, r: &ReplicaAccumulator| {
             [tile.x0 + r.pixel % tile.width(), tile.y0 + r.pixel / tile.width()]
         };
-        let mut whole: Vec<_> = replicas(&image, &image).iter().map(|r| position(&image, r)).collect();
+        let mut whole: Vec<_> = replicas(&image, &image, 1).iter().map(|r| position(&image, r)).collect();
         let tiles = image.tiles(13);
         let mut parts: Vec<_> =
-            tiles.iter().flat_map(|t| replicas(&image, t).into_iter().map(|r| position(t, &r))).collect();
+            tiles.iter().flat_map(|t| replicas(&image, t, 1).into_iter().map(|r| position(t, &r))).collect();
         whole.sort_unstable();
         parts.sort_unstable();
         assert_eq!(whole, parts);
         // 120,000/64 = 1875 with a standard deviation of 43
         assert!((whole.len() as f64 - 1875.0).abs() < 4.0 * 43.0, "{}", whole.len());
         let small = PixelBounds { x0: 0, x1: 20, y0: 0, y1: 20 };
-        assert_eq!(replicas(&small, &small).len(), 400);
+        assert_eq!(replicas(&small, &small, 1).len(), 400);
     }
 }

@@ -1,9 +1,10 @@
 //! Images: pixels with named channels, their encodings, pyramids for filtered lookups, and metrics of their difference.
 //!
 //! Reading order: [`color`], [`view_transform`], [`mipmap`], [`mod@file`], [`oiio`], [`file_parts`], [`oidn`],
-//! [`metrics`], [`heat`].
+//! [`metrics`], [`compare`], [`heat`].
 
 pub mod color;
+pub mod compare;
 pub mod file;
 pub mod file_parts;
 pub mod heat;
@@ -67,6 +68,34 @@ impl Image {
     }
 }
 
+/// Adjacent channels of one name.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct Layer {
+    /// What precedes the last dot in the names of the channels, the whole name of a single channel, or [`IMAGE_LAYER`].
+    pub name: String,
+    /// Their positions.
+    pub channels: std::ops::Range<usize>,
+}
+
+/// What the layer of the channels `R G B` is called: the image itself.
+pub const IMAGE_LAYER: &str = "beauty";
+
+/// Channels by layers, in their order.
+pub fn layers<S: AsRef<str>>(channels: &[S]) -> Vec<Layer> {
+    let mut layers: Vec<Layer> = Vec::new();
+    for (index, channel) in channels.iter().enumerate() {
+        let name = match channel.as_ref() {
+            "R" | "G" | "B" | "A" => IMAGE_LAYER,
+            other => other.rsplit_once('.').map_or(other, |(name, _)| name),
+        };
+        match layers.last_mut() {
+            Some(layer) if layer.name == name => layer.channels.end = index + 1,
+            _ => layers.push(Layer { name: name.to_owned(), channels: index..index + 1 }),
+        }
+    }
+    layers
+}
+
 /// Positions of the colour channels of an [`Image`].
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum ColorChannels {
@@ -89,6 +118,15 @@ impl ColorChannels {
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn layers_are_what_precedes_the_last_dot() {
+        let names = ["R", "G", "B", "A", "depth.Z", "samples", "View.Combined.R", "View.Combined.G", "View.Mist.Z"];
+        let found: Vec<_> = layers(&names).into_iter().map(|l| (l.name, l.channels)).collect();
+        let expected =
+            [("beauty", 0..4), ("depth", 4..5), ("samples", 5..6), ("View.Combined", 6..8), ("View.Mist", 8..9)];
+        assert_eq!(found, expected.map(|(name, channels)| (name.to_owned(), channels)));
+    }
 
     #[test]
     fn channels_are_found_by_name_whatever_their_order() {

@@ -1,6 +1,6 @@
-//! From scene files to scenes: the meaning of pbrt's directives ([`pbrt`]) and of glTF ([`gltf`]), and the images and meshes that they name
-//! ([`resources`], [`images`]), which the scenes of an animation share ([`cache`]). A [`fingerprint`] tells a scene from
-//! others.
+//! From scene files to scenes: the meaning of pbrt's directives ([`pbrt`]) and of glTF ([`gltf`]), and the images and
+//! meshes that they name ([`resources`], [`images`]), which the scenes of an animation share ([`cache`]). A
+//! [`fingerprint`] tells a scene from others.
 //!
 //! The files themselves are parsed by the crate `lumiris_formats`. User input never panics: problems are collected,
 //! with their source locations, in [`Diagnostics`].
@@ -18,7 +18,7 @@ use crate::settings::Settings;
 use cache::FileCache;
 use fingerprint::SceneFiles;
 use lumiris_formats::diagnostic::{Diagnostics, Report};
-use lumiris_formats::pbrt::parser::parse_file;
+use lumiris_formats::pbrt::parser::{parse_file, parse_source};
 use lumiris_formats::source::SourceMap;
 use pbrt::state::Builder;
 use std::path::{Path, PathBuf};
@@ -67,11 +67,37 @@ pub fn load_with(path: &Path, options: &LoadOptions, files: &FileCache) -> Resul
     if path.extension().is_some_and(is_gltf) {
         return gltf::load(path, options, files);
     }
+    let folder = path.parent().map(Path::to_path_buf).unwrap_or_default();
+    load_parsed(folder, options, files, |sources, diagnostics, builder| {
+        parse_file(path, sources, diagnostics, builder);
+    })
+}
+
+/// Loads a scene from its text; files that it names are sought in `folder`. Messages call it `name`.
+pub fn load_text(
+    text: &str,
+    name: &str,
+    folder: &Path,
+    options: &LoadOptions,
+    files: &FileCache,
+) -> Result<Loaded, Box<Report>> {
+    load_parsed(folder.to_path_buf(), options, files, |sources, diagnostics, builder| {
+        let file = sources.add_text(name, text.as_bytes().to_vec());
+        parse_source(file, &folder.join(name), sources, diagnostics, builder);
+    })
+}
+
+/// Builds the scene that `parse` reads.
+fn load_parsed(
+    folder: PathBuf,
+    options: &LoadOptions,
+    files: &FileCache,
+    parse: impl FnOnce(&mut SourceMap, &mut Diagnostics, &mut Builder<'_>),
+) -> Result<Loaded, Box<Report>> {
     let mut sources = SourceMap::new();
     let mut diagnostics = Diagnostics::new();
-    let folder = path.parent().map(Path::to_path_buf).unwrap_or_default();
     let mut builder = Builder::new(folder, options);
-    parse_file(path, &mut sources, &mut diagnostics, &mut builder);
+    parse(&mut sources, &mut diagnostics, &mut builder);
     let scene_files = SceneFiles::new(&sources, builder.files());
     let finished = builder.finish(files, &mut diagnostics);
     let failed = diagnostics.has_errors();

@@ -4,7 +4,7 @@
 //! [`Tracer`] for each thread, and reports. Reading order: `segment` is a path between two vertices, `vertices` finds
 //! the next ones, and [`path`] is the loop over them; `wavefront` has the vertices of `mc` and `mis` side by side.
 //! `roulette` decides which paths end and split where they arrive (`arrivals`), by what `pilot` paths found.
-//! [`irradiance_cache`] and [`photon_map`] replace the light that Lambertian parts reflect (`diffuse`).
+//! Pixels that are neighbours may share paths ([`reuse`]). [`irradiance_cache`] and [`photon_map`] replace the light that Lambertian parts reflect (`diffuse`).
 
 mod arrivals;
 mod diffuse;
@@ -12,6 +12,7 @@ pub mod irradiance_cache;
 pub mod path;
 pub mod photon_map;
 mod pilot;
+pub mod reuse;
 mod roulette;
 mod segment;
 mod vertices;
@@ -23,7 +24,7 @@ pub use photon_map::{MapStats, PhotonMapIntegrator};
 pub use pilot::GuidedIntegrator;
 
 use crate::direct::Fits;
-use crate::film::{Film, PixelSample};
+use crate::film::PixelSample;
 use crate::photons::PhotonError;
 use crate::scene::RenderJob;
 use crate::settings::{IntegratorKind, RouletteKind};
@@ -45,8 +46,8 @@ pub trait Integrator: Sync {
         false
     }
 
-    /// Statistics of the image, with those of all tracers. What is counted by pixel is added to the film.
-    fn statistics(&self, paths: PathStats, film: &mut Film) -> Statistics;
+    /// Statistics of the image, with those of all tracers.
+    fn statistics(&self, paths: PathStats) -> Statistics;
 }
 
 /// What one thread traces samples with: buffers and counts.
@@ -72,14 +73,14 @@ pub fn integrator<'a>(
         IntegratorKind::Path if job.settings().integrator.roulette != RouletteKind::Throughput => {
             Box::new(GuidedIntegrator::new(job))
         }
-        IntegratorKind::Direct | IntegratorKind::Path => Box::new(PathIntegrator),
+        IntegratorKind::Direct | IntegratorKind::Path => Box::new(PathIntegrator::new(job)),
         IntegratorKind::IrradianceCache => Box::new(CacheIntegrator::new(job, cameras, stop)),
         IntegratorKind::PhotonMap => Box::new(PhotonMapIntegrator::new(job, cameras, stop)?),
     })
 }
 
 /// Statistics of an image.
-#[derive(Clone, Copy, Debug, Default)]
+#[derive(Clone, Debug, Default)]
 pub struct Statistics {
     /// Counts and times, summed over threads.
     pub paths: PathStats,
@@ -87,4 +88,6 @@ pub struct Statistics {
     pub cache: Option<CacheReport>,
     /// The photon maps, if there are any.
     pub photons: Option<MapStats>,
+    /// Pixels that asked for the records of the cache, by their coordinates: one entry for each record.
+    pub records: Vec<[u32; 2]>,
 }

@@ -11,14 +11,16 @@
 //!
 //! All integrators follow their paths through the one loop here; [`AtVertices`] is what they do differently.
 
+use super::reuse::{self, Groups, Place, Reuse};
 pub use super::segment::{CameraSample, PathStats};
 use super::segment::{PathState, Vertex, emptied, extend, extend_to_emitter};
 pub use super::vertices::Recording;
 use super::vertices::{Stage, VertexSearch};
 use super::wavefront::{Batch, Buffers, Estimate, Output};
 use super::{Integrator, Statistics, Tracer};
+use crate::bsdfs::{Bsdf, Diffuse};
 use crate::direct::{DirectStage, Estimator, Fits, ShadingPoint};
-use crate::film::{Film, PixelSample};
+use crate::film::PixelSample;
 use crate::materials::SurfaceBsdf;
 use crate::scene::RenderJob;
 use crate::settings::IntegratorSettings;
@@ -27,14 +29,24 @@ use std::time::Instant;
 
 /// Path tracing: nothing is prepared.
 #[derive(Clone, Copy, Debug, Default)]
-pub struct PathIntegrator;
+pub struct PathIntegrator {
+    /// Which samples share paths.
+    groups: Groups,
+}
+
+impl PathIntegrator {
+    /// Of an image that is rendered in whole cells.
+    pub(super) fn new(job: &RenderJob) -> Self {
+        PathIntegrator { groups: if reuse::edge(job) > 1 { Groups::Cells } else { Groups::None } }
+    }
+}
 
 impl Integrator for PathIntegrator {
     fn tracer(&self, with_features: bool) -> Box<dyn Tracer + '_> {
-        Box::new(PathTracer::new(with_features))
+        Box::new(PathTracer::sharing(self.groups, with_features))
     }
 
-    fn statistics(&self, paths: PathStats, _: &mut Film) -> Statistics {
+    fn statistics(&self, paths: PathStats) -> Statistics {
         Statistics { paths, ..Statistics::default() }
     }
 }
@@ -81,6 +93,8 @@ pub struct PathTracer {
     radiance: Vec<Rgb>,
     direct: DirectStage,
     buffers: Option<Box<Buffers>>,
+    /// Paths that samples of a batch share.
+    reuse: Reuse,
     /// The vertex whose estimator all have, if not each its own.
     pub(super) estimator_of: Option<u32>,
     /// Paths go on by specular lobes only.
@@ -108,6 +122,11 @@ impl PathTracer {
         let mut tracer = PathTracer::default();
         tracer.search.omits_features = !with_features;
         tracer
+    }
+
+    /// The same, where these samples of a batch share paths if the settings say so.
+    pub fn sharing(groups: Groups, with_features: bool) -> Self {
+        PathTracer { reuse: Reuse::of(groups), ..PathTracer::new(with_features) }
     }
 
     /// Copies the rays that are traced from now on, for measurements.
@@ -145,12 +164,13 @@ impl PathTracer {
     ) {
         let depth = settings.depth();
         fits.begin_batch(samples.len());
+        let is_plain = own.is_none() && self.outcomes.is_none();
+        self.reuse.begin(settings.path_reuse.filter(|_| is_plain), samples.len());
         for vertex in 0..=depth {
             let count = self.search.active.len();
             if count == 0 {
                 break;
             }
-            let is_plain = own.is_none() && self.outcomes.is_none();
             let estimate = Estimate::new(settings, vertex).filter(|_| is_plain);
             let room = count * self.search.arrivals.max_paths() as usize;
             let mut batch = estimate.map(|e| Batch::new(self.buffers.take().unwrap_or_default(), e, room));
@@ -161,17 +181,24 @@ impl PathTracer {
             let estimator = Estimator::at_vertex(settings, self.estimator_of.unwrap_or(vertex));
             let step = Step { settings, estimator, vertex, continues: vertex + 1 < depth, vertices, shadings };
             let points = self.points(&step, samples);
+            self.share(&step, out);
             self.light_points(job, &step, &points, fits, out);
             self.extend_paths(&step, &points);
             if let Some(mut batch) = batch {
                 let (stats, direct) = (&mut self.search.stats, &mut self.direct.stats);
                 let segments = self.search.recording.as_mut().map(|r| r.segments_at(vertex));
-                batch.shade(job, &mut Output { samples: out, fits, next: &mut self.next, stats, direct, segments });
+                let (samples, next, reuse) = (&mut *out, &mut self.next, self.reuse.active());
+                batch.shade(job, &mut Output { samples, fits, next, stats, direct, segments, reuse });
                 self.buffers = Some(batch.into_buffers());
             }
             std::mem::swap(&mut self.search.active, &mut self.next);
             self.spare_points = emptied(points);
             self.search.recycle(step.vertices);
+        }
+        if let Some(reuse) = self.reuse.active() {
+            let start = Instant::now();
+            self.direct.stats.segments += reuse.resolve(job, samples, out);
+            self.direct.stats.t2 += start.elapsed();
         }
         fits.end_batch(samples.iter().map(|s| (s.fit, s.weight)));
     }
@@ -202,6 +229,17 @@ impl PathTracer {
             }
         }
         points
+    }
+
+    /// Lets the paths at Lambertian vertices that are not in columns be shared.
+    fn share(&mut self, step: &Step<'_, '_>, out: &mut [PixelSample]) {
+        let Some(reuse) = self.reuse.active() else { return };
+        for (path, v) in self.search.active.iter_mut().zip(&step.vertices) {
+            let Bsdf::Diffuse(Diffuse { reflectance }) = v.bsdf.bsdf else { continue };
+            let at = Place::new((v.surface.p, v.surface.p_error), (v.bsdf.n, v.bsdf.frame.z), v.wo);
+            let radiance = &mut out[path.sample as usize].radiance;
+            path.beta = reuse.arrive((path.sample, step.vertex, v.is_next), at, (path.beta, reflectance), radiance);
+        }
     }
 
     /// Adds the direct light of the vertices of the active paths.

@@ -11,7 +11,7 @@ use super::roulette::{PixelMeans, Roulette, Tail};
 use super::segment::{CameraSample, PathStats};
 use super::{Integrator, Statistics, Tracer};
 use crate::direct::{Estimator, Fits};
-use crate::film::{Film, PixelSample};
+use crate::film::PixelSample;
 use crate::scene::RenderJob;
 use crate::settings::IntegratorSettings;
 use lumiris_numbers::math::hash::pcg4d;
@@ -79,7 +79,7 @@ impl Integrator for GuidedIntegrator {
         Box::new(GuidedTracer { settings: &self.settings, paths: self.path_tracer(with_features) })
     }
 
-    fn statistics(&self, mut paths: PathStats, _: &mut Film) -> Statistics {
+    fn statistics(&self, mut paths: PathStats) -> Statistics {
         paths.merge(&self.pilot);
         Statistics { paths, ..Statistics::default() }
     }
@@ -138,7 +138,7 @@ impl Grid {
             let ray = scene.camera.ray(film, [lx, ly], time);
             let weight = ray.weight * scene.film.scale;
             let sample_counts = settings.sample_counts();
-            CameraSample { ray, weight, stream, direct: stream, sample_counts, fit: 0, pixel }
+            CameraSample { ray, weight, stream, direct: stream, sample_counts, index: sample, fit: 0, pixel }
         })
     }
 }

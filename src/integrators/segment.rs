@@ -87,6 +87,8 @@ pub struct CameraSample {
     pub direct: SampleStream,
     /// Sample counts at its first vertex.
     pub sample_counts: SampleCounts,
+    /// Its index among the samples of its pixel.
+    pub index: u32,
     /// The fit of its pixel.
     pub fit: u32,
     /// Its pixel; any, where none is the sample's.
@@ -128,14 +130,16 @@ pub(super) struct Carried {
     pub(super) width: f32,
     pub(super) spread: f32,
     pub(super) time: f32,
+    /// See [`PathState`].
+    pub(super) passed: u32,
 }
 
 impl PathState {
     /// At a vertex with the throughput `beta`, where a pixel has the given width.
     #[inline]
     pub(super) fn carried(&self, beta: Rgb, width: f32) -> Carried {
-        let PathState { sample, branch, eta_scale, spread, ray: Ray { time, .. }, .. } = *self;
-        Carried { sample, branch, beta, eta_scale, width, spread, time }
+        let PathState { sample, branch, eta_scale, spread, passed, ray: Ray { time, .. }, .. } = *self;
+        Carried { sample, branch, beta, eta_scale, width, spread, time, passed }
     }
 
     /// What the path carries of the emission of a surface, with the weight of the technique that found it.
@@ -297,6 +301,8 @@ pub(super) struct Vertex<'w> {
     pub(super) wo: Vec3,
     pub(super) stream: SampleStream,
     pub(super) direct: SampleStream,
+    /// The path has passed no surface since its last vertex.
+    pub(super) is_next: bool,
 }
 
 impl<'w> Vertex<'w> {

@@ -204,7 +204,7 @@ impl VertexSearch {
             let [stream, direct] = streams.map(|s| s.domain(domain::VERTEX + at.vertex));
             let Carried { beta, branch, .. } = carried;
             self.kept.push(PathState { branch, beta, width, passed: 0, travelled: 0.0, technique: None, ..*path });
-            vertices.push(Vertex { surface, bsdf, wo, stream, direct });
+            vertices.push(Vertex { surface, bsdf, wo, stream, direct, is_next: path.passed == 0 });
         }
     }
 

@@ -12,10 +12,13 @@
 //! the pilot's noise, which the jackknife tells: all candidates have the same pixels, so that the difference of two of
 //! them is known better than either.
 //!
+//! In paths, a third round finds by blocks of pixels whether they share paths ([`super::auto_reuse`]).
+//!
 //! Times differ from run to run, so the choice is made once, becomes part of the settings, and is recorded with them:
 //! rendering with these settings gives the same image to the bit. All candidates are unbiased, and the pilot has random
 //! numbers of its own; so the choice adds no bias.
 
+use super::auto_reuse;
 pub use super::auto_round::Trial;
 use super::auto_round::{Candidate, Difference, Round};
 use super::visibility_cache::build_visibility_cache;
@@ -25,10 +28,12 @@ use crate::film::PixelBounds;
 use crate::imaging::metrics::difference::DEFAULT_EPSILON;
 use crate::integrators::PathTracer;
 use crate::integrators::path::CameraSample;
+use crate::integrators::reuse::{self, Groups};
 use crate::scene::RenderJob;
 use crate::settings::{
-    EstimatorKind, IntegratorKind, IntegratorSettings, Proposals, RisSettings, Settings, StageTimes,
+    Allocation, EstimatorKind, IntegratorKind, IntegratorSettings, Proposals, RisSettings, Settings, StageTimes,
 };
+use lumiris_numbers::estimators::efficiency::Model;
 use lumiris_numbers::math::hash::{pcg4d, unit_f32};
 use rayon::prelude::*;
 use serde::{Deserialize, Serialize};
@@ -41,12 +46,14 @@ const CHUNK: usize = 64;
 /// Most pixels of a round: deviations are then known to a percent or two.
 const MAX_PIXELS: usize = 4096;
 /// Fewest pixels of a round for which a choice is more than chance.
-const MIN_PIXELS: usize = 64;
-/// Time of both rounds, as a fraction of that of the image.
-const FRACTION: f64 = 0.03;
-/// Time of both rounds over that of rendering their pixels once, with the same number of samples and seeds: in direct light,
-/// and in paths.
-const TRIALS: [f64; 2] = [10.0, 16.0];
+const MIN_PIXELS: usize = 128;
+/// Pixels of a round with which numbers of samples are known well enough in most images.
+const ENOUGH_PIXELS: usize = 256;
+/// Time of all rounds, as a fraction of that of the image: what is wanted, and the most where that is not enough.
+const FRACTIONS: [f64; 2] = [0.03, 0.08];
+/// Time of all rounds over that of rendering the pixels of one once, with the same number of samples and seeds: in direct
+/// light, and in paths.
+const TRIALS: [f64; 2] = [10.0, 20.0];
 /// Combined with the seed of the image and the number of the round.
 const SEED: u32 = 0x61_75_74_6f;
 /// Share of the greatest efficiency, by the model, with which fewer samples will do.
@@ -82,6 +89,9 @@ pub struct AutoChoice {
     pub variance: [f64; 3],
     /// The trials of both rounds.
     pub trials: [Vec<Trial>; 2],
+    /// Those with and without shared paths, in blocks of pixels.
+    #[serde(default)]
+    pub sharing: Vec<Trial>,
     /// The chosen one of the second round.
     pub chosen: String,
     /// Processor time of the pilot (s).
@@ -150,8 +160,8 @@ pub(super) fn proposals(job: &RenderJob) -> Option<(u32, StageTimes)> {
 
 /// Where a round measures.
 struct Pilot {
-    /// Pixels of both rounds.
-    pixels: [Vec<[u32; 2]>; 2],
+    /// Pixels of the rounds; those of the third are blocks.
+    pixels: [Vec<[u32; 2]>; 3],
     /// Samples of each and seed.
     spp: u32,
     seed: u32,
@@ -163,12 +173,13 @@ impl Pilot {
         let Settings { integrator, sampling } = job.settings();
         let bounds = job.world.scene.film.bounds;
         let spp = 1 << sampling.spp.clamp(1, MAX_SPP).ilog2();
-        let samples = bounds.area() as f64 * f64::from(sampling.spp) * FRACTION;
+        let samples = bounds.area() as f64 * f64::from(sampling.spp);
         let per_pixel = f64::from(2 * spp) * TRIALS[usize::from(integrator.depth() > 1)];
-        let count = ((samples / per_pixel) as usize).min(MAX_PIXELS);
+        let [wanted, most] = FRACTIONS.map(|fraction| (samples * fraction / per_pixel) as usize);
+        let count = wanted.max(most.min(ENOUGH_PIXELS)).min(MAX_PIXELS);
         let is_measurable = matches!(integrator.kind, IntegratorKind::Direct | IntegratorKind::Path);
         (is_measurable && count >= MIN_PIXELS).then(|| Pilot {
-            pixels: [0, 1].map(|round| pixels(&bounds, count, round)),
+            pixels: [pixels(&bounds, count, 0), pixels(&bounds, count, 1), blocks(&bounds, 2 * count)],
             spp,
             seed: sampling.seed,
         })
@@ -203,6 +214,7 @@ impl Pilot {
         let second = self.round(job, &candidates, 1);
         let chosen = second.choose(&candidates, predicted);
         let second = second.trials(&candidates);
+        let shared = self.share(job, &candidates[chosen].settings, &model);
         if !candidates[chosen].settings.uses_visibility_cache() {
             job.lights.set_visibility_cache(None);
         }
@@ -211,11 +223,39 @@ impl Pilot {
             spp: self.spp,
             cost: model.cost,
             variance: model.variance,
-            chosen: second[chosen].name.clone(),
+            chosen: Candidate::named(shared.1).name,
             seconds: (processor_time::of_process() - start).as_secs_f64(),
             trials: [trials, second],
+            sharing: shared.0,
         };
-        (choice, candidates[chosen].settings)
+        (choice, shared.1)
+    }
+
+    /// Third round: whether pixels share paths, and the numbers of samples if they do.
+    fn share(&self, job: &RenderJob, chosen: &IntegratorSettings, model: &Model) -> (Vec<Trial>, IntegratorSettings) {
+        let Settings { integrator: base, sampling } = *job.settings();
+        let is_open = base.path_reuse.is_none() && sampling.allocation == Allocation::Auto;
+        if !is_open || reuse::obstacle(job).is_some() || self.pixels[2].is_empty() {
+            return (Vec::new(), *chosen);
+        }
+        let candidates = auto_reuse::candidates(chosen);
+        let round = self.round(job, &candidates, 2).by_blocks((auto_reuse::EDGE * auto_reuse::EDGE) as usize);
+        let trials = round.trials(&candidates);
+        let Some(gain) = auto_reuse::best(&round) else { return (trials, *chosen) };
+        let mut settings = IntegratorSettings { path_reuse: Some(gain.edge), ..*chosen };
+        if chosen.estimator == EstimatorKind::Mis {
+            // What is left of the variance is more that of first vertices; no further than what was measured goes
+            let [first, later] = [0, 1].map(|vertex| chosen.sample_counts_at(vertex).samples);
+            let light = |numbers: &[u32], range: [u32; 2]| {
+                let in_range = numbers.iter().filter(|n| (range[0]..=range[1]).contains(n));
+                in_range.map(|&n| n - 1).collect::<Vec<_>>()
+            };
+            let choices = [light(&FIRST, [first, 2 * first]), light(&LATER, [2, later])];
+            let best = auto_reuse::model(model, &gain).best(choices.each_ref().map(Vec::as_slice), NEARLY);
+            let numbers = with_samples(&base, best.map(|n| n + 1));
+            (settings.samples, settings.later_samples) = (numbers.samples, numbers.later_samples);
+        }
+        (trials, settings)
     }
 
     /// Measures all candidates on the pixels of a round.
@@ -301,6 +341,20 @@ fn pixels(bounds: &PixelBounds, count: usize, round: u32) -> Vec<[u32; 2]> {
     (0..rows).flat_map(|row| (0..columns).map(move |column| pixel(row, column))).collect()
 }
 
+/// As many pixels in blocks, or somewhat less; none where there is no room for any.
+fn blocks(bounds: &PixelBounds, count: usize) -> Vec<[u32; 2]> {
+    const EDGE: u32 = auto_reuse::EDGE;
+    let [width, height] = [bounds.width() / EDGE, bounds.height() / EDGE];
+    if width == 0 || height == 0 {
+        return Vec::new();
+    }
+    let corners = pixels(&PixelBounds { x0: 0, x1: width, y0: 0, y1: height }, count / (EDGE * EDGE) as usize, 2);
+    let block = |[x, y]: [u32; 2]| {
+        (0..EDGE * EDGE).map(move |i| [bounds.x0 + x * EDGE + i % EDGE, bounds.y0 + y * EDGE + i / EDGE])
+    };
+    corners.into_iter().flat_map(block).collect()
+}
+
 /// Renders some pixels with each candidate and seed: of each candidate, processor time (ns), and the difference of the two
 /// means of each pixel. The `turn` decides which candidate is first.
 fn measure(
@@ -310,7 +364,8 @@ fn measure(
     seeds: [u32; 2],
     turn: usize,
 ) -> Vec<(f64, Vec<Difference>)> {
-    let mut worker = Worker::new(PathTracer::new(false));
+    let groups = if reuse::obstacle(run.job).is_none() { Groups::Grid } else { Groups::None };
+    let mut worker = Worker::new(PathTracer::sharing(groups, false));
     let mut times = vec![0.0; candidates.len()];
     let mut images = vec![[(); 2].map(|()| Vec::<[f64; 3]>::new()); candidates.len()];
     for k in 0..candidates.len() {

@@ -56,6 +56,9 @@ impl Candidate {
         if settings.estimator == EstimatorKind::Mis {
             name += &format!(", BSDF fraction {}", settings.bsdf_fraction());
         }
+        if let Some(edge) = settings.path_reuse {
+            name += &format!(", paths of {edge} × {edge} pixels");
+        }
         Candidate { name, settings, preparation: 0.0 }
     }
 }
@@ -72,8 +75,18 @@ pub(super) struct Round {
 }
 
 impl Round {
+    /// The round whose pixels are blocks of so many that stand one after the other: they are not independent.
+    pub(super) fn by_blocks(mut self, size: usize) -> Round {
+        for (_, differences) in &mut self.measured {
+            let mean =
+                |block: &[Difference]| [0, 1].map(|j| block.iter().map(|d| d[j]).sum::<f64>() / block.len() as f64);
+            *differences = differences.chunks(size).map(mean).collect();
+        }
+        self
+    }
+
     /// Variances of a camera sample by a candidate: with all pixels, and without each of the groups.
-    fn variances(&self, k: usize) -> Vec<f64> {
+    pub(super) fn variances(&self, k: usize) -> Vec<f64> {
         let differences = &self.measured[k].1;
         let groups = GROUPS.min(differences.len());
         let mut sums = vec![[0.0; 3]; groups];
@@ -143,7 +156,7 @@ impl Round {
 
 /// A value, and its standard error, which includes that of two times, from what it is with all pixels and without each of
 /// the groups.
-fn jackknife(values: &[f64]) -> (f64, f64) {
+pub(super) fn jackknife(values: &[f64]) -> (f64, f64) {
     let groups = &values[1..];
     let n = groups.len() as f64;
     let mean = groups.iter().sum::<f64>() / n;

@@ -109,6 +109,7 @@ impl<'a> CameraSampler<'a> {
                 stream,
                 direct: self.direct_stream(pixel, sample, seed).unwrap_or(stream),
                 sample_counts: self.chosen_counts(pixel, &stream).unwrap_or(sample_counts),
+                index: sample,
                 fit,
                 pixel,
             }
@@ -135,6 +136,7 @@ impl<'a> CameraSampler<'a> {
             stream,
             direct: stream,
             sample_counts: self.chosen_counts(pixel, &stream).unwrap_or_else(|| settings.integrator.sample_counts()),
+            index: sample,
             fit: 0,
             pixel,
         }

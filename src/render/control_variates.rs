@@ -12,8 +12,9 @@ use rayon::prelude::*;
 /// Corrects all pixels of `film`, which holds the tiles, and its replicas. `position` is that of a pixel of a tile.
 pub(super) fn correct(film: &mut Film, tiles: &[Tile], position: impl Fn(&PixelBounds, u32) -> [u32; 2]) {
     let Some(m) = tiles.first().map(|t| t.fits.controls()).filter(|m| *m > 0) else { return };
-    let mut pixels = vec![Pixel::default(); film.pixels.len()];
-    let mut controls = vec![0.0; film.pixels.len() * m];
+    let mut pixels = vec![Pixel::default(); film.len()];
+    let mut controls = vec![0.0; film.len() * m];
+    let sums_of_film = film.pixels();
     // Σ c of each replica, by the index of its pixel
     let mut of_replicas = std::collections::BTreeMap::<u32, Vec<f64>>::new();
     for tile in tiles {
@@ -23,8 +24,8 @@ pub(super) fn correct(film: &mut Film, tiles: &[Tile], position: impl Fn(&PixelB
         };
         for fit in 0..tile.bounds.area() as u32 {
             let (at, (value, sums)) = (place(fit), tile.fits.sums_of_controls(fit));
-            pixels[at] = pixel(&film.pixels[at], value);
-            let per_sample = 1.0 / film.pixels[at].count.max(1) as f64;
+            pixels[at] = pixel(&sums_of_film[at], value);
+            let per_sample = 1.0 / sums_of_film[at].count.max(1) as f64;
             for (c, sum) in controls[at * m..][..m].iter_mut().zip(sums) {
                 *c = (sum * per_sample) as f32;
             }
@@ -34,6 +35,7 @@ pub(super) fn correct(film: &mut Film, tiles: &[Tile], position: impl Fn(&PixelB
         }
     }
 
+    drop(sums_of_film);
     let picture = Picture::new(film.bounds.width() as usize, m, pixels, controls);
     let rows = (0..picture.height()).into_par_iter();
     let beta: Vec<Vec<f32>> = rows
@@ -45,16 +47,16 @@ pub(super) fn correct(film: &mut Film, tiles: &[Tile], position: impl Fn(&PixelB
         .collect();
     let beta: Vec<f32> = beta.concat();
     let of_pixel = |i: usize| &beta[i * 3 * m..][..3 * m];
-    for (i, pixel) in film.pixels.iter_mut().enumerate() {
-        subtract(pixel, picture.correction(i, of_pixel(i)));
-    }
-    for replica in &mut film.replicas {
+    let corrections = (0..film.len()).map(|i| picture.correction(i, of_pixel(i))).collect();
+    let mut replicas = film.replicas().to_vec();
+    for replica in &mut replicas {
         let count = replica.count.max(1) as f64;
         let Some(sums) = of_replicas.get(&replica.pixel) else { continue };
         let controls: Vec<f32> = sums.iter().map(|s| (s / count) as f32).collect();
         let off = correction(&controls, of_pixel(replica.pixel as usize));
         replica.radiance.iter_mut().zip(off).for_each(|(sum, off)| *sum -= count * f64::from(off));
     }
+    film.correct(corrections, replicas);
 }
 
 /// A pixel with `value` as the sum of its estimates of direct light. What it can be compared to depends on what camera
@@ -66,15 +68,5 @@ fn pixel(sums: &PixelSums, value: [f64; 3]) -> Pixel {
         mean: value.map(|v| (v / count) as f32),
         class: is_covered.then_some(sums.material),
         normal: sums.normal.map(|v| (v / count) as f32),
-    }
-}
-
-/// Subtracts `off` from the mean of a pixel. The spread of its samples remains.
-fn subtract(pixel: &mut PixelSums, off: [f32; 3]) {
-    let count = pixel.count.max(1) as f64;
-    for ((sum, squares), off) in pixel.radiance.iter_mut().zip(&mut pixel.radiance_squared).zip(off) {
-        let before = *sum;
-        *sum -= count * f64::from(off);
-        *squares += (*sum * *sum - before * before) / count;
     }
 }

@@ -8,7 +8,6 @@
 //! An id is the 32-bit MurmurHash3 of a name, as the float of the same bits. A pixel has the [`RANKS`] ids that cover
 //! most of it, two in each group of four channels.
 
-use super::output::Channels;
 use super::{BATCH_PATHS, RenderSettings, ThreadError, position, thread_pool};
 use crate::accel::{Coherence, Hit, RayBatch};
 use crate::film::{Film, PixelBounds};
@@ -17,6 +16,7 @@ use crate::scene::{RenderJob, Scene};
 use rayon::prelude::*;
 use std::collections::{BTreeMap, HashSet};
 use std::io::Cursor;
+use std::ops::Range;
 use strum::{EnumString, IntoStaticStr, VariantNames};
 
 /// Ids per pixel.
@@ -32,13 +32,17 @@ pub enum Cryptomatte {
     Material,
 }
 
-/// Channels and metadata of one Cryptomatte.
+/// One Cryptomatte.
 #[derive(Clone, Debug)]
 pub struct Layer {
     /// Its name, `CryptoObject` or `CryptoMaterial`.
     pub name: &'static str,
-    /// Values: `CryptoObject00.R` is the first id and `.G` its coverage, `.B` and `.A` are the second.
-    pub channels: Channels,
+    /// Names of the channels: `CryptoObject00.R` is the first id and `.G` its coverage, `.B` and `.A` are the second.
+    pub channels: Vec<String>,
+    /// The image.
+    bounds: PixelBounds,
+    /// By rows and columns.
+    tiles: Vec<LayerTile>,
     /// Entries `cryptomatte/…`, with the names of all ids.
     pub metadata: Vec<(String, String)>,
 }
@@ -80,11 +84,12 @@ impl Cryptomatte {
         }
     }
 
-    fn finish(self, data: Vec<f32>, hashes: &BTreeMap<String, u32>) -> Layer {
+    fn finish(self, bounds: PixelBounds, mut tiles: Vec<LayerTile>) -> Layer {
+        let mut hashes = BTreeMap::new();
+        tiles.iter_mut().for_each(|tile| hashes.extend(std::mem::take(&mut tile.hashes)));
         let names =
             (0..RANKS / 2).flat_map(|group| ["R", "G", "B", "A"].map(|c| format!("{}{group:02}.{c}", self.layer())));
-        let channels = Channels { names: names.collect(), data };
-        Layer { name: self.layer(), channels, metadata: self.metadata(hashes) }
+        Layer { name: self.layer(), channels: names.collect(), bounds, tiles, metadata: self.metadata(&hashes) }
     }
 
     /// The entries that readers look for. The manifest is JSON, in the order of names.
@@ -132,21 +137,14 @@ pub fn cryptomattes(
     let camera = CameraSampler::new(job, settings.first_sample);
     let names: Vec<Vec<String>> = kinds.iter().map(|kind| kind.names(&job.world.scene)).collect();
     let tracer = Tracer { job, film, camera, first: settings.first_sample, kinds, names: &names };
-    let of_tiles: Vec<Vec<TileLayer>> =
+    let of_tiles: Vec<Vec<LayerTile>> =
         pool.install(|| tiles.par_iter().with_max_len(1).map(|tile| tracer.tile(tile)).collect());
 
-    let mut layers: Vec<(Vec<f32>, BTreeMap<String, u32>)> =
-        kinds.iter().map(|_| (vec![0.0; film.pixels.len() * STRIDE], BTreeMap::new())).collect();
-    for (tile, of_tile) in tiles.iter().zip(of_tiles) {
-        for ((data, hashes), part) in layers.iter_mut().zip(of_tile) {
-            hashes.extend(part.hashes.into_values());
-            for (y, row) in (tile.y0..tile.y1).zip(part.data.chunks_exact(tile.width() as usize * STRIDE)) {
-                let start = film.index(tile.x0, y) * STRIDE;
-                data[start..start + row.len()].copy_from_slice(row);
-            }
-        }
+    let mut layers: Vec<Vec<LayerTile>> = kinds.iter().map(|_| Vec::with_capacity(tiles.len())).collect();
+    for of_tile in of_tiles {
+        layers.iter_mut().zip(of_tile).for_each(|(layer, tile)| layer.push(tile));
     }
-    Ok(kinds.iter().zip(layers).map(|(kind, (data, hashes))| kind.finish(data, &hashes)).collect())
+    Ok(kinds.iter().zip(layers).map(|(kind, tiles)| kind.finish(film.bounds, tiles)).collect())
 }
 
 /// Channels of a Cryptomatte.
@@ -156,12 +154,37 @@ const STRIDE: usize = 2 * RANKS;
 type Ranked = Vec<(Key, f32)>;
 
 /// One kind in one tile.
-#[derive(Default)]
-struct TileLayer {
-    /// Channels of its pixels, row by row.
-    data: Vec<f32>,
+#[derive(Clone, Debug)]
+struct LayerTile {
+    bounds: PixelBounds,
+    /// Numbers of ids of its pixels, row by row.
+    counts: Vec<u8>,
+    /// Ids with their coverage, pixel by pixel.
+    covers: Vec<[f32; 2]>,
     /// Names and hashes of what is there.
-    hashes: BTreeMap<Key, (String, u32)>,
+    hashes: BTreeMap<String, u32>,
+}
+
+impl Layer {
+    /// The values of some rows, given by their coordinates, interleaved.
+    pub fn rows(&self, rows: Range<u32>) -> Vec<f32> {
+        let row = self.bounds.width() as usize * STRIDE;
+        let mut data = vec![0.0; rows.len() * row];
+        let first = self.tiles.partition_point(|t| t.bounds.y1 <= rows.start);
+        for tile in self.tiles[first..].iter().take_while(|t| t.bounds.y0 < rows.end) {
+            let mut covers = tile.covers.as_slice();
+            for (i, &count) in (0..).zip(&tile.counts) {
+                let (of_pixel, others) = covers.split_at(count.into());
+                covers = others;
+                let [x, y] = position(&tile.bounds, i);
+                if rows.contains(&y) {
+                    let at = (y - rows.start) as usize * row + (x - self.bounds.x0) as usize * STRIDE;
+                    data[at..at + 2 * of_pixel.len()].copy_from_slice(of_pixel.as_flattened());
+                }
+            }
+        }
+        data
+    }
 }
 
 struct Tracer<'a> {
@@ -176,23 +199,26 @@ struct Tracer<'a> {
 
 impl Tracer<'_> {
     /// All kinds in a tile.
-    fn tile(&self, tile: &PixelBounds) -> Vec<TileLayer> {
+    fn tile(&self, tile: &PixelBounds) -> Vec<LayerTile> {
         let mut pixels = vec![vec![Ranked::new(); tile.area()]; self.kinds.len()];
         self.trace(tile, &mut pixels);
         let layers = pixels.into_iter().zip(self.names).map(|(pixels, names)| {
-            let mut layer = TileLayer { data: vec![0.0; tile.area() * STRIDE], ..TileLayer::default() };
-            for (mut ranked, data) in pixels.into_iter().zip(layer.data.chunks_exact_mut(STRIDE)) {
+            let (mut counts, mut covers) = (Vec::with_capacity(pixels.len()), Vec::new());
+            let mut hashes = BTreeMap::<Key, (String, u32)>::new();
+            for mut ranked in pixels {
                 rank(&mut ranked);
-                for ((key, coverage), data) in ranked.iter().zip(data.chunks_exact_mut(2)) {
-                    let (_, hash) = layer.hashes.entry(*key).or_insert_with(|| {
-                        let name = name_of(names, *key);
+                counts.push(ranked.len() as u8);
+                for (key, coverage) in ranked {
+                    let (_, hash) = hashes.entry(key).or_insert_with(|| {
+                        let name = name_of(names, key);
                         let hash = hash(&name);
                         (name, hash)
                     });
-                    data.copy_from_slice(&[id(*hash), *coverage]);
+                    covers.push([id(*hash), coverage]);
                 }
             }
-            layer
+            covers.shrink_to_fit();
+            LayerTile { bounds: *tile, counts, covers, hashes: hashes.into_values().collect() }
         });
         layers.collect()
     }
@@ -201,10 +227,9 @@ impl Tracer<'_> {
     fn trace(&self, tile: &PixelBounds, pixels: &mut [Vec<Ranked>]) {
         let scene = &self.job.world.scene;
         let seed = self.job.settings().sampling.seed;
-        let count = |index: u32| {
-            let [x, y] = position(tile, index);
-            self.film.pixels[self.film.index(x, y)].count as u32
-        };
+        let mut sums = Vec::new();
+        self.film.read(tile, &mut sums);
+        let count = |index: u32| sums[index as usize].count as u32;
         // Ranges of samples, none longer than a batch
         let mut ranges = (0..tile.area() as u32).flat_map(|index| {
             let (first, count) = (self.first, count(index));

@@ -143,7 +143,7 @@ fn image(
     let render_settings =
         RenderSettings { spp, with_features: false, with_replicas: false, time_limit: None, ..*render_settings };
     let rendering = render(job, &render_settings, &AtomicBool::new(false), &|_| ())?;
-    Ok((rendering.film.pixels.iter().map(PixelSums::mean).collect(), plan))
+    Ok((rendering.film.pixels().iter().map(PixelSums::mean).collect(), plan))
 }
 
 /// What emits, as the camera sees it.

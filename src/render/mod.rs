@@ -6,6 +6,7 @@
 
 pub mod allocation;
 pub mod auto;
+mod auto_reuse;
 mod auto_round;
 pub mod bench;
 pub mod bench_frame;
@@ -15,6 +16,7 @@ mod control_variates;
 pub mod crosscheck;
 pub mod cryptomatte;
 pub mod efficiency;
+pub mod memory;
 pub mod noise;
 pub mod output;
 pub mod parts;
@@ -94,6 +96,8 @@ pub struct Progress {
     pub rays: u64,
     /// Time since the start.
     pub elapsed: Duration,
+    /// Passes over the whole image that are done.
+    pub passes: u32,
     /// Mean relative standard error of the pixels after the last pass for which it was determined, if there was one.
     pub noise: Option<f64>,
 }
@@ -122,6 +126,9 @@ pub struct Rendering {
 /// Gets the film of a tile that has new samples; called from worker threads.
 pub type TileObserver<'a> = dyn Fn(&Film) + Sync + 'a;
 
+/// Called after every pass over the whole image, before the next begins; gets the progress, and may stop the rendering.
+pub type PassObserver<'a> = dyn Fn(&Progress) + Sync + 'a;
+
 /// What a rendering goes on from, where its sums are stored, and who watches it.
 #[derive(Default)]
 pub struct Continuation<'a> {
@@ -133,6 +140,8 @@ pub struct Continuation<'a> {
     pub keeps_sums: bool,
     /// Gets tiles on the way.
     pub watch: Option<&'a TileObserver<'a>>,
+    /// Waits between passes.
+    pub passes: Option<&'a PassObserver<'a>>,
 }
 
 /// Why a rendering ended without an image.

@@ -1,8 +1,12 @@
 //! From the film to images: channels with names, and metadata.
 
-use crate::film::Film;
+use super::Rendering;
+use crate::film::{BAND, Film};
+use crate::imaging::{IMAGE_LAYER, Image};
 use crate::scene::{FilmSettings, SampleCountMap};
 use crate::settings::Settings;
+use rayon::prelude::*;
+use std::ops::Range;
 use strum::{EnumString, IntoStaticStr, VariantNames};
 
 /// A group of channels beside the image itself.
@@ -43,7 +47,8 @@ impl Aov {
         }
     }
 
-    fn channels(self) -> &'static [&'static str] {
+    /// Names of its channels.
+    pub fn channels(self) -> &'static [&'static str] {
         match self {
             Aov::Variance => &["variance.R", "variance.G", "variance.B"],
             Aov::Samples => &["samples"],
@@ -58,6 +63,9 @@ impl Aov {
     }
 }
 
+/// Channels of the image itself.
+const COLOUR: [&str; 3] = ["R", "G", "B"];
+
 /// Named channels, interleaved, row-major from the top left of the crop window.
 #[derive(Clone, Debug)]
 pub struct Channels {
@@ -67,48 +75,127 @@ pub struct Channels {
     pub data: Vec<f32>,
 }
 
-/// The image `R G B` and the chosen AOVs, linear. `sample_count_map` is the map that [`Aov::Ratio`] shows; without one
-/// it is black.
-pub fn channels(film: &Film, aovs: &[Aov], sample_count_map: Option<&SampleCountMap>) -> Channels {
-    let aov_names = aovs.iter().flat_map(|a| a.channels().iter().copied());
-    let names: Vec<String> = ["R", "G", "B"].into_iter().chain(aov_names).map(str::to_owned).collect();
-    let mut data = Vec::with_capacity(names.len() * film.pixels.len());
-    let variances = if aovs.contains(&Aov::Variance) { film.variances() } else { Vec::new() };
-    for (i, pixel) in film.pixels.iter().enumerate() {
-        data.extend(pixel.mean().map(|v| v as f32));
-        let count = pixel.count.max(1) as f64;
-        for aov in aovs {
-            match aov {
-                Aov::Variance => data.extend(variances[i].map(|v| v as f32)),
-                Aov::Samples => data.push(pixel.count as f32),
-                Aov::Albedo => data.extend(pixel.albedo.map(|v| (v / count) as f32)),
-                Aov::Normal => data.extend(pixel.normal.map(|v| (v / count) as f32)),
-                Aov::Depth if pixel.hits == 0 => data.push(f32::INFINITY),
-                Aov::Depth => data.push((pixel.depth / pixel.hits as f64) as f32),
-                Aov::Material => data.push(pixel.material as f32),
-                Aov::Object => data.push(pixel.object as f32),
-                Aov::Ratio => data.extend(sample_count_map.map_or([0.0; 5], |map| ratio_values(map, i))),
-                Aov::Records => data.push(pixel.records as f32),
+/// Layers of a film, which are made row by row.
+#[derive(Clone, Debug)]
+pub struct Layers<'a> {
+    film: &'a Film,
+    /// Whether `R G B` come first.
+    has_image: bool,
+    aovs: &'a [Aov],
+    /// The map that [`Aov::Ratio`] shows, and its greatest ratio; without one that layer is black.
+    sample_count_map: Option<(&'a SampleCountMap, f32)>,
+}
+
+impl<'a> Layers<'a> {
+    /// The chosen AOVs, after the image `R G B` if `has_image`. `sample_count_map` is what [`Aov::Ratio`] shows.
+    pub fn new(film: &'a Film, has_image: bool, aovs: &'a [Aov], sample_count_map: Option<&'a SampleCountMap>) -> Self {
+        let greatest = |map: &SampleCountMap| map.ratios.iter().copied().fold(1.0, f32::max).max(1.0 + f32::EPSILON);
+        Layers { film, has_image, aovs, sample_count_map: sample_count_map.map(|map| (map, greatest(map))) }
+    }
+
+    /// Names of the channels.
+    pub fn names(&self) -> Vec<String> {
+        let image = if self.has_image { &COLOUR[..] } else { &[] };
+        let aovs = self.aovs.iter().flat_map(|a| a.channels());
+        image.iter().chain(aovs).map(|&name| name.to_owned()).collect()
+    }
+
+    /// The values of some rows as [`Self::rows`] makes them, by several threads.
+    pub fn rows_in_parallel(&self, rows: Range<u32>) -> Vec<f32> {
+        let bands = rows.len().div_ceil(BAND as usize) as u32;
+        let band = |i: u32| rows.start + i * BAND..rows.end.min(rows.start + (i + 1) * BAND);
+        let made: Vec<Vec<f32>> = (0..bands).into_par_iter().with_max_len(1).map(|i| self.rows(band(i))).collect();
+        made.concat()
+    }
+
+    /// The values of some rows, given by their coordinates, interleaved.
+    pub fn rows(&self, rows: Range<u32>) -> Vec<f32> {
+        let stride = self.names().len();
+        let (mut pixels, mut variances) = (Vec::new(), Vec::new());
+        if self.aovs.contains(&Aov::Variance) {
+            self.film.read_rows_with_variances(rows.clone(), &mut pixels, &mut variances);
+        } else {
+            self.film.read_rows(rows.clone(), &mut pixels);
+        }
+        let first = self.film.index(self.film.bounds.x0, rows.start);
+        let mut data = Vec::with_capacity(stride * pixels.len());
+        for (i, pixel) in pixels.iter().enumerate() {
+            if self.has_image {
+                data.extend(pixel.mean().map(|v| v as f32));
+            }
+            let count = pixel.count.max(1) as f64;
+            for aov in self.aovs {
+                match aov {
+                    Aov::Variance => data.extend(variances[i].map(|v| v as f32)),
+                    Aov::Samples => data.push(pixel.count as f32),
+                    Aov::Albedo => data.extend(pixel.albedo.map(|v| (v / count) as f32)),
+                    Aov::Normal => data.extend(pixel.normal.map(|v| (v / count) as f32)),
+                    Aov::Depth if pixel.hits == 0 => data.push(f32::INFINITY),
+                    Aov::Depth => data.push((pixel.depth / pixel.hits as f64) as f32),
+                    Aov::Material => data.push(pixel.material as f32),
+                    Aov::Object => data.push(pixel.object as f32),
+                    Aov::Ratio => {
+                        data.extend(self.sample_count_map.map_or([0.0; 5], |map| ratio_values(map, first + i)));
+                    }
+                    Aov::Records => data.push(pixel.records as f32),
+                }
             }
         }
+        data
     }
-    Channels { names, data }
+}
+
+/// The image `R G B` and the chosen AOVs, linear, all rows at once. See [`Layers`] for large images.
+pub fn channels(film: &Film, aovs: &[Aov], sample_count_map: Option<&SampleCountMap>) -> Channels {
+    let layers = Layers::new(film, true, aovs, sample_count_map);
+    Channels { names: layers.names(), data: layers.rows(film.bounds.y0..film.bounds.y1) }
+}
+
+/// The same values, with an image of its own for each AOV; by their names, the image itself first.
+pub fn layers(film: &Film, aovs: &[Aov], sample_count_map: Option<&SampleCountMap>) -> Vec<(&'static str, Image)> {
+    let image = |has_image: bool, aovs: &[Aov]| {
+        let layers = Layers::new(film, has_image, aovs, sample_count_map);
+        Image {
+            width: film.bounds.width() as usize,
+            height: film.bounds.height() as usize,
+            channels: layers.names(),
+            data: layers.rows_in_parallel(film.bounds.y0..film.bounds.y1),
+        }
+    };
+    let of_aovs = aovs.iter().map(|&aov| (aov.into(), image(false, &[aov])));
+    [(IMAGE_LAYER, image(true, &[]))].into_iter().chain(of_aovs).collect()
+}
+
+/// The AOVs of an image under way.
+pub fn live_aovs(has_features: bool) -> Vec<Aov> {
+    let features = [Aov::Albedo, Aov::Normal, Aov::Depth].into_iter().filter(|_| has_features);
+    features.chain([Aov::Samples]).collect()
+}
+
+/// The AOVs that an image has unless others are asked for.
+pub fn default_aovs(has_ratio: bool, has_records: bool) -> Vec<Aov> {
+    let more = has_ratio.then_some(Aov::Ratio).into_iter().chain(has_records.then_some(Aov::Records));
+    Aov::ALL.into_iter().chain(more).collect()
 }
 
 /// Colour and numbers of a pixel of the map: from red at the minimum ratio (1) to green at the maximum of the map,
 /// logarithmically.
-fn ratio_values(map: &SampleCountMap, pixel: usize) -> [f32; 5] {
+fn ratio_values((map, max): (&SampleCountMap, f32), pixel: usize) -> [f32; 5] {
     let ratio = map.ratios[pixel];
-    let max = map.ratios.iter().copied().fold(1.0, f32::max).max(1.0 + f32::EPSILON);
     let green = (ratio.ln() / max.ln()).clamp(0.0, 1.0);
     let samples = (map.time / (f64::from(ratio) * map.t1 + map.t2)) as f32;
     [1.0 - green, green, 0.0, ratio * samples, samples]
 }
 
-/// Mean radiance of all pixels times `2^exposure`, linear RGB, interleaved.
-pub fn exposed(film: &Film, exposure: f32) -> Vec<f32> {
-    let gain = exposure.exp2();
-    film.pixels.iter().flat_map(|p| p.mean().map(|v| v as f32 * gain)).collect()
+/// How far a rendering came, as metadata entries.
+pub fn progress_metadata(rendering: &Rendering) -> Vec<(String, String)> {
+    let [least, most] = rendering.film.summary().samples;
+    let entries = [
+        ("complete", rendering.complete.to_string()),
+        ("samples_done", format!("{least} to {most} per pixel")),
+        ("seconds", format!("{:.3}", rendering.elapsed.as_secs_f64())),
+    ];
+    entries.map(|(key, value)| (format!("lumiris:{key}"), value)).to_vec()
 }
 
 /// Everything that an image depends on, as metadata entries `lumiris:…`: its settings and the film.
@@ -129,24 +216,51 @@ pub fn metadata(film: &FilmSettings, settings: &Settings) -> Vec<(String, String
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::film::{PixelBounds, PixelSums};
+    use crate::film::accumulator::PixelAccumulator;
+    use crate::film::{PixelBounds, PixelSample};
+    use lumiris_numbers::math::Rgb;
+
+    /// Two rows of three pixels, of which some have a sample.
+    fn film() -> Film {
+        let bounds = PixelBounds { x0: 4, x1: 7, y0: 9, y1: 11 };
+        let mut pixels = vec![PixelAccumulator::default(); 6];
+        pixels[0].add(0, &PixelSample { radiance: Rgb::new(1.0, 2.0, 4.0), features: None });
+        pixels[4].add(0, &PixelSample { radiance: Rgb::new(0.5, 0.25, 8.0), features: None });
+        Film::of_pixels([20, 20], bounds, &pixels)
+    }
 
     #[test]
     fn channel_count_matches_names_for_every_aov() {
-        let bounds = PixelBounds { x0: 0, x1: 2, y0: 0, y1: 1 };
-        let mut film = Film::new([2, 1], bounds);
-        film.pixels[0] = PixelSums { count: 1, radiance: [1.0, 2.0, 4.0], ..PixelSums::default() };
-        let c = channels(&film, &Aov::ALL, None);
-        assert_eq!(c.data.len(), c.names.len() * 2);
+        let c = channels(&film(), &Aov::ALL, None);
+        assert_eq!(c.data.len(), c.names.len() * 6);
         let depth = c.names.iter().position(|n| n == "depth.Z").unwrap();
         assert_eq!(c.data[depth], f32::INFINITY);
         assert_eq!(&c.data[..3], &[1.0, 2.0, 4.0]);
     }
 
     #[test]
-    fn exposure_counts_in_stops() {
-        let mut film = Film::new([1, 1], PixelBounds { x0: 0, x1: 1, y0: 0, y1: 1 });
-        film.pixels[0] = PixelSums { count: 1, radiance: [0.25, 0.5, 4.0], ..PixelSums::default() };
-        assert_eq!(exposed(&film, 1.0), [0.5, 1.0, 8.0]);
+    fn layers_are_those_of_the_whole_image_row_by_row() {
+        let film = film();
+        let whole = channels(&film, &[Aov::Samples], None);
+        let layers = Layers::new(&film, true, &[Aov::Samples], None);
+        assert_eq!([layers.rows(9..10), layers.rows(10..11)].concat(), whole.data);
+        assert_eq!(Layers::new(&film, false, &[Aov::Samples], None).rows(10..11), [0.0, 1.0, 0.0]);
+    }
+
+    #[test]
+    fn layers_have_the_values_of_the_channels() {
+        let film = film();
+        let aovs = [Aov::Depth, Aov::Albedo, Aov::Samples, Aov::Variance];
+        let all = channels(&film, &aovs, None);
+        let (width, mut names) = (film.bounds.width() as usize, Vec::new());
+        for (name, image) in layers(&film, &aovs, None) {
+            for (c, channel) in image.channels.iter().enumerate() {
+                let position = all.names.iter().position(|n| n == channel).unwrap();
+                let value = |i: usize| all.data[i * all.names.len() + position].to_bits();
+                (0..film.len()).for_each(|i| assert_eq!(image.get(i % width, i / width, c).to_bits(), value(i)));
+            }
+            names.push(name);
+        }
+        assert_eq!(names, ["beauty", "depth", "albedo", "samples", "variance"]);
     }
 }

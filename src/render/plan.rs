@@ -17,7 +17,7 @@ use super::{RenderSettings, Run, ThreadError, camera_batches};
 use crate::direct::Fits;
 use crate::film::PixelBounds;
 use crate::integrators::path::CameraSample;
-use crate::integrators::{PathTracer, Tracer};
+use crate::integrators::{PathTracer, Tracer, reuse};
 use crate::scene::{RenderJob, SampleCountMap};
 use crate::settings::table::rows;
 use crate::settings::{
@@ -52,6 +52,8 @@ pub struct Plan {
     pub ris: Option<RisChoice>,
     /// The settings that were chosen, by their names in metadata: with these, rendering gives the same image to the bit.
     pub chosen: Vec<(&'static str, String)>,
+    /// What the user should know of settings that have no effect.
+    pub warnings: Vec<String>,
 }
 
 /// The measured times and the chosen counts.
@@ -69,7 +71,8 @@ pub fn prepare(job: &mut RenderJob, threads: Option<usize>, ratio_map: bool) -> 
     let before = *job.settings();
     let auto = pool.install(|| auto::choose(job));
     if job.settings().sampling.allocation == Allocation::Auto {
-        let allocation = if auto.is_some() { Allocation::Adaptive } else { Allocation::Uniform };
+        let is_adaptive = auto.is_some() && reuse::edge(job) == 1;
+        let allocation = if is_adaptive { Allocation::Adaptive } else { Allocation::Uniform };
         job.change(|s| s.sampling.allocation = allocation);
     }
     let settings = job.settings().integrator;
@@ -79,7 +82,10 @@ pub fn prepare(job: &mut RenderJob, threads: Option<usize>, ratio_map: bool) -> 
     }
     let ris = choose_proposals(job, threads, ratio_map)?;
     job.pixel_samples = pool.install(|| allocate(job));
-    Ok(Plan { auto, ris, chosen: chosen(&before, job.settings()) })
+    let shares_paths = job.settings().integrator.path_reuse.is_some_and(|edge| edge > 1);
+    let obstacle = reuse::obstacle(job).filter(|_| shares_paths);
+    let warnings = obstacle.map(|reason| format!("pixels do not share paths: {reason}")).into_iter().collect();
+    Ok(Plan { auto, ris, chosen: chosen(&before, job.settings()), warnings })
 }
 
 /// True if [`prepare`] makes choices that follow from measured times.

@@ -3,25 +3,33 @@
 use super::camera_samples::{self, CameraSampler};
 use super::control_variates;
 use super::parts::{Checkpoints, PartError, StoredTile};
-use super::tiles::{Tile, Tiles, bounds_of_tiles, film, film_of_last, has_replicas, position};
+use super::tiles::{SHARE_TILE, Tile, Tiles, bounds_of_tiles, film, position, replica_edge};
 use super::worker::{AnyWorker, Workers};
 use super::{BATCH_PATHS, Continuation, Progress, RenderError, RenderSettings, Rendering, TileObserver};
 use crate::direct::Estimator;
 use crate::film::accumulator::PixelAccumulator;
+use crate::film::packed::PackedSums;
 use crate::film::replicas::{ReplicaAccumulator, replicas};
-use crate::film::{Film, PixelBounds};
+use crate::film::{Film, FilmTile, PixelBounds};
 use crate::integrators::path::CameraSample;
-use crate::integrators::{PathStats, Statistics, integrator};
+use crate::integrators::{PathStats, Statistics, integrator, reuse};
 use crate::scene::{FilmSettings, RenderJob};
 use lumiris_numbers::estimators::ocv::block_of;
 use lumiris_numbers::math::hash::pcg4d;
 use rayon::prelude::*;
-use std::sync::atomic::{AtomicBool, AtomicU64, Ordering};
+use std::collections::BTreeMap;
+use std::sync::Arc;
+use std::sync::atomic::{AtomicBool, AtomicU32, AtomicU64, Ordering};
 use std::time::{Duration, Instant};
 
 /// Time between two determinations of the noise for those who observe the progress: it takes as long as a few samples
 /// per pixel.
 const NOISE_INTERVAL: Duration = Duration::from_secs(1);
+/// The same by the time that one of them takes.
+const NOISE_REST: u32 = 50;
+
+// All samples of a cell are in one batch, and cells in one part of an image
+const _: () = assert!(BATCH_PATHS >= reuse::CELL.pow(2) as usize && SHARE_TILE.is_multiple_of(reuse::CELL));
 
 /// Combined with the seed of the image to give that of replicas.
 const REPLICA_SEED: u32 = 0x72_65_70_73;
@@ -34,7 +42,7 @@ pub(super) type TilePart = (PixelBounds, std::ops::Range<usize>);
 pub(super) fn batch_parts(run: &Run<'_>, rays: usize) -> (Vec<TilePart>, std::ops::Range<u32>) {
     let per_pixel = run.settings.spp.min(run.pass_length()).max(1);
     let pixels_per_batch = (BATCH_PATHS / per_pixel as usize).max(1);
-    let tiles = run.job.world.scene.film.bounds.tiles(run.settings.tile_size);
+    let tiles = run.job.world.scene.film.bounds.tiles(run.tile_size);
     let parts: Vec<_> = tiles
         .iter()
         .flat_map(|tile| {
@@ -70,12 +78,15 @@ pub(super) fn camera_batches(job: &RenderJob, tile_size: u32, rays: usize) -> Ve
 pub(super) struct Run<'a> {
     pub(super) job: &'a RenderJob,
     settings: &'a RenderSettings,
+    /// Edge of tiles: of whole cells where pixels share paths.
+    tile_size: u32,
     stop: &'a AtomicBool,
     observe: &'a (dyn Fn(&Progress) + Sync),
     pub(super) camera: CameraSampler<'a>,
     start: Instant,
     samples_done: AtomicU64,
     rays: AtomicU64,
+    passes: AtomicU32,
 }
 
 impl<'a> Run<'a> {
@@ -88,17 +99,19 @@ impl<'a> Run<'a> {
         Run {
             job,
             settings,
+            tile_size: if reuse::edge(job) > 1 { reuse::CELL } else { settings.tile_size },
             stop,
             observe,
             camera: CameraSampler::new(job, settings.first_sample),
             start: Instant::now(),
             samples_done: AtomicU64::new(0),
             rays: AtomicU64::new(0),
+            passes: AtomicU32::new(0),
         }
     }
 
     pub(super) fn run(self, threads: usize, continuation: Continuation<'_>) -> Result<Rendering, RenderError> {
-        let Continuation { stored, mut checkpoints, keeps_sums, watch } = continuation;
+        let Continuation { stored, mut checkpoints, keeps_sums, watch, passes } = continuation;
         let seed = self.job.settings().sampling.seed;
         let cameras = |pixel, sample| self.camera.sample_of_seed(pixel, sample, seed);
         let mut integrator = integrator(self.job, &cameras, self.stop)?;
@@ -106,7 +119,7 @@ impl<'a> Run<'a> {
 
         let end = self.end();
         let begin = tiles.iter().map(|t| t.done).min().unwrap_or(end);
-        let (mut first, mut noise, mut observed) = (begin, None, self.start);
+        let (mut first, mut noise, mut observed) = (begin, None, self.start + NOISE_INTERVAL);
         let mut stats = PathStats::default();
         while first < end && !self.stopped() {
             let served = end.min(first.saturating_add(integrator.prepare(first)?));
@@ -117,27 +130,46 @@ impl<'a> Run<'a> {
                 let watched = (noise, watch);
                 stats.merge(&self.whole_pass(&workers, &mut tiles, samples.clone(), watched, &mut checkpoints));
                 first = samples.end;
-                if observed.elapsed() >= NOISE_INTERVAL {
-                    noise = Some(self.film(&tiles).relative_noise());
-                    observed = Instant::now();
+                self.passes.fetch_add(1, Ordering::Relaxed);
+                if let (Some(passes), false) = (passes, self.stop.load(Ordering::Relaxed)) {
+                    passes(&self.progress(self.samples_total(&tiles), noise));
+                }
+                let now = Instant::now();
+                if now >= observed && first < end {
+                    noise = Some(self.film(&tiles).summary().relative_noise);
+                    observed = Instant::now() + NOISE_INTERVAL.max(now.elapsed() * NOISE_REST);
                 }
             }
         }
 
         let complete = tiles.iter().all(|t| t.done >= end);
         let keeps_sums = keeps_sums || checkpoints.is_some();
-        let FilmSettings { resolution, bounds, .. } = self.job.world.scene.film;
-        let mut film = if keeps_sums { self.film(&tiles) } else { film_of_last(resolution, bounds, &mut tiles) };
+        let Statistics { paths: stats, cache, photons, records } = integrator.statistics(stats);
+        add_records(&records, &mut tiles);
+        let mut film = self.film(&tiles);
         control_variates::correct(&mut film, &tiles, position);
-        let Statistics { paths: stats, cache, photons } = integrator.statistics(stats, &mut film);
-        if keeps_sums {
-            keep_records(&film, &mut tiles);
-        }
         if let Some(checkpoints) = checkpoints {
             checkpoints.finish(&tiles);
         }
         let sums = keeps_sums.then_some(Tiles(tiles));
         Ok(Rendering { film, stats, cache, photons, elapsed: self.start.elapsed(), complete, threads, sums })
+    }
+
+    /// Camera samples of all tiles, as if every pixel had the same number.
+    fn samples_total(&self, tiles: &[Tile]) -> u64 {
+        tiles.iter().map(|t| t.bounds.area() as u64).sum::<u64>() * u64::from(self.end() - self.begin())
+    }
+
+    /// What is done by now.
+    fn progress(&self, samples_total: u64, noise: Option<f64>) -> Progress {
+        Progress {
+            samples_done: self.samples_done.load(Ordering::Relaxed),
+            samples_total,
+            rays: self.rays.load(Ordering::Relaxed),
+            elapsed: self.start.elapsed(),
+            passes: self.passes.load(Ordering::Relaxed),
+            noise,
+        }
     }
 
     /// The index of the sample after the last one.
@@ -147,13 +179,13 @@ impl<'a> Run<'a> {
 
     /// The tiles, with what is stored of them.
     fn tiles(&self, stored: Option<Vec<StoredTile>>) -> Result<Vec<Tile>, PartError> {
-        let wants_replicas = has_replicas(self.job, self.settings);
+        let replica_edge = replica_edge(self.job, self.settings);
         let bounds = self.job.world.scene.film.bounds;
         let tiles = match stored {
-            Some(stored) => stored.into_iter().map(|s| s.restore(|b| self.tile(b, wants_replicas))).collect(),
+            Some(stored) => stored.into_iter().map(|s| s.restore(|b| self.tile(b, replica_edge))).collect(),
             None => {
-                let bounds = bounds_of_tiles(&bounds, self.settings.tile_size, self.settings.share);
-                Ok(bounds.into_iter().map(|b| self.tile(b, wants_replicas)).collect::<Vec<_>>())
+                let bounds = bounds_of_tiles(&bounds, self.tile_size, self.settings.share);
+                Ok(bounds.into_iter().map(|b| self.tile(b, replica_edge)).collect::<Vec<_>>())
             }
         }?;
         let done = |t: &Tile| t.bounds.area() as u64 * u64::from(t.done - self.begin());
@@ -195,12 +227,12 @@ impl<'a> Run<'a> {
     }
 
     /// A tile without samples.
-    fn tile(&self, bounds: PixelBounds, wants_replicas: bool) -> Tile {
+    fn tile(&self, bounds: PixelBounds, replica_edge: Option<u32>) -> Tile {
         let all = &self.job.world.scene.film.bounds;
-        let replicas = if wants_replicas { replicas(all, &bounds) } else { Vec::new() };
+        let replicas = replica_edge.map_or(Vec::new(), |edge| replicas(all, &bounds, edge));
         let integrator = &self.job.settings().integrator;
         let fits = Estimator::at_vertex(integrator, 0).fits(self.job, bounds.area() + replicas.len());
-        Tile { bounds, done: self.begin(), sums: vec![PixelAccumulator::default(); bounds.area()], replicas, fits }
+        Tile { bounds, done: self.begin(), sums: Arc::new(PackedSums::new(bounds.area())), replicas, fits }
     }
 
     /// The film of all tiles.
@@ -211,9 +243,8 @@ impl<'a> Run<'a> {
 
     /// The film of one tile.
     fn film_of(&self, tile: &Tile) -> Film {
-        let mut film = Film::new(self.job.world.scene.film.resolution, tile.bounds);
-        film.set_tile(&tile.bounds, &tile.sums, &[]);
-        film
+        let pixels = FilmTile { bounds: tile.bounds, sums: Arc::clone(&tile.sums) };
+        Film::new(self.job.world.scene.film.resolution, tile.bounds, vec![pixels], Vec::new())
     }
 
     /// Samples per pixel of the next pass over all tiles: 1, 1, 2, 4, …, so that there is a whole image soon. It lies
@@ -229,7 +260,7 @@ impl<'a> Run<'a> {
 
     /// Samples per pixel of the longest pass.
     fn pass_length(&self) -> u32 {
-        (BATCH_PATHS as u32 / self.settings.tile_size.max(1).pow(2)).clamp(1, 64)
+        (BATCH_PATHS as u32 / self.tile_size.max(1).pow(2)).clamp(1, 64)
     }
 
     /// Samples per pixel that fit into the time that is left, at the speed so far; at least one.
@@ -253,7 +284,7 @@ impl<'a> Run<'a> {
         samples: std::ops::Range<u32>,
         (noise, watch, pause): (Option<f64>, Option<&TileObserver<'_>>, Option<Instant>),
     ) -> PathStats {
-        let total = tiles.iter().map(|t| t.bounds.area() as u64).sum::<u64>() * u64::from(self.end() - self.begin());
+        let total = self.samples_total(tiles);
         tiles
             .par_iter_mut()
             .with_max_len(1)
@@ -270,13 +301,9 @@ impl<'a> Run<'a> {
                 }
                 let rays = stats.camera_rays + stats.bounce_rays + stats.direct.emitter_rays + stats.direct.segments;
                 let done = tile.bounds.area() as u64 * u64::from(samples.end - samples.start);
-                (self.observe)(&Progress {
-                    samples_done: self.samples_done.fetch_add(done, Ordering::Relaxed) + done,
-                    samples_total: total,
-                    rays: self.rays.fetch_add(rays, Ordering::Relaxed) + rays,
-                    elapsed: self.start.elapsed(),
-                    noise,
-                });
+                self.samples_done.fetch_add(done, Ordering::Relaxed);
+                self.rays.fetch_add(rays, Ordering::Relaxed);
+                (self.observe)(&self.progress(total, noise));
                 stats
             })
             .reduce(PathStats::default, |mut a, b| {
@@ -298,8 +325,10 @@ impl<'a> Run<'a> {
             ill_conditioned = tile.fits.solve();
         }
         let solve = start.elapsed();
+        worker.sums.resize(bounds.area(), PixelAccumulator::default());
+        tile.sums.read(0..bounds.area(), &mut worker.sums);
         let mut first = 0;
-        while first < tile.sums.len() {
+        while first < bounds.area() {
             let pixels = self.batch_of_pixels(&bounds, first, &samples);
             first = pixels.end;
             self.camera_samples(&bounds, pixels.clone(), &samples, &mut worker.scratch, &mut worker.samples);
@@ -307,9 +336,10 @@ impl<'a> Run<'a> {
             let mut results = worker.results.iter();
             for index in pixels {
                 let samples = self.samples_of(position(&bounds, index as u32), &samples);
-                samples.zip(results.by_ref()).for_each(|(i, r)| tile.sums[index].add(i, r));
+                samples.zip(results.by_ref()).for_each(|(i, r)| worker.sums[index].add(i, r));
             }
         }
+        tile.set_sums(&worker.sums, &mut worker.packing);
         self.render_replicas(worker, tile, samples);
         let mut stats = worker.tracer.take_stats();
         if begins_block {
@@ -383,12 +413,21 @@ impl<'a> Run<'a> {
     }
 }
 
-/// Stores the records of each pixel, which the film has got in the end, with its sums.
-fn keep_records(film: &Film, tiles: &mut [Tile]) {
-    for tile in tiles {
-        for (i, sums) in (0..).zip(&mut tile.sums) {
-            let [x, y] = position(&tile.bounds, i);
-            sums.records = film.pixels[film.index(x, y)].records;
+/// Adds the records of a cache, given by their pixels, to the sums of these.
+fn add_records(records: &[[u32; 2]], tiles: &mut [Tile]) {
+    let mut of_rows = BTreeMap::<u32, Vec<u32>>::new();
+    records.iter().for_each(|&[x, y]| of_rows.entry(y).or_default().push(x));
+    let add = |tile: &mut Tile| {
+        let PixelBounds { x0, x1, y0, y1 } = tile.bounds;
+        let inside = of_rows.range(y0..y1).flat_map(|(y, row)| row.iter().map(move |x| [*x, *y]));
+        let mut inside = inside.filter(|[x, _]| (x0..x1).contains(x)).peekable();
+        if inside.peek().is_some() {
+            let mut sums = tile.sums.unpacked();
+            inside.for_each(|[x, y]| sums[((y - y0) * (x1 - x0) + x - x0) as usize].records += 1);
+            tile.set_sums(&sums, &mut Vec::new());
         }
+    };
+    if !records.is_empty() {
+        tiles.par_iter_mut().for_each(add);
     }
 }

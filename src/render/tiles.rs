@@ -3,10 +3,13 @@
 use super::RenderSettings;
 use crate::direct::{Estimator, Fits};
 use crate::film::accumulator::PixelAccumulator;
+use crate::film::packed::PackedSums;
 use crate::film::replicas::ReplicaAccumulator;
-use crate::film::{Film, PixelBounds};
+use crate::film::{Film, FilmTile, PixelBounds};
+use crate::integrators::reuse;
 use crate::scene::RenderJob;
 use crate::settings::IntegratorKind;
+use std::sync::Arc;
 
 /// Edge of the tiles that are dealt out to parts (pixels).
 pub(super) const SHARE_TILE: u32 = 16;
@@ -40,11 +43,24 @@ pub(super) struct Tile {
     pub(super) bounds: PixelBounds,
     /// Index of the next sample of its pixels.
     pub(super) done: u32,
-    /// Sums of its pixels, row by row.
-    pub(super) sums: Vec<PixelAccumulator>,
+    /// Sums of its pixels, row by row; films share them.
+    pub(super) sums: Arc<PackedSums>,
     pub(super) replicas: Vec<ReplicaAccumulator>,
     /// Those of its pixels one after the other, then those of its replicas.
     pub(super) fits: Fits,
+}
+
+impl Tile {
+    /// Replaces the sums of its pixels; `scratch` is memory that calls share.
+    pub(super) fn set_sums(&mut self, sums: &[PixelAccumulator], scratch: &mut Vec<u8>) {
+        // Those that a film has are left to it
+        if Arc::get_mut(&mut self.sums).is_none() {
+            self.sums = Arc::new(PackedSums::new(sums.len()));
+        }
+        if let Some(packed) = Arc::get_mut(&mut self.sums) {
+            packed.set(sums, scratch);
+        }
+    }
 }
 
 /// Tiles that cover an image, or a part of it.
@@ -59,38 +75,29 @@ pub(super) fn bounds_of_tiles(image: &PixelBounds, size: u32, share: Option<Tile
     }
 }
 
-/// True if some pixels are estimated twice: that is requested, and tells anything. Samples that share photon maps vary
-/// together.
-pub(super) fn has_replicas(job: &RenderJob, render: &RenderSettings) -> bool {
+/// The edge of the blocks of pixels that are estimated twice; `None` if none are: that is not requested, or does not tell
+/// anything. Samples that share photon maps vary together. Where pixels share paths, blocks are half a cell.
+pub(super) fn replica_edge(job: &RenderJob, render: &RenderSettings) -> Option<u32> {
     let settings = job.settings();
     let shares_noise =
         settings.integrator.kind == IntegratorKind::PhotonMap && settings.integrator.photons.progressive.is_some();
     let is_over_pixels = Estimator::at_vertex(&settings.integrator, 0).is_over_pixels();
     let is_useful = !settings.sampling.sampler.has_independent_samples() || is_over_pixels;
-    render.with_replicas && is_useful && !shares_noise
+    let edge = if reuse::edge(job) > 1 { reuse::CELL / 2 } else { 1 };
+    (render.with_replicas && is_useful && !shares_noise).then_some(edge)
 }
 
-/// The film of tiles.
+/// The film of tiles, which shares their sums.
 pub(super) fn film(resolution: [u32; 2], bounds: PixelBounds, tiles: &[Tile]) -> Film {
-    let mut film = Film::new(resolution, bounds);
-    tiles.iter().for_each(|t| film.set_tile(&t.bounds, &t.sums, &t.replicas));
-    film.replicas.sort_unstable_by_key(|r| r.pixel);
-    film
-}
-
-/// The film of tiles whose sums are needed no more: the memory of each is free when its pixels are in the film. Tiles
-/// without control variates are removed.
-pub(super) fn film_of_last(resolution: [u32; 2], bounds: PixelBounds, tiles: &mut Vec<Tile>) -> Film {
-    let mut film = Film::new(resolution, bounds);
-    for tile in tiles.iter_mut().rev() {
-        film.set_tile(&tile.bounds, &std::mem::take(&mut tile.sums), &tile.replicas);
-        if tile.fits.controls() == 0 {
-            (tile.fits, tile.replicas) = (Fits::default(), Vec::new());
-        }
-    }
-    tiles.retain(|tile| tile.fits.controls() > 0);
-    film.replicas.sort_unstable_by_key(|r| r.pixel);
-    film
+    let width = bounds.width();
+    let index = |tile: &Tile, pixel: u32| {
+        let [x, y] = position(&tile.bounds, pixel);
+        (y - bounds.y0) * width + (x - bounds.x0)
+    };
+    let replicas = tiles.iter().flat_map(|t| t.replicas.iter().map(move |r| r.replica(index(t, r.pixel))));
+    let replicas = replicas.collect();
+    let tiles = tiles.iter().map(|t| FilmTile { bounds: t.bounds, sums: Arc::clone(&t.sums) });
+    Film::new(resolution, bounds, tiles.collect(), replicas)
 }
 
 /// Coordinates of the pixel of a tile with the given index, row by row.

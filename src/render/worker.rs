@@ -2,6 +2,7 @@
 
 use super::camera_samples::Scratch;
 use crate::film::PixelSample;
+use crate::film::accumulator::PixelAccumulator;
 use crate::integrators::path::CameraSample;
 use crate::integrators::{Integrator, Tracer};
 use std::sync::{Mutex, MutexGuard, PoisonError};
@@ -12,11 +13,16 @@ pub(super) struct Worker<T> {
     pub(super) samples: Vec<CameraSample>,
     pub(super) scratch: Scratch,
     pub(super) results: Vec<PixelSample>,
+    /// The sums of a tile, while samples are added to them.
+    pub(super) sums: Vec<PixelAccumulator>,
+    /// Memory to pack them.
+    pub(super) packing: Vec<u8>,
 }
 
 impl<T> Worker<T> {
     pub(super) fn new(tracer: T) -> Self {
-        Worker { tracer, samples: Vec::new(), scratch: Scratch::default(), results: Vec::new() }
+        let (samples, scratch, results) = Default::default();
+        Worker { tracer, samples, scratch, results, sums: Vec::new(), packing: Vec::new() }
     }
 }
 

@@ -22,6 +22,9 @@ pub struct IntegratorSettings {
     pub roulette_depth: Option<u32>,
     /// What decides by roulette whether a path goes on, and as how many paths.
     pub roulette: RouletteKind,
+    /// Edge of the blocks of pixels that share paths from their second diffuse vertex on; 1: none do. `None`: what `auto`
+    /// chooses, or 1.
+    pub path_reuse: Option<u32>,
     /// Direct-light estimator at each path vertex.
     pub estimator: EstimatorKind,
     /// Samples per estimate (N): shadow segments per shading point. `None` is the default of the estimator,
@@ -65,6 +68,7 @@ impl Default for IntegratorSettings {
             max_depth: 5,
             roulette_depth: Some(4),
             roulette: RouletteKind::Throughput,
+            path_reuse: None,
             estimator: EstimatorKind::Auto,
             samples: None,
             later_samples: None,

@@ -91,7 +91,7 @@ fn image_means(mut loaded: Loaded, proposals: u32, density: ProposalDensity) -> 
             RenderSettings { threads: Some(1), spp: job.settings().sampling.spp, ..RenderSettings::default() };
         let film = render(&job, &settings, &AtomicBool::new(false), &|_| ()).unwrap().film;
         for (channel, mean) in means.iter_mut().enumerate() {
-            mean.add(film.pixels.iter().map(|p| p.mean()[channel]).sum::<f64>() / film.pixels.len() as f64);
+            mean.add(film.pixels().iter().map(|p| p.mean()[channel]).sum::<f64>() / film.len() as f64);
         }
     }
     means
@@ -154,7 +154,7 @@ fn proposals_are_for_what_can_only_be_evaluated() {
         let job = loaded.job(AccelKind::Embree, None).unwrap();
         let settings = RenderSettings { spp: 2, ..RenderSettings::default() };
         let film = render(&job, &settings, &AtomicBool::new(false), &|_| ()).unwrap().film;
-        film.pixels.iter().map(|p| p.mean()).collect::<Vec<_>>()
+        film.pixels().iter().map(|p| p.mean()).collect::<Vec<_>>()
     };
     for (material, same) in [
         ("Material \"diffuse\"", true),

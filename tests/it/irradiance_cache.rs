@@ -96,9 +96,10 @@ fn with_cache(s: &mut Settings, cached: Cached) {
 /// Mean luminance of squares of pixels, row by row.
 pub(crate) fn squares(film: &Film, size: u32) -> Vec<f64> {
     let mut sums = Vec::new();
+    let of_film = film.pixels();
     for tile in film.bounds.tiles(size) {
         let pixels = (tile.y0..tile.y1).flat_map(|y| (tile.x0..tile.x1).map(move |x| (x, y)));
-        let of_pixel = |(x, y)| luminance(film.pixels[film.index(x, y)].mean());
+        let of_pixel = |(x, y)| luminance(of_film[film.index(x, y)].mean());
         sums.push(pixels.map(of_pixel).sum::<f64>() / tile.area() as f64);
     }
     sums
@@ -341,7 +342,8 @@ Shape "trianglemesh" "point3 P" [ -1 1 0  1 1 0  1 1 1  -1 1 1 ] "integer indice
             s.integrator.cache.radius = [1.5, 20.0];
         });
         let film = rendering(&job, RenderSettings { spp: 4, ..Default::default() }).film;
-        let column = |x: u32| (0..40).map(|y| film.pixels[film.index(x, y)].mean()[1]).sum::<f64>() / 40.0;
+        let pixels = film.pixels();
+        let column = |x: u32| (0..40).map(|y| pixels[film.index(x, y)].mean()[1]).sum::<f64>() / 40.0;
         // On the screen, x is to the left or to the right; the bright side tells
         let mut columns: Vec<f64> = (0..40).map(column).collect();
         if columns[0] > columns[39] {
@@ -368,7 +370,7 @@ fn scenes_without_light_or_without_things_have_no_records() {
             let job = world_of(&(EMPTY.to_owned() + things), |s| with_cache(s, cached));
             let r = rendering(&job, RenderSettings { spp: 2, ..Default::default() });
             assert_eq!(r.cache.unwrap().records, 0, "{things}");
-            assert!(r.film.pixels.iter().all(|p| p.mean() == [expected; 3]), "{things}");
+            assert!(r.film.pixels().iter().all(|p| p.mean() == [expected; 3]), "{things}");
         }
     }
 }

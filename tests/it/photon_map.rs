@@ -51,7 +51,7 @@ fn a_furnace_has_its_known_radiance() {
             job.change(|s| s.sampling.seed = seed);
             let film = rendering(&job, RenderSettings { spp: 2, ..Default::default() }).film;
             for (c, mean) in means.iter_mut().enumerate() {
-                mean.add(film.pixels.iter().map(|p| p.mean()[c]).sum::<f64>() / film.pixels.len() as f64);
+                mean.add(film.pixels().iter().map(|p| p.mean()[c]).sum::<f64>() / film.len() as f64);
             }
         }
         for (measured, albedo) in means.iter().zip([0.5, 0.25, 0.75]) {
@@ -109,7 +109,7 @@ fn maps_without_photons_are_no_light_and_no_error() {
         \"point3 P\" [ -1 -1 1  1 -1 1  1 1 1  -1 1 1 ] \"integer indices\" [ 0 1 2 0 2 3 ]\n";
     let mean = |job: &RenderJob| {
         let film = rendering(job, RenderSettings { spp: 16, ..Default::default() }).film;
-        film.pixels.iter().map(|p| p.mean()[1]).sum::<f64>() / film.pixels.len() as f64
+        film.pixels().iter().map(|p| p.mean()[1]).sum::<f64>() / film.len() as f64
     };
     let path = mean(&world_of(WALL, |_| ()));
     let progressive = ProgressiveSettings { radius: Some(0.5), ..Default::default() };

@@ -28,8 +28,8 @@ fn means(scene: &str, kind: RouletteKind, estimator: EstimatorKind) -> Vec<[f64;
         job.change(|s| s.sampling.seed = seed);
         let settings = RenderSettings { spp: 8, ..RenderSettings::default() };
         let film = render(&job, &settings, &AtomicBool::new(false), &|_| ()).unwrap().film;
-        let sum = film.pixels.iter().map(|p| p.mean()).fold([0.0; 3], |a, b| [a[0] + b[0], a[1] + b[1], a[2] + b[2]]);
-        sum.map(|s| s / film.pixels.len() as f64)
+        let sum = film.pixels().iter().map(|p| p.mean()).fold([0.0; 3], |a, b| [a[0] + b[0], a[1] + b[1], a[2] + b[2]]);
+        sum.map(|s| s / film.len() as f64)
     };
     (0..SEEDS).map(mean).collect()
 }

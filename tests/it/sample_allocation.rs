@@ -54,13 +54,14 @@ fn adaptive_images_have_the_samples_they_ask_for_and_do_not_depend_on_threads_or
         let (film, samples) = rendered(&mut job(), 1, 16);
         let (min, max) = (samples.counts.iter().min().unwrap(), samples.counts.iter().max().unwrap());
         assert!(max > &(2 * min), "{min} to {max}");
-        assert!(film.pixels.iter().zip(&samples.counts).all(|(p, &n)| p.count == u64::from(n)));
-        assert!(film.replicas.iter().all(|r| r.count == film.pixels[r.pixel as usize].count));
+        assert!(film.pixels().iter().zip(&samples.counts).all(|(p, &n)| p.count == u64::from(n)));
+        let pixels = film.pixels();
+        assert!(film.replicas().iter().all(|r| r.count == pixels[r.pixel as usize].count));
         if noise.is_none() {
-            let mean = samples.total() as f64 / film.pixels.len() as f64;
+            let mean = samples.total() as f64 / film.len() as f64;
             assert!((32.0..128.0).contains(&mean), "the time is that of 64: {mean}");
         }
-        let bits = |film: &Film| film.pixels.iter().map(|p| p.radiance.map(f64::to_bits)).collect::<Vec<_>>();
+        let bits = |film: &Film| film.pixels().iter().map(|p| p.radiance.map(f64::to_bits)).collect::<Vec<_>>();
         for (threads, tile_size) in [(3, 16), (2, 7)] {
             let (other, again) = rendered(&mut job(), threads, tile_size);
             assert_eq!(samples, again);
@@ -129,14 +130,14 @@ fn part(job: &RenderJob, first_sample: u32, spp: u32) -> Film {
 
 /// What must not be done: samples until their own noise is below the threshold.
 fn stopped_by_its_own_samples(job: &RenderJob, threshold: f64, limit: u32) -> f64 {
-    let mut film = part(job, 0, 2);
+    let mut pixels = part(job, 0, 2).pixels();
     loop {
-        let count = film.pixels[0].count as u32;
-        let own = film.pixels.iter().map(|p| luminance(p.variance_of_mean())).sum::<f64>() / film.pixels.len() as f64;
-        if own.sqrt() / (mean(&film.pixels) + 0.01) < threshold || count >= limit {
-            return mean(&film.pixels);
+        let count = pixels[0].count as u32;
+        let own = pixels.iter().map(|p| luminance(p.variance_of_mean())).sum::<f64>() / pixels.len() as f64;
+        if own.sqrt() / (mean(&pixels) + 0.01) < threshold || count >= limit {
+            return mean(&pixels);
         }
-        for (sum, more) in film.pixels.iter_mut().zip(&part(job, count, count).pixels) {
+        for (sum, more) in pixels.iter_mut().zip(&part(job, count, count).pixels()) {
             sum.count += more.count;
             for c in 0..3 {
                 sum.radiance[c] += more.radiance[c];
@@ -155,7 +156,7 @@ fn numbers_of_samples_add_no_bias() {
     // The truth: the same lights by their power, which has hardly any variance
     let mut exact = lottery(4, ("point\"", 400.0), 64);
     exact.change(|s| s.integrator.light_sampler = LightSamplerKind::Power);
-    let truth = mean(&part(&exact, 0, 4096).pixels);
+    let truth = mean(&part(&exact, 0, 4096).pixels());
 
     let (mut noise, mut adaptive, mut wrong) = (Welford::default(), Welford::default(), Welford::default());
     let mut numbers = std::collections::BTreeSet::new();
@@ -165,11 +166,11 @@ fn numbers_of_samples_add_no_bias() {
         });
         let (film, samples) = rendered(&mut job, 1, 16);
         numbers.extend(samples.counts);
-        noise.add(mean(&film.pixels));
+        noise.add(mean(&film.pixels()));
 
         job.change(|s| (s.sampling.noise, s.sampling.allocation, s.sampling.spp) = (None, Allocation::Adaptive, 16));
         prepare(&mut job, Some(1), false).unwrap();
-        adaptive.add(mean(&part(&job, 0, 16).pixels));
+        adaptive.add(mean(&part(&job, 0, 16).pixels()));
         job.pixel_samples = None;
         if seed < RUNS / 4 {
             wrong.add(stopped_by_its_own_samples(&job, f64::from(THRESHOLD), 256));

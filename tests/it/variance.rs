@@ -71,9 +71,9 @@ fn study(job: &mut RenderJob, spp: u32, seeds: u32) -> Study {
         job.change(|s| s.sampling.seed = seed);
         let film = film(job, settings);
         let flat = |values: Vec<[f64; 3]>| values.into_flattened();
-        means.push(flat(film.pixels.iter().map(|p| p.mean()).collect()));
+        means.push(flat(film.pixels().iter().map(|p| p.mean()).collect()));
         stated.push(flat(film.variances()));
-        independent.push(film.pixels.iter().flat_map(|p| p.variance_of_mean()).sum::<f64>());
+        independent.push(film.pixels().iter().flat_map(|p| p.variance_of_mean()).sum::<f64>());
     }
 
     // The variance between seeds is the mean over seeds of squared deviations, scaled by n/(n − 1).
@@ -129,7 +129,7 @@ fn variances_are_those_between_seeds_for_every_sampler_and_number_of_samples() {
 fn replicas_change_no_image_and_do_not_depend_on_tiles_and_threads() {
     let job = job(&LOUD[1], SamplerKind::SobolBlueNoise);
     let plain = film(&job, RenderSettings { spp: 5, ..RenderSettings::default() });
-    assert!(plain.replicas.is_empty());
+    assert!(plain.replicas().is_empty());
     let mut variances: Vec<Vec<[f64; 3]>> = Vec::new();
     for (threads, tile_size) in [(1, 16), (2, 16), (2, 7)] {
         let settings = RenderSettings {
@@ -140,8 +140,8 @@ fn replicas_change_no_image_and_do_not_depend_on_tiles_and_threads() {
             ..RenderSettings::default()
         };
         let film = film(&job, settings);
-        assert!(film.replicas.len() > 300);
-        assert!(film.pixels.iter().zip(&plain.pixels).all(|(a, b)| a.radiance == b.radiance));
+        assert!(film.replicas().len() > 300);
+        assert!(film.pixels().iter().zip(&plain.pixels()).all(|(a, b)| a.radiance == b.radiance));
         variances.push(film.variances());
     }
     assert!(variances.iter().all(|v| *v == variances[0]));

@@ -108,7 +108,7 @@ fn pixels(job: &mut RenderJob, seeds: u32) -> Welford {
         job.change(|s| s.sampling.seed = seed);
         let settings = RenderSettings { threads: Some(1), spp: 1, ..RenderSettings::default() };
         let film = render(job, &settings, &AtomicBool::new(false), &|_| ()).unwrap().film;
-        film.pixels.iter().for_each(|p: &PixelSums| values.add(p.mean()[0]));
+        film.pixels().iter().for_each(|p: &PixelSums| values.add(p.mean()[0]));
     }
     values
 }

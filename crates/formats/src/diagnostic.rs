@@ -3,7 +3,7 @@
 //! A run collects [`Diagnostic`]s in [`Diagnostics`]; at the end they become a [`Report`], which holds the formatted
 //! text and no longer needs the sources. Files that cannot be opened are gathered into one error.
 
-use super::source::{SourceMap, Span};
+use super::source::{Location, SourceMap, Span};
 use codespan_reporting::diagnostic as codespan;
 use codespan_reporting::files::{Error as FilesError, Files};
 use codespan_reporting::term;
@@ -220,8 +220,8 @@ pub struct Entry {
     pub severity: Severity,
     /// One sentence without a full stop.
     pub message: String,
-    /// `file:line:column` of the primary place, or empty.
-    pub location: String,
+    /// The primary place.
+    pub location: Option<Location>,
     /// The whole text with source lines and help, ending in a newline.
     pub rendered: String,
 }
@@ -295,7 +295,7 @@ fn entry(diagnostic: &Diagnostic, sources: &SourceMap) -> Entry {
     // Lines of source end in blanks where nothing is marked.
     let mut rendered: String = rendered.trim_end().lines().flat_map(|line| [line.trim_end(), "\n"]).collect();
     rendered.push('\n');
-    let location = diagnostic.labels.first().map_or(String::new(), |l| sources.locate(l.span).to_string());
+    let location = diagnostic.labels.first().map(|l| sources.locate(l.span));
     Entry { severity: diagnostic.severity, message: diagnostic.message.clone(), location, rendered }
 }
 
@@ -426,7 +426,7 @@ mod tests {
             .remark("not used")
             .help("did you mean");
         let report = diagnostics.finish(&sources);
-        assert_eq!(report.entries[0].location, "a.pbrt:2:3");
+        assert_eq!(report.entries[0].location.as_ref().unwrap().to_string(), "a.pbrt:2:3");
         let text = report.to_string();
         assert!(text.contains("a.pbrt:2:3"), "{text}");
         assert!(text.contains("\"integer xresolutoin\" 5"), "{text}");

@@ -21,4 +21,4 @@ pub use ocio::{OcioView, ocio_display};
 pub use part::{MetaValue, Part, Storage};
 pub(super) use read::{Input, read_failure};
 pub use read::{ReadImage, read_headers, read_image, read_metadata, read_part};
-pub use write::write_image;
+pub use write::{ROWS_AT_ONCE, RowSource, write_image, write_rows};

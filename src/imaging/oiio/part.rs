@@ -65,7 +65,8 @@ pub struct Part {
 }
 
 impl Part {
-    /// Linear values, stored as f32. `data` is row-major from the top left, channels interleaved.
+    /// Linear values, stored as f32. `data` is row-major from the top left, channels interleaved; it is empty where
+    /// values are made while they are written.
     pub fn linear(width: usize, height: usize, channels: Vec<String>, data: Vec<f32>) -> Self {
         Part {
             width,

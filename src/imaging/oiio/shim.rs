@@ -7,6 +7,14 @@ use std::ffi::{CStr, CString, c_char};
 use std::path::Path;
 use std::sync::OnceLock;
 
+/// Sets how many threads an EXR file is read or written by.
+pub(super) fn set_exr_threads(api: &sys::Api, threads: usize) {
+    let threads = i32::try_from(threads).unwrap_or(1);
+    // A version that lacks the attribute goes on as it is.
+    // SAFETY: the name ends in a zero byte; a null message buffer of size 0 is not written.
+    let _ = call(|e, n| unsafe { (api.set_int)(c"exr_threads".as_ptr(), threads, e, n) });
+}
+
 /// The shim; its threads are kept to one, since images are read in parallel already.
 pub(super) fn api() -> Result<&'static sys::Api, ImageError> {
     static CONFIGURED: OnceLock<()> = OnceLock::new();

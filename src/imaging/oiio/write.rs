@@ -2,12 +2,14 @@
 #![allow(unsafe_code)]
 
 use super::part::{MetaValue, Part};
-use super::shim::{api, c_path, c_text, call};
+use super::shim::{api, c_path, c_text, call, set_exr_threads};
 use crate::imaging::file::ImageError;
 use lumiris_formats::output::write_whole;
 use openimageio_sys as sys;
+use std::borrow::Cow;
 use std::ffi::{CString, c_char};
 use std::io;
+use std::ops::Range;
 use std::path::Path;
 use std::ptr;
 
@@ -27,6 +29,8 @@ impl Output {
         let mut handle = ptr::null_mut();
         // SAFETY: the name ends in a zero byte, and `handle` is only written.
         call(|e, n| unsafe { (api.output_create)(name.as_ptr(), &mut handle, e, n) }).map_err(|(_, m)| m)?;
+        // What compresses rows; the bytes do not depend on it
+        set_exr_threads(api, rayon::current_num_threads());
         Ok(Output { api, handle })
     }
 
@@ -90,20 +94,27 @@ impl Output {
         result.map_err(|(_, message)| message)
     }
 
-    fn write(&mut self, parts: &[Part]) -> Result<(), String> {
+    fn write(&mut self, parts: &[Part], values: &RowSource<'_>) -> Result<(), String> {
         // SAFETY: as above.
         call(|e, n| unsafe { (self.api.output_open)(self.handle, e, n) }).map_err(|(_, m)| m)?;
         for (index, part) in parts.iter().enumerate() {
-            let expected = part.width.checked_mul(part.height).and_then(|n| n.checked_mul(part.channels.len()));
-            if expected != Some(part.data.len()) {
-                return Err("the number of values does not fit the size of the image".to_owned());
+            let mut begin = 0;
+            while begin < part.height {
+                let rows = begin..part.height.min(begin + ROWS_AT_ONCE);
+                let data = values(index, rows.clone());
+                let expected = part.width.checked_mul(rows.len()).and_then(|n| n.checked_mul(part.channels.len()));
+                if expected != Some(data.len()) {
+                    return Err("the number of values does not fit the size of the image".to_owned());
+                }
+                let (first, count) = (rows.start as i32, data.len() as u64);
+                // SAFETY: `data` holds `count` floats, which is rows × width × channels by the check above.
+                call(|e, n| unsafe {
+                    let write = self.api.output_write;
+                    write(self.handle, index as i32, first, rows.len() as i32, data.as_ptr(), count, e, n)
+                })
+                .map_err(|(_, m)| m)?;
+                begin = rows.end;
             }
-            let (rows, count) = (part.height as i32, part.data.len() as u64);
-            // SAFETY: `data` holds `count` floats, which is rows × width × channels by the check above.
-            call(|e, n| unsafe {
-                (self.api.output_write)(self.handle, index as i32, 0, rows, part.data.as_ptr(), count, e, n)
-            })
-            .map_err(|(_, m)| m)?;
         }
         // SAFETY: as above; what was written is flushed, and a full disk shows here.
         call(|e, n| unsafe { (self.api.output_close)(self.handle, e, n) }).map_err(|(_, m)| m)
@@ -114,21 +125,40 @@ impl Drop for Output {
     fn drop(&mut self) {
         // SAFETY: the handle is live and freed once.
         unsafe { (self.api.output_free)(self.handle) };
+        set_exr_threads(self.api, 1);
     }
 }
 
+/// Rows that are written together: enough for all threads that compress them, 16 at a time.
+pub const ROWS_AT_ONCE: usize = 64;
+
+/// Makes the values of some rows of a part, interleaved. Parts are asked for one after the other, their rows in order.
+pub type RowSource<'a> = dyn Fn(usize, Range<usize>) -> Cow<'a, [f32]> + 'a;
+
 /// Writes an image; several parts in EXR only. Either the whole file appears under its name, or none.
 pub fn write_image(path: &Path, parts: &[Part]) -> Result<(), ImageError> {
+    let values = |part: usize, rows: Range<usize>| {
+        let Part { width, channels, data, .. } = &parts[part];
+        let row = width * channels.len();
+        // What is not there is missing at the end, where it is noticed; what is too much is as well
+        let end = if rows.end == parts[part].height { data.len() } else { data.len().min(row * rows.end) };
+        Cow::Borrowed(&data[end.min(row * rows.start)..end])
+    };
+    write_rows(path, parts, &values)
+}
+
+/// The same, with values that are made while they are written. The parts have none of their own.
+pub fn write_rows(path: &Path, parts: &[Part], values: &RowSource<'_>) -> Result<(), ImageError> {
     // The extension chooses the format: the file on its way has the same
-    write_whole(path, |file| write_to(file.path(), parts).map_err(io::Error::other))
+    write_whole(path, |file| write_to(file.path(), parts, values).map_err(io::Error::other))
         .map_err(|e| ImageError::Write { path: path.to_owned(), reason: e.to_string() })
 }
 
-fn write_to(path: &Path, parts: &[Part]) -> Result<(), String> {
+fn write_to(path: &Path, parts: &[Part], values: &RowSource<'_>) -> Result<(), String> {
     let mut output = Output::create(path)?;
     let is_exr = path.extension().is_some_and(|e| e.eq_ignore_ascii_case("exr"));
     for (index, part) in (0_i32..).zip(parts) {
         output.add_part(index, part, is_exr)?;
     }
-    output.write(parts)
+    output.write(parts, values)
 }

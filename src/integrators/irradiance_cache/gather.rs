@@ -119,6 +119,7 @@ impl Gatherer {
                     stream,
                     direct: stream,
                     sample_counts,
+                    index: 0,
                     fit: 0,
                     pixel: [0; 2],
                 });

@@ -30,7 +30,7 @@ use super::segment::{CameraSample, Vertex};
 use super::{Cameras, Integrator, Statistics, Tracer, diffuse};
 use crate::bsdfs::Lambertian;
 use crate::direct::Fits;
-use crate::film::{Film, PixelSample};
+use crate::film::PixelSample;
 use crate::scene::RenderJob;
 use crate::settings::Cached;
 use lumiris_numbers::math::Rgb;
@@ -71,15 +71,12 @@ impl Integrator for CacheIntegrator {
         Box::new(CacheTracer { cache: &self.cache, paths, lookups })
     }
 
-    fn statistics(&self, mut paths: PathStats, film: &mut Film) -> Statistics {
+    fn statistics(&self, mut paths: PathStats) -> Statistics {
         paths.merge(&self.build.paths);
-        for [x, y] in self.cache.records().iter().map(|r| r.pixel) {
-            let index = film.index(x, y);
-            film.pixels[index].records += 1;
-        }
-        let (records, bytes) = (self.cache.records().len(), self.cache.bytes());
-        let cache = Some(CacheReport { records, bytes, build: self.build, lookups: paths.lookups });
-        Statistics { paths, cache, photons: None }
+        let records: Vec<[u32; 2]> = self.cache.records().iter().map(|r| r.pixel).collect();
+        let bytes = self.cache.bytes();
+        let cache = Some(CacheReport { records: records.len(), bytes, build: self.build, lookups: paths.lookups });
+        Statistics { paths, cache, photons: None, records }
     }
 }
 

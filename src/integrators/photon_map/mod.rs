@@ -27,7 +27,7 @@ use super::{Cameras, Integrator, Statistics, Tracer, diffuse};
 use crate::bsdfs::{Bsdf, Diffuse, DiffuseTransmission, Lambertian};
 use crate::cameras::CameraRay;
 use crate::direct::{Estimator, Fits};
-use crate::film::{Film, PixelSample};
+use crate::film::PixelSample;
 use crate::materials::SurfaceBsdf;
 use crate::photons::{GatherScratch, PhotonError, Place, Search};
 use crate::scene::RenderJob;
@@ -93,8 +93,8 @@ impl Integrator for PhotonMapIntegrator<'_> {
         self.job.settings().integrator.photons.progressive.is_some()
     }
 
-    fn statistics(&self, paths: PathStats, _: &mut Film) -> Statistics {
-        Statistics { paths, cache: None, photons: Some(self.maker.stats) }
+    fn statistics(&self, paths: PathStats) -> Statistics {
+        Statistics { paths, photons: Some(self.maker.stats), ..Statistics::default() }
     }
 }
 
@@ -213,6 +213,7 @@ impl PhotonMapTracer<'_> {
                     stream,
                     direct: stream,
                     sample_counts,
+                    index: 0,
                     fit: 0,
                     pixel: [0; 2],
                 });

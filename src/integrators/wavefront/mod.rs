@@ -22,6 +22,7 @@ pub(super) use buffers::Buffers;
 use buffers::Stream;
 use columns::{Single, Surface, others};
 
+use super::reuse::{Place, Reuse};
 use super::segment::{
     BsdfTechnique, Carried, Direction, PathState, PathStats, domain, emptied, sampled_direction, survive,
 };
@@ -120,6 +121,8 @@ pub(super) struct Output<'a> {
     pub(super) direct: &'a mut DirectStats,
     /// Copies of the segments, if requested.
     pub(super) segments: Option<&'a mut Vec<RayBatch>>,
+    /// Takes the vertices of paths that pixels share, if they do.
+    pub(super) reuse: Option<&'a mut Reuse>,
 }
 
 impl<'w> Batch<'w> {
@@ -207,6 +210,7 @@ impl<'w> Batch<'w> {
         if self.estimate.vertex == 0 {
             self.buffers.set_normals(out.samples);
         }
+        self.share(out);
         self.buffers.scratch.begin(&job.lights, n);
         if self.estimate.has_controls {
             self.buffers.controls.begin(job, n, (&self.buffers.surface, &self.singles));
@@ -273,6 +277,22 @@ impl<'w> Batch<'w> {
                 i,
                 if let Bsdf::Diffuse(Diffuse { reflectance }) = bsdf.bsdf { reflectance } else { Rgb::BLACK },
             );
+        }
+    }
+
+    /// Lets the paths at Lambertian vertices be shared.
+    fn share(&mut self, out: &mut Output<'_>) {
+        let Some(reuse) = &mut out.reuse else { return };
+        let Buffers { paths, surface, samples, .. } = &mut *self.buffers;
+        let is_lambertian = &mut samples.light.is_delta;
+        is_lambertian[..paths.len()].fill(true);
+        others(&self.singles).for_each(|single| is_lambertian[single.index as usize] = false);
+        for (i, path) in paths.iter_mut().enumerate().filter(|(i, _)| is_lambertian[*i]) {
+            let point = (surface.p.vec3(i), surface.p_error.vec3(i));
+            let at = Place::new(point, (surface.n.vec3(i), surface.ns.vec3(i)), surface.wo.vec3(i));
+            let radiance = &mut out.samples[path.sample as usize].radiance;
+            let arrival = (path.sample, self.estimate.vertex, path.passed == 0);
+            path.beta = reuse.arrive(arrival, at, (path.beta, surface.rho.rgb(i)), radiance);
         }
     }
 

@@ -3,7 +3,7 @@
 use crate::direct::Estimator;
 use crate::film::PixelBounds;
 use crate::render::RenderSettings;
-use crate::render::tiles::{TileShare, has_replicas};
+use crate::render::tiles::{TileShare, replica_edge};
 use crate::scene::RenderJob;
 use std::ops::Range;
 use std::str::FromStr;
@@ -26,8 +26,8 @@ pub struct FilmHeader {
     pub share: Option<TileShare>,
     /// True if there are all these samples of all these pixels.
     pub is_finished: bool,
-    /// True if some pixels are estimated twice.
-    pub has_replicas: bool,
+    /// Edge of the blocks of pixels that are estimated twice, if there are any.
+    pub replica_edge: Option<u32>,
     /// Number of control variates that are summed.
     pub controls: u32,
     /// Tells the scene from others.
@@ -58,7 +58,7 @@ impl FilmHeader {
             spp,
             share: render.share,
             is_finished: false,
-            has_replicas: has_replicas(job, render),
+            replica_edge: replica_edge(job, render),
             controls: if estimator.is_over_pixels() { job.controls() as u32 } else { 0 },
             fingerprint,
             settings,
@@ -82,7 +82,7 @@ impl FilmHeader {
         if self.spp != other.spp {
             lines.push(format!("samples per pixel: {}, not {}", other.spp, self.spp));
         }
-        if (self.has_replicas, self.controls) != (other.has_replicas, other.controls) {
+        if (self.replica_edge, self.controls) != (other.replica_edge, other.controls) {
             lines.push("one of them holds the sums for a variance layer, the other does not".to_owned());
         }
         lines
@@ -120,7 +120,7 @@ impl FilmHeader {
             ("spp", self.spp.to_string()),
             ("share", share),
             ("finished", self.is_finished.to_string()),
-            ("replicas", self.has_replicas.to_string()),
+            ("replicas", self.replica_edge.unwrap_or(0).to_string()),
             ("controls", self.controls.to_string()),
             ("fingerprint", format!("{:016x}", self.fingerprint)),
         ];
@@ -157,7 +157,7 @@ impl FilmHeader {
             spp: own("spp")?.parse().ok()?,
             share,
             is_finished: own("finished")?.parse().ok()?,
-            has_replicas: own("replicas")?.parse().ok()?,
+            replica_edge: Some(own("replicas")?.parse().ok()?).filter(|&edge| edge > 0),
             controls: own("controls")?.parse().ok().filter(|n| *n <= 1 << 16)?,
             fingerprint: u64::from_str_radix(own("fingerprint")?, 16).ok()?,
             settings: named("setting "),
@@ -211,7 +211,7 @@ mod tests {
             spp: 32,
             share: Some(TileShare { index: 2, count: 5 }),
             is_finished: true,
-            has_replicas: false,
+            replica_edge: None,
             controls: 7,
             fingerprint: 0xfedc_ba98_7654_3210,
             settings: vec![

@@ -1,7 +1,7 @@
 //! Adds up the parts of an image. The sums are exact, so the result has the bits of the image rendered at once.
 //!
 //! First all headers are read: do the parts belong together, and is there every sample of every pixel, once? Then the
-//! parts are read one after the other, some tiles at a time, into the sums of the whole image.
+//! parts are read one after the other, some tiles at a time, into tiles that cover the image.
 
 use super::error::PartError;
 use super::file::{FilmReader, pixels_of};
@@ -9,13 +9,15 @@ use super::header::FilmHeader;
 use super::stored_tile::StoredTile;
 use crate::direct::Fits;
 use crate::film::accumulator::PixelAccumulator;
+use crate::film::packed::PackedSums;
 use crate::film::replicas::replicas;
 use crate::film::{Film, PixelBounds};
 use crate::render::control_variates;
-use crate::render::tiles::{SHARE_TILE, Tile, film_of_last, position};
+use crate::render::tiles::{SHARE_TILE, Tile, film, position};
 use std::collections::BTreeMap;
 use std::ops::Range;
 use std::path::{Path, PathBuf};
+use std::sync::Arc;
 
 /// Most lines of a message about many parts.
 const MAX_LINES: usize = 8;
@@ -53,23 +55,22 @@ pub fn merge(paths: &[PathBuf], allows_missing: bool) -> Result<Merged, PartErro
     }
 
     let bounds = first.header.bounds;
-    let mut whole = empty(&first.header);
+    let mut whole = Whole::empty(&first.header);
     for part in &parts {
         let mut reader = FilmReader::open(&part.path)?;
         let mut pixels = 0;
         while let Some(tiles) = reader.tiles()? {
             for tile in &tiles {
                 pixels += tile.bounds.area();
-                add(&mut whole, tile, part)?;
+                whole.add(tile, part)?;
             }
         }
         if pixels != pixels_of(&part.header) {
             return Err(PartError::damaged(&part.path, "it does not have the pixels that its header says"));
         }
     }
-    let mut tiles = vec![whole];
-    let mut film = film_of_last(first.header.resolution, bounds, &mut tiles);
-    control_variates::correct(&mut film, &tiles, position);
+    let mut film = film(first.header.resolution, bounds, &whole.tiles);
+    control_variates::correct(&mut film, &whole.tiles, position);
     Ok(Merged { film, header: first.header.clone(), missing, samples })
 }
 
@@ -169,54 +170,87 @@ fn gap(parts: &[Part], samples: Range<u32>, tiles: &[usize], count: usize) -> Ve
     vec![format!("{what} of {} of {count} tiles of {SHARE_TILE} pixels", tiles.len())]
 }
 
-/// A tile of the size of the image, without samples.
-fn empty(header: &FilmHeader) -> Tile {
-    let bounds = header.bounds;
-    let replicas = if header.has_replicas { replicas(&bounds, &bounds) } else { Vec::new() };
-    let fits = match header.controls as usize {
-        0 => Fits::default(),
-        controls => Fits::of_pixels(controls, bounds.area() + replicas.len()),
-    };
-    Tile { bounds, done: 0, sums: vec![PixelAccumulator::default(); bounds.area()], replicas, fits }
+/// The image on its way, in tiles of [`SHARE_TILE`] pixels.
+struct Whole {
+    bounds: PixelBounds,
+    tiles: Vec<Tile>,
+    packing: Vec<u8>,
 }
 
-/// Adds a stored tile to the image.
-fn add(whole: &mut Tile, tile: &StoredTile, part: &Part) -> Result<(), PartError> {
-    let damaged = |reason| PartError::damaged(&part.path, reason);
-    if part.header.is_finished && tile.done < part.header.samples.end {
-        return Err(damaged("a tile lacks samples that its header says are there"));
+impl Whole {
+    /// Tiles without samples.
+    fn empty(header: &FilmHeader) -> Self {
+        let image = header.bounds;
+        let tile = |bounds: PixelBounds| {
+            let replicas = header.replica_edge.map_or(Vec::new(), |edge| replicas(&image, &bounds, edge));
+            let fits = match header.controls as usize {
+                0 => Fits::default(),
+                controls => Fits::of_pixels(controls, bounds.area() + replicas.len()),
+            };
+            Tile { bounds, done: 0, sums: Arc::new(PackedSums::new(bounds.area())), replicas, fits }
+        };
+        Whole { bounds: image, tiles: image.tiles(SHARE_TILE).into_iter().map(tile).collect(), packing: Vec::new() }
     }
-    let rows = tile.bounds.area() + tile.replicas.len();
-    let row = tile.controls.len() / rows;
-    if row * rows != tile.controls.len()
-        || row != whole.fits.exact_sums().len() / (whole.sums.len() + whole.replicas.len())
-    {
-        return Err(damaged("it does not have the control variates that its header says"));
+
+    /// Adds a stored tile, of whatever size.
+    fn add(&mut self, stored: &StoredTile, part: &Part) -> Result<(), PartError> {
+        let damaged = |reason| PartError::damaged(&part.path, reason);
+        if part.header.is_finished && stored.done < part.header.samples.end {
+            return Err(damaged("a tile lacks samples that its header says are there"));
+        }
+        let rows = stored.bounds.area() + stored.replicas.len();
+        let row = stored.controls.len() / rows;
+        let expected = self.tiles.first().map_or(0, |t| t.fits.exact_sums().len() / (t.sums.len() + t.replicas.len()));
+        if row * rows != stored.controls.len() || row != expected {
+            return Err(damaged("it does not have the control variates that its header says"));
+        }
+        let sums = stored.sums.unpacked();
+        let columns = self.bounds.width().div_ceil(SHARE_TILE) as usize;
+        let cells = |from: u32, to: u32, origin: u32| {
+            (((from - origin) / SHARE_TILE) as usize)..((to - origin).div_ceil(SHARE_TILE) as usize)
+        };
+        for y in cells(stored.bounds.y0, stored.bounds.y1, self.bounds.y0) {
+            for x in cells(stored.bounds.x0, stored.bounds.x1, self.bounds.x0) {
+                let tile = &mut self.tiles[y * columns + x];
+                add_to(tile, (stored, &sums, row), &mut self.packing).map_err(damaged)?;
+            }
+        }
+        Ok(())
     }
-    let index = |i: u32| index_in(&whole.bounds, position(&tile.bounds, i));
-    let controls = |fit: usize| &tile.controls[fit * row..][..row];
-    for (i, sums) in tile.sums.iter().enumerate() {
-        let at = index(i as u32);
-        whole.sums[at].merge(sums);
+}
+
+/// Adds what a tile and a stored one have in common. `row` is the number of sums of control variates of each pixel.
+fn add_to(
+    tile: &mut Tile,
+    (stored, sums, row): (&StoredTile, &[PixelAccumulator], usize),
+    packing: &mut Vec<u8>,
+) -> Result<(), &'static str> {
+    let bounds = tile.bounds;
+    let index = |i: u32| {
+        let [x, y] = position(&stored.bounds, i);
+        let is_inside = (bounds.x0..bounds.x1).contains(&x) && (bounds.y0..bounds.y1).contains(&y);
+        is_inside.then(|| ((y - bounds.y0) * bounds.width() + x - bounds.x0) as usize)
+    };
+    let controls = |fit: usize| &stored.controls[fit * row..][..row];
+    let mut merged = tile.sums.unpacked();
+    for (i, sums) in sums.iter().enumerate() {
+        let Some(at) = index(i as u32) else { continue };
+        merged[at].merge(sums);
         if row > 0 {
-            whole.fits.merge_sums(at as u32, controls(i));
+            tile.fits.merge_sums(at as u32, controls(i));
         }
     }
-    for (i, replica) in tile.replicas.iter().enumerate() {
-        let at = index(replica.pixel) as u32;
-        let at = whole.replicas.binary_search_by_key(&at, |r| r.pixel);
-        let at = at.map_err(|_| damaged("it has a second estimate of a pixel that should have one"))?;
-        whole.replicas[at].sums.merge(&replica.sums);
+    tile.set_sums(&merged, packing);
+    for (i, replica) in stored.replicas.iter().enumerate() {
+        let Some(at) = index(replica.pixel) else { continue };
+        let at = tile.replicas.binary_search_by_key(&(at as u32), |r| r.pixel);
+        let at = at.map_err(|_| "it has a second estimate of a pixel that should have none")?;
+        tile.replicas[at].sums.merge(&replica.sums);
         if row > 0 {
-            whole.fits.merge_sums((whole.sums.len() + at) as u32, controls(tile.bounds.area() + i));
+            tile.fits.merge_sums((merged.len() + at) as u32, controls(stored.bounds.area() + i));
         }
     }
     Ok(())
-}
-
-/// Index of a pixel inside some bounds, row by row.
-fn index_in(bounds: &PixelBounds, [x, y]: [u32; 2]) -> usize {
-    (y - bounds.y0) as usize * bounds.width() as usize + (x - bounds.x0) as usize
 }
 
 /// The first of several paths that are the same file; `None` if there is none.

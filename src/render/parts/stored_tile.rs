@@ -2,9 +2,9 @@
 
 use super::error::PartError;
 use crate::film::PixelBounds;
-use crate::film::accumulator::PixelAccumulator;
 use crate::film::encoding::{Decoder, Encoder};
 use crate::film::exact::FixedSum;
+use crate::film::packed::PackedSums;
 use crate::film::replicas::ReplicaAccumulator;
 use crate::render::tiles::Tile;
 
@@ -15,7 +15,7 @@ pub struct StoredTile {
     pub bounds: PixelBounds,
     /// Index of the next sample of its pixels.
     pub done: u32,
-    pub(super) sums: Vec<PixelAccumulator>,
+    pub(super) sums: PackedSums,
     pub(super) replicas: Vec<ReplicaAccumulator>,
     /// Sums of values and control variates, of the pixels and then of the replicas.
     pub(super) controls: Vec<FixedSum>,
@@ -38,8 +38,10 @@ impl StoredTile {
         (0..).zip(self.controls.chunks(row)).for_each(|(fit, sums)| {
             tile.fits.merge_sums(fit, sums);
         });
-        (tile.sums, tile.replicas, tile.done) = (self.sums, self.replicas, self.done);
-        tile.sums.iter_mut().for_each(|sums| sums.records = 0);
+        (tile.replicas, tile.done) = (self.replicas, self.done);
+        let mut sums = self.sums.unpacked();
+        sums.iter_mut().for_each(|sums| sums.records = 0);
+        tile.set_sums(&sums, &mut Vec::new());
         Ok(tile)
     }
 
@@ -54,7 +56,8 @@ impl StoredTile {
             return None;
         }
         // As many as there are bytes for, whatever the numbers say
-        let sums = (0..bounds.area()).map(|_| decoder.pixel()).collect::<Option<_>>()?;
+        let sums = (0..bounds.area()).map(|_| decoder.pixel()).collect::<Option<Vec<_>>>()?;
+        let sums = PackedSums::of(&sums);
         let replicas: Vec<_> = (0..replicas).map(|_| decoder.replica()).collect::<Option<_>>()?;
         if replicas.iter().any(|r| r.pixel as usize >= bounds.area()) {
             return None;
@@ -71,7 +74,7 @@ pub(super) fn write(tile: &Tile, encoder: &mut Encoder) {
     [b.x0, b.x1, b.y0, b.y1, tile.done].into_iter().for_each(|n| encoder.word(n));
     encoder.word(tile.replicas.len() as u32);
     encoder.word(controls.len() as u32);
-    tile.sums.iter().for_each(|sums| encoder.pixel(sums));
+    tile.sums.unpacked().iter().for_each(|sums| encoder.pixel(sums));
     tile.replicas.iter().for_each(|replica| encoder.replica(replica));
     controls.iter().for_each(|sum| encoder.fixed(sum));
     tile.fits.memory().into_iter().for_each(|values| encoder.floats(values));

@@ -178,7 +178,7 @@ fn direct_is_path_of_one_bounce() {
         job.change(|s| s.integrator.max_depth = if kind == IntegratorKind::Path { 1 } else { 4 });
         let settings = RenderSettings { spp: 4, ..RenderSettings::default() };
         let film: Film = render(&job, &settings, &AtomicBool::new(false), &|_| ()).unwrap().film;
-        film.pixels.iter().map(PixelSums::mean).collect::<Vec<_>>()
+        film.pixels().iter().map(PixelSums::mean).collect::<Vec<_>>()
     };
     assert_eq!(image(IntegratorKind::Direct), image(IntegratorKind::Path));
 }

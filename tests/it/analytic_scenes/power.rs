@@ -78,7 +78,7 @@ pub(super) fn image_means(path: &Path, c: &Configuration, budget: Budget, seed: 
     let mut image = |i: u32| {
         job.change(|s| s.sampling.seed = seed.wrapping_add(i));
         let film = render(&job, &settings, &AtomicBool::new(false), &|_| ()).unwrap().film;
-        let mean = |c: usize| film.pixels.iter().map(|p| p.mean()[c]).sum::<f64>() / film.pixels.len() as f64;
+        let mean = |c: usize| film.pixels().iter().map(|p| p.mean()[c]).sum::<f64>() / film.len() as f64;
         [mean(0), mean(1), mean(2)]
     };
     (0..budget.images).map(&mut image).collect()

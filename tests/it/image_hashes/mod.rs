@@ -90,7 +90,7 @@ impl Hash {
 /// The hash of all sums that an image is made of.
 fn hash(film: &Film) -> u64 {
     let mut hash = Hash(0xcbf2_9ce4_8422_2325);
-    for p in &film.pixels {
+    for p in film.pixels() {
         let sums = [p.radiance, p.albedo, p.normal, [p.depth, 0.0, 0.0]];
         sums.as_flattened().iter().for_each(|v| hash.add(v.to_bits()));
         let counts = [p.count, p.hits, p.invalid, u64::from(p.material), u64::from(p.object)];

@@ -17,6 +17,7 @@ const CRATES: &[(&str, &str, &[&str])] = &[
     (".", "lumiris", &["lumiris_numbers", "lumiris_lanes", "lumiris_formats"]),
     ("crates/lab", "lumiris_lab", &["lumiris_numbers", "lumiris_lanes", "lumiris_formats", "lumiris"]),
     ("crates/cli", "lumiris_cli", &["lumiris_numbers", "lumiris_lanes", "lumiris_formats", "lumiris", "lumiris_lab"]),
+    ("python", "_lumiris", &["lumiris_numbers", "lumiris_formats", "lumiris"]),
     ("crates/test-support", "lumiris_test_support", &["lumiris_numbers"]),
 ];
 

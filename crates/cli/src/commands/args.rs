@@ -4,6 +4,7 @@ use super::denoise_args::DenoiseArgs;
 use super::exr::ExrArgs;
 use super::frame_list::{FrameList, parse_frames};
 use super::look::LookArgs;
+use super::memory::{MemoryLimit, parse_limit};
 use super::named::named;
 use super::part_args::PartArgs;
 use super::settings_args::SettingsArgs;
@@ -95,6 +96,10 @@ pub(super) struct RenderArgs {
     /// Write times and counts of every stage
     #[arg(long, value_name = "FILE.json")]
     pub stats: Option<PathBuf>,
+    /// Memory that the process may take, such as 24GB, or `off`: what will not fit is refused before it is rendered
+    /// [default: what the machine and its control groups have]
+    #[arg(long, value_name = "SIZE", value_parser = parse_limit)]
+    pub memory_limit: Option<MemoryLimit>,
     /// Print no progress, only warnings and errors
     #[arg(short, long)]
     pub quiet: bool,

@@ -1,10 +1,11 @@
 //! `lumiris compare`
 
 use super::progress;
-use crate::compare::columns::{column, shown_columns};
-use crate::compare::{Column, Compared, ImageSet, Metric, Scores, Settings, compare, load, write_page};
+use crate::compare::write_page;
 use anyhow::{Context, bail};
 use clap::{Args, ValueEnum};
+use lumiris::imaging::compare::columns::{column, shown_columns};
+use lumiris::imaging::compare::{COLUMNS, Column, Compared, ImageSet, Metric, Scores, Settings, Shown, compare, load};
 use lumiris::imaging::metrics::bias::Z_95;
 use lumiris_formats::output::write_text;
 use serde_json::{Map, Value, json};
@@ -122,7 +123,7 @@ fn pixels_per_degree(text: &str) -> Result<f64, String> {
 
 fn limit(text: &str) -> Result<Limit, String> {
     let (name, value) = text.split_once('=').ok_or("is not of the form NUMBER=LIMIT")?;
-    let names = || crate::compare::COLUMNS.map(|c| c.key).join(", ");
+    let names = || COLUMNS.map(|c| c.key).join(", ");
     let column = column(name.trim()).ok_or_else(|| format!("there is no number `{name}`; there are {}", names()))?;
     Ok(Limit { column, value: number(value)? })
 }
@@ -252,7 +253,7 @@ fn report(
     compared: &[Compared],
     failures: &[String],
 ) -> Value {
-    let image_json = |shown: &crate::compare::Shown| {
+    let image_json = |shown: &Shown| {
         json!({
             "path": shown.path.display().to_string(), "layer": shown.layer,
             "has_variance": shown.variance.is_some(),
@@ -282,7 +283,7 @@ fn report(
 
 fn numbers(map: &mut Map<String, Value>, settings: &Settings, compared: &Compared) {
     let s = &compared.scores;
-    for column in &crate::compare::COLUMNS {
+    for column in &COLUMNS {
         if column.metric.is_none_or(|m| settings.metrics.contains(&m)) {
             map.insert(column.key.to_owned(), json!((column.value)(s)));
         }

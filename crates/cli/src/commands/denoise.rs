@@ -1,7 +1,7 @@
 //! `lumiris denoise`: an image file gets the layer `denoised`.
 
 use super::UsageError;
-use super::denoise_args::{DENOISED, DENOISED_KEY, Denoised, open};
+use super::denoise_args::{DENOISED, DENOISED_KEY, Denoised, LAYER, open};
 use super::look::LookArgs;
 use super::part_args::is_part;
 use super::pictures::{check_outputs, is_exr, write_display};
@@ -12,11 +12,9 @@ use clap::Args;
 use lumiris::imaging::file_parts::{FilePart, read_file_parts};
 use lumiris::imaging::oidn::NoisyImage;
 use lumiris::imaging::oiio::{MetaValue, ReadLimits, Storage, write_image};
+use std::ops::Range;
 use std::path::PathBuf;
 use std::process::ExitCode;
-
-/// Name of the layer, and of its part in files of several parts.
-const LAYER: &str = "denoised";
 
 /// `lumiris denoise`
 #[derive(Args, Clone, Debug)]
@@ -70,9 +68,9 @@ pub(super) fn run(args: &DenoiseFileArgs) -> anyhow::Result<ExitCode> {
             }
             let part = &parts[main];
             let size = [part.image.width, part.image.height];
-            let shown = args.look.apply_to(denoised.pixels.clone())?;
             let metadata = [texts(&parts), denoised.metadata_shown()].concat();
-            write_display(path, (size, part.origin, part.full), shown, metadata)
+            let rows = |rows: Range<usize>| denoised.pixels[3 * size[0] * rows.start..3 * size[0] * rows.end].to_vec();
+            write_display(path, (size, part.origin, part.full), &args.look, &rows, metadata)
         };
         match write_or_rescue(path, write) {
             Ok(()) => written.push(path.display().to_string()),

@@ -1,12 +1,14 @@
 //! Options of denoising, and what became of it.
 
 use clap::Args;
-use lumiris::film::Film;
+use lumiris::film::{Film, PixelBounds};
 use lumiris::imaging::oidn::{DenoiseError, Denoiser, NoisyImage};
-use lumiris::render::output::{Aov, Channels, channels};
+use lumiris::render::output::{Aov, Layers};
 use std::path::{Path, PathBuf};
 
-/// Channels of the layer.
+/// Name of the layer, and of its part in files of several parts.
+pub(super) const LAYER: &str = "denoised";
+/// Its channels.
 pub(super) const DENOISED: [&str; 3] = ["denoised.R", "denoised.G", "denoised.B"];
 /// Metadata: what denoised the image, and by which layers.
 pub(super) const DENOISED_KEY: &str = "lumiris:denoised";
@@ -75,25 +77,18 @@ impl Denoised {
 
     /// Denoises a film that has the features of the first surfaces.
     pub(super) fn of_film(denoiser: &Denoiser, film: &Film) -> Result<Self, DenoiseError> {
-        let layers = channels(film, &[Aov::Albedo, Aov::Normal], None);
-        let pixels = layers.data.as_chunks::<9>().0;
-        let layer = |c: usize| pixels.iter().flat_map(|p| [p[c], p[c + 1], p[c + 2]]).collect::<Vec<f32>>();
+        let layer = |has_image: bool, aovs: &[Aov]| {
+            let PixelBounds { y0, y1, .. } = film.bounds;
+            Layers::new(film, has_image, aovs, None).rows_in_parallel(y0..y1)
+        };
         let image = NoisyImage {
             width: film.bounds.width() as usize,
             height: film.bounds.height() as usize,
-            color: layer(0),
-            albedo: Some(layer(3)),
-            normal: Some(layer(6)),
+            color: layer(true, &[]),
+            albedo: Some(layer(false, &[Aov::Albedo])),
+            normal: Some(layer(false, &[Aov::Normal])),
         };
         Denoised::new(denoiser, image)
-    }
-
-    /// Adds the layer to others of the same image.
-    pub(super) fn append_to(&self, layers: &mut Channels) {
-        let stride = layers.names.len().max(1);
-        let pixels = layers.data.chunks_exact(stride).zip(self.pixels.as_chunks::<3>().0);
-        layers.data = pixels.flat_map(|(others, rgb)| others.iter().chain(rgb).copied()).collect();
-        layers.names.extend(DENOISED.map(str::to_owned));
     }
 
     /// Metadata of files that have the layer.
@@ -106,19 +101,5 @@ impl Denoised {
         let mut metadata = self.metadata();
         metadata.push((SHOWN_KEY.to_owned(), "denoised".to_owned()));
         metadata
-    }
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-
-    #[test]
-    fn the_layer_stands_after_the_others() {
-        let denoised = Denoised { pixels: vec![5.0, 6.0, 7.0, 8.0, 9.0, 10.0], about: String::new() };
-        let mut layers = Channels { names: vec!["R".to_owned(), "G".to_owned()], data: vec![1.0, 2.0, 3.0, 4.0] };
-        denoised.append_to(&mut layers);
-        assert_eq!(layers.data, [1.0, 2.0, 5.0, 6.0, 7.0, 3.0, 4.0, 8.0, 9.0, 10.0]);
-        assert_eq!(layers.names, ["R", "G", "denoised.R", "denoised.G", "denoised.B"]);
     }
 }

@@ -6,9 +6,12 @@ use clap::Args;
 use clap::builder::PossibleValuesParser;
 use lumiris::cameras::Camera;
 use lumiris::film::Film;
-use lumiris::imaging::oiio::{MetaValue, Part, Storage};
-use lumiris::render::cryptomatte::{Cryptomatte, Layer};
-use lumiris::render::output::Channels;
+use lumiris::imaging::oiio::{MetaValue, Part, Storage, write_rows};
+use lumiris::render::cryptomatte::Cryptomatte;
+use std::borrow::Cow;
+use std::cell::RefCell;
+use std::ops::Range;
+use std::path::Path;
 use strum::{EnumString, VariantNames};
 
 /// Compressions, and whether they keep every bit of a float.
@@ -79,14 +82,26 @@ pub(super) struct ExrArgs {
     pub cryptomatte: Vec<Cryptomatte>,
 }
 
+/// Channels that belong together, which are made row by row.
+pub(super) struct ExrLayer<'a> {
+    /// Name of its part, where each layer has one.
+    pub name: String,
+    pub channels: Vec<String>,
+    /// The values of some rows, from 0 on, interleaved.
+    pub rows: Box<dyn Fn(Range<usize>) -> Vec<f32> + 'a>,
+    /// Entries that stand with the layer.
+    pub metadata: Vec<(String, String)>,
+    /// Whether the values are ids, which bear no loss.
+    pub is_exact: bool,
+}
+
 /// An image with its layers.
 pub(super) struct ExrImage<'a> {
     pub film: &'a Film,
     pub camera: &'a CameraMatrices,
     /// Wall-clock time of the rendering (s).
     pub seconds: f64,
-    pub channels: Channels,
-    pub cryptomattes: &'a [Layer],
+    pub layers: Vec<ExrLayer<'a>>,
     pub metadata: Vec<(String, String)>,
 }
 
@@ -104,88 +119,88 @@ impl ExrArgs {
         Ok(())
     }
 
-    /// The parts of a file, and a warning.
-    pub(super) fn parts(&self, image: ExrImage<'_>) -> (Vec<Part>, Option<String>) {
-        let warning = self.overflow(&image.channels);
-        let film = image.film;
-        let size = [film.bounds.width() as usize, film.bounds.height() as usize];
-        let new_part = |channels: Channels, compression: &str| {
-            let part = Part::linear(size[0], size[1], channels.names, channels.data).compressed_by(compression);
-            let full = film.resolution.map(|n| n as usize);
-            part.with_window([film.bounds.x0 as usize, film.bounds.y0 as usize], full)
-        };
-        let of_crypto = image.cryptomattes.iter().flat_map(|layer| layer.metadata.clone()).collect();
-        let mut parts = match self.exr_parts {
-            ExrParts::Single => {
-                let layers = image.cryptomattes.iter().map(|layer| &layer.channels);
-                vec![new_part(joined(std::iter::once(&image.channels).chain(layers)), &self.exr_compression)]
-            }
-            ExrParts::Multi => {
-                let layers = split(&image.channels).into_iter();
-                let parts = layers.map(|(name, channels)| new_part(channels, &self.exr_compression).named(&name));
-                let lossless = if self.is_lossless() { &self.exr_compression } else { "zip" };
-                let ids = image.cryptomattes.iter().map(|layer| {
-                    let part = new_part(layer.channels.clone(), lossless).named(layer.name);
-                    part.with_metadata(layer.metadata.clone())
-                });
-                parts.chain(ids).collect()
-            }
-        };
-        if self.exr_type == ExrType::Half {
-            parts = parts.into_iter().map(|part| part.channels_stored_as(&COLORS, Storage::Half)).collect();
-        }
-        // Readers of several parts look into the first for what concerns all
-        let first = parts.remove(0).with_metadata(image.metadata).with_metadata(of_crypto);
-        parts.insert(0, with_standard_attributes(first, image.camera, image.seconds));
-        (parts, warning)
+    /// True if each layer has a part of its own.
+    pub(super) fn is_multi(&self) -> bool {
+        self.exr_parts == ExrParts::Multi
     }
 
-    /// What the user should know of values that 16 bits do not hold.
-    fn overflow(&self, channels: &Channels) -> Option<String> {
-        let colors = channels.names.iter().map(|name| COLORS.contains(&name.as_str()));
-        let colors: Vec<bool> = colors.collect();
-        let pixels = channels.data.chunks_exact(channels.names.len().max(1));
-        let is_large = |pixel: &[f32]| pixel.iter().zip(&colors).any(|(v, color)| *color && v.abs() > MAX_HALF);
-        let count = pixels.filter(|pixel| is_large(pixel)).count();
-        (self.exr_type == ExrType::Half && count > 0).then(|| {
+    /// Writes a file; a warning is what it returns.
+    pub(super) fn write(&self, path: &Path, image: &ExrImage<'_>) -> anyhow::Result<Option<String>> {
+        let parts: Vec<&[ExrLayer<'_>]> = match self.exr_parts {
+            ExrParts::Single => vec![&image.layers],
+            ExrParts::Multi => image.layers.chunks(1).collect(),
+        };
+        let mut bright = vec![0; parts.len()];
+        let counts = RefCell::new(&mut bright);
+        let is_color = |name: &String| COLORS.contains(&name.as_str());
+        let colors: Vec<Vec<bool>> =
+            parts.iter().map(|layers| channels(layers).iter().map(is_color).collect()).collect();
+        let values = |part: usize, rows: Range<usize>| {
+            let data = joined(parts[part], rows);
+            if self.exr_type == ExrType::Half {
+                let is_bright = |(v, color): (&f32, &bool)| *color && v.abs() > MAX_HALF;
+                let pixels = data.chunks_exact(colors[part].len().max(1));
+                let count = pixels.filter(|pixel| pixel.iter().zip(&colors[part]).any(is_bright)).count();
+                counts.borrow_mut()[part] += count;
+            }
+            Cow::Owned(data)
+        };
+        write_rows(path, &self.parts(image, &parts), &values)?;
+        let count = bright.into_iter().max().unwrap_or(0);
+        Ok((count > 0).then(|| {
             format!("warning: {count} pixels are brighter than 65504, and infinite as half floats; --exr-type float keeps them")
-        })
+        }))
+    }
+
+    /// The parts of a file, without their values.
+    fn parts(&self, image: &ExrImage<'_>, parts: &[&[ExrLayer<'_>]]) -> Vec<Part> {
+        let film = image.film;
+        let [width, height] = [film.bounds.width() as usize, film.bounds.height() as usize];
+        let is_multi = self.is_multi();
+        let new_part = |layers: &&[ExrLayer<'_>]| {
+            let is_exact = is_multi && layers.iter().any(|layer| layer.is_exact);
+            let compression = if is_exact && !self.is_lossless() { "zip" } else { &self.exr_compression };
+            let part = Part::linear(width, height, channels(layers), Vec::new()).compressed_by(compression);
+            let part = part
+                .with_window([film.bounds.x0 as usize, film.bounds.y0 as usize], film.resolution.map(|n| n as usize));
+            let part =
+                if self.exr_type == ExrType::Half { part.channels_stored_as(&COLORS, Storage::Half) } else { part };
+            match layers {
+                [layer] if is_multi => part.named(&layer.name).with_metadata(layer.metadata.clone()),
+                _ => part,
+            }
+        };
+        let mut parts: Vec<Part> = parts.iter().map(new_part).collect();
+        // Readers of several parts look into the first for what concerns all
+        let of_layers = image.layers.iter().flat_map(|layer| layer.metadata.clone()).collect();
+        let first = parts.remove(0).with_metadata(image.metadata.clone()).with_metadata(of_layers);
+        parts.insert(0, with_standard_attributes(first, image.camera, image.seconds));
+        parts
     }
 }
 
-/// All channels side by side.
-fn joined<'a>(layers: impl Iterator<Item = &'a Channels>) -> Channels {
-    let layers: Vec<&Channels> = layers.collect();
-    let names: Vec<String> = layers.iter().flat_map(|layer| layer.names.iter().cloned()).collect();
-    let mut rows: Vec<_> = layers.iter().map(|layer| layer.data.chunks_exact(layer.names.len().max(1))).collect();
-    let mut data = Vec::with_capacity(layers.iter().map(|layer| layer.data.len()).sum());
-    let pixels = layers.first().map_or(0, |layer| layer.data.len() / layer.names.len().max(1));
-    for _ in 0..pixels {
-        rows.iter_mut().filter_map(Iterator::next).for_each(|values| data.extend_from_slice(values));
-    }
-    Channels { names, data }
+/// Names of the channels of layers.
+fn channels(layers: &[ExrLayer<'_>]) -> Vec<String> {
+    layers.iter().flat_map(|layer| layer.channels.iter().cloned()).collect()
 }
 
-/// The layers of channels, which stand one after the other: `beauty`, and others by what precedes the point in their
-/// names.
-fn split(channels: &Channels) -> Vec<(String, Channels)> {
-    let layer = |name: &str| match name {
-        "R" | "G" | "B" => "beauty".to_owned(),
-        _ => name.split_once('.').map_or(name, |(layer, _)| layer).to_owned(),
-    };
-    let mut layers: Vec<(String, std::ops::Range<usize>)> = Vec::new();
-    for (index, name) in channels.names.iter().enumerate() {
-        match layers.last_mut() {
-            Some((last, range)) if *last == layer(name) => range.end = index + 1,
-            _ => layers.push((layer(name), index..index + 1)),
+/// Some rows of all layers side by side.
+fn joined(layers: &[ExrLayer<'_>], rows: Range<usize>) -> Vec<f32> {
+    if let [layer] = layers {
+        return (layer.rows)(rows);
+    }
+    let values: Vec<Vec<f32>> = layers.iter().map(|layer| (layer.rows)(rows.clone())).collect();
+    let mut data = Vec::with_capacity(values.iter().map(Vec::len).sum());
+    let mut pixels: Vec<_> =
+        values.iter().zip(layers).map(|(values, layer)| values.chunks_exact(layer.channels.len())).collect();
+    while data.len() < data.capacity() {
+        let before = data.len();
+        pixels.iter_mut().filter_map(Iterator::next).for_each(|values| data.extend_from_slice(values));
+        if data.len() == before {
+            break;
         }
     }
-    let pixels = || channels.data.chunks_exact(channels.names.len());
-    let of_layer = |(name, range): (String, std::ops::Range<usize>)| {
-        let data = pixels().flat_map(|pixel| pixel[range.clone()].iter().copied()).collect();
-        (name, Channels { names: channels.names[range].to_vec(), data })
-    };
-    layers.into_iter().map(of_layer).collect()
+    data
 }
 
 /// Where the camera stood, as columns of 4 × 4 matrices.
@@ -242,24 +257,22 @@ fn with_standard_attributes(part: Part, camera: &CameraMatrices, seconds: f64) -
 mod tests {
     use super::*;
 
-    fn channels(names: &[&str], data: &[f32]) -> Channels {
-        Channels { names: names.iter().map(|&n| n.to_owned()).collect(), data: data.to_vec() }
-    }
-
     #[test]
-    fn layers_are_split_by_name_and_joined_by_pixel() {
-        let names = ["R", "G", "B", "samples", "depth.Z", "normal.X", "normal.Y"];
-        let data: Vec<f32> = (0..14).map(|i| i as f32).collect();
-        let layers = split(&channels(&names, &data));
-        let found: Vec<_> = layers.iter().map(|(name, c)| (name.as_str(), c.names.len(), c.data.clone())).collect();
-        let expected = [
-            ("beauty", 3, vec![0.0, 1.0, 2.0, 7.0, 8.0, 9.0]),
-            ("samples", 1, vec![3.0, 10.0]),
-            ("depth", 1, vec![4.0, 11.0]),
-            ("normal", 2, vec![5.0, 6.0, 12.0, 13.0]),
-        ];
-        assert_eq!(found, expected);
-        let again = joined(layers.iter().map(|(_, channels)| channels));
-        assert_eq!((again.names, again.data), (names.map(str::to_owned).to_vec(), data));
+    fn layers_are_joined_by_pixel() {
+        let layer = |name: &str, channels: &[&str], first: f32| ExrLayer {
+            name: name.to_owned(),
+            channels: channels.iter().map(|&n| n.to_owned()).collect(),
+            rows: Box::new({
+                let stride = channels.len();
+                move |rows| (rows.start * stride..rows.end * stride).map(|i| first + i as f32).collect()
+            }),
+            metadata: Vec::new(),
+            is_exact: false,
+        };
+        // Rows of one pixel
+        let layers = [layer("beauty", &["R", "G", "B"], 0.0), layer("samples", &["samples"], 50.0)];
+        assert_eq!(joined(&layers, 1..3), [3.0, 4.0, 5.0, 51.0, 6.0, 7.0, 8.0, 52.0]);
+        assert_eq!(joined(&layers[1..], 0..2), [50.0, 51.0]);
+        assert_eq!(channels(&layers), ["R", "G", "B", "samples"]);
     }
 }

@@ -1,10 +1,13 @@
 //! `lumiris info`
 
 use super::args::SceneArgs;
+use super::memory::taken;
 use super::progress;
 use super::settings::load_job;
 use clap::Args;
 use lumiris::geometry::Shape;
+use lumiris::render::RenderSettings;
+use lumiris::render::memory::{Wanted, predict};
 use lumiris::render::output::metadata;
 use lumiris::scene::{RenderJob, Scene};
 use lumiris::settings::{Setting, Value as SettingValue};
@@ -80,9 +83,25 @@ fn facts(job: &RenderJob) -> Value {
             "geometry_bytes": geometry_bytes(scene),
             "texture_bytes": scene.textures.images.iter().map(|i| i.bytes() as u64).sum::<u64>(),
             "accel_bytes": accel.bytes, "accel_peak_bytes": accel.peak_bytes,
+            "taken_bytes": taken(),
+            "predicted_with_all_layers": predicted(job, true),
+            "predicted_without_layers": predicted(job, false),
         },
         "settings": metadata(&scene.film, settings).into_iter().collect::<BTreeMap<_, _>>(),
         "changed_settings": settings.changed().map(changed).collect::<BTreeMap<_, _>>(),
+    })
+}
+
+/// Bytes that rendering will take, beyond what the scene does.
+fn predicted(job: &RenderJob, has_layers: bool) -> Value {
+    let spp = job.settings().sampling.spp;
+    let render =
+        RenderSettings { spp, with_features: has_layers, with_replicas: has_layers, ..RenderSettings::default() };
+    let prediction = predict(job, &Wanted { render: &render, cryptomattes: &[], is_denoised: false });
+    let pixels = job.world.scene.film.bounds.area().max(1) as u64;
+    json!({
+        "bytes": prediction.bytes(), "film_bytes": prediction.film, "film_bytes_per_pixel": prediction.film / pixels,
+        "output_bytes": prediction.output, "fixed_bytes": prediction.fixed,
     })
 }
 

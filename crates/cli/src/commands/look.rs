@@ -4,11 +4,9 @@ use super::UsageError;
 use anyhow::Context;
 use clap::Args;
 use clap::builder::{PossibleValuesParser, TypedValueParser};
-use lumiris::film::Film;
 use lumiris::imaging::ViewTransform;
 use lumiris::imaging::oiio::{OcioView, ocio_display};
 use lumiris::imaging::view_transform::auto_exposure;
-use lumiris::render::output::exposed;
 use strum::VariantNames;
 
 /// Names that configurations have for linear light with the primaries of Rec.709, which is what images hold.
@@ -73,6 +71,33 @@ pub(super) struct Displayed {
     pub metadata: Vec<(String, String)>,
 }
 
+/// Exposure and a curve of the renderer's.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Grade {
+    stops: f32,
+    curve: ViewTransform,
+}
+
+impl Grade {
+    /// Applies both to some pixels: RGB, interleaved.
+    pub(super) fn apply(&self, pixels: &mut [f32]) {
+        let gain = self.stops.exp2();
+        for rgb in pixels.as_chunks_mut::<3>().0 {
+            *rgb = self.curve.apply(rgb.map(|v| v * gain));
+        }
+    }
+
+    /// What the colours depend on.
+    pub(super) fn metadata(&self) -> Vec<(String, String)> {
+        metadata(self.stops, <&str>::from(self.curve).to_owned())
+    }
+}
+
+fn metadata(stops: f32, view: String) -> Vec<(String, String)> {
+    let entry = |key: &str, value: String| (format!("lumiris:{key}"), value);
+    vec![entry("exposure", stops.to_string()), entry("view_transform", view)]
+}
+
 fn parse_exposure(text: &str) -> Result<Exposure, String> {
     match text.parse::<f32>() {
         _ if text == "auto" => Ok(Exposure::Auto),
@@ -113,27 +138,30 @@ impl LookArgs {
         }
     }
 
-    /// The colours of a film.
-    pub(super) fn apply(&self, film: &Film) -> anyhow::Result<Displayed> {
-        self.apply_to(exposed(film, 0.0))
+    /// What is done to each pixel, if that depends on nothing else and is done by the renderer itself.
+    pub(super) fn grade(&self) -> Option<Grade> {
+        match (self.exposure, self.view_transform) {
+            (Exposure::Stops(stops), View::Curve(curve)) => Some(Grade { stops, curve }),
+            _ => None,
+        }
     }
 
     /// The colours of an image: RGB, interleaved.
     pub(super) fn apply_to(&self, mut pixels: Vec<f32>) -> anyhow::Result<Displayed> {
         let stops = self.stops(&pixels);
-        let gain = stops.exp2();
-        pixels.iter_mut().for_each(|v| *v *= gain);
-        let view = match self.view_transform {
+        let metadata = match self.view_transform {
             View::Curve(curve) => {
-                for rgb in pixels.as_chunks_mut::<3>().0 {
-                    *rgb = curve.apply(*rgb);
-                }
-                <&str>::from(curve).to_owned()
+                let grade = Grade { stops, curve };
+                grade.apply(&mut pixels);
+                grade.metadata()
             }
-            View::Ocio => self.ocio(&mut pixels)?,
+            View::Ocio => {
+                let gain = stops.exp2();
+                pixels.iter_mut().for_each(|v| *v *= gain);
+                metadata(stops, self.ocio(&mut pixels)?)
+            }
         };
-        let entry = |key: &str, value: String| (format!("lumiris:{key}"), value);
-        Ok(Displayed { pixels, metadata: vec![entry("exposure", stops.to_string()), entry("view_transform", view)] })
+        Ok(Displayed { pixels, metadata })
     }
 
     /// Applies the configuration; returns its names.

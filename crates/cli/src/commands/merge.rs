@@ -61,13 +61,14 @@ pub(super) fn run(args: &MergeArgs) -> anyhow::Result<ExitCode> {
     };
     let Written { paths, misplaced } = write_all(&picture, &args.output);
     merged.missing.iter().for_each(|what| progress::say(&format!("warning: {what}: missing")));
-    let invalid: u64 = merged.film.pixels.iter().map(|p| p.invalid).sum();
+    let summary = merged.film.summary();
+    let invalid = summary.invalid;
     if invalid > 0 {
         progress::say(&format!("warning: {invalid} samples were not finite, or too bright, and were counted as black"));
     }
     if !args.quiet {
         let names: Vec<String> = paths.iter().map(|path| path.display().to_string()).collect();
-        let noise = merged.film.relative_noise() * 100.0;
+        let noise = summary.relative_noise * 100.0;
         progress::say(&format!("{} from {} parts, noise {noise:.2} %", names.join(", "), args.parts.len()));
     }
     if !misplaced.is_empty() {
@@ -101,7 +102,7 @@ fn aovs(merged: &Merged) -> Vec<Aov> {
     match merged.header.note(AOV_NOTE) {
         Some(list) => list.split(',').filter_map(|name| name.parse().ok()).filter(|aov| *aov != Aov::Ratio).collect(),
         None => {
-            let has_records = merged.film.pixels.iter().any(|p| p.records > 0);
+            let has_records = merged.film.summary().has_records;
             Aov::ALL.into_iter().chain(has_records.then_some(Aov::Records)).collect()
         }
     }
@@ -117,8 +118,7 @@ fn metadata(merged: &Merged, seconds: f64) -> Vec<(String, String)> {
         add("plan", plan.to_owned());
     }
     add("complete", merged.missing.is_empty().to_string());
-    let counts = || merged.film.pixels.iter().map(|p| p.count);
-    let (min, max) = (counts().min().unwrap_or(0), counts().max().unwrap_or(0));
+    let [min, max] = merged.film.summary().samples;
     add("samples_done", format!("{min} to {max} per pixel"));
     add("seconds", format!("{seconds:.3}"));
     if !merged.missing.is_empty() {

@@ -18,6 +18,7 @@ mod frames;
 mod generate;
 mod info;
 mod look;
+mod memory;
 mod merge;
 mod named;
 mod part_args;

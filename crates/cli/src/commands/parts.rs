@@ -132,7 +132,7 @@ impl FilmFile {
     /// What the rendering goes on from.
     pub(super) fn continuation(&mut self) -> Continuation<'_> {
         let (stored, checkpoints) = (self.stored.take(), self.checkpoints.as_mut());
-        Continuation { stored, checkpoints, keeps_sums: self.keeps_sums, watch: None }
+        Continuation { stored, checkpoints, keeps_sums: self.keeps_sums, ..Continuation::default() }
     }
 
     /// Notes how the rendering ended.

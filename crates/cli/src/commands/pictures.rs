@@ -1,8 +1,8 @@
 //! The image files of a rendering.
 
 use super::args::RenderArgs;
-use super::denoise_args::Denoised;
-use super::exr::{CameraMatrices, ExrArgs, ExrImage};
+use super::denoise_args::{self, DENOISED, Denoised};
+use super::exr::{CameraMatrices, ExrArgs, ExrImage, ExrLayer};
 use super::look::{Displayed, LookArgs};
 use super::part_args::{extension, is_part};
 use super::plan_file::PlanFile;
@@ -10,15 +10,19 @@ use super::progress;
 use super::rescue::write_or_rescue;
 use anyhow::{Context, bail};
 use lumiris::film::Film;
-use lumiris::imaging::oiio::{self, Part};
+use lumiris::imaging::oiio::{self, Part, ROWS_AT_ONCE};
 use lumiris::render::Rendering;
 use lumiris::render::cryptomatte::Layer;
 use lumiris::render::output::{self, Aov};
 use lumiris::scene::{RenderJob, SampleCountMap};
+use std::borrow::Cow;
+use std::ops::Range;
 use std::path::{Path, PathBuf};
 
 /// File types for display-referred images.
 const DISPLAY_TYPES: [&str; 6] = ["png", "jpg", "jpeg", "tif", "tiff", "tga"];
+/// The layer of the image itself.
+const IMAGE: &str = "beauty";
 /// Metadata of an image that Ctrl-C has cut short.
 const INTERRUPTED_KEY: &str = "lumiris:interrupted";
 
@@ -138,50 +142,97 @@ impl Picture<'_> {
             return self.write_exr(path);
         }
         let film = self.film;
-        let displayed = match self.denoised {
-            Some(denoised) => self.look.apply_to(denoised.pixels.clone())?,
-            None => self.look.apply(film)?,
-        };
         let size = [film.bounds.width() as usize, film.bounds.height() as usize];
         let full = [film.resolution[0] as usize, film.resolution[1] as usize];
         let origin = [film.bounds.x0 as usize, film.bounds.y0 as usize];
         let of_denoised = self.denoised.map(Denoised::metadata_shown).unwrap_or_default();
-        write_display(path, (size, origin, full), displayed, [self.metadata.clone(), of_denoised].concat())
+        let metadata = [self.metadata.clone(), of_denoised].concat();
+        let image = output::Layers::new(film, true, &[], None);
+        let rows = |rows: Range<usize>| match self.denoised {
+            Some(denoised) => denoised.pixels[3 * size[0] * rows.start..3 * size[0] * rows.end].to_vec(),
+            None => image.rows_in_parallel(film.bounds.y0 + rows.start as u32..film.bounds.y0 + rows.end as u32),
+        };
+        write_display(path, (size, origin, full), self.look, &rows, metadata)
     }
 
     fn write_exr(&self, path: &Path) -> anyhow::Result<()> {
-        let mut channels = output::channels(self.film, &self.aovs, self.sample_count_map);
-        if let Some(denoised) = self.denoised {
-            denoised.append_to(&mut channels);
-        }
         let of_denoised = self.denoised.map(Denoised::metadata).unwrap_or_default();
-        let (parts, warning) = self.exr.parts(ExrImage {
+        let image = ExrImage {
             film: self.film,
             camera: &self.camera,
             seconds: self.seconds,
-            channels,
-            cryptomattes: self.cryptomattes,
+            layers: self.layers(),
             metadata: [self.metadata.clone(), of_denoised].concat(),
-        });
-        if let Some(warning) = warning {
+        };
+        if let Some(warning) = self.exr.write(path, &image)? {
             progress::say(&format!("{}: {warning}", path.display()));
         }
-        oiio::write_image(path, &parts)?;
         Ok(())
+    }
+
+    /// The layers of an EXR file: those of the film apart if each has a part of its own, and others after them.
+    fn layers(&self) -> Vec<ExrLayer<'_>> {
+        let top = self.film.bounds.y0;
+        let coordinates = move |rows: Range<usize>| top + rows.start as u32..top + rows.end as u32;
+        let layer = |name: &str, channels, rows| ExrLayer {
+            name: name.to_owned(),
+            channels,
+            rows,
+            metadata: Vec::new(),
+            is_exact: false,
+        };
+        let of_film = |name: &str, has_image: bool, aovs| {
+            let layers = output::Layers::new(self.film, has_image, aovs, self.sample_count_map);
+            layer(name, layers.names(), Box::new(move |rows| layers.rows_in_parallel(coordinates(rows))))
+        };
+        let mut layers = match self.exr.is_multi() {
+            false => vec![of_film(IMAGE, true, &self.aovs)],
+            true => {
+                let aovs = self.aovs.iter().map(|aov| of_film(<&str>::from(aov), false, std::slice::from_ref(aov)));
+                std::iter::once(of_film(IMAGE, true, &[])).chain(aovs).collect()
+            }
+        };
+        if let Some(denoised) = self.denoised {
+            let row = 3 * self.film.bounds.width() as usize;
+            let rows = move |rows: Range<usize>| denoised.pixels[row * rows.start..row * rows.end].to_vec();
+            layers.push(layer(denoise_args::LAYER, DENOISED.map(str::to_owned).to_vec(), Box::new(rows)));
+        }
+        let of_ids = self.cryptomattes.iter().map(|ids| ExrLayer {
+            metadata: ids.metadata.clone(),
+            is_exact: true,
+            ..layer(ids.name, ids.channels.clone(), Box::new(move |rows| ids.rows(coordinates(rows))))
+        });
+        layers.extend(of_ids);
+        layers
     }
 }
 
-/// Writes an image for a display: its size, the place of its first pixel in the full image, and the size of that.
+/// Writes an image for a display: its size, the place of its first pixel in the full image, and the size of that. `rows`
+/// makes the light of some rows, RGB, interleaved.
 pub(super) fn write_display(
     path: &Path,
     (size, origin, full): ([usize; 2], [usize; 2], [usize; 2]),
-    displayed: Displayed,
+    look: &LookArgs,
+    rows: &dyn Fn(Range<usize>) -> Vec<f32>,
     metadata: Vec<(String, String)>,
 ) -> anyhow::Result<()> {
     let names = ["R", "G", "B"].map(str::to_owned).to_vec();
-    let part = Part::display(size[0], size[1], names, displayed.pixels).with_window(origin, full);
-    oiio::write_image(path, &[part.with_metadata(metadata).with_metadata(displayed.metadata)])?;
-    Ok(())
+    let part = Part::display(size[0], size[1], names, Vec::new()).with_window(origin, full).with_metadata(metadata);
+    let Some(grade) = look.grade() else {
+        // The look follows from all pixels, or takes long to be set up
+        let all: Vec<Vec<f32>> =
+            (0..size[1]).step_by(ROWS_AT_ONCE).map(|y| rows(y..size[1].min(y + ROWS_AT_ONCE))).collect();
+        let Displayed { pixels, metadata } = look.apply_to(all.concat())?;
+        let some =
+            |_: usize, rows: Range<usize>| Cow::Borrowed(&pixels[3 * size[0] * rows.start..3 * size[0] * rows.end]);
+        return Ok(oiio::write_rows(path, &[part.with_metadata(metadata)], &some)?);
+    };
+    let graded = |_: usize, of: Range<usize>| {
+        let mut pixels = rows(of);
+        grade.apply(&mut pixels);
+        Cow::Owned(pixels)
+    };
+    Ok(oiio::write_rows(path, &[part.with_metadata(grade.metadata())], &graded)?)
 }
 
 impl Made<'_> {
@@ -206,9 +257,7 @@ impl Made<'_> {
         if let Some(list) = self.asked {
             return list.to_vec();
         }
-        let ratio = self.job.sample_count_map.as_ref().map(|_| Aov::Ratio);
-        let records = self.rendering.cache.map(|_| Aov::Records);
-        Aov::ALL.into_iter().chain(ratio).chain(records).collect()
+        output::default_aovs(self.job.sample_count_map.is_some(), self.rendering.cache.is_some())
     }
 
     /// What the image depends on, and how it came about.
@@ -221,16 +270,10 @@ impl Made<'_> {
         if !self.plan.settings.is_empty() {
             add("lumiris:plan", self.plan.text()?);
         }
-        add("lumiris:complete", rendering.complete.to_string());
         if self.is_interrupted {
             add(INTERRUPTED_KEY, "true".to_owned());
         }
-        let done = || rendering.film.pixels.iter().map(|p| p.count);
-        add(
-            "lumiris:samples_done",
-            format!("{} to {} per pixel", done().min().unwrap_or(0), done().max().unwrap_or(0)),
-        );
-        add("lumiris:seconds", format!("{:.3}", rendering.elapsed.as_secs_f64()));
+        metadata.extend(output::progress_metadata(rendering));
         Ok(metadata)
     }
 }

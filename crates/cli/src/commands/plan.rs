@@ -48,7 +48,7 @@ fn table(auto: &AutoChoice) -> String {
         "efficiency",
         "±"
     );
-    for Trial { name, nanoseconds, variance, efficiency, error } in auto.trials.iter().flatten() {
+    for Trial { name, nanoseconds, variance, efficiency, error } in auto.trials.iter().flatten().chain(&auto.sharing) {
         let error = efficiency * error;
         text += &format!("{name:<52}{nanoseconds:>10.0}{variance:>12.4}{efficiency:>12.2}{error:>8.2}\n");
     }

@@ -3,6 +3,7 @@
 use super::UsageError;
 use super::args::RenderArgs;
 use super::denoise_args::Denoised;
+use super::memory;
 use super::part_args::is_part;
 use super::parts::{self, FilmFile};
 use super::pictures::{Made, Written, check_outputs, is_exr, write_pictures};
@@ -18,8 +19,9 @@ use lumiris::imaging::oidn::Denoiser;
 use lumiris::import::cache::FileCache;
 use lumiris::integrators::photon_map::MapStats;
 use lumiris::render::cryptomatte::cryptomattes;
+use lumiris::render::memory::{Wanted, predict};
 use lumiris::render::output::{self, Aov};
-use lumiris::render::{CacheReport, Continuation, Progress, RenderSettings, Rendering, go_on};
+use lumiris::render::{CacheReport, Continuation, Progress, RenderSettings, Rendering, TileShare, go_on};
 use lumiris::scene::RenderJob;
 use lumiris_formats::output::write_text;
 use serde_json::json;
@@ -102,7 +104,12 @@ pub(super) fn render_one(args: &RenderArgs, session: &Session) -> anyhow::Result
     let asked = check(args)?;
     let (mut job, setup, files) = load_job_of(&args.scene, &session.files, stored.as_ref())?;
     parts::check_settings(args, job.settings())?;
+    check_memory(args, &job, asked.as_deref())?;
     let asks_for_ratio = asked.as_ref().is_some_and(|list| list.contains(&Aov::Ratio));
+    if args.denoise.denoise && job.settings().integrator.path_reuse.is_none() {
+        // A denoiser takes noise that is correlated between pixels for detail
+        job.change(|s| s.integrator.path_reuse = Some(1));
+    }
     let plan = plan(&args.scene, &mut job, asks_for_ratio, args.quiet)?;
     let outputs = outputs(args, &job);
     if args.output.is_empty() {
@@ -111,13 +118,7 @@ pub(super) fn render_one(args: &RenderArgs, session: &Session) -> anyhow::Result
     check_denoise(args, &outputs)?;
 
     let bar = Bar::new(args.quiet);
-    let needs = |is_shown: fn(&Aov) -> bool| asked.as_ref().is_none_or(|list| list.iter().any(is_shown));
-    let mut settings = RenderSettings {
-        time_limit: args.time.map(Duration::from_secs_f64),
-        with_replicas: needs(|aov| *aov == Aov::Variance),
-        with_features: args.denoise.denoise || needs(|aov| aov.is_feature()),
-        ..render_settings(&args.scene, &job)
-    };
+    let mut settings = settings_of(args, &job, asked.as_deref());
     let mut film_file = FilmFile::new(args, (&job, &plan, &files), &mut settings, stored)?;
     let continuation = film_file.as_mut().map_or_else(Continuation::default, FilmFile::continuation);
     let rendering = render_shown((&job, &settings), session, (&name_of(args), &bar), continuation)?;
@@ -130,10 +131,32 @@ pub(super) fn render_one(args: &RenderArgs, session: &Session) -> anyhow::Result
     Ok(Rendered {
         stats,
         seconds: rendering.elapsed.as_secs_f64(),
-        noise: rendering.film.relative_noise(),
+        noise: rendering.film.summary().relative_noise,
         complete: rendering.complete,
         misplaced: written.misplaced,
     })
+}
+
+/// How to render for the AOVs that are asked for.
+fn settings_of(args: &RenderArgs, job: &RenderJob, asked: Option<&[Aov]>) -> RenderSettings {
+    let needs = |is_shown: fn(&Aov) -> bool| asked.is_none_or(|list| list.iter().any(is_shown));
+    RenderSettings {
+        time_limit: args.time.map(Duration::from_secs_f64),
+        with_replicas: needs(|aov| *aov == Aov::Variance),
+        with_features: args.denoise.denoise || needs(|aov| aov.is_feature()),
+        ..render_settings(&args.scene, job)
+    }
+}
+
+/// Refuses an image that takes more memory than there is.
+fn check_memory(args: &RenderArgs, job: &RenderJob, asked: Option<&[Aov]>) -> anyhow::Result<()> {
+    let mut render = settings_of(args, job, asked);
+    if let Some([i, n]) = args.parts.part.filter(|_| args.parts.is_by_tiles()) {
+        render.share = Some(TileShare { index: i - 1, count: n });
+    }
+    let cryptomattes = &args.exr.cryptomatte[..];
+    let wanted = Wanted { render: &render, cryptomattes, is_denoised: args.denoise.denoise };
+    memory::check(args.memory_limit, &predict(job, &wanted))
 }
 
 /// Writes the images and parts of a rendering.
@@ -269,8 +292,8 @@ fn stats(args: &RenderArgs, job: &RenderJob, rendering: &Rendering, setup: Setup
         "accel": <&str>::from(args.scene.accel),
         "threads": rendering.threads,
         "complete": rendering.complete,
-        "invalid_samples": rendering.film.pixels.iter().map(|p| p.invalid).sum::<u64>(),
-        "relative_noise": rendering.film.relative_noise(),
+        "invalid_samples": rendering.film.summary().invalid,
+        "relative_noise": rendering.film.summary().relative_noise,
         "seconds": {
             "load": setup.load, "build": setup.build, "render": seconds(rendering.elapsed),
         },
@@ -280,7 +303,7 @@ fn stats(args: &RenderArgs, job: &RenderJob, rendering: &Rendering, setup: Setup
             "ocv_solve": seconds(d.solve),
         },
         "counts": {
-            "replica_pixels": rendering.film.replicas.len(), "camera_rays": s.camera_rays, "bounce_rays": s.bounce_rays, "proposals": d.proposals,
+            "replica_pixels": rendering.film.replicas().len(), "camera_rays": s.camera_rays, "bounce_rays": s.bounce_rays, "proposals": d.proposals,
             "emitter_rays": d.emitter_rays, "shadow_segments": d.segments,
             "ocv_systems": d.systems, "ocv_ill_conditioned": d.ill_conditioned,
         },
@@ -291,7 +314,7 @@ fn stats(args: &RenderArgs, job: &RenderJob, rendering: &Rendering, setup: Setup
             "nanoseconds_per_proposal": seconds(d.t1) * 1e9 / (d.proposals.max(1) as f64),
         },
         "memory": {
-            "accel_bytes": accel.bytes, "accel_peak_bytes": accel.peak_bytes,
+            "film_bytes": rendering.film.bytes(), "accel_bytes": accel.bytes, "accel_peak_bytes": accel.peak_bytes,
         },
         "photon_maps": rendering.photons.map(|p| photon_stats(&p)),
         "irradiance_cache": rendering.cache.map(|c| cache_stats(&c)),
@@ -334,12 +357,12 @@ fn report(args: &RenderArgs, rendering: &Rendering, outputs: &[PathBuf]) {
     }
     let names: Vec<String> = outputs.iter().map(|p| p.display().to_string()).collect();
     let names = if names.is_empty() { "rendered".to_owned() } else { names.join(", ") };
-    let spp = rendering.film.pixels.iter().map(|p| p.count).filter(|n| *n > 0).min().unwrap_or(0);
+    let spp = rendering.film.summary().least_samples.unwrap_or(0);
     let partial = if rendering.complete { "" } else { " (stopped early)" };
     progress::say(&format!(
         "{names} after {:.1} s, {spp} samples per pixel{partial}, noise {:.2} %",
         rendering.elapsed.as_secs_f64(),
-        rendering.film.relative_noise() * 100.0
+        rendering.film.summary().relative_noise * 100.0
     ));
     if let Some(c) = &rendering.cache {
         progress::say(&format!(
@@ -361,7 +384,7 @@ fn report(args: &RenderArgs, rendering: &Rendering, outputs: &[PathBuf]) {
             if p.maps > 1 { format!(", {} maps", p.maps) } else { String::new() }
         ));
     }
-    let invalid: u64 = rendering.film.pixels.iter().map(|p| p.invalid).sum();
+    let invalid = rendering.film.summary().invalid;
     if invalid > 0 {
         progress::say(&format!("warning: {invalid} samples were not finite, or too bright, and were counted as black"));
     }

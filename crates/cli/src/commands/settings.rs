@@ -11,7 +11,7 @@ use lumiris::import::cache::FileCache;
 use lumiris::import::fingerprint::SceneFiles;
 use lumiris::import::{LoadOptions, Loaded, load_with};
 use lumiris::render::RenderSettings;
-use lumiris::render::allocation::allows_adaptive;
+use lumiris::render::allocation::complete_for_noise;
 use lumiris::render::plan::prepare;
 use lumiris::scene::RenderJob;
 use lumiris::settings::table::rows;
@@ -19,9 +19,6 @@ use lumiris::settings::{Proposals, SampleCounts, Settings, StageTimes};
 use std::fs::read_to_string;
 use std::path::Path;
 use std::time::Instant;
-
-/// Maximum number of samples per pixel with `--noise`, if none is given.
-const MAX_SPP_FOR_NOISE: u32 = 4096;
 
 /// Times before the first ray is traced (s).
 #[derive(Clone, Copy, Debug)]
@@ -60,17 +57,8 @@ pub(super) fn load_scene(args: &SceneArgs, files: &FileCache, stored: Option<&St
         apply_plan(path, &mut loaded.settings)?;
     }
     args.settings.apply(&mut loaded.settings);
-    let sampling = &mut loaded.settings.sampling;
-    if sampling.noise.is_some() {
-        if !args.settings.has("spp") {
-            sampling.spp = MAX_SPP_FOR_NOISE;
-        }
-        if !allows_adaptive(&loaded.settings) {
-            let needs =
-                "--noise needs the integrator direct or path, and an estimator that does not fit blocks of samples";
-            return Err(UsageError(needs.to_owned()).into());
-        }
-    }
+    let has_spp = args.settings.has("spp");
+    complete_for_noise(&mut loaded.settings, has_spp).map_err(|needs| UsageError(format!("--noise {needs}")))?;
     // More samples belong to what the first ones were prepared for
     if let Some(stored) = stored {
         loaded.settings.sampling.spp = stored.spp()?;
@@ -140,6 +128,7 @@ pub(super) fn plan(args: &SceneArgs, job: &mut RenderJob, ratio_map: bool, quiet
         let (min, max) = range.unwrap_or((&0, &0));
         progress::say(&format!("adaptive: {min} to {max} samples per pixel"));
     }
+    plan.warnings.iter().for_each(|warning| progress::say(&format!("warning: {warning}")));
     PlanFile::new(&args.scene, &plan)
 }
 

@@ -5,12 +5,12 @@
 //! significance, compressed by zlib, in base64. Maps that are expensive to compute (ꟻLIP, tvi) are embedded in the same
 //! form.
 
-use super::columns::shown_columns;
-use super::load::{ImageSet, Shown};
-use super::scores::{Compared, Scores, Settings};
 use base64::Engine;
 use base64::engine::general_purpose::STANDARD;
 use flate2::{Compression, write::ZlibEncoder};
+use lumiris::imaging::compare::columns::shown_columns;
+use lumiris::imaging::compare::load::{ImageSet, Shown};
+use lumiris::imaging::compare::scores::{Compared, Scores, Settings};
 use lumiris::imaging::heat::{BLUE_RED, HEAT, Stops};
 use lumiris::imaging::metrics::Pixel;
 use lumiris_formats::output::write_whole;
@@ -149,8 +149,8 @@ fn planes(values: &[f32]) -> Vec<u8> {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::compare::load::Region;
-    use crate::compare::scores::compare;
+    use lumiris::imaging::compare::load::Region;
+    use lumiris::imaging::compare::scores::compare;
 
     #[test]
     fn values_keep_sixteen_bits_and_their_kind() {

@@ -1,20 +1,12 @@
 //! The pixels of an image as they are by now.
 
 use lumiris::film::{Film, PixelBounds};
+use lumiris::imaging::{Layer, layers};
 use lumiris::render::Progress;
-use lumiris::render::output::{Aov, channels};
+use lumiris::render::output::{Aov, Layers, channels, live_aovs};
 use std::collections::BTreeMap;
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::sync::{Mutex, MutexGuard, PoisonError};
-
-/// Adjacent channels that are shown together.
-#[derive(Clone, Debug, PartialEq, Eq)]
-pub(crate) struct Layer {
-    /// What precedes the point in their names; `beauty` for the image.
-    pub name: String,
-    /// Their indices.
-    pub channels: std::ops::Range<usize>,
-}
 
 /// The pixels of a tile.
 #[derive(Clone, Debug)]
@@ -54,10 +46,9 @@ pub(crate) struct Canvas {
 
 impl Canvas {
     pub(super) fn new(name: &str, bounds: PixelBounds, has_features: bool) -> Self {
-        let features = [Aov::Albedo, Aov::Normal, Aov::Depth].into_iter().filter(|_| has_features);
-        let aovs: Vec<Aov> = features.chain([Aov::Samples]).collect();
-        let empty = Film::new([0, 0], PixelBounds { x0: 0, x1: 0, y0: 0, y1: 0 });
-        let channels = channels(&empty, &aovs, None).names;
+        let aovs = live_aovs(has_features);
+        let empty = Film::new([0, 0], PixelBounds { x0: 0, x1: 0, y0: 0, y1: 0 }, Vec::new(), Vec::new());
+        let channels = Layers::new(&empty, true, &aovs, None).names();
         let layers = layers(&channels);
         Canvas {
             name: name.to_owned(),
@@ -77,9 +68,12 @@ impl Canvas {
 
     /// Takes the film of a tile.
     pub(crate) fn set_tile(&self, film: &Film) {
-        let b = &film.bounds;
-        let place = [b.x0 - self.bounds.x0, b.y0 - self.bounds.y0, b.width(), b.height()];
         let data = channels(film, &self.aovs, None).data;
+        self.set(&film.bounds, data);
+    }
+
+    fn set(&self, b: &PixelBounds, data: Vec<f32>) {
+        let place = [b.x0 - self.bounds.x0, b.y0 - self.bounds.y0, b.width(), b.height()];
         let mut state = self.state();
         if state.tiles.get(&[place[0], place[1]]).is_some_and(|tile| tile.data == data) {
             return;
@@ -99,13 +93,15 @@ impl Canvas {
 
     /// Takes the whole film, which the end of a rendering may have corrected: no tile will change any more.
     pub(crate) fn finish(&self, film: &Film, tile_size: u32) {
-        for bounds in film.bounds.tiles(tile_size) {
-            let mut tile = Film::new(film.resolution, bounds);
-            for (y, row) in (bounds.y0..).zip(tile.pixels.chunks_exact_mut(bounds.width() as usize)) {
-                let start = film.index(bounds.x0, y);
-                row.copy_from_slice(&film.pixels[start..start + row.len()]);
+        let layers = Layers::new(film, true, &self.aovs, None);
+        let tiles = film.bounds.tiles(tile_size);
+        for tiles in tiles.chunk_by(|a, b| a.y0 == b.y0) {
+            let rows = layers.rows_in_parallel(tiles[0].y0..tiles[0].y1);
+            for tile in tiles {
+                let columns = [tile.x0, tile.x1].map(|x| (x - film.bounds.x0) as usize * self.channels.len());
+                let rows = rows.chunks(film.bounds.width() as usize * self.channels.len());
+                self.set(tile, rows.flat_map(|row| &row[columns[0]..columns[1]]).copied().collect());
             }
-            self.set_tile(&tile);
         }
         self.is_finished.store(true, Ordering::Release);
     }
@@ -121,24 +117,10 @@ impl Canvas {
     }
 }
 
-fn layers(channels: &[String]) -> Vec<Layer> {
-    let mut layers: Vec<Layer> = Vec::new();
-    for (index, channel) in channels.iter().enumerate() {
-        let name = match channel.as_str() {
-            "R" | "G" | "B" => "beauty",
-            other => other.split('.').next().unwrap_or(other),
-        };
-        match layers.last_mut() {
-            Some(layer) if layer.name == name => layer.channels.end = index + 1,
-            _ => layers.push(Layer { name: name.to_owned(), channels: index..index + 1 }),
-        }
-    }
-    layers
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;
+    use lumiris::film::accumulator::PixelAccumulator;
 
     #[test]
     fn only_what_changed_is_handed_out() {
@@ -149,25 +131,25 @@ mod tests {
         assert_eq!(Canvas::new("a", bounds, false).layers.len(), 2);
 
         let tiles = bounds.tiles(16);
-        let film = |tile: PixelBounds| Film::new([100, 100], tile);
+        // Numbers of samples of some pixels; 0 of all others
+        let film = |tile: PixelBounds, counts: &[(usize, u32)]| {
+            let mut pixels = vec![PixelAccumulator::default(); tile.area()];
+            counts.iter().for_each(|&(i, count)| pixels[i].radiance.count = count);
+            Film::of_pixels([100, 100], tile, &pixels)
+        };
         assert_eq!(canvas.changed_since(0).1.len(), 0);
-        tiles.iter().for_each(|&tile| canvas.set_tile(&film(tile)));
+        tiles.iter().for_each(|&tile| canvas.set_tile(&film(tile, &[])));
         let (state, changed) = canvas.changed_since(0);
         assert_eq!(changed.iter().map(|t| t.place).collect::<Vec<_>>(), [[0, 0, 16, 10], [16, 0, 4, 10]]);
         assert_eq!(changed[1].data.len(), 40 * canvas.channels.len());
         assert_eq!(canvas.changed_since(state).1.len(), 0);
-        let mut lit = film(tiles[1]);
-        lit.pixels[3].count = 5;
-        canvas.set_tile(&lit);
+        canvas.set_tile(&film(tiles[1], &[(3, 5)]));
         let places = |changed: Vec<Tile>| changed.iter().map(|t| t.place).collect::<Vec<_>>();
         assert_eq!(places(canvas.changed_since(state).1), [[16, 0, 4, 10]]);
 
         // The end changes the first tile only
         let (state, _) = canvas.changed_since(0);
-        let mut all = film(bounds);
-        all.pixels[0].count = 1;
-        all.pixels[19].count = 5;
-        canvas.finish(&all, 16);
+        canvas.finish(&film(bounds, &[(0, 1), (19, 5)]), 16);
         assert_eq!(places(canvas.changed_since(state).1), [[0, 0, 16, 10]]);
         assert!(canvas.is_finished());
     }

@@ -151,6 +151,30 @@ fn info_counts_what_the_scene_holds() {
 }
 
 #[test]
+fn an_image_that_does_not_fit_is_refused_before_rendering_with_its_bytes() {
+    let folder = tempfile::tempdir().unwrap();
+    let gallery = scene("demo/gallery.pbrt");
+    let large = ["render", &gallery, "--resolution", "65536x65536", "--memory-limit", "24GB", "-o", "a.exr"];
+    let limited = ["render", &gallery, "--resolution", "64x64", "--memory-limit", "10MB", "-o", "a.exr"];
+    let start = std::time::Instant::now();
+    for args in [&large[..], &limited[..]] {
+        let output = lumiris(args, folder.path());
+        assert!(!output.status.success());
+        let message = stderr(&output);
+        let number = message.split("bytes)").next().and_then(|text| text.rsplit('(').next()).unwrap_or_default();
+        let bytes: u64 = number.trim().parse().unwrap_or_else(|_| panic!("no bytes: {message}"));
+        // At least the radiance of every pixel
+        let (least, limit) = if args[3] == "64x64" { (100_000_000, "10.0 MiB") } else { (44 << 32, "24.0 GiB") };
+        assert!(bytes > least && message.contains(&format!("{limit} that --memory-limit allows")), "{message}");
+        assert!(!folder.path().join("a.exr").exists());
+    }
+    assert!(start.elapsed().as_secs() < 60, "nothing of that size is rendered or allocated");
+    let fits =
+        ["render", &gallery, "--resolution", "64x36", "--spp", "1", "--memory-limit", "4GB", "-q", "-o", "a.exr"];
+    assert!(lumiris(&fits, folder.path()).status.success());
+}
+
+#[test]
 fn an_unknown_parameter_is_an_error_with_its_place() {
     let folder = tempfile::tempdir().unwrap();
     std::fs::write(folder.path().join("bad.pbrt"), "WorldBegin\nShape \"sphere\" \"float radios\" [ 1 ]\n").unwrap();

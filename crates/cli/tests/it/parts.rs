@@ -64,6 +64,7 @@ pub(crate) fn assert_same(a: &str, b: &str, folder: &Path, what: &str) {
 /// Integrators and estimators, and whether the samples of a pixel can be divided.
 pub(crate) const METHODS: &[(&str, bool)] = &[
     ("--integrator path --estimator mis", true),
+    ("--integrator path --estimator mis --path-reuse 3", true),
     ("--integrator path --estimator mis --roulette efficiency", true),
     ("--integrator path --estimator mis --allocation adaptive --spp 12", true),
     ("--integrator direct --estimator mc --sampler independent", true),

@@ -257,7 +257,7 @@ impl Measured {
         let means = radiance(&rendering.film);
         self.segments += rendering.stats.direct.segments;
         self.proposals += rendering.stats.direct.proposals;
-        self.invalid += rendering.film.pixels.iter().map(|p| p.invalid).sum::<u64>();
+        self.invalid += rendering.film.summary().invalid;
         if self.first.is_empty() {
             self.first = means.iter().map(|p| p.map(|v| v as f32)).collect();
             self.sum = vec![[0.0; 3]; means.len()];
@@ -367,7 +367,7 @@ pub fn same_mean(all: &[Measured], method: usize) -> f64 {
 
 /// Mean radiance of every pixel.
 pub fn radiance(film: &Film) -> Vec<[f64; 3]> {
-    film.pixels.iter().map(|p| p.mean()).collect()
+    film.pixels().iter().map(|p| p.mean()).collect()
 }
 
 /// Renders `turns` turns of all methods, the first of each with seed `first_seed` and on.

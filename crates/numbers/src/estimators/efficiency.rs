@@ -116,9 +116,22 @@ mod tests {
     #[test]
     fn nearly_the_best_may_be_cheaper() {
         let choices: Vec<u32> = (1..=64).collect();
-        let [best, near] = [1.0, 0.95].map(|share| TRUTH.best([&choices, &choices], share).map(f64::from));
-        assert!(TRUTH.efficiency(near) >= 0.95 * TRUTH.efficiency(best));
-        assert!(TRUTH.cost(near) < 0.85 * TRUTH.cost(best), "{near:?} {best:?}");
+        let best = TRUTH.best([&choices, &choices], 1.0).map(f64::from);
+        let least = |share: f64| share * TRUTH.efficiency(best);
+        let mut before = best;
+        for share in [0.98, 0.9, 0.7] {
+            let near = TRUTH.best([&choices, &choices], share).map(f64::from);
+            assert!(TRUTH.efficiency(near) >= least(share), "{share}: {near:?}");
+            assert!(TRUTH.cost(near) <= TRUTH.cost(before), "{share}: {near:?} {before:?}");
+            for first in &choices {
+                for later in &choices {
+                    let n = [*first, *later].map(f64::from);
+                    assert!(TRUTH.efficiency(n) < least(share) || TRUTH.cost(n) >= TRUTH.cost(near), "{share}: {n:?}");
+                }
+            }
+            before = near;
+        }
+        assert!(TRUTH.cost(before) < 0.9 * TRUTH.cost(best), "{before:?} {best:?}");
     }
 
     #[test]

@@ -212,7 +212,7 @@ fn options_out_of_range_are_errors_that_say_what_is_expected() {
 fn a_setting_applies_to_some_images_and_not_to_all_unless_it_says_so() {
     for row in rows() {
         let always = matches!(row.applies, Applies::Always);
-        let of_paths = ["roulette", "later-samples"].contains(&row.flag);
+        let of_paths = ["roulette", "later-samples", "path-reuse"].contains(&row.flag);
         assert!(always || of_paths || !row.applies.to(&Settings::default()), "--{}", row.flag);
         where_it_applies(row);
     }

@@ -34,7 +34,8 @@ impl Classes {
     ) -> Result<Self, ReproduceError> {
         let method = Method::mis(8).stratified();
         let rendering = stage.render(&method, View::Unshadowed, 32, 0, observer)?;
-        let surface = |i: usize| rendering.film.pixels[i].hits > 0;
+        let pixels = rendering.film.pixels();
+        let surface = |i: usize| pixels[i].hits > 0;
         let unshadowed = radiance(&rendering.film);
         let visibility: Vec<f64> = (0..reference.len())
             .map(|i| if surface(i) { luminance(reference[i]) / luminance(unshadowed[i]) } else { f64::NAN })

@@ -1,8 +1,11 @@
 //! The available metrics.
 
+use strum::{EnumString, IntoStaticStr, VariantNames};
+
 /// A metric that can be asked for.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
-pub(crate) enum Metric {
+#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, EnumString, IntoStaticStr, VariantNames)]
+#[strum(serialize_all = "lowercase")]
+pub enum Metric {
     /// Mean squared error.
     Mse,
     /// Its root.
@@ -27,7 +30,7 @@ pub(crate) enum Metric {
 
 impl Metric {
     /// All, in the order of tables.
-    pub(crate) const ALL: [Metric; 10] = [
+    pub const ALL: [Metric; 10] = [
         Metric::Mse,
         Metric::Rmse,
         Metric::RelMse,

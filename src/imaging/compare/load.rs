@@ -5,14 +5,14 @@
 //! be compared with a whole reference.
 
 use super::layers::{choose, remark};
-use lumiris::imaging::metrics::Pixel;
-use lumiris::imaging::metrics::flip::MAX_PIXELS;
-use lumiris::imaging::oiio::{ReadImage, ReadLimits, Window, read_headers, read_part};
+use crate::imaging::metrics::Pixel;
+use crate::imaging::metrics::flip::MAX_PIXELS;
+use crate::imaging::oiio::{ReadImage, ReadLimits, Window, read_headers, read_part};
 use std::path::{Path, PathBuf};
 
 /// A rectangle of pixels of the display window.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub(crate) struct Region {
+pub struct Region {
     /// First column.
     pub x: usize,
     /// First row from the top.
@@ -36,14 +36,14 @@ impl Region {
     }
 
     /// Columns and rows.
-    pub(crate) fn size(&self) -> [usize; 2] {
+    pub fn size(&self) -> [usize; 2] {
         [self.width, self.height]
     }
 }
 
 /// An image cut to the region that is compared.
 #[derive(Clone, Debug)]
-pub(crate) struct Shown {
+pub struct Shown {
     /// The file.
     pub path: PathBuf,
     /// The file's name, or the path where two files have one name.
@@ -62,7 +62,7 @@ pub(crate) struct Shown {
 
 /// Images of one size; the last one is the reference.
 #[derive(Clone, Debug)]
-pub(crate) struct ImageSet {
+pub struct ImageSet {
     /// Images in the order of the command line.
     pub images: Vec<Shown>,
     /// What they are compared with.
@@ -76,10 +76,11 @@ pub(crate) struct ImageSet {
 /// Everything that keeps the images from being compared, a line each.
 #[derive(Debug, thiserror::Error)]
 #[error("{}", .0.join("\n"))]
-pub(crate) struct LoadError(pub Vec<String>);
+pub struct LoadError(pub Vec<String>);
 
 /// An image as read.
-struct Raw {
+#[derive(Clone, Debug)]
+pub struct Raw {
     shown: Shown,
     region: Region,
     display: [usize; 2],
@@ -87,7 +88,7 @@ struct Raw {
 
 /// Reads images and their reference; all that is wrong is said at once. `layer` names the channels to read instead of
 /// the image itself.
-pub(crate) fn load(images: &[PathBuf], reference: &Path, layer: Option<&str>) -> Result<ImageSet, LoadError> {
+pub fn load(images: &[PathBuf], reference: &Path, layer: Option<&str>) -> Result<ImageSet, LoadError> {
     let all = images.iter().map(PathBuf::as_path).chain([reference]);
     let (mut raws, mut errors) = (Vec::new(), Vec::new());
     for path in all {
@@ -98,23 +99,31 @@ pub(crate) fn load(images: &[PathBuf], reference: &Path, layer: Option<&str>) ->
         }
     }
     let Some(truth) = raws.pop().filter(|_| errors.is_empty()) else { return Err(LoadError(errors)) };
-    errors.extend(raws.iter().filter(|r| r.display != truth.display).map(|r| {
-        let of = |raw: &Raw| format!("{} is {}×{}", raw.shown.path.display(), raw.display[0], raw.display[1]);
-        format!("{} and the reference {}: only images of one size can be compared", of(r), of(&truth))
-    }));
-    let region = raws.iter().fold(truth.region, |region, r| region.intersection(r.region));
-    if errors.is_empty() && region.width * region.height == 0 {
-        errors.push("there is no pixel that all images have: their data windows do not overlap".to_owned());
+    ImageSet::new(raws, truth)
+}
+
+impl ImageSet {
+    /// The region that all images have. All that is wrong is said at once.
+    pub fn new(raws: Vec<Raw>, truth: Raw) -> Result<ImageSet, LoadError> {
+        let mut errors = Vec::new();
+        errors.extend(raws.iter().filter(|r| r.display != truth.display).map(|r| {
+            let of = |raw: &Raw| format!("{} is {}×{}", raw.shown.path.display(), raw.display[0], raw.display[1]);
+            format!("{} and the reference {}: only images of one size can be compared", of(r), of(&truth))
+        }));
+        let region = raws.iter().fold(truth.region, |region, r| region.intersection(r.region));
+        if errors.is_empty() && region.width * region.height == 0 {
+            errors.push("there is no pixel that all images have: their data windows do not overlap".to_owned());
+        }
+        if !errors.is_empty() {
+            return Err(LoadError(errors));
+        }
+        let display = truth.display;
+        let cut = |raw: Raw| raw.cut(region);
+        let mut images: Vec<Shown> = raws.into_iter().map(cut).collect();
+        let mut reference = truth.cut(region);
+        name(images.iter_mut().chain([&mut reference]).collect());
+        Ok(ImageSet { images, reference, region, display })
     }
-    if !errors.is_empty() {
-        return Err(LoadError(errors));
-    }
-    let display = truth.display;
-    let cut = |raw: Raw| raw.cut(region);
-    let mut images: Vec<Shown> = raws.into_iter().map(cut).collect();
-    let mut reference = truth.cut(region);
-    name(images.iter_mut().chain([&mut reference]).collect());
-    Ok(ImageSet { images, reference, region, display })
 }
 
 /// Names images by their files, or by their paths where two have one name.
@@ -127,7 +136,8 @@ fn name(mut all: Vec<&mut Shown>) {
     }
 }
 
-fn read(path: &Path, layer: Option<&str>) -> Result<Raw, String> {
+/// Reads the colours of a file, or the layer named.
+pub fn read(path: &Path, layer: Option<&str>) -> Result<Raw, String> {
     let headers = read_headers(path).map_err(|e| e.to_string())?;
     let chosen = choose(&headers, layer).map_err(|reason| format!("{}: {reason}", path.display()))?;
     let read = read_part(path, chosen.part, &ReadLimits::default()).map_err(|e| e.to_string())?;
@@ -201,6 +211,27 @@ impl Shown {
 }
 
 impl Raw {
+    /// An image in memory, of which `window` is the place in a larger one. `variance` is that of the means of pixels.
+    pub fn of_pixels(
+        name: &str,
+        window: &Window,
+        width: usize,
+        pixels: Vec<Pixel>,
+        variance: Option<Vec<Pixel>>,
+    ) -> Raw {
+        let (region, display) = visible(window, [width, pixels.len() / width.max(1)]);
+        let shown = Shown {
+            path: PathBuf::from(name),
+            name: name.to_owned(),
+            layer: String::new(),
+            remarks: Vec::new(),
+            pixels,
+            variance,
+            is_half: false,
+        };
+        Raw { shown, region, display }
+    }
+
     fn cut(self, region: Region) -> Shown {
         self.shown.cut(self.region, region)
     }
@@ -209,7 +240,7 @@ impl Raw {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use lumiris::imaging::oiio::{Part, write_image};
+    use crate::imaging::oiio::{Part, write_image};
 
     fn names(names: &[&str]) -> Vec<String> {
         names.iter().map(|&n| n.to_owned()).collect()

@@ -2,7 +2,7 @@
 
 use super::metric::Metric;
 use super::scores::Scores;
-use lumiris::imaging::heat::significant;
+use crate::imaging::heat::significant;
 use std::collections::BTreeSet;
 use strum::IntoStaticStr;
 
@@ -21,7 +21,7 @@ pub enum Better {
 
 /// A number that each image has.
 #[derive(Clone, Copy, Debug)]
-pub(crate) struct Column {
+pub struct Column {
     /// Name on the command line and in JSON.
     pub key: &'static str,
     /// Heading.
@@ -61,7 +61,7 @@ fn decibels(v: f64) -> String {
 }
 
 /// All columns, in the order of tables.
-pub(crate) const COLUMNS: [Column; 17] = [
+pub const COLUMNS: [Column; 17] = [
     Column { key: "mse", title: "MSE", help: "mean squared error", value: |s| Some(s.differences.mse), ..PLAIN },
     Column {
         key: "rmse",
@@ -204,7 +204,7 @@ pub(crate) const COLUMNS: [Column; 17] = [
 ];
 
 /// The columns of a table of `scores`: the selected metrics that some image has, and counts that are not 0.
-pub(crate) fn shown_columns(metrics: &BTreeSet<Metric>, scores: &[&Scores]) -> Vec<&'static Column> {
+pub fn shown_columns(metrics: &BTreeSet<Metric>, scores: &[&Scores]) -> Vec<&'static Column> {
     let is_shown = |c: &&Column| match c.metric {
         Some(metric) => metrics.contains(&metric) && scores.iter().any(|s| (c.value)(s).is_some()),
         None => scores.iter().any(|s| (c.value)(s).is_some_and(|v| v != 0.0)),
@@ -213,7 +213,7 @@ pub(crate) fn shown_columns(metrics: &BTreeSet<Metric>, scores: &[&Scores]) -> V
 }
 
 /// The column called `key`.
-pub(crate) fn column(key: &str) -> Option<&'static Column> {
+pub fn column(key: &str) -> Option<&'static Column> {
     COLUMNS.iter().find(|c| c.key.eq_ignore_ascii_case(key))
 }
 

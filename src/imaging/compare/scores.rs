@@ -2,10 +2,10 @@
 
 use super::load::{ImageSet, Region, Shown};
 use super::metric::Metric;
-use lumiris::imaging::metrics::difference::DEFAULT_EPSILON;
-use lumiris::imaging::metrics::perceptual::perceptual_error_at;
-use lumiris::imaging::metrics::significance::{F32_ROUNDING, HALF_ROUNDING};
-use lumiris::imaging::metrics::{
+use crate::imaging::metrics::difference::DEFAULT_EPSILON;
+use crate::imaging::metrics::perceptual::perceptual_error_at;
+use crate::imaging::metrics::significance::{F32_ROUNDING, HALF_ROUNDING};
+use crate::imaging::metrics::{
     Bias, DEFAULT_PIXELS_PER_DEGREE, Differences, Pixel, Significance, bias, differences, hdr_flip, ldr_flip,
     mean_of_map, perceptual_map, significance, z_map,
 };
@@ -14,7 +14,7 @@ use strum::IntoStaticStr;
 
 /// What is computed, and how.
 #[derive(Clone, Debug, PartialEq)]
-pub(crate) struct Settings {
+pub struct Settings {
     /// Metrics to compute.
     pub metrics: BTreeSet<Metric>,
     /// Exposure (stops) of the display that LDR-ꟻLIP looks at.
@@ -44,7 +44,7 @@ impl Default for Settings {
 
 /// The metrics of an image. `None`: not selected, or not possible.
 #[derive(Clone, Debug, PartialEq)]
-pub(crate) struct Scores {
+pub struct Scores {
     /// Squared differences and counts.
     pub differences: Differences,
     /// PSNR (dB).
@@ -65,7 +65,7 @@ pub(crate) struct Scores {
 
 /// Values per pixel; NaN where a pixel takes no part.
 #[derive(Clone, Debug, Default, PartialEq)]
-pub(crate) struct Maps {
+pub struct Maps {
     /// LDR-ꟻLIP.
     pub flip: Option<Vec<f32>>,
     /// HDR-ꟻLIP.
@@ -78,7 +78,7 @@ pub(crate) struct Maps {
 
 /// What came out for an image.
 #[derive(Clone, Debug, PartialEq)]
-pub(crate) struct Compared {
+pub struct Compared {
     /// Numbers.
     pub scores: Scores,
     /// Maps of what was computed per pixel.
@@ -102,7 +102,7 @@ pub enum Noise {
 }
 
 /// Compares each image with the reference.
-pub(crate) fn compare(set: &ImageSet, settings: &Settings) -> Vec<Compared> {
+pub fn compare(set: &ImageSet, settings: &Settings) -> Vec<Compared> {
     set.images.iter().map(|image| compare_one(image, &set.reference, set.region, settings)).collect()
 }
 

@@ -4,11 +4,11 @@
 //! `Combined.R` or `ViewLayer.Combined.R` (Cycles), parts of one file that all have `R G B` (then the name of the part
 //! counts). A **layer** is a set of red, green and blue under one name.
 
-use lumiris::imaging::file::PartHeader;
+use crate::imaging::file::PartHeader;
 
 /// Channels that make a colour.
 #[derive(Clone, Debug, PartialEq, Eq)]
-pub(crate) struct Layer {
+pub struct Layer {
     /// Part of the file, from 0.
     pub part: usize,
     /// What stands before the channels' last dot, or the name of the part; empty for plain `R G B`.
@@ -34,7 +34,7 @@ impl Layer {
     }
 
     /// The name as in messages.
-    pub(crate) fn title(&self) -> &str {
+    pub fn title(&self) -> &str {
         if self.name.is_empty() { "R G B" } else { &self.name }
     }
 
@@ -61,7 +61,7 @@ fn component(name: &str) -> Option<usize> {
 }
 
 /// All colour layers of a file, in its order.
-pub(crate) fn color_layers(parts: &[PartHeader]) -> Vec<Layer> {
+pub fn color_layers(parts: &[PartHeader]) -> Vec<Layer> {
     let mut layers = Vec::new();
     for (part, header) in parts.iter().enumerate() {
         let mut names: Vec<&str> = Vec::new();
@@ -88,7 +88,7 @@ pub(crate) fn color_layers(parts: &[PartHeader]) -> Vec<Layer> {
 }
 
 /// The layer that is the image, or the one called `wanted` (a single channel as well). `Err` says what there is.
-pub(crate) fn choose(parts: &[PartHeader], wanted: Option<&str>) -> Result<Layer, String> {
+pub fn choose(parts: &[PartHeader], wanted: Option<&str>) -> Result<Layer, String> {
     let layers = color_layers(parts);
     let channels =
         || parts.iter().enumerate().flat_map(|(p, h)| h.channels.iter().enumerate().map(move |(c, n)| (p, c, n)));
@@ -112,7 +112,7 @@ pub(crate) fn choose(parts: &[PartHeader], wanted: Option<&str>) -> Result<Layer
 }
 
 /// What a person should know of the choice; `None` if there was none to make.
-pub(crate) fn remark(parts: &[PartHeader], chosen: &Layer) -> Option<String> {
+pub fn remark(parts: &[PartHeader], chosen: &Layer) -> Option<String> {
     let layers = color_layers(parts);
     let others: Vec<&str> = layers.iter().filter(|l| *l != chosen).map(Layer::title).collect();
     let plain = chosen.name.is_empty() && !layers.iter().any(|l| l != chosen && l.name.is_empty());

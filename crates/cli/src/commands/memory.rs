@@ -1,0 +1,140 @@
+//! Memory: what an image will take, and what there is.
+
+use anyhow::bail;
+use lumiris::render::memory::Prediction;
+use lumiris::settings::Value;
+use lumiris::settings::value::Kind;
+use std::fs;
+use std::path::{Path, PathBuf};
+
+/// What `--memory-limit` says.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub(super) enum MemoryLimit {
+    /// The process may take so many bytes.
+    Bytes(u64),
+    /// No limit.
+    Off,
+}
+
+/// Understands sizes as settings do, and `off`.
+pub(super) fn parse_limit(text: &str) -> Result<MemoryLimit, String> {
+    if text == "off" {
+        return Ok(MemoryLimit::Off);
+    }
+    match Kind::Bytes.parse(text) {
+        Ok(Value::Integer(bytes)) => Ok(MemoryLimit::Bytes(bytes)),
+        Ok(_) => Err("expected a number of bytes".to_owned()),
+        Err(expected) => Err(format!("{expected}, or off")),
+    }
+}
+
+/// Bytes as text.
+pub(super) fn size(bytes: u64) -> String {
+    let (unit, shift) = if bytes < 1 << 30 { ("MiB", 20) } else { ("GiB", 30) };
+    format!("{:.1} {unit}", bytes as f64 / f64::from(1 << shift))
+}
+
+/// Refuses an image that does not fit.
+pub(super) fn check(limit: Option<MemoryLimit>, prediction: &Prediction) -> anyhow::Result<()> {
+    let taken = taken();
+    let (limit, origin) = match limit {
+        Some(MemoryLimit::Off) => return Ok(()),
+        Some(MemoryLimit::Bytes(bytes)) => (bytes, "--memory-limit allows".to_owned()),
+        None => match available() {
+            Some((bytes, origin)) => (taken + bytes, format!("there is ({origin})")),
+            None => return Ok(()),
+        },
+    };
+    let needed = taken + prediction.bytes();
+    if needed > limit {
+        bail!(
+            "the image would need about {} ({needed} bytes): {} for the scene, {} for the film, {} for the rest. That is \
+             more than the {} that {origin}. --crop, --aov none and a lower --resolution need less, `--part-by tiles` \
+             divides it; `--memory-limit SIZE|off` sets another limit",
+            size(needed),
+            size(taken),
+            size(prediction.film),
+            size(prediction.output + prediction.fixed),
+            size(limit)
+        );
+    }
+    Ok(())
+}
+
+/// Bytes that this process takes; 0 where that is not known.
+pub(super) fn taken() -> u64 {
+    fs::read_to_string("/proc/self/status").ok().and_then(|text| kibibytes(&text, "VmRSS:")).unwrap_or(0)
+}
+
+/// Bytes that can be had, and who says so: what the machine has, or what a control group leaves.
+fn available() -> Option<(u64, String)> {
+    let text = fs::read_to_string("/proc/meminfo").ok()?;
+    let machine = (kibibytes(&text, "MemAvailable:")?, "MemAvailable of /proc/meminfo".to_owned());
+    let groups = group_folders().into_iter().filter_map(|folder| {
+        let left = left_in(&folder)?;
+        Some((left, format!("the control group {}", folder.display())))
+    });
+    groups.chain([machine]).min_by_key(|(bytes, _)| *bytes)
+}
+
+/// The value of a line such as `MemAvailable:  123 kB`.
+fn kibibytes(text: &str, name: &str) -> Option<u64> {
+    let line = text.lines().find_map(|line| line.strip_prefix(name))?;
+    Some(line.split_whitespace().next()?.parse::<u64>().ok()? * 1024)
+}
+
+/// The folders of this process's control group (version 2) and of those that hold it.
+fn group_folders() -> Vec<PathBuf> {
+    let Ok(text) = fs::read_to_string("/proc/self/cgroup") else { return Vec::new() };
+    let Some(group) = text.lines().find_map(|line| line.strip_prefix("0::/")) else { return Vec::new() };
+    let root = Path::new("/sys/fs/cgroup");
+    let own = root.join(group);
+    own.ancestors().take_while(|folder| folder.starts_with(root)).map(Path::to_path_buf).collect()
+}
+
+/// Bytes that a control group leaves, without files that are in memory as long as there is room.
+fn left_in(folder: &Path) -> Option<u64> {
+    let number = |name: &str| fs::read_to_string(folder.join(name)).ok()?.trim().parse::<u64>().ok();
+    let (max, current) = (number("memory.max")?, number("memory.current")?);
+    let stat = fs::read_to_string(folder.join("memory.stat")).unwrap_or_default();
+    let files = stat.lines().find_map(|line| line.strip_prefix("inactive_file ")?.trim().parse().ok()).unwrap_or(0);
+    Some(max.saturating_sub(current.saturating_sub(files)))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn sizes_have_units() {
+        assert_eq!(parse_limit("24GB"), Ok(MemoryLimit::Bytes(24 << 30)));
+        assert_eq!(parse_limit("1.5 MiB"), Ok(MemoryLimit::Bytes(3 << 19)));
+        assert_eq!(parse_limit("off"), Ok(MemoryLimit::Off));
+        for text in ["GB", "-1GB", "x MB", "1GBs", ""] {
+            assert!(parse_limit(text).is_err(), "{text}");
+        }
+        assert_eq!([size(3 << 19), size(47 << 29)], ["1.5 MiB", "23.5 GiB"]);
+    }
+
+    #[test]
+    fn what_does_not_fit_is_refused_with_its_bytes() {
+        let prediction = Prediction { film: 1 << 40, output: 5, fixed: 7 };
+        let error = check(Some(MemoryLimit::Bytes(1 << 40)), &prediction).unwrap_err().to_string();
+        assert!(error.contains("1024.0 GiB for the film") && error.contains("--memory-limit allows"), "{error}");
+        assert!(check(Some(MemoryLimit::Off), &prediction).is_ok());
+        let tiny = Prediction { film: 1, output: 1, fixed: 1 };
+        assert!(check(Some(MemoryLimit::Bytes(1 << 40)), &tiny).is_ok());
+    }
+
+    #[test]
+    fn a_control_group_leaves_what_is_neither_taken_nor_inactive() {
+        let folder = tempfile::tempdir().unwrap();
+        let write = |name: &str, text: &str| fs::write(folder.path().join(name), text).unwrap();
+        write("memory.current", "700\n");
+        write("memory.max", "max\n");
+        assert_eq!(left_in(folder.path()), None);
+        write("memory.max", "1000\n");
+        write("memory.stat", "anon 5\ninactive_file 100\n");
+        assert_eq!(left_in(folder.path()), Some(400));
+    }
+}

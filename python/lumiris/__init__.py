@@ -1,0 +1,33 @@
+"""Lumiris, an offline CPU renderer, as a Python module.
+
+>>> import lumiris
+>>> image = lumiris.render("scene.pbrt", spp=64, estimator="mis")
+>>> image["beauty"].shape
+(400, 600, 3)
+
+`render` gives layers of arrays, `read` and `write` are for EXR and other files, `compare` has the metrics of
+`lumiris compare`, and `lumiris.estimators` the estimators themselves. `settings` lists what can be set.
+"""
+
+from ._compare import Comparison, compare
+from ._image import Layers, read, write
+from ._lumiris import Progress, SceneError, __version__
+from ._render import Rendering, SceneWarning, Setting, render, settings
+from . import estimators
+
+__all__ = [
+    "Comparison",
+    "Layers",
+    "Progress",
+    "Rendering",
+    "SceneError",
+    "SceneWarning",
+    "Setting",
+    "__version__",
+    "compare",
+    "estimators",
+    "read",
+    "render",
+    "settings",
+    "write",
+]

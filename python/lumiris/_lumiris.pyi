@@ -1,0 +1,86 @@
+"""The native part of `lumiris`."""
+
+from typing import Callable, Dict, List, Optional, Sequence, Tuple, TypedDict, Union
+
+import numpy as np
+from numpy.typing import NDArray
+
+Array = NDArray[np.float32]
+Place = Tuple[Sequence[int], Sequence[int]]
+Pixels = Tuple[Array, Optional[Array], Optional[Place]]
+Samples = Tuple[Array, Array]
+Layer = Tuple[str, List[str], Array]
+
+__version__: str
+
+class SceneError(Exception):
+    """A scene that cannot be loaded; its text has all errors and warnings with their places in the source."""
+
+    #: The first error.
+    message: str
+    #: The file that it is in, or the scene.
+    file: str
+    #: Where it is, counted from 1; None if it belongs to no place.
+    line: Optional[int]
+    column: Optional[int]
+
+class Progress:
+    """The progress of a rendering."""
+
+    @property
+    def fraction(self) -> float:
+        """Share of the camera samples that are done, 0 to 1."""
+    @property
+    def passes(self) -> int:
+        """Passes over the whole image that are done."""
+    @property
+    def is_pass(self) -> bool:
+        """True after a pass over the whole image: the rendering waits."""
+    @property
+    def samples_done(self) -> int:
+        """Camera samples done, as if every pixel had the same number."""
+    @property
+    def samples_total(self) -> int:
+        """Camera samples requested."""
+    @property
+    def rays(self) -> int:
+        """Rays of all kinds traced so far."""
+    @property
+    def elapsed(self) -> float:
+        """Time since the first sample (s)."""
+    @property
+    def noise(self) -> Optional[float]:
+        """Mean relative standard error of the pixels, as last determined; None before."""
+    def image(self) -> Array:
+        """The image as it is by now."""
+    def layers(self) -> Dict[str, Array]:
+        """The image, features of the first surfaces, and numbers of samples, as they are by now."""
+
+class SettingRow(TypedDict):
+    group: str
+    help: str
+    default: str
+    values: str
+    names: List[str]
+    numbers: Optional[str]
+    has_bare: bool
+    key: str
+    aliases: List[str]
+
+def settings() -> Dict[str, SettingRow]: ...
+def read(path: str, part: int) -> Tuple[List[Layer], Dict[str, str], Place]: ...
+def write(
+    path: str, layers: List[Tuple[List[str], Array]], metadata: List[Tuple[str, str]], place: Optional[Place]
+) -> None: ...
+def render(
+    options: Dict[str, object], callback: Optional[Callable[[Progress], object]]
+) -> Tuple[List[Layer], List[Tuple[str, str]], Place, List[Tuple[str, str]], bool, float, List[str]]: ...
+def compare(
+    image: Union[str, Pixels], reference: Union[str, Pixels], options: Dict[str, object]
+) -> Tuple[List[Tuple[str, Optional[float]]], List[Tuple[str, Array]], str]: ...
+def mis(heuristic: str, a: Samples, b: Samples, is_factor: bool) -> Array: ...
+def ris_draws(strata: str, weights: Array, u: Array, u_ends: Array) -> Tuple[NDArray[np.uint32], Array]: ...
+def ocv(
+    form: str, samples: Samples, integrals: Array, others: Optional[Samples]
+) -> Tuple[Array, Array, int]: ...
+def optimal_mis(samples: Samples, integrals: Array) -> Tuple[Array, int]: ...

@@ -1,0 +1,211 @@
+"""Rendering."""
+
+from __future__ import annotations
+
+import difflib
+import json
+import numbers
+import os
+import warnings
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Callable, Dict, List, Mapping, Optional, Sequence, Tuple, Union
+
+from . import _lumiris
+from ._image import Layers, Path
+
+if TYPE_CHECKING:
+    from typing_extensions import Unpack
+
+    from ._settings import Settings
+
+#: Name of a scene that is given as text.
+_TEXT = "<scene>"
+
+
+class SceneWarning(UserWarning):
+    """The scene is used, but not as its author may expect."""
+
+
+@dataclass(frozen=True)
+class Setting:
+    """A setting of an image: a keyword of `render`, and an option of the command line with `-` in place of `_`."""
+
+    #: The heading that it stands under.
+    group: str
+    #: What it does.
+    help: str
+    #: The default in words.
+    default: str
+    #: The values that it can have, in words.
+    values: str
+    #: The names among these values.
+    names: Tuple[str, ...]
+    #: The name in metadata and plans.
+    key: str
+    #: Keywords that it had before, which are still accepted.
+    aliases: Tuple[str, ...]
+
+
+def settings() -> Dict[str, Setting]:
+    """All settings by their keywords."""
+    return {
+        name: Setting(
+            group=row["group"],
+            help=row["help"],
+            default=row["default"],
+            values=row["values"],
+            names=tuple(row["names"]),
+            key=row["key"],
+            aliases=tuple(row["aliases"]),
+        )
+        for name, row in _lumiris.settings().items()
+    }
+
+
+class Rendering(Layers):
+    """A rendered image: its layers, and how it came about."""
+
+    #: What was chosen by measurements, by names in metadata: with this as `plan`, the image is the same to the bit.
+    plan: Dict[str, str]
+    #: True if every pixel has all its samples.
+    complete: bool
+    #: Wall-clock time of the rendering, without that of loading (s).
+    seconds: float
+
+
+def _text(name: str, value: object) -> str:
+    """A value as on the command line."""
+    if isinstance(value, bool):
+        return "True" if value else "off"
+    if isinstance(value, str):
+        return value
+    if isinstance(value, numbers.Real):
+        return str(value)
+    if isinstance(value, (tuple, list)) and all(isinstance(v, numbers.Real) for v in value):
+        return ",".join(map(str, value))
+    raise TypeError(f"{name}: expected text, a number or a pair of numbers, but found {type(value).__name__}")
+
+
+def _texts(given: Mapping[str, object]) -> List[Tuple[str, str]]:
+    known = _lumiris.settings()
+    names = set(known).union(*(row["aliases"] for row in known.values()))
+    for name in given:
+        if name not in names:
+            near = difflib.get_close_matches(name, names, n=1)
+            hint = f": did you mean {near[0]!r}?" if near else ""
+            raise TypeError(f"render() has no keyword {name!r}{hint}")
+    return [(name, _text(name, value)) for name, value in given.items() if value is not None]
+
+
+def _plan(plan: Union[None, Path, Mapping[str, str]]) -> List[Tuple[str, str]]:
+    if plan is None:
+        return []
+    if isinstance(plan, Mapping):
+        return list(plan.items())
+    with open(plan, encoding="utf-8") as file:
+        try:
+            stored = json.load(file)["settings"]
+            return [(str(key), str(value)) for key, value in stored.items()]
+        except (AttributeError, KeyError, TypeError, json.JSONDecodeError) as error:
+            raise ValueError(f"{os.fspath(plan)} is no plan") from error
+
+
+def _source(scene: Path, folder: Optional[Path]) -> Union[str, Tuple[str, str, str]]:
+    is_text = isinstance(scene, str) and (folder is not None or "\n" in scene or '"' in scene)
+    if not is_text:
+        if folder is not None:
+            raise TypeError("folder: only for scenes that are given as text")
+        return os.fspath(scene)
+    return os.fspath(scene), _TEXT, os.fspath(folder or "")
+
+
+def render(
+    scene: Path,
+    *,
+    folder: Optional[Path] = None,
+    callback: Optional[Callable[[_lumiris.Progress], object]] = None,
+    interval: float = 0.1,
+    plan: Union[None, Path, Mapping[str, str]] = None,
+    resolution: Optional[Tuple[int, int]] = None,
+    crop: Optional[Tuple[float, float, float, float]] = None,
+    box_filter: bool = False,
+    accel: str = "embree",
+    packet_width: Optional[int] = None,
+    threads: Optional[int] = None,
+    tile_size: int = 16,
+    time: Optional[float] = None,
+    aov: Optional[Sequence[str]] = None,
+    **settings: Unpack[Settings],
+) -> Rendering:
+    """Renders a scene; the same bits as `lumiris render` with the same options.
+
+    The arrays of the result own the memory that the renderer has filled: nothing is copied.
+
+    Parameters
+    ----------
+    scene
+        A file (.pbrt, .pbrt.gz), or the text of one: a str is text if it has a line break or a quotation mark, or if
+        `folder` is given.
+    folder
+        Where files are sought that the text names; the working folder by default.
+    callback
+        Called with a `Progress` after every pass over the whole image, while the rendering waits (`is_pass`), and every
+        `interval` seconds (about) in between, while it goes on. `progress.image()` and `progress.layers()` are what there
+        is by now. Returning False ends the rendering: the result is the picture so far. An exception ends it, too, and is
+        raised. It is called in the thread that calls `render`.
+    interval
+        Time between two calls within a pass (s).
+    plan
+        Choices that an earlier rendering made by measurements (`Rendering.plan`), or a file of `lumiris plan`. Settings
+        override them.
+    resolution, crop, box_filter, accel, packet_width, threads, tile_size, time
+        As on the command line: columns and rows; x0, x1, y0, y1 in fractions of the image; a pixel filter of one pixel;
+        `embree` or `bvh`; rays per packet; threads; edge of a tile; seconds after which to stop.
+    aov
+        Layers beside the image: `variance`, `samples`, `albedo`, `normal`, `depth`, `material`, `object`, `ratio`, `records`.
+        None asks for all that there are; an empty list saves the time for them.
+    settings
+        The settings of the image, with the names of the command line and `_` for `-`; see `lumiris.settings()`. Values are
+        text as on the command line, numbers, or pairs of numbers; None leaves a setting to the scene. True is what an
+        option without a value is, False is `off`.
+
+    Raises
+    ------
+    SceneError
+        The scene cannot be loaded; it tells file, line and column, and its text has all errors.
+    TypeError, ValueError
+        An unknown keyword, or a value that is not allowed.
+    KeyboardInterrupt
+        Ctrl-C: the rendering ends with the tiles under way.
+
+    Warnings of the scene are given as `SceneWarning`. Other Python threads run meanwhile.
+    """
+    options: Dict[str, object] = {
+        "source": _source(scene, folder),
+        "resolution": resolution,
+        "crop": crop,
+        "box_filter": box_filter,
+        "accel": accel,
+        "packet_width": packet_width,
+        "threads": threads,
+        "tile_size": tile_size,
+        "time": time,
+        "aov": None if aov is None else list(aov),
+        "interval": interval,
+        "settings": _texts(settings),
+        "plan": _plan(plan),
+    }
+    layers, metadata, (origin, full), chosen, complete, seconds, remarks = _lumiris.render(options, callback)
+    for remark in remarks:
+        warnings.warn(remark.strip(), SceneWarning, stacklevel=2)
+    rendering = Rendering(
+        {name: array for name, _, array in layers},
+        channels={name: tuple(names) for name, names, _ in layers},
+        metadata=dict(metadata),
+        origin=(origin[0], origin[1]),
+        full_size=(full[0], full[1]),
+    )
+    rendering.plan = dict(chosen)
+    rendering.complete = complete
+    rendering.seconds = seconds
+    return rendering

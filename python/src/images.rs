@@ -1,0 +1,107 @@
+//! Images as arrays, and image files.
+
+use lumiris::imaging::oiio::{self, ImageError, Part, ReadLimits, Window};
+use lumiris::imaging::{Image, layers};
+use numpy::{IntoPyArray, PyArray3, PyArrayMethods, PyReadonlyArray3, PyUntypedArrayMethods};
+use pyo3::exceptions::{PyFileNotFoundError, PyOSError, PyValueError};
+use pyo3::prelude::*;
+use std::collections::BTreeMap;
+use std::path::PathBuf;
+
+/// A layer: its name, the names of its channels, and rows × columns × channels.
+pub(crate) type Layer<'py> = (String, Vec<String>, Bound<'py, PyArray3<f32>>);
+
+/// Where an image lies in a larger one: column and row of its first pixel, columns and rows of the larger one.
+pub(crate) type Place = ([usize; 2], [usize; 2]);
+
+/// An array that owns the values of an image.
+pub(crate) fn array(py: Python<'_>, image: Image) -> PyResult<Bound<'_, PyArray3<f32>>> {
+    image.data.into_pyarray(py).reshape([image.height, image.width, image.channels.len()])
+}
+
+/// Layers as arrays that own their values.
+pub(crate) fn arrays<'py>(py: Python<'py>, layers: Vec<(String, Image)>) -> PyResult<Vec<Layer<'py>>> {
+    layers.into_iter().map(|(name, image)| Ok((name, image.channels.clone(), array(py, image)?))).collect()
+}
+
+/// The exception of an image that cannot be read or written.
+pub(crate) fn image_error(error: ImageError) -> PyErr {
+    let text = error.to_string();
+    match error {
+        ImageError::NotFound { .. } => PyFileNotFoundError::new_err(text),
+        ImageError::Color(_) => PyValueError::new_err(text),
+        ImageError::Library(_)
+        | ImageError::Unreadable { .. }
+        | ImageError::TooLarge { .. }
+        | ImageError::Write { .. } => PyOSError::new_err(text),
+    }
+}
+
+/// Reads a part of a file: layers of linear values, metadata, and the place of the pixels.
+#[pyfunction]
+pub(crate) fn read(
+    py: Python<'_>,
+    path: PathBuf,
+    part: usize,
+) -> PyResult<(Vec<Layer<'_>>, BTreeMap<String, String>, Place)> {
+    let read = py.detach(|| oiio::read_part(&path, part, &ReadLimits::default())).map_err(image_error)?;
+    let size = [read.image.width, read.image.height];
+    let (image, encoding) = (read.image, read.encoding);
+    let found = py.detach(|| {
+        let stride = image.channels.len();
+        let image_of = |layer: lumiris::imaging::Layer| {
+            let channels = image.channels[layer.channels.clone()].to_vec();
+            // Opacity is never encoded
+            let decode = |c: usize, v: f32| if channels[c] == "A" { v } else { encoding.to_linear(v) };
+            let pixels = image.data.chunks_exact(stride).flat_map(|pixel| &pixel[layer.channels.clone()]);
+            let data = pixels.enumerate().map(|(i, v)| decode(i % channels.len(), *v)).collect();
+            (layer.name, Image { width: size[0], height: size[1], channels, data })
+        };
+        layers(&image.channels).into_iter().map(image_of).collect()
+    });
+    Ok((arrays(py, found)?, read.metadata, place(&read.window, size)))
+}
+
+/// Where the pixels of a file lie; data outside the display window has no place in it.
+fn place(window: &Window, size: [usize; 2]) -> Place {
+    let offset = |a: usize| i64::from(window.origin[a]) - i64::from(window.full_origin[a]);
+    let origin = [0, 1].map(|a| usize::try_from(offset(a)).unwrap_or(0));
+    let full = [0, 1].map(|a| window.full_size[a].max(origin[a] + size[a]));
+    (origin, full)
+}
+
+/// Writes layers, by the names of their channels, to an EXR file of 32-bit floats.
+#[pyfunction]
+pub(crate) fn write(
+    py: Python<'_>,
+    path: PathBuf,
+    layers: Vec<(Vec<String>, PyReadonlyArray3<'_, f32>)>,
+    metadata: Vec<(String, String)>,
+    place: Option<Place>,
+) -> PyResult<()> {
+    let [height, width] = layers.first().map_or([0, 0], |(_, layer)| [layer.shape()[0], layer.shape()[1]]);
+    let mut slices = Vec::with_capacity(layers.len());
+    for (names, layer) in &layers {
+        let shape = layer.shape();
+        if shape != [height, width, names.len()] {
+            let name = names.join(", ");
+            let wrong = format!("layer of {name}: shape {shape:?}, but expected [{height}, {width}, {}]", names.len());
+            return Err(PyValueError::new_err(wrong));
+        }
+        slices.push((names.len(), layer.as_slice()?));
+    }
+    if width * height == 0 {
+        return Err(PyValueError::new_err("there is nothing to write"));
+    }
+    let names: Vec<String> = layers.iter().flat_map(|(names, _)| names.clone()).collect();
+    py.detach(|| {
+        let pixel = |i: usize| slices.iter().flat_map(move |(count, data)| &data[i * count..(i + 1) * count]).copied();
+        let data = (0..width * height).flat_map(pixel).collect();
+        let mut part = Part::linear(width, height, names, data).with_metadata(metadata);
+        if let Some((origin, full)) = place {
+            part = part.with_window(origin, full);
+        }
+        oiio::write_image(&path, &[part])
+    })
+    .map_err(image_error)
+}

@@ -1,0 +1,34 @@
+//! The native part of the Python module `lumiris`; `python/lumiris` wraps it with names, documentation and types.
+//!
+//! Numbers cross the boundary in NumPy arrays. What Rust has computed becomes an array as it is: the array owns the
+//! memory, nothing is copied. What takes long runs without the GIL.
+//!
+//! Reading order: `settings` (keyword arguments), `images` (arrays and files), `render` with what its callback sees
+//! (`progress`), `compare`, `estimators`.
+#![cfg(feature = "module")]
+
+mod compare;
+mod estimators;
+mod images;
+mod progress;
+mod render;
+mod settings;
+
+use pyo3::prelude::*;
+
+/// The native module.
+#[pymodule]
+fn _lumiris(module: &Bound<'_, PyModule>) -> PyResult<()> {
+    module.add("__version__", env!("CARGO_PKG_VERSION"))?;
+    module.add("SceneError", module.py().get_type::<render::SceneError>())?;
+    module.add_class::<progress::PassProgress>()?;
+    module.add_function(wrap_pyfunction!(settings::settings, module)?)?;
+    module.add_function(wrap_pyfunction!(images::read, module)?)?;
+    module.add_function(wrap_pyfunction!(images::write, module)?)?;
+    module.add_function(wrap_pyfunction!(render::render, module)?)?;
+    module.add_function(wrap_pyfunction!(compare::compare, module)?)?;
+    module.add_function(wrap_pyfunction!(estimators::mis, module)?)?;
+    module.add_function(wrap_pyfunction!(estimators::ris_draws, module)?)?;
+    module.add_function(wrap_pyfunction!(estimators::ocv, module)?)?;
+    module.add_function(wrap_pyfunction!(estimators::optimal_mis, module)?)
+}

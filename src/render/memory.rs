@@ -1,0 +1,104 @@
+//! Memory that an image takes, predicted before it is rendered.
+//!
+//! A packed pixel takes the bits in which it differs from its neighbours, which only its samples tell. The figures here
+//! are those of one scene at 1 sample, rounded up (docs/measurements/memory.md). How they grow with samples is
+//! an estimate: a sum needs one more binary digit for twice as many.
+
+use super::cryptomatte::Cryptomatte;
+use super::tiles::replica_edge;
+use super::{RenderSettings, thread_pool};
+use crate::direct::Estimator;
+use crate::film::BAND;
+use crate::imaging::oiio::ROWS_AT_ONCE;
+use crate::scene::RenderJob;
+
+/// Bytes of a pixel with one sample: radiance and its squares, counts.
+const IMAGE: f64 = 44.0;
+/// Bytes of albedo, normal, depth and indices.
+const FEATURES: f64 = 26.0;
+/// Binary digits that twice as many samples add to both.
+const DIGITS: [f64; 2] = [9.0, 9.0];
+/// Bytes of the replicas of a pixel, of which there are few: exact sums, and numbers.
+const REPLICAS: f64 = 2.0;
+/// Bytes of a tile besides its sums, by pixel.
+const TILE: f64 = 2.0;
+/// Bytes of a Cryptomatte where a pixel shows two ids.
+const IDS: f64 = 18.0;
+/// Bytes of an image to denoise: colour, albedo, normal, what comes out, and the library's own.
+const DENOISED: f64 = 4.0 * (3.0 * 4.0) + 64.0;
+/// Bytes of a pixel while control variates are fitted over pixels, and by control variate.
+const FITTED: [f64; 2] = [288.0, 20.0];
+/// Bytes of a sum of control variates.
+const CONTROL: usize = 16;
+/// Bytes of a pixel that is read from the film, and of the channels of an image with all layers.
+const READ: usize = 144 + 24;
+const CHANNELS: usize = 16 * 4;
+/// Bytes of OpenImageIO and the libraries it depends on, of threads with their batches.
+const LIBRARIES: u64 = 150 << 20;
+const THREAD: u64 = 16 << 20;
+
+/// What is to be made of a job.
+#[derive(Clone, Copy, Debug)]
+pub struct Wanted<'a> {
+    /// Samples and layers.
+    pub render: &'a RenderSettings,
+    /// Cryptomattes.
+    pub cryptomattes: &'a [Cryptomatte],
+    /// Whether the image is denoised.
+    pub is_denoised: bool,
+}
+
+/// Bytes that an image takes, beyond its scene.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Prediction {
+    /// All that grows with the number of pixels.
+    pub film: u64,
+    /// The rows that are being written.
+    pub output: u64,
+    /// What any image takes: libraries, and the batches of threads.
+    pub fixed: u64,
+}
+
+impl Prediction {
+    /// All together.
+    pub fn bytes(&self) -> u64 {
+        self.film + self.output + self.fixed
+    }
+}
+
+/// Bytes that an image will take.
+pub fn predict(job: &RenderJob, wanted: &Wanted<'_>) -> Prediction {
+    let bounds = job.world.scene.film.bounds;
+    let render = wanted.render;
+    let threads = render.threads.unwrap_or_else(|| thread_pool(None).map_or(1, |pool| pool.current_num_threads()));
+    let share = render.share.map_or(1.0, |share| 1.0 / f64::from(share.count.max(1)));
+    let pixels = bounds.area() as f64;
+    let whole = if wanted.is_denoised { DENOISED } else { 0.0 } + wanted.cryptomattes.len() as f64 * IDS;
+    let width = bounds.width() as usize;
+    let band = (BAND as usize + 2) * READ * threads + 2 * ROWS_AT_ONCE * CHANNELS;
+    Prediction {
+        film: (pixels * (share * of_sums(job, render) + whole)) as u64,
+        output: (width * band) as u64,
+        fixed: LIBRARIES + THREAD * threads as u64,
+    }
+}
+
+/// Bytes of the sums of a pixel.
+fn of_sums(job: &RenderJob, render: &RenderSettings) -> f64 {
+    let doublings = f64::from(render.spp.max(1)).log2();
+    let grown = |bytes: f64, digits: f64| bytes + digits * doublings / 8.0;
+    let mut bytes = TILE + grown(IMAGE, DIGITS[0]);
+    if render.with_features {
+        bytes += grown(FEATURES, DIGITS[1]);
+    }
+    if replica_edge(job, render).is_some() {
+        bytes += REPLICAS;
+    }
+    let estimator = Estimator::at_vertex(&job.settings().integrator, 0);
+    let fits = estimator.fits(job, 1);
+    bytes += (fits.exact_sums().len() * CONTROL + fits.memory().map(size_of_val).iter().sum::<usize>()) as f64;
+    if estimator.is_over_pixels() {
+        bytes += FITTED[0] + FITTED[1] * fits.controls() as f64;
+    }
+    bytes
+}
