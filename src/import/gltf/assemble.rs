@@ -1,12 +1,12 @@
-//! Geometry, lights and camera of the scene.
+//! Geometry and lights of the scene.
 
 use super::materials::{Look, Materials};
 use super::meshes::{Primitive, placed, primitive};
 use super::nodes::{Node, instances, nodes};
+use super::pose::Pose;
+use super::textures::EmissionSource;
+use super::view::camera;
 use super::{LUMENS_PER_WATT, Messages};
-use crate::cameras::Camera;
-use crate::film::PixelBounds;
-use crate::film::filter::PixelFilter;
 use crate::geometry::{Geometry, GeometryId, GeometrySet, Group, Instance, Shape, TriangleMesh, Visibility};
 use crate::import::LoadOptions;
 use crate::import::cache::FileCache;
@@ -14,20 +14,13 @@ use crate::import::resources::report;
 use crate::lights::{
     Emission, EmissionImage, EnvironmentFilter, EnvironmentMap, EnvironmentMapping, Light, LightSetBuilder,
 };
-use crate::materials::MaterialSet;
-use crate::scene::{FilmSettings, Scene, Surface};
+use crate::materials::{MaterialId, MaterialSet};
+use crate::scene::{Scene, Surface};
 use lumiris_formats::gltf::{Document, GltfError, Place};
-use lumiris_formats::source::Span;
-use lumiris_numbers::math::{Affine3A, Bounds3, Rgb, Vec3};
+use lumiris_numbers::math::{Affine3A, Rgb, Vec3};
+use std::collections::HashMap;
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
-
-/// Height of an image whose size nobody gives.
-const HEIGHT: u32 = 720;
-/// Angle of view of the camera that frames a scene (degrees).
-const AUTO_FOV: f32 = 40.0;
-/// Direction from the scene to that camera.
-const AUTO_DIRECTION: Vec3 = Vec3::new(0.5, 0.35, 0.8);
 
 /// A scene while it is assembled.
 pub(super) struct Assembly<'a> {
@@ -37,12 +30,13 @@ pub(super) struct Assembly<'a> {
     set: GeometrySet,
     surfaces: Vec<Surface>,
     emitters: Vec<(GeometryId, Emission)>,
+    emission_images: HashMap<MaterialId, Option<Arc<EmissionImage>>>,
     lights: Vec<Light>,
 }
 
 impl<'a> Assembly<'a> {
     pub(super) fn new(document: &'a Document, options: &'a LoadOptions) -> Result<Self, GltfError> {
-        let failed = |e: std::io::Error| GltfError { place: String::new(), message: e.to_string() };
+        let failed = |e: std::io::Error| document.root().error(e.to_string());
         Ok(Assembly {
             document,
             options,
@@ -50,6 +44,7 @@ impl<'a> Assembly<'a> {
             set: GeometrySet::default(),
             surfaces: Vec::new(),
             emitters: Vec::new(),
+            emission_images: HashMap::new(),
             lights: Vec::new(),
         })
     }
@@ -62,20 +57,21 @@ impl<'a> Assembly<'a> {
         messages: &mut Messages<'_>,
     ) -> Result<Option<Scene>, GltfError> {
         self.materials.read(messages)?;
-        others.extend(self.materials.files());
+        others.extend(self.materials.textures.files());
         others.extend(self.options.environment.clone());
         let nodes = nodes(self.document)?;
         self.add_meshes(&nodes, files, messages)?;
         nodes.iter().for_each(|node| self.add_light(node));
         let bounds = self.set.world_bounds();
-        let (camera, film) = self.camera(&nodes, &bounds, messages);
+        let (camera, film) = camera(self.document, self.options, &nodes, &bounds, messages);
         if let Some(path) = &self.options.environment {
             self.lights.extend(environment(path, files, messages));
         } else if self.lights.is_empty() && self.emitters.is_empty() {
             messages.warning(&self.document.root().key("scenes"), "no light: all around is white (--environment FILE)");
             self.lights.push(Light::InfiniteConstant { l: Rgb::WHITE });
         }
-        self.materials.textures.images = self.materials.resources.load(files, messages.diagnostics);
+        let textures = &mut self.materials.textures;
+        textures.set.images = textures.resources.load(files, messages.diagnostics);
         if messages.diagnostics.has_errors() {
             return Ok(None);
         }
@@ -86,62 +82,84 @@ impl<'a> Assembly<'a> {
         for (geometry, emission) in &self.emitters {
             lights.add_area(*geometry, &self.set.geometries[*geometry as usize].shape, emission);
         }
-        let materials = MaterialSet::new(self.materials.entries, &self.materials.textures);
+        let materials = MaterialSet::new(self.materials.entries, &self.materials.textures.set);
         Ok(Some(Scene {
             camera,
             film,
             materials,
-            textures: Arc::new(self.materials.textures),
+            textures: Arc::new(self.materials.textures.set),
             lights: Arc::new(lights.build(&bounds)),
             geometry: Arc::new(self.set),
             surfaces: self.surfaces,
         }))
     }
 
-    /// Meshes that stand once, or that emit, are placed in world space; others are groups with instances.
+    /// Adds all meshes, each once for every pose.
     fn add_meshes(
         &mut self,
         nodes: &[Node<'a>],
         files: &FileCache,
         messages: &mut Messages<'_>,
     ) -> Result<(), GltfError> {
-        for (index, place) in self.document.root().key("meshes").items().iter().enumerate() {
-            let mut placements = Vec::new();
-            for node in nodes.iter().filter(|n| n.place.key("mesh").index() == Some(index)) {
-                if node.place.key("skin").exists() {
-                    messages.warning(&node.place.key("skin"), "skins are not applied");
-                }
-                let of_node = instances(self.document, &node.place)?;
-                placements.extend(of_node.into_iter().map(|m| node.world_from_node * m));
+        let meshes = self.document.root().key("meshes").items();
+        let mut users: Vec<Vec<&Node<'a>>> = vec![Vec::new(); meshes.len()];
+        for node in nodes {
+            if let Some(list) = node.mesh.and_then(|mesh| users.get_mut(mesh)) {
+                list.push(node);
             }
-            // What has no inverse is flat, and has no normals
-            placements.retain(|m| m.is_finite() && m.matrix3.determinant() != 0.0);
-            if placements.is_empty() {
+        }
+        for (place, users) in meshes.iter().zip(users) {
+            let mut poses: Vec<(Pose, Vec<Affine3A>)> = Vec::new();
+            for node in users {
+                let pose = Pose::of(self.document, place, node, nodes)?;
+                let world_from_node = if pose.is_skinned() { Affine3A::IDENTITY } else { node.world_from_node };
+                let placements = instances(self.document, &node.place)?.into_iter().map(|m| world_from_node * m);
+                // What has no inverse is flat, and has no normals
+                let placements = placements.filter(|m| m.is_finite() && m.matrix3.determinant() != 0.0);
+                match poses.iter_mut().find(|(p, _)| *p == pose) {
+                    Some((_, all)) => all.extend(placements),
+                    None => poses.push((pose, placements.collect())),
+                }
+            }
+            for (pose, placements) in poses.iter().filter(|(_, placements)| !placements.is_empty()) {
+                self.add_mesh(place, pose, placements, files, messages)?;
+            }
+        }
+        Ok(())
+    }
+
+    /// Primitives that stand once, or that emit, are placed in world space; others are a group with instances.
+    fn add_mesh(
+        &mut self,
+        place: &Place<'a>,
+        pose: &Pose,
+        placements: &[Affine3A],
+        files: &FileCache,
+        messages: &mut Messages<'_>,
+    ) -> Result<(), GltfError> {
+        let name = place.key("name").text().unwrap_or("mesh").to_owned();
+        let mut group = Vec::new();
+        for place in place.key("primitives").items() {
+            let Some(Primitive { mesh, material }) = primitive(self.document, &place, pose, messages)? else {
+                continue;
+            };
+            let looks = &self.materials.looks;
+            let look = looks[material.unwrap_or(looks.len() - 1).min(looks.len() - 1)].clone();
+            if placements.len() > 1 && look.emission.is_black() {
+                group.push(self.add_geometry(mesh, &look, &name));
                 continue;
             }
-            let name = place.key("name").text().unwrap_or("mesh").to_owned();
-            let mut group = Vec::new();
-            for place in place.key("primitives").items() {
-                let Some(Primitive { mesh, material }) = primitive(self.document, &place, messages)? else { continue };
-                let looks = &self.materials.looks;
-                let look = looks[material.unwrap_or(looks.len() - 1).min(looks.len() - 1)].clone();
-                if placements.len() > 1 && look.emission.is_black() {
-                    group.push(self.add_geometry(mesh, &look, &name));
-                    continue;
-                }
-                for m in &placements {
-                    let wrong = |message: String| GltfError { place: place.path.clone(), message };
-                    let id = self.add_geometry(placed(&mesh, m).map_err(wrong)?, &look, &name);
-                    self.set.root.geometries.push(id);
-                    self.add_emission(id, &look, files, messages);
-                }
+            for m in placements {
+                let id = self.add_geometry(placed(&mesh, m).map_err(|e| place.error(e))?, &look, &name);
+                self.set.root.geometries.push(id);
+                self.add_emission(id, &look, files, messages);
             }
-            if !group.is_empty() {
-                let id = self.set.groups.len() as u32;
-                self.set.groups.push(Group { geometries: group });
-                let instance = |m: &Affine3A| Instance { group: id, world_from_group: vec![*m] };
-                self.set.instances.extend(placements.iter().map(instance));
-            }
+        }
+        if !group.is_empty() {
+            let id = self.set.groups.len() as u32;
+            self.set.groups.push(Group { geometries: group });
+            let instance = |m: &Affine3A| Instance { group: id, world_from_group: vec![*m] };
+            self.set.instances.extend(placements.iter().map(instance));
         }
         Ok(())
     }
@@ -156,15 +174,9 @@ impl<'a> Assembly<'a> {
         if look.emission.is_black() {
             return;
         }
-        let image = look.emission_image.as_ref().and_then(|path| match files.rgb(path) {
-            Ok(image) => {
-                let (texels, [width, height]) = Arc::unwrap_or_clone(image);
-                EmissionImage::new(width, height, texels).ok().map(Arc::new)
-            }
-            Err(error) => {
-                report(&error, path, messages.span, messages.diagnostics);
-                None
-            }
+        let image = look.emission_image.as_ref().and_then(|source| {
+            let read = || emission_image(source, files, messages);
+            self.emission_images.entry(look.material).or_insert_with(read).clone()
         });
         self.emitters.push((id, Emission { l: look.emission, two_sided: look.is_double_sided, image }));
     }
@@ -188,53 +200,18 @@ impl<'a> Assembly<'a> {
             _ => self.lights.push(Light::Point { p, intensity }),
         }
     }
-
-    /// The first camera of the scene, or one that frames it, and the film.
-    fn camera(&self, nodes: &[Node<'a>], bounds: &Bounds3, messages: &mut Messages<'_>) -> (Camera, FilmSettings) {
-        let cameras = self.document.root().key("cameras");
-        let found = nodes.iter().find_map(|n| Some((n, cameras.item(n.place.key("camera").index()?))));
-        let found = if self.options.camera_auto { None } else { found };
-        if found.is_none() && !self.options.camera_auto {
-            messages.warning(&cameras, "no camera: one that frames the scene is used (--camera-auto)");
-        }
-        let aspect = found.as_ref().and_then(|(_, c)| c.key("perspective").key("aspectRatio").number());
-        let width = (HEIGHT as f32 * aspect.filter(|a| *a > 0.0).unwrap_or(16.0 / 9.0)).round().clamp(1.0, 65_536.0);
-        let resolution = self.options.resolution.unwrap_or([width as u32, HEIGHT]);
-        let aspect = resolution[0] as f32 / resolution[1] as f32;
-        let camera =
-            found.map_or_else(|| frame(bounds, aspect, resolution), |(n, c)| of_file(n, &c, aspect, resolution));
-        let [x0, x1, y0, y1] = self.options.crop.unwrap_or([0.0, 1.0, 0.0, 1.0]);
-        let at = |fraction: f32, size: u32| ((fraction * size as f32).ceil() as u32).min(size);
-        let [w, h] = resolution;
-        let bounds = PixelBounds { x0: at(x0, w), x1: at(x1, w), y0: at(y0, h), y1: at(y1, h) };
-        let filter = PixelFilter::Gaussian { rx: 1.5, ry: 1.5, sigma: 0.5 };
-        (camera, FilmSettings { resolution, bounds, filter, file_name: None, scale: 1.0 })
-    }
 }
 
-/// A camera of the file: it looks along −z; scales of its node do not count.
-fn of_file(node: &Node<'_>, camera: &Place<'_>, aspect: f32, resolution: [u32; 2]) -> Camera {
-    let (_, rotation, translation) = node.world_from_node.to_scale_rotation_translation();
-    let world_from_camera = Affine3A::from_scale_rotation_translation(Vec3::new(1.0, 1.0, -1.0), rotation, translation);
-    let orthographic = camera.key("orthographic");
-    if orthographic.exists() {
-        let y = orthographic.key("ymag").number().unwrap_or(1.0).abs().max(1e-6);
-        return Camera::orthographic(world_from_camera, [-y * aspect, y * aspect, -y, y], resolution, 0.0, 1e6);
-    }
-    let fov = camera.key("perspective").key("yfov").number().unwrap_or(0.8).clamp(1e-3, 3.1);
-    Camera::perspective(world_from_camera, fov.to_degrees(), [-aspect, aspect, -1.0, 1.0], resolution, 0.0, 1e6)
-}
-
-/// A camera that sees the whole scene.
-fn frame(bounds: &Bounds3, aspect: f32, resolution: [u32; 2]) -> Camera {
-    let (center, radius) = bounds.bounding_sphere();
-    let radius = if radius > 0.0 && radius.is_finite() { radius } else { 1.0 };
-    let half = (AUTO_FOV.to_radians() * 0.5).tan() * aspect.min(1.0);
-    let eye = center + AUTO_DIRECTION.normalize() * (radius / half.atan().sin());
-    let z = (center - eye).normalize();
-    let x = z.cross(Vec3::Y).normalize();
-    let world_from_camera = Affine3A::from_cols(x.into(), x.cross(z).into(), z.into(), eye.into());
-    Camera::perspective(world_from_camera, AUTO_FOV, [-aspect, aspect, -1.0, 1.0], resolution, 0.0, 1e6)
+fn emission_image(
+    source: &EmissionSource,
+    files: &FileCache,
+    messages: &mut Messages<'_>,
+) -> Option<Arc<EmissionImage>> {
+    let image =
+        files.rgb(&source.path).map_err(|error| report(&error, &source.path, messages.span, messages.diagnostics));
+    let (texels, [width, height]) = Arc::unwrap_or_clone(image.ok()?);
+    let image = EmissionImage::new(width, height, texels).ok()?;
+    Some(Arc::new(image.placed(source.wrap, source.mapping)))
 }
 
 /// An environment by an image, whose z becomes the y of the scene.
@@ -248,7 +225,7 @@ fn environment(path: &Path, files: &FileCache, messages: &mut Messages<'_>) -> O
             Some(Light::infinite_image(Arc::new(map), &turn, 1.0))
         }
         Err(reason) => {
-            messages.diagnostics.error(Span::default(), format!("{}: {reason}", path.display()));
+            messages.diagnostics.error(messages.span, format!("{}: {reason}", path.display()));
             None
         }
     }

@@ -1,8 +1,8 @@
 //! Primitives of meshes as triangles.
 
 use super::Messages;
+use super::pose::{Pose, Vertices};
 use crate::geometry::TriangleMesh;
-use lumiris_formats::gltf::document::error;
 use lumiris_formats::gltf::{Document, GltfError, Place};
 use lumiris_numbers::math::{Affine3A, Vec2, Vec3};
 
@@ -13,10 +13,11 @@ pub(super) struct Primitive {
     pub material: Option<usize>,
 }
 
-/// Triangles of a primitive; `None` for points and lines.
+/// Triangles of a primitive, bent by a pose; `None` for points and lines.
 pub(super) fn primitive(
     document: &Document,
     place: &Place<'_>,
+    pose: &Pose,
     messages: &mut Messages<'_>,
 ) -> Result<Option<Primitive>, GltfError> {
     let mode = place.key("mode").index().unwrap_or(4);
@@ -29,39 +30,50 @@ pub(super) fn primitive(
         messages.warning(&attributes, "without POSITION there is nothing to render");
         return Ok(None);
     };
-    let positions: Vec<Vec3> = document.accessor(positions)?.elements::<3>(0.0).into_iter().map(Vec3::from).collect();
+    let count = document.accessor(positions)?.count();
+    let mut vertices = Vertices {
+        positions: vectors(document, &attributes.key("POSITION"), count)?,
+        normals: vectors(document, &attributes.key("NORMAL"), count)?,
+        tangents: vectors(document, &attributes.key("TANGENT"), count)?,
+    };
+    pose.bend(document, place, &mut vertices, messages)?;
+    let Vertices { positions, normals, tangents } = vertices;
     if let Some(i) = positions.iter().position(|p| !p.is_finite()) {
-        return Err(error(&attributes.key("POSITION"), format!("vertex {i} is not finite")));
+        return Err(attributes.key("POSITION").error(format!("vertex {i} is not finite")));
     }
-    let count = positions.len();
     let indices = match place.key("indices").index() {
         Some(index) => document.accessor(index)?.values.iter().map(|&v| v as u32).collect(),
         None => (0..count as u32).collect::<Vec<u32>>(),
     };
     let triangles = triangles(&indices, mode);
-    let mut mesh = TriangleMesh::new(positions, triangles).map_err(|message| error(&place.key("indices"), message))?;
-    let values = |name: &str| match attributes.key(name).index() {
-        Some(index) => {
-            let values = document.accessor(index)?;
-            let has_all = values.values.len() == count * values.width;
-            if has_all { Ok(Some(values)) } else { Err(error(&attributes.key(name), "has not one element per vertex")) }
-        }
-        None => Ok(None),
-    };
+    let mut mesh = TriangleMesh::new(positions, triangles).map_err(|message| place.key("indices").error(message))?;
     let uvs = |name: &str| -> Result<Vec<Vec2>, GltfError> {
-        let uvs = values(name)?.map_or_else(Vec::new, |v| v.elements::<2>(0.0));
+        let uvs = per_vertex::<2>(document, &attributes.key(name), count, 0.0)?;
         Ok(uvs.into_iter().map(|[u, v]| Vec2::new(u, 1.0 - v)).collect())
     };
-    let vectors = |name: &str| -> Result<Vec<Vec3>, GltfError> {
-        Ok(values(name)?.map_or_else(Vec::new, |v| v.elements::<3>(0.0)).into_iter().map(Vec3::from).collect())
-    };
     (mesh.uvs, mesh.uvs1) = (uvs("TEXCOORD_0")?, uvs("TEXCOORD_1")?);
-    (mesh.normals, mesh.tangents) = (vectors("NORMAL")?, vectors("TANGENT")?);
-    mesh.colors = values("COLOR_0")?.map_or_else(Vec::new, |v| v.elements::<4>(1.0));
-    if place.key("targets").exists() {
-        messages.warning(&place.key("targets"), "morph targets are not applied");
-    }
+    (mesh.normals, mesh.tangents) = (normals, tangents);
+    mesh.colors = per_vertex(document, &attributes.key("COLOR_0"), count, 1.0)?;
     Ok(Some(Primitive { mesh, material: place.key("material").index() }))
+}
+
+/// Elements of an attribute, one per vertex, or none if it is not there.
+fn per_vertex<const N: usize>(
+    document: &Document,
+    place: &Place<'_>,
+    count: usize,
+    fill: f32,
+) -> Result<Vec<[f32; N]>, GltfError> {
+    let Some(index) = place.index() else { return Ok(Vec::new()) };
+    let elements = document.accessor(index)?.elements::<N>(fill);
+    if let Some(i) = elements.iter().position(|e| e.iter().any(|x| !x.is_finite())) {
+        return Err(place.error(format!("vertex {i} is not finite")));
+    }
+    if elements.len() == count { Ok(elements) } else { Err(place.error("has not one element per vertex")) }
+}
+
+fn vectors(document: &Document, place: &Place<'_>, count: usize) -> Result<Vec<Vec3>, GltfError> {
+    Ok(per_vertex::<3>(document, place, count, 0.0)?.into_iter().map(Vec3::from).collect())
 }
 
 /// Corners of a list, a strip or a fan.

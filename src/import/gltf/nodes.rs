@@ -1,13 +1,17 @@
 //! The tree of nodes: what stands where.
 
 use glam::{Mat4, Quat};
-use lumiris_formats::gltf::document::error;
 use lumiris_formats::gltf::{Document, GltfError, Place};
 use lumiris_numbers::math::{Affine3A, Vec3};
+use std::collections::HashSet;
 
 /// A node of the scene with its placement.
 pub(super) struct Node<'a> {
     pub place: Place<'a>,
+    /// Index of the node.
+    pub index: usize,
+    /// Index of its mesh.
+    pub mesh: Option<usize>,
     pub world_from_node: Affine3A,
 }
 
@@ -15,28 +19,29 @@ pub(super) struct Node<'a> {
 pub(super) fn nodes(document: &Document) -> Result<Vec<Node<'_>>, GltfError> {
     let root = document.root();
     let all = root.key("nodes");
+    let count = all.items().len();
     let scene = root.key("scenes").item(root.key("scene").index().unwrap_or(0));
     let mut open: Vec<(usize, Affine3A)> = if scene.exists() {
         scene.key("nodes").items().iter().filter_map(Place::index).map(|i| (i, Affine3A::IDENTITY)).collect()
     } else {
-        let is_child =
-            |i: usize| all.items().iter().any(|n| n.key("children").items().iter().any(|c| c.index() == Some(i)));
-        (0..all.items().len()).filter(|&i| !is_child(i)).map(|i| (i, Affine3A::IDENTITY)).collect()
+        let children: HashSet<usize> =
+            all.items().iter().flat_map(|n| n.key("children").items()).filter_map(|child| child.index()).collect();
+        (0..count).filter(|i| !children.contains(i)).map(|i| (i, Affine3A::IDENTITY)).collect()
     };
     open.reverse();
-    let mut is_met = vec![false; all.items().len()];
+    let mut is_met = vec![false; count];
     let mut nodes = Vec::new();
     while let Some((index, parent)) = open.pop() {
         let place = all.item(index);
         match is_met.get_mut(index) {
             Some(met) if !*met => *met = true,
-            Some(_) => return Err(error(&place, "the node has two parents, or is its own ancestor")),
-            None => return Err(error(&place, "is not there")),
+            Some(_) => return Err(place.error("the node has two parents, or is its own ancestor")),
+            None => return Err(place.error("is not there")),
         }
         let world_from_node = parent * transform(&place);
         let children = place.key("children").items();
         open.extend(children.iter().rev().filter_map(Place::index).map(|i| (i, world_from_node)));
-        nodes.push(Node { place, world_from_node });
+        nodes.push(Node { mesh: place.key("mesh").index(), place, index, world_from_node });
     }
     Ok(nodes)
 }

@@ -1,6 +1,5 @@
 //! Accessors: arrays of numbers in buffers, dense or sparse.
 
-use super::document::error;
 use super::{Document, GltfError, Place};
 
 /// Greatest number of elements of an accessor without bytes of its own, which are zeros.
@@ -61,6 +60,11 @@ pub struct Numbers {
 }
 
 impl Numbers {
+    /// Number of elements.
+    pub fn count(&self) -> usize {
+        self.values.len() / self.width.max(1)
+    }
+
     /// Elements of `N` components; what an element lacks is `fill`.
     pub fn elements<const N: usize>(&self, fill: f32) -> Vec<[f32; N]> {
         let element = |e: &[f64]| std::array::from_fn(|i| e.get(i).map_or(fill, |&v| v as f32));
@@ -95,12 +99,12 @@ impl Document {
         let component = place.key("componentType").index().and_then(Component::of);
         let width = place.key("type").text().and_then(width_of);
         let (Some(component), Some(width), Some(count)) = (component, width, place.key("count").index()) else {
-            return Err(error(&place, "has no valid type or count"));
+            return Err(place.error("has no valid type or count"));
         };
         let layout = Layout { component, width, count, normalized: place.key("normalized").is_true() };
         let mut values = match place.key("bufferView").index() {
             Some(_) => self.read(&place, &layout)?,
-            None if count > MAX_ZEROS => return Err(error(&place, format!("{count} elements have no bytes"))),
+            None if count > MAX_ZEROS => return Err(place.error(format!("{count} elements have no bytes"))),
             None => vec![0.0; count * width],
         };
         let sparse = place.key("sparse");
@@ -111,7 +115,7 @@ impl Document {
     }
 
     fn read(&self, place: &Place<'_>, layout: &Layout) -> Result<Vec<f64>, GltfError> {
-        let Some(view) = place.key("bufferView").index() else { return Err(error(place, "has no buffer view")) };
+        let Some(view) = place.key("bufferView").index() else { return Err(place.error("has no buffer view")) };
         let bytes = self.view(view)?;
         let size = layout.component.bytes() * layout.width;
         let stride = self.root().key("bufferViews").item(view).key("byteStride").index().unwrap_or(size).max(1);
@@ -121,7 +125,7 @@ impl Document {
         if end.is_none() || stride < layout.component.bytes() {
             let (count, have) = (layout.count, bytes.len());
             let message = format!("{count} elements from byte {offset} on are not in the buffer view of {have} bytes");
-            return Err(error(place, message));
+            return Err(place.error(message));
         }
         let mut values = Vec::with_capacity(layout.count * layout.width);
         for i in 0..layout.count {
@@ -138,7 +142,7 @@ impl Document {
         let count = sparse.key("count").index().unwrap_or(0);
         let place = sparse.key("indices");
         let Some(component) = place.key("componentType").index().and_then(Component::of) else {
-            return Err(error(&place, "has no valid type"));
+            return Err(place.error("has no valid type"));
         };
         let indices = self.read(&place, &Layout { component, width: 1, count, normalized: false })?;
         let new = self.read(&sparse.key("values"), &Layout { count, ..*layout })?;
@@ -146,7 +150,7 @@ impl Document {
             let at = *index as usize * layout.width;
             match values.get_mut(at..at + layout.width) {
                 Some(old) => old.copy_from_slice(element),
-                None => return Err(error(&place, format!("element {index} is not there"))),
+                None => return Err(place.error(format!("element {index} is not there"))),
             }
         }
         Ok(())

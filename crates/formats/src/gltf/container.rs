@@ -1,6 +1,6 @@
 //! The binary container: a header of 12 bytes, a chunk of JSON, and at most one chunk of bytes that counts.
 
-use super::GltfError;
+use super::place::GltfError;
 
 const MAGIC: &[u8; 4] = b"glTF";
 const JSON: u32 = 0x4e4f_534a;

@@ -1,33 +1,11 @@
 //! A document: its JSON, checked, and its buffers.
 
 use super::container::chunks;
-use super::place::Place;
+use super::place::{GltfError, Place};
+use super::schema;
 use base64::Engine;
-use gltf::json::validation::Validate;
 use serde_json::Value;
 use std::path::{Path, PathBuf};
-
-/// What is wrong, and where.
-#[derive(Clone, Debug, PartialEq, Eq)]
-pub struct GltfError {
-    /// Path in the JSON, or byte of the container.
-    pub place: String,
-    /// One sentence without a full stop.
-    pub message: String,
-}
-
-impl std::fmt::Display for GltfError {
-    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
-        if self.place.is_empty() { f.write_str(&self.message) } else { write!(f, "{}: {}", self.place, self.message) }
-    }
-}
-
-impl std::error::Error for GltfError {}
-
-/// An error at a place.
-pub fn error(place: &Place<'_>, message: impl Into<String>) -> GltfError {
-    GltfError { place: place.path.clone(), message: message.into() }
-}
 
 /// A document with its buffers.
 #[derive(Debug)]
@@ -80,25 +58,10 @@ impl Document {
     /// Parses a file that lies in `folder`, and reads its buffers. All errors of the schema are named.
     pub fn parse(file: &[u8], folder: &Path, required: &[&str]) -> Result<Document, Vec<GltfError>> {
         let (text, embedded) = chunks(file).map_err(|e| vec![e])?;
-        let at_text = |e: serde_json::Error| {
-            vec![GltfError { place: format!("line {}, column {}", e.line(), e.column()), message: e.to_string() }]
-        };
-        let json: Value = serde_json::from_slice(text).map_err(at_text)?;
+        let text = text.strip_prefix(b"\xef\xbb\xbf").unwrap_or(text);
+        let json: Value = serde_json::from_slice(text).map_err(|e| vec![syntax_error(file, text, &e)])?;
         check_asset(&json, required)?;
-        let root: gltf::json::Root = serde_json::from_slice(text).map_err(at_text)?;
-        let mut errors = Vec::new();
-        root.validate(&root, gltf::json::Path::new, &mut |path, problem| {
-            let message = match problem {
-                gltf::json::validation::Error::IndexOutOfBounds => "refers to something that is not there",
-                gltf::json::validation::Error::Missing => "is missing",
-                _ => "is not valid",
-            };
-            // Extensions are checked apart, and images may come by extensions
-            let place = path().as_str().to_owned();
-            if !place.starts_with("extensionsRequired") && !place.ends_with(".source") {
-                errors.push(GltfError { place, message: message.to_owned() });
-            }
-        });
+        let errors = schema::errors(&Place::root(&json));
         if !errors.is_empty() {
             return Err(errors);
         }
@@ -117,9 +80,9 @@ impl Document {
         if let Some(view) = place.key("bufferView").index() {
             return Ok(Content::Bytes(self.view(view)?.to_vec()));
         }
-        let uri = place.key("uri").text().ok_or_else(|| error(place, "has neither a URI nor a buffer view"))?;
+        let uri = place.key("uri").text().ok_or_else(|| place.error("has neither a URI nor a buffer view"))?;
         match data_uri(uri) {
-            Some(bytes) => bytes.map(Content::Bytes).map_err(|message| error(&place.key("uri"), message)),
+            Some(bytes) => bytes.map(Content::Bytes).map_err(|message| place.key("uri").error(message)),
             None => Ok(Content::File(self.folder.join(percent_decoded(uri)))),
         }
     }
@@ -135,14 +98,14 @@ impl Document {
                     Content::File(path) => {
                         let read = std::fs::read(&path);
                         self.files.push(path.clone());
-                        read.map_err(|e| error(&place.key("uri"), format!("{}: {e}", path.display())))?
+                        read.map_err(|e| place.key("uri").error(format!("{}: {e}", path.display())))?
                     }
                 },
             };
             let length = place.key("byteLength").index().unwrap_or(0);
             if bytes.len() < length {
                 let message = format!("the buffer has {} of its {length} bytes", bytes.len());
-                return Err(error(&place.key("byteLength"), message));
+                return Err(place.key("byteLength").error(message));
             }
             self.buffers.push(bytes);
             Ok(())
@@ -155,14 +118,24 @@ impl Document {
     pub fn view(&self, index: usize) -> Result<&[u8], GltfError> {
         let place = self.root().key("bufferViews").item(index);
         let (buffer, length) = (place.key("buffer").index(), place.key("byteLength").index());
-        let (Some(buffer), Some(length)) = (buffer, length) else { return Err(error(&place, "is not there")) };
+        let (Some(buffer), Some(length)) = (buffer, length) else { return Err(place.error("is not there")) };
         let offset = place.key("byteOffset").index().unwrap_or(0);
         let bytes = self.buffers.get(buffer).map_or(&[][..], Vec::as_slice);
         offset.checked_add(length).and_then(|end| bytes.get(offset..end)).ok_or_else(|| {
             let message = format!("{length} bytes from byte {offset} on are not in the buffer of {}", bytes.len());
-            error(&place, message)
+            place.error(message)
         })
     }
+}
+
+/// What is not JSON, in the bytes of the file.
+fn syntax_error(file: &[u8], text: &[u8], e: &serde_json::Error) -> GltfError {
+    let lines = text.split_inclusive(|&b| b == b'\n').take(e.line().saturating_sub(1));
+    let start = text.as_ptr() as usize - file.as_ptr() as usize;
+    let at = start + lines.map(<[u8]>::len).sum::<usize>() + e.column().saturating_sub(1);
+    let message = e.to_string();
+    let message = message.rsplit_once(" at line").map_or(message.as_str(), |(message, _)| message);
+    GltfError { place: format!("byte {at}"), message: message.to_owned() }
 }
 
 /// Checks the version and the extensions that must be understood.
@@ -171,14 +144,14 @@ fn check_asset(json: &Value, known: &[&str]) -> Result<(), Vec<GltfError>> {
     let version = root.key("asset").key("version");
     match version.text() {
         Some(text) if text.starts_with("2.") => {}
-        Some(text) => return Err(vec![error(&version, format!("glTF {text} is not read, only 2.x"))]),
-        None => return Err(vec![error(&version, "is missing")]),
+        Some(text) => return Err(vec![version.error(format!("glTF {text} is not read, only 2.x"))]),
+        None => return Err(vec![version.error("is missing")]),
     }
     let required = root.key("extensionsRequired").items();
     let unknown = required.iter().filter(|p| p.text().is_some_and(|name| !known.contains(&name)));
     let errors: Vec<GltfError> = unknown
         .map(|place| {
-            error(place, format!("the file needs the extension {}, which is not read", place.text().unwrap_or("")))
+            place.error(format!("the file needs the extension {}, which is not read", place.text().unwrap_or("")))
         })
         .collect();
     if errors.is_empty() { Ok(()) } else { Err(errors) }

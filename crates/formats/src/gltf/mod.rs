@@ -1,14 +1,18 @@
 //! glTF 2.0: containers, checked JSON, buffers and accessors. What they mean is decided by the renderer.
 //!
-//! The crate `gltf` checks the form of the JSON and all indices; whether accessors lie inside their buffers is checked
-//! here, before anything is read or allocated. Errors name the place in the JSON, or the byte of the container.
+//! The types of what is read and all indices are checked first; whether accessors lie inside their buffers, before
+//! anything is read or allocated. Errors name the place in the JSON, or the byte of the container.
 //!
-//! Reading order: [`container`], [`place`], [`document`], [`accessor`].
+//! Reading order: [`place`], [`container`], [`schema`], [`document`], [`accessor`]; [`locate`] for
+//! messages.
 
 pub mod accessor;
 pub mod container;
 pub mod document;
+pub mod locate;
 pub mod place;
+pub mod schema;
 
-pub use document::{Document, GltfError};
-pub use place::Place;
+pub use document::Document;
+pub use locate::locate;
+pub use place::{GltfError, Place};

@@ -2,6 +2,23 @@
 
 use serde_json::Value;
 
+/// What is wrong, and where.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct GltfError {
+    /// Path in the JSON, or byte of the container.
+    pub place: String,
+    /// One sentence without a full stop.
+    pub message: String,
+}
+
+impl std::fmt::Display for GltfError {
+    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        if self.place.is_empty() { f.write_str(&self.message) } else { write!(f, "{}: {}", self.place, self.message) }
+    }
+}
+
+impl std::error::Error for GltfError {}
+
 /// A place in the JSON.
 #[derive(Clone, Debug)]
 pub struct Place<'a> {
@@ -46,6 +63,11 @@ impl<'a> Place<'a> {
         self.value.and_then(Value::as_object).map_or_else(Vec::new, |o| o.keys().map(String::as_str).collect())
     }
 
+    /// An error at this place.
+    pub fn error(&self, message: impl Into<String>) -> GltfError {
+        GltfError { place: self.path.clone(), message: message.into() }
+    }
+
     /// True if there is something.
     pub fn exists(&self) -> bool {
         self.value.is_some()
@@ -56,9 +78,12 @@ impl<'a> Place<'a> {
         self.value.and_then(Value::as_f64).map(|v| v as f32).filter(|v| v.is_finite())
     }
 
-    /// A number that is not negative.
+    /// An integer that is not negative, which may be written with a fraction of 0.
     pub fn index(&self) -> Option<usize> {
-        self.value.and_then(Value::as_u64).and_then(|v| usize::try_from(v).ok())
+        // Integers of floats are exact up to 2⁵³
+        let whole = |v: f64| (v >= 0.0 && v.fract() == 0.0 && v < 9e15).then_some(v as u64);
+        let value = self.value.and_then(|v| v.as_u64().or_else(|| v.as_f64().and_then(whole)));
+        value.and_then(|v| usize::try_from(v).ok())
     }
 
     /// Text.
@@ -66,9 +91,24 @@ impl<'a> Place<'a> {
         self.value.and_then(Value::as_str)
     }
 
+    /// True or false.
+    pub fn flag(&self) -> Option<bool> {
+        self.value.and_then(Value::as_bool)
+    }
+
     /// True if it is there and true.
     pub fn is_true(&self) -> bool {
-        self.value.and_then(Value::as_bool).unwrap_or(false)
+        self.flag().unwrap_or(false)
+    }
+
+    /// True for an array.
+    pub fn is_array(&self) -> bool {
+        self.value.is_some_and(Value::is_array)
+    }
+
+    /// True for an object.
+    pub fn is_object(&self) -> bool {
+        self.value.is_some_and(Value::is_object)
     }
 
     /// An array of numbers, as many as asked for.
