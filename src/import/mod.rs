@@ -19,7 +19,7 @@ use cache::FileCache;
 use fingerprint::SceneFiles;
 use lumiris_formats::diagnostic::{Diagnostics, Report};
 use lumiris_formats::pbrt::parser::{parse_file, parse_source};
-use lumiris_formats::source::SourceMap;
+use lumiris_formats::source::{SourceMap, Span};
 use pbrt::state::Builder;
 use std::path::{Path, PathBuf};
 
@@ -98,6 +98,11 @@ fn load_parsed(
     let mut diagnostics = Diagnostics::new();
     let mut builder = Builder::new(folder, options);
     parse(&mut sources, &mut diagnostics, &mut builder);
+    if options.environment.is_some() || options.camera_auto {
+        let message =
+            "environment and camera of a pbrt scene are in its file: --environment and --camera-auto are for glTF";
+        diagnostics.error(Span::default(), message);
+    }
     let scene_files = SceneFiles::new(&sources, builder.files());
     let finished = builder.finish(files, &mut diagnostics);
     let failed = diagnostics.has_errors();

@@ -63,6 +63,9 @@ impl<'a> Assembly<'a> {
         self.add_meshes(&nodes, files, messages)?;
         nodes.iter().for_each(|node| self.add_light(node));
         let bounds = self.set.world_bounds();
+        if self.set.geometries.is_empty() {
+            messages.warning(&self.document.root().key("meshes"), "the scene has no meshes to render");
+        }
         let (camera, film) = camera(self.document, self.options, &nodes, &bounds, messages);
         if let Some(path) = &self.options.environment {
             self.lights.extend(environment(path, files, messages));

@@ -19,9 +19,9 @@ pub struct Document {
 
 /// Bytes of a data URI; `None` if it is none.
 fn data_uri(uri: &str) -> Option<Result<Vec<u8>, String>> {
-    let (kind, data) = uri.strip_prefix("data:")?.split_once(',')?;
+    let (kind, data) = uri.strip_prefix("data:")?.split_once(',').unwrap_or_default();
     if !kind.ends_with(";base64") {
-        return Some(Err("a data URI is not in base64".to_owned()));
+        return Some(Err("the data URI is not in base64".to_owned()));
     }
     Some(base64::engine::general_purpose::STANDARD.decode(data.trim_end()).map_err(|e| e.to_string()))
 }
@@ -92,7 +92,11 @@ impl Document {
         let result = Place::root(&json).key("buffers").items().into_iter().enumerate().try_for_each(|(i, place)| {
             let bytes = match (place.key("uri").exists(), embedded) {
                 (false, Some(bytes)) if i == 0 => bytes.to_vec(),
-                (false, _) => Vec::new(),
+                // A placeholder, which is an error only if something is in it
+                (false, _) => {
+                    self.buffers.push(Vec::new());
+                    return Ok(());
+                }
                 (true, _) => match self.content(&place)? {
                     Content::Bytes(bytes) => bytes,
                     Content::File(path) => {
@@ -135,7 +139,7 @@ fn syntax_error(file: &[u8], text: &[u8], e: &serde_json::Error) -> GltfError {
     let at = start + lines.map(<[u8]>::len).sum::<usize>() + e.column().saturating_sub(1);
     let message = e.to_string();
     let message = message.rsplit_once(" at line").map_or(message.as_str(), |(message, _)| message);
-    GltfError { place: format!("byte {at}"), message: message.to_owned() }
+    GltfError { place: format!("byte {at}"), message: format!("no JSON: {message}") }
 }
 
 /// Checks the version and the extensions that must be understood.
