@@ -156,3 +156,56 @@ impl Document {
         Ok(())
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::super::{Document, GltfError};
+    use base64::Engine;
+    use std::path::Path;
+
+    /// A document of one accessor, whose buffer has views of 12 bytes and of 4.
+    fn accessor(json: &str, bytes: [u8; 16]) -> Result<Vec<f64>, GltfError> {
+        let data = base64::engine::general_purpose::STANDARD.encode(bytes);
+        let text = format!(
+            r#"{{"asset":{{"version":"2.0"}},"accessors":[{json}],
+            "bufferViews":[{{"buffer":0,"byteLength":12}},{{"buffer":0,"byteOffset":12,"byteLength":4}}],
+            "buffers":[{{"byteLength":16,"uri":"data:application/octet-stream;base64,{data}"}}]}}"#
+        );
+        let document = Document::parse(text.as_bytes(), Path::new(""), &[]).map_err(|errors| errors[0].clone())?;
+        document.accessor(0).map(|numbers| numbers.values)
+    }
+
+    const BYTES: [u8; 16] = [0, 1, 2, 3, 4, 5, 6, 7, 8, 9, 10, 255, 2, 0, 128, 9];
+
+    #[test]
+    fn integers_are_read_normalised_or_not() {
+        let of = |rest: &str| {
+            let json =
+                format!(r#"{{"bufferView":0,"componentType":5120,"count":2,"type":"VEC2","byteOffset":8{rest}}}"#);
+            accessor(&json, BYTES).unwrap()
+        };
+        assert_eq!(of(""), [8.0, 9.0, 10.0, -1.0]);
+        assert_eq!(of(r#","normalized":true"#), [8.0 / 127.0, 9.0 / 127.0, 10.0 / 127.0, -1.0 / 127.0]);
+    }
+
+    #[test]
+    fn sparse_elements_replace_those_of_the_view_or_zeros() {
+        let sparse = r#""sparse":{"count":1,"indices":{"bufferView":1,"componentType":5121},
+            "values":{"bufferView":0,"byteOffset":4}}"#;
+        let of = |view: &str| format!(r#"{{{view}"componentType":5121,"count":3,"type":"VEC2",{sparse}}}"#);
+        assert_eq!(accessor(&of(""), BYTES).unwrap(), [0.0, 0.0, 0.0, 0.0, 4.0, 5.0]);
+        assert_eq!(accessor(&of(r#""bufferView":0,"#), BYTES).unwrap(), [0.0, 1.0, 2.0, 3.0, 4.0, 5.0]);
+        let mut outside = BYTES;
+        outside[12] = 3;
+        let error = accessor(&of(""), outside).unwrap_err();
+        assert_eq!(error.to_string(), "accessors[0].sparse.indices: element 3 is not there");
+    }
+
+    #[test]
+    fn what_lies_outside_of_its_view_is_refused_before_it_is_allocated() {
+        for (count, view) in [(u64::MAX, r#""bufferView":0,"#), (7, r#""bufferView":0,"#), (1 << 60, "")] {
+            let json = format!(r#"{{{view}"componentType":5121,"count":{count},"type":"VEC2"}}"#);
+            assert_eq!(accessor(&json, BYTES).unwrap_err().place, "accessors[0]", "{count}");
+        }
+    }
+}
