@@ -121,6 +121,26 @@ fn a_scene_looks_like_the_same_scene_of_pbrt() {
 }
 
 #[test]
+fn an_environment_is_seen_as_it_is_stored() {
+    let folder = tempfile::tempdir().unwrap();
+    let (path, sky) = (folder.path().join("a.gltf"), folder.path().join("sky.pfm"));
+    // Columns of 90°: the first two meet in direction −z; the lower row is the first one
+    let colors = |row: f32| [[1.0, 0.0, row], [0.0, 1.0, row], [0.0, 0.0, row], [0.0, 0.0, row]].concat();
+    std::fs::write(&sky, [b"PF\n4 2\n-1.0\n".to_vec(), floats(&colors(0.0)), floats(&colors(1.0))].concat()).unwrap();
+    let json = r#"{"asset":{"version":"2.0"},"nodes":[{"camera":0}],
+        "cameras":[{"type":"perspective","perspective":{"yfov":0.5,"znear":0.1}}]}"#;
+    std::fs::write(&path, json).unwrap();
+    let resolution = Some([2, 2]);
+    let options = LoadOptions { resolution, environment: Some(sky), ..LoadOptions::default() };
+    let job = load(&path, &options).unwrap().job(AccelKind::Embree, None).unwrap();
+    let settings = RenderSettings { spp: 64, ..RenderSettings::default() };
+    let image = channels(&render(&job, &settings, &AtomicBool::new(false), &|_| ()).unwrap().film, &[], None).data;
+    let red_left_of_green = |row: &[f32]| row[0] > 3.0 * row[1] && row[4] > 3.0 * row[3];
+    assert!(image.chunks_exact(6).all(red_left_of_green), "{image:?}");
+    assert!(image[2] > 3.0 * image[8], "blue above: {image:?}");
+}
+
+#[test]
 fn morph_targets_have_their_default_weights() {
     let mesh = |weights: &str| {
         format!(

@@ -16,6 +16,7 @@ use crate::lights::{
 };
 use crate::materials::{MaterialId, MaterialSet};
 use crate::scene::{Scene, Surface};
+use glam::Vec3A;
 use lumiris_formats::gltf::{Document, GltfError, Place};
 use lumiris_numbers::math::{Affine3A, Rgb, Vec3};
 use std::collections::HashMap;
@@ -217,15 +218,16 @@ fn emission_image(
     Some(Arc::new(image.placed(source.wrap, source.mapping)))
 }
 
-/// An environment by an image, whose z becomes the y of the scene.
+/// An environment by an image, whose z becomes the y of the scene. Its middle is in direction +x, and it is seen as it
+/// is stored: maps of pbrt have their columns counter-clockwise about z, so they are mirrored.
 fn environment(path: &Path, files: &FileCache, messages: &mut Messages<'_>) -> Option<Light> {
     let image = files.rgb(path).map_err(|error| report(&error, path, messages.span, messages.diagnostics)).ok()?;
     let (texels, size) = Arc::unwrap_or_clone(image);
     let mapping = if size[0] == size[1] { EnvironmentMapping::EqualArea } else { EnvironmentMapping::LatLong };
     match EnvironmentMap::new(texels, size, mapping, EnvironmentFilter::Nearest) {
         Ok(map) => {
-            let turn = Affine3A::from_rotation_x(-std::f32::consts::FRAC_PI_2);
-            Some(Light::infinite_image(Arc::new(map), &turn, 1.0))
+            let world_from_map = Affine3A::from_cols(-Vec3A::X, -Vec3A::Z, Vec3A::Y, Vec3A::ZERO);
+            Some(Light::infinite_image(Arc::new(map), &world_from_map, 1.0))
         }
         Err(reason) => {
             messages.diagnostics.error(messages.span, format!("{}: {reason}", path.display()));

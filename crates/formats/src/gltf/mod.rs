@@ -3,7 +3,7 @@
 //! The types of what is read and all indices are checked first; whether accessors lie inside their buffers, before
 //! anything is read or allocated. Errors name the place in the JSON, or the byte of the container.
 //!
-//! Reading order: [`place`], [`container`], [`schema`], [`document`], [`accessor`]; [`locate`] for
+//! Reading order: [`place`], [`container`], [`schema`], [`document`], [`accessor`]; [`mod@locate`] for
 //! messages.
 
 pub mod accessor;
