@@ -189,9 +189,12 @@ impl<'a> Assembly<'a> {
     fn add_light(&mut self, node: &Node<'a>) {
         let Some(index) = node.place.extension("KHR_lights_punctual").key("light").index() else { return };
         let light = self.document.root().extension("KHR_lights_punctual").key("lights").item(index);
-        let color = Rgb::from_array(light.key("color").numbers().unwrap_or([1.0; 3]));
+        let color = Rgb::from_array(light.key("color").numbers().unwrap_or([1.0; 3])).map(|c| c.max(0.0));
         let intensity = color * (light.key("intensity").number().unwrap_or(1.0).max(0.0) / LUMENS_PER_WATT);
         let m = &node.world_from_node;
+        if !m.is_finite() {
+            return;
+        }
         let (p, axis) = (m.transform_point3(Vec3::ZERO), m.transform_vector3(-Vec3::Z).normalize_or(-Vec3::Z));
         match light.key("type").text() {
             Some("directional") => self.lights.push(Light::Distant { wi_world: -axis, l: intensity }),

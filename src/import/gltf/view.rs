@@ -26,7 +26,9 @@ pub(super) fn camera(
     messages: &mut Messages<'_>,
 ) -> (Camera, FilmSettings) {
     let cameras = document.root().key("cameras");
-    let found = nodes.iter().find_map(|n| Some((n, cameras.item(n.place.key("camera").index()?))));
+    let mut placed =
+        nodes.iter().filter(|n| n.world_from_node.is_finite() && n.world_from_node.matrix3.determinant() != 0.0);
+    let found = placed.find_map(|n| Some((n, cameras.item(n.place.key("camera").index()?))));
     let found = if options.camera_auto { None } else { found };
     if found.is_none() && !options.camera_auto {
         messages.warning(&cameras, "no camera: one that frames the scene is used (--camera-auto)");
@@ -61,6 +63,7 @@ fn of_file(node: &Node<'_>, camera: &Place<'_>, aspect: f32, resolution: [u32; 2
 fn frame(bounds: &Bounds3, aspect: f32, resolution: [u32; 2]) -> Camera {
     let (center, radius) = bounds.bounding_sphere();
     let radius = if radius > 0.0 && radius.is_finite() { radius } else { 1.0 };
+    let center = if center.is_finite() { center } else { Vec3::ZERO };
     let half = (AUTO_FOV.to_radians() * 0.5).tan() * aspect.min(1.0);
     let eye = center + AUTO_DIRECTION.normalize() * (radius / half.atan().sin());
     let z = (center - eye).normalize();
