@@ -134,6 +134,8 @@ def render(
     threads: Optional[int] = None,
     tile_size: int = 16,
     time: Optional[float] = None,
+    environment: Optional[Path] = None,
+    camera_auto: bool = False,
     aov: Optional[Sequence[str]] = None,
     **settings: Unpack[Settings],
 ) -> Rendering:
@@ -144,7 +146,7 @@ def render(
     Parameters
     ----------
     scene
-        A file (.pbrt, .pbrt.gz), or the text of one: a str is text if it has a line break or a quotation mark, or if
+        A file (.pbrt, .pbrt.gz, .gltf, .glb), or the text of a pbrt file: a str is text if it has a line break or a quotation mark, or if
         `folder` is given.
     folder
         Where files are sought that the text names; the working folder by default.
@@ -161,6 +163,8 @@ def render(
     resolution, crop, box_filter, accel, packet_width, threads, tile_size, time
         As on the command line: columns and rows; x0, x1, y0, y1 in fractions of the image; a pixel filter of one pixel;
         `embree` or `bvh`; rays per packet; threads; edge of a tile; seconds after which to stop.
+    environment, camera_auto
+        Of glTF scenes: the image of an environment, and whether the scene is framed whatever its cameras.
     aov
         Layers beside the image: `variance`, `samples`, `albedo`, `normal`, `depth`, `material`, `object`, `ratio`, `records`.
         None asks for all that there are; an empty list saves the time for them.
@@ -190,6 +194,8 @@ def render(
         "threads": threads,
         "tile_size": tile_size,
         "time": time,
+        "environment": None if environment is None else os.fspath(environment),
+        "camera_auto": camera_auto,
         "aov": None if aov is None else list(aov),
         "interval": interval,
         "settings": _texts(settings),

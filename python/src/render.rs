@@ -49,6 +49,8 @@ pub(crate) struct Options {
     threads: Option<u32>,
     tile_size: u32,
     time: Option<f64>,
+    environment: Option<PathBuf>,
+    camera_auto: bool,
     aov: Option<Vec<String>>,
     interval: f64,
     settings: Vec<(String, String)>,
@@ -134,7 +136,12 @@ impl Options {
         };
         Ok(Request {
             source: self.source,
-            load: LoadOptions { resolution: self.resolution, crop: self.crop },
+            load: LoadOptions {
+                resolution: self.resolution,
+                crop: self.crop,
+                environment: self.environment,
+                camera_auto: self.camera_auto,
+            },
             box_filter: self.box_filter,
             accel,
             packet_width: self.packet_width,

@@ -1,15 +1,16 @@
 //! Alpha masks: which hits on a geometry with an alpha texture stop a ray. Both ray tracers call this.
 
 use super::Hit;
-use crate::geometry::GeometrySet;
+use crate::geometry::{GeometrySet, VertexValues};
 use lumiris_numbers::math::hash::{hash_floats, pcg4d, unit_f32};
 use lumiris_numbers::math::{Ray, Vec2, Vec3};
 use std::sync::Arc;
 
 /// Values of alpha textures.
 pub trait AlphaSource: Send + Sync {
-    /// Value of float texture `texture` at the texture coordinates `uv` of the world-space point `p`.
-    fn alpha(&self, texture: u32, uv: Vec2, p: Vec3) -> f32;
+    /// Value of float texture `texture` at the texture coordinates `uv` of the world-space point `p`, where the vertices
+    /// have the values `vertex`.
+    fn alpha(&self, texture: u32, uv: Vec2, vertex: &VertexValues, p: Vec3) -> f32;
 }
 
 /// The alpha test of a hit.
@@ -34,7 +35,8 @@ impl AlphaTest {
         let geometry = &self.geometry.geometries[hit.geometry as usize];
         let Some(texture) = geometry.alpha else { return true };
         let uv = geometry.shape.texture_coordinates(hit.primitive, hit.uv);
-        let alpha = self.source.alpha(texture, uv, world_ray.at(hit.t));
+        let vertex = geometry.shape.vertex_values(hit.primitive, hit.uv);
+        let alpha = self.source.alpha(texture, uv, &vertex, world_ray.at(hit.t));
         if alpha >= 1.0 {
             return true;
         }

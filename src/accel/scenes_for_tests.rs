@@ -13,7 +13,7 @@ use std::sync::Arc;
 pub(super) struct Stripes;
 
 impl AlphaSource for Stripes {
-    fn alpha(&self, texture: u32, uv: Vec2, p: Vec3) -> f32 {
+    fn alpha(&self, texture: u32, uv: Vec2, _: &crate::geometry::VertexValues, p: Vec3) -> f32 {
         match texture {
             0 => 0.0,
             1 => 0.4,

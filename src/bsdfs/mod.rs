@@ -3,7 +3,7 @@
 //! is scaled by 1/η².
 //!
 //! Reading order: [`fresnel`], [`microfacet`], [`diffuse`], [`diffuse_transmission`], [`conductor`], [`dielectric`],
-//! [`thin_dielectric`], [`coat_table`], [`coated_diffuse`], [`layered`]; then what can only be evaluated: [`models`],
+//! [`thin_dielectric`], [`coat_table`], [`coated_diffuse`], [`layered`], `ggx_albedo`, [`principled`]; then what can only be evaluated: [`models`],
 //! [`default_lobes`], [`evaluated`], [`mod@resample`].
 
 pub mod coat_table;
@@ -15,9 +15,11 @@ pub mod diffuse;
 pub mod diffuse_transmission;
 pub mod evaluated;
 pub mod fresnel;
+mod ggx_albedo;
 pub mod layered;
 pub mod microfacet;
 pub mod models;
+pub mod principled;
 pub mod resample;
 #[cfg(test)]
 mod tests;
@@ -34,6 +36,7 @@ pub use evaluated::Evaluated;
 pub use layered::{Base, Layered};
 pub use microfacet::TrowbridgeReitz;
 pub use models::Model;
+pub use principled::Principled;
 pub use resample::{Resampled, resample};
 pub use thin_dielectric::ThinDielectric;
 
@@ -120,6 +123,8 @@ pub enum Bsdf<'a> {
     CoatedDiffuse(CoatedDiffuse<'a>),
     /// Any base under any coat, by random walks.
     Layered(Layered),
+    /// Metal, glossy diffuse or glass under a coat.
+    Principled(Principled),
     /// Reflection that can only be evaluated.
     Evaluated(Evaluated),
 }
@@ -162,6 +167,7 @@ impl<'a> Bsdf<'a> {
             Bsdf::ThinDielectric(_) => Rgb::BLACK,
             Bsdf::CoatedDiffuse(b) => b.f(wo, wi),
             Bsdf::Layered(b) => b.f(wo, wi),
+            Bsdf::Principled(b) => b.f(wo, wi),
             Bsdf::Evaluated(b) => b.f(wo, wi),
         };
         if f.is_finite() { f } else { Rgb::BLACK }
@@ -181,6 +187,7 @@ impl<'a> Bsdf<'a> {
             Bsdf::ThinDielectric(_) => 0.0,
             Bsdf::CoatedDiffuse(b) => b.pdf(wo, wi),
             Bsdf::Layered(b) => b.pdf(wo, wi),
+            Bsdf::Principled(b) => b.pdf(wo, wi),
             Bsdf::Evaluated(b) => b.pdf(wo, wi),
         };
         if pdf.is_finite() { pdf } else { 0.0 }
@@ -195,6 +202,7 @@ impl<'a> Bsdf<'a> {
             Bsdf::DiffuseTransmission(b) => b.first_lobe(),
             Bsdf::CoatedDiffuse(b) => b.first_lobe(wo),
             Bsdf::Layered(b) => b.first_lobe(wo),
+            Bsdf::Principled(b) => b.first_lobe(wo),
             Bsdf::Evaluated(b) => b.density.first_lobe(),
             Bsdf::Diffuse(_) | Bsdf::Conductor(_) | Bsdf::Dielectric(_) | Bsdf::ThinDielectric(_) => 1.0,
         }
@@ -209,6 +217,7 @@ impl<'a> Bsdf<'a> {
             Bsdf::DiffuseTransmission(_) => return 0.0,
             Bsdf::CoatedDiffuse(b) => b.pdf_first_lobe(wo, wi),
             Bsdf::Layered(b) => b.pdf_first_lobe(wo, wi),
+            Bsdf::Principled(b) => b.pdf_first_lobe(wo, wi),
             Bsdf::Evaluated(b) => b.density.pdf_first_lobe(wo, wi),
         };
         // Not finite or, by rounding, more than the whole
@@ -240,7 +249,7 @@ impl<'a> Bsdf<'a> {
             Bsdf::Dielectric(b) => Some(LaneModel::Dielectric(b.lanes())),
             Bsdf::ThinDielectric(_) => Some(none),
             Bsdf::CoatedDiffuse(b) => b.lanes(wo),
-            Bsdf::Layered(_) | Bsdf::Evaluated(_) => None,
+            Bsdf::Layered(_) | Bsdf::Principled(_) | Bsdf::Evaluated(_) => None,
         }
     }
 
@@ -249,6 +258,7 @@ impl<'a> Bsdf<'a> {
     pub fn transmits(&self) -> bool {
         match self {
             Bsdf::DiffuseTransmission(_) | Bsdf::Dielectric(_) | Bsdf::ThinDielectric(_) => true,
+            Bsdf::Principled(b) => b.transmission > 0.0,
             Bsdf::Diffuse(_) | Bsdf::Conductor(_) | Bsdf::CoatedDiffuse(_) | Bsdf::Layered(_) | Bsdf::Evaluated(_) => {
                 false
             }
@@ -262,6 +272,7 @@ impl<'a> Bsdf<'a> {
         match self {
             Bsdf::Diffuse(_) => 1.0,
             Bsdf::DiffuseTransmission(_) | Bsdf::Evaluated(_) => self.first_lobe(wo),
+            Bsdf::Principled(b) => b.wide_lobe(wo),
             Bsdf::CoatedDiffuse(_) | Bsdf::Layered(_) => 1.0 - self.first_lobe(wo),
             Bsdf::Conductor(_) | Bsdf::Dielectric(_) | Bsdf::ThinDielectric(_) => 0.0,
         }
@@ -288,6 +299,7 @@ impl<'a> Bsdf<'a> {
             Bsdf::ThinDielectric(b) => b.sample(wo, uc),
             Bsdf::CoatedDiffuse(b) => b.sample(wo, uc, u),
             Bsdf::Layered(b) => b.sample(wo, uc, u),
+            Bsdf::Principled(b) => b.sample(wo, uc, u),
             Bsdf::Evaluated(b) => b.sample(wo, uc, u),
         };
         sample.filter(|s| s.pdf > 0.0 && s.pdf.is_finite() && s.wi.z != 0.0)
@@ -297,7 +309,11 @@ impl<'a> Bsdf<'a> {
     #[inline]
     pub fn has_non_specular(&self) -> bool {
         match self {
-            Bsdf::Diffuse(_) | Bsdf::DiffuseTransmission(_) | Bsdf::CoatedDiffuse(_) | Bsdf::Evaluated(_) => true,
+            Bsdf::Diffuse(_)
+            | Bsdf::DiffuseTransmission(_)
+            | Bsdf::CoatedDiffuse(_)
+            | Bsdf::Principled(_)
+            | Bsdf::Evaluated(_) => true,
             Bsdf::Conductor(b) => !b.distribution.is_smooth(),
             Bsdf::Dielectric(b) => !b.is_specular(),
             Bsdf::ThinDielectric(_) => false,
@@ -309,7 +325,7 @@ impl<'a> Bsdf<'a> {
     #[inline]
     pub fn has_specular(&self) -> bool {
         match self {
-            Bsdf::Diffuse(_) | Bsdf::DiffuseTransmission(_) | Bsdf::Evaluated(_) => false,
+            Bsdf::Diffuse(_) | Bsdf::DiffuseTransmission(_) | Bsdf::Principled(_) | Bsdf::Evaluated(_) => false,
             Bsdf::Conductor(b) => b.distribution.is_smooth(),
             Bsdf::Dielectric(b) => b.is_specular(),
             Bsdf::ThinDielectric(_) => true,
@@ -329,7 +345,8 @@ impl<'a> Bsdf<'a> {
             | Bsdf::Dielectric(_)
             | Bsdf::ThinDielectric(_)
             | Bsdf::CoatedDiffuse(_)
-            | Bsdf::Layered(_) => false,
+            | Bsdf::Layered(_)
+            | Bsdf::Principled(_) => false,
         }
     }
 
@@ -347,6 +364,7 @@ impl<'a> Bsdf<'a> {
             | Bsdf::Dielectric(_)
             | Bsdf::ThinDielectric(_)
             | Bsdf::Layered(_)
+            | Bsdf::Principled(_)
             | Bsdf::Evaluated(_) => None,
         }
     }
@@ -365,6 +383,7 @@ impl<'a> Bsdf<'a> {
             | Bsdf::Dielectric(_)
             | Bsdf::ThinDielectric(_)
             | Bsdf::Layered(_)
+            | Bsdf::Principled(_)
             | Bsdf::Evaluated(_) => {
                 let [uc, u0, u1] = u();
                 self.sample(wo, uc, [u0, u1]).map_or(Rgb::BLACK, |s| s.f * (s.wi.z.abs() / s.pdf))

@@ -3,7 +3,7 @@
 //! A ray hits the patch where it meets one of the segments from edge p00–p10 to edge p01–p11: a quadratic in u
 //! [Reshetov 2019], solved in f64, so that only the rounding of the ray itself limits the accuracy.
 
-use super::hit::{LocalHit, SurfaceHit, face_forward, round, spanning};
+use super::hit::{LocalHit, SurfaceHit, VertexValues, face_forward, round, spanning};
 use glam::DVec3;
 use lumiris_numbers::math::{Bounds3, Ray, Vec2, Vec3, gamma};
 
@@ -106,7 +106,8 @@ impl BilinearMesh {
         // Derivatives by the texture coordinates, by the chain rule.
         let (dpdu, dpdv) = self.texture_derivatives(i, uv, [du, dv]);
         let (dpdu, dpdv) = spanning(dpdu, dpdv, n);
-        SurfaceHit { p, p_error, n, ns, dpdu, dpdv, dpdus: dpdu, uv: self.texture_coordinates_at(i, uv) }
+        let uv = self.texture_coordinates_at(i, uv);
+        SurfaceHit { p, p_error, n, ns, dpdu, dpdv, dpdus: dpdu, uv, vertex: VertexValues::default() }
     }
 
     /// The texture coordinates of patch `i` at its parameters `uv`: the parameters themselves if the mesh has none.

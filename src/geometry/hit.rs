@@ -13,6 +13,21 @@ pub struct LocalHit {
     pub uv: [f32; 2],
 }
 
+/// Values that a mesh may give for its vertices besides the texture coordinates, interpolated.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct VertexValues {
+    /// Second texture coordinates; zero if there are none.
+    pub uv1: Vec2,
+    /// Linear colour and opacity; 1 if there are none.
+    pub color: [f32; 4],
+}
+
+impl Default for VertexValues {
+    fn default() -> Self {
+        VertexValues { uv1: Vec2::ZERO, color: [1.0; 4] }
+    }
+}
+
 /// A point on a surface as materials and lights see it. World space, unless the shape that made it says otherwise.
 #[derive(Clone, Copy, Debug)]
 pub struct SurfaceHit {
@@ -32,6 +47,8 @@ pub struct SurfaceHit {
     pub dpdus: Vec3,
     /// Texture coordinates.
     pub uv: Vec2,
+    /// What else the vertices have.
+    pub vertex: VertexValues,
 }
 
 impl SurfaceHit {
@@ -54,6 +71,7 @@ impl SurfaceHit {
             dpdv: world_from_group.transform_vector3(self.dpdv),
             dpdus: world_from_group.transform_vector3(self.dpdus),
             uv: self.uv,
+            vertex: self.vertex,
         }
     }
 }

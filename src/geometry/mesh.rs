@@ -1,6 +1,6 @@
 //! Indexed triangle meshes.
 
-use super::hit::{SurfaceHit, face_forward, round, spanning};
+use super::hit::{SurfaceHit, VertexValues, face_forward, round, spanning};
 use lumiris_numbers::math::{Bounds3, Vec2, Vec3, gamma};
 
 /// Indexed triangles. Optional per-vertex arrays are empty if absent, else as long as the positions.
@@ -14,6 +14,10 @@ pub struct TriangleMesh {
     pub normals: Vec<Vec3>,
     /// Texture coordinates.
     pub uvs: Vec<Vec2>,
+    /// Second texture coordinates.
+    pub uvs1: Vec<Vec2>,
+    /// Linear colours and opacities.
+    pub colors: Vec<[f32; 4]>,
     /// Shading tangents.
     pub tangents: Vec<Vec3>,
     /// True if the geometric normal is the reverse of (p1 − p0) × (p2 − p0): pbrt's
@@ -95,8 +99,9 @@ impl TriangleMesh {
         let (dpdu, dpdv) = partial_derivatives(corners, st);
         let (dpdu, dpdv) = spanning(dpdu, dpdv, ns);
         let dpdus = self.blend(&self.tangents, i, b).filter(|s| s.length_squared() > 0.0).unwrap_or(dpdu);
+        let vertex = self.vertex_values_at(i, uv);
         let uv = self.texture_coordinates_at(i, uv);
-        SurfaceHit { p, p_error, n, ns, dpdu, dpdv, dpdus, uv }
+        SurfaceHit { p, p_error, n, ns, dpdu, dpdv, dpdus, uv, vertex }
     }
 
     /// The texture coordinates of triangle `i`'s corners.
@@ -113,6 +118,24 @@ impl TriangleMesh {
     pub fn texture_coordinates_at(&self, i: usize, uv: [f32; 2]) -> Vec2 {
         let [st0, st1, st2] = self.texture_coordinates(i);
         st0 * (1.0 - uv[0] - uv[1]) + st1 * uv[0] + st2 * uv[1]
+    }
+
+    /// Second texture coordinates and colour of triangle `i` at the weights `uv` of vertices 1 and 2.
+    #[inline]
+    pub fn vertex_values_at(&self, i: usize, uv: [f32; 2]) -> VertexValues {
+        let mut values = VertexValues::default();
+        if self.uvs1.is_empty() && self.colors.is_empty() {
+            return values;
+        }
+        let vertices = self.indices[i].map(|v| v as usize);
+        let b = [1.0 - uv[0] - uv[1], uv[0], uv[1]];
+        if !self.uvs1.is_empty() {
+            values.uv1 = (0..3).map(|k| self.uvs1[vertices[k]] * b[k]).sum();
+        }
+        if !self.colors.is_empty() {
+            values.color = std::array::from_fn(|c| (0..3).map(|k| self.colors[vertices[k]][c] * b[k]).sum());
+        }
+        values
     }
 
     fn shading_normal(&self, i: usize, b: [f32; 3]) -> Option<Vec3> {

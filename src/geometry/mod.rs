@@ -13,7 +13,7 @@ pub mod set;
 pub mod triangle;
 
 pub use bilinear::BilinearMesh;
-pub use hit::{LocalHit, SurfaceHit};
+pub use hit::{LocalHit, SurfaceHit, VertexValues};
 pub use loop_subdiv::loop_subdivide;
 pub use mesh::TriangleMesh;
 pub use quadric::{Quadric, QuadricKind};
@@ -48,6 +48,14 @@ impl Shape {
             Shape::Mesh(mesh) => mesh.surface_hit(primitive as usize, uv),
             Shape::Quadric(quadric) => quadric.surface_hit(uv),
             Shape::Bilinear(mesh) => mesh.surface_hit(primitive as usize, uv),
+        }
+    }
+
+    /// What else vertices have, at the parametric position `uv` of `primitive`.
+    pub fn vertex_values(&self, primitive: u32, uv: [f32; 2]) -> VertexValues {
+        match self {
+            Shape::Mesh(mesh) => mesh.vertex_values_at(primitive as usize, uv),
+            Shape::Quadric(_) | Shape::Bilinear(_) => VertexValues::default(),
         }
     }
 

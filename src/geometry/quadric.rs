@@ -8,7 +8,7 @@
 //! applied to rays, takes it onto the local surface: the two transforms are rounded separately, and their difference
 //! would otherwise be an error of the point.
 
-use super::hit::{LocalHit, SurfaceHit, round, spanning};
+use super::hit::{LocalHit, SurfaceHit, VertexValues, round, spanning};
 use glam::{DAffine3, DVec3};
 use lumiris_numbers::math::transform::{swaps_handedness, transform_normal};
 use lumiris_numbers::math::{Affine3A, Bounds3, Ray, Vec2, Vec3, gamma};
@@ -118,7 +118,8 @@ impl Quadric {
         let n = if reversed { -outward } else { outward };
         let [dpdu, dpdv] = local.derivatives.map(|v| round(group_from_local.transform_vector3(v)));
         let (dpdu, dpdv) = spanning(dpdu, dpdv, n);
-        SurfaceHit { p, p_error, n, ns: n, dpdu, dpdv, dpdus: dpdu, uv: Vec2::from(uv) }
+        let vertex = VertexValues::default();
+        SurfaceHit { p, p_error, n, ns: n, dpdu, dpdv, dpdus: dpdu, uv: Vec2::from(uv), vertex }
     }
 }
 

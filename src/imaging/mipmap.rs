@@ -20,6 +20,33 @@ pub enum Wrap {
     Clamp,
     /// The unfolded octahedron: an edge is joined to itself, mirrored about its middle.
     OctahedralSphere,
+    /// As each axis has it.
+    Axes([AxisWrap; 2]),
+}
+
+/// What lies outside the image along one axis.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum AxisWrap {
+    /// The image again.
+    Repeat,
+    /// The image by turns mirrored and as it is.
+    Mirror,
+    /// The nearest pixel.
+    Clamp,
+}
+
+impl AxisWrap {
+    /// The pixel of 0..`count` that stands at `i`. Panics if there is none.
+    pub fn pixel(self, i: i64, count: i64) -> i64 {
+        match self {
+            AxisWrap::Repeat => i.rem_euclid(count),
+            AxisWrap::Mirror => {
+                let i = i.rem_euclid(2 * count);
+                if i < count { i } else { 2 * count - 1 - i }
+            }
+            AxisWrap::Clamp => i.clamp(0, count - 1),
+        }
+    }
 }
 
 /// The filter of a lookup.
@@ -234,6 +261,7 @@ impl MipMap {
             Wrap::Repeat => (x.rem_euclid(w), y.rem_euclid(h)),
             Wrap::Black => return None,
             Wrap::Clamp => (x.clamp(0, w - 1), y.clamp(0, h - 1)),
+            Wrap::Axes([of_x, of_y]) => (of_x.pixel(x, w), of_y.pixel(y, h)),
             Wrap::OctahedralSphere => {
                 // Each step over an edge mirrors the other axis; lookups go at most one image beyond.
                 let (mut x, mut y) = (x, y);
@@ -389,6 +417,11 @@ mod tests {
         assert_eq!(at(Wrap::Repeat, 5.125, -0.75), Rgb::new(0.0, 0.0, 7.0));
         assert_eq!(at(Wrap::Black, 0.0, 0.25).b, 3.5);
         assert_eq!(at(Wrap::Black, 1.5, 0.25), Rgb::BLACK);
+        let mixed = Wrap::Axes([AxisWrap::Mirror, AxisWrap::Clamp]);
+        assert_eq!(at(mixed, 1.125, 9.0), at(Wrap::Clamp, 0.875, 9.0));
+        assert_eq!(at(mixed, -2.125, 9.0), at(Wrap::Clamp, 0.125, 9.0));
+        let mixed = Wrap::Axes([AxisWrap::Repeat, AxisWrap::Mirror]);
+        assert_eq!(at(mixed, 5.125, -0.75), at(Wrap::Clamp, 0.125, 0.75));
         assert_eq!(at(Wrap::Repeat, f32::NAN, 0.2), Rgb::BLACK);
         assert!(at(Wrap::Repeat, 1e30, -1e30).is_finite());
     }

@@ -15,7 +15,7 @@ pub mod oiio;
 pub mod view_transform;
 
 pub use color::ColorEncoding;
-pub use mipmap::{Filter, MipMap, Wrap};
+pub use mipmap::{AxisWrap, Filter, MipMap, Wrap};
 pub use view_transform::ViewTransform;
 
 /// Pixels with named channels.

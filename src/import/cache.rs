@@ -4,7 +4,7 @@
 //! dropped when the next one has been loaded ([`FileCache::end_scene`]), so that memory holds what two scenes need at
 //! most. Text of scene files is not kept: it is what differs.
 
-use super::images::{ImageEncoding, ImageRequest, RgbImage, load_map, load_rgb};
+use super::images::{ImageChannels, ImageEncoding, ImageRequest, RgbImage, load_map, load_rgb};
 use crate::imaging::oiio::ImageError;
 use crate::imaging::{Filter, MipMap, Wrap};
 use lumiris_formats::ply::{PlyError, PlyMesh, read_ply};
@@ -90,7 +90,7 @@ pub struct FileCache {
     /// False if nothing is kept.
     keeps: bool,
     meshes: Shelf<(), PlyMesh>,
-    maps: Shelf<(ImageEncoding, Wrap, Filter), MipMap>,
+    maps: Shelf<(ImageChannels, ImageEncoding, Wrap, Filter), MipMap>,
     images: Shelf<(), RgbImage>,
     read: AtomicU64,
     shared: AtomicU64,
@@ -114,7 +114,7 @@ impl FileCache {
 
     /// The pyramid of an image for textures.
     pub fn map(&self, request: &ImageRequest) -> Result<Arc<MipMap>, ImageError> {
-        let how = (request.encoding, request.wrap, request.filter);
+        let how = (request.channels, request.encoding, request.wrap, request.filter);
         self.get(&self.maps, &request.path, how, || load_map(request))
     }
 

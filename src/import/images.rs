@@ -1,7 +1,7 @@
 //! Image files as scenes ask for them, and how they are read.
 
 use crate::imaging::oiio::{self, ImageError, ReadLimits};
-use crate::imaging::{ColorChannels, ColorEncoding, Filter, MipMap, Wrap};
+use crate::imaging::{ColorChannels, ColorEncoding, Filter, Image, MipMap, Wrap};
 use lumiris_numbers::math::Rgb;
 use std::path::{Path, PathBuf};
 
@@ -21,11 +21,22 @@ pub enum ImageEncoding {
     Gamma(f32),
 }
 
+/// Which channels of an image are read.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum ImageChannels {
+    /// Colour or grey.
+    Color,
+    /// Opacity; 1 where there is none.
+    Alpha,
+}
+
 /// An image as textures ask for it.
 #[derive(Clone, Debug, PartialEq)]
 pub struct ImageRequest {
     /// File.
     pub path: PathBuf,
+    /// The part of it.
+    pub channels: ImageChannels,
     /// Meaning of its numbers.
     pub encoding: ImageEncoding,
     /// Outside of 0..1.
@@ -37,6 +48,9 @@ pub struct ImageRequest {
 /// Reads an image as textures ask for it.
 pub fn load_map(request: &ImageRequest) -> Result<MipMap, ImageError> {
     let read = oiio::read_image(&request.path, &ReadLimits::default())?;
+    if request.channels == ImageChannels::Alpha {
+        return Ok(alpha_map(&read.image, request));
+    }
     let encoding = match request.encoding {
         // Floats are light already, whatever the scene says: pbrt-v4 decodes integers only.
         _ if read.encoding == ColorEncoding::Linear => ColorEncoding::Linear,
@@ -46,6 +60,17 @@ pub fn load_map(request: &ImageRequest) -> Result<MipMap, ImageError> {
         ImageEncoding::Gamma(gamma) => ColorEncoding::Gamma(gamma),
     };
     Ok(MipMap::new(&read.image, request.wrap, request.filter, encoding))
+}
+
+/// The opacity of an image, which is stored linear.
+fn alpha_map(image: &Image, request: &ImageRequest) -> MipMap {
+    let Some(position) = image.channel("A") else {
+        return MipMap::constant(1.0, request.wrap, request.filter);
+    };
+    let data = image.data.iter().skip(position).step_by(image.channels.len()).copied().collect();
+    let (width, height) = (image.width, image.height);
+    let alpha = Image { width, height, channels: vec!["Y".to_owned()], data };
+    MipMap::new(&alpha, request.wrap, request.filter, ColorEncoding::Linear)
 }
 
 /// Reads an image as linear RGB, rows from the top, with its size.

@@ -1,12 +1,13 @@
-//! From scene files to scenes: the meaning of directives ([`pbrt`]), and the images and meshes that they name
-//! ([`resources`], [`images`]), which the scenes of an animation share ([`cache`]). A [`fingerprint`] tells a scene from
-//! others.
+//! From scene files to scenes: the meaning of pbrt's directives ([`pbrt`]) and of glTF ([`gltf`]), and the images and
+//! meshes that they name ([`resources`], [`images`]), which the scenes of an animation share ([`cache`]). A
+//! [`fingerprint`] tells a scene from others.
 //!
 //! The files themselves are parsed by the crate `lumiris_formats`. User input never panics: problems are collected,
 //! with their source locations, in [`Diagnostics`].
 
 pub mod cache;
 pub mod fingerprint;
+pub mod gltf;
 pub mod images;
 pub mod pbrt;
 pub mod resources;
@@ -18,17 +19,21 @@ use cache::FileCache;
 use fingerprint::SceneFiles;
 use lumiris_formats::diagnostic::{Diagnostics, Report};
 use lumiris_formats::pbrt::parser::{parse_file, parse_source};
-use lumiris_formats::source::SourceMap;
+use lumiris_formats::source::{SourceMap, Span};
 use pbrt::state::Builder;
 use std::path::{Path, PathBuf};
 
 /// What overrides a scene file.
-#[derive(Clone, Copy, Debug, Default, PartialEq)]
+#[derive(Clone, Debug, Default, PartialEq)]
 pub struct LoadOptions {
     /// Size of the image (width, height).
     pub resolution: Option<[u32; 2]>,
     /// Crop window x0, x1, y0, y1 in fractions of the image.
     pub crop: Option<[f32; 4]>,
+    /// Image of the environment of a glTF scene.
+    pub environment: Option<PathBuf>,
+    /// True if a glTF scene is framed, whatever its cameras.
+    pub camera_auto: bool,
 }
 
 /// A scene, its settings, and warnings.
@@ -58,6 +63,10 @@ pub fn load(path: &Path, options: &LoadOptions) -> Result<Loaded, Box<Report>> {
 
 /// Loads a scene file; meshes and images that `files` has are not read again.
 pub fn load_with(path: &Path, options: &LoadOptions, files: &FileCache) -> Result<Loaded, Box<Report>> {
+    let is_gltf = |e: &std::ffi::OsStr| e.eq_ignore_ascii_case("gltf") || e.eq_ignore_ascii_case("glb");
+    if path.extension().is_some_and(is_gltf) {
+        return gltf::load(path, options, files);
+    }
     let folder = path.parent().map(Path::to_path_buf).unwrap_or_default();
     load_parsed(folder, options, files, |sources, diagnostics, builder| {
         parse_file(path, sources, diagnostics, builder);
@@ -89,6 +98,11 @@ fn load_parsed(
     let mut diagnostics = Diagnostics::new();
     let mut builder = Builder::new(folder, options);
     parse(&mut sources, &mut diagnostics, &mut builder);
+    if options.environment.is_some() || options.camera_auto {
+        let message =
+            "environment and camera of a pbrt scene are in its file: --environment and --camera-auto are for glTF";
+        diagnostics.error(Span::default(), message);
+    }
     let scene_files = SceneFiles::new(&sources, builder.files());
     let finished = builder.finish(files, &mut diagnostics);
     let failed = diagnostics.has_errors();

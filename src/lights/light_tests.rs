@@ -406,6 +406,31 @@ fn emission_images_are_looked_up_at_the_sampled_point() {
 }
 
 #[test]
+fn emission_images_may_have_texture_coordinates_of_their_own() {
+    let data: Vec<Rgb> = (0..64).map(|i| Rgb::new((i % 8) as f32, (i / 8) as f32, 1.0)).collect();
+    let image = super::EmissionImage::new(8, 8, data).unwrap();
+    let wrap = [crate::imaging::AxisWrap::Repeat, crate::imaging::AxisWrap::Mirror];
+    let image_from_uv = glam::Affine2::from_scale_angle_translation(Vec2::new(2.0, 3.0), 0.5, Vec2::new(-3.0, 0.25));
+    let mapping = super::EmissionMapping { second: true, image_from_uv };
+    let expected = image.clone().placed(wrap, None);
+    let image = Some(std::sync::Arc::new(image.placed(wrap, Some(mapping))));
+    let emission = Emission { l: Rgb::WHITE, two_sided: true, image };
+    let mut mesh = TriangleMesh::new(vec![Vec3::ZERO, Vec3::X, Vec3::Y], vec![[0, 1, 2]]).unwrap();
+    mesh.uvs = vec![Vec2::splat(0.1); 3];
+    mesh.uvs1 = vec![Vec2::ZERO, Vec2::X, Vec2::Y];
+    let light = &area_lights_of(&Shape::Mesh(mesh), &emission).lights[0];
+    let mut stream = pcg32([5, 6, 8]);
+    for _ in 0..1000 {
+        let s = light.sample_li(&LightCtx::at(Vec3::new(0.3, 0.4, 2.0)), stream.random::<[f32; 2]>()).unwrap();
+        // Both at the point, whatever the texture coordinates of other textures are there
+        let hit = LightHit { t: s.t, p: s.p, n: s.n, uv: Vec2::splat(0.1) };
+        assert_eq!(light.l(&hit, -s.wi), s.li);
+        let at = expected.lookup(image_from_uv.transform_point2(s.p.truncate()));
+        assert!((at - s.li).map(f32::abs).max_component() < 1e-2, "{at:?} {:?}", s.li);
+    }
+}
+
+#[test]
 fn delta_and_infinite_lights_are_consistent() {
     let distant = Light::Distant { wi_world: Vec3::Y, l: Rgb::splat(2.0) };
     let s = distant.sample_li(&LightCtx::at(Vec3::ONE), [0.1, 0.2]).unwrap();

@@ -1,8 +1,8 @@
 //! Shading frames, optionally perturbed by a normal map or a displacement texture [Blinn 1978].
 
-use super::{Material, MaterialEntry};
+use super::{Material, MaterialEntry, NormalMap};
 use crate::geometry::SurfaceHit;
-use crate::textures::{FloatTextureId, ImageId, TextureContext, TextureSet};
+use crate::textures::{FloatTextureId, TextureContext, TextureSet};
 use lumiris_numbers::math::{Frame, Vec2, Vec3};
 
 /// Step in u and v of the finite differences where the footprint is unknown.
@@ -20,10 +20,14 @@ pub fn shading_frame(entry: &MaterialEntry, textures: &TextureSet, hit: &Surface
 }
 
 /// The tangent-space normal 2c − 1 of the map, in the frame of the hit.
-fn normal_mapped(map: ImageId, textures: &TextureSet, hit: &SurfaceHit, ctx: &TextureContext) -> Frame {
-    let c = textures.images[map as usize].bilinear(0, Vec2::new(ctx.uv.x, 1.0 - ctx.uv.y));
+fn normal_mapped(map: NormalMap, textures: &TextureSet, hit: &SurfaceHit, ctx: &TextureContext) -> Frame {
+    let (st, _) = map.image.mapping.map(ctx);
+    let c = textures.images[map.image.image as usize].bilinear(0, Vec2::new(st.x, 1.0 - st.y));
     let local = Vec3::from_array((c * 2.0).to_array()) - Vec3::ONE;
     let frame = Frame::from_xz(hit.dpdus, hit.ns);
+    let is_mirrored = map.is_along_v && frame.y.dot(hit.dpdv) < 0.0;
+    let scale = Vec2::new(map.strength, if is_mirrored { -map.strength } else { map.strength });
+    let local = (local.truncate() * scale).extend(local.z);
     let ns = frame.to_world(local).normalize_or(hit.ns);
     Frame::from_xz(hit.dpdus, facing(ns, hit.n))
 }

@@ -1,14 +1,16 @@
 //! Materials: evaluate textures at a hit and build the BSDF in its shading frame. Semantics are pbrt-v4's.
 //!
-//! Reading order: this file, [`evaluated`], [`bump`], [`surface`].
+//! Reading order: this file, [`evaluated`], [`principled`], [`bump`], [`surface`].
 
 pub mod bump;
 pub mod evaluated;
+pub mod principled;
 pub mod surface;
 #[cfg(test)]
 mod tests;
 
 pub use evaluated::EvaluatedMaterial;
+pub use principled::PrincipledMaterial;
 pub use surface::SurfaceBsdf;
 
 use crate::bsdfs::{
@@ -16,7 +18,7 @@ use crate::bsdfs::{
     ProposalDensity, ThinDielectric, TrowbridgeReitz,
 };
 use crate::geometry::SurfaceHit;
-use crate::textures::{FloatTextureId, ImageId, RgbTextureId, TextureContext, TextureSet};
+use crate::textures::{FloatTextureId, ImageId, ImageTexture, Mapping2d, RgbTextureId, TextureContext, TextureSet};
 use lumiris_numbers::math::hash::{hash_floats, unit_f32};
 use lumiris_numbers::math::{Rgb, Vec3};
 use rayon::prelude::*;
@@ -127,6 +129,8 @@ pub enum Material {
         /// Walks per evaluation.
         samples: u32,
     },
+    /// Metal, glossy diffuse or glass under a coat.
+    Principled(PrincipledMaterial),
     /// Reflection that can only be evaluated.
     Evaluated(EvaluatedMaterial),
     /// One of two materials at each point, the second with probability `amount`.
@@ -147,6 +151,26 @@ impl Material {
     }
 }
 
+/// A tangent-space normal map.
+#[derive(Clone, Copy, Debug)]
+pub struct NormalMap {
+    /// The image, stored linear.
+    pub image: ImageTexture,
+    /// Factor of the tangential components.
+    pub strength: f32,
+    /// True if the second axis of tangent space is that of ∂p/∂v, where texture coordinates are mirrored; else it is at the
+    /// left of the first, as in pbrt-v4.
+    pub is_along_v: bool,
+}
+
+impl NormalMap {
+    /// The map as pbrt-v4 reads it.
+    pub fn unscaled(image: ImageId) -> Self {
+        let image = ImageTexture { image, mapping: Mapping2d::default(), scale: 1.0, invert: false };
+        NormalMap { image, strength: 1.0, is_along_v: false }
+    }
+}
+
 /// A material with its name and its maps.
 #[derive(Clone, Debug)]
 pub struct MaterialEntry {
@@ -155,7 +179,7 @@ pub struct MaterialEntry {
     /// The material.
     pub material: Material,
     /// Tangent-space normal map, stored linear; it goes before displacement.
-    pub normal_map: Option<ImageId>,
+    pub normal_map: Option<NormalMap>,
     /// Displacement along the normal, which bends the normal only (scene units).
     pub displacement: Option<FloatTextureId>,
 }
@@ -203,7 +227,8 @@ impl MaterialSet {
     /// for those that can only be evaluated.
     pub fn lobes(&self, density: ProposalDensity) -> usize {
         let has_two = |material: &Material| match material {
-            Material::CoatedDiffuse { .. }
+            Material::Principled(_)
+            | Material::CoatedDiffuse { .. }
             | Material::CoatedConductor { .. }
             | Material::DiffuseTransmission { .. } => true,
             Material::Evaluated(_) => density == ProposalDensity::Lobes,
@@ -317,6 +342,7 @@ impl MaterialSet {
                     samples: samples.max(1),
                 })
             }
+            Material::Principled(material) => Bsdf::Principled(material.bsdf(t)),
             Material::Evaluated(material) => {
                 Bsdf::Evaluated(Evaluated { model: material.model(t), density: ProposalDensity::default() })
             }

@@ -11,11 +11,22 @@ fn hit(n: Vec3) -> SurfaceHit {
     let frame = lumiris_numbers::math::Frame::from_xz(Vec3::new(1.0, 0.2, 0.1), n);
     let (dpdu, dpdv) = (frame.x * 2.0, frame.y * 3.0);
     let p = Vec3::new(1.0, 2.0, 3.0);
-    SurfaceHit { p, p_error: Vec3::ZERO, n, ns: n, dpdu, dpdv, dpdus: dpdu, uv: Vec2::new(0.4, 0.6) }
+    SurfaceHit {
+        p,
+        p_error: Vec3::ZERO,
+        n,
+        ns: n,
+        dpdu,
+        dpdv,
+        dpdus: dpdu,
+        uv: Vec2::new(0.4, 0.6),
+        vertex: Default::default(),
+    }
 }
 
 fn context(hit: &SurfaceHit) -> TextureContext {
-    TextureContext { uv: hit.uv, uv_width: Vec2::ZERO, p: hit.p, n: hit.n }
+    let (uv1, color) = (hit.vertex.uv1, hit.vertex.color);
+    TextureContext { uv: hit.uv, uv_width: Vec2::ZERO, uv1, color, p: hit.p, n: hit.n }
 }
 
 struct Bench {
@@ -136,7 +147,7 @@ fn a_normal_map_sets_the_normal_in_the_tangent_frame() {
     let map = bench.image(4, |_, _| ((local + Vec3::ONE) * 0.5).to_array());
     let reflectance = bench.rgb(0.5, 0.5, 0.5);
     let id = bench.material(Material::Diffuse { reflectance });
-    bench.entries[0].normal_map = Some(map);
+    bench.entries[0].normal_map = Some(NormalMap::unscaled(map));
     let (set, hit) = (bench.set(), hit(UP));
     let s = set.bsdf(id, &bench.textures, &hit, &context(&hit), UP).unwrap();
     let frame = lumiris_numbers::math::Frame::from_xz(hit.dpdus, hit.ns);

@@ -2,7 +2,7 @@
 
 use super::RenderJob;
 use crate::accel::Hit;
-use crate::geometry::SurfaceHit;
+use crate::geometry::{SurfaceHit, VertexValues};
 use crate::materials::SurfaceBsdf;
 use crate::textures::TextureContext;
 use lumiris_numbers::math::ray::offset_origin;
@@ -36,7 +36,8 @@ impl SurfaceInteraction {
             if length > 0.0 { footprint / length } else { 0.0 }
         };
         let uv_width = Vec2::new(extent(surface.dpdu), extent(surface.dpdv));
-        let context = TextureContext { uv: surface.uv, uv_width, p: surface.p, n: surface.n };
+        let VertexValues { uv1, color } = surface.vertex;
+        let context = TextureContext { uv: surface.uv, uv_width, uv1, color, p: surface.p, n: surface.n };
         SurfaceInteraction { hit: *hit, surface, wo: -ray.d.normalize(), width, distance, context }
     }
 

@@ -4,7 +4,7 @@ use super::Scene;
 use crate::accel::bvh::Bvh;
 use crate::accel::embree::{EmbreeAccel, EmbreeError};
 use crate::accel::{Accel, AlphaSource, Coherence, Hit, RayBatch};
-use crate::geometry::{Geometry, GeometryId, GeometrySet, Group, Shape, Visibility};
+use crate::geometry::{Geometry, GeometryId, GeometrySet, Group, Shape, VertexValues, Visibility};
 use crate::lights::LightId;
 use crate::textures::{TextureContext, TextureSet};
 use lumiris_lanes::level;
@@ -102,8 +102,9 @@ pub struct EmitterHit {
 }
 
 impl AlphaSource for TextureSet {
-    fn alpha(&self, texture: u32, uv: Vec2, p: Vec3) -> f32 {
-        self.float(texture, &TextureContext { uv, uv_width: Vec2::ZERO, p, n: Vec3::Z })
+    fn alpha(&self, texture: u32, uv: Vec2, vertex: &VertexValues, p: Vec3) -> f32 {
+        let VertexValues { uv1, color } = *vertex;
+        self.float(texture, &TextureContext { uv, uv_width: Vec2::ZERO, uv1, color, p, n: Vec3::Z })
     }
 }
 

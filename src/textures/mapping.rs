@@ -1,6 +1,7 @@
 //! Maps from surface points to texture coordinates.
 
 use super::TextureContext;
+use glam::Mat2;
 use lumiris_numbers::math::{Affine3A, Vec2, Vec3, warp};
 use std::f32::consts::{FRAC_1_PI, PI, TAU};
 
@@ -13,6 +14,15 @@ pub enum Mapping2d {
         scale: Vec2,
         /// Offset per axis.
         delta: Vec2,
+    },
+    /// matrix·uv + offset of the first or the second texture coordinates; of the latter, points are looked up.
+    Affine {
+        /// True for the second texture coordinates.
+        second: bool,
+        /// Linear part.
+        matrix: Mat2,
+        /// Offset.
+        offset: Vec2,
     },
     /// (θ/π, φ/2π) of the direction from the origin of texture space.
     Spherical {
@@ -49,6 +59,11 @@ impl Mapping2d {
     pub fn map(&self, ctx: &TextureContext) -> (Vec2, Vec2) {
         match self {
             Mapping2d::Uv { scale, delta } => (*scale * ctx.uv + *delta, scale.abs() * ctx.uv_width),
+            Mapping2d::Affine { second: true, matrix, offset } => (*matrix * ctx.uv1 + *offset, Vec2::ZERO),
+            Mapping2d::Affine { second: false, matrix, offset } => {
+                let width = Mat2::from_cols(matrix.x_axis.abs(), matrix.y_axis.abs()) * ctx.uv_width;
+                (*matrix * ctx.uv + *offset, width)
+            }
             Mapping2d::Spherical { texture_from_world } => {
                 let w = texture_from_world.transform_point3(ctx.p).normalize_or(Vec3::Z);
                 let st = Vec2::new(w.z.clamp(-1.0, 1.0).acos() * FRAC_1_PI, warp::azimuth(w) / TAU);
@@ -101,7 +116,7 @@ mod tests {
     use super::*;
 
     fn at(p: Vec3, uv: Vec2) -> TextureContext {
-        TextureContext { uv, uv_width: Vec2::new(0.1, 0.2), p, n: Vec3::Z }
+        TextureContext { uv, uv_width: Vec2::new(0.1, 0.2), uv1: Vec2::ZERO, color: [1.0; 4], p, n: Vec3::Z }
     }
 
     #[test]

@@ -27,6 +27,10 @@ pub struct TextureContext {
     /// Width of the filter in uv, per axis: the extent on the surface of what a camera sample stands for. 0 is a point
     /// lookup.
     pub uv_width: Vec2,
+    /// Second texture coordinates.
+    pub uv1: Vec2,
+    /// Linear colour and opacity of the vertices.
+    pub color: [f32; 4],
     /// World-space point.
     pub p: Vec3,
     /// World-space geometric normal.
@@ -53,6 +57,17 @@ pub enum FloatTexture {
     Constant(f32),
     /// An image; the mean of its channels.
     Image(ImageTexture),
+    /// One channel (0 to 2) of an image.
+    Channel(ImageTexture, usize),
+    /// Opacity of the vertices.
+    VertexOpacity,
+    /// 1 where the texture is at least the threshold, else 0.
+    Threshold {
+        /// Value.
+        tex: FloatTextureId,
+        /// Threshold.
+        threshold: f32,
+    },
     /// tex·scale.
     Scale {
         /// Value.
@@ -96,6 +111,15 @@ pub enum RgbTexture {
     Constant(Rgb),
     /// An image; one of one channel is grey.
     Image(ImageTexture),
+    /// Colour of the vertices.
+    VertexColor,
+    /// tex1·tex2.
+    Product {
+        /// A factor.
+        tex1: RgbTextureId,
+        /// The other one.
+        tex2: RgbTextureId,
+    },
     /// tex·scale.
     Scale {
         /// Value.
@@ -148,9 +172,10 @@ impl TextureSet {
     /// before the first lookup.
     pub fn add_float(&mut self, texture: FloatTexture) -> FloatTextureId {
         let children: &[FloatTextureId] = match &texture {
-            FloatTexture::Constant(_) => &[],
+            FloatTexture::Constant(_) | FloatTexture::VertexOpacity => &[],
             // Images may come later: an importer reads all of them at once.
-            FloatTexture::Image(_) => &[],
+            FloatTexture::Image(_) | FloatTexture::Channel(..) => &[],
+            FloatTexture::Threshold { tex, .. } => &[*tex],
             FloatTexture::Scale { tex, scale } => &[*tex, *scale],
             FloatTexture::Mix { tex1, tex2, amount } => &[*tex1, *tex2, *amount],
             FloatTexture::DirectionMix { tex1, tex2, .. } | FloatTexture::Checkerboard { tex1, tex2, .. } => {
@@ -167,8 +192,9 @@ impl TextureSet {
     /// before the first lookup.
     pub fn add_rgb(&mut self, texture: RgbTexture) -> RgbTextureId {
         let (children, weight): (&[RgbTextureId], Option<FloatTextureId>) = match &texture {
-            RgbTexture::Constant(_) => (&[], None),
+            RgbTexture::Constant(_) | RgbTexture::VertexColor => (&[], None),
             RgbTexture::Image(_) => (&[], None),
+            RgbTexture::Product { tex1, tex2 } => (&[*tex1, *tex2], None),
             RgbTexture::Scale { tex, scale } => (&[*tex], Some(*scale)),
             RgbTexture::Mix { tex1, tex2, amount } => (&[*tex1, *tex2], Some(*amount)),
             RgbTexture::DirectionMix { tex1, tex2, .. } | RgbTexture::Checkerboard { tex1, tex2, .. } => {
@@ -193,6 +219,9 @@ impl TextureSet {
         match self.floats[id as usize] {
             FloatTexture::Constant(v) => Some(v),
             FloatTexture::Image(_)
+            | FloatTexture::Channel(..)
+            | FloatTexture::VertexOpacity
+            | FloatTexture::Threshold { .. }
             | FloatTexture::Scale { .. }
             | FloatTexture::Mix { .. }
             | FloatTexture::DirectionMix { .. }
@@ -205,6 +234,8 @@ impl TextureSet {
         match self.rgbs[id as usize] {
             RgbTexture::Constant(v) => Some(v),
             RgbTexture::Image(_)
+            | RgbTexture::VertexColor
+            | RgbTexture::Product { .. }
             | RgbTexture::Scale { .. }
             | RgbTexture::Mix { .. }
             | RgbTexture::DirectionMix { .. }
@@ -220,6 +251,9 @@ impl TextureSet {
                 let v = self.image_value(image, ctx).average() * image.scale;
                 if image.invert { (1.0 - v).max(0.0) } else { v }
             }
+            FloatTexture::Channel(image, channel) => self.image_value(image, ctx)[*channel] * image.scale,
+            FloatTexture::VertexOpacity => ctx.color[3],
+            FloatTexture::Threshold { tex, threshold } => f32::from(u8::from(self.float(*tex, ctx) >= *threshold)),
             FloatTexture::Scale { tex, scale } => {
                 let scale = self.float(*scale, ctx);
                 if scale == 0.0 { 0.0 } else { self.float(*tex, ctx) * scale }
@@ -246,6 +280,8 @@ impl TextureSet {
                 let v = self.image_value(image, ctx) * image.scale;
                 (if image.invert { Rgb::WHITE - v } else { v }).map(|c| c.max(0.0))
             }
+            RgbTexture::VertexColor => Rgb::new(ctx.color[0], ctx.color[1], ctx.color[2]),
+            RgbTexture::Product { tex1, tex2 } => self.rgb(*tex1, ctx) * self.rgb(*tex2, ctx),
             RgbTexture::Scale { tex, scale } => {
                 let scale = self.float(*scale, ctx);
                 if scale == 0.0 { Rgb::BLACK } else { self.rgb(*tex, ctx) * scale }
@@ -264,7 +300,8 @@ impl TextureSet {
         }
     }
 
-    fn image_value(&self, texture: &ImageTexture, ctx: &TextureContext) -> Rgb {
+    /// Value of an image at a point.
+    pub fn image_value(&self, texture: &ImageTexture, ctx: &TextureContext) -> Rgb {
         let (st, width) = texture.mapping.map(ctx);
         // Images have t downwards.
         self.images[texture.image as usize].lookup(Vec2::new(st.x, 1.0 - st.y), width)
@@ -287,7 +324,14 @@ mod tests {
     use crate::imaging::{ColorEncoding, Image};
 
     fn at(u: f32, v: f32) -> TextureContext {
-        TextureContext { uv: Vec2::new(u, v), uv_width: Vec2::ZERO, p: Vec3::ZERO, n: Vec3::new(0.6, 0.0, 0.8) }
+        TextureContext {
+            uv: Vec2::new(u, v),
+            uv_width: Vec2::ZERO,
+            uv1: Vec2::ZERO,
+            color: [0.5; 4],
+            p: Vec3::ZERO,
+            n: Vec3::new(0.6, 0.0, 0.8),
+        }
     }
 
     /// A 2×2 image, red below, green above, blue on the right.

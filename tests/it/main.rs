@@ -5,6 +5,7 @@ mod analytic_scenes;
 mod bit_exact;
 mod crosscheck;
 mod evaluated;
+mod gltf;
 mod image_hashes;
 mod irradiance_cache;
 mod layering;

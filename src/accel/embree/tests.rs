@@ -358,7 +358,7 @@ fn unknown_packet_widths_are_refused() {
 fn a_panic_in_an_alpha_source_comes_out_of_the_query() {
     struct Broken;
     impl AlphaSource for Broken {
-        fn alpha(&self, _: u32, _: Vec2, _: Vec3) -> f32 {
+        fn alpha(&self, _: u32, _: Vec2, _: &crate::geometry::VertexValues, _: Vec3) -> f32 {
             panic!("broken texture")
         }
     }

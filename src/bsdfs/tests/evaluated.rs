@@ -170,7 +170,8 @@ fn resampling_is_unbiased_for_every_bsdf() {
                 | Bsdf::Dielectric(_)
                 | Bsdf::ThinDielectric(_)
                 | Bsdf::CoatedDiffuse(_)
-                | Bsdf::Layered(_) => {
+                | Bsdf::Layered(_)
+                | Bsdf::Principled(_) => {
                     let mut sums = [Welford::new(); 3];
                     let mut s = pcg32([seed, 77, 3]);
                     for _ in 0..100_000 {

@@ -191,7 +191,8 @@ fn allocation(point: &ShadingPoint<'_>) -> SampleAllocation {
         | Bsdf::Conductor(_)
         | Bsdf::Dielectric(_)
         | Bsdf::ThinDielectric(_)
-        | Bsdf::Layered(_) => (0.125, 0.5),
+        | Bsdf::Layered(_)
+        | Bsdf::Principled(_) => (0.125, 0.5),
     };
     let by_bsdf = (m as f32 * of_proposals).max(n as f32 * of_samples);
     // A power of two, for which the points of a Sobol' sequence are best distributed

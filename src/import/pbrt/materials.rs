@@ -5,16 +5,18 @@ use super::descriptions::MaterialUse;
 use super::spectrum::{Resolved, SpectrumUse};
 use super::state::Builder;
 use crate::bsdfs::models::LobeAxis;
-use crate::import::images::{ImageEncoding, ImageRequest};
-use crate::materials::{ConductorSpectrum, EvaluatedMaterial, Material, MaterialEntry, MaterialId, Roughness};
-use crate::textures::{Filter, FloatTexture, ImageId, RgbTexture, RgbTextureId, Wrap};
+use crate::import::images::{ImageChannels, ImageEncoding, ImageRequest};
+use crate::materials::{
+    ConductorSpectrum, EvaluatedMaterial, Material, MaterialEntry, MaterialId, NormalMap, Roughness,
+};
+use crate::textures::{Filter, FloatTexture, RgbTexture, RgbTextureId, Wrap};
 use lumiris_formats::diagnostic::{Diagnostics, did_you_mean};
 use lumiris_formats::pbrt::directive::Name;
 use lumiris_formats::pbrt::params::{Input, ParamSet, ParamType};
 use lumiris_formats::spectra;
 use lumiris_numbers::math::Rgb;
 
-/// Kinds of pbrt-v4 that are rendered, and `evaluated`.
+/// Kinds of pbrt-v4 that are rendered, `principled` and `evaluated`.
 const KINDS: &[&str] = &[
     "diffuse",
     "conductor",
@@ -25,6 +27,7 @@ const KINDS: &[&str] = &[
     "coatedconductor",
     "mix",
     "interface",
+    "principled",
     "evaluated",
 ];
 
@@ -81,15 +84,16 @@ impl Builder<'_> {
         MaterialEntry { name, material, normal_map: self.normal_map(p, d), displacement }
     }
 
-    fn normal_map(&mut self, p: &ParamSet, d: &mut Diagnostics) -> Option<ImageId> {
+    fn normal_map(&mut self, p: &ParamSet, d: &mut Diagnostics) -> Option<NormalMap> {
         let name = p.string("normalmap", d)?;
         let request = ImageRequest {
             path: self.folder.join(name),
+            channels: ImageChannels::Color,
             encoding: ImageEncoding::Linear,
             wrap: Wrap::Repeat,
             filter: Filter::Bilinear,
         };
-        Some(self.resources.image(request, p.span_of("normalmap")))
+        Some(NormalMap::unscaled(self.resources.image(request, p.span_of("normalmap"))))
     }
 
     fn scattering_material(&mut self, kind: &str, place: &Name, p: &ParamSet, d: &mut Diagnostics) -> Material {
@@ -141,6 +145,7 @@ impl Builder<'_> {
                 max_depth: count(p, "maxdepth", 10, d),
                 samples: count(p, "nsamples", 1, d),
             },
+            "principled" => self.principled(p, d),
             "evaluated" => self.evaluated(place, p, d),
             _ => self.other_material(kind, place, p, d),
         }
@@ -261,7 +266,13 @@ impl Builder<'_> {
         material
     }
 
-    fn albedo(&mut self, p: &ParamSet, name: &'static str, default: Rgb, d: &mut Diagnostics) -> RgbTextureId {
+    pub(super) fn albedo(
+        &mut self,
+        p: &ParamSet,
+        name: &'static str,
+        default: Rgb,
+        d: &mut Diagnostics,
+    ) -> RgbTextureId {
         self.rgb_param(p, name, default, SpectrumUse::Albedo, d)
     }
 
@@ -276,7 +287,7 @@ impl Builder<'_> {
     }
 
     /// An index of refraction: a number, or a spectrum of which the sodium line counts.
-    fn ior(&mut self, p: &ParamSet, name: &'static str, d: &mut Diagnostics) -> f32 {
+    pub(super) fn ior(&mut self, p: &ParamSet, name: &'static str, d: &mut Diagnostics) -> f32 {
         let eta = match p.type_of(name) {
             None => {
                 p.ignore(name);

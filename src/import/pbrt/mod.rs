@@ -13,6 +13,7 @@ pub mod finish;
 pub mod lights;
 pub mod materials;
 pub mod options;
+mod principled;
 pub mod settings;
 pub mod shapes;
 pub mod spectrum;

@@ -4,7 +4,7 @@ use super::checks::unknown;
 use super::spectrum::SpectrumUse;
 use super::state::Builder;
 use super::transform::affine;
-use crate::import::images::{ImageEncoding, ImageRequest};
+use crate::import::images::{ImageChannels, ImageEncoding, ImageRequest};
 use crate::textures::{
     CheckerboardMapping, Filter, FloatTexture, FloatTextureId, ImageTexture, Mapping2d, RgbTexture, RgbTextureId, Wrap,
 };
@@ -187,7 +187,8 @@ impl Builder<'_> {
             d.error(p.span, "an image texture needs a `string filename`");
             return None;
         };
-        let request = ImageRequest { path: self.folder.join(name), encoding, wrap, filter };
+        let request =
+            ImageRequest { path: self.folder.join(name), channels: ImageChannels::Color, encoding, wrap, filter };
         let image = self.resources.image(request, p.span_of("filename"));
         Some(ImageTexture { image, mapping, scale, invert })
     }

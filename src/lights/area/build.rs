@@ -1,6 +1,6 @@
 //! Area lights of a geometry: one per emissive primitive, or one for two triangles that form a rectangle.
 
-use super::{AreaLight, AreaShape, Emission, PatchLight, QuadricLight, RectangleLight, TriangleLight};
+use super::{AreaLight, AreaShape, Emission, EmissionMapping, PatchLight, QuadricLight, RectangleLight, TriangleLight};
 use crate::geometry::{BilinearMesh, Shape, TriangleMesh};
 use lumiris_numbers::math::{Vec2, Vec3};
 
@@ -43,10 +43,12 @@ pub fn area_lights_of(shape: &Shape, emission: &Emission) -> AreaLights {
 }
 
 fn triangles(mesh: &TriangleMesh, emission: &Emission, out: &mut AreaLights) {
+    let mapping = emission.image.as_ref().and_then(|image| image.mapping());
+    let triangle = |i: usize| triangle(mesh, i, mapping);
     let mut i = 0;
     while i < mesh.triangle_count() {
         let pair = (i + 1 < mesh.triangle_count())
-            .then(|| rectangle_of_pair(&triangle(mesh, i), &triangle(mesh, i + 1), emission.image.is_some()))
+            .then(|| rectangle_of_pair(&triangle(i), &triangle(i + 1), emission.image.is_some()))
             .flatten();
         match pair {
             Some(rectangle) => {
@@ -54,7 +56,7 @@ fn triangles(mesh: &TriangleMesh, emission: &Emission, out: &mut AreaLights) {
                 i += 2;
             }
             None => {
-                out.push(AreaShape::Triangle(triangle(mesh, i)), emission, 1);
+                out.push(AreaShape::Triangle(triangle(i)), emission, 1);
                 i += 1;
             }
         }
@@ -62,13 +64,12 @@ fn triangles(mesh: &TriangleMesh, emission: &Emission, out: &mut AreaLights) {
 }
 
 /// Triangle `i`. Its emitting side is that of the vertex normals if there are any, as in pbrt-v4.
-fn triangle(mesh: &TriangleMesh, i: usize) -> TriangleLight {
+fn triangle(mesh: &TriangleMesh, i: usize, mapping: Option<&EmissionMapping>) -> TriangleLight {
     let vertices = mesh.indices[i].map(|v| v as usize);
-    let uvs = if mesh.uvs.is_empty() {
-        [Vec2::ZERO, Vec2::new(1.0, 0.0), Vec2::new(1.0, 1.0)]
-    } else {
-        vertices.map(|v| mesh.uvs[v])
-    };
+    let all = if mapping.is_some_and(|m| m.second) { &mesh.uvs1 } else { &mesh.uvs };
+    let uvs =
+        if all.is_empty() { [Vec2::ZERO, Vec2::new(1.0, 0.0), Vec2::new(1.0, 1.0)] } else { vertices.map(|v| all[v]) };
+    let uvs = mapping.map_or(uvs, |m| uvs.map(|uv| m.image_from_uv.transform_point2(uv)));
     let mut light = TriangleLight::new(mesh.triangle(i), mesh.flip_normal, uvs);
     if !mesh.normals.is_empty() {
         let ns: Vec3 = vertices.iter().map(|&v| mesh.normals[v]).sum();

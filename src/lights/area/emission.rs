@@ -1,5 +1,7 @@
 //! Emission of an area light's surface.
 
+use crate::imaging::AxisWrap;
+use glam::Affine2;
 use lumiris_numbers::math::{Rgb, Vec2, Vec3};
 use std::sync::Arc;
 
@@ -57,6 +59,17 @@ pub struct EmissionImage {
     height: usize,
     data: Vec<Rgb>,
     mean: Rgb,
+    wrap: [AxisWrap; 2],
+    mapping: Option<EmissionMapping>,
+}
+
+/// Texture coordinates of an image on triangles, where they are not those of other textures.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct EmissionMapping {
+    /// True for the second texture coordinates.
+    pub second: bool,
+    /// Texture coordinates to those of the image.
+    pub image_from_uv: Affine2,
 }
 
 impl EmissionImage {
@@ -74,17 +87,33 @@ impl EmissionImage {
             }
         }
         let mean = Rgb::from_array(sums.map(|s| (s / data.len() as f64) as f32));
-        Ok(EmissionImage { width, height, data, mean })
+        Ok(EmissionImage { width, height, data, mean, wrap: [AxisWrap::Clamp; 2], mapping: None })
     }
 
-    /// Bilinear lookup at `uv`, clamped at the edges.
+    /// The image with other edges, columns first, and with texture coordinates of its own.
+    #[must_use]
+    pub fn placed(self, wrap: [AxisWrap; 2], mapping: Option<EmissionMapping>) -> Self {
+        EmissionImage { wrap, mapping, ..self }
+    }
+
+    /// How texture coordinates become those of the image, if they do.
+    pub fn mapping(&self) -> Option<&EmissionMapping> {
+        self.mapping.as_ref()
+    }
+
+    /// Bilinear lookup at `uv`.
     pub fn lookup(&self, uv: Vec2) -> Rgb {
-        let x = (uv.x * self.width as f32 - 0.5).clamp(-1.0, self.width as f32);
-        let y = ((1.0 - uv.y) * self.height as f32 - 0.5).clamp(-1.0, self.height as f32);
+        // Beyond these, floats have no fractions to interpolate by
+        let limit = |v: f32, count: usize, wrap: AxisWrap| match wrap {
+            AxisWrap::Clamp => v.clamp(-1.0, count as f32),
+            AxisWrap::Repeat | AxisWrap::Mirror => v.clamp(-1e7, 1e7),
+        };
+        let x = limit(uv.x * self.width as f32 - 0.5, self.width, self.wrap[0]);
+        let y = limit((1.0 - uv.y) * self.height as f32 - 0.5, self.height, self.wrap[1]);
         let (x0, y0) = (x.floor(), y.floor());
         let texel = |x: f32, y: f32| {
-            let column = (x.max(0.0) as usize).min(self.width - 1);
-            let row = (y.max(0.0) as usize).min(self.height - 1);
+            let column = self.wrap[0].pixel(x as i64, self.width as i64) as usize;
+            let row = self.wrap[1].pixel(y as i64, self.height as i64) as usize;
             self.data[row * self.width + column]
         };
         let (dx, dy) = (x - x0, y - y0);
@@ -105,6 +134,9 @@ mod tests {
         let at = |u, v| image.lookup(Vec2::new(u, v)).r;
         assert_eq!((at(0.25, 0.75), at(0.75, 0.75), at(0.25, 0.25), at(0.75, 0.25)), (1.0, 2.0, 3.0, 4.0));
         assert_eq!((at(-5.0, 9.0), at(7.0, -3.0), at(0.5, 0.5)), (1.0, 4.0, 2.5));
+        let repeated = image.clone().placed([AxisWrap::Repeat, AxisWrap::Mirror], None);
+        assert_eq!(repeated.lookup(Vec2::new(-0.75, 1.25)).r, 1.0);
+        assert_eq!(repeated.lookup(Vec2::new(3.75, -0.75)).r, 2.0);
         assert!(EmissionImage::new(2, 2, vec![Rgb::WHITE; 3]).is_err());
         let emission = Emission { l: Rgb::splat(2.0), two_sided: false, image: Some(Arc::new(image)) };
         assert!((emission.mean_luminance() - 5.0).abs() < 1e-5);

@@ -18,7 +18,7 @@ pub mod rectangle;
 pub mod triangle;
 
 pub use build::{AreaLights, area_lights_of};
-pub use emission::{Emission, EmissionImage};
+pub use emission::{Emission, EmissionImage, EmissionMapping};
 pub use patch::PatchLight;
 pub use quadric::QuadricLight;
 pub use rectangle::RectangleLight;
@@ -156,7 +156,9 @@ impl AreaLight {
             AreaShape::Rectangle(rectangle) => rectangle.n,
             AreaShape::Quadric(_) | AreaShape::Patch(_) => hit.n,
         };
-        self.emission.l(n, hit.uv, w)
+        let has_own_uv = self.emission.image.as_ref().is_some_and(|image| image.mapping().is_some());
+        let uv = if has_own_uv { self.uv(hit.p) } else { hit.uv };
+        self.emission.l(n, uv, w)
     }
 
     /// Luminance of the emitted power, π·A·L, twice that of a two-sided light.

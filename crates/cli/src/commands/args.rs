@@ -25,7 +25,7 @@ pub(super) fn aov() -> impl TypedValueParser<Value = Option<Aov>> {
 /// The scene, and options that override its settings.
 #[derive(Args, Clone, Debug)]
 pub(super) struct SceneArgs {
-    /// Scene file (.pbrt or .pbrt.gz)
+    /// Scene file (.pbrt, .pbrt.gz, .gltf or .glb)
     pub scene: PathBuf,
     #[command(flatten)]
     pub settings: SettingsArgs,
@@ -38,6 +38,12 @@ pub(super) struct SceneArgs {
     /// Crop window, in fractions of the image [default: the file's]
     #[arg(long, value_name = "X0,X1,Y0,Y1", value_parser = parse_crop)]
     pub crop: Option<[f32; 4]>,
+    /// Image of the environment of a glTF scene: latitude and longitude, or a square of equal areas
+    #[arg(long, value_name = "FILE")]
+    pub environment: Option<PathBuf>,
+    /// Frame a glTF scene from the front, whatever its cameras
+    #[arg(long)]
+    pub camera_auto: bool,
     /// Use a box filter of one pixel instead of the file's pixel filter
     #[arg(long)]
     pub box_filter: bool,

@@ -32,7 +32,12 @@ pub(super) struct SetupTimes {
 /// Loads the scene, but what `files` has of its files, and applies the options, after the settings of what is stored; prints
 /// warnings.
 pub(super) fn load_scene(args: &SceneArgs, files: &FileCache, stored: Option<&Stored>) -> anyhow::Result<Loaded> {
-    let options = LoadOptions { resolution: args.resolution, crop: args.crop };
+    let options = LoadOptions {
+        resolution: args.resolution,
+        crop: args.crop,
+        environment: args.environment.clone(),
+        camera_auto: args.camera_auto,
+    };
     let mut loaded = match load_with(&args.scene, &options, files) {
         Ok(loaded) => loaded,
         Err(diagnostics) => {

@@ -53,6 +53,10 @@ impl Stored {
         if let (AccelKind::Embree, Some(accel)) = (scene.accel, self.header.setting("lumiris:accel")) {
             scene.accel = accel.parse().map_err(|_| option("ray tracer"))?;
         }
+        if let (None, Some(path)) = (&scene.environment, note("environment")) {
+            scene.environment = Some(path.into());
+        }
+        scene.camera_auto |= note("camera_auto").is_some();
         scene.box_filter |= note("box_filter").is_some();
         if let (None, Some(list)) = (&args.aov, note(AOV_NOTE)) {
             let named = |name: &str| if name == "none" { Ok(None) } else { name.parse::<Aov>().map(Some) };

@@ -8,6 +8,7 @@ mod compare;
 mod denoise;
 mod farm;
 mod frames;
+mod gltf;
 mod looks;
 mod lost_output;
 mod parts;

@@ -78,7 +78,7 @@ pub enum View {
 impl Stage {
     /// Loads a scene for an image of `size` (width, height) pixels.
     pub fn load(path: &Path, size: [u32; 2], threads: Option<usize>) -> Result<Self, ReproduceError> {
-        let options = LoadOptions { resolution: Some(size), crop: None };
+        let options = LoadOptions { resolution: Some(size), ..LoadOptions::default() };
         let loaded = load(path, &options).map_err(|report| ReproduceError::Scene { path: path.to_owned(), report })?;
         let mut job = loaded.job(AccelKind::Embree, None)?;
         let cast = Arc::new(AtomicBool::new(true));

@@ -51,7 +51,8 @@ fn diffuse_at(world: &World, wo: Vec3, hit: &Hit) -> Option<Seen> {
         return None;
     }
     let surface = scene.geometry.surface_hit(hit.geometry, hit.primitive, hit.instance, hit.uv, 0.5);
-    let context = TextureContext { uv: surface.uv, uv_width: Vec2::ZERO, p: surface.p, n: surface.n };
+    let (uv1, color) = (surface.vertex.uv1, surface.vertex.color);
+    let context = TextureContext { uv: surface.uv, uv_width: Vec2::ZERO, uv1, color, p: surface.p, n: surface.n };
     let material = scene.surfaces[hit.geometry as usize].material;
     let bsdf = scene.materials.bsdf(material, &scene.textures, &surface, &context, wo)?;
     let part = bsdf.lambertian(wo).filter(|part| part.rest.is_none())?;

@@ -1,0 +1,47 @@
+//! glTF scenes: their options belong to the image, and so to parts and checkpoints.
+
+use super::parts::{assert_same, lumiris, run};
+use super::program::stderr;
+use std::path::Path;
+
+/// A triangle in a file, and an environment of two colours.
+fn write_scene(folder: &Path) {
+    // (0, 0, 0), (1, 0, 0) and (0, 1, 0)
+    let data = "AAAAAAAAAAAAAAAAAACAPwAAAAAAAAAAAAAAAAAAgD8AAAAA";
+    let text = format!(
+        r#"{{"asset":{{"version":"2.0"}},"nodes":[{{"mesh":0}}],
+        "meshes":[{{"primitives":[{{"attributes":{{"POSITION":0}}}}]}}],
+        "accessors":[{{"bufferView":0,"componentType":5126,"count":3,"type":"VEC3"}}],
+        "bufferViews":[{{"buffer":0,"byteLength":36}}],
+        "buffers":[{{"byteLength":36,"uri":"data:application/octet-stream;base64,{data}"}}]}}"#
+    );
+    std::fs::write(folder.join("a.gltf"), text).unwrap();
+    let mut sky = b"PF\n2 1\n-1.0\n".to_vec();
+    sky.extend([0.5_f32, 1.0, 2.0, 2.0, 1.0, 0.5].iter().flat_map(|v| v.to_le_bytes()));
+    std::fs::write(folder.join("sky.pfm"), sky).unwrap();
+}
+
+#[test]
+fn parts_and_checkpoints_keep_environment_and_camera() {
+    let folder = tempfile::tempdir().unwrap();
+    write_scene(folder.path());
+    let options = "--environment sky.pfm --camera-auto --resolution 16x16 --estimator mis --quiet";
+    run(&format!("render a.gltf {options} --spp 8 -o whole.exr"), folder.path());
+    for part in 1..=2 {
+        run(&format!("render a.gltf {options} --spp 8 --part {part}/2 -o {part}.part"), folder.path());
+    }
+    run("merge 1.part 2.part -o merged.exr --quiet", folder.path());
+    assert_same("whole.exr", "merged.exr", folder.path(), "parts");
+    run(&format!("render a.gltf {options} --spp 4 --checkpoint c.film -o half.exr"), folder.path());
+    run("render a.gltf --resume c.film --spp 8 --quiet -o resumed.exr", folder.path());
+    assert_same("whole.exr", "resumed.exr", folder.path(), "a checkpoint");
+}
+
+#[test]
+fn options_of_gltf_are_refused_for_pbrt() {
+    let folder = tempfile::tempdir().unwrap();
+    std::fs::write(folder.path().join("a.pbrt"), "WorldBegin\n").unwrap();
+    let output = lumiris("info a.pbrt --camera-auto", folder.path());
+    assert_eq!(output.status.code(), Some(3));
+    assert!(stderr(&output).contains("--camera-auto"), "{}", stderr(&output));
+}

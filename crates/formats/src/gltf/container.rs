@@ -1,0 +1,42 @@
+//! The binary container: a header of 12 bytes, a chunk of JSON, and at most one chunk of bytes that counts.
+
+use super::place::GltfError;
+
+const MAGIC: &[u8; 4] = b"glTF";
+const JSON: u32 = 0x4e4f_534a;
+const BIN: u32 = 0x004e_4942;
+
+/// The JSON and the bytes of a file, which is a container if it begins like one.
+pub fn chunks(file: &[u8]) -> Result<(&[u8], Option<&[u8]>), GltfError> {
+    if !file.starts_with(MAGIC) {
+        return Ok((file, None));
+    }
+    let word = |at: usize| file.get(at..at + 4).and_then(|b| b.try_into().ok()).map(u32::from_le_bytes);
+    let wrong = |at: usize, message: String| GltfError { place: format!("byte {at}"), message };
+    match word(4) {
+        Some(2) => {}
+        version => return Err(wrong(4, format!("the container has version 2, not {version:?}"))),
+    }
+    let length = word(8).unwrap_or(0) as usize;
+    if length > file.len() {
+        return Err(wrong(8, format!("the file says that it has {length} bytes, but has {}", file.len())));
+    }
+    let (mut at, mut json, mut bytes) = (12, None, None);
+    while at < length {
+        let (Some(size), Some(kind)) = (word(at), word(at + 4)) else {
+            return Err(wrong(at, "the header of a chunk is cut off".to_owned()));
+        };
+        let end = (at + 8).checked_add(size as usize).filter(|&end| end <= length);
+        let Some(end) = end else {
+            return Err(wrong(at, format!("a chunk of {size} bytes does not end in the file")));
+        };
+        let content = &file[at + 8..end];
+        match kind {
+            JSON if json.is_none() => json = Some(content),
+            BIN if bytes.is_none() => bytes = Some(content),
+            _ => {}
+        }
+        at = end;
+    }
+    json.map(|json| (json, bytes)).ok_or_else(|| wrong(12, "the container has no JSON".to_owned()))
+}

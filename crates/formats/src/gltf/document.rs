@@ -1,0 +1,162 @@
+//! A document: its JSON, checked, and its buffers.
+
+use super::container::chunks;
+use super::place::{GltfError, Place};
+use super::schema;
+use base64::Engine;
+use serde_json::Value;
+use std::path::{Path, PathBuf};
+
+/// A document with its buffers.
+#[derive(Debug)]
+pub struct Document {
+    json: Value,
+    buffers: Vec<Vec<u8>>,
+    /// Files that hold buffers.
+    pub files: Vec<PathBuf>,
+    folder: PathBuf,
+}
+
+/// Bytes of a data URI; `None` if it is none.
+fn data_uri(uri: &str) -> Option<Result<Vec<u8>, String>> {
+    let (kind, data) = uri.strip_prefix("data:")?.split_once(',').unwrap_or_default();
+    if !kind.ends_with(";base64") {
+        return Some(Err("the data URI is not in base64".to_owned()));
+    }
+    Some(base64::engine::general_purpose::STANDARD.decode(data.trim_end()).map_err(|e| e.to_string()))
+}
+
+/// The file name that a URI stands for.
+fn percent_decoded(uri: &str) -> String {
+    let (bytes, mut out, mut i) = (uri.as_bytes(), Vec::new(), 0);
+    while i < bytes.len() {
+        let hex = bytes.get(i + 1..i + 3).filter(|_| bytes[i] == b'%').and_then(|h| std::str::from_utf8(h).ok());
+        match hex.and_then(|h| u8::from_str_radix(h, 16).ok()) {
+            Some(byte) => {
+                out.push(byte);
+                i += 3;
+            }
+            None => {
+                out.push(bytes[i]);
+                i += 1;
+            }
+        }
+    }
+    String::from_utf8_lossy(&out).into_owned()
+}
+
+/// Where the content of an image or a buffer is.
+#[derive(Clone, Debug)]
+pub enum Content {
+    /// A file.
+    File(PathBuf),
+    /// In the document.
+    Bytes(Vec<u8>),
+}
+
+impl Document {
+    /// Parses a file that lies in `folder`, and reads its buffers. All errors of the schema are named.
+    pub fn parse(file: &[u8], folder: &Path, required: &[&str]) -> Result<Document, Vec<GltfError>> {
+        let (text, embedded) = chunks(file).map_err(|e| vec![e])?;
+        let text = text.strip_prefix(b"\xef\xbb\xbf").unwrap_or(text);
+        let json: Value = serde_json::from_slice(text).map_err(|e| vec![syntax_error(file, text, &e)])?;
+        check_asset(&json, required)?;
+        let errors = schema::errors(&Place::root(&json));
+        if !errors.is_empty() {
+            return Err(errors);
+        }
+        let mut document = Document { json, buffers: Vec::new(), files: Vec::new(), folder: folder.to_owned() };
+        document.read_buffers(embedded).map_err(|e| vec![e])?;
+        Ok(document)
+    }
+
+    /// The whole of it.
+    pub fn root(&self) -> Place<'_> {
+        Place::root(&self.json)
+    }
+
+    /// Where the content of an image is.
+    pub fn content(&self, place: &Place<'_>) -> Result<Content, GltfError> {
+        if let Some(view) = place.key("bufferView").index() {
+            return Ok(Content::Bytes(self.view(view)?.to_vec()));
+        }
+        let uri = place.key("uri").text().ok_or_else(|| place.error("has neither a URI nor a buffer view"))?;
+        match data_uri(uri) {
+            Some(bytes) => bytes.map(Content::Bytes).map_err(|message| place.key("uri").error(message)),
+            None => Ok(Content::File(self.folder.join(percent_decoded(uri)))),
+        }
+    }
+
+    fn read_buffers(&mut self, embedded: Option<&[u8]>) -> Result<(), GltfError> {
+        let json = std::mem::take(&mut self.json);
+        let result = Place::root(&json).key("buffers").items().into_iter().enumerate().try_for_each(|(i, place)| {
+            let bytes = match (place.key("uri").exists(), embedded) {
+                (false, Some(bytes)) if i == 0 => bytes.to_vec(),
+                // A placeholder, which is an error only if something is in it
+                (false, _) => {
+                    self.buffers.push(Vec::new());
+                    return Ok(());
+                }
+                (true, _) => match self.content(&place)? {
+                    Content::Bytes(bytes) => bytes,
+                    Content::File(path) => {
+                        let read = std::fs::read(&path);
+                        self.files.push(path.clone());
+                        read.map_err(|e| place.key("uri").error(format!("{}: {e}", path.display())))?
+                    }
+                },
+            };
+            let length = place.key("byteLength").index().unwrap_or(0);
+            if bytes.len() < length {
+                let message = format!("the buffer has {} of its {length} bytes", bytes.len());
+                return Err(place.key("byteLength").error(message));
+            }
+            self.buffers.push(bytes);
+            Ok(())
+        });
+        self.json = json;
+        result
+    }
+
+    /// The bytes of a buffer view.
+    pub fn view(&self, index: usize) -> Result<&[u8], GltfError> {
+        let place = self.root().key("bufferViews").item(index);
+        let (buffer, length) = (place.key("buffer").index(), place.key("byteLength").index());
+        let (Some(buffer), Some(length)) = (buffer, length) else { return Err(place.error("is not there")) };
+        let offset = place.key("byteOffset").index().unwrap_or(0);
+        let bytes = self.buffers.get(buffer).map_or(&[][..], Vec::as_slice);
+        offset.checked_add(length).and_then(|end| bytes.get(offset..end)).ok_or_else(|| {
+            let message = format!("{length} bytes from byte {offset} on are not in the buffer of {}", bytes.len());
+            place.error(message)
+        })
+    }
+}
+
+/// What is not JSON, in the bytes of the file.
+fn syntax_error(file: &[u8], text: &[u8], e: &serde_json::Error) -> GltfError {
+    let lines = text.split_inclusive(|&b| b == b'\n').take(e.line().saturating_sub(1));
+    let start = text.as_ptr() as usize - file.as_ptr() as usize;
+    let at = start + lines.map(<[u8]>::len).sum::<usize>() + e.column().saturating_sub(1);
+    let message = e.to_string();
+    let message = message.rsplit_once(" at line").map_or(message.as_str(), |(message, _)| message);
+    GltfError { place: format!("byte {at}"), message: format!("no JSON: {message}") }
+}
+
+/// Checks the version and the extensions that must be understood.
+fn check_asset(json: &Value, known: &[&str]) -> Result<(), Vec<GltfError>> {
+    let root = Place::root(json);
+    let version = root.key("asset").key("version");
+    match version.text() {
+        Some(text) if text.starts_with("2.") => {}
+        Some(text) => return Err(vec![version.error(format!("glTF {text} is not read, only 2.x"))]),
+        None => return Err(vec![version.error("is missing")]),
+    }
+    let required = root.key("extensionsRequired").items();
+    let unknown = required.iter().filter(|p| p.text().is_some_and(|name| !known.contains(&name)));
+    let errors: Vec<GltfError> = unknown
+        .map(|place| {
+            place.error(format!("the file needs the extension {}, which is not read", place.text().unwrap_or("")))
+        })
+        .collect();
+    if errors.is_empty() { Ok(()) } else { Err(errors) }
+}

@@ -1,0 +1,272 @@
+//! What members of the JSON must be, as far as the renderer reads them: a table of paths, and a walk that checks them.
+//!
+//! A path names members, with `[]` for every element of an array, `*` for every member of an object, and `@` for every
+//! reference to a texture. What is absent is no error here; who needs it says so.
+
+use super::place::{GltfError, Place};
+
+/// Greatest number of errors of one file that are named.
+const MAX_ERRORS: usize = 20;
+
+/// What a value must be.
+#[derive(Clone, Copy, Debug)]
+enum Rule {
+    /// Index into an array of the document.
+    Index(&'static str),
+    /// Index into the lights.
+    Light,
+    /// So many finite numbers.
+    Numbers(usize),
+    /// A finite number.
+    Number,
+    /// An integer that is not negative.
+    Whole,
+    /// One of these integers.
+    OneOf(&'static [usize]),
+    /// Text.
+    Text,
+    /// True or false.
+    Flag,
+    /// An array.
+    Array,
+    /// An object.
+    Object,
+}
+
+use Rule::{Array, Flag, Index, Light, Number, Numbers, Object, OneOf, Text, Whole};
+
+const COMPONENTS: Rule = OneOf(&[5120, 5121, 5122, 5123, 5125, 5126]);
+
+const RULES: &[(&str, Rule)] = &[
+    ("extensionsUsed", Array),
+    ("extensionsUsed[]", Text),
+    ("scene", Index("scenes")),
+    ("scenes", Array),
+    ("scenes[].nodes", Array),
+    ("scenes[].nodes[]", Index("nodes")),
+    ("nodes", Array),
+    ("nodes[]", Object),
+    ("nodes[].children", Array),
+    ("nodes[].children[]", Index("nodes")),
+    ("nodes[].mesh", Index("meshes")),
+    ("nodes[].camera", Index("cameras")),
+    ("nodes[].skin", Index("skins")),
+    ("nodes[].matrix", Numbers(16)),
+    ("nodes[].translation", Numbers(3)),
+    ("nodes[].rotation", Numbers(4)),
+    ("nodes[].scale", Numbers(3)),
+    ("nodes[].weights", Array),
+    ("nodes[].weights[]", Number),
+    ("nodes[].extensions.KHR_lights_punctual.light", Light),
+    ("nodes[].extensions.EXT_mesh_gpu_instancing.attributes.*", Index("accessors")),
+    ("meshes", Array),
+    ("meshes[].primitives", Array),
+    ("meshes[].weights", Array),
+    ("meshes[].weights[]", Number),
+    ("meshes[].primitives[].attributes", Object),
+    ("meshes[].primitives[].attributes.*", Index("accessors")),
+    ("meshes[].primitives[].indices", Index("accessors")),
+    ("meshes[].primitives[].material", Index("materials")),
+    ("meshes[].primitives[].mode", OneOf(&[0, 1, 2, 3, 4, 5, 6])),
+    ("meshes[].primitives[].targets", Array),
+    ("meshes[].primitives[].targets[]", Object),
+    ("meshes[].primitives[].targets[].*", Index("accessors")),
+    ("skins", Array),
+    ("skins[].joints", Array),
+    ("skins[].joints[]", Index("nodes")),
+    ("skins[].inverseBindMatrices", Index("accessors")),
+    ("cameras", Array),
+    ("cameras[].type", Text),
+    ("cameras[].perspective.yfov", Number),
+    ("cameras[].perspective.aspectRatio", Number),
+    ("cameras[].orthographic.xmag", Number),
+    ("cameras[].orthographic.ymag", Number),
+    ("extensions.KHR_lights_punctual.lights", Array),
+    ("extensions.KHR_lights_punctual.lights[].type", Text),
+    ("extensions.KHR_lights_punctual.lights[].color", Numbers(3)),
+    ("extensions.KHR_lights_punctual.lights[].intensity", Number),
+    ("extensions.KHR_lights_punctual.lights[].spot.innerConeAngle", Number),
+    ("extensions.KHR_lights_punctual.lights[].spot.outerConeAngle", Number),
+    ("accessors", Array),
+    ("accessors[].bufferView", Index("bufferViews")),
+    ("accessors[].byteOffset", Whole),
+    ("accessors[].componentType", COMPONENTS),
+    ("accessors[].count", Whole),
+    ("accessors[].type", Text),
+    ("accessors[].normalized", Flag),
+    ("accessors[].sparse.count", Whole),
+    ("accessors[].sparse.indices.bufferView", Index("bufferViews")),
+    ("accessors[].sparse.indices.byteOffset", Whole),
+    ("accessors[].sparse.indices.componentType", OneOf(&[5121, 5123, 5125])),
+    ("accessors[].sparse.values.bufferView", Index("bufferViews")),
+    ("accessors[].sparse.values.byteOffset", Whole),
+    ("bufferViews", Array),
+    ("bufferViews[].buffer", Index("buffers")),
+    ("bufferViews[].byteOffset", Whole),
+    ("bufferViews[].byteLength", Whole),
+    ("bufferViews[].byteStride", Whole),
+    ("buffers", Array),
+    ("buffers[].byteLength", Whole),
+    ("buffers[].uri", Text),
+    ("images", Array),
+    ("images[].bufferView", Index("bufferViews")),
+    ("images[].uri", Text),
+    ("textures", Array),
+    ("textures[].source", Index("images")),
+    ("textures[].sampler", Index("samplers")),
+    ("samplers", Array),
+    ("samplers[].magFilter", Whole),
+    ("samplers[].wrapS", OneOf(&[33071, 33648, 10497])),
+    ("samplers[].wrapT", OneOf(&[33071, 33648, 10497])),
+    ("materials", Array),
+    ("materials[]", Object),
+    ("materials[].alphaMode", Text),
+    ("materials[].alphaCutoff", Number),
+    ("materials[].doubleSided", Flag),
+    ("materials[].emissiveFactor", Numbers(3)),
+    ("materials[].normalTexture.scale", Number),
+    ("materials[].pbrMetallicRoughness.baseColorFactor", Numbers(4)),
+    ("materials[].pbrMetallicRoughness.metallicFactor", Number),
+    ("materials[].pbrMetallicRoughness.roughnessFactor", Number),
+    ("materials[].extensions.KHR_materials_anisotropy.anisotropyStrength", Number),
+    ("materials[].extensions.KHR_materials_anisotropy.anisotropyRotation", Number),
+    ("materials[].extensions.KHR_materials_clearcoat.clearcoatFactor", Number),
+    ("materials[].extensions.KHR_materials_clearcoat.clearcoatRoughnessFactor", Number),
+    ("materials[].extensions.KHR_materials_emissive_strength.emissiveStrength", Number),
+    ("materials[].extensions.KHR_materials_ior.ior", Number),
+    ("materials[].extensions.KHR_materials_pbrSpecularGlossiness.diffuseFactor", Numbers(4)),
+    ("materials[].extensions.KHR_materials_pbrSpecularGlossiness.specularFactor", Numbers(3)),
+    ("materials[].extensions.KHR_materials_pbrSpecularGlossiness.glossinessFactor", Number),
+    ("materials[].extensions.KHR_materials_specular.specularFactor", Number),
+    ("materials[].extensions.KHR_materials_specular.specularColorFactor", Numbers(3)),
+    ("materials[].extensions.KHR_materials_transmission.transmissionFactor", Number),
+    ("materials[].extensions.KHR_materials_volume.thicknessFactor", Number),
+    ("materials[].@", Object),
+    ("materials[].@.index", Index("textures")),
+    ("materials[].@.texCoord", Whole),
+    ("materials[].@.extensions.KHR_texture_transform.offset", Numbers(2)),
+    ("materials[].@.extensions.KHR_texture_transform.scale", Numbers(2)),
+    ("materials[].@.extensions.KHR_texture_transform.rotation", Number),
+    ("materials[].@.extensions.KHR_texture_transform.texCoord", Whole),
+];
+
+/// Members of a material that refer to a texture.
+const TEXTURES: &[&str] = &[
+    "normalTexture",
+    "emissiveTexture",
+    "pbrMetallicRoughness.baseColorTexture",
+    "pbrMetallicRoughness.metallicRoughnessTexture",
+    "extensions.KHR_materials_clearcoat.clearcoatTexture",
+    "extensions.KHR_materials_clearcoat.clearcoatRoughnessTexture",
+    "extensions.KHR_materials_pbrSpecularGlossiness.diffuseTexture",
+    "extensions.KHR_materials_pbrSpecularGlossiness.specularGlossinessTexture",
+    "extensions.KHR_materials_specular.specularTexture",
+    "extensions.KHR_materials_specular.specularColorTexture",
+    "extensions.KHR_materials_transmission.transmissionTexture",
+];
+
+/// All that is not what it must be, up to a limit.
+pub fn errors(root: &Place<'_>) -> Vec<GltfError> {
+    let mut errors = Vec::new();
+    for (path, rule) in RULES {
+        let textures = if path.contains('@') { TEXTURES } else { &[""] };
+        for texture in textures {
+            for place in places(root, &path.replace('@', texture)) {
+                if let Err(message) = rule.check(root, &place) {
+                    errors.push(place.error(message));
+                }
+                if errors.len() == MAX_ERRORS {
+                    return errors;
+                }
+            }
+        }
+    }
+    errors
+}
+
+/// The places of a path that exist.
+fn places<'a>(root: &Place<'a>, path: &str) -> Vec<Place<'a>> {
+    let mut places = vec![root.clone()];
+    for part in path.split('.') {
+        let key = part.trim_end_matches("[]");
+        places = match key {
+            "*" => places.iter().flat_map(|p| p.names().into_iter().map(|name| p.key(name))).collect(),
+            _ => places.iter().map(|p| p.key(key)).filter(Place::exists).collect(),
+        };
+        if part.ends_with("[]") {
+            places = places.iter().flat_map(Place::items).collect();
+        }
+    }
+    places
+}
+
+impl Rule {
+    fn check(self, root: &Place<'_>, place: &Place<'_>) -> Result<(), String> {
+        let holds = match self {
+            Index(array) => return check_index(place, &root.key(array)),
+            Light => return check_index(place, &root.extension("KHR_lights_punctual").key("lights")),
+            OneOf(values) => {
+                let is_one = place.index().is_some_and(|v| values.contains(&v));
+                return if is_one { Ok(()) } else { Err(format!("must be one of {values:?}")) };
+            }
+            Numbers(count) => {
+                let is_right = place.items().len() == count && place.items().iter().all(|n| n.number().is_some());
+                return if is_right { Ok(()) } else { Err(format!("must be {count} numbers")) };
+            }
+            Number => place.number().is_some(),
+            Whole => place.index().is_some(),
+            Text => place.text().is_some(),
+            Flag => place.flag().is_some(),
+            Array => place.is_array(),
+            Object => place.is_object(),
+        };
+        let what = match self {
+            Number => "a number",
+            Text => "text",
+            Flag => "true or false",
+            Array => "an array",
+            Object => "an object",
+            Index(_) | Light | Numbers(_) | OneOf(_) | Whole => "an integer that is not negative",
+        };
+        if holds { Ok(()) } else { Err(format!("must be {what}")) }
+    }
+}
+
+fn check_index(place: &Place<'_>, array: &Place<'_>) -> Result<(), String> {
+    let Some(index) = place.index() else { return Err("must be an integer that is not negative".to_owned()) };
+    let count = array.items().len();
+    if index < count { Ok(()) } else { Err(format!("{}[{index}] is not there, of {count}", array.path)) }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn messages(json: &str) -> Vec<String> {
+        errors(&Place::root(&serde_json::from_str(json).unwrap())).iter().map(ToString::to_string).collect()
+    }
+
+    #[test]
+    fn what_is_not_there_or_of_another_type_is_named() {
+        let nodes = r#"{"scene":2.0,"scenes":[{"nodes":[0,1]}],"nodes":[{"scale":[1,2],"mesh":"a"}]}"#;
+        assert_eq!(
+            messages(nodes),
+            [
+                "scene: scenes[2] is not there, of 1",
+                "scenes[0].nodes[1]: nodes[1] is not there, of 1",
+                "nodes[0].mesh: must be an integer that is not negative",
+                "nodes[0].scale: must be 3 numbers"
+            ]
+        );
+        let materials = r#"{"materials":[{"doubleSided":1,"normalTexture":{"index":0,"scale":"a"}}],"samplers":[
+            {"wrapS":7}],"images":{},"meshes":[{"primitives":[{"attributes":{"POSITION":0,"NORMAL":-1}}]}]}"#;
+        assert_eq!(messages(materials).len(), 7);
+        assert_eq!(messages(r#"{"asset":{"version":"2.0"},"scene":0,"scenes":[{}]}"#), [""; 0]);
+    }
+
+    #[test]
+    fn a_file_of_errors_has_a_limit() {
+        let nodes = vec![r#"{"mesh":1}"#; 100].join(",");
+        assert_eq!(messages(&format!(r#"{{"nodes":[{nodes}]}}"#)).len(), MAX_ERRORS);
+    }
+}

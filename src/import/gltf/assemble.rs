@@ -1,0 +1,240 @@
+//! Geometry and lights of the scene.
+
+use super::materials::{Look, Materials};
+use super::meshes::{Primitive, placed, primitive};
+use super::nodes::{Node, instances, nodes};
+use super::pose::Pose;
+use super::textures::EmissionSource;
+use super::view::camera;
+use super::{LUMENS_PER_WATT, Messages};
+use crate::geometry::{Geometry, GeometryId, GeometrySet, Group, Instance, Shape, TriangleMesh, Visibility};
+use crate::import::LoadOptions;
+use crate::import::cache::FileCache;
+use crate::import::resources::report;
+use crate::lights::{
+    Emission, EmissionImage, EnvironmentFilter, EnvironmentMap, EnvironmentMapping, Light, LightSetBuilder,
+};
+use crate::materials::{MaterialId, MaterialSet};
+use crate::scene::{Scene, Surface};
+use glam::Vec3A;
+use lumiris_formats::gltf::{Document, GltfError, Place};
+use lumiris_numbers::math::{Affine3A, Rgb, Vec3};
+use std::collections::HashMap;
+use std::path::{Path, PathBuf};
+use std::sync::Arc;
+
+/// A scene while it is assembled.
+pub(super) struct Assembly<'a> {
+    document: &'a Document,
+    options: &'a LoadOptions,
+    materials: Materials<'a>,
+    set: GeometrySet,
+    surfaces: Vec<Surface>,
+    emitters: Vec<(GeometryId, Emission)>,
+    emission_images: HashMap<MaterialId, Option<Arc<EmissionImage>>>,
+    lights: Vec<Light>,
+}
+
+impl<'a> Assembly<'a> {
+    pub(super) fn new(document: &'a Document, options: &'a LoadOptions) -> Result<Self, GltfError> {
+        let failed = |e: std::io::Error| document.root().error(e.to_string());
+        Ok(Assembly {
+            document,
+            options,
+            materials: Materials::new(document).map_err(failed)?,
+            set: GeometrySet::default(),
+            surfaces: Vec::new(),
+            emitters: Vec::new(),
+            emission_images: HashMap::new(),
+            lights: Vec::new(),
+        })
+    }
+
+    /// The scene; files that it was read from are added to `others`.
+    pub(super) fn scene(
+        mut self,
+        files: &FileCache,
+        others: &mut Vec<PathBuf>,
+        messages: &mut Messages<'_>,
+    ) -> Result<Option<Scene>, GltfError> {
+        self.materials.read(messages)?;
+        others.extend(self.materials.textures.files());
+        others.extend(self.options.environment.clone());
+        let nodes = nodes(self.document)?;
+        self.add_meshes(&nodes, files, messages)?;
+        nodes.iter().for_each(|node| self.add_light(node));
+        let bounds = self.set.world_bounds();
+        if self.set.geometries.is_empty() {
+            messages.warning(&self.document.root().key("meshes"), "the scene has no meshes to render");
+        }
+        let (camera, film) = camera(self.document, self.options, &nodes, &bounds, messages);
+        if let Some(path) = &self.options.environment {
+            self.lights.extend(environment(path, files, messages));
+        } else if self.lights.is_empty() && self.emitters.is_empty() {
+            messages.warning(&self.document.root().key("scenes"), "no light: all around is white (--environment FILE)");
+            self.lights.push(Light::InfiniteConstant { l: Rgb::WHITE });
+        }
+        let textures = &mut self.materials.textures;
+        textures.set.images = textures.resources.load(files, messages.diagnostics);
+        if messages.diagnostics.has_errors() {
+            return Ok(None);
+        }
+        let mut lights = LightSetBuilder::default();
+        for light in self.lights {
+            lights.add(light);
+        }
+        for (geometry, emission) in &self.emitters {
+            lights.add_area(*geometry, &self.set.geometries[*geometry as usize].shape, emission);
+        }
+        let materials = MaterialSet::new(self.materials.entries, &self.materials.textures.set);
+        Ok(Some(Scene {
+            camera,
+            film,
+            materials,
+            textures: Arc::new(self.materials.textures.set),
+            lights: Arc::new(lights.build(&bounds)),
+            geometry: Arc::new(self.set),
+            surfaces: self.surfaces,
+        }))
+    }
+
+    /// Adds all meshes, each once for every pose.
+    fn add_meshes(
+        &mut self,
+        nodes: &[Node<'a>],
+        files: &FileCache,
+        messages: &mut Messages<'_>,
+    ) -> Result<(), GltfError> {
+        let meshes = self.document.root().key("meshes").items();
+        let mut users: Vec<Vec<&Node<'a>>> = vec![Vec::new(); meshes.len()];
+        for node in nodes {
+            if let Some(list) = node.mesh.and_then(|mesh| users.get_mut(mesh)) {
+                list.push(node);
+            }
+        }
+        for (place, users) in meshes.iter().zip(users) {
+            let mut poses: Vec<(Pose, Vec<Affine3A>)> = Vec::new();
+            for node in users {
+                let pose = Pose::of(self.document, place, node, nodes)?;
+                let world_from_node = if pose.is_skinned() { Affine3A::IDENTITY } else { node.world_from_node };
+                let placements = instances(self.document, &node.place)?.into_iter().map(|m| world_from_node * m);
+                // What has no inverse is flat, and has no normals
+                let placements = placements.filter(|m| m.is_finite() && m.matrix3.determinant() != 0.0);
+                match poses.iter_mut().find(|(p, _)| *p == pose) {
+                    Some((_, all)) => all.extend(placements),
+                    None => poses.push((pose, placements.collect())),
+                }
+            }
+            for (pose, placements) in poses.iter().filter(|(_, placements)| !placements.is_empty()) {
+                self.add_mesh(place, pose, placements, files, messages)?;
+            }
+        }
+        Ok(())
+    }
+
+    /// Primitives that stand once, or that emit, are placed in world space; others are a group with instances.
+    fn add_mesh(
+        &mut self,
+        place: &Place<'a>,
+        pose: &Pose,
+        placements: &[Affine3A],
+        files: &FileCache,
+        messages: &mut Messages<'_>,
+    ) -> Result<(), GltfError> {
+        let name = place.key("name").text().unwrap_or("mesh").to_owned();
+        let mut group = Vec::new();
+        for place in place.key("primitives").items() {
+            let Some(Primitive { mesh, material }) = primitive(self.document, &place, pose, messages)? else {
+                continue;
+            };
+            let looks = &self.materials.looks;
+            let look = looks[material.unwrap_or(looks.len() - 1).min(looks.len() - 1)].clone();
+            if placements.len() > 1 && look.emission.is_black() {
+                group.push(self.add_geometry(mesh, &look, &name));
+                continue;
+            }
+            for m in placements {
+                let id = self.add_geometry(placed(&mesh, m).map_err(|e| place.error(e))?, &look, &name);
+                self.set.root.geometries.push(id);
+                self.add_emission(id, &look, files, messages);
+            }
+        }
+        if !group.is_empty() {
+            let id = self.set.groups.len() as u32;
+            self.set.groups.push(Group { geometries: group });
+            let instance = |m: &Affine3A| Instance { group: id, world_from_group: vec![*m] };
+            self.set.instances.extend(placements.iter().map(instance));
+        }
+        Ok(())
+    }
+
+    fn add_geometry(&mut self, mesh: TriangleMesh, look: &Look, name: &str) -> GeometryId {
+        self.set.geometries.push(Geometry { shape: Shape::Mesh(mesh), alpha: look.alpha, visibility: Visibility::ALL });
+        self.surfaces.push(Surface { material: look.material, name: name.to_owned() });
+        (self.set.geometries.len() - 1) as GeometryId
+    }
+
+    fn add_emission(&mut self, id: GeometryId, look: &Look, files: &FileCache, messages: &mut Messages<'_>) {
+        if look.emission.is_black() {
+            return;
+        }
+        let image = look.emission_image.as_ref().and_then(|source| {
+            let read = || emission_image(source, files, messages);
+            self.emission_images.entry(look.material).or_insert_with(read).clone()
+        });
+        self.emitters.push((id, Emission { l: look.emission, two_sided: look.is_double_sided, image }));
+    }
+
+    /// `KHR_lights_punctual`: lights shine along −z.
+    fn add_light(&mut self, node: &Node<'a>) {
+        let Some(index) = node.place.extension("KHR_lights_punctual").key("light").index() else { return };
+        let light = self.document.root().extension("KHR_lights_punctual").key("lights").item(index);
+        let color = Rgb::from_array(light.key("color").numbers().unwrap_or([1.0; 3])).map(|c| c.max(0.0));
+        let intensity = color * (light.key("intensity").number().unwrap_or(1.0).max(0.0) / LUMENS_PER_WATT);
+        let m = &node.world_from_node;
+        if !m.is_finite() {
+            return;
+        }
+        let (p, axis) = (m.transform_point3(Vec3::ZERO), m.transform_vector3(-Vec3::Z).normalize_or(-Vec3::Z));
+        match light.key("type").text() {
+            Some("directional") => self.lights.push(Light::Distant { wi_world: -axis, l: intensity }),
+            Some("spot") => {
+                let angle = |key: &str, default: f32| light.key("spot").key(key).number().unwrap_or(default).cos();
+                let cos_total = angle("outerConeAngle", std::f32::consts::FRAC_PI_4);
+                let cos_falloff_start = angle("innerConeAngle", 0.0).max(cos_total);
+                self.lights.push(Light::Spot { p, axis, cos_total, cos_falloff_start, intensity });
+            }
+            _ => self.lights.push(Light::Point { p, intensity }),
+        }
+    }
+}
+
+fn emission_image(
+    source: &EmissionSource,
+    files: &FileCache,
+    messages: &mut Messages<'_>,
+) -> Option<Arc<EmissionImage>> {
+    let image =
+        files.rgb(&source.path).map_err(|error| report(&error, &source.path, messages.span, messages.diagnostics));
+    let (texels, [width, height]) = Arc::unwrap_or_clone(image.ok()?);
+    let image = EmissionImage::new(width, height, texels).ok()?;
+    Some(Arc::new(image.placed(source.wrap, source.mapping)))
+}
+
+/// An environment by an image, whose z becomes the y of the scene. Its middle is in direction +x, and it is seen as it
+/// is stored: maps of pbrt have their columns counter-clockwise about z, so they are mirrored.
+fn environment(path: &Path, files: &FileCache, messages: &mut Messages<'_>) -> Option<Light> {
+    let image = files.rgb(path).map_err(|error| report(&error, path, messages.span, messages.diagnostics)).ok()?;
+    let (texels, size) = Arc::unwrap_or_clone(image);
+    let mapping = if size[0] == size[1] { EnvironmentMapping::EqualArea } else { EnvironmentMapping::LatLong };
+    match EnvironmentMap::new(texels, size, mapping, EnvironmentFilter::Nearest) {
+        Ok(map) => {
+            let world_from_map = Affine3A::from_cols(-Vec3A::X, -Vec3A::Z, Vec3A::Y, Vec3A::ZERO);
+            Some(Light::infinite_image(Arc::new(map), &world_from_map, 1.0))
+        }
+        Err(reason) => {
+            messages.diagnostics.error(messages.span, format!("{}: {reason}", path.display()));
+            None
+        }
+    }
+}

@@ -1,0 +1,230 @@
+//! Materials: metallic-roughness, or specular-glossiness, with what extensions add.
+
+use super::Messages;
+use super::textures::{EmissionSource, Textures};
+use crate::import::images::{ImageChannels, ImageEncoding};
+use crate::materials::{Material, MaterialEntry, MaterialId, NormalMap, PrincipledMaterial};
+use crate::textures::{FloatTexture, FloatTextureId, ImageTexture, RgbTexture, RgbTextureId};
+use lumiris_formats::gltf::{Document, GltfError, Place};
+use lumiris_numbers::math::Rgb;
+
+/// What a primitive needs to know of its material.
+#[derive(Clone)]
+pub(super) struct Look {
+    pub material: MaterialId,
+    /// Texture of the opacity.
+    pub alpha: Option<FloatTextureId>,
+    /// Radiance, with the image that it is a factor of.
+    pub emission: Rgb,
+    pub emission_image: Option<EmissionSource>,
+    pub is_double_sided: bool,
+}
+
+/// Materials while a scene is read.
+pub(super) struct Materials<'a> {
+    document: &'a Document,
+    pub textures: Textures<'a>,
+    pub entries: Vec<MaterialEntry>,
+    pub looks: Vec<Look>,
+}
+
+/// An index of refraction so great that all light is reflected: colours of reflection are reflectances.
+const MIRROR_IOR: f32 = 1e6;
+
+/// Extensions of materials that are left out.
+const LEFT_OUT: &[(&str, &str)] = &[
+    ("KHR_materials_sheen", "sheen is not rendered"),
+    ("KHR_materials_iridescence", "thin films are not rendered"),
+    ("KHR_materials_dispersion", "dispersion is not rendered"),
+    ("KHR_materials_diffuse_transmission", "diffuse transmission is not rendered"),
+];
+
+/// A factor of a material.
+fn factor(place: &Place<'_>, default: f32) -> f32 {
+    place.number().unwrap_or(default)
+}
+
+impl<'a> Materials<'a> {
+    pub(super) fn new(document: &'a Document) -> std::io::Result<Self> {
+        Ok(Materials { document, textures: Textures::new(document)?, entries: Vec::new(), looks: Vec::new() })
+    }
+
+    /// Understands all materials, and the one of primitives without a material as the last.
+    pub(super) fn read(&mut self, messages: &mut Messages<'_>) -> Result<(), GltfError> {
+        let mut places = self.document.root().key("materials").items();
+        places.push(self.document.root().key("default material"));
+        for place in places {
+            let look = self.look(&place, messages)?;
+            self.looks.push(look);
+        }
+        Ok(())
+    }
+
+    /// Factor and texture of the base colour.
+    fn base(place: &Place<'a>) -> ([f32; 4], Place<'a>) {
+        let old = place.extension("KHR_materials_pbrSpecularGlossiness");
+        let pbr = place.key("pbrMetallicRoughness");
+        if old.exists() && !pbr.exists() {
+            return (old.key("diffuseFactor").numbers().unwrap_or([1.0; 4]), old.key("diffuseTexture"));
+        }
+        (pbr.key("baseColorFactor").numbers().unwrap_or([1.0; 4]), pbr.key("baseColorTexture"))
+    }
+
+    fn look(&mut self, place: &Place<'a>, messages: &mut Messages<'_>) -> Result<Look, GltfError> {
+        for (name, message) in LEFT_OUT.iter().filter(|(name, _)| place.extension(name).exists()) {
+            messages.warning(&place.extension(name), message);
+        }
+        let (factor, base) = Self::base(place);
+        let color = Rgb::new(factor[0], factor[1], factor[2]);
+        let is_unlit = place.extension("KHR_materials_unlit").exists();
+        let material = if is_unlit {
+            messages.warning(place, "an unlit surface emits its colour, and lights others");
+            Material::Diffuse { reflectance: self.textures.set.add_rgb(RgbTexture::Constant(Rgb::BLACK)) }
+        } else {
+            let tex1 = self.textures.colored(color, &base, messages)?;
+            let tex2 = self.textures.set.add_rgb(RgbTexture::VertexColor);
+            let base_color = self.textures.set.add_rgb(RgbTexture::Product { tex1, tex2 });
+            Material::Principled(self.principled(place, base_color, messages)?)
+        };
+        let normal = place.key("normalTexture");
+        let strength = normal.key("scale").number().unwrap_or(1.0);
+        let normal_map = self.textures.image(&normal, ImageChannels::Color, ImageEncoding::Linear, messages)?;
+        let normal_map = normal_map.map(|image| NormalMap { image, strength, is_along_v: true });
+        let name = place.key("name").text().unwrap_or("default").to_owned();
+        self.entries.push(MaterialEntry { name, material, normal_map, displacement: None });
+        let emission = if is_unlit { color } else { emitted(place) };
+        let emissive = if is_unlit { base.clone() } else { place.key("emissiveTexture") };
+        let emission_image = if emission.is_black() { None } else { self.textures.emission(&emissive, messages)? };
+        Ok(Look {
+            material: (self.entries.len() - 1) as MaterialId,
+            alpha: self.opacity(place, factor[3], &base, messages)?,
+            emission,
+            emission_image,
+            is_double_sided: place.key("doubleSided").is_true(),
+        })
+    }
+
+    fn principled(
+        &mut self,
+        place: &Place<'a>,
+        base_color: RgbTextureId,
+        messages: &mut Messages<'_>,
+    ) -> Result<PrincipledMaterial, GltfError> {
+        warn_of_approximations(place, messages);
+        let pbr = place.key("pbrMetallicRoughness");
+        let packed = pbr.key("metallicRoughnessTexture");
+        let specular = place.extension("KHR_materials_specular");
+        let coat = place.extension("KHR_materials_clearcoat");
+        let transmission = place.extension("KHR_materials_transmission");
+        let volume = place.extension("KHR_materials_volume");
+        let anisotropy = place.extension("KHR_materials_anisotropy").key("anisotropyStrength");
+        let color = Rgb::from_array(specular.key("specularColorFactor").numbers().unwrap_or([1.0; 3]));
+        let t = &mut self.textures;
+        let mut number = |place: &Place<'a>, key: &str, default: f32, texture: &Place<'a>, channel: usize| {
+            t.scaled(factor(&place.key(key), default), texture, channel, messages)
+        };
+        let of_coat = |key: &str| coat.key(key);
+        let mut material = PrincipledMaterial {
+            base_color,
+            metalness: number(&pbr, "metallicFactor", 1.0, &packed, 2)?,
+            roughness: number(&pbr, "roughnessFactor", 1.0, &packed, 1)?,
+            anisotropy: factor(&anisotropy, 0.0),
+            // 0 stands for an infinite index
+            ior: match factor(&place.extension("KHR_materials_ior").key("ior"), 1.5) {
+                0.0 => MIRROR_IOR,
+                ior => ior.max(1.0),
+            },
+            transmission: number(
+                &transmission,
+                "transmissionFactor",
+                0.0,
+                &transmission.key("transmissionTexture"),
+                0,
+            )?,
+            is_thin: factor(&volume.key("thicknessFactor"), 0.0) <= 0.0,
+            coat: number(&coat, "clearcoatFactor", 0.0, &of_coat("clearcoatTexture"), 0)?,
+            coat_roughness: number(&coat, "clearcoatRoughnessFactor", 0.0, &of_coat("clearcoatRoughnessTexture"), 1)?,
+            specular: t.opacity_scaled(
+                factor(&specular.key("specularFactor"), 1.0),
+                &specular.key("specularTexture"),
+                messages,
+            )?,
+            specular_color: t.colored(color, &specular.key("specularColorTexture"), messages)?,
+        };
+        let old = place.extension("KHR_materials_pbrSpecularGlossiness");
+        if old.exists() && !pbr.exists() {
+            self.specular_glossiness(&old, &mut material, messages)?;
+        }
+        Ok(material)
+    }
+
+    /// `KHR_materials_pbrSpecularGlossiness`: reflectance at normal incidence, and 1 − roughness, of a dielectric.
+    fn specular_glossiness(
+        &mut self,
+        place: &Place<'a>,
+        material: &mut PrincipledMaterial,
+        messages: &mut Messages<'_>,
+    ) -> Result<(), GltfError> {
+        let color = Rgb::from_array(place.key("specularFactor").numbers().unwrap_or([1.0; 3]));
+        let glossiness = factor(&place.key("glossinessFactor"), 1.0);
+        let texture = place.key("specularGlossinessTexture");
+        let image = self.textures.image(&texture, ImageChannels::Alpha, ImageEncoding::Linear, messages)?;
+        material.metalness = self.textures.float(0.0);
+        material.ior = MIRROR_IOR;
+        material.specular_color = self.textures.colored(color, &texture, messages)?;
+        material.roughness = match image {
+            Some(image) => {
+                let inverse = ImageTexture { scale: glossiness, invert: true, ..image };
+                self.textures.set.add_float(FloatTexture::Image(inverse))
+            }
+            None => self.textures.float(1.0 - glossiness),
+        };
+        Ok(())
+    }
+
+    /// The probability that rays are stopped; `None` for 1.
+    fn opacity(
+        &mut self,
+        place: &Place<'a>,
+        factor: f32,
+        base: &Place<'a>,
+        messages: &mut Messages<'_>,
+    ) -> Result<Option<FloatTextureId>, GltfError> {
+        let mode = place.key("alphaMode").text().unwrap_or("OPAQUE");
+        if mode == "OPAQUE" {
+            return Ok(None);
+        }
+        let tex = self.textures.opacity_scaled(factor, base, messages)?;
+        let scale = self.textures.set.add_float(FloatTexture::VertexOpacity);
+        let alpha = self.textures.set.add_float(FloatTexture::Scale { tex, scale });
+        if mode == "BLEND" {
+            return Ok(Some(alpha));
+        }
+        let threshold = place.key("alphaCutoff").number().unwrap_or(0.5);
+        Ok(Some(self.textures.set.add_float(FloatTexture::Threshold { tex: alpha, threshold })))
+    }
+}
+
+/// Radiance that a material emits, but for its texture.
+fn emitted(place: &Place<'_>) -> Rgb {
+    let strength = place.extension("KHR_materials_emissive_strength").key("emissiveStrength").number();
+    let color = Rgb::from_array(place.key("emissiveFactor").numbers().unwrap_or([0.0; 3]));
+    (color * strength.unwrap_or(1.0)).map(|c| c.max(0.0))
+}
+
+/// Says what is rendered in another way than the extensions have it.
+fn warn_of_approximations(place: &Place<'_>, messages: &mut Messages<'_>) {
+    let attenuation = place.extension("KHR_materials_volume").key("attenuationColor");
+    if attenuation.numbers::<3>().is_some_and(|c| c != [1.0; 3]) {
+        messages.warning(&attenuation, "absorption in volumes is not rendered");
+    }
+    let anisotropy = place.extension("KHR_materials_anisotropy");
+    let is_turned = anisotropy.key("anisotropyRotation").number().is_some_and(|r| r != 0.0);
+    if is_turned || anisotropy.key("anisotropyTexture").exists() {
+        messages.warning(&anisotropy, "the direction of anisotropy is that of the tangents");
+    }
+    let coat = place.extension("KHR_materials_clearcoat").key("clearcoatNormalTexture");
+    if coat.exists() {
+        messages.warning(&coat, "the coat has the normals of the base");
+    }
+}

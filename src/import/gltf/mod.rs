@@ -1,0 +1,120 @@
+//! glTF 2.0 scenes. Light of 1 cd/m² is taken for a radiance of 1 where surfaces emit; lights in candela and lux are
+//! divided by [`LUMENS_PER_WATT`], as Blender writes and reads them. Single-sided surfaces are rendered from both sides.
+//!
+//! Reading order: [`textures`], [`materials`], [`nodes`], [`pose`], [`meshes`], [`view`], [`assemble`].
+
+mod assemble;
+mod materials;
+mod meshes;
+mod nodes;
+mod pose;
+mod textures;
+mod view;
+
+use super::cache::FileCache;
+use super::fingerprint::SceneFiles;
+use super::{LoadOptions, Loaded};
+use crate::settings::Settings;
+use assemble::Assembly;
+use lumiris_formats::diagnostic::{Diagnostics, Report};
+use lumiris_formats::gltf::{Document, GltfError, Place, locate};
+use lumiris_formats::source::{FileId, SourceMap, Span};
+use std::collections::BTreeSet;
+use std::ops::Range;
+use std::path::Path;
+
+/// Luminous flux of a watt at 555 nm, by which lights are divided.
+pub const LUMENS_PER_WATT: f32 = 683.0;
+
+/// Extensions that a file may require. Of materials, these are also those whose lack a warning tells of.
+const KNOWN: &[&str] = &[
+    "EXT_mesh_gpu_instancing",
+    "KHR_lights_punctual",
+    "KHR_materials_anisotropy",
+    "KHR_materials_clearcoat",
+    "KHR_materials_diffuse_transmission",
+    "KHR_materials_dispersion",
+    "KHR_materials_emissive_strength",
+    "KHR_materials_ior",
+    "KHR_materials_iridescence",
+    "KHR_materials_pbrSpecularGlossiness",
+    "KHR_materials_sheen",
+    "KHR_materials_specular",
+    "KHR_materials_transmission",
+    "KHR_materials_unlit",
+    "KHR_materials_variants",
+    "KHR_materials_volume",
+    "KHR_mesh_quantization",
+    "KHR_texture_transform",
+];
+
+/// Messages about one file.
+struct Messages<'d> {
+    diagnostics: &'d mut Diagnostics,
+    file: FileId,
+    bytes: &'d [u8],
+    /// The beginning of the file.
+    span: Span,
+    warned: BTreeSet<String>,
+}
+
+impl Messages<'_> {
+    fn span_of(&self, place: &str) -> Span {
+        let Range { start, end } = locate(self.bytes, place);
+        Span { file: self.file, start: start as u32, end: end as u32 }
+    }
+
+    fn error(&mut self, error: &GltfError) {
+        self.diagnostics.error(self.span_of(&error.place), error.to_string());
+    }
+
+    /// A warning, given for the first place only.
+    fn warning(&mut self, place: &Place<'_>, message: &str) {
+        if self.warned.insert(message.to_owned()) {
+            let span = self.span_of(&place.path);
+            self.diagnostics.warning(span, message).remark(place.path.as_str());
+        }
+    }
+}
+
+/// Loads a .gltf or .glb file. `Err` holds all errors and the warnings.
+pub fn load(path: &Path, options: &LoadOptions, files: &FileCache) -> Result<Loaded, Box<Report>> {
+    let (mut sources, mut diagnostics) = (SourceMap::new(), Diagnostics::new());
+    let Ok(file) = sources.read(path) else {
+        diagnostics.missing_file(path, "cannot be opened", None);
+        return Err(Box::new(diagnostics.finish(&sources)));
+    };
+    let bytes = sources.shared_bytes(file);
+    let span = Span { file, start: 0, end: 0 };
+    let mut messages = Messages { diagnostics: &mut diagnostics, file, bytes: &bytes, span, warned: BTreeSet::new() };
+    let folder = path.parent().unwrap_or(Path::new(""));
+    let mut others = Vec::new();
+    let scene = match Document::parse(&bytes, folder, KNOWN) {
+        Ok(document) => {
+            for place in document.root().key("extensionsUsed").items() {
+                if place.text().is_some_and(|name| !KNOWN.contains(&name)) {
+                    messages.warning(&place, &format!("{} is not rendered", place.text().unwrap_or_default()));
+                }
+            }
+            others.clone_from(&document.files);
+            Assembly::new(&document, options).and_then(|assembly| assembly.scene(files, &mut others, &mut messages))
+        }
+        Err(errors) => {
+            errors.iter().for_each(|error| messages.error(error));
+            Ok(None)
+        }
+    };
+    let scene = scene.unwrap_or_else(|error| {
+        messages.error(&error);
+        None
+    });
+    let failed = diagnostics.has_errors();
+    let scene_files = SceneFiles::new(&sources, others);
+    let report = diagnostics.finish(&sources);
+    match scene {
+        Some(scene) if !failed => {
+            Ok(Loaded { scene, settings: Settings::default(), warnings: report, files: scene_files })
+        }
+        _ => Err(Box::new(report)),
+    }
+}

@@ -1,0 +1,78 @@
+//! The tree of nodes: what stands where.
+
+use glam::{Mat4, Quat};
+use lumiris_formats::gltf::{Document, GltfError, Place};
+use lumiris_numbers::math::{Affine3A, Vec3};
+use std::collections::HashSet;
+
+/// A node of the scene with its placement.
+pub(super) struct Node<'a> {
+    pub place: Place<'a>,
+    /// Index of the node.
+    pub index: usize,
+    /// Index of its mesh.
+    pub mesh: Option<usize>,
+    pub world_from_node: Affine3A,
+}
+
+/// All nodes of the scene, parents first. A node that is met twice is an error, so that no tree is endless.
+pub(super) fn nodes(document: &Document) -> Result<Vec<Node<'_>>, GltfError> {
+    let root = document.root();
+    let all = root.key("nodes");
+    let count = all.items().len();
+    let scene = root.key("scenes").item(root.key("scene").index().unwrap_or(0));
+    let mut open: Vec<(usize, Affine3A)> = if scene.exists() {
+        scene.key("nodes").items().iter().filter_map(Place::index).map(|i| (i, Affine3A::IDENTITY)).collect()
+    } else {
+        let children: HashSet<usize> =
+            all.items().iter().flat_map(|n| n.key("children").items()).filter_map(|child| child.index()).collect();
+        (0..count).filter(|i| !children.contains(i)).map(|i| (i, Affine3A::IDENTITY)).collect()
+    };
+    open.reverse();
+    let mut is_met = vec![false; count];
+    let mut nodes = Vec::new();
+    while let Some((index, parent)) = open.pop() {
+        let place = all.item(index);
+        match is_met.get_mut(index) {
+            Some(met) if !*met => *met = true,
+            Some(_) => return Err(place.error("the node has two parents, or is its own ancestor")),
+            None => return Err(place.error("is not there")),
+        }
+        let world_from_node = parent * transform(&place);
+        let children = place.key("children").items();
+        open.extend(children.iter().rev().filter_map(Place::index).map(|i| (i, world_from_node)));
+        nodes.push(Node { mesh: place.key("mesh").index(), place, index, world_from_node });
+    }
+    Ok(nodes)
+}
+
+fn transform(place: &Place<'_>) -> Affine3A {
+    if let Some(m) = place.key("matrix").numbers::<16>() {
+        return Affine3A::from_mat4(Mat4::from_cols_array(&m));
+    }
+    let translation = Vec3::from(place.key("translation").numbers().unwrap_or([0.0; 3]));
+    let scale = Vec3::from(place.key("scale").numbers().unwrap_or([1.0; 3]));
+    let rotation = Quat::from_array(place.key("rotation").numbers().unwrap_or([0.0, 0.0, 0.0, 1.0]));
+    let rotation = if rotation.length_squared() > 0.0 { rotation.normalize() } else { Quat::IDENTITY };
+    Affine3A::from_scale_rotation_translation(scale, rotation, translation)
+}
+
+/// Placements by `EXT_mesh_gpu_instancing`, relative to the node; one if there are none.
+pub(super) fn instances(document: &Document, place: &Place<'_>) -> Result<Vec<Affine3A>, GltfError> {
+    let attributes = place.extension("EXT_mesh_gpu_instancing").key("attributes");
+    let numbers = |name: &str| attributes.key(name).index().map(|i| document.accessor(i)).transpose();
+    let [translations, rotations, scales] = [numbers("TRANSLATION")?, numbers("ROTATION")?, numbers("SCALE")?];
+    let translations = translations.map(|n| n.elements::<3>(0.0));
+    let rotations = rotations.map(|n| n.elements::<4>(0.0));
+    let scales = scales.map(|n| n.elements::<3>(1.0));
+    let counts = [translations.as_ref().map(Vec::len), rotations.as_ref().map(Vec::len), scales.as_ref().map(Vec::len)];
+    let Some(&count) = counts.iter().flatten().min() else { return Ok(vec![Affine3A::IDENTITY]) };
+    let placement = |i: usize| {
+        let rotation = rotations.as_ref().map_or(Quat::IDENTITY, |r| Quat::from_array(r[i]));
+        let rotation = if rotation.length_squared() > 0.0 { rotation.normalize() } else { Quat::IDENTITY };
+        let scale = scales.as_ref().map_or(Vec3::ONE, |s| Vec3::from(s[i]));
+        let translation = translations.as_ref().map_or(Vec3::ZERO, |t| Vec3::from(t[i]));
+        Affine3A::from_scale_rotation_translation(scale, rotation, translation)
+    };
+    Ok((0..count).map(placement).collect())
+}

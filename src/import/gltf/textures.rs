@@ -1,0 +1,175 @@
+//! Textures and their images.
+
+use super::Messages;
+use crate::imaging::AxisWrap;
+use crate::import::images::{ImageChannels, ImageEncoding, ImageRequest};
+use crate::import::resources::Resources;
+use crate::lights::EmissionMapping;
+use crate::textures::{
+    Filter, FloatTexture, FloatTextureId, ImageTexture, Mapping2d, RgbTexture, RgbTextureId, TextureSet, Wrap,
+};
+use glam::{Affine2, Mat2};
+use lumiris_formats::gltf::document::Content;
+use lumiris_formats::gltf::{Document, GltfError, Place};
+use lumiris_numbers::math::{Rgb, Vec2};
+use std::path::{Path, PathBuf};
+
+/// An image that a material emits.
+#[derive(Clone, Debug)]
+pub(super) struct EmissionSource {
+    pub path: PathBuf,
+    pub wrap: [AxisWrap; 2],
+    pub mapping: Option<EmissionMapping>,
+}
+
+/// Textures while a scene is read.
+pub(super) struct Textures<'a> {
+    document: &'a Document,
+    pub set: TextureSet,
+    pub resources: Resources,
+    /// Holds images that are in the document.
+    folder: tempfile::TempDir,
+}
+
+impl<'a> Textures<'a> {
+    pub(super) fn new(document: &'a Document) -> std::io::Result<Self> {
+        let (set, resources) = (TextureSet::default(), Resources::default());
+        Ok(Textures { document, set, resources, folder: tempfile::tempdir()? })
+    }
+
+    pub(super) fn float(&mut self, value: f32) -> FloatTextureId {
+        self.set.add_float(FloatTexture::Constant(value))
+    }
+
+    /// A colour times a texture.
+    pub(super) fn colored(
+        &mut self,
+        color: Rgb,
+        place: &Place<'a>,
+        messages: &mut Messages<'_>,
+    ) -> Result<RgbTextureId, GltfError> {
+        let constant = self.set.add_rgb(RgbTexture::Constant(color));
+        let Some(image) = self.image(place, ImageChannels::Color, ImageEncoding::Srgb, messages)? else {
+            return Ok(constant);
+        };
+        let tex2 = self.set.add_rgb(RgbTexture::Image(image));
+        Ok(self.set.add_rgb(RgbTexture::Product { tex1: constant, tex2 }))
+    }
+
+    /// A number times a channel of a texture.
+    pub(super) fn scaled(
+        &mut self,
+        factor: f32,
+        place: &Place<'a>,
+        channel: usize,
+        messages: &mut Messages<'_>,
+    ) -> Result<FloatTextureId, GltfError> {
+        Ok(match self.image(place, ImageChannels::Color, ImageEncoding::Linear, messages)? {
+            Some(image) => self.set.add_float(FloatTexture::Channel(ImageTexture { scale: factor, ..image }, channel)),
+            None => self.float(factor),
+        })
+    }
+
+    /// A number times the opacity of a texture.
+    pub(super) fn opacity_scaled(
+        &mut self,
+        factor: f32,
+        place: &Place<'a>,
+        messages: &mut Messages<'_>,
+    ) -> Result<FloatTextureId, GltfError> {
+        Ok(match self.image(place, ImageChannels::Alpha, ImageEncoding::Linear, messages)? {
+            Some(image) => self.set.add_float(FloatTexture::Image(ImageTexture { scale: factor, ..image })),
+            None => self.float(factor),
+        })
+    }
+
+    /// The file of a texture; an image of the document becomes one.
+    fn file(&self, place: &Place<'a>, messages: &mut Messages<'_>) -> Result<Option<PathBuf>, GltfError> {
+        let Some(index) = place.key("index").index() else { return Ok(None) };
+        let texture = self.document.root().key("textures").item(index);
+        let Some(source) = texture.key("source").index() else {
+            messages.warning(&texture, "a texture without an image in PNG or JPEG is left out");
+            return Ok(None);
+        };
+        let image = self.document.root().key("images").item(source);
+        let bytes = match self.document.content(&image)? {
+            Content::File(path) => return Ok(Some(path)),
+            Content::Bytes(bytes) => bytes,
+        };
+        let extension = if bytes.starts_with(&[0xff, 0xd8]) { "jpg" } else { "png" };
+        let path = self.folder.path().join(format!("image{source}.{extension}"));
+        if !path.exists() {
+            std::fs::write(&path, bytes).map_err(|e| image.error(e.to_string()))?;
+        }
+        Ok(Some(path))
+    }
+
+    /// How an image goes on beyond its edges, along its rows and columns, and how it is filtered.
+    fn sampler(&self, place: &Place<'a>) -> ([AxisWrap; 2], Filter) {
+        let root = self.document.root();
+        let sampler = place.key("index").index().and_then(|i| root.key("textures").item(i).key("sampler").index());
+        let Some(sampler) = sampler.map(|i| root.key("samplers").item(i)) else {
+            return ([AxisWrap::Repeat; 2], Filter::Bilinear);
+        };
+        let wrap = ["wrapS", "wrapT"].map(|key| match sampler.key(key).index() {
+            Some(33071) => AxisWrap::Clamp,
+            Some(33648) => AxisWrap::Mirror,
+            _ => AxisWrap::Repeat,
+        });
+        (wrap, if sampler.key("magFilter").index() == Some(9728) { Filter::Point } else { Filter::Bilinear })
+    }
+
+    /// An image that is emitted.
+    pub(super) fn emission(
+        &self,
+        place: &Place<'a>,
+        messages: &mut Messages<'_>,
+    ) -> Result<Option<EmissionSource>, GltfError> {
+        let Some(path) = self.file(place, messages)? else { return Ok(None) };
+        let (second, image_from_uv) = mapping(place);
+        let is_plain = !second && image_from_uv == Affine2::IDENTITY;
+        let mapping = (!is_plain).then_some(EmissionMapping { second, image_from_uv });
+        Ok(Some(EmissionSource { path, wrap: self.sampler(place).0, mapping }))
+    }
+
+    pub(super) fn image(
+        &mut self,
+        place: &Place<'a>,
+        channels: ImageChannels,
+        encoding: ImageEncoding,
+        messages: &mut Messages<'_>,
+    ) -> Result<Option<ImageTexture>, GltfError> {
+        let Some(path) = self.file(place, messages)? else { return Ok(None) };
+        let (wrap, filter) = self.sampler(place);
+        let wrap = match wrap {
+            [AxisWrap::Repeat, AxisWrap::Repeat] => Wrap::Repeat,
+            [AxisWrap::Clamp, AxisWrap::Clamp] => Wrap::Clamp,
+            mixed => Wrap::Axes(mixed),
+        };
+        let image = self.resources.image(ImageRequest { path, channels, encoding, wrap, filter }, messages.span);
+        let (second, st_from_uv) = mapping(place);
+        let mapping = Mapping2d::Affine { second, matrix: st_from_uv.matrix2, offset: st_from_uv.translation };
+        Ok(Some(ImageTexture { image, mapping, scale: 1.0, invert: false }))
+    }
+
+    /// Files that are not in the document.
+    pub(super) fn files(&self) -> Vec<PathBuf> {
+        let is_own = |path: &Path| path.starts_with(self.folder.path());
+        self.resources.paths().filter(|path| !is_own(path)).map(Into::into).collect()
+    }
+}
+
+/// True for the second texture coordinates, and those of the image by them. They have v downwards in the file, and
+/// upwards here: v ↦ 1 − v on both sides of the transformation offset + rotation · scale.
+fn mapping(place: &Place<'_>) -> (bool, Affine2) {
+    let transform = place.extension("KHR_texture_transform");
+    let set = transform.key("texCoord").index().or_else(|| place.key("texCoord").index()).unwrap_or(0);
+    let offset = Vec2::from(transform.key("offset").numbers().unwrap_or([0.0; 2]));
+    let scale = Vec2::from(transform.key("scale").numbers().unwrap_or([1.0; 2]));
+    let (sin, cos) = transform.key("rotation").number().unwrap_or(0.0).sin_cos();
+    let matrix = Mat2::from_cols(Vec2::new(cos, -sin), Vec2::new(sin, cos)) * Mat2::from_diagonal(scale);
+    let flip = Mat2::from_diagonal(Vec2::new(1.0, -1.0));
+    // 1 − (M (u, 1 − v) + o)_v
+    let offset = flip * (matrix * Vec2::Y + offset) + Vec2::Y;
+    (set == 1, Affine2::from_mat2_translation(flip * matrix * flip, offset))
+}

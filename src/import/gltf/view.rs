@@ -1,0 +1,73 @@
+//! The camera and the film.
+
+use super::Messages;
+use super::nodes::Node;
+use crate::cameras::Camera;
+use crate::film::PixelBounds;
+use crate::film::filter::PixelFilter;
+use crate::import::LoadOptions;
+use crate::scene::FilmSettings;
+use lumiris_formats::gltf::{Document, Place};
+use lumiris_numbers::math::{Affine3A, Bounds3, Vec3};
+
+/// Height of an image whose size nobody gives.
+const HEIGHT: u32 = 720;
+/// Angle of view of the camera that frames a scene (degrees).
+const AUTO_FOV: f32 = 40.0;
+/// Direction from the scene to that camera.
+const AUTO_DIRECTION: Vec3 = Vec3::new(0.5, 0.35, 0.8);
+
+/// The first camera of the scene, or one that frames it, and the film.
+pub(super) fn camera(
+    document: &Document,
+    options: &LoadOptions,
+    nodes: &[Node<'_>],
+    bounds: &Bounds3,
+    messages: &mut Messages<'_>,
+) -> (Camera, FilmSettings) {
+    let cameras = document.root().key("cameras");
+    let mut placed =
+        nodes.iter().filter(|n| n.world_from_node.is_finite() && n.world_from_node.matrix3.determinant() != 0.0);
+    let found = placed.find_map(|n| Some((n, cameras.item(n.place.key("camera").index()?))));
+    let found = if options.camera_auto { None } else { found };
+    if found.is_none() && !options.camera_auto {
+        messages.warning(&cameras, "no camera: one that frames the scene is used (--camera-auto)");
+    }
+    let aspect = found.as_ref().and_then(|(_, c)| c.key("perspective").key("aspectRatio").number());
+    let width = (HEIGHT as f32 * aspect.filter(|a| *a > 0.0).unwrap_or(16.0 / 9.0)).round().clamp(1.0, 65_536.0);
+    let resolution = options.resolution.unwrap_or([width as u32, HEIGHT]);
+    let aspect = resolution[0] as f32 / resolution[1] as f32;
+    let camera = found.map_or_else(|| frame(bounds, aspect, resolution), |(n, c)| of_file(n, &c, aspect, resolution));
+    let [x0, x1, y0, y1] = options.crop.unwrap_or([0.0, 1.0, 0.0, 1.0]);
+    let at = |fraction: f32, size: u32| ((fraction * size as f32).ceil() as u32).min(size);
+    let [w, h] = resolution;
+    let bounds = PixelBounds { x0: at(x0, w), x1: at(x1, w), y0: at(y0, h), y1: at(y1, h) };
+    let filter = PixelFilter::Gaussian { rx: 1.5, ry: 1.5, sigma: 0.5 };
+    (camera, FilmSettings { resolution, bounds, filter, file_name: None, scale: 1.0 })
+}
+
+/// A camera of the file: it looks along −z; scales of its node do not count.
+fn of_file(node: &Node<'_>, camera: &Place<'_>, aspect: f32, resolution: [u32; 2]) -> Camera {
+    let (_, rotation, translation) = node.world_from_node.to_scale_rotation_translation();
+    let world_from_camera = Affine3A::from_scale_rotation_translation(Vec3::new(1.0, 1.0, -1.0), rotation, translation);
+    let orthographic = camera.key("orthographic");
+    if orthographic.exists() {
+        let y = orthographic.key("ymag").number().unwrap_or(1.0).abs().max(1e-6);
+        return Camera::orthographic(world_from_camera, [-y * aspect, y * aspect, -y, y], resolution, 0.0, 1e6);
+    }
+    let fov = camera.key("perspective").key("yfov").number().unwrap_or(0.8).clamp(1e-3, 3.1);
+    Camera::perspective(world_from_camera, fov.to_degrees(), [-aspect, aspect, -1.0, 1.0], resolution, 0.0, 1e6)
+}
+
+/// A camera that sees the whole scene.
+fn frame(bounds: &Bounds3, aspect: f32, resolution: [u32; 2]) -> Camera {
+    let (center, radius) = bounds.bounding_sphere();
+    let radius = if radius > 0.0 && radius.is_finite() { radius } else { 1.0 };
+    let center = if center.is_finite() { center } else { Vec3::ZERO };
+    let half = (AUTO_FOV.to_radians() * 0.5).tan() * aspect.min(1.0);
+    let eye = center + AUTO_DIRECTION.normalize() * (radius / half.atan().sin());
+    let z = (center - eye).normalize();
+    let x = z.cross(Vec3::Y).normalize();
+    let world_from_camera = Affine3A::from_cols(x.into(), x.cross(z).into(), z.into(), eye.into());
+    Camera::perspective(world_from_camera, AUTO_FOV, [-aspect, aspect, -1.0, 1.0], resolution, 0.0, 1e6)
+}

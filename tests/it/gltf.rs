@@ -1,0 +1,224 @@
+//! glTF scenes: what small ones become, that they look like the same scenes of pbrt, and that broken ones are refused
+//! without a panic.
+
+use lumiris::import::cache::FileCache;
+use lumiris::import::{LoadOptions, Loaded, load, load_text};
+use lumiris::render::output::channels;
+use lumiris::render::{RenderSettings, render};
+use lumiris::scene::AccelKind;
+use lumiris_numbers::math::{Bounds3, Vec3};
+use lumiris_test_support::random::{RngExt, pcg32};
+use std::panic::{AssertUnwindSafe, catch_unwind};
+use std::path::Path;
+use std::sync::atomic::AtomicBool;
+
+/// A container of some JSON and bytes.
+fn container(json: &str, mut bytes: Vec<u8>) -> Vec<u8> {
+    let mut text = json.as_bytes().to_vec();
+    text.resize(text.len().next_multiple_of(4), b' ');
+    bytes.resize(bytes.len().next_multiple_of(4), 0);
+    let mut file = b"glTF\x02\0\0\0".to_vec();
+    file.extend(((28 + text.len() + bytes.len()) as u32).to_le_bytes());
+    for (kind, chunk) in [(0x4e4f_534a_u32, text), (0x004e_4942, bytes)] {
+        file.extend((chunk.len() as u32).to_le_bytes());
+        file.extend(kind.to_le_bytes());
+        file.extend(chunk);
+    }
+    file
+}
+
+fn floats(values: &[f32]) -> Vec<u8> {
+    values.iter().flat_map(|v| v.to_le_bytes()).collect()
+}
+
+/// A container of a triangle with a principled material, a light and a camera.
+fn triangle() -> Vec<u8> {
+    let json = r#"{"asset":{"version":"2.0"},"scene":0,"extensionsUsed":["KHR_lights_punctual"],
+        "extensions":{"KHR_lights_punctual":{"lights":[{"type":"point","intensity":683}]}},
+        "scenes":[{"nodes":[0,1,2]}],
+        "nodes":[{"mesh":0},{"translation":[0,0,2],"extensions":{"KHR_lights_punctual":{"light":0}}},
+                 {"translation":[0,0,3],"camera":0}],
+        "cameras":[{"type":"perspective","perspective":{"yfov":0.7,"znear":0.1,"aspectRatio":2}}],
+        "materials":[{"pbrMetallicRoughness":{"baseColorFactor":[1,0.5,0.25,1],"metallicFactor":0}}],
+        "meshes":[{"primitives":[{"attributes":{"POSITION":0},"indices":1,"material":0}]}],
+        "accessors":[{"bufferView":0,"componentType":5126,"count":3,"type":"VEC3","min":[0,0,0],"max":[1,1,0]},
+                     {"bufferView":1,"componentType":5123,"count":3,"type":"SCALAR"}],
+        "bufferViews":[{"buffer":0,"byteLength":36},{"buffer":0,"byteOffset":36,"byteLength":6}],
+        "buffers":[{"byteLength":42}]}"#;
+    let mut bytes = floats(&[0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0, 1.0, 0.0]);
+    bytes.extend([0_u16, 1, 2].iter().flat_map(|v| v.to_le_bytes()));
+    container(json, bytes)
+}
+
+fn loaded(folder: &Path, bytes: &[u8]) -> Result<Loaded, String> {
+    let path = folder.join("a.glb");
+    std::fs::write(&path, bytes).unwrap();
+    load(&path, &LoadOptions::default()).map_err(|report| report.to_string())
+}
+
+/// Bounds of the scene of `nodes` and `rest`, whose accessors have `values`: three vectors each, but a matrix for the
+/// third one.
+fn bounds(nodes: &str, rest: &str, values: &[f32]) -> Result<(Bounds3, Loaded), String> {
+    let json = format!(
+        r#"{{"asset":{{"version":"2.0"}},"scenes":[{{"nodes":[0,1]}}],"nodes":[{nodes}],{rest},
+        "accessors":[{{"bufferView":0,"componentType":5126,"count":3,"type":"VEC3"}},
+                     {{"bufferView":0,"byteOffset":36,"componentType":5126,"count":3,"type":"VEC3"}},
+                     {{"bufferView":0,"byteOffset":72,"componentType":5126,"count":1,"type":"MAT4"}},
+                     {{"bufferView":0,"byteOffset":136,"componentType":5121,"count":3,"type":"VEC4"}},
+                     {{"bufferView":0,"byteOffset":148,"componentType":5121,"count":3,"type":"VEC4","normalized":true}}],
+        "bufferViews":[{{"buffer":0,"byteLength":160}}],"buffers":[{{"byteLength":160}}]}}"#
+    );
+    let mut bytes = floats(values);
+    bytes.resize(148, 0);
+    bytes.extend([255, 0, 0, 0].repeat(3));
+    let folder = tempfile::tempdir().unwrap();
+    let loaded = loaded(folder.path(), &container(&json, bytes))?;
+    Ok((loaded.scene.geometry.world_bounds(), loaded))
+}
+
+/// A triangle, the changes of its vertices, and a translation by (0, 0, 5).
+const VALUES: [f32; 34] = [
+    0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0, 1.0, 0.0, // vertices
+    0.0, 0.0, 0.0, 2.0, 0.0, 0.0, 0.0, 0.0, 4.0, // changes
+    1.0, 0.0, 0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0, 5.0, 1.0,
+];
+
+#[test]
+fn a_triangle_with_a_light_and_a_camera_is_read() {
+    let folder = tempfile::tempdir().unwrap();
+    let scene = loaded(folder.path(), &triangle()).unwrap().scene;
+    assert_eq!(scene.geometry.primitive_counts(), (1, 0, 0));
+    assert_eq!(scene.film.resolution, [1440, 720]);
+    assert!((scene.lights.lights[0].phi(1.0) - 4.0 * std::f32::consts::PI).abs() < 1e-3, "683 cd are 1 W/sr");
+}
+
+#[test]
+fn a_scene_looks_like_the_same_scene_of_pbrt() {
+    let folder = tempfile::tempdir().unwrap();
+    let text = r#"Scale -1 1 1
+        LookAt 0 0 3  0 0 0  0 1 0
+        Camera "perspective" "float fov" 40.107045
+        WorldBegin
+        LightSource "point" "rgb I" [1 1 1] "point3 from" [0 0 2]
+        Material "principled" "rgb base_color" [1 0.5 0.25] "float specular_roughness" 1
+        Shape "trianglemesh" "point3 P" [0 0 0  1 0 0  0 1 0] "integer indices" [0 1 2]"#;
+    let options = LoadOptions { resolution: Some([64, 32]), ..LoadOptions::default() };
+    let of_pbrt = load_text(text, "a.pbrt", folder.path(), &options, &FileCache::default());
+    let path = folder.path().join("a.glb");
+    std::fs::write(&path, triangle()).unwrap();
+    let [a, b] = [load(&path, &options), of_pbrt].map(|loaded| {
+        let mut loaded = loaded.map_err(|report| report.to_string()).unwrap();
+        loaded.settings = lumiris::settings::Settings::default();
+        let job = loaded.job(AccelKind::Embree, None).unwrap();
+        let settings = RenderSettings { spp: 16, ..RenderSettings::default() };
+        channels(&render(&job, &settings, &AtomicBool::new(false), &|_| ()).unwrap().film, &[], None).data
+    });
+    // The cameras are not the same to the bit, so a few samples at edges may differ
+    let different = a.iter().zip(&b).filter(|(a, b)| (*a - *b).abs() > 1e-3 * a.abs().max(1e-3)).count();
+    assert!(different * 50 < a.len(), "{different} of {} values differ", a.len());
+    let [sum_a, sum_b]: [f32; 2] = [&a, &b].map(|data| data.iter().sum());
+    assert!(sum_a > 1.0 && (sum_a / sum_b - 1.0).abs() < 1e-3, "{sum_a} {sum_b}");
+}
+
+#[test]
+fn an_environment_is_seen_as_it_is_stored() {
+    let folder = tempfile::tempdir().unwrap();
+    let (path, sky) = (folder.path().join("a.gltf"), folder.path().join("sky.pfm"));
+    // Columns of 90°: the first two meet in direction −z; the lower row is the first one
+    let colors = |row: f32| [[1.0, 0.0, row], [0.0, 1.0, row], [0.0, 0.0, row], [0.0, 0.0, row]].concat();
+    std::fs::write(&sky, [b"PF\n4 2\n-1.0\n".to_vec(), floats(&colors(0.0)), floats(&colors(1.0))].concat()).unwrap();
+    let json = r#"{"asset":{"version":"2.0"},"nodes":[{"camera":0}],
+        "cameras":[{"type":"perspective","perspective":{"yfov":0.5,"znear":0.1}}]}"#;
+    std::fs::write(&path, json).unwrap();
+    let resolution = Some([2, 2]);
+    let options = LoadOptions { resolution, environment: Some(sky), ..LoadOptions::default() };
+    let job = load(&path, &options).unwrap().job(AccelKind::Embree, None).unwrap();
+    let settings = RenderSettings { spp: 64, ..RenderSettings::default() };
+    let image = channels(&render(&job, &settings, &AtomicBool::new(false), &|_| ()).unwrap().film, &[], None).data;
+    let red_left_of_green = |row: &[f32]| row[0] > 3.0 * row[1] && row[4] > 3.0 * row[3];
+    assert!(image.chunks_exact(6).all(red_left_of_green), "{image:?}");
+    assert!(image[2] > 3.0 * image[8], "blue above: {image:?}");
+}
+
+#[test]
+fn morph_targets_have_their_default_weights() {
+    let mesh = |weights: &str| {
+        format!(
+            r#""meshes":[{{{weights}"primitives":[{{"attributes":{{"POSITION":0}},"targets":[{{"POSITION":1}}]}}]}}]"#
+        )
+    };
+    let top = |nodes: &str, weights: &str| bounds(nodes, &mesh(weights), &VALUES).unwrap().0.max;
+    assert_eq!(top(r#"{"mesh":0},{}"#, ""), Vec3::new(1.0, 1.0, 0.0));
+    assert_eq!(top(r#"{"mesh":0},{}"#, r#""weights":[0.5],"#), Vec3::new(2.0, 1.0, 2.0));
+    let of_node = r#"{"mesh":0,"weights":[1],"translation":[0,1,0]},{}"#;
+    assert_eq!(top(of_node, r#""weights":[0.5],"#), Vec3::new(3.0, 2.0, 4.0));
+}
+
+#[test]
+fn skins_follow_their_joints_and_not_their_node() {
+    let rest = |joint: u32| {
+        format!(
+            r#""skins":[{{"joints":[1],"inverseBindMatrices":2}}],"meshes":[{{"primitives":[
+            {{"attributes":{{"POSITION":0,"JOINTS_0":{joint},"WEIGHTS_0":4}}}}]}}]"#
+        )
+    };
+    let nodes = r#"{"mesh":0,"skin":0,"translation":[9,9,9]},{"translation":[10,0,0],"scale":[2,1,1]}"#;
+    let (bounds_of_skin, _) = bounds(nodes, &rest(3), &VALUES).unwrap();
+    assert_eq!((bounds_of_skin.min, bounds_of_skin.max), (Vec3::new(10.0, 0.0, 5.0), Vec3::new(12.0, 1.0, 5.0)));
+    let error = bounds(nodes, &rest(4), &VALUES).map(|_| ()).unwrap_err();
+    assert!(error.contains("JOINTS_0") && error.contains("of 1"), "{error}");
+}
+
+#[test]
+fn meshes_that_stand_twice_are_instances() {
+    let mesh = r#""meshes":[{"primitives":[{"attributes":{"POSITION":0}}]}]"#;
+    let (bounds, loaded) = bounds(r#"{"mesh":0},{"mesh":0,"scale":[-3,1,1]}"#, mesh, &VALUES).unwrap();
+    let geometry = &loaded.scene.geometry;
+    assert_eq!((geometry.groups.len(), geometry.instances.len(), geometry.geometries.len()), (1, 2, 1));
+    assert_eq!((bounds.min, bounds.max), (Vec3::new(-3.0, 0.0, 0.0), Vec3::new(1.0, 1.0, 0.0)));
+    assert!(loaded.warnings.to_string().contains("no light"), "{}", loaded.warnings);
+}
+
+#[test]
+fn what_is_not_read_is_an_error_with_its_place() {
+    let folder = tempfile::tempdir().unwrap();
+    let changed = |from: &str, to: &str| {
+        let to = format!("{to:0$}", from.len());
+        assert_eq!(from.len(), to.len());
+        let (mut bytes, from) = (triangle(), from.as_bytes());
+        let at = bytes.windows(from.len()).position(|w| w == from).unwrap();
+        bytes[at..at + from.len()].copy_from_slice(to.as_bytes());
+        loaded(folder.path(), &bytes).map(|_| ()).unwrap_err()
+    };
+    let error = changed(r#""extensionsUsed":["KHR_lights_punctual"]"#, r#""extensionsRequired":["KHR_draco_mesh"]"#);
+    assert!(error.contains("extensionsRequired[0]") && error.contains("KHR_draco_mesh"), "{error}");
+    let error = changed(r#""count":3,"type":"VEC3""#, r#""count":9,"type":"VEC3""#);
+    assert!(error.contains("accessors[0]"), "{error}");
+    let error = changed(r#""indices":1"#, r#""indices":7"#);
+    assert!(error.contains("meshes[0].primitives[0].indices") && error.contains("a.glb:8:"), "{error}");
+    let error = changed(r#""mesh":0}"#, r#""mesh":0]"#);
+    assert!(error.contains("a.glb:4:"), "{error}");
+    let error = loaded(folder.path(), &triangle()[..50]).map(|_| ()).unwrap_err();
+    assert!(error.contains("byte 8"), "{error}");
+}
+
+#[test]
+fn broken_containers_never_panic() {
+    let (folder, mut random) = (tempfile::tempdir().unwrap(), pcg32([6, 1, 8]));
+    let mut refused = 0;
+    for i in 0..3000 {
+        let mut bytes = triangle();
+        let length = bytes.len();
+        if i % 4 == 0 {
+            bytes.truncate(random.random_range(0..length));
+        } else {
+            for _ in 0..1 + i % 5 {
+                let at = random.random_range(0..length);
+                bytes[at] ^= 1 << random.random_range(0..8_u32);
+            }
+        }
+        let outcome = catch_unwind(AssertUnwindSafe(|| loaded(folder.path(), &bytes)));
+        refused += usize::from(outcome.unwrap_or_else(|_| panic!("mutation {i} panicked")).is_err());
+    }
+    assert!(refused > 1000, "{refused}");
+}
