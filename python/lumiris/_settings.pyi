@@ -12,6 +12,7 @@ class Settings(TypedDict, total=False):
     path_reuse: Optional[Union[int, Literal["auto"]]]
     light_groups: Optional[Literal["layers", "none"]]
     light_sampler: Optional[Literal["uniform", "power", "tree", "photons"]]
+    infinite_fraction: Optional[float]
     bsdf_proposals: Optional[int]
     bsdf_density: Optional[Literal["lobes", "uniform"]]
     sampler: Optional[Literal["independent", "stratified", "sobol", "zsobol"]]

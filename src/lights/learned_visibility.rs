@@ -110,16 +110,11 @@ impl LearnedVisibility {
     /// is no light.
     #[inline]
     pub fn sample_unseen(&self, ctx: &LightCtx, seen: &ContributingLights<'_>, u: f32) -> Option<UnseenLight> {
-        let TreeChoice { tree, infinite } = &self.choice;
+        let TreeChoice { tree, infinite, .. } = &self.choice;
 
-        // Infinite lights, each with the probability of the whole tree
         let unseen = || infinite.iter().filter(|&&light| seen.place(light).is_none());
         let count = unseen().count();
-        let p_infinite = match count {
-            0 => 0.0,
-            _ if tree.importance(ctx) > 0.0 => count as f32 / (count + 1) as f32,
-            _ => 1.0,
-        };
+        let p_infinite = self.choice.probability_of_some(ctx, count);
         if u < p_infinite {
             let x = u / p_infinite * count as f32;
             let i = (x as usize).min(count - 1);

@@ -4,7 +4,7 @@
 //! |---|---|
 //! | uniform | the same for all lights |
 //! | power | 95 % proportional to power, 5 % uniform, so that no light starves |
-//! | tree | equal for every infinite light and for the [`LightTree`](super::LightTree) over all others |
+//! | tree | by the [`LightTree`](super::LightTree), beside which every infinite light has its probability, or all have a given one |
 //! | photons | nearly always one of the lights that the visibility cache finds, if any; see [`super::visibility_cache_sampler`] |
 //!
 //! Lights without power are never chosen.
@@ -31,6 +31,22 @@ pub enum LightSamplerKind {
     Tree,
     /// By the same bound, over the lights that the visibility cache finds.
     Photons,
+}
+
+/// How lights are chosen.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct LightChoice {
+    /// The light sampler.
+    pub kind: LightSamplerKind,
+    /// Probability of all infinite lights together beside the light tree (0 to 1, exclusive). `None`: each has that of
+    /// the whole tree.
+    pub infinite_fraction: Option<f32>,
+}
+
+impl From<LightSamplerKind> for LightChoice {
+    fn from(kind: LightSamplerKind) -> Self {
+        LightChoice { kind, infinite_fraction: None }
+    }
 }
 
 /// A fixed distribution over lights: for single choices, and in order.
@@ -94,18 +110,18 @@ pub enum LightSampler {
 impl LightSampler {
     /// A sampler of `lights`, indexed as they are; `scene_radius` weighs infinite lights against others. That by
     /// photons has no visibility cache yet.
-    pub fn new(kind: LightSamplerKind, lights: &[Light], scene_radius: f32) -> Self {
+    pub fn new(choice: LightChoice, lights: &[Light], scene_radius: f32) -> Self {
+        let tree = |powers: &[f32]| TreeChoice::new(lights, powers, choice.infinite_fraction);
         let powers: Vec<f32> = lights.iter().map(|light| light.phi(scene_radius)).collect();
-        match kind {
+        match choice.kind {
             LightSamplerKind::Uniform => {
                 let weights: Vec<f32> = powers.iter().map(|&p| if p > 0.0 { 1.0 } else { 0.0 }).collect();
                 LightSampler::Uniform(FixedChoice::new(&weights))
             }
             LightSamplerKind::Power => LightSampler::Power(FixedChoice::new(&power_weights(&powers))),
-            LightSamplerKind::Tree => LightSampler::Tree(TreeChoice::new(lights, &powers)),
+            LightSamplerKind::Tree => LightSampler::Tree(tree(&powers)),
             LightSamplerKind::Photons => {
-                let base = TreeChoice::new(lights, &powers);
-                LightSampler::Photons(VisibilityCacheSampler::new(base, lights, scene_radius))
+                LightSampler::Photons(VisibilityCacheSampler::new(tree(&powers), lights, scene_radius))
             }
         }
     }
@@ -119,7 +135,7 @@ impl LightSampler {
     }
 
     /// The tree, if it takes part.
-    pub(super) fn tree(&self) -> Option<&TreeChoice> {
+    pub fn tree(&self) -> Option<&TreeChoice> {
         match self {
             LightSampler::Tree(choice) => Some(choice),
             LightSampler::Photons(choice) => Some(&choice.base),

@@ -43,7 +43,7 @@ pub use irradiance::Irradiances;
 pub use lanes::LightLanes;
 pub use layers::LightLayers;
 pub use learned_visibility::LearnedVisibility;
-pub use light_sampler::{LightSampler, LightSamplerKind};
+pub use light_sampler::{LightChoice, LightSampler, LightSamplerKind};
 pub use sampling::LightSampling;
 pub use set::{LightSet, LightSetBuilder};
 pub use tree::LightTree;

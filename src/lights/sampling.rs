@@ -2,7 +2,7 @@
 
 use super::visibility_cache::ContributingLights;
 use super::{
-    LearnedVisibility, LightCtx, LightGroups, LightHit, LightId, LightSample, LightSampler, LightSamplerKind, LightSet,
+    LearnedVisibility, LightChoice, LightCtx, LightGroups, LightHit, LightId, LightSample, LightSampler, LightSet,
     TreeChoice, VisibilityCache,
 };
 use lumiris_numbers::math::{Rgb, Vec3};
@@ -33,18 +33,19 @@ impl Deref for LightSampling {
 }
 
 impl LightSampling {
-    /// Chooses in the way `kind`, with at most `max` groups.
-    pub fn new(set: Arc<LightSet>, kind: LightSamplerKind, max: usize) -> Self {
-        let sampler = LightSampler::new(kind, &set.lights, set.scene_radius);
-        let (delta, groups) = (set.delta_sampler(kind), LightGroups::new(&set.lights, &sampler, max));
+    /// Chooses in the way `choice`, with at most `max` groups.
+    pub fn new(set: Arc<LightSet>, choice: impl Into<LightChoice>, max: usize) -> Self {
+        let choice = choice.into();
+        let sampler = LightSampler::new(choice, &set.lights, set.scene_radius);
+        let (delta, groups) = (set.delta_sampler(choice), LightGroups::new(&set.lights, &sampler, max));
         LightSampling { set, sampler, delta, groups, visibility_cache: None, learned: None }
     }
 
     /// Changes the light sampler; the visibility cache stays.
-    pub fn choose_by(&mut self, kind: LightSamplerKind, max: usize) {
-        self.sampler = LightSampler::new(kind, &self.set.lights, self.set.scene_radius);
+    pub fn choose_by(&mut self, choice: LightChoice, max: usize) {
+        self.sampler = LightSampler::new(choice, &self.set.lights, self.set.scene_radius);
         self.sampler.set_visibility_cache(self.visibility_cache.clone());
-        self.delta = self.set.delta_sampler(kind);
+        self.delta = self.set.delta_sampler(choice);
         self.set_groups(max);
     }
 
@@ -176,17 +177,24 @@ impl LightSampling {
 mod tests {
     use super::*;
     use crate::geometry::{Shape, TriangleMesh};
-    use crate::lights::{Emission, EnvironmentFilter, EnvironmentMap, EnvironmentMapping, Light, LightSetBuilder};
+    use crate::lights::{Emission, EnvironmentFilter, EnvironmentMap, EnvironmentMapping, Light};
+    use crate::lights::{LightSamplerKind, LightSetBuilder};
     use lumiris_numbers::math::{Affine3A, Bounds3};
     use lumiris_test_support::random::{RngExt, pcg32};
     use lumiris_test_support::{Moments, assert_chi_squared};
     use std::sync::Arc;
 
-    const KINDS: [LightSamplerKind; 4] =
-        [LightSamplerKind::Uniform, LightSamplerKind::Power, LightSamplerKind::Tree, LightSamplerKind::Photons];
+    const CHOICES: [LightChoice; 6] = [
+        LightChoice { kind: LightSamplerKind::Uniform, infinite_fraction: None },
+        LightChoice { kind: LightSamplerKind::Power, infinite_fraction: None },
+        LightChoice { kind: LightSamplerKind::Tree, infinite_fraction: None },
+        LightChoice { kind: LightSamplerKind::Tree, infinite_fraction: Some(0.125) },
+        LightChoice { kind: LightSamplerKind::Photons, infinite_fraction: None },
+        LightChoice { kind: LightSamplerKind::Photons, infinite_fraction: Some(0.9) },
+    ];
 
     /// The set, with photons of some lights around (0.4, 0.3, 0): more of those with a greater id.
-    fn with_cache(builder: LightSetBuilder, kind: LightSamplerKind, seen: &[LightId]) -> LightSampling {
+    fn with_cache(builder: LightSetBuilder, kind: LightChoice, seen: &[LightId]) -> LightSampling {
         let mut set = sampling(builder, kind, &bounds());
         let at = Vec3::new(0.4, 0.3, 0.0);
         let photons = seen.iter().flat_map(|&id| (0..=id % 7).map(move |_| (at, Vec3::Z, id)));
@@ -194,7 +202,7 @@ mod tests {
         set
     }
 
-    fn sampling(builder: LightSetBuilder, kind: LightSamplerKind, bounds: &Bounds3) -> LightSampling {
+    fn sampling(builder: LightSetBuilder, kind: impl Into<LightChoice>, bounds: &Bounds3) -> LightSampling {
         LightSampling::new(Arc::new(builder.build(bounds)), kind, 1)
     }
 
@@ -222,7 +230,7 @@ mod tests {
 
     #[test]
     fn every_sampler_is_a_distribution_over_the_lights_that_shine() {
-        for (kind, seen) in KINDS.into_iter().flat_map(|k| [(k, &[0, 2, 4][..]), (k, &[5, 900]), (k, &[])]) {
+        for (kind, seen) in CHOICES.into_iter().flat_map(|k| [(k, &[0, 2, 4][..]), (k, &[5, 900]), (k, &[])]) {
             let set = with_cache(builder(), kind, seen);
             let mut s = pcg32([1, 2, 3]);
             for ns in [Vec3::ZERO, Vec3::Z] {
@@ -245,6 +253,25 @@ mod tests {
     }
 
     #[test]
+    fn lights_at_infinity_have_their_fraction_where_others_can_contribute() {
+        let mut builder = LightSetBuilder::default();
+        builder.add_area(7, &quad(3.0), &Emission::constant(Rgb::splat(5.0)));
+        builder.add(Light::InfiniteConstant { l: Rgb::splat(0.1) });
+        builder.add(Light::Distant { wi_world: Vec3::Z, l: Rgb::WHITE });
+        for (infinite_fraction, expected) in [(None, 2.0 / 3.0), (Some(0.25), 0.25), (Some(0.9375), 0.9375)] {
+            let choice = LightChoice { kind: LightSamplerKind::Tree, infinite_fraction };
+            let set = sampling(builder.clone(), choice, &bounds());
+            let of = |z: f32| -> f32 {
+                let ctx = LightCtx::at(Vec3::new(0.4, 0.3, z));
+                [1, 2].iter().map(|&light| set.sampler.pmf(&ctx, light)).sum()
+            };
+            assert!((of(1.0) - expected).abs() < 1e-6, "{} {expected}", of(1.0));
+            // The lamp faces away
+            assert!((of(4.0) - 1.0).abs() < 1e-6, "{}", of(4.0));
+        }
+    }
+
+    #[test]
     fn runs_choose_each_light_by_its_probability_and_leave_a_uniform_number() {
         let mut builder = builder();
         for i in 0..80 {
@@ -253,7 +280,7 @@ mod tests {
         }
         // Few lights are compared at the point, many by the number of their photons
         let (few, many): (Vec<LightId>, Vec<LightId>) = ((0..80).step_by(7).collect(), (2..80).collect());
-        for (kind, seen) in KINDS.into_iter().flat_map(|k| [(k, &few), (k, &many)]) {
+        for (kind, seen) in CHOICES.into_iter().flat_map(|k| [(k, &few), (k, &many)]) {
             let set = with_cache(builder.clone(), kind, seen);
             for ns in [Vec3::ZERO, Vec3::Z] {
                 let ctx = LightCtx { p: Vec3::new(0.4, 0.3, 0.0), n: ns, ns };
@@ -309,7 +336,7 @@ mod tests {
                     .map_or(0.0, |s| f64::from(s.li.g * s.wi.dot(n).max(0.0) / s.pdf) / f64::from(n_samples));
             }
         }
-        for kind in KINDS {
+        for kind in CHOICES {
             // Photons of the wrong lights change nothing
             let set = with_cache(builder(), kind, &[2, 4]);
             let mut moments = Moments::default();
@@ -345,7 +372,7 @@ mod tests {
     #[test]
     fn scenes_without_light_or_without_extent_are_handled() {
         let ctx = LightCtx::at(Vec3::ZERO);
-        for kind in KINDS {
+        for kind in CHOICES {
             let set = sampling(LightSetBuilder::default(), kind, &Bounds3::EMPTY);
             assert!(set.sample(&ctx, 0.5, [0.5; 2]).is_none() && set.le(Vec3::Z).is_black());
             let mut b = LightSetBuilder::default();

@@ -2,7 +2,7 @@
 
 use super::area::AreaShape;
 use super::{
-    Emission, Light, LightCtx, LightId, LightLayers, LightSample, LightSampler, LightSamplerKind, SampledLight,
+    Emission, Light, LightChoice, LightCtx, LightId, LightLayers, LightSample, LightSampler, SampledLight,
     area_lights_of,
 };
 use crate::geometry::{GeometryId, Shape};
@@ -117,13 +117,13 @@ impl LightSet {
     }
 
     /// A sampler of the same kind over the delta lights; `None` if there are none.
-    pub fn delta_sampler(&self, kind: LightSamplerKind) -> Option<LightSampler> {
+    pub fn delta_sampler(&self, choice: LightChoice) -> Option<LightSampler> {
         let is_lit = |light: &&Light| light.is_delta() && light.phi(self.scene_radius) > 0.0;
         self.lights.iter().find(is_lit)?;
         let black = Light::Point { p: Vec3::ZERO, intensity: Rgb::BLACK };
         let delta: Vec<Light> =
             self.lights.iter().map(|l| if l.is_delta() { l.clone() } else { black.clone() }).collect();
-        Some(LightSampler::new(kind, &delta, self.scene_radius))
+        Some(LightSampler::new(choice, &delta, self.scene_radius))
     }
 
     /// The area lights, with the geometries that they are.

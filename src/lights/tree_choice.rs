@@ -12,32 +12,41 @@ pub struct TreeChoice {
     pub tree: Arc<LightTree>,
     /// Infinite lights, ascending.
     pub infinite: Vec<LightId>,
+    /// Probability of each of them over that of the whole tree.
+    odds: f32,
 }
 
 impl TreeChoice {
     /// A choice among `lights` in a scene of radius `scene_radius` (m).
     pub(super) fn of_lights(lights: &[Light], scene_radius: f32) -> Self {
         let powers: Vec<f32> = lights.iter().map(|light| light.phi(scene_radius)).collect();
-        Self::new(lights, &powers)
+        Self::new(lights, &powers, None)
     }
 
-    /// A choice among `lights` of the given `powers`.
-    pub(super) fn new(lights: &[Light], powers: &[f32]) -> Self {
+    /// A choice among `lights` of the given `powers`, where all infinite lights together have the probability
+    /// `infinite_fraction` (0 to 1, exclusive); `None`: each has that of the whole tree.
+    pub(super) fn new(lights: &[Light], powers: &[f32], infinite_fraction: Option<f32>) -> Self {
         let bounds: Vec<_> = lights.iter().map(Light::bounds).collect();
         let is_chosen = |&i: &usize| lights[i].is_infinite() && powers[i] > 0.0;
-        let infinite = (0..lights.len()).filter(is_chosen).map(|i| i as LightId).collect();
-        TreeChoice { tree: Arc::new(LightTree::new(&bounds)), infinite }
+        let infinite: Vec<LightId> = (0..lights.len()).filter(is_chosen).map(|i| i as LightId).collect();
+        let odds = infinite_fraction.map_or(1.0, |f| f / ((1.0 - f) * infinite.len().max(1) as f32));
+        TreeChoice { tree: Arc::new(LightTree::new(&bounds)), infinite, odds }
     }
 
-    /// Probability of the infinite lights together: each has that of the whole tree. 1 where nothing in the tree can
-    /// contribute.
+    /// Probability of the infinite lights together. 1 where nothing in the tree can contribute.
     #[inline]
     pub(super) fn infinite_probability(&self, ctx: &LightCtx) -> f32 {
-        let count = self.infinite.len();
+        self.probability_of_some(ctx, self.infinite.len())
+    }
+
+    /// Probability of `count` of the infinite lights, where the others cannot be chosen.
+    #[inline]
+    pub(super) fn probability_of_some(&self, ctx: &LightCtx, count: usize) -> f32 {
         if count == 0 {
             return 0.0;
         }
-        if self.tree.importance(ctx) > 0.0 { count as f32 / (count + 1) as f32 } else { 1.0 }
+        let odds = count as f32 * self.odds;
+        if self.tree.importance(ctx) > 0.0 { odds / (odds + 1.0) } else { 1.0 }
     }
 
     /// Chooses a light by `u` in [0, 1); `None` if there is none.
@@ -83,7 +92,7 @@ impl TreeChoice {
         (start, share): (f64, f32),
         out: &mut Vec<LightRun>,
     ) {
-        let TreeChoice { tree, infinite } = self;
+        let TreeChoice { tree, infinite, .. } = self;
         let p_infinite = self.infinite_probability(ctx);
         let each = f64::from(p_infinite * share) / infinite.len() as f64;
         let mut first = first;

@@ -12,19 +12,23 @@
 //! the pilot's noise, which the jackknife tells: all candidates have the same pixels, so that the difference of two of
 //! them is known better than either.
 //!
+//! Where lights at infinity are beside others, a round before these finds how many light samples are for them
+//! ([`super::auto_lights`]).
+//!
 //! In paths, a third round finds by blocks of pixels whether they share paths ([`super::auto_reuse`]).
 //!
 //! Times differ from run to run, so the choice is made once, becomes part of the settings, and is recorded with them:
 //! rendering with these settings gives the same image to the bit. All candidates are unbiased, and the pilot has random
 //! numbers of its own; so the choice adds no bias.
 
+use super::auto_lights;
+use super::auto_pixels::{blocks, pixels};
 use super::auto_reuse;
 pub use super::auto_round::Trial;
 use super::auto_round::{Candidate, Difference, Round};
 use super::visibility_cache::build_visibility_cache;
 use super::worker::Worker;
 use super::{RenderSettings, Run, processor_time};
-use crate::film::PixelBounds;
 use crate::imaging::metrics::difference::DEFAULT_EPSILON;
 use crate::integrators::PathTracer;
 use crate::integrators::path::CameraSample;
@@ -34,7 +38,7 @@ use crate::settings::{
     Allocation, EstimatorKind, IntegratorKind, IntegratorSettings, Proposals, RisSettings, Settings, StageTimes,
 };
 use lumiris_numbers::estimators::efficiency::Model;
-use lumiris_numbers::math::hash::{pcg4d, unit_f32};
+use lumiris_numbers::math::hash::pcg4d;
 use rayon::prelude::*;
 use serde::{Deserialize, Serialize};
 use std::sync::atomic::AtomicBool;
@@ -53,11 +57,16 @@ const ENOUGH_PIXELS: usize = 256;
 const FRACTIONS: [f64; 2] = [0.03, 0.08];
 /// Time of all rounds over that of rendering the pixels of one once, with the same number of samples and seeds: in direct
 /// light, and in paths.
-const TRIALS: [f64; 2] = [10.0, 20.0];
+const TRIALS: [f64; 2] = [11.0, 23.0];
+/// The same of the round that compares light choices.
+const LIGHT_TRIALS: f64 = 3.0;
 /// Combined with the seed of the image and the number of the round.
 const SEED: u32 = 0x61_75_74_6f;
 /// Share of the greatest efficiency, by the model, with which fewer samples will do.
 const NEARLY: f64 = 0.95;
+
+/// Numbers of samples, relative to those without a pilot, from which on fewer are tried too.
+const MANY: u32 = 3;
 
 /// Lights from which on photons may tell which of them contribute.
 const MANY_LIGHTS: usize = 16;
@@ -87,6 +96,9 @@ pub struct AutoChoice {
     pub cost: [f64; 3],
     /// The model: relative variance A, B_first, B_later.
     pub variance: [f64; 3],
+    /// Those with other fractions of light samples for lights at infinity.
+    #[serde(default)]
+    pub lights: Vec<Trial>,
     /// The trials of both rounds.
     pub trials: [Vec<Trial>; 2],
     /// Those with and without shared paths, in blocks of pixels.
@@ -160,8 +172,9 @@ pub(super) fn proposals(job: &RenderJob) -> Option<(u32, StageTimes)> {
 
 /// Where a round measures.
 struct Pilot {
-    /// Pixels of the rounds; those of the third are blocks.
-    pixels: [Vec<[u32; 2]>; 3],
+    /// Pixels of the rounds; those of the third are blocks, and the fourth is the one before all others, which may have
+    /// none.
+    pixels: [Vec<[u32; 2]>; 4],
     /// Samples of each and seed.
     spp: u32,
     seed: u32,
@@ -174,12 +187,23 @@ impl Pilot {
         let bounds = job.world.scene.film.bounds;
         let spp = 1 << sampling.spp.clamp(1, MAX_SPP).ilog2();
         let samples = bounds.area() as f64 * f64::from(sampling.spp);
-        let per_pixel = f64::from(2 * spp) * TRIALS[usize::from(integrator.depth() > 1)];
-        let [wanted, most] = FRACTIONS.map(|fraction| (samples * fraction / per_pixel) as usize);
-        let count = wanted.max(most.min(ENOUGH_PIXELS)).min(MAX_PIXELS);
+        let trials = TRIALS[usize::from(integrator.depth() > 1)];
+        let count = |trials: f64| {
+            let [wanted, most] =
+                FRACTIONS.map(|fraction| (samples * fraction / (f64::from(2 * spp) * trials)) as usize);
+            wanted.max(most.min(ENOUGH_PIXELS)).min(MAX_PIXELS)
+        };
+        let with_lights = count(trials + LIGHT_TRIALS);
+        let has_lights = auto_lights::is_open(&job.lights, integrator) && with_lights >= MIN_PIXELS;
+        let count = if has_lights { with_lights } else { count(trials) };
         let is_measurable = matches!(integrator.kind, IntegratorKind::Direct | IntegratorKind::Path);
         (is_measurable && count >= MIN_PIXELS).then(|| Pilot {
-            pixels: [pixels(&bounds, count, 0), pixels(&bounds, count, 1), blocks(&bounds, 2 * count)],
+            pixels: [
+                pixels(&bounds, count, 0),
+                pixels(&bounds, count, 1),
+                blocks(&bounds, 3 * count),
+                if has_lights { pixels(&bounds, count, 3) } else { Vec::new() },
+            ],
             spp,
             seed: sampling.seed,
         })
@@ -187,11 +211,11 @@ impl Pilot {
 
     fn choose(&self, job: &mut RenderJob) -> (AutoChoice, IntegratorSettings) {
         let start = processor_time::of_process();
-        let base = job.settings().integrator;
-        let base = &base;
-        // First round: the model
-        let has_later = base.depth() > 1;
+        let has_later = job.settings().integrator.depth() > 1;
         let [few, many] = if has_later { FIT_PATH } else { FIT_DIRECT };
+        let lights = self.choose_lights(job, few);
+        let base = &job.settings().integrator.clone();
+        // First round: the model
         let mut numbers = vec![[few, few], [many, few]];
         if has_later {
             numbers.push([few, many]);
@@ -225,10 +249,27 @@ impl Pilot {
             variance: model.variance,
             chosen: Candidate::named(shared.1).name,
             seconds: (processor_time::of_process() - start).as_secs_f64(),
+            lights,
             trials: [trials, second],
             sharing: shared.0,
         };
         (choice, shared.1)
+    }
+
+    /// Before all other rounds: the fraction of light samples for lights at infinity, with `n` samples at each vertex.
+    fn choose_lights(&self, job: &mut RenderJob, n: u32) -> Vec<Trial> {
+        let base = job.settings().integrator;
+        if self.pixels[3].is_empty() {
+            return Vec::new();
+        }
+        let count = job.lights.tree_choice().infinite.len() as f32;
+        let candidate = [Candidate::named(with_samples(&base, [n, n]))];
+        let (trials, fraction) = auto_lights::best(count / (count + 1.0), |fraction| {
+            job.change(|s| s.integrator.infinite_fraction = fraction);
+            self.round(job, &candidate, 3)
+        });
+        job.change(|s| s.integrator.infinite_fraction = fraction);
+        trials
     }
 
     /// Third round: whether pixels share paths, and the numbers of samples if they do.
@@ -277,6 +318,15 @@ impl Pilot {
     }
 }
 
+/// Numbers halfway to the best by the model, if these are much greater than those without a pilot: beyond what was measured,
+/// nets may gain less than the model says.
+fn halfway(base: &IntegratorSettings, best: [u32; 2]) -> Option<IntegratorSettings> {
+    let usual = [0, 1].map(|vertex| without_pilot(base).sample_counts_at(vertex).samples);
+    let halfway = [0, 1].map(|k| (f64::from(usual[k]) * f64::from(best[k])).sqrt().round() as u32);
+    let is_far = (0..2).any(|k| best[k] >= MANY * usual[k]);
+    is_far.then(|| with_samples(base, halfway))
+}
+
 /// What is done without a pilot, the best numbers of `mis`, and these with another setting each. None twice.
 fn second_round(base: &IntegratorSettings, best: [u32; 2]) -> Vec<Candidate> {
     let chosen = with_samples(base, best);
@@ -288,6 +338,7 @@ fn second_round(base: &IntegratorSettings, best: [u32; 2]) -> Vec<Candidate> {
         all.push(IntegratorSettings { roulette_depth: None, ..chosen });
     }
     all.push(resampled(base));
+    all.extend(halfway(base, best));
     let mut candidates: Vec<Candidate> = Vec::new();
     for settings in all {
         if candidates.iter().all(|c| c.settings != settings) {
@@ -321,38 +372,6 @@ fn with_photons(job: &mut RenderJob, nanoseconds: f64) -> Vec<Candidate> {
     };
     let numbers: &[u32] = if base.samples.is_some() { &[4] } else { &[2, 4, 8] };
     numbers.iter().map(|&n| contributing(n)).collect()
-}
-
-/// Pixels, one in each cell of a grid, at a place that depends on the round.
-fn pixels(bounds: &PixelBounds, count: usize, round: u32) -> Vec<[u32; 2]> {
-    let (width, height) = (bounds.width(), bounds.height());
-    let aspect = f64::from(width) / f64::from(height);
-    let columns = ((count as f64 * aspect).sqrt().round() as u32).clamp(1, width);
-    let rows = (count as u32 / columns).clamp(1, height);
-    let place = |k: u32, cells: u32, size: u32, u: f32| {
-        let [start, end] = [k, k + 1].map(|k| u64::from(k) * u64::from(size) / u64::from(cells)).map(|x| x as u32);
-        (start + ((end - start) as f32 * u) as u32).min(end - 1)
-    };
-    let pixel = |row: u32, column: u32| {
-        let h = pcg4d([row, column, SEED, round]);
-        let (x, y) = (place(column, columns, width, unit_f32(h[0])), place(row, rows, height, unit_f32(h[1])));
-        [bounds.x0 + x, bounds.y0 + y]
-    };
-    (0..rows).flat_map(|row| (0..columns).map(move |column| pixel(row, column))).collect()
-}
-
-/// As many pixels in blocks, or somewhat less; none where there is no room for any.
-fn blocks(bounds: &PixelBounds, count: usize) -> Vec<[u32; 2]> {
-    const EDGE: u32 = auto_reuse::EDGE;
-    let [width, height] = [bounds.width() / EDGE, bounds.height() / EDGE];
-    if width == 0 || height == 0 {
-        return Vec::new();
-    }
-    let corners = pixels(&PixelBounds { x0: 0, x1: width, y0: 0, y1: height }, count / (EDGE * EDGE) as usize, 2);
-    let block = |[x, y]: [u32; 2]| {
-        (0..EDGE * EDGE).map(move |i| [bounds.x0 + x * EDGE + i % EDGE, bounds.y0 + y * EDGE + i / EDGE])
-    };
-    corners.into_iter().flat_map(block).collect()
 }
 
 /// Renders some pixels with each candidate and seed: of each candidate, processor time (ns), and the difference of the two
@@ -405,20 +424,6 @@ fn measure(
 #[cfg(test)]
 mod tests {
     use super::*;
-
-    #[test]
-    fn pixels_lie_inside_the_image_and_apart() {
-        let bounds = PixelBounds { x0: 10, x1: 210, y0: 5, y1: 105 };
-        for round in 0..2 {
-            let pixels = pixels(&bounds, 300, round);
-            assert!((270..=330).contains(&pixels.len()), "{}", pixels.len());
-            assert!(pixels.iter().all(|[x, y]| (10..210).contains(x) && (5..105).contains(y)));
-            let different: std::collections::HashSet<_> = pixels.iter().collect();
-            assert_eq!(different.len(), pixels.len());
-        }
-        assert_ne!(pixels(&bounds, 300, 0), pixels(&bounds, 300, 1));
-        assert_eq!(pixels(&PixelBounds { x0: 0, x1: 2, y0: 0, y1: 1 }, 100, 0), [[0, 0], [1, 0]]);
-    }
 
     #[test]
     fn what_the_user_has_set_stays() {

@@ -1,18 +1,22 @@
 //! How many pixels share paths, as `--estimator auto` finds it by a pilot.
 //!
-//! Blocks of 2 × 2 pixels are rendered with and without sharing. A part S of the variance is divided by E² if blocks of
-//! E × E pixels share paths, and each of the E² − 1 other pixels costs the same time; so both follow for all E.
+//! Blocks of 4 × 4 pixels are rendered with and without sharing. A part S of the variance is divided by E² if blocks of
+//! E × E pixels share paths, and each of the E² − 1 other pixels costs the same time, beside what sharing takes in blocks of any
+//! size; so both follow for all E.
 
 use super::auto_round::{Candidate, Round, jackknife};
 use crate::settings::IntegratorSettings;
 use lumiris_numbers::estimators::efficiency::Model;
 
 /// Edge of the blocks of the pilot.
-pub(super) const EDGE: u32 = 2;
+pub(super) const EDGE: u32 = 4;
 /// Edges among which is chosen.
-const EDGES: [u32; 6] = [1, 2, 3, 4, 5, 6];
-/// Least time of another pixel's path, relative to that of a camera sample: what was measured may be less by chance.
-const MIN_COST: f64 = 0.005;
+const EDGES: [u32; 7] = [1, 2, 3, 4, 5, 6, 8];
+/// Least time of sharing in blocks of the pilot, relative to that of a camera sample: what was measured may be less by chance.
+const MIN_COST: f64 = 0.075;
+/// The part of that time which blocks of any size take: in a box and in the open, blocks of 2 × 2 pixels took half the time
+/// of blocks of 4 × 4.
+const FIXED: f64 = 1.0 / 3.0;
 /// Standard errors by which the gain must exceed nothing.
 const MIN_ERRORS: f64 = 1.0;
 const MIN_GAIN: f64 = 1.03;
@@ -38,9 +42,10 @@ pub(super) fn candidates(chosen: &IntegratorSettings) -> [Candidate; 2] {
 /// Time and variance relative to those without sharing, by what both candidates have.
 fn shared(edge: u32, [cost, more]: [f64; 2], [variance, less]: [f64; 2]) -> [f64; 2] {
     let (of_pilot, of_edge) = (f64::from(EDGE * EDGE), f64::from(edge * edge));
-    let of_pixel = ((more / cost - 1.0) / (of_pilot - 1.0)).max(MIN_COST);
+    let of_sharing = if edge > 1 { (more / cost - 1.0).max(MIN_COST) } else { 0.0 };
+    let of_blocks = FIXED + (1.0 - FIXED) * (of_edge - 1.0) / (of_pilot - 1.0);
     let part = ((1.0 - less / variance) / (1.0 - 1.0 / of_pilot)).clamp(0.0, 0.99);
-    [1.0 + of_pixel * (of_edge - 1.0), 1.0 - part * (1.0 - 1.0 / of_edge)]
+    [1.0 + of_sharing * of_blocks, 1.0 - part * (1.0 - 1.0 / of_edge)]
 }
 
 /// The edge that is most efficient by a round of both candidates, if that is more than chance.
@@ -78,12 +83,14 @@ mod tests {
 
     #[test]
     fn a_part_of_the_variance_goes_away_with_the_number_of_pixels() {
-        // Of a time of 10 and a variance of 8, 1 more for each pixel, and 6 that are shared
-        let at = |edge: u32| shared(edge, [10.0, 13.0], [8.0, 2.0 + 6.0 / 4.0]);
+        // Of a time of 10 and a variance of 8, 7.5 more and 1 more for each pixel, and 6 that are shared
+        let of_pilot = f64::from(EDGE * EDGE);
+        let at = |edge: u32| shared(edge, [10.0, 10.0 + 1.5 * (of_pilot - 1.0)], [8.0, 2.0 + 6.0 / of_pilot]);
         for edge in EDGES {
             let n = f64::from(edge * edge);
             let [cost, variance] = at(edge);
-            assert!((cost * 10.0 - (9.0 + n)).abs() < 1e-9 && (variance * 8.0 - (2.0 + 6.0 / n)).abs() < 1e-9);
+            let more = if edge > 1 { FIXED * 1.5 * (of_pilot - 1.0) + (n - 1.0) } else { 0.0 };
+            assert!((cost * 10.0 - (10.0 + more)).abs() < 1e-9 && (variance * 8.0 - (2.0 + 6.0 / n)).abs() < 1e-9);
         }
     }
 

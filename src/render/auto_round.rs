@@ -6,7 +6,7 @@ use serde::{Deserialize, Serialize};
 use std::f64::consts::PI;
 
 /// By how much a choice must be more efficient than the one before it.
-const MIN_GAIN: f64 = 1.03;
+pub(super) const MIN_GAIN: f64 = 1.03;
 /// Standard errors by which it must be: with other numbers of samples, where neither is safer than the other, and with another
 /// estimator, whose error may be that of few pixels which the pilot does not see.
 const MIN_ERRORS: [f64; 2] = [0.5, 2.0];

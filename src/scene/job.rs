@@ -33,7 +33,7 @@ impl RenderJob {
         let i = &settings.integrator;
         let scene = &world.scene;
         let lobes = scene.materials.lobes(i.bsdf_density);
-        let lights = LightSampling::new(Arc::clone(&scene.lights), i.light_sampler, max_groups(i, lobes));
+        let lights = LightSampling::new(Arc::clone(&scene.lights), i.light_choice(), max_groups(i, lobes));
         let has_alpha = |geometry: GeometryId| scene.geometry.geometries[geometry as usize].alpha.is_some();
         let irradiances = Irradiances::new(&scene.lights, has_alpha);
         let plain = (0..scene.geometry.geometries.len() as GeometryId).map(|g| plain_reflectance(scene, g)).collect();
@@ -46,7 +46,7 @@ impl RenderJob {
         self.settings = settings;
         self.lobes = self.world.scene.materials.lobes(i.bsdf_density);
         self.lights =
-            LightSampling::new(Arc::clone(&self.world.scene.lights), i.light_sampler, max_groups(i, self.lobes));
+            LightSampling::new(Arc::clone(&self.world.scene.lights), i.light_choice(), max_groups(i, self.lobes));
         self.sample_count_map = None;
         self.pixel_samples = None;
     }
@@ -70,8 +70,8 @@ impl RenderJob {
         let i = &self.settings.integrator;
         self.lobes = self.world.scene.materials.lobes(i.bsdf_density);
         let max = max_groups(i, self.lobes);
-        if i.light_sampler != before.light_sampler {
-            self.lights.choose_by(i.light_sampler, max);
+        if i.light_choice() != before.light_choice() {
+            self.lights.choose_by(i.light_choice(), max);
         } else if (i.bsdf_density, i.ocv.components) != (before.bsdf_density, before.ocv.components) {
             self.lights.set_groups(max);
         }

@@ -6,7 +6,7 @@
 use super::photon_map::PhotonMapSettings;
 use super::ris::RisSettings;
 use crate::bsdfs::ProposalDensity;
-use crate::lights::LightSamplerKind;
+use crate::lights::{LightChoice, LightSamplerKind};
 use lumiris_numbers::estimators::mis::Heuristic;
 use lumiris_numbers::estimators::ocv::{Form, MAX_COMPONENTS};
 use strum::{EnumString, IntoStaticStr, VariantNames};
@@ -42,6 +42,9 @@ pub struct IntegratorSettings {
     pub bsdf_fraction: Option<f32>,
     /// The light sampler.
     pub light_sampler: LightSamplerKind,
+    /// Fraction of the light samples by a light tree that go to lights at infinity (0 to 1, exclusive). `None`: what `auto`
+    /// chooses, or as many to each as to all other lights together.
+    pub infinite_fraction: Option<f32>,
     /// Settings of `ris`.
     pub ris: RisSettings,
     /// Settings of `irradiance-cache`.
@@ -78,6 +81,7 @@ impl Default for IntegratorSettings {
             heuristic: None,
             bsdf_fraction: None,
             light_sampler: LightSamplerKind::Tree,
+            infinite_fraction: None,
             ris: RisSettings::default(),
             cache: IrradianceCacheSettings::default(),
             photons: PhotonMapSettings::default(),
@@ -122,6 +126,16 @@ impl IntegratorSettings {
     /// costs no ray of its own; control variates need samples of all components, unless they correct those of `mis`.
     pub fn bsdf_fraction(&self) -> f32 {
         self.bsdf_fraction.unwrap_or(if self.is_like_mis() { 0.25 } else { 0.5 })
+    }
+
+    /// How lights are chosen.
+    pub fn light_choice(&self) -> LightChoice {
+        LightChoice { kind: self.light_sampler, infinite_fraction: self.infinite_fraction }
+    }
+
+    /// True if lights are chosen by a light tree, and those at infinity beside it.
+    pub fn has_light_tree(&self) -> bool {
+        matches!(self.light_sampler, LightSamplerKind::Tree | LightSamplerKind::Photons)
     }
 
     /// True if samples are drawn and weighted as `mis` does.

@@ -113,6 +113,19 @@ pub(super) const TRANSPORT: Group = Group {
             ..Setting::BASE
         },
         Setting {
+            flag: "infinite-fraction",
+            value_name: "FRACTION",
+            parameters: &["infinitefraction"],
+            key: "infinite_fraction",
+            kind: Kind::Real { range: Interval::open(0.0, 1.0), words: &[] },
+            help: "Fraction of the light samples by the light tree that go to lights at infinity: skies and suns",
+            applies: Applies::If(|s| s.integrator.has_light_tree()),
+            default: "as many to each of them as to all other lights together; auto measures what is best",
+            get: |s| s.integrator.infinite_fraction.map(Value::Real),
+            set: |s, v| v.real().map(|fraction| s.integrator.infinite_fraction = Some(fraction)),
+            ..Setting::BASE
+        },
+        Setting {
             flag: "bsdf-proposals",
             value_name: "M",
             parameters: &["bsdfproposals"],

@@ -48,7 +48,8 @@ fn table(auto: &AutoChoice) -> String {
         "efficiency",
         "±"
     );
-    for Trial { name, nanoseconds, variance, efficiency, error } in auto.trials.iter().flatten().chain(&auto.sharing) {
+    let trials = auto.lights.iter().chain(auto.trials.iter().flatten()).chain(&auto.sharing);
+    for Trial { name, nanoseconds, variance, efficiency, error } in trials {
         let error = efficiency * error;
         text += &format!("{name:<52}{nanoseconds:>10.0}{variance:>12.4}{efficiency:>12.2}{error:>8.2}\n");
     }
