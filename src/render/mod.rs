@@ -31,7 +31,7 @@ mod worker;
 use crate::direct::Estimator;
 use crate::film::Film;
 pub use crate::integrators::CacheReport;
-use crate::integrators::{MapStats, PathStats};
+use crate::integrators::{MapStats, PathStats, through_media};
 use crate::photons::PhotonError;
 use crate::scene::RenderJob;
 use crate::settings::Settings;
@@ -153,6 +153,9 @@ pub enum RenderError {
     /// The integrator could not prepare its photon maps.
     #[error(transparent)]
     Photons(#[from] PhotonError),
+    /// There are media, and the settings leave them out.
+    #[error("{0}")]
+    Media(String),
     /// The sums to go on from are those of something else.
     #[error(transparent)]
     Stored(#[from] PartError),
@@ -184,6 +187,9 @@ pub fn go_on(
     observe: &(dyn Fn(&Progress) + Sync),
     continuation: Continuation<'_>,
 ) -> Result<Rendering, RenderError> {
+    if let Some(obstacle) = through_media::obstacle(job) {
+        return Err(RenderError::Media(obstacle));
+    }
     let pool = thread_pool(settings.threads)?;
     let threads = pool.current_num_threads();
     pool.install(|| Run::new(job, settings, stop, observe).run(threads, continuation))
