@@ -455,3 +455,51 @@ fn auto_knows_media() {
     // 8192 samples of a standard deviation below 1
     assert!((mean - 1.0).abs() < 0.06, "{mean}");
 }
+
+/// What a scene file says wrong is named with its place.
+#[test]
+fn faults_in_media_are_reported_with_their_places() {
+    let report = |medium: &str| {
+        let text = format!("WorldBegin\nMakeNamedMedium \"m\" {medium}");
+        let loaded = load_text(&text, "media", Path::new("."), &LoadOptions::default(), &FileCache::default());
+        loaded.map(|_| ()).unwrap_err().to_string()
+    };
+    let grid = r#""string type" "uniformgrid" "integer nx" 2"#;
+    for (medium, fault) in [
+        (r#""string type" "fog""#.to_owned(), "unknown medium `fog`"),
+        (r#""string type" "nanovdb" "string filename" "a.nvdb""#.to_owned(), "`nanovdb` cannot be read"),
+        (r#""rgb sigma_a" [-1 0 0]"#.to_owned(), "sigma_a must be finite and not negative"),
+        (r#""float scale" -2"#.to_owned(), "scale must be finite and not negative"),
+        (r#""float g" 1.5"#.to_owned(), "g must be from -1 to 1"),
+        (r#""string preset" "Milk""#.to_owned(), "unknown preset `Milk`"),
+        (r#""float density" 1"#.to_owned(), "density"),
+        (format!(r#"{grid} "float density" [1 2 3]"#), "density has 3 values, and nx × ny × nz = 2 × 1 × 1"),
+        (format!(r#"{grid} "float density" [1 -2]"#), "density must be finite and not negative"),
+        (grid.to_owned(), "a uniformgrid needs `float density`"),
+        (
+            format!(r#"{grid} "float density" [1 2] "float temperature" [1 2] "rgb Le" [1 1 1]"#),
+            "by `Le` or by `temperature`, not by both",
+        ),
+        (r#""string type" "uniformgrid" "integer nz" 0 "float density" []"#.to_owned(), "nz must be positive, not 0"),
+        (r#""string type" "cloud" "point3 p0" [0 1 0]"#.to_owned(), "p0 and p1 must differ along every axis"),
+        (r#""string type" "rgbgrid""#.to_owned(), "an rgbgrid needs `rgb sigma_a` or `rgb sigma_s`"),
+        (r#""string type" "rgbgrid" "rgb sigma_s" [1 1 1] "rgb Le" [1 1 1]"#.to_owned(), "needs `rgb sigma_a`"),
+        (r#""string type" "rgbgrid" "rgb sigma_s" [1 1 1 2 2 2]"#.to_owned(), "sigma_s has 2 values"),
+        ("\nMakeNamedMedium \"m\"".to_owned(), "medium `m` is defined twice"),
+        ("\nMediumInterface \"n\" \"m\" Shape \"sphere\"".to_owned(), "unknown medium `n`"),
+    ] {
+        let found = report(&medium);
+        assert!(found.contains(fault) && found.contains("media:"), "{medium}: {found}");
+    }
+}
+
+/// Which media a scene has, and what of it is left out.
+#[test]
+fn media_that_nothing_refers_to_leave_a_scene_as_it_is() {
+    let unused = camera("0 0 3", "", 3)
+        + &format!(
+            r#"MakeNamedMedium "fog" LightSource "infinite" "rgb L" [1 1 1] MediumInterface "fog" "fog" Material "interface" {BOX}"#
+        );
+    let job = job(&unused, AccelKind::Embree);
+    assert!(job.world.scene.media.is_empty() && job.world.scene.surfaces.is_empty());
+}
