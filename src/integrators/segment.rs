@@ -32,6 +32,8 @@ pub(super) mod domain {
     pub(crate) const SPLIT: u32 = 1 << 20;
     /// The way to vertex k, through media, uses the domain `FLIGHT + k`.
     pub(crate) const FLIGHT: u32 = 1 << 19;
+    /// The light about which distances of a flight may be equiangular.
+    pub(crate) const FOCUS: u32 = 1 << 18;
 }
 
 /// Counts and times.

@@ -13,6 +13,7 @@ use crate::materials::SurfaceBsdf;
 use crate::media::{End, Flight, Numbers, Segment, Sides};
 use crate::scene::{RenderJob, SurfaceInteraction};
 use lumiris_numbers::math::{Rgb, Vec3};
+use lumiris_numbers::samplers::SampleStream;
 use std::time::Instant;
 
 /// Surfaces without scattering that a path may pass between two vertices.
@@ -238,7 +239,8 @@ impl VertexSearch {
         let segment = Segment { o, d, length: hit.map_or(f32::INFINITY, |hit| hit.t * scale) };
         let [stream, _] = self.arrivals.streams(&at.samples[path.sample as usize], path.branch);
         let mut numbers = Numbers::new(stream.domain(domain::FLIGHT + at.vertex).domain(path.passed));
-        let Flight { emitted, end } = medium.fly(&segment, path.beta, &mut numbers);
+        let flight = medium.fly(&segment, path.beta, &mut numbers, || focus(at.job, &segment, &stream, at.vertex));
+        let Flight { emitted, end } = flight;
         at.out[path.sample as usize].radiance += path.beta * emitted;
         match end {
             End::Through { weight } => {
@@ -328,6 +330,19 @@ impl VertexSearch {
             self.stats.bounce_time += time;
         }
     }
+}
+
+/// The middle of a light that the light sampler chooses for a point of a segment; `None` if that is at infinity. Where the
+/// point is only changes the noise: light is expected from the near part of the segment.
+fn focus(job: &RenderJob, segment: &Segment, stream: &SampleStream, vertex: u32) -> Option<Vec3> {
+    let lights = &job.lights;
+    if lights.infinite.len() == lights.lit.len() {
+        return None;
+    }
+    let u = stream.domain(domain::FLIGHT + vertex).draw_random(domain::FOCUS);
+    let p = segment.o + segment.d * (0.5 * segment.length.min(lights.scene_radius));
+    let chosen = lights.sampler.sample(&LightCtx::at(p), u)?;
+    lights.lights[chosen.light as usize].bounds().map(|bounds| bounds.bounds.center())
 }
 
 /// The geometric normal at a hit of a mesh in world space by a ray of direction `d`, on the side that it comes from.

@@ -47,7 +47,7 @@ const SAMPLES_PER_CELL: usize = 4;
 const MAX_CELLS: usize = 64;
 /// Majorants of a cloud along each axis, and points along an axis of a cell from which they are estimated.
 const CLOUD_CELLS: usize = 24;
-const CLOUD_POINTS: usize = 3;
+const CLOUD_POINTS: usize = 4;
 /// What is added to the greatest density that was found: a factor, and a density below which none is taken for a bound.
 const CLOUD_MARGIN: [f32; 2] = [1.25, 0.05];
 /// Weight of a shadow segment below which roulette decides about it, and the probability of going on.
@@ -208,16 +208,15 @@ impl Collisions<'_> {
     }
 }
 
-/// Estimated bounds: the greatest density at some points of each cell, and a margin.
+/// Estimated bounds: the greatest density at some points of each cell and of those around it, and a margin.
 fn cloud_majorants(cloud: &Cloud, bounds: &Bounds3) -> MajorantGrid {
-    let sigma_t = (cloud.sigma_a + cloud.sigma_s).max_component();
-    MajorantGrid::new([CLOUD_CELLS; 3], |low, high| {
-        let last = (CLOUD_POINTS - 1) as f32;
-        let greatest = (0..CLOUD_POINTS.pow(3)).fold(0.0_f32, |greatest, i| {
-            let [x, y, z] = [1, CLOUD_POINTS, CLOUD_POINTS.pow(2)].map(|n| (i / n % CLOUD_POINTS) as f32 / last);
-            let p = low + (high - low) * Vec3::new(x, y, z);
+    let greatest = MajorantGrid::new([CLOUD_CELLS; 3], |low, high| {
+        (0..CLOUD_POINTS.pow(3)).fold(0.0_f32, |greatest, i| {
+            let place = [1, CLOUD_POINTS, CLOUD_POINTS.pow(2)].map(|n| (i / n % CLOUD_POINTS) as f32 + 0.5);
+            let p = low + (high - low) * Vec3::from(place) / CLOUD_POINTS as f32;
             greatest.max(cloud.density_at(bounds.min + bounds.diagonal() * p))
-        });
-        sigma_t * (greatest * CLOUD_MARGIN[0] + CLOUD_MARGIN[1]).min(1.0)
-    })
+        })
+    });
+    let sigma_t = (cloud.sigma_a + cloud.sigma_s).max_component();
+    greatest.with_neighbors(|density| sigma_t * (density * CLOUD_MARGIN[0] + CLOUD_MARGIN[1]).min(1.0))
 }

@@ -20,7 +20,7 @@ pub use heterogeneous::{Field, Heterogeneous};
 pub use homogeneous::Homogeneous;
 pub use track::{End, Flight, Numbers, Segment};
 
-use lumiris_numbers::math::Rgb;
+use lumiris_numbers::math::{Rgb, Vec3};
 
 /// Index into [`MediumSet::media`].
 pub type MediumId = u32;
@@ -79,11 +79,18 @@ impl Medium {
         }
     }
 
-    /// A flight along a segment of a path of throughput `beta`: see [`Flight`].
+    /// A flight along a segment of a path of throughput `beta`: see [`Flight`]. `focus` chooses a point of a light, about
+    /// which distances in homogeneous media may be equiangular.
     #[inline]
-    pub fn fly(&self, segment: &Segment, beta: Rgb, numbers: &mut Numbers) -> Flight {
+    pub fn fly(
+        &self,
+        segment: &Segment,
+        beta: Rgb,
+        numbers: &mut Numbers,
+        focus: impl FnOnce() -> Option<Vec3>,
+    ) -> Flight {
         match self {
-            Medium::Homogeneous(m) => m.fly(segment.length, beta, numbers.pair()),
+            Medium::Homogeneous(m) => m.fly(segment, beta, numbers.first(), focus),
             Medium::Heterogeneous(m) => m.fly(segment, beta, numbers),
         }
     }

@@ -64,6 +64,12 @@ impl Numbers {
         Numbers { stream, rest: None }
     }
 
+    /// Four numbers in [0, 1), of a flight that needs no others.
+    #[inline]
+    pub fn first(&self) -> [f32; 4] {
+        self.stream.draw::<4>()
+    }
+
     /// Two numbers in [0, 1).
     #[inline]
     pub fn pair(&mut self) -> [f32; 2] {
