@@ -169,7 +169,8 @@ mod tests {
                 // A distance that rounding has put at the end
                 expected[bins - 1] += expected[bins];
                 observed[bins - 1] += observed[bins];
-                (expected.truncate(bins), observed.truncate(bins));
+                expected.truncate(bins);
+                observed.truncate(bins);
             }
             let chi = chi_squared_test(&observed, &expected, significance);
             assert!(!chi.rejected, "{k}: {chi:?}");

@@ -42,7 +42,7 @@ pub enum Medium {
     /// The same everywhere.
     Homogeneous(Homogeneous),
     /// One that varies in a box, outside of which there is nothing.
-    Heterogeneous(Heterogeneous),
+    Heterogeneous(Box<Heterogeneous>),
 }
 
 impl Medium {
