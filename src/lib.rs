@@ -6,7 +6,7 @@
 //! | layer | modules |
 //! |---|---|
 //! | 1 | [`imaging`] |
-//! | 2 | [`textures`], [`geometry`], [`bsdfs`], [`cameras`], [`film`] |
+//! | 2 | [`textures`], [`geometry`], [`bsdfs`], [`media`], [`cameras`], [`film`] |
 //! | 3 | [`materials`], [`lights`], [`accel`] |
 //! | 4 | [`settings`] |
 //! | 5 | [`scene`] |
@@ -25,6 +25,7 @@ pub mod import;
 pub mod integrators;
 pub mod lights;
 pub mod materials;
+pub mod media;
 pub mod photons;
 pub mod render;
 pub mod scene;

@@ -3,7 +3,7 @@
 //! is scaled by 1/η².
 //!
 //! Reading order: [`fresnel`], [`microfacet`], [`diffuse`], [`diffuse_transmission`], [`conductor`], [`dielectric`],
-//! [`thin_dielectric`], [`coat_table`], [`coated_diffuse`], [`layered`], `ggx_albedo`, [`principled`]; then what can only be evaluated: [`models`],
+//! [`thin_dielectric`], [`coat_table`], [`coated_diffuse`], [`layered`], `ggx_albedo`, [`principled`]; [`phase`] in media; then what can only be evaluated: [`models`],
 //! [`default_lobes`], [`evaluated`], [`mod@resample`].
 
 pub mod coat_table;
@@ -19,6 +19,7 @@ mod ggx_albedo;
 pub mod layered;
 pub mod microfacet;
 pub mod models;
+pub mod phase;
 pub mod principled;
 pub mod resample;
 #[cfg(test)]
@@ -36,6 +37,7 @@ pub use evaluated::Evaluated;
 pub use layered::{Base, Layered};
 pub use microfacet::TrowbridgeReitz;
 pub use models::Model;
+pub use phase::Phase;
 pub use principled::Principled;
 pub use resample::{Resampled, resample};
 pub use thin_dielectric::ThinDielectric;
@@ -127,6 +129,8 @@ pub enum Bsdf<'a> {
     Principled(Principled),
     /// Reflection that can only be evaluated.
     Evaluated(Evaluated),
+    /// Scattering in a medium: no surface, and no cosine.
+    Phase(Phase),
 }
 
 /// The part of a BSDF that needs of the light no more than its irradiance, and what remains.
@@ -156,7 +160,7 @@ impl<'a> Bsdf<'a> {
     /// Value without cosine (1/sr), without deltas. 0 at the horizon and never NaN or infinite.
     #[inline]
     pub fn f(&self, wo: Vec3, wi: Vec3) -> Rgb {
-        if wo.z == 0.0 || wi.z == 0.0 {
+        if (wo.z == 0.0 || wi.z == 0.0) && self.has_surface() {
             return Rgb::BLACK;
         }
         let f = match self {
@@ -169,6 +173,7 @@ impl<'a> Bsdf<'a> {
             Bsdf::Layered(b) => b.f(wo, wi),
             Bsdf::Principled(b) => b.f(wo, wi),
             Bsdf::Evaluated(b) => b.f(wo, wi),
+            Bsdf::Phase(b) => Rgb::splat(b.p(wo, wi)),
         };
         if f.is_finite() { f } else { Rgb::BLACK }
     }
@@ -176,7 +181,7 @@ impl<'a> Bsdf<'a> {
     /// Density of the non-specular part of [`Self::sample`] per steradian.
     #[inline]
     pub fn pdf(&self, wo: Vec3, wi: Vec3) -> f32 {
-        if wo.z == 0.0 || wi.z == 0.0 {
+        if (wo.z == 0.0 || wi.z == 0.0) && self.has_surface() {
             return 0.0;
         }
         let pdf = match self {
@@ -189,6 +194,7 @@ impl<'a> Bsdf<'a> {
             Bsdf::Layered(b) => b.pdf(wo, wi),
             Bsdf::Principled(b) => b.pdf(wo, wi),
             Bsdf::Evaluated(b) => b.pdf(wo, wi),
+            Bsdf::Phase(b) => b.p(wo, wi),
         };
         if pdf.is_finite() { pdf } else { 0.0 }
     }
@@ -204,7 +210,9 @@ impl<'a> Bsdf<'a> {
             Bsdf::Layered(b) => b.first_lobe(wo),
             Bsdf::Principled(b) => b.first_lobe(wo),
             Bsdf::Evaluated(b) => b.density.first_lobe(),
-            Bsdf::Diffuse(_) | Bsdf::Conductor(_) | Bsdf::Dielectric(_) | Bsdf::ThinDielectric(_) => 1.0,
+            Bsdf::Diffuse(_) | Bsdf::Conductor(_) | Bsdf::Dielectric(_) | Bsdf::ThinDielectric(_) | Bsdf::Phase(_) => {
+                1.0
+            }
         }
     }
 
@@ -212,7 +220,9 @@ impl<'a> Bsdf<'a> {
     #[inline]
     pub fn pdf_first_lobe(&self, wo: Vec3, wi: Vec3, pdf: f32) -> f32 {
         let first = match self {
-            Bsdf::Diffuse(_) | Bsdf::Conductor(_) | Bsdf::Dielectric(_) | Bsdf::ThinDielectric(_) => return pdf,
+            Bsdf::Diffuse(_) | Bsdf::Conductor(_) | Bsdf::Dielectric(_) | Bsdf::ThinDielectric(_) | Bsdf::Phase(_) => {
+                return pdf;
+            }
             Bsdf::DiffuseTransmission(_) if wo.z * wi.z > 0.0 => return pdf,
             Bsdf::DiffuseTransmission(_) => return 0.0,
             Bsdf::CoatedDiffuse(b) => b.pdf_first_lobe(wo, wi),
@@ -222,6 +232,18 @@ impl<'a> Bsdf<'a> {
         };
         // Not finite or, by rounding, more than the whole
         if first > 0.0 { first.min(pdf) } else { 0.0 }
+    }
+
+    /// False in a medium, where directions along the horizon of the frame are no others, and there is no cosine.
+    #[inline]
+    pub fn has_surface(&self) -> bool {
+        !matches!(self, Bsdf::Phase(_))
+    }
+
+    /// |cos θ| of a direction in the frame, by which f is multiplied; 1 in a medium.
+    #[inline]
+    pub fn cos(&self, w: Vec3) -> f32 {
+        if self.has_surface() { w.z.abs() } else { 1.0 }
     }
 
     /// How f and pdf are evaluated for many directions at once, seen from `wo`; `None` if one by one: random walks,
@@ -249,7 +271,7 @@ impl<'a> Bsdf<'a> {
             Bsdf::Dielectric(b) => Some(LaneModel::Dielectric(b.lanes())),
             Bsdf::ThinDielectric(_) => Some(none),
             Bsdf::CoatedDiffuse(b) => b.lanes(wo),
-            Bsdf::Layered(_) | Bsdf::Principled(_) | Bsdf::Evaluated(_) => None,
+            Bsdf::Layered(_) | Bsdf::Principled(_) | Bsdf::Evaluated(_) | Bsdf::Phase(_) => None,
         }
     }
 
@@ -257,7 +279,7 @@ impl<'a> Bsdf<'a> {
     #[inline]
     pub fn transmits(&self) -> bool {
         match self {
-            Bsdf::DiffuseTransmission(_) | Bsdf::Dielectric(_) | Bsdf::ThinDielectric(_) => true,
+            Bsdf::DiffuseTransmission(_) | Bsdf::Dielectric(_) | Bsdf::ThinDielectric(_) | Bsdf::Phase(_) => true,
             Bsdf::Principled(b) => b.transmission > 0.0,
             Bsdf::Diffuse(_) | Bsdf::Conductor(_) | Bsdf::CoatedDiffuse(_) | Bsdf::Layered(_) | Bsdf::Evaluated(_) => {
                 false
@@ -274,7 +296,7 @@ impl<'a> Bsdf<'a> {
             Bsdf::DiffuseTransmission(_) | Bsdf::Evaluated(_) => self.first_lobe(wo),
             Bsdf::Principled(b) => b.wide_lobe(wo),
             Bsdf::CoatedDiffuse(_) | Bsdf::Layered(_) => 1.0 - self.first_lobe(wo),
-            Bsdf::Conductor(_) | Bsdf::Dielectric(_) | Bsdf::ThinDielectric(_) => 0.0,
+            Bsdf::Conductor(_) | Bsdf::Dielectric(_) | Bsdf::ThinDielectric(_) | Bsdf::Phase(_) => 0.0,
         }
     }
 
@@ -288,7 +310,8 @@ impl<'a> Bsdf<'a> {
     /// directions of non-specular samples are distributed by [`Self::pdf`].
     #[inline]
     pub fn sample_direction(&self, wo: Vec3, uc: f32, u: [f32; 2]) -> Option<BsdfSample> {
-        if wo.z == 0.0 {
+        let has_surface = self.has_surface();
+        if wo.z == 0.0 && has_surface {
             return None;
         }
         let sample = match self {
@@ -301,8 +324,9 @@ impl<'a> Bsdf<'a> {
             Bsdf::Layered(b) => b.sample(wo, uc, u),
             Bsdf::Principled(b) => b.sample(wo, uc, u),
             Bsdf::Evaluated(b) => b.sample(wo, uc, u),
+            Bsdf::Phase(b) => b.sample(wo, u),
         };
-        sample.filter(|s| s.pdf > 0.0 && s.pdf.is_finite() && s.wi.z != 0.0)
+        sample.filter(|s| s.pdf > 0.0 && s.pdf.is_finite() && (s.wi.z != 0.0 || !has_surface))
     }
 
     /// True if [`Self::f`] is not always 0: the point can be lit by sampling lights.
@@ -313,6 +337,7 @@ impl<'a> Bsdf<'a> {
             | Bsdf::DiffuseTransmission(_)
             | Bsdf::CoatedDiffuse(_)
             | Bsdf::Principled(_)
+            | Bsdf::Phase(_)
             | Bsdf::Evaluated(_) => true,
             Bsdf::Conductor(b) => !b.distribution.is_smooth(),
             Bsdf::Dielectric(b) => !b.is_specular(),
@@ -325,7 +350,11 @@ impl<'a> Bsdf<'a> {
     #[inline]
     pub fn has_specular(&self) -> bool {
         match self {
-            Bsdf::Diffuse(_) | Bsdf::DiffuseTransmission(_) | Bsdf::Principled(_) | Bsdf::Evaluated(_) => false,
+            Bsdf::Diffuse(_)
+            | Bsdf::DiffuseTransmission(_)
+            | Bsdf::Principled(_)
+            | Bsdf::Evaluated(_)
+            | Bsdf::Phase(_) => false,
             Bsdf::Conductor(b) => b.distribution.is_smooth(),
             Bsdf::Dielectric(b) => b.is_specular(),
             Bsdf::ThinDielectric(_) => true,
@@ -346,6 +375,7 @@ impl<'a> Bsdf<'a> {
             | Bsdf::ThinDielectric(_)
             | Bsdf::CoatedDiffuse(_)
             | Bsdf::Layered(_)
+            | Bsdf::Phase(_)
             | Bsdf::Principled(_) => false,
         }
     }
@@ -365,6 +395,7 @@ impl<'a> Bsdf<'a> {
             | Bsdf::ThinDielectric(_)
             | Bsdf::Layered(_)
             | Bsdf::Principled(_)
+            | Bsdf::Phase(_)
             | Bsdf::Evaluated(_) => None,
         }
     }
@@ -379,6 +410,7 @@ impl<'a> Bsdf<'a> {
             Bsdf::DiffuseTransmission(b) => b.reflectance + b.transmittance,
             Bsdf::CoatedDiffuse(b) => b.albedo(wo),
             Bsdf::Evaluated(Evaluated { model: Model::Diffuse(reflectance), .. }) => *reflectance,
+            Bsdf::Phase(_) => Rgb::WHITE,
             Bsdf::Conductor(_)
             | Bsdf::Dielectric(_)
             | Bsdf::ThinDielectric(_)

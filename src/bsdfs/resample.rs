@@ -44,7 +44,7 @@ pub fn resample(
     for j in 0..proposals {
         let [uc, u0, u1] = u_proposal(j);
         let Some(s) = bsdf.sample(wo, uc, [u0, u1]) else { continue };
-        let p_hat = s.f.luminance() * s.wi.z.abs();
+        let p_hat = s.f.luminance() * bsdf.cos(s.wi);
         reservoir.offer((s, p_hat), p_hat / s.pdf);
     }
     let ((s, p_hat), sum) = reservoir.into_kept()?;

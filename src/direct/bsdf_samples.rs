@@ -28,7 +28,7 @@ pub(super) fn draw(
     lobe: usize,
 ) -> Option<PendingBsdf> {
     let s = point.bsdf.sample(point.wo, uc, [u0, u1])?;
-    let f_cos = s.f * s.wi.dot(point.bsdf.frame.z).abs();
+    let f_cos = s.f * point.bsdf.cos(s.wi);
     let specular = s.lobe.is_specular();
     (!f_cos.is_black()).then_some(PendingBsdf { point: index, wi: s.wi, f_cos, pdf: s.pdf, specular, lobe, allocation })
 }

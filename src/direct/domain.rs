@@ -24,3 +24,5 @@ pub(super) const GROUP: u32 = 16;
 pub(super) const HALF: u32 = 32;
 /// Contributing light number k uses the domain `CONTRIBUTING + k`.
 pub(super) const CONTRIBUTING: u32 = 64;
+/// Segment number k of a point goes through media by the domain `TRANSMITTANCE + k`.
+pub(super) const TRANSMITTANCE: u32 = 1 << 20;

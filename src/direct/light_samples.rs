@@ -54,7 +54,7 @@ pub(super) fn unshadowed_candidate(
     (light, sample): (LightId, LightSample),
 ) -> Option<Candidate> {
     // Unshadowed integrand
-    let f_cos = point.bsdf.f(point.wo, sample.wi) * sample.wi.dot(point.bsdf.frame.z).abs();
+    let f_cos = point.bsdf.f(point.wo, sample.wi) * point.bsdf.cos(sample.wi);
     let f = f_cos * sample.li;
     if f.is_black() || !(sample.pdf > 0.0) {
         return None;

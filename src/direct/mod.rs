@@ -20,7 +20,7 @@
 //! | [`light_samples`], [`bsdf_samples`], [`t1`] | T1 by light sampling and by BSDF sampling |
 //! | [`mixture`], [`components`], [`fits`] | samples with the densities of the components of their mixture, the normal equations of their estimates, and coefficients for later ones |
 //! | [`proposal_columns`] | the many light samples of resampling, in columns |
-//! | [`shadow_segments`] | T2 |
+//! | [`shadow_segments`], [`transmittance`] | T2, in empty space and through media |
 
 mod bsdf_samples;
 pub mod candidates;
@@ -35,6 +35,7 @@ pub mod proposal_columns;
 pub mod shadow_segments;
 pub mod stats;
 mod t1;
+mod transmittance;
 
 use crate::accel::RayBatch;
 use crate::lights::LightId;
@@ -105,8 +106,7 @@ impl DirectStage {
         if estimator.selects_visible() {
             batch.segments.set_free();
         } else {
-            batch.segments.trace(&*job.world.accel);
-            batch.candidates.stats.segments += batch.segments.rays().len() as u64;
+            batch.candidates.stats.segments += batch.segments.trace(job, points);
         }
         let traced = Instant::now();
 

@@ -3,6 +3,7 @@
 use super::domain;
 use crate::lights::{LightCtx, LightSample};
 use crate::materials::SurfaceBsdf;
+use crate::media::{MediumId, Sides};
 use crate::settings::SampleCounts;
 use lumiris_numbers::math::ray::{SEGMENT_END, offset_origin};
 use lumiris_numbers::math::{Ray, Vec3};
@@ -32,6 +33,8 @@ pub struct ShadingPoint<'a> {
     /// The path goes on in the direction of the only BSDF sample, and its next segment finds the emitter: the sample
     /// counts in the weights of the others, and is not drawn here.
     pub bsdf_by_path: bool,
+    /// What rays that leave the point go through.
+    pub media: Sides,
 }
 
 impl ShadingPoint<'_> {
@@ -44,6 +47,9 @@ impl ShadingPoint<'_> {
     /// The context for sampling lights.
     #[inline]
     pub fn light_ctx(&self) -> LightCtx {
+        if !self.bsdf.bsdf.has_surface() {
+            return LightCtx::at(self.p);
+        }
         LightCtx { p: self.p, n: self.bsdf.lit_normal(self.wo), ns: self.bsdf.frame.z }
     }
 
@@ -51,6 +57,12 @@ impl ShadingPoint<'_> {
     #[inline]
     pub fn origin(&self, w: Vec3) -> Vec3 {
         offset_origin(self.p, self.p_error, self.bsdf.n, w)
+    }
+
+    /// The medium into which the direction `w` leads.
+    #[inline]
+    pub fn medium(&self, w: Vec3) -> Option<MediumId> {
+        self.media.towards(self.bsdf.n.dot(w))
     }
 
     /// The ray that leaves the point towards `w`.

@@ -1,8 +1,11 @@
 //! T2: shadow segments, packed in the order of their shading points, and the resulting visibility bits.
 
 use super::candidates::Candidates;
-use crate::accel::{Accel, Coherence, RayBatch};
+use super::point::ShadingPoint;
+use super::transmittance::Crossing;
+use crate::accel::{Coherence, RayBatch};
 use crate::lights::LightId;
+use crate::scene::RenderJob;
 use lumiris_numbers::math::{Ray, Rgb, Vec3};
 
 /// True if a candidate with this contribution needs a segment: it is finite and not zero.
@@ -19,6 +22,7 @@ pub struct Segments {
     points: Vec<u32>,
     lights: Vec<LightId>,
     occluded: Vec<bool>,
+    crossing: Crossing,
 }
 
 impl Segments {
@@ -54,9 +58,22 @@ impl Segments {
         &self.rays
     }
 
-    /// Traces all segments.
-    pub fn trace(&mut self, accel: &dyn Accel) {
-        accel.occluded(&self.rays, Coherence::Packets, &mut self.occluded);
+    /// Traces all segments, which leave `points`. Where there are media, contributions are multiplied by an estimate of the
+    /// transmittance. Returns the number of rays.
+    pub fn trace(&mut self, job: &RenderJob, points: &[ShadingPoint<'_>]) -> u64 {
+        if job.world.scene.media.is_empty() {
+            job.world.accel.occluded(&self.rays, Coherence::Packets, &mut self.occluded);
+            return self.rays.len() as u64;
+        }
+        let Segments { rays, contributions, points: of, occluded, crossing, .. } = self;
+        crossing.start(rays, of, points);
+        let traced = crossing.trace(job);
+        occluded.clear();
+        occluded.extend(crossing.transmittance().map(Rgb::is_black));
+        for (contribution, transmittance) in contributions.iter_mut().zip(crossing.transmittance()) {
+            *contribution *= transmittance;
+        }
+        traced
     }
 
     /// Marks all segments as unoccluded without tracing them.

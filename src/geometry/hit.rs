@@ -52,6 +52,22 @@ pub struct SurfaceHit {
 }
 
 impl SurfaceHit {
+    /// A point without a surface: normals and derivatives are zero.
+    pub fn in_space(p: Vec3) -> Self {
+        let zero = Vec3::ZERO;
+        SurfaceHit {
+            p,
+            p_error: zero,
+            n: zero,
+            ns: zero,
+            dpdu: zero,
+            dpdv: zero,
+            dpdus: zero,
+            uv: Vec2::ZERO,
+            vertex: VertexValues::default(),
+        }
+    }
+
     /// The hit of a placed shape. The error bound covers the rounding of the point and of the ray's own way into the
     /// group's space and back.
     #[must_use]

@@ -36,6 +36,7 @@ pub fn obstacle(job: &RenderJob) -> Option<&'static str> {
     };
     let reasons = [
         (!of_paths, "the integrators direct and path have them"),
+        (job.world.scene.media.is_emissive(), "what media send out is of no light"),
         (!has_sums, "the estimators mc, mis, ris and contributing have them, without control variates"),
     ];
     reasons.into_iter().find(|(holds, _)| *holds).map(|(_, reason)| reason)

@@ -4,7 +4,7 @@
 //! [`Tracer`] for each thread, and reports. Reading order: `segment` is a path between two vertices, `vertices` finds
 //! the next ones, and [`path`] is the loop over them; `wavefront` has the vertices of `mc` and `mis` side by side.
 //! `roulette` decides which paths end and split where they arrive (`arrivals`), by what `pilot` paths found.
-//! Pixels that are neighbours may share paths ([`reuse`]). [`irradiance_cache`] and [`photon_map`] replace the light that Lambertian parts reflect (`diffuse`).
+//! Pixels that are neighbours may share paths ([`reuse`]). [`through_media`] says which settings know participating media. [`irradiance_cache`] and [`photon_map`] replace the light that Lambertian parts reflect (`diffuse`).
 
 mod arrivals;
 mod diffuse;
@@ -16,6 +16,7 @@ mod pilot;
 pub mod reuse;
 mod roulette;
 mod segment;
+pub mod through_media;
 mod vertices;
 mod wavefront;
 

@@ -111,6 +111,8 @@ struct Step<'s, 'w> {
     vertex: u32,
     /// Paths go on from here.
     continues: bool,
+    /// Paths go on from here, if only to see what media send out.
+    looks_on: bool,
     vertices: Vec<Vertex<'w>>,
     /// Of each vertex, if the integrator decides that.
     shadings: Option<Vec<Shading<'w>>>,
@@ -149,7 +151,7 @@ impl PathTracer {
         fits: &mut Fits,
         out: &mut Vec<PixelSample>,
     ) {
-        self.search.start(samples, out);
+        self.search.start(job, samples, out);
         self.follow((job, settings), None, samples, fits, out);
     }
 
@@ -162,7 +164,8 @@ impl PathTracer {
         fits: &mut Fits,
         out: &mut [PixelSample],
     ) {
-        let depth = settings.depth();
+        let (depth, media) = (settings.depth(), &job.world.scene.media);
+        let is_emissive = media.is_emissive();
         fits.begin_batch(samples.len());
         let is_plain = own.is_none() && self.outcomes.is_none();
         self.reuse.begin(settings.path_reuse.filter(|_| is_plain), samples.len());
@@ -171,7 +174,7 @@ impl PathTracer {
             if count == 0 {
                 break;
             }
-            let estimate = Estimate::new(settings, vertex).filter(|_| is_plain);
+            let estimate = Estimate::new(settings, vertex).filter(|_| is_plain && media.is_empty());
             let room = count * self.search.arrivals.max_paths() as usize;
             let mut batch = estimate.map(|e| Batch::new(self.buffers.take().unwrap_or_default(), e, room));
             let stage = Stage { job, vertex, depth, samples, out: &mut *out, batch: batch.as_mut() };
@@ -179,7 +182,10 @@ impl PathTracer {
             let found = Found { vertex, paths: &self.search.active, vertices: &vertices };
             let shadings = own.as_mut().map(|own| own(&found, out));
             let estimator = Estimator::at_vertex(settings, self.estimator_of.unwrap_or(vertex));
-            let step = Step { settings, estimator, vertex, continues: vertex + 1 < depth, vertices, shadings };
+            // Light samples do not find what media send out: beyond the last vertex there is another segment for it
+            let continues = vertex + 1 < depth;
+            let looks_on = is_emissive && vertex < depth;
+            let step = Step { settings, estimator, vertex, continues, looks_on, vertices, shadings };
             let points = self.points(&step, samples);
             self.share(&step, out);
             self.light_points(job, &step, &points, fits, out);
@@ -285,7 +291,7 @@ impl PathTracer {
         let Step { settings, vertex, .. } = *step;
         let paths = self.search.active.iter().zip(&step.vertices);
         match &step.shadings {
-            _ if !step.continues => {}
+            _ if !step.continues && !step.looks_on => {}
             None => self.next.extend(paths.zip(points).filter_map(|((path, v), point)| match &step.estimator {
                 Estimator::Mis(mis) if point.bsdf_by_path => extend_to_emitter(path, v, point, vertex, (settings, mis)),
                 _ => Some(extend(path, v, vertex, settings)?.0),

@@ -9,6 +9,7 @@ use crate::film::Features;
 use crate::geometry::SurfaceHit;
 use crate::lights::{LightCtx, LightHit};
 use crate::materials::SurfaceBsdf;
+use crate::media::{MediumId, Sides};
 use crate::scene::{RenderJob, SurfaceInteraction};
 use crate::settings::{IntegratorSettings, SampleCounts};
 use lumiris_numbers::estimators::mis::{Heuristic, Technique};
@@ -29,6 +30,10 @@ pub(super) mod domain {
     /// Paths that are `count` at vertex k use points of the domain `SPLIT + 16 k + count` in place of that of the path
     /// which they were until then.
     pub(crate) const SPLIT: u32 = 1 << 20;
+    /// The way to vertex k, through media, uses the domain `FLIGHT + k`.
+    pub(crate) const FLIGHT: u32 = 1 << 19;
+    /// The light about which distances of a flight may be equiangular.
+    pub(crate) const FOCUS: u32 = 1 << 18;
 }
 
 /// Counts and times.
@@ -115,6 +120,10 @@ pub(super) struct PathState {
     pub(super) travelled: f32,
     /// The technique that drew the direction, if the segment looks for emitters.
     pub(super) technique: Option<BsdfTechnique>,
+    /// What the ray goes through.
+    pub(super) medium: Option<MediumId>,
+    /// The path has ended in a medium, and only looks for the features of the first surface behind.
+    pub(super) is_ghost: bool,
 }
 
 /// What a path keeps at a vertex of what it brought there.
@@ -169,6 +178,14 @@ impl PathState {
         }
     }
 
+    /// Multiplies what it carries by what a medium lets pass.
+    pub(super) fn weaken(&mut self, weight: Rgb) {
+        self.beta *= weight;
+        if let Some(technique) = &mut self.technique {
+            technique.survivor = technique.survivor.map(|survivor| survivor * weight);
+        }
+    }
+
     /// Features of a hit of a mesh that reflects `rho`, without the normal.
     pub(super) fn plain_features(&self, job: &RenderJob, hit: &Hit, distance: f32, rho: Rgb) -> Features {
         Features {
@@ -203,9 +220,10 @@ impl PathState {
     }
 
     /// The path beyond a surface that does not scatter, with the throughput `beta`.
-    pub(super) fn pass(&self, beta: Rgb, interaction: &SurfaceInteraction) -> PathState {
+    pub(super) fn pass(&self, job: &RenderJob, beta: Rgb, interaction: &SurfaceInteraction) -> PathState {
         PathState {
             beta,
+            medium: interaction.medium_beyond(job, self.ray.d, self.medium),
             ray: Ray { o: interaction.origin(self.ray.d), ..self.ray },
             width: interaction.width,
             passed: self.passed + 1,
@@ -253,7 +271,20 @@ impl Carried {
     pub(super) fn segment(&self, o: Vec3, wi: Vec3, beta: Rgb, eta_scale: f32) -> PathState {
         let Carried { sample, branch, width, spread, time, .. } = *self;
         let ray = Ray { o, d: wi, t_max: f32::INFINITY, time };
-        PathState { sample, branch, ray, beta, eta_scale, width, spread, passed: 0, travelled: 0.0, technique: None }
+        PathState {
+            sample,
+            branch,
+            ray,
+            beta,
+            eta_scale,
+            width,
+            spread,
+            passed: 0,
+            travelled: 0.0,
+            technique: None,
+            medium: None,
+            is_ghost: false,
+        }
     }
 }
 
@@ -303,12 +334,20 @@ pub(super) struct Vertex<'w> {
     pub(super) direct: SampleStream,
     /// The path has passed no surface since its last vertex.
     pub(super) is_next: bool,
+    /// What rays that leave it go through.
+    pub(super) media: Sides,
 }
 
 impl<'w> Vertex<'w> {
     /// Origin of a ray that leaves the vertex in direction `w`.
     fn origin(&self, w: Vec3) -> Vec3 {
         offset_origin(self.surface.p, self.surface.p_error, self.bsdf.n, w)
+    }
+
+    /// The segment in a direction, with what it goes through.
+    fn segment(&self, carried: &Carried, wi: Vec3, beta: Rgb, eta_scale: f32) -> PathState {
+        let medium = self.media.towards(self.bsdf.n.dot(wi));
+        PathState { medium, ..carried.segment(self.origin(wi), wi, beta, eta_scale) }
     }
 
     /// The shading normal on the side of the viewer.
@@ -329,6 +368,7 @@ impl<'w> Vertex<'w> {
             fit,
             sample: 0,
             bsdf_by_path: false,
+            media: self.media,
         }
     }
 }
@@ -344,7 +384,7 @@ pub(super) fn extend(
     let carried = path.carried(path.beta, path.width);
     let (beta, eta_scale) = carried.beyond(&direction)?;
     let beta = survive(beta, eta_scale, &v.stream, vertex + 1, settings)?;
-    Some((carried.segment(v.origin(direction.wi), direction.wi, beta, eta_scale), direction.lobe))
+    Some((v.segment(&carried, direction.wi, beta, eta_scale), direction.lobe))
 }
 
 /// The next path segment by BSDF sampling, which looks for the emitter of the sample as well. Roulette ends it only behind
@@ -367,7 +407,7 @@ pub(super) fn extend_to_emitter(
         heuristic: mis.heuristic,
         survivor: survive(beta, eta_scale, &v.stream, vertex + 1, settings),
     };
-    let next = carried.segment(v.origin(direction.wi), direction.wi, beta, eta_scale);
+    let next = v.segment(&carried, direction.wi, beta, eta_scale);
     Some(PathState { technique: Some(technique), ..next })
 }
 

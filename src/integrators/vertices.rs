@@ -7,10 +7,13 @@ use super::segment::{CameraSample, Carried, PathState, PathStats, Vertex, domain
 use super::wavefront::Batch;
 use crate::accel::{Coherence, Hit, RayBatch};
 use crate::film::{Features, PixelSample};
-use crate::geometry::Shape;
+use crate::geometry::{Shape, SurfaceHit};
 use crate::lights::LightCtx;
+use crate::materials::SurfaceBsdf;
+use crate::media::{End, Flight, Numbers, Segment, Sides};
 use crate::scene::{RenderJob, SurfaceInteraction};
 use lumiris_numbers::math::{Rgb, Vec3};
+use lumiris_numbers::samplers::SampleStream;
 use std::time::Instant;
 
 /// Surfaces without scattering that a path may pass between two vertices.
@@ -77,7 +80,7 @@ pub(super) struct VertexSearch {
 
 impl VertexSearch {
     /// Starts paths with the camera rays.
-    pub(super) fn start(&mut self, samples: &[CameraSample], out: &mut Vec<PixelSample>) {
+    pub(super) fn start(&mut self, job: &RenderJob, samples: &[CameraSample], out: &mut Vec<PixelSample>) {
         out.clear();
         out.resize(samples.len(), PixelSample::default());
         self.layers.begin(samples.len());
@@ -94,6 +97,8 @@ impl VertexSearch {
             passed: 0,
             travelled: 0.0,
             technique: None,
+            medium: job.world.scene.media.camera,
+            is_ghost: false,
         }));
     }
 
@@ -115,8 +120,11 @@ impl VertexSearch {
             let start = Instant::now();
             self.passing.clear();
             self.escaped.clear();
-            let (active, hits) = (std::mem::take(&mut self.active), std::mem::take(&mut self.hits));
-            for (k, (path, hit)) in active.iter().zip(&hits).enumerate() {
+            let (mut active, hits) = (std::mem::take(&mut self.active), std::mem::take(&mut self.hits));
+            for (k, (path, hit)) in active.iter_mut().zip(&hits).enumerate() {
+                if path.medium.is_some() && self.fly(&mut at, path, hit.as_ref(), &mut vertices) {
+                    continue;
+                }
                 match hit {
                     Some(hit) if self.take_plain(&mut at, path, hit) => {}
                     Some(hit) => self.take(&mut at, path, hit, &mut vertices),
@@ -135,7 +143,7 @@ impl VertexSearch {
 
     #[inline]
     fn looks_for_emitters(&self, vertex: u32, path: &PathState) -> bool {
-        path.technique.is_some() || vertex == 0 && !self.only_reflected
+        !path.is_ghost && (path.technique.is_some() || vertex == 0 && !self.only_reflected)
     }
 
     /// Takes a hit of a mesh that reflects the same everywhere, whose point is found together with others; false if
@@ -178,7 +186,7 @@ impl VertexSearch {
         let Some(beta) = path.beta_beyond_emitter() else { return };
         let Some(bsdf) = interaction.scatter(at.job) else {
             if path.passed < MAX_PASSED {
-                self.passing.push(path.pass(beta, &interaction));
+                self.passing.push(path.pass(at.job, beta, &interaction));
             }
             return;
         };
@@ -192,7 +200,7 @@ impl VertexSearch {
             });
         }
         let width = interaction.width;
-        if at.vertex >= at.depth {
+        if at.vertex >= at.depth || path.is_ghost {
             return;
         }
         let mut carried = path.carried(beta, width);
@@ -210,7 +218,68 @@ impl VertexSearch {
             let [stream, direct] = streams.map(|s| s.domain(domain::VERTEX + at.vertex));
             let Carried { beta, branch, .. } = carried;
             self.kept.push(PathState { branch, beta, width, passed: 0, travelled: 0.0, technique: None, ..*path });
-            vertices.push(Vertex { surface, bsdf, wo, stream, direct, is_next: path.passed == 0 });
+            let media = interaction.sides(at.job, path.medium);
+            vertices.push(Vertex { surface, bsdf, wo, stream, direct, is_next: path.passed == 0, media });
+        }
+    }
+
+    /// Lets a path fly through its medium towards what its ray meets, and adds what the medium sends out. True if it is
+    /// scattered on the way: then what it meets does not matter, but as the first surface that denoisers want to know of.
+    fn fly<'w>(
+        &mut self,
+        at: &mut Stage<'_, 'w>,
+        path: &mut PathState,
+        hit: Option<&Hit>,
+        vertices: &mut Vec<Vertex<'w>>,
+    ) -> bool {
+        let Some(id) = path.medium.filter(|_| !path.is_ghost) else { return false };
+        let medium = &at.job.world.scene.media.media[id as usize];
+        let scale = path.ray.d.length();
+        let (o, d) = (path.ray.o, path.ray.d / scale);
+        let segment = Segment { o, d, length: hit.map_or(f32::INFINITY, |hit| hit.t * scale) };
+        let [stream, _] = self.arrivals.streams(&at.samples[path.sample as usize], path.branch);
+        let mut numbers = Numbers::new(stream.domain(domain::FLIGHT + at.vertex).domain(path.passed));
+        let flight = medium.fly(&segment, path.beta, &mut numbers, || focus(at.job, &segment, &stream, at.vertex));
+        let Flight { emitted, end } = flight;
+        at.out[path.sample as usize].radiance += path.beta * emitted;
+        match end {
+            End::Through { weight } => {
+                path.weaken(weight);
+                false
+            }
+            End::Scattered { t, weight } => {
+                if at.vertex < at.depth {
+                    let surface = SurfaceHit::in_space(o + d * t);
+                    let bsdf = SurfaceBsdf::in_medium(medium.g(), -d);
+                    self.scatter(at, (path, t, weight), (surface, bsdf), vertices);
+                }
+                path.is_ghost = at.vertex == 0 && !self.omits_features;
+                !path.is_ghost
+            }
+        }
+    }
+
+    /// Keeps a path that is scattered in its medium after the distance `t`, where its throughput gets the factor `weight`.
+    fn scatter<'w>(
+        &mut self,
+        at: &mut Stage<'_, 'w>,
+        (path, t, weight): (&PathState, f32, Rgb),
+        (surface, bsdf): (SurfaceHit, SurfaceBsdf<'w>),
+        vertices: &mut Vec<Vertex<'w>>,
+    ) {
+        let Some(beta) = path.beta_beyond_emitter() else { return };
+        let (sample, out) = (&at.samples[path.sample as usize], &at.out[path.sample as usize]);
+        let (width, wo) = (path.width + path.spread * t, bsdf.frame.z);
+        let mut carried = path.carried(beta * weight, width);
+        let count = self.arrivals.arrive((sample, out.radiance), at.vertex, &mut carried, || (surface.p, wo));
+        let (parent, media) = (carried.branch, Sides::both(path.medium));
+        for index in 0..count {
+            let branch = self.arrivals.branch(sample, parent, at.vertex, (count, index));
+            let streams = self.arrivals.streams(sample, branch);
+            let [stream, direct] = streams.map(|s| s.domain(domain::VERTEX + at.vertex));
+            let beta = carried.beta;
+            self.kept.push(PathState { branch, beta, width, passed: 0, travelled: 0.0, technique: None, ..*path });
+            vertices.push(Vertex { surface, bsdf, wo, stream, direct, is_next: path.passed == 0, media });
         }
     }
 
@@ -261,6 +330,19 @@ impl VertexSearch {
             self.stats.bounce_time += time;
         }
     }
+}
+
+/// The middle of a light that the light sampler chooses for a point of a segment; `None` if that is at infinity. Where the
+/// point is only changes the noise: light is expected from the near part of the segment.
+fn focus(job: &RenderJob, segment: &Segment, stream: &SampleStream, vertex: u32) -> Option<Vec3> {
+    let lights = &job.lights;
+    if lights.infinite.len() == lights.lit.len() {
+        return None;
+    }
+    let u = stream.domain(domain::FLIGHT + vertex).draw_random(domain::FOCUS);
+    let p = segment.o + segment.d * (0.5 * segment.length.min(lights.scene_radius));
+    let chosen = lights.sampler.sample(&LightCtx::at(p), u)?;
+    lights.lights[chosen.light as usize].bounds().map(|bounds| bounds.bounds.center())
 }
 
 /// The geometric normal at a hit of a mesh in world space by a ray of direction `d`, on the side that it comes from.

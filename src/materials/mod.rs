@@ -263,6 +263,23 @@ impl MaterialSet {
         None
     }
 
+    /// True if there may be no surface at a hit of the material.
+    pub fn may_pass(&self, id: MaterialId) -> bool {
+        match self.entries[id as usize].material {
+            // Mixtures of mixtures may hold anything
+            Material::Interface | Material::Mix { .. } => true,
+            Material::Diffuse { .. }
+            | Material::Conductor { .. }
+            | Material::Dielectric { .. }
+            | Material::ThinDielectric { .. }
+            | Material::DiffuseTransmission { .. }
+            | Material::CoatedDiffuse { .. }
+            | Material::CoatedConductor { .. }
+            | Material::Principled(_)
+            | Material::Evaluated(_) => false,
+        }
+    }
+
     /// The reflectance of a material that is Lambertian, the same everywhere, and does not bend normals.
     pub fn plain_reflectance(&self, id: MaterialId, textures: &TextureSet) -> Option<Rgb> {
         let MaterialEntry { material: Material::Diffuse { reflectance }, normal_map: None, displacement: None, .. } =

@@ -1,6 +1,6 @@
 //! A BSDF in the shading frame of a hit, for directions in world space.
 
-use crate::bsdfs::{Bsdf, BsdfSample, Lambertian, ProposalDensity, Resampled, resample};
+use crate::bsdfs::{Bsdf, BsdfSample, Lambertian, Phase, ProposalDensity, Resampled, resample};
 use lumiris_lanes::bsdf::Values;
 use lumiris_numbers::math::{Frame, Rgb, Vec3};
 
@@ -17,6 +17,13 @@ pub struct SurfaceBsdf<'a> {
 }
 
 impl<'a> SurfaceBsdf<'a> {
+    /// Scattering in a medium of asymmetry `g` by the phase function, seen from `wo`: no surface, so the geometric normal
+    /// is zero.
+    #[inline]
+    pub fn in_medium(g: f32, wo: Vec3) -> Self {
+        SurfaceBsdf { bsdf: Bsdf::Phase(Phase::new(g)), frame: Frame::from_z(wo), n: Vec3::ZERO }
+    }
+
     /// The same, directions of what can only be evaluated being proposed by `density`.
     #[inline]
     #[must_use]
@@ -37,7 +44,7 @@ impl<'a> SurfaceBsdf<'a> {
     #[inline]
     pub fn f_cos(&self, wo: Vec3, wi: Vec3) -> Rgb {
         let wi = self.frame.to_local(wi);
-        self.bsdf.f(self.frame.to_local(wo), wi) * wi.z.abs()
+        self.bsdf.f(self.frame.to_local(wo), wi) * self.bsdf.cos(wi)
     }
 
     /// Density of the non-specular part of [`Self::sample`] per steradian.
@@ -76,7 +83,7 @@ impl<'a> SurfaceBsdf<'a> {
         let wo = self.frame.to_local(wo);
         for i in 0..pdf.len() {
             let wi = self.frame.to_local(Vec3::new(wi[0][i], wi[1][i], wi[2][i]));
-            let value = self.bsdf.f(wo, wi) * wi.z.abs();
+            let value = self.bsdf.f(wo, wi) * self.bsdf.cos(wi);
             for c in 0..3 {
                 f_cos[c][i] = value[c];
             }
@@ -130,10 +137,10 @@ impl<'a> SurfaceBsdf<'a> {
         }
     }
 
-    /// |cos θ| of a world-space direction about the shading normal.
+    /// |cos θ| of a world-space direction about the shading normal; 1 in a medium.
     #[inline]
     pub fn cos(&self, w: Vec3) -> f32 {
-        self.frame.z.dot(w).abs()
+        if self.bsdf.has_surface() { self.frame.z.dot(w).abs() } else { 1.0 }
     }
 
     /// The Lambertian part as seen from `wo`, see [`Bsdf::lambertian`].

@@ -33,6 +33,7 @@ use crate::imaging::metrics::difference::DEFAULT_EPSILON;
 use crate::integrators::PathTracer;
 use crate::integrators::path::CameraSample;
 use crate::integrators::reuse::{self, Groups};
+use crate::integrators::through_media;
 use crate::scene::RenderJob;
 use crate::settings::{
     Allocation, EstimatorKind, IntegratorKind, IntegratorSettings, Proposals, RisSettings, Settings, StageTimes,
@@ -235,6 +236,9 @@ impl Pilot {
         // Second round: the best by the model, and what else there is
         let mut candidates = second_round(base, best);
         candidates.extend(with_photons(job, trials[0].nanoseconds));
+        if !job.world.scene.media.is_empty() {
+            candidates.retain(|c| through_media::obstacle_of(&c.settings).is_none());
+        }
         let second = self.round(job, &candidates, 1);
         let chosen = second.choose(&candidates, predicted);
         let second = second.trials(&candidates);

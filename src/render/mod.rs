@@ -33,7 +33,7 @@ mod worker;
 use crate::direct::Estimator;
 use crate::film::Film;
 pub use crate::integrators::CacheReport;
-use crate::integrators::{MapStats, PathStats};
+use crate::integrators::{MapStats, PathStats, through_media};
 use crate::photons::PhotonError;
 use crate::scene::RenderJob;
 use crate::settings::Settings;
@@ -155,6 +155,9 @@ pub enum RenderError {
     /// The integrator could not prepare its photon maps.
     #[error(transparent)]
     Photons(#[from] PhotonError),
+    /// There are media, and the settings leave them out.
+    #[error("{0}")]
+    Media(String),
     /// The sums to go on from are those of something else.
     #[error(transparent)]
     Stored(#[from] PartError),
@@ -186,6 +189,9 @@ pub fn go_on(
     observe: &(dyn Fn(&Progress) + Sync),
     continuation: Continuation<'_>,
 ) -> Result<Rendering, RenderError> {
+    if let Some(obstacle) = through_media::obstacle(job) {
+        return Err(RenderError::Media(obstacle));
+    }
     let pool = thread_pool(settings.threads)?;
     let threads = pool.current_num_threads();
     pool.install(|| Run::new(job, settings, stop, observe).run(threads, continuation))

@@ -13,11 +13,11 @@
 use super::allocation::allocate;
 use super::auto::{self, AutoChoice};
 use super::visibility_cache::build_visibility_cache;
-use super::{RenderSettings, Run, ThreadError, camera_batches};
+use super::{RenderError, RenderSettings, Run, ThreadError, camera_batches};
 use crate::direct::Fits;
 use crate::film::PixelBounds;
 use crate::integrators::path::CameraSample;
-use crate::integrators::{PathTracer, Tracer, light_layers, reuse};
+use crate::integrators::{PathTracer, Tracer, light_layers, reuse, through_media};
 use crate::scene::{RenderJob, SampleCountMap};
 use crate::settings::table::rows;
 use crate::settings::{
@@ -65,8 +65,11 @@ pub struct RisChoice {
     pub sample_counts: SampleCounts,
 }
 
-/// Completes what the settings of `job` leave open. `ratio_map` requests the map of the best M/N even if it is not used.
-pub fn prepare(job: &mut RenderJob, threads: Option<usize>, ratio_map: bool) -> Result<Plan, ThreadError> {
+/// Completes what the settings of `job` leave open, or says why there can be no image. `ratio_map` requests the map of the best M/N even if it is not used.
+pub fn prepare(job: &mut RenderJob, threads: Option<usize>, ratio_map: bool) -> Result<Plan, RenderError> {
+    if let Some(obstacle) = through_media::obstacle(job) {
+        return Err(RenderError::Media(obstacle));
+    }
     let pool = super::thread_pool(threads)?;
     let before = *job.settings();
     let auto = pool.install(|| auto::choose(job));

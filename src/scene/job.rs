@@ -25,6 +25,8 @@ pub struct RenderJob {
     lobes: usize,
     /// Reflectance of the geometries that are nothing but meshes of one Lambertian reflectance.
     plain: Vec<Option<Rgb>>,
+    /// Geometries that rays may pass: those of materials that are no surface, at least somewhere.
+    may_pass: Vec<bool>,
 }
 
 impl RenderJob {
@@ -37,7 +39,18 @@ impl RenderJob {
         let has_alpha = |geometry: GeometryId| scene.geometry.geometries[geometry as usize].alpha.is_some();
         let irradiances = Irradiances::new(&scene.lights, has_alpha);
         let plain = (0..scene.geometry.geometries.len() as GeometryId).map(|g| plain_reflectance(scene, g)).collect();
-        RenderJob { world, settings, lights, irradiances, sample_count_map: None, pixel_samples: None, lobes, plain }
+        let may_pass = scene.surfaces.iter().map(|surface| scene.materials.may_pass(surface.material)).collect();
+        RenderJob {
+            world,
+            settings,
+            lights,
+            irradiances,
+            sample_count_map: None,
+            pixel_samples: None,
+            lobes,
+            plain,
+            may_pass,
+        }
     }
 
     /// Prepares everything for other settings, as [`Self::new`] does; results of photons and pilots are dropped.
@@ -55,6 +68,12 @@ impl RenderJob {
     #[inline]
     pub fn plain_reflectance(&self, hit: &Hit) -> Option<Rgb> {
         if hit.instance == Hit::NO_INSTANCE { self.plain[hit.geometry as usize] } else { None }
+    }
+
+    /// True if rays may pass what they have hit: the material there may be no surface.
+    #[inline]
+    pub fn may_pass(&self, hit: &Hit) -> bool {
+        self.may_pass[hit.geometry as usize]
     }
 
     /// The settings.

@@ -21,6 +21,7 @@ use crate::film::filter::PixelFilter;
 use crate::geometry::GeometrySet;
 use crate::lights::LightSet;
 use crate::materials::{MaterialId, MaterialSet};
+use crate::media::{MediumSet, Sides};
 use crate::textures::TextureSet;
 use std::sync::Arc;
 
@@ -41,6 +42,8 @@ pub struct Scene {
     pub surfaces: Vec<Surface>,
     /// All lights.
     pub lights: Arc<LightSet>,
+    /// What is between surfaces.
+    pub media: MediumSet,
 }
 
 /// Surface properties of a geometry.
@@ -50,6 +53,8 @@ pub struct Surface {
     pub material: MaterialId,
     /// A readable name: the file or shape that it came from.
     pub name: String,
+    /// The media on its sides; `None` where both sides are in the same, whatever it is.
+    pub sides: Option<Sides>,
 }
 
 /// The image.

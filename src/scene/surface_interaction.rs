@@ -4,6 +4,7 @@ use super::RenderJob;
 use crate::accel::Hit;
 use crate::geometry::{SurfaceHit, VertexValues};
 use crate::materials::SurfaceBsdf;
+use crate::media::{MediumId, Sides};
 use crate::textures::TextureContext;
 use lumiris_numbers::math::ray::offset_origin;
 use lumiris_numbers::math::{Ray, Vec2, Vec3};
@@ -47,6 +48,18 @@ impl SurfaceInteraction {
         let material = scene.surfaces[self.hit.geometry as usize].material;
         let bsdf = scene.materials.bsdf(material, &scene.textures, &self.surface, &self.context, self.wo)?;
         Some(bsdf.proposed_by(job.settings().integrator.bsdf_density))
+    }
+
+    /// The media on the sides of the surface, which a ray in `medium` meets.
+    #[inline]
+    pub fn sides(&self, job: &RenderJob, medium: Option<MediumId>) -> Sides {
+        job.world.scene.surfaces[self.hit.geometry as usize].sides.unwrap_or(Sides::both(medium))
+    }
+
+    /// What a ray of direction `d` in `medium` comes into where it passes the surface.
+    #[inline]
+    pub fn medium_beyond(&self, job: &RenderJob, d: Vec3, medium: Option<MediumId>) -> Option<MediumId> {
+        self.sides(job, medium).towards(self.surface.n.dot(d))
     }
 
     /// Origin of a ray that leaves the surface in direction `w`.

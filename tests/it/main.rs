@@ -10,6 +10,7 @@ mod image_hashes;
 mod irradiance_cache;
 mod layering;
 mod light_groups;
+mod media;
 mod mutations;
 mod path_reuse;
 mod photon_map;

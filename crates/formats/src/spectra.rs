@@ -255,20 +255,43 @@ fn emission_of(f: impl Fn(f32) -> f64) -> Rgb {
     if xyz[1] > 0.0 { rgb(to_rgb(xyz.map(|c| c / xyz[1]))).map(|c| c.max(0.0)) } else { Rgb::BLACK }
 }
 
+/// ∫ȳ over wavelength (nm): luminance of a spectrum that is 1 everywhere, where it is not divided by this.
+pub const Y_INTEGRAL: f32 = 106.856_895;
+
 /// The colour of a black body of a temperature (K) scaled to Y = 1 by Planck's law; black for temperatures that are not
 /// positive.
 pub fn blackbody_rgb(kelvin: f32) -> Rgb {
     if kelvin.is_nan() || kelvin <= 0.0 {
         return Rgb::BLACK;
     }
-    // Second radiation constant hc/k (m·K). The exponent is taken relative to 555 nm, so that cold bodies do not
-    // underflow.
+    emission_of(|l| planck(f64::from(l), f64::from(kelvin)))
+}
+
+/// The colour of a black body whose radiance has its maximum over all wavelengths scaled to 1, so that hotter ones of the
+/// visible range are brighter; Y is [`Y_INTEGRAL`] for a spectrum that is 1 everywhere, as pbrt-v4 has it for what is
+/// not scaled to a luminance. Black for temperatures that are not positive.
+pub fn glow_rgb(kelvin: f32) -> Rgb {
+    if kelvin.is_nan() || kelvin <= 0.0 {
+        return Rgb::BLACK;
+    }
+    // Wien's displacement constant (nm·K)
+    const WIEN: f64 = 2.897_771_955e6;
+    let kelvin = f64::from(kelvin);
+    let peak = planck(WIEN / kelvin, kelvin);
+    let y: f64 = (LAMBDA_MIN..=LAMBDA_MAX)
+        .zip(&observer().bars)
+        .map(|(l, bar)| bar[1] * planck(f64::from(l), kelvin) / peak)
+        .sum();
+    if y.is_finite() { blackbody_rgb(kelvin as f32) * y as f32 } else { Rgb::BLACK }
+}
+
+/// Spectral radiance of a black body at the wavelength `l` (nm), relative to 555 nm in the exponent, so that cold bodies
+/// do not underflow.
+fn planck(l: f64, kelvin: f64) -> f64 {
+    // Second radiation constant hc/k (m·K)
     const C2: f64 = 1.438_776_877e-2;
-    let exponent = |l: f64| C2 / (l * 1e-9 * f64::from(kelvin));
-    emission_of(|l| {
-        let l = f64::from(l);
-        (555.0 / l).powi(5) * (exponent(555.0) - exponent(l)).exp() / -(-exponent(l)).exp_m1()
-    })
+    let exponent = |l: f64| C2 / (l * 1e-9 * kelvin);
+    (555.0 / l).powi(5) * (exponent(555.0) - exponent(l)).exp() / -(-exponent(l)).exp_m1()
 }
 
 /// The colour of a CIE standard illuminant scaled to Y = 1.

@@ -296,7 +296,7 @@ impl Buffers {
                 self.add(index, None, is_inside.then_some(estimate.without_g()), candidates);
                 continue;
             };
-            let f_cos = s.f * s.wi.dot(point.bsdf.frame.z).abs();
+            let f_cos = s.f * point.bsdf.cos(s.wi);
             self.rays.push(&point.ray(s.wi));
             self.pending.push(PendingBsdf {
                 point: index as u32,

@@ -34,6 +34,8 @@ use std::time::Instant;
 
 /// Proposals that are generated before samples are drawn from them: few enough to stay in the processor's cache.
 const CHUNK: usize = 2048;
+/// |g| below which a phase function is wide.
+const WIDE: f32 = 0.5;
 
 /// Resampling of light and BSDF samples.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -187,11 +189,13 @@ fn allocation(point: &ShadingPoint<'_>) -> SampleAllocation {
     }
     let (of_proposals, of_samples) = match bsdf {
         Bsdf::Diffuse(_) | Bsdf::DiffuseTransmission(_) | Bsdf::Evaluated(_) => (0.0625, 0.25),
+        Bsdf::Phase(phase) if phase.g().abs() < WIDE => (0.0625, 0.25),
         Bsdf::CoatedDiffuse(_)
         | Bsdf::Conductor(_)
         | Bsdf::Dielectric(_)
         | Bsdf::ThinDielectric(_)
         | Bsdf::Layered(_)
+        | Bsdf::Phase(_)
         | Bsdf::Principled(_) => (0.125, 0.5),
     };
     let by_bsdf = (m as f32 * of_proposals).max(n as f32 * of_samples);
@@ -253,7 +257,7 @@ impl Buffers {
                 }
             }
         }
-        self.probes.trace(&*job.world.accel);
+        self.probes.trace(job, chunk.points);
         for (&place, &occluded) in probed.iter().zip(self.probes.occluded()) {
             if occluded {
                 self.proposals.weight[place] = 0.0;

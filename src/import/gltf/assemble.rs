@@ -15,6 +15,7 @@ use crate::lights::{
     Emission, EmissionImage, EnvironmentFilter, EnvironmentMap, EnvironmentMapping, Light, LightSetBuilder,
 };
 use crate::materials::{MaterialId, MaterialSet};
+use crate::media::MediumSet;
 use crate::scene::{Scene, Surface};
 use glam::Vec3A;
 use lumiris_formats::gltf::{Document, GltfError, Place};
@@ -95,6 +96,7 @@ impl<'a> Assembly<'a> {
             lights: Arc::new(lights.build(&bounds)),
             geometry: Arc::new(self.set),
             surfaces: self.surfaces,
+            media: MediumSet::default(),
         }))
     }
 
@@ -170,7 +172,7 @@ impl<'a> Assembly<'a> {
 
     fn add_geometry(&mut self, mesh: TriangleMesh, look: &Look, name: &str) -> GeometryId {
         self.set.geometries.push(Geometry { shape: Shape::Mesh(mesh), alpha: look.alpha, visibility: Visibility::ALL });
-        self.surfaces.push(Surface { material: look.material, name: name.to_owned() });
+        self.surfaces.push(Surface { material: look.material, name: name.to_owned(), sides: None });
         (self.set.geometries.len() - 1) as GeometryId
     }
 

@@ -3,6 +3,7 @@
 use super::transform::Ctm;
 use crate::geometry::QuadricKind;
 use crate::materials::MaterialId;
+use crate::media::Medium;
 use lumiris_formats::pbrt::directive::Name;
 use lumiris_formats::pbrt::params::ParamSet;
 use lumiris_formats::source::Span;
@@ -23,6 +24,32 @@ pub enum MaterialUse {
     Id(MaterialId),
     /// By name.
     Named(Name),
+}
+
+/// Media on the two sides of a surface; `None` is empty space.
+#[derive(Clone, Debug, Default)]
+pub struct MediumNames {
+    /// Behind the normal.
+    pub inside: Option<Name>,
+    /// Where the normal points to.
+    pub outside: Option<Name>,
+}
+
+impl MediumNames {
+    /// True if they are two.
+    pub fn differ(&self) -> bool {
+        let text = |name: &Option<Name>| name.as_ref().map(|name| name.text.clone());
+        text(&self.inside) != text(&self.outside)
+    }
+}
+
+/// A medium by its name.
+#[derive(Clone, Debug)]
+pub struct MediumDesc {
+    /// Its name, and where it stands.
+    pub name: Name,
+    /// The medium; `None` after an error.
+    pub medium: Option<Medium>,
 }
 
 /// An area light as written; shapes that follow emit it.
@@ -142,4 +169,6 @@ pub struct ShapeDesc {
     pub alpha: Option<u32>,
     /// The object that it belongs to.
     pub object: Option<usize>,
+    /// The media on its sides.
+    pub media: MediumNames,
 }

@@ -1,7 +1,6 @@
 //! The state machine of the format: directives change the graphics state, or add objects with that state to the scene.
 
-use super::descriptions::{InstanceDesc, MaterialUse, ObjectDesc};
-use super::options::medium;
+use super::descriptions::{InstanceDesc, MaterialUse, MediumNames, ObjectDesc};
 use super::state::Builder;
 use super::transform::{Ctm, matrix_of};
 use lumiris_formats::color_space::ColorSpace;
@@ -44,7 +43,7 @@ impl Visitor for Builder<'_> {
             D::ColorSpace(name) => self.color_space(&name, diagnostics),
             D::Camera(name) => {
                 self.coordinate_systems.insert("camera".to_owned(), self.state.ctm.inverse());
-                self.options.camera(name, params, self.state.ctm);
+                self.options.camera(name, params, self.state.ctm, self.state.media.outside.clone());
             }
             D::Film(name) => self.options.film(name, params),
             D::Sampler(name) => self.options.sampler(name, params),
@@ -54,12 +53,11 @@ impl Visitor for Builder<'_> {
             D::Accelerator(_) => {}
             D::MakeNamedMedium(name) => {
                 self.with_defaults(AttributeTarget::Medium, &mut params);
-                medium(&name, &params, diagnostics);
+                self.make_named_medium(name, &mut params, diagnostics);
             }
             D::MediumInterface { inside, outside } => {
-                if !inside.text.is_empty() || !outside.text.is_empty() {
-                    diagnostics.warning_once(span, "participating media are not rendered yet: light passes freely");
-                }
+                let [inside, outside] = [inside, outside].map(|name| Some(name).filter(|name| !name.text.is_empty()));
+                self.state.media = MediumNames { inside, outside };
             }
             D::WorldBegin => self.world_begin(),
             D::WorldEnd => {}

@@ -2,6 +2,7 @@
 
 use super::descriptions::{AreaLightDesc, ShapeDesc};
 use super::lights::power_factor;
+use super::media::MediaInUse;
 use super::options::ParsedOptions;
 use super::shapes::{Made, ShapeError};
 use super::state::Builder;
@@ -33,6 +34,7 @@ struct Assembly {
     shutter: [f32; 2],
     /// Images that area lights emit.
     images: HashMap<PathBuf, Arc<EmissionImage>>,
+    media: MediaInUse,
 }
 
 impl Builder<'_> {
@@ -63,7 +65,8 @@ impl Builder<'_> {
 
         // Assemble the geometry
         let shutter = options.as_ref().map_or([0.0, 1.0], |s| s.shutter);
-        let mut assembly = Assembly { shutter, images, ..Assembly::default() };
+        let media = self.media_in_use(&shapes, d);
+        let mut assembly = Assembly { shutter, images, media, ..Assembly::default() };
         assembly.set.groups.resize_with(self.objects.len(), Group::default);
         for (desc, made) in shapes.iter().zip(made) {
             let material = self.material_of(&desc.material, d);
@@ -113,6 +116,7 @@ impl Builder<'_> {
             geometry: Arc::new(assembly.set),
             surfaces: assembly.surfaces,
             lights: Arc::new(lights),
+            media: assembly.media.set,
         };
         Some((scene, settings))
     }
@@ -120,6 +124,7 @@ impl Builder<'_> {
     /// Adds the shapes of one description to their group, or to the root, or to an instance of their own if they move.
     fn place(&self, assembly: &mut Assembly, desc: &ShapeDesc, made: Made, material: MaterialId, d: &mut Diagnostics) {
         let moving = desc.ctm.is_moving();
+        let sides = assembly.media.sides(&desc.media);
         let passes = matches!(self.materials[material as usize].material, Material::Interface);
         let mut ids = Vec::new();
         for shape in made.shapes {
@@ -136,15 +141,19 @@ impl Builder<'_> {
                     d.warning_once(light.span, "moving area lights are not rendered yet: the shape is dark");
                     None
                 }
+                (None, false) if passes && !assembly.media.set.is_empty() => {
+                    d.warning_once(light.span, "a surface that only bounds a medium does not emit, as in pbrt-v4");
+                    None
+                }
                 (None, false) => Some((emission_of(light, &shape, &assembly.images), light.group.clone())),
             });
-            if passes && emission.is_none() {
-                // Nothing scatters here, and media are not rendered: rays need not stop.
+            if passes && emission.is_none() && sides.is_none() {
+                // Nothing scatters here, and the medium stays the same: rays need not stop.
                 continue;
             }
             assembly.emitters.extend(emission.map(|(emission, group)| (id, emission, group)));
             assembly.set.geometries.push(Geometry { shape, alpha: desc.alpha, visibility: Visibility::ALL });
-            assembly.surfaces.push(Surface { material, name: desc.name.clone() });
+            assembly.surfaces.push(Surface { material, name: desc.name.clone(), sides });
             ids.push(id);
         }
         match (desc.object, moving) {

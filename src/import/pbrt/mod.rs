@@ -2,7 +2,7 @@
 //!
 //! Reading order: [`descriptions`] (what a file asks for), [`state`] (the scene while its file is read), [`checks`];
 //! a file for each kind of directive: [`transform`], [`options`], [`settings`], [`film`], [`spectrum`], [`textures`],
-//! [`materials`], [`lights`], [`shapes`]; [`directives`] (the state machine over `lumiris_formats::pbrt`'s directives);
+//! [`materials`], [`lights`], [`media`] with `media_presets`, [`shapes`]; [`directives`] (the state machine over `lumiris_formats::pbrt`'s directives);
 //! and [`finish`] (reads files and assembles the scene).
 
 pub mod checks;
@@ -12,6 +12,8 @@ pub mod film;
 pub mod finish;
 pub mod lights;
 pub mod materials;
+pub mod media;
+mod media_presets;
 pub mod options;
 mod principled;
 pub mod settings;

@@ -19,6 +19,7 @@ use lumiris_formats::source::Span;
 #[derive(Default)]
 pub struct Options {
     camera: Option<(Pending, Ctm)>,
+    camera_medium: Option<Name>,
     film: Option<Pending>,
     filter: Option<Pending>,
     sampler: Option<Pending>,
@@ -56,8 +57,19 @@ impl Options {
     }
 
     /// `Camera`; a second one replaces the first, as do the others.
-    pub fn camera(&mut self, name: Name, params: ParamSet, ctm: Ctm) {
+    pub fn camera(&mut self, name: Name, params: ParamSet, ctm: Ctm, medium: Option<Name>) {
         self.camera = Some((Pending { name, params }, ctm));
+        self.camera_medium = medium;
+    }
+
+    /// The medium around the camera.
+    pub fn camera_medium(&self) -> Option<&Name> {
+        self.camera_medium.as_ref()
+    }
+
+    /// Where the integrator `path` is asked for, which leaves media out in pbrt-v4.
+    pub fn integrator_without_media(&self) -> Option<Span> {
+        self.integrator.as_ref().map(|pending| &pending.name).filter(|name| name.text == "path").map(|name| name.span)
     }
 
     /// `Film`
@@ -225,42 +237,4 @@ fn screen_window(p: &ParamSet, [w, h]: [u32; 2], d: &mut Diagnostics) -> Option<
         }
     }
     Some(window)
-}
-
-/// `MakeNamedMedium`: its form is checked; media are not rendered yet.
-pub fn medium(name: &Name, p: &ParamSet, d: &mut Diagnostics) {
-    let kind = p.string("type", d).unwrap_or("homogeneous").to_owned();
-    let known = ["homogeneous", "uniformgrid", "rgbgrid", "cloud", "nanovdb"];
-    if !known.contains(&kind.as_str()) {
-        unknown(&kind, p.span_of("type"), "medium", &known, d);
-    }
-    for key in [
-        "preset",
-        "sigma_a",
-        "sigma_s",
-        "scale",
-        "g",
-        "Le",
-        "Lescale",
-        "p0",
-        "p1",
-        "density",
-        "nx",
-        "ny",
-        "nz",
-        "temperature",
-        "temperatureoffset",
-        "temperaturescale",
-        "temperaturecutoff",
-        "wispiness",
-        "frequency",
-        "filename",
-        "LeScale",
-    ] {
-        p.ignore(key);
-    }
-    p.report_unused(d);
-    if name.text.is_empty() {
-        d.error(name.span, "a medium needs a name");
-    }
 }

@@ -102,6 +102,7 @@ impl Builder<'_> {
                 area_light: self.state.area_light.clone(),
                 alpha,
                 object: self.current_object,
+                media: self.state.media.clone(),
             });
         }
     }

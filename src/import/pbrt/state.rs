@@ -1,7 +1,8 @@
 //! What the directives so far have made: the graphics state, and the scene while its file is read.
 
 use super::descriptions::{
-    AreaLightDesc, EnvironmentDesc, InstanceDesc, MaterialUse, ObjectDesc, ShapeDesc, ShapeSource,
+    AreaLightDesc, EnvironmentDesc, InstanceDesc, MaterialUse, MediumDesc, MediumNames, ObjectDesc, ShapeDesc,
+    ShapeSource,
 };
 use super::options::Options;
 use super::transform::{Ctm, affine};
@@ -36,6 +37,8 @@ pub struct GraphicsState {
     pub area_light: Option<AreaLightDesc>,
     /// Colour space of `rgb` parameters.
     pub color_space: ColorSpace,
+    /// Media on the sides of shapes; the camera is in the one outside.
+    pub media: MediumNames,
     /// Default parameters by `Attribute`.
     pub(super) defaults: Defaults,
 }
@@ -92,6 +95,8 @@ pub struct Builder<'a> {
     pub materials: Vec<MaterialEntry>,
     /// Named materials.
     pub named_materials: HashMap<String, u32>,
+    /// Media.
+    pub media: Vec<MediumDesc>,
     /// Lights that are no surfaces.
     pub lights: Vec<Light>,
     /// Their groups.
@@ -132,6 +137,7 @@ impl<'a> Builder<'a> {
                 material: MaterialUse::Id(default_material),
                 area_light: None,
                 color_space: ColorSpace::Srgb,
+                media: MediumNames::default(),
                 defaults: Defaults::default(),
             },
             stack: Vec::new(),
@@ -141,6 +147,7 @@ impl<'a> Builder<'a> {
             texture_names: TextureNames::default(),
             materials,
             named_materials: HashMap::new(),
+            media: Vec::new(),
             lights: Vec::new(),
             light_groups: Vec::new(),
             environments: Vec::new(),

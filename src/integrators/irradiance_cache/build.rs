@@ -185,7 +185,7 @@ fn ask_chunk(
         all.map(|(path, v)| Shading { lit: None, next: ask(found.vertex, path, v).then_some(v.bsdf) }).collect()
     };
     (paths.search.only_reflected, paths.only_specular) = (true, true);
-    paths.search.start(samples, &mut out);
+    paths.search.start(job, samples, &mut out);
     paths.follow((job, &job.settings().integrator), Some(own), samples, &mut Fits::default(), &mut out);
     // Paths went on vertex by vertex
     wanted.sort_by_key(|w: &RecordRequest| [w.pixel[1], w.pixel[0]]);

@@ -18,6 +18,7 @@ use crate::film::PixelSample;
 use crate::integrators::Tracer;
 use crate::integrators::path::{CameraSample, PathStats, PathTracer};
 use crate::materials::SurfaceBsdf;
+use crate::media::Sides;
 use crate::scene::{EmitterHit, EmitterScratch, RenderJob};
 use crate::settings::{Cached, IntegratorKind, IntegratorSettings, SampleCounts};
 use lumiris_numbers::estimators::ocv::block_of;
@@ -270,6 +271,7 @@ impl RecordRequest {
             n: self.n,
         };
         ShadingPoint {
+            media: Sides::default(),
             bsdf_by_path: false,
             p: self.p,
             p_error: self.p_error,

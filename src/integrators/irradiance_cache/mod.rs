@@ -96,7 +96,7 @@ impl Tracer for CacheTracer<'_> {
             self.lookups.misses += u64::from(known.is_none());
             known
         };
-        self.paths.search.start(samples, out);
+        self.paths.search.start(job, samples, out);
         let own: &mut AtVertices<'_> =
             &mut |found, out| diffuse::shade(found, includes_direct, out, |_, v, part| look_up(v, part));
         self.paths.follow((job, &job.settings().integrator), Some(own), samples, fits, out);

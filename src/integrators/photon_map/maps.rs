@@ -313,7 +313,7 @@ pub fn seen(job: &RenderJob, cameras: Cameras<'_>) -> Vec<(Vec3, Vec3)> {
     let pixels = (0..b.area() as u32).step_by(stride).map(|i| [b.x0 + i % b.width(), b.y0 + i / b.width()]);
     let samples: Vec<CameraSample> = pixels.map(|pixel| cameras(pixel, 0)).collect();
     let (mut search, mut results) = (VertexSearch::default(), Vec::new());
-    search.start(&samples, &mut results);
+    search.start(job, &samples, &mut results);
     let stage = Stage { job, vertex: 0, depth: 1, samples: &samples, out: &mut results, batch: None };
     let vertices = search.find(stage);
     let diffuse = vertices.iter().filter(|v| v.bsdf.lambertian(v.wo).is_some());

@@ -161,7 +161,7 @@ impl Tracer for PhotonMapTracer<'_> {
                 Some(Rgb::BLACK)
             })
         };
-        self.paths.search.start(samples, out);
+        self.paths.search.start(job, samples, out);
         self.paths.follow((job, settings), Some(own), samples, fits, out);
         self.lookups.correct(job, out);
 
@@ -225,7 +225,7 @@ impl PhotonMapTracer<'_> {
     fn finish_gather(&mut self, job: &RenderJob, settings: &IntegratorSettings) {
         let (maps, lookups) = (self.maps, &mut self.lookups);
         (self.gather.search.only_reflected, self.gather.estimator_of) = (true, Some(1));
-        self.gather.search.start(&self.samples, &mut self.results);
+        self.gather.search.start(job, &self.samples, &mut self.results);
         self.gather.search.active.retain(|path| !path.beta.is_black());
         let own: &mut AtVertices<'_> = &mut |found, out| lookups.arrive(maps, settings, found, out);
         let (samples, fits) = (&self.samples, &mut Fits::default());

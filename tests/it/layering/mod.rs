@@ -24,7 +24,7 @@ const CRATES: &[(&str, &str, &[&str])] = &[
 /// Modules of the renderer by layer; a module may import from strictly smaller layers.
 const LAYERS: &[&[&str]] = &[
     &["imaging"],
-    &["textures", "geometry", "bsdfs", "cameras", "film"],
+    &["textures", "geometry", "bsdfs", "media", "cameras", "film"],
     &["materials", "lights", "accel"],
     &["settings"],
     &["scene"],

@@ -76,11 +76,13 @@ fn facts(job: &RenderJob) -> Value {
         },
         "materials": materials,
         "lights": lights,
+        "media": scene.media.names.iter().zip(&scene.media.media).map(|(name, medium)| (name.clone(), medium.kind_name())).collect::<BTreeMap<_, _>>(),
         "textures": {
             "float": scene.textures.floats.len(), "rgb": scene.textures.rgbs.len(), "images": scene.textures.images.len(),
         },
         "memory": {
             "geometry_bytes": geometry_bytes(scene),
+            "medium_bytes": scene.media.media.iter().map(|m| m.bytes() as u64).sum::<u64>(),
             "texture_bytes": scene.textures.images.iter().map(|i| i.bytes() as u64).sum::<u64>(),
             "accel_bytes": accel.bytes, "accel_peak_bytes": accel.peak_bytes,
             "taken_bytes": taken(),

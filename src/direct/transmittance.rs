@@ -1,0 +1,133 @@
+//! T2 through media: segments go on through surfaces that only bound a medium, and carry an estimate of how much light
+//! passes, per channel.
+//!
+//! The estimate has the expectation exp(−∫σ_t) and is independent of the sample that the segment belongs to, so the
+//! expectation of its contribution is that of the sample times T. Densities of directions do not know of it.
+
+use super::domain;
+use super::point::ShadingPoint;
+use crate::accel::{Coherence, Hit, RayBatch};
+use crate::media::{MediumId, Numbers, Segment};
+use crate::scene::{RenderJob, SurfaceInteraction};
+use lumiris_numbers::math::ray::SEGMENT_END;
+use lumiris_numbers::math::{Ray, Rgb, Vec3};
+
+/// Surfaces that a segment may pass: it counts as occluded behind them.
+const MAX_PASSED: u32 = 64;
+
+/// Segments on their way through media.
+#[derive(Debug, Default)]
+pub(super) struct Crossing {
+    all: Vec<Crossed>,
+    /// Number of segments of each point so far.
+    counts: Vec<u32>,
+    /// Those that are under way, their rays, and what these meet.
+    active: Vec<u32>,
+    rays: RayBatch,
+    hits: Vec<Option<Hit>>,
+}
+
+/// A segment.
+#[derive(Clone, Copy, Debug)]
+struct Crossed {
+    /// What is left of it.
+    ray: Ray,
+    /// Where it ends; `None` for a direction.
+    end: Option<Vec3>,
+    /// What it goes through.
+    medium: Option<MediumId>,
+    numbers: Numbers,
+    /// Estimate of what passes.
+    transmittance: Rgb,
+}
+
+impl Crossing {
+    /// Begins with segments, each of one of the `points`.
+    pub(super) fn start(&mut self, rays: &RayBatch, of: &[u32], points: &[ShadingPoint<'_>]) {
+        self.all.clear();
+        // Numbers follow from the place among the segments of the same point, not of the batch
+        self.counts.clear();
+        self.counts.resize(points.len(), 0);
+        for (i, &of) in of.iter().enumerate() {
+            let (ray, point) = (rays.get(i), &points[of as usize]);
+            let index = self.counts[of as usize];
+            self.counts[of as usize] += 1;
+            self.all.push(Crossed {
+                ray,
+                end: ray.t_max.is_finite().then(|| ray.o + ray.d),
+                medium: point.medium(ray.d),
+                numbers: Numbers::new(point.stream.domain(domain::TRANSMITTANCE + index)),
+                transmittance: Rgb::WHITE,
+            });
+        }
+    }
+
+    /// What passes of each segment; black where it is occluded.
+    pub(super) fn transmittance(&self) -> impl Iterator<Item = Rgb> {
+        self.all.iter().map(|crossed| crossed.transmittance)
+    }
+
+    /// Traces all segments. Returns the number of rays.
+    pub(super) fn trace(&mut self, job: &RenderJob) -> u64 {
+        let mut traced = 0;
+        self.active.clear();
+        self.active.extend(0..self.all.len() as u32);
+        let mut coherence = Coherence::Packets;
+        for _ in 0..=MAX_PASSED {
+            let Crossing { all, active, rays, hits, .. } = &mut *self;
+            if active.is_empty() {
+                return traced;
+            }
+            rays.clear();
+            active.iter().for_each(|&i| rays.push(&all[i as usize].ray));
+            traced += active.len() as u64;
+            job.world.accel.intersect(rays, coherence, hits);
+            coherence = Coherence::Incoherent;
+            let mut hit = hits.iter();
+            active.retain(|&i| all[i as usize].goes_on(job, hit.next().and_then(Option::as_ref)));
+        }
+        for &i in &self.active {
+            self.all[i as usize].transmittance = Rgb::BLACK;
+        }
+        traced
+    }
+}
+
+impl Crossed {
+    /// Goes as far as what the ray meets; true if it goes on from there.
+    fn goes_on(&mut self, job: &RenderJob, hit: Option<&Hit>) -> bool {
+        let passed = match hit {
+            None => None,
+            Some(hit) if !job.may_pass(hit) => {
+                self.transmittance = Rgb::BLACK;
+                return false;
+            }
+            Some(hit) => {
+                let interaction = SurfaceInteraction::new(job, &self.ray, (0.0, 0.0), hit);
+                if interaction.scatter(job).is_some() {
+                    self.transmittance = Rgb::BLACK;
+                    return false;
+                }
+                Some(interaction)
+            }
+        };
+        if let Some(id) = self.medium {
+            let length = self.ray.d.length();
+            let d = self.ray.d / length;
+            let whole = if self.end.is_some() { length } else { f32::INFINITY };
+            let segment = Segment { o: self.ray.o, d, length: passed.map_or(whole, |passed| passed.distance) };
+            let medium = &job.world.scene.media.media[id as usize];
+            self.transmittance *= medium.transmittance(&segment, &mut self.numbers);
+        }
+        let Some(interaction) = passed.filter(|_| !self.transmittance.is_black()) else { return false };
+        let d = self.ray.d;
+        self.medium = interaction.medium_beyond(job, d, self.medium);
+        let o = interaction.origin(d);
+        self.ray = match self.end {
+            None => Ray { o, ..self.ray },
+            Some(end) if (end - o).dot(d) > 0.0 => Ray { o, d: end - o, t_max: SEGMENT_END, ..self.ray },
+            Some(_) => return false,
+        };
+        true
+    }
+}

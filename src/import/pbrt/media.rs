@@ -1,0 +1,312 @@
+//! `MakeNamedMedium` and `MediumInterface`.
+
+use super::checks::unknown;
+use super::descriptions::{MediumDesc, MediumNames, ShapeDesc};
+use super::media_presets;
+use super::spectrum::SpectrumUse;
+use super::state::Builder;
+use crate::media::{
+    Cloud, Field, Heterogeneous, Homogeneous, Medium, MediumId, MediumSet, RgbGrid, Samples, Sides, Temperature,
+    UniformGrid,
+};
+use lumiris_formats::diagnostic::{Diagnostics, did_you_mean};
+use lumiris_formats::pbrt::directive::Name;
+use lumiris_formats::pbrt::params::{ParamSet, ParamType};
+use lumiris_formats::spectra::{Y_INTEGRAL, glow_rgb};
+use lumiris_numbers::math::{Affine3A, Bounds3, Rgb, Vec3};
+use std::collections::HashMap;
+
+/// Temperatures whose radiance is tabulated.
+const TEMPERATURES: usize = 1024;
+
+/// The media that surfaces and the camera refer to.
+#[derive(Default)]
+pub(super) struct MediaInUse {
+    pub(super) set: MediumSet,
+    ids: HashMap<String, MediumId>,
+}
+
+impl MediaInUse {
+    fn id(&self, name: &Option<Name>) -> Option<MediumId> {
+        self.ids.get(&name.as_ref()?.text).copied()
+    }
+
+    /// The media on the sides of a shape; `None` if they are the same.
+    pub(super) fn sides(&self, names: &MediumNames) -> Option<Sides> {
+        let sides = Sides { front: self.id(&names.outside), back: self.id(&names.inside) };
+        (names.differ() && sides.differ()).then_some(sides)
+    }
+}
+
+impl Builder<'_> {
+    /// `MakeNamedMedium "name"`
+    pub fn make_named_medium(&mut self, name: Name, p: &mut ParamSet, d: &mut Diagnostics) {
+        if name.text.is_empty() {
+            d.error(name.span, "a medium needs a name");
+        }
+        if let Some(first) = self.media.iter().find(|m| m.name.text == name.text) {
+            let message = format!("medium `{}` is defined twice", name.text);
+            d.error(name.span, message).label(first.name.span, "first defined here");
+        }
+        let world_from_medium = self.still_transform("media", name.span, d);
+        let kind = p.string("type", d).unwrap_or("homogeneous").to_owned();
+        let medium = match kind.as_str() {
+            "homogeneous" => self.homogeneous(p, d),
+            "uniformgrid" => self.uniform_grid(p, &world_from_medium, d),
+            "rgbgrid" => self.rgb_grid(p, &world_from_medium, d),
+            "cloud" => self.cloud(p, &world_from_medium, d),
+            "nanovdb" => {
+                p.ignore_all();
+                let message = "medium `nanovdb` cannot be read: there is no library for this format here";
+                d.error(p.span_of("type"), message).help("write its densities as a `uniformgrid` or an `rgbgrid`");
+                None
+            }
+            other => {
+                p.ignore_all();
+                let known = ["homogeneous", "uniformgrid", "rgbgrid", "cloud"];
+                unknown(other, p.span_of("type"), "medium", &known, d);
+                None
+            }
+        };
+        p.report_unused(d);
+        self.media.push(MediumDesc { name, medium });
+    }
+
+    /// σ_a and σ_s with the scale; 1 where the file says nothing.
+    fn coefficients(&self, p: &ParamSet, scale: f32, d: &mut Diagnostics) -> Option<[Rgb; 2]> {
+        let mut of = [Rgb::WHITE; 2];
+        let preset = p.string("preset", d).map(str::to_owned);
+        let found = preset.as_deref().map(|name| (name, media_presets::preset(name)));
+        if let Some((name, None)) = found {
+            unknown(name, p.span_of("preset"), "preset", &media_presets::names(), d);
+            return None;
+        }
+        for (i, key) in ["sigma_a", "sigma_s"].into_iter().enumerate() {
+            let given = self.color_param(p, key, SpectrumUse::Unbounded, d);
+            let measured = found.and_then(|(_, preset)| preset).map(|preset| preset[i]);
+            if let (Some(_), Some(_)) = (given, measured) {
+                d.warning_once(p.span_of(key), format!("`preset` goes before `{key}`, as in pbrt-v4"));
+            }
+            of[i] = measured.or(given).unwrap_or(Rgb::WHITE) * scale;
+            if of[i].to_array().iter().any(|&c| !(c >= 0.0 && c.is_finite())) {
+                d.error(p.span_of(key), format!("{key} must be finite and not negative"));
+                return None;
+            }
+        }
+        Some(of)
+    }
+
+    fn homogeneous(&self, p: &ParamSet, d: &mut Diagnostics) -> Option<Medium> {
+        let scale = not_negative(p, "scale", 1.0, d);
+        let g = asymmetry(p, d);
+        let le = self.color_param(p, "Le", SpectrumUse::Illuminant, d).unwrap_or(Rgb::BLACK);
+        let le = le * not_negative(p, "Lescale", 1.0, d);
+        let [sigma_a, sigma_s] = self.coefficients(p, scale, d)?;
+        Some(Medium::Homogeneous(Homogeneous { sigma_a, sigma_s, le, g }))
+    }
+
+    fn uniform_grid(&self, p: &mut ParamSet, placement: &Affine3A, d: &mut Diagnostics) -> Option<Medium> {
+        let scale = not_negative(p, "scale", 1.0, d);
+        let g = asymmetry(p, d);
+        let bounds = bounds(p, d);
+        let resolution = resolution(p, d);
+        let le = self.color_param(p, "Le", SpectrumUse::Illuminant, d);
+        let offset = p.float("temperatureoffset", d);
+        let offset = offset.or_else(|| p.float("temperaturecutoff", d)).unwrap_or(0.0);
+        let temperature_scale = p.float("temperaturescale", d).unwrap_or(1.0);
+        let coefficients = self.coefficients(p, scale, d);
+        let resolution = resolution?;
+        let density = float_samples(p, "density", resolution, d);
+        let le_scale = float_samples(p, "Lescale", resolution, d);
+        let temperature = float_samples(p, "temperature", resolution, d);
+        if p.type_of("density").is_none() {
+            d.error(p.span, "a uniformgrid needs `float density`");
+            return None;
+        }
+        if let (Some(_), Some(_)) = (le, &temperature) {
+            d.error(
+                p.span_of("temperature"),
+                "the colour of the emission is given by `Le` or by `temperature`, not by both",
+            );
+            return None;
+        }
+        let temperature = temperature.map(|samples| glowing(samples, offset, temperature_scale));
+        let le = if temperature.is_some() { Rgb::WHITE } else { le.unwrap_or(Rgb::BLACK) };
+        let [sigma_a, sigma_s] = coefficients?;
+        let grid = UniformGrid { sigma_a, sigma_s, density: density?, le, le_scale, temperature };
+        Some(Medium::Heterogeneous(Box::new(Heterogeneous::new(Field::Uniform(grid), bounds?, placement, g))))
+    }
+
+    fn rgb_grid(&self, p: &ParamSet, placement: &Affine3A, d: &mut Diagnostics) -> Option<Medium> {
+        let scale = not_negative(p, "scale", 1.0, d);
+        let le_scale = not_negative(p, "Lescale", 1.0, d);
+        let g = asymmetry(p, d);
+        let bounds = bounds(p, d);
+        let resolution = resolution(p, d)?;
+        let [sigma_a, sigma_s, le] = ["sigma_a", "sigma_s", "Le"].map(|key| self.rgb_samples(p, key, resolution, d));
+        if p.type_of("sigma_a").is_none() && p.type_of("sigma_s").is_none() {
+            d.error(p.span, "an rgbgrid needs `rgb sigma_a` or `rgb sigma_s`");
+            return None;
+        }
+        if p.type_of("Le").is_some() && p.type_of("sigma_a").is_none() {
+            d.error(p.span_of("Le"), "an rgbgrid that emits needs `rgb sigma_a`");
+            return None;
+        }
+        // pbrt-v4 does not scale this emission to a luminance
+        let le = le.filter(|_| le_scale > 0.0).map(|samples| samples.map(|le| le * (le_scale * Y_INTEGRAL)));
+        let grid = RgbGrid { sigma_a, sigma_s, scale, le };
+        Some(Medium::Heterogeneous(Box::new(Heterogeneous::new(Field::Rgb(grid), bounds?, placement, g))))
+    }
+
+    fn cloud(&self, p: &ParamSet, placement: &Affine3A, d: &mut Diagnostics) -> Option<Medium> {
+        let g = asymmetry(p, d);
+        let bounds = bounds(p, d);
+        let density = not_negative(p, "density", 1.0, d);
+        let wispiness = not_negative(p, "wispiness", 1.0, d);
+        let frequency = not_negative(p, "frequency", 5.0, d);
+        let [sigma_a, sigma_s] = self.coefficients(p, 1.0, d)?;
+        let cloud = Cloud { sigma_a, sigma_s, density, wispiness, frequency };
+        Some(Medium::Heterogeneous(Box::new(Heterogeneous::new(Field::Cloud(cloud), bounds?, placement, g))))
+    }
+
+    fn rgb_samples(
+        &self,
+        p: &ParamSet,
+        key: &'static str,
+        resolution: [usize; 3],
+        d: &mut Diagnostics,
+    ) -> Option<Samples<Rgb>> {
+        let param = p.get(key, &[ParamType::Rgb], d)?;
+        let values = param.floats().unwrap_or_default();
+        let colors = values.chunks_exact(3).map(|c| self.state.color_space.to_rec709([c[0], c[1], c[2]]));
+        let is_wrong = |c: &f32| !(*c >= 0.0 && c.is_finite());
+        if values.iter().any(is_wrong) {
+            d.error(param.value_span, format!("{key} must be finite and not negative"));
+            return None;
+        }
+        // A colour of another space may lie beyond Rec.709
+        let samples = Samples::new(resolution, colors.map(|c| c.map(|c| c.max(0.0))).collect());
+        if samples.is_none() {
+            d.error(param.value_span, wrong_count(key, resolution, values.len() / 3));
+        }
+        samples
+    }
+
+    /// The media that shapes and the camera refer to.
+    pub(super) fn media_in_use(&self, shapes: &[ShapeDesc], d: &mut Diagnostics) -> MediaInUse {
+        let mut media = MediaInUse::default();
+        let used = |media: &mut MediaInUse, name: &Name, d: &mut Diagnostics| {
+            let Some(desc) = self.media.iter().find(|m| m.name.text == name.text) else {
+                let message = format!("unknown medium `{}`", name.text);
+                let near = did_you_mean(&name.text, self.media.iter().map(|m| m.name.text.as_str())).map(str::to_owned);
+                let diagnostic = d.error(name.span, message);
+                if let Some(near) = near {
+                    diagnostic.help(format!("did you mean `{near}`?"));
+                }
+                return None;
+            };
+            let medium = desc.medium.as_ref()?;
+            let MediaInUse { set, ids } = media;
+            Some(*ids.entry(name.text.clone()).or_insert_with(|| {
+                set.media.push(medium.clone());
+                set.names.push(name.text.clone());
+                (set.media.len() - 1) as MediumId
+            }))
+        };
+        if let Some(name) = self.options.camera_medium() {
+            media.set.camera = used(&mut media, name, d);
+        }
+        for shape in shapes.iter().filter(|shape| shape.media.differ()) {
+            for name in [&shape.media.inside, &shape.media.outside].into_iter().flatten() {
+                let id = used(&mut media, name, d);
+                let varies = id.is_some_and(|id| matches!(media.set.media[id as usize], Medium::Heterogeneous(_)));
+                if varies && shape.object.is_some() {
+                    let text =
+                        "a medium stays where it is defined, as in pbrt-v4, wherever instances of the object are";
+                    d.warning_once(name.span, text);
+                }
+            }
+        }
+        if let Some(span) = self.options.integrator_without_media().filter(|_| !media.set.is_empty()) {
+            d.warning_once(span, "media are rendered, which pbrt-v4 does with the integrator `volpath` only");
+        }
+        media
+    }
+}
+
+/// A finite number that is not negative, or the default after an error.
+fn not_negative(p: &ParamSet, key: &'static str, default: f32, d: &mut Diagnostics) -> f32 {
+    match p.float(key, d) {
+        Some(x) if x >= 0.0 && x.is_finite() => x,
+        Some(x) => {
+            d.error(p.span_of(key), format!("{key} must be finite and not negative, not {x}"));
+            default
+        }
+        None => default,
+    }
+}
+
+fn asymmetry(p: &ParamSet, d: &mut Diagnostics) -> f32 {
+    let g = p.float("g", d).unwrap_or(0.0);
+    if !(-1.0..=1.0).contains(&g) {
+        d.error(p.span_of("g"), format!("g must be from -1 to 1, not {g}"));
+    }
+    g
+}
+
+/// The box between `p0` and `p1`, in the space of the medium.
+fn bounds(p: &ParamSet, d: &mut Diagnostics) -> Option<Bounds3> {
+    let mut corner = |key, default| p.triple(key, ParamType::Point3, d).map_or(default, Vec3::from_array);
+    let (a, b) = (corner("p0", Vec3::ZERO), corner("p1", Vec3::ONE));
+    let size = (b - a).abs();
+    if !(size.min_element() > 0.0 && size.is_finite()) {
+        d.error(p.span_of("p1"), "p0 and p1 must differ along every axis");
+        return None;
+    }
+    Some(Bounds3 { min: a.min(b), max: a.max(b) })
+}
+
+fn resolution(p: &ParamSet, d: &mut Diagnostics) -> Option<[usize; 3]> {
+    let mut all = [1; 3];
+    for (n, key) in all.iter_mut().zip(["nx", "ny", "nz"]) {
+        let value = p.integer(key, d).unwrap_or(1);
+        if value < 1 {
+            d.error(p.span_of(key), format!("{key} must be positive, not {value}"));
+            return None;
+        }
+        *n = value as usize;
+    }
+    Some(all)
+}
+
+fn float_samples(
+    p: &mut ParamSet,
+    key: &'static str,
+    resolution: [usize; 3],
+    d: &mut Diagnostics,
+) -> Option<Samples<f32>> {
+    let span = p.span_of(key);
+    let values = p.take_floats(key, &[ParamType::Float], d)?;
+    if values.iter().any(|v| !(*v >= 0.0 && v.is_finite())) {
+        d.error(span, format!("{key} must be finite and not negative"));
+        return None;
+    }
+    let count = values.len();
+    let samples = Samples::new(resolution, values);
+    if samples.is_none() {
+        d.error(span, wrong_count(key, resolution, count));
+    }
+    samples
+}
+
+fn wrong_count(key: &str, [nx, ny, nz]: [usize; 3], count: usize) -> String {
+    format!("{key} has {count} values, and nx × ny × nz = {nx} × {ny} × {nz}")
+}
+
+/// The radiance of black bodies up to the highest temperature of the samples.
+fn glowing(samples: Samples<f32>, offset: f32, scale: f32) -> Temperature {
+    let hottest = samples.values().iter().map(|t| (t - offset) * scale).fold(0.0, f32::max);
+    let step = (hottest / (TEMPERATURES - 1) as f32).max(f32::MIN_POSITIVE);
+    let radiance = (0..TEMPERATURES).map(|i| glow_rgb(i as f32 * step)).collect();
+    Temperature { samples, offset, scale, radiance, step }
+}

@@ -1,0 +1,46 @@
+//! Which settings estimate light transport through media.
+
+use crate::scene::RenderJob;
+use crate::settings::{EstimatorKind, IntegratorKind, IntegratorSettings};
+
+/// Why an image of these settings cannot be rendered where there are media, and what can; `None` if it can.
+pub fn obstacle_of(settings: &IntegratorSettings) -> Option<String> {
+    let knows_integrator = match settings.kind {
+        IntegratorKind::Direct | IntegratorKind::Path => true,
+        IntegratorKind::IrradianceCache | IntegratorKind::PhotonMap => false,
+    };
+    let knows_estimator = match settings.estimator {
+        EstimatorKind::Auto
+        | EstimatorKind::Mc
+        | EstimatorKind::Mis
+        | EstimatorKind::Ris
+        | EstimatorKind::Contributing => true,
+        // Their corrections are fitted to what is visible or not, which is no bit in a medium
+        EstimatorKind::Ocv | EstimatorKind::OptimalMis | EstimatorKind::Correlated => false,
+    };
+    let traces_first = settings.estimator == EstimatorKind::Ris && settings.ris.target.has_visibility();
+    let name = |kind: &'static str| kind;
+    if !knows_integrator {
+        return Some(format!(
+            "the integrator {} leaves out participating media, which this scene has: direct and path render them",
+            name(settings.kind.into())
+        ));
+    }
+    if !knows_estimator {
+        return Some(format!(
+            "the estimator {} leaves out participating media, which this scene has: auto, mc, mis, ris and contributing know them",
+            name(settings.estimator.into())
+        ));
+    }
+    traces_first.then(|| {
+        let target: &'static str = settings.ris.target.into();
+        format!(
+            "the target {target} leaves out participating media, which this scene has: fgl and visibility know them"
+        )
+    })
+}
+
+/// [`obstacle_of`] the settings of an image, if there are media.
+pub fn obstacle(job: &RenderJob) -> Option<String> {
+    if job.world.scene.media.is_empty() { None } else { obstacle_of(&job.settings().integrator) }
+}

@@ -1,0 +1,222 @@
+//! A medium that varies in a box: tracking by tentative collisions.
+//!
+//! Tentative collisions come at the rate of a majorant σ̄, a bound of σ_t of all channels in a cell of a coarse grid. At each
+//! of them the medium is looked up, and the flight is scattered or goes on (a *null collision*), so that σ_s and σ_n = σ̄ − σ_t
+//! have their part, whatever the channel [Kutz et al. 2017]:
+//!
+//! P_s = Σ_c |β_c w_c| σ_s,c / Σ_c |β_c w_c| (σ_s,c + |σ_n,c|),  w ← w σ_s/(σ̄ P_s) or w σ_n/(σ̄ (1 − P_s)),
+//!
+//! where β_c w_c is the throughput so far: probabilities follow the channels that still carry something, which keeps weights
+//! bounded. Absorption is part of the weights, and no event. What is sent out is added at every tentative collision:
+//! w σ_a L_e/σ̄.
+//!
+//! All of this is unbiased for any σ̄ > 0, also where σ_t exceeds it: σ_n is negative there. The bounds of clouds are
+//! estimated, and use that.
+
+use super::majorants::{MajorantGrid, Pieces};
+use super::track::{End, Flight, Numbers, Segment};
+use super::{Cloud, Coefficients, RgbGrid, UniformGrid};
+use lumiris_numbers::math::{Affine3A, Bounds3, Rgb, Vec3};
+
+/// What varies.
+#[derive(Clone, Debug)]
+pub enum Field {
+    /// A density on a grid.
+    Uniform(UniformGrid),
+    /// Colours on a grid.
+    Rgb(RgbGrid),
+    /// A procedural cloud.
+    Cloud(Cloud),
+}
+
+/// A medium in a box.
+#[derive(Clone, Debug)]
+pub struct Heterogeneous {
+    field: Field,
+    bounds: Bounds3,
+    /// The box as the unit cube.
+    unit_from_world: Affine3A,
+    majorants: MajorantGrid,
+    /// Asymmetry of the phase function.
+    pub g: f32,
+}
+
+/// Samples along an axis for which there is a majorant.
+const SAMPLES_PER_CELL: usize = 4;
+/// Most majorants along an axis.
+const MAX_CELLS: usize = 64;
+/// Majorants of a cloud along each axis, and points along an axis of a cell from which they are estimated.
+const CLOUD_CELLS: usize = 24;
+const CLOUD_POINTS: usize = 4;
+/// What is added to the greatest density that was found: a factor, and a density below which none is taken for a bound.
+const CLOUD_MARGIN: [f32; 2] = [1.25, 0.05];
+/// Weight of a shadow segment below which roulette decides about it, and the probability of going on.
+const FAINT: [f32; 2] = [0.1, 0.25];
+
+impl Heterogeneous {
+    /// A field in a box of its own space, placed by an invertible map.
+    pub fn new(field: Field, bounds: Bounds3, world_from_medium: &Affine3A, g: f32) -> Self {
+        let size = bounds.diagonal();
+        let unit_from_medium = Affine3A::from_scale(size.recip()) * Affine3A::from_translation(-bounds.min);
+        let unit_from_world = unit_from_medium * world_from_medium.inverse();
+        let cells = |resolution: [usize; 3]| resolution.map(|n| n.div_ceil(SAMPLES_PER_CELL).clamp(1, MAX_CELLS));
+        let majorants = match &field {
+            Field::Uniform(grid) => {
+                let sigma_t = (grid.sigma_a + grid.sigma_s).max_component();
+                MajorantGrid::new(cells(grid.density.resolution()), |low, high| {
+                    sigma_t * grid.density.bound(low, high, |density| density)
+                })
+            }
+            Field::Rgb(grid) => MajorantGrid::new(cells(grid.resolution()), |low, high| grid.bound(low, high)),
+            Field::Cloud(cloud) => cloud_majorants(cloud, &bounds),
+        };
+        Heterogeneous { field, bounds, unit_from_world, majorants, g }
+    }
+
+    /// What kind of field it is, for people.
+    pub fn kind_name(&self) -> &'static str {
+        match self.field {
+            Field::Uniform(_) => "uniformgrid",
+            Field::Rgb(_) => "rgbgrid",
+            Field::Cloud(_) => "cloud",
+        }
+    }
+
+    /// True if it sends out light.
+    pub fn is_emissive(&self) -> bool {
+        match &self.field {
+            Field::Uniform(grid) => grid.is_emissive(),
+            Field::Rgb(grid) => grid.le.is_some(),
+            Field::Cloud(_) => false,
+        }
+    }
+
+    /// Bytes of its samples and majorants.
+    pub fn bytes(&self) -> usize {
+        let field = match &self.field {
+            Field::Uniform(grid) => grid.bytes(),
+            Field::Rgb(grid) => grid.bytes(),
+            Field::Cloud(_) => 0,
+        };
+        field + self.majorants.bytes()
+    }
+
+    /// The medium at a point of the unit cube.
+    fn at(&self, p: Vec3) -> Coefficients {
+        match &self.field {
+            Field::Uniform(grid) => grid.at(p),
+            Field::Rgb(grid) => grid.at(p),
+            Field::Cloud(cloud) => {
+                let density = cloud.density_at(self.bounds.min + self.bounds.diagonal() * p);
+                Coefficients { sigma_a: cloud.sigma_a * density, sigma_s: cloud.sigma_s * density, le: Rgb::BLACK }
+            }
+        }
+    }
+
+    /// The tentative collisions along a segment. A parameter of its line is a distance in world space (m).
+    fn collisions(&self, segment: &Segment) -> Collisions<'_> {
+        let o = self.unit_from_world.transform_point3(segment.o);
+        let d = self.unit_from_world.transform_vector3(segment.d);
+        let pieces = self.majorants.pieces(o, d, segment.length);
+        Collisions { medium: self, o, d, pieces, from: 0.0, to: 0.0, majorant: 0.0 }
+    }
+
+    /// A flight along a segment of a path of throughput `beta`.
+    pub(super) fn fly(&self, segment: &Segment, beta: Rgb, numbers: &mut Numbers) -> Flight {
+        let is_emissive = self.is_emissive();
+        let (mut weight, mut emitted) = (Rgb::WHITE, Rgb::BLACK);
+        let mut collisions = self.collisions(segment);
+        let mut u = numbers.pair();
+        while let Some(Collision { t, majorant, at }) = collisions.next(u[0]) {
+            let Coefficients { sigma_a, sigma_s, le } = at;
+            if is_emissive {
+                emitted += weight * sigma_a * le / majorant;
+            }
+            let sigma_n = (sigma_a + sigma_s).map(|sigma_t| majorant - sigma_t);
+            let carried = (weight * beta).map(f32::abs);
+            let sum = |v: Rgb| v.r + v.g + v.b;
+            let (scattered, passed) = (sum(carried * sigma_s), sum(carried * sigma_n.map(f32::abs)));
+            let p = scattered / (scattered + passed);
+            if !p.is_finite() {
+                return Flight { emitted, end: End::Through { weight: Rgb::BLACK } };
+            }
+            if u[1] < p {
+                return Flight { emitted, end: End::Scattered { t, weight: weight * sigma_s / (majorant * p) } };
+            }
+            weight = weight * sigma_n / (majorant * (1.0 - p));
+            u = numbers.pair();
+        }
+        Flight { emitted, end: End::Through { weight } }
+    }
+
+    /// T along a segment by ratio tracking: the product of σ_n/σ̄ over the tentative collisions [Novák et al. 2014].
+    pub(super) fn transmittance(&self, segment: &Segment, numbers: &mut Numbers) -> Rgb {
+        let mut weight = Rgb::WHITE;
+        let mut collisions = self.collisions(segment);
+        let mut u = numbers.pair();
+        while let Some(Collision { majorant, at, .. }) = collisions.next(u[0]) {
+            weight *= (at.sigma_a + at.sigma_s).map(|sigma_t| 1.0 - sigma_t / majorant);
+            if weight.map(f32::abs).max_component() < FAINT[0] {
+                if u[1] >= FAINT[1] {
+                    return Rgb::BLACK;
+                }
+                weight *= 1.0 / FAINT[1];
+            }
+            u = numbers.pair();
+        }
+        weight
+    }
+}
+
+/// A tentative collision.
+struct Collision {
+    /// Distance from the origin (m).
+    t: f32,
+    /// σ̄ (1/m).
+    majorant: f32,
+    at: Coefficients,
+}
+
+/// Tentative collisions along a line.
+struct Collisions<'a> {
+    medium: &'a Heterogeneous,
+    /// The line in the unit cube.
+    o: Vec3,
+    d: Vec3,
+    pieces: Pieces<'a>,
+    /// What is left of the present piece.
+    from: f32,
+    to: f32,
+    majorant: f32,
+}
+
+impl Collisions<'_> {
+    /// The next one, at an optical depth that `u` determines; `None` beyond the end of the line.
+    fn next(&mut self, u: f32) -> Option<Collision> {
+        let mut depth = -(-u).ln_1p();
+        loop {
+            let t = self.from + depth / self.majorant;
+            if self.majorant > 0.0 && t < self.to {
+                self.from = t;
+                let at = self.medium.at(self.o + self.d * t);
+                return Some(Collision { t, majorant: self.majorant, at });
+            }
+            depth = (depth - self.majorant * (self.to - self.from)).max(0.0);
+            let piece = self.pieces.next()?;
+            (self.from, self.to, self.majorant) = (piece.begin, piece.end, piece.majorant);
+        }
+    }
+}
+
+/// Estimated bounds: the greatest density at some points of each cell and of those around it, and a margin.
+fn cloud_majorants(cloud: &Cloud, bounds: &Bounds3) -> MajorantGrid {
+    let greatest = MajorantGrid::new([CLOUD_CELLS; 3], |low, high| {
+        (0..CLOUD_POINTS.pow(3)).fold(0.0_f32, |greatest, i| {
+            let place = [1, CLOUD_POINTS, CLOUD_POINTS.pow(2)].map(|n| (i / n % CLOUD_POINTS) as f32 + 0.5);
+            let p = low + (high - low) * Vec3::from(place) / CLOUD_POINTS as f32;
+            greatest.max(cloud.density_at(bounds.min + bounds.diagonal() * p))
+        })
+    });
+    let sigma_t = (cloud.sigma_a + cloud.sigma_s).max_component();
+    greatest.with_neighbors(|density| sigma_t * (density * CLOUD_MARGIN[0] + CLOUD_MARGIN[1]).min(1.0))
+}

@@ -1,0 +1,159 @@
+//! Participating media: what absorbs, scatters and emits light between surfaces, and free flights through it.
+//!
+//! σ_a and σ_s are the coefficients of absorption and of scattering (1/m), σ_t = σ_a + σ_s, all of them RGB. Light that
+//! goes a distance d is weakened to T = exp(−∫₀ᵈ σ_t). A medium sends out σ_a·L_e per unit length, and scatters by
+//! [Henyey and Greenstein 1941].
+//!
+//! Reading order: [`homogeneous`], [`grid`], [`noise`], [`cloud`], [`majorants`], [`heterogeneous`], [`track`].
+
+pub mod cloud;
+pub mod grid;
+pub mod heterogeneous;
+pub mod homogeneous;
+pub mod majorants;
+pub mod noise;
+pub mod track;
+
+pub use cloud::Cloud;
+pub use grid::{RgbGrid, Samples, Temperature, UniformGrid};
+pub use heterogeneous::{Field, Heterogeneous};
+pub use homogeneous::Homogeneous;
+pub use track::{End, Flight, Numbers, Segment};
+
+use lumiris_numbers::math::{Rgb, Vec3};
+
+/// Index into [`MediumSet::media`].
+pub type MediumId = u32;
+
+/// A medium at a point.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct Coefficients {
+    /// Absorption (1/m).
+    pub sigma_a: Rgb,
+    /// Scattering (1/m).
+    pub sigma_s: Rgb,
+    /// Emitted radiance, of which σ_a is sent out per unit length.
+    pub le: Rgb,
+}
+
+/// A medium in world space.
+#[derive(Clone, Debug)]
+pub enum Medium {
+    /// The same everywhere.
+    Homogeneous(Homogeneous),
+    /// One that varies in a box, outside of which there is nothing.
+    Heterogeneous(Box<Heterogeneous>),
+}
+
+impl Medium {
+    /// What kind of medium it is, for people.
+    pub fn kind_name(&self) -> &'static str {
+        match self {
+            Medium::Homogeneous(_) => "homogeneous",
+            Medium::Heterogeneous(m) => m.kind_name(),
+        }
+    }
+
+    /// True if it sends out light.
+    pub fn is_emissive(&self) -> bool {
+        match self {
+            Medium::Homogeneous(m) => m.is_emissive(),
+            Medium::Heterogeneous(m) => m.is_emissive(),
+        }
+    }
+
+    /// Asymmetry of the phase function, −1..1: the mean cosine between the directions before and after.
+    #[inline]
+    pub fn g(&self) -> f32 {
+        match self {
+            Medium::Homogeneous(m) => m.g,
+            Medium::Heterogeneous(m) => m.g,
+        }
+    }
+
+    /// Bytes of its tables.
+    pub fn bytes(&self) -> usize {
+        match self {
+            Medium::Homogeneous(_) => 0,
+            Medium::Heterogeneous(m) => m.bytes(),
+        }
+    }
+
+    /// A flight along a segment of a path of throughput `beta`: see [`Flight`]. `focus` chooses a point of a light, about
+    /// which distances in homogeneous media may be equiangular.
+    #[inline]
+    pub fn fly(
+        &self,
+        segment: &Segment,
+        beta: Rgb,
+        numbers: &mut Numbers,
+        focus: impl FnOnce() -> Option<Vec3>,
+    ) -> Flight {
+        match self {
+            Medium::Homogeneous(m) => m.fly(segment, beta, numbers.first(), focus),
+            Medium::Heterogeneous(m) => m.fly(segment, beta, numbers),
+        }
+    }
+
+    /// An unbiased estimate of T along a segment: exact in homogeneous media, which need no numbers, by ratio tracking
+    /// [Novák et al. 2014] in others.
+    #[inline]
+    pub fn transmittance(&self, segment: &Segment, numbers: &mut Numbers) -> Rgb {
+        match self {
+            Medium::Homogeneous(m) => m.transmittance(segment.length),
+            Medium::Heterogeneous(m) => m.transmittance(segment, numbers),
+        }
+    }
+}
+
+/// The media on the two sides of a surface, or around a point; `None` is empty space.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub struct Sides {
+    /// Where the geometric normal points to, which scene files call outside.
+    pub front: Option<MediumId>,
+    /// The other side.
+    pub back: Option<MediumId>,
+}
+
+impl Sides {
+    /// The same all around.
+    #[inline]
+    pub fn both(medium: Option<MediumId>) -> Self {
+        Sides { front: medium, back: medium }
+    }
+
+    /// True if light that passes comes into another medium.
+    pub fn differ(&self) -> bool {
+        self.front != self.back
+    }
+
+    /// The medium into which the direction of cosine `cos` to the geometric normal leads.
+    #[inline]
+    pub fn towards(&self, cos: f32) -> Option<MediumId> {
+        if cos < 0.0 { self.back } else { self.front }
+    }
+}
+
+/// The media of a scene.
+#[derive(Clone, Debug, Default)]
+pub struct MediumSet {
+    /// All that are used.
+    pub media: Vec<Medium>,
+    /// Their names, for messages.
+    pub names: Vec<String>,
+    /// The one around the camera.
+    pub camera: Option<MediumId>,
+}
+
+impl MediumSet {
+    /// True if all of space is empty.
+    #[inline]
+    pub fn is_empty(&self) -> bool {
+        self.media.is_empty()
+    }
+
+    /// True if one of them sends out light.
+    pub fn is_emissive(&self) -> bool {
+        self.media.iter().any(Medium::is_emissive)
+    }
+}
