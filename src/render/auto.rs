@@ -66,7 +66,7 @@ const SEED: u32 = 0x61_75_74_6f;
 /// Share of the greatest efficiency, by the model, with which fewer samples will do.
 const NEARLY: f64 = 0.95;
 
-/// Numbers of samples, relative to those without a pilot, from which on fewer are tried too.
+/// Numbers of samples, relative to those without a pilot, from which on fewer are tried too, and not more.
 const MANY: u32 = 3;
 
 /// Lights from which on photons may tell which of them contribute.
@@ -322,13 +322,13 @@ impl Pilot {
     }
 }
 
-/// Numbers halfway to the best by the model, if these are much greater than those without a pilot: beyond what was measured,
-/// nets may gain less than the model says.
-fn halfway(base: &IntegratorSettings, best: [u32; 2]) -> Option<IntegratorSettings> {
+/// Other numbers to be tried, since nets gain more or less than the model says: halfway to the best by the model, if these
+/// are much greater than those without a pilot, or else twice the best.
+fn other_numbers(base: &IntegratorSettings, best: [u32; 2]) -> IntegratorSettings {
     let usual = [0, 1].map(|vertex| without_pilot(base).sample_counts_at(vertex).samples);
-    let halfway = [0, 1].map(|k| (f64::from(usual[k]) * f64::from(best[k])).sqrt().round() as u32);
     let is_far = (0..2).any(|k| best[k] >= MANY * usual[k]);
-    is_far.then(|| with_samples(base, halfway))
+    let halfway = [0, 1].map(|k| (f64::from(usual[k]) * f64::from(best[k])).sqrt().round() as u32);
+    with_samples(base, if is_far { halfway } else { best.map(|n| 2 * n) })
 }
 
 /// What is done without a pilot, the best numbers of `mis`, and these with another setting each. None twice.
@@ -342,7 +342,7 @@ fn second_round(base: &IntegratorSettings, best: [u32; 2]) -> Vec<Candidate> {
         all.push(IntegratorSettings { roulette_depth: None, ..chosen });
     }
     all.push(resampled(base));
-    all.extend(halfway(base, best));
+    all.push(other_numbers(base, best));
     let mut candidates: Vec<Candidate> = Vec::new();
     for settings in all {
         if candidates.iter().all(|c| c.settings != settings) {
