@@ -46,8 +46,8 @@ const SAMPLES_PER_CELL: usize = 4;
 /// Most majorants along an axis.
 const MAX_CELLS: usize = 64;
 /// Majorants of a cloud along each axis, and points along an axis of a cell from which they are estimated.
-const CLOUD_CELLS: usize = 24;
-const CLOUD_POINTS: usize = 4;
+const CLOUD_CELLS: usize = 16;
+const CLOUD_POINTS: usize = 3;
 /// What is added to the greatest density that was found: a factor, and a density below which none is taken for a bound.
 const CLOUD_MARGIN: [f32; 2] = [1.25, 0.05];
 /// Weight of a shadow segment below which roulette decides about it, and the probability of going on.

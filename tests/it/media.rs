@@ -503,3 +503,26 @@ fn media_that_nothing_refers_to_leave_a_scene_as_it_is() {
     let job = job(&unused, AccelKind::Embree);
     assert!(job.world.scene.media.is_empty() && job.world.scene.surfaces.is_empty());
 }
+
+/// Features are those of the first surface behind media, also where every path ends before it.
+#[test]
+fn features_are_those_of_the_first_surface_behind_media() {
+    let text = camera("0 0 3", "", 3)
+        + &format!(
+            r#"MakeNamedMedium "fog" "rgb sigma_s" [9 9 9] "rgb sigma_a" [0 0 0] LightSource "infinite" "rgb L" [1 1 1]
+            Material "interface" MediumInterface "fog" "" {BOX} MediumInterface "" ""
+            Material "diffuse" "rgb reflectance" [0.2 0.4 0.6]
+            Shape "trianglemesh" "point3 P" [-9 -9 -2  9 -9 -2  9 9 -2  -9 9 -2] "integer indices" [0 1 2 0 2 3]"#
+        );
+    let job = job(&text, AccelKind::Embree);
+    let film = film(&job, RenderSettings { spp: 8, ..RenderSettings::default() });
+    for p in film.pixels() {
+        let n = p.hits as f64;
+        assert_eq!(p.hits, p.count);
+        assert!((p.depth / n - 5.0).abs() < 1e-5, "{}", p.depth / n);
+        for (found, expected) in p.albedo.iter().zip([0.2, 0.4, 0.6]) {
+            assert!((found / n - expected).abs() < 1e-5);
+        }
+        assert!((p.normal[2] / n - 1.0).abs() < 1e-5);
+    }
+}
