@@ -282,3 +282,37 @@ fn broken_containers_never_panic() {
     }
     assert!(refused > 1000, "{refused}");
 }
+
+/// What is said of a scene with a principled material of these parameters.
+fn said_of_principled(parameters: &str) -> String {
+    let text = format!("WorldBegin\nMaterial \"principled\" {parameters}\nShape \"sphere\"\n");
+    let loaded = load_text(&text, "a.pbrt", Path::new(""), &LoadOptions::default(), &FileCache::default());
+    loaded.map_or_else(|report| report.to_string(), |loaded| loaded.warnings.to_string())
+}
+
+#[test]
+fn numbers_of_principled_materials_outside_of_their_ranges_are_errors_with_places() {
+    let wrong = [
+        ("\"float base_metalness\" 2", "base_metalness must be from 0 to 1, not 2"),
+        ("\"float specular_roughness\" -1", "specular_roughness must be from 0 to 1, not -1"),
+        ("\"float specular_roughness_anisotropy\" 1.5", "must be from 0 to 1, not 1.5"),
+        ("\"float specular_ior\" 0", "an index of refraction must be positive, not 0"),
+        ("\"rgb base_color\" [0.5 2 0.5]", "base_color must be from 0 to 1, not 0.5 2 0.5"),
+        ("\"rgb specular_color\" [0.5 -1 0.5]", "specular_color must be 0 or more, not 0.5 -1 0.5"),
+    ];
+    for (parameters, message) in wrong {
+        let said = said_of_principled(parameters);
+        assert!(said.contains(message) && said.contains("a.pbrt:2:23"), "{said}");
+    }
+    let right =
+        "\"float coat_weight\" 1 \"rgb specular_color\" [3 1 0] \"rgb base_color\" [0 1 1] \"float coat_roughness\" 0";
+    assert!(!said_of_principled(right).contains("must be"), "{}", said_of_principled(right));
+}
+
+#[test]
+fn suggestions_for_parameters_name_what_is_wanted() {
+    let said = said_of_principled("\"float base_roughness\" 0.5");
+    assert!(said.contains("did you mean `specular_roughness`?"), "{said}");
+    let said = said_of_principled("\"texture specular_ior\" \"x\"");
+    assert!(said.contains("write `float specular_ior` or `spectrum specular_ior`"), "{said}");
+}
