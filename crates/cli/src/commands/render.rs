@@ -14,7 +14,7 @@ use super::settings::{SetupTimes, load_job_of, plan, render_settings};
 use super::stored::Stored;
 use crate::watch::{self, Watch};
 use anyhow::{Context, bail};
-use lumiris::film::Film;
+use lumiris::film::{Film, Summary};
 use lumiris::imaging::oidn::Denoiser;
 use lumiris::import::cache::FileCache;
 use lumiris::integrators::photon_map::MapStats;
@@ -357,12 +357,15 @@ fn report(args: &RenderArgs, rendering: &Rendering, outputs: &[PathBuf]) {
     }
     let names: Vec<String> = outputs.iter().map(|p| p.display().to_string()).collect();
     let names = if names.is_empty() { "rendered".to_owned() } else { names.join(", ") };
-    let spp = rendering.film.summary().least_samples.unwrap_or(0);
+    let summary = rendering.film.summary();
+    let is_of_tiles = args.parts.part.is_some() && args.parts.is_by_tiles();
+    let of = if is_of_tiles { Summary::samples_text_of_sampled } else { Summary::samples_text };
+    let samples = of(summary, if summary.samples[1] == 1 { "sample per pixel" } else { "samples per pixel" });
     let partial = if rendering.complete { "" } else { " (stopped early)" };
     progress::say(&format!(
-        "{names} after {:.1} s, {spp} samples per pixel{partial}, noise {:.2} %",
+        "{names} after {:.1} s, {samples}{partial}, noise {}",
         rendering.elapsed.as_secs_f64(),
-        rendering.film.summary().relative_noise * 100.0
+        progress::percent(summary.relative_noise)
     ));
     if let Some(c) = &rendering.cache {
         progress::say(&format!(
@@ -384,7 +387,7 @@ fn report(args: &RenderArgs, rendering: &Rendering, outputs: &[PathBuf]) {
             if p.maps > 1 { format!(", {} maps", p.maps) } else { String::new() }
         ));
     }
-    let invalid = rendering.film.summary().invalid;
+    let invalid = summary.invalid;
     if invalid > 0 {
         progress::say(&format!("warning: {invalid} samples were not finite, or too bright, and were counted as black"));
     }
