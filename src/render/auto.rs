@@ -104,7 +104,7 @@ pub(super) fn choose(job: &mut RenderJob) -> Option<AutoChoice> {
     if job.settings().integrator.estimator != EstimatorKind::Auto {
         return None;
     }
-    let choice = Pilot::new(job).map(|pilot| pilot.choose(job));
+    let choice = Pilot::new(job.settings(), &job.world.scene.film.bounds).map(|pilot| pilot.choose(job));
     let settings = choice.as_ref().map_or(without_pilot(&job.settings().integrator), |(_, settings)| *settings);
     job.change(|s| s.integrator = settings);
     choice.map(|(choice, _)| choice)
@@ -141,7 +141,7 @@ fn resampled(settings: &IntegratorSettings) -> IntegratorSettings {
 /// each camera sample costs anyway [Talbot 2005, §4.3]. `None` if the image is too small for a pilot. On the threads of the
 /// current pool.
 pub(super) fn proposals(job: &RenderJob) -> Option<(u32, StageTimes)> {
-    let pilot = Pilot::new(job)?;
+    let pilot = Pilot::new(job.settings(), &job.world.scene.film.bounds)?;
     let base = job.settings().integrator;
     let samples = base.sample_counts().samples;
     let with_ratio = |ratio: u32| {
@@ -158,6 +158,12 @@ pub(super) fn proposals(job: &RenderJob) -> Option<(u32, StageTimes)> {
     Some((samples * ratio, times))
 }
 
+/// True if the estimator is `auto` and its choice follows from a pilot's times. Numbers of the image and of the settings
+/// alone decide that, so it is the same on all machines.
+pub(super) fn is_measured(settings: &Settings, bounds: &PixelBounds) -> bool {
+    settings.integrator.estimator == EstimatorKind::Auto && Pilot::new(settings, bounds).is_some()
+}
+
 /// Where a round measures.
 struct Pilot {
     /// Pixels of the rounds; those of the third are blocks.
@@ -169,9 +175,8 @@ struct Pilot {
 
 impl Pilot {
     /// `None` if the image is too small, or its integrator has no estimates at path vertices alone.
-    fn new(job: &RenderJob) -> Option<Self> {
-        let Settings { integrator, sampling } = job.settings();
-        let bounds = job.world.scene.film.bounds;
+    fn new(settings: &Settings, bounds: &PixelBounds) -> Option<Self> {
+        let Settings { integrator, sampling } = settings;
         let spp = 1 << sampling.spp.clamp(1, MAX_SPP).ilog2();
         let samples = bounds.area() as f64 * f64::from(sampling.spp);
         let per_pixel = f64::from(2 * spp) * TRIALS[usize::from(integrator.depth() > 1)];
@@ -179,7 +184,7 @@ impl Pilot {
         let count = wanted.max(most.min(ENOUGH_PIXELS)).min(MAX_PIXELS);
         let is_measurable = matches!(integrator.kind, IntegratorKind::Direct | IntegratorKind::Path);
         (is_measurable && count >= MIN_PIXELS).then(|| Pilot {
-            pixels: [pixels(&bounds, count, 0), pixels(&bounds, count, 1), blocks(&bounds, 2 * count)],
+            pixels: [pixels(bounds, count, 0), pixels(bounds, count, 1), blocks(bounds, 2 * count)],
             spp,
             seed: sampling.seed,
         })

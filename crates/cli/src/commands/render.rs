@@ -103,7 +103,7 @@ pub(super) fn render_one(args: &RenderArgs, session: &Session) -> anyhow::Result
     let args = &args;
     let asked = check(args)?;
     let (mut job, setup, files) = load_job_of(&args.scene, &session.files, stored.as_ref())?;
-    parts::check_settings(args, job.settings())?;
+    parts::check_settings(args, job.settings(), &job.world.scene.film.bounds)?;
     check_memory(args, &job, asked.as_deref())?;
     let asks_for_ratio = asked.as_ref().is_some_and(|list| list.contains(&Aov::Ratio));
     if args.denoise.denoise && job.settings().integrator.path_reuse.is_none() {
