@@ -12,6 +12,7 @@ mod gltf;
 mod looks;
 mod lost_output;
 mod parts;
+mod messages;
 mod plan;
 mod program;
 mod reproduce;
