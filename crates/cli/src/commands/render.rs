@@ -17,6 +17,7 @@ use anyhow::{Context, bail};
 use lumiris::film::{Film, Summary};
 use lumiris::imaging::oidn::Denoiser;
 use lumiris::import::cache::FileCache;
+use lumiris::integrators::light_layers;
 use lumiris::integrators::photon_map::MapStats;
 use lumiris::render::cryptomatte::cryptomattes;
 use lumiris::render::memory::{Wanted, predict};
@@ -44,6 +45,8 @@ pub(super) struct Session {
     denoiser: Option<Denoiser>,
     /// Those who watch.
     watch: Watch,
+    /// True once it was said that layers of light groups are lost.
+    has_noted_layers: AtomicBool,
 }
 
 /// A picture that was rendered.
@@ -85,7 +88,7 @@ impl Session {
         }
         let stop = Arc::new(AtomicBool::new(false));
         stop_at_ctrl_c(&stop)?;
-        Ok(Session { stop, files, denoiser, watch })
+        Ok(Session { stop, files, denoiser, watch, has_noted_layers: AtomicBool::new(false) })
     }
 
     /// True once Ctrl-C was pressed.
@@ -116,6 +119,7 @@ pub(super) fn render_one(args: &RenderArgs, session: &Session) -> anyhow::Result
         check_outputs(&outputs)?;
     }
     check_denoise(args, &outputs)?;
+    note_layers(args, &job, (&outputs, asked.as_deref()), session);
 
     let bar = Bar::new(args.quiet);
     let mut settings = settings_of(args, &job, asked.as_deref());
@@ -135,6 +139,18 @@ pub(super) fn render_one(args: &RenderArgs, session: &Session) -> anyhow::Result
         complete: rendering.complete,
         misplaced: written.misplaced,
     })
+}
+
+/// Says, once, that no output holds the layers of light groups.
+fn note_layers(args: &RenderArgs, job: &RenderJob, (outputs, asked): (&[PathBuf], Option<&[Aov]>), session: &Session) {
+    let is_wanted = asked.is_none_or(|list| list.contains(&Aov::LightGroups));
+    let is_kept = outputs.iter().any(|path| is_exr(path) || is_part(path)) || args.parts.checkpoint.is_some();
+    if light_layers::count(job) == 0 || !is_wanted || is_kept || args.quiet {
+        return;
+    }
+    if !session.has_noted_layers.swap(true, Ordering::Relaxed) {
+        progress::say("note: only EXR files have the layers of light groups: -o image.exr");
+    }
 }
 
 /// How to render for the AOVs that are asked for.
