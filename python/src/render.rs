@@ -14,6 +14,7 @@ use lumiris::render::plan::prepare;
 use lumiris::render::{Continuation, Progress, RenderSettings, Rendering, go_on};
 use lumiris::scene::{AccelKind, RenderJob};
 use lumiris_formats::diagnostic::Report;
+use lumiris_formats::source::Position;
 use pyo3::exceptions::{PyException, PyRuntimeError, PyValueError};
 use pyo3::prelude::*;
 use std::path::PathBuf;
@@ -339,12 +340,17 @@ fn exception(py: Python<'_>, request: &Request, failure: Failure) -> PyErr {
             let error = SceneError::new_err(report.to_string().trim_end().to_owned());
             let first = report.errors().next();
             let place = first.and_then(|entry| entry.location.as_ref());
+            // Binary files have neither
+            let text = place.and_then(|place| match place.position {
+                Position::Text { line, column } => Some((line, column)),
+                Position::Byte(_) => None,
+            });
             let value = error.value(py);
             let set = || {
                 value.setattr("message", first.map(|entry| entry.message.as_str()))?;
                 value.setattr("file", place.map_or_else(|| request.scene(), |place| place.name.clone()))?;
-                value.setattr("line", place.map(|place| place.line))?;
-                value.setattr("column", place.map(|place| place.column))
+                value.setattr("line", text.map(|(line, _)| line))?;
+                value.setattr("column", text.map(|(_, column)| column))
             };
             set().err().unwrap_or(error)
         }

@@ -178,6 +178,10 @@ pub struct Film {
 pub struct Summary {
     /// Least and greatest number of samples of a pixel.
     pub samples: [u64; 2],
+    /// Samples of all pixels together.
+    pub all_samples: u64,
+    /// Number of pixels, and of those that have samples.
+    pub pixels: [u64; 2],
     /// Least number of samples of a pixel that has any.
     pub least_samples: Option<u64>,
     /// Samples that count as black; see [`PixelSums::invalid`].
@@ -187,6 +191,28 @@ pub struct Summary {
     pub relative_noise: f64,
     /// True if there are records of an irradiance cache.
     pub has_records: bool,
+}
+
+impl Summary {
+    /// Mean number of samples of a pixel, and the least and the greatest one if pixels differ: "12 per pixel", or
+    /// "11.8 per pixel (4 to 65)". Those of `unit` "per pixel".
+    pub fn samples_text(&self, unit: &str) -> String {
+        mean_and_range(self.all_samples, self.pixels[0], self.samples, unit)
+    }
+
+    /// The same of the pixels that have any samples, which are all that a part of tiles has.
+    pub fn samples_text_of_sampled(&self, unit: &str) -> String {
+        let range = [self.least_samples.unwrap_or(0), self.samples[1]];
+        mean_and_range(self.all_samples, self.pixels[1], range, unit)
+    }
+}
+
+fn mean_and_range(sum: u64, count: u64, [least, most]: [u64; 2], unit: &str) -> String {
+    if least == most {
+        return format!("{least} {unit}");
+    }
+    let mean = format!("{:.1}", sum as f64 / count.max(1) as f64);
+    format!("{} {unit} ({least} to {most})", mean.trim_end_matches(".0"))
 }
 
 impl Film {
@@ -330,6 +356,8 @@ pub const BAND: u32 = 16;
 struct RowSummary {
     samples: [u64; 2],
     least_samples: Option<u64>,
+    all_samples: u64,
+    pixels: [u64; 2],
     invalid: u64,
     /// Σ of relative standard errors, and of how many pixels.
     noise: (f64, u64),
@@ -349,6 +377,8 @@ impl RowSummary {
         RowSummary {
             samples: [counts().min().unwrap_or(0), counts().max().unwrap_or(0)],
             least_samples: counts().filter(|n| *n > 0).min(),
+            all_samples: counts().sum(),
+            pixels: [pixels.len() as u64, counts().filter(|n| *n > 0).count() as u64],
             invalid: pixels.iter().map(|p| p.invalid).sum(),
             noise,
             has_records: pixels.iter().any(|p| p.records > 0),
@@ -363,6 +393,8 @@ impl RowSummary {
                 rows.iter().map(|row| row.samples[1]).max().unwrap_or(0),
             ],
             least_samples: rows.iter().filter_map(|row| row.least_samples).min(),
+            all_samples: rows.iter().map(|row| row.all_samples).sum(),
+            pixels: [0, 1].map(|i| rows.iter().map(|row| row.pixels[i]).sum()),
             invalid: rows.iter().map(|row| row.invalid).sum(),
             relative_noise: if noise.1 == 0 { f64::INFINITY } else { noise.0 / noise.1 as f64 },
             has_records: rows.iter().any(|row| row.has_records),

@@ -85,4 +85,6 @@ pub struct PartHeader {
     pub name: String,
     /// Names of its channels.
     pub channels: Vec<String>,
+    /// Width and height of its pixels.
+    pub size: [usize; 2],
 }

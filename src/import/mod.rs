@@ -19,7 +19,7 @@ use cache::FileCache;
 use fingerprint::SceneFiles;
 use lumiris_formats::diagnostic::{Diagnostics, Report};
 use lumiris_formats::pbrt::parser::{parse_file, parse_source};
-use lumiris_formats::source::{SourceMap, Span};
+use lumiris_formats::source::SourceMap;
 use pbrt::state::Builder;
 use std::path::{Path, PathBuf};
 
@@ -56,6 +56,11 @@ impl Loaded {
     }
 }
 
+/// True if the name is that of a glTF file.
+pub fn is_gltf(path: &Path) -> bool {
+    path.extension().is_some_and(|e| e.eq_ignore_ascii_case("gltf") || e.eq_ignore_ascii_case("glb"))
+}
+
 /// Loads a scene file. `Err` holds all errors and the warnings.
 pub fn load(path: &Path, options: &LoadOptions) -> Result<Loaded, Box<Report>> {
     load_with(path, options, &FileCache::default())
@@ -63,8 +68,7 @@ pub fn load(path: &Path, options: &LoadOptions) -> Result<Loaded, Box<Report>> {
 
 /// Loads a scene file; meshes and images that `files` has are not read again.
 pub fn load_with(path: &Path, options: &LoadOptions, files: &FileCache) -> Result<Loaded, Box<Report>> {
-    let is_gltf = |e: &std::ffi::OsStr| e.eq_ignore_ascii_case("gltf") || e.eq_ignore_ascii_case("glb");
-    if path.extension().is_some_and(is_gltf) {
+    if is_gltf(path) {
         return gltf::load(path, options, files);
     }
     let folder = path.parent().map(Path::to_path_buf).unwrap_or_default();
@@ -101,7 +105,7 @@ fn load_parsed(
     if options.environment.is_some() || options.camera_auto {
         let message =
             "environment and camera of a pbrt scene are in its file: --environment and --camera-auto are for glTF";
-        diagnostics.error(Span::default(), message);
+        diagnostics.error_without_place(message);
     }
     let scene_files = SceneFiles::new(&sources, builder.files());
     let finished = builder.finish(files, &mut diagnostics);

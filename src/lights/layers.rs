@@ -48,6 +48,7 @@ impl LightLayers {
 pub fn fault_of_name(name: &str) -> Option<String> {
     let is_allowed = |c: char| c.is_alphanumeric() || matches!(c, '_' | '-');
     match name.chars().find(|&c| !is_allowed(c)) {
+        _ if name == OTHERS => Some(format!("the light group `{OTHERS}` is that of lights that name none")),
         _ if name.is_empty() => Some("the name of a light group is empty".to_owned()),
         Some(c) => Some(format!("the name of a light group has letters, digits, `_` and `-`, and no `{c}`")),
         None => None,
@@ -70,7 +71,7 @@ mod tests {
     #[test]
     fn names_are_parts_of_names_of_channels() {
         assert_eq!(fault_of_name("Key_2-ü"), None);
-        for name in ["", "a.b", "a b", "a,b"] {
+        for name in ["", "a.b", "a b", "a,b", "other"] {
             assert!(fault_of_name(name).is_some(), "{name}");
         }
     }

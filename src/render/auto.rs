@@ -29,6 +29,7 @@ use super::auto_round::{Candidate, Difference, Round};
 use super::visibility_cache::build_visibility_cache;
 use super::worker::Worker;
 use super::{RenderSettings, Run, processor_time};
+use crate::film::PixelBounds;
 use crate::imaging::metrics::difference::DEFAULT_EPSILON;
 use crate::integrators::PathTracer;
 use crate::integrators::path::CameraSample;
@@ -117,7 +118,9 @@ pub(super) fn choose(job: &mut RenderJob) -> Option<AutoChoice> {
     if job.settings().integrator.estimator != EstimatorKind::Auto {
         return None;
     }
-    let choice = Pilot::new(job).map(|pilot| pilot.choose(job));
+    let chooses_lights = auto_lights::is_open(&job.lights, &job.settings().integrator);
+    let pilot = Pilot::new(job.settings(), &job.world.scene.film.bounds, chooses_lights);
+    let choice = pilot.map(|pilot| pilot.choose(job));
     let settings = choice.as_ref().map_or(without_pilot(&job.settings().integrator), |(_, settings)| *settings);
     job.change(|s| s.integrator = settings);
     choice.map(|(choice, _)| choice)
@@ -154,7 +157,7 @@ fn resampled(settings: &IntegratorSettings) -> IntegratorSettings {
 /// each camera sample costs anyway [Talbot 2005, §4.3]. `None` if the image is too small for a pilot. On the threads of the
 /// current pool.
 pub(super) fn proposals(job: &RenderJob) -> Option<(u32, StageTimes)> {
-    let pilot = Pilot::new(job)?;
+    let pilot = Pilot::new(job.settings(), &job.world.scene.film.bounds, false)?;
     let base = job.settings().integrator;
     let samples = base.sample_counts().samples;
     let with_ratio = |ratio: u32| {
@@ -171,6 +174,12 @@ pub(super) fn proposals(job: &RenderJob) -> Option<(u32, StageTimes)> {
     Some((samples * ratio, times))
 }
 
+/// True if the estimator is `auto` and its choice follows from a pilot's times. Numbers of the image and of the settings
+/// alone decide that, so it is the same on all machines.
+pub(super) fn is_measured(settings: &Settings, bounds: &PixelBounds) -> bool {
+    settings.integrator.estimator == EstimatorKind::Auto && Pilot::new(settings, bounds, false).is_some()
+}
+
 /// Where a round measures.
 struct Pilot {
     /// Pixels of the rounds; those of the third are blocks, and the fourth is the one before all others, which may have
@@ -183,9 +192,9 @@ struct Pilot {
 
 impl Pilot {
     /// `None` if the image is too small, or its integrator has no estimates at path vertices alone.
-    fn new(job: &RenderJob) -> Option<Self> {
-        let Settings { integrator, sampling } = job.settings();
-        let bounds = job.world.scene.film.bounds;
+    /// Where `chooses_lights`, it has a round for that, if there is time.
+    fn new(settings: &Settings, bounds: &PixelBounds, chooses_lights: bool) -> Option<Self> {
+        let Settings { integrator, sampling } = settings;
         let spp = 1 << sampling.spp.clamp(1, MAX_SPP).ilog2();
         let samples = bounds.area() as f64 * f64::from(sampling.spp);
         let trials = TRIALS[usize::from(integrator.depth() > 1)];
@@ -195,15 +204,15 @@ impl Pilot {
             wanted.max(most.min(ENOUGH_PIXELS)).min(MAX_PIXELS)
         };
         let with_lights = count(trials + LIGHT_TRIALS);
-        let has_lights = auto_lights::is_open(&job.lights, integrator) && with_lights >= MIN_PIXELS;
+        let has_lights = chooses_lights && with_lights >= MIN_PIXELS;
         let count = if has_lights { with_lights } else { count(trials) };
         let is_measurable = matches!(integrator.kind, IntegratorKind::Direct | IntegratorKind::Path);
         (is_measurable && count >= MIN_PIXELS).then(|| Pilot {
             pixels: [
-                pixels(&bounds, count, 0),
-                pixels(&bounds, count, 1),
-                blocks(&bounds, 3 * count),
-                if has_lights { pixels(&bounds, count, 3) } else { Vec::new() },
+                pixels(bounds, count, 0),
+                pixels(bounds, count, 1),
+                blocks(bounds, 3 * count),
+                if has_lights { pixels(bounds, count, 3) } else { Vec::new() },
             ],
             spp,
             seed: sampling.seed,

@@ -165,10 +165,10 @@ pub enum RenderError {
 
 /// Why threads could not start.
 #[derive(Debug, thiserror::Error)]
-#[error("cannot start {threads} threads: {source}")]
+#[error("cannot start {threads} threads: {cause}")]
 pub struct ThreadError {
     threads: usize,
-    source: rayon::ThreadPoolBuildError,
+    cause: rayon::ThreadPoolBuildError,
 }
 
 /// Renders. `stop` ends it after the tiles under way; `observe` is called from worker threads.
@@ -206,5 +206,5 @@ pub fn depends_on_earlier_samples(settings: &Settings) -> bool {
 pub fn thread_pool(threads: Option<usize>) -> Result<rayon::ThreadPool, ThreadError> {
     let threads = threads.unwrap_or_else(|| std::thread::available_parallelism().map_or(1, usize::from));
     let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build();
-    pool.map_err(|source| ThreadError { threads, source })
+    pool.map_err(|cause| ThreadError { threads, cause })
 }

@@ -224,10 +224,9 @@ fn ratio_values((map, max): (&SampleCountMap, f32), pixel: usize) -> [f32; 5] {
 
 /// How far a rendering came, as metadata entries.
 pub fn progress_metadata(rendering: &Rendering) -> Vec<(String, String)> {
-    let [least, most] = rendering.film.summary().samples;
     let entries = [
         ("complete", rendering.complete.to_string()),
-        ("samples_done", format!("{least} to {most} per pixel")),
+        ("samples_done", rendering.film.summary().samples_text("per pixel")),
         ("seconds", format!("{:.3}", rendering.elapsed.as_secs_f64())),
     ];
     entries.map(|(key, value)| (format!("lumiris:{key}"), value)).to_vec()

@@ -94,11 +94,11 @@ pub fn prepare(job: &mut RenderJob, threads: Option<usize>, ratio_map: bool) -> 
     Ok(Plan { auto, ris, chosen: chosen(&before, job.settings()), warnings })
 }
 
-/// True if [`prepare`] makes choices that follow from measured times.
-pub fn follows_from_times(settings: &Settings) -> bool {
+/// True if [`prepare`] makes choices that follow from measured times, for an image with these pixels.
+pub fn follows_from_times(settings: &Settings, bounds: &PixelBounds) -> bool {
     let i = &settings.integrator;
     let is_open = !matches!(i.ris.proposals, Proposals::Fixed(_)) && i.ris.stage_times.is_none();
-    i.estimator == EstimatorKind::Auto || i.estimator == EstimatorKind::Ris && is_open
+    auto::is_measured(settings, bounds) || i.estimator == EstimatorKind::Ris && is_open
 }
 
 /// The settings that differ, either as they are set or by what is recorded of them: where something was open and the choice is

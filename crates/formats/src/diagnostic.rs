@@ -3,7 +3,7 @@
 //! A run collects [`Diagnostic`]s in [`Diagnostics`]; at the end they become a [`Report`], which holds the formatted
 //! text and no longer needs the sources. Files that cannot be opened are gathered into one error.
 
-use super::source::{Location, SourceMap, Span};
+use super::source::{Location, Position, SourceMap, Span};
 use codespan_reporting::diagnostic as codespan;
 use codespan_reporting::files::{Error as FilesError, Files};
 use codespan_reporting::term;
@@ -106,6 +106,11 @@ impl Diagnostics {
     /// Adds an error at `span`.
     pub fn error(&mut self, span: Span, message: impl Into<String>) -> &mut Diagnostic {
         self.push(Severity::Error, Some(span), message.into())
+    }
+
+    /// Adds an error that has no place in a file, such as that of an option.
+    pub fn error_without_place(&mut self, message: impl Into<String>) -> &mut Diagnostic {
+        self.push(Severity::Error, None, message.into())
     }
 
     /// Adds a warning at `span`.
@@ -275,7 +280,9 @@ impl std::error::Error for Report {}
 
 fn entry(diagnostic: &Diagnostic, sources: &SourceMap) -> Entry {
     let mut excerpts = Excerpts::default();
-    let labels = diagnostic.labels.iter().enumerate().map(|(i, label)| {
+    // Bytes of a binary file mean nothing to a reader, and something else to a terminal
+    let (binary, text): (Vec<_>, Vec<_>) = diagnostic.labels.iter().partition(|l| sources.is_binary(l.span.file));
+    let labels = text.into_iter().enumerate().map(|(i, label)| {
         let style = if i == 0 { codespan::LabelStyle::Primary } else { codespan::LabelStyle::Secondary };
         let (id, range) = excerpts.add(sources, label.span);
         codespan::Label::new(style, id, range).with_message(&label.message)
@@ -286,6 +293,7 @@ fn entry(diagnostic: &Diagnostic, sources: &SourceMap) -> Entry {
         Severity::Warning => codespan::Severity::Warning,
     };
     let mut text = codespan::Diagnostic::new(severity).with_message(&diagnostic.message).with_labels(labels);
+    text = text.with_notes(binary.into_iter().map(|label| remark_on_binary(label, sources)).collect());
     if let Some(help) = &diagnostic.help {
         text = text.with_notes(vec![format!("help: {}", help.replace('\n', "\n      "))]);
     }
@@ -297,6 +305,12 @@ fn entry(diagnostic: &Diagnostic, sources: &SourceMap) -> Entry {
     rendered.push('\n');
     let location = diagnostic.labels.first().map(|l| sources.locate(l.span));
     Entry { severity: diagnostic.severity, message: diagnostic.message.clone(), location, rendered }
+}
+
+/// A remark on a place in a binary file.
+fn remark_on_binary(label: &Label, sources: &SourceMap) -> String {
+    let separator = if label.message.is_empty() { "" } else { ": " };
+    format!("in {}{separator}{}", sources.locate(label.span), label.message)
 }
 
 /// Characters of a source line that are shown on each side of the marked place.
@@ -335,7 +349,10 @@ impl Excerpts {
         }
         let location = sources.locate(Span { start: from as u32, ..span });
         let text = before + &marked + &clean(&bytes[end.min(to)..to]);
-        let (line, first_column) = (location.line, location.column);
+        let (line, first_column) = match location.position {
+            Position::Text { line, column } => (line, column),
+            Position::Byte(byte) => (1, byte),
+        };
         self.0.push(Excerpt { name: location.name, text, line, first_column, key });
         (self.0.len() - 1, range)
     }
@@ -393,6 +410,19 @@ pub fn did_you_mean<'a>(word: &str, known: impl IntoIterator<Item = &'a str>) ->
     (near(&best) <= 1 + word.chars().count().min(best.chars().count()) / 4).then_some(best)
 }
 
+/// The known parameter that `name` was meant for: the one that differs by a slip of the pen, else the first whose last
+/// word, such as `roughness` of `specular_roughness`, is that of `name`, else one that is still near.
+pub fn similar_parameter<'a>(name: &str, known: impl Iterator<Item = &'a str> + Clone) -> Option<&'a str> {
+    /// Letters of the shortest word that says something.
+    const SHORTEST: usize = 3;
+    let last_word = |name: &str| name.rsplit(['_', '.', '-']).next().unwrap_or_default().to_lowercase();
+    let is_slip = |candidate: &&str| edit_distance(&name.to_lowercase(), &candidate.to_lowercase()) <= 2;
+    let near = did_you_mean(name, known.clone());
+    let word = last_word(name);
+    let mut alike = known.filter(|candidate| word.len() >= SHORTEST && last_word(candidate) == word);
+    near.filter(is_slip).or_else(|| alike.next()).or(near)
+}
+
 /// Insertions, deletions, replacements and swaps of neighbours from `a` to `b` [Damerau 1964].
 fn edit_distance(a: &str, b: &str) -> usize {
     let (a, b): (Vec<char>, Vec<char>) = (a.chars().take(64).collect(), b.chars().take(64).collect());
@@ -447,6 +477,20 @@ mod tests {
     }
 
     #[test]
+    fn binary_files_are_named_by_their_bytes_and_not_shown() {
+        let mut sources = SourceMap::new();
+        let file = sources.add_text("a.glb", b"glTF\x02\0\0\0\x1b[2J\xff".to_vec());
+        let mut diagnostics = Diagnostics::new();
+        diagnostics.error(Span { file, start: 8, end: 9 }, "too short").remark("the length").help("copy it again");
+        diagnostics.error_without_place("--environment: no light");
+        diagnostics.missing_file("sky.hdr", "no such file", Some(Span { file, start: 4, end: 5 }));
+        let text = diagnostics.finish(&sources).to_string();
+        assert!(text.contains("in a.glb, byte 8: the length") && text.contains("help: copy it again"), "{text}");
+        assert!(text.contains("sky.hdr: no such file, asked for at a.glb, byte 4"), "{text}");
+        assert!(!text.contains("glTF") && !text.contains("[2J") && !text.contains("-->"), "{text}");
+    }
+
+    #[test]
     fn repeated_warnings_are_counted_and_missing_files_are_one_error() {
         let mut sources = SourceMap::new();
         let file = sources.add_text("a", vec![b' '; 100]);
@@ -483,5 +527,15 @@ mod tests {
         assert_eq!(did_you_mean("xresolutoin", ["yresolution", "xresolution"]), Some("xresolution"));
         assert_eq!(did_you_mean("rufness", ["radius", "eta"]), None);
         assert_eq!(did_you_mean("Fov", ["fov"]), Some("fov"));
+        let known = ["base_color", "specular_roughness", "specular_weight", "coat_roughness", "interface.eta"];
+        let similar = |name| similar_parameter(name, known.into_iter());
+        assert_eq!(
+            similar("base_roughness"),
+            Some("specular_roughness"),
+            "though coat_roughness has more letters alike"
+        );
+        assert_eq!(similar("coat_rufness"), Some("coat_roughness"));
+        assert_eq!((similar("roughness"), similar("eta")), (Some("specular_roughness"), Some("interface.eta")));
+        assert_eq!(similar("metallic"), None);
     }
 }

@@ -29,20 +29,35 @@ impl Span {
     }
 }
 
-/// A position as shown to users; lines and columns count from 1.
+/// A position as shown to users.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Location {
     /// Name of the file.
     pub name: String,
-    /// Line.
-    pub line: usize,
-    /// Column, in characters.
-    pub column: usize,
+    /// Where in the file.
+    pub position: Position,
+}
+
+/// A position in a file.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Position {
+    /// In text; both count from 1.
+    Text {
+        /// Line.
+        line: usize,
+        /// Column, in characters.
+        column: usize,
+    },
+    /// In a binary file, from 0.
+    Byte(usize),
 }
 
 impl fmt::Display for Location {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        write!(f, "{}:{}:{}", self.name, self.line, self.column)
+        match self.position {
+            Position::Text { line, column } => write!(f, "{}:{line}:{column}", self.name),
+            Position::Byte(byte) => write!(f, "{}, byte {byte}", self.name),
+        }
     }
 }
 
@@ -57,6 +72,9 @@ struct SourceFile {
 pub struct SourceMap {
     files: Vec<SourceFile>,
 }
+
+/// Bytes at the beginning of a file that tell whether it is text.
+const HEAD: usize = 1024;
 
 /// Largest text that is read (bytes, after decompression): spans count in 32 bits.
 const MAX_BYTES: u64 = u32::MAX as u64 - 1;
@@ -99,14 +117,24 @@ impl SourceMap {
         self.files.get(file as usize).map_or("?", |f| &f.name)
     }
 
+    /// True for a file that is no text, since it begins with control characters, or is a binary container of glTF.
+    pub fn is_binary(&self, file: FileId) -> bool {
+        let bytes = self.bytes(file);
+        let is_control = |b: &u8| *b < b' ' && !b.is_ascii_whitespace();
+        bytes.starts_with(b"glTF") || bytes[..bytes.len().min(HEAD)].iter().any(is_control)
+    }
+
     /// Where a span starts.
     pub fn locate(&self, span: Span) -> Location {
-        let bytes = self.bytes(span.file);
+        let (name, bytes) = (self.name(span.file).to_owned(), self.bytes(span.file));
+        if self.is_binary(span.file) {
+            return Location { name, position: Position::Byte(span.start as usize) };
+        }
         let before = &bytes[..(span.start as usize).min(bytes.len())];
         let line_start = before.iter().rposition(|&b| b == b'\n').map_or(0, |i| i + 1);
         let line = 1 + before.iter().filter(|&&b| b == b'\n').count();
         let column = 1 + String::from_utf8_lossy(&before[line_start..]).chars().count();
-        Location { name: self.name(span.file).to_owned(), line, column }
+        Location { name, position: Position::Text { line, column } }
     }
 }
 
@@ -145,7 +173,7 @@ mod tests {
         let file = sources.read(&path).unwrap();
         assert_eq!(sources.bytes(file), b"WorldBegin\n# \xc3\xa4 b");
         let place = sources.locate(Span { file, start: 16, end: 17 });
-        assert_eq!((place.line, place.column), (2, 5));
+        assert_eq!(place.position, Position::Text { line: 2, column: 5 });
         std::fs::write(&path, [0x1f, 0x8b, 8, 0, 1, 2]).unwrap();
         assert!(sources.read(&path).is_err());
     }

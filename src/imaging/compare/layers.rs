@@ -127,7 +127,8 @@ mod tests {
     use super::*;
 
     fn part(name: &str, channels: &[&str]) -> PartHeader {
-        PartHeader { name: name.to_owned(), channels: channels.iter().map(|&c| c.to_owned()).collect() }
+        let channels = channels.iter().map(|&c| c.to_owned()).collect();
+        PartHeader { name: name.to_owned(), channels, size: [1, 1] }
     }
 
     #[test]

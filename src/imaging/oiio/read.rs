@@ -196,7 +196,8 @@ pub fn read_headers(path: &Path) -> Result<Vec<PartHeader>, ImageError> {
         let spec = input.spec().map_err(failed)?;
         let channels = input.channels(spec.nchannels).map_err(failed)?;
         let name = input.metadata(spec.attributes).remove("oiio:subimagename").unwrap_or_default();
-        headers.push(PartHeader { name, channels });
+        let size = [spec.width, spec.height].map(|n| usize::try_from(n).unwrap_or(0));
+        headers.push(PartHeader { name, channels, size });
     }
     Ok(headers)
 }

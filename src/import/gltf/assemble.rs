@@ -8,6 +8,7 @@ use super::textures::EmissionSource;
 use super::view::camera;
 use super::{LUMENS_PER_WATT, Messages};
 use crate::geometry::{Geometry, GeometryId, GeometrySet, Group, Instance, Shape, TriangleMesh, Visibility};
+use crate::imaging::oiio::ImageError;
 use crate::import::LoadOptions;
 use crate::import::cache::FileCache;
 use crate::import::resources::report;
@@ -61,8 +62,15 @@ impl<'a> Assembly<'a> {
         self.materials.read(messages)?;
         others.extend(self.materials.textures.files());
         others.extend(self.options.environment.clone());
+        if !self.document.unread.is_empty() {
+            // Nothing can be built, but what else is missing is said at once
+            self.check_images(files, messages);
+            return Ok(None);
+        }
         let nodes = nodes(self.document)?;
-        self.add_meshes(&nodes, files, messages)?;
+        if let Err(error) = self.add_meshes(&nodes, files, messages) {
+            messages.error(&error);
+        }
         nodes.iter().for_each(|node| self.add_light(node));
         let bounds = self.set.world_bounds();
         if self.set.geometries.is_empty() {
@@ -98,6 +106,17 @@ impl<'a> Assembly<'a> {
             surfaces: self.surfaces,
             media: MediumSet::default(),
         }))
+    }
+
+    /// Reads all images, for their errors.
+    fn check_images(&self, files: &FileCache, messages: &mut Messages<'_>) {
+        for look in self.materials.looks.iter().filter(|look| !look.emission.is_black()) {
+            look.emission_image.as_ref().map(|source| emission_image(source, files, messages));
+        }
+        if let Some(path) = &self.options.environment {
+            environment(path, files, messages);
+        }
+        self.materials.textures.resources.load(files, messages.diagnostics);
     }
 
     /// Adds all meshes, each once for every pose.
@@ -217,7 +236,7 @@ fn emission_image(
     messages: &mut Messages<'_>,
 ) -> Option<Arc<EmissionImage>> {
     let image =
-        files.rgb(&source.path).map_err(|error| report(&error, &source.path, messages.span, messages.diagnostics));
+        files.rgb(&source.path).map_err(|error| report(&error, &source.path, source.span, messages.diagnostics));
     let (texels, [width, height]) = Arc::unwrap_or_clone(image.ok()?);
     let image = EmissionImage::new(width, height, texels).ok()?;
     Some(Arc::new(image.placed(source.wrap, source.mapping)))
@@ -226,8 +245,14 @@ fn emission_image(
 /// An environment by an image, whose z becomes the y of the scene. Its middle is in direction +x, and it is seen as it
 /// is stored: maps of pbrt have their columns counter-clockwise about z, so they are mirrored.
 fn environment(path: &Path, files: &FileCache, messages: &mut Messages<'_>) -> Option<Light> {
-    let image = files.rgb(path).map_err(|error| report(&error, path, messages.span, messages.diagnostics)).ok()?;
-    let (texels, size) = Arc::unwrap_or_clone(image);
+    let d = &mut *messages.diagnostics;
+    let failed = |error: ImageError| match error {
+        ImageError::NotFound { .. } => d.missing_file(path, "no such file, asked for by --environment", None),
+        other => {
+            d.error_without_place(format!("--environment: {other}"));
+        }
+    };
+    let (texels, size) = Arc::unwrap_or_clone(files.rgb(path).map_err(failed).ok()?);
     let mapping = if size[0] == size[1] { EnvironmentMapping::EqualArea } else { EnvironmentMapping::LatLong };
     match EnvironmentMap::new(texels, size, mapping, EnvironmentFilter::Nearest) {
         Ok(map) => {
@@ -235,7 +260,7 @@ fn environment(path: &Path, files: &FileCache, messages: &mut Messages<'_>) -> O
             Some(Light::infinite_image(Arc::new(map), &world_from_map, 1.0))
         }
         Err(reason) => {
-            messages.diagnostics.error(messages.span, format!("{}: {reason}", path.display()));
+            messages.diagnostics.error_without_place(format!("--environment: {}: {reason}", path.display()));
             None
         }
     }

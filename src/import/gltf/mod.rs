@@ -17,7 +17,8 @@ use super::{LoadOptions, Loaded};
 use crate::settings::Settings;
 use assemble::Assembly;
 use lumiris_formats::diagnostic::{Diagnostics, Report};
-use lumiris_formats::gltf::{Document, GltfError, Place, locate};
+use lumiris_formats::gltf::document::Unread;
+use lumiris_formats::gltf::{Document, GltfError, Place, locate, locate_members};
 use lumiris_formats::source::{FileId, SourceMap, Span};
 use std::collections::BTreeSet;
 use std::ops::Range;
@@ -53,8 +54,8 @@ struct Messages<'d> {
     diagnostics: &'d mut Diagnostics,
     file: FileId,
     bytes: &'d [u8],
-    /// The beginning of the file.
-    span: Span,
+    /// Where images are named, once that is asked for.
+    images: Option<Vec<Span>>,
     warned: BTreeSet<String>,
 }
 
@@ -64,8 +65,30 @@ impl Messages<'_> {
         Span { file: self.file, start: start as u32, end: end as u32 }
     }
 
+    /// Where an image is named.
+    fn image_span(&mut self, index: usize) -> Span {
+        let (file, bytes) = (self.file, self.bytes);
+        let span = |Range { start, end }| Span { file, start: start as u32, end: end as u32 };
+        let all = || locate_members(bytes, "images", "uri").into_iter().map(span).collect();
+        let images: &mut Vec<Span> = self.images.get_or_insert_with(all);
+        images.get(index).copied().unwrap_or(Span { file, start: 0, end: 0 })
+    }
+
     fn error(&mut self, error: &GltfError) {
         self.diagnostics.error(self.span_of(&error.place), error.to_string());
+    }
+
+    /// Buffers that could not be read: missing files are one error with those of images.
+    fn unread(&mut self, buffers: &[Unread]) {
+        for buffer in buffers {
+            match buffer {
+                Unread::File { place, path, reason } => {
+                    let span = self.span_of(place);
+                    self.diagnostics.missing_file(path, reason, Some(span));
+                }
+                Unread::Content(error) => self.error(error),
+            }
+        }
     }
 
     /// A warning, given for the first place only.
@@ -85,8 +108,8 @@ pub fn load(path: &Path, options: &LoadOptions, files: &FileCache) -> Result<Loa
         return Err(Box::new(diagnostics.finish(&sources)));
     };
     let bytes = sources.shared_bytes(file);
-    let span = Span { file, start: 0, end: 0 };
-    let mut messages = Messages { diagnostics: &mut diagnostics, file, bytes: &bytes, span, warned: BTreeSet::new() };
+    let mut messages =
+        Messages { diagnostics: &mut diagnostics, file, bytes: &bytes, images: None, warned: BTreeSet::new() };
     let folder = path.parent().unwrap_or(Path::new(""));
     let mut others = Vec::new();
     let scene = match Document::parse(&bytes, folder, KNOWN) {
@@ -97,6 +120,7 @@ pub fn load(path: &Path, options: &LoadOptions, files: &FileCache) -> Result<Loa
                 }
             }
             others.clone_from(&document.files);
+            messages.unread(&document.unread);
             Assembly::new(&document, options).and_then(|assembly| assembly.scene(files, &mut others, &mut messages))
         }
         Err(errors) => {

@@ -11,6 +11,7 @@ use crate::textures::{
 use glam::{Affine2, Mat2};
 use lumiris_formats::gltf::document::Content;
 use lumiris_formats::gltf::{Document, GltfError, Place};
+use lumiris_formats::source::Span;
 use lumiris_numbers::math::{Rgb, Vec2};
 use std::path::{Path, PathBuf};
 
@@ -18,6 +19,8 @@ use std::path::{Path, PathBuf};
 #[derive(Clone, Debug)]
 pub(super) struct EmissionSource {
     pub path: PathBuf,
+    /// Where the file names it.
+    pub span: Span,
     pub wrap: [AxisWrap; 2],
     pub mapping: Option<EmissionMapping>,
 }
@@ -83,8 +86,8 @@ impl<'a> Textures<'a> {
         })
     }
 
-    /// The file of a texture; an image of the document becomes one.
-    fn file(&self, place: &Place<'a>, messages: &mut Messages<'_>) -> Result<Option<PathBuf>, GltfError> {
+    /// The file of a texture, and where it is named; an image of the document becomes one.
+    fn file(&self, place: &Place<'a>, messages: &mut Messages<'_>) -> Result<Option<(PathBuf, Span)>, GltfError> {
         let Some(index) = place.key("index").index() else { return Ok(None) };
         let texture = self.document.root().key("textures").item(index);
         let Some(source) = texture.key("source").index() else {
@@ -93,15 +96,16 @@ impl<'a> Textures<'a> {
         };
         let image = self.document.root().key("images").item(source);
         let bytes = match self.document.content(&image)? {
-            Content::File(path) => return Ok(Some(path)),
+            Content::File(path) => return Ok(Some((path, messages.image_span(source)))),
             Content::Bytes(bytes) => bytes,
+            Content::Unread => return Ok(None),
         };
         let extension = if bytes.starts_with(&[0xff, 0xd8]) { "jpg" } else { "png" };
         let path = self.folder.path().join(format!("image{source}.{extension}"));
         if !path.exists() {
             std::fs::write(&path, bytes).map_err(|e| image.error(e.to_string()))?;
         }
-        Ok(Some(path))
+        Ok(Some((path, messages.image_span(source))))
     }
 
     /// How an image goes on beyond its edges, along its rows and columns, and how it is filtered.
@@ -125,11 +129,11 @@ impl<'a> Textures<'a> {
         place: &Place<'a>,
         messages: &mut Messages<'_>,
     ) -> Result<Option<EmissionSource>, GltfError> {
-        let Some(path) = self.file(place, messages)? else { return Ok(None) };
+        let Some((path, span)) = self.file(place, messages)? else { return Ok(None) };
         let (second, image_from_uv) = mapping(place);
         let is_plain = !second && image_from_uv == Affine2::IDENTITY;
         let mapping = (!is_plain).then_some(EmissionMapping { second, image_from_uv });
-        Ok(Some(EmissionSource { path, wrap: self.sampler(place).0, mapping }))
+        Ok(Some(EmissionSource { path, span, wrap: self.sampler(place).0, mapping }))
     }
 
     pub(super) fn image(
@@ -139,14 +143,14 @@ impl<'a> Textures<'a> {
         encoding: ImageEncoding,
         messages: &mut Messages<'_>,
     ) -> Result<Option<ImageTexture>, GltfError> {
-        let Some(path) = self.file(place, messages)? else { return Ok(None) };
+        let Some((path, span)) = self.file(place, messages)? else { return Ok(None) };
         let (wrap, filter) = self.sampler(place);
         let wrap = match wrap {
             [AxisWrap::Repeat, AxisWrap::Repeat] => Wrap::Repeat,
             [AxisWrap::Clamp, AxisWrap::Clamp] => Wrap::Clamp,
             mixed => Wrap::Axes(mixed),
         };
-        let image = self.resources.image(ImageRequest { path, channels, encoding, wrap, filter }, messages.span);
+        let image = self.resources.image(ImageRequest { path, channels, encoding, wrap, filter }, span);
         let (second, st_from_uv) = mapping(place);
         let mapping = Mapping2d::Affine { second, matrix: st_from_uv.matrix2, offset: st_from_uv.translation };
         Ok(Some(ImageTexture { image, mapping, scale: 1.0, invert: false }))

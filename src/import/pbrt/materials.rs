@@ -294,6 +294,10 @@ impl Builder<'_> {
                 return 1.5;
             }
             Some(ParamType::Float) => p.float(name, d),
+            Some(ParamType::Texture | ParamType::String | ParamType::Integer | ParamType::Bool) => {
+                p.get(name, &[ParamType::Float, ParamType::Spectrum], d);
+                None
+            }
             Some(_) => {
                 let span = p.span_of(name);
                 let resolved = p.spectrum(name, d).and_then(|v| self.resolve_spectrum(v, span, d));

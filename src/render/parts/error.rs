@@ -7,12 +7,12 @@ use std::path::{Path, PathBuf};
 #[derive(Debug, thiserror::Error)]
 pub enum PartError {
     /// A file cannot be read or written.
-    #[error("{}: {source}", path.display())]
+    #[error("{}: {cause}", path.display())]
     Io {
         /// The file.
         path: PathBuf,
-        /// Why.
-        source: io::Error,
+        /// Why. No source of the error, whose text has it already.
+        cause: io::Error,
     },
     /// A file is something else, or of another version.
     #[error("{}: {reason}", path.display())]
@@ -39,8 +39,8 @@ pub enum PartError {
 }
 
 impl PartError {
-    pub(super) fn io(path: &Path, source: io::Error) -> Self {
-        PartError::Io { path: path.to_owned(), source }
+    pub(super) fn io(path: &Path, cause: io::Error) -> Self {
+        PartError::Io { path: path.to_owned(), cause }
     }
 
     pub(super) fn foreign(path: &Path, reason: &str) -> Self {

@@ -1,8 +1,10 @@
-//! What may import what: crates, the renderer's modules by layer, and no circles inside a folder.
+//! What may import what: crates, the renderer's modules by layer, and no circles inside a folder. And no file has
+//! marks of a merge that was left half done ([`conflicts`]).
 //!
 //! [`imports`] reads the sources. A folder's `mod.rs` is its interface: it declares and re-exports the files of the
 //! folder, and they use what it defines; that alone is no circle.
 
+mod conflicts;
 mod imports;
 
 use imports::{Crate, Import};

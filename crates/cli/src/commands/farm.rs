@@ -15,6 +15,7 @@ use super::settings::load_scene;
 use super::typed_options::AsTyped;
 use anyhow::{Context, bail};
 use clap::{Args, FromArgMatches, Subcommand};
+use lumiris::import::Loaded;
 use lumiris::import::cache::FileCache;
 use lumiris::render::output::Aov;
 use lumiris::render::plan::follows_from_times;
@@ -107,16 +108,17 @@ fn check(args: &SlurmArgs) -> anyhow::Result<bool> {
     let mut render = RenderArgs::from_arg_matches(&matches).map_err(|e| UsageError(e.to_string()))?;
     render.scene.plan.clone_from(&args.scene.args.plan);
 
-    let settings = load_scene(&render.scene, &FileCache::default(), None)?.settings;
-    let needs_plan = follows_from_times(&settings) && render.scene.plan.is_none();
+    let Loaded { scene, settings, .. } = load_scene(&render.scene, &FileCache::default(), None)?;
+    let is_measured = follows_from_times(&settings, &scene.film.bounds);
+    let needs_plan = is_measured && render.scene.plan.is_none();
     parts::check_division(&render, &settings)?;
     if !needs_plan {
-        parts::check_settings(&render, &settings)?;
+        parts::check_settings(&render, &settings, &scene.film.bounds)?;
     }
     // With other estimators and allocations, what a pilot finds decides how many samples there are
     let is_uniform = match settings.sampling.allocation {
         Allocation::Uniform => true,
-        Allocation::Auto => settings.integrator.estimator != EstimatorKind::Auto,
+        Allocation::Auto => settings.integrator.estimator != EstimatorKind::Auto || !is_measured,
         Allocation::Adaptive => false,
     };
     let (spp, count) = (settings.sampling.spp, args.count);

@@ -105,7 +105,8 @@ fn row(frame: &Frame) -> String {
     let Frame { number, outcome, files } = frame;
     let rendered = |rendered: &Rendered, note: &str| {
         let files = format!("{}, {}", files.read, files.shared);
-        format!("{number:>8}{:>10.1}{:>7.2} %  {files:<18}{note}", rendered.seconds, rendered.noise * 100.0)
+        let noise = progress::percent(rendered.noise);
+        format!("{number:>8}{:>10.1}{noise:>9}  {files:<18}{note}", rendered.seconds)
     };
     let other = |text: &str| format!("{number:>8}  {text}");
     match outcome {

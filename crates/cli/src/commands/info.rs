@@ -1,6 +1,7 @@
-//! `lumiris info`
+//! `lumiris info`: of scenes, and of images and parts ([`super::info_file`]).
 
 use super::args::SceneArgs;
+use super::info_file::facts_of_file;
 use super::memory::taken;
 use super::progress;
 use super::settings::load_job;
@@ -26,15 +27,21 @@ pub(super) struct InfoArgs {
 }
 
 pub(super) fn run(args: &InfoArgs) -> anyhow::Result<ExitCode> {
-    let (job, times) = load_job(&args.scene)?;
-    let mut facts = facts(&job);
-    facts["seconds"] = json!({ "load": times.load, "build": times.build });
-    facts["scene"] = json!(args.scene.scene.display().to_string());
+    let facts = match facts_of_file(&args.scene.scene)? {
+        Some(facts) => facts,
+        None => {
+            let (job, times) = load_job(&args.scene)?;
+            let mut facts = facts(&job);
+            facts["seconds"] = json!({ "load": times.load, "build": times.build });
+            facts["scene"] = json!(args.scene.scene.display().to_string());
+            facts
+        }
+    };
     if args.json {
         progress::print(&serde_json::to_string_pretty(&facts)?);
     } else {
         let mut text = String::new();
-        list(&facts, 0, &mut text);
+        list(&facts, (0, false), &mut text);
         progress::print(text.trim_end());
     }
     Ok(ExitCode::SUCCESS)
@@ -119,15 +126,19 @@ fn geometry_bytes(scene: &Scene) -> u64 {
     bytes.sum::<usize>() as u64
 }
 
-/// Writes a JSON object as an indented list.
-fn list(value: &Value, indent: usize, out: &mut String) {
+/// Names of objects whose names are those of a file, and are shown as they are.
+const VERBATIM: [&str; 2] = ["layers", "metadata"];
+
+/// Writes a JSON object as an indented list, its names as words unless they are verbatim.
+fn list(value: &Value, (indent, is_verbatim): (usize, bool), out: &mut String) {
     let Value::Object(map) = value else { return };
     for (key, value) in map {
-        let name = format!("{:indent$}{}", "", key.replace('_', " "));
+        let words = if is_verbatim { key.clone() } else { key.replace('_', " ") };
+        let name = format!("{:indent$}{words}", "");
         match value {
             Value::Object(_) => {
                 *out += &format!("{name}\n");
-                list(value, indent + 2, out);
+                list(value, (indent + 2, VERBATIM.contains(&key.as_str())), out);
             }
             Value::String(text) => *out += &format!("{name:<34}{text}\n"),
             other => *out += &format!("{name:<34}{other}\n"),

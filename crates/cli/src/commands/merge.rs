@@ -68,8 +68,9 @@ pub(super) fn run(args: &MergeArgs) -> anyhow::Result<ExitCode> {
     }
     if !args.quiet {
         let names: Vec<String> = paths.iter().map(|path| path.display().to_string()).collect();
-        let noise = summary.relative_noise * 100.0;
-        progress::say(&format!("{} from {} parts, noise {noise:.2} %", names.join(", "), args.parts.len()));
+        let noise = progress::percent(summary.relative_noise);
+        let parts = if args.parts.len() == 1 { "1 part".to_owned() } else { format!("{} parts", args.parts.len()) };
+        progress::say(&format!("{} from {parts}, noise {noise}", names.join(", ")));
     }
     if !misplaced.is_empty() {
         bail!(misplaced.join("\nlumiris: "));
@@ -115,8 +116,7 @@ fn metadata(merged: &Merged, seconds: f64) -> Vec<(String, String)> {
         add("plan", plan.to_owned());
     }
     add("complete", merged.missing.is_empty().to_string());
-    let [min, max] = merged.film.summary().samples;
-    add("samples_done", format!("{min} to {max} per pixel"));
+    add("samples_done", merged.film.summary().samples_text("per pixel"));
     add("seconds", format!("{seconds:.3}"));
     if !merged.missing.is_empty() {
         add("missing", merged.missing.join("; "));

@@ -17,6 +17,7 @@ mod frame_list;
 mod frames;
 mod generate;
 mod info;
+mod info_file;
 mod look;
 mod memory;
 mod merge;
@@ -67,7 +68,7 @@ enum Command {
     /// Measure the stages of the renderer
     #[command(allow_missing_positional = true)]
     Bench(bench::BenchArgs),
-    /// List the contents, memory and unsupported features of a scene
+    /// List the contents, memory and unsupported features of a scene, or the layers and settings of an image or a part
     Info(info::InfoArgs),
     /// Reproduce the figures of a paper by rendering and measuring, as an HTML page
     Reproduce(reproduce::ReproduceArgs),

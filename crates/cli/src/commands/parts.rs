@@ -8,13 +8,14 @@ use super::plan_file::PlanFile;
 use super::progress;
 use super::stored::{AOV_NOTE, PLAN_NOTE, SCENE_NOTE, SECONDS_NOTE, Stored};
 use anyhow::{Context, bail};
+use lumiris::film::PixelBounds;
 use lumiris::import::fingerprint::SceneFiles;
 use lumiris::render::output::{self, Aov};
 use lumiris::render::parts::{Checkpoints, FilmHeader, StoredTile, write_film};
 use lumiris::render::plan::follows_from_times;
 use lumiris::render::{Continuation, RenderSettings, Rendering, TileShare, depends_on_earlier_samples};
 use lumiris::scene::RenderJob;
-use lumiris::settings::Settings;
+use lumiris::settings::{EstimatorKind, Settings};
 use std::path::Path;
 use std::time::Duration;
 
@@ -67,17 +68,21 @@ pub(super) fn check_division(args: &RenderArgs, settings: &Settings) -> anyhow::
 }
 
 /// Rejects settings by which an image cannot be rendered in parts. Before a plan is made.
-pub(super) fn check_settings(args: &RenderArgs, settings: &Settings) -> anyhow::Result<()> {
+pub(super) fn check_settings(args: &RenderArgs, settings: &Settings, bounds: &PixelBounds) -> anyhow::Result<()> {
     let usage = |text: String| Err(UsageError(text).into());
     if !args.parts.is_partial() {
         return Ok(());
     }
     check_division(args, settings)?;
-    if follows_from_times(settings) {
+    if follows_from_times(settings, bounds) {
         let scene = args.scene.scene.display();
+        let instead = match settings.integrator.estimator {
+            EstimatorKind::Ris => "give a number of --proposals",
+            _ => "name an estimator, such as `--estimator mis`",
+        };
         return usage(format!(
             "what these settings leave open follows from measured times, and must be the same for all parts: make one plan \
-             with `lumiris plan {scene} … -o plan.json`, and render all parts with `--plan plan.json`"
+             with `lumiris plan {scene} … -o plan.json`, and render all parts with `--plan plan.json`; or {instead}"
         ));
     }
     Ok(())

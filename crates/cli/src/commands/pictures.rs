@@ -51,6 +51,13 @@ pub(super) fn is_exr(path: &Path) -> bool {
     extension(path) == "exr"
 }
 
+/// True for the names of images that scenes cannot have.
+pub(super) fn is_picture(path: &Path) -> bool {
+    const OTHERS: [&str; 5] = ["hdr", "pfm", "webp", "bmp", "gif"];
+    let extension = extension(path);
+    is_exr(path) || DISPLAY_TYPES.contains(&extension.as_str()) || OTHERS.contains(&extension.as_str())
+}
+
 /// Rejects outputs that cannot be written, before time is spent on rendering.
 pub(super) fn check_outputs(outputs: &[PathBuf]) -> anyhow::Result<()> {
     for path in outputs {

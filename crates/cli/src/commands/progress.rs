@@ -18,6 +18,11 @@ pub(super) fn print(text: &str) {
     let _ = writeln!(out, "{text}");
 }
 
+/// A relative standard error as text; it is unknown where no pixel has two samples.
+pub(super) fn percent(noise: f64) -> String {
+    if noise.is_finite() { format!("{:.2} %", noise * 100.0) } else { "unknown".to_owned() }
+}
+
 /// A progress bar of a rendering: progress, time left, rays per second, noise.
 pub(super) struct Bar(ProgressBar);
 
@@ -36,7 +41,7 @@ impl Bar {
         self.0.set_length(progress.samples_total);
         self.0.set_position(progress.samples_done);
         let rate = progress.rays as f64 / progress.elapsed.as_secs_f64().max(1e-9) * 1e-6;
-        let noise = progress.noise.filter(|n| n.is_finite()).map(|n| format!("  noise {:.2} %", n * 100.0));
+        let noise = progress.noise.filter(|n| n.is_finite()).map(|n| format!("  noise {}", percent(n)));
         self.0.set_message(format!("{rate:.2} Mrays/s{}", noise.unwrap_or_default()));
     }
 

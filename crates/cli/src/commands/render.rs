@@ -14,9 +14,10 @@ use super::settings::{SetupTimes, load_job_of, plan, render_settings};
 use super::stored::Stored;
 use crate::watch::{self, Watch};
 use anyhow::{Context, bail};
-use lumiris::film::Film;
+use lumiris::film::{Film, Summary};
 use lumiris::imaging::oidn::Denoiser;
 use lumiris::import::cache::FileCache;
+use lumiris::integrators::light_layers;
 use lumiris::integrators::photon_map::MapStats;
 use lumiris::render::cryptomatte::cryptomattes;
 use lumiris::render::memory::{Wanted, predict};
@@ -44,6 +45,8 @@ pub(super) struct Session {
     denoiser: Option<Denoiser>,
     /// Those who watch.
     watch: Watch,
+    /// True once it was said that layers of light groups are lost.
+    has_noted_layers: AtomicBool,
 }
 
 /// A picture that was rendered.
@@ -85,7 +88,7 @@ impl Session {
         }
         let stop = Arc::new(AtomicBool::new(false));
         stop_at_ctrl_c(&stop)?;
-        Ok(Session { stop, files, denoiser, watch })
+        Ok(Session { stop, files, denoiser, watch, has_noted_layers: AtomicBool::new(false) })
     }
 
     /// True once Ctrl-C was pressed.
@@ -103,7 +106,7 @@ pub(super) fn render_one(args: &RenderArgs, session: &Session) -> anyhow::Result
     let args = &args;
     let asked = check(args)?;
     let (mut job, setup, files) = load_job_of(&args.scene, &session.files, stored.as_ref())?;
-    parts::check_settings(args, job.settings())?;
+    parts::check_settings(args, job.settings(), &job.world.scene.film.bounds)?;
     check_memory(args, &job, asked.as_deref())?;
     let asks_for_ratio = asked.as_ref().is_some_and(|list| list.contains(&Aov::Ratio));
     if args.denoise.denoise && job.settings().integrator.path_reuse.is_none() {
@@ -116,6 +119,7 @@ pub(super) fn render_one(args: &RenderArgs, session: &Session) -> anyhow::Result
         check_outputs(&outputs)?;
     }
     check_denoise(args, &outputs)?;
+    note_layers(args, &job, (&outputs, asked.as_deref()), session);
 
     let bar = Bar::new(args.quiet);
     let mut settings = settings_of(args, &job, asked.as_deref());
@@ -135,6 +139,18 @@ pub(super) fn render_one(args: &RenderArgs, session: &Session) -> anyhow::Result
         complete: rendering.complete,
         misplaced: written.misplaced,
     })
+}
+
+/// Says, once, that no output holds the layers of light groups.
+fn note_layers(args: &RenderArgs, job: &RenderJob, (outputs, asked): (&[PathBuf], Option<&[Aov]>), session: &Session) {
+    let is_wanted = asked.is_none_or(|list| list.contains(&Aov::LightGroups));
+    let is_kept = outputs.iter().any(|path| is_exr(path) || is_part(path)) || args.parts.checkpoint.is_some();
+    if light_layers::count(job) == 0 || !is_wanted || is_kept || args.quiet {
+        return;
+    }
+    if !session.has_noted_layers.swap(true, Ordering::Relaxed) {
+        progress::say("note: only EXR files have the layers of light groups: -o image.exr");
+    }
 }
 
 /// How to render for the AOVs that are asked for.
@@ -357,12 +373,15 @@ fn report(args: &RenderArgs, rendering: &Rendering, outputs: &[PathBuf]) {
     }
     let names: Vec<String> = outputs.iter().map(|p| p.display().to_string()).collect();
     let names = if names.is_empty() { "rendered".to_owned() } else { names.join(", ") };
-    let spp = rendering.film.summary().least_samples.unwrap_or(0);
+    let summary = rendering.film.summary();
+    let is_of_tiles = args.parts.part.is_some() && args.parts.is_by_tiles();
+    let of = if is_of_tiles { Summary::samples_text_of_sampled } else { Summary::samples_text };
+    let samples = of(summary, if summary.samples[1] == 1 { "sample per pixel" } else { "samples per pixel" });
     let partial = if rendering.complete { "" } else { " (stopped early)" };
     progress::say(&format!(
-        "{names} after {:.1} s, {spp} samples per pixel{partial}, noise {:.2} %",
+        "{names} after {:.1} s, {samples}{partial}, noise {}",
         rendering.elapsed.as_secs_f64(),
-        rendering.film.summary().relative_noise * 100.0
+        progress::percent(summary.relative_noise)
     ));
     if let Some(c) = &rendering.cache {
         progress::say(&format!(
@@ -384,7 +403,7 @@ fn report(args: &RenderArgs, rendering: &Rendering, outputs: &[PathBuf]) {
             if p.maps > 1 { format!(", {} maps", p.maps) } else { String::new() }
         ));
     }
-    let invalid = rendering.film.summary().invalid;
+    let invalid = summary.invalid;
     if invalid > 0 {
         progress::say(&format!("warning: {invalid} samples were not finite, or too bright, and were counted as black"));
     }

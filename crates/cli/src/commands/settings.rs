@@ -2,6 +2,7 @@
 
 use super::UsageError;
 use super::args::SceneArgs;
+use super::pictures::is_picture;
 use super::plan_file::PlanFile;
 use super::progress;
 use super::stored::Stored;
@@ -9,7 +10,7 @@ use anyhow::{Context, bail};
 use lumiris::film::filter::PixelFilter;
 use lumiris::import::cache::FileCache;
 use lumiris::import::fingerprint::SceneFiles;
-use lumiris::import::{LoadOptions, Loaded, load_with};
+use lumiris::import::{LoadOptions, Loaded, is_gltf, load_with};
 use lumiris::render::RenderSettings;
 use lumiris::render::allocation::complete_for_noise;
 use lumiris::render::plan::prepare;
@@ -32,6 +33,7 @@ pub(super) struct SetupTimes {
 /// Loads the scene, but what `files` has of its files, and applies the options, after the settings of what is stored; prints
 /// warnings.
 pub(super) fn load_scene(args: &SceneArgs, files: &FileCache, stored: Option<&Stored>) -> anyhow::Result<Loaded> {
+    check_scene(args)?;
     let options = LoadOptions {
         resolution: args.resolution,
         crop: args.crop,
@@ -70,6 +72,24 @@ pub(super) fn load_scene(args: &SceneArgs, files: &FileCache, stored: Option<&St
         progress::say("warning: without samples on non-contributing lights, direct light is biased");
     }
     Ok(loaded)
+}
+
+/// Rejects what is no scene, and options of another kind of scenes.
+fn check_scene(args: &SceneArgs) -> anyhow::Result<()> {
+    let path = args.scene.display();
+    if is_picture(&args.scene) {
+        return Err(
+            UsageError(format!("{path} is an image, not a scene: `lumiris info {path}` shows its settings")).into()
+        );
+    }
+    let of_gltf = [("--environment", args.environment.is_some()), ("--camera-auto", args.camera_auto)];
+    if let Some((option, _)) = of_gltf.iter().find(|(_, is_given)| *is_given && !is_gltf(&args.scene)) {
+        let text = format!(
+            "{option} is for glTF scenes: environment and camera of a pbrt scene, such as {path}, are in its file"
+        );
+        return Err(UsageError(text).into());
+    }
+    Ok(())
 }
 
 /// Loads the scene and builds its ray tracers.

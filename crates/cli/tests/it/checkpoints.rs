@@ -159,7 +159,7 @@ fn a_finished_checkpoint_goes_on_to_more_samples_and_is_a_part() {
     run(&format!("{begun} --samples-to 12 -o twelve.exr"), folder);
     assert_same("twelve.exr", "resumed.exr", folder, "5 and 7 more samples");
     // An image of --spp 12 has narrower footprints, but no texture is seen here
-    assert_eq!(image("resumed.exr", folder).metadata["lumiris:samples_done"], "12 to 12 per pixel");
+    assert_eq!(image("resumed.exr", folder).metadata["lumiris:samples_done"], "12 per pixel");
     let output = lumiris("render GALLERY --resume c.film --spp 3 -q -o less.exr", folder);
     assert_eq!(output.status.code(), Some(2), "{}", stderr(&output));
     assert!(stderr(&output).contains("c.film cannot go on to 3 samples"), "{}", stderr(&output));

@@ -41,7 +41,23 @@ fn parts_and_checkpoints_keep_environment_and_camera() {
 fn options_of_gltf_are_refused_for_pbrt() {
     let folder = tempfile::tempdir().unwrap();
     std::fs::write(folder.path().join("a.pbrt"), "WorldBegin\n").unwrap();
-    let output = lumiris("info a.pbrt --camera-auto", folder.path());
+    for (option, name) in [("--camera-auto", "--camera-auto"), ("--environment sky.hdr", "--environment")] {
+        let output = lumiris(&format!("info a.pbrt {option}"), folder.path());
+        assert_eq!(output.status.code(), Some(2));
+        assert!(stderr(&output).contains(&format!("lumiris: {name} is for glTF")), "{}", stderr(&output));
+        assert!(!stderr(&output).contains("1:1"), "an option has no line: {}", stderr(&output));
+    }
+}
+
+#[test]
+fn a_missing_environment_is_a_fault_of_the_option_and_not_of_the_scene() {
+    let folder = tempfile::tempdir().unwrap();
+    write_scene(folder.path());
+    let output = lumiris("info a.gltf --camera-auto --environment nope.hdr", folder.path());
     assert_eq!(output.status.code(), Some(3));
-    assert!(stderr(&output).contains("--camera-auto"), "{}", stderr(&output));
+    let said = stderr(&output);
+    assert!(said.contains("nope.hdr: no such file, asked for by --environment") && !said.contains("a.gltf:"), "{said}");
+    std::fs::write(folder.path().join("nope.hdr"), "nothing").unwrap();
+    let said = stderr(&lumiris("info a.gltf --camera-auto --environment nope.hdr", folder.path()));
+    assert!(said.contains("error: --environment: nope.hdr: ") && !said.contains("a.gltf:"), "{said}");
 }

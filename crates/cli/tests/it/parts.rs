@@ -33,7 +33,7 @@ pub(crate) fn run(args: &str, folder: &Path) {
 }
 
 /// Runs the program, which must fail with the exit code and say all of the words.
-fn refuse(args: &str, folder: &Path, code: i32, words: &[&str]) {
+pub(crate) fn refuse(args: &str, folder: &Path, code: i32, words: &[&str]) {
     let output = lumiris(args, folder);
     let said = stderr(&output);
     assert_eq!(output.status.code(), Some(code), "{args}: {said}");
@@ -170,9 +170,24 @@ fn more_samples_than_first_asked_for_are_one_more_part() {
     run(&format!("{IMAGE} {method} --samples-from 7 --samples-to 12 -o more.part -o more.exr"), folder);
     run("merge more.part first.part -o merged.exr", folder);
     assert_same("single.exr", "merged.exr", folder, "7 + 5 samples");
-    assert_eq!(image("merged.exr", folder).metadata["lumiris:samples_done"], "12 to 12 per pixel");
+    assert_eq!(image("merged.exr", folder).metadata["lumiris:samples_done"], "12 per pixel");
     let [(_, all), (_, more)] = ["single.exr", "more.exr"].map(|name| bits(&image(name, folder)));
     assert_ne!(all, more, "an image of some of the samples");
+}
+
+#[test]
+fn an_image_too_small_for_a_pilot_needs_no_plan() {
+    let folder = tempfile::tempdir().unwrap();
+    let folder = folder.path();
+    let auto = "render GALLERY --integrator path --resolution 32x24 --spp 4 --estimator auto -q";
+    run(&format!("{auto} -o single.exr"), folder);
+    assert_eq!(image("single.exr", folder).metadata["lumiris:estimator"], "mis");
+    (1..3).for_each(|i| run(&format!("{auto} --part {i}/2 -o {i}.part"), folder));
+    let output = lumiris("merge 2.part 1.part -o merged.exr", folder);
+    assert!(output.status.success() && stderr(&output).contains("from 2 parts"), "{}", stderr(&output));
+    assert_same("single.exr", "merged.exr", folder, "without a pilot");
+    let said = stderr(&lumiris("merge 1.part --allow-missing -o some.exr", folder));
+    assert!(said.contains("from 1 part,"), "{said}");
 }
 
 #[test]
@@ -181,8 +196,18 @@ fn what_a_plan_has_chosen_is_the_same_for_all_parts() {
     let folder = folder.path();
     let auto = "GALLERY --integrator direct --resolution 64x48 --spp 8";
     let words = ["measured times", "lumiris plan", "--plan plan.json"];
-    refuse(&format!("render {auto} --part 1/2 -o 1.part"), folder, 2, &words);
-    refuse(&format!("render {auto} --estimator ris --part 1/2 -o 1.part"), folder, 2, &words);
+    refuse(
+        &format!("render {auto} --spp 512 --part 1/2 -o 1.part"),
+        folder,
+        2,
+        &[&words[..], &["--estimator mis"]].concat(),
+    );
+    refuse(
+        &format!("render {auto} --estimator ris --part 1/2 -o 1.part"),
+        folder,
+        2,
+        &[&words[..], &["--proposals"]].concat(),
+    );
     run(&format!("plan {auto} --estimator ris -o plan.json"), folder);
     let planned = format!("render {auto} --estimator ris --plan plan.json -q");
     run(&format!("{planned} -o single.exr"), folder);
@@ -266,9 +291,9 @@ fn missing_double_and_foreign_parts_are_named() {
     let some = image("some.exr", folder);
     assert_eq!(some.metadata["lumiris:complete"], "false");
     assert_eq!(some.metadata["lumiris:missing"], "samples 2 to 4 of all pixels");
-    assert_eq!(some.metadata["lumiris:samples_done"], "5 to 5 per pixel");
+    assert_eq!(some.metadata["lumiris:samples_done"], "5 per pixel");
     run("merge t3.part t1.part --allow-missing -o some.exr", folder);
-    assert_eq!(image("some.exr", folder).metadata["lumiris:samples_done"], "0 to 7 per pixel");
+    assert_eq!(image("some.exr", folder).metadata["lumiris:samples_done"], "4.2 per pixel (0 to 7)");
 }
 
 #[test]

@@ -13,11 +13,14 @@ pub fn chunks(file: &[u8]) -> Result<(&[u8], Option<&[u8]>), GltfError> {
     }
     let word = |at: usize| file.get(at..at + 4).and_then(|b| b.try_into().ok()).map(u32::from_le_bytes);
     let wrong = |at: usize, message: String| GltfError { place: format!("byte {at}"), message };
-    match word(4) {
-        Some(2) => {}
-        version => return Err(wrong(4, format!("the container has version 2, not {version:?}"))),
+    let (Some(version), Some(length)) = (word(4), word(8)) else {
+        let message = format!("the file ends after {} of the 12 bytes of its header", file.len());
+        return Err(wrong(file.len(), message));
+    };
+    if version != 2 {
+        return Err(wrong(4, format!("the container has version {version}, but only version 2 is read")));
     }
-    let length = word(8).unwrap_or(0) as usize;
+    let length = length as usize;
     if length > file.len() {
         return Err(wrong(8, format!("the file says that it has {length} bytes, but has {}", file.len())));
     }

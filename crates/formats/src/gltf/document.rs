@@ -11,10 +11,29 @@ use std::path::{Path, PathBuf};
 #[derive(Debug)]
 pub struct Document {
     json: Value,
-    buffers: Vec<Vec<u8>>,
+    /// `None` for those that could not be read.
+    buffers: Vec<Option<Vec<u8>>>,
     /// Files that hold buffers.
     pub files: Vec<PathBuf>,
+    /// Why buffers could not be read. With any of them, only images can be asked for.
+    pub unread: Vec<Unread>,
     folder: PathBuf,
+}
+
+/// Why a buffer could not be read.
+#[derive(Clone, Debug)]
+pub enum Unread {
+    /// Its file could not.
+    File {
+        /// Where it is named.
+        place: String,
+        /// The file.
+        path: PathBuf,
+        /// The reason.
+        reason: String,
+    },
+    /// Its content is not what the document says.
+    Content(GltfError),
 }
 
 /// Bytes of a data URI; `None` if it is none.
@@ -52,10 +71,13 @@ pub enum Content {
     File(PathBuf),
     /// In the document.
     Bytes(Vec<u8>),
+    /// In a buffer that could not be read, as [`Document::unread`] says.
+    Unread,
 }
 
 impl Document {
-    /// Parses a file that lies in `folder`, and reads its buffers. All errors of the schema are named.
+    /// Parses a file that lies in `folder`, and reads its buffers; those that cannot be read are in `unread`. All errors
+    /// of the schema are named.
     pub fn parse(file: &[u8], folder: &Path, required: &[&str]) -> Result<Document, Vec<GltfError>> {
         let (text, embedded) = chunks(file).map_err(|e| vec![e])?;
         let text = text.strip_prefix(b"\xef\xbb\xbf").unwrap_or(text);
@@ -65,8 +87,9 @@ impl Document {
         if !errors.is_empty() {
             return Err(errors);
         }
-        let mut document = Document { json, buffers: Vec::new(), files: Vec::new(), folder: folder.to_owned() };
-        document.read_buffers(embedded).map_err(|e| vec![e])?;
+        let (buffers, files, unread) = (Vec::new(), Vec::new(), Vec::new());
+        let mut document = Document { json, buffers, files, unread, folder: folder.to_owned() };
+        document.read_buffers(embedded);
         Ok(document)
     }
 
@@ -78,8 +101,17 @@ impl Document {
     /// Where the content of an image is.
     pub fn content(&self, place: &Place<'_>) -> Result<Content, GltfError> {
         if let Some(view) = place.key("bufferView").index() {
+            let buffer = self.root().key("bufferViews").item(view).key("buffer").index();
+            if buffer.and_then(|buffer| self.buffers.get(buffer)).is_some_and(Option::is_none) {
+                return Ok(Content::Unread);
+            }
             return Ok(Content::Bytes(self.view(view)?.to_vec()));
         }
+        self.uri_content(place)
+    }
+
+    /// The content that a URI names.
+    fn uri_content(&self, place: &Place<'_>) -> Result<Content, GltfError> {
         let uri = place.key("uri").text().ok_or_else(|| place.error("has neither a URI nor a buffer view"))?;
         match data_uri(uri) {
             Some(bytes) => bytes.map(Content::Bytes).map_err(|message| place.key("uri").error(message)),
@@ -87,35 +119,35 @@ impl Document {
         }
     }
 
-    fn read_buffers(&mut self, embedded: Option<&[u8]>) -> Result<(), GltfError> {
-        let json = std::mem::take(&mut self.json);
-        let result = Place::root(&json).key("buffers").items().into_iter().enumerate().try_for_each(|(i, place)| {
-            let bytes = match (place.key("uri").exists(), embedded) {
-                (false, Some(bytes)) if i == 0 => bytes.to_vec(),
-                // A placeholder, which is an error only if something is in it
-                (false, _) => {
-                    self.buffers.push(Vec::new());
-                    return Ok(());
-                }
-                (true, _) => match self.content(&place)? {
-                    Content::Bytes(bytes) => bytes,
-                    Content::File(path) => {
-                        let read = std::fs::read(&path);
-                        self.files.push(path.clone());
-                        read.map_err(|e| place.key("uri").error(format!("{}: {e}", path.display())))?
-                    }
-                },
-            };
-            let length = place.key("byteLength").index().unwrap_or(0);
-            if bytes.len() < length {
-                let message = format!("the buffer has {} of its {length} bytes", bytes.len());
-                return Err(place.key("byteLength").error(message));
+    fn read_buffers(&mut self, embedded: Option<&[u8]>) {
+        for index in 0..self.root().key("buffers").items().len() {
+            let (read, file) = self.read_buffer(index, embedded);
+            self.files.extend(file);
+            self.buffers.push(read.map_err(|unread| self.unread.push(unread)).ok());
+        }
+    }
+
+    /// The bytes of a buffer, and its file if it has one.
+    fn read_buffer(&self, index: usize, embedded: Option<&[u8]>) -> (Result<Vec<u8>, Unread>, Option<PathBuf>) {
+        let place = self.root().key("buffers").item(index);
+        if !place.key("uri").exists() {
+            // A placeholder is an error only if something is in it
+            let embedded = embedded.filter(|_| index == 0);
+            return (embedded.map_or(Ok(Vec::new()), |bytes| checked(bytes.to_vec(), &place)), None);
+        }
+        match self.uri_content(&place) {
+            Ok(Content::Bytes(bytes)) => (checked(bytes, &place), None),
+            Ok(Content::File(path)) => {
+                let read = std::fs::read(&path).map_err(|e| {
+                    let is_missing = e.kind() == std::io::ErrorKind::NotFound;
+                    let reason = if is_missing { "no such file".to_owned() } else { e.to_string() };
+                    Unread::File { place: place.key("uri").path, path: path.clone(), reason }
+                });
+                (read.and_then(|bytes| checked(bytes, &place)), Some(path))
             }
-            self.buffers.push(bytes);
-            Ok(())
-        });
-        self.json = json;
-        result
+            Ok(Content::Unread) => (Ok(Vec::new()), None),
+            Err(error) => (Err(Unread::Content(error)), None),
+        }
     }
 
     /// The bytes of a buffer view.
@@ -124,12 +156,22 @@ impl Document {
         let (buffer, length) = (place.key("buffer").index(), place.key("byteLength").index());
         let (Some(buffer), Some(length)) = (buffer, length) else { return Err(place.error("is not there")) };
         let offset = place.key("byteOffset").index().unwrap_or(0);
-        let bytes = self.buffers.get(buffer).map_or(&[][..], Vec::as_slice);
+        let bytes = self.buffers.get(buffer).and_then(Option::as_deref).unwrap_or_default();
         offset.checked_add(length).and_then(|end| bytes.get(offset..end)).ok_or_else(|| {
             let message = format!("{length} bytes from byte {offset} on are not in the buffer of {}", bytes.len());
             place.error(message)
         })
     }
+}
+
+/// The bytes of a buffer if they are as many as it says.
+fn checked(bytes: Vec<u8>, place: &Place<'_>) -> Result<Vec<u8>, Unread> {
+    let length = place.key("byteLength").index().unwrap_or(0);
+    if bytes.len() < length {
+        let message = format!("the buffer has {} of its {length} bytes", bytes.len());
+        return Err(Unread::Content(place.key("byteLength").error(message)));
+    }
+    Ok(bytes)
 }
 
 /// What is not JSON, in the bytes of the file.

@@ -9,9 +9,7 @@ pub fn locate(file: &[u8], place: &str) -> Range<usize> {
     if let Some(at) = place.strip_prefix("byte ").and_then(|at| at.parse::<usize>().ok()) {
         return at.min(file.len())..(at + 1).min(file.len());
     }
-    let Ok((json, _)) = chunks(file) else { return 0..0 };
-    let offset = json.as_ptr() as usize - file.as_ptr() as usize;
-    let mut at = skip_blanks(json, if json.starts_with(b"\xef\xbb\xbf") { 3 } else { 0 });
+    let Some((json, offset, mut at)) = beginning(file) else { return 0..0 };
     for part in place.split(['.', '[']).filter(|part| !part.is_empty()) {
         let next = match part.strip_suffix(']') {
             Some(index) => index.parse().ok().and_then(|index| item(json, at, index)),
@@ -20,9 +18,33 @@ pub fn locate(file: &[u8], place: &str) -> Range<usize> {
         let Some(next) = next else { break };
         at = next;
     }
+    shifted(value_at(json, at), offset)
+}
+
+/// Bytes of a member of each element of an array of the root, as [`locate`] has them, in one pass over the file.
+pub fn locate_members(file: &[u8], array: &str, key: &str) -> Vec<Range<usize>> {
+    let Some((json, offset, root)) = beginning(file) else { return Vec::new() };
+    let first = member(json, root, array).and_then(|array| item(json, array, 0));
+    let items = std::iter::successors(first, |&at| next(json, at));
+    items.map(|at| shifted(value_at(json, member(json, at, key).unwrap_or(at)), offset)).collect()
+}
+
+/// The JSON of a file, its first byte, and its root from there.
+fn beginning(file: &[u8]) -> Option<(&[u8], usize, usize)> {
+    let (json, _) = chunks(file).ok()?;
+    let offset = json.as_ptr() as usize - file.as_ptr() as usize;
+    Some((json, offset, skip_blanks(json, if json.starts_with(b"\xef\xbb\xbf") { 3 } else { 0 })))
+}
+
+/// Bytes of the value at `at`; the first byte of arrays and objects.
+fn value_at(json: &[u8], at: usize) -> Range<usize> {
     let is_container = json.get(at).is_none_or(|b| b"{[".contains(b));
     let end = if is_container { at + 1 } else { skip_value(json, at) };
-    offset + at..offset + end.min(json.len())
+    at..end.min(json.len())
+}
+
+fn shifted(range: Range<usize>, offset: usize) -> Range<usize> {
+    offset + range.start..offset + range.end
 }
 
 /// The value of a member of the object at `at`.
@@ -92,7 +114,7 @@ fn skip_value(json: &[u8], mut at: usize) -> usize {
 
 #[cfg(test)]
 mod tests {
-    use super::locate;
+    use super::{locate, locate_members};
 
     #[test]
     fn places_are_found_and_what_is_not_there_is_where_it_would_be() {
@@ -105,6 +127,19 @@ mod tests {
             for place in ["a[1].d", "e.f.g", "a[0][0]", "byte 999", "[x]"] {
                 assert!(locate(&json[..end], place).end <= end);
             }
+        }
+    }
+
+    #[test]
+    fn members_of_all_elements_are_where_each_alone_is() {
+        let json =
+            br#"{"a": 1, "images": [ {"uri": "a.png"}, {"name": "uri", "uri":"b,]}.png"} ,{"bufferView": 3}, 7]}"#;
+        let found = locate_members(json, "images", "uri");
+        let alone: Vec<_> = (0..4).map(|i| locate(json, &format!("images[{i}].uri"))).collect();
+        assert_eq!(found, alone);
+        assert!(locate_members(json, "meshes", "uri").is_empty());
+        for end in 0..json.len() {
+            assert!(locate_members(&json[..end], "images", "uri").iter().all(|range| range.end <= end));
         }
     }
 }

@@ -14,5 +14,5 @@ pub mod place;
 pub mod schema;
 
 pub use document::Document;
-pub use locate::locate;
+pub use locate::{locate, locate_members};
 pub use place::{GltfError, Place};

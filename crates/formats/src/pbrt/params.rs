@@ -3,7 +3,7 @@
 //! After a directive was processed, [`ParamSet::report_unused`] reports every parameter that was never looked up: a
 //! misspelled parameter is an error, never silently a default.
 
-use crate::diagnostic::{Diagnostics, did_you_mean};
+use crate::diagnostic::{Diagnostics, similar_parameter};
 use crate::source::Span;
 use std::cell::{Cell, RefCell};
 
@@ -382,7 +382,7 @@ impl ParamSet {
             let asked = self.asked.borrow();
             let message = format!("{} has no parameter `{}`", self.owner, param.name);
             let known = || asked.iter().copied().filter(|&n| n != param.name);
-            let help = match did_you_mean(&param.name, known()) {
+            let help = match similar_parameter(&param.name, known()) {
                 Some(near) => format!("did you mean `{near}`?"),
                 None if asked.is_empty() => "it takes no parameters".to_owned(),
                 None => format!("its parameters are {}", known().collect::<Vec<_>>().join(", ")),

@@ -15,12 +15,12 @@ pub enum ProceduralError {
     #[error("{0}")]
     Option(String),
     /// A file cannot be written.
-    #[error("cannot write {}: {source}", path.display())]
+    #[error("cannot write {}: {cause}", path.display())]
     Io {
         /// The file.
         path: PathBuf,
         /// Why.
-        source: io::Error,
+        cause: io::Error,
     },
     /// An image cannot be written.
     #[error(transparent)]
@@ -37,7 +37,7 @@ pub struct Written {
 /// Makes a statue and writes it as PLY.
 pub fn write_statue(path: &Path, options: &StatueOptions) -> Result<Written, ProceduralError> {
     let mesh = statue(options).map_err(ProceduralError::Option)?;
-    write_ply(path, &mesh).map_err(|source| ProceduralError::Io { path: path.to_owned(), source })?;
+    write_ply(path, &mesh).map_err(|cause| ProceduralError::Io { path: path.to_owned(), cause })?;
     Ok(Written { triangles: mesh.triangle_count() })
 }
 
@@ -52,7 +52,7 @@ pub fn write_sky(path: &Path, options: &SkyOptions) -> Result<(), ProceduralErro
 pub(super) fn write_texts(folder: &Path, texts: &[(&str, &str)]) -> Result<(), ProceduralError> {
     let failed = |path: &Path| {
         let path = path.to_owned();
-        move |source| ProceduralError::Io { path, source }
+        move |cause| ProceduralError::Io { path, cause }
     };
     std::fs::create_dir_all(folder).map_err(failed(folder))?;
     for (name, text) in texts {

@@ -83,12 +83,12 @@ pub enum ReproduceError {
     #[error(transparent)]
     Image(#[from] lumiris::imaging::oiio::ImageError),
     /// A file could not be written.
-    #[error("{path}: {source}")]
+    #[error("{path}: {cause}")]
     File {
         /// Which.
         path: PathBuf,
         /// Why.
-        source: std::io::Error,
+        cause: std::io::Error,
     },
     /// The observer ended it.
     #[error("ended before it was done")]
@@ -103,12 +103,12 @@ fn scaled(shape: [u32; 2], size: u32) -> [u32; 2] {
 
 /// Writes a file, with its name in the error.
 pub(crate) fn write_file(path: PathBuf, text: &str) -> Result<(), ReproduceError> {
-    write_text(&path, text).map_err(|source| ReproduceError::File { path, source })
+    write_text(&path, text).map_err(|cause| ReproduceError::File { path, cause })
 }
 
 /// Makes a folder, with its name in the error.
 pub(crate) fn make_folder(path: &std::path::Path) -> Result<(), ReproduceError> {
-    std::fs::create_dir_all(path).map_err(|source| ReproduceError::File { path: path.to_owned(), source })
+    std::fs::create_dir_all(path).map_err(|cause| ReproduceError::File { path: path.to_owned(), cause })
 }
 
 /// Time that is shared out among parts.

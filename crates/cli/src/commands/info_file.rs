@@ -1,0 +1,76 @@
+//! What `lumiris info` says of files that were rendered: images, and parts and checkpoints.
+
+use super::pictures::is_picture;
+use lumiris::imaging::oiio::{read_headers, read_metadata};
+use lumiris::render::parts::{FilmHeader, FilmReader, PartError};
+use serde_json::{Map, Value, json};
+use std::path::Path;
+
+/// Prefix of the settings in metadata.
+const PREFIX: &str = "lumiris:";
+
+/// Layers, settings and other metadata, as JSON; `None` for a file that may be a scene.
+pub(super) fn facts_of_file(path: &Path) -> anyhow::Result<Option<Value>> {
+    if is_picture(path) {
+        return Ok(Some(facts_of_image(path)?));
+    }
+    match FilmReader::open(path) {
+        Ok(reader) => Ok(Some(facts_of_part(path, reader.header()))),
+        Err(error @ PartError::Damaged { .. }) => Err(error.into()),
+        Err(_) => Ok(None),
+    }
+}
+
+fn facts_of_image(path: &Path) -> anyhow::Result<Value> {
+    let headers = read_headers(path)?;
+    let mut layers: Vec<(String, Vec<String>)> = Vec::new();
+    for channel in headers.iter().flat_map(|part| &part.channels) {
+        let (layer, name) = channel.rsplit_once('.').unwrap_or(("", channel));
+        let layer = if layer.is_empty() { "image" } else { layer };
+        match layers.iter_mut().find(|(other, _)| other == layer) {
+            Some((_, names)) => names.push(name.to_owned()),
+            None => layers.push((layer.to_owned(), vec![name.to_owned()])),
+        }
+    }
+    let layers: Map<_, _> = layers.into_iter().map(|(layer, names)| (layer, names.join(" ").into())).collect();
+    let [width, height] = headers.first().map_or([0, 0], |part| part.size);
+    let (settings, others) = divided(read_metadata(path)?);
+    Ok(json!({
+        "image": path.display().to_string(),
+        "size": format!("{width}x{height}"),
+        "parts": headers.len(),
+        "layers": layers,
+        "settings": settings,
+        "metadata": others,
+    }))
+}
+
+fn facts_of_part(path: &Path, header: &FilmHeader) -> Value {
+    let (settings, others) = divided(header.settings.iter().chain(&header.notes).cloned());
+    let share = header.share.map(|share| format!("{} of {}", share.index + 1, share.count));
+    json!({
+        "part": path.display().to_string(),
+        "size": format!("{}x{}", header.bounds.width(), header.bounds.height()),
+        "samples": format!("{} to {} of {}", header.samples.start, header.samples.end, header.spp),
+        "share of tiles": share.unwrap_or_else(|| "all".to_owned()),
+        "is complete": header.is_finished,
+        "light groups": header.light_layers.join(" "),
+        "settings": settings,
+        "metadata": others,
+    })
+}
+
+/// Settings of the renderer, with a plan as what it is, and everything else.
+fn divided(entries: impl IntoIterator<Item = (String, String)>) -> (Map<String, Value>, Map<String, Value>) {
+    let (mut settings, mut others) = (Map::new(), Map::new());
+    for (key, text) in entries {
+        let is_plan = key.trim_start_matches(PREFIX) == "plan";
+        let value = if is_plan { serde_json::from_str(&text).ok() } else { None };
+        let value = value.unwrap_or(Value::String(text));
+        match key.strip_prefix(PREFIX) {
+            Some(name) => settings.insert(name.to_owned(), value),
+            None => others.insert(key, value),
+        };
+    }
+    (settings, others)
+}

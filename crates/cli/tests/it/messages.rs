@@ -1,0 +1,64 @@
+//! What the program says: of files that are not what a command wants, and of the samples and the noise of an image.
+
+use super::parts::{image, lumiris, refuse, run};
+use super::program::stderr;
+
+#[test]
+fn the_reason_why_a_file_cannot_be_read_is_said_once() {
+    let folder = tempfile::tempdir().unwrap();
+    let said = stderr(&lumiris("merge missing.exr -o a.exr", folder.path()));
+    assert_eq!(said.matches("No such file").count(), 1, "{said}");
+    assert!(said.contains("missing.exr: No such file"), "{said}");
+}
+
+#[test]
+fn one_sample_has_no_known_noise() {
+    let folder = tempfile::tempdir().unwrap();
+    let one = "render GALLERY --resolution 16x9 --estimator mis --spp 1";
+    let said = stderr(&lumiris(&format!("{one} -o a.exr"), folder.path()));
+    assert!(said.contains("s, 1 sample per pixel, noise unknown") && !said.contains("inf"), "{said}");
+}
+
+#[test]
+fn samples_are_told_by_their_mean_and_range() {
+    let folder = tempfile::tempdir().unwrap();
+    let folder = folder.path();
+    let scene = "render GALLERY --resolution 96x54 --integrator direct --estimator mis --spp 64";
+    let said = stderr(&lumiris(&format!("{scene} --allocation adaptive -o a.exr"), folder));
+    let text = &image("a.exr", folder).metadata["lumiris:samples_done"];
+    let (mean, range) = text.split_once(" per pixel (").unwrap();
+    let samples = image("a.exr", folder);
+    let channel = samples.image.channel("samples").unwrap();
+    let counts = || samples.image.data.iter().skip(channel).step_by(samples.image.channels.len()).copied();
+    let expected = f64::from(counts().sum::<f32>()) / counts().count() as f64;
+    assert!((mean.parse::<f64>().unwrap() - expected).abs() <= 0.05 + 1e-9, "{text}, but {expected}");
+    assert!((expected - 64.0).abs() < 4.0, "--spp is the mean: {expected}");
+    let [least, most] = [counts().fold(f32::INFINITY, f32::min), counts().fold(0.0, f32::max)];
+    assert_eq!(range, format!("{least} to {most})"));
+    assert!(said.contains(&format!("{mean} samples per pixel ({range}")), "{said}");
+
+    run(&format!("{scene} --allocation uniform -o b.exr"), folder);
+    assert_eq!(image("b.exr", folder).metadata["lumiris:samples_done"], "64 per pixel");
+    let said = stderr(&lumiris(&format!("{scene} --allocation uniform --part 1/2 --part-by tiles -o b.part"), folder));
+    assert!(said.contains(", 64 samples per pixel"), "a part of tiles has all samples of its pixels: {said}");
+}
+
+#[test]
+fn images_are_described_and_not_read_as_scenes() {
+    let folder = tempfile::tempdir().unwrap();
+    let folder = folder.path();
+    run("render GALLERY --resolution 16x9 --estimator mis --spp 2 -q -o a.exr -o a.png -o a.part", folder);
+    for name in ["a.exr", "a.png", "a.part"] {
+        let output = lumiris(&format!("info {name} --json"), folder);
+        let facts: serde_json::Value = serde_json::from_slice(&output.stdout).unwrap();
+        assert_eq!(
+            (facts["size"].as_str(), facts["settings"]["estimator"].as_str()),
+            (Some("16x9"), Some("mis")),
+            "{name}"
+        );
+    }
+    refuse("render a.exr -o b.exr", folder, 2, &["a.exr is an image, not a scene", "lumiris info a.exr"]);
+    refuse("info no.exr", folder, 3, &["no.exr: no such file"]);
+    std::fs::write(folder.join("broken.exr"), "no image").unwrap();
+    refuse("info broken.exr", folder, 3, &["broken.exr: "]);
+}
