@@ -53,12 +53,12 @@ fn assert_success(output: &Output) {
 #[test]
 fn jobs_render_the_bits_of_the_image_at_once_in_any_folder_and_do_nothing_again() {
     let (root, folder) = queue();
-    let args = format!("{FARM} --integrator path --submit --sbatch --time=1:00:00");
+    let args = format!("{FARM} --integrator path --estimator ris --submit --sbatch --time=1:00:00");
     let output = farm(&args, &folder).output().unwrap();
     assert_success(&output);
     assert_eq!(String::from_utf8_lossy(&output.stdout), "plan: job 1\npart: job 2\nmerge: job 3\n");
     run(
-        "render GALLERY --resolution 40x36 --spp 7 -q --integrator path --plan image.farm/plan.json -o whole.exr",
+        "render GALLERY --resolution 40x36 --spp 7 -q --integrator path --estimator ris --plan image.farm/plan.json -o whole.exr",
         &folder,
     );
     assert_same("image.exr", "whole.exr", &folder, "merged by a queue");
@@ -67,6 +67,13 @@ fn jobs_render_the_bits_of_the_image_at_once_in_any_folder_and_do_nothing_again(
     assert!(calls.iter().all(|call| call.contains("--time=1:00:00") && call.contains("--requeue")), "{calls:?}");
     assert!(calls[1].contains("--array=1-3") && calls[1].contains("--dependency=afterok:1 "), "{}", calls[1]);
     assert!(calls[2].contains("--dependency=afterok:2 "), "{}", calls[2]);
+
+    // Nothing is measured where the image is too small for the pilot of `auto`
+    let output = farm(&FARM.replace("image.exr", "small.exr --integrator path --submit"), &folder).output().unwrap();
+    assert_success(&output);
+    assert!(!folder.join("small.farm/plan.json").exists(), "{}", String::from_utf8_lossy(&output.stdout));
+    run("render GALLERY --resolution 40x36 --spp 7 -q --integrator path -o whole.exr", &folder);
+    assert_same("small.exr", "whole.exr", &folder, "without a plan");
 
     // Again
     let modified = |name: &str| fs::metadata(folder.join("image.farm").join(name)).unwrap().modified().unwrap();
