@@ -19,17 +19,16 @@ pub fn obstacle_of(settings: &IntegratorSettings) -> Option<String> {
         EstimatorKind::Ocv | EstimatorKind::OptimalMis | EstimatorKind::Correlated => false,
     };
     let traces_first = settings.estimator == EstimatorKind::Ris && settings.ris.target.has_visibility();
-    let name = |kind: &'static str| kind;
     if !knows_integrator {
         return Some(format!(
             "the integrator {} leaves out participating media, which this scene has: direct and path render them",
-            name(settings.kind.into())
+            <&str>::from(settings.kind)
         ));
     }
     if !knows_estimator {
         return Some(format!(
             "the estimator {} leaves out participating media, which this scene has: auto, mc, mis, ris and contributing know them",
-            name(settings.estimator.into())
+            <&str>::from(settings.estimator)
         ));
     }
     traces_first.then(|| {

@@ -216,11 +216,17 @@ impl VertexSearch {
                 continue;
             }
             let [stream, direct] = streams.map(|s| s.domain(domain::VERTEX + at.vertex));
-            let Carried { beta, branch, .. } = carried;
-            self.kept.push(PathState { branch, beta, width, passed: 0, travelled: 0.0, technique: None, ..*path });
             let media = interaction.sides(at.job, path.medium);
+            self.keep(path, &carried);
             vertices.push(Vertex { surface, bsdf, wo, stream, direct, is_next: path.passed == 0, media });
         }
+    }
+
+    /// Keeps a path at a vertex, with what it has carried there.
+    #[inline]
+    fn keep(&mut self, path: &PathState, carried: &Carried) {
+        let Carried { beta, branch, width, .. } = *carried;
+        self.kept.push(PathState { branch, beta, width, passed: 0, travelled: 0.0, technique: None, ..*path });
     }
 
     /// Lets a path fly through its medium towards what its ray meets, and adds what the medium sends out. True if it is
@@ -274,11 +280,10 @@ impl VertexSearch {
         let count = self.arrivals.arrive((sample, out.radiance), at.vertex, &mut carried, || (surface.p, wo));
         let (parent, media) = (carried.branch, Sides::both(path.medium));
         for index in 0..count {
-            let branch = self.arrivals.branch(sample, parent, at.vertex, (count, index));
-            let streams = self.arrivals.streams(sample, branch);
+            carried.branch = self.arrivals.branch(sample, parent, at.vertex, (count, index));
+            let streams = self.arrivals.streams(sample, carried.branch);
             let [stream, direct] = streams.map(|s| s.domain(domain::VERTEX + at.vertex));
-            let beta = carried.beta;
-            self.kept.push(PathState { branch, beta, width, passed: 0, travelled: 0.0, technique: None, ..*path });
+            self.keep(path, &carried);
             vertices.push(Vertex { surface, bsdf, wo, stream, direct, is_next: path.passed == 0, media });
         }
     }

@@ -21,6 +21,7 @@ pub use homogeneous::Homogeneous;
 pub use track::{End, Flight, Numbers, Segment};
 
 use lumiris_numbers::math::{Rgb, Vec3};
+use std::sync::Arc;
 
 /// Index into [`MediumSet::media`].
 pub type MediumId = u32;
@@ -42,7 +43,7 @@ pub enum Medium {
     /// The same everywhere.
     Homogeneous(Homogeneous),
     /// One that varies in a box, outside of which there is nothing.
-    Heterogeneous(Box<Heterogeneous>),
+    Heterogeneous(Arc<Heterogeneous>),
 }
 
 impl Medium {

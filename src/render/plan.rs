@@ -65,7 +65,8 @@ pub struct RisChoice {
     pub sample_counts: SampleCounts,
 }
 
-/// Completes what the settings of `job` leave open, or says why there can be no image. `ratio_map` requests the map of the best M/N even if it is not used.
+/// Completes what the settings of `job` leave open, or says why there can be no image. `ratio_map` requests the map of
+/// the best M/N even if it is not used.
 pub fn prepare(job: &mut RenderJob, threads: Option<usize>, ratio_map: bool) -> Result<Plan, RenderError> {
     if let Some(obstacle) = through_media::obstacle(job) {
         return Err(RenderError::Media(obstacle));

@@ -11,6 +11,7 @@ use lumiris::render::plan::prepare;
 use lumiris::render::{RenderSettings, render};
 use lumiris::scene::{AccelKind, RenderJob};
 use lumiris::settings::{EstimatorKind, IntegratorKind, IntegratorSettings, Proposals, RouletteKind, Target};
+use lumiris_formats::spectra::Y_INTEGRAL;
 use std::path::Path;
 use std::sync::atomic::AtomicBool;
 
@@ -136,7 +137,7 @@ fn media(scattering: f32, absorption: f32, more: &str) -> Vec<(&'static str, Str
                     String::new()
                 } else {
                     // Not scaled to a luminance, as in pbrt-v4
-                    format!(r#""rgb Le" [{}] "float Lescale" {}"#, "1 1 1 ".repeat(64), 1.0 / 106.856_895)
+                    format!(r#""rgb Le" [{}] "float Lescale" {}"#, "1 1 1 ".repeat(64), 1.0 / Y_INTEGRAL)
                 }
             ),
         ),
@@ -152,6 +153,16 @@ fn cloud(scattering: f32, absorption: f32) -> String {
     )
 }
 
+/// A medium in a box, in even light of radiance 1 from everywhere.
+fn in_even_light(medium: &str) -> RenderJob {
+    let text = camera("0.3 0.2 3", "", 60)
+        + &format!(
+            r#"MakeNamedMedium "fog" {medium} LightSource "infinite" "rgb L" [1 1 1]
+            Material "interface" MediumInterface "fog" "" {BOX}"#
+        );
+    job(&text, AccelKind::Embree)
+}
+
 /// In even light, what only scatters is not seen: an environment of radiance 1 around a box of albedo 1, whatever the medium,
 /// phase function and estimator.
 #[test]
@@ -159,12 +170,7 @@ fn a_medium_that_only_scatters_is_invisible_in_even_light() {
     let mut all = media(1.2, 0.0, "");
     all.push(("cloud", cloud(1.5, 0.0)));
     for (name, medium) in all {
-        let text = camera("0.3 0.2 3", "", 60)
-            + &format!(
-                r#"MakeNamedMedium "fog" {medium} LightSource "infinite" "rgb L" [1 1 1]
-                Material "interface" MediumInterface "fog" "" {BOX}"#
-            );
-        let mut job = job(&text, AccelKind::Embree);
+        let mut job = in_even_light(&medium);
         for (estimator, settings) in estimators() {
             choose(&mut job, &settings);
             assert_answer(&mut job, 48, [1.0; 3], 0.13, &format!("{name}, {estimator}"));
@@ -181,12 +187,7 @@ fn a_medium_that_only_scatters_is_invisible_in_even_light() {
 #[test]
 fn a_medium_in_equilibrium_with_its_surroundings_is_invisible() {
     for (name, medium) in media(0.8, 1.0, r#""rgb Le" [1 1 1]"#) {
-        let text = camera("0.3 0.2 3", "", 60)
-            + &format!(
-                r#"MakeNamedMedium "fog" {medium} LightSource "infinite" "rgb L" [1 1 1]
-                Material "interface" MediumInterface "fog" "" {BOX}"#
-            );
-        let mut job = job(&text, AccelKind::Embree);
+        let mut job = in_even_light(&medium);
         for (estimator, settings) in estimators() {
             choose(&mut job, &settings);
             assert_answer(&mut job, 48, [1.0; 3], 0.13, &format!("{name}, {estimator}"));

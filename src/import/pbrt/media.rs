@@ -15,6 +15,7 @@ use lumiris_formats::pbrt::params::{ParamSet, ParamType};
 use lumiris_formats::spectra::{Y_INTEGRAL, glow_rgb};
 use lumiris_numbers::math::{Affine3A, Bounds3, Rgb, Vec3};
 use std::collections::HashMap;
+use std::sync::Arc;
 
 /// Temperatures whose radiance is tabulated.
 const TEMPERATURES: usize = 1024;
@@ -134,7 +135,7 @@ impl Builder<'_> {
         let le = if temperature.is_some() { Rgb::WHITE } else { le.unwrap_or(Rgb::BLACK) };
         let [sigma_a, sigma_s] = coefficients?;
         let grid = UniformGrid { sigma_a, sigma_s, density: density?, le, le_scale, temperature };
-        Some(Medium::Heterogeneous(Box::new(Heterogeneous::new(Field::Uniform(grid), bounds?, placement, g))))
+        Some(Medium::Heterogeneous(Arc::new(Heterogeneous::new(Field::Uniform(grid), bounds?, placement, g))))
     }
 
     fn rgb_grid(&self, p: &ParamSet, placement: &Affine3A, d: &mut Diagnostics) -> Option<Medium> {
@@ -155,7 +156,7 @@ impl Builder<'_> {
         // pbrt-v4 does not scale this emission to a luminance
         let le = le.filter(|_| le_scale > 0.0).map(|samples| samples.map(|le| le * (le_scale * Y_INTEGRAL)));
         let grid = RgbGrid { sigma_a, sigma_s, scale, le };
-        Some(Medium::Heterogeneous(Box::new(Heterogeneous::new(Field::Rgb(grid), bounds?, placement, g))))
+        Some(Medium::Heterogeneous(Arc::new(Heterogeneous::new(Field::Rgb(grid), bounds?, placement, g))))
     }
 
     fn cloud(&self, p: &ParamSet, placement: &Affine3A, d: &mut Diagnostics) -> Option<Medium> {
@@ -166,7 +167,7 @@ impl Builder<'_> {
         let frequency = not_negative(p, "frequency", 5.0, d);
         let [sigma_a, sigma_s] = self.coefficients(p, 1.0, d)?;
         let cloud = Cloud { sigma_a, sigma_s, density, wispiness, frequency };
-        Some(Medium::Heterogeneous(Box::new(Heterogeneous::new(Field::Cloud(cloud), bounds?, placement, g))))
+        Some(Medium::Heterogeneous(Arc::new(Heterogeneous::new(Field::Cloud(cloud), bounds?, placement, g))))
     }
 
     fn rgb_samples(
