@@ -45,8 +45,18 @@ impl TreeChoice {
         if count == 0 {
             return 0.0;
         }
+        if self.tree.importance(ctx) > 0.0 { self.fraction_of(count) } else { 1.0 }
+    }
+
+    /// Probability of the infinite lights together where others can contribute.
+    pub fn infinite_fraction(&self) -> f32 {
+        self.fraction_of(self.infinite.len())
+    }
+
+    #[inline]
+    fn fraction_of(&self, count: usize) -> f32 {
         let odds = count as f32 * self.odds;
-        if self.tree.importance(ctx) > 0.0 { odds / (odds + 1.0) } else { 1.0 }
+        odds / (odds + 1.0)
     }
 
     /// Chooses a light by `u` in [0, 1); `None` if there is none.

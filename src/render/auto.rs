@@ -22,18 +22,14 @@
 //! numbers of its own; so the choice adds no bias.
 
 use super::auto_lights;
-use super::auto_pixels::{blocks, pixels};
+use super::auto_measure::{SEED, blocks, measure, pixels};
 use super::auto_reuse;
 pub use super::auto_round::Trial;
 use super::auto_round::{Candidate, Difference, Round};
 use super::visibility_cache::build_visibility_cache;
-use super::worker::Worker;
 use super::{RenderSettings, Run, processor_time};
 use crate::film::PixelBounds;
-use crate::imaging::metrics::difference::DEFAULT_EPSILON;
-use crate::integrators::PathTracer;
-use crate::integrators::path::CameraSample;
-use crate::integrators::reuse::{self, Groups};
+use crate::integrators::reuse;
 use crate::integrators::through_media;
 use crate::scene::RenderJob;
 use crate::settings::{
@@ -62,8 +58,6 @@ const FRACTIONS: [f64; 2] = [0.03, 0.08];
 const TRIALS: [f64; 2] = [11.0, 23.0];
 /// The same of the round that compares light choices.
 const LIGHT_TRIALS: f64 = 3.0;
-/// Combined with the seed of the image and the number of the round.
-const SEED: u32 = 0x61_75_74_6f;
 /// Share of the greatest efficiency, by the model, with which fewer samples will do.
 const NEARLY: f64 = 0.95;
 
@@ -165,7 +159,7 @@ pub(super) fn proposals(job: &RenderJob) -> Option<(u32, StageTimes)> {
         let ris = RisSettings { proposals, ..base.ris };
         Candidate::named(IntegratorSettings { samples: Some(samples), ris, ..base })
     };
-    let round = pilot.round(job, &FIT_RATIOS.map(with_ratio), 0);
+    let round = pilot.round(job, &FIT_RATIOS.map(with_ratio), FIRST_ROUND);
     let ratios = FIT_RATIOS.map(|ratio| [f64::from(ratio), 1.0]);
     let model = round.models(&ratios).remove(0);
     let [ratio, _] = model.best([&RATIOS, &[1]], NEARLY);
@@ -180,10 +174,15 @@ pub(super) fn is_measured(settings: &Settings, bounds: &PixelBounds) -> bool {
     settings.integrator.estimator == EstimatorKind::Auto && Pilot::new(settings, bounds, false).is_some()
 }
 
+/// Numbers of the rounds, on which their pixels and random numbers depend.
+const FIRST_ROUND: usize = 0;
+const SECOND_ROUND: usize = 1;
+const SHARING: usize = 2;
+const LIGHTS: usize = 3;
+
 /// Where a round measures.
 struct Pilot {
-    /// Pixels of the rounds; those of the third are blocks, and the fourth is the one before all others, which may have
-    /// none.
+    /// Pixels of the rounds [`FIRST_ROUND`], [`SECOND_ROUND`], [`SHARING`], by blocks, and [`LIGHTS`], which may have none.
     pixels: [Vec<[u32; 2]>; 4],
     /// Samples of each and seed.
     spp: u32,
@@ -224,14 +223,15 @@ impl Pilot {
         let has_later = job.settings().integrator.depth() > 1;
         let [few, many] = if has_later { FIT_PATH } else { FIT_DIRECT };
         let lights = self.choose_lights(job, few);
-        let base = &job.settings().integrator.clone();
+        let base = job.settings().integrator;
+        let base = &base;
         // First round: the model
         let mut numbers = vec![[few, few], [many, few]];
         if has_later {
             numbers.push([few, many]);
         }
         let candidates: Vec<Candidate> = numbers.iter().map(|&n| Candidate::named(with_samples(base, n))).collect();
-        let first = self.round(job, &candidates, 0);
+        let first = self.round(job, &candidates, FIRST_ROUND);
         let of_light = |n: u32| if has_later { n - 1 } else { n };
         let numbers: Vec<[f64; 2]> = numbers.iter().map(|n| n.map(|n| f64::from(of_light(n)))).collect();
         let model = first.models(&numbers).remove(0);
@@ -248,7 +248,7 @@ impl Pilot {
         if !job.world.scene.media.is_empty() {
             candidates.retain(|c| through_media::obstacle_of(&c.settings).is_none());
         }
-        let second = self.round(job, &candidates, 1);
+        let second = self.round(job, &candidates, SECOND_ROUND);
         let chosen = second.choose(&candidates, predicted);
         let second = second.trials(&candidates);
         let shared = self.share(job, &candidates[chosen].settings, &model);
@@ -272,14 +272,14 @@ impl Pilot {
     /// Before all other rounds: the fraction of light samples for lights at infinity, with `n` samples at each vertex.
     fn choose_lights(&self, job: &mut RenderJob, n: u32) -> Vec<Trial> {
         let base = job.settings().integrator;
-        if self.pixels[3].is_empty() {
+        if self.pixels[LIGHTS].is_empty() {
             return Vec::new();
         }
-        let count = job.lights.tree_choice().infinite.len() as f32;
+        let usual = job.lights.tree_choice().infinite_fraction();
         let candidate = [Candidate::named(with_samples(&base, [n, n]))];
-        let (trials, fraction) = auto_lights::best(count / (count + 1.0), |fraction| {
+        let (trials, fraction) = auto_lights::best(usual, |fraction| {
             job.change(|s| s.integrator.infinite_fraction = fraction);
-            self.round(job, &candidate, 3)
+            self.round(job, &candidate, LIGHTS)
         });
         job.change(|s| s.integrator.infinite_fraction = fraction);
         trials
@@ -289,11 +289,11 @@ impl Pilot {
     fn share(&self, job: &RenderJob, chosen: &IntegratorSettings, model: &Model) -> (Vec<Trial>, IntegratorSettings) {
         let Settings { integrator: base, sampling } = *job.settings();
         let is_open = base.path_reuse.is_none() && sampling.allocation == Allocation::Auto;
-        if !is_open || reuse::obstacle(job).is_some() || self.pixels[2].is_empty() {
+        if !is_open || reuse::obstacle(job).is_some() || self.pixels[SHARING].is_empty() {
             return (Vec::new(), *chosen);
         }
         let candidates = auto_reuse::candidates(chosen);
-        let round = self.round(job, &candidates, 2).by_blocks((auto_reuse::EDGE * auto_reuse::EDGE) as usize);
+        let round = self.round(job, &candidates, SHARING).by_blocks((auto_reuse::EDGE * auto_reuse::EDGE) as usize);
         let trials = round.trials(&candidates);
         let Some(gain) = auto_reuse::best(&round) else { return (trials, *chosen) };
         let mut settings = IntegratorSettings { path_reuse: Some(gain.edge), ..*chosen };
@@ -385,53 +385,6 @@ fn with_photons(job: &mut RenderJob, nanoseconds: f64) -> Vec<Candidate> {
     };
     let numbers: &[u32] = if base.samples.is_some() { &[4] } else { &[2, 4, 8] };
     numbers.iter().map(|&n| contributing(n)).collect()
-}
-
-/// Renders some pixels with each candidate and seed: of each candidate, processor time (ns), and the difference of the two
-/// means of each pixel. The `turn` decides which candidate is first.
-fn measure(
-    run: &Run<'_>,
-    (pixels, spp): (&[[u32; 2]], u32),
-    candidates: &[Candidate],
-    seeds: [u32; 2],
-    turn: usize,
-) -> Vec<(f64, Vec<Difference>)> {
-    let groups = if reuse::obstacle(run.job).is_none() { Groups::Grid } else { Groups::None };
-    let mut worker = Worker::new(PathTracer::sharing(groups, false));
-    let mut times = vec![0.0; candidates.len()];
-    let mut images = vec![[(); 2].map(|()| Vec::<[f64; 3]>::new()); candidates.len()];
-    for k in 0..candidates.len() {
-        let k = (k + turn) % candidates.len();
-        let settings = &candidates[k].settings;
-        let sample_counts = settings.sample_counts();
-        let start = processor_time::of_thread();
-        for (image, seed) in images[k].iter_mut().zip(seeds) {
-            worker.samples.clear();
-            let samples = pixels.iter().map(|&pixel| (0, pixel, 0..spp));
-            run.camera.samples(samples, seed, &mut worker.scratch, &mut worker.samples);
-            worker.samples.iter_mut().for_each(|s| *s = CameraSample { sample_counts, direct: s.stream, ..*s });
-            let out = &mut worker.results;
-            worker.tracer.trace(run.job, settings, &worker.samples, &mut Default::default(), out);
-            image.extend(out.chunks(spp as usize).map(|samples| {
-                let sum = |c: usize| samples.iter().map(|s| f64::from(s.radiance.to_array()[c])).sum::<f64>();
-                [0, 1, 2].map(|c| sum(c) / f64::from(spp))
-            }));
-        }
-        times[k] = (processor_time::of_thread() - start).as_secs_f64() * 1e9;
-    }
-    let all = || images.iter().flatten();
-    let count = all().count() as f64;
-    let difference = |[a, b]: &[Vec<[f64; 3]>; 2], i: usize| {
-        let of_channel = |c: usize| {
-            let mean = all().map(|image| image[i][c]).sum::<f64>() / count;
-            let d = (a[i][c] - b[i][c]).abs() / (mean * mean + DEFAULT_EPSILON).sqrt();
-            if d.is_finite() { d } else { 0.0 }
-        };
-        let channels = [0, 1, 2].map(of_channel);
-        [channels.iter().sum::<f64>() / 3.0, channels.iter().map(|d| d * d).sum::<f64>() / 3.0]
-    };
-    let of_candidate = |images| (0..pixels.len()).map(|i| difference(images, i)).collect();
-    times.into_iter().zip(&images).map(|(time, images)| (time, of_candidate(images))).collect()
 }
 
 #[cfg(test)]

@@ -4,10 +4,9 @@
 //! what counts is how much of the variance it has. Fractions are those of a few binary digits: points of a net whose first
 //! coordinate lies in such an interval are a net again, so that samples of the sky and of the lamps stay well distributed.
 //!
-//! Only variances are compared: what a light sample costs hardly depends on its light, and the choice is the same on any
-//! machine.
+//! Light samples of lamps may take longer than those of the sky, so fractions are compared by efficiency.
 
-use super::auto_round::{MIN_GAIN, Round, Trial, jackknife};
+use super::auto_round::{MIN_GAIN, Round, Trial};
 use crate::lights::LightSampling;
 use crate::settings::IntegratorSettings;
 
@@ -22,53 +21,50 @@ pub(super) fn is_open(lights: &LightSampling, settings: &IntegratorSettings) -> 
     settings.infinite_fraction.is_none() && choice.is_some()
 }
 
-/// The fraction for which the variance is least by what `measure` finds for each, in rounds of one candidate; the trials, of
-/// which the first is that without a choice, whose fraction is `usual`.
+/// The fraction that is most efficient by what `measure` finds for each, in rounds of one candidate; the trials, of which the
+/// first is that without a choice, whose fraction is `usual`.
 pub(super) fn best(usual: f32, mut measure: impl FnMut(Option<f32>) -> Round) -> (Vec<Trial>, Option<f32>) {
-    let mut variances = |fraction| measure(fraction).variances(0);
-    let base = variances(None);
-    let (mut trials, mut best) = (vec![trial(&format!("usual fraction {usual}"), &base, &base)], (None, base.clone()));
+    let base = measure(None);
+    let mut trials = vec![trial("infinite fraction as usual", &base, &base)];
     let above = FRACTIONS.iter().copied().filter(|&f| f > usual);
     let below = FRACTIONS.iter().rev().copied().filter(|&f| f < usual);
     for fractions in [above.collect::<Vec<_>>(), below.collect()] {
+        let mut best: Option<(f32, Round)> = None;
         for fraction in fractions {
-            let found = variances(Some(fraction));
+            let found = measure(Some(fraction));
             trials.push(trial(&format!("infinite fraction {fraction}"), &found, &base));
-            let (gain, error) = gain(&found, &best.1);
+            let (gain, error) = found.gain_over(best.as_ref().map_or(&base, |(_, round)| round));
             if gain <= MIN_GAIN.ln().max(MIN_ERRORS * error) {
                 break;
             }
-            best = (Some(fraction), found);
+            best = Some((fraction, found));
         }
-        if best.0.is_some() {
-            break;
+        if let Some((fraction, _)) = best {
+            return (trials, Some(fraction));
         }
     }
-    (trials, best.0)
+    (trials, None)
 }
 
-/// The logarithm of a variance over another, and its standard error; no gain where either has no noise.
-fn gain(variances: &[f64], base: &[f64]) -> (f64, f64) {
-    jackknife(&variances.iter().zip(base).map(|(v, v_base)| (v_base / v).ln()).collect::<Vec<_>>())
-}
-
-fn trial(name: &str, variances: &[f64], base: &[f64]) -> Trial {
-    let (gain, error) = gain(variances, base);
-    Trial { name: name.to_owned(), nanoseconds: 0.0, variance: variances[0], efficiency: gain.exp(), error }
+fn trial(name: &str, round: &Round, base: &Round) -> Trial {
+    let (gain, error) = round.gain_over(base);
+    let (nanoseconds, variance) = (round.measured[0].0, round.variances(0)[0]);
+    Trial { name: name.to_owned(), nanoseconds, variance, efficiency: gain.exp(), error }
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
 
-    /// The choice where the variance is a/p + b/(1 − p), of which the infinite lights have a, and the fractions measured.
-    fn chosen([a, b]: [f64; 2]) -> (usize, Option<f32>) {
+    /// The choice where the variance is a/p + b/(1 − p), of which the infinite lights have a, and the number of fractions
+    /// measured; the time is 1 + c (1 − p).
+    fn chosen([a, b, c]: [f64; 3]) -> (usize, Option<f32>) {
         let measure = |fraction: Option<f32>| {
             let p = f64::from(fraction.unwrap_or(0.5));
             let variance = a / p + b / (1.0 - p);
             let of_pixel = |i: usize| (0.9 + 0.2 * (i % 7) as f64 / 6.0) * variance;
             let differences = (0..224).map(of_pixel).map(|v| [v.sqrt(), 2.0 * v]).collect();
-            Round { measured: vec![(1.0, differences)], spp: 4, is_direct: false }
+            Round { measured: vec![(1.0 + c * (1.0 - p), differences)], spp: 4, is_direct: false }
         };
         let (trials, fraction) = best(0.5, measure);
         (trials.len(), fraction)
@@ -77,10 +73,12 @@ mod tests {
     #[test]
     fn the_fraction_is_the_best_of_few() {
         // The best is 1/(1 + √(b/a))
-        assert_eq!(chosen([1.0, 1.0]), (3, None));
-        assert_eq!(chosen([9.0, 1.0]), (3, Some(0.75)));
-        assert_eq!(chosen([49.0, 1.0]), (4, Some(0.875)));
-        assert_eq!(chosen([1.0, 9.0]), (4, Some(0.25)));
-        assert_eq!(chosen([0.0, 1.0]), (4, Some(0.125)));
+        assert_eq!(chosen([1.0, 1.0, 0.0]), (3, None));
+        assert_eq!(chosen([9.0, 1.0, 0.0]), (3, Some(0.75)));
+        assert_eq!(chosen([49.0, 1.0, 0.0]), (4, Some(0.875)));
+        assert_eq!(chosen([1.0, 9.0, 0.0]), (4, Some(0.25)));
+        assert_eq!(chosen([0.0, 1.0, 0.0]), (4, Some(0.125)));
+        // Lamps take ten times as long
+        assert_eq!(chosen([1.0, 1.0, 9.0]), (3, Some(0.75)));
     }
 }

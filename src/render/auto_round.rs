@@ -103,14 +103,12 @@ impl Round {
     /// The logarithm of the efficiency of candidate `k` relative to `base`, and its standard error; no gain where either
     /// has no noise to be compared.
     fn gain(&self, k: usize, base: usize) -> (f64, f64) {
-        let [of_k, of_base] = [k, base].map(|k| self.variances(k));
-        let gains: Vec<f64> = of_k.iter().zip(&of_base).map(|(v, v_base)| (v_base / v).ln()).collect();
-        if k == base {
-            return (0.0, 0.0);
-        }
-        let (gain, error) = jackknife(&gains);
-        let times = (self.measured[base].0 / self.measured[k].0).ln();
-        if gain.is_finite() && times.is_finite() { (gain + times, error) } else { (0.0, 0.0) }
+        if k == base { (0.0, 0.0) } else { gain((self, k), (self, base)) }
+    }
+
+    /// The same of the first candidates of two rounds on the same pixels.
+    pub(super) fn gain_over(&self, base: &Round) -> (f64, f64) {
+        gain((self, 0), (base, 0))
     }
 
     /// The models by candidates of which the first has the `numbers` that the others have more of: by all pixels, and
@@ -152,6 +150,13 @@ impl Round {
         };
         candidates.iter().enumerate().map(trial).collect()
     }
+}
+
+fn gain((round, k): (&Round, usize), (of_base, base): (&Round, usize)) -> (f64, f64) {
+    let variances = round.variances(k).into_iter().zip(of_base.variances(base));
+    let (gain, error) = jackknife(&variances.map(|(v, v_base)| (v_base / v).ln()).collect::<Vec<_>>());
+    let times = (of_base.measured[base].0 / round.measured[k].0).ln();
+    if gain.is_finite() && times.is_finite() { (gain + times, error) } else { (0.0, 0.0) }
 }
 
 /// A value, and its standard error, which includes that of two times, from what it is with all pixels and without each of

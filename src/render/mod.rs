@@ -7,7 +7,7 @@
 pub mod allocation;
 pub mod auto;
 mod auto_lights;
-mod auto_pixels;
+mod auto_measure;
 mod auto_reuse;
 mod auto_round;
 pub mod bench;
