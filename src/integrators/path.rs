@@ -22,6 +22,7 @@ use crate::bsdfs::{Bsdf, Diffuse};
 use crate::direct::{DirectStage, Estimator, Fits, ShadingPoint};
 use crate::film::PixelSample;
 use crate::materials::SurfaceBsdf;
+use crate::media::Sides;
 use crate::scene::RenderJob;
 use crate::settings::IntegratorSettings;
 use lumiris_numbers::math::Rgb;
@@ -164,8 +165,8 @@ impl PathTracer {
         fits: &mut Fits,
         out: &mut [PixelSample],
     ) {
-        let (depth, media) = (settings.depth(), &job.world.scene.media);
-        let is_emissive = media.is_emissive();
+        let depth = settings.depth();
+        let is_emissive = job.world.scene.media.is_emissive();
         fits.begin_batch(samples.len());
         let is_plain = own.is_none() && self.outcomes.is_none();
         self.reuse.begin(settings.path_reuse.filter(|_| is_plain), samples.len());
@@ -174,7 +175,7 @@ impl PathTracer {
             if count == 0 {
                 break;
             }
-            let estimate = Estimate::new(settings, vertex).filter(|_| is_plain && media.is_empty());
+            let estimate = Estimate::new(settings, vertex).filter(|_| is_plain && !job.shadows_cross_media());
             let room = count * self.search.arrivals.max_paths() as usize;
             let mut batch = estimate.map(|e| Batch::new(self.buffers.take().unwrap_or_default(), e, room));
             let stage = Stage { job, vertex, depth, samples, out: &mut *out, batch: batch.as_mut() };
@@ -243,6 +244,9 @@ impl PathTracer {
         let Some(reuse) = self.reuse.active() else { return };
         for (path, v) in self.search.active.iter_mut().zip(&step.vertices) {
             let Bsdf::Diffuse(Diffuse { reflectance }) = v.bsdf.bsdf else { continue };
+            if v.media != Sides::default() {
+                continue;
+            }
             let at = Place::new((v.surface.p, v.surface.p_error), (v.bsdf.n, v.bsdf.frame.z), v.wo);
             let radiance = &mut out[path.sample as usize].radiance;
             path.beta = reuse.arrive((path.sample, step.vertex, v.is_next), at, (path.beta, reflectance), radiance);

@@ -46,7 +46,7 @@ pub fn obstacle(job: &RenderJob) -> Option<&'static str> {
         (settings.kind != IntegratorKind::Path, "only the integrator path has paths of its own for each pixel"),
         (settings.roulette != RouletteKind::Throughput, "they split"),
         (job.pixel_samples.is_some(), "pixels have different numbers of samples"),
-        (!job.world.scene.media.is_empty(), "there are media between their vertices"),
+        (job.shadows_cross_media(), "there may be media between their vertices"),
         (light_layers::count(job) > 0, "light groups have layers (--light-groups none: they have not)"),
         (geometry.has_motion() || is_cut_out, "what a ray meets varies with time or is cut out at random"),
     ];

@@ -150,7 +150,7 @@ impl VertexSearch {
     /// this is none.
     #[inline]
     fn take_plain(&mut self, at: &mut Stage<'_, '_>, path: &PathState, hit: &Hit) -> bool {
-        let Some(batch) = &mut at.batch else { return false };
+        let Some(batch) = at.batch.as_mut().filter(|_| path.medium.is_none()) else { return false };
         let Some(rho) = at.job.plain_reflectance(hit) else { return false };
         let Some(beta) = path.beta_beyond_emitter() else { return true };
         let distance = hit.t * path.ray.d.length();
@@ -207,16 +207,15 @@ impl VertexSearch {
         let (surface, wo) = (interaction.surface, interaction.wo);
         let place = || (surface.p, if surface.n.dot(wo) < 0.0 { -surface.n } else { surface.n });
         let count = self.arrivals.arrive((sample, out.radiance), at.vertex, &mut carried, place);
-        let parent = carried.branch;
+        let (parent, media) = (carried.branch, interaction.sides(at.job, path.medium));
         for index in 0..count {
             carried.branch = self.arrivals.branch(sample, parent, at.vertex, (count, index));
             let streams = self.arrivals.streams(sample, carried.branch);
             let is_taken = |batch: &mut &mut Batch<'w>| batch.push_vertex(&carried, &interaction, &bsdf, streams);
-            if at.batch.as_mut().is_some_and(is_taken) {
+            if media == Sides::default() && at.batch.as_mut().is_some_and(is_taken) {
                 continue;
             }
             let [stream, direct] = streams.map(|s| s.domain(domain::VERTEX + at.vertex));
-            let media = interaction.sides(at.job, path.medium);
             self.keep(path, &carried);
             vertices.push(Vertex { surface, bsdf, wo, stream, direct, is_next: path.passed == 0, media });
         }

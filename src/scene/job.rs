@@ -27,6 +27,8 @@ pub struct RenderJob {
     plain: Vec<Option<Rgb>>,
     /// Geometries that rays may pass: those of materials that are no surface, at least somewhere.
     may_pass: Vec<bool>,
+    /// See [`Self::shadows_cross_media`].
+    shadows_cross_media: bool,
 }
 
 impl RenderJob {
@@ -39,7 +41,8 @@ impl RenderJob {
         let has_alpha = |geometry: GeometryId| scene.geometry.geometries[geometry as usize].alpha.is_some();
         let irradiances = Irradiances::new(&scene.lights, has_alpha);
         let plain = (0..scene.geometry.geometries.len() as GeometryId).map(|g| plain_reflectance(scene, g)).collect();
-        let may_pass = scene.surfaces.iter().map(|surface| scene.materials.may_pass(surface.material)).collect();
+        let may_pass: Vec<bool> = scene.surfaces.iter().map(|s| scene.materials.may_pass(s.material)).collect();
+        let shadows_cross_media = !scene.media.is_empty() && may_pass.contains(&true);
         RenderJob {
             world,
             settings,
@@ -50,6 +53,7 @@ impl RenderJob {
             lobes,
             plain,
             may_pass,
+            shadows_cross_media,
         }
     }
 
@@ -64,10 +68,18 @@ impl RenderJob {
         self.pixel_samples = None;
     }
 
-    /// The reflectance at a hit of a mesh in world space that does not emit and reflects the same everywhere.
+    /// The reflectance at a hit of a mesh in world space that does not emit, reflects the same everywhere, and has the same
+    /// medium on both sides.
     #[inline]
     pub fn plain_reflectance(&self, hit: &Hit) -> Option<Rgb> {
         if hit.instance == Hit::NO_INSTANCE { self.plain[hit.geometry as usize] } else { None }
+    }
+
+    /// True if shadow segments may come into a medium on their way: through a surface that only bounds it. Without one,
+    /// segments that begin in empty space stay there.
+    #[inline]
+    pub fn shadows_cross_media(&self) -> bool {
+        self.shadows_cross_media
     }
 
     /// True if rays may pass what they have hit: the material there may be no surface.
@@ -120,9 +132,10 @@ impl RenderJob {
 
 /// See [`RenderJob::plain_reflectance`].
 fn plain_reflectance(scene: &Scene, geometry: GeometryId) -> Option<Rgb> {
+    let is_between_media = scene.surfaces[geometry as usize].sides.is_some();
     let is_mesh = matches!(scene.geometry.geometries[geometry as usize].shape, Shape::Mesh(_));
     let reflectance = scene.materials.plain_reflectance(scene.surfaces[geometry as usize].material, &scene.textures)?;
-    (is_mesh && !scene.lights.emits(geometry)).then_some(reflectance)
+    (is_mesh && !is_between_media && !scene.lights.emits(geometry)).then_some(reflectance)
 }
 
 /// Maximum number of groups of lights: the components of a mixture other than `lobes`.

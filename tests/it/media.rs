@@ -71,6 +71,22 @@ fn assert_answer(job: &mut RenderJob, spp: u32, answer: [f64; 3], detects: f64, 
     }
 }
 
+/// Means with their standard errors are those of all, weighted by what is known of each; a relative difference of `detects`
+/// would be found with a probability above 0.99.
+#[track_caller]
+fn assert_they_agree(answers: &[(String, ([f64; 3], [f64; 3]))], detects: f64) {
+    for c in 0..3 {
+        let weight = |error: &[f64; 3]| 1.0 / error[c].powi(2);
+        let sum: f64 = answers.iter().map(|(_, (_, error))| weight(error)).sum();
+        let mean = answers.iter().map(|(_, (mean, error))| mean[c] * weight(error)).sum::<f64>() / sum;
+        for (what, (found, error)) in answers {
+            let text = format!("{what}: channel {c} is {} ± {}, others {mean}", found[c], error[c]);
+            assert!((found[c] - mean).abs() < LIMIT * error[c], "{text}");
+            assert!(8.0 * error[c] < detects * mean, "too much noise: {text}");
+        }
+    }
+}
+
 /// All settings that know media.
 fn estimators() -> Vec<(String, IntegratorSettings)> {
     let base = |estimator, samples: u32| IntegratorSettings { estimator, samples: Some(samples), ..Default::default() };
@@ -346,18 +362,40 @@ fn estimators_and_ray_tracers_agree_in_fog_with_surfaces() {
                 answers.push((format!("{estimator}, {accel:?}, {depth} bounces"), means(&mut job, 24)));
             }
         }
-        // The mean of all, weighted by what is known of each
-        for c in 0..3 {
-            let weight = |error: &[f64; 3]| 1.0 / error[c].powi(2);
-            let sum: f64 = answers.iter().map(|(_, (_, error))| weight(error)).sum();
-            let mean = answers.iter().map(|(_, (mean, error))| mean[c] * weight(error)).sum::<f64>() / sum;
-            for (what, (found, error)) in &answers {
-                let text = format!("{what}: channel {c} is {} ± {}, others {mean}", found[c], error[c]);
-                assert!((found[c] - mean).abs() < LIMIT * error[c], "{text}");
-                assert!(8.0 * error[c] < 0.25 * mean, "too much noise: {text}");
-            }
-        }
+        assert_they_agree(&answers, 0.25);
     }
+}
+
+/// Where media lie behind glass only, shadow segments never come into one: `mis` has its columns, and pixels share paths. A
+/// wall behind a ball of coloured glass, in a corner of white walls.
+#[test]
+fn behind_glass_alone_media_leave_shadow_segments_and_shared_paths_as_they_are() {
+    let text = |sigma: &str| {
+        camera("0.1 0.1 3", "", 6)
+            + &format!(
+                r#"MakeNamedMedium "green" "rgb sigma_a" [{sigma}] "rgb sigma_s" [0 0 0]
+                AttributeBegin MediumInterface "green" "" Material "dielectric" Shape "sphere" "float radius" 0.5 AttributeEnd
+                Material "diffuse" "rgb reflectance" [0.8 0.8 0.8]
+                Shape "trianglemesh" "point3 P" [-2 -2 -1  2 -2 -1  2 2 -1  -2 2 -1] "integer indices" [0 1 2 0 2 3]
+                Shape "trianglemesh" "point3 P" [-2 -2 -1  2 -2 -1  2 -2 4  -2 -2 4] "integer indices" [0 1 2 0 2 3]
+                AttributeBegin MediumInterface "green" "green" Shape "sphere" "float radius" 0.1 AttributeEnd
+                AreaLightSource "diffuse" "rgb L" [5 5 5] "bool twosided" true
+                Shape "trianglemesh" "point3 P" [-1 2 -0.5  1 2 -0.5  1 2 1.5  -1 2 1.5] "integer indices" [0 1 2 0 2 3]"#
+            )
+    };
+    let mut job = job(&text("0.2 0.5 1"), AccelKind::Embree);
+    assert_eq!(reuse::obstacle(&job), None);
+    let mut answers = Vec::new();
+    for (estimator, samples, edge) in
+        [(EstimatorKind::Ris, 2, 1), (EstimatorKind::Mis, 2, 1), (EstimatorKind::Mis, 4, 1), (EstimatorKind::Mis, 2, 4)]
+    {
+        job.change(|s| {
+            (s.integrator.estimator, s.integrator.samples) = (estimator, Some(samples));
+            (s.integrator.path_reuse, s.integrator.ris.proposals) = (Some(edge), Proposals::Fixed(8));
+        });
+        answers.push((format!("{estimator:?} {samples}, blocks of {edge}"), means(&mut job, 256)));
+    }
+    assert_they_agree(&answers, 0.1);
 }
 
 /// Beyond the last vertex, too, a medium glows: before a wall of reflectance ρ in what absorbs and emits, without end,
