@@ -43,8 +43,11 @@ fn film(job: &RenderJob, settings: RenderSettings) -> Film {
     render(job, &settings, &AtomicBool::new(false), &|_| ()).unwrap().film
 }
 
-/// Means and standard errors of the channels over images.
-fn means(job: &mut RenderJob, spp: u32) -> ([f64; 3], [f64; 3]) {
+/// Means and standard errors of the channels.
+type Answer = ([f64; 3], [f64; 3]);
+
+/// Those over images.
+fn means(job: &mut RenderJob, spp: u32) -> Answer {
     let image = |seed| {
         job.change(|s| s.sampling.seed = seed);
         let film = film(job, RenderSettings { spp, ..RenderSettings::default() });
@@ -74,7 +77,7 @@ fn assert_answer(job: &mut RenderJob, spp: u32, answer: [f64; 3], detects: f64, 
 /// Means with their standard errors are those of all, weighted by what is known of each; a relative difference of `detects`
 /// would be found with a probability above 0.99.
 #[track_caller]
-fn assert_they_agree(answers: &[(String, ([f64; 3], [f64; 3]))], detects: f64) {
+fn assert_they_agree(answers: &[(String, Answer)], detects: f64) {
     for c in 0..3 {
         let weight = |error: &[f64; 3]| 1.0 / error[c].powi(2);
         let sum: f64 = answers.iter().map(|(_, (_, error))| weight(error)).sum();
