@@ -5,8 +5,11 @@
 //! callers with t upwards flip it. A filter of width w in (s, t) reads the level ℓ = levels − 1 + log₂ w, as in
 //! pbrt-v4.
 
+use super::tiles::{TILE, TileStore};
 use super::{ColorEncoding, Image};
 use lumiris_numbers::math::{Rgb, Vec2};
+use std::io;
+use std::sync::Arc;
 
 /// What lies outside the image.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
@@ -71,6 +74,37 @@ enum Texels {
     Bytes(Vec<u8>),
     /// Linear.
     Floats(Vec<f32>),
+    /// Either, in tiles.
+    Tiled(Tiled),
+}
+
+/// Tiles of a level, row-major; those at the right and lower edges are as large as all others.
+#[derive(Clone, Debug)]
+struct Tiled {
+    store: Arc<TileStore>,
+    /// Where the first one begins.
+    first: u64,
+    /// Tiles in a row.
+    columns: usize,
+    /// Bytes of a channel: 1 if they are stored by the byte table, or 4.
+    channel_bytes: usize,
+}
+
+impl Tiled {
+    /// The first `N` channels of a pixel.
+    #[inline]
+    fn values<const N: usize>(&self, channels: usize, [x, y]: [usize; 2], table: &[f32; 256]) -> [f32; N] {
+        let pixel_bytes = channels * self.channel_bytes;
+        let tile_bytes = TILE * TILE * pixel_bytes;
+        let tile = (y / TILE) * self.columns + x / TILE;
+        let at = (y % TILE * TILE + x % TILE) * pixel_bytes;
+        self.store.with_tile(self.first + (tile * tile_bytes) as u64, tile_bytes, |bytes| {
+            std::array::from_fn(|c| match self.channel_bytes {
+                1 => table[usize::from(bytes[at + c])],
+                _ => bytes[at + 4 * c..].first_chunk().map_or(0.0, |word| f32::from_ne_bytes(*word)),
+            })
+        })
+    }
 }
 
 #[derive(Clone, Debug)]
@@ -78,6 +112,34 @@ struct Level {
     width: usize,
     height: usize,
     texels: Texels,
+}
+
+impl Level {
+    /// Writes the pixels, which are not in tiles yet, to `store`.
+    fn tiles(&self, channels: usize, store: &Arc<TileStore>) -> io::Result<Tiled> {
+        let [columns, rows] = [self.width, self.height].map(|n| n.div_ceil(TILE));
+        let channel_bytes = if matches!(self.texels, Texels::Bytes(_)) { 1 } else { 4 };
+        let row_bytes = TILE * channels * channel_bytes;
+        // In one piece, since images that are read at once append to the same store
+        let mut all = vec![0; columns * rows * TILE * row_bytes];
+        for (tile, bytes) in all.chunks_exact_mut(TILE * row_bytes).enumerate() {
+            let (x0, y0) = (tile % columns * TILE, tile / columns * TILE);
+            let count = TILE.min(self.width - x0) * channels;
+            for (y, bytes) in (y0..self.height).zip(bytes.chunks_exact_mut(row_bytes)) {
+                let begin = (y * self.width + x0) * channels;
+                match &self.texels {
+                    Texels::Bytes(v) => bytes[..count].copy_from_slice(&v[begin..begin + count]),
+                    Texels::Floats(v) => {
+                        for (word, value) in bytes.chunks_exact_mut(4).zip(&v[begin..begin + count]) {
+                            word.copy_from_slice(&value.to_ne_bytes());
+                        }
+                    }
+                    Texels::Tiled(_) => {}
+                }
+            }
+        }
+        Ok(Tiled { store: Arc::clone(store), first: store.append(&all)?, columns, channel_bytes })
+    }
 }
 
 /// A pyramid of an image of one or three channels.
@@ -202,7 +264,7 @@ impl MipMap {
             }
         }
         let texels = match source.texels {
-            Texels::Floats(_) => Texels::Floats(values),
+            Texels::Floats(_) | Texels::Tiled(_) => Texels::Floats(values),
             Texels::Bytes(_) => Texels::Bytes(values.iter().map(|&v| nearest.of(v)).collect()),
         };
         Some(Level { width, height, texels })
@@ -223,11 +285,31 @@ impl MipMap {
         self.levels.len()
     }
 
-    /// Memory of the pixels (bytes).
+    /// The same with levels of more than a tile in `store`. `Err` if that cannot be written.
+    pub fn tiled(mut self, store: &Arc<TileStore>) -> io::Result<Self> {
+        let channels = self.channels;
+        for level in &mut self.levels {
+            if level.width * level.height > TILE * TILE {
+                level.texels = Texels::Tiled(level.tiles(channels, store)?);
+            }
+        }
+        Ok(self)
+    }
+
+    /// The store of its tiles, if it has any.
+    pub fn store(&self) -> Option<&Arc<TileStore>> {
+        match &self.levels[0].texels {
+            Texels::Tiled(tiled) => Some(&tiled.store),
+            Texels::Bytes(_) | Texels::Floats(_) => None,
+        }
+    }
+
+    /// Memory of the pixels (bytes), but for tiles.
     pub fn bytes(&self) -> usize {
         let of_level = |level: &Level| match &level.texels {
             Texels::Bytes(v) => v.len(),
             Texels::Floats(v) => v.len() * size_of::<f32>(),
+            Texels::Tiled(_) => 0,
         };
         self.levels.iter().map(of_level).sum()
     }
@@ -238,6 +320,8 @@ impl MipMap {
         match &level.texels {
             Texels::Bytes(v) => self.table[usize::from(v[i])],
             Texels::Floats(v) => v[i],
+            Texels::Tiled(tiled) if c == 0 => tiled.values::<1>(self.channels, [x, y], &self.table)[0],
+            Texels::Tiled(tiled) => tiled.values::<3>(self.channels, [x, y], &self.table)[c],
         }
     }
 
@@ -247,6 +331,9 @@ impl MipMap {
         let Some((x, y)) = self.wrap_pixel(level, x, y) else { return Rgb::BLACK };
         if self.channels == 1 {
             return Rgb::splat(self.texel_in(level, x, y, 0));
+        }
+        if let Texels::Tiled(tiled) = &level.texels {
+            return Rgb::from_array(tiled.values(self.channels, [x, y], &self.table));
         }
         Rgb::new(self.texel_in(level, x, y, 0), self.texel_in(level, x, y, 1), self.texel_in(level, x, y, 2))
     }
@@ -450,6 +537,28 @@ mod tests {
         assert_eq!(at(0.0), at(1.0 / 64.0));
         let mean = image.data.iter().step_by(3).sum::<f32>() / 256.0;
         assert!((at(0.5) - mean).abs() < 1e-5);
+    }
+
+    #[test]
+    fn tiles_hold_the_same_numbers() {
+        for (w, h) in [(200, 130), (64, 65), (64, 64), (1, 5000)] {
+            let bytes = image(w, h, |x, y| [0, 1, 2].map(|c| ((x * 7 + y * 13 + c * 5) % 256) as f32 / 255.0));
+            let floats = image(w, h, |x, y| [0, 1, 2].map(|c| (x * 31 + y * 17 + c) as f32 * 0.013));
+            for image in [bytes, floats] {
+                let map = MipMap::new(&image, Wrap::Repeat, Filter::Trilinear, ColorEncoding::Srgb);
+                let store = Arc::new(TileStore::new(200_000).unwrap());
+                let tiled = map.clone().tiled(&store).unwrap();
+                assert_eq!(tiled.store().is_some(), w * h > TILE * TILE);
+                assert!(tiled.bytes() < map.bytes() || w * h <= TILE * TILE);
+                for i in 0..3000_usize {
+                    let (level, x, y) = (i % map.levels(), (i * 37 % (2 * w)) as i64, (i * 101 % (2 * h)) as i64);
+                    assert_eq!(tiled.texel(level, x, y), map.texel(level, x, y));
+                    let st = Vec2::new(i as f32 * 0.01, i as f32 * 0.037);
+                    let width = Vec2::splat(0.001 * (i % 97) as f32);
+                    assert_eq!(tiled.lookup(st, width), map.lookup(st, width));
+                }
+            }
+        }
     }
 
     #[test]

@@ -1,6 +1,6 @@
 //! Images: pixels with named channels, their encodings, pyramids for filtered lookups, and metrics of their difference.
 //!
-//! Reading order: [`color`], [`view_transform`], [`mipmap`], [`mod@file`], [`oiio`], [`file_parts`], [`oidn`],
+//! Reading order: [`color`], [`view_transform`], [`tiles`], [`mipmap`], [`mod@file`], [`oiio`], [`file_parts`], [`oidn`],
 //! [`metrics`], [`compare`], [`heat`].
 
 pub mod color;
@@ -12,6 +12,7 @@ pub mod metrics;
 pub mod mipmap;
 pub mod oidn;
 pub mod oiio;
+pub mod tiles;
 pub mod view_transform;
 
 pub use color::ColorEncoding;

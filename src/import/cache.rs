@@ -3,15 +3,20 @@
 //! A file is the same as before if its name, its size and the time of its last change are. What a scene has not used is
 //! dropped when the next one has been loaded ([`FileCache::end_scene`]), so that memory holds what two scenes need at
 //! most. Text of scene files is not kept: it is what differs.
+//!
+//! Where the textures of a scene are not to take more than so much memory, the largest of them are in tiles of a temporary
+//! file ([`crate::imaging::tiles`]), and all others are in memory: of the limit, half or more is left for the tiles in use.
 
 use super::images::{ImageChannels, ImageEncoding, ImageRequest, RgbImage, load_map, load_rgb};
-use crate::imaging::oiio::ImageError;
+use crate::imaging::oiio::{ImageError, texture_bytes};
+use crate::imaging::tiles::TileStore;
 use crate::imaging::{Filter, MipMap, Wrap};
 use lumiris_formats::ply::{PlyError, PlyMesh, read_ply};
 use std::collections::HashMap;
+use std::io;
 use std::path::{Path, PathBuf};
 use std::sync::atomic::{AtomicU64, Ordering};
-use std::sync::{Arc, Mutex, PoisonError};
+use std::sync::{Arc, Mutex, OnceLock, PoisonError};
 use std::time::SystemTime;
 
 /// What tells a file from what it was before.
@@ -94,12 +99,70 @@ pub struct FileCache {
     images: Shelf<(), RgbImage>,
     read: AtomicU64,
     shared: AtomicU64,
+    /// Most bytes of the textures of a scene.
+    texture_memory: OnceLock<u64>,
+    /// Textures that are read into tiles: one after the other, since each is in memory as a whole for that time.
+    tiling: Mutex<()>,
+}
+
+/// Where the textures of a scene go.
+#[derive(Debug, Default)]
+pub struct TexturePlan {
+    /// For tiles; `None` if everything fits into memory.
+    store: Option<Arc<TileStore>>,
+    /// True for each image that goes there.
+    is_tiled: Vec<bool>,
 }
 
 impl FileCache {
     /// A cache for several scenes.
     pub fn keeping() -> Self {
         FileCache { keeps: true, ..FileCache::default() }
+    }
+
+    /// Lets the textures of each scene take at most so many bytes of memory. What was said first holds.
+    pub fn limit_textures(&self, bytes: u64) {
+        self.texture_memory.get_or_init(|| bytes);
+    }
+
+    /// Where the images of `requests` go, by the sizes that their headers tell. `Err` where there is no temporary file.
+    pub fn plan_textures<'a>(&self, requests: impl Iterator<Item = &'a ImageRequest>) -> io::Result<TexturePlan> {
+        let Some(&limit) = self.texture_memory.get() else { return Ok(TexturePlan::default()) };
+        // Coarser levels add a third. What cannot be read takes nothing: reading it is the error
+        let pyramid = |request: &ImageRequest| texture_bytes(&request.path).map_or(0, |b| b.saturating_add(b / 3));
+        let bytes: Vec<u64> = requests.map(pyramid).collect();
+        let mut in_memory = bytes.iter().fold(0_u64, |sum, &b| sum.saturating_add(b));
+        if in_memory <= limit {
+            return Ok(TexturePlan::default());
+        }
+        let mut by_size: Vec<usize> = (0..bytes.len()).collect();
+        by_size.sort_by_key(|&i| (std::cmp::Reverse(bytes[i]), i));
+        let mut is_tiled = vec![false; bytes.len()];
+        for i in by_size {
+            if in_memory <= limit / 2 {
+                break;
+            }
+            is_tiled[i] = true;
+            in_memory -= bytes[i];
+        }
+        Ok(TexturePlan { store: Some(Arc::new(TileStore::new(limit - in_memory)?)), is_tiled })
+    }
+
+    /// The pyramid of image `index` of a plan.
+    pub fn planned_map(
+        &self,
+        plan: &TexturePlan,
+        index: usize,
+        request: &ImageRequest,
+    ) -> Result<Arc<MipMap>, ImageError> {
+        let (Some(store), Some(true)) = (&plan.store, plan.is_tiled.get(index)) else { return self.map(request) };
+        let _alone = self.tiling.lock().unwrap_or_else(PoisonError::into_inner);
+        let tiled = load_map(request)?.tiled(store).map_err(|error| {
+            let reason = format!("does not fit into the temporary file for tiles of textures: {error}");
+            ImageError::Unreadable { path: request.path.clone(), reason }
+        })?;
+        self.read.fetch_add(1, Ordering::Relaxed);
+        Ok(Arc::new(tiled))
     }
 
     /// True if contents are kept: a scene then gets copies of meshes.

@@ -1,6 +1,6 @@
 //! Image files of a scene: each is requested once, and all are read in parallel.
 
-use super::cache::FileCache;
+use super::cache::{FileCache, TexturePlan};
 use super::images::ImageRequest;
 use crate::imaging::MipMap;
 use crate::imaging::oiio::ImageError;
@@ -39,7 +39,12 @@ impl Resources {
 
     /// Reads all images, in the order of their ids; errors go to `d`.
     pub fn load(&self, files: &FileCache, d: &mut Diagnostics) -> Vec<Arc<MipMap>> {
-        let loaded: Vec<_> = self.requests.par_iter().map(|(request, _)| files.map(request)).collect();
+        let plan = files.plan_textures(self.requests.iter().map(|(request, _)| request)).unwrap_or_else(|error| {
+            d.error_without_place(&format!("there is no temporary file for tiles of textures: {error}"));
+            TexturePlan::default()
+        });
+        let requests = self.requests.par_iter().enumerate();
+        let loaded: Vec<_> = requests.map(|(i, (request, _))| files.planned_map(&plan, i, request)).collect();
         let mut maps = Vec::with_capacity(loaded.len());
         for (result, (request, span)) in loaded.into_iter().zip(&self.requests) {
             match result {

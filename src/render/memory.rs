@@ -56,7 +56,7 @@ pub struct Prediction {
     pub film: u64,
     /// The rows that are being written.
     pub output: u64,
-    /// What any image takes: libraries, and the batches of threads.
+    /// What any image takes: libraries, and the batches of threads; and tiles of textures that are not in memory yet.
     pub fixed: u64,
 }
 
@@ -80,7 +80,9 @@ pub fn predict(job: &RenderJob, wanted: &Wanted<'_>) -> Prediction {
     Prediction {
         film: (pixels * (share * of_sums(job, render) + whole)) as u64,
         output: (width * band) as u64,
-        fixed: LIBRARIES + THREAD * threads as u64,
+        fixed: LIBRARIES
+            + THREAD * threads as u64
+            + job.world.scene.textures.stores().map(|s| s.capacity()).sum::<u64>(),
     }
 }
 

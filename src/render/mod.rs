@@ -158,6 +158,9 @@ pub enum RenderError {
     /// There are media, and the settings leave them out.
     #[error("{0}")]
     Media(String),
+    /// Texels could not be read while rendering.
+    #[error("{0}")]
+    Texels(String),
     /// The sums to go on from are those of something else.
     #[error(transparent)]
     Stored(#[from] PartError),
@@ -194,7 +197,12 @@ pub fn go_on(
     }
     let pool = thread_pool(settings.threads)?;
     let threads = pool.current_num_threads();
-    pool.install(|| Run::new(job, settings, stop, observe).run(threads, continuation))
+    let rendering = pool.install(|| Run::new(job, settings, stop, observe).run(threads, continuation))?;
+    // Some of its samples would be wrong
+    match job.world.scene.textures.stores().find_map(|store| store.failure()) {
+        Some(failure) => Err(RenderError::Texels(failure.to_owned())),
+        None => Ok(rendering),
+    }
 }
 
 /// True if the samples of a pixel depend on earlier ones: it cannot be divided into parts.

@@ -9,6 +9,7 @@ pub use crate::imaging::{Filter, Wrap};
 pub use mapping::{CheckerboardMapping, Mapping2d};
 
 use crate::imaging::MipMap;
+use crate::imaging::tiles::TileStore;
 use lumiris_numbers::math::{Rgb, Vec2, Vec3};
 use std::sync::Arc;
 
@@ -206,6 +207,17 @@ impl TextureSet {
         assert!(known, "a texture refers to earlier ones only");
         self.rgbs.push(texture);
         id
+    }
+
+    /// Where the texels are that do not fit into memory.
+    pub fn stores(&self) -> impl Iterator<Item = &TileStore> {
+        let mut seen: Vec<*const TileStore> = Vec::new();
+        let stores = self.images.iter().filter_map(|image| image.store());
+        stores.map(|store| &**store).filter(move |&store| {
+            let is_new = !seen.contains(&std::ptr::from_ref(store));
+            seen.push(store);
+            is_new
+        })
     }
 
     /// Adds an image.

@@ -20,5 +20,5 @@ pub use super::file::{ImageError, PartHeader, ReadLimits, Window};
 pub use ocio::{OcioView, ocio_display};
 pub use part::{MetaValue, Part, Storage};
 pub(super) use read::{Input, read_failure};
-pub use read::{ReadImage, read_headers, read_image, read_metadata, read_part};
+pub use read::{ReadImage, read_headers, read_image, read_metadata, read_part, texture_bytes};
 pub use write::{ROWS_AT_ONCE, RowSource, write_image, write_rows};

@@ -202,6 +202,17 @@ pub fn read_headers(path: &Path) -> Result<Vec<PartHeader>, ImageError> {
     Ok(headers)
 }
 
+/// Bytes that the pixels of the first part take as a texture, without coarser levels: one for each 8-bit number, four for any
+/// other. Reads no pixels.
+pub fn texture_bytes(path: &Path) -> Result<u64, ImageError> {
+    let input = Input::open(path, 0)?;
+    let spec = input.spec().map_err(|failure| read_failure(path, failure))?;
+    let [width, height, channels] = [spec.width, spec.height, spec.nchannels].map(|n| u64::try_from(n).unwrap_or(0));
+    let bytes = if spec.format == sys::OIIO_FORMAT_U8 { 1 } else { 4 };
+    let channels = if channels < 3 { channels.min(1) } else { 3 };
+    Ok(width.saturating_mul(height).saturating_mul(channels * bytes))
+}
+
 /// The error of a file that was not read.
 pub(in crate::imaging) fn read_failure(path: &Path, (code, reason): (i32, String)) -> ImageError {
     let path = path.to_owned();

@@ -44,6 +44,10 @@ pub(super) struct SceneArgs {
     /// Frame a glTF scene from the front, whatever its cameras
     #[arg(long)]
     pub camera_auto: bool,
+    /// Memory that the textures of the scene may take, such as 2GB, or `off`: what does not fit is read by tiles from a
+    /// temporary file (in TMPDIR). The image is the same to the bit [default: off]
+    #[arg(long, value_name = "SIZE", value_parser = parse_limit)]
+    pub texture_memory: Option<MemoryLimit>,
     /// Use a box filter of one pixel instead of the file's pixel filter
     #[arg(long)]
     pub box_filter: bool,

@@ -91,6 +91,8 @@ fn facts(job: &RenderJob) -> Value {
             "geometry_bytes": geometry_bytes(scene),
             "medium_bytes": scene.media.media.iter().map(|m| m.bytes() as u64).sum::<u64>(),
             "texture_bytes": scene.textures.images.iter().map(|i| i.bytes() as u64).sum::<u64>(),
+            "texture_bytes_in_tiles": scene.textures.stores().map(|s| s.counts().stored).sum::<u64>(),
+            "texture_tiles_at_most_bytes": scene.textures.stores().map(|s| s.capacity()).sum::<u64>(),
             "accel_bytes": accel.bytes, "accel_peak_bytes": accel.peak_bytes,
             "taken_bytes": taken(),
             "predicted_with_all_layers": predicted(job, true),

@@ -16,6 +16,7 @@ use crate::watch::{self, Watch};
 use anyhow::{Context, bail};
 use lumiris::film::{Film, Summary};
 use lumiris::imaging::oidn::Denoiser;
+use lumiris::imaging::tiles::TileCounts;
 use lumiris::import::cache::FileCache;
 use lumiris::integrators::light_layers;
 use lumiris::integrators::photon_map::MapStats;
@@ -297,6 +298,7 @@ fn asked_aovs(args: &RenderArgs) -> anyhow::Result<Option<Vec<Aov>>> {
 fn stats(args: &RenderArgs, job: &RenderJob, rendering: &Rendering, setup: SetupTimes) -> serde_json::Value {
     let s = &rendering.stats;
     let d = &s.direct;
+    let textures = &job.world.scene.textures;
     let seconds = |t: Duration| t.as_secs_f64();
     let mrays = |count: u64, t: Duration| count as f64 / seconds(t).max(1e-12) * 1e-6;
     let accel = job.world.accel.stats();
@@ -331,10 +333,16 @@ fn stats(args: &RenderArgs, job: &RenderJob, rendering: &Rendering, setup: Setup
         },
         "memory": {
             "film_bytes": rendering.film.bytes(), "accel_bytes": accel.bytes, "accel_peak_bytes": accel.peak_bytes,
+            "texture_bytes": textures.images.iter().map(|image| image.bytes()).sum::<usize>(),
+            "texture_tiles": textures.stores().map(|store| tile_counts(store.counts())).collect::<Vec<_>>(),
         },
         "photon_maps": rendering.photons.map(|p| photon_stats(&p)),
         "irradiance_cache": rendering.cache.map(|c| cache_stats(&c)),
     })
+}
+
+fn tile_counts(TileCounts { stored, read, held }: TileCounts) -> serde_json::Value {
+    json!({ "stored_bytes": stored, "tiles_read": read, "held_bytes": held })
 }
 
 fn photon_stats(p: &MapStats) -> serde_json::Value {

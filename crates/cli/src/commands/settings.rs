@@ -2,6 +2,7 @@
 
 use super::UsageError;
 use super::args::SceneArgs;
+use super::memory::MemoryLimit;
 use super::pictures::is_picture;
 use super::plan_file::PlanFile;
 use super::progress;
@@ -40,6 +41,9 @@ pub(super) fn load_scene(args: &SceneArgs, files: &FileCache, stored: Option<&St
         environment: args.environment.clone(),
         camera_auto: args.camera_auto,
     };
+    if let Some(MemoryLimit::Bytes(bytes)) = args.texture_memory {
+        files.limit_textures(bytes);
+    }
     let mut loaded = match load_with(&args.scene, &options, files) {
         Ok(loaded) => loaded,
         Err(diagnostics) => {

@@ -1,0 +1,248 @@
+//! Texels that do not fit into memory: tiles in a temporary file, of which a bounded cache holds those that were used last.
+//!
+//! The file has no name and vanishes with the program. Its tiles hold what the levels of a pyramid hold in memory, so a lookup
+//! reads the same numbers either way.
+
+use std::cell::RefCell;
+use std::collections::HashMap;
+use std::fs::File;
+use std::io;
+use std::os::unix::fs::FileExt;
+use std::sync::atomic::{AtomicU64, Ordering};
+use std::sync::{Arc, Mutex, OnceLock, PoisonError};
+
+/// Texels along a side of a tile.
+pub const TILE: usize = 64;
+/// Parts of the cache, each with a lock of its own.
+const SHARDS: usize = 32;
+/// Tiles that a thread finds again without a lock; they are kept in addition to those of the cache.
+const RECENT: usize = 32;
+
+/// Where a tile begins in the file, which tells it from all others.
+type Key = u64;
+
+/// Tiles of one part of the cache.
+#[derive(Debug, Default)]
+struct Shard {
+    places: HashMap<Key, usize>,
+    tiles: Vec<Slot>,
+    /// The tile that is looked at next when there is no room.
+    hand: usize,
+    bytes: u64,
+}
+
+#[derive(Debug)]
+struct Slot {
+    key: Key,
+    tile: Arc<[u8]>,
+    /// It was used since the hand passed.
+    is_used: bool,
+}
+
+impl Shard {
+    fn find(&mut self, key: Key) -> Option<Arc<[u8]>> {
+        let slot = &mut self.tiles[*self.places.get(&key)?];
+        slot.is_used = true;
+        Some(Arc::clone(&slot.tile))
+    }
+
+    /// Adds a tile, for which others make room that were not used of late [the clock algorithm: Corbató 1968]. One that is
+    /// larger than all there may be is not kept.
+    fn put(&mut self, key: Key, tile: &Arc<[u8]>, capacity: u64) {
+        let bytes = tile.len() as u64;
+        if bytes > capacity || self.places.contains_key(&key) {
+            return;
+        }
+        while self.bytes + bytes > capacity {
+            self.hand %= self.tiles.len();
+            if std::mem::take(&mut self.tiles[self.hand].is_used) {
+                self.hand += 1;
+                continue;
+            }
+            let out = self.tiles.swap_remove(self.hand);
+            self.places.remove(&out.key);
+            if let Some(moved) = self.tiles.get(self.hand) {
+                self.places.insert(moved.key, self.hand);
+            }
+            self.bytes -= out.tile.len() as u64;
+        }
+        self.places.insert(key, self.tiles.len());
+        self.tiles.push(Slot { key, tile: Arc::clone(tile), is_used: true });
+        self.bytes += bytes;
+    }
+}
+
+/// What was read and held.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub struct TileCounts {
+    /// Bytes in the file.
+    pub stored: u64,
+    /// Tiles read from it.
+    pub read: u64,
+    /// Bytes of the tiles that are held now.
+    pub held: u64,
+}
+
+/// Tiles in a temporary file, with a cache.
+#[derive(Debug)]
+pub struct TileStore {
+    file: File,
+    end: Mutex<u64>,
+    /// Most bytes of the cache.
+    capacity: u64,
+    shards: [Mutex<Shard>; SHARDS],
+    read: AtomicU64,
+    failure: OnceLock<String>,
+    /// Tells stores apart.
+    id: u64,
+}
+
+/// What a thread has used last.
+struct Recent {
+    of: (u64, Key),
+    tile: Arc<[u8]>,
+}
+
+thread_local! {
+    static RECENTLY: RefCell<Vec<Option<Recent>>> = const { RefCell::new(Vec::new()) };
+}
+
+impl TileStore {
+    /// A store whose cache takes `capacity` bytes at most, in the folder for temporary files (`TMPDIR`).
+    pub fn new(capacity: u64) -> io::Result<Self> {
+        static NEXT: AtomicU64 = AtomicU64::new(0);
+        Ok(TileStore {
+            file: tempfile::tempfile()?,
+            end: Mutex::new(0),
+            capacity,
+            shards: std::array::from_fn(|_| Mutex::default()),
+            read: AtomicU64::new(0),
+            failure: OnceLock::new(),
+            id: NEXT.fetch_add(1, Ordering::Relaxed),
+        })
+    }
+
+    /// Most bytes of the cache.
+    pub fn capacity(&self) -> u64 {
+        self.capacity
+    }
+
+    /// Appends bytes; where they begin.
+    pub fn append(&self, bytes: &[u8]) -> io::Result<u64> {
+        let mut end = self.end.lock().unwrap_or_else(PoisonError::into_inner);
+        let begin = *end;
+        self.file.write_all_at(bytes, begin)?;
+        *end += bytes.len() as u64;
+        Ok(begin)
+    }
+
+    /// What `read` makes of the `len` bytes that begin at `key`; of zeros if the file cannot be read, which
+    /// [`failure`](Self::failure) then tells.
+    #[inline]
+    pub fn with_tile<T>(&self, key: u64, len: usize, read: impl FnOnce(&[u8]) -> T) -> T {
+        RECENTLY.with_borrow_mut(|recently| {
+            if recently.is_empty() {
+                recently.resize_with(RECENT, || None);
+            }
+            let place = (key.wrapping_mul(0x9e37_79b9_7f4a_7c15) >> 32) as usize % RECENT;
+            if let Some(recent) = &recently[place]
+                && recent.of == (self.id, key)
+            {
+                return read(&recent.tile);
+            }
+            let recent = recently[place].insert(Recent { of: (self.id, key), tile: self.fetch(key, len) });
+            read(&recent.tile)
+        })
+    }
+
+    /// A tile from the cache, or else from the file.
+    fn fetch(&self, key: u64, len: usize) -> Arc<[u8]> {
+        let shard = (key.wrapping_mul(0xd134_2543_de82_ef95) >> 40) as usize % SHARDS;
+        let shard = || self.shards[shard].lock().unwrap_or_else(PoisonError::into_inner);
+        if let Some(tile) = shard().find(key) {
+            return tile;
+        }
+        // Not under the lock: others need not wait for the disk
+        let mut bytes = vec![0; len];
+        if let Err(error) = self.file.read_exact_at(&mut bytes, key) {
+            self.failure.get_or_init(|| format!("texels could not be read back from the temporary file: {error}"));
+            bytes.fill(0);
+        }
+        self.read.fetch_add(1, Ordering::Relaxed);
+        let tile: Arc<[u8]> = bytes.into();
+        shard().put(key, &tile, self.capacity / SHARDS as u64);
+        tile
+    }
+
+    /// Why lookups have found zeros instead of texels, if they have.
+    pub fn failure(&self) -> Option<&str> {
+        self.failure.get().map(String::as_str)
+    }
+
+    /// What was read and held.
+    pub fn counts(&self) -> TileCounts {
+        let held = |shard: &Mutex<Shard>| shard.lock().unwrap_or_else(PoisonError::into_inner).bytes;
+        TileCounts {
+            stored: *self.end.lock().unwrap_or_else(PoisonError::into_inner),
+            read: self.read.load(Ordering::Relaxed),
+            held: self.shards.iter().map(held).sum(),
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    const LEN: usize = 1000;
+
+    fn store(tiles: u64, capacity: u64) -> TileStore {
+        let store = TileStore::new(capacity).unwrap();
+        for i in 0..tiles {
+            assert_eq!(store.append(&vec![(i % 251) as u8; LEN]).unwrap(), i * LEN as u64);
+        }
+        store
+    }
+
+    #[test]
+    fn every_tile_is_found_by_all_threads_and_the_cache_stays_within_its_bounds() {
+        let capacity = (SHARDS * LEN * 5 / 2) as u64;
+        let store = store(1000, capacity);
+        std::thread::scope(|scope| {
+            for thread in 0..4 {
+                let store = &store;
+                scope.spawn(move || {
+                    for k in 0..20_000_u64 {
+                        let i = (k * 7919 + thread * 31 + k * k) % 1000;
+                        store.with_tile(i * LEN as u64, LEN, |tile| {
+                            assert!(tile.len() == LEN && tile.iter().all(|&b| b == (i % 251) as u8));
+                        });
+                        if k % 1000 == 0 {
+                            assert!(store.counts().held <= capacity);
+                        }
+                    }
+                });
+            }
+        });
+        let counts = store.counts();
+        assert!(counts.held > capacity / 2 && counts.held <= capacity && counts.stored == 1_000_000, "{counts:?}");
+        assert!(counts.read > 1000 && store.failure().is_none());
+    }
+
+    #[test]
+    fn what_fits_is_read_once() {
+        let store = store(100, 1 << 20);
+        for k in 0..10_000_u64 {
+            store.with_tile(k % 100 * LEN as u64, LEN, |tile| assert_eq!(tile[0], (k % 100) as u8));
+        }
+        assert_eq!(store.counts(), TileCounts { stored: 100_000, read: 100, held: 100_000 });
+    }
+
+    #[test]
+    fn what_cannot_be_read_is_zero_and_reported() {
+        let store = store(3, 1 << 20);
+        store.file.set_len(2500).unwrap();
+        assert!(store.with_tile(2000, LEN, |tile| tile.iter().all(|&b| b == 0)));
+        assert!(store.failure().unwrap().contains("temporary file"));
+    }
+}
