@@ -67,7 +67,7 @@ fn segments(p: &ParamSet, basis: Basis, degree: usize, d: &mut Diagnostics) -> O
     };
     let (count, span) = (points.len(), p.span_of("P"));
     let step = if basis == Basis::Bezier { degree } else { 1 };
-    if count <= degree || (count - 1 - degree) % step != 0 {
+    if count <= degree || !(count - 1 - degree).is_multiple_of(step) {
         let wanted = match basis {
             Basis::Bezier => format!("{}, {}, {} or so on", degree + 1, 2 * degree + 1, 3 * degree + 1),
             Basis::BSpline => format!("at least {}", degree + 1),
