@@ -170,7 +170,7 @@ impl Hair {
         }
         let uc = ((uc - before) / choice[p]).clamp(1e-5, 1.0 - f32::EPSILON);
 
-        // Elevation [d'Eon 2013]
+        // Elevation [d'Eon et al. 2013]
         let [sin_o, cos_o] = self.tilted(&o, p);
         let v = self.v[p];
         let cos = (1.0 + v * (uc + (1.0 - uc) * (-2.0 / v).exp()).ln()).clamp(-1.0, 1.0);
@@ -187,7 +187,7 @@ impl Hair {
 }
 
 /// M: density of the elevation per solid angle over a turn, ∫ M cos θi dθi = 1 [d'Eon et al. 2011, Eq. 7], by logarithms
-/// where the variance is small [d'Eon 2013].
+/// where the variance is small [d'Eon et al. 2013].
 fn longitudinal([sin_o, cos_o]: [f32; 2], [sin_i, cos_i]: [f32; 2], v: f32) -> f32 {
     let a = cos_i * cos_o / v;
     // The lobe is about −θo with pbrt's sign of the tilt
