@@ -63,7 +63,7 @@ fn wrong_curves_are_errors_with_a_place() {
         ("", "needs `point3 P`", "hair.pbrt:7:"),
     ];
     for (parameters, message, place) in wrong {
-        let error = try_load(&format!("Shape \"curve\" {parameters}\n")).err().expect(parameters);
+        let Err(error) = try_load(&format!("Shape \"curve\" {parameters}\n")) else { panic!("{parameters}") };
         assert!(error.contains(message) && error.contains(place), "{parameters}: {error}");
     }
 }
