@@ -3,7 +3,7 @@
 //! is scaled by 1/η².
 //!
 //! Reading order: [`fresnel`], [`microfacet`], [`diffuse`], [`diffuse_transmission`], [`conductor`], [`dielectric`],
-//! [`thin_dielectric`], [`coat_table`], [`coated_diffuse`], [`layered`], `ggx_albedo`, [`principled`]; [`phase`] in media; then what can only be evaluated: [`models`],
+//! [`thin_dielectric`], [`coat_table`], [`coated_diffuse`], [`layered`], `ggx_albedo`, [`principled`], [`hair`]; [`phase`] in media; then what can only be evaluated: [`models`],
 //! [`default_lobes`], [`evaluated`], [`mod@resample`].
 
 pub mod coat_table;
@@ -16,6 +16,7 @@ pub mod diffuse_transmission;
 pub mod evaluated;
 pub mod fresnel;
 mod ggx_albedo;
+pub mod hair;
 pub mod layered;
 pub mod microfacet;
 pub mod models;
@@ -34,6 +35,7 @@ pub use dielectric::Dielectric;
 pub use diffuse::Diffuse;
 pub use diffuse_transmission::DiffuseTransmission;
 pub use evaluated::Evaluated;
+pub use hair::Hair;
 pub use layered::{Base, Layered};
 pub use microfacet::TrowbridgeReitz;
 pub use models::Model;
@@ -127,6 +129,8 @@ pub enum Bsdf<'a> {
     Layered(Layered),
     /// Metal, glossy diffuse or glass under a coat.
     Principled(Principled),
+    /// A fibre.
+    Hair(Hair),
     /// Reflection that can only be evaluated.
     Evaluated(Evaluated),
     /// Scattering in a medium: no surface, and no cosine.
@@ -172,6 +176,7 @@ impl<'a> Bsdf<'a> {
             Bsdf::CoatedDiffuse(b) => b.f(wo, wi),
             Bsdf::Layered(b) => b.f(wo, wi),
             Bsdf::Principled(b) => b.f(wo, wi),
+            Bsdf::Hair(b) => b.f(wo, wi),
             Bsdf::Evaluated(b) => b.f(wo, wi),
             Bsdf::Phase(b) => Rgb::splat(b.p(wo, wi)),
         };
@@ -193,6 +198,7 @@ impl<'a> Bsdf<'a> {
             Bsdf::CoatedDiffuse(b) => b.pdf(wo, wi),
             Bsdf::Layered(b) => b.pdf(wo, wi),
             Bsdf::Principled(b) => b.pdf(wo, wi),
+            Bsdf::Hair(b) => b.pdf(wo, wi),
             Bsdf::Evaluated(b) => b.pdf(wo, wi),
             Bsdf::Phase(b) => b.p(wo, wi),
         };
@@ -210,9 +216,12 @@ impl<'a> Bsdf<'a> {
             Bsdf::Layered(b) => b.first_lobe(wo),
             Bsdf::Principled(b) => b.first_lobe(wo),
             Bsdf::Evaluated(b) => b.density.first_lobe(),
-            Bsdf::Diffuse(_) | Bsdf::Conductor(_) | Bsdf::Dielectric(_) | Bsdf::ThinDielectric(_) | Bsdf::Phase(_) => {
-                1.0
-            }
+            Bsdf::Diffuse(_)
+            | Bsdf::Conductor(_)
+            | Bsdf::Dielectric(_)
+            | Bsdf::ThinDielectric(_)
+            | Bsdf::Hair(_)
+            | Bsdf::Phase(_) => 1.0,
         }
     }
 
@@ -220,9 +229,12 @@ impl<'a> Bsdf<'a> {
     #[inline]
     pub fn pdf_first_lobe(&self, wo: Vec3, wi: Vec3, pdf: f32) -> f32 {
         let first = match self {
-            Bsdf::Diffuse(_) | Bsdf::Conductor(_) | Bsdf::Dielectric(_) | Bsdf::ThinDielectric(_) | Bsdf::Phase(_) => {
-                return pdf;
-            }
+            Bsdf::Diffuse(_)
+            | Bsdf::Conductor(_)
+            | Bsdf::Dielectric(_)
+            | Bsdf::ThinDielectric(_)
+            | Bsdf::Hair(_)
+            | Bsdf::Phase(_) => return pdf,
             Bsdf::DiffuseTransmission(_) if wo.z * wi.z > 0.0 => return pdf,
             Bsdf::DiffuseTransmission(_) => return 0.0,
             Bsdf::CoatedDiffuse(b) => b.pdf_first_lobe(wo, wi),
@@ -271,7 +283,7 @@ impl<'a> Bsdf<'a> {
             Bsdf::Dielectric(b) => Some(LaneModel::Dielectric(b.lanes())),
             Bsdf::ThinDielectric(_) => Some(none),
             Bsdf::CoatedDiffuse(b) => b.lanes(wo),
-            Bsdf::Layered(_) | Bsdf::Principled(_) | Bsdf::Evaluated(_) | Bsdf::Phase(_) => None,
+            Bsdf::Layered(_) | Bsdf::Principled(_) | Bsdf::Hair(_) | Bsdf::Evaluated(_) | Bsdf::Phase(_) => None,
         }
     }
 
@@ -279,7 +291,11 @@ impl<'a> Bsdf<'a> {
     #[inline]
     pub fn transmits(&self) -> bool {
         match self {
-            Bsdf::DiffuseTransmission(_) | Bsdf::Dielectric(_) | Bsdf::ThinDielectric(_) | Bsdf::Phase(_) => true,
+            Bsdf::DiffuseTransmission(_)
+            | Bsdf::Dielectric(_)
+            | Bsdf::ThinDielectric(_)
+            | Bsdf::Hair(_)
+            | Bsdf::Phase(_) => true,
             Bsdf::Principled(b) => b.transmission > 0.0,
             Bsdf::Diffuse(_) | Bsdf::Conductor(_) | Bsdf::CoatedDiffuse(_) | Bsdf::Layered(_) | Bsdf::Evaluated(_) => {
                 false
@@ -296,7 +312,7 @@ impl<'a> Bsdf<'a> {
             Bsdf::DiffuseTransmission(_) | Bsdf::Evaluated(_) => self.first_lobe(wo),
             Bsdf::Principled(b) => b.wide_lobe(wo),
             Bsdf::CoatedDiffuse(_) | Bsdf::Layered(_) => 1.0 - self.first_lobe(wo),
-            Bsdf::Conductor(_) | Bsdf::Dielectric(_) | Bsdf::ThinDielectric(_) | Bsdf::Phase(_) => 0.0,
+            Bsdf::Conductor(_) | Bsdf::Dielectric(_) | Bsdf::ThinDielectric(_) | Bsdf::Hair(_) | Bsdf::Phase(_) => 0.0,
         }
     }
 
@@ -323,6 +339,7 @@ impl<'a> Bsdf<'a> {
             Bsdf::CoatedDiffuse(b) => b.sample(wo, uc, u),
             Bsdf::Layered(b) => b.sample(wo, uc, u),
             Bsdf::Principled(b) => b.sample(wo, uc, u),
+            Bsdf::Hair(b) => b.sample(wo, uc, u),
             Bsdf::Evaluated(b) => b.sample(wo, uc, u),
             Bsdf::Phase(b) => b.sample(wo, u),
         };
@@ -337,6 +354,7 @@ impl<'a> Bsdf<'a> {
             | Bsdf::DiffuseTransmission(_)
             | Bsdf::CoatedDiffuse(_)
             | Bsdf::Principled(_)
+            | Bsdf::Hair(_)
             | Bsdf::Phase(_)
             | Bsdf::Evaluated(_) => true,
             Bsdf::Conductor(b) => !b.distribution.is_smooth(),
@@ -353,6 +371,7 @@ impl<'a> Bsdf<'a> {
             Bsdf::Diffuse(_)
             | Bsdf::DiffuseTransmission(_)
             | Bsdf::Principled(_)
+            | Bsdf::Hair(_)
             | Bsdf::Evaluated(_)
             | Bsdf::Phase(_) => false,
             Bsdf::Conductor(b) => b.distribution.is_smooth(),
@@ -376,6 +395,7 @@ impl<'a> Bsdf<'a> {
             | Bsdf::CoatedDiffuse(_)
             | Bsdf::Layered(_)
             | Bsdf::Phase(_)
+            | Bsdf::Hair(_)
             | Bsdf::Principled(_) => false,
         }
     }
@@ -395,6 +415,7 @@ impl<'a> Bsdf<'a> {
             | Bsdf::ThinDielectric(_)
             | Bsdf::Layered(_)
             | Bsdf::Principled(_)
+            | Bsdf::Hair(_)
             | Bsdf::Phase(_)
             | Bsdf::Evaluated(_) => None,
         }
@@ -416,6 +437,7 @@ impl<'a> Bsdf<'a> {
             | Bsdf::ThinDielectric(_)
             | Bsdf::Layered(_)
             | Bsdf::Principled(_)
+            | Bsdf::Hair(_)
             | Bsdf::Evaluated(_) => {
                 let [uc, u0, u1] = u();
                 self.sample(wo, uc, [u0, u1]).map_or(Rgb::BLACK, |s| s.f * (s.wi.z.abs() / s.pdf))

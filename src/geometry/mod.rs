@@ -1,8 +1,9 @@
 //! Shapes as data, their exact intersection on the CPU, and the differential geometry of hits.
 //!
-//! Reading order: [`hit`], [`triangle`], [`mesh`], [`quadric`], [`bilinear`], [`loop_subdiv`], [`set`].
+//! Reading order: [`hit`], [`triangle`], [`mesh`], [`quadric`], [`bilinear`], [`curve`], [`loop_subdiv`], [`set`].
 
 pub mod bilinear;
+pub mod curve;
 pub mod hit;
 pub mod loop_subdiv;
 pub mod mesh;
@@ -13,13 +14,14 @@ pub mod set;
 pub mod triangle;
 
 pub use bilinear::BilinearMesh;
+pub use curve::{Curve, CurveKind, CurveSet};
 pub use hit::{LocalHit, SurfaceHit, VertexValues};
 pub use loop_subdiv::loop_subdivide;
 pub use mesh::TriangleMesh;
 pub use quadric::{Quadric, QuadricKind};
 pub use set::{Geometry, GeometryId, GeometrySet, Group, GroupId, Instance, NO_INSTANCE, Visibility};
 
-use lumiris_numbers::math::{Bounds3, Vec2};
+use lumiris_numbers::math::{Bounds3, Vec2, Vec3};
 
 /// A shape in the space of its group (world space for the root group).
 #[derive(Clone, Debug)]
@@ -30,6 +32,8 @@ pub enum Shape {
     Quadric(Quadric),
     /// Indexed bilinear patches.
     Bilinear(BilinearMesh),
+    /// Bézier curves with a width.
+    Curves(CurveSet),
 }
 
 impl Shape {
@@ -39,15 +43,18 @@ impl Shape {
             Shape::Mesh(mesh) => mesh.bounds(),
             Shape::Quadric(quadric) => quadric.bounds(),
             Shape::Bilinear(mesh) => mesh.bounds(),
+            Shape::Curves(curves) => curves.bounds(),
         }
     }
 
-    /// The surface at the parametric position `uv` of `primitive`, in the space of the group.
-    pub fn surface_hit(&self, primitive: u32, uv: [f32; 2]) -> SurfaceHit {
+    /// The surface at the parametric position `uv` of `primitive`, in the space of the group. Curves are as a ray of
+    /// direction `d` sees them.
+    pub fn surface_hit(&self, primitive: u32, uv: [f32; 2], d: Vec3) -> SurfaceHit {
         match self {
             Shape::Mesh(mesh) => mesh.surface_hit(primitive as usize, uv),
             Shape::Quadric(quadric) => quadric.surface_hit(uv),
             Shape::Bilinear(mesh) => mesh.surface_hit(primitive as usize, uv),
+            Shape::Curves(curves) => curves.surface_hit(primitive as usize, uv, d),
         }
     }
 
@@ -55,7 +62,7 @@ impl Shape {
     pub fn vertex_values(&self, primitive: u32, uv: [f32; 2]) -> VertexValues {
         match self {
             Shape::Mesh(mesh) => mesh.vertex_values_at(primitive as usize, uv),
-            Shape::Quadric(_) | Shape::Bilinear(_) => VertexValues::default(),
+            Shape::Quadric(_) | Shape::Bilinear(_) | Shape::Curves(_) => VertexValues::default(),
         }
     }
 
@@ -63,7 +70,7 @@ impl Shape {
     pub fn texture_coordinates(&self, primitive: u32, uv: [f32; 2]) -> Vec2 {
         match self {
             Shape::Mesh(mesh) => mesh.texture_coordinates_at(primitive as usize, uv),
-            Shape::Quadric(_) => Vec2::from(uv),
+            Shape::Quadric(_) | Shape::Curves(_) => Vec2::from(uv),
             Shape::Bilinear(mesh) => mesh.texture_coordinates_at(primitive as usize, uv),
         }
     }

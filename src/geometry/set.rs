@@ -4,7 +4,7 @@
 //! nest.
 
 use super::{Shape, SurfaceHit};
-use lumiris_numbers::math::{Affine3A, Bounds3};
+use lumiris_numbers::math::{Affine3A, Bounds3, Ray, Vec3};
 use rayon::prelude::*;
 
 /// Index into [`GeometrySet::geometries`].
@@ -109,6 +109,7 @@ impl GeometrySet {
     }
 
     /// The surface in world space at the parametric position `uv` of a hit; `instance` is [`NO_INSTANCE`] in the root.
+    /// For emitters, and wherever there are no curves: those depend on the ray, see [`Self::surface_hit_of_ray`].
     pub fn surface_hit(
         &self,
         geometry: GeometryId,
@@ -117,11 +118,29 @@ impl GeometrySet {
         uv: [f32; 2],
         time: f32,
     ) -> SurfaceHit {
-        let hit = self.geometries[geometry as usize].shape.surface_hit(primitive, uv);
+        let ray = Ray { o: Vec3::ZERO, d: Vec3::Z, t_max: f32::INFINITY, time };
+        self.surface_hit_of_ray(geometry, primitive, instance, uv, &ray)
+    }
+
+    /// The surface in world space where `ray` met it, of which direction and time count.
+    pub fn surface_hit_of_ray(
+        &self,
+        geometry: GeometryId,
+        primitive: u32,
+        instance: u32,
+        uv: [f32; 2],
+        ray: &Ray,
+    ) -> SurfaceHit {
+        let shape = &self.geometries[geometry as usize].shape;
         if instance == NO_INSTANCE {
-            return hit;
+            return shape.surface_hit(primitive, uv, ray.d);
         }
-        hit.transformed(&self.instances[instance as usize].world_from_group_at(time))
+        let world_from_group = self.instances[instance as usize].world_from_group_at(ray.time);
+        let d = match shape {
+            Shape::Curves(_) => world_from_group.inverse().transform_vector3(ray.d),
+            Shape::Mesh(_) | Shape::Quadric(_) | Shape::Bilinear(_) => ray.d,
+        };
+        shape.surface_hit(primitive, uv, d).transformed(&world_from_group)
     }
 
     /// Number of primitives as stored: (triangles, quadrics, bilinear patches).
@@ -130,6 +149,17 @@ impl GeometrySet {
             Shape::Mesh(m) => (t + m.triangle_count(), q, b),
             Shape::Quadric(_) => (t, q + 1, b),
             Shape::Bilinear(m) => (t, q, b + m.patch_count()),
+            Shape::Curves(_) => (t, q, b),
+        })
+    }
+}
+
+impl GeometrySet {
+    /// Number of curves as stored, and of the pieces that ray tracers hold.
+    pub fn curve_counts(&self) -> (usize, usize) {
+        self.geometries.iter().fold((0, 0), |(curves, pieces), g| match &g.shape {
+            Shape::Curves(set) => (curves + set.curves().len(), pieces + set.piece_count()),
+            Shape::Mesh(_) | Shape::Quadric(_) | Shape::Bilinear(_) => (curves, pieces),
         })
     }
 }

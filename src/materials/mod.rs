@@ -1,15 +1,17 @@
 //! Materials: evaluate textures at a hit and build the BSDF in its shading frame. Semantics are pbrt-v4's.
 //!
-//! Reading order: this file, [`evaluated`], [`principled`], [`bump`], [`surface`].
+//! Reading order: this file, [`evaluated`], [`hair`], [`principled`], [`bump`], [`surface`].
 
 pub mod bump;
 pub mod evaluated;
+pub mod hair;
 pub mod principled;
 pub mod surface;
 #[cfg(test)]
 mod tests;
 
 pub use evaluated::EvaluatedMaterial;
+pub use hair::{HairColor, HairMaterial};
 pub use principled::PrincipledMaterial;
 pub use surface::SurfaceBsdf;
 
@@ -131,6 +133,8 @@ pub enum Material {
     },
     /// Metal, glossy diffuse or glass under a coat.
     Principled(PrincipledMaterial),
+    /// Fibres.
+    Hair(HairMaterial),
     /// Reflection that can only be evaluated.
     Evaluated(EvaluatedMaterial),
     /// One of two materials at each point, the second with probability `amount`.
@@ -236,6 +240,7 @@ impl MaterialSet {
             | Material::Conductor { .. }
             | Material::Dielectric { .. }
             | Material::ThinDielectric { .. }
+            | Material::Hair(_)
             | Material::Mix { .. }
             | Material::Interface => false,
         };
@@ -276,6 +281,7 @@ impl MaterialSet {
             | Material::CoatedDiffuse { .. }
             | Material::CoatedConductor { .. }
             | Material::Principled(_)
+            | Material::Hair(_)
             | Material::Evaluated(_) => false,
         }
     }
@@ -360,6 +366,7 @@ impl MaterialSet {
                 })
             }
             Material::Principled(material) => Bsdf::Principled(material.bsdf(t)),
+            Material::Hair(material) => Bsdf::Hair(material.bsdf(t)),
             Material::Evaluated(material) => {
                 Bsdf::Evaluated(Evaluated { model: material.model(t), density: ProposalDensity::default() })
             }

@@ -158,7 +158,8 @@ fn shadow_rays(job: &RenderJob, camera: &RayBatch, hits: &[Option<Hit>]) -> RayB
     for (i, hit) in hits.iter().enumerate() {
         let Some(hit) = hit else { continue };
         let time = camera.time[i];
-        let s = job.world.scene.geometry.surface_hit(hit.geometry, hit.primitive, hit.instance, hit.uv, time);
+        let (set, ray) = (&job.world.scene.geometry, camera.get(i));
+        let s = set.surface_hit_of_ray(hit.geometry, hit.primitive, hit.instance, hit.uv, &ray);
         let u = uniforms(Family::Shadow, i as u32);
         let ctx = LightCtx { p: s.p, n: s.n, ns: s.ns };
         let Some((_, sample)) = job.lights.sample(&ctx, u[0], [u[1], u[2]]) else { continue };
@@ -178,7 +179,8 @@ fn grazing_rays(scene: &Scene, camera: &RayBatch, hits: &[Option<Hit>]) -> RayBa
     for (i, hit) in hits.iter().enumerate() {
         let Some(hit) = hit else { continue };
         let time = camera.time[i];
-        let s = scene.geometry.surface_hit(hit.geometry, hit.primitive, hit.instance, hit.uv, time);
+        let ray = camera.get(i);
+        let s = scene.geometry.surface_hit_of_ray(hit.geometry, hit.primitive, hit.instance, hit.uv, &ray);
         let u = uniforms(Family::Grazing, i as u32);
         // Elevations from 10⁻⁵ to 10⁻¹ radians, log-uniform.
         let elevation = 10.0_f32.powf(-5.0 + 4.0 * u[0]);
@@ -200,7 +202,7 @@ fn edge_rays(scene: &Scene, count: u32) -> RayBatch {
         .iter()
         .filter_map(|&id| match &scene.geometry.geometries[id as usize].shape {
             Shape::Mesh(mesh) if mesh.triangle_count() > 0 => Some(mesh),
-            Shape::Mesh(_) | Shape::Quadric(_) | Shape::Bilinear(_) => None,
+            Shape::Mesh(_) | Shape::Quadric(_) | Shape::Bilinear(_) | Shape::Curves(_) => None,
         })
         .collect();
     if meshes.is_empty() {

@@ -28,7 +28,8 @@ pub struct SurfaceInteraction {
 impl SurfaceInteraction {
     /// The first hit of `ray`. A pixel is `width` wide at its origin, and `spread` wider per unit length.
     pub fn new(job: &RenderJob, ray: &Ray, (width, spread): (f32, f32), hit: &Hit) -> Self {
-        let surface = job.world.scene.geometry.surface_hit(hit.geometry, hit.primitive, hit.instance, hit.uv, ray.time);
+        let set = &job.world.scene.geometry;
+        let surface = set.surface_hit_of_ray(hit.geometry, hit.primitive, hit.instance, hit.uv, ray);
         let distance = hit.t * ray.d.length();
         let width = width + spread * distance;
         let footprint = width * job.settings().sampling.footprint();

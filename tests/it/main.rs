@@ -6,6 +6,7 @@ mod bit_exact;
 mod crosscheck;
 mod evaluated;
 mod gltf;
+mod hair;
 mod image_hashes;
 mod irradiance_cache;
 mod layering;

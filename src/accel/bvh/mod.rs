@@ -130,6 +130,11 @@ fn group_prims(set: &GeometrySet, group: &Group) -> Vec<PrimRef> {
                 prims.extend((0..mesh.patch_count()).filter_map(|i| PrimRef::of_points(id, i, &mesh.patch(i))));
             }
             Shape::Quadric(quadric) => prims.extend(PrimRef::of_bounds(id, 0, quadric.bounds())),
+            Shape::Curves(curves) => prims.par_extend(
+                (0..curves.piece_count())
+                    .into_par_iter()
+                    .filter_map(|i| PrimRef::of_bounds(id, i, curves.piece_bounds(i))),
+            ),
         }
     }
     prims

@@ -36,6 +36,13 @@ fn all_hits(set: &GeometrySet, id: GeometryId, ray: &Ray, instance: u32, hits: &
                 }
             }
         }
+        Shape::Curves(curves) => {
+            for i in 0..curves.piece_count() {
+                if let Some(hit) = curves.intersect(i, ray) {
+                    push(hit.t, hit.uv, i);
+                }
+            }
+        }
     }
 }
 

@@ -116,7 +116,7 @@ impl Block {
 /// A primitive that is not a triangle, or an instance.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) enum Other {
-    /// Quadric or bilinear patch.
+    /// Quadric, bilinear patch, or piece of a curve.
     Exact {
         geometry: u32,
         primitive: u32,

@@ -276,6 +276,7 @@ impl<'a, Q: Query> Walk<'a, Q> {
                 let local = match &self.bvh.geometry.geometries[geometry as usize].shape {
                     Shape::Quadric(quadric) => quadric.intersect(&ray),
                     Shape::Bilinear(mesh) => mesh.intersect_patch(primitive as usize, &ray),
+                    Shape::Curves(curves) => curves.intersect(primitive as usize, &ray),
                     Shape::Mesh(_) => None,
                 };
                 local.is_some_and(|l| self.offer(Hit { t: l.t, uv: l.uv, geometry, primitive, instance }))

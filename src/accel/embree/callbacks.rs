@@ -1,4 +1,4 @@
-//! Callbacks from Embree: nearest hits, alpha masks, quadrics and bilinear patches.
+//! Callbacks from Embree: nearest hits, alpha masks, quadrics, bilinear patches and curves.
 //!
 //! Embree passes N rays at once as a structure of arrays with N elements per field; lanes whose `valid` is not −1 are
 //! ignored. Fields are addressed by their index in the header's order, which holds for any N, including 1.
@@ -42,6 +42,7 @@ impl GeometryContext {
         let hit = match &self.world.set.geometries[self.id as usize].shape {
             Shape::Quadric(quadric) => quadric.intersect(&ray),
             Shape::Bilinear(mesh) => mesh.intersect_patch(primitive as usize, &ray),
+            Shape::Curves(curves) => curves.intersect(primitive as usize, &ray),
             Shape::Mesh(_) => None,
         }?;
         let found = Hit { t: hit.t, uv: hit.uv, geometry: self.id, primitive, instance };
@@ -174,6 +175,7 @@ pub(super) unsafe extern "C" fn bounds(arguments: *const sys::RTCBoundsFunctionA
         let box_of = || match &geometry.world.set.geometries[geometry.id as usize].shape {
             Shape::Bilinear(mesh) => Bounds3::from_points(mesh.patch(arguments.primID as usize)),
             Shape::Quadric(quadric) => quadric.bounds(),
+            Shape::Curves(curves) => curves.piece_bounds(arguments.primID as usize),
             Shape::Mesh(_) => Bounds3::EMPTY,
         };
         // An empty box leaves the primitive out.

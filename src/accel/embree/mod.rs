@@ -2,7 +2,7 @@
 //!
 //! Reading order: [`device`] (errors, memory), [`scene`] (geometries, instances), [`world`] (ids and exact hits),
 //! [`exact`] (exact hits of a block of rays), [`context`] (what the callbacks of a query share), [`callbacks`] (first
-//! hits, cut-outs, quadrics, patches), [`kernels`] (the two families' functions), [`query`] (batches), [`bare`] (Embree
+//! hits, cut-outs, quadrics, patches, curves), [`kernels`] (the two families' functions), [`query`] (batches), [`bare`] (Embree
 //! by itself, to compare with).
 //!
 //! # Answers do not depend on packets

@@ -55,6 +55,7 @@ impl EmbreeGeometry {
             }
             Shape::Quadric(_) => Self::user(device, 1)?,
             Shape::Bilinear(mesh) => Self::user(device, mesh.patch_count())?,
+            Shape::Curves(curves) => Self::user(device, curves.piece_count())?,
         };
         let user: *mut c_void = Arc::as_ptr(&context).cast_mut().cast();
         // SAFETY: the geometry, then the scene keeps the context, so it outlives the callbacks, which only read it.

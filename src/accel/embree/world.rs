@@ -173,6 +173,7 @@ fn can_be_met(set: &GeometrySet, id: GeometryId) -> bool {
         Shape::Mesh(mesh) => mesh.triangle_count(),
         Shape::Quadric(_) => 1,
         Shape::Bilinear(mesh) => mesh.patch_count(),
+        Shape::Curves(curves) => curves.piece_count(),
     };
     count > 0 && geometry.visibility.0 & crate::geometry::Visibility::ALL.0 != 0
 }

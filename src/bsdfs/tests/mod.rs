@@ -4,6 +4,7 @@ mod coats;
 mod densities;
 mod evaluated;
 
+use super::hair::HairLobes;
 use super::principled::Interior;
 use super::*;
 use lumiris_numbers::math::{safe_sqrt, sqr, warp};
@@ -67,11 +68,24 @@ pub(super) fn zoo<'a>(tables: &'a [CoatTable]) -> Vec<(String, Bsdf<'a>)> {
     ];
     zoo.extend(layers.iter().enumerate().map(|(i, &l)| (format!("layered {i}"), Bsdf::Layered(l))));
     zoo.extend(principled().map(|(name, b)| (format!("principled {name}"), Bsdf::Principled(b))));
+    zoo.extend(hair().map(|(name, b)| (format!("hair {name}"), Bsdf::Hair(b))));
     for density in ProposalDensity::iter() {
         let model = Model::CookTorrance(models::CookTorrance::new(RED, RED, 0.4, 0.5));
         zoo.push((format!("evaluated {density:?}"), Bsdf::Evaluated(Evaluated { model, density })));
     }
     zoo
+}
+
+/// Fibres met at several offsets.
+pub(super) fn hair() -> [(&'static str, Hair); 4] {
+    let lobes = |beta_m, beta_n, alpha| HairLobes { beta_m, beta_n, alpha };
+    let brown = Hair::sigma_a_of_melanin(1.3, 0.2);
+    [
+        ("brown", Hair::new(0.3, 1.55, brown, lobes(0.3, 0.3, 2.0))),
+        ("edge", Hair::new(-0.95, 1.55, Hair::sigma_a_of_reflectance(RED, 0.3), lobes(0.25, 0.4, 3.0))),
+        ("rough", Hair::new(-0.4, 1.3, brown, lobes(0.9, 0.8, 0.0))),
+        ("white", Hair::new(0.6, 1.55, Rgb::BLACK, lobes(0.4, 0.3, 2.0))),
+    ]
 }
 
 /// What the principled BSDF can be.
@@ -178,6 +192,9 @@ fn scattering_is_reciprocal() {
     for (name, b) in zoo(&tables) {
         if matches!(b, Bsdf::Layered(_)) {
             continue; // Noisy; its mean is compared with analog walks instead.
+        }
+        if matches!(b, Bsdf::Hair(_)) {
+            continue; // Its attenuation is a function of θo alone [Chiang et al. 2016].
         }
         for _ in 0..2000 {
             let (wo, wi) = (
@@ -295,4 +312,35 @@ fn a_white_principled_surface_loses_nothing() {
             assert!((mean - 1.0_f64).abs() < 0.006, "{name} {cos}: {mean}");
         }
     }
+}
+
+#[test]
+fn a_fibre_without_absorption_loses_nothing() {
+    // Σ_p A_p = 1, and the lobes are normalised; the estimate by uniform directions knows nothing of the density
+    let mut s = pcg32([9, 4, 1]);
+    for (beta_m, beta_n) in [(0.2, 0.4), (0.3, 0.3), (0.6, 0.9), (1.0, 1.0)] {
+        for cos in [0.9, 0.3, -0.7] {
+            let wo = warp::direction(cos, 0.7);
+            let (mut uniform, mut sampled) = (Moments::default(), Moments::default());
+            for _ in 0..200_000 {
+                let h = 2.0 * s.random::<f32>() - 1.0;
+                let b = Bsdf::Hair(Hair::new(h, 1.55, Rgb::BLACK, HairLobes { beta_m, beta_n, alpha: 2.0 }));
+                let wi = warp::sample_uniform_sphere(s.random::<[f32; 2]>());
+                uniform.add(f64::from(b.f(wo, wi).g * wi.z.abs() * 2.0 * TAU));
+                let x = b.sample(wo, s.random::<f32>(), s.random::<[f32; 2]>());
+                sampled.add(x.map_or(0.0, |x| f64::from(x.f.g * x.wi.z.abs() / x.pdf)));
+            }
+            uniform.assert_mean(1.0, 1e-4, 2e-3);
+            sampled.assert_mean(1.0, 1e-4, 2e-3);
+        }
+    }
+}
+
+#[test]
+fn the_colour_of_hair_is_that_of_its_bulk_and_black_hair_absorbs() {
+    let white = Hair::sigma_a_of_reflectance(Rgb::WHITE, 0.3);
+    assert!(white.is_black(), "{white:?}");
+    // [Chiang et al. 2016, Eq. 9] by hand: ln 0.5 = -0.693147, the polynomial at 0.3 is 5.888 within 1e-3
+    let half = Hair::sigma_a_of_reflectance(Rgb::splat(0.5), 0.3).g;
+    assert!((half - 0.0139).abs() < 2e-4, "{half}");
 }

@@ -1,7 +1,7 @@
 //! Descriptions of what a file asks for, kept until all of it and the files that it names are read.
 
 use super::transform::Ctm;
-use crate::geometry::QuadricKind;
+use crate::geometry::{Curve, CurveKind, QuadricKind};
 use crate::materials::MaterialId;
 use crate::media::Medium;
 use lumiris_formats::pbrt::directive::Name;
@@ -35,7 +35,24 @@ pub struct MediumNames {
     pub outside: Option<Name>,
 }
 
+impl MaterialUse {
+    /// True if both are the same material by the same way.
+    pub(super) fn is_same(&self, other: &MaterialUse) -> bool {
+        match (self, other) {
+            (MaterialUse::Id(a), MaterialUse::Id(b)) => a == b,
+            (MaterialUse::Named(a), MaterialUse::Named(b)) => a.text == b.text,
+            (MaterialUse::Id(_), MaterialUse::Named(_)) | (MaterialUse::Named(_), MaterialUse::Id(_)) => false,
+        }
+    }
+}
+
 impl MediumNames {
+    /// True if both name the same media.
+    pub(super) fn is_same(&self, other: &MediumNames) -> bool {
+        let text = |names: &MediumNames| [&names.inside, &names.outside].map(|n| n.as_ref().map(|n| n.text.clone()));
+        text(self) == text(other)
+    }
+
     /// True if they are two.
     pub fn differ(&self) -> bool {
         let text = |name: &Option<Name>| name.as_ref().map(|name| name.text.clone());
@@ -117,6 +134,8 @@ pub enum ShapeSource {
     Quadric(QuadricKind),
     /// Bilinear patches.
     Bilinear(PatchData),
+    /// Curves.
+    Curves(CurveData),
 }
 
 impl ShapeSource {
@@ -124,7 +143,11 @@ impl ShapeSource {
     pub(super) fn file(&self) -> Option<&Path> {
         match self {
             ShapeSource::Ply(path) => Some(path),
-            ShapeSource::Mesh(_) | ShapeSource::Loop(..) | ShapeSource::Quadric(_) | ShapeSource::Bilinear(_) => None,
+            ShapeSource::Mesh(_)
+            | ShapeSource::Loop(..)
+            | ShapeSource::Quadric(_)
+            | ShapeSource::Bilinear(_)
+            | ShapeSource::Curves(_) => None,
         }
     }
 }
@@ -146,6 +169,15 @@ pub struct PatchData {
     pub(super) indices: Vec<[u32; 4]>,
     pub(super) normals: Vec<Vec3>,
     pub(super) uvs: Vec<Vec2>,
+}
+
+/// Curves in object space.
+#[derive(Clone, Debug)]
+pub struct CurveData {
+    pub(super) kind: CurveKind,
+    pub(super) curves: Vec<Curve>,
+    /// Of ribbons, two for each curve.
+    pub(super) normals: Vec<[Vec3; 2]>,
 }
 
 /// A shape with all that the graphics state gives it.

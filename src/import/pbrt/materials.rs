@@ -28,6 +28,7 @@ const KINDS: &[&str] = &[
     "mix",
     "interface",
     "principled",
+    "hair",
     "evaluated",
 ];
 
@@ -146,6 +147,7 @@ impl Builder<'_> {
                 samples: count(p, "nsamples", 1, d),
             },
             "principled" => self.principled(p, d),
+            "hair" => self.hair(p, d),
             "evaluated" => self.evaluated(place, p, d),
             _ => self.other_material(kind, place, p, d),
         }
@@ -214,7 +216,7 @@ impl Builder<'_> {
     fn other_material(&mut self, kind: &str, place: &Name, p: &ParamSet, d: &mut Diagnostics) -> Material {
         match kind {
             "matte" | "plastic" | "substrate" | "uber" | "metal" | "mirror" | "glass" | "translucent" => {}
-            "hair" | "measured" | "subsurface" | "kdsubsurface" | "disney" | "fourier" => {
+            "measured" | "subsurface" | "kdsubsurface" | "disney" | "fourier" => {
                 d.warning_once(place.span, format!("material `{kind}` is not rendered yet: it is diffuse"));
                 p.ignore_all();
                 return Material::Diffuse { reflectance: self.textures.add_rgb(RgbTexture::Constant(Rgb::splat(0.5))) };

@@ -2,14 +2,16 @@
 //!
 //! Reading order: [`descriptions`] (what a file asks for), [`state`] (the scene while its file is read), [`checks`];
 //! a file for each kind of directive: [`transform`], [`options`], [`settings`], [`film`], [`spectrum`], [`textures`],
-//! [`materials`], [`lights`], [`media`] with `media_presets`, [`shapes`]; [`directives`] (the state machine over `lumiris_formats::pbrt`'s directives);
+//! [`materials`], `hair`, [`lights`], [`media`] with `media_presets`, `curves`, [`shapes`]; [`directives`] (the state machine over `lumiris_formats::pbrt`'s directives);
 //! and [`finish`] (reads files and assembles the scene).
 
 pub mod checks;
+mod curves;
 pub mod descriptions;
 pub mod directives;
 pub mod film;
 pub mod finish;
+mod hair;
 pub mod lights;
 pub mod materials;
 pub mod media;

@@ -1,6 +1,7 @@
 //! `Shape`: checked when it is parsed, created once all files have been read.
 
 use super::checks::unknown;
+use super::curves::{curve_data, merged, placed};
 use super::descriptions::{MeshData, PatchData, ShapeDesc, ShapeSource};
 use super::state::Builder;
 use super::transform::affine;
@@ -79,12 +80,14 @@ impl Builder<'_> {
                 }
                 patch_data(&mut p, d).map(ShapeSource::Bilinear)
             }
-            "curve" | "hyperboloid" | "cone" | "paraboloid" | "heightfield" | "nurbs" => {
+            "curve" => curve_data(&p, d).map(ShapeSource::Curves),
+            "hyperboloid" | "cone" | "paraboloid" | "heightfield" | "nurbs" => {
                 d.warning_once(kind.span, format!("shape `{}` is not rendered yet: it is left out", kind.text));
                 return;
             }
             other => {
-                let known = ["trianglemesh", "plymesh", "sphere", "disk", "cylinder", "bilinearmesh", "loopsubdiv"];
+                let known =
+                    ["trianglemesh", "plymesh", "sphere", "disk", "cylinder", "bilinearmesh", "loopsubdiv", "curve"];
                 unknown(other, kind.span, "shape", &known, d);
                 return;
             }
@@ -92,18 +95,25 @@ impl Builder<'_> {
         let alpha = self.alpha(&p, d);
         p.report_unused(d);
         if let Some(source) = source {
-            self.shapes.push(ShapeDesc {
+            let emits = self.state.area_light.is_some();
+            let is_curve = matches!(source, ShapeSource::Curves(_));
+            if is_curve && emits {
+                d.warning_once(p.span, "curves do not emit: their area light is left out");
+            }
+            let desc = ShapeDesc {
                 source,
                 name,
                 span: p.span,
                 ctm: self.state.ctm,
                 reverse_orientation: self.state.reverse_orientation,
                 material: self.state.material.clone(),
-                area_light: self.state.area_light.clone(),
+                area_light: self.state.area_light.clone().filter(|_| !is_curve),
                 alpha,
                 object: self.current_object,
                 media: self.state.media.clone(),
-            });
+            };
+            let rest = if is_curve { merged(self.shapes.last_mut(), desc) } else { Some(desc) };
+            self.shapes.extend(rest);
         }
     }
 
@@ -288,6 +298,7 @@ impl ShapeDesc {
                 };
                 made.shapes.push(Shape::Mesh(triangles(fine, &placement).map_err(wrong)?));
             }
+            ShapeSource::Curves(data) => made.shapes.push(Shape::Curves(placed(data, &m).map_err(wrong)?)),
             ShapeSource::Bilinear(data) => made.shapes.push(patches(data, &placement).map_err(wrong)?),
             ShapeSource::Ply(path) => {
                 let ply = mesh(&path).map_err(|error| match error {

@@ -95,10 +95,11 @@ impl Boundary {
             self.free.push(i);
         }
         world.accel.intersect(&self.rays, Coherence::Incoherent, &mut self.hits);
-        for (&i, hit) in self.free.iter().zip(&self.hits) {
+        for (k, (&i, hit)) in self.free.iter().zip(&self.hits).enumerate() {
             let Some(h) = hit else { continue };
             let probe = &probes[i as usize];
-            let n = world.scene.geometry.surface_hit(h.geometry, h.primitive, h.instance, h.uv, probe.time).n;
+            let (set, ray) = (&world.scene.geometry, self.rays.get(k));
+            let n = set.surface_hit_of_ray(h.geometry, h.primitive, h.instance, h.uv, &ray).n;
             if n.dot(probe.place.n).abs() >= MIN_NORMAL_COS {
                 out[i as usize] = trial;
             }

@@ -38,6 +38,8 @@ pub fn area_lights_of(shape: &Shape, emission: &Emission) -> AreaLights {
                 out.push(patch(mesh, i, emission.image.is_some()), emission, 1);
             }
         }
+        // The importer refuses curves that emit
+        Shape::Curves(_) => {}
     }
     out
 }

@@ -55,7 +55,7 @@ fn facts(job: &RenderJob) -> Value {
     let group_triangles = |group: &lumiris::geometry::Group| -> usize {
         let meshes = group.geometries.iter().map(|&id| match &set.geometries[id as usize].shape {
             Shape::Mesh(mesh) => mesh.triangle_count(),
-            Shape::Quadric(_) | Shape::Bilinear(_) => 0,
+            Shape::Quadric(_) | Shape::Bilinear(_) | Shape::Curves(_) => 0,
         });
         meshes.sum()
     };
@@ -76,6 +76,7 @@ fn facts(job: &RenderJob) -> Value {
     json!({
         "geometry": {
             "geometries": set.geometries.len(),
+            "curves": set.curve_counts().0, "curve_pieces": set.curve_counts().1,
             "triangles": triangles, "quadrics": quadrics, "patches": patches,
             "groups": set.groups.len(), "instances": set.instances.len(),
             "triangles_with_instances": group_triangles(&set.root) + instanced,
@@ -123,6 +124,7 @@ fn geometry_bytes(scene: &Scene) -> u64 {
             vectors * 12 + m.uvs.len() * 8
         }
         Shape::Quadric(q) => size_of_val(q),
+        Shape::Curves(curves) => curves.bytes(),
         Shape::Bilinear(m) => (m.positions.len() + m.normals.len()) * 12 + m.uvs.len() * 8 + m.indices.len() * 16,
     });
     bytes.sum::<usize>() as u64

@@ -6,7 +6,7 @@ use lumiris::accel::{Coherence, Hit, RayBatch};
 use lumiris::scene::World;
 use lumiris::textures::TextureContext;
 use lumiris_numbers::math::luminance;
-use lumiris_numbers::math::{Rgb, Vec2, Vec3};
+use lumiris_numbers::math::{Ray, Rgb, Vec2, Vec3};
 use std::f32::consts::FRAC_1_PI;
 
 /// A point of a diffuse surface.
@@ -50,7 +50,8 @@ fn diffuse_at(world: &World, wo: Vec3, hit: &Hit) -> Option<Seen> {
     if hit.instance == Hit::NO_INSTANCE && scene.lights.light_of(hit.geometry, hit.primitive).is_some() {
         return None;
     }
-    let surface = scene.geometry.surface_hit(hit.geometry, hit.primitive, hit.instance, hit.uv, 0.5);
+    let ray = Ray { o: Vec3::ZERO, d: -wo, t_max: f32::INFINITY, time: 0.5 };
+    let surface = scene.geometry.surface_hit_of_ray(hit.geometry, hit.primitive, hit.instance, hit.uv, &ray);
     let (uv1, color) = (surface.vertex.uv1, surface.vertex.color);
     let context = TextureContext { uv: surface.uv, uv_width: Vec2::ZERO, uv1, color, p: surface.p, n: surface.n };
     let material = scene.surfaces[hit.geometry as usize].material;

@@ -1,0 +1,177 @@
+//! `Shape "curve"`: all bases and degrees become cubic Bézier curves, exactly.
+
+use super::checks::unknown;
+use super::descriptions::{CurveData, ShapeDesc, ShapeSource};
+use crate::geometry::{Curve, CurveKind, CurveSet};
+use lumiris_formats::diagnostic::Diagnostics;
+use lumiris_formats::pbrt::params::{ParamSet, ParamType};
+use lumiris_numbers::math::transform::transform_normal;
+use lumiris_numbers::math::{Affine3A, Vec3};
+
+/// Basis of the control points.
+#[derive(Clone, Copy, PartialEq)]
+enum Basis {
+    Bezier,
+    BSpline,
+}
+
+/// The curves of one directive.
+pub(super) fn curve_data(p: &ParamSet, d: &mut Diagnostics) -> Option<CurveData> {
+    let kind = match p.string("type", d).unwrap_or("flat") {
+        "flat" => CurveKind::Flat,
+        "cylinder" => CurveKind::Cylinder,
+        "ribbon" => CurveKind::Ribbon,
+        other => {
+            unknown(other, p.span_of("type"), "type of curve", &["flat", "cylinder", "ribbon"], d);
+            return None;
+        }
+    };
+    let basis = match p.string("basis", d).unwrap_or("bezier") {
+        "bezier" => Basis::Bezier,
+        "bspline" => Basis::BSpline,
+        other => {
+            unknown(other, p.span_of("basis"), "basis of curves", &["bezier", "bspline"], d);
+            return None;
+        }
+    };
+    let degree = match p.integer("degree", d).unwrap_or(3) {
+        degree @ 2..=3 => degree as usize,
+        other => {
+            d.error(p.span_of("degree"), format!("the degree of a curve must be 2 or 3, not {other}"));
+            return None;
+        }
+    };
+    // Pieces are chosen by shape and width
+    p.ignore("splitdepth");
+
+    let segments = segments(p, basis, degree, d)?;
+    let widths = widths(p, d)?;
+    let normals = normals(p, kind, segments.len(), d)?;
+    let at = |i: usize| {
+        let x = i as f32 / segments.len() as f32;
+        widths[0] * (1.0 - x) + widths[1] * x
+    };
+    let curve = |(i, &points): (usize, &[Vec3; 4])| Curve { points, width: [at(i), at(i + 1)] };
+    let curves = segments.iter().enumerate().map(curve).collect();
+    Some(CurveData { kind, curves, normals })
+}
+
+/// Control points of the cubic Bézier curves.
+fn segments(p: &ParamSet, basis: Basis, degree: usize, d: &mut Diagnostics) -> Option<Vec<[Vec3; 4]>> {
+    let points: Vec<Vec3> = match p.get("P", &[ParamType::Point3], d).and_then(|p| p.floats()) {
+        Some(floats) => floats.chunks_exact(3).map(Vec3::from_slice).collect(),
+        None => {
+            d.error(p.span, "a curve needs `point3 P`");
+            return None;
+        }
+    };
+    let (count, span) = (points.len(), p.span_of("P"));
+    let step = if basis == Basis::Bezier { degree } else { 1 };
+    if count <= degree || !(count - 1 - degree).is_multiple_of(step) {
+        let wanted = match basis {
+            Basis::Bezier => format!("{}, {}, {} or so on", degree + 1, 2 * degree + 1, 3 * degree + 1),
+            Basis::BSpline => format!("at least {}", degree + 1),
+        };
+        d.error(span, format!("{count} control points: a curve of this basis and degree {degree} has {wanted}"));
+        return None;
+    }
+    if !points.iter().all(|p| p.is_finite()) {
+        d.error(span, "control points must be finite");
+        return None;
+    }
+    let segment = |first: usize| cubic(&points[first..=first + degree], basis);
+    Some((0..count - degree).step_by(step).map(segment).collect())
+}
+
+/// The cubic Bézier curve of one segment of a Bézier curve or uniform B-spline of degree 2 or 3.
+fn cubic(points: &[Vec3], basis: Basis) -> [Vec3; 4] {
+    match (basis, points) {
+        (Basis::Bezier, &[a, b, c, d]) => [a, b, c, d],
+        (Basis::BSpline, &[a, b, c, d]) => {
+            [(a + b * 4.0 + c) / 6.0, (b * 2.0 + c) / 3.0, (b + c * 2.0) / 3.0, (b + c * 4.0 + d) / 6.0]
+        }
+        (Basis::Bezier, &[a, b, c]) => elevated(a, b, c),
+        (Basis::BSpline, &[a, b, c]) => elevated((a + b) * 0.5, b, (b + c) * 0.5),
+        // The caller cuts segments of three or four points
+        _ => [Vec3::NAN; 4],
+    }
+}
+
+/// A quadratic Bézier curve as a cubic one.
+fn elevated(a: Vec3, b: Vec3, c: Vec3) -> [Vec3; 4] {
+    [a, (a + b * 2.0) / 3.0, (b * 2.0 + c) / 3.0, c]
+}
+
+/// Widths at both ends.
+fn widths(p: &ParamSet, d: &mut Diagnostics) -> Option<[f32; 2]> {
+    let width = p.float("width", d).unwrap_or(1.0);
+    let mut checked = |name: &'static str| {
+        let given = p.float(name, d);
+        let (value, place) = given.map_or((width, "width"), |value| (value, name));
+        if value >= 0.0 && value.is_finite() {
+            return Some(value);
+        }
+        d.error(p.span_of(place), format!("{place} of a curve must be finite and not negative, not {value}"));
+        None
+    };
+    let (first, last) = (checked("width0")?, checked("width1"));
+    Some([first, last?])
+}
+
+/// Normals at the ends of the segments of a ribbon.
+fn normals(p: &ParamSet, kind: CurveKind, segments: usize, d: &mut Diagnostics) -> Option<Vec<[Vec3; 2]>> {
+    let given = p.get("N", &[ParamType::Normal], d).and_then(|p| p.floats()).unwrap_or_default();
+    let given: Vec<Vec3> = given.chunks_exact(3).map(Vec3::from_slice).collect();
+    if kind != CurveKind::Ribbon {
+        if !given.is_empty() {
+            d.warning_once(p.span_of("N"), "`N` is used by curves of type `ribbon` alone: it is ignored");
+        }
+        return Some(Vec::new());
+    }
+    if given.len() != segments + 1 {
+        let (n, expected) = (given.len(), segments + 1);
+        let place = if given.is_empty() { p.span } else { p.span_of("N") };
+        d.error(place, format!("a ribbon of {segments} segments needs {expected} normals `N`, not {n}"));
+        return None;
+    }
+    if !given.iter().all(|n| n.is_finite() && n.length_squared() > 0.0) {
+        d.error(p.span_of("N"), "normals must be finite and not zero");
+        return None;
+    }
+    Some(given.windows(2).map(|n| [n[0].normalize(), n[1].normalize()]).collect())
+}
+
+/// Adds the curves of `desc` to those of `last`, if nothing but their numbers tells them apart; returns `desc` if they
+/// cannot be one geometry. A head of hair has as many directives as hairs.
+pub(super) fn merged(last: Option<&mut ShapeDesc>, desc: ShapeDesc) -> Option<ShapeDesc> {
+    let Some(last) = last else { return Some(desc) };
+    let is_alike = last.ctm == desc.ctm
+        && last.reverse_orientation == desc.reverse_orientation
+        && last.material.is_same(&desc.material)
+        && last.area_light.is_none()
+        && last.alpha == desc.alpha
+        && last.object == desc.object
+        && last.media.is_same(&desc.media);
+    match (&mut last.source, desc.source) {
+        (ShapeSource::Curves(all), ShapeSource::Curves(data)) if is_alike && all.kind == data.kind => {
+            all.curves.extend(data.curves);
+            all.normals.extend(data.normals);
+            None
+        }
+        (_, source) => Some(ShapeDesc { source, ..desc }),
+    }
+}
+
+/// Curves in the space of their group. A transformation that scales differently by axis scales the width by the cube
+/// root of its determinant.
+pub(super) fn placed(mut data: CurveData, m: &Affine3A) -> Result<CurveSet, String> {
+    let scale = m.matrix3.determinant().abs().cbrt();
+    for curve in &mut data.curves {
+        curve.points = curve.points.map(|p| m.transform_point3(p));
+        curve.width = curve.width.map(|w| w * scale);
+    }
+    for normals in &mut data.normals {
+        *normals = normals.map(|n| transform_normal(m, n));
+    }
+    CurveSet::new(data.kind, data.curves, data.normals)
+}
