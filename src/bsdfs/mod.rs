@@ -42,6 +42,7 @@ pub use principled::Principled;
 pub use resample::{Resampled, resample};
 pub use thin_dielectric::ThinDielectric;
 
+use dielectric::{Select, Transport};
 use lumiris_lanes::bsdf::Model as LaneModel;
 use lumiris_numbers::math::{Rgb, Vec3};
 use std::f32::consts::FRAC_1_PI;
@@ -119,6 +120,8 @@ pub enum Bsdf<'a> {
     Conductor(Conductor),
     /// Glass.
     Dielectric(Dielectric),
+    /// Refraction by an interface, without the reflection: out of an interior whose reflections are no vertices.
+    Exit(Dielectric),
     /// A sheet of glass.
     ThinDielectric(ThinDielectric),
     /// Lambertian under a clear coat.
@@ -168,6 +171,8 @@ impl<'a> Bsdf<'a> {
             Bsdf::DiffuseTransmission(b) => b.f(wo, wi),
             Bsdf::Conductor(b) => b.f(wo, wi),
             Bsdf::Dielectric(b) => b.f(wo, wi),
+            Bsdf::Exit(_) if wo.z * wi.z > 0.0 => Rgb::BLACK,
+            Bsdf::Exit(b) => b.f(wo, wi),
             Bsdf::ThinDielectric(_) => Rgb::BLACK,
             Bsdf::CoatedDiffuse(b) => b.f(wo, wi),
             Bsdf::Layered(b) => b.f(wo, wi),
@@ -189,6 +194,7 @@ impl<'a> Bsdf<'a> {
             Bsdf::DiffuseTransmission(b) => b.pdf(wo, wi),
             Bsdf::Conductor(b) => b.pdf(wo, wi),
             Bsdf::Dielectric(b) => b.pdf(wo, wi),
+            Bsdf::Exit(b) => b.pdf_select(wo, wi, Select::Transmission),
             Bsdf::ThinDielectric(_) => 0.0,
             Bsdf::CoatedDiffuse(b) => b.pdf(wo, wi),
             Bsdf::Layered(b) => b.pdf(wo, wi),
@@ -210,9 +216,12 @@ impl<'a> Bsdf<'a> {
             Bsdf::Layered(b) => b.first_lobe(wo),
             Bsdf::Principled(b) => b.first_lobe(wo),
             Bsdf::Evaluated(b) => b.density.first_lobe(),
-            Bsdf::Diffuse(_) | Bsdf::Conductor(_) | Bsdf::Dielectric(_) | Bsdf::ThinDielectric(_) | Bsdf::Phase(_) => {
-                1.0
-            }
+            Bsdf::Diffuse(_)
+            | Bsdf::Conductor(_)
+            | Bsdf::Dielectric(_)
+            | Bsdf::Exit(_)
+            | Bsdf::ThinDielectric(_)
+            | Bsdf::Phase(_) => 1.0,
         }
     }
 
@@ -220,7 +229,12 @@ impl<'a> Bsdf<'a> {
     #[inline]
     pub fn pdf_first_lobe(&self, wo: Vec3, wi: Vec3, pdf: f32) -> f32 {
         let first = match self {
-            Bsdf::Diffuse(_) | Bsdf::Conductor(_) | Bsdf::Dielectric(_) | Bsdf::ThinDielectric(_) | Bsdf::Phase(_) => {
+            Bsdf::Diffuse(_)
+            | Bsdf::Conductor(_)
+            | Bsdf::Dielectric(_)
+            | Bsdf::Exit(_)
+            | Bsdf::ThinDielectric(_)
+            | Bsdf::Phase(_) => {
                 return pdf;
             }
             Bsdf::DiffuseTransmission(_) if wo.z * wi.z > 0.0 => return pdf,
@@ -267,11 +281,11 @@ impl<'a> Bsdf<'a> {
                 let TrowbridgeReitz { alpha_x, alpha_y } = b.distribution;
                 Some(LaneModel::Conductor { alpha: [alpha_x, alpha_y], eta: b.eta.to_array(), k: b.k.to_array() })
             }
-            Bsdf::Dielectric(b) if b.is_specular() => Some(none),
+            Bsdf::Dielectric(b) | Bsdf::Exit(b) if b.is_specular() => Some(none),
             Bsdf::Dielectric(b) => Some(LaneModel::Dielectric(b.lanes())),
             Bsdf::ThinDielectric(_) => Some(none),
             Bsdf::CoatedDiffuse(b) => b.lanes(wo),
-            Bsdf::Layered(_) | Bsdf::Principled(_) | Bsdf::Evaluated(_) | Bsdf::Phase(_) => None,
+            Bsdf::Exit(_) | Bsdf::Layered(_) | Bsdf::Principled(_) | Bsdf::Evaluated(_) | Bsdf::Phase(_) => None,
         }
     }
 
@@ -279,7 +293,11 @@ impl<'a> Bsdf<'a> {
     #[inline]
     pub fn transmits(&self) -> bool {
         match self {
-            Bsdf::DiffuseTransmission(_) | Bsdf::Dielectric(_) | Bsdf::ThinDielectric(_) | Bsdf::Phase(_) => true,
+            Bsdf::DiffuseTransmission(_)
+            | Bsdf::Dielectric(_)
+            | Bsdf::Exit(_)
+            | Bsdf::ThinDielectric(_)
+            | Bsdf::Phase(_) => true,
             Bsdf::Principled(b) => b.transmission > 0.0,
             Bsdf::Diffuse(_) | Bsdf::Conductor(_) | Bsdf::CoatedDiffuse(_) | Bsdf::Layered(_) | Bsdf::Evaluated(_) => {
                 false
@@ -296,7 +314,7 @@ impl<'a> Bsdf<'a> {
             Bsdf::DiffuseTransmission(_) | Bsdf::Evaluated(_) => self.first_lobe(wo),
             Bsdf::Principled(b) => b.wide_lobe(wo),
             Bsdf::CoatedDiffuse(_) | Bsdf::Layered(_) => 1.0 - self.first_lobe(wo),
-            Bsdf::Conductor(_) | Bsdf::Dielectric(_) | Bsdf::ThinDielectric(_) | Bsdf::Phase(_) => 0.0,
+            Bsdf::Conductor(_) | Bsdf::Dielectric(_) | Bsdf::Exit(_) | Bsdf::ThinDielectric(_) | Bsdf::Phase(_) => 0.0,
         }
     }
 
@@ -319,6 +337,7 @@ impl<'a> Bsdf<'a> {
             Bsdf::DiffuseTransmission(b) => b.sample(wo, uc, u),
             Bsdf::Conductor(b) => b.sample(wo, u),
             Bsdf::Dielectric(b) => b.sample(wo, uc, u),
+            Bsdf::Exit(b) => b.sample_select(wo, uc, u, Transport::Radiance, Select::Transmission),
             Bsdf::ThinDielectric(b) => b.sample(wo, uc),
             Bsdf::CoatedDiffuse(b) => b.sample(wo, uc, u),
             Bsdf::Layered(b) => b.sample(wo, uc, u),
@@ -340,7 +359,7 @@ impl<'a> Bsdf<'a> {
             | Bsdf::Phase(_)
             | Bsdf::Evaluated(_) => true,
             Bsdf::Conductor(b) => !b.distribution.is_smooth(),
-            Bsdf::Dielectric(b) => !b.is_specular(),
+            Bsdf::Dielectric(b) | Bsdf::Exit(b) => !b.is_specular(),
             Bsdf::ThinDielectric(_) => false,
             Bsdf::Layered(b) => b.has_non_specular(),
         }
@@ -356,7 +375,7 @@ impl<'a> Bsdf<'a> {
             | Bsdf::Evaluated(_)
             | Bsdf::Phase(_) => false,
             Bsdf::Conductor(b) => b.distribution.is_smooth(),
-            Bsdf::Dielectric(b) => b.is_specular(),
+            Bsdf::Dielectric(b) | Bsdf::Exit(b) => b.is_specular(),
             Bsdf::ThinDielectric(_) => true,
             Bsdf::CoatedDiffuse(b) => b.has_specular(),
             Bsdf::Layered(b) => b.has_specular(),
@@ -372,6 +391,7 @@ impl<'a> Bsdf<'a> {
             | Bsdf::DiffuseTransmission(_)
             | Bsdf::Conductor(_)
             | Bsdf::Dielectric(_)
+            | Bsdf::Exit(_)
             | Bsdf::ThinDielectric(_)
             | Bsdf::CoatedDiffuse(_)
             | Bsdf::Layered(_)
@@ -392,6 +412,7 @@ impl<'a> Bsdf<'a> {
             Bsdf::Evaluated(Evaluated { model: Model::Diffuse(reflectance), .. }) => of(*reflectance, Rgb::BLACK, None),
             Bsdf::Conductor(_)
             | Bsdf::Dielectric(_)
+            | Bsdf::Exit(_)
             | Bsdf::ThinDielectric(_)
             | Bsdf::Layered(_)
             | Bsdf::Principled(_)
@@ -413,6 +434,7 @@ impl<'a> Bsdf<'a> {
             Bsdf::Phase(_) => Rgb::WHITE,
             Bsdf::Conductor(_)
             | Bsdf::Dielectric(_)
+            | Bsdf::Exit(_)
             | Bsdf::ThinDielectric(_)
             | Bsdf::Layered(_)
             | Bsdf::Principled(_)

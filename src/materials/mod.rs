@@ -1,15 +1,17 @@
 //! Materials: evaluate textures at a hit and build the BSDF in its shading frame. Semantics are pbrt-v4's.
 //!
-//! Reading order: this file, [`evaluated`], [`principled`], [`bump`], [`surface`].
+//! Reading order: this file, [`evaluated`], [`principled`], [`bump`], [`surface`]; [`half_space`] is what an interior gives back.
 
 pub mod bump;
 pub mod evaluated;
+pub mod half_space;
 pub mod principled;
 pub mod surface;
 #[cfg(test)]
 mod tests;
 
 pub use evaluated::EvaluatedMaterial;
+pub use half_space::HalfSpace;
 pub use principled::PrincipledMaterial;
 pub use surface::SurfaceBsdf;
 

@@ -17,6 +17,7 @@ mod photon_map;
 mod photons;
 mod roulette;
 mod sample_allocation;
+mod subsurface;
 mod variance;
 mod visibility_cache;
 mod wavefront;
