@@ -44,6 +44,7 @@ pub use principled::Principled;
 pub use resample::{Resampled, resample};
 pub use thin_dielectric::ThinDielectric;
 
+use dielectric::{Select, Transport};
 use lumiris_lanes::bsdf::Model as LaneModel;
 use lumiris_numbers::math::{Rgb, Vec3};
 use std::f32::consts::FRAC_1_PI;
@@ -121,6 +122,8 @@ pub enum Bsdf<'a> {
     Conductor(Conductor),
     /// Glass.
     Dielectric(Dielectric),
+    /// Refraction by an interface, without the reflection: out of an interior whose reflections are no vertices.
+    Exit(Dielectric),
     /// A sheet of glass.
     ThinDielectric(ThinDielectric),
     /// Lambertian under a clear coat.
@@ -172,6 +175,8 @@ impl<'a> Bsdf<'a> {
             Bsdf::DiffuseTransmission(b) => b.f(wo, wi),
             Bsdf::Conductor(b) => b.f(wo, wi),
             Bsdf::Dielectric(b) => b.f(wo, wi),
+            Bsdf::Exit(_) if wo.z * wi.z > 0.0 => Rgb::BLACK,
+            Bsdf::Exit(b) => b.f(wo, wi),
             Bsdf::ThinDielectric(_) => Rgb::BLACK,
             Bsdf::CoatedDiffuse(b) => b.f(wo, wi),
             Bsdf::Layered(b) => b.f(wo, wi),
@@ -194,6 +199,7 @@ impl<'a> Bsdf<'a> {
             Bsdf::DiffuseTransmission(b) => b.pdf(wo, wi),
             Bsdf::Conductor(b) => b.pdf(wo, wi),
             Bsdf::Dielectric(b) => b.pdf(wo, wi),
+            Bsdf::Exit(b) => b.pdf_select(wo, wi, Select::Transmission),
             Bsdf::ThinDielectric(_) => 0.0,
             Bsdf::CoatedDiffuse(b) => b.pdf(wo, wi),
             Bsdf::Layered(b) => b.pdf(wo, wi),
@@ -219,6 +225,7 @@ impl<'a> Bsdf<'a> {
             Bsdf::Diffuse(_)
             | Bsdf::Conductor(_)
             | Bsdf::Dielectric(_)
+            | Bsdf::Exit(_)
             | Bsdf::ThinDielectric(_)
             | Bsdf::Hair(_)
             | Bsdf::Phase(_) => 1.0,
@@ -232,6 +239,7 @@ impl<'a> Bsdf<'a> {
             Bsdf::Diffuse(_)
             | Bsdf::Conductor(_)
             | Bsdf::Dielectric(_)
+            | Bsdf::Exit(_)
             | Bsdf::ThinDielectric(_)
             | Bsdf::Hair(_)
             | Bsdf::Phase(_) => return pdf,
@@ -279,11 +287,16 @@ impl<'a> Bsdf<'a> {
                 let TrowbridgeReitz { alpha_x, alpha_y } = b.distribution;
                 Some(LaneModel::Conductor { alpha: [alpha_x, alpha_y], eta: b.eta.to_array(), k: b.k.to_array() })
             }
-            Bsdf::Dielectric(b) if b.is_specular() => Some(none),
+            Bsdf::Dielectric(b) | Bsdf::Exit(b) if b.is_specular() => Some(none),
             Bsdf::Dielectric(b) => Some(LaneModel::Dielectric(b.lanes())),
             Bsdf::ThinDielectric(_) => Some(none),
             Bsdf::CoatedDiffuse(b) => b.lanes(wo),
-            Bsdf::Layered(_) | Bsdf::Principled(_) | Bsdf::Hair(_) | Bsdf::Evaluated(_) | Bsdf::Phase(_) => None,
+            Bsdf::Exit(_)
+            | Bsdf::Layered(_)
+            | Bsdf::Principled(_)
+            | Bsdf::Hair(_)
+            | Bsdf::Evaluated(_)
+            | Bsdf::Phase(_) => None,
         }
     }
 
@@ -293,6 +306,7 @@ impl<'a> Bsdf<'a> {
         match self {
             Bsdf::DiffuseTransmission(_)
             | Bsdf::Dielectric(_)
+            | Bsdf::Exit(_)
             | Bsdf::ThinDielectric(_)
             | Bsdf::Hair(_)
             | Bsdf::Phase(_) => true,
@@ -312,7 +326,12 @@ impl<'a> Bsdf<'a> {
             Bsdf::DiffuseTransmission(_) | Bsdf::Evaluated(_) => self.first_lobe(wo),
             Bsdf::Principled(b) => b.wide_lobe(wo),
             Bsdf::CoatedDiffuse(_) | Bsdf::Layered(_) => 1.0 - self.first_lobe(wo),
-            Bsdf::Conductor(_) | Bsdf::Dielectric(_) | Bsdf::ThinDielectric(_) | Bsdf::Hair(_) | Bsdf::Phase(_) => 0.0,
+            Bsdf::Conductor(_)
+            | Bsdf::Dielectric(_)
+            | Bsdf::Exit(_)
+            | Bsdf::ThinDielectric(_)
+            | Bsdf::Hair(_)
+            | Bsdf::Phase(_) => 0.0,
         }
     }
 
@@ -335,6 +354,7 @@ impl<'a> Bsdf<'a> {
             Bsdf::DiffuseTransmission(b) => b.sample(wo, uc, u),
             Bsdf::Conductor(b) => b.sample(wo, u),
             Bsdf::Dielectric(b) => b.sample(wo, uc, u),
+            Bsdf::Exit(b) => b.sample_select(wo, uc, u, Transport::Radiance, Select::Transmission),
             Bsdf::ThinDielectric(b) => b.sample(wo, uc),
             Bsdf::CoatedDiffuse(b) => b.sample(wo, uc, u),
             Bsdf::Layered(b) => b.sample(wo, uc, u),
@@ -358,7 +378,7 @@ impl<'a> Bsdf<'a> {
             | Bsdf::Phase(_)
             | Bsdf::Evaluated(_) => true,
             Bsdf::Conductor(b) => !b.distribution.is_smooth(),
-            Bsdf::Dielectric(b) => !b.is_specular(),
+            Bsdf::Dielectric(b) | Bsdf::Exit(b) => !b.is_specular(),
             Bsdf::ThinDielectric(_) => false,
             Bsdf::Layered(b) => b.has_non_specular(),
         }
@@ -375,7 +395,7 @@ impl<'a> Bsdf<'a> {
             | Bsdf::Evaluated(_)
             | Bsdf::Phase(_) => false,
             Bsdf::Conductor(b) => b.distribution.is_smooth(),
-            Bsdf::Dielectric(b) => b.is_specular(),
+            Bsdf::Dielectric(b) | Bsdf::Exit(b) => b.is_specular(),
             Bsdf::ThinDielectric(_) => true,
             Bsdf::CoatedDiffuse(b) => b.has_specular(),
             Bsdf::Layered(b) => b.has_specular(),
@@ -391,6 +411,7 @@ impl<'a> Bsdf<'a> {
             | Bsdf::DiffuseTransmission(_)
             | Bsdf::Conductor(_)
             | Bsdf::Dielectric(_)
+            | Bsdf::Exit(_)
             | Bsdf::ThinDielectric(_)
             | Bsdf::CoatedDiffuse(_)
             | Bsdf::Layered(_)
@@ -412,6 +433,7 @@ impl<'a> Bsdf<'a> {
             Bsdf::Evaluated(Evaluated { model: Model::Diffuse(reflectance), .. }) => of(*reflectance, Rgb::BLACK, None),
             Bsdf::Conductor(_)
             | Bsdf::Dielectric(_)
+            | Bsdf::Exit(_)
             | Bsdf::ThinDielectric(_)
             | Bsdf::Layered(_)
             | Bsdf::Principled(_)
@@ -434,6 +456,7 @@ impl<'a> Bsdf<'a> {
             Bsdf::Phase(_) => Rgb::WHITE,
             Bsdf::Conductor(_)
             | Bsdf::Dielectric(_)
+            | Bsdf::Exit(_)
             | Bsdf::ThinDielectric(_)
             | Bsdf::Layered(_)
             | Bsdf::Principled(_)

@@ -40,7 +40,7 @@ impl Resources {
     /// Reads all images, in the order of their ids; errors go to `d`.
     pub fn load(&self, files: &FileCache, d: &mut Diagnostics) -> Vec<Arc<MipMap>> {
         let plan = files.plan_textures(self.requests.iter().map(|(request, _)| request)).unwrap_or_else(|error| {
-            d.error_without_place(&format!("there is no temporary file for tiles of textures: {error}"));
+            d.error_without_place(format!("there is no temporary file for tiles of textures: {error}"));
             TexturePlan::default()
         });
         let requests = self.requests.par_iter().enumerate();

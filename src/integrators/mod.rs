@@ -2,12 +2,13 @@
 //!
 //! An [`Integrator`] is what all threads share while an image is rendered: it prepares what samples need, makes a
 //! [`Tracer`] for each thread, and reports. Reading order: `segment` is a path between two vertices, `vertices` finds
-//! the next ones, and [`path`] is the loop over them; `wavefront` has the vertices of `mc` and `mis` side by side.
+//! the next ones, `interior` walks through materials on the way there, and [`path`] is the loop over them; `wavefront` has the vertices of `mc` and `mis` side by side.
 //! `roulette` decides which paths end and split where they arrive (`arrivals`), by what `pilot` paths found.
 //! Pixels that are neighbours may share paths ([`reuse`]). [`through_media`] says which settings know participating media. [`irradiance_cache`] and [`photon_map`] replace the light that Lambertian parts reflect (`diffuse`).
 
 mod arrivals;
 mod diffuse;
+mod interior;
 pub mod irradiance_cache;
 pub mod light_layers;
 pub mod path;

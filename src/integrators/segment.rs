@@ -34,6 +34,8 @@ pub(super) mod domain {
     pub(crate) const FLIGHT: u32 = 1 << 19;
     /// The light about which distances of a flight may be equiangular.
     pub(crate) const FOCUS: u32 = 1 << 18;
+    /// The walk through an interior on the way to vertex k uses the domain `WALK + k`.
+    pub(crate) const WALK: u32 = 1 << 17;
 }
 
 /// Counts and times.

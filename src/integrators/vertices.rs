@@ -57,7 +57,7 @@ pub(super) struct Stage<'a, 'w> {
 pub(super) struct VertexSearch {
     pub(super) active: Vec<PathState>,
     kept: Vec<PathState>,
-    passing: Vec<PathState>,
+    pub(super) passing: Vec<PathState>,
     /// Indices of active paths that meet nothing and look for emitters.
     escaped: Vec<u32>,
     rays: RayBatch,
@@ -185,7 +185,7 @@ impl VertexSearch {
         }
         let Some(beta) = path.beta_beyond_emitter() else { return };
         let Some(bsdf) = interaction.scatter(at.job) else {
-            if path.passed < MAX_PASSED {
+            if path.passed < MAX_PASSED || self.walks(at.job, path) {
                 self.passing.push(path.pass(at.job, beta, &interaction));
             }
             return;
@@ -203,11 +203,14 @@ impl VertexSearch {
         if at.vertex >= at.depth || path.is_ghost {
             return;
         }
+        let media = interaction.sides(at.job, path.medium);
+        let Some((bsdf, beta)) = self.leave(at, (path, beta), &interaction, (bsdf, media)) else { return };
+        let out = &at.out[path.sample as usize];
         let mut carried = path.carried(beta, width);
         let (surface, wo) = (interaction.surface, interaction.wo);
         let place = || (surface.p, if surface.n.dot(wo) < 0.0 { -surface.n } else { surface.n });
         let count = self.arrivals.arrive((sample, out.radiance), at.vertex, &mut carried, place);
-        let (parent, media) = (carried.branch, interaction.sides(at.job, path.medium));
+        let parent = carried.branch;
         for index in 0..count {
             carried.branch = self.arrivals.branch(sample, parent, at.vertex, (count, index));
             let streams = self.arrivals.streams(sample, carried.branch);
@@ -239,6 +242,9 @@ impl VertexSearch {
     ) -> bool {
         let Some(id) = path.medium.filter(|_| !path.is_ghost) else { return false };
         let medium = &at.job.world.scene.media.media[id as usize];
+        if medium.is_interior() {
+            return self.walk(at, medium, path, hit);
+        }
         let scale = path.ray.d.length();
         let (o, d) = (path.ray.o, path.ray.d / scale);
         let segment = Segment { o, d, length: hit.map_or(f32::INFINITY, |hit| hit.t * scale) };

@@ -1,10 +1,12 @@
 //! Materials: evaluate textures at a hit and build the BSDF in its shading frame. Semantics are pbrt-v4's.
 //!
-//! Reading order: this file, [`evaluated`], [`hair`], [`principled`], [`bump`], [`surface`].
+//! Reading order: this file, [`evaluated`], [`hair`], [`principled`], [`bump`], [`surface`]; [`half_space`] is what an
+//! interior gives back.
 
 pub mod bump;
 pub mod evaluated;
 pub mod hair;
+pub mod half_space;
 pub mod principled;
 pub mod surface;
 #[cfg(test)]
@@ -12,6 +14,7 @@ mod tests;
 
 pub use evaluated::EvaluatedMaterial;
 pub use hair::{HairColor, HairMaterial};
+pub use half_space::HalfSpace;
 pub use principled::PrincipledMaterial;
 pub use surface::SurfaceBsdf;
 

@@ -42,6 +42,9 @@ pub struct Coefficients {
 pub enum Medium {
     /// The same everywhere.
     Homogeneous(Homogeneous),
+    /// The same, as the interior of a material: light walks through it from surface to surface, and what happens on the
+    /// way is no bounce.
+    Interior(Homogeneous),
     /// One that varies in a box, outside of which there is nothing.
     Heterogeneous(Arc<Heterogeneous>),
 }
@@ -51,6 +54,7 @@ impl Medium {
     pub fn kind_name(&self) -> &'static str {
         match self {
             Medium::Homogeneous(_) => "homogeneous",
+            Medium::Interior(_) => "interior",
             Medium::Heterogeneous(m) => m.kind_name(),
         }
     }
@@ -58,7 +62,7 @@ impl Medium {
     /// True if it sends out light.
     pub fn is_emissive(&self) -> bool {
         match self {
-            Medium::Homogeneous(m) => m.is_emissive(),
+            Medium::Homogeneous(m) | Medium::Interior(m) => m.is_emissive(),
             Medium::Heterogeneous(m) => m.is_emissive(),
         }
     }
@@ -67,15 +71,21 @@ impl Medium {
     #[inline]
     pub fn g(&self) -> f32 {
         match self {
-            Medium::Homogeneous(m) => m.g,
+            Medium::Homogeneous(m) | Medium::Interior(m) => m.g,
             Medium::Heterogeneous(m) => m.g,
         }
+    }
+
+    /// True if it is the interior of a material.
+    #[inline]
+    pub fn is_interior(&self) -> bool {
+        matches!(self, Medium::Interior(_))
     }
 
     /// Bytes of its tables.
     pub fn bytes(&self) -> usize {
         match self {
-            Medium::Homogeneous(_) => 0,
+            Medium::Homogeneous(_) | Medium::Interior(_) => 0,
             Medium::Heterogeneous(m) => m.bytes(),
         }
     }
@@ -91,7 +101,7 @@ impl Medium {
         focus: impl FnOnce() -> Option<Vec3>,
     ) -> Flight {
         match self {
-            Medium::Homogeneous(m) => m.fly(segment, beta, numbers.first(), focus),
+            Medium::Homogeneous(m) | Medium::Interior(m) => m.fly(segment, beta, numbers.first(), focus),
             Medium::Heterogeneous(m) => m.fly(segment, beta, numbers),
         }
     }
@@ -101,7 +111,7 @@ impl Medium {
     #[inline]
     pub fn transmittance(&self, segment: &Segment, numbers: &mut Numbers) -> Rgb {
         match self {
-            Medium::Homogeneous(m) => m.transmittance(segment.length),
+            Medium::Homogeneous(m) | Medium::Interior(m) => m.transmittance(segment.length),
             Medium::Heterogeneous(m) => m.transmittance(segment, numbers),
         }
     }

@@ -18,6 +18,7 @@ mod photon_map;
 mod photons;
 mod roulette;
 mod sample_allocation;
+mod subsurface;
 mod texture_tiles;
 mod variance;
 mod visibility_cache;

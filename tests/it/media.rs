@@ -21,7 +21,7 @@ const SEEDS: u32 = 32;
 const LIMIT: f64 = 5.2;
 
 /// A camera at `from` that looks along −z through a rectangle so small that all its rays are the same.
-fn camera(from: &str, outside: &str, depth: u32) -> String {
+pub(crate) fn camera(from: &str, outside: &str, depth: u32) -> String {
     format!(
         r#"Translate {from} Scale -1 1 -1
         MediumInterface "" "{outside}" Camera "orthographic" "float screenwindow" [ -0.0005 0.0005 -0.0005 0.0005 ]
@@ -34,7 +34,7 @@ fn camera(from: &str, outside: &str, depth: u32) -> String {
     )
 }
 
-fn job(text: &str, accel: AccelKind) -> RenderJob {
+pub(crate) fn job(text: &str, accel: AccelKind) -> RenderJob {
     let loaded = load_text(text, "media", Path::new("."), &LoadOptions::default(), &FileCache::default());
     loaded.map_err(|d| d.to_string()).unwrap().job(accel, None).unwrap()
 }
@@ -44,10 +44,10 @@ fn film(job: &RenderJob, settings: RenderSettings) -> Film {
 }
 
 /// Means and standard errors of the channels.
-type Answer = ([f64; 3], [f64; 3]);
+pub(crate) type Answer = ([f64; 3], [f64; 3]);
 
 /// Those over images.
-fn means(job: &mut RenderJob, spp: u32) -> Answer {
+pub(crate) fn means(job: &mut RenderJob, spp: u32) -> Answer {
     let image = |seed| {
         job.change(|s| s.sampling.seed = seed);
         let film = film(job, RenderSettings { spp, ..RenderSettings::default() });
@@ -63,7 +63,7 @@ fn means(job: &mut RenderJob, spp: u32) -> Answer {
 
 /// The mean of every channel is the answer, and a relative bias of `detects` would be found with a probability above 0.99.
 #[track_caller]
-fn assert_answer(job: &mut RenderJob, spp: u32, answer: [f64; 3], detects: f64, what: &str) {
+pub(crate) fn assert_answer(job: &mut RenderJob, spp: u32, answer: [f64; 3], detects: f64, what: &str) {
     let (mean, error) = means(job, spp);
     for c in 0..3 {
         // Rounding of f32, where there is no noise
@@ -77,7 +77,7 @@ fn assert_answer(job: &mut RenderJob, spp: u32, answer: [f64; 3], detects: f64, 
 /// Means with their standard errors are those of all, weighted by what is known of each; a relative difference of `detects`
 /// would be found with a probability above 0.99.
 #[track_caller]
-fn assert_they_agree(answers: &[(String, Answer)], detects: f64) {
+pub(crate) fn assert_they_agree(answers: &[(String, Answer)], detects: f64) {
     for c in 0..3 {
         let weight = |error: &[f64; 3]| 1.0 / error[c].powi(2);
         let sum: f64 = answers.iter().map(|(_, (_, error))| weight(error)).sum();
@@ -91,7 +91,7 @@ fn assert_they_agree(answers: &[(String, Answer)], detects: f64) {
 }
 
 /// All settings that know media.
-fn estimators() -> Vec<(String, IntegratorSettings)> {
+pub(crate) fn estimators() -> Vec<(String, IntegratorSettings)> {
     let base = |estimator, samples: u32| IntegratorSettings { estimator, samples: Some(samples), ..Default::default() };
     let mut all: Vec<(String, IntegratorSettings)> = Vec::new();
     for (kind, samples) in [
@@ -112,7 +112,7 @@ fn estimators() -> Vec<(String, IntegratorSettings)> {
 }
 
 /// Estimator, numbers of samples and target of `settings`.
-fn choose(job: &mut RenderJob, settings: &IntegratorSettings) {
+pub(crate) fn choose(job: &mut RenderJob, settings: &IntegratorSettings) {
     job.change(|s| {
         (s.integrator.estimator, s.integrator.samples) = (settings.estimator, settings.samples);
         s.integrator.ris = settings.ris;
@@ -121,7 +121,7 @@ fn choose(job: &mut RenderJob, settings: &IntegratorSettings) {
 }
 
 /// A medium in a box, or of which a box or a sphere is cut out.
-const BOX: &str = r#"Shape "trianglemesh" "point3 P" [-1 -1 -1  1 -1 -1  1 1 -1  -1 1 -1  -1 -1 1  1 -1 1  1 1 1  -1 1 1]
+pub(crate) const BOX: &str = r#"Shape "trianglemesh" "point3 P" [-1 -1 -1  1 -1 -1  1 1 -1  -1 1 -1  -1 -1 1  1 -1 1  1 1 1  -1 1 1]
     "integer indices" [0 2 1 0 3 2  4 5 6 4 6 7  0 1 5 0 5 4  3 7 6 3 6 2  0 4 7 0 7 3  1 2 6 1 6 5]"#;
 
 /// Values of a grid of 4 × 4 × 4 samples that are far from constant.

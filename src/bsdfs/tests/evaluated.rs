@@ -168,6 +168,7 @@ fn resampling_is_unbiased_for_every_bsdf() {
                 | Bsdf::DiffuseTransmission(_)
                 | Bsdf::Conductor(_)
                 | Bsdf::Dielectric(_)
+                | Bsdf::Exit(_)
                 | Bsdf::ThinDielectric(_)
                 | Bsdf::CoatedDiffuse(_)
                 | Bsdf::Layered(_)

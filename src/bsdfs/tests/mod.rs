@@ -73,6 +73,7 @@ pub(super) fn zoo<'a>(tables: &'a [CoatTable]) -> Vec<(String, Bsdf<'a>)> {
         let model = Model::CookTorrance(models::CookTorrance::new(RED, RED, 0.4, 0.5));
         zoo.push((format!("evaluated {density:?}"), Bsdf::Evaluated(Evaluated { model, density })));
     }
+    zoo.push(("exit 0.3".into(), Bsdf::Exit(glass(1.4, 0.3))));
     zoo
 }
 
@@ -206,7 +207,7 @@ fn scattering_is_reciprocal() {
             }
             let (mut a, mut c) = (b.f(wo, wi).g, b.f(wi, wo).g);
             let eta = match &b {
-                Bsdf::Dielectric(d) => d.eta,
+                Bsdf::Dielectric(d) | Bsdf::Exit(d) => d.eta,
                 Bsdf::Principled(Principled { interior: Interior::Solid(eta), .. }) => *eta,
                 _ => 1.0,
             };

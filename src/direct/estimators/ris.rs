@@ -193,6 +193,7 @@ fn allocation(point: &ShadingPoint<'_>) -> SampleAllocation {
         Bsdf::CoatedDiffuse(_)
         | Bsdf::Conductor(_)
         | Bsdf::Dielectric(_)
+        | Bsdf::Exit(_)
         | Bsdf::ThinDielectric(_)
         | Bsdf::Layered(_)
         | Bsdf::Phase(_)

@@ -3,7 +3,7 @@
 use super::transform::Ctm;
 use crate::geometry::{Curve, CurveKind, QuadricKind};
 use crate::materials::MaterialId;
-use crate::media::Medium;
+use crate::media::{Homogeneous, Medium};
 use lumiris_formats::pbrt::directive::Name;
 use lumiris_formats::pbrt::params::ParamSet;
 use lumiris_formats::source::Span;
@@ -67,6 +67,16 @@ pub struct MediumDesc {
     pub name: Name,
     /// The medium; `None` after an error.
     pub medium: Option<Medium>,
+}
+
+/// What is behind the surface of a material.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Interior {
+    pub(super) medium: Homogeneous,
+    /// Light comes in and out by mirror-like refraction only.
+    pub(super) is_smooth: bool,
+    /// The material.
+    pub(super) span: Span,
 }
 
 /// An area light as written; shapes that follow emit it.

@@ -65,7 +65,8 @@ impl Builder<'_> {
 
         // Assemble the geometry
         let shutter = options.as_ref().map_or([0.0, 1.0], |s| s.shutter);
-        let media = self.media_in_use(&shapes, d);
+        let mut media = self.media_in_use(&shapes, d);
+        self.add_interiors(&mut media, &shapes, d);
         let mut assembly = Assembly { shutter, images, media, ..Assembly::default() };
         assembly.set.groups.resize_with(self.objects.len(), Group::default);
         for (desc, made) in shapes.iter().zip(made) {
@@ -124,7 +125,7 @@ impl Builder<'_> {
     /// Adds the shapes of one description to their group, or to the root, or to an instance of their own if they move.
     fn place(&self, assembly: &mut Assembly, desc: &ShapeDesc, made: Made, material: MaterialId, d: &mut Diagnostics) {
         let moving = desc.ctm.is_moving();
-        let sides = assembly.media.sides(&desc.media);
+        let sides = assembly.media.sides(&desc.media, material);
         let passes = matches!(self.materials[material as usize].material, Material::Interface);
         let mut ids = Vec::new();
         for shape in made.shapes {

@@ -25,6 +25,7 @@ const KINDS: &[&str] = &[
     "diffusetransmission",
     "coateddiffuse",
     "coatedconductor",
+    "subsurface",
     "mix",
     "interface",
     "principled",
@@ -146,6 +147,7 @@ impl Builder<'_> {
                 max_depth: count(p, "maxdepth", 10, d),
                 samples: count(p, "nsamples", 1, d),
             },
+            "subsurface" => self.subsurface(place, p, d),
             "principled" => self.principled(p, d),
             "hair" => self.hair(p, d),
             "evaluated" => self.evaluated(place, p, d),
@@ -216,7 +218,7 @@ impl Builder<'_> {
     fn other_material(&mut self, kind: &str, place: &Name, p: &ParamSet, d: &mut Diagnostics) -> Material {
         match kind {
             "matte" | "plastic" | "substrate" | "uber" | "metal" | "mirror" | "glass" | "translucent" => {}
-            "measured" | "subsurface" | "kdsubsurface" | "disney" | "fourier" => {
+            "measured" | "kdsubsurface" | "disney" | "fourier" => {
                 d.warning_once(place.span, format!("material `{kind}` is not rendered yet: it is diffuse"));
                 p.ignore_all();
                 return Material::Diffuse { reflectance: self.textures.add_rgb(RgbTexture::Constant(Rgb::splat(0.5))) };
@@ -278,7 +280,13 @@ impl Builder<'_> {
         self.rgb_param(p, name, default, SpectrumUse::Albedo, d)
     }
 
-    fn roughness(&mut self, p: &ParamSet, names: [&'static str; 3], default: f32, d: &mut Diagnostics) -> Roughness {
+    pub(super) fn roughness(
+        &mut self,
+        p: &ParamSet,
+        names: [&'static str; 3],
+        default: f32,
+        d: &mut Diagnostics,
+    ) -> Roughness {
         let both = self.float_param(p, names[0], default, d);
         let mut axis = |name: &'static str| match p.float_input(name, d) {
             Some(_) => self.float_param(p, name, default, d),
@@ -365,6 +373,11 @@ impl Builder<'_> {
             return Material::Interface;
         };
         let ids = [first, second].map(|name| self.named_material(name, p.span_of("materials"), d));
+        for id in ids.into_iter().flatten().filter(|id| self.interiors.contains_key(id)) {
+            let name = &self.materials[id as usize].name;
+            let text = format!("a mix has no interior: `{name}` is clear glass in it");
+            d.warning_once(p.span_of("materials"), text);
+        }
         match ids {
             [Some(a), Some(b)] => Material::Mix { materials: [a, b], amount },
             _ => Material::Interface,

@@ -5,6 +5,7 @@ use super::descriptions::{MediumDesc, MediumNames, ShapeDesc};
 use super::media_presets;
 use super::spectrum::SpectrumUse;
 use super::state::Builder;
+use crate::materials::MaterialId;
 use crate::media::{
     Cloud, Field, Heterogeneous, Homogeneous, Medium, MediumId, MediumSet, RgbGrid, Samples, Sides, Temperature,
     UniformGrid,
@@ -25,6 +26,8 @@ const TEMPERATURES: usize = 1024;
 pub(super) struct MediaInUse {
     pub(super) set: MediumSet,
     ids: HashMap<String, MediumId>,
+    /// Interiors of materials.
+    pub(super) interiors: HashMap<MaterialId, MediumId>,
 }
 
 impl MediaInUse {
@@ -32,9 +35,13 @@ impl MediaInUse {
         self.ids.get(&name.as_ref()?.text).copied()
     }
 
-    /// The media on the sides of a shape; `None` if they are the same.
-    pub(super) fn sides(&self, names: &MediumNames) -> Option<Sides> {
-        let sides = Sides { front: self.id(&names.outside), back: self.id(&names.inside) };
+    /// The media on the sides of a shape of a material; `None` if they are the same.
+    pub(super) fn sides(&self, names: &MediumNames, material: MaterialId) -> Option<Sides> {
+        let front = self.id(&names.outside);
+        if let Some(&interior) = self.interiors.get(&material) {
+            return Some(Sides { front, back: Some(interior) });
+        }
+        let sides = Sides { front, back: self.id(&names.inside) };
         (names.differ() && sides.differ()).then_some(sides)
     }
 }
@@ -207,7 +214,7 @@ impl Builder<'_> {
                 return None;
             };
             let medium = desc.medium.as_ref()?;
-            let MediaInUse { set, ids } = media;
+            let MediaInUse { set, ids, .. } = media;
             Some(*ids.entry(name.text.clone()).or_insert_with(|| {
                 set.media.push(medium.clone());
                 set.names.push(name.text.clone());
@@ -217,7 +224,7 @@ impl Builder<'_> {
         if let Some(name) = self.options.camera_medium() {
             media.set.camera = used(&mut media, name, d);
         }
-        for shape in shapes.iter().filter(|shape| shape.media.differ()) {
+        for shape in shapes.iter().filter(|s| s.media.differ() || self.interior_of(&s.material).is_some()) {
             for name in [&shape.media.inside, &shape.media.outside].into_iter().flatten() {
                 let id = used(&mut media, name, d);
                 let varies = id.is_some_and(|id| matches!(media.set.media[id as usize], Medium::Heterogeneous(_)));

@@ -22,6 +22,7 @@ pub mod settings;
 pub mod shapes;
 pub mod spectrum;
 pub mod state;
+mod subsurface;
 pub mod textures;
 pub mod transform;
 

@@ -1,8 +1,8 @@
 //! What the directives so far have made: the graphics state, and the scene while its file is read.
 
 use super::descriptions::{
-    AreaLightDesc, EnvironmentDesc, InstanceDesc, MaterialUse, MediumDesc, MediumNames, ObjectDesc, ShapeDesc,
-    ShapeSource,
+    AreaLightDesc, EnvironmentDesc, InstanceDesc, Interior, MaterialUse, MediumDesc, MediumNames, ObjectDesc,
+    ShapeDesc, ShapeSource,
 };
 use super::options::Options;
 use super::transform::{Ctm, affine};
@@ -95,6 +95,8 @@ pub struct Builder<'a> {
     pub materials: Vec<MaterialEntry>,
     /// Named materials.
     pub named_materials: HashMap<String, u32>,
+    /// Interiors of materials of the kind `subsurface`.
+    pub(super) interiors: HashMap<MaterialId, Interior>,
     /// Media.
     pub media: Vec<MediumDesc>,
     /// Lights that are no surfaces.
@@ -147,6 +149,7 @@ impl<'a> Builder<'a> {
             texture_names: TextureNames::default(),
             materials,
             named_materials: HashMap::new(),
+            interiors: HashMap::new(),
             media: Vec::new(),
             lights: Vec::new(),
             light_groups: Vec::new(),
