@@ -8,6 +8,7 @@
 //! |---|---|---|---|
 //! | point | its position | uniform on the sphere | 4π·I, constant |
 //! | spot | its position | by its falloff | I times the solid angle of the falloff, constant |
+//! | goniometric, projection | its position | by its image | I/p_ω |
 //! | area | by area, see [`area`](super::area) | cosine about the normal, of one side or of either | π·Le/p_A |
 //! | distant | disk | its own | π·R²·E, constant |
 //! | environment | disk | by its image, or uniform | π·R²·Le/p_ω |
@@ -39,7 +40,7 @@ pub struct EmissionSample {
 
 impl EmissionSample {
     /// For lights without a surface.
-    fn in_space(p: Vec3, d: Vec3, power: Rgb) -> Option<Self> {
+    pub(super) fn in_space(p: Vec3, d: Vec3, power: Rgb) -> Option<Self> {
         EmissionSample { p, p_error: Vec3::ZERO, n: Vec3::ZERO, d, power }.if_lit()
     }
 
@@ -63,6 +64,7 @@ impl Light {
                 let solid_angle = spot::spot_solid_angle(*cos_total, *cos_falloff_start);
                 EmissionSample::in_space(*p, d.normalize(), *intensity * solid_angle)
             }
+            Light::Image(light) => light.sample_le(u_direction),
             Light::Distant { wi_world, l } => from_infinity(scene, u_position, *wi_world, *l),
             Light::Area(area) => area.sample_le(u_position, u_direction),
             Light::InfiniteConstant { l } => {

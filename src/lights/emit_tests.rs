@@ -5,12 +5,12 @@ use super::light_tests::{
     triangle_surface,
 };
 use super::{
-    Emission, EmissionImage, EmissionSample, EnvironmentFilter, EnvironmentMap, EnvironmentMapping, Light, LightCtx,
-    area_lights_of,
+    Emission, EmissionImage, EmissionSample, EnvironmentFilter, EnvironmentMap, EnvironmentMapping, ImageLight,
+    ImageMapping, Light, LightCtx, area_lights_of,
 };
 use crate::geometry::{BilinearMesh, Quadric, QuadricKind, Shape, TriangleMesh};
 use lumiris_numbers::math::warp::azimuth;
-use lumiris_numbers::math::{Affine3A, Frame, Rgb, Vec3};
+use lumiris_numbers::math::{Affine3A, Frame, Mat3, Rgb, Vec3};
 use lumiris_test_support::random::{Pcg32, RngExt, pcg32};
 use lumiris_test_support::{Moments, assert_chi_squared};
 use std::f32::consts::TAU;
@@ -35,6 +35,13 @@ fn environment(mapping: EnvironmentMapping, size: [usize; 2]) -> Light {
         (0..size[0] * size[1]).map(|i| Rgb::new((i % 7) as f32, (i * i % 11) as f32, if i == 9 { 40.0 } else { 1.0 }));
     let map = EnvironmentMap::new(texels.collect(), size, mapping, EnvironmentFilter::Bilinear).unwrap();
     Light::infinite_image(Arc::new(map), &placement(), 0.5)
+}
+
+/// A light that points down, with an image of its intensity.
+fn picture(mapping: ImageMapping, size: [usize; 2]) -> Light {
+    let texels = (0..size[0] * size[1]).map(|i| Rgb::new((i % 5) as f32, (i * i % 7) as f32, 1.0)).collect();
+    let down = Mat3::from_rotation_x(2.8) * Mat3::from_rotation_z(0.3);
+    Light::Image(Arc::new(ImageLight::new(Vec3::new(0.1, 0.3, 1.4), down, mapping, (texels, size)).unwrap()))
 }
 
 /// Every kind of light above the plane z = 0, and on both sides of it.
@@ -66,6 +73,8 @@ fn lights() -> Vec<(&'static str, Light)> {
         ("spot", spot(0.7, 0.95)),
         ("spot without falloff", spot(0.8, 0.8)),
         ("spot wider than a half-space", spot(-0.6, 0.1)),
+        ("goniometric", picture(ImageMapping::Sphere, [6, 6])),
+        ("projection", picture(ImageMapping::Plane { half: [0.9, 0.6] }, [6, 4])),
         ("distant", Light::Distant { wi_world: Vec3::new(0.3, -0.4, 0.7).normalize(), l }),
         ("triangle", area(&triangle, &both)),
         ("rectangle", area(&down, &one)),

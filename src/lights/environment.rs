@@ -12,7 +12,7 @@ use lumiris_numbers::math::sphere_map::{
     equal_area_sphere_to_square, equal_area_square_to_sphere, lat_long_to_sphere, pdf_equal_area_square_to_sphere,
     pdf_lat_long_to_sphere, sphere_to_lat_long, wrap_equal_area_texel,
 };
-use lumiris_numbers::math::{Mat3, PiecewiseConstant2D, Rgb, Vec2, Vec3};
+use lumiris_numbers::math::{Affine3A, Mat3, PiecewiseConstant2D, Rgb, Vec2, Vec3};
 use std::f64::consts::PI;
 
 /// Directions that are looked up together.
@@ -63,6 +63,17 @@ pub struct EnvironmentMap {
 /// The colour with components that are negative or not finite set to 0.
 pub(super) fn cleaned(c: Rgb) -> Rgb {
     c.map(|x| if x.is_finite() { x.max(0.0) } else { 0.0 })
+}
+
+/// The rotation of a transform, with a mirror if it has one: the orthogonal map next to it whose x axis is the same.
+pub fn orthogonal(world_from_light: &Affine3A) -> Mat3 {
+    let m = &world_from_light.matrix3;
+    let x = Vec3::from(m.x_axis).normalize_or(Vec3::X);
+    let (y0, z0) = (Vec3::from(m.y_axis), Vec3::from(m.z_axis));
+    let y = (y0 - x * x.dot(y0)).normalize_or(x.any_orthonormal_vector());
+    let z = x.cross(y);
+    let z = if z.dot(z0) < 0.0 { -z } else { z };
+    Mat3::from_cols(x, y, z)
 }
 
 /// The colour of a texel.

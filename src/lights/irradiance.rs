@@ -82,7 +82,11 @@ fn mean_l(light: &Light) -> Rgb {
             AreaShape::Quadric(_) | AreaShape::Patch(_) => Rgb::BLACK,
         },
         Light::InfiniteConstant { l } => *l,
-        Light::Point { .. } | Light::Spot { .. } | Light::Distant { .. } | Light::InfiniteImage { .. } => Rgb::BLACK,
+        Light::Point { .. }
+        | Light::Spot { .. }
+        | Light::Image(_)
+        | Light::Distant { .. }
+        | Light::InfiniteImage { .. } => Rgb::BLACK,
     };
     if l.is_finite() && l.luminance() > 0.0 { l } else { Rgb::BLACK }
 }
@@ -227,6 +231,7 @@ mod tests {
             Light::Area(_)
             | Light::Point { .. }
             | Light::Spot { .. }
+            | Light::Image(_)
             | Light::Distant { .. }
             | Light::InfiniteConstant { .. }
             | Light::InfiniteImage { .. } => false,

@@ -17,7 +17,11 @@ impl Light {
                 map.lanes(*world_from_light, *scale).sample(lumiris_lanes::level(), u, out);
             }
             // The same for all numbers
-            Light::Point { .. } | Light::Spot { .. } | Light::Distant { .. } | Light::InfiniteConstant { .. } => {
+            Light::Point { .. }
+            | Light::Spot { .. }
+            | Light::Image(_)
+            | Light::Distant { .. }
+            | Light::InfiniteConstant { .. } => {
                 let Some(s) = self.sample_li(ctx, [0.5; 2]) else { return out.pdf.fill(0.0) };
                 for (wi, value) in out.wi.iter_mut().zip(s.wi.to_array()) {
                     wi.fill(value);

@@ -10,6 +10,7 @@ pub mod choice;
 pub mod emit;
 pub mod environment;
 pub mod groups;
+pub mod image_light;
 pub mod irradiance;
 pub mod lanes;
 pub mod layers;
@@ -39,6 +40,7 @@ pub use choice::{LightRun, SampledLight};
 pub use emit::EmissionSample;
 pub use environment::{EnvironmentFilter, EnvironmentMap, EnvironmentMapping};
 pub use groups::LightGroups;
+pub use image_light::{ImageLight, ImageMapping};
 pub use irradiance::Irradiances;
 pub use lanes::LightLanes;
 pub use layers::LightLayers;
@@ -141,6 +143,8 @@ pub enum Light {
         /// Radiant intensity on the axis.
         intensity: Rgb,
     },
+    /// Emits from a point by an image: goniometric and projection lights.
+    Image(Arc<ImageLight>),
     /// Parallel light from infinity.
     Distant {
         /// Unit direction to the light.
@@ -172,6 +176,7 @@ impl Light {
         match self {
             Light::Point { .. } => "point",
             Light::Spot { .. } => "spot",
+            Light::Image(light) => light.kind_name(),
             Light::Distant { .. } => "distant",
             Light::Area(area) => match area.shape {
                 AreaShape::Triangle(_) => "triangle",
@@ -186,13 +191,7 @@ impl Light {
 
     /// An environment light. Of `world_from_light` only the rotation (with a possible mirror) is used.
     pub fn infinite_image(map: Arc<EnvironmentMap>, world_from_light: &Affine3A, scale: f32) -> Self {
-        let m = &world_from_light.matrix3;
-        let x = Vec3::from(m.x_axis).normalize_or(Vec3::X);
-        let (y0, z0) = (Vec3::from(m.y_axis), Vec3::from(m.z_axis));
-        let y = (y0 - x * x.dot(y0)).normalize_or(x.any_orthonormal_vector());
-        let z = x.cross(y);
-        let z = if z.dot(z0) < 0.0 { -z } else { z };
-        Light::InfiniteImage { map, world_from_light: Mat3::from_cols(x, y, z), scale }
+        Light::InfiniteImage { map, world_from_light: environment::orthogonal(world_from_light), scale }
     }
 
     /// Samples a direction towards the light; `None` if no direction is lit by it.
@@ -203,6 +202,7 @@ impl Light {
             Light::Spot { p, axis, cos_total, cos_falloff_start, intensity } => point::sample_li_from(*p, ctx, |w| {
                 *intensity * spot::spot_falloff(w.dot(*axis), *cos_total, *cos_falloff_start)
             }),
+            Light::Image(light) => light.sample_li(ctx),
             Light::Distant { wi_world, l } => {
                 let s = environment::infinite_sample(*wi_world, *l, 1.0);
                 (!l.is_black()).then_some(LightSample { is_delta: true, ..s })
@@ -225,7 +225,7 @@ impl Light {
     #[inline]
     pub fn pdf_li(&self, ctx: &LightCtx, wi: Vec3, hit: &LightHit) -> f32 {
         match self {
-            Light::Point { .. } | Light::Spot { .. } | Light::Distant { .. } => 0.0,
+            Light::Point { .. } | Light::Spot { .. } | Light::Image(_) | Light::Distant { .. } => 0.0,
             Light::Area(area) => area.pdf_li(ctx, wi, hit),
             Light::InfiniteConstant { l } => {
                 if l.is_black() {
@@ -245,6 +245,7 @@ impl Light {
             Light::Area(area) => area.l(hit, w),
             Light::Point { .. }
             | Light::Spot { .. }
+            | Light::Image(_)
             | Light::Distant { .. }
             | Light::InfiniteConstant { .. }
             | Light::InfiniteImage { .. } => Rgb::BLACK,
@@ -258,7 +259,9 @@ impl Light {
         match self {
             Light::InfiniteConstant { l } => *l,
             Light::InfiniteImage { map, world_from_light, scale } => map.le(world_from_light.transpose() * w) * *scale,
-            Light::Point { .. } | Light::Spot { .. } | Light::Distant { .. } | Light::Area(_) => Rgb::BLACK,
+            Light::Point { .. } | Light::Spot { .. } | Light::Image(_) | Light::Distant { .. } | Light::Area(_) => {
+                Rgb::BLACK
+            }
         }
     }
 
@@ -272,6 +275,7 @@ impl Light {
             }
             Light::Point { .. }
             | Light::Spot { .. }
+            | Light::Image(_)
             | Light::Distant { .. }
             | Light::Area(_)
             | Light::InfiniteConstant { .. } => (self.le(w), self.pdf_li(&LightCtx::at(w), w, &LightHit::INFINITE)),
@@ -300,6 +304,7 @@ impl Light {
             Light::Spot { cos_total, cos_falloff_start, intensity, .. } => {
                 intensity.luminance() * spot::spot_solid_angle(*cos_total, *cos_falloff_start)
             }
+            Light::Image(light) => light.phi(),
             Light::Distant { l, .. } => l.luminance() * disk,
             Light::Area(area) => area.phi(),
             Light::InfiniteConstant { l } => 4.0 * PI * l.luminance() * disk,
@@ -313,7 +318,7 @@ impl Light {
     pub fn is_infinite(&self) -> bool {
         match self {
             Light::Distant { .. } | Light::InfiniteConstant { .. } | Light::InfiniteImage { .. } => true,
-            Light::Point { .. } | Light::Spot { .. } | Light::Area(_) => false,
+            Light::Point { .. } | Light::Spot { .. } | Light::Image(_) | Light::Area(_) => false,
         }
     }
 
@@ -321,7 +326,7 @@ impl Light {
     #[inline]
     pub fn is_delta(&self) -> bool {
         match self {
-            Light::Point { .. } | Light::Spot { .. } | Light::Distant { .. } => true,
+            Light::Point { .. } | Light::Spot { .. } | Light::Image(_) | Light::Distant { .. } => true,
             Light::Area(_) | Light::InfiniteConstant { .. } | Light::InfiniteImage { .. } => false,
         }
     }
@@ -343,6 +348,7 @@ impl Light {
                 let theta_e = (cos_total.acos() - cos_falloff_start.acos()).max(0.0);
                 at(*p, *axis, *cos_falloff_start, theta_e.cos(), *intensity)
             }
+            Light::Image(light) => light.bounds(),
             Light::Area(area) => area.bounds(),
             Light::Distant { .. } | Light::InfiniteConstant { .. } | Light::InfiniteImage { .. } => return None,
         };

@@ -8,6 +8,7 @@ mod evaluated;
 mod gltf;
 mod hair;
 mod image_hashes;
+mod image_lights;
 mod irradiance_cache;
 mod layering;
 mod light_groups;

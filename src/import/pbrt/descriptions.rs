@@ -96,19 +96,43 @@ pub struct AreaLightDesc {
     pub span: Span,
 }
 
-/// An environment map that waits for its image.
+/// What the image of a light means.
+#[derive(Clone, Copy, Debug)]
+pub enum ImageUse {
+    /// Radiance from everywhere.
+    Environment {
+        /// Illuminance that replaces the brightness, if positive.
+        illuminance: f32,
+    },
+    /// Factors of an intensity by direction.
+    Goniometric {
+        /// Radiant intensity.
+        intensity: Rgb,
+        /// Power that replaces the brightness, if positive.
+        power: f32,
+    },
+    /// Intensities in a rectangle.
+    Projection {
+        /// Angle of view along the shorter side (degrees).
+        fov: f32,
+        /// Power that replaces the brightness, if positive.
+        power: f32,
+    },
+}
+
+/// A light that waits for its image.
 #[derive(Clone, Debug)]
 pub struct EnvironmentDesc {
     /// Image.
     pub path: PathBuf,
     /// Where it is named.
     pub span: Span,
-    /// Orientation.
+    /// What it means.
+    pub image_use: ImageUse,
+    /// Place and orientation.
     pub world_from_light: Affine3A,
-    /// Factor of the radiance.
+    /// Factor of the radiance, or of the intensity.
     pub scale: f32,
-    /// Illuminance that replaces the brightness, if positive.
-    pub illuminance: f32,
     /// Place among the lights.
     pub index: usize,
 }

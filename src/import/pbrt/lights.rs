@@ -1,16 +1,18 @@
 //! `LightSource`, `AreaLightSource`
 
 use super::checks::unknown;
-use super::descriptions::{AreaLightDesc, EnvironmentDesc};
+use super::descriptions::{AreaLightDesc, EnvironmentDesc, ImageUse};
 use super::spectrum::SpectrumUse;
 use super::state::Builder;
+use crate::lights::environment::orthogonal;
 use crate::lights::layers::fault_of_name;
 use crate::lights::spot::spot_solid_angle;
-use crate::lights::{EnvironmentFilter, EnvironmentMap, EnvironmentMapping, Light};
+use crate::lights::{EnvironmentFilter, EnvironmentMap, EnvironmentMapping, ImageLight, ImageMapping, Light};
 use lumiris_formats::diagnostic::Diagnostics;
 use lumiris_formats::pbrt::directive::Name;
 use lumiris_formats::pbrt::params::{ParamSet, ParamType};
-use lumiris_numbers::math::{Affine3A, Rgb, Vec3, warp};
+use lumiris_formats::source::Span;
+use lumiris_numbers::math::{Affine3A, Mat3, Rgb, Vec3, warp};
 use std::f32::consts::PI;
 use std::sync::Arc;
 
@@ -24,15 +26,11 @@ impl Builder<'_> {
             "spot" => self.spot(p, &world_from_light, scale, d),
             "distant" => self.distant(p, &world_from_light, scale, d),
             "infinite" | "exinfinite" => self.infinite(p, &world_from_light, scale, d),
-            "goniometric" | "projection" => {
-                d.warning_once(kind.span, format!("light `{}` is not rendered yet: it is dark", kind.text));
-                for key in ["I", "power", "filename", "fov", "from", "to", "mapname"] {
-                    p.ignore(key);
-                }
-                None
-            }
+            "goniometric" => self.goniometric(p, &world_from_light, scale, d),
+            "projection" => self.projection(p, &world_from_light, scale, d),
             other => {
-                unknown(other, kind.span, "light", &["point", "spot", "distant", "infinite"], d);
+                let known = ["point", "spot", "distant", "infinite", "goniometric", "projection"];
+                unknown(other, kind.span, "light", &known, d);
                 return;
             }
         };
@@ -117,16 +115,57 @@ impl Builder<'_> {
         if color.is_some() {
             d.error(p.span_of("L"), "an infinite light has `L` or `filename`, not both");
         }
-        self.environments.push(EnvironmentDesc {
-            path: self.folder.join(name),
-            span,
-            world_from_light: *world_from_light,
-            scale,
-            illuminance,
-            index: self.lights.len(),
-        });
-        // Its place is kept by a dark light until the image is there.
-        Some(Light::InfiniteConstant { l: Rgb::BLACK })
+        Some(self.wait_for_image((&name, span), ImageUse::Environment { illuminance }, world_from_light, scale))
+    }
+
+    /// A light that keeps the place of another one until the image of that is there.
+    fn wait_for_image(
+        &mut self,
+        (name, span): (&str, Span),
+        image_use: ImageUse,
+        world_from_light: &Affine3A,
+        scale: f32,
+    ) -> Light {
+        let (path, index) = (self.folder.join(name), self.lights.len());
+        let world_from_light = *world_from_light;
+        self.environments.push(EnvironmentDesc { path, span, image_use, world_from_light, scale, index });
+        Light::InfiniteConstant { l: Rgb::BLACK }
+    }
+
+    /// `LightSource "goniometric"`: in the frame of the light, z of the image's sphere is y.
+    fn goniometric(
+        &mut self,
+        p: &ParamSet,
+        world_from_light: &Affine3A,
+        scale: f32,
+        d: &mut Diagnostics,
+    ) -> Option<Light> {
+        let intensity = self.emitted(p, "I", d);
+        let power = p.float("power", d).unwrap_or(0.0);
+        let name = image_of(p, "goniometric", d)?;
+        let swap = Affine3A::from_mat3(Mat3::from_cols(Vec3::X, Vec3::Z, Vec3::Y));
+        let image_use = ImageUse::Goniometric { intensity, power };
+        Some(self.wait_for_image((&name, p.span_of("filename")), image_use, &(*world_from_light * swap), scale))
+    }
+
+    /// `LightSource "projection"`: along z, with the first row of the image at the greatest y.
+    fn projection(
+        &mut self,
+        p: &ParamSet,
+        world_from_light: &Affine3A,
+        scale: f32,
+        d: &mut Diagnostics,
+    ) -> Option<Light> {
+        let fov = p.float("fov", d).unwrap_or(90.0);
+        let power = p.float("power", d).unwrap_or(0.0);
+        let name = image_of(p, "projection", d)?;
+        if !(fov > 0.0 && fov < 180.0) {
+            d.error(p.span_of("fov"), format!("fov must be above 0 and below 180 degrees, not {fov}"));
+            return None;
+        }
+        let flip = Affine3A::from_scale(Vec3::new(1.0, -1.0, 1.0));
+        let image_use = ImageUse::Projection { fov, power };
+        Some(self.wait_for_image((&name, p.span_of("filename")), image_use, &(*world_from_light * flip), scale))
     }
 
     /// `AreaLightSource "diffuse"`
@@ -152,6 +191,15 @@ impl Builder<'_> {
         self.emission_images.extend(image.as_ref().map(|(path, _)| path.clone()));
         Some(AreaLightDesc { l: color.unwrap_or(Rgb::WHITE) * scale, two_sided, image, power, group, span: p.span })
     }
+}
+
+/// `filename`, which a light needs.
+fn image_of(p: &ParamSet, kind: &str, d: &mut Diagnostics) -> Option<String> {
+    let name = p.string("filename", d).map(str::to_owned);
+    if name.is_none() {
+        d.error(p.span, format!("a {kind} light needs `filename`"));
+    }
+    name
 }
 
 /// `lightgroup`: the layer of the image that the light has.
@@ -188,26 +236,63 @@ fn light_scale(p: &ParamSet, d: &mut Diagnostics) -> f32 {
 impl EnvironmentDesc {
     /// The light, when its image (rows from the top) is there.
     pub fn light(&self, texels: Vec<Rgb>, size: [usize; 2], d: &mut Diagnostics) -> Option<Light> {
+        let made = match self.image_use {
+            ImageUse::Environment { illuminance } => self.environment(texels, size, illuminance, d),
+            ImageUse::Goniometric { intensity, power } => self.goniometric(texels, size, (intensity, power)),
+            ImageUse::Projection { fov, power } => self.projection(texels, size, (fov, power)),
+        };
+        made.map_err(|reason| {
+            d.error(self.span, reason);
+        })
+        .ok()
+    }
+
+    fn environment(
+        &self,
+        texels: Vec<Rgb>,
+        size: [usize; 2],
+        illuminance: f32,
+        d: &mut Diagnostics,
+    ) -> Result<Light, String> {
         let mapping = if size[0] == size[1] {
             EnvironmentMapping::EqualArea
         } else if size[0] == 2 * size[1] {
             d.warning_once(self.span, "a latitude-longitude map is pbrt-v3; pbrt-v4 takes equal-area maps");
             EnvironmentMapping::LatLong
         } else {
-            let message = format!("an environment map is square or twice as wide as high, not {}×{}", size[0], size[1]);
-            d.error(self.span, message);
-            return None;
+            return Err(format!("an environment map is square or twice as wide as high, not {}×{}", size[0], size[1]));
         };
-        match EnvironmentMap::new(texels, size, mapping, EnvironmentFilter::Nearest) {
-            Ok(map) => {
-                let factor = if self.illuminance > 0.0 { self.illuminance / map_illuminance(&map) } else { 1.0 };
-                Some(Light::infinite_image(Arc::new(map), &self.world_from_light, self.scale * factor))
-            }
-            Err(reason) => {
-                d.error(self.span, reason);
-                None
-            }
+        let map = EnvironmentMap::new(texels, size, mapping, EnvironmentFilter::Nearest)?;
+        let factor = if illuminance > 0.0 { illuminance / map_illuminance(&map) } else { 1.0 };
+        Ok(Light::infinite_image(Arc::new(map), &self.world_from_light, self.scale * factor))
+    }
+
+    /// Position and orthogonal map of directions.
+    fn place(&self) -> (Vec3, Mat3) {
+        (self.world_from_light.translation.into(), orthogonal(&self.world_from_light))
+    }
+
+    /// As in pbrt-v4, the image is grey: the mean of its channels. `power` is that of a white intensity.
+    fn goniometric(&self, texels: Vec<Rgb>, size: [usize; 2], (intensity, power): (Rgb, f32)) -> Result<Light, String> {
+        if size[0] != size[1] {
+            return Err(format!("a goniometric diagram is square (an equal-area map), not {}×{}", size[0], size[1]));
         }
+        let grey: Vec<Rgb> = texels.iter().map(|c| Rgb::splat((c.r + c.g + c.b) / 3.0)).collect();
+        let (p, frame) = self.place();
+        let white = ImageLight::new(p, frame, ImageMapping::Sphere, (grey.clone(), size))?.phi();
+        let factor = if power > 0.0 && white > 0.0 { power / white } else { 1.0 };
+        let texels = grey.iter().map(|&c| c * intensity * (self.scale * factor)).collect();
+        Ok(Light::Image(Arc::new(ImageLight::new(p, frame, ImageMapping::Sphere, (texels, size))?)))
+    }
+
+    fn projection(&self, texels: Vec<Rgb>, size: [usize; 2], (fov, power): (f32, f32)) -> Result<Light, String> {
+        let tan = (0.5 * fov.to_radians()).tan();
+        let aspect = size[0] as f32 / size[1].max(1) as f32;
+        let half = [tan * aspect.max(1.0), tan * aspect.recip().max(1.0)];
+        let (p, frame) = self.place();
+        let light = ImageLight::new(p, frame, ImageMapping::Plane { half }, (texels, size))?;
+        let factor = if power > 0.0 && light.phi() > 0.0 { power / light.phi() } else { 1.0 };
+        Ok(Light::Image(Arc::new(light.scaled(self.scale * factor))))
     }
 }
 
