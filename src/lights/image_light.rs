@@ -78,7 +78,7 @@ impl ImageLight {
     /// The same with all intensities multiplied.
     #[must_use]
     pub fn scaled(mut self, factor: f32) -> Self {
-        self.texels.iter_mut().for_each(|c| *c = *c * factor);
+        self.texels.iter_mut().for_each(|c| *c *= factor);
         self.phi *= factor;
         self
     }
