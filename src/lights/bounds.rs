@@ -18,7 +18,7 @@ pub struct LightBounds {
     pub cos_theta_e: f32,
     /// True if they emit along the reversed normals too.
     pub two_sided: bool,
-    /// Sum of the luminances of their maximum radiant intensities.
+    /// Sum of the luminances of their maximum radiant intensities; of lights with an image, of the mean ones.
     pub intensity: f32,
 }
 

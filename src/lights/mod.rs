@@ -1,7 +1,7 @@
 //! Lights: their emission, the sampling of directions towards them, and the choice of one of many.
 //!
-//! Reading order: [`point`], [`spot`], [`area`], [`environment`], [`emit`], [`lanes`], [`bounds`], [`choice`],
-//! [`tree`], [`tree_choice`], [`visibility_cache`], [`learned_visibility`], [`visibility_cache_sampler`],
+//! Reading order: [`point`], [`spot`], [`image_light`], [`area`], [`environment`], [`emit`], [`lanes`], [`bounds`],
+//! [`choice`], [`tree`], [`tree_choice`], [`visibility_cache`], [`learned_visibility`], [`visibility_cache_sampler`],
 //! [`light_sampler`], [`layers`], [`set`], [`groups`], [`sampling`], [`many`], [`irradiance`].
 
 pub mod area;
