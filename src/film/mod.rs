@@ -337,6 +337,8 @@ impl Film {
     /// What it is like on the whole.
     pub fn summary(&self) -> &Summary {
         self.summary.get_or_init(|| {
+            // Once, and not by all threads at the same time
+            self.variance_scale();
             let bands = self.bands().map_init(Default::default, |(pixels, variances), rows| {
                 self.read_rows_with_variances(rows, pixels, variances);
                 let width = self.bounds.width().max(1) as usize;

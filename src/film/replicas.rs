@@ -137,14 +137,18 @@ impl Film {
         variances
     }
 
-    fn variance_scale(&self) -> &VarianceScale {
-        self.variance_scale.get_or_init(|| {
-            if self.replicas.is_empty() {
-                return VarianceScale::default();
-            }
+    pub(super) fn variance_scale(&self) -> &VarianceScale {
+        if let Some(scale) = self.variance_scale.get() {
+            return scale;
+        }
+        // Not while others wait for it: a thread that works on this may take up work that asks for it as well
+        let scale = if self.replicas.is_empty() {
+            VarianceScale::default()
+        } else {
             let bands = self.bands().map_init(Vec::new, |pixels, rows| self.measured_twice(rows, pixels));
             VarianceScale { classes: classes(bands.collect::<Vec<_>>().concat()) }
-        })
+        };
+        self.variance_scale.get_or_init(|| scale)
     }
 
     /// The variances estimated at the replicas of some rows.
