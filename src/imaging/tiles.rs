@@ -13,8 +13,9 @@ use std::sync::{Arc, Mutex, OnceLock, PoisonError};
 
 /// Texels along a side of a tile.
 pub const TILE: usize = 64;
-/// Parts of the cache, each with a lock of its own.
-const SHARDS: usize = 32;
+/// Most parts of the cache, each with a lock of its own, and the fewest bytes of one: four of the largest tiles.
+const SHARDS: u64 = 32;
+const SHARD_BYTES: u64 = 4 * (TILE * TILE * 12) as u64;
 /// Tiles that a thread finds again without a lock; they are kept in addition to those of the cache.
 const RECENT: usize = 32;
 
@@ -90,7 +91,7 @@ pub struct TileStore {
     end: Mutex<u64>,
     /// Most bytes of the cache.
     capacity: u64,
-    shards: [Mutex<Shard>; SHARDS],
+    shards: Vec<Mutex<Shard>>,
     read: AtomicU64,
     failure: OnceLock<String>,
     /// Tells stores apart.
@@ -115,7 +116,7 @@ impl TileStore {
             file: tempfile::tempfile()?,
             end: Mutex::new(0),
             capacity,
-            shards: std::array::from_fn(|_| Mutex::default()),
+            shards: (0..(capacity / SHARD_BYTES).clamp(1, SHARDS)).map(|_| Mutex::default()).collect(),
             read: AtomicU64::new(0),
             failure: OnceLock::new(),
             id: NEXT.fetch_add(1, Ordering::Relaxed),
@@ -157,7 +158,7 @@ impl TileStore {
 
     /// A tile from the cache, or else from the file.
     fn fetch(&self, key: u64, len: usize) -> Arc<[u8]> {
-        let shard = (key.wrapping_mul(0xd134_2543_de82_ef95) >> 40) as usize % SHARDS;
+        let shard = (key.wrapping_mul(0xd134_2543_de82_ef95) >> 40) as usize % self.shards.len();
         let shard = || self.shards[shard].lock().unwrap_or_else(PoisonError::into_inner);
         if let Some(tile) = shard().find(key) {
             return tile;
@@ -170,8 +171,14 @@ impl TileStore {
         }
         self.read.fetch_add(1, Ordering::Relaxed);
         let tile: Arc<[u8]> = bytes.into();
-        shard().put(key, &tile, self.capacity / SHARDS as u64);
+        shard().put(key, &tile, self.capacity / self.shards.len() as u64);
         tile
+    }
+
+    /// Cuts the file, as a disk that fails does.
+    #[cfg(test)]
+    pub(crate) fn lose(&self, len: u64) {
+        self.file.set_len(len).unwrap();
     }
 
     /// Why lookups have found zeros instead of texels, if they have.
@@ -206,14 +213,16 @@ mod tests {
 
     #[test]
     fn every_tile_is_found_by_all_threads_and_the_cache_stays_within_its_bounds() {
-        let capacity = (SHARDS * LEN * 5 / 2) as u64;
+        // Several parts, each of which has tiles to drop
+        let capacity = 3 * SHARD_BYTES;
         let store = store(1000, capacity);
+        assert_eq!(store.shards.len(), 3);
         std::thread::scope(|scope| {
             for thread in 0..4 {
                 let store = &store;
                 scope.spawn(move || {
                     for k in 0..20_000_u64 {
-                        let i = (k * 7919 + thread * 31 + k * k) % 1000;
+                        let i = ((k + thread) * 0x9e37_79b9 >> 13) % 1000;
                         store.with_tile(i * LEN as u64, LEN, |tile| {
                             assert!(tile.len() == LEN && tile.iter().all(|&b| b == (i % 251) as u8));
                         });
@@ -225,8 +234,19 @@ mod tests {
             }
         });
         let counts = store.counts();
-        assert!(counts.held > capacity / 2 && counts.held <= capacity && counts.stored == 1_000_000, "{counts:?}");
+        assert!(counts.held > capacity / 2 && counts.held <= capacity, "{counts:?}");
         assert!(counts.read > 1000 && store.failure().is_none());
+    }
+
+    #[test]
+    fn a_small_cache_holds_the_largest_tiles_as_well() {
+        let len = TILE * TILE * 12;
+        let store = TileStore::new(2 * len as u64).unwrap();
+        let keys = [1, 2].map(|value| store.append(&vec![value; len]).unwrap());
+        keys.iter().for_each(|&key| drop(store.fetch(key, len)));
+        assert_eq!(store.counts(), TileCounts { stored: 2 * len as u64, read: 2, held: 2 * len as u64 });
+        keys.iter().for_each(|&key| drop(store.fetch(key, len)));
+        assert_eq!(store.counts().read, 2);
     }
 
     #[test]
@@ -241,7 +261,7 @@ mod tests {
     #[test]
     fn what_cannot_be_read_is_zero_and_reported() {
         let store = store(3, 1 << 20);
-        store.file.set_len(2500).unwrap();
+        store.lose(2500);
         assert!(store.with_tile(2000, LEN, |tile| tile.iter().all(|&b| b == 0)));
         assert!(store.failure().unwrap().contains("temporary file"));
     }

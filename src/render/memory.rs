@@ -80,9 +80,7 @@ pub fn predict(job: &RenderJob, wanted: &Wanted<'_>) -> Prediction {
     Prediction {
         film: (pixels * (share * of_sums(job, render) + whole)) as u64,
         output: (width * band) as u64,
-        fixed: LIBRARIES
-            + THREAD * threads as u64
-            + job.world.scene.textures.stores().map(|s| s.capacity()).sum::<u64>(),
+        fixed: LIBRARIES + THREAD * threads as u64 + job.world.scene.textures.store().map_or(0, |s| s.capacity()),
     }
 }
 

@@ -197,12 +197,7 @@ pub fn go_on(
     }
     let pool = thread_pool(settings.threads)?;
     let threads = pool.current_num_threads();
-    let rendering = pool.install(|| Run::new(job, settings, stop, observe).run(threads, continuation))?;
-    // Some of its samples would be wrong
-    match job.world.scene.textures.stores().find_map(|store| store.failure()) {
-        Some(failure) => Err(RenderError::Texels(failure.to_owned())),
-        None => Ok(rendering),
-    }
+    pool.install(|| Run::new(job, settings, stop, observe).run(threads, continuation))
 }
 
 /// True if the samples of a pixel depend on earlier ones: it cannot be divided into parts.

@@ -10,6 +10,7 @@ use crate::direct::Estimator;
 use crate::film::packed::PackedSums;
 use crate::film::replicas::{ReplicaAccumulator, replicas};
 use crate::film::{Film, FilmTile, PixelBounds};
+use crate::imaging::tiles::TileStore;
 use crate::integrators::path::CameraSample;
 use crate::integrators::{PathStats, Statistics, integrator, light_layers, reuse};
 use crate::scene::{FilmSettings, RenderJob};
@@ -80,6 +81,8 @@ pub(super) struct Run<'a> {
     /// Edge of tiles: of whole cells where pixels share paths.
     tile_size: u32,
     stop: &'a AtomicBool,
+    /// Where texels are that did not fit into memory.
+    texels: Option<&'a TileStore>,
     observe: &'a (dyn Fn(&Progress) + Sync),
     pub(super) camera: CameraSampler<'a>,
     start: Instant,
@@ -100,6 +103,7 @@ impl<'a> Run<'a> {
             settings,
             tile_size: if reuse::edge(job) > 1 { reuse::CELL } else { settings.tile_size },
             stop,
+            texels: job.world.scene.textures.store(),
             observe,
             camera: CameraSampler::new(job, settings.first_sample),
             start: Instant::now(),
@@ -142,6 +146,10 @@ impl<'a> Run<'a> {
             }
         }
 
+        // Some samples are wrong: they are neither shown nor stored
+        if let Some(failure) = self.failure() {
+            return Err(RenderError::Texels(failure.to_owned()));
+        }
         let complete = tiles.iter().all(|t| t.done >= end);
         let keeps_sums = keeps_sums || checkpoints.is_some();
         let Statistics { paths: stats, cache, photons, records } = integrator.statistics(stats);
@@ -212,10 +220,12 @@ impl<'a> Run<'a> {
             let pause = checkpoints.as_ref().map(|c| c.due());
             stats.merge(&self.pass(workers, tiles, samples.clone(), (noise, watch, pause)));
             match checkpoints {
-                Some(checkpoints) if checkpoints.due() <= Instant::now() => checkpoints.store(tiles),
+                Some(checkpoints) if checkpoints.due() <= Instant::now() && self.failure().is_none() => {
+                    checkpoints.store(tiles);
+                }
                 _ => {}
             }
-            if self.stop.load(Ordering::Relaxed) || tiles.iter().all(|t| t.done >= samples.end) {
+            if self.stops_at_once() || tiles.iter().all(|t| t.done >= samples.end) {
                 return stats;
             }
         }
@@ -274,7 +284,17 @@ impl<'a> Run<'a> {
 
     fn stopped(&self) -> bool {
         let late = self.settings.time_limit.is_some_and(|limit| self.start.elapsed() >= limit);
-        late || self.stop.load(Ordering::Relaxed)
+        late || self.stops_at_once()
+    }
+
+    /// True if no tile is to be begun any more.
+    fn stops_at_once(&self) -> bool {
+        self.stop.load(Ordering::Relaxed) || self.failure().is_some()
+    }
+
+    /// Why some samples are wrong.
+    fn failure(&self) -> Option<&str> {
+        self.texels.and_then(TileStore::failure)
     }
 
     /// Adds the samples of a range to every tile, as far as it does not have them; begins none after `pause`.
@@ -292,7 +312,7 @@ impl<'a> Run<'a> {
             .map(|tile| {
                 let samples = tile.done.max(samples.start)..samples.end;
                 let pauses = pause.is_some_and(|pause| Instant::now() >= pause);
-                if samples.is_empty() || pauses || self.stop.load(Ordering::Relaxed) {
+                if samples.is_empty() || pauses || self.stops_at_once() {
                     return PathStats::default();
                 }
                 let stats = workers.with_one(|worker| self.render_tile(worker, tile, samples.clone()));
@@ -425,5 +445,52 @@ fn add_records(records: &[[u32; 2]], tiles: &mut [Tile]) {
     };
     if !records.is_empty() {
         tiles.par_iter_mut().for_each(add);
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::imaging::oiio::{Part, write_image};
+    use crate::import::cache::FileCache;
+    use crate::import::{LoadOptions, load_text};
+    use crate::render::go_on;
+    use crate::render::parts::FilmHeader;
+    use crate::scene::AccelKind;
+
+    const FLOOR: &str = r#"
+LookAt 0 0 2  0 0 0  0 1 0
+Camera "perspective" "float fov" 50
+Film "rgb" "integer xresolution" 8 "integer yresolution" 8
+WorldBegin
+LightSource "infinite" "rgb L" [ 1 1 1 ]
+Texture "t" "spectrum" "imagemap" "string filename" "t.png" "float uscale" 0.01 "float vscale" 0.01
+Material "diffuse" "texture reflectance" "t"
+Shape "bilinearmesh" "point3 P" [ -9 -9 0  9 -9 0  -9 9 0  9 9 0 ]
+"#;
+
+    #[test]
+    fn what_is_rendered_with_lost_texels_is_neither_an_image_nor_a_checkpoint() {
+        let folder = tempfile::tempdir().unwrap();
+        let names = ["R", "G", "B"].map(str::to_owned).to_vec();
+        write_image(&folder.path().join("t.png"), &[Part::display(200, 200, names, vec![0.5; 120_000])]).unwrap();
+        for is_lost in [false, true] {
+            let files = FileCache::default();
+            files.limit_textures(1000);
+            let loaded = load_text(FLOOR, "floor", folder.path(), &LoadOptions::default(), &files).unwrap();
+            let job = loaded.job(AccelKind::Bvh, None).unwrap();
+            if is_lost {
+                job.world.scene.textures.store().unwrap().lose(0);
+            }
+            let settings = RenderSettings { spp: 16, ..RenderSettings::default() };
+            let (path, header) =
+                (folder.path().join("c.film"), FilmHeader::new(&job, &settings, 16, 0, [Vec::new(), Vec::new()]));
+            let mut checkpoints = Checkpoints::new(path.clone(), Duration::ZERO, header, |_| ());
+            let continuation = Continuation { checkpoints: Some(&mut checkpoints), ..Continuation::default() };
+            let outcome = go_on(&job, &settings, &AtomicBool::new(false), &|_| (), continuation);
+            assert_eq!(matches!(outcome, Err(RenderError::Texels(_))), is_lost);
+            assert_eq!((outcome.is_ok(), path.exists()), (!is_lost, !is_lost));
+            let _ = std::fs::remove_file(path);
+        }
     }
 }

@@ -209,15 +209,9 @@ impl TextureSet {
         id
     }
 
-    /// Where the texels are that do not fit into memory.
-    pub fn stores(&self) -> impl Iterator<Item = &TileStore> {
-        let mut seen: Vec<*const TileStore> = Vec::new();
-        let stores = self.images.iter().filter_map(|image| image.store());
-        stores.map(|store| &**store).filter(move |&store| {
-            let is_new = !seen.contains(&std::ptr::from_ref(store));
-            seen.push(store);
-            is_new
-        })
+    /// Where the texels are that do not fit into memory: all images of a scene have the same store.
+    pub fn store(&self) -> Option<&TileStore> {
+        self.images.iter().find_map(|image| image.store()).map(|store| &**store)
     }
 
     /// Adds an image.

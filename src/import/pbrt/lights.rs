@@ -98,7 +98,10 @@ impl Builder<'_> {
         d: &mut Diagnostics,
     ) -> Option<Light> {
         if p.ignore("portal") {
-            d.warning_once(p.span_of("portal"), "portals are not used yet: the light is the same, with more noise");
+            d.warning_once(
+                p.span_of("portal"),
+                "portals are not used yet: light that does not come through this one is not left out",
+            );
         }
         let illuminance = p.float("illuminance", d).unwrap_or(0.0);
         let color = self.color_param(p, "L", SpectrumUse::Illuminant, d);
