@@ -5,7 +5,8 @@
 //! callers with t upwards flip it. A filter of width w in (s, t) reads the level ℓ = levels − 1 + log₂ w, as in
 //! pbrt-v4.
 
-use super::tiles::{TILE, TileStore};
+use super::level::{Level, NearestByte, Texels, exact_bytes};
+use super::tiles::TileStore;
 use super::{ColorEncoding, Image};
 use lumiris_numbers::math::{Rgb, Vec2};
 use std::io;
@@ -67,81 +68,6 @@ pub enum Filter {
     Ewa,
 }
 
-/// Values of one level, row-major from the top left, channels interleaved.
-#[derive(Clone, Debug)]
-enum Texels {
-    /// As stored; linear values by the byte table.
-    Bytes(Vec<u8>),
-    /// Linear.
-    Floats(Vec<f32>),
-    /// Either, in tiles.
-    Tiled(Tiled),
-}
-
-/// Tiles of a level, row-major; those at the right and lower edges are as large as all others.
-#[derive(Clone, Debug)]
-struct Tiled {
-    store: Arc<TileStore>,
-    /// Where the first one begins.
-    first: u64,
-    /// Tiles in a row.
-    columns: usize,
-    /// Bytes of a channel: 1 if they are stored by the byte table, or 4.
-    channel_bytes: usize,
-}
-
-impl Tiled {
-    /// The first `N` channels of a pixel.
-    #[inline]
-    fn values<const N: usize>(&self, channels: usize, [x, y]: [usize; 2], table: &[f32; 256]) -> [f32; N] {
-        let pixel_bytes = channels * self.channel_bytes;
-        let tile_bytes = TILE * TILE * pixel_bytes;
-        let tile = (y / TILE) * self.columns + x / TILE;
-        let at = (y % TILE * TILE + x % TILE) * pixel_bytes;
-        self.store.with_tile(self.first + (tile * tile_bytes) as u64, tile_bytes, |bytes| {
-            std::array::from_fn(|c| match self.channel_bytes {
-                1 => table[usize::from(bytes[at + c])],
-                _ => bytes[at + 4 * c..].first_chunk().map_or(0.0, |word| f32::from_ne_bytes(*word)),
-            })
-        })
-    }
-}
-
-#[derive(Clone, Debug)]
-struct Level {
-    width: usize,
-    height: usize,
-    texels: Texels,
-}
-
-impl Level {
-    /// Writes the pixels, which are not in tiles yet, to `store`.
-    fn tiles(&self, channels: usize, store: &Arc<TileStore>) -> io::Result<Tiled> {
-        let [columns, rows] = [self.width, self.height].map(|n| n.div_ceil(TILE));
-        let channel_bytes = if matches!(self.texels, Texels::Bytes(_)) { 1 } else { 4 };
-        let row_bytes = TILE * channels * channel_bytes;
-        // In one piece, since images that are read at once append to the same store
-        let mut all = vec![0; columns * rows * TILE * row_bytes];
-        for (tile, bytes) in all.chunks_exact_mut(TILE * row_bytes).enumerate() {
-            let (x0, y0) = (tile % columns * TILE, tile / columns * TILE);
-            let count = TILE.min(self.width - x0) * channels;
-            for (y, bytes) in (y0..self.height).zip(bytes.chunks_exact_mut(row_bytes)) {
-                let begin = (y * self.width + x0) * channels;
-                match &self.texels {
-                    Texels::Bytes(v) => bytes[..count].copy_from_slice(&v[begin..begin + count]),
-                    Texels::Floats(v) => {
-                        for (word, value) in bytes.chunks_exact_mut(4).zip(&v[begin..begin + count]) {
-                            word.copy_from_slice(&value.to_ne_bytes());
-                        }
-                    }
-                    Texels::Tiled(_) => {}
-                }
-            }
-        }
-        Ok(Tiled { store: Arc::clone(store), first: store.append(&all)?, columns, channel_bytes })
-    }
-}
-
 /// A pyramid of an image of one or three channels.
 #[derive(Clone, Debug)]
 pub struct MipMap {
@@ -151,54 +77,6 @@ pub struct MipMap {
     filter: Filter,
     /// Linear values of the bytes.
     table: Box<[f32; 256]>,
-}
-
-/// Channels `positions` of all pixels as bytes; `None` unless all values are multiples of 1/255 in 0..1.
-fn exact_bytes(image: &Image, positions: &[usize]) -> Option<Vec<u8>> {
-    let mut bytes = Vec::with_capacity(image.width * image.height * positions.len());
-    for pixel in image.data.chunks_exact(image.channels.len()) {
-        for &c in positions {
-            let v = pixel[c];
-            let byte = (v * 255.0 + 0.5) as u8;
-            // False for NaN as well.
-            let exact = (0.0..=1.0).contains(&v) && (f32::from(byte) / 255.0 - v).abs() < 1e-6;
-            if !exact {
-                return None;
-            }
-            bytes.push(byte);
-        }
-    }
-    Some(bytes)
-}
-
-/// The inverse of a table of linear values of bytes.
-struct NearestByte {
-    table: [f32; 256],
-    /// For each part of 0..1, how many values of the table lie below its beginning.
-    below: [u8; NearestByte::PARTS],
-}
-
-impl NearestByte {
-    const PARTS: usize = 1024;
-
-    fn new(table: &[f32; 256]) -> Self {
-        let begin = |part: usize| part as f32 / Self::PARTS as f32;
-        let below = std::array::from_fn(|part| table.partition_point(|&t| t < begin(part)).min(255) as u8);
-        NearestByte { table: *table, below }
-    }
-
-    /// Byte whose linear value is nearest to `v`.
-    fn of(&self, v: f32) -> u8 {
-        // The first value that is not below v
-        let part = ((v * Self::PARTS as f32) as usize).min(Self::PARTS - 1);
-        let mut above = self.below[part];
-        while above < 255 && self.table[usize::from(above)] < v {
-            above += 1;
-        }
-        let under = above.saturating_sub(1);
-        let distance = |byte: u8| (v - self.table[usize::from(byte)]).abs();
-        if distance(under) < distance(above) { under } else { above }
-    }
 }
 
 impl MipMap {
@@ -256,7 +134,9 @@ impl MipMap {
                     let mut sum = 0.0_f64;
                     for &(row, row_weight) in &rows {
                         for &(column, weight) in columns {
-                            sum += f64::from(row_weight * weight * self.texel_in(source, column, row, c));
+                            sum += f64::from(
+                                row_weight * weight * source.texel([column, row], c, self.channels, &self.table),
+                            );
                         }
                     }
                     values.push(sum as f32);
@@ -287,55 +167,27 @@ impl MipMap {
 
     /// The same with levels of more than a tile in `store`. `Err` if that cannot be written.
     pub fn tiled(mut self, store: &Arc<TileStore>) -> io::Result<Self> {
-        let channels = self.channels;
         for level in &mut self.levels {
-            if level.width * level.height > TILE * TILE {
-                level.texels = Texels::Tiled(level.tiles(channels, store)?);
-            }
+            level.put_into(store, self.channels)?;
         }
         Ok(self)
     }
 
     /// The store of its tiles, if it has any.
     pub fn store(&self) -> Option<&Arc<TileStore>> {
-        match &self.levels[0].texels {
-            Texels::Tiled(tiled) => Some(&tiled.store),
-            Texels::Bytes(_) | Texels::Floats(_) => None,
-        }
+        self.levels[0].store()
     }
 
     /// Memory of the pixels (bytes), but for tiles.
     pub fn bytes(&self) -> usize {
-        let of_level = |level: &Level| match &level.texels {
-            Texels::Bytes(v) => v.len(),
-            Texels::Floats(v) => v.len() * size_of::<f32>(),
-            Texels::Tiled(_) => 0,
-        };
-        self.levels.iter().map(of_level).sum()
-    }
-
-    #[inline]
-    fn texel_in(&self, level: &Level, x: usize, y: usize, c: usize) -> f32 {
-        let i = (y * level.width + x) * self.channels + c;
-        match &level.texels {
-            Texels::Bytes(v) => self.table[usize::from(v[i])],
-            Texels::Floats(v) => v[i],
-            Texels::Tiled(tiled) if c == 0 => tiled.values::<1>(self.channels, [x, y], &self.table)[0],
-            Texels::Tiled(tiled) => tiled.values::<3>(self.channels, [x, y], &self.table)[c],
-        }
+        self.levels.iter().map(Level::bytes).sum()
     }
 
     /// Linear colour of a pixel of a level, wrapped; grey if the map has one channel. Panics if there is no such level.
     pub fn texel(&self, level: usize, x: i64, y: i64) -> Rgb {
         let level = &self.levels[level];
         let Some((x, y)) = self.wrap_pixel(level, x, y) else { return Rgb::BLACK };
-        if self.channels == 1 {
-            return Rgb::splat(self.texel_in(level, x, y, 0));
-        }
-        if let Texels::Tiled(tiled) = &level.texels {
-            return Rgb::from_array(tiled.values(self.channels, [x, y], &self.table));
-        }
-        Rgb::new(self.texel_in(level, x, y, 0), self.texel_in(level, x, y, 1), self.texel_in(level, x, y, 2))
+        level.color([x, y], self.channels, &self.table)
     }
 
     /// The pixel inside the image that stands at (x, y).
@@ -430,6 +282,7 @@ fn overlaps(i: usize, n: usize, m: usize) -> Vec<(usize, f32)> {
 
 #[cfg(test)]
 mod tests {
+    use super::super::tiles::TILE;
     use super::*;
 
     fn image(width: usize, height: usize, value: impl Fn(usize, usize) -> [f32; 3]) -> Image {
@@ -446,22 +299,6 @@ mod tests {
 
     fn map(image: &Image, wrap: Wrap, filter: Filter) -> MipMap {
         MipMap::new(image, wrap, filter, ColorEncoding::Linear)
-    }
-
-    #[test]
-    fn the_inverse_of_a_byte_table_finds_the_nearest_byte() {
-        for encoding in
-            [ColorEncoding::Linear, ColorEncoding::Srgb, ColorEncoding::Gamma(2.2), ColorEncoding::Gamma(0.5)]
-        {
-            let table = encoding.byte_table();
-            let nearest = NearestByte::new(&table);
-            for i in -10..=10_010 {
-                let v = i as f32 / 10_000.0;
-                let distance = |byte: u8| (table[usize::from(byte)] - v).abs();
-                let min = (0..=255).map(distance).fold(f32::INFINITY, f32::min);
-                assert_eq!(distance(nearest.of(v)), min, "{encoding:?} {v}");
-            }
-        }
     }
 
     #[test]

@@ -1,6 +1,6 @@
 //! Images: pixels with named channels, their encodings, pyramids for filtered lookups, and metrics of their difference.
 //!
-//! Reading order: [`color`], [`view_transform`], [`tiles`], [`mipmap`], [`mod@file`], [`oiio`], [`file_parts`], [`oidn`],
+//! Reading order: [`color`], [`view_transform`], [`tiles`], `level`, [`mipmap`], [`mod@file`], [`oiio`], [`file_parts`], [`oidn`],
 //! [`metrics`], [`compare`], [`heat`].
 
 pub mod color;
@@ -8,6 +8,7 @@ pub mod compare;
 pub mod file;
 pub mod file_parts;
 pub mod heat;
+mod level;
 pub mod metrics;
 pub mod mipmap;
 pub mod oidn;

@@ -222,7 +222,7 @@ mod tests {
                 let store = &store;
                 scope.spawn(move || {
                     for k in 0..20_000_u64 {
-                        let i = ((k + thread) * 0x9e37_79b9 >> 13) % 1000;
+                        let i = (((k + thread) * 0x9e37_79b9) >> 13) % 1000;
                         store.with_tile(i * LEN as u64, LEN, |tile| {
                             assert!(tile.len() == LEN && tile.iter().all(|&b| b == (i % 251) as u8));
                         });

@@ -41,7 +41,8 @@ fn environment(mapping: EnvironmentMapping, size: [usize; 2]) -> Light {
 fn picture(mapping: ImageMapping, size: [usize; 2]) -> Light {
     let texels = (0..size[0] * size[1]).map(|i| Rgb::new((i % 5) as f32, (i * i % 7) as f32, 1.0)).collect();
     let down = Mat3::from_rotation_x(2.8) * Mat3::from_rotation_z(0.3);
-    Light::Image(Arc::new(ImageLight::new(Vec3::new(0.1, 0.3, 1.4), down, mapping, (texels, size)).unwrap()))
+    let light = ImageLight::new(Vec3::new(0.1, 0.3, 1.4), down, mapping, (texels, size)).unwrap();
+    Light::Image(Arc::new(light.scaled(Rgb::new(0.5, 1.0, 3.0))))
 }
 
 /// Every kind of light above the plane z = 0, and on both sides of it.
@@ -306,6 +307,7 @@ fn what_emits_nothing_sends_no_photons() {
     let line = TriangleMesh::new(vec![Vec3::ZERO, Vec3::X, Vec3::X * 2.0], vec![[0, 1, 2]]).unwrap();
     let dark =
         EnvironmentMap::new(vec![Rgb::BLACK; 4], [2, 2], EnvironmentMapping::EqualArea, EnvironmentFilter::Nearest);
+    let no_picture = ImageLight::new(Vec3::ZERO, Mat3::IDENTITY, ImageMapping::Sphere, (vec![Rgb::BLACK; 4], [2, 2]));
     let area = |shape: &Shape, emission: &Emission| Light::Area(area_lights_of(shape, emission).lights.remove(0));
     let closed =
         |intensity| Light::Spot { p: Vec3::ZERO, axis: Vec3::Z, cos_total: 1.0, cos_falloff_start: 1.0, intensity };
@@ -317,6 +319,7 @@ fn what_emits_nothing_sends_no_photons() {
         area(&Shape::Mesh(line), &Emission::constant(Rgb::WHITE)),
         Light::InfiniteConstant { l: Rgb::BLACK },
         Light::infinite_image(Arc::new(dark.unwrap()), &Affine3A::IDENTITY, 1.0),
+        Light::Image(Arc::new(no_picture.unwrap())),
     ] {
         for u in [[0.0, 0.0], [0.3, 0.8], [0.999_999_94; 2]] {
             assert!(light.sample_le(SCENE, u, u).is_none(), "{light:?}");

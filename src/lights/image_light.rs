@@ -58,9 +58,7 @@ impl ImageLight {
             return Err(format!("an image of {width}×{height} has {} texels", texels.len()));
         }
         let texels: Vec<Rgb> = texels.into_iter().map(cleaned).collect();
-        let solid_angle = |i: usize| solid_angle(mapping, size, [i % width, i / width]);
-        let powers: Vec<f64> =
-            texels.iter().enumerate().map(|(i, c)| f64::from(c.luminance()) * solid_angle(i)).collect();
+        let powers = powers(mapping, size, &texels);
         let weights: Vec<f32> = powers.iter().map(|&w| w as f32).collect();
         let phi = powers.iter().sum::<f64>() as f32;
         let distribution = PiecewiseConstant2D::new(&weights, width);
@@ -75,11 +73,11 @@ impl ImageLight {
         }
     }
 
-    /// The same with all intensities multiplied.
+    /// The same with all intensities multiplied. Photons are still drawn by the luminance that the image had.
     #[must_use]
-    pub fn scaled(mut self, factor: f32) -> Self {
+    pub fn scaled(mut self, factor: Rgb) -> Self {
         self.texels.iter_mut().for_each(|c| *c *= factor);
-        self.phi *= factor;
+        self.phi = powers(self.mapping, self.size, &self.texels).iter().sum::<f64>() as f32;
         self
     }
 
@@ -156,6 +154,12 @@ impl ImageLight {
             intensity: self.phi / steradians,
         }
     }
+}
+
+/// Luminance of the power of each texel.
+fn powers(mapping: ImageMapping, size: [usize; 2], texels: &[Rgb]) -> Vec<f64> {
+    let of = |(i, c): (usize, &Rgb)| f64::from(c.luminance()) * solid_angle(mapping, size, [i % size[0], i / size[0]]);
+    texels.iter().enumerate().map(of).collect()
 }
 
 /// Solid angle of a rectangle of the plane z = 1 between the axis and a corner (x, y).

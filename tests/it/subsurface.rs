@@ -55,15 +55,16 @@ fn a_rough_boundary_has_light_samples_that_agree_with_those_of_its_bsdf() {
             );
         job(&text, accel)
     };
+    let mut job = text(AccelKind::Embree);
     let mut answers = Vec::new();
-    for accel in [AccelKind::Embree, AccelKind::Bvh] {
-        let mut job = text(accel);
-        for (estimator, settings) in estimators() {
-            choose(&mut job, &settings);
-            answers.push((format!("{estimator}, {accel:?}"), means(&mut job, 64)));
-        }
+    for (estimator, settings) in estimators() {
+        choose(&mut job, &settings);
+        answers.push((estimator, means(&mut job, 256)));
     }
-    assert_they_agree(&answers, 0.6);
+    assert_they_agree(&answers, 0.25);
+    // The other tracer has the same bits
+    let both = [AccelKind::Embree, AccelKind::Bvh].map(|accel| means(&mut text(accel), 4));
+    assert_eq!(both[0], both[1]);
 }
 
 /// The radiance of a half-space with an index-matched boundary in even light, seen along the normal:
@@ -131,7 +132,7 @@ fn a_half_space_gives_back_the_reflectance_that_is_asked_for() {
     assert!((HalfSpace::new(1.33).reflectance(HalfSpace::new(1.33).albedo(0.5, 0.0)) - 0.5).abs() < 1e-6);
 }
 
-/// A ball in fog, instanced and mirrored, is the ball itself; what glows inside of it is found.
+/// A ball, instanced and mirrored, is the ball itself; what glows inside of it is found.
 #[test]
 fn interiors_are_those_of_instances_too_and_hold_other_things() {
     let ball = r#"AttributeBegin Material "subsurface" "rgb sigma_s" [3 3 3] "rgb sigma_a" [0.1 0.3 0.9] Shape "sphere" "float radius" 1 AttributeEnd"#;

@@ -282,10 +282,14 @@ impl EnvironmentDesc {
         }
         let grey: Vec<Rgb> = texels.iter().map(|c| Rgb::splat((c.r + c.g + c.b) / 3.0)).collect();
         let (p, frame) = self.place();
-        let white = ImageLight::new(p, frame, ImageMapping::Sphere, (grey.clone(), size))?.phi();
-        let factor = if power > 0.0 && white > 0.0 { power / white } else { 1.0 };
-        let texels = grey.iter().map(|&c| c * intensity * (self.scale * factor)).collect();
-        Ok(Light::Image(Arc::new(ImageLight::new(p, frame, ImageMapping::Sphere, (texels, size))?)))
+        let light = ImageLight::new(p, frame, ImageMapping::Sphere, (grey, size))?;
+        Ok(Light::Image(Arc::new(self.scaled(light, intensity, power))))
+    }
+
+    /// The light with a factor of its intensity, and with `power` instead of its own if that is positive.
+    fn scaled(&self, light: ImageLight, factor: Rgb, power: f32) -> ImageLight {
+        let brightness = if power > 0.0 && light.phi() > 0.0 { power / light.phi() } else { 1.0 };
+        light.scaled(factor * (self.scale * brightness))
     }
 
     fn projection(&self, texels: Vec<Rgb>, size: [usize; 2], (fov, power): (f32, f32)) -> Result<Light, String> {
@@ -294,8 +298,7 @@ impl EnvironmentDesc {
         let half = [tan * aspect.max(1.0), tan * aspect.recip().max(1.0)];
         let (p, frame) = self.place();
         let light = ImageLight::new(p, frame, ImageMapping::Plane { half }, (texels, size))?;
-        let factor = if power > 0.0 && light.phi() > 0.0 { power / light.phi() } else { 1.0 };
-        Ok(Light::Image(Arc::new(light.scaled(self.scale * factor))))
+        Ok(Light::Image(Arc::new(self.scaled(light, Rgb::WHITE, power))))
     }
 }
 

@@ -1,0 +1,199 @@
+//! One level of an image pyramid: its pixels as bytes or as floats, in memory or in tiles.
+
+use super::Image;
+use super::tiles::{TILE, TileStore};
+use lumiris_numbers::math::Rgb;
+use std::io;
+use std::sync::Arc;
+
+/// Values of one level, row-major from the top left, channels interleaved.
+#[derive(Clone, Debug)]
+pub(super) enum Texels {
+    /// As stored; linear values by the byte table.
+    Bytes(Vec<u8>),
+    /// Linear.
+    Floats(Vec<f32>),
+    /// Either, in tiles.
+    Tiled(Tiled),
+}
+
+/// Tiles of a level, row-major; those at the right and lower edges are as large as all others.
+#[derive(Clone, Debug)]
+pub(super) struct Tiled {
+    store: Arc<TileStore>,
+    /// Where the first one begins.
+    first: u64,
+    /// Tiles in a row.
+    columns: usize,
+    /// Bytes of a channel: 1 if they are stored by the byte table, or 4.
+    channel_bytes: usize,
+}
+
+impl Tiled {
+    /// The first `N` channels of a pixel.
+    #[inline]
+    fn values<const N: usize>(&self, channels: usize, [x, y]: [usize; 2], table: &[f32; 256]) -> [f32; N] {
+        let pixel_bytes = channels * self.channel_bytes;
+        let tile_bytes = TILE * TILE * pixel_bytes;
+        let tile = (y / TILE) * self.columns + x / TILE;
+        let at = (y % TILE * TILE + x % TILE) * pixel_bytes;
+        self.store.with_tile(self.first + (tile * tile_bytes) as u64, tile_bytes, |bytes| {
+            std::array::from_fn(|c| match self.channel_bytes {
+                1 => table[usize::from(bytes[at + c])],
+                _ => bytes[at + 4 * c..].first_chunk().map_or(0.0, |word| f32::from_ne_bytes(*word)),
+            })
+        })
+    }
+}
+
+#[derive(Clone, Debug)]
+pub(super) struct Level {
+    pub(super) width: usize,
+    pub(super) height: usize,
+    pub(super) texels: Texels,
+}
+
+impl Level {
+    /// The linear value of a channel of a pixel; `table` has those of bytes.
+    #[inline]
+    pub(super) fn texel(&self, [x, y]: [usize; 2], c: usize, channels: usize, table: &[f32; 256]) -> f32 {
+        let i = (y * self.width + x) * channels + c;
+        match &self.texels {
+            Texels::Bytes(v) => table[usize::from(v[i])],
+            Texels::Floats(v) => v[i],
+            Texels::Tiled(_) => self.color([x, y], channels, table)[c],
+        }
+    }
+
+    /// The linear colour of a pixel; grey if there is one channel.
+    #[inline]
+    pub(super) fn color(&self, pixel: [usize; 2], channels: usize, table: &[f32; 256]) -> Rgb {
+        match (&self.texels, channels) {
+            (Texels::Tiled(tiled), 1) => Rgb::splat(tiled.values::<1>(channels, pixel, table)[0]),
+            (Texels::Tiled(tiled), _) => Rgb::from_array(tiled.values(channels, pixel, table)),
+            (_, 1) => Rgb::splat(self.texel(pixel, 0, channels, table)),
+            _ => Rgb::from_array([0, 1, 2].map(|c| self.texel(pixel, c, channels, table))),
+        }
+    }
+
+    /// Bytes in memory.
+    pub(super) fn bytes(&self) -> usize {
+        match &self.texels {
+            Texels::Bytes(v) => v.len(),
+            Texels::Floats(v) => v.len() * size_of::<f32>(),
+            Texels::Tiled(_) => 0,
+        }
+    }
+
+    /// Where its tiles are, if it has any.
+    pub(super) fn store(&self) -> Option<&Arc<TileStore>> {
+        match &self.texels {
+            Texels::Tiled(tiled) => Some(&tiled.store),
+            Texels::Bytes(_) | Texels::Floats(_) => None,
+        }
+    }
+
+    /// Puts the pixels into `store`, if they are more than a tile.
+    pub(super) fn put_into(&mut self, store: &Arc<TileStore>, channels: usize) -> io::Result<()> {
+        if self.width * self.height > TILE * TILE {
+            self.texels = Texels::Tiled(self.tiles(channels, store)?);
+        }
+        Ok(())
+    }
+
+    /// Writes the pixels, which are not in tiles yet, to `store`.
+    fn tiles(&self, channels: usize, store: &Arc<TileStore>) -> io::Result<Tiled> {
+        let [columns, rows] = [self.width, self.height].map(|n| n.div_ceil(TILE));
+        let channel_bytes = if matches!(self.texels, Texels::Bytes(_)) { 1 } else { 4 };
+        let row_bytes = TILE * channels * channel_bytes;
+        // In one piece, since images that are read at once append to the same store
+        let mut all = vec![0; columns * rows * TILE * row_bytes];
+        for (tile, bytes) in all.chunks_exact_mut(TILE * row_bytes).enumerate() {
+            let (x0, y0) = (tile % columns * TILE, tile / columns * TILE);
+            let count = TILE.min(self.width - x0) * channels;
+            for (y, bytes) in (y0..self.height).zip(bytes.chunks_exact_mut(row_bytes)) {
+                let begin = (y * self.width + x0) * channels;
+                match &self.texels {
+                    Texels::Bytes(v) => bytes[..count].copy_from_slice(&v[begin..begin + count]),
+                    Texels::Floats(v) => {
+                        for (word, value) in bytes.chunks_exact_mut(4).zip(&v[begin..begin + count]) {
+                            word.copy_from_slice(&value.to_ne_bytes());
+                        }
+                    }
+                    Texels::Tiled(_) => {}
+                }
+            }
+        }
+        Ok(Tiled { store: Arc::clone(store), first: store.append(&all)?, columns, channel_bytes })
+    }
+}
+
+/// Channels `positions` of all pixels as bytes; `None` unless all values are multiples of 1/255 in 0..1.
+pub(super) fn exact_bytes(image: &Image, positions: &[usize]) -> Option<Vec<u8>> {
+    let mut bytes = Vec::with_capacity(image.width * image.height * positions.len());
+    for pixel in image.data.chunks_exact(image.channels.len()) {
+        for &c in positions {
+            let v = pixel[c];
+            let byte = (v * 255.0 + 0.5) as u8;
+            // False for NaN as well.
+            let exact = (0.0..=1.0).contains(&v) && (f32::from(byte) / 255.0 - v).abs() < 1e-6;
+            if !exact {
+                return None;
+            }
+            bytes.push(byte);
+        }
+    }
+    Some(bytes)
+}
+
+/// The inverse of a table of linear values of bytes.
+pub(super) struct NearestByte {
+    table: [f32; 256],
+    /// For each part of 0..1, how many values of the table lie below its beginning.
+    below: [u8; NearestByte::PARTS],
+}
+
+impl NearestByte {
+    const PARTS: usize = 1024;
+
+    pub(super) fn new(table: &[f32; 256]) -> Self {
+        let begin = |part: usize| part as f32 / Self::PARTS as f32;
+        let below = std::array::from_fn(|part| table.partition_point(|&t| t < begin(part)).min(255) as u8);
+        NearestByte { table: *table, below }
+    }
+
+    /// Byte whose linear value is nearest to `v`.
+    pub(super) fn of(&self, v: f32) -> u8 {
+        // The first value that is not below v
+        let part = ((v * Self::PARTS as f32) as usize).min(Self::PARTS - 1);
+        let mut above = self.below[part];
+        while above < 255 && self.table[usize::from(above)] < v {
+            above += 1;
+        }
+        let under = above.saturating_sub(1);
+        let distance = |byte: u8| (v - self.table[usize::from(byte)]).abs();
+        if distance(under) < distance(above) { under } else { above }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::imaging::ColorEncoding;
+
+    #[test]
+    fn the_inverse_of_a_byte_table_finds_the_nearest_byte() {
+        for encoding in
+            [ColorEncoding::Linear, ColorEncoding::Srgb, ColorEncoding::Gamma(2.2), ColorEncoding::Gamma(0.5)]
+        {
+            let table = encoding.byte_table();
+            let nearest = NearestByte::new(&table);
+            for i in -10..=10_010 {
+                let v = i as f32 / 10_000.0;
+                let distance = |byte: u8| (table[usize::from(byte)] - v).abs();
+                let min = (0..=255).map(distance).fold(f32::INFINITY, f32::min);
+                assert_eq!(distance(nearest.of(v)), min, "{encoding:?} {v}");
+            }
+        }
+    }
+}
