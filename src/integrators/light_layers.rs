@@ -69,14 +69,20 @@ impl LayerSums {
         &self.sums
     }
 
-    /// Adds what a sample has of a light. `wi` is the direction to it, unit.
+    /// Adds what a sample has of a light at the point `p`. `wi` is the direction to it, unit.
     #[inline]
-    pub(super) fn add(&mut self, lights: &LightSampling, sample: u32, (light, wi): (LightId, Vec3), value: Rgb) {
+    pub(super) fn add(
+        &mut self,
+        lights: &LightSampling,
+        sample: u32,
+        (light, p, wi): (LightId, Vec3, Vec3),
+        value: Rgb,
+    ) {
         if !self.are_kept() {
             return;
         }
         if lights.infinite.len() > 1 && lights.infinite.contains(&light) {
-            return self.add_infinite(lights, sample, wi, value);
+            return self.add_infinite(lights, sample, (p, wi), value);
         }
         self.sums[sample as usize * self.layers + lights.layers.of(light)] += value;
     }
@@ -92,9 +98,9 @@ impl LayerSums {
         }
     }
 
-    /// Adds what a sample has of all infinite lights together.
+    /// Adds what a sample has of all infinite lights together, at `p` from the direction `wi`.
     #[inline]
-    pub(super) fn add_infinite(&mut self, lights: &LightSampling, sample: u32, wi: Vec3, value: Rgb) {
+    pub(super) fn add_infinite(&mut self, lights: &LightSampling, sample: u32, (p, wi): (Vec3, Vec3), value: Rgb) {
         if !self.are_kept() {
             return;
         }
@@ -103,9 +109,9 @@ impl LayerSums {
             of_sample[lights.layers.of(light)] += value;
             return;
         }
-        let whole = lights.le(wi);
+        let whole = lights.le(p, wi);
         for &light in &lights.infinite {
-            let le = lights.lights[light as usize].le(wi);
+            let le = lights.lights[light as usize].le(p, wi);
             let share = |c: usize| if whole[c] == 0.0 { 0.0 } else { value[c] * (le[c] / whole[c]) };
             of_sample[lights.layers.of(light)] += Rgb::new(share(0), share(1), share(2));
         }

@@ -281,9 +281,9 @@ impl PathTracer {
         let layers = &mut self.search.layers;
         if layers.are_kept() {
             let lit: Vec<&PathState> = lit.collect();
-            for (point, light, contribution) in self.direct.visible() {
-                let path = lit[point as usize];
-                layers.add(&job.lights, path.sample, light, path.beta * contribution);
+            for (point, (light, wi), contribution) in self.direct.visible() {
+                let (path, p) = (lit[point as usize], points[point as usize].light_ctx().p);
+                layers.add(&job.lights, path.sample, (light, p, wi), path.beta * contribution);
             }
         }
     }

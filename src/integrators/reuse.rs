@@ -47,6 +47,7 @@ pub fn obstacle(job: &RenderJob) -> Option<&'static str> {
         (settings.roulette != RouletteKind::Throughput, "they split"),
         (job.pixel_samples.is_some(), "pixels have different numbers of samples"),
         (job.shadows_cross_media(), "there may be media between their vertices"),
+        (job.world.scene.materials.has_dispersion(), "paths may have wavelengths"),
         (light_layers::count(job) > 0, "light groups have layers (--light-groups none: they have not)"),
         (geometry.has_motion() || is_cut_out, "what a ray meets varies with time or is cut out at random"),
     ];

@@ -36,6 +36,8 @@ pub(super) mod domain {
     pub(crate) const FOCUS: u32 = 1 << 18;
     /// The walk through an interior on the way to vertex k uses the domain `WALK + k`.
     pub(crate) const WALK: u32 = 1 << 17;
+    /// The wavelength of the path.
+    pub(crate) const WAVELENGTH: u32 = 1 << 16;
 }
 
 /// Counts and times.
@@ -124,6 +126,8 @@ pub(super) struct PathState {
     pub(super) technique: Option<BsdfTechnique>,
     /// What the ray goes through.
     pub(super) medium: Option<MediumId>,
+    /// The wavelength (nm) that the path has got where its index of refraction depends on it.
+    pub(super) wavelength: Option<f32>,
     /// The path has ended in a medium, and only looks for the features of the first surface behind.
     pub(super) is_ghost: bool,
 }
@@ -143,14 +147,16 @@ pub(super) struct Carried {
     pub(super) time: f32,
     /// See [`PathState`].
     pub(super) passed: u32,
+    /// See [`PathState`].
+    pub(super) wavelength: Option<f32>,
 }
 
 impl PathState {
     /// At a vertex with the throughput `beta`, where a pixel has the given width.
     #[inline]
     pub(super) fn carried(&self, beta: Rgb, width: f32) -> Carried {
-        let PathState { sample, branch, eta_scale, spread, passed, ray: Ray { time, .. }, .. } = *self;
-        Carried { sample, branch, beta, eta_scale, width, spread, time, passed }
+        let PathState { sample, branch, eta_scale, spread, passed, wavelength, ray: Ray { time, .. }, .. } = *self;
+        Carried { sample, branch, beta, eta_scale, width, spread, time, passed, wavelength }
     }
 
     /// What the path carries of the emission of a surface, with the weight of the technique that found it.
@@ -271,7 +277,7 @@ impl Carried {
     /// The path from the origin `o` on in the direction `wi`, with what [`Self::beyond`] says.
     #[inline]
     pub(super) fn segment(&self, o: Vec3, wi: Vec3, beta: Rgb, eta_scale: f32) -> PathState {
-        let Carried { sample, branch, width, spread, time, .. } = *self;
+        let Carried { sample, branch, width, spread, time, wavelength, .. } = *self;
         let ray = Ray { o, d: wi, t_max: f32::INFINITY, time };
         PathState {
             sample,
@@ -285,6 +291,7 @@ impl Carried {
             travelled: 0.0,
             technique: None,
             medium: None,
+            wavelength,
             is_ghost: false,
         }
     }

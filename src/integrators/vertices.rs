@@ -6,10 +6,12 @@ use super::light_layers::LayerSums;
 use super::segment::{CameraSample, Carried, PathState, PathStats, Vertex, domain, emptied};
 use super::wavefront::Batch;
 use crate::accel::{Coherence, Hit, RayBatch};
+use crate::bsdfs::Bsdf;
 use crate::film::{Features, PixelSample};
 use crate::geometry::{Shape, SurfaceHit};
 use crate::lights::LightCtx;
 use crate::materials::SurfaceBsdf;
+use crate::materials::dispersion::sample_wavelength;
 use crate::media::{End, Flight, Numbers, Segment, Sides};
 use crate::scene::{RenderJob, SurfaceInteraction};
 use lumiris_numbers::math::{Rgb, Vec3};
@@ -98,6 +100,7 @@ impl VertexSearch {
             travelled: 0.0,
             technique: None,
             medium: job.world.scene.media.camera,
+            wavelength: None,
             is_ghost: false,
         }));
     }
@@ -203,6 +206,14 @@ impl VertexSearch {
         if at.vertex >= at.depth || path.is_ghost {
             return;
         }
+        let (mut path, mut bsdf, mut beta) = (*path, bsdf, beta);
+        if let Bsdf::Dielectric(interface) = &mut bsdf.bsdf
+            && let Some(dispersion) = interaction.dispersion(at.job)
+        {
+            let (lambda, weight) = self.wavelength(at, &path);
+            (interface.eta, path.wavelength, beta) = (dispersion.eta(lambda), Some(lambda), beta * weight);
+        }
+        let path = &path;
         let media = interaction.sides(at.job, path.medium);
         let Some((bsdf, beta)) = self.leave(at, (path, beta), &interaction, (bsdf, media)) else { return };
         let out = &at.out[path.sample as usize];
@@ -224,11 +235,31 @@ impl VertexSearch {
         }
     }
 
+    /// The wavelength of a path, and the factor of its throughput for choosing one.
+    fn wavelength(&self, at: &Stage<'_, '_>, path: &PathState) -> (f32, Rgb) {
+        path.wavelength.map_or_else(
+            || {
+                let [stream, _] = self.arrivals.streams(&at.samples[path.sample as usize], path.branch);
+                sample_wavelength(stream.domain(domain::WAVELENGTH).draw::<1>()[0])
+            },
+            |lambda| (lambda, Rgb::WHITE),
+        )
+    }
+
     /// Keeps a path at a vertex, with what it has carried there.
     #[inline]
     fn keep(&mut self, path: &PathState, carried: &Carried) {
-        let Carried { beta, branch, width, .. } = *carried;
-        self.kept.push(PathState { branch, beta, width, passed: 0, travelled: 0.0, technique: None, ..*path });
+        let Carried { beta, branch, width, wavelength, .. } = *carried;
+        self.kept.push(PathState {
+            branch,
+            beta,
+            width,
+            wavelength,
+            passed: 0,
+            travelled: 0.0,
+            technique: None,
+            ..*path
+        });
     }
 
     /// Lets a path fly through its medium towards what its ray meets, and adds what the medium sends out. True if it is
@@ -299,9 +330,9 @@ impl VertexSearch {
         self.escaped.retain(|&k| {
             let path = &active[k as usize];
             if path.technique.is_none() {
-                let l = path.beta * lights.le(path.ray.d);
+                let l = path.beta * lights.le(path.ray.o, path.ray.d);
                 out[path.sample as usize].radiance += l;
-                layers.add_infinite(lights, path.sample, path.ray.d, l);
+                layers.add_infinite(lights, path.sample, (path.ray.o, path.ray.d), l);
             }
             path.technique.is_some()
         });
@@ -317,7 +348,7 @@ impl VertexSearch {
                 let weight =
                     path.technique.filter(|_| !l.is_black()).map_or(1.0, |technique| technique.weight(|_| p_light));
                 out[path.sample as usize].radiance += l * weight;
-                layers.add_infinite(lights, path.sample, path.ray.d, l * weight);
+                layers.add_infinite(lights, path.sample, (ctx(i).p, path.ray.d), l * weight);
             },
         );
     }

@@ -11,6 +11,7 @@
 //! | goniometric, projection | its position | by its image | I/p_ω |
 //! | area | by area, see [`area`](super::area) | cosine about the normal, of one side or of either | π·Le/p_A |
 //! | distant | disk | its own | π·R²·E, constant |
+//! | portal | evenly over it, then back by the scene's size | by what of its image passes | A·Le·cos θ/p_ω |
 //! | environment | disk | by its image, or uniform | π·R²·Le/p_ω |
 //!
 //! The disk has the radius R of the scene's bounding sphere, is perpendicular to the direction and touches that sphere
@@ -74,6 +75,7 @@ impl Light {
                 let s = map.sample(u_direction)?;
                 from_infinity(scene, u_position, *world_from_light * s.w, s.le * (*scale / s.pdf))
             }
+            Light::Portal(light) => light.sample_le(scene, u_position, u_direction),
         }
     }
 }

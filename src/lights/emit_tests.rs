@@ -6,7 +6,7 @@ use super::light_tests::{
 };
 use super::{
     Emission, EmissionImage, EmissionSample, EnvironmentFilter, EnvironmentMap, EnvironmentMapping, ImageLight,
-    ImageMapping, Light, LightCtx, area_lights_of,
+    ImageMapping, Light, LightCtx, Portal, PortalLight, area_lights_of,
 };
 use crate::geometry::{BilinearMesh, Quadric, QuadricKind, Shape, TriangleMesh};
 use lumiris_numbers::math::warp::azimuth;
@@ -35,6 +35,17 @@ fn environment(mapping: EnvironmentMapping, size: [usize; 2]) -> Light {
         (0..size[0] * size[1]).map(|i| Rgb::new((i % 7) as f32, (i * i % 11) as f32, if i == 9 { 40.0 } else { 1.0 }));
     let map = EnvironmentMap::new(texels.collect(), size, mapping, EnvironmentFilter::Bilinear).unwrap();
     Light::infinite_image(Arc::new(map), &placement(), 0.5)
+}
+
+/// The same image through a skylight.
+fn skylight() -> Light {
+    let Light::InfiniteImage { map, world_from_light, scale } = environment(EnvironmentMapping::EqualArea, [8, 8])
+    else {
+        panic!("an image is expected")
+    };
+    let at = |x: f32, y: f32| Vec3::new(x, y, 1.5 + 0.2 * x);
+    let portal = Portal::new([at(-0.4, -0.5), at(-0.4, 0.7), at(0.8, 0.7), at(0.8, -0.5)]).unwrap();
+    Light::Portal(Arc::new(PortalLight::new(&map, world_from_light, scale, portal)))
 }
 
 /// A light that points down, with an image of its intensity.
@@ -93,6 +104,7 @@ fn lights() -> Vec<(&'static str, Light)> {
         ("constant environment", Light::InfiniteConstant { l }),
         ("equal-area environment", environment(EnvironmentMapping::EqualArea, [8, 8])),
         ("latitude-longitude environment", environment(EnvironmentMapping::LatLong, [9, 5])),
+        ("portal", skylight()),
     ]
 }
 
@@ -243,8 +255,9 @@ fn light_from_infinity_comes_through_a_disk_that_covers_the_scene() {
         assert!(s.d == -wi && s.n == Vec3::ZERO && (p.z - 1.0).abs() < 1e-5);
         [p.truncate().length_squared(), azimuth(p) / TAU]
     }));
-    // Whatever the direction, the disk faces the scene and touches its sphere.
-    for (name, light) in lights().into_iter().filter(|(_, light)| light.is_infinite()) {
+    // Whatever the direction, the disk faces the scene and touches its sphere. Portals have no disk
+    let has_disk = |light: &Light| light.is_infinite() && !matches!(light, Light::Portal(_));
+    for (name, light) in lights().into_iter().filter(|(_, light)| has_disk(light)) {
         for s in emitted(&light, 9).iter().take(2000) {
             let from_centre = s.p - SCENE.0;
             assert!((from_centre.dot(-s.d) / SCENE.1 - 1.0).abs() < 1e-4, "{name}");

@@ -185,13 +185,7 @@ impl EnvironmentMap {
         let (bins, u) = self.distribution.bins(u);
         let texel = &self.texels[self.texel_index(bins[0].index as isize, bins[1].index as isize)];
         let p = self.distribution.place(bins, u)?;
-        let (w, density) = match self.mapping {
-            EnvironmentMapping::EqualArea => (equal_area_square_to_sphere(p), pdf_equal_area_square_to_sphere()),
-            EnvironmentMapping::LatLong => {
-                let w = lat_long_to_sphere(p);
-                (w, pdf_lat_long_to_sphere(w))
-            }
-        };
+        let (w, density) = self.to_sphere(p);
         let pdf = texel[3] * density;
         (pdf > 0.0 && pdf.is_finite()).then(|| EnvironmentSample { w: w.normalize(), le: self.lookup(p), pdf })
     }
@@ -285,6 +279,44 @@ impl EnvironmentMap {
                 let first = self.texel_index(x0 as isize, y0 as isize);
                 let pair = |i: usize| color(self.texels[i]).lerp(color(self.texels[i + 1]), dx);
                 pair(first).lerp(pair(first + self.width + 2), dy)
+            }
+        }
+    }
+
+    /// Calls `visit` with directions, radiances and solid angles (sr) of small parts of all texels that have, or are next to
+    /// one that has, a luminance above `bright`.
+    pub(super) fn each_bright_part(&self, bright: f32, mut visit: impl FnMut(Vec3, Rgb, f32)) {
+        let is_bright = |x: usize, y: usize| {
+            (0..9).any(|k| {
+                color(self.texels[y * (self.width + 2) + x + k / 3 * (self.width + 2) + k % 3]).luminance() > bright
+            })
+        };
+        let all = (0..self.height).flat_map(|y| (0..self.width).map(move |x| [x, y]));
+        let texels: Vec<[usize; 2]> = all.filter(|&[x, y]| is_bright(x, y)).collect();
+        // As fine as takes a second or so
+        let parts = ((1 << 24) / texels.len().max(1)).isqrt().clamp(4, 64);
+        let area = 1.0 / (self.width * self.height * parts * parts) as f32;
+        for [x, y] in texels {
+            for k in 0..parts * parts {
+                let within = |k: usize| (k as f32 + 0.5) / parts as f32;
+                let p = Vec2::new(
+                    (x as f32 + within(k % parts)) / self.width as f32,
+                    (y as f32 + within(k / parts)) / self.height as f32,
+                );
+                let (w, density) = self.to_sphere(p);
+                visit(w, self.lookup(p), area / density);
+            }
+        }
+    }
+
+    /// The direction of a place in the square, and the density per steradian of a uniform one.
+    #[inline]
+    fn to_sphere(&self, p: Vec2) -> (Vec3, f32) {
+        match self.mapping {
+            EnvironmentMapping::EqualArea => (equal_area_square_to_sphere(p), pdf_equal_area_square_to_sphere()),
+            EnvironmentMapping::LatLong => {
+                let w = lat_long_to_sphere(p);
+                (w, pdf_lat_long_to_sphere(w))
             }
         }
     }

@@ -86,7 +86,8 @@ fn mean_l(light: &Light) -> Rgb {
         | Light::Spot { .. }
         | Light::Image(_)
         | Light::Distant { .. }
-        | Light::InfiniteImage { .. } => Rgb::BLACK,
+        | Light::InfiniteImage { .. }
+        | Light::Portal(_) => Rgb::BLACK,
     };
     if l.is_finite() && l.luminance() > 0.0 { l } else { Rgb::BLACK }
 }
@@ -234,7 +235,8 @@ mod tests {
             | Light::Image(_)
             | Light::Distant { .. }
             | Light::InfiniteConstant { .. }
-            | Light::InfiniteImage { .. } => false,
+            | Light::InfiniteImage { .. }
+            | Light::Portal(_) => false,
         })
     }
 

@@ -450,7 +450,7 @@ fn delta_and_infinite_lights_are_consistent() {
     let mut stream = pcg32([3, 3, 3]);
     for _ in 0..1000 {
         let s = light.sample_li(&LightCtx::at(Vec3::ONE), stream.random::<[f32; 2]>()).unwrap();
-        let le = light.le(s.wi);
+        let le = light.le(Vec3::ZERO, s.wi);
         let pdf = light.pdf_li(&LightCtx::at(Vec3::ONE), s.wi, &LightHit::INFINITE);
         assert!((le.r - s.li.r).abs() < 1e-3 * (1.0 + le.r) && pdf > 0.0);
         let by_hand = turn.inverse().transform_vector3(s.wi).normalize();

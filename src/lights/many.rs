@@ -412,7 +412,7 @@ mod tests {
             };
             let (mut li, mut pdf) = (s.li, s.pdf);
             if lights.infinite.contains(&light) && lights.infinite.len() > 1 {
-                (li, pdf) = (lights.le(s.wi), lights.pdf_infinite(&ctx, s.wi));
+                (li, pdf) = (lights.le(ctx.p, s.wi), lights.pdf_infinite(&ctx, s.wi));
             }
             let what = lights.lights[light as usize].kind_name();
             drawn += 1;

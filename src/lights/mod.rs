@@ -1,6 +1,6 @@
 //! Lights: their emission, the sampling of directions towards them, and the choice of one of many.
 //!
-//! Reading order: [`point`], [`spot`], [`image_light`], [`area`], [`environment`], [`emit`], [`lanes`], [`bounds`],
+//! Reading order: [`point`], [`spot`], [`image_light`], [`area`], [`environment`], [`portal`], [`emit`], [`lanes`], [`bounds`],
 //! [`choice`], [`tree`], [`tree_choice`], [`visibility_cache`], [`learned_visibility`], [`visibility_cache_sampler`],
 //! [`light_sampler`], [`layers`], [`set`], [`groups`], [`sampling`], [`many`], [`irradiance`].
 
@@ -18,6 +18,7 @@ pub mod learned_visibility;
 pub mod light_sampler;
 pub mod many;
 pub mod point;
+pub mod portal;
 pub mod sampling;
 pub mod set;
 pub mod spot;
@@ -46,6 +47,7 @@ pub use lanes::LightLanes;
 pub use layers::LightLayers;
 pub use learned_visibility::LearnedVisibility;
 pub use light_sampler::{LightChoice, LightSampler, LightSamplerKind};
+pub use portal::{Portal, PortalLight};
 pub use sampling::LightSampling;
 pub use set::{LightSet, LightSetBuilder};
 pub use tree::LightTree;
@@ -168,6 +170,8 @@ pub enum Light {
         /// Factor of the image's radiance.
         scale: f32,
     },
+    /// Radiance by an image, through a rectangle.
+    Portal(Arc<PortalLight>),
 }
 
 impl Light {
@@ -186,6 +190,7 @@ impl Light {
             },
             Light::InfiniteConstant { .. } => "infinite, constant",
             Light::InfiniteImage { .. } => "infinite, image",
+            Light::Portal(_) => "infinite, portal",
         }
     }
 
@@ -217,6 +222,7 @@ impl Light {
                 let s = map.sample(u)?;
                 Some(environment::infinite_sample(*world_from_light * s.w, s.le * *scale, s.pdf))
             }
+            Light::Portal(light) => light.sample_li(ctx, u),
         }
     }
 
@@ -235,6 +241,7 @@ impl Light {
                 }
             }
             Light::InfiniteImage { map, world_from_light, .. } => map.pdf(world_from_light.transpose() * wi),
+            Light::Portal(light) => light.le_and_pdf(ctx.p, wi).1,
         }
     }
 
@@ -248,55 +255,59 @@ impl Light {
             | Light::Image(_)
             | Light::Distant { .. }
             | Light::InfiniteConstant { .. }
-            | Light::InfiniteImage { .. } => Rgb::BLACK,
+            | Light::InfiniteImage { .. }
+            | Light::Portal(_) => Rgb::BLACK,
         }
     }
 
-    /// Radiance that an infinite light sends along a ray which leaves the scene in unit direction `w`; black for all
-    /// others.
+    /// Radiance that an infinite light sends along a ray which leaves the scene from `p` in unit direction `w`; black for
+    /// all others.
     #[inline]
-    pub fn le(&self, w: Vec3) -> Rgb {
+    pub fn le(&self, p: Vec3, w: Vec3) -> Rgb {
         match self {
             Light::InfiniteConstant { l } => *l,
             Light::InfiniteImage { map, world_from_light, scale } => map.le(world_from_light.transpose() * w) * *scale,
+            Light::Portal(light) => light.le(p, w),
             Light::Point { .. } | Light::Spot { .. } | Light::Image(_) | Light::Distant { .. } | Light::Area(_) => {
                 Rgb::BLACK
             }
         }
     }
 
-    /// [`le`](Self::le) of an infinite light and [`pdf_li`](Self::pdf_li) in the direction `w`.
+    /// [`le`](Self::le) of an infinite light and [`pdf_li`](Self::pdf_li) at `p` in the direction `w`.
     #[inline]
-    pub fn le_and_pdf(&self, w: Vec3) -> (Rgb, f32) {
+    pub fn le_and_pdf(&self, p: Vec3, w: Vec3) -> (Rgb, f32) {
         match self {
             Light::InfiniteImage { map, world_from_light, scale } => {
                 let (le, pdf) = map.le_and_pdf(world_from_light.transpose() * w);
                 (le * *scale, pdf)
             }
+            Light::Portal(light) => light.le_and_pdf(p, w),
             Light::Point { .. }
             | Light::Spot { .. }
             | Light::Image(_)
             | Light::Distant { .. }
             | Light::Area(_)
-            | Light::InfiniteConstant { .. } => (self.le(w), self.pdf_li(&LightCtx::at(w), w, &LightHit::INFINITE)),
+            | Light::InfiniteConstant { .. } => (self.le(p, w), self.pdf_li(&LightCtx::at(p), w, &LightHit::INFINITE)),
         }
     }
 
-    /// [`le_and_pdf`](Self::le_and_pdf) of `n` directions.
-    pub fn le_and_pdf_many(&self, n: usize, w: impl Fn(usize) -> Vec3, mut out: impl FnMut(usize, Rgb, f32)) {
+    /// [`le_and_pdf`](Self::le_and_pdf) of `n` points and directions.
+    pub fn le_and_pdf_many(&self, n: usize, at: impl Fn(usize) -> (Vec3, Vec3), mut out: impl FnMut(usize, Rgb, f32)) {
         if let Light::InfiniteImage { map, world_from_light, scale } = self {
             let to_light = world_from_light.transpose();
-            map.le_and_pdf_many(n, |i| to_light * w(i), |i, le, pdf| out(i, le * *scale, pdf));
+            map.le_and_pdf_many(n, |i| to_light * at(i).1, |i, le, pdf| out(i, le * *scale, pdf));
         } else {
             for i in 0..n {
-                let (le, pdf) = self.le_and_pdf(w(i));
+                let (p, w) = at(i);
+                let (le, pdf) = self.le_and_pdf(p, w);
                 out(i, le, pdf);
             }
         }
     }
 
     /// Luminance of the emitted power. Of an infinite light, the power that reaches a disk of the scene's radius from
-    /// all directions.
+    /// all directions, or that passes through its portal.
     pub fn phi(&self, scene_radius: f32) -> f32 {
         let disk = PI * scene_radius * scene_radius;
         let phi = match self {
@@ -309,6 +320,7 @@ impl Light {
             Light::Area(area) => area.phi(),
             Light::InfiniteConstant { l } => 4.0 * PI * l.luminance() * disk,
             Light::InfiniteImage { map, scale, .. } => map.luminance_integral() * *scale * disk,
+            Light::Portal(light) => light.phi(),
         };
         if phi.is_finite() { phi.max(0.0) } else { 0.0 }
     }
@@ -317,7 +329,9 @@ impl Light {
     #[inline]
     pub fn is_infinite(&self) -> bool {
         match self {
-            Light::Distant { .. } | Light::InfiniteConstant { .. } | Light::InfiniteImage { .. } => true,
+            Light::Distant { .. } | Light::InfiniteConstant { .. } | Light::InfiniteImage { .. } | Light::Portal(_) => {
+                true
+            }
             Light::Point { .. } | Light::Spot { .. } | Light::Image(_) | Light::Area(_) => false,
         }
     }
@@ -327,7 +341,7 @@ impl Light {
     pub fn is_delta(&self) -> bool {
         match self {
             Light::Point { .. } | Light::Spot { .. } | Light::Image(_) | Light::Distant { .. } => true,
-            Light::Area(_) | Light::InfiniteConstant { .. } | Light::InfiniteImage { .. } => false,
+            Light::Area(_) | Light::InfiniteConstant { .. } | Light::InfiniteImage { .. } | Light::Portal(_) => false,
         }
     }
 
@@ -350,7 +364,9 @@ impl Light {
             }
             Light::Image(light) => light.bounds(),
             Light::Area(area) => area.bounds(),
-            Light::Distant { .. } | Light::InfiniteConstant { .. } | Light::InfiniteImage { .. } => return None,
+            Light::Distant { .. } | Light::InfiniteConstant { .. } | Light::InfiniteImage { .. } | Light::Portal(_) => {
+                return None;
+            }
         };
         (bounds.intensity > 0.0 && bounds.intensity.is_finite()).then_some(bounds)
     }

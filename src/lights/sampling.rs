@@ -133,7 +133,7 @@ impl LightSampling {
     #[inline]
     pub fn infinite_in_direction(&self, ctx: &LightCtx, wi: Vec3) -> (Rgb, f32) {
         self.set.infinite.iter().fold((Rgb::BLACK, 0.0), |(sum, density), &i| {
-            let (le, pdf) = self.set.lights[i as usize].le_and_pdf(wi);
+            let (le, pdf) = self.set.lights[i as usize].le_and_pdf(ctx.p, wi);
             let pdf = if pdf > 0.0 { pdf * self.sampler.pmf(ctx, i) } else { 0.0 };
             (sum + le, density + pdf)
         })
@@ -149,7 +149,10 @@ impl LightSampling {
         if let [light] = self.set.infinite[..] {
             self.set.lights[light as usize].le_and_pdf_many(
                 n,
-                |i| at(i).1,
+                |i| {
+                    let (ctx, wi) = at(i);
+                    (ctx.p, wi)
+                },
                 |i, le, pdf| {
                     let pdf = if pdf > 0.0 { pdf * self.sampler.pmf(&at(i).0, light) } else { 0.0 };
                     out(i, le, pdf);
@@ -362,11 +365,11 @@ mod tests {
         assert_eq!((set.light_of(7, 2), set.light_of(0, 0), set.light_of(9, 0)), (None, None, None));
         assert_eq!(set.infinite, [3, 5]);
         let w = Vec3::new(0.6, 0.0, 0.8);
-        assert_eq!(set.le(w), set.lights[3].le(w) + set.lights[5].le(w));
-        let ctx = LightCtx::at(Vec3::ZERO);
+        let (ctx, p) = (LightCtx::at(Vec3::ZERO), Vec3::ZERO);
+        assert_eq!(set.le(p, w), set.lights[3].le(p, w) + set.lights[5].le(p, w));
         let each: f32 = [3, 5].iter().map(|&i| set.pdf(&ctx, i, w, &LightHit::INFINITE)).sum();
         assert!(each > 0.0 && set.pdf_infinite(&ctx, w) == each);
-        assert_eq!(set.infinite_in_direction(&ctx, w), (set.le(w), each));
+        assert_eq!(set.infinite_in_direction(&ctx, w), (set.le(p, w), each));
     }
 
     #[test]
@@ -374,7 +377,7 @@ mod tests {
         let ctx = LightCtx::at(Vec3::ZERO);
         for kind in CHOICES {
             let set = sampling(LightSetBuilder::default(), kind, &Bounds3::EMPTY);
-            assert!(set.sample(&ctx, 0.5, [0.5; 2]).is_none() && set.le(Vec3::Z).is_black());
+            assert!(set.sample(&ctx, 0.5, [0.5; 2]).is_none() && set.le(ctx.p, Vec3::Z).is_black());
             let mut b = LightSetBuilder::default();
             b.add(Light::InfiniteConstant { l: Rgb::WHITE });
             assert!(sampling(b, kind, &Bounds3::EMPTY).sample(&ctx, 0.999, [0.5; 2]).is_some());

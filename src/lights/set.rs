@@ -55,7 +55,7 @@ impl LightSetBuilder {
         let (center, radius) = scene_bounds.bounding_sphere();
         let has_extent = radius > 0.0 && radius.is_finite();
         let scene_radius = if has_extent { radius } else { 1.0 };
-        let has_le = |light: &Light| matches!(light, Light::InfiniteConstant { .. } | Light::InfiniteImage { .. });
+        let has_le = |light: &Light| light.is_infinite() && !light.is_delta();
         let infinite = (0..self.lights.len()).filter(|&i| has_le(&self.lights[i])).map(|i| i as LightId).collect();
         let is_lit = |&i: &usize| self.lights[i].phi(scene_radius) > 0.0;
         let lit = (0..self.lights.len()).filter(is_lit).map(|i| i as LightId).collect();
@@ -157,9 +157,9 @@ impl LightSet {
         (pdf > 0.0 && pdf.is_finite()).then_some((choice.light, LightSample { pdf, ..sample }))
     }
 
-    /// Radiance that all infinite lights send along a ray that leaves the scene in direction `w`.
+    /// Radiance that all infinite lights send along a ray that leaves the scene from `p` in direction `w`.
     #[inline]
-    pub fn le(&self, w: Vec3) -> Rgb {
-        self.infinite.iter().map(|&i| self.lights[i as usize].le(w)).sum()
+    pub fn le(&self, p: Vec3, w: Vec3) -> Rgb {
+        self.infinite.iter().map(|&i| self.lights[i as usize].le(p, w)).sum()
     }
 }

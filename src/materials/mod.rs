@@ -1,9 +1,10 @@
 //! Materials: evaluate textures at a hit and build the BSDF in its shading frame. Semantics are pbrt-v4's.
 //!
-//! Reading order: this file, [`evaluated`], [`hair`], [`principled`], [`bump`], [`surface`]; [`half_space`] is what an
+//! Reading order: this file, [`dispersion`], [`evaluated`], [`hair`], [`principled`], [`bump`], [`surface`]; [`half_space`] is what an
 //! interior gives back.
 
 pub mod bump;
+pub mod dispersion;
 pub mod evaluated;
 pub mod hair;
 pub mod half_space;
@@ -12,6 +13,7 @@ pub mod surface;
 #[cfg(test)]
 mod tests;
 
+pub use dispersion::Dispersion;
 pub use evaluated::EvaluatedMaterial;
 pub use hair::{HairColor, HairMaterial};
 pub use half_space::HalfSpace;
@@ -27,6 +29,7 @@ use crate::textures::{FloatTextureId, ImageId, ImageTexture, Mapping2d, RgbTextu
 use lumiris_numbers::math::hash::{hash_floats, unit_f32};
 use lumiris_numbers::math::{Rgb, Vec3};
 use rayon::prelude::*;
+use std::sync::Arc;
 use strum::IntoStaticStr;
 
 /// Index into a [`MaterialSet`].
@@ -189,6 +192,8 @@ pub struct MaterialEntry {
     pub normal_map: Option<NormalMap>,
     /// Displacement along the normal, which bends the normal only (scene units).
     pub displacement: Option<FloatTextureId>,
+    /// The index of glass by wavelength, in place of the material's own.
+    pub dispersion: Option<Arc<Dispersion>>,
 }
 
 /// All materials of a scene, with the tables of their coats.
@@ -269,6 +274,11 @@ impl MaterialSet {
             id = if amount <= 0.0 || (amount < 1.0 && amount < unit_f32(hash)) { a } else { b };
         }
         None
+    }
+
+    /// True if the index of any depends on the wavelength.
+    pub fn has_dispersion(&self) -> bool {
+        self.entries.iter().any(|entry| entry.dispersion.is_some())
     }
 
     /// True if there may be no surface at a hit of the material.

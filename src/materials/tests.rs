@@ -60,7 +60,13 @@ impl Bench {
     }
 
     fn material(&mut self, material: Material) -> MaterialId {
-        self.entries.push(MaterialEntry { name: "m".into(), material, normal_map: None, displacement: None });
+        self.entries.push(MaterialEntry {
+            name: "m".into(),
+            material,
+            normal_map: None,
+            displacement: None,
+            dispersion: None,
+        });
         (self.entries.len() - 1) as MaterialId
     }
 

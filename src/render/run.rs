@@ -352,8 +352,9 @@ impl<'a> Run<'a> {
             let pixels = self.batch_of_pixels(&bounds, first, &samples);
             first = pixels.end;
             self.camera_samples(&bounds, pixels.clone(), &samples, &mut worker.scratch, &mut worker.samples);
-            worker.tracer.trace(self.job, &worker.samples, &mut tile.fits, &mut worker.results);
-            worker.add(pixels.map(|index| (index, self.samples_of(position(&bounds, index as u32), &samples))));
+            worker.trace(self.job, &mut tile.fits);
+            let pixels = pixels.map(|index| (index, self.samples_of(position(&bounds, index as u32), &samples)));
+            worker.add(&self.job.world.scene.film, pixels);
         }
         worker.write(tile);
         self.render_replicas(worker, tile, samples);
@@ -392,7 +393,7 @@ impl<'a> Run<'a> {
             let pixels = replicas.iter().zip(&mut fits);
             let pixels = pixels.map(|(r, fit)| (fit, position(&tile.bounds, r.pixel), samples_of(r)));
             self.camera.samples(pixels, seed, &mut worker.scratch, &mut worker.samples);
-            worker.tracer.trace(self.job, &worker.samples, &mut tile.fits, &mut worker.results);
+            worker.trace(self.job, &mut tile.fits);
             let mut results = worker.results.iter();
             for replica in replicas {
                 for result in results.by_ref().take(samples_of(replica).len()) {

@@ -2,10 +2,12 @@
 
 use super::camera_samples::Scratch;
 use super::tiles::Tile;
+use crate::direct::Fits;
 use crate::film::PixelSample;
 use crate::film::accumulator::PixelAccumulator;
 use crate::integrators::path::CameraSample;
 use crate::integrators::{Integrator, Tracer};
+use crate::scene::{FilmSettings, RenderJob};
 use std::ops::Range;
 use std::sync::{Mutex, MutexGuard, PoisonError};
 
@@ -42,8 +44,17 @@ impl AnyWorker<'_> {
         }
     }
 
+    /// Traces the samples; the results have the colours of the film.
+    pub(super) fn trace(&mut self, job: &RenderJob, fits: &mut Fits) {
+        self.tracer.trace(job, &self.samples, fits, &mut self.results);
+        let film = &job.world.scene.film;
+        if film.balance.is_some() {
+            self.results.iter_mut().for_each(|result| result.radiance = film.balanced(result.radiance));
+        }
+    }
+
     /// Adds the results to the sums of their pixels, which are given in order with the indices of their samples.
-    pub(super) fn add(&mut self, pixels: impl Iterator<Item = (usize, Range<u32>)>) {
+    pub(super) fn add(&mut self, film: &FilmSettings, pixels: impl Iterator<Item = (usize, Range<u32>)>) {
         let Worker { tracer, results, sums, layers, .. } = self;
         let count = layers.len();
         let of_layers = tracer.light_layers();
@@ -53,6 +64,7 @@ impl AnyWorker<'_> {
                 sums[pixel].add(i, result);
                 // Its own layers are `count` numbers
                 for (sums, &radiance) in layers.iter_mut().zip(&of_layers[k * count..]) {
+                    let radiance = film.balanced(radiance);
                     sums[pixel].add(i, &PixelSample { radiance, features: None });
                 }
             }

@@ -23,6 +23,7 @@ use crate::lights::LightSet;
 use crate::materials::{MaterialId, MaterialSet};
 use crate::media::{MediumSet, Sides};
 use crate::textures::TextureSet;
+use lumiris_numbers::math::{Mat3, Rgb, Vec3};
 use std::sync::Arc;
 
 /// What is rendered.
@@ -70,4 +71,14 @@ pub struct FilmSettings {
     pub file_name: Option<String>,
     /// Factor from radiance to pixel value (ISO and exposure of the sensor); 1 by default.
     pub scale: f32,
+    /// White balance, a linear map of colours; `None` leaves them.
+    pub balance: Option<Mat3>,
+}
+
+impl FilmSettings {
+    /// The colour that the film has for one of the scene.
+    #[inline]
+    pub fn balanced(&self, c: Rgb) -> Rgb {
+        self.balance.map_or(c, |balance| Rgb::from_array((balance * Vec3::from_array(c.to_array())).to_array()))
+    }
 }

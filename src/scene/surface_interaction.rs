@@ -3,7 +3,7 @@
 use super::RenderJob;
 use crate::accel::Hit;
 use crate::geometry::{SurfaceHit, VertexValues};
-use crate::materials::SurfaceBsdf;
+use crate::materials::{Dispersion, SurfaceBsdf};
 use crate::media::{MediumId, Sides};
 use crate::textures::TextureContext;
 use lumiris_numbers::math::ray::offset_origin;
@@ -49,6 +49,14 @@ impl SurfaceInteraction {
         let material = scene.surfaces[self.hit.geometry as usize].material;
         let bsdf = scene.materials.bsdf(material, &scene.textures, &self.surface, &self.context, self.wo)?;
         Some(bsdf.proposed_by(job.settings().integrator.bsdf_density))
+    }
+
+    /// How the index of the material depends on the wavelength, if it does.
+    pub fn dispersion<'j>(&self, job: &'j RenderJob) -> Option<&'j Dispersion> {
+        let scene = &job.world.scene;
+        let material = scene.surfaces[self.hit.geometry as usize].material;
+        let id = scene.materials.resolve(material, &scene.textures, &self.context, self.wo)?;
+        scene.materials.entries()[id as usize].dispersion.as_deref()
     }
 
     /// The media on the sides of the surface, which a ray in `medium` meets.

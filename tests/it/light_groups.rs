@@ -14,7 +14,8 @@ use std::sync::atomic::AtomicBool;
 /// Edge of the images (pixels).
 const EDGE: u32 = 12;
 
-/// Lights of the scene by group: an area light that paths meet, deltas, and two infinite lights, which overlap.
+/// Lights of the scene by group: an area light that paths meet, deltas, and infinite lights, which overlap, one of them
+/// through a portal.
 const LIGHTS: [(&str, &str); 4] = [
     (
         "key",
@@ -22,7 +23,11 @@ const LIGHTS: [(&str, &str); 4] = [
            Shape "trianglemesh" "integer indices" [0 1 2 0 2 3] "point3 P" [-1 0 -1 1 0 -1 1 0 1 -1 0 1] AttributeEnd
            LightSource "spot" "rgb I" [4 1 1] "point3 from" [-2 2 -2] "point3 to" [0 0 0] "string lightgroup" "key""#,
     ),
-    ("rim", r#"LightSource "point" "rgb I" [1 2 6] "point3 from" [2 1.5 1] "string lightgroup" "rim""#),
+    (
+        "rim",
+        r#"LightSource "point" "rgb I" [1 2 6] "point3 from" [2 1.5 1] "string lightgroup" "rim"
+           LightSource "infinite" "rgb L" [4 3 2] "point3 portal" [-2 3.5 -1  2 3.5 -1  2 3.5 1  -2 3.5 1] "string lightgroup" "rim""#,
+    ),
     (
         "sky",
         r#"LightSource "infinite" "rgb L" [0.2 0.4 0.8] "string lightgroup" "sky"

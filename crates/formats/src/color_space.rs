@@ -1,7 +1,8 @@
-//! RGB colour spaces of scene files, and their conversion to linear Rec.709.
+//! RGB colour spaces of scene files, their conversion to linear Rec.709, and white balance.
 
+use crate::spectra::{blackbody_xyz, rec709_matrix};
 use glam::{DMat3, DVec3};
-use lumiris_numbers::math::Rgb;
+use lumiris_numbers::math::{Mat3, Rgb};
 
 /// A colour space that `ColorSpace` names.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
@@ -51,6 +52,40 @@ impl ColorSpace {
     }
 }
 
+/// Cone responses of XYZ by rows [Lam 1985], called Bradford.
+const BRADFORD: [[f64; 3]; 3] = [[0.8951, 0.2664, -0.1614], [-0.7502, 1.7135, 0.0367], [0.0389, -0.0685, 1.0296]];
+/// Temperatures (K) of white that cameras know.
+const TEMPERATURES: std::ops::RangeInclusive<f32> = 1000.0..=25_000.0;
+
+/// The map of linear Rec.709 that makes daylight of a correlated colour temperature (K) white, by scaling the responses of
+/// Bradford; below 4000 K, that of a black body. `None` below 1000 K and above 25,000 K. As in pbrt-v4.
+pub fn white_balance(kelvin: f32) -> Option<Mat3> {
+    if !TEMPERATURES.contains(&kelvin) {
+        return None;
+    }
+    let rgb_from_xyz = DMat3::from_cols_array_2d(&rec709_matrix()).transpose();
+    let bradford = DMat3::from_cols_array_2d(&BRADFORD).transpose();
+    let xyz_from_rgb = rgb_from_xyz.inverse();
+    let white = bradford * xyz_from_rgb * DVec3::ONE;
+    let source = daylight_xyz(kelvin).unwrap_or_else(|| DVec3::from_array(blackbody_xyz(kelvin.into())));
+    let source = bradford * (source / source.y);
+    let adapted = bradford.inverse() * DMat3::from_diagonal(white / source) * bradford;
+    Some((rgb_from_xyz * adapted * xyz_from_rgb).as_mat3())
+}
+
+/// XYZ of daylight with Y = 1 [CIE 15:2004]; `None` below 4000 K.
+fn daylight_xyz(kelvin: f32) -> Option<DVec3> {
+    // The second radiation constant has changed since: D65 is of 6504 K
+    let t = f64::from(kelvin) * 1.4388 / 1.4380;
+    let x = match t {
+        ..4000.0 => return None,
+        ..7000.0 => -4.6070e9 / t.powi(3) + 2.9678e6 / t.powi(2) + 0.09911e3 / t + 0.244063,
+        _ => -2.0064e9 / t.powi(3) + 1.9018e6 / t.powi(2) + 0.24748e3 / t + 0.23704,
+    };
+    let y = -3.0 * x * x + 2.870 * x - 0.275;
+    Some(DVec3::new(x / y, 1.0, (1.0 - x - y) / y))
+}
+
 /// The matrix whose columns are the primaries, scaled so that (1, 1, 1) is the white of Y = 1.
 fn xyz_from_rgb(chromaticities: [[f64; 2]; 4]) -> DMat3 {
     let [r, g, b, white] = chromaticities.map(|[x, y]| DVec3::new(x / y, 1.0, (1.0 - x - y) / y));
@@ -78,6 +113,37 @@ mod tests {
     fn the_white_of_aces_is_warmer_than_d65() {
         let white = ColorSpace::Aces2065.to_rec709([1.0; 3]);
         assert!(white.r > white.b && (white.luminance() - 1.0).abs() < 1e-3, "{white:?}");
+    }
+
+    #[test]
+    fn white_balance_makes_its_light_white() {
+        // The chromaticities of D50 and D55, and of a black body of 2856 K, illuminant A
+        for (kelvin, [x, y]) in
+            [(5000.0, [0.34567, 0.35850]), (5500.0, [0.33242, 0.34743]), (2856.0, [0.44757, 0.40745])]
+        {
+            let light = to_rec709_from_xyz(DVec3::new(x / y, 1.0, (1.0 - x - y) / y));
+            let white = white_balance(kelvin).unwrap() * light.as_vec3();
+            assert!((white - white.y).abs().max_element() < 4e-3, "{kelvin} {white}");
+            assert!((white.y - 1.0).abs() < 4e-3, "{kelvin} {white}");
+        }
+        // D65 stays as it is, and colours other than white with it
+        let same = white_balance(6500.0).unwrap();
+        assert!((same - Mat3::IDENTITY).to_cols_array().iter().all(|x| x.abs() < 4e-3), "{same}");
+        // The published adaptation of XYZ from D50 to D65 [Lindbloom 2017]
+        let published = DMat3::from_cols_array_2d(&[
+            [0.955_576_6, -0.023_039_3, 0.063_163_6],
+            [-0.028_289_5, 1.009_941_6, 0.021_007_7],
+            [0.012_298_2, -0.020_483_0, 1.329_909_8],
+        ]);
+        let xyz_from_rgb = xyz_from_rgb(REC709);
+        let expected = xyz_from_rgb.inverse() * published.transpose() * xyz_from_rgb;
+        let found = white_balance(5003.0).unwrap();
+        assert!((found - expected.as_mat3()).to_cols_array().iter().all(|x| x.abs() < 3e-3), "{found} {expected}");
+        assert!([0.0, 999.0, 1e9, f32::NAN, -5000.0].iter().all(|&k| white_balance(k).is_none()));
+    }
+
+    fn to_rec709_from_xyz(xyz: DVec3) -> DVec3 {
+        xyz_from_rgb(REC709).inverse() * xyz
     }
 
     #[test]

@@ -77,7 +77,7 @@ impl Spectrum {
         }
     }
 
-    /// The tabulated optical constant of a name such as `metal-Cu-eta`, or the constant index of a glass.
+    /// The tabulated optical constant of a name such as `metal-Cu-eta`, or the index of a glass.
     pub fn named(name: &str) -> Option<Self> {
         let metal = |value: &[f32]| Spectrum::from_slices(data::METAL_LAMBDA, value);
         Some(match name {
@@ -95,7 +95,10 @@ impl Spectrum {
             "metal-MgO-k" => Spectrum::constant(0.0),
             "metal-TiO2-eta" => Spectrum::from_slices(data::TIO2_LAMBDA, data::TIO2_ETA),
             "metal-TiO2-k" => Spectrum::from_slices(data::TIO2_LAMBDA, data::TIO2_K),
-            _ => Spectrum::constant(data::GLASSES.iter().find(|g| g.0 == name)?.1),
+            _ => {
+                let (_, b, c) = data::GLASSES.iter().find(|g| g.0 == name)?;
+                Spectrum::per_nm(|l| sellmeier(b, c, f64::from(l)) as f32)
+            }
         })
     }
 
@@ -146,6 +149,24 @@ impl Spectrum {
     pub fn at_d_line(&self) -> f32 {
         self.at(587.6)
     }
+}
+
+/// The index of a glass at a wavelength (nm).
+fn sellmeier(b: &[f64; 3], c: &[f64; 3], lambda: f64) -> f64 {
+    let squared = (lambda * 1e-3).powi(2);
+    (1.0 + b.iter().zip(c).map(|(b, c)| b * squared / (squared - c)).sum::<f64>()).sqrt()
+}
+
+/// What the channels of Rec.709 have of white light (D65) at each nm of a range, without negative parts; each channel adds up
+/// to 1.
+pub fn white_responses() -> (std::ops::RangeInclusive<u32>, &'static [Rgb]) {
+    static RESPONSES: OnceLock<Vec<Rgb>> = OnceLock::new();
+    let responses = RESPONSES.get_or_init(|| {
+        let all: Vec<[f64; 3]> = d65_observer().map(|xyz| to_rgb(xyz).map(|c| c.max(0.0))).collect();
+        let sum = all.iter().fold([0.0; 3], |sum, &c| add(sum, c));
+        all.iter().map(|c| rgb([0, 1, 2].map(|i| c[i] / sum[i]))).collect()
+    });
+    (LAMBDA_MIN..=LAMBDA_MAX, responses)
 }
 
 /// Colour matching functions and illuminant at a wavelength of the integrals.
@@ -248,11 +269,21 @@ pub fn emission_rgb(spectrum: &Spectrum) -> Rgb {
 }
 
 fn emission_of(f: impl Fn(f32) -> f64) -> Rgb {
-    let xyz = (LAMBDA_MIN..=LAMBDA_MAX).zip(&observer().bars).fold([0.0; 3], |sum, (l, bar)| {
+    let xyz = xyz_of(f);
+    if xyz[1] > 0.0 { rgb(to_rgb(xyz.map(|c| c / xyz[1]))).map(|c| c.max(0.0)) } else { Rgb::BLACK }
+}
+
+/// ∫ f·(x̄, ȳ, z̄).
+fn xyz_of(f: impl Fn(f32) -> f64) -> [f64; 3] {
+    (LAMBDA_MIN..=LAMBDA_MAX).zip(&observer().bars).fold([0.0; 3], |sum, (l, bar)| {
         let value = f(l as f32);
         add(sum, bar.map(|b| b * value))
-    });
-    if xyz[1] > 0.0 { rgb(to_rgb(xyz.map(|c| c / xyz[1]))).map(|c| c.max(0.0)) } else { Rgb::BLACK }
+    })
+}
+
+/// XYZ of a black body of a positive temperature (K), up to a factor.
+pub(super) fn blackbody_xyz(kelvin: f64) -> [f64; 3] {
+    xyz_of(|l| planck(f64::from(l), kelvin))
 }
 
 /// ∫ȳ over wavelength (nm): luminance of a spectrum that is 1 everywhere, where it is not divided by this.
@@ -490,7 +521,21 @@ mod tests {
         assert!(Spectrum::from_text("400 1 400 2").unwrap_err().contains("increase"));
         assert!(Spectrum::from_text("400 x").unwrap_err().contains("`x`"));
         assert!(Spectrum::from_text("").is_err());
-        assert_eq!(Spectrum::named("glass-BK7").unwrap().at_d_line(), 1.5168);
+        // Of the catalogue
+        for (glass, index) in [
+            ("BK7", 1.51680),
+            ("BAF10", 1.67003),
+            ("FK51A", 1.48656),
+            ("LASF9", 1.85025),
+            ("F5", 1.67271),
+            ("SF5", 1.67271),
+            ("F10", 1.72828),
+            ("SF10", 1.72828),
+            ("SF11", 1.78472),
+        ] {
+            let found = Spectrum::named(&format!("glass-{glass}")).unwrap().at_d_line();
+            assert!((found - index).abs() < 2e-5, "{glass} {found}");
+        }
         assert!(Spectrum::named("metal-Xx-eta").is_none());
         for name in Spectrum::names() {
             assert!(Spectrum::named(name).is_some() || illuminant_rgb(name).is_some(), "{name}");

@@ -62,6 +62,7 @@ impl Ocv {
                     let (value, mut controls) = (equations.mean(sums), means_of_columns(equations, sums));
                     // Groups, then the first lobe
                     controls[..equations.components()].rotate_left(job.lobes());
+                    let value = job.world.scene.film.balanced(Rgb::from_array(value)).to_array();
                     fits.set_controls(points[i].sample, value, &controls[..job.controls()]);
                     value
                 }

@@ -91,7 +91,7 @@ impl<'a> Materials<'a> {
         let normal_map = self.textures.image(&normal, ImageChannels::Color, ImageEncoding::Linear, messages)?;
         let normal_map = normal_map.map(|image| NormalMap { image, strength, is_along_v: true });
         let name = place.key("name").text().unwrap_or("default").to_owned();
-        self.entries.push(MaterialEntry { name, material, normal_map, displacement: None });
+        self.entries.push(MaterialEntry { name, material, normal_map, displacement: None, dispersion: None });
         let emission = if is_unlit { color } else { emitted(place) };
         let emissive = if is_unlit { base.clone() } else { place.key("emissiveTexture") };
         let emission_image = if emission.is_black() { None } else { self.textures.emission(&emissive, messages)? };

@@ -43,7 +43,7 @@ pub(super) fn camera(
     let [w, h] = resolution;
     let bounds = PixelBounds { x0: at(x0, w), x1: at(x1, w), y0: at(y0, h), y1: at(y1, h) };
     let filter = PixelFilter::Gaussian { rx: 1.5, ry: 1.5, sigma: 0.5 };
-    (camera, FilmSettings { resolution, bounds, filter, file_name: None, scale: 1.0 })
+    (camera, FilmSettings { resolution, bounds, filter, file_name: None, scale: 1.0, balance: None })
 }
 
 /// A camera of the file: it looks along −z; scales of its node do not count.

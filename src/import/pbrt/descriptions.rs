@@ -2,6 +2,7 @@
 
 use super::transform::Ctm;
 use crate::geometry::{Curve, CurveKind, QuadricKind};
+use crate::lights::Portal;
 use crate::materials::MaterialId;
 use crate::media::{Homogeneous, Medium};
 use lumiris_formats::pbrt::directive::Name;
@@ -103,6 +104,8 @@ pub enum ImageUse {
     Environment {
         /// Illuminance that replaces the brightness, if positive.
         illuminance: f32,
+        /// What the light comes through.
+        portal: Option<Portal>,
     },
     /// Factors of an intensity by direction.
     Goniometric {

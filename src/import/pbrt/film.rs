@@ -6,10 +6,12 @@ use crate::film::PixelBounds;
 use crate::film::filter::PixelFilter;
 use crate::import::LoadOptions;
 use crate::scene::FilmSettings;
+use lumiris_formats::color_space::white_balance;
 use lumiris_formats::diagnostic::Diagnostics;
 use lumiris_formats::pbrt::directive::Name;
 use lumiris_formats::pbrt::params::{ParamSet, ParamType, Values};
 use lumiris_formats::source::Span;
+use lumiris_numbers::math::Mat3;
 
 /// Understands `Film` and `PixelFilter`: the film, and the factor that its sensor's ISO gives.
 pub(super) fn finish_film(
@@ -25,6 +27,7 @@ pub(super) fn finish_film(
         filter,
         file_name: None,
         scale: 1.0,
+        balance: None,
     };
     let mut crop = [0.0, 1.0, 0.0, 1.0];
     let mut pixel_bounds = None;
@@ -58,7 +61,7 @@ pub(super) fn finish_film(
             }
         }
         pixel_bounds = read_pixel_bounds(p, d);
-        scale = sensor(p, d);
+        (scale, film.balance) = sensor(p, d);
         // The sensor's diagonal matters to realistic cameras; half-floats and splits of the file do not to us.
         for key in
             ["diagonal", "savefp16", "maxcomponentvalue", "coordinatesystem", "nbuckets", "lambdamin", "lambdamax"]
@@ -135,16 +138,21 @@ fn film_kind(name: &Name, d: &mut Diagnostics) {
     }
 }
 
-/// The factor that a sensor's ISO gives; exposure time is the camera's.
-fn sensor(p: &ParamSet, d: &mut Diagnostics) -> f32 {
+/// The factor that a sensor's ISO gives, and its white balance; exposure time is the camera's.
+fn sensor(p: &ParamSet, d: &mut Diagnostics) -> (f32, Option<Mat3>) {
     if p.string("sensor", d).is_some_and(|s| s != "cie1931") {
-        d.warning_once(p.span_of("sensor"), "measured sensors are not rendered yet: cie1931 is used");
+        d.warning_once(
+            p.span_of("sensor"),
+            "measured sensors are not rendered: cie1931 is used, with the white balance that is asked for",
+        );
     }
-    if p.float("whitebalance", d).is_some_and(|k| k != 0.0) {
-        d.warning_once(p.span_of("whitebalance"), "white balance is not rendered yet");
+    let kelvin = p.float("whitebalance", d).unwrap_or(0.0);
+    let balance = (kelvin != 0.0).then(|| white_balance(kelvin)).flatten();
+    if kelvin != 0.0 && balance.is_none() {
+        d.error(p.span_of("whitebalance"), format!("whitebalance is 0 or from 1000 to 25000 K, not {kelvin}"));
     }
     let scale = p.float("scale", d).unwrap_or(1.0);
-    scale * positive(p, "iso", 100.0, d) / 100.0
+    (scale * positive(p, "iso", 100.0, d) / 100.0, balance)
 }
 fn read_pixel_bounds(p: &ParamSet, d: &mut Diagnostics) -> Option<PixelBounds> {
     let param = p.get("pixelbounds", &[ParamType::Integer], d)?;

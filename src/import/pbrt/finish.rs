@@ -108,7 +108,12 @@ impl Builder<'_> {
                 emission,
             );
         }
-        let lights = lights.build(&assembly.set.world_bounds());
+        let bounds = assembly.set.world_bounds();
+        for (_, span) in self.portals.iter().filter(|(portal, _)| !portal.lights(&bounds)) {
+            let message = "no shape is on the side of the portal that is lit: its light will not be seen";
+            d.warning_once(*span, message).map(|w| w.help("reverse the order of its corners"));
+        }
+        let lights = lights.build(&bounds);
         let scene = Scene {
             camera,
             film,

@@ -4,15 +4,14 @@ use super::checks::unknown;
 use super::descriptions::{AreaLightDesc, EnvironmentDesc, ImageUse};
 use super::spectrum::SpectrumUse;
 use super::state::Builder;
-use crate::lights::environment::orthogonal;
 use crate::lights::layers::fault_of_name;
 use crate::lights::spot::spot_solid_angle;
-use crate::lights::{EnvironmentFilter, EnvironmentMap, EnvironmentMapping, ImageLight, ImageMapping, Light};
+use crate::lights::{EnvironmentFilter, EnvironmentMap, EnvironmentMapping, Light, Portal, PortalLight};
 use lumiris_formats::diagnostic::Diagnostics;
 use lumiris_formats::pbrt::directive::Name;
 use lumiris_formats::pbrt::params::{ParamSet, ParamType};
 use lumiris_formats::source::Span;
-use lumiris_numbers::math::{Affine3A, Mat3, Rgb, Vec3, warp};
+use lumiris_numbers::math::{Affine3A, Mat3, Rgb, Vec3};
 use std::f32::consts::PI;
 use std::sync::Arc;
 
@@ -97,12 +96,8 @@ impl Builder<'_> {
         scale: f32,
         d: &mut Diagnostics,
     ) -> Option<Light> {
-        if p.ignore("portal") {
-            d.warning_once(
-                p.span_of("portal"),
-                "portals are not used yet: light that does not come through this one is not left out",
-            );
-        }
+        let portal = portal(p, d);
+        self.portals.extend(portal.map(|portal| (portal, p.span_of("portal"))));
         let illuminance = p.float("illuminance", d).unwrap_or(0.0);
         let color = self.color_param(p, "L", SpectrumUse::Illuminant, d);
         if p.type_of("mapname").is_some() {
@@ -112,13 +107,13 @@ impl Builder<'_> {
         let file = file.or_else(|| p.string("mapname", d).map(|f| (f.to_owned(), p.span_of("mapname"))));
         let Some((name, span)) = file else {
             let l = color.unwrap_or(Rgb::WHITE) * scale;
-            let factor = if illuminance > 0.0 { illuminance / PI } else { 1.0 };
-            return Some(Light::InfiniteConstant { l: l * factor });
+            let l = l * if illuminance > 0.0 { illuminance / PI } else { 1.0 };
+            return Some(portal.map_or(Light::InfiniteConstant { l }, |portal| constant_portal(l, portal)));
         };
         if color.is_some() {
             d.error(p.span_of("L"), "an infinite light has `L` or `filename`, not both");
         }
-        Some(self.wait_for_image((&name, span), ImageUse::Environment { illuminance }, world_from_light, scale))
+        Some(self.wait_for_image((&name, span), ImageUse::Environment { illuminance, portal }, world_from_light, scale))
     }
 
     /// A light that keeps the place of another one until the image of that is there.
@@ -196,6 +191,22 @@ impl Builder<'_> {
     }
 }
 
+/// `portal`: corners in world space, whatever the current transformation is.
+fn portal(p: &ParamSet, d: &mut Diagnostics) -> Option<Portal> {
+    let param = p.get("portal", &[ParamType::Point3], d)?;
+    let corners: Vec<Vec3> = param.floats().unwrap_or_default().chunks_exact(3).map(Vec3::from_slice).collect();
+    let portal =
+        <[Vec3; 4]>::try_from(corners).map_err(|_| "a portal has four corners".to_owned()).and_then(Portal::new);
+    portal.map_err(|reason| d.error(param.value_span, reason)).ok()
+}
+
+/// The same radiance from everywhere beyond a portal.
+fn constant_portal(l: Rgb, portal: Portal) -> Light {
+    let map = EnvironmentMap::new(vec![l], [1, 1], EnvironmentMapping::EqualArea, EnvironmentFilter::Nearest)
+        .expect("one texel is square");
+    Light::Portal(Arc::new(PortalLight::new(&map, Mat3::IDENTITY, 1.0, portal)))
+}
+
 /// `filename`, which a light needs.
 fn image_of(p: &ParamSet, kind: &str, d: &mut Diagnostics) -> Option<String> {
     let name = p.string("filename", d).map(str::to_owned);
@@ -234,85 +245,6 @@ fn light_scale(p: &ParamSet, d: &mut Diagnostics) -> f32 {
     }
     d.error(p.span_of("scale"), format!("scale must be finite and not negative, not {scale}"));
     0.0
-}
-
-impl EnvironmentDesc {
-    /// The light, when its image (rows from the top) is there.
-    pub fn light(&self, texels: Vec<Rgb>, size: [usize; 2], d: &mut Diagnostics) -> Option<Light> {
-        let made = match self.image_use {
-            ImageUse::Environment { illuminance } => self.environment(texels, size, illuminance, d),
-            ImageUse::Goniometric { intensity, power } => self.goniometric(texels, size, (intensity, power)),
-            ImageUse::Projection { fov, power } => self.projection(texels, size, (fov, power)),
-        };
-        made.map_err(|reason| {
-            d.error(self.span, reason);
-        })
-        .ok()
-    }
-
-    fn environment(
-        &self,
-        texels: Vec<Rgb>,
-        size: [usize; 2],
-        illuminance: f32,
-        d: &mut Diagnostics,
-    ) -> Result<Light, String> {
-        let mapping = if size[0] == size[1] {
-            EnvironmentMapping::EqualArea
-        } else if size[0] == 2 * size[1] {
-            d.warning_once(self.span, "a latitude-longitude map is pbrt-v3; pbrt-v4 takes equal-area maps");
-            EnvironmentMapping::LatLong
-        } else {
-            return Err(format!("an environment map is square or twice as wide as high, not {}×{}", size[0], size[1]));
-        };
-        let map = EnvironmentMap::new(texels, size, mapping, EnvironmentFilter::Nearest)?;
-        let factor = if illuminance > 0.0 { illuminance / map_illuminance(&map) } else { 1.0 };
-        Ok(Light::infinite_image(Arc::new(map), &self.world_from_light, self.scale * factor))
-    }
-
-    /// Position and orthogonal map of directions.
-    fn place(&self) -> (Vec3, Mat3) {
-        (self.world_from_light.translation.into(), orthogonal(&self.world_from_light))
-    }
-
-    /// As in pbrt-v4, the image is grey: the mean of its channels. `power` is that of a white intensity.
-    fn goniometric(&self, texels: Vec<Rgb>, size: [usize; 2], (intensity, power): (Rgb, f32)) -> Result<Light, String> {
-        if size[0] != size[1] {
-            return Err(format!("a goniometric diagram is square (an equal-area map), not {}×{}", size[0], size[1]));
-        }
-        let grey: Vec<Rgb> = texels.iter().map(|c| Rgb::splat((c.r + c.g + c.b) / 3.0)).collect();
-        let (p, frame) = self.place();
-        let light = ImageLight::new(p, frame, ImageMapping::Sphere, (grey, size))?;
-        Ok(Light::Image(Arc::new(self.scaled(light, intensity, power))))
-    }
-
-    /// The light with a factor of its intensity, and with `power` instead of its own if that is positive.
-    fn scaled(&self, light: ImageLight, factor: Rgb, power: f32) -> ImageLight {
-        let brightness = if power > 0.0 && light.phi() > 0.0 { power / light.phi() } else { 1.0 };
-        light.scaled(factor * (self.scale * brightness))
-    }
-
-    fn projection(&self, texels: Vec<Rgb>, size: [usize; 2], (fov, power): (f32, f32)) -> Result<Light, String> {
-        let tan = (0.5 * fov.to_radians()).tan();
-        let aspect = size[0] as f32 / size[1].max(1) as f32;
-        let half = [tan * aspect.max(1.0), tan * aspect.recip().max(1.0)];
-        let (p, frame) = self.place();
-        let light = ImageLight::new(p, frame, ImageMapping::Plane { half }, (texels, size))?;
-        Ok(Light::Image(Arc::new(self.scaled(light, Rgb::WHITE, power))))
-    }
-}
-
-/// Illuminance of the light's own z = 0 plane by the upper half of the map, by stratified cosine sampling.
-fn map_illuminance(map: &EnvironmentMap) -> f32 {
-    const N: usize = 512;
-    let mut sum = 0.0_f64;
-    for y in 0..N {
-        for x in 0..N {
-            let u = [(x as f32 + 0.5) / N as f32, (y as f32 + 0.5) / N as f32];
-            sum += f64::from(map.le(warp::sample_cosine_hemisphere(u)).luminance());
-        }
-    }
-    (sum / (N * N) as f64) as f32 * PI
 }
 
 /// The factor that gives a surface of `area` (m²) the power that is asked for; `mean` is the mean of its image.

@@ -7,7 +7,7 @@ use super::state::Builder;
 use crate::bsdfs::models::LobeAxis;
 use crate::import::images::{ImageChannels, ImageEncoding, ImageRequest};
 use crate::materials::{
-    ConductorSpectrum, EvaluatedMaterial, Material, MaterialEntry, MaterialId, NormalMap, Roughness,
+    ConductorSpectrum, Dispersion, EvaluatedMaterial, Material, MaterialEntry, MaterialId, NormalMap, Roughness,
 };
 use crate::textures::{Filter, FloatTexture, RgbTexture, RgbTextureId, Wrap};
 use lumiris_formats::diagnostic::{Diagnostics, did_you_mean};
@@ -15,6 +15,7 @@ use lumiris_formats::pbrt::directive::Name;
 use lumiris_formats::pbrt::params::{Input, ParamSet, ParamType};
 use lumiris_formats::spectra;
 use lumiris_numbers::math::Rgb;
+use std::sync::Arc;
 
 /// Kinds of pbrt-v4 that are rendered, `principled` and `evaluated`.
 const KINDS: &[&str] = &[
@@ -83,7 +84,8 @@ impl Builder<'_> {
             Some(Input::Texture(texture)) => self.float_texture_named(texture, p.span_of("displacement"), d),
             Some(Input::Value(_)) | None => None,
         };
-        MaterialEntry { name, material, normal_map: self.normal_map(p, d), displacement }
+        let dispersion = matches!(kind, "dielectric" | "glass").then(|| self.dispersion(p)).flatten();
+        MaterialEntry { name, material, normal_map: self.normal_map(p, d), displacement, dispersion }
     }
 
     fn normal_map(&mut self, p: &ParamSet, d: &mut Diagnostics) -> Option<NormalMap> {
@@ -296,7 +298,18 @@ impl Builder<'_> {
         Roughness { u, v, remap: p.boolean("remaproughness", d).unwrap_or(true) }
     }
 
-    /// An index of refraction: a number, or a spectrum of which the sodium line counts.
+    /// Dispersion by a spectrum `eta`; what is wrong with it has been said.
+    fn dispersion(&mut self, p: &ParamSet) -> Option<Arc<Dispersion>> {
+        let mut known = Diagnostics::default();
+        let is_spectrum = p.type_of("eta") == Some(ParamType::Spectrum);
+        let value = p.spectrum("eta", &mut known).filter(|_| is_spectrum)?;
+        match self.resolve_spectrum(value, p.span_of("eta"), &mut known)? {
+            Resolved::Curve(curve) => Dispersion::new(&curve).map(Arc::new),
+            Resolved::Rgb(_) => None,
+        }
+    }
+
+    /// An index of refraction: a number, or a spectrum of which the helium d line counts.
     pub(super) fn ior(&mut self, p: &ParamSet, name: &'static str, d: &mut Diagnostics) -> f32 {
         let eta = match p.type_of(name) {
             None => {
@@ -311,9 +324,6 @@ impl Builder<'_> {
             Some(_) => {
                 let span = p.span_of(name);
                 let resolved = p.spectrum(name, d).and_then(|v| self.resolve_spectrum(v, span, d));
-                if matches!(resolved, Some(Resolved::Curve(_))) {
-                    d.warning_once(span, "dispersion is not rendered: the index at 587.6 nm is used");
-                }
                 resolved.map(|r| match r {
                     Resolved::Rgb(rgb) => rgb.average(),
                     Resolved::Curve(curve) => curve.at_d_line(),

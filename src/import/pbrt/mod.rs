@@ -2,7 +2,7 @@
 //!
 //! Reading order: [`descriptions`] (what a file asks for), [`state`] (the scene while its file is read), [`checks`];
 //! a file for each kind of directive: [`transform`], [`options`], [`settings`], [`film`], [`spectrum`], [`textures`],
-//! [`materials`], `hair`, [`lights`], [`media`] with `media_presets`, `curves`, [`shapes`]; [`directives`] (the state machine over `lumiris_formats::pbrt`'s directives);
+//! [`materials`], `hair`, [`lights`], `image_lights`, [`media`] with `media_presets`, `curves`, [`shapes`]; [`directives`] (the state machine over `lumiris_formats::pbrt`'s directives);
 //! and [`finish`] (reads files and assembles the scene).
 
 pub mod checks;
@@ -12,6 +12,7 @@ pub mod directives;
 pub mod film;
 pub mod finish;
 mod hair;
+mod image_lights;
 pub mod lights;
 pub mod materials;
 pub mod media;

@@ -8,7 +8,7 @@ use super::options::Options;
 use super::transform::{Ctm, affine};
 use crate::import::LoadOptions;
 use crate::import::resources::Resources;
-use crate::lights::Light;
+use crate::lights::{Light, Portal};
 use crate::materials::{Material, MaterialEntry, MaterialId};
 use crate::textures::{FloatTextureId, RgbTexture, RgbTextureId, TextureSet};
 use lumiris_formats::color_space::ColorSpace;
@@ -105,6 +105,8 @@ pub struct Builder<'a> {
     pub light_groups: Vec<Option<Arc<str>>>,
     /// Environment maps that wait for their image.
     pub environments: Vec<EnvironmentDesc>,
+    /// Portals, and where they stand.
+    pub portals: Vec<(Portal, Span)>,
     /// Images that area lights emit.
     pub emission_images: Vec<PathBuf>,
     /// Shapes that wait for their files.
@@ -154,6 +156,7 @@ impl<'a> Builder<'a> {
             lights: Vec::new(),
             light_groups: Vec::new(),
             environments: Vec::new(),
+            portals: Vec::new(),
             emission_images: Vec::new(),
             shapes: Vec::new(),
             objects: Vec::new(),
@@ -192,6 +195,7 @@ impl<'a> Builder<'a> {
 fn default_material(materials: &mut Vec<MaterialEntry>, textures: &mut TextureSet) -> MaterialId {
     let reflectance = textures.add_rgb(RgbTexture::Constant(Rgb::splat(0.5)));
     let material = Material::Diffuse { reflectance };
-    materials.push(MaterialEntry { name: "default".to_owned(), material, normal_map: None, displacement: None });
+    let name = "default".to_owned();
+    materials.push(MaterialEntry { name, material, normal_map: None, displacement: None, dispersion: None });
     (materials.len() - 1) as MaterialId
 }

@@ -115,11 +115,12 @@ impl Buffers {
         let visible = self.traced.index.iter().zip(&self.traced.occluded).filter(|(_, occluded)| !**occluded);
         for i in visible.map(|(&i, _)| i as usize) {
             let (path, wi) = (&self.paths[i], self.samples.light.wi.vec3(i));
+            let p = self.surface.lit_points().get(i).p;
             let contribution = path.beta * self.samples.c.rgb(i);
             let drawn = || Some(only.unwrap_or_else(|| self.scratch.chosen(i)));
             match if by_light { drawn() } else { self.emitter_rays.lights[i] } {
-                Some(light) => layers.add(&job.lights, path.sample, (light, wi), contribution),
-                None => layers.add_infinite(&job.lights, path.sample, wi, contribution),
+                Some(light) => layers.add(&job.lights, path.sample, (light, p, wi), contribution),
+                None => layers.add_infinite(&job.lights, path.sample, (p, wi), contribution),
             }
         }
     }

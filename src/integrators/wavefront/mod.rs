@@ -243,7 +243,8 @@ impl<'w> Batch<'w> {
             out.samples[path.sample as usize].radiance += path.beta * radiance;
             if self.estimate.has_controls {
                 let controls = &self.buffers.controls.of(i)[..job.controls()];
-                out.fits.set_controls(path.sample, radiance.to_array(), controls);
+                let value = job.world.scene.film.balanced(radiance).to_array();
+                out.fits.set_controls(path.sample, value, controls);
             }
         }
         if self.estimate.continues {

@@ -1,0 +1,78 @@
+//! `whitebalance` of a film: a linear map of what the film would have without.
+
+use lumiris::film::{Film, PixelSums};
+use lumiris::import::cache::FileCache;
+use lumiris::import::{LoadOptions, load_text};
+use lumiris::render::{RenderSettings, render};
+use lumiris::scene::{AccelKind, RenderJob};
+use lumiris::settings::{EstimatorKind, IntegratorKind};
+use lumiris_formats::color_space::white_balance;
+use lumiris_numbers::math::Vec3;
+use std::path::Path;
+use std::sync::atomic::AtomicBool;
+
+/// Coloured light of two groups on coloured surfaces.
+fn scene(film: &str) -> String {
+    format!(
+        r#"LookAt 0 1 -4  0 0 0  0 1 0
+        Camera "perspective" "float fov" 50
+        Film "rgb" "integer xresolution" 8 "integer yresolution" 8 {film}
+        WorldBegin
+        LightSource "infinite" "rgb L" [0.3 0.5 0.9] "string lightgroup" "sky"
+        AttributeBegin AreaLightSource "diffuse" "rgb L" [9 5 1] Translate 0 2 0 Shape "sphere" "float radius" 0.4 AttributeEnd
+        Material "diffuse" "rgb reflectance" [0.8 0.4 0.1]
+        Shape "sphere" "float radius" 0.7
+        Material "diffuse" "rgb reflectance" [0.2 0.6 0.4]
+        Translate 0 -0.7 0
+        Shape "trianglemesh" "point3 P" [ -5 0 -5  5 0 -5  5 0 5  -5 0 5 ] "integer indices" [ 0 1 2 0 2 3 ]"#
+    )
+}
+
+fn load(film: &str) -> Result<RenderJob, String> {
+    let loaded = load_text(&scene(film), "film.pbrt", Path::new("."), &LoadOptions::default(), &FileCache::default());
+    Ok(loaded.map_err(|d| d.to_string())?.job(AccelKind::Embree, None).unwrap())
+}
+
+fn film(job: &RenderJob) -> Film {
+    render(job, &RenderSettings { spp: 8, ..RenderSettings::default() }, &AtomicBool::new(false), &|_| ()).unwrap().film
+}
+
+/// Means of a film and of its layers.
+fn means(film: &Film) -> Vec<Vec<[f64; 3]>> {
+    let of = |film: &Film| film.pixels().iter().map(PixelSums::mean).collect();
+    std::iter::once(of(film)).chain(film.light_layers().iter().map(|(_, layer)| of(layer))).collect()
+}
+
+#[test]
+fn the_balanced_image_is_the_map_of_the_other() {
+    let map = white_balance(3200.0).unwrap();
+    for (kind, estimator) in [
+        (IntegratorKind::Path, EstimatorKind::Mis),
+        (IntegratorKind::Direct, EstimatorKind::Ris),
+        (IntegratorKind::Direct, EstimatorKind::Ocv),
+        (IntegratorKind::IrradianceCache, EstimatorKind::Mis),
+    ] {
+        let [balanced, plain] = ["\"float whitebalance\" 3200", ""].map(|parameters| {
+            let mut job = load(parameters).unwrap();
+            job.change(|s| (s.integrator.kind, s.integrator.estimator) = (kind, estimator));
+            means(&film(&job))
+        });
+        assert_eq!(balanced.len(), plain.len());
+        for (balanced, plain) in balanced.iter().flatten().zip(plain.iter().flatten()) {
+            let expected = map * Vec3::from_array(plain.map(|v| v as f32));
+            let difference = (Vec3::from_array(balanced.map(|v| v as f32)) - expected).abs().max_element();
+            // Control variates are fitted to other colours, which changes their noise
+            let tolerance = if estimator == EstimatorKind::Ocv { 0.2 } else { 1e-4 };
+            assert!(difference <= tolerance * expected.abs().max_element(), "{estimator:?}: {balanced:?} {expected}");
+        }
+    }
+}
+
+#[test]
+fn temperatures_that_no_camera_has_are_errors() {
+    for kelvin in ["-1", "20", "1e9"] {
+        let error = load(&format!("\"float whitebalance\" {kelvin}")).err().unwrap();
+        assert!(error.contains("from 1000 to 25000 K") && error.contains("film.pbrt:3:"), "{error}");
+    }
+    assert!(load("\"float whitebalance\" 0").unwrap().world.scene.film.balance.is_none());
+}
