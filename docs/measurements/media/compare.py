@@ -1,7 +1,7 @@
 #!/usr/bin/env python3
 """Participating media beside Mitsuba 3: compare.py FOLDER [SAMPLES]
 
-Writes two scenes into the folder, renders them with `lumiris` and with Mitsuba (`volpath`), and prints means, and the ratios
+Writes scenes into the folder, renders them with `lumiris` and with Mitsuba (`volpath`), and prints means, and the ratios
 of 16 x 16 pixels. Needs the Python packages numpy, OpenEXR and mitsuba.
 """
 import subprocess
@@ -67,6 +67,15 @@ def smoke_text(density):
     return text + 'Material "diffuse" "rgb reflectance" [ 0.5 0.5 0.5 ]\n' + pbrt_quad(FLOOR)
 
 
+def ball_text(alpha):
+    """A ball of `Material "subsurface"` under a sky, beside a lamp."""
+    text = HEAD.format(look="0 0.6 -4.2  0 0 0 ", fov=34, depth=60, name="ball")
+    text += 'LightSource "infinite" "rgb L" [ 0.3 0.3 0.3 ]\nAttributeBegin Translate -2.5 2.5 -1.5\n'
+    text += 'AreaLightSource "diffuse" "rgb L" [ 8 8 8 ] Shape "sphere" "float radius" 1 AttributeEnd\n'
+    text += 'Material "subsurface" "rgb sigma_s" [ 4 3 2 ] "rgb sigma_a" [ 0.05 0.2 0.6 ] "float eta" 1.33 "float g" 0.3\n'
+    return text + f'"float roughness" {alpha} "bool remaproughness" false Shape "sphere" "float radius" 1\n'
+
+
 def rgb(values):
     return {"type": "rgb", "value": values}
 
@@ -91,7 +100,7 @@ def frame(origin, target, fov, depth, samples):
     film = {"type": "hdrfilm", "width": 64, "height": 64, "rfilter": {"type": "box"}, "pixel_format": "rgb"}
     sampler = {"type": "independent", "sample_count": samples}
     sensor = {"type": "perspective", "fov": fov, "to_world": to_world, "film": film, "sampler": sampler}
-    return {"type": "scene", "integrator": {"type": "volpath", "max_depth": depth + 1, "rr_depth": 100}, "sensor": sensor}
+    return {"type": "scene", "integrator": {"type": "volpath", "max_depth": depth + 1, "rr_depth": 1000}, "sensor": sensor}
 
 
 def gas_scene(folder, samples):
@@ -127,6 +136,22 @@ def smoke_scene(folder, density, samples):
     return scene
 
 
+def ball_scene(alpha, samples):
+    albedo, sigma_t = rgb([4 / 4.05, 3 / 3.2, 2 / 2.6]), rgb([0.81, 0.64, 0.52])
+    phase = {"type": "hg", "g": 0.3}
+    inside = {"type": "homogeneous", "albedo": albedo, "sigma_t": sigma_t, "scale": 5.0, "phase": phase}
+    boundary = {"type": "dielectric", "int_ior": 1.33, "ext_ior": 1.0}
+    if alpha > 0:
+        boundary |= {"type": "roughdielectric", "distribution": "ggx", "alpha": alpha}
+    # Every event of a walk counts there
+    scene = frame([0, 0.6, -4.2], [0, 0, 0], 34, 3000, samples)
+    scene["sky"] = {"type": "constant", "radiance": rgb([0.3, 0.3, 0.3])}
+    lamp = {"type": "area", "radiance": rgb([8, 8, 8])}
+    scene["lamp"] = {"type": "sphere", "center": [-2.5, 2.5, -1.5], "radius": 1, "emitter": lamp}
+    scene["ball"] = {"type": "sphere", "radius": 1, "bsdf": boundary, "interior": inside}
+    return scene
+
+
 def compare(folder, name, text, scene, samples):
     (folder / f"{name}.pbrt").write_text(text)
     arguments = ["--estimator", "mis", "--spp", str(samples // 4), "--quiet", "-o", str(folder / f"{name}.exr")]
@@ -151,6 +176,8 @@ def main():
     print("| scene | means, R G B, relative to Mitsuba | blocks of 16 × 16 pixels |\n|---|---|---|")
     compare(folder, "gas", gas_text(), gas_scene(folder, samples), samples)
     compare(folder, "smoke", smoke_text(density), smoke_scene(folder, density, samples), samples)
+    for name, alpha in [("ball", 0), ("rough ball", 0.3)]:
+        compare(folder, name, ball_text(alpha), ball_scene(alpha, samples), samples)
 
 
 main()
