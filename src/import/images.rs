@@ -2,6 +2,7 @@
 
 use crate::imaging::oiio::{self, ImageError, ReadLimits};
 use crate::imaging::{ColorChannels, ColorEncoding, Filter, Image, MipMap, Wrap};
+use crate::textures::Udim;
 use lumiris_numbers::math::Rgb;
 use std::path::{Path, PathBuf};
 
@@ -43,6 +44,26 @@ pub struct ImageRequest {
     pub wrap: Wrap,
     /// Between texels.
     pub filter: Filter,
+}
+
+/// What stands for the number of a tile in the name of an image file.
+pub const UDIM: &str = "<UDIM>";
+
+/// The tiles of a path whose file name has [`UDIM`], in the order of their numbers; those that are there.
+pub fn tiles(path: &Path) -> Vec<(u32, PathBuf)> {
+    let name = path.file_name().and_then(|name| name.to_str()).unwrap_or_default();
+    let Some((before, after)) = name.split_once(UDIM) else { return Vec::new() };
+    let folder = path.parent().filter(|folder| !folder.as_os_str().is_empty()).unwrap_or(Path::new("."));
+    let entries = std::fs::read_dir(folder).into_iter().flatten().flatten();
+    let number = |name: &str| {
+        let digits = name.strip_prefix(before)?.strip_suffix(after)?;
+        let is_number = digits.len() == 4 && digits.bytes().all(|b| b.is_ascii_digit());
+        digits.parse().ok().filter(|&number| is_number && Udim::is_number(number))
+    };
+    let tile = |entry: std::fs::DirEntry| Some((number(entry.file_name().to_str()?)?, entry.path()));
+    let mut tiles: Vec<(u32, PathBuf)> = entries.filter_map(tile).collect();
+    tiles.sort();
+    tiles
 }
 
 /// Reads an image as textures ask for it.

@@ -121,6 +121,8 @@ impl PortalLight {
             / means.iter().map(|m| m.jacobian).sum::<f64>();
         let bright = BRIGHT * mean as f32;
         if means.iter().any(|m| m.radiance.luminance() > bright) {
+            // Those of a large map are half a gigabyte: not twice at once
+            drop(means);
             means = self::means(map, light_from_portal, cells, bright);
             add_bright(map, light_from_portal, cells, bright, &mut means);
         }

@@ -176,7 +176,7 @@ pub struct NormalMap {
 impl NormalMap {
     /// The map as pbrt-v4 reads it.
     pub fn unscaled(image: ImageId) -> Self {
-        let image = ImageTexture { image, mapping: Mapping2d::default(), scale: 1.0, invert: false };
+        let image = ImageTexture { image, mapping: Mapping2d::default(), udim: None, scale: 1.0, invert: false };
         NormalMap { image, strength: 1.0, is_along_v: false }
     }
 }

@@ -127,7 +127,7 @@ fn shading_frames_follow_the_tangent() {
 fn a_displacement_tilts_the_normal_by_its_slope() {
     let mut bench = Bench::new();
     let image = bench.image(64, |u, v| [0.5 * u - 0.25 * v + 0.25; 3]);
-    let texture = ImageTexture { image, mapping: Mapping2d::default(), scale: 1.0, invert: false };
+    let texture = ImageTexture { image, mapping: Mapping2d::default(), udim: None, scale: 1.0, invert: false };
     let displacement = bench.textures.add_float(FloatTexture::Image(texture));
     let reflectance = bench.rgb(0.5, 0.5, 0.5);
     let id = bench.material(Material::Diffuse { reflectance });
@@ -208,7 +208,7 @@ fn coats_share_tables_and_walk_only_where_they_must() {
     let mut bench = Bench::new();
     let (rough, smooth) = (bench.float(0.04), bench.float(0.0));
     let image = bench.image(2, |_, _| [0.04; 3]);
-    let texture = ImageTexture { image, mapping: Mapping2d::default(), scale: 1.0, invert: false };
+    let texture = ImageTexture { image, mapping: Mapping2d::default(), udim: None, scale: 1.0, invert: false };
     let (textured, other) = [0, 1].map(|_| bench.textures.add_float(FloatTexture::Image(texture))).into();
     let roughness = |u, v, remap| Roughness { u, v, remap };
     let constant = bench.coated(roughness(rough, rough, true), 0.0);

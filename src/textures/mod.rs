@@ -4,9 +4,11 @@
 //! pbrt-v4's. Checkerboards are point sampled: the pixel integrates over their edges.
 
 pub mod mapping;
+pub mod udim;
 
 pub use crate::imaging::{Filter, Wrap};
 pub use mapping::{CheckerboardMapping, Mapping2d};
+pub use udim::{Udim, UdimId};
 
 use crate::imaging::MipMap;
 use crate::imaging::tiles::TileStore;
@@ -41,8 +43,10 @@ pub struct TextureContext {
 /// Lookup of an image.
 #[derive(Clone, Copy, Debug)]
 pub struct ImageTexture {
-    /// The image.
+    /// The image; of tiles, the first one.
     pub image: ImageId,
+    /// Tiles in its place.
+    pub udim: Option<UdimId>,
     /// Point to image coordinates; (0, 0) is the lower left.
     pub mapping: Mapping2d,
     /// Factor of the values.
@@ -166,6 +170,8 @@ pub struct TextureSet {
     pub rgbs: Vec<RgbTexture>,
     /// Images.
     pub images: Vec<Arc<MipMap>>,
+    /// Images that are tiles.
+    pub udims: Vec<Udim>,
 }
 
 impl TextureSet {
@@ -306,11 +312,16 @@ impl TextureSet {
         }
     }
 
-    /// Value of an image at a point.
+    /// Value of an image at a point; black where there is no tile.
     pub fn image_value(&self, texture: &ImageTexture, ctx: &TextureContext) -> Rgb {
-        let (st, width) = texture.mapping.map(ctx);
+        let (mut st, width) = texture.mapping.map(ctx);
+        let mut image = texture.image;
+        if let Some(udim) = texture.udim {
+            let Some(tile) = self.udims[udim as usize].tile(st) else { return Rgb::BLACK };
+            (image, st) = tile;
+        }
         // Images have t downwards.
-        self.images[texture.image as usize].lookup(Vec2::new(st.x, 1.0 - st.y), width)
+        self.images[image as usize].lookup(Vec2::new(st.x, 1.0 - st.y), width)
     }
 }
 
@@ -350,7 +361,7 @@ mod tests {
         }
         let mut set = TextureSet::default();
         let image = set.add_image(MipMap::new(&image, Wrap::Repeat, Filter::Bilinear, ColorEncoding::Linear));
-        (set, ImageTexture { image, mapping: Mapping2d::default(), scale: 1.0, invert: false })
+        (set, ImageTexture { image, mapping: Mapping2d::default(), udim: None, scale: 1.0, invert: false })
     }
 
     #[test]

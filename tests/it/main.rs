@@ -23,6 +23,7 @@ mod roulette;
 mod sample_allocation;
 mod subsurface;
 mod texture_tiles;
+mod udim;
 mod variance;
 mod visibility_cache;
 mod wavefront;

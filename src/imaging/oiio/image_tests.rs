@@ -152,3 +152,27 @@ fn failures_say_what_and_leave_nothing() {
     assert!(write_image(&folder.path().join("no/where.exr"), &[]).is_err());
     assert_eq!(std::fs::read_dir(folder.path()).unwrap().count(), 1);
 }
+
+/// OpenEXR's threads were as many as each file asked for, and a file that was being written when another changed that was never
+/// complete.
+#[test]
+fn files_are_written_and_read_at_the_same_time() {
+    let (done, all) = std::sync::mpsc::channel();
+    for thread in 0..4_usize {
+        let done = done.clone();
+        std::thread::spawn(move || {
+            let folder = tempfile::tempdir().unwrap();
+            for i in 0..40 {
+                let (width, height) = ([2, 64][(i + thread) % 2], [2, 300][(i + thread) % 2]);
+                let data: Vec<f32> = (0..width * height * 3).map(|k| (k * 7 % 1000) as f32).collect();
+                let path = folder.path().join(format!("{i}.exr"));
+                write_image(&path, &[Part::linear(width, height, names(&["R", "G", "B"]), data.clone())]).unwrap();
+                assert_eq!(read_image(&path, &ReadLimits::default()).unwrap().image.data, data);
+            }
+            done.send(()).unwrap();
+        });
+    }
+    for _ in 0..4 {
+        all.recv_timeout(std::time::Duration::from_secs(300)).expect("a file is neither written nor refused");
+    }
+}

@@ -7,20 +7,15 @@ use std::ffi::{CStr, CString, c_char};
 use std::path::Path;
 use std::sync::OnceLock;
 
-/// Sets how many threads an EXR file is read or written by.
-pub(super) fn set_exr_threads(api: &sys::Api, threads: usize) {
-    let threads = i32::try_from(threads).unwrap_or(1);
-    // A version that lacks the attribute goes on as it is.
-    // SAFETY: the name ends in a zero byte; a null message buffer of size 0 is not written.
-    let _ = call(|e, n| unsafe { (api.set_int)(c"exr_threads".as_ptr(), threads, e, n) });
-}
-
-/// The shim; its threads are kept to one, since images are read in parallel already.
+/// The shim. Its threads are kept to one, since images are read in parallel already, but for those that compress rows of EXR
+/// files, which all files share. Their number never changes: OpenEXR 3.1 loses rows of a file that is being written
+/// when that happens, and waits for them for ever.
 pub(super) fn api() -> Result<&'static sys::Api, ImageError> {
     static CONFIGURED: OnceLock<()> = OnceLock::new();
     let api = sys::load().map_err(ImageError::Library)?;
     CONFIGURED.get_or_init(|| {
-        for (name, value) in [(c"threads", 1), (c"exr_threads", 1)] {
+        let threads = i32::try_from(rayon::current_num_threads()).unwrap_or(1);
+        for (name, value) in [(c"threads", 1), (c"exr_threads", threads)] {
             // A version that lacks the attribute goes on as it is.
             // SAFETY: the name ends in a zero byte; a null message buffer of size 0 is not written.
             let _ = call(|e, n| unsafe { (api.set_int)(name.as_ptr(), value, e, n) });

@@ -2,7 +2,7 @@
 #![allow(unsafe_code)]
 
 use super::part::{MetaValue, Part};
-use super::shim::{api, c_path, c_text, call, set_exr_threads};
+use super::shim::{api, c_path, c_text, call};
 use crate::imaging::file::ImageError;
 use lumiris_formats::output::write_whole;
 use openimageio_sys as sys;
@@ -29,8 +29,6 @@ impl Output {
         let mut handle = ptr::null_mut();
         // SAFETY: the name ends in a zero byte, and `handle` is only written.
         call(|e, n| unsafe { (api.output_create)(name.as_ptr(), &mut handle, e, n) }).map_err(|(_, m)| m)?;
-        // What compresses rows; the bytes do not depend on it
-        set_exr_threads(api, rayon::current_num_threads());
         Ok(Output { api, handle })
     }
 
@@ -125,7 +123,6 @@ impl Drop for Output {
     fn drop(&mut self) {
         // SAFETY: the handle is live and freed once.
         unsafe { (self.api.output_free)(self.handle) };
-        set_exr_threads(self.api, 1);
     }
 }
 

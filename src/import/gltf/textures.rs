@@ -153,7 +153,7 @@ impl<'a> Textures<'a> {
         let image = self.resources.image(ImageRequest { path, channels, encoding, wrap, filter }, span);
         let (second, st_from_uv) = mapping(place);
         let mapping = Mapping2d::Affine { second, matrix: st_from_uv.matrix2, offset: st_from_uv.translation };
-        Ok(Some(ImageTexture { image, mapping, scale: 1.0, invert: false }))
+        Ok(Some(ImageTexture { image, mapping, udim: None, scale: 1.0, invert: false }))
     }
 
     /// Files that are not in the document.

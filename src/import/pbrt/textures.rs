@@ -4,13 +4,15 @@ use super::checks::unknown;
 use super::spectrum::SpectrumUse;
 use super::state::Builder;
 use super::transform::affine;
-use crate::import::images::{ImageChannels, ImageEncoding, ImageRequest};
+use crate::import::images::{ImageChannels, ImageEncoding, ImageRequest, UDIM, tiles};
 use crate::textures::{
-    CheckerboardMapping, Filter, FloatTexture, FloatTextureId, ImageTexture, Mapping2d, RgbTexture, RgbTextureId, Wrap,
+    CheckerboardMapping, Filter, FloatTexture, FloatTextureId, ImageId, ImageTexture, Mapping2d, RgbTexture,
+    RgbTextureId, Udim, UdimId, Wrap,
 };
 use lumiris_formats::diagnostic::{Diagnostics, did_you_mean};
 use lumiris_formats::pbrt::directive::Name;
 use lumiris_formats::pbrt::params::{Input, ParamSet, ParamType, SpectrumValue};
+use lumiris_formats::source::Span;
 use lumiris_numbers::math::{Affine3A, Rgb, Vec2, Vec3};
 
 impl Builder<'_> {
@@ -187,10 +189,32 @@ impl Builder<'_> {
             d.error(p.span, "an image texture needs a `string filename`");
             return None;
         };
-        let request =
-            ImageRequest { path: self.folder.join(name), channels: ImageChannels::Color, encoding, wrap, filter };
-        let image = self.resources.image(request, p.span_of("filename"));
-        Some(ImageTexture { image, mapping, scale, invert })
+        let (path, span) = (self.folder.join(name), p.span_of("filename"));
+        let request = ImageRequest { path, channels: ImageChannels::Color, encoding, wrap, filter };
+        let (image, udim) = if name.contains(UDIM) {
+            let (first, udim) = self.udim(&request, span, d)?;
+            (first, Some(udim))
+        } else {
+            (self.resources.image(request, span), None)
+        };
+        Some(ImageTexture { image, udim, mapping, scale, invert })
+    }
+
+    /// The tiles of a name with [`UDIM`] that are in its folder, and the first one. Beyond its edges a tile has what is at them.
+    fn udim(&mut self, request: &ImageRequest, span: Span, d: &mut Diagnostics) -> Option<(ImageId, UdimId)> {
+        let mut udim = Udim::default();
+        let mut first = None;
+        for (number, path) in tiles(&request.path) {
+            let image = self.resources.image(ImageRequest { path, wrap: Wrap::Clamp, ..request.clone() }, span);
+            udim.set(number, image);
+            first.get_or_insert(image);
+        }
+        let Some(first) = first else {
+            d.error(span, format!("there is no tile of {}, such as …1001…", request.path.display()));
+            return None;
+        };
+        self.textures.udims.push(udim);
+        Some((first, (self.textures.udims.len() - 1) as UdimId))
     }
 
     fn encoding(&self, p: &ParamSet, d: &mut Diagnostics) -> Option<ImageEncoding> {

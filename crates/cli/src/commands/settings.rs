@@ -86,6 +86,9 @@ fn check_scene(args: &SceneArgs) -> anyhow::Result<()> {
             UsageError(format!("{path} is an image, not a scene: `lumiris info {path}` shows its settings")).into()
         );
     }
+    if let Some(what) = mesh_kind(&args.scene) {
+        return Err(UsageError(format!("{path} is a mesh, not a scene: {what}")).into());
+    }
     let of_gltf = [("--environment", args.environment.is_some()), ("--camera-auto", args.camera_auto)];
     if let Some((option, _)) = of_gltf.iter().find(|(_, is_given)| *is_given && !is_gltf(&args.scene)) {
         let text = format!(
@@ -94,6 +97,16 @@ fn check_scene(args: &SceneArgs) -> anyhow::Result<()> {
         return Err(UsageError(text).into());
     }
     Ok(())
+}
+
+/// What to do with a mesh, if the file is one by its name.
+fn mesh_kind(path: &Path) -> Option<&'static str> {
+    let extension = path.extension()?.to_str()?.to_ascii_lowercase();
+    match extension.as_str() {
+        "ply" => Some("`Shape \"plymesh\" \"string filename\" \"…\"` in a .pbrt file places it"),
+        "obj" | "stl" | "fbx" | "usd" | "usda" | "usdc" => Some("convert it to PLY for a .pbrt file, or to glTF"),
+        _ => None,
+    }
 }
 
 /// Loads the scene and builds its ray tracers.

@@ -58,6 +58,8 @@ fn images_are_described_and_not_read_as_scenes() {
         );
     }
     refuse("render a.exr -o b.exr", folder, 2, &["a.exr is an image, not a scene", "lumiris info a.exr"]);
+    refuse("render a.ply -o b.exr", folder, 2, &["a.ply is a mesh, not a scene", "plymesh"]);
+    refuse("info a.OBJ", folder, 2, &["a.OBJ is a mesh, not a scene", "convert it to PLY"]);
     refuse("info no.exr", folder, 3, &["no.exr: no such file"]);
     std::fs::write(folder.join("broken.exr"), "no image").unwrap();
     refuse("info broken.exr", folder, 3, &["broken.exr: "]);

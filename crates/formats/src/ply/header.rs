@@ -154,7 +154,10 @@ impl Header {
 /// Reads the header; the stream then stands at the first row.
 pub(super) fn read_header(stream: &mut Stream<'_>) -> Result<Header, PlyError> {
     if read_line(stream)?.trim_end() != "ply" {
-        return Err(PlyError::header(1, "is not a PLY file: it does not start with `ply`"));
+        return Err(PlyError::header(
+            1,
+            "is not a PLY file: it does not start with `ply` (meshes of other formats must be converted)",
+        ));
     }
     let mut encoding = None;
     let mut elements: Vec<Element> = Vec::new();

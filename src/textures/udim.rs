@@ -1,0 +1,64 @@
+//! UDIM: images side by side over the plane of texture coordinates. Tile 1001 + u + 10·v covers [u, u + 1) × [v, v + 1), for
+//! u from 0 to 9.
+
+use super::ImageId;
+use lumiris_numbers::math::Vec2;
+
+/// Index into [`TextureSet::udims`](super::TextureSet::udims).
+pub type UdimId = u32;
+
+/// Tiles in a row.
+const COLUMNS: usize = 10;
+/// Number of the first tile.
+const FIRST: u32 = 1001;
+/// Number of the last one.
+const LAST: u32 = 9999;
+
+/// The images of the tiles.
+#[derive(Clone, Debug, Default)]
+pub struct Udim {
+    /// By u + 10·v.
+    tiles: Vec<Option<ImageId>>,
+}
+
+impl Udim {
+    /// True if a tile can have this number.
+    pub fn is_number(number: u32) -> bool {
+        (FIRST..=LAST).contains(&number)
+    }
+
+    /// Sets the image of a tile, whose number [is one](Self::is_number).
+    pub fn set(&mut self, number: u32, image: ImageId) {
+        let index = (number - FIRST) as usize;
+        self.tiles.resize(self.tiles.len().max(index + 1), None);
+        self.tiles[index] = Some(image);
+    }
+
+    /// The tile that covers a point, t upwards, and the point within it; `None` where there is none.
+    #[inline]
+    pub fn tile(&self, st: Vec2) -> Option<(ImageId, Vec2)> {
+        let corner = st.floor();
+        let is_inside = corner.x >= 0.0 && corner.x < COLUMNS as f32 && corner.y >= 0.0 && corner.y.is_finite();
+        let index = is_inside.then(|| corner.x as usize + COLUMNS * corner.y as usize)?;
+        Some((*self.tiles.get(index)?.as_ref()?, st - corner))
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn tiles_cover_their_squares() {
+        let mut udim = Udim::default();
+        for (number, image) in [(1001, 7), (1002, 8), (1010, 9), (1011, 10)] {
+            udim.set(number, image);
+        }
+        let at = |x: f32, y: f32| udim.tile(Vec2::new(x, y)).map(|(image, _)| image);
+        assert_eq!([at(0.0, 0.0), at(0.99, 0.99), at(1.0, 0.5), at(9.5, 0.5)], [Some(7), Some(7), Some(8), Some(9)]);
+        assert_eq!([at(0.5, 1.0), at(1.5, 1.0), at(10.5, 0.5), at(-0.1, 0.5)], [Some(10), None, None, None]);
+        assert_eq!([at(0.5, -0.1), at(0.5, 1e30), at(f32::NAN, 0.5), at(2.5, 0.5)], [None; 4]);
+        assert_eq!(udim.tile(Vec2::new(1.25, 0.75)).unwrap().1, Vec2::new(0.25, 0.75));
+        assert!(!Udim::is_number(1000) && Udim::is_number(1001) && !Udim::is_number(10_000));
+    }
+}
