@@ -38,7 +38,8 @@ impl Udim {
     #[inline]
     pub fn tile(&self, st: Vec2) -> Option<(ImageId, Vec2)> {
         let corner = st.floor();
-        let is_inside = corner.x >= 0.0 && corner.x < COLUMNS as f32 && corner.y >= 0.0 && corner.y.is_finite();
+        let rows = self.tiles.len().div_ceil(COLUMNS) as f32;
+        let is_inside = corner.x >= 0.0 && corner.x < COLUMNS as f32 && corner.y >= 0.0 && corner.y < rows;
         let index = is_inside.then(|| corner.x as usize + COLUMNS * corner.y as usize)?;
         Some((*self.tiles.get(index)?.as_ref()?, st - corner))
     }
