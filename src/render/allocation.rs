@@ -16,8 +16,8 @@ use super::pilot_samples::trace_pixels;
 use super::worker::Worker;
 use super::{RenderSettings, Run, position};
 use crate::direct::Estimator;
+use crate::film::PixelBounds;
 use crate::film::accumulator::PixelAccumulator;
-use crate::film::{PixelBounds, PixelSums};
 use crate::imaging::metrics::difference::DEFAULT_EPSILON;
 use crate::integrators::{PathStats, PathTracer, Tracer};
 use crate::scene::{PixelSamples, RenderJob};
@@ -42,6 +42,8 @@ const RADIUS: usize = 2;
 const RANGE: [f64; 2] = [0.5, 8.0];
 /// One in this many tiles is sampled first.
 const SCOUTS: u32 = 4;
+/// Tiles whose samples are in memory before they are reduced to what [`Measured`] holds.
+const TILES_AT_ONCE: usize = 1024;
 /// Pixels from which on a part of the image tells whether there is anything to gain.
 const MIN_SCOUTED: usize = 256 * (COST_TILE * COST_TILE) as usize;
 /// Factor of the error below which numbers remain uniform.
@@ -66,7 +68,7 @@ pub(super) fn allocate(job: &RenderJob) -> Option<PixelSamples> {
         return None;
     }
     pilot.measure(|tile| tile % SCOUTS != 0);
-    let counts = counts(&pilot.weights(|_| true), &pilot.costs, spp);
+    let counts = counts(&pilot.weights(|_| true), &pilot.costs(), spp);
     (pilot.gain(spp) >= MIN_GAIN).then_some(PixelSamples { bounds: pilot.bounds, spp, counts })
 }
 
@@ -93,16 +95,34 @@ pub fn allows_adaptive(settings: &Settings) -> bool {
         && settings.sampling.spp >= MIN_SPP
 }
 
+/// What a pilot's samples of a pixel say, in few bytes: a pilot has all pixels of an image at once.
+#[derive(Clone, Copy, Debug, Default)]
+struct Measured {
+    count: u32,
+    /// Σ of the samples.
+    radiance: [f32; 3],
+    /// Variance of a sample; 0 of fewer than two.
+    variance: [f32; 3],
+    /// Cost of a sample; 0 where nothing was measured.
+    cost: f32,
+}
+
+impl Measured {
+    fn of(samples: &PixelAccumulator, cost: f64) -> Self {
+        let sums = samples.sums();
+        let variance = sums.variance_of_mean().map(|v| (v * sums.count as f64) as f32);
+        Measured { count: sums.count as u32, radiance: sums.radiance.map(|x| x as f32), variance, cost: cost as f32 }
+    }
+}
+
 /// A few samples of the pixels, or of some of them.
 struct Pilot<'a> {
     job: &'a RenderJob,
     /// Samples of a pixel, fraction of the pixels that have them, and seed.
     sampling: (u32, f32, u32),
     bounds: PixelBounds,
-    /// Sums of the samples, row by row.
-    sums: Vec<PixelSums>,
-    /// Cost of a sample of each pixel; 0 where nothing was measured.
-    costs: Vec<f64>,
+    /// Row by row.
+    pixels: Vec<Measured>,
 }
 
 impl<'a> Pilot<'a> {
@@ -113,8 +133,8 @@ impl<'a> Pilot<'a> {
         let spp = (wanted.round() as u32).clamp(PILOT_SPP[0], PILOT_SPP[1]);
         let seed = pcg4d([sampling.seed, PILOT_SEED, 0, 0])[0];
         let bounds = job.world.scene.film.bounds;
-        let (sums, costs) = (vec![PixelSums::default(); bounds.area()], vec![0.0; bounds.area()]);
-        Pilot { job, sampling: (spp, (wanted / f64::from(spp)) as f32, seed), bounds, sums, costs }
+        let pixels = vec![Measured::default(); bounds.area()];
+        Pilot { job, sampling: (spp, (wanted / f64::from(spp)) as f32, seed), bounds, pixels }
     }
 
     /// Samples the tiles whose numbers are chosen. Tiles with the same remainder lie on lattices.
@@ -125,14 +145,21 @@ impl<'a> Pilot<'a> {
         tiles.retain(|t| is_chosen((t.x0 - self.bounds.x0) / COST_TILE + 2 * ((t.y0 - self.bounds.y0) / COST_TILE)));
         let worker = || Worker::new(PathTracer::new(false));
         let of_tile = |worker: &mut _, tile: &_| pilot_tile(&run, worker, tile, self.sampling);
-        let measured: Vec<_> = tiles.par_iter().map_init(worker, of_tile).collect();
-        for (tile, (sums, cost)) in tiles.iter().zip(measured) {
-            for (i, sums) in sums.into_iter().enumerate() {
-                let [x, y] = position(tile, i as u32);
-                let at = (y - self.bounds.y0) as usize * self.bounds.width() as usize + (x - self.bounds.x0) as usize;
-                (self.sums[at], self.costs[at]) = (sums, cost);
+        for tiles in tiles.chunks(TILES_AT_ONCE) {
+            let measured: Vec<_> = tiles.par_iter().map_init(worker, of_tile).collect();
+            for (tile, measured) in tiles.iter().zip(measured) {
+                for (i, measured) in measured.into_iter().enumerate() {
+                    let [x, y] = position(tile, i as u32);
+                    let row = (y - self.bounds.y0) as usize * self.bounds.width() as usize;
+                    self.pixels[row + (x - self.bounds.x0) as usize] = measured;
+                }
             }
         }
+    }
+
+    /// The cost of a sample of each pixel.
+    fn costs(&self) -> Vec<f32> {
+        self.pixels.iter().map(|p| p.cost).collect()
     }
 
     /// The pixels up to `radius` away in each direction.
@@ -146,31 +173,32 @@ impl<'a> Pilot<'a> {
     /// Σ of the variance of a sample over its squared mean plus ε by channel; the mean is that of neighbours, too. `None`
     /// where it is not known.
     fn relative_variance(&self, i: usize) -> Option<f64> {
-        let p = &self.sums[i];
+        let p = &self.pixels[i];
         if p.count < 2 {
             return None;
         }
         let (mut sum, mut count) = ([0.0; 3], 0);
-        for q in self.around(i, 1).map(|q| &self.sums[q]) {
+        for q in self.around(i, 1).map(|q| &self.pixels[q]) {
             count += q.count;
-            (0..3).for_each(|c| sum[c] += q.radiance[c]);
+            (0..3).for_each(|c| sum[c] += f64::from(q.radiance[c]));
         }
-        let variance = p.variance_of_mean();
         let of_channel = |c: usize| {
-            let mean = sum[c] / count as f64;
-            p.count as f64 * variance[c] / (mean * mean + DEFAULT_EPSILON)
+            let mean = sum[c] / f64::from(count);
+            f64::from(p.variance[c]) / (mean * mean + DEFAULT_EPSILON)
         };
         Some((0..3).map(of_channel).sum())
     }
 
     /// v_p: the relative variance, averaged over the chosen ones of the neighbours.
-    fn weights(&self, is_chosen: impl Fn(usize) -> bool + Sync) -> Vec<f64> {
+    fn weights(&self, is_chosen: impl Fn(usize) -> bool + Sync) -> Vec<f32> {
         let area = self.bounds.area();
-        let of_pixels: Vec<Option<f64>> = (0..area).into_par_iter().map(|i| self.relative_variance(i)).collect();
+        // Not a number where it is not known
+        let of_pixel = |i: usize| self.relative_variance(i).map_or(f32::NAN, |v| v as f32);
+        let of_pixels: Vec<f32> = (0..area).into_par_iter().map(of_pixel).collect();
         let smooth = |i: usize| {
-            let known = self.around(i, RADIUS).filter(|&q| is_chosen(q)).filter_map(|q| of_pixels[q]);
-            let (sum, count) = known.fold((0.0, 0), |(s, n), v| (s + v, n + 1));
-            sum / f64::from(count.max(1))
+            let known = self.around(i, RADIUS).filter(|&q| is_chosen(q)).map(|q| of_pixels[q]).filter(|v| !v.is_nan());
+            let (sum, count) = known.fold((0.0, 0), |(s, n), v| (s + f64::from(v), n + 1));
+            (sum / f64::from(count.max(1))) as f32
         };
         (0..area).into_par_iter().map(smooth).collect()
     }
@@ -179,7 +207,7 @@ impl<'a> Pilot<'a> {
     fn gain(&self, spp: u32) -> f64 {
         let width = self.bounds.width() as usize;
         let is_even = |i: usize| (i % width + i / width).is_multiple_of(2);
-        let counts = counts(&self.weights(is_even), &self.costs, spp);
+        let counts = counts(&self.weights(is_even), &self.costs(), spp);
         let odd = (0..counts.len()).filter(|&i| !is_even(i));
         let known = odd.filter_map(|i| Some((self.relative_variance(i)?, f64::from(counts[i]))));
         let (uniform, adaptive) = known.fold((0.0, 0.0), |(u, a), (v, n)| (u + v / f64::from(spp), a + v / n));
@@ -187,13 +215,13 @@ impl<'a> Pilot<'a> {
     }
 }
 
-/// The pilot's samples in a tile, and their mean cost.
+/// What the pilot's samples in a tile say.
 fn pilot_tile(
     run: &Run<'_>,
     worker: &mut Worker<PathTracer>,
     tile: &PixelBounds,
     (spp, fraction, seed): (u32, f32, u32),
-) -> (Vec<PixelSums>, f64) {
+) -> Vec<Measured> {
     let mut sums = vec![PixelAccumulator::default(); tile.area()];
     let is_chosen = |i: &u32| {
         let [x, y] = position(tile, *i);
@@ -201,7 +229,8 @@ fn pilot_tile(
     };
     let chosen: Vec<u32> = (0..tile.area() as u32).filter(is_chosen).collect();
     trace_pixels(run, worker, (tile, &chosen), 0..spp, seed, |i, sample| sums[i as usize].add(0, sample));
-    (sums.iter().map(PixelAccumulator::sums).collect(), cost(&worker.tracer.take_stats()))
+    let cost = cost(&worker.tracer.take_stats());
+    sums.iter().map(|samples| Measured::of(samples, cost)).collect()
 }
 
 /// Mean cost of a camera sample; that of one which hits nothing is 1.
@@ -211,11 +240,12 @@ fn cost(stats: &PathStats) -> f64 {
 }
 
 /// Numbers of samples n ∝ √(v/c), limited to [`RANGE`], of the same cost as `spp` everywhere.
-fn counts(weights: &[f64], costs: &[f64], spp: u32) -> Vec<u32> {
-    let wanted: Vec<f64> = weights.iter().zip(costs).map(|(v, c)| (v / c.max(1.0)).sqrt()).collect();
+fn counts(weights: &[f32], costs: &[f32], spp: u32) -> Vec<u32> {
+    let wanted: Vec<f32> = weights.iter().zip(costs).map(|(v, c)| (v / c.max(1.0)).sqrt()).collect();
     let limit = |n: f64| n.clamp(RANGE[0], RANGE[1]);
-    let cost_of = |factor: f64| wanted.iter().zip(costs).map(|(w, c)| limit(factor * w) * c).sum::<f64>();
-    let all = costs.iter().sum::<f64>();
+    let of_pixel = |factor: f64, (w, c): (&f32, &f32)| limit(factor * f64::from(*w)) * f64::from(*c);
+    let cost_of = |factor: f64| wanted.iter().zip(costs).map(|pixel| of_pixel(factor, pixel)).sum::<f64>();
+    let all = costs.iter().map(|c| f64::from(*c)).sum::<f64>();
     // Bisection of the logarithm; costs rise with the factor
     let (mut low, mut high) = (-60.0_f64, 60.0_f64);
     for _ in 0..60 {
@@ -224,9 +254,9 @@ fn counts(weights: &[f64], costs: &[f64], spp: u32) -> Vec<u32> {
     }
     let factor = low.exp2();
     // Where nothing varies, all pixels have the mean
-    let is_open = |w: &f64| *w > 0.0 && factor.is_finite();
-    let count = |w: &f64| if is_open(w) { limit(factor * w) } else { RANGE[0] };
-    wanted.iter().map(|w| ((count(w) * f64::from(spp)).round() as u32).max(1)).collect()
+    let is_open = |w: f64| w > 0.0 && factor.is_finite();
+    let count = |w: f64| if is_open(w) { limit(factor * w) } else { RANGE[0] };
+    wanted.iter().map(|w| ((count(f64::from(*w)) * f64::from(spp)).round() as u32).max(1)).collect()
 }
 
 #[cfg(test)]
@@ -237,19 +267,19 @@ mod tests {
     #[test]
     fn numbers_of_samples_follow_noise_and_cost_and_keep_the_time() {
         // Two in three pixels have a quarter of the variance of the others, and one of these costs twice as much
-        let weights: Vec<f64> = (0..300).map(|i| if i % 3 == 0 { 4.0 } else { 1.0 }).collect();
-        let costs: Vec<f64> = (0..300).map(|i| if i % 3 == 1 { 2.0 } else { 1.0 }).collect();
+        let weights: Vec<f32> = (0..300).map(|i| if i % 3 == 0 { 4.0 } else { 1.0 }).collect();
+        let costs: Vec<f32> = (0..300).map(|i| if i % 3 == 1 { 2.0 } else { 1.0 }).collect();
         let counts = counts(&weights, &costs, 64);
         assert!((f64::from(counts[0]) / f64::from(counts[2]) - 2.0).abs() < 0.05, "{:?}", &counts[..3]);
         assert!((f64::from(counts[2]) / f64::from(counts[1]) - SQRT_2).abs() < 0.05, "{:?}", &counts[..3]);
-        let time: f64 = counts.iter().zip(&costs).map(|(&n, c)| f64::from(n) * c).sum();
-        let uniform = 64.0 * costs.iter().sum::<f64>();
+        let time: f64 = counts.iter().zip(&costs).map(|(&n, &c)| f64::from(n) * f64::from(c)).sum();
+        let uniform = 64.0 * f64::from(costs.iter().sum::<f32>());
         assert!((time / uniform - 1.0).abs() < 0.01, "{time} {uniform}");
     }
 
     #[test]
     fn no_pixel_has_less_than_half_or_more_than_eight_times_the_mean() {
-        let weights: Vec<f64> = (0..1000).map(|i| if i == 5 { 1e12 } else { f64::from(i % 2) * 1e-9 }).collect();
+        let weights: Vec<f32> = (0..1000_u16).map(|i| if i == 5 { 1e12 } else { f32::from(i % 2) * 1e-9 }).collect();
         let counts = counts(&weights, &[1.0; 1000], 16);
         assert_eq!((counts[5], counts[0]), (128, 8));
         assert!(counts.iter().all(|n| (8..=128).contains(n)));

@@ -1,7 +1,7 @@
 //! Memory that an image takes, predicted before it is rendered.
 //!
 //! A packed pixel takes the bits in which it differs from its neighbours, which only its samples tell. The figures here
-//! are those of one scene at 1 sample, rounded up (docs/measurements/memory.md). How they grow with samples is
+//! are those of one scene at 1 sample (docs/measurements/memory.md). How they grow with samples is
 //! an estimate: a sum needs one more binary digit for twice as many.
 
 use super::cryptomatte::Cryptomatte;
@@ -9,14 +9,14 @@ use super::tiles::replica_edge;
 use super::{RenderSettings, thread_pool};
 use crate::direct::Estimator;
 use crate::film::BAND;
-use crate::imaging::oiio::ROWS_AT_ONCE;
+use crate::imaging::oiio::{ROWS_AT_ONCE, is_loaded};
 use crate::integrators::light_layers;
 use crate::scene::RenderJob;
 
 /// Bytes of a pixel with one sample: radiance and its squares, counts.
-const IMAGE: f64 = 44.0;
+const IMAGE: f64 = 38.0;
 /// Bytes of albedo, normal, depth and indices.
-const FEATURES: f64 = 26.0;
+const FEATURES: f64 = 17.0;
 /// Binary digits that twice as many samples add to both.
 const DIGITS: [f64; 2] = [9.0, 9.0];
 /// Bytes of the replicas of a pixel, of which there are few: exact sums, and numbers.
@@ -35,8 +35,8 @@ const CONTROL: usize = 16;
 const READ: usize = 144 + 24;
 const CHANNELS: usize = 16 * 4;
 /// Bytes of OpenImageIO and the libraries it depends on, of threads with their batches.
-const LIBRARIES: u64 = 150 << 20;
-const THREAD: u64 = 16 << 20;
+const LIBRARIES: u64 = 118 << 20;
+const THREAD: u64 = 8 << 20;
 
 /// What is to be made of a job.
 #[derive(Clone, Copy, Debug)]
@@ -56,7 +56,8 @@ pub struct Prediction {
     pub film: u64,
     /// The rows that are being written.
     pub output: u64,
-    /// What any image takes: libraries, and the batches of threads; and tiles of textures that are not in memory yet.
+    /// What any image takes: libraries, unless they are loaded, and the batches of threads; and tiles of textures that are not
+    /// in memory yet.
     pub fixed: u64,
 }
 
@@ -76,11 +77,12 @@ pub fn predict(job: &RenderJob, wanted: &Wanted<'_>) -> Prediction {
     let pixels = bounds.area() as f64;
     let whole = if wanted.is_denoised { DENOISED } else { 0.0 } + wanted.cryptomattes.len() as f64 * IDS;
     let width = bounds.width() as usize;
+    let libraries = if is_loaded() { 0 } else { LIBRARIES };
     let band = (BAND as usize + 2) * READ * threads + 2 * ROWS_AT_ONCE * CHANNELS;
     Prediction {
         film: (pixels * (share * of_sums(job, render) + whole)) as u64,
         output: (width * band) as u64,
-        fixed: LIBRARIES + THREAD * threads as u64 + job.world.scene.textures.store().map_or(0, |s| s.capacity()),
+        fixed: libraries + THREAD * threads as u64 + job.world.scene.textures.store().map_or(0, |s| s.capacity()),
     }
 }
 

@@ -18,6 +18,7 @@ mod image_tests;
 
 pub use super::file::{ImageError, PartHeader, ReadLimits, Window};
 pub use ocio::{OcioView, ocio_display};
+pub use openimageio_sys::is_loaded;
 pub use part::{MetaValue, Part, Storage};
 pub(super) use read::{Input, read_failure};
 pub use read::{ReadImage, read_headers, read_image, read_metadata, read_part, texture_bytes};

@@ -12,5 +12,5 @@
 mod load;
 mod types;
 
-pub use load::{Api, load};
+pub use load::{Api, is_loaded, load};
 pub use types::*;

@@ -148,9 +148,15 @@ api! {
 /// the executable, the place where it was built, and at last a copy held in the executable, which is
 /// written to the directory for temporary files while it is being opened.
 pub fn load() -> Result<&'static Api, String> {
-    static API: OnceLock<Result<Api, String>> = OnceLock::new();
     API.get_or_init(find).as_ref().map_err(Clone::clone)
 }
+
+/// True if [`load`] has loaded it.
+pub fn is_loaded() -> bool {
+    matches!(API.get(), Some(Ok(_)))
+}
+
+static API: OnceLock<Result<Api, String>> = OnceLock::new();
 
 /// Tries the candidates of [`load`].
 fn find() -> Result<Api, String> {

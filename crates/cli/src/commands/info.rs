@@ -2,7 +2,7 @@
 
 use super::args::SceneArgs;
 use super::info_file::facts_of_file;
-use super::memory::taken;
+use super::memory::{most_taken, taken};
 use super::progress;
 use super::settings::load_job;
 use clap::Args;
@@ -95,7 +95,7 @@ fn facts(job: &RenderJob) -> Value {
             "texture_bytes_in_tiles": scene.textures.store().map_or(0, |s| s.counts().stored),
             "texture_tiles_at_most_bytes": scene.textures.store().map_or(0, |s| s.capacity()),
             "accel_bytes": accel.bytes, "accel_peak_bytes": accel.peak_bytes,
-            "taken_bytes": taken(),
+            "taken_bytes": taken(), "most_taken_bytes": most_taken(),
             "predicted_with_all_layers": predicted(job, true),
             "predicted_without_layers": predicted(job, false),
         },
@@ -104,7 +104,7 @@ fn facts(job: &RenderJob) -> Value {
     })
 }
 
-/// Bytes that rendering will take, beyond what the scene does.
+/// Bytes that rendering will take beyond what the scene does, and at most with it.
 fn predicted(job: &RenderJob, has_layers: bool) -> Value {
     let spp = job.settings().sampling.spp;
     let render =
@@ -112,7 +112,7 @@ fn predicted(job: &RenderJob, has_layers: bool) -> Value {
     let prediction = predict(job, &Wanted { render: &render, cryptomattes: &[], is_denoised: false });
     let pixels = job.world.scene.film.bounds.area().max(1) as u64;
     json!({
-        "bytes": prediction.bytes(), "film_bytes": prediction.film, "film_bytes_per_pixel": prediction.film / pixels,
+        "bytes": prediction.bytes(), "peak_bytes": most_taken().max(taken() + prediction.bytes()), "film_bytes": prediction.film, "film_bytes_per_pixel": prediction.film / pixels,
         "output_bytes": prediction.output, "fixed_bytes": prediction.fixed,
     })
 }

@@ -1,5 +1,6 @@
 //! Memory: what an image will take, and what there is.
 
+use super::progress;
 use anyhow::bail;
 use lumiris::render::memory::Prediction;
 use lumiris::settings::Value;
@@ -36,7 +37,16 @@ pub(super) fn size(bytes: u64) -> String {
 
 /// Refuses an image that does not fit.
 pub(super) fn check(limit: Option<MemoryLimit>, prediction: &Prediction) -> anyhow::Result<()> {
-    let taken = taken();
+    let (taken, most) = (taken(), most_taken());
+    if let Some(MemoryLimit::Bytes(bytes)) = limit
+        && bytes < most
+    {
+        progress::say(&format!(
+            "warning: loading the scene took {}, more than the {} that --memory-limit allows",
+            size(most),
+            size(bytes)
+        ));
+    }
     let (limit, origin) = match limit {
         Some(MemoryLimit::Off) => return Ok(()),
         Some(MemoryLimit::Bytes(bytes)) => (bytes, "--memory-limit allows".to_owned()),
@@ -63,7 +73,16 @@ pub(super) fn check(limit: Option<MemoryLimit>, prediction: &Prediction) -> anyh
 
 /// Bytes that this process takes; 0 where that is not known.
 pub(super) fn taken() -> u64 {
-    fs::read_to_string("/proc/self/status").ok().and_then(|text| kibibytes(&text, "VmRSS:")).unwrap_or(0)
+    of_process("VmRSS:")
+}
+
+/// The most bytes that this process has taken; 0 where that is not known.
+pub(super) fn most_taken() -> u64 {
+    of_process("VmHWM:")
+}
+
+fn of_process(name: &str) -> u64 {
+    fs::read_to_string("/proc/self/status").ok().and_then(|text| kibibytes(&text, name)).unwrap_or(0)
 }
 
 /// Bytes that can be had, and who says so: what the machine has, or what a control group leaves.

@@ -146,6 +146,11 @@ fn info_counts_what_the_scene_holds() {
     assert!(output.status.success(), "{}", stderr(&output));
     let facts: serde_json::Value = serde_json::from_slice(&output.stdout).unwrap();
     assert_eq!(facts["geometry"]["instances"], 8);
+    let memory = |name: &str| facts["memory"][name].as_u64().unwrap();
+    let predicted = |name: &str| facts["memory"]["predicted_with_all_layers"][name].as_u64().unwrap();
+    // Libraries are to be loaded yet, so the peak is still to come
+    assert!(predicted("fixed_bytes") > 100 << 20 && memory("most_taken_bytes") >= memory("taken_bytes"));
+    assert!(predicted("peak_bytes") > memory("most_taken_bytes") && predicted("peak_bytes") > predicted("bytes"));
     // A knot of 576 triangles, four times subdivided, four walls and a lamp of two triangles each.
     assert_eq!(facts["geometry"]["triangles"], 576 * 256 + 5 * 2);
 }
