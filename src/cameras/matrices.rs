@@ -1,20 +1,12 @@
 //! What compositing programs want to know of a camera: the matrices of OpenEXR's standard attributes.
 
-use super::{Camera, CameraBase};
+use super::Camera;
 use lumiris_numbers::math::{Mat4, Vec4};
 
 impl Camera {
-    fn base(&self) -> &CameraBase {
-        match self {
-            Camera::Perspective { base, .. } | Camera::Orthographic { base, .. } | Camera::Spherical { base, .. } => {
-                base
-            }
-        }
-    }
-
-    /// From world space to the space of the camera: x right, y up, z forward.
+    /// From world space to the space of the camera when its motion begins: x right, y up, z forward.
     pub fn camera_from_world(&self) -> Mat4 {
-        Mat4::from(self.base().world_from_camera.inverse())
+        Mat4::from(self.base().world_from_camera[0].inverse())
     }
 
     /// From world space to the image: (0, 0) is its upper left corner, (1, 1) the lower right one, after division by w.

@@ -8,9 +8,11 @@ mod matrices;
 
 use lumiris_lanes::camera::Pinhole;
 use lumiris_numbers::math::sphere_map::{equal_area_square_to_sphere, lat_long_to_sphere, wrap_equal_area_square};
+use lumiris_numbers::math::transform::placement_at;
 use lumiris_numbers::math::warp::sample_uniform_disk_concentric;
 use lumiris_numbers::math::{Affine3A, Ray, Vec2, Vec3};
 use std::f32::consts::PI;
+use std::sync::Arc;
 
 /// A ray from the camera.
 #[derive(Clone, Copy, Debug)]
@@ -35,9 +37,10 @@ pub enum SphericalMapping {
 }
 
 /// What all cameras have.
-#[derive(Clone, Copy, Debug)]
+#[derive(Clone, Debug)]
 pub struct CameraBase {
-    world_from_camera: Affine3A,
+    /// At equidistant times 0..=1, linear between them; one if the camera does not move.
+    world_from_camera: Arc<[Affine3A]>,
     resolution: Vec2,
     shutter: [f32; 2],
 }
@@ -52,7 +55,7 @@ pub struct Lens {
 }
 
 /// A camera.
-#[derive(Clone, Copy, Debug)]
+#[derive(Clone, Debug)]
 pub enum Camera {
     /// Thin lens.
     Perspective {
@@ -95,15 +98,22 @@ pub fn default_screen_window(frame_aspect: f32) -> [f32; 4] {
 impl CameraBase {
     fn new(world_from_camera: Affine3A, resolution: [u32; 2]) -> Self {
         let resolution = Vec2::new(resolution[0].max(1) as f32, resolution[1].max(1) as f32);
-        CameraBase { world_from_camera, resolution, shutter: [0.0, 1.0] }
+        CameraBase { world_from_camera: Arc::new([world_from_camera]), resolution, shutter: [0.0, 1.0] }
     }
 
     /// The ray of a point and a direction of camera space.
     #[inline]
     fn ray(&self, o: Vec3, d: Vec3, time_u: f32) -> Ray {
-        let time = self.shutter[0] + time_u * (self.shutter[1] - self.shutter[0]);
-        let d = self.world_from_camera.transform_vector3(d).normalize();
-        Ray { o: self.world_from_camera.transform_point3(o), d, t_max: f32::INFINITY, time }
+        let time = self.time(time_u);
+        let world_from_camera = placement_at(&self.world_from_camera, time);
+        let d = world_from_camera.transform_vector3(d).normalize();
+        Ray { o: world_from_camera.transform_point3(o), d, t_max: f32::INFINITY, time }
+    }
+
+    /// Time of the number `time_u` in 0..1.
+    #[inline]
+    fn time(&self, time_u: f32) -> f32 {
+        self.shutter[0] + time_u * (self.shutter[1] - self.shutter[0])
     }
 
     /// Film to screen.
@@ -171,32 +181,56 @@ impl Camera {
     /// from 0 to 1. Without this it is open from 0 to 1.
     #[must_use]
     pub fn with_shutter(mut self, open: f32, close: f32) -> Self {
-        match &mut self {
-            Camera::Perspective { base, .. } | Camera::Orthographic { base, .. } | Camera::Spherical { base, .. } => {
-                base.shutter = [open, close];
-            }
-        }
+        self.base_mut().shutter = [open, close];
         self
     }
 
-    /// What makes many rays at once, if the camera has no lens, and the point that they come from.
+    /// The same camera, placed at equidistant times 0..=1, in which instances move from 0 to 1. It moves linearly between
+    /// them. There is at least one.
+    #[must_use]
+    pub fn moving(mut self, world_from_camera: &[Affine3A]) -> Self {
+        self.base_mut().world_from_camera = world_from_camera.into();
+        self
+    }
+
+    /// True if it moves, so that time matters.
+    pub fn is_moving(&self) -> bool {
+        self.base().world_from_camera.len() > 1
+    }
+
+    fn base(&self) -> &CameraBase {
+        match self {
+            Camera::Perspective { base, .. } | Camera::Orthographic { base, .. } | Camera::Spherical { base, .. } => {
+                base
+            }
+        }
+    }
+
+    fn base_mut(&mut self) -> &mut CameraBase {
+        match self {
+            Camera::Perspective { base, .. } | Camera::Orthographic { base, .. } | Camera::Spherical { base, .. } => {
+                base
+            }
+        }
+    }
+
+    /// What makes many rays at once, if the camera has no lens and does not move, and the point that they come from.
     pub fn pinhole(&self) -> Option<(Pinhole, Vec3)> {
         let Camera::Perspective { base, screen_window, tan_half_fov, lens } = self else { return None };
+        let [world_from_camera] = &*base.world_from_camera else { return None };
         let pinhole = Pinhole {
-            world_from_camera: base.world_from_camera.matrix3.into(),
+            world_from_camera: world_from_camera.matrix3.into(),
             resolution: base.resolution,
             screen_window: *screen_window,
             tan_half_fov: *tan_half_fov,
             pixel_area: base.pixel_area(screen_window),
         };
-        (lens.radius <= 0.0).then(|| (pinhole, base.world_from_camera.transform_point3(Vec3::ZERO)))
+        (lens.radius <= 0.0).then(|| (pinhole, world_from_camera.transform_point3(Vec3::ZERO)))
     }
 
     /// Time of the number `time_u` in 0..1.
     pub fn time(&self, time_u: f32) -> f32 {
-        let (Camera::Perspective { base, .. } | Camera::Orthographic { base, .. } | Camera::Spherical { base, .. }) =
-            self;
-        base.shutter[0] + time_u * (base.shutter[1] - base.shutter[0])
+        self.base().time(time_u)
     }
 
     /// The ray of the raster point `film_xy`, through the point `u_lens` of the lens, at `time_u` of the shutter
@@ -215,7 +249,7 @@ impl Camera {
             Camera::Orthographic { base, screen_window, lens } => {
                 let o = base.screen_point(screen_window, film_xy).extend(0.0);
                 let (o, d) = lens.through(o, Vec3::Z, u_lens);
-                let m = &base.world_from_camera.matrix3;
+                let m = placement_at(&base.world_from_camera, base.time(time_u)).matrix3;
                 let scale = m.x_axis.cross(m.y_axis).length();
                 let width0 = (base.pixel_area(screen_window) * scale).sqrt();
                 CameraRay { ray: base.ray(o, d, time_u), spread: 0.0, width0, weight: 1.0 }
@@ -406,6 +440,19 @@ mod tests {
         near(d(EqualArea, 50.0, 100.0), Vec3::Z);
         // Filters reach over the edge.
         assert!((d(EqualArea, -0.5, 20.0) - d(EqualArea, 0.5, 80.0)).length() < 1e-5);
+    }
+
+    #[test]
+    fn a_moving_camera_is_where_its_time_says() {
+        let samples = [0.0, 1.0, 4.0].map(|x| Affine3A::from_translation(Vec3::X * x));
+        let camera = perspective(Affine3A::IDENTITY, 50.0, PINHOLE);
+        assert!(!camera.is_moving() && camera.pinhole().is_some());
+        let camera = camera.moving(&samples).with_shutter(0.5, 1.0);
+        assert!(camera.is_moving() && camera.pinhole().is_none());
+        let o = |u| camera.ray(Vec2::new(100.0, 50.0), [0.5; 2], u).ray.o;
+        near(o(0.0), Vec3::X);
+        near(o(0.5), Vec3::X * 2.5);
+        near(o(1.0), Vec3::X * 4.0);
     }
 
     #[test]

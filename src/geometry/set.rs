@@ -4,6 +4,7 @@
 //! nest.
 
 use super::{Shape, SurfaceHit};
+use lumiris_numbers::math::transform::placement_at;
 use lumiris_numbers::math::{Affine3A, Bounds3, Ray, Vec3};
 use rayon::prelude::*;
 
@@ -59,17 +60,7 @@ pub struct Instance {
 impl Instance {
     /// Placement at `time` in 0..=1.
     pub fn world_from_group_at(&self, time: f32) -> Affine3A {
-        let last = self.world_from_group.len() - 1;
-        if last == 0 {
-            return self.world_from_group[0];
-        }
-        let x = time.clamp(0.0, 1.0) * last as f32;
-        let i = (x as usize).min(last - 1);
-        lumiris_numbers::math::transform::lerp_affine(
-            &self.world_from_group[i],
-            &self.world_from_group[i + 1],
-            x - i as f32,
-        )
+        placement_at(&self.world_from_group, time)
     }
 }
 

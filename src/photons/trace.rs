@@ -18,9 +18,9 @@ use super::walk::{Arrival, Particle, WalkSettings, Walker};
 use crate::bsdfs::dielectric::Transport;
 use crate::lights::LightSet;
 use crate::scene::RenderJob;
+use lumiris_numbers::math::Ray;
 use lumiris_numbers::math::hash::pcg4d;
 use lumiris_numbers::math::ray::offset_origin;
-use lumiris_numbers::math::{Ray, Vec2};
 use rayon::prelude::*;
 use std::ops::Range;
 use std::sync::atomic::{AtomicBool, Ordering};
@@ -329,9 +329,7 @@ impl<'a> Run<'a> {
         let s = scene.lights.lights[light as usize].sample_le(sphere, [p0, p1], [d0, d1])?;
         let o = if s.n == glam::Vec3::ZERO { s.p } else { offset_origin(s.p, s.p_error, s.n, s.d) };
         let [u_time] = stream.domain(domain::TIME).draw::<1>();
-        // The camera knows its shutter
-        let time = scene.camera.ray(Vec2::splat(0.5), [0.5; 2], u_time).ray.time;
-        let ray = Ray { o, d: s.d, t_max: f32::INFINITY, time };
+        let ray = Ray { o, d: s.d, t_max: f32::INFINITY, time: scene.camera.time(u_time) };
         Some(Particle::new(index, ray, s.power / pmf, Origin::Primary(light), stream))
     }
 

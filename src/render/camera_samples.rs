@@ -66,7 +66,8 @@ pub(super) struct Scratch {
 
 impl<'a> CameraSampler<'a> {
     pub(super) fn new(job: &'a RenderJob, first_sample: u32) -> Self {
-        let (scene, has_motion) = (&job.world.scene, job.world.scene.geometry.has_motion());
+        let scene = &job.world.scene;
+        let has_motion = scene.geometry.has_motion() || scene.camera.is_moving();
         let pinhole = if has_motion { None } else { scene.camera.pinhole() };
         let settings = job.settings();
         let estimator = Estimator::at_vertex(&settings.integrator, 0);

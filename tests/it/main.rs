@@ -14,6 +14,7 @@ mod irradiance_cache;
 mod layering;
 mod light_groups;
 mod media;
+mod motion;
 mod mutations;
 mod path_reuse;
 mod photon_map;

@@ -147,6 +147,8 @@ pub struct ObjectDesc {
     pub name: String,
     /// Where it is named.
     pub span: Span,
+    /// Objects that it holds, placed in its space.
+    pub instances: Vec<InstanceDesc>,
 }
 
 /// A placement of an object.

@@ -158,15 +158,11 @@ impl Builder<'_> {
         }
         let index = self.objects.len();
         self.object_names.insert(name.text.clone(), index);
-        self.objects.push(ObjectDesc { name: name.text, span: name.span });
+        self.objects.push(ObjectDesc { name: name.text, span: name.span, instances: Vec::new() });
         self.current_object = Some(index);
     }
 
     fn object_instance(&mut self, name: &Name, span: Span, diagnostics: &mut Diagnostics) {
-        if self.current_object.is_some() {
-            diagnostics.error(span, "an object cannot contain an instance");
-            return;
-        }
         let Some(&object) = self.object_names.get(&name.text) else {
             let message = format!("unknown object `{}`", name.text);
             let near = did_you_mean(&name.text, self.object_names.keys().map(String::as_str)).map(str::to_owned);
@@ -176,7 +172,14 @@ impl Builder<'_> {
             }
             return;
         };
-        self.instances.push(InstanceDesc { object, ctm: self.state.ctm });
+        let instance = InstanceDesc { object, ctm: self.state.ctm };
+        match self.current_object {
+            Some(current) if current == object => {
+                diagnostics.error(span, format!("the object `{}` cannot contain itself", name.text));
+            }
+            Some(current) => self.objects[current].instances.push(instance),
+            None => self.instances.push(instance),
+        }
     }
 
     fn pop(&mut self) {

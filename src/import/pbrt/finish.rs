@@ -1,12 +1,13 @@
 //! The end of an import: reads all files in parallel, and assembles the scene in the order of its text.
 
 use super::descriptions::{AreaLightDesc, ShapeDesc};
+use super::instances::Objects;
 use super::lights::power_factor;
 use super::media::MediaInUse;
 use super::options::ParsedOptions;
 use super::shapes::{Made, ShapeError};
 use super::state::Builder;
-use crate::geometry::{Geometry, GeometryId, GeometrySet, Group, Instance, Shape, Visibility};
+use crate::geometry::{Geometry, GeometryId, GeometrySet, Group, GroupId, Instance, Shape, Visibility};
 use crate::imaging::oiio::ImageError;
 use crate::import::cache::FileCache;
 use crate::import::images::RgbImage;
@@ -17,7 +18,7 @@ use crate::scene::{Scene, Surface};
 use crate::settings::Settings;
 use lumiris_formats::diagnostic::Diagnostics;
 use lumiris_formats::ply::PlyMesh;
-use lumiris_numbers::math::Rgb;
+use lumiris_numbers::math::{Affine3A, Rgb};
 use rayon::prelude::*;
 use std::collections::{BTreeSet, HashMap};
 use std::path::{Path, PathBuf};
@@ -35,6 +36,8 @@ struct Assembly {
     /// Images that area lights emit.
     images: HashMap<PathBuf, Arc<EmissionImage>>,
     media: MediaInUse,
+    /// By object, what moves within: groups with their placements.
+    moving: Vec<Vec<(GroupId, Vec<Affine3A>)>>,
 }
 
 impl Builder<'_> {
@@ -69,6 +72,7 @@ impl Builder<'_> {
         self.add_interiors(&mut media, &shapes, d);
         let mut assembly = Assembly { shutter, images, media, ..Assembly::default() };
         assembly.set.groups.resize_with(self.objects.len(), Group::default);
+        assembly.moving.resize_with(self.objects.len(), Vec::new);
         for (desc, made) in shapes.iter().zip(made) {
             let material = self.material_of(&desc.material, d);
             match (made, material) {
@@ -85,11 +89,11 @@ impl Builder<'_> {
                 (Ok(_), None) => {}
             }
         }
-        for instance in &self.instances {
-            assembly
-                .set
-                .instances
-                .push(Instance { group: instance.object as u32, world_from_group: instance.ctm.samples(shutter) });
+        match (Objects { objects: &self.objects, moving: &assembly.moving, shutter }).place(&self.instances) {
+            Ok(instances) => assembly.set.instances.extend(instances),
+            Err(reason) => {
+                d.error_without_place(reason);
+            }
         }
         if d.has_errors() {
             return None;
@@ -144,7 +148,7 @@ impl Builder<'_> {
                     None
                 }
                 (None, true) => {
-                    d.warning_once(light.span, "moving area lights are not rendered yet: the shape is dark");
+                    d.warning_once(light.span, "moving area lights are not rendered, as in pbrt-v4: the shape is dark");
                     None
                 }
                 (None, false) if passes && !assembly.media.set.is_empty() => {
@@ -164,15 +168,15 @@ impl Builder<'_> {
         }
         match (desc.object, moving) {
             (Some(object), false) => assembly.set.groups[object].geometries.extend(ids),
-            (Some(object), true) => {
-                d.warning_once(desc.span, "motion inside an object is not rendered yet: it stays where it starts");
-                assembly.set.groups[object].geometries.extend(ids);
-            }
             (None, false) => assembly.set.root.geometries.extend(ids),
-            (None, true) => {
+            (object, true) => {
                 let group = assembly.set.groups.len() as u32;
                 assembly.set.groups.push(Group { geometries: ids });
-                assembly.set.instances.push(Instance { group, world_from_group: desc.ctm.samples(assembly.shutter) });
+                let world_from_group = desc.ctm.samples(assembly.shutter);
+                match object {
+                    Some(object) => assembly.moving[object].push((group, world_from_group)),
+                    None => assembly.set.instances.push(Instance { group, world_from_group }),
+                }
             }
         }
     }

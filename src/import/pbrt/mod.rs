@@ -13,6 +13,7 @@ pub mod film;
 pub mod finish;
 mod hair;
 mod image_lights;
+mod instances;
 pub mod lights;
 pub mod materials;
 pub mod media;

@@ -136,9 +136,6 @@ impl Options {
             let camera = Camera::perspective(affine(&Ctm::IDENTITY.start), 90.0, window, resolution, 0.0, 1e6);
             return Some((camera, [0.0, 1.0], 1.0));
         };
-        if ctm.is_moving() {
-            d.warning_once(name.span, "moving cameras are not rendered yet: it stays where it starts");
-        }
         let world_from_camera = affine(&ctm.start.inverse());
         let open = params.float("shutteropen", d).unwrap_or(0.0);
         let close = params.float("shutterclose", d).unwrap_or(1.0);
@@ -186,7 +183,8 @@ impl Options {
             }
         };
         params.report_unused(d);
-        Some((camera?, frame.shutter, close - open))
+        let camera = camera?.moving(&ctm.inverse().samples(frame.shutter));
+        Some((camera, frame.shutter, close - open))
     }
 }
 

@@ -185,7 +185,7 @@ impl<'a> Builder<'a> {
     /// The current transformation of something that cannot move; a motion is reported and left out.
     pub fn still_transform(&self, what: &str, span: Span, diagnostics: &mut Diagnostics) -> Affine3A {
         if self.state.ctm.is_moving() {
-            diagnostics.warning_once(span, format!("moving {what} are not rendered yet: it stays where it starts"));
+            diagnostics.warning_once(span, format!("moving {what} are not rendered: it stays where it starts"));
         }
         affine(&self.state.ctm.start)
     }

@@ -26,6 +26,27 @@ pub fn lerp_affine(a: &Affine3A, b: &Affine3A, t: f32) -> Affine3A {
     Affine3A { matrix3: a.matrix3 * s + b.matrix3 * t, translation: a.translation * s + b.translation * t }
 }
 
+/// The placement at `time` in 0..=1 of something that has `samples` at equidistant times, and moves linearly between them. There
+/// is at least one sample.
+#[inline]
+pub fn placement_at(samples: &[Affine3A], time: f32) -> Affine3A {
+    let last = samples.len() - 1;
+    if last == 0 {
+        return samples[0];
+    }
+    let x = time.clamp(0.0, 1.0) * last as f32;
+    let i = (x as usize).min(last - 1);
+    lerp_affine(&samples[i], &samples[i + 1], x - i as f32)
+}
+
+/// The placements of something that moves within something that moves. Between samples the product of both is no longer linear, so there
+/// are as many as the finer motion has.
+pub fn compose_placements(outer: &[Affine3A], inner: &[Affine3A]) -> Vec<Affine3A> {
+    let count = outer.len().max(inner.len());
+    let time = |i: usize| if count == 1 { 0.0 } else { i as f32 / (count - 1) as f32 };
+    (0..count).map(|i| placement_at(outer, time(i)) * placement_at(inner, time(i))).collect()
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -38,6 +59,20 @@ mod tests {
         assert!(n2.dot(m.transform_vector3(t)).abs() < 1e-6);
         assert!(n2.dot(m.transform_vector3(n)) > 0.0);
         assert!(swaps_handedness(&m));
+    }
+
+    #[test]
+    fn motions_within_motions_are_products_at_the_times_of_the_finer() {
+        let moves = |steps: usize| -> Vec<Affine3A> {
+            (0..=steps).map(|i| Affine3A::from_translation(Vec3::X * (i as f32 / steps as f32))).collect()
+        };
+        let turned = Affine3A::from_rotation_z(std::f32::consts::FRAC_PI_2);
+        let made = compose_placements(&moves(1), &moves(4));
+        assert_eq!(made.len(), 5);
+        assert_eq!(placement_at(&made, 0.375).translation.x, 0.75);
+        let made = compose_placements(&[turned], &moves(2));
+        assert!((placement_at(&made, 0.5).transform_point3(Vec3::ZERO) - Vec3::Y * 0.5).length() < 1e-6);
+        assert_eq!(compose_placements(&[turned], &[turned]).len(), 1);
     }
 
     #[test]

@@ -1,0 +1,50 @@
+//! Placements of objects, and of what moves or is placed inside of them.
+
+use super::descriptions::{InstanceDesc, ObjectDesc};
+use crate::geometry::{GroupId, Instance};
+use lumiris_numbers::math::Affine3A;
+use lumiris_numbers::math::transform::compose_placements;
+
+/// Most placements of groups in a scene.
+pub(super) const MAX_INSTANCES: u64 = 100_000_000;
+
+/// The objects of a scene. What stands still in one is a group with the object's index.
+pub(super) struct Objects<'a> {
+    /// Objects; each holds only those before it.
+    pub objects: &'a [ObjectDesc],
+    /// By object, what moves within: groups with their placements.
+    pub moving: &'a [Vec<(GroupId, Vec<Affine3A>)>],
+    /// Opening and closing of the shutter as fractions of the motion.
+    pub shutter: [f32; 2],
+}
+
+impl Objects<'_> {
+    /// The placements of groups that these of objects make; `Err` if they are too many.
+    pub(super) fn place(&self, instances: &[InstanceDesc]) -> Result<Vec<Instance>, String> {
+        let mut sizes: Vec<u64> = Vec::new();
+        for (object, moving) in self.objects.iter().zip(self.moving) {
+            let nested = object.instances.iter().map(|i| sizes[i.object]).fold(0, u64::saturating_add);
+            sizes.push(nested.saturating_add(1 + moving.len() as u64));
+        }
+        let all = instances.iter().map(|i| sizes[i.object]).fold(0, u64::saturating_add);
+        if all > MAX_INSTANCES {
+            return Err(format!("objects within objects make {all} instances; at most {MAX_INSTANCES} are"));
+        }
+        let mut placed = Vec::with_capacity(all as usize);
+        for instance in instances {
+            self.place_one(instance.object, instance.ctm.samples(self.shutter), &mut placed);
+        }
+        Ok(placed)
+    }
+
+    fn place_one(&self, object: usize, placement: Vec<Affine3A>, placed: &mut Vec<Instance>) {
+        for (group, within) in &self.moving[object] {
+            placed.push(Instance { group: *group, world_from_group: compose_placements(&placement, within) });
+        }
+        for instance in &self.objects[object].instances {
+            let within = instance.ctm.samples(self.shutter);
+            self.place_one(instance.object, compose_placements(&placement, &within), placed);
+        }
+        placed.push(Instance { group: object as GroupId, world_from_group: placement });
+    }
+}
