@@ -10,12 +10,12 @@ impl Camera {
     }
 
     /// From world space to the image: (0, 0) is its upper left corner, (1, 1) the lower right one, after division by w.
-    /// A spherical camera has no such matrix.
+    /// Spherical cameras have no such matrix, and those with lenses none that is exact.
     pub fn ndc_from_world(&self) -> Option<Mat4> {
         let (window, scale, is_perspective) = match self {
             Camera::Perspective { screen_window, tan_half_fov, .. } => (screen_window, *tan_half_fov, true),
             Camera::Orthographic { screen_window, .. } => (screen_window, 1.0, false),
-            Camera::Spherical { .. } => return None,
+            Camera::Spherical { .. } | Camera::Realistic { .. } => return None,
         };
         let [x0, x1, y0, y1] = *window;
         // x = (screen x − x0) / (x1 − x0), where screen x = camera x / (scale · w), and w is camera z or 1

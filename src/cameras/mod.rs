@@ -4,8 +4,10 @@
 //! coordinates have their origin at the upper left, one unit per pixel, y down. The screen window `[x0, x1, y0, y1]` is
 //! the part of the screen covered by the film; by default it spans −1..1 on the shorter axis.
 
+mod lens_system;
 mod matrices;
 
+pub use lens_system::{Aperture, LensElement, LensSystem};
 use lumiris_lanes::camera::Pinhole;
 use lumiris_numbers::math::sphere_map::{equal_area_square_to_sphere, lat_long_to_sphere, wrap_equal_area_square};
 use lumiris_numbers::math::transform::placement_at;
@@ -83,6 +85,15 @@ pub enum Camera {
         base: CameraBase,
         /// Mapping of the film.
         mapping: SphericalMapping,
+    },
+    /// A film behind lenses.
+    Realistic {
+        /// Common part.
+        base: CameraBase,
+        /// Width and height of the film (m).
+        film_size: Vec2,
+        /// Lenses.
+        lens: Arc<LensSystem>,
     },
 }
 
@@ -177,6 +188,13 @@ impl Camera {
         Camera::Spherical { base: CameraBase::new(world_from_camera, resolution), mapping }
     }
 
+    /// A camera whose film, with a diagonal (m), lies behind lenses.
+    pub fn realistic(world_from_camera: Affine3A, resolution: [u32; 2], diagonal: f32, lens: LensSystem) -> Self {
+        let base = CameraBase::new(world_from_camera, resolution);
+        let film_size = base.resolution * (diagonal / base.resolution.length());
+        Camera::Realistic { base, film_size, lens: Arc::new(lens) }
+    }
+
     /// The same camera with a shutter that is open from `open` to `close`, in the unit of time in which instances move
     /// from 0 to 1. Without this it is open from 0 to 1.
     #[must_use]
@@ -200,17 +218,19 @@ impl Camera {
 
     fn base(&self) -> &CameraBase {
         match self {
-            Camera::Perspective { base, .. } | Camera::Orthographic { base, .. } | Camera::Spherical { base, .. } => {
-                base
-            }
+            Camera::Perspective { base, .. }
+            | Camera::Orthographic { base, .. }
+            | Camera::Spherical { base, .. }
+            | Camera::Realistic { base, .. } => base,
         }
     }
 
     fn base_mut(&mut self) -> &mut CameraBase {
         match self {
-            Camera::Perspective { base, .. } | Camera::Orthographic { base, .. } | Camera::Spherical { base, .. } => {
-                base
-            }
+            Camera::Perspective { base, .. }
+            | Camera::Orthographic { base, .. }
+            | Camera::Spherical { base, .. }
+            | Camera::Realistic { base, .. } => base,
         }
     }
 
@@ -268,6 +288,13 @@ impl Camera {
                 };
                 let d = Vec3::new(d.x, d.z, d.y);
                 CameraRay { ray: base.ray(Vec3::ZERO, d, time_u), spread: solid_angle.sqrt(), width0: 0.0, weight: 1.0 }
+            }
+            Camera::Realistic { base, film_size, lens } => {
+                // The film sees the scene upside down and mirrored: its upper left corner is at the lower right
+                let p = (film_xy / base.resolution - 0.5) * *film_size * Vec2::new(-1.0, 1.0);
+                let s = lens.sample(p, u_lens);
+                let spread = lens.spread(p) * film_size.x / base.resolution.x;
+                CameraRay { ray: base.ray(s.o, s.d, time_u), spread, width0: 0.0, weight: s.weight }
             }
         }
     }

@@ -12,6 +12,7 @@ mod image_hashes;
 mod image_lights;
 mod irradiance_cache;
 mod layering;
+mod lenses;
 mod light_groups;
 mod media;
 mod motion;

@@ -115,6 +115,16 @@ pub fn parse_i32(bytes: &[u8]) -> Result<(i32, usize), NumberError> {
     i32::try_from(value).map(|v| (v, i)).map_err(|_| NumberError::Overflow)
 }
 
+/// The numbers of a text file: between blanks or commas, with comments after `#`.
+pub fn numbers_of_text(text: &str) -> Result<Vec<f32>, String> {
+    let words = text.lines().flat_map(|line| line.split('#').next().unwrap_or("").split([' ', '\t', '\r', ',']));
+    let number = |word: &str| match parse_f32(word.as_bytes()) {
+        Ok((value, length)) if length == word.len() => Ok(value),
+        _ => Err(format!("`{}` is no number", word.chars().take(40).collect::<String>())),
+    };
+    words.filter(|word| !word.is_empty()).map(number).collect()
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;

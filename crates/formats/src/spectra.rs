@@ -8,7 +8,7 @@
 //!   `scale` or `power`, and its spectrum determines only the colour;
 //! - η(λ), k(λ) of a conductor: see [`conductor_rgb`].
 
-use super::number::parse_f32;
+use super::number::numbers_of_text;
 use super::spectra_data as data;
 use lumiris_numbers::math::Rgb;
 use std::path::Path;
@@ -58,15 +58,7 @@ impl Spectrum {
 
     /// From the text of an `.spd` file: pairs, with comments after `#`.
     pub fn from_text(text: &str) -> Result<Self, String> {
-        let words = text.lines().flat_map(|line| line.split('#').next().unwrap_or("").split([' ', '\t', '\r', ',']));
-        let numbers: Result<Vec<f32>, String> = words
-            .filter(|word| !word.is_empty())
-            .map(|word| match parse_f32(word.as_bytes()) {
-                Ok((value, _)) => Ok(value),
-                Err(_) => Err(format!("`{}` is no number", word.chars().take(40).collect::<String>())),
-            })
-            .collect();
-        Spectrum::from_pairs(&numbers?)
+        Spectrum::from_pairs(&numbers_of_text(text)?)
     }
 
     /// Reads an `.spd` file.

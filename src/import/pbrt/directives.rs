@@ -43,7 +43,8 @@ impl Visitor for Builder<'_> {
             D::ColorSpace(name) => self.color_space(&name, diagnostics),
             D::Camera(name) => {
                 self.coordinate_systems.insert("camera".to_owned(), self.state.ctm.inverse());
-                self.options.camera(name, params, self.state.ctm, self.state.media.outside.clone());
+                let place = (self.state.ctm, self.folder.as_path());
+                self.options.camera(name, params, place, self.state.media.outside.clone());
             }
             D::Film(name) => self.options.film(name, params),
             D::Sampler(name) => self.options.sampler(name, params),

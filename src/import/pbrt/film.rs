@@ -13,13 +13,21 @@ use lumiris_formats::pbrt::params::{ParamSet, ParamType, Values};
 use lumiris_formats::source::Span;
 use lumiris_numbers::math::Mat3;
 
-/// Understands `Film` and `PixelFilter`: the film, and the factor that its sensor's ISO gives.
+/// What a film's sensor says of its exposure.
+pub(super) struct Sensor {
+    /// Factor by its ISO and scale.
+    pub(super) scale: f32,
+    /// Diagonal, which matters to realistic cameras (mm).
+    pub(super) diagonal: f32,
+}
+
+/// Understands `Film` and `PixelFilter`.
 pub(super) fn finish_film(
     pending: Option<&Pending>,
     filter: Option<&Pending>,
     load: &LoadOptions,
     d: &mut Diagnostics,
-) -> (FilmSettings, f32) {
+) -> (FilmSettings, Sensor) {
     let filter = finish_filter(filter, d);
     let mut film = FilmSettings {
         resolution: load.resolution.unwrap_or([1280, 720]),
@@ -31,7 +39,7 @@ pub(super) fn finish_film(
     };
     let mut crop = [0.0, 1.0, 0.0, 1.0];
     let mut pixel_bounds = None;
-    let mut scale = 1.0;
+    let mut sensor = Sensor { scale: 1.0, diagonal: 35.0 };
     if let Some(Pending { name, params: p }) = pending {
         film_kind(name, d);
         let mut size = |key: &'static str, default: u32| match p.integer(key, d) {
@@ -61,11 +69,10 @@ pub(super) fn finish_film(
             }
         }
         pixel_bounds = read_pixel_bounds(p, d);
-        (scale, film.balance) = sensor(p, d);
-        // The sensor's diagonal matters to realistic cameras; half-floats and splits of the file do not to us.
-        for key in
-            ["diagonal", "savefp16", "maxcomponentvalue", "coordinatesystem", "nbuckets", "lambdamin", "lambdamax"]
-        {
+        (sensor.scale, film.balance) = exposure(p, d);
+        sensor.diagonal = positive(p, "diagonal", sensor.diagonal, d);
+        // Half-floats and splits of the file do not matter to us
+        for key in ["savefp16", "maxcomponentvalue", "coordinatesystem", "nbuckets", "lambdamin", "lambdamax"] {
             if p.ignore(key) && key == "maxcomponentvalue" {
                 d.warning_once(p.span_of(key), "maxcomponentvalue is ignored: clamping would darken the image");
             }
@@ -81,7 +88,7 @@ pub(super) fn finish_film(
         let span = pending.map_or_else(Span::default, |f| f.name.span);
         d.error(span, "the crop window holds no pixel");
     }
-    (film, scale)
+    (film, sensor)
 }
 
 fn finish_filter(pending: Option<&Pending>, d: &mut Diagnostics) -> PixelFilter {
@@ -139,7 +146,7 @@ fn film_kind(name: &Name, d: &mut Diagnostics) {
 }
 
 /// The factor that a sensor's ISO gives, and its white balance; exposure time is the camera's.
-fn sensor(p: &ParamSet, d: &mut Diagnostics) -> (f32, Option<Mat3>) {
+fn exposure(p: &ParamSet, d: &mut Diagnostics) -> (f32, Option<Mat3>) {
     if p.string("sensor", d).is_some_and(|s| s != "cie1931") {
         d.warning_once(
             p.span_of("sensor"),

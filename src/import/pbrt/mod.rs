@@ -14,6 +14,7 @@ pub mod finish;
 mod hair;
 mod image_lights;
 mod instances;
+mod lenses;
 pub mod lights;
 pub mod materials;
 pub mod media;

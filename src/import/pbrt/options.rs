@@ -4,6 +4,7 @@
 use super::checks::{positive, unknown};
 use super::descriptions::Pending;
 use super::film::finish_film;
+use super::lenses::{self, realistic};
 use super::settings::{finish_integrator, finish_sampler};
 use super::transform::{Ctm, affine};
 use crate::cameras::{Camera, SphericalMapping, default_screen_window};
@@ -14,12 +15,15 @@ use lumiris_formats::diagnostic::Diagnostics;
 use lumiris_formats::pbrt::directive::Name;
 use lumiris_formats::pbrt::params::ParamSet;
 use lumiris_formats::source::Span;
+use std::path::{Path, PathBuf};
 
 /// The options as far as they were read.
 #[derive(Default)]
 pub struct Options {
     camera: Option<(Pending, Ctm)>,
     camera_medium: Option<Name>,
+    /// Where the files of the camera are.
+    folder: PathBuf,
     film: Option<Pending>,
     filter: Option<Pending>,
     sampler: Option<Pending>,
@@ -57,9 +61,16 @@ impl Options {
     }
 
     /// `Camera`; a second one replaces the first, as do the others.
-    pub fn camera(&mut self, name: Name, params: ParamSet, ctm: Ctm, medium: Option<Name>) {
+    pub fn camera(&mut self, name: Name, params: ParamSet, (ctm, folder): (Ctm, &Path), medium: Option<Name>) {
         self.camera = Some((Pending { name, params }, ctm));
+        self.folder = folder.to_owned();
         self.camera_medium = medium;
+    }
+
+    /// The files that the camera names.
+    pub fn camera_files(&self) -> Vec<PathBuf> {
+        let camera = self.camera.as_ref().filter(|(pending, _)| pending.name.text == "realistic");
+        camera.map_or_else(Vec::new, |(pending, _)| lenses::files(&pending.params, &self.folder))
     }
 
     /// The medium around the camera.
@@ -119,17 +130,22 @@ impl Options {
 
     /// Parses all options.
     pub fn finish(&self, load: &LoadOptions, d: &mut Diagnostics) -> Option<ParsedOptions> {
-        let (film, exposure_scale) = finish_film(self.film.as_ref(), self.filter.as_ref(), load, d);
+        let (film, sensor) = finish_film(self.film.as_ref(), self.filter.as_ref(), load, d);
         let mut settings = Settings::default();
         settings.sampling.seed = self.seed.unwrap_or(settings.sampling.seed);
         finish_sampler(self.sampler.as_ref(), &mut settings, d);
         finish_integrator(self.integrator.as_ref(), &mut settings, d);
-        let (camera, shutter, seconds) = self.finish_camera(film.resolution, d)?;
-        let film = FilmSettings { scale: exposure_scale * seconds, ..film };
+        let (camera, shutter, seconds) = self.finish_camera(film.resolution, sensor.diagonal, d)?;
+        let film = FilmSettings { scale: sensor.scale * seconds, ..film };
         Some(ParsedOptions { camera, film, settings, shutter })
     }
 
-    fn finish_camera(&self, resolution: [u32; 2], d: &mut Diagnostics) -> Option<(Camera, [f32; 2], f32)> {
+    fn finish_camera(
+        &self,
+        resolution: [u32; 2],
+        diagonal: f32,
+        d: &mut Diagnostics,
+    ) -> Option<(Camera, [f32; 2], f32)> {
         let Some((Pending { name, params }, ctm)) = &self.camera else {
             let aspect = resolution[0] as f32 / resolution[1] as f32;
             let window = default_screen_window(aspect);
@@ -172,13 +188,10 @@ impl Options {
                 };
                 Some(Camera::spherical(world_from_camera, resolution, mapping))
             }
-            "realistic" => {
-                d.error(name.span, "camera `realistic` is not rendered yet")
-                    .help("use perspective with lensradius and focaldistance");
-                return None;
-            }
+            "realistic" => realistic(params, &self.folder, diagonal / 1000.0, d)
+                .map(|lens| Camera::realistic(world_from_camera, resolution, diagonal / 1000.0, lens)),
             other => {
-                unknown(other, name.span, "camera", &["perspective", "orthographic", "spherical"], d);
+                unknown(other, name.span, "camera", &["perspective", "orthographic", "realistic", "spherical"], d);
                 return None;
             }
         };

@@ -179,6 +179,7 @@ impl<'a> Builder<'a> {
         files.extend(self.environments.iter().map(|e| e.path.clone()));
         files.extend(self.emission_images.iter().cloned());
         files.extend(self.resources.paths().map(Path::to_path_buf));
+        files.extend(self.options.camera_files());
         files
     }
 

@@ -1,0 +1,345 @@
+//! Systems of spherical lenses, traced surface by surface [Kolb et al. 1995].
+//!
+//! The film lies in the plane z = 0, the scene is at greater z. Lengths are metres, as in pbrt-v4. Directions of a point of the film are chosen
+//! in the *exit pupil*: the part of the plane of the rear surface's vertex that light leaves through, seen from that point. Its
+//! bounds are found in advance for rings of the film. The measured quantity is irradiance
+//! E = ∫ L cos⁴θ / s² dA over the pupil, where s is the distance of the plane.
+
+use lumiris_numbers::math::{DVec2, DVec3, Vec2, Vec3};
+use rayon::prelude::*;
+use std::f64::consts::{FRAC_PI_4, PI};
+
+/// Rings of the film that have an exit pupil each.
+const RINGS: usize = 64;
+/// Points along each edge of the square that is searched for an exit pupil, and places in a ring.
+const SEARCH: [usize; 2] = [96, 3];
+/// Half that square's edge, relative to the radius of the rear surface.
+const SEARCHED: f64 = 1.5;
+
+/// A surface of a lens system.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct LensElement {
+    /// Radius of curvature (m): positive where the centre is on the side of the film, 0 for the aperture stop.
+    pub curvature_radius: f64,
+    /// Distance to the next surface on the side of the film (m).
+    pub thickness: f64,
+    /// Index of refraction of what is between them; 0 and 1 are air.
+    pub eta: f64,
+    /// Radius of the opening (m).
+    pub aperture_radius: f64,
+}
+
+/// What the stop lets through, within its radius.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub enum Aperture {
+    /// Everything.
+    #[default]
+    Circle,
+    /// Less towards the edge.
+    Gaussian,
+    /// What is in a star-shaped polygon around the centre: its corners, in order.
+    Polygon(Vec<[f64; 2]>),
+    /// What an image says: its texels over −1..1 in both directions, rows from the top.
+    Image(Vec<f32>, [usize; 2]),
+}
+
+/// A ray that has left the lenses.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct LensRay {
+    /// Origin, on the front surface (m).
+    pub o: Vec3,
+    /// Unit direction.
+    pub d: Vec3,
+    /// cos⁴θ/s² over the density of the point of the pupil, times what the stop lets through; 0 where the lenses stop light,
+    /// and the ray is that of the middle of the pupil.
+    pub weight: f32,
+}
+
+/// An exit pupil, as seen from a ring of the film where it meets the x axis.
+#[derive(Clone, Copy, Debug)]
+struct Pupil {
+    min: DVec2,
+    max: DVec2,
+    /// The mean of the points that light passes.
+    middle: DVec2,
+}
+
+/// A lens system in front of a film, in focus.
+#[derive(Clone, Debug)]
+pub struct LensSystem {
+    /// From the front to the rear.
+    elements: Vec<LensElement>,
+    /// Distances of the vertices from the film.
+    z: Vec<f64>,
+    aperture: Aperture,
+    /// By which weights are multiplied, so that all shapes of the aperture let as much through as a circle.
+    aperture_scale: f64,
+    /// Half the diagonal of the film.
+    film_radius: f64,
+    focal_length: f64,
+    /// Distance of the film from the principal plane.
+    image_distance: f64,
+    pupils: Vec<Pupil>,
+}
+
+impl LensSystem {
+    /// Places the film so that points at `focus_distance` (m, from the film) are sharp near the axis. `diagonal` is the film's (m).
+    /// `Err` says what is wrong with the lenses, or that they cannot focus.
+    pub fn new(
+        elements: &[LensElement],
+        aperture: Aperture,
+        focus_distance: f64,
+        diagonal: f64,
+    ) -> Result<Self, String> {
+        check(elements)?;
+        let [a, b, c, d] = paraxial(elements);
+        if c >= 0.0 {
+            return Err("the lenses do not collect light: they have no positive focal length".to_owned());
+        }
+        // Film at s, point at `gap` − s before the front: A s + B + (gap − s)(C s + D) = 0
+        let depth: f64 = elements[..elements.len() - 1].iter().map(|e| e.thickness).sum();
+        let gap = focus_distance - depth;
+        let (half, rest) = (0.5 * (a + gap * c - d), b + gap * d);
+        let root = half * half + c * rest;
+        if !(root >= 0.0) {
+            return Err(format!("{focus_distance} m is too near to be in focus"));
+        }
+        let at_infinity = -d / c;
+        let roots = [1.0, -1.0].map(|sign| (half + sign * root.sqrt()) / c);
+        let s = roots.into_iter().min_by(|x, y| (x - at_infinity).abs().total_cmp(&(y - at_infinity).abs()));
+        let s = s.filter(|s| *s > 0.0 && gap > *s).ok_or_else(|| format!("{focus_distance} m cannot be in focus"))?;
+        let mut z = vec![s; elements.len()];
+        for i in (0..elements.len() - 1).rev() {
+            z[i] = z[i + 1] + elements[i].thickness;
+        }
+        let mut system = LensSystem {
+            elements: elements.to_vec(),
+            z,
+            aperture_scale: aperture.scale(),
+            aperture,
+            film_radius: 0.5 * diagonal,
+            focal_length: -1.0 / c,
+            image_distance: s - at_infinity - 1.0 / c,
+            pupils: Vec::new(),
+        };
+        system.pupils = (0..RINGS).into_par_iter().map(|ring| system.pupil(ring)).collect();
+        if system.pupils[0].max.x < system.pupils[0].min.x {
+            return Err("no light passes the lenses".to_owned());
+        }
+        Ok(system)
+    }
+
+    /// Focal length (m).
+    pub fn focal_length(&self) -> f64 {
+        self.focal_length
+    }
+
+    /// A ray of the film point (x, y), through the point of the exit pupil that `u` chooses.
+    pub fn sample(&self, film: Vec2, u: [f32; 2]) -> LensRay {
+        let film = film.as_dvec2();
+        let r = film.length();
+        let pupil = &self.pupils[((r / self.film_radius * RINGS as f64) as usize).min(RINGS - 1)];
+        let u = DVec2::from(u.map(f64::from));
+        let size = pupil.max - pupil.min;
+        if let Some((ray, through)) = self.through(film, pupil.min + u * size) {
+            let weight = ray.1 * size.x * size.y * through;
+            return LensRay { o: ray.0.o, d: ray.0.d, weight: weight as f32 };
+        }
+        let middle = self.through(film, pupil.middle).map(|((ray, _), _)| ray);
+        middle.unwrap_or(LensRay { o: Vec3::Z * self.z[0] as f32, d: Vec3::Z, weight: 0.0 })
+    }
+
+    /// Angle between the rays of film points at (x, y) whose distance is 1 m, as far as it is small (radians).
+    pub fn spread(&self, film: Vec2) -> f32 {
+        let tangent = f64::from(film.length()) / self.image_distance;
+        let cos = 1.0 / (1.0 + tangent * tangent).sqrt();
+        (cos.powf(1.5) / self.image_distance) as f32
+    }
+
+    /// The ray (of weight 0) from a film point through a point of the rear plane, which is given for film points on the x
+    /// axis and turned to this one; cos⁴θ/s², and what the stop lets through.
+    fn through(&self, film: DVec2, rear: DVec2) -> Option<((LensRay, f64), f64)> {
+        let r = film.length();
+        let axis = if r > 0.0 { film / r } else { DVec2::X };
+        let (o, rear) = (film.extend(0.0), axis.rotate(rear).extend(self.rear()));
+        let d = (rear - o).normalize();
+        let (p, out, through) = self.trace(o, d)?;
+        let ray = LensRay { o: p.as_vec3(), d: out.as_vec3().normalize(), weight: 0.0 };
+        Some(((ray, d.z.powi(4) / (self.rear() * self.rear())), through))
+    }
+
+    /// Distance of the rear surface's vertex from the film.
+    fn rear(&self) -> f64 {
+        self.z[self.z.len() - 1]
+    }
+
+    /// Follows a ray from the film to where it leaves the front surface: its point there, its direction, and the fraction
+    /// of the light that the stop lets through.
+    fn trace(&self, mut o: DVec3, mut d: DVec3) -> Option<(DVec3, DVec3, f64)> {
+        let mut through = 1.0;
+        for (i, element) in self.elements.iter().enumerate().rev() {
+            let (z, radius) = (self.z[i], element.curvature_radius);
+            let t = if radius == 0.0 { (z - o.z) / d.z } else { at_sphere(o, d, z - radius, radius)? };
+            if t < 0.0 {
+                return None;
+            }
+            o += d * t;
+            if o.truncate().length_squared() > element.aperture_radius * element.aperture_radius {
+                return None;
+            }
+            if radius == 0.0 {
+                through *= self.aperture.at(o.truncate() / element.aperture_radius) * self.aperture_scale;
+                if through == 0.0 {
+                    return None;
+                }
+                continue;
+            }
+            let n = (DVec3::Z * (z - radius) - o) / radius;
+            let [from, to] = [element.eta, self.eta_before(i)];
+            d = refract(d, if n.dot(d) < 0.0 { n } else { -n }, from.max(1.0) / to)?;
+        }
+        Some((o, d, through))
+    }
+
+    /// Index of refraction on the scene's side of a surface.
+    fn eta_before(&self, i: usize) -> f64 {
+        if i == 0 { 1.0 } else { self.elements[i - 1].eta.max(1.0) }
+    }
+
+    /// Where light of a ring of the film passes the rear plane; nothing: a pupil of negative size.
+    fn pupil(&self, ring: usize) -> Pupil {
+        let half = SEARCHED * self.elements[self.elements.len() - 1].aperture_radius;
+        let cell = 2.0 * half / SEARCH[0] as f64;
+        let (mut min, mut max, mut sum, mut count) = (DVec2::INFINITY, DVec2::NEG_INFINITY, DVec2::ZERO, 0.0);
+        for place in 0..SEARCH[1] {
+            let fraction = (ring as f64 + place as f64 / (SEARCH[1] - 1) as f64) / RINGS as f64;
+            let film = DVec2::X * fraction * self.film_radius;
+            for k in 0..SEARCH[0] * SEARCH[0] {
+                let at = DVec2::new((k % SEARCH[0]) as f64 + 0.5, (k / SEARCH[0]) as f64 + 0.5) * cell - half;
+                if self.through(film, at).is_some() {
+                    (min, max, sum, count) = (min.min(at), max.max(at), sum + at, count + 1.0);
+                }
+            }
+        }
+        if count == 0.0 {
+            return Pupil { min: DVec2::ZERO, max: DVec2::NEG_INFINITY, middle: DVec2::ZERO };
+        }
+        // What the search misses is less than a cell away
+        Pupil { min: min - cell, max: max + cell, middle: sum / count }
+    }
+}
+
+impl Aperture {
+    /// A shape by the name that pbrt-v4 gives it.
+    pub fn named(name: &str) -> Option<Self> {
+        let polygon = |corners: usize, radii: [f64; 2], turn: f64| {
+            let corner = |i: usize| {
+                let (sin, cos) = (2.0 * PI * i as f64 / corners as f64 + turn).sin_cos();
+                [cos * radii[i % 2], sin * radii[i % 2]]
+            };
+            Aperture::Polygon((0..corners).map(corner).collect())
+        };
+        Some(match name {
+            "circle" => Aperture::Circle,
+            "gaussian" => Aperture::Gaussian,
+            "square" => polygon(4, [1.0, 1.0], FRAC_PI_4),
+            "pentagon" => polygon(5, [1.0, 1.0], 0.5 * PI),
+            "star" => polygon(10, [1.0, 0.382], 0.5 * PI),
+            _ => return None,
+        })
+    }
+
+    /// The names of all shapes.
+    pub const NAMES: [&str; 5] = ["circle", "gaussian", "square", "pentagon", "star"];
+
+    /// The fraction that passes at a point of the unit disk.
+    fn at(&self, p: DVec2) -> f64 {
+        match self {
+            Aperture::Circle => 1.0,
+            Aperture::Gaussian => (-2.0 * p.length_squared() / 0.64).exp(),
+            Aperture::Polygon(corners) => {
+                let edges = corners.iter().zip(corners.iter().cycle().skip(1));
+                let crosses = |([ax, ay], [bx, by]): &(&[f64; 2], &[f64; 2])| {
+                    (ay > &p.y) != (by > &p.y) && p.x < ax + (p.y - ay) / (by - ay) * (bx - ax)
+                };
+                f64::from(u8::from(edges.filter(crosses).count() % 2 == 1))
+            }
+            Aperture::Image(texels, [width, height]) => {
+                let at = |x: f64, n: usize| (((x + 1.0) * 0.5 * n as f64).max(0.0) as usize).min(n - 1);
+                f64::from(texels[at(-p.y, *height) * width + at(p.x, *width)].max(0.0))
+            }
+        }
+    }
+
+    /// By how much more a circle lets through; 1 where nothing passes.
+    fn scale(&self) -> f64 {
+        const POINTS: usize = 512;
+        let place = |i: usize| (i as f64 + 0.5) / POINTS as f64 * 2.0 - 1.0;
+        let disk = (0..POINTS * POINTS).map(|k| DVec2::new(place(k % POINTS), place(k / POINTS)));
+        let (all, passed) =
+            disk.filter(|p| p.length_squared() <= 1.0).fold((0.0, 0.0), |(n, s), p| (n + 1.0, s + self.at(p)));
+        if passed > 0.0 && *self != Aperture::Circle { all / passed } else { 1.0 }
+    }
+}
+
+/// `Err` says which surface is impossible.
+fn check(elements: &[LensElement]) -> Result<(), String> {
+    if elements.is_empty() {
+        return Err("there are no surfaces".to_owned());
+    }
+    for (i, e) in elements.iter().enumerate() {
+        let values = [e.curvature_radius, e.thickness, e.eta, e.aperture_radius];
+        let is_right = values.iter().all(|v| v.is_finite())
+            && e.thickness >= 0.0
+            && e.aperture_radius > 0.0
+            && (e.eta == 0.0 || e.eta >= 1.0)
+            && (e.curvature_radius == 0.0 || e.aperture_radius <= e.curvature_radius.abs());
+        if !is_right {
+            return Err(format!(
+                "surface {} has impossible numbers: thickness is not negative, the index of refraction 0 or at least 1, the diameter \
+                 positive and at most twice the radius of curvature",
+                i + 1
+            ));
+        }
+    }
+    match elements.iter().filter(|e| e.curvature_radius == 0.0).count() {
+        0 | 1 => Ok(()),
+        n => Err(format!("there are {n} aperture stops; a lens has one")),
+    }
+}
+
+/// The matrix [A, B, C, D] that takes (height, angle) at the rear surface to those at the front, for rays near the axis.
+fn paraxial(elements: &[LensElement]) -> [f64; 4] {
+    let mut m = [1.0, 0.0, 0.0, 1.0];
+    for (i, e) in elements.iter().enumerate().rev() {
+        if i + 1 < elements.len() {
+            m = [m[0] + e.thickness * m[2], m[1] + e.thickness * m[3], m[2], m[3]];
+        }
+        if e.curvature_radius != 0.0 {
+            let (from, to) = (e.eta.max(1.0), if i == 0 { 1.0 } else { elements[i - 1].eta.max(1.0) });
+            let power = (to - from) / (to * e.curvature_radius);
+            m = [m[0], m[1], m[2] * from / to + power * m[0], m[3] * from / to + power * m[1]];
+        }
+    }
+    m
+}
+
+/// Where a ray meets a sphere around (0, 0, `center`), on the side of its vertex.
+fn at_sphere(o: DVec3, d: DVec3, center: f64, radius: f64) -> Option<f64> {
+    let to = o - DVec3::Z * center;
+    let b = to.dot(d);
+    let root = b * b - to.length_squared() + radius * radius;
+    // A vertex towards the scene is where rays leave the sphere
+    (root >= 0.0).then(|| -b + root.sqrt().copysign(radius))
+}
+
+/// The refracted direction; `n` is against `d`, `eta` the ratio of indices. `None`: total reflection.
+fn refract(d: DVec3, n: DVec3, eta: f64) -> Option<DVec3> {
+    let cos = -d.dot(n);
+    let root = 1.0 - eta * eta * (1.0 - cos * cos);
+    (root >= 0.0).then(|| d * eta + n * (eta * cos - root.sqrt()))
+}
+
+#[cfg(test)]
+#[path = "lens_system_tests.rs"]
+mod tests;
