@@ -136,6 +136,7 @@ def render(
     time: Optional[float] = None,
     environment: Optional[Path] = None,
     camera_auto: bool = False,
+    time_in_scene: Optional[float] = None,
     aov: Optional[Sequence[str]] = None,
     **settings: Unpack[Settings],
 ) -> Rendering:
@@ -163,8 +164,9 @@ def render(
     resolution, crop, box_filter, accel, packet_width, threads, tile_size, time
         As on the command line: columns and rows; x0, x1, y0, y1 in fractions of the image; a pixel filter of one pixel;
         `embree` or `bvh`; rays per packet; threads; edge of a tile; seconds after which to stop.
-    environment, camera_auto
-        Of glTF scenes: the image of an environment, and whether the scene is framed whatever its cameras.
+    environment, camera_auto, time_in_scene
+        Of glTF scenes: the image of an environment, whether the scene is framed whatever its cameras, and the time of its
+        animations (s).
     aov
         Layers beside the image: `variance`, `samples`, `albedo`, `normal`, `depth`, `material`, `object`, `ratio`, `records`.
         None asks for all that there are; an empty list saves the time for them.
@@ -196,6 +198,7 @@ def render(
         "time": time,
         "environment": None if environment is None else os.fspath(environment),
         "camera_auto": camera_auto,
+        "time_in_scene": time_in_scene,
         "aov": None if aov is None else list(aov),
         "interval": interval,
         "settings": _texts(settings),

@@ -34,6 +34,8 @@ pub struct LoadOptions {
     pub environment: Option<PathBuf>,
     /// True if a glTF scene is framed, whatever its cameras.
     pub camera_auto: bool,
+    /// The time (s) at which animations of a glTF scene are seen; without it things are where they stand.
+    pub time: Option<f32>,
 }
 
 /// A scene, its settings, and warnings.
@@ -102,9 +104,9 @@ fn load_parsed(
     let mut diagnostics = Diagnostics::new();
     let mut builder = Builder::new(folder, options);
     parse(&mut sources, &mut diagnostics, &mut builder);
-    if options.environment.is_some() || options.camera_auto {
-        let message =
-            "environment and camera of a pbrt scene are in its file: --environment and --camera-auto are for glTF";
+    if options.environment.is_some() || options.camera_auto || options.time.is_some() {
+        let message = "environment, camera and time of a pbrt scene are in its file: --environment, --camera-auto and \
+                       --time-in-scene are for glTF";
         diagnostics.error_without_place(message);
     }
     let scene_files = SceneFiles::new(&sources, builder.files());

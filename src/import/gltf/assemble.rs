@@ -1,5 +1,6 @@
 //! Geometry and lights of the scene.
 
+use super::animation::changes;
 use super::materials::{Look, Materials};
 use super::meshes::{Primitive, placed, primitive};
 use super::nodes::{Node, instances, nodes};
@@ -67,7 +68,8 @@ impl<'a> Assembly<'a> {
             self.check_images(files, messages);
             return Ok(None);
         }
-        let nodes = nodes(self.document)?;
+        let changes = self.options.time.map(|time| changes(self.document, time, messages)).transpose()?;
+        let nodes = nodes(self.document, &changes.unwrap_or_default())?;
         if let Err(error) = self.add_meshes(&nodes, files, messages) {
             messages.error(&error);
         }

@@ -1,8 +1,9 @@
 //! glTF 2.0 scenes. Light of 1 cd/m² is taken for a radiance of 1 where surfaces emit; lights in candela and lux are
 //! divided by [`LUMENS_PER_WATT`], as Blender writes and reads them. Single-sided surfaces are rendered from both sides.
 //!
-//! Reading order: [`textures`], [`materials`], [`nodes`], [`pose`], [`meshes`], [`view`], [`assemble`].
+//! Reading order: [`textures`], [`materials`], [`animation`], [`nodes`], [`pose`], [`meshes`], [`view`], [`assemble`].
 
+mod animation;
 mod assemble;
 mod materials;
 mod meshes;

@@ -1,5 +1,6 @@
 //! The tree of nodes: what stands where.
 
+use super::animation::{Change, Changes};
 use glam::{Mat4, Quat};
 use lumiris_formats::gltf::{Document, GltfError, Place};
 use lumiris_numbers::math::{Affine3A, Vec3};
@@ -13,10 +14,12 @@ pub(super) struct Node<'a> {
     /// Index of its mesh.
     pub mesh: Option<usize>,
     pub world_from_node: Affine3A,
+    /// Weights of morph targets, by an animation.
+    pub weights: Option<Vec<f32>>,
 }
 
-/// All nodes of the scene, parents first. A node that is met twice is an error, so that no tree is endless.
-pub(super) fn nodes(document: &Document) -> Result<Vec<Node<'_>>, GltfError> {
+/// All nodes of the scene, parents first, with what animations change. A node that is met twice is an error, so that no tree is endless.
+pub(super) fn nodes<'d>(document: &'d Document, changes: &Changes) -> Result<Vec<Node<'d>>, GltfError> {
     let root = document.root();
     let all = root.key("nodes");
     let count = all.items().len();
@@ -38,21 +41,23 @@ pub(super) fn nodes(document: &Document) -> Result<Vec<Node<'_>>, GltfError> {
             Some(_) => return Err(place.error("the node has two parents, or is its own ancestor")),
             None => return Err(place.error("is not there")),
         }
-        let world_from_node = parent * transform(&place);
+        let change = changes.get(&index).cloned().unwrap_or_default();
+        let world_from_node = parent * transform(&place, &change);
         let children = place.key("children").items();
         open.extend(children.iter().rev().filter_map(Place::index).map(|i| (i, world_from_node)));
-        nodes.push(Node { mesh: place.key("mesh").index(), place, index, world_from_node });
+        nodes.push(Node { mesh: place.key("mesh").index(), place, index, world_from_node, weights: change.weights });
     }
     Ok(nodes)
 }
 
-fn transform(place: &Place<'_>) -> Affine3A {
+fn transform(place: &Place<'_>, change: &Change) -> Affine3A {
     if let Some(m) = place.key("matrix").numbers::<16>() {
         return Affine3A::from_mat4(Mat4::from_cols_array(&m));
     }
-    let translation = Vec3::from(place.key("translation").numbers().unwrap_or([0.0; 3]));
-    let scale = Vec3::from(place.key("scale").numbers().unwrap_or([1.0; 3]));
-    let rotation = Quat::from_array(place.key("rotation").numbers().unwrap_or([0.0, 0.0, 0.0, 1.0]));
+    let translation = Vec3::from(change.translation.or_else(|| place.key("translation").numbers()).unwrap_or([0.0; 3]));
+    let scale = Vec3::from(change.scale.or_else(|| place.key("scale").numbers()).unwrap_or([1.0; 3]));
+    let rotation = change.rotation.or_else(|| place.key("rotation").numbers()).unwrap_or([0.0, 0.0, 0.0, 1.0]);
+    let rotation = Quat::from_array(rotation);
     let rotation = if rotation.length_squared() > 0.0 { rotation.normalize() } else { Quat::IDENTITY };
     Affine3A::from_scale_rotation_translation(scale, rotation, translation)
 }

@@ -1,4 +1,4 @@
-//! What moves the vertices of a mesh before its node does: morph targets by their default weights, and skins by the
+//! What moves the vertices of a mesh before its node does: morph targets by their weights, and skins by the
 //! joints as they stand.
 
 use super::Messages;
@@ -36,7 +36,9 @@ impl Pose {
         node: &Node<'_>,
         nodes: &[Node<'_>],
     ) -> Result<Self, GltfError> {
-        let weights = weights(&node.place.key("weights")).or_else(|| weights(&mesh.key("weights"))).unwrap_or_default();
+        let of_node = || weights(&node.place.key("weights"));
+        let weights =
+            node.weights.clone().or_else(of_node).or_else(|| weights(&mesh.key("weights"))).unwrap_or_default();
         let Some(skin) = node.place.key("skin").index() else { return Ok(Pose { weights, joints: None }) };
         let skin = document.root().key("skins").item(skin);
         let inverses = match skin.key("inverseBindMatrices").index() {

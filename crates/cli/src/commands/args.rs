@@ -44,6 +44,9 @@ pub(super) struct SceneArgs {
     /// Frame a glTF scene from the front, whatever its cameras
     #[arg(long)]
     pub camera_auto: bool,
+    /// Time (s) at which the animations of a glTF scene are seen [default: without animations]
+    #[arg(long, value_name = "SECONDS", value_parser = parse_time_in_scene)]
+    pub time_in_scene: Option<f32>,
     /// Memory that the textures of the scene may take, such as 2GB, or `off`: what does not fit is read by tiles from a
     /// temporary file (in TMPDIR). The image is the same to the bit [default: off]
     #[arg(long, value_name = "SIZE", value_parser = parse_limit)]
@@ -76,9 +79,13 @@ pub(super) struct RenderArgs {
     /// [default: the name in the file, or SCENE.exr]
     #[arg(short, long, value_name = "FILE")]
     pub output: Vec<PathBuf>,
-    /// Frames of an animation, such as 1-48, 1-48:2 or 5,10-20: `####` in SCENE and FILE becomes the number of the frame
+    /// Frames of an animation, such as 1-48, 1-48:2 or 5,10-20: `####` in SCENE and FILE becomes the number of the frame;
+    /// a glTF scene needs none (--fps)
     #[arg(long, value_name = "LIST", value_parser = parse_frames, requires = "output")]
     pub frames: Option<FrameList>,
+    /// With --frames of a glTF scene without ####: frames per second; frame n is the scene at the time n/F
+    #[arg(long, value_name = "F", default_value_t = 24.0, value_parser = parse_fps, requires = "frames")]
+    pub fps: f32,
     /// With --frames: leave out those whose images are there, and were not cut short by Ctrl-C
     #[arg(long, requires = "frames")]
     pub skip_existing: bool,
@@ -142,6 +149,16 @@ fn parse_packet_width(text: &str) -> Result<u32, String> {
         "16" => Ok(16),
         _ => Err("expected 1, 4, 8 or 16".to_owned()),
     }
+}
+
+/// Understands a time of a scene, which may lie before its start.
+pub(super) fn parse_time_in_scene(text: &str) -> Result<f32, String> {
+    text.parse::<f32>().ok().filter(|s| s.is_finite()).ok_or_else(|| "expected a number of seconds".to_owned())
+}
+
+fn parse_fps(text: &str) -> Result<f32, String> {
+    let fps = text.parse::<f32>().ok().filter(|f| *f > 0.0 && f.is_finite());
+    fps.ok_or_else(|| "expected a positive number of frames per second".to_owned())
 }
 
 fn parse_seconds(text: &str) -> Result<f64, String> {

@@ -10,7 +10,9 @@ use super::pictures::are_complete;
 use super::progress;
 use super::render::{INTERRUPTED, Rendered, Session, check, render_one, write_stats};
 use lumiris::import::cache::{FileCache, FileCounts};
+use lumiris::import::is_gltf;
 use serde_json::json;
+use std::path::Path;
 use std::process::ExitCode;
 
 /// What became of a frame.
@@ -68,16 +70,25 @@ pub(super) fn run(args: &RenderArgs, list: &FrameList) -> anyhow::Result<ExitCod
 
 /// Scene and images must have a place for the number: all frames would be the same, or overwrite each other.
 fn check_names(args: &RenderArgs) -> Result<(), UsageError> {
-    let names = args.output.iter().chain([&args.scene.scene]);
+    let scene = Some(&args.scene.scene).filter(|scene| !is_animated(args, scene));
+    let names = args.output.iter().chain(scene);
     match names.into_iter().find(|path| !has_number(path)) {
         Some(path) => Err(UsageError(format!("--frames: {} has no #### for the number of the frame", path.display()))),
         None => Ok(()),
     }
 }
 
+/// True if frames are times of one scene, and not scenes.
+fn is_animated(args: &RenderArgs, scene: &Path) -> bool {
+    is_gltf(scene) && !has_number(scene) && args.scene.time_in_scene.is_none()
+}
+
 /// The options of one frame.
 fn of_frame(args: &RenderArgs, frame: u32) -> RenderArgs {
     let mut args = args.clone();
+    if is_animated(&args, &args.scene.scene) {
+        args.scene.time_in_scene = Some(frame as f32 / args.fps);
+    }
     args.scene.scene = numbered(&args.scene.scene, frame);
     args.output.iter_mut().for_each(|path| *path = numbered(path, frame));
     (args.frames, args.stats) = (None, None);

@@ -223,12 +223,13 @@ fn described(args: &RenderArgs, job: &RenderJob, settings: &RenderSettings) -> V
 
 /// What may differ between parts, and what going on needs.
 fn notes(args: &RenderArgs, plan: &PlanFile, job: &RenderJob) -> anyhow::Result<Vec<(String, String)>> {
-    let SceneArgs { scene, resolution, crop, environment, camera_auto, box_filter, .. } = &args.scene;
+    let SceneArgs { scene, resolution, crop, environment, camera_auto, time_in_scene, box_filter, .. } = &args.scene;
     let mut notes = vec![(SCENE_NOTE, scene.display().to_string())];
     notes.extend(resolution.map(|[w, h]| ("resolution", format!("{w}x{h}"))));
     notes.extend(crop.map(|c| ("crop", c.map(|v| v.to_string()).join(","))));
     notes.extend(environment.as_ref().map(|path| ("environment", path.display().to_string())));
     notes.extend(camera_auto.then(|| ("camera_auto", "true".to_owned())));
+    notes.extend(time_in_scene.map(|time| ("time_in_scene", time.to_string())));
     notes.extend(box_filter.then(|| ("box_filter", "true".to_owned())));
     notes.extend((!plan.settings.is_empty()).then(|| plan.text()).transpose()?.map(|text| (PLAN_NOTE, text)));
     let name = |aov: &Option<Aov>| aov.map_or("none", <&str>::from);

@@ -40,6 +40,7 @@ pub(super) fn load_scene(args: &SceneArgs, files: &FileCache, stored: Option<&St
         crop: args.crop,
         environment: args.environment.clone(),
         camera_auto: args.camera_auto,
+        time: args.time_in_scene,
     };
     if let Some(MemoryLimit::Bytes(bytes)) = args.texture_memory {
         files.limit_textures(bytes);
@@ -89,10 +90,14 @@ fn check_scene(args: &SceneArgs) -> anyhow::Result<()> {
     if let Some(what) = mesh_kind(&args.scene) {
         return Err(UsageError(format!("{path} is a mesh, not a scene: {what}")).into());
     }
-    let of_gltf = [("--environment", args.environment.is_some()), ("--camera-auto", args.camera_auto)];
+    let of_gltf = [
+        ("--environment", args.environment.is_some()),
+        ("--camera-auto", args.camera_auto),
+        ("--time-in-scene", args.time_in_scene.is_some()),
+    ];
     if let Some((option, _)) = of_gltf.iter().find(|(_, is_given)| *is_given && !is_gltf(&args.scene)) {
         let text = format!(
-            "{option} is for glTF scenes: environment and camera of a pbrt scene, such as {path}, are in its file"
+            "{option} is for glTF scenes: environment, camera and time of a pbrt scene, such as {path}, are in its file"
         );
         return Err(UsageError(text).into());
     }

@@ -1,6 +1,6 @@
 //! What a rendering goes on from: a checkpoint or an unfinished part.
 
-use super::args::{RenderArgs, parse_crop, parse_resolution};
+use super::args::{RenderArgs, parse_crop, parse_resolution, parse_time_in_scene};
 use super::part_args::PartArgs;
 use anyhow::Context;
 use lumiris::render::output::Aov;
@@ -57,6 +57,9 @@ impl Stored {
             scene.environment = Some(path.into());
         }
         scene.camera_auto |= note("camera_auto").is_some();
+        if let (None, Some(text)) = (scene.time_in_scene, note("time_in_scene")) {
+            scene.time_in_scene = Some(parse_time_in_scene(text).map_err(|_| option("time"))?);
+        }
         scene.box_filter |= note("box_filter").is_some();
         if let (None, Some(list)) = (&args.aov, note(AOV_NOTE)) {
             let named = |name: &str| if name == "none" { Ok(None) } else { name.parse::<Aov>().map(Some) };

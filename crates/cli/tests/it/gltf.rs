@@ -4,14 +4,19 @@ use super::parts::{assert_same, lumiris, run};
 use super::program::stderr;
 use std::path::Path;
 
-/// A triangle in a file, and an environment of two colours.
+/// A triangle in a file, which an animation moves by one unit in a second, a camera, and an environment of two colours.
 fn write_scene(folder: &Path) {
     // (0, 0, 0), (1, 0, 0) and (0, 1, 0)
     let data = "AAAAAAAAAAAAAAAAAACAPwAAAAAAAAAAAAAAAAAAgD8AAAAA";
     let text = format!(
-        r#"{{"asset":{{"version":"2.0"}},"nodes":[{{"mesh":0}}],
+        r#"{{"asset":{{"version":"2.0"}},"nodes":[{{"mesh":0}},{{"camera":0,"translation":[0.5,0.5,4]}}],
+        "cameras":[{{"type":"perspective","perspective":{{"yfov":0.7,"znear":0.1}}}}],
+        "animations":[{{"samplers":[{{"input":1,"output":2}}],
+                       "channels":[{{"sampler":0,"target":{{"node":0,"path":"translation"}}}}]}}],
         "meshes":[{{"primitives":[{{"attributes":{{"POSITION":0}}}}]}}],
-        "accessors":[{{"bufferView":0,"componentType":5126,"count":3,"type":"VEC3"}}],
+        "accessors":[{{"bufferView":0,"componentType":5126,"count":3,"type":"VEC3"}},
+                     {{"bufferView":0,"byteOffset":8,"componentType":5126,"count":2,"type":"SCALAR"}},
+                     {{"bufferView":0,"componentType":5126,"count":2,"type":"VEC3"}}],
         "bufferViews":[{{"buffer":0,"byteLength":36}}],
         "buffers":[{{"byteLength":36,"uri":"data:application/octet-stream;base64,{data}"}}]}}"#
     );
@@ -38,10 +43,33 @@ fn parts_and_checkpoints_keep_environment_and_camera() {
 }
 
 #[test]
+fn frames_are_times_of_an_animation() {
+    let folder = tempfile::tempdir().unwrap();
+    write_scene(folder.path());
+    let options = "--environment sky.pfm --resolution 16x16 --estimator mis --spp 4 --quiet";
+    run(&format!("render a.gltf {options} --frames 0-2 --fps 2 -o f.####.exr"), folder.path());
+    for (frame, time) in [("0000", "0"), ("0001", "0.5"), ("0002", "1")] {
+        run(&format!("render a.gltf {options} --time-in-scene {time} -o {frame}.exr"), folder.path());
+        assert_same(&format!("f.{frame}.exr"), &format!("{frame}.exr"), folder.path(), frame);
+    }
+    let bytes = |name: &str| std::fs::read(folder.path().join(name)).unwrap();
+    assert_ne!(bytes("f.0000.exr"), bytes("f.0002.exr"));
+
+    // A part says what time it is of
+    run(&format!("render a.gltf {options} --time-in-scene 0.5 --checkpoint c.film -o half.exr"), folder.path());
+    run("render a.gltf --resume c.film --quiet -o resumed.exr", folder.path());
+    assert_same("0001.exr", "resumed.exr", folder.path(), "a checkpoint");
+}
+
+#[test]
 fn options_of_gltf_are_refused_for_pbrt() {
     let folder = tempfile::tempdir().unwrap();
     std::fs::write(folder.path().join("a.pbrt"), "WorldBegin\n").unwrap();
-    for (option, name) in [("--camera-auto", "--camera-auto"), ("--environment sky.hdr", "--environment")] {
+    for (option, name) in [
+        ("--camera-auto", "--camera-auto"),
+        ("--environment sky.hdr", "--environment"),
+        ("--time-in-scene 1", "--time-in-scene"),
+    ] {
         let output = lumiris(&format!("info a.pbrt {option}"), folder.path());
         assert_eq!(output.status.code(), Some(2));
         assert!(stderr(&output).contains(&format!("lumiris: {name} is for glTF")), "{}", stderr(&output));

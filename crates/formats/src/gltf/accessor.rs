@@ -65,6 +65,11 @@ impl Numbers {
         self.values.len() / self.width.max(1)
     }
 
+    /// All components of all elements.
+    pub fn values(&self) -> Vec<f32> {
+        self.values.iter().map(|&v| v as f32).collect()
+    }
+
     /// Elements of `N` components; what an element lacks is `fill`.
     pub fn elements<const N: usize>(&self, fill: f32) -> Vec<[f32; N]> {
         let element = |e: &[f64]| std::array::from_fn(|i| e.get(i).map_or(fill, |&v| v as f32));
