@@ -386,3 +386,51 @@ fn animations_move_nodes_and_bend_meshes_at_a_time() {
     let still = at(&triangle(), Some(1.0)).unwrap().warnings.to_string();
     assert!(still.contains("no animation"), "{still}");
 }
+
+/// A box 2 wide, with glass that bends nothing and absorbs, seen from outside in white surroundings.
+fn glass(volume: &str) -> Vec<u8> {
+    let json = format!(
+        r#"{{"asset":{{"version":"2.0"}},"scenes":[{{"nodes":[0,1]}}],
+        "nodes":[{{"mesh":0}},{{"translation":[0.1,0.2,9],"camera":0}}],
+        "cameras":[{{"type":"orthographic","orthographic":{{"xmag":0.01,"ymag":0.01,"znear":0.1,"zfar":20}}}}],
+        "materials":[{{"pbrMetallicRoughness":{{"metallicFactor":0,"roughnessFactor":0}},"extensions":{{
+            "KHR_materials_transmission":{{"transmissionFactor":1}},"KHR_materials_ior":{{"ior":1}},
+            "KHR_materials_volume":{{{volume}}}}}}}],
+        "meshes":[{{"primitives":[{{"attributes":{{"POSITION":0}},"indices":1,"material":0}}]}}],
+        "accessors":[{{"bufferView":0,"componentType":5126,"count":8,"type":"VEC3"}},
+                     {{"bufferView":1,"componentType":5121,"count":36,"type":"SCALAR"}}],
+        "bufferViews":[{{"buffer":0,"byteLength":96}},{{"buffer":0,"byteOffset":96,"byteLength":36}}],
+        "buffers":[{{"byteLength":132}}]}}"#
+    );
+    let corner = |i: usize| [0, 1, 2].map(|axis| if i >> axis & 1 == 1 { 1.0 } else { -1.0 });
+    let mut bytes = floats(&(0..8).flat_map(corner).collect::<Vec<f32>>());
+    // Seen from outside, corners go counterclockwise
+    for [a, b, c, d] in [[0, 2, 3, 1], [4, 5, 7, 6], [0, 1, 5, 4], [2, 6, 7, 3], [0, 4, 6, 2], [1, 3, 7, 5]] {
+        bytes.extend([a, b, c, a, c, d]);
+    }
+    container(&json, bytes)
+}
+
+#[test]
+fn light_in_a_volume_has_the_colour_of_its_distance() {
+    let folder = tempfile::tempdir().unwrap();
+    let color = |volume: &str| {
+        let path = folder.path().join("a.glb");
+        std::fs::write(&path, glass(volume)).unwrap();
+        let options = LoadOptions { resolution: Some([4, 4]), ..LoadOptions::default() };
+        let job = load(&path, &options).map_err(|r| r.to_string()).unwrap().job(AccelKind::Embree, None).unwrap();
+        let settings = RenderSettings { spp: 64, ..RenderSettings::default() };
+        let data = channels(&render(&job, &settings, &AtomicBool::new(false), &|_| ()).unwrap().film, &[], None).data;
+        [0, 1, 2].map(|c| data.iter().skip(c).step_by(3).sum::<f32>() / 16.0)
+    };
+    let near = |volume: &str, expected: [f32; 3]| {
+        let found = color(volume);
+        let off = found.iter().zip(expected).map(|(a, b)| (a - b).abs()).fold(0.0, f32::max);
+        assert!(off < 2e-3, "{volume}: {found:?}, not {expected:?}");
+    };
+    // Two units of the box are four times the distance
+    let attenuation = r#""attenuationColor":[0.9,0.5,1],"attenuationDistance":0.5"#;
+    near(&format!(r#""thicknessFactor":1,{attenuation}"#), [0.9_f32.powi(4), 0.5_f32.powi(4), 1.0]);
+    near(attenuation, [1.0; 3]);
+    near(r#""thicknessFactor":1,"attenuationColor":[0.9,0.5,1]"#, [1.0; 3]);
+}

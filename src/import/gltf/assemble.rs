@@ -17,7 +17,7 @@ use crate::lights::{
     Emission, EmissionImage, EnvironmentFilter, EnvironmentMap, EnvironmentMapping, Light, LightSetBuilder,
 };
 use crate::materials::{MaterialId, MaterialSet};
-use crate::media::MediumSet;
+use crate::media::{Homogeneous, Medium, MediumId, MediumSet, Sides};
 use crate::scene::{Scene, Surface};
 use glam::Vec3A;
 use lumiris_formats::gltf::{Document, GltfError, Place};
@@ -36,6 +36,9 @@ pub(super) struct Assembly<'a> {
     emitters: Vec<(GeometryId, Emission)>,
     emission_images: HashMap<MaterialId, Option<Arc<EmissionImage>>>,
     lights: Vec<Light>,
+    media: MediumSet,
+    /// What is inside of materials.
+    interiors: HashMap<MaterialId, MediumId>,
 }
 
 impl<'a> Assembly<'a> {
@@ -50,6 +53,8 @@ impl<'a> Assembly<'a> {
             emitters: Vec::new(),
             emission_images: HashMap::new(),
             lights: Vec::new(),
+            media: MediumSet::default(),
+            interiors: HashMap::new(),
         })
     }
 
@@ -106,7 +111,7 @@ impl<'a> Assembly<'a> {
             lights: Arc::new(lights.build(&bounds)),
             geometry: Arc::new(self.set),
             surfaces: self.surfaces,
-            media: MediumSet::default(),
+            media: self.media,
         }))
     }
 
@@ -193,8 +198,18 @@ impl<'a> Assembly<'a> {
 
     fn add_geometry(&mut self, mesh: TriangleMesh, look: &Look, name: &str) -> GeometryId {
         self.set.geometries.push(Geometry { shape: Shape::Mesh(mesh), alpha: look.alpha, visibility: Visibility::ALL });
-        self.surfaces.push(Surface { material: look.material, name: name.to_owned(), sides: None });
+        let sides = look.interior.as_ref().map(|medium| Sides { front: None, back: Some(self.interior(look, medium)) });
+        self.surfaces.push(Surface { material: look.material, name: name.to_owned(), sides });
         (self.set.geometries.len() - 1) as GeometryId
+    }
+
+    /// The medium inside of a material.
+    fn interior(&mut self, look: &Look, medium: &Homogeneous) -> MediumId {
+        *self.interiors.entry(look.material).or_insert_with(|| {
+            self.media.media.push(Medium::Homogeneous(medium.clone()));
+            self.media.names.push(self.materials.entries[look.material as usize].name.clone());
+            (self.media.media.len() - 1) as MediumId
+        })
     }
 
     fn add_emission(&mut self, id: GeometryId, look: &Look, files: &FileCache, messages: &mut Messages<'_>) {

@@ -4,6 +4,7 @@ use super::Messages;
 use super::textures::{EmissionSource, Textures};
 use crate::import::images::{ImageChannels, ImageEncoding};
 use crate::materials::{Material, MaterialEntry, MaterialId, NormalMap, PrincipledMaterial};
+use crate::media::Homogeneous;
 use crate::textures::{FloatTexture, FloatTextureId, ImageTexture, RgbTexture, RgbTextureId};
 use lumiris_formats::gltf::{Document, GltfError, Place};
 use lumiris_numbers::math::Rgb;
@@ -18,6 +19,8 @@ pub(super) struct Look {
     pub emission: Rgb,
     pub emission_image: Option<EmissionSource>,
     pub is_double_sided: bool,
+    /// What absorbs light inside.
+    pub interior: Option<Homogeneous>,
 }
 
 /// Materials while a scene is read.
@@ -30,6 +33,9 @@ pub(super) struct Materials<'a> {
 
 /// An index of refraction so great that all light is reflected: colours of reflection are reflectances.
 const MIRROR_IOR: f32 = 1e6;
+
+/// The least component of a colour that light has after some distance in a volume: none at all would need infinite absorption.
+const LEAST_COLOR: f32 = 1e-6;
 
 /// Extensions of materials that are left out.
 const LEFT_OUT: &[(&str, &str)] = &[
@@ -101,6 +107,7 @@ impl<'a> Materials<'a> {
             emission,
             emission_image,
             is_double_sided: place.key("doubleSided").is_true(),
+            interior: absorption(place),
         })
     }
 
@@ -212,12 +219,19 @@ fn emitted(place: &Place<'_>) -> Rgb {
     (color * strength.unwrap_or(1.0)).map(|c| c.max(0.0))
 }
 
+/// `KHR_materials_volume`: white light has the colour after the distance, in the units of the world.
+fn absorption(place: &Place<'_>) -> Option<Homogeneous> {
+    let volume = place.extension("KHR_materials_volume");
+    let color = Rgb::from_array(volume.key("attenuationColor").numbers()?);
+    let distance = volume.key("attenuationDistance").number().filter(|d| *d > 0.0 && d.is_finite())?;
+    let is_filled =
+        place.extension("KHR_materials_transmission").exists() && factor(&volume.key("thicknessFactor"), 0.0) > 0.0;
+    let sigma_a = color.map(|c| -c.clamp(LEAST_COLOR, 1.0).ln() / distance);
+    (is_filled && !sigma_a.is_black()).then(|| Homogeneous { sigma_a, sigma_s: Rgb::BLACK, le: Rgb::BLACK, g: 0.0 })
+}
+
 /// Says what is rendered in another way than the extensions have it.
 fn warn_of_approximations(place: &Place<'_>, messages: &mut Messages<'_>) {
-    let attenuation = place.extension("KHR_materials_volume").key("attenuationColor");
-    if attenuation.numbers::<3>().is_some_and(|c| c != [1.0; 3]) {
-        messages.warning(&attenuation, "absorption in volumes is not rendered");
-    }
     let anisotropy = place.extension("KHR_materials_anisotropy");
     let is_turned = anisotropy.key("anisotropyRotation").number().is_some_and(|r| r != 0.0);
     if is_turned || anisotropy.key("anisotropyTexture").exists() {
