@@ -4,6 +4,7 @@
 
 pub mod bilinear;
 pub mod curve;
+pub mod displacement;
 pub mod hit;
 pub mod loop_subdiv;
 pub mod mesh;
@@ -15,6 +16,7 @@ pub mod triangle;
 
 pub use bilinear::BilinearMesh;
 pub use curve::{Curve, CurveKind, CurveSet};
+pub use displacement::DisplacedMesh;
 pub use hit::{LocalHit, SurfaceHit, VertexValues};
 pub use loop_subdiv::loop_subdivide;
 pub use mesh::TriangleMesh;

@@ -1,7 +1,7 @@
 //! The procedural cloud of pbrt-v4: gradient noise of five frequencies, at places that noise has displaced, which becomes
 //! thinner with height.
 
-use super::noise::{gradient, noise};
+use lumiris_numbers::math::noise::{gradient, noise};
 use lumiris_numbers::math::{Rgb, Vec3};
 
 /// A cloud in its own space, where y is the height: dense below 0, and empty above 1.

@@ -4,14 +4,13 @@
 //! goes a distance d is weakened to T = exp(−∫₀ᵈ σ_t). A medium sends out σ_a·L_e per unit length, and scatters by
 //! [Henyey and Greenstein 1941].
 //!
-//! Reading order: [`homogeneous`], [`grid`], [`noise`], [`cloud`], [`majorants`], [`heterogeneous`], [`track`].
+//! Reading order: [`homogeneous`], [`grid`], [`cloud`], [`majorants`], [`heterogeneous`], [`track`].
 
 pub mod cloud;
 pub mod grid;
 pub mod heterogeneous;
 pub mod homogeneous;
 pub mod majorants;
-pub mod noise;
 pub mod track;
 
 pub use cloud::Cloud;

@@ -4,10 +4,12 @@
 //! pbrt-v4's. Checkerboards are point sampled: the pixel integrates over their edges.
 
 pub mod mapping;
+mod procedural;
 pub mod udim;
 
 pub use crate::imaging::{Filter, Wrap};
 pub use mapping::{CheckerboardMapping, Mapping2d};
+pub use procedural::{Bilerp, Dots, Marble, NoiseKind, NoiseTexture, Octaves};
 pub use udim::{Udim, UdimId};
 
 use crate::imaging::MipMap;
@@ -107,6 +109,19 @@ pub enum FloatTexture {
         /// Value of odd cells.
         tex2: FloatTextureId,
     },
+    /// Noise.
+    Noise(NoiseTexture),
+    /// tex1 inside of dots, tex2 between them.
+    Dots {
+        /// Dots.
+        dots: Dots,
+        /// Value inside.
+        tex1: FloatTextureId,
+        /// Value outside.
+        tex2: FloatTextureId,
+    },
+    /// Bilinear between corners.
+    Bilerp(Bilerp<f32>),
 }
 
 /// A colour on surfaces.
@@ -159,6 +174,19 @@ pub enum RgbTexture {
         /// Value of odd cells.
         tex2: RgbTextureId,
     },
+    /// Marble.
+    Marble(Marble),
+    /// tex1 inside of dots, tex2 between them.
+    Dots {
+        /// Dots.
+        dots: Dots,
+        /// Value inside.
+        tex1: RgbTextureId,
+        /// Value outside.
+        tex2: RgbTextureId,
+    },
+    /// Bilinear between corners.
+    Bilerp(Bilerp<Rgb>),
 }
 
 /// All textures of a scene.
@@ -182,12 +210,13 @@ impl TextureSet {
             FloatTexture::Constant(_) | FloatTexture::VertexOpacity => &[],
             // Images may come later: an importer reads all of them at once.
             FloatTexture::Image(_) | FloatTexture::Channel(..) => &[],
+            FloatTexture::Noise(_) | FloatTexture::Bilerp(_) => &[],
             FloatTexture::Threshold { tex, .. } => &[*tex],
             FloatTexture::Scale { tex, scale } => &[*tex, *scale],
             FloatTexture::Mix { tex1, tex2, amount } => &[*tex1, *tex2, *amount],
-            FloatTexture::DirectionMix { tex1, tex2, .. } | FloatTexture::Checkerboard { tex1, tex2, .. } => {
-                &[*tex1, *tex2]
-            }
+            FloatTexture::DirectionMix { tex1, tex2, .. }
+            | FloatTexture::Checkerboard { tex1, tex2, .. }
+            | FloatTexture::Dots { tex1, tex2, .. } => &[*tex1, *tex2],
         };
         let id = self.floats.len() as FloatTextureId;
         assert!(children.iter().all(|&c| c < id), "a texture refers to earlier ones only");
@@ -200,13 +229,13 @@ impl TextureSet {
     pub fn add_rgb(&mut self, texture: RgbTexture) -> RgbTextureId {
         let (children, weight): (&[RgbTextureId], Option<FloatTextureId>) = match &texture {
             RgbTexture::Constant(_) | RgbTexture::VertexColor => (&[], None),
-            RgbTexture::Image(_) => (&[], None),
+            RgbTexture::Image(_) | RgbTexture::Marble(_) | RgbTexture::Bilerp(_) => (&[], None),
             RgbTexture::Product { tex1, tex2 } => (&[*tex1, *tex2], None),
             RgbTexture::Scale { tex, scale } => (&[*tex], Some(*scale)),
             RgbTexture::Mix { tex1, tex2, amount } => (&[*tex1, *tex2], Some(*amount)),
-            RgbTexture::DirectionMix { tex1, tex2, .. } | RgbTexture::Checkerboard { tex1, tex2, .. } => {
-                (&[*tex1, *tex2], None)
-            }
+            RgbTexture::DirectionMix { tex1, tex2, .. }
+            | RgbTexture::Checkerboard { tex1, tex2, .. }
+            | RgbTexture::Dots { tex1, tex2, .. } => (&[*tex1, *tex2], None),
         };
         let id = self.rgbs.len() as RgbTextureId;
         let known = children.iter().all(|&c| c < id) && weight.is_none_or(|w| (w as usize) < self.floats.len());
@@ -237,6 +266,9 @@ impl TextureSet {
             | FloatTexture::Scale { .. }
             | FloatTexture::Mix { .. }
             | FloatTexture::DirectionMix { .. }
+            | FloatTexture::Noise(_)
+            | FloatTexture::Dots { .. }
+            | FloatTexture::Bilerp(_)
             | FloatTexture::Checkerboard { .. } => None,
         }
     }
@@ -251,6 +283,9 @@ impl TextureSet {
             | RgbTexture::Scale { .. }
             | RgbTexture::Mix { .. }
             | RgbTexture::DirectionMix { .. }
+            | RgbTexture::Marble(_)
+            | RgbTexture::Dots { .. }
+            | RgbTexture::Bilerp(_)
             | RgbTexture::Checkerboard { .. } => None,
         }
     }
@@ -281,6 +316,9 @@ impl TextureSet {
             FloatTexture::Checkerboard { mapping, tex1, tex2 } => {
                 self.float(if mapping.is_even(ctx) { *tex1 } else { *tex2 }, ctx)
             }
+            FloatTexture::Noise(noise) => noise.value(ctx),
+            FloatTexture::Dots { dots, tex1, tex2 } => self.float(if dots.is_inside(ctx) { *tex1 } else { *tex2 }, ctx),
+            FloatTexture::Bilerp(bilerp) => bilerp.value(ctx),
         }
     }
 
@@ -309,6 +347,9 @@ impl TextureSet {
             RgbTexture::Checkerboard { mapping, tex1, tex2 } => {
                 self.rgb(if mapping.is_even(ctx) { *tex1 } else { *tex2 }, ctx)
             }
+            RgbTexture::Marble(marble) => marble.color(ctx),
+            RgbTexture::Dots { dots, tex1, tex2 } => self.rgb(if dots.is_inside(ctx) { *tex1 } else { *tex2 }, ctx),
+            RgbTexture::Bilerp(bilerp) => bilerp.value(ctx).map(|c| c.max(0.0)),
         }
     }
 
@@ -336,84 +377,4 @@ where
 }
 
 #[cfg(test)]
-mod tests {
-    use super::*;
-    use crate::imaging::{ColorEncoding, Image};
-
-    fn at(u: f32, v: f32) -> TextureContext {
-        TextureContext {
-            uv: Vec2::new(u, v),
-            uv_width: Vec2::ZERO,
-            uv1: Vec2::ZERO,
-            color: [0.5; 4],
-            p: Vec3::ZERO,
-            n: Vec3::new(0.6, 0.0, 0.8),
-        }
-    }
-
-    /// A 2×2 image, red below, green above, blue on the right.
-    fn set() -> (TextureSet, ImageTexture) {
-        let mut image = Image::new(2, 2, &["R", "G", "B"]);
-        for x in 0..2 {
-            image.set(x, 1, 0, 0.75);
-            image.set(x, 0, 1, 0.5);
-            image.set(1, x, 2, 1.5);
-        }
-        let mut set = TextureSet::default();
-        let image = set.add_image(MipMap::new(&image, Wrap::Repeat, Filter::Bilinear, ColorEncoding::Linear));
-        (set, ImageTexture { image, mapping: Mapping2d::default(), udim: None, scale: 1.0, invert: false })
-    }
-
-    #[test]
-    fn images_have_their_origin_at_the_lower_left() {
-        let (mut set, image) = set();
-        let (rgb, float) = (set.add_rgb(RgbTexture::Image(image)), set.add_float(FloatTexture::Image(image)));
-        assert_eq!(set.rgb(rgb, &at(0.25, 0.25)), Rgb::new(0.75, 0.0, 0.0));
-        assert_eq!(set.rgb(rgb, &at(0.75, 0.75)), Rgb::new(0.0, 0.5, 1.5));
-        assert!((set.float(float, &at(0.25, 0.25)) - 0.25).abs() < 1e-6);
-    }
-
-    #[test]
-    fn scale_comes_before_invert_and_colours_stay_positive() {
-        let (mut set, image) = set();
-        let texture = ImageTexture { scale: 2.0, invert: true, ..image };
-        let (rgb, float) = (set.add_rgb(RgbTexture::Image(texture)), set.add_float(FloatTexture::Image(texture)));
-        assert_eq!(set.rgb(rgb, &at(0.75, 0.75)), Rgb::new(1.0, 0.0, 0.0));
-        assert!((set.float(float, &at(0.25, 0.25)) - 0.5).abs() < 1e-6);
-        assert_eq!(set.float(float, &at(0.75, 0.75)), 0.0);
-    }
-
-    #[test]
-    fn trees_combine_their_leaves() {
-        let (mut set, _) = set();
-        let [a, b, quarter] = [2.0, 6.0, 0.25].map(|v| set.add_float(FloatTexture::Constant(v)));
-        let [red, blue] =
-            [Rgb::new(1.0, 0.0, 0.0), Rgb::new(0.0, 0.0, 1.0)].map(|c| set.add_rgb(RgbTexture::Constant(c)));
-        let mix = set.add_float(FloatTexture::Mix { tex1: a, tex2: b, amount: quarter });
-        let scale = set.add_float(FloatTexture::Scale { tex: mix, scale: quarter });
-        let along = set.add_float(FloatTexture::DirectionMix { tex1: a, tex2: b, direction: Vec3::Z });
-        assert_eq!(set.float(mix, &at(0.0, 0.0)), 3.0);
-        assert_eq!(set.float(scale, &at(0.0, 0.0)), 0.75);
-        assert!((set.float(along, &at(0.0, 0.0)) - (0.8 * 2.0 + 0.2 * 6.0)).abs() < 1e-5);
-
-        let mapping = CheckerboardMapping::Squares(Mapping2d::default());
-        let board = set.add_rgb(RgbTexture::Checkerboard { mapping, tex1: red, tex2: blue });
-        let float_board = set.add_float(FloatTexture::Checkerboard { mapping, tex1: a, tex2: b });
-        assert_eq!((set.rgb(board, &at(0.5, 0.5)).r, set.rgb(board, &at(1.5, 0.5)).b), (1.0, 1.0));
-        assert_eq!((set.float(float_board, &at(0.5, 0.5)), set.float(float_board, &at(0.5, 1.5))), (2.0, 6.0));
-
-        let rgb_mix = set.add_rgb(RgbTexture::Mix { tex1: red, tex2: board, amount: quarter });
-        let rgb_scale = set.add_rgb(RgbTexture::Scale { tex: rgb_mix, scale: a });
-        assert_eq!(set.rgb(rgb_scale, &at(1.5, 0.5)), Rgb::new(1.5, 0.0, 0.5));
-        let rgb_along = set.add_rgb(RgbTexture::DirectionMix { tex1: red, tex2: blue, direction: Vec3::Z });
-        assert!((set.rgb(rgb_along, &at(0.0, 0.0)).b - 0.2).abs() < 1e-5);
-        assert_eq!((set.constant_float(a), set.constant_float(mix)), (Some(2.0), None));
-        assert_eq!((set.constant_rgb(red), set.constant_rgb(board)), (Some(Rgb::new(1.0, 0.0, 0.0)), None));
-    }
-
-    #[test]
-    #[should_panic(expected = "earlier ones only")]
-    fn a_texture_cannot_refer_to_itself() {
-        TextureSet::default().add_float(FloatTexture::Scale { tex: 0, scale: 0 });
-    }
-}
+mod tests;

@@ -5,6 +5,7 @@ mod analytic_scenes;
 mod bit_exact;
 mod crosscheck;
 mod dispersion;
+mod displacement;
 mod evaluated;
 mod gltf;
 mod hair;

@@ -5,6 +5,7 @@ use crate::geometry::{Curve, CurveKind, QuadricKind};
 use crate::lights::Portal;
 use crate::materials::MaterialId;
 use crate::media::{Homogeneous, Medium};
+use crate::textures::FloatTextureId;
 use lumiris_formats::pbrt::directive::Name;
 use lumiris_formats::pbrt::params::ParamSet;
 use lumiris_formats::source::Span;
@@ -219,6 +220,15 @@ pub struct CurveData {
     pub(super) normals: Vec<[Vec3; 2]>,
 }
 
+/// Displacement of a mesh along its normals.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct DisplacementDesc {
+    /// A float texture: how far, in the units of the mesh.
+    pub texture: FloatTextureId,
+    /// Longest edge of a triangle of the displaced mesh, in the units of the scene.
+    pub edge_length: f32,
+}
+
 /// A shape with all that the graphics state gives it.
 #[derive(Clone, Debug)]
 pub struct ShapeDesc {
@@ -238,6 +248,8 @@ pub struct ShapeDesc {
     pub area_light: Option<AreaLightDesc>,
     /// Cut-outs.
     pub alpha: Option<u32>,
+    /// By how much the surface moves.
+    pub displacement: Option<DisplacementDesc>,
     /// The object that it belongs to.
     pub object: Option<usize>,
     /// The media on its sides.

@@ -16,6 +16,7 @@ use crate::lights::{Emission, EmissionImage, LightSetBuilder, area_lights_of};
 use crate::materials::{Material, MaterialId, MaterialSet};
 use crate::scene::{Scene, Surface};
 use crate::settings::Settings;
+use crate::textures::TextureSet;
 use lumiris_formats::diagnostic::Diagnostics;
 use lumiris_formats::ply::PlyMesh;
 use lumiris_numbers::math::{Affine3A, Rgb};
@@ -57,12 +58,13 @@ impl Builder<'_> {
             },
             || {
                 rayon::join(
-                    || make_shapes(&mut shapes, files),
+                    || make_shapes(&mut shapes, files, None),
                     || MaterialSet::new(self.materials.clone(), &self.textures),
                 )
             },
         );
         self.textures.images = texture_images;
+        let made = if d.has_errors() { made } else { with_displaced(made, &mut shapes, files, &self.textures) };
         self.add_environments(images, d);
         let images = self.check_emission_images(emission_images, &shapes, d);
 
@@ -74,6 +76,7 @@ impl Builder<'_> {
         assembly.set.groups.resize_with(self.objects.len(), Group::default);
         assembly.moving.resize_with(self.objects.len(), Vec::new);
         for (desc, made) in shapes.iter().zip(made) {
+            let Some(made) = made else { continue };
             let material = self.material_of(&desc.material, d);
             match (made, material) {
                 (Ok(made), Some(material)) => {
@@ -234,14 +237,34 @@ fn load_images(paths: &[PathBuf], files: &FileCache) -> Vec<LoadedImage> {
 
 /// Makes all shapes. Where meshes are kept for other scenes, each file is read once; elsewhere a mesh is placed as soon
 /// as it has been read, so that there is one copy of it.
-fn make_shapes(shapes: &mut [ShapeDesc], files: &FileCache) -> Vec<Result<Made, ShapeError>> {
-    let paths: BTreeSet<&Path> = shapes.iter().filter(|_| files.keeps()).filter_map(|s| s.source.file()).collect();
+/// All shapes: those that need the images of textures are made at last.
+fn with_displaced(
+    made: Vec<Option<Result<Made, ShapeError>>>,
+    shapes: &mut [ShapeDesc],
+    files: &FileCache,
+    textures: &TextureSet,
+) -> Vec<Option<Result<Made, ShapeError>>> {
+    let displaced = make_shapes(shapes, files, Some(textures));
+    made.into_iter().zip(displaced).map(|(made, displaced)| made.or(displaced)).collect()
+}
+
+/// The shapes that are displaced by textures, which are given then, or the others.
+fn make_shapes(
+    shapes: &mut [ShapeDesc],
+    files: &FileCache,
+    textures: Option<&TextureSet>,
+) -> Vec<Option<Result<Made, ShapeError>>> {
+    let is_meant = |shape: &ShapeDesc| shape.displacement.is_some() == textures.is_some();
+    let nothing = TextureSet::default();
+    let textures = textures.unwrap_or(&nothing);
+    let paths: BTreeSet<&Path> =
+        shapes.iter().filter(|s| files.keeps() && is_meant(s)).filter_map(|s| s.source.file()).collect();
     let paths: Vec<PathBuf> = paths.into_iter().map(Path::to_path_buf).collect();
     // What cannot be read is reported by the shapes that need it
     let meshes = paths.into_par_iter().filter_map(|path| files.mesh(&path).ok().map(|mesh| (path, mesh)));
     let meshes: HashMap<PathBuf, Arc<PlyMesh>> = meshes.collect();
     let mesh = |path: &Path| meshes.get(path).map_or_else(|| files.mesh(path), |mesh| Ok(Arc::clone(mesh)));
-    shapes.par_iter_mut().map(|shape| shape.make(&mesh)).collect()
+    shapes.par_iter_mut().map(|shape| is_meant(shape).then(|| shape.make(&mesh, textures))).collect()
 }
 
 enum EmissionError {

@@ -30,6 +30,7 @@ pub struct Options {
     integrator: Option<Pending>,
     times: Option<[f32; 2]>,
     seed: Option<u32>,
+    edge_scale: Option<f32>,
 }
 
 /// The options, parsed.
@@ -73,6 +74,11 @@ impl Options {
         camera.map_or_else(Vec::new, |(pending, _)| lenses::files(&pending.params, &self.folder))
     }
 
+    /// Factor of the edges of displaced meshes.
+    pub fn edge_scale(&self) -> f32 {
+        self.edge_scale.unwrap_or(1.0)
+    }
+
     /// The medium around the camera.
     pub fn camera_medium(&self) -> Option<&Name> {
         self.camera_medium.as_ref()
@@ -108,6 +114,9 @@ impl Options {
         if let Some(seed) = params.integer("seed", d) {
             self.seed = Some(seed as u32);
         }
+        if params.float("displacementedgescale", d).is_some() {
+            self.edge_scale = Some(positive(params, "displacementedgescale", 1.0, d));
+        }
         // Options of pbrt's own workings, and of its display.
         for name in [
             "disablepixeljitter",
@@ -116,7 +125,6 @@ impl Options {
             "forcediffuse",
             "pixelstats",
             "wavefront",
-            "displacementedgescale",
             "msereferenceimage",
             "msereferenceout",
             "rendercoordsys",

@@ -1,13 +1,14 @@
 //! `Shape`: checked when it is parsed, created once all files have been read.
 
-use super::checks::unknown;
+use super::checks::{positive, unknown};
 use super::curves::{curve_data, merged, placed};
-use super::descriptions::{MeshData, PatchData, ShapeDesc, ShapeSource};
+use super::descriptions::{DisplacementDesc, MeshData, PatchData, ShapeDesc, ShapeSource};
 use super::state::Builder;
 use super::transform::affine;
+use crate::geometry::displacement::MAX_TRIANGLES;
 use crate::geometry::loop_subdiv::loop_subdivide;
-use crate::geometry::{BilinearMesh, Quadric, QuadricKind, Shape, TriangleMesh};
-use crate::textures::FloatTexture;
+use crate::geometry::{BilinearMesh, DisplacedMesh, Quadric, QuadricKind, Shape, TriangleMesh};
+use crate::textures::{FloatTexture, TextureContext, TextureSet};
 use lumiris_formats::diagnostic::Diagnostics;
 use lumiris_formats::pbrt::directive::Name;
 use lumiris_formats::pbrt::params::{Input, ParamSet, ParamType};
@@ -57,13 +58,6 @@ impl Builder<'_> {
                 Some(file) => {
                     name = file.to_owned();
                     let path = self.folder.join(file);
-                    if p.ignore("displacement") {
-                        d.warning_once(
-                            p.span_of("displacement"),
-                            "displaced meshes are not rendered yet: it stays smooth",
-                        );
-                    }
-                    p.ignore("edgelength");
                     Some(ShapeSource::Ply(path))
                 }
                 None => {
@@ -93,6 +87,10 @@ impl Builder<'_> {
             }
         };
         let alpha = self.alpha(&p, d);
+        let is_mesh = source
+            .as_ref()
+            .is_some_and(|s| matches!(s, ShapeSource::Mesh(_) | ShapeSource::Ply(_) | ShapeSource::Loop(..)));
+        let displacement = if is_mesh { self.displacement(&p, d) } else { None };
         p.report_unused(d);
         if let Some(source) = source {
             let emits = self.state.area_light.is_some();
@@ -109,12 +107,24 @@ impl Builder<'_> {
                 material: self.state.material.clone(),
                 area_light: self.state.area_light.clone().filter(|_| !is_curve),
                 alpha,
+                displacement,
                 object: self.current_object,
                 media: self.state.media.clone(),
             };
             let rest = if is_curve { merged(self.shapes.last_mut(), desc) } else { Some(desc) };
             self.shapes.extend(rest);
         }
+    }
+
+    /// `"texture displacement"` of a mesh, which may be refined to edges of `"float edgelength"`.
+    fn displacement(&self, p: &ParamSet, d: &mut Diagnostics) -> Option<DisplacementDesc> {
+        let edge_length = positive(p, "edgelength", 1.0, d);
+        let Input::Texture(name) = p.float_input("displacement", d)? else {
+            d.error(p.span_of("displacement"), "displacement is a texture");
+            return None;
+        };
+        let texture = self.float_texture_named(name, p.span_of("displacement"), d)?;
+        Some(DisplacementDesc { texture, edge_length: edge_length * self.options.edge_scale() })
     }
 
     /// Cut-outs; fully opaque ones are left out.
@@ -264,13 +274,22 @@ impl ShapeDesc {
         if self.ctm.is_moving() { Affine3A::IDENTITY } else { affine(&self.ctm.start) }
     }
 
-    /// Makes the shapes in the space of their group; `mesh` reads a PLY file. Takes the arrays out of `self`.
-    pub fn make(&mut self, mesh: &dyn Fn(&Path) -> Result<Arc<PlyMesh>, PlyError>) -> Result<Made, ShapeError> {
+    /// Makes the shapes in the space of their group; `mesh` reads a PLY file, `textures` displace. Takes the arrays out of `self`.
+    pub fn make(
+        &mut self,
+        mesh: &dyn Fn(&Path) -> Result<Arc<PlyMesh>, PlyError>,
+        textures: &TextureSet,
+    ) -> Result<Made, ShapeError> {
         let m = self.group_from_object();
         // pbrt flips where the transformation of the shape mirrors, moving or not.
         let reverse = self.reverse_orientation;
         let flip = reverse ^ swaps_handedness(&affine(&self.ctm.start));
         let placement = Placement { group_from_object: m, flip, reverse };
+        let displacement = self.displacement;
+        let finished = |data: MeshData| match &displacement {
+            Some(displacement) => displaced(data, displacement, (&m, textures)).map_err(ShapeError::Wrong),
+            None => Ok(data),
+        };
         let source = std::mem::replace(&mut self.source, ShapeSource::Mesh(MeshData::default()));
         let wrong = |reason: String| ShapeError::Wrong(reason);
         let mut made = Made::default();
@@ -281,7 +300,9 @@ impl ShapeDesc {
                 local_from_group: m.inverse(),
                 flip_normal: flip,
             })),
-            ShapeSource::Mesh(data) => made.shapes.push(Shape::Mesh(triangles(data, &placement).map_err(wrong)?)),
+            ShapeSource::Mesh(data) => {
+                made.shapes.push(Shape::Mesh(triangles(finished(data)?, &placement).map_err(wrong)?));
+            }
             ShapeSource::Loop(data, levels) => {
                 let faces = data.indices.len() as u64 * 4_u64.saturating_pow(levels);
                 if faces > 200_000_000 {
@@ -296,7 +317,7 @@ impl ShapeDesc {
                     indices: mesh.indices,
                     ..MeshData::default()
                 };
-                made.shapes.push(Shape::Mesh(triangles(fine, &placement).map_err(wrong)?));
+                made.shapes.push(Shape::Mesh(triangles(finished(fine)?, &placement).map_err(wrong)?));
             }
             ShapeSource::Curves(data) => made.shapes.push(Shape::Curves(placed(data, &m).map_err(wrong)?)),
             ShapeSource::Bilinear(data) => made.shapes.push(patches(data, &placement).map_err(wrong)?),
@@ -305,8 +326,12 @@ impl ShapeDesc {
                     PlyError::Io { source, .. } => ShapeError::Missing(path.clone(), source.to_string()),
                     other => ShapeError::Wrong(format!("{}: {other}", path.display())),
                 })?;
-                let ply = Arc::unwrap_or_clone(ply);
+                let mut ply = Arc::unwrap_or_clone(ply);
                 made.warnings = ply.warnings.iter().map(|w| format!("{}: {w}", path.display())).collect();
+                if displacement.is_some() {
+                    let halves = ply.quads.drain(..).flat_map(|[a, b, c, d]| [[a, b, c], [a, c, d]]);
+                    ply.triangles.extend(halves);
+                }
                 if !ply.quads.is_empty() {
                     let data = PatchData {
                         positions: ply.positions.clone(),
@@ -325,7 +350,7 @@ impl ShapeDesc {
                         tangents: Vec::new(),
                         uvs: ply.uvs,
                     };
-                    made.shapes.push(Shape::Mesh(triangles(data, &placement).map_err(wrong)?));
+                    made.shapes.push(Shape::Mesh(triangles(finished(data)?, &placement).map_err(wrong)?));
                 }
             }
         }
@@ -352,6 +377,24 @@ struct Placement {
     flip: bool,
     /// `ReverseOrientation`, which reverses given normals as well.
     reverse: bool,
+}
+
+/// A mesh that is refined and displaced in its own space.
+fn displaced(
+    data: MeshData,
+    displacement: &DisplacementDesc,
+    (group_from_object, textures): (&Affine3A, &TextureSet),
+) -> Result<MeshData, String> {
+    let mut mesh = DisplacedMesh::new(data.positions, data.normals, data.uvs, data.indices)?;
+    let length = |a: Vec3, b: Vec3| group_from_object.transform_vector3(a - b).length();
+    mesh.refine(length, displacement.edge_length, MAX_TRIANGLES)?;
+    mesh.displace(|p, n, uv| {
+        let (p, n) = (group_from_object.transform_point3(p), transform_normal(group_from_object, n));
+        let point = TextureContext { uv, uv_width: Vec2::ZERO, uv1: Vec2::ZERO, color: [1.0; 4], p, n };
+        textures.float(displacement.texture, &point)
+    });
+    let DisplacedMesh { positions, normals, uvs, indices } = mesh;
+    Ok(MeshData { positions, indices, normals, tangents: Vec::new(), uvs })
 }
 
 fn triangles(mut data: MeshData, placement: &Placement) -> Result<TriangleMesh, String> {

@@ -6,8 +6,8 @@ use super::state::Builder;
 use super::transform::affine;
 use crate::import::images::{ImageChannels, ImageEncoding, ImageRequest, UDIM, tiles};
 use crate::textures::{
-    CheckerboardMapping, Filter, FloatTexture, FloatTextureId, ImageId, ImageTexture, Mapping2d, RgbTexture,
-    RgbTextureId, Udim, UdimId, Wrap,
+    Bilerp, CheckerboardMapping, Dots, Filter, FloatTexture, FloatTextureId, ImageId, ImageTexture, Mapping2d, Marble,
+    NoiseKind, NoiseTexture, Octaves, RgbTexture, RgbTextureId, Udim, UdimId, Wrap,
 };
 use lumiris_formats::diagnostic::{Diagnostics, did_you_mean};
 use lumiris_formats::pbrt::directive::Name;
@@ -66,8 +66,19 @@ impl Builder<'_> {
                 Some(image) => FloatTexture::Image(image),
                 None => FloatTexture::Constant(1.0),
             },
+            "fbm" | "wrinkled" | "windy" => FloatTexture::Noise(self.noise(&class.text, p, d)),
+            "dots" => FloatTexture::Dots {
+                dots: Dots { mapping: self.mapping(p, d) },
+                tex1: self.float_param(p, "inside", 1.0, d),
+                tex2: self.float_param(p, "outside", 0.0, d),
+            },
+            "bilerp" => {
+                let corners = CORNERS.map(|(key, value)| p.float(key, d).unwrap_or(value));
+                FloatTexture::Bilerp(Bilerp { mapping: self.mapping(p, d), corners })
+            }
             other => {
-                later(other, class, p, d);
+                wrong_class(other, class, FLOAT_CLASSES, d);
+                p.ignore_all();
                 FloatTexture::Constant(0.5)
             }
         }
@@ -103,11 +114,37 @@ impl Builder<'_> {
                 Some(image) => RgbTexture::Image(image),
                 None => RgbTexture::Constant(Rgb::WHITE),
             },
+            "marble" => RgbTexture::Marble(Marble {
+                octaves: octaves(p, d),
+                scale: p.float("scale", d).unwrap_or(1.0),
+                variation: p.float("variation", d).unwrap_or(0.2),
+                texture_from_world: self.texture_from_world(),
+            }),
+            "dots" => RgbTexture::Dots {
+                dots: Dots { mapping: self.mapping(p, d) },
+                tex1: self.rgb_param(p, "inside", Rgb::WHITE, SpectrumUse::Albedo, d),
+                tex2: self.rgb_param(p, "outside", Rgb::BLACK, SpectrumUse::Albedo, d),
+            },
+            "bilerp" => {
+                let corners = CORNERS
+                    .map(|(key, value)| self.color_param(p, key, SpectrumUse::Albedo, d).unwrap_or(Rgb::splat(value)));
+                RgbTexture::Bilerp(Bilerp { mapping: self.mapping(p, d), corners })
+            }
             other => {
-                later(other, class, p, d);
+                wrong_class(other, class, RGB_CLASSES, d);
+                p.ignore_all();
                 RgbTexture::Constant(Rgb::splat(0.5))
             }
         }
+    }
+
+    fn noise(&self, class: &str, p: &ParamSet, d: &mut Diagnostics) -> NoiseTexture {
+        let kind = match class {
+            "fbm" => NoiseKind::Fbm(octaves(p, d)),
+            "wrinkled" => NoiseKind::Wrinkled(octaves(p, d)),
+            _ => NoiseKind::Windy,
+        };
+        NoiseTexture { kind, texture_from_world: self.texture_from_world() }
     }
 
     fn direction(&self, p: &ParamSet, d: &mut Diagnostics) -> Vec3 {
@@ -323,36 +360,43 @@ impl Builder<'_> {
     }
 }
 
-/// Textures that pbrt has and that are not rendered yet.
-fn later(class: &str, name: &Name, p: &ParamSet, d: &mut Diagnostics) {
-    let known = ["bilerp", "dots", "fbm", "marble", "ptex", "windy", "wrinkled"];
-    if !known.contains(&class) {
-        let all = ["constant", "scale", "mix", "directionmix", "checkerboard", "imagemap"];
-        unknown(class, name.span, "texture class", &all, d);
-        return;
-    }
-    d.warning_once(name.span, format!("texture `{class}` is not rendered yet: it is constant 0.5"));
-    for key in [
-        "v00",
-        "v01",
-        "v10",
-        "v11",
-        "inside",
-        "outside",
-        "octaves",
-        "roughness",
-        "scale",
-        "variation",
-        "filename",
-        "encoding",
-        "mapping",
-        "uscale",
-        "vscale",
-        "udelta",
-        "vdelta",
-        "v1",
-        "v2",
-    ] {
-        p.ignore(key);
+/// The corners of a bilinear texture, and their default values.
+const CORNERS: [(&str, f32); 4] = [("v00", 0.0), ("v10", 0.0), ("v01", 1.0), ("v11", 1.0)];
+/// Most octaves of noise: the frequency of the last is 10⁹.
+const MAX_OCTAVES: i32 = 30;
+const FLOAT_CLASSES: &[&str] = &[
+    "constant",
+    "scale",
+    "mix",
+    "directionmix",
+    "checkerboard",
+    "imagemap",
+    "fbm",
+    "wrinkled",
+    "windy",
+    "dots",
+    "bilerp",
+];
+const RGB_CLASSES: &[&str] =
+    &["constant", "scale", "mix", "directionmix", "checkerboard", "imagemap", "marble", "dots", "bilerp"];
+
+fn octaves(p: &ParamSet, d: &mut Diagnostics) -> Octaves {
+    let roughness = p.float("roughness", d).unwrap_or(0.5);
+    let count = match p.integer("octaves", d).unwrap_or(8) {
+        count @ 0..=MAX_OCTAVES => count as u32,
+        other => {
+            d.error(p.span_of("octaves"), format!("octaves must be from 0 to {MAX_OCTAVES}, not {other}"));
+            0
+        }
+    };
+    Octaves { count, roughness }
+}
+
+/// A class that is not rendered, or that there is not.
+fn wrong_class(class: &str, name: &Name, known: &[&str], d: &mut Diagnostics) {
+    if class == "ptex" {
+        d.warning_once(name.span, "texture `ptex` is not rendered: it is constant 0.5");
+    } else {
+        unknown(class, name.span, "texture class", known, d);
     }
 }

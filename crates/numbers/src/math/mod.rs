@@ -5,7 +5,8 @@
 //! `to_from`; colour is linear Rec.709; angles are radians; f32 for light.
 //!
 //! Reading order: [`rgb`], [`frame`], [`transform`], [`ray`], [`bounds`], [`warp`], [`sphere_map`], [`octahedral`],
-//! [`cumulative`], [`distribution`], [`alias`], [`hash`], [`number`].
+//! [`cumulative`], [`distribution`], [`alias`], [`hash`], [`noise`],
+//! [`number`].
 
 pub mod alias;
 pub mod bounds;
@@ -13,6 +14,7 @@ pub mod cumulative;
 pub mod distribution;
 pub mod frame;
 pub mod hash;
+pub mod noise;
 pub mod number;
 pub mod octahedral;
 pub mod ray;

@@ -1,7 +1,7 @@
 //! Gradient noise in three dimensions [Perlin 2002], with the permutation of that paper, so that clouds are those of
 //! other renderers.
 
-use lumiris_numbers::math::Vec3;
+use super::Vec3;
 
 /// A permutation of 0..=255.
 const PERMUTATION: [u8; 256] = [
