@@ -206,7 +206,7 @@ impl<'a> Assembly<'a> {
     /// The medium inside of a material.
     fn interior(&mut self, look: &Look, medium: &Homogeneous) -> MediumId {
         *self.interiors.entry(look.material).or_insert_with(|| {
-            self.media.media.push(Medium::Homogeneous(medium.clone()));
+            self.media.media.push(Medium::Homogeneous(*medium));
             self.media.names.push(self.materials.entries[look.material as usize].name.clone());
             (self.media.media.len() - 1) as MediumId
         })

@@ -227,7 +227,7 @@ fn absorption(place: &Place<'_>) -> Option<Homogeneous> {
     let is_filled =
         place.extension("KHR_materials_transmission").exists() && factor(&volume.key("thicknessFactor"), 0.0) > 0.0;
     let sigma_a = color.map(|c| -c.clamp(LEAST_COLOR, 1.0).ln() / distance);
-    (is_filled && !sigma_a.is_black()).then(|| Homogeneous { sigma_a, sigma_s: Rgb::BLACK, le: Rgb::BLACK, g: 0.0 })
+    (is_filled && !sigma_a.is_black()).then_some(Homogeneous { sigma_a, sigma_s: Rgb::BLACK, le: Rgb::BLACK, g: 0.0 })
 }
 
 /// Says what is rendered in another way than the extensions have it.
