@@ -7,11 +7,12 @@ use super::settings::{load_job, render_settings};
 use super::settings_args::SettingsArgs;
 use anyhow::Context;
 use clap::Args;
+use lumiris::integrators::through_media;
 use lumiris::lights::LightSamplerKind;
 use lumiris::render::efficiency::{Case, Row, measure_efficiency};
 use lumiris::settings::{EstimatorKind, IntegratorKind, Settings};
 use serde_json::{Value, json};
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 
 /// Options of `bench efficiency`.
 #[derive(Args, Clone, Debug)]
@@ -80,7 +81,10 @@ pub(super) fn efficiency(scene_args: &SceneArgs, own: &EfficiencyArgs) -> anyhow
         let kinds = if own.integrators.is_empty() { &given[..] } else { &own.integrators };
         for &kind in kinds {
             let base = Settings { integrator: base.integrator.of_kind(kind), ..base };
-            let cases = cases(own, &base);
+            let mut cases = cases(own, &base);
+            if !job.world.scene.media.is_empty() {
+                cases.retain(|case| is_possible(case, path));
+            }
             let of_scene = render_settings(&scene, &job);
             let rows = measure_efficiency(&mut job, &cases, own.seeds, &of_scene, &mut |name, seed| {
                 progress::say(&format!("{}: {name}, seed {seed}", path.display()));
@@ -95,6 +99,15 @@ pub(super) fn efficiency(scene_args: &SceneArgs, own: &EfficiencyArgs) -> anyhow
         }
     }
     Ok(tables.into())
+}
+
+/// Says why a case is left out of a scene with media, if it is.
+fn is_possible(case: &Case, scene: &Path) -> bool {
+    let obstacle = through_media::obstacle_of(&case.settings.integrator);
+    if let Some(obstacle) = &obstacle {
+        progress::say(&format!("{}: {} is left out: {obstacle}", scene.display(), case.name));
+    }
+    obstacle.is_none()
 }
 
 fn cases(args: &EfficiencyArgs, base: &Settings) -> Vec<Case> {
