@@ -85,6 +85,9 @@ pub(super) fn efficiency(scene_args: &SceneArgs, own: &EfficiencyArgs) -> anyhow
             if !job.world.scene.media.is_empty() {
                 cases.retain(|case| is_possible(case, path));
             }
+            if cases.is_empty() {
+                continue;
+            }
             let of_scene = render_settings(&scene, &job);
             let rows = measure_efficiency(&mut job, &cases, own.seeds, &of_scene, &mut |name, seed| {
                 progress::say(&format!("{}: {name}, seed {seed}", path.display()));
