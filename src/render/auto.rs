@@ -26,7 +26,7 @@ use super::auto_measure::{SEED, blocks, measure, pixels};
 use super::auto_reuse;
 pub use super::auto_round::Trial;
 use super::auto_round::{Candidate, Difference, Round};
-use super::visibility_cache::build_visibility_cache;
+use super::visibility_cache::{PHOTON_PATHS, build_visibility_cache};
 use super::{RenderSettings, Run, processor_time};
 use crate::film::PixelBounds;
 use crate::integrators::reuse;
@@ -66,8 +66,11 @@ const MANY: u32 = 3;
 
 /// Lights from which on photons may tell which of them contribute.
 const MANY_LIGHTS: usize = 16;
-/// Time of an image beside which that of the photons is small (ns).
-const LONG: f64 = 5e9;
+/// Time of a photon path (ns), about, and the share of an image's time that photons may take.
+const PHOTON_TIME: f64 = 2000.0;
+const PHOTON_SHARE: f64 = 0.1;
+/// Fewest photon paths that tell enough.
+const MIN_PHOTONS: f64 = 65_536.0;
 
 /// Numbers of samples that are compared where light is direct: a quarter are BSDF samples.
 const DIRECT: [u32; 9] = [2, 4, 8, 12, 16, 24, 32, 48, 64];
@@ -361,16 +364,23 @@ fn second_round(base: &IntegratorSettings, best: [u32; 2]) -> Vec<Candidate> {
     candidates
 }
 
-/// Candidates that know by photons which lights contribute at a place, if there are many lights and a camera sample takes
-/// so long that the photons, which are traced for them, take little of the image's time.
+/// Candidates that know by photons which lights contribute at a place, if there are many lights and the image takes
+/// so long that photons enough take little of its time.
 fn with_photons(job: &mut RenderJob, nanoseconds: f64) -> Vec<Candidate> {
-    let Settings { integrator: base, sampling } = *job.settings();
+    let Settings { integrator: mut base, sampling } = *job.settings();
     let samples = job.world.scene.film.bounds.area() as f64 * f64::from(sampling.spp);
-    if job.lights.lights.len() < MANY_LIGHTS || samples * nanoseconds < LONG {
+    let affordable = samples * nanoseconds * PHOTON_SHARE / PHOTON_TIME;
+    let given = base.photons.visibility_photons;
+    if job.lights.lights.len() < MANY_LIGHTS || affordable < given.map_or(MIN_PHOTONS, f64::from) {
         return Vec::new();
     }
+    if affordable < PHOTON_PATHS as f64 {
+        base.photons.visibility_photons = given.or(Some(affordable as u32));
+    }
     let start = processor_time::of_process();
+    job.change(|s| s.integrator.photons.visibility_photons = base.photons.visibility_photons);
     let cache = build_visibility_cache(job);
+    job.change(|s| s.integrator.photons.visibility_photons = given);
     let preparation = (processor_time::of_process() - start).as_secs_f64() * 1e9 / samples;
     job.lights.set_visibility_cache(cache.map(|(cache, _)| cache));
     let contributing = |n: u32| {

@@ -11,8 +11,8 @@ use crate::settings::IntegratorKind;
 use lumiris_numbers::math::Vec3;
 use lumiris_numbers::math::hash::{pcg4d, unit_f32};
 
-/// Photon paths.
-const PATHS: u64 = 1 << 18;
+/// Photon paths, unless a number is given.
+pub(super) const PHOTON_PATHS: u64 = 1 << 18;
 /// Fraction of the photon paths distributed evenly over the lights: a weak light next to a surface matters as much as a
 /// strong one far away.
 const UNIFORM_FRACTION: f32 = 0.25;
@@ -25,7 +25,7 @@ const IMPORTON_SEED: u32 = 0x6c69_6768;
 /// with their number. `None` if no photon arrives at a surface: estimates then do without a cache.
 pub fn build_visibility_cache(job: &RenderJob) -> Option<(VisibilityCache, usize)> {
     let lights = &job.lights;
-    let paths = job.settings().integrator.photons.visibility_photons.map_or(PATHS, u64::from);
+    let paths = job.settings().integrator.photons.visibility_photons.map_or(PHOTON_PATHS, u64::from);
     let seen = seen_points(job);
     let weights = weights_at(job, &seen);
     let tracing = Tracing {
