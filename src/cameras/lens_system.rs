@@ -208,24 +208,30 @@ impl LensSystem {
 
     /// Where light of a ring of the film passes the rear plane; nothing: a pupil of negative size.
     fn pupil(&self, ring: usize) -> Pupil {
-        let half = SEARCHED * self.elements[self.elements.len() - 1].aperture_radius;
-        let cell = 2.0 * half / SEARCH[0] as f64;
+        let half = DVec2::splat(SEARCHED * self.elements[self.elements.len() - 1].aperture_radius);
+        let everywhere = Pupil { min: -half, max: half, middle: DVec2::ZERO };
+        // Of a narrow stop, the first search finds few points, and the second those around them
+        let found = self.search(ring, &everywhere).and_then(|near| self.search(ring, &near));
+        found.unwrap_or(Pupil { min: DVec2::ZERO, max: DVec2::NEG_INFINITY, middle: DVec2::ZERO })
+    }
+
+    /// Where light of a ring passes a rectangle of the rear plane.
+    fn search(&self, ring: usize, within: &Pupil) -> Option<Pupil> {
+        let cell = (within.max - within.min) / SEARCH[0] as f64;
         let (mut min, mut max, mut sum, mut count) = (DVec2::INFINITY, DVec2::NEG_INFINITY, DVec2::ZERO, 0.0);
         for place in 0..SEARCH[1] {
             let fraction = (ring as f64 + place as f64 / (SEARCH[1] - 1) as f64) / RINGS as f64;
             let film = DVec2::X * fraction * self.film_radius;
             for k in 0..SEARCH[0] * SEARCH[0] {
-                let at = DVec2::new((k % SEARCH[0]) as f64 + 0.5, (k / SEARCH[0]) as f64 + 0.5) * cell - half;
+                let cells = DVec2::new((k % SEARCH[0]) as f64 + 0.5, (k / SEARCH[0]) as f64 + 0.5);
+                let at = within.min + cells * cell;
                 if self.through(film, at).is_some() {
                     (min, max, sum, count) = (min.min(at), max.max(at), sum + at, count + 1.0);
                 }
             }
         }
-        if count == 0.0 {
-            return Pupil { min: DVec2::ZERO, max: DVec2::NEG_INFINITY, middle: DVec2::ZERO };
-        }
         // What the search misses is less than a cell away
-        Pupil { min: min - cell, max: max + cell, middle: sum / count }
+        (count > 0.0).then(|| Pupil { min: min - cell, max: max + cell, middle: sum / count })
     }
 }
 

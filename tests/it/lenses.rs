@@ -61,6 +61,9 @@ fn an_even_sky_gives_the_irradiance_of_the_stop() {
     // f/4: half of the diameter that makes f/2
     let [middle, corner] = [sky[20 * 60 + 30], sky[0]];
     assert!((middle / (PI / 64.0) - 1.0).abs() < 0.1, "{middle}");
+    // Without a diameter, the stop is 1 mm wide, as in pbrt-v4
+    let narrow = image("\"realistic\" \"string lensfile\" \"double-gauss.dat\"", SKY)[20 * 60 + 30];
+    assert!((middle / narrow / 8.55_f64.powi(2) - 1.0).abs() < 0.05, "{middle} {narrow}");
     // Less towards the corners: cos⁴θ for 43.27/2 mm at 50 mm, and what the rims take
     let cos4 = (1.0 + (21.6_f64 / 50.0).powi(2)).powi(-2);
     assert!(corner / middle < cos4 * 1.1 && corner / middle > 0.3 * cos4, "{corner} {middle}");

@@ -112,5 +112,11 @@ fn objects_that_hold_themselves_or_too_much_are_errors() {
         writeln!(text, "ObjectBegin \"{level}\" {inner}{inner} ObjectEnd").unwrap();
     }
     let error = of(&format!("{text}ObjectInstance \"30\""));
+    let mut deep = format!("ObjectBegin \"0\" {SHAPE} ObjectEnd\n");
+    for level in 1..=30_000 {
+        writeln!(deep, "ObjectBegin \"{level}\" ObjectInstance \"{}\" ObjectEnd", level - 1).unwrap();
+    }
+    let loaded = load(&format!("{WORLD}{deep}ObjectInstance \"30000\"")).unwrap();
+    assert_eq!(loaded.scene.geometry.instances.len(), 30_001);
     assert!(error.contains("2147483647 instances; at most 100000000"), "{error}");
 }

@@ -32,19 +32,17 @@ impl Objects<'_> {
         }
         let mut placed = Vec::with_capacity(all as usize);
         for instance in instances {
-            self.place_one(instance.object, instance.ctm.samples(self.shutter), &mut placed);
+            // Not by recursion: nothing limits how deep objects nest
+            let mut open = vec![(instance.object, instance.ctm.samples(self.shutter))];
+            while let Some((object, placement)) = open.pop() {
+                for (group, within) in &self.moving[object] {
+                    placed.push(Instance { group: *group, world_from_group: compose_placements(&placement, within) });
+                }
+                let within = |i: &InstanceDesc| compose_placements(&placement, &i.ctm.samples(self.shutter));
+                open.extend(self.objects[object].instances.iter().map(|i| (i.object, within(i))));
+                placed.push(Instance { group: object as GroupId, world_from_group: placement });
+            }
         }
         Ok(placed)
-    }
-
-    fn place_one(&self, object: usize, placement: Vec<Affine3A>, placed: &mut Vec<Instance>) {
-        for (group, within) in &self.moving[object] {
-            placed.push(Instance { group: *group, world_from_group: compose_placements(&placement, within) });
-        }
-        for instance in &self.objects[object].instances {
-            let within = instance.ctm.samples(self.shutter);
-            self.place_one(instance.object, compose_placements(&placement, &within), placed);
-        }
-        placed.push(Instance { group: object as GroupId, world_from_group: placement });
     }
 }

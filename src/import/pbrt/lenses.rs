@@ -8,6 +8,9 @@ use lumiris_formats::number::numbers_of_text;
 use lumiris_formats::pbrt::params::ParamSet;
 use std::path::{Path, PathBuf};
 
+/// Diameter of the stop unless one is given, as in pbrt-v4 (mm).
+const APERTURE: f32 = 1.0;
+
 /// The files that a camera names.
 pub(super) fn files(p: &ParamSet, folder: &Path) -> Vec<PathBuf> {
     // What is wrong with the parameters has been said
@@ -37,16 +40,14 @@ pub(super) fn realistic(p: &ParamSet, folder: &Path, diagonal: f32, d: &mut Diag
             return None;
         }
     };
-    if p.float("aperturediameter", d).is_some() {
-        let stop = f64::from(positive(p, "aperturediameter", 1.0, d)) / 1000.0 / 2.0;
-        for element in elements.iter_mut().filter(|e| e.curvature_radius == 0.0) {
-            if stop > element.aperture_radius {
-                let widest = (element.aperture_radius * 2000.0) as f32;
-                let message = format!("the aperture of these lenses is {widest} mm at most, which it has here");
-                d.warning_once(p.span_of("aperturediameter"), message);
-            }
-            element.aperture_radius = stop.min(element.aperture_radius);
+    let stop = f64::from(positive(p, "aperturediameter", APERTURE, d)) / 1000.0 / 2.0;
+    for element in elements.iter_mut().filter(|e| e.curvature_radius == 0.0) {
+        if stop > element.aperture_radius {
+            let widest = (element.aperture_radius * 2000.0) as f32;
+            let message = format!("the aperture of these lenses is {widest} mm at most, which it has here");
+            d.warning_once(p.span_of("aperturediameter"), message);
         }
+        element.aperture_radius = stop.min(element.aperture_radius);
     }
     let focus = positive(p, "focusdistance", 10.0, d);
     let aperture = aperture(p, folder, d)?;
