@@ -66,6 +66,7 @@ test-python: setup
 	  PATH="$(dir $(CARGO)):$$PATH" "$$environment/bin/maturin" build --quiet --profile dev --locked \
 	    --manifest-path python/Cargo.toml --out target/python/wheels && \
 	  "$$environment/bin/pip" install --quiet --disable-pip-version-check --force-reinstall --no-deps target/python/wheels/*.whl && \
+	  { [ -n "$$LUMIRIS_OIDN" ] || LUMIRIS_OIDN=$$(.ci/open-image-denoise.sh) || LUMIRIS_OIDN=; } && export LUMIRIS_OIDN && \
 	  cd python && LUMIRIS=../target/debug/lumiris "$$environment/bin/pytest" -q && \
 	  "$$environment/bin/python" -m mypy lumiris tests
 

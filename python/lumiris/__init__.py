@@ -6,10 +6,11 @@
 (400, 600, 3)
 
 `render` gives layers of arrays, `read` and `write` are for EXR and other files, `compare` has the metrics of
-`lumiris compare`, and `lumiris.estimators` the estimators themselves. `settings` lists what can be set.
+`lumiris compare`, `denoise` is Open Image Denoise, and `lumiris.estimators` are the estimators themselves. `settings` lists what can be set.
 """
 
 from ._compare import Comparison, compare
+from ._denoise import denoise
 from ._image import Layers, read, write
 from ._lumiris import Progress, SceneError, __version__
 from ._render import Rendering, SceneWarning, Setting, render, settings
@@ -25,6 +26,7 @@ __all__ = [
     "Setting",
     "__version__",
     "compare",
+    "denoise",
     "estimators",
     "read",
     "render",

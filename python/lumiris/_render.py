@@ -137,7 +137,9 @@ def render(
     environment: Optional[Path] = None,
     camera_auto: bool = False,
     time_in_scene: Optional[float] = None,
+    texture_memory: Union[None, int, str] = None,
     aov: Optional[Sequence[str]] = None,
+    cryptomatte: Sequence[str] = (),
     **settings: Unpack[Settings],
 ) -> Rendering:
     """Renders a scene; the same bits as `lumiris render` with the same options.
@@ -170,6 +172,12 @@ def render(
     aov
         Layers beside the image: `variance`, `samples`, `albedo`, `normal`, `depth`, `material`, `object`, `ratio`, `records`.
         None asks for all that there are; an empty list saves the time for them.
+    texture_memory
+        Most bytes that textures take in memory, as a number or a text such as `2G`; others are read by tiles from a
+        temporary file. The image is the same.
+    cryptomatte
+        Cryptomatte layers of ids and coverage: `object`, `material`, or both. Their names of ids are metadata; `lumiris.write`
+        makes a file of them that compositing programs read.
     settings
         The settings of the image, with the names of the command line and `_` for `-`; see `lumiris.settings()`. Values are
         text as on the command line, numbers, or pairs of numbers; None leaves a setting to the scene. True is what an
@@ -199,6 +207,8 @@ def render(
         "environment": None if environment is None else os.fspath(environment),
         "camera_auto": camera_auto,
         "time_in_scene": time_in_scene,
+        "texture_memory": None if texture_memory is None else str(texture_memory),
+        "cryptomatte": [cryptomatte] if isinstance(cryptomatte, str) else list(cryptomatte),
         "aov": None if aov is None else list(aov),
         "interval": interval,
         "settings": _texts(settings),

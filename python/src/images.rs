@@ -24,6 +24,17 @@ pub(crate) fn arrays<'py>(py: Python<'py>, layers: Vec<(String, Image)>) -> PyRe
     layers.into_iter().map(|(name, image)| Ok((name, image.channels.clone(), array(py, image)?))).collect()
 }
 
+/// The layers of an image by the names of its channels.
+pub(crate) fn split(image: &Image) -> Vec<(String, Image)> {
+    let stride = image.channels.len();
+    let image_of = |layer: lumiris::imaging::Layer| {
+        let channels = image.channels[layer.channels.clone()].to_vec();
+        let pixels = image.data.chunks_exact(stride).flat_map(|pixel| &pixel[layer.channels.clone()]);
+        (layer.name, Image { width: image.width, height: image.height, channels, data: pixels.copied().collect() })
+    };
+    layers(&image.channels).into_iter().map(image_of).collect()
+}
+
 /// The exception of an image that cannot be read or written.
 pub(crate) fn image_error(error: ImageError) -> PyErr {
     let text = error.to_string();
@@ -46,18 +57,15 @@ pub(crate) fn read(
 ) -> PyResult<(Vec<Layer<'_>>, BTreeMap<String, String>, Place)> {
     let read = py.detach(|| oiio::read_part(&path, part, &ReadLimits::default())).map_err(image_error)?;
     let size = [read.image.width, read.image.height];
-    let (image, encoding) = (read.image, read.encoding);
+    let (mut image, encoding) = (read.image, read.encoding);
     let found = py.detach(|| {
-        let stride = image.channels.len();
-        let image_of = |layer: lumiris::imaging::Layer| {
-            let channels = image.channels[layer.channels.clone()].to_vec();
+        let Image { channels, data, .. } = &mut image;
+        for pixel in data.chunks_exact_mut(channels.len()) {
             // Opacity is never encoded
-            let decode = |c: usize, v: f32| if channels[c] == "A" { v } else { encoding.to_linear(v) };
-            let pixels = image.data.chunks_exact(stride).flat_map(|pixel| &pixel[layer.channels.clone()]);
-            let data = pixels.enumerate().map(|(i, v)| decode(i % channels.len(), *v)).collect();
-            (layer.name, Image { width: size[0], height: size[1], channels, data })
-        };
-        layers(&image.channels).into_iter().map(image_of).collect()
+            let encoded = pixel.iter_mut().zip(channels.iter()).filter(|(_, name)| *name != "A");
+            encoded.for_each(|(v, _)| *v = encoding.to_linear(*v));
+        }
+        split(&image)
     });
     Ok((arrays(py, found)?, read.metadata, place(&read.window, size)))
 }

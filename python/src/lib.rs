@@ -4,10 +4,11 @@
 //! memory, nothing is copied. What takes long runs without the GIL.
 //!
 //! Reading order: `settings` (keyword arguments), `images` (arrays and files), `render` with what its callback sees
-//! (`progress`), `compare`, `estimators`.
+//! (`progress`), `compare`, `denoise`, `estimators`.
 #![cfg(feature = "module")]
 
 mod compare;
+mod denoise;
 mod estimators;
 mod images;
 mod progress;
@@ -27,6 +28,7 @@ fn _lumiris(module: &Bound<'_, PyModule>) -> PyResult<()> {
     module.add_function(wrap_pyfunction!(images::write, module)?)?;
     module.add_function(wrap_pyfunction!(render::render, module)?)?;
     module.add_function(wrap_pyfunction!(compare::compare, module)?)?;
+    module.add_function(wrap_pyfunction!(denoise::denoise, module)?)?;
     module.add_function(wrap_pyfunction!(estimators::mis, module)?)?;
     module.add_function(wrap_pyfunction!(estimators::ris_draws, module)?)?;
     module.add_function(wrap_pyfunction!(estimators::ocv, module)?)?;

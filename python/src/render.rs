@@ -1,18 +1,20 @@
 //! Rendering: the work in a thread of its own, and the calling thread, which calls back and watches for Ctrl-C.
 
-use crate::images::{Layer, Place, arrays};
+use crate::images::{Layer, Place, arrays, split};
 use crate::progress::{Canvas, PassProgress};
 use crate::settings::{Given, apply, parse, parse_plan};
-use lumiris::film::Film;
 use lumiris::film::filter::PixelFilter;
+use lumiris::film::{Film, PixelBounds};
 use lumiris::imaging::Image;
 use lumiris::import::cache::FileCache;
-use lumiris::import::{LoadOptions, Loaded, load, load_text};
+use lumiris::import::{LoadOptions, Loaded, load_text, load_with};
 use lumiris::render::allocation::complete_for_noise;
+use lumiris::render::cryptomatte::{Cryptomatte, cryptomattes};
 use lumiris::render::output::{self, Aov};
 use lumiris::render::plan::prepare;
 use lumiris::render::{Continuation, Progress, RenderSettings, Rendering, go_on};
 use lumiris::scene::{AccelKind, RenderJob};
+use lumiris::settings::value::{Kind, Value};
 use lumiris_formats::diagnostic::Report;
 use lumiris_formats::source::Position;
 use pyo3::exceptions::{PyException, PyRuntimeError, PyValueError};
@@ -53,7 +55,9 @@ pub(crate) struct Options {
     environment: Option<PathBuf>,
     camera_auto: bool,
     time_in_scene: Option<f32>,
+    texture_memory: Option<String>,
     aov: Option<Vec<String>>,
+    cryptomatte: Vec<String>,
     interval: f64,
     settings: Vec<(String, String)>,
     plan: Vec<(String, String)>,
@@ -63,11 +67,14 @@ pub(crate) struct Options {
 struct Request {
     source: Source,
     load: LoadOptions,
+    /// Most bytes of textures in memory.
+    texture_memory: Option<u64>,
     box_filter: bool,
     accel: AccelKind,
     packet_width: Option<u32>,
     render: RenderSettings,
     aov: Option<Vec<Aov>>,
+    cryptomatte: Vec<Cryptomatte>,
     interval: Duration,
     settings: Given,
     plan: Given,
@@ -107,6 +114,12 @@ impl Options {
             |name: &String| name.parse().map_err(|_| PyValueError::new_err(format!("aov: there is no `{name}`")));
         let aov =
             self.aov.as_ref().map(|list| list.iter().map(parse_aov).collect::<PyResult<Vec<Aov>>>()).transpose()?;
+        let cryptomatte = |name: &String| {
+            name.parse()
+                .map_err(|_| PyValueError::new_err(format!("cryptomatte: expected object or material, not `{name}`")))
+        };
+        let cryptomatte = self.cryptomatte.iter().map(cryptomatte).collect::<PyResult<Vec<Cryptomatte>>>()?;
+        let texture_memory = self.texture_memory.as_deref().map(bytes).transpose()?;
         if self.resolution.is_some_and(|size| size.iter().any(|n| !(1..=65_536).contains(n))) {
             return wrong("resolution: expected two whole numbers from 1 to 65536".to_owned());
         }
@@ -145,11 +158,13 @@ impl Options {
                 camera_auto: self.camera_auto,
                 time: self.time_in_scene,
             },
+            texture_memory,
             box_filter: self.box_filter,
             accel,
             packet_width: self.packet_width,
             render,
             aov,
+            cryptomatte,
             interval: seconds("interval", self.interval)?,
             settings: parse(&self.settings)?,
             plan: parse_plan(&self.plan)?,
@@ -160,9 +175,13 @@ impl Options {
 impl Request {
     /// Loads the scene and applies the settings.
     fn load(&self) -> Result<Loaded, Failure> {
+        let files = FileCache::default();
+        if let Some(bytes) = self.texture_memory {
+            files.limit_textures(bytes);
+        }
         let loaded = match &self.source {
-            Source::File(path) => load(path, &self.load),
-            Source::Text((text, name, folder)) => load_text(text, name, folder, &self.load, &FileCache::default()),
+            Source::File(path) => load_with(path, &self.load, &files),
+            Source::Text((text, name, folder)) => load_text(text, name, folder, &self.load, &files),
         };
         let mut loaded = loaded.map_err(Failure::Scene)?;
         apply(&self.plan, &mut loaded.settings);
@@ -211,11 +230,20 @@ impl Request {
         let aovs = self.aov.clone();
         let has = (job.sample_count_map.is_some(), rendering.cache.is_some());
         let aovs = aovs.unwrap_or_else(|| output::default_aovs(&rendering.film, has.0, has.1));
-        let layers = output::layers(&rendering.film, &aovs, job.sample_count_map.as_ref());
+        let mut layers = output::layers(&rendering.film, &aovs, job.sample_count_map.as_ref());
+        let mut metadata = self.metadata(&job, &rendering);
+        for ids in cryptomattes(&job, &settings, &rendering.film, &self.cryptomatte).map_err(|error| other(&error))? {
+            let PixelBounds { x0, y0, x1, y1 } = rendering.film.bounds;
+            let size = [x1 - x0, y1 - y0].map(|n| n as usize);
+            let image =
+                Image { width: size[0], height: size[1], channels: ids.channels.clone(), data: ids.rows(y0..y1) };
+            layers.extend(split(&image));
+            metadata.extend(ids.metadata);
+        }
         let Film { bounds, resolution, .. } = &rendering.film;
         Ok(Done {
             layers,
-            metadata: self.metadata(&job, &rendering),
+            metadata,
             place: ([bounds.x0 as usize, bounds.y0 as usize], resolution.map(|n| n as usize)),
             plan: plan.chosen,
             complete: rendering.complete,
@@ -231,6 +259,15 @@ impl Request {
         metadata.push(("lumiris:accel".to_owned(), <&str>::from(self.accel).to_owned()));
         metadata.extend(output::progress_metadata(rendering));
         metadata
+    }
+}
+
+/// A number of bytes, as on the command line.
+fn bytes(text: &str) -> PyResult<u64> {
+    match Kind::Bytes.parse(text) {
+        Ok(Value::Integer(bytes)) => Ok(bytes),
+        Ok(_) => Err(PyValueError::new_err("texture_memory: expected a number of bytes")),
+        Err(expected) => Err(PyValueError::new_err(format!("texture_memory: {expected}, but found `{text}`"))),
     }
 }
 

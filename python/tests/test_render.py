@@ -128,6 +128,8 @@ def test_none_leaves_a_setting_and_old_names_are_accepted() -> None:
         ({"time": -1.0}, ValueError, "time"),
         ({"aov": ["fog"]}, ValueError, "fog"),
         ({"accel": "octree"}, ValueError, "accel"),
+        ({"texture_memory": "much"}, ValueError, "texture_memory"),
+        ({"cryptomatte": ["light"]}, ValueError, "cryptomatte: expected object or material, not `light`"),
         ({"noise": 0.1, "spp": 64, "estimator": "ocv"}, ValueError, "noise needs the integrator direct or path"),
         ({"plan": {"colour": "red"}}, ValueError, "there is no setting `colour`"),
         ({"callback": 3}, TypeError, "not callable"),
@@ -179,3 +181,34 @@ def test_a_plan_gives_the_image_that_it_came_from() -> None:
     assert "proposals" in first.plan
     again = lumiris.render(SCENE, **options, plan=first.plan)
     assert np.array_equal(first["beauty"], again["beauty"])
+
+
+def test_textures_beyond_a_limit_give_the_same_image(tmp_path: pathlib.Path) -> None:
+    lumiris.write(tmp_path / "noise.exr", np.random.default_rng(1).random((256, 256, 3), dtype=np.float32))
+    scene = SCENE.replace(
+        'Material "diffuse" "rgb reflectance" [ 0.5 0.25 0.75 ]',
+        'Texture "noise" "spectrum" "imagemap" "string filename" "noise.exr"\n'
+        'Material "diffuse" "texture reflectance" "noise"',
+    )
+    images = [
+        lumiris.render(scene, folder=tmp_path, **TINY, texture_memory=limit)["beauty"] for limit in (None, 100_000, "1K")
+    ]
+    assert len({image.tobytes() for image in images}) == 1
+
+
+def test_cryptomattes_are_those_of_the_program(scene_file: pathlib.Path, program: str) -> None:
+    path = scene_file.with_suffix(".exr")
+    options = ["--spp", "4", "--cryptomatte", "object"]
+    subprocess.run([program, "render", "--quiet", str(scene_file), "-o", str(path), *options], check=True)
+    expected = lumiris.read(path)
+    image = lumiris.render(scene_file, spp=4, cryptomatte=["object"])
+    assert image.keys() == expected.keys()
+    names = [name for name in image if name.startswith("CryptoObject")]
+    assert len(names) == 3
+    for name in names:
+        assert np.array_equal(image[name].view(np.uint32), expected[name].view(np.uint32)), name
+    # The floor and the sphere cover what is no sky
+    coverage = sum(image[name][:, :, 1::2].sum(axis=2) for name in names)
+    assert np.all(coverage <= 1.0 + 1e-6) and np.mean(coverage > 0.99) > 0.5
+    entries = {key: value for key, value in image.metadata.items() if key.startswith("cryptomatte/")}
+    assert entries and all(expected.metadata[key] == value for key, value in entries.items())

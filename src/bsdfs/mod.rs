@@ -3,7 +3,7 @@
 //! is scaled by 1/η².
 //!
 //! Reading order: [`fresnel`], [`microfacet`], [`diffuse`], [`diffuse_transmission`], [`conductor`], [`dielectric`],
-//! [`thin_dielectric`], [`coat_table`], [`coated_diffuse`], [`layered`], `ggx_albedo`, [`principled`], [`hair`]; [`phase`] in media; then what can only be evaluated: [`models`],
+//! [`thin_dielectric`], [`coat_table`], [`coated_diffuse`], [`layered`], `ggx_albedo`, [`sheen`], [`principled`], [`hair`]; [`phase`] in media; then what can only be evaluated: [`models`],
 //! [`default_lobes`], [`evaluated`], [`mod@resample`].
 
 pub mod coat_table;
@@ -23,6 +23,7 @@ pub mod models;
 pub mod phase;
 pub mod principled;
 pub mod resample;
+pub mod sheen;
 #[cfg(test)]
 mod tests;
 pub mod thin_dielectric;

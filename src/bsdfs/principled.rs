@@ -11,11 +11,12 @@
 //! * or is refracted into a solid by [`Dielectric`], whose exact reflectance replaces Schlick's.
 //!
 //! A coat of weight c and albedo S_c lets min(1 − c S_c(wo), 1 − c S_c(wi)) of what is below through: reciprocal, and
-//! never more than is left. Smooth facets are as rough as the smoothest that count as rough, so there are no deltas.
+//! never more than is left. Between them is [`Sheen`], the fuzz of OpenPBR, which has it above the coat. Smooth facets are as rough as the smoothest that count as rough, so there are no deltas.
 
 use super::dielectric::Dielectric;
 use super::fresnel::reflect;
 use super::microfacet::SMOOTH_ALPHA;
+use super::sheen::Sheen;
 use super::{BsdfSample, Lobe, TrowbridgeReitz, ggx_albedo};
 use lumiris_numbers::math::{Rgb, Vec3, warp};
 use std::f32::consts::FRAC_1_PI;
@@ -49,6 +50,8 @@ pub struct Principled {
     pub transmission: f32,
     /// What the glass is.
     pub interior: Interior,
+    /// Fibres on the base.
+    pub sheen: Sheen,
     /// Weight of the coat.
     pub coat: f32,
     /// Facets of the coat; not smooth.
@@ -167,13 +170,18 @@ impl Principled {
 
     /// Value without cosine (1/sr).
     pub fn f(&self, wo: Vec3, wi: Vec3) -> Rgb {
-        let below = if wo.z * wi.z > 0.0 { self.f_reflection(wo, wi) } else { self.f_transmission(wo, wi) };
+        let reflects = wo.z * wi.z > 0.0;
+        let mut below = if reflects { self.f_reflection(wo, wi) } else { self.f_transmission(wo, wi) };
+        if self.sheen.exists() {
+            let sheen = if reflects { self.sheen.f(upper(wo), upper(wi)) } else { Rgb::BLACK };
+            below = below * self.sheen.passes(wo.z, wi.z) + sheen;
+        }
         if self.coat <= 0.0 {
             return below;
         }
         let facets = self.coat_facets();
         let passes = 1.0 - self.coat_albedo(&facets, wo.z).max(self.coat_albedo(&facets, wi.z));
-        let coat = if wo.z * wi.z > 0.0 { self.f_coat(&facets, upper(wo), upper(wi)) } else { Rgb::BLACK };
+        let coat = if reflects { self.f_coat(&facets, upper(wo), upper(wi)) } else { Rgb::BLACK };
         below * passes + coat
     }
 
@@ -226,7 +234,7 @@ impl Principled {
         (single + multiple) * self.base_color * thin
     }
 
-    /// Probabilities in proportion to albedos; multiple scattering is drawn with the diffuse lobe.
+    /// Probabilities in proportion to albedos; multiple scattering and sheen are drawn with the diffuse lobe.
     fn choice(&self, wo: Vec3) -> Choice {
         let [_, diffuse, thin, solid] = self.parts();
         let alpha = self.alpha();
@@ -236,13 +244,15 @@ impl Principled {
         let passes = 1.0 - self.dielectric_facets(mean).albedo(e).average();
         let coat = if self.coat > 0.0 { self.coat_albedo(&self.coat_facets(), wo.z) } else { 0.0 };
         let base = self.base_color.average();
-        let below = 1.0 - coat;
+        let (sheen, left) =
+            if self.sheen.exists() { (self.sheen.albedo(wo.z), self.sheen.passes(wo.z, wo.z)) } else { (0.0, 1.0) };
+        let below = (1.0 - coat) * left;
         let weights = Choice {
             facets: single * below,
             coat,
             thin: thin * base * passes * below,
             solid: solid * below,
-            diffuse: (diffuse * base * passes + multiple) * below,
+            diffuse: (diffuse * base * passes + multiple) * below + sheen * (1.0 - coat),
         };
         let sum = weights.facets + weights.coat + weights.thin + weights.solid + weights.diffuse;
         if !(sum > 0.0) {

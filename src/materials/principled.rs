@@ -3,6 +3,7 @@
 use super::{Textures, distribution_of};
 use crate::bsdfs::Principled;
 use crate::bsdfs::principled::{Interior, rough};
+use crate::bsdfs::sheen::{LEAST_ALPHA, Sheen};
 use crate::textures::{FloatTextureId, RgbTextureId};
 use lumiris_numbers::math::sqr;
 
@@ -27,6 +28,12 @@ pub struct PrincipledMaterial {
     pub transmission: FloatTextureId,
     /// True if glass is a sheet; else a solid.
     pub is_thin: bool,
+    /// Weight of the sheen.
+    pub sheen: FloatTextureId,
+    /// Colour of the sheen.
+    pub sheen_color: RgbTextureId,
+    /// Square root of the sheen's alpha.
+    pub sheen_roughness: FloatTextureId,
     /// Weight of the coat.
     pub coat: FloatTextureId,
     /// Square root of the coat's alpha.
@@ -51,6 +58,10 @@ impl PrincipledMaterial {
             distribution: rough(distribution_of(along, alpha, false)),
             transmission: unit(self.transmission),
             interior: if refracts { Interior::Solid(self.ior) } else { Interior::Thin },
+            sheen: Sheen {
+                color: t.rgb(self.sheen_color).clamp(0.0, 1.0) * unit(self.sheen),
+                alpha: sqr(unit(self.sheen_roughness)).max(LEAST_ALPHA),
+            },
             coat: unit(self.coat),
             coat_distribution: rough(distribution_of(coat_alpha, coat_alpha, false)),
         }

@@ -37,6 +37,7 @@ use crate::settings::{
 };
 use lumiris_numbers::estimators::efficiency::Model;
 use lumiris_numbers::math::hash::pcg4d;
+use lumiris_numbers::samplers::SamplerKind;
 use rayon::prelude::*;
 use serde::{Deserialize, Serialize};
 use std::sync::atomic::AtomicBool;
@@ -75,11 +76,16 @@ const MIN_PHOTONS: f64 = 65_536.0;
 /// Numbers of samples that are compared where light is direct: a quarter are BSDF samples.
 const DIRECT: [u32; 9] = [2, 4, 8, 12, 16, 24, 32, 48, 64];
 /// In paths, one is the BSDF sample by which the path goes on: numbers at first vertices, and at later ones.
-const FIRST: [u32; 11] = [2, 3, 4, 6, 8, 10, 12, 16, 24, 32, 48];
-const LATER: [u32; 8] = [2, 3, 4, 5, 6, 8, 12, 16];
+/// Points of nets are best spread where they are as many as a power of two.
+const FIRST: [u32; 6] = [2, 3, 5, 9, 17, 33];
+const LATER: [u32; 5] = [2, 3, 5, 9, 17];
 /// Samples from which the model is fitted: few and many, in direct light and in paths.
 const FIT_DIRECT: [u32; 2] = [4, 16];
-const FIT_PATH: [u32; 2] = [2, 8];
+const FIT_PATH: [u32; 2] = [2, 5];
+/// What numbers of samples leave of the variance, as a power of these: of independent ones, and of those of nets at first and
+/// later vertices of paths.
+const INDEPENDENT: [f64; 2] = [1.0; 2];
+const OF_NETS: [f64; 2] = [1.25, 1.0];
 /// M/N from which the model of resampling is fitted, and among which it chooses.
 const FIT_RATIOS: [u32; 2] = [2, 16];
 const RATIOS: [u32; 8] = [1, 2, 3, 4, 6, 8, 12, 16];
@@ -95,6 +101,9 @@ pub struct AutoChoice {
     pub cost: [f64; 3],
     /// The model: relative variance A, B_first, B_later.
     pub variance: [f64; 3],
+    /// The model: powers of the numbers of samples, of which the inverse B_first and B_later are for.
+    #[serde(default = "independent")]
+    pub powers: [f64; 2],
     /// Those with other fractions of light samples for lights at infinity.
     #[serde(default)]
     pub lights: Vec<Trial>,
@@ -107,6 +116,10 @@ pub struct AutoChoice {
     pub chosen: String,
     /// Processor time of the pilot (s).
     pub seconds: f64,
+}
+
+fn independent() -> [f64; 2] {
+    INDEPENDENT
 }
 
 /// Chooses, where the settings of `job` ask for it, and changes them; `None` if they do not, or if the image is too small
@@ -164,7 +177,7 @@ pub(super) fn proposals(job: &RenderJob) -> Option<(u32, StageTimes)> {
     };
     let round = pilot.round(job, &FIT_RATIOS.map(with_ratio), FIRST_ROUND);
     let ratios = FIT_RATIOS.map(|ratio| [f64::from(ratio), 1.0]);
-    let model = round.models(&ratios).remove(0);
+    let model = round.models(&ratios, INDEPENDENT).remove(0);
     let [ratio, _] = model.best([&RATIOS, &[1]], NEARLY);
     let of_sample = |nanoseconds: f64| (nanoseconds / f64::from(samples) * 10.0).round().max(1.0) / 10.0;
     let times = StageTimes { t1: of_sample(model.cost[1]), t2: of_sample(model.cost[0]) };
@@ -237,11 +250,15 @@ impl Pilot {
         let first = self.round(job, &candidates, FIRST_ROUND);
         let of_light = |n: u32| if has_later { n - 1 } else { n };
         let numbers: Vec<[f64; 2]> = numbers.iter().map(|n| n.map(|n| f64::from(of_light(n)))).collect();
-        let model = first.models(&numbers).remove(0);
+        let is_net = has_later && job.settings().sampling.sampler != SamplerKind::Independent;
+        let models = first.models(&numbers, if is_net { OF_NETS } else { INDEPENDENT });
+        let model = models[0];
         let light = |numbers: &[u32]| numbers.iter().map(|&n| of_light(n)).collect::<Vec<_>>();
-        let choices = if has_later { [light(&FIRST), light(&LATER)] } else { [light(&DIRECT), vec![few]] };
+        // A power that was fitted is known as far as twice the most that was measured
+        let is_known = |n: &u32| model.powers[0] <= 1.0 || *n <= 2 * many;
+        let known: Vec<u32> = DIRECT.into_iter().filter(is_known).collect();
+        let choices = if has_later { [light(&FIRST), light(&LATER)] } else { [light(&known), vec![few]] };
         let best = model.best(choices.each_ref().map(Vec::as_slice), NEARLY);
-        let predicted = first.predicted(&numbers, best.map(f64::from));
         let best = best.map(|n| if has_later { n + 1 } else { n });
         let trials = first.trials(&candidates);
 
@@ -252,7 +269,15 @@ impl Pilot {
             candidates.retain(|c| through_media::obstacle_of(&c.settings).is_none());
         }
         let second = self.round(job, &candidates, SECOND_ROUND);
-        let chosen = second.choose(&candidates, predicted);
+        let predicted = |candidate: &Candidate| {
+            let n = [0, 1].map(|vertex| candidate.settings.sample_counts_at(vertex).samples);
+            let usual = without_pilot(base);
+            let is_of_model =
+                candidate.settings == with_samples(base, n) || candidate.settings == usual && n == [few; 2];
+            is_of_model.then(|| Round::predicted(&models, n.map(|n| f64::from(of_light(n)))))
+        };
+        let predicted: Vec<_> = candidates.iter().map(predicted).collect();
+        let chosen = second.choose(&candidates, &predicted);
         let second = second.trials(&candidates);
         let shared = self.share(job, &candidates[chosen].settings, &model);
         if !candidates[chosen].settings.uses_visibility_cache() {
@@ -263,6 +288,7 @@ impl Pilot {
             spp: self.spp,
             cost: model.cost,
             variance: model.variance,
+            powers: model.powers,
             chosen: Candidate::named(shared.1).name,
             seconds: (processor_time::of_process() - start).as_secs_f64(),
             lights,
@@ -339,8 +365,10 @@ impl Pilot {
 fn other_numbers(base: &IntegratorSettings, best: [u32; 2]) -> IntegratorSettings {
     let usual = [0, 1].map(|vertex| without_pilot(base).sample_counts_at(vertex).samples);
     let is_far = (0..2).any(|k| best[k] >= MANY * usual[k]);
-    let halfway = [0, 1].map(|k| (f64::from(usual[k]) * f64::from(best[k])).sqrt().round() as u32);
-    with_samples(base, if is_far { halfway } else { best.map(|n| 2 * n) })
+    // In paths, one of them is the BSDF sample
+    let other = u32::from(base.depth() > 1);
+    let halfway = |k: usize| (f64::from(usual[k] - other) * f64::from(best[k] - other)).sqrt().round() as u32;
+    with_samples(base, [0, 1].map(|k| if is_far { halfway(k) } else { 2 * (best[k] - other) } + other))
 }
 
 /// What is done without a pilot, the best numbers of `mis`, and these with another setting each. None twice.

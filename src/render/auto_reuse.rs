@@ -74,7 +74,7 @@ pub(super) fn model(of_one: &Model, gain: &Gain) -> Model {
     let pixels = f64::from(gain.edge * gain.edge);
     let of_light = v_later * (1.0 - 1.0 / pixels);
     let rest = (v - (gain.variance - of_light).max(0.0)).max(v / pixels);
-    Model { cost: [a + gain.cost, b_first, b_later], variance: [rest, v_first, v_later / pixels] }
+    Model { cost: [a + gain.cost, b_first, b_later], variance: [rest, v_first, v_later / pixels], ..*of_one }
 }
 
 #[cfg(test)]
@@ -97,7 +97,7 @@ mod tests {
     #[test]
     fn the_model_of_shared_paths_has_what_is_left_of_the_variance() {
         // 6 of 8 are shared, 2 of these are of light at later vertices, and 1 is of light at the first
-        let of_one = Model { cost: [9.0, 1.0, 1.0], variance: [5.0, 1.0, 2.0] };
+        let of_one = Model { cost: [9.0, 1.0, 1.0], variance: [5.0, 1.0, 2.0], powers: [1.0; 2] };
         let gain = Gain { edge: 2, cost: 3.0, variance: 6.0 * 0.75 };
         let shared = model(&of_one, &gain);
         assert!((shared.variance([1.0, 1.0]) - (8.0 - 4.5)).abs() < 1e-12, "{shared:?}");

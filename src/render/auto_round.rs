@@ -112,32 +112,37 @@ impl Round {
     }
 
     /// The models by candidates of which the first has the `numbers` that the others have more of: by all pixels, and
-    /// without each of the groups.
-    pub(super) fn models(&self, numbers: &[[f64; 2]]) -> Vec<Model> {
+    /// without each of the groups. `powers` are those of what the numbers leave of the variance.
+    pub(super) fn models(&self, numbers: &[[f64; 2]], powers: [f64; 2]) -> Vec<Model> {
         let variances: Vec<Vec<f64>> = (0..numbers.len()).map(|k| self.variances(k)).collect();
         let of = |i: usize| {
             let measured =
                 |k: usize| Measured { samples: numbers[k], cost: self.measured[k].0, variance: variances[k][i] };
-            Model::fit(&measured(0), [Some(measured(1)), (numbers.len() > 2).then(|| measured(2))])
+            let more = [Some(measured(1)), (numbers.len() > 2).then(|| measured(2))];
+            Model::fit(&measured(0), more, powers)
         };
         (0..variances[0].len()).map(of).collect()
     }
 
-    /// The logarithm of the efficiency with the numbers `best`, relative to the first candidate, by the model, and its
-    /// standard error.
-    pub(super) fn predicted(&self, numbers: &[[f64; 2]], best: [f64; 2]) -> (f64, f64) {
-        let gain = |model: &Model| (model.efficiency(best) / model.efficiency(numbers[0])).ln();
-        jackknife(&self.models(numbers).iter().map(gain).collect::<Vec<_>>())
+    /// The logarithm of the efficiency with other numbers by the models of the pixels of this round: all, and without each
+    /// of the groups.
+    pub(super) fn predicted(models: &[Model], numbers: [f64; 2]) -> Vec<f64> {
+        models.iter().map(|model| model.efficiency(numbers).ln()).collect()
     }
 
-    /// The index of the candidate to be taken. The first one stands for no choice at all; of the second one, the gain over
-    /// that is `predicted` by the pixels of another round.
-    pub(super) fn choose(&self, candidates: &[Candidate], predicted: (f64, f64)) -> usize {
+    /// The index of the candidate to be taken. The first one stands for no choice at all. `predicted` is what a model by the
+    /// pixels of another round says of candidates, where it has them: the gain of one of these over another is known from both.
+    pub(super) fn choose(&self, candidates: &[Candidate], predicted: &[Option<Vec<f64>>]) -> usize {
         (1..candidates.len()).fold(0, |chosen, k| {
             let is_other = candidates[k].settings.estimator != candidates[chosen].settings.estimator;
             let measured = self.gain(k, chosen);
-            let is_predicted = (chosen, k) == (0, 1) && !is_other;
-            let (gain, error) = if is_predicted { united(measured, predicted) } else { measured };
+            let (gain, error) = match (&predicted[k], &predicted[chosen]) {
+                (Some(gains), Some(bases)) => {
+                    let differences: Vec<f64> = gains.iter().zip(bases).map(|(gain, base)| gain - base).collect();
+                    united(measured, jackknife(&differences))
+                }
+                _ => measured,
+            };
             if gain > MIN_GAIN.ln().max(MIN_ERRORS[usize::from(is_other)] * error) { k } else { chosen }
         })
     }
@@ -226,7 +231,7 @@ mod tests {
                     differences.push([d, d * d]);
                 }
             }
-            chosen += Round { measured, spp: 1, is_direct: false }.choose(&candidates, (0.0, f64::INFINITY));
+            chosen += Round { measured, spp: 1, is_direct: false }.choose(&candidates, &[None, None]);
         }
         f64::from(chosen as u32) / 1000.0
     }

@@ -40,7 +40,8 @@ fn triangle() -> Vec<u8> {
         "nodes":[{"mesh":0},{"translation":[0,0,2],"extensions":{"KHR_lights_punctual":{"light":0}}},
                  {"translation":[0,0,3],"camera":0}],
         "cameras":[{"type":"perspective","perspective":{"yfov":0.7,"znear":0.1,"aspectRatio":2}}],
-        "materials":[{"pbrMetallicRoughness":{"baseColorFactor":[1,0.5,0.25,1],"metallicFactor":0}}],
+        "materials":[{"pbrMetallicRoughness":{"baseColorFactor":[1,0.5,0.25,1],"metallicFactor":0},
+            "extensions":{"KHR_materials_sheen":{"sheenColorFactor":[0.2,0.9,0.5],"sheenRoughnessFactor":0.7}}}],
         "meshes":[{"primitives":[{"attributes":{"POSITION":0},"indices":1,"material":0}]}],
         "accessors":[{"bufferView":0,"componentType":5126,"count":3,"type":"VEC3","min":[0,0,0],"max":[1,1,0]},
                      {"bufferView":1,"componentType":5123,"count":3,"type":"SCALAR"}],
@@ -102,6 +103,7 @@ fn a_scene_looks_like_the_same_scene_of_pbrt() {
         WorldBegin
         LightSource "point" "rgb I" [1 1 1] "point3 from" [0 0 2]
         Material "principled" "rgb base_color" [1 0.5 0.25] "float specular_roughness" 1
+            "float fuzz_weight" 1 "rgb fuzz_color" [0.2 0.9 0.5] "float fuzz_roughness" 0.7
         Shape "trianglemesh" "point3 P" [0 0 0  1 0 0  0 1 0] "integer indices" [0 1 2]"#;
     let options = LoadOptions { resolution: Some([64, 32]), ..LoadOptions::default() };
     let of_pbrt = load_text(text, "a.pbrt", folder.path(), &options, &FileCache::default());
@@ -297,6 +299,7 @@ fn numbers_of_principled_materials_outside_of_their_ranges_are_errors_with_place
         ("\"float base_metalness\" 2", "base_metalness must be from 0 to 1, not 2"),
         ("\"float specular_roughness\" -1", "specular_roughness must be from 0 to 1, not -1"),
         ("\"float specular_roughness_anisotropy\" 1.5", "must be from 0 to 1, not 1.5"),
+        ("\"float fuzz_weight\" 1.5", "fuzz_weight must be from 0 to 1, not 1.5"),
         ("\"float specular_ior\" 0", "an index of refraction must be positive, not 0"),
         ("\"rgb base_color\" [0.5 2 0.5]", "base_color must be from 0 to 1, not 0.5 2 0.5"),
         ("\"rgb specular_color\" [0.5 -1 0.5]", "specular_color must be 0 or more, not 0.5 -1 0.5"),

@@ -6,6 +6,7 @@ mod evaluated;
 
 use super::hair::HairLobes;
 use super::principled::Interior;
+use super::sheen::Sheen;
 use super::*;
 use lumiris_numbers::math::{safe_sqrt, sqr, warp};
 use lumiris_test_support::Moments;
@@ -90,7 +91,7 @@ pub(super) fn hair() -> [(&'static str, Hair); 4] {
 }
 
 /// What the principled BSDF can be.
-pub(super) fn principled() -> [(&'static str, Principled); 7] {
+pub(super) fn principled() -> [(&'static str, Principled); 9] {
     let plain = Principled {
         base_color: RED,
         metalness: 0.0,
@@ -99,6 +100,7 @@ pub(super) fn principled() -> [(&'static str, Principled); 7] {
         distribution: ggx(0.25, 0.25),
         transmission: 0.0,
         interior: Interior::Thin,
+        sheen: Sheen { color: Rgb::BLACK, alpha: 0.3 },
         coat: 0.0,
         coat_distribution: ggx(0.1, 0.1),
     };
@@ -110,6 +112,11 @@ pub(super) fn principled() -> [(&'static str, Principled); 7] {
         ("coated", Principled { coat: 0.8, metalness: 0.3, ..plain }),
         ("thin", Principled { transmission: 0.7, ..plain }),
         ("solid", Principled { transmission: 1.0, interior: solid, ..plain }),
+        ("cloth", Principled { sheen: Sheen { color: RED, alpha: 0.3 }, ..plain }),
+        (
+            "velvet",
+            Principled { sheen: Sheen { color: Rgb::WHITE, alpha: 0.09 }, coat: 0.5, transmission: 0.5, ..plain },
+        ),
         ("mixed", Principled { transmission: 0.5, interior: solid, coat: 0.5, metalness: 0.2, ..plain }),
     ]
 }
@@ -301,8 +308,9 @@ fn furnaces_have_their_known_albedo() {
 fn a_white_principled_surface_loses_nothing() {
     let white = |b: Principled| Principled { base_color: Rgb::WHITE, coat: 0.0, ..b };
     for (name, b) in principled().map(|(name, b)| (name, Bsdf::Principled(white(b)))) {
-        if name == "metal" || name == "solid" || name == "mixed" {
-            continue; // Anisotropic tables are approximate; refraction has no multiple scattering.
+        if ["metal", "solid", "cloth", "velvet", "mixed"].contains(&name) {
+            // Anisotropic tables are approximate; refraction has no multiple scattering; sheen leaves less than is left
+            continue;
         }
         for cos in [0.1, 0.5, 1.0] {
             let (wo, mut s, mut mean) = (warp::direction(cos, 0.4), pcg32([2, 4, 6]), 0.0);

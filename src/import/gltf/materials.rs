@@ -39,7 +39,6 @@ const LEAST_COLOR: f32 = 1e-6;
 
 /// Extensions of materials that are left out.
 const LEFT_OUT: &[(&str, &str)] = &[
-    ("KHR_materials_sheen", "sheen is not rendered"),
     ("KHR_materials_iridescence", "thin films are not rendered"),
     ("KHR_materials_dispersion", "dispersion is not rendered"),
     ("KHR_materials_diffuse_transmission", "diffuse transmission is not rendered"),
@@ -122,10 +121,12 @@ impl<'a> Materials<'a> {
         let packed = pbr.key("metallicRoughnessTexture");
         let specular = place.extension("KHR_materials_specular");
         let coat = place.extension("KHR_materials_clearcoat");
+        let sheen = place.extension("KHR_materials_sheen");
         let transmission = place.extension("KHR_materials_transmission");
         let volume = place.extension("KHR_materials_volume");
         let anisotropy = place.extension("KHR_materials_anisotropy").key("anisotropyStrength");
         let color = Rgb::from_array(specular.key("specularColorFactor").numbers().unwrap_or([1.0; 3]));
+        let sheen_color = Rgb::from_array(sheen.key("sheenColorFactor").numbers().unwrap_or([0.0; 3]));
         let t = &mut self.textures;
         let mut number = |place: &Place<'a>, key: &str, default: f32, texture: &Place<'a>, channel: usize| {
             t.scaled(factor(&place.key(key), default), texture, channel, messages)
@@ -154,6 +155,13 @@ impl<'a> Materials<'a> {
             specular: t.opacity_scaled(
                 factor(&specular.key("specularFactor"), 1.0),
                 &specular.key("specularTexture"),
+                messages,
+            )?,
+            sheen: t.float(1.0),
+            sheen_color: t.colored(sheen_color, &sheen.key("sheenColorTexture"), messages)?,
+            sheen_roughness: t.opacity_scaled(
+                factor(&sheen.key("sheenRoughnessFactor"), 0.0),
+                &sheen.key("sheenRoughnessTexture"),
                 messages,
             )?,
             specular_color: t.colored(color, &specular.key("specularColorTexture"), messages)?,

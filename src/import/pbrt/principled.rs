@@ -3,10 +3,12 @@
 //! | parameter | default | range |
 //! |---|---|---|
 //! | `spectrum base_color` | 0.8 | 0 to 1 |
-//! | `float base_metalness`, `transmission_weight`, `coat_weight`, `coat_roughness` | 0 | 0 to 1 |
+//! | `float base_metalness`, `transmission_weight`, `fuzz_weight`, `coat_weight`, `coat_roughness` | 0 | 0 to 1 |
 //! | `float specular_weight` | 1 | 0 to 1 |
 //! | `spectrum specular_color` | 1 | not negative |
 //! | `float specular_roughness` (the square root of alpha) | 0.3 | 0 to 1 |
+//! | `spectrum fuzz_color` | 1 | 0 to 1 |
+//! | `float fuzz_roughness` (the square root of alpha) | 0.5 | 0 to 1 |
 //! | `float specular_ior` | 1.5 | above 0 |
 //! | `float specular_roughness_anisotropy` | 0 | 0 to 1 |
 //! | `bool geometry_thin_walled` | false | |
@@ -35,6 +37,9 @@ impl Builder<'_> {
             specular_color: self.color_up_to(f32::INFINITY, p, ("specular_color", Rgb::WHITE), d),
             transmission: self.unit(p, "transmission_weight", 0.0, d),
             is_thin: p.boolean("geometry_thin_walled", d).unwrap_or(false),
+            sheen: self.unit(p, "fuzz_weight", 0.0, d),
+            sheen_color: self.color_up_to(1.0, p, ("fuzz_color", Rgb::WHITE), d),
+            sheen_roughness: self.unit(p, "fuzz_roughness", 0.5, d),
             coat: self.unit(p, "coat_weight", 0.0, d),
             coat_roughness: self.unit(p, "coat_roughness", 0.0, d),
         })
