@@ -198,7 +198,7 @@ def test_textures_beyond_a_limit_give_the_same_image(tmp_path: pathlib.Path) -> 
 
 def test_cryptomattes_are_those_of_the_program(scene_file: pathlib.Path, program: str) -> None:
     path = scene_file.with_suffix(".exr")
-    options = ["--spp", "4", "--cryptomatte", "object"]
+    options = ["--spp", "4", "--cryptomatte=object"]
     subprocess.run([program, "render", "--quiet", str(scene_file), "-o", str(path), *options], check=True)
     expected = lumiris.read(path)
     image = lumiris.render(scene_file, spp=4, cryptomatte=["object"])
