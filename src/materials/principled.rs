@@ -7,6 +7,35 @@ use crate::bsdfs::sheen::{LEAST_ALPHA, Sheen};
 use crate::textures::{FloatTextureId, RgbTextureId};
 use lumiris_numbers::math::sqr;
 
+/// Strength of the anisotropy, 0..1, of several models: with 0 both alphas are that of the roughness.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub enum Anisotropy {
+    /// `KHR_materials_anisotropy`: along, alpha goes to 1 with the square of the strength.
+    Gltf(f32),
+    /// OpenPBR: the ratio of the alphas is 1 − strength, and the mean of their squares is kept.
+    OpenPbr(f32),
+    /// The ratio is 1 − 0.9 strength, and their product is kept [Burley 2012].
+    Disney(f32),
+}
+
+impl Anisotropy {
+    /// Alphas along and across.
+    fn alphas(self, alpha: f32) -> [f32; 2] {
+        match self {
+            Anisotropy::Gltf(strength) => [alpha + (1.0 - alpha) * sqr(strength.clamp(0.0, 1.0)), alpha],
+            Anisotropy::OpenPbr(strength) => {
+                let ratio = 1.0 - strength;
+                let along = alpha * (2.0 / (1.0 + sqr(ratio))).sqrt();
+                [along, ratio * along]
+            }
+            Anisotropy::Disney(strength) => {
+                let aspect = (1.0 - 0.9 * strength).sqrt();
+                [alpha / aspect, alpha * aspect]
+            }
+        }
+    }
+}
+
 /// Textures of a principled BSDF; weights and colours are clamped to 0..1.
 #[derive(Clone, Copy, Debug)]
 pub struct PrincipledMaterial {
@@ -16,8 +45,8 @@ pub struct PrincipledMaterial {
     pub metalness: FloatTextureId,
     /// Square root of alpha.
     pub roughness: FloatTextureId,
-    /// How far alpha along ∂p/∂u is on the way from alpha to 1, square root.
-    pub anisotropy: f32,
+    /// How alpha differs along ∂p/∂u and across.
+    pub anisotropy: Anisotropy,
     /// Index of refraction.
     pub ior: f32,
     /// Factor of the dielectric's reflectance.
@@ -47,7 +76,7 @@ impl PrincipledMaterial {
         let specular = unit(self.specular);
         let f0 = sqr((self.ior - 1.0) / (self.ior + 1.0));
         let alpha = sqr(unit(self.roughness));
-        let along = alpha + (1.0 - alpha) * sqr(self.anisotropy.clamp(0.0, 1.0));
+        let [along, across] = self.anisotropy.alphas(alpha);
         let coat_alpha = sqr(unit(self.coat_roughness));
         let refracts = !self.is_thin && (self.ior - 1.0).abs() > 1e-3;
         Principled {
@@ -55,7 +84,7 @@ impl PrincipledMaterial {
             metalness: unit(self.metalness),
             f0: (t.rgb(self.specular_color) * f0).clamp(0.0, 1.0) * specular,
             f90: specular,
-            distribution: rough(distribution_of(along, alpha, false)),
+            distribution: rough(distribution_of(along, across, false)),
             transmission: unit(self.transmission),
             interior: if refracts { Interior::Solid(self.ior) } else { Interior::Thin },
             sheen: Sheen {
@@ -65,5 +94,23 @@ impl PrincipledMaterial {
             coat: unit(self.coat),
             coat_distribution: rough(distribution_of(coat_alpha, coat_alpha, false)),
         }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn anisotropy_is_what_each_model_says() {
+        let alpha = 0.25;
+        for none in [Anisotropy::Gltf(0.0), Anisotropy::OpenPbr(0.0), Anisotropy::Disney(0.0)] {
+            assert_eq!(none.alphas(alpha), [alpha; 2], "{none:?}");
+        }
+        assert_eq!(Anisotropy::Gltf(1.0).alphas(alpha), [1.0, alpha]);
+        let [x, y] = Anisotropy::OpenPbr(0.6).alphas(alpha);
+        assert!((y / x - 0.4).abs() < 1e-6 && ((x * x + y * y) / 2.0 - alpha * alpha).abs() < 1e-6, "{x} {y}");
+        let [x, y] = Anisotropy::Disney(0.6).alphas(alpha);
+        assert!((y / x - 0.46).abs() < 1e-6 && (x * y - alpha * alpha).abs() < 1e-6, "{x} {y}");
     }
 }

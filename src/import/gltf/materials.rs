@@ -3,6 +3,7 @@
 use super::Messages;
 use super::textures::{EmissionSource, Textures};
 use crate::import::images::{ImageChannels, ImageEncoding};
+use crate::materials::principled::Anisotropy;
 use crate::materials::{Material, MaterialEntry, MaterialId, NormalMap, PrincipledMaterial};
 use crate::media::Homogeneous;
 use crate::textures::{FloatTexture, FloatTextureId, ImageTexture, RgbTexture, RgbTextureId};
@@ -136,7 +137,7 @@ impl<'a> Materials<'a> {
             base_color,
             metalness: number(&pbr, "metallicFactor", 1.0, &packed, 2)?,
             roughness: number(&pbr, "roughnessFactor", 1.0, &packed, 1)?,
-            anisotropy: factor(&anisotropy, 0.0),
+            anisotropy: Anisotropy::Gltf(factor(&anisotropy, 0.0)),
             // 0 stands for an infinite index
             ior: match factor(&place.extension("KHR_materials_ior").key("ior"), 1.5) {
                 0.0 => MIRROR_IOR,

@@ -13,36 +13,79 @@
 //! | `float specular_roughness_anisotropy` | 0 | 0 to 1 |
 //! | `bool geometry_thin_walled` | false | |
 //!
-//! Values outside of their ranges are errors; those of textures are clamped.
+//! Values outside of their ranges are errors; those of textures are clamped. Parameters have the names that Blender and
+//! Disney's material give them as well ([`SPELLINGS`]); of both,
+//!
+//! * `specular_ior_level` and `specular` (numbers, default 0.5) are half the factor of the reflectance;
+//! * `anisotropic` keeps the product of both alphas, their ratio being 1 − 0.9 times it [Burley 2012];
+//! * `clearcoatgloss` (a number) is a coat whose alpha is 0.1 to 0.001.
 
 use super::state::Builder;
+use crate::materials::principled::Anisotropy;
 use crate::materials::{Material, PrincipledMaterial};
-use crate::textures::{FloatTextureId, RgbTextureId};
+use crate::textures::{FloatTexture, FloatTextureId, RgbTexture, RgbTextureId};
 use lumiris_formats::diagnostic::Diagnostics;
 use lumiris_formats::pbrt::params::{ParamSet, ParamType, SpectrumValue};
 use lumiris_numbers::math::Rgb;
 
+/// Names of OpenPBR, and others of the same meaning.
+const SPELLINGS: &[(&str, &[&str])] = &[
+    ("base_color", &["basecolor"]),
+    ("base_metalness", &["metallic"]),
+    ("specular_roughness", &["roughness"]),
+    ("specular_ior", &["ior", "eta"]),
+    ("specular_color", &["specular_tint"]),
+    ("transmission_weight", &["spectrans"]),
+    ("fuzz_weight", &["sheen_weight", "sheen"]),
+    ("fuzz_color", &["sheen_tint"]),
+    ("fuzz_roughness", &["sheen_roughness"]),
+    ("coat_weight", &["clearcoat"]),
+    ("geometry_thin_walled", &["thin"]),
+];
+
 impl Builder<'_> {
     /// The material that the parameters describe.
     pub(super) fn principled(&mut self, p: &ParamSet, d: &mut Diagnostics) -> Material {
-        let anisotropy = p.float("specular_roughness_anisotropy", d).unwrap_or(0.0);
-        check_unit(anisotropy, p, "specular_roughness_anisotropy", d);
+        let mut name = |name: &'static str| spelled(p, name, d);
+        let [color, metalness, roughness, ior] =
+            ["base_color", "base_metalness", "specular_roughness", "specular_ior"].map(&mut name);
+        let [specular_color, transmission, coat, thin] =
+            ["specular_color", "transmission_weight", "coat_weight", "geometry_thin_walled"].map(&mut name);
+        let fuzz = ["fuzz_weight", "fuzz_color", "fuzz_roughness"].map(&mut name);
         Material::Principled(PrincipledMaterial {
-            base_color: self.color_up_to(1.0, p, ("base_color", Rgb::splat(0.8)), d),
-            metalness: self.unit(p, "base_metalness", 0.0, d),
-            roughness: self.unit(p, "specular_roughness", 0.3, d),
-            anisotropy,
-            ior: self.ior(p, "specular_ior", d),
+            base_color: self.color_up_to(1.0, p, (color, Rgb::splat(0.8)), d),
+            metalness: self.unit(p, metalness, 0.0, d),
+            roughness: self.unit(p, roughness, 0.3, d),
+            anisotropy: anisotropy(p, d),
+            ior: self.ior(p, ior, d),
             specular: self.unit(p, "specular_weight", 1.0, d),
-            specular_color: self.color_up_to(f32::INFINITY, p, ("specular_color", Rgb::WHITE), d),
-            transmission: self.unit(p, "transmission_weight", 0.0, d),
-            is_thin: p.boolean("geometry_thin_walled", d).unwrap_or(false),
-            sheen: self.unit(p, "fuzz_weight", 0.0, d),
-            sheen_color: self.color_up_to(1.0, p, ("fuzz_color", Rgb::WHITE), d),
-            sheen_roughness: self.unit(p, "fuzz_roughness", 0.5, d),
-            coat: self.unit(p, "coat_weight", 0.0, d),
-            coat_roughness: self.unit(p, "coat_roughness", 0.0, d),
+            specular_color: self.specular_color(p, specular_color, d),
+            transmission: self.unit(p, transmission, 0.0, d),
+            is_thin: p.boolean(thin, d).unwrap_or(false),
+            sheen: self.unit(p, fuzz[0], 0.0, d),
+            sheen_color: self.color_up_to(1.0, p, (fuzz[1], Rgb::WHITE), d),
+            sheen_roughness: self.unit(p, fuzz[2], 0.5, d),
+            coat: self.unit(p, coat, 0.0, d),
+            coat_roughness: self.coat_roughness(p, d),
         })
+    }
+
+    /// The colour, times twice the level of Blender and Disney.
+    fn specular_color(&mut self, p: &ParamSet, name: &'static str, d: &mut Diagnostics) -> RgbTextureId {
+        let color = self.color_up_to(f32::INFINITY, p, (name, Rgb::WHITE), d);
+        let Some((name, level)) = number_of(p, ["specular_ior_level", "specular"], d) else { return color };
+        check_unit(level, p, name, d);
+        let level = self.textures.add_rgb(RgbTexture::Constant(Rgb::splat(2.0 * level)));
+        self.textures.add_rgb(RgbTexture::Product { tex1: color, tex2: level })
+    }
+
+    /// The roughness of the coat, or Disney's gloss.
+    fn coat_roughness(&mut self, p: &ParamSet, d: &mut Diagnostics) -> FloatTextureId {
+        let Some((name, gloss)) = number_of(p, ["clearcoatgloss"], d) else {
+            return self.unit(p, "coat_roughness", 0.0, d);
+        };
+        check_unit(gloss, p, name, d);
+        self.textures.add_float(FloatTexture::Constant((0.1 + (0.001 - 0.1) * gloss).sqrt()))
     }
 
     /// A number from 0 to 1, or a texture.
@@ -73,6 +116,36 @@ impl Builder<'_> {
         }
         id
     }
+}
+
+/// The name by which a parameter of OpenPBR is given, of which there may be one.
+fn spelled(p: &ParamSet, name: &'static str, d: &mut Diagnostics) -> &'static str {
+    let others = SPELLINGS.iter().find(|(of, _)| *of == name).map_or(&[][..], |(_, others)| others);
+    let mut given = std::iter::once(name).chain(others.iter().copied()).filter(|n| p.type_of(n).is_some());
+    let Some(first) = given.next() else { return name };
+    for other in given {
+        p.ignore(other);
+        d.error(p.span_of(other), format!("{other} is {first}, which is given as well"));
+    }
+    first
+}
+
+/// The number that is given by the first of these names that is.
+fn number_of<const N: usize>(
+    p: &ParamSet,
+    names: [&'static str; N],
+    d: &mut Diagnostics,
+) -> Option<(&'static str, f32)> {
+    names.into_iter().find_map(|name| p.float(name, d).map(|x| (name, x)))
+}
+
+fn anisotropy(p: &ParamSet, d: &mut Diagnostics) -> Anisotropy {
+    let of_disney = number_of(p, ["anisotropic"], d);
+    let (name, x) = of_disney.or(number_of(p, ["specular_roughness_anisotropy"], d)).unwrap_or_default();
+    if !name.is_empty() {
+        check_unit(x, p, name, d);
+    }
+    if of_disney.is_some() { Anisotropy::Disney(x) } else { Anisotropy::OpenPbr(x) }
 }
 
 fn check_unit(x: f32, p: &ParamSet, name: &'static str, d: &mut Diagnostics) {
