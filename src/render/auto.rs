@@ -62,7 +62,7 @@ const LIGHT_TRIALS: f64 = 3.0;
 /// Share of the greatest efficiency, by the model, with which fewer samples will do.
 const NEARLY: f64 = 0.95;
 
-/// Numbers of samples, relative to those without a pilot, from which on fewer are tried too, and not more.
+/// Numbers of samples, relative to usual ones, from which on fewer are tried too, and not more.
 const MANY: u32 = 3;
 
 /// Lights from which on photons may tell which of them contribute.
@@ -79,6 +79,8 @@ const DIRECT: [u32; 9] = [2, 4, 8, 12, 16, 24, 32, 48, 64];
 /// Points of nets are best spread where they are as many as a power of two.
 const FIRST: [u32; 6] = [2, 3, 5, 9, 17, 33];
 const LATER: [u32; 5] = [2, 3, 5, 9, 17];
+/// As many as are best or nearly so in most scenes, in direct light: the pilot of a small image may not see it.
+const USUAL_DIRECT: u32 = 8;
 /// Samples from which the model is fitted: few and many, in direct light and in paths.
 const FIT_DIRECT: [u32; 2] = [4, 16];
 const FIT_PATH: [u32; 2] = [2, 5];
@@ -139,6 +141,12 @@ pub(super) fn choose(job: &mut RenderJob) -> Option<AutoChoice> {
 /// The settings where nothing can be measured.
 fn without_pilot(settings: &IntegratorSettings) -> IntegratorSettings {
     IntegratorSettings { estimator: EstimatorKind::Mis, ..*settings }
+}
+
+/// What is taken where the pilot finds nothing better.
+fn usual(settings: &IntegratorSettings) -> IntegratorSettings {
+    let base = without_pilot(settings);
+    if base.depth() > 1 { base } else { with_samples(settings, [USUAL_DIRECT; 2]) }
 }
 
 /// `mis` with these numbers of samples, where they are open.
@@ -361,9 +369,9 @@ impl Pilot {
 }
 
 /// Other numbers to be tried, since nets gain more or less than the model says: halfway to the best by the model, if these
-/// are much greater than those without a pilot, or else twice the best.
+/// are much greater than usual, or else twice the best.
 fn other_numbers(base: &IntegratorSettings, best: [u32; 2]) -> IntegratorSettings {
-    let usual = [0, 1].map(|vertex| without_pilot(base).sample_counts_at(vertex).samples);
+    let usual = [0, 1].map(|vertex| usual(base).sample_counts_at(vertex).samples);
     let is_far = (0..2).any(|k| best[k] >= MANY * usual[k]);
     // In paths, one of them is the BSDF sample
     let other = u32::from(base.depth() > 1);
@@ -371,10 +379,10 @@ fn other_numbers(base: &IntegratorSettings, best: [u32; 2]) -> IntegratorSetting
     with_samples(base, [0, 1].map(|k| if is_far { halfway(k) } else { 2 * (best[k] - other) } + other))
 }
 
-/// What is done without a pilot, the best numbers of `mis`, and these with another setting each. None twice.
+/// What is usual, the best numbers of `mis`, and these with another setting each. None twice.
 fn second_round(base: &IntegratorSettings, best: [u32; 2]) -> Vec<Candidate> {
     let chosen = with_samples(base, best);
-    let mut all = vec![without_pilot(base), chosen];
+    let mut all = vec![usual(base), chosen];
     if chosen.bsdf_fraction != base.bsdf_fraction && best[0].max(best[1]) > 4 {
         all.push(IntegratorSettings { bsdf_fraction: None, ..chosen });
     }
