@@ -237,6 +237,21 @@ mod tests {
     }
 
     #[test]
+    fn what_a_model_says_of_both_counts_with_what_was_measured() {
+        let candidate = |n| {
+            let estimator = EstimatorKind::Mis;
+            Candidate::named(IntegratorSettings { estimator, samples: Some(n), ..IntegratorSettings::default() })
+        };
+        let candidates = [candidate(4), candidate(8)];
+        let measured = (1.0, vec![[1.0, 1.0]; 256]);
+        let round = Round { measured: vec![measured.clone(), measured], spp: 4, is_direct: false };
+        let model = |gain: f64| Some(vec![gain; 1 + GROUPS]);
+        assert_eq!(round.choose(&candidates, &[model(0.0), model(0.5)]), 1);
+        assert_eq!(round.choose(&candidates, &[model(0.5), model(0.0)]), 0);
+        assert_eq!(round.choose(&candidates, &[model(0.0), None]), 0);
+    }
+
+    #[test]
     fn a_gain_within_the_noise_changes_nothing() {
         use EstimatorKind::{Mis, Ris};
         // As good: chosen as often as a normal number exceeds half its standard error, and twice that
