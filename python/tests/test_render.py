@@ -183,7 +183,9 @@ def test_a_plan_gives_the_image_that_it_came_from() -> None:
     assert np.array_equal(first["beauty"], again["beauty"])
 
 
-def test_textures_beyond_a_limit_give_the_same_image(tmp_path: pathlib.Path) -> None:
+def test_textures_beyond_a_limit_give_the_same_image(
+    tmp_path: pathlib.Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
     lumiris.write(tmp_path / "noise.exr", np.random.default_rng(1).random((256, 256, 3), dtype=np.float32))
     scene = SCENE.replace(
         'Material "diffuse" "rgb reflectance" [ 0.5 0.25 0.75 ]',
@@ -194,6 +196,11 @@ def test_textures_beyond_a_limit_give_the_same_image(tmp_path: pathlib.Path) -> 
         lumiris.render(scene, folder=tmp_path, **TINY, texture_memory=limit)["beauty"] for limit in (None, 100_000, "1K")
     ]
     assert len({image.tobytes() for image in images}) == 1
+    # They are in a file, and only those that do not fit
+    monkeypatch.setenv("TMPDIR", str(tmp_path / "nowhere"))
+    lumiris.render(scene, folder=tmp_path, **TINY, texture_memory="1G")
+    with pytest.raises(lumiris.SceneError, match="no temporary file"):
+        lumiris.render(scene, folder=tmp_path, **TINY, texture_memory="1K")
 
 
 def test_cryptomattes_are_those_of_the_program(scene_file: pathlib.Path, program: str) -> None:

@@ -40,7 +40,7 @@ pub(super) fn mean(alpha: f32) -> [f32; 2] {
 }
 
 /// Index of the entry below x in 0..1, and the place between it and the next.
-fn place(x: f32, count: usize) -> (usize, f32) {
+pub(super) fn place(x: f32, count: usize) -> (usize, f32) {
     let x = x.clamp(0.0, 1.0) * (count - 1) as f32;
     let i = (x as usize).min(count - 2);
     (i, x - i as f32)

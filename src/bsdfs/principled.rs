@@ -11,7 +11,9 @@
 //! * or is refracted into a solid by [`Dielectric`], whose exact reflectance replaces Schlick's.
 //!
 //! A coat of weight c and albedo S_c lets min(1 − c S_c(wo), 1 − c S_c(wi)) of what is below through: reciprocal, and
-//! never more than is left. Between them is [`Sheen`], the fuzz of OpenPBR, which has it above the coat. Smooth facets are as rough as the smoothest that count as rough, so there are no deltas.
+//! never more than is left. Between them is [`Sheen`], the fuzz of OpenPBR, which has it above the coat.
+//!
+//! Smooth facets are as rough as the smoothest that count as rough, so there are no deltas.
 
 use super::dielectric::Dielectric;
 use super::fresnel::reflect;

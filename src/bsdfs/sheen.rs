@@ -4,6 +4,7 @@
 //! E(μ) of a white sheen is tabulated. A sheen of colour c is above what is below as in glTF's `KHR_materials_sheen`:
 //! 1 − max(c) max(E(wo), E(wi)) of that is left, which is reciprocal and never more than what the sheen leaves.
 
+use super::ggx_albedo::place;
 use lumiris_numbers::math::{Rgb, Vec3, warp};
 use std::f32::consts::{PI, TAU};
 use std::sync::LazyLock;
@@ -53,9 +54,13 @@ impl Sheen {
 fn white(wo: Vec3, wi: Vec3, alpha: f32) -> f32 {
     let m = (wo + wi).normalize_or(Vec3::Z);
     let sin2 = (1.0 - m.z * m.z).max(0.0);
-    let d = (2.0 + 1.0 / alpha) * sin2.powf(0.5 / alpha) / TAU;
     let g = 1.0 / (1.0 + lambda(wo.z, alpha) + lambda(wi.z, alpha));
-    d * g / (4.0 * wo.z * wi.z)
+    density(sin2, alpha) * g / (4.0 * wo.z * wi.z)
+}
+
+/// D of a normal by the square of the sine of its polar angle.
+fn density(sin2: f32, alpha: f32) -> f32 {
+    (2.0 + 1.0 / alpha) * sin2.powf(0.5 / alpha) / TAU
 }
 
 /// Λ of a cosine > 0.
@@ -77,11 +82,6 @@ static TABLE: LazyLock<Vec<[f32; COSINES]>> = LazyLock::new(|| {
 
 /// E(μ), from the table.
 fn albedo(mu: f32, alpha: f32) -> f32 {
-    let place = |x: f32, count: usize| {
-        let x = x.clamp(0.0, 1.0) * (count - 1) as f32;
-        let i = (x as usize).min(count - 2);
-        (i, x - i as f32)
-    };
     let ((row, t), (column, s)) = (place(alpha.sqrt(), ROUGHNESSES), place(mu.sqrt(), COSINES));
     let of_row = |row: usize| TABLE[row][column] + (TABLE[row][column + 1] - TABLE[row][column]) * s;
     of_row(row) + (of_row(row + 1) - of_row(row)) * t
@@ -134,8 +134,7 @@ mod tests {
             let sum: f32 = (0..n)
                 .map(|i| {
                     let theta = (i as f32 + 0.5) / n as f32 * 0.5 * PI;
-                    let d = (2.0 + 1.0 / alpha) * theta.sin().powf(1.0 / alpha) / TAU;
-                    d * theta.cos() * theta.sin() * TAU * 0.5 * PI / n as f32
+                    density(theta.sin().powi(2), alpha) * theta.cos() * theta.sin() * TAU * 0.5 * PI / n as f32
                 })
                 .sum();
             assert!((sum - 1.0).abs() < 1e-3, "{alpha}: {sum}");
