@@ -115,7 +115,7 @@ fn main() {
                 let mut out = LightLanes { wi: [x, y, z], li: [r, g, b], pdf };
                 time(m, |point| {
                     let [jx, jy, ..] = pcg4d([point, 7, 7, 7]).map(|h| h as f32 * 1e-10);
-                    let ctx = LightCtx { p: Vec3::new(jx, 0.0, jy), n: Vec3::Y, ns: Vec3::Y };
+                    let ctx = LightCtx::on(Vec3::new(jx, 0.0, jy), Vec3::Y);
                     let u = numbers[point as usize].each_ref().map(|u| &u[..]);
                     if is_single {
                         light.sample_li_each(&ctx, u, &mut out);

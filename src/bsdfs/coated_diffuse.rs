@@ -56,6 +56,11 @@ impl<'a> CoatedDiffuse<'a> {
         }
     }
 
+    /// Microfacets of the interface.
+    pub(super) fn distribution(&self) -> TrowbridgeReitz {
+        self.interface.distribution
+    }
+
     /// Albedo for light to `wo`: interface and base.
     pub fn albedo(&self, wo: Vec3) -> Rgb {
         let [t, r] = self.directional(if wo.z < 0.0 { -wo } else { wo });

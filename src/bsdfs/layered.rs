@@ -222,6 +222,15 @@ impl Layered {
         lobes.interface + lobes.base
     }
 
+    /// The strongest lobe that is not the cosine, see [`super::Bsdf::glossy_lobe`].
+    pub(super) fn glossy_lobe(&self, wo: Vec3) -> (TrowbridgeReitz, f32) {
+        let lobes = self.lobes(if wo.z < 0.0 { -wo } else { wo });
+        match &self.base {
+            Base::Conductor(metal) if lobes.base > lobes.interface => (metal.distribution, lobes.base),
+            _ => (self.top.distribution, lobes.interface),
+        }
+    }
+
     /// Density of these, times their probabilities, see [`super::Bsdf::pdf_first_lobe`].
     pub(super) fn pdf_first_lobe(&self, wo: Vec3, wi: Vec3) -> f32 {
         let Some((wo, wi)) = super::to_upper(wo, wi) else { return 0.0 };

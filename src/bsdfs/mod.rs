@@ -255,6 +255,27 @@ impl<'a> Bsdf<'a> {
         if first > 0.0 { first.min(pdf) } else { 0.0 }
     }
 
+    /// The strongest rough lobe about the mirror direction of `wo`: its α, the greater one where it is anisotropic, and its
+    /// part of the albedo (0 to 1). `None` if there is none, or if light passes as well, of which it would tell nothing.
+    #[inline]
+    pub fn glossy_lobe(&self, wo: Vec3) -> Option<(f32, f32)> {
+        let (distribution, share) = match self {
+            Bsdf::Conductor(b) => (b.distribution, 1.0),
+            Bsdf::CoatedDiffuse(b) => (b.distribution(), b.first_lobe(wo)),
+            Bsdf::Layered(b) => b.glossy_lobe(wo),
+            Bsdf::Principled(b) => b.glossy_lobe(wo)?,
+            Bsdf::Diffuse(_)
+            | Bsdf::DiffuseTransmission(_)
+            | Bsdf::Dielectric(_)
+            | Bsdf::Exit(_)
+            | Bsdf::ThinDielectric(_)
+            | Bsdf::Hair(_)
+            | Bsdf::Evaluated(_)
+            | Bsdf::Phase(_) => return None,
+        };
+        (!distribution.is_smooth()).then_some((distribution.alpha_x.max(distribution.alpha_y), share))
+    }
+
     /// False in a medium, where directions along the horizon of the frame are no others, and there is no cosine.
     #[inline]
     pub fn has_surface(&self) -> bool {

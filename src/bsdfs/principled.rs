@@ -270,6 +270,18 @@ impl Principled {
         self.choice(wo).facets
     }
 
+    /// The strongest lobe that is reflected, see [`super::Bsdf::glossy_lobe`].
+    pub(super) fn glossy_lobe(&self, wo: Vec3) -> Option<(TrowbridgeReitz, f32)> {
+        let choice = self.choice(wo);
+        if self.transmission > 0.0 {
+            None
+        } else if choice.coat > choice.facets {
+            Some((self.coat_distribution, choice.coat))
+        } else {
+            Some((self.distribution, choice.facets))
+        }
+    }
+
     /// Probability of the cosine, see [`super::Bsdf::wide_lobe`].
     pub(super) fn wide_lobe(&self, wo: Vec3) -> f32 {
         self.choice(wo).diffuse

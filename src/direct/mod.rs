@@ -45,8 +45,8 @@ use estimators::Batch;
 pub use estimators::Estimator;
 pub use fits::Fits;
 use lumiris_numbers::math::{Rgb, Vec3};
-pub use point::ShadingPoint;
 use point::halves;
+pub use point::{ShadingPoint, lobe_for_lights};
 pub use stats::DirectStats;
 use std::time::Instant;
 

@@ -1,7 +1,7 @@
 //! A point at which direct light is estimated, and the rays that leave it.
 
 use super::domain;
-use crate::lights::{LightCtx, LightSample};
+use crate::lights::{GlossyLobe, LightCtx, LightSample, LightSampling};
 use crate::materials::SurfaceBsdf;
 use crate::media::{MediumId, Sides};
 use crate::settings::SampleCounts;
@@ -20,6 +20,8 @@ pub struct ShadingPoint<'a> {
     pub wo: Vec3,
     /// Scattering at the point, with the frame and the geometric normal.
     pub bsdf: SurfaceBsdf<'a>,
+    /// The lobe that lights are chosen by, see [`lobe_for_lights`].
+    pub lobe: GlossyLobe,
     /// Time in 0..1.
     pub time: f32,
     /// Random numbers of this point; each technique uses its own domain.
@@ -37,6 +39,17 @@ pub struct ShadingPoint<'a> {
     pub media: Sides,
 }
 
+/// The lobe that is reflected to `wo`, if the choice of a light depends on it.
+#[inline]
+pub fn lobe_for_lights(lights: &LightSampling, bsdf: &SurfaceBsdf<'_>, wo: Vec3) -> GlossyLobe {
+    if !lights.sampler.needs_lobes() {
+        return GlossyLobe::NONE;
+    }
+    let frame = &bsdf.frame;
+    let lobe = bsdf.bsdf.glossy_lobe(frame.to_local(wo));
+    lobe.map_or(GlossyLobe::NONE, |(alpha, share)| GlossyLobe::new(wo, frame.z, alpha, share))
+}
+
 impl ShadingPoint<'_> {
     /// Number of light samples beside a BSDF sample that the path takes: all others, but none where every lobe is
     /// specular.
@@ -50,7 +63,7 @@ impl ShadingPoint<'_> {
         if !self.bsdf.bsdf.has_surface() {
             return LightCtx::at(self.p);
         }
-        LightCtx { p: self.p, n: self.bsdf.lit_normal(self.wo), ns: self.bsdf.frame.z }
+        LightCtx { p: self.p, n: self.bsdf.lit_normal(self.wo), ns: self.bsdf.frame.z, lobe: self.lobe }
     }
 
     /// The origin of a ray that leaves the point towards `w`.

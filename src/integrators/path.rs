@@ -19,8 +19,9 @@ use super::vertices::{Stage, VertexSearch};
 use super::wavefront::{Batch, Buffers, Estimate, Output};
 use super::{Integrator, Statistics, Tracer};
 use crate::bsdfs::{Bsdf, Diffuse};
-use crate::direct::{DirectStage, Estimator, Fits, ShadingPoint};
+use crate::direct::{DirectStage, Estimator, Fits, ShadingPoint, lobe_for_lights};
 use crate::film::PixelSample;
+use crate::lights::LightSampling;
 use crate::materials::SurfaceBsdf;
 use crate::media::Sides;
 use crate::scene::RenderJob;
@@ -187,7 +188,7 @@ impl PathTracer {
             let continues = vertex + 1 < depth;
             let looks_on = is_emissive && vertex < depth;
             let step = Step { settings, estimator, vertex, continues, looks_on, vertices, shadings };
-            let points = self.points(&step, samples);
+            let points = self.points(&job.lights, &step, samples);
             self.share(&step, out);
             self.light_points(job, &step, &points, fits, out);
             self.extend_paths(&step, &points);
@@ -212,7 +213,12 @@ impl PathTracer {
     }
 
     /// The points whose direct light is estimated.
-    fn points<'w>(&mut self, step: &Step<'_, 'w>, samples: &[CameraSample]) -> Vec<ShadingPoint<'w>> {
+    fn points<'w>(
+        &mut self,
+        lights: &LightSampling,
+        step: &Step<'_, 'w>,
+        samples: &[CameraSample],
+    ) -> Vec<ShadingPoint<'w>> {
         let sample_counts = step.estimator.sample_counts();
         // Outcomes are those of all samples of a first vertex
         let may_continue = step.continues && step.shadings.is_none() && (step.vertex > 0 || self.outcomes.is_none());
@@ -224,6 +230,7 @@ impl PathTracer {
                 && !v.bsdf.bsdf.is_only_evaluated();
             ShadingPoint {
                 bsdf_by_path,
+                lobe: lobe_for_lights(lights, &v.bsdf, v.wo),
                 sample: path.sample,
                 ..v.shading_point(path.ray.time, sample_counts, sample.fit)
             }
@@ -232,9 +239,10 @@ impl PathTracer {
         let all = step.vertices.iter().zip(&self.search.active).map(point);
         match &step.shadings {
             None => points.extend(all),
-            Some(shadings) => {
-                points.extend(all.zip(shadings).filter_map(|(point, s)| Some(ShadingPoint { bsdf: s.lit?, ..point })))
-            }
+            Some(shadings) => points.extend(all.zip(shadings).filter_map(|(point, s)| {
+                let bsdf = s.lit?;
+                Some(ShadingPoint { bsdf, lobe: lobe_for_lights(lights, &bsdf, point.wo), ..point })
+            })),
         }
         points
     }

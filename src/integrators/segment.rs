@@ -7,7 +7,7 @@ use crate::direct::estimators::mis::Mis;
 use crate::direct::{DirectStats, ShadingPoint};
 use crate::film::Features;
 use crate::geometry::SurfaceHit;
-use crate::lights::{LightCtx, LightHit};
+use crate::lights::{GlossyLobe, LightCtx, LightHit};
 use crate::materials::SurfaceBsdf;
 use crate::media::{MediumId, Sides};
 use crate::scene::{RenderJob, SurfaceInteraction};
@@ -371,6 +371,7 @@ impl<'w> Vertex<'w> {
             p_error: self.surface.p_error,
             wo: self.wo,
             bsdf: self.bsdf,
+            lobe: GlossyLobe::NONE,
             time,
             stream: self.direct.domain(domain::DIRECT),
             sample_counts,

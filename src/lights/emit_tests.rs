@@ -154,7 +154,7 @@ fn photons_deposit_the_irradiance_that_direct_light_has() {
                     .sample_le(SCENE, stream.random::<[f32; 2]>(), stream.random::<[f32; 2]>())
                     .map_or(Rgb::BLACK, |s| deposit(&s, n));
                 let [x, y] = stream.random::<[f32; 2]>().map(|u| (2.0 * u - 1.0) * HALF);
-                let ctx = LightCtx { p: Vec3::new(x, y, 0.0), n, ns: n };
+                let ctx = LightCtx::on(Vec3::new(x, y, 0.0), n);
                 let li = light
                     .sample_li(&ctx, stream.random::<[f32; 2]>())
                     .map_or(Rgb::BLACK, |s| s.li * (s.wi.dot(n).max(0.0) / s.pdf));

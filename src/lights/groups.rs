@@ -217,7 +217,7 @@ mod tests {
                 for max in [1, 2, 5, 8] {
                     let set = set(kind, points, infinite);
                     let groups = LightGroups::new(&set.lights, &set.sampler, max);
-                    let ctx = LightCtx { p: Vec3::new(0.4, 0.3, 0.0), n: Vec3::Z, ns: Vec3::Z };
+                    let ctx = LightCtx::on(Vec3::new(0.4, 0.3, 0.0), Vec3::Z);
                     let pmfs = groups.pmfs(&set.sampler, &ctx);
                     assert!((pmfs.iter().sum::<f32>() - 1.0).abs() < 1e-5, "{kind:?} {pmfs:?}");
                     assert!(groups.len() <= max.max(usize::from(infinite > 0) + usize::from(points > 0)));

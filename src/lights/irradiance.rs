@@ -253,7 +253,7 @@ mod tests {
             if is_near(set, p) {
                 continue;
             }
-            let ctx = LightCtx { p, n, ns: n };
+            let ctx = LightCtx::on(p, n);
             let e = f64::from(known.irradiance(set, p, n).g);
             // A corner just above the horizon is found by few samples
             let count = if e > 0.0 && e < 1e-3 { 400_000 } else { 4000 };

@@ -89,7 +89,7 @@ impl LearnedVisibility {
     #[inline]
     pub fn importance(&self, ctx: &LightCtx, light: LightId) -> f32 {
         if self.choice.tree.contains(light) {
-            self.choice.tree.light_importance(ctx, light)
+            self.choice.tree.light_importance(&ctx.diffuse(), light)
         } else {
             self.irradiances[light as usize]
         }
@@ -113,6 +113,8 @@ impl LearnedVisibility {
     #[inline]
     pub fn sample_unseen(&self, ctx: &LightCtx, seen: &ContributingLights<'_>, u: f32) -> Option<UnseenLight> {
         let TreeChoice { tree, infinite, .. } = &self.choice;
+        // V̂ goes by the irradiance
+        let ctx = &ctx.diffuse();
 
         let unseen = || infinite.iter().filter(|&&light| seen.place(light).is_none());
         let count = unseen().count();
@@ -172,7 +174,7 @@ mod tests {
     fn visibility_is_the_ratio_of_photons_to_those_expected_and_the_prior_without_any() {
         // A lamp above a floor: the irradiance I/h² is that of N·A/(4π h²) photons.
         let lights = [Light::Point { p: AT + Vec3::Z * 3.0, intensity: Rgb::splat(7.0) }];
-        let ctx = LightCtx { p: AT, n: Vec3::Z, ns: Vec3::Z };
+        let ctx = LightCtx::on(AT, Vec3::Z);
         let of = |paths: f32| {
             let cache = VisibilityCache::new(std::iter::once((AT, Vec3::Z, 0)), 0.1);
             let cache = cache.with_paths(std::iter::once((0, paths)));
@@ -197,7 +199,7 @@ mod tests {
         {
             let cache = cache(seen, count, paths);
             let learned = learned(&cache);
-            let ctx = LightCtx { p: AT, n: Vec3::Z, ns: Vec3::Z };
+            let ctx = LightCtx::on(AT, Vec3::Z);
             let contributing = cache.lookup_with_sums(AT, Vec3::Z);
             assert_eq!(contributing.lights.len(), seen.len());
 
@@ -223,7 +225,7 @@ mod tests {
 
     #[test]
     fn lights_whose_photons_were_expected_and_did_not_come_are_chosen_less() {
-        let ctx = LightCtx { p: AT, n: Vec3::Z, ns: Vec3::Z };
+        let ctx = LightCtx::on(AT, Vec3::Z);
         let share_of_near = |paths: f32| {
             let cache = cache(&[5], 1, paths);
             let learned = learned(&cache);

@@ -143,6 +143,12 @@ impl LightSampler {
         }
     }
 
+    /// True if probabilities depend on [`LightCtx::lobe`].
+    #[inline]
+    pub fn needs_lobes(&self) -> bool {
+        self.tree().is_some_and(|choice| choice.tree.has_choice())
+    }
+
     /// Chooses a light by `u` in [0, 1); `None` if there is none.
     #[inline]
     pub fn sample(&self, ctx: &LightCtx, u: f32) -> Option<SampledLight> {

@@ -267,7 +267,7 @@ fn estimated_irradiance(light: &AreaLight, p: Vec3, n: Vec3) -> Moments {
     let mut moments = Moments::default();
     for _ in 0..200_000 {
         let value = light
-            .sample_li(&LightCtx { p, n, ns: n }, stream.random::<[f32; 2]>())
+            .sample_li(&LightCtx::on(p, n), stream.random::<[f32; 2]>())
             .map_or(0.0, |s| f64::from(s.li.r) * f64::from(s.wi.dot(n).max(0.0)) / f64::from(s.pdf));
         moments.add(value);
     }

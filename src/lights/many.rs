@@ -3,7 +3,7 @@
 //! Points that chose the same light are sampled together: rectangles, triangles and infinite lights by kernels, whatever
 //! has none one by one. How many points there are changes no bit: a light that has a kernel is always sampled by it.
 
-use super::{AreaLight, AreaShape, Light, LightCtx, LightId, LightLanes};
+use super::{AreaLight, AreaShape, GlossyLobe, Light, LightCtx, LightId, LightLanes};
 use super::{LightSample, LightSampler, LightSampling, Turns};
 use lumiris_lanes::area::{Rectangle, many};
 use lumiris_lanes::columns::{Column, Columns3, padded, reserve};
@@ -26,13 +26,16 @@ pub struct LitPoints<'a> {
     pub n: &'a Columns3,
     /// Shading normals.
     pub ns: &'a Columns3,
+    /// Lobes that lights are chosen by; none if no choice depends on them.
+    pub lobes: &'a [GlossyLobe],
 }
 
 impl LitPoints<'_> {
     /// One of them.
     #[inline]
     pub fn get(&self, i: usize) -> LightCtx {
-        LightCtx { p: self.p.vec3(i), n: self.n.vec3(i), ns: self.ns.vec3(i) }
+        let lobe = self.lobes.get(i).copied().unwrap_or(GlossyLobe::NONE);
+        LightCtx { p: self.p.vec3(i), n: self.n.vec3(i), ns: self.ns.vec3(i), lobe }
     }
 }
 
@@ -340,6 +343,7 @@ mod tests {
     use crate::lights::{
         Emission, EnvironmentFilter, EnvironmentMap, EnvironmentMapping, LightSamplerKind, LightSetBuilder,
     };
+    use lumiris_numbers::math::warp::sample_uniform_sphere;
     use lumiris_numbers::math::{Affine3A, Bounds3};
     use lumiris_test_support::random::{Pcg32, RngExt, pcg32};
     use std::sync::Arc;
@@ -389,7 +393,13 @@ mod tests {
             n.set(i, Vec3::Z);
             ns.set(i, Vec3::Z);
         }
-        let at = LitPoints { p: &p, n: &n, ns: &ns };
+        let lobes: Vec<GlossyLobe> = (0..N)
+            .map(|i| match i % 3 {
+                0 => GlossyLobe::NONE,
+                k => GlossyLobe::new(sample_uniform_sphere(stream.random::<[f32; 2]>()), Vec3::Z, 0.2 * k as f32, 0.7),
+            })
+            .collect();
+        let at = LitPoints { p: &p, n: &n, ns: &ns, lobes: &lobes };
         let (mut scratch, mut out) = (Scratch::default(), LightSamples::default());
         out.reserve(len);
         scratch.begin(&lights, N);

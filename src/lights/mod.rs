@@ -1,7 +1,7 @@
 //! Lights: their emission, the sampling of directions towards them, and the choice of one of many.
 //!
 //! Reading order: [`point`], [`spot`], [`image_light`], [`area`], [`environment`], [`portal`], [`emit`], [`lanes`], [`bounds`],
-//! [`choice`], [`tree`], [`tree_choice`], [`visibility_cache`], [`learned_visibility`], [`visibility_cache_sampler`],
+//! [`choice`], [`glossy_lobe`], [`tree`], [`tree_choice`], [`visibility_cache`], [`learned_visibility`], [`visibility_cache_sampler`],
 //! [`light_sampler`], [`layers`], [`set`], [`groups`], [`sampling`], [`many`], [`irradiance`].
 
 pub mod area;
@@ -9,6 +9,7 @@ pub mod bounds;
 pub mod choice;
 pub mod emit;
 pub mod environment;
+pub mod glossy_lobe;
 pub mod groups;
 pub mod image_light;
 pub mod irradiance;
@@ -40,6 +41,7 @@ pub use bounds::LightBounds;
 pub use choice::{LightRun, SampledLight};
 pub use emit::EmissionSample;
 pub use environment::{EnvironmentFilter, EnvironmentMap, EnvironmentMapping};
+pub use glossy_lobe::GlossyLobe;
 pub use groups::LightGroups;
 pub use image_light::{ImageLight, ImageMapping};
 pub use irradiance::Irradiances;
@@ -72,13 +74,28 @@ pub struct LightCtx {
     pub n: Vec3,
     /// Shading normal, unit; zero if there is none.
     pub ns: Vec3,
+    /// What is reflected more than by a diffuse surface, which the choice of a light takes into account.
+    pub lobe: GlossyLobe,
 }
 
 impl LightCtx {
     /// A point without a surface.
     #[inline]
     pub fn at(p: Vec3) -> Self {
-        LightCtx { p, n: Vec3::ZERO, ns: Vec3::ZERO }
+        LightCtx { p, n: Vec3::ZERO, ns: Vec3::ZERO, lobe: GlossyLobe::NONE }
+    }
+
+    /// A point of a diffuse surface of this normal.
+    #[inline]
+    pub fn on(p: Vec3, n: Vec3) -> Self {
+        LightCtx { p, n, ns: n, lobe: GlossyLobe::NONE }
+    }
+
+    /// The point as if the surface were diffuse.
+    #[inline]
+    #[must_use]
+    pub fn diffuse(&self) -> Self {
+        LightCtx { lobe: GlossyLobe::NONE, ..*self }
     }
 }
 

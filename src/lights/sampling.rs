@@ -237,7 +237,7 @@ mod tests {
             let set = with_cache(builder(), kind, seen);
             let mut s = pcg32([1, 2, 3]);
             for ns in [Vec3::ZERO, Vec3::Z] {
-                let ctx = LightCtx { p: Vec3::new(0.4, 0.3, 0.0), n: ns, ns };
+                let ctx = LightCtx::on(Vec3::new(0.4, 0.3, 0.0), ns);
                 let pmf: Vec<f64> = (0..6).map(|i| f64::from(set.sampler.pmf(&ctx, i))).collect();
                 assert!((pmf.iter().sum::<f64>() - 1.0).abs() < 1e-5, "{kind:?} {pmf:?}");
                 assert_eq!(pmf.iter().map(|&p| p > 0.0).collect::<Vec<_>>(), [true, true, false, true, true, true]);
@@ -286,7 +286,7 @@ mod tests {
         for (kind, seen) in CHOICES.into_iter().flat_map(|k| [(k, &few), (k, &many)]) {
             let set = with_cache(builder.clone(), kind, seen);
             for ns in [Vec3::ZERO, Vec3::Z] {
-                let ctx = LightCtx { p: Vec3::new(0.4, 0.3, 0.0), n: ns, ns };
+                let ctx = LightCtx::on(Vec3::new(0.4, 0.3, 0.0), ns);
                 // A regular list: counts are exact up to one at each end of a run
                 let count = 1_u32 << 16;
                 let positions: Vec<u32> = (0..count).map(|i| (i << 16) + 0x8000).collect();
@@ -327,7 +327,7 @@ mod tests {
     #[test]
     fn all_samplers_agree_on_the_irradiance_and_with_the_sum_over_lights() {
         let (p, n) = (Vec3::new(0.4, 0.3, 0.0), Vec3::Z);
-        let ctx = LightCtx { p, n, ns: n };
+        let ctx = LightCtx::on(p, n);
         let reference = sampling(builder(), LightSamplerKind::Uniform, &bounds());
         let mut s = pcg32([4, 2, 3]);
         let mut exact = 0.0;

@@ -4,7 +4,8 @@
 //! The importance of a node at p is I·cos θ′·cos θi′/max(d², r²): I the summed intensity, d the distance to the centre
 //! of its bounding sphere, r that sphere's radius, θ′ the minimum angle between an emitter's normal and the direction
 //! to p, θi′ the minimum angle between the surface normal and a direction to the node. Both sides of the maximum are
-//! squared lengths, so the result does not depend on the unit of length.
+//! squared lengths, so the result does not depend on the unit of length. On glossy surfaces, cos θi′ gives way to
+//! [`GlossyLobe::reflected`](super::GlossyLobe::reflected).
 
 use super::tree_build::{Item, build};
 use super::tree_node::Node;
@@ -75,6 +76,12 @@ impl LightTree {
     #[inline]
     pub fn is_empty(&self) -> bool {
         self.nodes.is_empty()
+    }
+
+    /// True if it holds more than one light.
+    #[inline]
+    pub fn has_choice(&self) -> bool {
+        self.nodes.len() > 1
     }
 
     /// True if it holds the light.
@@ -321,7 +328,7 @@ impl LightTree {
 mod tests {
     use super::*;
     use crate::geometry::{Shape, TriangleMesh};
-    use crate::lights::{Emission, Light, area_lights_of};
+    use crate::lights::{Emission, GlossyLobe, Light, area_lights_of};
     use lumiris_numbers::math::warp::sample_uniform_sphere;
     use lumiris_numbers::math::{Rgb, Vec3};
     use lumiris_test_support::assert_chi_squared;
@@ -361,7 +368,15 @@ mod tests {
     fn random_ctx(s: &mut Pcg32, scale: f32) -> LightCtx {
         let p = (Vec3::new(s.random::<f32>(), s.random::<f32>(), s.random::<f32>()) * 1.6 - 0.3) * scale;
         let n = sample_uniform_sphere(s.random::<[f32; 2]>());
-        if s.random::<f32>() < 0.2 { LightCtx::at(p) } else { LightCtx { p, n, ns: n } }
+        match s.random_range(0..5) {
+            0 => LightCtx::at(p),
+            1 | 2 => LightCtx::on(p, n),
+            _ => {
+                let (alpha, share) = (s.random::<f32>().powi(2), s.random::<f32>().sqrt());
+                let lobe = GlossyLobe::new(sample_uniform_sphere(s.random::<[f32; 2]>()), n, alpha, share);
+                LightCtx { lobe, ..LightCtx::on(p, n) }
+            }
+        }
     }
 
     #[test]
@@ -448,7 +463,7 @@ mod tests {
 
     #[test]
     fn degenerate_sets_are_handled() {
-        let ctx = LightCtx { p: Vec3::ZERO, n: Vec3::Y, ns: Vec3::Y };
+        let ctx = LightCtx::on(Vec3::ZERO, Vec3::Y);
         // None, or none that shines.
         assert!(tree_of(&[]).sample(&ctx, 0.5).is_none());
         let black = Light::Point { p: Vec3::ONE, intensity: Rgb::BLACK };

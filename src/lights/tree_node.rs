@@ -79,8 +79,10 @@ impl Node {
         }
 
         // The surface may transmit, so light from its back counts too.
-        let cos_i = wi.dot(ctx.ns).abs().min(1.0);
+        let cos = wi.dot(ctx.ns);
+        let cos_i = cos.abs().min(1.0);
         let sin_i = safe_sqrt(1.0 - sqr(cos_i));
-        importance * cos_of_difference(sin_i, cos_i, sin_b, cos_b).max(COSINE_SLACK)
+        let cos_max = cos_of_difference(sin_i, cos_i, sin_b, cos_b).max(COSINE_SLACK);
+        importance * ctx.lobe.reflected(wi, cos, sin2_b, cos_max)
     }
 }

@@ -161,7 +161,7 @@ fn shadow_rays(job: &RenderJob, camera: &RayBatch, hits: &[Option<Hit>]) -> RayB
         let (set, ray) = (&job.world.scene.geometry, camera.get(i));
         let s = set.surface_hit_of_ray(hit.geometry, hit.primitive, hit.instance, hit.uv, &ray);
         let u = uniforms(Family::Shadow, i as u32);
-        let ctx = LightCtx { p: s.p, n: s.n, ns: s.ns };
+        let ctx = LightCtx { ns: s.ns, ..LightCtx::on(s.p, s.n) };
         let Some((_, sample)) = job.lights.sample(&ctx, u[0], [u[1], u[2]]) else { continue };
         let o = offset_origin(s.p, s.p_error, s.n, sample.wi);
         if sample.t.is_finite() {

@@ -68,7 +68,7 @@ fn weights_at(job: &RenderJob, points: &[(Vec3, Vec3)]) -> Option<Vec<f32>> {
     let mut weights = vec![0.0; lights.lights.len()];
     for (i, &(p, n)) in (0..).zip(points) {
         let [u, ..] = pcg4d([i, job.settings().sampling.seed, IMPORTON_SEED, 0]).map(unit_f32);
-        if let Some(choice) = tree.sample(&LightCtx { p, n, ns: n }, u) {
+        if let Some(choice) = tree.sample(&LightCtx::on(p, n), u) {
             weights[choice.light as usize] += 1.0;
         }
     }

@@ -17,6 +17,7 @@ use crate::direct::{DirectStage, Estimator, Fits, ShadingPoint};
 use crate::film::PixelSample;
 use crate::integrators::Tracer;
 use crate::integrators::path::{CameraSample, PathStats, PathTracer};
+use crate::lights::GlossyLobe;
 use crate::materials::SurfaceBsdf;
 use crate::media::Sides;
 use crate::scene::{EmitterHit, EmitterScratch, RenderJob};
@@ -277,6 +278,7 @@ impl RecordRequest {
             p_error: self.p_error,
             wo: self.ns,
             bsdf,
+            lobe: GlossyLobe::NONE,
             time: self.time,
             stream: self.stream_of_block(job, block, index).domain(domain::SOURCES),
             sample_counts,

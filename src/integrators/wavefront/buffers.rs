@@ -53,7 +53,7 @@ impl Buffers {
             self.hits.resize(len / LANES, TriangleHits::default());
         }
         self.radiance.reserve(len);
-        let Surface { p, p_error, n, lit, ns, wo, rho } = &mut self.surface;
+        let Surface { p, p_error, n, lit, ns, wo, rho, .. } = &mut self.surface;
         [p, p_error, n, lit, ns, wo, rho].into_iter().for_each(|c| c.reserve(len));
         let SampleColumns { u: [u0, u1, u2], light, f_cos, p_bsdf, c, o, d, t_max } = &mut self.samples;
         light.reserve(len);

@@ -2,6 +2,7 @@
 
 use crate::accel::RayBatch;
 use crate::bsdfs::Bsdf;
+use crate::lights::GlossyLobe;
 use crate::lights::many::{LightSamples, LitPoints};
 use crate::materials::SurfaceBsdf;
 use lumiris_lanes::columns::{Column, Columns3};
@@ -18,13 +19,15 @@ pub(super) struct Surface {
     /// The normal on the side that is lit; zero if both are.
     pub(super) lit: Columns3,
     pub(super) ns: Columns3,
+    /// Lobes that lights are chosen by; none if no choice depends on them.
+    pub(super) lobes: Vec<GlossyLobe>,
     pub(super) wo: Columns3,
     pub(super) rho: Columns3,
 }
 
 impl Surface {
     pub(super) fn lit_points(&self) -> LitPoints<'_> {
-        LitPoints { p: &self.p, n: &self.lit, ns: &self.ns }
+        LitPoints { p: &self.p, n: &self.lit, ns: &self.ns, lobes: &self.lobes }
     }
 
     pub(super) fn lambertian(&self, len: usize) -> Lambertian<'_> {

@@ -30,9 +30,10 @@ use super::segment::{
 use crate::accel::{Coherence, Hit, RayBatch};
 use crate::bsdfs::{Bsdf, Diffuse, Lobe};
 use crate::direct::estimators::ocv::Ocv;
-use crate::direct::{self, DirectStats, Estimator, Fits};
+use crate::direct::{self, DirectStats, Estimator, Fits, lobe_for_lights};
 use crate::film::PixelSample;
 use crate::geometry::Shape;
+use crate::lights::{GlossyLobe, LightSampling};
 use crate::materials::SurfaceBsdf;
 use crate::scene::{RenderJob, SurfaceInteraction};
 use crate::settings::IntegratorSettings;
@@ -209,7 +210,7 @@ impl<'w> Batch<'w> {
         self.buffers.radiance.get_mut(padded(n)).into_iter().for_each(|c| c.fill(0.0));
         let start = Instant::now();
         self.buffers.find_points(n);
-        self.set_singles();
+        self.set_singles(&job.lights);
         if self.estimate.vertex == 0 {
             self.buffers.set_normals(out.samples);
         }
@@ -267,8 +268,15 @@ impl<'w> Batch<'w> {
     }
 
     /// Writes the singles into the columns.
-    fn set_singles(&mut self) {
-        let Surface { p, p_error, n, lit, ns, wo, rho } = &mut self.buffers.surface;
+    fn set_singles(&mut self, lights: &LightSampling) {
+        let Surface { p, p_error, n, lit, ns, lobes, wo, rho } = &mut self.buffers.surface;
+        lobes.clear();
+        if lights.sampler.needs_lobes() && others(&self.singles).next().is_some() {
+            lobes.resize(self.buffers.paths.len(), GlossyLobe::NONE);
+            for single in others(&self.singles) {
+                lobes[single.index as usize] = lobe_for_lights(lights, &single.bsdf, single.wo);
+            }
+        }
         for single in &self.singles {
             let (i, bsdf) = (single.index as usize, &single.bsdf);
             p.set(i, single.p);
