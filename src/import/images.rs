@@ -107,3 +107,218 @@ pub fn load_rgb(path: &Path) -> Result<RgbImage, ImageError> {
     let texels = pixels.map(|p| Rgb::from_array(channels.map(|c| read.encoding.to_linear(p[c]))));
     Ok((texels.collect(), [image.width, image.height]))
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::imaging::tiles::TileStore;
+    use std::fmt::Write;
+    use std::sync::Arc;
+
+    /// An image of two pixels, as 8-bit or 16-bit integers or floats, that no code of this program wrote.
+    struct Sample {
+        name: &'static str,
+        bytes: Vec<u8>,
+        /// The values that are stored.
+        stored: [[f32; 3]; 2],
+        is_integer: bool,
+        tolerance: f32,
+    }
+
+    const BYTES: [[u8; 3]; 2] = [[0, 51, 188], [128, 10, 255]];
+    const WORDS: [[u16; 3]; 2] = [[0, 13107, 48000], [32768, 2570, 65535]];
+    /// Multiples of 1/16, which halves and shared exponents hold.
+    const FLOATS: [[f32; 3]; 2] = [[0.0, 0.1875, 0.75], [0.5, 0.0625, 2.5]];
+
+    fn of_bytes(name: &'static str, bytes: Vec<u8>) -> Sample {
+        Sample { name, bytes, stored: BYTES.map(|p| p.map(|v| f32::from(v) / 255.0)), is_integer: true, tolerance: 0.0 }
+    }
+
+    fn of_words(name: &'static str, bytes: Vec<u8>) -> Sample {
+        Sample {
+            name,
+            bytes,
+            stored: WORDS.map(|p| p.map(|v| f32::from(v) / 65535.0)),
+            is_integer: true,
+            tolerance: 0.0,
+        }
+    }
+
+    fn of_floats(name: &'static str, bytes: Vec<u8>) -> Sample {
+        Sample { name, bytes, stored: FLOATS, is_integer: false, tolerance: 0.0 }
+    }
+
+    /// Targa of 24 bits or, with `alpha`, of 32.
+    fn tga(alpha: Option<u8>) -> Vec<u8> {
+        let (bits, of_alpha) = if alpha.is_some() { (32, 8) } else { (24, 0) };
+        // Rows from the top
+        let mut file = vec![0, 0, 2, 0, 0, 0, 0, 0, 0, 0, 0, 0, 2, 0, 1, 0, bits, 0x20 | of_alpha];
+        for [r, g, b] in BYTES {
+            file.extend([b, g, r].into_iter().chain(alpha));
+        }
+        file
+    }
+
+    /// PNG of RGB, in a block that is not compressed.
+    fn png(bits: u8, pixels: &[u8]) -> Vec<u8> {
+        let crc = |bytes: &[u8]| {
+            let shift = |c: u32, _| if c & 1 == 1 { 0xedb8_8320 ^ (c >> 1) } else { c >> 1 };
+            !bytes.iter().fold(!0_u32, |c, &byte| (0..8).fold(c ^ u32::from(byte), shift))
+        };
+        let rows = [&[0], pixels].concat();
+        let adler = rows.iter().fold((1_u32, 0_u32), |(a, b), &v| (a + u32::from(v), b + a + u32::from(v)));
+        let len = rows.len() as u16;
+        let mut data = vec![0x78, 0x01, 1];
+        data.extend([len, !len].iter().flat_map(|v| v.to_le_bytes()));
+        data.extend(rows);
+        data.extend((((adler.1 % 65521) << 16) | (adler.0 % 65521)).to_be_bytes());
+        let header = [&[0, 0, 0, 2, 0, 0, 0, 1, bits][..], &[2, 0, 0, 0]].concat();
+        let mut file = b"\x89PNG\r\n\x1a\n".to_vec();
+        for (name, content) in [(b"IHDR", &header), (b"IDAT", &data), (b"IEND", &Vec::new())] {
+            let chunk = [&name[..], content].concat();
+            file.extend((content.len() as u32).to_be_bytes());
+            file.extend(&chunk);
+            file.extend(crc(&chunk).to_be_bytes());
+        }
+        file
+    }
+
+    /// Little-endian TIFF of one strip without compression: bits per sample, and 1 for integers or 3 for floats.
+    fn tiff(bits: u16, kind: u16, pixels: &[u8]) -> Vec<u8> {
+        const ENTRIES: u16 = 11;
+        let end_of_directory = 8 + 2 + 12 * u32::from(ENTRIES) + 4;
+        let (triples, data) = (end_of_directory, end_of_directory + 12);
+        let mut file = b"II\x2a\0\x08\0\0\0".to_vec();
+        file.extend(ENTRIES.to_le_bytes());
+        let mut entry = |tag: u16, kind: u16, count: u32, value: u32| {
+            file.extend([tag, kind].iter().flat_map(|v| v.to_le_bytes()));
+            file.extend([count, value].iter().flat_map(|v| v.to_le_bytes()));
+        };
+        let (short, long) = (3, 4);
+        entry(256, short, 1, 2); // width
+        entry(257, short, 1, 1); // height
+        entry(258, short, 3, triples); // bits per sample
+        entry(259, short, 1, 1); // no compression
+        entry(262, short, 1, 2); // RGB
+        entry(273, long, 1, data);
+        entry(277, short, 1, 3); // samples per pixel
+        entry(278, short, 1, 1); // rows per strip
+        entry(279, long, 1, pixels.len() as u32);
+        entry(284, short, 1, 1); // interleaved
+        entry(339, short, 3, triples + 6); // sample format
+        file.extend([0; 4]);
+        file.extend([bits, bits, bits, kind, kind, kind].iter().flat_map(|v| v.to_le_bytes()));
+        file.extend(pixels);
+        file
+    }
+
+    /// OpenEXR of one scan line without compression, of halves or floats.
+    fn exr(is_half: bool) -> Vec<u8> {
+        let mut file = [0x0131_2f76_u32, 2].iter().flat_map(|v| v.to_le_bytes()).collect::<Vec<u8>>();
+        let mut attribute = |name: &str, kind: &str, value: &[u8]| {
+            file.extend(format!("{name}\0{kind}\0").bytes());
+            file.extend((value.len() as u32).to_le_bytes());
+            file.extend(value);
+        };
+        let channel = |name: &str| {
+            let numbers = [if is_half { 1_u32 } else { 2 }, 0, 1, 1];
+            [format!("{name}\0").into_bytes(), numbers.iter().flat_map(|v| v.to_le_bytes()).collect()].concat()
+        };
+        let channels: Vec<u8> = ["B", "G", "R"].into_iter().flat_map(channel).chain([0]).collect();
+        let window: Vec<u8> = [0_u32, 0, 1, 0].iter().flat_map(|v| v.to_le_bytes()).collect();
+        attribute("channels", "chlist", &channels);
+        attribute("compression", "compression", &[0]);
+        attribute("dataWindow", "box2i", &window);
+        attribute("displayWindow", "box2i", &window);
+        attribute("lineOrder", "lineOrder", &[0]);
+        attribute("pixelAspectRatio", "float", &1.0_f32.to_le_bytes());
+        attribute("screenWindowCenter", "v2f", &[0; 8]);
+        attribute("screenWindowWidth", "float", &1.0_f32.to_le_bytes());
+        file.push(0);
+        // Halves of normal numbers: the exponent's bias is 15 instead of 127
+        let half = |v: f32| if v == 0.0 { 0 } else { ((v.to_bits() >> 13) - ((127 - 15) << 10)) as u16 };
+        let line = [2, 1, 0].into_iter().flat_map(|c| FLOATS.map(|p| p[c]));
+        let line: Vec<u8> = if is_half {
+            line.flat_map(|v| half(v).to_le_bytes()).collect()
+        } else {
+            line.flat_map(f32::to_le_bytes).collect()
+        };
+        file.extend((file.len() as u64 + 8).to_le_bytes());
+        file.extend([0_u32, line.len() as u32].iter().flat_map(|v| v.to_le_bytes()));
+        file.extend(line);
+        file
+    }
+
+    /// Radiance's picture of shared exponents, without runs.
+    fn hdr() -> Vec<u8> {
+        let mut file = b"#?RADIANCE\nFORMAT=32-bit_rle_rgbe\n\n-Y 1 +X 2\n".to_vec();
+        for pixel in FLOATS {
+            let exponent = pixel.into_iter().fold(0.0, f32::max).log2().floor() as i32 + 1;
+            file.extend(pixel.map(|v| (v * 2.0_f32.powi(8 - exponent)) as u8));
+            file.push((exponent + 128) as u8);
+        }
+        file
+    }
+
+    fn samples() -> Vec<Sample> {
+        let bytes = BYTES.concat();
+        let words = |of: fn(u16) -> [u8; 2]| WORDS.concat().into_iter().flat_map(of).collect::<Vec<u8>>();
+        let floats: Vec<u8> = FLOATS.concat().into_iter().flat_map(f32::to_le_bytes).collect();
+        let with_header = |header: &str, pixels: &[u8]| [header.as_bytes(), pixels].concat();
+        vec![
+            of_bytes("a.tga", tga(None)),
+            of_bytes("b.tga", tga(Some(100))),
+            of_bytes("a.png", png(8, &bytes)),
+            of_bytes("a.ppm", with_header("P6 2 1 255\n", &bytes)),
+            of_bytes("a.tif", tiff(8, 1, &bytes)),
+            of_words("b.png", png(16, &words(u16::to_be_bytes))),
+            // OpenImageIO is one level off
+            Sample { tolerance: 4e-5, ..of_words("b.ppm", with_header("P6 2 1 65535\n", &words(u16::to_be_bytes))) },
+            of_words("b.tif", tiff(16, 1, &words(u16::to_le_bytes))),
+            of_floats("c.tif", tiff(32, 3, &floats)),
+            of_floats("a.exr", exr(true)),
+            of_floats("b.exr", exr(false)),
+            of_floats("a.pfm", with_header("PF\n2 1\n-1.0\n", &floats)),
+            of_floats("a.hdr", hdr()),
+        ]
+    }
+
+    #[test]
+    fn texels_are_linear_whatever_the_format_and_the_encoding() {
+        let folder = tempfile::tempdir().unwrap();
+        let srgb = |v: f32| if v <= 0.04045 { v / 12.92 } else { ((v + 0.055) / 1.055).powf(2.4) };
+        let decoded = |encoding: ImageEncoding, v: f32| match encoding {
+            ImageEncoding::Auto | ImageEncoding::Srgb => srgb(v),
+            ImageEncoding::Linear => v,
+            ImageEncoding::Gamma(gamma) => v.powf(gamma),
+        };
+        let encodings = [ImageEncoding::Auto, ImageEncoding::Srgb, ImageEncoding::Linear, ImageEncoding::Gamma(1.8)];
+        let store = Arc::new(TileStore::new(1 << 20).unwrap());
+        let mut wrong = String::new();
+        for sample in samples() {
+            let path = folder.path().join(sample.name);
+            std::fs::write(&path, &sample.bytes).unwrap();
+            for encoding in encodings {
+                let request = ImageRequest {
+                    path: path.clone(),
+                    channels: ImageChannels::Color,
+                    encoding,
+                    wrap: Wrap::Clamp,
+                    filter: Filter::Point,
+                };
+                let map = load_map(&request).unwrap_or_else(|error| panic!("{error}"));
+                let tiled = load_map(&request).unwrap().tiled(&store).unwrap();
+                for (x, stored) in sample.stored.iter().enumerate() {
+                    // What is stored as a float is light already
+                    let expected = stored.map(|v| if sample.is_integer { decoded(encoding, v) } else { v });
+                    let found = map.texel(0, x as i64, 0).to_array();
+                    assert_eq!(found, tiled.texel(0, x as i64, 0).to_array());
+                    if found.iter().zip(expected).any(|(a, b)| (a - b).abs() > 1e-6 + 2e-6 * b + sample.tolerance) {
+                        writeln!(wrong, "{} {encoding:?} pixel {x}: {found:?} for {expected:?}", sample.name).unwrap();
+                    }
+                }
+            }
+        }
+        assert!(wrong.is_empty(), "{wrong}");
+    }
+}
