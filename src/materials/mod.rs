@@ -321,8 +321,14 @@ impl MaterialSet {
     ) -> Option<SurfaceBsdf<'_>> {
         let id = self.resolve(id, textures, ctx, wo)?;
         let entry = &self.entries[id as usize];
-        let bsdf = self.local_bsdf(id, &Textures { set: textures, ctx })?;
-        Some(SurfaceBsdf { bsdf, frame: bump::shading_frame(entry, textures, hit, ctx), n: hit.n })
+        let t = Textures { set: textures, ctx };
+        let bsdf = self.local_bsdf(id, &t)?;
+        let frame = bump::shading_frame(entry, textures, hit, ctx);
+        let frame = match &entry.material {
+            Material::Principled(material) => material.frame(frame, hit.dpdv, &t),
+            _ => frame,
+        };
+        Some(SurfaceBsdf { bsdf, frame, n: hit.n })
     }
 
     fn local_bsdf(&self, id: MaterialId, t: &Textures<'_>) -> Option<Bsdf<'_>> {

@@ -5,7 +5,7 @@ use crate::bsdfs::Principled;
 use crate::bsdfs::principled::{Interior, rough};
 use crate::bsdfs::sheen::{LEAST_ALPHA, Sheen};
 use crate::textures::{FloatTextureId, RgbTextureId};
-use lumiris_numbers::math::sqr;
+use lumiris_numbers::math::{Frame, Vec2, Vec3, sqr};
 
 /// Strength of the anisotropy, 0..1, of several models: with 0 both alphas are that of the roughness.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -18,7 +18,40 @@ pub enum Anisotropy {
     Disney(f32),
 }
 
+/// The direction along which alpha is that along, where it is not ∂p/∂u.
+#[derive(Clone, Copy, Debug)]
+pub struct AnisotropyDirection {
+    /// Angle from ∂p/∂u towards ∂p/∂v (radians).
+    pub rotation: f32,
+    /// Red and green of `KHR_materials_anisotropy`: the direction before the rotation, along ∂p/∂u and ∂p/∂v, from −1 to 1
+    /// for 0 to 1. Blue is a factor of the strength.
+    pub map: Option<RgbTextureId>,
+}
+
+impl AnisotropyDirection {
+    /// `frame` turned about its z. `dpdv` is ∂p/∂v, which tells on which side of x the direction is.
+    fn turned(&self, frame: &Frame, dpdv: Vec3, t: &Textures<'_>) -> Frame {
+        let direction = self.map.map_or(Vec2::X, |map| {
+            let c = t.rgb(map) * 2.0;
+            Vec2::new(c.r - 1.0, c.g - 1.0)
+        });
+        let direction = Vec2::from_angle(self.rotation).rotate(direction);
+        let up = if frame.y.dot(dpdv) < 0.0 { -frame.y } else { frame.y };
+        let x = frame.x * direction.x + up * direction.y;
+        if x.length_squared() > 1e-6 { Frame::from_xz(x, frame.z) } else { *frame }
+    }
+}
+
 impl Anisotropy {
+    /// With `factor` times the strength.
+    fn times(self, factor: f32) -> Self {
+        match self {
+            Anisotropy::Gltf(strength) => Anisotropy::Gltf(strength * factor),
+            Anisotropy::OpenPbr(strength) => Anisotropy::OpenPbr(strength * factor),
+            Anisotropy::Disney(strength) => Anisotropy::Disney(strength * factor),
+        }
+    }
+
     /// Alphas along and across.
     fn alphas(self, alpha: f32) -> [f32; 2] {
         match self {
@@ -47,6 +80,8 @@ pub struct PrincipledMaterial {
     pub roughness: FloatTextureId,
     /// How alpha differs along ∂p/∂u and across.
     pub anisotropy: Anisotropy,
+    /// Direction of the anisotropy; `None`: along ∂p/∂u.
+    pub direction: Option<AnisotropyDirection>,
     /// Index of refraction.
     pub ior: f32,
     /// Factor of the dielectric's reflectance.
@@ -70,13 +105,19 @@ pub struct PrincipledMaterial {
 }
 
 impl PrincipledMaterial {
+    /// The frame of the BSDF: `frame`, or that turned to the direction of the anisotropy.
+    pub(super) fn frame(&self, frame: Frame, dpdv: Vec3, t: &Textures<'_>) -> Frame {
+        self.direction.map_or(frame, |direction| direction.turned(&frame, dpdv, t))
+    }
+
     /// The BSDF at a point.
     pub(super) fn bsdf(&self, t: &Textures<'_>) -> Principled {
         let unit = |id: FloatTextureId| t.float(id).clamp(0.0, 1.0);
         let specular = unit(self.specular);
         let f0 = sqr((self.ior - 1.0) / (self.ior + 1.0));
         let alpha = sqr(unit(self.roughness));
-        let [along, across] = self.anisotropy.alphas(alpha);
+        let factor = self.direction.and_then(|d| d.map).map_or(1.0, |map| t.rgb(map).b.clamp(0.0, 1.0));
+        let [along, across] = self.anisotropy.times(factor).alphas(alpha);
         let coat_alpha = sqr(unit(self.coat_roughness));
         let refracts = !self.is_thin && (self.ior - 1.0).abs() > 1e-3;
         Principled {

@@ -2,6 +2,7 @@
 #![allow(clippy::unwrap_used)]
 
 mod analytic_scenes;
+mod anisotropy;
 mod bit_exact;
 mod crosscheck;
 mod dispersion;

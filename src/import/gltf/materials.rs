@@ -3,7 +3,7 @@
 use super::Messages;
 use super::textures::{EmissionSource, Textures};
 use crate::import::images::{ImageChannels, ImageEncoding};
-use crate::materials::principled::Anisotropy;
+use crate::materials::principled::{Anisotropy, AnisotropyDirection};
 use crate::materials::{Material, MaterialEntry, MaterialId, NormalMap, PrincipledMaterial};
 use crate::media::Homogeneous;
 use crate::textures::{FloatTexture, FloatTextureId, ImageTexture, RgbTexture, RgbTextureId};
@@ -125,7 +125,7 @@ impl<'a> Materials<'a> {
         let sheen = place.extension("KHR_materials_sheen");
         let transmission = place.extension("KHR_materials_transmission");
         let volume = place.extension("KHR_materials_volume");
-        let anisotropy = place.extension("KHR_materials_anisotropy").key("anisotropyStrength");
+        let anisotropy = place.extension("KHR_materials_anisotropy");
         let color = Rgb::from_array(specular.key("specularColorFactor").numbers().unwrap_or([1.0; 3]));
         let sheen_color = Rgb::from_array(sheen.key("sheenColorFactor").numbers().unwrap_or([0.0; 3]));
         let t = &mut self.textures;
@@ -137,7 +137,8 @@ impl<'a> Materials<'a> {
             base_color,
             metalness: number(&pbr, "metallicFactor", 1.0, &packed, 2)?,
             roughness: number(&pbr, "roughnessFactor", 1.0, &packed, 1)?,
-            anisotropy: Anisotropy::Gltf(factor(&anisotropy, 0.0)),
+            anisotropy: Anisotropy::Gltf(factor(&anisotropy.key("anisotropyStrength"), 0.0)),
+            direction: None,
             // 0 stands for an infinite index
             ior: match factor(&place.extension("KHR_materials_ior").key("ior"), 1.5) {
                 0.0 => MIRROR_IOR,
@@ -167,11 +168,25 @@ impl<'a> Materials<'a> {
             )?,
             specular_color: t.colored(color, &specular.key("specularColorTexture"), messages)?,
         };
+        material.direction = self.anisotropy_direction(&anisotropy, messages)?;
         let old = place.extension("KHR_materials_pbrSpecularGlossiness");
         if old.exists() && !pbr.exists() {
             self.specular_glossiness(&old, &mut material, messages)?;
         }
         Ok(material)
+    }
+
+    /// Rotation and texture of `KHR_materials_anisotropy`.
+    fn anisotropy_direction(
+        &mut self,
+        place: &Place<'a>,
+        messages: &mut Messages<'_>,
+    ) -> Result<Option<AnisotropyDirection>, GltfError> {
+        let rotation = factor(&place.key("anisotropyRotation"), 0.0);
+        let texture = place.key("anisotropyTexture");
+        let image = self.textures.image(&texture, ImageChannels::Color, ImageEncoding::Linear, messages)?;
+        let map = image.map(|image| self.textures.set.add_rgb(RgbTexture::Image(image)));
+        Ok((rotation != 0.0 || map.is_some()).then_some(AnisotropyDirection { rotation, map }))
     }
 
     /// `KHR_materials_pbrSpecularGlossiness`: reflectance at normal incidence, and 1 − roughness, of a dielectric.
@@ -241,11 +256,6 @@ fn absorption(place: &Place<'_>) -> Option<Homogeneous> {
 
 /// Says what is rendered in another way than the extensions have it.
 fn warn_of_approximations(place: &Place<'_>, messages: &mut Messages<'_>) {
-    let anisotropy = place.extension("KHR_materials_anisotropy");
-    let is_turned = anisotropy.key("anisotropyRotation").number().is_some_and(|r| r != 0.0);
-    if is_turned || anisotropy.key("anisotropyTexture").exists() {
-        messages.warning(&anisotropy, "the direction of anisotropy is that of the tangents");
-    }
     let coat = place.extension("KHR_materials_clearcoat").key("clearcoatNormalTexture");
     if coat.exists() {
         messages.warning(&coat, "the coat has the normals of the base");

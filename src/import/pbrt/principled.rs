@@ -18,15 +18,17 @@
 //!
 //! * `specular_ior_level` and `specular` (numbers, default 0.5) are half the factor of the reflectance;
 //! * `anisotropic` keeps the product of both alphas, their ratio being 1 − 0.9 times it [Burley 2012];
+//! * `anisotropic_rotation` turns the direction of the greater alpha from ∂p/∂u towards ∂p/∂v, 1 being a whole turn;
 //! * `clearcoatgloss` (a number) is a coat whose alpha is 0.1 to 0.001.
 
 use super::state::Builder;
-use crate::materials::principled::Anisotropy;
+use crate::materials::principled::{Anisotropy, AnisotropyDirection};
 use crate::materials::{Material, PrincipledMaterial};
 use crate::textures::{FloatTexture, FloatTextureId, RgbTexture, RgbTextureId};
 use lumiris_formats::diagnostic::Diagnostics;
 use lumiris_formats::pbrt::params::{ParamSet, ParamType, SpectrumValue};
 use lumiris_numbers::math::Rgb;
+use std::f32::consts::TAU;
 
 /// Names of OpenPBR, and others of the same meaning.
 const SPELLINGS: &[(&str, &[&str])] = &[
@@ -57,6 +59,8 @@ impl Builder<'_> {
             metalness: self.unit(p, metalness, 0.0, d),
             roughness: self.unit(p, roughness, 0.3, d),
             anisotropy: anisotropy(p, d),
+            direction: number_of(p, ["anisotropic_rotation"], d)
+                .map(|(_, turns)| AnisotropyDirection { rotation: turns * TAU, map: None }),
             ior: self.ior(p, ior, d),
             specular: self.unit(p, "specular_weight", 1.0, d),
             specular_color: self.specular_color(p, specular_color, d),
