@@ -2,7 +2,7 @@
 //! surface. The models are those of pbrt-v4 [Pharr et al. 2023, ch. 9 and 14]; f of transmission is for radiance, that
 //! is scaled by 1/η².
 //!
-//! Reading order: [`fresnel`], [`microfacet`], [`diffuse`], [`diffuse_transmission`], [`conductor`], [`dielectric`],
+//! Reading order: [`lobe`], [`fresnel`], [`microfacet`], [`diffuse`], [`diffuse_transmission`], [`conductor`], [`dielectric`],
 //! [`thin_dielectric`], [`coat_table`], [`coated_diffuse`], [`layered`], `ggx_albedo`, [`sheen`], [`principled`], [`hair`]; [`phase`] in media; then what can only be evaluated: [`models`],
 //! [`default_lobes`], [`evaluated`], [`mod@resample`].
 
@@ -18,6 +18,7 @@ pub mod fresnel;
 mod ggx_albedo;
 pub mod hair;
 pub mod layered;
+pub mod lobe;
 pub mod microfacet;
 pub mod models;
 pub mod phase;
@@ -38,6 +39,7 @@ pub use diffuse_transmission::DiffuseTransmission;
 pub use evaluated::Evaluated;
 pub use hair::Hair;
 pub use layered::{Base, Layered};
+pub use lobe::{BsdfSample, Lobe};
 pub use microfacet::TrowbridgeReitz;
 pub use models::Model;
 pub use phase::Phase;
@@ -49,68 +51,9 @@ use dielectric::{Select, Transport};
 use lumiris_lanes::bsdf::Model as LaneModel;
 use lumiris_numbers::math::{Rgb, Vec3};
 use std::f32::consts::FRAC_1_PI;
-use std::ops::BitOr;
-
-/// What kind of scattering a sample is: a set of flags.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub struct Lobe(u8);
-
-impl Lobe {
-    /// To the side of `wo`.
-    pub const REFLECTION: Lobe = Lobe(1);
-    /// To the other side.
-    pub const TRANSMISSION: Lobe = Lobe(2);
-    /// Lambertian or as wide.
-    pub const DIFFUSE: Lobe = Lobe(4);
-    /// A rough peak.
-    pub const GLOSSY: Lobe = Lobe(8);
-    /// A delta: `pdf` is a probability, and f and pdf of the methods leave it out.
-    pub const SPECULAR: Lobe = Lobe(16);
-
-    /// True if all flags of `other` are set.
-    #[inline]
-    pub const fn contains(self, other: Lobe) -> bool {
-        self.0 & other.0 == other.0
-    }
-
-    /// True if the direction is a delta.
-    #[inline]
-    pub const fn is_specular(self) -> bool {
-        self.contains(Lobe::SPECULAR)
-    }
-
-    /// True if the direction is on the other side.
-    #[inline]
-    pub const fn is_transmission(self) -> bool {
-        self.contains(Lobe::TRANSMISSION)
-    }
-}
 
 /// Most lobes that [`Bsdf::first_lobe`] tells apart.
 pub const MAX_LOBES: usize = 2;
-
-impl BitOr for Lobe {
-    type Output = Lobe;
-    #[inline]
-    fn bitor(self, other: Lobe) -> Lobe {
-        Lobe(self.0 | other.0)
-    }
-}
-
-/// A sampled direction. The weight of the path is `f·|cos θi|/pdf` for all lobes.
-#[derive(Clone, Copy, Debug)]
-pub struct BsdfSample {
-    /// Value without cosine (1/sr); of a delta, its weight over |cos θi|, times `pdf`.
-    pub f: Rgb,
-    /// Direction to the light.
-    pub wi: Vec3,
-    /// Density per steradian; of a delta, its probability.
-    pub pdf: f32,
-    /// Kind of scattering.
-    pub lobe: Lobe,
-    /// Index of refraction of the side of `wi` relative to that of `wo`; 1 for reflection.
-    pub eta: f32,
-}
 
 /// The scattering of one surface point.
 #[derive(Clone, Copy, Debug)]

@@ -1,0 +1,62 @@
+//! Samples of a BSDF, and the lobes that they are of.
+
+use lumiris_numbers::math::{Rgb, Vec3};
+use std::ops::BitOr;
+
+/// What kind of scattering a sample is: a set of flags.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Lobe(u8);
+
+impl Lobe {
+    /// To the side of `wo`.
+    pub const REFLECTION: Lobe = Lobe(1);
+    /// To the other side.
+    pub const TRANSMISSION: Lobe = Lobe(2);
+    /// Lambertian or as wide.
+    pub const DIFFUSE: Lobe = Lobe(4);
+    /// A rough peak.
+    pub const GLOSSY: Lobe = Lobe(8);
+    /// A delta: `pdf` is a probability, and f and pdf of the methods leave it out.
+    pub const SPECULAR: Lobe = Lobe(16);
+
+    /// True if all flags of `other` are set.
+    #[inline]
+    pub const fn contains(self, other: Lobe) -> bool {
+        self.0 & other.0 == other.0
+    }
+
+    /// True if the direction is a delta.
+    #[inline]
+    pub const fn is_specular(self) -> bool {
+        self.contains(Lobe::SPECULAR)
+    }
+
+    /// True if the direction is on the other side.
+    #[inline]
+    pub const fn is_transmission(self) -> bool {
+        self.contains(Lobe::TRANSMISSION)
+    }
+}
+
+impl BitOr for Lobe {
+    type Output = Lobe;
+    #[inline]
+    fn bitor(self, other: Lobe) -> Lobe {
+        Lobe(self.0 | other.0)
+    }
+}
+
+/// A sampled direction. The weight of the path is `f·|cos θi|/pdf` for all lobes.
+#[derive(Clone, Copy, Debug)]
+pub struct BsdfSample {
+    /// Value without cosine (1/sr); of a delta, its weight over |cos θi|, times `pdf`.
+    pub f: Rgb,
+    /// Direction to the light.
+    pub wi: Vec3,
+    /// Density per steradian; of a delta, its probability.
+    pub pdf: f32,
+    /// Kind of scattering.
+    pub lobe: Lobe,
+    /// Index of refraction of the side of `wi` relative to that of `wo`; 1 for reflection.
+    pub eta: f32,
+}
