@@ -12,9 +12,10 @@
 //! whether an x_i takes part does not depend on the direction that it drew, and light from surfaces that are not
 //! Lambertian, beyond others that do not scatter, or of emitters, remains with its own path.
 //!
-//! The samples of one index in a block of pixels are a group. Where blocks lie depends on the index, so that the noise of
+//! The samples of one turn in a block of pixels are a group. Where blocks lie depends on the turn, so that the noise of
 //! two pixels is never the same for all samples. Groups end at [cells](CELL), which are always rendered together: so
-//! images do not depend on tiles.
+//! images do not depend on tiles. Where pixels have different numbers of samples, those of one turn are of the same part of
+//! the image ([`crate::scene::PixelSamples::turn`]); the numbers are independent of the samples, and so is who is in a group.
 
 use super::light_layers;
 use super::segment::CameraSample;
@@ -45,7 +46,6 @@ pub fn obstacle(job: &RenderJob) -> Option<&'static str> {
         (settings.depth() < 2, "paths of one bounce have nothing to share"),
         (settings.kind != IntegratorKind::Path, "only the integrator path has paths of its own for each pixel"),
         (settings.roulette != RouletteKind::Throughput, "they split"),
-        (job.pixel_samples.is_some(), "pixels have different numbers of samples"),
         (job.shadows_cross_media(), "there may be media between their vertices"),
         (job.world.scene.materials.has_dispersion(), "paths may have wavelengths"),
         (light_layers::count(job) > 0, "light groups have layers (--light-groups none: they have not)"),
@@ -185,7 +185,7 @@ impl Reuse {
             return 0;
         }
         let (origin, groups, edge) = (job.world.scene.film.bounds, self.groups, self.edge);
-        let group = |s: &CameraSample| groups.of(edge, [s.pixel[0] - origin.x0, s.pixel[1] - origin.y0], s.index);
+        let group = |s: &CameraSample| groups.of(edge, [s.pixel[0] - origin.x0, s.pixel[1] - origin.y0], s.turn);
         self.order.clear();
         self.order.extend(samples.iter().map(group).zip(0_u32..));
         self.order.sort_unstable();
@@ -262,21 +262,21 @@ impl Reuse {
 }
 
 impl Groups {
-    /// The group of sample `index` of a pixel, counted from the corner of the image.
-    fn of(self, edge: u32, [x, y]: [u32; 2], index: u32) -> u64 {
+    /// The group of a sample of a pixel, counted from the corner of the image.
+    fn of(self, edge: u32, [x, y]: [u32; 2], turn: u32) -> u64 {
         let (cell, block) = match self {
             Groups::None => return 0,
             Groups::Grid => ([x / edge, y / edge], [0; 2]),
             Groups::Cells => {
                 let cell = [x / CELL, y / CELL];
-                let [dx, dy, ..] = pcg4d([cell[0], cell[1], index, SEED]);
+                let [dx, dy, ..] = pcg4d([cell[0], cell[1], turn, SEED]);
                 let block = |p: u32, d: u32| (p % CELL + d % edge) / edge;
                 (cell, [block(x, dx), block(y, dy)])
             }
         };
         // A batch has few cells, near each other, and at most CELL blocks in a row of one
         let ([cell_x, cell_y], [block_x, block_y]) = (cell.map(|c| u64::from(c & 0x7ff)), block.map(u64::from));
-        u64::from(index) << 32 | cell_y << 21 | cell_x << 10 | block_y << 5 | block_x
+        u64::from(turn) << 32 | cell_y << 21 | cell_x << 10 | block_y << 5 | block_x
     }
 }
 

@@ -96,8 +96,8 @@ pub struct CameraSample {
     pub direct: SampleStream,
     /// Sample counts at its first vertex.
     pub sample_counts: SampleCounts,
-    /// Its index among the samples of its pixel.
-    pub index: u32,
+    /// Which samples of neighbouring pixels may share its path: its index, where all pixels have as many samples.
+    pub turn: u32,
     /// The fit of its pixel.
     pub fit: u32,
     /// Its pixel; any, where none is the sample's.

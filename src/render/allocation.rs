@@ -6,48 +6,54 @@
 //! pixel's samples remains unbiased: were n_p to follow from the very samples that are averaged, pixels whose first samples
 //! happen to be dark would stay dark.
 //!
+//! What visible lights make of v_p is known from more samples than the rest, which see nothing but these lights and so cost
+//! little: it lies in few pixels, those at the edges. The rest is averaged over neighbours.
+//!
 //! What is gained is estimated from the pilot, too, by one half of the pixels with numbers from the other half, first on a
 //! part of the image: where noise is much the same everywhere, as in most paths of many bounces, numbers remain uniform.
 //!
 //! The numbers depend on scene, settings and seed only; costs are counted in rays and proposals and not in seconds.
 
+use super::allocation_counts::{ALONE, Rules, SHARED, counts};
 use super::noise::counts_for;
 use super::pilot_samples::trace_pixels;
 use super::worker::Worker;
 use super::{RenderSettings, Run, position};
 use crate::direct::Estimator;
-use crate::film::PixelBounds;
 use crate::film::accumulator::PixelAccumulator;
+use crate::film::{PixelBounds, PixelSample, PixelSums};
 use crate::imaging::metrics::difference::DEFAULT_EPSILON;
+use crate::integrators::reuse::{self, Groups};
 use crate::integrators::{PathStats, PathTracer, Tracer};
 use crate::scene::{PixelSamples, RenderJob};
-use crate::settings::{Allocation, IntegratorKind, Settings};
+use crate::settings::{Allocation, IntegratorKind, IntegratorSettings, Settings};
 use lumiris_numbers::math::hash::{pcg4d, unit_f32};
+use lumiris_numbers::math::luminance;
 use rayon::prelude::*;
 use std::sync::atomic::AtomicBool;
 
 /// Fewest samples per pixel for which a pilot pays.
 const MIN_SPP: u32 = 8;
-/// Samples of the pilot as a fraction of those of the image.
-const PILOT_FRACTION: f64 = 0.05;
 /// Fewest and most samples of a pixel in the pilot; with less than the fewest, the pilot has fewer pixels.
 const PILOT_SPP: [u32; 2] = [2, 8];
+/// Samples of two sets each that see visible lights alone: as a part of those of the image, and fewest and most of them.
+const SIGHT_PART: u32 = 16;
+const SIGHT_SPP: [u32; 2] = [1, 4];
+/// Factor by which visible lights differ among neighbours for a pixel to have more of these samples, and how many.
+const EDGE_RATIO: f64 = 4.0;
+const SIGHT_OF_EDGES: u32 = 8;
+/// Both sets.
+const BOTH: [usize; 2] = [0, 1];
 /// Combined with the seed of the image to give that of the pilot.
 const PILOT_SEED: u32 = 0x61_6c_6c_6f;
 /// Edge of the tiles whose samples have one cost (pixels): part of the result, unlike that of rendering.
 const COST_TILE: u32 = 16;
-/// Variances are averaged over this many pixels to each side.
-const RADIUS: usize = 2;
-/// Fewest and most samples of a pixel, relative to the mean.
-const RANGE: [f64; 2] = [0.5, 8.0];
 /// One in this many tiles is sampled first.
 const SCOUTS: u32 = 4;
 /// Tiles whose samples are in memory before they are reduced to what [`Measured`] holds.
 const TILES_AT_ONCE: usize = 1024;
 /// Pixels from which on a part of the image tells whether there is anything to gain.
 const MIN_SCOUTED: usize = 256 * (COST_TILE * COST_TILE) as usize;
-/// Factor of the error below which numbers remain uniform.
-const MIN_GAIN: f64 = 1.05;
 /// Maximum number of samples per pixel for a standard error that is asked for, if none is given.
 const MAX_SPP_FOR_NOISE: u32 = 4096;
 
@@ -64,12 +70,12 @@ pub(super) fn allocate(job: &RenderJob) -> Option<PixelSamples> {
     let spp = settings.sampling.spp;
     pilot.measure(|tile| tile % SCOUTS == 0);
     // Few tiles say nothing of the others
-    if pilot.bounds.area() >= MIN_SCOUTED && pilot.gain(spp) < MIN_GAIN {
+    if pilot.bounds.area() >= MIN_SCOUTED && pilot.gain(spp) < pilot.rules.min_gain {
         return None;
     }
     pilot.measure(|tile| tile % SCOUTS != 0);
-    let counts = counts(&pilot.weights(|_| true), &pilot.costs(), spp);
-    (pilot.gain(spp) >= MIN_GAIN).then_some(PixelSamples { bounds: pilot.bounds, spp, counts })
+    let counts = counts(&pilot.weights(|_| true, &BOTH), &pilot.costs(), (&pilot.rules, spp));
+    (pilot.gain(spp) >= pilot.rules.min_gain).then_some(PixelSamples { bounds: pilot.bounds, spp, counts })
 }
 
 /// Completes settings that ask for a standard error: its maximum number of samples per pixel, unless `has_spp`. `Err` says what it
@@ -99,42 +105,80 @@ pub fn allows_adaptive(settings: &Settings) -> bool {
 #[derive(Clone, Copy, Debug, Default)]
 struct Measured {
     count: u32,
-    /// Σ of the samples.
+    /// Σ of the samples without what they see of visible lights.
     radiance: [f32; 3],
-    /// Variance of a sample; 0 of fewer than two.
+    /// Variance of these; 0 of fewer than two.
     variance: [f32; 3],
+    /// Mean of what samples see of visible lights.
+    sight: [f32; 3],
+    /// Variance of that from each of two sets of samples, of the channel that varies most.
+    sight_variance: [f32; 2],
     /// Cost of a sample; 0 where nothing was measured.
     cost: f32,
 }
 
 impl Measured {
-    fn of(samples: &PixelAccumulator, cost: f64) -> Self {
+    fn of(samples: &PixelAccumulator, sight: &[PixelAccumulator; 2], cost: f64) -> Self {
         let sums = samples.sums();
-        let variance = sums.variance_of_mean().map(|v| (v * sums.count as f64) as f32);
-        Measured { count: sums.count as u32, radiance: sums.radiance.map(|x| x as f32), variance, cost: cost as f32 }
+        let [a, b] = sight.each_ref().map(PixelAccumulator::sums);
+        Measured {
+            count: sums.count as u32,
+            radiance: sums.radiance.map(|x| x as f32),
+            variance: variance(&sums).map(|v| v as f32),
+            sight: std::array::from_fn(|c| {
+                ((a.radiance[c] + b.radiance[c]) / (a.count + b.count).max(1) as f64) as f32
+            }),
+            sight_variance: [a, b].map(|sums| variance(&sums).into_iter().fold(0.0, f64::max) as f32),
+            cost: cost as f32,
+        }
     }
+}
+
+/// The variance of a sample.
+fn variance(sums: &PixelSums) -> [f64; 3] {
+    sums.variance_of_mean().map(|v| v * sums.count as f64)
 }
 
 /// A few samples of the pixels, or of some of them.
 struct Pilot<'a> {
     job: &'a RenderJob,
-    /// Samples of a pixel, fraction of the pixels that have them, and seed.
-    sampling: (u32, f32, u32),
+    sampling: PilotSampling,
+    rules: Rules,
     bounds: PixelBounds,
     /// Row by row.
     pixels: Vec<Measured>,
 }
 
+#[derive(Clone, Copy)]
+struct PilotSampling {
+    /// Samples of a pixel.
+    spp: u32,
+    /// Part of the pixels that have them.
+    fraction: f32,
+    seed: u32,
+    /// Edge of the blocks of pixels that have them together, and share paths.
+    edge: u32,
+    /// Samples of each of two sets that see visible lights alone.
+    sight: u32,
+}
+
 impl<'a> Pilot<'a> {
     /// Without samples.
     fn new(job: &'a RenderJob) -> Self {
-        let sampling = &job.settings().sampling;
-        let wanted = PILOT_FRACTION * f64::from(sampling.spp);
+        let (sampling, edge) = (&job.settings().sampling, reuse::edge(job));
+        let rules = if edge > 1 { SHARED } else { ALONE };
+        let wanted = rules.fraction * f64::from(sampling.spp);
         let spp = (wanted.round() as u32).clamp(PILOT_SPP[0], PILOT_SPP[1]);
-        let seed = pcg4d([sampling.seed, PILOT_SEED, 0, 0])[0];
+        let sampling = PilotSampling {
+            spp,
+            fraction: (wanted / f64::from(spp)) as f32,
+            seed: pcg4d([sampling.seed, PILOT_SEED, 0, 0])[0],
+            edge,
+            sight: (sampling.spp / SIGHT_PART).clamp(SIGHT_SPP[0], SIGHT_SPP[1]),
+        };
         let bounds = job.world.scene.film.bounds;
         let pixels = vec![Measured::default(); bounds.area()];
-        Pilot { job, sampling: (spp, (wanted / f64::from(spp)) as f32, seed), bounds, pixels }
+        Pilot { job, sampling, rules, bounds, pixels }
     }
 
     /// Samples the tiles whose numbers are chosen. Tiles with the same remainder lie on lattices.
@@ -143,7 +187,8 @@ impl<'a> Pilot<'a> {
         let run = Run::new(self.job, &render, &stop, &|_| ());
         let mut tiles = self.bounds.tiles(COST_TILE);
         tiles.retain(|t| is_chosen((t.x0 - self.bounds.x0) / COST_TILE + 2 * ((t.y0 - self.bounds.y0) / COST_TILE)));
-        let worker = || Worker::new(PathTracer::new(false));
+        let groups = if self.sampling.edge > 1 { Groups::Grid } else { Groups::None };
+        let worker = || Worker::new(PathTracer::sharing(groups, false));
         let of_tile = |worker: &mut _, tile: &_| pilot_tile(&run, worker, tile, self.sampling);
         for tiles in tiles.chunks(TILES_AT_ONCE) {
             let measured: Vec<_> = tiles.par_iter().map_init(worker, of_tile).collect();
@@ -165,54 +210,97 @@ impl<'a> Pilot<'a> {
     /// The pixels up to `radius` away in each direction.
     fn around(&self, i: usize, radius: usize) -> impl Iterator<Item = usize> + use<> {
         let (width, height) = (self.bounds.width() as usize, self.bounds.height() as usize);
-        let window = |i: usize, len: usize| i.saturating_sub(radius)..(i + radius + 1).min(len);
+        let window = |i: usize, len: usize| i.saturating_sub(radius)..i.saturating_add(radius + 1).min(len);
         let columns = window(i % width, width);
         window(i / width, height).flat_map(move |y| columns.clone().map(move |x| y * width + x))
     }
 
-    /// Σ of the variance of a sample over its squared mean plus ε by channel; the mean is that of neighbours, too. `None`
-    /// where it is not known.
-    fn relative_variance(&self, i: usize) -> Option<f64> {
-        let p = &self.pixels[i];
-        if p.count < 2 {
-            return None;
-        }
+    /// 1/(m² + ε) of each channel; m is the mean of what a pixel sees of visible lights, and of the rest of its neighbours.
+    fn relative_to(&self, i: usize) -> [f64; 3] {
         let (mut sum, mut count) = ([0.0; 3], 0);
-        for q in self.around(i, 1).map(|q| &self.pixels[q]) {
+        for q in self.around(i, self.rules.radii[0]).map(|q| &self.pixels[q]) {
             count += q.count;
             (0..3).for_each(|c| sum[c] += f64::from(q.radiance[c]));
         }
-        let of_channel = |c: usize| {
-            let mean = sum[c] / f64::from(count);
-            f64::from(p.variance[c]) / (mean * mean + DEFAULT_EPSILON)
-        };
-        Some((0..3).map(of_channel).sum())
+        std::array::from_fn(|c| {
+            let mean = f64::from(self.pixels[i].sight[c]) + sum[c] / f64::from(count.max(1));
+            1.0 / (mean * mean + DEFAULT_EPSILON)
+        })
     }
 
-    /// v_p: the relative variance, averaged over the chosen ones of the neighbours.
-    fn weights(&self, is_chosen: impl Fn(usize) -> bool + Sync) -> Vec<f32> {
-        let area = self.bounds.area();
-        // Not a number where it is not known
-        let of_pixel = |i: usize| self.relative_variance(i).map_or(f32::NAN, |v| v as f32);
-        let of_pixels: Vec<f32> = (0..area).into_par_iter().map(of_pixel).collect();
-        let smooth = |i: usize| {
-            let known = self.around(i, RADIUS).filter(|&q| is_chosen(q)).map(|q| of_pixels[q]).filter(|v| !v.is_nan());
-            let (sum, count) = known.fold((0.0, 0), |(s, n), v| (s + f64::from(v), n + 1));
-            (sum / f64::from(count.max(1))) as f32
-        };
-        (0..area).into_par_iter().map(smooth).collect()
+    /// Relative variance of a sample without visible lights, added up over channels. `None` where it is not known.
+    fn relative_variance(&self, i: usize) -> Option<f64> {
+        let p = &self.pixels[i];
+        let of_channels = self.relative_to(i).into_iter().zip(p.variance);
+        (p.count >= 2).then(|| of_channels.map(|(relative, v)| relative * f64::from(v)).sum())
     }
 
-    /// By how much the numbers lower the error: that of half of the pixels, with numbers that follow from the other half.
+    /// The same of visible lights, by some of the sets of samples.
+    fn of_sight(&self, i: usize, sets: &[usize]) -> f64 {
+        let variances = sets.iter().map(|&k| f64::from(self.pixels[i].sight_variance[k]));
+        let variance = variances.sum::<f64>() / sets.len() as f64;
+        if variance > 0.0 { variance * self.relative_to(i).iter().sum::<f64>() } else { 0.0 }
+    }
+
+    /// v_p: the relative variance, averaged over the chosen ones of the neighbours, and that of visible lights by some of
+    /// the sets of samples.
+    fn weights(&self, is_chosen: impl Fn(usize) -> bool + Sync, sets: &[usize]) -> Vec<f32> {
+        let known = |i: usize| self.relative_variance(i).filter(|_| is_chosen(i));
+        // Σ over neighbours, and their number
+        let terms = (0..self.bounds.area()).into_par_iter().map(|i| known(i).map_or([0.0; 2], |v| [v, 1.0]));
+        let sums = box_sums(terms.collect(), self.bounds.width() as usize, self.rules.radii[1]);
+        let weight =
+            |(i, [sum, count]): (usize, [f64; 2])| (sum.max(0.0) / count.max(1.0) + self.of_sight(i, sets)) as f32;
+        sums.into_par_iter().enumerate().map(weight).collect()
+    }
+
+    /// By how much the numbers lower error × cost: of half of the pixels, with numbers that follow from the other half, and
+    /// of visible lights by one set of samples with numbers that follow from the other. Where pixels share paths, the
+    /// geometric mean for the relative and for the absolute error, which is nearly all at edges of visible lights.
     fn gain(&self, spp: u32) -> f64 {
         let width = self.bounds.width() as usize;
         let is_even = |i: usize| (i % width + i / width).is_multiple_of(2);
-        let counts = counts(&self.weights(is_even), &self.costs(), spp);
-        let odd = (0..counts.len()).filter(|&i| !is_even(i));
-        let known = odd.filter_map(|i| Some((self.relative_variance(i)?, f64::from(counts[i]))));
-        let (uniform, adaptive) = known.fold((0.0, 0.0), |(u, a), (v, n)| (u + v / f64::from(spp), a + v / n));
-        if adaptive > 0.0 { uniform / adaptive } else { 1.0 }
+        let counts = counts(&self.weights(is_even, &[0]), &self.costs(), (&self.rules, spp));
+        let (mut uniform, mut adaptive) = ([0.0; 3], [0.0; 3]);
+        for i in (0..counts.len()).filter(|&i| !is_even(i)) {
+            let Some(relative) = self.relative_variance(i) else { continue };
+            let p = &self.pixels[i];
+            let of_sight = f64::from(p.sight_variance[1]);
+            let absolute = 3.0 * of_sight + p.variance.iter().map(|v| f64::from(*v)).sum::<f64>();
+            let n = f64::from(counts[i]) / f64::from(spp);
+            for (sums, n) in [(&mut uniform, 1.0), (&mut adaptive, n)] {
+                let terms = [(relative + self.of_sight(i, &[1])) / n, absolute / n, f64::from(p.cost) * n];
+                sums.iter_mut().zip(terms).for_each(|(sum, term)| *sum += term);
+            }
+        }
+        let [relative, absolute, cost] = [0, 1, 2].map(|k| uniform[k] / adaptive[k]);
+        let gain = cost * if self.rules.doubles { (relative * absolute).sqrt() } else { relative };
+        if gain.is_finite() { gain } else { 1.0 }
     }
+}
+
+/// Σ over the neighbours up to `radius` away in each direction, in rows of so many.
+fn box_sums(mut values: Vec<[f64; 2]>, width: usize, radius: usize) -> Vec<[f64; 2]> {
+    let sums_of = |line: &[[f64; 2]]| -> Vec<[f64; 2]> {
+        let prefix: Vec<[f64; 2]> = std::iter::once([0.0; 2])
+            .chain(line.iter().scan([0.0; 2], |sum, v| {
+                *sum = [sum[0] + v[0], sum[1] + v[1]];
+                Some(*sum)
+            }))
+            .collect();
+        let sum = |i: usize| {
+            let (from, to) = (prefix[i.saturating_sub(radius)], prefix[(i + radius + 1).min(line.len())]);
+            [to[0] - from[0], to[1] - from[1]]
+        };
+        (0..line.len()).map(sum).collect()
+    };
+    let height = values.len() / width.max(1);
+    values.par_chunks_mut(width.max(1)).for_each(|row| row.copy_from_slice(&sums_of(row)));
+    let columns: Vec<Vec<[f64; 2]>> = (0..width)
+        .into_par_iter()
+        .map(|x| sums_of(&(0..height).map(|y| values[y * width + x]).collect::<Vec<_>>()))
+        .collect();
+    (0..values.len()).into_par_iter().map(|i| columns[i % width][i / width]).collect()
 }
 
 /// What the pilot's samples in a tile say.
@@ -220,70 +308,68 @@ fn pilot_tile(
     run: &Run<'_>,
     worker: &mut Worker<PathTracer>,
     tile: &PixelBounds,
-    (spp, fraction, seed): (u32, f32, u32),
+    PilotSampling { spp, fraction, seed, edge, sight: sight_spp }: PilotSampling,
 ) -> Vec<Measured> {
-    let mut sums = vec![PixelAccumulator::default(); tile.area()];
+    let settings = &run.job.settings().integrator;
+    let origin = run.job.world.scene.film.bounds;
+    let seeing = &IntegratorSettings { max_depth: 0, ..*settings };
     let is_chosen = |i: &u32| {
         let [x, y] = position(tile, *i);
+        let [x, y] = [x - origin.x0, y - origin.y0].map(|x| x / edge);
         unit_f32(pcg4d([x, y, PILOT_SEED, 1])[0]) < fraction
     };
     let chosen: Vec<u32> = (0..tile.area() as u32).filter(is_chosen).collect();
-    trace_pixels(run, worker, (tile, &chosen), 0..spp, seed, |i, sample| sums[i as usize].add(0, sample));
+    let mut seen = Vec::with_capacity(chosen.len() * spp as usize);
+    trace_pixels(run, worker, seeing, (tile, &chosen), (0..spp, seed), |_, sample| seen.push(sample.radiance));
+    worker.tracer.take_stats();
+    let mut sums = vec![PixelAccumulator::default(); tile.area()];
+    let mut seen = seen.into_iter();
+    trace_pixels(run, worker, settings, (tile, &chosen), (0..spp, seed), |i, sample| {
+        let radiance = sample.radiance - seen.next().unwrap_or_default();
+        sums[i as usize].add(0, &PixelSample { radiance, features: None });
+    });
     let cost = cost(&worker.tracer.take_stats());
-    sums.iter().map(|samples| Measured::of(samples, cost)).collect()
+    let sight = see(run, worker, seeing, tile, (sight_spp, seed));
+    worker.tracer.take_stats();
+    sums.iter().zip(&sight).map(|(samples, sight)| Measured::of(samples, sight, cost)).collect()
+}
+
+/// Two sets of samples that see visible lights alone: more for pixels beside which these differ.
+fn see(
+    run: &Run<'_>,
+    worker: &mut Worker<PathTracer>,
+    settings: &IntegratorSettings,
+    tile: &PixelBounds,
+    (spp, seed): (u32, u32),
+) -> Vec<[PixelAccumulator; 2]> {
+    let mut sums = vec![[PixelAccumulator::default(); 2]; tile.area()];
+    let seeds = [1, 2].map(|set| pcg4d([seed, PILOT_SEED, 0, set])[0]);
+    let mut add = |pixels: &[u32], samples: std::ops::Range<u32>| {
+        for (set, seed) in seeds.into_iter().enumerate() {
+            trace_pixels(run, worker, settings, (tile, pixels), (samples.clone(), seed), |i, sample| {
+                sums[i as usize][set].add(0, sample);
+            });
+        }
+        let luminance = |sums: &PixelAccumulator| luminance(sums.radiance.values());
+        sums.iter().map(|sets| sets.each_ref().map(luminance)).collect::<Vec<_>>()
+    };
+    let all: Vec<u32> = (0..tile.area() as u32).collect();
+    let first = add(&all, 0..spp);
+    let (width, height) = (tile.width() as usize, tile.height() as usize);
+    let differs = |i: &u32| {
+        let (x, y) = (*i as usize % width, *i as usize / width);
+        let rows = y.saturating_sub(1)..(y + 2).min(height);
+        let around = rows.flat_map(|y| (x.saturating_sub(1)..(x + 2).min(width)).map(move |x| y * width + x));
+        let (low, high) = around.flat_map(|q| first[q]).fold((f64::INFINITY, 0.0), |(a, b), v| (v.min(a), v.max(b)));
+        high > EDGE_RATIO * low
+    };
+    let edges: Vec<u32> = all.iter().copied().filter(differs).collect();
+    add(&edges, spp..SIGHT_OF_EDGES * spp);
+    sums
 }
 
 /// Mean cost of a camera sample; that of one which hits nothing is 1.
 fn cost(stats: &PathStats) -> f64 {
     let work = stats.camera_rays + 2 * stats.bounce_rays + stats.direct.proposals;
     work as f64 / stats.camera_rays.max(1) as f64
-}
-
-/// Numbers of samples n ∝ √(v/c), limited to [`RANGE`], of the same cost as `spp` everywhere.
-fn counts(weights: &[f32], costs: &[f32], spp: u32) -> Vec<u32> {
-    let wanted: Vec<f32> = weights.iter().zip(costs).map(|(v, c)| (v / c.max(1.0)).sqrt()).collect();
-    let limit = |n: f64| n.clamp(RANGE[0], RANGE[1]);
-    let of_pixel = |factor: f64, (w, c): (&f32, &f32)| limit(factor * f64::from(*w)) * f64::from(*c);
-    let cost_of = |factor: f64| wanted.iter().zip(costs).map(|pixel| of_pixel(factor, pixel)).sum::<f64>();
-    let all = costs.iter().map(|c| f64::from(*c)).sum::<f64>();
-    // Bisection of the logarithm; costs rise with the factor
-    let (mut low, mut high) = (-60.0_f64, 60.0_f64);
-    for _ in 0..60 {
-        let middle = 0.5 * (low + high);
-        if cost_of(middle.exp2()) < all { low = middle } else { high = middle }
-    }
-    let factor = low.exp2();
-    // Where nothing varies, all pixels have the mean
-    let is_open = |w: f64| w > 0.0 && factor.is_finite();
-    let count = |w: f64| if is_open(w) { limit(factor * w) } else { RANGE[0] };
-    wanted.iter().map(|w| ((count(f64::from(*w)) * f64::from(spp)).round() as u32).max(1)).collect()
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-    use std::f64::consts::SQRT_2;
-
-    #[test]
-    fn numbers_of_samples_follow_noise_and_cost_and_keep_the_time() {
-        // Two in three pixels have a quarter of the variance of the others, and one of these costs twice as much
-        let weights: Vec<f32> = (0..300).map(|i| if i % 3 == 0 { 4.0 } else { 1.0 }).collect();
-        let costs: Vec<f32> = (0..300).map(|i| if i % 3 == 1 { 2.0 } else { 1.0 }).collect();
-        let counts = counts(&weights, &costs, 64);
-        assert!((f64::from(counts[0]) / f64::from(counts[2]) - 2.0).abs() < 0.05, "{:?}", &counts[..3]);
-        assert!((f64::from(counts[2]) / f64::from(counts[1]) - SQRT_2).abs() < 0.05, "{:?}", &counts[..3]);
-        let time: f64 = counts.iter().zip(&costs).map(|(&n, &c)| f64::from(n) * f64::from(c)).sum();
-        let uniform = 64.0 * f64::from(costs.iter().sum::<f32>());
-        assert!((time / uniform - 1.0).abs() < 0.01, "{time} {uniform}");
-    }
-
-    #[test]
-    fn no_pixel_has_less_than_half_or_more_than_eight_times_the_mean() {
-        let weights: Vec<f32> = (0..1000_u16).map(|i| if i == 5 { 1e12 } else { f32::from(i % 2) * 1e-9 }).collect();
-        let counts = counts(&weights, &[1.0; 1000], 16);
-        assert_eq!((counts[5], counts[0]), (128, 8));
-        assert!(counts.iter().all(|n| (8..=128).contains(n)));
-        let still = super::counts(&[0.0; 4], &[1.0; 4], 16);
-        assert!(still.iter().all(|n| *n >= 1), "nothing varies: {still:?}");
-    }
 }

@@ -4,7 +4,8 @@ use crate::cameras::CameraRay;
 use crate::direct::Estimator;
 use crate::film::filter::FilterSampler;
 use crate::integrators::path::CameraSample;
-use crate::scene::RenderJob;
+use crate::integrators::reuse;
+use crate::scene::{PixelSamples, RenderJob};
 use crate::settings::{Proposals, SampleCounts};
 use lumiris_lanes::camera::{Pinhole, PinholeRays};
 use lumiris_lanes::columns::{Column, Columns3, padded, reserve};
@@ -31,6 +32,8 @@ pub(super) struct CameraSampler<'a> {
     /// The first sample of the rendering.
     first_sample: u32,
     filter: FilterSampler,
+    /// Samples of pixels that have different numbers of them, and share paths.
+    shared: Option<&'a PixelSamples>,
     /// False if the time of a ray does not matter.
     has_motion: bool,
     /// What makes many rays at once.
@@ -79,7 +82,8 @@ impl<'a> CameraSampler<'a> {
             DirectNumbers::Same
         };
         let (filter, sample_counts) = (scene.film.filter.sampler(), settings.integrator.sample_counts());
-        CameraSampler { job, first_sample, filter, has_motion, pinhole, direct, sample_counts }
+        let shared = job.pixel_samples.as_ref().filter(|_| reuse::edge(job) > 1);
+        CameraSampler { job, first_sample, shared, filter, has_motion, pinhole, direct, sample_counts }
     }
 
     /// Appends samples of some pixels, each with a range of its own and given with the fits of its samples.
@@ -133,7 +137,7 @@ impl<'a> CameraSampler<'a> {
                 stream,
                 direct: self.direct_stream(pixel, sample, seed).unwrap_or(stream),
                 sample_counts: self.chosen_counts(pixel, &stream).unwrap_or(self.sample_counts),
-                index: sample,
+                turn: self.turn(pixel, sample),
                 fit,
                 pixel,
             }
@@ -160,10 +164,16 @@ impl<'a> CameraSampler<'a> {
             stream,
             direct: stream,
             sample_counts: self.chosen_counts(pixel, &stream).unwrap_or(self.sample_counts),
-            index: sample,
+            turn: self.turn(pixel, sample),
             fit: 0,
             pixel,
         }
+    }
+
+    /// Which samples of neighbouring pixels may share its path.
+    #[inline]
+    fn turn(&self, pixel: [u32; 2], sample: u32) -> u32 {
+        self.shared.map_or(sample, |of_pixels| of_pixels.turn(pixel, sample - self.first_sample))
     }
 
     /// The random numbers of direct light, if they are those of a block.

@@ -5,6 +5,7 @@
 //! neither threads, nor tiles, nor passes, nor [`parts`] of the image change a bit.
 
 pub mod allocation;
+mod allocation_counts;
 pub mod auto;
 mod auto_lights;
 mod auto_measure;

@@ -75,7 +75,7 @@ pub fn prepare(job: &mut RenderJob, threads: Option<usize>, ratio_map: bool) -> 
     let before = *job.settings();
     let auto = pool.install(|| auto::choose(job));
     if job.settings().sampling.allocation == Allocation::Auto {
-        let is_adaptive = auto.is_some() && reuse::edge(job) == 1;
+        let is_adaptive = auto.is_some();
         let allocation = if is_adaptive { Allocation::Adaptive } else { Allocation::Uniform };
         job.change(|s| s.sampling.allocation = allocation);
     }

@@ -3,7 +3,7 @@
 use super::camera_samples::{self, CameraSampler};
 use super::control_variates;
 use super::parts::{Checkpoints, PartError, StoredTile};
-use super::tiles::{SHARE_TILE, Tile, Tiles, bounds_of_tiles, empty_layers, film, position, replica_edge};
+use super::tiles::{SHARE_TILE, Tile, Tiles, batches, bounds_of_tiles, empty_layers, film, position, replica_edge};
 use super::worker::{AnyWorker, Workers};
 use super::{BATCH_PATHS, Continuation, Progress, RenderError, RenderSettings, Rendering, TileObserver};
 use crate::direct::Estimator;
@@ -18,6 +18,7 @@ use lumiris_numbers::estimators::ocv::block_of;
 use lumiris_numbers::math::hash::pcg4d;
 use rayon::prelude::*;
 use std::collections::BTreeMap;
+use std::ops::Range;
 use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, AtomicU32, AtomicU64, Ordering};
 use std::time::{Duration, Instant};
@@ -35,11 +36,11 @@ const _: () = assert!(BATCH_PATHS >= reuse::CELL.pow(2) as usize && SHARE_TILE.i
 const REPLICA_SEED: u32 = 0x72_65_70_73;
 
 /// Pixels of a tile.
-pub(super) type TilePart = (PixelBounds, std::ops::Range<usize>);
+pub(super) type TilePart = (PixelBounds, Range<usize>);
 
 /// The pixels of batches as the renderer makes them in its first pass, spread over the image, about `rays` camera
 /// samples together; and the range of samples of each.
-pub(super) fn batch_parts(run: &Run<'_>, rays: usize) -> (Vec<TilePart>, std::ops::Range<u32>) {
+pub(super) fn batch_parts(run: &Run<'_>, rays: usize) -> (Vec<TilePart>, Range<u32>) {
     let per_pixel = run.settings.spp.min(run.pass_length()).max(1);
     let pixels_per_batch = (BATCH_PATHS / per_pixel as usize).max(1);
     let tiles = run.job.world.scene.film.bounds.tiles(run.tile_size);
@@ -78,6 +79,7 @@ pub(super) fn camera_batches(job: &RenderJob, tile_size: u32, rays: usize) -> Ve
 pub(super) struct Run<'a> {
     pub(super) job: &'a RenderJob,
     settings: &'a RenderSettings,
+    shares_paths: bool,
     /// Edge of tiles: of whole cells where pixels share paths.
     tile_size: u32,
     stop: &'a AtomicBool,
@@ -98,10 +100,12 @@ impl<'a> Run<'a> {
         stop: &'a AtomicBool,
         observe: &'a (dyn Fn(&Progress) + Sync),
     ) -> Self {
+        let shares_paths = reuse::edge(job) > 1;
         Run {
             job,
             settings,
-            tile_size: if reuse::edge(job) > 1 { reuse::CELL } else { settings.tile_size },
+            shares_paths,
+            tile_size: if shares_paths { reuse::CELL } else { settings.tile_size },
             stop,
             texels: job.world.scene.textures.store(),
             observe,
@@ -211,7 +215,7 @@ impl<'a> Run<'a> {
         &self,
         workers: &Workers<'_>,
         tiles: &mut [Tile],
-        samples: std::ops::Range<u32>,
+        samples: Range<u32>,
         (noise, watch): (Option<f64>, Option<&TileObserver<'_>>),
         checkpoints: &mut Option<&mut Checkpoints>,
     ) -> PathStats {
@@ -302,7 +306,7 @@ impl<'a> Run<'a> {
         &self,
         workers: &Workers<'_>,
         tiles: &mut [Tile],
-        samples: std::ops::Range<u32>,
+        samples: Range<u32>,
         (noise, watch, pause): (Option<f64>, Option<&TileObserver<'_>>, Option<Instant>),
     ) -> PathStats {
         let total = self.samples_total(tiles);
@@ -334,7 +338,7 @@ impl<'a> Run<'a> {
     }
 
     /// Adds the samples of a range to one tile, in batches of whole pixels.
-    fn render_tile(&self, worker: &mut AnyWorker<'_>, tile: &mut Tile, samples: std::ops::Range<u32>) -> PathStats {
+    fn render_tile(&self, worker: &mut AnyWorker<'_>, tile: &mut Tile, samples: Range<u32>) -> PathStats {
         let bounds = tile.bounds;
         let mut ill_conditioned = 0;
         let settings = &self.job.settings().integrator;
@@ -347,10 +351,7 @@ impl<'a> Run<'a> {
         }
         let solve = start.elapsed();
         worker.read(tile);
-        let mut first = 0;
-        while first < bounds.area() {
-            let pixels = self.batch_of_pixels(&bounds, first, &samples);
-            first = pixels.end;
+        for (pixels, samples) in self.batches(&bounds, &samples) {
             self.camera_samples(&bounds, pixels.clone(), &samples, &mut worker.scratch, &mut worker.samples);
             worker.trace(self.job, &mut tile.fits);
             let pixels = pixels.map(|index| (index, self.samples_of(position(&bounds, index as u32), &samples)));
@@ -369,21 +370,19 @@ impl<'a> Run<'a> {
         stats
     }
 
-    /// The pixels of a tile from index `first` on that have a batch of samples in a pass; at least one pixel.
-    fn batch_of_pixels(&self, tile: &PixelBounds, first: usize, pass: &std::ops::Range<u32>) -> std::ops::Range<usize> {
-        let (mut end, mut paths) = (first, 0);
-        while end < tile.area() {
-            paths += self.samples_of(position(tile, end as u32), pass).len();
-            if paths > BATCH_PATHS && end > first {
-                break;
-            }
-            end += 1;
+    /// Batches of the samples of a tile in a pass: parts of its pixels, or where these share paths, parts of the pass.
+    fn batches(&self, tile: &PixelBounds, pass: &Range<u32>) -> Vec<(Range<usize>, Range<u32>)> {
+        let of = |index: usize, pass: &Range<u32>| self.samples_of(position(tile, index as u32), pass).len();
+        if self.shares_paths {
+            let paths = |i: u32| (0..tile.area()).map(|index| of(index, &(i..i + 1))).sum();
+            return batches(pass.clone(), paths).into_iter().map(|part| (0..tile.area(), part)).collect();
         }
-        first..end
+        let parts = batches(0..tile.area() as u32, |index| of(index as usize, pass));
+        parts.into_iter().map(|part| (part.start as usize..part.end as usize, pass.clone())).collect()
     }
 
     /// Adds the samples of a pass to the replicas of a tile.
-    fn render_replicas(&self, worker: &mut AnyWorker<'_>, tile: &mut Tile, pass: std::ops::Range<u32>) {
+    fn render_replicas(&self, worker: &mut AnyWorker<'_>, tile: &mut Tile, pass: Range<u32>) {
         let seed = pcg4d([self.job.settings().sampling.seed, REPLICA_SEED, 0, 0])[0];
         let samples_of = |r: &ReplicaAccumulator| self.samples_of(position(&tile.bounds, r.pixel), &pass);
         let mut fits = tile.bounds.area() as u32..;
@@ -407,8 +406,8 @@ impl<'a> Run<'a> {
     pub(super) fn camera_samples(
         &self,
         tile: &PixelBounds,
-        pixels: std::ops::Range<usize>,
-        pass: &std::ops::Range<u32>,
+        pixels: Range<usize>,
+        pass: &Range<u32>,
         scratch: &mut camera_samples::Scratch,
         out: &mut Vec<CameraSample>,
     ) {
@@ -422,7 +421,7 @@ impl<'a> Run<'a> {
 
     /// The samples that a pass has of a pixel.
     #[inline]
-    fn samples_of(&self, pixel: [u32; 2], pass: &std::ops::Range<u32>) -> std::ops::Range<u32> {
+    fn samples_of(&self, pixel: [u32; 2], pass: &Range<u32>) -> Range<u32> {
         let Some(of_pixels) = &self.job.pixel_samples else { return pass.clone() };
         let first = self.settings.first_sample;
         let [start, end] = [pass.start, pass.end].map(|i| first + of_pixels.until(pixel, i - first));

@@ -1,6 +1,6 @@
 //! Tiles: the pixels that are rendered together, with their exact sums; and which of them a part of an image has.
 
-use super::RenderSettings;
+use super::{BATCH_PATHS, RenderSettings};
 use crate::direct::{Estimator, Fits};
 use crate::film::accumulator::PixelAccumulator;
 use crate::film::packed::PackedSums;
@@ -9,6 +9,7 @@ use crate::film::{Film, FilmTile, PixelBounds};
 use crate::integrators::reuse;
 use crate::scene::RenderJob;
 use crate::settings::IntegratorKind;
+use std::ops::Range;
 use std::sync::Arc;
 
 /// Edge of the tiles that are dealt out to parts (pixels).
@@ -124,6 +125,23 @@ pub(super) fn film(resolution: [u32; 2], bounds: PixelBounds, tiles: &[Tile], la
 /// Coordinates of the pixel of a tile with the given index, row by row.
 pub(super) fn position(tile: &PixelBounds, index: u32) -> [u32; 2] {
     [tile.x0 + index % tile.width(), tile.y0 + index / tile.width()]
+}
+
+/// Parts of a range of at most [`BATCH_PATHS`] paths each, or of one element.
+pub(super) fn batches(range: Range<u32>, paths_of: impl Fn(u32) -> usize) -> Vec<Range<u32>> {
+    let mut parts: Vec<Range<u32>> = Vec::new();
+    let mut paths = 0;
+    for i in range {
+        let more = paths_of(i);
+        match parts.last_mut() {
+            Some(part) if paths + more <= BATCH_PATHS => (part.end, paths) = (i + 1, paths + more),
+            _ => {
+                parts.push(i..i + 1);
+                paths = more;
+            }
+        }
+    }
+    parts
 }
 
 #[cfg(test)]

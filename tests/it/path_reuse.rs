@@ -5,7 +5,7 @@ use lumiris::film::{Film, PixelSums};
 use lumiris::import::{LoadOptions, load};
 use lumiris::integrators::reuse;
 use lumiris::render::{RenderSettings, render};
-use lumiris::scene::{AccelKind, RenderJob};
+use lumiris::scene::{AccelKind, PixelSamples, RenderJob};
 use lumiris::settings::{EstimatorKind, IntegratorKind, RouletteKind};
 use std::path::{Path, PathBuf};
 use std::sync::atomic::AtomicBool;
@@ -28,12 +28,21 @@ fn film(job: &RenderJob, settings: RenderSettings) -> Film {
 
 /// Images of different seeds, which are independent: channels of the means of all pixels.
 fn pixel_means(job: &mut RenderJob, seeds: std::ops::Range<u32>, spp: u32) -> Vec<Vec<f64>> {
+    let numbers = job.pixel_samples.clone();
     let image = |seed| {
         job.change(|s| s.sampling.seed = seed);
+        job.pixel_samples.clone_from(&numbers);
         let film = film(job, RenderSettings { spp, ..RenderSettings::default() });
         film.pixels().iter().flat_map(PixelSums::mean).collect()
     };
     seeds.map(image).collect()
+}
+
+/// From a quarter of the mean number of samples to twice as many, in no order.
+fn different_numbers(job: &RenderJob, spp: u32) -> PixelSamples {
+    let bounds = job.world.scene.film.bounds;
+    let counts = (0..bounds.area() as u32).map(|i| (spp / 4) << (i * 7 / 3 % 4)).collect();
+    PixelSamples { bounds, spp, counts }
 }
 
 /// Mean and the variance of it.
@@ -76,17 +85,21 @@ fn known_answers_remain_where_pixels_share_paths() {
 /// stay. Each channel of each of 192 pixels has the mean that it has without sharing, at a level of 10⁻⁶ each (|z| of 4.9).
 /// The box has the power: half of its values would notice 8 %, and without one of the cosines, the distance, the occlusion
 /// of a pair or of the others, or with the reflectance of another pixel, 31 to 250 values differ. The gallery has textures, normals of their own,
-/// glass and metal, and notices 30 %.
+/// glass and metal, and notices 30 %. The same where pixels that share have different numbers of samples.
 #[test]
 fn every_pixel_has_the_light_that_it_has_without_sharing() {
     let (mis, ris) = (EstimatorKind::Mis, EstimatorKind::Ris);
-    for (name, estimator, seeds, detects) in
-        [("fan/box", mis, 48, 0.08), ("fan/box", ris, 24, 0.12), ("demo/gallery", mis, 32, 0.3)]
-    {
+    for (name, estimator, seeds, detects, differ) in [
+        ("fan/box", mis, 48, 0.08, false),
+        ("fan/box", mis, 48, 0.1, true),
+        ("fan/box", ris, 24, 0.12, false),
+        ("demo/gallery", mis, 32, 0.3, false),
+    ] {
         let [alone, shared] = [(1, 0..seeds), (4, 1000..1000 + seeds)].map(|(edge, seeds)| {
             let mut job = job(&scene(name), [16, 12], edge);
             job.change(|s| (s.integrator.kind, s.integrator.max_depth) = (IntegratorKind::Path, 5));
             job.change(|s| (s.integrator.estimator, s.integrator.samples) = (estimator, Some(6)));
+            job.pixel_samples = (differ && edge > 1).then(|| different_numbers(&job, 128));
             assert_eq!(reuse::edge(&job), edge);
             pixel_means(&mut job, seeds, 128)
         });
@@ -136,9 +149,14 @@ fn threads_tiles_packets_and_passes_do_not_change_a_bit() {
         let options = LoadOptions { resolution: Some([70, 45]), ..LoadOptions::default() };
         let mut loaded = load(&scene("demo/gallery"), &options).map_err(|d| d.to_string()).unwrap();
         (loaded.settings.integrator.estimator, loaded.settings.integrator.path_reuse) = (EstimatorKind::Mis, Some(3));
-        let job = loaded.job(AccelKind::Embree, packet_width).unwrap();
-        let film = film(&job, RenderSettings { spp: 5, ..settings });
-        film.pixels().iter().flat_map(|p| p.mean().map(f64::to_bits)).collect::<Vec<_>>()
+        let mut job = loaded.job(AccelKind::Embree, packet_width).unwrap();
+        let mut images = Vec::new();
+        for numbers in [None, Some(different_numbers(&job, 20))] {
+            job.pixel_samples = numbers;
+            let film = film(&job, RenderSettings { spp: 5, ..settings });
+            images.extend(film.pixels().iter().flat_map(|p| p.mean().map(f64::to_bits)));
+        }
+        images
     };
     let settings = RenderSettings { threads: Some(1), ..RenderSettings::default() };
     let reference = image(None, settings);

@@ -121,7 +121,7 @@ impl Gatherer {
                     stream,
                     direct: stream,
                     sample_counts,
-                    index: 0,
+                    turn: 0,
                     fit: 0,
                     pixel: [0; 2],
                 });

@@ -213,7 +213,7 @@ impl PhotonMapTracer<'_> {
                     stream,
                     direct: stream,
                     sample_counts,
-                    index: 0,
+                    turn: 0,
                     fit: 0,
                     pixel: [0; 2],
                 });
