@@ -12,7 +12,7 @@ use super::hit::{LocalHit, SurfaceHit, VertexValues, round, spanning};
 use glam::{DAffine3, DVec3};
 use lumiris_numbers::math::transform::{swaps_handedness, transform_normal};
 use lumiris_numbers::math::{Affine3A, Bounds3, Ray, Vec2, Vec3, gamma};
-use std::f64::consts::TAU;
+use std::f64::consts::{PI, TAU};
 
 /// Which quadric, in its local space (pbrt's parameters; angles in radians).
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -85,24 +85,31 @@ impl Quadric {
     ///
     /// A ray that leaves from [`lumiris_numbers::math::ray::offset_origin`] does not meet the point again that it left.
     pub fn intersect(&self, ray: &Ray) -> Option<LocalHit> {
+        let (t, uv) = self.first(ray, |p| self.kind.parameters(p))?;
+        Some(LocalHit { t, uv })
+    }
+
+    /// t of that hit, without its parameters.
+    pub fn distance(&self, ray: &Ray) -> Option<f32> {
+        self.first(ray, |p| self.kind.azimuth(p).map(|_| ())).map(|(t, ())| t)
+    }
+
+    /// The first point of the full quadric in (0, t_max) that is `part` of it, and its t.
+    #[inline]
+    fn first<T>(&self, ray: &Ray, part: impl Fn(DVec3) -> Option<T>) -> Option<(f32, T)> {
         let local_from_group = self.local_from_group.as_daffine3();
         let o = local_from_group.transform_point3(ray.o.as_dvec3());
         let d = local_from_group.transform_vector3(ray.d.as_dvec3());
+        let roots = self.kind.roots(o, d)?;
 
         // Below this parameter a hit is rounding noise: o is the sum of terms of this size.
         let scale = o.abs().max_element() + local_from_group.translation.abs().max_element() + self.kind.radius();
         let t_min = scale * 2.0_f64.powi(-44) / d.length();
-        for t in self.kind.roots(o, d)? {
+        roots.into_iter().find_map(|t| {
             let rounded = t as f32;
-            if t > t_min
-                && rounded > 0.0
-                && rounded < ray.t_max
-                && let Some(uv) = self.kind.parameters(o + d * t)
-            {
-                return Some(LocalHit { t: rounded, uv });
-            }
-        }
-        None
+            let is_met = t > t_min && rounded > 0.0 && rounded < ray.t_max;
+            if is_met { part(o + d * t).map(|part| (rounded, part)) } else { None }
+        })
     }
 
     /// The surface at the parameters `uv`, in the space of the group.
@@ -162,35 +169,57 @@ impl QuadricKind {
 
     /// Parameters of a point of the full quadric; `None` if it is cut off.
     fn parameters(&self, p: DVec3) -> Option<[f32; 2]> {
-        let phi = p.y.atan2(p.x);
-        let phi = if phi < 0.0 { phi + TAU } else { phi };
-        let r = p.x.hypot(p.y);
-        let (v, phi_max) = match *self {
+        let (phi, phi_max) = self.azimuth(p)?;
+        let v = match *self {
+            QuadricKind::Sphere { radius, z_min, z_max, .. } => {
+                let [from, to] = polar_range(radius, z_min, z_max);
+                // Exact near the poles, where arc cosines are not.
+                ratio(p.x.hypot(p.y).atan2(p.z) - from, to - from)
+            }
+            QuadricKind::Cylinder { z_min, z_max, .. } => {
+                let (z_min, z_max) = (f64::from(z_min), f64::from(z_max));
+                ratio(p.z - z_min, z_max - z_min)
+            }
+            QuadricKind::Disk { radius, inner_radius, .. } => {
+                let (radius, inner_radius) = (f64::from(radius), f64::from(inner_radius));
+                ratio(radius - p.x.hypot(p.y), radius - inner_radius)
+            }
+        };
+        let phi = phi.unwrap_or_else(|| azimuth(p));
+        Some([ratio(phi, phi_max) as f32, v as f32])
+    }
+
+    /// Azimuth of a point of the full quadric, where that tells whether it is cut off, and φ_max; `None` if it is.
+    #[inline]
+    fn azimuth(&self, p: DVec3) -> Option<(Option<f64>, f64)> {
+        let phi_max = match *self {
             QuadricKind::Sphere { radius, z_min, z_max, phi_max } => {
                 if (z_min > -radius && p.z < f64::from(z_min)) || (z_max < radius && p.z > f64::from(z_max)) {
                     return None;
                 }
-                let [from, to] = polar_range(radius, z_min, z_max);
-                // Exact near the poles, where arc cosines are not.
-                (ratio(r.atan2(p.z) - from, to - from), phi_max)
+                phi_max
             }
             QuadricKind::Cylinder { z_min, z_max, phi_max, .. } => {
-                let (z_min, z_max) = (f64::from(z_min), f64::from(z_max));
-                if p.z < z_min || p.z > z_max {
+                if p.z < f64::from(z_min) || p.z > f64::from(z_max) {
                     return None;
                 }
-                (ratio(p.z - z_min, z_max - z_min), phi_max)
+                phi_max
             }
             QuadricKind::Disk { radius, inner_radius, phi_max, .. } => {
-                let (radius, inner_radius) = (f64::from(radius), f64::from(inner_radius));
-                if r > radius || r < inner_radius {
+                let r = p.x.hypot(p.y);
+                if r > f64::from(radius) || r < f64::from(inner_radius) {
                     return None;
                 }
-                (ratio(radius - r, radius - inner_radius), phi_max)
+                phi_max
             }
         };
         let phi_max = f64::from(phi_max);
-        (phi <= phi_max).then(|| [ratio(phi, phi_max) as f32, v as f32])
+        // Azimuths are at most 2π
+        if phi_max >= TAU && p.is_finite() {
+            return Some((None, phi_max));
+        }
+        let phi = azimuth(p);
+        (phi <= phi_max).then_some((Some(phi), phi_max))
     }
 
     /// The surface at parameters (u, v).
@@ -236,8 +265,18 @@ fn ratio(x: f64, y: f64) -> f64 {
     if y == 0.0 { 0.0 } else { x / y }
 }
 
+/// Azimuth about z, in 0..2π.
+#[inline]
+fn azimuth(p: DVec3) -> f64 {
+    let phi = p.y.atan2(p.x);
+    if phi < 0.0 { phi + TAU } else { phi }
+}
+
 /// Polar angles of z_min and z_max.
 fn polar_range(radius: f32, z_min: f32, z_max: f32) -> [f64; 2] {
+    if z_min == -radius && z_max == radius {
+        return [PI, 0.0];
+    }
     [z_min, z_max].map(|z| (f64::from(z) / f64::from(radius)).clamp(-1.0, 1.0).acos())
 }
 
@@ -246,7 +285,12 @@ fn polar_range(radius: f32, z_min: f32, z_max: f32) -> [f64; 2] {
 fn sphere_roots(o: DVec3, d: DVec3, radius: f64) -> Option<[f64; 2]> {
     let a = d.length_squared();
     let b = o.dot(d);
-    let nearest = (o - d * (b / a)).length();
+    let nearest = o - d * (b / a);
+    // Far beyond what rounding changes
+    if nearest.length_squared() > radius * radius * (1.0 + 1e-9) {
+        return None;
+    }
+    let nearest = nearest.length();
     let discriminant = a * (radius + nearest) * (radius - nearest);
     if discriminant.is_nan() || discriminant < 0.0 {
         return None;
@@ -341,6 +385,7 @@ mod tests {
             let to_group = |p: Vec3| quadric.group_from_local.transform_point3(p);
             let (o, target) = (to_group(random_point(&mut s) * 3.0), to_group(random_point(&mut s) * 1.5));
             let ray = Ray { o, d: target - o, t_max: f32::INFINITY, time: 0.0 };
+            assert_eq!(quadric.distance(&ray), quadric.intersect(&ray).map(|hit| hit.t));
             match (quadric.intersect(&ray), reference(&quadric, &ray)) {
                 (Some(hit), Some(t)) => {
                     both += 1;

@@ -36,6 +36,16 @@ impl GeometryContext {
         self.alpha.as_ref().is_none_or(|alpha| alpha.stops(hit, world_ray))
     }
 
+    /// t of the exact hit of a quadric or patch with 0 < t < `t_limit`.
+    fn distance(&self, world_ray: &Ray, primitive: u32, instance: u32, t_limit: f32) -> Option<f32> {
+        match &self.world.set.geometries[self.id as usize].shape {
+            Shape::Quadric(quadric) if !self.has_alpha() => {
+                quadric.distance(&Ray { t_max: t_limit, ..self.world.group_ray(world_ray, instance) })
+            }
+            _ => self.intersect(world_ray, primitive, instance, t_limit).map(|hit| hit.t),
+        }
+    }
+
     /// The exact hit of a quadric or patch with 0 < t < `t_limit`.
     fn intersect(&self, world_ray: &Ray, primitive: u32, instance: u32, t_limit: f32) -> Option<LocalHit> {
         let ray = Ray { t_max: t_limit, ..self.world.group_ray(world_ray, instance) };
@@ -201,7 +211,10 @@ pub(super) unsafe extern "C" fn intersect(arguments: *const sys::RTCIntersectFun
         let hits = Lanes { words: rays.words.add(RAY_WORDS * n), n };
         let inst_id = query.rtc.instID[0];
         for lane in active(arguments.valid, n) {
-            let found = lane_hit(geometry, query, rays, lane, (arguments.primID, inst_id));
+            let intersect = |ray: &Ray, instance, end| {
+                geometry.intersect(ray, arguments.primID, instance, end).map(|hit| (hit.t, hit))
+            };
+            let found = lane_hit(geometry, query, (rays, lane), inst_id, intersect);
             let end = found.and_then(|hit| {
                 let (geometry, primitive, instance) = (arguments.geomID, arguments.primID, inst_id);
                 let hit = Reported { geometry, primitive, instance, t: hit.t, uv: hit.uv };
@@ -230,7 +243,9 @@ pub(super) unsafe extern "C" fn occluded(arguments: *const sys::RTCOccludedFunct
         let rays = Lanes { words: arguments.ray.cast(), n };
         let inst_id = query.rtc.instID[0];
         for lane in active(arguments.valid, n) {
-            let found = lane_hit(geometry, query, rays, lane, (arguments.primID, inst_id)).is_some();
+            let intersect =
+                |ray: &Ray, instance, end| geometry.distance(ray, arguments.primID, instance, end).map(|t| (t, ()));
+            let found = lane_hit(geometry, query, (rays, lane), inst_id, intersect).is_some();
             *arguments.valid.add(lane) = if found { -1 } else { 0 };
             if found {
                 rays.set(TFAR, lane, f32::NEG_INFINITY);
@@ -239,24 +254,26 @@ pub(super) unsafe extern "C" fn occluded(arguments: *const sys::RTCOccludedFunct
     }
 }
 
-/// The hit of one lane with primitive `at.0` in the instance of `at.1`.
+/// What `intersect` finds with the ray of one lane in the instance of `inst_id`, between the ray's limits: it gets the ray,
+/// the instance and the upper limit.
 ///
 /// # Safety
 /// `rays` has n lanes of rays, and `lane` is below n.
-unsafe fn lane_hit(
+#[inline]
+unsafe fn lane_hit<T>(
     geometry: &GeometryContext,
     query: &mut QueryContext<'_>,
-    rays: Lanes,
-    lane: usize,
-    at: (u32, u32),
-) -> Option<LocalHit> {
+    (rays, lane): (Lanes, usize),
+    inst_id: u32,
+    intersect: impl Fn(&Ray, u32, f32) -> Option<(f32, T)>,
+) -> Option<T> {
     // SAFETY: by the caller.
     let (id, start, end) = unsafe { (rays.get_u32(ID, lane), rays.get(TNEAR, lane), rays.get(TFAR, lane)) };
     let mut found = None;
     query.guard(|query| {
         let ray = query.rays.get(id as usize);
-        let instance = geometry.world.instance(at.1);
-        found = geometry.intersect(&ray, at.0, instance, end).filter(|hit| hit.t > start);
+        let instance = geometry.world.instance(inst_id);
+        found = intersect(&ray, instance, end).filter(|(t, _)| *t > start);
     });
-    found
+    found.map(|(_, found)| found)
 }
