@@ -20,13 +20,13 @@ pub(super) enum Texels {
 /// Tiles of a level, row-major; those at the right and lower edges are as large as all others.
 #[derive(Clone, Debug)]
 pub(super) struct Tiled {
-    store: Arc<TileStore>,
+    pub(super) store: Arc<TileStore>,
     /// Where the first one begins.
-    first: u64,
+    pub(super) first: u64,
     /// Tiles in a row.
-    columns: usize,
+    pub(super) columns: usize,
     /// Bytes of a channel: 1 if they are stored by the byte table, or 4.
-    channel_bytes: usize,
+    pub(super) channel_bytes: usize,
 }
 
 impl Tiled {

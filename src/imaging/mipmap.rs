@@ -1,11 +1,14 @@
 //! Image pyramids for filtered lookups.
 //!
 //! Level 0 is the image; each next level halves both sides, rounding down, by the exact area mean (a box filter over
-//! possibly fractional pixels), down to one pixel. Texture coordinates (s, t) run over 0..1 from the **top left**;
+//! possibly fractional pixels), down to one pixel; or a file holds them all. Texture coordinates (s, t) run over 0..1 from the **top left**;
 //! callers with t upwards flip it. A filter of width w in (s, t) reads the level ℓ = levels − 1 + log₂ w, as in
 //! pbrt-v4.
 
+use super::file::ImageError;
+use super::file_tiles::FileTexels;
 use super::level::{Level, NearestByte, Texels, exact_bytes};
+use super::oiio::FilePyramid;
 use super::tiles::TileStore;
 use super::{ColorEncoding, Image};
 use lumiris_numbers::math::{Rgb, Vec2};
@@ -80,16 +83,27 @@ pub struct MipMap {
 }
 
 impl MipMap {
-    /// The pyramid of an image's colour channels (see [`Image::color_channels`]), whose values `encoding` makes linear.
-    /// An image whose values are all multiples of 1/255 in 0..1, as read from 8 bits, is kept in bytes. An image
-    /// without pixels or channels is one black pixel.
+    /// The pyramid of an image's colour channels (see [`Image::color_channels`]), as [`Self::of_channels`] makes it. An
+    /// image without channels is one black pixel.
     pub fn new(image: &Image, wrap: Wrap, filter: Filter, encoding: ColorEncoding) -> Self {
-        let channels = image.color_channels();
+        match image.color_channels() {
+            Some(channels) => Self::of_channels(image, channels.as_slice(), (wrap, filter, encoding)),
+            None => Self::constant(0.0, wrap, filter),
+        }
+    }
+
+    /// The pyramid of the channels at these positions, one or three, whose values `encoding` makes linear. An image whose
+    /// values are all multiples of 1/255 in 0..1, as read from 8 bits, is kept in bytes. An image without pixels is one
+    /// black pixel.
+    pub fn of_channels(
+        image: &Image,
+        positions: &[usize],
+        (wrap, filter, encoding): (Wrap, Filter, ColorEncoding),
+    ) -> Self {
         let (width, height) = (image.width, image.height);
-        let (Some(channels), true) = (channels, width > 0 && height > 0) else {
+        if width == 0 || height == 0 {
             return Self::constant(0.0, wrap, filter);
-        };
-        let positions = channels.as_slice();
+        }
         let stride = image.channels.len();
         let table = Box::new(encoding.byte_table());
         let texels = match exact_bytes(image, positions) {
@@ -101,6 +115,24 @@ impl MipMap {
         };
         let level = Level { width, height, texels };
         Self::with_base(level, positions.len(), wrap, filter, table)
+    }
+
+    /// The pyramid that a file holds, of the channels at these positions, one or three, whose values `encoding` makes linear.
+    /// 8-bit values are kept in bytes. Levels of more than a tile are read when they are wanted, if there is a `store`.
+    pub fn of_file(
+        file: FilePyramid,
+        channels: Vec<usize>,
+        (wrap, filter, encoding): (Wrap, Filter, ColorEncoding),
+        store: Option<&Arc<TileStore>>,
+    ) -> Result<Self, ImageError> {
+        let (table, count) = (Box::new(encoding.byte_table()), channels.len());
+        let texels = FileTexels { file: Arc::new(file), channels, encoding };
+        let level = |index: usize| match store {
+            Some(store) => texels.tiled_level(index, store),
+            None => texels.level(index),
+        };
+        let levels = (0..texels.file.sizes().len()).map(level).collect::<Result<_, ImageError>>()?;
+        Ok(MipMap { levels, channels: count, wrap, filter, table })
     }
 
     /// One pixel of one channel.

@@ -1,12 +1,13 @@
 //! Images: pixels with named channels, their encodings, pyramids for filtered lookups, and metrics of their difference.
 //!
-//! Reading order: [`color`], [`view_transform`], [`tiles`], `level`, [`mipmap`], [`mod@file`], [`oiio`], [`file_parts`], [`oidn`],
-//! [`metrics`], [`compare`], [`heat`].
+//! Reading order: [`color`], [`view_transform`], [`mod@file`], [`oiio`], [`tiles`], `level`, `file_tiles`, [`mipmap`], [`file_parts`],
+//! [`oidn`], [`metrics`], [`compare`], [`heat`].
 
 pub mod color;
 pub mod compare;
 pub mod file;
 pub mod file_parts;
+mod file_tiles;
 pub mod heat;
 mod level;
 pub mod metrics;
@@ -61,12 +62,7 @@ impl Image {
     /// The channels to read as colour: R, G and B (in any case of letters) if all are there, otherwise Y or the first
     /// channel alone. `None` if there are no channels.
     pub fn color_channels(&self) -> Option<ColorChannels> {
-        let find = |name: &str| self.channels.iter().position(|c| c.eq_ignore_ascii_case(name));
-        match (find("R"), find("G"), find("B")) {
-            (Some(r), Some(g), Some(b)) => Some(ColorChannels::Rgb([r, g, b])),
-            _ if self.channels.is_empty() => None,
-            _ => Some(ColorChannels::Grey(find("Y").unwrap_or(0))),
-        }
+        ColorChannels::of(&self.channels)
     }
 }
 
@@ -108,6 +104,16 @@ pub enum ColorChannels {
 }
 
 impl ColorChannels {
+    /// Those of channels with these names, as [`Image::color_channels`] has them.
+    pub fn of(names: &[String]) -> Option<Self> {
+        let find = |name: &str| names.iter().position(|c| c.eq_ignore_ascii_case(name));
+        match (find("R"), find("G"), find("B")) {
+            (Some(r), Some(g), Some(b)) => Some(ColorChannels::Rgb([r, g, b])),
+            _ if names.is_empty() => None,
+            _ => Some(ColorChannels::Grey(find("Y").unwrap_or(0))),
+        }
+    }
+
     /// The positions as a slice of one or three.
     pub fn as_slice(&self) -> &[usize] {
         match self {

@@ -1,7 +1,8 @@
-//! Texels that do not fit into memory: tiles in a temporary file, of which a bounded cache holds those that were used last.
+//! Texels that do not fit into memory: tiles in a temporary file, or in image files that hold pyramids themselves. A bounded
+//! cache holds those that were used last.
 //!
-//! The file has no name and vanishes with the program. Its tiles hold what the levels of a pyramid hold in memory, so a lookup
-//! reads the same numbers either way.
+//! The temporary file has no name and vanishes with the program. Tiles hold what the levels of a pyramid hold in memory, so a
+//! lookup reads the same numbers either way.
 
 use std::cell::RefCell;
 use std::collections::HashMap;
@@ -9,7 +10,7 @@ use std::fs::File;
 use std::io;
 use std::os::unix::fs::FileExt;
 use std::sync::atomic::{AtomicU64, Ordering};
-use std::sync::{Arc, Mutex, OnceLock, PoisonError};
+use std::sync::{Arc, Mutex, OnceLock, PoisonError, RwLock};
 
 /// Texels along a side of a tile.
 pub const TILE: usize = 64;
@@ -19,8 +20,10 @@ const SHARD_BYTES: u64 = 4 * (TILE * TILE * 12) as u64;
 /// Tiles that a thread finds again without a lock; they are kept in addition to those of the cache.
 const RECENT: usize = 32;
 
-/// Where a tile begins in the file, which tells it from all others.
+/// Where a tile begins in the temporary file, or after [`OF_FILES`] those of all other files.
 type Key = u64;
+/// First key of tiles of other files.
+const OF_FILES: Key = 1 << 63;
 
 /// Tiles of one part of the cache.
 #[derive(Debug, Default)]
@@ -76,19 +79,43 @@ impl Shard {
 /// What was read and held.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct TileCounts {
-    /// Bytes in the file.
+    /// Bytes in the temporary file.
     pub stored: u64,
-    /// Tiles read from it.
+    /// Tiles read from it and from other files.
     pub read: u64,
     /// Bytes of the tiles that are held now.
     pub held: u64,
 }
 
-/// Tiles in a temporary file, with a cache.
+/// Makes a tile of an image file, by its index.
+pub(super) type ReadTile = dyn Fn(usize) -> Result<Vec<u8>, String> + Send + Sync;
+
+/// The tiles of other files: those of each level, and where the next begin.
+struct Files {
+    levels: Vec<FileLevel>,
+    end: Key,
+}
+
+/// The tiles of a level.
+#[derive(Clone)]
+struct FileLevel {
+    begin: Key,
+    tile_bytes: usize,
+    read: Arc<ReadTile>,
+}
+
+impl std::fmt::Debug for Files {
+    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        f.debug_struct("Files").field("levels", &self.levels.len()).field("end", &self.end).finish()
+    }
+}
+
+/// Tiles in files, with a cache.
 #[derive(Debug)]
 pub struct TileStore {
     file: File,
     end: Mutex<u64>,
+    files: RwLock<Files>,
     /// Most bytes of the cache.
     capacity: u64,
     shards: Vec<Mutex<Shard>>,
@@ -115,6 +142,7 @@ impl TileStore {
         Ok(TileStore {
             file: tempfile::tempfile()?,
             end: Mutex::new(0),
+            files: RwLock::new(Files { levels: Vec::new(), end: OF_FILES }),
             capacity,
             shards: (0..(capacity / SHARD_BYTES).clamp(1, SHARDS)).map(|_| Mutex::default()).collect(),
             read: AtomicU64::new(0),
@@ -137,7 +165,16 @@ impl TileStore {
         Ok(begin)
     }
 
-    /// What `read` makes of the `len` bytes that begin at `key`; of zeros if the file cannot be read, which
+    /// Adds a level of so many tiles of `tile_bytes` each, which `read` makes when they are wanted; where they begin.
+    pub(super) fn add_level(&self, tiles: usize, tile_bytes: usize, read: Arc<ReadTile>) -> Key {
+        let mut files = self.files.write().unwrap_or_else(PoisonError::into_inner);
+        let begin = files.end;
+        files.end += (tiles * tile_bytes) as u64;
+        files.levels.push(FileLevel { begin, tile_bytes, read });
+        begin
+    }
+
+    /// What `read` makes of the `len` bytes that begin at `key`; of zeros if a file cannot be read, which
     /// [`failure`](Self::failure) then tells.
     #[inline]
     pub fn with_tile<T>(&self, key: u64, len: usize, read: impl FnOnce(&[u8]) -> T) -> T {
@@ -156,7 +193,7 @@ impl TileStore {
         })
     }
 
-    /// A tile from the cache, or else from the file.
+    /// A tile from the cache, or else from its file.
     fn fetch(&self, key: u64, len: usize) -> Arc<[u8]> {
         let shard = (key.wrapping_mul(0xd134_2543_de82_ef95) >> 40) as usize % self.shards.len();
         let shard = || self.shards[shard].lock().unwrap_or_else(PoisonError::into_inner);
@@ -164,15 +201,32 @@ impl TileStore {
             return tile;
         }
         // Not under the lock: others need not wait for the disk
-        let mut bytes = vec![0; len];
-        if let Err(error) = self.file.read_exact_at(&mut bytes, key) {
-            self.failure.get_or_init(|| format!("texels could not be read back from the temporary file: {error}"));
-            bytes.fill(0);
-        }
+        let bytes = self.read(key, len).unwrap_or_else(|reason| {
+            self.failure.get_or_init(|| reason);
+            vec![0; len]
+        });
         self.read.fetch_add(1, Ordering::Relaxed);
         let tile: Arc<[u8]> = bytes.into();
         shard().put(key, &tile, self.capacity / self.shards.len() as u64);
         tile
+    }
+
+    /// A tile from its file.
+    fn read(&self, key: Key, len: usize) -> Result<Vec<u8>, String> {
+        if key < OF_FILES {
+            let mut bytes = vec![0; len];
+            return match self.file.read_exact_at(&mut bytes, key) {
+                Ok(()) => Ok(bytes),
+                Err(error) => Err(format!("texels could not be read back from the temporary file: {error}")),
+            };
+        }
+        let level = {
+            let files = self.files.read().unwrap_or_else(PoisonError::into_inner);
+            let after = files.levels.partition_point(|level| level.begin <= key);
+            files.levels[after - 1].clone()
+        };
+        (level.read)((key - level.begin) as usize / level.tile_bytes)
+            .map_err(|reason| format!("texels could not be read: {reason}"))
     }
 
     /// Cuts the file, as a disk that fails does.

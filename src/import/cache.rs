@@ -7,7 +7,7 @@
 //! Where the textures of a scene are not to take more than so much memory, the largest of them are in tiles of a temporary
 //! file ([`crate::imaging::tiles`]), and all others are in memory: of the limit, half or more is left for the tiles in use.
 
-use super::images::{ImageChannels, ImageEncoding, ImageRequest, RgbImage, load_map, load_rgb};
+use super::images::{ImageChannels, ImageEncoding, ImageRequest, RgbImage, load_map, load_rgb, load_tiled_map};
 use crate::imaging::oiio::{ImageError, texture_bytes};
 use crate::imaging::tiles::TileStore;
 use crate::imaging::{Filter, MipMap, Wrap};
@@ -157,10 +157,7 @@ impl FileCache {
     ) -> Result<Arc<MipMap>, ImageError> {
         let (Some(store), Some(true)) = (&plan.store, plan.is_tiled.get(index)) else { return self.map(request) };
         let _alone = self.tiling.lock().unwrap_or_else(PoisonError::into_inner);
-        let tiled = load_map(request)?.tiled(store).map_err(|error| {
-            let reason = format!("does not fit into the temporary file for tiles of textures: {error}");
-            ImageError::Unreadable { path: request.path.clone(), reason }
-        })?;
+        let tiled = load_tiled_map(request, store)?;
         self.read.fetch_add(1, Ordering::Relaxed);
         Ok(Arc::new(tiled))
     }

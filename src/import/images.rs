@@ -1,10 +1,12 @@
 //! Image files as scenes ask for them, and how they are read.
 
-use crate::imaging::oiio::{self, ImageError, ReadLimits};
-use crate::imaging::{ColorChannels, ColorEncoding, Filter, Image, MipMap, Wrap};
+use crate::imaging::oiio::{self, FilePyramid, ImageError, ReadLimits};
+use crate::imaging::tiles::TileStore;
+use crate::imaging::{ColorChannels, ColorEncoding, Filter, MipMap, Wrap};
 use crate::textures::Udim;
 use lumiris_numbers::math::Rgb;
 use std::path::{Path, PathBuf};
+use std::sync::Arc;
 
 /// Linear texels, rows from the top, and the size of the image.
 pub type RgbImage = (Vec<Rgb>, [usize; 2]);
@@ -66,32 +68,65 @@ pub fn tiles(path: &Path) -> Vec<(u32, PathBuf)> {
     tiles
 }
 
-/// Reads an image as textures ask for it.
+/// Reads an image as textures ask for it. A file that holds all levels of a pyramid, as `.tx` files do, gives them.
 pub fn load_map(request: &ImageRequest) -> Result<MipMap, ImageError> {
-    let read = oiio::read_image(&request.path, &ReadLimits::default())?;
-    if request.channels == ImageChannels::Alpha {
-        return Ok(alpha_map(&read.image, request));
+    if let Some(file) = FilePyramid::open(&request.path)? {
+        return file_map(file, request, None);
     }
+    image_map(request)
+}
+
+/// The same with levels of more than a tile in `store`: read from the file when they are wanted, if it holds them.
+pub fn load_tiled_map(request: &ImageRequest, store: &Arc<TileStore>) -> Result<MipMap, ImageError> {
+    if let Some(file) = FilePyramid::open(&request.path)? {
+        return file_map(file, request, Some(store));
+    }
+    image_map(request)?.tiled(store).map_err(|error| {
+        let reason = format!("does not fit into the temporary file for tiles of textures: {error}");
+        ImageError::Unreadable { path: request.path.clone(), reason }
+    })
+}
+
+/// The pyramid of an image.
+fn image_map(request: &ImageRequest) -> Result<MipMap, ImageError> {
+    let read = oiio::read_image(&request.path, &ReadLimits::default())?;
+    let (channels, encoding) = meaning(request, &read.image.channels, read.encoding);
+    let how = (request.wrap, request.filter, encoding);
+    Ok(channels.map_or_else(|| without_channels(request), |channels| MipMap::of_channels(&read.image, &channels, how)))
+}
+
+/// The pyramid that a file holds.
+fn file_map(file: FilePyramid, request: &ImageRequest, store: Option<&Arc<TileStore>>) -> Result<MipMap, ImageError> {
+    let (channels, encoding) = meaning(request, file.channels(), file.encoding());
+    let how = (request.wrap, request.filter, encoding);
+    channels.map_or_else(|| Ok(without_channels(request)), |channels| MipMap::of_file(file, channels, how, store))
+}
+
+/// Positions of the channels that are asked for, if there are any, and how they are encoded, by the names of all channels and the
+/// usual encoding of the file.
+fn meaning(request: &ImageRequest, names: &[String], usual: ColorEncoding) -> (Option<Vec<usize>>, ColorEncoding) {
+    let channels = match request.channels {
+        // Opacity is stored linear
+        ImageChannels::Alpha => {
+            return (names.iter().position(|name| name == "A").map(|a| vec![a]), ColorEncoding::Linear);
+        }
+        ImageChannels::Color => ColorChannels::of(names).map(|channels| channels.as_slice().to_vec()),
+    };
     let encoding = match request.encoding {
         // Floats are light already, whatever the scene says: pbrt-v4 decodes integers only.
-        _ if read.encoding == ColorEncoding::Linear => ColorEncoding::Linear,
-        ImageEncoding::Auto => read.encoding,
+        _ if usual == ColorEncoding::Linear => ColorEncoding::Linear,
+        ImageEncoding::Auto => usual,
         ImageEncoding::Srgb => ColorEncoding::Srgb,
         ImageEncoding::Linear => ColorEncoding::Linear,
         ImageEncoding::Gamma(gamma) => ColorEncoding::Gamma(gamma),
     };
-    Ok(MipMap::new(&read.image, request.wrap, request.filter, encoding))
+    (channels, encoding)
 }
 
-/// The opacity of an image, which is stored linear.
-fn alpha_map(image: &Image, request: &ImageRequest) -> MipMap {
-    let Some(position) = image.channel("A") else {
-        return MipMap::constant(1.0, request.wrap, request.filter);
-    };
-    let data = image.data.iter().skip(position).step_by(image.channels.len()).copied().collect();
-    let (width, height) = (image.width, image.height);
-    let alpha = Image { width, height, channels: vec!["Y".to_owned()], data };
-    MipMap::new(&alpha, request.wrap, request.filter, ColorEncoding::Linear)
+/// What stands for channels that are not there: opaque, and black.
+fn without_channels(request: &ImageRequest) -> MipMap {
+    let value = if request.channels == ImageChannels::Alpha { 1.0 } else { 0.0 };
+    MipMap::constant(value, request.wrap, request.filter)
 }
 
 /// Reads an image as linear RGB, rows from the top, with its size.
@@ -111,9 +146,7 @@ pub fn load_rgb(path: &Path) -> Result<RgbImage, ImageError> {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::imaging::tiles::TileStore;
     use std::fmt::Write;
-    use std::sync::Arc;
 
     /// An image of two pixels, as 8-bit or 16-bit integers or floats, that no code of this program wrote.
     struct Sample {

@@ -26,6 +26,7 @@ mod portals;
 mod roulette;
 mod sample_allocation;
 mod subsurface;
+mod texture_pyramids;
 mod texture_tiles;
 mod udim;
 mod variance;

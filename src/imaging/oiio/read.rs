@@ -34,6 +34,9 @@ pub(in crate::imaging) struct Input {
     part: i32,
 }
 
+// SAFETY: a handle may go from thread to thread, if one at a time uses it.
+unsafe impl Send for Input {}
+
 impl Input {
     pub(in crate::imaging) fn open(path: &Path, part: i32) -> Result<Self, ImageError> {
         let unreadable = |reason: String| ImageError::Unreadable { path: path.to_owned(), reason };
@@ -55,6 +58,47 @@ impl Input {
         Ok(Input { api, handle, part })
     }
 
+    /// A level of the part, if there is one.
+    pub(super) fn level(&self, level: i32) -> Option<sys::OiioLevel> {
+        let mut found = sys::OiioLevel::default();
+        // SAFETY: the handle is live until drop, here and below.
+        call(|e, n| unsafe { (self.api.input_level)(self.handle, self.part, level, &mut found, e, n) }).ok()?;
+        Some(found)
+    }
+
+    /// The pixels of a level from `origin` on, in `size` columns and rows, of a range of channels.
+    pub(super) fn region(
+        &self,
+        level: i32,
+        origin: [i32; 2],
+        size: [i32; 2],
+        channels: [i32; 2],
+    ) -> Result<Vec<f32>, (i32, String)> {
+        let counts = [size[0], size[1], channels[1] - channels[0]].map(|n| usize::try_from(n).unwrap_or(0));
+        let mut pixels = vec![0.0; counts.iter().product()];
+        let ([x, y], [width, height], [begin, end]) = (origin, size, channels);
+        let (out, count) = (pixels.as_mut_ptr(), pixels.len() as u64);
+        // SAFETY: as above; `out` holds `count` floats, and nothing is written unless these are as many as asked for.
+        call(|e, n| unsafe {
+            (self.api.input_read_region)(
+                self.handle,
+                self.part,
+                level,
+                x,
+                y,
+                width,
+                height,
+                begin,
+                end,
+                out,
+                count,
+                e,
+                n,
+            )
+        })?;
+        Ok(pixels)
+    }
+
     fn parts(&self) -> Result<usize, (i32, String)> {
         let mut count = 0;
         // SAFETY: the handle is live until drop, here and below.
@@ -62,7 +106,7 @@ impl Input {
         Ok(usize::try_from(count).unwrap_or(0))
     }
 
-    fn spec(&self) -> Result<sys::OiioSpec, (i32, String)> {
+    pub(super) fn spec(&self) -> Result<sys::OiioSpec, (i32, String)> {
         let mut spec = sys::OiioSpec::default();
         // SAFETY: as above.
         call(|e, n| unsafe { (self.api.input_spec)(self.handle, self.part, &mut spec, e, n) })?;
@@ -76,7 +120,7 @@ impl Input {
         Ok((text(name), Storage::of_format(format)))
     }
 
-    fn channels(&self, count: i32) -> Result<Vec<String>, (i32, String)> {
+    pub(super) fn channels(&self, count: i32) -> Result<Vec<String>, (i32, String)> {
         (0..count).map(|i| self.channel(i).map(|(name, _)| name)).collect()
     }
 
@@ -165,8 +209,7 @@ pub fn read_part(path: &Path, part: usize, limits: &ReadLimits) -> Result<ReadIm
     let data = input.pixels(limits.bytes_for(path.metadata().map_or(0, |m| m.len()))).map_err(failed)?;
     let channels = input.channels(spec.nchannels).map_err(failed)?;
     let metadata = input.metadata(spec.attributes);
-    let is_integer = matches!(spec.format, sys::OIIO_FORMAT_U8 | sys::OIIO_FORMAT_U16);
-    let encoding = if is_integer { ColorEncoding::Srgb } else { ColorEncoding::Linear };
+    let encoding = usual_encoding(&spec);
     // The header was checked against the pixels by the shim: the sizes are positive.
     let image = Image { width: spec.width as usize, height: spec.height as usize, channels, data };
     let size = |n: i32| usize::try_from(n).unwrap_or(0);
@@ -176,6 +219,12 @@ pub fn read_part(path: &Path, part: usize, limits: &ReadLimits) -> Result<ReadIm
         full_size: [size(spec.full_width), size(spec.full_height)],
     };
     Ok(ReadImage { image, encoding, metadata, parts, window, is_half: spec.format == sys::OIIO_FORMAT_HALF })
+}
+
+/// The usual encoding of a file: sRGB for 8-bit and 16-bit integers, linear for everything else.
+pub(super) fn usual_encoding(spec: &sys::OiioSpec) -> ColorEncoding {
+    let is_integer = matches!(spec.format, sys::OIIO_FORMAT_U8 | sys::OIIO_FORMAT_U16);
+    if is_integer { ColorEncoding::Srgb } else { ColorEncoding::Linear }
 }
 
 /// Reads the metadata of the first part of an image, as text by name, and no pixels.

@@ -15,7 +15,7 @@
 #include <stddef.h>
 #include <stdint.h>
 
-#define OIIO_SHIM_ABI 2
+#define OIIO_SHIM_ABI 3
 
 #if defined(_WIN32)
 #define OIIO_SHIM_API __declspec(dllexport)
@@ -67,6 +67,12 @@ typedef struct OiioSpec {
   int32_t deep;          /* 1: several samples per pixel; such pixels cannot be read here */
   int32_t attributes;    /* number of metadata entries */
 } OiioSpec;
+
+/* One level of the pyramid of a subimage. */
+typedef struct OiioLevel {
+  int32_t width, height;           /* pixels */
+  int32_t tile_width, tile_height; /* pixels; 0: stored in rows */
+} OiioLevel;
 
 /* One metadata entry. */
 typedef struct OiioAttribute {
@@ -137,6 +143,17 @@ OIIO_SHIM_API int32_t oiio_shim_input_float_count(OiioInput* input, int32_t subi
    error the pixels are undefined but initialised as they were. */
 OIIO_SHIM_API int32_t oiio_shim_input_read(OiioInput* input, int32_t subimage, float* pixels, uint64_t count,
                                            char* error, size_t error_size);
+/* A level of a subimage, of which 0 is the image itself. OIIO_UNSUPPORTED if the file has no such level, or if it is deep,
+   a volume, or empty. */
+OIIO_SHIM_API int32_t oiio_shim_input_level(OiioInput* input, int32_t subimage, int32_t level, OiioLevel* out,
+                                            char* error, size_t error_size);
+/* Reads `width` x `height` pixels of a level from column x and row y on, counted from the top left of the level, which
+   must hold them: the channels [channel_begin, channel_end), interleaved, top row first. `count` is
+   width * height * (channel_end - channel_begin). */
+OIIO_SHIM_API int32_t oiio_shim_input_read_region(OiioInput* input, int32_t subimage, int32_t level, int32_t x,
+                                                  int32_t y, int32_t width, int32_t height, int32_t channel_begin,
+                                                  int32_t channel_end, float* pixels, uint64_t count, char* error,
+                                                  size_t error_size);
 /* Closes and frees. Null is allowed. */
 OIIO_SHIM_API void oiio_shim_input_close(OiioInput* input);
 

@@ -9,6 +9,7 @@
 #include <vector>
 
 static_assert(sizeof(OiioSpec) == 14 * 4, "src/types.rs declares 14 words");
+static_assert(sizeof(OiioLevel) == 4 * 4, "src/types.rs declares four words");
 static_assert(sizeof(void*) != 8 || sizeof(OiioAttribute) == 40, "src/types.rs declares five words");
 
 namespace {
@@ -101,7 +102,32 @@ struct OiioInput {
                                         std::to_string(max_bytes >> 20) + " MiB (damaged file?)"};
     return row * uint64_t(spec.height);
   }
+
+  // Header of a level of a subimage.
+  ImageSpec level(int32_t subimage, int32_t level) {
+    require(subimage >= 0 && level >= 0, "negative index");
+    const ImageSpec spec = input->spec_dimensions(subimage, level);
+    drain();
+    const bool usable = !spec.deep && spec.depth <= 1 && spec.width > 0 && spec.height > 0 && spec.nchannels > 0;
+    if (!usable) throw Failure{OIIO_UNSUPPORTED, "the file has no such level"};
+    return spec;
+  }
 };
+
+namespace {
+
+// Columns or rows [begin, end) of a level.
+struct Span {
+  int begin, end;
+
+  // The whole tiles that hold them, of a level that has `size` of them from 0 on; all where there are no tiles.
+  Span of_tiles(int tile, int size) const {
+    if (tile <= 0) return {0, size};
+    return {begin / tile * tile, int(std::min<int64_t>(size, (int64_t(end) + tile - 1) / tile * tile))};
+  }
+};
+
+}  // namespace
 
 // ---- library ----
 
@@ -237,6 +263,50 @@ int32_t oiio_shim_input_read(OiioInput* input, int32_t subimage, float* pixels, 
     const int channels = input->part(subimage).spec.nchannels;
     if (!input->input->read_image(subimage, 0, 0, channels, TypeDesc(TypeDesc::FLOAT), pixels))
       throw Failure{OIIO_CANNOT_READ, or_else(input->drain(), "the pixels cannot be read")};
+  });
+}
+
+int32_t oiio_shim_input_level(OiioInput* input, int32_t subimage, int32_t level, OiioLevel* out, char* error,
+                              size_t error_size) {
+  return guard(error, error_size, [&] {
+    require(input != nullptr && out != nullptr, "null argument");
+    const ImageSpec spec = input->level(subimage, level);
+    *out = {spec.width, spec.height, spec.tile_width, spec.tile_height};
+  });
+}
+
+int32_t oiio_shim_input_read_region(OiioInput* input, int32_t subimage, int32_t level, int32_t x, int32_t y,
+                                    int32_t width, int32_t height, int32_t channel_begin, int32_t channel_end,
+                                    float* pixels, uint64_t count, char* error, size_t error_size) {
+  return guard(error, error_size, [&] {
+    require(input != nullptr && pixels != nullptr, "null argument");
+    const ImageSpec spec = input->level(subimage, level);
+    require(x >= 0 && y >= 0 && width > 0 && height > 0 && width <= spec.width - x && height <= spec.height - y,
+            "pixels outside of the level");
+    require(channel_begin >= 0 && channel_begin < channel_end && channel_end <= spec.nchannels, "no such channels");
+    const uint64_t channels = uint64_t(channel_end - channel_begin);
+    require(count == uint64_t(width) * uint64_t(height) * channels, "the number of floats is not that of the pixels");
+
+    // Files give whole tiles, or whole rows
+    const bool tiled = spec.tile_width > 0 && spec.tile_height > 0;
+    const Span columns = Span{x, x + width}.of_tiles(tiled ? spec.tile_width : 0, spec.width);
+    const Span rows = tiled ? Span{y, y + height}.of_tiles(spec.tile_height, spec.height) : Span{y, y + height};
+    const uint64_t row = uint64_t(columns.end - columns.begin) * channels;
+    const bool exact = columns.end - columns.begin == width && rows.end - rows.begin == height;
+    std::vector<float> whole(exact ? 0 : size_t(row * uint64_t(rows.end - rows.begin)));
+    float* const target = exact ? pixels : whole.data();
+    const TypeDesc floats(TypeDesc::FLOAT);
+    const bool read = tiled ? input->input->read_tiles(subimage, level, spec.x + columns.begin, spec.x + columns.end,
+                                                       spec.y + rows.begin, spec.y + rows.end, spec.z, spec.z + 1,
+                                                       channel_begin, channel_end, floats, target)
+                            : input->input->read_scanlines(subimage, level, spec.y + rows.begin, spec.y + rows.end,
+                                                           spec.z, channel_begin, channel_end, floats, target);
+    if (!read) throw Failure{OIIO_CANNOT_READ, or_else(input->drain(), "the pixels cannot be read")};
+    if (exact) return;
+    const uint64_t wanted = uint64_t(width) * channels;
+    const uint64_t left = uint64_t(x - columns.begin) * channels;
+    for (int i = 0; i < height; ++i)
+      std::copy_n(target + uint64_t(y - rows.begin + i) * row + left, wanted, pixels + uint64_t(i) * wanted);
   });
 }
 

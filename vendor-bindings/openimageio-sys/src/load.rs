@@ -1,6 +1,6 @@
 //! Finding and opening the shim.
 
-use crate::types::{OIIO_SHIM_ABI, OiioAttribute, OiioInput, OiioOutput, OiioPart, OiioSpec};
+use crate::types::{OIIO_SHIM_ABI, OiioAttribute, OiioInput, OiioLevel, OiioOutput, OiioPart, OiioSpec};
 use libloading::Library;
 use std::env;
 use std::ffi::{OsStr, c_char};
@@ -95,6 +95,18 @@ api! {
     /// Reads all channels, interleaved, top row first. `count` is that of `input_float_count`.
     fn input_read(
         input: *mut OiioInput, subimage: i32, pixels: *mut f32, count: u64,
+        error: *mut c_char, error_size: usize,
+    ) -> i32;
+    /// A level of the pyramid of a subimage, of which 0 is the image itself.
+    fn input_level(
+        input: *mut OiioInput, subimage: i32, level: i32, out: *mut OiioLevel,
+        error: *mut c_char, error_size: usize,
+    ) -> i32;
+    /// Reads `width` × `height` pixels of a level from column `x` and row `y` on: the channels from `channel_begin` to
+    /// before `channel_end`, interleaved, top row first. `count` is the number of these floats.
+    fn input_read_region(
+        input: *mut OiioInput, subimage: i32, level: i32, x: i32, y: i32, width: i32, height: i32,
+        channel_begin: i32, channel_end: i32, pixels: *mut f32, count: u64,
         error: *mut c_char, error_size: usize,
     ) -> i32;
     /// Closes and frees; null is allowed.

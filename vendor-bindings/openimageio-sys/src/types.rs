@@ -4,7 +4,7 @@ use std::ffi::{c_char, c_void};
 use std::mem::size_of;
 
 /// Version of the interface; the shim tells its own by `Api::abi`.
-pub const OIIO_SHIM_ABI: i32 = 2;
+pub const OIIO_SHIM_ABI: i32 = 3;
 
 /// Success.
 pub const OIIO_OK: i32 = 0;
@@ -92,6 +92,20 @@ pub struct OiioSpec {
     pub attributes: i32,
 }
 
+/// One level of the pyramid of a subimage.
+#[repr(C)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub struct OiioLevel {
+    /// Width (pixels).
+    pub width: i32,
+    /// Height (pixels).
+    pub height: i32,
+    /// Width of its tiles (pixels); 0 if it is stored in rows.
+    pub tile_width: i32,
+    /// Height of its tiles (pixels); 0 if it is stored in rows.
+    pub tile_height: i32,
+}
+
 /// One metadata entry. The pointers live until the input is closed.
 #[repr(C)]
 #[derive(Clone, Copy, Debug)]
@@ -143,6 +157,7 @@ pub struct OiioPart {
 // The shim asserts the same figures.
 const _: () = {
     assert!(size_of::<OiioSpec>() == 14 * 4);
+    assert!(size_of::<OiioLevel>() == 4 * 4);
     assert!(size_of::<*const c_char>() != 8 || size_of::<OiioAttribute>() == 40);
     assert!(size_of::<*const c_char>() != 8 || size_of::<OiioPart>() == 72);
 };

@@ -1,0 +1,79 @@
+//! Texels of a file that holds a pyramid: whole levels, and tiles that are read when they are wanted.
+
+use super::ColorEncoding;
+use super::file::ImageError;
+use super::level::{Level, Texels, Tiled};
+use super::oiio::FilePyramid;
+use super::tiles::{TILE, TileStore};
+use std::sync::Arc;
+
+/// Some channels of a pyramid, as textures keep them.
+#[derive(Clone, Debug)]
+pub(super) struct FileTexels {
+    pub(super) file: Arc<FilePyramid>,
+    /// Positions of one or three channels.
+    pub(super) channels: Vec<usize>,
+    pub(super) encoding: ColorEncoding,
+}
+
+impl FileTexels {
+    /// Bytes of a channel: 1 if a table makes them linear, or 4.
+    fn channel_bytes(&self) -> usize {
+        if self.file.is_bytes() { 1 } else { 4 }
+    }
+
+    /// A whole level.
+    pub(super) fn level(&self, level: usize) -> Result<Level, ImageError> {
+        let [width, height] = self.file.sizes()[level];
+        let values = self.file.level(level, &self.channels)?;
+        let texels = match self.channel_bytes() {
+            1 => Texels::Bytes(values.into_iter().map(byte).collect()),
+            _ => Texels::Floats(values.into_iter().map(|v| self.encoding.to_linear(v)).collect()),
+        };
+        Ok(Level { width, height, texels })
+    }
+
+    /// The same with tiles in `store` that are read when they are wanted, unless it is a tile itself.
+    pub(super) fn tiled_level(&self, level: usize, store: &Arc<TileStore>) -> Result<Level, ImageError> {
+        let [width, height] = self.file.sizes()[level];
+        if width * height <= TILE * TILE {
+            return self.level(level);
+        }
+        let [columns, rows] = [width, height].map(|n| n.div_ceil(TILE));
+        let texels = self.clone();
+        let read = move |index: usize| texels.tile(level, index).map_err(|error| error.to_string());
+        let first = store.add_level(columns * rows, self.tile_bytes(), Arc::new(read));
+        let tiled = Tiled { store: Arc::clone(store), first, columns, channel_bytes: self.channel_bytes() };
+        Ok(Level { width, height, texels: Texels::Tiled(tiled) })
+    }
+
+    fn tile_bytes(&self) -> usize {
+        TILE * TILE * self.channels.len() * self.channel_bytes()
+    }
+
+    /// A tile of a level, row by row; zeros beyond the level.
+    fn tile(&self, level: usize, index: usize) -> Result<Vec<u8>, ImageError> {
+        let [width, height] = self.file.sizes()[level];
+        let columns = width.div_ceil(TILE);
+        let origin = [index % columns * TILE, index / columns * TILE];
+        let size = [TILE.min(width - origin[0]), TILE.min(height - origin[1])];
+        let values = self.file.region(level, origin, size, &self.channels)?;
+
+        let mut bytes = vec![0; self.tile_bytes()];
+        let rows = bytes.chunks_exact_mut(self.tile_bytes() / TILE);
+        for (row, values) in rows.zip(values.chunks_exact(size[0] * self.channels.len())) {
+            match self.channel_bytes() {
+                1 => row.iter_mut().zip(values).for_each(|(b, v)| *b = byte(*v)),
+                _ => row.chunks_exact_mut(4).zip(values).for_each(|(word, v)| {
+                    word.copy_from_slice(&self.encoding.to_linear(*v).to_ne_bytes());
+                }),
+            }
+        }
+        Ok(bytes)
+    }
+}
+
+/// The byte of a multiple of 1/255.
+fn byte(v: f32) -> u8 {
+    (v * 255.0 + 0.5) as u8
+}
