@@ -83,24 +83,29 @@ impl NanoSpec {
         })
     }
 
-    /// The grid as it is in memory.
-    pub fn bytes(&self) -> Vec<u8> {
-        let wide = self.ty == 2;
-        let key = |p: &[i32; 3], bits: u32| p.map(|i| i >> bits);
-        let mut lowers: BTreeMap<[i32; 3], Vec<Child<'_>>> = BTreeMap::new();
+    /// Nodes of 32³ entries, in which those of 16³ have no value, and these.
+    fn nodes(&self) -> (Nodes<Tile>, Nodes<Child<'_>>) {
+        let mut lowers: Nodes<Child<'_>> = BTreeMap::new();
         for (origin, values) in &self.leaves {
             lowers.entry(key(origin, 7)).or_default().push((*origin, Err(values)));
         }
         for (origin, _, value) in self.tiles.iter().filter(|t| t.1 == 8) {
             lowers.entry(key(origin, 7)).or_default().push((*origin, Ok(*value)));
         }
-        let mut uppers: BTreeMap<[i32; 3], Vec<([i32; 3], Option<f32>)>> = BTreeMap::new();
+        let mut uppers: Nodes<Tile> = BTreeMap::new();
         for lower in lowers.keys() {
             uppers.entry(lower.map(|i| i >> 5)).or_default().push((lower.map(|i| i << 7), None));
         }
         for (origin, _, value) in self.tiles.iter().filter(|t| t.1 == 128) {
             uppers.entry(key(origin, 12)).or_default().push((*origin, Some(*value)));
         }
+        (uppers, lowers)
+    }
+
+    /// The grid as it is in memory.
+    pub fn bytes(&self) -> Vec<u8> {
+        let wide = self.ty == 2;
+        let (uppers, lowers) = self.nodes();
         let roots: Vec<_> = self.tiles.iter().filter(|t| t.1 == 4096).collect();
 
         // Where everything goes
@@ -214,6 +219,16 @@ impl NanoSpec {
         }
     }
 }
+
+fn key(p: &[i32; 3], bits: u32) -> [i32; 3] {
+    p.map(|i| i >> bits)
+}
+
+/// Entries of nodes, which are known by their indices in units of their size.
+type Nodes<T> = BTreeMap<[i32; 3], Vec<T>>;
+
+/// A tile, or a node if it has no value.
+type Tile = ([i32; 3], Option<f32>);
 
 /// A tile or a leaf.
 type Child<'a> = ([i32; 3], Result<f32, &'a Vec<f32>>);
