@@ -11,7 +11,7 @@ use std::path::PathBuf;
 pub struct SceneFiles {
     /// Hash of the texts.
     texts: u64,
-    /// Meshes, images and spectra, in the order of the texts.
+    /// Meshes, volumes, images and spectra, in the order of the texts.
     others: Vec<PathBuf>,
 }
 

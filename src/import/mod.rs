@@ -1,5 +1,5 @@
-//! From scene files to scenes: the meaning of pbrt's directives ([`pbrt`]) and of glTF ([`gltf`]), and the images and
-//! meshes that they name ([`resources`], [`images`]), which the scenes of an animation share ([`cache`]). A
+//! From scene files to scenes: the meaning of pbrt's directives ([`pbrt`]) and of glTF ([`gltf`]), and the images,
+//! meshes and volumes that they name ([`resources`], [`images`], [`volumes`]), which the scenes of an animation share ([`cache`]). A
 //! [`fingerprint`] tells a scene from others.
 //!
 //! The files themselves are parsed by the crate `lumiris_formats`. User input never panics: problems are collected,
@@ -11,6 +11,7 @@ pub mod gltf;
 pub mod images;
 pub mod pbrt;
 pub mod resources;
+pub mod volumes;
 
 use crate::accel::embree::EmbreeError;
 use crate::scene::{AccelKind, RenderJob, Scene, World};

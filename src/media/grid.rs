@@ -1,8 +1,10 @@
 //! Media that are given by samples on a grid over the unit cube, between which they are interpolated linearly.
 //!
-//! As in pbrt-v4, sample i of n lies at (i + ½)/n, and beyond the outermost samples there are zeros.
+//! As in pbrt-v4, sample i of n of a dense grid lies at (i + ½)/n, and beyond the outermost samples there are zeros. Those of
+//! a sparse grid lie where its map places their indices.
 
 use super::Coefficients;
+use super::sparse::SparseSamples;
 use lumiris_numbers::math::{Rgb, Vec3};
 use std::ops::{Add, Mul};
 
@@ -87,11 +89,66 @@ impl<T: Copy + Default + Add<Output = T> + Mul<f32, Output = T>> Samples<T> {
     }
 }
 
+/// Numbers in the unit cube.
+#[derive(Clone, Debug)]
+pub enum Scalars {
+    /// A sample for each cell.
+    Dense(Samples<f32>),
+    /// A tree of voxels.
+    Sparse(SparseSamples),
+}
+
+impl Scalars {
+    /// The value at a point of the unit cube.
+    #[inline]
+    pub fn at(&self, p: Vec3) -> f32 {
+        match self {
+            Scalars::Dense(samples) => samples.at(p),
+            Scalars::Sparse(samples) => samples.at(p),
+        }
+    }
+
+    /// A bound of the values in a box in the unit cube; at least zero.
+    pub fn bound(&self, low: Vec3, high: Vec3) -> f32 {
+        match self {
+            Scalars::Dense(samples) => samples.bound(low, high, |value| value),
+            Scalars::Sparse(samples) => samples.bound(low, high),
+        }
+    }
+
+    /// Number of samples along each axis.
+    pub fn resolution(&self) -> [usize; 3] {
+        match self {
+            Scalars::Dense(samples) => samples.resolution(),
+            Scalars::Sparse(samples) => samples.resolution(),
+        }
+    }
+
+    /// The least and the greatest sample.
+    pub fn extremes(&self) -> [f32; 2] {
+        match self {
+            Scalars::Dense(samples) => {
+                let ends = [f32::INFINITY, f32::NEG_INFINITY];
+                samples.values().iter().fold(ends, |[low, high], &v| [low.min(v), high.max(v)])
+            }
+            Scalars::Sparse(samples) => samples.extremes(),
+        }
+    }
+
+    /// Bytes of the samples.
+    pub fn bytes(&self) -> usize {
+        match self {
+            Scalars::Dense(samples) => samples.bytes(),
+            Scalars::Sparse(samples) => samples.bytes(),
+        }
+    }
+}
+
 /// Emitted radiance by temperature: colours of black bodies between which it is interpolated.
 #[derive(Clone, Debug)]
 pub struct Temperature {
     /// Samples of it.
-    pub samples: Samples<f32>,
+    pub samples: Scalars,
     /// Subtracted from the samples.
     pub offset: f32,
     /// Then a factor: kelvins.
@@ -126,7 +183,7 @@ pub struct UniformGrid {
     /// Scattering where the density is 1 (1/m).
     pub sigma_s: Rgb,
     /// The density.
-    pub density: Samples<f32>,
+    pub density: Scalars,
     /// Emitted radiance; with a temperature, its factor.
     pub le: Rgb,
     /// Factor of the emission, if it varies.

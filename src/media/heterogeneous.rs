@@ -15,7 +15,7 @@
 
 use super::majorants::{MajorantGrid, Pieces};
 use super::track::{End, Flight, Numbers, Segment};
-use super::{Cloud, Coefficients, RgbGrid, UniformGrid};
+use super::{Cloud, Coefficients, RgbGrid, Scalars, UniformGrid};
 use lumiris_numbers::math::{Affine3A, Bounds3, Rgb, Vec3};
 
 /// What varies.
@@ -63,9 +63,7 @@ impl Heterogeneous {
         let majorants = match &field {
             Field::Uniform(grid) => {
                 let sigma_t = (grid.sigma_a + grid.sigma_s).max_component();
-                MajorantGrid::new(cells(grid.density.resolution()), |low, high| {
-                    sigma_t * grid.density.bound(low, high, |density| density)
-                })
+                MajorantGrid::new(cells(grid.density.resolution()), |low, high| sigma_t * grid.density.bound(low, high))
             }
             Field::Rgb(grid) => MajorantGrid::new(cells(grid.resolution()), |low, high| grid.bound(low, high)),
             Field::Cloud(cloud) => cloud_majorants(cloud, &bounds),
@@ -75,8 +73,11 @@ impl Heterogeneous {
 
     /// What kind of field it is, for people.
     pub fn kind_name(&self) -> &'static str {
-        match self.field {
-            Field::Uniform(_) => "uniformgrid",
+        match &self.field {
+            Field::Uniform(grid) => match grid.density {
+                Scalars::Dense(_) => "uniformgrid",
+                Scalars::Sparse(_) => "nanovdb",
+            },
             Field::Rgb(_) => "rgbgrid",
             Field::Cloud(_) => "cloud",
         }

@@ -4,19 +4,21 @@
 //! goes a distance d is weakened to T = exp(−∫₀ᵈ σ_t). A medium sends out σ_a·L_e per unit length, and scatters by
 //! [Henyey and Greenstein 1941].
 //!
-//! Reading order: [`homogeneous`], [`grid`], [`cloud`], [`majorants`], [`heterogeneous`], [`track`].
+//! Reading order: [`homogeneous`], [`sparse`], [`grid`], [`cloud`], [`majorants`], [`heterogeneous`], [`track`].
 
 pub mod cloud;
 pub mod grid;
 pub mod heterogeneous;
 pub mod homogeneous;
 pub mod majorants;
+pub mod sparse;
 pub mod track;
 
 pub use cloud::Cloud;
-pub use grid::{RgbGrid, Samples, Temperature, UniformGrid};
+pub use grid::{RgbGrid, Samples, Scalars, Temperature, UniformGrid};
 pub use heterogeneous::{Field, Heterogeneous};
 pub use homogeneous::Homogeneous;
+pub use sparse::{Cube, SparseGrid, SparseSamples};
 pub use track::{End, Flight, Numbers, Segment};
 
 use lumiris_numbers::math::{Rgb, Vec3};

@@ -31,5 +31,6 @@ mod texture_tiles;
 mod udim;
 mod variance;
 mod visibility_cache;
+mod volumes;
 mod wavefront;
 mod white_balance;

@@ -509,7 +509,6 @@ fn faults_in_media_are_reported_with_their_places() {
     let grid = r#""string type" "uniformgrid" "integer nx" 2"#;
     for (medium, fault) in [
         (r#""string type" "fog""#.to_owned(), "unknown medium `fog`"),
-        (r#""string type" "nanovdb" "string filename" "a.nvdb""#.to_owned(), "`nanovdb` cannot be read"),
         (r#""rgb sigma_a" [-1 0 0]"#.to_owned(), "sigma_a must be finite and not negative"),
         (r#""float scale" -2"#.to_owned(), "scale must be finite and not negative"),
         (r#""float g" 1.5"#.to_owned(), "g must be from -1 to 1"),

@@ -1,15 +1,16 @@
-//! File formats: pbrt-v4 text to checked directives, PLY files to meshes, glTF files to checked JSON and arrays, measured spectra to colours; and atomic
-//! writing of files.
+//! File formats: pbrt-v4 text to checked directives, PLY files to meshes, NanoVDB files to sparse grids, glTF files to
+//! checked JSON and arrays, measured spectra to colours; and atomic writing of files.
 //!
 //! User input never panics. Errors are collected with their positions in [`diagnostic::Diagnostics`]. The meaning of
 //! directives is not decided here: the renderer builds its scene from them.
 //!
-//! Reading order: [`source`], [`diagnostic`], [`number`], [`pbrt`], [`ply`], [`gltf`], [`spectra`], [`upsampling`],
-//! [`color_space`], [`output`].
+//! Reading order: [`source`], [`diagnostic`], [`number`], [`pbrt`], [`ply`], [`nanovdb`], [`gltf`], [`spectra`],
+//! [`upsampling`], [`color_space`], [`output`].
 
 pub mod color_space;
 pub mod diagnostic;
 pub mod gltf;
+pub mod nanovdb;
 pub mod number;
 pub mod output;
 pub mod pbrt;

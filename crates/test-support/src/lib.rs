@@ -1,6 +1,7 @@
-//! What tests of several crates use: statistical assertions, and integrals of known value.
+//! What tests of several crates use: statistical assertions, integrals of known value, and files of volumes.
 
 pub mod integrals;
+pub mod nanovdb;
 pub mod random;
 pub mod significance;
 

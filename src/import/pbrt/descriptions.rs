@@ -67,8 +67,34 @@ impl MediumNames {
 pub struct MediumDesc {
     /// Its name, and where it stands.
     pub name: Name,
-    /// The medium; `None` after an error.
+    /// The medium; `None` after an error, and before its file is read.
     pub medium: Option<Medium>,
+    /// What waits for a file.
+    pub(super) volume: Option<VolumeDesc>,
+}
+
+/// A medium that waits for its file.
+#[derive(Clone, Debug)]
+pub(super) struct VolumeDesc {
+    /// The file.
+    pub(super) path: PathBuf,
+    /// Where it is named.
+    pub(super) span: Span,
+    /// Name of the grid of densities, and where it stands.
+    pub(super) density: (String, Span),
+    /// The same of temperatures; no place if the text does not name it. `None` if nothing is to glow.
+    pub(super) temperature: Option<(String, Option<Span>)>,
+    /// What is subtracted from temperatures, and then their factor.
+    pub(super) offset: f32,
+    pub(super) scale: f32,
+    /// Coefficients where the density is 1 (1/m).
+    pub(super) sigma_a: Rgb,
+    pub(super) sigma_s: Rgb,
+    /// Factor of the emission.
+    pub(super) le_scale: f32,
+    pub(super) g: f32,
+    /// From the space of the file.
+    pub(super) placement: Affine3A,
 }
 
 /// What is behind the surface of a material.

@@ -70,6 +70,7 @@ impl Builder<'_> {
 
         // Assemble the geometry
         let shutter = options.as_ref().map_or([0.0, 1.0], |s| s.shutter);
+        self.load_volumes(files, d);
         let mut media = self.media_in_use(&shapes, d);
         self.add_interiors(&mut media, &shapes, d);
         let mut assembly = Assembly { shutter, images, media, ..Assembly::default() };

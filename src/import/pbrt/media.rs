@@ -7,8 +7,8 @@ use super::spectrum::SpectrumUse;
 use super::state::Builder;
 use crate::materials::MaterialId;
 use crate::media::{
-    Cloud, Field, Heterogeneous, Homogeneous, Medium, MediumId, MediumSet, RgbGrid, Samples, Sides, Temperature,
-    UniformGrid,
+    Cloud, Field, Heterogeneous, Homogeneous, Medium, MediumId, MediumSet, RgbGrid, Samples, Scalars, Sides,
+    Temperature, UniformGrid,
 };
 use lumiris_formats::diagnostic::{Diagnostics, did_you_mean};
 use lumiris_formats::pbrt::directive::Name;
@@ -58,30 +58,29 @@ impl Builder<'_> {
         }
         let world_from_medium = self.still_transform("media", name.span, d);
         let kind = p.string("type", d).unwrap_or("homogeneous").to_owned();
+        let mut volume = None;
         let medium = match kind.as_str() {
             "homogeneous" => self.homogeneous(p, d),
             "uniformgrid" => self.uniform_grid(p, &world_from_medium, d),
             "rgbgrid" => self.rgb_grid(p, &world_from_medium, d),
             "cloud" => self.cloud(p, &world_from_medium, d),
             "nanovdb" => {
-                p.ignore_all();
-                let message = "medium `nanovdb` cannot be read: there is no library for this format here";
-                d.error(p.span_of("type"), message).help("write its densities as a `uniformgrid` or an `rgbgrid`");
+                volume = self.nanovdb(p, world_from_medium, d);
                 None
             }
             other => {
                 p.ignore_all();
-                let known = ["homogeneous", "uniformgrid", "rgbgrid", "cloud"];
+                let known = ["homogeneous", "uniformgrid", "rgbgrid", "cloud", "nanovdb"];
                 unknown(other, p.span_of("type"), "medium", &known, d);
                 None
             }
         };
         p.report_unused(d);
-        self.media.push(MediumDesc { name, medium });
+        self.media.push(MediumDesc { name, medium, volume });
     }
 
     /// σ_a and σ_s with the scale; 1 where the file says nothing.
-    fn coefficients(&self, p: &ParamSet, scale: f32, d: &mut Diagnostics) -> Option<[Rgb; 2]> {
+    pub(super) fn coefficients(&self, p: &ParamSet, scale: f32, d: &mut Diagnostics) -> Option<[Rgb; 2]> {
         let mut of = [Rgb::WHITE; 2];
         let preset = p.string("preset", d).map(str::to_owned);
         let found = preset.as_deref().map(|name| (name, media_presets::preset(name)));
@@ -138,10 +137,10 @@ impl Builder<'_> {
             );
             return None;
         }
-        let temperature = temperature.map(|samples| glowing(samples, offset, temperature_scale));
+        let temperature = temperature.map(|samples| glowing(Scalars::Dense(samples), offset, temperature_scale));
         let le = if temperature.is_some() { Rgb::WHITE } else { le.unwrap_or(Rgb::BLACK) };
         let [sigma_a, sigma_s] = coefficients?;
-        let grid = UniformGrid { sigma_a, sigma_s, density: density?, le, le_scale, temperature };
+        let grid = UniformGrid { sigma_a, sigma_s, density: Scalars::Dense(density?), le, le_scale, temperature };
         Some(Medium::Heterogeneous(Arc::new(Heterogeneous::new(Field::Uniform(grid), bounds?, placement, g))))
     }
 
@@ -243,7 +242,7 @@ impl Builder<'_> {
 }
 
 /// A finite number that is not negative, or the default after an error.
-fn not_negative(p: &ParamSet, key: &'static str, default: f32, d: &mut Diagnostics) -> f32 {
+pub(super) fn not_negative(p: &ParamSet, key: &'static str, default: f32, d: &mut Diagnostics) -> f32 {
     match p.float(key, d) {
         Some(x) if x >= 0.0 && x.is_finite() => x,
         Some(x) => {
@@ -254,7 +253,7 @@ fn not_negative(p: &ParamSet, key: &'static str, default: f32, d: &mut Diagnosti
     }
 }
 
-fn asymmetry(p: &ParamSet, d: &mut Diagnostics) -> f32 {
+pub(super) fn asymmetry(p: &ParamSet, d: &mut Diagnostics) -> f32 {
     let g = p.float("g", d).unwrap_or(0.0);
     if !(-1.0..=1.0).contains(&g) {
         d.error(p.span_of("g"), format!("g must be from -1 to 1, not {g}"));
@@ -312,8 +311,8 @@ fn wrong_count(key: &str, [nx, ny, nz]: [usize; 3], count: usize) -> String {
 }
 
 /// The radiance of black bodies up to the highest temperature of the samples.
-fn glowing(samples: Samples<f32>, offset: f32, scale: f32) -> Temperature {
-    let hottest = samples.values().iter().map(|t| (t - offset) * scale).fold(0.0, f32::max);
+pub(super) fn glowing(samples: Scalars, offset: f32, scale: f32) -> Temperature {
+    let hottest = samples.extremes().into_iter().map(|t| (t - offset) * scale).fold(0.0, f32::max);
     let step = (hottest / (TEMPERATURES - 1) as f32).max(f32::MIN_POSITIVE);
     let radiance = (0..TEMPERATURES).map(|i| glow_rgb(i as f32 * step)).collect();
     Temperature { samples, offset, scale, radiance, step }

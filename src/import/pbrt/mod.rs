@@ -2,7 +2,7 @@
 //!
 //! Reading order: [`descriptions`] (what a file asks for), [`state`] (the scene while its file is read), [`checks`];
 //! a file for each kind of directive: [`transform`], [`options`], [`settings`], [`film`], [`spectrum`], [`textures`],
-//! [`materials`], `hair`, [`lights`], `image_lights`, [`media`] with `media_presets`, `curves`, [`shapes`]; [`directives`] (the state machine over `lumiris_formats::pbrt`'s directives);
+//! [`materials`], `hair`, [`lights`], `image_lights`, [`media`] with `media_presets` and `volumes`, `curves`, [`shapes`]; [`directives`] (the state machine over `lumiris_formats::pbrt`'s directives);
 //! and [`finish`] (reads files and assembles the scene).
 
 pub mod checks;
@@ -28,6 +28,7 @@ pub mod state;
 mod subsurface;
 pub mod textures;
 pub mod transform;
+mod volumes;
 
 #[cfg(test)]
 mod tests;

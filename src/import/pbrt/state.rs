@@ -168,7 +168,7 @@ impl<'a> Builder<'a> {
         }
     }
 
-    /// The files that the text names: spectra, meshes and images.
+    /// The files that the text names: spectra, meshes, volumes and images.
     pub fn files(&self) -> Vec<PathBuf> {
         let mesh = |shape: &ShapeDesc| match &shape.source {
             ShapeSource::Ply(path) => Some(path.clone()),
@@ -176,6 +176,7 @@ impl<'a> Builder<'a> {
         };
         let mut files = self.spectrum_files.borrow().clone();
         files.extend(self.shapes.iter().filter_map(mesh));
+        files.extend(self.media.iter().filter_map(|m| Some(m.volume.as_ref()?.path.clone())));
         files.extend(self.environments.iter().map(|e| e.path.clone()));
         files.extend(self.emission_images.iter().cloned());
         files.extend(self.resources.paths().map(Path::to_path_buf));

@@ -27,7 +27,7 @@ pub use alias::{AliasTable, DiscreteSample};
 pub use bounds::Bounds3;
 pub use distribution::{PiecewiseConstant1D, PiecewiseConstant2D, Sample1D, Sample2D};
 pub use frame::Frame;
-pub use glam::{Affine3A, DVec2, DVec3, Mat3, Mat3A, Mat4, Quat, Vec2, Vec3, Vec3A, Vec4};
+pub use glam::{Affine3A, DAffine3, DVec2, DVec3, Mat3, Mat3A, Mat4, Quat, Vec2, Vec3, Vec3A, Vec4};
 pub use ray::Ray;
 pub use rgb::{Rgb, luminance};
 

@@ -1,0 +1,192 @@
+//! The list of the grids of a file, and the bytes of one of them.
+//!
+//! A segment begins with 16 bytes: a magic number, the version, the number of its grids, and how they are compressed. For
+//! each grid follow 176 bytes and its name; then all grids, of the sizes that these say.
+
+use super::bytes::Bytes;
+use super::{NanoError, TYPES, ValueType, blosc};
+use flate2::read::ZlibDecoder;
+use std::io::{Read, Seek, SeekFrom};
+
+/// What files begin with, up to 32.5; grids begin with the same.
+const MAGIC_EITHER: &[u8; 8] = b"NanoVDB0";
+/// What grids begin with, and files that are grids alone.
+const MAGIC_GRID: &[u8; 8] = b"NanoVDB1";
+/// What files begin with.
+const MAGIC_FILE: &[u8; 8] = b"NanoVDB2";
+
+/// The version whose layout is read.
+const MAJOR: u32 = 32;
+
+/// Sizes of the head of a segment, of the head of an entry of its list, and of that of a grid.
+const SEGMENT: usize = 16;
+const ENTRY: usize = 176;
+pub(super) const GRID: usize = 672;
+
+/// Longest name that is believed.
+const MAX_NAME: u32 = 1 << 16;
+/// Largest factor by which deflate expands.
+const MAX_DEFLATE: u64 = 1032;
+/// Largest factor by which LZ4 expands, and a margin for heads.
+const MAX_LZ4: u64 = 300;
+
+/// How a grid is compressed.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+enum Codec {
+    None,
+    Zip,
+    Blosc,
+}
+
+/// A grid of a file.
+struct Entry {
+    name: String,
+    /// Where it begins in the file, and its size there.
+    start: u64,
+    stored: u64,
+    /// Its size in memory.
+    size: u64,
+    ty: u32,
+    codec: Codec,
+}
+
+/// Name and bytes of the first grid of a name. Nothing else of the file is read but heads.
+pub(super) fn grid_bytes(
+    reader: &mut (impl Read + Seek),
+    size: u64,
+    name: &str,
+) -> Result<(String, Vec<u8>), NanoError> {
+    let mut found = Vec::new();
+    let mut at = 0;
+    while at < size {
+        let mut magic = [0; 8];
+        reader.seek(SeekFrom::Start(at))?;
+        reader.read_exact(&mut magic).map_err(|_| foreign(at, &[]))?;
+        let (entries, end) = match &magic {
+            MAGIC_GRID => raw_grid(reader, at)?,
+            MAGIC_EITHER | MAGIC_FILE => segment(reader, at)?,
+            other => return Err(foreign(at, other)),
+        };
+        for entry in entries {
+            if entry.name == name {
+                return Ok((entry.name.clone(), read_entry(reader, &entry, size)?));
+            }
+            found.push(entry.name);
+        }
+        at = end.filter(|&end| end > at).ok_or_else(|| NanoError::damaged("its list of grids has wrong sizes"))?;
+    }
+    Err(NanoError::no_grid(name, found))
+}
+
+/// What is wrong with a file that has `magic` where a segment should begin.
+fn foreign(at: u64, magic: &[u8]) -> NanoError {
+    if at > 0 {
+        return NanoError::damaged(format!("there is no segment at byte {at}"));
+    }
+    let reversed: Vec<u8> = magic.iter().rev().copied().collect();
+    match magic {
+        [0x20, b'B', b'D', b'V', ..] => NanoError::Format(", but an OpenVDB file: convert it with nanovdb_convert"),
+        _ if reversed.starts_with(b"NanoVDB") => {
+            NanoError::Format(" of this kind of machine: its numbers have their high bytes first")
+        }
+        _ => NanoError::Format(": it does not begin with `NanoVDB`"),
+    }
+}
+
+fn check_version(version: u32) -> Result<(), NanoError> {
+    let (major, minor) = (version >> 21, version >> 10 & 0x7ff);
+    if major == MAJOR { Ok(()) } else { Err(NanoError::Version { major, minor }) }
+}
+
+/// A grid without a list.
+fn raw_grid(reader: &mut impl Read, at: u64) -> Result<(Vec<Entry>, Option<u64>), NanoError> {
+    // Its magic number has been read
+    let mut head = [0; GRID];
+    reader.read_exact(&mut head[8..])?;
+    let head = Bytes(&head);
+    check_version(head.u32(16)?)?;
+    let size = head.u64(32)?;
+    let (name, ty) = (head.text(40, 256)?, head.u32(636)?);
+    let entry = Entry { name, start: at, stored: size, size, ty, codec: Codec::None };
+    Ok((vec![entry], at.checked_add(size)))
+}
+
+/// The grids of a segment, and where it ends.
+fn segment(reader: &mut impl Read, at: u64) -> Result<(Vec<Entry>, Option<u64>), NanoError> {
+    let mut head = [0; SEGMENT];
+    reader.read_exact(&mut head[8..])?;
+    let head = Bytes(&head);
+    check_version(head.u32(8)?)?;
+    let codec = match head.u16(14)? {
+        0 => Codec::None,
+        1 => Codec::Zip,
+        2 => Codec::Blosc,
+        other => return Err(NanoError::Codec(format!("codec {other}"))),
+    };
+    let mut entries = Vec::new();
+    let mut start = at + SEGMENT as u64;
+    for _ in 0..head.u16(12)? {
+        let mut bytes = [0; ENTRY];
+        reader.read_exact(&mut bytes)?;
+        let bytes = Bytes(&bytes);
+        let length = bytes.u32(136)?;
+        if length > MAX_NAME {
+            return Err(NanoError::damaged(format!("the name of a grid has {length} bytes")));
+        }
+        let mut name = vec![0; length as usize];
+        reader.read_exact(&mut name)?;
+        let name = Bytes(&name).text(0, length as usize)?;
+        start += ENTRY as u64 + u64::from(length);
+        entries.push(Entry { name, start: 0, stored: bytes.u64(8)?, size: bytes.u64(0)?, ty: bytes.u32(32)?, codec });
+    }
+    let mut end = Some(start);
+    for entry in &mut entries {
+        entry.start = end.ok_or_else(|| NanoError::damaged("its list of grids has wrong sizes"))?;
+        end = entry.start.checked_add(entry.stored);
+    }
+    Ok((entries, end))
+}
+
+/// The bytes of a grid, decompressed.
+fn read_entry(reader: &mut (impl Read + Seek), entry: &Entry, file: u64) -> Result<Vec<u8>, NanoError> {
+    if ValueType::from_code(entry.ty).is_none() {
+        let ty = TYPES.get(entry.ty as usize).map_or_else(|| format!("{}", entry.ty), |name| (*name).to_owned());
+        return Err(NanoError::Values { name: entry.name.clone(), ty });
+    }
+    let available = file.saturating_sub(entry.start).min(entry.stored);
+    let most = match entry.codec {
+        Codec::None => available,
+        Codec::Zip => available.saturating_mul(MAX_DEFLATE),
+        Codec::Blosc => available.saturating_mul(MAX_LZ4),
+    };
+    if entry.size > most || entry.size < GRID as u64 || available < entry.stored {
+        let message = format!("its grid `{}` of {} bytes does not fit into the file", entry.name, entry.size);
+        return Err(NanoError::damaged(message));
+    }
+    reader.seek(SeekFrom::Start(entry.start))?;
+    let mut stored = reader.take(entry.stored);
+    match entry.codec {
+        Codec::None => {
+            let mut bytes = Vec::with_capacity(entry.size as usize);
+            stored.take(entry.size).read_to_end(&mut bytes)?;
+            whole(bytes, entry)
+        }
+        Codec::Zip => {
+            // Its compressed size comes first
+            stored.read_exact(&mut [0; 8])?;
+            let mut bytes = Vec::new();
+            let inflated = ZlibDecoder::new(stored).take(entry.size).read_to_end(&mut bytes);
+            inflated.map_err(|error| NanoError::damaged(format!("its zip data: {error}")))?;
+            whole(bytes, entry)
+        }
+        Codec::Blosc => blosc::read_chunks(&mut stored, entry.size).and_then(|bytes| whole(bytes, entry)),
+    }
+}
+
+fn whole(bytes: Vec<u8>, entry: &Entry) -> Result<Vec<u8>, NanoError> {
+    let (has, wanted) = (bytes.len() as u64, entry.size);
+    if has != wanted {
+        return Err(NanoError::damaged(format!("its grid `{}` has {has} bytes, and not {wanted}", entry.name)));
+    }
+    Ok(bytes)
+}

@@ -1,0 +1,289 @@
+//! NanoVDB files: sparse grids of numbers [Museth 2021].
+//!
+//! A file is a row of segments, each of which lists its grids and then holds them, plain or compressed; or it is grids
+//! alone. A grid is the memory of a tree: a root with blocks of 4096³ voxels, below it nodes of 32³ and of 16³ entries, and
+//! leaves of 8³ voxels. An entry that has no child is a *tile*: all of its voxels have one value. Whatever no block holds has
+//! the value of the background. Every number has its low byte first.
+//!
+//! The layout is that of all versions 32.x. Of a file, only the list and the grid asked for are read. Each offset is
+//! checked, no node is visited twice, and memory is taken for what the file can hold only.
+//!
+//! Reading order: `bytes`, `file`, `blosc`, `tree`.
+
+mod blosc;
+mod bytes;
+mod file;
+mod tree;
+
+use std::fmt;
+use std::fs::File;
+use std::io::{self, BufReader, Cursor};
+use std::path::{Path, PathBuf};
+
+/// Voxels of a leaf along each axis.
+pub const LEAF: i32 = 8;
+/// Voxels of a leaf.
+pub const LEAF_VOXELS: usize = 512;
+
+/// A sparse grid of numbers.
+#[derive(Clone, Debug, PartialEq)]
+pub struct NanoGrid {
+    /// Its name in the file.
+    pub name: String,
+    /// What its values mean.
+    pub class: GridClass,
+    /// How the file stores them.
+    pub values: ValueType,
+    /// The value of voxels that are in no leaf and no tile.
+    pub background: f32,
+    /// Tiles of another value.
+    pub tiles: Vec<Tile>,
+    /// First voxel of each leaf, a multiple of 8.
+    pub leaves: Vec<[i32; 3]>,
+    /// The 512 values of each leaf, z first.
+    pub leaf_values: Vec<f32>,
+    /// First and last active voxel along each axis, if the file says.
+    pub index_bounds: Option<[[i32; 3]; 2]>,
+    /// Box in the space of the file that holds active voxels, each from its index to the next, if the file says.
+    pub bounds: Option<[[f64; 3]; 2]>,
+    /// Columns of the matrix from indices to the space of the file, and what is added. The matrix is finite.
+    pub space_from_index: [[f64; 3]; 4],
+}
+
+impl NanoGrid {
+    /// The box in the space of the file that holds what is active: as the file says, or as far as leaves and tiles reach;
+    /// `None` if there are none.
+    pub fn space_bounds(&self) -> Option<[[f64; 3]; 2]> {
+        if self.bounds.is_some() {
+            return self.bounds;
+        }
+        let leaves = self.leaves.iter().map(|origin| (*origin, LEAF));
+        let cubes = leaves.chain(self.tiles.iter().map(|tile| (tile.origin, tile.size)));
+        let content = cubes.map(|(origin, size)| [origin, origin.map(|i| i.saturating_add(size - 1))]);
+        let [low, high] = self.index_bounds.or_else(|| content.reduce(joined))?;
+        let [x, y, z, translation] = self.space_from_index;
+        let corner = |i: usize| {
+            let index =
+                |axis: usize| if i >> axis & 1 == 0 { f64::from(low[axis]) } else { f64::from(high[axis]) + 1.0 };
+            let row = |r: usize| x[r] * index(0) + y[r] * index(1) + z[r] * index(2) + translation[r];
+            [[row(0), row(1), row(2)]; 2]
+        };
+        (0..8).map(corner).reduce(joined)
+    }
+
+    /// Replaces every value by what `f` makes of it, if it makes anything of it; says how many were replaced.
+    pub fn replace(&mut self, f: impl Fn(f32) -> Option<f32>) -> usize {
+        let tiles = self.tiles.iter_mut().map(|tile| &mut tile.value);
+        let all = self.leaf_values.iter_mut().chain(tiles).chain([&mut self.background]);
+        let mut count = 0;
+        for value in all {
+            if let Some(better) = f(*value) {
+                *value = better;
+                count += 1;
+            }
+        }
+        count
+    }
+}
+
+/// The box of two boxes.
+fn joined<T: Copy + PartialOrd>([a, b]: [[T; 3]; 2], [c, d]: [[T; 3]; 2]) -> [[T; 3]; 2] {
+    let least = |x: T, y: T| if y < x { y } else { x };
+    let greatest = |x: T, y: T| if y > x { y } else { x };
+    [[0, 1, 2].map(|i| least(a[i], c[i])), [0, 1, 2].map(|i| greatest(b[i], d[i]))]
+}
+
+/// A cube of voxels of one value.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Tile {
+    /// Its first voxel, a multiple of its size.
+    pub origin: [i32; 3],
+    /// Voxels along each axis: 8, 128 or 4096.
+    pub size: i32,
+    /// Their value.
+    pub value: f32,
+}
+
+/// How values are stored.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum ValueType {
+    /// 32 bits.
+    Float,
+    /// 64 bits.
+    Double,
+    /// Steps between two values of a leaf, of 4, 8 or 16 bits.
+    Fixed(u8),
+    /// Steps of 1 to 16 bits, as each leaf says.
+    FixedByLeaf,
+}
+
+/// Names of the types of the format, in its order.
+const TYPES: [&str; 27] = [
+    "unknown",
+    "float",
+    "double",
+    "int16",
+    "int32",
+    "int64",
+    "vec3f",
+    "vec3d",
+    "mask",
+    "half",
+    "uint32",
+    "bool",
+    "rgba8",
+    "fp4",
+    "fp8",
+    "fp16",
+    "fpn",
+    "vec4f",
+    "vec4d",
+    "index",
+    "onindex",
+    "indexmask",
+    "onindexmask",
+    "pointindex",
+    "vec3u8",
+    "vec3u16",
+    "uint8",
+];
+
+impl ValueType {
+    fn from_code(code: u32) -> Option<Self> {
+        Some(match *TYPES.get(code as usize)? {
+            "float" => ValueType::Float,
+            "double" => ValueType::Double,
+            "fp4" => ValueType::Fixed(4),
+            "fp8" => ValueType::Fixed(8),
+            "fp16" => ValueType::Fixed(16),
+            "fpn" => ValueType::FixedByLeaf,
+            _ => return None,
+        })
+    }
+}
+
+/// What the values of a grid mean.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct GridClass(pub u32);
+
+impl GridClass {
+    /// The file does not say.
+    pub const UNKNOWN: GridClass = GridClass(0);
+    /// A density, or something else that belongs to a volume.
+    pub const FOG_VOLUME: GridClass = GridClass(2);
+}
+
+impl fmt::Display for GridClass {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        let names = [
+            "a grid of unknown class",
+            "a level set",
+            "a fog volume",
+            "a staggered grid",
+            "an index of points",
+            "a set of points",
+            "a topology",
+            "a volume of voxels",
+            "an index",
+            "an index of tensors",
+        ];
+        f.write_str(names.get(self.0 as usize).unwrap_or(&names[0]))
+    }
+}
+
+/// Errors of NanoVDB files.
+#[derive(Debug, thiserror::Error)]
+pub enum NanoError {
+    /// It cannot be read.
+    #[error("{}{source}", if path.as_os_str().is_empty() { String::new() } else { format!("{}: ", path.display()) })]
+    Io {
+        /// The file; empty if bytes were given.
+        path: PathBuf,
+        /// The reason.
+        source: io::Error,
+    },
+    /// It is something else.
+    #[error("is not a NanoVDB file{0}")]
+    Format(&'static str),
+    /// Its version has another layout.
+    #[error("has version {major}.{minor} of NanoVDB, of which 32.x is read: convert it anew")]
+    Version {
+        /// Number of the layout.
+        major: u32,
+        /// Number within.
+        minor: u32,
+    },
+    /// It is compressed in a way that is not read.
+    #[error("is compressed by {0}, which is not read: convert it without, or with zip")]
+    Codec(String),
+    /// It has no grid of the name.
+    #[error("has no grid `{name}`: {}", if found.is_empty() { "it has no grids".to_owned() } else { format!("its grids are {}", found.join(", ")) })]
+    NoGrid {
+        /// The name.
+        name: String,
+        /// Names of those that there are.
+        found: Vec<String>,
+    },
+    /// The values of the grid are no numbers that are read.
+    #[error("its grid `{name}` has values of the type {ty}: float, double, fp4, fp8, fp16 and fpn are read")]
+    Values {
+        /// The grid.
+        name: String,
+        /// Their type.
+        ty: String,
+    },
+    /// It is damaged.
+    #[error("is damaged: {0}")]
+    Damaged(String),
+}
+
+impl NanoError {
+    fn damaged(message: impl Into<String>) -> Self {
+        NanoError::Damaged(message.into())
+    }
+
+    fn no_grid(name: &str, found: Vec<String>) -> Self {
+        NanoError::NoGrid { name: name.to_owned(), found }
+    }
+}
+
+impl From<io::Error> for NanoError {
+    fn from(source: io::Error) -> Self {
+        match source.kind() {
+            io::ErrorKind::UnexpectedEof => NanoError::damaged("it ends too early"),
+            _ => NanoError::Io { path: PathBuf::new(), source },
+        }
+    }
+}
+
+/// Reads the first grid of a name from a file.
+pub fn read_nanovdb(path: &Path, name: &str) -> Result<NanoGrid, NanoError> {
+    open(path).map_err(NanoError::from).and_then(|(file, size)| read_any(BufReader::new(file), size, name)).map_err(
+        |error| match error {
+            NanoError::Io { source, .. } => NanoError::Io { path: path.to_owned(), source },
+            other => other,
+        },
+    )
+}
+
+/// Reads the first grid of a name from the bytes of a file.
+pub fn parse_nanovdb(bytes: &[u8], name: &str) -> Result<NanoGrid, NanoError> {
+    read_any(Cursor::new(bytes), bytes.len() as u64, name)
+}
+
+fn open(path: &Path) -> io::Result<(File, u64)> {
+    // Opening a pipe would wait for a writer, and reading a folder gives an unclear message
+    let metadata = std::fs::metadata(path)?;
+    if !metadata.is_file() {
+        return Err(io::Error::new(io::ErrorKind::InvalidInput, "is not a regular file"));
+    }
+    Ok((File::open(path)?, metadata.len()))
+}
+
+fn read_any(mut reader: impl io::Read + io::Seek, size: u64, name: &str) -> Result<NanoGrid, NanoError> {
+    let (name, bytes) = file::grid_bytes(&mut reader, size, name)?;
+    tree::grid(name, &bytes)
+}
+
+#[cfg(test)]
+mod tests;

@@ -1,0 +1,168 @@
+//! `MakeNamedMedium` of the type `nanovdb`: what its parameters say, and the medium once its file has been read.
+
+use super::descriptions::VolumeDesc;
+use super::media::{asymmetry, glowing, not_negative};
+use super::state::Builder;
+use crate::import::cache::FileCache;
+use crate::import::volumes::{Volume, VolumeRequest, VolumeUse};
+use crate::media::{Field, Heterogeneous, Medium, Scalars, SparseSamples, UniformGrid};
+use lumiris_formats::diagnostic::Diagnostics;
+use lumiris_formats::nanovdb::{GridClass, NanoError};
+use lumiris_formats::pbrt::params::ParamSet;
+use lumiris_formats::source::Span;
+use lumiris_numbers::math::{Affine3A, Bounds3, Rgb, Vec3};
+use rayon::prelude::*;
+use std::path::Path;
+use std::sync::Arc;
+
+/// Requests of all media, each once, and what came of them.
+#[derive(Default)]
+struct Volumes {
+    requests: Vec<VolumeRequest>,
+    read: Vec<Result<Arc<Volume>, NanoError>>,
+}
+
+impl Volumes {
+    fn find(&self, path: &Path, grid: &str, usage: VolumeUse) -> Option<&Result<Arc<Volume>, NanoError>> {
+        let place = self.requests.iter().position(|r| r.path == path && r.grid == grid && r.usage == usage);
+        self.read.get(place?)
+    }
+}
+
+impl Builder<'_> {
+    /// What the parameters say; `None` after an error.
+    pub(super) fn nanovdb(&self, p: &ParamSet, placement: Affine3A, d: &mut Diagnostics) -> Option<VolumeDesc> {
+        let scale = not_negative(p, "scale", 1.0, d);
+        let le_scale = not_negative(p, "Lescale", 1.0, d);
+        let g = asymmetry(p, d);
+        let offset = p.float("temperatureoffset", d);
+        let offset = offset.or_else(|| p.float("temperaturecutoff", d)).unwrap_or(0.0);
+        let temperature_scale = p.float("temperaturescale", d).unwrap_or(1.0);
+        for (key, value) in [("temperatureoffset", offset), ("temperaturescale", temperature_scale)] {
+            if !value.is_finite() {
+                d.error(p.span_of(key), format!("{key} must be finite"));
+            }
+        }
+        let density = p.string("gridname", d).unwrap_or("density").to_owned();
+        let named = p.string("temperaturename", d).map(str::to_owned);
+        let span = named.is_some().then(|| p.span_of("temperaturename"));
+        let temperature = (named.unwrap_or_else(|| "temperature".to_owned()), span);
+        let coefficients = self.coefficients(p, scale, d);
+        let Some(name) = p.string("filename", d).filter(|name| !name.is_empty()) else {
+            d.error(p.span, "a nanovdb medium needs `string filename`");
+            return None;
+        };
+        let [sigma_a, sigma_s] = coefficients?;
+        Some(VolumeDesc {
+            path: self.folder.join(name),
+            span: p.span_of("filename"),
+            density: (density, p.span_of("gridname")),
+            temperature: (le_scale > 0.0).then_some(temperature),
+            offset,
+            scale: temperature_scale,
+            sigma_a,
+            sigma_s,
+            le_scale,
+            g,
+            placement,
+        })
+    }
+
+    /// Reads the files of all media that wait for one.
+    pub(super) fn load_volumes(&mut self, files: &FileCache, d: &mut Diagnostics) {
+        let mut volumes = Volumes::default();
+        for desc in self.media.iter().filter_map(|m| m.volume.as_ref()) {
+            let density = Some((&desc.density.0, VolumeUse::Density));
+            let temperature = desc.temperature.as_ref().map(|(name, _)| (name, VolumeUse::Temperature));
+            for (grid, usage) in density.into_iter().chain(temperature) {
+                let request = VolumeRequest { path: desc.path.clone(), grid: grid.clone(), usage };
+                if !volumes.requests.contains(&request) {
+                    volumes.requests.push(request);
+                }
+            }
+        }
+        volumes.read = volumes.requests.par_iter().map(|request| files.volume(request)).collect();
+        for medium in &mut self.media {
+            if let Some(desc) = &medium.volume {
+                medium.medium = medium_of(desc, &volumes, d);
+            }
+        }
+    }
+}
+
+/// The grid, if it could be read and is a volume; errors go to `d`.
+fn checked(
+    desc: &VolumeDesc,
+    (name, span): (&str, Span),
+    read: Option<&Result<Arc<Volume>, NanoError>>,
+    d: &mut Diagnostics,
+) -> Option<Arc<Volume>> {
+    match read? {
+        Ok(volume) if [GridClass::UNKNOWN, GridClass::FOG_VOLUME].contains(&volume.class) => {
+            if volume.replaced > 0 {
+                let what = "values that are negative or no numbers are taken for 0";
+                let message = format!("{}: grid `{name}`: {} {what}", desc.path.display(), volume.replaced);
+                d.warning_once(span, message);
+            }
+            Some(Arc::clone(volume))
+        }
+        Ok(volume) => {
+            let message = format!("{}: grid `{name}` is {}, and no fog volume", desc.path.display(), volume.class);
+            d.error(span, message);
+            None
+        }
+        Err(NanoError::Io { source, .. }) => {
+            d.missing_file(desc.path.clone(), source, Some(desc.span));
+            None
+        }
+        Err(error @ NanoError::NoGrid { .. }) => {
+            d.error(span, format!("{} {error}", desc.path.display()));
+            None
+        }
+        Err(error) => {
+            d.error(desc.span, format!("{} {error}", desc.path.display()));
+            None
+        }
+    }
+}
+
+/// The medium of a description; `None` after an error.
+fn medium_of(desc: &VolumeDesc, volumes: &Volumes, d: &mut Diagnostics) -> Option<Medium> {
+    let (name, span) = &desc.density;
+    let density = checked(desc, (name.as_str(), *span), volumes.find(&desc.path, name, VolumeUse::Density), d)?;
+    let mut hot = None;
+    if let Some((name, span)) = &desc.temperature {
+        let read = volumes.find(&desc.path, name, VolumeUse::Temperature);
+        match (read, span) {
+            // As in pbrt-v4, nothing glows then
+            (Some(Err(NanoError::NoGrid { .. })), None) => {}
+            (Some(Err(error @ NanoError::NoGrid { .. })), Some(span)) => {
+                d.warning_once(*span, format!("{} {error}: nothing glows", desc.path.display()));
+            }
+            _ => hot = Some(checked(desc, (name.as_str(), span.unwrap_or(desc.span)), read, d)?),
+        }
+    }
+
+    // The box of both
+    let boxes = [density.bounds, hot.as_ref().and_then(|hot| hot.bounds)].into_iter().flatten();
+    let bounds = boxes.map(|corners| corners.map(|c| Vec3::from_array(c.map(|x| x as f32))));
+    let joined = bounds.reduce(|[a, b], [c, e]| [a.min(c), b.max(e)]);
+    let [min, max] = joined.unwrap_or([Vec3::ZERO, Vec3::ONE]);
+    let bounds = Bounds3 { min, max };
+    let size = bounds.diagonal();
+    if !(size.min_element() > 0.0 && size.is_finite()) {
+        d.error(desc.span, format!("{}: its box from {min} to {max} has no volume", desc.path.display()));
+        return None;
+    }
+    let placed = |volume: &Volume| SparseSamples::new(Arc::clone(&volume.grid), &volume.space_from_index, &bounds);
+    let (Some(samples), Some(hot)) = (placed(&density), hot.map_or(Some(None), |hot| placed(&hot).map(Some))) else {
+        d.error(desc.span, format!("{}: the map of a grid has no inverse", desc.path.display()));
+        return None;
+    };
+    let temperature = hot.map(|samples| glowing(Scalars::Sparse(samples), desc.offset, desc.scale));
+    let le = if temperature.is_some() { Rgb::splat(desc.le_scale) } else { Rgb::BLACK };
+    let density = Scalars::Sparse(samples);
+    let grid = UniformGrid { sigma_a: desc.sigma_a, sigma_s: desc.sigma_s, density, le, le_scale: None, temperature };
+    let medium = Heterogeneous::new(Field::Uniform(grid), bounds, &desc.placement, desc.g);
+    Some(Medium::Heterogeneous(Arc::new(medium)))
+}

@@ -1,0 +1,59 @@
+//! Grids of NanoVDB files as trees.
+
+use crate::media::{Cube, SparseGrid};
+use lumiris_formats::nanovdb::{GridClass, NanoError, read_nanovdb};
+use lumiris_numbers::math::{DAffine3, DVec3};
+use std::path::{Path, PathBuf};
+use std::sync::Arc;
+
+/// What a grid is read for.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum VolumeUse {
+    /// Densities, none of which is negative.
+    Density,
+    /// Temperatures.
+    Temperature,
+}
+
+/// A grid that a scene asks for.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct VolumeRequest {
+    /// The file.
+    pub path: PathBuf,
+    /// Name of the grid.
+    pub grid: String,
+    /// What for.
+    pub usage: VolumeUse,
+}
+
+/// A grid that was read.
+#[derive(Debug)]
+pub struct Volume {
+    /// Its values.
+    pub grid: Arc<SparseGrid>,
+    /// What they mean.
+    pub class: GridClass,
+    /// From indices to the space of the file.
+    pub space_from_index: DAffine3,
+    /// The box of its active voxels in the space of the file; `None` if there are none.
+    pub bounds: Option<[[f64; 3]; 2]>,
+    /// How many values were taken for 0, since no such value can be.
+    pub replaced: usize,
+}
+
+/// Reads a grid.
+pub fn load_volume(path: &Path, grid: &str, usage: VolumeUse) -> Result<Volume, NanoError> {
+    let mut grid = read_nanovdb(path, grid)?;
+    let is_possible = |v: f32| v.is_finite() && (usage == VolumeUse::Temperature || v >= 0.0);
+    let replaced = grid.replace(|v| (!is_possible(v)).then_some(0.0));
+    let [x, y, z, translation] = grid.space_from_index.map(DVec3::from_array);
+    let cubes: Vec<Cube> =
+        grid.tiles.iter().map(|tile| Cube { origin: tile.origin, size: tile.size, value: tile.value }).collect();
+    Ok(Volume {
+        class: grid.class,
+        space_from_index: DAffine3::from_cols(x, y, z, translation),
+        bounds: grid.space_bounds(),
+        replaced,
+        grid: Arc::new(SparseGrid::new(grid.background, &cubes, &grid.leaves, grid.leaf_values)),
+    })
+}
