@@ -1,4 +1,4 @@
-//! Meshes and images that one scene after the other uses, such as the frames of an animation.
+//! Meshes, images and measured materials that one scene after the other uses, such as the frames of an animation.
 //!
 //! A file is the same as before if its name, its size and the time of its last change are. What a scene has not used is
 //! dropped when the next one has been loaded ([`FileCache::end_scene`]), so that memory holds what two scenes need at
@@ -8,6 +8,8 @@
 //! file ([`crate::imaging::tiles`]), and all others are in memory: of the limit, half or more is left for the tiles in use.
 
 use super::images::{ImageChannels, ImageEncoding, ImageRequest, RgbImage, load_map, load_rgb};
+use super::measured::{MeasuredError, load_tables};
+use crate::bsdfs::MeasuredTables;
 use crate::imaging::oiio::{ImageError, texture_bytes};
 use crate::imaging::tiles::TileStore;
 use crate::imaging::{Filter, MipMap, Wrap};
@@ -89,7 +91,7 @@ pub struct FileCounts {
     pub shared: u64,
 }
 
-/// Contents of meshes and images by file.
+/// Contents of meshes, images and measured materials by file.
 #[derive(Debug, Default)]
 pub struct FileCache {
     /// False if nothing is kept.
@@ -97,6 +99,7 @@ pub struct FileCache {
     meshes: Shelf<(), PlyMesh>,
     maps: Shelf<(ImageChannels, ImageEncoding, Wrap, Filter), MipMap>,
     images: Shelf<(), RgbImage>,
+    measured: Shelf<(), MeasuredTables>,
     read: AtomicU64,
     shared: AtomicU64,
     /// Most bytes of the textures of a scene.
@@ -186,11 +189,17 @@ impl FileCache {
         self.get(&self.images, path, (), || load_rgb(path))
     }
 
+    /// The tables of a measured material.
+    pub fn measured(&self, path: &Path) -> Result<Arc<MeasuredTables>, MeasuredError> {
+        self.get(&self.measured, path, (), || load_tables(path))
+    }
+
     /// Ends a scene: drops what it did not use, and says how many files it read and shared.
     pub fn end_scene(&self) -> FileCounts {
         self.meshes.drop_unused();
         self.maps.drop_unused();
         self.images.drop_unused();
+        self.measured.drop_unused();
         FileCounts { read: self.read.swap(0, Ordering::Relaxed), shared: self.shared.swap(0, Ordering::Relaxed) }
     }
 

@@ -1,5 +1,5 @@
-//! From scene files to scenes: the meaning of pbrt's directives ([`pbrt`]) and of glTF ([`gltf`]), and the images and
-//! meshes that they name ([`resources`], [`images`]), which the scenes of an animation share ([`cache`]). A
+//! From scene files to scenes: the meaning of pbrt's directives ([`pbrt`]) and of glTF ([`gltf`]), and the images,
+//! meshes and measured materials that they name ([`resources`], [`images`], [`measured`]), which the scenes of an animation share ([`cache`]). A
 //! [`fingerprint`] tells a scene from others.
 //!
 //! The files themselves are parsed by the crate `lumiris_formats`. User input never panics: problems are collected,
@@ -9,6 +9,7 @@ pub mod cache;
 pub mod fingerprint;
 pub mod gltf;
 pub mod images;
+pub mod measured;
 pub mod pbrt;
 pub mod resources;
 

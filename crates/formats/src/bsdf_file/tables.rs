@@ -120,7 +120,8 @@ fn table_size(field: &Field<'_>, families: &[usize]) -> Result<[usize; 2], Tenso
     {
         return Ok([*columns, *rows]);
     }
-    let expected: Vec<String> = families.iter().map(usize::to_string).chain(["2 or more".into(), "2 or more".into()]).collect();
+    let expected: Vec<String> =
+        families.iter().map(usize::to_string).chain(["2 or more".into(), "2 or more".into()]).collect();
     let (name, shape) = (&field.name, &field.shape);
     Err(field.wrong(format!("`{name}` has the shape {shape:?}, not [{}]", expected.join(", "))))
 }
@@ -193,7 +194,10 @@ mod tests {
     #[test]
     fn tables_have_their_sizes_and_colours_their_channels() {
         let bsdf = MeasuredBsdf::parse(&file(&parts(), &[1])).unwrap();
-        assert_eq!((bsdf.ndf_size, bsdf.sigma_size, bsdf.visible_size, bsdf.color_size), ([3, 2], [2, 3], [4, 4], [2, 2]));
+        assert_eq!(
+            (bsdf.ndf_size, bsdf.sigma_size, bsdf.visible_size, bsdf.color_size),
+            ([3, 2], [2, 3], [4, 4], [2, 2])
+        );
         assert_eq!((bsdf.color.len(), bsdf.luminance.len(), bsdf.visible.len()), (24, 24, 96));
         assert_eq!((bsdf.color[1], bsdf.color[5]), (Rgb::new(2.0, 6.0, 10.0), Rgb::new(14.0, 18.0, 22.0)));
         assert!(bsdf.is_relative && bsdf.description == "test");

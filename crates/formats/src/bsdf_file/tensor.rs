@@ -159,7 +159,9 @@ impl<'a> Reader<'a> {
         let name = String::from_utf8_lossy(self.take(length.into(), &what)?).into_owned();
         let dimensions = usize::from(u16::from_le_bytes(self.array(&what)?));
         if dimensions > MOST_DIMENSIONS {
-            return Err(self.wrong(format!("`{name}` has {dimensions} dimensions, but at most {MOST_DIMENSIONS} are read")));
+            return Err(
+                self.wrong(format!("`{name}` has {dimensions} dimensions, but at most {MOST_DIMENSIONS} are read"))
+            );
         }
         let [code] = self.array(&what)?;
         let Some(ty) = NumberType::from_code(code) else {
@@ -211,14 +213,16 @@ impl<'a> TensorFile<'a> {
     pub fn need(&self, name: &str) -> Result<&Field<'a>, TensorError> {
         let missing = || {
             let there: Vec<&str> = self.fields.iter().map(|field| field.name.as_str()).collect();
-            TensorError { byte: MAGIC.len() + 2, message: format!("there is no field `{name}`, but {}", there.join(", ")) }
+            TensorError {
+                byte: MAGIC.len() + 2,
+                message: format!("there is no field `{name}`, but {}", there.join(", ")),
+            }
         };
         self.field(name).ok_or_else(missing)
     }
 }
 
-/// Writes such a file, for tests and examples: names with dimensions and the numbers of f32, or bytes.
-#[doc(hidden)]
+/// The bytes of a file of these fields: names, shapes and numbers.
 pub fn write_tensor_file(fields: &[(&str, Vec<usize>, FieldData<'_>)]) -> Vec<u8> {
     let header: usize = 18 + fields.iter().map(|(name, shape, _)| 13 + name.len() + 8 * shape.len()).sum::<usize>();
     let (mut file, mut data) = (MAGIC.to_vec(), Vec::new());
@@ -241,7 +245,6 @@ pub fn write_tensor_file(fields: &[(&str, Vec<usize>, FieldData<'_>)]) -> Vec<u8
 }
 
 /// Numbers of [`write_tensor_file`].
-#[doc(hidden)]
 #[derive(Clone, Copy, Debug)]
 pub enum FieldData<'a> {
     /// Of type u8.
