@@ -89,6 +89,13 @@ impl MeasuredTables {
         let symmetry = Symmetry::of(&bsdf.phi)?;
         let sizes = || "its tables do not have the sizes that they should have".to_owned();
         let grid = ParameterGrid::new([bsdf.phi, bsdf.theta]).ok_or_else(sizes)?;
+        let of_all = |size: [usize; 2]| size[0] * size[1] * grid.tables();
+        let is_whole = bsdf.visible.len() == of_all(bsdf.visible_size)
+            && bsdf.luminance.len() == of_all(bsdf.color_size)
+            && bsdf.color.len() == of_all(bsdf.color_size);
+        if !is_whole {
+            return Err(sizes());
+        }
         // Noise of the measurement may be below 0
         let areas = |values: Vec<f32>| values.into_iter().map(|x| x.max(0.0)).collect();
         let ndf = BilinearTables::new(bsdf.ndf_size, areas(bsdf.ndf)).ok_or_else(sizes)?;

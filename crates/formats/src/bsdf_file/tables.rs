@@ -77,17 +77,17 @@ impl MeasuredBsdf {
         let file = TensorFile::parse(bytes)?;
         let (phi, theta) = (increasing(file.need("phi_i")?)?, increasing(file.need("theta_i")?)?);
         let families = [phi.len(), theta.len()];
-        let [ndf, sigma] = [file.need("ndf")?, file.need("sigma")?];
+        let [(ndf_size, ndf), (sigma_size, sigma)] = [facets(file.need("ndf")?)?, facets(file.need("sigma")?)?];
         let [visible, luminance] = [file.need("vndf")?, file.need("luminance")?];
         let color_size = table_size(luminance, &families)?;
         let description = file.field("description").map(Field::bytes).transpose()?.unwrap_or_default();
         let flag = file.need("jacobian")?;
         Ok(MeasuredBsdf {
             description: String::from_utf8_lossy(description).into_owned(),
-            ndf_size: table_size(ndf, &[])?,
-            ndf: ndf.floats()?,
-            sigma_size: table_size(sigma, &[])?,
-            sigma: sigma.floats()?,
+            ndf_size,
+            ndf,
+            sigma_size,
+            sigma,
             visible_size: table_size(visible, &families)?,
             visible: visible.floats()?,
             luminance: luminance.floats()?,
@@ -109,6 +109,14 @@ fn increasing(field: &Field<'_>) -> Result<Vec<f32>, TensorError> {
     match values.windows(2).find(|w| w[0] >= w[1]) {
         Some(w) => Err(field.wrong(format!("`{}` must increase, but {} follows {}", field.name, w[1], w[0]))),
         None => Ok(values),
+    }
+}
+
+/// The size of a single table and its numbers. One row is for all azimuths, and stands there twice.
+fn facets(field: &Field<'_>) -> Result<([usize; 2], Vec<f32>), TensorError> {
+    match field.shape[..] {
+        [1, columns] if columns >= 2 => Ok(([columns, 2], field.floats()?.repeat(2))),
+        _ => Ok((table_size(field, &[])?, field.floats()?)),
     }
 }
 
@@ -202,6 +210,11 @@ mod tests {
         assert_eq!((bsdf.color[1], bsdf.color[5]), (Rgb::new(2.0, 6.0, 10.0), Rgb::new(14.0, 18.0, 22.0)));
         assert!(bsdf.is_relative && bsdf.description == "test");
         assert!(!MeasuredBsdf::parse(&file(&parts(), &[0])).unwrap().is_relative);
+        // One row of D is for all azimuths
+        let mut parts = parts();
+        parts[2] = ("ndf", vec![1, 3], ramp(3));
+        let bsdf = MeasuredBsdf::parse(&file(&parts, &[1])).unwrap();
+        assert_eq!((bsdf.ndf_size, bsdf.ndf), ([3, 2], vec![1.0, 2.0, 3.0, 1.0, 2.0, 3.0]));
     }
 
     #[test]
@@ -230,7 +243,7 @@ mod tests {
     fn what_does_not_fit_is_an_error_that_says_so() {
         assert!(error_with(|p| p[0].2 = vec![1.0, 1.0]).contains("`phi_i` must increase, but 1 follows 1"));
         assert!(error_with(|p| p[1].1 = vec![3, 1]).contains("`theta_i` has the shape [3, 1], not that of a list"));
-        assert!(error_with(|p| p[2] = ("ndf", vec![1, 6], ramp(6))).contains("not [2 or more, 2 or more]"));
+        assert!(error_with(|p| p[2] = ("ndf", vec![6, 1], ramp(6))).contains("not [2 or more, 2 or more]"));
         assert!(error_with(|p| p[4].1 = vec![3, 2, 4, 4]).contains("[3, 2, 4, 4], not [2, 3, 2 or more, 2 or more]"));
         assert!(error_with(|p| p[6].1 = vec![2, 3, 2, 3, 2]).contains("`rgb` has the shape [2, 3, 2, 3, 2]"));
         assert!(error_with(|p| p[6].0 = "spectra").contains("there is no field `rgb`"));
