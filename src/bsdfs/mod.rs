@@ -3,7 +3,7 @@
 //! is scaled by 1/η².
 //!
 //! Reading order: [`lobe`], [`fresnel`], [`microfacet`], [`diffuse`], [`diffuse_transmission`], [`conductor`], [`dielectric`],
-//! [`thin_dielectric`], [`coat_table`], [`coated_diffuse`], [`layered`], `ggx_albedo`, [`sheen`], [`principled`], [`hair`]; [`phase`] in media; then what can only be evaluated: [`models`],
+//! [`thin_dielectric`], [`coat_table`], [`coated_diffuse`], [`layered`], `ggx_albedo`, [`sheen`], [`principled`], [`hair`], [`measured`]; [`phase`] in media; then what can only be evaluated: [`models`],
 //! [`default_lobes`], [`evaluated`], [`mod@resample`].
 
 pub mod coat_table;
@@ -19,6 +19,7 @@ mod ggx_albedo;
 pub mod hair;
 pub mod layered;
 pub mod lobe;
+pub mod measured;
 pub mod microfacet;
 pub mod models;
 pub mod phase;
@@ -40,6 +41,7 @@ pub use evaluated::Evaluated;
 pub use hair::Hair;
 pub use layered::{Base, Layered};
 pub use lobe::{BsdfSample, Lobe};
+pub use measured::{Measured, MeasuredTables};
 pub use microfacet::TrowbridgeReitz;
 pub use models::Model;
 pub use phase::Phase;
@@ -78,6 +80,8 @@ pub enum Bsdf<'a> {
     Principled(Principled),
     /// A fibre.
     Hair(Hair),
+    /// Reflection by tables of a measurement.
+    Measured(Measured<'a>),
     /// Reflection that can only be evaluated.
     Evaluated(Evaluated),
     /// Scattering in a medium: no surface, and no cosine.
@@ -126,6 +130,7 @@ impl<'a> Bsdf<'a> {
             Bsdf::Layered(b) => b.f(wo, wi),
             Bsdf::Principled(b) => b.f(wo, wi),
             Bsdf::Hair(b) => b.f(wo, wi),
+            Bsdf::Measured(b) => b.f(wo, wi),
             Bsdf::Evaluated(b) => b.f(wo, wi),
             Bsdf::Phase(b) => Rgb::splat(b.p(wo, wi)),
         };
@@ -149,6 +154,7 @@ impl<'a> Bsdf<'a> {
             Bsdf::Layered(b) => b.pdf(wo, wi),
             Bsdf::Principled(b) => b.pdf(wo, wi),
             Bsdf::Hair(b) => b.pdf(wo, wi),
+            Bsdf::Measured(b) => b.pdf(wo, wi),
             Bsdf::Evaluated(b) => b.pdf(wo, wi),
             Bsdf::Phase(b) => b.p(wo, wi),
         };
@@ -172,6 +178,7 @@ impl<'a> Bsdf<'a> {
             | Bsdf::Exit(_)
             | Bsdf::ThinDielectric(_)
             | Bsdf::Hair(_)
+            | Bsdf::Measured(_)
             | Bsdf::Phase(_) => 1.0,
         }
     }
@@ -186,6 +193,7 @@ impl<'a> Bsdf<'a> {
             | Bsdf::Exit(_)
             | Bsdf::ThinDielectric(_)
             | Bsdf::Hair(_)
+            | Bsdf::Measured(_)
             | Bsdf::Phase(_) => return pdf,
             Bsdf::DiffuseTransmission(_) if wo.z * wi.z > 0.0 => return pdf,
             Bsdf::DiffuseTransmission(_) => return 0.0,
@@ -203,6 +211,7 @@ impl<'a> Bsdf<'a> {
     #[inline]
     pub fn glossy_lobe(&self, wo: Vec3) -> Option<(f32, f32)> {
         let (distribution, share) = match self {
+            Bsdf::Measured(b) => return Some((b.alpha(), 1.0)),
             Bsdf::Conductor(b) => (b.distribution, 1.0),
             Bsdf::CoatedDiffuse(b) => (b.distribution(), b.first_lobe(wo)),
             Bsdf::Layered(b) => b.glossy_lobe(wo),
@@ -260,6 +269,27 @@ impl<'a> Bsdf<'a> {
             | Bsdf::Layered(_)
             | Bsdf::Principled(_)
             | Bsdf::Hair(_)
+            | Bsdf::Measured(_)
+            | Bsdf::Evaluated(_)
+            | Bsdf::Phase(_) => None,
+        }
+    }
+
+    /// The index of refraction of light that passes, where another takes its place for one wavelength.
+    #[inline]
+    pub fn eta_mut(&mut self) -> Option<&mut f32> {
+        match self {
+            Bsdf::Dielectric(b) => Some(&mut b.eta),
+            Bsdf::Principled(b) => b.eta_mut(),
+            Bsdf::Diffuse(_)
+            | Bsdf::DiffuseTransmission(_)
+            | Bsdf::Conductor(_)
+            | Bsdf::Exit(_)
+            | Bsdf::ThinDielectric(_)
+            | Bsdf::CoatedDiffuse(_)
+            | Bsdf::Layered(_)
+            | Bsdf::Hair(_)
+            | Bsdf::Measured(_)
             | Bsdf::Evaluated(_)
             | Bsdf::Phase(_) => None,
         }
@@ -276,9 +306,12 @@ impl<'a> Bsdf<'a> {
             | Bsdf::Hair(_)
             | Bsdf::Phase(_) => true,
             Bsdf::Principled(b) => b.transmission > 0.0,
-            Bsdf::Diffuse(_) | Bsdf::Conductor(_) | Bsdf::CoatedDiffuse(_) | Bsdf::Layered(_) | Bsdf::Evaluated(_) => {
-                false
-            }
+            Bsdf::Diffuse(_)
+            | Bsdf::Conductor(_)
+            | Bsdf::CoatedDiffuse(_)
+            | Bsdf::Layered(_)
+            | Bsdf::Measured(_)
+            | Bsdf::Evaluated(_) => false,
         }
     }
 
@@ -296,6 +329,7 @@ impl<'a> Bsdf<'a> {
             | Bsdf::Exit(_)
             | Bsdf::ThinDielectric(_)
             | Bsdf::Hair(_)
+            | Bsdf::Measured(_)
             | Bsdf::Phase(_) => 0.0,
         }
     }
@@ -325,6 +359,7 @@ impl<'a> Bsdf<'a> {
             Bsdf::Layered(b) => b.sample(wo, uc, u),
             Bsdf::Principled(b) => b.sample(wo, uc, u),
             Bsdf::Hair(b) => b.sample(wo, uc, u),
+            Bsdf::Measured(b) => b.sample(wo, u),
             Bsdf::Evaluated(b) => b.sample(wo, uc, u),
             Bsdf::Phase(b) => b.sample(wo, u),
         };
@@ -340,6 +375,7 @@ impl<'a> Bsdf<'a> {
             | Bsdf::CoatedDiffuse(_)
             | Bsdf::Principled(_)
             | Bsdf::Hair(_)
+            | Bsdf::Measured(_)
             | Bsdf::Phase(_)
             | Bsdf::Evaluated(_) => true,
             Bsdf::Conductor(b) => !b.distribution.is_smooth(),
@@ -357,6 +393,7 @@ impl<'a> Bsdf<'a> {
             | Bsdf::DiffuseTransmission(_)
             | Bsdf::Principled(_)
             | Bsdf::Hair(_)
+            | Bsdf::Measured(_)
             | Bsdf::Evaluated(_)
             | Bsdf::Phase(_) => false,
             Bsdf::Conductor(b) => b.distribution.is_smooth(),
@@ -382,6 +419,7 @@ impl<'a> Bsdf<'a> {
             | Bsdf::Layered(_)
             | Bsdf::Phase(_)
             | Bsdf::Hair(_)
+            | Bsdf::Measured(_)
             | Bsdf::Principled(_) => false,
         }
     }
@@ -403,6 +441,7 @@ impl<'a> Bsdf<'a> {
             | Bsdf::Layered(_)
             | Bsdf::Principled(_)
             | Bsdf::Hair(_)
+            | Bsdf::Measured(_)
             | Bsdf::Phase(_)
             | Bsdf::Evaluated(_) => None,
         }
@@ -426,6 +465,7 @@ impl<'a> Bsdf<'a> {
             | Bsdf::Layered(_)
             | Bsdf::Principled(_)
             | Bsdf::Hair(_)
+            | Bsdf::Measured(_)
             | Bsdf::Evaluated(_) => {
                 let [uc, u0, u1] = u();
                 self.sample(wo, uc, [u0, u1]).map_or(Rgb::BLACK, |s| s.f * (s.wi.z.abs() / s.pdf))

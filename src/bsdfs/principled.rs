@@ -127,6 +127,14 @@ fn upper(w: Vec3) -> Vec3 {
 }
 
 impl Principled {
+    /// The index of what is a solid that lets light in.
+    pub(super) fn eta_mut(&mut self) -> Option<&mut f32> {
+        match &mut self.interior {
+            Interior::Solid(eta) if self.transmission > 0.0 && self.metalness < 1.0 => Some(eta),
+            Interior::Solid(_) | Interior::Thin => None,
+        }
+    }
+
     /// The roughness that albedos are tabulated for.
     fn alpha(&self) -> f32 {
         (self.distribution.alpha_x * self.distribution.alpha_y).sqrt()

@@ -1,4 +1,4 @@
-//! Meshes, images and volumes that one scene after the other uses, such as the frames of an animation.
+//! Meshes, images, volumes and measured materials that one scene after the other uses, such as the frames of an animation.
 //!
 //! A file is the same as before if its name, its size and the time of its last change are. What a scene has not used is
 //! dropped when the next one has been loaded ([`FileCache::end_scene`]), so that memory holds what two scenes need at
@@ -8,7 +8,9 @@
 //! file ([`crate::imaging::tiles`]), and all others are in memory: of the limit, half or more is left for the tiles in use.
 
 use super::images::{ImageChannels, ImageEncoding, ImageRequest, RgbImage, load_map, load_rgb, load_tiled_map};
+use super::measured::{MeasuredError, load_tables};
 use super::volumes::{Volume, VolumeRequest, VolumeUse, load_volume};
+use crate::bsdfs::MeasuredTables;
 use crate::imaging::oiio::{ImageError, texture_bytes};
 use crate::imaging::tiles::TileStore;
 use crate::imaging::{Filter, MipMap, Wrap};
@@ -91,7 +93,7 @@ pub struct FileCounts {
     pub shared: u64,
 }
 
-/// Contents of meshes, images and volumes by file.
+/// Contents of meshes, images, volumes and measured materials by file.
 #[derive(Debug, Default)]
 pub struct FileCache {
     /// False if nothing is kept.
@@ -100,6 +102,7 @@ pub struct FileCache {
     maps: Shelf<(ImageChannels, ImageEncoding, Wrap, Filter), MipMap>,
     images: Shelf<(), RgbImage>,
     volumes: Shelf<(String, VolumeUse), Volume>,
+    measured: Shelf<(), MeasuredTables>,
     read: AtomicU64,
     shared: AtomicU64,
     /// Most bytes of the textures of a scene.
@@ -192,12 +195,18 @@ impl FileCache {
         self.get(&self.volumes, &request.path, how, || load_volume(&request.path, &request.grid, request.usage))
     }
 
+    /// The tables of a measured material.
+    pub fn measured(&self, path: &Path) -> Result<Arc<MeasuredTables>, MeasuredError> {
+        self.get(&self.measured, path, (), || load_tables(path))
+    }
+
     /// Ends a scene: drops what it did not use, and says how many files it read and shared.
     pub fn end_scene(&self) -> FileCounts {
         self.meshes.drop_unused();
         self.maps.drop_unused();
         self.images.drop_unused();
         self.volumes.drop_unused();
+        self.measured.drop_unused();
         FileCounts { read: self.read.swap(0, Ordering::Relaxed), shared: self.shared.swap(0, Ordering::Relaxed) }
     }
 

@@ -1,5 +1,6 @@
 //! From scene files to scenes: the meaning of pbrt's directives ([`pbrt`]) and of glTF ([`gltf`]), and the images,
-//! meshes and volumes that they name ([`resources`], [`images`], [`volumes`]), which the scenes of an animation share ([`cache`]). A
+//! meshes, volumes and measured materials that they name ([`resources`], [`images`], [`volumes`], [`measured`]), which the scenes of an
+//! animation share ([`cache`]). A
 //! [`fingerprint`] tells a scene from others.
 //!
 //! The files themselves are parsed by the crate `lumiris_formats`. User input never panics: problems are collected,
@@ -9,6 +10,7 @@ pub mod cache;
 pub mod fingerprint;
 pub mod gltf;
 pub mod images;
+pub mod measured;
 pub mod pbrt;
 pub mod resources;
 pub mod volumes;

@@ -6,7 +6,6 @@ use super::light_layers::LayerSums;
 use super::segment::{CameraSample, Carried, PathState, PathStats, Vertex, domain, emptied};
 use super::wavefront::Batch;
 use crate::accel::{Coherence, Hit, RayBatch};
-use crate::bsdfs::Bsdf;
 use crate::film::{Features, PixelSample};
 use crate::geometry::{Shape, SurfaceHit};
 use crate::lights::LightCtx;
@@ -207,11 +206,11 @@ impl VertexSearch {
             return;
         }
         let (mut path, mut bsdf, mut beta) = (*path, bsdf, beta);
-        if let Bsdf::Dielectric(interface) = &mut bsdf.bsdf
+        if let Some(eta) = bsdf.bsdf.eta_mut()
             && let Some(dispersion) = interaction.dispersion(at.job)
         {
             let (lambda, weight) = self.wavelength(at, &path);
-            (interface.eta, path.wavelength, beta) = (dispersion.eta(lambda), Some(lambda), beta * weight);
+            (*eta, path.wavelength, beta) = (dispersion.eta(lambda), Some(lambda), beta * weight);
         }
         let path = &path;
         let media = interaction.sides(at.job, path.medium);

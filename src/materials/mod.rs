@@ -22,7 +22,7 @@ pub use surface::SurfaceBsdf;
 
 use crate::bsdfs::{
     Base, Bsdf, CoatTable, CoatedDiffuse, Conductor, Dielectric, Diffuse, DiffuseTransmission, Evaluated, Layered,
-    ProposalDensity, ThinDielectric, TrowbridgeReitz,
+    Measured, MeasuredTables, ProposalDensity, ThinDielectric, TrowbridgeReitz,
 };
 use crate::geometry::SurfaceHit;
 use crate::textures::{FloatTextureId, ImageId, ImageTexture, Mapping2d, RgbTextureId, TextureContext, TextureSet};
@@ -141,6 +141,11 @@ pub enum Material {
     Principled(PrincipledMaterial),
     /// Fibres.
     Hair(HairMaterial),
+    /// What was measured.
+    Measured {
+        /// Index into the tables of the [`MaterialSet`].
+        tables: u32,
+    },
     /// Reflection that can only be evaluated.
     Evaluated(EvaluatedMaterial),
     /// One of two materials at each point, the second with probability `amount`.
@@ -203,6 +208,8 @@ pub struct MaterialSet {
     coats: Vec<CoatTable>,
     /// Per material, its table.
     coat_of: Vec<Option<u32>>,
+    /// Tables of measured materials.
+    measured: Vec<Arc<MeasuredTables>>,
 }
 
 /// What a coat's table depends on, by bits: η, thickness, and the alphas unless they are textured.
@@ -232,7 +239,13 @@ impl MaterialSet {
             None => CoatTable::for_all_roughness(key.eta, key.thickness),
         };
         let coats = keys.par_iter().map(tabulate).collect();
-        MaterialSet { entries, coats, coat_of }
+        MaterialSet { entries, coats, coat_of, measured: Vec::new() }
+    }
+
+    /// With the tables that measured materials refer to.
+    #[must_use]
+    pub fn with_measured(self, measured: Vec<Arc<MeasuredTables>>) -> Self {
+        MaterialSet { measured, ..self }
     }
 
     /// Maximum number of lobes of a BSDF of these materials, by [`Bsdf::first_lobe`], if `density` proposes directions
@@ -249,6 +262,7 @@ impl MaterialSet {
             | Material::Dielectric { .. }
             | Material::ThinDielectric { .. }
             | Material::Hair(_)
+            | Material::Measured { .. }
             | Material::Mix { .. }
             | Material::Interface => false,
         };
@@ -295,6 +309,7 @@ impl MaterialSet {
             | Material::CoatedConductor { .. }
             | Material::Principled(_)
             | Material::Hair(_)
+            | Material::Measured { .. }
             | Material::Evaluated(_) => false,
         }
     }
@@ -386,6 +401,7 @@ impl MaterialSet {
             }
             Material::Principled(material) => Bsdf::Principled(material.bsdf(t)),
             Material::Hair(material) => Bsdf::Hair(material.bsdf(t)),
+            Material::Measured { tables } => Bsdf::Measured(Measured { tables: &self.measured[tables as usize] }),
             Material::Evaluated(material) => {
                 Bsdf::Evaluated(Evaluated { model: material.model(t), density: ProposalDensity::default() })
             }

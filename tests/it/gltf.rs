@@ -417,13 +417,18 @@ fn animations_move_nodes_and_bend_meshes_at_a_time() {
 
 /// A box 2 wide, with glass that bends nothing and absorbs, seen from outside in white surroundings.
 fn glass(volume: &str) -> Vec<u8> {
+    glass_of(1.0, &format!(r#""KHR_materials_volume":{{{volume}}}"#))
+}
+
+/// A box 2 wide of glass of an index, with extensions, seen from outside in white surroundings.
+fn glass_of(ior: f32, extensions: &str) -> Vec<u8> {
     let json = format!(
         r#"{{"asset":{{"version":"2.0"}},"scenes":[{{"nodes":[0,1]}}],
         "nodes":[{{"mesh":0}},{{"translation":[0.1,0.2,9],"camera":0}}],
         "cameras":[{{"type":"orthographic","orthographic":{{"xmag":0.01,"ymag":0.01,"znear":0.1,"zfar":20}}}}],
         "materials":[{{"pbrMetallicRoughness":{{"metallicFactor":0,"roughnessFactor":0}},"extensions":{{
-            "KHR_materials_transmission":{{"transmissionFactor":1}},"KHR_materials_ior":{{"ior":1}},
-            "KHR_materials_volume":{{{volume}}}}}}}],
+            "KHR_materials_transmission":{{"transmissionFactor":1}},"KHR_materials_ior":{{"ior":{ior}}},
+            {extensions}}}}}],
         "meshes":[{{"primitives":[{{"attributes":{{"POSITION":0}},"indices":1,"material":0}}]}}],
         "accessors":[{{"bufferView":0,"componentType":5126,"count":8,"type":"VEC3"}},
                      {{"bufferView":1,"componentType":5121,"count":36,"type":"SCALAR"}}],
@@ -439,20 +444,51 @@ fn glass(volume: &str) -> Vec<u8> {
     container(&json, bytes)
 }
 
+fn load_glass(folder: &Path, bytes: &[u8]) -> Loaded {
+    let path = folder.join("a.glb");
+    std::fs::write(&path, bytes).unwrap();
+    let options = LoadOptions { resolution: Some([4, 4]), ..LoadOptions::default() };
+    load(&path, &options).map_err(|r| r.to_string()).unwrap()
+}
+
+/// The mean colour that is seen.
+fn color_of(folder: &Path, bytes: &[u8], spp: u32) -> [f32; 3] {
+    let job = load_glass(folder, bytes).job(AccelKind::Embree, None).unwrap();
+    let settings = RenderSettings { spp, ..RenderSettings::default() };
+    let data = channels(&render(&job, &settings, &AtomicBool::new(false), &|_| ()).unwrap().film, &[], None).data;
+    [0, 1, 2].map(|c| data.iter().skip(c).step_by(3).sum::<f32>() / 16.0)
+}
+
+#[test]
+fn dispersion_has_the_abbe_number_of_the_file_and_leaves_white_light_white() {
+    let folder = tempfile::tempdir().unwrap();
+    let with = |ior: f32, volume: &str| {
+        glass_of(ior, &format!(r#""KHR_materials_dispersion":{{"dispersion":4}},"KHR_materials_volume":{{{volume}}}"#))
+    };
+    let solid = r#""thicknessFactor":1"#;
+    let loaded = load_glass(folder.path(), &with(1.5, solid));
+    assert!(!loaded.warnings.to_string().contains("dispersion"), "{}", loaded.warnings);
+    let entry = &loaded.scene.materials.entries()[0];
+    let dispersion = entry.dispersion.as_ref().unwrap();
+    // The Abbe number is 5
+    let difference = dispersion.eta(486.13) - dispersion.eta(656.27);
+    assert!((dispersion.eta(587.56) - 1.5).abs() < 1e-4 && (difference - 0.1).abs() < 1e-3, "{difference}");
+    for (ior, volume) in [(1.5, ""), (1.0, solid), (0.0, solid)] {
+        assert!(!load_glass(folder.path(), &with(ior, volume)).scene.materials.has_dispersion(), "{ior} {volume}");
+    }
+    // Smooth glass without absorption loses nothing of even light, whatever its wavelength
+    let plain = color_of(folder.path(), &glass_of(1.5, &format!(r#""KHR_materials_volume":{{{solid}}}"#)), 1024);
+    let dispersed = color_of(folder.path(), &with(1.5, solid), 1024);
+    for (a, b) in plain.into_iter().zip(dispersed) {
+        assert!((a - b).abs() < 0.02, "{plain:?} {dispersed:?}");
+    }
+}
+
 #[test]
 fn light_in_a_volume_has_the_colour_of_its_distance() {
     let folder = tempfile::tempdir().unwrap();
-    let color = |volume: &str| {
-        let path = folder.path().join("a.glb");
-        std::fs::write(&path, glass(volume)).unwrap();
-        let options = LoadOptions { resolution: Some([4, 4]), ..LoadOptions::default() };
-        let job = load(&path, &options).map_err(|r| r.to_string()).unwrap().job(AccelKind::Embree, None).unwrap();
-        let settings = RenderSettings { spp: 64, ..RenderSettings::default() };
-        let data = channels(&render(&job, &settings, &AtomicBool::new(false), &|_| ()).unwrap().film, &[], None).data;
-        [0, 1, 2].map(|c| data.iter().skip(c).step_by(3).sum::<f32>() / 16.0)
-    };
     let near = |volume: &str, expected: [f32; 3]| {
-        let found = color(volume);
+        let found = color_of(folder.path(), &glass(volume), 64);
         let off = found.iter().zip(expected).map(|(a, b)| (a - b).abs()).fold(0.0, f32::max);
         assert!(off < 2e-3, "{volume}: {found:?}, not {expected:?}");
     };

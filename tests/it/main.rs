@@ -16,6 +16,7 @@ mod irradiance_cache;
 mod layering;
 mod lenses;
 mod light_groups;
+mod measured;
 mod media;
 mod motion;
 mod mutations;

@@ -76,3 +76,45 @@ fn temperatures_that_no_camera_has_are_errors() {
     }
     assert!(load("\"float whitebalance\" 0").unwrap().world.scene.film.balance.is_none());
 }
+
+#[test]
+fn sensors_have_the_exposure_and_the_white_balance_of_pbrt() {
+    let film_of = |parameters: &str| load(parameters).unwrap().world.scene.film;
+    // The shutter is open for 1 s
+    for (parameters, scale) in [
+        ("", 1.0),
+        ("\"float iso\" 400", 4.0),
+        ("\"string sensor\" \"cie1931\" \"float iso\" 50", 0.5),
+        ("\"string sensor\" \"nikon_d850\"", 1.0),
+        ("\"string sensor\" \"sony_ilce_9\" \"float iso\" 150", 1.5),
+    ] {
+        assert_eq!(film_of(parameters).scale, scale, "{parameters}");
+    }
+    let open = |seconds: &str, film: &str| {
+        let shutter = format!("\"float fov\" 50 \"float shutteropen\" 1 \"float shutterclose\" {seconds}");
+        let text = scene(film).replace("\"float fov\" 50", &shutter);
+        load_text(&text, "film.pbrt", Path::new("."), &LoadOptions::default(), &FileCache::default()).unwrap()
+    };
+    for sensor in ["cie1931", "canon_eos_5d_mkiv"] {
+        let film = format!("\"string sensor\" \"{sensor}\" \"float iso\" 200");
+        assert_eq!(open("1.25", &film).scene.film.scale, 0.5, "{sensor}");
+    }
+
+    // Daylight of 6500 K is white to cameras unless they are told
+    let balance = |parameters: &str| film_of(parameters).balance;
+    assert_eq!(balance("\"string sensor\" \"canon_eos_m\""), white_balance(6500.0));
+    assert_eq!(balance("\"string sensor\" \"canon_eos_m\" \"float whitebalance\" 4000"), white_balance(4000.0));
+    assert_eq!(balance("\"string sensor\" \"cie1931\""), None);
+    let warnings = open("2", "\"string sensor\" \"canon_eos_m\"").warnings.to_string();
+    assert!(warnings.contains("sensor `canon_eos_m` has the colours of cie1931"), "{warnings}");
+}
+
+#[test]
+fn sensors_that_pbrt_does_not_know_are_errors_with_the_names_of_those_that_it_knows() {
+    let error = load("\"string sensor\" \"canon_eos_100d_mkII\"").err().unwrap();
+    for part in ["unknown sensor `canon_eos_100d_mkII`", "film.pbrt:3:", "canon_eos_100d"] {
+        assert!(error.contains(part), "{error}");
+    }
+    let error = load("\"string sensor\" \"eye\"").err().unwrap();
+    assert!(error.contains("cie1931") && error.contains("sony_ilce_7rm3"), "{error}");
+}

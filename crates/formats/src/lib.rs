@@ -1,12 +1,13 @@
 //! File formats: pbrt-v4 text to checked directives, PLY files to meshes, NanoVDB files to sparse grids, glTF files to
-//! checked JSON and arrays, measured spectra to colours; and atomic writing of files.
+//! checked JSON and arrays, measured BSDFs to tables, measured spectra to colours; and atomic writing of files.
 //!
 //! User input never panics. Errors are collected with their positions in [`diagnostic::Diagnostics`]. The meaning of
 //! directives is not decided here: the renderer builds its scene from them.
 //!
 //! Reading order: [`source`], [`diagnostic`], [`number`], [`pbrt`], [`ply`], [`nanovdb`], [`gltf`], [`spectra`],
-//! [`upsampling`], [`color_space`], [`output`].
+//! [`upsampling`], [`bsdf_file`], [`color_space`], [`output`].
 
+pub mod bsdf_file;
 pub mod color_space;
 pub mod diagnostic;
 pub mod gltf;

@@ -255,6 +255,18 @@ pub fn unbounded_rgb(spectrum: &Spectrum) -> Rgb {
     rgb(under_d65(|l| f64::from(spectrum.at(l)))).map(|c| c.max(0.0))
 }
 
+/// What the samples of a reflectance at wavelengths (nm) in increasing order contribute to linear Rec.709 under D65, if it
+/// is linear between them and the same beyond them. The weights of each channel add up to 1.
+pub fn hat_weights(lambda: &[f32]) -> Vec<[f64; 3]> {
+    let hat = |i: usize, l: f32| {
+        let rise = |from: f32, to: f32| f64::from((l - from) / (to - from)).clamp(0.0, 1.0);
+        let before = i.checked_sub(1).map_or(1.0, |before| rise(lambda[before], lambda[i]));
+        let after = lambda.get(i + 1).map_or(1.0, |&after| rise(after, lambda[i]));
+        before.min(after)
+    };
+    (0..lambda.len()).map(|i| under_d65(|l| hat(i, l))).collect()
+}
+
 /// The colour of an emission scaled to Y = 1; black if it emits nothing visible.
 pub fn emission_rgb(spectrum: &Spectrum) -> Rgb {
     emission_of(|l| f64::from(spectrum.at(l)))

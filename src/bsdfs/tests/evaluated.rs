@@ -176,6 +176,7 @@ fn resampling_is_unbiased_for_every_bsdf() {
                 | Bsdf::Layered(_)
                 | Bsdf::Phase(_)
                 | Bsdf::Hair(_)
+                | Bsdf::Measured(_)
                 | Bsdf::Principled(_) => {
                     let mut sums = [Welford::new(); 3];
                     let mut s = pcg32([seed, 77, 3]);

@@ -3,6 +3,7 @@
 mod coats;
 mod densities;
 mod evaluated;
+mod measured;
 
 use super::hair::HairLobes;
 use super::principled::Interior;
@@ -70,6 +71,7 @@ pub(super) fn zoo<'a>(tables: &'a [CoatTable]) -> Vec<(String, Bsdf<'a>)> {
     zoo.extend(layers.iter().enumerate().map(|(i, &l)| (format!("layered {i}"), Bsdf::Layered(l))));
     zoo.extend(principled().map(|(name, b)| (format!("principled {name}"), Bsdf::Principled(b))));
     zoo.extend(hair().map(|(name, b)| (format!("hair {name}"), Bsdf::Hair(b))));
+    zoo.extend(measured::measured().map(|(name, b)| (format!("measured {name}"), Bsdf::Measured(b))));
     for density in ProposalDensity::iter() {
         let model = Model::CookTorrance(models::CookTorrance::new(RED, RED, 0.4, 0.5));
         zoo.push((format!("evaluated {density:?}"), Bsdf::Evaluated(Evaluated { model, density })));
@@ -203,6 +205,9 @@ fn scattering_is_reciprocal() {
         }
         if matches!(b, Bsdf::Hair(_)) {
             continue; // Its attenuation is a function of θo alone [Chiang et al. 2016].
+        }
+        if matches!(b, Bsdf::Measured(_)) {
+            continue; // Tables are interpolated in one of both directions.
         }
         for _ in 0..2000 {
             let (wo, wi) = (

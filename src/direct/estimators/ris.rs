@@ -198,6 +198,7 @@ fn allocation(point: &ShadingPoint<'_>) -> SampleAllocation {
         | Bsdf::Layered(_)
         | Bsdf::Phase(_)
         | Bsdf::Hair(_)
+        | Bsdf::Measured(_)
         | Bsdf::Principled(_) => (0.125, 0.5),
     };
     let by_bsdf = (m as f32 * of_proposals).max(n as f32 * of_samples);

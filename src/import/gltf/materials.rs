@@ -4,11 +4,13 @@ use super::Messages;
 use super::textures::{EmissionSource, Textures};
 use crate::import::images::{ImageChannels, ImageEncoding};
 use crate::materials::principled::{Anisotropy, AnisotropyDirection};
-use crate::materials::{Material, MaterialEntry, MaterialId, NormalMap, PrincipledMaterial};
+use crate::materials::{Dispersion, Material, MaterialEntry, MaterialId, NormalMap, PrincipledMaterial};
 use crate::media::Homogeneous;
 use crate::textures::{FloatTexture, FloatTextureId, ImageTexture, RgbTexture, RgbTextureId};
 use lumiris_formats::gltf::{Document, GltfError, Place};
+use lumiris_formats::spectra::Spectrum;
 use lumiris_numbers::math::Rgb;
+use std::sync::Arc;
 
 /// What a primitive needs to know of its material.
 #[derive(Clone)]
@@ -35,13 +37,15 @@ pub(super) struct Materials<'a> {
 /// An index of refraction so great that all light is reflected: colours of reflection are reflectances.
 const MIRROR_IOR: f32 = 1e6;
 
+/// Below, light passes as if there were no surface.
+const LEAST_IOR: f32 = 1.0011;
+
 /// The least component of a colour that light has after some distance in a volume: none at all would need infinite absorption.
 const LEAST_COLOR: f32 = 1e-6;
 
 /// Extensions of materials that are left out.
 const LEFT_OUT: &[(&str, &str)] = &[
     ("KHR_materials_iridescence", "thin films are not rendered"),
-    ("KHR_materials_dispersion", "dispersion is not rendered"),
     ("KHR_materials_diffuse_transmission", "diffuse transmission is not rendered"),
 ];
 
@@ -97,7 +101,8 @@ impl<'a> Materials<'a> {
         let normal_map = self.textures.image(&normal, ImageChannels::Color, ImageEncoding::Linear, messages)?;
         let normal_map = normal_map.map(|image| NormalMap { image, strength, is_along_v: true });
         let name = place.key("name").text().unwrap_or("default").to_owned();
-        self.entries.push(MaterialEntry { name, material, normal_map, displacement: None, dispersion: None });
+        let dispersion = if is_unlit { None } else { dispersion(place) };
+        self.entries.push(MaterialEntry { name, material, normal_map, displacement: None, dispersion });
         let emission = if is_unlit { color } else { emitted(place) };
         let emissive = if is_unlit { base.clone() } else { place.key("emissiveTexture") };
         let emission_image = if emission.is_black() { None } else { self.textures.emission(&emissive, messages)? };
@@ -139,11 +144,7 @@ impl<'a> Materials<'a> {
             roughness: number(&pbr, "roughnessFactor", 1.0, &packed, 1)?,
             anisotropy: Anisotropy::Gltf(factor(&anisotropy.key("anisotropyStrength"), 0.0)),
             direction: None,
-            // 0 stands for an infinite index
-            ior: match factor(&place.extension("KHR_materials_ior").key("ior"), 1.5) {
-                0.0 => MIRROR_IOR,
-                ior => ior.max(1.0),
-            },
+            ior: ior(place),
             transmission: number(
                 &transmission,
                 "transmissionFactor",
@@ -243,15 +244,49 @@ fn emitted(place: &Place<'_>) -> Rgb {
     (color * strength.unwrap_or(1.0)).map(|c| c.max(0.0))
 }
 
+/// `KHR_materials_ior`: 0 stands for an infinite index.
+fn ior(place: &Place<'_>) -> f32 {
+    match factor(&place.extension("KHR_materials_ior").key("ior"), 1.5) {
+        0.0 => MIRROR_IOR,
+        ior => ior.max(1.0),
+    }
+}
+
+/// `KHR_materials_dispersion` of a solid: 20 over the Abbe number (n − 1)/(n(F) − n(C)), where n is the index at the line d.
+/// Between the lines and beyond them the index goes with the inverse square of the wavelength, which is Cauchy's law.
+fn dispersion(place: &Place<'_>) -> Option<Arc<Dispersion>> {
+    // nm
+    let [d, f, c] = [587.56, 486.13, 656.27];
+    let strength = place.extension("KHR_materials_dispersion").key("dispersion").number().filter(|s| *s > 0.0)?;
+    let n = ior(place);
+    if !is_filled(place) || n <= LEAST_IOR || n >= MIRROR_IOR {
+        return None;
+    }
+    let inverse_square = |lambda: f32| 1.0 / (lambda * lambda);
+    let slope = (n - 1.0) * strength / 20.0 / (inverse_square(f) - inverse_square(c));
+    let index = |lambda: f32| (n + slope * (inverse_square(lambda) - inverse_square(d))).max(LEAST_IOR);
+    let pairs: Vec<f32> = (350..=800).step_by(5).flat_map(|l| [l as f32, index(l as f32)]).collect();
+    Dispersion::new(&Spectrum::from_pairs(&pairs).ok()?).map(Arc::new)
+}
+
+/// True for glass that is a solid.
+fn is_filled(place: &Place<'_>) -> bool {
+    let thickness = place.extension("KHR_materials_volume").key("thicknessFactor");
+    place.extension("KHR_materials_transmission").exists() && factor(&thickness, 0.0) > 0.0
+}
+
 /// `KHR_materials_volume`: white light has the colour after the distance, in the units of the world.
 fn absorption(place: &Place<'_>) -> Option<Homogeneous> {
     let volume = place.extension("KHR_materials_volume");
     let color = Rgb::from_array(volume.key("attenuationColor").numbers()?);
     let distance = volume.key("attenuationDistance").number().filter(|d| *d > 0.0 && d.is_finite())?;
-    let is_filled =
-        place.extension("KHR_materials_transmission").exists() && factor(&volume.key("thicknessFactor"), 0.0) > 0.0;
     let sigma_a = color.map(|c| -c.clamp(LEAST_COLOR, 1.0).ln() / distance);
-    (is_filled && !sigma_a.is_black()).then_some(Homogeneous { sigma_a, sigma_s: Rgb::BLACK, le: Rgb::BLACK, g: 0.0 })
+    (is_filled(place) && !sigma_a.is_black()).then_some(Homogeneous {
+        sigma_a,
+        sigma_s: Rgb::BLACK,
+        le: Rgb::BLACK,
+        g: 0.0,
+    })
 }
 
 /// Says what is rendered in another way than the extensions have it.

@@ -13,6 +13,29 @@ use lumiris_formats::pbrt::params::{ParamSet, ParamType, Values};
 use lumiris_formats::source::Span;
 use lumiris_numbers::math::Mat3;
 
+/// The sensor whose responses are colour matching functions, which is the default.
+const OBSERVER: &str = "cie1931";
+/// Sensors of cameras that pbrt-v4 has measured responses of.
+const CAMERAS: [&str; 17] = [
+    "canon_eos_100d",
+    "canon_eos_1dx_mkii",
+    "canon_eos_200d",
+    "canon_eos_200d_mkii",
+    "canon_eos_5d",
+    "canon_eos_5d_mkii",
+    "canon_eos_5d_mkiii",
+    "canon_eos_5d_mkiv",
+    "canon_eos_5ds",
+    "canon_eos_m",
+    "hasselblad_l1d_20c",
+    "nikon_d810",
+    "nikon_d850",
+    "sony_ilce_6400",
+    "sony_ilce_7m3",
+    "sony_ilce_7rm3",
+    "sony_ilce_9",
+];
+
 /// What a film's sensor says of its exposure.
 pub(super) struct Sensor {
     /// Factor by its ISO and scale.
@@ -145,15 +168,15 @@ fn film_kind(name: &Name, d: &mut Diagnostics) {
     }
 }
 
-/// The factor that a sensor's ISO gives, and its white balance; exposure time is the camera's.
+/// The factor that a sensor's ISO gives, and its white balance; exposure time is the camera's. Sensors of cameras are
+/// balanced for daylight of 6500 K unless another temperature is given. pbrt-v4 scales what they respond to that white to the
+/// luminance that it has, so that the factor is the same for all.
 fn exposure(p: &ParamSet, d: &mut Diagnostics) -> (f32, Option<Mat3>) {
-    if p.string("sensor", d).is_some_and(|s| s != "cie1931") {
-        d.warning_once(
-            p.span_of("sensor"),
-            "measured sensors are not rendered: cie1931 is used, with the white balance that is asked for",
-        );
-    }
-    let kelvin = p.float("whitebalance", d).unwrap_or(0.0);
+    let is_camera = sensor_is_of_camera(p, d);
+    let kelvin = match p.float("whitebalance", d).unwrap_or(0.0) {
+        0.0 if is_camera => 6500.0,
+        kelvin => kelvin,
+    };
     let balance = (kelvin != 0.0).then(|| white_balance(kelvin)).flatten();
     if kelvin != 0.0 && balance.is_none() {
         d.error(p.span_of("whitebalance"), format!("whitebalance is 0 or from 1000 to 25000 K, not {kelvin}"));
@@ -161,6 +184,21 @@ fn exposure(p: &ParamSet, d: &mut Diagnostics) -> (f32, Option<Mat3>) {
     let scale = p.float("scale", d).unwrap_or(1.0);
     (scale * positive(p, "iso", 100.0, d) / 100.0, balance)
 }
+
+/// True if the film has the sensor of a camera.
+fn sensor_is_of_camera(p: &ParamSet, d: &mut Diagnostics) -> bool {
+    let Some(name) = p.string("sensor", d).filter(|name| *name != OBSERVER) else { return false };
+    let name = name.to_owned();
+    if !CAMERAS.contains(&name.as_str()) {
+        let known: Vec<&str> = std::iter::once(OBSERVER).chain(CAMERAS).collect();
+        unknown(&name, p.span_of("sensor"), "sensor", &known, d);
+        return false;
+    }
+    let message = format!("sensor `{name}` has the colours of {OBSERVER}; its exposure and white balance are its own");
+    d.warning_once(p.span_of("sensor"), message);
+    true
+}
+
 fn read_pixel_bounds(p: &ParamSet, d: &mut Diagnostics) -> Option<PixelBounds> {
     let param = p.get("pixelbounds", &[ParamType::Integer], d)?;
     if let Values::Integers(v) = &param.values

@@ -3,6 +3,7 @@
 use super::descriptions::{AreaLightDesc, ShapeDesc};
 use super::instances::Objects;
 use super::lights::power_factor;
+use super::measured;
 use super::media::MediaInUse;
 use super::options::ParsedOptions;
 use super::shapes::{Made, ShapeError};
@@ -51,10 +52,12 @@ impl Builder<'_> {
         let environment_paths: Vec<PathBuf> = self.environments.iter().map(|e| e.path.clone()).collect();
         let emission_paths = self.emission_image_paths();
         // Images first: while one thread loads the library that reads them, the others have meshes and coats to work on
-        let ((images, emission_images, texture_images), (made, materials)) = rayon::join(
+        let ((images, emission_images, texture_images, measured), (made, materials)) = rayon::join(
             || {
                 let emission_images = load_emission_images(&emission_paths, files);
-                (load_images(&environment_paths, files), emission_images, self.resources.load(files, d))
+                let textures = self.resources.load(files, d);
+                let measured = measured::load(&self.measured_files, files);
+                (load_images(&environment_paths, files), emission_images, textures, measured)
             },
             || {
                 rayon::join(
@@ -64,6 +67,7 @@ impl Builder<'_> {
             },
         );
         self.textures.images = texture_images;
+        let materials = materials.with_measured(measured::check(measured, &self.measured_files, d));
         let made = if d.has_errors() { made } else { with_displaced(made, &mut shapes, files, &self.textures) };
         self.add_environments(images, d);
         let images = self.check_emission_images(emission_images, &shapes, d);

@@ -31,6 +31,7 @@ const KINDS: &[&str] = &[
     "interface",
     "principled",
     "hair",
+    "measured",
     "evaluated",
 ];
 
@@ -152,6 +153,7 @@ impl Builder<'_> {
             "subsurface" => self.subsurface(place, p, d),
             "principled" => self.principled(p, d),
             "hair" => self.hair(p, d),
+            "measured" => self.measured(place, p, d),
             "evaluated" => self.evaluated(place, p, d),
             _ => self.other_material(kind, place, p, d),
         }
@@ -220,7 +222,7 @@ impl Builder<'_> {
     fn other_material(&mut self, kind: &str, place: &Name, p: &ParamSet, d: &mut Diagnostics) -> Material {
         match kind {
             "matte" | "plastic" | "substrate" | "uber" | "metal" | "mirror" | "glass" | "translucent" => {}
-            "measured" | "kdsubsurface" | "disney" | "fourier" => {
+            "kdsubsurface" | "disney" | "fourier" => {
                 d.warning_once(place.span, format!("material `{kind}` is not rendered yet: it is diffuse"));
                 p.ignore_all();
                 return Material::Diffuse { reflectance: self.textures.add_rgb(RgbTexture::Constant(Rgb::splat(0.5))) };

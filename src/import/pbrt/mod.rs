@@ -2,7 +2,7 @@
 //!
 //! Reading order: [`descriptions`] (what a file asks for), [`state`] (the scene while its file is read), [`checks`];
 //! a file for each kind of directive: [`transform`], [`options`], [`settings`], [`film`], [`spectrum`], [`textures`],
-//! [`materials`], `hair`, [`lights`], `image_lights`, [`media`] with `media_presets` and `volumes`, `curves`, [`shapes`]; [`directives`] (the state machine over `lumiris_formats::pbrt`'s directives);
+//! [`materials`], `hair`, `measured`, [`lights`], `image_lights`, [`media`] with `media_presets` and `volumes`, `curves`, [`shapes`]; [`directives`] (the state machine over `lumiris_formats::pbrt`'s directives);
 //! and [`finish`] (reads files and assembles the scene).
 
 pub mod checks;
@@ -17,6 +17,7 @@ mod instances;
 mod lenses;
 pub mod lights;
 pub mod materials;
+mod measured;
 pub mod media;
 mod media_presets;
 pub mod options;

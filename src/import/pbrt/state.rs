@@ -121,6 +121,8 @@ pub struct Builder<'a> {
     pub instances: Vec<InstanceDesc>,
     /// Images to be read.
     pub resources: Resources,
+    /// Files of measured materials that wait to be read.
+    pub(super) measured_files: Vec<(PathBuf, Span)>,
     /// Files of spectra that were read.
     pub(super) spectrum_files: RefCell<Vec<PathBuf>>,
 }
@@ -164,17 +166,19 @@ impl<'a> Builder<'a> {
             current_object: None,
             instances: Vec::new(),
             resources: Resources::default(),
+            measured_files: Vec::new(),
             spectrum_files: RefCell::default(),
         }
     }
 
-    /// The files that the text names: spectra, meshes, volumes and images.
+    /// The files that the text names: spectra, measured materials, meshes, volumes and images.
     pub fn files(&self) -> Vec<PathBuf> {
         let mesh = |shape: &ShapeDesc| match &shape.source {
             ShapeSource::Ply(path) => Some(path.clone()),
             _ => None,
         };
         let mut files = self.spectrum_files.borrow().clone();
+        files.extend(self.measured_files.iter().map(|(path, _)| path.clone()));
         files.extend(self.shapes.iter().filter_map(mesh));
         files.extend(self.media.iter().filter_map(|m| Some(m.volume.as_ref()?.path.clone())));
         files.extend(self.environments.iter().map(|e| e.path.clone()));

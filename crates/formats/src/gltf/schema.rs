@@ -132,6 +132,7 @@ const RULES: &[(&str, Rule)] = &[
     ("materials[].extensions.KHR_materials_anisotropy.anisotropyRotation", Number),
     ("materials[].extensions.KHR_materials_clearcoat.clearcoatFactor", Number),
     ("materials[].extensions.KHR_materials_clearcoat.clearcoatRoughnessFactor", Number),
+    ("materials[].extensions.KHR_materials_dispersion.dispersion", Number),
     ("materials[].extensions.KHR_materials_emissive_strength.emissiveStrength", Number),
     ("materials[].extensions.KHR_materials_ior.ior", Number),
     ("materials[].extensions.KHR_materials_pbrSpecularGlossiness.diffuseFactor", Numbers(4)),

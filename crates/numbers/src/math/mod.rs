@@ -5,10 +5,11 @@
 //! `to_from`; colour is linear Rec.709; angles are radians; f32 for light.
 //!
 //! Reading order: [`rgb`], [`frame`], [`transform`], [`ray`], [`bounds`], [`warp`], [`sphere_map`], [`octahedral`],
-//! [`cumulative`], [`distribution`], [`alias`], [`hash`], [`noise`],
+//! [`cumulative`], [`distribution`], [`bilinear`], [`alias`], [`hash`], [`noise`],
 //! [`number`].
 
 pub mod alias;
+pub mod bilinear;
 pub mod bounds;
 pub mod cumulative;
 pub mod distribution;
@@ -24,6 +25,7 @@ pub mod transform;
 pub mod warp;
 
 pub use alias::{AliasTable, DiscreteSample};
+pub use bilinear::{BilinearTables, Blend, ParameterGrid, PiecewiseBilinear2D};
 pub use bounds::Bounds3;
 pub use distribution::{PiecewiseConstant1D, PiecewiseConstant2D, Sample1D, Sample2D};
 pub use frame::Frame;

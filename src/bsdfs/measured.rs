@@ -1,0 +1,249 @@
+//! Measured reflection in the adaptive parameterisation of [Dupuy and Jakob 2018], on both sides of the surface.
+//!
+//! Light goes to wo as if from facets: wi is wo mirrored at a normal m. Directions are points of the unit square, by
+//! (√(2θ/π), (φ + π)/2π), for isotropic surfaces with the φ of m from that of wo. The table of visible normals is a density
+//! over this square for each of some wo; sampling it is the map R of random numbers u to m, and
+//!
+//! f cos θi = s(u) D(m)/(4 σ(wo)), u = R⁻¹(m),
+//!
+//! where s is the table of colours, D the one of normals and σ that of projected areas: s is what samples of R weigh, and
+//! changes little with u. Samples draw u by the luminance of s. With p(u) and p(m) the densities over the square, that of wi
+//! per steradian is p(u) p(m)/(2π² √(2θm/π) sin θm · 4 (wo·m)).
+
+use super::fresnel::reflect;
+use super::{BsdfSample, Lobe, to_upper};
+use lumiris_formats::bsdf_file::MeasuredBsdf;
+use lumiris_numbers::math::{BilinearTables, Blend, ParameterGrid, PiecewiseBilinear2D, Rgb, Vec2, Vec3};
+use std::f32::consts::{FRAC_PI_2, PI, TAU};
+
+/// How far the azimuths of the tables may be from a whole, a half or a quarter turn, in turns.
+const AZIMUTH_TOLERANCE: f32 = 0.01;
+
+/// What the azimuth of wo means to the surface.
+#[derive(Clone, Copy, Debug, PartialEq)]
+enum Symmetry {
+    /// Nothing.
+    Isotropic,
+    /// All azimuths have tables.
+    None,
+    /// Half a turn about n changes nothing: tables are for the side of this direction.
+    HalfTurn(Vec2),
+    /// Reflection at both axes changes nothing: tables are for the quadrant of this direction.
+    Quadrants(Vec2),
+}
+
+impl Symmetry {
+    /// By the azimuths of tables (radians).
+    fn of(phi: &[f32]) -> Result<Self, String> {
+        let (&[first, .., last], 3..) = (phi, phi.len()) else { return Ok(Symmetry::Isotropic) };
+        let middle = Vec2::from_angle(0.5 * (first + last));
+        let covers = |turns: f32| ((last - first) / TAU - turns).abs() < AZIMUTH_TOLERANCE;
+        if covers(1.0) {
+            return Ok(Symmetry::None);
+        } else if covers(0.5) {
+            return Ok(Symmetry::HalfTurn(middle));
+        } else if covers(0.25) && middle.abs().min_element() > 0.6 {
+            return Ok(Symmetry::Quadrants(middle));
+        }
+        Err(format!(
+            "the azimuths of its tables go from {first} to {last} rad, not over a whole, a half or a quarter turn"
+        ))
+    }
+
+    /// Factors of x and y that bring a direction to where tables are.
+    fn signs(self, w: Vec3) -> Vec2 {
+        let sign = |product: f32| if product < 0.0 { -1.0 } else { 1.0 };
+        match self {
+            Symmetry::Isotropic | Symmetry::None => Vec2::ONE,
+            Symmetry::HalfTurn(middle) => Vec2::splat(sign(middle.dot(w.truncate()))),
+            Symmetry::Quadrants(middle) => Vec2::new(sign(middle.x * w.x), sign(middle.y * w.y)),
+        }
+    }
+}
+
+/// D and σ, by which colours are given.
+#[derive(Clone, Debug)]
+struct Facets {
+    ndf: BilinearTables<f32>,
+    sigma: BilinearTables<f32>,
+}
+
+/// The tables of a measured surface.
+#[derive(Clone, Debug)]
+pub struct MeasuredTables {
+    /// Azimuth and polar angle of wo.
+    grid: ParameterGrid,
+    symmetry: Symmetry,
+    /// `None` if colours are f cos θi themselves.
+    facets: Option<Facets>,
+    visible: PiecewiseBilinear2D,
+    luminance: PiecewiseBilinear2D,
+    color: BilinearTables<Rgb>,
+    /// tan θ of the cone about n that has half of the facets.
+    alpha: f32,
+}
+
+impl MeasuredTables {
+    /// From what a file holds; `Err` says what does not fit.
+    pub fn new(bsdf: MeasuredBsdf) -> Result<Self, String> {
+        let symmetry = Symmetry::of(&bsdf.phi)?;
+        let sizes = || "its tables do not have the sizes that they should have".to_owned();
+        let grid = ParameterGrid::new([bsdf.phi, bsdf.theta]).ok_or_else(sizes)?;
+        let of_all = |size: [usize; 2]| size[0] * size[1] * grid.tables();
+        let is_whole = bsdf.visible.len() == of_all(bsdf.visible_size)
+            && bsdf.luminance.len() == of_all(bsdf.color_size)
+            && bsdf.color.len() == of_all(bsdf.color_size);
+        if !is_whole {
+            return Err(sizes());
+        }
+        // Noise of the measurement may be below 0
+        let areas = |values: Vec<f32>| values.into_iter().map(|x| x.max(0.0)).collect();
+        let ndf = BilinearTables::new(bsdf.ndf_size, areas(bsdf.ndf)).ok_or_else(sizes)?;
+        let sigma = BilinearTables::new(bsdf.sigma_size, areas(bsdf.sigma)).ok_or_else(sizes)?;
+        Ok(MeasuredTables {
+            alpha: median_slope(&ndf),
+            facets: bsdf.is_relative.then_some(Facets { ndf, sigma }),
+            visible: PiecewiseBilinear2D::new(bsdf.visible_size, bsdf.visible).ok_or_else(sizes)?,
+            luminance: PiecewiseBilinear2D::new(bsdf.color_size, bsdf.luminance).ok_or_else(sizes)?,
+            color: BilinearTables::new(bsdf.color_size, bsdf.color).ok_or_else(sizes)?,
+            grid,
+            symmetry,
+        })
+    }
+}
+
+/// tan θ of the cone about n that has half of ∫ D cos θ: α, were D that of GGX.
+fn median_slope(ndf: &BilinearTables<f32>) -> f32 {
+    const POLAR: usize = 256;
+    const AZIMUTH: usize = 32;
+    let ring = |i: usize| {
+        let u = (i as f32 + 0.5) / POLAR as f32;
+        let around = (0..AZIMUTH).map(|j| ndf.at(&Blend::only(0), Vec2::new(u, (j as f32 + 0.5) / AZIMUTH as f32)));
+        // dθ is π u du
+        let theta = polar_of(u);
+        around.sum::<f32>().max(0.0) * u * theta.sin() * theta.cos()
+    };
+    let rings: Vec<f32> = (0..POLAR).map(ring).collect();
+    let half = 0.5 * rings.iter().sum::<f32>();
+    let mut sum = 0.0;
+    let inside = rings.iter().take_while(|&&r| {
+        sum += r;
+        sum < half
+    });
+    let alpha = polar_of(inside.count() as f32 / POLAR as f32).tan();
+    if alpha > 0.0 { alpha.min(1.0) } else { 1.0 }
+}
+
+/// θ of a coordinate of the square.
+fn polar_of(x: f32) -> f32 {
+    x * x * FRAC_PI_2
+}
+
+/// The polar angle of a direction, which keeps its digits near n.
+fn theta_of(w: Vec3) -> f32 {
+    w.truncate().length().atan2(w.z)
+}
+
+/// The point of the square for a polar angle and an azimuth.
+fn square(theta: f32, phi: f32) -> Vec2 {
+    let turns = phi / TAU + 0.5;
+    Vec2::new((theta / FRAC_PI_2).max(0.0).sqrt(), turns - turns.floor())
+}
+
+/// Measured reflection.
+#[derive(Clone, Copy, Debug)]
+pub struct Measured<'a> {
+    /// What was measured.
+    pub tables: &'a MeasuredTables,
+}
+
+/// What follows from wo, which is in the upper hemisphere and where tables are.
+struct Seen {
+    wo: Vec3,
+    blend: Blend,
+    /// What is added to azimuths within the square.
+    turned: f32,
+    /// Its place in the square.
+    place: Vec2,
+}
+
+impl Measured<'_> {
+    fn seen(&self, wo: Vec3) -> Seen {
+        let (theta, phi) = (theta_of(wo), wo.y.atan2(wo.x));
+        let turned = if self.tables.symmetry == Symmetry::Isotropic { phi } else { 0.0 };
+        Seen { wo, blend: self.tables.grid.at([phi, theta]), turned, place: square(theta, phi) }
+    }
+
+    /// Both directions where tables are; `None` if they are on different sides.
+    fn folded(&self, wo: Vec3, wi: Vec3) -> Option<(Vec3, Vec3)> {
+        let (wo, wi) = to_upper(wo, wi)?;
+        let signs = self.tables.symmetry.signs(wo).extend(1.0);
+        Some((wo * signs, wi * signs))
+    }
+
+    /// f cos θi (1/sr) at a normal whose place in the square is `m`, and whose random number is `u`.
+    fn f_cos(&self, seen: &Seen, m: Vec2, u: Vec2) -> Rgb {
+        let color = self.tables.color.at(&seen.blend, u);
+        let relative = |facets: &Facets| {
+            let all = Blend::only(0);
+            facets.ndf.at(&all, m) / (4.0 * facets.sigma.at(&all, seen.place))
+        };
+        color * self.tables.facets.as_ref().map_or(1.0, relative)
+    }
+
+    /// Value without cosine (1/sr).
+    pub fn f(&self, wo: Vec3, wi: Vec3) -> Rgb {
+        let Some((wo, wi)) = self.folded(wo, wi) else { return Rgb::BLACK };
+        let Some(m) = (wo + wi).try_normalize() else { return Rgb::BLACK };
+        let seen = self.seen(wo);
+        let place = square(theta_of(m), m.y.atan2(m.x) - seen.turned);
+        let u = self.tables.visible.invert(&seen.blend, place);
+        self.f_cos(&seen, place, u) / wi.z
+    }
+
+    /// Density of [`Self::sample`] per steradian.
+    pub fn pdf(&self, wo: Vec3, wi: Vec3) -> f32 {
+        let Some((wo, wi)) = self.folded(wo, wi) else { return 0.0 };
+        let Some(m) = (wo + wi).try_normalize() else { return 0.0 };
+        let seen = self.seen(wo);
+        let place = square(theta_of(m), m.y.atan2(m.x) - seen.turned);
+        let u = self.tables.visible.invert(&seen.blend, place);
+        let density = self.tables.luminance.pdf(&seen.blend, u) * self.tables.visible.pdf(&seen.blend, place);
+        density / steradians(place.x, m, wo)
+    }
+
+    /// The reflection by a visible normal, by the luminance that there is of it.
+    pub fn sample(&self, wo: Vec3, u: [f32; 2]) -> Option<BsdfSample> {
+        let side = Vec3::splat(wo.z.signum());
+        let signs = self.tables.symmetry.signs(wo * side).extend(1.0);
+        let seen = self.seen(wo * side * signs);
+
+        // Choose a normal
+        let number = self.tables.luminance.sample(&seen.blend, Vec2::from(u));
+        let normal = self.tables.visible.sample(&seen.blend, number.p);
+        let (sin, cos) = polar_of(normal.p.x).sin_cos();
+        let phi = (2.0 * normal.p.y - 1.0) * PI + seen.turned;
+        let m = Vec3::new(sin * phi.cos(), sin * phi.sin(), cos);
+
+        // Reflect
+        let wi = reflect(seen.wo, m);
+        if seen.wo.dot(m) <= 0.0 || wi.z <= 0.0 {
+            return None;
+        }
+        let f = self.f_cos(&seen, normal.p, number.p) / wi.z;
+        let pdf = number.pdf * normal.pdf / steradians(normal.p.x, m, seen.wo);
+        Some(BsdfSample { f, wi: wi * signs * side, pdf, lobe: Lobe::GLOSSY | Lobe::REFLECTION, eta: 1.0 })
+    }
+
+    /// How wide the distribution of normals is: the α of a GGX whose median slope is that of the facets.
+    pub fn alpha(&self) -> f32 {
+        self.tables.alpha
+    }
+}
+
+/// Steradians of wi per area of the square of m, whose first coordinate is `x`. At n itself, where they are 0, a number
+/// that keeps densities finite.
+fn steradians(x: f32, m: Vec3, wo: Vec3) -> f32 {
+    let normals = 2.0 * PI * PI * x * m.truncate().length();
+    normals.max(1e-12) * 4.0 * wo.dot(m)
+}

@@ -1,0 +1,22 @@
+//! Files of measured materials.
+
+use crate::bsdfs::MeasuredTables;
+use lumiris_formats::bsdf_file::{BsdfFileError, read_bsdf};
+use std::path::Path;
+
+/// Why there are no tables.
+#[derive(Debug, thiserror::Error)]
+pub enum MeasuredError {
+    /// The file cannot be read.
+    #[error(transparent)]
+    File(#[from] BsdfFileError),
+    /// What it holds does not fit together.
+    #[error("{0}")]
+    Tables(String),
+}
+
+/// The tables of a file.
+pub fn load_tables(path: &Path) -> Result<MeasuredTables, MeasuredError> {
+    MeasuredTables::new(read_bsdf(path)?)
+        .map_err(|reason| MeasuredError::Tables(format!("{}: {reason}", path.display())))
+}

@@ -1,0 +1,57 @@
+//! `Material "measured"`.
+
+use super::state::Builder;
+use crate::bsdfs::MeasuredTables;
+use crate::import::cache::FileCache;
+use crate::import::measured::MeasuredError;
+use crate::materials::Material;
+use lumiris_formats::bsdf_file::BsdfFileError;
+use lumiris_formats::diagnostic::Diagnostics;
+use lumiris_formats::pbrt::directive::Name;
+use lumiris_formats::pbrt::params::ParamSet;
+use lumiris_formats::source::Span;
+use rayon::prelude::*;
+use std::path::PathBuf;
+use std::sync::Arc;
+
+impl Builder<'_> {
+    /// `string filename`, of which each is read once, with the meshes.
+    pub(super) fn measured(&mut self, place: &Name, p: &ParamSet, d: &mut Diagnostics) -> Material {
+        let Some(name) = p.string("filename", d) else {
+            d.error(place.span, "material `measured` needs a `string filename`")
+                .help("a file `.bsdf` of the RGL material database, or of the same form");
+            return Material::Interface;
+        };
+        let (path, span) = (self.folder.join(name), p.span_of("filename"));
+        let known = self.measured_files.iter().position(|(file, _)| *file == path);
+        let tables = known.unwrap_or_else(|| {
+            self.measured_files.push((path, span));
+            self.measured_files.len() - 1
+        });
+        Material::Measured { tables: tables as u32 }
+    }
+}
+
+/// The content of a file, or what is wrong with it.
+pub(super) type Loaded = Result<Arc<MeasuredTables>, MeasuredError>;
+
+/// Reads all files.
+pub(super) fn load(wanted: &[(PathBuf, Span)], files: &FileCache) -> Vec<Loaded> {
+    wanted.par_iter().map(|(path, _)| files.measured(path)).collect()
+}
+
+/// The tables in the order of their files; what could not be read is reported.
+pub(super) fn check(loaded: Vec<Loaded>, wanted: &[(PathBuf, Span)], d: &mut Diagnostics) -> Vec<Arc<MeasuredTables>> {
+    let report = |(loaded, (path, span)): (Loaded, &(PathBuf, Span))| match loaded {
+        Ok(tables) => Some(tables),
+        Err(MeasuredError::File(BsdfFileError::Unreadable { reason, .. })) => {
+            d.missing_file(path, reason, Some(*span));
+            None
+        }
+        Err(error) => {
+            d.error(*span, error.to_string());
+            None
+        }
+    };
+    loaded.into_iter().zip(wanted).filter_map(report).collect()
+}
