@@ -100,7 +100,7 @@ fn of_sums(job: &RenderJob, render: &RenderSettings) -> f64 {
     bytes += light_layers::count(job) as f64 * grown(IMAGE, DIGITS[0]);
     let estimator = Estimator::at_vertex(&job.settings().integrator, 0);
     let fits = estimator.fits(job, 1);
-    bytes += (fits.exact_sums().len() * CONTROL + fits.memory().map(size_of_val).iter().sum::<usize>()) as f64;
+    bytes += (fits.sum_count() * CONTROL + fits.memory().map(size_of_val).iter().sum::<usize>()) as f64;
     if estimator.is_over_pixels() {
         bytes += FITTED[0] + FITTED[1] * fits.controls() as f64;
     }
