@@ -80,9 +80,12 @@ struct Request {
     plan: Given,
 }
 
+/// Layers by their names.
+type NamedImages = Vec<(String, Image)>;
+
 /// A rendering with all that is told of it.
 struct Done {
-    layers: Vec<(String, Image)>,
+    layers: NamedImages,
     metadata: Vec<(String, String)>,
     place: Place,
     plan: Vec<(&'static str, String)>,
@@ -303,7 +306,7 @@ impl Request {
         asked: &Asked,
         (job, settings): (&RenderJob, &RenderSettings),
         rendering: &Rendering,
-    ) -> Result<(Vec<(String, Image)>, Vec<(String, String)>), Failure> {
+    ) -> Result<(NamedImages, Vec<(String, String)>), Failure> {
         let has = (job.sample_count_map.is_some(), rendering.cache.is_some());
         let aovs = asked.aovs.clone().unwrap_or_else(|| output::default_aovs(&rendering.film, has.0, has.1));
         let mut layers = output::layers(&rendering.film, &aovs, job.sample_count_map.as_ref());

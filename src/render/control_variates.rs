@@ -17,7 +17,7 @@ use std::collections::BTreeMap;
 use std::ops::Range;
 
 /// Rows that are corrected together.
-const ROWS: u32 = 32;
+pub(super) const ROWS: u32 = 32;
 
 /// Corrects all pixels of `film`, which holds the tiles, and its replicas.
 pub(super) fn correct(film: &mut Film, tiles: &[Tile]) {

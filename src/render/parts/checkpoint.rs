@@ -16,6 +16,8 @@ use std::time::{Duration, Instant};
 /// Time between two checkpoints, at least, by the time that writing one takes.
 const REST: u32 = 100;
 
+/// Time that a rendering has at least for its first tile.
+const SHORTEST: Duration = Duration::from_millis(50);
 /// More than this is as good as never (ten years), and what is added to the time of day must not overflow it.
 const LONGEST: Duration = Duration::from_secs(315_360_000);
 
@@ -63,9 +65,13 @@ impl Checkpoints {
         self.due
     }
 
-    /// Stores the sums so far, unless the disk is still busy with the ones before.
+    /// Stores the sums so far, unless the disk is still busy with the ones before, or there are none yet.
     pub(in crate::render) fn store(&mut self, tiles: &[Tile]) {
         let start = Instant::now();
+        if tiles.iter().all(|t| t.done <= self.header.samples.start) {
+            self.due = start + self.interval.max(SHORTEST);
+            return;
+        }
         let is_busy = self.under_way.as_ref().is_some_and(|thread| !thread.is_finished());
         if !is_busy {
             self.await_disk();
