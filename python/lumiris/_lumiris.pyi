@@ -75,6 +75,9 @@ def write(
 def render(
     options: Dict[str, object], callback: Optional[Callable[[Progress], object]]
 ) -> Tuple[List[Layer], List[Tuple[str, str]], Place, List[Tuple[str, str]], bool, float, List[str]]: ...
+def merge(
+    parts: List[str], allow_missing: bool, aov: Optional[List[str]]
+) -> Tuple[List[Layer], List[Tuple[str, str]], Place, List[str], float]: ...
 def compare(
     image: Union[str, Pixels], reference: Union[str, Pixels], options: Dict[str, object]
 ) -> Tuple[List[Tuple[str, Optional[float]]], List[Tuple[str, Array]], str]: ...

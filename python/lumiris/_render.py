@@ -8,7 +8,7 @@ import numbers
 import os
 import warnings
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Callable, Dict, List, Mapping, Optional, Sequence, Tuple, Union
+from typing import TYPE_CHECKING, Callable, Dict, Iterable, List, Literal, Mapping, Optional, Sequence, Tuple, Union
 
 from . import _lumiris
 from ._image import Layers, Path
@@ -20,6 +20,8 @@ if TYPE_CHECKING:
 
 #: Name of a scene that is given as text.
 _TEXT = "<scene>"
+#: Time between checkpoints (s).
+_CHECKPOINT_SECONDS = 60.0
 
 
 class SceneWarning(UserWarning):
@@ -60,6 +62,17 @@ def settings() -> Dict[str, Setting]:
         )
         for name, row in _lumiris.settings().items()
     }
+
+
+class Merged(Layers):
+    """An image of parts: its layers, and what is missing."""
+
+    #: What is missing, in words; none unless that was allowed.
+    missing: Tuple[str, ...]
+    #: True if no sample is missing.
+    complete: bool
+    #: Time that all parts took together (s).
+    seconds: float
 
 
 class Rendering(Layers):
@@ -119,6 +132,26 @@ def _source(scene: Path, folder: Optional[Path]) -> Union[str, Tuple[str, str, s
     return os.fspath(scene), _TEXT, os.fspath(folder or "")
 
 
+def _part(part: Union[None, str, Tuple[int, int]]) -> Optional[Tuple[int, int]]:
+    if part is None:
+        return None
+    words = part.split("/") if isinstance(part, str) else [str(number) for number in part]
+    try:
+        index, count = map(int, words)
+    except ValueError as error:
+        raise ValueError(f"part: expected (i, n) or 'i/n', such as '3/8', not {part!r}") from error
+    if not 1 <= index <= count < 2**32:
+        raise ValueError(f"part: expected 1 <= i <= n, not {part!r}")
+    return index, count
+
+
+def _checkpoint(checkpoint: Union[None, Path, Tuple[Path, float]]) -> Optional[Tuple[str, float]]:
+    if checkpoint is None:
+        return None
+    path, seconds = checkpoint if isinstance(checkpoint, tuple) else (checkpoint, _CHECKPOINT_SECONDS)
+    return os.fspath(path), seconds
+
+
 def render(
     scene: Path,
     *,
@@ -140,6 +173,13 @@ def render(
     texture_memory: Union[None, int, str] = None,
     aov: Optional[Sequence[str]] = None,
     cryptomatte: Sequence[str] = (),
+    part: Union[None, str, Tuple[int, int]] = None,
+    part_by: Literal["samples", "tiles"] = "samples",
+    samples_from: Optional[int] = None,
+    samples_to: Optional[int] = None,
+    part_file: Optional[Path] = None,
+    checkpoint: Union[None, Path, Tuple[Path, float]] = None,
+    resume: Optional[Path] = None,
     **settings: Unpack[Settings],
 ) -> Rendering:
     """Renders a scene; the same bits as `lumiris render` with the same options.
@@ -178,6 +218,18 @@ def render(
     cryptomatte
         Cryptomatte layers of ids and coverage: `object`, `material`, or both. Their names of ids are metadata; `lumiris.write`
         makes a file of them that compositing programs read.
+    part, part_by
+        The i-th of n parts of the image, `(i, n)` or `"i/n"`: a share of the samples of every pixel, or of the tiles.
+    samples_from, samples_to
+        Index of the first sample of every pixel, and the index after the last one.
+    part_file
+        Where the exact sums of what is rendered are stored, for `lumiris.merge` and `lumiris merge`; `part` needs one.
+    checkpoint
+        A file in which all that is needed to go on is stored every so many seconds (60 unless given: `(file, seconds)`) and
+        in the end, also after Ctrl-C. One that cannot be written is a warning.
+    resume
+        A checkpoint or an unfinished part to go on from, with its settings; `spp` may ask for more samples. If it is
+        `checkpoint` and there is none yet, the rendering starts. The image is that of an uninterrupted rendering to the bit.
     settings
         The settings of the image, with the names of the command line and `_` for `-`; see `lumiris.settings()`. Values are
         text as on the command line, numbers, or pairs of numbers; None leaves a setting to the scene. True is what an
@@ -188,7 +240,10 @@ def render(
     SceneError
         The scene cannot be loaded; it tells file, line and column, and its text has all errors.
     TypeError, ValueError
-        An unknown keyword, or a value that is not allowed.
+        An unknown keyword, or a value that is not allowed; a checkpoint that is damaged, of another scene or of other
+        settings.
+    OSError
+        A file of `resume` or `part_file` cannot be read or written, or the folder of `checkpoint` or `part_file` is not there.
     KeyboardInterrupt
         Ctrl-C: the rendering ends with the tiles under way.
 
@@ -213,6 +268,15 @@ def render(
         "interval": interval,
         "settings": _texts(settings),
         "plan": _plan(plan),
+        "parts": {
+            "part": _part(part),
+            "part_by": part_by,
+            "samples_from": samples_from,
+            "samples_to": samples_to,
+            "part_file": None if part_file is None else os.fspath(part_file),
+            "checkpoint": _checkpoint(checkpoint),
+            "resume": None if resume is None else os.fspath(resume),
+        },
     }
     layers, metadata, (origin, full), chosen, complete, seconds, remarks = _lumiris.render(options, callback)
     for remark in remarks:
@@ -228,3 +292,32 @@ def render(
     rendering.complete = complete
     rendering.seconds = seconds
     return rendering
+
+
+def merge(
+    parts: Iterable[Path], *, allow_missing: bool = False, aov: Optional[Sequence[str]] = None
+) -> Merged:
+    """Merges parts of an image, in any order: the bits of the image that is rendered at once.
+
+    `parts` are files that `render` has stored by `part_file`, or `lumiris render --part`; finished checkpoints are parts, too.
+    `aov` chooses layers, as for `render`; by default they are those that the parts were rendered for. If parts are missing,
+    `allow_missing` merges what there is, with a `SceneWarning`. Raises ValueError for parts that are missing, double, damaged
+    or of another image, and OSError for files that cannot be read.
+    """
+    paths = [os.fspath(part) for part in parts]
+    layers, metadata, (origin, full), missing, seconds = _lumiris.merge(
+        paths, allow_missing, None if aov is None else list(aov)
+    )
+    for what in missing:
+        warnings.warn(f"{what}: missing", SceneWarning, stacklevel=2)
+    merged = Merged(
+        {name: array for name, _, array in layers},
+        channels={name: tuple(names) for name, names, _ in layers},
+        metadata=dict(metadata),
+        origin=(origin[0], origin[1]),
+        full_size=(full[0], full[1]),
+    )
+    merged.missing = tuple(missing)
+    merged.complete = not missing
+    merged.seconds = seconds
+    return merged

@@ -4,13 +4,15 @@
 //! memory, nothing is copied. What takes long runs without the GIL.
 //!
 //! Reading order: `settings` (keyword arguments), `images` (arrays and files), `render` with what its callback sees
-//! (`progress`), `compare`, `denoise`, `estimators`.
+//! (`attendant`, `progress`), `parts`, `compare`, `denoise`, `estimators`.
 #![cfg(feature = "module")]
 
+mod attendant;
 mod compare;
 mod denoise;
 mod estimators;
 mod images;
+mod parts;
 mod progress;
 mod render;
 mod settings;
@@ -27,6 +29,7 @@ fn _lumiris(module: &Bound<'_, PyModule>) -> PyResult<()> {
     module.add_function(wrap_pyfunction!(images::read, module)?)?;
     module.add_function(wrap_pyfunction!(images::write, module)?)?;
     module.add_function(wrap_pyfunction!(render::render, module)?)?;
+    module.add_function(wrap_pyfunction!(parts::merge, module)?)?;
     module.add_function(wrap_pyfunction!(compare::compare, module)?)?;
     module.add_function(wrap_pyfunction!(denoise::denoise, module)?)?;
     module.add_function(wrap_pyfunction!(estimators::mis, module)?)?;

@@ -1,19 +1,23 @@
-//! Rendering: the work in a thread of its own, and the calling thread, which calls back and watches for Ctrl-C.
+//! Rendering: options, and the work in a thread of its own.
 
+use crate::attendant::{Attendant, Event};
 use crate::images::{Layer, Place, arrays, split};
-use crate::progress::{Canvas, PassProgress};
+use crate::parts::{PartOptions, Parts, in_words_of_python, part_error, place};
+use crate::progress::Canvas;
 use crate::settings::{Given, apply, parse, parse_plan};
 use lumiris::film::filter::PixelFilter;
 use lumiris::film::{Film, PixelBounds};
 use lumiris::imaging::Image;
 use lumiris::import::cache::FileCache;
+use lumiris::import::fingerprint::SceneFiles;
 use lumiris::import::{LoadOptions, Loaded, load_text, load_with};
 use lumiris::render::allocation::complete_for_noise;
 use lumiris::render::cryptomatte::{Cryptomatte, cryptomattes};
 use lumiris::render::output::{self, Aov};
+use lumiris::render::parts::{Asked, FilmFile, PartError, Storage, Stored};
 use lumiris::render::plan::prepare;
-use lumiris::render::{Continuation, Progress, RenderSettings, Rendering, go_on};
-use lumiris::scene::{AccelKind, RenderJob};
+use lumiris::render::{Continuation, Progress, RenderError, RenderSettings, Rendering, go_on};
+use lumiris::scene::RenderJob;
 use lumiris::settings::value::{Kind, Value};
 use lumiris_formats::diagnostic::Report;
 use lumiris_formats::source::Position;
@@ -21,14 +25,11 @@ use pyo3::exceptions::{PyException, PyRuntimeError, PyValueError};
 use pyo3::prelude::*;
 use std::path::PathBuf;
 use std::sync::atomic::{AtomicBool, Ordering};
-use std::sync::mpsc::{Receiver, RecvTimeoutError, Sender, SyncSender, channel, sync_channel};
+use std::sync::mpsc::{Receiver, Sender, channel, sync_channel};
 use std::sync::{Arc, Mutex, PoisonError};
 use std::time::{Duration, Instant};
 
 pyo3::create_exception!(lumiris, SceneError, PyException, "A scene that cannot be loaded.");
-
-/// Time between two looks for Ctrl-C.
-const ATTENTION: Duration = Duration::from_millis(50);
 
 /// What to render: a file, or a text with a name and the folder of the files that it names.
 #[derive(Debug, FromPyObject)]
@@ -61,28 +62,30 @@ pub(crate) struct Options {
     interval: f64,
     settings: Vec<(String, String)>,
     plan: Vec<(String, String)>,
+    parts: PartOptions,
 }
 
 /// The options, checked.
 struct Request {
     source: Source,
-    load: LoadOptions,
+    asked: Asked,
     /// Most bytes of textures in memory.
     texture_memory: Option<u64>,
-    box_filter: bool,
-    accel: AccelKind,
     packet_width: Option<u32>,
     render: RenderSettings,
-    aov: Option<Vec<Aov>>,
+    parts: Parts,
     cryptomatte: Vec<Cryptomatte>,
     interval: Duration,
     settings: Given,
     plan: Given,
 }
 
+/// Layers by their names.
+type NamedImages = Vec<(String, Image)>;
+
 /// A rendering with all that is told of it.
 struct Done {
-    layers: Vec<(String, Image)>,
+    layers: NamedImages,
     metadata: Vec<(String, String)>,
     place: Place,
     plan: Vec<(&'static str, String)>,
@@ -95,15 +98,10 @@ struct Done {
 enum Failure {
     Scene(Box<Report>),
     Value(String),
+    Part(PartError),
     Other(String),
     /// Ctrl-C, or an exception, ended the work before there was anything to keep.
     Stopped,
-}
-
-/// What the working thread tells the calling one.
-enum Event {
-    Begin(Arc<Canvas>),
-    Pass(Progress, SyncSender<()>),
 }
 
 impl Options {
@@ -140,30 +138,30 @@ impl Options {
             let duration = Duration::try_from_secs_f64(seconds).ok().filter(|duration| !duration.is_zero());
             duration.ok_or_else(|| PyValueError::new_err(format!("{name}: expected a positive number of seconds")))
         };
-        let needs = |is_shown: fn(&Aov) -> bool| aov.as_ref().is_none_or(|list| list.iter().any(is_shown));
         let render = RenderSettings {
             threads: self.threads.map(|t| t as usize),
             tile_size: self.tile_size,
             time_limit: self.time.map(|time| seconds("time", time)).transpose()?,
-            with_replicas: needs(|aov| *aov == Aov::Variance),
-            with_features: needs(|aov| aov.is_feature()),
             ..RenderSettings::default()
         };
+        let parts = self.parts.checked(self.time.is_some())?;
+        if parts.extent.is_partial() && !cryptomatte.is_empty() {
+            return wrong("cryptomatte needs the whole image, not a part".to_owned());
+        }
+        let load = LoadOptions {
+            resolution: self.resolution,
+            crop: self.crop,
+            environment: self.environment,
+            camera_auto: self.camera_auto,
+            time: self.time_in_scene,
+        };
         Ok(Request {
+            asked: Asked { scene: self.source.name(), load, box_filter: self.box_filter, accel, aovs: aov },
             source: self.source,
-            load: LoadOptions {
-                resolution: self.resolution,
-                crop: self.crop,
-                environment: self.environment,
-                camera_auto: self.camera_auto,
-                time: self.time_in_scene,
-            },
             texture_memory,
-            box_filter: self.box_filter,
-            accel,
             packet_width: self.packet_width,
             render,
-            aov,
+            parts,
             cryptomatte,
             interval: seconds("interval", self.interval)?,
             settings: parse(&self.settings)?,
@@ -172,34 +170,49 @@ impl Options {
     }
 }
 
+impl Source {
+    /// The name of the scene in metadata.
+    fn name(&self) -> String {
+        match self {
+            Source::File(path) => path.display().to_string(),
+            Source::Text((_, name, _)) => name.clone(),
+        }
+    }
+}
+
 impl Request {
-    /// Loads the scene and applies the settings.
-    fn load(&self) -> Result<Loaded, Failure> {
+    /// Loads the scene and applies the settings, after those of what is stored.
+    fn load(&self, asked: &Asked, stored: Option<&Stored>) -> Result<Loaded, Failure> {
         let files = FileCache::default();
         if let Some(bytes) = self.texture_memory {
             files.limit_textures(bytes);
         }
         let loaded = match &self.source {
-            Source::File(path) => load_with(path, &self.load, &files),
-            Source::Text((text, name, folder)) => load_text(text, name, folder, &self.load, &files),
+            Source::File(path) => load_with(path, &asked.load, &files),
+            Source::Text((text, name, folder)) => load_text(text, name, folder, &asked.load, &files),
         };
         let mut loaded = loaded.map_err(Failure::Scene)?;
+        if let Some(stored) = stored {
+            stored.apply(&mut loaded.settings).map_err(Failure::Part)?;
+        }
         apply(&self.plan, &mut loaded.settings);
         apply(&self.settings, &mut loaded.settings);
-        let has_spp = self.settings.iter().any(|(row, _)| row.flag == "spp");
-        complete_for_noise(&mut loaded.settings, has_spp).map_err(|needs| Failure::Value(format!("noise {needs}")))?;
-        if self.box_filter {
+        complete_for_noise(&mut loaded.settings, self.spp().is_some())
+            .map_err(|needs| Failure::Value(format!("noise {needs}")))?;
+        // More samples belong to what the first ones were prepared for
+        if let Some(stored) = stored {
+            loaded.settings.sampling.spp = stored.spp().map_err(Failure::Part)?;
+        }
+        if asked.box_filter {
             loaded.scene.film.filter = PixelFilter::Box { rx: 0.5, ry: 0.5 };
         }
         Ok(loaded)
     }
 
-    /// The name of the scene in metadata.
-    fn scene(&self) -> String {
-        match &self.source {
-            Source::File(path) => path.display().to_string(),
-            Source::Text((_, name, _)) => name.clone(),
-        }
+    /// The number of samples that is asked for.
+    fn spp(&self) -> Option<u32> {
+        let (_, value) = self.settings.iter().find(|(row, _)| row.flag == "spp")?;
+        value.integer().and_then(|n| u32::try_from(n).ok())
     }
 
     /// All the work. `hooks` are there if someone is called back.
@@ -211,40 +224,41 @@ impl Request {
     ) -> Result<Done, Failure> {
         let goes_on = || if stop.load(Ordering::Relaxed) { Err(Failure::Stopped) } else { Ok(()) };
         let other = |error: &dyn std::error::Error| Failure::Other(error.to_string());
-        let loaded = self.load()?;
+        let mut asked = self.asked.clone();
+        let stored = self.parts.stored().map_err(Failure::Part)?;
+        stored.as_ref().map_or(Ok(()), |stored| asked.complete(stored)).map_err(Failure::Part)?;
+        let mut loaded = self.load(&asked, stored.as_ref())?;
         let mut warnings = Vec::from_iter(Some(loaded.warnings.to_string()).filter(|text| !text.is_empty()));
         if loaded.settings.integrator.leaves_lights_out() {
             warnings.push("without samples on non-contributing lights, direct light is biased".to_owned());
         }
         goes_on()?;
-        let mut job = loaded.job(self.accel, self.packet_width).map_err(|error| other(&error))?;
+        let files = std::mem::take(&mut loaded.files);
+        let mut job = loaded.job(asked.accel, self.packet_width).map_err(|error| other(&error))?;
+        let extent = &self.parts.extent;
+        let divided = extent.check_settings(job.settings(), &job.world.scene.film.bounds, &asked.scene);
+        divided.map_err(|error| Failure::Value(in_words_of_python(&error)))?;
         goes_on()?;
-        let asks_for_ratio = self.aov.as_ref().is_some_and(|list| list.contains(&Aov::Ratio));
+        let asks_for_ratio = asked.aovs.as_ref().is_some_and(|list| list.contains(&Aov::Ratio));
         let plan = prepare(&mut job, self.render.threads, asks_for_ratio).map_err(|error| other(&error))?;
         goes_on()?;
         warnings.extend(plan.warnings);
 
-        let spp = job.pixel_samples.as_ref().map_or(job.settings().sampling.spp, |of_pixels| of_pixels.spp);
-        let settings = RenderSettings { spp, ..self.render };
-        let rendering = observed(&job, &settings, stop, latest, events).map_err(|error| other(&error))?;
-        let aovs = self.aov.clone();
-        let has = (job.sample_count_map.is_some(), rendering.cache.is_some());
-        let aovs = aovs.unwrap_or_else(|| output::default_aovs(&rendering.film, has.0, has.1));
-        let mut layers = output::layers(&rendering.film, &aovs, job.sample_count_map.as_ref());
-        let mut metadata = self.metadata(&job, &rendering);
-        for ids in cryptomattes(&job, &settings, &rendering.film, &self.cryptomatte).map_err(|error| other(&error))? {
-            let PixelBounds { x0, y0, x1, y1 } = rendering.film.bounds;
-            let size = [x1 - x0, y1 - y0].map(|n| n as usize);
-            let image =
-                Image { width: size[0], height: size[1], channels: ids.channels.clone(), data: ids.rows(y0..y1) };
-            layers.extend(split(&image));
-            metadata.extend(ids.metadata);
+        let mut settings = self.render_settings(&asked, &job);
+        let (mut film_file, told) = self.film_file(&asked, (&job, &files), &mut settings, stored)?;
+        let continuation = film_file.as_mut().map_or_else(Continuation::default, FilmFile::continuation);
+        let rendering =
+            observed((&job, &settings), (stop, latest), events, continuation).map_err(|error| other(&error))?;
+        warnings.extend(told.try_iter());
+        if let (Some(film_file), Some(path)) = (&mut film_file, &self.parts.file) {
+            film_file.end(&rendering);
+            film_file.write(path, &rendering).map_err(Failure::Part)?;
         }
-        let Film { bounds, resolution, .. } = &rendering.film;
+        let (layers, metadata) = self.layers(&asked, (&job, &settings), &rendering)?;
         Ok(Done {
             layers,
             metadata,
-            place: ([bounds.x0 as usize, bounds.y0 as usize], resolution.map(|n| n as usize)),
+            place: place(&rendering.film),
             plan: plan.chosen,
             complete: rendering.complete,
             seconds: rendering.elapsed.as_secs_f64(),
@@ -252,13 +266,64 @@ impl Request {
         })
     }
 
-    /// What the image depends on, and how it came about.
-    fn metadata(&self, job: &RenderJob, rendering: &Rendering) -> Vec<(String, String)> {
+    /// How to render what is asked for.
+    fn render_settings(&self, asked: &Asked, job: &RenderJob) -> RenderSettings {
+        let needs = |is_shown: fn(&Aov) -> bool| asked.aovs.as_ref().is_none_or(|list| list.iter().any(is_shown));
+        RenderSettings {
+            spp: job.pixel_samples.as_ref().map_or(job.settings().sampling.spp, |of_pixels| of_pixels.spp),
+            with_replicas: needs(|aov| *aov == Aov::Variance),
+            with_features: needs(|aov| aov.is_feature()),
+            ..self.render
+        }
+    }
+
+    /// Sets what is rendered; what is stored of it, if anything is, and where warnings of that arrive.
+    fn film_file(
+        &self,
+        asked: &Asked,
+        job: (&RenderJob, &SceneFiles),
+        settings: &mut RenderSettings,
+        stored: Option<Stored>,
+    ) -> Result<(Option<FilmFile>, Receiver<String>), Failure> {
+        let Parts { extent, file, checkpoint, .. } = &self.parts;
+        let spp = settings.spp;
+        let applied = extent.apply(settings, stored.as_ref(), self.spp());
+        applied.map_err(|error| Failure::Value(in_words_of_python(&error)))?;
+        let (warn, told) = channel();
+        if file.is_none() && checkpoint.is_none() && stored.is_none() {
+            return Ok((None, told));
+        }
+        let storage = Storage { checkpoint: checkpoint.clone(), keeps_sums: file.is_some(), stored, plan: None };
+        // Nobody listens any more once the image is there: that is no error
+        let warn = move |text: &str| drop(warn.send(text.to_owned()));
+        let film_file = FilmFile::new(asked, job, (settings, spp), storage, warn).map_err(Failure::Part)?;
+        Ok((Some(film_file), told))
+    }
+
+    /// The layers of the image, and its metadata.
+    fn layers(
+        &self,
+        asked: &Asked,
+        (job, settings): (&RenderJob, &RenderSettings),
+        rendering: &Rendering,
+    ) -> Result<(NamedImages, Vec<(String, String)>), Failure> {
+        let has = (job.sample_count_map.is_some(), rendering.cache.is_some());
+        let aovs = asked.aovs.clone().unwrap_or_else(|| output::default_aovs(&rendering.film, has.0, has.1));
+        let mut layers = output::layers(&rendering.film, &aovs, job.sample_count_map.as_ref());
         let mut metadata = output::metadata(&job.world.scene.film, job.settings());
-        metadata.push(("lumiris:scene".to_owned(), self.scene()));
-        metadata.push(("lumiris:accel".to_owned(), <&str>::from(self.accel).to_owned()));
+        metadata.push(("lumiris:scene".to_owned(), asked.scene.clone()));
+        metadata.push(("lumiris:accel".to_owned(), <&str>::from(asked.accel).to_owned()));
         metadata.extend(output::progress_metadata(rendering));
-        metadata
+        let ids = cryptomattes(job, settings, &rendering.film, &self.cryptomatte);
+        for ids in ids.map_err(|error| Failure::Other(error.to_string()))? {
+            let PixelBounds { x0, y0, x1, y1 } = rendering.film.bounds;
+            let size = [x1 - x0, y1 - y0].map(|n| n as usize);
+            let image =
+                Image { width: size[0], height: size[1], channels: ids.channels.clone(), data: ids.rows(y0..y1) };
+            layers.extend(split(&image));
+            metadata.extend(ids.metadata);
+        }
+        Ok((layers, metadata))
     }
 }
 
@@ -273,13 +338,12 @@ fn bytes(text: &str) -> PyResult<u64> {
 
 /// Renders; tells of tiles and passes if there is someone to tell.
 fn observed(
-    job: &RenderJob,
-    settings: &RenderSettings,
-    stop: &AtomicBool,
-    latest: &Mutex<Option<Progress>>,
+    (job, settings): (&RenderJob, &RenderSettings),
+    (stop, latest): (&AtomicBool, &Mutex<Option<Progress>>),
     events: Option<Sender<Event>>,
-) -> Result<Rendering, lumiris::render::RenderError> {
-    let Some(events) = events else { return go_on(job, settings, stop, &|_| (), Continuation::default()) };
+    continuation: Continuation<'_>,
+) -> Result<Rendering, RenderError> {
+    let Some(events) = events else { return go_on(job, settings, stop, &|_| (), continuation) };
     let film = &job.world.scene.film;
     let canvas = Arc::new(Canvas::new(film.resolution, film.bounds, settings.with_features));
     // Nobody listens any more once the rendering is to stop: that is no error
@@ -292,87 +356,15 @@ fn observed(
             let _ = wait.recv();
         }
     };
-    let hooks = Continuation { watch: Some(&set_tile), passes: Some(&passed), ..Continuation::default() };
+    let hooks = Continuation { watch: Some(&set_tile), passes: Some(&passed), ..continuation };
     go_on(job, settings, stop, &observe, hooks)
-}
-
-/// The calling thread while another one renders.
-struct Attendant<'a> {
-    callback: Option<&'a Py<PyAny>>,
-    interval: Duration,
-    stop: &'a AtomicBool,
-    latest: &'a Mutex<Option<Progress>>,
-    canvas: Option<Arc<Canvas>>,
-    called: Instant,
-    /// The exception of Ctrl-C, or of the callback.
-    raised: Option<PyErr>,
-}
-
-impl Attendant<'_> {
-    /// Attends until the other thread has ended: it drops `finished` and the senders of events.
-    fn attend(&mut self, events: &Receiver<Event>, finished: &Receiver<()>) {
-        loop {
-            match events.recv_timeout(ATTENTION.min(self.interval)) {
-                Ok(Event::Begin(canvas)) => self.canvas = Some(canvas),
-                Ok(Event::Pass(progress, done)) => {
-                    // What was before the pass has been overtaken
-                    self.latest.lock().unwrap_or_else(PoisonError::into_inner).take();
-                    self.call(progress, true);
-                    // The other side may have ended
-                    let _ = done.send(());
-                }
-                Err(RecvTimeoutError::Timeout) => self.call_latest(),
-                // Nobody is called back, or the rendering is about to end
-                Err(RecvTimeoutError::Disconnected) => match finished.recv_timeout(ATTENTION) {
-                    Err(RecvTimeoutError::Timeout) => {}
-                    Ok(()) | Err(RecvTimeoutError::Disconnected) => return,
-                },
-            }
-            self.raise_if(|_, py| py.check_signals());
-        }
-    }
-
-    /// Calls back within a pass, if it is time.
-    fn call_latest(&mut self) {
-        if self.called.elapsed() >= self.interval
-            && let Some(progress) = self.latest.lock().unwrap_or_else(PoisonError::into_inner).take()
-        {
-            self.call(progress, false);
-        }
-    }
-
-    fn call(&mut self, progress: Progress, is_pass: bool) {
-        let (Some(callback), Some(canvas)) = (self.callback, self.canvas.clone()) else { return };
-        if self.stop.load(Ordering::Relaxed) {
-            return;
-        }
-        self.raise_if(|attendant, py| {
-            let returned = callback.call1(py, (PassProgress { progress, is_pass, canvas },))?;
-            // Only `False` itself: a callback that returns nothing goes on
-            if returned.bind(py).extract::<bool>().is_ok_and(|goes_on| !goes_on) {
-                attendant.stop.store(true, Ordering::Relaxed);
-            }
-            Ok(())
-        });
-        self.called = Instant::now();
-    }
-
-    /// Runs something of Python; an exception ends the rendering.
-    fn raise_if(&mut self, run: impl FnOnce(&Self, Python<'_>) -> PyResult<()>) {
-        if self.raised.is_some() {
-            return;
-        }
-        if let Err(error) = Python::attach(|py| run(self, py)) {
-            self.stop.store(true, Ordering::Relaxed);
-            self.raised = Some(error);
-        }
-    }
 }
 
 /// The exception of a failure.
 fn exception(py: Python<'_>, request: &Request, failure: Failure) -> PyErr {
     match failure {
         Failure::Value(text) => PyValueError::new_err(text),
+        Failure::Part(error) => part_error(error),
         Failure::Other(text) => PyRuntimeError::new_err(text),
         Failure::Stopped => PyRuntimeError::new_err("the rendering was stopped before it began"),
         Failure::Scene(report) => {
@@ -387,7 +379,7 @@ fn exception(py: Python<'_>, request: &Request, failure: Failure) -> PyErr {
             let value = error.value(py);
             let set = || {
                 value.setattr("message", first.map(|entry| entry.message.as_str()))?;
-                value.setattr("file", place.map_or_else(|| request.scene(), |place| place.name.clone()))?;
+                value.setattr("file", place.map_or_else(|| request.asked.scene.clone(), |place| place.name.clone()))?;
                 value.setattr("line", text.map(|(line, _)| line))?;
                 value.setattr("column", text.map(|(_, column)| column))
             };

@@ -1,6 +1,7 @@
 //! What estimators keep of a pixel: coefficients fitted to its earlier estimates, or the sums of its control variates.
 
 use crate::film::exact::FixedSum;
+use crate::film::packed::PackedRows;
 use lumiris_numbers::estimators::ocv::NormalEquations;
 
 /// Solves the systems of all fits from their sums. Returns how many are ill-conditioned.
@@ -24,6 +25,9 @@ pub struct Fits {
 #[derive(Clone, Debug, Default)]
 struct Controls {
     components: usize,
+    /// The sums but while some are added.
+    packed: PackedRows,
+    /// The sums while some are added; none else.
     sums: Vec<FixedSum>,
     /// Those of the batch that is being traced, by camera sample.
     batch: Vec<f32>,
@@ -33,6 +37,14 @@ impl Controls {
     fn row(&self, index: usize) -> std::ops::Range<usize> {
         let len = 3 + self.components;
         index * len..(index + 1) * len
+    }
+
+    /// The sums, to be changed.
+    fn unpack(&mut self) -> &mut Vec<FixedSum> {
+        if self.sums.is_empty() {
+            self.sums = self.packed.unpacked();
+        }
+        &mut self.sums
     }
 }
 
@@ -51,14 +63,14 @@ impl Fits {
 
     /// Sums of values and of `components` control variates without estimates, of `count` pixels.
     pub fn of_pixels(components: usize, count: usize) -> Self {
-        let sums = vec![FixedSum::default(); count * (3 + components)];
-        let controls = Controls { components, sums, batch: Vec::new() };
+        let packed = PackedRows::new(count, 3 + components);
+        let controls = Controls { components, packed, ..Controls::default() };
         Fits { controls, ..Fits::default() }
     }
 
     /// Begins a batch of camera samples.
     pub(crate) fn begin_batch(&mut self, samples: usize) {
-        if !self.controls.sums.is_empty() {
+        if !self.controls.packed.is_empty() {
             self.controls.batch.clear();
             self.controls.batch.resize(samples * (3 + self.controls.components), 0.0);
         }
@@ -77,6 +89,7 @@ impl Fits {
         if self.controls.batch.is_empty() {
             return;
         }
+        self.controls.unpack();
         for (i, (fit, weight)) in samples.enumerate() {
             let (from, to) = (self.controls.row(i), self.controls.row(fit as usize));
             for (sum, v) in self.controls.sums[to].iter_mut().zip(&self.controls.batch[from]) {
@@ -90,22 +103,34 @@ impl Fits {
         self.controls.components
     }
 
-    /// Σ of the values of a pixel, by channel, and of its control variates.
-    pub fn sums_of_controls(&self, fit: u32) -> ([f64; 3], impl Iterator<Item = f64> + '_) {
-        let sums = &self.controls.sums[self.controls.row(fit as usize)];
-        ([0, 1, 2].map(|c| sums[c].value()), sums[3..].iter().map(FixedSum::value))
+    /// Number of sums: of the values, by channel, and of the control variates of all pixels.
+    pub fn sum_count(&self) -> usize {
+        self.controls.packed.len()
     }
 
-    /// The sums of values and control variates of all pixels; none if they are not summed.
-    pub fn exact_sums(&self) -> &[FixedSum] {
-        &self.controls.sums
+    /// The sums of the values, by channel, and of the control variates of all pixels, one pixel after the other; none if they
+    /// are not summed.
+    pub fn exact_sums(&self) -> Vec<FixedSum> {
+        match self.controls.sums.is_empty() {
+            true => self.controls.packed.unpacked(),
+            false => self.controls.sums.clone(),
+        }
     }
 
     /// Adds sums of values and control variates to those of a pixel. False if these are not as many.
     pub fn merge_sums(&mut self, fit: u32, sums: &[FixedSum]) -> bool {
         let row = self.controls.row(fit as usize);
-        let own = self.controls.sums.get_mut(row).filter(|own| own.len() == sums.len());
+        let own = self.controls.unpack().get_mut(row).filter(|own| own.len() == sums.len());
         own.map(|own| own.iter_mut().zip(sums).for_each(|(a, b)| a.merge(b))).is_some()
+    }
+
+    /// Keeps the sums in the bytes that they need until some are added; `scratch` is memory that calls share.
+    pub fn pack(&mut self, scratch: &mut Vec<u8>) {
+        let Controls { packed, sums, batch, .. } = &mut self.controls;
+        if !sums.is_empty() {
+            packed.set(sums, scratch);
+        }
+        (*sums, *batch) = (Vec::new(), Vec::new());
     }
 
     /// What later estimates follow from: the sums of all fits, and their coefficients.

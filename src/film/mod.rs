@@ -253,6 +253,11 @@ impl Film {
         (self.variance_scale, self.summary) = Default::default();
     }
 
+    /// True if the means of pixels are not those of the sums of its tiles.
+    pub fn is_corrected(&self) -> bool {
+        !self.corrections.is_empty()
+    }
+
     /// Index of a pixel, row by row.
     pub fn index(&self, x: u32, y: u32) -> usize {
         (y - self.bounds.y0) as usize * self.bounds.width() as usize + (x - self.bounds.x0) as usize

@@ -60,13 +60,7 @@ impl PackedSums {
         scratch.clear();
         pack(sums, scratch);
         self.len = sums.len();
-        if self.bytes.capacity() < scratch.len() || self.bytes.capacity() > scratch.len() + 2 * GRANULE {
-            // Without the old ones, their memory can be that of the new ones
-            self.bytes = Vec::new();
-            self.bytes.reserve_exact(scratch.len().next_multiple_of(GRANULE.min(scratch.len())));
-        }
-        self.bytes.clear();
-        self.bytes.extend_from_slice(scratch);
+        replace(&mut self.bytes, scratch);
     }
 
     /// Reads some pixels. `out` has as many.
@@ -82,6 +76,63 @@ impl PackedSums {
     pub fn unpacked(&self) -> Vec<PixelAccumulator> {
         let mut all = vec![PixelAccumulator::default(); self.len];
         self.read(0..self.len, &mut all);
+        all
+    }
+}
+
+/// Replaces bytes that are kept, in memory that is not much more than they need.
+fn replace(bytes: &mut Vec<u8>, new: &[u8]) {
+    if bytes.capacity() < new.len() || bytes.capacity() > new.len() + 2 * GRANULE {
+        // Without the old ones, their memory can be that of the new ones
+        *bytes = Vec::new();
+        bytes.reserve_exact(new.len().next_multiple_of(GRANULE.min(new.len())));
+    }
+    bytes.clear();
+    bytes.extend_from_slice(new);
+}
+
+/// Rows of sums in the bytes that they need, which are none if all are 0.
+#[derive(Clone, Debug, Default, PartialEq, Eq)]
+pub struct PackedRows {
+    rows: usize,
+    columns: usize,
+    bytes: Vec<u8>,
+}
+
+impl PackedRows {
+    /// Sums that are 0.
+    pub fn new(rows: usize, columns: usize) -> Self {
+        PackedRows { rows, columns, bytes: Vec::new() }
+    }
+
+    /// Number of sums.
+    pub fn len(&self) -> usize {
+        self.rows * self.columns
+    }
+
+    /// True if there are no sums.
+    pub fn is_empty(&self) -> bool {
+        self.len() == 0
+    }
+
+    /// Replaces all sums, row by row, by as many; `scratch` is memory that calls share.
+    pub fn set(&mut self, sums: &[FixedSum], scratch: &mut Vec<u8>) {
+        scratch.clear();
+        let rows: Vec<&[FixedSum]> = sums.chunks_exact(self.columns.max(1)).collect();
+        (0..self.columns).for_each(|c| pack_column(&rows, |row| row[c].bits(), scratch));
+        scratch.extend([0; PADDING]);
+        replace(&mut self.bytes, scratch);
+    }
+
+    /// All sums, row by row.
+    pub fn unpacked(&self) -> Vec<FixedSum> {
+        let mut all = vec![FixedSum::default(); self.len()];
+        if !self.bytes.is_empty() {
+            let mut reader = Reader { bytes: &self.bytes, len: self.rows, pixels: 0..self.rows, at: 0 };
+            for c in 0..self.columns {
+                reader.column(|row, bits| all[row * self.columns + c] = FixedSum::from_bits(bits));
+            }
+        }
         all
     }
 }
@@ -133,7 +184,7 @@ fn unpack(reader: &mut Reader<'_>, out: &mut [PixelAccumulator]) {
 macro_rules! packer {
     ($name:ident, $number:ty, $unsigned:ty) => {
         #[inline(always)]
-        fn $name(sums: &[PixelAccumulator], value: impl Fn(&PixelAccumulator) -> $number, out: &mut Vec<u8>) {
+        fn $name<T>(sums: &[T], value: impl Fn(&T) -> $number, out: &mut Vec<u8>) {
             let (mut least, mut greatest, mut digits) = (<$number>::MAX, <$number>::MIN, 0);
             for v in sums.iter().map(&value) {
                 (least, greatest, digits) = (least.min(v), greatest.max(v), digits | v);
@@ -150,7 +201,7 @@ macro_rules! packer {
             let mut at = out.len();
             let end = at + width * sums.len();
             out.resize(end + PADDING, 0);
-            let rest = |s: &PixelAccumulator| value(s).wrapping_sub(least) as $unsigned >> zeros;
+            let rest = |s: &T| value(s).wrapping_sub(least) as $unsigned >> zeros;
             match width {
                 0 => {}
                 1..=8 => sums.iter().for_each(|s| {
@@ -373,6 +424,20 @@ mod tests {
             for start in 0..=5 - len {
                 assert!(PackedSums::of(&sums[start..start + len]).unpacked() == sums[start..start + len]);
             }
+        }
+    }
+
+    #[test]
+    fn rows_are_kept() {
+        let mut s = pcg32([8, 4, 2]);
+        for (rows, columns) in [(1, 1), (256, 7), (300, 3)] {
+            let bits = |shift: u32, bits: u128| FixedSum::from_bits((bits >> shift) as i128);
+            let sums: Vec<FixedSum> =
+                (0..rows * columns).map(|i| bits(20 * (i % columns) as u32 % 128, s.random())).collect();
+            let mut packed = PackedRows::new(rows, columns);
+            assert!(packed.unpacked().iter().all(|sum| *sum == FixedSum::default()));
+            packed.set(&sums, &mut Vec::new());
+            assert!(packed.unpacked() == sums, "{rows} {columns}");
         }
     }
 

@@ -3,60 +3,121 @@
 //!
 //! A replica is corrected by the coefficients of its pixel, which depend on neither of both estimates: so the two remain
 //! independent but for β, and their difference gives the variance of the corrected pixel.
+//!
+//! Rows are corrected some at a time, with the rows around that their coefficients depend on: only the corrections are kept
+//! of all of them.
 
-use super::tiles::Tile;
+use super::tiles::{Tile, position};
+use crate::film::exact::FixedSum;
+use crate::film::replicas::Replica;
 use crate::film::{Film, PixelBounds, PixelSums};
-use lumiris_numbers::estimators::ocv::pixels::{Memory, Picture, Pixel, correction};
+use lumiris_numbers::estimators::ocv::pixels::{MARGIN, Memory, Picture, Pixel, correction};
 use rayon::prelude::*;
+use std::collections::BTreeMap;
+use std::ops::Range;
 
-/// Corrects all pixels of `film`, which holds the tiles, and its replicas. `position` is that of a pixel of a tile.
-pub(super) fn correct(film: &mut Film, tiles: &[Tile], position: impl Fn(&PixelBounds, u32) -> [u32; 2]) {
+/// Rows that are corrected together.
+pub(super) const ROWS: u32 = 32;
+
+/// Corrects all pixels of `film`, which holds the tiles, and its replicas.
+pub(super) fn correct(film: &mut Film, tiles: &[Tile]) {
     let Some(m) = tiles.first().map(|t| t.fits.controls()).filter(|m| *m > 0) else { return };
-    let mut pixels = vec![Pixel::default(); film.len()];
-    let mut controls = vec![0.0; film.len() * m];
-    let sums_of_film = film.pixels();
-    // Σ c of each replica, by the index of its pixel
-    let mut of_replicas = std::collections::BTreeMap::<u32, Vec<f64>>::new();
-    for tile in tiles {
-        let place = |i: u32| {
-            let [x, y] = position(&tile.bounds, i);
-            film.index(x, y)
-        };
-        for fit in 0..tile.bounds.area() as u32 {
-            let (at, (value, sums)) = (place(fit), tile.fits.sums_of_controls(fit));
-            pixels[at] = pixel(&sums_of_film[at], value);
-            let per_sample = 1.0 / sums_of_film[at].count.max(1) as f64;
-            for (c, sum) in controls[at * m..][..m].iter_mut().zip(sums) {
-                *c = (sum * per_sample) as f32;
-            }
-        }
-        for (fit, replica) in (tile.bounds.area() as u32..).zip(&tile.replicas) {
-            of_replicas.insert(place(replica.pixel) as u32, tile.fits.sums_of_controls(fit).1.collect());
-        }
-    }
-
-    drop(sums_of_film);
-    let picture = Picture::new(film.bounds.width() as usize, m, pixels, controls);
-    let rows = (0..picture.height()).into_par_iter();
-    let beta: Vec<Vec<f32>> = rows
-        .map_init(Memory::default, |memory, row| {
-            let mut beta = Vec::new();
-            picture.coefficients(row, memory, &mut beta);
-            beta
-        })
-        .collect();
-    let beta: Vec<f32> = beta.concat();
-    let of_pixel = |i: usize| &beta[i * 3 * m..][..3 * m];
-    let corrections = (0..film.len()).map(|i| picture.correction(i, of_pixel(i))).collect();
+    let PixelBounds { y0, y1, .. } = film.bounds;
+    let mut corrections = Vec::with_capacity(film.len());
     let mut replicas = film.replicas().to_vec();
-    for replica in &mut replicas {
-        let count = replica.count.max(1) as f64;
-        let Some(sums) = of_replicas.get(&replica.pixel) else { continue };
-        let controls: Vec<f32> = sums.iter().map(|s| (s / count) as f32).collect();
-        let off = correction(&controls, of_pixel(replica.pixel as usize));
-        replica.radiance.iter_mut().zip(off).for_each(|(sum, off)| *sum -= count * f64::from(off));
+    for top in (y0..y1).step_by(ROWS as usize) {
+        let rows = top..y1.min(top + ROWS);
+        let around = y0.max(top.saturating_sub(MARGIN as u32))..y1.min(rows.end + MARGIN as u32);
+        let band = Band::read(film, tiles, (rows, around), m);
+        band.correct(&mut corrections, &mut replicas);
     }
     film.correct(corrections, replicas);
+}
+
+/// Some rows of a film.
+struct Band {
+    picture: Picture,
+    components: usize,
+    /// Those that are corrected, by their index in the picture.
+    rows: Range<usize>,
+    /// Index of their first pixel in the film.
+    first: usize,
+    /// c̄ of each of their replicas, by the index of its pixel in the film.
+    of_replicas: BTreeMap<usize, Vec<f32>>,
+}
+
+impl Band {
+    /// Reads `rows`, and `around` them, with `m` control variates.
+    fn read(film: &Film, tiles: &[Tile], (rows, around): (Range<u32>, Range<u32>), m: usize) -> Self {
+        let width = film.bounds.width() as usize;
+        let mut sums = Vec::new();
+        film.read_rows(around.clone(), &mut sums);
+        let mut pixels = vec![Pixel::default(); sums.len()];
+        let mut controls = vec![0.0; sums.len() * m];
+        let mut of_replicas = BTreeMap::new();
+        let has_rows = |t: &&Tile| t.bounds.y0 < around.end && around.start < t.bounds.y1;
+        for tile in tiles.iter().filter(has_rows) {
+            let exact = tile.fits.exact_sums();
+            let mut fits = exact.chunks_exact(3 + m);
+            for (i, fit) in (0..tile.bounds.area() as u32).zip(fits.by_ref()) {
+                let [x, y] = position(&tile.bounds, i);
+                if !around.contains(&y) {
+                    continue;
+                }
+                let at = film.index(x, y) - film.index(film.bounds.x0, around.start);
+                pixels[at] = pixel(&sums[at], [0, 1, 2].map(|c| fit[c].value()));
+                let per_sample = 1.0 / sums[at].count.max(1) as f64;
+                means(fit, |sum| sum * per_sample, &mut controls[at * m..][..m]);
+            }
+            for (replica, fit) in tile.replicas.iter().zip(fits) {
+                let [x, y] = position(&tile.bounds, replica.pixel);
+                if rows.contains(&y) {
+                    let mut controls = vec![0.0; m];
+                    let count = f64::from(replica.sums.count.max(1));
+                    means(fit, |sum| sum / count, &mut controls);
+                    of_replicas.insert(film.index(x, y), controls);
+                }
+            }
+        }
+        Band {
+            picture: Picture::new(width, m, pixels, controls),
+            components: m,
+            rows: (rows.start - around.start) as usize..(rows.end - around.start) as usize,
+            first: film.index(film.bounds.x0, rows.start),
+            of_replicas,
+        }
+    }
+
+    /// Appends the corrections of the rows, and corrects their replicas.
+    fn correct(&self, corrections: &mut Vec<[f32; 3]>, replicas: &mut [Replica]) {
+        let beta: Vec<Vec<f32>> = self
+            .rows
+            .clone()
+            .into_par_iter()
+            .map_init(Memory::default, |memory, row| {
+                let mut beta = Vec::new();
+                self.picture.coefficients(row, memory, &mut beta);
+                beta
+            })
+            .collect();
+        let beta = beta.concat();
+        let of_pixel = |i: usize| &beta[i * 3 * self.components..][..3 * self.components];
+        let skipped = self.rows.start * self.picture.width();
+        let count = self.rows.len() * self.picture.width();
+        corrections.extend((0..count).map(|i| self.picture.correction(skipped + i, of_pixel(i))));
+        let begin = replicas.partition_point(|r| (r.pixel as usize) < self.first);
+        for replica in replicas[begin..].iter_mut().take_while(|r| (r.pixel as usize) < self.first + count) {
+            let Some(controls) = self.of_replicas.get(&(replica.pixel as usize)) else { continue };
+            let off = correction(controls, of_pixel(replica.pixel as usize - self.first));
+            let samples = replica.count.max(1) as f64;
+            replica.radiance.iter_mut().zip(off).for_each(|(sum, off)| *sum -= samples * f64::from(off));
+        }
+    }
+}
+
+/// The means of control variates from the sums of a pixel, by what makes a mean of a sum.
+fn means(sums: &[FixedSum], mean_of: impl Fn(f64) -> f64, out: &mut [f32]) {
+    out.iter_mut().zip(&sums[3..]).for_each(|(mean, sum)| *mean = mean_of(sum.value()) as f32);
 }
 
 /// A pixel with `value` as the sum of its estimates of direct light. What it can be compared to depends on what camera

@@ -4,6 +4,7 @@
 //! are those of one scene at 1 sample (docs/measurements/memory.md). How they grow with samples is
 //! an estimate: a sum needs one more binary digit for twice as many.
 
+use super::control_variates::ROWS;
 use super::cryptomatte::Cryptomatte;
 use super::tiles::replica_edge;
 use super::{RenderSettings, thread_pool};
@@ -12,6 +13,7 @@ use crate::film::BAND;
 use crate::imaging::oiio::{ROWS_AT_ONCE, is_loaded};
 use crate::integrators::light_layers;
 use crate::scene::RenderJob;
+use lumiris_numbers::estimators::ocv::pixels::MARGIN;
 
 /// Bytes of a pixel with one sample: radiance and its squares, counts.
 const IMAGE: f64 = 38.0;
@@ -27,10 +29,13 @@ const TILE: f64 = 2.0;
 const IDS: f64 = 18.0;
 /// Bytes of an image to denoise: colour, albedo, normal, what comes out, and the library's own.
 const DENOISED: f64 = 4.0 * (3.0 * 4.0) + 64.0;
-/// Bytes of a pixel while control variates are fitted over pixels, and by control variate.
-const FITTED: [f64; 2] = [288.0, 20.0];
-/// Bytes of a sum of control variates.
-const CONTROL: usize = 16;
+/// Bytes of a sum of control variates with one sample, and binary digits that twice as many samples add.
+const CONTROL: f64 = 3.5;
+const CONTROL_DIGITS: f64 = 3.0;
+/// Bytes of what a pixel is corrected by where control variates are fitted over pixels; and of a pixel of the rows that are
+/// corrected together, and by control variate.
+const CORRECTION: f64 = 12.0;
+const FITTED: [usize; 2] = [240, 13];
 /// Bytes of a pixel that is read from the film, and of the channels of an image with all layers.
 const READ: usize = 144 + 24;
 const CHANNELS: usize = 16 * 4;
@@ -81,9 +86,18 @@ pub fn predict(job: &RenderJob, wanted: &Wanted<'_>) -> Prediction {
     let band = (BAND as usize + 2) * READ * threads + 2 * ROWS_AT_ONCE * CHANNELS;
     Prediction {
         film: (pixels * (share * of_sums(job, render) + whole)) as u64,
-        output: (width * band) as u64,
+        output: (width * (band + of_corrected_rows(job))) as u64,
         fixed: libraries + THREAD * threads as u64 + job.world.scene.textures.store().map_or(0, |s| s.capacity()),
     }
+}
+
+/// Bytes of a column of the rows that are corrected together, where control variates are fitted over pixels.
+fn of_corrected_rows(job: &RenderJob) -> usize {
+    let estimator = Estimator::at_vertex(&job.settings().integrator, 0);
+    if !estimator.is_over_pixels() {
+        return 0;
+    }
+    (ROWS as usize + 2 * MARGIN) * (FITTED[0] + FITTED[1] * job.controls())
 }
 
 /// Bytes of the sums of a pixel.
@@ -100,9 +114,10 @@ fn of_sums(job: &RenderJob, render: &RenderSettings) -> f64 {
     bytes += light_layers::count(job) as f64 * grown(IMAGE, DIGITS[0]);
     let estimator = Estimator::at_vertex(&job.settings().integrator, 0);
     let fits = estimator.fits(job, 1);
-    bytes += (fits.exact_sums().len() * CONTROL + fits.memory().map(size_of_val).iter().sum::<usize>()) as f64;
+    bytes += fits.memory().map(size_of_val).iter().sum::<usize>() as f64;
+    bytes += fits.sum_count() as f64 * grown(CONTROL, CONTROL_DIGITS);
     if estimator.is_over_pixels() {
-        bytes += FITTED[0] + FITTED[1] * fits.controls() as f64;
+        bytes += CORRECTION;
     }
     bytes
 }

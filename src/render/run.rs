@@ -159,7 +159,7 @@ impl<'a> Run<'a> {
         let Statistics { paths: stats, cache, photons, records } = integrator.statistics(stats);
         add_records(&records, &mut tiles);
         let mut film = self.film(&tiles);
-        control_variates::correct(&mut film, &tiles, position);
+        control_variates::correct(&mut film, &tiles);
         if let Some(checkpoints) = checkpoints {
             checkpoints.finish(&tiles);
         }
@@ -359,6 +359,7 @@ impl<'a> Run<'a> {
         }
         worker.write(tile);
         self.render_replicas(worker, tile, samples);
+        tile.fits.pack(&mut worker.packing);
         let mut stats = worker.tracer.take_stats();
         if begins_block {
             let direct = &mut stats.direct;

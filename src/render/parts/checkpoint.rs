@@ -4,10 +4,10 @@
 //! renames the file. So there is always one whole checkpoint after the first, and what writing costs the rendering is
 //! known: if that is more than a hundredth of the time between two, checkpoints become rarer.
 
-use super::file::{partial_path, write_tiles};
+use super::file::write_tiles;
 use super::header::FilmHeader;
+use super::partial::Partial;
 use crate::render::tiles::Tile;
-use lumiris_formats::output::sync_and_rename;
 use std::io;
 use std::path::PathBuf;
 use std::thread::JoinHandle;
@@ -15,6 +15,11 @@ use std::time::{Duration, Instant};
 
 /// Time between two checkpoints, at least, by the time that writing one takes.
 const REST: u32 = 100;
+
+/// Time that a rendering has at least for its first tile.
+const SHORTEST: Duration = Duration::from_millis(50);
+/// More than this is as good as never (ten years), and what is added to the time of day must not overflow it.
+const LONGEST: Duration = Duration::from_secs(315_360_000);
 
 /// Stores checkpoints of one rendering.
 pub struct Checkpoints {
@@ -40,6 +45,7 @@ impl Checkpoints {
         header: FilmHeader,
         warn: impl Fn(&str) + Send + Sync + 'static,
     ) -> Self {
+        let interval = interval.min(LONGEST);
         let due = Instant::now() + interval;
         Checkpoints {
             path,
@@ -59,9 +65,13 @@ impl Checkpoints {
         self.due
     }
 
-    /// Stores the sums so far, unless the disk is still busy with the ones before.
+    /// Stores the sums so far, unless the disk is still busy with the ones before, or there are none yet.
     pub(in crate::render) fn store(&mut self, tiles: &[Tile]) {
         let start = Instant::now();
+        if tiles.iter().all(|t| t.done <= self.header.samples.start) {
+            self.due = start + self.interval.max(SHORTEST);
+            return;
+        }
         let is_busy = self.under_way.as_ref().is_some_and(|thread| !thread.is_finished());
         if !is_busy {
             self.await_disk();
@@ -80,11 +90,10 @@ impl Checkpoints {
     }
 
     fn write(&mut self, tiles: &[Tile]) {
-        let (partial, path) = (partial_path(&self.path), self.path.clone());
         self.header.is_finished = tiles.iter().all(|t| t.done >= self.header.samples.end);
-        match write_tiles(&partial, &self.header, tiles) {
-            Ok(()) => {
-                let to_disk = move || sync_and_rename(&partial, &path);
+        match Partial::write(&self.path, |file| write_tiles(file, &self.header, tiles)) {
+            Ok(partial) => {
+                let to_disk = move || partial.end();
                 match std::thread::Builder::new().name("checkpoint".to_owned()).spawn(to_disk) {
                     Ok(thread) => self.under_way = Some(thread),
                     Err(error) => self.report(Err(error)),
@@ -106,8 +115,6 @@ impl Checkpoints {
         match written {
             Ok(()) => self.stored += 1,
             Err(error) => {
-                // What is left of it would keep a full disk full
-                let _ = std::fs::remove_file(partial_path(&self.path));
                 if !std::mem::replace(&mut self.has_warned, true) {
                     let stays = if self.stored > 0 { "; the last one stays" } else { "" };
                     let path = self.path.display();

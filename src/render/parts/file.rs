@@ -4,10 +4,11 @@
 
 use super::error::PartError;
 use super::header::FilmHeader;
+use super::partial::Partial;
 use super::stored_tile::{self, StoredTile};
+use crate::film::PixelBounds;
 use crate::film::encoding::{Decoder, Encoder};
-use crate::render::tiles::{Tile, Tiles};
-use lumiris_formats::output::sync_and_rename;
+use crate::render::tiles::{SHARE_TILE, Tile, Tiles};
 use rayon::prelude::*;
 use std::fs::File;
 use std::io::{self, BufReader, Read, Write};
@@ -28,35 +29,23 @@ const CHUNKS_AT_ONCE: usize = 16;
 
 /// Writes a file of sums under a name beside `path`, which is then renamed: `path` is never half of a file.
 pub fn write_film(path: &Path, header: &FilmHeader, tiles: &Tiles) -> Result<(), PartError> {
-    let partial = partial_path(path);
-    let written = write_tiles(&partial, header, &tiles.0).and_then(|()| sync_and_rename(&partial, path));
-    written.map_err(|error| {
-        let _ = std::fs::remove_file(&partial);
-        PartError::io(path, error)
-    })
-}
-
-/// The name under which a file is written.
-pub(super) fn partial_path(path: &Path) -> PathBuf {
-    let mut name = path.as_os_str().to_owned();
-    name.push(".tmp");
-    PathBuf::from(name)
+    let written = Partial::write(path, |file| write_tiles(file, header, &tiles.0)).and_then(Partial::end);
+    written.map_err(|error| PartError::io(path, error))
 }
 
 /// Writes a file of sums.
-pub(super) fn write_tiles(path: &Path, header: &FilmHeader, tiles: &[Tile]) -> io::Result<()> {
-    let mut file = File::create(path)?;
+pub(super) fn write_tiles(file: &mut File, header: &FilmHeader, tiles: &[Tile]) -> io::Result<()> {
     file.write_all(MAGIC)?;
     file.write_all(&VERSION.to_le_bytes())?;
-    write_chunk(&mut file, HEADER, header.text().as_bytes())?;
+    write_chunk(file, HEADER, header.text().as_bytes())?;
 
     let per_chunk = (CHUNK_PIXELS / tiles.first().map_or(1, |t| t.bounds.area()).max(1)).max(1);
     let chunks: Vec<&[Tile]> = tiles.chunks(per_chunk).collect();
     for chunks in chunks.chunks(CHUNKS_AT_ONCE) {
         let encoded: Vec<Vec<u8>> = chunks.par_iter().map(|tiles| chunk_of(tiles)).collect();
-        encoded.iter().try_for_each(|bytes| write_chunk(&mut file, TILES, bytes))?;
+        encoded.iter().try_for_each(|bytes| write_chunk(file, TILES, bytes))?;
     }
-    write_chunk(&mut file, END, &(chunks.len() as u64).to_le_bytes())?;
+    write_chunk(file, END, &(chunks.len() as u64).to_le_bytes())?;
     file.flush()
 }
 
@@ -96,6 +85,8 @@ pub struct FilmReader {
     left: u64,
     header: FilmHeader,
     chunks: u64,
+    /// Pixels that were read.
+    pixels: PixelSet,
 }
 
 impl FilmReader {
@@ -123,7 +114,8 @@ impl FilmReader {
         let header = std::str::from_utf8(&bytes).ok().filter(|_| letter == HEADER).and_then(FilmHeader::parse);
         let header = header.ok_or_else(|| PartError::damaged(path, "its header means nothing"))?;
         let left = left - (bytes.len() as u64 + CHUNK_OVERHEAD);
-        Ok(FilmReader { path: path.to_owned(), file, left, header, chunks: 0 })
+        let pixels = PixelSet::default();
+        Ok(FilmReader { path: path.to_owned(), file, left, header, chunks: 0, pixels })
     }
 
     /// The header.
@@ -136,7 +128,7 @@ impl FilmReader {
         &self.path
     }
 
-    /// The next tiles; `None` at the end of the file.
+    /// The next tiles; `None` at the end of the file. Together they are the pixels that the header says, each once.
     pub fn tiles(&mut self) -> Result<Option<Vec<StoredTile>>, PartError> {
         let damaged = |reason| PartError::damaged(&self.path, reason);
         let (letter, bytes) = read_chunk(&mut self.file, self.left).map_err(|e| e.at(&self.path))?;
@@ -146,11 +138,18 @@ impl FilmReader {
                 self.chunks += 1;
                 let mut decoder = Decoder::new(&bytes);
                 let count = decoder.word().ok_or_else(|| damaged("there are no tiles where some should be"))?;
-                let tiles = (0..count).map(|_| StoredTile::read(&mut decoder, &self.header.bounds));
+                let tiles = (0..count).map(|_| StoredTile::read(&mut decoder, &self.header));
                 let tiles = tiles.collect::<Option<Vec<_>>>().filter(|_| decoder.is_at_end());
-                tiles.map(Some).ok_or_else(|| damaged("its tiles mean nothing"))
+                let tiles = tiles.ok_or_else(|| damaged("its tiles mean nothing"))?;
+                if !tiles.iter().all(|tile| self.pixels.insert(&tile.bounds, &self.header)) {
+                    return Err(damaged("it has a pixel twice, or one that is of another part"));
+                }
+                Ok(Some(tiles))
             }
-            END if bytes == self.chunks.to_le_bytes() && self.left == 0 => Ok(None),
+            END if bytes == self.chunks.to_le_bytes() && self.left == 0 => {
+                let is_whole = self.pixels.count == pixels_of(&self.header);
+                is_whole.then_some(None).ok_or_else(|| damaged("it does not have the pixels that its header says"))
+            }
             END => Err(damaged("there is more or less than its end says")),
             _ => Err(damaged("it holds something unknown")),
         }
@@ -162,16 +161,40 @@ impl FilmReader {
         while let Some(tiles) = self.tiles()? {
             all.extend(tiles);
         }
-        let covered: usize = all.iter().map(|t| t.bounds.area()).sum();
-        if covered != pixels_of(&self.header) {
-            return Err(PartError::damaged(&self.path, "it does not have the pixels that its header says"));
-        }
         Ok(all)
     }
 }
 
+/// Pixels of an image, a bit each.
+#[derive(Debug, Default)]
+struct PixelSet {
+    words: Vec<u64>,
+    count: usize,
+}
+
+impl PixelSet {
+    /// Inserts the pixels of a tile, which lies inside the image. False if one of them is there already, or is not of the part
+    /// that the header says.
+    fn insert(&mut self, tile: &PixelBounds, header: &FilmHeader) -> bool {
+        let image = &header.bounds;
+        self.words.resize(image.area().div_ceil(64), 0);
+        self.count += tile.area();
+        let columns = image.width().div_ceil(SHARE_TILE) as usize;
+        let cell = |v: u32, origin: u32| ((v - origin) / SHARE_TILE) as usize;
+        let mut is_new = |x: u32, y: u32| {
+            let at = (y - image.y0) as usize * image.width() as usize + (x - image.x0) as usize;
+            let (word, bit) = (&mut self.words[at / 64], 1 << (at % 64));
+            let is_ours = header.share.is_none_or(|share| share.has(cell(y, image.y0) * columns + cell(x, image.x0)));
+            let is_new = *word & bit == 0;
+            *word |= bit;
+            is_ours && is_new
+        };
+        (tile.y0..tile.y1).all(|y| (tile.x0..tile.x1).all(|x| is_new(x, y)))
+    }
+}
+
 /// Number of pixels that a file has.
-pub(super) fn pixels_of(header: &FilmHeader) -> usize {
+fn pixels_of(header: &FilmHeader) -> usize {
     match header.share {
         Some(share) => share.tiles(&header.bounds).map(|tile| tile.area()).sum(),
         None => header.bounds.area(),
@@ -220,4 +243,75 @@ fn read_chunk(file: &mut impl Read, left: u64) -> Result<(u8, Vec<u8>), ChunkErr
         return Err(ChunkError::Damaged("a checksum is wrong"));
     }
     Ok((head[0], bytes))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::direct::Fits;
+    use crate::film::packed::PackedSums;
+    use crate::render::tiles::TileShare;
+    use std::sync::Arc;
+
+    const IMAGE: PixelBounds = PixelBounds { x0: 3, x1: 43, y0: 1, y1: 21 };
+
+    fn header(share: Option<TileShare>) -> FilmHeader {
+        FilmHeader {
+            resolution: [64, 48],
+            bounds: IMAGE,
+            samples: 4..8,
+            spp: 32,
+            share,
+            is_finished: true,
+            replica_edge: None,
+            controls: 0,
+            light_layers: Vec::new(),
+            fingerprint: 0,
+            settings: Vec::new(),
+            notes: Vec::new(),
+        }
+    }
+
+    fn tile(bounds: PixelBounds, done: u32) -> Tile {
+        let sums = Arc::new(PackedSums::new(bounds.area()));
+        Tile { bounds, done, sums, layers: Vec::new(), replicas: Vec::new(), fits: Fits::default() }
+    }
+
+    /// What is wrong with a file of these tiles, all of whose checksums are right.
+    fn fault(share: Option<TileShare>, tiles: &[Tile]) -> Option<String> {
+        let folder = tempfile::tempdir().unwrap();
+        let path = folder.path().join("a.part");
+        write_tiles(&mut File::create(&path).unwrap(), &header(share), tiles).unwrap();
+        FilmReader::open(&path).unwrap().all_tiles().err().map(|error| error.to_string())
+    }
+
+    #[test]
+    fn tiles_that_are_not_those_of_the_header_are_damage() {
+        let whole = || -> Vec<Tile> { IMAGE.tiles(7).into_iter().map(|bounds| tile(bounds, 8)).collect() };
+        assert_eq!(fault(None, &whole()), None);
+        assert!(fault(None, &whole()[1..]).unwrap().contains("does not have the pixels"));
+        let mut tiles = whole();
+        tiles[1] = tile(tiles[0].bounds, 8);
+        assert!(fault(None, &tiles).unwrap().contains("a pixel twice"));
+        for (k, wrong) in [
+            tile(PixelBounds { x1: 44, ..IMAGE }, 8),
+            tile(PixelBounds { x0: 43, x1: 3, ..IMAGE }, 8),
+            tile(IMAGE, 3),
+            tile(IMAGE, 9),
+        ]
+        .into_iter()
+        .enumerate()
+        {
+            assert!(fault(None, &[wrong]).unwrap().contains("its tiles mean nothing"), "{k}");
+        }
+
+        let share = TileShare { index: 1, count: 3 };
+        let ours = || -> Vec<Tile> { share.tiles(&IMAGE).map(|bounds| tile(bounds, 4)).collect() };
+        assert_eq!(fault(Some(share), &ours()), None);
+        let mut tiles = ours();
+        tiles[0].bounds = IMAGE.tiles(SHARE_TILE)[0];
+        assert!(fault(Some(share), &tiles).unwrap().contains("of another part"));
+        // More parts than tiles: some have none
+        assert_eq!(fault(Some(TileShare { index: 6, count: 7 }), &[]), None);
+    }
 }

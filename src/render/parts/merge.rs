@@ -4,15 +4,18 @@
 //! parts are read one after the other, some tiles at a time, into tiles that cover the image.
 
 use super::error::PartError;
-use super::file::{FilmReader, pixels_of};
+use super::file::FilmReader;
 use super::header::FilmHeader;
+use super::notes::{PLAN_NOTE, SCENE_NOTE, SECONDS, asked_aovs, has_features};
 use super::stored_tile::StoredTile;
 use crate::direct::Fits;
 use crate::film::accumulator::PixelAccumulator;
+use crate::film::exact::FixedSum;
 use crate::film::packed::PackedSums;
 use crate::film::replicas::replicas;
 use crate::film::{Film, PixelBounds};
 use crate::render::control_variates;
+use crate::render::output::{Aov, default_aovs};
 use crate::render::tiles::{SHARE_TILE, Tile, empty_layers, film, position};
 use std::collections::BTreeMap;
 use std::ops::Range;
@@ -33,6 +36,41 @@ pub struct Merged {
     pub missing: Vec<String>,
     /// Indices of the samples that a whole image has.
     pub samples: Range<u32>,
+    /// Time that all parts took together (s).
+    pub seconds: f64,
+}
+
+impl Merged {
+    /// The layers that the parts were rendered for.
+    pub fn aovs(&self) -> Vec<Aov> {
+        match asked_aovs(&self.header) {
+            Some(list) => list.into_iter().filter(|aov| *aov != Aov::Ratio).collect(),
+            None => default_aovs(&self.film, false, self.film.summary().has_records),
+        }
+    }
+
+    /// True if the film has albedos and normals.
+    pub fn has_features(&self) -> bool {
+        has_features(&self.header)
+    }
+
+    /// Metadata as of an image that is rendered at once.
+    pub fn metadata(&self) -> Vec<(String, String)> {
+        let settings = self.header.settings.iter().filter(|(key, _)| key.starts_with("lumiris:")).cloned();
+        let mut metadata: Vec<(String, String)> = settings.collect();
+        let mut add = |key: &str, value: String| metadata.push((format!("lumiris:{key}"), value));
+        add("scene", self.header.note(SCENE_NOTE).unwrap_or_default().to_owned());
+        if let Some(plan) = self.header.note(PLAN_NOTE) {
+            add("plan", plan.to_owned());
+        }
+        add("complete", self.missing.is_empty().to_string());
+        add("samples_done", self.film.summary().samples_text("per pixel"));
+        add("seconds", format!("{:.3}", self.seconds));
+        if !self.missing.is_empty() {
+            add("missing", self.missing.join("; "));
+        }
+        metadata
+    }
 }
 
 /// Merges parts, in any order.
@@ -58,20 +96,17 @@ pub fn merge(paths: &[PathBuf], allows_missing: bool) -> Result<Merged, PartErro
     let mut whole = Whole::empty(&first.header);
     for part in &parts {
         let mut reader = FilmReader::open(&part.path)?;
-        let mut pixels = 0;
-        while let Some(tiles) = reader.tiles()? {
-            for tile in &tiles {
-                pixels += tile.bounds.area();
-                whole.add(tile, part)?;
-            }
+        if *reader.header() != part.header {
+            return Err(PartError::damaged(&part.path, "it became another file while it was read"));
         }
-        if pixels != pixels_of(&part.header) {
-            return Err(PartError::damaged(&part.path, "it does not have the pixels that its header says"));
+        while let Some(tiles) = reader.tiles()? {
+            tiles.iter().try_for_each(|tile| whole.add(tile, part))?;
         }
     }
     let mut film = film(first.header.resolution, bounds, &whole.tiles, &first.header.light_layers);
-    control_variates::correct(&mut film, &whole.tiles, position);
-    Ok(Merged { film, header: first.header.clone(), missing, samples })
+    control_variates::correct(&mut film, &whole.tiles);
+    let seconds = parts.iter().filter_map(|p| p.header.note(SECONDS)?.parse::<f64>().ok()).sum();
+    Ok(Merged { film, header: first.header.clone(), missing, samples, seconds })
 }
 
 /// A part that is not read yet.
@@ -200,9 +235,10 @@ impl Whole {
             return Err(damaged("a tile lacks samples that its header says are there"));
         }
         let rows = stored.bounds.area() + stored.replicas.len();
-        let row = stored.controls.len() / rows;
-        let expected = self.tiles.first().map_or(0, |t| t.fits.exact_sums().len() / (t.sums.len() + t.replicas.len()));
-        if row * rows != stored.controls.len() || row != expected {
+        let controls = stored.controls.unpacked();
+        let row = controls.len() / rows;
+        let expected = self.tiles.first().map_or(0, |t| t.fits.sum_count() / (t.sums.len() + t.replicas.len()));
+        if row * rows != controls.len() || row != expected {
             return Err(damaged("it does not have the control variates that its header says"));
         }
         if stored.layers.len() != part.header.light_layers.len() {
@@ -217,7 +253,7 @@ impl Whole {
         for y in cells(stored.bounds.y0, stored.bounds.y1, self.bounds.y0) {
             for x in cells(stored.bounds.x0, stored.bounds.x1, self.bounds.x0) {
                 let tile = &mut self.tiles[y * columns + x];
-                add_to(tile, (stored, &sums, row), &mut self.packing).map_err(damaged)?;
+                add_to(tile, (stored, &sums, &controls[..]), &mut self.packing).map_err(damaged)?;
                 add_layers_to(tile, (&stored.bounds, &layers), &mut self.packing);
             }
         }
@@ -225,18 +261,21 @@ impl Whole {
     }
 }
 
-/// Adds what a tile and a stored one have in common. `row` is the number of sums of control variates of each pixel.
+/// Adds what a tile and a stored one have in common. The stored one has `controls` as sums of control variates, of all pixels.
 fn add_to(
     tile: &mut Tile,
-    (stored, sums, row): (&StoredTile, &[PixelAccumulator], usize),
+    (stored, sums, controls): (&StoredTile, &[PixelAccumulator], &[FixedSum]),
     packing: &mut Vec<u8>,
 ) -> Result<(), &'static str> {
     let bounds = tile.bounds;
     let index = |i: u32| index_in(&bounds, &stored.bounds, i);
-    let controls = |fit: usize| &stored.controls[fit * row..][..row];
+    let row = controls.len() / (sums.len() + stored.replicas.len());
+    let controls = |fit: usize| &controls[fit * row..][..row];
     let mut merged = tile.sums.unpacked();
     for (i, sums) in sums.iter().enumerate() {
         let Some(at) = index(i as u32) else { continue };
+        let counts = [merged[at].radiance.count, sums.radiance.count];
+        counts[0].checked_add(counts[1]).ok_or("with it, a pixel has more samples than can be counted")?;
         merged[at].merge(sums);
         if row > 0 {
             tile.fits.merge_sums(at as u32, controls(i));
@@ -252,6 +291,7 @@ fn add_to(
             tile.fits.merge_sums((merged.len() + at) as u32, controls(stored.bounds.area() + i));
         }
     }
+    tile.fits.pack(packing);
     Ok(())
 }
 

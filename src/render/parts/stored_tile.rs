@@ -1,10 +1,10 @@
 //! The sums of a tile in a file.
 
 use super::error::PartError;
+use super::header::FilmHeader;
 use crate::film::PixelBounds;
 use crate::film::encoding::{Decoder, Encoder};
-use crate::film::exact::FixedSum;
-use crate::film::packed::PackedSums;
+use crate::film::packed::{PackedRows, PackedSums};
 use crate::film::replicas::ReplicaAccumulator;
 use crate::render::tiles::Tile;
 use std::sync::Arc;
@@ -21,7 +21,7 @@ pub struct StoredTile {
     pub(super) layers: Vec<PackedSums>,
     pub(super) replicas: Vec<ReplicaAccumulator>,
     /// Sums of values and control variates, of the pixels and then of the replicas.
-    pub(super) controls: Vec<FixedSum>,
+    pub(super) controls: PackedRows,
     /// What later samples follow from.
     memory: [Vec<f32>; 2],
 }
@@ -34,13 +34,14 @@ impl StoredTile {
         if pixels(&tile.replicas) != pixels(&self.replicas) {
             return Err(PartError::Sums("the pixels that are estimated twice are not the same"));
         }
-        if !tile.fits.restore(self.memory) || tile.fits.exact_sums().len() != self.controls.len() {
+        if !tile.fits.restore(self.memory) || tile.fits.sum_count() != self.controls.len() {
             return Err(PartError::Sums("there are not as many control variates"));
         }
         let row = 3 + tile.fits.controls();
-        (0..).zip(self.controls.chunks(row)).for_each(|(fit, sums)| {
+        (0..).zip(self.controls.unpacked().chunks(row)).for_each(|(fit, sums)| {
             tile.fits.merge_sums(fit, sums);
         });
+        tile.fits.pack(&mut Vec::new());
         (tile.replicas, tile.done) = (self.replicas, self.done);
         if tile.layers.len() != self.layers.len() {
             return Err(PartError::Sums("there are not as many light groups"));
@@ -52,14 +53,15 @@ impl StoredTile {
         Ok(tile)
     }
 
-    /// Reads a tile inside `image`; `None` if it is none.
-    pub(super) fn read(decoder: &mut Decoder<'_>, image: &PixelBounds) -> Option<Self> {
+    /// Reads a tile of what the header says; `None` if it is none.
+    pub(super) fn read(decoder: &mut Decoder<'_>, header: &FilmHeader) -> Option<Self> {
+        let (image, samples) = (&header.bounds, &header.samples);
         let mut word = || decoder.word();
         let (bounds, done) = (PixelBounds { x0: word()?, x1: word()?, y0: word()?, y1: word()? }, word()?);
         let (layers, replicas, controls) = (word()? as usize, word()? as usize, word()? as usize);
         let is_inside =
             image.x0 <= bounds.x0 && bounds.x1 <= image.x1 && image.y0 <= bounds.y0 && bounds.y1 <= image.y1;
-        if !is_inside || bounds.area() == 0 {
+        if !is_inside || bounds.area() == 0 || done < samples.start || done > samples.end {
             return None;
         }
         // As many as there are bytes for, whatever the numbers say
@@ -68,10 +70,17 @@ impl StoredTile {
         let sums = pixels()?;
         let layers = (0..layers).map(|_| pixels()).collect::<Option<_>>()?;
         let replicas: Vec<_> = (0..replicas).map(|_| decoder.replica()).collect::<Option<_>>()?;
-        if replicas.iter().any(|r| r.pixel as usize >= bounds.area()) {
+        let is_in_order = replicas.windows(2).all(|pair| pair[0].pixel < pair[1].pixel);
+        if !is_in_order || replicas.iter().any(|r| r.pixel as usize >= bounds.area()) {
             return None;
         }
-        let controls = (0..controls).map(|_| decoder.fixed()).collect::<Option<_>>()?;
+        let numbers = (0..controls).map(|_| decoder.fixed()).collect::<Option<Vec<_>>>()?;
+        let rows = bounds.area() + replicas.len();
+        let mut controls = PackedRows::new(rows, numbers.len() / rows);
+        if controls.len() != numbers.len() {
+            return None;
+        }
+        controls.set(&numbers, &mut Vec::new());
         let memory = [decoder.floats()?, decoder.floats()?];
         Some(StoredTile { bounds, done, sums, layers, replicas, controls, memory })
     }

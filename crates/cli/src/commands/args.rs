@@ -6,11 +6,12 @@ use super::frame_list::{FrameList, parse_frames};
 use super::look::LookArgs;
 use super::memory::{MemoryLimit, parse_limit};
 use super::named::named;
-use super::part_args::PartArgs;
+use super::part_args::{LONGEST, PartArgs};
 use super::settings_args::SettingsArgs;
 use super::watch_args::WatchArgs;
 use clap::Args;
 use clap::builder::{PossibleValuesParser, TypedValueParser};
+use lumiris::import::LoadOptions;
 use lumiris::render::output::Aov;
 use lumiris::scene::AccelKind;
 use std::path::PathBuf;
@@ -69,6 +70,19 @@ pub(super) struct SceneArgs {
     pub tile_size: u32,
 }
 
+impl SceneArgs {
+    /// How the scene is loaded.
+    pub(super) fn load_options(&self) -> LoadOptions {
+        LoadOptions {
+            resolution: self.resolution,
+            crop: self.crop,
+            environment: self.environment.clone(),
+            camera_auto: self.camera_auto,
+            time: self.time_in_scene,
+        }
+    }
+}
+
 /// `lumiris render`
 #[derive(Args, Clone, Debug)]
 pub(super) struct RenderArgs {
@@ -79,8 +93,8 @@ pub(super) struct RenderArgs {
     /// [default: the name in the file, or SCENE.exr]
     #[arg(short, long, value_name = "FILE")]
     pub output: Vec<PathBuf>,
-    /// Frames of an animation, such as 1-48, 1-48:2 or 5,10-20: `####` in SCENE and FILE becomes the number of the frame;
-    /// a glTF scene needs none (--fps)
+    /// Frames of an animation, such as 1-48, 1-48:2 or 5,10-20: `####` in SCENE, and in the FILEs of --output, --checkpoint and
+    /// --resume, becomes the number of the frame; a glTF scene needs none (--fps)
     #[arg(long, value_name = "LIST", value_parser = parse_frames, requires = "output")]
     pub frames: Option<FrameList>,
     /// With --frames of a glTF scene without ####: frames per second; frame n is the scene at the time n/F
@@ -118,7 +132,7 @@ pub(super) struct RenderArgs {
     pub parts: PartArgs,
 }
 
-pub(super) fn parse_resolution(text: &str) -> Result<[u32; 2], String> {
+fn parse_resolution(text: &str) -> Result<[u32; 2], String> {
     let (w, h) = text.split_once(['x', 'X']).ok_or("expected WIDTHxHEIGHT, such as 640x480")?;
     let parse = |s: &str| match s.trim().parse::<u32>() {
         Ok(n @ 1..=65_536) => Ok(n),
@@ -127,7 +141,7 @@ pub(super) fn parse_resolution(text: &str) -> Result<[u32; 2], String> {
     Ok([parse(w)?, parse(h)?])
 }
 
-pub(super) fn parse_crop(text: &str) -> Result<[f32; 4], String> {
+fn parse_crop(text: &str) -> Result<[f32; 4], String> {
     let values: Vec<f32> = text
         .split(',')
         .map(|s| s.trim().parse().map_err(|_| format!("`{s}` is not a number")))
@@ -152,18 +166,18 @@ fn parse_packet_width(text: &str) -> Result<u32, String> {
 }
 
 /// Understands a time of a scene, which may lie before its start.
-pub(super) fn parse_time_in_scene(text: &str) -> Result<f32, String> {
+fn parse_time_in_scene(text: &str) -> Result<f32, String> {
     text.parse::<f32>().ok().filter(|s| s.is_finite()).ok_or_else(|| "expected a number of seconds".to_owned())
 }
 
-fn parse_fps(text: &str) -> Result<f32, String> {
+pub(super) fn parse_fps(text: &str) -> Result<f32, String> {
     let fps = text.parse::<f32>().ok().filter(|f| *f > 0.0 && f.is_finite());
     fps.ok_or_else(|| "expected a positive number of frames per second".to_owned())
 }
 
 fn parse_seconds(text: &str) -> Result<f64, String> {
     match text.parse::<f64>() {
-        Ok(s) if s > 0.0 && s.is_finite() => Ok(s),
+        Ok(s) if s > 0.0 && s.is_finite() => Ok(s.min(LONGEST)),
         _ => Err("expected a positive number of seconds".to_owned()),
     }
 }

@@ -1,5 +1,7 @@
 //! Options of denoising, and what became of it.
 
+use super::UsageError;
+use super::part_args::extension;
 use clap::Args;
 use lumiris::film::{Film, PixelBounds};
 use lumiris::imaging::oidn::{DenoiseError, Denoiser, NoisyImage};
@@ -17,7 +19,7 @@ const SHOWN_KEY: &str = "lumiris:layer";
 /// Environment variable of the library.
 const LIBRARY_VARIABLE: &str = "LUMIRIS_OIDN";
 
-/// Options of `render`.
+/// Options of `render` and `merge`.
 #[derive(Args, Clone, Debug)]
 #[command(next_help_heading = "Denoising")]
 pub(super) struct DenoiseArgs {
@@ -34,6 +36,24 @@ impl DenoiseArgs {
     /// Opens the library, if the image is to be denoised.
     pub(super) fn open(&self, threads: Option<u32>) -> anyhow::Result<Option<Denoiser>> {
         self.denoise.then(|| open(self.oidn_library.as_deref(), threads)).transpose()
+    }
+
+    /// Refuses to show a denoised image without keeping the other.
+    pub(super) fn check(&self, outputs: &[PathBuf]) -> Result<(), UsageError> {
+        if self.denoise && !outputs.iter().any(|path| extension(path) == "exr") {
+            let text = "--denoise needs an EXR file among the outputs, which keeps the image as it was rendered";
+            return Err(UsageError(text.to_owned()));
+        }
+        Ok(())
+    }
+}
+
+/// The image without noise; or why there is none, which is no reason to lose the image. Whether the film has the features of
+/// the first surfaces is said.
+pub(super) fn denoise(denoiser: &Denoiser, film: &Film, has_features: bool) -> (Option<Denoised>, Option<String>) {
+    match Denoised::of_film(denoiser, film, has_features) {
+        Ok(denoised) => (Some(denoised), None),
+        Err(error) => (None, Some(format!("{error}; the image is written as it is"))),
     }
 }
 
@@ -75,8 +95,8 @@ impl Denoised {
         Ok(Denoised { pixels: denoiser.denoise(image)?, about })
     }
 
-    /// Denoises a film that has the features of the first surfaces.
-    pub(super) fn of_film(denoiser: &Denoiser, film: &Film) -> Result<Self, DenoiseError> {
+    /// Denoises a film, by the features of the first surfaces if it has them.
+    fn of_film(denoiser: &Denoiser, film: &Film, has_features: bool) -> Result<Self, DenoiseError> {
         let layer = |has_image: bool, aovs: &[Aov]| {
             let PixelBounds { y0, y1, .. } = film.bounds;
             Layers::new(film, has_image, aovs, None).rows_in_parallel(y0..y1)
@@ -85,8 +105,8 @@ impl Denoised {
             width: film.bounds.width() as usize,
             height: film.bounds.height() as usize,
             color: layer(true, &[]),
-            albedo: Some(layer(false, &[Aov::Albedo])),
-            normal: Some(layer(false, &[Aov::Normal])),
+            albedo: has_features.then(|| layer(false, &[Aov::Albedo])),
+            normal: has_features.then(|| layer(false, &[Aov::Normal])),
         };
         Denoised::new(denoiser, image)
     }

@@ -4,10 +4,10 @@ use super::UsageError;
 use super::named::named;
 use clap::Args;
 use clap::builder::PossibleValuesParser;
-use lumiris::cameras::Camera;
 use lumiris::film::Film;
 use lumiris::imaging::oiio::{MetaValue, Part, Storage, write_rows};
 use lumiris::render::cryptomatte::Cryptomatte;
+use lumiris::render::parts::CameraMatrices;
 use std::borrow::Cow;
 use std::cell::RefCell;
 use std::ops::Range;
@@ -201,43 +201,6 @@ fn joined(layers: &[ExrLayer<'_>], rows: Range<usize>) -> Vec<f32> {
         }
     }
     data
-}
-
-/// Where the camera stood, as columns of 4 × 4 matrices.
-#[derive(Clone, Copy, Debug, Default, PartialEq)]
-pub(super) struct CameraMatrices {
-    camera_from_world: Option<[f32; 16]>,
-    ndc_from_world: Option<[f32; 16]>,
-}
-
-/// Notes of parts that hold them.
-const MATRIX_NOTES: [&str; 2] = ["camera_from_world", "ndc_from_world"];
-
-impl CameraMatrices {
-    /// Those of a camera.
-    pub(super) fn of(camera: &Camera) -> Self {
-        CameraMatrices {
-            camera_from_world: Some(camera.camera_from_world().to_cols_array()),
-            ndc_from_world: camera.ndc_from_world().map(|m| m.to_cols_array()),
-        }
-    }
-
-    /// As notes of a part.
-    pub(super) fn notes(&self) -> impl Iterator<Item = (String, String)> {
-        let text = |m: [f32; 16]| m.map(|v| v.to_string()).join(",");
-        let matrices = MATRIX_NOTES.into_iter().zip([self.camera_from_world, self.ndc_from_world]);
-        matrices.filter_map(move |(key, m)| Some((key.to_owned(), text(m?))))
-    }
-
-    /// From the notes of a part.
-    pub(super) fn from_notes<'a>(note: impl Fn(&str) -> Option<&'a str>) -> Self {
-        let matrix = |key| {
-            let values: Vec<f32> = note(key)?.split(',').map_while(|v| v.parse().ok()).collect();
-            <[f32; 16]>::try_from(values).ok()
-        };
-        let [camera_from_world, ndc_from_world] = MATRIX_NOTES.map(matrix);
-        CameraMatrices { camera_from_world, ndc_from_world }
-    }
 }
 
 /// Adds the attributes that other programs know.

@@ -1,9 +1,12 @@
 //! `lumiris farm`: an image rendered in parts by the nodes of a cluster.
 
 use super::UsageError;
-use super::args::{RenderArgs, SceneArgs, aov};
+use super::args::{RenderArgs, SceneArgs, aov, parse_fps};
+use super::denoise_args::DenoiseArgs;
 use super::exr::ExrArgs;
 use super::farm_scripts::{Job, quoted};
+use super::frame_list::{FrameList, has_number, numbered, parse_frames};
+use super::frames::{check_numbers, first_of};
 use super::look::LookArgs;
 use super::merge::check_look;
 use super::named::named;
@@ -44,9 +47,18 @@ enum Queue {
 struct SlurmArgs {
     #[command(flatten)]
     scene: AsTyped<SceneArgs>,
-    /// Number of parts, each of which is a task of an array job
-    #[arg(long = "parts", value_name = "N", value_parser = clap::value_parser!(u32).range(1..=1_000_000))]
-    count: u32,
+    /// Frames of an animation, such as 1-48, as for `render`: an array job and a merge for each
+    #[arg(long, value_name = "LIST", value_parser = parse_frames)]
+    frames: Option<FrameList>,
+    /// With --frames of a glTF scene without ####: frames per second [default: 24]
+    #[arg(long, value_name = "F", value_parser = parse_fps, requires = "frames")]
+    fps: Option<f32>,
+    /// Number of parts of an image, each of which is a task of an array job [default with --frames: 1]
+    #[arg(
+        long = "parts", value_name = "N", value_parser = clap::value_parser!(u32).range(1..=1_000_000),
+        required_unless_present = "frames"
+    )]
+    count: Option<u32>,
     /// What a part has: `samples`, a share of the samples of every pixel, or `tiles`, all samples of a share of the pixels
     #[arg(long, value_name = "WHAT", default_value = "samples", value_parser = named::<PartBy>())]
     part_by: PartBy,
@@ -60,13 +72,16 @@ struct SlurmArgs {
     look: AsTyped<LookArgs>,
     #[command(flatten)]
     exr: AsTyped<ExrArgs>,
+    #[command(flatten)]
+    denoise: AsTyped<DenoiseArgs>,
     /// Time between the checkpoints of a part
     #[arg(long, value_name = "SECONDS", default_value_t = 60, value_parser = clap::value_parser!(u32).range(1..))]
     checkpoint_seconds: u32,
     /// An option of sbatch for all jobs, such as --sbatch=--partition=render; may be given several times
     #[arg(long, value_name = "OPTION", allow_hyphen_values = true)]
     sbatch: Vec<String>,
-    /// Folder of scripts, parts and logs, on a file system that all nodes share [default: the first output, .farm]
+    /// Folder of scripts, parts and logs, on a file system that all nodes share [default: the first output, .farm, without
+    /// ####]
     #[arg(long, value_name = "DIR")]
     dir: Option<PathBuf>,
     /// The program on the nodes [default: this one, by its path]
@@ -77,17 +92,29 @@ struct SlurmArgs {
     submit: bool,
 }
 
+impl SlurmArgs {
+    /// Number of parts of an image.
+    fn count(&self) -> u32 {
+        self.count.unwrap_or(1)
+    }
+}
+
 pub(super) fn run(args: &FarmArgs) -> anyhow::Result<ExitCode> {
     let Queue::Slurm(args) = &args.queue;
-    check_outputs(&args.output)?;
+    check_outputs(&outputs_of_first(args))?;
     if let Some(path) = args.output.iter().find(|path| extension(path) == PART_TYPE) {
         return Err(UsageError(format!("{}: parts are merged to an image, such as image.exr", path.display())).into());
     }
     check_look(&args.look.args, &args.exr.args)?;
-    let needs_plan = check(args)?;
-    let folder = args.dir.clone().unwrap_or_else(|| args.output[0].with_extension("farm"));
+    args.denoise.args.check(&args.output)?;
+    let (first, needs_plan) = check(args)?;
+    let folder = args.dir.clone().unwrap_or_else(|| default_folder(&args.output[0]));
     let folder = absolute(&folder).with_context(|| format!("cannot find {}", folder.display()))?;
-    let job = job(args, &folder, needs_plan)?;
+    if args.frames.is_some() && has_number(&folder) {
+        let text = format!("--frames: {} is one folder for all frames: give a --dir without #", folder.display());
+        return Err(UsageError(text).into());
+    }
+    let job = job(args, &folder, (&first, needs_plan))?;
     write_folder(args, &folder, &job)?;
     if args.submit {
         submit(&folder)?;
@@ -98,15 +125,49 @@ pub(super) fn run(args: &FarmArgs) -> anyhow::Result<ExitCode> {
     Ok(ExitCode::SUCCESS)
 }
 
-/// Rejects what cannot be rendered in parts, before anything is written; true if a plan must be made.
-fn check(args: &SlurmArgs) -> anyhow::Result<bool> {
+/// Outputs of the first frame.
+fn outputs_of_first(args: &SlurmArgs) -> Vec<PathBuf> {
+    match first_frame(args) {
+        Some(frame) => args.output.iter().map(|path| numbered(path, frame)).collect(),
+        None => args.output.clone(),
+    }
+}
+
+fn first_frame(args: &SlurmArgs) -> Option<u32> {
+    args.frames.as_ref().and_then(|list| list.0.first().copied())
+}
+
+/// The folder of an image, or of all images of which this one has ####.
+fn default_folder(output: &Path) -> PathBuf {
+    let name = output.file_name().unwrap_or_default().to_string_lossy();
+    let mut words: Vec<String> = name.split('#').filter(|word| !word.is_empty()).map(str::to_owned).collect();
+    if let Some((_, before)) = words.split_last_mut() {
+        // What set the number apart sets nothing apart any more
+        before.iter_mut().for_each(|word| *word = word.trim_end_matches(['.', '_', '-']).to_owned());
+    }
+    let name = words.concat();
+    let name = if name.is_empty() || name.starts_with('.') { format!("frames{name}") } else { name };
+    output.with_file_name(name).with_extension("farm")
+}
+
+/// Rejects what cannot be rendered in parts, before anything is written. The options of the first image, and true if a plan
+/// must be made.
+fn check(args: &SlurmArgs) -> anyhow::Result<(RenderArgs, bool)> {
     let mut words = part_options(args, None);
-    words.extend(["--part".to_owned(), format!("1/{}", args.count), "-o".to_owned(), "1.part".to_owned()]);
+    words.extend(["--part".to_owned(), format!("1/{}", args.count())]);
+    words.extend(["-o".to_owned(), (if args.frames.is_some() { "####.part" } else { "1.part" }).to_owned()]);
+    words.extend(args.frames.iter().map(|list| format!("--frames={}", list.text())));
     words.extend(["--".to_owned(), text(&args.scene.args.scene)?]);
     let command = RenderArgs::augment_args(clap::Command::new("render").no_binary_name(true));
     let matches = command.try_get_matches_from(words).map_err(|e| UsageError(e.to_string()))?;
     let mut render = RenderArgs::from_arg_matches(&matches).map_err(|e| UsageError(e.to_string()))?;
     render.scene.plan.clone_from(&args.scene.args.plan);
+    if let Some(frames) = &args.frames {
+        check_numbers(args.output.iter())?;
+        let first = first_of(&render, frames)?;
+        check_scenes(&render.scene.scene, frames)?;
+        render = first;
+    }
 
     let Loaded { scene, settings, .. } = load_scene(&render.scene, &FileCache::default(), None)?;
     let is_measured = follows_from_times(&settings, &scene.film.bounds);
@@ -121,12 +182,23 @@ fn check(args: &SlurmArgs) -> anyhow::Result<bool> {
         Allocation::Auto => settings.integrator.estimator != EstimatorKind::Auto || !is_measured,
         Allocation::Adaptive => false,
     };
-    let (spp, count) = (settings.sampling.spp, args.count);
+    let (spp, count) = (settings.sampling.spp, args.count());
     if is_uniform && args.part_by == PartBy::Samples && spp < count {
         let message = format!("{spp} samples per pixel cannot be {count} parts: divide with --part-by tiles");
         return Err(UsageError(message).into());
     }
-    Ok(needs_plan)
+    Ok((render, needs_plan))
+}
+
+/// Fails if the scene of a frame is missing. Only that of the first frame is loaded.
+fn check_scenes(scene: &Path, frames: &FrameList) -> anyhow::Result<()> {
+    let scenes = frames.0.iter().map(|&frame| numbered(scene, frame));
+    let missing: Vec<String> = scenes.filter(|path| !path.is_file()).map(|path| path.display().to_string()).collect();
+    match missing.first() {
+        Some(first) if missing.len() == 1 => bail!("{first}: there is no such scene"),
+        Some(first) => bail!("{first} and the scenes of {} more frames are missing", missing.len() - 1),
+        None => Ok(()),
+    }
 }
 
 /// Options of `lumiris render`, the same for all parts.
@@ -138,11 +210,12 @@ fn part_options(args: &SlurmArgs, plan: Option<String>) -> Vec<String> {
         format!("--aov={}", names.join(","))
     });
     words.extend(names);
+    words.extend(args.fps.map(|fps| format!("--fps={fps}")));
     words.push(format!("--part-by={}", <&str>::from(args.part_by)));
     words
 }
 
-fn job(args: &SlurmArgs, folder: &Path, needs_plan: bool) -> anyhow::Result<Job> {
+fn job(args: &SlurmArgs, folder: &Path, (first, needs_plan): (&RenderArgs, bool)) -> anyhow::Result<Job> {
     let from = std::env::current_dir().context("there is no current folder")?;
     let program = match &args.program {
         Some(path) => path.clone(),
@@ -150,20 +223,27 @@ fn job(args: &SlurmArgs, folder: &Path, needs_plan: bool) -> anyhow::Result<Job>
     };
     let has_plan = needs_plan || args.scene.args.plan.is_some();
     let plan = if has_plan { Some(text(&folder.join("plan.json"))?) } else { None };
-    let mut merge = [args.look.words_without(&[]), args.exr.words_without(&[])].concat();
+    let mut merge =
+        [args.look.words_without(&[]), args.exr.words_without(&[]), args.denoise.words_without(&[])].concat();
     for path in &args.output {
-        merge.push(format!("--output={}", text(&absolute(path)?)?));
+        // Scripts go to the folder where this runs, whose name may have # itself
+        merge.push(format!("--output={}", text(path)?));
     }
+    // One plan for all frames: that of the first
+    let mut planned = args.scene.words_without(&["plan", "time-in-scene"]);
+    planned.extend(first.scene.time_in_scene.map(|time| format!("--time-in-scene={time}")));
     Ok(Job {
         lumiris: text(&program)?,
         from: text(&from)?,
         folder: text(folder)?,
         scene: text(&args.scene.args.scene)?,
-        parts: args.count,
+        first_scene: text(&first.scene.scene)?,
+        frames: args.frames.as_ref().map_or(Vec::new(), |list| list.0.clone()),
+        parts: args.count(),
         seconds: f64::from(args.checkpoint_seconds),
         needs_plan,
         has_threads: args.scene.args.threads.is_some(),
-        options: [args.scene.words_without(&["plan"]), part_options(args, plan), merge, args.sbatch.clone()],
+        options: [planned, part_options(args, plan), merge, args.sbatch.clone()],
     })
 }
 
@@ -224,4 +304,20 @@ fn submit(folder: &Path) -> anyhow::Result<()> {
     }
     progress::print(out.trim_end());
     Ok(())
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn the_folder_is_called_like_the_image_without_the_number_of_a_frame() {
+        let folder = |name: &str| default_folder(Path::new(name)).display().to_string();
+        assert_eq!(folder("a/image.exr"), "a/image.farm");
+        assert_eq!(folder("image"), "image.farm");
+        assert_eq!(folder("out.####.exr"), "out.farm");
+        assert_eq!(folder("a/out_##.left.exr"), "a/out.left.farm");
+        assert_eq!(folder("####.exr"), "frames.farm");
+        assert_eq!(folder("####"), "frames.farm");
+    }
 }

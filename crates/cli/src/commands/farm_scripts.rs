@@ -8,6 +8,9 @@ const SCRIPTS: [(&str, &str); 4] = [
     ("submit.sh", include_str!("farm/submit.sh")),
 ];
 
+/// What scripts that work at a frame have in place of `# FRAME`.
+const FRAME: &str = include_str!("farm/frame.sh");
+
 /// What the scripts do.
 #[derive(Clone, Debug, Default)]
 pub(super) struct Job {
@@ -18,7 +21,11 @@ pub(super) struct Job {
     /// The folder of scripts, parts and logs.
     pub(super) folder: String,
     pub(super) scene: String,
-    /// Number of parts.
+    /// The scene that a plan is made for: that of the first frame.
+    pub(super) first_scene: String,
+    /// Numbers of frames; none if it is one image.
+    pub(super) frames: Vec<u32>,
+    /// Number of parts of an image.
     pub(super) parts: u32,
     /// Time between checkpoints (s).
     pub(super) seconds: f64,
@@ -34,11 +41,18 @@ impl Job {
     /// Names and texts of the scripts.
     pub(super) fn scripts(&self) -> Vec<(&'static str, String)> {
         let flag = |is: bool| if is { "yes" } else { "" };
-        let words =
-            [("lumiris", &self.lumiris), ("from", &self.from), ("folder", &self.folder), ("scene", &self.scene)];
+        let words = [
+            ("lumiris", &self.lumiris),
+            ("from", &self.from),
+            ("folder", &self.folder),
+            ("scene", &self.scene),
+            ("first_scene", &self.first_scene),
+        ];
         let words: String = words.iter().map(|(name, value)| format!("{name}={}\n", quoted(value))).collect();
+        let frames: Vec<String> = self.frames.iter().map(u32::to_string).collect();
         let numbers = format!(
-            "parts={}\nseconds={}\nneeds_plan={}\nhas_threads={}\n",
+            "frames=({})\nparts={}\nseconds={}\nneeds_plan={}\nhas_threads={}\n",
+            frames.join(" "),
             self.parts,
             self.seconds,
             flag(self.needs_plan),
@@ -47,6 +61,7 @@ impl Job {
         let script = |((name, body), options): (&(&'static str, &str), &Vec<String>)| {
             let options: Vec<String> = options.iter().map(|word| quoted(word)).collect();
             let options = options.join(" ");
+            let body = body.replace("# FRAME\n", FRAME);
             (*name, format!("#!/bin/bash\n{words}{numbers}options=({options})\n\n{body}"))
         };
         SCRIPTS.iter().zip(&self.options).map(script).collect()

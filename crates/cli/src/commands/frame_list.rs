@@ -9,6 +9,13 @@ const MAX_FRAMES: u32 = 1_000_000;
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub(super) struct FrameList(pub Vec<u32>);
 
+impl FrameList {
+    /// The numbers, separated by commas.
+    pub(super) fn text(&self) -> String {
+        self.0.iter().map(u32::to_string).collect::<Vec<_>>().join(",")
+    }
+}
+
 /// Parses `1-48`, `1-48:2`, `5`, and lists of these separated by commas.
 pub(super) fn parse_frames(text: &str) -> Result<FrameList, String> {
     let mut frames = Vec::new();

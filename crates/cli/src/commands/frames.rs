@@ -12,7 +12,7 @@ use super::render::{INTERRUPTED, Rendered, Session, check, render_one, write_sta
 use lumiris::import::cache::{FileCache, FileCounts};
 use lumiris::import::is_gltf;
 use serde_json::json;
-use std::path::Path;
+use std::path::{Path, PathBuf};
 use std::process::ExitCode;
 
 /// What became of a frame.
@@ -68,11 +68,22 @@ pub(super) fn run(args: &RenderArgs, list: &FrameList) -> anyhow::Result<ExitCod
     Ok(if session.is_stopped() { ExitCode::from(INTERRUPTED) } else { ExitCode::SUCCESS })
 }
 
-/// Scene and images must have a place for the number: all frames would be the same, or overwrite each other.
+/// Scene, images and checkpoints must have a place for the number: all frames would be the same, or overwrite each other.
 fn check_names(args: &RenderArgs) -> Result<(), UsageError> {
     let scene = Some(&args.scene.scene).filter(|scene| !is_animated(args, scene));
-    let names = args.output.iter().chain(scene);
-    match names.into_iter().find(|path| !has_number(path)) {
+    let checkpoint = args.parts.checkpoint.as_ref().map(|(path, _)| path);
+    check_numbers(args.output.iter().chain(scene).chain(checkpoint).chain(&args.parts.resume))
+}
+
+/// The options of the first frame, of which those of all frames must be right.
+pub(super) fn first_of(args: &RenderArgs, list: &FrameList) -> Result<RenderArgs, UsageError> {
+    check_names(args)?;
+    Ok(of_frame(args, list.0.first().copied().unwrap_or(0)))
+}
+
+/// Refuses names without a place for the number of a frame.
+pub(super) fn check_numbers<'a>(mut names: impl Iterator<Item = &'a PathBuf>) -> Result<(), UsageError> {
+    match names.find(|path| !has_number(path)) {
         Some(path) => Err(UsageError(format!("--frames: {} has no #### for the number of the frame", path.display()))),
         None => Ok(()),
     }
@@ -89,8 +100,9 @@ fn of_frame(args: &RenderArgs, frame: u32) -> RenderArgs {
     if is_animated(&args, &args.scene.scene) {
         args.scene.time_in_scene = Some(frame as f32 / args.fps);
     }
-    args.scene.scene = numbered(&args.scene.scene, frame);
-    args.output.iter_mut().for_each(|path| *path = numbered(path, frame));
+    let checkpoint = args.parts.checkpoint.as_mut().map(|(path, _)| path);
+    let names = [&mut args.scene.scene].into_iter().chain(&mut args.output);
+    names.chain(checkpoint).chain(&mut args.parts.resume).for_each(|path| *path = numbered(path, frame));
     (args.frames, args.stats) = (None, None);
     args
 }

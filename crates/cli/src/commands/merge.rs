@@ -1,16 +1,18 @@
 //! `lumiris merge`: parts of an image become the image.
 
 use super::UsageError;
-use super::exr::{CameraMatrices, ExrArgs};
+use super::denoise_args::{self, DenoiseArgs, Denoised};
+use super::exr::ExrArgs;
+use super::frame_list::{FrameList, numbered, parse_frames};
+use super::frames::check_numbers;
 use super::look::LookArgs;
 use super::part_args::is_part;
 use super::pictures::{Picture, Written, check_outputs, write_all};
 use super::progress;
-use super::stored::{AOV_NOTE, PLAN_NOTE, SCENE_NOTE, SECONDS_NOTE};
 use anyhow::bail;
 use clap::Args;
-use lumiris::render::output::{Aov, default_aovs};
-use lumiris::render::parts::FilmReader;
+use lumiris::imaging::oidn::Denoiser;
+use lumiris::render::parts::CameraMatrices;
 use lumiris::render::parts::merge::{Merged, merge, repeated};
 use std::path::PathBuf;
 use std::process::ExitCode;
@@ -24,6 +26,9 @@ pub(super) struct MergeArgs {
     /// Output image; may be given several times, as for `render`
     #[arg(short, long, value_name = "FILE", required = true)]
     output: Vec<PathBuf>,
+    /// Frames of an animation, such as 1-48: `####` in PARTs and FILEs becomes the number of the frame
+    #[arg(long, value_name = "LIST", value_parser = parse_frames)]
+    frames: Option<FrameList>,
     /// Merge what there is if parts are missing, and say so in the metadata
     #[arg(long)]
     allow_missing: bool,
@@ -31,12 +36,41 @@ pub(super) struct MergeArgs {
     look: LookArgs,
     #[command(flatten)]
     exr: ExrArgs,
+    #[command(flatten)]
+    denoise: DenoiseArgs,
     /// Print only warnings and errors
     #[arg(short, long)]
     quiet: bool,
 }
 
 pub(super) fn run(args: &MergeArgs) -> anyhow::Result<ExitCode> {
+    check_look(&args.look, &args.exr)?;
+    args.denoise.check(&args.output)?;
+    let denoiser = args.denoise.open(None)?;
+    let Some(frames) = &args.frames else {
+        merge_one(args, denoiser.as_ref())?;
+        return Ok(ExitCode::SUCCESS);
+    };
+
+    // A frame that fails does not stop the others
+    check_numbers(args.output.iter().chain(&args.parts))?;
+    let mut failed = 0;
+    for &frame in &frames.0 {
+        let mut of_frame = args.clone();
+        of_frame.parts.iter_mut().chain(&mut of_frame.output).for_each(|path| *path = numbered(path, frame));
+        if let Err(error) = merge_one(&of_frame, denoiser.as_ref()) {
+            progress::say(&format!("lumiris: frame {frame}: {error:#}"));
+            failed += 1;
+        }
+    }
+    if failed > 0 {
+        bail!("{failed} of {} frames failed", frames.0.len());
+    }
+    Ok(ExitCode::SUCCESS)
+}
+
+/// Merges the parts of one image.
+fn merge_one(args: &MergeArgs, denoiser: Option<&Denoiser>) -> anyhow::Result<()> {
     check_outputs(&args.output)?;
     if let Some(path) = args.output.iter().find(|path| is_part(path)) {
         return Err(UsageError(format!("{}: parts are merged to an image, such as image.exr", path.display())).into());
@@ -44,22 +78,40 @@ pub(super) fn run(args: &MergeArgs) -> anyhow::Result<ExitCode> {
     if let Some(path) = repeated(&args.parts) {
         return Err(UsageError(format!("{} is given twice", path.display())).into());
     }
-    check_look(&args.look, &args.exr)?;
-    let seconds = seconds(args)?;
     let merged = merge(&args.parts, args.allow_missing)?;
+    let (denoised, not_denoised) = denoise(denoiser, &merged);
     let picture = Picture {
         film: &merged.film,
         look: &args.look,
         exr: &args.exr,
-        aovs: aovs(&merged),
+        aovs: merged.aovs(),
         sample_count_map: None,
         cryptomattes: &[],
-        denoised: None,
+        denoised: denoised.as_ref(),
         camera: CameraMatrices::from_notes(|name| merged.header.note(name)),
-        seconds,
-        metadata: metadata(&merged, seconds),
+        seconds: merged.seconds,
+        metadata: merged.metadata(),
     };
-    let Written { paths, misplaced } = write_all(&picture, &args.output);
+    let Written { paths, mut misplaced } = write_all(&picture, &args.output);
+    misplaced.extend(not_denoised);
+    report(args, &merged, &paths);
+    if !misplaced.is_empty() {
+        bail!(misplaced.join("\nlumiris: "));
+    }
+    Ok(())
+}
+
+/// The image without noise, if it is asked for; or why there is none, which is no reason to lose the image.
+fn denoise(denoiser: Option<&Denoiser>, merged: &Merged) -> (Option<Denoised>, Option<String>) {
+    let Some(denoiser) = denoiser else { return (None, None) };
+    if !merged.has_features() {
+        progress::say("warning: the parts have neither albedo nor normal: denoised by colour, which loses detail");
+    }
+    denoise_args::denoise(denoiser, &merged.film, merged.has_features())
+}
+
+/// Says what became of the parts.
+fn report(args: &MergeArgs, merged: &Merged, paths: &[PathBuf]) {
     merged.missing.iter().for_each(|what| progress::say(&format!("warning: {what}: missing")));
     let summary = merged.film.summary();
     let invalid = summary.invalid;
@@ -72,10 +124,6 @@ pub(super) fn run(args: &MergeArgs) -> anyhow::Result<ExitCode> {
         let parts = if args.parts.len() == 1 { "1 part".to_owned() } else { format!("{} parts", args.parts.len()) };
         progress::say(&format!("{} from {parts}, noise {noise}", names.join(", ")));
     }
-    if !misplaced.is_empty() {
-        bail!(misplaced.join("\nlumiris: "));
-    }
-    Ok(ExitCode::SUCCESS)
 }
 
 /// Refuses what an image from parts cannot be.
@@ -86,40 +134,4 @@ pub(super) fn check_look(look: &LookArgs, exr: &ExrArgs) -> anyhow::Result<()> {
         return Err(UsageError("--cryptomatte needs the scene: render the whole image with it".to_owned()).into());
     }
     Ok(())
-}
-
-/// Time that all parts took together (s).
-fn seconds(args: &MergeArgs) -> anyhow::Result<f64> {
-    let mut sum = 0.0;
-    for path in &args.parts {
-        let reader = FilmReader::open(path)?;
-        sum += reader.header().note(SECONDS_NOTE).and_then(|text| text.parse::<f64>().ok()).unwrap_or(0.0);
-    }
-    Ok(sum)
-}
-
-/// The layers that the parts were rendered for.
-fn aovs(merged: &Merged) -> Vec<Aov> {
-    match merged.header.note(AOV_NOTE) {
-        Some(list) => list.split(',').filter_map(|name| name.parse().ok()).filter(|aov| *aov != Aov::Ratio).collect(),
-        None => default_aovs(&merged.film, false, merged.film.summary().has_records),
-    }
-}
-
-/// Metadata as of an image that is rendered at once.
-fn metadata(merged: &Merged, seconds: f64) -> Vec<(String, String)> {
-    let settings = merged.header.settings.iter().filter(|(key, _)| key.starts_with("lumiris:")).cloned();
-    let mut metadata: Vec<(String, String)> = settings.collect();
-    let mut add = |key: &str, value: String| metadata.push((format!("lumiris:{key}"), value));
-    add("scene", merged.header.note(SCENE_NOTE).unwrap_or_default().to_owned());
-    if let Some(plan) = merged.header.note(PLAN_NOTE) {
-        add("plan", plan.to_owned());
-    }
-    add("complete", merged.missing.is_empty().to_string());
-    add("samples_done", merged.film.summary().samples_text("per pixel"));
-    add("seconds", format!("{seconds:.3}"));
-    if !merged.missing.is_empty() {
-        add("missing", merged.missing.join("; "));
-    }
-    metadata
 }

@@ -34,7 +34,6 @@ mod rescue;
 mod settings;
 mod settings_args;
 mod shell;
-mod stored;
 mod typed_options;
 mod watch_args;
 

@@ -9,6 +9,9 @@ use strum::{EnumString, IntoStaticStr, VariantNames};
 pub(super) const PART_TYPE: &str = "part";
 /// Time between checkpoints, if none is given (s).
 const CHECKPOINT_SECONDS: f64 = 60.0;
+/// Longest time that is asked for (s): more is as good as never.
+pub(super) const LONGEST: f64 = 1e9;
+
 /// What a part has of the image.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, EnumString, IntoStaticStr, VariantNames)]
 #[strum(serialize_all = "kebab-case")]
@@ -70,7 +73,7 @@ fn parse_checkpoint(text: &str) -> Result<(PathBuf, f64), String> {
     let with_seconds = text.rsplit_once(',').and_then(|(path, seconds)| Some((path, seconds.trim().parse().ok()?)));
     match with_seconds {
         Some((path, seconds)) if seconds > 0.0 && f64::is_finite(seconds) && !path.is_empty() => {
-            Ok((PathBuf::from(path), seconds))
+            Ok((PathBuf::from(path), seconds.min(LONGEST)))
         }
         Some(_) => Err("expected FILE or FILE,SECONDS with a positive number of seconds".to_owned()),
         None => Ok((PathBuf::from(text), CHECKPOINT_SECONDS)),

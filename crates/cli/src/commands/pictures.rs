@@ -2,7 +2,7 @@
 
 use super::args::RenderArgs;
 use super::denoise_args::{self, DENOISED, Denoised};
-use super::exr::{CameraMatrices, ExrArgs, ExrImage, ExrLayer};
+use super::exr::{ExrArgs, ExrImage, ExrLayer};
 use super::look::{Displayed, LookArgs};
 use super::part_args::{extension, is_part};
 use super::plan_file::PlanFile;
@@ -14,6 +14,7 @@ use lumiris::imaging::oiio::{self, Part, ROWS_AT_ONCE};
 use lumiris::render::Rendering;
 use lumiris::render::cryptomatte::Layer;
 use lumiris::render::output::{self, Aov};
+use lumiris::render::parts::{CameraMatrices, FilmReader};
 use lumiris::scene::{RenderJob, SampleCountMap};
 use std::borrow::Cow;
 use std::ops::Range;
@@ -80,11 +81,14 @@ pub(super) fn check_outputs(outputs: &[PathBuf]) -> anyhow::Result<()> {
     Ok(())
 }
 
-/// True if all these images are there, and none of them was cut short by Ctrl-C. (Images appear under their names when
-/// they are whole; only EXR and PNG tell of Ctrl-C.)
+/// True if all these images and parts are there, and none of them was cut short by Ctrl-C. (Files appear under their names
+/// when they are whole; of images, only EXR and PNG tell of Ctrl-C.)
 pub(super) fn are_complete(outputs: &[PathBuf]) -> bool {
-    outputs.iter().all(|path| {
-        path.is_file() && oiio::read_metadata(path).is_ok_and(|metadata| !metadata.contains_key(INTERRUPTED_KEY))
+    outputs.iter().all(|path| match is_part(path) {
+        true => FilmReader::open(path).is_ok_and(|part| part.header().is_finished),
+        false => {
+            path.is_file() && oiio::read_metadata(path).is_ok_and(|metadata| !metadata.contains_key(INTERRUPTED_KEY))
+        }
     })
 }
 

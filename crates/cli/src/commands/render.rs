@@ -2,16 +2,15 @@
 
 use super::UsageError;
 use super::args::RenderArgs;
-use super::denoise_args::Denoised;
+use super::denoise_args::denoise;
 use super::memory;
 use super::part_args::is_part;
-use super::parts::{self, FilmFile};
+use super::parts;
 use super::pictures::{Made, Written, check_outputs, is_exr, write_pictures};
 use super::plan_file::PlanFile;
 use super::progress::{self, Bar};
 use super::rescue::write_or_rescue;
 use super::settings::{SetupTimes, load_job_of, plan, render_settings};
-use super::stored::Stored;
 use crate::watch::{self, Watch};
 use anyhow::{Context, bail};
 use lumiris::film::{Film, Summary};
@@ -23,6 +22,7 @@ use lumiris::integrators::photon_map::MapStats;
 use lumiris::render::cryptomatte::cryptomattes;
 use lumiris::render::memory::{Wanted, predict};
 use lumiris::render::output::{self, Aov};
+use lumiris::render::parts::FilmFile;
 use lumiris::render::{CacheReport, Continuation, Progress, RenderSettings, Rendering, TileShare, go_on};
 use lumiris::scene::RenderJob;
 use lumiris_formats::output::write_text;
@@ -101,9 +101,9 @@ impl Session {
 /// Renders a picture and writes it. What could not be written is no error here, but part of the result.
 pub(super) fn render_one(args: &RenderArgs, session: &Session) -> anyhow::Result<Rendered> {
     check_outputs(&args.output)?;
-    let stored = Stored::read(&args.parts)?;
+    let stored = parts::stored(&args.parts)?;
     let mut args = args.clone();
-    stored.as_ref().map_or(Ok(()), |stored| stored.complete(&mut args))?;
+    stored.as_ref().map_or(Ok(()), |stored| parts::complete(&mut args, stored))?;
     let args = &args;
     let asked = check(args)?;
     let (mut job, setup, files) = load_job_of(&args.scene, &session.files, stored.as_ref())?;
@@ -124,7 +124,7 @@ pub(super) fn render_one(args: &RenderArgs, session: &Session) -> anyhow::Result
 
     let bar = Bar::new(args.quiet);
     let mut settings = settings_of(args, &job, asked.as_deref());
-    let mut film_file = FilmFile::new(args, (&job, &plan, &files), &mut settings, stored)?;
+    let mut film_file = parts::film_file(args, (&job, &plan, &files), &mut settings, stored)?;
     let continuation = film_file.as_mut().map_or_else(Continuation::default, FilmFile::continuation);
     let rendering = render_shown((&job, &settings), session, (&name_of(args), &bar), continuation)?;
     bar.finish();
@@ -132,7 +132,7 @@ pub(super) fn render_one(args: &RenderArgs, session: &Session) -> anyhow::Result
     let written = write_results(args, (&job, &plan, &rendering), (session, &settings), (film_file.as_mut(), outputs))?;
     report(args, &rendering, &written.paths);
     let mut stats = stats(args, &job, &rendering, setup);
-    stats["checkpoints"] = film_file.map_or(serde_json::Value::Null, |f| f.stats());
+    stats["checkpoints"] = parts::stats(film_file.as_ref());
     Ok(Rendered {
         stats,
         seconds: rendering.elapsed.as_secs_f64(),
@@ -187,7 +187,8 @@ fn write_results(
     let has_exr = outputs.iter().any(|path| is_exr(path));
     let kinds = if has_exr { &args.exr.cryptomatte[..] } else { &[] };
     let cryptomattes = cryptomattes(job, settings, &rendering.film, kinds)?;
-    let (denoised, not_denoised) = denoise(session, &rendering.film);
+    let denoised = session.denoiser.as_ref().map(|denoiser| denoise(denoiser, &rendering.film, true));
+    let (denoised, not_denoised) = denoised.unwrap_or_default();
     let asked = asked_aovs(args)?;
     let asked = asked.as_deref();
     let is_interrupted = session.is_stopped();
@@ -197,30 +198,19 @@ fn write_results(
     written.misplaced.extend(not_denoised);
     if let Some(film_file) = film_file.filter(|_| !part_files.is_empty()) {
         film_file.end(rendering);
-        part_files.into_iter().for_each(|path| written.write(path, |path| film_file.write(path, rendering)));
+        let write = |path: &Path| Ok(film_file.write(path, rendering)?);
+        part_files.into_iter().for_each(|path| written.write(path, write));
     }
     Ok(written)
 }
 
-/// The image without noise, if it is asked for; or why there is none, which is no reason to lose the image.
-fn denoise(session: &Session, film: &Film) -> (Option<Denoised>, Option<String>) {
-    match session.denoiser.as_ref().map(|denoiser| Denoised::of_film(denoiser, film)) {
-        Some(Ok(denoised)) => (Some(denoised), None),
-        Some(Err(error)) => (None, Some(format!("{error}; the image is written as it is"))),
-        None => (None, None),
-    }
-}
-
 /// Refuses to denoise what is no whole image, and to show a denoised image without keeping the other.
-fn check_denoise(args: &RenderArgs, outputs: &[PathBuf]) -> anyhow::Result<()> {
-    let usage = |text: &str| Err(UsageError(text.to_owned()).into());
+fn check_denoise(args: &RenderArgs, outputs: &[PathBuf]) -> Result<(), UsageError> {
     if args.denoise.denoise && args.parts.part.is_some() {
-        return usage("--denoise needs the whole image: merge the parts, then use `lumiris denoise`");
+        let text = "--denoise needs the whole image: merge the parts with `lumiris merge --denoise`";
+        return Err(UsageError(text.to_owned()));
     }
-    if args.denoise.denoise && !outputs.iter().any(|path| is_exr(path)) {
-        return usage("--denoise needs an EXR file among the outputs, which keeps the image as it was rendered");
-    }
-    Ok(())
+    args.denoise.check(outputs)
 }
 
 /// Renders, for those who watch as well.
@@ -239,7 +229,7 @@ fn render_shown(
     let set_tile = |tile: &Film| shown.set_tile(tile);
     let watched = Continuation { watch: Some(&set_tile), ..continuation };
     let rendering = go_on(job, settings, &session.stop, &observe, watched)?;
-    shown.finish(&rendering.film, settings.tile_size);
+    shown.finish(&rendering.film);
     Ok(rendering)
 }
 

@@ -6,14 +6,14 @@ use super::memory::MemoryLimit;
 use super::pictures::is_picture;
 use super::plan_file::PlanFile;
 use super::progress;
-use super::stored::Stored;
 use anyhow::{Context, bail};
 use lumiris::film::filter::PixelFilter;
 use lumiris::import::cache::FileCache;
 use lumiris::import::fingerprint::SceneFiles;
-use lumiris::import::{LoadOptions, Loaded, is_gltf, load_with};
+use lumiris::import::{Loaded, is_gltf, load_with};
 use lumiris::render::RenderSettings;
 use lumiris::render::allocation::complete_for_noise;
+use lumiris::render::parts::Stored;
 use lumiris::render::plan::prepare;
 use lumiris::scene::RenderJob;
 use lumiris::settings::table::rows;
@@ -35,17 +35,10 @@ pub(super) struct SetupTimes {
 /// warnings.
 pub(super) fn load_scene(args: &SceneArgs, files: &FileCache, stored: Option<&Stored>) -> anyhow::Result<Loaded> {
     check_scene(args)?;
-    let options = LoadOptions {
-        resolution: args.resolution,
-        crop: args.crop,
-        environment: args.environment.clone(),
-        camera_auto: args.camera_auto,
-        time: args.time_in_scene,
-    };
     if let Some(MemoryLimit::Bytes(bytes)) = args.texture_memory {
         files.limit_textures(bytes);
     }
-    let mut loaded = match load_with(&args.scene, &options, files) {
+    let mut loaded = match load_with(&args.scene, &args.load_options(), files) {
         Ok(loaded) => loaded,
         Err(diagnostics) => {
             progress::say(diagnostics.to_string().trim_end());

@@ -1,7 +1,7 @@
 //! Watching an image while it converges: in tev ([`tev`]), and on a page in the browser ([`server`]).
 //!
-//! Threads that render leave their tiles in a [`Canvas`](canvas::Canvas), which takes a copy of some kilobytes; those
-//! that send them on do so from there, some times a second, and only what has changed.
+//! Threads that render leave their tiles in a [`Canvas`](canvas::Canvas), which shares their sums; those that send them on
+//! make pixels of them, some times a second at most, and only of what has changed.
 
 mod canvas;
 mod server;

@@ -71,6 +71,7 @@ fn options_that_would_lose_the_image_itself_are_refused() {
         ("render scene.pbrt --denoise -o a.png", "needs an EXR file"),
         ("render scene.pbrt --denoise --part 1/2 -o a.part", "merge the parts"),
         ("render scene.pbrt --oidn-library a.so -o a.exr", "--denoise"),
+        ("merge a.part --denoise -o a.png", "needs an EXR file"),
         ("denoise in.exr -o a.part", "no part"),
         ("denoise in.png -o a.exr", "only EXR"),
     ] {
@@ -110,6 +111,19 @@ fn the_denoised_layer_stands_beside_the_image_and_png_shows_it() {
     for (key, value) in &raw.metadata {
         assert_eq!(b.metadata.get(key), Some(value), "{key}");
     }
+    // The same of parts
+    for i in 1..3 {
+        succeed(path, &format!("render scene.pbrt -q --part {i}/2 -o {i}.part"));
+    }
+    succeed(path, "merge 1.part 2.part -q --denoise -o merged.exr -o merged.png");
+    let merged = read(path, "merged.exr");
+    assert!(bits(&merged, DENOISED) == bits(&a, DENOISED) && bits(&merged, RGB) == bits(&raw, RGB));
+    assert_eq!(read(path, "merged.png").image, read(path, "a.png").image);
+    succeed(path, "render scene.pbrt -q --aov none -o bare.part");
+    let said = succeed(path, "merge bare.part -q --denoise -o bare.exr");
+    assert!(said.contains("neither albedo nor normal"), "{said}");
+    assert!(about("bare.exr").unwrap().ends_with("by colour"));
+
     // Once more: the layer is replaced
     succeed(path, "denoise b.exr -q -o b.exr");
     assert!(b.image == read(path, "b.exr").image);

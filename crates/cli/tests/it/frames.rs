@@ -136,6 +136,47 @@ fn existing_images_are_left_alone_unless_they_are_incomplete() {
 }
 
 #[test]
+fn parts_of_frames_are_merged_to_the_frames() {
+    let folder = animation();
+    let path = |name: &str| folder.path().join(name);
+    let run = |args: &str| {
+        let output = lumiris(folder.path(), args);
+        assert!(output.status.success(), "{args}: {}", stderr(&output));
+        stderr(&output)
+    };
+    let frames = "render shot.####.pbrt --frames 1-3:2 --estimator mis -q";
+    run(&format!("{frames} -o whole.##.exr"));
+    run(&format!("{frames} --part 1/2 -o f.####.1.part --checkpoint c.####.film"));
+    // The other part of a frame alone: what frames share does not tell their files apart
+    run("render shot.0003.pbrt --estimator mis -q --part 2/2 -o f.0003.2.part");
+    run(&format!("{frames} --part 2/2 -o f.####.2.part --skip-existing --stats s.json"));
+    let results: Vec<_> = stats(&path("s.json")).iter().map(|f| f["result"].as_str().unwrap().to_owned()).collect();
+    assert_eq!(results, ["done", "skipped"]);
+    run("merge f.####.2.part f.####.1.part --frames 1,3 -q -o m.##.exr");
+    for number in ["01", "03"] {
+        let [whole, merged] = ["whole", "m"].map(|name| image(&path(&format!("{name}.{number}.exr"))));
+        assert_eq!(bits(&whole), bits(&merged), "frame {number}");
+    }
+
+    // What is stored of each frame goes on to it
+    run(&format!("{frames} --part 1/2 --checkpoint c.####.film --resume c.####.film -o again.####.part"));
+    run("merge again.####.part f.####.2.part --frames 3 -q -o n.#.exr");
+    assert_eq!(bits(&image(&path("n.3.exr"))), bits(&image(&path("m.03.exr"))));
+
+    // A frame without parts does not stop the others
+    std::fs::remove_file(path("f.0001.1.part")).unwrap();
+    let output = lumiris(folder.path(), "merge f.####.2.part f.####.1.part --frames 1,3 -o o.#.exr");
+    let text = stderr(&output);
+    assert_eq!(output.status.code(), Some(3), "{text}");
+    assert!(text.contains("frame 1: f.0001.1.part: No such file") && text.contains("1 of 2 frames failed"), "{text}");
+    assert!(path("o.3.exr").exists() && !path("o.1.exr").exists());
+    // A part that is not finished is no reason to leave the frame out
+    std::fs::write(path("f.0001.1.part"), "half of").unwrap();
+    run(&format!("{frames} --part 1/2 -o f.####.1.part --skip-existing"));
+    run("merge f.####.2.part f.####.1.part --frames 1,3 -q -o o.#.exr");
+}
+
+#[test]
 fn ctrl_c_ends_a_sequence_and_its_frame_is_rendered_again() {
     let folder = animation();
     let args = "render shot.####.pbrt --frames 1-2 -o f.#.exr --spp 1000000000 --stats s.json -q";
@@ -166,6 +207,11 @@ fn names_without_a_place_for_the_number_are_usage_errors() {
         "render shot.####.pbrt --frames 2-1 -o f.#.exr",
         "render shot.####.pbrt --frames 1 -o f.#.exr --aov none,depth",
         "render shot.0001.pbrt --skip-existing -o f.exr",
+        "render shot.####.pbrt --frames 1-2 --estimator mis --part 1/2 -o f.part",
+        "render shot.####.pbrt --frames 1-2 --checkpoint c.film -o f.#.exr",
+        "render shot.####.pbrt --frames 1-2 --resume c.film -o f.#.exr",
+        "merge f.####.part --frames 1-2 -o f.exr",
+        "merge f.1.part --frames 1-2 -o f.#.exr",
     ] {
         assert_eq!(lumiris(folder.path(), args).status.code(), Some(2), "{args}");
     }

@@ -253,6 +253,41 @@ fn what_cannot_be_divided_is_refused_with_the_reason() {
 }
 
 #[test]
+fn parts_without_pixels_are_parts_and_times_beyond_all_bounds_are_never() {
+    let folder = tempfile::tempdir().unwrap();
+    let folder = folder.path();
+    let render = format!("{IMAGE} --integrator direct --estimator mis --resolution 16x16");
+    run(&format!("{render} --time 1e300 --checkpoint c.film,1e300 -o single.exr"), folder);
+    (1..4).for_each(|i| run(&format!("{render} --part {i}/3 --part-by tiles -o {i}.part"), folder));
+    run("merge 2.part 1.part 3.part -q -o merged.exr", folder);
+    assert_same("single.exr", "merged.exr", folder, "of one tile");
+    refuse("merge 2.part 3.part -o m.exr", folder, 3, &["samples 0 to 7 of all pixels"]);
+    // Nothing of the image is there
+    run("merge 2.part 3.part --allow-missing -q -o black.exr", folder);
+    run("merge c.film -q -o checkpoint.exr", folder);
+    assert_same("single.exr", "checkpoint.exr", folder, "a checkpoint");
+}
+
+#[cfg(unix)]
+#[test]
+fn two_renderings_with_one_checkpoint_leave_it_whole() {
+    let folder = tempfile::tempdir().unwrap();
+    let folder = folder.path();
+    let render = "render GALLERY --resolution 96x64 --integrator direct --estimator mis --spp 24 --threads 1 -q";
+    let start = |i: u32| {
+        let mut command = command(&format!("{render} --checkpoint c.film,0.001 -o {i}.exr"), folder);
+        command.stderr(std::process::Stdio::piped()).spawn().unwrap()
+    };
+    for child in [start(1), start(2)] {
+        let output = child.wait_with_output().unwrap();
+        assert!(output.status.success(), "{}", stderr(&output));
+    }
+    run("merge c.film -q -o merged.exr", folder);
+    assert_same("1.exr", "merged.exr", folder, "the checkpoint of two renderings");
+    assert!(!folder.join("c.film.tmp").exists());
+}
+
+#[test]
 fn missing_double_and_foreign_parts_are_named() {
     let folder = tempfile::tempdir().unwrap();
     let folder = folder.path();

@@ -1,14 +1,15 @@
-# Renders one part: of the number that Slurm gives the task, or that of the argument (for other queues).
+# Renders one part: of the number that Slurm gives the task, or that of the last argument (for other queues).
 
 set -u
+# FRAME
 i=${1:-${SLURM_ARRAY_TASK_ID:?which part? Give its number}}
 cd "$from" || exit 3
 if ! [ "$i" -ge 1 ] 2>/dev/null || ! [ "$i" -le "$parts" ]; then
-  echo "there is no part $i of $parts" >&2
+  echo "there is no part $i of $parts$of" >&2
   exit 2
 fi
-if [ -e "$folder/$i.part" ]; then
-  echo "part $i of $parts is complete"
+if [ -e "$folder/$image$i.part" ]; then
+  echo "part $i of $parts$of is complete"
   exit 0
 fi
 
@@ -25,8 +26,9 @@ child= interrupted=1 is_late=
 trap 'interrupted=1' TERM
 trap 'interrupted=1 is_late=1; [ -z "$child" ] || kill -TERM "$child"' USR1
 
-"$lumiris" render "${options[@]}" "${threads[@]}" --part "$i/$parts" --checkpoint "$folder/$i.film,$seconds" \
-  --resume "$folder/$i.film" -o "$folder/$i.unfinished.part" -q -- "$scene" &
+"$lumiris" render "${options[@]}" "${threads[@]}" "${frame[@]}" --part "$i/$parts" \
+  --checkpoint "$folder/$named$i.film,$seconds" --resume "$folder/$named$i.film" \
+  -o "$folder/$named$i.unfinished.part" -q -- "$scene" &
 child=$!
 [ -z "$is_late" ] || kill -TERM "$child"
 
@@ -41,14 +43,14 @@ done
 
 if [ "$code" -eq 0 ]; then
   # Only what is complete has the name of a part. A node that seemed lost may have rendered it meanwhile: the same bits
-  mv "$folder/$i.unfinished.part" "$folder/$i.part" || [ -e "$folder/$i.part" ] || exit 3
-  rm -f "$folder/$i.film"
-  echo "part $i of $parts is rendered"
+  mv "$folder/$image$i.unfinished.part" "$folder/$image$i.part" || [ -e "$folder/$image$i.part" ] || exit 3
+  rm -f "$folder/$image$i.film"
+  echo "part $i of $parts$of is rendered"
   exit 0
 fi
-rm -f "$folder/$i.unfinished.part"
-if [ -n "$is_late" ] && [ -n "${SLURM_JOB_ID:-}" ] && [ -e "$folder/$i.film" ]; then
-  echo "the time limit is near: part $i of $parts goes back to the queue"
+rm -f "$folder/$image$i.unfinished.part"
+if [ -n "$is_late" ] && [ -n "${SLURM_JOB_ID:-}" ] && [ -e "$folder/$image$i.film" ]; then
+  echo "the time limit is near: part $i of $parts$of goes back to the queue"
   scontrol requeue "$SLURM_JOB_ID"
 fi
 exit "$code"

@@ -18,7 +18,9 @@ id=$(wc -l <"$CALLS")
 for word in "$@"; do
   case $word in --array=*) last=${word##*-} ;; --chdir=*) cd "${word#*=}" || exit 1 ;; esac
 done
-for i in $(seq "${last:-1}"); do SLURM_ARRAY_TASK_ID=$i SLURM_CPUS_ON_NODE=1 bash "${@: -1}" >>log 2>&1 || exit 1; done
+script=("${@: -1}")
+[[ $script == *.sh ]] || script=("${@: -2}")
+for i in $(seq "${last:-1}"); do SLURM_ARRAY_TASK_ID=$i SLURM_CPUS_ON_NODE=1 bash "${script[@]}" >>log 2>&1 || exit 1; done
 echo "$id;cluster"
 "#;
 const FARM: &str = "farm slurm GALLERY --resolution 40x36 --spp 7 --parts 3 -o image.exr";
@@ -84,6 +86,72 @@ fn jobs_render_the_bits_of_the_image_at_once_in_any_folder_and_do_nothing_again(
     assert!(log.contains("part 2 of 3 is rendered") && log.contains("part 2 of 3 is complete"), "{log}");
 }
 
+/// Scenes of two frames, in the folder.
+fn write_frames(folder: &Path) {
+    for number in [1, 2] {
+        let scene = format!(
+            "LookAt 0 0 {number} 0 0 -5 0 1 0\nCamera \"perspective\"\nSampler \"independent\" \"integer pixelsamples\" [ 4 ]\n\
+             Film \"rgb\" \"integer xresolution\" [ 24 ] \"integer yresolution\" [ 16 ]\nWorldBegin\n\
+             LightSource \"infinite\"\nTranslate 0 0 -5\nShape \"sphere\"\n"
+        );
+        fs::write(folder.join(format!("shot.{number:04}.pbrt")), scene).unwrap();
+    }
+}
+
+/// Fails unless frames have the pixels of images rendered at once.
+fn assert_frames(folder: &Path, plan: &str) {
+    for number in 1..=2 {
+        run(&format!("render shot.000{number}.pbrt -q {plan} -o whole.exr"), folder);
+        assert_same(&format!("out.000{number}.exr"), "whole.exr", folder, &format!("frame {number}"));
+    }
+}
+
+#[test]
+fn frames_have_jobs_of_their_own_and_those_that_are_merged_are_left_alone() {
+    let (root, folder) = queue();
+    write_frames(&folder);
+    let args = "farm slurm shot.####.pbrt --frames 1-2 --parts 2 --estimator ris -o out.####.exr";
+    let output = farm(&format!("{args} --submit"), &folder).output().unwrap();
+    assert_success(&output);
+    let told = "plan: job 1\npart of frame 1: job 2\nmerge of frame 1: job 3\npart of frame 2: job 4\nmerge of frame 2: job 5\n";
+    assert_eq!(String::from_utf8_lossy(&output.stdout), told);
+    assert_frames(&folder, "--estimator ris --plan out.farm/plan.json");
+    let calls = fs::read_to_string(root.path().join("calls")).unwrap();
+    let calls: Vec<&str> = calls.lines().collect();
+    for (i, words) in [(1, "--output=0001.%a.log --array=1-2 "), (3, "--dependency=afterok:1 "), (4, "afterok:4 ")] {
+        assert!(calls[i].contains(words), "{}", calls[i]);
+    }
+
+    // What is left of a frame is rendered again, and the other is not submitted
+    fs::remove_file(folder.join("out.farm/0002.merged")).unwrap();
+    fs::remove_file(folder.join("out.farm/0002.1.part")).unwrap();
+    fs::remove_file(folder.join("out.0002.exr")).unwrap();
+    let output = farm(&format!("{args} --submit"), &folder).output().unwrap();
+    assert_success(&output);
+    let told = "frame 1 is merged\npart of frame 2: job 6\nmerge of frame 2: job 7\n";
+    assert_eq!(String::from_utf8_lossy(&output.stdout), told);
+    assert_frames(&folder, "--estimator ris --plan out.farm/plan.json");
+    let log = fs::read_to_string(folder.join("out.farm/log")).unwrap();
+    assert!(log.contains("part 2 of 2 of frame 2 is complete"), "{log}");
+
+    // Without a queue
+    fs::remove_dir_all(folder.join("out.farm")).unwrap();
+    fs::remove_file(folder.join("out.0001.exr")).unwrap();
+    let args = "farm slurm shot.####.pbrt --frames 1-2 --estimator mis -o out.####.exr";
+    assert_success(&farm(args, &folder).output().unwrap());
+    let script = |args: &str| Command::new("bash").args(args.split(' ')).current_dir(folder.join("out.farm")).output();
+    for line in ["part.sh 1 1", "part.sh 2 1", "merge.sh 1", "merge.sh 2"] {
+        assert_success(&script(line).unwrap());
+    }
+    assert_frames(&folder, "--estimator mis");
+    for (line, words) in
+        [("part.sh", "which frame?"), ("part.sh 3 1", "no frame 3"), ("part.sh 1 2", "no part 2 of 1 of frame 1")]
+    {
+        let output = script(line).unwrap();
+        assert!(!output.status.success() && stderr(&output).contains(words), "{line}: {}", stderr(&output));
+    }
+}
+
 #[test]
 fn values_with_dashes_and_bare_options_reach_the_parts() {
     let (_root, folder) = queue();
@@ -113,6 +181,13 @@ fn what_cannot_be_rendered_or_submitted_is_refused() {
     refuse(&format!("{FARM} --integrator direct --estimator ocv --ocv progressive"), 2, "--part-by tiles");
     refuse(&FARM.replace("GALLERY", "none.pbrt"), 3, "none.pbrt");
     refuse(&FARM.replace("image.exr", "image.part"), 2, "merged to an image");
+    write_frames(&folder);
+    let frames = FARM.replace("GALLERY", "shot.####.pbrt --frames 1-2 --estimator mis");
+    refuse(&frames, 2, "image.exr has no ####");
+    refuse(&FARM.replace("image.exr", "image.#.exr --frames 1-2"), 2, "gallery.pbrt has no ####");
+    let frames = frames.replace("image.exr", "image.####.exr");
+    refuse(&format!("{frames} --frames 1-3"), 3, "shot.0003.pbrt");
+    refuse(&format!("{frames} --dir a#b"), 2, "a --dir without #");
     assert!(!folder.join("image.farm").exists());
 
     // Other files are kept
@@ -212,7 +287,7 @@ fn a_cluster_renders_the_bits_of_the_image_though_a_task_is_requeued_and_a_node_
 
 #[test]
 #[ignore = "needs Slurm, which `make test-farm` installs"]
-fn sbatch_says_what_is_wrong() {
+fn a_cluster_says_what_is_wrong_and_renders_frames() {
     let root = tempfile::tempdir().unwrap();
     let cluster = Cluster(root.path().join("cluster"));
     fs::create_dir(&cluster.0).unwrap();
@@ -222,4 +297,12 @@ fn sbatch_says_what_is_wrong() {
     assert_eq!(output.status.code(), Some(3));
     assert!(stderr(&output).contains("invalid partition specified: none"), "{}", stderr(&output));
     assert!(cluster.slurm("squeue --noheader").is_empty());
+
+    // The same cluster renders frames
+    write_frames(root.path());
+    let args = "farm slurm shot.####.pbrt --frames 1-2 --parts 2 --estimator mis -o out.####.exr --submit";
+    assert_success(&command(args, root.path()).env("SLURM_CONF", cluster.0.join("slurm.conf")).output().unwrap());
+    let is_merged = |frame| root.path().join(format!("out.farm/000{frame}.merged")).exists();
+    wait_until("two merged frames", 120, || is_merged(1) && is_merged(2));
+    assert_frames(root.path(), "--estimator mis");
 }

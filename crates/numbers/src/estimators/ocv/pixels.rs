@@ -20,6 +20,8 @@ use crate::math::luminance;
 
 /// Radius of the square of pixels that β is fitted to.
 const RADIUS: usize = 6;
+/// Rows above and below a row that its coefficients depend on: those pixels, and their neighbours.
+pub const MARGIN: usize = RADIUS + 1;
 /// Minimum number of neighbours whose mean stands for the picture.
 const MIN_AROUND: f64 = 3.0;
 /// Maximum ratio of the light around two pixels that are alike.
@@ -103,6 +105,11 @@ impl Picture {
         let mut picture = Picture { width: width.max(1), equations, pixels, controls, around: Vec::new() };
         picture.around = (0..picture.pixels.len()).map(|i| picture.look_around(i, i)).collect();
         picture
+    }
+
+    /// Number of pixels of a row.
+    pub fn width(&self) -> usize {
+        self.width
     }
 
     /// Number of rows of pixels.

@@ -1,0 +1,91 @@
+//! The calling thread while another one renders: it calls back and watches for Ctrl-C.
+
+use crate::progress::{Canvas, PassProgress};
+use lumiris::render::Progress;
+use pyo3::prelude::*;
+use std::sync::atomic::{AtomicBool, Ordering};
+use std::sync::mpsc::{Receiver, RecvTimeoutError, SyncSender};
+use std::sync::{Arc, Mutex, PoisonError};
+use std::time::{Duration, Instant};
+
+/// Time between two looks for Ctrl-C.
+const ATTENTION: Duration = Duration::from_millis(50);
+
+/// What the working thread tells the calling one.
+pub(crate) enum Event {
+    Begin(Arc<Canvas>),
+    Pass(Progress, SyncSender<()>),
+}
+
+/// The calling thread while another one renders.
+pub(crate) struct Attendant<'a> {
+    pub(crate) callback: Option<&'a Py<PyAny>>,
+    pub(crate) interval: Duration,
+    pub(crate) stop: &'a AtomicBool,
+    pub(crate) latest: &'a Mutex<Option<Progress>>,
+    pub(crate) canvas: Option<Arc<Canvas>>,
+    pub(crate) called: Instant,
+    /// The exception of Ctrl-C, or of the callback.
+    pub(crate) raised: Option<PyErr>,
+}
+
+impl Attendant<'_> {
+    /// Attends until the other thread has ended: it drops `finished` and the senders of events.
+    pub(crate) fn attend(&mut self, events: &Receiver<Event>, finished: &Receiver<()>) {
+        loop {
+            match events.recv_timeout(ATTENTION.min(self.interval)) {
+                Ok(Event::Begin(canvas)) => self.canvas = Some(canvas),
+                Ok(Event::Pass(progress, done)) => {
+                    // What was before the pass has been overtaken
+                    self.latest.lock().unwrap_or_else(PoisonError::into_inner).take();
+                    self.call(progress, true);
+                    // The other side may have ended
+                    let _ = done.send(());
+                }
+                Err(RecvTimeoutError::Timeout) => self.call_latest(),
+                // Nobody is called back, or the rendering is about to end
+                Err(RecvTimeoutError::Disconnected) => match finished.recv_timeout(ATTENTION) {
+                    Err(RecvTimeoutError::Timeout) => {}
+                    Ok(()) | Err(RecvTimeoutError::Disconnected) => return,
+                },
+            }
+            self.raise_if(|_, py| py.check_signals());
+        }
+    }
+
+    /// Calls back within a pass, if it is time.
+    fn call_latest(&mut self) {
+        if self.called.elapsed() >= self.interval
+            && let Some(progress) = self.latest.lock().unwrap_or_else(PoisonError::into_inner).take()
+        {
+            self.call(progress, false);
+        }
+    }
+
+    fn call(&mut self, progress: Progress, is_pass: bool) {
+        let (Some(callback), Some(canvas)) = (self.callback, self.canvas.clone()) else { return };
+        if self.stop.load(Ordering::Relaxed) {
+            return;
+        }
+        self.raise_if(|attendant, py| {
+            let returned = callback.call1(py, (PassProgress { progress, is_pass, canvas },))?;
+            // Only `False` itself: a callback that returns nothing goes on
+            if returned.bind(py).extract::<bool>().is_ok_and(|goes_on| !goes_on) {
+                attendant.stop.store(true, Ordering::Relaxed);
+            }
+            Ok(())
+        });
+        self.called = Instant::now();
+    }
+
+    /// Runs something of Python; an exception ends the rendering.
+    fn raise_if(&mut self, run: impl FnOnce(&Self, Python<'_>) -> PyResult<()>) {
+        if self.raised.is_some() {
+            return;
+        }
+        if let Err(error) = Python::attach(|py| run(self, py)) {
+            self.stop.store(true, Ordering::Relaxed);
+            self.raised = Some(error);
+        }
+    }
+}

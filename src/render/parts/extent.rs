@@ -1,0 +1,143 @@
+//! Which samples of which pixels are asked for.
+
+use super::stored::Stored;
+use crate::film::PixelBounds;
+use crate::render::plan::follows_from_times;
+use crate::render::{RenderSettings, TileShare, depends_on_earlier_samples};
+use crate::settings::{EstimatorKind, Settings};
+
+/// A part of an image; the whole of it by default.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub struct Extent {
+    /// The I-th of N parts, from 1.
+    pub part: Option<[u32; 2]>,
+    /// True if a part is a share of the pixels, false if it is one of the samples of all pixels.
+    pub is_by_tiles: bool,
+    /// Index of the first sample of each pixel.
+    pub samples_from: Option<u32>,
+    /// Index after the last one.
+    pub samples_to: Option<u32>,
+}
+
+/// Why an image cannot be divided so, in the words of the command line.
+#[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
+#[error("{0}")]
+pub struct ExtentError(String);
+
+impl From<&str> for ExtentError {
+    fn from(text: &str) -> Self {
+        ExtentError(text.to_owned())
+    }
+}
+
+impl Extent {
+    /// True if it is not the whole image.
+    pub fn is_partial(&self) -> bool {
+        self.part.is_some() || self.has_range()
+    }
+
+    fn has_range(&self) -> bool {
+        self.samples_from.is_some() || self.samples_to.is_some()
+    }
+
+    /// Rejects what contradicts itself, or a limit of the time.
+    pub fn check(&self, is_limited: bool) -> Result<(), ExtentError> {
+        if self.part.is_some_and(|[i, n]| i < 1 || i > n) {
+            return Err("--part: expected I/N with 1 <= I <= N, such as 3/8".into());
+        }
+        if self.part.is_some() && !self.is_by_tiles && self.has_range() {
+            let reason = "--part is a share of the samples: it cannot stand beside --samples-from and --samples-to";
+            return Err(reason.into());
+        }
+        if self.is_partial() && is_limited {
+            return Err("parts of an image cannot be limited by --time: their samples would not be known".into());
+        }
+        Ok(())
+    }
+
+    /// Rejects settings by which an image cannot be divided.
+    pub fn check_division(&self, settings: &Settings) -> Result<(), ExtentError> {
+        if settings.sampling.noise.is_some() {
+            return Err("parts of an image cannot be limited by --noise: give a number of samples, --spp".into());
+        }
+        let is_by_samples = !self.is_by_tiles || self.has_range();
+        if is_by_samples && depends_on_earlier_samples(settings) {
+            let reason = "with a progressive estimator, samples depend on earlier ones of their pixel";
+            return Err(ExtentError(format!("{reason}: divide the image with --part-by tiles")));
+        }
+        Ok(())
+    }
+
+    /// Rejects settings by which the image of a scene cannot be rendered in parts. Before a plan is made.
+    pub fn check_settings(&self, settings: &Settings, bounds: &PixelBounds, scene: &str) -> Result<(), ExtentError> {
+        if !self.is_partial() {
+            return Ok(());
+        }
+        self.check_division(settings)?;
+        if follows_from_times(settings, bounds) {
+            let instead = match settings.integrator.estimator {
+                EstimatorKind::Ris => "give a number of --proposals",
+                _ => "name an estimator, such as `--estimator mis`",
+            };
+            return Err(ExtentError(format!(
+                "what these settings leave open follows from measured times, and must be the same for all parts: make one plan \
+                 with `lumiris plan {scene} … -o plan.json`, and render all parts with `--plan plan.json`; or {instead}"
+            )));
+        }
+        Ok(())
+    }
+
+    /// Sets what is rendered: this part of an image with the samples that are set, or what is stored. `more` is the number of
+    /// samples that an image goes on to.
+    pub fn apply(
+        &self,
+        settings: &mut RenderSettings,
+        stored: Option<&Stored>,
+        more: Option<u32>,
+    ) -> Result<(), ExtentError> {
+        let spp = settings.spp;
+        (settings.skip, settings.spp) = (self.samples_from.unwrap_or(0), self.samples_to.unwrap_or(spp));
+        if let Some([i, n]) = self.part {
+            if self.is_by_tiles {
+                settings.share = Some(TileShare { index: i - 1, count: n });
+            } else {
+                let until = |i: u32| (u64::from(spp) * u64::from(i) / u64::from(n)) as u32;
+                (settings.skip, settings.spp) = (until(i - 1), until(i));
+                if spp < n {
+                    let reason = format!("{spp} samples per pixel cannot be {n} parts: divide with --part-by tiles");
+                    return Err(ExtentError(reason));
+                }
+            }
+        }
+        if let Some(stored) = stored {
+            self.go_on(settings, stored, more)?;
+        }
+        if settings.skip >= settings.spp {
+            return Err(ExtentError(format!("there are no samples from {} to {}", settings.skip, settings.spp)));
+        }
+        Ok(())
+    }
+
+    /// The same from what is stored.
+    fn go_on(&self, settings: &mut RenderSettings, stored: &Stored, more: Option<u32>) -> Result<(), ExtentError> {
+        let header = &stored.header;
+        let before = (header.samples.start, header.samples.end, header.share);
+        if self.is_partial() && before != (settings.skip, settings.spp, settings.share) {
+            return Err(ExtentError(format!("{} is of another part of the image", stored.path.display())));
+        }
+        (settings.skip, settings.spp, settings.share) = before;
+        // The samples of a part follow from those of the whole image, which --spp names
+        if let Some(more) = more.filter(|n| !self.is_partial() && *n != header.samples.end) {
+            let done = stored.tiles.iter().map(|t| t.done).max().unwrap_or(0);
+            if header.samples.start > 0 || more < done {
+                let path = stored.path.display();
+                return Err(ExtentError(format!(
+                    "{path} cannot go on to {more} samples: it has {done}, of {} to {}",
+                    before.0, before.1
+                )));
+            }
+            settings.spp = more;
+        }
+        Ok(())
+    }
+}

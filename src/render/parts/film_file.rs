@@ -1,0 +1,99 @@
+//! What is stored of a rendering: checkpoints on the way, a part in the end.
+
+use super::checkpoint::Checkpoints;
+use super::error::PartError;
+use super::file::write_film;
+use super::header::FilmHeader;
+use super::notes::{Asked, PLAN_NOTE, SECONDS};
+use super::stored::Stored;
+use super::stored_tile::StoredTile;
+use crate::import::fingerprint::SceneFiles;
+use crate::render::{Continuation, RenderSettings, Rendering};
+use crate::scene::RenderJob;
+use std::path::{Path, PathBuf};
+use std::time::Duration;
+
+/// What is to be stored of a rendering.
+#[derive(Debug, Default)]
+pub struct Storage {
+    /// Where checkpoints are stored, and the time between two of them.
+    pub checkpoint: Option<(PathBuf, Duration)>,
+    /// Whether the sums are kept, to be a part.
+    pub keeps_sums: bool,
+    /// What the rendering goes on from.
+    pub stored: Option<Stored>,
+    /// What was chosen by measurements, as text.
+    pub plan: Option<String>,
+}
+
+/// What is stored of a rendering, and how it is called.
+pub struct FilmFile {
+    header: FilmHeader,
+    checkpoints: Option<Checkpoints>,
+    stored: Option<Vec<StoredTile>>,
+    keeps_sums: bool,
+}
+
+impl FilmFile {
+    /// What is stored of a rendering that is prepared for `spp` samples per pixel. Fails if it cannot go on from what is
+    /// stored. What goes wrong with checkpoints is told to `warn`.
+    pub fn new(
+        asked: &Asked,
+        (job, files): (&RenderJob, &SceneFiles),
+        (settings, spp): (&RenderSettings, u32),
+        storage: Storage,
+        warn: impl Fn(&str) + Send + Sync + 'static,
+    ) -> Result<FilmFile, PartError> {
+        let fingerprint = files.fingerprint().map_err(|(path, error)| PartError::io(&path, error))?;
+        let described = asked.described(job, settings);
+        let notes = asked.notes(storage.plan, &job.world.scene.camera);
+        let mut header = FilmHeader::new(job, settings, spp, fingerprint, [described, notes]);
+        if let Some(stored) = &storage.stored {
+            check_kinship(stored, &header)?;
+            // What was measured then is not measured again
+            let plan = stored.header.note(PLAN_NOTE).filter(|_| header.note(PLAN_NOTE).is_none());
+            header.notes.extend(plan.map(|text| (PLAN_NOTE.to_owned(), text.to_owned())));
+        }
+        let checkpoints =
+            storage.checkpoint.map(|(path, interval)| Checkpoints::new(path, interval, header.clone(), warn));
+        let stored = storage.stored.map(|s| s.tiles);
+        Ok(FilmFile { header, checkpoints, stored, keeps_sums: storage.keeps_sums })
+    }
+
+    /// What the rendering goes on from.
+    pub fn continuation(&mut self) -> Continuation<'_> {
+        let (stored, checkpoints) = (self.stored.take(), self.checkpoints.as_mut());
+        Continuation { stored, checkpoints, keeps_sums: self.keeps_sums, ..Continuation::default() }
+    }
+
+    /// Notes how the rendering ended.
+    pub fn end(&mut self, rendering: &Rendering) {
+        self.header.is_finished = rendering.complete;
+        self.header.notes.push((SECONDS.to_owned(), rendering.elapsed.as_secs_f64().to_string()));
+    }
+
+    /// Writes the part that was rendered.
+    pub fn write(&self, path: &Path, rendering: &Rendering) -> Result<(), PartError> {
+        let sums = rendering.sums.as_ref().ok_or(PartError::Sums("they were not kept"))?;
+        write_film(path, &self.header, sums)
+    }
+
+    /// The checkpoints, if there are any.
+    pub fn checkpoints(&self) -> Option<&Checkpoints> {
+        self.checkpoints.as_ref()
+    }
+}
+
+/// Fails if what is stored is of another scene or of other settings.
+fn check_kinship(stored: &Stored, header: &FilmHeader) -> Result<(), PartError> {
+    let mut differences = stored.header.differences_of_settings(header);
+    if stored.header.spp != header.spp {
+        differences.push(format!("samples per pixel: {}, not {}", header.spp, stored.header.spp));
+    }
+    if differences.is_empty() {
+        return Ok(());
+    }
+    let path = stored.path.display();
+    let lines = differences.join("\n  ");
+    Err(PartError::Parts(format!("{path} is of another scene or of other settings:\n  {lines}")))
+}

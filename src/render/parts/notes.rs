@@ -1,0 +1,168 @@
+//! What files of sums tell of a rendering: what its image depends on, which all parts have in common, and notes, by which it
+//! is continued and merged.
+
+use super::error::PartError;
+use super::header::FilmHeader;
+use super::stored::Stored;
+use crate::cameras::Camera;
+use crate::import::LoadOptions;
+use crate::render::RenderSettings;
+use crate::render::output::{self, Aov};
+use crate::scene::{AccelKind, RenderJob};
+use std::str::FromStr;
+
+/// Note of the layers that the image is to have.
+const AOV: &str = "aov";
+/// Note of the path of the scene.
+pub(super) const SCENE_NOTE: &str = "scene";
+/// Note of the plan that was made for it.
+pub(super) const PLAN_NOTE: &str = "plan";
+/// Note of the time that it took.
+pub(super) const SECONDS: &str = "seconds";
+/// Notes of the matrices of the camera.
+const MATRICES: [&str; 2] = ["camera_from_world", "ndc_from_world"];
+/// Entry of what the sums are of, besides radiance; and its word for the features of the first surfaces.
+const LAYERS: &str = "layers";
+const FEATURES: &str = "features";
+
+/// What is asked of a rendering, besides its settings and its extent.
+#[derive(Clone, Debug, Default)]
+pub struct Asked {
+    /// The scene, as it is called in metadata.
+    pub scene: String,
+    /// How it is loaded.
+    pub load: LoadOptions,
+    /// Whether there is a box filter of one pixel in place of its own filter.
+    pub box_filter: bool,
+    /// The ray tracer.
+    pub accel: AccelKind,
+    /// The layers of its image; the default ones if `None`.
+    pub aovs: Option<Vec<Aov>>,
+}
+
+impl Asked {
+    /// What is stored, where nothing is asked for now.
+    pub fn complete(&mut self, stored: &Stored) -> Result<(), PartError> {
+        let note = |name| stored.header.note(name).filter(|text| !text.is_empty());
+        let wrong = |name: &str| stored.foreign(&format!("the stored {name} means nothing"));
+        let load = &mut self.load;
+        if let (None, Some(text)) = (load.resolution, note("resolution")) {
+            let is_size = |size: &[u32; 2]| size.iter().all(|n| (1..=1 << 16).contains(n));
+            load.resolution = Some(list(text, 'x').filter(is_size).ok_or_else(|| wrong("resolution"))?);
+        }
+        if let (None, Some(text)) = (load.crop, note("crop")) {
+            let is_inside = |[x0, x1, y0, y1]: &[f32; 4]| {
+                0.0 <= *x0 && x0 < x1 && *x1 <= 1.0 && 0.0 <= *y0 && y0 < y1 && *y1 <= 1.0
+            };
+            load.crop = Some(list(text, ',').filter(is_inside).ok_or_else(|| wrong("crop window"))?);
+        }
+        if let (AccelKind::Embree, Some(accel)) = (self.accel, stored.header.setting("lumiris:accel")) {
+            self.accel = accel.parse().map_err(|_| wrong("ray tracer"))?;
+        }
+        if let (None, Some(path)) = (&load.environment, note("environment")) {
+            load.environment = Some(path.into());
+        }
+        load.camera_auto |= note("camera_auto").is_some();
+        if let (None, Some(text)) = (load.time, note("time_in_scene")) {
+            load.time = Some(text.parse().ok().filter(|t| f32::is_finite(*t)).ok_or_else(|| wrong("time"))?);
+        }
+        self.box_filter |= note("box_filter").is_some();
+        if let (None, Some(text)) = (&self.aovs, note(AOV)) {
+            self.aovs = Some(aovs(text).ok_or_else(|| wrong("list of layers"))?);
+        }
+        Ok(())
+    }
+
+    /// What may differ between parts, and what going on needs. `plan` is what was chosen by measurements.
+    pub(super) fn notes(&self, plan: Option<String>, camera: &Camera) -> Vec<(String, String)> {
+        let LoadOptions { resolution, crop, environment, camera_auto, time } = &self.load;
+        let names = |aovs: &Vec<Aov>| match aovs[..] {
+            [] => "none".to_owned(),
+            _ => aovs.iter().map(<&str>::from).collect::<Vec<_>>().join(","),
+        };
+        let notes = [
+            (SCENE_NOTE, Some(self.scene.clone())),
+            ("resolution", resolution.map(|[w, h]| format!("{w}x{h}"))),
+            ("crop", crop.map(|c| c.map(|v| v.to_string()).join(","))),
+            ("environment", environment.as_ref().map(|path| path.display().to_string())),
+            ("camera_auto", camera_auto.then(|| "true".to_owned())),
+            ("time_in_scene", time.map(|time| time.to_string())),
+            ("box_filter", self.box_filter.then(|| "true".to_owned())),
+            (PLAN_NOTE, plan),
+            (AOV, self.aovs.as_ref().map(names)),
+        ];
+        let notes = notes.into_iter().filter_map(|(key, value)| Some((key.to_owned(), value?)));
+        notes.chain(CameraMatrices::of(camera).notes()).collect()
+    }
+
+    /// What parts of an image have in common.
+    pub(super) fn described(&self, job: &RenderJob, settings: &RenderSettings) -> Vec<(String, String)> {
+        let mut entries = output::metadata(&job.world.scene.film, job.settings());
+        entries.push(("lumiris:accel".to_owned(), <&str>::from(self.accel).to_owned()));
+        let layers = [(settings.with_features, FEATURES), (settings.with_replicas, "variance")];
+        let layers: Vec<&str> = layers.into_iter().filter(|(has, _)| *has).map(|(_, name)| name).collect();
+        entries.push((LAYERS.to_owned(), layers.join(" ")));
+        // One entry for each name
+        let mut joined: Vec<(String, String)> = Vec::new();
+        for (key, value) in entries {
+            match joined.iter_mut().find(|(other, _)| *other == key) {
+                Some((_, values)) => *values = format!("{values}; {value}"),
+                None => joined.push((key, value)),
+            }
+        }
+        joined
+    }
+}
+
+/// The layers that a note tells; `None` if there is no such layer.
+fn aovs(text: &str) -> Option<Vec<Aov>> {
+    text.split(',').filter(|name| *name != "none").map(|name| name.parse().ok()).collect()
+}
+
+/// The layers that a rendering was asked for.
+pub(super) fn asked_aovs(header: &FilmHeader) -> Option<Vec<Aov>> {
+    header.note(AOV).and_then(aovs)
+}
+
+/// True if the sums have the features of first surfaces.
+pub(super) fn has_features(header: &FilmHeader) -> bool {
+    header.setting(LAYERS).is_some_and(|layers| layers.split(' ').any(|name| name == FEATURES))
+}
+
+/// Numbers, of which there are N.
+fn list<T: FromStr, const N: usize>(text: &str, separator: char) -> Option<[T; N]> {
+    let values: Vec<T> = text.split(separator).map(|v| v.parse().ok()).collect::<Option<_>>()?;
+    values.try_into().ok()
+}
+
+/// Where the camera stood, as columns of 4 × 4 matrices.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct CameraMatrices {
+    /// From world space to the space of the camera.
+    pub camera_from_world: Option<[f32; 16]>,
+    /// From world space to the image.
+    pub ndc_from_world: Option<[f32; 16]>,
+}
+
+impl CameraMatrices {
+    /// Those of a camera.
+    pub fn of(camera: &Camera) -> Self {
+        CameraMatrices {
+            camera_from_world: Some(camera.camera_from_world().to_cols_array()),
+            ndc_from_world: camera.ndc_from_world().map(|m| m.to_cols_array()),
+        }
+    }
+
+    /// As notes of a part.
+    fn notes(&self) -> impl Iterator<Item = (String, String)> {
+        let text = |m: [f32; 16]| m.map(|v| v.to_string()).join(",");
+        let matrices = MATRICES.into_iter().zip([self.camera_from_world, self.ndc_from_world]);
+        matrices.filter_map(move |(key, m)| Some((key.to_owned(), text(m?))))
+    }
+
+    /// From the notes of a part.
+    pub fn from_notes<'a>(note: impl Fn(&str) -> Option<&'a str>) -> Self {
+        let [camera_from_world, ndc_from_world] = MATRICES.map(|key| list(note(key)?, ','));
+        CameraMatrices { camera_from_world, ndc_from_world }
+    }
+}
