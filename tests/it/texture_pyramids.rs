@@ -26,6 +26,9 @@ fn byte(level: usize, x: usize, y: usize, c: usize) -> u8 {
     ((x * 3 + y * 7 + c * 50 + level * 37) % 256) as u8
 }
 
+/// Type, number and bytes of the values of a tag.
+type Values = (u16, usize, Vec<u8>);
+
 /// A TIFF file of so many levels, with tiles of this edge, of bytes or of floats.
 fn tiff(levels: usize, tile: usize, is_float: bool) -> Vec<u8> {
     let mut file = b"II*\0\0\0\0\0".to_vec();
@@ -50,7 +53,7 @@ fn tiff(levels: usize, tile: usize, is_float: bool) -> Vec<u8> {
         let one = |value: usize| (long, 1, (value as u32).to_le_bytes().to_vec());
         let longs = |values: Vec<u32>| (long, values.len(), values.iter().flat_map(|v| v.to_le_bytes()).collect());
         let name = b"Plain Texture\0".to_vec();
-        let tags: [(u16, (u16, usize, Vec<u8>)); 13] = [
+        let tags: [(u16, Values); 13] = [
             (256, one(width)),
             (257, one(height)),
             (258, shorts(if is_float { 32 } else { 8 })),
