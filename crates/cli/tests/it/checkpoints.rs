@@ -63,8 +63,9 @@ impl Random {
 }
 
 /// Renders with a method, is killed again and again, and compares. Returns how often it was killed, and how often it
-/// went on from samples that an earlier process had stored.
-fn killed(method: &str, spp: u32, random: &mut Random) -> (u32, u32) {
+/// went on from samples that an earlier process had stored. The first time it is killed `early`, perhaps before it
+/// has stored anything, or else some time after that, however busy the machine is.
+fn killed(method: &str, spp: u32, early: bool, random: &mut Random) -> (u32, u32) {
     let folder = tempfile::tempdir().unwrap();
     let folder = folder.path();
     let image = format!("render GALLERY --resolution 80x60 {method} --spp {spp} -q");
@@ -79,6 +80,9 @@ fn killed(method: &str, spp: u32, random: &mut Random) -> (u32, u32) {
         let options = format!("--threads {threads} --tile-size {tile} --checkpoint c.film,0.02 --resume c.film");
         resumed += u32::from(stored > 0);
         let mut child = start(&format!("{image} {options} -o resumed.exr"), folder);
+        while !(early && kills == 0) && !checkpoint.exists() && child.try_wait().unwrap().is_none() {
+            std::thread::sleep(Duration::from_millis(1));
+        }
         // Some end during the preparation; over time they live longer, so that there is an end
         let life = random.below(40 + whole.as_millis() as u64 * u64::from(2 + kills) / 8);
         let end = Instant::now() + Duration::from_millis(life);
@@ -118,7 +122,7 @@ fn kill(times: u32) {
         // From the middle on, so that few rounds have methods of all kinds
         let method = methods[(turn * 4 + turn / methods.len()) % methods.len()];
         let spp = if method.contains("photon") || method.contains("cache") { 9 } else { 43 };
-        let (k, r) = killed(method, spp, &mut random);
+        let (k, r) = killed(method, spp, turn % 4 == 0, &mut random);
         (kills, resumed, turn) = (kills + k, resumed + r, turn + 1);
     }
     assert!(2 * resumed > kills, "only {resumed} of {kills} killed renderings had stored anything");
