@@ -88,6 +88,9 @@ pub enum Bsdf<'a> {
     Phase(Phase),
 }
 
+/// The roughness up to which surfaces are said to make caustics.
+const MAX_CAUSTIC_ALPHA: f32 = 0.3;
+
 /// The part of a BSDF that needs of the light no more than its irradiance, and what remains.
 #[derive(Clone, Copy, Debug)]
 pub struct Lambertian<'a> {
@@ -226,6 +229,33 @@ impl<'a> Bsdf<'a> {
             | Bsdf::Phase(_) => return None,
         };
         (!distribution.is_smooth()).then_some((distribution.alpha_x.max(distribution.alpha_y), share))
+    }
+
+    /// True for metals and glass that are smooth or nearly so: light that they send on is bundled to caustics.
+    pub fn makes_caustics(&self) -> bool {
+        let is_narrow = |d: &TrowbridgeReitz| d.is_smooth() || d.alpha_x.max(d.alpha_y) <= MAX_CAUSTIC_ALPHA;
+        match self {
+            Bsdf::Conductor(b) => is_narrow(&b.distribution),
+            Bsdf::Dielectric(b) => is_narrow(&b.distribution),
+            Bsdf::ThinDielectric(_) => true,
+            _ => false,
+        }
+    }
+
+    /// True if f and pdf are functions of the directions, and pdf is that of sampled directions: not estimates by random
+    /// walks, not of what can only be evaluated, and not of interiors.
+    pub fn is_evaluated_exactly(&self) -> bool {
+        match self {
+            Bsdf::Diffuse(_)
+            | Bsdf::DiffuseTransmission(_)
+            | Bsdf::Conductor(_)
+            | Bsdf::Dielectric(_)
+            | Bsdf::ThinDielectric(_)
+            | Bsdf::CoatedDiffuse(_)
+            | Bsdf::Principled(_)
+            | Bsdf::Measured(_) => true,
+            Bsdf::Exit(_) | Bsdf::Layered(_) | Bsdf::Hair(_) | Bsdf::Evaluated(_) | Bsdf::Phase(_) => false,
+        }
     }
 
     /// False in a medium, where directions along the horizon of the frame are no others, and there is no cosine.

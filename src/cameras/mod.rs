@@ -29,6 +29,17 @@ pub struct CameraRay {
     pub weight: f32,
 }
 
+/// Where the camera sees a point.
+#[derive(Clone, Copy, Debug)]
+pub struct Projection {
+    /// The raster point.
+    pub film_xy: Vec2,
+    /// The point of the lens, in world space.
+    pub o: Vec3,
+    /// Area of the film (pixels) per solid angle at `o` (1/sr).
+    pub density: f32,
+}
+
 /// How a spherical camera maps its film.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum SphericalMapping {
@@ -300,6 +311,42 @@ impl Camera {
     }
 }
 
+impl Camera {
+    /// True if [`Self::project`] knows where it sees points.
+    pub fn projects(&self) -> bool {
+        matches!(self, Camera::Perspective { .. })
+    }
+
+    /// Where the point `p` of world space is seen through the point `u_lens` of the lens at `time_u` of the shutter
+    /// interval, on the film or beside it; `None` behind the camera, and for cameras that are not perspective.
+    pub fn project(&self, p: Vec3, u_lens: [f32; 2], time_u: f32) -> Option<Projection> {
+        let Camera::Perspective { base, screen_window, tan_half_fov, lens } = self else { return None };
+        let world_from_camera = placement_at(&base.world_from_camera, base.time(time_u));
+        let on_lens = if lens.radius > 0.0 { sample_uniform_disk_concentric(u_lens) * lens.radius } else { Vec2::ZERO };
+        let on_lens = on_lens.extend(0.0);
+        let d = world_from_camera.inverse().transform_point3(p) - on_lens;
+        if !(d.z > 0.0) {
+            return None;
+        }
+
+        // All rays of a film point meet in the plane in focus
+        let distance = if lens.radius > 0.0 { lens.focal_distance } else { 1.0 };
+        let focus = on_lens + d * (distance / d.z);
+        let screen = focus.truncate() / (distance * *tan_half_fov);
+        let [x0, x1, y0, y1] = *screen_window;
+        let film_xy = Vec2::new((screen.x - x0) / (x1 - x0), (y1 - screen.y) / (y1 - y0)) * base.resolution;
+
+        // From the solid angle of world space to that of camera space, the plane in focus, and the film
+        let direction = d.normalize();
+        let stretched = world_from_camera.transform_vector3(direction).length();
+        let solid_angle = stretched.powi(3) / world_from_camera.matrix3.determinant().abs();
+        let area = (focus - on_lens).length_squared() / direction.z;
+        let pixel = base.pixel_area(screen_window) * (distance * *tan_half_fov).powi(2);
+        let density = solid_angle * area / pixel;
+        density.is_finite().then(|| Projection { film_xy, o: world_from_camera.transform_point3(on_lens), density })
+    }
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -340,6 +387,31 @@ mod tests {
         // An off-centre window.
         let shifted = Camera::perspective(Affine3A::IDENTITY, 90.0, [0.0, 1.0, 0.0, 1.0], [10, 10], 0.0, 1e6);
         near(shifted.ray(Vec2::new(0.0, 10.0), [0.5; 2], 0.0).ray.d, Vec3::Z);
+    }
+
+    #[test]
+    fn points_of_rays_are_seen_where_the_rays_come_from() {
+        use lumiris_numbers::math::Quat;
+        let rotated = Affine3A::from_rotation_translation(Quat::from_rotation_y(0.7), Vec3::ONE);
+        let stretched = rotated * Affine3A::from_scale(Vec3::new(-2.0, 1.0, 0.7));
+        for (placement, radius) in [(rotated, 0.0), (rotated, 0.2), (stretched, 0.0), (stretched, 0.1)] {
+            let camera = Camera::perspective(placement, 50.0, [-1.5, 2.0, -1.0, 0.9], [200, 100], radius, 3.0);
+            for (film, u) in [([3.0, 5.0], [0.1, 0.9]), ([150.0, 70.0], [0.6, 0.3]), ([-7.0, 104.0], [0.5, 0.5])] {
+                let film = Vec2::from(film);
+                let at = |film| camera.ray(film, u, 0.5).ray;
+                let (ray, t) = (at(film), 4.5);
+                let seen = camera.project(ray.at(t), u, 0.5).unwrap();
+                assert!((seen.film_xy - film).length() < 1e-2, "{} {film}", seen.film_xy);
+                near(seen.o, ray.o);
+                // The solid angle of a square of the film, by its sides
+                let h = 0.25;
+                let side = |d: Vec2| at(film + d * h).d - at(film - d * h).d;
+                let solid_angle = side(Vec2::X).cross(side(Vec2::Y)).length();
+                let expected = 4.0 * h * h / solid_angle;
+                assert!((seen.density / expected - 1.0).abs() < 2e-3, "{} {expected}", seen.density);
+                assert!(camera.project(ray.at(-t), u, 0.5).is_none());
+            }
+        }
     }
 
     #[test]

@@ -182,6 +182,34 @@ impl AxisSampler {
     }
 }
 
+impl AxisSampler {
+    fn radius(&self) -> f32 {
+        match self {
+            AxisSampler::Point => 0.0,
+            AxisSampler::Box { r } | AxisSampler::Tent { r } | AxisSampler::Table { r, .. } => *r,
+        }
+    }
+
+    /// The filter whose samples these are, over its integral.
+    fn value(&self, x: f32) -> f32 {
+        match self {
+            AxisSampler::Point => 0.0,
+            AxisSampler::Box { r } if x.abs() <= *r => 0.5 / r,
+            AxisSampler::Tent { r } if x.abs() <= *r => (r - x.abs()) / (r * r),
+            AxisSampler::Box { .. } | AxisSampler::Tent { .. } => 0.0,
+            AxisSampler::Table { r, distribution, is_negative, weight } => {
+                let place = (x / r + 1.0) * 0.5;
+                if !(0.0..1.0).contains(&place) {
+                    return 0.0;
+                }
+                let index = ((place * is_negative.len() as f32) as usize).min(is_negative.len() - 1);
+                let sign = if is_negative[index] { -1.0 } else { 1.0 };
+                distribution.pdf(place) * 0.5 / r * weight * sign
+            }
+        }
+    }
+}
+
 /// Draws places from a [`PixelFilter`].
 #[derive(Clone, Debug)]
 pub struct FilterSampler {
@@ -195,6 +223,22 @@ impl FilterSampler {
     pub fn sample(&self, u: [f32; 2]) -> FilterSample {
         let ((x, wx), (y, wy)) = (self.x.sample(u[0]), self.y.sample(u[1]));
         FilterSample { offset: Vec2::new(x, y), weight: wx * wy }
+    }
+
+    /// The filter whose samples [`Self::sample`] draws at an offset from the pixel's centre, over its integral: the table,
+    /// where that is sampled.
+    pub fn value(&self, offset: Vec2) -> f32 {
+        self.x.value(offset.x) * self.y.value(offset.y)
+    }
+
+    /// Radii beyond which it is 0, in pixels.
+    pub fn radius(&self) -> Vec2 {
+        Vec2::new(self.x.radius(), self.y.radius())
+    }
+
+    /// True if all samples are at the centre of the pixel.
+    pub fn is_point(&self) -> bool {
+        matches!(self.x, AxisSampler::Point) || matches!(self.y, AxisSampler::Point)
     }
 }
 
@@ -282,6 +326,31 @@ mod tests {
             let slack = 0.004 * f64::from(r.x * r.x) / expected.abs();
             moments.assert_mean(expected, 1e-5, slack);
         }
+    }
+
+    #[test]
+    fn values_are_those_of_the_samples_and_integrate_to_one() {
+        for (k, filter) in FILTERS.into_iter().enumerate() {
+            let (sampler, r) = (filter.sampler(), filter.radius());
+            let mut stream = pcg32([k as u32, 10, 10]);
+            // E[value/pdf] over places by the filter itself, with its sign, is the integral of the magnitude
+            let (mut integral, mut moment) = (Moments::default(), Moments::default());
+            for _ in 0..100_000 {
+                let [x, y] = stream.random::<[f32; 2]>().map(|u| 2.0 * u - 1.0);
+                let value = sampler.value(Vec2::new(x, y) * r) * 4.0 * r.x * r.y;
+                integral.add(f64::from(value));
+                moment.add(f64::from(value * x * x));
+            }
+            integral.assert_mean(1.0, 1e-5, 1e-5);
+            let mut sampled = Moments::default();
+            for _ in 0..100_000 {
+                let s = sampler.sample(stream.random::<[f32; 2]>());
+                sampled.add(f64::from(s.weight * s.offset.x * s.offset.x / (r.x * r.x)));
+            }
+            moment.assert_mean(sampled.0.mean(), 1e-5, 4.0 * sampled.0.standard_error() / moment.0.mean().abs());
+            assert_eq!(sampler.value(r * 1.01), 0.0);
+        }
+        assert!(PixelFilter::Box { rx: 0.0, ry: 0.0 }.sampler().is_point());
     }
 
     #[test]

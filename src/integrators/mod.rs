@@ -4,13 +4,14 @@
 //! [`Tracer`] for each thread, and reports. Reading order: `segment` is a path between two vertices, `vertices` finds
 //! the next ones, `interior` walks through materials on the way there, and [`path`] is the loop over them; `wavefront` has the vertices of `mc` and `mis` side by side.
 //! `roulette` decides which paths end and split where they arrive (`arrivals`), by what `pilot` paths found.
-//! Pixels that are neighbours may share paths ([`reuse`]). [`through_media`] says which settings know participating media. [`irradiance_cache`] and [`photon_map`] replace the light that Lambertian parts reflect (`diffuse`).
+//! Pixels that are neighbours may share paths ([`reuse`]), and light paths bring caustics ([`light_paths`]). [`through_media`] says which settings know participating media. [`irradiance_cache`] and [`photon_map`] replace the light that Lambertian parts reflect (`diffuse`).
 
 mod arrivals;
 mod diffuse;
 mod interior;
 pub mod irradiance_cache;
 pub mod light_layers;
+pub mod light_paths;
 pub mod path;
 pub mod photon_map;
 mod pilot;
@@ -22,6 +23,7 @@ mod vertices;
 mod wavefront;
 
 pub use irradiance_cache::{CacheIntegrator, CacheReport, IrradianceCache};
+pub use light_paths::LightPathStats;
 pub use path::{CameraSample, PathIntegrator, PathStats, PathTracer};
 pub use photon_map::{MapStats, PhotonMapIntegrator};
 pub use pilot::GuidedIntegrator;
@@ -100,6 +102,8 @@ pub struct Statistics {
     pub cache: Option<CacheReport>,
     /// The photon maps, if there are any.
     pub photons: Option<MapStats>,
+    /// Light paths, if there are any.
+    pub light: Option<LightPathStats>,
     /// Pixels that asked for the records of the cache, by their coordinates: one entry for each record.
     pub records: Vec<[u32; 2]>,
 }

@@ -11,6 +11,7 @@
 //!
 //! All integrators follow their paths through the one loop here; [`AtVertices`] is what they do differently.
 
+use super::light_paths::LightImage;
 use super::reuse::{self, Groups, Place, Reuse};
 pub use super::segment::{CameraSample, PathStats};
 use super::segment::{PathState, Vertex, emptied, extend, extend_to_emitter};
@@ -24,32 +25,60 @@ use crate::film::PixelSample;
 use crate::lights::LightSampling;
 use crate::materials::SurfaceBsdf;
 use crate::media::Sides;
+use crate::photons::PhotonError;
 use crate::scene::RenderJob;
 use crate::settings::IntegratorSettings;
 use lumiris_numbers::math::Rgb;
+use std::sync::Arc;
 use std::time::Instant;
 
-/// Path tracing: nothing is prepared.
-#[derive(Clone, Copy, Debug, Default)]
-pub struct PathIntegrator {
+/// Path tracing: nothing is prepared, but light paths if there are any.
+pub struct PathIntegrator<'a> {
+    job: &'a RenderJob,
     /// Which samples share paths.
     groups: Groups,
+    light: Option<LightImage>,
 }
 
-impl PathIntegrator {
+impl<'a> PathIntegrator<'a> {
     /// Of an image that is rendered in whole cells.
-    pub(super) fn new(job: &RenderJob) -> Self {
-        PathIntegrator { groups: if reuse::edge(job) > 1 { Groups::Cells } else { Groups::None } }
+    pub(super) fn new(job: &'a RenderJob) -> Self {
+        let groups = if reuse::edge(job) > 1 { Groups::Cells } else { Groups::None };
+        PathIntegrator { job, groups, light: LightImage::new(job) }
     }
 }
 
-impl Integrator for PathIntegrator {
+impl Integrator for PathIntegrator<'_> {
+    fn prepare(&mut self, first: u32) -> Result<u32, PhotonError> {
+        Ok(self.light.as_mut().map_or(u32::MAX, |light| light.prepare(self.job, first)))
+    }
+
     fn tracer(&self, with_features: bool) -> Box<dyn Tracer + '_> {
-        Box::new(PathTracer::sharing(self.groups, with_features))
+        let mut paths = PathTracer::sharing(self.groups, with_features);
+        let Some(light) = &self.light else { return Box::new(paths) };
+        paths.search.guide = Some(Arc::clone(&light.guide));
+        Box::new(WithLightPaths { paths, light })
     }
 
     fn statistics(&self, paths: PathStats) -> Statistics {
-        Statistics { paths, ..Statistics::default() }
+        Statistics { paths, light: self.light.as_ref().map(|light| light.stats), ..Statistics::default() }
+    }
+}
+
+/// Traces camera paths, and adds what light paths have found.
+struct WithLightPaths<'a> {
+    paths: PathTracer,
+    light: &'a LightImage,
+}
+
+impl Tracer for WithLightPaths<'_> {
+    fn trace(&mut self, job: &RenderJob, samples: &[CameraSample], fits: &mut Fits, out: &mut Vec<PixelSample>) {
+        Tracer::trace(&mut self.paths, job, samples, fits, out);
+        self.light.add(samples.iter().map(|s| (s.pixel, s.turn)), out);
+    }
+
+    fn take_stats(&mut self) -> PathStats {
+        Tracer::take_stats(&mut self.paths)
     }
 }
 
@@ -196,8 +225,8 @@ impl PathTracer {
                 let (stats, direct) = (&mut self.search.stats, &mut self.direct.stats);
                 let segments = self.search.recording.as_mut().map(|r| r.segments_at(vertex));
                 let (samples, next, reuse) = (&mut *out, &mut self.next, self.reuse.active());
-                let layers = &mut self.search.layers;
-                batch.shade(job, &mut Output { samples, fits, next, stats, direct, segments, reuse, layers });
+                let (layers, guide) = (&mut self.search.layers, self.search.guide.as_deref());
+                batch.shade(job, &mut Output { samples, fits, next, stats, direct, segments, reuse, layers, guide });
                 self.buffers = Some(batch.into_buffers());
             }
             std::mem::swap(&mut self.search.active, &mut self.next);

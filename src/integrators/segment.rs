@@ -1,5 +1,6 @@
 //! A path on its way: its state between two vertices, and the ways in which it goes on.
 
+use super::light_paths::{Chain, Guide};
 use crate::accel::Hit;
 use crate::bsdfs::Lobe;
 use crate::cameras::CameraRay;
@@ -96,7 +97,8 @@ pub struct CameraSample {
     pub direct: SampleStream,
     /// Sample counts at its first vertex.
     pub sample_counts: SampleCounts,
-    /// Which samples of neighbouring pixels may share its path: its index, where all pixels have as many samples.
+    /// Which samples of neighbouring pixels may share its path, and which light paths it has: its index, where all pixels
+    /// have as many samples.
     pub turn: u32,
     /// The fit of its pixel.
     pub fit: u32,
@@ -130,6 +132,8 @@ pub(super) struct PathState {
     pub(super) wavelength: Option<f32>,
     /// The path has ended in a medium, and only looks for the features of the first surface behind.
     pub(super) is_ghost: bool,
+    /// What light paths could have found as well.
+    pub(super) chain: Chain,
 }
 
 /// What a path keeps at a vertex of what it brought there.
@@ -149,18 +153,21 @@ pub(super) struct Carried {
     pub(super) passed: u32,
     /// See [`PathState`].
     pub(super) wavelength: Option<f32>,
+    /// See [`PathState`].
+    pub(super) chain: Chain,
 }
 
 impl PathState {
     /// At a vertex with the throughput `beta`, where a pixel has the given width.
     #[inline]
     pub(super) fn carried(&self, beta: Rgb, width: f32) -> Carried {
-        let PathState { sample, branch, eta_scale, spread, passed, wavelength, ray: Ray { time, .. }, .. } = *self;
-        Carried { sample, branch, beta, eta_scale, width, spread, time, passed, wavelength }
+        let PathState { sample, branch, eta_scale, spread, passed, wavelength, chain, ray: Ray { time, .. }, .. } =
+            *self;
+        Carried { sample, branch, beta, eta_scale, width, spread, time, passed, wavelength, chain }
     }
 
     /// What the path carries of the emission of a surface, with the weight of the technique that found it.
-    pub(super) fn emission(&self, job: &RenderJob, interaction: &SurfaceInteraction) -> Rgb {
+    pub(super) fn emission(&self, job: &RenderJob, interaction: &SurfaceInteraction, guide: Option<&Guide>) -> Rgb {
         let lights = &job.lights;
         if interaction.hit.instance != Hit::NO_INSTANCE {
             return Rgb::BLACK;
@@ -170,7 +177,10 @@ impl PathState {
         };
         let s = &interaction.surface;
         let hit = LightHit { t: self.depth(interaction), p: s.p, n: s.n, uv: s.uv };
-        let l = self.beta * lights.lights[light as usize].l(&hit, interaction.wo);
+        let mut l = self.beta * lights.lights[light as usize].l(&hit, interaction.wo);
+        if let Some(guide) = guide.filter(|_| self.chain.is_caustic() && !l.is_black()) {
+            l *= self.chain.rest(guide.density(light, s.n, interaction.wo));
+        }
         match &self.technique {
             Some(technique) if !l.is_black() => l * technique.weight(|ctx| lights.pdf(ctx, light, self.ray.d, &hit)),
             _ => l,
@@ -236,6 +246,7 @@ impl PathState {
             width: interaction.width,
             passed: self.passed + 1,
             travelled: self.travelled + interaction.distance,
+            chain: Chain::NONE,
             ..*self
         }
     }
@@ -274,10 +285,20 @@ impl Carried {
         (!beta.is_black() && beta.is_finite()).then_some((beta, eta_scale))
     }
 
+    /// What light paths could have found as well, in a direction beyond a vertex of geometric normal `n`.
+    #[inline]
+    pub(super) fn chain_beyond(&self, n: Vec3, direction: &Direction) -> Chain {
+        if self.chain.is_caustic() {
+            return self.chain;
+        }
+        let pdf = direction.pdf.filter(|_| !direction.lobe.is_specular());
+        self.chain.beyond_first(pdf, n.dot(direction.wi))
+    }
+
     /// The path from the origin `o` on in the direction `wi`, with what [`Self::beyond`] says.
     #[inline]
     pub(super) fn segment(&self, o: Vec3, wi: Vec3, beta: Rgb, eta_scale: f32) -> PathState {
-        let Carried { sample, branch, width, spread, time, wavelength, .. } = *self;
+        let Carried { sample, branch, width, spread, time, wavelength, chain, .. } = *self;
         let ray = Ray { o, d: wi, t_max: f32::INFINITY, time };
         PathState {
             sample,
@@ -293,6 +314,7 @@ impl Carried {
             medium: None,
             wavelength,
             is_ghost: false,
+            chain,
         }
     }
 }
@@ -354,9 +376,11 @@ impl<'w> Vertex<'w> {
     }
 
     /// The segment in a direction, with what it goes through.
-    fn segment(&self, carried: &Carried, wi: Vec3, beta: Rgb, eta_scale: f32) -> PathState {
+    fn segment(&self, carried: &Carried, direction: &Direction, beta: Rgb, eta_scale: f32) -> PathState {
+        let wi = direction.wi;
         let medium = self.media.towards(self.bsdf.n.dot(wi));
-        PathState { medium, ..carried.segment(self.origin(wi), wi, beta, eta_scale) }
+        let chain = carried.chain_beyond(self.bsdf.n, direction);
+        PathState { medium, chain, ..carried.segment(self.origin(wi), wi, beta, eta_scale) }
     }
 
     /// The shading normal on the side of the viewer.
@@ -394,7 +418,7 @@ pub(super) fn extend(
     let carried = path.carried(path.beta, path.width);
     let (beta, eta_scale) = carried.beyond(&direction)?;
     let beta = survive(beta, eta_scale, &v.stream, vertex + 1, settings)?;
-    Some((v.segment(&carried, direction.wi, beta, eta_scale), direction.lobe))
+    Some((v.segment(&carried, &direction, beta, eta_scale), direction.lobe))
 }
 
 /// The next path segment by BSDF sampling, which looks for the emitter of the sample as well. Roulette ends it only behind
@@ -417,7 +441,7 @@ pub(super) fn extend_to_emitter(
         heuristic: mis.heuristic,
         survivor: survive(beta, eta_scale, &v.stream, vertex + 1, settings),
     };
-    let next = v.segment(&carried, direction.wi, beta, eta_scale);
+    let next = v.segment(&carried, &direction, beta, eta_scale);
     Some(PathState { technique: Some(technique), ..next })
 }
 

@@ -3,6 +3,7 @@
 
 use super::arrivals::Arrivals;
 use super::light_layers::LayerSums;
+use super::light_paths::{Chain, Guide};
 use super::segment::{CameraSample, Carried, PathState, PathStats, Vertex, domain, emptied};
 use super::wavefront::Batch;
 use crate::accel::{Coherence, Hit, RayBatch};
@@ -15,6 +16,7 @@ use crate::media::{End, Flight, Numbers, Segment, Sides};
 use crate::scene::{RenderJob, SurfaceInteraction};
 use lumiris_numbers::math::{Rgb, Vec3};
 use lumiris_numbers::samplers::SampleStream;
+use std::sync::Arc;
 use std::time::Instant;
 
 /// Surfaces without scattering that a path may pass between two vertices.
@@ -75,6 +77,8 @@ pub(super) struct VertexSearch {
     pub(super) arrivals: Arrivals,
     /// What is of each light group.
     pub(super) layers: LayerSums,
+    /// Of the light paths that bring a part of the light, if any do.
+    pub(super) guide: Option<Arc<Guide>>,
     /// Copies of what is traced, if requested.
     pub(super) recording: Option<Recording>,
 }
@@ -101,6 +105,7 @@ impl VertexSearch {
             medium: job.world.scene.media.camera,
             wavelength: None,
             is_ghost: false,
+            chain: Chain::NONE,
         }));
     }
 
@@ -163,6 +168,11 @@ impl VertexSearch {
         if at.vertex < at.depth {
             let mut carried = path.carried(beta, path.width + path.spread * distance);
             let (sample, d) = (&at.samples[path.sample as usize], path.ray.d);
+            carried.chain = if self.begins_chain(at.vertex, path) {
+                Chain::at_first(facing_normal(at.job, hit, d).dot(d), carried.width)
+            } else {
+                Chain::NONE
+            };
             let place = || (path.ray.at(hit.t), facing_normal(at.job, hit, d));
             let found = at.out[path.sample as usize].radiance;
             let (arrivals, branch) = (&mut self.arrivals, carried.branch);
@@ -181,7 +191,7 @@ impl VertexSearch {
         let interaction = SurfaceInteraction::new(at.job, &path.ray, (path.width, path.spread), hit);
         let (sample, out) = (&at.samples[path.sample as usize], &mut at.out[path.sample as usize]);
         if self.looks_for_emitters(at.vertex, path) {
-            let emission = path.emission(at.job, &interaction);
+            let emission = path.emission(at.job, &interaction, self.guide.as_deref());
             out.radiance += emission;
             self.layers.add_emission(at.job, path.sample, &interaction.hit, emission);
         }
@@ -217,6 +227,7 @@ impl VertexSearch {
         let Some((bsdf, beta)) = self.leave(at, (path, beta), &interaction, (bsdf, media)) else { return };
         let out = &at.out[path.sample as usize];
         let mut carried = path.carried(beta, width);
+        carried.chain = self.chain(at, path, &interaction, &bsdf);
         let (surface, wo) = (interaction.surface, interaction.wo);
         let place = || (surface.p, if surface.n.dot(wo) < 0.0 { -surface.n } else { surface.n });
         let count = self.arrivals.arrive((sample, out.radiance), at.vertex, &mut carried, place);
@@ -234,6 +245,27 @@ impl VertexSearch {
         }
     }
 
+    /// True if light paths bring light to what the path has met.
+    #[inline]
+    fn begins_chain(&self, vertex: u32, path: &PathState) -> bool {
+        self.guide.is_some() && vertex == 0 && path.passed == 0
+    }
+
+    /// What light paths could have found as well, at a vertex of this BSDF.
+    fn chain(&self, at: &Stage<'_, '_>, path: &PathState, met: &SurfaceInteraction, bsdf: &SurfaceBsdf<'_>) -> Chain {
+        if self.guide.is_none() || path.passed > 0 {
+            return Chain::NONE;
+        }
+        // The emitter is to be found by the next segment, and the last vertex has none
+        match (bsdf.bsdf.makes_caustics(), path.chain.is_open()) {
+            (true, true) if at.vertex + 1 < at.depth => path.chain.bundled(),
+            (false, _) if at.vertex == 0 && bsdf.bsdf.is_evaluated_exactly() => {
+                Chain::at_first(bsdf.n.dot(met.wo), met.width)
+            }
+            _ => Chain::NONE,
+        }
+    }
+
     /// The wavelength of a path, and the factor of its throughput for choosing one.
     fn wavelength(&self, at: &Stage<'_, '_>, path: &PathState) -> (f32, Rgb) {
         path.wavelength.map_or_else(
@@ -248,12 +280,13 @@ impl VertexSearch {
     /// Keeps a path at a vertex, with what it has carried there.
     #[inline]
     fn keep(&mut self, path: &PathState, carried: &Carried) {
-        let Carried { beta, branch, width, wavelength, .. } = *carried;
+        let Carried { beta, branch, width, wavelength, chain, .. } = *carried;
         self.kept.push(PathState {
             branch,
             beta,
             width,
             wavelength,
+            chain,
             passed: 0,
             travelled: 0.0,
             technique: None,

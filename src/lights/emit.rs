@@ -39,6 +39,21 @@ pub struct EmissionSample {
     pub power: Rgb,
 }
 
+/// A point of a surface, and what leaves it in a direction.
+#[derive(Clone, Copy, Debug)]
+pub struct EmittingPoint {
+    /// The point.
+    pub p: Vec3,
+    /// Bound of its rounding error per axis.
+    pub p_error: Vec3,
+    /// Normal on the side of the direction.
+    pub n: Vec3,
+    /// Density of the point (1/m²).
+    pub pdf_area: f32,
+    /// Radiance that leaves it; black on a side that does not emit.
+    pub radiance: Rgb,
+}
+
 impl EmissionSample {
     /// For lights without a surface.
     pub(super) fn in_space(p: Vec3, d: Vec3, power: Rgb) -> Option<Self> {
@@ -93,6 +108,15 @@ fn from_infinity(
 }
 
 impl AreaLight {
+    /// Samples a point of the surface, by area or nearly so, as it emits in the unit direction `d`.
+    pub fn sample_point_towards(&self, u_position: [f32; 2], d: Vec3) -> EmittingPoint {
+        let point = self.sample_point(u_position);
+        let faces = point.n.dot(d) > 0.0;
+        let radiance = if faces || self.emission.two_sided { self.radiance(point.p) } else { Rgb::BLACK };
+        let n = if faces { point.n } else { -point.n };
+        EmittingPoint { p: point.p, p_error: point.p_error, n, pdf_area: point.pdf_area, radiance }
+    }
+
     /// [`Light::sample_le`] of a surface: by area, and by the cosine about the normal.
     fn sample_le(&self, u_position: [f32; 2], u_direction: [f32; 2]) -> Option<EmissionSample> {
         let point = self.sample_point(u_position);

@@ -39,7 +39,7 @@ mod light_tests;
 pub use area::{AreaLight, AreaShape, Emission, EmissionImage, EmissionMapping, area_lights_of};
 pub use bounds::LightBounds;
 pub use choice::{LightRun, SampledLight};
-pub use emit::EmissionSample;
+pub use emit::{EmissionSample, EmittingPoint};
 pub use environment::{EnvironmentFilter, EnvironmentMap, EnvironmentMapping};
 pub use glossy_lobe::GlossyLobe;
 pub use groups::LightGroups;

@@ -148,6 +148,15 @@ impl LightSet {
         e.light_of_primitive.get(primitive as usize).map(|&i| e.first_light + i)
     }
 
+    /// The number of the geometry that each light is part of, among those that emit; `None` for lights that have none.
+    pub fn sources(&self) -> Vec<Option<u32>> {
+        let mut sources = vec![None; self.lights.len()];
+        for (source, e) in (0..).zip(&self.emitting) {
+            e.light_of_primitive.iter().for_each(|i| sources[(e.first_light + i) as usize] = Some(source));
+        }
+        sources
+    }
+
     /// Samples a direction to a light that was chosen by `choice`. `pdf` of the sample includes the probability of the
     /// choice: it is per steradian, or a probability for delta lights.
     #[inline]

@@ -143,6 +143,13 @@ impl<'a> SurfaceBsdf<'a> {
         if self.bsdf.has_surface() { self.frame.z.dot(w).abs() } else { 1.0 }
     }
 
+    /// The factor of f where light is followed from `wo` to `wi` instead of radiance, which refraction by the relative index
+    /// `eta` has scaled [Veach 1997, §5.3.2].
+    #[inline]
+    pub fn adjoint_cos(&self, wo: Vec3, wi: Vec3, eta: f32) -> f32 {
+        (wo.dot(self.frame.z) * wi.dot(self.n) / wo.dot(self.n)).abs() * eta * eta
+    }
+
     /// The Lambertian part as seen from `wo`, see [`Bsdf::lambertian`].
     #[inline]
     pub fn lambertian(&self, wo: Vec3) -> Option<Lambertian<'a>> {

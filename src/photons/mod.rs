@@ -18,12 +18,12 @@ pub mod light_distribution;
 pub mod map;
 #[cfg(test)]
 mod map_tests;
-mod path;
+pub(crate) mod path;
 pub mod photon;
 pub mod rules;
 pub mod trace;
 mod tree;
-mod walk;
+pub(crate) mod walk;
 
 pub use error::PhotonError;
 pub use importance::{Importance, ImportanceSettings, LowImportance, importons, trace_importons};

@@ -7,19 +7,19 @@ use lumiris_numbers::math::hash::pcg4d;
 use lumiris_numbers::samplers::{SampleStream, SamplerKind};
 
 /// Photon paths that are traced together.
-pub(super) const BATCH: u64 = 4096;
+pub(crate) const BATCH: u64 = 4096;
 /// log₂ of the points of a sequence.
 const SEQUENCE_BITS: u32 = 16;
 
 /// Random-number domains of a photon path.
-pub(super) mod domain {
+pub(crate) mod domain {
     pub(crate) const LIGHT: u32 = 0;
     pub(crate) const EMISSION: u32 = 1;
     pub(crate) const TIME: u32 = 2;
 }
 
 /// Random numbers of a photon path.
-pub(super) fn path_stream(seed: u32, path: u64) -> SampleStream {
+pub(crate) fn path_stream(seed: u32, path: u64) -> SampleStream {
     let block = path >> SEQUENCE_BITS;
     let [block_seed, key, ..] = pcg4d([seed, block as u32, (block >> 32) as u32, 0x7068_6f74]);
     let index = (path & ((1 << SEQUENCE_BITS) - 1)) as u32;

@@ -206,10 +206,9 @@ impl Scattering<'_> {
         let (f, origin) = self.of_part(&drawn);
 
         // Weight
-        let (n, ns) = (self.bsdf.n, self.bsdf.frame.z);
         let cosine = match transport {
-            Transport::Radiance => wi.dot(ns).abs(),
-            Transport::Importance => (wo.dot(ns) * wi.dot(n) / wo.dot(n)).abs() * drawn.eta * drawn.eta,
+            Transport::Radiance => wi.dot(self.bsdf.frame.z).abs(),
+            Transport::Importance => self.bsdf.adjoint_cos(wo, wi, drawn.eta),
         };
         let power = particle.power * f * (cosine * drawn.weight);
         if power.is_black() || !power.is_finite() {

@@ -4,7 +4,7 @@ use crate::cameras::CameraRay;
 use crate::direct::Estimator;
 use crate::film::filter::FilterSampler;
 use crate::integrators::path::CameraSample;
-use crate::integrators::reuse;
+use crate::integrators::{light_paths, reuse};
 use crate::scene::{PixelSamples, RenderJob};
 use crate::settings::{Proposals, SampleCounts};
 use lumiris_lanes::camera::{Pinhole, PinholeRays};
@@ -32,7 +32,7 @@ pub(super) struct CameraSampler<'a> {
     /// The first sample of the rendering.
     first_sample: u32,
     filter: FilterSampler,
-    /// Samples of pixels that have different numbers of them, and share paths.
+    /// Samples of pixels that have different numbers of them, and share camera paths or light paths.
     shared: Option<&'a PixelSamples>,
     /// False if the time of a ray does not matter.
     has_motion: bool,
@@ -82,7 +82,7 @@ impl<'a> CameraSampler<'a> {
             DirectNumbers::Same
         };
         let (filter, sample_counts) = (scene.film.filter.sampler(), settings.integrator.sample_counts());
-        let shared = job.pixel_samples.as_ref().filter(|_| reuse::edge(job) > 1);
+        let shared = job.pixel_samples.as_ref().filter(|_| reuse::edge(job) > 1 || light_paths::per_sample(job) > 0.0);
         CameraSampler { job, first_sample, shared, filter, has_motion, pinhole, direct, sample_counts }
     }
 
@@ -170,10 +170,10 @@ impl<'a> CameraSampler<'a> {
         }
     }
 
-    /// Which samples of neighbouring pixels may share its path.
+    /// Which samples of neighbouring pixels may share its path, and which light paths it has.
     #[inline]
     fn turn(&self, pixel: [u32; 2], sample: u32) -> u32 {
-        self.shared.map_or(sample, |of_pixels| of_pixels.turn(pixel, sample - self.first_sample))
+        self.shared.map_or(sample, |of_pixels| self.first_sample + of_pixels.turn(pixel, sample - self.first_sample))
     }
 
     /// The random numbers of direct light, if they are those of a block.

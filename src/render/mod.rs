@@ -34,7 +34,7 @@ mod worker;
 use crate::direct::Estimator;
 use crate::film::Film;
 pub use crate::integrators::CacheReport;
-use crate::integrators::{MapStats, PathStats, through_media};
+use crate::integrators::{LightPathStats, MapStats, PathStats, through_media};
 use crate::photons::PhotonError;
 use crate::scene::RenderJob;
 use crate::settings::Settings;
@@ -116,6 +116,8 @@ pub struct Rendering {
     pub cache: Option<CacheReport>,
     /// The photon maps, if there are any.
     pub photons: Option<MapStats>,
+    /// Light paths, if there were any.
+    pub light: Option<LightPathStats>,
     /// Wall-clock time.
     pub elapsed: Duration,
     /// True if every pixel has all its samples.

@@ -156,7 +156,7 @@ impl<'a> Run<'a> {
         }
         let complete = tiles.iter().all(|t| t.done >= end);
         let keeps_sums = keeps_sums || checkpoints.is_some();
-        let Statistics { paths: stats, cache, photons, records } = integrator.statistics(stats);
+        let Statistics { paths: stats, cache, photons, light, records } = integrator.statistics(stats);
         add_records(&records, &mut tiles);
         let mut film = self.film(&tiles);
         control_variates::correct(&mut film, &tiles);
@@ -164,7 +164,7 @@ impl<'a> Run<'a> {
             checkpoints.finish(&tiles);
         }
         let sums = keeps_sums.then_some(Tiles(tiles));
-        Ok(Rendering { film, stats, cache, photons, elapsed: self.start.elapsed(), complete, threads, sums })
+        Ok(Rendering { film, stats, cache, photons, light, elapsed: self.start.elapsed(), complete, threads, sums })
     }
 
     /// Camera samples of all tiles, as if every pixel had the same number.

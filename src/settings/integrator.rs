@@ -25,6 +25,8 @@ pub struct IntegratorSettings {
     /// Edge of the blocks of pixels that share paths from their second diffuse vertex on; 1: none do. `None`: what `auto`
     /// chooses, or 1.
     pub path_reuse: Option<u32>,
+    /// Light paths per camera sample that bring caustics; 0: none do. `None`: what `auto` chooses, or 0.
+    pub light_paths: Option<f32>,
     /// Lights that name groups have layers of their own in the image.
     pub light_groups: bool,
     /// Direct-light estimator at each path vertex.
@@ -74,6 +76,7 @@ impl Default for IntegratorSettings {
             roulette_depth: Some(4),
             roulette: RouletteKind::Throughput,
             path_reuse: None,
+            light_paths: None,
             light_groups: true,
             estimator: EstimatorKind::Auto,
             samples: None,

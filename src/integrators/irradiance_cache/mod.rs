@@ -76,7 +76,7 @@ impl Integrator for CacheIntegrator {
         let records: Vec<[u32; 2]> = self.cache.records().iter().map(|r| r.pixel).collect();
         let bytes = self.cache.bytes();
         let cache = Some(CacheReport { records: records.len(), bytes, build: self.build, lookups: paths.lookups });
-        Statistics { paths, cache, photons: None, records }
+        Statistics { paths, cache, records, ..Statistics::default() }
     }
 }
 

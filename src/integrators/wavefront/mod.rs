@@ -23,6 +23,7 @@ use buffers::Stream;
 use columns::{Single, Surface, others};
 
 use super::light_layers::LayerSums;
+use super::light_paths::Guide;
 use super::reuse::{Place, Reuse};
 use super::segment::{
     BsdfTechnique, Carried, Direction, PathState, PathStats, domain, emptied, sampled_direction, survive,
@@ -127,6 +128,8 @@ pub(super) struct Output<'a> {
     pub(super) reuse: Option<&'a mut Reuse>,
     /// Takes what is of each light group, if that is kept.
     pub(super) layers: &'a mut LayerSums,
+    /// Of the light paths that bring a part of the light, if any do.
+    pub(super) guide: Option<&'a Guide>,
 }
 
 impl<'w> Batch<'w> {
@@ -223,7 +226,7 @@ impl<'w> Batch<'w> {
 
         for k in 0..light {
             let start = Instant::now();
-            self.sample_lights(job, k);
+            self.sample_lights(job, out.guide, k);
             let t1 = self.trace(job, out, (true, start));
             out.direct.t1_light += t1;
             self.add_controls(job, true);
@@ -309,10 +312,11 @@ impl<'w> Batch<'w> {
     }
 
     /// Light sample `k` of each vertex: contributions and segments.
-    fn sample_lights(&mut self, job: &RenderJob, k: u32) {
+    fn sample_lights(&mut self, job: &RenderJob, guide: Option<&Guide>, k: u32) {
         let n = self.buffers.paths.len();
+        let only = job.lights.sampler.only_light();
         self.buffers.draw(Stream::Direct(direct::domain::LIGHT, self.estimate.counts.light, k));
-        let Buffers { surface, samples, scratch, .. } = &mut *self.buffers;
+        let Buffers { paths, surface, samples, scratch, .. } = &mut *self.buffers;
         job.lights.sample_many(n, surface.lit_points(), &samples.u, scratch, &mut samples.light);
 
         let len = padded(n);
@@ -323,7 +327,12 @@ impl<'w> Batch<'w> {
             let i = single.index as usize;
             if samples.light.pdf[i] > 0.0 {
                 let wi = samples.light.wi.vec3(i);
-                samples.f_cos.set_rgb(i, single.bsdf.f_cos(single.wo, wi));
+                let mut f_cos = single.bsdf.f_cos(single.wo, wi);
+                if let Some(guide) = guide.filter(|_| paths[i].chain.is_caustic() && samples.light.is_far[i] == 0.0) {
+                    let light = only.unwrap_or_else(|| scratch.chosen(i));
+                    f_cos *= paths[i].chain.rest(guide.density(light, samples.light.n.vec3(i), -wi));
+                }
+                samples.f_cos.set_rgb(i, f_cos);
                 samples.p_bsdf[i] = single.bsdf.pdf(single.wo, wi);
             }
         }
@@ -402,17 +411,18 @@ impl<'w> Batch<'w> {
         // Those follow below
         others(&self.singles).for_each(|single| samples.p_bsdf[single.index as usize] = 0.0);
         surface.origins(samples, len);
-        let mut follow = |i: usize, direction: &Direction, o: Vec3, n_light: u32| {
+        let mut follow = |i: usize, direction: &Direction, o: Vec3, n_light: u32, n: Vec3| {
             let Some((beta, eta_scale)) = paths[i].beyond(direction) else { return };
             let survivor = survive(beta, eta_scale, &streams[i], vertex + 1, settings);
+            let chain = paths[i].chain_beyond(n, direction);
             if counts.by_path {
                 let pdf = direction.pdf.filter(|_| !direction.lobe.is_specular());
                 let (ctx, heuristic) = (surface.lit_points().get(i), *heuristic);
                 let technique = BsdfTechnique { ctx, n_light: n_light as f32, pdf, heuristic, survivor };
                 let segment = paths[i].segment(o, direction.wi, beta, eta_scale);
-                next.push(PathState { technique: Some(technique), ..segment });
+                next.push(PathState { technique: Some(technique), chain, ..segment });
             } else if let Some(beta) = survivor {
-                next.push(paths[i].segment(o, direction.wi, beta, eta_scale));
+                next.push(PathState { chain, ..paths[i].segment(o, direction.wi, beta, eta_scale) });
             }
         };
         for i in (0..n).filter(|&i| samples.p_bsdf[i] > 0.0) {
@@ -423,7 +433,7 @@ impl<'w> Batch<'w> {
                 lobe: Lobe::DIFFUSE | Lobe::REFLECTION,
                 pdf: Some(samples.p_bsdf[i]),
             };
-            follow(i, &direction, samples.o.vec3(i), counts.light);
+            follow(i, &direction, samples.o.vec3(i), counts.light, surface.n.vec3(i));
         }
         for single in others(&self.singles) {
             let (i, bsdf) = (single.index as usize, &single.bsdf);
@@ -431,7 +441,7 @@ impl<'w> Batch<'w> {
             let Some(direction) = sampled_direction(bsdf, single.wo, u) else { continue };
             let o = offset_origin(single.p, single.p_error, bsdf.n, direction.wi);
             let n_light = if bsdf.bsdf.has_non_specular() { counts.light } else { 0 };
-            follow(i, &direction, o, n_light);
+            follow(i, &direction, o, n_light, bsdf.n);
         }
     }
 }

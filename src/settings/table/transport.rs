@@ -86,6 +86,24 @@ pub(super) const TRANSPORT: Group = Group {
             ..Setting::BASE
         },
         Setting {
+            flag: "light-paths",
+            value_name: "N",
+            parameters: &["lightpaths"],
+            key: "light_paths",
+            kind: Kind::Real { range: Interval::closed(0.0, 64.0), words: &["auto"] },
+            help: "Light paths per camera sample that bring the light of emitting surfaces over metal and glass to diffuse \
+                   surfaces (caustics), which camera paths find by chance only; both share it; 0: none",
+            default: "auto: what --estimator auto finds to be the most efficient, or else 0",
+            applies: Applies::Integrators(&[IntegratorKind::Path]),
+            get: |s| Some(s.integrator.light_paths.map_or(Value::Name("auto"), Value::Real)),
+            resolved: Some(|s| Some(Value::Real(s.integrator.light_paths.unwrap_or(0.0)))),
+            set: |s, v| {
+                s.integrator.light_paths = if v.name().is_some() { None } else { Some(v.real()?) };
+                Some(())
+            },
+            ..Setting::BASE
+        },
+        Setting {
             flag: "light-groups",
             value_name: "KIND",
             parameters: &["lightgroups"],

@@ -1,0 +1,118 @@
+//! What of a camera path light paths could have found as well, and how the two share it.
+
+/// The part of a camera path from its first vertex on: any surface there, and after that metal and glass only. See
+/// [`super`].
+#[derive(Clone, Copy, Debug)]
+pub(in crate::integrators) struct Chain {
+    /// Density of camera samples at the first vertex (1/m², projected); beyond it that of the direction as well
+    /// (1/(m² sr), projected). 0 if light paths cannot find the path.
+    density: f32,
+    /// Metal or glass was met.
+    is_bundled: bool,
+}
+
+impl Chain {
+    /// Of no use for light paths.
+    pub(in crate::integrators) const NONE: Chain = Chain { density: 0.0, is_bundled: false };
+
+    /// At a first vertex that is seen at the cosine `cos` to its geometric normal, where a pixel is `width` wide.
+    #[inline]
+    pub(in crate::integrators) fn at_first(cos: f32, width: f32) -> Self {
+        Chain { density: samples_per_area(cos, width), ..Chain::NONE }.checked()
+    }
+
+    /// Beyond that vertex, in a direction of the density `pdf` (1/sr) and at the cosine `cos` to the geometric normal;
+    /// `None` if no other technique finds the direction.
+    #[inline]
+    #[must_use]
+    pub(in crate::integrators) fn beyond_first(self, pdf: Option<f32>, cos: f32) -> Self {
+        let Some(pdf) = pdf.filter(|_| self.is_open()) else { return Chain::NONE };
+        Chain { density: self.density * projected(pdf, cos), ..self }.checked()
+    }
+
+    /// At metal or glass.
+    #[inline]
+    #[must_use]
+    pub(in crate::integrators) fn bundled(self) -> Self {
+        Chain { is_bundled: true, ..self }
+    }
+
+    /// True if what is at the next vertex decides.
+    #[inline]
+    pub(in crate::integrators) fn is_open(&self) -> bool {
+        self.density > 0.0
+    }
+
+    /// True if light paths may have found what the path meets now.
+    #[inline]
+    pub(in crate::integrators) fn is_caustic(&self) -> bool {
+        self.is_open() && self.is_bundled
+    }
+
+    /// What is left to the camera path of light that light paths bring with the density `of_light`
+    /// ([`super::Guide::density`]).
+    #[inline]
+    pub(in crate::integrators) fn rest(&self, of_light: f32) -> f32 {
+        1.0 - light_weight(of_light, self.density)
+    }
+
+    fn checked(self) -> Self {
+        if self.density.is_finite() { self } else { Chain::NONE }
+    }
+}
+
+/// Density of camera samples (1/m², projected) where a pixel is `width` wide and seen at the cosine `cos`.
+#[inline]
+fn samples_per_area(cos: f32, width: f32) -> f32 {
+    cos.abs() / (width * width)
+}
+
+/// A density per steradian of projected solid angle.
+#[inline]
+fn projected(pdf: f32, cos: f32) -> f32 {
+    pdf / cos.abs()
+}
+
+/// Density of camera paths that light paths are compared with: seen at the cosine `cos_seen` where a pixel is `width` wide,
+/// and on in a direction of the density `pdf` (1/sr) at the cosine `cos`.
+#[inline]
+pub(super) fn camera_density((cos_seen, width): (f32, f32), (pdf, cos): (f32, f32)) -> f32 {
+    Chain::at_first(cos_seen, width).beyond_first(Some(pdf), cos).density
+}
+
+/// Weight of a light path by the balance heuristic [Veach 1997, §9.2.2]; 0 where one of both densities is 0.
+#[inline]
+pub(super) fn light_weight(of_light: f32, of_camera: f32) -> f32 {
+    if of_light > 0.0 && of_camera > 0.0 { 1.0 / (1.0 + of_camera / of_light) } else { 0.0 }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn both_weights_are_one_together_whatever_the_densities() {
+        for (light, width) in [(0.0, 1.0), (1e-9, 0.01), (3.0, 0.2), (1e30, 1e-3), (f32::INFINITY, 1.0)] {
+            let chain = Chain::at_first(-0.5, width).beyond_first(Some(0.3), -0.7).bundled();
+            assert!(chain.is_caustic());
+            let weight = light_weight(light, camera_density((0.5, width), (0.3, 0.7)));
+            assert!((chain.rest(light) + weight - 1.0).abs() < 1e-6, "{light} {width}");
+        }
+    }
+
+    #[test]
+    fn what_light_paths_cannot_find_is_left_to_camera_paths() {
+        let first = Chain::at_first(1.0, 1.0);
+        assert!(first.is_open() && !first.is_caustic() && first.bundled().is_caustic());
+        for none in [
+            Chain::NONE,
+            Chain::at_first(1.0, 0.0),
+            first.beyond_first(None, 1.0),
+            first.beyond_first(Some(1.0), 0.0),
+            first.beyond_first(Some(0.0), 1.0),
+        ] {
+            assert!(!none.is_open() && !none.bundled().is_caustic() && none.rest(5.0) == 1.0, "{none:?}");
+        }
+        assert_eq!(light_weight(5.0, camera_density((1.0, 1.0), (1.0, 0.0))), 0.0);
+    }
+}

@@ -1,0 +1,188 @@
+//! Where light paths begin: at which lights, and in which directions.
+//!
+//! Few directions lead from a lamp over glass or metal to what the camera sees. A pilot finds them: rays in all directions
+//! find metal and glass, and light paths there find what is of use. Lights of one geometry share a table over the directions
+//! of world space. What the pilot has missed has the density 0, and is left to the camera paths; so the estimate is unbiased
+//! whatever it finds.
+
+use crate::lights::{EmittingPoint, Light, LightId, LightSet};
+use crate::photons::LightDistribution;
+use lumiris_numbers::math::sphere_map::{
+    equal_area_sphere_to_square, equal_area_square_to_sphere, pdf_equal_area_square_to_sphere, wrap_equal_area_texel,
+};
+use lumiris_numbers::math::{PiecewiseConstant2D, Rgb, Vec2, Vec3};
+
+/// Cells along the edge of the map of directions.
+const EDGE: usize = 64;
+/// Groups of lights that have a table of their own; all others share one.
+const MAX_GROUPS: usize = 256;
+
+/// A light path as it leaves its light.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Emitted {
+    pub(super) light: LightId,
+    pub(super) p: Vec3,
+    pub(super) p_error: Vec3,
+    /// Normal on the side that emits.
+    pub(super) n: Vec3,
+    pub(super) d: Vec3,
+    /// Its power (W), for one light path in all.
+    pub(super) power: Rgb,
+    /// See [`Guide::density`].
+    pub(super) density: f32,
+}
+
+/// How light paths begin.
+#[derive(Debug)]
+pub(in crate::integrators) struct Guide {
+    lights: LightDistribution,
+    /// Table of each light.
+    group_of: Vec<u16>,
+    tables: Vec<PiecewiseConstant2D>,
+    /// Light paths per area of each light (1/m²).
+    rates: Vec<f32>,
+    /// Light paths that are traced together.
+    pub(super) paths: u32,
+}
+
+/// What the paths of a pilot found, by light and by direction.
+#[derive(Clone, Debug)]
+pub(super) struct Found {
+    of_light: Vec<f64>,
+    /// By table and cell.
+    of_direction: Vec<f64>,
+}
+
+impl Guide {
+    /// That of a pilot, by power and in all directions; `None` without area lights.
+    pub(super) fn everywhere(set: &LightSet, paths: u32) -> Option<Self> {
+        let sources = set.sources();
+        let last = sources.iter().flatten().max().map_or(0, |&last| (last as usize).min(MAX_GROUPS - 1));
+        let group_of = sources.iter().map(|source| source.map_or(0, |s| (s as usize).min(last) as u16)).collect();
+        let uniform = PiecewiseConstant2D::new(&[1.0; EDGE * EDGE], EDGE);
+        Self::new(set, group_of, vec![uniform; last + 1], paths, |light| f64::from(power(set, light)))
+    }
+
+    fn new(
+        set: &LightSet,
+        group_of: Vec<u16>,
+        tables: Vec<PiecewiseConstant2D>,
+        paths: u32,
+        weight: impl Fn(LightId) -> f64,
+    ) -> Option<Self> {
+        let of_area = |light: LightId| if area(set, light) > 0.0 { weight(light) as f32 } else { 0.0 };
+        let lights = LightDistribution::by_weights(set, 0.0, of_area)?;
+        let rate = |light: LightId| match area(set, light) {
+            area if area > 0.0 => lights.pmf(light) / area * paths as f32,
+            _ => 0.0,
+        };
+        let rates = (0..set.lights.len() as LightId).map(rate).collect();
+        Some(Guide { lights, group_of, tables, rates, paths })
+    }
+
+    /// The same directions by another number of paths.
+    #[must_use]
+    pub(super) fn with_paths(mut self, paths: u32) -> Self {
+        let factor = paths as f32 / self.paths as f32;
+        self.rates.iter_mut().for_each(|rate| *rate *= factor);
+        Guide { paths, ..self }
+    }
+
+    /// Nothing was found yet.
+    pub(super) fn begin(&self) -> Found {
+        let cells = self.tables.len() * EDGE * EDGE;
+        Found { of_light: vec![0.0; self.rates.len()], of_direction: vec![0.0; cells] }
+    }
+
+    /// Adds what a path found that left `light` in the direction `d`.
+    pub(super) fn add(&self, found: &mut Found, light: LightId, d: Vec3, value: f64) {
+        let cell = (equal_area_sphere_to_square(d) * EDGE as f32).clamp(Vec2::ZERO, Vec2::splat((EDGE - 1) as f32));
+        let cell = cell.y as usize * EDGE + cell.x as usize;
+        found.of_light[light as usize] += value;
+        found.of_direction[usize::from(self.group_of[light as usize]) * EDGE * EDGE + cell] += value;
+    }
+
+    /// By what was found; `None` if that is nothing.
+    pub(super) fn learned(&self, set: &LightSet, found: &Found) -> Option<Self> {
+        let tables = found.of_direction.chunks(EDGE * EDGE).map(table).collect();
+        Self::new(set, self.group_of.clone(), tables, self.paths, |light| found.of_light[light as usize])
+    }
+
+    /// Density of light paths (1/(m² sr), projected) that leave `light`, whose normal is `n` there, in the direction `d`; 0
+    /// if none do.
+    #[inline]
+    pub(in crate::integrators) fn density(&self, light: LightId, n: Vec3, d: Vec3) -> f32 {
+        let rate = self.rates[light as usize];
+        if rate > 0.0 { rate * self.pdf(light, d) / n.dot(d).abs() } else { 0.0 }
+    }
+
+    /// Density of the direction (1/sr).
+    #[inline]
+    fn pdf(&self, light: LightId, d: Vec3) -> f32 {
+        let table = &self.tables[usize::from(self.group_of[light as usize])];
+        table.pdf(equal_area_sphere_to_square(d)) * pdf_equal_area_square_to_sphere()
+    }
+
+    /// A light path by two numbers for the light, two for the point, and two for the direction; `None` if it carries
+    /// nothing.
+    pub(super) fn emit(&self, set: &LightSet, u_light: [f32; 2], [u_point, u_d]: [[f32; 2]; 2]) -> Option<Emitted> {
+        let (light, pmf) = self.lights.sample(u_light);
+        let place = self.tables[usize::from(self.group_of[light as usize])].sample(u_d)?;
+        let d = equal_area_square_to_sphere(place.p);
+        let Light::Area(area) = &set.lights[light as usize] else { return None };
+        let EmittingPoint { p, p_error, n, pdf_area, radiance } = area.sample_point_towards(u_point, d);
+        let pdf = pdf_area * pmf * place.pdf * pdf_equal_area_square_to_sphere();
+        let power = radiance * (n.dot(d) / pdf);
+        let density = self.density(light, n, d);
+        (!power.is_black() && power.is_finite()).then_some(Emitted { light, p, p_error, n, d, power, density })
+    }
+}
+
+/// Area of a light; 0 if it has none.
+fn area(set: &LightSet, light: LightId) -> f32 {
+    if let Light::Area(area) = &set.lights[light as usize] { area.area() } else { 0.0 }
+}
+
+/// Power of a light with an area.
+fn power(set: &LightSet, light: LightId) -> f32 {
+    if let Light::Area(area) = &set.lights[light as usize] { area.phi() } else { 0.0 }
+}
+
+/// Directions by what was found in them and in their neighbours.
+fn table(cells: &[f64]) -> PiecewiseConstant2D {
+    let edge = EDGE as isize;
+    let around = |x: isize, y: isize| {
+        let mut sum = 0.0;
+        for (dy, wy) in (-1..).zip([1.0, 2.0, 1.0]) {
+            for (dx, wx) in (-1..).zip([1.0, 2.0, 1.0]) {
+                let (x, y) = wrap_equal_area_texel(x + dx, y + dy, edge);
+                sum += wx * wy * cells[(y * edge + x) as usize];
+            }
+        }
+        sum
+    };
+    let total: f64 = 16.0 * cells.iter().sum::<f64>();
+    let value = |(x, y)| if total > 0.0 { (around(x, y) / total) as f32 } else { 0.0 };
+    let cells: Vec<f32> = (0..edge).flat_map(|y| (0..edge).map(move |x| (x, y))).map(value).collect();
+    PiecewiseConstant2D::new(&cells, EDGE)
+}
+
+impl Found {
+    /// This and that, each as if it were one path in all.
+    pub(super) fn mixed(&self, other: &Found) -> Found {
+        let mix = |a: &[f64], b: &[f64]| {
+            let [all_a, all_b] = [a, b].map(|values| values.iter().sum::<f64>());
+            let share = |value: f64, all: f64| if all > 0.0 { value / all } else { 0.0 };
+            a.iter().zip(b).map(|(a, b)| share(*a, all_a) + share(*b, all_b)).collect()
+        };
+        let of_tables = |found: &Found| -> Vec<f64> {
+            let normalised = |cells: &[f64]| {
+                let all: f64 = cells.iter().sum();
+                cells.iter().map(move |cell| if all > 0.0 { cell / all } else { 0.0 }).collect::<Vec<f64>>()
+            };
+            found.of_direction.chunks(EDGE * EDGE).flat_map(normalised).collect()
+        };
+        let of_direction = of_tables(self).iter().zip(of_tables(other)).map(|(a, b)| a + b).collect();
+        Found { of_light: mix(&self.of_light, &other.of_light), of_direction }
+    }
+}

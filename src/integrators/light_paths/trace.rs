@@ -1,0 +1,249 @@
+//! Light paths over metal and glass to what the camera sees, a batch at a time.
+
+use super::chain::{camera_density, light_weight};
+use super::guide::{Emitted, Guide};
+use crate::accel::{Coherence, Hit, RayBatch};
+use crate::film::filter::FilterSampler;
+use crate::lights::LightId;
+use crate::materials::SurfaceBsdf;
+use crate::photons::path::{domain, path_stream};
+use crate::scene::{RenderJob, SurfaceInteraction};
+use lumiris_numbers::math::ray::{SEGMENT_END, offset_origin};
+use lumiris_numbers::math::{Ray, Rgb, Vec2, Vec3};
+use lumiris_numbers::samplers::SampleStream;
+use std::ops::Range;
+
+/// Random-number domains of a light path beside those of its beginning: the place on the lens and in the filter, and vertex
+/// k at `VERTEX + k`.
+const FILM: u32 = 3;
+const VERTEX: u32 = 16;
+
+/// A light path on its way.
+#[derive(Clone, Copy, Debug)]
+struct LightPath {
+    ray: Ray,
+    power: Rgb,
+    stream: SampleStream,
+    light: LightId,
+    /// Direction in which it left the light, and the density of that.
+    d: Vec3,
+    density: f32,
+}
+
+/// A light path that the camera sees, unless something lies between.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Seen {
+    pub(super) pixel: [u32; 2],
+    /// What it adds to a pixel of one camera sample, if all light paths are one.
+    pub(super) value: Rgb,
+    /// Where it came from.
+    pub(super) light: LightId,
+    pub(super) d: Vec3,
+}
+
+/// Traces light paths; holds the buffers of one worker.
+#[derive(Debug, Default)]
+pub(super) struct Walker {
+    active: Vec<LightPath>,
+    next: Vec<LightPath>,
+    rays: RayBatch,
+    hits: Vec<Option<Hit>>,
+    pub(super) seen: Vec<Seen>,
+    shadows: RayBatch,
+    occluded: Vec<bool>,
+    /// Rays and segments traced so far.
+    pub(super) traced: u64,
+}
+
+/// What all light paths have in common.
+pub(super) struct Scene<'a> {
+    pub(super) job: &'a RenderJob,
+    pub(super) guide: &'a Guide,
+    pub(super) filter: FilterSampler,
+}
+
+impl<'a> Scene<'a> {
+    pub(super) fn new(job: &'a RenderJob, guide: &'a Guide) -> Self {
+        Scene { job, guide, filter: job.world.scene.film.filter.sampler() }
+    }
+}
+
+impl Walker {
+    /// Traces some of the light paths of a seed: `self.seen` becomes those that the camera sees.
+    pub(super) fn trace(&mut self, scene: &Scene<'_>, seed: u32, paths: Range<u64>) {
+        let job = scene.job;
+        self.seen.clear();
+        self.shadows.clear();
+        self.active.clear();
+        self.active.extend(paths.filter_map(|path| emit(scene, path_stream(seed, path))));
+        // The last scattering event is where the camera sees it, and paths of one more are left to camera paths
+        for bundled in 0..job.settings().integrator.depth().saturating_sub(1) {
+            self.rays.set(self.active.iter().map(|path| &path.ray));
+            job.world.accel.intersect(&self.rays, Coherence::Incoherent, &mut self.hits);
+            self.traced += self.active.len() as u64;
+            self.next.clear();
+            for (path, hit) in self.active.iter().zip(&self.hits) {
+                let Some(hit) = hit else { continue };
+                let interaction = SurfaceInteraction::new(job, &path.ray, (0.0, 0.0), hit);
+                let Some(bsdf) = interaction.scatter(job) else { continue };
+                if bsdf.bsdf.makes_caustics() {
+                    self.next.extend(path.scattered(&interaction, &bsdf, VERTEX + bundled));
+                } else if bundled > 0
+                    && let Some((seen, segment)) = path.connect(scene, &interaction)
+                {
+                    self.seen.push(seen);
+                    self.shadows.push(&segment);
+                }
+            }
+            std::mem::swap(&mut self.active, &mut self.next);
+        }
+        job.world.accel.occluded(&self.shadows, Coherence::Packets, &mut self.occluded);
+        self.traced += self.seen.len() as u64;
+        let mut occluded = self.occluded.iter();
+        self.seen.retain(|_| !occluded.next().copied().unwrap_or(true));
+    }
+}
+
+/// Metal or glass that a ray from a light meets.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Bundling {
+    pub(super) light: LightId,
+    pub(super) d: Vec3,
+    /// What arrives there (W), for one path in all.
+    pub(super) value: Rgb,
+}
+
+impl Walker {
+    /// The first surfaces of light paths that are metal or glass.
+    pub(super) fn first_hits(&mut self, scene: &Scene<'_>, seed: u32, paths: Range<u64>) -> Vec<Bundling> {
+        let job = scene.job;
+        self.active.clear();
+        self.active.extend(paths.filter_map(|path| emit(scene, path_stream(seed, path))));
+        self.rays.set(self.active.iter().map(|path| &path.ray));
+        job.world.accel.intersect(&self.rays, Coherence::Incoherent, &mut self.hits);
+        let met = |(path, hit): (&LightPath, &Option<Hit>)| {
+            let at = SurfaceInteraction::new(job, &path.ray, (0.0, 0.0), hit.as_ref()?);
+            let bundles = at.scatter(job)?.bsdf.makes_caustics();
+            bundles.then_some(Bundling { light: path.light, d: path.d, value: path.power })
+        };
+        self.active.iter().zip(&self.hits).filter_map(met).collect()
+    }
+}
+
+/// A light path as it leaves its light.
+fn emit(scene: &Scene<'_>, stream: SampleStream) -> Option<LightPath> {
+    let [p0, p1, d0, d1] = stream.domain(domain::EMISSION).draw::<4>();
+    let choice = stream.domain(domain::LIGHT).draw::<2>();
+    let Emitted { light, p, p_error, n, d, power, density } =
+        scene.guide.emit(&scene.job.world.scene.lights, choice, [[p0, p1], [d0, d1]])?;
+    let time = scene.job.world.scene.camera.time(0.0);
+    let ray = Ray { o: offset_origin(p, p_error, n, d), d, t_max: f32::INFINITY, time };
+    Some(LightPath { ray, power, stream, light, d, density })
+}
+
+impl LightPath {
+    /// The path after metal or glass.
+    fn scattered(&self, at: &SurfaceInteraction, bsdf: &SurfaceBsdf<'_>, key: u32) -> Option<LightPath> {
+        let [uc, u0, u1] = self.stream.domain(key).draw::<3>();
+        let s = bsdf.sample(at.wo, uc, [u0, u1])?;
+        let power = self.power * s.f * (bsdf.adjoint_cos(at.wo, s.wi, s.eta) / s.pdf);
+        let ray = Ray { o: at.origin(s.wi), d: s.wi, ..self.ray };
+        (!power.is_black() && power.is_finite()).then_some(LightPath { ray, power, ..*self })
+    }
+
+    /// The path as the camera sees it at any other surface, and the segment between.
+    fn connect(&self, scene: &Scene<'_>, at: &SurfaceInteraction) -> Option<(Seen, Ray)> {
+        let (job, film) = (scene.job, &scene.job.world.scene.film);
+        let camera = &job.world.scene.camera;
+        let [l0, l1, u] = self.stream.domain(FILM).draw::<3>();
+        let p = at.surface.p;
+        let seen = camera.project(p, [l0, l1], 0.0)?;
+        let (pixel, of_filter) = pixel_of(&scene.filter, seen.film_xy, u)?;
+        let [x, y] = pixel;
+        let bounds = film.bounds;
+        if !((bounds.x0..bounds.x1).contains(&x) && (bounds.y0..bounds.y1).contains(&y)) {
+            return None;
+        }
+
+        // The surface as a camera ray meets it, whose footprint its textures are filtered by
+        let from = camera.ray(seen.film_xy, [l0, l1], 0.0);
+        let d = p - seen.o;
+        let distance = d.length();
+        let ray = Ray { o: seen.o, d: d / distance, t_max: f32::INFINITY, time: self.ray.time };
+        let at_camera = SurfaceInteraction::new(job, &ray, (from.width0, from.spread), &Hit { t: distance, ..at.hit });
+        let bsdf = at_camera.scatter(job)?;
+        if bsdf.bsdf.makes_caustics() || !bsdf.bsdf.is_evaluated_exactly() {
+            return None;
+        }
+        let (wo, wi) = (at_camera.wo, at.wo);
+        let (cos, cos_light) = (bsdf.n.dot(wo).abs(), bsdf.n.dot(wi).abs());
+        let of_camera = camera_density((cos, at_camera.width), (bsdf.pdf(wo, wi), cos_light));
+        let weight = light_weight(self.density, of_camera);
+        if !(weight > 0.0) {
+            return None;
+        }
+        let measure = cos * seen.density / (distance * distance * cos_light);
+        let value = self.power * bsdf.f_cos(wo, wi) * (measure * weight * of_filter * film.scale);
+        if value.is_black() || !value.is_finite() {
+            return None;
+        }
+        let o = offset_origin(p, at.surface.p_error, bsdf.n, wo);
+        let segment = Ray { o, d: seen.o - o, t_max: SEGMENT_END, time: self.ray.time };
+        Some((Seen { pixel, value, light: self.light, d: self.d }, segment))
+    }
+}
+
+/// One of the pixels whose filter has the point of the film, drawn by the magnitude of the filter there, and the filter
+/// over the probability.
+fn pixel_of(filter: &FilterSampler, film_xy: Vec2, u: f32) -> Option<([u32; 2], f32)> {
+    let reach = filter.radius() + 0.5;
+    let pixels = |x: f32, reach: f32| (x - reach).floor().max(0.0) as u32..=(x + reach).max(0.0) as u32;
+    let all = || {
+        let rows = pixels(film_xy.y, reach.y);
+        let of_row = move |y| pixels(film_xy.x, reach.x).map(move |x| [x, y]);
+        let value = |[x, y]: [u32; 2]| filter.value(film_xy - Vec2::new(x as f32 + 0.5, y as f32 + 0.5));
+        rows.flat_map(of_row).map(move |pixel| (pixel, value(pixel))).filter(|(_, value)| *value != 0.0)
+    };
+    let total: f32 = all().map(|(_, value)| value.abs()).sum();
+    let (mut left, mut chosen) = (u * total, None);
+    for (pixel, value) in all() {
+        chosen = Some((pixel, total * value.signum()));
+        left -= value.abs();
+        if left < 0.0 {
+            break;
+        }
+    }
+    chosen
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::film::filter::PixelFilter;
+
+    #[test]
+    fn pixels_are_drawn_by_their_filters() {
+        for filter in [
+            PixelFilter::Box { rx: 0.5, ry: 0.5 },
+            PixelFilter::Gaussian { rx: 1.5, ry: 1.5, sigma: 0.5 },
+            PixelFilter::LanczosSinc { rx: 3.0, ry: 2.0, tau: 3.0 },
+        ] {
+            let sampler = filter.sampler();
+            let film = Vec2::new(20.37, 11.81);
+            let count = 100_000;
+            let mut sums = std::collections::BTreeMap::<[u32; 2], f64>::new();
+            for i in 0..count {
+                let u = (i as f32 + 0.5) / count as f32;
+                let (pixel, value) = pixel_of(&sampler, film, u).unwrap();
+                *sums.entry(pixel).or_default() += f64::from(value) / f64::from(count);
+            }
+            for y in 5..18 {
+                for x in 14..27 {
+                    let expected = sampler.value(film - Vec2::new(x as f32 + 0.5, y as f32 + 0.5));
+                    let sum = sums.get(&[x, y]).copied().unwrap_or(0.0);
+                    assert!((sum - f64::from(expected)).abs() < 1e-3, "{filter:?} {x} {y}: {sum} {expected}");
+                }
+            }
+        }
+    }
+}
