@@ -30,6 +30,7 @@ use crate::settings::{Allocation, IntegratorKind, IntegratorSettings, Settings};
 use lumiris_numbers::math::hash::{pcg4d, unit_f32};
 use lumiris_numbers::math::luminance;
 use rayon::prelude::*;
+use std::collections::BTreeMap;
 use std::sync::atomic::AtomicBool;
 
 /// Fewest samples per pixel for which a pilot pays.
@@ -42,6 +43,10 @@ const SIGHT_SPP: [u32; 2] = [1, 4];
 /// Factor by which visible lights differ among neighbours for a pixel to have more of these samples, and how many.
 const EDGE_RATIO: f64 = 4.0;
 const SIGHT_OF_EDGES: u32 = 8;
+/// Pixels to each side that are taken to have what a pixel sees of the variance of visible lights.
+const SIGHT_RADIUS: usize = 1;
+/// Pixels of a material that count as much as the mean of all pixels.
+const FEW_PIXELS: f64 = 16.0;
 /// Both sets.
 const BOTH: [usize; 2] = [0, 1];
 /// Combined with the seed of the image to give that of the pilot.
@@ -115,12 +120,17 @@ struct Measured {
     sight_variance: [f32; 2],
     /// Cost of a sample; 0 where nothing was measured.
     cost: f32,
+    /// Material of the first surface, or [`NO_MATERIAL`].
+    material: u32,
 }
 
+/// The material of pixels that see no surface.
+const NO_MATERIAL: u32 = u32::MAX;
+
 impl Measured {
-    fn of(samples: &PixelAccumulator, sight: &[PixelAccumulator; 2], cost: f64) -> Self {
+    fn of(samples: &PixelAccumulator, sight: &Sight, cost: f64) -> Self {
         let sums = samples.sums();
-        let [a, b] = sight.each_ref().map(PixelAccumulator::sums);
+        let [a, b] = sight.sets.each_ref().map(PixelAccumulator::sums);
         Measured {
             count: sums.count as u32,
             radiance: sums.radiance.map(|x| x as f32),
@@ -130,8 +140,15 @@ impl Measured {
             }),
             sight_variance: [a, b].map(|sums| variance(&sums).into_iter().fold(0.0, f64::max) as f32),
             cost: cost as f32,
+            material: sight.material,
         }
     }
+}
+
+/// What samples see that go no further than the first surface.
+struct Sight {
+    sets: [PixelAccumulator; 2],
+    material: u32,
 }
 
 /// The variance of a sample.
@@ -188,7 +205,7 @@ impl<'a> Pilot<'a> {
         let mut tiles = self.bounds.tiles(COST_TILE);
         tiles.retain(|t| is_chosen((t.x0 - self.bounds.x0) / COST_TILE + 2 * ((t.y0 - self.bounds.y0) / COST_TILE)));
         let groups = if self.sampling.edge > 1 { Groups::Grid } else { Groups::None };
-        let worker = || Worker::new(PathTracer::sharing(groups, false));
+        let worker = || Worker::new(PathTracer::sharing(groups, self.rules.radius.is_none()));
         let of_tile = |worker: &mut _, tile: &_| pilot_tile(&run, worker, tile, self.sampling);
         for tiles in tiles.chunks(TILES_AT_ONCE) {
             let measured: Vec<_> = tiles.par_iter().map_init(worker, of_tile).collect();
@@ -217,13 +234,18 @@ impl<'a> Pilot<'a> {
 
     /// 1/(m² + ε) of each channel; m is the mean of what a pixel sees of visible lights, and of the rest of its neighbours.
     fn relative_to(&self, i: usize) -> [f64; 3] {
+        self.relative_beside(i, self.pixels[i].sight.map(f64::from))
+    }
+
+    /// The same beside visible lights of this radiance.
+    fn relative_beside(&self, i: usize, sight: [f64; 3]) -> [f64; 3] {
         let (mut sum, mut count) = ([0.0; 3], 0);
-        for q in self.around(i, self.rules.radii[0]).map(|q| &self.pixels[q]) {
+        for q in self.around(i, self.rules.mean_radius).map(|q| &self.pixels[q]) {
             count += q.count;
             (0..3).for_each(|c| sum[c] += f64::from(q.radiance[c]));
         }
         std::array::from_fn(|c| {
-            let mean = f64::from(self.pixels[i].sight[c]) + sum[c] / f64::from(count.max(1));
+            let mean = sight[c] + sum[c] / f64::from(count.max(1));
             1.0 / (mean * mean + DEFAULT_EPSILON)
         })
     }
@@ -242,16 +264,53 @@ impl<'a> Pilot<'a> {
         if variance > 0.0 { variance * self.relative_to(i).iter().sum::<f64>() } else { 0.0 }
     }
 
-    /// v_p: the relative variance, averaged over the chosen ones of the neighbours, and that of visible lights by some of
-    /// the sets of samples.
+    /// v_p: the relative variance, averaged over the chosen ones of the neighbours or of all pixels of the material, and that
+    /// of visible lights by some of the sets of samples.
     fn weights(&self, is_chosen: impl Fn(usize) -> bool + Sync, sets: &[usize]) -> Vec<f32> {
         let known = |i: usize| self.relative_variance(i).filter(|_| is_chosen(i));
-        // Σ over neighbours, and their number
-        let terms = (0..self.bounds.area()).into_par_iter().map(|i| known(i).map_or([0.0; 2], |v| [v, 1.0]));
-        let sums = box_sums(terms.collect(), self.bounds.width() as usize, self.rules.radii[1]);
-        let weight =
-            |(i, [sum, count]): (usize, [f64; 2])| (sum.max(0.0) / count.max(1.0) + self.of_sight(i, sets)) as f32;
-        sums.into_par_iter().enumerate().map(weight).collect()
+        let rest = match self.rules.radius {
+            Some(radius) => {
+                // Σ over neighbours, and their number
+                let terms = (0..self.bounds.area()).into_par_iter().map(|i| known(i).map_or([0.0; 2], |v| [v, 1.0]));
+                box_sums(terms.collect(), self.bounds.width() as usize, radius)
+            }
+            None => self.of_materials(known),
+        };
+        let weight = |(i, [sum, count]): (usize, [f64; 2])| {
+            (sum.max(0.0) / count.max(1.0) + self.of_sight_around(i, sets)) as f32
+        };
+        rest.into_par_iter().enumerate().map(weight).collect()
+    }
+
+    /// Σ of what is known of pixels of the same first material, and their number: near the mean of all where they are few.
+    fn of_materials(&self, known: impl Fn(usize) -> Option<f64>) -> Vec<[f64; 2]> {
+        let (mut all, mut of_material) = ([0.0; 2], BTreeMap::<u32, [f64; 2]>::new());
+        for (i, pixel) in self.pixels.iter().enumerate() {
+            let Some(v) = known(i) else { continue };
+            for sums in [&mut all, of_material.entry(pixel.material).or_default()] {
+                *sums = [sums[0] + v, sums[1] + 1.0];
+            }
+        }
+        let mean = all[0] / all[1].max(1.0);
+        let with_mean = |[sum, count]: [f64; 2]| [sum + FEW_PIXELS * mean, count + FEW_PIXELS];
+        let of = |pixel: &Measured| with_mean(of_material.get(&pixel.material).copied().unwrap_or_default());
+        self.pixels.iter().map(of).collect()
+    }
+
+    /// The relative variance of visible lights that a pixel has, or its neighbours together: a few samples do not see the
+    /// edge of a light in all pixels that it touches.
+    fn of_sight_around(&self, i: usize, sets: &[usize]) -> f64 {
+        let (mut variance, mut sight, mut count) = (0.0, [0.0; 3], 0.0);
+        for q in self.around(i, SIGHT_RADIUS).map(|q| &self.pixels[q]) {
+            variance += sets.iter().map(|&k| f64::from(q.sight_variance[k])).sum::<f64>() / sets.len() as f64;
+            (0..3).for_each(|c| sight[c] += f64::from(q.sight[c]));
+            count += 1.0;
+        }
+        if variance == 0.0 {
+            return 0.0;
+        }
+        let of_all = variance / count * self.relative_beside(i, sight.map(|s| s / count)).iter().sum::<f64>();
+        of_all.max(self.of_sight(i, sets))
     }
 
     /// By how much the numbers lower error × cost: of half of the pixels, with numbers that follow from the other half, and
@@ -341,17 +400,20 @@ fn see(
     settings: &IntegratorSettings,
     tile: &PixelBounds,
     (spp, seed): (u32, u32),
-) -> Vec<[PixelAccumulator; 2]> {
-    let mut sums = vec![[PixelAccumulator::default(); 2]; tile.area()];
+) -> Vec<Sight> {
+    let none = || Sight { sets: <[PixelAccumulator; 2]>::default(), material: NO_MATERIAL };
+    let mut sums: Vec<Sight> = std::iter::repeat_with(none).take(tile.area()).collect();
     let seeds = [1, 2].map(|set| pcg4d([seed, PILOT_SEED, 0, set])[0]);
     let mut add = |pixels: &[u32], samples: std::ops::Range<u32>| {
         for (set, seed) in seeds.into_iter().enumerate() {
             trace_pixels(run, worker, settings, (tile, pixels), (samples.clone(), seed), |i, sample| {
-                sums[i as usize][set].add(0, sample);
+                let sight = &mut sums[i as usize];
+                sight.sets[set].add(0, sample);
+                sight.material = sample.features.as_ref().map_or(sight.material, |features| features.material);
             });
         }
         let luminance = |sums: &PixelAccumulator| luminance(sums.radiance.values());
-        sums.iter().map(|sets| sets.each_ref().map(luminance)).collect::<Vec<_>>()
+        sums.iter().map(|sight| sight.sets.each_ref().map(luminance)).collect::<Vec<_>>()
     };
     let all: Vec<u32> = (0..tile.area() as u32).collect();
     let first = add(&all, 0..spp);

@@ -10,8 +10,10 @@ const RANGE: [f64; 2] = [0.5, 8.0];
 pub(super) struct Rules {
     /// Samples of the pilot as a fraction of those of the image.
     pub(super) fraction: f64,
-    /// Pixels to each side over which means and variances are averaged.
-    pub(super) radii: [usize; 2],
+    /// Pixels to each side over which means are averaged.
+    pub(super) mean_radius: usize,
+    /// The same of variances; `None`: over all pixels of a material.
+    pub(super) radius: Option<usize>,
     /// True if pixels have this number of samples or twice, 4 times or 8 times as many.
     pub(super) doubles: bool,
     /// Gain below which numbers remain uniform.
@@ -19,11 +21,12 @@ pub(super) struct Rules {
 }
 
 /// Where pixels have paths of their own.
-pub(super) const ALONE: Rules = Rules { fraction: 0.05, radii: [1, 2], doubles: false, min_gain: 1.05 };
+pub(super) const ALONE: Rules =
+    Rules { fraction: 0.05, mean_radius: 1, radius: Some(2), doubles: false, min_gain: 1.05 };
 /// Where they share them: few samples do not tell what is left of the noise of one pixel from that of others, so numbers
-/// follow from visible lights, whose edges gain nothing by sharing. All others have as many samples as each other, so that
-/// they share all of their paths.
-pub(super) const SHARED: Rules = Rules { fraction: 0.025, radii: [4, 1 << 24], doubles: true, min_gain: 1.03 };
+/// follow from visible lights, whose edges gain nothing by sharing, and from materials: metal and glass share nothing
+/// either. All others have as many samples as each other, so that they share all of their paths.
+pub(super) const SHARED: Rules = Rules { fraction: 0.025, mean_radius: 4, radius: None, doubles: true, min_gain: 1.03 };
 
 /// Numbers of samples n ∝ √(v/c), limited to [`RANGE`], of the same cost as `spp` everywhere; or [`doubled`] ones.
 pub(super) fn counts(weights: &[f32], costs: &[f32], (rules, spp): (&Rules, u32)) -> Vec<u32> {
