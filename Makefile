@@ -16,7 +16,7 @@ SHARE = $(DESTDIR)$(PREFIX)/share
 
 run: setup
 	$(CARGO) build --release
-	$(BINARY) render $(SCENE) --spp 16 -o gallery.png -o gallery.exr
+	$(BINARY) render $(SCENE) --spp 12 -o gallery.png -o gallery.exr
 	@echo "The image is in gallery.png and gallery.exr."
 
 build: setup

@@ -10,6 +10,7 @@ class Settings(TypedDict, total=False):
     roulette_depth: Optional[Union[int, Literal["off"], bool]]
     roulette: Optional[Literal["throughput", "adjoint", "efficiency"]]
     path_reuse: Optional[Union[int, Literal["auto"]]]
+    light_paths: Optional[Union[float, Literal["auto"]]]
     light_groups: Optional[Literal["layers", "none"]]
     light_sampler: Optional[Literal["uniform", "power", "tree", "photons"]]
     infinite_fraction: Optional[float]

@@ -11,7 +11,7 @@
 //!
 //! All integrators follow their paths through the one loop here; [`AtVertices`] is what they do differently.
 
-use super::light_paths::LightImage;
+use super::light_paths::{LightImage, LightPilot};
 use super::reuse::{self, Groups, Place, Reuse};
 pub use super::segment::{CameraSample, PathStats};
 use super::segment::{PathState, Vertex, emptied, extend, extend_to_emitter};
@@ -160,6 +160,15 @@ impl PathTracer {
     /// The same, where these samples of a batch share paths if the settings say so.
     pub fn sharing(groups: Groups, with_features: bool) -> Self {
         PathTracer { reuse: Reuse::of(groups), ..PathTracer::new(with_features) }
+    }
+
+    /// Leaves to light paths what these find, as many for each camera sample of the image as given, from now on: what remains is
+    /// less than the radiance. `None`: nothing.
+    pub fn leave(&mut self, job: &RenderJob, light: Option<(&LightPilot, f64)>) {
+        self.search.guide = light.map(|(pilot, per_sample)| {
+            let paths = per_sample * job.world.scene.film.bounds.area() as f64;
+            Arc::new(pilot.guide().with_paths(paths.clamp(1.0, f64::from(u32::MAX)) as u32))
+        });
     }
 
     /// Copies the rays that are traced from now on, for measurements.

@@ -22,13 +22,14 @@
 //! numbers of its own; so the choice adds no bias.
 
 use super::auto_lights;
-use super::auto_measure::{SEED, blocks, measure, pixels};
+use super::auto_measure::{Chunk, SEED, blocks, measure, pixels};
 use super::auto_reuse;
 pub use super::auto_round::Trial;
-use super::auto_round::{Candidate, Difference, Round};
+use super::auto_round::{Candidate, Round};
 use super::visibility_cache::{PHOTON_PATHS, build_visibility_cache};
 use super::{RenderSettings, Run, processor_time};
 use crate::film::PixelBounds;
+use crate::integrators::light_paths::{self, LightPilot};
 use crate::integrators::reuse;
 use crate::integrators::through_media;
 use crate::scene::RenderJob;
@@ -51,7 +52,7 @@ const MAX_PIXELS: usize = 4096;
 /// Fewest pixels of a round for which a choice is more than chance.
 const MIN_PIXELS: usize = 128;
 /// Pixels of a round with which numbers of samples are known well enough in most images.
-const ENOUGH_PIXELS: usize = 256;
+const ENOUGH_PIXELS: usize = 384;
 /// Time of all rounds, as a fraction of that of the image: what is wanted, and the most where that is not enough.
 const FRACTIONS: [f64; 2] = [0.03, 0.08];
 /// Time of all rounds over that of rendering the pixels of one once, with the same number of samples and seeds: in direct
@@ -79,6 +80,13 @@ const DIRECT: [u32; 9] = [2, 4, 8, 12, 16, 24, 32, 48, 64];
 /// Points of nets are best spread where they are as many as a power of two.
 const FIRST: [u32; 6] = [2, 3, 5, 9, 17, 33];
 const LATER: [u32; 5] = [2, 3, 5, 9, 17];
+/// The same where pixels share paths.
+const FIRST_SHARED: [u32; 8] = [2, 3, 4, 5, 7, 9, 17, 33];
+const LATER_SHARED: [u32; 7] = [2, 3, 4, 5, 7, 9, 17];
+/// Light paths per camera sample among which is chosen.
+const LIGHT_PATHS: [f32; 8] = [0.0, 0.03125, 0.0625, 0.125, 0.25, 0.5, 1.0, 2.0];
+/// Part of a pilot of light paths whose whole is traced before the image.
+const LIGHT_PILOT: u64 = 4;
 /// As many as are best or nearly so in most scenes, in direct light: the pilot of a small image may not see it.
 const USUAL_DIRECT: u32 = 8;
 /// Samples from which the model is fitted: few and many, in direct light and in paths.
@@ -132,7 +140,7 @@ pub(super) fn choose(job: &mut RenderJob) -> Option<AutoChoice> {
     }
     let chooses_lights = auto_lights::is_open(&job.lights, &job.settings().integrator);
     let pilot = Pilot::new(job.settings(), &job.world.scene.film.bounds, chooses_lights);
-    let choice = pilot.map(|pilot| pilot.choose(job));
+    let choice = pilot.map(|mut pilot| pilot.choose(job));
     let settings = choice.as_ref().map_or(without_pilot(&job.settings().integrator), |(_, settings)| *settings);
     job.change(|s| s.integrator = settings);
     choice.map(|(choice, _)| choice)
@@ -204,6 +212,13 @@ const SECOND_ROUND: usize = 1;
 const SHARING: usize = 2;
 const LIGHTS: usize = 3;
 
+/// What was measured of the chosen settings: the variance of a camera sample, its time (ns), and [`Round::relative`].
+struct Measured {
+    variance: f64,
+    nanoseconds: f64,
+    relative: f64,
+}
+
 /// Where a round measures.
 struct Pilot {
     /// Pixels of the rounds [`FIRST_ROUND`], [`SECOND_ROUND`], [`SHARING`], by blocks, and [`LIGHTS`], which may have none.
@@ -211,6 +226,8 @@ struct Pilot {
     /// Samples of each and seed.
     spp: u32,
     seed: u32,
+    /// What light paths find, if they may be of use.
+    light: Option<LightPilot>,
 }
 
 impl Pilot {
@@ -239,11 +256,15 @@ impl Pilot {
             ],
             spp,
             seed: sampling.seed,
+            light: None,
         })
     }
 
-    fn choose(&self, job: &mut RenderJob) -> (AutoChoice, IntegratorSettings) {
+    fn choose(&mut self, job: &mut RenderJob) -> (AutoChoice, IntegratorSettings) {
         let start = processor_time::of_process();
+        if job.settings().integrator.light_paths.is_none_or(|paths| paths > 0.0) {
+            self.light = LightPilot::new(job, LIGHT_PILOT);
+        }
         let has_later = job.settings().integrator.depth() > 1;
         let [few, many] = if has_later { FIT_PATH } else { FIT_DIRECT };
         let lights = self.choose_lights(job, few);
@@ -286,8 +307,12 @@ impl Pilot {
         };
         let predicted: Vec<_> = candidates.iter().map(predicted).collect();
         let chosen = second.choose(&candidates, &predicted);
+        let relative = second.relative;
         let second = second.trials(&candidates);
-        let shared = self.share(job, &candidates[chosen].settings, &model);
+        let (sharing, mut settings) = self.share(job, &candidates[chosen].settings, &model);
+        let &Trial { variance, nanoseconds, .. } =
+            if settings.path_reuse.is_some() { &sharing[1] } else { &second[chosen] };
+        settings.light_paths = self.choose_light_paths(job, &settings, &Measured { variance, nanoseconds, relative });
         if !candidates[chosen].settings.uses_visibility_cache() {
             job.lights.set_visibility_cache(None);
         }
@@ -297,13 +322,13 @@ impl Pilot {
             cost: model.cost,
             variance: model.variance,
             powers: model.powers,
-            chosen: Candidate::named(shared.1).name,
+            chosen: Candidate::named(settings).name,
             seconds: (processor_time::of_process() - start).as_secs_f64(),
             lights,
             trials: [trials, second],
-            sharing: shared.0,
+            sharing,
         };
-        (choice, shared.1)
+        (choice, settings)
     }
 
     /// Before all other rounds: the fraction of light samples for lights at infinity, with `n` samples at each vertex.
@@ -329,24 +354,46 @@ impl Pilot {
         if !is_open || reuse::obstacle(job).is_some() || self.pixels[SHARING].is_empty() {
             return (Vec::new(), *chosen);
         }
-        let candidates = auto_reuse::candidates(chosen);
+        // Twice the light samples at first and at later vertices, where they are open
+        let is_mis = chosen.estimator == EstimatorKind::Mis;
+        let light = [0, 1].map(|vertex| chosen.sample_counts_at(vertex).samples.max(2) - 1);
+        let more = [[2 * light[0], light[1]], [light[0], 2 * light[1]]];
+        let settings = more.map(|n| with_samples(&base, n.map(|n| n + 1)));
+        let is_open =
+            is_mis && settings.iter().all(|s| [s.samples, s.later_samples] != [chosen.samples, chosen.later_samples]);
+        let candidates = auto_reuse::candidates(chosen, if is_open { &settings } else { &[] });
         let round = self.round(job, &candidates, SHARING).by_blocks((auto_reuse::EDGE * auto_reuse::EDGE) as usize);
         let trials = round.trials(&candidates);
-        let Some(gain) = auto_reuse::best(&round) else { return (trials, *chosen) };
-        let mut settings = IntegratorSettings { path_reuse: Some(gain.edge), ..*chosen };
-        if chosen.estimator == EstimatorKind::Mis {
-            // What is left of the variance is more that of first vertices; no further than what was measured goes
-            let [first, later] = [0, 1].map(|vertex| chosen.sample_counts_at(vertex).samples);
-            let light = |numbers: &[u32], range: [u32; 2]| {
-                let in_range = numbers.iter().filter(|n| (range[0]..=range[1]).contains(n));
-                in_range.map(|&n| n - 1).collect::<Vec<_>>()
-            };
-            let choices = [light(&FIRST, [first, 2 * first]), light(&LATER, [2, later])];
-            let best = auto_reuse::model(model, &gain).best(choices.each_ref().map(Vec::as_slice), NEARLY);
-            let numbers = with_samples(&base, best.map(|n| n + 1));
-            (settings.samples, settings.later_samples) = (numbers.samples, numbers.later_samples);
+        let shared = if is_open {
+            let numbers = [light, more[0], more[1]].map(|n| n.map(f64::from));
+            let of_pilot = round.models_from(1, &numbers, model.powers);
+            // No further than what was measured
+            let within =
+                |numbers: &[u32], most: u32| numbers.iter().map(|n| n - 1).filter(|n| *n <= most).collect::<Vec<_>>();
+            let choices = [within(&FIRST_SHARED, more[0][0]), within(&LATER_SHARED, more[1][1])];
+            auto_reuse::best_numbers(&round, light, (model, &of_pilot), choices.each_ref().map(Vec::as_slice))
+        } else {
+            auto_reuse::best(&round).map(|edge| (edge, light))
+        };
+        let Some((edge, numbers)) = shared else { return (trials, *chosen) };
+        let numbers = if is_open { with_samples(&base, numbers.map(|n| n + 1)) } else { *chosen };
+        let IntegratorSettings { samples, later_samples, .. } = numbers;
+        (trials, IntegratorSettings { path_reuse: Some(edge), samples, later_samples, ..*chosen })
+    }
+
+    /// Last: how many light paths there are for each camera sample, where a camera sample by the settings has the variance and
+    /// the time (ns) given.
+    fn choose_light_paths(&self, job: &RenderJob, settings: &IntegratorSettings, at: &Measured) -> Option<f32> {
+        let light = self.light.as_ref()?;
+        if settings.light_paths.is_some() || light_paths::obstacle_of(job, settings).is_some() {
+            return settings.light_paths;
         }
-        (trials, settings)
+        let samples = job.world.scene.film.bounds.area() as f64 * f64::from(job.settings().sampling.spp);
+        let error = |per_sample: f32| {
+            let n = f64::from(per_sample);
+            (at.variance + at.relative * light.variance(n)) * (at.nanoseconds + light.time(n, samples))
+        };
+        LIGHT_PATHS.into_iter().min_by(|a, b| error(*a).total_cmp(&error(*b)))
     }
 
     /// Measures all candidates on the pixels of a round.
@@ -355,16 +402,19 @@ impl Pilot {
         let run = Run::new(job, &render, &stop, &|_| ());
         let seeds = [0, 1].map(|k| pcg4d([self.seed, SEED, round as u32, k])[0]);
         let chunks: Vec<_> = self.pixels[round].chunks(CHUNK).enumerate().collect();
-        let measured: Vec<Vec<(f64, Vec<Difference>)>> =
-            chunks.into_par_iter().map(|(i, pixels)| measure(&run, (pixels, self.spp), candidates, seeds, i)).collect();
+        let of_chunk = |(i, pixels): (usize, &[[u32; 2]])| {
+            measure(&run, (pixels, self.spp), candidates, self.light.as_ref(), (seeds, i))
+        };
+        let measured: Vec<Chunk> = chunks.into_par_iter().map(of_chunk).collect();
         let samples = self.pixels[round].len() as f64 * f64::from(2 * self.spp);
         let of = |k: usize| {
-            let nanoseconds = measured.iter().map(|chunk| chunk[k].0).sum::<f64>() / samples;
-            let differences = measured.iter().flat_map(|chunk| &chunk[k].1).copied().collect();
+            let nanoseconds = measured.iter().map(|chunk| chunk.of_candidates[k].0).sum::<f64>() / samples;
+            let differences = measured.iter().flat_map(|chunk| &chunk.of_candidates[k].1).copied().collect();
             (nanoseconds + candidates[k].preparation, differences)
         };
         let is_direct = job.settings().integrator.depth() <= 1;
-        Round { measured: (0..candidates.len()).map(of).collect(), spp: self.spp, is_direct }
+        let relative = measured.iter().map(|chunk| chunk.relative).sum::<f64>() / self.pixels[round].len() as f64;
+        Round { measured: (0..candidates.len()).map(of).collect(), spp: self.spp, is_direct, relative }
     }
 }
 

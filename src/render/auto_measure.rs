@@ -7,6 +7,7 @@ use super::{Run, processor_time};
 use crate::film::PixelBounds;
 use crate::imaging::metrics::difference::DEFAULT_EPSILON;
 use crate::integrators::PathTracer;
+use crate::integrators::light_paths::{self, LightPilot};
 use crate::integrators::path::CameraSample;
 use crate::integrators::reuse::{self, Groups};
 use lumiris_numbers::math::hash::{pcg4d, unit_f32};
@@ -46,15 +47,26 @@ pub(super) fn blocks(bounds: &PixelBounds, count: usize) -> Vec<[u32; 2]> {
     corners.into_iter().flat_map(block).collect()
 }
 
-/// Renders some pixels with each candidate and seed: of each candidate, processor time (ns), and the difference of the two
-/// means of each pixel. The `turn` decides which candidate is first.
+/// Light paths per camera sample to which all candidates that know them leave what they find, if no number is asked for.
+const LIGHT_PATHS: f64 = 0.25;
+
+/// What [`measure`] found.
+pub(super) struct Chunk {
+    /// Of each candidate, processor time (ns), and the difference of the two means of each pixel.
+    pub(super) of_candidates: Vec<(f64, Vec<Difference>)>,
+    /// Σ of 1/(m² + ε) of the pixels, averaged over channels, m being their means.
+    pub(super) relative: f64,
+}
+
+/// Renders some pixels with each candidate and seed. The `turn` decides which candidate is first. What `light` paths find, if
+/// they are of use, is left to them.
 pub(super) fn measure(
     run: &Run<'_>,
     (pixels, spp): (&[[u32; 2]], u32),
     candidates: &[Candidate],
-    seeds: [u32; 2],
-    turn: usize,
-) -> Vec<(f64, Vec<Difference>)> {
+    light: Option<&LightPilot>,
+    (seeds, turn): ([u32; 2], usize),
+) -> Chunk {
     let groups = if reuse::obstacle(run.job).is_none() { Groups::Grid } else { Groups::None };
     let mut worker = Worker::new(PathTracer::sharing(groups, false));
     let mut times = vec![0.0; candidates.len()];
@@ -63,6 +75,9 @@ pub(super) fn measure(
         let k = (k + turn) % candidates.len();
         let settings = &candidates[k].settings;
         let sample_counts = settings.sample_counts();
+        let per_sample = settings.light_paths.map_or(LIGHT_PATHS, f64::from);
+        let knows = light_paths::obstacle_of(run.job, settings).is_none() && per_sample > 0.0;
+        worker.tracer.leave(run.job, light.filter(|_| knows).map(|light| (light, per_sample)));
         let start = processor_time::of_thread();
         for (image, seed) in images[k].iter_mut().zip(seeds) {
             worker.samples.clear();
@@ -80,17 +95,22 @@ pub(super) fn measure(
     }
     let all = || images.iter().flatten();
     let count = all().count() as f64;
+    let relative_to = |i: usize, c: usize| {
+        let mean = all().map(|image| image[i][c]).sum::<f64>() / count;
+        1.0 / (mean * mean + DEFAULT_EPSILON)
+    };
     let difference = |[a, b]: &[Vec<[f64; 3]>; 2], i: usize| {
         let of_channel = |c: usize| {
-            let mean = all().map(|image| image[i][c]).sum::<f64>() / count;
-            let d = (a[i][c] - b[i][c]).abs() / (mean * mean + DEFAULT_EPSILON).sqrt();
+            let d = (a[i][c] - b[i][c]).abs() * relative_to(i, c).sqrt();
             if d.is_finite() { d } else { 0.0 }
         };
         let channels = [0, 1, 2].map(of_channel);
         [channels.iter().sum::<f64>() / 3.0, channels.iter().map(|d| d * d).sum::<f64>() / 3.0]
     };
     let of_candidate = |images| (0..pixels.len()).map(|i| difference(images, i)).collect();
-    times.into_iter().zip(&images).map(|(time, images)| (time, of_candidate(images))).collect()
+    let of_candidates = times.into_iter().zip(&images).map(|(time, images)| (time, of_candidate(images))).collect();
+    let of_channels = |i: usize| (0..3).map(|c| relative_to(i, c)).sum::<f64>() / 3.0;
+    Chunk { of_candidates, relative: (0..pixels.len()).map(of_channels).filter(|r| r.is_finite()).sum() }
 }
 
 #[cfg(test)]

@@ -1,6 +1,6 @@
-//! How many pixels share paths, as `--estimator auto` finds it by a pilot.
+//! How many pixels share paths, and with how many samples, as `--estimator auto` finds it by a pilot.
 //!
-//! Blocks of 4 × 4 pixels are rendered with and without sharing. A part S of the variance is divided by E² if blocks of
+//! Blocks of 4 × 4 pixels are rendered with and without sharing, and with other numbers of samples. A part S of the variance is divided by E² if blocks of
 //! E × E pixels share paths, and each of the E² − 1 other pixels costs the same time, beside what sharing takes in blocks of any
 //! size; so both follow for all E.
 
@@ -10,7 +10,7 @@ use lumiris_numbers::estimators::efficiency::Model;
 
 /// Edge of the blocks of the pilot.
 pub(super) const EDGE: u32 = 4;
-/// Edges among which is chosen: the larger blocks are, the coarser is the grain, and plain MSE gains nothing more.
+/// Edges among which is chosen, of which the first shares nothing: the larger blocks are, the coarser is the grain, and plain MSE gains nothing more.
 const EDGES: [u32; 6] = [1, 2, 3, 4, 5, 6];
 /// Least time of sharing in blocks of the pilot, relative to that of a camera sample: what was measured may be less by chance.
 const MIN_COST: f64 = 0.075;
@@ -22,21 +22,17 @@ const MIN_ERRORS: f64 = 1.0;
 const MIN_GAIN: f64 = 1.03;
 /// Share of the greatest efficiency with which smaller blocks will do.
 const NEARLY: f64 = 0.98;
+/// The same with which fewer light samples will do: the noise of few pixels, which the pilot does not see, is rarely theirs.
+const NUMBERS_NEARLY: f64 = 0.88;
 
-/// What sharing costs and gains.
-#[derive(Clone, Copy, Debug)]
-pub(super) struct Gain {
-    /// Edge of the blocks.
-    pub(super) edge: u32,
-    /// Time of a camera sample that is added (ns).
-    pub(super) cost: f64,
-    /// Variance of a camera sample that goes away.
-    pub(super) variance: f64,
-}
+/// Numbers of light samples at first and at later vertices.
+pub(super) type Numbers = [u32; 2];
 
-/// Without and with sharing.
-pub(super) fn candidates(chosen: &IntegratorSettings) -> [Candidate; 2] {
-    [1, EDGE].map(|edge| Candidate::named(IntegratorSettings { path_reuse: Some(edge), ..*chosen }))
+/// Without and with sharing, and with sharing by `more` settings of other numbers of samples.
+pub(super) fn candidates(chosen: &IntegratorSettings, more: &[IntegratorSettings]) -> Vec<Candidate> {
+    let shared = |settings: &IntegratorSettings| IntegratorSettings { path_reuse: Some(EDGE), ..*settings };
+    let alone = IntegratorSettings { path_reuse: Some(1), ..*chosen };
+    [alone, shared(chosen)].into_iter().chain(more.iter().map(shared)).map(Candidate::named).collect()
 }
 
 /// Time and variance relative to those without sharing, by what both candidates have.
@@ -49,7 +45,7 @@ fn shared(edge: u32, [cost, more]: [f64; 2], [variance, less]: [f64; 2]) -> [f64
 }
 
 /// The edge that is most efficient by a round of both candidates, if that is more than chance.
-pub(super) fn best(round: &Round) -> Option<Gain> {
+pub(super) fn best(round: &Round) -> Option<u32> {
     let costs = [round.measured[0].0, round.measured[1].0];
     let variances = [round.variances(0), round.variances(1)];
     let gains = |edge: u32| -> Vec<f64> {
@@ -59,22 +55,37 @@ pub(super) fn best(round: &Round) -> Option<Gain> {
     let greatest = EDGES.iter().map(|&edge| gains(edge)[0]).fold(0.0, f64::max);
     let edge = EDGES.into_iter().find(|&edge| gains(edge)[0] >= greatest + NEARLY.ln())?;
     let (gain, error) = jackknife(&gains(edge));
-    let [cost, variance] = shared(edge, costs, [variances[0][0], variances[1][0]]);
-    (edge > 1 && gain > MIN_GAIN.ln().max(MIN_ERRORS * error)).then_some(Gain {
-        edge,
-        cost: (cost - 1.0) * costs[0],
-        variance: (1.0 - variance) * variances[0][0],
-    })
+    (edge > 1 && gain > MIN_GAIN.ln().max(MIN_ERRORS * error)).then_some(edge)
 }
 
-/// The model where pixels share paths: light samples at later vertices are shared as well.
-pub(super) fn model(of_one: &Model, gain: &Gain) -> Model {
-    let [a, b_first, b_later] = of_one.cost;
-    let [v, v_first, v_later] = of_one.variance;
-    let pixels = f64::from(gain.edge * gain.edge);
-    let of_light = v_later * (1.0 - 1.0 / pixels);
-    let rest = (v - (gain.variance - of_light).max(0.0)).max(v / pixels);
-    Model { cost: [a + gain.cost, b_first, b_later], variance: [rest, v_first, v_later / pixels], ..*of_one }
+/// The edge and the numbers that are most efficient by a round of [`candidates`], if they share paths and that is more than
+/// chance. `numbers` are those of the candidates that share, `of_one` is the model of paths that are not shared, and `shared`
+/// that of blocks of the pilot: with all pixels, and without each of the groups.
+pub(super) fn best_numbers(
+    round: &Round,
+    numbers: Numbers,
+    (of_one, of_pilot): (&Model, &[Model]),
+    choices: [&[u32]; 2],
+) -> Option<(u32, Numbers)> {
+    let light = |n: Numbers| n.map(f64::from);
+    let alone = round.variances(0);
+    // Time and variance, by the pixels of group `i`
+    let at = |i: usize, edge: u32, n: Numbers| {
+        let cost = round.measured[0].0 * of_one.cost(light(n)) / of_one.cost(light(numbers));
+        let variance = alone[i] * of_one.variance(light(n)) / of_one.variance(light(numbers));
+        let model = &of_pilot[i];
+        let part = shared(edge, [cost, model.cost(light(n))], [variance, model.variance(light(n))]);
+        [cost * part[0], variance * part[1]]
+    };
+    let efficiency = |i: usize, edge: u32, n: Numbers| -at(i, edge, n).iter().map(|x| x.ln()).sum::<f64>();
+    let pairs = || choices[0].iter().flat_map(|&first| choices[1].iter().map(move |&later| [first, later]));
+    let all = || EDGES.into_iter().skip(1).flat_map(|edge| pairs().map(move |n| (edge, n)));
+    let greatest = all().map(|(edge, n)| efficiency(0, edge, n)).fold(f64::NEG_INFINITY, f64::max);
+    let good = all().filter(|&(edge, n)| efficiency(0, edge, n) >= greatest + NUMBERS_NEARLY.ln());
+    let (edge, best) = good.min_by(|a, b| at(0, a.0, a.1)[0].total_cmp(&at(0, b.0, b.1)[0]))?;
+    let gains: Vec<f64> = (0..alone.len()).map(|i| efficiency(i, edge, best) - efficiency(i, 1, numbers)).collect();
+    let (gain, error) = jackknife(&gains);
+    (gain > MIN_GAIN.ln().max(MIN_ERRORS * error)).then_some((edge, best))
 }
 
 #[cfg(test)]
@@ -95,15 +106,36 @@ mod tests {
     }
 
     #[test]
-    fn the_model_of_shared_paths_has_what_is_left_of_the_variance() {
-        // 6 of 8 are shared, 2 of these are of light at later vertices, and 1 is of light at the first
-        let of_one = Model { cost: [9.0, 1.0, 1.0], variance: [5.0, 1.0, 2.0], powers: [1.0; 2] };
-        let gain = Gain { edge: 2, cost: 3.0, variance: 6.0 * 0.75 };
-        let shared = model(&of_one, &gain);
-        assert!((shared.variance([1.0, 1.0]) - (8.0 - 4.5)).abs() < 1e-12, "{shared:?}");
-        assert!((shared.cost([1.0, 1.0]) - (11.0 + 3.0)).abs() < 1e-12);
-        // Light samples at later vertices count for four pixels
-        assert_eq!(shared.variance[2], 0.5);
+    fn numbers_and_edge_are_those_of_the_least_error_in_a_time() {
+        // Variance a + b/first + (c + d/later), of which the latter is shared
+        let truth = |edge: u32, [first, later]: [f64; 2]| {
+            let pixels = f64::from(edge * edge);
+            let cost = 10.0 + first + 2.0 * later;
+            let of_blocks = FIXED + (1.0 - FIXED) * (pixels - 1.0) / f64::from(EDGE * EDGE - 1);
+            let sharing = if edge > 1 { 1.0 + 0.8 * of_blocks } else { 1.0 };
+            [cost * sharing, 0.5 + 2.0 / first + (4.0 + 6.0 / later) / pixels]
+        };
+        let measured = |edge, n: [f64; 2]| {
+            let [cost, variance] = truth(edge, n);
+            let d = (2.0 * variance / 4.0).sqrt();
+            (cost, vec![[d, d * d]; 64])
+        };
+        let numbers = [[2.0, 1.0], [4.0, 1.0], [2.0, 2.0]];
+        let mut all = vec![measured(1, numbers[0])];
+        all.extend(numbers.iter().map(|&n| measured(EDGE, n)));
+        let round = Round { measured: all, spp: 4, is_direct: false, relative: 1.0 };
+        let of_one = Model { cost: [10.0, 1.0, 2.0], variance: [4.5, 2.0, 6.0], powers: [1.0; 2] };
+        let of_pilot = round.models_from(1, &numbers, [1.0; 2]);
+        let choices: [&[u32]; 2] = [&[1, 2, 4, 8], &[1, 2, 4]];
+        let (edge, n) = best_numbers(&round, [2, 1], (&of_one, &of_pilot), choices).unwrap();
+        let efficiency = |edge, n: [u32; 2]| 1.0 / truth(edge, n.map(f64::from)).iter().product::<f64>();
+        let pairs = choices[0].iter().flat_map(|&first| choices[1].iter().map(move |&later| [first, later]));
+        let greatest = pairs.flat_map(|n| EDGES.map(|edge| efficiency(edge, n))).fold(0.0, f64::max);
+        assert!(efficiency(edge, n) >= 0.87 * greatest, "{edge} {n:?}");
+        // Of nothing that is shared, nothing is
+        let nothing = Round { measured: vec![measured(1, numbers[0]); 4], spp: 4, is_direct: false, relative: 1.0 };
+        let of_pilot = nothing.models_from(1, &numbers, [1.0; 2]);
+        assert!(best_numbers(&nothing, [2, 1], (&of_one, &of_pilot), [&[2], &[1]]).is_none());
     }
 
     #[test]
@@ -114,9 +146,10 @@ mod tests {
             measured: vec![(100.0, differences(1.0)), (110.0, differences(gain))],
             spp: 4,
             is_direct: false,
+            relative: 1.0,
         };
         assert!(best(&round(1.0)).is_none() && best(&round(1.2)).is_none());
         let found = best(&round(0.3)).unwrap();
-        assert!(found.edge >= 3 && found.cost > 0.0 && found.variance > 0.0, "{found:?}");
+        assert!(found >= 3, "{found}");
     }
 }

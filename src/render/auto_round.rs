@@ -56,6 +56,9 @@ impl Candidate {
         if settings.estimator == EstimatorKind::Mis {
             name += &format!(", BSDF fraction {}", settings.bsdf_fraction());
         }
+        if let Some(paths) = settings.light_paths.filter(|paths| *paths > 0.0) {
+            name += &format!(", {paths} light paths");
+        }
         if let Some(edge) = settings.path_reuse {
             name += &format!(", paths of {edge} × {edge} pixels");
         }
@@ -72,6 +75,8 @@ pub(super) struct Round {
     /// Samples of a pixel and seed.
     pub(super) spp: u32,
     pub(super) is_direct: bool,
+    /// 1/(m² + ε), averaged over channels and pixels, m being their means.
+    pub(super) relative: f64,
 }
 
 impl Round {
@@ -114,11 +119,19 @@ impl Round {
     /// The models by candidates of which the first has the `numbers` that the others have more of: by all pixels, and
     /// without each of the groups. `powers` are those of what the numbers leave of the variance.
     pub(super) fn models(&self, numbers: &[[f64; 2]], powers: [f64; 2]) -> Vec<Model> {
-        let variances: Vec<Vec<f64>> = (0..numbers.len()).map(|k| self.variances(k)).collect();
+        self.models_from(0, numbers, powers)
+    }
+
+    /// The same by candidates from `begin` on.
+    pub(super) fn models_from(&self, begin: usize, numbers: &[[f64; 2]], powers: [f64; 2]) -> Vec<Model> {
+        let variances: Vec<Vec<f64>> = (0..numbers.len()).map(|k| self.variances(begin + k)).collect();
         let of = |i: usize| {
-            let measured =
-                |k: usize| Measured { samples: numbers[k], cost: self.measured[k].0, variance: variances[k][i] };
-            let more = [Some(measured(1)), (numbers.len() > 2).then(|| measured(2))];
+            let measured = |k: usize| Measured {
+                samples: numbers[k],
+                cost: self.measured[begin + k].0,
+                variance: variances[k][i],
+            };
+            let more = [1, 2].map(|k| (k < numbers.len()).then(|| measured(k)));
             Model::fit(&measured(0), more, powers)
         };
         (0..variances[0].len()).map(of).collect()
@@ -231,7 +244,7 @@ mod tests {
                     differences.push([d, d * d]);
                 }
             }
-            chosen += Round { measured, spp: 1, is_direct: false }.choose(&candidates, &[None, None]);
+            chosen += Round { measured, spp: 1, is_direct: false, relative: 1.0 }.choose(&candidates, &[None, None]);
         }
         f64::from(chosen as u32) / 1000.0
     }
@@ -244,7 +257,7 @@ mod tests {
         };
         let candidates = [candidate(4), candidate(8)];
         let measured = (1.0, vec![[1.0, 1.0]; 256]);
-        let round = Round { measured: vec![measured.clone(), measured], spp: 4, is_direct: false };
+        let round = Round { measured: vec![measured.clone(), measured], spp: 4, is_direct: false, relative: 1.0 };
         let model = |gain: f64| Some(vec![gain; 1 + GROUPS]);
         assert_eq!(round.choose(&candidates, &[model(0.0), model(0.5)]), 1);
         assert_eq!(round.choose(&candidates, &[model(0.5), model(0.0)]), 0);

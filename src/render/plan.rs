@@ -17,7 +17,7 @@ use super::{RenderError, RenderSettings, Run, ThreadError, camera_batches};
 use crate::direct::Fits;
 use crate::film::PixelBounds;
 use crate::integrators::path::CameraSample;
-use crate::integrators::{PathTracer, Tracer, light_layers, reuse, through_media};
+use crate::integrators::{PathTracer, Tracer, light_layers, light_paths, reuse, through_media};
 use crate::scene::{RenderJob, SampleCountMap};
 use crate::settings::table::rows;
 use crate::settings::{
@@ -89,9 +89,12 @@ pub fn prepare(job: &mut RenderJob, threads: Option<usize>, ratio_map: bool) -> 
     let shares_paths = job.settings().integrator.path_reuse.is_some_and(|edge| edge > 1);
     let obstacle = reuse::obstacle(job).filter(|_| shares_paths);
     let unshared = obstacle.map(|reason| format!("pixels do not share paths: {reason}"));
+    let wants_light_paths = job.settings().integrator.light_paths.is_some_and(|paths| paths > 0.0);
+    let obstacle = light_paths::obstacle(job).filter(|_| wants_light_paths);
+    let without_light_paths = obstacle.map(|reason| format!("there are no light paths: {reason}"));
     let obstacle = light_layers::obstacle(job).filter(|_| light_layers::is_wanted(job));
     let without_layers = obstacle.map(|reason| format!("light groups have no layers: {reason}"));
-    let warnings = unshared.into_iter().chain(without_layers).collect();
+    let warnings = unshared.into_iter().chain(without_light_paths).chain(without_layers).collect();
     Ok(Plan { auto, ris, chosen: chosen(&before, job.settings()), warnings })
 }
 

@@ -16,6 +16,7 @@ mod irradiance_cache;
 mod layering;
 mod lenses;
 mod light_groups;
+mod light_paths;
 mod measured;
 mod media;
 mod motion;

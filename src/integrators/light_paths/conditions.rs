@@ -8,7 +8,11 @@ use crate::settings::{IntegratorKind, IntegratorSettings, RouletteKind};
 
 /// Why light paths cannot help to render this image.
 pub fn obstacle(job: &RenderJob) -> Option<&'static str> {
-    let settings = &job.settings().integrator;
+    obstacle_of(job, &job.settings().integrator)
+}
+
+/// Why they cannot with these settings.
+pub fn obstacle_of(job: &RenderJob, settings: &IntegratorSettings) -> Option<&'static str> {
     let scene = &job.world.scene;
     let is_cut_out = scene.geometry.geometries.iter().any(|g| g.alpha.is_some());
     let has_motion = scene.geometry.has_motion() || scene.camera.is_moving();

@@ -33,7 +33,7 @@ pub(super) struct Emitted {
 }
 
 /// How light paths begin.
-#[derive(Debug)]
+#[derive(Clone, Debug)]
 pub(in crate::integrators) struct Guide {
     lights: LightDistribution,
     /// Table of each light.
@@ -82,10 +82,11 @@ impl Guide {
 
     /// The same directions by another number of paths.
     #[must_use]
-    pub(super) fn with_paths(mut self, paths: u32) -> Self {
+    pub(in crate::integrators) fn with_paths(&self, paths: u32) -> Self {
         let factor = paths as f32 / self.paths as f32;
-        self.rates.iter_mut().for_each(|rate| *rate *= factor);
-        Guide { paths, ..self }
+        let rates = self.rates.iter().map(|rate| rate * factor).collect();
+        let Guide { lights, group_of, tables, .. } = self.clone();
+        Guide { lights, group_of, tables, rates, paths }
     }
 
     /// Nothing was found yet.
@@ -184,5 +185,93 @@ impl Found {
         };
         let of_direction = of_tables(self).iter().zip(of_tables(other)).map(|(a, b)| a + b).collect();
         Found { of_light: mix(&self.of_light, &other.of_light), of_direction }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::geometry::{BilinearMesh, Shape, TriangleMesh};
+    use crate::lights::{Emission, LightSetBuilder};
+    use lumiris_numbers::math::Bounds3;
+    use lumiris_test_support::random::{RngExt, pcg32};
+    use lumiris_test_support::{Moments, assert_chi_squared};
+
+    /// A point light, which has no area, a bent patch, and a mesh of two triangles that emit on both sides.
+    fn lights() -> LightSet {
+        let mut builder = LightSetBuilder::default();
+        builder.add(Light::Point { p: Vec3::ZERO, intensity: Rgb::WHITE });
+        let positions = vec![v(-0.5, -0.5, 2.0), v(-0.4, 0.7, 2.1), v(0.5, -0.6, 1.8), v(0.6, 0.5, 2.2)];
+        let patch = BilinearMesh { positions, indices: vec![[0, 1, 2, 3]], ..BilinearMesh::default() };
+        builder.add_area(3, &Shape::Bilinear(patch), &Emission::constant(Rgb::new(3.0, 1.0, 0.5)));
+        let corners = vec![v(0.0, 0.0, 0.0), v(2.0, 0.0, 0.0), v(0.0, 1.0, 0.3), v(2.0, 2.0, 0.0)];
+        let mesh = Shape::Mesh(TriangleMesh::new(corners, vec![[0, 1, 2], [1, 3, 2]]).unwrap());
+        builder.add_area(1, &mesh, &Emission { two_sided: true, ..Emission::constant(Rgb::new(1.0, 2.0, 4.0)) });
+        builder.build(&Bounds3 { min: Vec3::splat(-2.0), max: Vec3::splat(3.0) })
+    }
+
+    #[test]
+    fn light_paths_carry_the_power_of_all_lights_with_an_area() {
+        let set = lights();
+        let guide = Guide::everywhere(&set, 1).unwrap();
+        let power: f32 = (1..4).map(|light| power(&set, light)).sum();
+        let mut s = pcg32([1, 2, 3]);
+        let mut moments = Moments::default();
+        for _ in 0..200_000 {
+            let emitted = guide.emit(&set, s.random(), [s.random(), s.random()]);
+            moments.add(f64::from(emitted.map_or(0.0, |e| e.power.luminance())));
+        }
+        moments.assert_mean(f64::from(power), 1e-5, 1e-5);
+    }
+
+    #[test]
+    fn learned_light_paths_have_their_density() {
+        let set = lights();
+        let all = Guide::everywhere(&set, 1000).unwrap();
+        let mut found = all.begin();
+        for (light, d, value) in [(1, v(0.3, 0.2, -0.9), 1.0), (1, v(-0.5, 0.1, -0.4), 0.5), (2, v(0.1, 0.9, 0.4), 2.0)]
+        {
+            all.add(&mut found, light, d.normalize(), value);
+        }
+        let guide = all.learned(&set, &found).unwrap().with_paths(500);
+        assert!(all.learned(&set, &all.begin()).is_none());
+        // Of each light that was found, by cells of the map of directions
+        const CELLS: usize = 32;
+        let cell = |d: Vec3| {
+            let p = (equal_area_sphere_to_square(d) * CELLS as f32).clamp(Vec2::ZERO, Vec2::splat(31.0));
+            p.y as usize * CELLS + p.x as usize
+        };
+        let mut s = pcg32([1, 2, 4]);
+        let mut observed = vec![0.0; 4 * CELLS * CELLS];
+        let count = 100_000;
+        for _ in 0..count {
+            let Some(e) = guide.emit(&set, s.random(), [s.random(), s.random()]) else { continue };
+            observed[e.light as usize * CELLS * CELLS + cell(e.d)] += 1.0;
+            let density = guide.density(e.light, e.n, e.d);
+            assert!((density / e.density - 1.0).abs() < 1e-5 && e.n.dot(e.d) > 0.0);
+            // Power is radiance over the density, of which the guide has that of so many paths
+            let Light::Area(area) = &set.lights[e.light as usize] else { panic!("it has no area") };
+            let radiance = area.emission.radiance(Vec2::ZERO).luminance();
+            let is_flat = e.light > 1;
+            assert!(!is_flat || (e.power.luminance() * density / (500.0 * radiance) - 1.0).abs() < 1e-3);
+        }
+        // By integration of the density over the sphere; of the mesh, which emits in all directions
+        let fine = 16 * CELLS;
+        let mut expected = vec![0.0_f64; observed.len()];
+        for i in 0..fine * fine {
+            let p = Vec2::new((i % fine) as f32 + 0.5, (i / fine) as f32 + 0.5) / fine as f32;
+            let d = equal_area_square_to_sphere(p);
+            for light in [2, 3] {
+                let pdf = guide.rates[light as usize] * area(&set, light) / 500.0 * guide.pdf(light, d);
+                let solid_angle = 4.0 * std::f32::consts::PI / (fine * fine) as f32;
+                expected[light as usize * CELLS * CELLS + cell(d)] += f64::from(pdf * solid_angle * count as f32);
+            }
+        }
+        let of_mesh = 2 * CELLS * CELLS..4 * CELLS * CELLS;
+        assert_chi_squared(&observed[of_mesh.clone()], &expected[of_mesh], 1e-5);
+    }
+
+    fn v(x: f32, y: f32, z: f32) -> Vec3 {
+        Vec3::new(x, y, z)
     }
 }

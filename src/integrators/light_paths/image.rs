@@ -2,41 +2,20 @@
 
 use super::conditions::per_sample;
 use super::guide::Guide;
-use super::trace::{Scene, Seen, Walker};
+use super::pilot::LightPilot;
+use super::trace::{LightPathStats, Scene, Seen, parts, trace};
 use crate::film::{PixelBounds, PixelSample};
-use crate::photons::path::BATCH;
 use crate::scene::RenderJob;
 use lumiris_numbers::math::Rgb;
 use lumiris_numbers::math::hash::pcg4d;
 use rayon::prelude::*;
 use std::ops::Range;
 use std::sync::Arc;
-use std::time::{Duration, Instant};
 
-/// Combined with the seed of the image to give those of light paths, and of the pilot.
+/// Combined with the seed of the image to give those of light paths.
 const SEED: u32 = 0x6c_69_67_68;
-const PILOT_SEED: u32 = 0x6c_70_69_6c;
-/// Light paths of the image for each ray of the pilot, limits of the number of these, and rays for each of its light paths.
-const SAMPLES_PER_RAY: u64 = 16;
-const PILOT_RAYS: [u64; 2] = [1 << 14, 1 << 20];
-const RAYS_PER_PATH: u64 = 4;
-/// Rounds of light paths.
-const ROUNDS: u32 = 2;
 /// Light paths that are traced at a time, at most.
-const MAX_PATHS: u64 = 1 << 23;
-
-/// Counts and times of light paths.
-#[derive(Clone, Copy, Debug, Default)]
-pub struct LightPathStats {
-    /// Light paths.
-    pub paths: u64,
-    /// Those that a pixel got.
-    pub seen: u64,
-    /// Rays and segments traced.
-    pub rays: u64,
-    /// Time (s), summed over threads.
-    pub time: Duration,
-}
+const MAX_PATHS: u64 = 1 << 21;
 
 /// A contribution to a pixel.
 #[derive(Clone, Copy, Debug)]
@@ -70,8 +49,8 @@ impl LightImage {
         if paths < 1.0 {
             return None;
         }
-        let mut stats = LightPathStats::default();
-        let guide = learn(job, &mut stats)?.with_paths(paths.min(f64::from(u32::MAX)) as u32);
+        let pilot = LightPilot::new(job, 1)?;
+        let (guide, stats) = (pilot.guide.with_paths(paths.min(f64::from(u32::MAX)) as u32), pilot.stats);
         let rows = vec![0; bounds.height() as usize + 1];
         let has_entries = vec![0; bounds.area().div_ceil(64)];
         Some(LightImage { guide: Arc::new(guide), bounds, served: 0, entries: Vec::new(), rows, has_entries, stats })
@@ -134,66 +113,3 @@ impl LightImage {
 
 /// The bits of a turn beside those which count the samples of a pixel in it, see [`crate::scene::PixelSamples::turn`].
 const TURN: u32 = (1 << 20) - 1;
-
-/// Batches of so many light paths.
-fn parts(paths: u64) -> impl Iterator<Item = Range<u64>> {
-    (0..paths.div_ceil(BATCH)).map(move |i| i * BATCH..((i + 1) * BATCH).min(paths))
-}
-
-/// Traces batches of light paths; what the camera sees of each, in their order.
-fn trace(
-    scene: &Scene<'_>,
-    parts: &[(u32, Range<u64>)],
-    seed: impl Fn(u32) -> u32 + Sync,
-    stats: &mut LightPathStats,
-) -> Vec<Vec<Seen>> {
-    let one = |walker: &mut Walker, (turn, part): &(u32, Range<u64>)| {
-        let start = Instant::now();
-        walker.traced = 0;
-        walker.trace(scene, seed(*turn), part.clone());
-        (walker.seen.clone(), walker.traced, start.elapsed())
-    };
-    let all: Vec<_> = parts.par_iter().with_max_len(1).map_init(Walker::default, one).collect();
-    stats.paths += parts.iter().map(|(_, part)| part.end - part.start).sum::<u64>();
-    all.into_iter()
-        .map(|(seen, rays, time)| {
-            stats.seen += seen.len() as u64;
-            stats.rays += rays;
-            stats.time += time;
-            seen
-        })
-        .collect()
-}
-
-/// Finds by a pilot where light paths of use begin; `None` if it found none.
-fn learn(job: &RenderJob, stats: &mut LightPathStats) -> Option<Guide> {
-    let (set, bounds) = (&job.world.scene.lights, job.world.scene.film.bounds);
-    let samples = bounds.area() as u64 * u64::from(job.settings().sampling.spp);
-    let rays = (samples / SAMPLES_PER_RAY).clamp(PILOT_RAYS[0], PILOT_RAYS[1]);
-    let seed = |round: u32| pcg4d([PILOT_SEED, round, 0, 0])[0];
-
-    // Where metal and glass are
-    let everywhere = Guide::everywhere(set, rays as u32)?;
-    let mut bundling = everywhere.begin();
-    let scene = Scene::new(job, &everywhere);
-    let of_part = |walker: &mut Walker, part: Range<u64>| walker.first_hits(&scene, seed(0), part);
-    let hits: Vec<_> = parts(rays).collect::<Vec<_>>().into_par_iter().map_init(Walker::default, of_part).collect();
-    stats.rays += rays;
-    for hit in hits.iter().flatten() {
-        everywhere.add(&mut bundling, hit.light, hit.d, f64::from(hit.value.luminance()));
-    }
-
-    // What is seen of the light that they send on
-    let mut found = everywhere.begin();
-    let mut guide = everywhere.learned(set, &bundling)?;
-    for round in 1..=ROUNDS {
-        let parts: Vec<_> = parts(rays / RAYS_PER_PATH).map(|part| (round, part)).collect();
-        let scene = Scene::new(job, &guide);
-        let seen = trace(&scene, &parts, seed, stats);
-        for seen in seen.iter().flatten() {
-            guide.add(&mut found, seen.light, seen.d, f64::from(seen.value.luminance().abs()));
-        }
-        guide = guide.learned(set, &if round < ROUNDS { found.mixed(&bundling) } else { found.clone() })?;
-    }
-    Some(guide)
-}

@@ -18,10 +18,12 @@ mod chain;
 mod conditions;
 mod guide;
 mod image;
+mod pilot;
 mod trace;
 
 pub(super) use chain::Chain;
-pub use conditions::{obstacle, per_sample};
+pub use conditions::{obstacle, obstacle_of, per_sample};
 pub(super) use guide::Guide;
 pub(super) use image::LightImage;
-pub use image::LightPathStats;
+pub use pilot::LightPilot;
+pub use trace::LightPathStats;

@@ -6,12 +6,14 @@ use crate::accel::{Coherence, Hit, RayBatch};
 use crate::film::filter::FilterSampler;
 use crate::lights::LightId;
 use crate::materials::SurfaceBsdf;
-use crate::photons::path::{domain, path_stream};
+use crate::photons::path::{BATCH, domain, path_stream};
 use crate::scene::{RenderJob, SurfaceInteraction};
 use lumiris_numbers::math::ray::{SEGMENT_END, offset_origin};
 use lumiris_numbers::math::{Ray, Rgb, Vec2, Vec3};
 use lumiris_numbers::samplers::SampleStream;
+use rayon::prelude::*;
 use std::ops::Range;
+use std::time::{Duration, Instant};
 
 /// Random-number domains of a light path beside those of its beginning: the place on the lens and in the filter, and vertex
 /// k at `VERTEX + k`.
@@ -36,6 +38,8 @@ pub(super) struct Seen {
     pub(super) pixel: [u32; 2],
     /// What it adds to a pixel of one camera sample, if all light paths are one.
     pub(super) value: Rgb,
+    /// Its weight, which is a factor of that.
+    pub(super) weight: f32,
     /// Where it came from.
     pub(super) light: LightId,
     pub(super) d: Vec3,
@@ -189,7 +193,7 @@ impl LightPath {
         }
         let o = offset_origin(p, at.surface.p_error, bsdf.n, wo);
         let segment = Ray { o, d: seen.o - o, t_max: SEGMENT_END, time: self.ray.time };
-        Some((Seen { pixel, value, light: self.light, d: self.d }, segment))
+        Some((Seen { pixel, value, weight, light: self.light, d: self.d }, segment))
     }
 }
 
@@ -214,6 +218,49 @@ fn pixel_of(filter: &FilterSampler, film_xy: Vec2, u: f32) -> Option<([u32; 2], 
         }
     }
     chosen
+}
+
+/// Counts and times of light paths.
+#[derive(Clone, Copy, Debug, Default)]
+pub struct LightPathStats {
+    /// Light paths.
+    pub paths: u64,
+    /// Those that a pixel got.
+    pub seen: u64,
+    /// Rays and segments traced.
+    pub rays: u64,
+    /// Time (s), summed over threads.
+    pub time: Duration,
+}
+
+/// Batches of so many light paths.
+pub(super) fn parts(paths: u64) -> impl Iterator<Item = Range<u64>> {
+    (0..paths.div_ceil(BATCH)).map(move |i| i * BATCH..((i + 1) * BATCH).min(paths))
+}
+
+/// Traces batches of light paths; what the camera sees of each, in their order.
+pub(super) fn trace(
+    scene: &Scene<'_>,
+    parts: &[(u32, Range<u64>)],
+    seed: impl Fn(u32) -> u32 + Sync,
+    stats: &mut LightPathStats,
+) -> Vec<Vec<Seen>> {
+    let one = |walker: &mut Walker, (turn, part): &(u32, Range<u64>)| {
+        let start = Instant::now();
+        walker.traced = 0;
+        walker.trace(scene, seed(*turn), part.clone());
+        (walker.seen.clone(), walker.traced, start.elapsed())
+    };
+    let all: Vec<_> = parts.par_iter().with_max_len(1).map_init(Walker::default, one).collect();
+    stats.paths += parts.iter().map(|(_, part)| part.end - part.start).sum::<u64>();
+    all.into_iter()
+        .map(|(seen, rays, time)| {
+            stats.seen += seen.len() as u64;
+            stats.rays += rays;
+            stats.time += time;
+            seen
+        })
+        .collect()
 }
 
 #[cfg(test)]

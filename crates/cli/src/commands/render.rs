@@ -17,8 +17,8 @@ use lumiris::film::{Film, Summary};
 use lumiris::imaging::oidn::Denoiser;
 use lumiris::imaging::tiles::TileCounts;
 use lumiris::import::cache::FileCache;
-use lumiris::integrators::light_layers;
 use lumiris::integrators::photon_map::MapStats;
+use lumiris::integrators::{LightPathStats, light_layers};
 use lumiris::render::cryptomatte::cryptomattes;
 use lumiris::render::memory::{Wanted, predict};
 use lumiris::render::output::{self, Aov};
@@ -327,12 +327,17 @@ fn stats(args: &RenderArgs, job: &RenderJob, rendering: &Rendering, setup: Setup
             "texture_tiles": textures.store().map(|store| tile_counts(store.counts())),
         },
         "photon_maps": rendering.photons.map(|p| photon_stats(&p)),
+        "light_paths": rendering.light.map(|l| light_path_stats(&l)),
         "irradiance_cache": rendering.cache.map(|c| cache_stats(&c)),
     })
 }
 
 fn tile_counts(TileCounts { stored, read, held }: TileCounts) -> serde_json::Value {
     json!({ "stored_bytes": stored, "tiles_read": read, "held_bytes": held })
+}
+
+fn light_path_stats(l: &LightPathStats) -> serde_json::Value {
+    json!({ "paths": l.paths, "seen": l.seen, "rays": l.rays, "thread_seconds": l.time.as_secs_f64() })
 }
 
 fn photon_stats(p: &MapStats) -> serde_json::Value {

@@ -80,7 +80,7 @@ fn killed(method: &str, spp: u32, early: bool, random: &mut Random) -> (u32, u32
         let options = format!("--threads {threads} --tile-size {tile} --checkpoint c.film,0.02 --resume c.film");
         resumed += u32::from(stored > 0);
         let mut child = start(&format!("{image} {options} -o resumed.exr"), folder);
-        while !(early && kills == 0) && !checkpoint.exists() && child.try_wait().unwrap().is_none() {
+        while !(checkpoint.exists() || early && kills == 0) && child.try_wait().unwrap().is_none() {
             std::thread::sleep(Duration::from_millis(1));
         }
         // Some end during the preparation; over time they live longer, so that there is an end

@@ -65,6 +65,7 @@ pub(crate) fn assert_same(a: &str, b: &str, folder: &Path, what: &str) {
 pub(crate) const METHODS: &[(&str, bool)] = &[
     ("--integrator path --estimator mis", true),
     ("--integrator path --estimator mis --path-reuse 3", true),
+    ("--integrator path --estimator mis --path-reuse 2 --light-paths 0.5", true),
     ("--integrator path --estimator mis --roulette efficiency", true),
     ("--integrator path --estimator mis --allocation adaptive --spp 12", true),
     ("--integrator direct --estimator mc --sampler independent", true),

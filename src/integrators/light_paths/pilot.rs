@@ -1,0 +1,109 @@
+//! The pilot that finds where light paths of use begin, and what they are worth.
+
+use super::conditions::obstacle;
+use super::guide::Guide;
+use super::trace::{LightPathStats, Scene, Walker, parts, trace};
+use crate::scene::RenderJob;
+use lumiris_numbers::math::hash::pcg4d;
+use rayon::prelude::*;
+use std::ops::Range;
+use std::time::Instant;
+
+/// Seed of pilots.
+const SEED: u32 = 0x6c_70_69_6c;
+/// Camera samples of the image for each ray of the pilot, limits of the number of these, and rays for each light path of the
+/// pilot.
+const SAMPLES_PER_RAY: u64 = 16;
+const RAYS: [u64; 2] = [1 << 14, 1 << 20];
+const RAYS_PER_PATH: u64 = 4;
+/// Rounds of light paths.
+const ROUNDS: u32 = 2;
+
+/// What a pilot of light paths has found.
+#[derive(Debug)]
+pub struct LightPilot {
+    pub(super) guide: Guide,
+    pub(super) stats: LightPathStats,
+    /// Light paths that were seen in the last round: the square of what one brings without weight, and its density over that
+    /// of a camera sample.
+    seen: Vec<[f64; 2]>,
+    /// Light paths of that round, and their time (ns).
+    round: (u64, f64),
+    /// Time of the pilot (ns).
+    nanoseconds: f64,
+    pixels: f64,
+}
+
+impl LightPilot {
+    /// The pilot of an image, with a part 1/`divisor` of its paths; `None` if light paths cannot help, or none of use was found.
+    pub fn new(job: &RenderJob, divisor: u64) -> Option<Self> {
+        if obstacle(job).is_some() {
+            return None;
+        }
+        let (set, bounds) = (&job.world.scene.lights, job.world.scene.film.bounds);
+        let samples = bounds.area() as u64 * u64::from(job.settings().sampling.spp);
+        let rays = (samples / (SAMPLES_PER_RAY * divisor)).clamp(RAYS[0], RAYS[1]);
+        let seed = |round: u32| pcg4d([SEED, round, 0, 0])[0];
+        let mut stats = LightPathStats::default();
+
+        // Where metal and glass are
+        let everywhere = Guide::everywhere(set, rays as u32)?;
+        let mut bundling = everywhere.begin();
+        let scene = Scene::new(job, &everywhere);
+        let of_part = |walker: &mut Walker, part: Range<u64>| {
+            let start = Instant::now();
+            (walker.first_hits(&scene, seed(0), part), start.elapsed())
+        };
+        let hits: Vec<_> = parts(rays).collect::<Vec<_>>().into_par_iter().map_init(Walker::default, of_part).collect();
+        stats.rays += rays;
+        for (hits, time) in &hits {
+            hits.iter().for_each(|hit| everywhere.add(&mut bundling, hit.light, hit.d, hit.value.luminance().into()));
+            stats.time += *time;
+        }
+
+        // What is seen of the light that they send on
+        let mut found = everywhere.begin();
+        let mut guide = everywhere.learned(set, &bundling)?;
+        let (mut moments, mut of_round) = (Vec::new(), (0, 0.0));
+        for round in 1..=ROUNDS {
+            let parts: Vec<_> = parts(rays / RAYS_PER_PATH).map(|part| (round, part)).collect();
+            let (scene, before) = (Scene::new(job, &guide), stats);
+            let seen = trace(&scene, &parts, seed, &mut stats);
+            moments.clear();
+            for seen in seen.iter().flatten() {
+                let value = f64::from(seen.value.luminance().abs());
+                guide.add(&mut found, seen.light, seen.d, value);
+                let weight = f64::from(seen.weight);
+                let ratio = weight / (1.0 - weight).max(1e-9) / f64::from(guide.paths);
+                moments.push([(value / weight).powi(2), ratio]);
+            }
+            of_round = (stats.paths - before.paths, (stats.time - before.time).as_secs_f64() * 1e9);
+            guide = guide.learned(set, &if round < ROUNDS { found.mixed(&bundling) } else { found.clone() })?;
+        }
+        let nanoseconds = stats.time.as_secs_f64() * 1e9 * divisor as f64;
+        Some(LightPilot { guide, stats, seen: moments, round: of_round, nanoseconds, pixels: bounds.area() as f64 })
+    }
+
+    /// Where light paths begin.
+    pub(in crate::integrators) fn guide(&self) -> &Guide {
+        &self.guide
+    }
+
+    /// The variance of a camera sample, averaged over pixels, that is of light which light paths find as well, of which so many
+    /// are traced for each. 0: none are, and it is all of camera paths.
+    pub fn variance(&self, per_sample: f64) -> f64 {
+        let paths = per_sample * self.pixels;
+        // ∫f²/(p + paths q) by light paths of the density q
+        let moment = |[square, ratio]: &[f64; 2]| square * ratio / (1.0 + paths * ratio);
+        self.seen.iter().map(moment).sum::<f64>() / (self.round.0.max(1) as f64 * self.pixels)
+    }
+
+    /// The time (ns) that they add to one of `samples` camera samples.
+    pub fn time(&self, per_sample: f64, samples: f64) -> f64 {
+        if per_sample > 0.0 {
+            per_sample * self.round.1 / self.round.0.max(1) as f64 + self.nanoseconds / samples
+        } else {
+            0.0
+        }
+    }
+}

@@ -1,0 +1,210 @@
+//! Light paths that bring caustics: the light of every pixel, its noise, and bits.
+
+use lumiris::film::{Film, PixelSums};
+use lumiris::import::cache::FileCache;
+use lumiris::import::{LoadOptions, load_text};
+use lumiris::integrators::light_paths::{obstacle, per_sample};
+use lumiris::render::{RenderSettings, render};
+use lumiris::scene::{AccelKind, PixelSamples, RenderJob};
+use lumiris::settings::{EstimatorKind, IntegratorKind, RouletteKind};
+use std::path::Path;
+use std::sync::atomic::AtomicBool;
+
+/// A ball of glass, a ball of metal that is a little rough, and a sheet of glass, on a floor, before a wall; lamps, one of
+/// which is a rectangle with two sides, and a dim sky. The lamps are so large that camera paths find them.
+const BALLS: &str = r#"
+LookAt 0 2 -5  0 0.6 0  0 1 0
+Camera "perspective" "float fov" 40 LENS
+Film "rgb" "integer xresolution" 16 "integer yresolution" 12
+PixelFilter FILTER
+Integrator "path" "integer maxdepth" 5
+WorldBegin
+LightSource "infinite" "rgb L" [ 0.05 0.06 0.08 ]
+AttributeBegin
+  AreaLightSource "diffuse" "rgb L" [ 5 4 3 ]
+  Translate 1.4 2.2 -0.4
+  Shape "sphere" "float radius" SIZE
+AttributeEnd
+AttributeBegin
+  AreaLightSource "diffuse" "rgb L" [ 2 3 4 ] "bool twosided" true
+  Shape "bilinearmesh" "point3 P" [ -2.2 1.2 -0.5  -2.2 1.2 0.7  -1.8 2.2 -0.5  -1.8 2.2 0.7 ]
+AttributeEnd
+Material FLOOR
+Shape "bilinearmesh" "point3 P" [ -4 0 -4  4 0 -4  -4 0 4  4 0 4 ]
+Material "diffuse" "rgb reflectance" [ 0.6 0.5 0.4 ]
+Shape "bilinearmesh" "point3 P" [ -4 0 1.6  4 0 1.6  -4 4 1.6  4 4 1.6 ]
+AttributeBegin
+  Material "dielectric" "float eta" 1.5
+  Translate 0.8 0.6 0
+  Shape "sphere" "float radius" 0.6
+AttributeEnd
+AttributeBegin
+  Material "conductor" "float roughness" 0.04
+  Translate -0.8 0.5 0
+  Shape "sphere" "float radius" 0.5
+AttributeEnd
+Material "thindielectric" "float eta" 1.5
+Shape "bilinearmesh" "point3 P" [ -0.2 0 -1.2  0.3 0 -0.9  -0.2 0.8 -1.2  0.3 0.8 -0.9 ]
+"#;
+
+const DIFFUSE: &str = r#""diffuse" "rgb reflectance" [ 0.5 0.5 0.6 ]"#;
+const COATED: &str = r#""coateddiffuse" "rgb reflectance" [ 0.5 0.5 0.6 ] "float roughness" 0.05"#;
+const SMOOTH: &str = r#""coateddiffuse" "rgb reflectance" [ 0.5 0.5 0.6 ] "float roughness" 0"#;
+const METAL: &str = r#""conductor" "float roughness" 0.4"#;
+const GAUSSIAN: &str = r#""gaussian""#;
+
+struct Scene {
+    floor: &'static str,
+    filter: &'static str,
+    lens: &'static str,
+    size: f32,
+}
+
+const SCENE: Scene = Scene { floor: DIFFUSE, filter: GAUSSIAN, lens: "", size: 0.5 };
+
+impl Scene {
+    fn job(&self, light_paths: f32, resolution: [u32; 2]) -> RenderJob {
+        let text = BALLS
+            .replace("FLOOR", self.floor)
+            .replace("FILTER", self.filter)
+            .replace("LENS", self.lens)
+            .replace("SIZE", &self.size.to_string());
+        let options = LoadOptions { resolution: Some(resolution), ..LoadOptions::default() };
+        let mut loaded = load_text(&text, "balls", Path::new("."), &options, &FileCache::default()).unwrap();
+        let integrator = &mut loaded.settings.integrator;
+        (integrator.estimator, integrator.light_paths) = (EstimatorKind::Mis, Some(light_paths));
+        loaded.job(AccelKind::Embree, None).unwrap()
+    }
+}
+
+fn film(job: &RenderJob, settings: RenderSettings) -> Film {
+    render(job, &settings, &AtomicBool::new(false), &|_| ()).unwrap().film
+}
+
+/// Images of different seeds, which are independent: channels of the means of all pixels.
+fn pixel_means(job: &mut RenderJob, seeds: std::ops::Range<u32>, spp: u32) -> Vec<Vec<f64>> {
+    let numbers = job.pixel_samples.clone();
+    let image = |seed| {
+        job.change(|s| s.sampling.seed = seed);
+        job.pixel_samples.clone_from(&numbers);
+        let film = film(job, RenderSettings { spp, ..RenderSettings::default() });
+        film.pixels().iter().flat_map(PixelSums::mean).collect()
+    };
+    seeds.map(image).collect()
+}
+
+/// From half of the mean number of samples to four times as many, in no order.
+fn different_numbers(job: &RenderJob, spp: u32) -> PixelSamples {
+    let bounds = job.world.scene.film.bounds;
+    let counts = (0..bounds.area() as u32).map(|i| (spp / 2) << (i * 7 / 3 % 4)).collect();
+    PixelSamples { bounds, spp, counts }
+}
+
+/// Mean and the variance of it.
+fn mean_of(values: impl Iterator<Item = f64> + Clone) -> (f64, f64) {
+    let n = values.clone().count() as f64;
+    let mean = values.clone().sum::<f64>() / n;
+    (mean, values.map(|v| (v - mean).powi(2)).sum::<f64>() / (n - 1.0) / n)
+}
+
+/// Light paths and camera paths share the light: every pixel has the light that it has without light paths, at a level of
+/// 10⁻⁶ of each value (|z| of 4.9), and so has the image, whose light over metal and glass would be there twice or not at
+/// all. Half of the values notice a fifth, and the image notices 1.5 %; less where the floor is metal. Few and many light paths, coats that are rough and smooth, rough metal, a
+/// lens, a filter with negative lobes, other numbers of samples, and paths that pixels share.
+#[test]
+fn every_pixel_has_the_light_that_it_has_without_light_paths() {
+    let lanczos = r#""sinc" "float xradius" 2 "float yradius" 2"#;
+    let lens = r#""float lensradius" 0.15 "float focaldistance" 4"#;
+    for (scene, per_sample, edge, differ, detects) in [
+        (SCENE, 0.5, 1, false, [0.2, 0.015]),
+        (Scene { floor: COATED, ..SCENE }, 8.0, 1, false, [0.2, 0.015]),
+        (Scene { floor: SMOOTH, lens, ..SCENE }, 2.0, 1, true, [0.2, 0.015]),
+        (Scene { floor: METAL, filter: lanczos, ..SCENE }, 2.0, 1, false, [0.4, 0.04]),
+        (SCENE, 4.0, 3, true, [0.2, 0.015]),
+    ] {
+        let what = format!("{}, {}, {}, {per_sample} light paths", scene.floor, scene.filter, scene.lens);
+        let [without, with] = [(0.0, 0..40), (per_sample, 1000..1040)].map(|(light_paths, seeds)| {
+            let mut job = scene.job(light_paths, [16, 12]);
+            job.change(|s| (s.integrator.samples, s.integrator.path_reuse) = (Some(3), Some(edge)));
+            assert_eq!(obstacle(&job), None);
+            job.pixel_samples = differ.then(|| different_numbers(&job, 64));
+            pixel_means(&mut job, seeds, 64)
+        });
+        let (mut limits, mut wrong) = (Vec::new(), Vec::new());
+        for k in 0..without[0].len() {
+            let of = |images: &[Vec<f64>]| mean_of(images.iter().map(|image| image[k]));
+            let ((a, v_a), (b, v_b)) = (of(&without), of(&with));
+            let error = (v_a + v_b).sqrt();
+            if (a - b).abs() > 4.9 * error {
+                wrong.push(format!("pixel {}, channel {}: {b} with and {a} without, ± {error}", k / 3, k % 3));
+            }
+            limits.push(8.0 * error / a);
+        }
+        assert!(wrong.is_empty(), "{what}: {} values, such as {}", wrong.len(), wrong[0]);
+        limits.sort_by(f64::total_cmp);
+        let median = limits[limits.len() / 2];
+        assert!(median < detects[0], "{what} notices {median}");
+
+        let all = |images: &[Vec<f64>]| mean_of(images.iter().map(|image| image.iter().sum::<f64>()));
+        let ((a, v_a), (b, v_b)) = (all(&without), all(&with));
+        let error = (v_a + v_b).sqrt();
+        let what = format!("{what}: {b} with and {a} without, ± {error}");
+        assert!((a - b).abs() < 4.0 * error && 4.0 * error < detects[1] * a, "{what}");
+    }
+}
+
+/// With a small lamp the relative variance of the whole image, of which caustics are a part, is less than 1/1.3.
+#[test]
+fn light_paths_leave_little_of_the_noise_of_a_small_lamp() {
+    let pairs = |light_paths| {
+        let mut job = Scene { size: 0.05, ..SCENE }.job(light_paths, [32, 24]);
+        job.change(|s| s.integrator.samples = Some(3));
+        let images = pixel_means(&mut job, 0..16, 16);
+        let relative = |(a, b): (&f64, &f64)| (a - b).powi(2) / (0.25 * (a + b).powi(2) + 0.01);
+        let error = |pair: &[Vec<f64>]| pair[0].iter().zip(&pair[1]).map(relative).sum::<f64>();
+        images.chunks(2).map(error).collect::<Vec<_>>()
+    };
+    let gains: Vec<f64> = pairs(0.0).into_iter().zip(pairs(1.0)).map(|(without, with)| (without / with).ln()).collect();
+    let (gain, variance) = mean_of(gains.iter().copied());
+    let what = format!("variance by {} ± {:.0} %", gain.exp(), 100.0 * variance.sqrt());
+    assert!(gain - 4.0 * variance.sqrt() > 1.3_f64.ln(), "{what}");
+}
+
+#[test]
+fn threads_tiles_and_passes_do_not_change_a_bit() {
+    let image = |differ: bool, settings: RenderSettings| {
+        let mut job = Scene { floor: COATED, ..SCENE }.job(0.7, [40, 27]);
+        job.pixel_samples = differ.then(|| different_numbers(&job, 20));
+        let film = film(&job, RenderSettings { spp: 20, ..settings });
+        film.pixels().iter().flat_map(|p| p.mean().map(f64::to_bits)).collect::<Vec<_>>()
+    };
+    for differ in [false, true] {
+        let settings = RenderSettings { threads: Some(1), ..RenderSettings::default() };
+        let reference = image(differ, settings);
+        for (threads, tile_size) in [(2, 16), (3, 1), (1, 200)] {
+            let other = image(differ, RenderSettings { threads: Some(threads), tile_size, ..settings });
+            assert!(reference == other, "{threads} threads, tiles of {tile_size}");
+        }
+    }
+}
+
+#[test]
+fn images_that_light_paths_cannot_help_are_those_without() {
+    let mut job = SCENE.job(1.0, [8, 6]);
+    assert!(per_sample(&job) == 1.0);
+    for change in [
+        |job: &mut RenderJob| job.change(|s| s.integrator.roulette = RouletteKind::Efficiency),
+        |job: &mut RenderJob| job.change(|s| s.integrator.kind = IntegratorKind::Direct),
+        |job: &mut RenderJob| job.change(|s| s.integrator.estimator = EstimatorKind::Ris),
+        |job: &mut RenderJob| job.change(|s| s.integrator.max_depth = 2),
+    ] {
+        let before = *job.settings();
+        change(&mut job);
+        assert!(obstacle(&job).is_some() && per_sample(&job) == 0.0);
+        let with = film(&job, RenderSettings { spp: 2, ..RenderSettings::default() });
+        job.change(|s| s.integrator.light_paths = Some(0.0));
+        let without = film(&job, RenderSettings { spp: 2, ..RenderSettings::default() });
+        assert!(with.pixels().iter().zip(&without.pixels()).all(|(a, b)| a.mean() == b.mean()));
+        job.change(|s| *s = before);
+    }
+}
