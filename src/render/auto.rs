@@ -15,7 +15,10 @@
 //! Where lights at infinity are beside others, a round before these finds how many light samples are for them
 //! ([`super::auto_lights`]).
 //!
-//! In paths, a third round finds by blocks of pixels whether they share paths ([`super::auto_reuse`]).
+//! In paths, a third round finds by blocks of pixels whether they share paths, and with how many samples
+//! ([`super::auto_reuse`]). What light paths find ([`crate::integrators::light_paths`]) is left to them in all rounds; how many
+//! there are follows from a pilot of theirs, which knows the variance that camera paths would have of the same light: few
+//! pixels of a round do not see it.
 //!
 //! Times differ from run to run, so the choice is made once, becomes part of the settings, and is recorded with them:
 //! rendering with these settings gives the same image to the bit. All candidates are unbiased, and the pilot has random

@@ -1,14 +1,13 @@
 //! Light paths that bring caustics: the light of every pixel, its noise, and bits.
 
-use lumiris::film::{Film, PixelSums};
+use crate::path_reuse::{film, mean_of, pixel_means};
 use lumiris::import::cache::FileCache;
 use lumiris::import::{LoadOptions, load_text};
 use lumiris::integrators::light_paths::{obstacle, per_sample};
-use lumiris::render::{RenderSettings, render};
+use lumiris::render::RenderSettings;
 use lumiris::scene::{AccelKind, PixelSamples, RenderJob};
 use lumiris::settings::{EstimatorKind, IntegratorKind, RouletteKind};
 use std::path::Path;
-use std::sync::atomic::AtomicBool;
 
 /// A ball of glass, a ball of metal that is a little rough, and a sheet of glass, on a floor, before a wall; lamps, one of
 /// which is a rectangle with two sides, and a dim sky. The lamps are so large that camera paths find them.
@@ -77,34 +76,11 @@ impl Scene {
     }
 }
 
-fn film(job: &RenderJob, settings: RenderSettings) -> Film {
-    render(job, &settings, &AtomicBool::new(false), &|_| ()).unwrap().film
-}
-
-/// Images of different seeds, which are independent: channels of the means of all pixels.
-fn pixel_means(job: &mut RenderJob, seeds: std::ops::Range<u32>, spp: u32) -> Vec<Vec<f64>> {
-    let numbers = job.pixel_samples.clone();
-    let image = |seed| {
-        job.change(|s| s.sampling.seed = seed);
-        job.pixel_samples.clone_from(&numbers);
-        let film = film(job, RenderSettings { spp, ..RenderSettings::default() });
-        film.pixels().iter().flat_map(PixelSums::mean).collect()
-    };
-    seeds.map(image).collect()
-}
-
 /// From half of the mean number of samples to four times as many, in no order.
 fn different_numbers(job: &RenderJob, spp: u32) -> PixelSamples {
     let bounds = job.world.scene.film.bounds;
     let counts = (0..bounds.area() as u32).map(|i| (spp / 2) << (i * 7 / 3 % 4)).collect();
     PixelSamples { bounds, spp, counts }
-}
-
-/// Mean and the variance of it.
-fn mean_of(values: impl Iterator<Item = f64> + Clone) -> (f64, f64) {
-    let n = values.clone().count() as f64;
-    let mean = values.clone().sum::<f64>() / n;
-    (mean, values.map(|v| (v - mean).powi(2)).sum::<f64>() / (n - 1.0) / n)
 }
 
 /// Light paths and camera paths share the light: every pixel has the light that it has without light paths, at a level of

@@ -22,12 +22,12 @@ fn job(scene: &Path, resolution: [u32; 2], path_reuse: u32) -> RenderJob {
     loaded.job(AccelKind::Embree, None).unwrap()
 }
 
-fn film(job: &RenderJob, settings: RenderSettings) -> Film {
+pub(crate) fn film(job: &RenderJob, settings: RenderSettings) -> Film {
     render(job, &settings, &AtomicBool::new(false), &|_| ()).unwrap().film
 }
 
 /// Images of different seeds, which are independent: channels of the means of all pixels.
-fn pixel_means(job: &mut RenderJob, seeds: std::ops::Range<u32>, spp: u32) -> Vec<Vec<f64>> {
+pub(crate) fn pixel_means(job: &mut RenderJob, seeds: std::ops::Range<u32>, spp: u32) -> Vec<Vec<f64>> {
     let numbers = job.pixel_samples.clone();
     let image = |seed| {
         job.change(|s| s.sampling.seed = seed);
@@ -46,7 +46,7 @@ fn different_numbers(job: &RenderJob, spp: u32) -> PixelSamples {
 }
 
 /// Mean and the variance of it.
-fn mean_of(values: impl Iterator<Item = f64> + Clone) -> (f64, f64) {
+pub(crate) fn mean_of(values: impl Iterator<Item = f64> + Clone) -> (f64, f64) {
     let n = values.clone().count() as f64;
     let mean = values.clone().sum::<f64>() / n;
     (mean, values.map(|v| (v - mean).powi(2)).sum::<f64>() / (n - 1.0) / n)
