@@ -86,6 +86,8 @@ const LATER: [u32; 5] = [2, 3, 5, 9, 17];
 /// The same where pixels share paths.
 const FIRST_SHARED: [u32; 8] = [2, 3, 4, 5, 7, 9, 17, 33];
 const LATER_SHARED: [u32; 7] = [2, 3, 4, 5, 7, 9, 17];
+/// Light samples at first vertices, without sharing, from which on there are not more with it.
+const MANY_LIGHT_SAMPLES: u32 = 4;
 /// Light paths per camera sample among which is chosen.
 const LIGHT_PATHS: [f32; 8] = [0.0, 0.03125, 0.0625, 0.125, 0.25, 0.5, 1.0, 2.0];
 /// Part of a pilot of light paths whose whole is traced before the image.
@@ -373,7 +375,9 @@ impl Pilot {
             // No further than what was measured
             let within =
                 |numbers: &[u32], most: u32| numbers.iter().map(|n| n - 1).filter(|n| *n <= most).collect::<Vec<_>>();
-            let choices = [within(&FIRST_SHARED, more[0][0]), within(&LATER_SHARED, more[1][1])];
+            // Many samples at first vertices were chosen for what is not shared: twice as many tell the model, and are too many
+            let most = if light[0] > MANY_LIGHT_SAMPLES { light[0] } else { more[0][0] };
+            let choices = [within(&FIRST_SHARED, most), within(&LATER_SHARED, more[1][1])];
             auto_reuse::best_numbers(&round, light, (model, &of_pilot), choices.each_ref().map(Vec::as_slice))
         } else {
             auto_reuse::best(&round).map(|edge| (edge, light))
