@@ -23,7 +23,7 @@ pub mod photon;
 pub mod rules;
 pub mod trace;
 mod tree;
-pub(crate) mod walk;
+mod walk;
 
 pub use error::PhotonError;
 pub use importance::{Importance, ImportanceSettings, LowImportance, importons, trace_importons};

@@ -11,9 +11,8 @@ use std::time::Instant;
 
 /// Seed of pilots.
 const SEED: u32 = 0x6c_70_69_6c;
-/// Camera samples of the image for each ray of the pilot, limits of the number of these, and rays for each light path of the
-/// pilot.
-const SAMPLES_PER_RAY: u64 = 16;
+/// Limits of the number of rays, of which there is one for each pixel, and rays for each light path of the pilot. They do not
+/// depend on the number of samples: an image that goes on to more samples keeps its light paths.
 const RAYS: [u64; 2] = [1 << 14, 1 << 20];
 const RAYS_PER_PATH: u64 = 4;
 /// Rounds of light paths.
@@ -41,8 +40,7 @@ impl LightPilot {
             return None;
         }
         let (set, bounds) = (&job.world.scene.lights, job.world.scene.film.bounds);
-        let samples = bounds.area() as u64 * u64::from(job.settings().sampling.spp);
-        let rays = (samples / (SAMPLES_PER_RAY * divisor)).clamp(RAYS[0], RAYS[1]);
+        let rays = (bounds.area() as u64 / divisor).clamp(RAYS[0], RAYS[1]);
         let seed = |round: u32| pcg4d([SEED, round, 0, 0])[0];
         let mut stats = LightPathStats::default();
 
