@@ -155,7 +155,7 @@ fn bsdfs() {
             continue;
         }
         let frame = Frame::from_z(Vec3::new(0.48, 0.6, 0.64));
-        let surface = SurfaceBsdf { bsdf, frame, n: frame.z };
+        let surface = SurfaceBsdf { bsdf, frame, makes_caustics: false, n: frame.z };
         let wo = frame.to_world(Vec3::new(0.6, 0.0, 0.8));
         for m in SIZES {
             let mut stream = pcg32([3, 1, 4]);

@@ -238,6 +238,7 @@ impl<'a> Bsdf<'a> {
             Bsdf::Conductor(b) => is_narrow(&b.distribution),
             Bsdf::Dielectric(b) => is_narrow(&b.distribution),
             Bsdf::ThinDielectric(_) => true,
+            Bsdf::Principled(b) => is_narrow(&b.distribution) && b.metal_or_glass() > 0.5,
             _ => false,
         }
     }

@@ -148,6 +148,12 @@ impl Principled {
         [self.metalness, dielectric * (1.0 - self.transmission), thin, solid]
     }
 
+    /// The part that is metal or glass.
+    pub fn metal_or_glass(&self) -> f32 {
+        let [metal, _, thin, solid] = self.parts();
+        metal + thin + solid
+    }
+
     fn dielectric_facets(&self, mean: f32) -> Facets {
         Facets::new(self.f0, Rgb::splat(self.f90), mean)
     }

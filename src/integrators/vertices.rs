@@ -257,7 +257,7 @@ impl VertexSearch {
             return Chain::NONE;
         }
         // The emitter is to be found by the next segment, and the last vertex has none
-        match (bsdf.bsdf.makes_caustics(), path.chain.is_open()) {
+        match (bsdf.makes_caustics, path.chain.is_open()) {
             (true, true) if at.vertex + 1 < at.depth => path.chain.bundled(),
             (false, _) if at.vertex == 0 && bsdf.bsdf.is_evaluated_exactly() => {
                 Chain::at_first(bsdf.n.dot(met.wo), met.width)

@@ -210,6 +210,8 @@ pub struct MaterialSet {
     coat_of: Vec<Option<u32>>,
     /// Tables of measured materials.
     measured: Vec<Arc<MeasuredTables>>,
+    /// Per material, whether it bundles light to caustics.
+    caustics: Vec<bool>,
 }
 
 /// What a coat's table depends on, by bits: η, thickness, and the alphas unless they are textured.
@@ -239,13 +241,29 @@ impl MaterialSet {
             None => CoatTable::for_all_roughness(key.eta, key.thickness),
         };
         let coats = keys.par_iter().map(tabulate).collect();
-        MaterialSet { entries, coats, coat_of, measured: Vec::new() }
+        MaterialSet { caustics: vec![false; entries.len()], entries, coats, coat_of, measured: Vec::new() }
     }
 
     /// With the tables that measured materials refer to.
     #[must_use]
     pub fn with_measured(self, measured: Vec<Arc<MeasuredTables>>) -> Self {
         MaterialSet { measured, ..self }
+    }
+
+    /// Finds out which materials bundle light to caustics, by the mean of each of their textures, whose images are there
+    /// by now. It is the same at all points of a material: techniques that share paths, and see a texture at other places or
+    /// widths, must agree on it.
+    #[must_use]
+    pub fn find_caustics(self, textures: &TextureSet) -> Self {
+        let t = Textures { set: textures, ctx: &TextureContext::whole() };
+        let makes = |id| self.local_bsdf(id, &t).is_some_and(|bsdf| bsdf.makes_caustics());
+        let caustics = (0..self.entries.len() as MaterialId).map(makes).collect();
+        MaterialSet { caustics, ..self }
+    }
+
+    /// True if what a hit of the material is made of is drawn anew for every direction.
+    pub fn is_mixture(&self, id: MaterialId) -> bool {
+        matches!(self.entries[id as usize].material, Material::Mix { .. })
     }
 
     /// Maximum number of lobes of a BSDF of these materials, by [`Bsdf::first_lobe`], if `density` proposes directions
@@ -343,7 +361,7 @@ impl MaterialSet {
             Material::Principled(material) => material.frame(frame, hit.dpdv, &t),
             _ => frame,
         };
-        Some(SurfaceBsdf { bsdf, frame, n: hit.n })
+        Some(SurfaceBsdf { bsdf, frame, n: hit.n, makes_caustics: self.caustics[id as usize] })
     }
 
     fn local_bsdf(&self, id: MaterialId, t: &Textures<'_>) -> Option<Bsdf<'_>> {

@@ -14,6 +14,8 @@ pub struct SurfaceBsdf<'a> {
     pub frame: Frame,
     /// Geometric normal, unit, not turned to the viewer.
     pub n: Vec3,
+    /// True if its material bundles light to caustics, see [`super::MaterialSet::find_caustics`].
+    pub makes_caustics: bool,
 }
 
 impl<'a> SurfaceBsdf<'a> {
@@ -21,7 +23,8 @@ impl<'a> SurfaceBsdf<'a> {
     /// is zero.
     #[inline]
     pub fn in_medium(g: f32, wo: Vec3) -> Self {
-        SurfaceBsdf { bsdf: Bsdf::Phase(Phase::new(g)), frame: Frame::from_z(wo), n: Vec3::ZERO }
+        let frame = Frame::from_z(wo);
+        SurfaceBsdf { bsdf: Bsdf::Phase(Phase::new(g)), frame, n: Vec3::ZERO, makes_caustics: false }
     }
 
     /// The same, directions of what can only be evaluated being proposed by `density`.
@@ -210,7 +213,7 @@ mod tests {
             for n in [1, 8, 13, 32, 100] {
                 for _ in 0..8 {
                     let frame = Frame::from_z(sample_uniform_sphere(stream.random::<[f32; 2]>()));
-                    let surface = SurfaceBsdf { bsdf, frame, n: frame.z };
+                    let surface = SurfaceBsdf { bsdf, frame, n: frame.z, makes_caustics: false };
                     let wo = sample_uniform_sphere(stream.random::<[f32; 2]>());
                     let w: Vec<Vec3> = (0..n).map(|_| sample_uniform_sphere(stream.random::<[f32; 2]>())).collect();
                     let wi: [Vec<f32>; 3] = std::array::from_fn(|c| w.iter().map(|w| w[c]).collect());

@@ -51,6 +51,12 @@ impl SurfaceInteraction {
         Some(bsdf.proposed_by(job.settings().integrator.bsdf_density))
     }
 
+    /// True if what is hit is one of several materials, drawn by the direction that it is seen from.
+    pub fn is_mixture(&self, job: &RenderJob) -> bool {
+        let scene = &job.world.scene;
+        scene.materials.is_mixture(scene.surfaces[self.hit.geometry as usize].material)
+    }
+
     /// How the index of the material depends on the wavelength, if it does.
     pub fn dispersion<'j>(&self, job: &'j RenderJob) -> Option<&'j Dispersion> {
         let scene = &job.world.scene;

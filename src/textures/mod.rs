@@ -42,6 +42,14 @@ pub struct TextureContext {
     pub n: Vec3,
 }
 
+impl TextureContext {
+    /// A lookup that takes all of an image in.
+    pub fn whole() -> Self {
+        let (uv, p, n) = (Vec2::splat(0.5), Vec3::ZERO, Vec3::Z);
+        TextureContext { uv, uv_width: Vec2::splat(1e3), uv1: uv, color: [1.0; 4], p, n }
+    }
+}
+
 /// Lookup of an image.
 #[derive(Clone, Copy, Debug)]
 pub struct ImageTexture {

@@ -102,7 +102,8 @@ impl<'a> Assembly<'a> {
         for (geometry, emission) in &self.emitters {
             lights.add_area(*geometry, &self.set.geometries[*geometry as usize].shape, emission);
         }
-        let materials = MaterialSet::new(self.materials.entries, &self.materials.textures.set);
+        let textures = &self.materials.textures.set;
+        let materials = MaterialSet::new(self.materials.entries, textures).find_caustics(textures);
         Ok(Some(Scene {
             camera,
             film,

@@ -67,7 +67,8 @@ impl Builder<'_> {
             },
         );
         self.textures.images = texture_images;
-        let materials = materials.with_measured(measured::check(measured, &self.measured_files, d));
+        let measured = measured::check(measured, &self.measured_files, d);
+        let materials = materials.with_measured(measured).find_caustics(&self.textures);
         let made = if d.has_errors() { made } else { with_displaced(made, &mut shapes, files, &self.textures) };
         self.add_environments(images, d);
         let images = self.check_emission_images(emission_images, &shapes, d);

@@ -270,6 +270,7 @@ impl RecordRequest {
             bsdf: Bsdf::Diffuse(Diffuse { reflectance: Rgb::WHITE }),
             frame: Frame::from_z(self.ns),
             n: self.n,
+            makes_caustics: false,
         };
         ShadingPoint {
             media: Sides::default(),

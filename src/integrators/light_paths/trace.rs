@@ -90,9 +90,13 @@ impl Walker {
                 let Some(hit) = hit else { continue };
                 let interaction = SurfaceInteraction::new(job, &path.ray, (0.0, 0.0), hit);
                 let Some(bsdf) = interaction.scatter(job) else { continue };
-                if bsdf.bsdf.makes_caustics() {
+                if bsdf.makes_caustics {
                     self.next.extend(path.scattered(&interaction, &bsdf, VERTEX + bundled));
-                } else if bundled > 0
+                }
+                // Of a mixture, the camera may see another part than the light
+                let may_be_seen = !bsdf.makes_caustics || interaction.is_mixture(job);
+                if bundled > 0
+                    && may_be_seen
                     && let Some((seen, segment)) = path.connect(scene, &interaction)
                 {
                     self.seen.push(seen);
@@ -127,7 +131,7 @@ impl Walker {
         job.world.accel.intersect(&self.rays, Coherence::Incoherent, &mut self.hits);
         let met = |(path, hit): (&LightPath, &Option<Hit>)| {
             let at = SurfaceInteraction::new(job, &path.ray, (0.0, 0.0), hit.as_ref()?);
-            let bundles = at.scatter(job)?.bsdf.makes_caustics();
+            let bundles = at.scatter(job)?.makes_caustics;
             bundles.then_some(Bundling { light: path.light, d: path.d, value: path.power })
         };
         self.active.iter().zip(&self.hits).filter_map(met).collect()
@@ -176,7 +180,7 @@ impl LightPath {
         let ray = Ray { o: seen.o, d: d / distance, t_max: f32::INFINITY, time: self.ray.time };
         let at_camera = SurfaceInteraction::new(job, &ray, (from.width0, from.spread), &Hit { t: distance, ..at.hit });
         let bsdf = at_camera.scatter(job)?;
-        if bsdf.bsdf.makes_caustics() || !bsdf.bsdf.is_evaluated_exactly() {
+        if bsdf.makes_caustics || !bsdf.bsdf.is_evaluated_exactly() {
             return None;
         }
         let (wo, wi) = (at_camera.wo, at.wo);
