@@ -46,7 +46,9 @@ use rayon::prelude::*;
 use serde::{Deserialize, Serialize};
 use std::sync::atomic::AtomicBool;
 
-/// Most samples of a pixel and seed. With fewer than the image has, what their net gains would not be seen.
+/// Fewest samples of a pixel and seed, in direct light and in paths, and most: with the fewest there are most pixels in the same
+/// time, with fewer than the image has, what their net gains is not seen, which is more where light is direct.
+const MIN_SPP: [u32; 2] = [16, 8];
 const MAX_SPP: u32 = 32;
 /// Pixels that a thread renders at a time.
 const CHUNK: usize = 64;
@@ -94,6 +96,9 @@ const LIGHT_PATHS: [f32; 8] = [0.0, 0.03125, 0.0625, 0.125, 0.25, 0.5, 1.0, 2.0]
 const LIGHT_PILOT: u64 = 4;
 /// As many as are best or nearly so in most scenes, in direct light: the pilot of a small image may not see it.
 const USUAL_DIRECT: u32 = 8;
+/// The same in paths, and the edge of blocks of pixels that share them, where nothing is known of the image.
+const USUAL_PATH: [u32; 2] = [3, 2];
+const USUAL_EDGE: u32 = 3;
 /// Samples from which the model is fitted: few and many, in direct light and in paths.
 const FIT_DIRECT: [u32; 2] = [4, 16];
 const FIT_PATH: [u32; 2] = [2, 5];
@@ -146,17 +151,36 @@ pub(super) fn choose(job: &mut RenderJob) -> Option<AutoChoice> {
     let chooses_lights = auto_lights::is_open(&job.lights, &job.settings().integrator);
     let pilot = Pilot::new(job.settings(), &job.world.scene.film.bounds, chooses_lights);
     let choice = pilot.map(|mut pilot| pilot.choose(job));
-    let settings = choice.as_ref().map_or(without_pilot(&job.settings().integrator), |(_, settings)| *settings);
+    let settings = choice.as_ref().map_or_else(|| unmeasured(job), |(_, settings)| *settings);
     job.change(|s| s.integrator = settings);
     choice.map(|(choice, _)| choice)
 }
 
-/// The settings where nothing can be measured.
+/// The settings of an image that is too small for a pilot: those that are good in most scenes.
+fn unmeasured(job: &RenderJob) -> IntegratorSettings {
+    let Settings { integrator: base, sampling } = *job.settings();
+    if !has_vertices(&base) {
+        return without_pilot(&base);
+    }
+    if base.depth() <= 1 {
+        return usual(&base);
+    }
+    let is_open = sampling.allocation == Allocation::Auto && reuse::obstacle(job).is_none();
+    let path_reuse = base.path_reuse.or(is_open.then_some(USUAL_EDGE));
+    IntegratorSettings { path_reuse, ..with_samples(&base, USUAL_PATH) }
+}
+
+/// True if its integrator has estimates at path vertices alone.
+fn has_vertices(settings: &IntegratorSettings) -> bool {
+    matches!(settings.kind, IntegratorKind::Direct | IntegratorKind::Path)
+}
+
+/// `mis`, with its numbers of samples as they are.
 fn without_pilot(settings: &IntegratorSettings) -> IntegratorSettings {
     IntegratorSettings { estimator: EstimatorKind::Mis, ..*settings }
 }
 
-/// What is taken where the pilot finds nothing better.
+/// What is taken where the pilot finds nothing better, before sharing.
 fn usual(settings: &IntegratorSettings) -> IntegratorSettings {
     let base = without_pilot(settings);
     if base.depth() > 1 { base } else { with_samples(settings, [USUAL_DIRECT; 2]) }
@@ -196,7 +220,9 @@ pub(super) fn proposals(job: &RenderJob) -> Option<(u32, StageTimes)> {
         let ris = RisSettings { proposals, ..base.ris };
         Candidate::named(IntegratorSettings { samples: Some(samples), ris, ..base })
     };
-    let round = pilot.round(job, &FIT_RATIOS.map(with_ratio), FIRST_ROUND);
+    let candidates = FIT_RATIOS.map(with_ratio);
+    pilot.warm_up(job, &candidates[0]);
+    let round = pilot.round(job, &candidates, FIRST_ROUND);
     let ratios = FIT_RATIOS.map(|ratio| [f64::from(ratio), 1.0]);
     let model = round.models(&ratios, INDEPENDENT).remove(0);
     let [ratio, _] = model.best([&RATIOS, &[1]], NEARLY);
@@ -240,19 +266,22 @@ impl Pilot {
     /// Where `chooses_lights`, it has a round for that, if there is time.
     fn new(settings: &Settings, bounds: &PixelBounds, chooses_lights: bool) -> Option<Self> {
         let Settings { integrator, sampling } = settings;
-        let spp = 1 << sampling.spp.clamp(1, MAX_SPP).ilog2();
         let samples = bounds.area() as f64 * f64::from(sampling.spp);
-        let trials = TRIALS[usize::from(integrator.depth() > 1)];
-        let count = |trials: f64| {
+        let kind = usize::from(integrator.depth() > 1);
+        let (trials, fewest) = (TRIALS[kind], MIN_SPP[kind]);
+        let pixels_in = |trials: f64, spp: u32| {
             let [wanted, most] =
                 FRACTIONS.map(|fraction| (samples * fraction / (f64::from(2 * spp) * trials)) as usize);
             wanted.max(most.min(ENOUGH_PIXELS)).min(MAX_PIXELS)
         };
-        let with_lights = count(trials + LIGHT_TRIALS);
+        let mut spp = 1 << sampling.spp.clamp(1, MAX_SPP).ilog2();
+        while spp > fewest && pixels_in(trials, spp) < ENOUGH_PIXELS {
+            spp /= 2;
+        }
+        let with_lights = pixels_in(trials + LIGHT_TRIALS, spp);
         let has_lights = chooses_lights && with_lights >= MIN_PIXELS;
-        let count = if has_lights { with_lights } else { count(trials) };
-        let is_measurable = matches!(integrator.kind, IntegratorKind::Direct | IntegratorKind::Path);
-        (is_measurable && count >= MIN_PIXELS).then(|| Pilot {
+        let count = if has_lights { with_lights } else { pixels_in(trials, spp) };
+        (has_vertices(integrator) && count >= MIN_PIXELS).then(|| Pilot {
             pixels: [
                 pixels(bounds, count, 0),
                 pixels(bounds, count, 1),
@@ -272,6 +301,7 @@ impl Pilot {
         }
         let has_later = job.settings().integrator.depth() > 1;
         let [few, many] = if has_later { FIT_PATH } else { FIT_DIRECT };
+        self.warm_up(job, &Candidate::named(with_samples(&job.settings().integrator, [few, few])));
         let lights = self.choose_lights(job, few);
         let base = job.settings().integrator;
         let base = &base;
@@ -401,6 +431,15 @@ impl Pilot {
             (at.variance + at.relative * light.variance(n)) * (at.nanoseconds + light.time(n, samples))
         };
         LIGHT_PATHS.into_iter().min_by(|a, b| error(*a).total_cmp(&error(*b)))
+    }
+
+    /// Renders some pixels on each thread, so that what is measured first is not what finds all caches cold.
+    fn warm_up(&self, job: &RenderJob, candidate: &Candidate) {
+        let (render, stop) = (RenderSettings::default(), AtomicBool::new(false));
+        let run = Run::new(job, &render, &stop, &|_| ());
+        let pixels = &self.pixels[FIRST_ROUND];
+        let some = &pixels[..pixels.len().min(CHUNK)];
+        rayon::broadcast(|_| measure(&run, (some, self.spp), std::slice::from_ref(candidate), None, ([0; 2], 0)));
     }
 
     /// Measures all candidates on the pixels of a round.

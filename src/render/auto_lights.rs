@@ -6,14 +6,15 @@
 //!
 //! Light samples of lamps may take longer than those of the sky, so fractions are compared by efficiency.
 
-use super::auto_round::{MIN_GAIN, Round, Trial};
+use super::auto_round::{Round, Trial};
 use crate::lights::LightSampling;
 use crate::settings::IntegratorSettings;
 
 /// Fractions among which is chosen.
 const FRACTIONS: [f32; 6] = [0.125, 0.25, 0.5, 0.75, 0.875, 0.9375];
-/// Standard errors by which a fraction must be better than the one before it.
-const MIN_ERRORS: f64 = 0.5;
+/// By how much a fraction must be better than the one before it, and standard errors by which it must be.
+const MIN_GAIN: f64 = 1.1;
+const MIN_ERRORS: f64 = 1.0;
 
 /// True if there is anything to choose.
 pub(super) fn is_open(lights: &LightSampling, settings: &IntegratorSettings) -> bool {
@@ -75,7 +76,7 @@ mod tests {
         // The best is 1/(1 + √(b/a))
         assert_eq!(chosen([1.0, 1.0, 0.0]), (3, None));
         assert_eq!(chosen([9.0, 1.0, 0.0]), (3, Some(0.75)));
-        assert_eq!(chosen([49.0, 1.0, 0.0]), (4, Some(0.875)));
+        assert_eq!(chosen([99.0, 1.0, 0.0]), (4, Some(0.875)));
         assert_eq!(chosen([1.0, 9.0, 0.0]), (4, Some(0.25)));
         assert_eq!(chosen([0.0, 1.0, 0.0]), (4, Some(0.125)));
         // Lamps take ten times as long

@@ -5,10 +5,11 @@ use lumiris_numbers::estimators::efficiency::{Measured, Model};
 use serde::{Deserialize, Serialize};
 use std::f64::consts::PI;
 
-/// By how much a choice must be more efficient than the one before it.
+/// By how much a choice must be more efficient than the one before it; and one that has fewer samples than usual, whose error
+/// may be that of few pixels which the pilot does not see.
 pub(super) const MIN_GAIN: f64 = 1.03;
-/// Standard errors by which it must be: with other numbers of samples, where neither is safer than the other, and with another
-/// estimator, whose error may be that of few pixels which the pilot does not see.
+const MIN_GAIN_OF_FEW: f64 = 1.5;
+/// Standard errors by which it must be: with other numbers of samples, and with another estimator, of which the same is true.
 const MIN_ERRORS: [f64; 2] = [0.5, 2.0];
 /// Relative standard error of a measured time.
 const TIME_ERROR: f64 = 0.02;
@@ -148,6 +149,8 @@ impl Round {
     pub(super) fn choose(&self, candidates: &[Candidate], predicted: &[Option<Vec<f64>>]) -> usize {
         (1..candidates.len()).fold(0, |chosen, k| {
             let is_other = candidates[k].settings.estimator != candidates[chosen].settings.estimator;
+            let [samples, usual] = [k, 0].map(|k| candidates[k].settings.sample_counts_at(0).samples);
+            let least = if !is_other && samples < usual { MIN_GAIN_OF_FEW } else { MIN_GAIN };
             let measured = self.gain(k, chosen);
             let (gain, error) = match (&predicted[k], &predicted[chosen]) {
                 (Some(gains), Some(bases)) => {
@@ -156,7 +159,7 @@ impl Round {
                 }
                 _ => measured,
             };
-            if gain > MIN_GAIN.ln().max(MIN_ERRORS[usize::from(is_other)] * error) { k } else { chosen }
+            if gain > least.ln().max(MIN_ERRORS[usize::from(is_other)] * error) { k } else { chosen }
         })
     }
 
