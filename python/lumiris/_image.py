@@ -3,12 +3,15 @@
 from __future__ import annotations
 
 import os
-from typing import Dict, Mapping, Optional, Tuple, Union
+from typing import TYPE_CHECKING, Dict, Iterable, List, Mapping, Optional, Tuple, Type, TypeVar, Union
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from . import _lumiris
+
+if TYPE_CHECKING:
+    from ._lumiris import Layer, Place
 
 Array = NDArray[np.float32]
 Path = Union[str, "os.PathLike[str]"]
@@ -17,6 +20,8 @@ Path = Union[str, "os.PathLike[str]"]
 IMAGE = "beauty"
 #: Names of channels by their number, where a layer does not tell them; what follows the dot.
 _COMPONENTS = {3: ("R", "G", "B"), 4: ("R", "G", "B", "A")}
+
+_Kind = TypeVar("_Kind", bound="Layers")
 
 
 class Layers(Dict[str, Array]):
@@ -49,6 +54,17 @@ class Layers(Dict[str, Array]):
         self.origin = origin
         self.full_size = full_size
 
+    @classmethod
+    def _of(cls: Type[_Kind], layers: List[Layer], metadata: Iterable[Tuple[str, str]], place: Place) -> _Kind:
+        origin, full = place
+        return cls(
+            {name: array for name, _, array in layers},
+            channels={name: tuple(names) for name, names, _ in layers},
+            metadata=dict(metadata),
+            origin=(origin[0], origin[1]),
+            full_size=(full[0], full[1]),
+        )
+
     def __repr__(self) -> str:
         layers = ", ".join(f"{name!r}: {'×'.join(map(str, layer.shape))}" for name, layer in self.items())
         return f"<{type(self).__name__} {layers}>"
@@ -79,14 +95,8 @@ def read(path: Path, *, part: int = 0) -> Layers:
     Values are linear; integers of 8 and 16 bits are decoded by the sRGB curve. `part` is that of an EXR file of several
     parts, from 0. Raises FileNotFoundError and OSError.
     """
-    layers, metadata, (origin, full) = _lumiris.read(os.fspath(path), part)
-    return Layers(
-        {name: array for name, _, array in layers},
-        channels={name: tuple(names) for name, names, _ in layers},
-        metadata=metadata,
-        origin=(origin[0], origin[1]),
-        full_size=(full[0], full[1]),
-    )
+    layers, metadata, place = _lumiris.read(os.fspath(path), part)
+    return Layers._of(layers, metadata.items(), place)
 
 
 def write(

@@ -278,16 +278,10 @@ def render(
             "resume": None if resume is None else os.fspath(resume),
         },
     }
-    layers, metadata, (origin, full), chosen, complete, seconds, remarks = _lumiris.render(options, callback)
+    layers, metadata, place, chosen, complete, seconds, remarks = _lumiris.render(options, callback)
     for remark in remarks:
         warnings.warn(remark.strip(), SceneWarning, stacklevel=2)
-    rendering = Rendering(
-        {name: array for name, _, array in layers},
-        channels={name: tuple(names) for name, names, _ in layers},
-        metadata=dict(metadata),
-        origin=(origin[0], origin[1]),
-        full_size=(full[0], full[1]),
-    )
+    rendering = Rendering._of(layers, metadata, place)
     rendering.plan = dict(chosen)
     rendering.complete = complete
     rendering.seconds = seconds
@@ -305,18 +299,10 @@ def merge(
     or of another image, and OSError for files that cannot be read.
     """
     paths = [os.fspath(part) for part in parts]
-    layers, metadata, (origin, full), missing, seconds = _lumiris.merge(
-        paths, allow_missing, None if aov is None else list(aov)
-    )
+    layers, metadata, place, missing, seconds = _lumiris.merge(paths, allow_missing, None if aov is None else list(aov))
     for what in missing:
         warnings.warn(f"{what}: missing", SceneWarning, stacklevel=2)
-    merged = Merged(
-        {name: array for name, _, array in layers},
-        channels={name: tuple(names) for name, names, _ in layers},
-        metadata=dict(metadata),
-        origin=(origin[0], origin[1]),
-        full_size=(full[0], full[1]),
-    )
+    merged = Merged._of(layers, metadata, place)
     merged.missing = tuple(missing)
     merged.complete = not missing
     merged.seconds = seconds
