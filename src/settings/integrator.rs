@@ -268,7 +268,7 @@ pub enum Cached {
 #[derive(Clone, Copy, Debug, PartialEq, Eq, EnumString, IntoStaticStr, VariantNames)]
 #[strum(serialize_all = "kebab-case")]
 pub enum EstimatorKind {
-    /// What a pilot finds to be the most efficient; `mis` where the image is too small for a pilot.
+    /// What a pilot finds to be the most efficient; `mis` with usual numbers where the image is too small for a pilot.
     Auto,
     /// Light sampling only (and the specular lobes of BSDFs).
     Mc,

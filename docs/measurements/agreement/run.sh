@@ -1,15 +1,20 @@
 #!/usr/bin/env bash
-# Renders the scenes below a folder and compares them with the references in its folder `references`:
-#   run.sh SCENES_FOLDER OUTPUT_FOLDER [SAMPLES_PER_PIXEL]
+# Renders the scenes below a folder, with several seeds each, and compares them with the references in its folder `references`:
+#   run.sh SCENES_FOLDER OUTPUT_FOLDER [SAMPLES_PER_PIXEL [SEEDS]]
+# The samples are those of all seeds together.
 set -euo pipefail
-scenes=$1 out=$2 spp=${3:-256}
+scenes=$1 out=$2 spp=${3:-256} seeds=${4:-8}
 here=$(dirname "$0")
-pairs=()
 render() { # name file resolution
-  local common=("$scenes/$2" --resolution "$3" --spp "$spp" --box-filter --quiet)
-  lumiris render "${common[@]}" --integrator direct -o "$out/$1-direct.exr"
-  lumiris render "${common[@]}" --integrator path --max-depth 5 -o "$out/$1-path5.exr"
-  pairs+=("$out/$1-direct.exr" "$scenes/references/$1-direct.exr" "$out/$1-path5.exr" "$scenes/references/$1-path5.exr")
+  local kind seed
+  for kind in direct path5; do
+    local settings=(--integrator path --max-depth 5)
+    [ "$kind" = direct ] && settings=(--integrator direct)
+    for seed in $(seq "$seeds"); do
+      lumiris render "$scenes/$2" --resolution "$3" --spp $((spp / seeds)) --seed "$seed" --box-filter --quiet --aov none \
+        --estimator mis "${settings[@]}" -o "$out/$1-$kind.$seed.exr"
+    done
+  done
 }
 mkdir -p "$out"
 render cornell-box cornell-box/scene-v4.pbrt 256x256
@@ -21,4 +26,4 @@ render chess-set chess-set/ChessSet.pbrt 256x256
 render armadillo-env armadillo-env/scene-v4.pbrt 256x256
 render buddha-fractal buddha-fractal/buddha-fractal-v4.pbrt 150x240
 render killeroo-simple killeroos/killeroo-simple.pbrt 256x256
-python3 "$here/regions.py" "${pairs[@]}"
+python3 "$here/regions.py" "$scenes/references" "$out"
