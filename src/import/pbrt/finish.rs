@@ -67,8 +67,7 @@ impl Builder<'_> {
             },
         );
         self.textures.images = texture_images;
-        let measured = measured::check(measured, &self.measured_files, d);
-        let materials = materials.with_measured(measured).find_caustics(&self.textures);
+        let materials = materials.with_measured(measured::check(measured, &self.measured_files, d));
         let made = if d.has_errors() { made } else { with_displaced(made, &mut shapes, files, &self.textures) };
         self.add_environments(images, d);
         let images = self.check_emission_images(emission_images, &shapes, d);
@@ -130,7 +129,7 @@ impl Builder<'_> {
         let scene = Scene {
             camera,
             film,
-            materials,
+            materials: materials.find_caustics(&self.textures),
             textures: Arc::new(self.textures),
             geometry: Arc::new(assembly.set),
             surfaces: assembly.surfaces,

@@ -27,9 +27,15 @@ const SCENES: [(&str, &str, [u32; 2]); 5] = [
 /// Integrators: a name and the directive, as in a scene file.
 const INTEGRATORS: [(&str, &str); 25] = [
     ("direct mc", r#""direct" "string estimator" "mc" "integer samples" 2"#),
-    ("direct mis", r#""direct""#),
-    ("direct mis balance by power", r#""direct" "string heuristic" "balance" "string lightsampler" "power""#),
-    ("direct mis maximum uniform", r#""direct" "string heuristic" "maximum" "string lightsampler" "uniform""#),
+    ("direct mis", r#""direct" "string estimator" "mis""#),
+    (
+        "direct mis balance by power",
+        r#""direct" "string estimator" "mis" "string heuristic" "balance" "string lightsampler" "power""#,
+    ),
+    (
+        "direct mis maximum uniform",
+        r#""direct" "string estimator" "mis" "string heuristic" "maximum" "string lightsampler" "uniform""#,
+    ),
     ("direct ris", r#""direct" "string estimator" "ris" "integer samples" 4 "integer proposals" 32"#),
     (
         "direct ris strata of proposals",
@@ -61,7 +67,7 @@ const INTEGRATORS: [(&str, &str); 25] = [
         r#""direct" "string estimator" "ris" "integer proposals" 16 "string lightsampler" "photons"
            "string target" "visibility" "integer visibilityphotons" 3000"#,
     ),
-    ("path mis", r#""path" "integer maxdepth" 5"#),
+    ("path mis", r#""path" "integer maxdepth" 5 "string estimator" "mis""#),
     ("path ris", r#""path" "integer maxdepth" 4 "string estimator" "ris" "integer proposals" 16"#),
     ("path ocv", r#""path" "integer maxdepth" 3 "string estimator" "ocv""#),
     ("irradiance-cache", r#""irradiance-cache" "integer maxdepth" 3 "integer cachesamples" 64"#),
