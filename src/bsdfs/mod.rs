@@ -90,6 +90,8 @@ pub enum Bsdf<'a> {
 
 /// The roughness up to which surfaces are said to make caustics.
 const MAX_CAUSTIC_ALPHA: f32 = 0.3;
+/// The part of a surface that must be metal or glass for it.
+const CAUSTIC_PART: f32 = 0.5;
 
 /// The part of a BSDF that needs of the light no more than its irradiance, and what remains.
 #[derive(Clone, Copy, Debug)]
@@ -238,7 +240,7 @@ impl<'a> Bsdf<'a> {
             Bsdf::Conductor(b) => is_narrow(&b.distribution),
             Bsdf::Dielectric(b) => is_narrow(&b.distribution),
             Bsdf::ThinDielectric(_) => true,
-            Bsdf::Principled(b) => is_narrow(&b.distribution) && b.metal_or_glass() > 0.5,
+            Bsdf::Principled(b) => is_narrow(&b.distribution) && b.metal_or_glass() > CAUSTIC_PART,
             _ => false,
         }
     }

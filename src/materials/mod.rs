@@ -250,8 +250,8 @@ impl MaterialSet {
         MaterialSet { measured, ..self }
     }
 
-    /// Finds out which materials bundle light to caustics, by the mean of each of their textures, whose images are there
-    /// by now. It is the same at all points of a material: techniques that share paths, and see a texture at other places or
+    /// Finds out which materials bundle light to caustics, by one value of each of their textures, that of an image being its
+    /// mean. Images are there by now. It is the same at all points of a material: techniques that share paths, and see a texture at other places or
     /// widths, must agree on it.
     #[must_use]
     pub fn find_caustics(self, textures: &TextureSet) -> Self {

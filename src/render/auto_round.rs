@@ -268,6 +268,22 @@ mod tests {
     }
 
     #[test]
+    fn fewer_samples_than_usual_need_a_great_gain() {
+        let candidate = |n| {
+            let estimator = EstimatorKind::Mis;
+            Candidate::named(IntegratorSettings { estimator, samples: Some(n), ..IntegratorSettings::default() })
+        };
+        // Without noise but that of times
+        let chosen = |numbers: [u32; 2], gain: f64| {
+            let measured = vec![(gain, vec![[1.0, 1.0]; 256]), (1.0, vec![[1.0, 1.0]; 256])];
+            let round = Round { measured, spp: 4, is_direct: true, relative: 1.0 };
+            round.choose(&numbers.map(candidate), &[None, None])
+        };
+        assert_eq!([1.4, 1.6].map(|gain| chosen([8, 4], gain)), [0, 1]);
+        assert_eq!([1.01, 1.2].map(|gain| chosen([8, 16], gain)), [0, 1]);
+    }
+
+    #[test]
     fn a_gain_within_the_noise_changes_nothing() {
         use EstimatorKind::{Mis, Ris};
         // As good: chosen as often as a normal number exceeds half its standard error, and twice that

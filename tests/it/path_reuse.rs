@@ -4,9 +4,10 @@ use crate::analytic_scenes::answer;
 use lumiris::film::{Film, PixelSums};
 use lumiris::import::{LoadOptions, load};
 use lumiris::integrators::reuse;
+use lumiris::render::plan::{follows_from_times, prepare};
 use lumiris::render::{RenderSettings, render};
 use lumiris::scene::{AccelKind, PixelSamples, RenderJob};
-use lumiris::settings::{EstimatorKind, IntegratorKind, RouletteKind};
+use lumiris::settings::{Allocation, EstimatorKind, IntegratorKind, IntegratorSettings, RouletteKind};
 use std::path::{Path, PathBuf};
 use std::sync::atomic::AtomicBool;
 
@@ -179,4 +180,41 @@ fn images_whose_pixels_cannot_share_paths_are_those_without() {
     job.change(|s| s.integrator.path_reuse = Some(1));
     let alone = film(&job, RenderSettings { spp: 2, ..RenderSettings::default() });
     assert!(direct.pixels().iter().zip(&alone.pixels()).all(|(a, b)| a.mean() == b.mean()));
+}
+
+/// What `auto` is where an image is too small to be measured: what is good in most scenes, where it is open and possible.
+#[test]
+fn auto_shares_paths_in_images_that_are_too_small_to_be_measured() {
+    let path = scene("demo/gallery");
+    let of = |change: fn(&mut RenderJob)| {
+        let mut job = job(&path, [64, 36], 1);
+        job.change(|s| {
+            s.integrator.kind = IntegratorKind::Path;
+            s.integrator.max_depth = 5;
+            (s.integrator.estimator, s.integrator.path_reuse) = (EstimatorKind::Auto, None);
+            s.sampling.spp = 4;
+        });
+        change(&mut job);
+        let bounds = job.world.scene.film.bounds;
+        assert!(!follows_from_times(job.settings(), &bounds));
+        prepare(&mut job, Some(1), false).unwrap();
+        let IntegratorSettings { estimator, path_reuse, .. } = job.settings().integrator;
+        assert_eq!(estimator, EstimatorKind::Mis);
+        let samples = [0, 1].map(|vertex| job.settings().integrator.sample_counts_at(vertex).samples);
+        (samples, path_reuse)
+    };
+    assert_eq!(of(|_| ()), ([3, 2], Some(3)));
+    assert_eq!(of(|job| job.change(|s| s.integrator.samples = Some(7))), ([7, 2], Some(3)));
+    assert_eq!(of(|job| job.change(|s| s.integrator.path_reuse = Some(1))), ([3, 2], Some(1)));
+    assert_eq!(of(|job| job.change(|s| s.integrator.roulette = RouletteKind::Efficiency)), ([3, 2], None));
+    assert_eq!(of(|job| job.change(|s| s.sampling.allocation = Allocation::Uniform)), ([3, 2], None));
+    assert_eq!(of(|job| job.change(|s| s.integrator.kind = IntegratorKind::Direct)).0[0], 8);
+
+    // Sixteen times as many pixels of eight times as many samples are measured
+    let mut large = job(&path, [256, 144], 1);
+    large.change(|s| {
+        (s.integrator.kind, s.integrator.max_depth) = (IntegratorKind::Path, 5);
+        (s.integrator.estimator, s.sampling.spp) = (EstimatorKind::Auto, 32);
+    });
+    assert!(follows_from_times(large.settings(), &large.world.scene.film.bounds));
 }
