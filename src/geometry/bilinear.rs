@@ -18,6 +18,8 @@ pub struct BilinearMesh {
     pub normals: Vec<Vec3>,
     /// Texture coordinates per vertex, or empty.
     pub uvs: Vec<Vec2>,
+    /// Number of the face that each patch is, or empty.
+    pub faces: Vec<u32>,
     /// True if the geometric normal is the reverse of ∂p/∂u × ∂p/∂v.
     pub flip_normal: bool,
 }
@@ -107,7 +109,13 @@ impl BilinearMesh {
         let (dpdu, dpdv) = self.texture_derivatives(i, uv, [du, dv]);
         let (dpdu, dpdv) = spanning(dpdu, dpdv, n);
         let uv = self.texture_coordinates_at(i, uv);
-        SurfaceHit { p, p_error, n, ns, dpdu, dpdv, dpdus: dpdu, uv, vertex: VertexValues::default() }
+        SurfaceHit { p, p_error, n, ns, dpdu, dpdv, dpdus: dpdu, uv, vertex: self.vertex_values_of(i) }
+    }
+
+    /// What patch `i` has besides the texture coordinates.
+    #[inline]
+    pub fn vertex_values_of(&self, i: usize) -> VertexValues {
+        VertexValues { face: self.faces.get(i).copied().unwrap_or(0), ..VertexValues::default() }
     }
 
     /// The texture coordinates of patch `i` at its parameters `uv`: the parameters themselves if the mesh has none.

@@ -13,18 +13,20 @@ pub struct LocalHit {
     pub uv: [f32; 2],
 }
 
-/// Values that a mesh may give for its vertices besides the texture coordinates, interpolated.
+/// What a mesh may give besides the texture coordinates: values of its vertices, interpolated, and of the face.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct VertexValues {
     /// Second texture coordinates; zero if there are none.
     pub uv1: Vec2,
     /// Linear colour and opacity; 1 if there are none.
     pub color: [f32; 4],
+    /// Number of the face that it is on, for textures of faces; 0 if the mesh has none.
+    pub face: u32,
 }
 
 impl Default for VertexValues {
     fn default() -> Self {
-        VertexValues { uv1: Vec2::ZERO, color: [1.0; 4] }
+        VertexValues { uv1: Vec2::ZERO, color: [1.0; 4], face: 0 }
     }
 }
 

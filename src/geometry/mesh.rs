@@ -3,7 +3,7 @@
 use super::hit::{SurfaceHit, VertexValues, face_forward, round, spanning};
 use lumiris_numbers::math::{Bounds3, Vec2, Vec3, gamma};
 
-/// Indexed triangles. Optional per-vertex arrays are empty if absent, else as long as the positions.
+/// Indexed triangles. Optional arrays are empty if absent; those of vertices are else as long as the positions.
 #[derive(Clone, Debug, Default)]
 pub struct TriangleMesh {
     /// Vertex positions, with one more zero element at the end: Embree reads 16 bytes at each 12-byte vertex.
@@ -20,6 +20,8 @@ pub struct TriangleMesh {
     pub colors: Vec<[f32; 4]>,
     /// Shading tangents.
     pub tangents: Vec<Vec3>,
+    /// Per triangle, the number of the face that it is (a part of).
+    pub faces: Vec<u32>,
     /// True if the geometric normal is the reverse of (p1 − p0) × (p2 − p0): pbrt's
     /// `ReverseOrientation` xor a mirroring transform.
     pub flip_normal: bool,
@@ -120,10 +122,11 @@ impl TriangleMesh {
         st0 * (1.0 - uv[0] - uv[1]) + st1 * uv[0] + st2 * uv[1]
     }
 
-    /// Second texture coordinates and colour of triangle `i` at the weights `uv` of vertices 1 and 2.
+    /// Second texture coordinates, colour and face of triangle `i` at the weights `uv` of vertices 1 and 2.
     #[inline]
     pub fn vertex_values_at(&self, i: usize, uv: [f32; 2]) -> VertexValues {
-        let mut values = VertexValues::default();
+        let face = self.faces.get(i).copied().unwrap_or(0);
+        let mut values = VertexValues { face, ..VertexValues::default() };
         if self.uvs1.is_empty() && self.colors.is_empty() {
             return values;
         }

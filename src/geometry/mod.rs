@@ -60,11 +60,12 @@ impl Shape {
         }
     }
 
-    /// What else vertices have, at the parametric position `uv` of `primitive`.
+    /// What else there is, at the parametric position `uv` of `primitive`.
     pub fn vertex_values(&self, primitive: u32, uv: [f32; 2]) -> VertexValues {
         match self {
             Shape::Mesh(mesh) => mesh.vertex_values_at(primitive as usize, uv),
-            Shape::Quadric(_) | Shape::Bilinear(_) | Shape::Curves(_) => VertexValues::default(),
+            Shape::Bilinear(mesh) => mesh.vertex_values_of(primitive as usize),
+            Shape::Quadric(_) | Shape::Curves(_) => VertexValues::default(),
         }
     }
 

@@ -1,10 +1,11 @@
 //! Images: pixels with named channels, their encodings, pyramids for filtered lookups, and metrics of their difference.
 //!
-//! Reading order: [`color`], [`view_transform`], [`mod@file`], [`oiio`], [`tiles`], `level`, `file_tiles`, [`mipmap`], [`file_parts`],
-//! [`oidn`], [`metrics`], [`compare`], [`heat`].
+//! Reading order: [`color`], [`view_transform`], [`mod@file`], [`oiio`], [`tiles`], `level`, `file_tiles`, [`mipmap`], [`face_map`],
+//! [`file_parts`], [`oidn`], [`metrics`], [`compare`], [`heat`].
 
 pub mod color;
 pub mod compare;
+pub mod face_map;
 pub mod file;
 pub mod file_parts;
 mod file_tiles;
@@ -18,6 +19,7 @@ pub mod tiles;
 pub mod view_transform;
 
 pub use color::ColorEncoding;
+pub use face_map::FaceMap;
 pub use mipmap::{AxisWrap, Filter, MipMap, Wrap};
 pub use view_transform::ViewTransform;
 

@@ -1,4 +1,4 @@
-//! Meshes, images, volumes and measured materials that one scene after the other uses, such as the frames of an animation.
+//! Meshes, images, textures of faces, volumes and measured materials that one scene after the other uses, such as the frames of an animation.
 //!
 //! A file is the same as before if its name, its size and the time of its last change are. What a scene has not used is
 //! dropped when the next one has been loaded ([`FileCache::end_scene`]), so that memory holds what two scenes need at
@@ -7,15 +7,17 @@
 //! Where the textures of a scene are not to take more than so much memory, the largest of them are in tiles of a temporary
 //! file ([`crate::imaging::tiles`]), and all others are in memory: of the limit, half or more is left for the tiles in use.
 
+use super::face_maps::{FaceMapRequest, load_face_map};
 use super::images::{ImageChannels, ImageEncoding, ImageRequest, RgbImage, load_map, load_rgb, load_tiled_map};
 use super::measured::{MeasuredError, load_tables};
 use super::volumes::{Volume, VolumeRequest, VolumeUse, load_volume};
 use crate::bsdfs::MeasuredTables;
 use crate::imaging::oiio::{ImageError, texture_bytes};
 use crate::imaging::tiles::TileStore;
-use crate::imaging::{Filter, MipMap, Wrap};
+use crate::imaging::{ColorEncoding, FaceMap, Filter, MipMap, Wrap};
 use lumiris_formats::nanovdb::NanoError;
 use lumiris_formats::ply::{PlyError, PlyMesh, read_ply};
+use lumiris_formats::ptex::PtexError;
 use std::collections::HashMap;
 use std::io;
 use std::path::{Path, PathBuf};
@@ -93,7 +95,7 @@ pub struct FileCounts {
     pub shared: u64,
 }
 
-/// Contents of meshes, images, volumes and measured materials by file.
+/// Contents of meshes, images, textures of faces, volumes and measured materials by file.
 #[derive(Debug, Default)]
 pub struct FileCache {
     /// False if nothing is kept.
@@ -101,6 +103,7 @@ pub struct FileCache {
     meshes: Shelf<(), PlyMesh>,
     maps: Shelf<(ImageChannels, ImageEncoding, Wrap, Filter), MipMap>,
     images: Shelf<(), RgbImage>,
+    face_maps: Shelf<ColorEncoding, FaceMap>,
     volumes: Shelf<(String, VolumeUse), Volume>,
     measured: Shelf<(), MeasuredTables>,
     read: AtomicU64,
@@ -189,6 +192,12 @@ impl FileCache {
         self.get(&self.images, path, (), || load_rgb(path))
     }
 
+    /// Textures of faces.
+    pub fn face_map(&self, request: &FaceMapRequest) -> Result<Arc<FaceMap>, PtexError> {
+        let FaceMapRequest { path, encoding } = request;
+        self.get(&self.face_maps, path, *encoding, || load_face_map(path, *encoding))
+    }
+
     /// A grid of a volume.
     pub fn volume(&self, request: &VolumeRequest) -> Result<Arc<Volume>, NanoError> {
         let how = (request.grid.clone(), request.usage);
@@ -205,6 +214,7 @@ impl FileCache {
         self.meshes.drop_unused();
         self.maps.drop_unused();
         self.images.drop_unused();
+        self.face_maps.drop_unused();
         self.volumes.drop_unused();
         self.measured.drop_unused();
         FileCounts { read: self.read.swap(0, Ordering::Relaxed), shared: self.shared.swap(0, Ordering::Relaxed) }

@@ -1,5 +1,6 @@
 //! From scene files to scenes: the meaning of pbrt's directives ([`pbrt`]) and of glTF ([`gltf`]), and the images,
-//! meshes, volumes and measured materials that they name ([`resources`], [`images`], [`volumes`], [`measured`]), which the scenes of an
+//! meshes, textures of faces, volumes and measured materials that they name ([`resources`], [`images`], [`face_maps`], [`volumes`],
+//! [`measured`]), which the scenes of an
 //! animation share ([`cache`]). A
 //! [`fingerprint`] tells a scene from others.
 //!
@@ -7,6 +8,7 @@
 //! with their source locations, in [`Diagnostics`].
 
 pub mod cache;
+pub mod face_maps;
 pub mod fingerprint;
 pub mod gltf;
 pub mod images;

@@ -26,7 +26,7 @@ fn hit(n: Vec3) -> SurfaceHit {
 
 fn context(hit: &SurfaceHit) -> TextureContext {
     let (uv1, color) = (hit.vertex.uv1, hit.vertex.color);
-    TextureContext { uv: hit.uv, uv_width: Vec2::ZERO, uv1, color, p: hit.p, n: hit.n }
+    TextureContext { uv: hit.uv, uv_width: Vec2::ZERO, uv1, color, face: hit.vertex.face, p: hit.p, n: hit.n }
 }
 
 struct Bench {

@@ -38,8 +38,8 @@ impl SurfaceInteraction {
             if length > 0.0 { footprint / length } else { 0.0 }
         };
         let uv_width = Vec2::new(extent(surface.dpdu), extent(surface.dpdv));
-        let VertexValues { uv1, color } = surface.vertex;
-        let context = TextureContext { uv: surface.uv, uv_width, uv1, color, p: surface.p, n: surface.n };
+        let VertexValues { uv1, color, face } = surface.vertex;
+        let context = TextureContext { uv: surface.uv, uv_width, uv1, color, face, p: surface.p, n: surface.n };
         SurfaceInteraction { hit: *hit, surface, wo: -ray.d.normalize(), width, distance, context }
     }
 

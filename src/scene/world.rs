@@ -103,8 +103,8 @@ pub struct EmitterHit {
 
 impl AlphaSource for TextureSet {
     fn alpha(&self, texture: u32, uv: Vec2, vertex: &VertexValues, p: Vec3) -> f32 {
-        let VertexValues { uv1, color } = *vertex;
-        self.float(texture, &TextureContext { uv, uv_width: Vec2::ZERO, uv1, color, p, n: Vec3::Z })
+        let VertexValues { uv1, color, face } = *vertex;
+        self.float(texture, &TextureContext { uv, uv_width: Vec2::ZERO, uv1, color, face, p, n: Vec3::Z })
     }
 }
 

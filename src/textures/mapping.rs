@@ -116,7 +116,7 @@ mod tests {
     use super::*;
 
     fn at(p: Vec3, uv: Vec2) -> TextureContext {
-        TextureContext { uv, uv_width: Vec2::new(0.1, 0.2), uv1: Vec2::ZERO, color: [1.0; 4], p, n: Vec3::Z }
+        TextureContext { uv, uv_width: Vec2::new(0.1, 0.2), uv1: Vec2::ZERO, color: [1.0; 4], face: 0, p, n: Vec3::Z }
     }
 
     #[test]

@@ -12,8 +12,8 @@ pub use mapping::{CheckerboardMapping, Mapping2d};
 pub use procedural::{Bilerp, Dots, Marble, NoiseKind, NoiseTexture, Octaves};
 pub use udim::{Udim, UdimId};
 
-use crate::imaging::MipMap;
 use crate::imaging::tiles::TileStore;
+use crate::imaging::{FaceMap, MipMap};
 use lumiris_numbers::math::{Rgb, Vec2, Vec3};
 use std::sync::Arc;
 
@@ -23,6 +23,8 @@ pub type FloatTextureId = u32;
 pub type RgbTextureId = u32;
 /// Index into [`TextureSet::images`].
 pub type ImageId = u32;
+/// Index into [`TextureSet::face_maps`].
+pub type FaceMapId = u32;
 
 /// Where a texture is looked up.
 #[derive(Clone, Copy, Debug)]
@@ -36,6 +38,8 @@ pub struct TextureContext {
     pub uv1: Vec2,
     /// Linear colour and opacity of the vertices.
     pub color: [f32; 4],
+    /// Number of the face of the mesh.
+    pub face: u32,
     /// World-space point.
     pub p: Vec3,
     /// World-space geometric normal.
@@ -46,7 +50,7 @@ impl TextureContext {
     /// A lookup that takes all of an image in.
     pub fn whole() -> Self {
         let (uv, p, n) = (Vec2::splat(0.5), Vec3::ZERO, Vec3::Z);
-        TextureContext { uv, uv_width: Vec2::splat(1e3), uv1: uv, color: [1.0; 4], p, n }
+        TextureContext { uv, uv_width: Vec2::splat(1e3), uv1: uv, color: [1.0; 4], face: 0, p, n }
     }
 }
 
@@ -65,6 +69,15 @@ pub struct ImageTexture {
     pub invert: bool,
 }
 
+/// Lookup of the texture of a face, by the texture coordinates.
+#[derive(Clone, Copy, Debug)]
+pub struct FaceTexture {
+    /// Textures of the faces.
+    pub map: FaceMapId,
+    /// Factor of the values.
+    pub scale: f32,
+}
+
 /// A float on surfaces.
 #[derive(Clone, Copy, Debug)]
 pub enum FloatTexture {
@@ -74,6 +87,8 @@ pub enum FloatTexture {
     Image(ImageTexture),
     /// One channel (0 to 2) of an image.
     Channel(ImageTexture, usize),
+    /// The texture of the face; the mean of its channels.
+    Faces(FaceTexture),
     /// Opacity of the vertices.
     VertexOpacity,
     /// 1 where the texture is at least the threshold, else 0.
@@ -139,6 +154,8 @@ pub enum RgbTexture {
     Constant(Rgb),
     /// An image; one of one channel is grey.
     Image(ImageTexture),
+    /// The texture of the face.
+    Faces(FaceTexture),
     /// Colour of the vertices.
     VertexColor,
     /// tex1·tex2.
@@ -208,6 +225,8 @@ pub struct TextureSet {
     pub images: Vec<Arc<MipMap>>,
     /// Images that are tiles.
     pub udims: Vec<Udim>,
+    /// Textures of faces.
+    pub face_maps: Vec<Arc<FaceMap>>,
 }
 
 impl TextureSet {
@@ -217,7 +236,7 @@ impl TextureSet {
         let children: &[FloatTextureId] = match &texture {
             FloatTexture::Constant(_) | FloatTexture::VertexOpacity => &[],
             // Images may come later: an importer reads all of them at once.
-            FloatTexture::Image(_) | FloatTexture::Channel(..) => &[],
+            FloatTexture::Image(_) | FloatTexture::Channel(..) | FloatTexture::Faces(_) => &[],
             FloatTexture::Noise(_) | FloatTexture::Bilerp(_) => &[],
             FloatTexture::Threshold { tex, .. } => &[*tex],
             FloatTexture::Scale { tex, scale } => &[*tex, *scale],
@@ -237,7 +256,8 @@ impl TextureSet {
     pub fn add_rgb(&mut self, texture: RgbTexture) -> RgbTextureId {
         let (children, weight): (&[RgbTextureId], Option<FloatTextureId>) = match &texture {
             RgbTexture::Constant(_) | RgbTexture::VertexColor => (&[], None),
-            RgbTexture::Image(_) | RgbTexture::Marble(_) | RgbTexture::Bilerp(_) => (&[], None),
+            RgbTexture::Image(_) | RgbTexture::Faces(_) => (&[], None),
+            RgbTexture::Marble(_) | RgbTexture::Bilerp(_) => (&[], None),
             RgbTexture::Product { tex1, tex2 } => (&[*tex1, *tex2], None),
             RgbTexture::Scale { tex, scale } => (&[*tex], Some(*scale)),
             RgbTexture::Mix { tex1, tex2, amount } => (&[*tex1, *tex2], Some(*amount)),
@@ -257,6 +277,13 @@ impl TextureSet {
         self.images.iter().find_map(|image| image.store()).map(|store| &**store)
     }
 
+    /// Memory of all images and textures of faces (bytes), but for tiles.
+    pub fn bytes(&self) -> u64 {
+        let images: usize = self.images.iter().map(|image| image.bytes()).sum();
+        let faces: usize = self.face_maps.iter().map(|map| map.bytes()).sum();
+        (images + faces) as u64
+    }
+
     /// Adds an image.
     pub fn add_image(&mut self, image: MipMap) -> ImageId {
         self.images.push(Arc::new(image));
@@ -269,6 +296,7 @@ impl TextureSet {
             FloatTexture::Constant(v) => Some(v),
             FloatTexture::Image(_)
             | FloatTexture::Channel(..)
+            | FloatTexture::Faces(_)
             | FloatTexture::VertexOpacity
             | FloatTexture::Threshold { .. }
             | FloatTexture::Scale { .. }
@@ -286,6 +314,7 @@ impl TextureSet {
         match self.rgbs[id as usize] {
             RgbTexture::Constant(v) => Some(v),
             RgbTexture::Image(_)
+            | RgbTexture::Faces(_)
             | RgbTexture::VertexColor
             | RgbTexture::Product { .. }
             | RgbTexture::Scale { .. }
@@ -307,6 +336,7 @@ impl TextureSet {
                 if image.invert { (1.0 - v).max(0.0) } else { v }
             }
             FloatTexture::Channel(image, channel) => self.image_value(image, ctx)[*channel] * image.scale,
+            FloatTexture::Faces(faces) => self.face_value(faces, ctx).average(),
             FloatTexture::VertexOpacity => ctx.color[3],
             FloatTexture::Threshold { tex, threshold } => f32::from(u8::from(self.float(*tex, ctx) >= *threshold)),
             FloatTexture::Scale { tex, scale } => {
@@ -338,6 +368,7 @@ impl TextureSet {
                 let v = self.image_value(image, ctx) * image.scale;
                 (if image.invert { Rgb::WHITE - v } else { v }).map(|c| c.max(0.0))
             }
+            RgbTexture::Faces(faces) => self.face_value(faces, ctx).map(|c| c.max(0.0)),
             RgbTexture::VertexColor => Rgb::new(ctx.color[0], ctx.color[1], ctx.color[2]),
             RgbTexture::Product { tex1, tex2 } => self.rgb(*tex1, ctx) * self.rgb(*tex2, ctx),
             RgbTexture::Scale { tex, scale } => {
@@ -371,6 +402,11 @@ impl TextureSet {
         }
         // Images have t downwards.
         self.images[image as usize].lookup(Vec2::new(st.x, 1.0 - st.y), width)
+    }
+
+    /// Value of the texture of a face at a point.
+    fn face_value(&self, texture: &FaceTexture, ctx: &TextureContext) -> Rgb {
+        self.face_maps[texture.map as usize].value(ctx.face, ctx.uv, ctx.uv_width) * texture.scale
     }
 }
 

@@ -170,7 +170,7 @@ mod tests {
 
     fn at(p: Vec3) -> TextureContext {
         let uv = p.truncate();
-        TextureContext { uv, uv_width: Vec2::ZERO, uv1: Vec2::ZERO, color: [1.0; 4], p, n: Vec3::Z }
+        TextureContext { uv, uv_width: Vec2::ZERO, uv1: Vec2::ZERO, color: [1.0; 4], face: 0, p, n: Vec3::Z }
     }
 
     fn points() -> impl Iterator<Item = Vec3> {

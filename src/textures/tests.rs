@@ -7,6 +7,7 @@ fn at(u: f32, v: f32) -> TextureContext {
         uv_width: Vec2::ZERO,
         uv1: Vec2::ZERO,
         color: [0.5; 4],
+        face: 0,
         p: Vec3::ZERO,
         n: Vec3::new(0.6, 0.0, 0.8),
     }

@@ -25,6 +25,7 @@ mod path_reuse;
 mod photon_map;
 mod photons;
 mod portals;
+mod ptex;
 mod roulette;
 mod sample_allocation;
 mod subsurface;

@@ -39,7 +39,7 @@ fn each_tile_has_its_image_and_the_rest_is_black() {
     let wall = textures.rgbs.iter().find_map(|t| if let RgbTexture::Image(image) = t { Some(image) } else { None });
     let at = |u: f32, v: f32| {
         let (uv, uv1) = (Vec2::new(u, v), Vec2::ZERO);
-        let ctx = TextureContext { uv, uv_width: Vec2::ZERO, uv1, color: [1.0; 4], p: Vec3::ZERO, n: Vec3::Z };
+        let ctx = TextureContext { uv, uv_width: Vec2::ZERO, uv1, color: [1.0; 4], face: 0, p: Vec3::ZERO, n: Vec3::Z };
         textures.image_value(wall.unwrap(), &ctx)
     };
     for (u, v, value) in [

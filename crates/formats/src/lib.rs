@@ -1,10 +1,10 @@
-//! File formats: pbrt-v4 text to checked directives, PLY files to meshes, NanoVDB files to sparse grids, glTF files to
+//! File formats: pbrt-v4 text to checked directives, PLY files to meshes, Ptex files to textures of faces, NanoVDB files to sparse grids, glTF files to
 //! checked JSON and arrays, measured BSDFs to tables, measured spectra to colours; and atomic writing of files.
 //!
 //! User input never panics. Errors are collected with their positions in [`diagnostic::Diagnostics`]. The meaning of
 //! directives is not decided here: the renderer builds its scene from them.
 //!
-//! Reading order: [`source`], [`diagnostic`], [`number`], [`pbrt`], [`ply`], [`nanovdb`], [`gltf`], [`spectra`],
+//! Reading order: [`source`], [`diagnostic`], [`number`], [`pbrt`], [`ply`], [`ptex`], [`nanovdb`], [`gltf`], [`spectra`],
 //! [`upsampling`], [`bsdf_file`], [`color_space`], [`output`].
 
 pub mod bsdf_file;
@@ -16,6 +16,7 @@ pub mod number;
 pub mod output;
 pub mod pbrt;
 pub mod ply;
+pub mod ptex;
 pub mod source;
 pub mod spectra;
 pub mod spectra_data;

@@ -1,7 +1,8 @@
-//! What tests of several crates use: statistical assertions, integrals of known value, and files of volumes.
+//! What tests of several crates use: statistical assertions, integrals of known value, and files of volumes and of textures.
 
 pub mod integrals;
 pub mod nanovdb;
+pub mod ptex;
 pub mod random;
 pub mod significance;
 

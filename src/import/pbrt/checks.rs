@@ -3,6 +3,7 @@
 use lumiris_formats::diagnostic::{Diagnostics, did_you_mean};
 use lumiris_formats::pbrt::params::ParamSet;
 use lumiris_formats::source::Span;
+use std::path::Path;
 
 /// A positive number, or the default after an error.
 pub(super) fn positive(p: &ParamSet, key: &'static str, default: f32, d: &mut Diagnostics) -> f32 {
@@ -14,6 +15,29 @@ pub(super) fn positive(p: &ParamSet, key: &'static str, default: f32, d: &mut Di
         }
         None => default,
     }
+}
+
+/// What was read of files, in their order; others are reported: as missing where `unreadable` has a reason of the system.
+pub(super) fn readable<'a, T, E: ToString>(
+    loaded: Vec<Result<T, E>>,
+    places: impl Iterator<Item = (&'a Path, Span)>,
+    d: &mut Diagnostics,
+    unreadable: impl Fn(&E) -> Option<String>,
+) -> Vec<T> {
+    let report = |(loaded, (path, span)): (Result<T, E>, (&Path, Span))| {
+        let error = match loaded {
+            Ok(content) => return Some(content),
+            Err(error) => error,
+        };
+        match unreadable(&error) {
+            Some(reason) => d.missing_file(path, reason, Some(span)),
+            None => {
+                d.error(span, error.to_string());
+            }
+        }
+        None
+    };
+    loaded.into_iter().zip(places).filter_map(report).collect()
 }
 
 /// An error about an unknown name, with similar names.

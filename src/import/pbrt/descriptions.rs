@@ -226,6 +226,8 @@ pub struct MeshData {
     pub(super) normals: Vec<Vec3>,
     pub(super) tangents: Vec<Vec3>,
     pub(super) uvs: Vec<Vec2>,
+    /// Numbers of the faces.
+    pub(super) faces: Vec<u32>,
 }
 
 /// Arrays of a bilinear mesh in object space.
@@ -235,6 +237,8 @@ pub struct PatchData {
     pub(super) indices: Vec<[u32; 4]>,
     pub(super) normals: Vec<Vec3>,
     pub(super) uvs: Vec<Vec2>,
+    /// Numbers of the faces.
+    pub(super) faces: Vec<u32>,
 }
 
 /// Curves in object space.

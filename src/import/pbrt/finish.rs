@@ -6,6 +6,7 @@ use super::lights::power_factor;
 use super::measured;
 use super::media::MediaInUse;
 use super::options::ParsedOptions;
+use super::ptex;
 use super::shapes::{Made, ShapeError};
 use super::state::Builder;
 use crate::geometry::{Geometry, GeometryId, GeometrySet, Group, GroupId, Instance, Shape, Visibility};
@@ -52,12 +53,13 @@ impl Builder<'_> {
         let environment_paths: Vec<PathBuf> = self.environments.iter().map(|e| e.path.clone()).collect();
         let emission_paths = self.emission_image_paths();
         // Images first: while one thread loads the library that reads them, the others have meshes and coats to work on
-        let ((images, emission_images, texture_images, measured), (made, materials)) = rayon::join(
+        let ((images, emission_images, texture_images, face_maps, measured), (made, materials)) = rayon::join(
             || {
                 let emission_images = load_emission_images(&emission_paths, files);
                 let textures = self.resources.load(files, d);
+                let face_maps = ptex::load(&self.face_maps, files);
                 let measured = measured::load(&self.measured_files, files);
-                (load_images(&environment_paths, files), emission_images, textures, measured)
+                (load_images(&environment_paths, files), emission_images, textures, face_maps, measured)
             },
             || {
                 rayon::join(
@@ -67,6 +69,7 @@ impl Builder<'_> {
             },
         );
         self.textures.images = texture_images;
+        self.textures.face_maps = ptex::check(face_maps, &self.face_maps, d);
         let materials = materials.with_measured(measured::check(measured, &self.measured_files, d));
         let made = if d.has_errors() { made } else { with_displaced(made, &mut shapes, files, &self.textures) };
         self.add_environments(images, d);

@@ -1,5 +1,6 @@
 //! `Material "measured"`.
 
+use super::checks::readable;
 use super::state::Builder;
 use crate::bsdfs::MeasuredTables;
 use crate::import::cache::FileCache;
@@ -42,16 +43,9 @@ pub(super) fn load(wanted: &[(PathBuf, Span)], files: &FileCache) -> Vec<Loaded>
 
 /// The tables in the order of their files; what could not be read is reported.
 pub(super) fn check(loaded: Vec<Loaded>, wanted: &[(PathBuf, Span)], d: &mut Diagnostics) -> Vec<Arc<MeasuredTables>> {
-    let report = |(loaded, (path, span)): (Loaded, &(PathBuf, Span))| match loaded {
-        Ok(tables) => Some(tables),
-        Err(MeasuredError::File(BsdfFileError::Unreadable { reason, .. })) => {
-            d.missing_file(path, reason, Some(*span));
-            None
-        }
-        Err(error) => {
-            d.error(*span, error.to_string());
-            None
-        }
-    };
-    loaded.into_iter().zip(wanted).filter_map(report).collect()
+    let places = wanted.iter().map(|(path, span)| (path.as_path(), *span));
+    readable(loaded, places, d, |error| match error {
+        MeasuredError::File(BsdfFileError::Unreadable { reason, .. }) => Some(reason.to_string()),
+        MeasuredError::File(BsdfFileError::Wrong { .. }) | MeasuredError::Tables(_) => None,
+    })
 }

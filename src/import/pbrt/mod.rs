@@ -1,7 +1,7 @@
 //! The pbrt-v4 scene format.
 //!
 //! Reading order: [`descriptions`] (what a file asks for), [`state`] (the scene while its file is read), [`checks`];
-//! a file for each kind of directive: [`transform`], [`options`], [`settings`], [`film`], [`spectrum`], [`textures`],
+//! a file for each kind of directive: [`transform`], [`options`], [`settings`], [`film`], [`spectrum`], [`textures`], `ptex`,
 //! [`materials`], `hair`, `measured`, [`lights`], `image_lights`, [`media`] with `media_presets` and `volumes`, `curves`, [`shapes`]; [`directives`] (the state machine over `lumiris_formats::pbrt`'s directives);
 //! and [`finish`] (reads files and assembles the scene).
 
@@ -22,6 +22,7 @@ pub mod media;
 mod media_presets;
 pub mod options;
 mod principled;
+mod ptex;
 pub mod settings;
 pub mod shapes;
 pub mod spectrum;

@@ -230,6 +230,17 @@ fn indices<const N: usize>(p: &mut ParamSet, count: usize, d: &mut Diagnostics) 
     Some(values.chunks_exact(N).map(|c| std::array::from_fn(|i| c[i] as u32)).collect())
 }
 
+/// Numbers of faces, which textures of faces go by.
+fn face_numbers(p: &mut ParamSet, count: usize, d: &mut Diagnostics) -> Vec<u32> {
+    let numbers = p.take_integers("faceIndices", d).unwrap_or_default();
+    if !(numbers.is_empty() || numbers.len() == count) || numbers.iter().any(|&n| n < 0) {
+        let message = format!("faceIndices must be {count} numbers, one for each face, none of which is negative");
+        d.error(p.span_of("faceIndices"), message);
+        return Vec::new();
+    }
+    numbers.into_iter().map(|n| n as u32).collect()
+}
+
 fn mesh_data(p: &mut ParamSet, d: &mut Diagnostics) -> Option<MeshData> {
     let Some(positions) = vec3s(p, "P", POINTS, d) else {
         d.error(p.span, format!("{} needs `point3 P`", p.owner));
@@ -240,8 +251,9 @@ fn mesh_data(p: &mut ParamSet, d: &mut Diagnostics) -> Option<MeshData> {
     let tangents = vec3s(p, "S", VECTORS, d).unwrap_or_default();
     let uvs = uvs(p, d);
     let indices = indices::<3>(p, count, d)?;
-    p.ignore("faceIndices");
+    let faces = face_numbers(p, indices.len(), d);
     Some(MeshData {
+        faces,
         indices,
         normals: per_vertex(normals, count, "N", p, d),
         tangents: per_vertex(tangents, count, "S", p, d),
@@ -259,8 +271,9 @@ fn patch_data(p: &mut ParamSet, d: &mut Diagnostics) -> Option<PatchData> {
     let normals = vec3s(p, "N", NORMALS, d).unwrap_or_default();
     let uvs = uvs(p, d);
     let indices = indices::<4>(p, count, d)?;
-    p.ignore("faceIndices");
+    let faces = face_numbers(p, indices.len(), d);
     Some(PatchData {
+        faces,
         indices,
         normals: per_vertex(normals, count, "N", p, d),
         uvs: per_vertex(uvs, count, "uv", p, d),
@@ -339,6 +352,7 @@ impl ShapeDesc {
                         indices: ply.quads.iter().map(|&[a, b, c, d]| [a, b, d, c]).collect(),
                         normals: ply.normals.clone(),
                         uvs: ply.uvs.clone(),
+                        faces: std::mem::take(&mut ply.quad_numbers),
                     };
                     made.shapes.push(patches(data, &placement).map_err(wrong)?);
                 }
@@ -349,6 +363,7 @@ impl ShapeDesc {
                         normals: ply.normals,
                         tangents: Vec::new(),
                         uvs: ply.uvs,
+                        faces: ply.triangle_numbers,
                     };
                     made.shapes.push(Shape::Mesh(triangles(finished(data)?, &placement).map_err(wrong)?));
                 }
@@ -390,11 +405,11 @@ fn displaced(
     mesh.refine(length, displacement.edge_length, MAX_TRIANGLES)?;
     mesh.displace(|p, n, uv| {
         let (p, n) = (group_from_object.transform_point3(p), transform_normal(group_from_object, n));
-        let point = TextureContext { uv, uv_width: Vec2::ZERO, uv1: Vec2::ZERO, color: [1.0; 4], p, n };
+        let point = TextureContext { uv, uv_width: Vec2::ZERO, uv1: Vec2::ZERO, color: [1.0; 4], face: 0, p, n };
         textures.float(displacement.texture, &point)
     });
     let DisplacedMesh { positions, normals, uvs, indices } = mesh;
-    Ok(MeshData { positions, indices, normals, tangents: Vec::new(), uvs })
+    Ok(MeshData { positions, indices, normals, uvs, ..MeshData::default() })
 }
 
 fn triangles(mut data: MeshData, placement: &Placement) -> Result<TriangleMesh, String> {
@@ -403,7 +418,7 @@ fn triangles(mut data: MeshData, placement: &Placement) -> Result<TriangleMesh, 
     place_normals(&mut data.normals, m, placement.reverse);
     data.tangents.iter_mut().for_each(|t| *t = m.transform_vector3(*t));
     let mut mesh = TriangleMesh::new(data.positions, data.indices)?;
-    (mesh.normals, mesh.tangents, mesh.uvs) = (data.normals, data.tangents, data.uvs);
+    (mesh.normals, mesh.tangents, mesh.uvs, mesh.faces) = (data.normals, data.tangents, data.uvs, data.faces);
     mesh.flip_normal = placement.flip;
     Ok(mesh)
 }
@@ -432,6 +447,7 @@ fn parallelograms(data: &PatchData) -> Option<MeshData> {
         }));
         mesh.indices.extend([[first, first + 1, first + 3], [first, first + 3, first + 2]]);
     }
+    mesh.faces = data.faces.iter().flat_map(|&face| [face; 2]).collect();
     Some(mesh)
 }
 
@@ -447,6 +463,7 @@ fn patches(mut data: PatchData, placement: &Placement) -> Result<Shape, String> 
         indices: data.indices,
         normals: data.normals,
         uvs: data.uvs,
+        faces: data.faces,
         flip_normal: placement.flip,
     }))
 }

@@ -7,6 +7,7 @@ use super::descriptions::{
 use super::options::Options;
 use super::transform::{Ctm, affine};
 use crate::import::LoadOptions;
+use crate::import::face_maps::FaceMapRequest;
 use crate::import::resources::Resources;
 use crate::lights::{Light, Portal};
 use crate::materials::{Material, MaterialEntry, MaterialId};
@@ -121,6 +122,8 @@ pub struct Builder<'a> {
     pub instances: Vec<InstanceDesc>,
     /// Images to be read.
     pub resources: Resources,
+    /// Textures of faces that wait to be read.
+    pub(super) face_maps: Vec<(FaceMapRequest, Span)>,
     /// Files of measured materials that wait to be read.
     pub(super) measured_files: Vec<(PathBuf, Span)>,
     /// Files of spectra that were read.
@@ -166,12 +169,13 @@ impl<'a> Builder<'a> {
             current_object: None,
             instances: Vec::new(),
             resources: Resources::default(),
+            face_maps: Vec::new(),
             measured_files: Vec::new(),
             spectrum_files: RefCell::default(),
         }
     }
 
-    /// The files that the text names: spectra, measured materials, meshes, volumes and images.
+    /// The files that the text names: spectra, measured materials, textures of faces, meshes, volumes and images.
     pub fn files(&self) -> Vec<PathBuf> {
         let mesh = |shape: &ShapeDesc| match &shape.source {
             ShapeSource::Ply(path) => Some(path.clone()),
@@ -179,6 +183,7 @@ impl<'a> Builder<'a> {
         };
         let mut files = self.spectrum_files.borrow().clone();
         files.extend(self.measured_files.iter().map(|(path, _)| path.clone()));
+        files.extend(self.face_maps.iter().map(|(request, _)| request.path.clone()));
         files.extend(self.shapes.iter().filter_map(mesh));
         files.extend(self.media.iter().filter_map(|m| Some(m.volume.as_ref()?.path.clone())));
         files.extend(self.environments.iter().map(|e| e.path.clone()));

@@ -66,6 +66,10 @@ impl Builder<'_> {
                 Some(image) => FloatTexture::Image(image),
                 None => FloatTexture::Constant(1.0),
             },
+            "ptex" => match self.face_texture(p, d) {
+                Some(faces) => FloatTexture::Faces(faces),
+                None => FloatTexture::Constant(1.0),
+            },
             "fbm" | "wrinkled" | "windy" => FloatTexture::Noise(self.noise(&class.text, p, d)),
             "dots" => FloatTexture::Dots {
                 dots: Dots { mapping: self.mapping(p, d) },
@@ -77,7 +81,7 @@ impl Builder<'_> {
                 FloatTexture::Bilerp(Bilerp { mapping: self.mapping(p, d), corners })
             }
             other => {
-                wrong_class(other, class, FLOAT_CLASSES, d);
+                unknown(other, class.span, "texture class", FLOAT_CLASSES, d);
                 p.ignore_all();
                 FloatTexture::Constant(0.5)
             }
@@ -114,6 +118,10 @@ impl Builder<'_> {
                 Some(image) => RgbTexture::Image(image),
                 None => RgbTexture::Constant(Rgb::WHITE),
             },
+            "ptex" => match self.face_texture(p, d) {
+                Some(faces) => RgbTexture::Faces(faces),
+                None => RgbTexture::Constant(Rgb::WHITE),
+            },
             "marble" => RgbTexture::Marble(Marble {
                 octaves: octaves(p, d),
                 scale: p.float("scale", d).unwrap_or(1.0),
@@ -131,7 +139,7 @@ impl Builder<'_> {
                 RgbTexture::Bilerp(Bilerp { mapping: self.mapping(p, d), corners })
             }
             other => {
-                wrong_class(other, class, RGB_CLASSES, d);
+                unknown(other, class.span, "texture class", RGB_CLASSES, d);
                 p.ignore_all();
                 RgbTexture::Constant(Rgb::splat(0.5))
             }
@@ -254,7 +262,7 @@ impl Builder<'_> {
         Some((first, (self.textures.udims.len() - 1) as UdimId))
     }
 
-    fn encoding(&self, p: &ParamSet, d: &mut Diagnostics) -> Option<ImageEncoding> {
+    pub(super) fn encoding(&self, p: &ParamSet, d: &mut Diagnostics) -> Option<ImageEncoding> {
         let Some(text) = p.string("encoding", d) else { return Some(ImageEncoding::Auto) };
         let gamma = text.strip_prefix("gamma ").and_then(|g| g.trim().parse::<f32>().ok()).filter(|g| *g > 0.0);
         match (text, gamma) {
@@ -371,6 +379,7 @@ const FLOAT_CLASSES: &[&str] = &[
     "directionmix",
     "checkerboard",
     "imagemap",
+    "ptex",
     "fbm",
     "wrinkled",
     "windy",
@@ -378,7 +387,7 @@ const FLOAT_CLASSES: &[&str] = &[
     "bilerp",
 ];
 const RGB_CLASSES: &[&str] =
-    &["constant", "scale", "mix", "directionmix", "checkerboard", "imagemap", "marble", "dots", "bilerp"];
+    &["constant", "scale", "mix", "directionmix", "checkerboard", "imagemap", "ptex", "marble", "dots", "bilerp"];
 
 fn octaves(p: &ParamSet, d: &mut Diagnostics) -> Octaves {
     let roughness = p.float("roughness", d).unwrap_or(0.5);
@@ -390,13 +399,4 @@ fn octaves(p: &ParamSet, d: &mut Diagnostics) -> Octaves {
         }
     };
     Octaves { count, roughness }
-}
-
-/// A class that is not rendered, or that there is not.
-fn wrong_class(class: &str, name: &Name, known: &[&str], d: &mut Diagnostics) {
-    if class == "ptex" {
-        d.warning_once(name.span, "texture `ptex` is not rendered: it is constant 0.5");
-    } else {
-        unknown(class, name.span, "texture class", known, d);
-    }
 }

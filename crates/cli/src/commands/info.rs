@@ -87,11 +87,12 @@ fn facts(job: &RenderJob) -> Value {
         "media": scene.media.names.iter().zip(&scene.media.media).map(|(name, medium)| (name.clone(), medium.kind_name())).collect::<BTreeMap<_, _>>(),
         "textures": {
             "float": scene.textures.floats.len(), "rgb": scene.textures.rgbs.len(), "images": scene.textures.images.len(),
+            "face_maps": scene.textures.face_maps.len(),
         },
         "memory": {
             "geometry_bytes": geometry_bytes(scene),
             "medium_bytes": scene.media.media.iter().map(|m| m.bytes() as u64).sum::<u64>(),
-            "texture_bytes": scene.textures.images.iter().map(|i| i.bytes() as u64).sum::<u64>(),
+            "texture_bytes": scene.textures.bytes(),
             "texture_bytes_in_tiles": scene.textures.store().map_or(0, |s| s.counts().stored),
             "texture_tiles_at_most_bytes": scene.textures.store().map_or(0, |s| s.capacity()),
             "accel_bytes": accel.bytes, "accel_peak_bytes": accel.peak_bytes,
@@ -121,11 +122,13 @@ fn geometry_bytes(scene: &Scene) -> u64 {
     let bytes = scene.geometry.geometries.iter().map(|g| match &g.shape {
         Shape::Mesh(m) => {
             let vectors = m.padded_positions().len() + m.normals.len() + m.tangents.len() + m.indices.len();
-            vectors * 12 + m.uvs.len() * 8
+            vectors * 12 + m.uvs.len() * 8 + m.faces.len() * 4
         }
         Shape::Quadric(q) => size_of_val(q),
         Shape::Curves(curves) => curves.bytes(),
-        Shape::Bilinear(m) => (m.positions.len() + m.normals.len()) * 12 + m.uvs.len() * 8 + m.indices.len() * 16,
+        Shape::Bilinear(m) => {
+            (m.positions.len() + m.normals.len()) * 12 + m.uvs.len() * 8 + m.indices.len() * 16 + m.faces.len() * 4
+        }
     });
     bytes.sum::<usize>() as u64
 }

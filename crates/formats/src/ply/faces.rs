@@ -1,11 +1,14 @@
 //! Face lists and triangle strips.
 
-use super::header::{Element, Scalar};
+use super::header::{Element, Property, Scalar};
 use super::numbers::{ByteOrder, Numbers, number_at};
 use super::stream::{MAX_FILL, Stream};
 use super::{Place, PlyError, PlyMesh};
 use lumiris_numbers::math::Vec3;
+use std::iter::repeat_n;
 
+/// The property that has the number of a face.
+const NUMBER: &str = "face_indices";
 /// Ends a strip and begins another inside one list.
 const RESTART: i64 = -1;
 
@@ -15,6 +18,9 @@ pub(super) struct Faces {
     vertices: u64,
     triangles: Vec<[u32; 3]>,
     quads: Vec<[u32; 4]>,
+    /// Numbers of the faces that triangles and quads are, if the file has any.
+    triangle_numbers: Vec<u32>,
+    quad_numbers: Vec<u32>,
     polygons: u64,
     degenerate: u64,
 }
@@ -61,9 +67,14 @@ impl Faces {
         numbers: &mut impl Numbers<'a>,
     ) -> Result<(), PlyError> {
         let mut corners = Vec::new();
+        let number_column = element.scalar(NUMBER);
         for row in rows {
+            let mut number = None;
             for (i, property) in element.properties.iter().enumerate() {
                 match property.list {
+                    None if Some(i) == number_column => {
+                        number = Some(numbers.integer(property.ty, &element.name)? as u32)
+                    }
                     Some(count_type) if i == column => {
                         let count = numbers.list_length(count_type, property.ty, &element.name)?;
                         corners.clear();
@@ -72,11 +83,11 @@ impl Faces {
                             let index = numbers.integer(property.ty, &element.name)?;
                             corners.push(self.check(index, row, place)?);
                         }
-                        self.push(&corners);
                     }
                     Some(_) | None => numbers.skip_property(property, &element.name)?,
                 }
             }
+            self.push(&corners, number);
         }
         Ok(())
     }
@@ -105,19 +116,30 @@ impl Faces {
                 self.triangles.truncate(before);
                 return Ok(done);
             }
+            if let Some(number) = rows.number {
+                let faces = available[..block * rows.stride].chunks_exact(rows.stride);
+                self.triangle_numbers.extend(faces.map(|face| number_at!(u32, BIG, face, number)));
+            }
             stream.consume(block * rows.stride);
             done += block as u64;
         }
     }
 
-    /// Adds the face of some vertices, all in range.
-    fn push(&mut self, corners: &[u32]) {
+    /// Adds the face of some vertices, all in range, and its number.
+    fn push(&mut self, corners: &[u32], number: Option<u32>) {
         match *corners {
-            [a, b, c] => self.triangles.push([a, b, c]),
-            [a, b, c, d] => self.quads.push([a, b, c, d]),
+            [a, b, c] => {
+                self.triangles.push([a, b, c]);
+                self.triangle_numbers.extend(number);
+            }
+            [a, b, c, d] => {
+                self.quads.push([a, b, c, d]);
+                self.quad_numbers.extend(number);
+            }
             [first, ref rest @ ..] if rest.len() > 3 => {
                 self.polygons += 1;
                 self.triangles.extend(rest.windows(2).map(|pair| [first, pair[0], pair[1]]));
+                self.triangle_numbers.extend(number.iter().flat_map(|&number| repeat_n(number, rest.len() - 1)));
             }
             _ => self.degenerate += 1,
         }
@@ -186,6 +208,10 @@ impl Faces {
         self.triangles.shrink_to_fit();
         mesh.triangles = self.triangles;
         mesh.quads = self.quads;
+        // Strips have no numbers
+        let all = |numbers: Vec<u32>, faces: usize| if numbers.len() == faces { numbers } else { Vec::new() };
+        mesh.triangle_numbers = all(self.triangle_numbers, mesh.triangles.len());
+        mesh.quad_numbers = all(self.quad_numbers, mesh.quads.len());
         if self.polygons > 0 {
             let n = self.polygons;
             mesh.warnings.push(format!("{n} faces have more than four vertices; each becomes a fan of triangles"));
@@ -210,6 +236,8 @@ struct TriangleRows {
     offset: usize,
     /// Of the row (bytes).
     stride: usize,
+    /// Of the number of the face in the row, if it has one.
+    number: Option<usize>,
 }
 
 impl TriangleRows {
@@ -222,7 +250,12 @@ impl TriangleRows {
         let others = element.properties.iter().filter(|p| p.list.is_some()).count();
         let offset = element.properties[..column].iter().map(|p| p.ty.size()).sum();
         let stride = element.min_stride() - 1 + Self::LIST;
-        (is_common && others == 1 && stride <= MAX_FILL).then_some(TriangleRows { offset, stride })
+        let number = element.scalar(NUMBER);
+        let is_common =
+            is_common && number.is_none_or(|i| matches!(element.properties[i].ty, Scalar::I32 | Scalar::U32));
+        let bytes = |property: &Property| if property.list.is_some() { Self::LIST } else { property.ty.size() };
+        let number = number.map(|i| element.properties[..i].iter().map(bytes).sum());
+        (is_common && others == 1 && stride <= MAX_FILL).then_some(TriangleRows { offset, stride, number })
     }
 }
 
@@ -239,9 +272,17 @@ fn drop_broken_vertices(mesh: &mut PlyMesh) {
         return;
     }
     let faces = mesh.triangles.len() + mesh.quads.len();
-    mesh.triangles.retain(|t| t.iter().all(|&v| !broken[v as usize]));
-    mesh.quads.retain(|q| q.iter().all(|&v| !broken[v as usize]));
+    retain_whole(&mut mesh.triangles, &mut mesh.triangle_numbers, &broken);
+    retain_whole(&mut mesh.quads, &mut mesh.quad_numbers, &broken);
     mesh.positions.iter_mut().filter(|p| !p.is_finite()).for_each(|p| *p = Vec3::ZERO);
     let left_out = faces - mesh.triangles.len() - mesh.quads.len();
     mesh.warnings.push(format!("{count} vertices are not finite; {left_out} faces of them are left out"));
+}
+
+/// Removes faces of broken vertices, and their numbers.
+fn retain_whole<const N: usize>(faces: &mut Vec<[u32; N]>, numbers: &mut Vec<u32>, broken: &[bool]) {
+    let is_whole = |face: &[u32; N]| face.iter().all(|&v| !broken[v as usize]);
+    let mut kept = faces.iter().map(is_whole);
+    numbers.retain(|_| kept.next().unwrap_or(true));
+    faces.retain(is_whole);
 }

@@ -40,6 +40,10 @@ pub struct PlyMesh {
     /// Faces of four vertices in the order of the file, which is around the face; indices are in range.
     /// A bilinear patch p00, p10, p01, p11 has the corners 0, 1, 3, 2 of it.
     pub quads: Vec<[u32; 4]>,
+    /// Numbers of the faces (`face_indices`) of the triangles, or empty.
+    pub triangle_numbers: Vec<u32>,
+    /// Numbers of the faces of the quads, or empty.
+    pub quad_numbers: Vec<u32>,
     /// What was odd.
     pub warnings: Vec<String>,
 }

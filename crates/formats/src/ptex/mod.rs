@@ -1,0 +1,280 @@
+//! Ptex files (`.ptx`): a texture for each face of a mesh, without texture coordinates [Burley and Lacewell 2008]. The
+//! format is that of <https://ptex.us/PtexFile.html>, version 1.
+//!
+//! Level 0 is read, of quadrilateral meshes; coarser levels follow from it. A file consists of a header, and of blocks
+//! whose sizes the header tells: numbers of the faces, means of the faces, sizes of the levels, levels. Blocks are
+//! compressed each by itself. Whatever a file says of sizes is compared with its own size before anything is allocated.
+//!
+//! Reading order: [`blocks`], numbers and blocks; then this file.
+
+mod blocks;
+#[cfg(test)]
+mod tests;
+
+use blocks::{Blocks, Encoding, NumberType, inflate};
+use std::path::{Path, PathBuf};
+
+/// Largest logarithm of a face's number of texels in a row: larger ones are no sizes of textures.
+const MOST_LOG2: u8 = 16;
+
+/// Texels take at most so many bytes for one of the file, more than the compression of pictures makes of one, or
+/// [`LEAST_ROOM`] in a small file: what claims more is damaged.
+const MOST_EXPANSION: usize = 4096;
+const LEAST_ROOM: usize = 1 << 26;
+
+/// What a file holds.
+#[derive(Clone, Debug, PartialEq)]
+pub struct PtexFile {
+    /// Faces, in the order of their numbers.
+    pub faces: Vec<PtexFace>,
+    /// Channels of a texel: three if the file has as many, else one.
+    pub channels: usize,
+    /// Texels of all faces, face by face.
+    pub texels: PtexTexels,
+}
+
+/// Numbers of texels, channels interleaved.
+#[derive(Clone, Debug, PartialEq)]
+pub enum PtexTexels {
+    /// Multiples of 1/255.
+    Bytes(Vec<u8>),
+    /// Numbers; integers of 16 bits are divided by 65535.
+    Floats(Vec<f32>),
+}
+
+/// A face of the mesh. Its texels stand row by row, from (u, v) = (0, 0); a face of one colour has one.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct PtexFace {
+    /// Index of its first texel.
+    pub first: usize,
+    /// Binary logarithms of the numbers of columns and rows.
+    pub log2: [u8; 2],
+    /// What is beyond its edges v = 0, u = 1, v = 1, u = 0.
+    pub neighbors: [Option<Neighbor>; 4],
+}
+
+/// A face beyond an edge, which joins it along one of its own edges, in the reverse direction.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Neighbor {
+    /// Number of the face.
+    pub face: u32,
+    /// Its edge, in the order of [`PtexFace::neighbors`].
+    pub edge: u8,
+}
+
+/// Why a file cannot be read.
+#[derive(Debug, thiserror::Error)]
+pub enum PtexError {
+    /// The system says no.
+    #[error("{reason}")]
+    Unreadable {
+        /// The file.
+        path: PathBuf,
+        /// What it says.
+        reason: std::io::Error,
+    },
+    /// It is no such file, or not one that can be rendered.
+    #[error("{}: byte {byte}: {message}", path.display())]
+    Wrong {
+        /// The file; empty for bytes.
+        path: PathBuf,
+        /// Offset from the beginning of the file.
+        byte: usize,
+        /// One sentence without a full stop.
+        message: String,
+    },
+}
+
+impl PtexError {
+    fn wrong(byte: usize, message: impl Into<String>) -> Self {
+        PtexError::Wrong { path: PathBuf::new(), byte, message: message.into() }
+    }
+}
+
+/// Reads a file.
+pub fn read_ptex(path: &Path) -> Result<PtexFile, PtexError> {
+    let bytes = std::fs::read(path).map_err(|reason| PtexError::Unreadable { path: path.to_owned(), reason })?;
+    parse_ptex(&bytes).map_err(|error| match error {
+        PtexError::Wrong { byte, message, .. } => PtexError::Wrong { path: path.to_owned(), byte, message },
+        PtexError::Unreadable { .. } => error,
+    })
+}
+
+/// What the header says.
+struct Header {
+    ty: NumberType,
+    /// Channels in the file.
+    channels: usize,
+    faces: usize,
+    extension_size: usize,
+    faces_size: usize,
+    means_size: usize,
+    levels_size: usize,
+}
+
+impl Header {
+    fn read(blocks: &mut Blocks<'_>) -> Result<Self, PtexError> {
+        if blocks.take(4, "the header")? != b"Ptex" {
+            return Err(PtexError::wrong(0, "this is no Ptex file"));
+        }
+        let version = blocks.u32()?;
+        if version != 1 {
+            return Err(PtexError::wrong(4, format!("version {version} is unknown; 1 is read")));
+        }
+        match blocks.u32()? {
+            0 => {
+                return Err(PtexError::wrong(
+                    8,
+                    "textures of triangles are not rendered, only those of quadrilaterals",
+                ));
+            }
+            1 => {}
+            other => return Err(PtexError::wrong(8, format!("there is no type of mesh {other}"))),
+        }
+        let ty = blocks.u32()?;
+        let ty =
+            NumberType::from_code(ty).ok_or_else(|| PtexError::wrong(12, format!("there is no type of data {ty}")))?;
+        let _alpha = blocks.u32()?;
+        let channels = usize::from(blocks.u16()?);
+        let levels = blocks.u16()?;
+        let faces = blocks.u32()? as usize;
+        if channels == 0 || levels == 0 || faces == 0 {
+            let message = format!("{channels} channels, {levels} levels and {faces} faces are no texture");
+            return Err(PtexError::wrong(20, message));
+        }
+        let [extension_size, faces_size, means_size, levels_size] = blocks.sizes()?;
+        let _minor_version = blocks.u32()?;
+        // The sizes of all levels together, and of metadata
+        blocks.take(16, "the header")?;
+        Ok(Header { ty, channels, faces, extension_size, faces_size, means_size, levels_size })
+    }
+
+    /// Bytes of a texel.
+    fn texel_bytes(&self) -> usize {
+        self.channels * self.ty.size()
+    }
+}
+
+/// Reads the bytes of a file.
+pub fn parse_ptex(bytes: &[u8]) -> Result<PtexFile, PtexError> {
+    let mut blocks = Blocks::new(bytes, 0);
+    let header = Header::read(&mut blocks)?;
+    let extension = blocks.take(header.extension_size, "the extended header")?;
+    // Border modes and metadata, then the size of edits
+    if extension.get(24..32).is_some_and(|edits| edits.iter().any(|&b| b != 0)) {
+        let message = "edits that were added to the file are not read; `ptxutil -c` makes it whole";
+        return Err(PtexError::wrong(64 + 24, message));
+    }
+
+    const FACE_BYTES: usize = 20;
+    let at = blocks.at();
+    let infos = inflate(blocks.take(header.faces_size, "the faces")?, header.faces.checked_mul(FACE_BYTES), at)?;
+    let at = blocks.at();
+    let means_bytes = header.faces.checked_mul(header.texel_bytes());
+    let means = inflate(blocks.take(header.means_size, "the means of the faces")?, means_bytes, at)?;
+    let at = blocks.at();
+    let mut levels = Blocks::new(blocks.take(header.levels_size, "the sizes of the levels")?, at);
+    let _level_size = levels.take(8, "the size of a level")?;
+    let level_header_size = levels.u32()? as usize;
+    let level_faces = levels.u32()? as usize;
+    if level_faces != header.faces {
+        return Err(PtexError::wrong(at, format!("level 0 has {level_faces} of {} faces", header.faces)));
+    }
+    let at = blocks.at();
+    let sizes = inflate(blocks.take(level_header_size, "the sizes of textures")?, header.faces.checked_mul(4), at)?;
+
+    let mut out = Interleaved::new(&header);
+    let mut faces = Vec::with_capacity(header.faces);
+    let mut planar = Vec::new();
+    let mut room = bytes.len().saturating_mul(MOST_EXPANSION).max(LEAST_ROOM);
+    for (face, (info, size)) in infos.chunks_exact(FACE_BYTES).zip(sizes.chunks_exact(4)).enumerate() {
+        let at = blocks.at();
+        let (encoding, size) = Encoding::of(u32::from_le_bytes([size[0], size[1], size[2], size[3]]));
+        let data = blocks.take(size, "the texture of a face")?;
+        let is_constant = info[3] & FLAG_CONSTANT != 0;
+        let log2 = if is_constant || matches!(encoding, Encoding::Constant) { [0, 0] } else { [info[0], info[1]] };
+        if log2.iter().any(|&log2| log2 > MOST_LOG2) {
+            return Err(PtexError::wrong(at, format!("face {face} has 2^{} × 2^{} texels", log2[0], log2[1])));
+        }
+        let size = header.texel_bytes() << (log2[0] + log2[1]);
+        room = room.checked_sub(size).ok_or_else(|| {
+            PtexError::wrong(
+                at,
+                format!("the textures up to face {face} are too large for a file of {} bytes", bytes.len()),
+            )
+        })?;
+        planar.clear();
+        if is_constant {
+            // The means stand channel by channel
+            let size = header.ty.size();
+            for channel in means.chunks_exact(header.faces * size) {
+                planar.extend_from_slice(&channel[face * size..][..size]);
+            }
+        } else {
+            blocks::read_texels(data, encoding, log2, (header.channels, header.ty), &mut planar, at)?;
+        }
+        faces.push(PtexFace { first: out.texels(), log2, neighbors: neighbors(info, &infos) });
+        out.push(&planar);
+    }
+    Ok(PtexFile { faces, channels: out.channels, texels: out.values })
+}
+
+/// Flags of a face.
+const FLAG_CONSTANT: u8 = 1;
+const FLAG_SUBFACE: u8 = 8;
+
+/// The neighbours of a face, but for those of half its size or twice: parts of faces that are no quadrilaterals beside
+/// whole ones.
+fn neighbors(info: &[u8], infos: &[u8]) -> [Option<Neighbor>; 4] {
+    std::array::from_fn(|side| {
+        let id = &info[4 + 4 * side..][..4];
+        let face = u32::from_le_bytes([id[0], id[1], id[2], id[3]]);
+        let start = (face as usize).checked_mul(info.len())?;
+        let other = infos.get(start..start.checked_add(info.len())?)?;
+        let is_alike = (other[3] ^ info[3]) & FLAG_SUBFACE == 0;
+        is_alike.then_some(Neighbor { face, edge: info[2] >> (2 * side) & 3 })
+    })
+}
+
+/// Texels with the channels that are wanted.
+struct Interleaved {
+    ty: NumberType,
+    /// Channels in the file.
+    of: usize,
+    /// Channels that are kept.
+    channels: usize,
+    values: PtexTexels,
+}
+
+impl Interleaved {
+    fn new(header: &Header) -> Self {
+        let values =
+            if header.ty == NumberType::U8 { PtexTexels::Bytes(Vec::new()) } else { PtexTexels::Floats(Vec::new()) };
+        let channels = if header.channels >= 3 { 3 } else { 1 };
+        Interleaved { ty: header.ty, of: header.channels, channels, values }
+    }
+
+    /// How many texels there are.
+    fn texels(&self) -> usize {
+        let numbers = match &self.values {
+            PtexTexels::Bytes(v) => v.len(),
+            PtexTexels::Floats(v) => v.len(),
+        };
+        numbers / self.channels
+    }
+
+    /// Adds texels that stand channel by channel.
+    fn push(&mut self, planar: &[u8]) {
+        let size = self.ty.size();
+        let count = planar.len() / (self.of * size);
+        for texel in 0..count {
+            for channel in 0..self.channels {
+                let at = (channel * count + texel) * size;
+                match &mut self.values {
+                    PtexTexels::Bytes(values) => values.push(planar[at]),
+                    PtexTexels::Floats(values) => values.push(self.ty.number(&planar[at..at + size])),
+                }
+            }
+        }
+    }
+}

@@ -1,0 +1,19 @@
+//! Ptex files as textures of faces.
+
+use crate::imaging::{ColorEncoding, FaceMap};
+use lumiris_formats::ptex::{PtexError, read_ptex};
+use std::path::{Path, PathBuf};
+
+/// The textures of faces that a scene asks for.
+#[derive(Clone, Debug, PartialEq)]
+pub struct FaceMapRequest {
+    /// File.
+    pub path: PathBuf,
+    /// Meaning of its numbers.
+    pub encoding: ColorEncoding,
+}
+
+/// Reads a file.
+pub fn load_face_map(path: &Path, encoding: ColorEncoding) -> Result<FaceMap, PtexError> {
+    Ok(FaceMap::new(read_ptex(path)?, encoding))
+}

@@ -1,0 +1,59 @@
+//! `Texture "ptex"`.
+
+use super::checks::readable;
+use super::state::Builder;
+use crate::imaging::{ColorEncoding, FaceMap};
+use crate::import::cache::FileCache;
+use crate::import::face_maps::FaceMapRequest;
+use crate::import::images::ImageEncoding;
+use crate::textures::FaceTexture;
+use lumiris_formats::diagnostic::Diagnostics;
+use lumiris_formats::pbrt::params::ParamSet;
+use lumiris_formats::ptex::PtexError;
+use lumiris_formats::source::Span;
+use rayon::prelude::*;
+use std::sync::Arc;
+
+/// What pbrt-v4 takes numbers for where `encoding` says nothing, of whatever type they are.
+const USUAL: ColorEncoding = ColorEncoding::Gamma(2.2);
+
+impl Builder<'_> {
+    /// `string filename`, of which each is read once, with the meshes.
+    pub(super) fn face_texture(&mut self, p: &ParamSet, d: &mut Diagnostics) -> Option<FaceTexture> {
+        let encoding = match self.encoding(p, d)? {
+            ImageEncoding::Auto => USUAL,
+            ImageEncoding::Srgb => ColorEncoding::Srgb,
+            ImageEncoding::Linear => ColorEncoding::Linear,
+            ImageEncoding::Gamma(gamma) => ColorEncoding::Gamma(gamma),
+        };
+        let scale = p.float("scale", d).unwrap_or(1.0);
+        let Some(name) = p.string("filename", d) else {
+            d.error(p.span, "a texture `ptex` needs a `string filename`");
+            return None;
+        };
+        let (request, span) = (FaceMapRequest { path: self.folder.join(name), encoding }, p.span_of("filename"));
+        let known = self.face_maps.iter().position(|(known, _)| *known == request);
+        let map = known.unwrap_or_else(|| {
+            self.face_maps.push((request, span));
+            self.face_maps.len() - 1
+        });
+        Some(FaceTexture { map: map as u32, scale })
+    }
+}
+
+/// The content of a file, or what is wrong with it.
+pub(super) type Loaded = Result<Arc<FaceMap>, PtexError>;
+
+/// Reads all files.
+pub(super) fn load(wanted: &[(FaceMapRequest, Span)], files: &FileCache) -> Vec<Loaded> {
+    wanted.par_iter().map(|(request, _)| files.face_map(request)).collect()
+}
+
+/// The textures in the order of their files; what could not be read is reported.
+pub(super) fn check(loaded: Vec<Loaded>, wanted: &[(FaceMapRequest, Span)], d: &mut Diagnostics) -> Vec<Arc<FaceMap>> {
+    let places = wanted.iter().map(|(request, span)| (request.path.as_path(), *span));
+    readable(loaded, places, d, |error| match error {
+        PtexError::Unreadable { reason, .. } => Some(reason.to_string()),
+        PtexError::Wrong { .. } => None,
+    })
+}
