@@ -145,6 +145,22 @@ def _part(part: Union[None, str, Tuple[int, int]]) -> Optional[Tuple[int, int]]:
     return index, count
 
 
+def _resolution(resolution: Union[None, str, Tuple[int, int]]) -> Optional[Tuple[int, int]]:
+    if not isinstance(resolution, str):
+        return resolution
+    try:
+        width, height = map(int, resolution.split("x"))
+    except ValueError as error:
+        raise ValueError(f"resolution: expected (width, height) or 'WxH', not {resolution!r}") from error
+    return width, height
+
+
+def _aov(aov: Union[None, str, Sequence[str]]) -> Optional[List[str]]:
+    if isinstance(aov, str):
+        return [] if aov == "none" else aov.split(",")
+    return None if aov is None else list(aov)
+
+
 def _checkpoint(checkpoint: Union[None, Path, Tuple[Path, float]]) -> Optional[Tuple[str, float]]:
     if checkpoint is None:
         return None
@@ -159,7 +175,7 @@ def render(
     callback: Optional[Callable[[_lumiris.Progress], object]] = None,
     interval: float = 0.1,
     plan: Union[None, Path, Mapping[str, str]] = None,
-    resolution: Optional[Tuple[int, int]] = None,
+    resolution: Union[None, str, Tuple[int, int]] = None,
     crop: Optional[Tuple[float, float, float, float]] = None,
     box_filter: bool = False,
     accel: str = "embree",
@@ -171,7 +187,7 @@ def render(
     camera_auto: bool = False,
     time_in_scene: Optional[float] = None,
     texture_memory: Union[None, int, str] = None,
-    aov: Optional[Sequence[str]] = None,
+    aov: Union[None, str, Sequence[str]] = None,
     cryptomatte: Sequence[str] = (),
     part: Union[None, str, Tuple[int, int]] = None,
     part_by: Literal["samples", "tiles"] = "samples",
@@ -204,14 +220,14 @@ def render(
         Choices that an earlier rendering made by measurements (`Rendering.plan`), or a file of `lumiris plan`. Settings
         override them.
     resolution, crop, box_filter, accel, packet_width, threads, tile_size, time
-        As on the command line: columns and rows; x0, x1, y0, y1 in fractions of the image; a pixel filter of one pixel;
+        As on the command line: columns and rows, or text such as "640x360"; x0, x1, y0, y1 in fractions of the image; a pixel filter of one pixel;
         `embree` or `bvh`; rays per packet; threads; edge of a tile; seconds after which to stop.
     environment, camera_auto, time_in_scene
         Of glTF scenes: the image of an environment, whether the scene is framed whatever its cameras, and the time of its
         animations (s).
     aov
         Layers beside the image: `variance`, `samples`, `albedo`, `normal`, `depth`, `material`, `object`, `ratio`, `records`.
-        None asks for all that there are; an empty list saves the time for them.
+        None asks for all that there are; "none" or an empty list saves the time for them.
     texture_memory
         Most bytes that textures take in memory, as a number or a text such as `2G`; others are read by tiles from a
         temporary file. The image is the same.
@@ -251,7 +267,7 @@ def render(
     """
     options: Dict[str, object] = {
         "source": _source(scene, folder),
-        "resolution": resolution,
+        "resolution": _resolution(resolution),
         "crop": crop,
         "box_filter": box_filter,
         "accel": accel,
@@ -264,7 +280,7 @@ def render(
         "time_in_scene": time_in_scene,
         "texture_memory": None if texture_memory is None else str(texture_memory),
         "cryptomatte": [cryptomatte] if isinstance(cryptomatte, str) else list(cryptomatte),
-        "aov": None if aov is None else list(aov),
+        "aov": _aov(aov),
         "interval": interval,
         "settings": _texts(settings),
         "plan": _plan(plan),
@@ -289,7 +305,7 @@ def render(
 
 
 def merge(
-    parts: Iterable[Path], *, allow_missing: bool = False, aov: Optional[Sequence[str]] = None
+    parts: Iterable[Path], *, allow_missing: bool = False, aov: Union[None, str, Sequence[str]] = None
 ) -> Merged:
     """Merges parts of an image, in any order: the bits of the image that is rendered at once.
 
@@ -299,7 +315,7 @@ def merge(
     or of another image, and OSError for files that cannot be read.
     """
     paths = [os.fspath(part) for part in parts]
-    layers, metadata, place, missing, seconds = _lumiris.merge(paths, allow_missing, None if aov is None else list(aov))
+    layers, metadata, place, missing, seconds = _lumiris.merge(paths, allow_missing, _aov(aov))
     for what in missing:
         warnings.warn(f"{what}: missing", SceneWarning, stacklevel=2)
     merged = Merged._of(layers, metadata, place)

@@ -15,7 +15,7 @@ use lumiris::render::allocation::complete_for_noise;
 use lumiris::render::cryptomatte::{Cryptomatte, cryptomattes};
 use lumiris::render::output::{self, Aov};
 use lumiris::render::parts::{Asked, FilmFile, PartError, Storage, Stored};
-use lumiris::render::plan::prepare;
+use lumiris::render::plan::{Preparation, prepare};
 use lumiris::render::{Continuation, Progress, RenderError, RenderSettings, Rendering, go_on};
 use lumiris::scene::RenderJob;
 use lumiris::settings::value::{Kind, Value};
@@ -240,11 +240,21 @@ impl Request {
         divided.map_err(|error| Failure::Value(in_words_of_python(&error)))?;
         goes_on()?;
         let asks_for_ratio = asked.aovs.as_ref().is_some_and(|list| list.contains(&Aov::Ratio));
-        let plan = prepare(&mut job, self.render.threads, asks_for_ratio).map_err(|error| other(&error))?;
-        goes_on()?;
+        let start = Instant::now();
+        let how = Preparation {
+            threads: self.render.threads,
+            ratio_map: asks_for_ratio,
+            time_limit: self.render.time_limit.filter(|_| stored.is_none() && self.plan.is_empty()),
+            stop,
+        };
+        let plan = prepare(&mut job, &how).map_err(|error| match error {
+            RenderError::Stopped => Failure::Stopped,
+            error => other(&error),
+        })?;
         warnings.extend(plan.warnings);
 
         let mut settings = self.render_settings(&asked, &job);
+        settings.time_limit = settings.time_limit.map(|limit| limit.saturating_sub(start.elapsed()));
         let (mut film_file, told) = self.film_file(&asked, (&job, &files), &mut settings, stored)?;
         let continuation = film_file.as_mut().map_or_else(Continuation::default, FilmFile::continuation);
         let rendering =

@@ -219,3 +219,15 @@ def test_cryptomattes_are_those_of_the_program(scene_file: pathlib.Path, program
     assert np.all(coverage <= 1.0 + 1e-6) and np.mean(coverage > 0.99) > 0.5
     entries = {key: value for key, value in image.metadata.items() if key.startswith("cryptomatte/")}
     assert entries and all(expected.metadata[key] == value for key, value in entries.items())
+
+
+def test_resolution_and_layers_may_be_texts_of_the_command_line() -> None:
+    options: Dict[str, Any] = {"spp": 1, "estimator": "mis"}
+    image = lumiris.render(SCENE, resolution="5x4", aov="albedo,depth", **options)
+    same = lumiris.render(SCENE, resolution=(5, 4), aov=["albedo", "depth"], **options)
+    assert image["beauty"].shape == (4, 5, 3) and set(image) == set(same)
+    assert set(lumiris.render(SCENE, resolution="5x4", aov="none", **options)) == set(
+        lumiris.render(SCENE, resolution="5x4", aov=[], **options)
+    )
+    with pytest.raises(ValueError, match="'WxH'"):
+        lumiris.render(SCENE, resolution="5*4", **options)

@@ -31,7 +31,7 @@ use lumiris_numbers::math::hash::{pcg4d, unit_f32};
 use lumiris_numbers::math::luminance;
 use rayon::prelude::*;
 use std::collections::BTreeMap;
-use std::sync::atomic::AtomicBool;
+use std::sync::atomic::{AtomicBool, Ordering};
 
 /// Fewest samples per pixel for which a pilot pays.
 const MIN_SPP: u32 = 8;
@@ -62,16 +62,17 @@ const MIN_SCOUTED: usize = 256 * (COST_TILE * COST_TILE) as usize;
 /// Maximum number of samples per pixel for a standard error that is asked for, if none is given.
 const MAX_SPP_FOR_NOISE: u32 = 4096;
 
-/// The camera samples of each pixel, if the settings ask for different numbers and allow them.
-pub(super) fn allocate(job: &RenderJob) -> Option<PixelSamples> {
+/// The camera samples of each pixel, if the settings ask for different numbers and allow them. They are of no use once `stop` is
+/// true, which ends the pilot.
+pub(super) fn allocate(job: &RenderJob, stop: &AtomicBool) -> Option<PixelSamples> {
     let settings = job.settings();
     if let Some(noise) = settings.sampling.noise.filter(|_| allows_adaptive(settings)) {
-        return Some(counts_for(job, noise, settings.sampling.spp));
+        return Some(counts_for(job, noise, stop));
     }
     if settings.sampling.allocation != Allocation::Adaptive || !allows_adaptive(settings) {
         return None;
     }
-    let mut pilot = Pilot::new(job);
+    let mut pilot = Pilot::new(job, stop);
     let spp = settings.sampling.spp;
     pilot.measure(|tile| tile % SCOUTS == 0);
     // Few tiles say nothing of the others
@@ -159,6 +160,7 @@ fn variance(sums: &PixelSums) -> [f64; 3] {
 /// A few samples of the pixels, or of some of them.
 struct Pilot<'a> {
     job: &'a RenderJob,
+    stop: &'a AtomicBool,
     sampling: PilotSampling,
     rules: Rules,
     bounds: PixelBounds,
@@ -181,32 +183,35 @@ struct PilotSampling {
 
 impl<'a> Pilot<'a> {
     /// Without samples.
-    fn new(job: &'a RenderJob) -> Self {
+    fn new(job: &'a RenderJob, stop: &'a AtomicBool) -> Self {
         let (sampling, edge) = (&job.settings().sampling, reuse::edge(job));
         let rules = if edge > 1 { SHARED } else { ALONE };
-        let wanted = rules.fraction * f64::from(sampling.spp);
+        let wanted = rules.fraction * f64::from(sampling.pilot_spp());
         let spp = (wanted.round() as u32).clamp(PILOT_SPP[0], PILOT_SPP[1]);
         let sampling = PilotSampling {
             spp,
             fraction: (wanted / f64::from(spp)) as f32,
             seed: pcg4d([sampling.seed, PILOT_SEED, 0, 0])[0],
             edge,
-            sight: (sampling.spp / SIGHT_PART).clamp(SIGHT_SPP[0], SIGHT_SPP[1]),
+            sight: (sampling.pilot_spp() / SIGHT_PART).clamp(SIGHT_SPP[0], SIGHT_SPP[1]),
         };
         let bounds = job.world.scene.film.bounds;
         let pixels = vec![Measured::default(); bounds.area()];
-        Pilot { job, sampling, rules, bounds, pixels }
+        Pilot { job, stop, sampling, rules, bounds, pixels }
     }
 
     /// Samples the tiles whose numbers are chosen. Tiles with the same remainder lie on lattices.
     fn measure(&mut self, is_chosen: impl Fn(u32) -> bool) {
-        let (render, stop) = (RenderSettings::default(), AtomicBool::new(false));
-        let run = Run::new(self.job, &render, &stop, &|_| ());
+        let render = RenderSettings::default();
+        let run = Run::new(self.job, &render, self.stop, &|_| ());
         let mut tiles = self.bounds.tiles(COST_TILE);
         tiles.retain(|t| is_chosen((t.x0 - self.bounds.x0) / COST_TILE + 2 * ((t.y0 - self.bounds.y0) / COST_TILE)));
         let groups = if self.sampling.edge > 1 { Groups::Grid } else { Groups::None };
         let worker = || Worker::new(PathTracer::sharing(groups, self.rules.radius.is_none()));
-        let of_tile = |worker: &mut _, tile: &_| pilot_tile(&run, worker, tile, self.sampling);
+        let of_tile = |worker: &mut _, tile: &PixelBounds| {
+            let is_over = self.stop.load(Ordering::Relaxed);
+            if is_over { Vec::new() } else { pilot_tile(&run, worker, tile, self.sampling) }
+        };
         for tiles in tiles.chunks(TILES_AT_ONCE) {
             let measured: Vec<_> = tiles.par_iter().map_init(worker, of_tile).collect();
             for (tile, measured) in tiles.iter().zip(measured) {

@@ -29,8 +29,9 @@ use super::auto_measure::{Chunk, SEED, blocks, measure, pixels};
 use super::auto_reuse;
 pub use super::auto_round::Trial;
 use super::auto_round::{Candidate, Round};
+use super::preparation::Preparation;
 use super::visibility_cache::{PHOTON_PATHS, build_visibility_cache};
-use super::{RenderSettings, Run, processor_time};
+use super::{RenderError, RenderSettings, Run, processor_time};
 use crate::film::PixelBounds;
 use crate::integrators::light_paths::{self, LightPilot};
 use crate::integrators::reuse;
@@ -144,16 +145,16 @@ fn independent() -> [f64; 2] {
 
 /// Chooses, where the settings of `job` ask for it, and changes them; `None` if they do not, or if the image is too small
 /// for a pilot. On the threads of the current pool.
-pub(super) fn choose(job: &mut RenderJob) -> Option<AutoChoice> {
+pub(super) fn choose(job: &mut RenderJob, how: &Preparation<'_>) -> Result<Option<AutoChoice>, RenderError> {
     if job.settings().integrator.estimator != EstimatorKind::Auto {
-        return None;
+        return Ok(None);
     }
     let chooses_lights = auto_lights::is_open(&job.lights, &job.settings().integrator);
     let pilot = Pilot::new(job.settings(), &job.world.scene.film.bounds, chooses_lights);
-    let choice = pilot.map(|mut pilot| pilot.choose(job));
+    let choice = pilot.map(|mut pilot| pilot.choose(job, how)).transpose()?;
     let settings = choice.as_ref().map_or_else(|| unmeasured(job), |(_, settings)| *settings);
     job.change(|s| s.integrator = settings);
-    choice.map(|(choice, _)| choice)
+    Ok(choice.map(|(choice, _)| choice))
 }
 
 /// The settings of an image that is too small for a pilot: those that are good in most scenes.
@@ -211,8 +212,8 @@ fn resampled(settings: &IntegratorSettings) -> IntegratorSettings {
 /// efficient ratio by a model of what few and many proposals take and leave of the variance, where T2/T1 leaves out what
 /// each camera sample costs anyway [Talbot 2005, §4.3]. `None` if the image is too small for a pilot. On the threads of the
 /// current pool.
-pub(super) fn proposals(job: &RenderJob) -> Option<(u32, StageTimes)> {
-    let pilot = Pilot::new(job.settings(), &job.world.scene.film.bounds, false)?;
+pub(super) fn proposals(job: &RenderJob, how: &Preparation<'_>) -> Result<Option<(u32, StageTimes)>, RenderError> {
+    let Some(pilot) = Pilot::new(job.settings(), &job.world.scene.film.bounds, false) else { return Ok(None) };
     let base = job.settings().integrator;
     let samples = base.sample_counts().samples;
     let with_ratio = |ratio: u32| {
@@ -222,13 +223,13 @@ pub(super) fn proposals(job: &RenderJob) -> Option<(u32, StageTimes)> {
     };
     let candidates = FIT_RATIOS.map(with_ratio);
     pilot.warm_up(job, &candidates[0]);
-    let round = pilot.round(job, &candidates, FIRST_ROUND);
+    let round = pilot.round(job, &candidates, FIRST_ROUND, how)?;
     let ratios = FIT_RATIOS.map(|ratio| [f64::from(ratio), 1.0]);
     let model = round.models(&ratios, INDEPENDENT).remove(0);
     let [ratio, _] = model.best([&RATIOS, &[1]], NEARLY);
     let of_sample = |nanoseconds: f64| (nanoseconds / f64::from(samples) * 10.0).round().max(1.0) / 10.0;
     let times = StageTimes { t1: of_sample(model.cost[1]), t2: of_sample(model.cost[0]) };
-    Some((samples * ratio, times))
+    Ok(Some((samples * ratio, times)))
 }
 
 /// True if the estimator is `auto` and its choice follows from a pilot's times. Numbers of the image and of the settings
@@ -266,7 +267,7 @@ impl Pilot {
     /// Where `chooses_lights`, it has a round for that, if there is time.
     fn new(settings: &Settings, bounds: &PixelBounds, chooses_lights: bool) -> Option<Self> {
         let Settings { integrator, sampling } = settings;
-        let samples = bounds.area() as f64 * f64::from(sampling.spp);
+        let samples = bounds.area() as f64 * f64::from(sampling.pilot_spp());
         let kind = usize::from(integrator.depth() > 1);
         let (trials, fewest) = (TRIALS[kind], MIN_SPP[kind]);
         let pixels_in = |trials: f64, spp: u32| {
@@ -274,7 +275,7 @@ impl Pilot {
                 FRACTIONS.map(|fraction| (samples * fraction / (f64::from(2 * spp) * trials)) as usize);
             wanted.max(most.min(ENOUGH_PIXELS)).min(MAX_PIXELS)
         };
-        let mut spp = 1 << sampling.spp.clamp(1, MAX_SPP).ilog2();
+        let mut spp = 1 << sampling.pilot_spp().clamp(1, MAX_SPP).ilog2();
         while spp > fewest && pixels_in(trials, spp) < ENOUGH_PIXELS {
             spp /= 2;
         }
@@ -294,7 +295,11 @@ impl Pilot {
         })
     }
 
-    fn choose(&mut self, job: &mut RenderJob) -> (AutoChoice, IntegratorSettings) {
+    fn choose(
+        &mut self,
+        job: &mut RenderJob,
+        how: &Preparation<'_>,
+    ) -> Result<(AutoChoice, IntegratorSettings), RenderError> {
         let start = processor_time::of_process();
         if job.settings().integrator.light_paths.is_none_or(|paths| paths > 0.0) {
             self.light = LightPilot::new(job, LIGHT_PILOT);
@@ -302,7 +307,7 @@ impl Pilot {
         let has_later = job.settings().integrator.depth() > 1;
         let [few, many] = if has_later { FIT_PATH } else { FIT_DIRECT };
         self.warm_up(job, &Candidate::named(with_samples(&job.settings().integrator, [few, few])));
-        let lights = self.choose_lights(job, few);
+        let lights = self.choose_lights(job, few, how)?;
         let base = job.settings().integrator;
         let base = &base;
         // First round: the model
@@ -311,7 +316,7 @@ impl Pilot {
             numbers.push([few, many]);
         }
         let candidates: Vec<Candidate> = numbers.iter().map(|&n| Candidate::named(with_samples(base, n))).collect();
-        let first = self.round(job, &candidates, FIRST_ROUND);
+        let first = self.round(job, &candidates, FIRST_ROUND, how)?;
         let of_light = |n: u32| if has_later { n - 1 } else { n };
         let numbers: Vec<[f64; 2]> = numbers.iter().map(|n| n.map(|n| f64::from(of_light(n)))).collect();
         let is_net = has_later && job.settings().sampling.sampler != SamplerKind::Independent;
@@ -332,7 +337,7 @@ impl Pilot {
         if !job.world.scene.media.is_empty() {
             candidates.retain(|c| through_media::obstacle_of(&c.settings).is_none());
         }
-        let second = self.round(job, &candidates, SECOND_ROUND);
+        let second = self.round(job, &candidates, SECOND_ROUND, how)?;
         let predicted = |candidate: &Candidate| {
             let n = [0, 1].map(|vertex| candidate.settings.sample_counts_at(vertex).samples);
             let usual = without_pilot(base);
@@ -344,7 +349,7 @@ impl Pilot {
         let chosen = second.choose(&candidates, &predicted);
         let relative = second.relative;
         let second = second.trials(&candidates);
-        let (sharing, mut settings) = self.share(job, &candidates[chosen].settings, &model);
+        let (sharing, mut settings) = self.share(job, &candidates[chosen].settings, &model, how)?;
         let &Trial { variance, nanoseconds, .. } =
             if settings.path_reuse.is_some() { &sharing[1] } else { &second[chosen] };
         settings.light_paths = self.choose_light_paths(job, &settings, &Measured { variance, nanoseconds, relative });
@@ -363,31 +368,37 @@ impl Pilot {
             trials: [trials, second],
             sharing,
         };
-        (choice, settings)
+        Ok((choice, settings))
     }
 
     /// Before all other rounds: the fraction of light samples for lights at infinity, with `n` samples at each vertex.
-    fn choose_lights(&self, job: &mut RenderJob, n: u32) -> Vec<Trial> {
+    fn choose_lights(&self, job: &mut RenderJob, n: u32, how: &Preparation<'_>) -> Result<Vec<Trial>, RenderError> {
         let base = job.settings().integrator;
         if self.pixels[LIGHTS].is_empty() {
-            return Vec::new();
+            return Ok(Vec::new());
         }
         let usual = job.lights.tree_choice().infinite_fraction();
         let candidate = [Candidate::named(with_samples(&base, [n, n]))];
         let (trials, fraction) = auto_lights::best(usual, |fraction| {
             job.change(|s| s.integrator.infinite_fraction = fraction);
-            self.round(job, &candidate, LIGHTS)
-        });
+            self.round(job, &candidate, LIGHTS, how)
+        })?;
         job.change(|s| s.integrator.infinite_fraction = fraction);
-        trials
+        Ok(trials)
     }
 
     /// Third round: whether pixels share paths, and the numbers of samples if they do.
-    fn share(&self, job: &RenderJob, chosen: &IntegratorSettings, model: &Model) -> (Vec<Trial>, IntegratorSettings) {
+    fn share(
+        &self,
+        job: &RenderJob,
+        chosen: &IntegratorSettings,
+        model: &Model,
+        how: &Preparation<'_>,
+    ) -> Result<(Vec<Trial>, IntegratorSettings), RenderError> {
         let Settings { integrator: base, sampling } = *job.settings();
         let is_open = base.path_reuse.is_none() && sampling.allocation == Allocation::Auto;
         if !is_open || reuse::obstacle(job).is_some() || self.pixels[SHARING].is_empty() {
-            return (Vec::new(), *chosen);
+            return Ok((Vec::new(), *chosen));
         }
         // Twice the light samples at first and at later vertices, where they are open
         let is_mis = chosen.estimator == EstimatorKind::Mis;
@@ -397,7 +408,8 @@ impl Pilot {
         let is_open =
             is_mis && settings.iter().all(|s| [s.samples, s.later_samples] != [chosen.samples, chosen.later_samples]);
         let candidates = auto_reuse::candidates(chosen, if is_open { &settings } else { &[] });
-        let round = self.round(job, &candidates, SHARING).by_blocks((auto_reuse::EDGE * auto_reuse::EDGE) as usize);
+        let round = self.round(job, &candidates, SHARING, how)?;
+        let round = round.by_blocks((auto_reuse::EDGE * auto_reuse::EDGE) as usize);
         let trials = round.trials(&candidates);
         let shared = if is_open {
             let numbers = [light, more[0], more[1]].map(|n| n.map(f64::from));
@@ -412,10 +424,10 @@ impl Pilot {
         } else {
             auto_reuse::best(&round).map(|edge| (edge, light))
         };
-        let Some((edge, numbers)) = shared else { return (trials, *chosen) };
+        let Some((edge, numbers)) = shared else { return Ok((trials, *chosen)) };
         let numbers = if is_open { with_samples(&base, numbers.map(|n| n + 1)) } else { *chosen };
         let IntegratorSettings { samples, later_samples, .. } = numbers;
-        (trials, IntegratorSettings { path_reuse: Some(edge), samples, later_samples, ..*chosen })
+        Ok((trials, IntegratorSettings { path_reuse: Some(edge), samples, later_samples, ..*chosen }))
     }
 
     /// Last: how many light paths there are for each camera sample, where a camera sample by the settings has the variance and
@@ -425,7 +437,7 @@ impl Pilot {
         if settings.light_paths.is_some() || light_paths::obstacle_of(job, settings).is_some() {
             return settings.light_paths;
         }
-        let samples = job.world.scene.film.bounds.area() as f64 * f64::from(job.settings().sampling.spp);
+        let samples = job.world.scene.film.bounds.area() as f64 * f64::from(job.settings().sampling.pilot_spp());
         let error = |per_sample: f32| {
             let n = f64::from(per_sample);
             (at.variance + at.relative * light.variance(n)) * (at.nanoseconds + light.time(n, samples))
@@ -443,15 +455,22 @@ impl Pilot {
     }
 
     /// Measures all candidates on the pixels of a round.
-    fn round(&self, job: &RenderJob, candidates: &[Candidate], round: usize) -> Round {
+    fn round(
+        &self,
+        job: &RenderJob,
+        candidates: &[Candidate],
+        round: usize,
+        how: &Preparation<'_>,
+    ) -> Result<Round, RenderError> {
         let (render, stop) = (RenderSettings::default(), AtomicBool::new(false));
         let run = Run::new(job, &render, &stop, &|_| ());
         let seeds = [0, 1].map(|k| pcg4d([self.seed, SEED, round as u32, k])[0]);
         let chunks: Vec<_> = self.pixels[round].chunks(CHUNK).enumerate().collect();
         let of_chunk = |(i, pixels): (usize, &[[u32; 2]])| {
-            measure(&run, (pixels, self.spp), candidates, self.light.as_ref(), (seeds, i))
+            how.goes_on()?;
+            Ok(measure(&run, (pixels, self.spp), candidates, self.light.as_ref(), (seeds, i)))
         };
-        let measured: Vec<Chunk> = chunks.into_par_iter().map(of_chunk).collect();
+        let measured: Vec<Chunk> = chunks.into_par_iter().map(of_chunk).collect::<Result<_, RenderError>>()?;
         let samples = self.pixels[round].len() as f64 * f64::from(2 * self.spp);
         let of = |k: usize| {
             let nanoseconds = measured.iter().map(|chunk| chunk.of_candidates[k].0).sum::<f64>() / samples;
@@ -460,7 +479,7 @@ impl Pilot {
         };
         let is_direct = job.settings().integrator.depth() <= 1;
         let relative = measured.iter().map(|chunk| chunk.relative).sum::<f64>() / self.pixels[round].len() as f64;
-        Round { measured: (0..candidates.len()).map(of).collect(), spp: self.spp, is_direct, relative }
+        Ok(Round { measured: (0..candidates.len()).map(of).collect(), spp: self.spp, is_direct, relative })
     }
 }
 
@@ -500,7 +519,7 @@ fn second_round(base: &IntegratorSettings, best: [u32; 2]) -> Vec<Candidate> {
 /// so long that photons enough take little of its time.
 fn with_photons(job: &mut RenderJob, nanoseconds: f64) -> Vec<Candidate> {
     let Settings { integrator: mut base, sampling } = *job.settings();
-    let samples = job.world.scene.film.bounds.area() as f64 * f64::from(sampling.spp);
+    let samples = job.world.scene.film.bounds.area() as f64 * f64::from(sampling.pilot_spp());
     let affordable = samples * nanoseconds * PHOTON_SHARE / PHOTON_TIME;
     let given = base.photons.visibility_photons;
     if job.lights.lights.len() < MANY_LIGHTS || affordable < given.map_or(MIN_PHOTONS, f64::from) {

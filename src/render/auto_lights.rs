@@ -23,16 +23,19 @@ pub(super) fn is_open(lights: &LightSampling, settings: &IntegratorSettings) -> 
 }
 
 /// The fraction that is most efficient by what `measure` finds for each, in rounds of one candidate; the trials, of which the
-/// first is that without a choice, whose fraction is `usual`.
-pub(super) fn best(usual: f32, mut measure: impl FnMut(Option<f32>) -> Round) -> (Vec<Trial>, Option<f32>) {
-    let base = measure(None);
+/// first is that without a choice, whose fraction is `usual`. `Err` is that of `measure`.
+pub(super) fn best<E>(
+    usual: f32,
+    mut measure: impl FnMut(Option<f32>) -> Result<Round, E>,
+) -> Result<(Vec<Trial>, Option<f32>), E> {
+    let base = measure(None)?;
     let mut trials = vec![trial("infinite fraction as usual", &base, &base)];
     let above = FRACTIONS.iter().copied().filter(|&f| f > usual);
     let below = FRACTIONS.iter().rev().copied().filter(|&f| f < usual);
     for fractions in [above.collect::<Vec<_>>(), below.collect()] {
         let mut best: Option<(f32, Round)> = None;
         for fraction in fractions {
-            let found = measure(Some(fraction));
+            let found = measure(Some(fraction))?;
             trials.push(trial(&format!("infinite fraction {fraction}"), &found, &base));
             let (gain, error) = found.gain_over(best.as_ref().map_or(&base, |(_, round)| round));
             if gain <= MIN_GAIN.ln().max(MIN_ERRORS * error) {
@@ -41,10 +44,10 @@ pub(super) fn best(usual: f32, mut measure: impl FnMut(Option<f32>) -> Round) ->
             best = Some((fraction, found));
         }
         if let Some((fraction, _)) = best {
-            return (trials, Some(fraction));
+            return Ok((trials, Some(fraction)));
         }
     }
-    (trials, None)
+    Ok((trials, None))
 }
 
 fn trial(name: &str, round: &Round, base: &Round) -> Trial {
@@ -65,9 +68,10 @@ mod tests {
             let variance = a / p + b / (1.0 - p);
             let of_pixel = |i: usize| (0.9 + 0.2 * (i % 7) as f64 / 6.0) * variance;
             let differences = (0..224).map(of_pixel).map(|v| [v.sqrt(), 2.0 * v]).collect();
-            Round { measured: vec![(1.0 + c * (1.0 - p), differences)], spp: 4, is_direct: false, relative: 1.0 }
+            let measured = vec![(1.0 + c * (1.0 - p), differences)];
+            Ok::<_, ()>(Round { measured, spp: 4, is_direct: false, relative: 1.0 })
         };
-        let (trials, fraction) = best(0.5, measure);
+        let (trials, fraction) = best(0.5, measure).unwrap();
         (trials.len(), fraction)
     }
 

@@ -9,7 +9,7 @@
 //! Intervals are those of ±2 standard errors: of errors by the spread between blocks of the image, with the covariance of
 //! the two that are compared, and of CPU times by the spread between seeds.
 
-use super::plan::{Plan, prepare};
+use super::plan::{Plan, Preparation, prepare};
 use super::{RenderError, RenderSettings, processor_time, render};
 use crate::film::{PixelBounds, PixelSums};
 use crate::imaging::metrics::difference::DEFAULT_EPSILON;
@@ -138,7 +138,7 @@ fn image(
     render_settings: &RenderSettings,
 ) -> Result<(Vec<[f64; 3]>, Plan), RenderError> {
     job.reset(settings);
-    let plan = prepare(job, render_settings.threads, false)?;
+    let plan = prepare(job, &Preparation::on(render_settings.threads))?;
     let spp = job.pixel_samples.as_ref().map_or(job.settings().sampling.spp, |of_pixels| of_pixels.spp);
     let render_settings =
         RenderSettings { spp, with_features: false, with_replicas: false, time_limit: None, ..*render_settings };

@@ -25,6 +25,7 @@ pub mod output;
 pub mod parts;
 mod pilot_samples;
 pub mod plan;
+mod preparation;
 pub mod processor_time;
 mod run;
 mod tiles;
@@ -161,6 +162,9 @@ pub enum RenderError {
     /// There are media, and the settings leave them out.
     #[error("{0}")]
     Media(String),
+    /// It was stopped before the first sample.
+    #[error("stopped before the first sample")]
+    Stopped,
     /// Texels could not be read while rendering.
     #[error("{0}")]
     Texels(String),

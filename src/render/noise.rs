@@ -18,7 +18,7 @@ use crate::scene::{PixelSamples, RenderJob};
 use lumiris_numbers::math::hash::pcg4d;
 use lumiris_numbers::math::luminance;
 use rayon::prelude::*;
-use std::sync::atomic::AtomicBool;
+use std::sync::atomic::{AtomicBool, Ordering};
 
 /// Edge of a block (pixels).
 pub const BLOCK: u32 = 16;
@@ -29,16 +29,17 @@ const REACH: u32 = 16;
 /// Combined with the seed of the image to give those of the pilot.
 const SEED: u32 = 0x6e_6f_69_73;
 
-/// The camera samples of each pixel for a noise of `threshold` in every block, at most `limit`.
-pub(super) fn counts_for(job: &RenderJob, threshold: f32, limit: u32) -> PixelSamples {
-    let (render, stop) = (RenderSettings::default(), AtomicBool::new(false));
-    let run = Run::new(job, &render, &stop, &|_| ());
+/// The camera samples of each pixel for a noise of `threshold` in every block, at most those of the settings. They are of no use
+/// once `stop` is true, which ends the pilot.
+pub(super) fn counts_for(job: &RenderJob, threshold: f32, stop: &AtomicBool) -> PixelSamples {
+    let render = RenderSettings::default();
+    let run = Run::new(job, &render, stop, &|_| ());
     let seed = job.settings().sampling.seed;
     let seeds = [0, 1].map(|k| pcg4d([seed, SEED, 0, k])[0]);
     let bounds = job.world.scene.film.bounds;
     let blocks = bounds.tiles(BLOCK);
     let of_blocks: Vec<u32> =
-        blocks.par_iter().map(|block| count_of_block(&run, block, seeds, threshold, limit)).collect();
+        blocks.par_iter().map(|block| count_of_block(&run, block, seeds, threshold, stop)).collect();
 
     let mut counts = vec![1; bounds.area()];
     for (block, count) in blocks.iter().zip(of_blocks) {
@@ -52,7 +53,9 @@ pub(super) fn counts_for(job: &RenderJob, threshold: f32, limit: u32) -> PixelSa
 }
 
 /// The samples per pixel of a block.
-fn count_of_block(run: &Run<'_>, block: &PixelBounds, seeds: [u32; 2], threshold: f32, limit: u32) -> u32 {
+fn count_of_block(run: &Run<'_>, block: &PixelBounds, seeds: [u32; 2], threshold: f32, stop: &AtomicBool) -> u32 {
+    let sampling = &run.job.settings().sampling;
+    let (limit, pilot_limit) = (sampling.spp, sampling.pilot_spp());
     let mut sums = seeds.map(|_| vec![[0.0; 3]; block.area()]);
     let (mut done, mut until) = (0, FIRST);
     loop {
@@ -63,7 +66,7 @@ fn count_of_block(run: &Run<'_>, block: &PixelBounds, seeds: [u32; 2], threshold
         }
         done = until;
         let needed = samples_for(&sums, done, threshold);
-        if needed <= f64::from(REACH * 2 * done) || 2 * done >= limit {
+        if needed <= f64::from(REACH * 2 * done) || 2 * done >= pilot_limit || stop.load(Ordering::Relaxed) {
             return needed.clamp(1.0, f64::from(limit)) as u32;
         }
         until = 2 * done;

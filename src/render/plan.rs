@@ -12,6 +12,7 @@
 
 use super::allocation::allocate;
 use super::auto::{self, AutoChoice};
+pub use super::preparation::Preparation;
 use super::visibility_cache::build_visibility_cache;
 use super::{RenderError, RenderSettings, Run, ThreadError, camera_batches};
 use crate::direct::Fits;
@@ -28,7 +29,7 @@ use lumiris_numbers::estimators::ris::choice::{Costs, MomentsEstimate, Variances
 use lumiris_numbers::estimators::stats::median;
 use rayon::prelude::*;
 use std::sync::atomic::AtomicBool;
-use std::time::Duration;
+use std::time::{Duration, Instant};
 
 /// Camera rays on which times are measured.
 const TIMING_RAYS: usize = 8192;
@@ -65,15 +66,18 @@ pub struct RisChoice {
     pub sample_counts: SampleCounts,
 }
 
-/// Completes what the settings of `job` leave open, or says why there can be no image. `ratio_map` requests the map of
-/// the best M/N even if it is not used.
-pub fn prepare(job: &mut RenderJob, threads: Option<usize>, ratio_map: bool) -> Result<Plan, RenderError> {
+/// Completes what the settings of `job` leave open, or says why there can be no image.
+pub fn prepare(job: &mut RenderJob, how: &Preparation<'_>) -> Result<Plan, RenderError> {
     if let Some(obstacle) = through_media::obstacle(job) {
         return Err(RenderError::Media(obstacle));
     }
-    let pool = super::thread_pool(threads)?;
+    let pool = super::thread_pool(how.threads)?;
     let before = *job.settings();
-    let auto = pool.install(|| auto::choose(job));
+    if let Some(limit) = how.time_limit.filter(|_| has_pilot(&before) && before.sampling.pilot_spp.is_none()) {
+        let spp = pool.install(|| samples_in(job, limit));
+        job.change(|s| s.sampling.pilot_spp = Some(spp).filter(|&spp| spp < s.sampling.spp));
+    }
+    let auto = pool.install(|| auto::choose(job, how))?;
     if job.settings().sampling.allocation == Allocation::Auto {
         let is_adaptive = auto.is_some();
         let allocation = if is_adaptive { Allocation::Adaptive } else { Allocation::Uniform };
@@ -84,8 +88,9 @@ pub fn prepare(job: &mut RenderJob, threads: Option<usize>, ratio_map: bool) -> 
         let visibility_cache = pool.install(|| build_visibility_cache(job));
         job.lights.set_visibility_cache(visibility_cache.map(|(visibility_cache, _)| visibility_cache));
     }
-    let ris = choose_proposals(job, threads, ratio_map)?;
-    job.pixel_samples = pool.install(|| allocate(job));
+    let ris = choose_proposals(job, how)?;
+    job.pixel_samples = pool.install(|| allocate(job, how.stop));
+    how.goes_on()?;
     let shares_paths = job.settings().integrator.path_reuse.is_some_and(|edge| edge > 1);
     let obstacle = reuse::obstacle(job).filter(|_| shares_paths);
     let unshared = obstacle.map(|reason| format!("pixels do not share paths: {reason}"));
@@ -105,6 +110,33 @@ pub fn follows_from_times(settings: &Settings, bounds: &PixelBounds) -> bool {
     auto::is_measured(settings, bounds) || i.estimator == EstimatorKind::Ris && is_open
 }
 
+/// True if settings ask for pilots, which take a part of the time of the image.
+fn has_pilot(settings: &Settings) -> bool {
+    let sampling = &settings.sampling;
+    settings.integrator.estimator == EstimatorKind::Auto
+        || sampling.allocation == Allocation::Adaptive
+        || sampling.noise.is_some()
+}
+
+/// Samples per pixel for which there is time, about, on the threads of the current pool: as long as those of `mis` take.
+fn samples_in(job: &RenderJob, limit: Duration) -> u32 {
+    let batches = camera_batches(job, RenderSettings::default().tile_size, TIMING_RAYS);
+    let settings = IntegratorSettings { estimator: EstimatorKind::Mis, ..job.settings().integrator };
+    let trace = || {
+        rayon::broadcast(|_| {
+            let (mut tracer, mut out) = (PathTracer::default(), Vec::new());
+            batches.iter().for_each(|batch| tracer.trace(job, &settings, batch, &mut Fits::default(), &mut out));
+        })
+    };
+    // The first turn fills caches
+    let threads = trace().len();
+    let start = Instant::now();
+    trace();
+    let samples = threads as f64 * batches.iter().map(Vec::len).sum::<usize>() as f64;
+    let per_second = samples / start.elapsed().as_secs_f64().max(1e-9);
+    (limit.as_secs_f64() * per_second / job.world.scene.film.bounds.area().max(1) as f64) as u32
+}
+
 /// The settings that differ, either as they are set or by what is recorded of them: where something was open and the choice is
 /// what is recorded of open settings, too, it would be measured again.
 fn chosen(before: &Settings, after: &Settings) -> Vec<(&'static str, String)> {
@@ -115,11 +147,8 @@ fn chosen(before: &Settings, after: &Settings) -> Vec<(&'static str, String)> {
 }
 
 /// Chooses M and N of `ris`, if they are open.
-fn choose_proposals(
-    job: &mut RenderJob,
-    threads: Option<usize>,
-    ratio_map: bool,
-) -> Result<Option<RisChoice>, ThreadError> {
+fn choose_proposals(job: &mut RenderJob, how: &Preparation<'_>) -> Result<Option<RisChoice>, RenderError> {
+    let Preparation { threads, ratio_map, .. } = *how;
     let settings = job.settings().integrator;
     let is_open = !matches!(settings.ris.proposals, Proposals::Fixed(_));
     if settings.estimator != EstimatorKind::Ris || !is_open && !ratio_map {
@@ -129,7 +158,7 @@ fn choose_proposals(
     // By a pilot, or times alone; without light they do not matter
     let is_open = settings.ris.proposals == Proposals::Auto && settings.ris.stage_times.is_none();
     let pool = super::thread_pool(threads)?;
-    let by_pilot = if is_open { pool.install(|| auto::proposals(job)) } else { None };
+    let by_pilot = if is_open { pool.install(|| auto::proposals(job, how))? } else { None };
     let times = by_pilot.map(|(_, times)| times).or(settings.ris.stage_times).or_else(|| measure(job));
     let times = times.unwrap_or(StageTimes { t1: 1.0, t2: 1.0 });
 

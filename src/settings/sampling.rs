@@ -17,6 +17,8 @@ pub struct SamplingSettings {
     pub seed: u32,
     /// Samples per pixel that texture footprints are computed for; `spp` if `None`.
     pub footprint_spp: Option<u32>,
+    /// Samples per pixel that pilots are made for; `spp` if `None`.
+    pub pilot_spp: Option<u32>,
     /// How camera samples are distributed over the pixels.
     pub allocation: Allocation,
     /// Relative standard error that every block of the image is to have; `spp` is then the maximum number of samples.
@@ -43,6 +45,7 @@ impl Default for SamplingSettings {
             spp: 16,
             seed: 0,
             footprint_spp: None,
+            pilot_spp: None,
             allocation: Allocation::Auto,
             noise: None,
         }
@@ -53,6 +56,11 @@ impl SamplingSettings {
     /// Samples per pixel that texture footprints are computed for.
     pub fn footprint_spp(&self) -> u32 {
         self.footprint_spp.unwrap_or(self.spp).max(1)
+    }
+
+    /// Samples per pixel that pilots are made for: a pilot takes a part of their time.
+    pub fn pilot_spp(&self) -> u32 {
+        self.pilot_spp.map_or(self.spp, |n| n.min(self.spp)).max(1)
     }
 
     /// Width of a texture footprint in pixels: the distance of neighbouring samples, 1/√spp, but at least an eighth

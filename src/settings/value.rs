@@ -128,6 +128,11 @@ impl Integers {
     /// All numbers of 32 bits.
     pub const ALL: Integers = Integers { min: 0, max: u32::MAX as u64 };
 
+    /// True if the upper bound is that of the numbers that are stored.
+    fn is_open(&self) -> bool {
+        self.max >= u64::from(u32::MAX)
+    }
+
     /// True if `n` lies between the bounds.
     pub fn contains(&self, n: i64) -> bool {
         u64::try_from(n).is_ok_and(|n| (self.min..=self.max).contains(&n))
@@ -137,7 +142,7 @@ impl Integers {
 impl fmt::Display for Integers {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         let Integers { min, max } = self;
-        if *max >= u64::from(u32::MAX) { write!(f, "at least {min}") } else { write!(f, "from {min} to {max}") }
+        if self.is_open() { write!(f, "at least {min}") } else { write!(f, "from {min} to {max}") }
     }
 }
 
@@ -215,7 +220,13 @@ impl Kind {
             }
             Kind::Bytes => bytes(text).map(Value::Integer),
         };
-        value.ok_or_else(|| format!("expected {self}"))
+        value.ok_or_else(|| match self {
+            // Not said elsewhere, since it is no limit of what is sensible
+            Kind::Integer { range, .. } if range.is_open() && text.parse().is_ok_and(|n: u64| n > range.max) => {
+                format!("expected a whole number from {} to {}", range.min, range.max)
+            }
+            _ => format!("expected {self}"),
+        })
     }
 }
 
@@ -293,6 +304,14 @@ mod tests {
             let expected = "expected none, floor:E or cut-off:E, E being above 0 and up to 1";
             assert_eq!(kind.parse(wrong), Err(expected.to_owned()), "{wrong}");
         }
+    }
+
+    #[test]
+    fn numbers_that_are_too_large_to_be_stored_are_told_the_largest() {
+        let integer = Kind::Integer { range: Integers { min: 1, ..Integers::ALL }, words: &[] };
+        assert_eq!(integer.parse("4294967295"), Ok(Value::Integer(4_294_967_295)));
+        assert_eq!(integer.parse("4294967296"), Err("expected a whole number from 1 to 4294967295".to_owned()));
+        assert_eq!(integer.parse("0"), Err("expected a whole number at least 1".to_owned()));
     }
 
     #[test]

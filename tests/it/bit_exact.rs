@@ -4,7 +4,7 @@ use lumiris::film::Film;
 use lumiris::import::{LoadOptions, load};
 use lumiris::lights::LightSamplerKind;
 use lumiris::render::output::{Aov, channels};
-use lumiris::render::plan::prepare;
+use lumiris::render::plan::{Preparation, prepare};
 use lumiris::render::{RenderSettings, render};
 use lumiris::scene::{AccelKind, RenderJob};
 use lumiris::settings::{EstimatorKind, Proposals, RouletteKind, Target};
@@ -141,7 +141,7 @@ fn what_a_plan_chose_gives_the_same_image_when_it_is_given() {
         // Chosen from times of this run
         let mut planned = gallery(EstimatorKind::Ris, None);
         planned.change(|s| s.integrator.ris.proposals = proposals);
-        let plan = prepare(&mut planned, Some(2), false).unwrap().ris.unwrap();
+        let plan = prepare(&mut planned, &Preparation::on(Some(2))).unwrap().ris.unwrap();
         assert!(
             plan.sample_counts.proposals >= plan.sample_counts.samples && plan.times.t1 > 0.0 && plan.times.t2 > 0.0
         );
@@ -153,7 +153,7 @@ fn what_a_plan_chose_gives_the_same_image_when_it_is_given() {
         if proposals == Proposals::Optimal {
             let times = Some(plan.times);
             given.change(|s| (s.integrator.ris.proposals, s.integrator.ris.stage_times) = (proposals, times));
-            prepare(&mut given, Some(1), false).unwrap();
+            prepare(&mut given, &Preparation::on(Some(1))).unwrap();
         } else {
             given.change(|s| s.integrator.ris.proposals = Proposals::Fixed(plan.sample_counts.proposals));
         }
@@ -170,7 +170,7 @@ fn images_with_photons_that_tell_of_lights_are_the_same_for_any_number_of_thread
             job.change(|s| s.integrator.ris.target = Target::Visibility);
             job.change(|s| s.integrator.photons.visibility_photons = Some(20_000));
             job.change(|s| s.integrator.light_sampler = LightSamplerKind::Photons);
-            prepare(&mut job, Some(threads), false).unwrap();
+            prepare(&mut job, &Preparation::on(Some(threads))).unwrap();
             assert!(job.lights.visibility_cache().is_some());
             film(&job, RenderSettings { threads: Some(threads), ..RenderSettings::default() })
         };

@@ -7,7 +7,7 @@ use lumiris::film::{Film, PixelSums};
 use lumiris::import::cache::FileCache;
 use lumiris::import::{LoadOptions, load_text};
 use lumiris::integrators::reuse;
-use lumiris::render::plan::prepare;
+use lumiris::render::plan::{Preparation, prepare};
 use lumiris::render::{RenderSettings, render};
 use lumiris::scene::{AccelKind, RenderJob};
 use lumiris::settings::{EstimatorKind, IntegratorKind, IntegratorSettings, Proposals, RouletteKind, Target};
@@ -455,7 +455,7 @@ fn settings_that_leave_media_out_are_refused() {
     let error = |job: &mut RenderJob| {
         let settings = RenderSettings::default();
         let rendered = render(job, &settings, &AtomicBool::new(false), &|_| ()).map(|_| ()).unwrap_err().to_string();
-        assert_eq!(prepare(job, None, false).unwrap_err().to_string(), rendered);
+        assert_eq!(prepare(job, &Preparation::on(None)).unwrap_err().to_string(), rendered);
         rendered
     };
     for kind in [EstimatorKind::Ocv, EstimatorKind::OptimalMis, EstimatorKind::Correlated] {
@@ -472,7 +472,7 @@ fn settings_that_leave_media_out_are_refused() {
     // Paths are not shared, and say so
     job.change(|s| (s.integrator.kind, s.integrator.path_reuse) = (IntegratorKind::Path, Some(4)));
     assert!(reuse::obstacle(&job).unwrap().contains("media"));
-    let plan = prepare(&mut job, None, false).unwrap();
+    let plan = prepare(&mut job, &Preparation::on(None)).unwrap();
     assert!(plan.warnings.iter().any(|w| w.contains("media")), "{:?}", plan.warnings);
 }
 
@@ -488,7 +488,7 @@ fn auto_knows_media() {
     );
     let mut job = job(&text, AccelKind::Embree);
     job.change(|s| (s.integrator.estimator, s.sampling.spp) = (EstimatorKind::Auto, 1024));
-    let plan = prepare(&mut job, None, false).unwrap();
+    let plan = prepare(&mut job, &Preparation::on(None)).unwrap();
     assert!(plan.auto.is_some(), "the image is large enough for a pilot");
     assert_eq!(reuse::edge(&job), 1);
     job.pixel_samples = None;

@@ -4,7 +4,7 @@ use crate::analytic_scenes::answer;
 use lumiris::film::{Film, PixelSums};
 use lumiris::import::{LoadOptions, load};
 use lumiris::integrators::reuse;
-use lumiris::render::plan::{follows_from_times, prepare};
+use lumiris::render::plan::{Preparation, follows_from_times, prepare};
 use lumiris::render::{RenderSettings, render};
 use lumiris::scene::{AccelKind, PixelSamples, RenderJob};
 use lumiris::settings::{Allocation, EstimatorKind, IntegratorKind, IntegratorSettings, RouletteKind};
@@ -197,7 +197,7 @@ fn auto_shares_paths_in_images_that_are_too_small_to_be_measured() {
         change(&mut job);
         let bounds = job.world.scene.film.bounds;
         assert!(!follows_from_times(job.settings(), &bounds));
-        prepare(&mut job, Some(1), false).unwrap();
+        prepare(&mut job, &Preparation::on(Some(1))).unwrap();
         let IntegratorSettings { estimator, path_reuse, .. } = job.settings().integrator;
         assert_eq!(estimator, EstimatorKind::Mis);
         let samples = [0, 1].map(|vertex| job.settings().integrator.sample_counts_at(vertex).samples);

@@ -3,14 +3,15 @@
 use lumiris::film::{Film, PixelSums};
 use lumiris::import::{LoadOptions, load};
 use lumiris::lights::LightSamplerKind;
-use lumiris::render::plan::prepare;
-use lumiris::render::{RenderSettings, render};
+use lumiris::render::plan::{Preparation, prepare};
+use lumiris::render::{RenderError, RenderSettings, render};
 use lumiris::scene::{AccelKind, PixelSamples, RenderJob};
 use lumiris::settings::{Allocation, EstimatorKind, IntegratorKind, Settings};
 use lumiris_numbers::estimators::stats::{Welford, z_test};
 use lumiris_numbers::math::luminance;
 use std::path::Path;
 use std::sync::atomic::AtomicBool;
+use std::time::Duration;
 
 fn gallery(change: impl FnOnce(&mut Settings)) -> RenderJob {
     let path = Path::new(env!("CARGO_MANIFEST_DIR")).join("scenes/demo/gallery.pbrt");
@@ -25,7 +26,7 @@ fn gallery(change: impl FnOnce(&mut Settings)) -> RenderJob {
 
 /// The film, with the numbers of samples that were decided on.
 fn rendered(job: &mut RenderJob, threads: usize, tile_size: u32) -> (Film, PixelSamples) {
-    prepare(job, Some(threads), false).unwrap();
+    prepare(job, &Preparation::on(Some(threads))).unwrap();
     let samples = job.pixel_samples.clone().expect("numbers that differ");
     let settings = RenderSettings {
         threads: Some(threads),
@@ -82,7 +83,7 @@ fn integrators_that_share_noise_and_estimators_that_fit_blocks_have_uniform_numb
             s.sampling.allocation = Allocation::Adaptive;
             change(s);
         });
-        prepare(&mut job, Some(2), false).unwrap();
+        prepare(&mut job, &Preparation::on(Some(2))).unwrap();
         assert_eq!(job.pixel_samples, None);
     }
 }
@@ -169,7 +170,7 @@ fn numbers_of_samples_add_no_bias() {
         noise.add(mean(&film.pixels()));
 
         job.change(|s| (s.sampling.noise, s.sampling.allocation, s.sampling.spp) = (None, Allocation::Adaptive, 16));
-        prepare(&mut job, Some(1), false).unwrap();
+        prepare(&mut job, &Preparation::on(Some(1))).unwrap();
         adaptive.add(mean(&part(&job, 0, 16).pixels()));
         job.pixel_samples = None;
         if seed < RUNS / 4 {
@@ -182,4 +183,45 @@ fn numbers_of_samples_add_no_bias() {
     assert!(z(&adaptive).abs() < 3.0, "adaptive: {} instead of {truth}, z = {}", adaptive.mean(), z(&adaptive));
     // A quarter of the runs suffices to find the bias of samples that decide on their own number
     assert!(z(&wrong) < -5.0, "{} instead of {truth}, z = {}", wrong.mean(), z(&wrong));
+}
+
+#[test]
+fn pilots_are_made_for_the_samples_that_there_is_time_for_and_end_when_they_are_stopped() {
+    let job = || {
+        gallery(|s| {
+            s.integrator.estimator = EstimatorKind::Auto;
+            s.sampling.spp = 100_000;
+        })
+    };
+    let in_time = |limit: f64, spp: Option<u32>| {
+        let mut job = job();
+        job.change(|s| s.sampling.pilot_spp = spp);
+        let time_limit = Some(Duration::from_secs_f64(limit));
+        let plan = prepare(&mut job, &Preparation { time_limit, ..Preparation::on(Some(1)) }).unwrap();
+        let chosen = plan.chosen.iter().find(|(key, _)| *key == "pilot_spp").map(|(_, value)| value.clone());
+        (job.settings().sampling.pilot_spp, chosen)
+    };
+    let (spp, chosen) = in_time(0.05, None);
+    assert!(spp.is_some_and(|spp| spp < 10_000), "{spp:?}");
+    assert_eq!(chosen, spp.map(|spp| spp.to_string()), "it becomes a setting, on which images depend");
+    assert_eq!(in_time(0.05, Some(20)), (Some(20), None), "what is set stays");
+
+    let stop = AtomicBool::new(true);
+    let error = prepare(&mut job(), &Preparation { stop: &stop, ..Preparation::on(Some(1)) }).unwrap_err();
+    assert!(matches!(error, RenderError::Stopped), "{error}");
+}
+
+#[test]
+fn numbers_of_pixels_follow_from_the_pilot_that_is_asked_for() {
+    let counts = |pilot_spp: Option<u32>, spp: u32| {
+        let mut job = gallery(|s| {
+            s.sampling.allocation = Allocation::Adaptive;
+            (s.sampling.spp, s.sampling.pilot_spp) = (spp, pilot_spp);
+        });
+        prepare(&mut job, &Preparation::on(Some(2))).unwrap();
+        job.pixel_samples.map(|samples| samples.counts)
+    };
+    assert_eq!(counts(Some(64), 64), counts(None, 64));
+    assert_eq!(counts(Some(1000), 64), counts(None, 64), "not more than there are samples");
+    assert!(counts(Some(32), 4096).is_some_and(|few| Some(few) != counts(None, 4096)));
 }

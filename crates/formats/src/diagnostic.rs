@@ -113,6 +113,11 @@ impl Diagnostics {
         self.push(Severity::Error, None, message.into())
     }
 
+    /// Adds a warning that has no place in a file.
+    pub fn warning_without_place(&mut self, message: impl Into<String>) -> &mut Diagnostic {
+        self.push(Severity::Warning, None, message.into())
+    }
+
     /// Adds a warning at `span`.
     pub fn warning(&mut self, span: Span, message: impl Into<String>) -> &mut Diagnostic {
         self.push(Severity::Warning, Some(span), message.into())

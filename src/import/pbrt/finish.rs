@@ -16,6 +16,7 @@ use crate::import::images::RgbImage;
 use crate::import::resources::report;
 use crate::lights::{Emission, EmissionImage, LightSetBuilder, area_lights_of};
 use crate::materials::{Material, MaterialId, MaterialSet};
+use crate::media::Medium;
 use crate::scene::{Scene, Surface};
 use crate::settings::Settings;
 use crate::textures::TextureSet;
@@ -129,6 +130,9 @@ impl Builder<'_> {
             d.warning_once(*span, message).map(|w| w.help("reverse the order of its corners"));
         }
         let lights = lights.build(&bounds);
+        if lights.lights.is_empty() && !assembly.media.set.media.iter().any(Medium::is_emissive) {
+            d.warning_without_place("nothing emits light: the image will be black");
+        }
         let scene = Scene {
             camera,
             film,

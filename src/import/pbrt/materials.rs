@@ -281,7 +281,11 @@ impl Builder<'_> {
         default: Rgb,
         d: &mut Diagnostics,
     ) -> RgbTextureId {
-        self.rgb_param(p, name, default, SpectrumUse::Albedo, d)
+        let albedo = self.rgb_param(p, name, default, SpectrumUse::Albedo, d);
+        if self.textures.constant_rgb(albedo).is_some_and(|c| c != c.clamp(0.0, 1.0)) {
+            d.warning_once(p.span_of(name), format!("`{name}` is beyond 0 to 1, to which it is clamped"));
+        }
+        albedo
     }
 
     pub(super) fn roughness(
@@ -297,6 +301,12 @@ impl Builder<'_> {
             None => both,
         };
         let (u, v) = (axis(names[1]), axis(names[2]));
+        for (name, texture) in names.into_iter().zip([both, u, v]) {
+            let value = self.textures.constant_float(texture).filter(|_| p.type_of(name).is_some());
+            if let Some(wrong) = value.filter(|value| !(*value >= 0.0 && value.is_finite())) {
+                d.error(p.span_of(name), format!("{name} must be at least 0, not {wrong}"));
+            }
+        }
         Roughness { u, v, remap: p.boolean("remaproughness", d).unwrap_or(true) }
     }
 

@@ -195,6 +195,16 @@ fn vec3s(p: &mut ParamSet, name: &'static str, types: &[ParamType], d: &mut Diag
     Some(out)
 }
 
+/// The vertices of a mesh; without them the rest of it is nothing to speak of.
+fn positions(p: &mut ParamSet, d: &mut Diagnostics) -> Option<Vec<Vec3>> {
+    let positions = vec3s(p, "P", POINTS, d);
+    if positions.is_none() {
+        d.error(p.span, format!("{} needs `point3 P`", p.owner));
+        p.ignore_all();
+    }
+    positions
+}
+
 /// Texture coordinates under any of their names.
 fn uvs(p: &mut ParamSet, d: &mut Diagnostics) -> Vec<Vec2> {
     let floats = p.take_floats("uv", UVS, d).or_else(|| p.take_floats("st", UVS, d)).unwrap_or_default();
@@ -242,10 +252,7 @@ fn face_numbers(p: &mut ParamSet, count: usize, d: &mut Diagnostics) -> Vec<u32>
 }
 
 fn mesh_data(p: &mut ParamSet, d: &mut Diagnostics) -> Option<MeshData> {
-    let Some(positions) = vec3s(p, "P", POINTS, d) else {
-        d.error(p.span, format!("{} needs `point3 P`", p.owner));
-        return None;
-    };
+    let positions = positions(p, d)?;
     let count = positions.len();
     let normals = vec3s(p, "N", NORMALS, d).unwrap_or_default();
     let tangents = vec3s(p, "S", VECTORS, d).unwrap_or_default();
@@ -263,10 +270,7 @@ fn mesh_data(p: &mut ParamSet, d: &mut Diagnostics) -> Option<MeshData> {
 }
 
 fn patch_data(p: &mut ParamSet, d: &mut Diagnostics) -> Option<PatchData> {
-    let Some(positions) = vec3s(p, "P", POINTS, d) else {
-        d.error(p.span, format!("{} needs `point3 P`", p.owner));
-        return None;
-    };
+    let positions = positions(p, d)?;
     let count = positions.len();
     let normals = vec3s(p, "N", NORMALS, d).unwrap_or_default();
     let uvs = uvs(p, d);

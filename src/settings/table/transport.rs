@@ -200,8 +200,8 @@ pub(super) const SAMPLING: Group = Group {
             key: "allocation",
             kind: choice(Allocation::VARIANTS),
             help: "Distribution of the camera samples over the pixels: as many in each, or more where a pilot finds more \
-                   noise, so that --spp is their mean. Adaptive numbers are for the integrators direct and path, from 8 \
-                   samples per pixel on",
+                   noise, in about the time of --spp in each. Adaptive numbers are for the integrators direct and path, \
+                   from 8 samples per pixel on",
             default: "auto: adaptive with --estimator auto, otherwise uniform",
             get: |s| Some(Value::Name(s.sampling.allocation.into())),
             set: |s, v| v.named().map(|allocation| s.sampling.allocation = allocation),
@@ -238,6 +238,20 @@ pub(super) const SAMPLING: Group = Group {
             get: |s| s.sampling.footprint_spp.map(|n| Value::Integer(n.into())),
             resolved: Some(|s| Some(Value::Integer(s.sampling.footprint_spp().into()))),
             set: |s, v| v.count().map(|n| s.sampling.footprint_spp = Some(n)),
+            ..Setting::BASE
+        },
+        Setting {
+            flag: "pilot-spp",
+            value_name: "K",
+            directive: Directive::Sampler,
+            parameters: &["pilotspp"],
+            key: "pilot_spp",
+            kind: integer(1, MAX_U32),
+            help: "Camera samples per pixel that pilots are made for, if that is less than --spp: pilots take a part of their \
+                   time",
+            default: "--spp; with --time as many as there is time for",
+            get: |s| s.sampling.pilot_spp.map(|n| Value::Integer(n.into())),
+            set: |s, v| v.count().map(|n| s.sampling.pilot_spp = Some(n)),
             ..Setting::BASE
         },
         Setting {

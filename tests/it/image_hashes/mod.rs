@@ -7,7 +7,7 @@
 
 use lumiris::film::Film;
 use lumiris::import::{LoadOptions, load};
-use lumiris::render::plan::prepare;
+use lumiris::render::plan::{Preparation, prepare};
 use lumiris::render::{RenderSettings, render};
 use lumiris::scene::AccelKind;
 use std::fmt::Write;
@@ -134,7 +134,7 @@ fn row(folder: &Path, scene: &str, size: [u32; 2], sampler: &str, integrator: &s
     let options = LoadOptions { resolution: Some(size), ..LoadOptions::default() };
     let loaded = load(&path, &options).map_err(|report| report.to_string()).unwrap();
     let mut job = loaded.job(AccelKind::Embree, None).unwrap();
-    prepare(&mut job, Some(2), false).unwrap();
+    prepare(&mut job, &Preparation::on(Some(2))).unwrap();
     let settings = RenderSettings { threads: Some(2), spp: SPP, ..RenderSettings::default() };
     hash(&render(&job, &settings, &AtomicBool::new(false), &|_| ()).unwrap().film)
 }

@@ -42,7 +42,7 @@ pub(super) struct SceneArgs {
     /// Image of the environment of a glTF scene: latitude and longitude, or a square of equal areas
     #[arg(long, value_name = "FILE")]
     pub environment: Option<PathBuf>,
-    /// Frame a glTF scene from the front, whatever its cameras
+    /// Frame a glTF scene from the front and somewhat above, whatever its cameras
     #[arg(long)]
     pub camera_auto: bool,
     /// Time (s) at which the animations of a glTF scene are seen [default: without animations]
@@ -103,7 +103,8 @@ pub(super) struct RenderArgs {
     /// With --frames: leave out those whose images are there, and were not cut short by Ctrl-C
     #[arg(long, requires = "frames")]
     pub skip_existing: bool,
-    /// Stop after the first pass that ends later than this many seconds, if not all samples per pixel are done before
+    /// Stop after the first pass that ends later than this many seconds from when the scene is loaded, pilots included, if not all
+    /// samples per pixel are done before
     #[arg(long, value_name = "SECONDS", value_parser = parse_seconds)]
     pub time: Option<f64>,
     /// AOVs: additional channels of EXR files, or `none`, which saves the time for them [default: all, and ratio with

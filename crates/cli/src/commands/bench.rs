@@ -9,6 +9,7 @@ use clap::{Args, ValueEnum};
 use lumiris::render::bench::{BenchSettings, RayCase, Report, measure};
 use lumiris::render::bench_frame::{FrameReport, measure_frame};
 use lumiris::render::bench_photons::{PhotonReport, measure_photons};
+use lumiris::render::plan::Preparation;
 use lumiris::scene::{AccelKind, RenderJob};
 use lumiris_formats::output::write_text;
 use serde_json::json;
@@ -68,7 +69,7 @@ pub(super) fn run(args: &BenchArgs) -> anyhow::Result<ExitCode> {
         bail!("bench measures Embree; leave out --accel");
     }
     let (mut job, times) = load_job(&args.scene)?;
-    plan(&args.scene, &mut job, false, false)?;
+    plan(&args.scene, &mut job, &Preparation::default(), false)?;
     let asked = |subject| args.subject == subject || args.subject == Subject::All;
     let settings = BenchSettings {
         intersect: asked(Subject::Intersect),

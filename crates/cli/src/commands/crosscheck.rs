@@ -9,6 +9,7 @@ use lumiris::accel::Accel;
 use lumiris::accel::bvh::Bvh;
 use lumiris::imaging::oiio::{self, Part};
 use lumiris::render::crosscheck::{EDGE_ULPS, Report, T_TOLERANCE_ULPS, crosscheck};
+use lumiris::render::plan::Preparation;
 use lumiris::render::{output, render};
 use lumiris::scene::{AccelKind, RenderJob, World};
 use lumiris_formats::output::write_text;
@@ -64,7 +65,7 @@ pub(super) fn run(args: &CrosscheckArgs) -> anyhow::Result<ExitCode> {
 
     // Rays
     let (mut job, _) = load_job(&args.scene)?;
-    plan(&args.scene, &mut job, false, true)?;
+    plan(&args.scene, &mut job, &Preparation::default(), true)?;
     let bvh: Box<dyn Accel> =
         Box::new(Bvh::new(Arc::clone(&job.world.scene.geometry), Some(Arc::clone(&job.world.scene.textures) as _)));
     let report = crosscheck(&job, &*bvh, args.rays);

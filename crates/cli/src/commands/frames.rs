@@ -8,7 +8,7 @@ use super::args::RenderArgs;
 use super::frame_list::{FrameList, has_number, numbered};
 use super::pictures::are_complete;
 use super::progress;
-use super::render::{INTERRUPTED, Rendered, Session, check, render_one, write_stats};
+use super::render::{INTERRUPTED, Rendered, Session, check, is_stop, render_one, write_stats};
 use lumiris::import::cache::{FileCache, FileCounts};
 use lumiris::import::is_gltf;
 use serde_json::json;
@@ -114,6 +114,7 @@ fn render_frame(args: &RenderArgs, session: &Session) -> Outcome {
     match render_one(args, session) {
         Ok(rendered) if rendered.misplaced.is_empty() => Outcome::Done(rendered),
         Ok(rendered) => Outcome::Failed(rendered.misplaced.join("; "), Some(rendered)),
+        Err(error) if is_stop(&error) => Outcome::NotRendered,
         Err(error) => {
             let reason = format!("{error:#}");
             progress::say(&format!("lumiris: {reason}"));

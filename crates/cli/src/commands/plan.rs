@@ -6,6 +6,7 @@ use super::settings::{load_job, plan};
 use anyhow::Context;
 use clap::Args;
 use lumiris::render::auto::{AutoChoice, Trial};
+use lumiris::render::plan::Preparation;
 use lumiris_formats::output::write_text;
 use std::path::PathBuf;
 use std::process::ExitCode;
@@ -22,7 +23,7 @@ pub(super) struct PlanArgs {
 
 pub(super) fn run(args: &PlanArgs) -> anyhow::Result<ExitCode> {
     let (mut job, _) = load_job(&args.scene)?;
-    let file = plan(&args.scene, &mut job, false, true)?;
+    let file = plan(&args.scene, &mut job, &Preparation::default(), true)?;
     if let Ok(auto) = serde_json::from_value::<AutoChoice>(file.auto.clone()) {
         progress::print(&table(&auto));
     }

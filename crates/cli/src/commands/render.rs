@@ -23,7 +23,8 @@ use lumiris::render::cryptomatte::cryptomattes;
 use lumiris::render::memory::{Wanted, predict};
 use lumiris::render::output::{self, Aov};
 use lumiris::render::parts::FilmFile;
-use lumiris::render::{CacheReport, Continuation, Progress, RenderSettings, Rendering, TileShare, go_on};
+use lumiris::render::plan::Preparation;
+use lumiris::render::{CacheReport, Continuation, Progress, RenderError, RenderSettings, Rendering, TileShare, go_on};
 use lumiris::scene::RenderJob;
 use lumiris_formats::output::write_text;
 use serde_json::json;
@@ -31,7 +32,7 @@ use std::path::{Path, PathBuf};
 use std::process::ExitCode;
 use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
-use std::time::Duration;
+use std::time::{Duration, Instant};
 
 /// Exit code of a rendering that was stopped by Ctrl-C, as in shells.
 pub(super) const INTERRUPTED: u8 = 130;
@@ -54,7 +55,7 @@ pub(super) struct Session {
 pub(super) struct Rendered {
     /// Statistics.
     pub stats: serde_json::Value,
-    /// Wall-clock time of the rendering (s).
+    /// Wall-clock time of the rendering, with that of pilots (s).
     pub seconds: f64,
     /// Mean relative standard error of the pixels.
     pub noise: f64,
@@ -66,7 +67,13 @@ pub(super) struct Rendered {
 
 pub(super) fn run(args: &RenderArgs) -> anyhow::Result<ExitCode> {
     let session = Session::start(args, FileCache::default())?;
-    let mut rendered = render_one(args, &session)?;
+    let mut rendered = match render_one(args, &session) {
+        Err(error) if is_stop(&error) => {
+            progress::say(&format!("{error}: nothing is written"));
+            return Ok(ExitCode::from(INTERRUPTED));
+        }
+        result => result?,
+    };
     if let Some(path) = &args.stats {
         rendered.misplaced.extend(write_stats(path, &rendered.stats).err().map(|e| format!("{e:#}")));
     }
@@ -74,6 +81,11 @@ pub(super) fn run(args: &RenderArgs) -> anyhow::Result<ExitCode> {
         bail!(rendered.misplaced.join("\nlumiris: "));
     }
     Ok(if session.is_stopped() { ExitCode::from(INTERRUPTED) } else { ExitCode::SUCCESS })
+}
+
+/// True if a rendering was stopped before it had anything to write.
+pub(super) fn is_stop(error: &anyhow::Error) -> bool {
+    matches!(error.downcast_ref(), Some(RenderError::Stopped))
 }
 
 impl Session {
@@ -114,7 +126,13 @@ pub(super) fn render_one(args: &RenderArgs, session: &Session) -> anyhow::Result
         // A denoiser takes noise that is correlated between pixels for detail
         job.change(|s| s.integrator.path_reuse = Some(1));
     }
-    let plan = plan(&args.scene, &mut job, asks_for_ratio, args.quiet)?;
+    let start = Instant::now();
+    // What goes on, or is planned, has its pilots, whatever the time
+    let is_open = stored.is_none() && args.scene.plan.is_none();
+    let time_limit = args.time.filter(|_| is_open).map(Duration::from_secs_f64);
+    let how = Preparation { ratio_map: asks_for_ratio, time_limit, stop: &session.stop, ..Preparation::default() };
+    let plan = plan(&args.scene, &mut job, &how, args.quiet)?;
+    let preparation = start.elapsed();
     let outputs = outputs(args, &job);
     if args.output.is_empty() {
         check_outputs(&outputs)?;
@@ -124,18 +142,22 @@ pub(super) fn render_one(args: &RenderArgs, session: &Session) -> anyhow::Result
 
     let bar = Bar::new(args.quiet);
     let mut settings = settings_of(args, &job, asked.as_deref());
+    settings.time_limit = settings.time_limit.map(|limit| limit.saturating_sub(preparation));
     let mut film_file = parts::film_file(args, (&job, &plan, &files), &mut settings, stored)?;
     let continuation = film_file.as_mut().map_or_else(Continuation::default, FilmFile::continuation);
     let rendering = render_shown((&job, &settings), session, (&name_of(args), &bar), continuation)?;
     bar.finish();
+    if session.is_stopped() && rendering.film.summary().samples[1] == 0 {
+        return Err(RenderError::Stopped.into());
+    }
 
     let written = write_results(args, (&job, &plan, &rendering), (session, &settings), (film_file.as_mut(), outputs))?;
-    report(args, &rendering, &written.paths);
-    let mut stats = stats(args, &job, &rendering, setup);
+    report(args, &rendering, (preparation, &written.paths));
+    let mut stats = stats(args, &job, &rendering, SetupTimes { prepare: preparation.as_secs_f64(), ..setup });
     stats["checkpoints"] = parts::stats(film_file.as_ref());
     Ok(Rendered {
         stats,
-        seconds: rendering.elapsed.as_secs_f64(),
+        seconds: (preparation + rendering.elapsed).as_secs_f64(),
         noise: rendering.film.summary().relative_noise,
         complete: rendering.complete,
         misplaced: written.misplaced,
@@ -303,7 +325,7 @@ fn stats(args: &RenderArgs, job: &RenderJob, rendering: &Rendering, setup: Setup
         "invalid_samples": rendering.film.summary().invalid,
         "relative_noise": rendering.film.summary().relative_noise,
         "seconds": {
-            "load": setup.load, "build": setup.build, "render": seconds(rendering.elapsed),
+            "load": setup.load, "build": setup.build, "prepare": setup.prepare, "render": seconds(rendering.elapsed),
         },
         "thread_seconds": {
             "camera_rays": seconds(s.camera_time), "bounce_rays": seconds(s.bounce_time), "shade": seconds(s.shade_time),
@@ -370,7 +392,7 @@ fn cache_stats(c: &CacheReport) -> serde_json::Value {
     })
 }
 
-fn report(args: &RenderArgs, rendering: &Rendering, outputs: &[PathBuf]) {
+fn report(args: &RenderArgs, rendering: &Rendering, (preparation, outputs): (Duration, &[PathBuf])) {
     if args.quiet {
         return;
     }
@@ -381,9 +403,14 @@ fn report(args: &RenderArgs, rendering: &Rendering, outputs: &[PathBuf]) {
     let of = if is_of_tiles { Summary::samples_text_of_sampled } else { Summary::samples_text };
     let samples = of(summary, if summary.samples[1] == 1 { "sample per pixel" } else { "samples per pixel" });
     let partial = if rendering.complete { "" } else { " (stopped early)" };
+    let pilots = if preparation.as_secs_f64() < 0.05 {
+        String::new()
+    } else {
+        format!(" ({:.1} s of it for pilots)", preparation.as_secs_f64())
+    };
     progress::say(&format!(
-        "{names} after {:.1} s, {samples}{partial}, noise {}",
-        rendering.elapsed.as_secs_f64(),
+        "{names} after {:.1} s{pilots}, {samples}{partial}, noise {}",
+        (preparation + rendering.elapsed).as_secs_f64(),
         progress::percent(summary.relative_noise)
     ));
     if let Some(c) = &rendering.cache {

@@ -14,11 +14,10 @@ use lumiris::import::{Loaded, is_gltf, load_with};
 use lumiris::render::RenderSettings;
 use lumiris::render::allocation::complete_for_noise;
 use lumiris::render::parts::Stored;
-use lumiris::render::plan::prepare;
+use lumiris::render::plan::{Preparation, prepare};
 use lumiris::scene::RenderJob;
 use lumiris::settings::table::rows;
 use lumiris::settings::{Proposals, SampleCounts, Settings, StageTimes};
-use std::fs::read_to_string;
 use std::path::Path;
 use std::time::Instant;
 
@@ -29,6 +28,8 @@ pub(super) struct SetupTimes {
     pub load: f64,
     /// Building ray tracers.
     pub build: f64,
+    /// Pilots, and what else follows from settings that are open.
+    pub prepare: f64,
 }
 
 /// Loads the scene, but what `files` has of its files, and applies the options, after the settings of what is stored; prints
@@ -126,13 +127,12 @@ pub(super) fn load_job_of(
     let job = loaded
         .job(args.accel, args.packet_width)
         .with_context(|| format!("cannot build the ray tracer of {}", args.scene.display()))?;
-    Ok((job, SetupTimes { load, build: start.elapsed().as_secs_f64() }, files))
+    Ok((job, SetupTimes { load, build: start.elapsed().as_secs_f64(), prepare: 0.0 }, files))
 }
 
 /// Applies the choices of a plan file, which options may override.
 fn apply_plan(path: &Path, settings: &mut Settings) -> anyhow::Result<()> {
-    let text = read_to_string(path).with_context(|| format!("cannot read {}", path.display()))?;
-    let file: PlanFile = serde_json::from_str(&text).with_context(|| format!("{} is no plan", path.display()))?;
+    let file = PlanFile::read(path)?;
     for (key, value) in &file.settings {
         let row = rows().find(|row| row.key == key);
         let row = row.with_context(|| format!("{}: there is no setting `{key}`", path.display()))?;
@@ -143,9 +143,14 @@ fn apply_plan(path: &Path, settings: &mut Settings) -> anyhow::Result<()> {
     Ok(())
 }
 
-/// Chooses what the settings leave open, and prints it unless `quiet`.
-pub(super) fn plan(args: &SceneArgs, job: &mut RenderJob, ratio_map: bool, quiet: bool) -> anyhow::Result<PlanFile> {
-    let plan = prepare(job, args.threads.map(|t| t as usize), ratio_map)?;
+/// Chooses what the settings leave open, and prints it unless `quiet`; on the threads of the options.
+pub(super) fn plan(
+    args: &SceneArgs,
+    job: &mut RenderJob,
+    how: &Preparation<'_>,
+    quiet: bool,
+) -> anyhow::Result<PlanFile> {
+    let plan = prepare(job, &Preparation { threads: args.threads.map(|t| t as usize), ..*how })?;
     if let (Some(auto), false) = (&plan.auto, quiet) {
         progress::say(&format!("auto: {}", auto.chosen));
     }
@@ -164,7 +169,15 @@ pub(super) fn plan(args: &SceneArgs, job: &mut RenderJob, ratio_map: bool, quiet
         progress::say(&format!("adaptive: {min} to {max} samples per pixel"));
     }
     plan.warnings.iter().for_each(|warning| progress::say(&format!("warning: {warning}")));
-    PlanFile::new(&args.scene, &plan)
+    if let Some(path) = &args.plan
+        && let Some(other) = PlanFile::read(path)?.other_image(&args.scene, job)
+    {
+        progress::say(&format!(
+            "warning: {} was made for {other}: its choices may not suit this image",
+            path.display()
+        ));
+    }
+    PlanFile::new(&args.scene, job, &plan)
 }
 
 /// Render settings from the options.

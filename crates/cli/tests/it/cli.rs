@@ -2,7 +2,7 @@
 
 use lumiris::imaging::oiio::{ReadLimits, read_image};
 use std::path::Path;
-use std::process::{Command, Output};
+use std::process::{Command, Output, Stdio};
 
 fn lumiris(args: &[&str], folder: &Path) -> Output {
     Command::new(env!("CARGO_BIN_EXE_lumiris")).args(args).current_dir(folder).output().unwrap()
@@ -298,6 +298,22 @@ fn ctrl_c_writes_what_there_is() {
     let samples = exr.image.channel("samples").unwrap();
     let channels = exr.image.channels.len();
     assert!(exr.image.data.iter().skip(samples).step_by(channels).all(|&n| n >= 1.0));
+}
+
+#[test]
+fn ctrl_c_before_the_first_sample_leaves_what_there_is() {
+    let folder = tempfile::tempdir().unwrap();
+    std::fs::write(folder.path().join("a.exr"), "an image of yesterday").unwrap();
+    // So many samples have a pilot that takes longer than this test
+    let args = ["render", &scene("demo/gallery.pbrt"), "--spp", "1000000", "-q", "-o", "a.exr"];
+    let mut command = Command::new(env!("CARGO_BIN_EXE_lumiris"));
+    let child = command.args(args).current_dir(folder.path()).stderr(Stdio::piped()).spawn().unwrap();
+    std::thread::sleep(std::time::Duration::from_secs(2));
+    assert!(Command::new("kill").args(["-INT", &child.id().to_string()]).status().unwrap().success());
+    let output = child.wait_with_output().unwrap();
+    assert_eq!(output.status.code(), Some(130));
+    assert!(stderr(&output).contains("stopped before the first sample: nothing is written"), "{}", stderr(&output));
+    assert_eq!(std::fs::read(folder.path().join("a.exr")).unwrap(), b"an image of yesterday");
 }
 
 #[test]

@@ -64,3 +64,27 @@ fn images_are_described_and_not_read_as_scenes() {
     std::fs::write(folder.join("broken.exr"), "no image").unwrap();
     refuse("info broken.exr", folder, 3, &["broken.exr: "]);
 }
+
+#[test]
+fn what_can_hardly_be_meant_is_said() {
+    let folder = tempfile::tempdir().unwrap();
+    let folder = folder.path();
+    let said = |text: &str| {
+        let text = format!("WorldBegin\n{text}\nShape \"sphere\"");
+        std::fs::write(folder.join("s.pbrt"), text).unwrap();
+        let output = lumiris("render s.pbrt --resolution 8x8 --spp 1 --estimator mis -o a.png", folder);
+        (output.status.code(), stderr(&output))
+    };
+    let (code, dark) = said("");
+    assert!(code == Some(0) && dark.contains("nothing emits light: the image will be black"), "{dark}");
+    let (code, light) = said("LightSource \"infinite\"");
+    assert!(code == Some(0) && !light.contains("warning"), "{light}");
+    let (code, bright) = said("LightSource \"infinite\" Material \"diffuse\" \"rgb reflectance\" [ 5 0.5 0.5 ]");
+    assert!(code == Some(0) && bright.contains("`reflectance` is beyond 0 to 1") && bright.contains("s.pbrt:2:"));
+    let (code, rough) = said("Material \"conductor\" \"float vroughness\" -1 \"float uroughness\" 0.1");
+    assert!(code == Some(3) && rough.contains("vroughness must be at least 0, not -1"), "{rough}");
+    assert_eq!(rough.matches("must be at least 0").count(), 1, "{rough}");
+    // What else a mesh without vertices has is no error of its own
+    let (code, empty) = said("Shape \"trianglemesh\" \"integer indices\" [ 0 1 2 ]");
+    assert!(code == Some(3) && empty.contains("needs `point3 P`") && !empty.contains("has no parameter"), "{empty}");
+}

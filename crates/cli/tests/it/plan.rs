@@ -63,6 +63,29 @@ fn the_plan_of_a_scene_is_stored_with_what_it_follows_from() {
 }
 
 #[test]
+fn a_plan_of_another_image_is_used_with_a_warning() {
+    let folder = tempfile::tempdir().unwrap();
+    let plan = |scene: &str, image: &str| {
+        format!(r#"{{"version": "1", "scene": "{scene}", "image": {image}, "settings": {{"estimator": "mis"}}}}"#)
+    };
+    let small = ["--resolution", "8x6", "--spp", "1", "-q", "-o", "a.png"];
+    for (text, warning) in [
+        (plan("a/gallery.pbrt", "[8, 6, 1]"), None),
+        (plan("a/gallery.0012.pbrt", "null"), Some("was made for a/gallery.0012.pbrt:")),
+        (plan("a/fog.pbrt", "[8, 6, 1]"), Some("was made for a/fog.pbrt:")),
+        (plan("gallery.pbrt", "[80, 60, 16]"), Some("was made for 80x60 pixels with 16 samples:")),
+    ] {
+        std::fs::write(folder.path().join("plan.json"), text).unwrap();
+        let output = lumiris(&[&["render", &gallery(), "--plan", "plan.json"], &small[..]].concat(), folder.path());
+        assert!(output.status.success(), "{}", stderr(&output));
+        match warning {
+            Some(warning) => assert!(stderr(&output).contains(warning), "{}", stderr(&output)),
+            None => assert_eq!(stderr(&output), ""),
+        }
+    }
+}
+
+#[test]
 fn what_is_no_plan_is_an_error_that_says_why() {
     let folder = tempfile::tempdir().unwrap();
     let path = gallery();

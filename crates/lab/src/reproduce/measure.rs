@@ -14,7 +14,7 @@ use lumiris::film::Film;
 use lumiris::film::filter::PixelFilter;
 use lumiris::import::{LoadOptions, load};
 use lumiris::lights::{LightSamplerKind, VisibilityCache};
-use lumiris::render::plan::prepare;
+use lumiris::render::plan::{Preparation, prepare};
 use lumiris::render::processor_time;
 use lumiris::render::{RenderSettings, Rendering, render};
 use lumiris::scene::{AccelKind, RenderJob};
@@ -120,7 +120,7 @@ impl Stage {
         self.set(&Method::ris(1, 1).lights_by(lights).stratified().strata(Strata::Systematic));
         self.job.change(|s| (s.integrator.ris.proposals, s.integrator.ris.stage_times) = (Proposals::Auto, None));
         self.shadows.store(true, Ordering::Relaxed);
-        Ok(prepare(&mut self.job, self.threads, false)?.ris.map(|ris| ris.times))
+        Ok(prepare(&mut self.job, &Preparation::on(self.threads))?.ris.map(|ris| ris.times))
     }
 
     /// Finds the best allocation of an estimate's time to proposals and samples in each pixel, by the renderer's own
@@ -133,7 +133,7 @@ impl Stage {
         self.job.world.scene.film.filter = PixelFilter::Box { rx: CENTRE, ry: CENTRE };
         self.job.change(|s| s.integrator.ris.stage_times = Some(times));
         self.shadows.store(true, Ordering::Relaxed);
-        prepare(&mut self.job, self.threads, false)?;
+        prepare(&mut self.job, &Preparation::on(self.threads))?;
         let seconds = processor_time::of_process().saturating_sub(start).as_secs_f64();
         let Some(map) = &mut self.job.sample_count_map else { return Ok((Vec::new(), seconds)) };
         map.time = budget;
