@@ -1,5 +1,6 @@
 //! The image files of a rendering.
 
+use super::UsageError;
 use super::args::RenderArgs;
 use super::denoise_args::{self, DENOISED, Denoised};
 use super::exr::{ExrArgs, ExrImage, ExrLayer};
@@ -62,22 +63,34 @@ pub(super) fn is_picture(path: &Path) -> bool {
 /// Rejects outputs that cannot be written, before time is spent on rendering.
 pub(super) fn check_outputs(outputs: &[PathBuf]) -> anyhow::Result<()> {
     for path in outputs {
-        if !is_exr(path) && !is_part(path) && !DISPLAY_TYPES.contains(&extension(path).as_str()) {
-            bail!("{}: the output format must be .exr, .{}", path.display(), DISPLAY_TYPES.join(", ."));
+        if !is_output(path) {
+            let text = format!("{}: the output format must be .exr, .{}", path.display(), DISPLAY_TYPES.join(", ."));
+            return Err(UsageError(text).into());
         }
-        let folder = path.parent().filter(|p| !p.as_os_str().is_empty()).unwrap_or(Path::new("."));
-        if !folder.is_dir() {
-            bail!("{}: folder {} does not exist", path.display(), folder.display());
-        }
-        if path.is_dir() {
-            bail!("{} is a folder", path.display());
-        }
-        // As the image itself will be written; the file is gone at once
-        tempfile::Builder::new()
-            .prefix(".partial-")
-            .tempfile_in(folder)
-            .with_context(|| format!("{}: nothing can be written to {}", path.display(), folder.display()))?;
+        check_writable(path)?;
     }
+    Ok(())
+}
+
+/// True if a file of this name can be written, by its extension.
+pub(super) fn is_output(path: &Path) -> bool {
+    is_exr(path) || is_part(path) || DISPLAY_TYPES.contains(&extension(path).as_str())
+}
+
+/// Refuses a file that cannot be written.
+pub(super) fn check_writable(path: &Path) -> anyhow::Result<()> {
+    let folder = path.parent().filter(|p| !p.as_os_str().is_empty()).unwrap_or(Path::new("."));
+    if !folder.is_dir() {
+        bail!("{}: folder {} does not exist", path.display(), folder.display());
+    }
+    if path.is_dir() {
+        bail!("{} is a folder", path.display());
+    }
+    // As the file itself will be written; this one is gone at once
+    tempfile::Builder::new()
+        .prefix(".partial-")
+        .tempfile_in(folder)
+        .with_context(|| format!("{}: nothing can be written to {}", path.display(), folder.display()))?;
     Ok(())
 }
 

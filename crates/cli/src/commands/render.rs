@@ -6,7 +6,7 @@ use super::denoise_args::denoise;
 use super::memory;
 use super::part_args::is_part;
 use super::parts;
-use super::pictures::{Made, Written, check_outputs, is_exr, write_pictures};
+use super::pictures::{Made, Written, check_outputs, check_writable, is_exr, is_output, write_pictures};
 use super::plan_file::PlanFile;
 use super::progress::{self, Bar};
 use super::rescue::write_or_rescue;
@@ -94,6 +94,7 @@ impl Session {
         if !args.output.is_empty() {
             check_denoise(args, &args.output)?;
         }
+        args.stats.as_deref().map_or(Ok(()), check_writable)?;
         let denoiser = args.denoise.open(args.scene.threads)?;
         let watch = Watch::start(&args.watch.places()?, progress::say)?;
         if let Some(address) = watch.page {
@@ -282,6 +283,14 @@ fn outputs(args: &RenderArgs, job: &RenderJob) -> Vec<PathBuf> {
         return args.output.clone();
     }
     let from_file = job.world.scene.film.file_name.as_ref().map(PathBuf::from);
+    let from_file = from_file.map(|path| {
+        if is_output(&path) {
+            return path;
+        }
+        let exr = path.with_extension("exr");
+        progress::say(&format!("note: {} becomes {}", path.display(), exr.display()));
+        exr
+    });
     vec![from_file.unwrap_or_else(|| {
         let name = args.scene.scene.file_name().unwrap_or_default().to_string_lossy().into_owned();
         let stem = name.trim_end_matches(".gz").trim_end_matches(".pbrt").to_owned();

@@ -169,6 +169,10 @@ pub(super) fn plan(
         progress::say(&format!("adaptive: {min} to {max} samples per pixel"));
     }
     plan.warnings.iter().for_each(|warning| progress::say(&format!("warning: {warning}")));
+    let idle = args.settings.without_effect(job.settings());
+    if !idle.is_empty() && !quiet {
+        progress::say(&format!("note: without effect on this image: {}", idle.join(", ")));
+    }
     if let Some(path) = &args.plan
         && let Some(other) = PlanFile::read(path)?.other_image(&args.scene, job)
     {

@@ -24,6 +24,12 @@ impl SettingsArgs {
         value.integer().and_then(|n| u32::try_from(n).ok())
     }
 
+    /// Options that are given, and change nothing of an image with these settings.
+    pub(super) fn without_effect(&self, settings: &Settings) -> Vec<String> {
+        let idle = self.typed.iter().filter(|(row, _)| !row.applies.to(settings));
+        idle.map(|(row, _)| format!("--{}", row.flag)).collect()
+    }
+
     /// Parses options outside the command line of the program.
     pub(super) fn parse<'a>(words: impl Iterator<Item = &'a str>) -> Result<Self, String> {
         let command = Self::augment_args(Command::new("settings").no_binary_name(true).disable_help_flag(true));

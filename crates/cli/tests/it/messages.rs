@@ -88,3 +88,38 @@ fn what_can_hardly_be_meant_is_said() {
     let (code, empty) = said("Shape \"trianglemesh\" \"integer indices\" [ 0 1 2 ]");
     assert!(code == Some(3) && empty.contains("needs `point3 P`") && !empty.contains("has no parameter"), "{empty}");
 }
+
+#[test]
+fn options_without_effect_are_named() {
+    let folder = tempfile::tempdir().unwrap();
+    let folder = folder.path();
+    let image = "render GALLERY --resolution 8x6 --spp 1 -o a.png";
+    let said =
+        stderr(&lumiris(&format!("{image} --estimator mis --proposals 16 --samples 2 --cache-error 0.1"), folder));
+    assert!(said.contains("note: without effect on this image: --proposals, --cache-error"), "{said}");
+    let said = stderr(&lumiris(&format!("{image} --estimator ris --proposals 16 --samples 2"), folder));
+    assert!(!said.contains("note:"), "{said}");
+}
+
+#[test]
+fn statistics_that_cannot_be_written_are_refused_before_the_image_is_rendered() {
+    let folder = tempfile::tempdir().unwrap();
+    let folder = folder.path();
+    refuse(
+        "render GALLERY --resolution 8x6 --spp 1 -o a.png --stats no/s.json",
+        folder,
+        3,
+        &["folder no does not exist"],
+    );
+    assert!(!folder.join("a.png").exists());
+}
+
+#[test]
+fn a_scene_that_names_an_image_of_another_type_has_an_exr() {
+    let folder = tempfile::tempdir().unwrap();
+    let folder = folder.path();
+    let film = "Film \"rgb\" \"string filename\" \"b.pfm\"\nWorldBegin\nLightSource \"infinite\"";
+    std::fs::write(folder.join("s.pbrt"), film).unwrap();
+    let said = stderr(&lumiris("render s.pbrt --resolution 8x8 --spp 1", folder));
+    assert!(said.contains("note: b.pfm becomes b.exr") && folder.join("b.exr").exists(), "{said}");
+}
