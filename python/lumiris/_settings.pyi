@@ -21,6 +21,7 @@ class Settings(TypedDict, total=False):
     allocation: Optional[Literal["auto", "uniform", "adaptive"]]
     noise: Optional[Union[float, Literal["off"], bool]]
     footprint_spp: Optional[int]
+    pilot_spp: Optional[int]
     seed: Optional[int]
     estimator: Optional[Literal["auto", "mc", "mis", "ris", "ocv", "optimal-mis", "correlated", "contributing"]]
     samples: Optional[Union[int, Literal["auto"]]]
