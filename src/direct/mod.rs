@@ -106,7 +106,9 @@ impl DirectStage {
         if estimator.selects_visible() {
             batch.segments.set_free();
         } else {
-            batch.candidates.stats.segments += batch.segments.trace(job, points);
+            let [segments, collisions] = batch.segments.trace(job, points);
+            batch.candidates.stats.segments += segments;
+            batch.candidates.stats.collisions += collisions;
         }
         let traced = Instant::now();
 

@@ -59,11 +59,11 @@ impl Segments {
     }
 
     /// Traces all segments, which leave `points`. Where there are media, contributions are multiplied by an estimate of the
-    /// transmittance. Returns the number of rays.
-    pub fn trace(&mut self, job: &RenderJob, points: &[ShadingPoint<'_>]) -> u64 {
+    /// transmittance. Returns the numbers of rays and of tentative collisions.
+    pub fn trace(&mut self, job: &RenderJob, points: &[ShadingPoint<'_>]) -> [u64; 2] {
         if job.world.scene.media.is_empty() {
             job.world.accel.occluded(&self.rays, Coherence::Packets, &mut self.occluded);
-            return self.rays.len() as u64;
+            return [self.rays.len() as u64, 0];
         }
         let Segments { rays, contributions, points: of, occluded, crossing, .. } = self;
         crossing.start(rays, of, points);
@@ -73,7 +73,7 @@ impl Segments {
         for (contribution, transmittance) in contributions.iter_mut().zip(crossing.transmittance()) {
             *contribution *= transmittance;
         }
-        traced
+        [traced, crossing.collisions()]
     }
 
     /// Marks all segments as unoccluded without tracing them.

@@ -13,6 +13,8 @@ pub struct DirectStats {
     pub emitter_rays: u64,
     /// Shadow segments traced by T2.
     pub segments: u64,
+    /// Tentative collisions of segments in media, about.
+    pub collisions: u64,
     /// Time in T1.
     pub t1: Duration,
     /// Its part for light samples.
@@ -37,6 +39,7 @@ impl DirectStats {
         self.light_proposals += other.light_proposals;
         self.emitter_rays += other.emitter_rays;
         self.segments += other.segments;
+        self.collisions += other.collisions;
         self.t1 += other.t1;
         self.t1_light += other.t1_light;
         self.select += other.select;

@@ -67,6 +67,11 @@ impl Crossing {
         self.all.iter().map(|crossed| crossed.transmittance)
     }
 
+    /// Tentative collisions of all segments, about.
+    pub(super) fn collisions(&self) -> u64 {
+        self.all.iter().map(|crossed| u64::from(crossed.numbers.drawn)).sum()
+    }
+
     /// Traces all segments. Returns the number of rays.
     pub(super) fn trace(&mut self, job: &RenderJob) -> u64 {
         let mut traced = 0;

@@ -54,6 +54,8 @@ pub struct PathStats {
     pub bounce_time: Duration,
     /// Time in hits, textures and materials.
     pub shade_time: Duration,
+    /// Tentative collisions of flights through media, about.
+    pub collisions: u64,
     /// Direct lighting.
     pub direct: DirectStats,
     /// Lookups in an irradiance cache.
@@ -77,6 +79,7 @@ impl PathStats {
         self.camera_time += other.camera_time;
         self.bounce_time += other.bounce_time;
         self.shade_time += other.shade_time;
+        self.collisions += other.collisions;
         self.direct.merge(&other.direct);
         self.lookups.lookups += other.lookups.lookups;
         self.lookups.misses += other.lookups.misses;

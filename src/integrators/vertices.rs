@@ -314,6 +314,7 @@ impl VertexSearch {
         let [stream, _] = self.arrivals.streams(&at.samples[path.sample as usize], path.branch);
         let mut numbers = Numbers::new(stream.domain(domain::FLIGHT + at.vertex).domain(path.passed));
         let flight = medium.fly(&segment, path.beta, &mut numbers, || focus(at.job, &segment, &stream, at.vertex));
+        self.stats.collisions += u64::from(numbers.drawn);
         let Flight { emitted, end } = flight;
         at.out[path.sample as usize].radiance += path.beta * emitted;
         match end {

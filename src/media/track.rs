@@ -52,6 +52,8 @@ pub enum End {
 pub struct Numbers {
     stream: SampleStream,
     rest: Option<HashStream>,
+    /// How many pairs were drawn: tentative collisions, each a lookup of the medium, and ends of lines.
+    pub drawn: u32,
 }
 
 /// Domain of the numbers of later collisions.
@@ -61,7 +63,7 @@ impl Numbers {
     /// Those of a place in the tree of random numbers.
     #[inline]
     pub fn new(stream: SampleStream) -> Self {
-        Numbers { stream, rest: None }
+        Numbers { stream, rest: None, drawn: 0 }
     }
 
     /// Four numbers in [0, 1), of a flight that needs no others.
@@ -73,6 +75,7 @@ impl Numbers {
     /// Two numbers in [0, 1).
     #[inline]
     pub fn pair(&mut self) -> [f32; 2] {
+        self.drawn += 1;
         if let Some(rest) = &mut self.rest {
             return rest.next_2d();
         }

@@ -59,6 +59,8 @@ const SCOUTS: u32 = 4;
 const TILES_AT_ONCE: usize = 1024;
 /// Pixels from which on a part of the image tells whether there is anything to gain.
 const MIN_SCOUTED: usize = 256 * (COST_TILE * COST_TILE) as usize;
+/// Cost of a tentative collision in a medium, a lookup: as measured in a sparse volume.
+const COLLISION_COST: f64 = 1.5;
 /// Maximum number of samples per pixel for a standard error that is asked for, if none is given.
 const MAX_SPP_FOR_NOISE: u32 = 4096;
 
@@ -392,7 +394,7 @@ fn pilot_tile(
         let radiance = sample.radiance - seen.next().unwrap_or_default();
         sums[i as usize].add(0, &PixelSample { radiance, features: None });
     });
-    let cost = cost(&worker.tracer.take_stats());
+    let cost = cost(&worker.tracer.take_stats(), chosen.len() * spp as usize);
     let sight = see(run, worker, seeing, tile, (sight_spp, seed));
     worker.tracer.take_stats();
     sums.iter().zip(&sight).map(|(samples, sight)| Measured::of(samples, sight, cost)).collect()
@@ -435,8 +437,10 @@ fn see(
     sums
 }
 
-/// Mean cost of a camera sample; that of one which hits nothing is 1.
-fn cost(stats: &PathStats) -> f64 {
+/// Mean cost of so many camera samples; that of one which hits nothing is 1. Rays that go on where a medium begins or ends are more
+/// than samples.
+fn cost(stats: &PathStats, samples: usize) -> f64 {
     let work = stats.camera_rays + 2 * stats.bounce_rays + stats.direct.proposals;
-    work as f64 / stats.camera_rays.max(1) as f64
+    let collisions = (stats.collisions + stats.direct.collisions) as f64 * COLLISION_COST;
+    (work as f64 + collisions) / samples.max(1) as f64
 }

@@ -343,7 +343,7 @@ fn stats(args: &RenderArgs, job: &RenderJob, rendering: &Rendering, setup: Setup
         },
         "counts": {
             "replica_pixels": rendering.film.replicas().len(), "camera_rays": s.camera_rays, "bounce_rays": s.bounce_rays, "proposals": d.proposals,
-            "emitter_rays": d.emitter_rays, "shadow_segments": d.segments,
+            "emitter_rays": d.emitter_rays, "shadow_segments": d.segments, "medium_collisions": s.collisions + d.collisions,
             "ocv_systems": d.systems, "ocv_ill_conditioned": d.ill_conditioned,
         },
         "rates": {
