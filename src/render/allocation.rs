@@ -444,3 +444,17 @@ fn cost(stats: &PathStats, samples: usize) -> f64 {
     let collisions = (stats.collisions + stats.direct.collisions) as f64 * COLLISION_COST;
     (work as f64 + collisions) / samples.max(1) as f64
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn the_cost_of_samples_is_that_of_all_their_rays_and_collisions() {
+        let mut stats = PathStats { camera_rays: 12, bounce_rays: 5, collisions: 4, ..PathStats::default() };
+        (stats.direct.proposals, stats.direct.collisions) = (8, 6);
+        // Two of the camera rays went on behind the bounds of a medium
+        assert_eq!(cost(&stats, 10), (12.0 + 10.0 + 8.0 + 10.0 * COLLISION_COST) / 10.0);
+        assert_eq!(cost(&PathStats::default(), 0), 0.0);
+    }
+}

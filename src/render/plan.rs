@@ -134,7 +134,7 @@ fn samples_in(job: &RenderJob, limit: Duration) -> u32 {
     trace();
     let samples = threads as f64 * batches.iter().map(Vec::len).sum::<usize>() as f64;
     let per_second = samples / start.elapsed().as_secs_f64().max(1e-9);
-    (limit.as_secs_f64() * per_second / job.world.scene.film.bounds.area().max(1) as f64) as u32
+    ((limit.as_secs_f64() * per_second / job.world.scene.film.bounds.area().max(1) as f64) as u32).max(1)
 }
 
 /// The settings that differ, either as they are set or by what is recorded of them: where something was open and the choice is

@@ -286,8 +286,10 @@ impl<'a> Run<'a> {
         ((left * f64::from(done) / elapsed.as_secs_f64().max(1e-9)) as u32).max(1)
     }
 
+    /// True if no pass is to be begun any more; there is one, however little time there is.
     fn stopped(&self) -> bool {
-        let late = self.settings.time_limit.is_some_and(|limit| self.start.elapsed() >= limit);
+        let is_over = |limit| self.start.elapsed() >= limit && self.passes.load(Ordering::Relaxed) > 0;
+        let late = self.settings.time_limit.is_some_and(is_over);
         late || self.stops_at_once()
     }
 

@@ -4,9 +4,11 @@ use crate::media::{Answer, BOX, assert_answer, assert_they_agree, camera, choose
 use lumiris::import::cache::FileCache;
 use lumiris::import::{LoadOptions, load_text};
 use lumiris::media::Medium;
+use lumiris::render::{RenderSettings, render};
 use lumiris::scene::{AccelKind, RenderJob};
 use lumiris_test_support::nanovdb::{NanoSpec, plain_nano_file};
 use std::path::Path;
+use std::sync::atomic::AtomicBool;
 
 /// Voxels along an axis, the index of the first, and the distance between them.
 const VOXELS: i32 = 20;
@@ -117,6 +119,26 @@ fn a_volume_is_lit_like_the_dense_grid_of_its_values() {
     // Temperatures have a map of their own
     let named = scene(&sparse("hot.nvdb", r#""string gridname" "fog" "string temperaturename" "heat""#));
     assert!(job(&named, folder.path()).world.scene.media.is_emissive());
+}
+
+/// What a sample costs, by which their numbers are adaptive.
+#[test]
+fn collisions_are_counted_of_flights_and_of_shadow_segments() {
+    let collisions = |factor: f32| {
+        let edge = STEP * f64::from(VOXELS) / 2.0;
+        let medium = format!(
+            r#"MakeNamedMedium "m" "string type" "uniformgrid" {COLORS} "float density" [{}] "integer nx" {VOXELS} "integer ny" {VOXELS}
+            "integer nz" {VOXELS} "point3 p0" [-{edge} -{edge} -{edge}] "point3 p1" [{edge} {edge} {edge}]"#,
+            values(|_| factor)
+        );
+        let mut job = job(&scene(&medium), Path::new("."));
+        choose(&mut job, &estimators()[1].1);
+        let settings = RenderSettings { spp: 16, ..RenderSettings::default() };
+        let stats = render(&job, &settings, &AtomicBool::new(false), &|_| ()).unwrap().stats;
+        [stats.collisions, stats.direct.collisions]
+    };
+    let (thin, dense) = (collisions(0.1), collisions(4.0));
+    assert!((0..2).all(|k| thin[k] > 0 && dense[k] > 2 * thin[k]), "{thin:?} {dense:?}");
 }
 
 /// In even light, a volume that only scatters is not seen, by any estimator.

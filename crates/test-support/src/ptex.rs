@@ -25,6 +25,8 @@ pub enum PtexEncoding {
 pub struct PtexFaceSpec {
     /// Logarithms of columns and rows.
     pub log2: [u8; 2],
+    /// What the file says in their place, if it lies.
+    pub claimed: Option<[u8; 2]>,
     /// Numbers of the faces beyond the edges, −1 for none, and their edges.
     pub neighbors: [(u32, u8); 4],
     /// True for a part of a face that is no quadrilateral.
@@ -40,6 +42,7 @@ impl PtexFaceSpec {
     pub fn new(log2: [u8; 2], texels: Vec<f32>) -> Self {
         PtexFaceSpec {
             log2,
+            claimed: None,
             neighbors: [(u32::MAX, 0); 4],
             is_subface: false,
             encoding: PtexEncoding::Compressed,
@@ -133,7 +136,8 @@ pub fn ptex_file(spec: &PtexSpec) -> Vec<u8> {
     for face in &spec.faces {
         let edges = face.neighbors.iter().enumerate().fold(0, |edges, (i, n)| edges | n.1 << (2 * i));
         let flags = u8::from(face.encoding == PtexEncoding::Mean) | u8::from(face.is_subface) << 3;
-        infos.extend([face.log2[0], face.log2[1], edges, flags]);
+        let [columns, rows] = face.claimed.unwrap_or(face.log2);
+        infos.extend([columns, rows, edges, flags]);
         infos.extend(face.neighbors.iter().flat_map(|n| n.0.to_le_bytes()));
         for (c, means) in means.iter_mut().enumerate() {
             let channel = face.texels.iter().skip(c).step_by(spec.channels.into());

@@ -123,3 +123,15 @@ fn a_scene_that_names_an_image_of_another_type_has_an_exr() {
     let said = stderr(&lumiris("render s.pbrt --resolution 8x8 --spp 1", folder));
     assert!(said.contains("note: b.pfm becomes b.exr") && folder.join("b.exr").exists(), "{said}");
 }
+
+#[test]
+fn there_is_a_sample_however_little_time_there_is() {
+    let folder = tempfile::tempdir().unwrap();
+    let folder = folder.path();
+    run("render GALLERY --resolution 64x36 --spp 100000 --time 0.000001 -q -o a.exr", folder);
+    let file = image("a.exr", folder);
+    let channel = file.image.channel("samples").unwrap();
+    assert!(file.image.data.iter().skip(channel).step_by(file.image.channels.len()).all(|&n| n >= 1.0));
+    // An image of few samples, as far as pilots are concerned
+    assert_eq!(file.metadata["lumiris:pilot_spp"], "1");
+}

@@ -153,6 +153,23 @@ impl Header {
     fn texel_bytes(&self) -> usize {
         self.channels * self.ty.size()
     }
+
+    /// Appends the mean of a face; means stand channel by channel.
+    fn mean(&self, means: &[u8], face: usize, out: &mut Vec<u8>) {
+        let size = self.ty.size();
+        let channels = means.chunks_exact(self.faces * size);
+        channels.for_each(|channel| out.extend_from_slice(&channel[face * size..][..size]));
+    }
+
+    /// Logarithms of the columns and rows that are stored of a face, for which there must be `room` (bytes). `Err` says what is
+    /// wrong with them.
+    fn size(&self, info: &[u8], encoding: Encoding, room: &mut usize) -> Result<[u8; 2], String> {
+        let log2 = if matches!(encoding, Encoding::Constant) { [0, 0] } else { [info[0], info[1]] };
+        let is_known = log2.iter().all(|&log2| log2 <= MOST_LOG2);
+        let bytes = if is_known { self.texel_bytes() << (log2[0] + log2[1]) } else { usize::MAX };
+        *room = room.checked_sub(bytes).ok_or_else(|| format!("has 2^{} × 2^{} texels", log2[0], log2[1]))?;
+        Ok(log2)
+    }
 }
 
 /// Reads the bytes of a file.
@@ -187,32 +204,21 @@ pub fn parse_ptex(bytes: &[u8]) -> Result<PtexFile, PtexError> {
     let mut faces = Vec::with_capacity(header.faces);
     let mut planar = Vec::new();
     let mut room = bytes.len().saturating_mul(MOST_EXPANSION).max(LEAST_ROOM);
-    for (face, (info, size)) in infos.chunks_exact(FACE_BYTES).zip(sizes.chunks_exact(4)).enumerate() {
+    for (number, (info, size)) in infos.chunks_exact(FACE_BYTES).zip(sizes.chunks_exact(4)).enumerate() {
         let at = blocks.at();
         let (encoding, size) = Encoding::of(u32::from_le_bytes([size[0], size[1], size[2], size[3]]));
-        let data = blocks.take(size, "the texture of a face")?;
-        let is_constant = info[3] & FLAG_CONSTANT != 0;
-        let log2 = if is_constant || matches!(encoding, Encoding::Constant) { [0, 0] } else { [info[0], info[1]] };
-        if log2.iter().any(|&log2| log2 > MOST_LOG2) {
-            return Err(PtexError::wrong(at, format!("face {face} has 2^{} × 2^{} texels", log2[0], log2[1])));
-        }
-        let size = header.texel_bytes() << (log2[0] + log2[1]);
-        room = room.checked_sub(size).ok_or_else(|| {
-            PtexError::wrong(
-                at,
-                format!("the textures up to face {face} are too large for a file of {} bytes", bytes.len()),
-            )
-        })?;
+        let block = blocks.take(size, "the texture of a face")?;
         planar.clear();
-        if is_constant {
-            // The means stand channel by channel
-            let size = header.ty.size();
-            for channel in means.chunks_exact(header.faces * size) {
-                planar.extend_from_slice(&channel[face * size..][..size]);
-            }
+        let log2 = if info[3] & FLAG_CONSTANT != 0 {
+            header.mean(&means, number, &mut planar);
+            [0, 0]
         } else {
-            blocks::read_texels(data, encoding, log2, (header.channels, header.ty), &mut planar, at)?;
-        }
+            let log2 = header.size(info, encoding, &mut room).map_err(|what| {
+                PtexError::wrong(at, format!("face {number} {what}, in a file of {} bytes", bytes.len()))
+            })?;
+            blocks::read_texels(block, encoding, log2, (header.channels, header.ty), &mut planar, at)?;
+            log2
+        };
         faces.push(PtexFace { first: out.texels(), log2, neighbors: neighbors(info, &infos) });
         out.push(&planar);
     }

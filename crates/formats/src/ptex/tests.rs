@@ -97,4 +97,11 @@ fn what_is_not_read_is_said() {
     assert!(message(12, &[9]).contains("type of data 9"));
     assert!(message(20, &[0]).contains("0 channels"));
     assert!(message(64 + 24, &[1]).contains("edits"));
+    // A face that claims far more texels than the file can have of tiles of one colour
+    let mut face = PtexFaceSpec { encoding: PtexEncoding::Tiled([0, 0]), ..PtexFaceSpec::new([0, 0], vec![0.5]) };
+    let file = |face: &PtexFaceSpec| ptex_file(&PtexSpec { ty: 3, channels: 1, faces: vec![face.clone(); 3] });
+    assert!(parse_ptex(&file(&face)).is_ok());
+    face.claimed = Some([16, 16]);
+    let error = parse_ptex(&file(&face)).unwrap_err().to_string();
+    assert!(error.contains("face 0 has 2^16 × 2^16 texels, in a file of"), "{error}");
 }
