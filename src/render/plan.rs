@@ -105,15 +105,20 @@ pub fn prepare(job: &mut RenderJob, how: &Preparation<'_>) -> Result<Plan, Rende
 
 /// True if [`prepare`] makes choices that follow from measured times, for an image with these pixels.
 pub fn follows_from_times(settings: &Settings, bounds: &PixelBounds) -> bool {
-    let i = &settings.integrator;
-    let is_open = !matches!(i.ris.proposals, Proposals::Fixed(_)) && i.ris.stage_times.is_none();
-    auto::is_measured(settings, bounds) || i.estimator == EstimatorKind::Ris && is_open
+    auto::is_measured(settings, bounds) || measures_proposals(&settings.integrator)
+}
+
+/// True if the number of proposals of `ris` follows from measured times.
+fn measures_proposals(settings: &IntegratorSettings) -> bool {
+    let is_open = !matches!(settings.ris.proposals, Proposals::Fixed(_)) && settings.ris.stage_times.is_none();
+    settings.estimator == EstimatorKind::Ris && is_open
 }
 
 /// True if settings ask for pilots, which take a part of the time of the image.
 fn has_pilot(settings: &Settings) -> bool {
     let sampling = &settings.sampling;
     settings.integrator.estimator == EstimatorKind::Auto
+        || measures_proposals(&settings.integrator)
         || sampling.allocation == Allocation::Adaptive
         || sampling.noise.is_some()
 }
