@@ -318,7 +318,8 @@ fn numbers_of_principled_materials_outside_of_their_ranges_are_errors_with_place
 #[test]
 fn names_of_blender_and_disney_mean_those_of_openpbr() {
     let material = |parameters: &str| {
-        let text = format!("WorldBegin\nMaterial \"principled\" {parameters}\nShape \"sphere\"\n");
+        let text =
+            format!("WorldBegin\nLightSource \"infinite\"\nMaterial \"principled\" {parameters}\nShape \"sphere\"\n");
         let loaded = load_text(&text, "a.pbrt", Path::new(""), &LoadOptions::default(), &FileCache::default());
         let loaded = loaded.map_err(|report| report.to_string()).unwrap();
         assert_eq!(loaded.warnings.to_string(), "");
