@@ -51,11 +51,6 @@ impl FaceMap {
         FaceMap { faces, channels, texels, table }
     }
 
-    /// Number of faces.
-    pub fn faces(&self) -> usize {
-        self.faces.len()
-    }
-
     /// Memory of faces and texels (bytes).
     pub fn bytes(&self) -> usize {
         let texels = match &self.texels {
@@ -126,8 +121,13 @@ impl FaceMap {
     }
 
     fn color(&self, face: &PtexFace, level: usize, [x, y]: [usize; 2]) -> Rgb {
-        let before: usize = (0..level).map(|level| size_of(face.log2, level).iter().product::<usize>()).sum();
-        let i = (face.first + before + y * size_of(face.log2, level)[0] + x) * self.channels;
+        let texel = if face.is_constant {
+            0
+        } else {
+            let before: usize = (0..level).map(|level| size_of(face.log2, level).iter().product::<usize>()).sum();
+            before + y * size_of(face.log2, level)[0] + x
+        };
+        let i = (face.first + texel) * self.channels;
         let number = |c: usize| match &self.texels {
             PtexTexels::Bytes(v) => self.table[usize::from(v[i + c])],
             PtexTexels::Floats(v) => v[i + c],
@@ -156,10 +156,13 @@ fn with_levels<T: Copy>(
 ) -> Vec<T> {
     let mut out = Vec::with_capacity(base.len() + base.len() / 3 + faces.len() * channels);
     for face in faces {
-        let [columns, rows] = size_of(face.log2, 0);
-        let texels = &base[face.first * channels..][..columns * rows * channels];
+        let count = if face.is_constant { 1 } else { size_of(face.log2, 0).iter().product() };
+        let texels = &base[face.first * channels..][..count * channels];
         face.first = out.len() / channels;
         out.extend_from_slice(texels);
+        if face.is_constant {
+            continue;
+        }
         let mut finer = out.len() - texels.len();
         for level in 1..=usize::from(face.log2[0].max(face.log2[1])) {
             let ([fine_columns, fine_rows], [columns, rows]) =
@@ -254,7 +257,7 @@ mod tests {
                 let edge = ((side + 2 + 4 - if is_there { turn(i, j) } else { 0 }) % 4) as u8;
                 is_there.then_some(Neighbor { face: (4 * j + i) as u32, edge })
             });
-            faces.push(PtexFace { first, log2: [log2; 2], neighbors });
+            faces.push(PtexFace { first, log2: [log2; 2], is_constant: false, neighbors });
         }
         let file = PtexFile { faces, channels: 1, texels: PtexTexels::Floats(texels) };
         FaceMap::new(file, ColorEncoding::Linear)
@@ -299,9 +302,34 @@ mod tests {
     }
 
     #[test]
+    fn faces_of_one_colour_meet_their_neighbors_at_the_edge_alone() {
+        // Two faces of 8 × 8 texels side by side, the right one of one colour, by one texel or by as many
+        let map = |is_constant: bool| {
+            let beyond = |edge: usize, face: u32, of: u8| {
+                std::array::from_fn(|e| (e == edge).then_some(Neighbor { face, edge: of }))
+            };
+            let left = PtexFace { first: 0, log2: [3, 3], is_constant: false, neighbors: beyond(1, 1, 3) };
+            let right = PtexFace { first: 64, log2: [3, 3], is_constant, neighbors: beyond(3, 0, 1) };
+            let mut texels: Vec<f32> = (0..64).map(|i| i as f32 / 63.0).collect();
+            texels.resize(64 + if is_constant { 1 } else { 64 }, 5.0);
+            let file = PtexFile { faces: vec![left, right], channels: 1, texels: PtexTexels::Floats(texels) };
+            FaceMap::new(file, ColorEncoding::Linear)
+        };
+        let (one, all) = (map(true), map(false));
+        for (face, width) in [(0, 0.0), (1, 0.0), (0, 0.4), (1, 0.4), (0, 1.0), (1, 1.0)] {
+            for uv in [[0.01, 0.3], [0.5, 0.5], [0.99, 0.8], [0.2, 0.99]] {
+                let [a, b] = [&one, &all].map(|map| map.value(face, Vec2::from(uv), Vec2::splat(width)).r);
+                assert!((a - b).abs() < 1e-5, "face {face} at {uv:?}, width {width}: {a} and {b}");
+            }
+        }
+        assert!((one.value(1, Vec2::splat(0.5), Vec2::ZERO).r - 5.0).abs() < 1e-5);
+        assert!(one.value(1, Vec2::new(0.01, 0.5), Vec2::ZERO).r < 4.0);
+    }
+
+    #[test]
     fn levels_are_means_and_wide_filters_see_the_whole_face() {
         let texels: Vec<u8> = (0..32).map(|i| if i % 2 == 0 { 10 } else { 210 }).collect();
-        let face = PtexFace { first: 0, log2: [3, 2], neighbors: [None; 4] };
+        let face = PtexFace { first: 0, log2: [3, 2], is_constant: false, neighbors: [None; 4] };
         let file = PtexFile { faces: vec![face], channels: 1, texels: PtexTexels::Bytes(texels) };
         let map = FaceMap::new(file, ColorEncoding::Linear);
         let wide = map.value(0, Vec2::new(0.3, 0.6), Vec2::splat(1e3)).r;
@@ -319,7 +347,7 @@ mod tests {
     fn narrow_footprints_keep_what_varies_along_the_narrow_axis() {
         // Columns that alternate: a filter that is wide along v alone leaves them
         let texels: Vec<f32> = (0..64 * 64).map(|i| f32::from(u8::from(i % 64 / 4 % 2 == 0))).collect();
-        let face = PtexFace { first: 0, log2: [6, 6], neighbors: [None; 4] };
+        let face = PtexFace { first: 0, log2: [6, 6], is_constant: false, neighbors: [None; 4] };
         let file = PtexFile { faces: vec![face], channels: 1, texels: PtexTexels::Floats(texels) };
         let map = FaceMap::new(file, ColorEncoding::Linear);
         let contrast = |width: Vec2| {

@@ -354,7 +354,7 @@ fn stats(args: &RenderArgs, job: &RenderJob, rendering: &Rendering, setup: Setup
         },
         "memory": {
             "film_bytes": rendering.film.bytes(), "accel_bytes": accel.bytes, "accel_peak_bytes": accel.peak_bytes,
-            "texture_bytes": textures.images.iter().map(|image| image.bytes()).sum::<usize>(),
+            "texture_bytes": textures.bytes(),
             "texture_tiles": textures.store().map(|store| tile_counts(store.counts())),
         },
         "photon_maps": rendering.photons.map(|p| photon_stats(&p)),

@@ -42,13 +42,15 @@ pub enum PtexTexels {
     Floats(Vec<f32>),
 }
 
-/// A face of the mesh. Its texels stand row by row, from (u, v) = (0, 0); a face of one colour has one.
+/// A face of the mesh. Its texels stand row by row, from (u, v) = (0, 0); of a face of one colour there is one.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct PtexFace {
     /// Index of its first texel.
     pub first: usize,
     /// Binary logarithms of the numbers of columns and rows.
     pub log2: [u8; 2],
+    /// True if one texel stands for all.
+    pub is_constant: bool,
     /// What is beyond its edges v = 0, u = 1, v = 1, u = 0.
     pub neighbors: [Option<Neighbor>; 4],
 }
@@ -161,12 +163,15 @@ impl Header {
         channels.for_each(|channel| out.extend_from_slice(&channel[face * size..][..size]));
     }
 
-    /// Logarithms of the columns and rows that are stored of a face, for which there must be `room` (bytes). `Err` says what is
-    /// wrong with them.
-    fn size(&self, info: &[u8], encoding: Encoding, room: &mut usize) -> Result<[u8; 2], String> {
-        let log2 = if matches!(encoding, Encoding::Constant) { [0, 0] } else { [info[0], info[1]] };
-        let is_known = log2.iter().all(|&log2| log2 <= MOST_LOG2);
-        let bytes = if is_known { self.texel_bytes() << (log2[0] + log2[1]) } else { usize::MAX };
+    /// Logarithms of the columns and rows of a face, for whose texels there must be `room` (bytes). `Err` says what is wrong
+    /// with them.
+    fn size(&self, info: &[u8], is_constant: bool, room: &mut usize) -> Result<[u8; 2], String> {
+        let log2 = [info[0], info[1]];
+        let bytes = match log2.iter().all(|&log2| log2 <= MOST_LOG2) {
+            true if is_constant => self.texel_bytes(),
+            true => self.texel_bytes() << (log2[0] + log2[1]),
+            false => usize::MAX,
+        };
         *room = room.checked_sub(bytes).ok_or_else(|| format!("has 2^{} × 2^{} texels", log2[0], log2[1]))?;
         Ok(log2)
     }
@@ -209,17 +214,18 @@ pub fn parse_ptex(bytes: &[u8]) -> Result<PtexFile, PtexError> {
         let (encoding, size) = Encoding::of(u32::from_le_bytes([size[0], size[1], size[2], size[3]]));
         let block = blocks.take(size, "the texture of a face")?;
         planar.clear();
-        let log2 = if info[3] & FLAG_CONSTANT != 0 {
+        let is_mean = info[3] & FLAG_CONSTANT != 0;
+        let is_constant = is_mean || matches!(encoding, Encoding::Constant);
+        let log2 = header.size(info, is_constant, &mut room).map_err(|what| {
+            PtexError::wrong(at, format!("face {number} {what}, in a file of {} bytes", bytes.len()))
+        })?;
+        if is_mean {
             header.mean(&means, number, &mut planar);
-            [0, 0]
         } else {
-            let log2 = header.size(info, encoding, &mut room).map_err(|what| {
-                PtexError::wrong(at, format!("face {number} {what}, in a file of {} bytes", bytes.len()))
-            })?;
-            blocks::read_texels(block, encoding, log2, (header.channels, header.ty), &mut planar, at)?;
-            log2
-        };
-        faces.push(PtexFace { first: out.texels(), log2, neighbors: neighbors(info, &infos) });
+            let stored = if is_constant { [0, 0] } else { log2 };
+            blocks::read_texels(block, encoding, stored, (header.channels, header.ty), &mut planar, at)?;
+        }
+        faces.push(PtexFace { first: out.texels(), log2, is_constant, neighbors: neighbors(info, &infos) });
         out.push(&planar);
     }
     Ok(PtexFile { faces, channels: out.channels, texels: out.values })
