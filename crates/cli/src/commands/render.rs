@@ -288,7 +288,9 @@ fn outputs(args: &RenderArgs, job: &RenderJob) -> Vec<PathBuf> {
             return path;
         }
         let exr = path.with_extension("exr");
-        progress::say(&format!("note: {} becomes {}", path.display(), exr.display()));
+        if !args.quiet {
+            progress::say(&format!("note: {} becomes {}", path.display(), exr.display()));
+        }
         exr
     });
     vec![from_file.unwrap_or_else(|| {
