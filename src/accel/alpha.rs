@@ -1,17 +1,10 @@
 //! Alpha masks: which hits on a geometry with an alpha texture stop a ray. Both ray tracers call this.
 
 use super::Hit;
-use crate::geometry::{GeometrySet, VertexValues};
+use crate::geometry::{AlphaSource, GeometrySet};
+use lumiris_numbers::math::Ray;
 use lumiris_numbers::math::hash::{hash_floats, pcg4d, unit_f32};
-use lumiris_numbers::math::{Ray, Vec2, Vec3};
 use std::sync::Arc;
-
-/// Values of alpha textures.
-pub trait AlphaSource: Send + Sync {
-    /// Value of float texture `texture` at the texture coordinates `uv` of the world-space point `p`, where the vertices
-    /// have the values `vertex`.
-    fn alpha(&self, texture: u32, uv: Vec2, vertex: &VertexValues, p: Vec3) -> f32;
-}
 
 /// The alpha test of a hit.
 #[derive(Clone)]

@@ -9,7 +9,7 @@ pub mod embree;
 #[cfg(test)]
 mod scenes_for_tests;
 
-pub use alpha::{AlphaSource, AlphaTest};
+pub use alpha::AlphaTest;
 pub use bvh::Bvh;
 
 use crate::geometry::GeometryId;

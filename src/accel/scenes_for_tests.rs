@@ -1,9 +1,10 @@
 //! Scenes and rays for the tests of both ray tracers.
 
-use super::{AlphaSource, RayBatch};
+use super::RayBatch;
 use crate::geometry::reference_for_tests::random_point;
 use crate::geometry::{
-    BilinearMesh, Geometry, GeometrySet, Group, Instance, Quadric, QuadricKind, Shape, TriangleMesh, Visibility,
+    AlphaSource, BilinearMesh, Geometry, GeometrySet, Group, Instance, Quadric, QuadricKind, Shape, TriangleMesh,
+    Visibility,
 };
 use lumiris_numbers::math::{Affine3A, Quat, Ray, Vec2, Vec3};
 use lumiris_test_support::random::{Pcg32, RngExt, pcg32};

@@ -30,6 +30,13 @@ impl Default for VertexValues {
     }
 }
 
+/// Values of alpha textures.
+pub trait AlphaSource: Send + Sync {
+    /// Value of float texture `texture` at the texture coordinates `uv` of the world-space point `p`, where the vertices
+    /// have the values `vertex`.
+    fn alpha(&self, texture: u32, uv: Vec2, vertex: &VertexValues, p: Vec3) -> f32;
+}
+
 /// A point on a surface as materials and lights see it. World space, unless the shape that made it says otherwise.
 #[derive(Clone, Copy, Debug)]
 pub struct SurfaceHit {

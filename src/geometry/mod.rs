@@ -17,7 +17,7 @@ pub mod triangle;
 pub use bilinear::BilinearMesh;
 pub use curve::{Curve, CurveKind, CurveSet};
 pub use displacement::DisplacedMesh;
-pub use hit::{LocalHit, SurfaceHit, VertexValues};
+pub use hit::{AlphaSource, LocalHit, SurfaceHit, VertexValues};
 pub use loop_subdiv::loop_subdivide;
 pub use mesh::TriangleMesh;
 pub use quadric::{Quadric, QuadricKind};

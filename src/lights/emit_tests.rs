@@ -60,8 +60,8 @@ fn picture(mapping: ImageMapping, size: [usize; 2]) -> Light {
 fn lights() -> Vec<(&'static str, Light)> {
     let l = Rgb::new(3.0, 5.0, 0.5);
     let image = EmissionImage::new(4, 4, (0..16).map(|i| Rgb::new(i as f32, 1.0, (i % 3) as f32)).collect()).unwrap();
-    let textured = Emission { l, two_sided: false, image: Some(Arc::new(image)) };
-    let both = Emission { l, two_sided: true, image: None };
+    let textured = Emission { image: Some(Arc::new(image)), ..Emission::constant(l) };
+    let both = Emission { two_sided: true, ..Emission::constant(l) };
     let area = |shape: &Shape, emission: &Emission| Light::Area(area_lights_of(shape, emission).lights.remove(0));
     let one = Emission::constant(l);
     let down = rectangle_mesh(Vec3::new(-0.3, -0.6, 1.5), Vec3::Y, Vec3::X * 0.8);

@@ -281,7 +281,7 @@ mod tests {
         let mut stream = pcg32([1, 8, 4]);
         for shape in shapes() {
             for two_sided in [false, true] {
-                let emission = Emission { l: Rgb::new(1.0, 3.0, 2.0), two_sided, image: None };
+                let emission = Emission { two_sided, ..Emission::constant(Rgb::new(1.0, 3.0, 2.0)) };
                 let lit = assert_integrates(&set(std::slice::from_ref(&shape), &emission), &mut stream);
                 let is_left_out = two_sided && matches!(shape, Shape::Quadric(_));
                 assert_eq!(lit == 0, is_left_out);
@@ -317,7 +317,7 @@ mod tests {
     fn lights_with_cut_outs_and_of_unknown_irradiance_take_no_part() {
         let data = [1.0, 2.0, 3.0, 6.0].map(Rgb::splat).to_vec();
         let image = Some(Arc::new(EmissionImage::new(2, 2, data).unwrap()));
-        let emission = Emission { l: Rgb::splat(2.0), two_sided: false, image };
+        let emission = Emission { image, ..Emission::constant(Rgb::splat(2.0)) };
         let shapes = &shapes()[..1];
         let (p, n) = (Vec3::new(0.5, 0.5, 0.0), Vec3::Z);
         let set = set(shapes, &emission);

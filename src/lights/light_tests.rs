@@ -19,7 +19,7 @@ pub(super) struct Surface {
 }
 
 pub(super) fn light_of(shape: &Shape) -> AreaLight {
-    let emission = Emission { l: Rgb::WHITE, two_sided: true, image: None };
+    let emission = Emission { two_sided: true, ..Emission::constant(Rgb::WHITE) };
     let mut out = area_lights_of(shape, &emission);
     assert_eq!(out.lights.len(), 1);
     out.lights.remove(0)
@@ -364,7 +364,7 @@ fn one_sided_lights_emit_on_the_side_of_their_normal() {
 fn powers_are_those_of_lambertian_emitters() {
     let full = QuadricKind::Sphere { radius: 2.0, z_min: -2.0, z_max: 2.0, phi_max: std::f32::consts::TAU };
     let sphere = Shape::Quadric(quadric(full, Affine3A::from_scale(Vec3::splat(0.5))));
-    let constant = |two_sided| Emission { l: Rgb::splat(3.0), two_sided, image: None };
+    let constant = |two_sided| Emission { two_sided, ..Emission::constant(Rgb::splat(3.0)) };
     let phi = |shape: &Shape, two_sided| f64::from(area_lights_of(shape, &constant(two_sided)).lights[0].phi());
     assert!((phi(&sphere, false) / (3.0 * PI * 4.0 * PI) - 1.0).abs() < 1e-5);
     let rectangle = rectangle_mesh(Vec3::ZERO, Vec3::X * 2.0, Vec3::Y * 3.0);
@@ -381,7 +381,7 @@ fn powers_are_those_of_lambertian_emitters() {
 fn emission_images_are_looked_up_at_the_sampled_point() {
     let data: Vec<Rgb> = (0..64).map(|i| Rgb::new((i % 8) as f32, (i / 8) as f32, 1.0)).collect();
     let image = Some(std::sync::Arc::new(super::EmissionImage::new(8, 8, data).unwrap()));
-    let emission = Emission { l: Rgb::splat(2.0), two_sided: true, image: image.clone() };
+    let emission = Emission { two_sided: true, image: image.clone(), ..Emission::constant(Rgb::splat(2.0)) };
     let positions = vec![Vec3::ZERO, Vec3::X * 2.0, Vec3::Y, Vec3::X * 2.0 + Vec3::Y];
     let flat = BilinearMesh { positions: positions.clone(), indices: vec![[0, 1, 2, 3]], ..BilinearMesh::default() };
     let mut bent = flat.clone();
@@ -414,7 +414,7 @@ fn emission_images_may_have_texture_coordinates_of_their_own() {
     let mapping = super::EmissionMapping { second: true, image_from_uv };
     let expected = image.clone().placed(wrap, None);
     let image = Some(std::sync::Arc::new(image.placed(wrap, Some(mapping))));
-    let emission = Emission { l: Rgb::WHITE, two_sided: true, image };
+    let emission = Emission { two_sided: true, image, ..Emission::constant(Rgb::WHITE) };
     let mut mesh = TriangleMesh::new(vec![Vec3::ZERO, Vec3::X, Vec3::Y], vec![[0, 1, 2]]).unwrap();
     mesh.uvs = vec![Vec2::splat(0.1); 3];
     mesh.uvs1 = vec![Vec2::ZERO, Vec2::X, Vec2::Y];

@@ -36,7 +36,7 @@ mod emit_tests;
 #[cfg(test)]
 mod light_tests;
 
-pub use area::{AreaLight, AreaShape, Emission, EmissionImage, EmissionMapping, area_lights_of};
+pub use area::{AreaLight, AreaShape, Cover, Emission, EmissionImage, EmissionMapping, area_lights_of};
 pub use bounds::LightBounds;
 pub use choice::{LightRun, SampledLight};
 pub use emit::{EmissionSample, EmittingPoint};

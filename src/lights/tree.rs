@@ -353,7 +353,7 @@ mod tests {
                     k => {
                         let mut edge = || sample_uniform_sphere(s.random::<[f32; 2]>()) * scale * 0.01;
                         let mesh = TriangleMesh::new(vec![p, p + edge(), p + edge()], vec![[0, 1, 2]]).unwrap();
-                        let emission = Emission { l, two_sided: k == 2, image: None };
+                        let emission = Emission { two_sided: k == 2, ..Emission::constant(l) };
                         Light::Area(area_lights_of(&Shape::Mesh(mesh), &emission).lights.remove(0))
                     }
                 }

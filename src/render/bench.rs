@@ -7,8 +7,9 @@
 use super::{BATCH_PATHS, camera_batches};
 use crate::accel::embree::bare::{Bare, Packed};
 use crate::accel::embree::{EmbreeAccel, EmbreeError};
-use crate::accel::{Accel, AlphaSource, Coherence, RayBatch};
+use crate::accel::{Accel, Coherence, RayBatch};
 use crate::direct::{Estimator, Fits};
+use crate::geometry::AlphaSource;
 use crate::integrators::path::{CameraSample, Recording};
 use crate::integrators::{PathStats, PathTracer, Tracer};
 use crate::scene::RenderJob;

@@ -7,13 +7,13 @@
 
 use super::worker::Worker;
 use super::{RenderSettings, Run, batch_parts};
-use crate::accel::AlphaSource;
 use crate::accel::RayBatch;
 use crate::accel::embree::EmbreeError;
 use crate::accel::embree::bare::{Bare, Packed};
 use crate::direct::Estimator;
 use crate::film::PixelBounds;
 use crate::film::accumulator::PixelAccumulator;
+use crate::geometry::AlphaSource;
 use crate::integrators::path::Recording;
 use crate::integrators::{PathStats, PathTracer, Tracer};
 use crate::scene::RenderJob;

@@ -3,8 +3,8 @@
 use super::Scene;
 use crate::accel::bvh::Bvh;
 use crate::accel::embree::{EmbreeAccel, EmbreeError};
-use crate::accel::{Accel, AlphaSource, Coherence, Hit, RayBatch};
-use crate::geometry::{Geometry, GeometryId, GeometrySet, Group, Shape, VertexValues, Visibility};
+use crate::accel::{Accel, Coherence, Hit, RayBatch};
+use crate::geometry::{AlphaSource, Geometry, GeometryId, GeometrySet, Group, Shape, VertexValues, Visibility};
 use crate::lights::LightId;
 use crate::textures::{TextureContext, TextureSet};
 use lumiris_lanes::level;

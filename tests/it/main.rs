@@ -1,6 +1,7 @@
 //! Whole-program tests; one binary, a module per subject.
 #![allow(clippy::unwrap_used)]
 
+mod alpha_lights;
 mod analytic_scenes;
 mod anisotropy;
 mod bit_exact;

@@ -14,8 +14,8 @@ mod tests;
 mod tree;
 mod walk;
 
-use super::{Accel, AccelStats, AlphaSource, AlphaTest, Coherence, Hit, RayBatch};
-use crate::geometry::{Geometry, GeometrySet, Group, Shape, Visibility};
+use super::{Accel, AccelStats, AlphaTest, Coherence, Hit, RayBatch};
+use crate::geometry::{AlphaSource, Geometry, GeometrySet, Group, Shape, Visibility};
 use build::{PrimRef, build_binary};
 use lumiris_numbers::math::{Affine3A, Bounds3, Vec3};
 use rayon::prelude::*;

@@ -52,8 +52,8 @@ mod scene;
 mod tests;
 mod world;
 
-use super::{Accel, AccelStats, AlphaSource, AlphaTest, Coherence, Hit, RayBatch};
-use crate::geometry::{GeometryId, GeometrySet, Shape};
+use super::{Accel, AccelStats, AlphaTest, Coherence, Hit, RayBatch};
+use crate::geometry::{AlphaSource, GeometryId, GeometrySet, Shape};
 use callbacks::GeometryContext;
 use device::Device;
 use embree4_sys::{RTCDeviceProperty as Property, RTCError};

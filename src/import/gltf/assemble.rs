@@ -14,7 +14,7 @@ use crate::import::LoadOptions;
 use crate::import::cache::FileCache;
 use crate::import::resources::report;
 use crate::lights::{
-    Emission, EmissionImage, EnvironmentFilter, EnvironmentMap, EnvironmentMapping, Light, LightSetBuilder,
+    Cover, Emission, EmissionImage, EnvironmentFilter, EnvironmentMap, EnvironmentMapping, Light, LightSetBuilder,
 };
 use crate::materials::{MaterialId, MaterialSet};
 use crate::media::{Homogeneous, Medium, MediumId, MediumSet, Sides};
@@ -99,18 +99,19 @@ impl<'a> Assembly<'a> {
         for light in self.lights {
             lights.add(light);
         }
-        for (geometry, emission) in &self.emitters {
-            lights.add_area(*geometry, &self.set.geometries[*geometry as usize].shape, emission);
+        let (geometry, textures) = (Arc::new(self.set), Arc::new(self.materials.textures.set));
+        for (id, emission) in self.emitters {
+            let cover = Cover::of(&geometry, id, Arc::clone(&textures) as _);
+            lights.add_area(id, &geometry.geometries[id as usize].shape, &Emission { cover, ..emission });
         }
-        let textures = &self.materials.textures.set;
-        let materials = MaterialSet::new(self.materials.entries, textures).find_caustics(textures);
+        let materials = MaterialSet::new(self.materials.entries, &textures).find_caustics(&textures);
         Ok(Some(Scene {
             camera,
             film,
             materials,
-            textures: Arc::new(self.materials.textures.set),
+            textures,
             lights: Arc::new(lights.build(&bounds)),
-            geometry: Arc::new(self.set),
+            geometry,
             surfaces: self.surfaces,
             media: self.media,
         }))
@@ -221,7 +222,8 @@ impl<'a> Assembly<'a> {
             let read = || emission_image(source, files, messages);
             self.emission_images.entry(look.material).or_insert_with(read).clone()
         });
-        self.emitters.push((id, Emission { l: look.emission, two_sided: look.is_double_sided, image }));
+        let two_sided = look.is_double_sided;
+        self.emitters.push((id, Emission { two_sided, image, ..Emission::constant(look.emission) }));
     }
 
     /// `KHR_lights_punctual`: lights shine along −z.

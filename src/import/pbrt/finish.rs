@@ -14,7 +14,7 @@ use crate::imaging::oiio::ImageError;
 use crate::import::cache::FileCache;
 use crate::import::images::RgbImage;
 use crate::import::resources::report;
-use crate::lights::{Emission, EmissionImage, LightSetBuilder, area_lights_of};
+use crate::lights::{Cover, Emission, EmissionImage, LightSetBuilder, area_lights_of};
 use crate::materials::{Material, MaterialId, MaterialSet};
 use crate::media::Medium;
 use crate::scene::{Scene, Surface};
@@ -117,28 +117,29 @@ impl Builder<'_> {
         for (light, group) in self.lights.into_iter().zip(self.light_groups) {
             lights.in_group(group).add(light);
         }
-        for (geometry, emission, group) in &assembly.emitters {
-            lights.in_group(group.clone()).add_area(
-                *geometry,
-                &assembly.set.geometries[*geometry as usize].shape,
-                emission,
-            );
+        let (geometry, textures) = (Arc::new(assembly.set), Arc::new(self.textures));
+        for (id, emission, group) in assembly.emitters {
+            // As in pbrt-v4, what has an alpha of 0 everywhere is a light that cannot be seen
+            let is_unseen = |cover: &Arc<Cover>| textures.constant_float(cover.texture) == Some(0.0);
+            let cover = Cover::of(&geometry, id, Arc::clone(&textures) as _).filter(|cover| !is_unseen(cover));
+            let shape = &geometry.geometries[id as usize].shape;
+            lights.in_group(group).add_area(id, shape, &Emission { cover, ..emission });
         }
-        let bounds = assembly.set.world_bounds();
+        let bounds = geometry.world_bounds();
         for (_, span) in self.portals.iter().filter(|(portal, _)| !portal.lights(&bounds)) {
             let message = "no shape is on the side of the portal that is lit: its light will not be seen";
             d.warning_once(*span, message).map(|w| w.help("reverse the order of its corners"));
         }
         let lights = lights.build(&bounds);
-        if lights.lights.is_empty() && !assembly.media.set.media.iter().any(Medium::is_emissive) {
+        if lights.lit.is_empty() && !assembly.media.set.media.iter().any(Medium::is_emissive) {
             d.warning_without_place("nothing emits light: the image will be black");
         }
         let scene = Scene {
             camera,
             film,
-            materials: materials.find_caustics(&self.textures),
-            textures: Arc::new(self.textures),
-            geometry: Arc::new(assembly.set),
+            materials: materials.find_caustics(&textures),
+            textures,
+            geometry,
             surfaces: assembly.surfaces,
             lights: Arc::new(lights),
             media: assembly.media.set,
@@ -166,7 +167,7 @@ impl Builder<'_> {
                     d.warning_once(light.span, "moving area lights are not rendered, as in pbrt-v4: the shape is dark");
                     None
                 }
-                (None, false) if passes && !assembly.media.set.is_empty() => {
+                (None, false) if passes => {
                     d.warning_once(light.span, "a surface that only bounds a medium does not emit, as in pbrt-v4");
                     None
                 }
@@ -295,7 +296,7 @@ fn load_emission_images(paths: &[PathBuf], files: &FileCache) -> Vec<(PathBuf, R
 /// The emission of a shape in world space.
 fn emission_of(light: &AreaLightDesc, shape: &Shape, images: &HashMap<PathBuf, Arc<EmissionImage>>) -> Emission {
     let image = light.image.as_ref().and_then(|(path, _)| images.get(path).cloned());
-    let mut emission = Emission { l: light.l, two_sided: light.two_sided, image };
+    let mut emission = Emission { two_sided: light.two_sided, image, ..Emission::constant(light.l) };
     if light.power > 0.0 {
         let area = area_lights_of(shape, &emission).lights.iter().map(|l| l.area()).sum();
         // The image counts, and the colour does not: pbrt-v4 takes the colour for white here.

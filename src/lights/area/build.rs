@@ -35,7 +35,7 @@ pub fn area_lights_of(shape: &Shape, emission: &Emission) -> AreaLights {
         }
         Shape::Bilinear(mesh) => {
             for i in 0..mesh.patch_count() {
-                out.push(patch(mesh, i, emission.image.is_some()), emission, 1);
+                out.push(patch(mesh, i, emission.is_textured()), emission, 1);
             }
         }
         // The importer refuses curves that emit

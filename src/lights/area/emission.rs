@@ -1,5 +1,6 @@
 //! Emission of an area light's surface.
 
+use super::Cover;
 use crate::imaging::AxisWrap;
 use glam::Affine2;
 use lumiris_numbers::math::{Rgb, Vec2, Vec3};
@@ -14,12 +15,20 @@ pub struct Emission {
     pub two_sided: bool,
     /// Radiance over the texture coordinates.
     pub image: Option<Arc<EmissionImage>>,
+    /// Where the surface is, if an alpha texture cuts it out.
+    pub cover: Option<Arc<Cover>>,
 }
 
 impl Emission {
     /// The same radiance everywhere, on the side of the normal.
     pub fn constant(l: Rgb) -> Self {
-        Emission { l, two_sided: false, image: None }
+        Emission { l, two_sided: false, image: None, cover: None }
+    }
+
+    /// True if what is emitted depends on the place.
+    #[inline]
+    pub fn is_textured(&self) -> bool {
+        self.image.is_some() || self.cover.is_some()
     }
 
     /// Radiance at `uv` in direction `w`, where the normal is `n`.
@@ -138,7 +147,7 @@ mod tests {
         assert_eq!(repeated.lookup(Vec2::new(-0.75, 1.25)).r, 1.0);
         assert_eq!(repeated.lookup(Vec2::new(3.75, -0.75)).r, 2.0);
         assert!(EmissionImage::new(2, 2, vec![Rgb::WHITE; 3]).is_err());
-        let emission = Emission { l: Rgb::splat(2.0), two_sided: false, image: Some(Arc::new(image)) };
+        let emission = Emission { image: Some(Arc::new(image)), ..Emission::constant(Rgb::splat(2.0)) };
         assert!((emission.mean_luminance() - 5.0).abs() < 1e-5);
         assert!(emission.l(Vec3::Z, Vec2::ZERO, -Vec3::Z).is_black());
     }

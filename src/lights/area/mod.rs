@@ -11,6 +11,7 @@
 //! A light has its own copy of its geometry, in world space.
 
 pub mod build;
+pub mod cover;
 pub mod emission;
 pub mod patch;
 pub mod quadric;
@@ -18,6 +19,7 @@ pub mod rectangle;
 pub mod triangle;
 
 pub use build::{AreaLights, area_lights_of};
+pub use cover::Cover;
 pub use emission::{Emission, EmissionImage, EmissionMapping};
 pub use patch::PatchLight;
 pub use quadric::QuadricLight;
@@ -111,7 +113,7 @@ impl AreaLight {
             AreaShape::Patch(patch) => patch.sample(ctx.p, u),
         }?;
         let uv = if self.emission.image.is_some() { self.uv(s.p) } else { Vec2::ZERO };
-        let li = self.emission.l(s.n, uv, -s.wi);
+        let li = self.covered(self.emission.l(s.n, uv, -s.wi), s.p);
         let ShapeSample { p, n, p_error, wi, t, pdf } = s;
         Some(LightSample { li, wi, pdf, t, p, n, p_error, is_delta: false })
     }
@@ -126,10 +128,23 @@ impl AreaLight {
         }
     }
 
-    /// Radiance that leaves the point `p` of the surface on a side that emits.
+    /// Radiance that leaves the point `p` of the surface on a side that emits, by the part of it that is there.
     pub(super) fn radiance(&self, p: Vec3) -> Rgb {
         let uv = if self.emission.image.is_some() { self.uv(p) } else { Vec2::ZERO };
-        self.emission.radiance(uv)
+        self.covered(self.emission.radiance(uv), p)
+    }
+
+    /// A radiance at the point `p` of the surface, times the part of that which its alpha texture leaves.
+    #[inline]
+    fn covered(&self, l: Rgb, p: Vec3) -> Rgb {
+        match &self.emission.cover {
+            Some(cover) if !l.is_black() => {
+                // Two triangles may be one rectangle
+                let count = if matches!(self.shape, AreaShape::Rectangle(_)) { 2 } else { 1 };
+                l * cover.alpha((self.primitive, count), p, || self.uv(p))
+            }
+            _ => l,
+        }
     }
 
     /// Density per steradian of [`sample_li`](Self::sample_li) at the point `hit`. Of a surface that a ray can cross
@@ -147,7 +162,7 @@ impl AreaLight {
         }
     }
 
-    /// Radiance that leaves the point `hit` in direction `w`. Which side a flat light emits from is read from the
+    /// Radiance that leaves the point `hit`, which a ray has found to be there, in direction `w`. Which side a flat light emits from is read from the
     /// light itself, so that both techniques agree; curved ones use the normal of the hit.
     #[inline]
     pub fn l(&self, hit: &LightHit, w: Vec3) -> Rgb {

@@ -1,0 +1,66 @@
+//! The part of an emitting surface that an alpha texture leaves.
+
+use crate::geometry::{AlphaSource, GeometryId, GeometrySet, Shape, TriangleMesh};
+use lumiris_numbers::math::{Vec2, Vec3};
+use std::fmt;
+use std::sync::Arc;
+
+/// The alpha texture of an emitting geometry. A ray hits the surface with probability alpha and sees all of its radiance,
+/// so the radiance of a point that is sampled is multiplied by alpha: both techniques find the same light.
+#[derive(Clone)]
+pub struct Cover {
+    /// All shapes.
+    pub geometry: Arc<GeometrySet>,
+    /// That which emits, in world space.
+    pub id: GeometryId,
+    /// Its alpha texture, and what evaluates that.
+    pub texture: u32,
+    /// All textures.
+    pub source: Arc<dyn AlphaSource>,
+}
+
+impl fmt::Debug for Cover {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.debug_struct("Cover").field("id", &self.id).field("texture", &self.texture).finish_non_exhaustive()
+    }
+}
+
+impl Cover {
+    /// That of a geometry; `None` if it has no alpha texture.
+    pub fn of(geometry: &Arc<GeometrySet>, id: GeometryId, source: Arc<dyn AlphaSource>) -> Option<Arc<Cover>> {
+        let texture = geometry.geometries[id as usize].alpha?;
+        Some(Arc::new(Cover { geometry: Arc::clone(geometry), id, texture, source }))
+    }
+
+    /// Alpha, from 0 to 1, at the point `p` of a light, which is `count` primitives from `first` on; `uv` is its texture
+    /// coordinates there, if it is no mesh of triangles.
+    pub(super) fn alpha(&self, (first, count): (u32, u32), p: Vec3, uv: impl FnOnce() -> Vec2) -> f32 {
+        let shape = &self.geometry.geometries[self.id as usize].shape;
+        let (primitive, place) = match shape {
+            Shape::Mesh(mesh) => triangle_at(mesh, first, count, p),
+            _ => (first, [0.0; 2]),
+        };
+        let st = match shape {
+            Shape::Mesh(_) => shape.texture_coordinates(primitive, place),
+            _ => uv(),
+        };
+        let alpha = self.source.alpha(self.texture, st, &shape.vertex_values(primitive, place), p);
+        if alpha.is_nan() { 0.0 } else { alpha.clamp(0.0, 1.0) }
+    }
+}
+
+/// Which of the triangles from `first` on the point lies in, and the weights of its vertices 1 and 2 there.
+fn triangle_at(mesh: &TriangleMesh, first: u32, count: u32, p: Vec3) -> (u32, [f32; 2]) {
+    let weights = |i: u32| {
+        let [a, b, c] = mesh.triangle(i as usize);
+        // Least squares for p − a = b1·e1 + b2·e2
+        let (e1, e2, d) = (b - a, c - a, p - a);
+        let (aa, ab, bb) = (e1.dot(e1), e1.dot(e2), e2.dot(e2));
+        let (x, y) = (d.dot(e1), d.dot(e2));
+        let determinant = aa * bb - ab * ab;
+        [(bb * x - ab * y) / determinant, (aa * y - ab * x) / determinant]
+    };
+    let inside = |[b1, b2]: [f32; 2]| b1.min(b2).min(1.0 - b1 - b2);
+    let all = (first..first + count).map(|i| (i, weights(i)));
+    all.max_by(|a, b| inside(a.1).total_cmp(&inside(b.1))).unwrap_or((first, [0.0; 2]))
+}
