@@ -4,7 +4,8 @@ use crate::imaging::oiio::{self, FilePyramid, ImageError, ReadLimits};
 use crate::imaging::tiles::TileStore;
 use crate::imaging::{ColorChannels, ColorEncoding, Filter, MipMap, Wrap};
 use crate::textures::Udim;
-use lumiris_numbers::math::Rgb;
+use lumiris_formats::color_space::{Chromaticities, Colored, is_rec709, rec709_from};
+use lumiris_numbers::math::{Mat3, Rgb, Vec3};
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
 
@@ -31,6 +32,8 @@ pub enum ImageChannels {
     Color,
     /// Opacity; 1 where there is none.
     Alpha,
+    /// What a texture of numbers reads: opacity where not all is opaque, and colour or grey otherwise.
+    Number,
 }
 
 /// An image as textures ask for it.
@@ -46,6 +49,36 @@ pub struct ImageRequest {
     pub wrap: Wrap,
     /// Between texels.
     pub filter: Filter,
+}
+
+/// Metadata by which files of floats tell their colour space: x and y of red, green, blue and white.
+const CHROMATICITIES: &str = "chromaticities";
+/// Most columns and rows of the level of a file by which its opacity is judged.
+const SMALL: usize = 128;
+
+impl ImageRequest {
+    /// The same with channels that are known, by the names of those of the image, and by whether channel `a` is 1 everywhere.
+    fn resolved(&self, names: &[String], is_opaque: impl Fn(usize) -> bool) -> ImageRequest {
+        // The opacity of Targa files is no number of theirs in pbrt-v4
+        let is_targa = self.path.extension().is_some_and(|e| e.eq_ignore_ascii_case("tga"));
+        let alpha = names.iter().position(|name| name == "A").filter(|_| !is_targa);
+        let channels = match (self.channels, alpha) {
+            (ImageChannels::Number, Some(a)) if !is_opaque(a) => ImageChannels::Alpha,
+            (ImageChannels::Number, _) => ImageChannels::Color,
+            (channels, _) => channels,
+        };
+        ImageRequest { channels, ..self.clone() }
+    }
+}
+
+/// From the colour space that a file tells to Rec.709, if they differ and `channels` are colours.
+fn rec709_of(chromaticities: Option<&str>, channels: ImageChannels, of: Colored) -> Option<Mat3> {
+    let numbers = chromaticities?.split([',', ' ']).filter_map(|number| number.parse::<f64>().ok());
+    let numbers: [f64; 8] = numbers.collect::<Vec<_>>().try_into().ok()?;
+    let xy = |i: usize| [numbers[2 * i], numbers[2 * i + 1]];
+    let space: Chromaticities = std::array::from_fn(xy);
+    let is_other = channels == ImageChannels::Color && !is_rec709(&space);
+    is_other.then(|| rec709_from(&space, of)).flatten()
 }
 
 /// What stands for the number of a tile in the name of an image file.
@@ -70,15 +103,22 @@ pub fn tiles(path: &Path) -> Vec<(u32, PathBuf)> {
 
 /// Reads an image as textures ask for it. A file that holds all levels of a pyramid, as `.tx` files do, gives them.
 pub fn load_map(request: &ImageRequest) -> Result<MipMap, ImageError> {
-    if let Some(file) = FilePyramid::open(&request.path)? {
-        return file_map(file, request, None);
+    match pyramid(request)? {
+        Some(file) => file_map(file, request, None),
+        None => image_map(request),
     }
-    image_map(request)
+}
+
+/// A file that holds all levels, in a colour space whose numbers can be taken as they are.
+fn pyramid(request: &ImageRequest) -> Result<Option<FilePyramid>, ImageError> {
+    let is_as_it_is =
+        |file: &FilePyramid| rec709_of(file.chromaticities(), request.channels, Colored::Factor).is_none();
+    Ok(FilePyramid::open(&request.path)?.filter(is_as_it_is))
 }
 
 /// The same with levels of more than a tile in `store`: read from the file when they are wanted, if it holds them.
 pub fn load_tiled_map(request: &ImageRequest, store: &Arc<TileStore>) -> Result<MipMap, ImageError> {
-    if let Some(file) = FilePyramid::open(&request.path)? {
+    if let Some(file) = pyramid(request)? {
         return file_map(file, request, Some(store));
     }
     image_map(request)?.tiled(store).map_err(|error| {
@@ -89,14 +129,30 @@ pub fn load_tiled_map(request: &ImageRequest, store: &Arc<TileStore>) -> Result<
 
 /// The pyramid of an image.
 fn image_map(request: &ImageRequest) -> Result<MipMap, ImageError> {
-    let read = oiio::read_image(&request.path, &ReadLimits::default())?;
-    let (channels, encoding) = meaning(request, &read.image.channels, read.encoding);
+    let mut read = oiio::read_image(&request.path, &ReadLimits::default())?;
+    let image = &mut read.image;
+    let count = image.channels.len();
+    let is_opaque = |a: usize| image.data.iter().skip(a).step_by(count).all(|&alpha| alpha >= 1.0);
+    let resolved = request.resolved(&image.channels, is_opaque);
+    let chromaticities = read.metadata.get(CHROMATICITIES).filter(|_| read.encoding == ColorEncoding::Linear);
+    let matrix = rec709_of(chromaticities.map(String::as_str), request.channels, Colored::Factor);
+    if let (Some(matrix), Some(ColorChannels::Rgb(rgb))) = (matrix, image.color_channels()) {
+        for pixel in image.data.chunks_exact_mut(count) {
+            let color = matrix * Vec3::from_array(rgb.map(|c| pixel[c]));
+            rgb.iter().zip(color.to_array()).for_each(|(&c, value)| pixel[c] = value);
+        }
+    }
+    let (channels, encoding) = meaning(&resolved, &read.image.channels, read.encoding);
     let how = (request.wrap, request.filter, encoding);
     Ok(channels.map_or_else(|| without_channels(request), |channels| MipMap::of_channels(&read.image, &channels, how)))
 }
 
 /// The pyramid that a file holds.
 fn file_map(file: FilePyramid, request: &ImageRequest, store: Option<&Arc<TileStore>>) -> Result<MipMap, ImageError> {
+    // A level of few texels tells whether all are opaque
+    let small = file.sizes().iter().position(|size| size[0].max(size[1]) <= SMALL).unwrap_or(0);
+    let is_opaque = |a| file.level(small, &[a]).is_ok_and(|level| level.iter().all(|&alpha| alpha >= 1.0));
+    let request = &request.resolved(file.channels(), is_opaque);
     let (channels, encoding) = meaning(request, file.channels(), file.encoding());
     let how = (request.wrap, request.filter, encoding);
     channels.map_or_else(|| Ok(without_channels(request)), |channels| MipMap::of_file(file, channels, how, store))
@@ -110,7 +166,9 @@ fn meaning(request: &ImageRequest, names: &[String], usual: ColorEncoding) -> (O
         ImageChannels::Alpha => {
             return (names.iter().position(|name| name == "A").map(|a| vec![a]), ColorEncoding::Linear);
         }
-        ImageChannels::Color => ColorChannels::of(names).map(|channels| channels.as_slice().to_vec()),
+        ImageChannels::Color | ImageChannels::Number => {
+            ColorChannels::of(names).map(|channels| channels.as_slice().to_vec())
+        }
     };
     let encoding = match request.encoding {
         // Floats are light already, whatever the scene says: pbrt-v4 decodes integers only.
@@ -139,7 +197,10 @@ pub fn load_rgb(path: &Path) -> Result<RgbImage, ImageError> {
         None => return Err(ImageError::Unreadable { path: path.to_owned(), reason: "has no channels".to_owned() }),
     };
     let pixels = image.data.chunks_exact(image.channels.len());
-    let texels = pixels.map(|p| Rgb::from_array(channels.map(|c| read.encoding.to_linear(p[c]))));
+    let chromaticities = read.metadata.get(CHROMATICITIES).map(String::as_str);
+    let matrix = rec709_of(chromaticities, ImageChannels::Color, Colored::Light).unwrap_or(Mat3::IDENTITY);
+    let color = |p: &[f32]| matrix * Vec3::from_array(channels.map(|c| read.encoding.to_linear(p[c])));
+    let texels = pixels.map(|p| Rgb::from_array(color(p).to_array()));
     Ok((texels.collect(), [image.width, image.height]))
 }
 
@@ -246,7 +307,7 @@ mod tests {
     }
 
     /// OpenEXR of one scan line without compression, of halves or floats.
-    fn exr(is_half: bool) -> Vec<u8> {
+    fn exr(is_half: bool, chromaticities: Option<[f32; 8]>) -> Vec<u8> {
         let mut file = [0x0131_2f76_u32, 2].iter().flat_map(|v| v.to_le_bytes()).collect::<Vec<u8>>();
         let mut attribute = |name: &str, kind: &str, value: &[u8]| {
             file.extend(format!("{name}\0{kind}\0").bytes());
@@ -267,6 +328,9 @@ mod tests {
         attribute("pixelAspectRatio", "float", &1.0_f32.to_le_bytes());
         attribute("screenWindowCenter", "v2f", &[0; 8]);
         attribute("screenWindowWidth", "float", &1.0_f32.to_le_bytes());
+        if let Some(xy) = chromaticities {
+            attribute("chromaticities", "chromaticities", xy.map(f32::to_le_bytes).as_flattened());
+        }
         file.push(0);
         // Halves of normal numbers: the exponent's bias is 15 instead of 127
         let half = |v: f32| if v == 0.0 { 0 } else { ((v.to_bits() >> 13) - ((127 - 15) << 10)) as u16 };
@@ -309,8 +373,8 @@ mod tests {
             Sample { tolerance: 4e-5, ..of_words("b.ppm", with_header("P6 2 1 65535\n", &words(u16::to_be_bytes))) },
             of_words("b.tif", tiff(16, 1, &words(u16::to_le_bytes))),
             of_floats("c.tif", tiff(32, 3, &floats)),
-            of_floats("a.exr", exr(true)),
-            of_floats("b.exr", exr(false)),
+            of_floats("a.exr", exr(true, None)),
+            of_floats("b.exr", exr(false, None)),
             of_floats("a.pfm", with_header("PF\n2 1\n-1.0\n", &floats)),
             of_floats("a.hdr", hdr()),
         ]
@@ -353,5 +417,53 @@ mod tests {
             }
         }
         assert!(wrong.is_empty(), "{wrong}");
+    }
+
+    fn request(path: &Path, channels: ImageChannels) -> ImageRequest {
+        let (wrap, filter) = (Wrap::Clamp, Filter::Point);
+        ImageRequest { path: path.to_owned(), channels, encoding: ImageEncoding::Auto, wrap, filter }
+    }
+
+    #[test]
+    fn files_of_floats_may_have_another_colour_space() {
+        let folder = tempfile::tempdir().unwrap();
+        let path = folder.path().join("a.exr");
+        // Red, green, blue and white
+        let rec709 = [0.64, 0.33, 0.3, 0.6, 0.15, 0.06, 0.3127, 0.329];
+        let rec2020 = [0.708, 0.292, 0.17, 0.797, 0.131, 0.046, 0.3127, 0.329];
+        // The primaries of Rec.2020 in Rec.709 [ITU-R BT.2087]
+        let matrix = [[1.6605, -0.5876, -0.0728], [-0.1246, 1.1329, -0.0083], [-0.0182, -0.1006, 1.1187]];
+        let converted = |p: [f32; 3]| matrix.map(|row: [f32; 3]| row.iter().zip(p).map(|(a, b)| a * b).sum::<f32>());
+        for (chromaticities, is_other) in [(None, false), (Some(rec709), false), (Some(rec2020), true)] {
+            std::fs::write(&path, exr(false, chromaticities)).unwrap();
+            let (texels, _) = load_rgb(&path).unwrap();
+            let [colors, numbers] =
+                [ImageChannels::Color, ImageChannels::Number].map(|c| load_map(&request(&path, c)).unwrap());
+            for (x, stored) in FLOATS.into_iter().enumerate() {
+                let expected = if is_other { converted(stored) } else { stored };
+                let near = |found: Rgb, expected: [f32; 3]| {
+                    assert!((found - Rgb::from_array(expected)).map(f32::abs).max_component() < 1e-3, "{found:?}");
+                };
+                near(texels[x], expected);
+                near(colors.texel(0, x as i64, 0), expected);
+                // What is no colour has no space
+                near(numbers.texel(0, x as i64, 0), stored);
+            }
+        }
+    }
+
+    #[test]
+    fn numbers_are_the_opacity_of_an_image_that_is_not_all_opaque() {
+        let folder = tempfile::tempdir().unwrap();
+        let path = folder.path().join("leaf.exr");
+        let texel = |alpha: f32, channels| {
+            let names = ["R", "G", "B", "A"].map(str::to_owned).to_vec();
+            let part = oiio::Part::linear(2, 1, names, vec![0.2, 0.4, 0.9, alpha, 0.2, 0.4, 0.9, 1.0]);
+            oiio::write_image(&path, &[part]).unwrap();
+            load_map(&request(&path, channels)).unwrap().texel(0, 0, 0).to_array()
+        };
+        assert_eq!(texel(0.25, ImageChannels::Number), [0.25; 3]);
+        assert_eq!(texel(1.0, ImageChannels::Number), texel(1.0, ImageChannels::Color));
+        assert!((texel(0.25, ImageChannels::Color)[2] - 0.9).abs() < 1e-3);
     }
 }

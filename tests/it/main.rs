@@ -5,6 +5,7 @@ mod alpha_lights;
 mod analytic_scenes;
 mod anisotropy;
 mod bit_exact;
+mod color_spaces;
 mod crosscheck;
 mod dispersion;
 mod displacement;

@@ -509,7 +509,7 @@ fn faults_in_media_are_reported_with_their_places() {
     let grid = r#""string type" "uniformgrid" "integer nx" 2"#;
     for (medium, fault) in [
         (r#""string type" "fog""#.to_owned(), "unknown medium `fog`"),
-        (r#""rgb sigma_a" [-1 0 0]"#.to_owned(), "sigma_a must be finite and not negative"),
+        (r#""rgb sigma_a" [-1 0 0]"#.to_owned(), "a colour must not be negative"),
         (r#""float scale" -2"#.to_owned(), "scale must be finite and not negative"),
         (r#""float g" 1.5"#.to_owned(), "g must be from -1 to 1"),
         (r#""string preset" "Milk""#.to_owned(), "unknown preset `Milk`"),

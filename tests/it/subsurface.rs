@@ -162,7 +162,7 @@ fn what_cannot_be_an_interior_is_refused_with_its_place() {
     };
     for (material, expected) in [
         (r#"Material "subsurface" "rgb sigma_a" [1 1 1]"#, "needs `sigma_s`"),
-        (r#"Material "subsurface" "rgb sigma_a" [1 -1 1] "rgb sigma_s" [1 1 1]"#, "not negative"),
+        (r#"Material "subsurface" "rgb sigma_a" [1 -1 1] "rgb sigma_s" [1 1 1]"#, "must not be negative"),
         (r#"Material "subsurface" "rgb reflectance" [1 1 1] "rgb sigma_s" [1 1 1]"#, "not both"),
         (r#"Material "subsurface" "rgb reflectance" [1 1 1] "float mfp" 0"#, "mfp must be finite and positive"),
         (r#"Material "subsurface" "string name" "Marbel""#, "Marble"),

@@ -2,7 +2,7 @@
 
 use crate::spectra::{blackbody_xyz, rec709_matrix};
 use glam::{DMat3, DVec3};
-use lumiris_numbers::math::{Mat3, Rgb};
+use lumiris_numbers::math::{Mat3, Rgb, Vec3};
 
 /// A colour space that `ColorSpace` names.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
@@ -19,7 +19,9 @@ pub enum ColorSpace {
 }
 
 /// Chromaticities (x, y) of red, green, blue and white.
-const REC709: [[f64; 2]; 4] = [[0.64, 0.33], [0.30, 0.60], [0.15, 0.06], [0.3127, 0.3290]];
+pub type Chromaticities = [[f64; 2]; 4];
+
+const REC709: Chromaticities = [[0.64, 0.33], [0.30, 0.60], [0.15, 0.06], [0.3127, 0.3290]];
 
 impl ColorSpace {
     /// The names of the format.
@@ -31,7 +33,7 @@ impl ColorSpace {
         Self::NAMES.iter().position(|n| *n == name).map(|i| all[i])
     }
 
-    fn chromaticities(self) -> [[f64; 2]; 4] {
+    fn chromaticities(self) -> Chromaticities {
         match self {
             ColorSpace::Srgb => REC709,
             ColorSpace::DciP3 => [[0.680, 0.320], [0.265, 0.690], [0.150, 0.060], [0.3127, 0.3290]],
@@ -40,16 +42,43 @@ impl ColorSpace {
         }
     }
 
-    /// A colour of this space in linear Rec.709, through XYZ and without adapting the white: the white of a space is
-    /// the light of that chromaticity.
-    pub fn to_rec709(self, rgb: [f32; 3]) -> Rgb {
-        if self == ColorSpace::Srgb {
-            return Rgb::from_array(rgb);
+    /// A colour of this space in linear Rec.709.
+    pub fn to_rec709(self, rgb: [f32; 3], of: Colored) -> Rgb {
+        // All spaces have a conversion
+        match rec709_from(&self.chromaticities(), of).filter(|_| self != ColorSpace::Srgb) {
+            Some(matrix) => Rgb::from_array((matrix * Vec3::from_array(rgb)).to_array()),
+            None => Rgb::from_array(rgb),
         }
-        let xyz = xyz_from_rgb(self.chromaticities()) * DVec3::from_array(rgb.map(f64::from));
-        let out = xyz_from_rgb(REC709).inverse() * xyz;
-        Rgb::new(out.x as f32, out.y as f32, out.z as f32)
     }
+}
+
+/// What a colour is of.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Colored {
+    /// Light: that of the white of a space has its chromaticity.
+    Light,
+    /// A factor of light, such as a reflectance: equal numbers are grey in any space.
+    Factor,
+}
+
+/// Linear colours of the space of these chromaticities in linear Rec.709, through XYZ; those of factors with the white
+/// adapted by Bradford. `None` if there is no such space.
+pub fn rec709_from(chromaticities: &Chromaticities, of: Colored) -> Option<Mat3> {
+    let xyz_from_rgb = xyz_from_rgb(*chromaticities);
+    let xyz_from_rec709 = self::xyz_from_rgb(REC709);
+    let white = |xyz_from_rgb: DMat3| xyz_from_rgb * DVec3::ONE;
+    let adapted = match of {
+        Colored::Light => DMat3::IDENTITY,
+        Colored::Factor => adaptation(white(xyz_from_rgb), white(xyz_from_rec709)),
+    };
+    let matrix = (xyz_from_rec709.inverse() * adapted * xyz_from_rgb).as_mat3();
+    (matrix.is_finite() && matrix.determinant() != 0.0).then_some(matrix)
+}
+
+/// True if the space of these chromaticities is Rec.709, to the digits that files give.
+pub fn is_rec709(chromaticities: &Chromaticities) -> bool {
+    const ROUNDING: f64 = 1e-3;
+    chromaticities.as_flattened().iter().zip(REC709.as_flattened()).all(|(a, b)| (a - b).abs() < ROUNDING)
 }
 
 /// Cone responses of XYZ by rows [Lam 1985], called Bradford.
@@ -64,13 +93,16 @@ pub fn white_balance(kelvin: f32) -> Option<Mat3> {
         return None;
     }
     let rgb_from_xyz = DMat3::from_cols_array_2d(&rec709_matrix()).transpose();
-    let bradford = DMat3::from_cols_array_2d(&BRADFORD).transpose();
     let xyz_from_rgb = rgb_from_xyz.inverse();
-    let white = bradford * xyz_from_rgb * DVec3::ONE;
     let source = daylight_xyz(kelvin).unwrap_or_else(|| DVec3::from_array(blackbody_xyz(kelvin.into())));
-    let source = bradford * (source / source.y);
-    let adapted = bradford.inverse() * DMat3::from_diagonal(white / source) * bradford;
+    let adapted = adaptation(source / source.y, xyz_from_rgb * DVec3::ONE);
     Some((rgb_from_xyz * adapted * xyz_from_rgb).as_mat3())
+}
+
+/// The map of XYZ that turns one white into another by scaling the responses of Bradford.
+fn adaptation(from: DVec3, to: DVec3) -> DMat3 {
+    let bradford = DMat3::from_cols_array_2d(&BRADFORD).transpose();
+    bradford.inverse() * DMat3::from_diagonal((bradford * to) / (bradford * from)) * bradford
 }
 
 /// XYZ of daylight with Y = 1 [CIE 15:2004]; `None` below 4000 K.
@@ -87,9 +119,8 @@ fn daylight_xyz(kelvin: f32) -> Option<DVec3> {
 }
 
 /// The matrix whose columns are the primaries, scaled so that (1, 1, 1) is the white of Y = 1.
-fn xyz_from_rgb(chromaticities: [[f64; 2]; 4]) -> DMat3 {
+fn xyz_from_rgb(chromaticities: Chromaticities) -> DMat3 {
     let [r, g, b, white] = chromaticities.map(|[x, y]| DVec3::new(x / y, 1.0, (1.0 - x - y) / y));
-    // A primary with y = 0 is no light; none of the spaces has one.
     let primaries = DMat3::from_cols(r, g, b);
     primaries * DMat3::from_diagonal(primaries.inverse() * white)
 }
@@ -101,18 +132,34 @@ mod tests {
     #[test]
     fn d65_spaces_share_their_white_and_rec709_is_itself() {
         for space in [ColorSpace::Srgb, ColorSpace::DciP3, ColorSpace::Rec2020] {
-            let white = space.to_rec709([1.0; 3]);
+            let white = space.to_rec709([1.0; 3], Colored::Light);
             assert!((white - Rgb::WHITE).map(f32::abs).max_component() < 1e-5, "{space:?} {white:?}");
         }
         // The green of Rec.2020 lies outside of Rec.709.
-        let green = ColorSpace::Rec2020.to_rec709([0.0, 1.0, 0.0]);
+        let green = ColorSpace::Rec2020.to_rec709([0.0, 1.0, 0.0], Colored::Light);
         assert!((green.r + 0.5876).abs() < 1e-3 && (green.g - 1.1329).abs() < 1e-3 && green.b < 0.0, "{green:?}");
     }
 
     #[test]
     fn the_white_of_aces_is_warmer_than_d65() {
-        let white = ColorSpace::Aces2065.to_rec709([1.0; 3]);
+        let white = ColorSpace::Aces2065.to_rec709([1.0; 3], Colored::Light);
         assert!(white.r > white.b && (white.luminance() - 1.0).abs() < 1e-3, "{white:?}");
+        // What is white of a surface is that under any light
+        let white = ColorSpace::Aces2065.to_rec709([0.5; 3], Colored::Factor);
+        assert!((white - Rgb::splat(0.5)).map(f32::abs).max_component() < 1e-5, "{white:?}");
+    }
+
+    #[test]
+    fn chromaticities_that_are_no_space_have_no_conversion() {
+        let with = |place: usize, xy: [f64; 2]| {
+            let mut all = REC709;
+            all[place] = xy;
+            all
+        };
+        for wrong in [with(0, [0.3, 0.6]), with(3, [0.3, 0.0]), with(1, [f64::NAN, 0.5]), [[0.0; 2]; 4]] {
+            assert!(rec709_from(&wrong, Colored::Light).is_none() && !is_rec709(&wrong), "{wrong:?}");
+        }
+        assert!(is_rec709(&with(0, [0.6401, 0.33])) && !is_rec709(&with(0, [0.68, 0.32])));
     }
 
     #[test]

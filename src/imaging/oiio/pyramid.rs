@@ -20,6 +20,7 @@ pub struct FilePyramid {
     channels: Vec<String>,
     encoding: ColorEncoding,
     is_bytes: bool,
+    chromaticities: Option<String>,
 }
 
 impl std::fmt::Debug for FilePyramid {
@@ -41,6 +42,7 @@ impl FilePyramid {
             channels: input.channels(spec.nchannels).map_err(failed)?,
             encoding: usual_encoding(&spec),
             is_bytes: spec.format == sys::OIIO_FORMAT_U8,
+            chromaticities: input.metadata(spec.attributes).remove("chromaticities"),
             input: Mutex::new(input),
         }))
     }
@@ -63,6 +65,11 @@ impl FilePyramid {
     /// The usual encoding of such a file.
     pub fn encoding(&self) -> ColorEncoding {
         self.encoding
+    }
+
+    /// What the file says of its colour space: x and y of red, green, blue and white.
+    pub fn chromaticities(&self) -> Option<&str> {
+        self.chromaticities.as_deref()
     }
 
     /// All values are multiples of 1/255 in 0..1.

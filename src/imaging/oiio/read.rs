@@ -155,7 +155,7 @@ impl Input {
         Ok(entries.collect())
     }
 
-    fn metadata(&self, count: i32) -> BTreeMap<String, String> {
+    pub(super) fn metadata(&self, count: i32) -> BTreeMap<String, String> {
         let entry = |index| self.attribute(index, |a| Some((text(a.name), text(a.value))));
         (0..count).filter_map(entry).collect()
     }

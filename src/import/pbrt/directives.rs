@@ -36,8 +36,8 @@ impl Visitor for Builder<'_> {
             }
             D::AttributeEnd => self.pop(),
             D::Attribute(target) => {
-                let list = self.state.defaults.of(target);
-                list.extend(params.iter().cloned());
+                let defaults = params.in_color_space(self.state.color_space);
+                self.state.defaults.of(target).extend(defaults);
             }
             D::Option => self.options.option(&params, diagnostics),
             D::ColorSpace(name) => self.color_space(&name, diagnostics),
@@ -46,7 +46,13 @@ impl Visitor for Builder<'_> {
                 let place = (self.state.ctm, self.folder.as_path());
                 self.options.camera(name, params, place, self.state.media.outside.clone());
             }
-            D::Film(name) => self.options.film(name, params),
+            D::Film(name) => {
+                if self.state.color_space != ColorSpace::Srgb {
+                    let message = "the image is in linear Rec.709, whatever the colour space before `Film`";
+                    diagnostics.warning_once(name.span, message);
+                }
+                self.options.film(name, params);
+            }
             D::Sampler(name) => self.options.sampler(name, params),
             D::Integrator(name) => self.options.integrator(name, params),
             D::PixelFilter(name) => self.options.pixel_filter(name, params),

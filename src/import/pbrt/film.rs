@@ -76,22 +76,23 @@ pub(super) fn finish_film(
         let from_file = [size("xresolution", 1280), size("yresolution", 720)];
         film.resolution = load.resolution.unwrap_or(from_file);
         film.file_name = p.string("filename", d).map(str::to_owned);
+        pixel_bounds = read_pixel_bounds(p, d);
         if let Some(v) = p.floats("cropwindow", d) {
             match *v {
-                [x0, x1, y0, y1]
-                    if (0.0..=1.0).contains(&x0) && x0 < x1 && x1 <= 1.0 && 0.0 <= y0 && y0 < y1 && y1 <= 1.0 =>
-                {
+                // As in pbrt-v4: what lies outside is cut off, ends in any order
+                [x0, x1, y0, y1] if v.iter().all(|x| x.is_finite()) => {
+                    let ends = |a: f32, b: f32| [a.min(b), a.max(b)].map(|x| x.clamp(0.0, 1.0));
+                    let ([x0, x1], [y0, y1]) = (ends(x0, x1), ends(y0, y1));
                     crop = [x0, x1, y0, y1];
+                    if pixel_bounds.take().is_some() {
+                        d.warning_once(p.span_of("pixelbounds"), "`cropwindow` goes before `pixelbounds`");
+                    }
                 }
                 _ => {
-                    d.error(
-                        p.span_of("cropwindow"),
-                        "cropwindow takes x0 x1 y0 y1 with 0 <= x0 < x1 <= 1 and 0 <= y0 < y1 <= 1",
-                    );
+                    d.error(p.span_of("cropwindow"), "cropwindow takes four numbers, x0 x1 y0 y1");
                 }
             }
         }
-        pixel_bounds = read_pixel_bounds(p, d);
         (sensor.scale, film.balance) = exposure(p, d);
         sensor.diagonal = positive(p, "diagonal", sensor.diagonal, d);
         // Half-floats and splits of the file do not matter to us
@@ -157,7 +158,12 @@ fn finish_filter(pending: Option<&Pending>, d: &mut Diagnostics) -> PixelFilter 
 
 fn film_kind(name: &Name, d: &mut Diagnostics) {
     match name.text.as_str() {
-        "rgb" | "gbuffer" => {}
+        "rgb" => {}
+        "gbuffer" => {
+            let message =
+                "film `gbuffer` is rendered as `rgb`, with the layers of --aov: normals and depths in world space";
+            d.warning_once(name.span, message);
+        }
         "image" => {
             d.warning_once(name.span, "film `image` is pbrt-v3; pbrt-v4 writes `rgb`");
         }

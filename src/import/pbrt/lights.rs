@@ -7,6 +7,7 @@ use super::state::Builder;
 use crate::lights::layers::fault_of_name;
 use crate::lights::spot::spot_solid_angle;
 use crate::lights::{EnvironmentFilter, EnvironmentMap, EnvironmentMapping, Light, Portal, PortalLight};
+use lumiris_formats::color_space::Colored;
 use lumiris_formats::diagnostic::Diagnostics;
 use lumiris_formats::pbrt::directive::Name;
 use lumiris_formats::pbrt::params::{ParamSet, ParamType};
@@ -41,8 +42,13 @@ impl Builder<'_> {
         self.light_groups.resize(self.lights.len(), group);
     }
 
+    /// What emits no given colour: the illuminant of the current colour space.
+    fn white(&self) -> Rgb {
+        self.state.color_space.to_rec709([1.0; 3], Colored::Light)
+    }
+
     fn emitted(&self, p: &ParamSet, name: &'static str, d: &mut Diagnostics) -> Rgb {
-        self.color_param(p, name, SpectrumUse::Illuminant, d).unwrap_or(Rgb::WHITE)
+        self.color_param(p, name, SpectrumUse::Illuminant, d).unwrap_or_else(|| self.white())
     }
 
     fn point(&self, p: &ParamSet, world_from_light: &Affine3A, scale: f32, d: &mut Diagnostics) -> Option<Light> {
@@ -106,7 +112,7 @@ impl Builder<'_> {
         let file = p.string("filename", d).map(|f| (f.to_owned(), p.span_of("filename")));
         let file = file.or_else(|| p.string("mapname", d).map(|f| (f.to_owned(), p.span_of("mapname"))));
         let Some((name, span)) = file else {
-            let l = color.unwrap_or(Rgb::WHITE) * scale;
+            let l = color.unwrap_or_else(|| self.white()) * scale;
             let l = l * if illuminance > 0.0 { illuminance / PI } else { 1.0 };
             return Some(portal.map_or(Light::InfiniteConstant { l }, |portal| constant_portal(l, portal)));
         };
@@ -187,7 +193,8 @@ impl Builder<'_> {
         let group = light_group(p, d);
         p.report_unused(d);
         self.emission_images.extend(image.as_ref().map(|(path, _)| path.clone()));
-        Some(AreaLightDesc { l: color.unwrap_or(Rgb::WHITE) * scale, two_sided, image, power, group, span: p.span })
+        let l = color.unwrap_or_else(|| if image.is_some() { Rgb::WHITE } else { self.white() });
+        Some(AreaLightDesc { l: l * scale, two_sided, image, power, group, span: p.span })
     }
 }
 

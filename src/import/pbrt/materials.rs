@@ -12,7 +12,7 @@ use crate::materials::{
 use crate::textures::{Filter, FloatTexture, RgbTexture, RgbTextureId, Wrap};
 use lumiris_formats::diagnostic::{Diagnostics, did_you_mean};
 use lumiris_formats::pbrt::directive::Name;
-use lumiris_formats::pbrt::params::{Input, ParamSet, ParamType};
+use lumiris_formats::pbrt::params::{Input, ParamSet, ParamType, SpectrumValue};
 use lumiris_formats::spectra;
 use lumiris_numbers::math::Rgb;
 use std::sync::Arc;
@@ -315,7 +315,7 @@ impl Builder<'_> {
         let mut known = Diagnostics::default();
         let is_spectrum = p.type_of("eta") == Some(ParamType::Spectrum);
         let value = p.spectrum("eta", &mut known).filter(|_| is_spectrum)?;
-        match self.resolve_spectrum(value, p.span_of("eta"), &mut known)? {
+        match self.resolve_spectrum(value, SpectrumUse::Unbounded, p.span_of("eta"), &mut known)? {
             Resolved::Curve(curve) => Dispersion::new(&curve).map(Arc::new),
             Resolved::Rgb(_) => None,
         }
@@ -335,7 +335,8 @@ impl Builder<'_> {
             }
             Some(_) => {
                 let span = p.span_of(name);
-                let resolved = p.spectrum(name, d).and_then(|v| self.resolve_spectrum(v, span, d));
+                let resolved =
+                    p.spectrum(name, d).and_then(|v| self.resolve_spectrum(v, SpectrumUse::Unbounded, span, d));
                 resolved.map(|r| match r {
                     Resolved::Rgb(rgb) => rgb.average(),
                     Resolved::Curve(curve) => curve.at_d_line(),
@@ -368,8 +369,8 @@ impl Builder<'_> {
         p.ignore(reflectance);
         let mut input = |builder: &Self, name: &'static str, default: &str| match p.spectrum_input(name, d) {
             Some(Input::Texture(_)) => None,
-            Some(Input::Value(value)) => builder.resolve_spectrum(value, p.span_of(name), d),
-            None => builder.resolve_spectrum(lumiris_formats::pbrt::params::SpectrumValue::Named(default), p.span, d),
+            Some(Input::Value(value)) => builder.resolve_spectrum(value, SpectrumUse::Unbounded, p.span_of(name), d),
+            None => builder.resolve_spectrum(SpectrumValue::Named(default), SpectrumUse::Unbounded, p.span, d),
         };
         let eta = input(self, eta_name, "metal-Cu-eta");
         let k = input(self, k_name, "metal-Cu-k");

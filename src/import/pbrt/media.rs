@@ -10,6 +10,7 @@ use crate::media::{
     Cloud, Field, Heterogeneous, Homogeneous, Medium, MediumId, MediumSet, RgbGrid, Samples, Scalars, Sides,
     Temperature, UniformGrid,
 };
+use lumiris_formats::color_space::Colored;
 use lumiris_formats::diagnostic::{Diagnostics, did_you_mean};
 use lumiris_formats::pbrt::directive::Name;
 use lumiris_formats::pbrt::params::{ParamSet, ParamType};
@@ -185,7 +186,9 @@ impl Builder<'_> {
     ) -> Option<Samples<Rgb>> {
         let param = p.get(key, &[ParamType::Rgb], d)?;
         let values = param.floats().unwrap_or_default();
-        let colors = values.chunks_exact(3).map(|c| self.state.color_space.to_rec709([c[0], c[1], c[2]]));
+        let space = param.color_space.unwrap_or(self.state.color_space);
+        let of = if key == "Le" { Colored::Light } else { Colored::Factor };
+        let colors = values.chunks_exact(3).map(|c| space.to_rec709([c[0], c[1], c[2]], of));
         let is_wrong = |c: &f32| !(*c >= 0.0 && c.is_finite());
         if values.iter().any(is_wrong) {
             d.error(param.value_span, format!("{key} must be finite and not negative"));

@@ -112,7 +112,7 @@ impl Builder<'_> {
     ) -> RgbTextureId {
         let id = self.albedo(p, name, default, d);
         let is_rgb = p.type_of(name) == Some(ParamType::Rgb);
-        if let Some(SpectrumValue::Rgb([r, g, b])) = is_rgb.then(|| p.spectrum(name, d)).flatten()
+        if let Some(SpectrumValue::Rgb([r, g, b], _)) = is_rgb.then(|| p.spectrum(name, d)).flatten()
             && [r, g, b].iter().any(|x| !(0.0..=most).contains(x))
         {
             let range = if most.is_finite() { format!("from 0 to {most}") } else { "0 or more".to_owned() };

@@ -72,7 +72,10 @@ pub(super) fn finish_integrator(pending: Option<&Pending>, s: &mut Settings, d: 
 pub(super) fn finish_sampler(pending: Option<&Pending>, s: &mut Settings, d: &mut Diagnostics) {
     let Some(Pending { name, params: p }) = pending else { return };
     match name.text.as_str() {
-        "independent" | "random" => s.sampling.sampler = SamplerKind::Independent,
+        "independent" | "random" => {
+            // Of all samplers it alone has this default
+            (s.sampling.sampler, s.sampling.spp) = (SamplerKind::Independent, 4);
+        }
         // pbrt's stratified samples cover a pixel together, as those of a sequence do
         "sobol" | "paddedsobol" | "halton" | "pmj02bn" | "stratified" | "lowdiscrepancy" | "02sequence"
         | "maxmindist" => {

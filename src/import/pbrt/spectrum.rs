@@ -1,6 +1,7 @@
 //! Spectrum parameters to linear Rec.709.
 
 use super::state::Builder;
+use lumiris_formats::color_space::Colored;
 use lumiris_formats::diagnostic::Diagnostics;
 use lumiris_formats::pbrt::params::SpectrumValue;
 use lumiris_formats::source::Span;
@@ -17,6 +18,16 @@ pub enum SpectrumUse {
     Unbounded,
     /// Emitted light; spectra and blackbodies are scaled to unit luminance, as pbrt-v4 does.
     Illuminant,
+}
+
+impl SpectrumUse {
+    /// What its colours are of.
+    pub fn colored(self) -> Colored {
+        match self {
+            SpectrumUse::Illuminant => Colored::Light,
+            SpectrumUse::Albedo | SpectrumUse::Unbounded => Colored::Factor,
+        }
+    }
 }
 
 /// A spectrum parameter that is a colour or a curve.
@@ -40,10 +51,23 @@ impl Resolved {
 
 impl Builder<'_> {
     /// Finds out what a spectrum parameter is; `None` after an error.
-    pub fn resolve_spectrum(&self, value: SpectrumValue<'_>, span: Span, d: &mut Diagnostics) -> Option<Resolved> {
-        let space = self.state.color_space;
+    pub fn resolve_spectrum(
+        &self,
+        value: SpectrumValue<'_>,
+        usage: SpectrumUse,
+        span: Span,
+        d: &mut Diagnostics,
+    ) -> Option<Resolved> {
         match value {
-            SpectrumValue::Rgb(rgb) => finite(space.to_rec709(rgb), span, d).map(Resolved::Rgb),
+            // What is beyond 0 to 1 of an albedo is warned of where it is used
+            SpectrumValue::Rgb(rgb, _) if usage != SpectrumUse::Albedo && rgb.iter().any(|c| *c < 0.0) => {
+                d.error(span, "a colour must not be negative");
+                None
+            }
+            SpectrumValue::Rgb(rgb, space) => {
+                let rgb = space.unwrap_or(self.state.color_space).to_rec709(rgb, usage.colored());
+                finite(rgb, span, d).map(Resolved::Rgb)
+            }
             SpectrumValue::Xyz(xyz) => finite(spectra::xyz_to_rgb(xyz), span, d).map(Resolved::Rgb),
             SpectrumValue::Blackbody(kelvin, factor) if kelvin > 0.0 && kelvin.is_finite() => {
                 Some(Resolved::Rgb(spectra::blackbody_rgb(kelvin) * factor))
@@ -87,7 +111,7 @@ impl Builder<'_> {
 
     /// The colour of a spectrum parameter; `None` after an error.
     pub fn color(&self, value: SpectrumValue<'_>, usage: SpectrumUse, span: Span, d: &mut Diagnostics) -> Option<Rgb> {
-        Some(match (self.resolve_spectrum(value, span, d)?, usage) {
+        Some(match (self.resolve_spectrum(value, usage, span, d)?, usage) {
             (Resolved::Rgb(rgb), _) => rgb,
             (Resolved::Curve(curve), SpectrumUse::Illuminant) => spectra::emission_rgb(&curve),
             (Resolved::Curve(curve), SpectrumUse::Albedo) => spectra::reflectance_rgb(&curve),

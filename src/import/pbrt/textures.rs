@@ -62,7 +62,7 @@ impl Builder<'_> {
                 tex1: self.float_param(p, "tex1", 1.0, d),
                 tex2: self.float_param(p, "tex2", 0.0, d),
             },
-            "imagemap" => match self.image_texture(p, d) {
+            "imagemap" => match self.image_texture(ImageChannels::Number, p, d) {
                 Some(image) => FloatTexture::Image(image),
                 None => FloatTexture::Constant(1.0),
             },
@@ -114,7 +114,7 @@ impl Builder<'_> {
                 tex1: self.rgb_param(p, "tex1", Rgb::WHITE, SpectrumUse::Albedo, d),
                 tex2: self.rgb_param(p, "tex2", Rgb::BLACK, SpectrumUse::Albedo, d),
             },
-            "imagemap" => match self.image_texture(p, d) {
+            "imagemap" => match self.image_texture(ImageChannels::Color, p, d) {
                 Some(image) => RgbTexture::Image(image),
                 None => RgbTexture::Constant(Rgb::WHITE),
             },
@@ -199,7 +199,7 @@ impl Builder<'_> {
         }
     }
 
-    fn image_texture(&mut self, p: &ParamSet, d: &mut Diagnostics) -> Option<ImageTexture> {
+    fn image_texture(&mut self, channels: ImageChannels, p: &ParamSet, d: &mut Diagnostics) -> Option<ImageTexture> {
         let mapping = self.mapping(p, d);
         let wrap = match p.string("wrap", d).unwrap_or("repeat") {
             "repeat" => Wrap::Repeat,
@@ -235,7 +235,7 @@ impl Builder<'_> {
             return None;
         };
         let (path, span) = (self.folder.join(name), p.span_of("filename"));
-        let request = ImageRequest { path, channels: ImageChannels::Color, encoding, wrap, filter };
+        let request = ImageRequest { path, channels, encoding, wrap, filter };
         let (image, udim) = if name.contains(UDIM) {
             let (first, udim) = self.udim(&request, span, d)?;
             (first, Some(udim))

@@ -3,6 +3,7 @@
 //! After a directive was processed, [`ParamSet::report_unused`] reports every parameter that was never looked up: a
 //! misspelled parameter is an error, never silently a default.
 
+use crate::color_space::ColorSpace;
 use crate::diagnostic::{Diagnostics, similar_parameter};
 use crate::source::Span;
 use std::cell::{Cell, RefCell};
@@ -148,6 +149,8 @@ pub struct Param {
     pub value_span: Span,
     /// The values; whole values of the type.
     pub values: Values,
+    /// Colour space of an `rgb` where that is not the current one of the directive which has it.
+    pub color_space: Option<ColorSpace>,
     used: Cell<bool>,
     inherited: bool,
 }
@@ -155,15 +158,15 @@ pub struct Param {
 impl Param {
     /// A parameter that has not been used yet.
     pub fn new(ty: ParamType, name: String, span: Span, value_span: Span, values: Values) -> Self {
-        Param { ty, name, span, value_span, values, used: Cell::new(false), inherited: false }
+        Param { ty, name, span, value_span, values, color_space: None, used: Cell::new(false), inherited: false }
     }
 }
 
 /// A spectrum as written.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum SpectrumValue<'a> {
-    /// Red, green, blue in the current colour space.
-    Rgb([f32; 3]),
+    /// Red, green, blue in a colour space: that of the parameter, or the current one.
+    Rgb([f32; 3], Option<ColorSpace>),
     /// CIE XYZ (pbrt-v3).
     Xyz([f32; 3]),
     /// Temperature (K) and a factor (pbrt-v3; 1 in v4).
@@ -218,6 +221,11 @@ impl ParamSet {
                 self.params.push(Param { inherited: true, used: Cell::new(false), ..default.clone() });
             }
         }
+    }
+
+    /// All parameters, as they are in the colour space that is current here, for a directive elsewhere.
+    pub fn in_color_space(&self, space: ColorSpace) -> impl Iterator<Item = Param> {
+        self.params.iter().map(move |p| Param { color_space: Some(space), ..p.clone() })
     }
 
     /// All parameters.
@@ -425,7 +433,9 @@ impl Param {
 
     fn spectrum(&self, diagnostics: &mut Diagnostics) -> Option<SpectrumValue<'_>> {
         let value = match (&self.values, self.ty) {
-            (Values::Floats(v), ParamType::Rgb) => v.as_slice().try_into().ok().map(SpectrumValue::Rgb),
+            (Values::Floats(v), ParamType::Rgb) => {
+                v.as_slice().try_into().ok().map(|rgb| SpectrumValue::Rgb(rgb, self.color_space))
+            }
             (Values::Floats(v), ParamType::Xyz) => v.as_slice().try_into().ok().map(SpectrumValue::Xyz),
             (Values::Floats(v), ParamType::Blackbody) => match v.as_slice() {
                 [kelvin] => Some(SpectrumValue::Blackbody(*kelvin, 1.0)),
