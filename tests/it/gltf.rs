@@ -489,7 +489,7 @@ fn dispersion_has_the_abbe_number_of_the_file_and_leaves_white_light_white() {
 fn light_in_a_volume_has_the_colour_of_its_distance() {
     let folder = tempfile::tempdir().unwrap();
     let near = |volume: &str, expected: [f32; 3]| {
-        let found = color_of(folder.path(), &glass(volume), 64);
+        let found = color_of(folder.path(), &glass(volume), 2048);
         let off = found.iter().zip(expected).map(|(a, b)| (a - b).abs()).fold(0.0, f32::max);
         assert!(off < 2e-3, "{volume}: {found:?}, not {expected:?}");
     };

@@ -84,14 +84,14 @@ fn blue_noise_point(s: &State64Bit) -> NetPoint {
 }
 
 impl SampleStream {
-    /// The root stream of sample `sample` (< 2³¹) of a pixel. Streams of different seeds are independent.
+    /// The root stream of sample `sample` of a pixel. Streams of different seeds are independent.
     pub fn new(kind: SamplerKind, pixel: [u32; 2], sample: u32, seed: u32) -> Self {
-        let (x, y) = (pixel[0] as i32, pixel[1] as i32);
-        // openqmc takes the index as i32, and a frame number which it adds to the number of the pixel (16 bits): seeds
-        // that were frames as they are would give shifted copies of one image. Multiples of the golden ratio stay
-        // apart.
-        let index = (sample & 0x7fff_ffff) as i32;
-        let frame = (seed.wrapping_mul(0x9e37_79b1) >> 2) as i32;
+        // openqmc knows 256 × 256 pixels and 65,536 samples, and a frame number to which it adds that of the pixel: what is
+        // beyond these, and seeds, make frames that have nothing in common, or there would be shifted copies of one image
+        let (x, y) = ((pixel[0] & 0xff) as i32, (pixel[1] & 0xff) as i32);
+        let index = (sample & 0xffff) as i32;
+        let [frame, ..] = pcg4d([pixel[0] >> 8, pixel[1] >> 8, sample >> 16, seed]);
+        let frame = (frame >> 2) as i32;
         SampleStream(match kind {
             SamplerKind::Independent => {
                 let h = pcg4d([pixel[0], pixel[1], sample, seed]);
@@ -192,6 +192,25 @@ mod tests {
                     assert_ne!(draw(70 + shift, 9, 0), draw(70, 9, seed), "{kind:?} {seed} {shift}");
                     assert_ne!(draw(70, 9 + shift, 0), draw(70, 9, seed), "{kind:?} {seed} {shift}");
                 }
+            }
+        }
+    }
+
+    #[test]
+    fn nothing_comes_again_in_other_pixels_samples_and_seeds() {
+        for kind in SamplerKind::iter() {
+            let draw =
+                |[x, y]: [u32; 2], sample, seed| SampleStream::new(kind, [x, y], sample, seed).domain(4).draw::<2>();
+            for [x, y] in [[3, 200], [70, 9], [255, 0]] {
+                for (dx, dy) in [(256, 0), (0, 256), (256, 256), (512, 0), (65_536, 0)] {
+                    assert_ne!(draw([x, y], 5, 0), draw([x + dx, y + dy], 5, 0), "{kind:?} {dx} {dy}");
+                }
+                for sample in [65_536, 131_072, 1 << 31] {
+                    assert_ne!(draw([x, y], 5, 0), draw([x, y], 5 + sample, 0), "{kind:?} {sample}");
+                    assert_ne!(draw([x, y], 5 + sample, 0), draw([x, y], 5, 1), "{kind:?} {sample}");
+                }
+                // Seeds whose multiples of the golden ratio are neighbours
+                assert_ne!(draw([x, y], 5, 0), draw([x, y], 5, 244_002_641), "{kind:?}");
             }
         }
     }
