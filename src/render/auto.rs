@@ -411,6 +411,8 @@ impl Pilot {
         let round = self.round(job, &candidates, SHARING, how)?;
         let round = round.by_blocks((auto_reuse::EDGE * auto_reuse::EDGE) as usize);
         let trials = round.trials(&candidates);
+        // Few pixels at edges, whose camera samples differ, have most of the mean variance, and all others most of what is shared
+        let round = Round { is_robust: true, ..round };
         let shared = if is_open {
             let numbers = [light, more[0], more[1]].map(|n| n.map(f64::from));
             let of_pilot = round.models_from(1, &numbers, model.powers);
@@ -477,9 +479,9 @@ impl Pilot {
             let differences = measured.iter().flat_map(|chunk| &chunk.of_candidates[k].1).copied().collect();
             (nanoseconds + candidates[k].preparation, differences)
         };
-        let is_direct = job.settings().integrator.depth() <= 1;
+        let is_robust = job.settings().integrator.depth() <= 1;
         let relative = measured.iter().map(|chunk| chunk.relative).sum::<f64>() / self.pixels[round].len() as f64;
-        Ok(Round { measured: (0..candidates.len()).map(of).collect(), spp: self.spp, is_direct, relative })
+        Ok(Round { measured: (0..candidates.len()).map(of).collect(), spp: self.spp, is_robust, relative })
     }
 }
 

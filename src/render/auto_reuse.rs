@@ -24,6 +24,9 @@ const MIN_GAIN: f64 = 1.03;
 const NEARLY: f64 = 0.98;
 /// The same with which fewer light samples will do: the noise of few pixels, which the pilot does not see, is rarely theirs.
 const NUMBERS_NEARLY: f64 = 0.88;
+/// Part of the time that more light samples at later vertices may take, whatever the pilot says: few of its pixels have most of
+/// what these lower.
+const LITTLE: f64 = 0.06;
 
 /// Numbers of light samples at first and at later vertices.
 pub(super) type Numbers = [u32; 2];
@@ -79,10 +82,18 @@ pub(super) fn best_numbers(
     };
     let efficiency = |i: usize, edge: u32, n: Numbers| -at(i, edge, n).iter().map(|x| x.ln()).sum::<f64>();
     let pairs = || choices[0].iter().flat_map(|&first| choices[1].iter().map(move |&later| [first, later]));
-    let all = || EDGES.into_iter().skip(1).flat_map(|edge| pairs().map(move |n| (edge, n)));
-    let greatest = all().map(|(edge, n)| efficiency(0, edge, n)).fold(f64::NEG_INFINITY, f64::max);
-    let good = all().filter(|&(edge, n)| efficiency(0, edge, n) >= greatest + NUMBERS_NEARLY.ln());
+    let with_edge = |n: Numbers| {
+        let edges = || EDGES.into_iter().skip(1);
+        let greatest = edges().map(|edge| efficiency(0, edge, n)).fold(f64::NEG_INFINITY, f64::max);
+        edges().find(|&edge| efficiency(0, edge, n) >= greatest + NEARLY.ln()).map(|edge| (edge, n))
+    };
+    let all: Vec<(u32, Numbers)> = pairs().filter_map(with_edge).collect();
+    let greatest = all.iter().map(|&(edge, n)| efficiency(0, edge, n)).fold(f64::NEG_INFINITY, f64::max);
+    let good = all.into_iter().filter(|&(edge, n)| efficiency(0, edge, n) >= greatest + NUMBERS_NEARLY.ln());
     let (edge, best) = good.min_by(|a, b| at(0, a.0, a.1)[0].total_cmp(&at(0, b.0, b.1)[0]))?;
+    let affordable = (1.0 + LITTLE) * at(0, edge, best)[0];
+    let later = choices[1].iter().filter(|&&n| n > best[1] && at(0, edge, [best[0], n])[0] <= affordable).max();
+    let best = [best[0], later.copied().unwrap_or(best[1])];
     let gains: Vec<f64> = (0..alone.len()).map(|i| efficiency(i, edge, best) - efficiency(i, 1, numbers)).collect();
     let (gain, error) = jackknife(&gains);
     (gain > MIN_GAIN.ln().max(MIN_ERRORS * error)).then_some((edge, best))
@@ -123,7 +134,7 @@ mod tests {
         let numbers = [[2.0, 1.0], [4.0, 1.0], [2.0, 2.0]];
         let mut all = vec![measured(1, numbers[0])];
         all.extend(numbers.iter().map(|&n| measured(EDGE, n)));
-        let round = Round { measured: all, spp: 4, is_direct: false, relative: 1.0 };
+        let round = Round { measured: all, spp: 4, is_robust: false, relative: 1.0 };
         let of_one = Model { cost: [10.0, 1.0, 2.0], variance: [4.5, 2.0, 6.0], powers: [1.0; 2] };
         let of_pilot = round.models_from(1, &numbers, [1.0; 2]);
         let choices: [&[u32]; 2] = [&[1, 2, 4, 8], &[1, 2, 4]];
@@ -133,7 +144,7 @@ mod tests {
         let greatest = pairs.flat_map(|n| EDGES.map(|edge| efficiency(edge, n))).fold(0.0, f64::max);
         assert!(efficiency(edge, n) >= 0.87 * greatest, "{edge} {n:?}");
         // Of nothing that is shared, nothing is
-        let nothing = Round { measured: vec![measured(1, numbers[0]); 4], spp: 4, is_direct: false, relative: 1.0 };
+        let nothing = Round { measured: vec![measured(1, numbers[0]); 4], spp: 4, is_robust: false, relative: 1.0 };
         let of_pilot = nothing.models_from(1, &numbers, [1.0; 2]);
         assert!(best_numbers(&nothing, [2, 1], (&of_one, &of_pilot), [&[2], &[1]]).is_none());
     }
@@ -145,7 +156,7 @@ mod tests {
         let round = |gain: f64| Round {
             measured: vec![(100.0, differences(1.0)), (110.0, differences(gain))],
             spp: 4,
-            is_direct: false,
+            is_robust: false,
             relative: 1.0,
         };
         assert!(best(&round(1.0)).is_none() && best(&round(1.2)).is_none());

@@ -75,7 +75,8 @@ pub(super) struct Round {
     pub(super) measured: Vec<(f64, Vec<Difference>)>,
     /// Samples of a pixel and seed.
     pub(super) spp: u32,
-    pub(super) is_direct: bool,
+    /// True if the geometric mean of both means counts, and not that of the variance alone.
+    pub(super) is_robust: bool,
     /// 1/(m² + ε), averaged over channels and pixels, m being their means.
     pub(super) relative: f64,
 }
@@ -101,7 +102,7 @@ impl Round {
             *sum = [sum[0] + d[0], sum[1] + d[1], sum[2] + 1.0];
         }
         let total = sums.iter().fold([0.0; 3], |a, b| [0, 1, 2].map(|j| a[j] + b[j]));
-        let of = |sum: [f64; 3]| variance([sum[0] / sum[2], sum[1] / sum[2]], self.is_direct) * f64::from(self.spp);
+        let of = |sum: [f64; 3]| variance([sum[0] / sum[2], sum[1] / sum[2]], self.is_robust) * f64::from(self.spp);
         let without = |group: &[f64; 3]| of([0, 1, 2].map(|j| total[j] - group[j]));
         std::iter::once(of(total)).chain(sums.iter().map(without)).collect()
     }
@@ -200,9 +201,9 @@ fn united((a, a_error): (f64, f64), (b, b_error): (f64, f64)) -> (f64, f64) {
 
 /// The variance of a mean, from the mean absolute and the mean squared difference of two of them: for normal numbers of
 /// standard deviation σ these are 2σ/√π and 2σ². In direct light both count.
-fn variance([absolute, squared]: [f64; 2], is_direct: bool) -> f64 {
+fn variance([absolute, squared]: [f64; 2], is_robust: bool) -> f64 {
     let of_squares = 0.5 * squared;
-    if is_direct { (0.25 * PI * absolute * absolute * of_squares).sqrt() } else { of_squares }
+    if is_robust { (0.25 * PI * absolute * absolute * of_squares).sqrt() } else { of_squares }
 }
 
 #[cfg(test)]
@@ -220,8 +221,8 @@ mod tests {
             sums[0] += d;
             sums[1] += d * d * 20_000.0;
         }
-        for is_direct in [false, true] {
-            let variance = 8.0 * variance(sums, is_direct);
+        for is_robust in [false, true] {
+            let variance = 8.0 * variance(sums, is_robust);
             assert!((variance * 12.0 - 1.0).abs() < 0.03, "{variance}");
         }
     }
@@ -247,7 +248,7 @@ mod tests {
                     differences.push([d, d * d]);
                 }
             }
-            chosen += Round { measured, spp: 1, is_direct: false, relative: 1.0 }.choose(&candidates, &[None, None]);
+            chosen += Round { measured, spp: 1, is_robust: false, relative: 1.0 }.choose(&candidates, &[None, None]);
         }
         f64::from(chosen as u32) / 1000.0
     }
@@ -260,7 +261,7 @@ mod tests {
         };
         let candidates = [candidate(4), candidate(8)];
         let measured = (1.0, vec![[1.0, 1.0]; 256]);
-        let round = Round { measured: vec![measured.clone(), measured], spp: 4, is_direct: false, relative: 1.0 };
+        let round = Round { measured: vec![measured.clone(), measured], spp: 4, is_robust: false, relative: 1.0 };
         let model = |gain: f64| Some(vec![gain; 1 + GROUPS]);
         assert_eq!(round.choose(&candidates, &[model(0.0), model(0.5)]), 1);
         assert_eq!(round.choose(&candidates, &[model(0.5), model(0.0)]), 0);
@@ -276,7 +277,7 @@ mod tests {
         // Without noise but that of times
         let chosen = |numbers: [u32; 2], gain: f64| {
             let measured = vec![(gain, vec![[1.0, 1.0]; 256]), (1.0, vec![[1.0, 1.0]; 256])];
-            let round = Round { measured, spp: 4, is_direct: true, relative: 1.0 };
+            let round = Round { measured, spp: 4, is_robust: true, relative: 1.0 };
             round.choose(&numbers.map(candidate), &[None, None])
         };
         assert_eq!([1.4, 1.6].map(|gain| chosen([8, 4], gain)), [0, 1]);
