@@ -58,10 +58,10 @@ impl Segments {
         &self.rays
     }
 
-    /// Traces all segments, which leave `points`. Where there are media, contributions are multiplied by an estimate of the
-    /// transmittance. Returns the numbers of rays and of tentative collisions.
+    /// Traces all segments, which leave `points`. Where there are media, or surfaces that rays may pass, contributions are
+    /// multiplied by an estimate of the transmittance. Returns the numbers of rays and of tentative collisions.
     pub fn trace(&mut self, job: &RenderJob, points: &[ShadingPoint<'_>]) -> [u64; 2] {
-        if job.world.scene.media.is_empty() {
+        if job.world.scene.media.is_empty() && !job.shadows_pass() {
             job.world.accel.occluded(&self.rays, Coherence::Packets, &mut self.occluded);
             return [self.rays.len() as u64, 0];
         }

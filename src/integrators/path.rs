@@ -74,7 +74,7 @@ struct WithLightPaths<'a> {
 impl Tracer for WithLightPaths<'_> {
     fn trace(&mut self, job: &RenderJob, samples: &[CameraSample], fits: &mut Fits, out: &mut Vec<PixelSample>) {
         Tracer::trace(&mut self.paths, job, samples, fits, out);
-        self.light.add(samples.iter().map(|s| (s.pixel, s.turn)), out);
+        self.light.add(samples.iter().map(|s| (s.pixel, s.turn, s.is_replica)), out);
     }
 
     fn take_stats(&mut self) -> PathStats {
@@ -214,7 +214,7 @@ impl PathTracer {
             if count == 0 {
                 break;
             }
-            let estimate = Estimate::new(settings, vertex).filter(|_| is_plain && !job.shadows_cross_media());
+            let estimate = Estimate::new(settings, vertex).filter(|_| is_plain && !job.shadows_pass());
             let room = count * self.search.arrivals.max_paths() as usize;
             let mut batch = estimate.map(|e| Batch::new(self.buffers.take().unwrap_or_default(), e, room));
             let stage = Stage { job, vertex, depth, samples, out: &mut *out, batch: batch.as_mut() };

@@ -146,7 +146,17 @@ impl Grid {
             let ray = scene.camera.ray(film, [lx, ly], time);
             let weight = ray.weight * scene.film.scale;
             let sample_counts = settings.sample_counts();
-            CameraSample { ray, weight, stream, direct: stream, sample_counts, turn: sample, fit: 0, pixel }
+            CameraSample {
+                ray,
+                weight,
+                stream,
+                direct: stream,
+                sample_counts,
+                turn: sample,
+                fit: 0,
+                pixel,
+                is_replica: false,
+            }
         })
     }
 }

@@ -46,7 +46,10 @@ pub fn obstacle(job: &RenderJob) -> Option<&'static str> {
         (settings.depth() < 2, "paths of one bounce have nothing to share"),
         (settings.kind != IntegratorKind::Path, "only the integrator path has paths of its own for each pixel"),
         (settings.roulette != RouletteKind::Throughput, "they split"),
-        (job.shadows_cross_media(), "there may be media between their vertices"),
+        (
+            job.shadows_pass(),
+            "rays may pass surfaces between their vertices, bounds of media or mixtures with `interface`",
+        ),
         (job.world.scene.materials.has_dispersion(), "paths may have wavelengths"),
         (light_layers::count(job) > 0, "light groups have layers (--light-groups none: they have not)"),
         (geometry.has_motion() || is_cut_out, "what a ray meets varies with time or is cut out at random"),

@@ -107,6 +107,8 @@ pub struct CameraSample {
     pub fit: u32,
     /// Its pixel; any, where none is the sample's.
     pub pixel: [u32; 2],
+    /// True if it is of a second estimate of its pixel, by which the variance is known.
+    pub is_replica: bool,
 }
 
 /// The state of a path.

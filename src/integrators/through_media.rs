@@ -18,7 +18,6 @@ pub fn obstacle_of(settings: &IntegratorSettings) -> Option<String> {
         // Their corrections are fitted to what is visible or not, which is no bit in a medium
         EstimatorKind::Ocv | EstimatorKind::OptimalMis | EstimatorKind::Correlated => false,
     };
-    let traces_first = settings.estimator == EstimatorKind::Ris && settings.ris.target.has_visibility();
     if !knows_integrator {
         return Some(format!(
             "the integrator {} leaves out participating media, which this scene has: direct and path render them",
@@ -31,7 +30,7 @@ pub fn obstacle_of(settings: &IntegratorSettings) -> Option<String> {
             <&str>::from(settings.estimator)
         ));
     }
-    traces_first.then(|| {
+    traces_first(settings).then(|| {
         let target: &'static str = settings.ris.target.into();
         format!(
             "the target {target} leaves out participating media, which this scene has: fgl and visibility know them"
@@ -39,7 +38,20 @@ pub fn obstacle_of(settings: &IntegratorSettings) -> Option<String> {
     })
 }
 
-/// [`obstacle_of`] the settings of an image, if there are media.
+/// [`obstacle_of`] the settings of an image, if there are media; or why they do not render one with surfaces that rays may
+/// pass.
 pub fn obstacle(job: &RenderJob) -> Option<String> {
-    if job.world.scene.media.is_empty() { None } else { obstacle_of(&job.settings().integrator) }
+    let settings = &job.settings().integrator;
+    if !job.world.scene.media.is_empty() {
+        return obstacle_of(settings);
+    }
+    (job.shadows_pass() && traces_first(settings)).then(|| {
+        let target: &'static str = settings.ris.target.into();
+        format!("the target {target} does not see through mixtures with `interface`: fgl and visibility do")
+    })
+}
+
+/// True if samples are chosen by what is visible, as if nothing let light through.
+fn traces_first(settings: &IntegratorSettings) -> bool {
+    settings.estimator == EstimatorKind::Ris && settings.ris.target.has_visibility()
 }

@@ -29,6 +29,7 @@ use crate::textures::{FloatTextureId, ImageId, ImageTexture, Mapping2d, RgbTextu
 use lumiris_numbers::math::hash::{hash_floats, unit_f32};
 use lumiris_numbers::math::{Rgb, Vec3};
 use rayon::prelude::*;
+use std::collections::BTreeSet;
 use std::sync::Arc;
 use strum::IntoStaticStr;
 
@@ -315,21 +316,16 @@ impl MaterialSet {
 
     /// True if there may be no surface at a hit of the material.
     pub fn may_pass(&self, id: MaterialId) -> bool {
-        match self.entries[id as usize].material {
-            // Mixtures of mixtures may hold anything
-            Material::Interface | Material::Mix { .. } => true,
-            Material::Diffuse { .. }
-            | Material::Conductor { .. }
-            | Material::Dielectric { .. }
-            | Material::ThinDielectric { .. }
-            | Material::DiffuseTransmission { .. }
-            | Material::CoatedDiffuse { .. }
-            | Material::CoatedConductor { .. }
-            | Material::Principled(_)
-            | Material::Hair(_)
-            | Material::Measured { .. }
-            | Material::Evaluated(_) => false,
+        // Mixtures of mixtures may hold themselves
+        let (mut open, mut seen) = (vec![id], BTreeSet::new());
+        while let Some(id) = open.pop() {
+            match self.entries[id as usize].material {
+                Material::Interface => return true,
+                Material::Mix { materials, .. } if seen.insert(id) => open.extend(materials),
+                _ => {}
+            }
         }
+        false
     }
 
     /// The reflectance of a material that is Lambertian, the same everywhere, and does not bend normals.

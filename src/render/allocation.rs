@@ -16,17 +16,17 @@
 
 use super::allocation_counts::{ALONE, Rules, SHARED, counts};
 use super::noise::counts_for;
-use super::pilot_samples::trace_pixels;
+use super::pilot_samples::{LeftToLightPaths, trace_pixels};
 use super::worker::Worker;
 use super::{RenderSettings, Run, position};
 use crate::direct::Estimator;
 use crate::film::accumulator::PixelAccumulator;
 use crate::film::{PixelBounds, PixelSample, PixelSums};
 use crate::imaging::metrics::difference::DEFAULT_EPSILON;
-use crate::integrators::reuse::{self, Groups};
+use crate::integrators::reuse;
 use crate::integrators::{PathStats, PathTracer, Tracer};
 use crate::scene::{PixelSamples, RenderJob};
-use crate::settings::{Allocation, IntegratorKind, IntegratorSettings, Settings};
+use crate::settings::{Allocation, IntegratorKind, IntegratorSettings, SamplingSettings, Settings};
 use lumiris_numbers::math::hash::{pcg4d, unit_f32};
 use lumiris_numbers::math::luminance;
 use rayon::prelude::*;
@@ -95,8 +95,14 @@ pub fn complete_for_noise(settings: &mut Settings, has_spp: bool) -> Result<(), 
     if !has_spp {
         settings.sampling.spp = MAX_SPP_FOR_NOISE;
     }
-    let needs = "needs the integrator direct or path, and an estimator that does not fit blocks of samples";
-    if allows_adaptive(settings) { Ok(()) } else { Err(needs) }
+    let enough = SamplingSettings { spp: MIN_SPP, ..settings.sampling };
+    if allows_adaptive(settings) {
+        Ok(())
+    } else if allows_adaptive(&Settings { sampling: enough, ..*settings }) {
+        Err("needs 8 samples per pixel at least (--spp)")
+    } else {
+        Err("needs the integrator direct or path, and an estimator that does not fit blocks of samples")
+    }
 }
 
 /// True if pixels may have different numbers of samples: they share nothing, are fitted neither to others nor in blocks, and have
@@ -165,6 +171,7 @@ struct Pilot<'a> {
     stop: &'a AtomicBool,
     sampling: PilotSampling,
     rules: Rules,
+    left: LeftToLightPaths,
     bounds: PixelBounds,
     /// Row by row.
     pixels: Vec<Measured>,
@@ -199,7 +206,7 @@ impl<'a> Pilot<'a> {
         };
         let bounds = job.world.scene.film.bounds;
         let pixels = vec![Measured::default(); bounds.area()];
-        Pilot { job, stop, sampling, rules, bounds, pixels }
+        Pilot { job, stop, sampling, rules, left: LeftToLightPaths::new(job), bounds, pixels }
     }
 
     /// Samples the tiles whose numbers are chosen. Tiles with the same remainder lie on lattices.
@@ -208,8 +215,7 @@ impl<'a> Pilot<'a> {
         let run = Run::new(self.job, &render, self.stop, &|_| ());
         let mut tiles = self.bounds.tiles(COST_TILE);
         tiles.retain(|t| is_chosen((t.x0 - self.bounds.x0) / COST_TILE + 2 * ((t.y0 - self.bounds.y0) / COST_TILE)));
-        let groups = if self.sampling.edge > 1 { Groups::Grid } else { Groups::None };
-        let worker = || Worker::new(PathTracer::sharing(groups, self.rules.radius.is_none()));
+        let worker = || self.left.worker(self.job, self.rules.radius.is_none());
         let of_tile = |worker: &mut _, tile: &PixelBounds| {
             let is_over = self.stop.load(Ordering::Relaxed);
             if is_over { Vec::new() } else { pilot_tile(&run, worker, tile, self.sampling) }

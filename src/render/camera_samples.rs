@@ -140,6 +140,7 @@ impl<'a> CameraSampler<'a> {
                 turn: self.turn(pixel, sample),
                 fit,
                 pixel,
+                is_replica: false,
             }
         }));
     }
@@ -167,6 +168,7 @@ impl<'a> CameraSampler<'a> {
             turn: self.turn(pixel, sample),
             fit: 0,
             pixel,
+            is_replica: false,
         }
     }
 

@@ -10,10 +10,12 @@
 //! therefore unbiased. Rendering until the image's own samples agree would stop too early where they agree by chance: where
 //! they all miss what is rare and bright.
 
-use super::pilot_samples::pilot_images;
+use super::pilot_samples::{LeftToLightPaths, pilot_images};
+use super::worker::Worker;
 use super::{RenderSettings, Run, position};
 use crate::film::PixelBounds;
 use crate::imaging::metrics::difference::DEFAULT_EPSILON;
+use crate::integrators::PathTracer;
 use crate::scene::{PixelSamples, RenderJob};
 use lumiris_numbers::math::hash::pcg4d;
 use lumiris_numbers::math::luminance;
@@ -38,8 +40,9 @@ pub(super) fn counts_for(job: &RenderJob, threshold: f32, stop: &AtomicBool) -> 
     let seeds = [0, 1].map(|k| pcg4d([seed, SEED, 0, k])[0]);
     let bounds = job.world.scene.film.bounds;
     let blocks = bounds.tiles(BLOCK);
-    let of_blocks: Vec<u32> =
-        blocks.par_iter().map(|block| count_of_block(&run, block, seeds, threshold, stop)).collect();
+    let left = LeftToLightPaths::new(job);
+    let of_block = |worker: &mut _, block| count_of_block(&run, worker, block, (seeds, threshold), stop);
+    let of_blocks: Vec<u32> = blocks.par_iter().map_init(|| left.worker(job, false), of_block).collect();
 
     let mut counts = vec![1; bounds.area()];
     for (block, count) in blocks.iter().zip(of_blocks) {
@@ -53,14 +56,20 @@ pub(super) fn counts_for(job: &RenderJob, threshold: f32, stop: &AtomicBool) -> 
 }
 
 /// The samples per pixel of a block.
-fn count_of_block(run: &Run<'_>, block: &PixelBounds, seeds: [u32; 2], threshold: f32, stop: &AtomicBool) -> u32 {
+fn count_of_block(
+    run: &Run<'_>,
+    worker: &mut Worker<PathTracer>,
+    block: &PixelBounds,
+    (seeds, threshold): ([u32; 2], f32),
+    stop: &AtomicBool,
+) -> u32 {
     let sampling = &run.job.settings().sampling;
     let (limit, pilot_limit) = (sampling.spp, sampling.pilot_spp());
     let mut sums = seeds.map(|_| vec![[0.0; 3]; block.area()]);
     let (mut done, mut until) = (0, FIRST);
     loop {
         for (sums, seed) in sums.iter_mut().zip(seeds) {
-            for (sum, added) in sums.iter_mut().zip(pilot_images(run, block, done..until, seed)) {
+            for (sum, added) in sums.iter_mut().zip(pilot_images(run, worker, block, done..until, seed)) {
                 (0..3).for_each(|c| sum[c] += added[c]);
             }
         }

@@ -6,16 +6,47 @@ use crate::direct::Fits;
 use crate::film::accumulator::RadianceAccumulator;
 use crate::film::{PixelBounds, PixelSample};
 use crate::integrators::PathTracer;
+use crate::integrators::light_paths::{self, LightPilot};
+use crate::integrators::reuse::{self, Groups};
+use crate::scene::RenderJob;
 use crate::settings::IntegratorSettings;
 use std::ops::Range;
 
+/// Part of a pilot of light paths whose whole is traced before the image.
+const LIGHT_PILOT: u64 = 4;
+
+/// What light paths find in an image that has them: pilots leave it to them as the image does.
+pub(super) struct LeftToLightPaths(Option<(LightPilot, f64)>);
+
+impl LeftToLightPaths {
+    /// Traces a pilot of light paths, if there are any. On the threads of the current pool.
+    pub(super) fn new(job: &RenderJob) -> Self {
+        let per_sample = f64::from(light_paths::per_sample(job));
+        let pilot = (per_sample > 0.0).then(|| LightPilot::new(job, LIGHT_PILOT)).flatten();
+        LeftToLightPaths(pilot.map(|pilot| (pilot, per_sample)))
+    }
+
+    /// A worker whose paths leave that, and in which pixels share paths as they do in the image.
+    pub(super) fn worker(&self, job: &RenderJob, with_features: bool) -> Worker<PathTracer> {
+        let groups = if reuse::edge(job) > 1 { Groups::Grid } else { Groups::None };
+        let mut tracer = PathTracer::sharing(groups, with_features);
+        tracer.leave(job, self.0.as_ref().map(|(pilot, per_sample)| (pilot, *per_sample)));
+        Worker::new(tracer)
+    }
+}
+
 /// The sums of some samples of the pixels of a tile, with random numbers of a seed.
-pub(super) fn pilot_images(run: &Run<'_>, tile: &PixelBounds, samples: Range<u32>, seed: u32) -> Vec<[f64; 3]> {
+pub(super) fn pilot_images(
+    run: &Run<'_>,
+    worker: &mut Worker<PathTracer>,
+    tile: &PixelBounds,
+    samples: Range<u32>,
+    seed: u32,
+) -> Vec<[f64; 3]> {
     let mut sums = vec![RadianceAccumulator::default(); tile.area()];
     let all: Vec<u32> = (0..tile.area() as u32).collect();
-    let mut worker = Worker::new(PathTracer::new(false));
     let settings = &run.job.settings().integrator;
-    trace_pixels(run, &mut worker, settings, (tile, &all), (samples, seed), |i, sample| {
+    trace_pixels(run, worker, settings, (tile, &all), (samples, seed), |i, sample| {
         sums[i as usize].add(sample.radiance);
     });
     sums.iter().map(RadianceAccumulator::values).collect()

@@ -134,7 +134,7 @@ impl<'a> Run<'a> {
             let workers = Workers::new(&*integrator, with_features, light_layers::count(self.job));
             while first < served && !self.stopped() {
                 let length = self.next_pass(first - self.settings.first_sample, first - begin);
-                let samples = first..(first + length).min(served);
+                let samples = first..first.saturating_add(length).min(served);
                 let watched = (noise, watch);
                 stats.merge(&self.whole_pass(&workers, &mut tiles, samples.clone(), watched, &mut checkpoints));
                 first = samples.end;
@@ -395,6 +395,7 @@ impl<'a> Run<'a> {
             let pixels = replicas.iter().zip(&mut fits);
             let pixels = pixels.map(|(r, fit)| (fit, position(&tile.bounds, r.pixel), samples_of(r)));
             self.camera.samples(pixels, seed, &mut worker.scratch, &mut worker.samples);
+            worker.samples.iter_mut().for_each(|sample| sample.is_replica = true);
             worker.trace(self.job, &mut tile.fits);
             let mut results = worker.results.iter();
             for replica in replicas {

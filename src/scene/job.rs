@@ -27,8 +27,8 @@ pub struct RenderJob {
     plain: Vec<Option<Rgb>>,
     /// Geometries that rays may pass: those of materials that are no surface, at least somewhere.
     may_pass: Vec<bool>,
-    /// See [`Self::shadows_cross_media`].
-    shadows_cross_media: bool,
+    /// See [`Self::shadows_pass`].
+    shadows_pass: bool,
 }
 
 impl RenderJob {
@@ -42,7 +42,7 @@ impl RenderJob {
         let irradiances = Irradiances::new(&scene.lights, has_alpha);
         let plain = (0..scene.geometry.geometries.len() as GeometryId).map(|g| plain_reflectance(scene, g)).collect();
         let may_pass: Vec<bool> = scene.surfaces.iter().map(|s| scene.materials.may_pass(s.material)).collect();
-        let shadows_cross_media = !scene.media.is_empty() && may_pass.contains(&true);
+        let shadows_pass = may_pass.contains(&true);
         RenderJob {
             world,
             settings,
@@ -53,7 +53,7 @@ impl RenderJob {
             lobes,
             plain,
             may_pass,
-            shadows_cross_media,
+            shadows_pass,
         }
     }
 
@@ -75,11 +75,11 @@ impl RenderJob {
         if hit.instance == Hit::NO_INSTANCE { self.plain[hit.geometry as usize] } else { None }
     }
 
-    /// True if shadow segments may come into a medium on their way: through a surface that only bounds it. Without one,
-    /// segments that begin in empty space stay there.
+    /// True if shadow segments may pass surfaces on their way: those that only bound a medium, and mixtures with them.
+    /// Without one, segments that begin in empty space stay there.
     #[inline]
-    pub fn shadows_cross_media(&self) -> bool {
-        self.shadows_cross_media
+    pub fn shadows_pass(&self) -> bool {
+        self.shadows_pass
     }
 
     /// True if rays may pass what they have hit: the material there may be no surface.

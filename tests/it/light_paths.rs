@@ -77,6 +77,31 @@ impl Scene {
     }
 }
 
+/// Balls of glass and metal, and so many light paths for each camera sample.
+pub(crate) fn caustics(resolution: [u32; 2], light_paths: f32) -> RenderJob {
+    SCENE.job(light_paths, resolution)
+}
+
+/// Samples beyond 2²⁰ have the light of light paths as well: their images have the same mean. Half of the light that is
+/// brought would be 4.9 standard errors.
+#[test]
+fn samples_of_any_number_have_their_light_paths() {
+    let mut job = SCENE.job(4.0, [16, 12]);
+    let mut mean = |light_paths: f32, first_sample: u32| {
+        job.change(|s| s.integrator.light_paths = Some(light_paths));
+        let images = (0..24).map(|seed| {
+            job.change(|s| s.sampling.seed = seed);
+            let film = film(&job, RenderSettings { spp: 16, first_sample, ..RenderSettings::default() });
+            film.pixels().iter().flat_map(|p| p.mean()).sum::<f64>()
+        });
+        mean_of(images.collect::<Vec<_>>().into_iter())
+    };
+    let (first, v_first) = mean(4.0, 0);
+    let (later, v_later) = mean(4.0, (1 << 20) - 5);
+    let error = (v_first + v_later).sqrt();
+    assert!((first - later).abs() < 4.0 * error && error < 0.005 * first, "{first} {later} ± {error}");
+}
+
 /// From half of the mean number of samples to four times as many, in no order.
 fn different_numbers(job: &RenderJob, spp: u32) -> PixelSamples {
     let bounds = job.world.scene.film.bounds;

@@ -401,6 +401,34 @@ fn behind_glass_alone_media_leave_shadow_segments_and_shared_paths_as_they_are()
     assert_they_agree(&answers, 0.1);
 }
 
+/// A sheet before a lamp, half of which is nothing and the other half black, lets half of the light through, without a medium
+/// as well: L = ρ/π · I/d² · 1/2.
+#[test]
+fn surfaces_that_rays_may_pass_let_light_through_where_there_are_no_media() {
+    for depth in [1, 4] {
+        let text = camera("0 0 1", "", depth)
+            + r#"LightSource "point" "rgb I" [ 1 2 4 ] "point3 from" [ 0 0 2 ]
+            Material "diffuse" "rgb reflectance" [ 0.5 0.5 0.5 ]
+            Shape "bilinearmesh" "point3 P" [ -9 -9 0  9 -9 0  -9 9 0  9 9 0 ]
+            MakeNamedMaterial "nothing" "string type" "interface"
+            MakeNamedMaterial "black" "string type" "diffuse" "rgb reflectance" [ 0 0 0 ]
+            Material "mix" "string materials" [ "nothing" "black" ] "float amount" 0.5
+            Shape "bilinearmesh" "point3 P" [ -9 -9 1.5  9 -9 1.5  -9 9 1.5  9 9 1.5 ]"#;
+        let mut job = job(&text, AccelKind::Embree);
+        assert!(job.world.scene.media.is_empty() && reuse::obstacle(&job).is_some());
+        let answer = [1.0, 2.0, 4.0].map(|i| 0.5 / std::f64::consts::PI * i / 4.0 * 0.5);
+        for (name, settings) in estimators() {
+            choose(&mut job, &settings);
+            assert_answer(&mut job, 64, answer, 0.2, &format!("{name}, {depth} bounces"));
+        }
+        job.change(|s| (s.integrator.estimator, s.integrator.samples) = (EstimatorKind::Ocv, Some(4)));
+        assert_answer(&mut job, 64, answer, 0.2, &format!("ocv, {depth} bounces"));
+        job.change(|s| (s.integrator.estimator, s.integrator.ris.target) = (EstimatorKind::Ris, Target::Gv));
+        let refused = render(&job, &RenderSettings::default(), &AtomicBool::new(false), &|_| ());
+        assert!(refused.err().is_some_and(|error| error.to_string().contains("interface")));
+    }
+}
+
 /// Beyond the last vertex, too, a medium glows: before a wall of reflectance ρ in what absorbs and emits, without end,
 /// L = L_e (1 − T) + T ρ L_e.
 #[test]

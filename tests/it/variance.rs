@@ -126,6 +126,13 @@ fn variances_are_those_between_seeds_for_every_sampler_and_number_of_samples() {
 }
 
 #[test]
+fn light_paths_have_their_part_of_the_variance() {
+    let mut job = crate::light_paths::caustics([24, 18], 1.0);
+    let s = study(&mut job, 16, 48);
+    assert!(s.error < 0.08 && (s.stated - 1.0).abs() < 0.25, "{} ± {}", s.stated, s.error);
+}
+
+#[test]
 fn replicas_change_no_image_and_do_not_depend_on_tiles_and_threads() {
     let job = job(&LOUD[1], SamplerKind::SobolBlueNoise);
     let plain = film(&job, RenderSettings { spp: 5, ..RenderSettings::default() });

@@ -33,7 +33,17 @@ fn camera_samples(job: &RenderJob) -> Vec<CameraSample> {
         let film = Vec2::new(pixel[0] as f32 + 0.5, pixel[1] as f32 + 0.5);
         let ray = job.world.scene.camera.ray(film, [0.5; 2], 0.0);
         let sample_counts = job.settings().integrator.sample_counts();
-        CameraSample { ray, weight: 1.0, stream, direct: stream, sample_counts, turn: 0, fit: 0, pixel }
+        CameraSample {
+            ray,
+            weight: 1.0,
+            stream,
+            direct: stream,
+            sample_counts,
+            turn: 0,
+            fit: 0,
+            pixel,
+            is_replica: false,
+        }
     };
     pixels.map(sample).collect()
 }

@@ -38,6 +38,10 @@ impl Mis {
     /// Allocates the samples of a point to the techniques.
     pub(super) fn allocation(&self, point: &ShadingPoint<'_>) -> SampleAllocation {
         let n = point.sample_counts.samples;
+        // Of one sample, half of a point has none
+        if n == 0 {
+            return SampleAllocation::fixed(0, 0);
+        }
         if point.bsdf_by_path {
             return SampleAllocation { bsdf_draws: 0, ..SampleAllocation::fixed(point.light_samples_beside_path(), 1) };
         }

@@ -124,6 +124,7 @@ impl Gatherer {
                     turn: 0,
                     fit: 0,
                     pixel: [0; 2],
+                    is_replica: false,
                 });
             }
         }

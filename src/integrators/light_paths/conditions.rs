@@ -27,6 +27,7 @@ pub fn obstacle_of(job: &RenderJob, settings: &IntegratorSettings) -> Option<&'s
         (!scene.camera.projects(), "only a perspective camera knows where it sees a point"),
         (scene.film.filter.sampler().is_point(), "the pixel filter has no extent"),
         (!scene.media.is_empty(), "there are media"),
+        (job.shadows_pass(), "there are surfaces that rays may pass"),
         (scene.materials.has_dispersion(), "paths may have wavelengths"),
         (light_layers::count(job) > 0, "light groups have layers (--light-groups none: they have not)"),
         (has_motion || is_cut_out, "what a ray meets varies with time or is cut out at random"),

@@ -9,6 +9,7 @@ use crate::scene::RenderJob;
 use lumiris_numbers::math::Rgb;
 use lumiris_numbers::math::hash::pcg4d;
 use rayon::prelude::*;
+use std::f32::consts::SQRT_2;
 use std::ops::Range;
 use std::sync::Arc;
 
@@ -21,6 +22,7 @@ const MAX_PATHS: u64 = 1 << 21;
 #[derive(Clone, Copy, Debug)]
 struct Entry {
     x: u32,
+    /// Its bits of [`TURN`].
     turn: u32,
     value: Rgb,
 }
@@ -71,7 +73,7 @@ impl LightImage {
         let factor = 1.0 / paths as f32;
         let mut all: Vec<(u32, Entry)> = Vec::with_capacity(found.iter().map(Vec::len).sum());
         for ((turn, _), seen) in parts.iter().zip(&found) {
-            let entry = |s: &Seen| (s.pixel[1], Entry { x: s.pixel[0], turn: *turn, value: s.value * factor });
+            let entry = |s: &Seen| (s.pixel[1], Entry { x: s.pixel[0], turn: *turn & TURN, value: s.value * factor });
             all.extend(seen.iter().map(entry));
         }
         // Stable: what a pixel has of one turn is added in the order of the light paths
@@ -94,9 +96,13 @@ impl LightImage {
         (y - self.bounds.y0) as usize * self.bounds.width() as usize + (x - self.bounds.x0) as usize
     }
 
-    /// Adds to camera samples, given by pixel and turn, what their pixels have of that turn.
-    pub(in crate::integrators) fn add(&self, samples: impl Iterator<Item = ([u32; 2], u32)>, out: &mut [PixelSample]) {
-        for (([x, y], turn), out) in samples.zip(out) {
+    /// Adds to camera samples, given by pixel, turn, and whether they are of a replica, what their pixels have of that turn.
+    pub(in crate::integrators) fn add(
+        &self,
+        samples: impl Iterator<Item = ([u32; 2], u32, bool)>,
+        out: &mut [PixelSample],
+    ) {
+        for (([x, y], turn, is_replica), out) in samples.zip(out) {
             let place = self.place(x, y);
             if self.has_entries[place / 64] >> (place % 64) & 1 == 0 {
                 continue;
@@ -106,9 +112,18 @@ impl LightImage {
             let turn = turn & TURN;
             let begin = row.partition_point(|entry| (entry.x, entry.turn) < (x, turn));
             let own = row[begin..].iter().take_while(|entry| (entry.x, entry.turn) == (x, turn));
-            out.radiance += own.map(|entry| entry.value).sum::<Rgb>();
+            let factor = if is_replica { of_replica(turn) } else { 1.0 };
+            out.radiance += own.map(|entry| entry.value).sum::<Rgb>() * factor;
         }
     }
+}
+
+/// The factor of a turn in a replica, whose difference from its pixel tells the variance. There is one set of light paths for
+/// both, so the difference is made: turns differ by a random sign s, and of Σ e (1 + √2 s)/n and Σ e/n half the squared difference
+/// is Σ e²/n² in the mean, which is the variance of the latter, since few turns of a pixel have any of it.
+fn of_replica(turn: u32) -> f32 {
+    let is_more = pcg4d([turn, SEED, 1, 0])[0] & 1 == 1;
+    1.0 + if is_more { SQRT_2 } else { -SQRT_2 }
 }
 
 /// The bits of a turn beside those which count the samples of a pixel in it, see [`crate::scene::PixelSamples::turn`].

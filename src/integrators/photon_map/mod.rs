@@ -216,6 +216,7 @@ impl PhotonMapTracer<'_> {
                     turn: 0,
                     fit: 0,
                     pixel: [0; 2],
+                    is_replica: false,
                 });
             }
         }

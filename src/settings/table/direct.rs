@@ -35,7 +35,8 @@ pub(super) const DIRECT: Group = Group {
             key: "samples",
             kind: Kind::Integer { range: SAMPLES, words: &["auto"] },
             help: "Samples per estimate (N): shadow rays per shading point, or `auto` for the estimator's default",
-            default: "auto: 2 for mc, and for mis with more than one bounce; otherwise 4; ris halves it at every bounce",
+            default: "auto: what --estimator auto finds; 2 for mc, and for mis with more than one bounce; otherwise 4; ris halves \
+                      it at every bounce",
             get: |s| Some(s.integrator.samples.map_or(Value::Name("auto"), |n| Value::Integer(n.into()))),
             resolved: Some(|s| Some(Value::Integer(s.integrator.sample_counts().samples.into()))),
             set: |s, v| {

@@ -75,7 +75,7 @@ pub(super) const TRANSPORT: Group = Group {
             kind: Kind::Integer { range: Integers { min: 1, max: 16 }, words: &["auto"] },
             help: "Blocks of E × E pixels share what their paths find from the second diffuse vertex on, by E² − 1 shadow rays \
                    more for each path: less noise, which is correlated within a block; 1: none do",
-            default: "auto: what --estimator auto finds to be the most efficient, or else 1",
+            default: "auto: what --estimator auto finds to be the most efficient, 3 in images too small for that; 1 with others",
             applies: Applies::Integrators(&[IntegratorKind::Path]),
             get: |s| Some(s.integrator.path_reuse.map_or(Value::Name("auto"), |n| Value::Integer(n.into()))),
             resolved: Some(|s| Some(Value::Integer(s.integrator.path_reuse.unwrap_or(1).into()))),

@@ -32,7 +32,7 @@ pub(super) struct CrosscheckArgs {
     #[command(flatten)]
     scene: SceneArgs,
     /// Rays of each family
-    #[arg(long, value_name = "K", default_value_t = 1_000_000)]
+    #[arg(long, value_name = "K", default_value_t = 1_000_000, value_parser = clap::value_parser!(u32).range(1..))]
     rays: u32,
     /// Write the report as JSON
     #[arg(long, value_name = "FILE.json")]
