@@ -66,7 +66,10 @@ fn lights() -> Vec<(&'static str, Light)> {
     let one = Emission::constant(l);
     let down = rectangle_mesh(Vec3::new(-0.3, -0.6, 1.5), Vec3::Y, Vec3::X * 0.8);
     let corners = [Vec3::new(0.0, -0.7, 1.2), Vec3::new(-0.5, 0.5, 1.6), Vec3::new(0.8, 0.3, 1.4)];
-    let triangle = Shape::Mesh(TriangleMesh::new(corners.to_vec(), vec![[0, 1, 2]]).unwrap());
+    let mut mesh = TriangleMesh::new(corners.to_vec(), vec![[0, 1, 2]]).unwrap();
+    let triangle = Shape::Mesh(mesh.clone());
+    mesh.colors = vec![[1.0, 0.2, 0.0, 1.0], [0.0, 3.0, 0.5, 1.0], [0.1, 0.0, 2.0, 1.0]];
+    let colored = Shape::Mesh(mesh);
     let mut flat = bent_patch();
     flat.positions = [[-0.5, -0.5], [-0.5, 0.5], [0.5, -0.5], [0.5, 0.5]].map(|[x, y]| Vec3::new(x, y, 1.7)).to_vec();
     let above = Affine3A::from_translation(Vec3::Z * 1.5);
@@ -89,6 +92,7 @@ fn lights() -> Vec<(&'static str, Light)> {
         ("projection", picture(ImageMapping::Plane { half: [0.9, 0.6] }, [6, 4])),
         ("distant", Light::Distant { wi_world: Vec3::new(0.3, -0.4, 0.7).normalize(), l }),
         ("triangle", area(&triangle, &both)),
+        ("triangle of three colours", area(&colored, &Emission { has_vertex_colors: true, ..both.clone() })),
         ("rectangle", area(&down, &one)),
         ("two-sided rectangle", area(&down, &both)),
         ("textured rectangle", area(&Shape::Bilinear(flat), &textured)),

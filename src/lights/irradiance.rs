@@ -75,9 +75,9 @@ impl Irradiances {
 fn mean_l(light: &Light) -> Rgb {
     let l = match light {
         Light::Area(area) => match &area.shape {
-            AreaShape::Triangle(_) | AreaShape::Rectangle(_) => area.emission.mean(),
+            AreaShape::Triangle(_) | AreaShape::Rectangle(_) => area.mean_radiance(),
             AreaShape::Quadric(quadric) if quadric.outward_sphere().is_some() && !area.emission.two_sided => {
-                area.emission.mean()
+                area.mean_radiance()
             }
             AreaShape::Quadric(_) | AreaShape::Patch(_) => Rgb::BLACK,
         },

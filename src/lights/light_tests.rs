@@ -431,6 +431,42 @@ fn emission_images_may_have_texture_coordinates_of_their_own() {
 }
 
 #[test]
+fn vertex_colours_are_a_factor_of_radiance_power_and_importance() {
+    let mut mesh = TriangleMesh::new(vec![Vec3::ZERO, Vec3::X, Vec3::Y], vec![[0, 1, 2]]).unwrap();
+    mesh.colors = vec![[0.0, 0.0, 1.0, 1.0], [1.0, 0.0, 1.0, 1.0], [0.0, 1.0, 1.0, 1.0]];
+    let of = |mesh: &TriangleMesh, emission: &Emission| area_lights_of(&Shape::Mesh(mesh.clone()), emission).lights;
+    let plain = Emission { two_sided: true, ..Emission::constant(Rgb::splat(2.0)) };
+    let emission = Emission { has_vertex_colors: true, ..plain.clone() };
+    let light = of(&mesh, &emission).remove(0);
+    let mut stream = pcg32([5, 6, 9]);
+    let samples: Vec<_> = (0..1000).map(|_| stream.random::<[f32; 2]>()).collect();
+    for u in samples {
+        let s = light.sample_li(&LightCtx::at(Vec3::new(0.3, 0.4, 2.0)), u).unwrap();
+        assert_eq!(light.l(&LightHit { t: s.t, p: s.p, n: s.n, uv: Vec2::ZERO }, -s.wi), s.li);
+        let expected = Rgb::new(2.0 * s.p.x, 2.0 * s.p.y, 2.0);
+        assert!((expected - s.li).map(f32::abs).max_component() < 1e-5, "{expected:?} {:?}", s.li);
+        let point = light.sample_point_towards(u, Vec3::Z);
+        let expected = Rgb::new(2.0 * point.p.x, 2.0 * point.p.y, 2.0);
+        assert!((expected - point.radiance).map(f32::abs).max_component() < 1e-5, "{:?}", point.radiance);
+    }
+    let mean = Rgb::new(2.0 / 3.0, 2.0 / 3.0, 2.0);
+    assert!((light.phi() - std::f32::consts::PI * mean.luminance()).abs() < 1e-5, "{}", light.phi());
+    assert!((light.bounds().intensity - 0.5 * mean.luminance()).abs() < 1e-5);
+    assert_eq!(of(&mesh, &plain)[0].mean_radiance(), Rgb::splat(2.0));
+
+    // Triangles of one colour are a rectangle of that colour; others are none
+    let Shape::Mesh(mut quad) = rectangle_mesh(Vec3::ZERO, Vec3::X, Vec3::Y) else { panic!("a mesh") };
+    quad.colors = vec![[0.5, 0.25, 0.0, 1.0]; 4];
+    let lights = of(&quad, &emission);
+    assert!(matches!(lights[..], [AreaLight { shape: AreaShape::Rectangle(_), .. }]), "{lights:?}");
+    assert_eq!(lights[0].mean_radiance(), Rgb::new(1.0, 0.5, 0.0));
+    quad.colors[3][0] = 1.0;
+    let lights = of(&quad, &emission);
+    assert_eq!(lights.len(), 2);
+    assert!((lights[1].mean_radiance().r - 4.0 / 3.0).abs() < 1e-6, "{lights:?}");
+}
+
+#[test]
 fn delta_and_infinite_lights_are_consistent() {
     let distant = Light::Distant { wi_world: Vec3::Y, l: Rgb::splat(2.0) };
     let s = distant.sample_li(&LightCtx::at(Vec3::ONE), [0.1, 0.2]).unwrap();

@@ -221,7 +221,7 @@ impl LightSampling {
     fn sample_one_light(&self, light: LightId, n: usize, p: &Columns3, u: [&[f32]; 2], out: &mut LightSamples) {
         let len = u[0].len();
         match &self.lights[light as usize] {
-            Light::Area(area) if !area.emission.is_textured() && area.sample_many(n, p, u, out) => {}
+            Light::Area(area) if area.is_even() && area.sample_many(n, p, u, out) => {}
             source @ (Light::InfiniteConstant { .. } | Light::InfiniteImage { .. }) if len > 0 => {
                 let (wi, li, pdf) = (out.wi.get_mut(len), out.li.get_mut(len), &mut out.pdf[..len]);
                 source.sample_li_lanes(&LightCtx::at(Vec3::ZERO), u, &mut LightLanes { wi, li, pdf });

@@ -4,10 +4,11 @@
 use lumiris::geometry::Shape;
 use lumiris::import::cache::FileCache;
 use lumiris::import::{LoadOptions, Loaded, load, load_text};
+use lumiris::lights::{AreaLight, Light};
 use lumiris::render::output::channels;
 use lumiris::render::{RenderSettings, render};
 use lumiris::scene::AccelKind;
-use lumiris_numbers::math::{Bounds3, Vec3};
+use lumiris_numbers::math::{Bounds3, Rgb, Vec3};
 use lumiris_test_support::random::{RngExt, pcg32};
 use std::panic::{AssertUnwindSafe, catch_unwind};
 use std::path::Path;
@@ -155,6 +156,25 @@ fn morph_targets_have_their_default_weights() {
     assert_eq!(top(r#"{"mesh":0},{}"#, r#""weights":[0.5],"#), Vec3::new(2.0, 1.0, 2.0));
     let of_node = r#"{"mesh":0,"weights":[1],"translation":[0,1,0]},{}"#;
     assert_eq!(top(of_node, r#""weights":[0.5],"#), Vec3::new(3.0, 2.0, 4.0));
+}
+
+#[test]
+fn unlit_surfaces_emit_the_colours_of_their_vertices_and_others_do_not() {
+    let light = |material: &str| -> AreaLight {
+        let mesh = format!(
+            r#""materials":[{{{material}}}],
+            "meshes":[{{"primitives":[{{"attributes":{{"POSITION":0,"COLOR_0":1}},"material":0}}]}}]"#
+        );
+        let (_, loaded) = bounds(r#"{"mesh":0},{}"#, &mesh, &VALUES).unwrap();
+        let [Light::Area(light)] = &loaded.scene.lights.lights[..] else { panic!("{:?}", loaded.scene.lights) };
+        light.clone()
+    };
+    // The colours are (0, 0, 0), (2, 0, 0) and (0, 0, 4)
+    let factor = r#""pbrMetallicRoughness":{"baseColorFactor":[0.5,0.5,0.5,1]}"#;
+    let unlit = light(&format!(r#"{factor},"extensions":{{"KHR_materials_unlit":{{}}}}"#)).mean_radiance();
+    assert!((unlit - Rgb::new(1.0 / 3.0, 0.0, 2.0 / 3.0)).map(f32::abs).max_component() < 1e-6, "{unlit:?}");
+    let lit = light(&format!(r#"{factor},"emissiveFactor":[1,1,1]"#)).mean_radiance();
+    assert_eq!(lit, Rgb::WHITE);
 }
 
 #[test]

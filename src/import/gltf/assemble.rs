@@ -222,8 +222,9 @@ impl<'a> Assembly<'a> {
             let read = || emission_image(source, files, messages);
             self.emission_images.entry(look.material).or_insert_with(read).clone()
         });
-        let two_sided = look.is_double_sided;
-        self.emitters.push((id, Emission { two_sided, image, ..Emission::constant(look.emission) }));
+        let (two_sided, has_vertex_colors) = (look.is_double_sided, look.emits_vertex_colors);
+        let emission = Emission { two_sided, image, has_vertex_colors, ..Emission::constant(look.emission) };
+        self.emitters.push((id, emission));
     }
 
     /// `KHR_lights_punctual`: lights shine along −z.

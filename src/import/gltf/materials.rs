@@ -21,6 +21,8 @@ pub(super) struct Look {
     /// Radiance, with the image that it is a factor of.
     pub emission: Rgb,
     pub emission_image: Option<EmissionSource>,
+    /// True if the colours of the vertices are a factor of it.
+    pub emits_vertex_colors: bool,
     pub is_double_sided: bool,
     /// What absorbs light inside.
     pub interior: Option<Homogeneous>,
@@ -111,6 +113,7 @@ impl<'a> Materials<'a> {
             alpha: self.opacity(place, factor[3], &base, messages)?,
             emission,
             emission_image,
+            emits_vertex_colors: is_unlit,
             is_double_sided: place.key("doubleSided").is_true(),
             interior: absorption(place),
         })

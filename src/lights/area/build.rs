@@ -2,7 +2,7 @@
 
 use super::{AreaLight, AreaShape, Emission, EmissionMapping, PatchLight, QuadricLight, RectangleLight, TriangleLight};
 use crate::geometry::{BilinearMesh, Shape, TriangleMesh};
-use lumiris_numbers::math::{Vec2, Vec3};
+use lumiris_numbers::math::{Rgb, Vec2, Vec3};
 
 /// Tolerance of right angles, of coplanarity and of parallel edges, relative to the edges.
 const RECTANGLE_TOLERANCE: f32 = 1e-4;
@@ -47,22 +47,35 @@ pub fn area_lights_of(shape: &Shape, emission: &Emission) -> AreaLights {
 fn triangles(mesh: &TriangleMesh, emission: &Emission, out: &mut AreaLights) {
     let mapping = emission.image.as_ref().and_then(|image| image.mapping());
     let triangle = |i: usize| triangle(mesh, i, mapping);
+    let colors = |i: usize| corner_colors(mesh, i).filter(|_| emission.has_vertex_colors);
     let mut i = 0;
     while i < mesh.triangle_count() {
-        let pair = (i + 1 < mesh.triangle_count())
+        let corners = colors(i);
+        // One colour is a factor of the emission
+        let color = corners.map_or(Some(Rgb::WHITE), |[a, b, c]| (a == b && a == c).then_some(a));
+        let colored = Emission { l: emission.l * color.unwrap_or(Rgb::WHITE), ..emission.clone() };
+        let pair = (i + 1 < mesh.triangle_count() && color.is_some() && colors(i + 1) == corners)
             .then(|| rectangle_of_pair(&triangle(i), &triangle(i + 1), emission.image.is_some()))
             .flatten();
         match pair {
             Some(rectangle) => {
-                out.push(AreaShape::Rectangle(rectangle), emission, 2);
+                out.push(AreaShape::Rectangle(rectangle), &colored, 2);
                 i += 2;
             }
             None => {
-                out.push(AreaShape::Triangle(triangle(i)), emission, 1);
+                let colors = corners.filter(|_| color.is_none()).map(Box::new);
+                out.push(AreaShape::Triangle(TriangleLight { colors, ..triangle(i) }), &colored, 1);
                 i += 1;
             }
         }
     }
+}
+
+/// Colours of the corners of triangle `i`, if the mesh has any.
+fn corner_colors(mesh: &TriangleMesh, i: usize) -> Option<[Rgb; 3]> {
+    let color = |v: u32| mesh.colors.get(v as usize).map(|[r, g, b, _]| Rgb::new(*r, *g, *b).map(|c| c.max(0.0)));
+    let [a, b, c] = mesh.indices[i];
+    Some([color(a)?, color(b)?, color(c)?])
 }
 
 /// Triangle `i`. Its emitting side is that of the vertex normals if there are any, as in pbrt-v4.

@@ -15,6 +15,8 @@ pub struct Emission {
     pub two_sided: bool,
     /// Radiance over the texture coordinates.
     pub image: Option<Arc<EmissionImage>>,
+    /// True if the vertex colours of a triangle mesh are a factor.
+    pub has_vertex_colors: bool,
     /// Where the surface is, if an alpha texture cuts it out.
     pub cover: Option<Arc<Cover>>,
 }
@@ -22,7 +24,7 @@ pub struct Emission {
 impl Emission {
     /// The same radiance everywhere, on the side of the normal.
     pub fn constant(l: Rgb) -> Self {
-        Emission { l, two_sided: false, image: None, cover: None }
+        Emission { l, two_sided: false, image: None, has_vertex_colors: false, cover: None }
     }
 
     /// True if what is emitted depends on the place.
@@ -56,9 +58,14 @@ impl Emission {
 
     /// Luminance of [`mean`](Self::mean).
     pub fn mean_luminance(&self) -> f32 {
-        let luminance = self.mean().luminance();
-        if luminance.is_finite() { luminance.max(0.0) } else { 0.0 }
+        luminance_of(self.mean())
     }
+}
+
+/// Luminance of a radiance that may not be finite.
+pub(super) fn luminance_of(radiance: Rgb) -> f32 {
+    let luminance = radiance.luminance();
+    if luminance.is_finite() { luminance.max(0.0) } else { 0.0 }
 }
 
 /// A linear RGB image that an area light emits; v = 0 is its last row, as in pbrt-v4.

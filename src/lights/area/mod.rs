@@ -113,7 +113,7 @@ impl AreaLight {
             AreaShape::Patch(patch) => patch.sample(ctx.p, u),
         }?;
         let uv = if self.emission.image.is_some() { self.uv(s.p) } else { Vec2::ZERO };
-        let li = self.covered(self.emission.l(s.n, uv, -s.wi), s.p);
+        let li = self.covered(self.colored(self.emission.l(s.n, uv, -s.wi), s.p), s.p);
         let ShapeSample { p, n, p_error, wi, t, pdf } = s;
         Some(LightSample { li, wi, pdf, t, p, n, p_error, is_delta: false })
     }
@@ -131,7 +131,7 @@ impl AreaLight {
     /// Radiance that leaves the point `p` of the surface on a side that emits, by the part of it that is there.
     pub(super) fn radiance(&self, p: Vec3) -> Rgb {
         let uv = if self.emission.image.is_some() { self.uv(p) } else { Vec2::ZERO };
-        self.covered(self.emission.radiance(uv), p)
+        self.covered(self.colored(self.emission.radiance(uv), p), p)
     }
 
     /// A radiance at the point `p` of the surface, times the part of that which its alpha texture leaves.
@@ -145,6 +145,36 @@ impl AreaLight {
             }
             _ => l,
         }
+    }
+
+    /// A radiance of the emission, times the colour of the vertices at the point `p`.
+    #[inline]
+    fn colored(&self, radiance: Rgb, p: Vec3) -> Rgb {
+        match &self.shape {
+            AreaShape::Triangle(triangle) if triangle.colors.is_some() => radiance * triangle.color(p),
+            AreaShape::Triangle(_) | AreaShape::Rectangle(_) | AreaShape::Quadric(_) | AreaShape::Patch(_) => radiance,
+        }
+    }
+
+    /// True if it has the same radiance everywhere.
+    pub(super) fn is_even(&self) -> bool {
+        let has_colors = matches!(&self.shape, AreaShape::Triangle(triangle) if triangle.colors.is_some());
+        !self.emission.is_textured() && !has_colors
+    }
+
+    /// The radiance, averaged over the image and the vertices.
+    pub fn mean_radiance(&self) -> Rgb {
+        match &self.shape {
+            AreaShape::Triangle(triangle) if triangle.colors.is_some() => self.emission.mean() * triangle.mean_color(),
+            AreaShape::Triangle(_) | AreaShape::Rectangle(_) | AreaShape::Quadric(_) | AreaShape::Patch(_) => {
+                self.emission.mean()
+            }
+        }
+    }
+
+    /// Luminance of [`mean_radiance`](Self::mean_radiance).
+    fn mean_luminance(&self) -> f32 {
+        emission::luminance_of(self.mean_radiance())
     }
 
     /// Density per steradian of [`sample_li`](Self::sample_li) at the point `hit`. Of a surface that a ray can cross
@@ -173,13 +203,13 @@ impl AreaLight {
         };
         let has_own_uv = self.emission.image.as_ref().is_some_and(|image| image.mapping().is_some());
         let uv = if has_own_uv { self.uv(hit.p) } else { hit.uv };
-        self.emission.l(n, uv, w)
+        self.colored(self.emission.l(n, uv, w), hit.p)
     }
 
     /// Luminance of the emitted power, π·A·L, twice that of a two-sided light.
     pub fn phi(&self) -> f32 {
         let sides = if self.emission.two_sided { 2.0 } else { 1.0 };
-        PI * self.area() * self.emission.mean_luminance() * sides
+        PI * self.area() * self.mean_luminance() * sides
     }
 
     /// Area of the surface.
@@ -206,7 +236,7 @@ impl AreaLight {
             cos_theta_o,
             cos_theta_e: 0.0,
             two_sided: self.emission.two_sided,
-            intensity: projected_area * self.emission.mean_luminance(),
+            intensity: projected_area * self.mean_luminance(),
         }
     }
 

@@ -2,7 +2,7 @@
 
 use super::{ShapePoint, ShapeSample, pdf_by_area};
 use lumiris_numbers::math::warp::sample_uniform_triangle;
-use lumiris_numbers::math::{Bounds3, Vec2, Vec3, gamma};
+use lumiris_numbers::math::{Bounds3, Rgb, Vec2, Vec3, gamma};
 
 /// A triangle that emits.
 #[derive(Clone, Debug)]
@@ -15,6 +15,8 @@ pub struct TriangleLight {
     pub area: f32,
     /// Texture coordinates of the corners.
     pub uvs: [Vec2; 3],
+    /// Factors of the radiance at the corners; `None` for 1.
+    pub colors: Option<Box<[Rgb; 3]>>,
 }
 
 impl TriangleLight {
@@ -23,7 +25,8 @@ impl TriangleLight {
         let [a, b, c] = p.map(|p| p.as_dvec3());
         let cross = (b - a).cross(c - a);
         let n = cross.normalize_or_zero().as_vec3();
-        TriangleLight { p, n: if flip_normal { -n } else { n }, area: (0.5 * cross.length()) as f32, uvs }
+        let area = (0.5 * cross.length()) as f32;
+        TriangleLight { p, n: if flip_normal { -n } else { n }, area, uvs, colors: None }
     }
 
     #[inline]
@@ -49,12 +52,32 @@ impl TriangleLight {
     }
 
     pub(super) fn uv(&self, p: Vec3) -> Vec2 {
+        let [b0, b1, b2] = self.barycentric(p);
+        self.uvs[0] * b0 + self.uvs[1] * b1 + self.uvs[2] * b2
+    }
+
+    /// The factor of the radiance at the point `p`.
+    #[inline]
+    pub(super) fn color(&self, p: Vec3) -> Rgb {
+        let Some(colors) = &self.colors else { return Rgb::WHITE };
+        // Rounding may leave the triangle
+        let [b0, b1, b2] = self.barycentric(p).map(|b| b.clamp(0.0, 1.0));
+        colors[0] * b0 + colors[1] * b1 + colors[2] * b2
+    }
+
+    /// The mean of that factor.
+    pub(super) fn mean_color(&self) -> Rgb {
+        self.colors.as_ref().map_or(Rgb::WHITE, |colors| colors.iter().copied().sum::<Rgb>() / 3.0)
+    }
+
+    /// Weights of the corners at the point `p`.
+    fn barycentric(&self, p: Vec3) -> [f32; 3] {
         // Least squares for p − p0 = b1·e1 + b2·e2.
         let (e1, e2, d) = (self.p[1] - self.p[0], self.p[2] - self.p[0], p - self.p[0]);
         let (a, b, c) = (e1.dot(e1), e1.dot(e2), e2.dot(e2));
         let determinant = a * c - b * b;
         let (x, y) = (d.dot(e1), d.dot(e2));
         let (b1, b2) = ((c * x - b * y) / determinant, (a * y - b * x) / determinant);
-        self.uvs[0] * (1.0 - b1 - b2) + self.uvs[1] * b1 + self.uvs[2] * b2
+        [1.0 - b1 - b2, b1, b2]
     }
 }
