@@ -178,6 +178,24 @@ fn unlit_surfaces_emit_the_colours_of_their_vertices_and_others_do_not() {
 }
 
 #[test]
+fn specular_glossiness_goes_before_its_fallback() {
+    let loaded = |fallback: &str| {
+        let mesh = format!(
+            r#""meshes":[{{"primitives":[{{"attributes":{{"POSITION":0}},"material":0}}]}}],
+            "images":[{{"uri":"nope.png"}}],"textures":[{{"source":0}}],"materials":[{{{fallback}
+                "extensions":{{"KHR_materials_pbrSpecularGlossiness":{{"diffuseFactor":[0.1,0.2,0.3,1],"glossinessFactor":0.25}}}}}}]"#
+        );
+        let (_, loaded) = bounds(r#"{"mesh":0},{}"#, &mesh, &VALUES).unwrap();
+        format!("{:?} {:?}", loaded.scene.materials, loaded.scene.textures)
+    };
+    let alone = loaded("");
+    assert_eq!(loaded(r#""pbrMetallicRoughness":{},"#), alone);
+    let whole = r#""baseColorFactor":[1,0,0,1],"baseColorTexture":{"index":0},"metallicRoughnessTexture":{"index":0}"#;
+    assert_eq!(loaded(&format!(r#""pbrMetallicRoughness":{{{whole}}},"#)), alone);
+    assert!(alone.contains("0.75") && alone.contains("0.3"), "{alone}");
+}
+
+#[test]
 fn skins_follow_their_joints_and_not_their_node() {
     let rest = |joint: u32| {
         format!(

@@ -51,6 +51,11 @@ const LEFT_OUT: &[(&str, &str)] = &[
     ("KHR_materials_diffuse_transmission", "diffuse transmission is not rendered"),
 ];
 
+/// What a material has beside metallic-roughness, which is for readers that do not know it.
+fn glossiness_of<'a>(place: &Place<'a>) -> Option<Place<'a>> {
+    Some(place.extension("KHR_materials_pbrSpecularGlossiness")).filter(Place::exists)
+}
+
 /// A factor of a material.
 fn factor(place: &Place<'_>, default: f32) -> f32 {
     place.number().unwrap_or(default)
@@ -74,9 +79,10 @@ impl<'a> Materials<'a> {
 
     /// Factor and texture of the base colour.
     fn base(place: &Place<'a>) -> ([f32; 4], Place<'a>) {
-        let old = place.extension("KHR_materials_pbrSpecularGlossiness");
         let pbr = place.key("pbrMetallicRoughness");
-        if old.exists() && !pbr.exists() {
+        // The colour of unlit surfaces is that of metallic-roughness
+        let is_unlit = place.extension("KHR_materials_unlit").exists() && pbr.exists();
+        if let Some(old) = glossiness_of(place).filter(|_| !is_unlit) {
             return (old.key("diffuseFactor").numbers().unwrap_or([1.0; 4]), old.key("diffuseTexture"));
         }
         (pbr.key("baseColorFactor").numbers().unwrap_or([1.0; 4]), pbr.key("baseColorTexture"))
@@ -126,7 +132,9 @@ impl<'a> Materials<'a> {
         messages: &mut Messages<'_>,
     ) -> Result<PrincipledMaterial, GltfError> {
         warn_of_approximations(place, messages);
-        let pbr = place.key("pbrMetallicRoughness");
+        let old = glossiness_of(place);
+        // Images of the fallback are not read
+        let pbr = if old.is_some() { Place::default() } else { place.key("pbrMetallicRoughness") };
         let packed = pbr.key("metallicRoughnessTexture");
         let specular = place.extension("KHR_materials_specular");
         let coat = place.extension("KHR_materials_clearcoat");
@@ -173,8 +181,7 @@ impl<'a> Materials<'a> {
             specular_color: t.colored(color, &specular.key("specularColorTexture"), messages)?,
         };
         material.direction = self.anisotropy_direction(&anisotropy, messages)?;
-        let old = place.extension("KHR_materials_pbrSpecularGlossiness");
-        if old.exists() && !pbr.exists() {
+        if let Some(old) = old {
             self.specular_glossiness(&old, &mut material, messages)?;
         }
         Ok(material)

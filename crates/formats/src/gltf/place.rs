@@ -19,8 +19,8 @@ impl std::fmt::Display for GltfError {
 
 impl std::error::Error for GltfError {}
 
-/// A place in the JSON.
-#[derive(Clone, Debug)]
+/// A place in the JSON; by default, none where anything is.
+#[derive(Clone, Debug, Default)]
 pub struct Place<'a> {
     value: Option<&'a Value>,
     /// Such as `meshes[0].primitives[1]`.
