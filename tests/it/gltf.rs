@@ -144,6 +144,9 @@ fn an_environment_is_seen_as_it_is_stored() {
     assert!(image[2] > 3.0 * image[8], "blue above: {image:?}");
 }
 
+/// A file of one pixel.
+const PIXEL: &str = "iVBORw0KGgoAAAANSUhEUgAAAAEAAAABCAIAAACQd1PeAAAADElEQVR4nGNoaPgPAAODAgAApfuJAAAAAElFTkSuQmCC";
+
 #[test]
 fn morph_targets_have_their_default_weights() {
     let mesh = |weights: &str| {
@@ -193,6 +196,26 @@ fn specular_glossiness_goes_before_its_fallback() {
     let whole = r#""baseColorFactor":[1,0,0,1],"baseColorTexture":{"index":0},"metallicRoughnessTexture":{"index":0}"#;
     assert_eq!(loaded(&format!(r#""pbrMetallicRoughness":{{{whole}}},"#)), alone);
     assert!(alone.contains("0.75") && alone.contains("0.3"), "{alone}");
+}
+
+#[test]
+fn texture_coordinates_beyond_the_second_are_told_once() {
+    let folder = tempfile::tempdir().unwrap();
+    let path = folder.path().join("a.gltf");
+    let texture = r#"{"index":0,"texCoord":2}"#;
+    let json = format!(
+        r#"{{"asset":{{"version":"2.0"}},"images":[{{"uri":"data:image/png;base64,{PIXEL}"}}],"textures":[{{"source":0}}],
+        "materials":[{{"pbrMetallicRoughness":{{"baseColorTexture":{texture},"metallicRoughnessTexture":{texture}}},
+            "normalTexture":{{"index":0,"extensions":{{"KHR_texture_transform":{{"texCoord":3}}}}}},
+            "emissiveTexture":{texture}}},
+            {{"pbrMetallicRoughness":{{"baseColorTexture":{{"index":0,"texCoord":1}}}}}}]}}"#
+    );
+    std::fs::write(&path, json).unwrap();
+    let said = load(&path, &LoadOptions::default()).unwrap().warnings.to_string();
+    assert_eq!(said.matches("TEXCOORD_2 is not read: textures have TEXCOORD_0").count(), 1, "{said}");
+    assert_eq!(said.matches("TEXCOORD_3 is not read").count(), 1, "{said}");
+    assert!(said.contains("materials[0].pbrMetallicRoughness.baseColorTexture.texCoord"), "{said}");
+    assert!(!said.contains("TEXCOORD_1"), "{said}");
 }
 
 #[test]

@@ -130,7 +130,7 @@ impl<'a> Textures<'a> {
         messages: &mut Messages<'_>,
     ) -> Result<Option<EmissionSource>, GltfError> {
         let Some((path, span)) = self.file(place, messages)? else { return Ok(None) };
-        let (second, image_from_uv) = mapping(place);
+        let (second, image_from_uv) = mapping(place, messages);
         let is_plain = !second && image_from_uv == Affine2::IDENTITY;
         let mapping = (!is_plain).then_some(EmissionMapping { second, image_from_uv });
         Ok(Some(EmissionSource { path, span, wrap: self.sampler(place).0, mapping }))
@@ -151,7 +151,7 @@ impl<'a> Textures<'a> {
             mixed => Wrap::Axes(mixed),
         };
         let image = self.resources.image(ImageRequest { path, channels, encoding, wrap, filter }, span);
-        let (second, st_from_uv) = mapping(place);
+        let (second, st_from_uv) = mapping(place, messages);
         let mapping = Mapping2d::Affine { second, matrix: st_from_uv.matrix2, offset: st_from_uv.translation };
         Ok(Some(ImageTexture { image, mapping, udim: None, scale: 1.0, invert: false }))
     }
@@ -165,9 +165,13 @@ impl<'a> Textures<'a> {
 
 /// True for the second texture coordinates, and those of the image by them. They have v downwards in the file, and
 /// upwards here: v ↦ 1 − v on both sides of the transformation offset + rotation · scale.
-fn mapping(place: &Place<'_>) -> (bool, Affine2) {
+fn mapping(place: &Place<'_>, messages: &mut Messages<'_>) -> (bool, Affine2) {
     let transform = place.extension("KHR_texture_transform");
-    let set = transform.key("texCoord").index().or_else(|| place.key("texCoord").index()).unwrap_or(0);
+    let sets = [transform.key("texCoord"), place.key("texCoord")];
+    let set = sets.iter().find_map(|key| Some((key, key.index()?)));
+    if let Some((key, set @ 2..)) = set {
+        messages.warning(key, &format!("TEXCOORD_{set} is not read: textures have TEXCOORD_0 in its place"));
+    }
     let offset = Vec2::from(transform.key("offset").numbers().unwrap_or([0.0; 2]));
     let scale = Vec2::from(transform.key("scale").numbers().unwrap_or([1.0; 2]));
     let (sin, cos) = transform.key("rotation").number().unwrap_or(0.0).sin_cos();
@@ -175,5 +179,5 @@ fn mapping(place: &Place<'_>) -> (bool, Affine2) {
     let flip = Mat2::from_diagonal(Vec2::new(1.0, -1.0));
     // 1 − (M (u, 1 − v) + o)_v
     let offset = flip * (matrix * Vec2::Y + offset) + Vec2::Y;
-    (set == 1, Affine2::from_mat2_translation(flip * matrix * flip, offset))
+    (set.is_some_and(|(_, set)| set == 1), Affine2::from_mat2_translation(flip * matrix * flip, offset))
 }
