@@ -8,7 +8,7 @@ use lumiris::lights::{AreaLight, Light};
 use lumiris::render::output::channels;
 use lumiris::render::{RenderSettings, render};
 use lumiris::scene::AccelKind;
-use lumiris_numbers::math::{Bounds3, Rgb, Vec3};
+use lumiris_numbers::math::{Bounds3, Rgb, Vec2, Vec3};
 use lumiris_test_support::random::{RngExt, pcg32};
 use std::panic::{AssertUnwindSafe, catch_unwind};
 use std::path::Path;
@@ -216,6 +216,36 @@ fn texture_coordinates_beyond_the_second_are_told_once() {
     assert_eq!(said.matches("TEXCOORD_3 is not read").count(), 1, "{said}");
     assert!(said.contains("materials[0].pbrMetallicRoughness.baseColorTexture.texCoord"), "{said}");
     assert!(!said.contains("TEXCOORD_1"), "{said}");
+}
+
+#[test]
+fn orthographic_cameras_see_all_that_they_ask_for() {
+    let folder = tempfile::tempdir().unwrap();
+    let path = folder.path().join("a.gltf");
+    let seen = |resolution, size: &str| {
+        let camera = format!(r#"{{"type":"orthographic","orthographic":{{{size}"znear":0.1,"zfar":9}}}}"#);
+        let json = format!(
+            r#"{{"asset":{{"version":"2.0"}},"cameras":[{camera}],"nodes":[{{"camera":0,"translation":[0,0,3]}}]}}"#
+        );
+        std::fs::write(&path, json).unwrap();
+        let scene = load(&path, &LoadOptions { resolution, ..LoadOptions::default() }).unwrap().scene;
+        let inverse = scene.camera.ndc_from_world().unwrap().inverse();
+        // From corner to corner of the image, whatever it calls them
+        let corners = [Vec3::ZERO, Vec3::new(1.0, 1.0, 0.0)].map(|ndc| inverse.project_point3(ndc));
+        (scene.film.resolution, (corners[1] - corners[0]).abs().truncate())
+    };
+    let near = |(resolution, size): ([u32; 2], Vec2), expected: ([u32; 2], [f32; 2])| {
+        assert_eq!(resolution, expected.0);
+        assert!((size - Vec2::from(expected.1)).abs().max_element() < 1e-4, "{size}");
+    };
+    let high = r#""xmag":1,"ymag":2,"#;
+    near(seen(None, high), ([360, 720], [2.0, 4.0]));
+    near(seen(Some([50, 100]), high), ([50, 100], [2.0, 4.0]));
+    near(seen(Some([100, 100]), high), ([100, 100], [4.0, 4.0]));
+    // The width is what the height follows
+    near(seen(Some([100, 400]), high), ([100, 400], [2.0, 8.0]));
+    near(seen(None, r#""ymag":3,"#), ([720, 720], [6.0, 6.0]));
+    near(seen(None, r#""xmag":0,"ymag":0,"#), ([1280, 720], [2.0 * 16.0 / 9.0, 2.0]));
 }
 
 #[test]

@@ -33,8 +33,8 @@ pub(super) fn camera(
     if found.is_none() && !options.camera_auto {
         messages.warning(&cameras, "no camera: one that frames the scene is used (--camera-auto)");
     }
-    let aspect = found.as_ref().and_then(|(_, c)| c.key("perspective").key("aspectRatio").number());
-    let width = (HEIGHT as f32 * aspect.filter(|a| *a > 0.0).unwrap_or(16.0 / 9.0)).round().clamp(1.0, 65_536.0);
+    let aspect = found.as_ref().and_then(|(_, c)| aspect_of(c));
+    let width = (HEIGHT as f32 * aspect.unwrap_or(16.0 / 9.0)).round().clamp(1.0, 65_536.0);
     let resolution = options.resolution.unwrap_or([width as u32, HEIGHT]);
     let aspect = resolution[0] as f32 / resolution[1] as f32;
     let camera = found.map_or_else(|| frame(bounds, aspect, resolution), |(n, c)| of_file(n, &c, aspect, resolution));
@@ -46,13 +46,32 @@ pub(super) fn camera(
     (camera, FilmSettings { resolution, bounds, filter, file_name: None, scale: 1.0, balance: None })
 }
 
-/// A camera of the file: it looks along −z; scales of its node do not count.
+/// Width by height of the image that a camera asks for, if it does.
+fn aspect_of(camera: &Place<'_>) -> Option<f32> {
+    let orthographic = camera.key("orthographic");
+    let aspect = if orthographic.exists() {
+        half_size(&orthographic).map(|[x, y]| x / y)
+    } else {
+        camera.key("perspective").key("aspectRatio").number()
+    };
+    aspect.filter(|a| *a > 0.0 && a.is_finite())
+}
+
+/// Half the width and half the height that an orthographic camera asks for.
+fn half_size(orthographic: &Place<'_>) -> Option<[f32; 2]> {
+    let [x, y] = ["xmag", "ymag"].map(|key| orthographic.key(key).number().map(f32::abs).filter(|half| *half > 0.0));
+    Some([x.or(y)?, y.or(x)?])
+}
+
+/// A camera of the file: it looks along −z; scales of its node do not count. In an image of another aspect ratio, a perspective
+/// camera keeps its angle of view upwards, and an orthographic one sees more, to the sides or upwards.
 fn of_file(node: &Node<'_>, camera: &Place<'_>, aspect: f32, resolution: [u32; 2]) -> Camera {
     let (_, rotation, translation) = node.world_from_node.to_scale_rotation_translation();
     let world_from_camera = Affine3A::from_scale_rotation_translation(Vec3::new(1.0, 1.0, -1.0), rotation, translation);
     let orthographic = camera.key("orthographic");
     if orthographic.exists() {
-        let y = orthographic.key("ymag").number().unwrap_or(1.0).abs().max(1e-6);
+        let [x, y] = half_size(&orthographic).unwrap_or([1.0; 2]);
+        let y = y.max(x / aspect).max(1e-6);
         return Camera::orthographic(world_from_camera, [-y * aspect, y * aspect, -y, y], resolution, 0.0, 1e6);
     }
     let fov = camera.key("perspective").key("yfov").number().unwrap_or(0.8).clamp(1e-3, 3.1);
