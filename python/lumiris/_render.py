@@ -184,6 +184,8 @@ def render(
     tile_size: int = 16,
     time: Optional[float] = None,
     environment: Optional[Path] = None,
+    scene_in_file: Union[None, int, str] = None,
+    camera: Union[None, int, str] = None,
     camera_auto: bool = False,
     time_in_scene: Optional[float] = None,
     texture_memory: Union[None, int, str] = None,
@@ -222,9 +224,9 @@ def render(
     resolution, crop, box_filter, accel, packet_width, threads, tile_size, time
         As on the command line: columns and rows, or text such as "640x360"; x0, x1, y0, y1 in fractions of the image; a pixel filter of one pixel;
         `embree` or `bvh`; rays per packet; threads; edge of a tile; seconds after which to stop.
-    environment, camera_auto, time_in_scene
-        Of glTF scenes: the image of an environment, whether the scene is framed whatever its cameras, and the time of its
-        animations (s).
+    environment, scene_in_file, camera, camera_auto, time_in_scene
+        Of glTF scenes: the image of an environment, the scene of the file and its camera by their names or indices, whether the scene
+        is framed whatever its cameras, and the time of its animations (s).
     aov
         Layers beside the image: `variance`, `samples`, `albedo`, `normal`, `depth`, `material`, `object`, `ratio`, `records`.
         None asks for all that there are; "none" or an empty list saves the time for them.
@@ -276,6 +278,8 @@ def render(
         "tile_size": tile_size,
         "time": time,
         "environment": None if environment is None else os.fspath(environment),
+        "scene_in_file": None if scene_in_file is None else str(scene_in_file),
+        "camera": None if camera is None else str(camera),
         "camera_auto": camera_auto,
         "time_in_scene": time_in_scene,
         "texture_memory": None if texture_memory is None else str(texture_memory),

@@ -54,6 +54,8 @@ pub(crate) struct Options {
     tile_size: u32,
     time: Option<f64>,
     environment: Option<PathBuf>,
+    scene_in_file: Option<String>,
+    camera: Option<String>,
     camera_auto: bool,
     time_in_scene: Option<f32>,
     texture_memory: Option<String>,
@@ -152,6 +154,8 @@ impl Options {
             resolution: self.resolution,
             crop: self.crop,
             environment: self.environment,
+            scene: self.scene_in_file,
+            camera: self.camera,
             camera_auto: self.camera_auto,
             time: self.time_in_scene,
         };

@@ -37,10 +37,28 @@ pub struct LoadOptions {
     pub crop: Option<[f32; 4]>,
     /// Image of the environment of a glTF scene.
     pub environment: Option<PathBuf>,
+    /// Name or index of the scene of a glTF file; without it, the one that the file has as its default, or the first.
+    pub scene: Option<String>,
+    /// Name or index of the camera of a glTF scene; without it, the first.
+    pub camera: Option<String>,
     /// True if a glTF scene is framed, whatever its cameras.
     pub camera_auto: bool,
     /// The time (s) at which animations of a glTF scene are seen; without it things are where they stand.
     pub time: Option<f32>,
+}
+
+impl LoadOptions {
+    /// The first option that is for glTF scenes only, if any is given.
+    pub fn of_gltf(&self) -> Option<&'static str> {
+        let options = [
+            ("--environment", self.environment.is_some()),
+            ("--scene-in-file", self.scene.is_some()),
+            ("--camera", self.camera.is_some()),
+            ("--camera-auto", self.camera_auto),
+            ("--time-in-scene", self.time.is_some()),
+        ];
+        options.into_iter().find_map(|(option, is_given)| is_given.then_some(option))
+    }
 }
 
 /// A scene, its settings, and warnings.
@@ -109,9 +127,9 @@ fn load_parsed(
     let mut diagnostics = Diagnostics::new();
     let mut builder = Builder::new(folder, options);
     parse(&mut sources, &mut diagnostics, &mut builder);
-    if options.environment.is_some() || options.camera_auto || options.time.is_some() {
-        let message = "environment, camera and time of a pbrt scene are in its file: --environment, --camera-auto and \
-                       --time-in-scene are for glTF";
+    if let Some(option) = options.of_gltf() {
+        let message =
+            format!("{option} is for glTF scenes: environment, camera and time of a pbrt scene are in its file");
         diagnostics.error_without_place(message);
     }
     let scene_files = SceneFiles::new(&sources, builder.files());

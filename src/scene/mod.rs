@@ -45,6 +45,17 @@ pub struct Scene {
     pub lights: Arc<LightSet>,
     /// What is between surfaces.
     pub media: MediumSet,
+    /// What the file has in place of this scene and its camera.
+    pub choices: Choices,
+}
+
+/// Names of what a file lets people choose from, by their indices. A pbrt file has no choice.
+#[derive(Clone, Debug, Default, PartialEq, Eq)]
+pub struct Choices {
+    /// Cameras of the scene; empty for those without a name.
+    pub cameras: Vec<String>,
+    /// Scenes of the file; empty for those without a name.
+    pub scenes: Vec<String>,
 }
 
 /// Surface properties of a geometry.

@@ -1,12 +1,13 @@
 //! Geometry and lights of the scene.
 
 use super::animation::changes;
+use super::choice::{Names, chosen, name_of, shown};
 use super::materials::{Look, Materials};
 use super::meshes::{Primitive, placed, primitive};
 use super::nodes::{Node, instances, nodes};
 use super::pose::Pose;
 use super::textures::EmissionSource;
-use super::view::camera;
+use super::view::{camera, cameras, chosen_camera};
 use super::{LUMENS_PER_WATT, Messages};
 use crate::geometry::{Geometry, GeometryId, GeometrySet, Group, Instance, Shape, TriangleMesh, Visibility};
 use crate::imaging::oiio::ImageError;
@@ -14,14 +15,16 @@ use crate::import::LoadOptions;
 use crate::import::cache::FileCache;
 use crate::import::resources::report;
 use crate::lights::{
-    Cover, Emission, EmissionImage, EnvironmentFilter, EnvironmentMap, EnvironmentMapping, Light, LightSetBuilder,
+    Cover, Emission, EmissionImage, EnvironmentFilter, EnvironmentMap, EnvironmentMapping, Light, LightSet,
+    LightSetBuilder,
 };
 use crate::materials::{MaterialId, MaterialSet};
 use crate::media::{Homogeneous, Medium, MediumId, MediumSet, Sides};
-use crate::scene::{Scene, Surface};
+use crate::scene::{Choices, Scene, Surface};
+use crate::textures::TextureSet;
 use glam::Vec3A;
 use lumiris_formats::gltf::{Document, GltfError, Place};
-use lumiris_numbers::math::{Affine3A, Rgb, Vec3};
+use lumiris_numbers::math::{Affine3A, Bounds3, Rgb, Vec3};
 use std::collections::HashMap;
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
@@ -74,7 +77,10 @@ impl<'a> Assembly<'a> {
             return Ok(None);
         }
         let changes = self.options.time.map(|time| changes(self.document, time, messages)).transpose()?;
-        let nodes = nodes(self.document, &changes.unwrap_or_default())?;
+        let Some((scene, scenes)) = self.chosen_scene(messages) else { return Ok(None) };
+        let nodes = nodes(self.document, &scene, &changes.unwrap_or_default())?;
+        let (placed, camera_names) = cameras(self.document, &nodes);
+        let choices = Choices { cameras: shown(&camera_names), scenes };
         if let Err(error) = self.add_meshes(&nodes, files, messages) {
             messages.error(&error);
         }
@@ -83,7 +89,8 @@ impl<'a> Assembly<'a> {
         if self.set.geometries.is_empty() {
             messages.warning(&self.document.root().key("meshes"), "the scene has no meshes to render");
         }
-        let (camera, film) = camera(self.document, self.options, &nodes, &bounds, messages);
+        let found = chosen_camera(self.options, (&placed, &camera_names), messages);
+        let (camera, film) = camera(self.options, found, &bounds);
         if let Some(path) = &self.options.environment {
             self.lights.extend(environment(path, files, messages));
         } else if self.lights.is_empty() && self.emitters.is_empty() {
@@ -95,26 +102,37 @@ impl<'a> Assembly<'a> {
         if messages.diagnostics.has_errors() {
             return Ok(None);
         }
-        let mut lights = LightSetBuilder::default();
-        for light in self.lights {
-            lights.add(light);
-        }
         let (geometry, textures) = (Arc::new(self.set), Arc::new(self.materials.textures.set));
-        for (id, emission) in self.emitters {
-            let cover = Cover::of(&geometry, id, Arc::clone(&textures) as _);
-            lights.add_area(id, &geometry.geometries[id as usize].shape, &Emission { cover, ..emission });
-        }
+        let lights = light_set(self.lights, self.emitters, (&geometry, &textures), &bounds);
         let materials = MaterialSet::new(self.materials.entries, &textures).find_caustics(&textures);
         Ok(Some(Scene {
             camera,
             film,
             materials,
             textures,
-            lights: Arc::new(lights.build(&bounds)),
+            lights: Arc::new(lights),
             geometry,
             surfaces: self.surfaces,
             media: self.media,
+            choices,
         }))
+    }
+
+    /// The scene that is asked for, or that of the file, and the names of all.
+    fn chosen_scene(&self, messages: &mut Messages<'_>) -> Option<(Place<'a>, Vec<String>)> {
+        let scenes = self.document.root().key("scenes");
+        let names: Names<'a> = scenes.items().iter().map(|scene| [name_of(scene), None]).collect();
+        let index = match &self.options.scene {
+            Some(wanted) => chosen(["scene", "--scene-in-file"], wanted, &names),
+            None => Ok(self.document.root().key("scene").index().unwrap_or(0)),
+        };
+        match index {
+            Ok(index) => Some((scenes.item(index), shown(&names))),
+            Err(message) => {
+                messages.diagnostics.error_without_place(message);
+                None
+            }
+        }
     }
 
     /// Reads all images, for their errors.
@@ -249,6 +267,24 @@ impl<'a> Assembly<'a> {
             _ => self.lights.push(Light::Point { p, intensity }),
         }
     }
+}
+
+/// All lights, those of surfaces last.
+fn light_set(
+    lights: Vec<Light>,
+    emitters: Vec<(GeometryId, Emission)>,
+    (geometry, textures): (&Arc<GeometrySet>, &Arc<TextureSet>),
+    bounds: &Bounds3,
+) -> LightSet {
+    let mut set = LightSetBuilder::default();
+    for light in lights {
+        set.add(light);
+    }
+    for (id, emission) in emitters {
+        let cover = Cover::of(geometry, id, Arc::clone(textures) as _);
+        set.add_area(id, &geometry.geometries[id as usize].shape, &Emission { cover, ..emission });
+    }
+    set.build(bounds)
 }
 
 fn emission_image(

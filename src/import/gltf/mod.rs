@@ -1,10 +1,12 @@
 //! glTF 2.0 scenes. Light of 1 cd/m² is taken for a radiance of 1 where surfaces emit; lights in candela and lux are
 //! divided by [`LUMENS_PER_WATT`], as Blender writes and reads them. Single-sided surfaces are rendered from both sides.
 //!
-//! Reading order: [`textures`], [`materials`], [`animation`], [`nodes`], [`pose`], [`meshes`], [`view`], [`assemble`].
+//! Reading order: [`choice`], [`textures`], [`materials`], [`animation`], [`nodes`], [`pose`], [`meshes`], [`view`],
+//! [`assemble`].
 
 mod animation;
 mod assemble;
+mod choice;
 mod materials;
 mod meshes;
 mod nodes;
@@ -104,6 +106,9 @@ impl Messages<'_> {
 /// Loads a .gltf or .glb file. `Err` holds all errors and the warnings.
 pub fn load(path: &Path, options: &LoadOptions, files: &FileCache) -> Result<Loaded, Box<Report>> {
     let (mut sources, mut diagnostics) = (SourceMap::new(), Diagnostics::new());
+    if options.camera.is_some() && options.camera_auto {
+        diagnostics.error_without_place("--camera and --camera-auto ask for two cameras");
+    }
     let Ok(file) = sources.read(path) else {
         diagnostics.missing_file(path, "cannot be opened", None);
         return Err(Box::new(diagnostics.finish(&sources)));

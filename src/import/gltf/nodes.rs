@@ -18,12 +18,15 @@ pub(super) struct Node<'a> {
     pub weights: Option<Vec<f32>>,
 }
 
-/// All nodes of the scene, parents first, with what animations change. A node that is met twice is an error, so that no tree is endless.
-pub(super) fn nodes<'d>(document: &'d Document, changes: &Changes) -> Result<Vec<Node<'d>>, GltfError> {
-    let root = document.root();
-    let all = root.key("nodes");
+/// All nodes of a scene, parents first, with what animations change; of all without parents if there is no such scene. A node
+/// that is met twice is an error, so that no tree is endless.
+pub(super) fn nodes<'d>(
+    document: &'d Document,
+    scene: &Place<'d>,
+    changes: &Changes,
+) -> Result<Vec<Node<'d>>, GltfError> {
+    let all = document.root().key("nodes");
     let count = all.items().len();
-    let scene = root.key("scenes").item(root.key("scene").index().unwrap_or(0));
     let mut open: Vec<(usize, Affine3A)> = if scene.exists() {
         scene.key("nodes").items().iter().filter_map(Place::index).map(|i| (i, Affine3A::IDENTITY)).collect()
     } else {

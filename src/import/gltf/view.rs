@@ -1,6 +1,7 @@
 //! The camera and the film.
 
 use super::Messages;
+use super::choice::{Names, chosen, name_of};
 use super::nodes::Node;
 use crate::cameras::Camera;
 use crate::film::PixelBounds;
@@ -17,22 +18,48 @@ const AUTO_FOV: f32 = 40.0;
 /// Direction from the scene to that camera.
 const AUTO_DIRECTION: Vec3 = Vec3::new(0.5, 0.35, 0.8);
 
-/// The first camera of the scene, or one that frames it, and the film.
-pub(super) fn camera(
-    document: &Document,
+/// A camera that stands in the scene.
+pub(super) type Placed<'n, 'd> = (&'n Node<'d>, Place<'d>);
+
+/// The cameras of the scene, in the order of its nodes, and their names: those of the nodes before their own.
+pub(super) fn cameras<'n, 'd>(document: &'d Document, nodes: &'n [Node<'d>]) -> (Vec<Placed<'n, 'd>>, Names<'d>) {
+    let all = document.root().key("cameras");
+    let stands = |n: &&Node<'_>| n.world_from_node.is_finite() && n.world_from_node.matrix3.determinant() != 0.0;
+    let camera = |n: &'n Node<'d>| Some((n, all.item(n.place.key("camera").index()?)));
+    let placed: Vec<Placed<'n, 'd>> = nodes.iter().filter(stands).filter_map(camera).collect();
+    let names = placed.iter().map(|(node, camera)| [name_of(&node.place), name_of(camera)]).collect();
+    (placed, names)
+}
+
+/// The camera that is asked for, or the first one; `None` for one that frames the scene.
+pub(super) fn chosen_camera<'n, 'd>(
     options: &LoadOptions,
-    nodes: &[Node<'_>],
-    bounds: &Bounds3,
+    (placed, names): (&[Placed<'n, 'd>], &Names<'d>),
     messages: &mut Messages<'_>,
-) -> (Camera, FilmSettings) {
-    let cameras = document.root().key("cameras");
-    let mut placed =
-        nodes.iter().filter(|n| n.world_from_node.is_finite() && n.world_from_node.matrix3.determinant() != 0.0);
-    let found = placed.find_map(|n| Some((n, cameras.item(n.place.key("camera").index()?))));
-    let found = if options.camera_auto { None } else { found };
-    if found.is_none() && !options.camera_auto {
-        messages.warning(&cameras, "no camera: one that frames the scene is used (--camera-auto)");
+) -> Option<Placed<'n, 'd>> {
+    if options.camera_auto {
+        return None;
     }
+    let index = match &options.camera {
+        Some(wanted) => chosen(["camera", "--camera"], wanted, names),
+        None if placed.is_empty() => {
+            let place = Place::default().key("cameras");
+            messages.warning(&place, "no camera: one that frames the scene is used (--camera-auto)");
+            return None;
+        }
+        None => Ok(0),
+    };
+    match index {
+        Ok(index) => placed.get(index).cloned(),
+        Err(message) => {
+            messages.diagnostics.error_without_place(message);
+            None
+        }
+    }
+}
+
+/// A camera of the scene, or one that frames it, and the film.
+pub(super) fn camera(options: &LoadOptions, found: Option<Placed<'_, '_>>, bounds: &Bounds3) -> (Camera, FilmSettings) {
     let aspect = found.as_ref().and_then(|(_, c)| aspect_of(c));
     let width = (HEIGHT as f32 * aspect.unwrap_or(16.0 / 9.0)).round().clamp(1.0, 65_536.0);
     let resolution = options.resolution.unwrap_or([width as u32, HEIGHT]);

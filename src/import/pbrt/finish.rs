@@ -17,7 +17,7 @@ use crate::import::resources::report;
 use crate::lights::{Cover, Emission, EmissionImage, LightSetBuilder, area_lights_of};
 use crate::materials::{Material, MaterialId, MaterialSet};
 use crate::media::Medium;
-use crate::scene::{Scene, Surface};
+use crate::scene::{Choices, Scene, Surface};
 use crate::settings::Settings;
 use crate::textures::TextureSet;
 use lumiris_formats::diagnostic::Diagnostics;
@@ -143,6 +143,7 @@ impl Builder<'_> {
             surfaces: assembly.surfaces,
             lights: Arc::new(lights),
             media: assembly.media.set,
+            choices: Choices::default(),
         };
         Some((scene, settings))
     }

@@ -62,7 +62,13 @@ impl Asked {
         if let (None, Some(path)) = (&load.environment, note("environment")) {
             load.environment = Some(path.into());
         }
-        load.camera_auto |= note("camera_auto").is_some();
+        if let (None, Some(name)) = (&load.scene, note("scene_in_file")) {
+            load.scene = Some(name.to_owned());
+        }
+        match note("camera") {
+            Some(name) if load.camera.is_none() && !load.camera_auto => load.camera = Some(name.to_owned()),
+            _ => load.camera_auto |= load.camera.is_none() && note("camera_auto").is_some(),
+        }
         if let (None, Some(text)) = (load.time, note("time_in_scene")) {
             load.time = Some(text.parse().ok().filter(|t| f32::is_finite(*t)).ok_or_else(|| wrong("time"))?);
         }
@@ -75,7 +81,7 @@ impl Asked {
 
     /// What may differ between parts, and what going on needs. `plan` is what was chosen by measurements.
     pub(super) fn notes(&self, plan: Option<String>, camera: &Camera) -> Vec<(String, String)> {
-        let LoadOptions { resolution, crop, environment, camera_auto, time } = &self.load;
+        let LoadOptions { resolution, crop, environment, scene, camera: camera_name, camera_auto, time } = &self.load;
         let names = |aovs: &Vec<Aov>| match aovs[..] {
             [] => "none".to_owned(),
             _ => aovs.iter().map(<&str>::from).collect::<Vec<_>>().join(","),
@@ -85,6 +91,8 @@ impl Asked {
             ("resolution", resolution.map(|[w, h]| format!("{w}x{h}"))),
             ("crop", crop.map(|c| c.map(|v| v.to_string()).join(","))),
             ("environment", environment.as_ref().map(|path| path.display().to_string())),
+            ("scene_in_file", scene.clone()),
+            ("camera", camera_name.clone()),
             ("camera_auto", camera_auto.then(|| "true".to_owned())),
             ("time_in_scene", time.map(|time| time.to_string())),
             ("box_filter", self.box_filter.then(|| "true".to_owned())),

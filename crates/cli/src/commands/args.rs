@@ -42,6 +42,12 @@ pub(super) struct SceneArgs {
     /// Image of the environment of a glTF scene: latitude and longitude, or a square of equal areas
     #[arg(long, value_name = "FILE")]
     pub environment: Option<PathBuf>,
+    /// Scene of a glTF file, by its name or its index [default: the file's]
+    #[arg(long, value_name = "NAME|INDEX")]
+    pub scene_in_file: Option<String>,
+    /// Camera of a glTF scene, by its name or its index, which `lumiris info` lists [default: the first]
+    #[arg(long, value_name = "NAME|INDEX", conflicts_with = "camera_auto")]
+    pub camera: Option<String>,
     /// Frame a glTF scene from the front and somewhat above, whatever its cameras
     #[arg(long)]
     pub camera_auto: bool,
@@ -77,6 +83,8 @@ impl SceneArgs {
             resolution: self.resolution,
             crop: self.crop,
             environment: self.environment.clone(),
+            scene: self.scene_in_file.clone(),
+            camera: self.camera.clone(),
             camera_auto: self.camera_auto,
             time: self.time_in_scene,
         }

@@ -10,7 +10,7 @@ use lumiris::geometry::Shape;
 use lumiris::render::RenderSettings;
 use lumiris::render::memory::{Wanted, predict};
 use lumiris::render::output::metadata;
-use lumiris::scene::{RenderJob, Scene};
+use lumiris::scene::{Choices, RenderJob, Scene};
 use lumiris::settings::{Setting, Value as SettingValue};
 use serde_json::{Value, json};
 use std::collections::BTreeMap;
@@ -34,6 +34,9 @@ pub(super) fn run(args: &InfoArgs) -> anyhow::Result<ExitCode> {
             let mut facts = facts(&job);
             facts["seconds"] = json!({ "load": times.load, "build": times.build });
             facts["scene"] = json!(args.scene.scene.display().to_string());
+            let Choices { cameras, scenes } = &job.world.scene.choices;
+            let choices = [("cameras", cameras), ("scenes", scenes)];
+            choices.into_iter().filter(|(_, all)| !all.is_empty()).for_each(|(key, all)| facts[key] = json!(all));
             facts
         }
     };

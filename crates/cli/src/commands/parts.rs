@@ -79,7 +79,8 @@ pub(super) fn complete(args: &mut RenderArgs, stored: &Stored) -> anyhow::Result
     let scene = &mut args.scene;
     (scene.box_filter, scene.accel) = (asked.box_filter, asked.accel);
     (scene.resolution, scene.crop, scene.time_in_scene) = (asked.load.resolution, asked.load.crop, asked.load.time);
-    (scene.environment, scene.camera_auto) = (asked.load.environment, asked.load.camera_auto);
+    (scene.environment, scene.scene_in_file) = (asked.load.environment, asked.load.scene);
+    (scene.camera, scene.camera_auto) = (asked.load.camera, asked.load.camera_auto);
     let list = |aovs: Vec<_>| if aovs.is_empty() { vec![None] } else { aovs.into_iter().map(Some).collect() };
     args.aov = asked.aovs.map(list);
     Ok(())

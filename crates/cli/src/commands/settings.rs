@@ -84,12 +84,7 @@ fn check_scene(args: &SceneArgs) -> anyhow::Result<()> {
     if let Some(what) = mesh_kind(&args.scene) {
         return Err(UsageError(format!("{path} is a mesh, not a scene: {what}")).into());
     }
-    let of_gltf = [
-        ("--environment", args.environment.is_some()),
-        ("--camera-auto", args.camera_auto),
-        ("--time-in-scene", args.time_in_scene.is_some()),
-    ];
-    if let Some((option, _)) = of_gltf.iter().find(|(_, is_given)| *is_given && !is_gltf(&args.scene)) {
+    if let Some(option) = args.load_options().of_gltf().filter(|_| !is_gltf(&args.scene)) {
         let text = format!(
             "{option} is for glTF scenes: environment, camera and time of a pbrt scene, such as {path}, are in its file"
         );

@@ -67,6 +67,8 @@ fn options_of_gltf_are_refused_for_pbrt() {
     std::fs::write(folder.path().join("a.pbrt"), "WorldBegin\n").unwrap();
     for (option, name) in [
         ("--camera-auto", "--camera-auto"),
+        ("--camera 0", "--camera"),
+        ("--scene-in-file 0", "--scene-in-file"),
         ("--environment sky.hdr", "--environment"),
         ("--time-in-scene 1", "--time-in-scene"),
     ] {
@@ -75,6 +77,50 @@ fn options_of_gltf_are_refused_for_pbrt() {
         assert!(stderr(&output).contains(&format!("lumiris: {name} is for glTF")), "{}", stderr(&output));
         assert!(!stderr(&output).contains("1:1"), "an option has no line: {}", stderr(&output));
     }
+}
+
+#[test]
+fn cameras_are_listed_and_chosen_by_name_or_index() {
+    let folder = tempfile::tempdir().unwrap();
+    write_scene(folder.path());
+    let path = folder.path().join("a.gltf");
+    let nodes = r#""scenes":[{"nodes":[0,1,2]},{"name":"b","nodes":[2]}],"nodes":["#;
+    let near = r#""translation":[0.5,0.5,4]},{"camera":0,"name":"near","translation":[0.5,0.5,2]}"#;
+    let text = std::fs::read_to_string(&path).unwrap();
+    let text = text.replace(r#""nodes":["#, nodes).replace(r#""translation":[0.5,0.5,4]}"#, near);
+    std::fs::write(&path, text).unwrap();
+    let facts = |scene: &str| -> serde_json::Value {
+        let output = lumiris(&format!("info a.gltf --environment sky.pfm --json {scene}"), folder.path());
+        serde_json::from_slice(&output.stdout).unwrap()
+    };
+    assert_eq!(facts("")["cameras"], serde_json::json!(["", "near"]));
+    assert_eq!(facts("")["scenes"], serde_json::json!(["", "b"]));
+    assert_eq!(facts("--scene-in-file b")["cameras"], serde_json::json!(["near"]));
+
+    let options = "--environment sky.pfm --resolution 16x16 --estimator mis --spp 4 --quiet";
+    for (image, camera) in [("0", "--camera 0"), ("1", "--camera 1"), ("near", "--camera near"), ("first", "")] {
+        run(&format!("render a.gltf {options} {camera} -o {image}.exr"), folder.path());
+    }
+    let bytes = |name: &str| std::fs::read(folder.path().join(name)).unwrap();
+    assert_ne!(bytes("0.exr"), bytes("1.exr"));
+    assert_same("1.exr", "near.exr", folder.path(), "a name");
+    assert_same("0.exr", "first.exr", folder.path(), "the default");
+
+    let output = lumiris("info a.gltf --camera far", folder.path());
+    assert_eq!(output.status.code(), Some(3));
+    assert!(
+        stderr(&output).contains("--camera: there is no camera `far`; cameras: 0, 1 (near)"),
+        "{}",
+        stderr(&output)
+    );
+    let output = lumiris("info a.gltf --scene-in-file 2", folder.path());
+    assert!(stderr(&output).contains("there is no scene `2`; scenes: 0, 1 (b)"), "{}", stderr(&output));
+    assert_eq!(lumiris("info a.gltf --camera 0 --camera-auto", folder.path()).status.code(), Some(2));
+
+    // A checkpoint knows its camera
+    run(&format!("render a.gltf {options} --camera near --checkpoint c.film -o half.exr"), folder.path());
+    run("render a.gltf --resume c.film --quiet -o resumed.exr", folder.path());
+    assert_same("1.exr", "resumed.exr", folder.path(), "a checkpoint");
 }
 
 #[test]
