@@ -138,10 +138,14 @@ const RULES: &[(&str, Rule)] = &[
     ("materials[].extensions.KHR_materials_pbrSpecularGlossiness.diffuseFactor", Numbers(4)),
     ("materials[].extensions.KHR_materials_pbrSpecularGlossiness.specularFactor", Numbers(3)),
     ("materials[].extensions.KHR_materials_pbrSpecularGlossiness.glossinessFactor", Number),
+    ("materials[].extensions.KHR_materials_sheen.sheenColorFactor", Numbers(3)),
+    ("materials[].extensions.KHR_materials_sheen.sheenRoughnessFactor", Number),
     ("materials[].extensions.KHR_materials_specular.specularFactor", Number),
     ("materials[].extensions.KHR_materials_specular.specularColorFactor", Numbers(3)),
     ("materials[].extensions.KHR_materials_transmission.transmissionFactor", Number),
     ("materials[].extensions.KHR_materials_volume.thicknessFactor", Number),
+    ("materials[].extensions.KHR_materials_volume.attenuationColor", Numbers(3)),
+    ("materials[].extensions.KHR_materials_volume.attenuationDistance", Number),
     ("materials[].@", Object),
     ("materials[].@.index", Index("textures")),
     ("materials[].@.texCoord", Whole),
@@ -157,10 +161,13 @@ const TEXTURES: &[&str] = &[
     "emissiveTexture",
     "pbrMetallicRoughness.baseColorTexture",
     "pbrMetallicRoughness.metallicRoughnessTexture",
+    "extensions.KHR_materials_anisotropy.anisotropyTexture",
     "extensions.KHR_materials_clearcoat.clearcoatTexture",
     "extensions.KHR_materials_clearcoat.clearcoatRoughnessTexture",
     "extensions.KHR_materials_pbrSpecularGlossiness.diffuseTexture",
     "extensions.KHR_materials_pbrSpecularGlossiness.specularGlossinessTexture",
+    "extensions.KHR_materials_sheen.sheenColorTexture",
+    "extensions.KHR_materials_sheen.sheenRoughnessTexture",
     "extensions.KHR_materials_specular.specularTexture",
     "extensions.KHR_materials_specular.specularColorTexture",
     "extensions.KHR_materials_transmission.transmissionTexture",
@@ -263,6 +270,31 @@ mod tests {
             {"wrapS":7}],"images":{},"meshes":[{"primitives":[{"attributes":{"POSITION":0,"NORMAL":-1}}]}]}"#;
         assert_eq!(messages(materials).len(), 7);
         assert_eq!(messages(r#"{"asset":{"version":"2.0"},"scene":0,"scenes":[{}]}"#), [""; 0]);
+    }
+
+    #[test]
+    fn factors_and_textures_of_all_extensions_of_materials_are_checked() {
+        let of = |extension: &str, members: &str| {
+            messages(&format!(r#"{{"materials":[{{"extensions":{{"KHR_materials_{extension}":{{{members}}}}}}}]}}"#))
+        };
+        for (extension, texture) in [
+            ("anisotropy", "anisotropyTexture"),
+            ("clearcoat", "clearcoatRoughnessTexture"),
+            ("sheen", "sheenColorTexture"),
+            ("sheen", "sheenRoughnessTexture"),
+            ("specular", "specularTexture"),
+            ("transmission", "transmissionTexture"),
+        ] {
+            let place = format!("materials[0].extensions.KHR_materials_{extension}.{texture}.index");
+            let expected = [format!("{place}: textures[7] is not there, of 0")];
+            assert_eq!(of(extension, &format!(r#""{texture}":{{"index":7}}"#)), expected);
+        }
+        let said = of("sheen", r#""sheenColorFactor":"x","sheenRoughnessFactor":[1]"#).join("\n");
+        assert!(said.contains("sheenColorFactor: must be 3 numbers"), "{said}");
+        assert!(said.contains("sheenRoughnessFactor: must be a number"), "{said}");
+        let said = of("volume", r#""attenuationColor":1,"attenuationDistance":"far""#).join("\n");
+        assert!(said.contains("attenuationColor: must be 3 numbers"), "{said}");
+        assert!(said.contains("attenuationDistance: must be a number"), "{said}");
     }
 
     #[test]
