@@ -249,6 +249,39 @@ fn orthographic_cameras_see_all_that_they_ask_for() {
 }
 
 #[test]
+fn hidden_nodes_and_their_children_are_left_out_but_for_cameras_and_joints() {
+    let folder = tempfile::tempdir().unwrap();
+    let path = folder.path().join("a.gltf");
+    let load_with = |visible: &str, child: &str| {
+        // (0, 0, 0), (1, 0, 0) and (0, 1, 0)
+        let data = "AAAAAAAAAAAAAAAAAACAPwAAAAAAAAAAAAAAAAAAgD8AAAAA";
+        let json = format!(
+            r#"{{"asset":{{"version":"2.0"}},"extensionsRequired":["KHR_node_visibility","KHR_lights_punctual"],
+            "scenes":[{{"nodes":[0,2]}}],
+            "nodes":[{{"children":[1],"mesh":0,"extensions":{{"KHR_node_visibility":{{{visible}}}}}}},
+                {{"mesh":0,"camera":0,"translation":[5,0,3],
+                  "extensions":{{"KHR_lights_punctual":{{"light":0}},"KHR_node_visibility":{{{child}}}}}}},
+                {{"mesh":0}}],
+            "extensions":{{"KHR_lights_punctual":{{"lights":[{{"type":"point"}}]}}}},
+            "cameras":[{{"type":"perspective","perspective":{{"yfov":0.7,"znear":0.1,"aspectRatio":2}}}}],
+            "meshes":[{{"primitives":[{{"attributes":{{"POSITION":0}}}}]}}],
+            "accessors":[{{"bufferView":0,"componentType":5126,"count":3,"type":"VEC3"}}],
+            "bufferViews":[{{"buffer":0,"byteLength":36}}],
+            "buffers":[{{"byteLength":36,"uri":"data:application/octet-stream;base64,{data}"}}]}}"#
+        );
+        std::fs::write(&path, json).unwrap();
+        let scene = load(&path, &LoadOptions::default()).map_err(|report| report.to_string()).unwrap().scene;
+        let points = scene.lights.lights.iter().filter(|light| matches!(light, Light::Point { .. })).count();
+        assert_eq!(scene.film.resolution, [1440, 720], "the camera is there");
+        (scene.geometry.world_bounds().max.x, points)
+    };
+    assert_eq!(load_with("", ""), (6.0, 1));
+    assert_eq!(load_with(r#""visible":true"#, ""), (6.0, 1));
+    assert_eq!(load_with("", r#""visible":false"#), (1.0, 0));
+    assert_eq!(load_with(r#""visible":false"#, r#""visible":true"#), (1.0, 0));
+}
+
+#[test]
 fn skins_follow_their_joints_and_not_their_node() {
     let rest = |joint: u32| {
         format!(
@@ -259,6 +292,8 @@ fn skins_follow_their_joints_and_not_their_node() {
     let nodes = r#"{"mesh":0,"skin":0,"translation":[9,9,9]},{"translation":[10,0,0],"scale":[2,1,1]}"#;
     let (bounds_of_skin, _) = bounds(nodes, &rest(3), &VALUES).unwrap();
     assert_eq!((bounds_of_skin.min, bounds_of_skin.max), (Vec3::new(10.0, 0.0, 5.0), Vec3::new(12.0, 1.0, 5.0)));
+    let hidden = nodes.replace(r#""scale""#, r#""extensions":{"KHR_node_visibility":{"visible":false}},"scale""#);
+    assert_eq!(bounds(&hidden, &rest(3), &VALUES).unwrap().0, bounds_of_skin, "joints need not be seen");
     let error = bounds(nodes, &rest(4), &VALUES).map(|_| ()).unwrap_err();
     assert!(error.contains("JOINTS_0") && error.contains("of 1"), "{error}");
 }

@@ -247,7 +247,8 @@ impl<'a> Assembly<'a> {
 
     /// `KHR_lights_punctual`: lights shine along −z.
     fn add_light(&mut self, node: &Node<'a>) {
-        let Some(index) = node.place.extension("KHR_lights_punctual").key("light").index() else { return };
+        let light = node.place.extension("KHR_lights_punctual").key("light").index();
+        let Some(index) = light.filter(|_| node.is_visible) else { return };
         let light = self.document.root().extension("KHR_lights_punctual").key("lights").item(index);
         let color = Rgb::from_array(light.key("color").numbers().unwrap_or([1.0; 3])).map(|c| c.max(0.0));
         let intensity = color * (light.key("intensity").number().unwrap_or(1.0).max(0.0) / LUMENS_PER_WATT);

@@ -11,8 +11,10 @@ pub(super) struct Node<'a> {
     pub place: Place<'a>,
     /// Index of the node.
     pub index: usize,
-    /// Index of its mesh.
+    /// Index of its mesh, if it is seen.
     pub mesh: Option<usize>,
+    /// False if it, or a parent, is hidden by `KHR_node_visibility`: without meshes and lights, but with cameras and joints.
+    pub is_visible: bool,
     pub world_from_node: Affine3A,
     /// Weights of morph targets, by an animation.
     pub weights: Option<Vec<f32>>,
@@ -27,17 +29,18 @@ pub(super) fn nodes<'d>(
 ) -> Result<Vec<Node<'d>>, GltfError> {
     let all = document.root().key("nodes");
     let count = all.items().len();
-    let mut open: Vec<(usize, Affine3A)> = if scene.exists() {
-        scene.key("nodes").items().iter().filter_map(Place::index).map(|i| (i, Affine3A::IDENTITY)).collect()
+    let at_root = |i| (i, Affine3A::IDENTITY, true);
+    let mut open: Vec<(usize, Affine3A, bool)> = if scene.exists() {
+        scene.key("nodes").items().iter().filter_map(Place::index).map(at_root).collect()
     } else {
         let children: HashSet<usize> =
             all.items().iter().flat_map(|n| n.key("children").items()).filter_map(|child| child.index()).collect();
-        (0..count).filter(|i| !children.contains(i)).map(|i| (i, Affine3A::IDENTITY)).collect()
+        (0..count).filter(|i| !children.contains(i)).map(at_root).collect()
     };
     open.reverse();
     let mut is_met = vec![false; count];
     let mut nodes = Vec::new();
-    while let Some((index, parent)) = open.pop() {
+    while let Some((index, parent, is_parent_visible)) = open.pop() {
         let place = all.item(index);
         match is_met.get_mut(index) {
             Some(met) if !*met => *met = true,
@@ -46,9 +49,12 @@ pub(super) fn nodes<'d>(
         }
         let change = changes.get(&index).cloned().unwrap_or_default();
         let world_from_node = parent * transform(&place, &change);
+        let is_hidden = place.extension("KHR_node_visibility").key("visible").flag() == Some(false);
+        let is_visible = is_parent_visible && !is_hidden;
         let children = place.key("children").items();
-        open.extend(children.iter().rev().filter_map(Place::index).map(|i| (i, world_from_node)));
-        nodes.push(Node { mesh: place.key("mesh").index(), place, index, world_from_node, weights: change.weights });
+        open.extend(children.iter().rev().filter_map(Place::index).map(|i| (i, world_from_node, is_visible)));
+        let mesh = place.key("mesh").index().filter(|_| is_visible);
+        nodes.push(Node { mesh, is_visible, place, index, world_from_node, weights: change.weights });
     }
     Ok(nodes)
 }

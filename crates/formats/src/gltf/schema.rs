@@ -58,6 +58,7 @@ const RULES: &[(&str, Rule)] = &[
     ("nodes[].weights", Array),
     ("nodes[].weights[]", Number),
     ("nodes[].extensions.KHR_lights_punctual.light", Light),
+    ("nodes[].extensions.KHR_node_visibility.visible", Flag),
     ("nodes[].extensions.EXT_mesh_gpu_instancing.attributes.*", Index("accessors")),
     ("meshes", Array),
     ("meshes[].primitives", Array),
@@ -266,6 +267,8 @@ mod tests {
                 "nodes[0].scale: must be 3 numbers"
             ]
         );
+        let hidden = r#"{"nodes":[{"extensions":{"KHR_node_visibility":{"visible":0}}}]}"#;
+        assert_eq!(messages(hidden), ["nodes[0].extensions.KHR_node_visibility.visible: must be true or false"]);
         let materials = r#"{"materials":[{"doubleSided":1,"normalTexture":{"index":0,"scale":"a"}}],"samplers":[
             {"wrapS":7}],"images":{},"meshes":[{"primitives":[{"attributes":{"POSITION":0,"NORMAL":-1}}]}]}"#;
         assert_eq!(messages(materials).len(), 7);
