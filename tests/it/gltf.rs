@@ -96,6 +96,23 @@ fn a_triangle_with_a_light_and_a_camera_is_read() {
 }
 
 #[test]
+fn a_range_of_a_light_is_told() {
+    let folder = tempfile::tempdir().unwrap();
+    let said = |file: &[u8]| loaded(folder.path(), file).unwrap().warnings.to_string();
+    assert!(!said(&triangle()).contains("range"));
+    let file = replaced(&triangle(), r#""intensity":683"#, r#""range":2      "#);
+    let said = said(&file);
+    assert!(said.contains("no range") && said.contains("lights[0].range"), "{said}");
+}
+
+/// A file in which a text is another of the same length.
+fn replaced(file: &[u8], from: &str, to: &str) -> Vec<u8> {
+    assert_eq!(from.len(), to.len());
+    let at = file.windows(from.len()).position(|w| w == from.as_bytes()).unwrap();
+    [&file[..at], to.as_bytes(), &file[at + from.len()..]].concat()
+}
+
+#[test]
 fn a_scene_looks_like_the_same_scene_of_pbrt() {
     let folder = tempfile::tempdir().unwrap();
     let text = r#"Scale -1 1 1
@@ -313,11 +330,7 @@ fn what_is_not_read_is_an_error_with_its_place() {
     let folder = tempfile::tempdir().unwrap();
     let changed = |from: &str, to: &str| {
         let to = format!("{to:0$}", from.len());
-        assert_eq!(from.len(), to.len());
-        let (mut bytes, from) = (triangle(), from.as_bytes());
-        let at = bytes.windows(from.len()).position(|w| w == from).unwrap();
-        bytes[at..at + from.len()].copy_from_slice(to.as_bytes());
-        loaded(folder.path(), &bytes).map(|_| ()).unwrap_err()
+        loaded(folder.path(), &replaced(&triangle(), from, &to)).map(|_| ()).unwrap_err()
     };
     let error = changed(r#""extensionsUsed":["KHR_lights_punctual"]"#, r#""extensionsRequired":["KHR_draco_mesh"]"#);
     assert!(error.contains("extensionsRequired[0]") && error.contains("KHR_draco_mesh"), "{error}");

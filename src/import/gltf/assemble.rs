@@ -84,7 +84,7 @@ impl<'a> Assembly<'a> {
         if let Err(error) = self.add_meshes(&nodes, files, messages) {
             messages.error(&error);
         }
-        nodes.iter().for_each(|node| self.add_light(node));
+        nodes.iter().for_each(|node| self.add_light(node, messages));
         let bounds = self.set.world_bounds();
         if self.set.geometries.is_empty() {
             messages.warning(&self.document.root().key("meshes"), "the scene has no meshes to render");
@@ -246,7 +246,7 @@ impl<'a> Assembly<'a> {
     }
 
     /// `KHR_lights_punctual`: lights shine along −z.
-    fn add_light(&mut self, node: &Node<'a>) {
+    fn add_light(&mut self, node: &Node<'a>, messages: &mut Messages<'_>) {
         let light = node.place.extension("KHR_lights_punctual").key("light").index();
         let Some(index) = light.filter(|_| node.is_visible) else { return };
         let light = self.document.root().extension("KHR_lights_punctual").key("lights").item(index);
@@ -255,6 +255,10 @@ impl<'a> Assembly<'a> {
         let m = &node.world_from_node;
         if !m.is_finite() {
             return;
+        }
+        if light.key("range").exists() {
+            messages
+                .warning(&light.key("range"), "lights have no range: they fall off with the square of the distance");
         }
         let (p, axis) = (m.transform_point3(Vec3::ZERO), m.transform_vector3(-Vec3::Z).normalize_or(-Vec3::Z));
         match light.key("type").text() {
