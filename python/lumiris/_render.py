@@ -187,6 +187,7 @@ def render(
     scene_in_file: Union[None, int, str] = None,
     camera: Union[None, int, str] = None,
     camera_auto: bool = False,
+    light_units: Optional[Literal["watt", "candela"]] = None,
     time_in_scene: Optional[float] = None,
     texture_memory: Union[None, int, str] = None,
     aov: Union[None, str, Sequence[str]] = None,
@@ -224,9 +225,10 @@ def render(
     resolution, crop, box_filter, accel, packet_width, threads, tile_size, time
         As on the command line: columns and rows, or text such as "640x360"; x0, x1, y0, y1 in fractions of the image; a pixel filter of one pixel;
         `embree` or `bvh`; rays per packet; threads; edge of a tile; seconds after which to stop.
-    environment, scene_in_file, camera, camera_auto, time_in_scene
+    environment, scene_in_file, camera, camera_auto, light_units, time_in_scene
         Of glTF scenes: the image of an environment, the scene of the file and its camera by their names or indices, whether the scene
-        is framed whatever its cameras, and the time of its animations (s).
+        is framed whatever its cameras, whether candela and lux of lights are divided by 683 (`watt`, the default) or taken as they are
+        (`candela`), and the time of its animations (s).
     aov
         Layers beside the image: `variance`, `samples`, `albedo`, `normal`, `depth`, `material`, `object`, `ratio`, `records`.
         None asks for all that there are; "none" or an empty list saves the time for them.
@@ -281,6 +283,7 @@ def render(
         "scene_in_file": None if scene_in_file is None else str(scene_in_file),
         "camera": None if camera is None else str(camera),
         "camera_auto": camera_auto,
+        "light_units": light_units,
         "time_in_scene": time_in_scene,
         "texture_memory": None if texture_memory is None else str(texture_memory),
         "cryptomatte": [cryptomatte] if isinstance(cryptomatte, str) else list(cryptomatte),

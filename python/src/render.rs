@@ -10,6 +10,7 @@ use lumiris::film::{Film, PixelBounds};
 use lumiris::imaging::Image;
 use lumiris::import::cache::FileCache;
 use lumiris::import::fingerprint::SceneFiles;
+use lumiris::import::gltf::LightUnits;
 use lumiris::import::{LoadOptions, Loaded, load_text, load_with};
 use lumiris::render::allocation::complete_for_noise;
 use lumiris::render::cryptomatte::{Cryptomatte, cryptomattes};
@@ -57,6 +58,7 @@ pub(crate) struct Options {
     scene_in_file: Option<String>,
     camera: Option<String>,
     camera_auto: bool,
+    light_units: Option<String>,
     time_in_scene: Option<f32>,
     texture_memory: Option<String>,
     aov: Option<Vec<String>>,
@@ -150,6 +152,8 @@ impl Options {
         if parts.extent.is_partial() && !cryptomatte.is_empty() {
             return wrong("cryptomatte needs the whole image, not a part".to_owned());
         }
+        let light_units = self.light_units.as_deref().map(str::parse::<LightUnits>).transpose();
+        let light_units = light_units.map_err(|_| PyValueError::new_err("light_units: expected watt or candela"))?;
         let load = LoadOptions {
             resolution: self.resolution,
             crop: self.crop,
@@ -157,6 +161,7 @@ impl Options {
             scene: self.scene_in_file,
             camera: self.camera,
             camera_auto: self.camera_auto,
+            light_units,
             time: self.time_in_scene,
         };
         Ok(Request {

@@ -22,6 +22,7 @@ use crate::scene::{AccelKind, RenderJob, Scene, World};
 use crate::settings::Settings;
 use cache::FileCache;
 use fingerprint::SceneFiles;
+use gltf::LightUnits;
 use lumiris_formats::diagnostic::{Diagnostics, Report};
 use lumiris_formats::pbrt::parser::{parse_file, parse_source};
 use lumiris_formats::source::SourceMap;
@@ -43,6 +44,8 @@ pub struct LoadOptions {
     pub camera: Option<String>,
     /// True if a glTF scene is framed, whatever its cameras.
     pub camera_auto: bool,
+    /// What the candela and lux of a glTF scene's lights are.
+    pub light_units: Option<LightUnits>,
     /// The time (s) at which animations of a glTF scene are seen; without it things are where they stand.
     pub time: Option<f32>,
 }
@@ -55,6 +58,7 @@ impl LoadOptions {
             ("--scene-in-file", self.scene.is_some()),
             ("--camera", self.camera.is_some()),
             ("--camera-auto", self.camera_auto),
+            ("--light-units", self.light_units.is_some()),
             ("--time-in-scene", self.time.is_some()),
         ];
         options.into_iter().find_map(|(option, is_given)| is_given.then_some(option))
@@ -128,8 +132,9 @@ fn load_parsed(
     let mut builder = Builder::new(folder, options);
     parse(&mut sources, &mut diagnostics, &mut builder);
     if let Some(option) = options.of_gltf() {
-        let message =
-            format!("{option} is for glTF scenes: environment, camera and time of a pbrt scene are in its file");
+        let message = format!(
+            "{option} is for glTF scenes: environment, camera, lights and time of a pbrt scene are in its file"
+        );
         diagnostics.error_without_place(message);
     }
     let scene_files = SceneFiles::new(&sources, builder.files());

@@ -3,6 +3,7 @@
 
 use lumiris::geometry::Shape;
 use lumiris::import::cache::FileCache;
+use lumiris::import::gltf::LightUnits;
 use lumiris::import::{LoadOptions, Loaded, load, load_text};
 use lumiris::lights::{AreaLight, Light};
 use lumiris::render::output::channels;
@@ -93,6 +94,27 @@ fn a_triangle_with_a_light_and_a_camera_is_read() {
     assert_eq!(scene.geometry.primitive_counts(), (1, 0, 0));
     assert_eq!(scene.film.resolution, [1440, 720]);
     assert!((scene.lights.lights[0].phi(1.0) - 4.0 * std::f32::consts::PI).abs() < 1e-3, "683 cd are 1 W/sr");
+}
+
+#[test]
+fn lights_are_in_watts_or_in_the_candela_of_emission() {
+    let folder = tempfile::tempdir().unwrap();
+    let path = folder.path().join("a.glb");
+    let light = |file: &[u8], light_units| {
+        std::fs::write(&path, file).unwrap();
+        let options = LoadOptions { light_units, ..LoadOptions::default() };
+        load(&path, &options).unwrap().scene.lights.lights[0].phi(1.0)
+    };
+    // Blanks make up for the length of the word
+    let [point, sun] = [("point", 8), ("directional", 2)]
+        .map(|(kind, blanks)| format!("\"type\":\"{kind}\",\"intensity\":683}}]}}}},\n{:blanks$}\"scenes\"", ""));
+    let sun = replaced(&triangle(), &point, &sun);
+    for (file, watts) in [(triangle(), 4.0 * std::f32::consts::PI), (sun, std::f32::consts::PI)] {
+        for (units, factor) in [(None, 1.0), (Some(LightUnits::Watt), 1.0), (Some(LightUnits::Candela), 683.0)] {
+            let found = light(&file, units);
+            assert!((found / (watts * factor) - 1.0).abs() < 1e-5, "{units:?}: {found}");
+        }
+    }
 }
 
 #[test]

@@ -1,5 +1,6 @@
 //! Geometry and lights of the scene.
 
+use super::Messages;
 use super::animation::changes;
 use super::choice::{Names, chosen, name_of, shown};
 use super::materials::{Look, Materials};
@@ -8,7 +9,6 @@ use super::nodes::{Node, instances, nodes};
 use super::pose::Pose;
 use super::textures::EmissionSource;
 use super::view::{camera, cameras, chosen_camera};
-use super::{LUMENS_PER_WATT, Messages};
 use crate::geometry::{Geometry, GeometryId, GeometrySet, Group, Instance, Shape, TriangleMesh, Visibility};
 use crate::imaging::oiio::ImageError;
 use crate::import::LoadOptions;
@@ -251,7 +251,8 @@ impl<'a> Assembly<'a> {
         let Some(index) = light.filter(|_| node.is_visible) else { return };
         let light = self.document.root().extension("KHR_lights_punctual").key("lights").item(index);
         let color = Rgb::from_array(light.key("color").numbers().unwrap_or([1.0; 3])).map(|c| c.max(0.0));
-        let intensity = color * (light.key("intensity").number().unwrap_or(1.0).max(0.0) / LUMENS_PER_WATT);
+        let per_candela = self.options.light_units.unwrap_or_default().per_candela();
+        let intensity = color * (light.key("intensity").number().unwrap_or(1.0).max(0.0) * per_candela);
         let m = &node.world_from_node;
         if !m.is_finite() {
             return;

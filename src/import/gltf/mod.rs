@@ -1,5 +1,5 @@
-//! glTF 2.0 scenes. Light of 1 cd/m² is taken for a radiance of 1 where surfaces emit; lights in candela and lux are
-//! divided by [`LUMENS_PER_WATT`], as Blender writes and reads them. Single-sided surfaces are rendered from both sides.
+//! glTF 2.0 scenes. Light of 1 cd/m² is taken for a radiance of 1 where surfaces emit; what lights in candela and lux are
+//! beside it, [`LightUnits`] says. Single-sided surfaces are rendered from both sides.
 //!
 //! Reading order: [`choice`], [`textures`], [`materials`], [`animation`], [`nodes`], [`pose`], [`meshes`], [`view`],
 //! [`assemble`].
@@ -26,9 +26,31 @@ use lumiris_formats::source::{FileId, SourceMap, Span};
 use std::collections::BTreeSet;
 use std::ops::Range;
 use std::path::Path;
+use strum::{EnumString, IntoStaticStr, VariantNames};
 
 /// Luminous flux of a watt at 555 nm, by which lights are divided.
 pub const LUMENS_PER_WATT: f32 = 683.0;
+
+/// What the candela and lux of lights are, beside an emission of 1.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, EnumString, IntoStaticStr, VariantNames)]
+#[strum(serialize_all = "kebab-case")]
+pub enum LightUnits {
+    /// Divided by [`LUMENS_PER_WATT`]: W/sr and W/m², as Blender has them where it writes candela and lux.
+    #[default]
+    Watt,
+    /// As they are: emission is in cd/m², as the specification has it, or nothing has units.
+    Candela,
+}
+
+impl LightUnits {
+    /// The intensity of a candela, and the irradiance of a lux.
+    fn per_candela(self) -> f32 {
+        match self {
+            LightUnits::Watt => 1.0 / LUMENS_PER_WATT,
+            LightUnits::Candela => 1.0,
+        }
+    }
+}
 
 /// Extensions that a file may require. Of materials, these are also those whose lack a warning tells of.
 const KNOWN: &[&str] = &[

@@ -69,6 +69,9 @@ impl Asked {
             Some(name) if load.camera.is_none() && !load.camera_auto => load.camera = Some(name.to_owned()),
             _ => load.camera_auto |= load.camera.is_none() && note("camera_auto").is_some(),
         }
+        if let (None, Some(name)) = (load.light_units, note("light_units")) {
+            load.light_units = Some(name.parse().map_err(|_| wrong("unit of lights"))?);
+        }
         if let (None, Some(text)) = (load.time, note("time_in_scene")) {
             load.time = Some(text.parse().ok().filter(|t| f32::is_finite(*t)).ok_or_else(|| wrong("time"))?);
         }
@@ -81,7 +84,8 @@ impl Asked {
 
     /// What may differ between parts, and what going on needs. `plan` is what was chosen by measurements.
     pub(super) fn notes(&self, plan: Option<String>, camera: &Camera) -> Vec<(String, String)> {
-        let LoadOptions { resolution, crop, environment, scene, camera: camera_name, camera_auto, time } = &self.load;
+        let LoadOptions { resolution, crop, environment, scene, camera: camera_name, camera_auto, light_units, time } =
+            &self.load;
         let names = |aovs: &Vec<Aov>| match aovs[..] {
             [] => "none".to_owned(),
             _ => aovs.iter().map(<&str>::from).collect::<Vec<_>>().join(","),
@@ -94,6 +98,7 @@ impl Asked {
             ("scene_in_file", scene.clone()),
             ("camera", camera_name.clone()),
             ("camera_auto", camera_auto.then(|| "true".to_owned())),
+            ("light_units", light_units.map(|units| <&str>::from(units).to_owned())),
             ("time_in_scene", time.map(|time| time.to_string())),
             ("box_filter", self.box_filter.then(|| "true".to_owned())),
             (PLAN_NOTE, plan),

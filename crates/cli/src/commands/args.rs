@@ -12,6 +12,7 @@ use super::watch_args::WatchArgs;
 use clap::Args;
 use clap::builder::{PossibleValuesParser, TypedValueParser};
 use lumiris::import::LoadOptions;
+use lumiris::import::gltf::LightUnits;
 use lumiris::render::output::Aov;
 use lumiris::scene::AccelKind;
 use std::path::PathBuf;
@@ -51,6 +52,10 @@ pub(super) struct SceneArgs {
     /// Frame a glTF scene from the front and somewhat above, whatever its cameras
     #[arg(long)]
     pub camera_auto: bool,
+    /// What candela and lux of lights in a glTF file are beside emission: with `watt`, 683 of them are 1 W/sr and 1 W/m², as in files of Blender; with
+    /// `candela` they are taken as they are, with emission in cd/m², as glTF has it [default: watt]
+    #[arg(long, value_name = "UNIT", value_parser = named::<LightUnits>())]
+    pub light_units: Option<LightUnits>,
     /// Time (s) at which the animations of a glTF scene are seen [default: without animations]
     #[arg(long, value_name = "SECONDS", value_parser = parse_time_in_scene)]
     pub time_in_scene: Option<f32>,
@@ -86,6 +91,7 @@ impl SceneArgs {
             scene: self.scene_in_file.clone(),
             camera: self.camera.clone(),
             camera_auto: self.camera_auto,
+            light_units: self.light_units,
             time: self.time_in_scene,
         }
     }

@@ -81,6 +81,7 @@ pub(super) fn complete(args: &mut RenderArgs, stored: &Stored) -> anyhow::Result
     (scene.resolution, scene.crop, scene.time_in_scene) = (asked.load.resolution, asked.load.crop, asked.load.time);
     (scene.environment, scene.scene_in_file) = (asked.load.environment, asked.load.scene);
     (scene.camera, scene.camera_auto) = (asked.load.camera, asked.load.camera_auto);
+    scene.light_units = asked.load.light_units;
     let list = |aovs: Vec<_>| if aovs.is_empty() { vec![None] } else { aovs.into_iter().map(Some).collect() };
     args.aov = asked.aovs.map(list);
     Ok(())

@@ -86,7 +86,7 @@ fn check_scene(args: &SceneArgs) -> anyhow::Result<()> {
     }
     if let Some(option) = args.load_options().of_gltf().filter(|_| !is_gltf(&args.scene)) {
         let text = format!(
-            "{option} is for glTF scenes: environment, camera and time of a pbrt scene, such as {path}, are in its file"
+            "{option} is for glTF scenes: environment, camera, lights and time of a pbrt scene, such as {path}, are in its file"
         );
         return Err(UsageError(text).into());
     }

@@ -68,6 +68,7 @@ fn options_of_gltf_are_refused_for_pbrt() {
     for (option, name) in [
         ("--camera-auto", "--camera-auto"),
         ("--camera 0", "--camera"),
+        ("--light-units watt", "--light-units"),
         ("--scene-in-file 0", "--scene-in-file"),
         ("--environment sky.hdr", "--environment"),
         ("--time-in-scene 1", "--time-in-scene"),
