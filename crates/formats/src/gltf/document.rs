@@ -3,7 +3,8 @@
 use super::container::chunks;
 use super::place::{GltfError, Place};
 use super::schema;
-use base64::Engine;
+use base64::engine::{DecodePaddingMode, GeneralPurpose, GeneralPurposeConfig};
+use base64::{Engine, alphabet};
 use serde_json::Value;
 use std::path::{Path, PathBuf};
 
@@ -36,13 +37,19 @@ pub enum Unread {
     Content(GltfError),
 }
 
+/// Base64 of data URIs, some of which are without the padding at the end.
+const BASE64: GeneralPurpose = GeneralPurpose::new(
+    &alphabet::STANDARD,
+    GeneralPurposeConfig::new().with_decode_padding_mode(DecodePaddingMode::Indifferent),
+);
+
 /// Bytes of a data URI; `None` if it is none.
 fn data_uri(uri: &str) -> Option<Result<Vec<u8>, String>> {
     let (kind, data) = uri.strip_prefix("data:")?.split_once(',').unwrap_or_default();
     if !kind.ends_with(";base64") {
         return Some(Err("the data URI is not in base64".to_owned()));
     }
-    Some(base64::engine::general_purpose::STANDARD.decode(data.trim_end()).map_err(|e| e.to_string()))
+    Some(BASE64.decode(data.trim_end()).map_err(|e| e.to_string()))
 }
 
 /// The file name that a URI stands for.
@@ -201,4 +208,19 @@ fn check_asset(json: &Value, known: &[&str]) -> Result<(), Vec<GltfError>> {
         })
         .collect();
     if errors.is_empty() { Ok(()) } else { Err(errors) }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn data_uris_may_lack_their_padding() {
+        let decoded = |uri: &str| data_uri(uri).unwrap();
+        for uri in ["data:;base64,AAECAw==", "data:;base64,AAECAw", "data:image/png;base64,AAECAw=="] {
+            assert_eq!(decoded(uri), Ok(vec![0, 1, 2, 3]), "{uri}");
+        }
+        assert!(decoded("data:;base64,AAEC*w").is_err() && decoded("data:;base64,AAECA").is_err());
+        assert!(decoded("data:text/plain,AAEC").is_err() && data_uri("a.bin").is_none());
+    }
 }
