@@ -62,7 +62,7 @@ fn a_sheet_on_a_ramp_is_a_slope() {
     // Edges are measured where the mesh stands
     let (vertices, triangles) = mesh("", Path::new("."), &bent);
     assert!(triangles >= 2 * 64 && vertices.iter().all(|[x, _, z]| (z - (x + 1.0) * 0.5).abs() < 1e-5), "{triangles}");
-    let (_, triangles) = mesh("Option \"float displacementedgescale\" 8\n", Path::new("."), &bent);
+    let (_, triangles) = mesh("Option \"displacementedgescale\" 8\n", Path::new("."), &bent);
     assert_eq!(triangles, 4, "edges of at most 2 units");
 }
 

@@ -39,7 +39,7 @@ impl Visitor for Builder<'_> {
                 let defaults = params.in_color_space(self.state.color_space);
                 self.state.defaults.of(target).extend(defaults);
             }
-            D::Option => self.options.option(&params, diagnostics),
+            D::Option { name, value } => self.options.option(&name, &value, diagnostics),
             D::ColorSpace(name) => self.color_space(&name, diagnostics),
             D::Camera(name) => {
                 self.coordinate_systems.insert("camera".to_owned(), self.state.ctm.inverse());

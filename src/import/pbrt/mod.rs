@@ -33,4 +33,6 @@ pub mod transform;
 mod volumes;
 
 #[cfg(test)]
+mod scene_tests;
+#[cfg(test)]
 mod tests;

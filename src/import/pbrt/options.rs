@@ -109,31 +109,38 @@ impl Options {
         self.filter = Some(Pending { name, params });
     }
 
-    /// `Option`
-    pub fn option(&mut self, params: &ParamSet, d: &mut Diagnostics) {
-        if let Some(seed) = params.integer("seed", d) {
-            self.seed = Some(seed as u32);
+    /// `Option "name" value`: case, `-` and `_` of the name do not count.
+    pub fn option(&mut self, name: &Name, value: &Name, d: &mut Diagnostics) {
+        let letters = name.text.chars().filter(|c| !matches!(c, '-' | '_'));
+        let key = letters.collect::<String>().to_ascii_lowercase();
+        let wrong = |d: &mut Diagnostics, expected: &str| {
+            d.error(value.span, format!("option `{}` takes {expected}, not `{}`", name.text, value.text));
+        };
+        let text = value.text.as_str();
+        match key.as_str() {
+            // Negative numbers stand for the bits of large ones
+            "seed" => match text.parse::<i32>().map(|n| n as u32).or_else(|_| text.parse()) {
+                Ok(seed) => self.seed = Some(seed),
+                Err(_) => wrong(d, "a whole number of 32 bits"),
+            },
+            "displacementedgescale" => match text.parse::<f32>() {
+                Ok(scale) if scale > 0.0 && scale.is_finite() => self.edge_scale = Some(scale),
+                Ok(_) | Err(_) => wrong(d, "a positive number"),
+            },
+            "disablepixeljitter" | "disabletexturefiltering" | "disablewavelengthjitter" | "forcediffuse"
+            | "pixelstats" | "wavefront" => match text {
+                // How pbrt computes an image is not the image
+                "true" if key == "wavefront" => {}
+                "true" => warn_without_effect(name, d),
+                "false" => {}
+                _ => wrong(d, "true or false"),
+            },
+            "msereferenceimage" | "msereferenceout" => warn_without_effect(name, d),
+            // The space that pbrt computes in: the image is the same
+            "rendercoordsys" if ["camera", "cameraworld", "world"].contains(&text) => {}
+            "rendercoordsys" => wrong(d, "camera, cameraworld or world"),
+            _ => unknown(&name.text, name.span, "option", OPTIONS, d),
         }
-        if params.float("displacementedgescale", d).is_some() {
-            self.edge_scale = Some(positive(params, "displacementedgescale", 1.0, d));
-        }
-        // Options of pbrt's own workings, and of its display.
-        for name in [
-            "disablepixeljitter",
-            "disabletexturefiltering",
-            "disablewavelengthjitter",
-            "forcediffuse",
-            "pixelstats",
-            "wavefront",
-            "msereferenceimage",
-            "msereferenceout",
-            "rendercoordsys",
-        ] {
-            if params.ignore(name) {
-                d.warning_once(params.span_of(name), format!("option `{name}` has no effect here"));
-            }
-        }
-        params.report_unused(d);
     }
 
     /// Parses all options.
@@ -207,6 +214,25 @@ impl Options {
         let camera = camera?.moving(&ctm.inverse().samples(frame.shutter));
         Some((camera, frame.shutter, close - open))
     }
+}
+
+/// Options of pbrt-v4.
+const OPTIONS: &[&str] = &[
+    "disablepixeljitter",
+    "disabletexturefiltering",
+    "disablewavelengthjitter",
+    "displacementedgescale",
+    "forcediffuse",
+    "msereferenceimage",
+    "msereferenceout",
+    "pixelstats",
+    "rendercoordsys",
+    "seed",
+    "wavefront",
+];
+
+fn warn_without_effect(name: &Name, d: &mut Diagnostics) {
+    d.warning_once(name.span, format!("option `{}` has no effect here", name.text));
 }
 
 fn perspective(

@@ -119,6 +119,23 @@ impl Arguments<'_> {
         Ok(Name { text, span: token.span })
     }
 
+    /// The value of an option, in quotes or not.
+    pub fn option_value(&mut self, lexer: &mut Lexer<'_>) -> Result<Name, Reported> {
+        let position = lexer.position();
+        let token = self.next(lexer, "the value of an option")?;
+        let text = match token.kind {
+            TokenKind::Quoted => lexer.unquote(token.span).map_err(|e| self.report(e))?,
+            TokenKind::Word if !is_keyword(lexer, token) => lexer.text(token.span).into_owned(),
+            TokenKind::Word | TokenKind::Open | TokenKind::Close => {
+                let found = shorten(&lexer.text(token.span));
+                lexer.rewind(position);
+                let message = format!("an option takes a number, true, false or a string in quotes, not `{found}`");
+                return self.fail(token.span, message);
+            }
+        };
+        Ok(Name { text, span: token.span })
+    }
+
     fn next(&mut self, lexer: &mut Lexer<'_>, expected: &str) -> Result<Token, Reported> {
         match lexer.next_token() {
             Ok(Some(token)) => Ok(token),

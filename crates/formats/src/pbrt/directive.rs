@@ -3,10 +3,10 @@
 use super::params::ParamSet;
 use crate::source::Span;
 
-/// A string argument and its place.
+/// A string argument, or the value of an option, and its place.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Name {
-    /// The string.
+    /// The string, without quotes.
     pub text: String,
     /// Where it stands.
     pub span: Span,
@@ -59,7 +59,7 @@ pub enum DirectiveKind {
     AttributeBegin,
     AttributeEnd,
     Attribute(AttributeTarget),
-    Option,
+    Option { name: Name, value: Name },
     ColorSpace(Name),
     Camera(Name),
     Film(Name),

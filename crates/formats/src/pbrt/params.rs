@@ -134,6 +134,19 @@ impl Values {
     pub fn is_empty(&self) -> bool {
         self.len() == 0
     }
+
+    /// The text of the only scalar.
+    pub fn only(&self) -> Option<String> {
+        fn text<T: ToString>(values: &[T]) -> Option<String> {
+            if let [value] = values { Some(value.to_string()) } else { None }
+        }
+        match self {
+            Values::Floats(v) => text(v),
+            Values::Integers(v) => text(v),
+            Values::Bools(v) => text(v),
+            Values::Strings(v) => text(v),
+        }
+    }
 }
 
 /// One parameter.

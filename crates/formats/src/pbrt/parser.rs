@@ -223,16 +223,37 @@ impl Parser<'_> {
                 self.emit(D::Attribute(target), span, params);
                 return Ok(());
             }
-            "Option" => {
-                let params = self.arguments().params(lexer, "Option".to_owned(), span);
-                self.emit(D::Option, span, params);
-                return Ok(());
-            }
+            "Option" => return self.option(lexer, span),
             _ => return self.unknown_directive(keyword, span),
         };
         let name = self.arguments().name(lexer, keyword)?;
         let params = self.arguments().params(lexer, format!("{keyword} \"{}\"", name.text), span);
         self.emit(make(name), span, params);
+        Ok(())
+    }
+
+    /// `Option "name" value`; files made for Lumiris may have typed parameters there, as other directives do.
+    fn option(&mut self, lexer: &mut Lexer<'_>, span: Span) -> Result<(), Reported> {
+        let position = lexer.position();
+        let name = self.arguments().name(lexer, "Option")?;
+        if !name.text.trim().contains(|c: char| c.is_ascii_whitespace()) {
+            let value = self.arguments().option_value(lexer)?;
+            self.emit(DirectiveKind::Option { name, value }, span, ParamSet::new("Option", span));
+            return Ok(());
+        }
+        lexer.rewind(position);
+        let params = self.arguments().params(lexer, "Option".to_owned(), span);
+        let message = "an option of pbrt-v4 has no type: Option \"name\" value";
+        self.diagnostics.warning_first(name.span, message);
+        for param in params.iter() {
+            let Some(text) = param.values.only() else {
+                let message = format!("an option takes one value, not {}", param.values.len());
+                return self.fail(param.value_span, message);
+            };
+            let name = Name { text: param.name.clone(), span: param.span };
+            let value = Name { text, span: param.value_span };
+            self.emit(DirectiveKind::Option { name, value }, span, ParamSet::new("Option", span));
+        }
         Ok(())
     }
 
