@@ -28,12 +28,7 @@ impl Visitor for Builder<'_> {
             D::CoordSysTransform(name) => self.coordinate_system(&name, diagnostics),
             D::ActiveTransform(active) => self.state.active = active,
             D::TransformTimes(times) => self.options.transform_times(times, span, diagnostics),
-            D::TransformBegin | D::AttributeBegin => self.stack.push(self.state.clone()),
-            D::TransformEnd => {
-                if let Some(saved) = self.stack.pop() {
-                    (self.state.ctm, self.state.active) = (saved.ctm, saved.active);
-                }
-            }
+            D::AttributeBegin => self.stack.push(self.state.clone()),
             D::AttributeEnd => self.pop(),
             D::Attribute(target) => {
                 let defaults = params.in_color_space(self.state.color_space);

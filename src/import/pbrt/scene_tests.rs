@@ -2,6 +2,7 @@
 
 use crate::import::cache::FileCache;
 use crate::import::{LoadOptions, Loaded, load_text};
+use crate::materials::Material;
 use std::path::Path;
 
 /// A small image of what follows `WorldBegin`; `head` is before it.
@@ -10,6 +11,12 @@ fn load_with(head: &str, world: &str) -> Result<Loaded, String> {
     let text = format!("{film}\n{head}\nWorldBegin\nLightSource \"infinite\"\n{world}\n");
     let folder = Path::new("/nonexistent");
     load_text(&text, "scene.pbrt", folder, &LoadOptions::default(), &FileCache::default()).map_err(|r| r.to_string())
+}
+
+/// The material of a surface.
+fn material(loaded: &Loaded, surface: usize) -> &Material {
+    let scene = &loaded.scene;
+    &scene.materials.entries()[scene.surfaces[surface].material as usize].material
 }
 
 #[test]
@@ -51,4 +58,13 @@ fn wrong_options_are_errors_that_say_what_is_possible() {
         let error = load_with(&format!("Option {option}"), "").unwrap_err();
         assert!(error.contains(message) && error.contains("scene.pbrt:"), "{option}: {error}");
     }
+}
+
+#[test]
+fn transform_end_restores_all_as_attribute_end_does() {
+    let world = r#"Material "diffuse" TransformBegin Material "interface" Scale 2 2 2 TransformEnd Shape "disk""#;
+    let loaded = load_with("", world).unwrap();
+    assert_eq!(material(&loaded, 0).kind_name(), "diffuse");
+    let warnings = loaded.warnings.to_string();
+    assert!(warnings.contains("TransformBegin is AttributeBegin in pbrt-v4"), "{warnings}");
 }

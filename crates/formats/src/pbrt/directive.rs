@@ -54,8 +54,6 @@ pub enum DirectiveKind {
     CoordSysTransform(Name),
     ActiveTransform(ActiveTimes),
     TransformTimes([f32; 2]),
-    TransformBegin,
-    TransformEnd,
     AttributeBegin,
     AttributeEnd,
     Attribute(AttributeTarget),

@@ -61,7 +61,6 @@ fn identity(path: &Path) -> PathBuf {
 #[derive(Clone, Copy, PartialEq, Eq)]
 enum Block {
     Attribute,
-    Transform,
     Object,
 }
 
@@ -69,7 +68,6 @@ impl Block {
     fn begin(self) -> &'static str {
         match self {
             Block::Attribute => "AttributeBegin",
-            Block::Transform => "TransformBegin",
             Block::Object => "ObjectBegin",
         }
     }
@@ -77,7 +75,6 @@ impl Block {
     fn end(self) -> &'static str {
         match self {
             Block::Attribute => "AttributeEnd",
-            Block::Transform => "TransformEnd",
             Block::Object => "ObjectEnd",
         }
     }
@@ -169,15 +166,15 @@ impl Parser<'_> {
             }
             "AttributeBegin" => return self.open_block(Block::Attribute, D::AttributeBegin, span),
             "TransformBegin" => {
-                self.arguments().v3(span, "TransformBegin is pbrt-v3; AttributeBegin takes its place");
-                return self.open_block(Block::Transform, D::TransformBegin, span);
+                let message = "TransformBegin is AttributeBegin in pbrt-v4: its end restores materials and all else as well";
+                self.diagnostics.warning_first(span, message);
+                return self.open_block(Block::Attribute, D::AttributeBegin, span);
             }
             "ObjectBegin" => {
                 let name = self.arguments().name(lexer, keyword)?;
                 return self.open_block(Block::Object, D::ObjectBegin(name), span);
             }
-            "AttributeEnd" => return self.close_block(Block::Attribute, D::AttributeEnd, span),
-            "TransformEnd" => return self.close_block(Block::Transform, D::TransformEnd, span),
+            "AttributeEnd" | "TransformEnd" => return self.close_block(Block::Attribute, D::AttributeEnd, span),
             "ObjectEnd" => return self.close_block(Block::Object, D::ObjectEnd, span),
             "ObjectInstance" => D::ObjectInstance(self.arguments().name(lexer, keyword)?),
             "ColorSpace" => D::ColorSpace(self.arguments().name(lexer, keyword)?),
