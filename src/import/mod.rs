@@ -131,6 +131,7 @@ fn load_parsed(
     let mut diagnostics = Diagnostics::new();
     let mut builder = Builder::new(folder, options);
     parse(&mut sources, &mut diagnostics, &mut builder);
+    builder.resolve(&mut diagnostics);
     if let Some(option) = options.of_gltf() {
         let message = format!(
             "{option} is for glTF scenes: environment, camera, lights and time of a pbrt scene are in its file"

@@ -1,7 +1,7 @@
 //! Textures: float and RGB functions of a surface point. All textures of a scene are stored in one [`TextureSet`].
 //!
-//! Textures are trees whose nodes refer to earlier ones by index, so that no tree can contain itself. Semantics are
-//! pbrt-v4's. Checkerboards are point sampled: the pixel integrates over their edges.
+//! Textures are trees whose nodes refer to earlier ones by index, so that no tree can contain itself; roots that an
+//! importer reserves are copies, to which no node refers. Semantics are pbrt-v4's. Checkerboards are point sampled: the pixel integrates over their edges.
 
 pub mod mapping;
 mod procedural;
@@ -249,6 +249,18 @@ impl TextureSet {
         assert!(children.iter().all(|&c| c < id), "a texture refers to earlier ones only");
         self.floats.push(texture);
         id
+    }
+
+    /// A place for a float texture that is not known yet, and that no texture refers to; see [`Self::fill_float`].
+    pub fn reserve_float(&mut self) -> FloatTextureId {
+        // Whoever asks too early must not take it for a constant
+        self.floats.push(FloatTexture::VertexOpacity);
+        (self.floats.len() - 1) as FloatTextureId
+    }
+
+    /// Makes a reserved place a copy of a texture.
+    pub fn fill_float(&mut self, reserved: FloatTextureId, texture: FloatTextureId) {
+        self.floats[reserved as usize] = self.floats[texture as usize];
     }
 
     /// Adds an RGB texture. Panics if it refers to a texture that is not in the set yet; its image may come later,

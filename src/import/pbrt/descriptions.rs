@@ -6,6 +6,7 @@ use crate::lights::Portal;
 use crate::materials::MaterialId;
 use crate::media::{Homogeneous, Medium};
 use crate::textures::FloatTextureId;
+use lumiris_formats::color_space::ColorSpace;
 use lumiris_formats::pbrt::directive::Name;
 use lumiris_formats::pbrt::params::ParamSet;
 use lumiris_formats::source::Span;
@@ -17,6 +18,42 @@ use std::sync::Arc;
 pub(super) struct Pending {
     pub name: Name,
     pub params: ParamSet,
+}
+
+/// What the parameters of textures and materials mean something by.
+#[derive(Clone, Copy)]
+pub(super) struct ParamState {
+    pub ctm: Ctm,
+    pub color_space: ColorSpace,
+}
+
+/// A texture that is made once all of them are known.
+pub(super) struct TextureDesc {
+    pub name: Name,
+    /// Of floats, or of spectra.
+    pub is_float: bool,
+    pub class: Name,
+    pub params: ParamSet,
+    pub state: ParamState,
+}
+
+/// A material that is made once all textures and the names of all materials are known.
+pub(super) struct MaterialDesc {
+    /// Its place among the materials.
+    pub id: MaterialId,
+    /// A name for people.
+    pub name: String,
+    pub kind: Name,
+    pub params: ParamSet,
+    pub state: ParamState,
+}
+
+/// A placement of an object that is not defined yet.
+pub(super) struct LateInstance {
+    pub name: Name,
+    /// The object that it is in.
+    pub holder: Option<usize>,
+    pub ctm: Ctm,
 }
 
 /// The material of a shape: known, or by a name that may be defined later.

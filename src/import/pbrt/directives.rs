@@ -1,6 +1,6 @@
 //! The state machine of the format: directives change the graphics state, or add objects with that state to the scene.
 
-use super::descriptions::{InstanceDesc, MaterialUse, MediumNames, ObjectDesc};
+use super::descriptions::{InstanceDesc, LateInstance, MaterialUse, MediumNames, ObjectDesc};
 use super::state::Builder;
 use super::transform::{Ctm, matrix_of};
 use lumiris_formats::color_space::ColorSpace;
@@ -66,16 +66,16 @@ impl Visitor for Builder<'_> {
             D::ReverseOrientation => self.state.reverse_orientation = !self.state.reverse_orientation,
             D::Material(name) => {
                 self.with_defaults(AttributeTarget::Material, &mut params);
-                self.material(&name, &params, diagnostics);
+                self.material(name, params);
             }
             D::MakeNamedMaterial(name) => {
                 self.with_defaults(AttributeTarget::Material, &mut params);
-                self.make_named_material(name, &params, diagnostics);
+                self.make_named_material(name, params, diagnostics);
             }
             D::NamedMaterial(name) => self.state.material = MaterialUse::Named(name),
             D::Texture { name, value, class } => {
                 self.with_defaults(AttributeTarget::Texture, &mut params);
-                self.texture(name, &value, &class, &params, diagnostics);
+                self.texture(name, &value, class, params, diagnostics);
             }
             D::LightSource(name) => {
                 self.with_defaults(AttributeTarget::Light, &mut params);
@@ -94,7 +94,7 @@ impl Visitor for Builder<'_> {
                 self.current_object = None;
                 self.pop();
             }
-            D::ObjectInstance(name) => self.object_instance(&name, span, diagnostics),
+            D::ObjectInstance(name) => self.object_instance(name, span, diagnostics),
         }
     }
 }
@@ -164,14 +164,9 @@ impl Builder<'_> {
         self.current_object = Some(index);
     }
 
-    fn object_instance(&mut self, name: &Name, span: Span, diagnostics: &mut Diagnostics) {
+    fn object_instance(&mut self, name: Name, span: Span, diagnostics: &mut Diagnostics) {
         let Some(&object) = self.object_names.get(&name.text) else {
-            let message = format!("unknown object `{}`", name.text);
-            let near = did_you_mean(&name.text, self.object_names.keys().map(String::as_str)).map(str::to_owned);
-            let diagnostic = diagnostics.error(name.span, message);
-            if let Some(near) = near {
-                diagnostic.help(format!("did you mean `{near}`?"));
-            }
+            self.late_instances.push(LateInstance { name, holder: self.current_object, ctm: self.state.ctm });
             return;
         };
         let instance = InstanceDesc { object, ctm: self.state.ctm };

@@ -1,7 +1,7 @@
 //! `Material`, `MakeNamedMaterial`
 
 use super::checks::unknown;
-use super::descriptions::MaterialUse;
+use super::descriptions::{MaterialDesc, MaterialUse};
 use super::spectrum::{Resolved, SpectrumUse};
 use super::state::Builder;
 use crate::bsdfs::models::LobeAxis;
@@ -13,6 +13,7 @@ use crate::textures::{Filter, FloatTexture, RgbTexture, RgbTextureId, Wrap};
 use lumiris_formats::diagnostic::{Diagnostics, did_you_mean};
 use lumiris_formats::pbrt::directive::Name;
 use lumiris_formats::pbrt::params::{Input, ParamSet, ParamType, SpectrumValue};
+use lumiris_formats::source::Span;
 use lumiris_formats::spectra;
 use lumiris_numbers::math::Rgb;
 use std::sync::Arc;
@@ -39,54 +40,53 @@ const KINDS: &[&str] = &[
 const MODELS: &[&str] = &["diffuse", "orennayar", "cooktorrance", "phong", "retroreflective", "ashikhminshirley"];
 
 impl Builder<'_> {
-    /// `Material "kind"`
-    pub fn material(&mut self, kind: &Name, p: &ParamSet, d: &mut Diagnostics) {
-        let entry = self.material_entry(kind.text.clone(), &kind.text, kind, p, d);
-        p.report_unused(d);
-        self.state.material = MaterialUse::Id(self.add_material(entry));
+    /// `Material "kind"`, which is made when all names are known.
+    pub fn material(&mut self, kind: Name, params: ParamSet) {
+        let id = self.add_material(kind.text.clone(), kind, params);
+        self.state.material = MaterialUse::Id(id);
     }
 
     /// `MakeNamedMaterial "name" "string type" "kind"`
-    pub fn make_named_material(&mut self, name: Name, p: &ParamSet, d: &mut Diagnostics) {
-        let Some(kind) = p.string("type", d).map(str::to_owned) else {
-            d.error(p.span, format!("material `{}` needs a `string type`", name.text));
-            return;
-        };
-        let place = Name { text: kind.clone(), span: p.span_of("type") };
-        let entry = self.material_entry(name.text.clone(), &kind, &place, p, d);
-        p.report_unused(d);
-        if self.named_materials.contains_key(&name.text) {
-            d.error(name.span, format!("material `{}` is defined twice", name.text));
+    pub fn make_named_material(&mut self, name: Name, params: ParamSet, d: &mut Diagnostics) {
+        if let Some((_, first)) = self.named_materials.get(&name.text) {
+            let message = format!("material `{}` is defined twice", name.text);
+            d.error(name.span, message).label(*first, "first defined here");
             return;
         }
-        let id = self.add_material(entry);
-        self.named_materials.insert(name.text, id);
+        let Some(text) = params.string("type", d).map(str::to_owned) else {
+            d.error(params.span, format!("material `{}` needs a `string type`", name.text));
+            return;
+        };
+        let kind = Name { text, span: params.span_of("type") };
+        let id = self.add_material(name.text.clone(), kind, params);
+        self.named_materials.insert(name.text, (id, name.span));
     }
 
-    fn add_material(&mut self, entry: MaterialEntry) -> MaterialId {
+    /// Keeps a place for the material.
+    fn add_material(&mut self, name: String, kind: Name, params: ParamSet) -> MaterialId {
+        let (id, state) = (self.materials.len() as MaterialId, self.param_state());
+        let material = Material::Interface;
+        let entry =
+            MaterialEntry { name: name.clone(), material, normal_map: None, displacement: None, dispersion: None };
         self.materials.push(entry);
-        (self.materials.len() - 1) as MaterialId
+        self.pending_materials.push(MaterialDesc { id, name, kind, params, state });
+        id
     }
 
-    fn material_entry(
-        &mut self,
-        name: String,
-        kind: &str,
-        place: &Name,
-        p: &ParamSet,
-        d: &mut Diagnostics,
-    ) -> MaterialEntry {
+    /// Makes a material, when all textures are there.
+    pub(super) fn material_entry(&mut self, desc: &MaterialDesc, d: &mut Diagnostics) -> MaterialEntry {
+        let (kind, p) = (desc.kind.text.as_str(), &desc.params);
         let material = match kind {
             "" | "none" | "interface" => Material::Interface,
             "mix" => self.mix(p, d),
-            _ => self.scattering_material(kind, place, p, d),
+            _ => self.scattering_material(desc, d),
         };
         let displacement = match p.float_input("displacement", d) {
             Some(Input::Texture(texture)) => self.float_texture_named(texture, p.span_of("displacement"), d),
             Some(Input::Value(_)) | None => None,
         };
         let dispersion = matches!(kind, "dielectric" | "glass").then(|| self.dispersion(p)).flatten();
-        MaterialEntry { name, material, normal_map: self.normal_map(p, d), displacement, dispersion }
+        MaterialEntry { name: desc.name.clone(), material, normal_map: self.normal_map(p, d), displacement, dispersion }
     }
 
     fn normal_map(&mut self, p: &ParamSet, d: &mut Diagnostics) -> Option<NormalMap> {
@@ -101,9 +101,10 @@ impl Builder<'_> {
         Some(NormalMap::unscaled(self.resources.image(request, p.span_of("normalmap"))))
     }
 
-    fn scattering_material(&mut self, kind: &str, place: &Name, p: &ParamSet, d: &mut Diagnostics) -> Material {
+    fn scattering_material(&mut self, desc: &MaterialDesc, d: &mut Diagnostics) -> Material {
+        let (place, p) = (&desc.kind, &desc.params);
         let grey = Rgb::splat(0.5);
-        match kind {
+        match place.text.as_str() {
             "diffuse" => Material::Diffuse { reflectance: self.albedo(p, "reflectance", grey, d) },
             "conductor" => Material::Conductor {
                 spectrum: self.conductor(p, ["eta", "k", "reflectance"], d),
@@ -150,12 +151,12 @@ impl Builder<'_> {
                 max_depth: count(p, "maxdepth", 10, d),
                 samples: count(p, "nsamples", 1, d),
             },
-            "subsurface" => self.subsurface(place, p, d),
+            "subsurface" => self.subsurface(desc, d),
             "principled" => self.principled(p, d),
             "hair" => self.hair(p, d),
             "measured" => self.measured(place, p, d),
             "evaluated" => self.evaluated(place, p, d),
-            _ => self.other_material(kind, place, p, d),
+            _ => self.other_material(place, p, d),
         }
     }
 
@@ -219,7 +220,8 @@ impl Builder<'_> {
     }
 
     /// Materials of pbrt-v3, and those that are not rendered yet.
-    fn other_material(&mut self, kind: &str, place: &Name, p: &ParamSet, d: &mut Diagnostics) -> Material {
+    fn other_material(&mut self, place: &Name, p: &ParamSet, d: &mut Diagnostics) -> Material {
+        let kind = place.text.as_str();
         match kind {
             "matte" | "plastic" | "substrate" | "uber" | "metal" | "mirror" | "glass" | "translucent" => {}
             "kdsubsurface" | "disney" | "fourier" => {
@@ -396,25 +398,15 @@ impl Builder<'_> {
             return Material::Interface;
         };
         let ids = [first, second].map(|name| self.named_material(name, p.span_of("materials"), d));
-        for id in ids.into_iter().flatten().filter(|id| self.interiors.contains_key(id)) {
-            let name = &self.materials[id as usize].name;
-            let text = format!("a mix has no interior: `{name}` is clear glass in it");
-            d.warning_once(p.span_of("materials"), text);
-        }
         match ids {
             [Some(a), Some(b)] => Material::Mix { materials: [a, b], amount },
             _ => Material::Interface,
         }
     }
 
-    /// The material of a name that must be known by now.
-    fn named_material(
-        &self,
-        name: &str,
-        span: lumiris_formats::source::Span,
-        d: &mut Diagnostics,
-    ) -> Option<MaterialId> {
-        let found = self.named_materials.get(name).copied();
+    /// The material of a name, when all names are known.
+    fn named_material(&self, name: &str, span: Span, d: &mut Diagnostics) -> Option<MaterialId> {
+        let found = self.named_materials.get(name).map(|(id, _)| *id);
         if found.is_none() {
             let near = did_you_mean(name, self.named_materials.keys().map(String::as_str)).map(str::to_owned);
             let diagnostic = d.error(span, format!("unknown material `{name}`"));

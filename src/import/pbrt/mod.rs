@@ -1,8 +1,9 @@
 //! The pbrt-v4 scene format.
 //!
 //! Reading order: [`descriptions`] (what a file asks for), [`state`] (the scene while its file is read), [`checks`];
-//! a file for each kind of directive: [`transform`], [`options`], [`settings`], [`film`], [`spectrum`], [`textures`], `ptex`,
+//! a file for each kind of directive: [`transform`], [`options`], [`settings`], [`film`], [`spectrum`], `texture_names`, [`textures`], `ptex`,
 //! [`materials`], `hair`, `measured`, [`lights`], `image_lights`, [`media`] with `media_presets` and `volumes`, `curves`, [`shapes`]; [`directives`] (the state machine over `lumiris_formats::pbrt`'s directives);
+//! `resolve` (what has a name, which may be used before it is defined);
 //! and [`finish`] (reads files and assembles the scene).
 
 pub mod checks;
@@ -23,11 +24,13 @@ mod media_presets;
 pub mod options;
 mod principled;
 mod ptex;
+mod resolve;
 pub mod settings;
 pub mod shapes;
 pub mod spectrum;
 pub mod state;
 mod subsurface;
+mod texture_names;
 pub mod textures;
 pub mod transform;
 mod volumes;

@@ -127,8 +127,12 @@ impl Options {
                 Ok(scale) if scale > 0.0 && scale.is_finite() => self.edge_scale = Some(scale),
                 Ok(_) | Err(_) => wrong(d, "a positive number"),
             },
-            "disablepixeljitter" | "disabletexturefiltering" | "disablewavelengthjitter" | "forcediffuse"
-            | "pixelstats" | "wavefront" => match text {
+            "disablepixeljitter"
+            | "disabletexturefiltering"
+            | "disablewavelengthjitter"
+            | "forcediffuse"
+            | "pixelstats"
+            | "wavefront" => match text {
                 // How pbrt computes an image is not the image
                 "true" if key == "wavefront" => {}
                 "true" => warn_without_effect(name, d),

@@ -3,6 +3,7 @@
 use crate::import::cache::FileCache;
 use crate::import::{LoadOptions, Loaded, load_text};
 use crate::materials::Material;
+use lumiris_numbers::math::Rgb;
 use std::path::Path;
 
 /// A small image of what follows `WorldBegin`; `head` is before it.
@@ -67,4 +68,134 @@ fn transform_end_restores_all_as_attribute_end_does() {
     assert_eq!(material(&loaded, 0).kind_name(), "diffuse");
     let warnings = loaded.warnings.to_string();
     assert!(warnings.contains("TransformBegin is AttributeBegin in pbrt-v4"), "{warnings}");
+}
+
+/// The reflectance of a diffuse surface that is the same everywhere.
+fn reflectance(loaded: &Loaded, surface: usize) -> Rgb {
+    let Material::Diffuse { reflectance } = *material(loaded, surface) else { panic!("it is diffuse") };
+    loaded.scene.textures.constant_rgb(reflectance).unwrap()
+}
+
+#[test]
+fn textures_may_be_used_before_they_are_defined() {
+    let world = r#"
+        Material "diffuse" "texture reflectance" "late"
+        Shape "disk" "texture alpha" "cut"
+        Shape "disk" "texture alpha" "cut" "float height" 2
+        AttributeBegin
+            ColorSpace "rec2020"
+            Texture "late" "spectrum" "constant" "rgb value" [ 0 0.5 0 ]
+        AttributeEnd
+        Texture "cut" "float" "constant" "float value" 0.25"#;
+    let loaded = load_with("", world).unwrap();
+    let color = reflectance(&loaded, 0);
+    assert!(color.g > 0.5 && color.r != 0.0, "the colour space is that of the texture: {color:?}");
+    for geometry in &loaded.scene.geometry.geometries {
+        assert_eq!(loaded.scene.textures.constant_float(geometry.alpha.unwrap()), Some(0.25));
+    }
+}
+
+#[test]
+fn what_is_asked_of_constant_textures_is_asked_of_later_ones_too() {
+    let sigma = |value: &str| {
+        let world = format!(
+            "Material \"matte\" \"texture sigma\" \"s\" Shape \"disk\"
+             Texture \"s\" \"float\" \"constant\" \"float value\" {value}"
+        );
+        material(&load_with("", &world).unwrap(), 0).kind_name()
+    };
+    assert_eq!((sigma("0"), sigma("20")), ("diffuse", "evaluated"));
+    let world = r#"Material "conductor" "texture roughness" "r" Texture "r" "float" "constant" "float value" -1"#;
+    assert!(load_with("", world).unwrap_err().contains("roughness must be at least 0, not -1"));
+}
+
+#[test]
+fn textures_are_made_in_the_order_of_pbrt() {
+    // Spectra come after floats
+    let world = r#"
+        Texture "s" "spectrum" "scale" "rgb tex" [ 1 1 1 ] "texture scale" "f"
+        Texture "f" "float" "constant" "float value" 0.5
+        Material "diffuse" "texture reflectance" "s" Shape "disk""#;
+    load_with("", world).unwrap();
+    // Images come first
+    let world = r#"
+        Texture "f" "float" "scale" "texture tex" "i"
+        Texture "i" "float" "imagemap" "string filename" "gone.png""#;
+    let error = load_with("", world).unwrap_err();
+    assert!(error.contains("1 file cannot be read") && !error.contains("texture `i`"), "{error}");
+    // Others of their type come in the order of the text, so there are no rings
+    for (world, place) in [
+        (r#"Texture "a" "float" "scale" "texture tex" "b" Texture "b" "float" "constant""#, "scene.pbrt:5:29"),
+        (r#"Texture "a" "spectrum" "mix" "texture tex1" "a""#, "scene.pbrt:5:30"),
+        (
+            r#"Texture "a" "float" "mix" "texture tex1" "b" Texture "b" "float" "mix" "texture tex1" "a""#,
+            "scene.pbrt:5:27",
+        ),
+    ] {
+        let error = load_with("", world).unwrap_err();
+        assert!(error.contains("is not made before the one that uses it") && error.contains(place), "{error}");
+    }
+}
+
+#[test]
+fn unknown_names_are_errors_where_they_are_used_first() {
+    for (world, message) in [
+        (
+            "Shape \"disk\" \"texture alpha\" \"cuts\"\nShape \"disk\" \"texture alpha\" \"cuts\"
+             Texture \"cut\" \"float\" \"constant\"",
+            "unknown float texture `cuts`\n  --> scene.pbrt:5:14",
+        ),
+        (
+            "Material \"diffuse\" \"texture reflectance\" \"wod\" Texture \"wood\" \"spectrum\" \"constant\"",
+            "did you mean `wood`?",
+        ),
+        (
+            "Material \"diffuse\" \"texture reflectance\" \"a\" Texture \"a\" \"float\" \"constant\"",
+            "a float texture of this name exists",
+        ),
+        ("ObjectInstance \"tre\" ObjectBegin \"tree\" ObjectEnd", "did you mean `tree`?"),
+        ("Material \"mix\" \"string materials\" [ \"a\" \"a\" ]", "unknown material `a`"),
+    ] {
+        let error = load_with("", world).unwrap_err();
+        assert!(error.contains(message) && error.starts_with("error: "), "{error}");
+        assert_eq!(error.matches("error: ").count(), if message.contains("`a`") { 2 } else { 1 }, "{error}");
+    }
+}
+
+#[test]
+fn names_are_defined_once_and_both_places_are_named() {
+    for twice in [
+        r#"Texture "a" "float" "constant" Texture "a" "float" "constant" "float value" 2"#,
+        r#"Texture "a" "spectrum" "constant" Texture "a" "spectrum" "constant""#,
+        r#"MakeNamedMaterial "a" "string type" "diffuse" MakeNamedMaterial "a" "string type" "diffuse""#,
+    ] {
+        let error = load_with("", twice).unwrap_err();
+        assert!(error.contains("`a` is defined twice") && error.contains("first defined here"), "{error}");
+    }
+    load_with("", r#"Texture "a" "float" "constant" Texture "a" "spectrum" "constant""#).unwrap();
+}
+
+#[test]
+fn objects_may_be_placed_before_they_are_defined() {
+    let loaded = load_with("", r#"Translate 1 2 3 ObjectInstance "o" ObjectBegin "o" Shape "disk" ObjectEnd"#).unwrap();
+    let [instance] = loaded.scene.geometry.instances.as_slice() else { panic!("it is placed once") };
+    assert_eq!(instance.world_from_group[0].translation.to_array(), [1.0, 2.0, 3.0]);
+    let nested = r#"ObjectBegin "a" ObjectInstance "b" ObjectEnd ObjectBegin "b" ObjectInstance "a" ObjectEnd"#;
+    let error = load_with("", nested).unwrap_err();
+    assert!(error.contains("object `b` is defined after the one that holds it"), "{error}");
+}
+
+#[test]
+fn mixtures_may_name_later_materials_but_not_themselves() {
+    let late = r#"
+        Material "mix" "string materials" [ "a" "b" ] Shape "disk"
+        MakeNamedMaterial "a" "string type" "mix" "string materials" [ "b" "b" ]
+        MakeNamedMaterial "b" "string type" "diffuse""#;
+    assert_eq!(material(&load_with("", late).unwrap(), 0).kind_name(), "mix");
+    let ring = r#"
+        MakeNamedMaterial "a" "string type" "mix" "string materials" [ "b" "c" ]
+        MakeNamedMaterial "b" "string type" "mix" "string materials" [ "c" "a" ]
+        MakeNamedMaterial "c" "string type" "diffuse""#;
+    let error = load_with("", ring).unwrap_err();
+    assert!(error.contains("the mixture `a` holds itself, or one that does\n  --> scene.pbrt:6:"), "{error}");
 }

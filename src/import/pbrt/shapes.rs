@@ -117,13 +117,13 @@ impl Builder<'_> {
     }
 
     /// `"texture displacement"` of a mesh, which may be refined to edges of `"float edgelength"`.
-    fn displacement(&self, p: &ParamSet, d: &mut Diagnostics) -> Option<DisplacementDesc> {
+    fn displacement(&mut self, p: &ParamSet, d: &mut Diagnostics) -> Option<DisplacementDesc> {
         let edge_length = positive(p, "edgelength", 1.0, d);
         let Input::Texture(name) = p.float_input("displacement", d)? else {
             d.error(p.span_of("displacement"), "displacement is a texture");
             return None;
         };
-        let texture = self.float_texture_named(name, p.span_of("displacement"), d)?;
+        let texture = self.late_float_texture(name, p.span_of("displacement"));
         Some(DisplacementDesc { texture, edge_length: edge_length * self.options.edge_scale() })
     }
 
@@ -135,7 +135,7 @@ impl Builder<'_> {
         match p.float_input("alpha", d)? {
             Input::Value(alpha) if alpha >= 1.0 => None,
             Input::Value(alpha) => Some(self.textures.add_float(FloatTexture::Constant(alpha))),
-            Input::Texture(texture) => self.float_texture_named(texture, p.span_of("alpha"), d),
+            Input::Texture(texture) => Some(self.late_float_texture(texture, p.span_of("alpha"))),
         }
     }
 }

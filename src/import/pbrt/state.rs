@@ -1,10 +1,11 @@
 //! What the directives so far have made: the graphics state, and the scene while its file is read.
 
 use super::descriptions::{
-    AreaLightDesc, EnvironmentDesc, InstanceDesc, Interior, MaterialUse, MediumDesc, MediumNames, ObjectDesc,
-    ShapeDesc, ShapeSource,
+    AreaLightDesc, EnvironmentDesc, InstanceDesc, Interior, LateInstance, MaterialDesc, MaterialUse, MediumDesc,
+    MediumNames, ObjectDesc, ShapeDesc, ShapeSource, TextureDesc,
 };
 use super::options::Options;
+use super::texture_names::TextureNames;
 use super::transform::{Ctm, affine};
 use crate::import::LoadOptions;
 use crate::import::face_maps::FaceMapRequest;
@@ -19,7 +20,7 @@ use lumiris_formats::pbrt::params::Param;
 use lumiris_formats::source::Span;
 use lumiris_numbers::math::{Affine3A, Rgb};
 use std::cell::RefCell;
-use std::collections::HashMap;
+use std::collections::{BTreeMap, HashMap};
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
 
@@ -67,13 +68,6 @@ impl Defaults {
     }
 }
 
-/// Textures by name; floats and spectra have names of their own.
-#[derive(Debug, Default)]
-pub struct TextureNames {
-    pub(super) floats: HashMap<String, FloatTextureId>,
-    pub(super) rgbs: HashMap<String, RgbTextureId>,
-}
-
 /// The scene while its file is read.
 pub struct Builder<'a> {
     /// Folder that file names are relative to.
@@ -90,12 +84,20 @@ pub struct Builder<'a> {
     pub options: Options,
     /// Textures so far.
     pub textures: TextureSet,
-    /// Names of textures.
-    pub texture_names: TextureNames,
-    /// Materials so far.
+    /// Names of float textures.
+    pub(super) float_textures: TextureNames<FloatTextureId>,
+    /// Names of textures of spectra.
+    pub(super) rgb_textures: TextureNames<RgbTextureId>,
+    /// Textures that wait for the end of the text.
+    pub(super) pending_textures: Vec<TextureDesc>,
+    /// Textures of shapes by name, with their first use: reserved until all are made.
+    pub(super) late_textures: BTreeMap<String, (Span, FloatTextureId)>,
+    /// Materials; each stands for nothing until it is made.
     pub materials: Vec<MaterialEntry>,
-    /// Named materials.
-    pub named_materials: HashMap<String, u32>,
+    /// Materials that wait for the end of the text.
+    pub(super) pending_materials: Vec<MaterialDesc>,
+    /// Named materials, and where they are defined.
+    pub named_materials: HashMap<String, (MaterialId, Span)>,
     /// Interiors of materials of the kind `subsurface`.
     pub(super) interiors: HashMap<MaterialId, Interior>,
     /// Media.
@@ -120,6 +122,8 @@ pub struct Builder<'a> {
     pub current_object: Option<usize>,
     /// Placements of objects.
     pub instances: Vec<InstanceDesc>,
+    /// Those of objects that are not defined yet.
+    pub(super) late_instances: Vec<LateInstance>,
     /// Images to be read.
     pub resources: Resources,
     /// Textures of faces that wait to be read.
@@ -153,8 +157,12 @@ impl<'a> Builder<'a> {
             coordinate_systems: HashMap::new(),
             options: Options::default(),
             textures,
-            texture_names: TextureNames::default(),
+            float_textures: TextureNames::new("float"),
+            rgb_textures: TextureNames::new("spectrum"),
+            pending_textures: Vec::new(),
+            late_textures: BTreeMap::new(),
             materials,
+            pending_materials: Vec::new(),
             named_materials: HashMap::new(),
             interiors: HashMap::new(),
             media: Vec::new(),
@@ -168,6 +176,7 @@ impl<'a> Builder<'a> {
             object_names: HashMap::new(),
             current_object: None,
             instances: Vec::new(),
+            late_instances: Vec::new(),
             resources: Resources::default(),
             face_maps: Vec::new(),
             measured_files: Vec::new(),

@@ -1,7 +1,7 @@
 //! `Material "subsurface"`: a dielectric boundary around a scattering interior.
 
 use super::checks::unknown;
-use super::descriptions::{Interior, MaterialUse, ShapeDesc};
+use super::descriptions::{Interior, MaterialDesc, MaterialUse, ShapeDesc};
 use super::media::MediaInUse;
 use super::media_presets;
 use super::spectrum::SpectrumUse;
@@ -10,7 +10,6 @@ use crate::lights::Light;
 use crate::materials::{HalfSpace, Material, MaterialId};
 use crate::media::{Homogeneous, Medium, MediumId};
 use lumiris_formats::diagnostic::Diagnostics;
-use lumiris_formats::pbrt::directive::Name;
 use lumiris_formats::pbrt::params::{ParamSet, ParamType};
 use lumiris_numbers::math::Rgb;
 
@@ -22,8 +21,9 @@ const ETA: f32 = 1.33;
 const DEFAULT: [Rgb; 2] = [Rgb::new(0.0011, 0.0024, 0.014), Rgb::new(2.55, 3.21, 3.77)];
 
 impl Builder<'_> {
-    /// The boundary; the interior is kept for the material that is added next.
-    pub(super) fn subsurface(&mut self, place: &Name, p: &ParamSet, d: &mut Diagnostics) -> Material {
+    /// The boundary; the interior is kept beside it.
+    pub(super) fn subsurface(&mut self, desc: &MaterialDesc, d: &mut Diagnostics) -> Material {
+        let p = &desc.params;
         if let Some(key) = COLORS.into_iter().find(|key| p.type_of(key) == Some(ParamType::Texture)) {
             let text = format!("an interior is the same everywhere: with a textured `{key}` the material is diffuse");
             d.warning_once(p.span_of(key), text);
@@ -36,8 +36,7 @@ impl Builder<'_> {
         if let Some(medium) = self.interior(p, eta, d) {
             let is_zero = |id| self.textures.constant_float(id) == Some(0.0);
             let is_smooth = is_zero(roughness.u) && is_zero(roughness.v);
-            let id = self.materials.len() as MaterialId;
-            self.interiors.insert(id, Interior { medium, is_smooth, span: place.span });
+            self.interiors.insert(desc.id, Interior { medium, is_smooth, span: desc.kind.span });
         }
         Material::Dielectric { eta, roughness }
     }
@@ -125,10 +124,10 @@ impl Builder<'_> {
     /// The material of a shape, if it has an interior.
     pub(super) fn interior_of(&self, material: &MaterialUse) -> Option<MaterialId> {
         let id = match material {
-            MaterialUse::Id(id) => Some(id),
-            MaterialUse::Named(name) => self.named_materials.get(&name.text),
+            MaterialUse::Id(id) => Some(*id),
+            MaterialUse::Named(name) => self.named_materials.get(&name.text).map(|(id, _)| *id),
         };
-        id.copied().filter(|id| self.interiors.contains_key(id))
+        id.filter(|id| self.interiors.contains_key(id))
     }
 
     /// Adds the interiors of shapes to the media.

@@ -1,6 +1,7 @@
 //! `Texture`
 
 use super::checks::unknown;
+use super::descriptions::TextureDesc;
 use super::spectrum::SpectrumUse;
 use super::state::Builder;
 use super::transform::affine;
@@ -9,15 +10,15 @@ use crate::textures::{
     Bilerp, CheckerboardMapping, Dots, Filter, FloatTexture, FloatTextureId, ImageId, ImageTexture, Mapping2d, Marble,
     NoiseKind, NoiseTexture, Octaves, RgbTexture, RgbTextureId, Udim, UdimId, Wrap,
 };
-use lumiris_formats::diagnostic::{Diagnostics, did_you_mean};
+use lumiris_formats::diagnostic::Diagnostics;
 use lumiris_formats::pbrt::directive::Name;
 use lumiris_formats::pbrt::params::{Input, ParamSet, ParamType, SpectrumValue};
 use lumiris_formats::source::Span;
 use lumiris_numbers::math::{Affine3A, Rgb, Vec2, Vec3};
 
 impl Builder<'_> {
-    /// `Texture "name" "float|spectrum" "class"`
-    pub fn texture(&mut self, name: Name, value: &Name, class: &Name, p: &ParamSet, d: &mut Diagnostics) {
+    /// `Texture "name" "float|spectrum" "class"`, of which textures are made at the end of the text.
+    pub fn texture(&mut self, name: Name, value: &Name, class: Name, params: ParamSet, d: &mut Diagnostics) {
         let is_float = match value.text.as_str() {
             "float" => true,
             "spectrum" => false,
@@ -27,15 +28,24 @@ impl Builder<'_> {
             }
             other => return unknown(other, value.span, "texture type", &["float", "spectrum"], d),
         };
-        // A name of another colour use shares the map of spectra; a second definition replaces the first, as in pbrt.
-        if is_float {
+        let is_new = if is_float { self.float_textures.define(&name, d) } else { self.rgb_textures.define(&name, d) };
+        if is_new {
+            let state = self.param_state();
+            self.pending_textures.push(TextureDesc { name, is_float, class, params, state });
+        }
+    }
+
+    /// Makes a texture, when those that it may refer to are there.
+    pub(super) fn make_texture(&mut self, desc: &TextureDesc, d: &mut Diagnostics) {
+        let (class, p) = (&desc.class, &desc.params);
+        if desc.is_float {
             let texture = self.float_texture(class, p, d);
             let id = self.textures.add_float(texture);
-            self.texture_names.floats.insert(name.text, id);
+            self.float_textures.set(&desc.name, id);
         } else {
             let texture = self.rgb_texture(class, p, d);
             let id = self.textures.add_rgb(texture);
-            self.texture_names.rgbs.insert(name.text, id);
+            self.rgb_textures.set(&desc.name, id);
         }
         p.report_unused(d);
     }
@@ -296,25 +306,9 @@ impl Builder<'_> {
         self.textures.add_float(FloatTexture::Constant(value))
     }
 
-    /// The float texture of a name; an error if there is none.
-    pub fn float_texture_named(
-        &self,
-        name: &str,
-        span: lumiris_formats::source::Span,
-        d: &mut Diagnostics,
-    ) -> Option<FloatTextureId> {
-        let found = self.texture_names.floats.get(name).copied();
-        if found.is_none() {
-            let is_rgb = self.texture_names.rgbs.contains_key(name);
-            let near = did_you_mean(name, self.texture_names.floats.keys().map(String::as_str)).map(str::to_owned);
-            let diagnostic = d.error(span, format!("unknown float texture `{name}`"));
-            if is_rgb {
-                diagnostic.help("a spectrum texture of this name exists");
-            } else if let Some(near) = near {
-                diagnostic.help(format!("did you mean `{near}`?"));
-            }
-        }
-        found
+    /// The float texture of a name, when all are made or it is before the one that is being made.
+    pub fn float_texture_named(&self, name: &str, span: Span, d: &mut Diagnostics) -> Option<FloatTextureId> {
+        self.float_textures.find(name, span, &self.rgb_textures, d)
     }
 
     /// A spectrum parameter or the texture that it names.
@@ -327,7 +321,7 @@ impl Builder<'_> {
         d: &mut Diagnostics,
     ) -> RgbTextureId {
         let color = match p.spectrum_input(name, d) {
-            Some(Input::Texture(texture)) => match self.rgb_texture_named(texture, p, name, d) {
+            Some(Input::Texture(texture)) => match self.rgb_texture_named(texture, p.span_of(name), d) {
                 Some(id) => return id,
                 None => default,
             },
@@ -337,22 +331,8 @@ impl Builder<'_> {
         self.textures.add_rgb(RgbTexture::Constant(color))
     }
 
-    fn rgb_texture_named(
-        &self,
-        texture: &str,
-        p: &ParamSet,
-        name: &'static str,
-        d: &mut Diagnostics,
-    ) -> Option<RgbTextureId> {
-        let found = self.texture_names.rgbs.get(texture).copied();
-        if found.is_none() {
-            let near = did_you_mean(texture, self.texture_names.rgbs.keys().map(String::as_str)).map(str::to_owned);
-            let diagnostic = d.error(p.span_of(name), format!("unknown spectrum texture `{texture}`"));
-            if let Some(near) = near {
-                diagnostic.help(format!("did you mean `{near}`?"));
-            }
-        }
-        found
+    fn rgb_texture_named(&self, name: &str, span: Span, d: &mut Diagnostics) -> Option<RgbTextureId> {
+        self.rgb_textures.find(name, span, &self.float_textures, d)
     }
 
     /// A spectrum parameter that cannot be a texture.

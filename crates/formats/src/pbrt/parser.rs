@@ -166,7 +166,8 @@ impl Parser<'_> {
             }
             "AttributeBegin" => return self.open_block(Block::Attribute, D::AttributeBegin, span),
             "TransformBegin" => {
-                let message = "TransformBegin is AttributeBegin in pbrt-v4: its end restores materials and all else as well";
+                let message =
+                    "TransformBegin is AttributeBegin in pbrt-v4: its end restores materials and all else as well";
                 self.diagnostics.warning_first(span, message);
                 return self.open_block(Block::Attribute, D::AttributeBegin, span);
             }

@@ -1,0 +1,131 @@
+//! Names that may be used before they are defined, as in pbrt: when all directives have been read, textures and materials
+//! are made, and objects and the textures of shapes are found.
+//!
+//! pbrt-v4 makes textures of images first, then the others of floats and those of spectra, each in the order of the
+//! text: a texture refers to those that are made before it, so that none can contain itself.
+
+use super::descriptions::{InstanceDesc, LateInstance, ParamState};
+use super::state::Builder;
+use crate::materials::{Material, MaterialId};
+use crate::textures::FloatTextureId;
+use lumiris_formats::diagnostic::{Diagnostics, did_you_mean};
+use lumiris_formats::source::Span;
+
+impl Builder<'_> {
+    /// What the parameters of a texture or a material mean something by, here.
+    pub(super) fn param_state(&self) -> ParamState {
+        ParamState { ctm: self.state.ctm, color_space: self.state.color_space }
+    }
+
+    fn set_param_state(&mut self, state: ParamState) {
+        (self.state.ctm, self.state.color_space) = (state.ctm, state.color_space);
+    }
+
+    /// Makes and finds all that has a name.
+    pub fn resolve(&mut self, d: &mut Diagnostics) {
+        self.make_textures(d);
+        self.make_materials(d);
+        self.fill_late_textures(d);
+        self.place_late_instances(d);
+    }
+
+    fn make_textures(&mut self, d: &mut Diagnostics) {
+        let mut textures = std::mem::take(&mut self.pending_textures);
+        // The sort is stable
+        textures.sort_by_key(|texture| match texture.class.text.as_str() {
+            "imagemap" | "ptex" => 0,
+            _ if texture.is_float => 1,
+            _ => 2,
+        });
+        for texture in &textures {
+            self.set_param_state(texture.state);
+            self.make_texture(texture, d);
+        }
+    }
+
+    fn make_materials(&mut self, d: &mut Diagnostics) {
+        let materials = std::mem::take(&mut self.pending_materials);
+        for desc in &materials {
+            self.set_param_state(desc.state);
+            self.materials[desc.id as usize] = self.material_entry(desc, d);
+            desc.params.report_unused(d);
+        }
+
+        // Mixtures, when all materials are known
+        let mut mixtures: Vec<(MaterialId, [MaterialId; 2], Span)> = Vec::new();
+        for desc in &materials {
+            if let Material::Mix { materials, .. } = self.materials[desc.id as usize].material {
+                mixtures.push((desc.id, materials, desc.params.span_of("materials")));
+            }
+        }
+        for (_, parts, span) in &mixtures {
+            for id in parts.iter().filter(|id| self.interiors.contains_key(id)) {
+                let name = &self.materials[*id as usize].name;
+                d.warning_once(*span, format!("a mix has no interior: `{name}` is clear glass in it"));
+            }
+        }
+        self.check_mixtures(mixtures, d);
+    }
+
+    /// Mixtures that hold themselves are errors.
+    fn check_mixtures(&self, mut mixtures: Vec<(MaterialId, [MaterialId; 2], Span)>, d: &mut Diagnostics) {
+        // Those that are left are in a ring, or hold one that is; most are in their order, which takes one pass
+        let mut is_open = vec![false; self.materials.len()];
+        mixtures.iter().for_each(|(id, ..)| is_open[*id as usize] = true);
+        loop {
+            let before = mixtures.len();
+            mixtures.retain(|(id, parts, _)| {
+                is_open[*id as usize] = parts.iter().any(|&part| is_open[part as usize]);
+                is_open[*id as usize]
+            });
+            if mixtures.len() == before {
+                break;
+            }
+        }
+        for (id, _, span) in mixtures {
+            let name = &self.materials[id as usize].name;
+            d.error(span, format!("the mixture `{name}` holds itself, or one that does"));
+        }
+    }
+
+    /// The float texture of a name for a shape, whether it is defined already or not.
+    pub(super) fn late_float_texture(&mut self, name: &str, span: Span) -> FloatTextureId {
+        if let Some((_, id)) = self.late_textures.get(name) {
+            return *id;
+        }
+        let id = self.textures.reserve_float();
+        self.late_textures.insert(name.to_owned(), (span, id));
+        id
+    }
+
+    fn fill_late_textures(&mut self, d: &mut Diagnostics) {
+        let mut wanted: Vec<_> = std::mem::take(&mut self.late_textures).into_iter().collect();
+        wanted.sort_by_key(|(_, (span, _))| *span);
+        for (name, (span, reserved)) in wanted {
+            if let Some(texture) = self.float_textures.find(&name, span, &self.rgb_textures, d) {
+                self.textures.fill_float(reserved, texture);
+            }
+        }
+    }
+
+    fn place_late_instances(&mut self, d: &mut Diagnostics) {
+        for LateInstance { name, holder, ctm } in std::mem::take(&mut self.late_instances) {
+            match (self.object_names.get(&name.text), holder) {
+                (Some(&object), None) => self.instances.push(InstanceDesc { object, ctm }),
+                // Objects hold earlier ones only, so that none can contain itself
+                (Some(&object), Some(_)) => {
+                    let message = format!("object `{}` is defined after the one that holds it", name.text);
+                    d.error(name.span, message).label(self.objects[object].span, "defined here");
+                }
+                (None, _) => {
+                    let near = did_you_mean(&name.text, self.object_names.keys().map(String::as_str));
+                    let near = near.map(|near| format!("did you mean `{near}`?"));
+                    let diagnostic = d.error(name.span, format!("unknown object `{}`", name.text));
+                    if let Some(near) = near {
+                        diagnostic.help(near);
+                    }
+                }
+            }
+        }
+    }
+}

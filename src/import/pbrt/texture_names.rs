@@ -1,0 +1,62 @@
+//! Textures of one type by their names, which may be used before they are defined.
+
+use lumiris_formats::diagnostic::{Diagnostics, did_you_mean};
+use lumiris_formats::pbrt::directive::Name;
+use lumiris_formats::source::Span;
+use std::collections::HashMap;
+
+/// Textures of one type by their names.
+#[derive(Debug)]
+pub(super) struct TextureNames<I> {
+    /// `float` or `spectrum`.
+    kind: &'static str,
+    /// Where each is defined, and the texture once it is made.
+    by_name: HashMap<String, (Span, Option<I>)>,
+}
+
+impl<I: Copy> TextureNames<I> {
+    /// No names.
+    pub(super) fn new(kind: &'static str) -> Self {
+        TextureNames { kind, by_name: HashMap::new() }
+    }
+
+    /// Notes that a name is defined; false after an error.
+    pub(super) fn define(&mut self, name: &Name, d: &mut Diagnostics) -> bool {
+        if let Some((first, _)) = self.by_name.get(&name.text) {
+            let message = format!("{} texture `{}` is defined twice", self.kind, name.text);
+            d.error(name.span, message).label(*first, "first defined here");
+            return false;
+        }
+        self.by_name.insert(name.text.clone(), (name.span, None));
+        true
+    }
+
+    /// Gives a name its texture.
+    pub(super) fn set(&mut self, name: &Name, texture: I) {
+        self.by_name.insert(name.text.clone(), (name.span, Some(texture)));
+    }
+
+    /// The texture of a name; an error if there is none so far. `other` are those of the other type.
+    pub(super) fn find<J>(&self, name: &str, span: Span, other: &TextureNames<J>, d: &mut Diagnostics) -> Option<I> {
+        let kind = self.kind;
+        match self.by_name.get(name) {
+            Some((_, Some(texture))) => return Some(*texture),
+            Some((defined, None)) => {
+                let message = format!("{kind} texture `{name}` is not made before the one that uses it");
+                d.error(span, message)
+                    .label(*defined, "defined here")
+                    .help("textures of images are made first, then the others in their order, spectra after floats");
+            }
+            None => {
+                let near = did_you_mean(name, self.by_name.keys().map(String::as_str)).map(str::to_owned);
+                let diagnostic = d.error(span, format!("unknown {kind} texture `{name}`"));
+                if other.by_name.contains_key(name) {
+                    diagnostic.help(format!("a {} texture of this name exists", other.kind));
+                } else if let Some(near) = near {
+                    diagnostic.help(format!("did you mean `{near}`?"));
+                }
+            }
+        }
+        None
+    }
+}
