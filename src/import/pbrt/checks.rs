@@ -5,6 +5,11 @@ use lumiris_formats::pbrt::params::ParamSet;
 use lumiris_formats::source::Span;
 use std::path::Path;
 
+/// The name of a file; as in pbrt, an empty one is none.
+pub(super) fn file_name<'p>(p: &'p ParamSet, key: &'static str, d: &mut Diagnostics) -> Option<&'p str> {
+    p.string(key, d).filter(|name| !name.is_empty())
+}
+
 /// A positive number, or the default after an error.
 pub(super) fn positive(p: &ParamSet, key: &'static str, default: f32, d: &mut Diagnostics) -> f32 {
     match p.float(key, d) {

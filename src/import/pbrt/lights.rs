@@ -1,6 +1,6 @@
 //! `LightSource`, `AreaLightSource`
 
-use super::checks::unknown;
+use super::checks::{file_name, unknown};
 use super::descriptions::{AreaLightDesc, EnvironmentDesc, ImageUse};
 use super::spectrum::SpectrumUse;
 use super::state::Builder;
@@ -109,8 +109,8 @@ impl Builder<'_> {
         if p.type_of("mapname").is_some() {
             d.warning_once(p.span_of("mapname"), "`mapname` is pbrt-v3; pbrt-v4 writes `filename`");
         }
-        let file = p.string("filename", d).map(|f| (f.to_owned(), p.span_of("filename")));
-        let file = file.or_else(|| p.string("mapname", d).map(|f| (f.to_owned(), p.span_of("mapname"))));
+        let file = file_name(p, "filename", d).map(|f| (f.to_owned(), p.span_of("filename")));
+        let file = file.or_else(|| file_name(p, "mapname", d).map(|f| (f.to_owned(), p.span_of("mapname"))));
         let Some((name, span)) = file else {
             let l = color.unwrap_or_else(|| self.white()) * scale;
             let l = l * if illuminance > 0.0 { illuminance / PI } else { 1.0 };
@@ -184,7 +184,7 @@ impl Builder<'_> {
         let color = self.color_param(p, "L", SpectrumUse::Illuminant, d);
         let two_sided = p.boolean("twosided", d).unwrap_or(false);
         let power = p.float("power", d).unwrap_or(0.0);
-        let image = p.string("filename", d).map(|f| (self.folder.join(f), p.span_of("filename")));
+        let image = file_name(p, "filename", d).map(|f| (self.folder.join(f), p.span_of("filename")));
         if color.is_some() && image.is_some() {
             d.error(p.span_of("L"), "an area light has `L` or `filename`, not both");
         }
@@ -216,7 +216,7 @@ fn constant_portal(l: Rgb, portal: Portal) -> Light {
 
 /// `filename`, which a light needs.
 fn image_of(p: &ParamSet, kind: &str, d: &mut Diagnostics) -> Option<String> {
-    let name = p.string("filename", d).map(str::to_owned);
+    let name = file_name(p, "filename", d).map(str::to_owned);
     if name.is_none() {
         d.error(p.span, format!("a {kind} light needs `filename`"));
     }

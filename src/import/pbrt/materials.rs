@@ -1,6 +1,6 @@
 //! `Material`, `MakeNamedMaterial`
 
-use super::checks::unknown;
+use super::checks::{file_name, unknown};
 use super::descriptions::{MaterialDesc, MaterialUse};
 use super::spectrum::{Resolved, SpectrumUse};
 use super::state::Builder;
@@ -90,7 +90,7 @@ impl Builder<'_> {
     }
 
     fn normal_map(&mut self, p: &ParamSet, d: &mut Diagnostics) -> Option<NormalMap> {
-        let name = p.string("normalmap", d)?;
+        let name = file_name(p, "normalmap", d)?;
         let request = ImageRequest {
             path: self.folder.join(name),
             channels: ImageChannels::Color,

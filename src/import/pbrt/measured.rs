@@ -1,6 +1,6 @@
 //! `Material "measured"`.
 
-use super::checks::readable;
+use super::checks::{file_name, readable};
 use super::state::Builder;
 use crate::bsdfs::MeasuredTables;
 use crate::import::cache::FileCache;
@@ -18,7 +18,7 @@ use std::sync::Arc;
 impl Builder<'_> {
     /// `string filename`, of which each is read once, with the meshes.
     pub(super) fn measured(&mut self, place: &Name, p: &ParamSet, d: &mut Diagnostics) -> Material {
-        let Some(name) = p.string("filename", d) else {
+        let Some(name) = file_name(p, "filename", d) else {
             d.error(place.span, "material `measured` needs a `string filename`")
                 .help("a file `.bsdf` of the RGL material database, or of the same form");
             return Material::Interface;

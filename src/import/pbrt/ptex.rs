@@ -1,6 +1,6 @@
 //! `Texture "ptex"`.
 
-use super::checks::readable;
+use super::checks::{file_name, readable};
 use super::state::Builder;
 use crate::imaging::{ColorEncoding, FaceMap};
 use crate::import::cache::FileCache;
@@ -27,7 +27,7 @@ impl Builder<'_> {
             ImageEncoding::Gamma(gamma) => ColorEncoding::Gamma(gamma),
         };
         let scale = p.float("scale", d).unwrap_or(1.0);
-        let Some(name) = p.string("filename", d) else {
+        let Some(name) = file_name(p, "filename", d) else {
             d.error(p.span, "a texture `ptex` needs a `string filename`");
             return None;
         };

@@ -199,3 +199,17 @@ fn mixtures_may_name_later_materials_but_not_themselves() {
     let error = load_with("", ring).unwrap_err();
     assert!(error.contains("the mixture `a` holds itself, or one that does\n  --> scene.pbrt:6:"), "{error}");
 }
+
+#[test]
+fn empty_names_of_files_are_none() {
+    let world = r#"
+        LightSource "infinite" "string filename" "" "rgb L" [ 2 2 2 ]
+        Material "diffuse" "string normalmap" ""
+        AreaLightSource "diffuse" "string filename" "" "rgb L" [ 3 3 3 ]
+        Shape "disk""#;
+    let loaded = load_with("", world).unwrap();
+    assert_eq!(loaded.scene.lights.lights.len(), 3);
+    assert!(loaded.scene.materials.entries().iter().all(|entry| entry.normal_map.is_none()));
+    let error = load_with("", r#"LightSource "projection" "string filename" """#).unwrap_err();
+    assert!(error.contains("a projection light needs `filename`"), "{error}");
+}

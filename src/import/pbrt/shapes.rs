@@ -1,6 +1,6 @@
 //! `Shape`: checked when it is parsed, created once all files have been read.
 
-use super::checks::{positive, unknown};
+use super::checks::{file_name, positive, unknown};
 use super::curves::{curve_data, merged, placed};
 use super::descriptions::{DisplacementDesc, MeshData, PatchData, ShapeDesc, ShapeSource};
 use super::state::Builder;
@@ -54,7 +54,7 @@ impl Builder<'_> {
                     }
                 }
             }
-            "plymesh" => match p.string("filename", d) {
+            "plymesh" => match file_name(&p, "filename", d) {
                 Some(file) => {
                     name = file.to_owned();
                     let path = self.folder.join(file);

@@ -1,6 +1,6 @@
 //! `Texture`
 
-use super::checks::unknown;
+use super::checks::{file_name, unknown};
 use super::descriptions::TextureDesc;
 use super::spectrum::SpectrumUse;
 use super::state::Builder;
@@ -240,7 +240,7 @@ impl Builder<'_> {
             encoding = if gamma { ImageEncoding::Srgb } else { ImageEncoding::Linear };
         }
         let (scale, invert) = (p.float("scale", d).unwrap_or(1.0), p.boolean("invert", d).unwrap_or(false));
-        let Some(name) = p.string("filename", d) else {
+        let Some(name) = file_name(p, "filename", d) else {
             d.error(p.span, "an image texture needs a `string filename`");
             return None;
         };

@@ -1,5 +1,6 @@
 //! `MakeNamedMedium` of the type `nanovdb`: what its parameters say, and the medium once its file has been read.
 
+use super::checks::file_name;
 use super::descriptions::VolumeDesc;
 use super::media::{asymmetry, glowing, not_negative};
 use super::state::Builder;
@@ -48,7 +49,7 @@ impl Builder<'_> {
         let span = named.is_some().then(|| p.span_of("temperaturename"));
         let temperature = (named.unwrap_or_else(|| "temperature".to_owned()), span);
         let coefficients = self.coefficients(p, scale, d);
-        let Some(name) = p.string("filename", d).filter(|name| !name.is_empty()) else {
+        let Some(name) = file_name(p, "filename", d) else {
             d.error(p.span, "a nanovdb medium needs `string filename`");
             return None;
         };
