@@ -485,6 +485,9 @@ mod tests {
         let a = illuminant_rgb("stdillum-A").unwrap();
         near(blackbody_rgb(2856.0), a.to_array(), 0.01);
         near(blackbody_rgb(6504.0), [1.0; 3], 0.06);
+        // The white of ACES is close to daylight of 6000 K, between D50 and D65.
+        let [d50, d60] = ["stdillum-D50", "illum-acesD60"].map(|name| illuminant_rgb(name).unwrap());
+        assert!((d60.luminance() - 1.0).abs() < 1e-3 && d60.r > d60.g && d60.g > d60.b && d60.b > d50.b, "{d60:?}");
         assert_eq!(blackbody_rgb(-1.0), Rgb::BLACK);
         assert!(blackbody_rgb(100.0).is_finite());
     }

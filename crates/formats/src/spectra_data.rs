@@ -447,7 +447,8 @@ const SF10: ([f64; 3], [f64; 3]) =
 const SF11: ([f64; 3], [f64; 3]) =
     ([1.737_596_95, 0.313_747_346, 1.898_781_01], [0.013_188_707, 0.062_306_814_2, 155.236_29]);
 
-/// Chromaticity (x, y) of standard illuminants for the 2° observer [CIE 15:2004], by pbrt's names.
+/// Chromaticity (x, y) of standard illuminants for the 2° observer [CIE 15:2004], and the white of ACES
+/// [SMPTE ST 2065-1], by pbrt's names.
 pub const ILLUMINANTS: &[(&str, [f64; 2])] = &[
     ("stdillum-A", [0.447_58, 0.407_45]),
     ("stdillum-D50", [0.345_67, 0.358_51]),
@@ -464,4 +465,5 @@ pub const ILLUMINANTS: &[(&str, [f64; 2])] = &[
     ("stdillum-F10", [0.3458, 0.3588]),
     ("stdillum-F11", [0.3805, 0.3769]),
     ("stdillum-F12", [0.4370, 0.4042]),
+    ("illum-acesD60", [0.321_68, 0.337_67]),
 ];
