@@ -213,3 +213,14 @@ fn empty_names_of_files_are_none() {
     let error = load_with("", r#"LightSource "projection" "string filename" """#).unwrap_err();
     assert!(error.contains("a projection light needs `filename`"), "{error}");
 }
+
+#[test]
+fn parameters_are_those_of_the_version_that_has_them() {
+    let gone = r#"Texture "i" "spectrum" "imagemap" "float maxanisotropy" 4 "bool trilinear" true"#;
+    let error = load_with("", gone).unwrap_err();
+    assert!(error.contains("`trilinear` is pbrt-v3") && !error.contains("`maxanisotropy`"), "{error}");
+    let lamps = "LightSource \"point\" \"blackbody I\" [ 5500 2 ]\nLightSource \"point\" \"blackbody I\" [ 5500 2 ]";
+    let warnings = load_with("", lamps).unwrap().warnings.to_string();
+    assert_eq!(warnings.matches("a blackbody with a factor is pbrt-v3").count(), 1, "{warnings}");
+    assert_eq!(load_with("", "LightSource \"point\" \"blackbody I\" 5500").unwrap().warnings.to_string(), "");
+}

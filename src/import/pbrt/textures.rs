@@ -232,9 +232,11 @@ impl Builder<'_> {
             }
         };
         let mut encoding = self.encoding(p, d)?;
-        if p.boolean("trilinear", d).is_some() || p.float("maxanisotropy", d).is_some() {
-            d.warning_once(p.span, "`trilinear` and `maxanisotropy` are pbrt-v3; pbrt-v4 writes `filter`");
+        if p.boolean("trilinear", d).is_some() {
+            d.warning_once(p.span_of("trilinear"), "`trilinear` is pbrt-v3; pbrt-v4 writes `filter`");
         }
+        // It bounds a kernel of `ewa` that the samples of the pixel take the place of
+        p.float("maxanisotropy", d);
         if let Some(gamma) = p.boolean("gamma", d) {
             d.warning_once(p.span_of("gamma"), "`gamma` is pbrt-v3; pbrt-v4 writes `encoding`");
             encoding = if gamma { ImageEncoding::Srgb } else { ImageEncoding::Linear };

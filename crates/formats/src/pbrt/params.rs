@@ -452,7 +452,11 @@ impl Param {
             (Values::Floats(v), ParamType::Xyz) => v.as_slice().try_into().ok().map(SpectrumValue::Xyz),
             (Values::Floats(v), ParamType::Blackbody) => match v.as_slice() {
                 [kelvin] => Some(SpectrumValue::Blackbody(*kelvin, 1.0)),
-                [kelvin, factor] => Some(SpectrumValue::Blackbody(*kelvin, *factor)),
+                [kelvin, factor] => {
+                    let message = "a blackbody with a factor is pbrt-v3; one of pbrt-v4 is a temperature, and lights have a `scale`";
+                    diagnostics.warning_first(self.value_span, message);
+                    Some(SpectrumValue::Blackbody(*kelvin, *factor))
+                }
                 _ => None,
             },
             (Values::Floats(v), _) if !v.is_empty() && v.len() % 2 == 0 => Some(SpectrumValue::Samples(v)),
