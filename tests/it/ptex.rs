@@ -104,10 +104,8 @@ fn what_is_wrong_has_its_place() {
     assert!(damaged.contains("no.ptx: byte 4:") && damaged.contains("wall.pbrt:6:"), "{damaged}");
     assert!(error("", PLY).contains("needs a `string filename`"));
     let texture = r#""string filename" "wall.ptx""#;
-    let numbers = error(
-        texture,
-        r#"Shape "bilinearmesh" "point3 P" [ 0 0 0  1 0 0  0 1 0  1 1 0 ] "integer faceIndices" [ 1 2 ]"#,
-    );
+    let shape = r#"Shape "bilinearmesh" "point3 P" [ 0 0 0  1 0 0  0 1 0  1 1 0 ] "integer faceIndices" [ 1 2 ]"#;
+    let numbers = load(folder.path(), texture, shape).unwrap().warnings.to_string();
     assert!(numbers.contains("faceIndices must be 1 numbers") && numbers.contains("wall.pbrt:8:"), "{numbers}");
     assert!(error(texture, &PLY.replace("plymesh", "plymash")).contains("plymesh"));
 }

@@ -1,5 +1,6 @@
 //! What whole scenes mean: their directives in other orders, and what pbrt repairs.
 
+use crate::geometry::Shape;
 use crate::import::cache::FileCache;
 use crate::import::{LoadOptions, Loaded, load_text};
 use crate::materials::Material;
@@ -223,4 +224,45 @@ fn parameters_are_those_of_the_version_that_has_them() {
     let warnings = load_with("", lamps).unwrap().warnings.to_string();
     assert_eq!(warnings.matches("a blackbody with a factor is pbrt-v3").count(), 1, "{warnings}");
     assert_eq!(load_with("", "LightSource \"point\" \"blackbody I\" 5500").unwrap().warnings.to_string(), "");
+}
+
+#[test]
+fn what_pbrt_leaves_out_of_meshes_is_left_out_with_a_warning() {
+    let corners = "\"point3 P\" [ 0 0 0  1 0 0  0 1 0  1 1 1 ]";
+    let triangles = |rest: &str| format!("Shape \"trianglemesh\" {corners} {rest}");
+    let patch = |rest: &str| format!("Shape \"bilinearmesh\" {corners} {rest}");
+    let faces = "\"integer indices\" [ 0 1 2 1 2 3 ]";
+    for (shape, warning) in [
+        (triangles("\"integer indices\" [ 0 1 2 1 2 3 9 9 ]"), "must be a multiple of 3, not 8: 2 are left out"),
+        (triangles(&format!("{faces} \"normal N\" [ 0 0 1 ]")), "`N` has 1 entries, but there are 4 vertices"),
+        (triangles(&format!("{faces} \"vector3 S\" [ 0 0 1 ]")), "`S` has 1 entries"),
+        (triangles(&format!("{faces} \"point2 uv\" [ 0 0 1 1 ]")), "`uv` has 2 entries"),
+        (triangles(&format!("{faces} \"integer faceIndices\" [ 1 ]")), "faceIndices must be 2 numbers"),
+        (
+            triangles(&format!("{faces} \"integer faceIndices\" [ 1 -1 ]")),
+            "none of which is negative: they are left out",
+        ),
+        (patch("\"integer indices\" [ 0 1 2 3 0 ]"), "must be a multiple of 4, not 5: 1 are left out"),
+        (patch("\"normal N\" [ 0 0 1 ]"), "`N` has 1 entries"),
+        (patch("\"integer faceIndices\" [ 1 2 ]"), "faceIndices must be 1 numbers"),
+    ] {
+        let loaded = load_with("", &shape).unwrap();
+        let warnings = loaded.warnings.to_string();
+        assert!(warnings.contains(warning) && warnings.contains("scene.pbrt:5:"), "{warnings}");
+        match &loaded.scene.geometry.geometries[0].shape {
+            Shape::Mesh(mesh) => {
+                assert_eq!(mesh.indices, [[0, 1, 2], [1, 2, 3]]);
+                assert!(
+                    mesh.normals.is_empty() && mesh.tangents.is_empty() && mesh.uvs.is_empty() && mesh.faces.is_empty()
+                );
+            }
+            Shape::Bilinear(mesh) => {
+                assert_eq!(mesh.indices, [[0, 1, 2, 3]]);
+                assert!(mesh.normals.is_empty() && mesh.uvs.is_empty() && mesh.faces.is_empty());
+            }
+            other => panic!("{other:?}"),
+        }
+    }
+    let outside = load_with("", &triangles("\"integer indices\" [ 0 1 9 ]")).unwrap_err();
+    assert!(outside.contains("index 9 is out of range"), "{outside}");
 }

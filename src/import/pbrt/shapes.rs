@@ -211,27 +211,32 @@ fn uvs(p: &mut ParamSet, d: &mut Diagnostics) -> Vec<Vec2> {
     floats.chunks_exact(2).map(Vec2::from_slice).collect()
 }
 
-/// An array that must be as long as the positions, or absent.
+/// An array that must be as long as the positions, or absent: any other is left out, as pbrt does.
 fn per_vertex<T>(values: Vec<T>, count: usize, name: &'static str, p: &ParamSet, d: &mut Diagnostics) -> Vec<T> {
     if values.is_empty() || values.len() == count {
         return values;
     }
-    let message = format!("`{name}` has {} entries, but there are {count} vertices", values.len());
-    d.error(p.span_of(name), message);
+    let message = format!("`{name}` has {} entries, but there are {count} vertices: it is left out", values.len());
+    d.warning_once(p.span_of(name), message);
     Vec::new()
 }
 
+/// Vertices of the faces; as in pbrt, surplus indices are left out.
 fn indices<const N: usize>(p: &mut ParamSet, count: usize, d: &mut Diagnostics) -> Option<Vec<[u32; N]>> {
-    let Some(values) = p.take_integers("indices", d) else {
+    let Some(mut values) = p.take_integers("indices", d).filter(|values| !values.is_empty()) else {
         if count == N {
             return Some(vec![std::array::from_fn(|i| i as u32)]);
         }
         d.error(p.span, format!("{} needs `integer indices`: it has {count} vertices", p.owner));
         return None;
     };
-    if values.len() % N != 0 {
-        d.error(p.span_of("indices"), format!("the number of indices must be a multiple of {N}, not {}", values.len()));
-        return None;
+    let surplus = values.len() % N;
+    if surplus != 0 {
+        let whole = values.len() - surplus;
+        let message =
+            format!("the number of indices must be a multiple of {N}, not {}: {surplus} are left out", values.len());
+        d.warning_once(p.span_of("indices"), message);
+        values.truncate(whole);
     }
     if let Some(bad) = values.iter().find(|&&i| i < 0 || i as usize >= count) {
         d.error(p.span_of("indices"), format!("index {bad} is out of range: there are {count} vertices"));
@@ -240,12 +245,14 @@ fn indices<const N: usize>(p: &mut ParamSet, count: usize, d: &mut Diagnostics) 
     Some(values.chunks_exact(N).map(|c| std::array::from_fn(|i| c[i] as u32)).collect())
 }
 
-/// Numbers of faces, which textures of faces go by.
+/// Numbers of faces, which textures of faces go by; as in pbrt, wrong ones are left out.
 fn face_numbers(p: &mut ParamSet, count: usize, d: &mut Diagnostics) -> Vec<u32> {
     let numbers = p.take_integers("faceIndices", d).unwrap_or_default();
     if !(numbers.is_empty() || numbers.len() == count) || numbers.iter().any(|&n| n < 0) {
-        let message = format!("faceIndices must be {count} numbers, one for each face, none of which is negative");
-        d.error(p.span_of("faceIndices"), message);
+        let message = format!(
+            "faceIndices must be {count} numbers, one for each face, none of which is negative: they are left out"
+        );
+        d.warning_once(p.span_of("faceIndices"), message);
         return Vec::new();
     }
     numbers.into_iter().map(|n| n as u32).collect()
