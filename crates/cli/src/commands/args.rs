@@ -27,7 +27,7 @@ pub(super) fn aov() -> impl TypedValueParser<Value = Option<Aov>> {
 /// The scene, and options that override its settings.
 #[derive(Args, Clone, Debug)]
 pub(super) struct SceneArgs {
-    /// Scene file (.pbrt, .pbrt.gz, .gltf or .glb)
+    /// Scene file (.pbrt, .pbrt.gz, .gltf or .glb), or - for a pbrt scene from the standard input
     pub scene: PathBuf,
     #[command(flatten)]
     pub settings: SettingsArgs,

@@ -14,7 +14,7 @@ use super::part_args::{PART_TYPE, PartBy, extension};
 use super::parts;
 use super::pictures::check_outputs;
 use super::progress;
-use super::settings::load_scene;
+use super::settings::{is_standard_input, load_scene};
 use super::typed_options::AsTyped;
 use anyhow::{Context, bail};
 use clap::{Args, FromArgMatches, Subcommand};
@@ -169,6 +169,9 @@ fn check(args: &SlurmArgs) -> anyhow::Result<(RenderArgs, bool)> {
         render = first;
     }
 
+    if is_standard_input(&render.scene.scene) {
+        return Err(UsageError("the tasks of a farm read the scene each: it must be a file".to_owned()).into());
+    }
     let Loaded { scene, settings, .. } = load_scene(&render.scene, &FileCache::default(), None)?;
     let is_measured = follows_from_times(&settings, &scene.film.bounds);
     let needs_plan = is_measured && render.scene.plan.is_none();

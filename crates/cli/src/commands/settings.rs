@@ -10,7 +10,7 @@ use anyhow::{Context, bail};
 use lumiris::film::filter::PixelFilter;
 use lumiris::import::cache::FileCache;
 use lumiris::import::fingerprint::SceneFiles;
-use lumiris::import::{Loaded, is_gltf, load_with};
+use lumiris::import::{Loaded, is_gltf, load_text, load_with};
 use lumiris::render::RenderSettings;
 use lumiris::render::allocation::complete_for_noise;
 use lumiris::render::parts::Stored;
@@ -18,7 +18,9 @@ use lumiris::render::plan::{Preparation, prepare};
 use lumiris::scene::RenderJob;
 use lumiris::settings::table::rows;
 use lumiris::settings::{Proposals, SampleCounts, Settings, StageTimes};
+use std::io::{self, Read};
 use std::path::Path;
+use std::sync::OnceLock;
 use std::time::Instant;
 
 /// Times before the first ray is traced (s).
@@ -39,11 +41,19 @@ pub(super) fn load_scene(args: &SceneArgs, files: &FileCache, stored: Option<&St
     if let Some(MemoryLimit::Bytes(bytes)) = args.texture_memory {
         files.limit_textures(bytes);
     }
-    let mut loaded = match load_with(&args.scene, &args.load_options(), files) {
+    let options = args.load_options();
+    let read = if is_standard_input(&args.scene) {
+        let text = standard_input().context("the standard input cannot be read")?;
+        load_text(text, "<stdin>", Path::new(""), &options, files)
+    } else {
+        load_with(&args.scene, &options, files)
+    };
+    let mut loaded = match read {
         Ok(loaded) => loaded,
         Err(diagnostics) => {
             progress::say(diagnostics.to_string().trim_end());
-            bail!("{} could not be loaded", args.scene.display());
+            let name = if is_standard_input(&args.scene) { "<stdin>".into() } else { args.scene.to_string_lossy() };
+            bail!("{name} could not be loaded");
         }
     };
     let warnings = loaded.warnings.to_string();
@@ -71,6 +81,28 @@ pub(super) fn load_scene(args: &SceneArgs, files: &FileCache, stored: Option<&St
         progress::say("warning: without samples on non-contributing lights, direct light is biased");
     }
     Ok(loaded)
+}
+
+/// True for `-`: a pbrt scene whose files are relative to the working directory.
+pub(super) fn is_standard_input(scene: &Path) -> bool {
+    scene.as_os_str() == "-"
+}
+
+/// All of the standard input, which commands may load more than once.
+fn standard_input() -> io::Result<&'static str> {
+    static TEXT: OnceLock<String> = OnceLock::new();
+    if let Some(text) = TEXT.get() {
+        return Ok(text);
+    }
+    let mut bytes = Vec::new();
+    io::stdin().lock().take(u64::from(u32::MAX)).read_to_end(&mut bytes)?;
+    // Comments need not be UTF-8
+    let text = String::from_utf8_lossy(&bytes).into_owned();
+    // Places in a text are numbers of 32 bits
+    if text.len() >= u32::MAX as usize {
+        return Err(io::Error::new(io::ErrorKind::InvalidData, "larger than 4 GiB"));
+    }
+    Ok(TEXT.get_or_init(|| text))
 }
 
 /// Rejects what is no scene, and options of another kind of scenes.

@@ -1,6 +1,7 @@
 //! The program from outside: images, statistics, and its messages about bad input.
 
 use lumiris::imaging::oiio::{ReadLimits, read_image};
+use std::io::Write;
 use std::path::Path;
 use std::process::{Command, Output, Stdio};
 
@@ -14,6 +15,31 @@ fn scene(name: &str) -> String {
 
 fn stderr(output: &Output) -> String {
     String::from_utf8_lossy(&output.stderr).into_owned()
+}
+
+/// The program with a text as its standard input.
+fn lumiris_reading(text: &str, args: &[&str], folder: &Path) -> Output {
+    let mut command = Command::new(env!("CARGO_BIN_EXE_lumiris"));
+    command.args(args).current_dir(folder).stdin(Stdio::piped()).stdout(Stdio::piped()).stderr(Stdio::piped());
+    let mut child = command.spawn().unwrap();
+    // A program that ends early closes its end
+    let _ = child.stdin.take().unwrap().write_all(text.as_bytes());
+    child.wait_with_output().unwrap()
+}
+
+#[test]
+fn scenes_are_read_from_the_standard_input() {
+    let folder = tempfile::tempdir().unwrap();
+    std::fs::write(folder.path().join("part.pbrt"), "Shape \"sphere\"\n").unwrap();
+    let head = "Film \"rgb\" \"integer xresolution\" 8 \"integer yresolution\" 8\nWorldBegin\n";
+    let text = format!("{head}LightSource \"infinite\" # \u{e9}\nInclude \"part.pbrt\"\n");
+    let output = lumiris_reading(&text, &["render", "-", "--spp", "1", "-o", "a.exr", "-q"], folder.path());
+    assert!(output.status.success(), "{}", stderr(&output));
+    assert!(read_image(&folder.path().join("a.exr"), &ReadLimits::default()).is_ok());
+
+    let output = lumiris_reading("WorldBegin\nShape \"spere\"\n", &["info", "-"], folder.path());
+    let text = stderr(&output);
+    assert!(text.contains("<stdin>:2:7") && text.contains("<stdin> could not be loaded"), "{text}");
 }
 
 #[test]

@@ -180,6 +180,7 @@ fn what_cannot_be_rendered_or_submitted_is_refused() {
     refuse(&format!("{FARM} --estimator mis --parts 8"), 2, "cannot be 8 parts");
     refuse(&format!("{FARM} --integrator direct --estimator ocv --ocv progressive"), 2, "--part-by tiles");
     refuse(&FARM.replace("GALLERY", "none.pbrt"), 3, "none.pbrt");
+    refuse(&FARM.replace("GALLERY", "-"), 2, "it must be a file");
     refuse(&FARM.replace("image.exr", "image.part"), 2, "merged to an image");
     write_frames(&folder);
     let frames = FARM.replace("GALLERY", "shot.####.pbrt --frames 1-2 --estimator mis");
