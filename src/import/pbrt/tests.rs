@@ -143,6 +143,9 @@ const PIECES: &[&str] = &[
     "ActiveTransform",
     "All",
     "TransformBegin",
+    "TransformEnd",
+    "Option",
+    "\"seed\"",
     "\"\\q\"",
 ];
 
