@@ -115,6 +115,15 @@ impl Asked {
         let layers = [(settings.with_features, FEATURES), (settings.with_replicas, "variance")];
         let layers: Vec<&str> = layers.into_iter().filter(|(has, _)| *has).map(|(_, name)| name).collect();
         entries.push((LAYERS.to_owned(), layers.join(" ")));
+        // What of a scene is shown, where its file does not say so alone
+        let LoadOptions { scene, camera, camera_auto, light_units, time, .. } = &self.load;
+        let shown = [
+            ("scene_in_file", scene.clone()),
+            ("camera", camera.clone().or_else(|| camera_auto.then(|| "one that frames the scene".to_owned()))),
+            ("light_units", light_units.map(|units| <&str>::from(units).to_owned())),
+            ("time_in_scene", time.map(|time| time.to_string())),
+        ];
+        entries.extend(shown.into_iter().filter_map(|(key, value)| Some((key.to_owned(), value?))));
         // One entry for each name
         let mut joined: Vec<(String, String)> = Vec::new();
         for (key, value) in entries {

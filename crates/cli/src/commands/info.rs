@@ -36,7 +36,9 @@ pub(super) fn run(args: &InfoArgs) -> anyhow::Result<ExitCode> {
             facts["scene"] = json!(args.scene.scene.display().to_string());
             let Choices { cameras, scenes } = &job.world.scene.choices;
             let choices = [("cameras", cameras), ("scenes", scenes)];
-            choices.into_iter().filter(|(_, all)| !all.is_empty()).for_each(|(key, all)| facts[key] = json!(all));
+            // One without a name is no choice
+            let is_choice = |all: &[String]| all.len() > 1 || all.iter().any(|name| !name.is_empty());
+            choices.into_iter().filter(|(_, all)| is_choice(all)).for_each(|(key, all)| facts[key] = json!(all));
             facts
         }
     };

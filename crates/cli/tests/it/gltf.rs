@@ -122,6 +122,16 @@ fn cameras_are_listed_and_chosen_by_name_or_index() {
     run(&format!("render a.gltf {options} --camera near --checkpoint c.film -o half.exr"), folder.path());
     run("render a.gltf --resume c.film --quiet -o resumed.exr", folder.path());
     assert_same("1.exr", "resumed.exr", folder.path(), "a checkpoint");
+    // What shows something else is no part of the same image
+    for (option, difference) in [
+        ("--camera 0", "camera: 0, not near"),
+        ("--camera-auto", "camera: one that frames the scene, not near"),
+        ("--light-units candela", "light_units: candela, which was not set"),
+        ("--time-in-scene 1", "time_in_scene: 1, which was not set"),
+    ] {
+        let output = lumiris(&format!("render a.gltf {option} --resume c.film --quiet -o other.exr"), folder.path());
+        assert!(!output.status.success() && stderr(&output).contains(difference), "{option}: {}", stderr(&output));
+    }
 }
 
 #[test]
