@@ -56,6 +56,10 @@ pub struct Choices {
     pub cameras: Vec<String>,
     /// Scenes of the file; empty for those without a name.
     pub scenes: Vec<String>,
+    /// The index of the camera that is shown, unless that is the first.
+    pub camera: Option<usize>,
+    /// The index of the scene that is shown, unless that is the one of the file.
+    pub scene: Option<usize>,
 }
 
 /// Surface properties of a geometry.

@@ -140,20 +140,25 @@ impl SourceMap {
 
 /// Reads a whole file of at most [`MAX_BYTES`], decompressing gzip.
 fn read_maybe_gzip(path: &Path) -> io::Result<Vec<u8>> {
-    let too_large = || io::Error::new(io::ErrorKind::InvalidData, "larger than 4 GiB");
     let file = File::open(path)?;
     let metadata = file.metadata()?;
     if metadata.is_dir() {
         return Err(io::Error::new(io::ErrorKind::InvalidInput, "is a folder"));
     }
     let length = metadata.len();
-    let mut bytes = Vec::with_capacity(length.min(MAX_BYTES) as usize);
-    file.take(MAX_BYTES + 1).read_to_end(&mut bytes)?;
+    read_bytes(file, length.min(MAX_BYTES) as usize)
+}
+
+/// Reads at most [`MAX_BYTES`], about as many as `expected`, decompressing gzip.
+pub fn read_bytes(input: impl Read, expected: usize) -> io::Result<Vec<u8>> {
+    let mut bytes = Vec::with_capacity(expected);
+    input.take(MAX_BYTES + 1).read_to_end(&mut bytes)?;
     if bytes.starts_with(&[0x1f, 0x8b]) {
         let mut text = Vec::new();
         GzDecoder::new(bytes.as_slice()).take(MAX_BYTES + 1).read_to_end(&mut text)?;
         bytes = text;
     }
+    let too_large = || io::Error::new(io::ErrorKind::InvalidData, "larger than 4 GiB");
     if bytes.len() as u64 > MAX_BYTES { Err(too_large()) } else { Ok(bytes) }
 }
 

@@ -77,10 +77,10 @@ impl<'a> Assembly<'a> {
             return Ok(None);
         }
         let changes = self.options.time.map(|time| changes(self.document, time, messages)).transpose()?;
-        let Some((scene, scenes)) = self.chosen_scene(messages) else { return Ok(None) };
+        let Some((scene, mut choices)) = self.chosen_scene(messages) else { return Ok(None) };
         let nodes = nodes(self.document, &scene, &changes.unwrap_or_default())?;
         let (placed, camera_names) = cameras(self.document, &nodes);
-        let choices = Choices { cameras: shown(&camera_names), scenes };
+        choices.cameras = shown(&camera_names);
         if let Err(error) = self.add_meshes(&nodes, files, messages) {
             messages.error(&error);
         }
@@ -90,6 +90,8 @@ impl<'a> Assembly<'a> {
             messages.warning(&self.document.root().key("meshes"), "the scene has no meshes to render");
         }
         let found = chosen_camera(self.options, (&placed, &camera_names), messages);
+        let index = found.as_ref().and_then(|(node, _)| placed.iter().position(|(other, _)| other.index == node.index));
+        choices.camera = index.filter(|&i| i > 0);
         let (camera, film) = camera(self.options, found, &bounds);
         if let Some(path) = &self.options.environment {
             self.lights.extend(environment(path, files, messages));
@@ -118,16 +120,20 @@ impl<'a> Assembly<'a> {
         }))
     }
 
-    /// The scene that is asked for, or that of the file, and the names of all.
-    fn chosen_scene(&self, messages: &mut Messages<'_>) -> Option<(Place<'a>, Vec<String>)> {
+    /// The scene that is asked for, or that of the file, and what there is to choose from but for cameras.
+    fn chosen_scene(&self, messages: &mut Messages<'_>) -> Option<(Place<'a>, Choices)> {
         let scenes = self.document.root().key("scenes");
         let names: Names<'a> = scenes.items().iter().map(|scene| [name_of(scene), None]).collect();
+        let usual = self.document.root().key("scene").index().unwrap_or(0);
         let index = match &self.options.scene {
             Some(wanted) => chosen(["scene", "--scene-in-file"], wanted, &names),
-            None => Ok(self.document.root().key("scene").index().unwrap_or(0)),
+            None => Ok(usual),
         };
         match index {
-            Ok(index) => Some((scenes.item(index), shown(&names))),
+            Ok(index) => {
+                let scene = (index != usual).then_some(index);
+                Some((scenes.item(index), Choices { scenes: shown(&names), scene, ..Choices::default() }))
+            }
             Err(message) => {
                 messages.diagnostics.error_without_place(message);
                 None

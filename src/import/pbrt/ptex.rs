@@ -20,7 +20,7 @@ const USUAL: ColorEncoding = ColorEncoding::Gamma(2.2);
 impl Builder<'_> {
     /// `string filename`, of which each is read once, with the meshes.
     pub(super) fn face_texture(&mut self, p: &ParamSet, d: &mut Diagnostics) -> Option<FaceTexture> {
-        let encoding = match self.encoding(p, d)? {
+        let encoding = match self.encoding(p, d) {
             ImageEncoding::Auto => USUAL,
             ImageEncoding::Srgb => ColorEncoding::Srgb,
             ImageEncoding::Linear => ColorEncoding::Linear,

@@ -231,7 +231,7 @@ impl Builder<'_> {
                 Filter::Bilinear
             }
         };
-        let mut encoding = self.encoding(p, d)?;
+        let mut encoding = self.encoding(p, d);
         if p.boolean("trilinear", d).is_some() {
             d.warning_once(p.span_of("trilinear"), "`trilinear` is pbrt-v3; pbrt-v4 writes `filter`");
         }
@@ -274,17 +274,18 @@ impl Builder<'_> {
         Some((first, (self.textures.udims.len() - 1) as UdimId))
     }
 
-    pub(super) fn encoding(&self, p: &ParamSet, d: &mut Diagnostics) -> Option<ImageEncoding> {
-        let Some(text) = p.string("encoding", d) else { return Some(ImageEncoding::Auto) };
+    /// `encoding`; an unknown one is an error, and as none.
+    pub(super) fn encoding(&self, p: &ParamSet, d: &mut Diagnostics) -> ImageEncoding {
+        let Some(text) = p.string("encoding", d) else { return ImageEncoding::Auto };
         let gamma = text.strip_prefix("gamma ").and_then(|g| g.trim().parse::<f32>().ok()).filter(|g| *g > 0.0);
         match (text, gamma) {
-            ("sRGB", _) => Some(ImageEncoding::Srgb),
-            ("linear", _) => Some(ImageEncoding::Linear),
-            (_, Some(gamma)) => Some(ImageEncoding::Gamma(gamma)),
+            ("sRGB", _) => ImageEncoding::Srgb,
+            ("linear", _) => ImageEncoding::Linear,
+            (_, Some(gamma)) => ImageEncoding::Gamma(gamma),
             _ => {
                 let message = format!("unknown encoding `{text}`");
                 d.error(p.span_of("encoding"), message).help("one of sRGB, linear, gamma N");
-                None
+                ImageEncoding::Auto
             }
         }
     }

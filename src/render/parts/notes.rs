@@ -6,9 +6,10 @@ use super::header::FilmHeader;
 use super::stored::Stored;
 use crate::cameras::Camera;
 use crate::import::LoadOptions;
+use crate::import::gltf::LightUnits;
 use crate::render::RenderSettings;
 use crate::render::output::{self, Aov};
-use crate::scene::{AccelKind, RenderJob};
+use crate::scene::{AccelKind, Choices, RenderJob};
 use std::str::FromStr;
 
 /// Note of the layers that the image is to have.
@@ -116,11 +117,18 @@ impl Asked {
         let layers: Vec<&str> = layers.into_iter().filter(|(has, _)| *has).map(|(_, name)| name).collect();
         entries.push((LAYERS.to_owned(), layers.join(" ")));
         // What of a scene is shown, where its file does not say so alone
-        let LoadOptions { scene, camera, camera_auto, light_units, time, .. } = &self.load;
+        let LoadOptions { camera_auto, light_units, time, .. } = &self.load;
+        let Choices { cameras, scenes, camera, scene } = &job.world.scene.choices;
+        let one_of = |index: &Option<usize>, names: &[String]| {
+            let index = (*index)?;
+            Some(format!("{index} {}", names.get(index).map_or("", String::as_str)).trim_end().to_owned())
+        };
+        let framing = || camera_auto.then(|| "one that frames the scene".to_owned());
+        let units = light_units.filter(|units| *units != LightUnits::default());
         let shown = [
-            ("scene_in_file", scene.clone()),
-            ("camera", camera.clone().or_else(|| camera_auto.then(|| "one that frames the scene".to_owned()))),
-            ("light_units", light_units.map(|units| <&str>::from(units).to_owned())),
+            ("scene_in_file", one_of(scene, scenes)),
+            ("camera", one_of(camera, cameras).or_else(framing)),
+            ("light_units", units.map(|units| <&str>::from(units).to_owned())),
             ("time_in_scene", time.map(|time| time.to_string())),
         ];
         entries.extend(shown.into_iter().filter_map(|(key, value)| Some((key.to_owned(), value?))));

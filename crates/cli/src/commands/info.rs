@@ -34,7 +34,7 @@ pub(super) fn run(args: &InfoArgs) -> anyhow::Result<ExitCode> {
             let mut facts = facts(&job);
             facts["seconds"] = json!({ "load": times.load, "build": times.build });
             facts["scene"] = json!(args.scene.scene.display().to_string());
-            let Choices { cameras, scenes } = &job.world.scene.choices;
+            let Choices { cameras, scenes, .. } = &job.world.scene.choices;
             let choices = [("cameras", cameras), ("scenes", scenes)];
             // One without a name is no choice
             let is_choice = |all: &[String]| all.len() > 1 || all.iter().any(|name| !name.is_empty());

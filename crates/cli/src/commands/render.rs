@@ -10,7 +10,7 @@ use super::pictures::{Made, Written, check_outputs, check_writable, is_exr, is_o
 use super::plan_file::PlanFile;
 use super::progress::{self, Bar};
 use super::rescue::write_or_rescue;
-use super::settings::{SetupTimes, load_job_of, plan, render_settings};
+use super::settings::{SetupTimes, is_standard_input, load_job_of, plan, render_settings};
 use crate::watch::{self, Watch};
 use anyhow::{Context, bail};
 use lumiris::film::{Film, Summary};
@@ -294,7 +294,9 @@ fn outputs(args: &RenderArgs, job: &RenderJob) -> Vec<PathBuf> {
         exr
     });
     vec![from_file.unwrap_or_else(|| {
-        let name = args.scene.scene.file_name().unwrap_or_default().to_string_lossy().into_owned();
+        let scene = &args.scene.scene;
+        let scene = if is_standard_input(scene) { Path::new("stdin") } else { scene };
+        let name = scene.file_name().unwrap_or_default().to_string_lossy().into_owned();
         let stem = name.trim_end_matches(".gz").trim_end_matches(".pbrt").to_owned();
         PathBuf::from(stem + ".exr")
     })]

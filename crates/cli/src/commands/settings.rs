@@ -18,7 +18,8 @@ use lumiris::render::plan::{Preparation, prepare};
 use lumiris::scene::RenderJob;
 use lumiris::settings::table::rows;
 use lumiris::settings::{Proposals, SampleCounts, Settings, StageTimes};
-use std::io::{self, Read};
+use lumiris_formats::source::read_bytes;
+use std::io;
 use std::path::Path;
 use std::sync::OnceLock;
 use std::time::Instant;
@@ -94,14 +95,12 @@ fn standard_input() -> io::Result<&'static str> {
     if let Some(text) = TEXT.get() {
         return Ok(text);
     }
-    let mut bytes = Vec::new();
-    io::stdin().lock().take(u64::from(u32::MAX)).read_to_end(&mut bytes)?;
+    let bytes = read_bytes(io::stdin().lock(), 0)?;
+    if bytes.starts_with(b"glTF") || bytes.trim_ascii_start().starts_with(b"{") {
+        return Err(io::Error::new(io::ErrorKind::InvalidData, "it is glTF, which is read from files"));
+    }
     // Comments need not be UTF-8
     let text = String::from_utf8_lossy(&bytes).into_owned();
-    // Places in a text are numbers of 32 bits
-    if text.len() >= u32::MAX as usize {
-        return Err(io::Error::new(io::ErrorKind::InvalidData, "larger than 4 GiB"));
-    }
     Ok(TEXT.get_or_init(|| text))
 }
 

@@ -122,10 +122,16 @@ fn cameras_are_listed_and_chosen_by_name_or_index() {
     run(&format!("render a.gltf {options} --camera near --checkpoint c.film -o half.exr"), folder.path());
     run("render a.gltf --resume c.film --quiet -o resumed.exr", folder.path());
     assert_same("1.exr", "resumed.exr", folder.path(), "a checkpoint");
+    // The same by other words
+    run(
+        "render a.gltf --camera 1 --light-units watt --scene-in-file 0 --resume c.film --quiet -o again.exr",
+        folder.path(),
+    );
+    assert_same("1.exr", "again.exr", folder.path(), "an index, and what is the default");
     // What shows something else is no part of the same image
     for (option, difference) in [
-        ("--camera 0", "camera: 0, not near"),
-        ("--camera-auto", "camera: one that frames the scene, not near"),
+        ("--camera 0", "camera: none, not 1 near"),
+        ("--camera-auto", "camera: one that frames the scene, not 1 near"),
         ("--light-units candela", "light_units: candela, which was not set"),
         ("--time-in-scene 1", "time_in_scene: 1, which was not set"),
     ] {

@@ -25,6 +25,12 @@ enum Rule {
     OneOf(&'static [usize]),
     /// Text.
     Text,
+    /// One of these words.
+    Word(&'static [&'static str]),
+    /// A finite number above 0.
+    Positive,
+    /// A finite number that is 0 at least.
+    NotNegative,
     /// True or false.
     Flag,
     /// An array.
@@ -33,7 +39,7 @@ enum Rule {
     Object,
 }
 
-use Rule::{Array, Flag, Index, Light, Number, Numbers, Object, OneOf, Text, Whole};
+use Rule::{Array, Flag, Index, Light, NotNegative, Number, Numbers, Object, OneOf, Positive, Text, Whole, Word};
 
 const COMPONENTS: Rule = OneOf(&[5120, 5121, 5122, 5123, 5125, 5126]);
 
@@ -77,15 +83,15 @@ const RULES: &[(&str, Rule)] = &[
     ("skins[].joints[]", Index("nodes")),
     ("skins[].inverseBindMatrices", Index("accessors")),
     ("cameras", Array),
-    ("cameras[].type", Text),
-    ("cameras[].perspective.yfov", Number),
+    ("cameras[].type", Word(&["perspective", "orthographic"])),
+    ("cameras[].perspective.yfov", Positive),
     ("cameras[].perspective.aspectRatio", Number),
     ("cameras[].orthographic.xmag", Number),
     ("cameras[].orthographic.ymag", Number),
     ("extensions.KHR_lights_punctual.lights", Array),
-    ("extensions.KHR_lights_punctual.lights[].type", Text),
+    ("extensions.KHR_lights_punctual.lights[].type", Word(&["directional", "point", "spot"])),
     ("extensions.KHR_lights_punctual.lights[].color", Numbers(3)),
-    ("extensions.KHR_lights_punctual.lights[].intensity", Number),
+    ("extensions.KHR_lights_punctual.lights[].intensity", NotNegative),
     ("extensions.KHR_lights_punctual.lights[].spot.innerConeAngle", Number),
     ("extensions.KHR_lights_punctual.lights[].spot.outerConeAngle", Number),
     ("accessors", Array),
@@ -121,7 +127,7 @@ const RULES: &[(&str, Rule)] = &[
     ("samplers[].wrapT", OneOf(&[33071, 33648, 10497])),
     ("materials", Array),
     ("materials[]", Object),
-    ("materials[].alphaMode", Text),
+    ("materials[].alphaMode", Word(&["OPAQUE", "MASK", "BLEND"])),
     ("materials[].alphaCutoff", Number),
     ("materials[].doubleSided", Flag),
     ("materials[].emissiveFactor", Numbers(3)),
@@ -222,6 +228,12 @@ impl Rule {
                 let is_right = place.items().len() == count && place.items().iter().all(|n| n.number().is_some());
                 return if is_right { Ok(()) } else { Err(format!("must be {count} numbers")) };
             }
+            Word(words) => {
+                let is_one = place.text().is_some_and(|text| words.contains(&text));
+                return if is_one { Ok(()) } else { Err(format!("must be one of {}", words.join(", "))) };
+            }
+            Positive => place.number().is_some_and(|x| x > 0.0),
+            NotNegative => place.number().is_some_and(|x| x >= 0.0),
             Number => place.number().is_some(),
             Whole => place.index().is_some(),
             Text => place.text().is_some(),
@@ -231,11 +243,13 @@ impl Rule {
         };
         let what = match self {
             Number => "a number",
+            Positive => "a number above 0",
+            NotNegative => "a number that is not negative",
             Text => "text",
             Flag => "true or false",
             Array => "an array",
             Object => "an object",
-            Index(_) | Light | Numbers(_) | OneOf(_) | Whole => "an integer that is not negative",
+            Index(_) | Light | Numbers(_) | OneOf(_) | Word(_) | Whole => "an integer that is not negative",
         };
         if holds { Ok(()) } else { Err(format!("must be {what}")) }
     }
@@ -273,6 +287,28 @@ mod tests {
             {"wrapS":7}],"images":{},"meshes":[{"primitives":[{"attributes":{"POSITION":0,"NORMAL":-1}}]}]}"#;
         assert_eq!(messages(materials).len(), 7);
         assert_eq!(messages(r#"{"asset":{"version":"2.0"},"scene":0,"scenes":[{}]}"#), [""; 0]);
+    }
+
+    #[test]
+    fn words_and_ranges_are_those_of_the_specification() {
+        let of_light =
+            |light: &str| messages(&format!(r#"{{"extensions":{{"KHR_lights_punctual":{{"lights":[{light}]}}}}}}"#));
+        let place = "extensions.KHR_lights_punctual.lights[0]";
+        assert_eq!(of_light(r#"{"type":"area"}"#), [format!("{place}.type: must be one of directional, point, spot")]);
+        assert_eq!(
+            of_light(r#"{"intensity":-5}"#),
+            [format!("{place}.intensity: must be a number that is not negative")]
+        );
+        assert_eq!(of_light(r#"{"type":"spot","intensity":0}"#), [""; 0]);
+        let rest = r#"{"cameras":[{"type":"panoramic","perspective":{"yfov":-1}}],"materials":[{"alphaMode":"mask"}]}"#;
+        assert_eq!(
+            messages(rest),
+            [
+                "cameras[0].type: must be one of perspective, orthographic",
+                "cameras[0].perspective.yfov: must be a number above 0",
+                "materials[0].alphaMode: must be one of OPAQUE, MASK, BLEND",
+            ]
+        );
     }
 
     #[test]
