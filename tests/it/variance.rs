@@ -127,7 +127,7 @@ fn variances_are_those_between_seeds_for_every_sampler_and_number_of_samples() {
 
 #[test]
 fn light_paths_have_their_part_of_the_variance() {
-    let mut job = crate::light_paths::caustics([24, 18], 1.0);
+    let mut job = crate::light_paths::caustics(1.0);
     let s = study(&mut job, 16, 48);
     assert!(s.error < 0.08 && (s.stated - 1.0).abs() < 0.25, "{} ± {}", s.stated, s.error);
 }

@@ -119,11 +119,13 @@ impl LightImage {
 }
 
 /// The factor of a turn in a replica, whose difference from its pixel tells the variance. There is one set of light paths for
-/// both, so the difference is made: turns differ by a random sign s, and of Σ e (1 + √2 s)/n and Σ e/n half the squared difference
-/// is Σ e²/n² in the mean, which is the variance of the latter, since few turns of a pixel have any of it.
+/// both, so the difference is made, by a sign s of each turn: Σ e (1 + √2 s)/n and Σ e/n differ by √2 Σ s e/n, of which half the
+/// square is the variance of the latter in the mean, if as many turns have either sign. So two that follow each other have
+/// different ones, at random which. Pixels with samples in few of the turns have random signs, and state too much.
 fn of_replica(turn: u32) -> f32 {
-    let is_more = pcg4d([turn, SEED, 1, 0])[0] & 1 == 1;
-    1.0 + if is_more { SQRT_2 } else { -SQRT_2 }
+    let turn = turn & TURN;
+    let [of_pair, ..] = pcg4d([turn >> 1, SEED, 1, 0]);
+    1.0 + if (of_pair ^ turn) & 1 == 1 { SQRT_2 } else { -SQRT_2 }
 }
 
 /// The bits of a turn beside those which count the samples of a pixel in it, see [`crate::scene::PixelSamples::turn`].
