@@ -43,6 +43,10 @@ pub(super) fn light_candidate(
     allocation: &SampleAllocation,
     drawn: (LightId, LightSample),
 ) -> Option<Candidate> {
+    // Without the path, what media send out would have no other technique near by: there it is left to the next segment
+    if !point.bsdf_by_path && job.lights.medium_of(drawn.0).is_some() {
+        return None;
+    }
     // Infinite lights overlap: a direction belongs to all of them together
     unshadowed_candidate((index, point), allocation, with_infinite(job, &point.light_ctx(), drawn))
 }

@@ -65,8 +65,8 @@ impl Segments {
             job.world.accel.occluded(&self.rays, Coherence::Packets, &mut self.occluded);
             return [self.rays.len() as u64, 0];
         }
-        let Segments { rays, contributions, points: of, occluded, crossing, .. } = self;
-        crossing.start(rays, of, points);
+        let Segments { rays, contributions, points: of, lights, occluded, crossing } = self;
+        crossing.start(job, (rays, of, lights), points);
         let traced = crossing.trace(job);
         occluded.clear();
         occluded.extend(crossing.transmittance().map(Rgb::is_black));

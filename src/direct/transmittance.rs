@@ -7,6 +7,7 @@
 use super::domain;
 use super::point::ShadingPoint;
 use crate::accel::{Coherence, Hit, RayBatch};
+use crate::lights::LightId;
 use crate::media::{MediumId, Numbers, Segment};
 use crate::scene::{RenderJob, SurfaceInteraction};
 use lumiris_numbers::math::ray::SEGMENT_END;
@@ -34,6 +35,8 @@ struct Crossed {
     ray: Ray,
     /// Where it ends; `None` for a direction.
     end: Option<Vec3>,
+    /// The medium that has to be there, if it is one that glows.
+    medium_of_end: Option<MediumId>,
     /// What it goes through.
     medium: Option<MediumId>,
     numbers: Numbers,
@@ -42,8 +45,13 @@ struct Crossed {
 }
 
 impl Crossing {
-    /// Begins with segments, each of one of the `points`.
-    pub(super) fn start(&mut self, rays: &RayBatch, of: &[u32], points: &[ShadingPoint<'_>]) {
+    /// Begins with segments, each of one of the `points` to a light.
+    pub(super) fn start(
+        &mut self,
+        job: &RenderJob,
+        (rays, of, lights): (&RayBatch, &[u32], &[LightId]),
+        points: &[ShadingPoint<'_>],
+    ) {
         self.all.clear();
         // Numbers follow from the place among the segments of the same point, not of the batch
         self.counts.clear();
@@ -55,6 +63,7 @@ impl Crossing {
             self.all.push(Crossed {
                 ray,
                 end: ray.t_max.is_finite().then(|| ray.o + ray.d),
+                medium_of_end: job.lights.medium_of(lights[i]),
                 medium: point.medium(ray.d),
                 numbers: Numbers::new(point.stream.domain(domain::TRANSMITTANCE + index)),
                 transmittance: Rgb::WHITE,
@@ -124,15 +133,23 @@ impl Crossed {
             let medium = &job.world.scene.media.media[id as usize];
             self.transmittance *= medium.transmittance(&segment, &mut self.numbers);
         }
-        let Some(interaction) = passed.filter(|_| !self.transmittance.is_black()) else { return false };
+        let Some(interaction) = passed.filter(|_| !self.transmittance.is_black()) else { return self.ends() };
         let d = self.ray.d;
         self.medium = interaction.medium_beyond(job, d, self.medium);
         let o = interaction.origin(d);
         self.ray = match self.end {
             None => Ray { o, ..self.ray },
             Some(end) if (end - o).dot(d) > 0.0 => Ray { o, d: end - o, t_max: SEGMENT_END, ..self.ray },
-            Some(_) => return false,
+            Some(_) => return self.ends(),
         };
         true
+    }
+
+    /// At its end: what glows is seen only where it is, which is not all of its box.
+    fn ends(&mut self) -> bool {
+        if self.medium_of_end.is_some() && self.medium != self.medium_of_end {
+            self.transmittance = Rgb::BLACK;
+        }
+        false
     }
 }

@@ -19,7 +19,7 @@ use crate::bsdfs::fresnel::fr_dielectric;
 use crate::bsdfs::{Bsdf, Dielectric, Phase};
 use crate::lights::LightCtx;
 use crate::materials::SurfaceBsdf;
-use crate::media::{End, Flight, Medium, Numbers, Segment, Sides};
+use crate::media::{End, Flight, Glimpse, Medium, Numbers, Segment, Sides};
 use crate::scene::{RenderJob, SurfaceInteraction};
 use lumiris_numbers::estimators::mis::Heuristic;
 use lumiris_numbers::math::{Ray, Rgb, Vec3};
@@ -52,7 +52,7 @@ impl VertexSearch {
         let segment = Segment { o, d, length: hit.map_or(f32::INFINITY, |hit| hit.t * scale) };
         let [stream, _] = self.arrivals.streams(&at.samples[path.sample as usize], path.branch);
         let mut numbers = Numbers::new(stream.domain(domain::FLIGHT + at.vertex).domain(path.passed));
-        let Flight { end, .. } = medium.fly(&segment, path.beta, &mut numbers, || None);
+        let Flight { end, .. } = medium.fly(&segment, path.beta, &mut numbers, || None, (0.0, |_: &Glimpse| 1.0));
         let (t, weight) = match end {
             End::Through { weight } => {
                 path.weaken(weight);

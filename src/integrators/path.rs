@@ -140,10 +140,8 @@ struct Step<'s, 'w> {
     estimator: Estimator,
     /// Index along the paths.
     vertex: u32,
-    /// Paths go on from here.
-    continues: bool,
     /// Paths go on from here, if only to see what media send out.
-    looks_on: bool,
+    continues: bool,
     vertices: Vec<Vertex<'w>>,
     /// Of each vertex, if the integrator decides that.
     shadings: Option<Vec<Shading<'w>>>,
@@ -222,10 +220,9 @@ impl PathTracer {
             let found = Found { vertex, paths: &self.search.active, vertices: &vertices };
             let shadings = own.as_mut().map(|own| own(&found, out));
             let estimator = Estimator::at_vertex(settings, self.estimator_of.unwrap_or(vertex));
-            // Light samples do not find what media send out: beyond the last vertex there is another segment for it
-            let continues = vertex + 1 < depth;
-            let looks_on = is_emissive && vertex < depth;
-            let step = Step { settings, estimator, vertex, continues, looks_on, vertices, shadings };
+            // Light samples alone do not find all that media send out: beyond the last vertex there is another segment for it
+            let continues = vertex + 1 < depth || is_emissive && vertex < depth;
+            let step = Step { settings, estimator, vertex, continues, vertices, shadings };
             let points = self.points(&job.lights, &step, samples);
             self.share(&step, out);
             self.light_points(job, &step, &points, fits, out);
@@ -341,7 +338,7 @@ impl PathTracer {
         let Step { settings, vertex, .. } = *step;
         let paths = self.search.active.iter().zip(&step.vertices);
         match &step.shadings {
-            _ if !step.continues && !step.looks_on => {}
+            _ if !step.continues => {}
             None => self.next.extend(paths.zip(points).filter_map(|((path, v), point)| match &step.estimator {
                 Estimator::Mis(mis) if point.bsdf_by_path => extend_to_emitter(path, v, point, vertex, (settings, mis)),
                 _ => Some(extend(path, v, vertex, settings)?.0),

@@ -12,7 +12,7 @@ use crate::geometry::{Shape, SurfaceHit};
 use crate::lights::LightCtx;
 use crate::materials::SurfaceBsdf;
 use crate::materials::dispersion::sample_wavelength;
-use crate::media::{End, Flight, Numbers, Segment, Sides};
+use crate::media::{End, Flight, Glimpse, Numbers, Segment, Sides};
 use crate::scene::{RenderJob, SurfaceInteraction};
 use lumiris_numbers::math::{Rgb, Vec3};
 use lumiris_numbers::samplers::SampleStream;
@@ -313,7 +313,15 @@ impl VertexSearch {
         let segment = Segment { o, d, length: hit.map_or(f32::INFINITY, |hit| hit.t * scale) };
         let [stream, _] = self.arrivals.streams(&at.samples[path.sample as usize], path.branch);
         let mut numbers = Numbers::new(stream.domain(domain::FLIGHT + at.vertex).domain(path.passed));
-        let flight = medium.fly(&segment, path.beta, &mut numbers, || focus(at.job, &segment, &stream, at.vertex));
+        // What light samples could have found as well, which need no more to be seen than what is near
+        let technique = path.technique.filter(|technique| technique.pdf.is_some());
+        let least = if technique.is_none() { at.job.lights.glimpse_rate(id) } else { 0.0 };
+        let weigh = |glimpse: &Glimpse| {
+            let p = o + d * glimpse.t;
+            technique.map_or(1.0, |t| t.weight(|ctx| at.job.lights.pdf_glow(ctx, id, (glimpse, p))))
+        };
+        let focus = || focus(at.job, &segment, &stream, at.vertex);
+        let flight = medium.fly(&segment, path.beta, &mut numbers, focus, (least, weigh));
         self.stats.collisions += u64::from(numbers.drawn);
         let Flight { emitted, end } = flight;
         at.out[path.sample as usize].radiance += path.beta * emitted;

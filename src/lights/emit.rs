@@ -91,6 +91,7 @@ impl Light {
                 from_infinity(scene, u_position, *world_from_light * s.w, s.le * (*scale / s.pdf))
             }
             Light::Portal(light) => light.sample_le(scene, u_position, u_direction),
+            Light::Glow(_) => None,
         }
     }
 }

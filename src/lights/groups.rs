@@ -48,11 +48,12 @@ impl LightGroups {
     /// Divides `lights`, which `sampler` chooses from, into at most `max` (1 to [`MAX_GROUPS`]) groups.
     pub fn new(lights: &[Light], sampler: &LightSampler, max: usize) -> Self {
         let max = max.clamp(1, MAX_GROUPS);
-        let bounds: Vec<_> = lights.iter().map(Light::bounds).collect();
         let own_tree;
         let tree = match sampler.tree() {
             Some(choice) => &choice.tree,
             None => {
+                let is_chosen = |light: &&Light| !matches!(light, Light::Glow(_));
+                let bounds: Vec<_> = lights.iter().map(|light| Some(light).filter(is_chosen)?.bounds()).collect();
                 own_tree = LightTree::new(&bounds);
                 &own_tree
             }

@@ -87,7 +87,8 @@ fn mean_l(light: &Light) -> Rgb {
         | Light::Image(_)
         | Light::Distant { .. }
         | Light::InfiniteImage { .. }
-        | Light::Portal(_) => Rgb::BLACK,
+        | Light::Portal(_)
+        | Light::Glow(_) => Rgb::BLACK,
     };
     if l.is_finite() && l.luminance() > 0.0 { l } else { Rgb::BLACK }
 }
@@ -236,7 +237,8 @@ mod tests {
             | Light::Distant { .. }
             | Light::InfiniteConstant { .. }
             | Light::InfiniteImage { .. }
-            | Light::Portal(_) => false,
+            | Light::Portal(_)
+            | Light::Glow(_) => false,
         })
     }
 

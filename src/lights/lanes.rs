@@ -28,7 +28,7 @@ impl Light {
                 }
                 out.fill(s.li.to_array(), s.pdf);
             }
-            Light::Area(_) | Light::Portal(_) => self.sample_li_each(ctx, u, out),
+            Light::Area(_) | Light::Portal(_) | Light::Glow(_) => self.sample_li_each(ctx, u, out),
         }
     }
 

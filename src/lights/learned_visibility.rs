@@ -68,7 +68,7 @@ pub(super) fn facing_irradiance(light: &Light, scene_radius: f32) -> f32 {
         Light::InfiniteConstant { .. } | Light::InfiniteImage { .. } => light.phi(scene_radius) / (4.0 * disk),
         // The mean over the scene
         Light::Portal(_) => light.phi(scene_radius) / disk,
-        Light::Point { .. } | Light::Spot { .. } | Light::Image(_) | Light::Area(_) => 0.0,
+        Light::Point { .. } | Light::Spot { .. } | Light::Image(_) | Light::Area(_) | Light::Glow(_) => 0.0,
     }
 }
 

@@ -7,7 +7,7 @@
 //! | tree | by the [`LightTree`](super::LightTree), beside which every infinite light has its probability, or all have a given one |
 //! | photons | nearly always one of the lights that the visibility cache finds, if any; see [`super::visibility_cache_sampler`] |
 //!
-//! Lights without power are never chosen.
+//! Lights without power are never chosen, but for media that glow: these have a place in the tree alone, if they are asked for.
 
 use super::choice::UNIT;
 use super::{Light, LightCtx, LightId, LightRun, SampledLight, TreeChoice, Turns};
@@ -41,11 +41,13 @@ pub struct LightChoice {
     /// Probability of all infinite lights together beside the light tree (0 to 1, exclusive). `None`: each has that of
     /// the whole tree.
     pub infinite_fraction: Option<f32>,
+    /// The tree has parts of media that glow as well.
+    pub glows: bool,
 }
 
 impl From<LightSamplerKind> for LightChoice {
     fn from(kind: LightSamplerKind) -> Self {
-        LightChoice { kind, infinite_fraction: None }
+        LightChoice { kind, infinite_fraction: None, glows: false }
     }
 }
 
@@ -111,7 +113,7 @@ impl LightSampler {
     /// A sampler of `lights`, indexed as they are; `scene_radius` weighs infinite lights against others. That by
     /// photons has no visibility cache yet.
     pub fn new(choice: LightChoice, lights: &[Light], scene_radius: f32) -> Self {
-        let tree = |powers: &[f32]| TreeChoice::new(lights, powers, choice.infinite_fraction);
+        let tree = |powers: &[f32]| TreeChoice::new((lights, powers), choice.infinite_fraction, choice.glows);
         let powers: Vec<f32> = lights.iter().map(|light| light.phi(scene_radius)).collect();
         match choice.kind {
             LightSamplerKind::Uniform => {

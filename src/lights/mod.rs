@@ -1,6 +1,6 @@
 //! Lights: their emission, the sampling of directions towards them, and the choice of one of many.
 //!
-//! Reading order: [`point`], [`spot`], [`image_light`], [`area`], [`environment`], [`portal`], [`emit`], [`lanes`], [`bounds`],
+//! Reading order: [`point`], [`spot`], [`image_light`], [`area`], [`environment`], [`portal`], [`glow`], [`emit`], [`lanes`], [`bounds`],
 //! [`choice`], [`glossy_lobe`], [`tree`], [`tree_choice`], [`visibility_cache`], [`learned_visibility`], [`visibility_cache_sampler`],
 //! [`light_sampler`], [`layers`], [`set`], [`groups`], [`sampling`], [`many`], [`irradiance`].
 
@@ -10,6 +10,7 @@ pub mod choice;
 pub mod emit;
 pub mod environment;
 pub mod glossy_lobe;
+pub mod glow;
 pub mod groups;
 pub mod image_light;
 pub mod irradiance;
@@ -42,6 +43,7 @@ pub use choice::{LightRun, SampledLight};
 pub use emit::{EmissionSample, EmittingPoint};
 pub use environment::{EnvironmentFilter, EnvironmentMap, EnvironmentMapping};
 pub use glossy_lobe::GlossyLobe;
+pub use glow::Glow;
 pub use groups::LightGroups;
 pub use image_light::{ImageLight, ImageMapping};
 pub use irradiance::Irradiances;
@@ -189,6 +191,8 @@ pub enum Light {
     },
     /// Radiance by an image, through a rectangle.
     Portal(Arc<PortalLight>),
+    /// A part of a medium that glows; see [`glow`].
+    Glow(Box<Glow>),
 }
 
 impl Light {
@@ -208,6 +212,7 @@ impl Light {
             Light::InfiniteConstant { .. } => "infinite, constant",
             Light::InfiniteImage { .. } => "infinite, image",
             Light::Portal(_) => "infinite, portal",
+            Light::Glow(_) => "glow",
         }
     }
 
@@ -240,15 +245,16 @@ impl Light {
                 Some(environment::infinite_sample(*world_from_light * s.w, s.le * *scale, s.pdf))
             }
             Light::Portal(light) => light.sample_li(ctx, u),
+            Light::Glow(glow) => glow.sample_li(ctx, u),
         }
     }
 
     /// Density per steradian of [`sample_li`](Self::sample_li) in the direction `wi`, which hits this light at `hit`.
-    /// 0 for delta lights.
+    /// 0 for delta lights, and for media, whose points are not on rays' ends ([`Glow::pdf`]).
     #[inline]
     pub fn pdf_li(&self, ctx: &LightCtx, wi: Vec3, hit: &LightHit) -> f32 {
         match self {
-            Light::Point { .. } | Light::Spot { .. } | Light::Image(_) | Light::Distant { .. } => 0.0,
+            Light::Point { .. } | Light::Spot { .. } | Light::Image(_) | Light::Distant { .. } | Light::Glow(_) => 0.0,
             Light::Area(area) => area.pdf_li(ctx, wi, hit),
             Light::InfiniteConstant { l } => {
                 if l.is_black() {
@@ -273,7 +279,8 @@ impl Light {
             | Light::Distant { .. }
             | Light::InfiniteConstant { .. }
             | Light::InfiniteImage { .. }
-            | Light::Portal(_) => Rgb::BLACK,
+            | Light::Portal(_)
+            | Light::Glow(_) => Rgb::BLACK,
         }
     }
 
@@ -285,9 +292,12 @@ impl Light {
             Light::InfiniteConstant { l } => *l,
             Light::InfiniteImage { map, world_from_light, scale } => map.le(world_from_light.transpose() * w) * *scale,
             Light::Portal(light) => light.le(p, w),
-            Light::Point { .. } | Light::Spot { .. } | Light::Image(_) | Light::Distant { .. } | Light::Area(_) => {
-                Rgb::BLACK
-            }
+            Light::Point { .. }
+            | Light::Spot { .. }
+            | Light::Image(_)
+            | Light::Distant { .. }
+            | Light::Area(_)
+            | Light::Glow(_) => Rgb::BLACK,
         }
     }
 
@@ -305,6 +315,7 @@ impl Light {
             | Light::Image(_)
             | Light::Distant { .. }
             | Light::Area(_)
+            | Light::Glow(_)
             | Light::InfiniteConstant { .. } => (self.le(p, w), self.pdf_li(&LightCtx::at(p), w, &LightHit::INFINITE)),
         }
     }
@@ -324,7 +335,7 @@ impl Light {
     }
 
     /// Luminance of the emitted power. Of an infinite light, the power that reaches a disk of the scene's radius from
-    /// all directions, or that passes through its portal.
+    /// all directions, or that passes through its portal. 0 for media, which send out no photons.
     pub fn phi(&self, scene_radius: f32) -> f32 {
         let disk = PI * scene_radius * scene_radius;
         let phi = match self {
@@ -338,6 +349,7 @@ impl Light {
             Light::InfiniteConstant { l } => 4.0 * PI * l.luminance() * disk,
             Light::InfiniteImage { map, scale, .. } => map.luminance_integral() * *scale * disk,
             Light::Portal(light) => light.phi(),
+            Light::Glow(_) => 0.0,
         };
         if phi.is_finite() { phi.max(0.0) } else { 0.0 }
     }
@@ -349,7 +361,7 @@ impl Light {
             Light::Distant { .. } | Light::InfiniteConstant { .. } | Light::InfiniteImage { .. } | Light::Portal(_) => {
                 true
             }
-            Light::Point { .. } | Light::Spot { .. } | Light::Image(_) | Light::Area(_) => false,
+            Light::Point { .. } | Light::Spot { .. } | Light::Image(_) | Light::Area(_) | Light::Glow(_) => false,
         }
     }
 
@@ -358,7 +370,11 @@ impl Light {
     pub fn is_delta(&self) -> bool {
         match self {
             Light::Point { .. } | Light::Spot { .. } | Light::Image(_) | Light::Distant { .. } => true,
-            Light::Area(_) | Light::InfiniteConstant { .. } | Light::InfiniteImage { .. } | Light::Portal(_) => false,
+            Light::Area(_)
+            | Light::InfiniteConstant { .. }
+            | Light::InfiniteImage { .. }
+            | Light::Portal(_)
+            | Light::Glow(_) => false,
         }
     }
 
@@ -381,6 +397,7 @@ impl Light {
             }
             Light::Image(light) => light.bounds(),
             Light::Area(area) => area.bounds(),
+            Light::Glow(glow) => glow.bounds(),
             Light::Distant { .. } | Light::InfiniteConstant { .. } | Light::InfiniteImage { .. } | Light::Portal(_) => {
                 return None;
             }

@@ -5,6 +5,7 @@ use super::{
     LearnedVisibility, LightChoice, LightCtx, LightGroups, LightHit, LightId, LightSample, LightSampler, LightSet,
     TreeChoice, VisibilityCache,
 };
+use crate::media::{Glimpse, MediumId};
 use lumiris_numbers::math::{Rgb, Vec3};
 use std::ops::Deref;
 use std::sync::Arc;
@@ -108,6 +109,13 @@ impl LightSampling {
         self.set.sample_choice(ctx, self.sampler.sample(ctx, u_choice)?, u)
     }
 
+    /// Density of sampling the point of a glimpse of a medium, whose place in world space is `p`, from `ctx` (per steradian).
+    pub fn pdf_glow(&self, ctx: &LightCtx, medium: MediumId, (glimpse, p): (&Glimpse, Vec3)) -> f32 {
+        let Some((light, glow)) = self.set.glow_at(medium, glimpse.unit) else { return 0.0 };
+        let pmf = self.sampler.pmf(ctx, light);
+        if pmf > 0.0 { pmf * glow.pdf(ctx, (glimpse.unit, p), glimpse.rate) } else { 0.0 }
+    }
+
     /// Samples a direction to a light of one group, whose probability is `group_pmf`; otherwise as
     /// [`sample`](Self::sample).
     #[inline]
@@ -188,12 +196,12 @@ mod tests {
     use std::sync::Arc;
 
     const CHOICES: [LightChoice; 6] = [
-        LightChoice { kind: LightSamplerKind::Uniform, infinite_fraction: None },
-        LightChoice { kind: LightSamplerKind::Power, infinite_fraction: None },
-        LightChoice { kind: LightSamplerKind::Tree, infinite_fraction: None },
-        LightChoice { kind: LightSamplerKind::Tree, infinite_fraction: Some(0.125) },
-        LightChoice { kind: LightSamplerKind::Photons, infinite_fraction: None },
-        LightChoice { kind: LightSamplerKind::Photons, infinite_fraction: Some(0.9) },
+        LightChoice { kind: LightSamplerKind::Uniform, infinite_fraction: None, glows: false },
+        LightChoice { kind: LightSamplerKind::Power, infinite_fraction: None, glows: false },
+        LightChoice { kind: LightSamplerKind::Tree, infinite_fraction: None, glows: false },
+        LightChoice { kind: LightSamplerKind::Tree, infinite_fraction: Some(0.125), glows: false },
+        LightChoice { kind: LightSamplerKind::Photons, infinite_fraction: None, glows: false },
+        LightChoice { kind: LightSamplerKind::Photons, infinite_fraction: Some(0.9), glows: false },
     ];
 
     /// The set, with photons of some lights around (0.4, 0.3, 0): more of those with a greater id.
@@ -262,7 +270,7 @@ mod tests {
         builder.add(Light::InfiniteConstant { l: Rgb::splat(0.1) });
         builder.add(Light::Distant { wi_world: Vec3::Z, l: Rgb::WHITE });
         for (infinite_fraction, expected) in [(None, 2.0 / 3.0), (Some(0.25), 0.25), (Some(0.9375), 0.9375)] {
-            let choice = LightChoice { kind: LightSamplerKind::Tree, infinite_fraction };
+            let choice = LightChoice { infinite_fraction, ..LightSamplerKind::Tree.into() };
             let set = sampling(builder.clone(), choice, &bounds());
             let of = |z: f32| -> f32 {
                 let ctx = LightCtx::at(Vec3::new(0.4, 0.3, z));

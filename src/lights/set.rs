@@ -1,11 +1,13 @@
 //! All lights of a scene, and the map from hits to lights.
 
 use super::area::AreaShape;
+use super::glow::{Glow, Parts};
 use super::{
     Emission, Light, LightChoice, LightCtx, LightId, LightLayers, LightSample, LightSampler, SampledLight,
     area_lights_of,
 };
 use crate::geometry::{GeometryId, Shape};
+use crate::media::{Medium, MediumId, MediumSet};
 use lumiris_numbers::math::{Bounds3, Rgb, Vec3};
 use std::sync::Arc;
 
@@ -25,6 +27,21 @@ pub struct LightSetBuilder {
     /// The group of the lights that are added next, and those of all so far.
     group: Option<Arc<str>>,
     groups: Vec<Option<Arc<str>>>,
+    glowing: Vec<GlowingMedium>,
+}
+
+/// Places along a camera ray through a medium of average width at which it is seen whether it glows, at least.
+const GLIMPSES: f32 = 8.0;
+
+/// The parts of a medium that glow.
+#[derive(Clone, Debug)]
+struct GlowingMedium {
+    medium: MediumId,
+    parts: Parts,
+    /// Of each part, if it glows.
+    lights: Vec<Option<LightId>>,
+    /// Rate at which camera rays look for it (1/m).
+    rate: f32,
 }
 
 impl LightSetBuilder {
@@ -50,6 +67,24 @@ impl LightSetBuilder {
         self.emitting.push(EmittingGeometry { geometry, first_light, light_of_primitive: area.light_of_primitive });
     }
 
+    /// Adds what glows of the media.
+    pub fn add_media(&mut self, media: &MediumSet) {
+        for (id, medium) in (0..).zip(&media.media) {
+            let Medium::Heterogeneous(medium) = medium else { continue };
+            if !medium.is_emissive() {
+                continue;
+            }
+            let parts = Parts::of(medium);
+            let glows = parts.glows(medium, id);
+            let bounds = glows.iter().flatten().fold(Bounds3::EMPTY, |b, glow| b.union(glow.bounds().bounds));
+            let size = bounds.diagonal();
+            let rate = if size.is_finite() { GLIMPSES / size.element_product().cbrt() } else { 0.0 };
+            let glows = glows.into_iter();
+            let lights = glows.map(|glow| glow.map(|glow| self.add(Light::Glow(Box::new(glow))))).collect();
+            self.glowing.push(GlowingMedium { medium: id, parts, lights, rate });
+        }
+    }
+
     /// The set, for a scene of the given bounds.
     pub fn build(mut self, scene_bounds: &Bounds3) -> LightSet {
         let (center, radius) = scene_bounds.bounding_sphere();
@@ -66,6 +101,7 @@ impl LightSetBuilder {
             lit,
             layers: LightLayers::new(&self.groups),
             emitting: self.emitting,
+            glowing: self.glowing,
             scene_centre: if center.is_finite() { center } else { Vec3::ZERO },
             scene_radius,
         }
@@ -85,6 +121,7 @@ pub struct LightSet {
     pub layers: LightLayers,
     /// Sorted by geometry.
     emitting: Vec<EmittingGeometry>,
+    glowing: Vec<GlowingMedium>,
     /// Centre of the scene's bounding sphere; the origin for an empty scene.
     pub scene_centre: Vec3,
     /// Radius of the scene's bounding sphere; 1 for a scene without extent.
@@ -155,6 +192,27 @@ impl LightSet {
             e.light_of_primitive.iter().for_each(|i| sources[(e.first_light + i) as usize] = Some(source));
         }
         sources
+    }
+
+    /// The light that is the part of a medium at a point of its unit cube, if that glows.
+    #[inline]
+    pub fn glow_at(&self, medium: MediumId, unit: Vec3) -> Option<(LightId, &Glow)> {
+        let glowing = self.glowing.iter().find(|glowing| glowing.medium == medium)?;
+        let light = glowing.lights[glowing.parts.at(unit)]?;
+        let Light::Glow(glow) = &self.lights[light as usize] else { return None };
+        Some((light, glow))
+    }
+
+    /// Rate at which camera rays look for what glows of a medium (1/m), by the size of what does; 0 if nothing does.
+    #[inline]
+    pub fn glimpse_rate(&self, medium: MediumId) -> f32 {
+        self.glowing.iter().find(|glowing| glowing.medium == medium).map_or(0.0, |glowing| glowing.rate)
+    }
+
+    /// The medium in which a light is, if it is one that glows.
+    #[inline]
+    pub fn medium_of(&self, light: LightId) -> Option<MediumId> {
+        if let Some(Light::Glow(glow)) = self.lights.get(light as usize) { Some(glow.id) } else { None }
     }
 
     /// Samples a direction to a light that was chosen by `choice`. `pdf` of the sample includes the probability of the

@@ -20,13 +20,14 @@ impl TreeChoice {
     /// A choice among `lights` in a scene of radius `scene_radius` (m).
     pub(super) fn of_lights(lights: &[Light], scene_radius: f32) -> Self {
         let powers: Vec<f32> = lights.iter().map(|light| light.phi(scene_radius)).collect();
-        Self::new(lights, &powers, None)
+        Self::new((lights, &powers), None, false)
     }
 
-    /// A choice among `lights` of the given `powers`, where all infinite lights together have the probability
-    /// `infinite_fraction` (0 to 1, exclusive); `None`: each has that of the whole tree.
-    pub(super) fn new(lights: &[Light], powers: &[f32], infinite_fraction: Option<f32>) -> Self {
-        let bounds: Vec<_> = lights.iter().map(Light::bounds).collect();
+    /// A choice among `lights` of the given `powers`, with or without the parts of media that glow, where all infinite lights
+    /// together have the probability `infinite_fraction` (0 to 1, exclusive); `None`: each has that of the whole tree.
+    pub(super) fn new((lights, powers): (&[Light], &[f32]), infinite_fraction: Option<f32>, glows: bool) -> Self {
+        let is_asked_for = |light: &&Light| glows || !matches!(light, Light::Glow(_));
+        let bounds: Vec<_> = lights.iter().map(|light| Some(light).filter(is_asked_for)?.bounds()).collect();
         let is_chosen = |&i: &usize| lights[i].is_infinite() && powers[i] > 0.0;
         let infinite: Vec<LightId> = (0..lights.len()).filter(is_chosen).map(|i| i as LightId).collect();
         let odds = infinite_fraction.map_or(1.0, |f| f / ((1.0 - f) * infinite.len().max(1) as f32));

@@ -7,14 +7,14 @@
 //! P_s = Σ_c |β_c w_c| σ_s,c / Σ_c |β_c w_c| (σ_s,c + |σ_n,c|),  w ← w σ_s/(σ̄ P_s) or w σ_n/(σ̄ (1 − P_s)),
 //!
 //! where β_c w_c is the throughput so far: probabilities follow the channels that still carry something, which keeps weights
-//! bounded. Absorption is part of the weights, and no event. What is sent out is added at every tentative collision:
-//! w σ_a L_e/σ̄.
+//! bounded. Absorption is part of the weights, and no event. At any place the weight, or 0 once the flight is scattered, has the
+//! expectation T: so what is sent out is added at places that do not depend on the collisions, at a rate λ: w σ_a L_e/λ.
 //!
 //! All of this is unbiased for any σ̄ > 0, also where σ_t exceeds it: σ_n is negative there. The bounds of clouds are
 //! estimated, and use that.
 
 use super::majorants::{MajorantGrid, Pieces};
-use super::track::{End, Flight, Numbers, Segment};
+use super::track::{End, Flight, Glimpse, Numbers, Segment};
 use super::{Cloud, Coefficients, RgbGrid, Scalars, UniformGrid};
 use lumiris_numbers::math::{Affine3A, Bounds3, Rgb, Vec3};
 
@@ -36,6 +36,7 @@ pub struct Heterogeneous {
     bounds: Bounds3,
     /// The box as the unit cube.
     unit_from_world: Affine3A,
+    world_from_unit: Affine3A,
     majorants: MajorantGrid,
     /// Asymmetry of the phase function.
     pub g: f32,
@@ -68,7 +69,8 @@ impl Heterogeneous {
             Field::Rgb(grid) => MajorantGrid::new(cells(grid.resolution()), |low, high| grid.bound(low, high)),
             Field::Cloud(cloud) => cloud_majorants(cloud, &bounds),
         };
-        Heterogeneous { field, bounds, unit_from_world, majorants, g }
+        let world_from_unit = unit_from_world.inverse();
+        Heterogeneous { field, bounds, unit_from_world, world_from_unit, majorants, g }
     }
 
     /// What kind of field it is, for people.
@@ -90,6 +92,46 @@ impl Heterogeneous {
             Field::Rgb(grid) => grid.le.is_some(),
             Field::Cloud(_) => false,
         }
+    }
+
+    /// Numbers of samples along the axes of its box, or of the majorants where it has none.
+    pub fn resolution(&self) -> [usize; 3] {
+        match &self.field {
+            Field::Uniform(grid) => grid.density.resolution(),
+            Field::Rgb(grid) => grid.resolution(),
+            Field::Cloud(_) => self.majorants.resolution(),
+        }
+    }
+
+    /// σ_a L_e at a point of the unit cube.
+    pub fn glow(&self, p: Vec3) -> Rgb {
+        let Coefficients { sigma_a, le, .. } = self.at(p);
+        sigma_a * le
+    }
+
+    /// Rate of the glimpses of a path at a point of the unit cube (1/m), where no more are asked for.
+    pub fn glimpse_rate(&self, p: Vec3) -> f32 {
+        self.majorants.at(p)
+    }
+
+    /// A point of the unit cube in world space.
+    pub fn world_point(&self, p: Vec3) -> Vec3 {
+        self.world_from_unit.transform_point3(p)
+    }
+
+    /// A point of world space in the space of the unit cube.
+    pub fn unit_point(&self, p: Vec3) -> Vec3 {
+        self.unit_from_world.transform_point3(p)
+    }
+
+    /// Bounds in world space of a box in the unit cube.
+    pub fn world_bounds(&self, bounds: Bounds3) -> Bounds3 {
+        bounds.transformed(&self.world_from_unit)
+    }
+
+    /// Volume of its box (m³).
+    pub fn volume(&self) -> f32 {
+        self.world_from_unit.matrix3.determinant().abs()
     }
 
     /// Bytes of its samples and majorants.
@@ -116,23 +158,43 @@ impl Heterogeneous {
 
     /// The tentative collisions along a segment. A parameter of its line is a distance in world space (m).
     fn collisions(&self, segment: &Segment) -> Collisions<'_> {
-        let o = self.unit_from_world.transform_point3(segment.o);
+        let o = self.unit_point(segment.o);
         let d = self.unit_from_world.transform_vector3(segment.d);
         let pieces = self.majorants.pieces(o, d, segment.length);
         Collisions { medium: self, o, d, pieces, from: 0.0, to: 0.0, majorant: 0.0 }
     }
 
-    /// A flight along a segment of a path of throughput `beta`.
-    pub(super) fn fly(&self, segment: &Segment, beta: Rgb, numbers: &mut Numbers) -> Flight {
-        let is_emissive = self.is_emissive();
+    /// The points along a segment at which it is seen whether the medium glows, of which the first has the place `offset` in
+    /// its part.
+    fn glimpses(&self, segment: &Segment, (least, offset): (f32, f32)) -> Glimpses<'_> {
+        let Collisions { o, d, pieces, .. } = self.collisions(segment);
+        Glimpses { o, d, pieces, least, from: 0.0, to: 0.0, rate: 0.0, left: offset }
+    }
+
+    /// A flight along a segment of a path of throughput `beta`; `least` and `weigh` as in [`super::Medium::fly`].
+    pub(super) fn fly(
+        &self,
+        segment: &Segment,
+        beta: Rgb,
+        numbers: &mut Numbers,
+        (least, weigh): (f32, impl Fn(&Glimpse) -> f32),
+    ) -> Flight {
         let (mut weight, mut emitted) = (Rgb::WHITE, Rgb::BLACK);
         let mut collisions = self.collisions(segment);
-        let mut u = numbers.pair();
-        while let Some(Collision { t, majorant, at }) = collisions.next(u[0]) {
-            let Coefficients { sigma_a, sigma_s, le } = at;
-            if is_emissive {
-                emitted += weight * sigma_a * le / majorant;
+        let mut glimpses = self.is_emissive().then(|| self.glimpses(segment, (least, numbers.offset())));
+        let mut glow_before = |t: f32, weight: Rgb, numbers: &mut Numbers| {
+            let Some(glimpses) = &mut glimpses else { return };
+            while let Some(glimpse) = glimpses.next_before(t) {
+                numbers.drawn += 1;
+                let l = weight * self.glow(glimpse.unit) / glimpse.rate;
+                if !l.is_black() {
+                    emitted += l * weigh(&glimpse);
+                }
             }
+        };
+        let mut u = numbers.pair();
+        while let Some(Collision { t, majorant, at: Coefficients { sigma_a, sigma_s, .. } }) = collisions.next(u[0]) {
+            glow_before(t, weight, numbers);
             let sigma_n = (sigma_a + sigma_s).map(|sigma_t| majorant - sigma_t);
             let carried = (weight * beta).map(f32::abs);
             let sum = |v: Rgb| v.r + v.g + v.b;
@@ -147,6 +209,7 @@ impl Heterogeneous {
             weight = weight * sigma_n / (majorant * (1.0 - p));
             u = numbers.pair();
         }
+        glow_before(f32::INFINITY, weight, numbers);
         Flight { emitted, end: End::Through { weight } }
     }
 
@@ -205,6 +268,45 @@ impl Collisions<'_> {
             depth = (depth - self.majorant * (self.to - self.from)).max(0.0);
             let piece = self.pieces.next()?;
             (self.from, self.to, self.majorant) = (piece.begin, piece.end, piece.majorant);
+        }
+    }
+}
+
+/// Points at which a flight looks for what the medium sends out: at a stated rate, one in each of equal parts.
+struct Glimpses<'a> {
+    /// The line in the unit cube.
+    o: Vec3,
+    d: Vec3,
+    pieces: Pieces<'a>,
+    /// Rate at least where there is any medium (1/m).
+    least: f32,
+    /// What is left of the present piece, and the rate there.
+    from: f32,
+    to: f32,
+    rate: f32,
+    /// What is left up to the next point, as a part of a part.
+    left: f32,
+}
+
+impl Glimpses<'_> {
+    /// The next one up to the distance `end`.
+    fn next_before(&mut self, end: f32) -> Option<Glimpse> {
+        loop {
+            let t = self.from + self.left / self.rate;
+            if self.rate > 0.0 && t < self.to {
+                if t > end {
+                    return None;
+                }
+                (self.from, self.left) = (t, 1.0);
+                return Some(Glimpse { t, unit: self.o + self.d * t, rate: self.rate });
+            }
+            if self.to > end {
+                return None;
+            }
+            self.left = (self.left - self.rate * (self.to - self.from)).max(0.0);
+            let piece = self.pieces.next()?;
+            let rate = if piece.majorant > 0.0 { piece.majorant.max(self.least) } else { 0.0 };
+            (self.from, self.to, self.rate) = (piece.begin, piece.end, rate);
         }
     }
 }

@@ -58,6 +58,26 @@ impl MajorantGrid {
         size_of_val(&self.values[..])
     }
 
+    /// Numbers of cells along the axes.
+    pub fn resolution(&self) -> [usize; 3] {
+        self.resolution
+    }
+
+    /// The bound at a point of the unit cube.
+    #[inline]
+    pub fn at(&self, p: Vec3) -> f32 {
+        let [nx, ny, _] = self.resolution;
+        let [x, y, z] = [0, 1, 2].map(|axis| self.cell(p, axis));
+        self.values[x + nx * (y + ny * z)]
+    }
+
+    /// The place of a point among the cells along an axis.
+    #[inline]
+    fn cell(&self, p: Vec3, axis: usize) -> usize {
+        let n = self.resolution[axis];
+        (p[axis] * n as f32).clamp(0.0, (n - 1) as f32) as usize
+    }
+
     /// The parts of the ray `o + t·d`, 0 < t < `t_max`, in the unit cube, cell by cell [Amanatides and Woo 1987].
     pub fn pieces(&self, o: Vec3, d: Vec3, t_max: f32) -> Pieces<'_> {
         // The part inside the cube
@@ -81,8 +101,7 @@ impl MajorantGrid {
         // The first cell, and where the ray leaves it
         let p = o + d * begin;
         for axis in 0..3 {
-            let n = self.resolution[axis];
-            let cell = (p[axis] * n as f32).clamp(0.0, (n - 1) as f32) as usize;
+            let (n, cell) = (self.resolution[axis], self.cell(p, axis));
             walk.cell[axis] = cell;
             walk.up[axis] = d[axis] > 0.0;
             if d[axis] != 0.0 {

@@ -19,7 +19,7 @@ pub use grid::{RgbGrid, Samples, Scalars, Temperature, UniformGrid};
 pub use heterogeneous::{Field, Heterogeneous};
 pub use homogeneous::Homogeneous;
 pub use sparse::{Cube, SparseGrid, SparseSamples};
-pub use track::{End, Flight, Numbers, Segment};
+pub use track::{End, Flight, Glimpse, Numbers, Segment};
 
 use lumiris_numbers::math::{Rgb, Vec3};
 use std::sync::Arc;
@@ -92,7 +92,8 @@ impl Medium {
     }
 
     /// A flight along a segment of a path of throughput `beta`: see [`Flight`]. `focus` chooses a point of a light, about
-    /// which distances in homogeneous media may be equiangular.
+    /// which distances in homogeneous media may be equiangular. A medium that varies is seen to glow at places at the rate of its
+    /// majorant, or `least` (1/m) if that is more: `weigh` is the weight of what it sends out there, where another technique finds it as well.
     #[inline]
     pub fn fly(
         &self,
@@ -100,10 +101,11 @@ impl Medium {
         beta: Rgb,
         numbers: &mut Numbers,
         focus: impl FnOnce() -> Option<Vec3>,
+        (least, weigh): (f32, impl Fn(&Glimpse) -> f32),
     ) -> Flight {
         match self {
             Medium::Homogeneous(m) | Medium::Interior(m) => m.fly(segment, beta, numbers.first(), focus),
-            Medium::Heterogeneous(m) => m.fly(segment, beta, numbers),
+            Medium::Heterogeneous(m) => m.fly(segment, beta, numbers, (least, weigh)),
         }
     }
 

@@ -30,6 +30,17 @@ pub struct Flight {
     pub end: End,
 }
 
+/// A place where a flight through a medium that varies looks for what it sends out.
+#[derive(Clone, Copy, Debug)]
+pub struct Glimpse {
+    /// Distance from the origin (m).
+    pub t: f32,
+    /// The point in the unit cube of the medium.
+    pub unit: Vec3,
+    /// Rate of such places (1/m).
+    pub rate: f32,
+}
+
 /// How a flight ends.
 #[derive(Clone, Copy, Debug)]
 pub enum End {
@@ -58,6 +69,8 @@ pub struct Numbers {
 
 /// Domain of the numbers of later collisions.
 const REST: u32 = 1;
+/// Domain of the places of glimpses.
+const GLIMPSES: u32 = 2;
 
 impl Numbers {
     /// Those of a place in the tree of random numbers.
@@ -70,6 +83,12 @@ impl Numbers {
     #[inline]
     pub fn first(&self) -> [f32; 4] {
         self.stream.draw::<4>()
+    }
+
+    /// A number in [0, 1) for the places of glimpses.
+    #[inline]
+    pub fn offset(&self) -> f32 {
+        self.stream.domain(GLIMPSES).draw::<1>()[0]
     }
 
     /// Two numbers in [0, 1).

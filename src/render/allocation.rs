@@ -125,8 +125,8 @@ struct Measured {
     variance: [f32; 3],
     /// Mean of what samples see of visible lights.
     sight: [f32; 3],
-    /// Variance of that from each of two sets of samples, of the channel that varies most.
-    sight_variance: [f32; 2],
+    /// Variance of that from each of two sets of samples.
+    sight_variance: [[f32; 3]; 2],
     /// Cost of a sample; 0 where nothing was measured.
     cost: f32,
     /// Material of the first surface, or [`NO_MATERIAL`].
@@ -147,11 +147,22 @@ impl Measured {
             sight: std::array::from_fn(|c| {
                 ((a.radiance[c] + b.radiance[c]) / (a.count + b.count).max(1) as f64) as f32
             }),
-            sight_variance: [a, b].map(|sums| variance(&sums).into_iter().fold(0.0, f64::max) as f32),
+            sight_variance: [a, b].map(|sums| variance(&sums).map(|v| v as f32)),
             cost: cost as f32,
             material: sight.material,
         }
     }
+
+    /// The variance of what samples see of visible lights, by some of the sets.
+    fn mean_sight_variance(&self, sets: &[usize]) -> [f64; 3] {
+        let of = |c: usize| sets.iter().map(|&k| f64::from(self.sight_variance[k][c])).sum::<f64>() / sets.len() as f64;
+        [0, 1, 2].map(of)
+    }
+}
+
+/// Σ over channels.
+fn dot(a: [f64; 3], b: [f64; 3]) -> f64 {
+    a.into_iter().zip(b).map(|(a, b)| a * b).sum()
 }
 
 /// What samples see that go no further than the first surface.
@@ -272,9 +283,8 @@ impl<'a> Pilot<'a> {
 
     /// The same of visible lights, by some of the sets of samples.
     fn of_sight(&self, i: usize, sets: &[usize]) -> f64 {
-        let variances = sets.iter().map(|&k| f64::from(self.pixels[i].sight_variance[k]));
-        let variance = variances.sum::<f64>() / sets.len() as f64;
-        if variance > 0.0 { variance * self.relative_to(i).iter().sum::<f64>() } else { 0.0 }
+        let variance = self.pixels[i].mean_sight_variance(sets);
+        if variance == [0.0; 3] { 0.0 } else { dot(variance, self.relative_to(i)) }
     }
 
     /// v_p: the relative variance, averaged over the chosen ones of the neighbours or of all pixels of the material, and that
@@ -313,16 +323,19 @@ impl<'a> Pilot<'a> {
     /// The relative variance of visible lights that a pixel has, or its neighbours together: a few samples do not see the
     /// edge of a light in all pixels that it touches.
     fn of_sight_around(&self, i: usize, sets: &[usize]) -> f64 {
-        let (mut variance, mut sight, mut count) = (0.0, [0.0; 3], 0.0);
+        let (mut variance, mut sight, mut count) = ([0.0; 3], [0.0; 3], 0.0);
         for q in self.around(i, SIGHT_RADIUS).map(|q| &self.pixels[q]) {
-            variance += sets.iter().map(|&k| f64::from(q.sight_variance[k])).sum::<f64>() / sets.len() as f64;
-            (0..3).for_each(|c| sight[c] += f64::from(q.sight[c]));
+            let of_pixel = q.mean_sight_variance(sets);
+            (0..3).for_each(|c| {
+                variance[c] += of_pixel[c];
+                sight[c] += f64::from(q.sight[c]);
+            });
             count += 1.0;
         }
-        if variance == 0.0 {
+        if variance == [0.0; 3] {
             return 0.0;
         }
-        let of_all = variance / count * self.relative_beside(i, sight.map(|s| s / count)).iter().sum::<f64>();
+        let of_all = dot(variance, self.relative_beside(i, sight.map(|s| s / count))) / count;
         of_all.max(self.of_sight(i, sets))
     }
 
@@ -337,8 +350,7 @@ impl<'a> Pilot<'a> {
         for i in (0..counts.len()).filter(|&i| !is_even(i)) {
             let Some(relative) = self.relative_variance(i) else { continue };
             let p = &self.pixels[i];
-            let of_sight = f64::from(p.sight_variance[1]);
-            let absolute = 3.0 * of_sight + p.variance.iter().map(|v| f64::from(*v)).sum::<f64>();
+            let absolute: f64 = p.sight_variance[1].iter().chain(&p.variance).map(|v| f64::from(*v)).sum();
             let n = f64::from(counts[i]) / f64::from(spp);
             for (sums, n) in [(&mut uniform, 1.0), (&mut adaptive, n)] {
                 let terms = [(relative + self.of_sight(i, &[1])) / n, absolute / n, f64::from(p.cost) * n];

@@ -524,7 +524,7 @@ fn with_photons(job: &mut RenderJob, nanoseconds: f64) -> Vec<Candidate> {
     let samples = job.world.scene.film.bounds.area() as f64 * f64::from(sampling.pilot_spp());
     let affordable = samples * nanoseconds * PHOTON_SHARE / PHOTON_TIME;
     let given = base.photons.visibility_photons;
-    if job.lights.lights.len() < MANY_LIGHTS || affordable < given.map_or(MIN_PHOTONS, f64::from) {
+    if job.lights.lit.len() < MANY_LIGHTS || affordable < given.map_or(MIN_PHOTONS, f64::from) {
         return Vec::new();
     }
     if affordable < PHOTON_PATHS as f64 {

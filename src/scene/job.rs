@@ -4,7 +4,7 @@ use super::{PixelSamples, SampleCountMap, Scene, World};
 use crate::accel::Hit;
 use crate::bsdfs::MAX_LOBES;
 use crate::geometry::{GeometryId, Shape};
-use crate::lights::{Irradiances, LightSampling};
+use crate::lights::{Irradiances, LightChoice, LightSampling};
 use crate::settings::{IntegratorSettings, Settings};
 use lumiris_numbers::math::Rgb;
 use std::sync::Arc;
@@ -37,12 +37,13 @@ impl RenderJob {
         let i = &settings.integrator;
         let scene = &world.scene;
         let lobes = scene.materials.lobes(i.bsdf_density);
-        let lights = LightSampling::new(Arc::clone(&scene.lights), i.light_choice(), max_groups(i, lobes));
         let has_alpha = |geometry: GeometryId| scene.geometry.geometries[geometry as usize].alpha.is_some();
         let irradiances = Irradiances::new(&scene.lights, has_alpha);
         let plain = (0..scene.geometry.geometries.len() as GeometryId).map(|g| plain_reflectance(scene, g)).collect();
         let may_pass: Vec<bool> = scene.surfaces.iter().map(|s| scene.materials.may_pass(s.material)).collect();
         let shadows_pass = may_pass.contains(&true);
+        let choice = light_choice(i, shadows_pass);
+        let lights = LightSampling::new(Arc::clone(&scene.lights), choice, max_groups(i, lobes));
         RenderJob {
             world,
             settings,
@@ -62,8 +63,8 @@ impl RenderJob {
         let i = &settings.integrator;
         self.settings = settings;
         self.lobes = self.world.scene.materials.lobes(i.bsdf_density);
-        self.lights =
-            LightSampling::new(Arc::clone(&self.world.scene.lights), i.light_choice(), max_groups(i, self.lobes));
+        let choice = light_choice(i, self.shadows_pass);
+        self.lights = LightSampling::new(Arc::clone(&self.world.scene.lights), choice, max_groups(i, self.lobes));
         self.sample_count_map = None;
         self.pixel_samples = None;
     }
@@ -101,8 +102,9 @@ impl RenderJob {
         let i = &self.settings.integrator;
         self.lobes = self.world.scene.materials.lobes(i.bsdf_density);
         let max = max_groups(i, self.lobes);
-        if i.light_choice() != before.light_choice() {
-            self.lights.choose_by(i.light_choice(), max);
+        let choice = light_choice(i, self.shadows_pass);
+        if choice != light_choice(&before, self.shadows_pass) {
+            self.lights.choose_by(choice, max);
         } else if (i.bsdf_density, i.ocv.components) != (before.bsdf_density, before.ocv.components) {
             self.lights.set_groups(max);
         }
@@ -136,6 +138,12 @@ fn plain_reflectance(scene: &Scene, geometry: GeometryId) -> Option<Rgb> {
     let is_mesh = matches!(scene.geometry.geometries[geometry as usize].shape, Shape::Mesh(_));
     let reflectance = scene.materials.plain_reflectance(scene.surfaces[geometry as usize].material, &scene.textures)?;
     (is_mesh && !is_between_media && !scene.lights.emits(geometry)).then_some(reflectance)
+}
+
+/// How lights are chosen. Segments that see into media that glow are those that pass boundaries.
+fn light_choice(settings: &IntegratorSettings, shadows_pass: bool) -> LightChoice {
+    let choice = settings.light_choice();
+    LightChoice { glows: choice.glows && shadows_pass, ..choice }
 }
 
 /// Maximum number of groups of lights: the components of a mixture other than `lobes`.

@@ -133,7 +133,16 @@ impl IntegratorSettings {
 
     /// How lights are chosen.
     pub fn light_choice(&self) -> LightChoice {
-        LightChoice { kind: self.light_sampler, infinite_fraction: self.infinite_fraction }
+        let glows = self.finds_glows_at(0) && self.finds_glows_at(1);
+        LightChoice { kind: self.light_sampler, infinite_fraction: self.infinite_fraction, glows }
+    }
+
+    /// True if light samples at a path vertex, counted from 0, may look for what media send out: then the path is their only
+    /// BSDF sample, which finds it too.
+    fn finds_glows_at(&self, vertex: u32) -> bool {
+        let is_mis = matches!(self.estimator, EstimatorKind::Auto | EstimatorKind::Mis);
+        let samples = self.sample_counts_at(vertex).samples;
+        is_mis && samples >= 2 && bsdf_samples(samples, self.bsdf_fraction()) == 1
     }
 
     /// True if lights are chosen by a light tree, and those at infinity beside it.
@@ -203,6 +212,11 @@ impl IntegratorSettings {
             None => first,
         }
     }
+}
+
+/// Number of BSDF samples among `n` ≥ 2 samples, of which they are a fraction: at least one, as of light samples.
+pub fn bsdf_samples(n: u32, fraction: f32) -> u32 {
+    ((n as f32 * fraction) as u32).clamp(1, n - 1)
 }
 
 /// What is computed.

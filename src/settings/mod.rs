@@ -15,7 +15,7 @@ pub mod value;
 pub use integrator::{
     Cached, ContributingSettings, CorrelatedForm, CorrelatedSettings, EstimatorKind, IntegratorKind,
     IntegratorSettings, IrradianceCacheSettings, OcvSettings, OptimalForm, RouletteKind, SampleCounts,
-    SamplingTechnique,
+    SamplingTechnique, bsdf_samples,
 };
 pub use photon_map::{PhotonMapSettings, PhotonStorage, ProgressiveSettings};
 pub use ris::{ProposalPoints, Proposals, RisSettings, StageTimes, Strata, Target};

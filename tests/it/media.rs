@@ -7,11 +7,14 @@ use lumiris::film::{Film, PixelSums};
 use lumiris::import::cache::FileCache;
 use lumiris::import::{LoadOptions, load_text};
 use lumiris::integrators::reuse;
+use lumiris::lights::LightCtx;
+use lumiris::media::Medium;
 use lumiris::render::plan::{Preparation, prepare};
 use lumiris::render::{RenderSettings, render};
 use lumiris::scene::{AccelKind, RenderJob};
 use lumiris::settings::{EstimatorKind, IntegratorKind, IntegratorSettings, Proposals, RouletteKind, Target};
 use lumiris_formats::spectra::Y_INTEGRAL;
+use lumiris_numbers::math::Vec3;
 use std::path::Path;
 use std::sync::atomic::AtomicBool;
 
@@ -450,6 +453,78 @@ fn what_glows_beyond_the_last_vertex_lights_it() {
     for (estimator, settings) in estimators() {
         choose(&mut job, &settings);
         assert_answer(&mut job, 2, answer, 0.01, &estimator);
+    }
+}
+
+/// A wall beside what glows, of which the boundary lets half be seen: L = ρ/π ∫ σ_a L_e cos θ/r² dV over that half, where next to nothing
+/// is absorbed. Light samples find it, and so do paths alone.
+#[test]
+fn light_samples_find_what_glows_where_it_is_and_not_beyond_its_boundary() {
+    let place = r#""point3 p0" [0.5 -0.5 -0.9] "point3 p1" [1.3 0.3 0.1] "integer nx" 4 "integer ny" 4 "integer nz" 4"#;
+    let (low, high) = (Vec3::new(0.5, -0.5, -0.9), Vec3::new(0.9, 0.3, 0.1));
+    let boundary = r#"Shape "trianglemesh" "point3 P" [0.5 -0.5 -0.9  0.9 -0.5 -0.9  0.9 0.3 -0.9  0.5 0.3 -0.9
+        0.5 -0.5 0.1  0.9 -0.5 0.1  0.9 0.3 0.1  0.5 0.3 0.1]
+        "integer indices" [0 2 1 0 3 2  4 5 6 4 6 7  0 1 5 0 5 4  3 7 6 3 6 2  0 4 7 0 7 3  1 2 6 1 6 5]"#;
+    let text = camera("0.1 0.2 3", "", 1)
+        + &format!(
+            r#"MakeNamedMedium "fire" "string type" "uniformgrid" "rgb sigma_a" [0.002 0.001 0.003] "rgb sigma_s" [0 0 0] {place}
+            "float density" [{}] "rgb Le" [300 200 100]
+            AttributeBegin Material "interface" MediumInterface "fire" "" {boundary} AttributeEnd
+            Material "diffuse" "rgb reflectance" [0.5 0.4 0.8]
+            Shape "trianglemesh" "point3 P" [-9 -9 -1  9 -9 -1  9 9 -1  -9 9 -1] "integer indices" [0 1 2 0 2 3]"#,
+            grid(1, 2.0)
+        );
+    let mut job = job(&text, AccelKind::Embree);
+    let Medium::Heterogeneous(fire) = job.world.scene.media.media[0].clone() else { panic!("no grid") };
+    let at = Vec3::new(0.1, -0.2, -1.0);
+    // By the rule of midpoints, in the unit cube, of which the boundary holds the lower half along x
+    let (steps, mut irradiance) = (64, [0.0_f64; 3]);
+    for i in 0..steps * steps * steps / 2 {
+        let place = [i % (steps / 2), i / (steps / 2) % steps, i / (steps * steps / 2)];
+        let unit = Vec3::from(place.map(|x| (x as f32 + 0.5) / steps as f32));
+        let p = fire.world_point(unit);
+        assert!(p.cmpge(low).all() && p.cmple(high).all());
+        let (r2, cos) = ((p - at).length_squared(), (p - at).normalize().z);
+        let volume = fire.volume() / (steps * steps * steps) as f32;
+        let glow = fire.glow(unit).to_array();
+        (0..3).for_each(|c| irradiance[c] += f64::from(glow[c] * cos / r2 * volume));
+    }
+    let rho = [0.5, 0.4, 0.8];
+    let answer = [0, 1, 2].map(|c| rho[c] / std::f64::consts::PI * irradiance[c]);
+    for (name, settings) in estimators() {
+        choose(&mut job, &settings);
+        let looks = settings.estimator == EstimatorKind::Mis && settings.samples > Some(1);
+        let ctx = LightCtx::on(at, Vec3::Z);
+        assert_eq!(job.lights.sampler.sample(&ctx, 0.5).is_some(), looks, "{name}");
+        assert_answer(&mut job, 128, answer, if looks { 0.03 } else { 0.4 }, &name);
+    }
+}
+
+/// Smoke that glows and scatters, before a wall and around a glossy ball, with a lamp and a sky: nobody knows the answer, but all
+/// estimators agree on it.
+#[test]
+fn estimators_agree_where_smoke_glows() {
+    for depth in [1, 4] {
+        let text = camera("0.1 0.2 3", "", depth)
+            + &format!(
+                r#"MakeNamedMedium "smoke" {} LightSource "infinite" "rgb L" [0.2 0.3 0.4]
+                AttributeBegin Material "interface" MediumInterface "smoke" "" {BOX} AttributeEnd
+                AttributeBegin MediumInterface "smoke" "smoke" Material "coateddiffuse" "rgb reflectance" [0.6 0.5 0.4] "float roughness" 0.3
+                Translate 0.2 0 -0.2 Shape "sphere" "float radius" 0.4 AttributeEnd
+                AreaLightSource "diffuse" "rgb L" [2 5 7] Material "diffuse" Shape "trianglemesh"
+                "point3 P" [1.5 -0.5 0  1.9 -0.5 0.1  1.7 -0.2 0] "integer indices" [0 1 2]"#,
+                media(0.6, 0.8, r#""rgb Le" [3 2 1]"#)[1].1
+            );
+        let mut job = job(&text, AccelKind::Embree);
+        let mut answers = Vec::new();
+        for (name, settings) in estimators() {
+            choose(&mut job, &settings);
+            answers.push((format!("{name}, {depth} bounces"), means(&mut job, 32)));
+        }
+        choose(&mut job, &estimators()[1].1);
+        job.change(|s| s.integrator.roulette = RouletteKind::Efficiency);
+        answers.push((format!("splitting, {depth} bounces"), means(&mut job, 32)));
+        assert_they_agree(&answers, 0.25);
     }
 }
 

@@ -4,7 +4,7 @@ use crate::direct::candidates::{Candidates, SampleAllocation};
 use crate::direct::light_samples;
 use crate::direct::point::ShadingPoint;
 use crate::direct::t1::T1;
-use crate::settings::IntegratorSettings;
+use crate::settings::{IntegratorSettings, bsdf_samples};
 use lumiris_numbers::estimators::mis::Heuristic;
 
 /// Light and BSDF sampling.
@@ -27,7 +27,7 @@ impl Mis {
 
     /// Number of BSDF samples among `n` ≥ 2 samples.
     pub fn bsdf_samples(&self, n: u32) -> u32 {
-        ((n as f32 * self.bsdf_fraction) as u32).clamp(1, n - 1)
+        bsdf_samples(n, self.bsdf_fraction)
     }
 
     /// True if an estimate of `n` samples has one of BSDF sampling, which the path can continue by.

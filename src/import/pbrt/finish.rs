@@ -125,6 +125,7 @@ impl Builder<'_> {
             let shape = &geometry.geometries[id as usize].shape;
             lights.in_group(group).add_area(id, shape, &Emission { cover, ..emission });
         }
+        lights.in_group(None).add_media(&assembly.media.set);
         let bounds = geometry.world_bounds();
         for (_, span) in self.portals.iter().filter(|(portal, _)| !portal.lights(&bounds)) {
             let message = "no shape is on the side of the portal that is lit: its light will not be seen";

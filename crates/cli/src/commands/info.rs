@@ -7,6 +7,7 @@ use super::progress;
 use super::settings::load_job;
 use clap::Args;
 use lumiris::geometry::Shape;
+use lumiris::lights::Light;
 use lumiris::render::RenderSettings;
 use lumiris::render::memory::{Wanted, predict};
 use lumiris::render::output::metadata;
@@ -72,7 +73,7 @@ fn facts(job: &RenderJob) -> Value {
         *materials.entry(entry.material.kind_name()).or_default() += 1;
     }
     let mut lights: BTreeMap<&str, usize> = BTreeMap::new();
-    for light in &scene.lights.lights {
+    for light in scene.lights.lights.iter().filter(|light| !matches!(light, Light::Glow(_))) {
         *lights.entry(light.kind_name()).or_default() += 1;
     }
     let accel = job.world.accel.stats();
