@@ -103,6 +103,9 @@ pub enum ProposalPoints {
 pub enum Target {
     /// Luminance of f·G·L: everything but visibility.
     Fgl,
+    /// As `fgl`; in surrounding pixels, what the draws have of each group of lights tells what is seen of the group, which is a control
+    /// variate of the pixel.
+    FglControl,
     /// G·V: for surfaces and lights that are more expensive to evaluate than a ray is to trace.
     Gv,
     /// G·V·L: for surfaces that are more expensive to evaluate than a ray is to trace.
@@ -117,7 +120,7 @@ impl Target {
     /// True if proposals are traced before they are resampled.
     pub fn has_visibility(self) -> bool {
         match self {
-            Target::Fgl | Target::Visibility | Target::VisibilityControl => false,
+            Target::Fgl | Target::FglControl | Target::Visibility | Target::VisibilityControl => false,
             Target::Gv | Target::Gvl => true,
         }
     }

@@ -27,7 +27,7 @@ use super::t1::{BsdfBuffers, T1};
 use crate::scene::RenderJob;
 use crate::settings::{
     ContributingSettings, CorrelatedForm, CorrelatedSettings, EstimatorKind, IntegratorSettings, OptimalForm,
-    SampleCounts,
+    RisSettings, SampleCounts, Target,
 };
 use contributing::Contributing;
 use correlated::Correlated;
@@ -78,12 +78,15 @@ impl Estimator {
     }
 
     /// The settings with an estimator for later vertices. Progressive estimators are fitted to the first vertices of a
-    /// pixel, which are close together; at later ones, which lie anywhere, `mis` is used.
+    /// pixel, which are close together; at later ones, which lie anywhere, `mis` is used, or `ris` without what was fitted.
     #[must_use]
     pub fn without_fits(settings: &IntegratorSettings) -> IntegratorSettings {
         let estimator = Self::new(settings, 0);
         if !estimator.is_progressive() && !estimator.is_over_pixels() {
             return *settings;
+        }
+        if let Estimator::Ris(_) = estimator {
+            return IntegratorSettings { ris: RisSettings { target: Target::Fgl, ..settings.ris }, ..*settings };
         }
         let samples = Some(settings.sample_counts_at(1).samples);
         IntegratorSettings { estimator: EstimatorKind::Mis, samples, ..*settings }
@@ -138,7 +141,11 @@ impl Estimator {
 
     /// True if the estimates of a pixel are corrected by what was fitted to other pixels.
     pub fn is_over_pixels(&self) -> bool {
-        matches!(self, Estimator::Ocv(ocv) if ocv.form == Form::Pixels)
+        match self {
+            Estimator::Ocv(ocv) => ocv.form == Form::Pixels,
+            Estimator::Ris(ris) => ris.has_fitted_control(),
+            _ => false,
+        }
     }
 
     /// True if an estimate consists of two independent halves.
@@ -158,7 +165,7 @@ impl Estimator {
     /// `count` fits without samples; none if estimates do not use fits.
     pub fn fits(&self, job: &RenderJob, count: usize) -> Fits {
         let solver = match self {
-            Estimator::Ocv(_) if self.is_over_pixels() => return Fits::of_pixels(job.controls(), count),
+            _ if self.is_over_pixels() => return Fits::of_pixels(job.controls(), count),
             Estimator::Ocv(_) if self.is_progressive() => ocv::solve,
             Estimator::OptimalMis(_) if self.is_progressive() => optimal_mis::solve,
             _ => return Fits::default(),
@@ -215,6 +222,7 @@ impl Estimator {
             Estimator::Ris(_) => {
                 segments.resolve(out);
                 out.iter_mut().zip(&ris.known).for_each(|(out, &known)| *out += known);
+                ris.set_controls(job, points, out, fits);
             }
             Estimator::Ocv(ocv) => {
                 ocv.resolve(job, points, (candidates, segments, components), fits, out);

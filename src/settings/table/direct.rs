@@ -173,8 +173,8 @@ pub(super) const RIS: Group = Group {
             parameters: &["target"],
             key: "target",
             kind: choice(Target::VARIANTS),
-            help: "Target density of resampling: f*G*L; with visibility V, where shading is more expensive than \
-                   tracing rays; f*G*L with V estimated by the visibility cache (visibility), which may be a \
+            help: "Target density of resampling: f*G*L, also with what surrounding pixels see of groups of lights as \
+                   control variates (fgl-control); with visibility V, where shading is more expensive than tracing rays; f*G*L with V estimated by the visibility cache (visibility), which may be a \
                    control variate as well (visibility-control)",
             applies: Applies::Estimators(&[Ris]),
             get: |s| Some(Value::Name(s.integrator.ris.target.into())),

@@ -133,6 +133,9 @@ fn visibility_cache_configurations() -> Vec<Configuration> {
         ..ris
     });
     let control = Configuration { target: Target::VisibilityControl, ..ris };
+    let fitted = Configuration { target: Target::FglControl, ..ris };
+    all.extend([1, 4].map(|samples| Configuration { samples, ..fitted }));
+    all.push(Configuration { strata: Strata::None, sampler: SamplerKind::Independent, ..fitted });
     all.extend([Absent, Right, Wrong].map(|visibility_cache| Configuration { visibility_cache, ..control }));
     all.push(Configuration { visibility_cache: Wrong, strata: Strata::None, ..control });
     let ocv = Configuration { estimator: EstimatorKind::Ocv, samples: 5, light_sampler, ..*base };

@@ -47,3 +47,38 @@ impl Known {
         self.sum
     }
 }
+
+/// Most groups of proposals.
+pub const MAX_GROUPS: usize = 8;
+
+/// Control variates of an estimate by groups of proposals: the weights of the draws of a group, each times its scale, less
+/// those of all its proposals.
+///
+/// Given the proposals, the expectation of each is 0, as a draw has the scale 1/E[number of times that it is drawn]. If
+/// weights are what proposals contribute unoccluded, and a group has the visibility v_g wherever they lie, then the estimate less
+/// Σ v_g times these is v_g times all proposals of each group: which groups happened to be drawn no longer matters. That is the control variate of
+/// Fan et al. 2006 [Eq. 7] for sets that are resampled.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct OfGroups {
+    sums: [f32; MAX_GROUPS],
+}
+
+impl OfGroups {
+    /// Adds a proposal of a group.
+    #[inline]
+    pub fn propose(&mut self, group: usize, weight: f32) {
+        self.sums[group] -= weight;
+    }
+
+    /// Adds a draw, whose weight is `scaled` by its scale.
+    #[inline]
+    pub fn draw(&mut self, group: usize, scaled: f32) {
+        self.sums[group] += scaled;
+    }
+
+    /// The control variate of each group.
+    #[inline]
+    pub fn sums(&self) -> &[f32; MAX_GROUPS] {
+        &self.sums
+    }
+}
