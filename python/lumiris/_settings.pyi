@@ -35,6 +35,7 @@ class Settings(TypedDict, total=False):
     target: Optional[Literal["fgl", "gv", "gvl", "visibility", "visibility-control"]]
     stage_times: Optional[Tuple[float, float]]
     ocv: Optional[Literal["paper", "regression", "crossfit", "progressive", "pixels"]]
+    control_variates: Optional[Literal["auto", "always"]]
     components: Optional[int]
     optimal_mis: Optional[Literal["direct", "progressive"]]
     correlated: Optional[Literal["combined", "crossfit"]]

@@ -306,6 +306,19 @@ pub struct OcvSettings {
     pub form: Form,
     /// Maximum number of components of the mixture: BSDF lobes and groups of lights; `None`: as many as possible.
     pub components: Option<u32>,
+    /// Whether the form over pixels has control variates.
+    pub control_variates: ControlVariates,
+}
+
+/// Whether `ocv` over pixels has control variates.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, EnumString, IntoStaticStr, VariantNames)]
+#[strum(serialize_all = "kebab-case")]
+pub enum ControlVariates {
+    /// Where a pilot finds that they gain more than they cost; elsewhere the estimator is `mis`.
+    #[default]
+    Auto,
+    /// In any image.
+    Always,
 }
 
 impl OcvSettings {
