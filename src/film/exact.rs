@@ -15,6 +15,8 @@
 pub const LIMIT: f32 = 549_755_813_888.0;
 /// The same for albedos and normals.
 const UNIT_LIMIT: f32 = 4.0;
+/// Magnitude below which terms of [`FixedSum`] are less than 2⁶³ quanta.
+const SMALL: f64 = 64.0;
 /// Binary digits after the point.
 const FIXED_BITS: i32 = 56;
 const SQUARE_BITS: i32 = 80;
@@ -60,6 +62,13 @@ impl FixedSum {
     pub fn add_product(&mut self, a: f32, b: f32) {
         // All digits fit
         let x = f64::from(a) * f64::from(b);
+        if x.abs() < SMALL {
+            // Beyond 2⁵¹ quanta, products of two f32 numbers are whole numbers of them
+            let quanta = x * power(FIXED_BITS);
+            let half = if quanta.abs() < (1_u64 << 51) as f64 { 0.5_f64.copysign(quanta) } else { 0.0 };
+            self.0 = { self.0 }.wrapping_add(((quanta + half) as i64).into());
+            return;
+        }
         if !(x.abs() < f64::from(LIMIT)) {
             return;
         }

@@ -29,6 +29,18 @@ pub struct PixelSample {
     pub features: Option<Features>,
 }
 
+/// Which features samples have.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub enum FeatureSet {
+    /// None.
+    None,
+    /// All but the albedo, which takes a while where it has to be estimated.
+    NoAlbedo,
+    /// All.
+    #[default]
+    All,
+}
+
 /// Features of the first surface that a camera ray meets.
 #[derive(Clone, Copy, Debug, Default)]
 pub struct Features {

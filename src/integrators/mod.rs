@@ -29,7 +29,7 @@ pub use photon_map::{MapStats, PhotonMapIntegrator};
 pub use pilot::GuidedIntegrator;
 
 use crate::direct::Fits;
-use crate::film::PixelSample;
+use crate::film::{FeatureSet, PixelSample};
 use crate::photons::PhotonError;
 use crate::scene::RenderJob;
 use crate::settings::{IntegratorKind, RouletteKind};
@@ -45,7 +45,7 @@ pub trait Integrator: Sync {
     }
 
     /// What one thread traces samples with, using what is prepared.
-    fn tracer(&self, with_features: bool) -> Box<dyn Tracer + '_>;
+    fn tracer(&self, features: FeatureSet) -> Box<dyn Tracer + '_>;
 
     /// True if pixels share random numbers, so that their variance cannot be told from a few of them.
     fn shares_noise(&self) -> bool {

@@ -21,7 +21,7 @@ use super::wavefront::{Batch, Buffers, Estimate, Output};
 use super::{Integrator, Statistics, Tracer};
 use crate::bsdfs::{Bsdf, Diffuse};
 use crate::direct::{DirectStage, Estimator, Fits, ShadingPoint, lobe_for_lights};
-use crate::film::PixelSample;
+use crate::film::{FeatureSet, PixelSample};
 use crate::lights::LightSampling;
 use crate::materials::SurfaceBsdf;
 use crate::media::Sides;
@@ -53,8 +53,8 @@ impl Integrator for PathIntegrator<'_> {
         Ok(self.light.as_mut().map_or(u32::MAX, |light| light.prepare(self.job, first)))
     }
 
-    fn tracer(&self, with_features: bool) -> Box<dyn Tracer + '_> {
-        let mut paths = PathTracer::sharing(self.groups, with_features);
+    fn tracer(&self, features: FeatureSet) -> Box<dyn Tracer + '_> {
+        let mut paths = PathTracer::sharing(self.groups, features);
         let Some(light) = &self.light else { return Box::new(paths) };
         paths.search.guide = Some(Arc::clone(&light.guide));
         Box::new(WithLightPaths { paths, light })
@@ -148,16 +148,16 @@ struct Step<'s, 'w> {
 }
 
 impl PathTracer {
-    /// With or without features of first surfaces.
-    pub fn new(with_features: bool) -> Self {
+    /// With these features of first surfaces.
+    pub fn new(features: FeatureSet) -> Self {
         let mut tracer = PathTracer::default();
-        tracer.search.omits_features = !with_features;
+        tracer.search.features = features;
         tracer
     }
 
     /// The same, where these samples of a batch share paths if the settings say so.
-    pub fn sharing(groups: Groups, with_features: bool) -> Self {
-        PathTracer { reuse: Reuse::of(groups), ..PathTracer::new(with_features) }
+    pub fn sharing(groups: Groups, features: FeatureSet) -> Self {
+        PathTracer { reuse: Reuse::of(groups), ..PathTracer::new(features) }
     }
 
     /// Leaves to light paths what these find, as many for each camera sample of the image as given, from now on: what remains is

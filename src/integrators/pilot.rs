@@ -11,7 +11,7 @@ use super::roulette::{PixelMeans, Roulette, Tail};
 use super::segment::{CameraSample, PathStats};
 use super::{Integrator, Statistics, Tracer};
 use crate::direct::{Estimator, Fits};
-use crate::film::PixelSample;
+use crate::film::{FeatureSet, PixelSample};
 use crate::scene::RenderJob;
 use crate::settings::IntegratorSettings;
 use lumiris_numbers::math::hash::pcg4d;
@@ -67,16 +67,16 @@ impl GuidedIntegrator {
     }
 
     /// Traces paths that end and split by what the pilot found.
-    pub fn path_tracer(&self, with_features: bool) -> PathTracer {
-        let mut paths = PathTracer::new(with_features);
+    pub fn path_tracer(&self, features: FeatureSet) -> PathTracer {
+        let mut paths = PathTracer::new(features);
         paths.search.arrivals.mode = Mode::Guided(Arc::clone(&self.roulette));
         paths
     }
 }
 
 impl Integrator for GuidedIntegrator {
-    fn tracer(&self, with_features: bool) -> Box<dyn Tracer + '_> {
-        Box::new(GuidedTracer { settings: &self.settings, paths: self.path_tracer(with_features) })
+    fn tracer(&self, features: FeatureSet) -> Box<dyn Tracer + '_> {
+        Box::new(GuidedTracer { settings: &self.settings, paths: self.path_tracer(features) })
     }
 
     fn statistics(&self, mut paths: PathStats) -> Statistics {
@@ -217,7 +217,7 @@ fn learn(job: &RenderJob) -> (Roulette, PathStats) {
     let grid = Grid::new(job);
     let rows: Vec<Row> = (0..grid.rows)
         .into_par_iter()
-        .map_init(|| PathTracer::new(false), |tracer, row| trace_row(tracer, job, &settings, &grid, row))
+        .map_init(|| PathTracer::new(FeatureSet::None), |tracer, row| trace_row(tracer, job, &settings, &grid, row))
         .collect();
 
     // Means of the image
@@ -291,7 +291,7 @@ mod tests {
                 let job = loaded.job(AccelKind::Embree, None).unwrap();
                 let guided = wrong(&job);
                 let grid = Grid { edge: 0.02, columns: SAMPLES / 2, rows: 1, seed: 3 };
-                let mut tracer = guided.path_tracer(false);
+                let mut tracer = guided.path_tracer(FeatureSet::None);
                 let (mut out, mut l) = (Vec::new(), Vec::new());
                 for first in (0..grid.columns).step_by(2048) {
                     let pairs = (first..first + 2048).flat_map(|i| grid.pair(&job, guided.settings(), [i, 0]));

@@ -6,7 +6,7 @@ use crate::bsdfs::Lobe;
 use crate::cameras::CameraRay;
 use crate::direct::estimators::mis::Mis;
 use crate::direct::{DirectStats, ShadingPoint};
-use crate::film::Features;
+use crate::film::{FeatureSet, Features};
 use crate::geometry::SurfaceHit;
 use crate::lights::{GlossyLobe, LightCtx, LightHit};
 use crate::materials::SurfaceBsdf;
@@ -225,11 +225,14 @@ impl PathState {
         job: &RenderJob,
         interaction: &SurfaceInteraction,
         bsdf: &SurfaceBsdf<'_>,
-        stream: &SampleStream,
+        (features, stream): (FeatureSet, &SampleStream),
     ) -> Features {
         let z = bsdf.frame.z;
         Features {
-            albedo: bsdf.albedo_estimate(interaction.wo, || stream.domain(domain::ALBEDO).draw::<3>()),
+            albedo: match features {
+                FeatureSet::All => bsdf.albedo_estimate(interaction.wo, || stream.domain(domain::ALBEDO).draw::<3>()),
+                FeatureSet::None | FeatureSet::NoAlbedo => Rgb::BLACK,
+            },
             normal: if z.dot(interaction.wo) < 0.0 { -z } else { z },
             depth: self.depth(interaction),
             material: job.world.scene.surfaces[interaction.hit.geometry as usize].material,

@@ -7,7 +7,7 @@ use super::light_paths::{Chain, Guide};
 use super::segment::{CameraSample, Carried, PathState, PathStats, Vertex, domain, emptied};
 use super::wavefront::Batch;
 use crate::accel::{Coherence, Hit, RayBatch};
-use crate::film::{Features, PixelSample};
+use crate::film::{FeatureSet, Features, PixelSample};
 use crate::geometry::{Shape, SurfaceHit};
 use crate::lights::LightCtx;
 use crate::materials::SurfaceBsdf;
@@ -71,8 +71,8 @@ pub(super) struct VertexSearch {
     pub(super) stats: PathStats,
     /// Omits emission towards the camera, and all features except the depth.
     pub(super) only_reflected: bool,
-    /// Omits all features.
-    pub(super) omits_features: bool,
+    /// The features of first surfaces that are determined.
+    pub(super) features: FeatureSet,
     /// What is done about paths that arrive at vertices.
     pub(super) arrivals: Arrivals,
     /// What is of each light group.
@@ -161,7 +161,7 @@ impl VertexSearch {
         let Some(rho) = at.job.plain_reflectance(hit) else { return false };
         let Some(beta) = path.beta_beyond_emitter() else { return true };
         let distance = hit.t * path.ray.d.length();
-        if at.vertex == 0 && !self.omits_features {
+        if at.vertex == 0 && self.features != FeatureSet::None {
             let features = &mut at.out[path.sample as usize].features;
             features.get_or_insert_with(|| path.plain_features(at.job, hit, distance, rho));
         }
@@ -202,12 +202,13 @@ impl VertexSearch {
             }
             return;
         };
-        if at.vertex == 0 && !self.omits_features {
+        if at.vertex == 0 && self.features != FeatureSet::None {
             out.features.get_or_insert_with(|| {
                 if self.only_reflected {
                     Features { depth: path.depth(&interaction), ..Features::default() }
                 } else {
-                    path.features(at.job, &interaction, &bsdf, &sample.stream.domain(domain::VERTEX))
+                    let stream = sample.stream.domain(domain::VERTEX);
+                    path.features(at.job, &interaction, &bsdf, (self.features, &stream))
                 }
             });
         }
@@ -336,7 +337,7 @@ impl VertexSearch {
                     let bsdf = SurfaceBsdf::in_medium(medium.g(), -d);
                     self.scatter(at, (path, t, weight), (surface, bsdf), vertices);
                 }
-                path.is_ghost = at.vertex == 0 && !self.omits_features;
+                path.is_ghost = at.vertex == 0 && self.features != FeatureSet::None;
                 !path.is_ghost
             }
         }

@@ -5,7 +5,7 @@
 //! it; the groups merely divide that choice in two, first a group and then a light of it, so that the number of samples
 //! per group can be fixed.
 
-use super::{Light, LightCtx, LightId, LightSampler, LightTree, SampledLight};
+use super::{CutNode, Light, LightCtx, LightId, LightSampler, LightTree, SampledLight, Turns};
 use lumiris_numbers::math::{AliasTable, ONE_MINUS_EPSILON};
 
 /// Maximum number of groups.
@@ -27,13 +27,13 @@ pub struct LightGroups {
 enum Choice {
     /// Groups of fixed probabilities.
     Fixed(Vec<FixedGroup>),
-    /// Subtrees of the sampler's tree, by their topmost nodes, ascending.
-    Tree(Vec<u32>),
+    /// Subtrees of the sampler's tree, by their topmost nodes, ascending, and the nodes above.
+    Tree { cut: Vec<u32>, above: Vec<CutNode> },
 }
 
 impl Default for Choice {
     fn default() -> Self {
-        Choice::Tree(Vec::new())
+        Choice::Tree { cut: Vec::new(), above: Vec::new() }
     }
 }
 
@@ -77,7 +77,7 @@ impl LightGroups {
             lights.iter().for_each(|&l| group_of[l as usize] = g as u8);
         }
         let choice = match sampler.tree() {
-            Some(_) => Choice::Tree(cut),
+            Some(_) => Choice::Tree { above: tree.above(&cut), cut },
             None => {
                 let fixed = |lights: Vec<LightId>| {
                     let weights: Vec<f32> = lights.iter().map(|&l| sampler.pmf(&ctx, l)).collect();
@@ -93,7 +93,7 @@ impl LightGroups {
     pub fn len(&self) -> usize {
         match &self.choice {
             Choice::Fixed(groups) => groups.len(),
-            Choice::Tree(cut) => cut.len() + usize::from(self.has_infinite),
+            Choice::Tree { cut, .. } => cut.len() + usize::from(self.has_infinite),
         }
     }
 
@@ -112,14 +112,23 @@ impl LightGroups {
     /// Probability that the sampler of the set chooses a light of each group, seen from a point. They sum to one,
     /// unless nothing can be chosen.
     pub fn pmfs(&self, sampler: &LightSampler, ctx: &LightCtx) -> [f32; MAX_GROUPS] {
+        let mut turns = Turns::NONE;
+        self.pmfs_again(sampler, ctx, &mut turns)
+    }
+
+    /// [`Self::pmfs`], where the point's `turns` hold what is known of it.
+    #[inline]
+    pub fn pmfs_again(&self, sampler: &LightSampler, ctx: &LightCtx, turns: &mut Turns) -> [f32; MAX_GROUPS] {
         let mut pmfs = [0.0; MAX_GROUPS];
         match &self.choice {
-            Choice::Tree(cut) => {
+            Choice::Tree { cut, above } => {
                 let Some(choice) = sampler.tree() else { return pmfs };
-                let p_infinite = choice.infinite_probability(ctx);
-                let first = usize::from(self.has_infinite);
-                choice.tree.cut_pmfs(ctx, cut, &mut pmfs[first..]);
-                pmfs[first..].iter_mut().for_each(|p| *p *= 1.0 - p_infinite);
+                let p_infinite = turns.probability(Turns::BESIDE, || choice.infinite_probability(ctx));
+                let of_tree = &mut pmfs[usize::from(self.has_infinite)..];
+                if !cut.is_empty() {
+                    choice.tree.cut_pmfs(ctx, above, turns, of_tree);
+                }
+                of_tree.iter_mut().for_each(|p| *p *= 1.0 - p_infinite);
                 if self.has_infinite {
                     pmfs[0] = p_infinite;
                 }
@@ -159,14 +168,14 @@ impl LightGroups {
         u: f32,
     ) -> Option<SampledLight> {
         match &self.choice {
-            Choice::Tree(_) if self.has_infinite && group == 0 => {
+            Choice::Tree { .. } if self.has_infinite && group == 0 => {
                 let infinite = &sampler.tree()?.infinite;
                 let x = u * infinite.len() as f32;
                 let i = (x as usize).min(infinite.len() - 1);
                 let u = (x - i as f32).clamp(0.0, ONE_MINUS_EPSILON);
                 Some(SampledLight { light: infinite[i], pmf: group_pmf / infinite.len() as f32, u })
             }
-            Choice::Tree(cut) => {
+            Choice::Tree { cut, .. } => {
                 let place = *cut.get(group - usize::from(self.has_infinite))?;
                 let (light, pmf, u) = sampler.tree()?.tree.sample_below(ctx, place, u)?;
                 Some(SampledLight { light, pmf: pmf * group_pmf, u })

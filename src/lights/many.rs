@@ -3,6 +3,7 @@
 //! Points that chose the same light are sampled together: rectangles, triangles and infinite lights by kernels, whatever
 //! has none one by one. How many points there are changes no bit: a light that has a kernel is always sampled by it.
 
+use super::groups::MAX_GROUPS;
 use super::{AreaLight, AreaShape, GlossyLobe, Light, LightCtx, LightId, LightLanes};
 use super::{LightSample, LightSampler, LightSampling, Turns};
 use lumiris_lanes::area::{Rectangle, many};
@@ -121,6 +122,12 @@ impl Scratch {
         if lights.sampler.only_light().is_none() {
             self.turns.resize(n, Turns::NONE);
         }
+    }
+
+    /// [`LightGroups::pmfs`](super::LightGroups::pmfs) of `lights` at point `i`, which is `at`; there is more than one light.
+    #[inline]
+    pub fn group_pmfs(&mut self, lights: &LightSampling, i: usize, at: &LightCtx) -> [f32; MAX_GROUPS] {
+        lights.groups.pmfs_again(&lights.sampler, at, &mut self.turns[i])
     }
 
     /// The light that point `i` chose in the last [`LightSampling::sample_many`], where there is more than one.

@@ -54,7 +54,7 @@ pub use light_sampler::{LightChoice, LightSampler, LightSamplerKind};
 pub use portal::{Portal, PortalLight};
 pub use sampling::LightSampling;
 pub use set::{LightSet, LightSetBuilder};
-pub use tree::LightTree;
+pub use tree::{CutNode, LightTree};
 pub use tree_choice::TreeChoice;
 pub use turns::Turns;
 pub use visibility_cache::VisibilityCache;

@@ -30,6 +30,22 @@ pub struct LightTree {
     leaves: Vec<u32>,
 }
 
+/// An inner node above a cut of the tree.
+#[derive(Clone, Copy, Debug)]
+pub struct CutNode {
+    place: usize,
+    number: usize,
+    /// The first subtrees below its children.
+    left: usize,
+    right: usize,
+}
+
+/// The number of a child of the node of this `number`, where the root has 1: 2n and 2n + 1 below [`Turns::COUNT`].
+#[inline]
+fn child(number: usize, is_right: bool) -> usize {
+    if number < Turns::COUNT { 2 * number + usize::from(is_right) } else { number }
+}
+
 /// Positions descending the tree.
 #[derive(Clone, Copy, Default)]
 struct Descent {
@@ -155,8 +171,7 @@ impl LightTree {
         self.descend(0, u, |place, number| turns.probability(number, || self.left_probability(ctx, place)))
     }
 
-    /// Goes down from a node: `left(node, number)` is the probability to turn left there, where the children of the node
-    /// of number n have the numbers 2n and 2n + 1 below [`Turns::COUNT`], and the first one has 1.
+    /// Goes down from a node, which has the number 1: `left(node, number)` is the probability to turn left there.
     #[inline]
     fn descend(&self, place: u32, u: f32, mut left: impl FnMut(usize, usize) -> f32) -> Option<(LightId, f32, f32)> {
         let (mut place, mut number, mut pmf, mut u) = (place as usize, 1, 1.0, u);
@@ -173,9 +188,7 @@ impl LightTree {
                 pmf *= 1.0 - p;
                 place = node.index as usize;
             }
-            if number < Turns::COUNT {
-                number = 2 * number + usize::from(!turns_left);
-            }
+            number = child(number, !turns_left);
             u = u.min(ONE_MINUS_EPSILON);
             node = &self.nodes[place];
         }
@@ -256,21 +269,43 @@ impl LightTree {
         }
     }
 
-    /// Probabilities by which [`sample`](Self::sample) gets into each subtree of a [`cut`](Self::cut), in its order.
-    pub fn cut_pmfs(&self, ctx: &LightCtx, cut: &[u32], pmfs: &mut [f32]) {
-        let mut stack = [(0_u32, 1.0_f32); MAX_DEPTH];
-        let mut size = usize::from(!cut.is_empty());
-        while size > 0 {
-            size -= 1;
-            let (place, pmf) = stack[size];
-            if let Ok(i) = cut.binary_search(&place) {
-                pmfs[i] = pmf;
-                continue;
-            }
-            let p = self.left_probability(ctx, place as usize);
-            stack[size] = (self.nodes[place as usize].index, pmf * (1.0 - p));
-            stack[size + 1] = (place + 1, pmf * p);
-            size += 2;
+    /// The inner nodes above a [`cut`](Self::cut), each before those below it.
+    pub fn above(&self, cut: &[u32]) -> Vec<CutNode> {
+        let mut above = Vec::new();
+        if !cut.is_empty() {
+            self.add_above((0, 1), (cut, 0), &mut above);
+        }
+        above
+    }
+
+    /// Adds the inner nodes from `place` on down, which has the given number; the first of the subtrees below it is `first`.
+    /// Returns the subtree after the last one.
+    fn add_above(
+        &self,
+        (place, number): (u32, usize),
+        (cut, first): (&[u32], usize),
+        above: &mut Vec<CutNode>,
+    ) -> usize {
+        if cut.binary_search(&place).is_ok() {
+            return first + 1;
+        }
+        let i = above.len();
+        above.push(CutNode { place: place as usize, number, left: first, right: first });
+        let right = self.add_above((place + 1, child(number, false)), (cut, first), above);
+        above[i].right = right;
+        self.add_above((self.nodes[place as usize].index, child(number, true)), (cut, right), above)
+    }
+
+    /// Probabilities by which [`sample`](Self::sample) gets into each subtree of a cut that is not empty, in its order, by
+    /// the nodes [`above`](Self::above) it; the point's `turns` hold what is known of it.
+    #[inline]
+    pub fn cut_pmfs(&self, ctx: &LightCtx, above: &[CutNode], turns: &mut Turns, pmfs: &mut [f32]) {
+        pmfs[0] = 1.0;
+        for node in above {
+            let p = turns.probability(node.number, || self.left_probability(ctx, node.place));
+            let pmf = pmfs[node.left];
+            pmfs[node.left] = pmf * p;
+            pmfs[node.right] = pmf * (1.0 - p);
         }
     }
 

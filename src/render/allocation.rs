@@ -21,7 +21,7 @@ use super::worker::Worker;
 use super::{RenderSettings, Run, position};
 use crate::direct::Estimator;
 use crate::film::accumulator::PixelAccumulator;
-use crate::film::{PixelBounds, PixelSample, PixelSums};
+use crate::film::{FeatureSet, PixelBounds, PixelSample, PixelSums};
 use crate::imaging::metrics::difference::DEFAULT_EPSILON;
 use crate::integrators::reuse;
 use crate::integrators::{PathStats, PathTracer, Tracer};
@@ -226,7 +226,8 @@ impl<'a> Pilot<'a> {
         let run = Run::new(self.job, &render, self.stop, &|_| ());
         let mut tiles = self.bounds.tiles(COST_TILE);
         tiles.retain(|t| is_chosen((t.x0 - self.bounds.x0) / COST_TILE + 2 * ((t.y0 - self.bounds.y0) / COST_TILE)));
-        let worker = || self.left.worker(self.job, self.rules.radius.is_none());
+        let features = if self.rules.radius.is_none() { FeatureSet::NoAlbedo } else { FeatureSet::None };
+        let worker = || self.left.worker(self.job, features);
         let of_tile = |worker: &mut _, tile: &PixelBounds| {
             let is_over = self.stop.load(Ordering::Relaxed);
             if is_over { Vec::new() } else { pilot_tile(&run, worker, tile, self.sampling) }

@@ -4,7 +4,7 @@ use super::auto_reuse;
 use super::auto_round::{Candidate, Difference};
 use super::worker::Worker;
 use super::{Run, processor_time};
-use crate::film::PixelBounds;
+use crate::film::{FeatureSet, PixelBounds};
 use crate::imaging::metrics::difference::DEFAULT_EPSILON;
 use crate::integrators::PathTracer;
 use crate::integrators::light_paths::{self, LightPilot};
@@ -68,7 +68,7 @@ pub(super) fn measure(
     (seeds, turn): ([u32; 2], usize),
 ) -> Chunk {
     let groups = if reuse::obstacle(run.job).is_none() { Groups::Grid } else { Groups::None };
-    let mut worker = Worker::new(PathTracer::sharing(groups, false));
+    let mut worker = Worker::new(PathTracer::sharing(groups, FeatureSet::None));
     let mut times = vec![0.0; candidates.len()];
     let mut images = vec![[(); 2].map(|()| Vec::<[f64; 3]>::new()); candidates.len()];
     for k in 0..candidates.len() {

@@ -116,13 +116,13 @@ impl Band {
 }
 
 /// The means of control variates from the sums of a pixel, by what makes a mean of a sum.
-fn means(sums: &[FixedSum], mean_of: impl Fn(f64) -> f64, out: &mut [f32]) {
+pub(super) fn means(sums: &[FixedSum], mean_of: impl Fn(f64) -> f64, out: &mut [f32]) {
     out.iter_mut().zip(&sums[3..]).for_each(|(mean, sum)| *mean = mean_of(sum.value()) as f32);
 }
 
 /// A pixel with `value` as the sum of its estimates of direct light. What it can be compared to depends on what camera
 /// rays have met: all of them one surface of the same material.
-fn pixel(sums: &PixelSums, value: [f64; 3]) -> Pixel {
+pub(super) fn pixel(sums: &PixelSums, value: [f64; 3]) -> Pixel {
     let count = sums.count.max(1) as f64;
     let is_covered = sums.count > 0 && sums.hits == sums.count;
     Pixel {

@@ -15,6 +15,7 @@ pub mod bench;
 pub mod bench_frame;
 pub mod bench_photons;
 mod camera_samples;
+mod control_pilot;
 mod control_variates;
 pub mod crosscheck;
 pub mod cryptomatte;

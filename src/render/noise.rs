@@ -13,7 +13,7 @@
 use super::pilot_samples::{LeftToLightPaths, pilot_images};
 use super::worker::Worker;
 use super::{RenderSettings, Run, position};
-use crate::film::PixelBounds;
+use crate::film::{FeatureSet, PixelBounds};
 use crate::imaging::metrics::difference::DEFAULT_EPSILON;
 use crate::integrators::PathTracer;
 use crate::scene::{PixelSamples, RenderJob};
@@ -42,7 +42,7 @@ pub(super) fn counts_for(job: &RenderJob, threshold: f32, stop: &AtomicBool) -> 
     let blocks = bounds.tiles(BLOCK);
     let left = LeftToLightPaths::new(job);
     let of_block = |worker: &mut _, block| count_of_block(&run, worker, block, (seeds, threshold), stop);
-    let of_blocks: Vec<u32> = blocks.par_iter().map_init(|| left.worker(job, false), of_block).collect();
+    let of_blocks: Vec<u32> = blocks.par_iter().map_init(|| left.worker(job, FeatureSet::None), of_block).collect();
 
     let mut counts = vec![1; bounds.area()];
     for (block, count) in blocks.iter().zip(of_blocks) {

@@ -4,7 +4,7 @@ use super::worker::Worker;
 use super::{BATCH_PATHS, Run, position};
 use crate::direct::Fits;
 use crate::film::accumulator::RadianceAccumulator;
-use crate::film::{PixelBounds, PixelSample};
+use crate::film::{FeatureSet, PixelBounds, PixelSample};
 use crate::integrators::PathTracer;
 use crate::integrators::light_paths::{self, LightPilot};
 use crate::integrators::reuse::{self, Groups};
@@ -27,9 +27,9 @@ impl LeftToLightPaths {
     }
 
     /// A worker whose paths leave that, and in which pixels share paths as they do in the image.
-    pub(super) fn worker(&self, job: &RenderJob, with_features: bool) -> Worker<PathTracer> {
+    pub(super) fn worker(&self, job: &RenderJob, features: FeatureSet) -> Worker<PathTracer> {
         let groups = if reuse::edge(job) > 1 { Groups::Grid } else { Groups::None };
-        let mut tracer = PathTracer::sharing(groups, with_features);
+        let mut tracer = PathTracer::sharing(groups, features);
         tracer.leave(job, self.0.as_ref().map(|(pilot, per_sample)| (pilot, *per_sample)));
         Worker::new(tracer)
     }

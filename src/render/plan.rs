@@ -12,6 +12,7 @@
 
 use super::allocation::allocate;
 use super::auto::{self, AutoChoice};
+use super::control_pilot;
 pub use super::preparation::Preparation;
 use super::visibility_cache::build_visibility_cache;
 use super::{RenderError, RenderSettings, Run, ThreadError, camera_batches};
@@ -88,6 +89,8 @@ pub fn prepare(job: &mut RenderJob, how: &Preparation<'_>) -> Result<Plan, Rende
         let visibility_cache = pool.install(|| build_visibility_cache(job));
         job.lights.set_visibility_cache(visibility_cache.map(|(visibility_cache, _)| visibility_cache));
     }
+    pool.install(|| control_pilot::choose(job, how.stop));
+    how.goes_on()?;
     let ris = choose_proposals(job, how)?;
     job.pixel_samples = pool.install(|| allocate(job, how.stop));
     how.goes_on()?;
@@ -119,6 +122,7 @@ fn has_pilot(settings: &Settings) -> bool {
     let sampling = &settings.sampling;
     settings.integrator.estimator == EstimatorKind::Auto
         || measures_proposals(&settings.integrator)
+        || control_pilot::is_wanted(settings)
         || sampling.allocation == Allocation::Adaptive
         || sampling.noise.is_some()
 }

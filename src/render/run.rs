@@ -9,7 +9,7 @@ use super::{BATCH_PATHS, Continuation, Progress, RenderError, RenderSettings, Re
 use crate::direct::Estimator;
 use crate::film::packed::PackedSums;
 use crate::film::replicas::{ReplicaAccumulator, replicas};
-use crate::film::{Film, FilmTile, PixelBounds};
+use crate::film::{FeatureSet, Film, FilmTile, PixelBounds};
 use crate::imaging::tiles::TileStore;
 use crate::integrators::path::CameraSample;
 use crate::integrators::{PathStats, Statistics, integrator, light_layers, reuse};
@@ -130,8 +130,7 @@ impl<'a> Run<'a> {
         let mut stats = PathStats::default();
         while first < end && !self.stopped() {
             let served = end.min(first.saturating_add(integrator.prepare(first)?));
-            let with_features = self.settings.with_features || self.is_over_pixels();
-            let workers = Workers::new(&*integrator, with_features, light_layers::count(self.job));
+            let workers = Workers::new(&*integrator, self.features(), light_layers::count(self.job));
             while first < served && !self.stopped() {
                 let length = self.next_pass(first - self.settings.first_sample, first - begin);
                 let samples = first..first.saturating_add(length).min(served);
@@ -235,9 +234,14 @@ impl<'a> Run<'a> {
         }
     }
 
-    /// True if pixels are corrected by what is fitted to others, which needs the features of all.
-    fn is_over_pixels(&self) -> bool {
-        Estimator::at_vertex(&self.job.settings().integrator, 0).is_over_pixels()
+    /// The features that are asked for, or that tell which pixels are alike where they are fitted to others.
+    fn features(&self) -> FeatureSet {
+        let is_over_pixels = Estimator::at_vertex(&self.job.settings().integrator, 0).is_over_pixels();
+        match (self.settings.with_features, is_over_pixels) {
+            (true, _) => FeatureSet::All,
+            (false, true) => FeatureSet::NoAlbedo,
+            (false, false) => FeatureSet::None,
+        }
     }
 
     /// A tile without samples.

@@ -3,8 +3,8 @@
 use super::camera_samples::Scratch;
 use super::tiles::Tile;
 use crate::direct::Fits;
-use crate::film::PixelSample;
 use crate::film::accumulator::PixelAccumulator;
+use crate::film::{FeatureSet, PixelSample};
 use crate::integrators::path::CameraSample;
 use crate::integrators::{Integrator, Tracer};
 use crate::scene::{FilmSettings, RenderJob};
@@ -86,7 +86,7 @@ pub(super) type AnyWorker<'a> = Worker<Box<dyn Tracer + 'a>>;
 /// The workers that use what an integrator has prepared.
 pub(super) struct Workers<'a> {
     integrator: &'a dyn Integrator,
-    with_features: bool,
+    features: FeatureSet,
     /// Number of layers by lights.
     light_layers: usize,
     /// Those without a tile, whose buffers are large enough already.
@@ -94,15 +94,15 @@ pub(super) struct Workers<'a> {
 }
 
 impl<'a> Workers<'a> {
-    pub(super) fn new(integrator: &'a dyn Integrator, with_features: bool, light_layers: usize) -> Self {
-        Workers { integrator, with_features, light_layers, idle: Mutex::default() }
+    pub(super) fn new(integrator: &'a dyn Integrator, features: FeatureSet, light_layers: usize) -> Self {
+        Workers { integrator, features, light_layers, idle: Mutex::default() }
     }
 
     /// Lets one of them work.
     pub(super) fn with_one<R>(&self, work: impl FnOnce(&mut AnyWorker<'a>) -> R) -> R {
         let idle = self.idle().pop();
         let mut worker = idle.unwrap_or_else(|| {
-            let mut tracer = self.integrator.tracer(self.with_features);
+            let mut tracer = self.integrator.tracer(self.features);
             tracer.keep_light_layers(self.light_layers);
             Worker::new(tracer)
         });

@@ -320,6 +320,19 @@ pub struct OcvSettings {
     pub form: Form,
     /// Maximum number of components of the mixture: BSDF lobes and groups of lights; `None`: as many as possible.
     pub components: Option<u32>,
+    /// Whether the form over pixels, or that of `ris`, has control variates.
+    pub control_variates: ControlVariates,
+}
+
+/// Whether estimators whose control variates are fitted over pixels have them.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, EnumString, IntoStaticStr, VariantNames)]
+#[strum(serialize_all = "kebab-case")]
+pub enum ControlVariates {
+    /// Where a pilot finds that they gain more than they cost; elsewhere the estimator is `mis`, or `ris` with the target `fgl`.
+    #[default]
+    Auto,
+    /// In any image.
+    Always,
 }
 
 impl OcvSettings {

@@ -13,7 +13,7 @@ pub mod table;
 pub mod value;
 
 pub use integrator::{
-    Cached, ContributingSettings, CorrelatedForm, CorrelatedSettings, EstimatorKind, IntegratorKind,
+    Cached, ContributingSettings, ControlVariates, CorrelatedForm, CorrelatedSettings, EstimatorKind, IntegratorKind,
     IntegratorSettings, IrradianceCacheSettings, OcvSettings, OptimalForm, RouletteKind, SampleCounts,
     SamplingTechnique, bsdf_samples,
 };

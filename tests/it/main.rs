@@ -6,6 +6,7 @@ mod analytic_scenes;
 mod anisotropy;
 mod bit_exact;
 mod color_spaces;
+mod control_variates;
 mod crosscheck;
 mod dispersion;
 mod evaluated;

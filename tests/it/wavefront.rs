@@ -1,7 +1,7 @@
 //! Vertices side by side are the vertices one by one: the same random numbers give the same radiance.
 
 use lumiris::direct::Fits;
-use lumiris::film::PixelSample;
+use lumiris::film::{FeatureSet, PixelSample};
 use lumiris::import::{LoadOptions, load};
 use lumiris::integrators::path::CameraSample;
 use lumiris::integrators::{GuidedIntegrator, PathTracer};
@@ -53,7 +53,7 @@ fn traced(job: &RenderJob, samples: &[CameraSample], side_by_side: bool) -> Vec<
     let mut out = Vec::new();
     let is_guided = job.settings().integrator.roulette != RouletteKind::Throughput;
     let guided = is_guided.then(|| GuidedIntegrator::new(job));
-    let mut tracer = guided.as_ref().map_or_else(PathTracer::default, |guided| guided.path_tracer(true));
+    let mut tracer = guided.as_ref().map_or_else(PathTracer::default, |guided| guided.path_tracer(FeatureSet::All));
     let settings = guided.as_ref().map_or(&job.settings().integrator, GuidedIntegrator::settings);
     tracer.outcomes = (!side_by_side).then(Vec::new);
     tracer.trace(job, settings, samples, &mut Fits::default(), &mut out);

@@ -30,7 +30,7 @@ use super::segment::{CameraSample, Vertex};
 use super::{Cameras, Integrator, Statistics, Tracer, diffuse};
 use crate::bsdfs::Lambertian;
 use crate::direct::Fits;
-use crate::film::PixelSample;
+use crate::film::{FeatureSet, PixelSample};
 use crate::scene::RenderJob;
 use crate::settings::Cached;
 use lumiris_numbers::math::Rgb;
@@ -66,8 +66,8 @@ impl CacheIntegrator {
 }
 
 impl Integrator for CacheIntegrator {
-    fn tracer(&self, with_features: bool) -> Box<dyn Tracer + '_> {
-        let (paths, lookups) = (PathTracer::new(with_features), LookupStats::default());
+    fn tracer(&self, features: FeatureSet) -> Box<dyn Tracer + '_> {
+        let (paths, lookups) = (PathTracer::new(features), LookupStats::default());
         Box::new(CacheTracer { cache: &self.cache, paths, lookups })
     }
 

@@ -27,7 +27,7 @@ use super::{Cameras, Integrator, Statistics, Tracer, diffuse};
 use crate::bsdfs::{Bsdf, Diffuse, DiffuseTransmission, Lambertian};
 use crate::cameras::CameraRay;
 use crate::direct::{Estimator, Fits};
-use crate::film::PixelSample;
+use crate::film::{FeatureSet, PixelSample};
 use crate::materials::SurfaceBsdf;
 use crate::photons::{GatherScratch, PhotonError, Place, Search};
 use crate::scene::RenderJob;
@@ -76,11 +76,11 @@ impl Integrator for PhotonMapIntegrator<'_> {
         Ok(if self.shares_noise() { 1 } else { u32::MAX })
     }
 
-    fn tracer(&self, with_features: bool) -> Box<dyn Tracer + '_> {
+    fn tracer(&self, features: FeatureSet) -> Box<dyn Tracer + '_> {
         let maps = self.maps.as_ref().expect("maps are prepared before samples are traced");
         Box::new(PhotonMapTracer {
             maps,
-            paths: PathTracer::new(with_features),
+            paths: PathTracer::new(features),
             gather: PathTracer::default(),
             lookups: Lookups::default(),
             samples: Vec::new(),

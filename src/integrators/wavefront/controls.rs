@@ -8,7 +8,7 @@
 use super::columns::{SampleColumns, Single, Surface, Traced, others};
 use super::emitters::EmitterRays;
 use crate::accel::RayBatch;
-use crate::lights::many::{NO_LIGHT, Scratch};
+use crate::lights::many::Scratch;
 use crate::scene::RenderJob;
 use lumiris_numbers::estimators::ocv::MAX_COMPONENTS;
 use lumiris_numbers::math::Vec3;
@@ -20,6 +20,8 @@ pub(super) struct Controls {
     sums: Vec<[f32; MAX_COMPONENTS]>,
     /// The place of the lobe, if BSDFs may have two.
     lobe: Option<usize>,
+    /// What the last sample of each vertex has of light sampling.
+    parts: Vec<f32>,
     is_hidden: Vec<bool>,
     hidden: RayBatch,
     hidden_of: Vec<u32>,
@@ -27,16 +29,26 @@ pub(super) struct Controls {
 }
 
 impl Controls {
-    /// Begins `n` vertices, with their columns at the negative of the expectation.
-    pub(super) fn begin(&mut self, job: &RenderJob, n: usize, (surface, singles): (&Surface, &[Single<'_>])) {
+    /// Begins `n` vertices, with their columns at the negative of the expectation. `scratch` has begun with them.
+    pub(super) fn begin(
+        &mut self,
+        job: &RenderJob,
+        n: usize,
+        (surface, scratch): (&Surface, &mut Scratch),
+        singles: &[Single<'_>],
+    ) {
         self.sums.clear();
+        self.sums.resize(n, [0.0; MAX_COMPONENTS]);
         let (lights, at) = (&job.lights, surface.lit_points());
-        self.sums.extend((0..n).map(|i| {
-            let mut sums = [0.0; MAX_COMPONENTS];
-            let pmfs = lights.groups.pmfs(&lights.sampler, &at.get(i));
-            sums.iter_mut().zip(pmfs).for_each(|(sum, pmf)| *sum = -pmf);
-            sums
-        }));
+        if let Some(light) = lights.sampler.only_light() {
+            let group = lights.groups.group_of(light).unwrap_or(0);
+            self.sums.iter_mut().for_each(|sums| sums[group] = -1.0);
+        } else {
+            for (i, sums) in self.sums.iter_mut().enumerate() {
+                let pmfs = scratch.group_pmfs(lights, i, &at.get(i));
+                sums.iter_mut().zip(pmfs).for_each(|(sum, pmf)| *sum = -pmf);
+            }
+        }
         self.lobe = job.has_two_lobes().then(|| lights.groups.len());
         if let Some(lobe) = self.lobe {
             others(singles).for_each(|s| self.sums[s.index as usize][lobe] = -s.bsdf.first_lobe(s.wo));
@@ -52,16 +64,16 @@ impl Controls {
         singles: &[Single<'_>],
     ) {
         self.find_hidden(job, samples, traced);
-        let only = job.lights.sampler.only_light();
-        for (i, (sums, is_hidden)) in self.sums.iter_mut().zip(&self.is_hidden).enumerate() {
-            let light = only.unwrap_or_else(|| scratch.chosen(i));
-            if light == NO_LIGHT {
-                continue;
+        self.divide([n_light, n_bsdf], samples, 1.0 / n_light);
+        for (&i, _) in self.hidden_of.iter().zip(&self.occluded).filter(|(_, occluded)| **occluded) {
+            self.parts[i as usize] = 1.0 / n_light;
+        }
+        let groups = &job.lights.groups;
+        let group_of_only = job.lights.sampler.only_light().map(|light| groups.group_of(light));
+        for (i, (sums, part)) in self.sums.iter_mut().zip(&self.parts).enumerate() {
+            if let Some(group) = group_of_only.unwrap_or_else(|| groups.group_of(scratch.chosen(i))) {
+                sums[group] += part;
             }
-            let Some(group) = job.lights.groups.group_of(light) else { continue };
-            let (p_light, p_bsdf) = (samples.light.pdf[i], samples.p_bsdf[i]);
-            let is_own = *is_hidden || samples.c.rgb(i).is_black();
-            sums[group] += if is_own { 1.0 / n_light } else { p_light / (n_light * p_light + n_bsdf * p_bsdf) };
         }
         let Some(lobe) = self.lobe else { return };
         for single in others(singles) {
@@ -82,19 +94,29 @@ impl Controls {
         (samples, emitters): (&SampleColumns, &EmitterRays),
         singles: &[Single<'_>],
     ) {
-        let lights = &job.lights;
-        let infinite = lights.infinite.iter().find_map(|l| lights.groups.group_of(*l));
-        for (i, sums) in self.sums.iter_mut().enumerate() {
-            let (p_light, p_bsdf) = (samples.light.pdf[i], samples.p_bsdf[i]);
-            if samples.c.rgb(i).is_black() || !(p_light > 0.0) {
-                continue;
-            }
-            let group = emitters.lights[i].map_or(infinite, |light| lights.groups.group_of(light));
-            if let Some(group) = group {
-                sums[group] += p_light / (n_light * p_light + n_bsdf * p_bsdf);
+        self.divide([n_light, n_bsdf], samples, 0.0);
+        let groups = &job.lights.groups;
+        let infinite = job.lights.infinite.iter().find_map(|l| groups.group_of(*l));
+        for ((sums, part), light) in self.sums.iter_mut().zip(&self.parts).zip(&emitters.lights) {
+            if *part > 0.0
+                && let Some(group) = light.map_or(infinite, |light| groups.group_of(light))
+            {
+                sums[group] += part;
             }
         }
         self.add_lobes([n_light, n_bsdf], samples, singles);
+    }
+
+    /// Sets the parts of light sampling in samples that contribute, and those of all others to `alone`.
+    fn divide(&mut self, [n_light, n_bsdf]: [f32; 2], samples: &SampleColumns, alone: f32) {
+        let n = self.sums.len();
+        self.parts.resize(n, 0.0);
+        let ([r, g, b], p_light, p_bsdf) = (samples.c.get(n), &samples.light.pdf[..n], &samples.p_bsdf[..n]);
+        for (i, part) in self.parts.iter_mut().enumerate() {
+            let contributes = (r[i] != 0.0) | (g[i] != 0.0) | (b[i] != 0.0);
+            let own = p_light[i] / (n_light * p_light[i] + n_bsdf * p_bsdf[i]);
+            *part = if contributes & (p_light[i] > 0.0) { own } else { alone };
+        }
     }
 
     /// Adds the part of the first lobe in a BSDF sample of each vertex.
@@ -123,11 +145,11 @@ impl Controls {
     fn find_hidden(&mut self, job: &RenderJob, samples: &SampleColumns, traced: &Traced) {
         self.is_hidden.clear();
         self.is_hidden.resize(self.sums.len(), false);
+        self.hidden_of.clear();
         if !job.world.emitters_hide() {
             return;
         }
         self.hidden.clear();
-        self.hidden_of.clear();
         for (k, &i) in traced.index.iter().enumerate() {
             if traced.occluded[k] && samples.p_bsdf[i as usize] > 0.0 {
                 self.hidden.push(&traced.rays.get(k));

@@ -218,9 +218,10 @@ impl<'w> Batch<'w> {
             self.buffers.set_normals(out.samples);
         }
         self.share(out);
-        self.buffers.scratch.begin(&job.lights, n);
+        let Buffers { scratch, controls, surface, .. } = &mut *self.buffers;
+        scratch.begin(&job.lights, n);
         if self.estimate.has_controls {
-            self.buffers.controls.begin(job, n, (&self.buffers.surface, &self.singles));
+            controls.begin(job, n, (surface, scratch), &self.singles);
         }
         out.stats.shade_time += start.elapsed();
 

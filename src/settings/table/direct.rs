@@ -4,8 +4,8 @@ use super::{Applies, Group, MAX_SAMPLES, Setting, choice, integer};
 use crate::settings::EstimatorKind::{Contributing, Correlated, Mis, Ocv, OptimalMis, Ris};
 use crate::settings::value::{Integers, Interval, Kind, Value};
 use crate::settings::{
-    CorrelatedForm, EstimatorKind, OptimalForm, ProposalPoints, Proposals, SamplingTechnique, StageTimes, Strata,
-    Target,
+    ControlVariates, CorrelatedForm, EstimatorKind, OptimalForm, ProposalPoints, Proposals, SamplingTechnique,
+    StageTimes, Strata, Target,
 };
 use lumiris_numbers::estimators::mis::Heuristic;
 use lumiris_numbers::estimators::ocv::{Form, MAX_COMPONENTS};
@@ -217,6 +217,22 @@ pub(super) const CONTROL_VARIATES: Group = Group {
             applies: Applies::Estimators(&[Ocv]),
             get: |s| Some(Value::Name(s.integrator.ocv.form.into())),
             set: |s, v| v.named().map(|form| s.integrator.ocv.form = form),
+            ..Setting::BASE
+        },
+        Setting {
+            flag: "control-variates",
+            parameters: &["controlvariates"],
+            key: "control_variates",
+            kind: choice(ControlVariates::VARIANTS),
+            help: "Control variates over pixels, of ocv and of ris with the target fgl-control: in any image, or where a \
+                   pilot finds that they gain more than they cost; elsewhere the image is that of mis, or of fgl",
+            applies: Applies::If(|s| match s.integrator.estimator {
+                Ocv => s.integrator.ocv.form == Form::Pixels,
+                Ris => s.integrator.ris.target == Target::FglControl,
+                _ => false,
+            }),
+            get: |s| Some(Value::Name(s.integrator.ocv.control_variates.into())),
+            set: |s, v| v.named().map(|kind| s.integrator.ocv.control_variates = kind),
             ..Setting::BASE
         },
         Setting {

@@ -5,8 +5,8 @@ use lumiris::import::{LoadOptions, load};
 use lumiris::lights::LightSamplerKind;
 use lumiris::scene::{AccelKind, RenderJob};
 use lumiris::settings::{
-    Cached, CorrelatedForm, CorrelatedSettings, EstimatorKind, IntegratorKind, OcvSettings, OptimalForm,
-    ProposalPoints, Proposals, SamplingTechnique, Strata, Target,
+    Cached, ControlVariates, CorrelatedForm, CorrelatedSettings, EstimatorKind, IntegratorKind, OcvSettings,
+    OptimalForm, ProposalPoints, Proposals, SamplingTechnique, Strata, Target,
 };
 use lumiris_numbers::estimators::mis::Heuristic;
 use lumiris_numbers::estimators::ocv::Form;
@@ -50,7 +50,7 @@ pub(super) const BASE: Configuration = Configuration {
     estimator: EstimatorKind::Mis,
     heuristic: Heuristic::Power,
     samples: 2,
-    ocv: OcvSettings { form: Form::Progressive, components: None },
+    ocv: OcvSettings { form: Form::Progressive, components: None, control_variates: ControlVariates::Always },
     optimal_mis: OptimalForm::Progressive,
     correlated: CorrelatedSettings { form: CorrelatedForm::Combined, technique: SamplingTechnique::Bsdf },
     bsdf_fraction: 0.5,

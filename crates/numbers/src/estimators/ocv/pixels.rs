@@ -120,7 +120,7 @@ impl Picture {
     /// What is known of pixel `i` from its neighbours but `without`.
     fn look_around(&self, i: usize, without: usize) -> Around {
         let mut around = Around::NOTHING;
-        self.each_within(1, i, |q| {
+        self.each_within(1, i, |q, _| {
             if q != without && self.are_alike(q, i) {
                 around.add(q, &self.pixels[q]);
             }
@@ -128,13 +128,14 @@ impl Picture {
         around
     }
 
-    /// Pixels of the square around pixel `i`, without it.
-    fn each_within(&self, radius: usize, i: usize, mut f: impl FnMut(usize)) {
+    /// Pixels of the square around pixel `i`, without it, and whether they are next to it.
+    #[inline]
+    fn each_within(&self, radius: usize, i: usize, mut f: impl FnMut(usize, bool)) {
         let (x, y) = (i % self.width, i / self.width);
         for row in y.saturating_sub(radius)..(y + radius + 1).min(self.height()) {
             for column in x.saturating_sub(radius)..(x + radius + 1).min(self.width) {
                 if (column, row) != (x, y) {
-                    f(row * self.width + column);
+                    f(row * self.width + column, column.abs_diff(x) <= 1 && row.abs_diff(y) <= 1);
                 }
             }
         }
@@ -191,13 +192,12 @@ impl Picture {
     fn sum_around(&self, p: usize, (first, terms): (usize, &[f32]), sums: &mut [f32]) -> f32 {
         let Some(light) = self.around[p].light() else { return 0.0 };
         let len = self.equations.len();
-        let (px, py) = (p % self.width, p / self.width);
         let is_as_lit = |l: f64| l <= MAX_RATIO * light && light <= MAX_RATIO * l;
-        self.each_within(RADIUS, p, |q| {
+        self.each_within(RADIUS, p, |q, is_next| {
             if !self.are_alike(q, p) {
                 return;
             }
-            if px.abs_diff(q % self.width) <= 1 && py.abs_diff(q / self.width) <= 1 {
+            if is_next {
                 let around = self.look_around(q, p);
                 if around.light().is_some_and(is_as_lit) {
                     self.add_pixel(q, &around, sums);
