@@ -94,15 +94,17 @@ fn pays(job: &RenderJob, stop: &AtomicBool) -> bool {
     };
     let blocks = blocks(bounds, sampling.seed);
     let [mut alone, mut corrected] = [0.0; 2];
-    [(0, SCOUT_GAIN), (1, MIN_GAIN[usize::from(job.controls() > job.lights.groups.len())])].into_iter().all(|(first, gain)| {
-        let some: Vec<_> = blocks.iter().skip(first).step_by(2).collect();
-        let worker = || left.worker(job, FeatureSet::NoAlbedo);
-        let differences: Vec<_> = some.into_par_iter().map_init(worker, of_block).collect();
-        for [a, c] in differences {
-            (alone, corrected) = (alone + a, corrected + c);
-        }
-        alone > gain * corrected
-    })
+    [(0, SCOUT_GAIN), (1, MIN_GAIN[usize::from(job.controls() > job.lights.groups.len())])].into_iter().all(
+        |(first, gain)| {
+            let some: Vec<_> = blocks.iter().skip(first).step_by(2).collect();
+            let worker = || left.worker(job, FeatureSet::NoAlbedo);
+            let differences: Vec<_> = some.into_par_iter().map_init(worker, of_block).collect();
+            for [a, c] in differences {
+                (alone, corrected) = (alone + a, corrected + c);
+            }
+            alone > gain * corrected
+        },
+    )
 }
 
 /// The blocks: one of each of as many runs of equal length, row by row.

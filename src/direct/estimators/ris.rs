@@ -280,7 +280,7 @@ impl Buffers {
     pub(super) fn set_controls(&self, job: &RenderJob, points: &[ShadingPoint<'_>], out: &[Rgb], fits: &mut Fits) {
         for ((point, of_groups), estimate) in points.iter().zip(&self.of_groups).zip(out) {
             let value = job.world.scene.film.balanced(*estimate).to_array();
-            fits.set_controls(point.sample, value, &of_groups.sums()[..job.controls()]);
+            fits.set_controls(point.sample, value, &of_groups.parts()[..job.controls()]);
         }
     }
 

@@ -54,8 +54,9 @@ fn corrected(m: usize, pixels: Vec<Pixel>, controls: Vec<f32>) -> [Estimates; 2]
 fn resampled(sampler: &Sampler, (sets, draws): (u32, u32), stream: &mut Pcg32) -> [Estimates; 2] {
     let (mut pixels, mut controls) = (Vec::new(), Vec::new());
     for _ in 0..EDGE * EDGE {
-        let (mut mean, mut of_groups) = ([0.0; 3], OfGroups::default());
+        let (mut mean, mut parts) = ([0.0; 3], [0.0; 2]);
         for _ in 0..sets {
+            let mut of_groups = OfGroups::default();
             let (mut weights, mut proposals, mut drawn) = (Vec::new(), Vec::new(), Vec::new());
             sampler.points(1, stream, |point| {
                 let of_one = 1.0 / (point.mixture_pdf * f64::from(sampler.n * sets));
@@ -69,9 +70,10 @@ fn resampled(sampler: &Sampler, (sets, draws): (u32, u32), stream: &mut Pcg32) -
                 of_groups.draw(group, weight * draw.scale);
                 (0..3).for_each(|c| mean[c] += f[c] * f64::from(draw.scale));
             }
+            (0..2).for_each(|g| parts[g] += of_groups.parts()[g] / sets as f32);
         }
         pixels.push(Pixel { mean: mean.map(|v| v as f32), class: Some(1), normal: [0.0, 0.0, 1.0] });
-        controls.extend(&of_groups.sums()[..2]);
+        controls.extend(parts);
     }
     corrected(2, pixels, controls)
 }

@@ -12,6 +12,9 @@
 //! * β is held back by the ridge and the factor of [`System::OTHER_SAMPLES`], in units in which the controls of the
 //!   pixels have together a mean square of one: columns that hardly vary are left out.
 //!
+//! * Nor is β more than [`MAX_BETA`] times the light around p: controls are parts of one, so that no more than that can follow from
+//!   them, but where those of other pixels hardly vary, noise would be taken for much more.
+//!
 //! p itself is no part of any of this: not of the means of its neighbours, nor of what is bright or like it.
 
 use super::normal::NormalEquations;
@@ -26,6 +29,8 @@ pub const MARGIN: usize = RADIUS + 1;
 const MIN_AROUND: f64 = 3.0;
 /// Maximum ratio of the light around two pixels that are alike.
 const MAX_RATIO: f64 = 2.0;
+/// Most of β, relative to the luminance of the light around a pixel: blue light has a fourteenth of its radiance.
+const MAX_BETA: f64 = 16.0;
 /// Minimum squared length of the mean normal of a pixel that is one surface, and minimum part of it that is the product
 /// with that of a pixel which is alike.
 const MIN_FLATNESS: f32 = 0.95;
@@ -168,8 +173,10 @@ impl Picture {
             scales.push(self.sum_around(row * self.width + column, (first, terms), sums));
         }
         self.equations.solve(System::OTHER_SAMPLES, sums, beta);
-        for (beta, scale) in beta.chunks_mut(width.max(1)).zip(scales) {
-            beta.iter_mut().for_each(|b| *b *= *scale);
+        let around = &self.around[row * self.width..];
+        for ((beta, scale), around) in beta.chunks_mut(width.max(1)).zip(scales).zip(around) {
+            let most = (MAX_BETA * around.light().unwrap_or(0.0)) as f32;
+            beta.iter_mut().for_each(|b| *b = (*b * *scale).clamp(-most, most));
         }
     }
 

@@ -52,15 +52,17 @@ impl Known {
 pub const MAX_GROUPS: usize = 8;
 
 /// Control variates of an estimate by groups of proposals: the weights of the draws of a group, each times its scale, less
-/// those of all its proposals.
+/// those of all its proposals, as parts of the weight of all proposals.
 ///
 /// Given the proposals, the expectation of each is 0, as a draw has the scale 1/E[number of times that it is drawn]. If
 /// weights are what proposals contribute unoccluded, and a group has the visibility v_g wherever they lie, then the estimate less
-/// Σ v_g times these is v_g times all proposals of each group: which groups happened to be drawn no longer matters. That is the control variate of
-/// Fan et al. 2006 [Eq. 7] for sets that are resampled.
+/// Σ v_g times these, times the weight of all, is v_g times all proposals of each group: which groups happened to be drawn no
+/// longer matters. That is the control variate of Fan et al. 2006 [Eq. 7] for sets that are resampled. As parts they are bounded,
+/// whereas weights are not: that of a light close by behind a wall would be more than anything that is seen.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct OfGroups {
     sums: [f32; MAX_GROUPS],
+    total: f32,
 }
 
 impl OfGroups {
@@ -68,6 +70,7 @@ impl OfGroups {
     #[inline]
     pub fn propose(&mut self, group: usize, weight: f32) {
         self.sums[group] -= weight;
+        self.total += weight;
     }
 
     /// Adds a draw, whose weight is `scaled` by its scale.
@@ -76,9 +79,9 @@ impl OfGroups {
         self.sums[group] += scaled;
     }
 
-    /// The control variate of each group.
+    /// The control variate of each group; 0 without proposals.
     #[inline]
-    pub fn sums(&self) -> &[f32; MAX_GROUPS] {
-        &self.sums
+    pub fn parts(&self) -> [f32; MAX_GROUPS] {
+        if self.total > 0.0 { self.sums.map(|sum| sum / self.total) } else { [0.0; MAX_GROUPS] }
     }
 }
