@@ -20,6 +20,7 @@ pub struct LightSampling {
     pub delta: Option<LightSampler>,
     /// The lights as components of a mixture.
     pub groups: LightGroups,
+    choice: LightChoice,
     visibility_cache: Option<Arc<VisibilityCache>>,
     /// What the visibility cache tells.
     learned: Option<LearnedVisibility>,
@@ -39,14 +40,16 @@ impl LightSampling {
         let choice = choice.into();
         let sampler = LightSampler::new(choice, &set.lights, set.scene_radius);
         let (delta, groups) = (set.delta_sampler(choice), LightGroups::new(&set.lights, &sampler, max));
-        LightSampling { set, sampler, delta, groups, visibility_cache: None, learned: None }
+        LightSampling { set, sampler, delta, groups, choice, visibility_cache: None, learned: None }
     }
 
     /// Changes the light sampler; the visibility cache stays.
     pub fn choose_by(&mut self, choice: LightChoice, max: usize) {
         self.sampler = LightSampler::new(choice, &self.set.lights, self.set.scene_radius);
+        self.choice = choice;
         self.sampler.set_visibility_cache(self.visibility_cache.clone());
         self.delta = self.set.delta_sampler(choice);
+        self.learn();
         self.set_groups(max);
     }
 
@@ -61,9 +64,19 @@ impl LightSampling {
         let is_lit = |light: LightId| self.set.lit.binary_search(&light).is_ok();
         self.visibility_cache = visibility_cache.map(|visibility_cache| Arc::new(visibility_cache.of_lights(is_lit)));
         self.sampler.set_visibility_cache(self.visibility_cache.clone());
+        self.learn();
+    }
+
+    /// Determines what the visibility cache tells of the lights, of which those that send out no photons are none.
+    fn learn(&mut self) {
         let LightSet { lights, scene_radius, .. } = &*self.set;
         let cache = self.visibility_cache.as_ref().filter(|cache| !cache.is_empty());
-        self.learned = cache.map(|cache| LearnedVisibility::new(self.tree_choice(), lights, *scene_radius, cache));
+        let choice = || {
+            let powers: Vec<f32> = lights.iter().map(|light| light.phi(*scene_radius)).collect();
+            let of_lights = || TreeChoice::new((lights, &powers), self.choice.infinite_fraction, false);
+            self.sampler.tree().filter(|_| !self.choice.glows).cloned().unwrap_or_else(of_lights)
+        };
+        self.learned = cache.map(|cache| LearnedVisibility::new(choice(), lights, *scene_radius, cache));
     }
 
     /// The choice by the light tree, whatever the light sampler is.
@@ -107,6 +120,11 @@ impl LightSampling {
     #[inline]
     pub fn sample(&self, ctx: &LightCtx, u_choice: f32, u: [f32; 2]) -> Option<(LightId, LightSample)> {
         self.set.sample_choice(ctx, self.sampler.sample(ctx, u_choice)?, u)
+    }
+
+    /// True if light samples find media that glow.
+    pub fn find_glows(&self) -> bool {
+        self.choice.glows && self.set.has_glows()
     }
 
     /// Density of sampling the point of a glimpse of a medium, whose place in world space is `p`, from `ctx` (per steradian).
@@ -190,6 +208,7 @@ mod tests {
     use crate::geometry::{Shape, TriangleMesh};
     use crate::lights::{Emission, EnvironmentFilter, EnvironmentMap, EnvironmentMapping, Light};
     use crate::lights::{LightSamplerKind, LightSetBuilder};
+    use crate::media::{Field, Heterogeneous, Medium, MediumSet, RgbGrid, Samples};
     use lumiris_numbers::math::{Affine3A, Bounds3};
     use lumiris_test_support::random::{RngExt, pcg32};
     use lumiris_test_support::{Moments, assert_chi_squared};
@@ -378,6 +397,30 @@ mod tests {
         let each: f32 = [3, 5].iter().map(|&i| set.pdf(&ctx, i, w, &LightHit::INFINITE)).sum();
         assert!(each > 0.0 && set.pdf_infinite(&ctx, w) == each);
         assert_eq!(set.infinite_in_direction(&ctx, w), (set.le(p, w), each));
+    }
+
+    #[test]
+    fn what_photons_tell_is_of_lights_that_send_out_some() {
+        let grid = RgbGrid {
+            sigma_a: Some(Samples::new([1; 3], vec![Rgb::WHITE]).unwrap()),
+            sigma_s: None,
+            scale: 1.0,
+            le: Some(Samples::new([1; 3], vec![Rgb::WHITE]).unwrap()),
+        };
+        let fire = Heterogeneous::new(Field::Rgb(grid), bounds(), &Affine3A::IDENTITY, 0.0);
+        let media = MediumSet { media: vec![Medium::Heterogeneous(Arc::new(fire))], ..Default::default() };
+        let mut builder = builder();
+        builder.add_media(&media);
+        let choice = |glows| LightChoice { glows, ..LightSamplerKind::Tree.into() };
+        let mut set = with_cache(builder, choice(true), &[0, 2]);
+        let is_glow = |light: &LightId| set.medium_of(*light).is_some();
+        let glow = (0..set.lights.len() as LightId).find(is_glow).unwrap();
+        let ctx = LightCtx::at(Vec3::new(0.4, 0.3, 0.0));
+        for glows in [true, false, true] {
+            set.choose_by(choice(glows), 1);
+            assert_eq!((set.find_glows(), set.sampler.pmf(&ctx, glow) > 0.0), (glows, glows));
+            assert_eq!(set.learned_visibility().unwrap().importance(&ctx, glow), 0.0);
+        }
     }
 
     #[test]

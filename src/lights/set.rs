@@ -27,7 +27,8 @@ pub struct LightSetBuilder {
     /// The group of the lights that are added next, and those of all so far.
     group: Option<Arc<str>>,
     groups: Vec<Option<Arc<str>>>,
-    glowing: Vec<GlowingMedium>,
+    /// By medium, of those that glow.
+    glowing: Vec<Option<GlowingMedium>>,
 }
 
 /// Places along a camera ray through a medium of average width at which it is seen whether it glows, at least.
@@ -36,7 +37,6 @@ const GLIMPSES: f32 = 8.0;
 /// The parts of a medium that glow.
 #[derive(Clone, Debug)]
 struct GlowingMedium {
-    medium: MediumId,
     parts: Parts,
     /// Of each part, if it glows.
     lights: Vec<Option<LightId>>,
@@ -70,6 +70,7 @@ impl LightSetBuilder {
     /// Adds what glows of the media.
     pub fn add_media(&mut self, media: &MediumSet) {
         for (id, medium) in (0..).zip(&media.media) {
+            self.glowing.push(None);
             let Medium::Heterogeneous(medium) = medium else { continue };
             if !medium.is_emissive() {
                 continue;
@@ -78,10 +79,11 @@ impl LightSetBuilder {
             let glows = parts.glows(medium, id);
             let bounds = glows.iter().flatten().fold(Bounds3::EMPTY, |b, glow| b.union(glow.bounds().bounds));
             let size = bounds.diagonal();
-            let rate = if size.is_finite() { GLIMPSES / size.element_product().cbrt() } else { 0.0 };
+            let rate = GLIMPSES / size.element_product().cbrt();
             let glows = glows.into_iter();
             let lights = glows.map(|glow| glow.map(|glow| self.add(Light::Glow(Box::new(glow))))).collect();
-            self.glowing.push(GlowingMedium { medium: id, parts, lights, rate });
+            let rate = if rate.is_finite() { rate } else { 0.0 };
+            *self.glowing.last_mut().expect("was added above") = Some(GlowingMedium { parts, lights, rate });
         }
     }
 
@@ -121,7 +123,8 @@ pub struct LightSet {
     pub layers: LightLayers,
     /// Sorted by geometry.
     emitting: Vec<EmittingGeometry>,
-    glowing: Vec<GlowingMedium>,
+    /// By medium, of those that glow.
+    glowing: Vec<Option<GlowingMedium>>,
     /// Centre of the scene's bounding sphere; the origin for an empty scene.
     pub scene_centre: Vec3,
     /// Radius of the scene's bounding sphere; 1 for a scene without extent.
@@ -194,10 +197,15 @@ impl LightSet {
         sources
     }
 
+    /// True if any medium glows that is a light.
+    pub fn has_glows(&self) -> bool {
+        self.glowing.iter().any(Option::is_some)
+    }
+
     /// The light that is the part of a medium at a point of its unit cube, if that glows.
     #[inline]
     pub fn glow_at(&self, medium: MediumId, unit: Vec3) -> Option<(LightId, &Glow)> {
-        let glowing = self.glowing.iter().find(|glowing| glowing.medium == medium)?;
+        let glowing = self.glowing.get(medium as usize)?.as_ref()?;
         let light = glowing.lights[glowing.parts.at(unit)]?;
         let Light::Glow(glow) = &self.lights[light as usize] else { return None };
         Some((light, glow))
@@ -206,7 +214,7 @@ impl LightSet {
     /// Rate at which camera rays look for what glows of a medium (1/m), by the size of what does; 0 if nothing does.
     #[inline]
     pub fn glimpse_rate(&self, medium: MediumId) -> f32 {
-        self.glowing.iter().find(|glowing| glowing.medium == medium).map_or(0.0, |glowing| glowing.rate)
+        self.glowing.get(medium as usize).and_then(Option::as_ref).map_or(0.0, |glowing| glowing.rate)
     }
 
     /// The medium in which a light is, if it is one that glows.

@@ -168,7 +168,7 @@ impl Heterogeneous {
     /// its part.
     fn glimpses(&self, segment: &Segment, (least, offset): (f32, f32)) -> Glimpses<'_> {
         let Collisions { o, d, pieces, .. } = self.collisions(segment);
-        Glimpses { o, d, pieces, least, from: 0.0, to: 0.0, rate: 0.0, left: offset }
+        Glimpses { o, d, pieces, least, from: 0.0, to: 0.0, rate: 0.0, left: offset, count: 0 }
     }
 
     /// A flight along a segment of a path of throughput `beta`; `least` and `weigh` as in [`super::Medium::fly`].
@@ -280,30 +280,33 @@ struct Glimpses<'a> {
     pieces: Pieces<'a>,
     /// Rate at least where there is any medium (1/m).
     least: f32,
-    /// What is left of the present piece, and the rate there.
+    /// The present piece, and the rate there.
     from: f32,
     to: f32,
     rate: f32,
-    /// What is left up to the next point, as a part of a part.
+    /// What is left from its begin up to its first point, as a part of a part, and points so far.
     left: f32,
+    count: u32,
 }
 
 impl Glimpses<'_> {
     /// The next one up to the distance `end`.
     fn next_before(&mut self, end: f32) -> Option<Glimpse> {
         loop {
-            let t = self.from + self.left / self.rate;
+            let passed = self.left + self.count as f32;
+            let t = self.from + passed / self.rate;
             if self.rate > 0.0 && t < self.to {
                 if t > end {
                     return None;
                 }
-                (self.from, self.left) = (t, 1.0);
+                self.count += 1;
                 return Some(Glimpse { t, unit: self.o + self.d * t, rate: self.rate });
             }
             if self.to > end {
                 return None;
             }
-            self.left = (self.left - self.rate * (self.to - self.from)).max(0.0);
+            self.left = (passed - self.rate * (self.to - self.from)).max(0.0);
+            self.count = 0;
             let piece = self.pieces.next()?;
             let rate = if piece.majorant > 0.0 { piece.majorant.max(self.least) } else { 0.0 };
             (self.from, self.to, self.rate) = (piece.begin, piece.end, rate);

@@ -149,6 +149,10 @@ pub(super) fn choose(job: &mut RenderJob, how: &Preparation<'_>) -> Result<Optio
     if job.settings().integrator.estimator != EstimatorKind::Auto {
         return Ok(None);
     }
+    // Media that glow are lights only where the path is the one BSDF sample
+    if job.lights.find_glows() && job.settings().integrator.bsdf_fraction.is_none() {
+        job.change(|s| s.integrator.bsdf_fraction = Some(0.0));
+    }
     let chooses_lights = auto_lights::is_open(&job.lights, &job.settings().integrator);
     let pilot = Pilot::new(job.settings(), &job.world.scene.film.bounds, chooses_lights);
     let choice = pilot.map(|mut pilot| pilot.choose(job, how)).transpose()?;
@@ -337,6 +341,10 @@ impl Pilot {
         if !job.world.scene.media.is_empty() {
             candidates.retain(|c| through_media::obstacle_of(&c.settings).is_none());
         }
+        // All candidates choose from the same lights, and others would not find what glows
+        if job.lights.find_glows() {
+            candidates.retain(|c| c.settings.light_choice().glows);
+        }
         let second = self.round(job, &candidates, SECOND_ROUND, how)?;
         let predicted = |candidate: &Candidate| {
             let n = [0, 1].map(|vertex| candidate.settings.sample_counts_at(vertex).samples);
@@ -524,7 +532,10 @@ fn with_photons(job: &mut RenderJob, nanoseconds: f64) -> Vec<Candidate> {
     let samples = job.world.scene.film.bounds.area() as f64 * f64::from(sampling.pilot_spp());
     let affordable = samples * nanoseconds * PHOTON_SHARE / PHOTON_TIME;
     let given = base.photons.visibility_photons;
-    if job.lights.lit.len() < MANY_LIGHTS || affordable < given.map_or(MIN_PHOTONS, f64::from) {
+    if job.lights.find_glows()
+        || job.lights.lit.len() < MANY_LIGHTS
+        || affordable < given.map_or(MIN_PHOTONS, f64::from)
+    {
         return Vec::new();
     }
     if affordable < PHOTON_PATHS as f64 {

@@ -68,14 +68,10 @@ pub(super) fn choose(job: &mut RenderJob, stop: &AtomicBool) {
 }
 
 /// True if [`choose`] has something to choose for an image with these pixels.
-fn is_open(settings: &Settings, bounds: &PixelBounds) -> bool {
-    is_wanted(settings) && bounds.area() >= BLOCKS[0] * PIXELS_PER_BLOCK
-}
-
-/// True if settings leave the choice to a pilot, where the image is large enough for one.
-pub(super) fn is_wanted(settings: &Settings) -> bool {
+pub(super) fn is_open(settings: &Settings, bounds: &PixelBounds) -> bool {
     let i = &settings.integrator;
-    Estimator::at_vertex(i, 0).is_over_pixels()
+    bounds.area() >= BLOCKS[0] * PIXELS_PER_BLOCK
+        && Estimator::at_vertex(i, 0).is_over_pixels()
         && i.ocv.control_variates == ControlVariates::Auto
         && matches!(i.kind, IntegratorKind::Direct | IntegratorKind::Path)
 }

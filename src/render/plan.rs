@@ -73,8 +73,8 @@ pub fn prepare(job: &mut RenderJob, how: &Preparation<'_>) -> Result<Plan, Rende
         return Err(RenderError::Media(obstacle));
     }
     let pool = super::thread_pool(how.threads)?;
-    let before = *job.settings();
-    if let Some(limit) = how.time_limit.filter(|_| has_pilot(&before) && before.sampling.pilot_spp.is_none()) {
+    let (before, bounds) = (*job.settings(), job.world.scene.film.bounds);
+    if let Some(limit) = how.time_limit.filter(|_| has_pilot(&before, &bounds) && before.sampling.pilot_spp.is_none()) {
         let spp = pool.install(|| samples_in(job, limit));
         job.change(|s| s.sampling.pilot_spp = Some(spp).filter(|&spp| spp < s.sampling.spp));
     }
@@ -118,11 +118,11 @@ fn measures_proposals(settings: &IntegratorSettings) -> bool {
 }
 
 /// True if settings ask for pilots, which take a part of the time of the image.
-fn has_pilot(settings: &Settings) -> bool {
+fn has_pilot(settings: &Settings, bounds: &PixelBounds) -> bool {
     let sampling = &settings.sampling;
     settings.integrator.estimator == EstimatorKind::Auto
         || measures_proposals(&settings.integrator)
-        || control_pilot::is_wanted(settings)
+        || control_pilot::is_open(settings, bounds)
         || sampling.allocation == Allocation::Adaptive
         || sampling.noise.is_some()
 }

@@ -567,6 +567,8 @@ fn settings_that_leave_media_out_are_refused() {
     }
     job.change(|s| (s.integrator.estimator, s.integrator.ris.target) = (EstimatorKind::Ris, Target::Gvl));
     assert!(error(&mut job).contains("target gvl"));
+    job.change(|s| s.integrator.ris.target = Target::FglControl);
+    assert!(error(&mut job).contains("target fgl-control"));
     job.change(|s| s.integrator.estimator = EstimatorKind::Mis);
     for kind in [IntegratorKind::IrradianceCache, IntegratorKind::PhotonMap] {
         job.change(|s| s.integrator.kind = kind);
@@ -599,6 +601,32 @@ fn auto_knows_media() {
     let mean = film.pixels().iter().map(|p| p.mean()[0]).sum::<f64>() / film.len() as f64;
     // 8192 samples of a standard deviation below 1
     assert!((mean - 1.0).abs() < 0.06, "{mean}");
+}
+
+/// Where media glow, `auto` chooses among what finds them by light samples, whether it measures or not.
+#[test]
+fn auto_has_light_samples_of_what_glows() {
+    for (depth, edge) in [(1, 16), (1, 64), (5, 16), (5, 64)] {
+        let resolution = format!("\"integer xresolution\" {edge} \"integer yresolution\" {edge}");
+        let mut text =
+            camera("0.3 0.2 3", "", depth).replace("\"integer xresolution\" 4 \"integer yresolution\" 4", &resolution);
+        text += &format!(
+            r#"MakeNamedMedium "fire" {} AttributeBegin Material "interface" MediumInterface "fire" "" {BOX} AttributeEnd
+            Shape "trianglemesh" "point3 P" [-9 -9 -2  9 -9 -2  9 9 -2  -9 9 -2] "integer indices" [0 1 2 0 2 3] "#,
+            media(0.1, 0.8, r#""rgb Le" [3 2 1]"#)[1].1
+        );
+        for i in 0..20 {
+            text += &format!("LightSource \"point\" \"rgb I\" [ 1 1 1 ] \"point3 from\" [ {i} 3 0 ]\n");
+        }
+        let mut job = job(&text, AccelKind::Embree);
+        job.change(|s| {
+            (s.integrator.estimator, s.sampling.spp) = (EstimatorKind::Auto, 512);
+            s.integrator.kind = if depth == 1 { IntegratorKind::Direct } else { IntegratorKind::Path };
+        });
+        let plan = prepare(&mut job, &Preparation::on(None)).unwrap();
+        assert_eq!(plan.auto.is_some(), edge == 64, "{depth} bounces, {edge} pixels");
+        assert!(job.lights.find_glows(), "{depth} bounces, {edge} pixels: {:?}", plan.chosen);
+    }
 }
 
 /// What a scene file says wrong is named with its place.

@@ -14,8 +14,8 @@
 //! ([`lumiris_numbers::estimators::ris::control`]).
 //!
 //! With the target `fgl-control`, what is seen of each group of lights is fitted to the surrounding pixels: the control variates
-//! of a pixel are, for each group, q̂·r of the draws in place of all proposals ([`OfGroups`]), so that what chance gives to one group
-//! and takes from another is taken back. Later vertices of a path have the target `fgl`.
+//! of a pixel are, for each group, its part of q̂·r of the draws less its part of that of all proposals ([`OfGroups`]), so that what
+//! chance gives to one group and takes from another is taken back. Later vertices of a path have the target `fgl`.
 //!
 //! Targets with visibility reverse the order: proposals are traced, and N of the visible ones are shaded; light samples
 //! do not need the BSDF before that.

@@ -368,7 +368,7 @@ mod tests {
             ("\"string proposals\" \"many\"", "one of auto, optimal"),
             ("\"integer proposals\" 0", "proposals must be from 1 to 4096, not 0"),
             ("\"string strata\" \"some\"", "one of none, proposals, weights, systematic"),
-            ("\"string target\" \"l\"", "one of fgl, gv, gvl"),
+            ("\"string target\" \"l\"", "one of fgl, fgl-control, gv, gvl"),
             ("\"string estimator\" \"rys\"", "one of auto, mc, mis, ris, ocv, optimal-mis, correlated"),
         ] {
             let report = settings(&format!("Integrator \"path\" {parameter}")).unwrap_err();
