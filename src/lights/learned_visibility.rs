@@ -167,7 +167,7 @@ mod tests {
 
     fn learned(cache: &VisibilityCache) -> LearnedVisibility {
         let lights = lamps();
-        LearnedVisibility::new(TreeChoice::of_lights(&lights, RADIUS), &lights, RADIUS, cache)
+        LearnedVisibility::new(TreeChoice::of_lights(&lights, RADIUS, None), &lights, RADIUS, cache)
     }
 
     #[test]
@@ -178,7 +178,7 @@ mod tests {
         let of = |paths: f32| {
             let cache = VisibilityCache::new(std::iter::once((AT, Vec3::Z, 0)), 0.1);
             let cache = cache.with_paths(std::iter::once((0, paths)));
-            let learned = LearnedVisibility::new(TreeChoice::of_lights(&lights, RADIUS), &lights, RADIUS, &cache);
+            let learned = LearnedVisibility::new(TreeChoice::of_lights(&lights, RADIUS, None), &lights, RADIUS, &cache);
             let importance = learned.importance(&ctx, 0);
             move |count| learned.visibility(0, importance, count)
         };

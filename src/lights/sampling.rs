@@ -71,18 +71,20 @@ impl LightSampling {
     fn learn(&mut self) {
         let LightSet { lights, scene_radius, .. } = &*self.set;
         let cache = self.visibility_cache.as_ref().filter(|cache| !cache.is_empty());
-        let choice = || {
-            let powers: Vec<f32> = lights.iter().map(|light| light.phi(*scene_radius)).collect();
-            let of_lights = || TreeChoice::new((lights, &powers), self.choice.infinite_fraction, false);
-            self.sampler.tree().filter(|_| !self.choice.glows).cloned().unwrap_or_else(of_lights)
-        };
-        self.learned = cache.map(|cache| LearnedVisibility::new(choice(), lights, *scene_radius, cache));
+        self.learned = cache.map(|cache| {
+            let choice = if self.choice.glows {
+                TreeChoice::of_lights(lights, *scene_radius, self.choice.infinite_fraction)
+            } else {
+                self.tree_choice()
+            };
+            LearnedVisibility::new(choice, lights, *scene_radius, cache)
+        });
     }
 
     /// The choice by the light tree, whatever the light sampler is.
     pub fn tree_choice(&self) -> TreeChoice {
         let choice = self.sampler.tree().cloned();
-        choice.unwrap_or_else(|| TreeChoice::of_lights(&self.set.lights, self.set.scene_radius))
+        choice.unwrap_or_else(|| TreeChoice::of_lights(&self.set.lights, self.set.scene_radius, None))
     }
 
     /// What photons tell of the visibility of lights; `None` without photons.

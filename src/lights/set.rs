@@ -199,7 +199,7 @@ impl LightSet {
 
     /// True if any medium glows that is a light.
     pub fn has_glows(&self) -> bool {
-        self.glowing.iter().any(Option::is_some)
+        self.glowing.iter().flatten().any(|glowing| glowing.lights.iter().any(Option::is_some))
     }
 
     /// The light that is the part of a medium at a point of its unit cube, if that glows.

@@ -17,10 +17,10 @@ pub struct TreeChoice {
 }
 
 impl TreeChoice {
-    /// A choice among `lights` in a scene of radius `scene_radius` (m).
-    pub(super) fn of_lights(lights: &[Light], scene_radius: f32) -> Self {
+    /// A choice among `lights` that have power, in a scene of radius `scene_radius` (m); `infinite_fraction` as in [`new`](Self::new).
+    pub(super) fn of_lights(lights: &[Light], scene_radius: f32, infinite_fraction: Option<f32>) -> Self {
         let powers: Vec<f32> = lights.iter().map(|light| light.phi(scene_radius)).collect();
-        Self::new((lights, &powers), None, false)
+        Self::new((lights, &powers), infinite_fraction, false)
     }
 
     /// A choice among `lights` of the given `powers`, with or without the parts of media that glow, where all infinite lights
