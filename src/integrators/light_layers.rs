@@ -65,8 +65,8 @@ impl LayerSums {
     }
 
     /// By sample, then by layer.
-    pub(super) fn sums(&self) -> &[Rgb] {
-        &self.sums
+    pub(super) fn sums(&mut self) -> &mut [Rgb] {
+        &mut self.sums
     }
 
     /// Adds what a sample has of a light at the point `p`. `wi` is the direction to it, unit.

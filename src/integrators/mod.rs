@@ -66,8 +66,8 @@ pub trait Tracer: Send {
     fn keep_light_layers(&mut self, _count: usize) {}
 
     /// The light of the layers of the last batch: by sample, then by layer; nothing if none are kept.
-    fn light_layers(&self) -> &[Rgb] {
-        &[]
+    fn light_layers(&mut self) -> &mut [Rgb] {
+        &mut []
     }
 
     /// The counts and times since the last call.

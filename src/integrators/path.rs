@@ -361,7 +361,7 @@ impl Tracer for PathTracer {
         self.search.layers.layers = count;
     }
 
-    fn light_layers(&self) -> &[Rgb] {
+    fn light_layers(&mut self) -> &mut [Rgb] {
         self.search.layers.sums()
     }
 

@@ -100,7 +100,7 @@ impl Tracer for GuidedTracer<'_> {
         self.paths.keep_light_layers(count);
     }
 
-    fn light_layers(&self) -> &[Rgb] {
+    fn light_layers(&mut self) -> &mut [Rgb] {
         self.paths.light_layers()
     }
 

@@ -7,14 +7,15 @@
 //! happen to be dark would stay dark.
 //!
 //! What visible lights make of v_p is known from more samples than the rest, which see nothing but these lights and so cost
-//! little: it lies in few pixels, those at the edges. The rest is averaged over neighbours.
+//! little: it lies in few pixels, those at the edges. The rest is averaged over neighbours. In the image, too, samples may
+//! see lights by more camera rays than become paths ([`super::looks`]): as many as their own variance and cost ask for.
 //!
 //! What is gained is estimated from the pilot, too, by one half of the pixels with numbers from the other half, first on a
 //! part of the image: where noise is much the same everywhere, as in most paths of many bounces, numbers remain uniform.
 //!
 //! The numbers depend on scene, settings and seed only; costs are counted in rays and proposals and not in seconds.
 
-use super::allocation_counts::{ALONE, Rules, SHARED, counts};
+use super::allocation_counts::{ALONE, Pixel, Rules, SHARED, Share, counts};
 use super::noise::counts_for;
 use super::pilot_samples::{LeftToLightPaths, trace_pixels};
 use super::worker::Worker;
@@ -61,6 +62,9 @@ const TILES_AT_ONCE: usize = 1024;
 const MIN_SCOUTED: usize = 256 * (COST_TILE * COST_TILE) as usize;
 /// Cost of a tentative collision in a medium, a lookup: as measured in a sparse volume.
 const COLLISION_COST: f64 = 1.5;
+/// Cost of what only sees visible lights, relative to that of its rays: as measured in four scenes with 9 for a sample (0.9 to
+/// 2.7).
+const LOOK_COST: f64 = 2.0;
 /// Maximum number of samples per pixel for a standard error that is asked for, if none is given.
 const MAX_SPP_FOR_NOISE: u32 = 4096;
 
@@ -82,8 +86,8 @@ pub(super) fn allocate(job: &RenderJob, stop: &AtomicBool) -> Option<PixelSample
         return None;
     }
     pilot.measure(|tile| tile % SCOUTS != 0);
-    let counts = counts(&pilot.weights(|_| true, &BOTH), &pilot.costs(), (&pilot.rules, spp));
-    (pilot.gain(spp) >= pilot.rules.min_gain).then_some(PixelSamples { bounds: pilot.bounds, spp, counts })
+    let (counts, looks) = counts(&pilot.known(|_| true, &BOTH), (&pilot.rules, spp));
+    (pilot.gain(spp) >= pilot.rules.min_gain).then_some(PixelSamples { bounds: pilot.bounds, spp, counts, looks })
 }
 
 /// Completes settings that ask for a standard error: its maximum number of samples per pixel, unless `has_spp`. `Err` says what it
@@ -115,6 +119,14 @@ pub fn allows_adaptive(settings: &Settings) -> bool {
         && settings.sampling.spp >= MIN_SPP
 }
 
+/// True if samples of an image that is rendered with the settings `of_paths` may be split: their looks have the noise of visible
+/// lights then.
+pub(super) fn may_split(settings: &Settings, of_paths: &IntegratorSettings) -> bool {
+    let sampling = settings.sampling;
+    let is_open = sampling.allocation != Allocation::Uniform && sampling.noise.is_none();
+    is_open && allows_adaptive(&Settings { integrator: *of_paths, sampling })
+}
+
 /// What a pilot's samples of a pixel say, in few bytes: a pilot has all pixels of an image at once.
 #[derive(Clone, Copy, Debug, Default)]
 struct Measured {
@@ -127,8 +139,9 @@ struct Measured {
     sight: [f32; 3],
     /// Variance of that from each of two sets of samples.
     sight_variance: [[f32; 3]; 2],
-    /// Cost of a sample; 0 where nothing was measured.
+    /// Cost of a sample, and of one that sees visible lights alone; 0 where nothing was measured.
     cost: f32,
+    look: f32,
     /// Material of the first surface, or [`NO_MATERIAL`].
     material: u32,
 }
@@ -137,7 +150,7 @@ struct Measured {
 const NO_MATERIAL: u32 = u32::MAX;
 
 impl Measured {
-    fn of(samples: &PixelAccumulator, sight: &Sight, cost: f64) -> Self {
+    fn of(samples: &PixelAccumulator, sight: &Sight, [cost, look]: [f64; 2]) -> Self {
         let sums = samples.sums();
         let [a, b] = sight.sets.each_ref().map(PixelAccumulator::sums);
         Measured {
@@ -149,6 +162,7 @@ impl Measured {
             }),
             sight_variance: [a, b].map(|sums| variance(&sums).map(|v| v as f32)),
             cost: cost as f32,
+            look: look as f32,
             material: sight.material,
         }
     }
@@ -244,11 +258,6 @@ impl<'a> Pilot<'a> {
         }
     }
 
-    /// The cost of a sample of each pixel.
-    fn costs(&self) -> Vec<f32> {
-        self.pixels.iter().map(|p| p.cost).collect()
-    }
-
     /// The pixels up to `radius` away in each direction.
     fn around(&self, i: usize, radius: usize) -> impl Iterator<Item = usize> + use<> {
         let (width, height) = (self.bounds.width() as usize, self.bounds.height() as usize);
@@ -288,9 +297,9 @@ impl<'a> Pilot<'a> {
         if variance == [0.0; 3] { 0.0 } else { dot(variance, self.relative_to(i)) }
     }
 
-    /// v_p: the relative variance, averaged over the chosen ones of the neighbours or of all pixels of the material, and that
-    /// of visible lights by some of the sets of samples.
-    fn weights(&self, is_chosen: impl Fn(usize) -> bool + Sync, sets: &[usize]) -> Vec<f32> {
+    /// What is known of each pixel: the relative variance, averaged over the chosen ones of the neighbours or of all pixels of
+    /// the material, and that of visible lights by some of the sets of samples.
+    fn known(&self, is_chosen: impl Fn(usize) -> bool + Sync, sets: &[usize]) -> Vec<Pixel> {
         let known = |i: usize| self.relative_variance(i).filter(|_| is_chosen(i));
         let rest = match self.rules.radius {
             Some(radius) => {
@@ -300,10 +309,12 @@ impl<'a> Pilot<'a> {
             }
             None => self.of_materials(known),
         };
-        let weight = |(i, [sum, count]): (usize, [f64; 2])| {
-            (sum.max(0.0) / count.max(1.0) + self.of_sight_around(i, sets)) as f32
+        let of_pixel = |(i, [sum, count]): (usize, [f64; 2])| {
+            let Measured { cost, look, .. } = self.pixels[i];
+            let rest = (sum.max(0.0) / count.max(1.0)) as f32;
+            Pixel { rest, sight: self.of_sight_around(i, sets) as f32, cost, look }
         };
-        rest.into_par_iter().enumerate().map(weight).collect()
+        rest.into_par_iter().enumerate().map(of_pixel).collect()
     }
 
     /// Σ of what is known of pixels of the same first material, and their number: near the mean of all where they are few.
@@ -346,16 +357,23 @@ impl<'a> Pilot<'a> {
     fn gain(&self, spp: u32) -> f64 {
         let width = self.bounds.width() as usize;
         let is_even = |i: usize| (i % width + i / width).is_multiple_of(2);
-        let counts = counts(&self.weights(is_even, &[0]), &self.costs(), (&self.rules, spp));
+        let (counts, looks) = counts(&self.known(is_even, &[0]), (&self.rules, spp));
         let (mut uniform, mut adaptive) = ([0.0; 3], [0.0; 3]);
         for i in (0..counts.len()).filter(|&i| !is_even(i)) {
             let Some(relative) = self.relative_variance(i) else { continue };
             let p = &self.pixels[i];
-            let absolute: f64 = p.sight_variance[1].iter().chain(&p.variance).map(|v| f64::from(*v)).sum();
-            let n = f64::from(counts[i]) / f64::from(spp);
-            for (sums, n) in [(&mut uniform, 1.0), (&mut adaptive, n)] {
-                let terms = [(relative + self.of_sight(i, &[1])) / n, absolute / n, f64::from(p.cost) * n];
-                sums.iter_mut().zip(terms).for_each(|(sum, term)| *sum += term);
+            let [rest, sight] = [p.variance, p.sight_variance[1]].map(|v| v.iter().map(|v| f64::from(*v)).sum::<f64>());
+            let share = Share { samples: f64::from(counts[i]) / f64::from(spp), looks: looks[i] };
+            for (sums, share) in [(&mut uniform, Share::ONE), (&mut adaptive, share)] {
+                let known = |rest: f64, sight: f64| Pixel {
+                    rest: rest as f32,
+                    sight: sight as f32,
+                    cost: p.cost,
+                    look: p.look,
+                };
+                let [relative, cost] = share.of(&known(relative, self.of_sight(i, &[1])));
+                let [absolute, _] = share.of(&known(rest, sight));
+                sums.iter_mut().zip([relative, absolute, cost]).for_each(|(sum, term)| *sum += term);
             }
         }
         let [relative, absolute, cost] = [0, 1, 2].map(|k| uniform[k] / adaptive[k]);
@@ -413,10 +431,11 @@ fn pilot_tile(
         let radiance = sample.radiance - seen.next().unwrap_or_default();
         sums[i as usize].add(0, &PixelSample { radiance, features: None });
     });
-    let cost = cost(&worker.tracer.take_stats(), chosen.len() * spp as usize);
+    let cost_of = cost(&worker.tracer.take_stats(), chosen.len() * spp as usize);
     let sight = see(run, worker, seeing, tile, (sight_spp, seed));
-    worker.tracer.take_stats();
-    sums.iter().zip(&sight).map(|(samples, sight)| Measured::of(samples, sight, cost)).collect()
+    let looks: u64 = sight.iter().flat_map(|sight| &sight.sets).map(|sums| u64::from(sums.radiance.count)).sum();
+    let costs = [cost_of, LOOK_COST * cost(&worker.tracer.take_stats(), looks as usize)];
+    sums.iter().zip(&sight).map(|(samples, sight)| Measured::of(samples, sight, costs)).collect()
 }
 
 /// Two sets of samples that see visible lights alone: more for pixels beside which these differ.

@@ -1,9 +1,19 @@
-//! How many camera samples pixels get, from the variance and the cost of each.
+//! How many camera samples pixels get, and how many looks each of these, from the variance and the cost of both.
 
-/// Steps by which the rate converges at which error is exchanged for cost.
+use rayon::prelude::*;
+
+/// Steps by which the rate converges at which error is exchanged for cost, where it changes the cost of the image; and by
+/// which it is found for a given cost.
 const ITERATIONS: usize = 8;
+const BISECTIONS: usize = 50;
 /// Fewest and most samples of a pixel, relative to the mean.
 const RANGE: [f64; 2] = [0.5, 8.0];
+/// Fewest samples of a pixel whose samples are split: beside lights there is more noise than few samples know of.
+const MIN_SPLIT: f64 = 1.0;
+/// Most looks of a sample, its own included.
+pub(super) const MAX_LOOKS: u8 = 64;
+/// Pixels whose sums are added up by one thread.
+const CHUNK: usize = 1 << 14;
 
 /// What numbers follow from.
 #[derive(Clone, Copy)]
@@ -28,49 +38,101 @@ pub(super) const ALONE: Rules =
 /// either. All others have as many samples as each other, so that they share all of their paths.
 pub(super) const SHARED: Rules = Rules { fraction: 0.025, mean_radius: 4, radius: None, doubles: true, min_gain: 1.03 };
 
-/// Numbers of samples n ∝ √(v/c), limited to [`RANGE`], of the same cost as `spp` everywhere; or [`doubled`] ones.
-pub(super) fn counts(weights: &[f32], costs: &[f32], (rules, spp): (&Rules, u32)) -> Vec<u32> {
-    if rules.doubles {
-        return doubled(weights, costs, spp);
-    }
-    let wanted: Vec<f32> = weights.iter().zip(costs).map(|(v, c)| (v / c.max(1.0)).sqrt()).collect();
-    let limit = |n: f64| n.clamp(RANGE[0], RANGE[1]);
-    let of_pixel = |factor: f64, (w, c): (&f32, &f32)| limit(factor * f64::from(*w)) * f64::from(*c);
-    let cost_of = |factor: f64| wanted.iter().zip(costs).map(|pixel| of_pixel(factor, pixel)).sum::<f64>();
-    let all = costs.iter().map(|c| f64::from(*c)).sum::<f64>();
-    // Bisection of the logarithm; costs rise with the factor
-    let (mut low, mut high) = (-60.0_f64, 60.0_f64);
-    for _ in 0..60 {
-        let middle = 0.5 * (low + high);
-        if cost_of(middle.exp2()) < all { low = middle } else { high = middle }
-    }
-    let factor = low.exp2();
-    // Where nothing varies, all pixels have the mean
-    let is_open = |w: f64| w > 0.0 && factor.is_finite();
-    let count = |w: f64| if is_open(w) { limit(factor * w) } else { RANGE[0] };
-    wanted.iter().map(|w| ((count(f64::from(*w)) * f64::from(spp)).round() as u32).max(1)).collect()
+/// What is known of a pixel.
+#[derive(Clone, Copy, Debug, Default)]
+pub(super) struct Pixel {
+    /// Relative variance of a sample without visible lights.
+    pub(super) rest: f32,
+    /// Relative variance of what a sample sees of visible lights.
+    pub(super) sight: f32,
+    /// Cost of a sample.
+    pub(super) cost: f32,
+    /// Cost of a look.
+    pub(super) look: f32,
 }
 
-/// `spp` samples, or 2, 4 or 8 times as many where that lowers error × cost of the image.
-fn doubled(weights: &[f32], costs: &[f32], spp: u32) -> Vec<u32> {
-    let pixels = || weights.iter().zip(costs).map(|(v, c)| [f64::from(*v), f64::from(c.max(1.0))]);
-    // From n to 2n samples the error falls by v/2n, and the cost rises by c n
-    let factor = |[v, c]: [f64; 2], rate: f64| {
-        let mut n = 1.0;
-        while n < RANGE[1] && v > 2.0 * n * n * c * rate {
-            n *= 2.0;
-        }
-        n
-    };
-    let mut rate = f64::INFINITY;
-    for _ in 0..ITERATIONS {
-        let (error, cost) = pixels().fold((0.0, 0.0), |(error, cost), [v, c]| {
-            let n = factor([v, c], rate);
-            (error + v / n, cost + c * n)
-        });
-        rate = error / cost;
+/// What a pixel gets.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub(super) struct Share {
+    /// Samples, relative to the mean.
+    pub(super) samples: f64,
+    /// Looks of each, its own included.
+    pub(super) looks: u8,
+}
+
+impl Share {
+    /// That of all pixels of an image whose samples are not distributed.
+    pub(super) const ONE: Share = Share { samples: 1.0, looks: 1 };
+
+    /// Error and cost of a pixel that gets it. The path of a sample has a look of its own; where there are more, that one is
+    /// repeated, to be told from what the path finds later.
+    pub(super) fn of(self, pixel: &Pixel) -> [f64; 2] {
+        let Pixel { rest, sight, cost, look } = *pixel;
+        let looks = f64::from(self.looks);
+        let error = (f64::from(rest) + f64::from(sight) / looks) / self.samples;
+        let of_looks = if self.looks > 1 { looks * f64::from(look) } else { 0.0 };
+        [error, (f64::from(cost.max(1.0)) + of_looks) * self.samples]
     }
-    pixels().map(|pixel| factor(pixel, rate) as u32 * spp).collect()
+
+    /// What makes error + rate × cost least. Samples and looks follow from their own variances: n ∝ √(v/c).
+    fn best(pixel: &Pixel, rate: f64, rules: &Rules) -> Share {
+        let [rest, sight, cost, look] =
+            [pixel.rest, pixel.sight, pixel.cost.max(1.0), pixel.look.max(1.0)].map(f64::from);
+        let with_looks = |samples: f64| {
+            let looks = (sight / (look * rate)).sqrt() / samples;
+            // Not a number where nothing varies
+            [1.0, looks.round().max(1.0).min(f64::from(MAX_LOOKS))].map(|looks| Share { samples, looks: looks as u8 })
+        };
+        let better = |a: Share, b: Share| {
+            let [a_loss, b_loss] = [a, b].map(|share| {
+                let [error, cost] = share.of(pixel);
+                error + rate * cost
+            });
+            if b_loss < a_loss { b } else { a }
+        };
+        if rules.doubles {
+            return [1.0, 2.0, 4.0, 8.0].into_iter().flat_map(with_looks).reduce(better).unwrap_or(Share::ONE);
+        }
+        let limit = |variance: f64| (variance / (cost * rate)).sqrt().clamp(RANGE[0], RANGE[1]);
+        let [together, apart] = [limit(rest + sight), limit(rest).max(MIN_SPLIT)].map(with_looks);
+        better(better(together[0], together[1]), apart[1])
+    }
+}
+
+/// Numbers of samples of pixels, and of the looks of each sample: those of the least error, of the same cost as `spp` samples
+/// everywhere; or if samples are doubled, `spp` or 2, 4 or 8 times as many, where that lowers error × cost of the image.
+pub(super) fn counts(pixels: &[Pixel], (rules, spp): (&Rules, u32)) -> (Vec<u32>, Vec<u8>) {
+    let sums = |rate: f64| -> [f64; 2] {
+        let of_chunk = |pixels: &[Pixel]| {
+            pixels.iter().fold([0.0; 2], |sum, pixel| {
+                let of_pixel = Share::best(pixel, rate, rules).of(pixel);
+                [sum[0] + of_pixel[0], sum[1] + of_pixel[1]]
+            })
+        };
+        // In the order of chunks, whoever is first
+        let of_chunks: Vec<[f64; 2]> = pixels.par_chunks(CHUNK).map(of_chunk).collect();
+        of_chunks.into_iter().fold([0.0; 2], |a, b| [a[0] + b[0], a[1] + b[1]])
+    };
+    let rate = if rules.doubles {
+        (0..ITERATIONS).fold(f64::INFINITY, |rate, _| {
+            let [error, cost] = sums(rate);
+            error / cost
+        })
+    } else {
+        let all: f64 = pixels.iter().map(|pixel| f64::from(pixel.cost.max(1.0))).sum();
+        // Bisection of the logarithm; costs fall as the rate rises
+        let (mut low, mut high) = (-100.0_f64, 60.0_f64);
+        for _ in 0..BISECTIONS {
+            let middle = 0.5 * (low + high);
+            if sums(middle.exp2())[1] > all { low = middle } else { high = middle }
+        }
+        high.exp2()
+    };
+    let share = |pixel: &Pixel| {
+        let Share { samples, looks } = Share::best(pixel, rate, rules);
+        (((samples * f64::from(spp)).round() as u32).max(1), looks)
+    };
+    pixels.par_iter().map(share).unzip()
 }
 
 #[cfg(test)]
@@ -78,12 +140,34 @@ mod tests {
     use super::*;
     use std::f64::consts::SQRT_2;
 
+    /// Pixels of these variances without visible lights, and of these costs.
+    fn pixels(variances: &[f32], costs: &[f32]) -> Vec<Pixel> {
+        let pixel = |(&rest, &cost): (&f32, &f32)| Pixel { rest, sight: 0.0, cost, look: 1.0 };
+        variances.iter().zip(costs).map(pixel).collect()
+    }
+
+    /// Numbers of samples of pixels without visible lights.
+    fn numbers(variances: &[f32], costs: &[f32], (rules, spp): (&Rules, u32)) -> Vec<u32> {
+        let (counts, looks) = counts(&pixels(variances, costs), (rules, spp));
+        assert!(looks.iter().all(|looks| *looks == 1));
+        counts
+    }
+
+    /// Error and cost of pixels with the numbers that they got.
+    fn error_and_cost(pixels: &[Pixel], (counts, looks): &(Vec<u32>, Vec<u8>), spp: u32) -> [f64; 2] {
+        let all = pixels.iter().zip(counts.iter().zip(looks));
+        all.fold([0.0; 2], |sum, (pixel, (&n, &looks))| {
+            let [error, cost] = Share { samples: f64::from(n) / f64::from(spp), looks }.of(pixel);
+            [sum[0] + error, sum[1] + cost]
+        })
+    }
+
     #[test]
     fn numbers_of_samples_follow_noise_and_cost_and_keep_the_time() {
         // Two in three pixels have a quarter of the variance of the others, and one of these costs twice as much
         let weights: Vec<f32> = (0..300).map(|i| if i % 3 == 0 { 4.0 } else { 1.0 }).collect();
         let costs: Vec<f32> = (0..300).map(|i| if i % 3 == 1 { 2.0 } else { 1.0 }).collect();
-        let counts = counts(&weights, &costs, (&ALONE, 64));
+        let counts = numbers(&weights, &costs, (&ALONE, 64));
         assert!((f64::from(counts[0]) / f64::from(counts[2]) - 2.0).abs() < 0.05, "{:?}", &counts[..3]);
         assert!((f64::from(counts[2]) / f64::from(counts[1]) - SQRT_2).abs() < 0.05, "{:?}", &counts[..3]);
         let time: f64 = counts.iter().zip(&costs).map(|(&n, &c)| f64::from(n) * f64::from(c)).sum();
@@ -94,11 +178,44 @@ mod tests {
     #[test]
     fn no_pixel_has_less_than_half_or_more_than_eight_times_the_mean() {
         let weights: Vec<f32> = (0..1000_u16).map(|i| if i == 5 { 1e12 } else { f32::from(i % 2) * 1e-9 }).collect();
-        let counts = counts(&weights, &[1.0; 1000], (&ALONE, 16));
+        let counts = numbers(&weights, &[1.0; 1000], (&ALONE, 16));
         assert_eq!((counts[5], counts[0]), (128, 8));
         assert!(counts.iter().all(|n| (8..=128).contains(n)));
-        let still = super::counts(&[0.0; 4], &[1.0; 4], (&ALONE, 16));
-        assert!(still.iter().all(|n| *n >= 1), "nothing varies: {still:?}");
+        for rules in [ALONE, SHARED] {
+            let still = numbers(&[0.0; 4], &[1.0; 4], (&rules, 16));
+            assert!(still.iter().all(|n| *n >= 1), "nothing varies: {still:?}");
+        }
+    }
+
+    #[test]
+    fn what_varies_by_visible_lights_has_more_looks_and_not_more_paths() {
+        // One pixel in 50 sees the edge of a lamp; a path costs 10 looks
+        let pixel = |i: usize| Pixel {
+            rest: 1.0,
+            sight: if i.is_multiple_of(50) { 400.0 } else { 0.0 },
+            cost: 20.0,
+            look: 2.0,
+        };
+        let all: Vec<Pixel> = (0..1000).map(pixel).collect();
+        for rules in [ALONE, SHARED] {
+            let given = counts(&all, (&rules, 64));
+            let (edge, other) = ((given.0[0], given.1[0]), (given.0[1], given.1[1]));
+            assert_eq!(other.1, 1);
+            // √(s c/(r c_look)) where both are free
+            assert!((50..=64).contains(&edge.1), "{edge:?} {other:?}");
+            assert!(edge.0 < 2 * other.0, "{edge:?} {other:?}");
+            // Better than samples alone by far, and than twice or half as many looks
+            let alone: Vec<Pixel> = all.iter().map(|p| Pixel { rest: p.rest + p.sight, sight: 0.0, ..*p }).collect();
+            let loss = |given: &(Vec<u32>, Vec<u8>)| error_and_cost(&all, given, 64).iter().product::<f64>();
+            assert!(loss(&given) < 0.65 * loss(&counts(&alone, (&rules, 64))));
+            for looks in [edge.1 / 2, MAX_LOOKS] {
+                let changed = given.1.iter().map(|&n| if n > 1 { looks } else { 1 }).collect();
+                assert!(loss(&given) <= 1.001 * loss(&(given.0.clone(), changed)), "{looks}");
+            }
+        }
+        // The same of an image in which light varies as much: a look more is worth no more than what it costs
+        let still: Vec<Pixel> = all.iter().map(|p| Pixel { rest: 400.0, ..*p }).collect();
+        assert!(counts(&still, (&ALONE, 64)).1.iter().all(|looks| *looks <= 3));
     }
 
     #[test]
@@ -116,11 +233,9 @@ mod tests {
             }
         };
         let weights: Vec<f32> = (0..1000).map(weight).collect();
-        let counts = counts(&weights, &[2.0; 1000], (&SHARED, 12));
-        let error_and_cost = |counts: &[u32]| {
-            let error: f64 = weights.iter().zip(counts).map(|(v, &n)| f64::from(*v) / f64::from(n)).sum();
-            error * counts.iter().map(|&n| f64::from(n)).sum::<f64>()
-        };
+        let counts = numbers(&weights, &[2.0; 1000], (&SHARED, 12));
+        let all = pixels(&weights, &[2.0; 1000]);
+        let loss = |counts: &[u32]| error_and_cost(&all, &(counts.to_vec(), vec![1; 1000]), 12).iter().product::<f64>();
         assert_eq!(counts[7], 96);
         assert!(
             counts
@@ -129,13 +244,13 @@ mod tests {
                 .all(|(i, n)| [12, 24, 48, 96].contains(n) && (i % 100 == 7 || i % 100 == 8 || *n == 12))
         );
         // None is better with twice or half as many, all pixels of its kind together
-        let best = error_and_cost(&counts);
+        let best = loss(&counts);
         for kind in [7, 8, 9] {
             for factor in [0.5, 2.0] {
                 let mut other = counts.clone();
                 other.iter_mut().skip(kind).step_by(100).for_each(|n| *n = (f64::from(*n) * factor) as u32);
                 let is_allowed = (12..=96).contains(&other[kind]);
-                assert!(!is_allowed || error_and_cost(&other) >= 0.999 * best, "{kind} {factor}");
+                assert!(!is_allowed || loss(&other) >= 0.999 * best, "{kind} {factor}");
             }
         }
     }

@@ -1,15 +1,17 @@
 //! The pixels where the pilot of `--estimator auto` measures, and what it measures there.
 
+use super::allocation::may_split;
 use super::auto_reuse;
 use super::auto_round::{Candidate, Difference};
 use super::worker::Worker;
 use super::{Run, processor_time};
-use crate::film::{FeatureSet, PixelBounds};
+use crate::film::{FeatureSet, PixelBounds, PixelSample};
 use crate::imaging::metrics::difference::DEFAULT_EPSILON;
 use crate::integrators::PathTracer;
 use crate::integrators::light_paths::{self, LightPilot};
 use crate::integrators::path::CameraSample;
 use crate::integrators::reuse::{self, Groups};
+use crate::settings::IntegratorSettings;
 use lumiris_numbers::math::hash::{pcg4d, unit_f32};
 
 /// Combined with the number of the round, and for its samples with the seed of the image.
@@ -59,7 +61,7 @@ pub(super) struct Chunk {
 }
 
 /// Renders some pixels with each candidate and seed. The `turn` decides which candidate is first. What `light` paths find, if
-/// they are of use, is left to them.
+/// they are of use, is left to them, and where samples are split the noise of visible lights is left to their looks.
 pub(super) fn measure(
     run: &Run<'_>,
     (pixels, spp): (&[[u32; 2]], u32),
@@ -69,28 +71,19 @@ pub(super) fn measure(
 ) -> Chunk {
     let groups = if reuse::obstacle(run.job).is_none() { Groups::Grid } else { Groups::None };
     let mut worker = Worker::new(PathTracer::sharing(groups, FeatureSet::None));
+    let is_split = candidates.first().is_some_and(|c| may_split(run.job.settings(), &c.settings));
+    let seeing = candidates.first().filter(|_| is_split).map(|c| IntegratorSettings { max_depth: 0, ..c.settings });
+    let seen = seeing.map(|settings| seeds.map(|seed| image(run, &mut worker, &settings, (pixels, spp), seed)));
     let mut times = vec![0.0; candidates.len()];
     let mut images = vec![[(); 2].map(|()| Vec::<[f64; 3]>::new()); candidates.len()];
     for k in 0..candidates.len() {
         let k = (k + turn) % candidates.len();
         let settings = &candidates[k].settings;
-        let sample_counts = settings.sample_counts();
         let per_sample = settings.light_paths.map_or(LIGHT_PATHS, f64::from);
         let knows = light_paths::obstacle_of(run.job, settings).is_none() && per_sample > 0.0;
         worker.tracer.leave(run.job, light.filter(|_| knows).map(|light| (light, per_sample)));
         let start = processor_time::of_thread();
-        for (image, seed) in images[k].iter_mut().zip(seeds) {
-            worker.samples.clear();
-            let samples = pixels.iter().map(|&pixel| (0, pixel, 0..spp));
-            run.camera.samples(samples, seed, &mut worker.scratch, &mut worker.samples);
-            worker.samples.iter_mut().for_each(|s| *s = CameraSample { sample_counts, direct: s.stream, ..*s });
-            let out = &mut worker.results;
-            worker.tracer.trace(run.job, settings, &worker.samples, &mut Default::default(), out);
-            image.extend(out.chunks(spp as usize).map(|samples| {
-                let sum = |c: usize| samples.iter().map(|s| f64::from(s.radiance.to_array()[c])).sum::<f64>();
-                [0, 1, 2].map(|c| sum(c) / f64::from(spp))
-            }));
-        }
+        images[k] = seeds.map(|seed| image(run, &mut worker, settings, (pixels, spp), seed));
         times[k] = (processor_time::of_thread() - start).as_secs_f64() * 1e9;
     }
     let all = || images.iter().flatten();
@@ -101,7 +94,8 @@ pub(super) fn measure(
     };
     let difference = |[a, b]: &[Vec<[f64; 3]>; 2], i: usize| {
         let of_channel = |c: usize| {
-            let d = (a[i][c] - b[i][c]).abs() * relative_to(i, c).sqrt();
+            let of_seen = seen.as_ref().map_or(0.0, |[a, b]| a[i][c] - b[i][c]);
+            let d = (a[i][c] - b[i][c] - of_seen).abs() * relative_to(i, c).sqrt();
             if d.is_finite() { d } else { 0.0 }
         };
         let channels = [0, 1, 2].map(of_channel);
@@ -111,6 +105,28 @@ pub(super) fn measure(
     let of_candidates = times.into_iter().zip(&images).map(|(time, images)| (time, of_candidate(images))).collect();
     let of_channels = |i: usize| (0..3).map(|c| relative_to(i, c)).sum::<f64>() / 3.0;
     Chunk { of_candidates, relative: (0..pixels.len()).map(of_channels).filter(|r| r.is_finite()).sum() }
+}
+
+/// The means of the samples of some pixels, with random numbers of a seed.
+fn image(
+    run: &Run<'_>,
+    worker: &mut Worker<PathTracer>,
+    settings: &IntegratorSettings,
+    (pixels, spp): (&[[u32; 2]], u32),
+    seed: u32,
+) -> Vec<[f64; 3]> {
+    worker.samples.clear();
+    let samples = pixels.iter().map(|&pixel| (0, pixel, 0..spp));
+    run.camera.samples(samples, seed, &mut worker.scratch, &mut worker.samples);
+    let sample_counts = settings.sample_counts();
+    worker.samples.iter_mut().for_each(|s| *s = CameraSample { sample_counts, direct: s.stream, ..*s });
+    let out = &mut worker.results;
+    worker.tracer.trace(run.job, settings, &worker.samples, &mut Default::default(), out);
+    let of_pixel = |samples: &[PixelSample]| {
+        let sum = |c: usize| samples.iter().map(|s| f64::from(s.radiance.to_array()[c])).sum::<f64>();
+        [0, 1, 2].map(|c| sum(c) / f64::from(spp))
+    };
+    out.chunks(spp as usize).map(of_pixel).collect()
 }
 
 #[cfg(test)]

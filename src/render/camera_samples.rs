@@ -175,7 +175,9 @@ impl<'a> CameraSampler<'a> {
     /// Which samples of neighbouring pixels may share its path, and which light paths it has.
     #[inline]
     fn turn(&self, pixel: [u32; 2], sample: u32) -> u32 {
-        self.shared.map_or(sample, |of_pixels| self.first_sample + of_pixels.turn(pixel, sample - self.first_sample))
+        self.shared.map_or(sample, |of_pixels| {
+            self.first_sample.wrapping_add(of_pixels.turn(pixel, sample.wrapping_sub(self.first_sample)))
+        })
     }
 
     /// The random numbers of direct light, if they are those of a block.

@@ -20,6 +20,7 @@ mod control_variates;
 pub mod crosscheck;
 pub mod cryptomatte;
 pub mod efficiency;
+mod looks;
 pub mod memory;
 pub mod noise;
 pub mod output;

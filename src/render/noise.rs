@@ -52,7 +52,7 @@ pub(super) fn counts_for(job: &RenderJob, threshold: f32, stop: &AtomicBool) -> 
         }
     }
     let mean = counts.iter().map(|&n| u64::from(n)).sum::<u64>().div_ceil(counts.len().max(1) as u64);
-    PixelSamples { bounds, spp: (mean as u32).max(1), counts }
+    PixelSamples { bounds, spp: (mean as u32).max(1), counts, looks: Vec::new() }
 }
 
 /// The samples per pixel of a block.

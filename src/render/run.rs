@@ -14,6 +14,7 @@ use crate::imaging::tiles::TileStore;
 use crate::integrators::path::CameraSample;
 use crate::integrators::{PathStats, Statistics, integrator, light_layers, reuse};
 use crate::scene::{FilmSettings, RenderJob};
+use crate::settings::{SamplingSettings, Settings};
 use lumiris_numbers::estimators::ocv::block_of;
 use lumiris_numbers::math::hash::pcg4d;
 use rayon::prelude::*;
@@ -347,8 +348,8 @@ impl<'a> Run<'a> {
     fn render_tile(&self, worker: &mut AnyWorker<'_>, tile: &mut Tile, samples: Range<u32>) -> PathStats {
         let bounds = tile.bounds;
         let mut ill_conditioned = 0;
-        let settings = &self.job.settings().integrator;
-        let done = samples.start - self.settings.first_sample;
+        let Settings { integrator: settings, sampling: SamplingSettings { seed, .. } } = self.job.settings();
+        let (seed, done) = (*seed, samples.start - self.settings.first_sample);
         let start = Instant::now();
         let begins_block =
             Estimator::at_vertex(settings, 0).is_progressive() && done > 0 && block_of(done).first == done;
@@ -359,14 +360,16 @@ impl<'a> Run<'a> {
         worker.read(tile);
         for (pixels, samples) in self.batches(&bounds, &samples) {
             self.camera_samples(&bounds, pixels.clone(), &samples, &mut worker.scratch, &mut worker.samples);
-            worker.trace(self.job, &mut tile.fits);
-            let pixels = pixels.map(|index| (index, self.samples_of(position(&bounds, index as u32), &samples)));
+            let of_pixel = |index: usize| position(&bounds, index as u32);
+            let of_pixels = pixels.clone().map(of_pixel).map(|pixel| (pixel, self.samples_of(pixel, &samples)));
+            worker.trace((self.job, &self.camera), &mut tile.fits, (of_pixels, seed));
+            let pixels = pixels.map(|index| (index, self.samples_of(of_pixel(index), &samples)));
             worker.add(&self.job.world.scene.film, pixels);
         }
         worker.write(tile);
         self.render_replicas(worker, tile, samples);
         tile.fits.pack(&mut worker.packing);
-        let mut stats = worker.tracer.take_stats();
+        let mut stats = worker.take_stats();
         if begins_block {
             let direct = &mut stats.direct;
             direct.systems += (tile.sums.len() + tile.replicas.len()) as u64;
@@ -400,7 +403,8 @@ impl<'a> Run<'a> {
             let pixels = pixels.map(|(r, fit)| (fit, position(&tile.bounds, r.pixel), samples_of(r)));
             self.camera.samples(pixels, seed, &mut worker.scratch, &mut worker.samples);
             worker.samples.iter_mut().for_each(|sample| sample.is_replica = true);
-            worker.trace(self.job, &mut tile.fits);
+            let of_pixels = replicas.iter().map(|r| (position(&tile.bounds, r.pixel), samples_of(r)));
+            worker.trace((self.job, &self.camera), &mut tile.fits, (of_pixels, seed));
             let mut results = worker.results.iter();
             for replica in replicas {
                 for result in results.by_ref().take(samples_of(replica).len()) {

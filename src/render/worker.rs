@@ -1,12 +1,13 @@
 //! What the threads of a rendering hold: a tracer each, with the memory of a batch.
 
-use super::camera_samples::Scratch;
+use super::camera_samples::{CameraSampler, Scratch};
+use super::looks::Looks;
 use super::tiles::Tile;
 use crate::direct::Fits;
 use crate::film::accumulator::PixelAccumulator;
 use crate::film::{FeatureSet, PixelSample};
 use crate::integrators::path::CameraSample;
-use crate::integrators::{Integrator, Tracer};
+use crate::integrators::{Integrator, PathStats, Tracer};
 use crate::scene::{FilmSettings, RenderJob};
 use std::ops::Range;
 use std::sync::{Mutex, MutexGuard, PoisonError};
@@ -23,12 +24,13 @@ pub(super) struct Worker<T> {
     layers: Vec<Vec<PixelAccumulator>>,
     /// Memory to pack them.
     pub(super) packing: Vec<u8>,
+    looks: Looks,
 }
 
 impl<T> Worker<T> {
     pub(super) fn new(tracer: T) -> Self {
-        let (samples, scratch, results) = Default::default();
-        Worker { tracer, samples, scratch, results, sums: Vec::new(), layers: Vec::new(), packing: Vec::new() }
+        let (samples, scratch, results, sums, layers, packing, looks) = Default::default();
+        Worker { tracer, samples, scratch, results, sums, layers, packing, looks }
     }
 }
 
@@ -44,13 +46,28 @@ impl AnyWorker<'_> {
         }
     }
 
-    /// Traces the samples; the results have the colours of the film.
-    pub(super) fn trace(&mut self, job: &RenderJob, fits: &mut Fits) {
-        self.tracer.trace(job, &self.samples, fits, &mut self.results);
+    /// Traces the samples, whose pixels are given in order with the indices of their samples, and their looks; the results have
+    /// the colours of the film. `seed` is that of the samples.
+    pub(super) fn trace(
+        &mut self,
+        (job, camera): (&RenderJob, &CameraSampler<'_>),
+        fits: &mut Fits,
+        (pixels, seed): (impl Iterator<Item = ([u32; 2], Range<u32>)>, u32),
+    ) {
+        let Worker { tracer, samples, results, looks, .. } = self;
+        tracer.trace(job, samples, fits, results);
+        looks.replace((job, camera), (samples, seed), pixels, (results, tracer.light_layers()));
         let film = &job.world.scene.film;
         if film.balance.is_some() {
             self.results.iter_mut().for_each(|result| result.radiance = film.balanced(result.radiance));
         }
+    }
+
+    /// The counts and times since the last call.
+    pub(super) fn take_stats(&mut self) -> PathStats {
+        let mut stats = self.tracer.take_stats();
+        stats.merge(&self.looks.take_stats());
+        stats
     }
 
     /// Adds the results to the sums of their pixels, which are given in order with the indices of their samples.
@@ -104,7 +121,7 @@ impl<'a> Workers<'a> {
         let mut worker = idle.unwrap_or_else(|| {
             let mut tracer = self.integrator.tracer(self.features);
             tracer.keep_light_layers(self.light_layers);
-            Worker::new(tracer)
+            Worker { looks: Looks::new(self.light_layers), ..Worker::new(tracer) }
         });
         let result = work(&mut worker);
         self.idle().push(worker);

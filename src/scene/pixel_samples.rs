@@ -11,6 +11,9 @@ pub struct PixelSamples {
     pub spp: u32,
     /// Numbers, row by row, at least 1.
     pub counts: Vec<u32>,
+    /// Camera rays of each sample that see lights directly, row by row, at least 1; if none are given, 1 everywhere. The path of
+    /// a sample begins with one of them.
+    pub looks: Vec<u8>,
 }
 
 impl PixelSamples {
@@ -32,9 +35,18 @@ impl PixelSamples {
     }
 
     /// All samples of a pixel.
-    fn count(&self, [x, y]: [u32; 2]) -> u32 {
-        let row = (y - self.bounds.y0) as usize * self.bounds.width() as usize;
-        self.counts[row + (x - self.bounds.x0) as usize]
+    fn count(&self, pixel: [u32; 2]) -> u32 {
+        self.counts[self.index(pixel)]
+    }
+
+    /// Camera rays of each sample of a pixel.
+    #[inline]
+    pub fn looks(&self, pixel: [u32; 2]) -> u32 {
+        if self.looks.is_empty() { 1 } else { u32::from(self.looks[self.index(pixel)]) }
+    }
+
+    fn index(&self, [x, y]: [u32; 2]) -> usize {
+        (y - self.bounds.y0) as usize * self.bounds.width() as usize + (x - self.bounds.x0) as usize
     }
 
     /// All samples of the image.
@@ -50,7 +62,7 @@ mod tests {
     #[test]
     fn a_part_of_the_passes_takes_that_part_of_the_samples_of_every_pixel() {
         let bounds = PixelBounds { x0: 3, x1: 5, y0: 7, y1: 8 };
-        let samples = PixelSamples { bounds, spp: 16, counts: vec![4, 50] };
+        let samples = PixelSamples { bounds, spp: 16, counts: vec![4, 50], looks: Vec::new() };
         assert_eq!([0, 1, 4, 8, 16].map(|done| samples.until([3, 7], done)), [0, 1, 1, 2, 4]);
         assert_eq!([0, 1, 4, 8, 16, 32].map(|done| samples.until([4, 7], done)), [0, 4, 13, 25, 50, 100]);
         assert_eq!(samples.total(), 54);
@@ -59,7 +71,7 @@ mod tests {
     #[test]
     fn a_sample_has_the_turn_in_which_it_is_taken() {
         let bounds = PixelBounds { x0: 3, x1: 6, y0: 7, y1: 8 };
-        let samples = PixelSamples { bounds, spp: 16, counts: vec![4, 50, 16] };
+        let samples = PixelSamples { bounds, spp: 16, counts: vec![4, 50, 16], looks: Vec::new() };
         for pixel in [[3, 7], [4, 7], [5, 7]] {
             for done in 0..40 {
                 let of_pass = samples.until(pixel, done)..samples.until(pixel, done + 1);

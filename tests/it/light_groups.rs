@@ -1,12 +1,12 @@
 //! Layers of the image by groups of lights: they add up to the image, and each has the light of its group alone.
 
-use lumiris::film::{Film, PixelSums};
+use lumiris::film::{Film, PixelBounds, PixelSums};
 use lumiris::import::cache::FileCache;
 use lumiris::import::{LoadOptions, load_text};
 use lumiris::integrators::light_layers;
 use lumiris::render::output::{Aov, channels};
 use lumiris::render::{RenderSettings, render};
-use lumiris::scene::{AccelKind, RenderJob};
+use lumiris::scene::{AccelKind, PixelSamples, RenderJob};
 use lumiris::settings::{EstimatorKind, IntegratorKind, RouletteKind, Target};
 use std::path::Path;
 use std::sync::atomic::AtomicBool;
@@ -98,9 +98,17 @@ fn choose(
     });
 }
 
+/// As many samples in all pixels, of which some have several looks.
+fn split(spp: u32) -> PixelSamples {
+    let (bounds, pixels) = (PixelBounds { x0: 0, x1: EDGE, y0: 0, y1: EDGE }, (EDGE * EDGE) as usize);
+    let looks = (0..pixels).map(|i| [1, 6][i % 2]).collect();
+    PixelSamples { bounds, spp, counts: vec![spp; pixels], looks }
+}
+
 #[test]
 fn layers_add_up_to_the_image_and_leave_its_bits() {
     let mut job = job(None);
+    job.pixel_samples = Some(split(4));
     for method in METHODS {
         choose(&mut job, method);
         assert_eq!(light_layers::count(&job), LIGHTS.len(), "{method:?}");
@@ -147,6 +155,7 @@ fn a_layer_has_the_light_of_its_group_alone() {
         (mean, values.iter().map(|v| (v[c] - mean).powi(2)).sum::<f64>() / (n - 1.0) / n)
     };
     let mut all = job(None);
+    all.pixel_samples = Some(split(32));
     for (group, _) in LIGHTS {
         let mut alone = job(Some(group));
         for method in METHODS {

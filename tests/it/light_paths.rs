@@ -112,7 +112,7 @@ fn samples_of_any_number_have_their_light_paths() {
 fn different_numbers(job: &RenderJob, spp: u32) -> PixelSamples {
     let bounds = job.world.scene.film.bounds;
     let counts = (0..bounds.area() as u32).map(|i| (spp / 2) << (i * 7 / 3 % 4)).collect();
-    PixelSamples { bounds, spp, counts }
+    PixelSamples { bounds, spp, counts, looks: Vec::new() }
 }
 
 /// Light paths and camera paths share the light: every pixel has the light that it has without light paths, at a level of

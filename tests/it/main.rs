@@ -20,6 +20,7 @@ mod layering;
 mod lenses;
 mod light_groups;
 mod light_paths;
+mod looks;
 mod measured;
 mod media;
 mod motion;

@@ -1,0 +1,191 @@
+//! Looks: samples that see lights by more camera rays than their own. They change no mean, and lower the noise at the edges of
+//! lights.
+
+use lumiris::film::Film;
+use lumiris::import::cache::FileCache;
+use lumiris::import::{LoadOptions, load_text};
+use lumiris::render::plan::{Preparation, prepare};
+use lumiris::render::{RenderSettings, render};
+use lumiris::scene::{AccelKind, PixelSamples, RenderJob};
+use lumiris::settings::{Allocation, EstimatorKind, IntegratorKind, RouletteKind};
+use lumiris_numbers::estimators::stats::{Welford, two_sample_z_test};
+use lumiris_numbers::math::luminance;
+use std::path::Path;
+use std::sync::atomic::AtomicBool;
+
+/// Edge of the images (pixels).
+const EDGE: u32 = 12;
+
+/// A camera that sees a lamp, through glass and in a mirror too, before a sky of two lights.
+const CAMERA: &str = r#"
+LookAt 0 1 -5  0 0.8 0  0 1 0  Camera "perspective" "float fov" 40
+Film "rgb" "integer xresolution" 12 "integer yresolution" 12
+WorldBegin
+"#;
+const LAMP: &str = r#"
+LightSource "infinite" "rgb L" [0.2 0.4 0.8]
+LightSource "infinite" "rgb L" [0.3 0.1 0.1]
+AttributeBegin AreaLightSource "diffuse" "rgb L" [9 7 5] Material "diffuse" "rgb reflectance" [0 0 0]
+Shape "trianglemesh" "integer indices" [0 2 1 0 3 2] "point3 P" [-1.3 1.2 1 0.7 1.5 1 0.6 2.2 1 -1.4 1.9 1] AttributeEnd
+"#;
+const SURFACES: &str = r#"
+Material "diffuse" "rgb reflectance" [0.6 0.6 0.5]
+Shape "trianglemesh" "integer indices" [0 1 2 0 2 3] "point3 P" [-4 0 -4 4 0 -4 4 0 4 -4 0 4]
+Material "conductor" "float roughness" 0
+AttributeBegin Translate 1 0.6 0.5 Shape "sphere" "float radius" 0.6 AttributeEnd
+"#;
+const GLASS: &str = r#"
+Material "dielectric"
+AttributeBegin Translate -0.6 0.9 -0.6 Shape "sphere" "float radius" 0.5 AttributeEnd
+"#;
+/// The camera is in mist.
+const MIST: &str = r#"
+MakeNamedMedium "mist" "string type" "homogeneous" "rgb sigma_a" [0.02 0.03 0.04] "rgb sigma_s" [0.08 0.08 0.08]
+MediumInterface "" "mist"
+"#;
+/// A cloud that glows.
+const CLOUD: &str = r#"
+MakeNamedMedium "glow" "string type" "uniformgrid" "integer nx" 2 "integer ny" 2 "integer nz" 2
+  "float density" [1 0 2 1 0.5 1 1 3] "rgb sigma_a" [0.6 0.6 0.6] "rgb sigma_s" [0.5 0.5 0.5]
+  "float Lescale" [2 2 2 2 2 2 2 2] "rgb Le" [1 0.6 0.2] "point3 p0" [-1.6 0.2 0] "point3 p1" [-0.6 1.2 1]
+AttributeBegin MediumInterface "glow" "mist" Material "interface"
+Shape "trianglemesh" "integer indices" [0 2 1 1 2 3 4 5 6 5 7 6 0 1 4 1 5 4 2 6 3 3 6 7 0 4 2 2 4 6 1 3 5 3 7 5]
+"point3 P" [-1.6 0.2 0 -0.6 0.2 0 -1.6 1.2 0 -0.6 1.2 0 -1.6 0.2 1 -0.6 0.2 1 -1.6 1.2 1 -0.6 1.2 1] AttributeEnd
+"#;
+
+fn job_of(text: &str, resolution: Option<[u32; 2]>) -> RenderJob {
+    let options = LoadOptions { resolution, ..LoadOptions::default() };
+    let loaded = load_text(text, "looks", Path::new("."), &options, &FileCache::default());
+    loaded.map_err(|d| d.to_string()).unwrap().job(AccelKind::Embree, None).unwrap()
+}
+
+fn job(parts: &[&str]) -> RenderJob {
+    job_of(&parts.concat(), None)
+}
+
+fn film(job: &RenderJob, spp: u32) -> Film {
+    let settings = RenderSettings { spp, with_replicas: true, ..RenderSettings::default() };
+    render(job, &settings, &AtomicBool::new(false), &|_| ()).unwrap().film
+}
+
+/// As many samples everywhere, with other numbers of looks in each pixel.
+fn split(spp: u32, looks: &[u8]) -> PixelSamples {
+    let bounds = lumiris::film::PixelBounds { x0: 0, x1: EDGE, y0: 0, y1: EDGE };
+    let pixels = (EDGE * EDGE) as usize;
+    PixelSamples {
+        bounds,
+        spp,
+        counts: vec![spp; pixels],
+        looks: (0..pixels).map(|i| looks[i % looks.len()]).collect(),
+    }
+}
+
+/// 10 settings × 4 parts of the image, two-sided z-tests of 2 × 96 images: one of 3.9 standard errors has a level of 10⁻⁴,
+/// so all together 4·10⁻³. A bias of 6 standard errors, at most 12 % of the mean, is found with a probability above 0.98.
+#[test]
+fn looks_change_no_mean() {
+    const IMAGES: u32 = 96;
+    const SPP: u32 = 16;
+    use EstimatorKind::{Contributing, Mis, Ris};
+    type Change = fn(&mut RenderJob);
+    let path: Change = |job| job.change(|s| s.integrator.kind = IntegratorKind::Path);
+    let shared: Change = |job| {
+        job.change(|s| (s.integrator.kind, s.integrator.path_reuse) = (IntegratorKind::Path, Some(3)));
+    };
+    let guided: Change = |job| {
+        job.change(|s| (s.integrator.kind, s.integrator.roulette) = (IntegratorKind::Path, RouletteKind::Efficiency));
+    };
+    let caustics: Change = |job| {
+        job.change(|s| (s.integrator.kind, s.integrator.light_paths) = (IntegratorKind::Path, Some(0.5)));
+    };
+    let direct: Change = |job| job.change(|s| s.integrator.kind = IntegratorKind::Direct);
+    let in_air = || job(&[CAMERA, LAMP, SURFACES, GLASS]);
+    let in_mist = || job(&[MIST, CAMERA, LAMP, SURFACES, CLOUD]);
+    let cases: [(&dyn Fn() -> RenderJob, EstimatorKind, Change); 10] = [
+        (&in_air, Mis, direct),
+        (&in_air, Ris, direct),
+        (&in_air, Contributing, direct),
+        (&in_air, Mis, path),
+        (&in_air, Mis, shared),
+        (&in_air, Mis, guided),
+        (&in_air, Mis, caustics),
+        (&in_mist, Mis, path),
+        (&in_mist, Ris, path),
+        (&in_mist, Mis, direct),
+    ];
+    for (i, (scene, estimator, change)) in cases.into_iter().enumerate() {
+        let mut job = scene();
+        change(&mut job);
+        job.change(|s| s.integrator.estimator = estimator);
+        // Quarters of the image
+        let mut means = |looks: &[u8], first: u32| {
+            let mut of_parts = [(); 4].map(|()| Welford::default());
+            job.pixel_samples = Some(split(SPP, looks));
+            for seed in first..first + IMAGES {
+                job.change(|s| s.sampling.seed = seed);
+                let pixels = film(&job, SPP).pixels();
+                for (k, part) in of_parts.iter_mut().enumerate() {
+                    let pixels = pixels[k * pixels.len() / 4..(k + 1) * pixels.len() / 4].iter();
+                    part.add(pixels.map(|p| luminance(p.mean())).sum::<f64>() / f64::from(EDGE * EDGE / 4));
+                }
+            }
+            of_parts
+        };
+        let (split, whole) = (means(&[5, 1, 2, 24], 0), means(&[1], IMAGES));
+        for (k, (split, whole)) in split.iter().zip(&whole).enumerate() {
+            let test = two_sample_z_test(split, whole);
+            let what = format!("case {i}, part {k}: {} and {}, z = {}", split.mean(), whole.mean(), test.statistic);
+            assert!(test.statistic.abs() < 3.9, "{what}");
+            let error = split.standard_error().hypot(whole.standard_error());
+            assert!(6.0 * error < 0.12 * whole.mean(), "too much noise: {what} ± {error}");
+        }
+    }
+}
+
+#[test]
+fn looks_lower_the_noise_of_visible_lights_and_images_state_what_is_left() {
+    let mut job = job(&[CAMERA, LAMP]);
+    job.change(|s| (s.integrator.kind, s.integrator.estimator) = (IntegratorKind::Direct, EstimatorKind::Mis));
+    // Between images, and as these state it
+    let mut variances = |looks: u8| {
+        job.pixel_samples = Some(split(16, &[looks]));
+        let mut of_pixels = vec![Welford::default(); (EDGE * EDGE) as usize];
+        let mut stated = Welford::default();
+        for seed in 0..48 {
+            job.change(|s| s.sampling.seed = seed);
+            let film = film(&job, 16);
+            of_pixels.iter_mut().zip(film.pixels()).for_each(|(sum, p)| sum.add(luminance(p.mean())));
+            stated.add(film.variances().iter().flatten().sum::<f64>());
+        }
+        let sum = of_pixels.iter().map(Welford::variance).sum::<f64>();
+        (sum, stated.mean())
+    };
+    let ((one, stated_of_one), (many, stated_of_many)) = (variances(1), variances(16));
+    assert!(many < 0.25 * one, "{many} {one}");
+    let (fall, stated) = (many / one, stated_of_many / stated_of_one);
+    assert!((0.5..2.0).contains(&(stated / fall)), "{fall}, and by the images {stated}");
+}
+
+#[test]
+fn adaptive_images_look_more_often_at_the_edges_of_lights() {
+    let mut job = job_of(&[CAMERA, LAMP, SURFACES].concat(), Some([64, 64]));
+    job.change(|s| {
+        (s.integrator.kind, s.integrator.estimator) = (IntegratorKind::Direct, EstimatorKind::Mis);
+        (s.sampling.allocation, s.sampling.spp, s.integrator.samples) = (Allocation::Adaptive, 64, Some(16));
+    });
+    prepare(&mut job, &Preparation::on(Some(2))).unwrap();
+    let looks = job.pixel_samples.clone().expect("numbers that differ").looks;
+    // Where the lamp is seen in a part of the pixel, without what it lights
+    job.change(|s| s.integrator.max_depth = 0);
+    job.pixel_samples = None;
+    let seen: Vec<f64> = film(&job, 1024).pixels().iter().map(|p| luminance(p.mean())).collect();
+    let is_edge = |v: f64| v > 1.5 && v < 6.0;
+    let mean = |of: &dyn Fn(f64) -> bool| {
+        let chosen = seen.iter().zip(&looks).filter(|(v, _)| of(**v)).map(|(_, &n)| f64::from(n));
+        let all: Vec<f64> = chosen.collect();
+        assert!(all.len() > 5, "{}", all.len());
+        all.iter().sum::<f64>() / all.len() as f64
+    };
+    let (edges, inside) = (mean(&is_edge), mean(&|v| v > 7.1));
+    assert!(edges > 4.0 && inside < 0.5 * edges, "{edges} {inside}");
+}
