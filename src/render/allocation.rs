@@ -8,7 +8,8 @@
 //!
 //! What visible lights make of v_p is known from more samples than the rest, which see nothing but these lights and so cost
 //! little: it lies in few pixels, those at the edges. The rest is averaged over neighbours. In the image, too, samples may
-//! see lights by more camera rays than become paths ([`super::looks`]): as many as their own variance and cost ask for.
+//! see lights by more camera rays than become paths ([`super::looks`]): as many as their own variance and cost ask for, as if they
+//! were independent. Of those of nets fewer would do for the relative error, which falls by 5 % then; the absolute one triples.
 //!
 //! What is gained is estimated from the pilot, too, by one half of the pixels with numbers from the other half, first on a
 //! part of the image: where noise is much the same everywhere, as in most paths of many bounces, numbers remain uniform.
@@ -62,8 +63,8 @@ const TILES_AT_ONCE: usize = 1024;
 const MIN_SCOUTED: usize = 256 * (COST_TILE * COST_TILE) as usize;
 /// Cost of a tentative collision in a medium, a lookup: as measured in a sparse volume.
 const COLLISION_COST: f64 = 1.5;
-/// Cost of what only sees visible lights, relative to that of its rays: as measured in four scenes with 9 for a sample (0.9 to
-/// 2.7).
+/// Cost of a ray that only sees visible lights, where [`cost`] has 1: measured as 0.9 to 2.5 in four scenes, beside samples of a
+/// camera ray and 8 proposals.
 const LOOK_COST: f64 = 2.0;
 /// Maximum number of samples per pixel for a standard error that is asked for, if none is given.
 const MAX_SPP_FOR_NOISE: u32 = 4096;
@@ -309,8 +310,13 @@ impl<'a> Pilot<'a> {
             }
             None => self.of_materials(known),
         };
+        // Few pixels may have no sample of a tile among them
+        let (sum, count) =
+            self.pixels.iter().filter(|p| p.cost > 0.0).fold((0.0, 0), |(sum, n), p| (sum + f64::from(p.cost), n + 1));
+        let mean = (sum / f64::from(count.max(1))) as f32;
         let of_pixel = |(i, [sum, count]): (usize, [f64; 2])| {
             let Measured { cost, look, .. } = self.pixels[i];
+            let cost = if cost == 0.0 && look > 0.0 { mean } else { cost };
             let rest = (sum.max(0.0) / count.max(1.0)) as f32;
             Pixel { rest, sight: self.of_sight_around(i, sets) as f32, cost, look }
         };

@@ -71,8 +71,9 @@ pub(super) fn measure(
 ) -> Chunk {
     let groups = if reuse::obstacle(run.job).is_none() { Groups::Grid } else { Groups::None };
     let mut worker = Worker::new(PathTracer::sharing(groups, FeatureSet::None));
-    let is_split = candidates.first().is_some_and(|c| may_split(run.job.settings(), &c.settings));
-    let seeing = candidates.first().filter(|_| is_split).map(|c| IntegratorSettings { max_depth: 0, ..c.settings });
+    let is_split = |k: usize| may_split(run.job.settings(), &candidates[k].settings);
+    let seeing = (0..candidates.len()).find(|&k| is_split(k));
+    let seeing = seeing.map(|k| IntegratorSettings { max_depth: 0, ..candidates[k].settings });
     let seen = seeing.map(|settings| seeds.map(|seed| image(run, &mut worker, &settings, (pixels, spp), seed)));
     let mut times = vec![0.0; candidates.len()];
     let mut images = vec![[(); 2].map(|()| Vec::<[f64; 3]>::new()); candidates.len()];
@@ -92,17 +93,17 @@ pub(super) fn measure(
         let mean = all().map(|image| image[i][c]).sum::<f64>() / count;
         1.0 / (mean * mean + DEFAULT_EPSILON)
     };
-    let difference = |[a, b]: &[Vec<[f64; 3]>; 2], i: usize| {
+    let difference = |[a, b]: &[Vec<[f64; 3]>; 2], is_split: bool, i: usize| {
         let of_channel = |c: usize| {
-            let of_seen = seen.as_ref().map_or(0.0, |[a, b]| a[i][c] - b[i][c]);
+            let of_seen = seen.as_ref().filter(|_| is_split).map_or(0.0, |[a, b]| a[i][c] - b[i][c]);
             let d = (a[i][c] - b[i][c] - of_seen).abs() * relative_to(i, c).sqrt();
             if d.is_finite() { d } else { 0.0 }
         };
         let channels = [0, 1, 2].map(of_channel);
         [channels.iter().sum::<f64>() / 3.0, channels.iter().map(|d| d * d).sum::<f64>() / 3.0]
     };
-    let of_candidate = |images| (0..pixels.len()).map(|i| difference(images, i)).collect();
-    let of_candidates = times.into_iter().zip(&images).map(|(time, images)| (time, of_candidate(images))).collect();
+    let of_candidate = |k| (0..pixels.len()).map(|i| difference(&images[k], is_split(k), i)).collect();
+    let of_candidates = times.into_iter().enumerate().map(|(k, time)| (time, of_candidate(k))).collect();
     let of_channels = |i: usize| (0..3).map(|c| relative_to(i, c)).sum::<f64>() / 3.0;
     Chunk { of_candidates, relative: (0..pixels.len()).map(of_channels).filter(|r| r.is_finite()).sum() }
 }

@@ -49,7 +49,7 @@ impl Split {
 }
 
 impl Looks {
-    /// Of tracers that keep so many layers by lights, and these features.
+    /// Beside a tracer that keeps so many layers by lights.
     pub(super) fn new(light_layers: usize) -> Self {
         let mut tracer = PathTracer::new(FeatureSet::None);
         tracer.keep_light_layers(light_layers);

@@ -34,7 +34,8 @@ pub enum Allocation {
     Auto,
     /// The same number for every pixel.
     Uniform,
-    /// More where a pilot finds more noise for the time.
+    /// More where a pilot finds more noise for the time; and for each of them more camera rays that see lights directly, where
+    /// that is most of the noise.
     Adaptive,
 }
 

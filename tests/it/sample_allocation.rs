@@ -44,11 +44,12 @@ fn rendered(job: &mut RenderJob, threads: usize, tile_size: u32) -> (Film, Pixel
 fn adaptive_images_have_the_samples_they_ask_for_and_do_not_depend_on_threads_or_tiles() {
     for noise in [None, Some(0.2)] {
         let job = || {
-            let mut job = lottery(48, ("spot\" \"float coneangle\" 8", 4.0), 4);
+            let mut job = lottery_beside(LAMP, 48, ("spot\" \"float coneangle\" 8", 4.0), 4);
             job.change(|s| {
                 s.sampling.allocation = Allocation::Adaptive;
                 s.sampling.noise = noise;
                 s.sampling.spp = if noise.is_some() { 400 } else { 64 };
+                s.integrator.samples = noise.is_none().then_some(8);
             });
             job
         };
@@ -59,6 +60,7 @@ fn adaptive_images_have_the_samples_they_ask_for_and_do_not_depend_on_threads_or
         let pixels = film.pixels();
         assert!(film.replicas().iter().all(|r| r.count == pixels[r.pixel as usize].count));
         if noise.is_none() {
+            assert!(samples.looks.iter().any(|looks| *looks > 2));
             let mean = samples.total() as f64 / film.len() as f64;
             assert!((32.0..128.0).contains(&mean), "the time is that of 64: {mean}");
         }
@@ -91,6 +93,17 @@ fn integrators_that_share_noise_and_estimators_that_fit_blocks_have_uniform_numb
 /// A floor below some lights, of which one has a kind and a power of its own: chosen uniformly, it is rare. An image of
 /// `size` × `size` pixels.
 fn lottery(size: u32, other: (&str, f64), lights: u32) -> RenderJob {
+    lottery_beside("", size, other, lights)
+}
+
+/// A lamp that is seen.
+const LAMP: &str = r#"
+AttributeBegin AreaLightSource "diffuse" "bool twosided" true "rgb L" [ 30 30 30 ]
+Shape "bilinearmesh" "point3 P" [ 0.1 0.1 0.1  0.4 0.1 0.2  0.1 0.1 0.5  0.4 0.1 0.6 ] AttributeEnd
+"#;
+
+/// The same beside other things.
+fn lottery_beside(things: &str, size: u32, other: (&str, f64), lights: u32) -> RenderJob {
     let mut text = r#"
 LookAt 0 2 0  0 0 0  0 0 1
 Camera "perspective" "float fov" 40
@@ -101,7 +114,8 @@ WorldBegin
 Material "diffuse" "rgb reflectance" [ 0.5 0.5 0.5 ]
 Shape "bilinearmesh" "point3 P" [ -2 0 -2  2 0 -2  -2 0 2  2 0 2 ]
 "#
-    .replace("SIZE", &size.to_string());
+    .replace("SIZE", &size.to_string())
+        + things;
     for i in 0..lights {
         let (kind, power) = if i == lights / 2 { other } else { ("point\"", 1.0) };
         text += &format!(

@@ -192,7 +192,9 @@ pub(super) fn plan(
     if let (Some(of_pixels), false) = (&job.pixel_samples, quiet) {
         let range = of_pixels.counts.iter().min().zip(of_pixels.counts.iter().max());
         let (min, max) = range.unwrap_or((&0, &0));
-        progress::say(&format!("adaptive: {min} to {max} samples per pixel"));
+        let looks = of_pixels.looks.iter().max().filter(|looks| **looks > 1);
+        let looks = looks.map_or(String::new(), |n| format!(", and up to {n} camera rays each where lights are seen"));
+        progress::say(&format!("adaptive: {min} to {max} samples per pixel{looks}"));
     }
     plan.warnings.iter().for_each(|warning| progress::say(&format!("warning: {warning}")));
     let idle = args.settings.without_effect(job.settings());

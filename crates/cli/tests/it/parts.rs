@@ -68,6 +68,7 @@ pub(crate) const METHODS: &[(&str, bool)] = &[
     ("--integrator path --estimator mis --path-reuse 2 --light-paths 0.5", true),
     ("--integrator path --estimator mis --roulette efficiency", true),
     ("--integrator path --estimator mis --allocation adaptive --spp 12", true),
+    ("--integrator direct --estimator mis --samples 8 --allocation adaptive --spp 16", true),
     ("--integrator direct --estimator mc --sampler independent", true),
     ("--integrator path --estimator ris --samples 2 --proposals 12", true),
     ("--integrator direct --estimator ris --samples 1 --proposals optimal --stage-times 20,200", true),
