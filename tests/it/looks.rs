@@ -108,7 +108,7 @@ fn looks_change_no_mean() {
                 "\"float fov\" 40",
                 "\"float fov\" 40 \"float lensradius\" 0.1 \"float focaldistance\" 4 \"float shutterclose\" 1",
             )
-            .replace("Film", "ActiveTransform EndTime Translate 0.3 0 0 ActiveTransform All Film");
+            .replace("LookAt", "ActiveTransform EndTime Translate 0.3 0 0 ActiveTransform All LookAt");
         let sensor = camera.replace(
             "\"integer yresolution\" 12",
             "\"integer yresolution\" 12 \"float whitebalance\" 4000 \"string sensor\" \"cie1931\"",
