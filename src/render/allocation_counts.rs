@@ -207,6 +207,9 @@ mod tests {
             // √(s c/(r c_look)) where both are free
             assert!((50..64).contains(&edge.1), "{edge:?} {other:?}");
             assert!(edge.0 < 2 * other.0, "{edge:?} {other:?}");
+            let [_, cost] = error_and_cost(&all, &given, 64);
+            let uniform: f64 = all.iter().map(|pixel| f64::from(pixel.cost)).sum();
+            assert!(rules.doubles || (cost / uniform - 1.0).abs() < 0.01, "looks are in the time: {cost} {uniform}");
             // Better than samples alone by far, and than twice or half as many looks
             let alone: Vec<Pixel> = all.iter().map(|p| Pixel { rest: p.rest + p.sight, sight: 0.0, ..*p }).collect();
             let loss = |given: &(Vec<u32>, Vec<u8>)| error_and_cost(&all, given, 64).iter().product::<f64>();
