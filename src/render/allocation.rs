@@ -18,7 +18,7 @@
 
 use super::allocation_counts::{ALONE, Pixel, Rules, SHARED, Share, counts};
 use super::noise::counts_for;
-use super::pilot_samples::{LeftToLightPaths, trace_pixels};
+use super::pilot_samples::{LOOK_COST, LeftToLightPaths, cost, trace_pixels};
 use super::worker::Worker;
 use super::{RenderSettings, Run, position};
 use crate::direct::Estimator;
@@ -26,7 +26,7 @@ use crate::film::accumulator::PixelAccumulator;
 use crate::film::{FeatureSet, PixelBounds, PixelSample, PixelSums};
 use crate::imaging::metrics::difference::DEFAULT_EPSILON;
 use crate::integrators::reuse;
-use crate::integrators::{PathStats, PathTracer, Tracer};
+use crate::integrators::{PathTracer, Tracer};
 use crate::scene::{PixelSamples, RenderJob};
 use crate::settings::{Allocation, IntegratorKind, IntegratorSettings, SamplingSettings, Settings};
 use lumiris_numbers::math::hash::{pcg4d, unit_f32};
@@ -61,11 +61,6 @@ const SCOUTS: u32 = 4;
 const TILES_AT_ONCE: usize = 1024;
 /// Pixels from which on a part of the image tells whether there is anything to gain.
 const MIN_SCOUTED: usize = 256 * (COST_TILE * COST_TILE) as usize;
-/// Cost of a tentative collision in a medium, a lookup: as measured in a sparse volume.
-const COLLISION_COST: f64 = 1.5;
-/// Cost of a ray that only sees visible lights, where [`cost`] has 1: measured as 0.9 to 2.5 in four scenes, beside samples of a
-/// camera ray and 8 proposals.
-const LOOK_COST: f64 = 2.0;
 /// Maximum number of samples per pixel for a standard error that is asked for, if none is given.
 const MAX_SPP_FOR_NOISE: u32 = 4096;
 
@@ -124,7 +119,7 @@ pub fn allows_adaptive(settings: &Settings) -> bool {
 /// lights then.
 pub(super) fn may_split(settings: &Settings, of_paths: &IntegratorSettings) -> bool {
     let sampling = settings.sampling;
-    let is_open = sampling.allocation != Allocation::Uniform && sampling.noise.is_none();
+    let is_open = sampling.allocation != Allocation::Uniform || sampling.noise.is_some();
     is_open && allows_adaptive(&Settings { integrator: *of_paths, sampling })
 }
 
@@ -479,26 +474,4 @@ fn see(
     let edges: Vec<u32> = all.iter().copied().filter(differs).collect();
     add(&edges, spp..SIGHT_OF_EDGES * spp);
     sums
-}
-
-/// Mean cost of so many camera samples; that of one which hits nothing is 1. Rays that go on where a medium begins or ends are more
-/// than samples.
-fn cost(stats: &PathStats, samples: usize) -> f64 {
-    let work = stats.camera_rays + 2 * stats.bounce_rays + stats.direct.proposals;
-    let collisions = (stats.collisions + stats.direct.collisions) as f64 * COLLISION_COST;
-    (work as f64 + collisions) / samples.max(1) as f64
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-
-    #[test]
-    fn the_cost_of_samples_is_that_of_all_their_rays_and_collisions() {
-        let mut stats = PathStats { camera_rays: 12, bounce_rays: 5, collisions: 4, ..PathStats::default() };
-        (stats.direct.proposals, stats.direct.collisions) = (8, 6);
-        // Two of the camera rays went on behind the bounds of a medium
-        assert_eq!(cost(&stats, 10), (12.0 + 10.0 + 8.0 + 10.0 * COLLISION_COST) / 10.0);
-        assert_eq!(cost(&PathStats::default(), 0), 0.0);
-    }
 }

@@ -58,6 +58,7 @@ fn trial(name: &str, round: &Round, base: &Round) -> Trial {
 
 #[cfg(test)]
 mod tests {
+    use super::super::auto_round::Mean;
     use super::*;
 
     /// The choice where the variance is a/p + b/(1 − p), of which the infinite lights have a, and the number of fractions
@@ -69,7 +70,7 @@ mod tests {
             let of_pixel = |i: usize| (0.9 + 0.2 * (i % 7) as f64 / 6.0) * variance;
             let differences = (0..224).map(of_pixel).map(|v| [v.sqrt(), 2.0 * v]).collect();
             let measured = vec![(1.0 + c * (1.0 - p), differences)];
-            Ok::<_, ()>(Round { measured, spp: 4, is_robust: false, relative: 1.0 })
+            Ok::<_, ()>(Round { measured, spp: 4, mean: Mean::Squares, relative: 1.0 })
         };
         let (trials, fraction) = best(0.5, measure).unwrap();
         (trials.len(), fraction)

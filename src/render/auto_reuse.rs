@@ -6,7 +6,7 @@
 
 use super::auto_round::{Candidate, Round, jackknife};
 use crate::settings::IntegratorSettings;
-use lumiris_numbers::estimators::efficiency::Model;
+use lumiris_numbers::estimators::efficiency::{KINDS, Model};
 
 /// Edge of the blocks of the pilot.
 pub(super) const EDGE: u32 = 4;
@@ -28,8 +28,8 @@ const NUMBERS_NEARLY: f64 = 0.88;
 /// what these lower.
 const LITTLE: f64 = 0.06;
 
-/// Numbers of light samples at first and at later vertices.
-pub(super) type Numbers = [u32; 2];
+/// Numbers of light samples at first and at later vertices, and of BSDF samples.
+pub(super) type Numbers = [u32; KINDS];
 
 /// Without and with sharing, and with sharing by `more` settings of other numbers of samples.
 pub(super) fn candidates(chosen: &IntegratorSettings, more: &[IntegratorSettings]) -> Vec<Candidate> {
@@ -63,7 +63,7 @@ pub(super) fn best(round: &Round) -> Option<u32> {
 
 /// The edge and the numbers that are most efficient by a round of [`candidates`], if they share paths and that is more than
 /// chance. `numbers` are those of the candidates that share, `of_one` is the model of paths that are not shared, and `shared`
-/// that of blocks of the pilot: with all pixels, and without each of the groups.
+/// that of blocks of the pilot: with all pixels, and without each of the groups. `choices` are those of light samples.
 pub(super) fn best_numbers(
     round: &Round,
     numbers: Numbers,
@@ -81,7 +81,7 @@ pub(super) fn best_numbers(
         [cost * part[0], variance * part[1]]
     };
     let efficiency = |i: usize, edge: u32, n: Numbers| -at(i, edge, n).iter().map(|x| x.ln()).sum::<f64>();
-    let pairs = || choices[0].iter().flat_map(|&first| choices[1].iter().map(move |&later| [first, later]));
+    let pairs = || choices[0].iter().flat_map(|&first| choices[1].iter().map(move |&later| [first, later, numbers[2]]));
     let with_edge = |n: Numbers| {
         let edges = || EDGES.into_iter().skip(1);
         let greatest = edges().map(|edge| efficiency(0, edge, n)).fold(f64::NEG_INFINITY, f64::max);
@@ -92,8 +92,9 @@ pub(super) fn best_numbers(
     let good = all.into_iter().filter(|&(edge, n)| efficiency(0, edge, n) >= greatest + NUMBERS_NEARLY.ln());
     let (edge, best) = good.min_by(|a, b| at(0, a.0, a.1)[0].total_cmp(&at(0, b.0, b.1)[0]))?;
     let affordable = (1.0 + LITTLE) * at(0, edge, best)[0];
-    let later = choices[1].iter().filter(|&&n| n > best[1] && at(0, edge, [best[0], n])[0] <= affordable).max();
-    let best = [best[0], later.copied().unwrap_or(best[1])];
+    let later =
+        choices[1].iter().filter(|&&n| n > best[1] && at(0, edge, [best[0], n, best[2]])[0] <= affordable).max();
+    let best = [best[0], later.copied().unwrap_or(best[1]), best[2]];
     let gains: Vec<f64> = (0..alone.len()).map(|i| efficiency(i, edge, best) - efficiency(i, 1, numbers)).collect();
     let (gain, error) = jackknife(&gains);
     (gain > MIN_GAIN.ln().max(MIN_ERRORS * error)).then_some((edge, best))
@@ -101,6 +102,7 @@ pub(super) fn best_numbers(
 
 #[cfg(test)]
 mod tests {
+    use super::super::auto_round::Mean;
     use super::*;
 
     #[test]
@@ -119,34 +121,34 @@ mod tests {
     #[test]
     fn numbers_and_edge_are_those_of_the_least_error_in_a_time() {
         // Variance a + b/first + (c + d/later), of which the latter is shared
-        let truth = |edge: u32, [first, later]: [f64; 2]| {
+        let truth = |edge: u32, [first, later, _]: [f64; KINDS]| {
             let pixels = f64::from(edge * edge);
             let cost = 10.0 + first + 2.0 * later;
             let of_blocks = FIXED + (1.0 - FIXED) * (pixels - 1.0) / f64::from(EDGE * EDGE - 1);
             let sharing = if edge > 1 { 1.0 + 0.8 * of_blocks } else { 1.0 };
             [cost * sharing, 0.5 + 2.0 / first + (4.0 + 6.0 / later) / pixels]
         };
-        let measured = |edge, n: [f64; 2]| {
+        let measured = |edge, n: [f64; KINDS]| {
             let [cost, variance] = truth(edge, n);
             let d = (2.0 * variance / 4.0).sqrt();
             (cost, vec![[d, d * d]; 64])
         };
-        let numbers = [[2.0, 1.0], [4.0, 1.0], [2.0, 2.0]];
+        let numbers = [[2.0, 1.0, 1.0], [4.0, 1.0, 1.0], [2.0, 2.0, 1.0]];
         let mut all = vec![measured(1, numbers[0])];
         all.extend(numbers.iter().map(|&n| measured(EDGE, n)));
-        let round = Round { measured: all, spp: 4, is_robust: false, relative: 1.0 };
-        let of_one = Model { cost: [10.0, 1.0, 2.0], variance: [4.5, 2.0, 6.0], powers: [1.0; 2] };
-        let of_pilot = round.models_from(1, &numbers, [1.0; 2]);
+        let round = Round { measured: all, spp: 4, mean: Mean::Squares, relative: 1.0 };
+        let of_one = Model { cost: [10.0, 1.0, 2.0, 0.0], variance: [4.5, 2.0, 6.0, 0.0], powers: [1.0; KINDS] };
+        let of_pilot = round.models_from(1, &numbers, [1.0; KINDS]);
         let choices: [&[u32]; 2] = [&[1, 2, 4, 8], &[1, 2, 4]];
-        let (edge, n) = best_numbers(&round, [2, 1], (&of_one, &of_pilot), choices).unwrap();
-        let efficiency = |edge, n: [u32; 2]| 1.0 / truth(edge, n.map(f64::from)).iter().product::<f64>();
-        let pairs = choices[0].iter().flat_map(|&first| choices[1].iter().map(move |&later| [first, later]));
+        let (edge, n) = best_numbers(&round, [2, 1, 1], (&of_one, &of_pilot), choices).unwrap();
+        let efficiency = |edge, n: Numbers| 1.0 / truth(edge, n.map(f64::from)).iter().product::<f64>();
+        let pairs = choices[0].iter().flat_map(|&first| choices[1].iter().map(move |&later| [first, later, 1]));
         let greatest = pairs.flat_map(|n| EDGES.map(|edge| efficiency(edge, n))).fold(0.0, f64::max);
         assert!(efficiency(edge, n) >= 0.87 * greatest, "{edge} {n:?}");
         // Of nothing that is shared, nothing is
-        let nothing = Round { measured: vec![measured(1, numbers[0]); 4], spp: 4, is_robust: false, relative: 1.0 };
-        let of_pilot = nothing.models_from(1, &numbers, [1.0; 2]);
-        assert!(best_numbers(&nothing, [2, 1], (&of_one, &of_pilot), [&[2], &[1]]).is_none());
+        let nothing = Round { measured: vec![measured(1, numbers[0]); 4], spp: 4, mean: Mean::Squares, relative: 1.0 };
+        let of_pilot = nothing.models_from(1, &numbers, [1.0; KINDS]);
+        assert!(best_numbers(&nothing, [2, 1, 1], (&of_one, &of_pilot), [&[2], &[1]]).is_none());
     }
 
     #[test]
@@ -156,7 +158,7 @@ mod tests {
         let round = |gain: f64| Round {
             measured: vec![(100.0, differences(1.0)), (110.0, differences(gain))],
             spp: 4,
-            is_robust: false,
+            mean: Mean::Squares,
             relative: 1.0,
         };
         assert!(best(&round(1.0)).is_none() && best(&round(1.2)).is_none());

@@ -9,6 +9,7 @@ mod allocation_counts;
 pub mod auto;
 mod auto_lights;
 mod auto_measure;
+mod auto_pixels;
 mod auto_reuse;
 mod auto_round;
 pub mod bench;

@@ -5,15 +5,21 @@ use super::{BATCH_PATHS, Run, position};
 use crate::direct::Fits;
 use crate::film::accumulator::RadianceAccumulator;
 use crate::film::{FeatureSet, PixelBounds, PixelSample};
-use crate::integrators::PathTracer;
 use crate::integrators::light_paths::{self, LightPilot};
 use crate::integrators::reuse::{self, Groups};
+use crate::integrators::{PathStats, PathTracer};
 use crate::scene::RenderJob;
 use crate::settings::IntegratorSettings;
 use std::ops::Range;
 
 /// Part of a pilot of light paths whose whole is traced before the image.
 const LIGHT_PILOT: u64 = 4;
+
+/// Cost of a tentative collision in a medium, a lookup: as measured in a sparse volume.
+const COLLISION_COST: f64 = 1.5;
+/// Cost of a ray that only sees visible lights, where [`cost`] has 1: measured as 0.9 to 2.5 in four scenes, beside samples of a
+/// camera ray and 8 proposals.
+pub(super) const LOOK_COST: f64 = 2.0;
 
 /// What light paths find in an image that has them: pilots leave it to them as the image does.
 pub(super) struct LeftToLightPaths(Option<(LightPilot, f64)>);
@@ -39,13 +45,12 @@ impl LeftToLightPaths {
 pub(super) fn pilot_images(
     run: &Run<'_>,
     worker: &mut Worker<PathTracer>,
+    settings: &IntegratorSettings,
     tile: &PixelBounds,
-    samples: Range<u32>,
-    seed: u32,
+    (samples, seed): (Range<u32>, u32),
 ) -> Vec<[f64; 3]> {
     let mut sums = vec![RadianceAccumulator::default(); tile.area()];
     let all: Vec<u32> = (0..tile.area() as u32).collect();
-    let settings = &run.job.settings().integrator;
     trace_pixels(run, worker, settings, (tile, &all), (samples, seed), |i, sample| {
         sums[i as usize].add(sample.radiance);
     });
@@ -69,5 +74,27 @@ pub(super) fn trace_pixels(
         for (&i, results) in pixels.iter().zip(worker.results.chunks(samples.len())) {
             results.iter().for_each(|r| add(i, r));
         }
+    }
+}
+
+/// Mean cost of so many camera samples; that of one which hits nothing is 1. Rays that go on where a medium begins or ends are more
+/// than samples.
+pub(super) fn cost(stats: &PathStats, samples: usize) -> f64 {
+    let work = stats.camera_rays + 2 * stats.bounce_rays + stats.direct.proposals;
+    let collisions = (stats.collisions + stats.direct.collisions) as f64 * COLLISION_COST;
+    (work as f64 + collisions) / samples.max(1) as f64
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn the_cost_of_samples_is_that_of_all_their_rays_and_collisions() {
+        let mut stats = PathStats { camera_rays: 12, bounce_rays: 5, collisions: 4, ..PathStats::default() };
+        (stats.direct.proposals, stats.direct.collisions) = (8, 6);
+        // Two of the camera rays went on behind the bounds of a medium
+        assert_eq!(cost(&stats, 10), (12.0 + 10.0 + 8.0 + 10.0 * COLLISION_COST) / 10.0);
+        assert_eq!(cost(&PathStats::default(), 0), 0.0);
     }
 }

@@ -59,8 +59,8 @@ fn adaptive_images_have_the_samples_they_ask_for_and_do_not_depend_on_threads_or
         assert!(film.pixels().iter().zip(&samples.counts).all(|(p, &n)| p.count == u64::from(n)));
         let pixels = film.pixels();
         assert!(film.replicas().iter().all(|r| r.count == pixels[r.pixel as usize].count));
+        assert!(samples.looks.iter().any(|looks| *looks > 2));
         if noise.is_none() {
-            assert!(samples.looks.iter().any(|looks| *looks > 2));
             let mean = samples.total() as f64 / film.len() as f64;
             assert!((32.0..128.0).contains(&mean), "the time is that of 64: {mean}");
         }
@@ -173,7 +173,14 @@ fn numbers_of_samples_add_no_bias() {
     exact.change(|s| s.integrator.light_sampler = LightSamplerKind::Power);
     let truth = mean(&part(&exact, 0, 4096).pixels());
 
+    // The same with a lamp that is seen, whose edges have looks
+    let beside_lamp = || lottery_beside(LAMP, 4, ("point\"", 400.0), 64);
+    let (mut lamp, mut exact) = (beside_lamp(), beside_lamp());
+    exact.change(|s| s.integrator.light_sampler = LightSamplerKind::Power);
+    let truth_of_lamp = mean(&part(&exact, 0, 1 << 17).pixels());
+
     let (mut noise, mut adaptive, mut wrong) = (Welford::default(), Welford::default(), Welford::default());
+    let (mut seen, mut with_looks) = (Welford::default(), 0);
     let mut numbers = std::collections::BTreeSet::new();
     for seed in 0..RUNS {
         job.change(|s| {
@@ -182,6 +189,12 @@ fn numbers_of_samples_add_no_bias() {
         let (film, samples) = rendered(&mut job, 1, 16);
         numbers.extend(samples.counts);
         noise.add(mean(&film.pixels()));
+        lamp.change(|s| {
+            (s.sampling.seed, s.sampling.noise, s.sampling.spp) = (seed, Some(THRESHOLD), 256);
+        });
+        let (film, samples) = rendered(&mut lamp, 1, 16);
+        with_looks += u32::from(!samples.looks.is_empty());
+        seen.add(mean(&film.pixels()));
 
         job.change(|s| (s.sampling.noise, s.sampling.allocation, s.sampling.spp) = (None, Allocation::Adaptive, 16));
         prepare(&mut job, &Preparation::on(Some(1))).unwrap();
@@ -194,6 +207,9 @@ fn numbers_of_samples_add_no_bias() {
     assert!(numbers.len() > 4, "the numbers vary: {numbers:?}");
     let z = |of: &Welford| z_test(of.mean(), truth, of.standard_error()).statistic;
     assert!(z(&noise).abs() < 3.0, "--noise: {} instead of {truth}, z = {}", noise.mean(), z(&noise));
+    let of_lamp = z_test(seen.mean(), truth_of_lamp, seen.standard_error()).statistic;
+    assert!(of_lamp.abs() < 3.0, "--noise, a lamp: {} instead of {truth_of_lamp}, z = {of_lamp}", seen.mean());
+    assert!(with_looks > RUNS / 4, "{with_looks}");
     assert!(z(&adaptive).abs() < 3.0, "adaptive: {} instead of {truth}, z = {}", adaptive.mean(), z(&adaptive));
     // A quarter of the runs suffices to find the bias of samples that decide on their own number
     assert!(z(&wrong) < -5.0, "{} instead of {truth}, z = {}", wrong.mean(), z(&wrong));

@@ -37,12 +37,16 @@ pub(super) fn run(args: &PlanArgs) -> anyhow::Result<ExitCode> {
 
 /// The pilot's measurements.
 fn table(auto: &AutoChoice) -> String {
-    let [a, first, later] = auto.cost;
-    let [v, v_first, v_later] = auto.variance;
+    const KINDS: [&str; 3] = ["light sample at the first vertex", "light sample at later ones", "BSDF sample"];
+    let parts = |values: &[f64], part: &dyn Fn(f64, &str) -> String| -> String {
+        let of_kinds = values.iter().skip(1).zip(KINDS).filter(|(value, _)| **value > 0.0);
+        of_kinds.map(|(value, kind)| format!(" + {}", part(*value, kind))).collect()
+    };
+    let [a, v] = [&auto.cost, &auto.variance].map(|values| values.first().copied().unwrap_or(0.0));
+    let times = parts(&auto.cost, &|b, kind| format!("{b:.0} per {kind}"));
+    let variances = parts(&auto.variance, &|b, kind| format!("{b:.4}/n of a {kind}"));
     let mut text = format!(
-        "time of a camera sample (ns): {a:.0} + {first:.0} per light sample at the first vertex + {later:.0} per light sample at later ones\n\
-         relative variance: {v:.4} + {v_first:.4}/n at the first vertex + {v_later:.4}/n at later ones\n\n\
-         {:<52}{:>10}{:>12}{:>12}{:>8}\n",
+        "time of a camera sample (ns): {a:.0}{times}\nrelative variance: {v:.4}{variances}\n\n{:<52}{:>10}{:>12}{:>12}{:>8}\n",
         format!("{} pixels of 2 × {} samples in each round", auto.pixels, auto.spp),
         "ns",
         "variance",

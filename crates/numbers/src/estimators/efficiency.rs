@@ -1,13 +1,13 @@
 //! How many samples are most efficient: a model of cost and variance of a path by its numbers of samples.
 //!
-//! A camera sample costs a + Σ_k b_k n_k, where n_k samples are drawn at vertices of kind k (first and later ones), and has
-//! the variance A + Σ_k B_k/n_k^p_k: A is that of the camera sample and the path, the rest what samples of lights and their
-//! visibility add. Efficiency is the inverse of the product. With one kind of independent samples (p = 1) it is greatest for
+//! A camera sample costs a + Σ_k b_k n_k, where n_k samples of kind k are drawn (of lights at first and at later vertices, and
+//! of the BSDF), and has the variance A + Σ_k B_k/n_k^p_k: A is that of the camera sample and the path, the rest what samples
+//! of lights and their visibility add. Efficiency is the inverse of the product. With one kind of independent samples (p = 1) it is greatest for
 //! n² = (a B)/(A b), as in the choice of M and N of resampling [Talbot 2005, §4.3]. Samples that are points of a net have
 //! p > 1, up to 3 where what they integrate is smooth [Owen 1997].
 
-/// Kinds of vertices: the first of a path, and all later ones.
-pub const KINDS: usize = 2;
+/// Kinds of samples: of lights at the first vertex of a path, of lights at all later ones, and of the BSDF at the first one.
+pub const KINDS: usize = 3;
 
 /// What was measured with some numbers of samples.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -34,9 +34,10 @@ pub struct Model {
 impl Model {
     /// The model through `base`, and through one measurement for each kind that has more samples of this kind only; `None`
     /// for kinds that do not occur, which then have no part. What noise makes negative is taken as 0. The `powers` are given,
-    /// but if there is one kind alone and more of it leaves less of the variance than these explain.
+    /// but where there are no later vertices and more light samples leave less of the variance than these explain.
     pub fn fit(base: &Measured, more: [Option<Measured>; KINDS], powers: [f64; KINDS]) -> Model {
-        let mut model = Model { cost: [base.cost, 0.0, 0.0], variance: [base.variance, 0.0, 0.0], powers };
+        let only = |a: f64| std::array::from_fn(|k| if k == 0 { a } else { 0.0 });
+        let mut model = Model { cost: only(base.cost), variance: only(base.variance), powers };
         for (k, more) in more.iter().enumerate() {
             let Some(more) = more else { continue };
             let (n0, n1) = (base.samples[k], more.samples[k]);
@@ -51,11 +52,15 @@ impl Model {
         // What a camera sample costs, and how it varies, without any light sample is not nothing
         model.cost[0] = model.cost[0].max(FLOOR * base.cost);
         let least = FLOOR * base.variance;
-        if let ([Some(more), None], true) = (more, model.variance[0] < least) {
+        if let ([Some(more), None, _], true) = (more, model.variance[0] < least) {
+            // What there is of other kinds is as much as it can be
+            let of_others = (model.variance[3] * base.samples[2].powf(-powers[2])).min(0.5 * more.variance);
+            model.variance[3] = of_others * base.samples[2].powf(powers[2]);
+            let rest = least + of_others;
             let ratio = more.samples[0] / base.samples[0];
-            let variances = (base.variance - least) / (more.variance - least).max(f64::MIN_POSITIVE);
+            let variances = (base.variance - rest) / (more.variance - rest).max(f64::MIN_POSITIVE);
             model.powers[0] = (variances.ln() / ratio.ln()).clamp(powers[0], MAX_POWER);
-            model.variance[1] = (base.variance - least) * base.samples[0].powf(model.powers[0]);
+            model.variance[1] = (base.variance - rest) * base.samples[0].powf(model.powers[0]);
         }
         model.variance[0] = model.variance[0].max(least);
         model
@@ -77,10 +82,22 @@ impl Model {
         1.0 / (self.variance(samples) * self.cost(samples))
     }
 
-    /// The cheapest numbers among `choices` of each kind of which the efficiency is at least `share` of the greatest. Near
-    /// its maximum efficiency hardly depends on numbers, and the maximum of a model that was measured is uncertain.
-    pub fn best(&self, choices: [&[u32]; KINDS], share: f64) -> [u32; KINDS] {
-        let all = || choices[0].iter().flat_map(|&first| choices[1].iter().map(move |&later| [first, later]));
+    /// The cheapest numbers among `choices` of each kind that `are_allowed` together, of which the efficiency is at least `share`
+    /// of the greatest. Near its maximum efficiency hardly depends on numbers, and the maximum of a model that was measured is
+    /// uncertain.
+    pub fn best(
+        &self,
+        choices: [&[u32]; KINDS],
+        share: f64,
+        are_allowed: impl Fn(&[u32; KINDS]) -> bool,
+    ) -> [u32; KINDS] {
+        let later = |first: u32| choices[1].iter().map(move |&later| [first, later]);
+        let all = || {
+            let lights = choices[0].iter().flat_map(move |&first| later(first));
+            let numbers =
+                lights.flat_map(move |[first, later]| choices[2].iter().map(move |&bsdf| [first, later, bsdf]));
+            numbers.filter(&are_allowed)
+        };
         let efficiency = |n: &[u32; KINDS]| self.efficiency(n.map(f64::from));
         let greatest = all().map(|n| efficiency(&n)).fold(f64::NEG_INFINITY, f64::max);
         let cost = |n: &[u32; KINDS]| self.cost(n.map(f64::from));
@@ -99,16 +116,17 @@ const MAX_POWER: f64 = 1.75;
 mod tests {
     use super::*;
 
-    const TRUTH: Model = Model { cost: [100.0, 10.0, 40.0], variance: [2.0, 5.0, 0.5], powers: [1.0; KINDS] };
+    const TRUTH: Model =
+        Model { cost: [100.0, 10.0, 40.0, 20.0], variance: [2.0, 5.0, 0.5, 3.0], powers: [1.0; KINDS] };
 
     fn measured(samples: [f64; KINDS]) -> Measured {
         Measured { samples, cost: TRUTH.cost(samples), variance: TRUTH.variance(samples) }
     }
 
     #[test]
-    fn a_model_is_recovered_from_three_measurements() {
-        let model =
-            Model::fit(&measured([1.0, 1.0]), [[7.0, 1.0], [1.0, 7.0]].map(|n| Some(measured(n))), [1.0; KINDS]);
+    fn a_model_is_recovered_from_four_measurements() {
+        let more = [[7.0, 1.0, 1.0], [1.0, 7.0, 1.0], [1.0, 1.0, 4.0]];
+        let model = Model::fit(&measured([1.0; KINDS]), more.map(|n| Some(measured(n))), [1.0; KINDS]);
         for (found, truth) in model.cost.iter().chain(&model.variance).zip(TRUTH.cost.iter().chain(&TRUTH.variance)) {
             assert!((found / truth - 1.0).abs() < 1e-12, "{model:?}");
         }
@@ -116,44 +134,60 @@ mod tests {
 
     #[test]
     fn what_nets_gain_is_a_power() {
-        let net = Model { cost: [100.0, 10.0, 0.0], variance: [0.02, 0.98, 0.0], powers: [1.5, 1.0] };
-        let at = |n: f64| Measured { samples: [n, 1.0], cost: net.cost([n, 1.0]), variance: net.variance([n, 1.0]) };
-        let model = Model::fit(&at(1.0), [Some(at(16.0)), None], [1.0; KINDS]);
+        let net = Model { cost: [100.0, 10.0, 0.0, 0.0], variance: [0.02, 0.98, 0.0, 0.0], powers: [1.5, 1.0, 1.0] };
+        let at = |n: f64| {
+            let samples = [n, 1.0, 1.0];
+            Measured { samples, cost: net.cost(samples), variance: net.variance(samples) }
+        };
+        let model = Model::fit(&at(1.0), [Some(at(16.0)), None, None], [1.0; KINDS]);
         assert!((model.powers[0] - 1.5).abs() < 1e-9, "{model:?}");
-        assert!((model.variance([64.0, 1.0]) / net.variance([64.0, 1.0]) - 1.0).abs() < 1e-9, "{model:?}");
+        assert!((model.variance([64.0, 1.0, 1.0]) / net.variance([64.0, 1.0, 1.0]) - 1.0).abs() < 1e-9, "{model:?}");
         // Less than nothing is noise
         let none = Measured { variance: 0.0, ..at(16.0) };
-        assert_eq!(Model::fit(&at(1.0), [Some(none), None], [1.0; KINDS]).powers, [MAX_POWER, 1.0]);
+        assert_eq!(Model::fit(&at(1.0), [Some(none), None, None], [1.0; KINDS]).powers, [MAX_POWER, 1.0, 1.0]);
+        // BSDF samples, which are not all that is left, keep their part
+        let both = Model { variance: [0.02, 0.9, 0.0, 0.02], ..net };
+        let at = |samples| Measured { samples, cost: both.cost(samples), variance: both.variance(samples) };
+        let more = [Some(at([16.0, 1.0, 1.0])), None, Some(at([1.0, 1.0, 4.0]))];
+        let model = Model::fit(&at([1.0; KINDS]), more, [1.0; KINDS]);
+        for samples in [[16.0, 1.0, 1.0], [1.0, 1.0, 4.0], [4.0, 1.0, 2.0]] {
+            assert!((model.variance(samples) / both.variance(samples) - 1.0).abs() < 0.05, "{samples:?} {model:?}");
+        }
     }
 
     #[test]
     fn the_best_numbers_are_those_of_the_closed_form() {
-        let direct = Model { cost: [90.0, 10.0, 0.0], variance: [1.0, 16.0, 0.0], ..TRUTH };
+        let direct = Model { cost: [90.0, 10.0, 0.0, 0.0], variance: [1.0, 16.0, 0.0, 0.0], ..TRUTH };
         // n² = (90 · 16)/(1 · 10) = 144
         let choices: Vec<u32> = (1..=64).collect();
-        assert_eq!(direct.best([&choices, &[1]], 1.0), [12, 1]);
-        let found = TRUTH.best([&choices, &choices], 1.0);
+        assert_eq!(direct.best([&choices, &[1], &[1]], 1.0, |_| true), [12, 1, 1]);
+        assert_eq!(direct.best([&choices, &[1], &[1]], 1.0, |n| n[0] < 10), [9, 1, 1]);
+        let choices = &choices[..16];
+        let found = TRUTH.best([choices; KINDS], 1.0, |_| true);
+        assert!(found.iter().all(|n| *n < 16) && found[0] > 1 && found[2] > 1, "{found:?}");
         let best = TRUTH.efficiency(found.map(f64::from));
-        for first in &choices {
-            for later in &choices {
-                assert!(TRUTH.efficiency([*first, *later].map(f64::from)) <= best);
+        for k in 0..KINDS {
+            for n in choices {
+                let mut other = found;
+                other[k] = *n;
+                assert!(TRUTH.efficiency(other.map(f64::from)) <= best);
             }
         }
     }
 
     #[test]
     fn nearly_the_best_may_be_cheaper() {
-        let choices: Vec<u32> = (1..=64).collect();
-        let best = TRUTH.best([&choices, &choices], 1.0).map(f64::from);
+        let choices: Vec<u32> = (1..=16).collect();
+        let best = TRUTH.best([&choices; KINDS], 1.0, |_| true).map(f64::from);
         let least = |share: f64| share * TRUTH.efficiency(best);
         let mut before = best;
         for share in [0.98, 0.9, 0.7] {
-            let near = TRUTH.best([&choices, &choices], share).map(f64::from);
+            let near = TRUTH.best([&choices; KINDS], share, |_| true).map(f64::from);
             assert!(TRUTH.efficiency(near) >= least(share), "{share}: {near:?}");
             assert!(TRUTH.cost(near) <= TRUTH.cost(before), "{share}: {near:?} {before:?}");
             for first in &choices {
                 for later in &choices {
-                    let n = [*first, *later].map(f64::from);
+                    let n = [f64::from(*first), f64::from(*later), near[2]];
                     assert!(TRUTH.efficiency(n) < least(share) || TRUTH.cost(n) >= TRUTH.cost(near), "{share}: {n:?}");
                 }
             }
@@ -164,12 +198,12 @@ mod tests {
 
     #[test]
     fn noise_gives_no_negative_parts() {
-        let base = Measured { samples: [1.0, 1.0], cost: 10.0, variance: 1.0 };
-        let worse = Measured { samples: [7.0, 1.0], cost: 9.0, variance: 1.2 };
-        let all = Measured { samples: [1.0, 7.0], cost: 100.0, variance: 0.01 };
-        let model = Model::fit(&base, [Some(worse), Some(all)], [1.0; KINDS]);
+        let base = Measured { samples: [1.0; KINDS], cost: 10.0, variance: 1.0 };
+        let worse = Measured { samples: [7.0, 1.0, 1.0], cost: 9.0, variance: 1.2 };
+        let all = Measured { samples: [1.0, 7.0, 1.0], cost: 100.0, variance: 0.01 };
+        let model = Model::fit(&base, [Some(worse), Some(all), None], [1.0; KINDS]);
         assert_eq!((model.cost[1], model.variance[1]), (0.0, 0.0));
         assert!(model.cost[0] > 0.0 && model.variance[0] > 0.0, "{model:?}");
-        assert_eq!(Model::fit(&base, [None, None], [1.0; KINDS]).cost([5.0, 5.0]), 10.0);
+        assert_eq!(Model::fit(&base, [None; KINDS], [1.0; KINDS]).cost([5.0; KINDS]), 10.0);
     }
 }
