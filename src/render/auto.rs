@@ -1,6 +1,6 @@
 //! The estimator `auto`: what is the most efficient for this image, by a pilot.
 //!
-//! Pixels spread over the image are rendered with several settings, each with two independent seeds. The difference of
+//! Pixels, more of them where there is more noise ([`super::auto_pixels`]), are rendered with several settings, each with two independent seeds. The difference of
 //! the two tells the standard deviation σ, relative to the mean, and the time of the thread is the cost. In paths, whose
 //! pixels mostly have as many samples each, the error is the mean of σ². Where light is direct and samples are allocated in
 //! proportion to σ, it is the square of the mean of σ, since edges of visible lights are left to looks; and the geometric mean of
@@ -60,18 +60,20 @@ const CHUNK: usize = 64;
 const MAX_PIXELS: usize = 4096;
 /// Fewest pixels of a round for which a choice is more than chance.
 const MIN_PIXELS: usize = 96;
-/// Pixels of a round with which numbers of samples are known well enough in most images, in direct light and in paths.
-const ENOUGH_PIXELS: [usize; 2] = [256, 128];
+/// Pixels of a round with which numbers of samples are known well enough in most images; and in direct light and in paths, from
+/// which on more samples of a pixel tell more than more pixels.
+const ENOUGH_PIXELS: usize = 384;
+const MANY_PIXELS: [usize; 2] = [256, 128];
 /// Time of all rounds, as a fraction of that of the image: what is wanted, and the most where that is not enough.
 const FRACTIONS: [f64; 2] = [0.03, 0.08];
 /// Time of all rounds over that of rendering the pixels of one once, with the same number of samples and seeds: in direct
 /// light, and in paths.
 const TRIALS: [f64; 2] = [13.0, 28.0];
+/// The same of the round that compares light choices.
+const LIGHT_TRIALS: f64 = 3.0;
 /// Pixels that are looked at before the rounds, for each pixel of one, and samples of each and seed.
 const SCOUTED: usize = 8;
 const SCOUT_SPP: u32 = 2;
-/// The same of the round that compares light choices.
-const LIGHT_TRIALS: f64 = 3.0;
 /// Share of the greatest efficiency, by the model, with which fewer samples will do.
 const NEARLY: f64 = 0.95;
 
@@ -227,10 +229,12 @@ fn fraction(bsdf: u32, samples: u32) -> f32 {
     }
 }
 
-/// True if paths go on by the only BSDF sample of later vertices, whatever the first one has: it finds lights without a ray of its
-/// own, and what light paths bring needs it. All vertices have one fraction.
-fn goes_on_by_one(&[light, later, bsdf]: &Numbers) -> bool {
-    bsdf_samples(later + 1, fraction(bsdf, light + bsdf)) == 1
+/// True if paths with these numbers go on by the only BSDF sample of later vertices, whatever the first one has: it finds lights
+/// without a ray of its own, and what light paths bring needs it. All vertices have one fraction.
+fn goes_on_by_one(base: &IntegratorSettings, numbers: &Numbers) -> bool {
+    let settings = with_numbers(base, *numbers);
+    let samples = settings.sample_counts_at(1).samples.max(2);
+    base.depth() <= 1 || bsdf_samples(samples, settings.bsdf_fraction()) == 1
 }
 
 /// The numbers of samples that settings of `mis` have.
@@ -318,14 +322,14 @@ impl Pilot {
         let Settings { integrator, sampling } = settings;
         let samples = bounds.area() as f64 * f64::from(sampling.pilot_spp());
         let kind = usize::from(integrator.depth() > 1);
-        let (trials, fewest, enough) = (TRIALS[kind], MIN_SPP[kind], ENOUGH_PIXELS[kind]);
+        let (trials, fewest, many) = (TRIALS[kind], MIN_SPP[kind], MANY_PIXELS[kind]);
         let pixels_in = |trials: f64, spp: u32| {
             let [wanted, most] =
                 FRACTIONS.map(|fraction| (samples * fraction / (f64::from(2 * spp) * trials)) as usize);
-            wanted.max(most.min(enough)).min(MAX_PIXELS)
+            wanted.max(most.min(ENOUGH_PIXELS)).min(MAX_PIXELS)
         };
         let mut spp = 1 << sampling.pilot_spp().clamp(1, MAX_SPP).ilog2();
-        while spp > fewest && pixels_in(trials, spp) < enough {
+        while spp > fewest && pixels_in(trials, spp) < many {
             spp /= 2;
         }
         let with_lights = pixels_in(trials + LIGHT_TRIALS, spp);
@@ -358,12 +362,18 @@ impl Pilot {
         let base = job.settings().integrator;
         let base = &base;
         // First round: the model
-        let is_open = base.bsdf_fraction.is_none();
-        let fitted = fit.iter().filter(|n| is_open || n[2] == few[2]);
+        let is_open = base.bsdf_fraction.is_none() && base.samples.is_none();
+        let fitted = fit.iter().filter(|n| n[2] == few[2] || is_open && goes_on_by_one(base, n));
         let candidates = different(fitted.map(|&n| with_numbers(base, n)));
+        // Where the share of BSDF samples is given, one stands for all of them
+        let numbers = |settings: &IntegratorSettings| {
+            let all = [0, 1].map(|vertex| settings.sample_counts_at(vertex).samples.max(2) - 1);
+            let of_one = [all[0], if has_later { all[1] } else { 1 }, 1];
+            (if is_open { numbers_of(settings) } else { of_one }).map(f64::from)
+        };
         let first = self.round(job, &candidates, FIRST_ROUND, how)?;
         let is_net = has_later && job.settings().sampling.sampler != SamplerKind::Independent;
-        let fitted: Vec<_> = candidates.iter().map(|c| numbers_of(&c.settings).map(f64::from)).collect();
+        let fitted: Vec<_> = candidates.iter().map(|c| numbers(&c.settings)).collect();
         let models = first.models(&fitted, if is_net { OF_NETS } else { INDEPENDENT });
         let model = models[0];
         // A power that was fitted is known as far as twice the most that was measured
@@ -374,7 +384,7 @@ impl Pilot {
         if !is_open {
             choices[2] = &few[2..];
         }
-        let best = model.best(choices, NEARLY, goes_on_by_one);
+        let best = model.best(choices, NEARLY, |n| !is_open || goes_on_by_one(base, n));
         let trials = first.trials(&candidates);
 
         // Second round: the best by the model, and what else there is
@@ -391,7 +401,7 @@ impl Pilot {
         let predicted = |candidate: &Candidate| {
             let IntegratorSettings { samples, later_samples, bsdf_fraction, .. } = candidate.settings;
             let with_its = IntegratorSettings { samples, later_samples, bsdf_fraction, ..without_pilot(base) };
-            (candidate.settings == with_its).then(|| Round::predicted(&models, numbers_of(&with_its).map(f64::from)))
+            (candidate.settings == with_its).then(|| Round::predicted(&models, numbers(&with_its)))
         };
         let predicted: Vec<_> = candidates.iter().map(predicted).collect();
         let chosen = second.choose(&candidates, &predicted);
@@ -567,9 +577,9 @@ impl Pilot {
             let differences = measured.iter().flat_map(|chunk| &chunk.of_candidates[k].1).copied().collect();
             (nanoseconds + candidates[k].preparation, differences)
         };
-        let settings = &candidates[0].settings;
+        let (settings, sampling) = (&candidates[0].settings, &job.settings().sampling);
         let mean = match settings.depth() {
-            0 | 1 if may_split(job.settings(), settings) => Mean::Deviations,
+            0 | 1 if sampling.noise.is_none() && may_split(job.settings(), settings) => Mean::Deviations,
             0 | 1 => Mean::Both,
             _ => Mean::Squares,
         };
@@ -582,7 +592,8 @@ impl Pilot {
 /// more light samples than usual, or else twice as many.
 fn other_numbers(base: &IntegratorSettings, best: Numbers) -> Numbers {
     let usual = numbers_of(&usual(base));
-    let is_far = (0..2).any(|k| best[k] >= MANY * usual[k]);
+    let totals = |[light, later, bsdf]: Numbers| [light + bsdf, later + 1];
+    let is_far = totals(best).into_iter().zip(totals(usual)).any(|(best, usual)| best >= MANY * usual);
     let other = |k: usize| {
         if is_far { (f64::from(usual[k]) * f64::from(best[k])).sqrt().round() as u32 } else { 2 * best[k] }
     };
@@ -596,7 +607,7 @@ fn second_round(base: &IntegratorSettings, best: Numbers) -> Vec<Candidate> {
     // What BSDF samples leave depends on how many light samples there are beside them, unlike in the model
     let [light, later, bsdf] = best;
     let more = [light, later, (light / 4).max(2)];
-    if bsdf == 1 && light >= 4 && goes_on_by_one(&more) {
+    if bsdf == 1 && light >= 4 && goes_on_by_one(base, &more) {
         all.push(with_numbers(base, more));
     }
     if base.depth() > 1 && base.roulette_depth.is_some_and(|first| first < base.depth()) {
@@ -604,7 +615,7 @@ fn second_round(base: &IntegratorSettings, best: Numbers) -> Vec<Candidate> {
     }
     all.push(resampled(base));
     let other = other_numbers(base, best);
-    if goes_on_by_one(&other) {
+    if other[2] == 1 || goes_on_by_one(base, &other) {
         all.push(with_numbers(base, other));
     }
     different(all)
@@ -668,7 +679,7 @@ mod tests {
         for light in FIRST_SHARED {
             for bsdf in DIRECT_BSDF {
                 assert_eq!(numbers_of(&with_numbers(&direct, [light, 1, bsdf])), [light, 1, bsdf]);
-                for later in LATER_SHARED.into_iter().filter(|&later| goes_on_by_one(&[light, later, bsdf])) {
+                for later in LATER_SHARED.into_iter().filter(|&later| goes_on_by_one(&path, &[light, later, bsdf])) {
                     let settings = with_numbers(&path, [light, later, bsdf]);
                     assert_eq!(numbers_of(&settings), [light, later, bsdf]);
                     let samples = settings.sample_counts_at(1).samples;
@@ -676,7 +687,9 @@ mod tests {
                 }
             }
         }
-        assert!(goes_on_by_one(&[1, 1, 4]) && !goes_on_by_one(&[1, 2, 2]));
+        assert!(goes_on_by_one(&path, &[1, 1, 4]) && !goes_on_by_one(&path, &[1, 2, 2]));
+        let later = IntegratorSettings { later_samples: Some(5), ..path };
+        assert!(goes_on_by_one(&later, &[7, 1, 1]) && !goes_on_by_one(&later, &[1, 1, 4]));
         let two = IntegratorSettings { samples: Some(2), ..path };
         assert_eq!(numbers_of(&with_numbers(&two, [1, 1, 4])), [1, 1, 1], "no more than there are");
     }

@@ -34,6 +34,8 @@ pub const BLOCK: u32 = 16;
 const FIRST: u32 = 2;
 /// Samples that a block may need for each sample of the pilot.
 const REACH: u32 = 16;
+/// Most looks for each sample of the pilot.
+const LOOKS_KNOWN: u32 = 4;
 /// Combined with the seed of the image to give those of the pilot.
 const SEED: u32 = 0x6e_6f_69_73;
 
@@ -143,10 +145,14 @@ fn numbers_for(Sums { all, seen, costs }: &Sums, width: usize, n: u32, threshold
     if sight == 0.0 {
         return alone;
     }
-    // Time × variance, with so many looks of pixels at edges, is least where their number is that
+    // Time × variance, with so many looks of pixels at edges, is least where their number is that; few samples tell it for few
     let [cost, look] = [costs[0].max(1.0), LOOK_COST * costs[1].max(1.0)];
     let part = at_edges as f64 / count;
-    let looks = (sight / at_edges as f64 * cost / (rest * look)).sqrt().min(f64::from(MAX_LOOKS)).round();
+    let looks = (sight / at_edges as f64 * cost / (rest * look))
+        .sqrt()
+        .min(f64::from(LOOKS_KNOWN * n))
+        .min(f64::from(MAX_LOOKS));
+    let looks = looks.round();
     let split = rest + sight / count / looks;
     if looks < 2.0 || split * (cost + part * looks * look) >= whole * cost {
         return alone;
@@ -201,7 +207,7 @@ mod tests {
         assert!((0..4096).all(|i| (looks[i] > 1) == (19..=21).contains(&(i % 64))), "in pixels beside it, too");
         let n = f64::from(looks[20]);
         // √(s c/(r c_look)), s being the mean over three columns
-        let best = (1e4 / 3.0 * 20.0 / LOOK_COST).sqrt().min(f64::from(MAX_LOOKS));
+        let best = (1e4 / 3.0 * 20.0 / LOOK_COST).sqrt().min(f64::from(4 * LOOKS_KNOWN));
         assert!((n / best - 1.0).abs() < 0.1, "{n} {best}");
         let wanted = |mean: f64| (0.02 * (mean + 0.01)).powi(2);
         let expected = (1.0 / 3.0 + 1e4 / 3.0 / 64.0 / n) / wanted(1.0 + 100.0 / 64.0);

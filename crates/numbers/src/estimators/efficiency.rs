@@ -34,7 +34,7 @@ pub struct Model {
 impl Model {
     /// The model through `base`, and through one measurement for each kind that has more samples of this kind only; `None`
     /// for kinds that do not occur, which then have no part. What noise makes negative is taken as 0. The `powers` are given,
-    /// but where there are no later vertices and more light samples leave less of the variance than these explain.
+    /// but where there are no later vertices and more independent light samples leave less of the variance than they explain.
     pub fn fit(base: &Measured, more: [Option<Measured>; KINDS], powers: [f64; KINDS]) -> Model {
         let only = |a: f64| std::array::from_fn(|k| if k == 0 { a } else { 0.0 });
         let mut model = Model { cost: only(base.cost), variance: only(base.variance), powers };
@@ -52,11 +52,12 @@ impl Model {
         // What a camera sample costs, and how it varies, without any light sample is not nothing
         model.cost[0] = model.cost[0].max(FLOOR * base.cost);
         let least = FLOOR * base.variance;
-        if let ([Some(more), None, _], true) = (more, model.variance[0] < least) {
-            // What there is of other kinds is as much as it can be
-            let of_others = (model.variance[3] * base.samples[2].powf(-powers[2])).min(0.5 * more.variance);
-            model.variance[3] = of_others * base.samples[2].powf(powers[2]);
-            let rest = least + of_others;
+        let of_light = model.variance[1] * base.samples[0].powf(-powers[0]);
+        if let ([Some(more), None, _], true) = (more, powers[0] <= 1.0 && base.variance - of_light < least) {
+            // BSDF samples keep their part, but where noise says more than there is
+            let of_bsdf = (model.variance[3] * base.samples[2].powf(-powers[2])).min(0.5 * more.variance);
+            model.variance[3] = of_bsdf * base.samples[2].powf(powers[2]);
+            let rest = least + of_bsdf;
             let ratio = more.samples[0] / base.samples[0];
             let variances = (base.variance - rest) / (more.variance - rest).max(f64::MIN_POSITIVE);
             model.powers[0] = (variances.ln() / ratio.ln()).clamp(powers[0], MAX_POWER);
@@ -153,6 +154,12 @@ mod tests {
         for samples in [[16.0, 1.0, 1.0], [1.0, 1.0, 4.0], [4.0, 1.0, 2.0]] {
             assert!((model.variance(samples) / both.variance(samples) - 1.0).abs() < 0.05, "{samples:?} {model:?}");
         }
+        // Where nearly all is of BSDF samples, noise leaves nothing for the rest, and does not make it that of lights
+        let noisy = |samples, variance| Measured { variance, ..at(samples) };
+        let more = [Some(noisy([16.0, 1.0, 1.0], 0.98)), None, Some(noisy([1.0, 1.0, 4.0], 0.24))];
+        let model = Model::fit(&noisy([1.0; KINDS], 1.0), more, [1.0; KINDS]);
+        assert_eq!(model.powers, [1.0; KINDS]);
+        assert!(model.variance([16.0, 1.0, 1.0]) > 0.95 && model.variance([1.0, 1.0, 4.0]) < 0.35, "{model:?}");
     }
 
     #[test]
