@@ -4,9 +4,10 @@
 //! E × E pixels share paths, and each of the E² − 1 other pixels costs the same time, beside what sharing takes in blocks of any
 //! size; so both follow for all E.
 
+use super::auto_candidates::Numbers;
 use super::auto_round::{Candidate, Round, jackknife};
 use crate::settings::IntegratorSettings;
-use lumiris_numbers::estimators::efficiency::{KINDS, Model};
+use lumiris_numbers::estimators::efficiency::Model;
 
 /// Edge of the blocks of the pilot.
 pub(super) const EDGE: u32 = 4;
@@ -27,9 +28,6 @@ const NUMBERS_NEARLY: f64 = 0.88;
 /// Part of the time that more light samples at later vertices may take, whatever the pilot says: few of its pixels have most of
 /// what these lower.
 const LITTLE: f64 = 0.06;
-
-/// Numbers of light samples at first and at later vertices, and of BSDF samples.
-pub(super) type Numbers = [u32; KINDS];
 
 /// Without and with sharing, and with sharing by `more` settings of other numbers of samples.
 pub(super) fn candidates(chosen: &IntegratorSettings, more: &[IntegratorSettings]) -> Vec<Candidate> {
@@ -104,6 +102,7 @@ pub(super) fn best_numbers(
 mod tests {
     use super::super::auto_round::Mean;
     use super::*;
+    use lumiris_numbers::estimators::efficiency::KINDS;
 
     #[test]
     fn a_part_of_the_variance_goes_away_with_the_number_of_pixels() {

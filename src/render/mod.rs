@@ -7,6 +7,7 @@
 pub mod allocation;
 mod allocation_counts;
 pub mod auto;
+mod auto_candidates;
 mod auto_lights;
 mod auto_measure;
 mod auto_pixels;
