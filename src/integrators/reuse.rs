@@ -19,16 +19,23 @@
 
 use super::light_layers;
 use super::segment::CameraSample;
-use crate::accel::{Accel, Coherence, RayBatch};
+use crate::accel::{Coherence, RayBatch};
 use crate::film::PixelSample;
 use crate::scene::RenderJob;
 use crate::settings::{IntegratorKind, RouletteKind};
+use lumiris_lanes::columns::{Column, Columns3, padded, reserve};
+use lumiris_lanes::connections::{Connections, Vertices, connect};
+use lumiris_lanes::lane::LANES;
+use lumiris_lanes::level;
+use lumiris_lanes::vertex::Ends;
 use lumiris_numbers::math::hash::pcg4d;
-use lumiris_numbers::math::ray::{SEGMENT_END, offset_origin};
-use lumiris_numbers::math::{Ray, Rgb, Vec3};
+use lumiris_numbers::math::ray::SEGMENT_END;
+use lumiris_numbers::math::{Rgb, Vec3};
 
 /// Edge of the squares of pixels that groups lie in, from the corner of the image.
 pub const CELL: u32 = 16;
+/// Second vertices that are connected together.
+const TOGETHER: usize = 16;
 /// Seed of where blocks lie.
 const SEED: u32 = 0x72_65_75_73;
 
@@ -106,13 +113,41 @@ struct Second {
     before: Rgb,
 }
 
-/// First and second vertex of two samples.
+/// A sample with a first vertex.
 #[derive(Clone, Copy, Debug)]
-struct Pair {
-    first: u32,
-    second: u32,
-    /// g, or 0 where nothing gets through.
-    g: f32,
+struct Member {
+    sample: u32,
+    /// Index of the first vertex along the path.
+    vertex: u32,
+    /// Throughput beyond it.
+    beta: Rgb,
+}
+
+/// A second vertex, and the first vertices of others that may see it.
+#[derive(Clone, Copy, Debug)]
+struct Shared {
+    /// The member whose path it is of.
+    member: u32,
+    /// g of that member.
+    own: f32,
+    /// Where the shares of others end.
+    end: usize,
+}
+
+/// What the paths of a batch share.
+#[derive(Debug, Default)]
+struct Shares {
+    /// Those of one group after another.
+    members: Vec<Member>,
+    shared: Vec<Shared>,
+    /// The members that may get something, those of one second vertex after another.
+    to: Vec<u32>,
+    /// g of these, or 0 where nothing gets through.
+    g: Column,
+    /// The segments between.
+    rays: RayBatch,
+    /// What the members get.
+    sums: Vec<Rgb>,
 }
 
 /// The paths of a batch that are shared.
@@ -121,15 +156,41 @@ pub(super) struct Reuse {
     groups: Groups,
     /// Edge of the blocks; 1 or 0 if the batch shares nothing.
     edge: u32,
-    /// Group and index of each sample, sorted.
-    order: Vec<(u64, u32)>,
+    /// Group and index of each sample, sorted: the index in the lower 32 bits.
+    order: Vec<u128>,
     first: Vec<Option<First>>,
     second: Vec<Option<Second>>,
-    shared: u32,
-    rays: RayBatch,
+    /// Number of second vertices.
+    count: u32,
+    group: Group,
+    shares: Shares,
     occluded: Vec<bool>,
-    pairs: Vec<Pair>,
     tails: Vec<Rgb>,
+}
+
+/// The vertices of a group, and what lies between them.
+#[derive(Debug, Default)]
+struct Group {
+    /// The first one of its members.
+    begin: usize,
+    first: Places,
+    /// Members whose second vertices were found, up to [`TOGETHER`].
+    found: Vec<u32>,
+    second: Places,
+    g: Column,
+    o: Columns3,
+    d: Columns3,
+    /// Which first vertices have segments to a second vertex that count.
+    kept: Vec<u32>,
+}
+
+/// Places in columns.
+#[derive(Debug, Default)]
+struct Places {
+    p: Columns3,
+    p_error: Columns3,
+    n: Columns3,
+    ns: Columns3,
 }
 
 impl Reuse {
@@ -145,7 +206,7 @@ impl Reuse {
         self.first.resize(count, None);
         self.second.clear();
         self.second.resize(count, None);
-        self.shared = 0;
+        self.count = 0;
     }
 
     /// Itself, if the batch shares paths.
@@ -175,7 +236,7 @@ impl Reuse {
             }
             Some(first) if first.vertex + 1 == vertex && is_next && second.is_none() => {
                 *second = Some(Second { at, before: std::mem::replace(radiance, Rgb::BLACK) });
-                self.shared += 1;
+                self.count += 1;
                 Rgb::splat(beta.map(f32::abs).max_component() / first.beta.map(f32::abs).max_component())
             }
             Some(_) => beta,
@@ -184,13 +245,13 @@ impl Reuse {
 
     /// Gives each sample its part of what the paths of its group have found; returns the number of segments.
     pub(super) fn resolve(&mut self, job: &RenderJob, samples: &[CameraSample], out: &mut [PixelSample]) -> u64 {
-        if self.shared == 0 {
+        if self.count == 0 {
             return 0;
         }
         let (origin, groups, edge) = (job.world.scene.film.bounds, self.groups, self.edge);
         let group = |s: &CameraSample| groups.of(edge, [s.pixel[0] - origin.x0, s.pixel[1] - origin.y0], s.turn);
         self.order.clear();
-        self.order.extend(samples.iter().map(group).zip(0_u32..));
+        self.order.extend(samples.iter().zip(0_u128..).map(|(s, i)| u128::from(group(s)) << 32 | i));
         self.order.sort_unstable();
 
         self.tails.clear();
@@ -200,67 +261,148 @@ impl Reuse {
                 sample.radiance = second.before;
             }
         }
-        self.pair();
-        self.trace(&*job.world.accel);
-        for pairs in self.pairs.chunk_by(|a, b| a.second == b.second) {
-            self.distribute(pairs, out);
+        self.connect();
+        job.world.accel.occluded(&self.shares.rays, Coherence::Packets, &mut self.occluded);
+        self.shares.distribute(&self.occluded, &self.tails);
+        for (member, &sum) in self.shares.members.iter().zip(&self.shares.sums) {
+            out[member.sample as usize].radiance += member.beta * sum;
         }
-        self.rays.len() as u64
+        self.shares.rays.len() as u64
     }
 
-    /// The pairs of all groups, by their second vertices, and the segments of all but those of one path.
-    fn pair(&mut self) {
-        let Reuse { order, first, second, rays, pairs, tails, .. } = self;
-        rays.clear();
-        pairs.clear();
-        for group in order.chunk_by(|a, b| a.0 == b.0) {
-            for &(_, j) in group {
-                let Some(end) = second[j as usize].as_ref().filter(|_| !tails[j as usize].is_black()) else { continue };
-                let vertex = first[j as usize].as_ref().map(|first| first.vertex);
-                for &(_, i) in group {
-                    let Some(start) = first[i as usize].as_ref().filter(|f| Some(f.vertex) == vertex) else { continue };
-                    let g = density(&start.at, &end.at);
-                    if i == j {
-                        pairs.push(Pair { first: i, second: j, g });
-                    } else if g > 0.0 {
-                        pairs.push(Pair { first: i, second: j, g });
-                        rays.push(&segment(&start.at, &end.at));
-                    }
+    /// What the members of each group share, and the segments for it.
+    fn connect(&mut self) {
+        let Reuse { order, first, second, group, shares, tails, .. } = self;
+        shares.clear();
+        for samples in order.chunk_by(|a, b| a >> 32 == b >> 32) {
+            group.begin = shares.members.len();
+            for sample in samples.iter().map(|&entry| entry as u32) {
+                let Some(First { at, vertex, beta }) = &first[sample as usize] else { continue };
+                group.first.set(shares.members.len() - group.begin, at);
+                shares.members.push(Member { sample, vertex: *vertex, beta: *beta });
+            }
+            for i in group.begin..shares.members.len() {
+                let sample = shares.members[i].sample as usize;
+                let Some(second) = second[sample].as_ref().filter(|_| !tails[sample].is_black()) else { continue };
+                group.second.set(group.found.len(), &second.at);
+                group.found.push(i as u32);
+                if group.found.len() == TOGETHER {
+                    group.connect(shares);
                 }
+            }
+            group.connect(shares);
+        }
+        let (RayBatch { t_max, time, .. }, count) = (&mut shares.rays, shares.to.len());
+        t_max.resize(count, SEGMENT_END);
+        time.resize(count, 0.0);
+    }
+}
+
+impl Group {
+    /// What members get from the second vertices that were found, and the segments for it.
+    fn connect(&mut self, shares: &mut Shares) {
+        let (len, count) = (padded(shares.members.len() - self.begin), self.found.len());
+        self.first.reserve(len);
+        [&mut self.o, &mut self.d].into_iter().for_each(|columns| columns.reserve(len * count));
+        reserve(&mut [&mut self.g], len * count);
+        self.kept.resize(self.kept.len().max(len), 0);
+        let (from, to) = (self.first.vertices(len), self.second.vertices(count));
+        let (o, d) = (self.o.get_mut(len * count), self.d.get_mut(len * count));
+        connect(level(), &from, &to, &mut Connections { g: &mut self.g[..len * count], o, d });
+        for k in 0..count {
+            self.share(k, len, shares);
+        }
+        self.found.clear();
+    }
+
+    /// What members get from the second vertex `k` of those that were found; columns have `len` first vertices for each.
+    fn share(&mut self, k: usize, len: usize, shares: &mut Shares) {
+        let member = self.found[k];
+        let (own, vertex) = (member as usize - self.begin, shares.members[member as usize].vertex);
+        let g = &self.g[k * len..][..len];
+        let mut count = 0;
+        for (i, (other, &g)) in shares.members[self.begin..].iter().zip(g).enumerate() {
+            self.kept[count] = i as u32;
+            count += usize::from(g > 0.0 && i != own && other.vertex == vertex);
+        }
+        let kept = &self.kept[..count];
+        shares.to.extend(kept.iter().map(|&i| self.begin as u32 + i));
+        let (o, d) = (self.o.get((k + 1) * len), self.d.get((k + 1) * len));
+        let RayBatch { ox, oy, oz, dx, dy, dz, .. } = &mut shares.rays;
+        let columns = [ox, oy, oz, dx, dy, dz].into_iter().zip(o.into_iter().chain(d).map(|from| &from[k * len..]));
+        for (to, from) in columns.chain([(&mut shares.g, g)]) {
+            to.extend(kept.iter().map(|&i| from[i as usize]));
+        }
+        shares.shared.push(Shared { member, own: g[own], end: shares.to.len() });
+    }
+}
+
+impl Shares {
+    fn clear(&mut self) {
+        let Shares { members, shared, to, g, rays, sums: _ } = self;
+        members.clear();
+        shared.clear();
+        to.clear();
+        g.clear();
+        rays.clear();
+    }
+
+    /// Gives members their parts of what was found, by sample, from second vertices on.
+    fn distribute(&mut self, occluded: &[bool], tails: &[Rgb]) {
+        self.sums.clear();
+        self.sums.resize(self.members.len(), Rgb::BLACK);
+        for (g, &is_occluded) in self.g.iter_mut().zip(occluded) {
+            *g = if is_occluded { 0.0 } else { *g };
+        }
+        let mut begin = 0;
+        for &Shared { member, own, end } in &self.shared {
+            let (g, to) = (&self.g[begin..end], &self.to[begin..end]);
+            begin = end;
+            let tail = tails[self.members[member as usize].sample as usize];
+            let sum = own + sum_of(g);
+            if own > 0.0 && sum.is_finite() && tail.is_finite() {
+                self.sums[member as usize] += tail * (own / sum);
+                for (&to, &g) in to.iter().zip(g) {
+                    self.sums[to as usize] += tail * (g / sum);
+                }
+            } else {
+                // Of no use to others, such as a path along a surface
+                self.sums[member as usize] += tail;
             }
         }
     }
+}
 
-    /// Finds which pairs see each other.
-    fn trace(&mut self, accel: &dyn Accel) {
-        accel.occluded(&self.rays, Coherence::Packets, &mut self.occluded);
-        let others = self.pairs.iter_mut().filter(|pair| pair.first != pair.second);
-        for (pair, _) in others.zip(&self.occluded).filter(|(_, is_occluded)| **is_occluded) {
-            pair.g = 0.0;
+/// The sum, in the order of as many sums as lanes.
+fn sum_of(values: &[f32]) -> f32 {
+    let (vectors, rest) = values.as_chunks::<LANES>();
+    let mut sums = [0.0; LANES];
+    for vector in vectors {
+        for (sum, value) in sums.iter_mut().zip(vector) {
+            *sum += value;
         }
     }
+    sums.iter().chain(rest).sum()
+}
 
-    /// Throughput beyond the first vertex of sample `i`.
-    #[inline]
-    fn beta(&self, i: usize) -> Rgb {
-        self.first[i].map_or(Rgb::BLACK, |first| first.beta)
+impl Places {
+    fn reserve(&mut self, len: usize) {
+        let Places { p, p_error, n, ns } = self;
+        [p, p_error, n, ns].into_iter().for_each(|columns| columns.reserve(len));
     }
 
-    /// Distributes what was found from one second vertex on.
-    fn distribute(&self, pairs: &[Pair], out: &mut [PixelSample]) {
-        let j = pairs[0].second as usize;
-        let tail = self.tails[j];
-        let sum: f32 = pairs.iter().map(|pair| pair.g).sum();
-        let own = pairs.iter().find(|pair| pair.first as usize == j).map_or(0.0, |pair| pair.g);
-        if !(own > 0.0 && sum.is_finite() && tail.is_finite()) {
-            // Of no use to others, such as a path along a surface
-            out[j].radiance += self.beta(j) * tail;
-            return;
-        }
-        for pair in pairs.iter().filter(|pair| pair.g > 0.0) {
-            let i = pair.first as usize;
-            out[i].radiance += self.beta(i) * tail * (pair.g / sum);
-        }
+    /// Sets place `i`, the last one so far or the one after it.
+    fn set(&mut self, i: usize, at: &Place) {
+        self.reserve(padded(i + 1));
+        self.p.set(i, at.p);
+        self.p_error.set(i, at.p_error);
+        self.n.set(i, at.n);
+        self.ns.set(i, at.ns);
+    }
+
+    fn vertices(&self, len: usize) -> Vertices<'_> {
+        let Places { p, p_error, n, ns } = self;
+        Vertices { ends: Ends { p: p.get(len), p_error: p_error.get(len), n: n.get(len) }, ns: ns.get(len) }
     }
 }
 
@@ -281,25 +423,4 @@ impl Groups {
         let ([cell_x, cell_y], [block_x, block_y]) = (cell.map(|c| u64::from(c & 0x7ff)), block.map(u64::from));
         u64::from(turn) << 32 | cell_y << 21 | cell_x << 10 | block_y << 5 | block_x
     }
-}
-
-/// π g: cos θ |cos θ_y|/‖y − x‖², if y lies above x, and x on the side of y that was lit.
-#[inline]
-fn density(x: &Place, y: &Place) -> f32 {
-    let d = y.p - x.p;
-    let (cos, cos_y, cos_shading) = (x.ns.dot(d), -y.n.dot(d), -y.ns.dot(d));
-    if cos > 0.0 && cos_y > 0.0 && cos_shading > 0.0 {
-        let d2 = d.length_squared();
-        cos * cos_y / (d2 * d2)
-    } else {
-        0.0
-    }
-}
-
-/// The shadow segment from x to y.
-#[inline]
-fn segment(x: &Place, y: &Place) -> Ray {
-    let o = offset_origin(x.p, x.p_error, x.n, y.p - x.p);
-    let end = offset_origin(y.p, y.p_error, y.n, o - y.p);
-    Ray { o, d: end - o, t_max: SEGMENT_END, time: 0.0 }
 }

@@ -78,25 +78,38 @@ impl Share {
     fn best(pixel: &Pixel, rate: f64, rules: &Rules) -> Share {
         let [rest, sight, cost, look] =
             [pixel.rest, pixel.sight, pixel.cost.max(1.0), pixel.look.max(1.0)].map(f64::from);
+        let all_looks = (sight / (look * rate)).sqrt();
         let with_looks = |samples: f64| {
-            let looks = (sight / (look * rate)).sqrt() / samples;
             // Not a number where nothing varies
-            [1.0, looks.round().max(1.0).min(f64::from(MAX_LOOKS))].map(|looks| Share { samples, looks: looks as u8 })
+            let looks = (all_looks / samples + 0.5).max(1.0).min(f64::from(MAX_LOOKS));
+            Share { samples, looks: looks as u8 }
         };
-        let better = |a: Share, b: Share| {
-            let [a_loss, b_loss] = [a, b].map(|share| {
-                let [error, cost] = share.of(pixel);
-                error + rate * cost
-            });
-            if b_loss < a_loss { b } else { a }
+        let loss = |share: Share| {
+            let [error, cost] = share.of(pixel);
+            error + rate * cost
         };
-        if rules.doubles {
-            return [1.0, 2.0, 4.0, 8.0].into_iter().flat_map(with_looks).reduce(better).unwrap_or(Share::ONE);
-        }
         let limit = |variance: f64| (variance / (cost * rate)).sqrt().clamp(RANGE[0], RANGE[1]);
-        let together = limit(rest + sight);
-        let split = [together, limit(rest)].map(|samples| with_looks(samples.max(MIN_SPLIT))[1]);
-        split.into_iter().fold(Share { samples: together, looks: 1 }, better)
+        let together = if rules.doubles { 1.0 } else { limit(rest + sight) };
+        let first = Share { samples: together, looks: 1 };
+        let mut best = (first, loss(first));
+        let mut consider = |share: Share| {
+            let loss = loss(share);
+            best = if loss < best.1 { (share, loss) } else { best };
+        };
+        // Where no light is seen a look more is never worth its cost
+        let is_lit = sight > 0.0;
+        if rules.doubles {
+            for samples in [1.0, 2.0, 4.0, 8.0] {
+                consider(Share { samples, looks: 1 });
+                if is_lit {
+                    consider(with_looks(samples));
+                }
+            }
+        } else if is_lit {
+            consider(with_looks(together.max(MIN_SPLIT)));
+            consider(with_looks(limit(rest).max(MIN_SPLIT)));
+        }
+        best.0
     }
 }
 

@@ -9,13 +9,14 @@
 //! In kernels there are no closures and no `map` over arrays: their code would be compiled without the vectors.
 //!
 //! Reading order: [`lane`], [`columns`], [`curve`], [`sampler`], [`light`], [`area`], [`environment`], [`bsdf`],
-//! [`combine`], [`camera`], [`hits`], [`triangles`], [`vertex`].
+//! [`combine`], [`camera`], [`hits`], [`triangles`], [`vertex`], [`connections`].
 
 pub mod area;
 pub mod bsdf;
 pub mod camera;
 pub mod columns;
 pub mod combine;
+pub mod connections;
 pub mod curve;
 pub mod environment;
 pub mod hits;

@@ -289,10 +289,10 @@ fn segments_lanes<S: Simd>(
 ) {
     for i in (0..is_far.len()).step_by(LANES) {
         let wi = Vec3s::load(simd, wi, i);
-        let o = offset_origins(end(simd, from, i), wi);
-        let light = end(simd, to, i);
+        let o = offset_origins(from.load(simd, i), wi);
+        let light = to.load(simd, i);
         let is_far = load(simd, is_far, i).simd_ne(F::splat(simd, 0.0));
-        let d = offset_origins(light, o.minus(light.0)).minus(o);
+        let d = offset_origins(light, o.minus(light[0])).minus(o);
         o.store(&mut out.o, i);
         either(is_far, wi, d).store(&mut out.d, i);
         store(is_far.select(F::splat(simd, f32::INFINITY), F::splat(simd, SEGMENT_END)), out.t_max, i);
@@ -307,18 +307,24 @@ pub fn origins(level: Level, from: &Ends<'_>, w: Columns3<'_>, out: &mut Columns
 #[inline(always)]
 fn origins_lanes<S: Simd>(simd: S, from: &Ends<'_>, w: Columns3<'_>, out: &mut ColumnsMut3<'_>) {
     for i in (0..w[0].len()).step_by(LANES) {
-        offset_origins(end(simd, from, i), Vec3s::load(simd, w, i)).store(out, i);
+        offset_origins(from.load(simd, i), Vec3s::load(simd, w, i)).store(out, i);
     }
 }
 
-#[inline(always)]
-fn end<S: Simd>(simd: S, at: &Ends<'_>, i: usize) -> (Vec3s<S>, Vec3s<S>, Vec3s<S>) {
-    (Vec3s::load(simd, at.p, i), Vec3s::load(simd, at.p_error, i), Vec3s::load(simd, at.n, i))
+/// Points, the bounds of their errors, and their normals.
+pub(super) type End<S> = [Vec3s<S>; 3];
+
+impl Ends<'_> {
+    /// The lanes from index `i` on.
+    #[inline(always)]
+    pub(super) fn load<S: Simd>(&self, simd: S, i: usize) -> End<S> {
+        [Vec3s::load(simd, self.p, i), Vec3s::load(simd, self.p_error, i), Vec3s::load(simd, self.n, i)]
+    }
 }
 
 /// As [`lumiris_numbers::math::ray::offset_origin`].
 #[inline(always)]
-fn offset_origins<S: Simd>((p, error, n): (Vec3s<S>, Vec3s<S>, Vec3s<S>), w: Vec3s<S>) -> Vec3s<S> {
+pub(super) fn offset_origins<S: Simd>([p, error, n]: End<S>, w: Vec3s<S>) -> Vec3s<S> {
     let zero = F::splat(p.x.token(), 0.0);
     let distance = absolute(n).dot(error);
     let offset = n.times(w.dot(n).simd_lt(zero).select(-distance, distance));

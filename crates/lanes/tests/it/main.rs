@@ -4,6 +4,7 @@
 mod area;
 mod bsdf;
 mod combine;
+mod connections;
 mod curve;
 mod environment;
 mod lane;
