@@ -112,13 +112,12 @@ impl LightGroups {
     /// Probability that the sampler of the set chooses a light of each group, seen from a point. They sum to one,
     /// unless nothing can be chosen.
     pub fn pmfs(&self, sampler: &LightSampler, ctx: &LightCtx) -> [f32; MAX_GROUPS] {
-        let mut turns = Turns::NONE;
-        self.pmfs_again(sampler, ctx, &mut turns)
+        self.pmfs_again(sampler, ctx, Turns::NONE)
     }
 
     /// [`Self::pmfs`], where the point's `turns` hold what is known of it.
     #[inline]
-    pub fn pmfs_again(&self, sampler: &LightSampler, ctx: &LightCtx, turns: &mut Turns) -> [f32; MAX_GROUPS] {
+    pub fn pmfs_again(&self, sampler: &LightSampler, ctx: &LightCtx, turns: Turns<'_>) -> [f32; MAX_GROUPS] {
         let mut pmfs = [0.0; MAX_GROUPS];
         match &self.choice {
             Choice::Tree { cut, above } => {

@@ -13,6 +13,7 @@ use super::choice::UNIT;
 use super::{Light, LightCtx, LightId, LightRun, SampledLight, TreeChoice, Turns};
 use super::{VisibilityCache, VisibilityCacheSampler};
 use lumiris_numbers::math::{AliasTable, cumulative};
+use std::ops::Deref;
 use std::sync::Arc;
 use strum::{EnumIter, EnumString, IntoStaticStr, VariantNames};
 
@@ -166,7 +167,7 @@ impl LightSampler {
 
     /// [`Self::sample`], where the point's `turns` hold what is known of it.
     #[inline]
-    pub fn sample_again(&self, ctx: &LightCtx, u: f32, turns: &mut Turns) -> Option<SampledLight> {
+    pub fn sample_again(&self, ctx: &impl Deref<Target = LightCtx>, u: f32, turns: Turns<'_>) -> Option<SampledLight> {
         match self {
             LightSampler::Tree(choice) => choice.sample_again(ctx, u, turns),
             _ => self.sample(ctx, u),

@@ -5,11 +5,13 @@
 
 use super::groups::MAX_GROUPS;
 use super::{AreaLight, AreaShape, GlossyLobe, Light, LightCtx, LightId, LightLanes};
-use super::{LightSample, LightSampler, LightSampling, Turns};
+use super::{LightSample, LightSampler, LightSampling, Tops};
 use lumiris_lanes::area::{Rectangle, many};
 use lumiris_lanes::columns::{Column, Columns3, padded, reserve};
 use lumiris_lanes::level;
+use lumiris_lanes::light_choice::{GlossyLobes, Receivers};
 use lumiris_numbers::math::{Rgb, Vec3};
+use std::cell::LazyCell;
 use std::ops::Range;
 
 /// Number of lights up to which points are sorted by counting.
@@ -100,13 +102,38 @@ impl LightSamples {
     }
 }
 
+/// Lobes in columns.
+#[derive(Debug, Default)]
+struct LobeColumns {
+    wo: Columns3,
+    rest: [Column; 4],
+}
+
+impl LobeColumns {
+    /// `len` columns of these lobes; `None` if there are none.
+    fn set(&mut self, lobes: &[GlossyLobe], len: usize) -> Option<GlossyLobes<'_>> {
+        let LobeColumns { wo, rest } = self;
+        wo.reserve(len);
+        reserve(&mut rest.each_mut(), len);
+        for (i, lobe) in lobes.iter().enumerate() {
+            wo.set(i, Vec3::from_array(lobe.wo));
+            for (column, x) in rest.iter_mut().zip([lobe.cos_o, lobe.alpha_squared, lobe.scale, lobe.diffuse]) {
+                column[i] = x;
+            }
+        }
+        let [cos_o, alpha_squared, scale, diffuse] = rest.each_ref().map(|column| &column[..len]);
+        (!lobes.is_empty()).then(|| GlossyLobes { wo: wo.get(len), cos_o, alpha_squared, scale, diffuse })
+    }
+}
+
 /// Memory of [`LightSampling::sample_many`].
 #[derive(Debug, Default)]
 pub struct Scratch {
     /// The light that each point chose, and the probability.
     chosen: Vec<(LightId, f32)>,
-    /// What earlier choices at the points have determined.
-    turns: Vec<Turns>,
+    /// What choices at the points have in common.
+    tops: Tops,
+    lobes: LobeColumns,
     /// Points sorted by light.
     order: Vec<u32>,
     begins: Vec<u32>,
@@ -116,18 +143,22 @@ pub struct Scratch {
 }
 
 impl Scratch {
-    /// Prepares for samples of `lights` at `n` points, one after another at each.
-    pub fn begin(&mut self, lights: &LightSampling, n: usize) {
-        self.turns.clear();
-        if lights.sampler.only_light().is_none() {
-            self.turns.resize(n, Turns::NONE);
+    /// Prepares for samples of `lights` at the `n` points `at`, one after another at each.
+    pub fn begin(&mut self, lights: &LightSampling, n: usize, at: LitPoints<'_>) {
+        self.tops.clear();
+        if let LightSampler::Tree(choice) = &lights.sampler
+            && lights.sampler.only_light().is_none()
+        {
+            let len = padded(n);
+            let lobes = self.lobes.set(at.lobes, len);
+            self.tops.determine(choice, &Receivers { p: at.p.get(len), ns: at.ns.get(len), lobes });
         }
     }
 
     /// [`LightGroups::pmfs`](super::LightGroups::pmfs) of `lights` at point `i`, which is `at`; there is more than one light.
     #[inline]
-    pub fn group_pmfs(&mut self, lights: &LightSampling, i: usize, at: &LightCtx) -> [f32; MAX_GROUPS] {
-        lights.groups.pmfs_again(&lights.sampler, at, &mut self.turns[i])
+    pub fn group_pmfs(&self, lights: &LightSampling, i: usize, at: &LightCtx) -> [f32; MAX_GROUPS] {
+        lights.groups.pmfs_again(&lights.sampler, at, self.tops.of(i))
     }
 
     /// The light that point `i` chose in the last [`LightSampling::sample_many`], where there is more than one.
@@ -154,11 +185,12 @@ impl LightSampling {
         } else {
             let mut chosen = std::mem::take(&mut scratch.chosen);
             chosen.clear();
-            let turns = scratch.turns[..n].iter_mut().enumerate();
-            chosen.extend(turns.map(|(i, turns)| match self.sampler.sample_again(&at.get(i), u[0][i], turns) {
-                Some(choice) => (choice.light, choice.pmf),
-                None => (NO_LIGHT, 0.0),
-            }));
+            let choose = |(i, &u): (usize, &f32)| {
+                let ctx = LazyCell::new(|| at.get(i));
+                let choice = self.sampler.sample_again(&ctx, u, scratch.tops.of(i));
+                choice.map_or((NO_LIGHT, 0.0), |choice| (choice.light, choice.pmf))
+            };
+            chosen.extend(u[0][..n].iter().enumerate().map(choose));
             self.sample_chosen(&chosen, at.p, [&u[1], &u[2]], scratch, out);
             scratch.chosen = chosen;
         }
@@ -409,7 +441,7 @@ mod tests {
         let at = LitPoints { p: &p, n: &n, ns: &ns, lobes: &lobes };
         let (mut scratch, mut out) = (Scratch::default(), LightSamples::default());
         out.reserve(len);
-        scratch.begin(&lights, N);
+        scratch.begin(&lights, N, at);
         // Choices after the first one know what that has determined
         for _ in 0..3 {
             u.iter_mut().for_each(|u| u[..N].fill_with(|| stream.random::<f32>()));

@@ -9,7 +9,6 @@ pub mod bounds;
 pub mod choice;
 pub mod emit;
 pub mod environment;
-pub mod glossy_lobe;
 pub mod glow;
 pub mod groups;
 pub mod image_light;
@@ -24,6 +23,7 @@ pub mod portal;
 pub mod sampling;
 pub mod set;
 pub mod spot;
+pub mod tops;
 pub mod tree;
 mod tree_build;
 pub mod tree_choice;
@@ -35,6 +35,8 @@ pub mod visibility_cache_sampler;
 #[cfg(test)]
 mod emit_tests;
 #[cfg(test)]
+mod glossy_lobe_tests;
+#[cfg(test)]
 mod light_tests;
 
 pub use area::{AreaLight, AreaShape, Cover, Emission, EmissionImage, EmissionMapping, area_lights_of};
@@ -42,7 +44,6 @@ pub use bounds::LightBounds;
 pub use choice::{LightRun, SampledLight};
 pub use emit::{EmissionSample, EmittingPoint};
 pub use environment::{EnvironmentFilter, EnvironmentMap, EnvironmentMapping};
-pub use glossy_lobe::GlossyLobe;
 pub use glow::Glow;
 pub use groups::LightGroups;
 pub use image_light::{ImageLight, ImageMapping};
@@ -54,12 +55,16 @@ pub use light_sampler::{LightChoice, LightSampler, LightSamplerKind};
 pub use portal::{Portal, PortalLight};
 pub use sampling::LightSampling;
 pub use set::{LightSet, LightSetBuilder};
+pub use tops::Tops;
 pub use tree::{CutNode, LightTree};
 pub use tree_choice::TreeChoice;
 pub use turns::Turns;
 pub use visibility_cache::VisibilityCache;
 pub use visibility_cache_sampler::VisibilityCacheSampler;
 
+pub use lumiris_numbers::math::light_bound::GlossyLobe;
+
+use lumiris_numbers::math::light_bound::Receiver;
 use lumiris_numbers::math::{Affine3A, Bounds3, Mat3, Rgb, Vec2, Vec3};
 use std::f32::consts::PI;
 use std::sync::Arc;
@@ -91,6 +96,13 @@ impl LightCtx {
     #[inline]
     pub fn on(p: Vec3, n: Vec3) -> Self {
         LightCtx { p, n, ns: n, lobe: GlossyLobe::NONE }
+    }
+
+    /// What bounds of lights need of it.
+    #[inline]
+    pub fn receiver(&self) -> Receiver<f32> {
+        let lobe = Some(self.lobe).filter(|lobe| lobe.scale > 0.0);
+        Receiver { p: self.p.to_array(), ns: self.ns.to_array(), lobe }
     }
 
     /// The point as if the surface were diffuse.

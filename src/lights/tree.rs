@@ -1,22 +1,16 @@
 //! A bounding volume hierarchy over lights, descended at random in proportion to an upper bound of each child's
-//! contribution [Conty Estévez and Kulla 2018; Pharr et al. 2023, §12.6.3].
-//!
-//! The importance of a node at p is I·cos θ′·cos θi′/max(d², r²): I the summed intensity, d the distance to the centre
-//! of its bounding sphere, r that sphere's radius, θ′ the minimum angle between an emitter's normal and the direction
-//! to p, θi′ the minimum angle between the surface normal and a direction to the node. Both sides of the maximum are
-//! squared lengths, so the result does not depend on the unit of length. On glossy surfaces, cos θi′ gives way to
-//! [`GlossyLobe::reflected`](super::GlossyLobe::reflected).
+//! contribution ([`lumiris_numbers::math::light_bound`]) [Conty Estévez and Kulla 2018; Pharr et al. 2023, §12.6.3].
 
 use super::tree_build::{Item, build};
 use super::tree_node::Node;
 use super::turns::Turns;
 use super::{LightBounds, LightCtx, LightId, LightRun};
 use lumiris_numbers::math::ONE_MINUS_EPSILON;
+use lumiris_numbers::math::light_bound::{LightBound, first_probability};
+use std::ops::Deref;
 
 /// Subtrees on the stack while positions descend together: one per level.
 const MAX_DEPTH: usize = 66;
-/// Minimum probability of a child that can contribute; f32 uniforms and 1 − p do not resolve much less.
-const MIN_PROBABILITY: f32 = 1.0 / (1 << 20) as f32;
 /// Trail of lights that are not in the tree.
 const NO_TRAIL: u64 = u64::MAX;
 
@@ -28,6 +22,8 @@ pub struct LightTree {
     trails: Vec<u64>,
     /// Per light, its leaf.
     leaves: Vec<u32>,
+    /// The inner nodes that have numbers below [`Turns::COUNT`], by place and number.
+    tops: Vec<(u32, usize)>,
 }
 
 /// An inner node above a cut of the tree.
@@ -65,7 +61,7 @@ impl LightTree {
             .filter(|item| item.center.is_finite() && item.bounds.intensity > 0.0)
             .collect();
         let mut tree =
-            LightTree { nodes: Vec::new(), trails: vec![NO_TRAIL; bounds.len()], leaves: vec![0; bounds.len()] };
+            LightTree { trails: vec![NO_TRAIL; bounds.len()], leaves: vec![0; bounds.len()], ..LightTree::default() };
         if !items.is_empty() {
             tree.nodes = vec![Node::new(&LightBounds::EMPTY, true, 0); 2 * items.len() - 1];
             build(&mut tree.nodes, 0, &mut items, 0);
@@ -77,6 +73,14 @@ impl LightTree {
     /// Fills in where lights are in the tree.
     fn find_leaves(&mut self) {
         let mut stack = vec![(0, 0, 0)];
+        let mut numbers = vec![(0, 1)];
+        while let Some((place, number)) = numbers.pop() {
+            let node = &self.nodes[place as usize];
+            if !node.is_leaf && number < Turns::COUNT {
+                self.tops.push((place, number));
+                numbers.extend([(place + 1, child(number, false)), (node.index, child(number, true))]);
+            }
+        }
         while let Some((place, depth, trail)) = stack.pop() {
             let node = &self.nodes[place as usize];
             if node.is_leaf {
@@ -106,6 +110,21 @@ impl LightTree {
         self.trails.get(light as usize).is_some_and(|&trail| trail != NO_TRAIL)
     }
 
+    /// The bound of all lights, if there are any.
+    pub fn root(&self) -> Option<&LightBound> {
+        self.nodes.first().map(|root| &root.bound)
+    }
+
+    /// The numbers of the inner nodes at the top, below [`Turns::COUNT`], with the bounds of their left and right children.
+    pub fn tops(&self) -> impl Iterator<Item = (usize, [&LightBound; 2])> {
+        self.tops.iter().map(|&(place, number)| (number, self.children(place as usize).map(|node| &node.bound)))
+    }
+
+    #[inline]
+    fn children(&self, place: usize) -> [&Node; 2] {
+        [&self.nodes[place + 1], &self.nodes[self.nodes[place].index as usize]]
+    }
+
     /// Upper bound, up to a common factor, of what all lights together contribute at a point; 0 if none can.
     #[inline]
     pub fn importance(&self, ctx: &LightCtx) -> f32 {
@@ -130,16 +149,9 @@ impl LightTree {
     #[inline]
     fn left_probability_by(&self, ctx: &LightCtx, place: usize, adjust: impl Fn(usize, f32) -> f32) -> f32 {
         let right_place = self.nodes[place].index as usize;
-        let (left, right) = (&self.nodes[place + 1], &self.nodes[right_place]);
-        let (a, b) = (adjust(place + 1, left.importance(ctx)), adjust(right_place, right.importance(ctx)));
-        let p = a / (a + b);
-        if a > 0.0 && b > 0.0 && p.is_finite() {
-            p.clamp(MIN_PROBABILITY, 1.0 - MIN_PROBABILITY)
-        } else if p.is_finite() {
-            p
-        } else {
-            left.intensity / (left.intensity + right.intensity)
-        }
+        let [left, right] = self.children(place);
+        let importances = [adjust(place + 1, left.importance(ctx)), adjust(right_place, right.importance(ctx))];
+        first_probability(importances, [&left.bound, &right.bound])
     }
 
     /// Chooses a light of the subtree below a node by `u` in [0, 1): its id, its probability in that subtree, and `u`
@@ -164,7 +176,12 @@ impl LightTree {
 
     /// [`Self::sample`], where the point's `turns` hold what is known of it.
     #[inline]
-    pub fn sample_again(&self, ctx: &LightCtx, u: f32, turns: &mut Turns) -> Option<(LightId, f32, f32)> {
+    pub fn sample_again(
+        &self,
+        ctx: &impl Deref<Target = LightCtx>,
+        u: f32,
+        turns: Turns<'_>,
+    ) -> Option<(LightId, f32, f32)> {
         if self.is_empty() {
             return None;
         }
@@ -246,7 +263,7 @@ impl LightTree {
         while cut.len() < max {
             let spread = |&place: &u32| {
                 let node = &self.nodes[place as usize];
-                if node.is_leaf { -1.0 } else { node.intensity * node.radius_squared }
+                if node.is_leaf { -1.0 } else { node.bound.intensity * node.bound.radius_squared }
             };
             let widest = (0..cut.len()).max_by(|&a, &b| spread(&cut[a]).total_cmp(&spread(&cut[b])));
             let Some(widest) = widest.filter(|&i| !self.nodes[cut[i] as usize].is_leaf) else { break };
@@ -299,7 +316,7 @@ impl LightTree {
     /// Probabilities by which [`sample`](Self::sample) gets into each subtree of a cut that is not empty, in its order, by
     /// the nodes [`above`](Self::above) it; the point's `turns` hold what is known of it.
     #[inline]
-    pub fn cut_pmfs(&self, ctx: &LightCtx, above: &[CutNode], turns: &mut Turns, pmfs: &mut [f32]) {
+    pub fn cut_pmfs(&self, ctx: &LightCtx, above: &[CutNode], turns: Turns<'_>, pmfs: &mut [f32]) {
         pmfs[0] = 1.0;
         for node in above {
             let p = turns.probability(node.number, || self.left_probability(ctx, node.place));

@@ -3,6 +3,7 @@
 use super::choice::UNIT;
 use super::{Light, LightCtx, LightId, LightRun, LightTree, SampledLight, Turns};
 use lumiris_numbers::math::ONE_MINUS_EPSILON;
+use std::ops::Deref;
 use std::sync::Arc;
 
 /// A light tree, with the infinite lights beside it.
@@ -68,7 +69,7 @@ impl TreeChoice {
 
     /// [`Self::sample`], where the point's `turns` hold what is known of it.
     #[inline]
-    pub fn sample_again(&self, ctx: &LightCtx, u: f32, turns: &mut Turns) -> Option<SampledLight> {
+    pub fn sample_again(&self, ctx: &impl Deref<Target = LightCtx>, u: f32, turns: Turns<'_>) -> Option<SampledLight> {
         let p_infinite = turns.probability(Turns::BESIDE, || self.infinite_probability(ctx));
         self.choose(u, p_infinite, |u| self.tree.sample_again(ctx, u, turns))
     }

@@ -4,7 +4,7 @@ use fearless_simd::{Simd, SimdCombine, SimdSplit, f64x8, prelude::*};
 use lumiris_numbers::math::number::Number;
 use lumiris_numbers::math::{Frame, Mat3, Vec3};
 use std::f32::consts::{FRAC_PI_2, TAU};
-use std::ops::{Add, Div, Mul};
+use std::ops::{Add, Div, Mul, Sub};
 
 /// The vector of f32 lanes.
 pub type F<S> = fearless_simd::f32x8<S>;
@@ -69,6 +69,15 @@ impl<S: Simd> Add for Wide<S> {
     }
 }
 
+impl<S: Simd> Sub for Wide<S> {
+    type Output = Self;
+
+    #[inline(always)]
+    fn sub(self, other: Self) -> Self {
+        Wide(self.0 - other.0)
+    }
+}
+
 impl<S: Simd> Mul for Wide<S> {
     type Output = Self;
 
@@ -114,8 +123,18 @@ impl<S: Simd> Number for Wide<S> {
     }
 
     #[inline(always)]
-    fn or_zero_if_not_finite(self) -> Self {
-        Wide(or_zero(self.0.is_finite(), self.0))
+    fn finite_or(self, other: Self) -> Self {
+        Wide(self.0.is_finite().select(self.0, other.0))
+    }
+
+    #[inline(always)]
+    fn root(self) -> Self {
+        Wide(self.0.sqrt())
+    }
+
+    #[inline(always)]
+    fn magnitude(self) -> Self {
+        Wide(self.0.abs())
     }
 }
 

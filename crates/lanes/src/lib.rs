@@ -9,7 +9,8 @@
 //! In kernels there are no closures and no `map` over arrays: their code would be compiled without the vectors.
 //!
 //! Reading order: [`lane`], [`columns`], [`curve`], [`sampler`], [`light`], [`area`], [`environment`], [`bsdf`],
-//! [`combine`], [`camera`], [`hits`], [`triangles`], [`vertex`], [`connections`].
+//! [`combine`], [`camera`], [`hits`], [`triangles`], [`vertex`], [`connections`],
+//! [`light_choice`].
 
 pub mod area;
 pub mod bsdf;
@@ -22,6 +23,7 @@ pub mod environment;
 pub mod hits;
 pub mod lane;
 pub mod light;
+pub mod light_choice;
 pub mod sampler;
 pub mod triangles;
 pub mod vertex;

@@ -219,7 +219,7 @@ impl<'w> Batch<'w> {
         }
         self.share(out);
         let Buffers { scratch, controls, surface, .. } = &mut *self.buffers;
-        scratch.begin(&job.lights, n);
+        scratch.begin(&job.lights, n, surface.lit_points());
         if self.estimate.has_controls {
             controls.begin(job, n, (surface, scratch), &self.singles);
         }

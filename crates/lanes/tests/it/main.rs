@@ -9,6 +9,7 @@ mod curve;
 mod environment;
 mod lane;
 mod light;
+mod light_choice;
 mod sampler;
 mod support;
 mod triangles;

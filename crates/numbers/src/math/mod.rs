@@ -6,7 +6,7 @@
 //!
 //! Reading order: [`rgb`], [`frame`], [`transform`], [`ray`], [`bounds`], [`warp`], [`sphere_map`], [`octahedral`],
 //! [`cumulative`], [`distribution`], [`bilinear`], [`alias`], [`hash`], [`noise`],
-//! [`number`].
+//! [`number`], [`light_bound`].
 
 pub mod alias;
 pub mod bilinear;
@@ -15,6 +15,7 @@ pub mod cumulative;
 pub mod distribution;
 pub mod frame;
 pub mod hash;
+pub mod light_bound;
 pub mod noise;
 pub mod number;
 pub mod octahedral;

@@ -1,10 +1,10 @@
 //! Formulas that are written once for single samples and for vectors of them.
 
-use std::ops::{Add, Div, Mul};
+use std::ops::{Add, Div, Mul, Sub};
 
 /// A number of one sample or of a vector of them: what a single sample and a kernel both need is written once over it.
 /// NaN compares as false.
-pub trait Number: Copy + Add<Output = Self> + Mul<Output = Self> + Div<Output = Self> {
+pub trait Number: Copy + Add<Output = Self> + Sub<Output = Self> + Mul<Output = Self> + Div<Output = Self> {
     /// `v`, in all lanes.
     fn constant(self, v: f32) -> Self;
 
@@ -20,8 +20,14 @@ pub trait Number: Copy + Add<Output = Self> + Mul<Output = Self> + Div<Output = 
     /// `yes` where `self ≥ bound`, else `no`.
     fn if_at_least(self, bound: Self, yes: Self, no: Self) -> Self;
 
-    /// 0 where it is infinite or NaN.
-    fn or_zero_if_not_finite(self) -> Self;
+    /// `other` where it is infinite or NaN.
+    fn finite_or(self, other: Self) -> Self;
+
+    /// The square root.
+    fn root(self) -> Self;
+
+    /// The absolute value.
+    fn magnitude(self) -> Self;
 }
 
 impl Number for f32 {
@@ -51,8 +57,18 @@ impl Number for f32 {
     }
 
     #[inline(always)]
-    fn or_zero_if_not_finite(self) -> f32 {
-        if self.is_finite() { self } else { 0.0 }
+    fn finite_or(self, other: f32) -> f32 {
+        if self.is_finite() { self } else { other }
+    }
+
+    #[inline(always)]
+    fn root(self) -> f32 {
+        self.sqrt()
+    }
+
+    #[inline(always)]
+    fn magnitude(self) -> f32 {
+        self.abs()
     }
 }
 
@@ -67,6 +83,7 @@ mod tests {
         for (a, above, at_least) in [(0.5, 4.0, 4.0), (1.0, 4.0, 3.0), (2.0, 3.0, 3.0), (f32::NAN, 4.0, 4.0)] {
             assert_eq!((a.if_above(1.0, 3.0, 4.0), a.if_at_least(1.0, 3.0, 4.0)), (above, at_least), "{a}");
         }
-        assert_eq!([2.0, f32::INFINITY, f32::NAN].map(Number::or_zero_if_not_finite), [2.0, 0.0, 0.0]);
+        assert_eq!([2.0, f32::INFINITY, f32::NAN].map(|x| x.finite_or(0.5)), [2.0, 0.5, 0.5]);
+        assert_eq!((9.0_f32.root(), (-3.0_f32).magnitude()), (3.0, 3.0));
     }
 }

@@ -38,7 +38,8 @@ type Block = [f32; BLOCK];
 /// The weight q̂·r of a proposal, or of several; 0 if that is not finite.
 #[inline(always)]
 pub fn weight<N: Number>(q_hat: N, r: N) -> N {
-    (q_hat * r).or_zero_if_not_finite()
+    let w = q_hat * r;
+    w.finite_or(w.constant(0.0))
 }
 
 /// The weight that counts: 0 for NaN, infinite and negative weights.

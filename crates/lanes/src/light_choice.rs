@@ -1,0 +1,85 @@
+//! Probabilities in a light tree for many points: where the branches at the top lead.
+//!
+//! The formulas are those of [`lumiris_numbers::math::light_bound`].
+
+use super::lane::{F, LANES, Vec3s, Wide, load, store};
+use super::vertex::Columns3;
+use fearless_simd::{Level, Simd, dispatch, prelude::*};
+use lumiris_numbers::math::light_bound::{GlossyLobe, LightBound, Receiver, first_probability};
+
+/// Points that are lit, in columns of a multiple of [`LANES`].
+#[derive(Clone, Copy, Debug)]
+pub struct Receivers<'a> {
+    /// Positions.
+    pub p: Columns3<'a>,
+    /// Shading normals; zero where there is none.
+    pub ns: Columns3<'a>,
+    /// What is reflected more than by diffuse surfaces, if anything is.
+    pub lobes: Option<GlossyLobes<'a>>,
+}
+
+/// [`GlossyLobe`] in columns.
+#[derive(Clone, Copy, Debug)]
+pub struct GlossyLobes<'a> {
+    /// Directions to the viewer.
+    pub wo: Columns3<'a>,
+    /// Their cosines to the shading normals.
+    pub cos_o: &'a [f32],
+    /// α² of microfacets.
+    pub alpha_squared: &'a [f32],
+    /// The factor of their density; 0 where there is no lobe.
+    pub scale: &'a [f32],
+    /// What is diffuse.
+    pub diffuse: &'a [f32],
+}
+
+/// For each point, the probability of the first of two bounds.
+pub fn first_probabilities(level: Level, bounds: [&LightBound; 2], at: &Receivers<'_>, out: &mut [f32]) {
+    dispatch!(level, simd => first_lanes(simd, bounds, at, out));
+}
+
+#[inline(always)]
+fn first_lanes<S: Simd>(simd: S, bounds: [&LightBound; 2], at: &Receivers<'_>, out: &mut [f32]) {
+    for i in (0..out.len()).step_by(LANES) {
+        let receiver = receiver(simd, at, i);
+        let importances = [bounds[0].importance(&receiver), bounds[1].importance(&receiver)];
+        store(first_probability(importances, bounds).0, out, i);
+    }
+}
+
+/// For each point, the importance of a bound.
+pub fn importances(level: Level, bound: &LightBound, at: &Receivers<'_>, out: &mut [f32]) {
+    dispatch!(level, simd => importances_lanes(simd, bound, at, out));
+}
+
+#[inline(always)]
+fn importances_lanes<S: Simd>(simd: S, bound: &LightBound, at: &Receivers<'_>, out: &mut [f32]) {
+    for i in (0..out.len()).step_by(LANES) {
+        store(bound.importance(&receiver(simd, at, i)).0, out, i);
+    }
+}
+
+#[inline(always)]
+fn receiver<S: Simd>(simd: S, at: &Receivers<'_>, i: usize) -> Receiver<Wide<S>> {
+    let (p, ns) = (three(simd, at.p, i), three(simd, at.ns, i));
+    let mut lobe = None;
+    if let Some(lobes) = &at.lobes {
+        let scale = load(simd, lobes.scale, i);
+        if scale.simd_gt(F::splat(simd, 0.0)).any_true() {
+            lobe = Some(GlossyLobe {
+                wo: three(simd, lobes.wo, i),
+                cos_o: Wide(load(simd, lobes.cos_o, i)),
+                alpha_squared: Wide(load(simd, lobes.alpha_squared, i)),
+                scale: Wide(scale),
+                diffuse: Wide(load(simd, lobes.diffuse, i)),
+            });
+        }
+    }
+    Receiver { p, ns, lobe }
+}
+
+#[inline(always)]
+fn three<S: Simd>(simd: S, from: Columns3<'_>, i: usize) -> [Wide<S>; 3] {
+    let v = Vec3s::load(simd, from, i);
+    [Wide(v.x), Wide(v.y), Wide(v.z)]
+}

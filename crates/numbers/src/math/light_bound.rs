@@ -1,0 +1,193 @@
+//! What lights within a common bound may contribute at a point [Conty Estévez and Kulla 2018; Pharr et al. 2023, §12.6.3].
+//!
+//! The importance at p is I·cos θ′·cos θi′/max(d², r²): I the summed intensity, d the distance to the centre of the bounding
+//! sphere, r that sphere's radius, θ′ the minimum angle between an emitter's normal and the direction to p, θi′ the minimum
+//! angle between the surface normal and a direction to the lights. Both sides of the maximum are squared lengths, so the
+//! result does not depend on the unit of length. On glossy surfaces, cos θi′ gives way to [`GlossyLobe::reflected`].
+//!
+//! The lobe is about the mirror direction of the viewer, as in many-light sampling that follows the BRDF [Liu et al. 2019].
+//! For lights of the irradiance E on a plane towards them, the light that reaches the viewer is nearly
+//! E·((1 − s) cos θi + s·π D(h) G₁(wo)/(4 cos θo)), where s is the part of the albedo that is the lobe's and D the density
+//! of isotropic GGX microfacets. The mean over lights within the angle b of wi is that of wi with α² + sin²b/4 instead of
+//! α², since half vectors turn half as far as directions: no larger than 1/b², whatever α is.
+
+use super::number::Number;
+use super::{Vec3, safe_sqrt, sqr};
+
+/// Slack of the cosines, for rounding: a light that can contribute never has importance 0.
+const COSINE_SLACK: f32 = 1e-3;
+/// Minimum probability of a child that can contribute; f32 uniforms and 1 − p do not resolve much less.
+const MIN_PROBABILITY: f32 = 1.0 / (1 << 20) as f32;
+/// Greatest part of the lobe: what it leaves out, anisotropy and light reflected several times, keeps a chance.
+const MAX_SHARE: f32 = 0.95;
+
+/// A vector by component.
+type Three<N> = [N; 3];
+
+/// Lights within a sphere and a cone of normals.
+#[derive(Clone, Copy, Debug)]
+pub struct LightBound {
+    /// Centre of the sphere.
+    pub center: Vec3,
+    /// Square of its radius.
+    pub radius_squared: f32,
+    /// Axis of the cone, unit.
+    pub axis: Vec3,
+    cos_theta_o: f32,
+    sin_theta_o: f32,
+    cos_theta_e: f32,
+    /// I, in the unit of intensities.
+    pub intensity: f32,
+    two_sided: bool,
+}
+
+/// What the choice of a light knows of a point.
+#[derive(Clone, Copy, Debug)]
+pub struct Receiver<N> {
+    /// Position.
+    pub p: Three<N>,
+    /// Shading normal, unit; zero if there is none.
+    pub ns: Three<N>,
+    /// What is reflected more than by a diffuse surface, if anything is.
+    pub lobe: Option<GlossyLobe<N>>,
+}
+
+/// A lobe that reflects light to the viewer, beside a diffuse part.
+#[derive(Clone, Copy, Debug)]
+pub struct GlossyLobe<N = f32> {
+    /// Direction to the viewer, unit.
+    pub wo: Three<N>,
+    /// Its cosine, signed, to the shading normal.
+    pub cos_o: N,
+    /// α² of the microfacets.
+    pub alpha_squared: N,
+    /// s G₁(wo)/(4 |cos θo|); 0 if there is no lobe.
+    pub scale: N,
+    /// 1 − s.
+    pub diffuse: N,
+}
+
+// No closures: in kernels their code would be compiled without the vectors
+
+#[inline(always)]
+fn three<N: Number>(number: N, v: Vec3) -> Three<N> {
+    [number.constant(v.x), number.constant(v.y), number.constant(v.z)]
+}
+
+#[inline(always)]
+fn dot<N: Number>(a: Three<N>, b: Three<N>) -> N {
+    a[0] * b[0] + a[1] * b[1] + a[2] * b[2]
+}
+
+/// The sine or cosine that goes with x.
+#[inline(always)]
+fn other<N: Number>(x: N) -> N {
+    (x.constant(1.0) - x * x).greater(x.constant(0.0)).root()
+}
+
+/// cos(max(0, a − b)) by [sin, cos] of both.
+#[inline(always)]
+fn cos_of_difference<N: Number>([sin_a, cos_a]: [N; 2], [sin_b, cos_b]: [N; 2]) -> N {
+    cos_a.if_above(cos_b, cos_a.constant(1.0), cos_a * cos_b + sin_a * sin_b)
+}
+
+/// sin(max(0, a − b)).
+#[inline(always)]
+fn sin_of_difference<N: Number>([sin_a, cos_a]: [N; 2], [sin_b, cos_b]: [N; 2]) -> N {
+    cos_a.if_above(cos_b, cos_a.constant(0.0), sin_a * cos_b - cos_a * sin_b)
+}
+
+impl LightBound {
+    /// Lights within the sphere of the given `center` and `radius`, whose normals lie in the cone of the angle θo about `axis`
+    /// and which shine within the angle θe of them; on both sides if `two_sided`.
+    pub fn new(
+        (center, radius): (Vec3, f32),
+        axis: Vec3,
+        [cos_theta_o, cos_theta_e]: [f32; 2],
+        two_sided: bool,
+        intensity: f32,
+    ) -> Self {
+        let (radius_squared, sin_theta_o) = (sqr(radius), safe_sqrt(1.0 - sqr(cos_theta_o)));
+        LightBound { center, radius_squared, axis, cos_theta_o, sin_theta_o, cos_theta_e, intensity, two_sided }
+    }
+
+    /// Upper bound, up to a common factor, of what the lights contribute; 0 if none can.
+    #[inline(always)]
+    pub fn importance<N: Number>(&self, at: &Receiver<N>) -> N {
+        let number = at.p[0];
+        let (zero, one, slack) = (number.constant(0.0), number.constant(1.0), number.constant(COSINE_SLACK));
+        let (center, axis) = (three(number, self.center), three(number, self.axis));
+        let radius_squared = number.constant(self.radius_squared);
+        let near = if self.radius_squared > 0.0 { self.intensity / self.radius_squared } else { 0.0 };
+
+        let d = [center[0] - at.p[0], center[1] - at.p[1], center[2] - at.p[2]];
+        let d2 = dot(d, d);
+        let length = d2.root();
+        let wi = [d[0] / length, d[1] / length, d[2] / length];
+        let sin2_b = radius_squared / d2;
+        let b = [sin2_b.root(), (one - sin2_b).greater(zero).root()];
+
+        // Angle between the axis and the direction to p, less the cone of normals, less the extent
+        let cos_axis = zero - dot(wi, axis);
+        let cos_w = if self.two_sided { cos_axis.magnitude() } else { cos_axis };
+        let w = [other(cos_w), cos_w];
+        let o = [number.constant(self.sin_theta_o), number.constant(self.cos_theta_o)];
+        let x = [sin_of_difference(w, o), cos_of_difference(w, o)];
+        let cos_light = cos_of_difference(x, b);
+        let is_seen = number.constant(self.cos_theta_e - COSINE_SLACK);
+        let importance = number.constant(self.intensity) * cos_light.greater(slack) / d2;
+        let importance = cos_light.if_at_least(is_seen, importance, zero);
+
+        // The surface may transmit, so light from its back counts too
+        let cos = dot(wi, at.ns);
+        let cos_i = cos.magnitude().lesser(one);
+        let cos_max = cos_of_difference([other(cos_i), cos_i], b).greater(slack);
+        let reflected = if let Some(lobe) = &at.lobe { lobe.reflected(wi, cos, sin2_b, cos_max) } else { cos_max };
+        let far = dot(at.ns, at.ns).if_above(zero, importance * reflected, importance);
+        radius_squared.if_at_least(d2, number.constant(near), far)
+    }
+}
+
+/// Probability of the first of two bounds, by their importances. If neither can contribute, the intensities decide.
+#[inline(always)]
+pub fn first_probability<N: Number>([a, b]: [N; 2], [first, second]: [&LightBound; 2]) -> N {
+    let (zero, least, most) = (a.constant(0.0), a.constant(MIN_PROBABILITY), a.constant(1.0 - MIN_PROBABILITY));
+    let p = (a / (a + b)).finite_or(a.constant(first.intensity / (first.intensity + second.intensity)));
+    a.if_above(zero, b.if_above(zero, p.greater(least).lesser(most), p), p)
+}
+
+impl GlossyLobe {
+    /// No lobe: all is diffuse.
+    pub const NONE: GlossyLobe = GlossyLobe { wo: [0.0; 3], cos_o: 0.0, alpha_squared: 0.0, scale: 0.0, diffuse: 1.0 };
+
+    /// The lobe of microfacets of roughness `alpha`, about the shading normal `ns`, that has `share` (0 to 1) of the
+    /// albedo seen from `wo`; all vectors unit.
+    pub fn new(wo: Vec3, ns: Vec3, alpha: f32, share: f32) -> Self {
+        let (cos_o, alpha_squared, share) = (wo.dot(ns), sqr(alpha), share.min(MAX_SHARE));
+        // G₁/|cos θo| of GGX, finite at the horizon
+        let visible = 2.0 / (cos_o.abs() + (alpha_squared + (1.0 - alpha_squared) * sqr(cos_o)).sqrt());
+        if !(share > 0.0) || !visible.is_finite() {
+            return Self::NONE;
+        }
+        GlossyLobe { wo: wo.to_array(), cos_o, alpha_squared, scale: 0.25 * share * visible, diffuse: 1.0 - share }
+    }
+}
+
+impl<N: Number> GlossyLobe<N> {
+    /// π·f·|cos θi| over the albedo, for lights within an angle of the sine √`sin2_b` of the direction `wi`, whose cosine to
+    /// the shading normal is `cos_i`, and whose greatest absolute cosine among these lights is `cos_max`.
+    #[inline(always)]
+    pub fn reflected(&self, wi: Three<N>, cos_i: N, sin2_b: N, cos_max: N) -> N {
+        let (zero, one, quarter) = (cos_i.constant(0.0), cos_i.constant(1.0), cos_i.constant(0.25));
+        let (two, least) = (cos_i.constant(2.0), cos_i.constant(1e-6));
+        let diffuse = self.diffuse * cos_max;
+        let sum = self.cos_o + cos_i;
+        let cos2_h = (sum * sum / (two * (one + dot(self.wo, wi))).greater(least)).lesser(one);
+        let alpha_squared = self.alpha_squared + quarter * sin2_b;
+        let denominator = one - cos2_h * (one - alpha_squared);
+        let lobe = diffuse + self.scale * alpha_squared / (denominator * denominator);
+        // On the other side, as far as all of them are there
+        let beyond = (cos_i * cos_i).if_at_least(sin2_b, diffuse, lobe);
+        self.scale.if_above(zero, (cos_i * self.cos_o).if_above(zero, lobe, beyond), diffuse)
+    }
+}
