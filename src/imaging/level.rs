@@ -68,11 +68,21 @@ impl Level {
     /// The linear colour of a pixel; grey if there is one channel.
     #[inline]
     pub(super) fn color(&self, pixel: [usize; 2], channels: usize, table: &[f32; 256]) -> Rgb {
+        let i = (pixel[1] * self.width + pixel[0]) * channels;
+        // The texels are told apart once, not for each channel
         match (&self.texels, channels) {
+            (Texels::Bytes(v), 1) => Rgb::splat(table[usize::from(v[i])]),
+            (Texels::Bytes(v), _) => {
+                let v = &v[i..i + 3];
+                Rgb::new(table[usize::from(v[0])], table[usize::from(v[1])], table[usize::from(v[2])])
+            }
+            (Texels::Floats(v), 1) => Rgb::splat(v[i]),
+            (Texels::Floats(v), _) => {
+                let v = &v[i..i + 3];
+                Rgb::new(v[0], v[1], v[2])
+            }
             (Texels::Tiled(tiled), 1) => Rgb::splat(tiled.values::<1>(channels, pixel, table)[0]),
             (Texels::Tiled(tiled), _) => Rgb::from_array(tiled.values(channels, pixel, table)),
-            (_, 1) => Rgb::splat(self.texel(pixel, 0, channels, table)),
-            _ => Rgb::from_array([0, 1, 2].map(|c| self.texel(pixel, c, channels, table))),
         }
     }
 
