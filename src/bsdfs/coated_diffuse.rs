@@ -82,7 +82,12 @@ impl<'a> CoatedDiffuse<'a> {
     /// Probability of sampling the interface; `wo` is in the upper hemisphere.
     #[inline]
     fn p_interface(&self, wo: Vec3) -> f32 {
-        let [t, r] = self.directional(wo);
+        self.p_interface_of(self.directional(wo))
+    }
+
+    /// The same by T and R of `wo`.
+    #[inline]
+    fn p_interface_of(&self, [t, r]: [f32; 2]) -> f32 {
         let base = self.base.average() * (PI * self.mean_transmittance * t);
         if r + base > 0.0 { r / (r + base) } else { 0.0 }
     }
@@ -108,15 +113,28 @@ impl<'a> CoatedDiffuse<'a> {
 
     /// Value without cosine (1/sr), without the mirror of a smooth interface.
     pub fn f(&self, wo: Vec3, wi: Vec3) -> Rgb {
-        let Some((wo, wi)) = super::to_upper(wo, wi) else { return Rgb::BLACK };
-        let base = self.base * (self.directional(wo)[0] * self.directional(wi)[0]);
-        self.interface.f(wo, wi) + base
+        self.f_and_pdf(wo, wi).0
     }
 
     /// Density of the non-specular part of [`Self::sample`] per steradian.
     pub fn pdf(&self, wo: Vec3, wi: Vec3) -> f32 {
-        let Some((wo, wi)) = super::to_upper(wo, wi) else { return 0.0 };
-        self.pdf_upper(wo, wi, self.p_interface(wo))
+        self.f_and_pdf(wo, wi).1
+    }
+
+    /// [`Self::f`] and [`Self::pdf`].
+    #[inline]
+    pub(super) fn f_and_pdf(&self, wo: Vec3, wi: Vec3) -> (Rgb, f32) {
+        let upper = super::to_upper(wo, wi);
+        upper.map_or((Rgb::BLACK, 0.0), |(wo, wi)| self.f_and_pdf_upper(wo, wi, self.directional(wo)))
+    }
+
+    /// The same in the upper hemisphere, by T and R of `wo`.
+    #[inline]
+    fn f_and_pdf_upper(&self, wo: Vec3, wi: Vec3, of_wo: [f32; 2]) -> (Rgb, f32) {
+        let (value, pdf) = self.interface.value_and_pdf(wo, wi, Select::Reflection);
+        let f = Rgb::splat(value) + self.base * (of_wo[0] * self.directional(wi)[0]);
+        let p = self.p_interface_of(of_wo);
+        (f, p * pdf + (1.0 - p) * warp::pdf_cosine_hemisphere(wi))
     }
 
     /// Probability of sampling the interface, see [`super::Bsdf::first_lobe`].
@@ -130,20 +148,17 @@ impl<'a> CoatedDiffuse<'a> {
         self.p_interface(wo) * self.interface.pdf_select(wo, wi, Select::Reflection)
     }
 
-    fn pdf_upper(&self, wo: Vec3, wi: Vec3, p: f32) -> f32 {
-        p * self.interface.pdf_select(wo, wi, Select::Reflection) + (1.0 - p) * warp::pdf_cosine_hemisphere(wi)
-    }
-
     /// The interface or the cosine, in proportion to the albedos.
     pub fn sample(&self, wo: Vec3, uc: f32, u: [f32; 2]) -> Option<BsdfSample> {
         let flip = if wo.z < 0.0 { -1.0 } else { 1.0 };
         let wo = wo * flip;
-        let p = self.p_interface(wo);
+        let of_wo = self.directional(wo);
+        let p = self.p_interface_of(of_wo);
         let (wi, lobe) = if uc >= p {
             (warp::sample_cosine_hemisphere(u), Lobe::DIFFUSE)
         } else if self.interface.is_specular() {
             let wi = Vec3::new(-wo.x, -wo.y, wo.z);
-            let f = Rgb::splat(self.directional(wo)[1] / wi.z);
+            let f = Rgb::splat(of_wo[1] / wi.z);
             let lobe = Lobe::SPECULAR | Lobe::REFLECTION;
             return Some(BsdfSample { f, wi: wi * flip, pdf: p, lobe, eta: 1.0 });
         } else {
@@ -152,7 +167,7 @@ impl<'a> CoatedDiffuse<'a> {
         if wi.z <= 0.0 {
             return None;
         }
-        let (f, pdf) = (self.f(wo, wi), self.pdf_upper(wo, wi, p));
+        let (f, pdf) = self.f_and_pdf_upper(wo, wi, of_wo);
         Some(BsdfSample { f, wi: wi * flip, pdf, lobe: lobe | Lobe::REFLECTION, eta: 1.0 })
     }
 }

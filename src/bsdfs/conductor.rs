@@ -25,25 +25,30 @@ impl Conductor {
 
     /// Value without cosine (1/sr); 0 if smooth.
     pub fn f(&self, wo: Vec3, wi: Vec3) -> Rgb {
-        if wo.z * wi.z <= 0.0 || self.distribution.is_smooth() {
-            return Rgb::BLACK;
-        }
-        let Some(m) = (wo + wi).try_normalize() else { return Rgb::BLACK };
-        self.f_of_m(wo, wi, m)
-    }
-
-    fn f_of_m(&self, wo: Vec3, wi: Vec3, m: Vec3) -> Rgb {
-        let d_g = self.distribution.d(m) * self.distribution.g(wo, wi);
-        fr_conductor(wo.dot(m).abs(), self.eta, self.k) * (d_g / (4.0 * wo.z * wi.z).abs())
+        self.f_and_pdf(wo, wi).0
     }
 
     /// Density of [`Self::sample`] per steradian; 0 if smooth.
     pub fn pdf(&self, wo: Vec3, wi: Vec3) -> f32 {
+        self.f_and_pdf(wo, wi).1
+    }
+
+    /// [`Self::f`] and [`Self::pdf`].
+    #[inline]
+    pub(super) fn f_and_pdf(&self, wo: Vec3, wi: Vec3) -> (Rgb, f32) {
         if wo.z * wi.z <= 0.0 || self.distribution.is_smooth() {
-            return 0.0;
+            return (Rgb::BLACK, 0.0);
         }
-        let Some(m) = (wo + wi).try_normalize() else { return 0.0 };
-        self.distribution.pdf_m(wo, m) / (4.0 * wo.dot(m).abs())
+        (wo + wi).try_normalize().map_or((Rgb::BLACK, 0.0), |m| self.f_and_pdf_of_m(wo, wi, m))
+    }
+
+    #[inline]
+    fn f_and_pdf_of_m(&self, wo: Vec3, wi: Vec3, m: Vec3) -> (Rgb, f32) {
+        let (distribution, cos_m) = (&self.distribution, wo.dot(m).abs());
+        let (d, lambda) = (distribution.d(m), distribution.lambda(wo));
+        let d_g = d / (1.0 + lambda + distribution.lambda(wi));
+        let f = fr_conductor(cos_m, self.eta, self.k) * (d_g / (4.0 * wo.z * wi.z).abs());
+        (f, TrowbridgeReitz::pdf_of(wo, lambda, d, cos_m) / (4.0 * cos_m))
     }
 
     /// The mirror direction, or a reflection by a visible microfacet.
@@ -61,7 +66,7 @@ impl Conductor {
         if wo.z * wi.z <= 0.0 {
             return None;
         }
-        let pdf = self.distribution.pdf_m(wo, m) / (4.0 * wo.dot(m).abs());
-        Some(BsdfSample { f: self.f_of_m(wo, wi, m), wi, pdf, lobe: Lobe::GLOSSY | Lobe::REFLECTION, eta: 1.0 })
+        let (f, pdf) = self.f_and_pdf_of_m(wo, wi, m);
+        Some(BsdfSample { f, wi, pdf, lobe: Lobe::GLOSSY | Lobe::REFLECTION, eta: 1.0 })
     }
 }

@@ -95,21 +95,55 @@ impl Dielectric {
         if self.is_specular() {
             return 0.0;
         }
-        self.half_vector(wo, wi).map_or(0.0, |(m, eta_p)| self.value_of_m(wo, wi, m, eta_p, transport))
+        let half_vector = self.half_vector(wo, wi);
+        half_vector.map_or(0.0, |m| self.value_and_pdf_of_m((wo, wi), m, transport, Select::All).0)
     }
 
-    fn value_of_m(&self, wo: Vec3, wi: Vec3, m: Vec3, eta_p: f32, transport: Transport) -> f32 {
-        let fresnel = fr_dielectric(wo.dot(m), self.eta);
-        let d_g = self.distribution.d(m) * self.distribution.g(wo, wi);
-        if wo.z * wi.z > 0.0 {
-            return d_g * fresnel / (4.0 * wo.z * wi.z).abs();
+    /// [`Self::f`] and [`Self::pdf`].
+    #[inline]
+    pub(super) fn f_and_pdf(&self, wo: Vec3, wi: Vec3) -> (Rgb, f32) {
+        let (value, pdf) = self.value_and_pdf(wo, wi, Select::All);
+        (Rgb::splat(value), pdf)
+    }
+
+    /// [`Self::value`] for radiance and [`Self::pdf_select`].
+    #[inline]
+    pub(super) fn value_and_pdf(&self, wo: Vec3, wi: Vec3, select: Select) -> (f32, f32) {
+        if self.is_specular() {
+            return (0.0, 0.0);
         }
-        let jacobian = wi.dot(m) * wo.dot(m) / (wo.z * wi.z * sqr(wi.dot(m) + wo.dot(m) / eta_p));
+        let half_vector = self.half_vector(wo, wi);
+        half_vector.map_or((0.0, 0.0), |m| self.value_and_pdf_of_m((wo, wi), m, Transport::Radiance, select))
+    }
+
+    /// Value and density, which have most in common.
+    #[inline]
+    fn value_and_pdf_of_m(
+        &self,
+        (wo, wi): (Vec3, Vec3),
+        (m, eta_p): (Vec3, f32),
+        transport: Transport,
+        select: Select,
+    ) -> (f32, f32) {
+        let (o_m, distribution) = (wo.dot(m), &self.distribution);
+        let fresnel = fr_dielectric(o_m, self.eta);
+        let (d, lambda) = (distribution.d(m), distribution.lambda(wo));
+        let d_g = d / (1.0 + lambda + distribution.lambda(wi));
+        let pdf_m = TrowbridgeReitz::pdf_of(wo, lambda, d, o_m);
+        let p_reflect = Self::p_reflect(select, fresnel);
+        if wo.z * wi.z > 0.0 {
+            let value = d_g * fresnel / (4.0 * wo.z * wi.z).abs();
+            return (value, p_reflect.map_or(0.0, |p| p * pdf_m / (4.0 * o_m.abs())));
+        }
+        let i_m = wi.dot(m);
+        let denominator = sqr(i_m + o_m / eta_p);
+        let jacobian = i_m * o_m / (wo.z * wi.z * denominator);
         let f = d_g * (1.0 - fresnel) * jacobian.abs();
-        match transport {
+        let value = match transport {
             Transport::Radiance => f / sqr(eta_p),
             Transport::Importance => f,
-        }
+        };
+        (value, p_reflect.map_or(0.0, |p| (1.0 - p) * pdf_m * i_m.abs() / denominator))
     }
 
     /// Density of [`Self::sample`] per steradian; 0 if specular.
@@ -123,17 +157,8 @@ impl Dielectric {
         if self.is_specular() {
             return 0.0;
         }
-        self.half_vector(wo, wi).map_or(0.0, |(m, eta_p)| self.pdf_of_m(wo, wi, m, eta_p, select))
-    }
-
-    fn pdf_of_m(&self, wo: Vec3, wi: Vec3, m: Vec3, eta_p: f32, select: Select) -> f32 {
-        let Some(p_reflect) = Self::p_reflect(select, fr_dielectric(wo.dot(m), self.eta)) else { return 0.0 };
-        let pdf_m = self.distribution.pdf_m(wo, m);
-        if wo.z * wi.z > 0.0 {
-            p_reflect * pdf_m / (4.0 * wo.dot(m).abs())
-        } else {
-            (1.0 - p_reflect) * pdf_m * wi.dot(m).abs() / sqr(wi.dot(m) + wo.dot(m) / eta_p)
-        }
+        let half_vector = self.half_vector(wo, wi);
+        half_vector.map_or(0.0, |m| self.value_and_pdf_of_m((wo, wi), m, Transport::Radiance, select).1)
     }
 
     /// Reflection or refraction, chosen by the Fresnel reflectance of the sampled microfacet.
@@ -168,9 +193,8 @@ impl Dielectric {
             return None;
         }
         let eta_p = self.eta_prime(wo, wi);
-        let f = Rgb::splat(self.value_of_m(wo, wi, m, eta_p, transport));
-        let pdf = self.pdf_of_m(wo, wi, m, eta_p, select);
-        Some(BsdfSample { f, wi, pdf, lobe: Lobe::GLOSSY | lobe, eta: eta_p })
+        let (f, pdf) = self.value_and_pdf_of_m((wo, wi), (m, eta_p), transport, select);
+        Some(BsdfSample { f: Rgb::splat(f), wi, pdf, lobe: Lobe::GLOSSY | lobe, eta: eta_p })
     }
 
     fn sample_specular(&self, wo: Vec3, uc: f32, transport: Transport, select: Select) -> Option<BsdfSample> {

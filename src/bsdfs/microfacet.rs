@@ -74,10 +74,16 @@ impl TrowbridgeReitz {
     /// Density of [`Self::sample_m`] per steradian of `m`; `m` is in the upper hemisphere.
     #[inline]
     pub fn pdf_m(&self, w: Vec3, m: Vec3) -> f32 {
+        Self::pdf_of(w, self.lambda(w), self.d(m), w.dot(m))
+    }
+
+    /// [`Self::pdf_m`] by Λ(w), D(m) and w·m.
+    #[inline]
+    pub(super) fn pdf_of(w: Vec3, lambda: f32, d: f32, w_m: f32) -> f32 {
         if w.z == 0.0 {
             return 0.0;
         }
-        self.g1(w) / w.z.abs() * self.d(m) * w.dot(m).abs()
+        1.0 / (1.0 + lambda) / w.z.abs() * d * w_m.abs()
     }
 
     /// A normal visible from `w` (or from `-w` if `w` is below the horizon), in the upper hemisphere.

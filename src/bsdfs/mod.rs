@@ -166,6 +166,21 @@ impl<'a> Bsdf<'a> {
         if pdf.is_finite() { pdf } else { 0.0 }
     }
 
+    /// [`Self::f`] and [`Self::pdf`], which have much in common where there are microfacets.
+    #[inline]
+    pub fn f_and_pdf(&self, wo: Vec3, wi: Vec3) -> (Rgb, f32) {
+        if wo.z == 0.0 || wi.z == 0.0 {
+            return (self.f(wo, wi), self.pdf(wo, wi));
+        }
+        let (f, pdf) = match self {
+            Bsdf::Conductor(b) => b.f_and_pdf(wo, wi),
+            Bsdf::Dielectric(b) => b.f_and_pdf(wo, wi),
+            Bsdf::CoatedDiffuse(b) => b.f_and_pdf(wo, wi),
+            _ => (self.f(wo, wi), self.pdf(wo, wi)),
+        };
+        (if f.is_finite() { f } else { Rgb::BLACK }, if pdf.is_finite() { pdf } else { 0.0 })
+    }
+
     /// Probability that [`Self::sample`] samples the first of at most two lobes, which it does if `uc` is less: the
     /// interface of a coat, the reflection of a diffuse transmitter, the cosine lobe of a proposal density. 1 for BSDFs
     /// of one lobe.

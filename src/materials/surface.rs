@@ -50,6 +50,14 @@ impl<'a> SurfaceBsdf<'a> {
         self.bsdf.f(self.frame.to_local(wo), wi) * self.bsdf.cos(wi)
     }
 
+    /// [`Self::f_cos`] and [`Self::pdf`].
+    #[inline]
+    pub fn f_cos_and_pdf(&self, wo: Vec3, wi: Vec3) -> (Rgb, f32) {
+        let wi = self.frame.to_local(wi);
+        let (f, pdf) = self.bsdf.f_and_pdf(self.frame.to_local(wo), wi);
+        (f * self.bsdf.cos(wi), pdf)
+    }
+
     /// Density of the non-specular part of [`Self::sample`] per steradian.
     #[inline]
     pub fn pdf(&self, wo: Vec3, wi: Vec3) -> f32 {
@@ -86,11 +94,12 @@ impl<'a> SurfaceBsdf<'a> {
         let wo = self.frame.to_local(wo);
         for i in 0..pdf.len() {
             let wi = self.frame.to_local(Vec3::new(wi[0][i], wi[1][i], wi[2][i]));
-            let value = self.bsdf.f(wo, wi) * self.bsdf.cos(wi);
+            let (f, density) = self.bsdf.f_and_pdf(wo, wi);
+            let value = f * self.bsdf.cos(wi);
             for c in 0..3 {
                 f_cos[c][i] = value[c];
             }
-            pdf[i] = self.bsdf.pdf(wo, wi);
+            pdf[i] = density;
         }
     }
 

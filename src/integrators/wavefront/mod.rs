@@ -328,13 +328,13 @@ impl<'w> Batch<'w> {
             let i = single.index as usize;
             if samples.light.pdf[i] > 0.0 {
                 let wi = samples.light.wi.vec3(i);
-                let mut f_cos = single.bsdf.f_cos(single.wo, wi);
+                let (mut f_cos, pdf) = single.bsdf.f_cos_and_pdf(single.wo, wi);
                 if let Some(guide) = guide.filter(|_| paths[i].chain.is_caustic() && samples.light.is_far[i] == 0.0) {
                     let light = only.unwrap_or_else(|| scratch.chosen(i));
                     f_cos *= paths[i].chain.rest(guide.density(light, samples.light.n.vec3(i), -wi));
                 }
                 samples.f_cos.set_rgb(i, f_cos);
-                samples.p_bsdf[i] = single.bsdf.pdf(single.wo, wi);
+                samples.p_bsdf[i] = pdf;
             }
         }
         for (p, is_delta) in samples.p_bsdf.iter_mut().zip(&samples.light.is_delta) {
