@@ -46,7 +46,7 @@ impl Conductor {
     fn f_and_pdf_of_m(&self, wo: Vec3, wi: Vec3, m: Vec3) -> (Rgb, f32) {
         let (distribution, cos_m) = (&self.distribution, wo.dot(m).abs());
         let (d, lambda) = (distribution.d(m), distribution.lambda(wo));
-        let d_g = d / (1.0 + lambda + distribution.lambda(wi));
+        let d_g = d * TrowbridgeReitz::g_of(lambda, distribution.lambda(wi));
         let f = fr_conductor(cos_m, self.eta, self.k) * (d_g / (4.0 * wo.z * wi.z).abs());
         (f, TrowbridgeReitz::pdf_of(wo, lambda, d, cos_m) / (4.0 * cos_m))
     }

@@ -128,7 +128,7 @@ impl Dielectric {
         let (o_m, distribution) = (wo.dot(m), &self.distribution);
         let fresnel = fr_dielectric(o_m, self.eta);
         let (d, lambda) = (distribution.d(m), distribution.lambda(wo));
-        let d_g = d / (1.0 + lambda + distribution.lambda(wi));
+        let d_g = d * TrowbridgeReitz::g_of(lambda, distribution.lambda(wi));
         let pdf_m = TrowbridgeReitz::pdf_of(wo, lambda, d, o_m);
         let p_reflect = Self::p_reflect(select, fresnel);
         if wo.z * wi.z > 0.0 {

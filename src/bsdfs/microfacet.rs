@@ -68,7 +68,13 @@ impl TrowbridgeReitz {
     /// Fraction that both `wo` and `wi` see.
     #[inline]
     pub fn g(&self, wo: Vec3, wi: Vec3) -> f32 {
-        1.0 / (1.0 + self.lambda(wo) + self.lambda(wi))
+        Self::g_of(self.lambda(wo), self.lambda(wi))
+    }
+
+    /// [`Self::g`] by Λ(wo) and Λ(wi).
+    #[inline]
+    pub(super) fn g_of(lambda_o: f32, lambda_i: f32) -> f32 {
+        1.0 / (1.0 + lambda_o + lambda_i)
     }
 
     /// Density of [`Self::sample_m`] per steradian of `m`; `m` is in the upper hemisphere.
