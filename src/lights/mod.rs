@@ -1,7 +1,7 @@
 //! Lights: their emission, the sampling of directions towards them, and the choice of one of many.
 //!
 //! Reading order: [`point`], [`spot`], [`image_light`], [`area`], [`environment`], [`portal`], [`glow`], [`emit`], [`lanes`], [`bounds`],
-//! [`choice`], [`glossy_lobe`], [`tree`], [`tree_choice`], [`visibility_cache`], [`learned_visibility`], [`visibility_cache_sampler`],
+//! [`choice`], [`turns`], [`tree`], [`tree_choice`], [`tops`], [`visibility_cache`], [`learned_visibility`], [`visibility_cache_sampler`],
 //! [`light_sampler`], [`layers`], [`set`], [`groups`], [`sampling`], [`many`], [`irradiance`].
 
 pub mod area;

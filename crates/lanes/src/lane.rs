@@ -123,6 +123,11 @@ impl<S: Simd> Number for Wide<S> {
     }
 
     #[inline(always)]
+    fn is_above(self, bound: Self) -> bool {
+        self.0.simd_gt(bound.0).all_true()
+    }
+
+    #[inline(always)]
     fn finite_or(self, other: Self) -> Self {
         Wide(self.0.is_finite().select(self.0, other.0))
     }

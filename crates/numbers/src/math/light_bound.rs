@@ -118,10 +118,13 @@ impl LightBound {
         let (zero, one, slack) = (number.constant(0.0), number.constant(1.0), number.constant(COSINE_SLACK));
         let (center, axis) = (three(number, self.center), three(number, self.axis));
         let radius_squared = number.constant(self.radius_squared);
-        let near = if self.radius_squared > 0.0 { self.intensity / self.radius_squared } else { 0.0 };
+        let near = number.constant(if self.radius_squared > 0.0 { self.intensity / self.radius_squared } else { 0.0 });
 
         let d = [center[0] - at.p[0], center[1] - at.p[1], center[2] - at.p[2]];
         let d2 = dot(d, d);
+        if radius_squared.is_above(d2) {
+            return near;
+        }
         let length = d2.root();
         let wi = [d[0] / length, d[1] / length, d[2] / length];
         let sin2_b = radius_squared / d2;
@@ -135,6 +138,9 @@ impl LightBound {
         let x = [sin_of_difference(w, o), cos_of_difference(w, o)];
         let cos_light = cos_of_difference(x, b);
         let is_seen = number.constant(self.cos_theta_e - COSINE_SLACK);
+        if is_seen.is_above(cos_light) {
+            return radius_squared.if_at_least(d2, near, zero);
+        }
         let importance = number.constant(self.intensity) * cos_light.greater(slack) / d2;
         let importance = cos_light.if_at_least(is_seen, importance, zero);
 
@@ -144,7 +150,7 @@ impl LightBound {
         let cos_max = cos_of_difference([other(cos_i), cos_i], b).greater(slack);
         let reflected = if let Some(lobe) = &at.lobe { lobe.reflected(wi, cos, sin2_b, cos_max) } else { cos_max };
         let far = dot(at.ns, at.ns).if_above(zero, importance * reflected, importance);
-        radius_squared.if_at_least(d2, number.constant(near), far)
+        radius_squared.if_at_least(d2, near, far)
     }
 }
 

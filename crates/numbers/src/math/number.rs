@@ -20,6 +20,9 @@ pub trait Number: Copy + Add<Output = Self> + Sub<Output = Self> + Mul<Output = 
     /// `yes` where `self ≥ bound`, else `no`.
     fn if_at_least(self, bound: Self, yes: Self, no: Self) -> Self;
 
+    /// True if `self > bound` in all lanes: what else is computed is in vain then.
+    fn is_above(self, bound: Self) -> bool;
+
     /// `other` where it is infinite or NaN.
     fn finite_or(self, other: Self) -> Self;
 
@@ -57,6 +60,11 @@ impl Number for f32 {
     }
 
     #[inline(always)]
+    fn is_above(self, bound: f32) -> bool {
+        self > bound
+    }
+
+    #[inline(always)]
     fn finite_or(self, other: f32) -> f32 {
         if self.is_finite() { self } else { other }
     }
@@ -84,6 +92,7 @@ mod tests {
             assert_eq!((a.if_above(1.0, 3.0, 4.0), a.if_at_least(1.0, 3.0, 4.0)), (above, at_least), "{a}");
         }
         assert_eq!([2.0, f32::INFINITY, f32::NAN].map(|x| x.finite_or(0.5)), [2.0, 0.5, 0.5]);
+        assert!(2.0.is_above(1.0) && !1.0.is_above(1.0) && !f32::NAN.is_above(1.0));
         assert_eq!((9.0_f32.root(), (-3.0_f32).magnitude()), (3.0, 3.0));
     }
 }
