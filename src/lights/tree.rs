@@ -66,21 +66,26 @@ impl LightTree {
             tree.nodes = vec![Node::new(&LightBounds::EMPTY, true, 0); 2 * items.len() - 1];
             build(&mut tree.nodes, 0, &mut items, 0);
             tree.find_leaves();
+            tree.find_tops();
         }
         tree
+    }
+
+    /// Fills in the nodes at the top.
+    fn find_tops(&mut self) {
+        let mut stack = vec![(0, 1)];
+        while let Some((place, number)) = stack.pop() {
+            let node = &self.nodes[place as usize];
+            if !node.is_leaf && number < Turns::COUNT {
+                self.tops.push((place, number));
+                stack.extend([(place + 1, child(number, false)), (node.index, child(number, true))]);
+            }
+        }
     }
 
     /// Fills in where lights are in the tree.
     fn find_leaves(&mut self) {
         let mut stack = vec![(0, 0, 0)];
-        let mut numbers = vec![(0, 1)];
-        while let Some((place, number)) = numbers.pop() {
-            let node = &self.nodes[place as usize];
-            if !node.is_leaf && number < Turns::COUNT {
-                self.tops.push((place, number));
-                numbers.extend([(place + 1, child(number, false)), (node.index, child(number, true))]);
-            }
-        }
         while let Some((place, depth, trail)) = stack.pop() {
             let node = &self.nodes[place as usize];
             if node.is_leaf {
