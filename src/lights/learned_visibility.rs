@@ -14,6 +14,10 @@
 //! The density of light samples that has the least variance is proportional to E·√V̂, as the second moment of a sample
 //! is E²·V̂/p. [`LearnedVisibility::sample_unseen`] chooses lights without photons in this way: of a node of the light
 //! tree, Φ/(A·N) is the sum over its lights.
+//!
+//! A node may hold many lights that are visible and of which few photons are expected each. What all those of a node that
+//! were not seen can be expected to send is as much as came from those seen exactly once [Good 1953], so c is their number
+//! for a node: where a far room is seen through a door, a few single photons of some of its lights tell of the others.
 
 use super::tree_choice::TreeChoice;
 use super::visibility_cache::{ContributingLights, VisibilityCache};
@@ -107,11 +111,24 @@ impl LearnedVisibility {
         count as f32 * self.of_one_photon[light as usize]
     }
 
+    /// The places in the tree, ascending, of the lights that were `seen` by one photon.
+    pub fn find_singles(&self, seen: &ContributingLights<'_>, singles: &mut Vec<u32>) {
+        singles.clear();
+        let once = seen.lights.iter().filter(|(_, count)| *count == 1);
+        singles.extend(once.filter_map(|&(light, _)| self.choice.tree.leaf(light)));
+        singles.sort_unstable();
+    }
+
     /// Chooses a light by `u` in [0, 1), nearly in proportion to E·√V̂ for lights without photons; every light that can
     /// contribute and is not in `seen` has a positive probability. Lights in `seen` may be chosen too. `None` if there
-    /// is no light.
+    /// is no light. `singles` are those of `seen`.
     #[inline]
-    pub fn sample_unseen(&self, ctx: &LightCtx, seen: &ContributingLights<'_>, u: f32) -> Option<UnseenLight> {
+    pub fn sample_unseen(
+        &self,
+        ctx: &LightCtx,
+        (seen, singles): (&ContributingLights<'_>, &[u32]),
+        u: f32,
+    ) -> Option<UnseenLight> {
         let TreeChoice { tree, infinite, .. } = &self.choice;
         // V̂ goes by the irradiance
         let ctx = &ctx.diffuse();
@@ -129,8 +146,9 @@ impl LearnedVisibility {
 
         // Those in the tree
         let u = ((u - p_infinite) / (1.0 - p_infinite)).min(ONE_MINUS_EPSILON);
-        let by_visibility = |node: usize, e: f32| e * estimate(e, self.of_nodes[node], 0.0).sqrt();
-        let (light, pmf, u) = tree.sample_by(ctx, u, by_visibility)?;
+        let by_visibility =
+            |node: usize, e: f32, singles: usize| e * estimate(e, self.of_nodes[node], singles as f32).sqrt();
+        let (light, pmf, u) = tree.sample_by(ctx, u, singles, by_visibility)?;
         Some(self.unseen(ctx, SampledLight { light, pmf: pmf * (1.0 - p_infinite), u }))
     }
 
@@ -195,20 +213,22 @@ mod tests {
     #[test]
     fn every_light_that_is_not_seen_is_chosen_with_the_probability_given() {
         for (seen, count, paths) in
-            [(&[0, 3, 12][..], 5, 1e4), (&[12, 13], 1, 100.0), (&[1], 3, 0.0), (&[2, 5], 9, 1e12)]
+            [(&[0, 3, 12][..], 5, 1e4), (&[12, 13], 1, 100.0), (&[1], 3, 0.0), (&[2, 5], 9, 1e12), (&[4, 5, 7], 1, 1e4)]
         {
             let cache = cache(seen, count, paths);
             let learned = learned(&cache);
             let ctx = LightCtx::on(AT, Vec3::Z);
             let contributing = cache.lookup_with_sums(AT, Vec3::Z);
             assert_eq!(contributing.lights.len(), seen.len());
+            let mut singles = Vec::new();
+            learned.find_singles(&contributing, &mut singles);
 
             // The mean of 1/pmf over the draws of a light is 1
             let draws = 200_000;
             let mut s = pcg32([3, 1, 4]);
             let (mut means, mut squares) = ([0.0_f64; 14], [0.0_f64; 14]);
             for _ in 0..draws {
-                let unseen = learned.sample_unseen(&ctx, &contributing, s.random::<f32>()).unwrap();
+                let unseen = learned.sample_unseen(&ctx, (&contributing, &singles), s.random::<f32>()).unwrap();
                 let SampledLight { light, pmf, u } = unseen.choice;
                 assert!((0.0..1.0).contains(&u) && pmf > 0.0);
                 assert_eq!(unseen.importance, learned.importance(&ctx, light));
@@ -230,10 +250,29 @@ mod tests {
             let cache = cache(&[5], 1, paths);
             let learned = learned(&cache);
             let contributing = cache.lookup_with_sums(AT, Vec3::Z);
-            let near = |i: u32| learned.sample_unseen(&ctx, &contributing, (i as f32 + 0.5) / 4096.0).unwrap();
+            let near = |i: u32| learned.sample_unseen(&ctx, (&contributing, &[]), (i as f32 + 0.5) / 4096.0).unwrap();
             (0..4096).filter(|&i| near(i).choice.light < 3).count()
         };
         let [few, many] = [1.0, 1e6].map(share_of_near);
         assert!(few > many + 100, "{few} {many}");
+    }
+
+    #[test]
+    fn lights_beside_those_of_single_photons_are_chosen_more() {
+        let ctx = LightCtx::on(AT, Vec3::Z);
+        let share_of_far = |seen: &[LightId], count: usize| {
+            let cache = cache(seen, count, 1e5);
+            let learned = learned(&cache);
+            let contributing = cache.lookup_with_sums(AT, Vec3::Z);
+            let mut singles = Vec::new();
+            learned.find_singles(&contributing, &mut singles);
+            assert_eq!(singles.len(), if count == 1 { seen.len() } else { 0 });
+            let chosen =
+                |i: u32| learned.sample_unseen(&ctx, (&contributing, &singles), (i as f32 + 0.5) / 4096.0).unwrap();
+            (0..4096).filter(|&i| (8..12).contains(&chosen(i).choice.light)).count()
+        };
+        let [none, many, single] = [share_of_far(&[], 0), share_of_far(&[9, 11], 50), share_of_far(&[9, 11], 1)];
+        assert_eq!(none, many, "lights with photons enough tell nothing of others");
+        assert!(single as f64 > 1.2 * none as f64, "{single} {none}");
     }
 }

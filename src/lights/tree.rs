@@ -139,44 +139,22 @@ impl LightTree {
     /// Upper bound, up to the same factor, of what one light contributes at a point; 0 if it is not in the tree.
     #[inline]
     pub fn light_importance(&self, ctx: &LightCtx, light: LightId) -> f32 {
-        if self.contains(light) { self.nodes[self.leaves[light as usize] as usize].importance(ctx) } else { 0.0 }
+        self.leaf(light).map_or(0.0, |leaf| self.nodes[leaf as usize].importance(ctx))
     }
 
     /// Probability to turn left at an inner node. If neither child can contribute, the intensities decide; so the
     /// probabilities of all leaves add up to 1 everywhere.
     #[inline]
     fn left_probability(&self, ctx: &LightCtx, place: usize) -> f32 {
-        self.left_probability_by(ctx, place, |_, importance| importance)
-    }
-
-    /// [`Self::left_probability`] with importances changed by `adjust(node, importance)`, which keeps positive ones
-    /// positive.
-    #[inline]
-    fn left_probability_by(&self, ctx: &LightCtx, place: usize, adjust: impl Fn(usize, f32) -> f32) -> f32 {
-        let right_place = self.nodes[place].index as usize;
         let [left, right] = self.children(place);
-        let importances = [adjust(place + 1, left.importance(ctx)), adjust(right_place, right.importance(ctx))];
-        first_probability(importances, [&left.bound, &right.bound])
+        first_probability([left.importance(ctx), right.importance(ctx)], [&left.bound, &right.bound])
     }
 
     /// Chooses a light of the subtree below a node by `u` in [0, 1): its id, its probability in that subtree, and `u`
     /// remapped to be uniform again.
     #[inline]
     pub fn sample_below(&self, ctx: &LightCtx, place: u32, u: f32) -> Option<(LightId, f32, f32)> {
-        self.sample_below_by(ctx, place, u, |_, importance| importance)
-    }
-
-    /// [`Self::sample_below`] with importances changed by `adjust(node, importance)`, which keeps positive ones
-    /// positive.
-    #[inline]
-    fn sample_below_by(
-        &self,
-        ctx: &LightCtx,
-        place: u32,
-        u: f32,
-        adjust: impl Fn(usize, f32) -> f32,
-    ) -> Option<(LightId, f32, f32)> {
-        self.descend(place, u, |place, _| self.left_probability_by(ctx, place, &adjust))
+        self.descend(place, u, |place, _| self.left_probability(ctx, place))
     }
 
     /// [`Self::sample`], where the point's `turns` hold what is known of it.
@@ -337,11 +315,41 @@ impl LightTree {
         if self.is_empty() { None } else { self.sample_below(ctx, 0, u) }
     }
 
-    /// [`Self::sample`] with importances changed by `adjust(node, importance)`, which keeps positive ones positive.
-    /// Nodes are numbered as in [`Self::sums`].
+    /// [`Self::sample`] with importances changed by `adjust(node, importance, count)`, which keeps positive ones positive: so
+    /// many of `leaves`, ascending places of leaves, are below the node. Nodes are numbered as in [`Self::sums`].
     #[inline]
-    pub fn sample_by(&self, ctx: &LightCtx, u: f32, adjust: impl Fn(usize, f32) -> f32) -> Option<(LightId, f32, f32)> {
-        if self.is_empty() { None } else { self.sample_below_by(ctx, 0, u, adjust) }
+    pub fn sample_by(
+        &self,
+        ctx: &LightCtx,
+        u: f32,
+        leaves: &[u32],
+        adjust: impl Fn(usize, f32, usize) -> f32,
+    ) -> Option<(LightId, f32, f32)> {
+        if self.is_empty() {
+            return None;
+        }
+        // Those below the node, and which of them are to its right
+        let (mut below, mut right_of, mut last) = (leaves, leaves, None);
+        self.descend(0, u, |place, _| {
+            if let Some((parent, middle)) = last {
+                below = if place == parent + 1 { &below[..middle] } else { right_of };
+            }
+            let right_place = self.nodes[place].index as usize;
+            let middle = below.partition_point(|&leaf| (leaf as usize) < right_place);
+            (right_of, last) = (&below[middle..], Some((place, middle)));
+            let [left, right] = self.children(place);
+            let importances = [
+                adjust(place + 1, left.importance(ctx), middle),
+                adjust(right_place, right.importance(ctx), below.len() - middle),
+            ];
+            first_probability(importances, [&left.bound, &right.bound])
+        })
+    }
+
+    /// The place of the leaf of a light; `None` if it is not in the tree.
+    #[inline]
+    pub fn leaf(&self, light: LightId) -> Option<u32> {
+        self.contains(light).then(|| self.leaves[light as usize])
     }
 
     /// For each node, the sum of `of` over the lights below it.

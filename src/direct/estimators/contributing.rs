@@ -9,7 +9,7 @@
 //!
 //! S_non samples are taken on the non-contributing lights, which a descent of the light tree chooses nearly in proportion
 //! to E_l·√V̂_l, where V̂_l is that of a light without photons: lights of which many photons were expected get few of these
-//! samples. A contributing light that is chosen counts 0. A sample of the light l, chosen with probability p_l, survives
+//! samples, and those beside lights with a single photon more. A contributing light that is chosen counts 0. A sample of the light l, chosen with probability p_l, survives
 //! Russian roulette with probability q_l = min(1, [`SURVIVAL`]·(E_l·√V̂_l/p_l)/Σ E·V̂), by what is expected of it relative to
 //! the contributing lights, and counts 1/(p_l·q_l) times. So every sum has the right expectation whatever the photons
 //! tell; without these samples (S_non = 0) the estimate is biased.
@@ -55,6 +55,8 @@ impl Contributing {
 pub(super) struct Buffers {
     /// Weights of the contributing lights.
     weights: Vec<f32>,
+    /// Those with one photon, by [`LearnedVisibility::find_singles`].
+    singles: Vec<u32>,
 }
 
 /// A point and the lights that are sampled from it.
@@ -93,13 +95,14 @@ impl Buffers {
         };
         let ctx = point.light_ctx();
         let at = At { lights, learned, index, point, ctx, seen: lights.contributing_lights(&ctx) };
+        learned.find_singles(&at.seen, &mut self.singles);
         let expected = match at.seen.lights.len() {
-            0 => return at.draw_unseen(n + noncontributing, f32::INFINITY, records),
+            0 => return at.draw_unseen(n + noncontributing, (f32::INFINITY, &[]), records),
             1..=MAX_WEIGHTED => self.draw_weighted(&at, n, records),
             _ => Some(at.draw_by_photons(n, records)),
         };
         match expected {
-            Some(expected) => n + at.draw_unseen(noncontributing, SURVIVAL / expected, records),
+            Some(expected) => n + at.draw_unseen(noncontributing, (SURVIVAL / expected, &self.singles), records),
             None => light_samples::draw(job, (index, point), &SampleAllocation::fixed(n + noncontributing, 0), records),
         }
     }
@@ -156,15 +159,15 @@ impl At<'_> {
     }
 
     /// Samples of non-contributing lights, of which as many survive as their expected contribution times `scale` says.
-    /// Returns how many.
-    fn draw_unseen(&self, n: u32, scale: f32, records: &mut Vec<Candidate>) -> u32 {
+    /// `singles` are those of the lights with one photon. Returns how many.
+    fn draw_unseen(&self, n: u32, (scale, singles): (f32, &[u32]), records: &mut Vec<Candidate>) -> u32 {
         if self.seen.lights.len() == self.lights.lit.len() {
             return 0;
         }
         let mut drawn = 0;
         for i in 0..n {
             let [u_choice, u_survival, u0, u1] = self.point.stream.split(domain::NONCONTRIBUTING, n, i).draw::<4>();
-            let Some(unseen) = self.learned.sample_unseen(&self.ctx, &self.seen, u_choice) else { continue };
+            let Some(unseen) = self.learned.sample_unseen(&self.ctx, (&self.seen, singles), u_choice) else { continue };
             let SampledLight { light, pmf, .. } = unseen.choice;
             // Contributing lights have their own samples
             if self.seen.place(light).is_some() || !(unseen.importance > 0.0) {
