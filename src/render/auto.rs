@@ -26,8 +26,10 @@
 
 use super::allocation::may_split;
 use super::auto_candidates::{
-    Numbers, different, goes_on_by_one, numbers_of, second_round, usual, with_numbers, without_pilot,
+    Numbers, contributing, different, goes_on_by_one, numbers_of, numbers_of_contributing, second_round, usual,
+    with_numbers, without_pilot,
 };
+use super::auto_contributing::Contributing;
 use super::auto_lights;
 use super::auto_measure::{Chunk, measure};
 use super::auto_pixels::{Place, SEED, Scouted, grid};
@@ -35,7 +37,6 @@ use super::auto_reuse;
 pub use super::auto_round::Trial;
 use super::auto_round::{Candidate, Mean, Round};
 use super::preparation::Preparation;
-use super::visibility_cache::{PHOTON_PATHS, build_visibility_cache};
 use super::{RenderError, RenderSettings, Run, processor_time};
 use crate::film::PixelBounds;
 use crate::integrators::light_paths::{self, LightPilot};
@@ -78,14 +79,6 @@ const SCOUTED: usize = 8;
 const SCOUT_SPP: u32 = 2;
 /// Share of the greatest efficiency, by the model, with which fewer samples will do.
 const NEARLY: f64 = 0.95;
-
-/// Lights from which on photons may tell which of them contribute.
-const MANY_LIGHTS: usize = 16;
-/// Time of a photon path (ns), about, and the share of an image's time that photons may take.
-const PHOTON_TIME: f64 = 2000.0;
-const PHOTON_SHARE: f64 = 0.1;
-/// Fewest photon paths that tell enough.
-const MIN_PHOTONS: f64 = 65_536.0;
 
 /// Numbers of light samples that are compared where light is direct, and of BSDF samples beside them.
 const DIRECT: [u32; 9] = [1, 2, 4, 8, 12, 16, 24, 32, 48];
@@ -286,24 +279,28 @@ impl Pilot {
         let has_later = job.settings().integrator.depth() > 1;
         let fit: &[Numbers] = if has_later { &FIT_PATH } else { &FIT_DIRECT };
         let few = fit[0];
-        self.scout(job, &Candidate::named(with_numbers(&job.settings().integrator, few)), how)?;
+        let nanoseconds = self.scout(job, &Candidate::named(with_numbers(&job.settings().integrator, few)), how)?;
         let lights = self.choose_lights(job, few, how)?;
+        let photons = Contributing::new(job, nanoseconds);
         let base = job.settings().integrator;
         let base = &base;
         // First round: the model
         let is_open = base.bsdf_fraction.is_none() && base.samples.is_none();
         let fitted = fit.iter().filter(|n| n[2] == few[2] || is_open && goes_on_by_one(base, n));
-        let candidates = different(fitted.map(|&n| with_numbers(base, n)));
+        let mut candidates = different(fitted.map(|&n| with_numbers(base, n)));
         // Where the share of BSDF samples is given, one stands for all of them
         let numbers = |settings: &IntegratorSettings| {
             let all = [0, 1].map(|vertex| settings.sample_counts_at(vertex).samples.max(2) - 1);
             let of_one = [all[0], if has_later { all[1] } else { 1 }, 1];
             (if is_open { numbers_of(settings) } else { of_one }).map(f64::from)
         };
+        let fitted: Vec<_> = candidates.iter().map(|c| numbers(&c.settings)).collect();
+        candidates.extend(photons.iter().flat_map(Contributing::fit));
         let first = self.round(job, &candidates, FIRST_ROUND, how)?;
         let is_net = has_later && job.settings().sampling.sampler != SamplerKind::Independent;
-        let fitted: Vec<_> = candidates.iter().map(|c| numbers(&c.settings)).collect();
-        let models = first.models(&fitted, if is_net { OF_NETS } else { INDEPENDENT });
+        let powers = if is_net { OF_NETS } else { INDEPENDENT };
+        let models = first.models(&fitted, powers);
+        let of_contributing = photons.as_ref().map(|_| Contributing::models(&first, fitted.len(), &candidates, powers));
         let model = models[0];
         // A power that was fitted is known as far as twice the most that was measured
         let is_known = |n: &u32| model.powers[0] <= 1.0 || *n <= 2 * fit[1][0];
@@ -318,7 +315,9 @@ impl Pilot {
 
         // Second round: the best by the model, and what else there is
         let mut candidates = second_round(base, best);
-        candidates.extend(with_photons(job, trials[0].nanoseconds));
+        if let (Some(photons), Some(models)) = (&photons, &of_contributing) {
+            candidates.extend(photons.best(&models[0], NEARLY));
+        }
         if !job.world.scene.media.is_empty() {
             candidates.retain(|c| through_media::obstacle_of(&c.settings).is_none());
         }
@@ -328,6 +327,10 @@ impl Pilot {
         }
         let second = self.round(job, &candidates, SECOND_ROUND, how)?;
         let predicted = |candidate: &Candidate| {
+            if candidate.settings.estimator == EstimatorKind::Contributing {
+                let models = of_contributing.as_ref()?;
+                return Some(Round::predicted(models, numbers_of_contributing(&candidate.settings).map(f64::from)));
+            }
             let IntegratorSettings { samples, later_samples, bsdf_fraction, .. } = candidate.settings;
             let with_its = IntegratorSettings { samples, later_samples, bsdf_fraction, ..without_pilot(base) };
             (candidate.settings == with_its).then(|| Round::predicted(&models, numbers(&with_its)))
@@ -336,7 +339,11 @@ impl Pilot {
         let chosen = second.choose(&candidates, &predicted);
         let relative = second.relative;
         let second = second.trials(&candidates);
-        let (sharing, mut settings) = self.share(job, &candidates[chosen].settings, &model, how)?;
+        let of_chosen = match &of_contributing {
+            Some(models) if candidates[chosen].settings.estimator == EstimatorKind::Contributing => &models[0],
+            _ => &model,
+        };
+        let (sharing, mut settings) = self.share(job, &candidates[chosen].settings, of_chosen, how)?;
         let &Trial { variance, nanoseconds, .. } =
             if settings.path_reuse.is_some() { &sharing[1] } else { &second[chosen] };
         settings.light_paths = self.choose_light_paths(job, &settings, &Measured { variance, nanoseconds, relative });
@@ -393,17 +400,17 @@ impl Pilot {
             return Ok((Vec::new(), *chosen));
         }
         // Twice the light samples at first and at later vertices, where they are open and there is one BSDF sample
-        let is_mis = chosen.estimator == EstimatorKind::Mis;
-        let numbers = numbers_of(chosen);
-        let [first, later, bsdf] = numbers;
-        let more = [[2 * first, later, bsdf], [first, 2 * later, bsdf]];
+        let is_contributing = chosen.estimator == EstimatorKind::Contributing;
+        let numbers = if is_contributing { numbers_of_contributing(chosen) } else { numbers_of(chosen) };
+        let [first, later, rest] = numbers;
+        let more = [[2 * first, later, rest], [first, 2 * later, rest]];
         let of = |n: Numbers| {
-            let IntegratorSettings { samples, later_samples, bsdf_fraction, .. } = with_numbers(&base, n);
+            let of_base = if is_contributing { contributing(&base, n) } else { with_numbers(&base, n) };
+            let IntegratorSettings { samples, later_samples, bsdf_fraction, .. } = of_base;
             IntegratorSettings { samples, later_samples, bsdf_fraction, ..*chosen }
         };
         let settings = more.map(of);
-        let is_open = is_mis
-            && bsdf == 1
+        let is_open = (is_contributing || chosen.estimator == EstimatorKind::Mis && rest == 1)
             && settings.iter().all(|s| [s.samples, s.later_samples] != [chosen.samples, chosen.later_samples]);
         let candidates = auto_reuse::candidates(chosen, if is_open { &settings } else { &[] });
         let round = self.round(job, &candidates, SHARING, how)?;
@@ -443,8 +450,9 @@ impl Pilot {
         LIGHT_PATHS.into_iter().min_by(|a, b| error(*a).total_cmp(&error(*b)))
     }
 
-    /// Finds by a few samples of a candidate where the noise is, and draws the pixels of all rounds.
-    fn scout(&mut self, job: &RenderJob, candidate: &Candidate, how: &Preparation<'_>) -> Result<(), RenderError> {
+    /// Finds by a few samples of a candidate where the noise is, and draws the pixels of all rounds. Returns the time of a camera
+    /// sample (ns).
+    fn scout(&mut self, job: &RenderJob, candidate: &Candidate, how: &Preparation<'_>) -> Result<f64, RenderError> {
         let bounds = job.world.scene.film.bounds;
         let (pixels, columns) = grid(&bounds, SCOUTED * self.count);
         let places: Vec<Place> = pixels.iter().map(|&pixel| Place { pixel, weight: 1.0 }).collect();
@@ -461,7 +469,7 @@ impl Pilot {
             scouted.draw_blocks(&bounds, 3 * count, SHARING as u32),
             if self.has_lights { drawn(LIGHTS) } else { Vec::new() },
         ];
-        Ok(())
+        Ok(round.measured[0].0)
     }
 
     /// Renders some pixels on each thread, so that what is measured first is not what finds all caches cold.
@@ -515,40 +523,4 @@ impl Pilot {
         let relative = measured.iter().map(|chunk| chunk.relative).sum::<f64>() / places.len() as f64;
         Ok(Round { measured: (0..candidates.len()).map(of).collect(), spp, mean, relative })
     }
-}
-
-/// Candidates that know by photons which lights contribute at a place, if there are many lights and the image takes
-/// so long that photons enough take little of its time.
-fn with_photons(job: &mut RenderJob, nanoseconds: f64) -> Vec<Candidate> {
-    let Settings { integrator: mut base, sampling } = *job.settings();
-    let samples = job.world.scene.film.bounds.area() as f64 * f64::from(sampling.pilot_spp());
-    let affordable = samples * nanoseconds * PHOTON_SHARE / PHOTON_TIME;
-    let given = base.photons.visibility_photons;
-    if job.lights.find_glows()
-        || job.lights.lit.len() < MANY_LIGHTS
-        || affordable < given.map_or(MIN_PHOTONS, f64::from)
-    {
-        return Vec::new();
-    }
-    if affordable < PHOTON_PATHS as f64 {
-        base.photons.visibility_photons = given.or(Some(affordable as u32));
-    }
-    let start = processor_time::of_process();
-    job.change(|s| s.integrator.photons.visibility_photons = base.photons.visibility_photons);
-    let cache = build_visibility_cache(job);
-    job.change(|s| s.integrator.photons.visibility_photons = given);
-    let preparation = (processor_time::of_process() - start).as_secs_f64() * 1e9 / samples;
-    job.lights.set_visibility_cache(cache.map(|(cache, _)| cache));
-    let contributing = |n: u32| {
-        let later = (base.depth() > 1).then_some((n / 2).max(1));
-        let settings = IntegratorSettings {
-            estimator: EstimatorKind::Contributing,
-            samples: base.samples.or(Some(n)),
-            later_samples: base.later_samples.or(later),
-            ..base
-        };
-        Candidate { preparation, ..Candidate::named(settings) }
-    };
-    let numbers: &[u32] = if base.samples.is_some() { &[4] } else { &[2, 4, 8] };
-    numbers.iter().map(|&n| contributing(n)).collect()
 }

@@ -1,7 +1,7 @@
 //! What takes part in the rounds of the pilot of `--estimator auto`: numbers of samples as settings, and the candidates among which it chooses.
 
 use super::auto_round::Candidate;
-use crate::settings::{EstimatorKind, IntegratorSettings, Proposals, bsdf_samples};
+use crate::settings::{ContributingSettings, EstimatorKind, IntegratorSettings, Proposals, bsdf_samples};
 use lumiris_numbers::estimators::efficiency::KINDS;
 
 /// Numbers of samples, relative to usual ones, from which on fewer are tried too, and not more.
@@ -67,6 +67,26 @@ pub(super) fn numbers_of(settings: &IntegratorSettings) -> Numbers {
     };
     let ([light, bsdf], [later, _]) = (at(0), at(1));
     [light, if settings.depth() > 1 { later } else { 1 }, bsdf]
+}
+
+/// `contributing` with these numbers of samples, where they are open: on contributing lights, at first and at later vertices, and
+/// on all other lights.
+pub(super) fn contributing(settings: &IntegratorSettings, [first, later, others]: Numbers) -> IntegratorSettings {
+    let given = settings.contributing.noncontributing_samples;
+    IntegratorSettings {
+        estimator: EstimatorKind::Contributing,
+        samples: settings.samples.or(Some(first)),
+        later_samples: settings.later_samples.or((settings.depth() > 1).then_some(later)),
+        contributing: ContributingSettings { noncontributing_samples: given.or(Some(others)) },
+        ..*settings
+    }
+}
+
+/// The numbers of samples that settings of `contributing` have.
+pub(super) fn numbers_of_contributing(settings: &IntegratorSettings) -> Numbers {
+    let [first, later] = [0, 1].map(|vertex| settings.sample_counts_at(vertex).samples);
+    let later = if settings.depth() > 1 { later } else { 1 };
+    [first, later, settings.contributing.noncontributing_samples()]
 }
 
 /// `ris` with its default numbers, where they are open.

@@ -54,6 +54,9 @@ impl Candidate {
         if settings.estimator == EstimatorKind::Ris {
             name += &format!(" of {}", settings.sample_counts().proposals);
         }
+        if settings.estimator == EstimatorKind::Contributing {
+            name += &format!(" and {} on others", settings.contributing.noncontributing_samples());
+        }
         if settings.estimator == EstimatorKind::Mis {
             name += &format!(", BSDF fraction {}", settings.bsdf_fraction());
         }

@@ -177,7 +177,7 @@ impl IntegratorSettings {
 
     /// True if non-contributing lights are left out, which is biased.
     pub fn leaves_lights_out(&self) -> bool {
-        self.estimator == EstimatorKind::Contributing && self.contributing.noncontributing_samples == 0
+        self.estimator == EstimatorKind::Contributing && self.contributing.noncontributing_samples() == 0
     }
 
     /// Default number of samples per estimate. What is fixed in the cost of a shading point justifies four: with
@@ -378,15 +378,17 @@ pub enum CorrelatedForm {
 }
 
 /// Direct light with separate samples on contributing and non-contributing lights [Keller and Wald 2000, §3].
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct ContributingSettings {
-    /// Samples on non-contributing lights (S_non), in addition to those of an estimate (S_con). 0 is biased.
-    pub noncontributing_samples: u32,
+    /// Samples on non-contributing lights (S_non), in addition to those of an estimate (S_con), if they are not the
+    /// default. 0 is biased.
+    pub noncontributing_samples: Option<u32>,
 }
 
-impl Default for ContributingSettings {
-    fn default() -> Self {
-        ContributingSettings { noncontributing_samples: 2 }
+impl ContributingSettings {
+    /// Samples on non-contributing lights.
+    pub fn noncontributing_samples(&self) -> u32 {
+        self.noncontributing_samples.unwrap_or(2)
     }
 }
 

@@ -121,7 +121,7 @@ fn contributing(samples: u32, noncontributing: u32) -> impl Fn(&mut IntegratorSe
     move |s| {
         s.estimator = EstimatorKind::Contributing;
         s.samples = Some(samples);
-        s.contributing.noncontributing_samples = noncontributing;
+        s.contributing.noncontributing_samples = Some(noncontributing);
     }
 }
 

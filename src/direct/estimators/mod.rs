@@ -26,8 +26,8 @@ use super::shadow_segments::Segments;
 use super::t1::{BsdfBuffers, T1};
 use crate::scene::RenderJob;
 use crate::settings::{
-    ContributingSettings, CorrelatedForm, CorrelatedSettings, EstimatorKind, IntegratorSettings, OptimalForm,
-    RisSettings, SampleCounts, Target,
+    CorrelatedForm, CorrelatedSettings, EstimatorKind, IntegratorSettings, OptimalForm, RisSettings, SampleCounts,
+    Target,
 };
 use contributing::Contributing;
 use correlated::Correlated;
@@ -109,7 +109,7 @@ impl Estimator {
                 Estimator::Correlated(Correlated { samples, form, technique })
             }
             EstimatorKind::Contributing => {
-                let ContributingSettings { noncontributing_samples } = settings.contributing;
+                let noncontributing_samples = settings.contributing.noncontributing_samples();
                 Estimator::Contributing(Contributing { samples, noncontributing_samples })
             }
         }

@@ -342,7 +342,7 @@ mod tests {
     #[test]
     fn settings_of_light_by_photons_are_read() {
         let s = settings("Integrator \"path\" \"string estimator\" \"contributing\" \"integer samples\" 8").unwrap();
-        assert_eq!((s.estimator, s.contributing.noncontributing_samples), (EstimatorKind::Contributing, 2));
+        assert_eq!((s.estimator, s.contributing.noncontributing_samples()), (EstimatorKind::Contributing, 2));
         assert!(
             s.uses_visibility_cache()
                 && !s.leaves_lights_out()

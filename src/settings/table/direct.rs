@@ -99,9 +99,11 @@ pub(super) const DIRECT: Group = Group {
             kind: integer(0, MAX_SAMPLES),
             help: "Samples of contributing on non-contributing lights, in addition to --samples on the contributing \
                    ones; 0 leaves these lights out, which is biased",
+            default: "2; auto measures what is best",
             applies: Applies::Estimators(&[Contributing]),
-            get: |s| Some(Value::Integer(s.integrator.contributing.noncontributing_samples.into())),
-            set: |s, v| v.count().map(|n| s.integrator.contributing.noncontributing_samples = n),
+            get: |s| s.integrator.contributing.noncontributing_samples.map(|n| Value::Integer(n.into())),
+            resolved: Some(|s| Some(Value::Integer(s.integrator.contributing.noncontributing_samples().into()))),
+            set: |s, v| v.count().map(|n| s.integrator.contributing.noncontributing_samples = Some(n)),
             ..Setting::BASE
         },
     ],

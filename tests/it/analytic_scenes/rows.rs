@@ -297,7 +297,7 @@ pub(super) fn job(path: &Path, c: &Configuration, edge: u32) -> RenderJob {
     settings.ris.points = c.points;
     settings.ris.target = c.target;
     settings.light_sampler = c.light_sampler;
-    settings.contributing.noncontributing_samples = c.noncontributing_samples;
+    settings.contributing.noncontributing_samples = Some(c.noncontributing_samples);
     if let Some(cached) = c.cached {
         settings.kind = IntegratorKind::IrradianceCache;
         settings.cache.cached = cached;

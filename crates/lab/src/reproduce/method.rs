@@ -174,7 +174,7 @@ impl Method {
         i.ris.proposals = if self.per_pixel { Proposals::Optimal } else { Proposals::Fixed(self.proposals) };
         i.ris.strata = self.strata;
         i.ris.target = self.target;
-        i.contributing.noncontributing_samples = self.noncontributing_samples;
+        i.contributing.noncontributing_samples = Some(self.noncontributing_samples);
         (settings.sampling.sampler, i.ris.points) = match self.points {
             Points::Independent => (SamplerKind::Independent, ProposalPoints::Independent),
             Points::PerEstimate => (SamplerKind::Stratified, ProposalPoints::Stratified),
