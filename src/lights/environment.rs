@@ -1,7 +1,7 @@
 //! Environment maps: radiance from all directions by an image, importance sampled.
 //!
-//! The image covers the unit square, which [`EnvironmentMapping`] maps to directions. The density is constant per texel
-//! and proportional to the mean of the interpolated luminance over the texel (times the solid angle of its row for
+//! The image covers the unit square, which [`EnvironmentMapping`] maps to directions. The density is constant per texel, or per
+//! block of nearly equal texels ([`TexelDistribution`]), and proportional to the mean of the interpolated luminance over the texel (times the solid angle of its row for
 //! latitude-longitude images): for bilinear lookups that is the image smoothed by [1/8, 6/8, 1/8] in both axes, which
 //! is positive wherever a lookup is. Per steradian it is pdf(u, v)/4π for equal-area images, and pdf(u, v)/(2π² sin θ)
 //! for latitude-longitude images.
@@ -12,7 +12,7 @@ use lumiris_numbers::math::sphere_map::{
     equal_area_sphere_to_square, equal_area_square_to_sphere, lat_long_to_sphere, pdf_equal_area_square_to_sphere,
     pdf_lat_long_to_sphere, sphere_to_lat_long, wrap_equal_area_texel,
 };
-use lumiris_numbers::math::{Affine3A, Mat3, PiecewiseConstant2D, Rgb, Vec2, Vec3};
+use lumiris_numbers::math::{Affine3A, Mat3, Rgb, TexelDistribution, Vec2, Vec3};
 use std::f64::consts::PI;
 
 /// Directions that are looked up together.
@@ -56,7 +56,7 @@ pub struct EnvironmentMap {
     filter: EnvironmentFilter,
     /// Red, green, blue and the density per unit area of the square, with a border that continues the image.
     texels: Vec<[f32; 4]>,
-    distribution: PiecewiseConstant2D,
+    distribution: TexelDistribution,
     luminance_integral: f32,
 }
 
@@ -126,7 +126,7 @@ impl EnvironmentMap {
             return Err(format!("an equal-area environment map must be square, but it is {width}×{height}"));
         }
         let texels = with_border(&texels, [width, height], mapping);
-        let distribution = PiecewiseConstant2D::new(&[], 1);
+        let distribution = TexelDistribution::new(&[], 1);
         let mut map = EnvironmentMap { width, height, mapping, filter, texels, distribution, luminance_integral: 0.0 };
         let weights = map.texel_weights();
         map.set_distribution(&weights);
@@ -136,11 +136,11 @@ impl EnvironmentMap {
 
     /// Samples in proportion to `weights`.
     fn set_distribution(&mut self, weights: &[f32]) {
-        self.distribution = PiecewiseConstant2D::new(weights, self.width);
+        self.distribution = TexelDistribution::new(weights, self.width);
         for y in 0..self.height {
             for x in 0..self.width {
                 let index = self.texel_index(x as isize, y as isize);
-                self.texels[index][3] = self.distribution.pdf_of_cell([x, y]);
+                self.texels[index][3] = self.distribution.pdf_of_texel([x, y]);
             }
         }
     }
@@ -182,9 +182,8 @@ impl EnvironmentMap {
     /// Samples a direction; `None` if the map is black.
     #[inline]
     pub fn sample(&self, u: [f32; 2]) -> Option<EnvironmentSample> {
-        let (bins, u) = self.distribution.bins(u);
-        let texel = &self.texels[self.texel_index(bins[0].index as isize, bins[1].index as isize)];
-        let p = self.distribution.place(bins, u)?;
+        let ([x, y], p) = self.distribution.sample(u)?;
+        let texel = &self.texels[self.texel_index(x as isize, y as isize)];
         let (w, density) = self.to_sphere(p);
         let pdf = texel[3] * density;
         (pdf > 0.0 && pdf.is_finite()).then(|| EnvironmentSample { w: w.normalize(), le: self.lookup(p), pdf })

@@ -9,14 +9,14 @@ use super::light::LightLanes;
 use fearless_simd::{Level, Simd, dispatch, f32x4, f32x8, prelude::*};
 use lumiris_numbers::math::distribution::{Running, STEP, clamped};
 use lumiris_numbers::math::sphere_map::pdf_equal_area_square_to_sphere;
-use lumiris_numbers::math::{Mat3, PiecewiseConstant2D};
+use lumiris_numbers::math::{Mat3, ONE_MINUS_EPSILON, TexelDistribution};
 use std::f32::consts::{PI, TAU};
 
 /// An image of the radiance from all directions, and how it is sampled.
 #[derive(Clone, Copy, Debug)]
 pub struct Environment<'a> {
     /// Density over the unit square.
-    pub distribution: &'a PiecewiseConstant2D,
+    pub distribution: &'a TexelDistribution,
     /// Red, green, blue and the density per unit area of the square, row by row, with a border of one texel that
     /// continues the image around the sphere.
     pub texels: &'a [[f32; 4]],
@@ -70,11 +70,40 @@ impl Places {
         self.width[i] = bin.end - bin.begin;
     }
 
-    /// The place in units of bins, and the index of the bin.
+    /// How far a number is in its bin.
+    #[inline(always)]
+    fn fraction(&self, i: usize) -> f32 {
+        (self.above[i] / self.width[i]).min(ONE_MINUS_EPSILON)
+    }
+}
+
+/// Where the numbers of a chunk fall among the texels of one dimension.
+struct Along {
+    texel: [i32; CHUNK],
+    /// In units of texels.
+    place: Column,
+}
+
+impl Along {
+    fn new() -> Self {
+        Along { texel: [0; CHUNK], place: [0.0; CHUNK] }
+    }
+
+    /// The texels at the places in blocks of one density, of so many texels.
+    #[inline(always)]
+    fn set<S: Simd>(&mut self, simd: S, i: usize, blocks: &Places, edge: usize) {
+        let block = I::from_slice(simd, &blocks.bin[i..i + LANES]);
+        let fraction = (load(simd, &blocks.above, i) / load(simd, &blocks.width, i)).min(ONE_MINUS_EPSILON);
+        let within = fraction * edge as f32;
+        let texel = within.floor().min(edge as f32 - 1.0);
+        let first = block * edge as i32;
+        (first + texel.to_int::<I<S>>()).store_slice(&mut self.texel[i..i + LANES]);
+        store(first.to_float::<F<S>>() + within, &mut self.place, i);
+    }
+
     #[inline(always)]
     fn lanes<S: Simd>(&self, simd: S, i: usize) -> (F<S>, I<S>) {
-        let bin = I::from_slice(simd, &self.bin[i..i + LANES]);
-        (bin.to_float::<F<S>>() + load(simd, &self.above, i) / load(simd, &self.width, i), bin)
+        (load(simd, &self.place, i), I::from_slice(simd, &self.texel[i..i + LANES]))
     }
 }
 
@@ -158,7 +187,7 @@ impl Environment<'_> {
 
     /// Inverts the running integrals.
     #[inline(always)]
-    fn places<S: Simd>(&self, simd: S, start: usize, count: usize, u: [&[f32]; 2]) -> [Places; 2] {
+    fn places<S: Simd>(&self, simd: S, start: usize, count: usize, u: [&[f32]; 2]) -> [Along; 2] {
         let [mut x, mut y] = [Places::new(), Places::new()];
         let (u0, u1) = (&u[0][start..start + count], &u[1][start..start + count]);
         let rows = self.distribution.rows();
@@ -168,7 +197,33 @@ impl Environment<'_> {
         for i in 0..count {
             x.set(i, simd, &self.distribution.row(y.bin[i] as usize), u0[i]);
         }
-        [x, y]
+        let edge = self.distribution.edge();
+        let mut along = [Along::new(), Along::new()];
+        for i in (0..count).step_by(LANES) {
+            let i = begin(i, count);
+            along[0].set(simd, i, &x, edge);
+            along[1].set(simd, i, &y, edge);
+        }
+        if self.distribution.has_varied() {
+            self.tell_apart(&x, &y, count, &mut along);
+        }
+        along
+    }
+
+    /// The texels of blocks in which they differ.
+    #[inline(always)]
+    fn tell_apart(&self, x: &Places, y: &Places, count: usize, along: &mut [Along; 2]) {
+        let edge = self.distribution.edge() as i32;
+        for i in 0..count {
+            let block = [x.bin[i], y.bin[i]];
+            let Some(within) = self.distribution.within([block[0] as usize, block[1] as usize]) else { continue };
+            let place = within.choose([x.fraction(i), y.fraction(i)]);
+            for k in 0..2 {
+                let texel = block[k] * edge + place.texel[k] as i32;
+                along[k].texel[i] = texel;
+                along[k].place[i] = texel as f32 + place.within[k];
+            }
+        }
     }
 
     /// Directions, and where their texels are.
@@ -176,7 +231,7 @@ impl Environment<'_> {
     fn directions<S: Simd>(
         &self,
         simd: S,
-        places: &[Places; 2],
+        places: &[Along; 2],
         i: usize,
         lookups: &mut Lookups,
         (wi, at): (&mut [&mut [f32]; 3], usize),

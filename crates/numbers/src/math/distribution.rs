@@ -31,7 +31,7 @@ pub struct Sample2D {
 
 /// Index of the bin of `x` among `n`.
 #[inline]
-fn bin_of(x: f32, n: usize) -> usize {
+pub(super) fn bin_of(x: f32, n: usize) -> usize {
     ((x * n as f32) as usize).min(n - 1)
 }
 
@@ -82,6 +82,14 @@ pub struct Bin {
     pub end: f32,
 }
 
+impl Bin {
+    /// How far the number is from the beginning to the end, in [0, 1).
+    #[inline(always)]
+    pub fn fraction(&self, u: f32) -> f32 {
+        ((u - self.begin) / (self.end - self.begin)).min(ONE_MINUS_EPSILON)
+    }
+}
+
 /// A running integral and its guide.
 #[derive(Clone, Copy, Debug)]
 pub struct Running<'a> {
@@ -120,11 +128,10 @@ pub fn clamped(u: f32) -> f32 {
     u.clamp(0.0, ONE_MINUS_EPSILON)
 }
 
-/// The point of `u` in its bin, one of `n`.
+/// The point of [0, 1) at a `fraction` of bin `i`, one of `n`.
 #[inline]
-fn place_in_bin(bin: Bin, u: f32, n: usize) -> f32 {
-    let i = bin.index;
-    let mut x = (i as f32 + (u - bin.begin) / (bin.end - bin.begin)) / n as f32;
+pub(super) fn place_in_bin(i: usize, fraction: f32, n: usize) -> f32 {
+    let mut x = (i as f32 + fraction) / n as f32;
     // Rounding must not carry the point into the next bin, whose value may be 0.
     while bin_of(x, n) > i || x >= 1.0 {
         x = x.next_down();
@@ -144,7 +151,7 @@ fn apply_cdf(cdf: &[f32], x: f32, n: usize) -> f32 {
 }
 
 /// Values that can be a density: negative and non-finite ones become 0.
-fn cleaned(values: &[f32]) -> Vec<f32> {
+pub(super) fn cleaned(values: &[f32]) -> Vec<f32> {
     values.iter().map(|&v| if v.is_finite() { v.max(0.0) } else { 0.0 }).collect()
 }
 
@@ -193,7 +200,7 @@ impl PiecewiseConstant1D {
         }
         let u = clamped(u);
         let bin = self.running().bin(u);
-        let (x, index) = (place_in_bin(bin, u, self.values.len()), bin.index);
+        let (x, index) = (place_in_bin(bin.index, bin.fraction(u), self.values.len()), bin.index);
         Some(Sample1D { x, pdf: self.values[index] / self.integral, index })
     }
 
@@ -291,19 +298,16 @@ impl PiecewiseConstant2D {
         ([self.row(row.index).bin(u[0]), row], u)
     }
 
-    /// The point of `u` in the cell that [`bins`](Self::bins) has found; `None` if the function is 0.
-    #[inline]
-    pub fn place(&self, bins: [Bin; 2], u: [f32; 2]) -> Option<Vec2> {
-        (self.marginal.integral > 0.0)
-            .then(|| Vec2::new(place_in_bin(bins[0], u[0], self.width), place_in_bin(bins[1], u[1], self.height)))
-    }
-
     /// The point of marginal cumulative probability `u[1]` in y and conditional `u[0]` in x; `None` if the function is
     /// 0.
     #[inline]
     pub fn sample(&self, u: [f32; 2]) -> Option<Sample2D> {
+        if self.marginal.integral <= 0.0 {
+            return None;
+        }
         let (bins, u) = self.bins(u);
-        let p = self.place(bins, u)?;
+        let at = |k: usize, n: usize| place_in_bin(bins[k].index, bins[k].fraction(u[k]), n);
+        let p = Vec2::new(at(0, self.width), at(1, self.height));
         let pdf = self.pdf_of_cell(bins.map(|b| b.index));
         (pdf > 0.0 && pdf.is_finite()).then_some(Sample2D { p, pdf })
     }

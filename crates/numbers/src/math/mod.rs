@@ -5,7 +5,7 @@
 //! `to_from`; colour is linear Rec.709; angles are radians; f32 for light.
 //!
 //! Reading order: [`rgb`], [`frame`], [`transform`], [`ray`], [`bounds`], [`warp`], [`sphere_map`], [`octahedral`],
-//! [`cumulative`], [`distribution`], [`bilinear`], [`alias`], [`hash`], [`noise`],
+//! [`cumulative`], [`distribution`], [`texel_distribution`], [`bilinear`], [`alias`], [`hash`], [`noise`],
 //! [`number`], [`light_bound`].
 
 pub mod alias;
@@ -22,6 +22,7 @@ pub mod octahedral;
 pub mod ray;
 pub mod rgb;
 pub mod sphere_map;
+pub mod texel_distribution;
 pub mod transform;
 pub mod warp;
 
@@ -33,6 +34,7 @@ pub use frame::Frame;
 pub use glam::{Affine3A, DAffine3, DVec2, DVec3, Mat3, Mat3A, Mat4, Quat, Vec2, Vec3, Vec3A, Vec4};
 pub use ray::Ray;
 pub use rgb::{Rgb, luminance};
+pub use texel_distribution::TexelDistribution;
 
 /// Largest f32 below one; random numbers are clamped to it so that `u < 1` holds after arithmetic.
 pub const ONE_MINUS_EPSILON: f32 = 1.0 - f32::EPSILON / 2.0;
