@@ -88,8 +88,7 @@ const DIRECT_BSDF: [u32; 5] = [1, 2, 4, 8, 16];
 const FIRST: [u32; 6] = [1, 2, 4, 8, 16, 32];
 const LATER: [u32; 5] = [1, 2, 4, 8, 16];
 const BSDF: [u32; 4] = [1, 2, 4, 8];
-/// The same where pixels share paths.
-const FIRST_SHARED: [u32; 8] = [1, 2, 3, 4, 6, 8, 16, 32];
+/// Later ones where pixels share paths.
 const LATER_SHARED: [u32; 7] = [1, 2, 3, 4, 6, 8, 16];
 /// Light samples at first vertices, without sharing, from which on there are not more with it.
 const MANY_LIGHT_SAMPLES: u32 = 4;
@@ -425,7 +424,7 @@ impl Pilot {
                 |numbers: &[u32], most: u32| numbers.iter().copied().filter(|n| *n <= most).collect::<Vec<_>>();
             // Many samples at first vertices were chosen for what is not shared: twice as many tell the model, and are too many
             let most = if first > MANY_LIGHT_SAMPLES { first } else { 2 * first };
-            let choices = [within(&FIRST_SHARED, most), within(&LATER_SHARED, 2 * later)];
+            let choices = [within(&FIRST, most), within(&LATER_SHARED, 2 * later)];
             auto_reuse::best_numbers(&round, numbers, (model, &of_pilot), choices.each_ref().map(Vec::as_slice))
         } else {
             auto_reuse::best(&round).map(|edge| (edge, numbers))

@@ -104,8 +104,9 @@ fn other_numbers(base: &IntegratorSettings, best: Numbers) -> Numbers {
     let usual = numbers_of(&usual(base));
     let totals = |[light, later, bsdf]: Numbers| [light + bsdf, later + 1];
     let is_far = totals(best).into_iter().zip(totals(usual)).any(|(best, usual)| best >= MANY * usual);
+    // Powers of two, of which points of nets are best spread
     let other = |k: usize| {
-        if is_far { (f64::from(usual[k]) * f64::from(best[k])).sqrt().round() as u32 } else { 2 * best[k] }
+        if is_far { 1 << (f64::from(usual[k]) * f64::from(best[k])).sqrt().log2().round() as u32 } else { 2 * best[k] }
     };
     [other(0), if base.depth() > 1 { other(1) } else { best[1] }, best[2]]
 }

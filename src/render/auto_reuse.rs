@@ -24,7 +24,7 @@ const MIN_GAIN: f64 = 1.03;
 /// Share of the greatest efficiency with which smaller blocks will do.
 const NEARLY: f64 = 0.98;
 /// The same with which fewer light samples will do: the noise of few pixels, which the pilot does not see, is rarely theirs.
-const NUMBERS_NEARLY: f64 = 0.88;
+const NUMBERS_NEARLY: f64 = 0.95;
 /// Part of the time that more light samples at later vertices may take, whatever the pilot says: few of its pixels have most of
 /// what these lower.
 const LITTLE: f64 = 0.06;
