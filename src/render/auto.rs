@@ -12,6 +12,9 @@
 //! the pilot's noise, which the jackknife tells: all candidates have the same pixels, so that the difference of two of
 //! them is known better than either.
 //!
+//! Where there are many lights and time for photons, `contributing` has a model of its own from the first round
+//! ([`super::auto_contributing`]), and its best numbers take part in the second.
+//!
 //! Where lights at infinity are beside others, a round before these finds how many light samples are for them
 //! ([`super::auto_lights`]).
 //!
@@ -77,8 +80,9 @@ const LIGHT_TRIALS: f64 = 3.0;
 /// Pixels that are looked at before the rounds, for each pixel of one, and samples of each and seed.
 const SCOUTED: usize = 8;
 const SCOUT_SPP: u32 = 2;
-/// Share of the greatest efficiency, by the model, with which fewer samples will do.
-const NEARLY: f64 = 0.95;
+/// Share of the greatest efficiency, by the model, with which fewer samples will do; and fewer proposals.
+const NEARLY: f64 = 0.99;
+const RATIO_NEARLY: f64 = 0.95;
 
 /// Numbers of light samples that are compared where light is direct, and of BSDF samples beside them.
 const DIRECT: [u32; 9] = [1, 2, 4, 8, 12, 16, 24, 32, 48];
@@ -196,7 +200,7 @@ pub(super) fn proposals(job: &RenderJob, how: &Preparation<'_>) -> Result<Option
     let round = pilot.round(job, &candidates, FIRST_ROUND, how)?;
     let ratios = FIT_RATIOS.map(|ratio| [f64::from(ratio), 1.0, 1.0]);
     let model = round.models(&ratios, INDEPENDENT).remove(0);
-    let [ratio, ..] = model.best([&RATIOS, &[1], &[1]], NEARLY, |_| true);
+    let [ratio, ..] = model.best([&RATIOS, &[1], &[1]], RATIO_NEARLY, |_| true);
     let of_sample = |nanoseconds: f64| (nanoseconds / f64::from(samples) * 10.0).round().max(1.0) / 10.0;
     let times = StageTimes { t1: of_sample(model.cost[1]), t2: of_sample(model.cost[0]) };
     Ok(Some((samples * ratio, times)))

@@ -173,6 +173,33 @@ mod tests {
     }
 
     #[test]
+    fn contributing_has_the_numbers_asked_for_or_given() {
+        let path = IntegratorSettings { kind: IntegratorKind::Path, ..IntegratorSettings::default() };
+        let direct = path.of_kind(IntegratorKind::Direct);
+        assert_eq!(numbers_of_contributing(&contributing(&path, [4, 2, 6])), [4, 2, 6]);
+        assert_eq!(numbers_of_contributing(&contributing(&direct, [4, 2, 6])), [4, 1, 6]);
+        let given = IntegratorSettings {
+            later_samples: Some(3),
+            contributing: ContributingSettings { noncontributing_samples: Some(5) },
+            ..path
+        };
+        assert_eq!(numbers_of_contributing(&contributing(&given, [4, 2, 6])), [4, 3, 5]);
+        let samples = IntegratorSettings { samples: Some(7), ..path };
+        assert_eq!(numbers_of_contributing(&contributing(&samples, [4, 2, 6])), [7, 2, 6]);
+    }
+
+    #[test]
+    fn other_numbers_are_powers_of_two_halfway_to_many() {
+        let direct = IntegratorSettings::default().of_kind(IntegratorKind::Direct);
+        let usual = numbers_of(&usual(&direct))[0];
+        for many in [24, 32, 48] {
+            let [light, ..] = other_numbers(&direct, [many, 1, 1]);
+            assert!(light.is_power_of_two() && light > usual && light < many, "{usual} {light} {many}");
+        }
+        assert_eq!(other_numbers(&direct, [8, 1, 4]), [16, 1, 4]);
+    }
+
+    #[test]
     fn what_the_user_has_set_stays() {
         let base = IntegratorSettings { samples: Some(5), bsdf_fraction: Some(0.3), ..IntegratorSettings::default() };
         for candidate in second_round(&base, [12, 1, 4]) {
