@@ -120,8 +120,8 @@ impl LearnedVisibility {
     }
 
     /// Chooses a light by `u` in [0, 1), nearly in proportion to E·√V̂ for lights without photons; every light that can
-    /// contribute and is not in `seen` has a positive probability. Lights in `seen` may be chosen too. `None` if there
-    /// is no light. `singles` are those of `seen`.
+    /// contribute and is not in `seen` has a positive probability. Lights in `seen` may be chosen too, but for single ones
+    /// beside others that can contribute. `None` if there is no light. `singles` are those of `seen`.
     #[inline]
     pub fn sample_unseen(
         &self,

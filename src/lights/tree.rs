@@ -316,7 +316,8 @@ impl LightTree {
     }
 
     /// [`Self::sample`] with importances changed by `adjust(node, importance, count)`, which keeps positive ones positive: so
-    /// many of `leaves`, ascending places of leaves, are below the node. Nodes are numbered as in [`Self::sums`].
+    /// many of `leaves`, ascending places of leaves, are below the node. These leaves themselves are chosen only where no
+    /// light beside them can contribute. Nodes are numbered as in [`Self::sums`].
     #[inline]
     pub fn sample_by(
         &self,
@@ -338,10 +339,10 @@ impl LightTree {
             let middle = below.partition_point(|&leaf| (leaf as usize) < right_place);
             (right_of, last) = (&below[middle..], Some((place, middle)));
             let [left, right] = self.children(place);
-            let importances = [
-                adjust(place + 1, left.importance(ctx), middle),
-                adjust(right_place, right.importance(ctx), below.len() - middle),
-            ];
+            let adjusted = |place: usize, child: &Node, count: usize| {
+                if child.is_leaf && count > 0 { 0.0 } else { adjust(place, child.importance(ctx), count) }
+            };
+            let importances = [adjusted(place + 1, left, middle), adjusted(right_place, right, below.len() - middle)];
             first_probability(importances, [&left.bound, &right.bound])
         })
     }

@@ -73,7 +73,7 @@ const MANY_PIXELS: [usize; 2] = [256, 128];
 /// Time of all rounds, as a fraction of that of the image: what is wanted, and the most where that is not enough.
 const FRACTIONS: [f64; 2] = [0.03, 0.08];
 /// Time of all rounds over that of rendering the pixels of one once, with the same number of samples and seeds: in direct
-/// light, and in paths.
+/// light, and in paths. Candidates with photons are beside that.
 const TRIALS: [f64; 2] = [13.0, 28.0];
 /// The same of the round that compares light choices.
 const LIGHT_TRIALS: f64 = 3.0;
@@ -120,7 +120,7 @@ pub struct AutoChoice {
     pub pixels: usize,
     /// Samples of each and seed.
     pub spp: u32,
-    /// The model: time a of a camera sample (ns), and of each light sample at first and at later vertices, and BSDF sample.
+    /// The model of `mis`: time a of a camera sample (ns), and of each light sample at first and at later vertices, and BSDF sample.
     pub cost: Vec<f64>,
     /// The model: relative variance A, and of one sample of each of these kinds.
     pub variance: Vec<f64>,
@@ -346,11 +346,12 @@ impl Pilot {
             Some(models) if candidates[chosen].settings.estimator == EstimatorKind::Contributing => &models[0],
             _ => &model,
         };
-        let (sharing, mut settings) = self.share(job, &candidates[chosen].settings, of_chosen, how)?;
+        let (sharing, mut settings) = self.share(job, &candidates[chosen], of_chosen, how)?;
         let &Trial { variance, nanoseconds, .. } =
             if settings.path_reuse.is_some() { &sharing[1] } else { &second[chosen] };
         settings.light_paths = self.choose_light_paths(job, &settings, &Measured { variance, nanoseconds, relative });
-        if !candidates[chosen].settings.uses_visibility_cache() {
+        // Other settings that use a cache have one of their own number of photons
+        if candidates[chosen].settings.estimator != EstimatorKind::Contributing {
             job.lights.set_visibility_cache(None);
         }
         let choice = AutoChoice {
@@ -393,7 +394,7 @@ impl Pilot {
     fn share(
         &self,
         job: &RenderJob,
-        chosen: &IntegratorSettings,
+        &Candidate { settings: ref chosen, preparation, .. }: &Candidate,
         model: &Model,
         how: &Preparation<'_>,
     ) -> Result<(Vec<Trial>, IntegratorSettings), RenderError> {
@@ -415,7 +416,8 @@ impl Pilot {
         let settings = more.map(of);
         let is_open = (is_contributing || chosen.estimator == EstimatorKind::Mis && rest == 1)
             && settings.iter().all(|s| [s.samples, s.later_samples] != [chosen.samples, chosen.later_samples]);
-        let candidates = auto_reuse::candidates(chosen, if is_open { &settings } else { &[] });
+        let mut candidates = auto_reuse::candidates(chosen, if is_open { &settings } else { &[] });
+        candidates.iter_mut().for_each(|c| c.preparation = preparation);
         let round = self.round(job, &candidates, SHARING, how)?;
         let round = round.by_blocks((auto_reuse::EDGE * auto_reuse::EDGE) as usize);
         let trials = round.trials(&candidates);

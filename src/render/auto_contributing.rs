@@ -22,7 +22,7 @@ const MIN_PHOTONS: f64 = 65_536.0;
 const FIT_DIRECT: [Numbers; 3] = [[2, 1, 2], [8, 1, 2], [2, 1, 8]];
 const FIT_PATH: [Numbers; 4] = [[2, 1, 1], [8, 1, 1], [2, 4, 1], [2, 1, 4]];
 /// Numbers among which it chooses: hardly beyond what was measured.
-const FIRST: [u32; 5] = [2, 4, 6, 8, 16];
+const FIRST: [u32; 4] = [2, 4, 8, 16];
 const LATER: [u32; 3] = [1, 2, 4];
 const OTHERS: [u32; 5] = [1, 2, 4, 6, 8];
 /// Numbers of samples on contributing lights above which fewer are tried too.
@@ -36,8 +36,9 @@ pub(super) struct Contributing {
 }
 
 impl Contributing {
-    /// Traces the photons for an image whose camera samples take about so long; `None` unless there are many lights, and the image
-    /// takes so long that photons enough take little of its time.
+    /// Traces the photons for an image whose camera samples take about so long, and gives the lights of the job the cache of them;
+    /// `None` unless there are many lights, and the image takes so long that photons enough take little of its time; where
+    /// media hinder it; and where no light is to be left out, but the settings say so.
     pub(super) fn new(job: &mut RenderJob, nanoseconds: f64) -> Option<Self> {
         let Settings { integrator: mut base, sampling } = *job.settings();
         let samples = job.world.scene.film.bounds.area() as f64 * f64::from(sampling.pilot_spp());
@@ -47,6 +48,7 @@ impl Contributing {
         // All candidates choose from the same lights, and others would not find what glows
         if job.lights.find_glows()
             || job.lights.lit.len() < MANY_LIGHTS
+            || base.leaves_lights_out()
             || affordable < given.map_or(MIN_PHOTONS, f64::from)
             || !job.world.scene.media.is_empty() && through_media::obstacle_of(&base).is_some()
         {

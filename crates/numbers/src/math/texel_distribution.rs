@@ -92,8 +92,9 @@ impl WithinBlock {
 }
 
 impl TexelDistribution {
-    /// The density proportional to `values`, row-major from y = 0, of an image `width` wide; rows that are not complete are
-    /// dropped. Negative or non-finite values enter as 0. There are blocks if sizes are multiples of 4 and there are many texels.
+    /// The density proportional to `values`, but for blocks of nearly equal ones, row-major from y = 0, of an image `width` wide;
+    /// rows that are not complete are dropped. Negative or non-finite values enter as 0. There are blocks if sizes are multiples
+    /// of 4 and there are many texels.
     pub fn new(values: &[f32], width: usize) -> Self {
         Self::of_blocks(values, width, if values.len() >= MANY { EDGE } else { 1 })
     }
@@ -310,6 +311,25 @@ mod tests {
                     assert!(d.pdf_of_texel(texel) > 0.0 && d.pdf(p) > 0.0 && p.max_element() < 1.0, "{at} {u:?}");
                 }
             }
+        }
+    }
+
+    #[test]
+    fn many_blocks_are_told_apart() {
+        // 16 × 12 blocks, every third of which is noise
+        let (width, height) = (64, 48);
+        let mut s = pcg32([2, 6, 3]);
+        let mut value = |i: usize| {
+            let block = i % width / EDGE + i / width / EDGE * (width / EDGE);
+            if block % 3 == 1 { 0.2 + s.random::<f32>() } else { 1.0 + block as f32 / 64.0 }
+        };
+        let values: Vec<f32> = (0..width * height).map(&mut value).collect();
+        let d = TexelDistribution::with_blocks(&values, width);
+        assert_eq!(d.within.len(), 64);
+        let mean = values.iter().sum::<f32>() / values.len() as f32;
+        for (i, v) in values.iter().enumerate() {
+            let pdf = d.pdf_of_texel([i % width, i / width]);
+            assert!((pdf * mean / v - 1.0).abs() < 1e-4, "{i}: {pdf} {}", v / mean);
         }
     }
 
