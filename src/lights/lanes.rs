@@ -111,6 +111,18 @@ mod tests {
         EnvironmentMap::new(texels, size, mapping, filter).unwrap()
     }
 
+    /// So large that texels are told apart only where they differ: smooth, and in one corner not.
+    fn large_map(mapping: EnvironmentMapping) -> EnvironmentMap {
+        const EDGE: usize = 512;
+        let mut stream = pcg32([11, 12, 14]);
+        let mut texel = |x: usize, y: usize| {
+            let noise = if x.max(y) < 256 { 3.0 * stream.random::<f32>() } else { 0.0 };
+            Rgb::new(0.5 + x as f32 / 512.0, 1.0, 0.2 + y as f32 / 256.0) * (1.0 + noise)
+        };
+        let texels = (0..EDGE * EDGE).map(|i| texel(i % EDGE, i / EDGE)).collect();
+        EnvironmentMap::new(texels, [EDGE, EDGE], mapping, EnvironmentFilter::Bilinear).unwrap()
+    }
+
     #[test]
     fn lanes_of_infinite_and_delta_lights_are_single_samples() {
         let mut stream = pcg32([3, 3, 3]);
@@ -122,6 +134,12 @@ mod tests {
                     let light = Light::infinite_image(Arc::new(map), &rotation, 1.5);
                     assert_like_singles(&light, &LightCtx::at(Vec3::ZERO), &mut stream, 1e-4);
                 }
+            }
+        }
+        for mapping in [EnvironmentMapping::EqualArea, EnvironmentMapping::LatLong] {
+            let light = Light::infinite_image(Arc::new(large_map(mapping)), &rotation, 1.5);
+            for _ in 0..20 {
+                assert_like_singles(&light, &LightCtx::at(Vec3::ZERO), &mut stream, 1e-3);
             }
         }
         let p = Vec3::new(1.0, 2.0, 3.0);
