@@ -80,11 +80,12 @@ pub(crate) struct EmitterInDirection {
 }
 
 /// What the samples of some points point at, whose rays among the emitters have met `hits`; `None` where that is dark.
-/// `far` is memory.
+/// `pmf` is the probability of the choice of a light at a point, and `far` is memory.
 pub(super) fn find_emitters(
     job: &RenderJob,
     points: &[ShadingPoint<'_>],
     (pending, hits): (&[PendingBsdf], &[Option<EmitterHit>]),
+    pmf: impl Fn(u32, &LightCtx, LightId) -> f32,
     far: &mut Vec<u32>,
     out: &mut Vec<Option<EmitterInDirection>>,
 ) {
@@ -93,34 +94,38 @@ pub(super) fn find_emitters(
     far.extend((0_u32..).zip(hits).filter(|(_, hit)| hit.is_none()).map(|(i, _)| i));
     out.clear();
     out.extend(pending.iter().zip(hits).map(|(sample, hit)| {
-        emitter_at(job, &ctx(sample), sample.wi, hit.as_ref()?, points[sample.point as usize].time)
+        let (time, pmf) = (points[sample.point as usize].time, |ctx: &_, light| pmf(sample.point, ctx, light));
+        emitter_at(job, &ctx(sample), sample.wi, hit.as_ref()?, time, pmf)
     }));
     let sample = |k: usize| &pending[far[k] as usize];
-    job.lights.infinite_in_directions(
+    job.lights.infinite_in_directions_by(
         far.len(),
         |k| (ctx(sample(k)), sample(k).wi),
+        |k, ctx, light| pmf(sample(k).point, ctx, light),
         |k, li, p_light| {
             out[far[k] as usize] = (!li.is_black()).then_some(EmitterInDirection { li, p_light, end: None });
         },
     );
 }
 
-/// What the direction `wi` points at by meeting `hit`; `None` if that is dark.
+/// What the direction `wi` points at by meeting `hit`, where lights are chosen with probability `pmf`; `None` if that is
+/// dark.
 pub(crate) fn emitter_at(
     job: &RenderJob,
     ctx: &LightCtx,
     wi: Vec3,
     hit: &EmitterHit,
     time: f32,
+    pmf: impl FnOnce(&LightCtx, LightId) -> f32,
 ) -> Option<EmitterInDirection> {
     let lights = &job.lights;
     let light = hit.light?;
     let surface = job.world.scene.geometry.surface_hit(hit.geometry, hit.primitive, Hit::NO_INSTANCE, hit.uv, time);
     let light_hit = LightHit { t: hit.t, p: surface.p, n: surface.n, uv: surface.uv };
     let li = lights.lights[light as usize].l(&light_hit, -wi);
-    (!li.is_black()).then(|| EmitterInDirection {
-        li,
-        p_light: lights.pdf(ctx, light, wi, &light_hit),
-        end: Some((surface.p, surface.p_error, surface.n)),
+    (!li.is_black()).then(|| {
+        let pdf = lights.lights[light as usize].pdf_li(ctx, wi, &light_hit);
+        let p_light = if pdf > 0.0 { pdf * pmf(ctx, light) } else { 0.0 };
+        EmitterInDirection { li, p_light, end: Some((surface.p, surface.p_error, surface.n)) }
     })
 }

@@ -5,7 +5,7 @@ use super::candidates::{Candidates, Drawn, SampleAllocation};
 use super::mixture::{Mixture, draw_groups, draw_together};
 use super::point::ShadingPoint;
 use super::shadow_segments::Segments;
-use super::t1::T1;
+use super::t1::{T1, choice_by_sampler};
 use crate::accel::RayBatch;
 use crate::scene::RenderJob;
 use lumiris_numbers::estimators::ocv::NormalEquations;
@@ -34,7 +34,7 @@ impl Components {
             self.mixtures.push(draw_groups(job, at, allocation, records));
             allocation.light_draws
         });
-        t1.draw_bsdf(allocate, &mut self.mixtures);
+        t1.draw_bsdf(allocate, &mut self.mixtures, choice_by_sampler(t1.job));
     }
 
     /// T1: light and BSDF samples as `mis` draws them.
@@ -48,7 +48,7 @@ impl Components {
             self.mixtures.push(draw_together(job, at, allocation, records));
             allocation.light_draws
         });
-        t1.draw_bsdf(allocate, &mut self.mixtures);
+        t1.draw_bsdf(allocate, &mut self.mixtures, choice_by_sampler(t1.job));
     }
 
     /// Adds up the normal equations of each point from its traced candidates.

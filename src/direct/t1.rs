@@ -6,6 +6,7 @@ use super::domain;
 use super::mixture::Mixture;
 use super::point::ShadingPoint;
 use crate::accel::RayBatch;
+use crate::lights::{LightCtx, LightId};
 use crate::scene::{EmitterHit, EmitterScratch, RenderJob};
 use std::time::Instant;
 
@@ -28,6 +29,11 @@ pub(super) struct BsdfBuffers {
     found: Vec<Option<EmitterInDirection>>,
 }
 
+/// Probability of the choice of a light by the light sampler.
+pub(super) fn choice_by_sampler(job: &RenderJob) -> impl Fn(u32, &LightCtx, LightId) -> f32 {
+    |_, ctx, light| job.lights.sampler.pmf(ctx, light)
+}
+
 impl T1<'_> {
     /// Draws the samples of both techniques; see [`Self::draw_lights`].
     pub(super) fn propose(
@@ -36,7 +42,7 @@ impl T1<'_> {
         draw: impl FnMut(&RenderJob, (u32, &ShadingPoint<'_>), &SampleAllocation, &mut Vec<Candidate>) -> u32,
     ) {
         self.draw_lights(&allocate, draw);
-        self.draw_bsdf(allocate, &mut []);
+        self.draw_bsdf(allocate, &mut [], choice_by_sampler(self.job));
     }
 
     /// Draws the light samples of all points, those of a point with `draw`, which adds the candidates and returns how
@@ -58,11 +64,12 @@ impl T1<'_> {
     }
 
     /// Draws the BSDF samples of all points; those that point at an emitter become candidates. `mixtures` are those of
-    /// the points, or none.
+    /// the points, or none; `pmf(point, ctx, light)` is the probability of the choice of a light, or a number of samples.
     pub(super) fn draw_bsdf(
         &mut self,
         allocate: impl Fn(&ShadingPoint<'_>) -> SampleAllocation,
         mixtures: &mut [Mixture],
+        pmf: impl Fn(u32, &LightCtx, LightId) -> f32,
     ) {
         // Directions
         let BsdfBuffers { pending, rays, hits, emitter_hits, far, found } = &mut *self.bsdf;
@@ -86,7 +93,7 @@ impl T1<'_> {
         // The emitters that they point at
         self.candidates.stats.emitter_rays += rays.len() as u64;
         self.job.world.intersect_emitters(rays, hits, emitter_hits);
-        find_emitters(self.job, self.points, (pending, emitter_hits), far, found);
+        find_emitters(self.job, self.points, (pending, emitter_hits), pmf, far, found);
         for ((pending, hit), found) in pending.iter().zip(emitter_hits).zip(found) {
             let point = &self.points[pending.point as usize];
             let mut candidate = bsdf_candidate(self.job, point, pending, (hit.as_ref(), *found));

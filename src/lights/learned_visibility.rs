@@ -12,7 +12,7 @@
 //! too far away, or has too few photon paths, for its photons to tell anything.
 //!
 //! The density of light samples that has the least variance is proportional to E·√V̂, as the second moment of a sample
-//! is E²·V̂/p. [`LearnedVisibility::sample_unseen`] chooses lights without photons in this way: of a node of the light
+//! is E²·V̂/p. On a glossy surface E is weighted by what is reflected to the viewer, but V̂ goes by E itself. [`LearnedVisibility::sample_unseen`] chooses lights without photons in this way: of a node of the light
 //! tree, Φ/(A·N) is the sum over its lights.
 //!
 //! A node may hold many lights that are visible and of which few photons are expected each. What all those of a node that
@@ -20,6 +20,7 @@
 //! for a node: where a far room is seen through a door, a few single photons of some of its lights tell of the others.
 
 use super::tree_choice::TreeChoice;
+use super::tree_node::Node;
 use super::visibility_cache::{ContributingLights, VisibilityCache};
 use super::{Light, LightCtx, LightId, SampledLight};
 use lumiris_numbers::math::ONE_MINUS_EPSILON;
@@ -50,7 +51,7 @@ pub struct LearnedVisibility {
 pub struct UnseenLight {
     /// The light.
     pub choice: SampledLight,
-    /// E, up to a factor that all lights have in common.
+    /// E, weighted by what is reflected, up to a factor that all lights have in common.
     pub importance: f32,
     /// V̂ of a light without photons.
     pub visibility: f32,
@@ -99,6 +100,15 @@ impl LearnedVisibility {
         }
     }
 
+    /// E of a light, weighted by what is reflected, and V̂ by its number of photons.
+    #[inline]
+    pub fn expect(&self, ctx: &LightCtx, light: LightId, count: u32) -> (f32, f32) {
+        let e = self.importance(ctx, light);
+        let is_by_lobe = ctx.lobe.scale > 0.0 && self.choice.tree.contains(light);
+        let reflected = if is_by_lobe { self.choice.tree.light_importance(ctx, light) } else { e };
+        (reflected, self.visibility(light, e, count))
+    }
+
     /// V̂ of a light by its E and its number of photons, from [`MIN_VISIBILITY`] to 1.
     #[inline]
     pub fn visibility(&self, light: LightId, importance: f32, count: u32) -> f32 {
@@ -111,12 +121,12 @@ impl LearnedVisibility {
         count as f32 * self.of_one_photon[light as usize]
     }
 
-    /// The places in the tree, ascending, of the lights that were `seen` by one photon.
+    /// Adds the places in the tree, ascending, of the lights that were `seen` by one photon.
     pub fn find_singles(&self, seen: &ContributingLights<'_>, singles: &mut Vec<u32>) {
-        singles.clear();
+        let first = singles.len();
         let once = seen.lights.iter().filter(|(_, count)| *count == 1);
         singles.extend(once.filter_map(|&(light, _)| self.choice.tree.leaf(light)));
-        singles.sort_unstable();
+        singles[first..].sort_unstable();
     }
 
     /// Chooses a light by `u` in [0, 1), nearly in proportion to E·√V̂ for lights without photons; every light that can
@@ -130,9 +140,6 @@ impl LearnedVisibility {
         u: f32,
     ) -> Option<UnseenLight> {
         let TreeChoice { tree, infinite, .. } = &self.choice;
-        // V̂ goes by the irradiance
-        let ctx = &ctx.diffuse();
-
         let unseen = || infinite.iter().filter(|&&light| seen.place(light).is_none());
         let count = unseen().count();
         let p_infinite = self.choice.probability_of_some(ctx, count);
@@ -146,16 +153,47 @@ impl LearnedVisibility {
 
         // Those in the tree
         let u = ((u - p_infinite) / (1.0 - p_infinite)).min(ONE_MINUS_EPSILON);
-        let by_visibility =
-            |node: usize, e: f32, singles: usize| e * estimate(e, self.of_nodes[node], singles as f32).sqrt();
-        let (light, pmf, u) = tree.sample_by(ctx, u, singles, by_visibility)?;
+        let (light, pmf, u) = tree.sample_by(u, singles, self.by_visibility(ctx))?;
         Some(self.unseen(ctx, SampledLight { light, pmf: pmf * (1.0 - p_infinite), u }))
+    }
+
+    /// A light that is not in `seen`, with the probability that [`Self::sample_unseen`] chooses it.
+    #[inline]
+    pub fn unseen_light(
+        &self,
+        ctx: &LightCtx,
+        (seen, singles): (&ContributingLights<'_>, &[u32]),
+        light: LightId,
+    ) -> UnseenLight {
+        let TreeChoice { tree, infinite, .. } = &self.choice;
+        let count = infinite.iter().filter(|&&light| seen.place(light).is_none()).count();
+        let p_infinite = self.choice.probability_of_some(ctx, count);
+        let pmf = if tree.contains(light) {
+            tree.pmf_by(light, singles, self.by_visibility(ctx)) * (1.0 - p_infinite)
+        } else if infinite.binary_search(&light).is_ok() {
+            p_infinite / count as f32
+        } else {
+            0.0
+        };
+        self.unseen(ctx, SampledLight { light, pmf, u: 0.0 })
+    }
+
+    /// E·√V̂ of nodes, as a function of the place, the node, and the number of lights below it with a single photon.
+    #[inline]
+    fn by_visibility(&self, ctx: &LightCtx) -> impl Fn(usize, &Node, usize) -> f32 {
+        let (by_lobe, diffuse) = (*ctx, ctx.diffuse());
+        move |place, node, singles| {
+            let e = node.importance(&diffuse);
+            let visibility = estimate(e, self.of_nodes[place], singles as f32);
+            let reflected = if by_lobe.lobe.scale > 0.0 { node.importance(&by_lobe) } else { e };
+            reflected * visibility.sqrt()
+        }
     }
 
     #[inline]
     fn unseen(&self, ctx: &LightCtx, choice: SampledLight) -> UnseenLight {
-        let importance = self.importance(ctx, choice.light);
-        UnseenLight { choice, importance, visibility: self.visibility(choice.light, importance, 0) }
+        let (importance, visibility) = self.expect(ctx, choice.light, 0);
+        UnseenLight { choice, importance, visibility }
     }
 }
 
@@ -232,6 +270,9 @@ mod tests {
                 let SampledLight { light, pmf, u } = unseen.choice;
                 assert!((0.0..1.0).contains(&u) && pmf > 0.0);
                 assert_eq!(unseen.importance, learned.importance(&ctx, light));
+                if !seen.contains(&light) {
+                    assert_eq!(learned.unseen_light(&ctx, (&contributing, &singles), light).choice.pmf, pmf);
+                }
                 means[light as usize] += f64::from(1.0 / pmf) / f64::from(draws);
                 squares[light as usize] += f64::from(1.0 / pmf).powi(2) / f64::from(draws);
             }

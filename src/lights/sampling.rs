@@ -160,9 +160,20 @@ impl LightSampling {
     /// Radiance that all infinite lights send from the direction `wi`, and [`pdf_infinite`](Self::pdf_infinite).
     #[inline]
     pub fn infinite_in_direction(&self, ctx: &LightCtx, wi: Vec3) -> (Rgb, f32) {
+        self.infinite_in_direction_by(ctx, wi, |ctx, light| self.sampler.pmf(ctx, light))
+    }
+
+    /// [`infinite_in_direction`](Self::infinite_in_direction), where a light is chosen with probability `pmf`.
+    #[inline]
+    pub fn infinite_in_direction_by(
+        &self,
+        ctx: &LightCtx,
+        wi: Vec3,
+        pmf: impl Fn(&LightCtx, LightId) -> f32,
+    ) -> (Rgb, f32) {
         self.set.infinite.iter().fold((Rgb::BLACK, 0.0), |(sum, density), &i| {
             let (le, pdf) = self.set.lights[i as usize].le_and_pdf(ctx.p, wi);
-            let pdf = if pdf > 0.0 { pdf * self.sampler.pmf(ctx, i) } else { 0.0 };
+            let pdf = if pdf > 0.0 { pdf * pmf(ctx, i) } else { 0.0 };
             (sum + le, density + pdf)
         })
     }
@@ -172,6 +183,17 @@ impl LightSampling {
         &self,
         n: usize,
         at: impl Fn(usize) -> (LightCtx, Vec3),
+        out: impl FnMut(usize, Rgb, f32),
+    ) {
+        self.infinite_in_directions_by(n, at, |_, ctx, light| self.sampler.pmf(ctx, light), out);
+    }
+
+    /// [`infinite_in_directions`](Self::infinite_in_directions), where a light is chosen with probability `pmf` at a point.
+    pub fn infinite_in_directions_by(
+        &self,
+        n: usize,
+        at: impl Fn(usize) -> (LightCtx, Vec3),
+        pmf: impl Fn(usize, &LightCtx, LightId) -> f32,
         mut out: impl FnMut(usize, Rgb, f32),
     ) {
         if let [light] = self.set.infinite[..] {
@@ -182,7 +204,7 @@ impl LightSampling {
                     (ctx.p, wi)
                 },
                 |i, le, pdf| {
-                    let pdf = if pdf > 0.0 { pdf * self.sampler.pmf(&at(i).0, light) } else { 0.0 };
+                    let pdf = if pdf > 0.0 { pdf * pmf(i, &at(i).0, light) } else { 0.0 };
                     out(i, le, pdf);
                 },
             );
@@ -191,7 +213,7 @@ impl LightSampling {
         } else {
             for i in 0..n {
                 let (ctx, wi) = at(i);
-                let (le, pdf) = self.infinite_in_direction(&ctx, wi);
+                let (le, pdf) = self.infinite_in_direction_by(&ctx, wi, |ctx, light| pmf(i, ctx, light));
                 out(i, le, pdf);
             }
         }

@@ -315,16 +315,15 @@ impl LightTree {
         if self.is_empty() { None } else { self.sample_below(ctx, 0, u) }
     }
 
-    /// [`Self::sample`] with importances changed by `adjust(node, importance, count)`, which keeps positive ones positive: so
-    /// many of `leaves`, ascending places of leaves, are below the node. These leaves themselves are chosen only where no
-    /// light beside them can contribute. Nodes are numbered as in [`Self::sums`].
+    /// [`Self::sample`] with the importances `importance(place, node, count)`, which are positive where those of the nodes
+    /// are: so many of `leaves`, ascending places of leaves, are below the node. These leaves themselves are chosen only
+    /// where no light beside them can contribute. Nodes are numbered as in [`Self::sums`].
     #[inline]
-    pub fn sample_by(
+    pub(super) fn sample_by(
         &self,
-        ctx: &LightCtx,
         u: f32,
         leaves: &[u32],
-        adjust: impl Fn(usize, f32, usize) -> f32,
+        importance: impl Fn(usize, &Node, usize) -> f32,
     ) -> Option<(LightId, f32, f32)> {
         if self.is_empty() {
             return None;
@@ -335,16 +334,29 @@ impl LightTree {
             if let Some((parent, middle)) = last {
                 below = if place == parent + 1 { &below[..middle] } else { right_of };
             }
-            let right_place = self.nodes[place].index as usize;
-            let middle = below.partition_point(|&leaf| (leaf as usize) < right_place);
+            let (p, middle) = self.left_probability_by(place, below, &importance);
             (right_of, last) = (&below[middle..], Some((place, middle)));
-            let [left, right] = self.children(place);
-            let adjusted = |place: usize, child: &Node, count: usize| {
-                if child.is_leaf && count > 0 { 0.0 } else { adjust(place, child.importance(ctx), count) }
-            };
-            let importances = [adjusted(place + 1, left, middle), adjusted(right_place, right, below.len() - middle)];
-            first_probability(importances, [&left.bound, &right.bound])
+            p
         })
+    }
+
+    /// The probability of the left child with the importances of [`Self::sample_by`], where the leaves `below` are
+    /// below the node; and how many of these are below that child.
+    #[inline]
+    fn left_probability_by(
+        &self,
+        place: usize,
+        below: &[u32],
+        importance: &impl Fn(usize, &Node, usize) -> f32,
+    ) -> (f32, usize) {
+        let right_place = self.nodes[place].index as usize;
+        let middle = below.partition_point(|&leaf| (leaf as usize) < right_place);
+        let [left, right] = self.children(place);
+        let of = |place: usize, child: &Node, count: usize| {
+            if child.is_leaf && count > 0 { 0.0 } else { importance(place, child, count) }
+        };
+        let importances = [of(place + 1, left, middle), of(right_place, right, below.len() - middle)];
+        (first_probability(importances, [&left.bound, &right.bound]), middle)
     }
 
     /// The place of the leaf of a light; `None` if it is not in the tree.
@@ -383,6 +395,34 @@ impl LightTree {
             } else {
                 pmf *= 1.0 - p;
                 place = self.nodes[place].index as usize;
+            }
+            trail >>= 1;
+        }
+        pmf
+    }
+
+    /// Probability that [`sample_by`](Self::sample_by) chooses `light`.
+    #[inline]
+    pub(super) fn pmf_by(
+        &self,
+        light: LightId,
+        leaves: &[u32],
+        importance: impl Fn(usize, &Node, usize) -> f32,
+    ) -> f32 {
+        if !self.contains(light) {
+            return 0.0;
+        }
+        let (mut place, mut pmf, mut trail, mut below) = (0, 1.0, self.trails[light as usize], leaves);
+        while !self.nodes[place].is_leaf {
+            let (p, middle) = self.left_probability_by(place, below, &importance);
+            if trail & 1 == 0 {
+                pmf *= p;
+                place += 1;
+                below = &below[..middle];
+            } else {
+                pmf *= 1.0 - p;
+                place = self.nodes[place].index as usize;
+                below = &below[middle..];
             }
             trail >>= 1;
         }

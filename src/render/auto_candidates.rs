@@ -77,7 +77,7 @@ pub(super) fn contributing(settings: &IntegratorSettings, [first, later, others]
         estimator: EstimatorKind::Contributing,
         samples: settings.samples.or(Some(first)),
         later_samples: settings.later_samples.or((settings.depth() > 1).then_some(later)),
-        contributing: ContributingSettings { noncontributing_samples: given.or(Some(others)) },
+        contributing: ContributingSettings { noncontributing_samples: given.or(Some(others)), ..settings.contributing },
         ..*settings
     }
 }
@@ -180,7 +180,7 @@ mod tests {
         assert_eq!(numbers_of_contributing(&contributing(&direct, [4, 2, 6])), [4, 1, 6]);
         let given = IntegratorSettings {
             later_samples: Some(3),
-            contributing: ContributingSettings { noncontributing_samples: Some(5) },
+            contributing: ContributingSettings { noncontributing_samples: Some(5), bsdf_samples: None },
             ..path
         };
         assert_eq!(numbers_of_contributing(&contributing(&given, [4, 2, 6])), [4, 3, 5]);

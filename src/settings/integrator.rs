@@ -383,12 +383,19 @@ pub struct ContributingSettings {
     /// Samples on non-contributing lights (S_non), in addition to those of an estimate (S_con), if they are not the
     /// default. 0 is biased.
     pub noncontributing_samples: Option<u32>,
+    /// BSDF samples where the BSDF is not diffuse (S_b), if they are not the default.
+    pub bsdf_samples: Option<u32>,
 }
 
 impl ContributingSettings {
     /// Samples on non-contributing lights.
     pub fn noncontributing_samples(&self) -> u32 {
         self.noncontributing_samples.unwrap_or(2)
+    }
+
+    /// BSDF samples where the BSDF is not diffuse.
+    pub fn bsdf_samples(&self) -> u32 {
+        self.bsdf_samples.unwrap_or(1)
     }
 }
 

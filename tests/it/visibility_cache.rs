@@ -7,13 +7,14 @@
 use super::analytic_scenes::answer;
 use lumiris::accel::{Coherence, RayBatch};
 use lumiris::film::PixelSums;
-use lumiris::import::{LoadOptions, load};
+use lumiris::import::cache::FileCache;
+use lumiris::import::{LoadOptions, load, load_text};
 use lumiris::lights::{LightId, LightSamplerKind, VisibilityCache};
 use lumiris::render::output::metadata;
 use lumiris::render::{RenderSettings, render};
 use lumiris::scene::{AccelKind, RenderJob};
 use lumiris::settings::{EstimatorKind, IntegratorSettings, Proposals, Target};
-use lumiris_numbers::estimators::stats::{Welford, t_test};
+use lumiris_numbers::estimators::stats::{Welford, t_test, two_sample_z_test};
 use lumiris_numbers::math::hash::pcg4d;
 use lumiris_numbers::math::ray::offset_origin;
 use lumiris_numbers::math::{Ray, Vec3};
@@ -188,4 +189,82 @@ fn brighter_lights_first_leave_little_noise_and_no_bias() {
     // Where all are seen, one of them in proportion to its brightness is worth as much as all.
     let [one, all] = [1, 9].map(|samples| pixels(&mut job(contributing(samples, 0), is_seen), 100).variance());
     assert!(one < 2.0 * all, "{one} {all}");
+}
+
+/// A floor that reflects lamps, some of them behind a wall, a sky, and another sky whose directions are the same.
+const GLOSSY: &str = r#"
+LookAt -1 0 1  0 0 0  0 0 1
+Camera "orthographic" "float screenwindow" [ -0.3 0.3 -0.3 0.3 ]
+Film "rgb" "integer xresolution" 12 "integer yresolution" 12
+Sampler "independent"
+Integrator "path" "integer maxdepth" 1
+WorldBegin
+LightSource "infinite" "rgb L" [ 0.06 0.06 0.06 ]
+LightSource "infinite" "rgb L" [ 0.02 0.02 0.02 ]
+LightSource "point" "rgb I" [ 1 1 1 ] "point3 from" [ 0.5 1 1.5 ]
+Material "conductor" "float roughness" 0.1 "bool remaproughness" false
+Shape "bilinearmesh" "point3 P" [ -9 -9 0  9 -9 0  -9 9 0  9 9 0 ]
+Material "coateddiffuse" "float roughness" 0.2 "bool remaproughness" false
+Shape "sphere" "float radius" 0.15
+Material "diffuse"
+Shape "bilinearmesh" "point3 P" [ 0.5 0.3 0  0.5 4 0  0.5 0.3 3  0.5 4 3 ]
+"#;
+
+/// The glossy floor below `lamps` × `lamps` lamps.
+fn glossy_job(lamps: u32, settings: impl Fn(&mut IntegratorSettings)) -> RenderJob {
+    let mut text = GLOSSY.to_owned();
+    for i in 0..lamps * lamps {
+        let [x, y] = [i % lamps, i / lamps].map(|k| f64::from(k) / f64::from(lamps) * 2.0);
+        let [x, y] = [x + 0.2, y - 1.0];
+        let size = 0.2 / f64::from(lamps);
+        text += &format!(
+            "AttributeBegin AreaLightSource \"diffuse\" \"rgb L\" [ {l} 1 2 ] \"bool twosided\" true \
+             Shape \"bilinearmesh\" \"point3 P\" [ {x} {y} 1.3 {x1} {y} 1.3 {x} {y1} 1.4 {x1} {y1} 1.4 ] AttributeEnd\n",
+            l = 1 + i % 3,
+            x1 = x + size,
+            y1 = y + size,
+        );
+    }
+    let loaded = load_text(&text, "glossy.pbrt", Path::new("."), &LoadOptions::default(), &FileCache::default());
+    let mut loaded = loaded.map_err(|d| d.to_string()).unwrap();
+    settings(&mut loaded.settings.integrator);
+    loaded.job(AccelKind::Embree, None).unwrap()
+}
+
+/// With BSDF samples on glossy surfaces.
+fn with_bsdf(samples: u32, noncontributing: u32, bsdf: u32) -> impl Fn(&mut IntegratorSettings) {
+    move |s| {
+        contributing(samples, noncontributing)(s);
+        s.contributing.bsdf_samples = Some(bsdf);
+    }
+}
+
+#[test]
+fn bsdf_samples_beside_contributing_lights_leave_no_bias() {
+    // Up to 64 lights are weighed, more are chosen by their photons; only one of `part` lights has any
+    for (lamps, part) in [(0, 1), (3, 3), (3, 1), (10, 3)] {
+        let mis = |s: &mut IntegratorSettings| (s.estimator, s.samples) = (EstimatorKind::Mis, Some(8));
+        let expected = pixels(&mut glossy_job(lamps, mis), 2000);
+        for (samples, noncontributing, bsdf) in [(1, 1, 1), (2, 1, 1), (4, 2, 4)] {
+            let mut job = glossy_job(lamps, with_bsdf(samples, noncontributing, bsdf));
+            let cache = cache_with(&job, CacheContents::Right).map(|cache| cache.of_lights(|light| light % part == 0));
+            job.lights.set_visibility_cache(cache);
+            let found = pixels(&mut job, 1000);
+            let p = two_sample_z_test(&found, &expected).p_value;
+            let difference = found.mean() / expected.mean() - 1.0;
+            assert!(p > 1e-4, "{lamps} {part}, {samples} {noncontributing} {bsdf}: {difference} p {p}");
+        }
+    }
+}
+
+#[test]
+fn bsdf_samples_take_the_bright_spots_from_glossy_surfaces() {
+    let variance = |bsdf: u32| {
+        let mut job = glossy_job(3, with_bsdf(4, 2, bsdf));
+        let cache = cache_with(&job, CacheContents::Right);
+        job.lights.set_visibility_cache(cache);
+        pixels(&mut job, 100).variance()
+    };
+    let [without, with] = [0, 1].map(variance);
+    assert!(without > 1.5 * with, "{without} without, {with} with BSDF samples");
 }

@@ -2,7 +2,7 @@
 //! others [Keller and Wald 2000, §3].
 //!
 //! S_con samples are taken on 𝓛_con in proportion to w_l = E_l·√V̂_l, the density of least variance: E_l is the light's
-//! irradiance without shadows, V̂_l its visibility as photons tell it ([`crate::lights::learned_visibility`]). With
+//! irradiance without shadows, on glossy surfaces weighted by what is reflected, V̂_l its visibility as photons tell it ([`crate::lights::learned_visibility`]). With
 //! m_l = S_con·w_l/Σ w, light l gets ⌊m_l⌋ or ⌈m_l⌉ samples by systematic resampling. If m_l ≥ 1, it counts their mean;
 //! otherwise it has a sample with probability m_l, which counts 1/m_l times. Where there are more than
 //! [`MAX_WEIGHTED`] such lights, S_con of them are chosen in proportion to their numbers of photons.
@@ -14,171 +14,367 @@
 //! the contributing lights, and counts 1/(p_l·q_l) times. So every sum has the right expectation whatever the photons
 //! tell; without these samples (S_non = 0) the estimate is biased.
 //!
+//! Light samples alone leave bright spots on glossy surfaces. There S_b BSDF samples are combined with them by multiple
+//! importance sampling [Veach and Guibas 1995]: a direction that points at the light l has the density r_l·p_l of light
+//! samples, where p_l is that of the light's own samples, and r_l the number of them that is expected at the point.
+//!
 //! Where no light contributes, all S_con + S_non samples are taken on non-contributing lights, without roulette. Without
 //! a visibility cache, or one that is empty, they are drawn as by `mc`.
 
 use super::mc;
-use crate::direct::candidates::{Candidate, SampleAllocation};
+use crate::bsdfs::Bsdf;
+use crate::direct::candidates::{Candidate, Candidates, SampleAllocation};
 use crate::direct::domain;
 use crate::direct::light_samples::{self, unshadowed_candidate};
 use crate::direct::point::ShadingPoint;
 use crate::direct::t1::T1;
+use crate::lights::learned_visibility::UnseenLight;
 use crate::lights::visibility_cache::ContributingLights;
-use crate::lights::{LearnedVisibility, LightCtx, LightId, LightSample, LightSampling, SampledLight};
+use crate::lights::{LearnedVisibility, LightCtx, LightId, LightSampling, SampledLight};
 use crate::scene::RenderJob;
+use lumiris_numbers::estimators::mis::Heuristic;
 use lumiris_numbers::math::cumulative;
+use std::ops::Range;
 
 /// Maximum number of contributing lights whose weights are compared at a point.
 pub const MAX_WEIGHTED: usize = 64;
 /// Survival probability of a sample of non-contributing lights, per part of the expected contribution of the others.
 const SURVIVAL: f32 = 3.0;
 
-/// Light sampling, separately of contributing and of non-contributing lights.
+/// Light sampling, separately of contributing and of non-contributing lights, and BSDF sampling of glossy surfaces.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Contributing {
     /// Samples on contributing lights (S_con).
     pub samples: u32,
     /// Samples on non-contributing lights (S_non).
     pub noncontributing_samples: u32,
+    /// BSDF samples where the BSDF is not diffuse (S_b).
+    pub bsdf_samples: u32,
+    /// Weights of light and BSDF samples.
+    pub heuristic: Heuristic,
 }
 
 impl Contributing {
+    /// Number of BSDF samples that are combined with the light samples at a point.
+    fn bsdf_samples_at(&self, bsdf: &Bsdf<'_>) -> u32 {
+        match bsdf {
+            Bsdf::Diffuse(_) | Bsdf::DiffuseTransmission(_) | Bsdf::Evaluated(_) => 0,
+            _ => self.bsdf_samples,
+        }
+    }
+
+    /// Densities of light samples include their expected numbers.
+    fn allocation(&self, point: &ShadingPoint<'_>) -> SampleAllocation {
+        let only = mc::allocation(point);
+        match self.bsdf_samples_at(&point.bsdf.bsdf) {
+            n if n > 0 && only.light_draws > 0 => {
+                SampleAllocation { n_light: 1.0, ..SampleAllocation::fixed(only.light_draws, n) }
+            }
+            _ => SampleAllocation { n_light: 1.0, ..only },
+        }
+    }
+
     pub(super) fn propose(&self, t1: &mut T1<'_>, buffers: &mut Buffers) {
-        t1.propose(mc::allocation, |job, at, allocation, records| {
-            if allocation.light_draws == 0 { 0 } else { buffers.draw(job, at, self.noncontributing_samples, records) }
+        buffers.rates.clear();
+        buffers.singles.clear();
+        let job = t1.job;
+        let mut draws = Draws { estimator: *self, job, buffers, of_points: Vec::new() };
+        let allocate = |point: &ShadingPoint<'_>| self.allocation(point);
+        t1.draw_lights(allocate, |_, at, allocation, records| draws.draw(at, allocation, records));
+        let Draws { buffers, of_points, .. } = draws;
+        let drawn_at = |point: u32| of_points.get(point as usize).and_then(Option::as_ref);
+        let first = t1.candidates.records.len();
+        t1.draw_bsdf(allocate, &mut [], |point, ctx, light| {
+            drawn_at(point).map_or(0.0, |drawn| drawn.rate(&job.lights, buffers, ctx, light))
         });
+        if self.noncontributing_samples == 0 {
+            // BSDF samples leave out the same lights
+            let is_left_out = |c: &Candidate| drawn_at(c.point).is_some_and(|drawn| drawn.leaves_out(c.light));
+            let mut place = 0;
+            t1.candidates.records.retain(|c| {
+                place += 1;
+                place <= first || !is_left_out(c)
+            });
+        }
+    }
+
+    pub(super) fn select(&self, candidates: &mut Candidates) {
+        if self.bsdf_samples == 0 {
+            mc::select(candidates);
+        } else {
+            candidates.weigh(|c| c.factor(self.heuristic));
+        }
     }
 }
 
-/// What is kept from point to point, to save allocations.
+/// What is kept from batch to batch, to save allocations.
 #[derive(Debug, Default)]
 pub(super) struct Buffers {
-    /// Weights of the contributing lights.
+    /// Weights of the contributing lights of a point.
     weights: Vec<f32>,
-    /// Those with one photon, by [`LearnedVisibility::find_singles`].
+    /// Expected numbers of samples of contributing lights, point by point.
+    rates: Vec<f32>,
+    /// Contributing lights with one photon, by [`LearnedVisibility::find_singles`], point by point.
     singles: Vec<u32>,
 }
 
+/// The light samples of a batch.
+struct Draws<'a, 'b> {
+    estimator: Contributing,
+    job: &'a RenderJob,
+    buffers: &'b mut Buffers,
+    /// How they were drawn at each point that has BSDF samples; empty if none has.
+    of_points: Vec<Option<Drawn<'a>>>,
+}
+
+/// How the light samples of a point were drawn.
+#[derive(Clone, Debug)]
+struct Drawn<'a> {
+    /// 𝓛_con with photon counts.
+    seen: ContributingLights<'a>,
+    /// The part of [`Buffers::rates`] that are theirs.
+    rates: Range<usize>,
+    /// The part of [`Buffers::singles`].
+    singles: Range<usize>,
+    others: Others,
+}
+
+/// How lights that are not in 𝓛_con were sampled.
+#[derive(Clone, Copy, Debug)]
+enum Others {
+    /// n times, and as many survive as their expected contribution times `scale` says.
+    Unseen { n: u32, scale: f32 },
+    /// n times by the light sampler, as all lights were.
+    BySampler { n: u32 },
+}
+
+impl Drawn<'_> {
+    /// True for a light of which no samples are taken on purpose.
+    fn leaves_out(&self, light: LightId) -> bool {
+        matches!(self.others, Others::Unseen { n: 0, .. }) && self.seen.place(light).is_none()
+    }
+
+    /// Expected number of samples of a light.
+    #[inline]
+    fn rate(&self, lights: &LightSampling, buffers: &Buffers, ctx: &LightCtx, light: LightId) -> f32 {
+        let n = match self.others {
+            Others::BySampler { n } => return n as f32 * lights.sampler.pmf(ctx, light),
+            Others::Unseen { n, .. } => n as f32,
+        };
+        if let Some(k) = self.seen.place(light) {
+            return buffers.rates[self.rates.start + k];
+        }
+        let (Others::Unseen { scale, .. }, Some(learned)) = (self.others, lights.learned_visibility()) else {
+            return 0.0;
+        };
+        let unseen = learned.unseen_light(ctx, (&self.seen, &buffers.singles[self.singles.clone()]), light);
+        let pmf = unseen.choice.pmf;
+        if pmf > 0.0 && unseen.importance > 0.0 { n * pmf * survival(&unseen, scale) } else { 0.0 }
+    }
+}
+
+/// Survival probability of a sample of a light without photons, where that of one with the expected contribution 1 is
+/// `scale`.
+#[inline]
+fn survival(unseen: &UnseenLight, scale: f32) -> f32 {
+    (unseen.importance * unseen.visibility.sqrt() / unseen.choice.pmf * scale).min(1.0)
+}
+
 /// A point and the lights that are sampled from it.
-struct At<'a> {
+struct At<'a, 'p> {
     lights: &'a LightSampling,
     learned: &'a LearnedVisibility,
     index: u32,
-    point: &'a ShadingPoint<'a>,
+    point: &'p ShadingPoint<'p>,
     ctx: LightCtx,
-    /// 𝓛_con with photon counts.
-    seen: ContributingLights<'a>,
+    n_bsdf: f32,
 }
 
-impl At<'_> {
-    /// A sample of a light chosen with probability `pmf`, one of `n` drawn in this way.
-    fn sample(&self, light: LightId, pmf: f32, n: u32, u: [f32; 2]) -> Option<Candidate> {
-        let sample = self.lights.lights[light as usize].sample_li(&self.ctx, u)?;
-        let drawn = (light, LightSample { pdf: sample.pdf * pmf, ..sample });
-        unshadowed_candidate((self.index, self.point), &SampleAllocation::fixed(n, 0), drawn)
+impl At<'_, '_> {
+    /// A sample of a light of which `rate` samples are expected.
+    fn sample(&self, light: LightId, rate: f32, u: [f32; 2], of_all: (&Drawn<'_>, &Buffers)) -> Option<Candidate> {
+        let mut sample = self.lights.lights[light as usize].sample_li(&self.ctx, u)?;
+        sample.pdf *= rate;
+        if self.n_bsdf > 0.0 && self.overlaps(light) {
+            // A direction of BSDF sampling belongs to all of them together
+            let rate = |ctx: &LightCtx, light| of_all.0.rate(self.lights, of_all.1, ctx, light);
+            (sample.li, sample.pdf) = self.lights.infinite_in_direction_by(&self.ctx, sample.wi, rate);
+        }
+        let allocation = SampleAllocation { n_bsdf: self.n_bsdf, ..SampleAllocation::fixed(1, 0) };
+        unshadowed_candidate((self.index, self.point), &allocation, (light, sample))
+    }
+
+    /// True if directions to the light are directions to others as well.
+    fn overlaps(&self, light: LightId) -> bool {
+        self.lights.infinite.len() > 1 && self.lights.infinite.contains(&light)
+    }
+
+    /// Expected number of samples of a contributing light of which `wanted` would be best, where `count` are drawn.
+    fn rate(&self, light: LightId, wanted: f32, count: u32) -> f32 {
+        // Numbers of two lights depend on the same random number
+        if wanted < 1.0 || self.n_bsdf > 0.0 && self.overlaps(light) { wanted } else { count as f32 }
     }
 }
 
-impl Buffers {
+/// Numbers that are wanted, Σ weights·`scale`, and those that are drawn by systematic resampling with `offset` in [0, 1).
+fn systematic(weights: &[f32], scale: f32, offset: f32) -> impl Iterator<Item = (f32, u32)> {
+    let (mut upto, mut given) = (offset, 0);
+    weights.iter().map(move |&weight| {
+        let wanted = weight * scale;
+        upto += wanted;
+        // At least one sample where one or more are wanted, whatever rounding does
+        let count = (upto as u32).saturating_sub(given).max(u32::from(wanted >= 1.0));
+        given = upto as u32;
+        (wanted, count)
+    })
+}
+
+impl Draws<'_, '_> {
     /// Draws the light samples of a point. Returns their number.
     fn draw(
         &mut self,
-        job: &RenderJob,
         (index, point): (u32, &ShadingPoint<'_>),
-        noncontributing: u32,
+        allocation: &SampleAllocation,
         records: &mut Vec<Candidate>,
     ) -> u32 {
-        let n = point.sample_counts.samples;
-        let lights = &job.lights;
-        let Some(learned) = lights.learned_visibility() else {
-            return light_samples::draw(job, (index, point), &SampleAllocation::fixed(n + noncontributing, 0), records);
-        };
-        let ctx = point.light_ctx();
-        let at = At { lights, learned, index, point, ctx, seen: lights.contributing_lights(&ctx) };
-        learned.find_singles(&at.seen, &mut self.singles);
-        let expected = match at.seen.lights.len() {
-            0 => return at.draw_unseen(n + noncontributing, (f32::INFINITY, &[]), records),
-            1..=MAX_WEIGHTED => self.draw_weighted(&at, n, records),
-            _ => Some(at.draw_by_photons(n, records)),
-        };
-        match expected {
-            Some(expected) => n + at.draw_unseen(noncontributing, (SURVIVAL / expected, &self.singles), records),
-            None => light_samples::draw(job, (index, point), &SampleAllocation::fixed(n + noncontributing, 0), records),
+        let (n, n_non, lights) = (allocation.light_draws, self.estimator.noncontributing_samples, &self.job.lights);
+        if n == 0 {
+            return 0;
         }
+        let n_bsdf = if self.estimator.bsdf_samples > 0 { allocation.n_bsdf } else { 0.0 };
+        let Buffers { rates, singles, .. } = &*self.buffers;
+        let mut drawn = Drawn {
+            seen: ContributingLights::default(),
+            rates: rates.len()..rates.len(),
+            singles: singles.len()..singles.len(),
+            others: Others::BySampler { n: n + n_non },
+        };
+        let by_cache = lights.learned_visibility().and_then(|learned| {
+            let ctx = point.light_ctx();
+            let at = At { lights, learned, index, point, ctx, n_bsdf };
+            drawn.seen = lights.contributing_lights(&ctx);
+            self.draw_by_cache(&at, [n, n_non], &mut drawn, records)
+        });
+        let count = by_cache.unwrap_or_else(|| {
+            let allocation = SampleAllocation { n_bsdf, ..SampleAllocation::fixed(n + n_non, 0) };
+            light_samples::draw(self.job, (index, point), &allocation, records)
+        });
+        if n_bsdf > 0.0 {
+            self.of_points.resize(index as usize, None);
+            self.of_points.push(Some(drawn));
+        } else {
+            self.buffers.rates.truncate(drawn.rates.start);
+            self.buffers.singles.truncate(drawn.singles.start);
+        }
+        count
     }
 
-    /// Samples of the contributing lights, in proportion to E·√V̂. Returns Σ E·V̂; `None`, and no samples, if it
-    /// is not known.
-    fn draw_weighted(&mut self, at: &At<'_>, n: u32, records: &mut Vec<Candidate>) -> Option<f32> {
-        // Weights
-        self.weights.clear();
+    /// Draws the light samples of a point by what photons tell. Returns their number; `None`, and no samples, if they
+    /// tell of no contribution.
+    fn draw_by_cache(
+        &mut self,
+        at: &At<'_, '_>,
+        [n, n_non]: [u32; 2],
+        drawn: &mut Drawn<'_>,
+        records: &mut Vec<Candidate>,
+    ) -> Option<u32> {
+        let seen = drawn.seen.lights;
+        if seen.is_empty() {
+            drawn.others = Others::Unseen { n: n + n_non, scale: f32::INFINITY };
+            return Some(at.draw_unseen((drawn, self.buffers), records));
+        }
+        let expected = if seen.len() <= MAX_WEIGHTED {
+            self.weigh(at, &drawn.seen)?
+        } else {
+            seen.iter().map(|&(light, count)| at.learned.irradiance_of(light, count)).sum()
+        };
+        at.learned.find_singles(&drawn.seen, &mut self.buffers.singles);
+        drawn.singles.end = self.buffers.singles.len();
+        drawn.others = Others::Unseen { n: n_non, scale: SURVIVAL / expected };
+        if seen.len() <= MAX_WEIGHTED {
+            self.draw_weighted(at, n, drawn, records);
+        } else {
+            self.draw_by_photons(at, n, drawn, records);
+        }
+        Some(n + at.draw_unseen((drawn, self.buffers), records))
+    }
+
+    /// Weighs the contributing lights by E·√V̂. Returns Σ E·V̂; `None` if it is not known.
+    fn weigh(&mut self, at: &At<'_, '_>, seen: &ContributingLights<'_>) -> Option<f32> {
+        let weights = &mut self.buffers.weights;
+        weights.clear();
         let (mut sum, mut expected) = (0.0, 0.0);
-        for &(light, count) in at.seen.lights {
-            let importance = at.learned.importance(&at.ctx, light);
-            let visibility = at.learned.visibility(light, importance, count);
+        for &(light, count) in seen.lights {
+            let (importance, visibility) = at.learned.expect(&at.ctx, light, count);
             let weight = importance * visibility.sqrt();
             sum += weight;
             expected += importance * visibility;
-            self.weights.push(weight);
+            weights.push(weight);
         }
-        if !(sum > 0.0 && sum.is_finite() && expected > 0.0) {
-            return None;
-        }
+        (sum > 0.0 && sum.is_finite() && expected > 0.0).then_some(expected)
+    }
 
-        // Samples
+    /// Samples of the contributing lights, in proportion to their weights.
+    fn draw_weighted(&mut self, at: &At<'_, '_>, n: u32, drawn: &mut Drawn<'_>, records: &mut Vec<Candidate>) {
+        let Buffers { weights, rates, .. } = &mut *self.buffers;
         let [offset] = at.point.stream.domain(domain::COUNTS).draw::<1>();
-        let scale = n as f32 / sum;
-        let (mut upto, mut given) = (offset, 0);
-        for (k, (&(light, _), &weight)) in at.seen.lights.iter().zip(&self.weights).enumerate() {
-            let wanted = weight * scale;
-            upto += wanted;
-            // At least one sample where one or more are wanted, whatever rounding does
-            let count = (upto as u32).saturating_sub(given).max(u32::from(wanted >= 1.0));
-            given = upto as u32;
+        let scale = n as f32 / weights.iter().sum::<f32>();
+        let lights = drawn.seen.lights;
+        let numbers = || systematic(weights, scale, offset).zip(lights);
+        rates.extend(numbers().map(|((wanted, count), &(light, _))| at.rate(light, wanted, count)));
+        drawn.rates.end = rates.len();
+
+        let buffers = &*self.buffers;
+        for (k, ((_, count), &(light, _))) in systematic(&buffers.weights, scale, offset).zip(lights).enumerate() {
+            let rate = buffers.rates[drawn.rates.start + k];
             for i in 0..count {
                 let u = at.point.stream.split(domain::CONTRIBUTING + k as u32, count, i).draw::<2>();
-                records.extend(at.sample(light, wanted.min(1.0), if wanted >= 1.0 { count } else { 1 }, u));
+                records.extend(at.sample(light, rate, u, (drawn, buffers)));
             }
         }
-        Some(expected)
+    }
+
+    /// Samples of contributing lights, chosen in proportion to their numbers of photons.
+    fn draw_by_photons(&mut self, at: &At<'_, '_>, n: u32, drawn: &mut Drawn<'_>, records: &mut Vec<Candidate>) {
+        let ContributingLights { lights, sums } = drawn.seen;
+        let Some(&total) = sums.last() else { return };
+        let rate = |k: usize| n as f32 * cumulative::weight(sums, k) / total as f32;
+        if at.n_bsdf > 0.0 {
+            self.buffers.rates.extend((0..lights.len()).map(rate));
+            drawn.rates.end = self.buffers.rates.len();
+        }
+        for i in 0..n {
+            let [u_choice, u0, u1] = at.point.stream.split(domain::LIGHT, n, i).draw::<3>();
+            let k = cumulative::find(sums, u_choice * total as f32).min(lights.len() - 1);
+            records.extend(at.sample(lights[k].0, rate(k), [u0, u1], (drawn, self.buffers)));
+        }
     }
 }
 
-impl At<'_> {
-    /// Contributing lights chosen in proportion to their numbers of photons. Returns the irradiance of all photons.
-    fn draw_by_photons(&self, n: u32, records: &mut Vec<Candidate>) -> f32 {
-        let ContributingLights { lights, sums } = self.seen;
-        let Some(&total) = sums.last() else { return 0.0 };
-        for i in 0..n {
-            let [u_choice, u0, u1] = self.point.stream.split(domain::LIGHT, n, i).draw::<3>();
-            let k = cumulative::find(sums, u_choice * total as f32).min(lights.len() - 1);
-            let pmf = cumulative::weight(sums, k) / total as f32;
-            records.extend(self.sample(lights[k].0, pmf, n, [u0, u1]));
-        }
-        lights.iter().map(|&(light, count)| self.learned.irradiance_of(light, count)).sum()
-    }
-
-    /// Samples of non-contributing lights, of which as many survive as their expected contribution times `scale` says.
-    /// `singles` are those of the lights with one photon. Returns how many.
-    fn draw_unseen(&self, n: u32, (scale, singles): (f32, &[u32]), records: &mut Vec<Candidate>) -> u32 {
-        if self.seen.lights.len() == self.lights.lit.len() {
+impl At<'_, '_> {
+    /// Samples of the lights without photons, of which as many survive as their expected contribution says. Returns how
+    /// many.
+    fn draw_unseen(&self, (drawn, buffers): (&Drawn<'_>, &Buffers), records: &mut Vec<Candidate>) -> u32 {
+        let Others::Unseen { n, scale } = drawn.others else { return 0 };
+        if drawn.seen.lights.len() == self.lights.lit.len() {
             return 0;
         }
-        let mut drawn = 0;
+        let (seen, singles) = (&drawn.seen, &buffers.singles[drawn.singles.clone()]);
+        let mut count = 0;
         for i in 0..n {
             let [u_choice, u_survival, u0, u1] = self.point.stream.split(domain::NONCONTRIBUTING, n, i).draw::<4>();
-            let Some(unseen) = self.learned.sample_unseen(&self.ctx, (&self.seen, singles), u_choice) else { continue };
+            let Some(unseen) = self.learned.sample_unseen(&self.ctx, (seen, singles), u_choice) else { continue };
             let SampledLight { light, pmf, .. } = unseen.choice;
             // Contributing lights have their own samples
-            if self.seen.place(light).is_some() || !(unseen.importance > 0.0) {
+            if seen.place(light).is_some() || !(unseen.importance > 0.0) {
                 continue;
             }
-            let survival = (unseen.importance * unseen.visibility.sqrt() / pmf * scale).min(1.0);
+            let survival = survival(&unseen, scale);
             if u_survival < survival {
-                drawn += 1;
-                records.extend(self.sample(light, pmf * survival, n, [u0, u1]));
+                count += 1;
+                records.extend(self.sample(light, n as f32 * pmf * survival, [u0, u1], (drawn, buffers)));
             }
         }
-        drawn
+        count
     }
 }

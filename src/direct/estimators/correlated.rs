@@ -27,7 +27,7 @@ use crate::direct::domain;
 use crate::direct::light_samples::{light_candidate, with_infinite};
 use crate::direct::point::ShadingPoint;
 use crate::direct::shadow_segments::Segments;
-use crate::direct::t1::T1;
+use crate::direct::t1::{T1, choice_by_sampler};
 use crate::lights::{LightId, LightSample};
 use crate::scene::{EmitterHit, EmitterScratch, RenderJob};
 use crate::settings::{CorrelatedForm, SamplingTechnique};
@@ -326,7 +326,8 @@ impl Buffers {
             candidates.stats.emitter_rays += self.rays.len() as u64;
             job.world.intersect_emitters(&self.rays, &mut self.hits, &mut self.emitter_hits);
             if crossing == 0 {
-                find_emitters(job, points, (&self.pending, &self.emitter_hits), &mut self.far, &mut self.emitters);
+                let from = (&self.pending[..], &self.emitter_hits[..]);
+                find_emitters(job, points, from, choice_by_sampler(job), &mut self.far, &mut self.emitters);
             }
             self.next_rays.clear();
             self.next_ray_of.clear();

@@ -8,7 +8,7 @@
 //! | [`ocv`] | those of `mis`, by groups of lights | those of `mis` | control variates |
 //! | [`optimal_mis`] | those of `mis`, by groups of lights | those of `mis` | optimal weights |
 //! | [`correlated`] | samples of one technique | 1/(n·p) | two estimates combined |
-//! | [`contributing`] | light samples, separately by what the visibility cache finds | 1/(n·p) | sum |
+//! | [`contributing`] | light samples, separately by what the visibility cache finds, and BSDF samples | those of `mis` | sum |
 
 pub mod contributing;
 pub mod correlated;
@@ -110,7 +110,9 @@ impl Estimator {
             }
             EstimatorKind::Contributing => {
                 let noncontributing_samples = settings.contributing.noncontributing_samples();
-                Estimator::Contributing(Contributing { samples, noncontributing_samples })
+                let bsdf_samples = settings.contributing.bsdf_samples();
+                let heuristic = settings.heuristic();
+                Estimator::Contributing(Contributing { samples, noncontributing_samples, bsdf_samples, heuristic })
             }
         }
     }
@@ -196,7 +198,8 @@ impl Estimator {
     /// Select: what each candidate contributes if its segment is unoccluded.
     pub(super) fn select(&self, candidates: &mut Candidates) {
         match self {
-            Estimator::Mc(_) | Estimator::Contributing(_) => mc::select(candidates),
+            Estimator::Mc(_) => mc::select(candidates),
+            Estimator::Contributing(contributing) => contributing.select(candidates),
             Estimator::Mis(mis) | Estimator::Ocv(Ocv { mis, .. }) | Estimator::OptimalMis(OptimalMis { mis, .. }) => {
                 mis.select(candidates)
             }

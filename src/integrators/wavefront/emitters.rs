@@ -45,7 +45,8 @@ impl EmitterRays {
             let Some(hit) = hit else { return far.push(i as u32) };
             lights[i] = hit.light;
             let (ctx, wi) = (surface.lit_points().get(i), samples.light.wi.vec3(i));
-            match direct::emitter_at(job, &ctx, wi, &hit, paths[i].time) {
+            let pmf = |ctx: &_, light| job.lights.sampler.pmf(ctx, light);
+            match direct::emitter_at(job, &ctx, wi, &hit, paths[i].time, pmf) {
                 Some(found) => set_emitter(&mut samples.light, i, &found),
                 None => samples.p_bsdf[i] = 0.0,
             }

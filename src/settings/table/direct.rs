@@ -106,6 +106,21 @@ pub(super) const DIRECT: Group = Group {
             set: |s, v| v.count().map(|n| s.integrator.contributing.noncontributing_samples = Some(n)),
             ..Setting::BASE
         },
+        Setting {
+            flag: "contributing-bsdf-samples",
+            value_name: "N",
+            parameters: &["contributingbsdfsamples"],
+            key: "contributing_bsdf_samples",
+            kind: integer(0, MAX_SAMPLES),
+            help: "BSDF samples of contributing on surfaces that are not diffuse, combined with its light samples by \
+                   --heuristic; 0 takes light samples alone",
+            default: "1",
+            applies: Applies::Estimators(&[Contributing]),
+            get: |s| s.integrator.contributing.bsdf_samples.map(|n| Value::Integer(n.into())),
+            resolved: Some(|s| Some(Value::Integer(s.integrator.contributing.bsdf_samples().into()))),
+            set: |s, v| v.count().map(|n| s.integrator.contributing.bsdf_samples = Some(n)),
+            ..Setting::BASE
+        },
     ],
 };
 
