@@ -24,6 +24,7 @@ use super::tree_node::Node;
 use super::visibility_cache::{ContributingLights, VisibilityCache};
 use super::{Light, LightCtx, LightId, SampledLight};
 use lumiris_numbers::math::ONE_MINUS_EPSILON;
+use lumiris_numbers::math::light_bound::Receiver;
 use std::f32::consts::PI;
 
 /// v₀ and a of the prior of V.
@@ -55,6 +56,12 @@ pub struct UnseenLight {
     pub importance: f32,
     /// V̂ of a light without photons.
     pub visibility: f32,
+}
+
+/// True if lights count by what the surface reflects of them.
+#[inline]
+fn is_glossy(ctx: &LightCtx) -> bool {
+    ctx.lobe.scale > 0.0
 }
 
 /// V̂ for a light of irradiance `importance` with `count` photons, one of which stands for `of_one_photon`.
@@ -104,7 +111,7 @@ impl LearnedVisibility {
     #[inline]
     pub fn expect(&self, ctx: &LightCtx, light: LightId, count: u32) -> (f32, f32) {
         let e = self.importance(ctx, light);
-        let is_by_lobe = ctx.lobe.scale > 0.0 && self.choice.tree.contains(light);
+        let is_by_lobe = is_glossy(ctx) && self.choice.tree.contains(light);
         let reflected = if is_by_lobe { self.choice.tree.light_importance(ctx, light) } else { e };
         (reflected, self.visibility(light, e, count))
     }
@@ -153,7 +160,11 @@ impl LearnedVisibility {
 
         // Those in the tree
         let u = ((u - p_infinite) / (1.0 - p_infinite)).min(ONE_MINUS_EPSILON);
-        let (light, pmf, u) = tree.sample_by(u, singles, self.by_visibility(ctx))?;
+        let (light, pmf, u) = if is_glossy(ctx) {
+            tree.sample_by(u, singles, self.by_lobe(ctx))
+        } else {
+            tree.sample_by(u, singles, self.by_visibility(ctx))
+        }?;
         Some(self.unseen(ctx, SampledLight { light, pmf: pmf * (1.0 - p_infinite), u }))
     }
 
@@ -169,7 +180,12 @@ impl LearnedVisibility {
         let count = infinite.iter().filter(|&&light| seen.place(light).is_none()).count();
         let p_infinite = self.choice.probability_of_some(ctx, count);
         let pmf = if tree.contains(light) {
-            tree.pmf_by(light, singles, self.by_visibility(ctx)) * (1.0 - p_infinite)
+            let of_tree = if is_glossy(ctx) {
+                tree.pmf_by(light, singles, self.by_lobe(ctx))
+            } else {
+                tree.pmf_by(light, singles, self.by_visibility(ctx))
+            };
+            of_tree * (1.0 - p_infinite)
         } else if infinite.binary_search(&light).is_ok() {
             p_infinite / count as f32
         } else {
@@ -178,15 +194,25 @@ impl LearnedVisibility {
         self.unseen(ctx, SampledLight { light, pmf, u: 0.0 })
     }
 
-    /// E·√V̂ of nodes, as a function of the place, the node, and the number of lights below it with a single photon.
+    /// E·√V̂ of nodes at a diffuse point, as a function of the place, the node, and the number of lights below it with a
+    /// single photon.
     #[inline]
     fn by_visibility(&self, ctx: &LightCtx) -> impl Fn(usize, &Node, usize) -> f32 {
-        let (by_lobe, diffuse) = (*ctx, ctx.diffuse());
+        let receiver = Receiver { lobe: None, ..ctx.receiver() };
         move |place, node, singles| {
-            let e = node.importance(&diffuse);
-            let visibility = estimate(e, self.of_nodes[place], singles as f32);
-            let reflected = if by_lobe.lobe.scale > 0.0 { node.importance(&by_lobe) } else { e };
-            reflected * visibility.sqrt()
+            let e = node.bound.importance(&receiver);
+            e * estimate(e, self.of_nodes[place], singles as f32).sqrt()
+        }
+    }
+
+    /// The same at a glossy point.
+    #[inline]
+    fn by_lobe(&self, ctx: &LightCtx) -> impl Fn(usize, &Node, usize) -> f32 {
+        let receiver = ctx.receiver();
+        let diffuse = Receiver { lobe: None, ..receiver };
+        move |place, node, singles| {
+            let e = node.bound.importance(&diffuse);
+            node.bound.importance(&receiver) * estimate(e, self.of_nodes[place], singles as f32).sqrt()
         }
     }
 
