@@ -12,8 +12,9 @@
 //! too far away, or has too few photon paths, for its photons to tell anything.
 //!
 //! The density of light samples that has the least variance is proportional to E·√V̂, as the second moment of a sample
-//! is E²·V̂/p. On a glossy surface E is weighted by what is reflected to the viewer, but V̂ goes by E itself. [`LearnedVisibility::sample_unseen`] chooses lights without photons in this way: of a node of the light
-//! tree, Φ/(A·N) is the sum over its lights.
+//! is E²·V̂/p. On a glossy surface E is weighted by what is reflected to the viewer, but V̂ goes by E itself.
+//! [`LearnedVisibility::sample_unseen`] chooses lights without photons in this way: of a node of the light tree, Φ/(A·N)
+//! is the sum over its lights.
 //!
 //! A node may hold many lights that are visible and of which few photons are expected each. What all those of a node that
 //! were not seen can be expected to send is as much as came from those seen exactly once [Good 1953], so c is their number

@@ -2,16 +2,18 @@
 //! others [Keller and Wald 2000, §3].
 //!
 //! S_con samples are taken on 𝓛_con in proportion to w_l = E_l·√V̂_l, the density of least variance: E_l is the light's
-//! irradiance without shadows, on glossy surfaces weighted by what is reflected, V̂_l its visibility as photons tell it ([`crate::lights::learned_visibility`]). With
-//! m_l = S_con·w_l/Σ w, light l gets ⌊m_l⌋ or ⌈m_l⌉ samples by systematic resampling. If m_l ≥ 1, it counts their mean;
-//! otherwise it has a sample with probability m_l, which counts 1/m_l times. Where there are more than
-//! [`MAX_WEIGHTED`] such lights, S_con of them are chosen in proportion to their numbers of photons.
+//! irradiance without shadows, on glossy surfaces weighted by what is reflected, V̂_l its visibility as photons tell it
+//! ([`crate::lights::learned_visibility`]). With m_l = S_con·w_l/Σ w, light l gets ⌊m_l⌋ or ⌈m_l⌉ samples by systematic
+//! resampling. If m_l ≥ 1, it counts their mean; otherwise it has a sample with probability m_l, which counts 1/m_l times.
+//! Where there are more than [`MAX_WEIGHTED`] such lights, S_con of them are chosen in proportion to their numbers of
+//! photons.
 //!
 //! S_non samples are taken on the non-contributing lights, which a descent of the light tree chooses nearly in proportion
 //! to E_l·√V̂_l, where V̂_l is that of a light without photons: lights of which many photons were expected get few of these
-//! samples, and those beside lights with a single photon more. A contributing light that is chosen counts 0. A sample of the light l, chosen with probability p_l, survives
-//! Russian roulette with probability q_l = min(1, [`SURVIVAL`]·(E_l·√V̂_l/p_l)/Σ E·V̂), by what is expected of it relative to
-//! the contributing lights, and counts 1/(p_l·q_l) times. So every sum has the right expectation whatever the photons
+//! samples, and those beside lights with a single photon more. A contributing light that is chosen counts 0. A sample of
+//! the light l, chosen with probability p_l, survives Russian roulette with probability
+//! q_l = min(1, [`SURVIVAL`]·(E_l·√V̂_l/p_l)/Σ E·V̂), by what is expected of it relative to the contributing lights, and
+//! counts 1/(p_l·q_l) times. So every sum has the right expectation whatever the photons
 //! tell; without these samples (S_non = 0) the estimate is biased.
 //!
 //! Light samples alone leave bright spots on glossy surfaces. There S_b BSDF samples are combined with them by multiple
