@@ -29,6 +29,7 @@ class Settings(TypedDict, total=False):
     heuristic: Optional[Literal["balance", "power", "maximum"]]
     bsdf_fraction: Optional[float]
     noncontributing_samples: Optional[int]
+    contributing_bsdf_samples: Optional[int]
     proposals: Optional[Union[int, Literal["auto", "optimal"]]]
     strata: Optional[Literal["none", "proposals", "weights", "systematic"]]
     proposal_points: Optional[Literal["independent", "stratified"]]

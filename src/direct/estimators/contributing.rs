@@ -14,7 +14,7 @@
 //! the light l, chosen with probability p_l, survives Russian roulette with probability
 //! q_l = min(1, [`SURVIVAL`]·(E_l·√V̂_l/p_l)/Σ E·V̂), by what is expected of it relative to the contributing lights, and
 //! counts 1/(p_l·q_l) times. So every sum has the right expectation whatever the photons
-//! tell; without these samples (S_non = 0) the estimate is biased.
+//! tell; without these samples (S_non = 0) the estimate is biased, and light samples are all that is taken.
 //!
 //! Light samples alone leave bright spots on glossy surfaces. There S_b BSDF samples are combined with them by multiple
 //! importance sampling [Veach and Guibas 1995]: a direction that points at the light l has the density r_l·p_l of light
@@ -85,19 +85,9 @@ impl Contributing {
         t1.draw_lights(allocate, |_, at, allocation, records| draws.draw(at, allocation, records));
         let Draws { buffers, of_points, .. } = draws;
         let drawn_at = |point: u32| of_points.get(point as usize).and_then(Option::as_ref);
-        let first = t1.candidates.records.len();
         t1.draw_bsdf(allocate, &mut [], |point, ctx, light| {
             drawn_at(point).map_or(0.0, |drawn| drawn.rate(&job.lights, buffers, ctx, light))
         });
-        if self.noncontributing_samples == 0 {
-            // BSDF samples leave out the same lights
-            let is_left_out = |c: &Candidate| drawn_at(c.point).is_some_and(|drawn| drawn.leaves_out(c.light));
-            let mut place = 0;
-            t1.candidates.records.retain(|c| {
-                place += 1;
-                place <= first || !is_left_out(c)
-            });
-        }
     }
 
     pub(super) fn select(&self, candidates: &mut Candidates) {
@@ -134,7 +124,9 @@ struct Draws<'a, 'b> {
 struct Drawn<'a> {
     /// 𝓛_con with photon counts.
     seen: ContributingLights<'a>,
-    /// The part of [`Buffers::rates`] that are theirs.
+    /// Samples on them (S_con).
+    n: u32,
+    /// The part of [`Buffers::rates`] that are theirs; none where they are chosen by their photons.
     rates: Range<usize>,
     /// The part of [`Buffers::singles`].
     singles: Range<usize>,
@@ -151,11 +143,6 @@ enum Others {
 }
 
 impl Drawn<'_> {
-    /// True for a light of which no samples are taken on purpose.
-    fn leaves_out(&self, light: LightId) -> bool {
-        matches!(self.others, Others::Unseen { n: 0, .. }) && self.seen.place(light).is_none()
-    }
-
     /// Expected number of samples of a light.
     #[inline]
     fn rate(&self, lights: &LightSampling, buffers: &Buffers, ctx: &LightCtx, light: LightId) -> f32 {
@@ -164,7 +151,8 @@ impl Drawn<'_> {
             Others::Unseen { n, .. } => n as f32,
         };
         if let Some(k) = self.seen.place(light) {
-            return buffers.rates[self.rates.start + k];
+            let weighted = buffers.rates[self.rates.clone()].get(k).copied();
+            return weighted.unwrap_or_else(|| self.rate_by_photons(k));
         }
         let (Others::Unseen { scale, .. }, Some(learned)) = (self.others, lights.learned_visibility()) else {
             return 0.0;
@@ -172,6 +160,13 @@ impl Drawn<'_> {
         let unseen = learned.unseen_light(ctx, (&self.seen, &buffers.singles[self.singles.clone()]), light);
         let pmf = unseen.choice.pmf;
         if pmf > 0.0 && unseen.importance > 0.0 { n * pmf * survival(&unseen, scale) } else { 0.0 }
+    }
+
+    /// Expected number of samples of contributing light number `k`, where these are chosen by their photons.
+    #[inline]
+    fn rate_by_photons(&self, k: usize) -> f32 {
+        let total = self.seen.sums.last().map_or(1.0, |&total| total as f32);
+        self.n as f32 * cumulative::weight(self.seen.sums, k) / total
     }
 }
 
@@ -247,6 +242,7 @@ impl Draws<'_, '_> {
         let Buffers { rates, singles, .. } = &*self.buffers;
         let mut drawn = Drawn {
             seen: ContributingLights::default(),
+            n,
             rates: rates.len()..rates.len(),
             singles: singles.len()..singles.len(),
             others: Others::BySampler { n: n + n_non },
@@ -294,9 +290,9 @@ impl Draws<'_, '_> {
         drawn.singles.end = self.buffers.singles.len();
         drawn.others = Others::Unseen { n: n_non, scale: SURVIVAL / expected };
         if seen.len() <= MAX_WEIGHTED {
-            self.draw_weighted(at, n, drawn, records);
+            self.draw_weighted(at, drawn, records);
         } else {
-            self.draw_by_photons(at, n, drawn, records);
+            self.draw_by_photons(at, drawn, records);
         }
         Some(n + at.draw_unseen((drawn, self.buffers), records))
     }
@@ -317,10 +313,10 @@ impl Draws<'_, '_> {
     }
 
     /// Samples of the contributing lights, in proportion to their weights.
-    fn draw_weighted(&mut self, at: &At<'_, '_>, n: u32, drawn: &mut Drawn<'_>, records: &mut Vec<Candidate>) {
+    fn draw_weighted(&mut self, at: &At<'_, '_>, drawn: &mut Drawn<'_>, records: &mut Vec<Candidate>) {
         let Buffers { weights, rates, .. } = &mut *self.buffers;
         let [offset] = at.point.stream.domain(domain::COUNTS).draw::<1>();
-        let scale = n as f32 / weights.iter().sum::<f32>();
+        let scale = drawn.n as f32 / weights.iter().sum::<f32>();
         let lights = drawn.seen.lights;
         let numbers = || systematic(weights, scale, offset).zip(lights);
         rates.extend(numbers().map(|((wanted, count), &(light, _))| at.rate(light, wanted, count)));
@@ -337,18 +333,14 @@ impl Draws<'_, '_> {
     }
 
     /// Samples of contributing lights, chosen in proportion to their numbers of photons.
-    fn draw_by_photons(&mut self, at: &At<'_, '_>, n: u32, drawn: &mut Drawn<'_>, records: &mut Vec<Candidate>) {
-        let ContributingLights { lights, sums } = drawn.seen;
+    fn draw_by_photons(&self, at: &At<'_, '_>, drawn: &Drawn<'_>, records: &mut Vec<Candidate>) {
+        let (ContributingLights { lights, sums }, n) = (drawn.seen, drawn.n);
         let Some(&total) = sums.last() else { return };
-        let rate = |k: usize| n as f32 * cumulative::weight(sums, k) / total as f32;
-        if at.n_bsdf > 0.0 {
-            self.buffers.rates.extend((0..lights.len()).map(rate));
-            drawn.rates.end = self.buffers.rates.len();
-        }
         for i in 0..n {
             let [u_choice, u0, u1] = at.point.stream.split(domain::LIGHT, n, i).draw::<3>();
             let k = cumulative::find(sums, u_choice * total as f32).min(lights.len() - 1);
-            records.extend(at.sample(lights[k].0, rate(k), [u0, u1], (drawn, self.buffers)));
+            let rate = drawn.rate_by_photons(k);
+            records.extend(at.sample(lights[k].0, rate, [u0, u1], (drawn, self.buffers)));
         }
     }
 }

@@ -110,7 +110,8 @@ impl Estimator {
             }
             EstimatorKind::Contributing => {
                 let noncontributing_samples = settings.contributing.noncontributing_samples();
-                let bsdf_samples = settings.contributing.bsdf_samples();
+                // They would find the lights that are left out
+                let bsdf_samples = if noncontributing_samples > 0 { settings.contributing.bsdf_samples() } else { 0 };
                 let heuristic = settings.heuristic();
                 Estimator::Contributing(Contributing { samples, noncontributing_samples, bsdf_samples, heuristic })
             }

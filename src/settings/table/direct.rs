@@ -113,7 +113,7 @@ pub(super) const DIRECT: Group = Group {
             key: "contributing_bsdf_samples",
             kind: integer(0, MAX_SAMPLES),
             help: "BSDF samples of contributing on surfaces that are not diffuse, combined with its light samples by \
-                   --heuristic; 0 takes light samples alone",
+                   --heuristic; 0 takes light samples alone, as --noncontributing-samples 0 does",
             default: "1",
             applies: Applies::Estimators(&[Contributing]),
             get: |s| s.integrator.contributing.bsdf_samples.map(|n| Value::Integer(n.into())),
