@@ -17,6 +17,7 @@ use lumiris::render::cryptomatte::{Cryptomatte, cryptomattes};
 use lumiris::render::output::{self, Aov};
 use lumiris::render::parts::{Asked, FilmFile, PartError, Storage, Stored};
 use lumiris::render::plan::{Preparation, prepare};
+use lumiris::render::processor_time;
 use lumiris::render::{Continuation, Progress, RenderError, RenderSettings, Rendering, go_on};
 use lumiris::scene::RenderJob;
 use lumiris::settings::value::{Kind, Value};
@@ -236,7 +237,9 @@ impl Request {
         let mut asked = self.asked.clone();
         let stored = self.parts.stored().map_err(Failure::Part)?;
         stored.as_ref().map_or(Ok(()), |stored| asked.complete(stored)).map_err(Failure::Part)?;
+        let before = processor_time::of_process();
         let mut loaded = self.load(&asked, stored.as_ref())?;
+        let loading = processor_time::of_process().saturating_sub(before);
         let mut warnings = Vec::from_iter(Some(loaded.warnings.to_string()).filter(|text| !text.is_empty()));
         if loaded.settings.integrator.leaves_lights_out() {
             warnings.push("without samples on non-contributing lights, direct light is biased".to_owned());
@@ -254,6 +257,7 @@ impl Request {
             threads: self.render.threads,
             ratio_map: asks_for_ratio,
             time_limit: self.render.time_limit.filter(|_| stored.is_none() && self.plan.is_empty()),
+            loading,
             stop,
         };
         let plan = prepare(&mut job, &how).map_err(|error| match error {

@@ -18,7 +18,10 @@
 //! Where lights at infinity are beside others, a round before these finds how many light samples are for them
 //! ([`super::auto_lights`]).
 //!
-//! In paths, a third round finds by blocks of pixels whether they share paths, and with how many samples
+//! In paths, a few of them and numbers between them are compared once more on more pixels ([`super::auto_check`]), since few pixels
+//! know an efficiency to a quarter. There, time is that of all that an image takes, with its part of loading and pilots.
+//!
+//! Then a further round finds by blocks of pixels whether they share paths, and with how many samples
 //! ([`super::auto_reuse`]). What light paths find ([`crate::integrators::light_paths`]) is left to them in all rounds; how many
 //! there are follows from a pilot of theirs, which knows the variance that camera paths would have of the same light: few
 //! pixels of a round do not see it.
@@ -32,13 +35,14 @@ use super::auto_candidates::{
     Numbers, contributing, different, goes_on_by_one, numbers_of, numbers_of_contributing, second_round, usual,
     with_numbers, without_pilot,
 };
+use super::auto_check;
 use super::auto_contributing::Contributing;
 use super::auto_lights;
 use super::auto_measure::{Chunk, measure};
 use super::auto_pixels::{Place, SEED, Scouted, grid};
 use super::auto_reuse;
 pub use super::auto_round::Trial;
-use super::auto_round::{Candidate, Mean, Round};
+use super::auto_round::{Candidate, Caution, Mean, Predicted, Round};
 use super::preparation::Preparation;
 use super::{RenderError, RenderSettings, Run, processor_time};
 use crate::film::PixelBounds;
@@ -55,6 +59,7 @@ use lumiris_numbers::samplers::SamplerKind;
 use rayon::prelude::*;
 use serde::{Deserialize, Serialize};
 use std::sync::atomic::AtomicBool;
+use std::time::Duration;
 
 /// Fewest samples of a pixel and seed, in direct light and in paths, and most: with the fewest there are most pixels in the same
 /// time, with fewer than the image has, what their net gains is not seen, which is more where light is direct.
@@ -80,6 +85,10 @@ const LIGHT_TRIALS: f64 = 3.0;
 /// Pixels that are looked at before the rounds, for each pixel of one, and samples of each and seed.
 const SCOUTED: usize = 8;
 const SCOUT_SPP: u32 = 2;
+/// Time of all rounds after the first one over that of the first, about.
+const FOLLOWING: f64 = 7.0;
+/// Standard error of what the model says of paths with more samples of two kinds, beside that of what was measured.
+const ERROR_OF_BOTH: f64 = 0.3;
 /// Share of the greatest efficiency, by the model, with which fewer samples will do; and fewer proposals.
 const NEARLY: f64 = 0.99;
 const RATIO_NEARLY: f64 = 0.95;
@@ -92,10 +101,6 @@ const DIRECT_BSDF: [u32; 5] = [1, 2, 4, 8, 16];
 const FIRST: [u32; 6] = [1, 2, 4, 8, 16, 32];
 const LATER: [u32; 5] = [1, 2, 4, 8, 16];
 const BSDF: [u32; 4] = [1, 2, 4, 8];
-/// Later ones where pixels share paths.
-const LATER_SHARED: [u32; 7] = [1, 2, 3, 4, 6, 8, 16];
-/// Light samples at first vertices, without sharing, from which on there are not more with it.
-const MANY_LIGHT_SAMPLES: u32 = 4;
 /// Light paths per camera sample among which is chosen.
 const LIGHT_PATHS: [f32; 8] = [0.0, 0.03125, 0.0625, 0.125, 0.25, 0.5, 1.0, 2.0];
 /// Part of a pilot of light paths whose whole is traced before the image.
@@ -120,7 +125,8 @@ pub struct AutoChoice {
     pub pixels: usize,
     /// Samples of each and seed.
     pub spp: u32,
-    /// The model of `mis`: time a of a camera sample (ns), and of each light sample at first and at later vertices, and BSDF sample.
+    /// The model of `mis`: time a of a camera sample (ns), in paths with its part of what the image takes before, and of each light
+    /// sample at first and at later vertices, and BSDF sample.
     pub cost: Vec<f64>,
     /// The model: relative variance A, and of one sample of each of these kinds.
     pub variance: Vec<f64>,
@@ -132,6 +138,9 @@ pub struct AutoChoice {
     pub lights: Vec<Trial>,
     /// The trials of both rounds.
     pub trials: [Vec<Trial>; 2],
+    /// Those of some of the second round and of numbers between them, on more pixels.
+    #[serde(default)]
+    pub checked: Vec<Trial>,
     /// Those with and without shared paths, in blocks of pixels.
     #[serde(default)]
     pub sharing: Vec<Trial>,
@@ -218,6 +227,7 @@ const SECOND_ROUND: usize = 1;
 const SHARING: usize = 2;
 const LIGHTS: usize = 3;
 const SCOUTING: usize = 4;
+const CHECK: usize = 5;
 
 /// What was measured of the chosen settings: the variance of a camera sample, its time (ns), and [`Round::relative`].
 struct Measured {
@@ -226,6 +236,9 @@ struct Measured {
     relative: f64,
 }
 
+/// Candidates, the index of the chosen one, and what was measured to check it, if it was.
+type Checked = (Vec<Candidate>, usize, Option<(f64, Vec<Trial>)>);
+
 /// Where a round measures.
 struct Pilot {
     /// Pixels of a round.
@@ -233,9 +246,13 @@ struct Pilot {
     has_lights: bool,
     /// Those of the rounds [`FIRST_ROUND`], [`SECOND_ROUND`], [`SHARING`], by blocks, and [`LIGHTS`], which may have none.
     places: [Vec<Place>; 4],
+    /// What the pixels of a further round are drawn from.
+    scouted: Option<Scouted>,
     /// Samples of each and seed.
     spp: u32,
     seed: u32,
+    /// What the image takes before it is rendered, per camera sample (ns).
+    fixed: f64,
     /// What light paths find, if they may be of use.
     light: Option<LightPilot>,
 }
@@ -264,8 +281,10 @@ impl Pilot {
             count,
             has_lights,
             places: Default::default(),
+            scouted: None,
             spp,
             seed: sampling.seed,
+            fixed: 0.0,
             light: None,
         })
     }
@@ -284,6 +303,7 @@ impl Pilot {
         let few = fit[0];
         let nanoseconds = self.scout(job, &Candidate::named(with_numbers(&job.settings().integrator, few)), how)?;
         let lights = self.choose_lights(job, few, how)?;
+        self.add_time(job, how.loading + (processor_time::of_process() - start));
         let photons = Contributing::new(job, nanoseconds);
         let base = job.settings().integrator;
         let base = &base;
@@ -299,7 +319,9 @@ impl Pilot {
         };
         let fitted: Vec<_> = candidates.iter().map(|c| numbers(&c.settings)).collect();
         candidates.extend(photons.iter().flat_map(Contributing::fit));
+        let of_round = processor_time::of_process();
         let first = self.round(job, &candidates, FIRST_ROUND, how)?;
+        let of_round = processor_time::of_process() - of_round;
         let is_net = has_later && job.settings().sampling.sampler != SamplerKind::Independent;
         let powers = if is_net { OF_NETS } else { INDEPENDENT };
         let models = first.models(&fitted, powers);
@@ -328,30 +350,43 @@ impl Pilot {
         if job.lights.find_glows() {
             candidates.retain(|c| c.settings.light_choice().glows);
         }
+        self.add_time(job, of_round.mul_f64(1.0 + FOLLOWING));
         let second = self.round(job, &candidates, SECOND_ROUND, how)?;
         let predicted = |candidate: &Candidate| {
             if candidate.settings.estimator == EstimatorKind::Contributing {
                 let models = of_contributing.as_ref()?;
-                return Some(Round::predicted(models, numbers_of_contributing(&candidate.settings).map(f64::from)));
+                let numbers = numbers_of_contributing(&candidate.settings).map(f64::from);
+                return Some(Predicted { gains: Round::predicted(models, numbers), error: 0.0 });
             }
             let IntegratorSettings { samples, later_samples, bsdf_fraction, .. } = candidate.settings;
             let with_its = IntegratorSettings { samples, later_samples, bsdf_fraction, ..without_pilot(base) };
-            (candidate.settings == with_its).then(|| Round::predicted(&models, numbers(&with_its)))
+            let [light, _, bsdf] = numbers(&with_its);
+            // What BSDF samples leave beside many light samples is not in the model
+            let error = if has_later && light > 1.0 && bsdf > 1.0 { ERROR_OF_BOTH } else { 0.0 };
+            let gains = || Round::predicted(&models, numbers(&with_its));
+            (candidate.settings == with_its).then(|| Predicted { gains: gains(), error })
         };
         let predicted: Vec<_> = candidates.iter().map(predicted).collect();
-        let chosen = second.choose(&candidates, &predicted);
-        let relative = second.relative;
-        let second = second.trials(&candidates);
+        let chosen = second.choose(&candidates, &predicted, Caution::OF_FEW);
+        let trials = [trials, second.trials(&candidates)];
+        let gains: Vec<_> = (0..candidates.len()).map(|k| second.united_gain(k, chosen, &predicted)).collect();
+        let (candidates, chosen, checked) = self.check(job, candidates, (&second, &gains, chosen), how)?;
+        let (relative, chosen_trial) = match &checked {
+            Some((relative, checked)) => (*relative, &checked[chosen]),
+            None => (second.relative, &trials[1][chosen]),
+        };
+        let chosen = &candidates[chosen];
         let of_chosen = match &of_contributing {
-            Some(models) if candidates[chosen].settings.estimator == EstimatorKind::Contributing => &models[0],
+            Some(models) if chosen.settings.estimator == EstimatorKind::Contributing => &models[0],
             _ => &model,
         };
-        let (sharing, mut settings) = self.share(job, &candidates[chosen], of_chosen, how)?;
-        let &Trial { variance, nanoseconds, .. } =
-            if settings.path_reuse.is_some() { &sharing[1] } else { &second[chosen] };
+        let (sharing, mut settings) = self.share(job, chosen, of_chosen, how)?;
+        // Where sharing is given, it was in all trials
+        let of_sharing = sharing.get(1).filter(|_| settings.path_reuse.is_some());
+        let &Trial { variance, nanoseconds, .. } = of_sharing.unwrap_or(chosen_trial);
         settings.light_paths = self.choose_light_paths(job, &settings, &Measured { variance, nanoseconds, relative });
         // Other settings that use a cache have one of their own number of photons
-        if candidates[chosen].settings.estimator != EstimatorKind::Contributing {
+        if chosen.settings.estimator != EstimatorKind::Contributing {
             job.lights.set_visibility_cache(None);
         }
         let choice = AutoChoice {
@@ -363,10 +398,21 @@ impl Pilot {
             chosen: Candidate::named(settings).name,
             seconds: (processor_time::of_process() - start).as_secs_f64(),
             lights,
-            trials: [trials, second],
+            trials,
+            checked: checked.map_or(Vec::new(), |(_, trials)| trials),
             sharing,
         };
         Ok((choice, settings))
+    }
+
+    /// Adds what was done before the image to the time of each of its samples, where there are paths and the number of samples does
+    /// not follow from their noise.
+    fn add_time(&mut self, job: &RenderJob, time: Duration) {
+        let Settings { integrator, sampling } = job.settings();
+        if sampling.noise.is_none() && integrator.depth() > 1 {
+            let samples = job.world.scene.film.bounds.area() as f64 * f64::from(sampling.pilot_spp());
+            self.fixed += time.as_secs_f64() * 1e9 / samples;
+        }
     }
 
     /// Before all other rounds: the fraction of light samples for lights at infinity, with few samples.
@@ -390,7 +436,35 @@ impl Pilot {
         Ok(trials)
     }
 
-    /// Third round: whether pixels share paths, and the numbers of samples if they do.
+    /// After the second `round`, by which candidates have these gains over the chosen one: some of them once more, and numbers
+    /// between them, on more pixels. Returns what is left to choose from, what is chosen, and [`Round::relative`] with the trials.
+    fn check(
+        &self,
+        job: &RenderJob,
+        candidates: Vec<Candidate>,
+        (round, gains, chosen): (&Round, &[(f64, f64)], usize),
+        how: &Preparation<'_>,
+    ) -> Result<Checked, RenderError> {
+        let Settings { integrator: base, sampling } = *job.settings();
+        let samples = job.world.scene.film.bounds.area() as f64 * f64::from(sampling.pilot_spp());
+        let times: Vec<f64> = round.measured.iter().map(|(time, _)| *time).collect();
+        let sizes = (self.places[SECOND_ROUND].len(), self.spp, samples);
+        // Where light is direct, numbers are limited by few pixels that adaptive counts do not find either: more pixels, of which
+        // the mean of σ is known better, led to choices that were no better
+        let has_later = base.depth() > 1;
+        let some = has_later.then(|| auto_check::choose(&base, &candidates, &times, (gains, chosen), sizes)).flatten();
+        let (Some(scouted), Some((some, count))) = (&self.scouted, some) else {
+            return Ok((candidates, chosen, None));
+        };
+        let places = scouted.draw(count.min(MAX_PIXELS), CHECK as u32);
+        let mut round = self.measured(job, &some, (&places, self.spp, CHECK), how)?;
+        let some = round.by_times(some);
+        let chosen = round.choose(&some, &[], Caution::OF_MANY);
+        let trials = round.trials(&some);
+        Ok((some, chosen, Some((round.relative, trials))))
+    }
+
+    /// Last round: whether pixels share paths, and the numbers of samples if they do.
     fn share(
         &self,
         job: &RenderJob,
@@ -425,12 +499,7 @@ impl Pilot {
         let round = Round { mean: Mean::Both, ..round };
         let shared = if is_open {
             let of_pilot = round.models_from(1, &[numbers, more[0], more[1]].map(|n| n.map(f64::from)), model.powers);
-            // No further than what was measured
-            let within =
-                |numbers: &[u32], most: u32| numbers.iter().copied().filter(|n| *n <= most).collect::<Vec<_>>();
-            // Many samples at first vertices were chosen for what is not shared: twice as many tell the model, and are too many
-            let most = if first > MANY_LIGHT_SAMPLES { first } else { 2 * first };
-            let choices = [within(&FIRST, most), within(&LATER_SHARED, 2 * later)];
+            let choices = auto_reuse::choices(&FIRST, numbers);
             auto_reuse::best_numbers(&round, numbers, (model, &of_pilot), choices.each_ref().map(Vec::as_slice))
         } else {
             auto_reuse::best(&round).map(|edge| (edge, numbers))
@@ -474,6 +543,7 @@ impl Pilot {
             scouted.draw_blocks(&bounds, 3 * count, SHARING as u32),
             if self.has_lights { drawn(LIGHTS) } else { Vec::new() },
         ];
+        self.scouted = Some(scouted);
         Ok(round.measured[0].0)
     }
 
@@ -517,7 +587,7 @@ impl Pilot {
         let of = |k: usize| {
             let nanoseconds = measured.iter().map(|chunk| chunk.of_candidates[k].0).sum::<f64>() / samples;
             let differences = measured.iter().flat_map(|chunk| &chunk.of_candidates[k].1).copied().collect();
-            (nanoseconds + candidates[k].preparation, differences)
+            (nanoseconds + candidates[k].preparation + self.fixed, differences)
         };
         let (settings, sampling) = (&candidates[0].settings, &job.settings().sampling);
         let mean = match settings.depth() {

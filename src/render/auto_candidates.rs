@@ -114,9 +114,13 @@ fn other_numbers(base: &IntegratorSettings, best: Numbers) -> Numbers {
 /// What is usual, the best numbers of `mis`, and these with another setting each. None twice.
 pub(super) fn second_round(base: &IntegratorSettings, best: Numbers) -> Vec<Candidate> {
     let chosen = with_numbers(base, best);
-    let mut all = vec![usual(base), chosen];
+    let mut all = vec![usual(base)];
     // What BSDF samples leave depends on how many light samples there are beside them, unlike in the model
     let [light, later, bsdf] = best;
+    if base.depth() > 1 && bsdf > 1 {
+        all.push(with_numbers(base, [light, later, 1]));
+    }
+    all.push(chosen);
     let more = [light, later, (light / 4).max(2)];
     if bsdf == 1 && light >= 4 && goes_on_by_one(base, &more) {
         all.push(with_numbers(base, more));
@@ -208,8 +212,8 @@ mod tests {
         }
         let open = IntegratorSettings::default();
         let candidates = second_round(&open, [12, 1, 4]);
-        let chosen = &candidates[1].settings;
-        assert_eq!([0, 1].map(|vertex| chosen.sample_counts_at(vertex).samples), [16, 2]);
+        let samples = |k: usize| [0, 1].map(|vertex| candidates[k].settings.sample_counts_at(vertex).samples);
+        assert_eq!([samples(1), samples(2)], [[13, 2], [16, 2]], "light samples alone, and the best");
         let names: std::collections::HashSet<&str> = candidates.iter().map(|c| c.name.as_str()).collect();
         assert_eq!(names.len(), candidates.len(), "{names:?}");
     }

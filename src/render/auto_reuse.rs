@@ -8,11 +8,16 @@ use super::auto_candidates::Numbers;
 use super::auto_round::{Candidate, Round, jackknife};
 use crate::settings::IntegratorSettings;
 use lumiris_numbers::estimators::efficiency::Model;
+use std::ops::RangeInclusive;
 
 /// Edge of the blocks of the pilot.
 pub(super) const EDGE: u32 = 4;
 /// Edges among which is chosen, of which the first shares nothing: the larger blocks are, the coarser is the grain, and plain MSE gains nothing more.
 const EDGES: [u32; 6] = [1, 2, 3, 4, 5, 6];
+/// Light samples at later vertices among which is chosen.
+const LATER: [u32; 7] = [1, 2, 3, 4, 6, 8, 16];
+/// Light samples at first vertices, without sharing, from which on there are not more with it.
+const MANY_LIGHT_SAMPLES: u32 = 4;
 /// Least time of sharing in blocks of the pilot, relative to that of a camera sample: what was measured may be less by chance.
 const MIN_COST: f64 = 0.075;
 /// The part of that time which blocks of any size take: in a box and in the open, blocks of 2 × 2 pixels took half the time
@@ -57,6 +62,17 @@ pub(super) fn best(round: &Round) -> Option<u32> {
     let edge = EDGES.into_iter().find(|&edge| gains(edge)[0] >= greatest + NEARLY.ln())?;
     let (gain, error) = jackknife(&gains(edge));
     (edge > 1 && gain > MIN_GAIN.ln().max(MIN_ERRORS * error)).then_some(edge)
+}
+
+/// The numbers of light samples at first vertices, of those given, and at later ones among which is chosen where pixels share
+/// paths: no more than were measured. First vertices are not shared, so that fewer of their samples are not better than before;
+/// and where there are many, twice as many tell the model, and are too many.
+pub(super) fn choices(of_first: &[u32], [first, later, _]: Numbers) -> [Vec<u32>; 2] {
+    let most = if first > MANY_LIGHT_SAMPLES { first } else { 2 * first };
+    let within = |numbers: &[u32], range: RangeInclusive<u32>| {
+        numbers.iter().copied().filter(|n| range.contains(n)).collect::<Vec<_>>()
+    };
+    [within(of_first, first..=most), within(&LATER, 1..=2 * later)]
 }
 
 /// The edge and the numbers that are most efficient by a round of [`candidates`], if they share paths and that is more than
@@ -115,6 +131,13 @@ mod tests {
             let more = if edge > 1 { FIXED * 1.5 * (of_pilot - 1.0) + (n - 1.0) } else { 0.0 };
             assert!((cost * 10.0 - (10.0 + more)).abs() < 1e-9 && (variance * 8.0 - (2.0 + 6.0 / n)).abs() < 1e-9);
         }
+    }
+
+    #[test]
+    fn first_vertices_have_as_many_samples_as_before_and_none_more_than_were_measured() {
+        let of_first = [1, 2, 4, 8, 16, 32];
+        assert_eq!(choices(&of_first, [2, 2, 1]), [vec![2, 4], vec![1, 2, 3, 4]]);
+        assert_eq!(choices(&of_first, [8, 1, 1]), [vec![8], vec![1, 2]]);
     }
 
     #[test]

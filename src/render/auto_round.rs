@@ -5,12 +5,24 @@ use lumiris_numbers::estimators::efficiency::{KINDS, Measured, Model};
 use serde::{Deserialize, Serialize};
 use std::f64::consts::PI;
 
-/// By how much a choice must be more efficient than the one before it; and one that has fewer samples than usual, whose error
-/// may be that of few pixels which the pilot does not see.
-pub(super) const MIN_GAIN: f64 = 1.03;
+/// By how much a choice must be more efficient than the one before it if it has fewer samples than usual, whose error may be
+/// that of few pixels which the pilot does not see.
 const MIN_GAIN_OF_FEW: f64 = 1.5;
-/// Standard errors by which it must be: with other numbers of samples, and with another estimator, of which the same is true.
-const MIN_ERRORS: [f64; 2] = [0.5, 1.5];
+
+/// By how much a choice must be more efficient than the one before it.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Caution {
+    gain: f64,
+    /// Standard errors: with other numbers of samples, and with another estimator, whose error may be that of few pixels.
+    errors: [f64; 2],
+}
+
+impl Caution {
+    /// Where many candidates are compared on few pixels, with those first that need no luck.
+    pub(super) const OF_FEW: Caution = Caution { gain: 1.03, errors: [0.5, 1.5] };
+    /// Where few are compared on more pixels.
+    pub(super) const OF_MANY: Caution = Caution { gain: 1.0, errors: [0.0, 1.5] };
+}
 /// Relative standard error of a measured time.
 const TIME_ERROR: f64 = 0.02;
 /// Groups of pixels that the jackknife leaves out.
@@ -21,7 +33,7 @@ const GROUPS: usize = 32;
 pub struct Trial {
     /// What they are.
     pub name: String,
-    /// Processor time of a camera sample (ns).
+    /// Processor time of a camera sample (ns), in paths with its part of what the image takes before.
     pub nanoseconds: f64,
     /// Relative variance of a camera sample, from as many samples per pixel as the pilot had: its mean over pixels, or the squared
     /// mean of the standard deviation, or the geometric mean of both.
@@ -34,6 +46,7 @@ pub struct Trial {
 }
 
 /// A candidate.
+#[derive(Clone)]
 pub(super) struct Candidate {
     pub(super) name: String,
     pub(super) settings: IntegratorSettings,
@@ -84,6 +97,14 @@ pub(super) enum Mean {
 /// Relative difference of the two means of a pixel, absolute and squared, averaged over channels.
 pub(super) type Difference = [f64; 2];
 
+/// What a model by the pixels of another round says of a candidate.
+pub(super) struct Predicted {
+    /// The logarithm of its efficiency, by all pixels and without each of the groups.
+    pub(super) gains: Vec<f64>,
+    /// Standard error of the model itself.
+    pub(super) error: f64,
+}
+
 /// What was measured of each candidate: the time of a camera sample (ns), and the differences of all pixels.
 pub(super) struct Round {
     pub(super) measured: Vec<(f64, Vec<Difference>)>,
@@ -103,6 +124,16 @@ impl Round {
             *differences = differences.chunks(size).map(mean).collect();
         }
         self
+    }
+
+    /// The first candidate, and the others by their times, which so is the order of what was measured of them.
+    pub(super) fn by_times(&mut self, candidates: Vec<Candidate>) -> Vec<Candidate> {
+        let measured = std::mem::take(&mut self.measured);
+        let mut both: Vec<_> = measured.into_iter().zip(candidates).collect();
+        both[1..].sort_by(|((a, _), _), ((b, _), _)| a.total_cmp(b));
+        let (measured, candidates) = both.into_iter().unzip();
+        self.measured = measured;
+        candidates
     }
 
     /// Variances of a camera sample by a candidate: with all pixels, and without each of the groups.
@@ -159,23 +190,30 @@ impl Round {
         models.iter().map(|model| model.efficiency(numbers).ln()).collect()
     }
 
-    /// The index of the candidate to be taken. The first one stands for no choice at all. `predicted` is what a model by the
-    /// pixels of another round says of candidates, where it has them: the gain of one of these over another is known from both.
-    pub(super) fn choose(&self, candidates: &[Candidate], predicted: &[Option<Vec<f64>>]) -> usize {
+    /// The index of the candidate to be taken. The first one stands for no choice at all. `predicted` is what a model says of
+    /// candidates, where it has them: the gain of one of these over another is known from both.
+    pub(super) fn choose(&self, candidates: &[Candidate], predicted: &[Option<Predicted>], caution: Caution) -> usize {
         (1..candidates.len()).fold(0, |chosen, k| {
             let is_other = candidates[k].settings.estimator != candidates[chosen].settings.estimator;
             let [samples, usual] = [k, 0].map(|k| candidates[k].settings.sample_counts_at(0).samples);
-            let least = if !is_other && samples < usual { MIN_GAIN_OF_FEW } else { MIN_GAIN };
-            let measured = self.gain(k, chosen);
-            let (gain, error) = match (&predicted[k], &predicted[chosen]) {
-                (Some(gains), Some(bases)) => {
-                    let differences: Vec<f64> = gains.iter().zip(bases).map(|(gain, base)| gain - base).collect();
-                    united(measured, jackknife(&differences))
-                }
-                _ => measured,
-            };
-            if gain > least.ln().max(MIN_ERRORS[usize::from(is_other)] * error) { k } else { chosen }
+            let least = if !is_other && samples < usual { MIN_GAIN_OF_FEW } else { caution.gain };
+            let (gain, error) = self.united_gain(k, chosen, predicted);
+            if gain > least.ln().max(caution.errors[usize::from(is_other)] * error) { k } else { chosen }
         })
+    }
+
+    /// The gain of a candidate over another by this round and by what is `predicted` of both, and its standard error.
+    pub(super) fn united_gain(&self, k: usize, base: usize, predicted: &[Option<Predicted>]) -> (f64, f64) {
+        let measured = self.gain(k, base);
+        let of = |k: usize| predicted.get(k).and_then(Option::as_ref);
+        match (of(k), of(base)) {
+            (Some(a), Some(b)) if k != base => {
+                let differences: Vec<f64> = a.gains.iter().zip(&b.gains).map(|(a, b)| a - b).collect();
+                let (gain, error) = jackknife(&differences);
+                united(measured, (gain, error.hypot(a.error).hypot(b.error)))
+            }
+            _ => measured,
+        }
     }
 
     pub(super) fn trials(&self, candidates: &[Candidate]) -> Vec<Trial> {
@@ -267,7 +305,11 @@ mod tests {
                     differences.push([d, d * d]);
                 }
             }
-            chosen += Round { measured, spp: 1, mean: Mean::Squares, relative: 1.0 }.choose(&candidates, &[None, None]);
+            chosen += Round { measured, spp: 1, mean: Mean::Squares, relative: 1.0 }.choose(
+                &candidates,
+                &[],
+                Caution::OF_FEW,
+            );
         }
         f64::from(chosen as u32) / 1000.0
     }
@@ -281,10 +323,12 @@ mod tests {
         let candidates = [candidate(4), candidate(8)];
         let measured = (1.0, vec![[1.0, 1.0]; 256]);
         let round = Round { measured: vec![measured.clone(), measured], spp: 4, mean: Mean::Squares, relative: 1.0 };
-        let model = |gain: f64| Some(vec![gain; 1 + GROUPS]);
-        assert_eq!(round.choose(&candidates, &[model(0.0), model(0.5)]), 1);
-        assert_eq!(round.choose(&candidates, &[model(0.5), model(0.0)]), 0);
-        assert_eq!(round.choose(&candidates, &[model(0.0), None]), 0);
+        let model = |gain: f64| Some(Predicted { gains: vec![gain; 1 + GROUPS], error: 0.0 });
+        assert_eq!(round.choose(&candidates, &[model(0.0), model(0.5)], Caution::OF_FEW), 1);
+        assert_eq!(round.choose(&candidates, &[model(0.5), model(0.0)], Caution::OF_FEW), 0);
+        assert_eq!(round.choose(&candidates, &[model(0.0), None], Caution::OF_FEW), 0);
+        let unsure = Some(Predicted { error: 3.0, ..model(0.5).unwrap() });
+        assert_eq!(round.choose(&candidates, &[model(0.0), unsure], Caution::OF_FEW), 0, "a model that knows little");
     }
 
     #[test]
@@ -297,10 +341,23 @@ mod tests {
         let chosen = |numbers: [u32; 2], gain: f64| {
             let measured = vec![(gain, vec![[1.0, 1.0]; 256]), (1.0, vec![[1.0, 1.0]; 256])];
             let round = Round { measured, spp: 4, mean: Mean::Deviations, relative: 1.0 };
-            round.choose(&numbers.map(candidate), &[None, None])
+            round.choose(&numbers.map(candidate), &[], Caution::OF_FEW)
         };
         assert_eq!([1.4, 1.6].map(|gain| chosen([8, 4], gain)), [0, 1]);
         assert_eq!([1.01, 1.2].map(|gain| chosen([8, 16], gain)), [0, 1]);
+    }
+
+    #[test]
+    fn candidates_and_what_was_measured_are_sorted_by_time() {
+        let candidate = |n| Candidate::named(IntegratorSettings { samples: Some(n), ..IntegratorSettings::default() });
+        let measured = [5.0, 9.0, 2.0, 7.0].map(|time| (time, vec![[1.0, time]; 4])).to_vec();
+        let mut round = Round { measured, spp: 4, mean: Mean::Squares, relative: 1.0 };
+        let sorted = round.by_times([5, 9, 2, 7].map(candidate).to_vec());
+        let numbers: Vec<_> = sorted.iter().map(|c| c.settings.samples.unwrap()).collect();
+        assert_eq!(numbers, [5, 2, 7, 9], "but the first one");
+        for (n, (time, differences)) in numbers.iter().zip(&round.measured) {
+            assert_eq!([f64::from(*n); 2], [*time, differences[0][1]]);
+        }
     }
 
     #[test]

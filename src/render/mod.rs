@@ -8,6 +8,7 @@ pub mod allocation;
 mod allocation_counts;
 pub mod auto;
 mod auto_candidates;
+mod auto_check;
 mod auto_contributing;
 mod auto_lights;
 mod auto_measure;

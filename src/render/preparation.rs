@@ -13,6 +13,8 @@ pub struct Preparation<'a> {
     pub ratio_map: bool,
     /// The time that preparation and rendering may take: pilots are not made for more samples than that is enough for.
     pub time_limit: Option<Duration>,
+    /// Processor time that the image took before, as of loading its scene: efficiency is that of all its time.
+    pub loading: Duration,
     /// Ends the preparation.
     pub stop: &'a AtomicBool,
 }
@@ -20,7 +22,7 @@ pub struct Preparation<'a> {
 impl Default for Preparation<'_> {
     fn default() -> Self {
         static NEVER: AtomicBool = AtomicBool::new(false);
-        Preparation { threads: None, ratio_map: false, time_limit: None, stop: &NEVER }
+        Preparation { threads: None, ratio_map: false, time_limit: None, loading: Duration::ZERO, stop: &NEVER }
     }
 }
 

@@ -7,6 +7,7 @@ use anyhow::Context;
 use clap::Args;
 use lumiris::render::auto::{AutoChoice, Trial};
 use lumiris::render::plan::Preparation;
+use lumiris::render::processor_time;
 use lumiris_formats::output::write_text;
 use std::path::PathBuf;
 use std::process::ExitCode;
@@ -22,8 +23,10 @@ pub(super) struct PlanArgs {
 }
 
 pub(super) fn run(args: &PlanArgs) -> anyhow::Result<ExitCode> {
+    let before = processor_time::of_process();
     let (mut job, _) = load_job(&args.scene)?;
-    let file = plan(&args.scene, &mut job, &Preparation::default(), true)?;
+    let loading = processor_time::of_process().saturating_sub(before);
+    let file = plan(&args.scene, &mut job, &Preparation { loading, ..Preparation::default() }, true)?;
     if let Ok(auto) = serde_json::from_value::<AutoChoice>(file.auto.clone()) {
         progress::print(&table(&auto));
     }
@@ -53,7 +56,7 @@ fn table(auto: &AutoChoice) -> String {
         "efficiency",
         "±"
     );
-    let trials = auto.lights.iter().chain(auto.trials.iter().flatten()).chain(&auto.sharing);
+    let trials = auto.lights.iter().chain(auto.trials.iter().flatten()).chain(&auto.checked).chain(&auto.sharing);
     for Trial { name, nanoseconds, variance, efficiency, error } in trials {
         let error = efficiency * error;
         text += &format!("{name:<52}{nanoseconds:>10.0}{variance:>12.4}{efficiency:>12.2}{error:>8.2}\n");

@@ -24,6 +24,7 @@ use lumiris::render::memory::{Wanted, predict};
 use lumiris::render::output::{self, Aov};
 use lumiris::render::parts::FilmFile;
 use lumiris::render::plan::Preparation;
+use lumiris::render::processor_time;
 use lumiris::render::{CacheReport, Continuation, Progress, RenderError, RenderSettings, Rendering, TileShare, go_on};
 use lumiris::scene::RenderJob;
 use lumiris_formats::output::write_text;
@@ -119,7 +120,9 @@ pub(super) fn render_one(args: &RenderArgs, session: &Session) -> anyhow::Result
     stored.as_ref().map_or(Ok(()), |stored| parts::complete(&mut args, stored))?;
     let args = &args;
     let asked = check(args)?;
+    let before = processor_time::of_process();
     let (mut job, setup, files) = load_job_of(&args.scene, &session.files, stored.as_ref())?;
+    let loading = processor_time::of_process().saturating_sub(before);
     parts::check_settings(args, job.settings(), &job.world.scene.film.bounds)?;
     check_memory(args, &job, asked.as_deref())?;
     let asks_for_ratio = asked.as_ref().is_some_and(|list| list.contains(&Aov::Ratio));
@@ -131,7 +134,7 @@ pub(super) fn render_one(args: &RenderArgs, session: &Session) -> anyhow::Result
     // What goes on, or is planned, has its pilots, whatever the time
     let is_open = stored.is_none() && args.scene.plan.is_none();
     let time_limit = args.time.filter(|_| is_open).map(Duration::from_secs_f64);
-    let how = Preparation { ratio_map: asks_for_ratio, time_limit, stop: &session.stop, ..Preparation::default() };
+    let how = Preparation { threads: None, ratio_map: asks_for_ratio, time_limit, loading, stop: &session.stop };
     let plan = plan(&args.scene, &mut job, &how, args.quiet)?;
     let preparation = start.elapsed();
     let outputs = outputs(args, &job);
