@@ -239,7 +239,6 @@ impl Request {
         stored.as_ref().map_or(Ok(()), |stored| asked.complete(stored)).map_err(Failure::Part)?;
         let before = processor_time::of_process();
         let mut loaded = self.load(&asked, stored.as_ref())?;
-        let loading = processor_time::of_process().saturating_sub(before);
         let mut warnings = Vec::from_iter(Some(loaded.warnings.to_string()).filter(|text| !text.is_empty()));
         if loaded.settings.integrator.leaves_lights_out() {
             warnings.push("without samples on non-contributing lights, direct light is biased".to_owned());
@@ -247,6 +246,7 @@ impl Request {
         goes_on()?;
         let files = std::mem::take(&mut loaded.files);
         let mut job = loaded.job(asked.accel, self.packet_width).map_err(|error| other(&error))?;
+        let loading = processor_time::of_process().saturating_sub(before);
         let extent = &self.parts.extent;
         let divided = extent.check_settings(job.settings(), &job.world.scene.film.bounds, &asked.scene);
         divided.map_err(|error| Failure::Value(in_words_of_python(&error)))?;

@@ -75,9 +75,9 @@ const MIN_PIXELS: usize = 96;
 /// which on more samples of a pixel tell more than more pixels.
 const ENOUGH_PIXELS: usize = 384;
 const MANY_PIXELS: [usize; 2] = [256, 128];
-/// Time of all rounds, as a fraction of that of the image: what is wanted, and the most where that is not enough.
+/// Time of all rounds but the check, as a fraction of that of the image: what is wanted, and the most where that is not enough.
 const FRACTIONS: [f64; 2] = [0.03, 0.08];
-/// Time of all rounds over that of rendering the pixels of one once, with the same number of samples and seeds: in direct
+/// Time of these rounds over that of rendering the pixels of one once, with the same number of samples and seeds: in direct
 /// light, and in paths. Candidates with photons are beside that.
 const TRIALS: [f64; 2] = [13.0, 28.0];
 /// The same of the round that compares light choices.
@@ -144,7 +144,7 @@ pub struct AutoChoice {
     /// Those with and without shared paths, in blocks of pixels.
     #[serde(default)]
     pub sharing: Vec<Trial>,
-    /// The chosen one of the second round.
+    /// The chosen one of all.
     pub chosen: String,
     /// Processor time of the pilot (s).
     pub seconds: f64,
@@ -302,8 +302,10 @@ impl Pilot {
         let fit: &[Numbers] = if has_later { &FIT_PATH } else { &FIT_DIRECT };
         let few = fit[0];
         let nanoseconds = self.scout(job, &Candidate::named(with_numbers(&job.settings().integrator, few)), how)?;
+        self.add_time(job, how, how.loading + (processor_time::of_process() - start));
+        let of_lights = processor_time::of_process();
         let lights = self.choose_lights(job, few, how)?;
-        self.add_time(job, how.loading + (processor_time::of_process() - start));
+        self.add_time(job, how, processor_time::of_process() - of_lights);
         let photons = Contributing::new(job, nanoseconds);
         let base = job.settings().integrator;
         let base = &base;
@@ -320,8 +322,10 @@ impl Pilot {
         let fitted: Vec<_> = candidates.iter().map(|c| numbers(&c.settings)).collect();
         candidates.extend(photons.iter().flat_map(Contributing::fit));
         let of_round = processor_time::of_process();
-        let first = self.round(job, &candidates, FIRST_ROUND, how)?;
-        let of_round = processor_time::of_process() - of_round;
+        let mut first = self.round(job, &candidates, FIRST_ROUND, how)?;
+        let before = self.fixed;
+        self.add_time(job, how, (processor_time::of_process() - of_round).mul_f64(1.0 + FOLLOWING));
+        first.measured.iter_mut().for_each(|(time, _)| *time += self.fixed - before);
         let is_net = has_later && job.settings().sampling.sampler != SamplerKind::Independent;
         let powers = if is_net { OF_NETS } else { INDEPENDENT };
         let models = first.models(&fitted, powers);
@@ -349,8 +353,10 @@ impl Pilot {
         // All candidates choose from the same lights, and others would not find what glows
         if job.lights.find_glows() {
             candidates.retain(|c| c.settings.light_choice().glows);
+            if candidates.first().is_none_or(|c| c.settings != usual(base)) {
+                candidates.insert(0, Candidate::named(without_pilot(base)));
+            }
         }
-        self.add_time(job, of_round.mul_f64(1.0 + FOLLOWING));
         let second = self.round(job, &candidates, SECOND_ROUND, how)?;
         let predicted = |candidate: &Candidate| {
             if candidate.settings.estimator == EstimatorKind::Contributing {
@@ -381,7 +387,7 @@ impl Pilot {
             _ => &model,
         };
         let (sharing, mut settings) = self.share(job, chosen, of_chosen, how)?;
-        // Where sharing is given, it was in all trials
+        // Where sharing is given, it has no trials
         let of_sharing = sharing.get(1).filter(|_| settings.path_reuse.is_some());
         let &Trial { variance, nanoseconds, .. } = of_sharing.unwrap_or(chosen_trial);
         settings.light_paths = self.choose_light_paths(job, &settings, &Measured { variance, nanoseconds, relative });
@@ -405,12 +411,12 @@ impl Pilot {
         Ok((choice, settings))
     }
 
-    /// Adds what was done before the image to the time of each of its samples, where there are paths and the number of samples does
-    /// not follow from their noise.
-    fn add_time(&mut self, job: &RenderJob, time: Duration) {
+    /// Adds what was done before the image to the time of each of its samples, where there are paths, and the number of samples
+    /// follows neither from their noise nor from their time.
+    fn add_time(&mut self, job: &RenderJob, how: &Preparation<'_>, time: Duration) {
         let Settings { integrator, sampling } = job.settings();
-        if sampling.noise.is_none() && integrator.depth() > 1 {
-            let samples = job.world.scene.film.bounds.area() as f64 * f64::from(sampling.pilot_spp());
+        if sampling.noise.is_none() && how.time_limit.is_none() && integrator.depth() > 1 {
+            let samples = job.world.scene.film.bounds.area() as f64 * f64::from(sampling.spp);
             self.fixed += time.as_secs_f64() * 1e9 / samples;
         }
     }
@@ -447,8 +453,10 @@ impl Pilot {
     ) -> Result<Checked, RenderError> {
         let Settings { integrator: base, sampling } = *job.settings();
         let samples = job.world.scene.film.bounds.area() as f64 * f64::from(sampling.pilot_spp());
-        let times: Vec<f64> = round.measured.iter().map(|(time, _)| *time).collect();
-        let sizes = (self.places[SECOND_ROUND].len(), self.spp, samples);
+        let of_pilot = |(c, (time, _)): (&Candidate, &(f64, _))| [*time, *time - c.preparation - self.fixed];
+        let times: Vec<[f64; 2]> = candidates.iter().zip(&round.measured).map(of_pilot).collect();
+        let most = self.scouted.as_ref().map_or(0, Scouted::len).min(MAX_PIXELS);
+        let sizes = (self.places[SECOND_ROUND].len()..=most, self.spp, samples);
         // Where light is direct, numbers are limited by few pixels that adaptive counts do not find either: more pixels, of which
         // the mean of σ is known better, led to choices that were no better
         let has_later = base.depth() > 1;
@@ -456,7 +464,7 @@ impl Pilot {
         let (Some(scouted), Some((some, count))) = (&self.scouted, some) else {
             return Ok((candidates, chosen, None));
         };
-        let places = scouted.draw(count.min(MAX_PIXELS), CHECK as u32);
+        let places = scouted.draw(count, CHECK as u32);
         let mut round = self.measured(job, &some, (&places, self.spp, CHECK), how)?;
         let some = round.by_times(some);
         let chosen = round.choose(&some, &[], Caution::OF_MANY);
@@ -512,9 +520,10 @@ impl Pilot {
     /// Last: how many light paths there are for each camera sample, where a camera sample by the settings has the variance and
     /// the time (ns) given.
     fn choose_light_paths(&self, job: &RenderJob, settings: &IntegratorSettings, at: &Measured) -> Option<f32> {
-        let light = self.light.as_ref()?;
-        if settings.light_paths.is_some() || light_paths::obstacle_of(job, settings).is_some() {
-            return settings.light_paths;
+        let given = settings.light_paths;
+        let Some(light) = self.light.as_ref().filter(|_| given.is_none()) else { return given };
+        if light_paths::obstacle_of(job, settings).is_some() {
+            return None;
         }
         let samples = job.world.scene.film.bounds.area() as f64 * f64::from(job.settings().sampling.pilot_spp());
         let error = |per_sample: f32| {

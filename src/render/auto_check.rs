@@ -7,6 +7,7 @@
 use super::auto_candidates::{Numbers, different, goes_on_by_one, numbers_of, with_numbers};
 use super::auto_round::Candidate;
 use crate::settings::{EstimatorKind, IntegratorSettings};
+use std::ops::RangeInclusive;
 
 /// Time of the round, as a fraction of that of the image.
 const FRACTION: f64 = 0.03;
@@ -24,31 +25,32 @@ const MIN_GAIN: f64 = 1.05;
 fn are_possible(gains: &[(f64, f64)], chosen: usize) -> Vec<usize> {
     let is_possible = |k: &usize| {
         let (gain, error) = gains[*k];
-        *k == 0 || *k == chosen || gain + POSSIBLE * error > MIN_GAIN.ln()
+        *k == 0 || *k == chosen || error.is_finite() && gain + POSSIBLE * error > MIN_GAIN.ln()
     };
     (0..gains.len()).filter(is_possible).collect()
 }
 
-/// Those that take part, the first of the round before first, by their `times` of a camera sample (ns); and how
-/// many pixels of `spp` samples and two seeds there are, of `samples` of the image, where the round before had `count`. `None` if
-/// that tells nothing more.
+/// Those that take part, the first of the round before first, by their `times` of a camera sample (ns): with its part of all that
+/// the image takes, and alone. And how many pixels of `spp` samples and two seeds there are, of `samples` of the image, where the
+/// round before had the first number of `counts`, and there are no more than the last. `None` if that tells nothing more.
 pub(super) fn choose(
     base: &IntegratorSettings,
     candidates: &[Candidate],
-    times: &[f64],
+    times: &[[f64; 2]],
     (gains, chosen): (&[(f64, f64)], usize),
-    (count, spp, samples): (usize, u32, f64),
+    (counts, spp, samples): (RangeInclusive<usize>, u32, f64),
 ) -> Option<(Vec<Candidate>, usize)> {
     let possible = are_possible(gains, chosen);
-    let error = possible.iter().map(|&k| gains[k].1).fold(0.0, f64::max);
-    let mut taken: Vec<(f64, Candidate)> = possible.iter().map(|&k| (times[k], candidates[k].clone())).collect();
-    let time = (times[0] * times[chosen]).sqrt();
+    let error = possible.iter().map(|&k| gains[k].1).filter(|e| e.is_finite()).fold(0.0, f64::max);
+    let mut taken: Vec<(f64, Candidate)> = possible.iter().map(|&k| (times[k][1], candidates[k].clone())).collect();
+    let time = (times[0][1] * times[chosen][1]).sqrt();
     let between = different(between(base, &candidates[0].settings, &candidates[chosen].settings));
     taken.extend(between.into_iter().filter(|c| !is_among(candidates, c)).map(|c| (time, c)));
     let of_pixel = f64::from(2 * spp) * taken.iter().map(|(time, _)| time).sum::<f64>();
-    let of_image = samples * times[chosen].max(times[0]);
-    let pixels = (FRACTION * of_image / of_pixel).min(count as f64 * (error / ERROR).powi(2));
-    let enough = taken.len() > 1 && pixels >= MIN_PIXELS * count as f64;
+    let of_image = samples * times[chosen][0].max(times[0][0]);
+    let count = *counts.start() as f64;
+    let pixels = (FRACTION * of_image / of_pixel).min(count * (error / ERROR).powi(2)).min(*counts.end() as f64);
+    let enough = taken.len() > 1 && pixels >= MIN_PIXELS * count;
     enough.then(|| (taken.into_iter().map(|(_, c)| c).collect(), pixels as usize))
 }
 
@@ -56,7 +58,7 @@ fn is_among(candidates: &[Candidate], candidate: &Candidate) -> bool {
     candidates.iter().any(|c| c.settings == candidate.settings)
 }
 
-/// Numbers between those of `mis` in both settings, powers of two: of all kinds, and with one BSDF sample.
+/// Numbers between those of `mis` in both settings, powers of two: of all kinds, and with one BSDF sample where that is open.
 fn between(
     base: &IntegratorSettings,
     usual: &IntegratorSettings,
@@ -94,22 +96,37 @@ mod tests {
     fn what_may_be_better_is_compared_and_what_is_between() {
         let candidates = candidates([[1, 1, 1], [16, 2, 1], [32, 2, 1], [2, 4, 1]]);
         let gains = [(-0.9, 0.3), (0.0, 0.0), (-0.1, 0.3), (-0.9, 0.3)];
-        let times = [1.0, 4.0, 8.0, 2.0];
-        let (taken, pixels) = choose(&path(), &candidates, &times, (&gains, 1), (128, 16, 1e6)).unwrap();
+        // Loading takes as long as two such samples
+        let times = [1.0, 4.0, 8.0, 2.0].map(|time| [time + 2.0, time]);
+        let of = |most: usize| choose(&path(), &candidates, &times, (&gains, 1), (128..=most, 16, 1e6));
+        let (taken, pixels) = of(4096).unwrap();
         let numbers: Vec<_> = taken.iter().map(|c| numbers_of(&c.settings)).collect();
         assert_eq!(numbers, [[1, 1, 1], [16, 2, 1], [32, 2, 1], [4, 2, 1]]);
-        // 0.03 · 4e6/(32 · (1 + 2 + 4 + 8))
-        assert_eq!(pixels, 250);
+        // 0.03 · 6e6/(32 · (1 + 2 + 4 + 8))
+        assert_eq!(pixels, 375);
+        assert_eq!(of(200).unwrap().1, 200);
+        assert!(of(150).is_none(), "as many as before tell nothing more");
+    }
+
+    #[test]
+    fn numbers_between_keep_what_is_given() {
+        let base = IntegratorSettings { samples: Some(9), path_reuse: Some(3), roulette_depth: None, ..path() };
+        let [usual, best] = [[1, 1, 1], [1, 8, 1]].map(|n| with_numbers(&base, n));
+        let between = between(&base, &usual, &best);
+        let of = |s: &IntegratorSettings| (s.samples, s.later_samples, s.path_reuse, s.roulette_depth);
+        assert!(between.iter().any(|s| of(s) == (Some(9), Some(5), Some(3), None)), "{between:?}");
+        assert!(between.iter().all(|s| s.samples == Some(9) && s.path_reuse == Some(3)), "{between:?}");
     }
 
     #[test]
     fn nothing_is_compared_that_is_known_or_would_be_known_no_better() {
         let candidates = candidates([[1, 1, 1], [2, 1, 1]]);
         let is_known = |gains: [(f64, f64); 2], chosen: usize, samples: f64| {
-            choose(&path(), &candidates, &[1.0, 1.5], (&gains, chosen), (128, 16, samples)).is_none()
+            choose(&path(), &candidates, &[[1.0; 2], [1.5; 2]], (&gains, chosen), (128..=4096, 16, samples)).is_none()
         };
         let of_error = |error: f64, samples: f64| is_known([(-0.2, error), (0.0, 0.0)], 1, samples);
         assert!(of_error(0.05, 1e7) && !of_error(0.2, 1e7) && of_error(0.2, 1e4));
+        assert!(is_known([(0.0, 0.0), (0.0, f64::INFINITY)], 0, 1e7), "there is no noise to be compared");
         assert!(is_known([(0.0, 0.0), (-0.5, 0.1)], 0, 1e7) && !is_known([(0.0, 0.0), (-0.05, 0.2)], 0, 1e7));
     }
 }

@@ -48,6 +48,11 @@ impl Scouted {
         Scouted { densities: deviations.into_iter().map(density).collect(), pixels }
     }
 
+    /// How many pixels there are.
+    pub(super) fn len(&self) -> usize {
+        self.pixels.len()
+    }
+
     /// About so many of the pixels, those of like weights beside each other. They depend on the round.
     pub(super) fn draw(&self, count: usize, round: u32) -> Vec<Place> {
         let mut places = self.drawn(count, round);

@@ -8,7 +8,6 @@ use super::auto_candidates::Numbers;
 use super::auto_round::{Candidate, Round, jackknife};
 use crate::settings::IntegratorSettings;
 use lumiris_numbers::estimators::efficiency::Model;
-use std::ops::RangeInclusive;
 
 /// Edge of the blocks of the pilot.
 pub(super) const EDGE: u32 = 4;
@@ -69,10 +68,9 @@ pub(super) fn best(round: &Round) -> Option<u32> {
 /// and where there are many, twice as many tell the model, and are too many.
 pub(super) fn choices(of_first: &[u32], [first, later, _]: Numbers) -> [Vec<u32>; 2] {
     let most = if first > MANY_LIGHT_SAMPLES { first } else { 2 * first };
-    let within = |numbers: &[u32], range: RangeInclusive<u32>| {
-        numbers.iter().copied().filter(|n| range.contains(n)).collect::<Vec<_>>()
-    };
-    [within(of_first, first..=most), within(&LATER, 1..=2 * later)]
+    let more = of_first.iter().copied().filter(|n| (first + 1..=most).contains(n));
+    let of_later = LATER.into_iter().filter(|n| *n <= 2 * later);
+    [std::iter::once(first).chain(more).collect(), of_later.collect()]
 }
 
 /// The edge and the numbers that are most efficient by a round of [`candidates`], if they share paths and that is more than
@@ -138,6 +136,7 @@ mod tests {
         let of_first = [1, 2, 4, 8, 16, 32];
         assert_eq!(choices(&of_first, [2, 2, 1]), [vec![2, 4], vec![1, 2, 3, 4]]);
         assert_eq!(choices(&of_first, [8, 1, 1]), [vec![8], vec![1, 2]]);
+        assert_eq!(choices(&of_first, [3, 1, 1])[0], [3, 4], "any number that is given");
     }
 
     #[test]

@@ -126,11 +126,16 @@ impl Round {
         self
     }
 
-    /// The first candidate, and the others by their times, which so is the order of what was measured of them.
+    /// The first candidate, those of its estimator by their times, and so the others, which so is the order of what was measured
+    /// of them.
     pub(super) fn by_times(&mut self, candidates: Vec<Candidate>) -> Vec<Candidate> {
         let measured = std::mem::take(&mut self.measured);
         let mut both: Vec<_> = measured.into_iter().zip(candidates).collect();
-        both[1..].sort_by(|((a, _), _), ((b, _), _)| a.total_cmp(b));
+        let estimator = both[0].1.settings.estimator;
+        both[1..].sort_by(|((a, _), of_a), ((b, _), of_b)| {
+            let are_other = [of_a, of_b].map(|c| c.settings.estimator != estimator);
+            are_other[0].cmp(&are_other[1]).then(a.total_cmp(b))
+        });
         let (measured, candidates) = both.into_iter().unzip();
         self.measured = measured;
         candidates
@@ -198,7 +203,11 @@ impl Round {
             let [samples, usual] = [k, 0].map(|k| candidates[k].settings.sample_counts_at(0).samples);
             let least = if !is_other && samples < usual { MIN_GAIN_OF_FEW } else { caution.gain };
             let (gain, error) = self.united_gain(k, chosen, predicted);
-            if gain > least.ln().max(caution.errors[usize::from(is_other)] * error) { k } else { chosen }
+            if error.is_finite() && gain > least.ln().max(caution.errors[usize::from(is_other)] * error) {
+                k
+            } else {
+                chosen
+            }
         })
     }
 
@@ -332,6 +341,17 @@ mod tests {
     }
 
     #[test]
+    fn where_there_is_no_noise_nothing_is_chosen() {
+        let candidates =
+            [4, 8].map(|n| Candidate::named(IntegratorSettings { samples: Some(n), ..IntegratorSettings::default() }));
+        let measured = vec![(2.0, vec![[0.0; 2]; 256]), (1.0, vec![[0.0; 2]; 256])];
+        let round = Round { measured, spp: 4, mean: Mean::Squares, relative: 1.0 };
+        for caution in [Caution::OF_FEW, Caution::OF_MANY] {
+            assert_eq!(round.choose(&candidates, &[], caution), 0);
+        }
+    }
+
+    #[test]
     fn fewer_samples_than_usual_need_a_great_gain() {
         let candidate = |n| {
             let estimator = EstimatorKind::Mis;
@@ -349,12 +369,15 @@ mod tests {
 
     #[test]
     fn candidates_and_what_was_measured_are_sorted_by_time() {
-        let candidate = |n| Candidate::named(IntegratorSettings { samples: Some(n), ..IntegratorSettings::default() });
-        let measured = [5.0, 9.0, 2.0, 7.0].map(|time| (time, vec![[1.0, time]; 4])).to_vec();
+        let candidate = |n| {
+            let estimator = if n == 3 { EstimatorKind::Ris } else { EstimatorKind::Mis };
+            Candidate::named(IntegratorSettings { estimator, samples: Some(n), ..IntegratorSettings::default() })
+        };
+        let measured = [5.0, 3.0, 9.0, 2.0, 7.0].map(|time| (time, vec![[1.0, time]; 4])).to_vec();
         let mut round = Round { measured, spp: 4, mean: Mean::Squares, relative: 1.0 };
-        let sorted = round.by_times([5, 9, 2, 7].map(candidate).to_vec());
+        let sorted = round.by_times([5, 3, 9, 2, 7].map(candidate).to_vec());
         let numbers: Vec<_> = sorted.iter().map(|c| c.settings.samples.unwrap()).collect();
-        assert_eq!(numbers, [5, 2, 7, 9], "but the first one");
+        assert_eq!(numbers, [5, 2, 7, 9, 3], "but the first one, and the other estimator");
         for (n, (time, differences)) in numbers.iter().zip(&round.measured) {
             assert_eq!([f64::from(*n); 2], [*time, differences[0][1]]);
         }

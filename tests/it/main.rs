@@ -4,6 +4,7 @@
 mod alpha_lights;
 mod analytic_scenes;
 mod anisotropy;
+mod auto;
 mod bit_exact;
 mod color_spaces;
 mod control_variates;

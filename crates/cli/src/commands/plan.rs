@@ -49,8 +49,8 @@ fn table(auto: &AutoChoice) -> String {
     let times = parts(&auto.cost, &|b, kind| format!("{b:.0} per {kind}"));
     let variances = parts(&auto.variance, &|b, kind| format!("{b:.4}/n of a {kind}"));
     let mut text = format!(
-        "time of a camera sample (ns): {a:.0}{times}\nrelative variance: {v:.4}{variances}\n\n{:<52}{:>10}{:>12}{:>12}{:>8}\n",
-        format!("{} pixels of 2 × {} samples in each round", auto.pixels, auto.spp),
+        "time of a camera sample, in paths with its part of loading and pilots (ns): {a:.0}{times}\nrelative variance: {v:.4}{variances}\n\n{:<52}{:>10}{:>12}{:>12}{:>8}\n",
+        format!("{} pixels of 2 × {} samples in a round", auto.pixels, auto.spp),
         "ns",
         "variance",
         "efficiency",

@@ -1,0 +1,72 @@
+//! What `--estimator auto` chooses, and what it leaves as it is.
+
+use lumiris::import::{LoadOptions, load};
+use lumiris::lights::LightSamplerKind;
+use lumiris::render::plan::{Preparation, prepare};
+use lumiris::scene::{AccelKind, RenderJob};
+use lumiris::settings::{Allocation, EstimatorKind, IntegratorKind, IntegratorSettings, RouletteKind, Settings};
+use lumiris_numbers::samplers::SamplerKind;
+use std::path::Path;
+use std::time::Duration;
+
+/// The gallery, large enough for a pilot, with settings changed.
+fn gallery(kind: IntegratorKind, change: impl FnOnce(&mut Settings)) -> RenderJob {
+    let path = Path::new(env!("CARGO_MANIFEST_DIR")).join("scenes/demo/gallery.pbrt");
+    let options = LoadOptions { resolution: Some([256, 144]), ..LoadOptions::default() };
+    let mut loaded = load(&path, &options).map_err(|d| d.to_string()).unwrap();
+    loaded.settings.integrator = IntegratorSettings::default().of_kind(kind);
+    loaded.settings.sampling.spp = 32;
+    change(&mut loaded.settings);
+    loaded.job(AccelKind::Embree, None).unwrap()
+}
+
+/// In paths, what an image took before is a part of the time of its samples; and where samples take long, more pixels tell what
+/// is chosen.
+#[test]
+fn what_an_image_takes_before_counts() {
+    let of = |kind: IntegratorKind| {
+        let how = Preparation { loading: Duration::from_secs(10), ..Preparation::on(None) };
+        prepare(&mut gallery(kind, |_| ()), &how).unwrap().auto.unwrap()
+    };
+    let of_sample = 10e9 / f64::from(256 * 144 * 32);
+    let path = of(IntegratorKind::Path);
+    assert!(path.cost[0] > of_sample && path.trials.iter().flatten().all(|t| t.nanoseconds > of_sample), "{path:?}");
+    assert!(path.checked.len() >= 2 && path.checked[0].name == path.trials[1][0].name, "{path:?}");
+    let direct = of(IntegratorKind::Direct);
+    assert!(direct.cost[0] < of_sample && direct.checked.is_empty(), "{direct:?}");
+}
+
+/// Whatever the user gives, the pilot chooses the rest.
+#[test]
+fn what_is_given_stays() {
+    let both = [IntegratorKind::Direct, IntegratorKind::Path];
+    let all: [fn(&mut Settings); 17] = [
+        |s| s.integrator.path_reuse = Some(1),
+        |s| s.integrator.path_reuse = Some(3),
+        |s| s.integrator.light_paths = Some(0.0),
+        |s| s.integrator.light_paths = Some(0.5),
+        |s| s.integrator.samples = Some(1),
+        |s| s.integrator.samples = Some(5),
+        |s| s.integrator.later_samples = Some(3),
+        |s| (s.integrator.samples, s.integrator.later_samples) = (Some(6), Some(2)),
+        |s| s.integrator.bsdf_fraction = Some(0.3),
+        |s| (s.integrator.samples, s.integrator.bsdf_fraction) = (Some(8), Some(0.0)),
+        |s| s.integrator.roulette_depth = None,
+        |s| s.integrator.roulette = RouletteKind::Efficiency,
+        |s| s.integrator.light_sampler = LightSamplerKind::Uniform,
+        |s| s.integrator.light_sampler = LightSamplerKind::Photons,
+        |s| s.integrator.contributing.noncontributing_samples = Some(3),
+        |s| s.sampling.allocation = Allocation::Uniform,
+        |s| s.sampling.sampler = SamplerKind::Independent,
+    ];
+    for (kind, (i, change)) in both.into_iter().flat_map(|kind| all.into_iter().enumerate().map(move |c| (kind, c))) {
+        let mut job = gallery(kind, change);
+        let given = *job.settings();
+        assert!(prepare(&mut job, &Preparation::on(None)).unwrap().auto.is_some());
+        let mut chosen = *job.settings();
+        assert_ne!(chosen.integrator.estimator, EstimatorKind::Auto);
+        // The same change once more makes no difference
+        change(&mut chosen);
+        assert_eq!(chosen, *job.settings(), "{kind:?}, change {i} of {given:?}");
+    }
+}
