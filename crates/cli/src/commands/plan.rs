@@ -48,18 +48,19 @@ fn table(auto: &AutoChoice) -> String {
     let [a, v] = [&auto.cost, &auto.variance].map(|values| values.first().copied().unwrap_or(0.0));
     let times = parts(&auto.cost, &|b, kind| format!("{b:.0} per {kind}"));
     let variances = parts(&auto.variance, &|b, kind| format!("{b:.4}/n of a {kind}"));
+    let trials = || auto.lights.iter().chain(auto.trials.iter().flatten()).chain(&auto.checked).chain(&auto.sharing);
+    let width = trials().map(|trial| trial.name.chars().count()).max().unwrap_or(0).max(40);
     let mut text = format!(
-        "time of a camera sample, in paths with its part of loading and pilots (ns): {a:.0}{times}\nrelative variance: {v:.4}{variances}\n\n{:<52}{:>10}{:>12}{:>12}{:>8}\n",
+        "time of a camera sample, in paths with its part of loading and pilots (ns): {a:.0}{times}\nrelative variance: {v:.4}{variances}\n\n{:<width$}{:>10}{:>12}{:>12}{:>8}\n",
         format!("{} pixels of 2 × {} samples in a round", auto.pixels, auto.spp),
         "ns",
         "variance",
         "efficiency",
         "±"
     );
-    let trials = auto.lights.iter().chain(auto.trials.iter().flatten()).chain(&auto.checked).chain(&auto.sharing);
-    for Trial { name, nanoseconds, variance, efficiency, error } in trials {
+    for Trial { name, nanoseconds, variance, efficiency, error } in trials() {
         let error = efficiency * error;
-        text += &format!("{name:<52}{nanoseconds:>10.0}{variance:>12.4}{efficiency:>12.2}{error:>8.2}\n");
+        text += &format!("{name:<width$}{nanoseconds:>10.0}{variance:>12.4}{efficiency:>12.2}{error:>8.2}\n");
     }
     text + &format!("chosen: {}", auto.chosen)
 }
