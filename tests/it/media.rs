@@ -606,9 +606,7 @@ fn auto_knows_media() {
 /// Where media glow, `auto` chooses among what finds them by light samples, whether it measures or not.
 #[test]
 fn auto_has_light_samples_of_what_glows() {
-    for (depth, edge, bsdf_fraction) in
-        [(1, 16, None), (1, 64, None), (5, 16, None), (5, 64, None), (1, 64, Some(0.25))]
-    {
+    for (depth, edge, given) in [(1, 16, None), (1, 64, None), (5, 16, None), (5, 64, None), (1, 64, Some(0.25))] {
         let resolution = format!("\"integer xresolution\" {edge} \"integer yresolution\" {edge}");
         let mut text =
             camera("0.3 0.2 3", "", depth).replace("\"integer xresolution\" 4 \"integer yresolution\" 4", &resolution);
@@ -622,8 +620,7 @@ fn auto_has_light_samples_of_what_glows() {
         }
         let mut job = job(&text, AccelKind::Embree);
         job.change(|s| {
-            (s.integrator.estimator, s.sampling.spp) = (EstimatorKind::Auto, 512);
-            s.integrator.bsdf_fraction = bsdf_fraction;
+            (s.integrator.estimator, s.integrator.bsdf_fraction, s.sampling.spp) = (EstimatorKind::Auto, given, 512);
             s.integrator.kind = if depth == 1 { IntegratorKind::Direct } else { IntegratorKind::Path };
         });
         let plan = prepare(&mut job, &Preparation::on(None)).unwrap();
