@@ -32,8 +32,8 @@
 
 use super::allocation::may_split;
 use super::auto_candidates::{
-    Numbers, contributing, different, goes_on_by_one, numbers_of, numbers_of_contributing, second_round, usual,
-    with_numbers, without_pilot,
+    Numbers, contributing, different, goes_on_by_one, numbers_of, numbers_of_contributing, second_round,
+    that_find_glows, usual, with_numbers, without_pilot,
 };
 use super::auto_check;
 use super::auto_contributing::Contributing;
@@ -352,10 +352,7 @@ impl Pilot {
         }
         // All candidates choose from the same lights, and others would not find what glows
         if job.lights.find_glows() {
-            candidates.retain(|c| c.settings.light_choice().glows);
-            if candidates.first().is_none_or(|c| c.settings != usual(base)) {
-                candidates.insert(0, Candidate::named(without_pilot(base)));
-            }
+            candidates = that_find_glows(base, candidates);
         }
         let second = self.round(job, &candidates, SECOND_ROUND, how)?;
         let predicted = |candidate: &Candidate| {

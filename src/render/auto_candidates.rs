@@ -136,6 +136,16 @@ pub(super) fn second_round(base: &IntegratorSettings, best: Numbers) -> Vec<Cand
     different(all)
 }
 
+/// Those that find what media send out, as `base` does, by whose numbers of samples the first is replaced if it does not.
+pub(super) fn that_find_glows(base: &IntegratorSettings, mut candidates: Vec<Candidate>) -> Vec<Candidate> {
+    let finds = |c: &Candidate| c.settings.light_choice().glows;
+    if !candidates.first().is_some_and(finds) {
+        candidates.insert(0, Candidate::named(without_pilot(base)));
+    }
+    candidates.retain(finds);
+    candidates
+}
+
 /// Candidates with these settings, none twice.
 pub(super) fn different(all: impl IntoIterator<Item = IntegratorSettings>) -> Vec<Candidate> {
     let mut candidates: Vec<Candidate> = Vec::new();
@@ -174,6 +184,21 @@ mod tests {
         assert!(goes_on_by_one(&later, &[7, 1, 1]) && !goes_on_by_one(&later, &[1, 1, 4]));
         let two = IntegratorSettings { samples: Some(2), ..path };
         assert_eq!(numbers_of(&with_numbers(&two, [1, 1, 4])), [1, 1, 1], "no more than there are");
+    }
+
+    #[test]
+    fn what_finds_glows_is_never_nothing() {
+        // A quarter of eight and more samples are more BSDF samples than one
+        let base = IntegratorSettings { bsdf_fraction: Some(0.25), ..IntegratorSettings::default() };
+        let base = base.of_kind(IntegratorKind::Direct);
+        let all = second_round(&base, [16, 1, 1]);
+        assert!(all.iter().all(|c| !c.settings.light_choice().glows));
+        let left = that_find_glows(&base, all);
+        assert!(left.len() == 1 && left[0].settings == without_pilot(&base) && left[0].settings.light_choice().glows);
+        // What finds them stays as it is
+        let open = IntegratorSettings { bsdf_fraction: Some(0.0), ..base };
+        let usual_first = that_find_glows(&open, second_round(&open, [16, 1, 1]));
+        assert!(usual_first.len() > 1 && usual_first[0].settings == usual(&open));
     }
 
     #[test]

@@ -23,6 +23,7 @@ impl Caution {
     /// Where few are compared on more pixels.
     pub(super) const OF_MANY: Caution = Caution { gain: 1.0, errors: [0.0, 1.5] };
 }
+
 /// Relative standard error of a measured time.
 const TIME_ERROR: f64 = 0.02;
 /// Groups of pixels that the jackknife leaves out.
