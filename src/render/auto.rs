@@ -22,7 +22,7 @@
 //! know an efficiency to a quarter. There, time is that of all that an image takes, with its part of loading and pilots.
 //!
 //! Then a further round finds by blocks of pixels whether they share paths, and with how many samples
-//! ([`super::auto_reuse`]). What light paths find ([`crate::integrators::light_paths`]) is left to them in all rounds; how many
+//! ([`super::auto_reuse`]); a third of the blocks tells where there is nothing to be shared. What light paths find ([`crate::integrators::light_paths`]) is left to them in all rounds; how many
 //! there are follows from a pilot of theirs, which knows the variance that camera paths would have of the same light: few
 //! pixels of a round do not see it.
 //!
@@ -36,7 +36,7 @@ use super::auto_candidates::{
     that_find_glows, usual, with_numbers, without_pilot,
 };
 use super::auto_check;
-use super::auto_contributing::Contributing;
+use super::auto_contributing::{self, Contributing};
 use super::auto_lights;
 use super::auto_measure::{Chunk, measure};
 use super::auto_pixels::{Place, SEED, Scouted, grid};
@@ -85,6 +85,8 @@ const LIGHT_TRIALS: f64 = 3.0;
 /// Pixels that are looked at before the rounds, for each pixel of one, and samples of each and seed.
 const SCOUTED: usize = 8;
 const SCOUT_SPP: u32 = 2;
+/// One in so many blocks of pixels that may share paths is looked at before the others.
+const SOME_BLOCKS: usize = 3;
 /// Time of all rounds after the first one over that of the first, about.
 const FOLLOWING: f64 = 7.0;
 /// Standard error of what the model says of paths with more samples of two kinds, beside that of what was measured.
@@ -344,8 +346,23 @@ impl Pilot {
 
         // Second round: the best by the model, and what else there is
         let mut candidates = second_round(base, best);
-        if let (Some(photons), Some(models)) = (&photons, &of_contributing) {
-            candidates.extend(photons.best(&models[0], NEARLY));
+        // Few pixels have most of the noise of glossy surfaces, so that a model may know little of BSDF samples
+        let gain = |n: [f64; KINDS]| Round::predicted(&models[..1], n)[0];
+        let of_best = gain(best.map(f64::from)) - gain(fitted[0]);
+        let with_more = fitted.iter().position(|n| n[2] > f64::from(best[2]));
+        if let Some(k) = with_more.filter(|&k| has_later && first.may_have(k, of_best)) {
+            let more = with_numbers(base, [best[0], best[1], fitted[k][2] as u32]);
+            if candidates.iter().all(|c| c.settings != more) {
+                candidates.push(Candidate::named(more));
+            }
+        }
+        if let (Some(photons), Some(of_photons)) = (&photons, &of_contributing) {
+            let with_photons = photons.best(&of_photons[0], NEARLY);
+            // Others would take most of the time of the round
+            if auto_contributing::is_far_better(&with_photons[0], of_photons, (best, &models)) {
+                candidates.truncate(1);
+            }
+            candidates.extend(with_photons);
         }
         if !job.world.scene.media.is_empty() {
             candidates.retain(|c| through_media::obstacle_of(&c.settings).is_none());
@@ -450,12 +467,12 @@ impl Pilot {
     ) -> Result<Checked, RenderError> {
         let Settings { integrator: base, sampling } = *job.settings();
         let samples = job.world.scene.film.bounds.area() as f64 * f64::from(sampling.pilot_spp());
-        let of_pilot = |(c, (time, _)): (&Candidate, &(f64, _))| [*time, *time - c.preparation - self.fixed];
-        let times: Vec<[f64; 2]> = candidates.iter().zip(&round.measured).map(of_pilot).collect();
+        let of_both =
+            |(c, (time, _)): (&Candidate, &(f64, _))| [*time, round.effort * (*time - c.preparation - self.fixed)];
+        let times: Vec<[f64; 2]> = candidates.iter().zip(&round.measured).map(of_both).collect();
         let most = self.scouted.as_ref().map_or(0, Scouted::len).min(MAX_PIXELS);
         let sizes = (self.places[SECOND_ROUND].len()..=most, self.spp, samples);
-        // Where light is direct, numbers are limited by few pixels that adaptive counts do not find either: more pixels, of which
-        // the mean of σ is known better, led to choices that were no better
+        // Where light is direct, more pixels led to choices that were no better
         let has_later = base.depth() > 1;
         let some = has_later.then(|| auto_check::choose(&base, &candidates, &times, (gains, chosen), sizes)).flatten();
         let (Some(scouted), Some((some, count))) = (&self.scouted, some) else {
@@ -497,11 +514,21 @@ impl Pilot {
             && settings.iter().all(|s| [s.samples, s.later_samples] != [chosen.samples, chosen.later_samples]);
         let mut candidates = auto_reuse::candidates(chosen, if is_open { &settings } else { &[] });
         candidates.iter_mut().for_each(|c| c.preparation = preparation);
-        let round = self.round(job, &candidates, SHARING, how)?;
-        let round = round.by_blocks((auto_reuse::EDGE * auto_reuse::EDGE) as usize);
-        let trials = round.trials(&candidates);
-        // Few pixels at edges, whose camera samples differ, have most of the mean variance, and all others most of what is shared
-        let round = Round { mean: Mean::Both, ..round };
+        let of_block = (auto_reuse::EDGE * auto_reuse::EDGE) as usize;
+        let measured = |candidates: &[Candidate], places: &[Place]| {
+            let round = self.measured(job, candidates, (places, self.spp, SHARING), how)?.by_blocks(of_block);
+            let trials = round.trials(candidates);
+            // Few pixels at edges, whose camera samples differ, have most of the mean variance, and all others most of what is shared
+            Ok::<_, RenderError>((Round { mean: Mean::Both, ..round }, trials))
+        };
+        // Some of the blocks tell where there is nothing to be shared
+        let all = &self.places[SHARING];
+        let some: Vec<Place> = all.chunks(of_block).step_by(SOME_BLOCKS).flatten().copied().collect();
+        let (round, trials) = measured(&candidates[..2], &some)?;
+        if !auto_reuse::is_possible(&round) {
+            return Ok((trials, *chosen));
+        }
+        let (round, trials) = measured(&candidates, all)?;
         let shared = if is_open {
             let of_pilot = round.models_from(1, &[numbers, more[0], more[1]].map(|n| n.map(f64::from)), model.powers);
             let choices = auto_reuse::choices(&FIRST, numbers);
@@ -590,10 +617,13 @@ impl Pilot {
         };
         let measured: Vec<Chunk> = chunks.into_par_iter().map(of_chunk).collect::<Result<_, RenderError>>()?;
         let samples = places.len() as f64 * f64::from(2 * spp);
+        let of_sample = |k: usize| measured.iter().map(|chunk| chunk.of_candidates[k].0).sum::<f64>() / samples;
+        let of_samples = (0..candidates.len()).map(of_sample).sum::<f64>() * samples;
+        let spent = measured.iter().map(|chunk| chunk.spent).sum::<f64>();
+        let effort = if of_samples > 0.0 { spent / of_samples } else { 1.0 };
         let of = |k: usize| {
-            let nanoseconds = measured.iter().map(|chunk| chunk.of_candidates[k].0).sum::<f64>() / samples;
             let differences = measured.iter().flat_map(|chunk| &chunk.of_candidates[k].1).copied().collect();
-            (nanoseconds + candidates[k].preparation + self.fixed, differences)
+            (of_sample(k) + candidates[k].preparation + self.fixed, differences)
         };
         let (settings, sampling) = (&candidates[0].settings, &job.settings().sampling);
         let mean = match settings.depth() {
@@ -602,6 +632,6 @@ impl Pilot {
             _ => Mean::Squares,
         };
         let relative = measured.iter().map(|chunk| chunk.relative).sum::<f64>() / places.len() as f64;
-        Ok(Round { measured: (0..candidates.len()).map(of).collect(), spp, mean, relative })
+        Ok(Round { measured: (0..candidates.len()).map(of).collect(), spp, mean, relative, effort })
     }
 }

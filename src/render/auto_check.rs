@@ -10,7 +10,7 @@ use crate::settings::{EstimatorKind, IntegratorSettings};
 use std::ops::RangeInclusive;
 
 /// Time of the round, as a fraction of that of the image.
-const FRACTION: f64 = 0.03;
+const FRACTION: f64 = 0.04;
 /// Standard error of the logarithm of an efficiency that is wanted.
 const ERROR: f64 = 0.06;
 /// Fewest pixels, relative to those of the round before.
@@ -30,8 +30,8 @@ fn are_possible(gains: &[(f64, f64)], chosen: usize) -> Vec<usize> {
     (0..gains.len()).filter(is_possible).collect()
 }
 
-/// Those that take part, the first of the round before first, by their `times` of a camera sample (ns): with its part of all that
-/// the image takes, and alone. And how many pixels of `spp` samples and two seeds there are, of `samples` of the image, where the
+/// Those that take part, the first of the round before first, by their `times` of a camera sample (ns): in the image, with its part
+/// of all that this takes, and in a round. And how many pixels of `spp` samples and two seeds there are, of `samples` of the image, where the
 /// round before had the first number of `counts`, and there are no more than the last. `None` if that tells nothing more.
 pub(super) fn choose(
     base: &IntegratorSettings,
@@ -102,8 +102,8 @@ mod tests {
         let (taken, pixels) = of(4096).unwrap();
         let numbers: Vec<_> = taken.iter().map(|c| numbers_of(&c.settings)).collect();
         assert_eq!(numbers, [[1, 1, 1], [16, 2, 1], [32, 2, 1], [4, 2, 1]]);
-        // 0.03 · 6e6/(32 · (1 + 2 + 4 + 8))
-        assert_eq!(pixels, 375);
+        // 0.04 · 6e6/(32 · (1 + 2 + 4 + 8))
+        assert_eq!(pixels, 500);
         assert_eq!(of(200).unwrap().1, 200);
         assert!(of(150).is_none(), "as many as before tell nothing more");
     }

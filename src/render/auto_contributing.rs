@@ -2,7 +2,7 @@
 //! variance as that of `mis`, in which samples on the lights without photons take the place of BSDF samples.
 
 use super::auto_candidates::{Numbers, contributing, different, numbers_of_contributing};
-use super::auto_round::{Candidate, Round};
+use super::auto_round::{Candidate, Round, jackknife};
 use super::processor_time;
 use super::visibility_cache::{PHOTON_PATHS, build_visibility_cache};
 use crate::integrators::through_media;
@@ -18,6 +18,10 @@ const PHOTON_SHARE: f64 = 0.1;
 /// Fewest photon paths that tell enough.
 const MIN_PHOTONS: f64 = 65_536.0;
 
+/// How many times as efficient it must be by the models for the others to be left out, and by how many standard errors more.
+const FAR_BETTER: f64 = 2.0;
+const MIN_ERRORS: f64 = 2.0;
+
 /// Numbers from which the model is fitted, in direct light and in paths.
 const FIT_DIRECT: [Numbers; 3] = [[2, 1, 2], [8, 1, 2], [2, 1, 8]];
 const FIT_PATH: [Numbers; 4] = [[2, 1, 1], [8, 1, 1], [2, 4, 1], [2, 1, 4]];
@@ -27,6 +31,15 @@ const LATER: [u32; 3] = [1, 2, 4];
 const OTHERS: [u32; 5] = [1, 2, 4, 6, 8];
 /// Numbers of samples on contributing lights above which fewer are tried too.
 const MANY: u32 = 4;
+
+/// True if a candidate with photons is so much more efficient by its models than the best numbers without photons are by theirs
+/// that these need not be compared. Models are by all pixels, and without each of the groups.
+pub(super) fn is_far_better(candidate: &Candidate, models: &[Model], others: (Numbers, &[Model])) -> bool {
+    let with = Round::predicted(models, numbers_of_contributing(&candidate.settings).map(f64::from));
+    let without = Round::predicted(others.1, others.0.map(f64::from));
+    let (gain, error) = jackknife(&with.iter().zip(&without).map(|(a, b)| a - b).collect::<Vec<_>>());
+    gain - MIN_ERRORS * error > FAR_BETTER.ln()
+}
 
 /// Candidates that know by photons which lights contribute.
 pub(super) struct Contributing {
@@ -97,5 +110,30 @@ impl Contributing {
             [best, [2 * first, later, others]]
         };
         self.candidates(&both)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::settings::IntegratorKind;
+
+    #[test]
+    fn others_are_left_out_where_photons_are_far_better() {
+        let base = IntegratorSettings { kind: IntegratorKind::Direct, ..IntegratorSettings::default() };
+        let candidate = Candidate::named(contributing(&base, [8, 1, 2]));
+        // Of these variances with one sample of a kind, by 32 groups that differ by a part
+        let models = |light: f64, spread: f64| -> Vec<Model> {
+            let model = |i: u32| Model {
+                cost: [1.0, 0.1, 0.0, 0.0],
+                variance: [0.0, light * (1.0 + spread * f64::from(i % 2)), 0.0, 0.0],
+                powers: [1.0; KINDS],
+            };
+            (0..33).map(model).collect()
+        };
+        let others = models(8.0, 0.0);
+        let is_far = |light: f64, spread: f64| is_far_better(&candidate, &models(light, spread), ([8, 1, 1], &others));
+        assert!(is_far(1.0, 0.0) && !is_far(4.0, 0.0) && !is_far(16.0, 0.0));
+        assert!(!is_far(1.0, 1.0), "it may be chance");
     }
 }

@@ -70,7 +70,7 @@ mod tests {
             let of_pixel = |i: usize| (0.9 + 0.2 * (i % 7) as f64 / 6.0) * variance;
             let differences = (0..224).map(of_pixel).map(|v| [v.sqrt(), 2.0 * v]).collect();
             let measured = vec![(1.0 + c * (1.0 - p), differences)];
-            Ok::<_, ()>(Round { measured, spp: 4, mean: Mean::Squares, relative: 1.0 })
+            Ok::<_, ()>(Round::of(measured, 4, Mean::Squares))
         };
         let (trials, fraction) = best(0.5, measure).unwrap();
         (trials.len(), fraction)

@@ -22,6 +22,8 @@ pub(super) struct Chunk {
     pub(super) of_candidates: Vec<(f64, Vec<Difference>)>,
     /// Σ of 1/(m² + ε) of the pixels times their weights, averaged over channels, m being their means.
     pub(super) relative: f64,
+    /// Processor time of all that (ns).
+    pub(super) spent: f64,
 }
 
 /// Renders some pixels with each candidate and seed. The `turn` decides which candidate is first. What `light` paths find, if
@@ -33,6 +35,7 @@ pub(super) fn measure(
     light: Option<&LightPilot>,
     (seeds, turn): ([u32; 2], usize),
 ) -> Chunk {
+    let begin = processor_time::of_thread();
     let groups = if reuse::obstacle(run.job).is_none() { Groups::Grid } else { Groups::None };
     let mut worker = Worker::new(PathTracer::sharing(groups, FeatureSet::None));
     let is_split = |k: usize| may_split(run.job.settings(), &candidates[k].settings);
@@ -71,7 +74,8 @@ pub(super) fn measure(
     let of_candidate = |k| (0..pixels.len()).map(|i| difference(&images[k], is_split(k), i)).collect();
     let of_candidates = times.into_iter().enumerate().map(|(k, time)| (time, of_candidate(k))).collect();
     let of_channels = |i: usize| (0..3).map(|c| relative_to(i, c)).sum::<f64>() / 3.0 * pixels[i].weight;
-    Chunk { of_candidates, relative: (0..pixels.len()).map(of_channels).filter(|r| r.is_finite()).sum() }
+    let relative = (0..pixels.len()).map(of_channels).filter(|r| r.is_finite()).sum();
+    Chunk { of_candidates, relative, spent: (processor_time::of_thread() - begin).as_secs_f64() * 1e9 }
 }
 
 /// The means of the samples of some pixels, with random numbers of a seed.

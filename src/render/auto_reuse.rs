@@ -22,6 +22,8 @@ const MIN_COST: f64 = 0.075;
 /// The part of that time which blocks of any size take: in a box and in the open, blocks of 2 × 2 pixels took half the time
 /// of blocks of 4 × 4.
 const FIXED: f64 = 1.0 / 3.0;
+/// Standard errors by which the gain may be more than it was where few blocks were looked at.
+const POSSIBLE: f64 = 1.0;
 /// Standard errors by which the gain must exceed nothing.
 const MIN_ERRORS: f64 = 1.0;
 const MIN_GAIN: f64 = 1.03;
@@ -49,14 +51,28 @@ fn shared(edge: u32, [cost, more]: [f64; 2], [variance, less]: [f64; 2]) -> [f64
     [1.0 + of_sharing * of_blocks, 1.0 - part * (1.0 - 1.0 / of_edge)]
 }
 
-/// The edge that is most efficient by a round of both candidates, if that is more than chance.
-pub(super) fn best(round: &Round) -> Option<u32> {
+/// What blocks of an edge gain by a round of both candidates, as a logarithm: by all pixels, and without each of the groups.
+fn gains(round: &Round) -> impl Fn(u32) -> Vec<f64> {
     let costs = [round.measured[0].0, round.measured[1].0];
     let variances = [round.variances(0), round.variances(1)];
-    let gains = |edge: u32| -> Vec<f64> {
+    move |edge| {
         let both = variances[0].iter().zip(&variances[1]);
         both.map(|(&all, &less)| -shared(edge, costs, [all, less]).iter().map(|x| x.ln()).sum::<f64>()).collect()
-    };
+    }
+}
+
+/// False if blocks of no edge may gain enough, by a round of both candidates.
+pub(super) fn is_possible(round: &Round) -> bool {
+    let gains = gains(round);
+    EDGES.into_iter().filter(|&edge| edge > 1).any(|edge| {
+        let (gain, error) = jackknife(&gains(edge));
+        gain + POSSIBLE * error > MIN_GAIN.ln()
+    })
+}
+
+/// The edge that is most efficient by a round of both candidates, if that is more than chance.
+pub(super) fn best(round: &Round) -> Option<u32> {
+    let gains = gains(round);
     let greatest = EDGES.iter().map(|&edge| gains(edge)[0]).fold(0.0, f64::max);
     let edge = EDGES.into_iter().find(|&edge| gains(edge)[0] >= greatest + NEARLY.ln())?;
     let (gain, error) = jackknife(&gains(edge));
@@ -157,7 +173,7 @@ mod tests {
         let numbers = [[2.0, 1.0, 1.0], [4.0, 1.0, 1.0], [2.0, 2.0, 1.0]];
         let mut all = vec![measured(1, numbers[0])];
         all.extend(numbers.iter().map(|&n| measured(EDGE, n)));
-        let round = Round { measured: all, spp: 4, mean: Mean::Squares, relative: 1.0 };
+        let round = Round::of(all, 4, Mean::Squares);
         let of_one = Model { cost: [10.0, 1.0, 2.0, 0.0], variance: [4.5, 2.0, 6.0, 0.0], powers: [1.0; KINDS] };
         let of_pilot = round.models_from(1, &numbers, [1.0; KINDS]);
         let choices: [&[u32]; 2] = [&[1, 2, 4, 8], &[1, 2, 4]];
@@ -167,7 +183,7 @@ mod tests {
         let greatest = pairs.flat_map(|n| EDGES.map(|edge| efficiency(edge, n))).fold(0.0, f64::max);
         assert!(efficiency(edge, n) >= 0.87 * greatest, "{edge} {n:?}");
         // Of nothing that is shared, nothing is
-        let nothing = Round { measured: vec![measured(1, numbers[0]); 4], spp: 4, mean: Mean::Squares, relative: 1.0 };
+        let nothing = Round::of(vec![measured(1, numbers[0]); 4], 4, Mean::Squares);
         let of_pilot = nothing.models_from(1, &numbers, [1.0; KINDS]);
         assert!(best_numbers(&nothing, [2, 1, 1], (&of_one, &of_pilot), [&[2], &[1]]).is_none());
     }
@@ -176,14 +192,14 @@ mod tests {
     fn nothing_is_shared_where_nothing_is_gained() {
         let differences =
             |scale: f64| (0..64).map(|i| 1.0 + 0.1 * f64::from(i % 7)).map(|d| [d, scale * d * d]).collect();
-        let round = |gain: f64| Round {
-            measured: vec![(100.0, differences(1.0)), (110.0, differences(gain))],
-            spp: 4,
-            mean: Mean::Squares,
-            relative: 1.0,
-        };
+        let round =
+            |gain: f64| Round::of(vec![(100.0, differences(1.0)), (110.0, differences(gain))], 4, Mean::Squares);
         assert!(best(&round(1.0)).is_none() && best(&round(1.2)).is_none());
         let found = best(&round(0.3)).unwrap();
         assert!(found >= 3, "{found}");
+        assert!(!is_possible(&round(1.0)) && !is_possible(&round(1.2)) && is_possible(&round(0.3)));
+        let mut few = round(0.5);
+        few.measured[1].1[5][1] = 60.0;
+        assert!(best(&few).is_none() && is_possible(&few), "one pixel, which may be chance");
     }
 }

@@ -24,6 +24,8 @@ impl Caution {
     pub(super) const OF_MANY: Caution = Caution { gain: 1.0, errors: [0.0, 1.5] };
 }
 
+/// Standard errors by which a candidate may be better than it was.
+const POSSIBLE: f64 = 1.5;
 /// Relative standard error of a measured time.
 const TIME_ERROR: f64 = 0.02;
 /// Groups of pixels that the jackknife leaves out.
@@ -114,9 +116,17 @@ pub(super) struct Round {
     pub(super) mean: Mean,
     /// 1/(m² + ε), averaged over channels and pixels, m being their means.
     pub(super) relative: f64,
+    /// Processor time of the round over that of as many samples of all pixels of the image by each candidate.
+    pub(super) effort: f64,
 }
 
 impl Round {
+    /// One whose means are 1.
+    #[cfg(test)]
+    pub(super) fn of(measured: Vec<(f64, Vec<Difference>)>, spp: u32, mean: Mean) -> Round {
+        Round { measured, spp, mean, relative: 1.0, effort: 1.0 }
+    }
+
     /// The round whose pixels are blocks of so many that stand one after the other: they are not independent.
     pub(super) fn by_blocks(mut self, size: usize) -> Round {
         for (_, differences) in &mut self.measured {
@@ -161,6 +171,12 @@ impl Round {
     /// has no noise to be compared.
     fn gain(&self, k: usize, base: usize) -> (f64, f64) {
         if k == base { (0.0, 0.0) } else { gain((self, k), (self, base)) }
+    }
+
+    /// True if candidate `k` may be as efficient as one of this gain over the first.
+    pub(super) fn may_have(&self, k: usize, gain: f64) -> bool {
+        let (measured, error) = self.gain(k, 0);
+        error.is_finite() && measured + POSSIBLE * error >= gain
     }
 
     /// The same of the first candidates of two rounds on the same pixels.
@@ -315,11 +331,7 @@ mod tests {
                     differences.push([d, d * d]);
                 }
             }
-            chosen += Round { measured, spp: 1, mean: Mean::Squares, relative: 1.0 }.choose(
-                &candidates,
-                &[],
-                Caution::OF_FEW,
-            );
+            chosen += Round::of(measured, 1, Mean::Squares).choose(&candidates, &[], Caution::OF_FEW);
         }
         f64::from(chosen as u32) / 1000.0
     }
@@ -332,7 +344,7 @@ mod tests {
         };
         let candidates = [candidate(4), candidate(8)];
         let measured = (1.0, vec![[1.0, 1.0]; 256]);
-        let round = Round { measured: vec![measured.clone(), measured], spp: 4, mean: Mean::Squares, relative: 1.0 };
+        let round = Round::of(vec![measured.clone(), measured], 4, Mean::Squares);
         let model = |gain: f64| Some(Predicted { gains: vec![gain; 1 + GROUPS], error: 0.0 });
         assert_eq!(round.choose(&candidates, &[model(0.0), model(0.5)], Caution::OF_FEW), 1);
         assert_eq!(round.choose(&candidates, &[model(0.5), model(0.0)], Caution::OF_FEW), 0);
@@ -346,10 +358,24 @@ mod tests {
         let candidates =
             [4, 8].map(|n| Candidate::named(IntegratorSettings { samples: Some(n), ..IntegratorSettings::default() }));
         let measured = vec![(2.0, vec![[0.0; 2]; 256]), (1.0, vec![[0.0; 2]; 256])];
-        let round = Round { measured, spp: 4, mean: Mean::Squares, relative: 1.0 };
+        let round = Round::of(measured, 4, Mean::Squares);
         for caution in [Caution::OF_FEW, Caution::OF_MANY] {
             assert_eq!(round.choose(&candidates, &[], caution), 0);
         }
+    }
+
+    #[test]
+    fn what_is_known_poorly_may_be_better() {
+        let may_have = |deviations: &dyn Fn(usize) -> f64, gain: f64| {
+            let differences = (0..256).map(|i| deviations(i)).map(|d| [d, d * d]).collect();
+            let round = Round::of(vec![(1.0, vec![[1.0, 1.0]; 256]), (1.0, differences)], 4, Mean::Squares);
+            round.may_have(1, gain.ln())
+        };
+        assert!(may_have(&|_| 1.0, 1.0) && !may_have(&|_| 1.0, 1.2));
+        // A few pixels have half of the variance
+        let of_few = |i: usize| if i.is_multiple_of(64) { 8.0 } else { 1.0 };
+        assert!(may_have(&of_few, 1.0) && !may_have(&of_few, 2.0));
+        assert!(!may_have(&|_| 1.4, 1.0), "known, and worse");
     }
 
     #[test]
@@ -361,7 +387,7 @@ mod tests {
         // Without noise but that of times
         let chosen = |numbers: [u32; 2], gain: f64| {
             let measured = vec![(gain, vec![[1.0, 1.0]; 256]), (1.0, vec![[1.0, 1.0]; 256])];
-            let round = Round { measured, spp: 4, mean: Mean::Deviations, relative: 1.0 };
+            let round = Round::of(measured, 4, Mean::Deviations);
             round.choose(&numbers.map(candidate), &[], Caution::OF_FEW)
         };
         assert_eq!([1.4, 1.6].map(|gain| chosen([8, 4], gain)), [0, 1]);
@@ -375,7 +401,7 @@ mod tests {
             Candidate::named(IntegratorSettings { estimator, samples: Some(n), ..IntegratorSettings::default() })
         };
         let measured = [5.0, 3.0, 9.0, 2.0, 7.0].map(|time| (time, vec![[1.0, time]; 4])).to_vec();
-        let mut round = Round { measured, spp: 4, mean: Mean::Squares, relative: 1.0 };
+        let mut round = Round::of(measured, 4, Mean::Squares);
         let sorted = round.by_times([5, 3, 9, 2, 7].map(candidate).to_vec());
         let numbers: Vec<_> = sorted.iter().map(|c| c.settings.samples.unwrap()).collect();
         assert_eq!(numbers, [5, 2, 7, 9, 3], "but the first one, and the other estimator");
