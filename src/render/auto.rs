@@ -39,7 +39,7 @@ use super::auto_check;
 use super::auto_contributing::{self, Contributing};
 use super::auto_lights;
 use super::auto_measure::{Chunk, measure};
-use super::auto_pixels::{Place, SEED, Scouted, grid};
+use super::auto_pixels::{Place, SEED, Scouted, grid, some_blocks};
 use super::auto_reuse;
 pub use super::auto_round::Trial;
 use super::auto_round::{Candidate, Caution, Mean, Predicted, Round};
@@ -85,8 +85,6 @@ const LIGHT_TRIALS: f64 = 3.0;
 /// Pixels that are looked at before the rounds, for each pixel of one, and samples of each and seed.
 const SCOUTED: usize = 8;
 const SCOUT_SPP: u32 = 2;
-/// One in so many blocks of pixels that may share paths is looked at before the others.
-const SOME_BLOCKS: usize = 3;
 /// Time of all rounds after the first one over that of the first, about.
 const FOLLOWING: f64 = 7.0;
 /// Standard error of what the model says of paths with more samples of two kinds, beside that of what was measured.
@@ -351,10 +349,10 @@ impl Pilot {
         let of_best = gain(best.map(f64::from)) - gain(fitted[0]);
         let with_more = fitted.iter().position(|n| n[2] > f64::from(best[2]));
         if let Some(k) = with_more.filter(|&k| has_later && first.may_have(k, of_best)) {
-            let more = with_numbers(base, [best[0], best[1], fitted[k][2] as u32]);
-            if candidates.iter().all(|c| c.settings != more) {
-                candidates.push(Candidate::named(more));
-            }
+            let more = (1..=best[1]).rev().map(|later| [best[0], later, fitted[k][2] as u32]);
+            let more = more.filter(|n| goes_on_by_one(base, n)).map(|n| with_numbers(base, n)).next();
+            let is_new = |more: &IntegratorSettings| candidates.iter().all(|c| c.settings != *more);
+            candidates.extend(more.filter(is_new).map(Candidate::named));
         }
         if let (Some(photons), Some(of_photons)) = (&photons, &of_contributing) {
             let with_photons = photons.best(&of_photons[0], NEARLY);
@@ -514,19 +512,25 @@ impl Pilot {
             && settings.iter().all(|s| [s.samples, s.later_samples] != [chosen.samples, chosen.later_samples]);
         let mut candidates = auto_reuse::candidates(chosen, if is_open { &settings } else { &[] });
         candidates.iter_mut().for_each(|c| c.preparation = preparation);
-        let of_block = (auto_reuse::EDGE * auto_reuse::EDGE) as usize;
         let measured = |candidates: &[Candidate], places: &[Place]| {
-            let round = self.measured(job, candidates, (places, self.spp, SHARING), how)?.by_blocks(of_block);
+            let round = self.measured(job, candidates, (places, self.spp, SHARING), how)?.by_blocks(auto_reuse::BLOCK);
             let trials = round.trials(candidates);
             // Few pixels at edges, whose camera samples differ, have most of the mean variance, and all others most of what is shared
             Ok::<_, RenderError>((Round { mean: Mean::Both, ..round }, trials))
         };
-        // Some of the blocks tell where there is nothing to be shared
+        // Some of the blocks tell where there is nothing to be shared, though fewer samples at later vertices may do then
         let all = &self.places[SHARING];
-        let some: Vec<Place> = all.chunks(of_block).step_by(SOME_BLOCKS).flatten().copied().collect();
-        let (round, trials) = measured(&candidates[..2], &some)?;
-        if !auto_reuse::is_possible(&round) {
-            return Ok((trials, *chosen));
+        let some = some_blocks(all);
+        let fewer = if is_open {
+            model.cost(numbers.map(f64::from)) / model.cost([first, 1, rest].map(f64::from))
+        } else {
+            1.0
+        };
+        if !some.is_empty() {
+            let (round, trials) = measured(&candidates[..2], &some)?;
+            if !auto_reuse::is_possible(&round, fewer) {
+                return Ok((trials, *chosen));
+            }
         }
         let (round, trials) = measured(&candidates, all)?;
         let shared = if is_open {

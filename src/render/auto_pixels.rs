@@ -5,7 +5,7 @@
 //! deviation around it, and to a part that all have, since few samples do not see everything; it counts as much as that
 //! was improbable. So the mean over pixels is that of the image, as in importance sampling.
 
-use super::auto_reuse::EDGE;
+use super::auto_reuse::{BLOCK, EDGE};
 use crate::film::PixelBounds;
 use lumiris_numbers::math::hash::{pcg4d, unit_f32};
 
@@ -13,6 +13,9 @@ use lumiris_numbers::math::hash::{pcg4d, unit_f32};
 pub(super) const SEED: u32 = 0x61_75_74_6f;
 /// Part of the probability that is the same for all pixels.
 const EVEN: f64 = 0.3;
+/// One in so many blocks is looked at before the others, if those are so many at least.
+const SOME: usize = 3;
+const MIN_SOME: usize = 6;
 /// Steps by which probabilities converge of which none is above 1.
 const ITERATIONS: usize = 8;
 
@@ -62,13 +65,12 @@ impl Scouted {
 
     /// As many pixels in blocks, or somewhat less; none where there is no room for any.
     pub(super) fn draw_blocks(&self, bounds: &PixelBounds, count: usize, round: u32) -> Vec<Place> {
-        let size = (EDGE * EDGE) as usize;
         let room = [bounds.width() / EDGE, bounds.height() / EDGE];
         if room.contains(&0) {
             return Vec::new();
         }
         let mut blocks: Vec<Place> = Vec::new();
-        let drawn = self.drawn(count / size, round);
+        let drawn = self.drawn(count / BLOCK, round);
         for &Place { pixel: [x, y], weight } in &drawn {
             let place = |x: u32, x0: u32, room: u32| x0 + EDGE * ((x - x0) / EDGE).min(room - 1);
             let pixel = [place(x, bounds.x0, room[0]), place(y, bounds.y0, room[1])];
@@ -107,6 +109,17 @@ impl Scouted {
         places.iter_mut().for_each(|place| place.weight *= each);
         places
     }
+}
+
+/// Some of the blocks, which stand one after the other by their weights, as a round of their own; none if they are too few.
+pub(super) fn some_blocks(places: &[Place]) -> Vec<Place> {
+    let mut some: Vec<Place> = places.chunks(BLOCK).skip(SOME / 2).step_by(SOME).flatten().copied().collect();
+    if some.len() < MIN_SOME * BLOCK {
+        return Vec::new();
+    }
+    let mean = some.iter().map(|place| place.weight).sum::<f64>() / some.len() as f64;
+    some.iter_mut().for_each(|place| place.weight /= mean);
+    some
 }
 
 /// Pixels of like weight are beside each other, so that the time of all of them tells that of each.
@@ -210,5 +223,19 @@ mod tests {
         let places = Scouted::new(pixels, columns, &still).draw(300, 0);
         assert!((299..=301).contains(&places.len()));
         assert!(places.iter().all(|place| (place.weight - 1.0).abs() < 0.01));
+    }
+
+    #[test]
+    fn some_blocks_stand_for_all() {
+        let blocks = |n: u32| -> Vec<Place> {
+            let of_block = |k: u32| (0..16).map(move |i| Place { pixel: [k, i], weight: f64::from(1 + k) });
+            (0..n).flat_map(of_block).collect()
+        };
+        let some = some_blocks(&blocks(24));
+        let numbers: Vec<u32> = some.iter().step_by(BLOCK).map(|place| place.pixel[0]).collect();
+        assert_eq!(numbers, [1, 4, 7, 10, 13, 16, 19, 22]);
+        let mean = some.iter().map(|place| place.weight).sum::<f64>() / some.len() as f64;
+        assert!((mean - 1.0).abs() < 1e-9 && some[0].weight < some[BLOCK].weight);
+        assert!(some_blocks(&blocks(12)).is_empty() && some_blocks(&[]).is_empty(), "too few");
     }
 }

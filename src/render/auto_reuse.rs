@@ -11,6 +11,8 @@ use lumiris_numbers::estimators::efficiency::Model;
 
 /// Edge of the blocks of the pilot.
 pub(super) const EDGE: u32 = 4;
+/// Pixels of these blocks.
+pub(super) const BLOCK: usize = (EDGE * EDGE) as usize;
 /// Edges among which is chosen, of which the first shares nothing: the larger blocks are, the coarser is the grain, and plain MSE gains nothing more.
 const EDGES: [u32; 6] = [1, 2, 3, 4, 5, 6];
 /// Light samples at later vertices among which is chosen.
@@ -61,12 +63,13 @@ fn gains(round: &Round) -> impl Fn(u32) -> Vec<f64> {
     }
 }
 
-/// False if blocks of no edge may gain enough, by a round of both candidates.
-pub(super) fn is_possible(round: &Round) -> bool {
+/// False if blocks of no edge may gain enough, by a round of both candidates, where paths with `fewer` samples at later vertices take
+/// less time by this factor.
+pub(super) fn is_possible(round: &Round, fewer: f64) -> bool {
     let gains = gains(round);
     EDGES.into_iter().filter(|&edge| edge > 1).any(|edge| {
         let (gain, error) = jackknife(&gains(edge));
-        gain + POSSIBLE * error > MIN_GAIN.ln()
+        gain + fewer.ln() + POSSIBLE * error > MIN_GAIN.ln()
     })
 }
 
@@ -197,9 +200,10 @@ mod tests {
         assert!(best(&round(1.0)).is_none() && best(&round(1.2)).is_none());
         let found = best(&round(0.3)).unwrap();
         assert!(found >= 3, "{found}");
-        assert!(!is_possible(&round(1.0)) && !is_possible(&round(1.2)) && is_possible(&round(0.3)));
+        assert!(!is_possible(&round(1.0), 1.0) && !is_possible(&round(1.2), 1.0) && is_possible(&round(0.3), 1.0));
+        assert!(is_possible(&round(1.0), 1.2), "with fewer samples at later vertices");
         let mut few = round(0.5);
         few.measured[1].1[5][1] = 60.0;
-        assert!(best(&few).is_none() && is_possible(&few), "one pixel, which may be chance");
+        assert!(best(&few).is_none() && is_possible(&few, 1.0), "one pixel, which may be chance");
     }
 }

@@ -367,7 +367,7 @@ mod tests {
     #[test]
     fn what_is_known_poorly_may_be_better() {
         let may_have = |deviations: &dyn Fn(usize) -> f64, gain: f64| {
-            let differences = (0..256).map(|i| deviations(i)).map(|d| [d, d * d]).collect();
+            let differences = (0..256).map(deviations).map(|d| [d, d * d]).collect();
             let round = Round::of(vec![(1.0, vec![[1.0, 1.0]; 256]), (1.0, differences)], 4, Mean::Squares);
             round.may_have(1, gain.ln())
         };
