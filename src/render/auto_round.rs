@@ -173,15 +173,15 @@ impl Round {
         if k == base { (0.0, 0.0) } else { gain((self, k), (self, base)) }
     }
 
+    /// The same of the first candidates of two rounds on the same pixels.
+    pub(super) fn gain_over(&self, base: &Round) -> (f64, f64) {
+        gain((self, 0), (base, 0))
+    }
+
     /// True if candidate `k` may be as efficient as one of this gain over the first.
     pub(super) fn may_have(&self, k: usize, gain: f64) -> bool {
         let (measured, error) = self.gain(k, 0);
         error.is_finite() && measured + POSSIBLE * error >= gain
-    }
-
-    /// The same of the first candidates of two rounds on the same pixels.
-    pub(super) fn gain_over(&self, base: &Round) -> (f64, f64) {
-        gain((self, 0), (base, 0))
     }
 
     /// The models by candidates of which the others each have more of one of the `numbers` of the first: by all pixels, and
