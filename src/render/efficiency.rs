@@ -1,10 +1,14 @@
 //! Efficiency of several settings on one scene: 1/(error × CPU time).
 //!
-//! Every setting renders the image with several seeds; settings take turns. What they leave to a pilot is chosen for the
-//! first seed. CPU time is that of all threads, and includes
-//! whatever the settings need before the first sample: light trees, photons, pilots. Unbiased images differ from the truth
-//! by their variance only, so the error of an image is the variance between its seeds, per pixel and channel; the mean
-//! over all settings and seeds says how bright a pixel is, for the relative error.
+//! Every setting renders the image with several seeds; settings take turns. What they leave to a pilot is chosen anew for
+//! each seed. CPU time is that of all threads, and includes whatever the settings need before the first sample: light
+//! trees, photons, pilots.
+//!
+//! With two reference images a and b, the error of an image x is (x − a)(x − b), per pixel and channel: what it expects
+//! is the squared error of x, since the noise of a and that of b are independent of x and of each other. Their mean says
+//! how bright a pixel is, for the relative error. They are of the same integrator, so that its own bias, if it has one, is
+//! none of the error. Without references, the error is the variance between seeds, which is that of unbiased images, and the mean over all settings and
+//! seeds says how bright a pixel is.
 //!
 //! Intervals are those of ±2 standard errors: of errors by the spread between blocks of the image, with the covariance of
 //! the two that are compared, and of CPU times by the spread between seeds.
@@ -15,8 +19,9 @@ use crate::film::{PixelBounds, PixelSums};
 use crate::imaging::metrics::difference::DEFAULT_EPSILON;
 use crate::lights::LightSamplerKind;
 use crate::scene::RenderJob;
-use crate::settings::{EstimatorKind, IntegratorKind, Settings};
+use crate::settings::{EstimatorKind, IntegratorKind, SamplingSettings, Settings};
 use lumiris_numbers::estimators::stats::Welford;
+use lumiris_numbers::math::hash::pcg4d;
 use lumiris_numbers::math::luminance;
 use serde::Serialize;
 use std::sync::atomic::AtomicBool;
@@ -27,6 +32,11 @@ const BLOCKS: u32 = 16;
 const EDGE_RADIUS: i64 = 2;
 /// Camera samples per pixel of the emission.
 const EDGE_SPP: u32 = 16;
+/// Combined with the seed of an image to give those of its references.
+const REFERENCE_SEED: u32 = 0x7265_6665;
+
+/// Colours of the pixels, row by row.
+pub type Colors = Vec<[f64; 3]>;
 
 /// Settings with the name that a report gives them.
 #[derive(Clone, Debug)]
@@ -42,7 +52,8 @@ pub struct Case {
 pub struct Efficiency {
     /// Mean error of one image.
     pub error: f64,
-    /// 1/(error × CPU time), relative to that of the first case.
+    /// 1/(error × CPU time), relative to that of the first case. Not a number where one of both errors is within the noise of
+    /// its references.
     pub relative: f64,
     /// Interval of `relative`.
     pub interval: [f64; 2],
@@ -63,57 +74,49 @@ pub struct Row {
     pub mse: Efficiency,
     /// By (x − r)² without pixels at the edge of visible lights, which only camera samples resolve.
     pub masked_mse: Efficiency,
-    /// The settings that were chosen because these left them open, by their names in metadata.
-    pub chosen: Vec<(&'static str, String)>,
+    /// The settings that were chosen for each seed because these left them open, by their names in metadata.
+    pub chosen: Vec<Vec<(&'static str, String)>>,
 }
 
 /// The images of a case.
 #[derive(Default)]
 struct Measured {
-    /// What its settings are with the choices made for the first seed.
-    planned: Option<Settings>,
-    /// Processor time of these choices (s).
-    pilot: f64,
     cpu: Vec<f64>,
-    images: Vec<Vec<[f64; 3]>>,
-    chosen: Vec<(&'static str, String)>,
+    images: Vec<Colors>,
+    chosen: Vec<Vec<(&'static str, String)>>,
 }
 
-/// Measures the cases with `seeds` seeds each, at least two. `observe` is told before each rendering.
+/// Measures the cases with `seeds` seeds each, at least two, against two images by [`reference_image`] if there are any.
+/// `observe` is told before each rendering.
 pub fn measure_efficiency(
     job: &mut RenderJob,
     cases: &[Case],
     seeds: u32,
+    references: Option<&[Colors; 2]>,
     render_settings: &RenderSettings,
     observe: &mut dyn FnMut(&str, u32),
 ) -> Result<Vec<Row>, RenderError> {
-    let seeds = seeds.max(2);
     let mut measured: Vec<Measured> = cases.iter().map(|_| Measured::default()).collect();
-    for seed in 0..seeds {
+    for seed in 0..seeds.max(2) {
         for (case, measured) in cases.iter().zip(&mut measured) {
             observe(&case.name, seed);
-            let mut settings = measured.planned.unwrap_or(case.settings);
-            settings.sampling.seed = case.settings.sampling.seed.wrapping_add(seed);
+            let mut settings = case.settings;
+            settings.sampling.seed = settings.sampling.seed.wrapping_add(seed);
             let start = processor_time::of_process();
             let (image, plan) = image(job, settings, render_settings)?;
-            let cpu = (processor_time::of_process() - start).as_secs_f64();
-            if measured.planned.is_none() {
-                // What the pilot chose for one seed is used for all, and each image has its time
-                measured.pilot = plan.auto.map_or(0.0, |auto| auto.seconds);
-                measured.chosen = plan.chosen;
-                measured.planned = Some(*job.settings());
-                measured.cpu.push(cpu);
-            } else {
-                measured.cpu.push(cpu + measured.pilot);
-            }
+            measured.cpu.push((processor_time::of_process() - start).as_secs_f64());
+            measured.chosen.push(plan.chosen);
             measured.images.push(image);
         }
     }
 
     let bounds = job.world.scene.film.bounds;
-    let pooled = pooled_mean(&measured, bounds.area());
-    let keep = away_from_edges(&emission(job, &cases[0].settings, render_settings)?, &pooled, &bounds);
-    let weights = Weights { pooled: &pooled, keep: &keep, bounds };
+    let mean_image = match references {
+        Some(references) => mean_of(references.iter(), bounds.area()),
+        None => mean_of(measured.iter().flat_map(|m| &m.images), bounds.area()),
+    };
+    let is_away = away_from_edges(&emission(job, &cases[0].settings, render_settings)?, &mean_image, &bounds);
+    let weights = Weights { mean: &mean_image, is_away: &is_away, references, bounds };
     let errors: Vec<Errors> = measured.iter().map(|m| weights.errors(&m.images)).collect();
     let rows = cases.iter().zip(&measured).zip(&errors).map(|((case, m), e)| {
         let compare = |of: fn(&Errors) -> &Vec<f64>| efficiency((of(e), &m.cpu), (of(&errors[0]), &measured[0].cpu));
@@ -131,12 +134,37 @@ pub fn measure_efficiency(
     Ok(rows.collect())
 }
 
+/// The settings of one of two references of an image by settings of these: their expectation is that of `base`, textures
+/// included, and their random numbers are of their own.
+pub fn reference_settings(base: &Settings, spp: u32, index: u32) -> Settings {
+    let mut settings = *base;
+    settings.integrator.estimator = EstimatorKind::Auto;
+    settings.sampling = SamplingSettings {
+        spp,
+        noise: None,
+        footprint_spp: Some(base.sampling.footprint_spp()),
+        seed: pcg4d([base.sampling.seed, REFERENCE_SEED, index, 0])[0],
+        ..base.sampling
+    };
+    settings
+}
+
+/// A reference by [`reference_settings`], in single precision as files have it.
+pub fn reference_image(
+    job: &mut RenderJob,
+    settings: Settings,
+    render_settings: &RenderSettings,
+) -> Result<Colors, RenderError> {
+    let (image, _) = image(job, settings, render_settings)?;
+    Ok(image.into_iter().map(|color| color.map(|v| f64::from(v as f32))).collect())
+}
+
 /// The image by these settings, with everything prepared anew.
 fn image(
     job: &mut RenderJob,
     settings: Settings,
     render_settings: &RenderSettings,
-) -> Result<(Vec<[f64; 3]>, Plan), RenderError> {
+) -> Result<(Colors, Plan), RenderError> {
     job.reset(settings);
     let plan = prepare(job, &Preparation::on(render_settings.threads))?;
     let spp = job.pixel_samples.as_ref().map_or(job.settings().sampling.spp, |of_pixels| of_pixels.spp);
@@ -147,11 +175,7 @@ fn image(
 }
 
 /// What emits, as the camera sees it.
-fn emission(
-    job: &mut RenderJob,
-    settings: &Settings,
-    render_settings: &RenderSettings,
-) -> Result<Vec<[f64; 3]>, RenderError> {
+fn emission(job: &mut RenderJob, settings: &Settings, render_settings: &RenderSettings) -> Result<Colors, RenderError> {
     let mut settings = *settings;
     settings.integrator.kind = IntegratorKind::Path;
     settings.integrator.max_depth = 0;
@@ -161,9 +185,8 @@ fn emission(
     Ok(image(job, settings, render_settings)?.0)
 }
 
-fn pooled_mean(measured: &[Measured], area: usize) -> Vec<[f64; 3]> {
+fn mean_of<'a>(images: impl Iterator<Item = &'a Colors> + Clone, area: usize) -> Colors {
     let mut sum = vec![[0.0; 3]; area];
-    let images = measured.iter().flat_map(|m| &m.images);
     let count = images.clone().count() as f64;
     for image in images {
         for (sum, x) in sum.iter_mut().zip(image) {
@@ -199,38 +222,51 @@ struct Errors {
 }
 
 struct Weights<'a> {
-    pooled: &'a [[f64; 3]],
-    keep: &'a [bool],
+    mean: &'a [[f64; 3]],
+    /// Pixels that count for the masked MSE.
+    is_away: &'a [bool],
+    references: Option<&'a [Colors; 2]>,
     bounds: PixelBounds,
 }
 
 impl Weights<'_> {
-    fn errors(&self, images: &[Vec<[f64; 3]>]) -> Errors {
+    fn errors(&self, images: &[Colors]) -> Errors {
         let (width, height) = (self.bounds.width(), self.bounds.height());
         let blocks = (BLOCKS * BLOCKS) as usize;
         let mut errors = Errors { relative: vec![0.0; blocks], squared: vec![0.0; blocks], masked: vec![0.0; blocks] };
-        let kept = self.keep.iter().filter(|k| **k).count();
-        for (i, r) in self.pooled.iter().enumerate() {
+        let kept = self.is_away.iter().filter(|k| **k).count();
+        for (i, r) in self.mean.iter().enumerate() {
             let (x, y) = (i as u32 % width, i as u32 / width);
             let block = (y * BLOCKS / height * BLOCKS + x * BLOCKS / width) as usize;
             for c in 0..3 {
-                let mut spread = Welford::default();
-                images.iter().for_each(|image| spread.add(image[i][c]));
-                let square = spread.variance() / (3 * self.pooled.len()) as f64;
+                let square = self.square(images, i, c) / (3 * self.mean.len()) as f64;
                 errors.squared[block] += square;
                 errors.relative[block] += square / (r[c] * r[c] + DEFAULT_EPSILON);
-                if self.keep[i] {
-                    errors.masked[block] += square * self.pooled.len() as f64 / kept as f64;
+                if self.is_away[i] {
+                    errors.masked[block] += square * self.mean.len() as f64 / kept as f64;
                 }
             }
         }
         errors
+    }
+
+    /// Squared error of one of the images at channel `c` of pixel `i`, expected.
+    fn square(&self, images: &[Colors], i: usize, c: usize) -> f64 {
+        if let Some([a, b]) = self.references {
+            return mean_by(images, |x| (x[i][c] - a[i][c]) * (x[i][c] - b[i][c]));
+        }
+        let mut spread = Welford::default();
+        images.iter().for_each(|image| spread.add(image[i][c]));
+        spread.variance()
     }
 }
 
 /// Efficiency of the errors by block and CPU times of one case, relative to those of another.
 fn efficiency((errors, cpu): (&[f64], &[f64]), (base, base_cpu): (&[f64], &[f64])) -> Efficiency {
     let (error, base_error) = (errors.iter().sum::<f64>(), base.iter().sum::<f64>());
+    if !is_known(errors) || !is_known(base) {
+        return Efficiency { error, relative: f64::NAN, interval: [f64::NAN; 2] };
+    }
     // Standard error of log(base_error/error): of a sum over blocks
     let terms: Vec<f64> = errors.iter().zip(base).map(|(e, b)| b / base_error - e / error).collect();
     let n = terms.len() as f64;
@@ -243,13 +279,30 @@ fn efficiency((errors, cpu): (&[f64], &[f64]), (base, base_cpu): (&[f64], &[f64]
     Efficiency { error, relative, interval: [relative / factor, relative * factor] }
 }
 
+/// True if an error, by blocks, is two of its standard errors at least: the logarithm of less has no interval.
+fn is_known(errors: &[f64]) -> bool {
+    let spread: Welford = errors.iter().copied().collect();
+    spread.mean() > 2.0 * spread.standard_error()
+}
+
 fn mean(values: &[f64]) -> f64 {
-    values.iter().sum::<f64>() / values.len().max(1) as f64
+    mean_by(values, |x| *x)
+}
+
+fn mean_by<T>(values: &[T], of: impl Fn(&T) -> f64) -> f64 {
+    values.iter().map(of).sum::<f64>() / values.len().max(1) as f64
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
+    use lumiris_test_support::random::{Pcg32, RngExt, pcg32};
+
+    /// Normal numbers [Box and Muller 1958].
+    fn normal(stream: &mut Pcg32) -> f64 {
+        let [a, b] = stream.random::<[f32; 2]>().map(f64::from);
+        (-2.0 * (1.0 - a).ln()).sqrt() * (std::f64::consts::TAU * b).cos()
+    }
 
     #[test]
     fn half_the_error_in_half_the_time_is_four_times_as_efficient() {
@@ -263,13 +316,9 @@ mod tests {
 
     #[test]
     fn the_interval_holds_the_ratio_of_errors_as_often_as_it_says() {
-        use lumiris_test_support::random::{RngExt, pcg32};
         let mut s = pcg32([11, 3, 1]);
         // Errors of two seeds: squares of normal numbers, of which one case has half the variance
-        let mut normal = || {
-            let [a, b] = s.random::<[f32; 2]>().map(f64::from);
-            (-2.0 * (1.0 - a).ln()).sqrt() * (std::f64::consts::TAU * b).cos()
-        };
+        let mut normal = || normal(&mut s);
         let inside = (0..400).filter(|_| {
             let base: Vec<f64> = (0..256).map(|_| (0..4).map(|_| normal().powi(2)).sum()).collect();
             let errors: Vec<f64> = (0..256).map(|_| 0.5 * (0..4).map(|_| normal().powi(2)).sum::<f64>()).collect();
@@ -278,6 +327,53 @@ mod tests {
         });
         let inside = inside.count();
         assert!((365..=396).contains(&inside), "{inside} of 400, 382 expected");
+    }
+
+    /// Images of 40 × 40 pixels with normal noise of this standard deviation and this bias around 1.
+    fn noisy(seed: u32, count: usize, deviation: f64, bias: f64) -> Vec<Colors> {
+        let mut s = pcg32([seed, 7, 2]);
+        let mut image = || (0..1600).map(|_| [0; 3].map(|_| 1.0 + bias + deviation * normal(&mut s))).collect();
+        (0..count).map(|_| image()).collect()
+    }
+
+    #[test]
+    fn noise_of_references_drops_out_and_bias_does_not() {
+        let bounds = PixelBounds { x0: 0, x1: 40, y0: 0, y1: 40 };
+        let references: [Colors; 2] = noisy(1, 2, 0.1, 0.0).try_into().expect("two");
+        let mean = mean_of(references.iter(), 1600);
+        let of = |references: Option<&[Colors; 2]>, images: &[Colors]| -> f64 {
+            let weights = Weights { mean: &mean, is_away: &[true; 1600], references, bounds };
+            weights.errors(images).squared.iter().sum()
+        };
+        // With one reference twice it would be five times as much. The standard error is that of the product of both
+        // references, 0.1²/√4800 = 6 % of 0.05²
+        let unbiased = noisy(2, 4, 0.05, 0.0);
+        assert!((of(Some(&references), &unbiased) / 0.0025 - 1.0).abs() < 0.2);
+        assert!((of(None, &unbiased) / 0.0025 - 1.0).abs() < 0.05, "a standard error is 1.2 %");
+        // Between seeds, bias is not to be seen
+        let biased = noisy(3, 4, 0.05, 0.1);
+        assert!((of(Some(&references), &biased) / 0.0125 - 1.0).abs() < 0.1);
+        assert!((of(None, &biased) / 0.0025 - 1.0).abs() < 0.05);
+    }
+
+    #[test]
+    fn an_error_within_the_noise_of_references_has_no_efficiency() {
+        let known: Vec<f64> = (0..256).map(|i| 1.0 + f64::from(i % 3)).collect();
+        let unknown: Vec<f64> = (0..256).map(|i| if i % 2 == 0 { 1.01 } else { -1.0 }).collect();
+        let of = |errors: &Vec<f64>, base: &Vec<f64>| efficiency((errors, &[1.0; 2]), (base, &[1.0; 2])).relative;
+        assert_eq!(of(&known, &known), 1.0);
+        assert!(of(&unknown, &known).is_nan() && of(&known, &unknown).is_nan());
+        assert!(of(&vec![0.0; 256], &known).is_nan());
+    }
+
+    #[test]
+    fn references_have_the_expectation_of_the_image_and_other_random_numbers() {
+        let mut base = Settings::default();
+        (base.sampling.spp, base.sampling.noise) = (16, Some(0.1));
+        let [a, b] = [0, 1].map(|index| reference_settings(&base, 1024, index));
+        assert_eq!((a.sampling.spp, a.sampling.noise, a.sampling.footprint()), (1024, None, base.sampling.footprint()));
+        let seeds = [base.sampling.seed, a.sampling.seed, b.sampling.seed];
+        assert!(seeds[1] != seeds[2] && seeds[1..].iter().all(|seed| seed.abs_diff(seeds[0]) > 1000), "{seeds:?}");
     }
 
     #[test]

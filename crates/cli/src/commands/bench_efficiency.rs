@@ -1,17 +1,20 @@
 //! `lumiris bench efficiency`: scenes × settings, as one table.
 
 use super::args::SceneArgs;
+use super::bench_references::References;
 use super::named::named;
 use super::progress;
-use super::settings::{load_job, render_settings};
+use super::settings::{load_job_of, render_settings};
 use super::settings_args::SettingsArgs;
 use anyhow::Context;
 use clap::Args;
+use lumiris::import::cache::FileCache;
 use lumiris::integrators::through_media;
 use lumiris::lights::LightSamplerKind;
-use lumiris::render::efficiency::{Case, Row, measure_efficiency};
+use lumiris::render::efficiency::{Case, Efficiency, Row, measure_efficiency};
 use lumiris::settings::{EstimatorKind, IntegratorKind, Settings};
-use serde_json::{Value, json};
+use serde::Serialize;
+use serde_json::Value;
 use std::path::{Path, PathBuf};
 
 /// Options of `bench efficiency`.
@@ -32,6 +35,18 @@ pub(super) struct EfficiencyArgs {
     /// Seeds of each setting
     #[arg(long, value_name = "N", default_value_t = 2, value_parser = clap::value_parser!(u32).range(2..=1000))]
     seeds: u32,
+    /// Options that all settings but the first get besides, as further settings: 'adaptive=--allocation adaptive'. May be
+    /// given several times
+    #[arg(long = "variant", value_name = "NAME=OPTIONS", value_parser = parse_case)]
+    variants: Vec<NamedOptions>,
+    /// Find errors against two references of N samples per pixel, by `--estimator auto` and the integrator, whose noise drops
+    /// out; without them, errors are variances between seeds
+    #[arg(long, value_name = "N", value_parser = clap::value_parser!(u32).range(1..))]
+    reference_spp: Option<u32>,
+    /// Keep the references in this folder, and use those of the same scene and settings that are there, which are of the
+    /// program that made them
+    #[arg(long, value_name = "DIR", requires = "reference_spp")]
+    references: Option<PathBuf>,
 }
 
 /// Options with a name.
@@ -69,14 +84,31 @@ fn default_cases(base: &Settings) -> Vec<Case> {
     cases
 }
 
-/// Measures all scenes and prints a table of each; the answer is what goes into the JSON file.
+/// What was measured of a scene.
+#[derive(Serialize)]
+struct Table {
+    scene: String,
+    integrator: &'static str,
+    max_depth: u32,
+    spp: u32,
+    seeds: u32,
+    reference_spp: Option<u32>,
+    rows: Vec<Row>,
+}
+
+/// Measures all scenes and prints a table of each, and one of what the first settings are by the best of the others; the
+/// answer is what goes into the JSON file.
 pub(super) fn efficiency(scene_args: &SceneArgs, own: &EfficiencyArgs) -> anyhow::Result<Value> {
     let mut tables = Vec::new();
     for path in std::iter::once(&scene_args.scene).chain(&own.more_scenes) {
         let mut scene = scene_args.clone();
         scene.scene.clone_from(path);
-        let (mut job, _) = load_job(&scene)?;
-        let base = *job.settings();
+        let (mut job, _, files) = load_job_of(&scene, &FileCache::default(), None)?;
+        let mut base = *job.settings();
+        // Cases with other numbers of samples are of the same textures
+        base.sampling.footprint_spp = Some(base.sampling.footprint_spp());
+        let references = own.reference_spp.map(|spp| References::new(spp, own.references.as_deref(), &scene, &files));
+        let references = references.transpose()?;
         let given = [base.integrator.kind];
         let kinds = if own.integrators.is_empty() { &given[..] } else { &own.integrators };
         for &kind in kinds {
@@ -89,19 +121,31 @@ pub(super) fn efficiency(scene_args: &SceneArgs, own: &EfficiencyArgs) -> anyhow
                 continue;
             }
             let of_scene = render_settings(&scene, &job);
-            let rows = measure_efficiency(&mut job, &cases, own.seeds, &of_scene, &mut |name, seed| {
-                progress::say(&format!("{}: {name}, seed {seed}", path.display()));
-            })
-            .with_context(|| format!("cannot render {}", path.display()))?;
-            let depth = base.integrator.depth();
-            progress::print(&table(&format!("{}, {}, {depth} bounces", path.display(), <&str>::from(kind)), &rows));
-            tables.push(json!({
-                "scene": path.display().to_string(), "integrator": <&str>::from(kind), "max_depth": depth,
-                "spp": base.sampling.spp, "seeds": own.seeds, "rows": rows,
-            }));
+            let references = references.as_ref().map(|r| r.images(&mut job, &base, &of_scene)).transpose()?;
+            let observe = &mut |name: &str, seed| progress::say(&format!("{}: {name}, seed {seed}", path.display()));
+            let rows = measure_efficiency(&mut job, &cases, own.seeds, references.as_ref(), &of_scene, observe)
+                .with_context(|| format!("cannot render {}", path.display()))?;
+            let table = Table {
+                scene: path.display().to_string(),
+                integrator: kind.into(),
+                max_depth: base.integrator.depth(),
+                spp: base.sampling.spp,
+                seeds: own.seeds,
+                reference_spp: own.reference_spp,
+                rows,
+            };
+            progress::print(&text(&table));
+            tables.push(table);
         }
     }
-    Ok(tables.into())
+    let variants: Vec<&str> = own.variants.iter().map(|variant| variant.name.as_str()).collect();
+    for variant in std::iter::once(None).chain(variants.iter().copied().map(Some)) {
+        let is_of = |row: &Row| variants.iter().copied().find(|name| is_variant(&row.name, name)) == variant;
+        if let Some(text) = summary(&tables, variant, is_of) {
+            progress::print(&text);
+        }
+    }
+    Ok(serde_json::to_value(&tables)?)
 }
 
 /// Says why a case is left out of a scene with media, if it is.
@@ -114,23 +158,50 @@ fn is_possible(case: &Case, scene: &Path) -> bool {
 }
 
 fn cases(args: &EfficiencyArgs, base: &Settings) -> Vec<Case> {
-    if args.cases.is_empty() {
-        return default_cases(base);
-    }
     let case = |named: &NamedOptions| {
         let mut settings = *base;
         named.options.apply(&mut settings);
         Case { name: named.name.clone(), settings }
     };
-    args.cases.iter().map(case).collect()
+    let mut cases = if args.cases.is_empty() { default_cases(base) } else { args.cases.iter().map(case).collect() };
+    let variants = args.variants.iter().flat_map(|variant| {
+        cases.iter().skip(1).map(|case| {
+            let mut settings = case.settings;
+            variant.options.apply(&mut settings);
+            Case { name: format!("{}{}", case.name, suffix(&variant.name)), settings }
+        })
+    });
+    let variants: Vec<Case> = variants.collect();
+    cases.extend(variants);
+    cases
 }
 
-fn table(title: &str, rows: &[Row]) -> String {
+/// What the names of settings with a variant end with.
+fn suffix(variant: &str) -> String {
+    format!(", {variant}")
+}
+
+fn is_variant(case: &str, variant: &str) -> bool {
+    case.ends_with(&suffix(variant))
+}
+
+fn text(table: &Table) -> String {
     let mut text = format!(
-        "\n{title}; efficiency relative to the first row, [interval of 2 standard errors]\n{:<28}{:>8}{:>10}{:>11}{:>24}{:>11}{:>24}{:>11}{:>8}\n",
-        "settings", "CPU s", "mean", "relMSE", "efficiency", "MSE masked", "efficiency", "MSE", "eff."
+        "\n{}, {}, {} bounces; efficiency relative to the first row, [interval of 2 standard errors]\n{:<28}{:>8}{:>10}{:>11}{:>24}{:>11}{:>24}{:>11}{:>8}\n",
+        table.scene,
+        table.integrator,
+        table.max_depth,
+        "settings",
+        "CPU s",
+        "mean",
+        "relMSE",
+        "efficiency",
+        "MSE masked",
+        "efficiency",
+        "MSE",
+        "eff."
     );
-    for row in rows {
+    for row in &table.rows {
         let interval = |[a, b]: [f64; 2]| format!("[{a:.2}, {b:.2}]");
         text += &format!(
             "{:<28}{:>8.2}{:>10.5}{:>11.3e}{:>8.2} {:>15}{:>11.3e}{:>8.2} {:>15}{:>11.3e}{:>8.2}\n",
@@ -146,12 +217,69 @@ fn table(title: &str, rows: &[Row]) -> String {
             row.mse.error,
             row.mse.relative,
         );
-        if !row.chosen.is_empty() {
-            let chosen: Vec<String> = row.chosen.iter().map(|(key, value)| format!("{key} {value}")).collect();
-            text += &format!("    chose {}\n", chosen.join(", "));
+        let mut choices: Vec<(Vec<String>, &Vec<_>)> = Vec::new();
+        for (seed, chosen) in row.chosen.iter().enumerate().filter(|(_, chosen)| !chosen.is_empty()) {
+            match choices.iter_mut().find(|(_, other)| *other == chosen) {
+                Some((seeds, _)) => seeds.push(seed.to_string()),
+                None => choices.push((vec![seed.to_string()], chosen)),
+            }
+        }
+        for (seeds, chosen) in choices {
+            let chosen: Vec<String> = chosen.iter().map(|(key, value)| format!("{key} {value}")).collect();
+            text += &format!("    chose {} (seed {})\n", chosen.join(", "), seeds.join(", "));
         }
     }
     text.trim_end().to_owned()
+}
+
+/// Errors by which the first settings are compared with the best of the others.
+const ERRORS: [&str; 3] = ["relMSE", "MSE masked", "MSE"];
+
+/// Efficiency by each of [`ERRORS`].
+fn efficiencies(row: &Row) -> [Efficiency; 3] {
+    [row.relmse, row.masked_mse, row.mse]
+}
+
+/// The efficiency of the first settings by that of the best of the others of a variant, for each error, with intervals and
+/// geometric means; `None` if there are no others. The best are chosen by the images that are compared, so they are the
+/// luckiest too.
+fn summary(tables: &[Table], variant: Option<&str>, is_of_variant: impl Fn(&Row) -> bool) -> Option<String> {
+    let title = format!("first row by the best of others in hindsight{}", variant.map(suffix).unwrap_or_default());
+    let mut text = format!("\n{title:<48}{:>8}", "CPU s");
+    ERRORS.iter().for_each(|name| text += &format!("{name:>12}{:<33}", ""));
+    text += "\n";
+    let mut logarithms = [(); 3].map(|()| Vec::new());
+    for table in tables {
+        let Some((first, others)) = table.rows.split_first() else { continue };
+        let others: Vec<&Row> = others.iter().filter(|row| is_of_variant(row)).collect();
+        if others.is_empty() {
+            continue;
+        }
+        // Scenes of different folders may have one name
+        let path = Path::new(&table.scene).with_extension("");
+        let last: Vec<_> = path.iter().rev().take(2).map(|part| part.to_string_lossy()).collect();
+        let name = last.into_iter().rev().collect::<Vec<_>>().join("/");
+        text += &format!("{:<48}{:>8.2}", format!("{name}, {}", table.integrator), first.cpu_seconds);
+        for (kind, logarithms) in logarithms.iter_mut().enumerate() {
+            let of = |row: &Row| efficiencies(row)[kind];
+            let known = others.iter().filter(|row| of(row).relative.is_finite());
+            let Some(best) = known.max_by(|a, b| of(a).relative.total_cmp(&of(b).relative)) else {
+                text += &format!("{:>8} {:<36}", "–", "");
+                continue;
+            };
+            let Efficiency { relative, interval: [low, high], .. } = of(best);
+            logarithms.push(-relative.ln());
+            let interval = format!("[{:.2}, {:.2}]", 1.0 / high, 1.0 / low);
+            text += &format!("{:>8.2} {interval:<15}{:<21}", 1.0 / relative, best.name);
+        }
+        text += "\n";
+    }
+    text += &format!("{:<56}", "geometric mean");
+    for logarithms in &logarithms {
+        let mean = (logarithms.iter().sum::<f64>() / logarithms.len() as f64).exp();
+        text += &format!("{mean:>8.2}{:<37}", "");
+    }
+    logarithms.iter().any(|l| !l.is_empty()).then(|| text.trim_end().to_owned())
 }
 
 #[cfg(test)]
@@ -178,5 +306,77 @@ mod tests {
         names.sort_unstable();
         names.dedup();
         assert_eq!(names.len(), cases.len());
+    }
+
+    #[test]
+    fn the_first_is_compared_with_the_best_of_the_others_for_each_error() {
+        let efficiency =
+            |relative: f64| Efficiency { error: 1.0, relative, interval: [relative / 2.0, relative * 2.0] };
+        let row = |name: &str, [relmse, masked, mse]: [f64; 3]| Row {
+            name: name.to_owned(),
+            cpu_seconds: 3.0,
+            mean: 1.0,
+            relmse: efficiency(relmse),
+            mse: efficiency(mse),
+            masked_mse: efficiency(masked),
+            chosen: Vec::new(),
+        };
+        let table = |scene: &str, rows: Vec<Row>| Table {
+            scene: scene.to_owned(),
+            integrator: "direct",
+            max_depth: 1,
+            spp: 4,
+            seeds: 2,
+            reference_spp: None,
+            rows,
+        };
+        let first = row("auto", [1.0; 3]);
+        let tables = [
+            table("a/one.pbrt", vec![first.clone(), row("x", [0.25, 0.5, 4.0]), row("y", [0.5, 0.2, 1.0])]),
+            table("c/b/two.pbrt", vec![first.clone(), row("z", [2.0, 0.5, 1.0]), row("z, v", [4.0, f64::NAN, 4.0])]),
+            table("b/alone.pbrt", vec![first]),
+        ];
+        let lines = |variant: Option<&str>| -> Vec<String> {
+            let text = summary(&tables, variant, |row| is_variant(&row.name, "v") == variant.is_some());
+            let text = text.expect("there are others");
+            text.trim().lines().map(|l| l.split_whitespace().collect::<Vec<_>>().join(" ")).collect()
+        };
+        assert_eq!(
+            lines(None)[1..],
+            [
+                "a/one, direct 3.00 2.00 [1.00, 4.00] y 2.00 [1.00, 4.00] x 0.25 [0.12, 0.50] x",
+                "b/two, direct 3.00 0.50 [0.25, 1.00] z 2.00 [1.00, 4.00] z 1.00 [0.50, 2.00] z",
+                "geometric mean 1.00 2.00 0.50",
+            ]
+        );
+        assert_eq!(
+            lines(Some("v"))[1..],
+            ["b/two, direct 3.00 0.25 [0.12, 0.50] z, v – 0.25 [0.12, 0.50] z, v", "geometric mean 0.25 NaN 0.25",]
+        );
+        assert!(summary(&tables, None, |_| false).is_none());
+    }
+
+    #[test]
+    fn variants_are_of_all_settings_but_the_first() {
+        use clap::Parser;
+        #[derive(Parser)]
+        struct Words {
+            #[command(flatten)]
+            own: EfficiencyArgs,
+        }
+        let words = [
+            "bench",
+            "--case=auto=",
+            "--case=mis=--estimator mis",
+            "--variant=four=--samples 4",
+            "--variant=no=--spp 9",
+        ];
+        let own = Words::parse_from(words).own;
+        let cases = cases(&own, &Settings::default());
+        let names: Vec<&str> = cases.iter().map(|c| c.name.as_str()).collect();
+        assert_eq!(names, ["auto", "mis", "mis, four", "mis, no"]);
+        assert_eq!(cases[2].settings.integrator.samples, Some(4));
+        assert_eq!(cases[2].settings.integrator.estimator, EstimatorKind::Mis);
+        assert_eq!((cases[3].settings.integrator.samples, cases[3].settings.sampling.spp), (None, 9));
     }
 }

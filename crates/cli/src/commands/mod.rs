@@ -6,6 +6,7 @@
 mod args;
 mod bench;
 mod bench_efficiency;
+mod bench_references;
 mod compare;
 mod crosscheck;
 mod denoise;

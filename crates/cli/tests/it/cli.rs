@@ -1,6 +1,6 @@
 //! The program from outside: images, statistics, and its messages about bad input.
 
-use lumiris::imaging::oiio::{ReadLimits, read_image};
+use lumiris::imaging::oiio::{Part, ReadLimits, read_image, write_image};
 use std::io::Write;
 use std::path::Path;
 use std::process::{Command, Output, Stdio};
@@ -308,6 +308,63 @@ fn bench_reports_every_case_with_the_hits_of_both_loops() {
     assert!(t1["t1"]["bsdf_nanoseconds"].is_number(), "{t1}");
     let intersect = report(&["intersect"]);
     assert!(intersect["t1"].is_null() && !names(&intersect["intersect"]).is_empty());
+}
+
+#[test]
+fn efficiency_is_measured_against_references_that_are_kept() {
+    let folder = tempfile::tempdir().unwrap();
+    let path = scene("analytic/rectangle.pbrt");
+    let args =
+        [
+            &["bench", "efficiency", path.as_str(), "--resolution", "32x32", "--spp", "4", "--reference-spp", "64"][..],
+            &[
+                "--references",
+                "kept",
+                "--case",
+                "auto=",
+                "--case",
+                "mis=--estimator mis --samples 1",
+                "--json",
+                "e.json",
+            ][..],
+            &["--variant", "four=--samples 4"][..],
+        ]
+        .concat();
+    let run = |more: &[&str]| -> (String, serde_json::Value) {
+        let output = lumiris(&[&args[..], more].concat(), folder.path());
+        assert!(output.status.success(), "{}", stderr(&output));
+        let report = std::fs::read_to_string(folder.path().join("e.json")).unwrap();
+        (stderr(&output), serde_json::from_str(&report).unwrap())
+    };
+    let kept = || -> Vec<_> {
+        std::fs::read_dir(folder.path().join("kept")).unwrap().map(|entry| entry.unwrap().path()).collect()
+    };
+    let is_rendered = |said: &str| [1, 2].map(|index| said.contains(&format!(": reference {index}, 64 samples")));
+    let (said, report) = run(&[]);
+    assert_eq!((is_rendered(&said), kept().len()), ([true; 2], 2), "{said}");
+    let rows = report[0]["rows"].as_array().unwrap();
+    let names: Vec<_> = rows.iter().map(|row| row["name"].as_str().unwrap()).collect();
+    assert_eq!(names, ["auto", "mis", "mis, four"]);
+    assert!(rows.iter().all(|row| row["relmse"]["error"].as_f64().unwrap() > 0.0), "{report}");
+
+    // The same images by the same references, which are read; by black ones the error is all of the image
+    let files = kept();
+    let (said, again) = run(&[]);
+    let error = |report: &serde_json::Value| report[0]["rows"][1]["mse"]["error"].as_f64().unwrap();
+    assert_eq!((is_rendered(&said), error(&again)), ([false; 2], error(&report)), "{said}");
+    let black =
+        |edge: usize| Part::linear(edge, edge, ["R", "G", "B"].map(str::to_owned).to_vec(), vec![0.0; 3 * edge * edge]);
+    files.iter().for_each(|path| write_image(path, &[black(32)]).unwrap());
+    assert!(error(&run(&[]).1) > 2.0 * error(&report));
+
+    // Others, and one of another size
+    for (i, other) in [&["--seed", "7"][..], &["--max-depth", "3"], &["--crop", "0,0.5,0,1"]].iter().enumerate() {
+        assert_eq!((is_rendered(&run(other).0), kept().len()), ([true; 2], 4 + 2 * i), "{other:?}");
+    }
+    write_image(&files[0], &[black(8)]).unwrap();
+    let output = lumiris(&args, folder.path());
+    assert_eq!(output.status.code(), Some(3));
+    assert!(stderr(&output).contains("8 × 8 pixels, but the image has 32 × 32"), "{}", stderr(&output));
 }
 
 #[test]

@@ -1,0 +1,106 @@
+//! The references of `lumiris bench efficiency`, which may be kept.
+
+use super::args::SceneArgs;
+use super::progress;
+use anyhow::{Context, anyhow, bail};
+use lumiris::film::PixelBounds;
+use lumiris::imaging::ColorChannels;
+use lumiris::imaging::oiio::{Part, ReadLimits, read_image, write_image};
+use lumiris::import::fingerprint::SceneFiles;
+use lumiris::render::RenderSettings;
+use lumiris::render::efficiency::{Colors, reference_image, reference_settings};
+use lumiris::render::output::metadata;
+use lumiris::scene::RenderJob;
+use lumiris::settings::Settings;
+use std::hash::{DefaultHasher, Hash, Hasher};
+use std::path::Path;
+
+/// Two images of a scene to compare others with.
+pub(super) struct References<'a> {
+    scene: &'a SceneArgs,
+    spp: u32,
+    /// Where they are kept, and what tells the files of the scene from others.
+    kept: Option<(&'a Path, u64)>,
+}
+
+impl<'a> References<'a> {
+    /// References of `spp` samples per pixel that `folder` keeps, if there is one.
+    pub(super) fn new(
+        spp: u32,
+        folder: Option<&'a Path>,
+        scene: &'a SceneArgs,
+        files: &SceneFiles,
+    ) -> anyhow::Result<Self> {
+        let keep = |folder: &'a Path| {
+            // Before hours are spent on what cannot be written
+            std::fs::create_dir_all(folder).with_context(|| format!("cannot create {}", folder.display()))?;
+            let fingerprint = files.fingerprint();
+            let fingerprint = fingerprint.map_err(|(path, e)| anyhow!("cannot read {}: {e}", path.display()))?;
+            anyhow::Ok((folder, fingerprint))
+        };
+        Ok(References { scene, spp, kept: folder.map(keep).transpose()? })
+    }
+
+    /// Both, which are rendered where they are not kept.
+    pub(super) fn images(
+        &self,
+        job: &mut RenderJob,
+        base: &Settings,
+        render_settings: &RenderSettings,
+    ) -> anyhow::Result<[Colors; 2]> {
+        let scene = self.scene.scene.display();
+        let mut image = |index: u32| -> anyhow::Result<Colors> {
+            let settings = reference_settings(base, self.spp, index);
+            let kept = self.kept.map(|(folder, fingerprint)| folder.join(self.name(fingerprint, job, &settings)));
+            if let Some(path) = kept.as_ref().filter(|path| path.exists()) {
+                return read(path, &job.world.scene.film.bounds);
+            }
+            progress::say(&format!("{scene}: reference {}, {} samples", index + 1, self.spp));
+            let colors = reference_image(job, settings, render_settings);
+            let colors = colors.with_context(|| format!("cannot render {scene}"))?;
+            if let Some(path) = kept {
+                write(&path, job, &settings, &colors).with_context(|| format!("cannot write {}", path.display()))?;
+            }
+            Ok(colors)
+        };
+        Ok([image(0)?, image(1)?])
+    }
+
+    /// A name for each scene, with what is shown of it, and settings.
+    fn name(&self, fingerprint: u64, job: &RenderJob, settings: &Settings) -> String {
+        let mut hasher = DefaultHasher::new();
+        let shown = format!("{:?}", self.scene.load_options());
+        (fingerprint, shown, metadata(&job.world.scene.film, settings)).hash(&mut hasher);
+        let name = self.scene.scene.file_stem().unwrap_or_default().to_string_lossy();
+        let kind = <&str>::from(settings.integrator.kind);
+        format!("{name}-{kind}-{}-{:016x}.exr", self.spp, hasher.finish())
+    }
+}
+
+/// Reads a reference of these pixels.
+fn read(path: &Path, bounds: &PixelBounds) -> anyhow::Result<Colors> {
+    let image = read_image(path, &ReadLimits::default())?.image;
+    let asked = [bounds.width() as usize, bounds.height() as usize];
+    if [image.width, image.height] != asked {
+        let [width, height] = asked;
+        bail!(
+            "{} is no reference: it has {} × {} pixels, but the image has {width} × {height}",
+            path.display(),
+            image.width,
+            image.height
+        );
+    }
+    let Some(ColorChannels::Rgb(rgb)) = image.color_channels() else {
+        bail!("{} is no reference: it has no channels R, G and B", path.display());
+    };
+    let pixels = image.data.chunks_exact(image.channels.len());
+    Ok(pixels.map(|pixel| rgb.map(|c| f64::from(pixel[c]))).collect())
+}
+
+fn write(path: &Path, job: &RenderJob, settings: &Settings, colors: &Colors) -> anyhow::Result<()> {
+    let film = &job.world.scene.film;
+    let data = colors.iter().flatten().map(|v| *v as f32).collect();
+    let names = ["R", "G", "B"].map(str::to_owned).to_vec();
+    let part = Part::linear(film.bounds.width() as usize, film.bounds.height() as usize, names, data);
+    Ok(write_image(path, &[part.with_metadata(metadata(film, settings))])?)
+}
