@@ -10,8 +10,9 @@
 //! none of the error. Without references, the error is the variance between seeds, which is that of unbiased images, and the mean over all settings and
 //! seeds says how bright a pixel is.
 //!
-//! Intervals are those of ±2 standard errors: of errors by the spread between blocks of the image, with the covariance of
-//! the two that are compared, and of CPU times by the spread between seeds.
+//! What a pilot chooses differs from seed to seed, and with it both error and time, so an efficiency is the inverse of the mean
+//! of their product. Intervals are those of ±2 standard errors: by the spread of the products between blocks of the image, with the covariance of
+//! the two that are compared, and by that between seeds.
 
 use super::plan::{Plan, Preparation, prepare};
 use super::{RenderError, RenderSettings, processor_time, render};
@@ -52,8 +53,8 @@ pub struct Case {
 pub struct Efficiency {
     /// Mean error of one image.
     pub error: f64,
-    /// 1/(error × CPU time), relative to that of the first case. Not a number where one of both errors is within the noise of
-    /// its references.
+    /// 1/(error × CPU time) by the mean product of seeds, relative to that of the first case. Not a number where one of both errors is within two of its
+    /// standard errors.
     pub relative: f64,
     /// Interval of `relative`.
     pub interval: [f64; 2],
@@ -117,9 +118,15 @@ pub fn measure_efficiency(
     };
     let is_away = away_from_edges(&emission(job, &cases[0].settings, render_settings)?, &mean_image, &bounds);
     let weights = Weights { mean: &mean_image, is_away: &is_away, references, bounds };
-    let errors: Vec<Errors> = measured.iter().map(|m| weights.errors(&m.images)).collect();
+    let errors: Vec<Vec<Errors>> = measured.iter().map(|m| weights.errors(&m.images)).collect();
     let rows = cases.iter().zip(&measured).zip(&errors).map(|((case, m), e)| {
-        let compare = |of: fn(&Errors) -> &Vec<f64>| efficiency((of(e), &m.cpu), (of(&errors[0]), &measured[0].cpu));
+        let compare = |of: fn(&Errors) -> &Vec<f64>| {
+            let seeds = |m: &Measured, errors: &[Errors]| -> Vec<Inefficiency> {
+                let both = errors.iter().zip(&m.cpu);
+                both.map(|(errors, cpu)| Inefficiency { errors: of(errors).clone(), cpu: *cpu }).collect()
+            };
+            efficiency(&seeds(m, e), &seeds(&measured[0], &errors[0]))
+        };
         let means = m.images.iter().flatten().map(|&p| luminance(p));
         Row {
             name: case.name.clone(),
@@ -215,6 +222,7 @@ fn away_from_edges(emission: &[[f64; 3]], image: &[[f64; 3]], bounds: &PixelBoun
 }
 
 /// Sums of errors over the blocks of the image, divided by the number of values in all of it.
+#[derive(Clone)]
 struct Errors {
     relative: Vec<f64>,
     squared: Vec<f64>,
@@ -230,7 +238,18 @@ struct Weights<'a> {
 }
 
 impl Weights<'_> {
-    fn errors(&self, images: &[Colors]) -> Errors {
+    /// Those of each image; without references, what is expected of all of them.
+    fn errors(&self, images: &[Colors]) -> Vec<Errors> {
+        if let Some([a, b]) = self.references {
+            let of = |x: &Colors| self.sums(|i, c| (x[i][c] - a[i][c]) * (x[i][c] - b[i][c]));
+            return images.iter().map(of).collect();
+        }
+        let variance = |i: usize, c: usize| images.iter().map(|image| image[i][c]).collect::<Welford>().variance();
+        vec![self.sums(variance); images.len()]
+    }
+
+    /// Sums of what `square` is at the channels of pixels.
+    fn sums(&self, square: impl Fn(usize, usize) -> f64) -> Errors {
         let (width, height) = (self.bounds.width(), self.bounds.height());
         let blocks = (BLOCKS * BLOCKS) as usize;
         let mut errors = Errors { relative: vec![0.0; blocks], squared: vec![0.0; blocks], masked: vec![0.0; blocks] };
@@ -239,7 +258,7 @@ impl Weights<'_> {
             let (x, y) = (i as u32 % width, i as u32 / width);
             let block = (y * BLOCKS / height * BLOCKS + x * BLOCKS / width) as usize;
             for c in 0..3 {
-                let square = self.square(images, i, c) / (3 * self.mean.len()) as f64;
+                let square = square(i, c) / (3 * self.mean.len()) as f64;
                 errors.squared[block] += square;
                 errors.relative[block] += square / (r[c] * r[c] + DEFAULT_EPSILON);
                 if self.is_away[i] {
@@ -249,33 +268,39 @@ impl Weights<'_> {
         }
         errors
     }
+}
 
-    /// Squared error of one of the images at channel `c` of pixel `i`, expected.
-    fn square(&self, images: &[Colors], i: usize, c: usize) -> f64 {
-        if let Some([a, b]) = self.references {
-            return mean_by(images, |x| (x[i][c] - a[i][c]) * (x[i][c] - b[i][c]));
-        }
-        let mut spread = Welford::default();
-        images.iter().for_each(|image| spread.add(image[i][c]));
-        spread.variance()
+/// Of one seed: errors by block of the image, and CPU time (s).
+#[derive(Clone)]
+struct Inefficiency {
+    errors: Vec<f64>,
+    cpu: f64,
+}
+
+impl Inefficiency {
+    fn error(&self) -> f64 {
+        self.errors.iter().sum()
     }
 }
 
-/// Efficiency of the errors by block and CPU times of one case, relative to those of another.
-fn efficiency((errors, cpu): (&[f64], &[f64]), (base, base_cpu): (&[f64], &[f64])) -> Efficiency {
-    let (error, base_error) = (errors.iter().sum::<f64>(), base.iter().sum::<f64>());
-    if !is_known(errors) || !is_known(base) {
+/// Efficiency of the seeds of one case, relative to those of another.
+fn efficiency(case: &[Inefficiency], base: &[Inefficiency]) -> Efficiency {
+    let error = mean_by(case, Inefficiency::error);
+    let [of_case, of_base] = [case, base].map(|seeds| -> Vec<f64> {
+        (0..seeds[0].errors.len()).map(|block| mean_by(seeds, |s| s.errors[block] * s.cpu)).collect()
+    });
+    if !is_known(&of_case) || !is_known(&of_base) {
         return Efficiency { error, relative: f64::NAN, interval: [f64::NAN; 2] };
     }
-    // Standard error of log(base_error/error): of a sum over blocks
-    let terms: Vec<f64> = errors.iter().zip(base).map(|(e, b)| b / base_error - e / error).collect();
+    // Standard error of the logarithm of the ratio: of sums over blocks, and over seeds
+    let [sum, base_sum] = [&of_case, &of_base].map(|blocks| blocks.iter().sum::<f64>());
+    let terms: Vec<f64> = of_case.iter().zip(&of_base).map(|(e, b)| b / base_sum - e / sum).collect();
     let n = terms.len() as f64;
-    let of_errors = terms.iter().map(|t| t * t).sum::<f64>() * n / (n - 1.0);
-    let mut times = Welford::default();
-    cpu.iter().zip(base_cpu).for_each(|(t, b)| times.add((b / t).ln()));
-    let standard_error = (of_errors + times.standard_error().powi(2)).sqrt();
-    let relative = base_error * mean(base_cpu) / (error * mean(cpu));
-    let factor = (2.0 * standard_error).exp();
+    let of_blocks = terms.iter().map(|t| t * t).sum::<f64>() * n / (n - 1.0);
+    let of_seed = |(s, b): (&Inefficiency, &Inefficiency)| (b.error() * b.cpu / (s.error() * s.cpu)).ln();
+    let of_seeds: Welford = case.iter().zip(base).map(of_seed).collect();
+    let standard_error = (of_blocks + of_seeds.standard_error().powi(2)).sqrt();
+    let (relative, factor) = (base_sum / sum, (2.0 * standard_error).exp());
     Efficiency { error, relative, interval: [relative / factor, relative * factor] }
 }
 
@@ -304,14 +329,23 @@ mod tests {
         (-2.0 * (1.0 - a).ln()).sqrt() * (std::f64::consts::TAU * b).cos()
     }
 
+    /// Seeds of these errors in each block of two, and these times.
+    fn seeds<const N: usize>(errors: [f64; N], cpu: [f64; N]) -> Vec<Inefficiency> {
+        let of = |(error, cpu)| Inefficiency { errors: vec![error; 2], cpu };
+        errors.into_iter().zip(cpu).map(of).collect()
+    }
+
     #[test]
     fn half_the_error_in_half_the_time_is_four_times_as_efficient() {
-        let base = vec![2.0; 256];
-        let e = efficiency((&vec![1.0; 256], &[3.0, 3.0]), (&base, &[6.0, 6.0]));
-        assert_eq!((e.error, e.relative), (256.0, 4.0));
+        let base = seeds([2.0; 2], [6.0; 2]);
+        let e = efficiency(&seeds([1.0; 2], [3.0; 2]), &base);
+        assert_eq!((e.error, e.relative), (2.0, 4.0));
         assert!(e.interval.iter().all(|v| (v - 4.0).abs() < 1e-9), "nothing varies: {:?}", e.interval);
-        let e = efficiency((&vec![1.0; 256], &[3.0, 4.0]), (&base, &[6.0, 6.0]));
-        assert!(e.interval[0] < 3.2 && e.interval[1] > 3.6, "times vary: {:?}", e.interval);
+        let e = efficiency(&seeds([1.0; 2], [3.0, 4.0]), &base);
+        assert!(e.interval[0] < 3.0 && e.interval[1] > 3.9, "times vary: {:?}", e.interval);
+        let e = efficiency(&seeds([0.5, 2.0], [6.0, 1.5]), &base);
+        assert!((e.relative - 4.0).abs() < 1e-9, "the time of one plan is not that of the other: {}", e.relative);
+        assert!(e.interval.iter().all(|v| (v - 4.0).abs() < 1e-9), "{:?}", e.interval);
     }
 
     #[test]
@@ -322,7 +356,8 @@ mod tests {
         let inside = (0..400).filter(|_| {
             let base: Vec<f64> = (0..256).map(|_| (0..4).map(|_| normal().powi(2)).sum()).collect();
             let errors: Vec<f64> = (0..256).map(|_| 0.5 * (0..4).map(|_| normal().powi(2)).sum::<f64>()).collect();
-            let e = efficiency((&errors, &[1.0, 1.0]), (&base, &[1.0, 1.0]));
+            let [case, base] = [errors, base].map(|errors| vec![Inefficiency { errors, cpu: 1.0 }; 2]);
+            let e = efficiency(&case, &base);
             (e.interval[0]..e.interval[1]).contains(&2.0)
         });
         let inside = inside.count();
@@ -343,7 +378,7 @@ mod tests {
         let mean = mean_of(references.iter(), 1600);
         let of = |references: Option<&[Colors; 2]>, images: &[Colors]| -> f64 {
             let weights = Weights { mean: &mean, is_away: &[true; 1600], references, bounds };
-            weights.errors(images).squared.iter().sum()
+            mean_by(&weights.errors(images), |errors| errors.squared.iter().sum())
         };
         // With one reference twice it would be five times as much. The standard error is that of the product of both
         // references, 0.1²/√4800 = 6 % of 0.05²
@@ -360,10 +395,13 @@ mod tests {
     fn an_error_within_the_noise_of_references_has_no_efficiency() {
         let known: Vec<f64> = (0..256).map(|i| 1.0 + f64::from(i % 3)).collect();
         let unknown: Vec<f64> = (0..256).map(|i| if i % 2 == 0 { 1.01 } else { -1.0 }).collect();
-        let of = |errors: &Vec<f64>, base: &Vec<f64>| efficiency((errors, &[1.0; 2]), (base, &[1.0; 2])).relative;
+        let of = |errors: &[f64], base: &[f64]| {
+            let [case, base] = [errors, base].map(|errors| vec![Inefficiency { errors: errors.to_vec(), cpu: 1.0 }; 2]);
+            efficiency(&case, &base).relative
+        };
         assert_eq!(of(&known, &known), 1.0);
         assert!(of(&unknown, &known).is_nan() && of(&known, &unknown).is_nan());
-        assert!(of(&vec![0.0; 256], &known).is_nan());
+        assert!(of(&[0.0; 256], &known).is_nan());
     }
 
     #[test]

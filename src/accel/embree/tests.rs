@@ -113,26 +113,37 @@ fn bits(hit: &Option<Hit>) -> Option<[u32; 6]> {
     hit.map(|h| [h.t.to_bits(), h.uv[0].to_bits(), h.uv[1].to_bits(), h.geometry, h.primitive, h.instance])
 }
 
-/// Asserts that all widths and coherence flags give the same bits.
+/// True if one of two hits is at an edge of its triangle, where rounding errors decide whether there is one.
+fn is_at_edge(hits: [&Option<Hit>; 2]) -> bool {
+    hits.into_iter().flatten().any(|Hit { uv: [u, v], .. }| u.min(*v).min(1.0 - u - v) < 1e-3)
+}
+
+/// The kernels of AVX2 test edges in single rays by other roundings than in packets, on some processors.
+fn rounds_edges_alike(config: &CStr) -> bool {
+    config != c"isa=avx2" && (config != c"" || is_x86_feature_detected!("avx512f"))
+}
+
+/// Asserts that all widths and coherence flags give the same bits, but for hits at edges where these may be rounded in other ways.
 fn assert_widths_agree(name: &str, set: &Arc<GeometrySet>, batches: &[RayBatch], config: &CStr) {
     let accels = WIDTHS.map(|width| configured(set, width, config));
+    let is_exact = rounds_edges_alike(config);
     for (b, rays) in batches.iter().enumerate() {
         let first = intersect(&accels[0], rays, Coherence::Incoherent);
         let first_occluded = occluded(&accels[0], rays, Coherence::Incoherent);
         assert!(first.iter().any(Option::is_some), "{name} {b}: nothing is hit");
         for (accel, coherence) in accels.iter().flat_map(|a| COHERENCES.map(|c| (a, c))) {
+            let what = format!("{config:?}, {name}, batch {b}, width {}, {coherence:?}", accel.packet_width(coherence));
             let other = intersect(accel, rays, coherence);
-            let differing = (0..rays.len()).find(|&i| bits(&first[i]) != bits(&other[i]));
-            let what = differing.map(|i| format!("{:?} {:?} {:?}", rays.get(i), first[i], other[i]));
-            assert_eq!(what, None, "{name}, batch {b}, width {}, {coherence:?}", accel.packet_width(coherence));
-            let other = occluded(accel, rays, coherence);
-            let differ = first_occluded.iter().zip(&other).filter(|(a, b)| a != b).count();
-            assert_eq!(
-                differ,
-                0,
-                "{name}, batch {b}, occlusion, width {}, {coherence:?}",
-                accel.packet_width(coherence)
-            );
+            let differs = |i: usize| bits(&first[i]) != bits(&other[i]);
+            let is_free = |i: usize| !is_exact && is_at_edge([&first[i], &other[i]]);
+            let differing = (0..rays.len()).find(|&i| differs(i) && !is_free(i));
+            let hits = differing.map(|i| format!("{:?} {:?} {:?}", rays.get(i), first[i], other[i]));
+            assert_eq!(hits, None, "{what}");
+            let of_edges = (0..rays.len()).filter(|&i| differs(i)).count();
+            assert!(of_edges * 4 < rays.len(), "{of_edges}: {what}");
+            let other_occluded = occluded(accel, rays, coherence);
+            let differing = (0..rays.len()).find(|&i| first_occluded[i] != other_occluded[i] && !is_free(i));
+            assert_eq!(differing, None, "occlusion, {what}");
         }
     }
 }

@@ -185,6 +185,15 @@ fn is_variant(case: &str, variant: &str) -> bool {
     case.ends_with(&suffix(variant))
 }
 
+/// An efficiency, or a dash where it is within the noise.
+fn known(efficiency: f64) -> String {
+    if efficiency.is_finite() { format!("{efficiency:.2}") } else { "–".to_owned() }
+}
+
+fn between([low, high]: [f64; 2]) -> String {
+    format!("[{}, {}]", known(low), known(high))
+}
+
 fn text(table: &Table) -> String {
     let mut text = format!(
         "\n{}, {}, {} bounces; efficiency relative to the first row, [interval of 2 standard errors]\n{:<28}{:>8}{:>10}{:>11}{:>24}{:>11}{:>24}{:>11}{:>8}\n",
@@ -202,21 +211,11 @@ fn text(table: &Table) -> String {
         "eff."
     );
     for row in &table.rows {
-        let interval = |[a, b]: [f64; 2]| format!("[{a:.2}, {b:.2}]");
-        text += &format!(
-            "{:<28}{:>8.2}{:>10.5}{:>11.3e}{:>8.2} {:>15}{:>11.3e}{:>8.2} {:>15}{:>11.3e}{:>8.2}\n",
-            row.name,
-            row.cpu_seconds,
-            row.mean,
-            row.relmse.error,
-            row.relmse.relative,
-            interval(row.relmse.interval),
-            row.masked_mse.error,
-            row.masked_mse.relative,
-            interval(row.masked_mse.interval),
-            row.mse.error,
-            row.mse.relative,
-        );
+        text += &format!("{:<28}{:>8.2}{:>10.5}", row.name, row.cpu_seconds, row.mean);
+        for Efficiency { error, relative, interval } in [row.relmse, row.masked_mse] {
+            text += &format!("{error:>11.3e}{:>8} {:>15}", known(relative), between(interval));
+        }
+        text += &format!("{:>11.3e}{:>8}\n", row.mse.error, known(row.mse.relative));
         let mut choices: Vec<(Vec<String>, &Vec<_>)> = Vec::new();
         for (seed, chosen) in row.chosen.iter().enumerate().filter(|(_, chosen)| !chosen.is_empty()) {
             match choices.iter_mut().find(|(_, other)| *other == chosen) {
@@ -262,22 +261,22 @@ fn summary(tables: &[Table], variant: Option<&str>, is_of_variant: impl Fn(&Row)
         text += &format!("{:<48}{:>8.2}", format!("{name}, {}", table.integrator), first.cpu_seconds);
         for (kind, logarithms) in logarithms.iter_mut().enumerate() {
             let of = |row: &Row| efficiencies(row)[kind];
-            let known = others.iter().filter(|row| of(row).relative.is_finite());
-            let Some(best) = known.max_by(|a, b| of(a).relative.total_cmp(&of(b).relative)) else {
-                text += &format!("{:>8} {:<36}", "–", "");
+            let others = others.iter().filter(|row| of(row).relative.is_finite());
+            let Some(best) = others.max_by(|a, b| of(a).relative.total_cmp(&of(b).relative)) else {
+                text += &format!("{:>8} {:<36}", known(f64::NAN), "");
                 continue;
             };
             let Efficiency { relative, interval: [low, high], .. } = of(best);
             logarithms.push(-relative.ln());
-            let interval = format!("[{:.2}, {:.2}]", 1.0 / high, 1.0 / low);
-            text += &format!("{:>8.2} {interval:<15}{:<21}", 1.0 / relative, best.name);
+            let interval = between([1.0 / high, 1.0 / low]);
+            text += &format!("{:>8} {interval:<15}{:<21}", known(1.0 / relative), best.name);
         }
         text += "\n";
     }
     text += &format!("{:<56}", "geometric mean");
     for logarithms in &logarithms {
         let mean = (logarithms.iter().sum::<f64>() / logarithms.len() as f64).exp();
-        text += &format!("{mean:>8.2}{:<37}", "");
+        text += &format!("{:>8}{:<37}", known(mean), "");
     }
     logarithms.iter().any(|l| !l.is_empty()).then(|| text.trim_end().to_owned())
 }
@@ -351,7 +350,7 @@ mod tests {
         );
         assert_eq!(
             lines(Some("v"))[1..],
-            ["b/two, direct 3.00 0.25 [0.12, 0.50] z, v – 0.25 [0.12, 0.50] z, v", "geometric mean 0.25 NaN 0.25",]
+            ["b/two, direct 3.00 0.25 [0.12, 0.50] z, v – 0.25 [0.12, 0.50] z, v", "geometric mean 0.25 – 0.25",]
         );
         assert!(summary(&tables, None, |_| false).is_none());
     }
