@@ -115,7 +115,7 @@ fn bits(hit: &Option<Hit>) -> Option<[u32; 6]> {
 
 /// True if one of two hits is at an edge of its triangle, where rounding errors decide whether there is one.
 fn is_at_edge(hits: [&Option<Hit>; 2]) -> bool {
-    hits.into_iter().flatten().any(|Hit { uv: [u, v], .. }| u.min(*v).min(1.0 - u - v) < 1e-3)
+    hits.into_iter().flatten().any(|Hit { uv: [u, v], .. }| u.min(*v).min(1.0 - u - v) < 1e-4)
 }
 
 /// The kernels of AVX2 test edges in single rays by other roundings than in packets, on some processors.
