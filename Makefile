@@ -41,10 +41,13 @@ test: setup
 	$(CARGO) test --workspace --doc
 	$(CARGO) test --workspace --no-fail-fast --lib --bins --tests
 
+# The tests of a part of the workspace are chosen by name here and below: with --package, dependencies have other features,
+# so that everything is compiled once more.
+
 # Renders on a Slurm cluster of two nodes that this machine plays: picture, requeued tasks, a node that goes down.
 test-farm: setup
 	@.ci/setup.sh $(FARM_PACKAGES)
-	$(CARGO) test -p lumiris-cli --test it -- --include-ignored --test-threads 1 farm::
+	$(CARGO) test --workspace --test it -- --include-ignored --test-threads 1 farm::
 
 # What needs Open Image Denoise: that of LUMIRIS_OIDN, or else one that is fetched once. Skipped where there is none to fetch.
 test-denoise: setup
@@ -52,17 +55,17 @@ test-denoise: setup
 	@library=$${LUMIRIS_OIDN:-$$(.ci/open-image-denoise.sh)} || library=; \
 	if [ -z "$$library" ]; then echo "Open Image Denoise could not be fetched: what needs it is not tested."; exit 0; fi; \
 	export LUMIRIS_OIDN="$$library" && \
-	  $(CARGO) test -p lumiris --lib -- --include-ignored imaging::oidn:: && \
-	  $(CARGO) test -p lumiris-cli --test it -- --include-ignored denoise::
+	  $(CARGO) test --workspace --lib -- --include-ignored imaging::oidn:: && \
+	  $(CARGO) test --workspace --test it -- --include-ignored denoise::
 
-# The Python module: builds its wheel as tests are built, installs it in an environment of its own, and tests it there.
-# Skipped where what that takes cannot be fetched.
+# The Python module: builds its wheel as tests are built, and the program, which its tests compare it with; installs it in an
+# environment of its own, and tests it there. Skipped where what that takes cannot be fetched.
 test-python: setup
 	@.ci/setup.sh python3-venv
 	@environment=$$(.ci/python-environment.sh) || environment=; \
 	if [ -z "$$environment" ]; then echo "maturin, NumPy and pytest could not be fetched: the Python module is not tested."; exit 0; fi; \
 	rm -rf target/python/wheels && \
-	  $(CARGO) build -p lumiris-cli && \
+	  $(CARGO) test --workspace --test it --no-run && \
 	  PATH="$(dir $(CARGO)):$$PATH" "$$environment/bin/maturin" build --quiet --profile dev --locked \
 	    --manifest-path python/Cargo.toml --out target/python/wheels && \
 	  "$$environment/bin/pip" install --quiet --disable-pip-version-check --force-reinstall --no-deps target/python/wheels/*.whl && \

@@ -213,7 +213,7 @@ fn reflected(arrival: &Recorded, total: Rgb) -> Rgb {
 /// Traces the pilot.
 fn learn(job: &RenderJob) -> (Roulette, PathStats) {
     let all = &job.settings().integrator;
-    let settings = IntegratorSettings { roulette_depth: Some(ROULETTE_DEPTH), ..Estimator::without_fits(all) };
+    let settings = IntegratorSettings { roulette_depth: Some(ROULETTE_DEPTH), ..Estimator::without_fits(all, 0) };
     let grid = Grid::new(job);
     let rows: Vec<Row> = (0..grid.rows)
         .into_par_iter()

@@ -105,13 +105,12 @@ pub fn complete_for_noise(settings: &mut Settings, has_spp: bool) -> Result<(), 
     }
 }
 
-/// True if pixels may have different numbers of samples: they share nothing, are fitted neither to others nor in blocks, and have
-/// enough samples for a pilot.
+/// True if pixels may have different numbers of samples: they are not fitted in blocks, and have enough samples for a pilot. Where
+/// they are fitted to others, numbers follow from noise that this has not lowered.
 pub fn allows_adaptive(settings: &Settings) -> bool {
     let i = &settings.integrator;
     matches!(i.kind, IntegratorKind::Direct | IntegratorKind::Path)
         && !Estimator::at_vertex(i, 0).is_progressive()
-        && !Estimator::at_vertex(i, 0).is_over_pixels()
         && settings.sampling.spp >= MIN_SPP
 }
 
@@ -414,7 +413,7 @@ fn pilot_tile(
     tile: &PixelBounds,
     PilotSampling { spp, fraction, seed, edge, sight: sight_spp }: PilotSampling,
 ) -> Vec<Measured> {
-    let settings = &run.job.settings().integrator;
+    let settings = &Estimator::without_fits(&run.job.settings().integrator, 0);
     let origin = run.job.world.scene.film.bounds;
     let seeing = &IntegratorSettings { max_depth: 0, ..*settings };
     let is_chosen = |i: &u32| {

@@ -116,8 +116,7 @@ pub fn measure_efficiency(
         Some(references) => mean_of(references.iter(), bounds.area()),
         None => mean_of(measured.iter().flat_map(|m| &m.images), bounds.area()),
     };
-    let is_away = away_from_edges(&emission(job, &cases[0].settings, render_settings)?, &mean_image, &bounds);
-    let weights = Weights { mean: &mean_image, is_away: &is_away, references, bounds };
+    let weights = Weights::new(job, &cases[0].settings, mean_image, references, render_settings)?;
     let errors: Vec<Vec<Errors>> = measured.iter().map(|m| weights.errors(&m.images)).collect();
     let rows = cases.iter().zip(&measured).zip(&errors).map(|((case, m), e)| {
         let compare = |of: fn(&Errors) -> &Vec<f64>| {
@@ -139,6 +138,42 @@ pub fn measure_efficiency(
         }
     });
     Ok(rows.collect())
+}
+
+/// Efficiency of each of these cases relative to that of the best of them, by relMSE, masked MSE and MSE, as one image of `spp`
+/// samples per pixel shows it that is none of those which [`measure_efficiency`] compares by as many seeds. It is 1 where
+/// the error is less than the noise of the references.
+pub fn first_look(
+    job: &mut RenderJob,
+    cases: &[Case],
+    [spp, seeds]: [u32; 2],
+    references: &[Colors; 2],
+    render_settings: &RenderSettings,
+    observe: &mut dyn FnMut(&str, u32),
+) -> Result<Vec<[f64; 3]>, RenderError> {
+    let Some(first) = cases.first() else { return Ok(Vec::new()) };
+    let mean_image = mean_of(references.iter(), job.world.scene.film.bounds.area());
+    let weights = Weights::new(job, &first.settings, mean_image, Some(references), render_settings)?;
+    let look = |case: &Case| {
+        observe(&case.name, seeds);
+        let mut settings = case.settings;
+        settings.sampling.seed = settings.sampling.seed.wrapping_add(seeds);
+        settings.sampling.spp = spp;
+        let start = processor_time::of_process();
+        let (image, _) = image(job, settings, render_settings)?;
+        let cpu = (processor_time::of_process() - start).as_secs_f64();
+        let errors = weights.errors(&[image]);
+        Ok([&errors[0].relative, &errors[0].masked, &errors[0].squared].map(|e| e.iter().sum::<f64>() * cpu))
+    };
+    let inefficiencies: Vec<[f64; 3]> = cases.iter().map(look).collect::<Result<_, RenderError>>()?;
+    Ok(relative_to_the_least(&inefficiencies))
+}
+
+/// What the least that is above zero is by each, and 1 for those which are not above zero.
+fn relative_to_the_least<const N: usize>(values: &[[f64; N]]) -> Vec<[f64; N]> {
+    let least: [f64; N] =
+        std::array::from_fn(|k| values.iter().map(|v| v[k]).filter(|v| *v > 0.0).fold(f64::INFINITY, f64::min));
+    values.iter().map(|v| std::array::from_fn(|k| if v[k] > 0.0 { least[k] / v[k] } else { 1.0 })).collect()
 }
 
 /// The settings of one of two references of an image by settings of these: their expectation is that of `base`, textures
@@ -230,14 +265,26 @@ struct Errors {
 }
 
 struct Weights<'a> {
-    mean: &'a [[f64; 3]],
+    mean: Colors,
     /// Pixels that count for the masked MSE.
-    is_away: &'a [bool],
+    is_away: Vec<bool>,
     references: Option<&'a [Colors; 2]>,
     bounds: PixelBounds,
 }
 
-impl Weights<'_> {
+impl<'a> Weights<'a> {
+    fn new(
+        job: &mut RenderJob,
+        settings: &Settings,
+        mean: Colors,
+        references: Option<&'a [Colors; 2]>,
+        render_settings: &RenderSettings,
+    ) -> Result<Self, RenderError> {
+        let bounds = job.world.scene.film.bounds;
+        let is_away = away_from_edges(&emission(job, settings, render_settings)?, &mean, &bounds);
+        Ok(Weights { mean, is_away, references, bounds })
+    }
+
     /// Those of each image; without references, what is expected of all of them.
     fn errors(&self, images: &[Colors]) -> Vec<Errors> {
         if let Some([a, b]) = self.references {
@@ -377,7 +424,7 @@ mod tests {
         let references: [Colors; 2] = noisy(1, 2, 0.1, 0.0).try_into().expect("two");
         let mean = mean_of(references.iter(), 1600);
         let of = |references: Option<&[Colors; 2]>, images: &[Colors]| -> f64 {
-            let weights = Weights { mean: &mean, is_away: &[true; 1600], references, bounds };
+            let weights = Weights { mean: mean.clone(), is_away: vec![true; 1600], references, bounds };
             mean_by(&weights.errors(images), |errors| errors.squared.iter().sum())
         };
         // With one reference twice it would be five times as much. The standard error is that of the product of both
@@ -402,6 +449,13 @@ mod tests {
         assert_eq!(of(&known, &known), 1.0);
         assert!(of(&unknown, &known).is_nan() && of(&known, &unknown).is_nan());
         assert!(of(&[0.0; 256], &known).is_nan());
+    }
+
+    #[test]
+    fn a_first_look_compares_with_the_best_by_each_error() {
+        let of = relative_to_the_least(&[[4.0, 1.0], [2.0, -1.0], [8.0, 5.0]]);
+        assert_eq!(of, [[0.5, 1.0], [1.0, 1.0], [0.25, 0.2]], "below zero is noise, and less than all others");
+        assert_eq!(relative_to_the_least(&[[0.0], [-1.0]]), [[1.0]; 2]);
     }
 
     #[test]

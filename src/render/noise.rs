@@ -18,6 +18,7 @@ use super::allocation_counts::MAX_LOOKS;
 use super::pilot_samples::{LOOK_COST, LeftToLightPaths, cost, pilot_images};
 use super::worker::Worker;
 use super::{RenderSettings, Run, position};
+use crate::direct::Estimator;
 use crate::film::{FeatureSet, PixelBounds};
 use crate::imaging::metrics::difference::DEFAULT_EPSILON;
 use crate::integrators::{PathTracer, Tracer};
@@ -91,6 +92,7 @@ fn numbers_of_block(
     stop: &AtomicBool,
 ) -> Numbers {
     let Settings { integrator, sampling } = run.job.settings();
+    let integrator = &Estimator::without_fits(integrator, 0);
     let (limit, pilot_limit) = (sampling.spp, sampling.pilot_spp());
     let seeing = IntegratorSettings { max_depth: 0, ..*integrator };
     let none = || seeds.map(|_| vec![[0.0; 3]; block.area()]);

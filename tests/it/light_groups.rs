@@ -141,13 +141,12 @@ fn layers_add_up_to_the_image_and_leave_its_bits() {
 #[test]
 fn a_layer_has_the_light_of_its_group_alone() {
     let images = 24;
-    let means = |job: &mut RenderJob, seeds: std::ops::Range<u32>, of: &dyn Fn(&Film) -> Vec<PixelSums>| {
-        let mean = |seed| {
-            job.change(|s| s.sampling.seed = seed);
-            let pixels = of(&film(job, 32));
-            [0, 1, 2].map(|c| pixels.iter().map(|p| p.mean()[c]).sum::<f64>() / f64::from(EDGE * EDGE))
-        };
-        seeds.map(mean).collect::<Vec<_>>()
+    let mean = |pixels: &[PixelSums]| {
+        [0, 1, 2].map(|c| pixels.iter().map(|p| p.mean()[c]).sum::<f64>() / f64::from(EDGE * EDGE))
+    };
+    let film = |job: &mut RenderJob, seed| {
+        job.change(|s| s.sampling.seed = seed);
+        film(job, 32)
     };
     let summary = |values: &[[f64; 3]], c: usize| {
         let n = values.len() as f64;
@@ -156,14 +155,15 @@ fn a_layer_has_the_light_of_its_group_alone() {
     };
     let mut all = job(None);
     all.pixel_samples = Some(split(32));
-    for (group, _) in LIGHTS {
-        let mut alone = job(Some(group));
-        for method in METHODS {
-            choose(&mut all, method);
-            choose(&mut alone, method);
+    let mut of_lights = LIGHTS.map(|(group, _)| job(Some(group)));
+    for method in METHODS {
+        choose(&mut all, method);
+        let films: Vec<Film> = (0..images).map(|seed| film(&mut all, seed)).collect();
+        for (alone, (group, _)) in of_lights.iter_mut().zip(LIGHTS) {
+            choose(alone, method);
             let layer = |film: &Film| film.light_layers().iter().find(|(name, _)| name == group).unwrap().1.pixels();
-            let of_layer = means(&mut all, 0..images, &layer);
-            let of_image = means(&mut alone, images..2 * images, &Film::pixels);
+            let of_layer: Vec<_> = films.iter().map(|film| mean(&layer(film))).collect();
+            let of_image: Vec<_> = (images..2 * images).map(|seed| mean(&film(alone, seed).pixels())).collect();
             for c in 0..3 {
                 let ((a, va), (b, vb)) = (summary(&of_layer, c), summary(&of_image, c));
                 let error = (va + vb).sqrt();

@@ -74,13 +74,14 @@ pub(super) struct Batch {
 impl Estimator {
     /// The estimator at a path vertex, counted from 0.
     pub fn at_vertex(settings: &IntegratorSettings, vertex: u32) -> Self {
-        if vertex == 0 { Self::new(settings, 0) } else { Self::new(&Self::without_fits(settings), vertex) }
+        if vertex == 0 { Self::new(settings, 0) } else { Self::new(&Self::without_fits(settings, 1), vertex) }
     }
 
-    /// The settings with an estimator for later vertices. Progressive estimators are fitted to the first vertices of a
-    /// pixel, which are close together; at later ones, which lie anywhere, `mis` is used, or `ris` without what was fitted.
+    /// The settings with an estimator that is not fitted, of as many samples as the path vertex `vertex` has: that of later vertices,
+    /// and of pilots. Progressive estimators are fitted to the first vertices of a pixel, which are close together; at later ones,
+    /// which lie anywhere, `mis` is used, or `ris` without what was fitted.
     #[must_use]
-    pub fn without_fits(settings: &IntegratorSettings) -> IntegratorSettings {
+    pub fn without_fits(settings: &IntegratorSettings, vertex: u32) -> IntegratorSettings {
         let estimator = Self::new(settings, 0);
         if !estimator.is_progressive() && !estimator.is_over_pixels() {
             return *settings;
@@ -88,7 +89,7 @@ impl Estimator {
         if let Estimator::Ris(_) = estimator {
             return IntegratorSettings { ris: RisSettings { target: Target::Fgl, ..settings.ris }, ..*settings };
         }
-        let samples = Some(settings.sample_counts_at(1).samples);
+        let samples = Some(settings.sample_counts_at(vertex).samples);
         IntegratorSettings { estimator: EstimatorKind::Mis, samples, ..*settings }
     }
 

@@ -103,7 +103,7 @@ impl Gatherer {
         let paths = IntegratorSettings {
             kind: IntegratorKind::Path,
             max_depth: settings.max_depth.saturating_sub(1),
-            ..Estimator::without_fits(settings)
+            ..Estimator::without_fits(settings, 1)
         };
         let sample_counts = Estimator::at_vertex(settings, 1).sample_counts();
         self.samples.clear();

@@ -58,11 +58,7 @@ pub(super) struct BenchArgs {
 
 pub(super) fn run(args: &BenchArgs) -> anyhow::Result<ExitCode> {
     if args.subject == Subject::Efficiency {
-        let tables = efficiency(&args.scene, &args.efficiency)?;
-        if let Some(path) = &args.json {
-            write_text(path, &serde_json::to_string_pretty(&tables)?)
-                .with_context(|| format!("cannot write {}", path.display()))?;
-        }
+        efficiency(&args.scene, &args.efficiency, args.json.as_deref())?;
         return Ok(ExitCode::SUCCESS);
     }
     if args.scene.accel != AccelKind::Embree {

@@ -11,10 +11,10 @@ use clap::Args;
 use lumiris::import::cache::FileCache;
 use lumiris::integrators::through_media;
 use lumiris::lights::LightSamplerKind;
-use lumiris::render::efficiency::{Case, Efficiency, Row, measure_efficiency};
+use lumiris::render::efficiency::{Case, Efficiency, Row, first_look, measure_efficiency};
 use lumiris::settings::{EstimatorKind, IntegratorKind, Settings};
+use lumiris_formats::output::write_text;
 use serde::Serialize;
-use serde_json::Value;
 use std::path::{Path, PathBuf};
 
 /// Options of `bench efficiency`.
@@ -47,7 +47,14 @@ pub(super) struct EfficiencyArgs {
     /// program that made them
     #[arg(long, value_name = "DIR", requires = "reference_spp")]
     references: Option<PathBuf>,
+    /// Before, render all settings but the first once with N samples per pixel, and leave out those that have less than half of
+    /// the efficiency of the best by every error, with each of the variants and without
+    #[arg(long, value_name = "N", requires = "reference_spp", value_parser = clap::value_parser!(u32).range(1..))]
+    screen_spp: Option<u32>,
 }
+
+/// Share of the best efficiency in a first look below which a case is left out.
+const LEFT_OUT_BELOW: f64 = 0.5;
 
 /// Options with a name.
 #[derive(Clone, Debug)]
@@ -94,12 +101,47 @@ struct Table {
     seeds: u32,
     reference_spp: Option<u32>,
     rows: Vec<Row>,
+    /// Settings that a first look left out.
+    left_out: Vec<LeftOut>,
 }
 
-/// Measures all scenes and prints a table of each, and one of what the first settings are by the best of the others; the
-/// answer is what goes into the JSON file.
-pub(super) fn efficiency(scene_args: &SceneArgs, own: &EfficiencyArgs) -> anyhow::Result<Value> {
+/// Settings of little efficiency.
+#[derive(Clone, Debug, Serialize)]
+struct LeftOut {
+    name: String,
+    /// Relative to the best of those with the same variant in a first look, by each of [`ERRORS`].
+    relative: [f64; 3],
+}
+
+impl LeftOut {
+    /// The efficiency by the error that favours it most.
+    fn best(&self) -> f64 {
+        self.relative.into_iter().fold(0.0, f64::max)
+    }
+}
+
+/// The cases without those that are left out, and these.
+fn sorted_out(cases: Vec<Case>, relative: &[[f64; 3]]) -> (Vec<Case>, Vec<LeftOut>) {
+    let (kept, left_out): (Vec<_>, Vec<_>) =
+        cases.into_iter().zip(relative).partition(|(_, relative)| relative.iter().any(|r| *r >= LEFT_OUT_BELOW));
+    let left_out = left_out.into_iter().map(|(case, relative)| LeftOut { name: case.name, relative: *relative });
+    (kept.into_iter().map(|(case, _)| case).collect(), left_out.collect())
+}
+
+/// Measures all scenes and prints a table of each, and one of what the first settings are by the best of the others. The JSON
+/// file is written after each table, so that what was measured is there if a scene cannot be rendered.
+pub(super) fn efficiency(scene_args: &SceneArgs, own: &EfficiencyArgs, json: Option<&Path>) -> anyhow::Result<()> {
     let mut tables = Vec::new();
+    let write = |tables: &[Table]| -> anyhow::Result<()> {
+        let Some(path) = json else { return Ok(()) };
+        write_text(path, &serde_json::to_string_pretty(tables)?)
+            .with_context(|| format!("cannot write {}", path.display()))
+    };
+    // Before hours are spent on what cannot be written
+    write(&tables)?;
+    let variants: Vec<&str> = own.variants.iter().map(|variant| variant.name.as_str()).collect();
+    let variants_and_none = || std::iter::once(None).chain(variants.iter().copied().map(Some));
+    let variant_of = |name: &str| variants.iter().copied().find(|variant| is_variant(name, variant));
     for path in std::iter::once(&scene_args.scene).chain(&own.more_scenes) {
         let mut scene = scene_args.clone();
         scene.scene.clone_from(path);
@@ -123,8 +165,22 @@ pub(super) fn efficiency(scene_args: &SceneArgs, own: &EfficiencyArgs) -> anyhow
             let of_scene = render_settings(&scene, &job);
             let references = references.as_ref().map(|r| r.images(&mut job, &base, &of_scene)).transpose()?;
             let observe = &mut |name: &str, seed| progress::say(&format!("{}: {name}, seed {seed}", path.display()));
+            let failed = || format!("cannot render {}", path.display());
+            let mut left_out = Vec::new();
+            if let Some((spp, references)) = own.screen_spp.zip(references.as_ref()) {
+                let others = cases.split_off(1);
+                for variant in variants_and_none() {
+                    let of_variant: Vec<Case> =
+                        others.iter().filter(|case| variant_of(&case.name) == variant).cloned().collect();
+                    let numbers = [spp, own.seeds];
+                    let relative = first_look(&mut job, &of_variant, numbers, references, &of_scene, observe);
+                    let (kept, weak) = sorted_out(of_variant, &relative.with_context(failed)?);
+                    cases.extend(kept);
+                    left_out.extend(weak);
+                }
+            }
             let rows = measure_efficiency(&mut job, &cases, own.seeds, references.as_ref(), &of_scene, observe)
-                .with_context(|| format!("cannot render {}", path.display()))?;
+                .with_context(failed)?;
             let table = Table {
                 scene: path.display().to_string(),
                 integrator: kind.into(),
@@ -133,19 +189,19 @@ pub(super) fn efficiency(scene_args: &SceneArgs, own: &EfficiencyArgs) -> anyhow
                 seeds: own.seeds,
                 reference_spp: own.reference_spp,
                 rows,
+                left_out,
             };
             progress::print(&text(&table));
             tables.push(table);
+            write(&tables)?;
         }
     }
-    let variants: Vec<&str> = own.variants.iter().map(|variant| variant.name.as_str()).collect();
-    for variant in std::iter::once(None).chain(variants.iter().copied().map(Some)) {
-        let is_of = |row: &Row| variants.iter().copied().find(|name| is_variant(&row.name, name)) == variant;
-        if let Some(text) = summary(&tables, variant, is_of) {
+    for variant in variants_and_none() {
+        if let Some(text) = summary(&tables, variant, |row| variant_of(&row.name) == variant) {
             progress::print(&text);
         }
     }
-    Ok(serde_json::to_value(&tables)?)
+    Ok(())
 }
 
 /// Says why a case is left out of a scene with media, if it is.
@@ -228,6 +284,11 @@ fn text(table: &Table) -> String {
             text += &format!("    chose {} (seed {})\n", chosen.join(", "), seeds.join(", "));
         }
     }
+    if !table.left_out.is_empty() {
+        let names: Vec<String> =
+            table.left_out.iter().map(|row| format!("{} ({})", row.name, known(row.best()))).collect();
+        text += &format!("less than half of the best at first sight: {}\n", names.join("; "));
+    }
     text.trim_end().to_owned()
 }
 
@@ -261,8 +322,10 @@ fn summary(tables: &[Table], variant: Option<&str>, is_of_variant: impl Fn(&Row)
         text += &format!("{:<48}{:>8.2}", format!("{name}, {}", table.integrator), first.cpu_seconds);
         for (kind, logarithms) in logarithms.iter_mut().enumerate() {
             let of = |row: &Row| efficiencies(row)[kind];
-            let others = others.iter().filter(|row| of(row).relative.is_finite());
-            let Some(best) = others.max_by(|a, b| of(a).relative.total_cmp(&of(b).relative)) else {
+            // Among those whose error is within its noise as well: the best of what is known may be the worst of all
+            let product = |row: &Row| of(row).error * row.cpu_seconds;
+            let best = others.iter().min_by(|a, b| product(a).total_cmp(&product(b)));
+            let Some(best) = best.filter(|row| of(row).relative.is_finite()) else {
                 text += &format!("{:>8} {:<36}", known(f64::NAN), "");
                 continue;
             };
@@ -309,8 +372,10 @@ mod tests {
 
     #[test]
     fn the_first_is_compared_with_the_best_of_the_others_for_each_error() {
-        let efficiency =
-            |relative: f64| Efficiency { error: 1.0, relative, interval: [relative / 2.0, relative * 2.0] };
+        let efficiency = |relative: f64| {
+            let error = if relative.is_nan() { 1.0 } else { 1.0 / relative };
+            Efficiency { error, relative, interval: [relative / 2.0, relative * 2.0] }
+        };
         let row = |name: &str, [relmse, masked, mse]: [f64; 3]| Row {
             name: name.to_owned(),
             cpu_seconds: 3.0,
@@ -328,10 +393,11 @@ mod tests {
             seeds: 2,
             reference_spp: None,
             rows,
+            left_out: Vec::new(),
         };
         let first = row("auto", [1.0; 3]);
         let tables = [
-            table("a/one.pbrt", vec![first.clone(), row("x", [0.25, 0.5, 4.0]), row("y", [0.5, 0.2, 1.0])]),
+            table("a/one.pbrt", vec![first.clone(), row("x", [0.25, 0.5, 4.0]), row("y", [0.5, f64::NAN, 1.0])]),
             table("c/b/two.pbrt", vec![first.clone(), row("z", [2.0, 0.5, 1.0]), row("z, v", [4.0, f64::NAN, 4.0])]),
             table("b/alone.pbrt", vec![first]),
         ];
@@ -343,7 +409,7 @@ mod tests {
         assert_eq!(
             lines(None)[1..],
             [
-                "a/one, direct 3.00 2.00 [1.00, 4.00] y 2.00 [1.00, 4.00] x 0.25 [0.12, 0.50] x",
+                "a/one, direct 3.00 2.00 [1.00, 4.00] y – 0.25 [0.12, 0.50] x",
                 "b/two, direct 3.00 0.50 [0.25, 1.00] z 2.00 [1.00, 4.00] z 1.00 [0.50, 2.00] z",
                 "geometric mean 1.00 2.00 0.50",
             ]
@@ -353,6 +419,15 @@ mod tests {
             ["b/two, direct 3.00 0.25 [0.12, 0.50] z, v – 0.25 [0.12, 0.50] z, v", "geometric mean 0.25 – 0.25",]
         );
         assert!(summary(&tables, None, |_| false).is_none());
+    }
+
+    #[test]
+    fn what_has_half_of_the_best_by_one_error_is_not_left_out() {
+        let cases = ["a", "b", "c"].map(|name| Case { name: name.to_owned(), settings: Settings::default() });
+        let (kept, left_out) = sorted_out(cases.to_vec(), &[[1.0, 0.1, 1.0], [0.4, 0.32, 0.2], [0.1, 0.1, 0.54]]);
+        assert_eq!(kept.iter().map(|case| case.name.as_str()).collect::<Vec<_>>(), ["a", "c"]);
+        let left_out: Vec<_> = left_out.iter().map(|row| (row.name.as_str(), row.best())).collect();
+        assert_eq!(left_out, [("b", 0.4)]);
     }
 
     #[test]

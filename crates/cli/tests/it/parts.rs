@@ -73,6 +73,7 @@ pub(crate) const METHODS: &[(&str, bool)] = &[
     ("--integrator path --estimator ris --samples 2 --proposals 12", true),
     ("--integrator direct --estimator ris --samples 1 --proposals optimal --stage-times 20,200", true),
     ("--integrator direct --estimator ocv --ocv pixels", true),
+    ("--integrator direct --estimator ocv --control-variates always --allocation adaptive --spp 16", true),
     ("--integrator direct --estimator ocv --ocv crossfit", true),
     ("--integrator direct --estimator ocv --ocv progressive", false),
     ("--integrator direct --estimator optimal-mis --optimal-mis progressive", false),
