@@ -4,7 +4,6 @@ use std::env;
 use std::process::Command;
 
 fn main() {
-    println!("cargo:rerun-if-changed=build.rs");
     embree();
     git_hash();
 }

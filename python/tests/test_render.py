@@ -130,7 +130,7 @@ def test_none_leaves_a_setting_and_old_names_are_accepted() -> None:
         ({"accel": "octree"}, ValueError, "accel"),
         ({"texture_memory": "much"}, ValueError, "texture_memory"),
         ({"cryptomatte": ["light"]}, ValueError, "cryptomatte: expected object or material, not `light`"),
-        ({"noise": 0.1, "spp": 64, "estimator": "ocv"}, ValueError, "noise needs the integrator direct or path"),
+        ({"noise": 0.1, "spp": 64, "estimator": "optimal-mis"}, ValueError, "noise needs the integrator direct or path"),
         ({"plan": {"colour": "red"}}, ValueError, "there is no setting `colour`"),
         ({"callback": 3}, TypeError, "not callable"),
     ],
