@@ -368,13 +368,7 @@ fn mean_by<T>(values: &[T], of: impl Fn(&T) -> f64) -> f64 {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use lumiris_test_support::random::{Pcg32, RngExt, pcg32};
-
-    /// Normal numbers [Box and Muller 1958].
-    fn normal(stream: &mut Pcg32) -> f64 {
-        let [a, b] = stream.random::<[f32; 2]>().map(f64::from);
-        (-2.0 * (1.0 - a).ln()).sqrt() * (std::f64::consts::TAU * b).cos()
-    }
+    use lumiris_test_support::random::{normal, pcg32};
 
     /// Seeds of these errors in each block of two, and these times.
     fn seeds<const N: usize>(errors: [f64; N], cpu: [f64; N]) -> Vec<Inefficiency> {

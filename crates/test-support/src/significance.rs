@@ -47,7 +47,7 @@ pub fn is_beyond(samples: &Welford, expected: f64, limit: f64, significance: f64
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::random::{Pcg32, RngExt, pcg32};
+    use crate::random::{normal, pcg32};
     use lumiris_numbers::estimators::stats::t_test;
 
     #[test]
@@ -55,12 +55,6 @@ mod tests {
         for (p, dof, expected) in [(0.05, 4, 2.776_445), (0.01, 10, 3.169_273), (0.05, 1_000_000, 1.959_966)] {
             assert!((critical_t(p, dof) - expected).abs() < 2e-6, "{p} {dof}: {}", critical_t(p, dof));
         }
-    }
-
-    /// Normal numbers [Box and Muller 1958].
-    fn normal(stream: &mut Pcg32) -> f64 {
-        let [u, v] = stream.random::<[f32; 2]>().map(f64::from);
-        (-2.0 * (1.0 - u).ln()).sqrt() * (std::f64::consts::TAU * v).cos()
     }
 
     #[test]

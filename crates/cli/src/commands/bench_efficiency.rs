@@ -287,7 +287,7 @@ fn text(table: &Table) -> String {
     if !table.left_out.is_empty() {
         let names: Vec<String> =
             table.left_out.iter().map(|row| format!("{} ({})", row.name, known(row.best()))).collect();
-        text += &format!("less than half of the best at first sight: {}\n", names.join("; "));
+        text += &format!("less than {LEFT_OUT_BELOW} of the best at first sight: {}\n", names.join("; "));
     }
     text.trim_end().to_owned()
 }
