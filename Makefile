@@ -12,7 +12,7 @@ PREFIX ?= /usr/local
 BINARY = target/release/lumiris
 SHARE = $(DESTDIR)$(PREFIX)/share
 
-.PHONY: run build install uninstall test test-farm test-denoise test-python test-power measure-power test-debian13 setup lint doc bindings clean
+.PHONY: run build install uninstall test test-scalar test-farm test-denoise test-python test-power measure-power test-debian13 setup lint doc bindings clean
 
 run: setup
 	$(CARGO) build --release
@@ -39,7 +39,12 @@ uninstall:
 test: setup
 	@.ci/setup.sh $(TEST_PACKAGES)
 	$(CARGO) test --workspace --doc
+	$(CARGO) test --profile scalar --package lumiris-lanes --features scalar
 	$(CARGO) test --workspace --no-fail-fast --lib --bins --tests
+
+# The kernels of all instruction sets against those without vectors, as a part of `make test`.
+test-scalar: setup
+	$(CARGO) test --profile scalar --package lumiris-lanes --features scalar
 
 # The tests of a part of the workspace are chosen by name here and below: with --package, dependencies have other features,
 # so that everything is compiled once more.

@@ -8,7 +8,6 @@ use lumiris::render::plan::{Preparation, prepare};
 use lumiris::render::{RenderSettings, render};
 use lumiris::scene::{AccelKind, RenderJob};
 use lumiris::settings::{EstimatorKind, Proposals, RouletteKind, Target};
-use lumiris_lanes::Level;
 use std::path::Path;
 use std::sync::atomic::AtomicBool;
 
@@ -55,7 +54,7 @@ fn the_instruction_set_of_the_lanes_does_not_change_a_bit() {
     for estimator in ESTIMATORS {
         let job = gallery(estimator, None);
         let reference = film(&job, RenderSettings::default());
-        for level in [Level::fallback()].into_iter().chain(lumiris_lanes::levels()) {
+        for level in lumiris_lanes::levels() {
             // Of the whole process: what other tests render at this time has the same bits as well
             lumiris_lanes::set_level(Some(level));
             let other = film(&job, RenderSettings::default());

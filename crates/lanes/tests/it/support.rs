@@ -2,9 +2,13 @@
 
 use lumiris_lanes::Level;
 
-/// All levels of this machine, the scalar one first.
+/// All levels of this machine, the scalar one first if it is compiled.
 pub(crate) fn levels() -> Vec<Level> {
-    [Level::fallback()].into_iter().chain(lumiris_lanes::levels()).collect()
+    #[cfg(feature = "scalar")]
+    let scalar = Some(Level::fallback());
+    #[cfg(not(feature = "scalar"))]
+    let scalar = None;
+    scalar.into_iter().chain(lumiris_lanes::levels()).collect()
 }
 
 /// Lengths with and without full vectors.

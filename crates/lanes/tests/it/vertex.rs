@@ -170,6 +170,6 @@ fn lambertian_directions_follow_the_cosine_on_the_side_of_wo() {
     let (half, mut pdf) = (vec![0.5; N], vec![1.0; N]);
     let mut wi: Three = [0, 1, 2].map(|_| vec![0.0; N]);
     let out = &mut wi.each_mut().map(|w| &mut w[..]);
-    sample_lambertian(Level::fallback(), &lambertian, [&half, &half], out, &mut pdf);
+    sample_lambertian(Level::baseline(), &lambertian, [&half, &half], out, &mut pdf);
     assert!(pdf.iter().all(|&p| p == 0.0));
 }
