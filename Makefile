@@ -36,10 +36,9 @@ uninstall:
 	  $(SHARE)/zsh/site-functions/_lumiris $(SHARE)/fish/vendor_completions.d/lumiris.fish \
 	  $(SHARE)/man/man1/lumiris.1 $(SHARE)/man/man1/lumiris-*.1
 
-test: setup
+test: setup test-scalar
 	@.ci/setup.sh $(TEST_PACKAGES)
 	$(CARGO) test --workspace --doc
-	$(CARGO) test --profile scalar --package lumiris-lanes --features scalar
 	$(CARGO) test --workspace --no-fail-fast --lib --bins --tests
 
 # The kernels of all instruction sets against those without vectors, as a part of `make test`.

@@ -39,6 +39,25 @@ pub(crate) fn pixel_means(job: &mut RenderJob, seeds: std::ops::Range<u32>, spp:
     seeds.map(image).collect()
 }
 
+/// Asserts that each channel of each pixel has one mean in the images without something and with it, at a level of 10⁻⁶ (|z| of
+/// 4.9), and that half of the values notice a relative difference of `detects`, of 8 standard errors.
+pub(crate) fn assert_pixels_agree((without, with): (&[Vec<f64>], &[Vec<f64>]), detects: f64, what: &str) {
+    let (mut limits, mut wrong) = (Vec::new(), Vec::new());
+    for k in 0..without[0].len() {
+        let of = |images: &[Vec<f64>]| mean_of(images.iter().map(|image| image[k]));
+        let ((a, v_a), (b, v_b)) = (of(without), of(with));
+        let error = (v_a + v_b).sqrt();
+        if (a - b).abs() > 4.9 * error {
+            wrong.push(format!("pixel {}, channel {}: {b} with and {a} without, ± {error}", k / 3, k % 3));
+        }
+        limits.push(8.0 * error / a);
+    }
+    assert!(wrong.is_empty(), "{what}: {} values, such as {}", wrong.len(), wrong[0]);
+    limits.sort_by(f64::total_cmp);
+    let median = limits[limits.len() / 2];
+    assert!(median < detects, "{what} notices {median}");
+}
+
 /// From a quarter of the mean number of samples to twice as many, in no order.
 fn different_numbers(job: &RenderJob, spp: u32) -> PixelSamples {
     let bounds = job.world.scene.film.bounds;
@@ -106,21 +125,7 @@ fn every_pixel_has_the_light_that_it_has_without_sharing() {
         let alone = images(1, 0..seeds, false);
         for &(detects, differ) in cases {
             let shared = images(4, 1000..1000 + seeds, differ);
-            let mut limits = Vec::new();
-            let mut wrong = Vec::new();
-            for k in 0..alone[0].len() {
-                let of = |images: &[Vec<f64>]| mean_of(images.iter().map(|image| image[k]));
-                let ((a, v_a), (b, v_b)) = (of(&alone), of(&shared));
-                let error = (v_a + v_b).sqrt();
-                if (a - b).abs() > 4.9 * error {
-                    wrong.push(format!("pixel {}, channel {}: {b} with and {a} without, ± {error}", k / 3, k % 3));
-                }
-                limits.push(8.0 * error / a);
-            }
-            assert!(wrong.is_empty(), "{name}, {estimator:?}: {} values, such as {}", wrong.len(), wrong[0]);
-            limits.sort_by(f64::total_cmp);
-            let median = limits[limits.len() / 2];
-            assert!(median < detects, "{name}, {estimator:?} notices {median}");
+            assert_pixels_agree((&alone, &shared), detects, &format!("{name}, {estimator:?}"));
         }
     }
 }

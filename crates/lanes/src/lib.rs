@@ -3,8 +3,8 @@
 //! A kernel is written once over vectors and compiled for each instruction set; [`Level`] chooses one when it is
 //! called. Only IEEE addition, multiplication, division and square root are used, in one order and never fused, so that
 //! the results are the same bits at every level. The scalar twin of a kernel is the kernel itself at the level without
-//! vectors, `Level::fallback()`, which the feature `scalar` adds. Slices may have any length: the last vector overlaps the one before it, and fewer
-//! numbers than one vector are padded.
+//! vectors, `Level::fallback()`, which the feature `scalar` adds. Slices may have any length: the last vector overlaps
+//! the one before it, and fewer numbers than one vector are padded.
 //!
 //! In kernels there are no closures and no `map` over arrays: their code would be compiled without the vectors.
 //!
