@@ -12,7 +12,7 @@ PREFIX ?= /usr/local
 BINARY = target/release/lumiris
 SHARE = $(DESTDIR)$(PREFIX)/share
 
-.PHONY: run build install uninstall test test-scalar test-farm test-denoise test-python test-power measure-power test-debian13 setup lint doc bindings clean
+.PHONY: run build install uninstall build-tests test test-scalar test-farm test-denoise test-python test-power measure-power test-debian13 setup lint doc bindings clean
 
 run: setup
 	$(CARGO) build --release
@@ -35,6 +35,10 @@ uninstall:
 	rm -f $(DESTDIR)$(PREFIX)/bin/lumiris $(SHARE)/bash-completion/completions/lumiris \
 	  $(SHARE)/zsh/site-functions/_lumiris $(SHARE)/fish/vendor_completions.d/lumiris.fish \
 	  $(SHARE)/man/man1/lumiris.1 $(SHARE)/man/man1/lumiris-*.1
+
+# All tests, without running them: at once, crates wait for each other less than step by step.
+build-tests: setup
+	$(CARGO) test --workspace --no-run --lib --bins --tests
 
 test: setup test-scalar
 	@.ci/setup.sh $(TEST_PACKAGES)
@@ -78,8 +82,8 @@ test-python: setup
 	  "$$environment/bin/python" -m mypy lumiris tests
 
 # Analytic scenes at full power: enough samples to detect a bias of 2 % (0.5 or 1 % where there is little noise), the
-# injection of that bias, and the table of what each row detects. `make test` does the same with a sixth of the samples
-# or less.
+# injection of that bias, and the table of what each row detects. `make test` does the same with a twelfth of the
+# samples or less.
 test-power: setup
 	$(CARGO) test -p lumiris --test it -- --ignored --nocapture known_answer_at_full_power
 
@@ -100,8 +104,7 @@ setup:
 
 lint: setup
 	$(CARGO) fmt --all --check
-	$(CARGO) clippy --workspace --all-targets -- -D warnings
-	$(CARGO) clippy -p lumiris-python --features module -- -D warnings
+	$(CARGO) clippy --workspace --all-targets --features lumiris-python/module -- -D warnings
 
 doc: setup
 	RUSTDOCFLAGS="-D warnings -A rustdoc::private-intra-doc-links" $(CARGO) doc --workspace --no-deps --document-private-items

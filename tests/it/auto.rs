@@ -10,9 +10,9 @@ use std::path::Path;
 use std::time::Duration;
 
 /// The gallery, large enough for a pilot, with settings changed.
-fn gallery(kind: IntegratorKind, change: impl FnOnce(&mut Settings)) -> RenderJob {
+fn gallery(kind: IntegratorKind, resolution: [u32; 2], change: impl FnOnce(&mut Settings)) -> RenderJob {
     let path = Path::new(env!("CARGO_MANIFEST_DIR")).join("scenes/demo/gallery.pbrt");
-    let options = LoadOptions { resolution: Some([256, 144]), ..LoadOptions::default() };
+    let options = LoadOptions { resolution: Some(resolution), ..LoadOptions::default() };
     let mut loaded = load(&path, &options).map_err(|d| d.to_string()).unwrap();
     loaded.settings.integrator = IntegratorSettings::default().of_kind(kind);
     loaded.settings.sampling.spp = 32;
@@ -27,7 +27,7 @@ fn what_an_image_takes_before_counts() {
     // Far more than any time that a machine takes for a sample
     let of = |kind: IntegratorKind| {
         let how = Preparation { loading: Duration::from_secs(10_000), ..Preparation::on(None) };
-        prepare(&mut gallery(kind, |_| ()), &how).unwrap().auto.unwrap()
+        prepare(&mut gallery(kind, [256, 144], |_| ()), &how).unwrap().auto.unwrap()
     };
     let of_sample = 10_000e9 / f64::from(256 * 144 * 32);
     let path = of(IntegratorKind::Path);
@@ -61,7 +61,7 @@ fn what_is_given_stays() {
         |s| s.sampling.sampler = SamplerKind::Independent,
     ];
     for (kind, (i, change)) in both.into_iter().flat_map(|kind| all.into_iter().enumerate().map(move |c| (kind, c))) {
-        let mut job = gallery(kind, change);
+        let mut job = gallery(kind, [224, 126], change);
         let given = *job.settings();
         assert!(prepare(&mut job, &Preparation::on(None)).unwrap().auto.is_some());
         let mut chosen = *job.settings();

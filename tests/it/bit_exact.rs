@@ -16,7 +16,7 @@ const ESTIMATORS: [EstimatorKind; 4] =
 
 fn gallery(estimator: EstimatorKind, packet_width: Option<u32>) -> RenderJob {
     let path = Path::new(env!("CARGO_MANIFEST_DIR")).join("scenes/demo/gallery.pbrt");
-    let options = LoadOptions { resolution: Some([96, 54]), ..LoadOptions::default() };
+    let options = LoadOptions { resolution: Some([96, 36]), ..LoadOptions::default() };
     let mut loaded = load(&path, &options).map_err(|d| d.to_string()).unwrap();
     loaded.settings.integrator.estimator = estimator;
     loaded.job(AccelKind::Embree, packet_width).unwrap()
@@ -39,12 +39,10 @@ fn threads_and_tiles_do_not_change_a_bit() {
     for estimator in ESTIMATORS {
         let job = gallery(estimator, None);
         let reference = film(&job, RenderSettings { threads: Some(1), ..RenderSettings::default() });
-        for threads in [1, 2, 3] {
-            for tile_size in [1, 8, 13, 64] {
-                let settings = RenderSettings { threads: Some(threads), tile_size, ..RenderSettings::default() };
-                let what = format!("{estimator:?}, {threads} threads, tiles of {tile_size}");
-                assert_same_bits(&reference, &film(&job, settings), &what);
-            }
+        for (threads, tile_size) in [(1, 1), (1, 64), (2, 8), (2, 13), (3, 1), (3, 64)] {
+            let settings = RenderSettings { threads: Some(threads), tile_size, ..RenderSettings::default() };
+            let what = format!("{estimator:?}, {threads} threads, tiles of {tile_size}");
+            assert_same_bits(&reference, &film(&job, settings), &what);
         }
     }
 }

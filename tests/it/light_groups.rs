@@ -137,7 +137,7 @@ fn layers_add_up_to_the_image_and_leave_its_bits() {
 
 /// A layer has the mean that the image has with its lights alone. 8 methods × 4 groups × 3 channels, two-sided t-tests over
 /// 2 × 24 images: with at least 23 degrees of freedom a t of 5.5 has a level of 1.4·10⁻⁵, so all together 1.3·10⁻³. A bias of
-/// 8.5 standard errors is found with a probability above 0.99; it is at most 40 % of the mean of the dimmest layer.
+/// 8.5 standard errors is found with a probability above 0.99; it is at most 55 % of the mean of the dimmest layer.
 #[test]
 fn a_layer_has_the_light_of_its_group_alone() {
     let images = 24;
@@ -146,7 +146,7 @@ fn a_layer_has_the_light_of_its_group_alone() {
     };
     let film = |job: &mut RenderJob, seed| {
         job.change(|s| s.sampling.seed = seed);
-        film(job, 32)
+        film(job, 16)
     };
     let summary = |values: &[[f64; 3]], c: usize| {
         let n = values.len() as f64;
@@ -154,7 +154,7 @@ fn a_layer_has_the_light_of_its_group_alone() {
         (mean, values.iter().map(|v| (v[c] - mean).powi(2)).sum::<f64>() / (n - 1.0) / n)
     };
     let mut all = job(None);
-    all.pixel_samples = Some(split(32));
+    all.pixel_samples = Some(split(16));
     let mut of_lights = LIGHTS.map(|(group, _)| job(Some(group)));
     for method in METHODS {
         choose(&mut all, method);
@@ -169,7 +169,7 @@ fn a_layer_has_the_light_of_its_group_alone() {
                 let error = (va + vb).sqrt();
                 let what = format!("{group}, {method:?}, channel {c}: {a} and {b} ± {error}");
                 assert!((a - b).abs() < 5.5 * error + 1e-6 * b, "{what}");
-                assert!(8.5 * error < 0.4 * b + 1e-9, "too much noise: {what}");
+                assert!(8.5 * error < 0.55 * b + 1e-9, "too much noise: {what}");
             }
         }
     }

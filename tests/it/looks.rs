@@ -81,11 +81,11 @@ fn split(spp: u32, looks: &[u8]) -> PixelSamples {
     }
 }
 
-/// 11 settings × 4 parts of the image, two-sided z-tests of 2 × 96 images: one of 3.9 standard errors has a level of 10⁻⁴,
-/// so all together 4·10⁻³. A bias of 6 standard errors, at most 12 % of the mean, is found with a probability above 0.98.
+/// 11 settings × 4 parts of the image, two-sided z-tests of 2 × 64 images: one of 3.9 standard errors has a level of 10⁻⁴,
+/// so all together 4·10⁻³. A bias of 6 standard errors, at most 15 % of the mean, is found with a probability above 0.98.
 #[test]
 fn looks_change_no_mean() {
-    const IMAGES: u32 = 96;
+    const IMAGES: u32 = 64;
     const SPP: u32 = 16;
     use EstimatorKind::{Contributing, Mis, Ris};
     type Change = fn(&mut RenderJob);
@@ -156,7 +156,7 @@ fn looks_change_no_mean() {
             let what = format!("case {i}, part {k}: {} and {}, z = {}", split.mean(), whole.mean(), test.statistic);
             assert!(test.statistic.abs() < 3.9, "{what}");
             let error = split.standard_error().hypot(whole.standard_error());
-            assert!(6.0 * error < 0.12 * whole.mean(), "too much noise: {what} ± {error}");
+            assert!(6.0 * error < 0.15 * whole.mean(), "too much noise: {what} ± {error}");
         }
     }
 }

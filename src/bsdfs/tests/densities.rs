@@ -28,7 +28,7 @@ fn integrate(f: &dyn Fn(f64, f64) -> f64, a: [f64; 2], b: [f64; 2], whole: f64, 
         [([a[0], ma], [b[0], mb]), ([a[0], ma], [mb, b[1]]), ([ma, a[1]], [b[0], mb]), ([ma, a[1]], [mb, b[1]])];
     let parts = cells.map(|(a, b)| gauss(f, a, b));
     let sum: f64 = parts.iter().sum();
-    if depth >= 2 && ((sum - whole).abs() < 1e-8 || depth >= 9) {
+    if depth >= 2 && ((sum - whole).abs() < 1e-7 || depth >= 9) {
         return sum;
     }
     cells.iter().zip(parts).map(|(&(a, b), part)| integrate(f, a, b, part, depth + 1)).sum()

@@ -22,7 +22,7 @@ use std::path::{Path, PathBuf};
 use std::sync::atomic::AtomicBool;
 
 /// What `make test` renders.
-const QUICK: Effort = Effort { goal: 2.5, min_images: 32 };
+const QUICK: Effort = Effort { goal: 3.5, min_images: 32 };
 /// What `make test-power` renders.
 const FULL: Effort = Effort { goal: 1.0, min_images: 64 };
 
