@@ -22,6 +22,7 @@ use crate::scene::RenderJob;
 use crate::settings::{ControlVariates, EstimatorKind, IntegratorKind, Settings, Target};
 use lumiris_numbers::estimators::ocv::pixels::{Memory, Picture};
 use lumiris_numbers::math::hash::{pcg4d, unit_f32};
+use lumiris_numbers::samplers::SamplerKind;
 use rayon::prelude::*;
 use std::sync::atomic::{AtomicBool, Ordering};
 
@@ -32,16 +33,19 @@ const MIN_PIXELS: usize = 8192;
 /// Fewest and most blocks, and pixels of the image for each.
 const BLOCKS: [usize; 2] = [8, 64];
 const PIXELS_PER_BLOCK: usize = 3072;
-/// Part of the samples per pixel that blocks have, with which as much is gained, and fewest of them.
+/// Part of the samples per pixel that blocks have, and fewest of them.
 const PART: u32 = 4;
 const MIN_SPP: u32 = 2;
 /// Fewest columns that may pay: by one of light and one of a lobe, no more than 6 % of the variance is explained even in
 /// hindsight (`docs/measurements/ocv/pixels.md`).
 const MIN_COLUMNS: usize = 3;
 /// By how much the error must fall, without and with the column of a lobe: more than columns take of the time, which is up
-/// to 10 and to 25 % (`docs/measurements/efficiency`).
-const MIN_GAIN: [f64; 2] = [1.07, 1.3];
-/// The same of the first half of the blocks, for the pilot to go on.
+/// to 20 and to 25 % (`docs/measurements/efficiency`).
+const MIN_GAIN: [f64; 2] = [1.2, 1.25];
+/// How many times that where samples are not independent: a net over all of them leaves less to gain than one over a part, 1.15
+/// of 1.35.
+const OF_NETS: f64 = 1.15;
+/// By how much that of the first half of the blocks must fall, for the pilot to go on.
 const SCOUT_GAIN: f64 = 1.03;
 /// Combined with the seed of the image to give those of the pilot.
 const PILOT_SEED: u32 = 0x63_6f_6e_74;
@@ -91,18 +95,18 @@ fn pays(job: &RenderJob, stop: &AtomicBool) -> bool {
         if is_over { [0.0; 2] } else { difference(seeds.map(|seed| images(&run, worker, block, (spp, seed)))) }
     };
     let blocks = blocks(bounds, sampling.seed);
+    let of_nets = if sampling.sampler == SamplerKind::Independent { 1.0 } else { OF_NETS };
+    let min_gain = of_nets * MIN_GAIN[usize::from(job.controls() > job.lights.groups.len())];
     let [mut alone, mut corrected] = [0.0; 2];
-    [(0, SCOUT_GAIN), (1, MIN_GAIN[usize::from(job.controls() > job.lights.groups.len())])].into_iter().all(
-        |(first, gain)| {
-            let some: Vec<_> = blocks.iter().skip(first).step_by(2).collect();
-            let worker = || left.worker(job, FeatureSet::NoAlbedo);
-            let differences: Vec<_> = some.into_par_iter().map_init(worker, of_block).collect();
-            for [a, c] in differences {
-                (alone, corrected) = (alone + a, corrected + c);
-            }
-            alone > gain * corrected
-        },
-    )
+    [(0, SCOUT_GAIN), (1, min_gain)].into_iter().all(|(first, gain)| {
+        let some: Vec<_> = blocks.iter().skip(first).step_by(2).collect();
+        let worker = || left.worker(job, FeatureSet::NoAlbedo);
+        let differences: Vec<_> = some.into_par_iter().map_init(worker, of_block).collect();
+        for [a, c] in differences {
+            (alone, corrected) = (alone + a, corrected + c);
+        }
+        alone > gain * corrected
+    })
 }
 
 /// The blocks: one of each of as many runs of equal length, row by row.
