@@ -83,7 +83,7 @@ test-python: setup
 
 # Analytic scenes at full power: enough samples to detect a bias of 2 % (0.5 or 1 % where there is little noise), the
 # injection of that bias, and the table of what each row detects. `make test` does the same with a twelfth of the
-# samples or less.
+# samples where there is noise.
 test-power: setup
 	$(CARGO) test -p lumiris --test it -- --ignored --nocapture known_answer_at_full_power
 

@@ -39,11 +39,11 @@ const MIN_SPP: u32 = 2;
 /// Fewest columns that may pay: by one of light and one of a lobe, no more than 6 % of the variance is explained even in
 /// hindsight (`docs/measurements/ocv/pixels.md`).
 const MIN_COLUMNS: usize = 3;
-/// By how much the error must fall, without and with the column of a lobe: more than columns take of the time, which is up
-/// to 20 and to 25 % (`docs/measurements/efficiency`).
+/// By how much the error must fall, without and with the column of a lobe: more than columns take of the time, which is
+/// some 20 and 25 % (`docs/measurements/efficiency`).
 const MIN_GAIN: [f64; 2] = [1.2, 1.25];
-/// How many times that where samples are not independent: a net over all of them leaves less to gain than one over a part, 1.15
-/// of 1.35.
+/// How many times that where samples are not independent: a net over all of them leaves less to gain than one over a part, 1.11 and
+/// 1.18 of 1.3.
 const OF_NETS: f64 = 1.15;
 /// By how much that of the first half of the blocks must fall, for the pilot to go on.
 const SCOUT_GAIN: f64 = 1.03;

@@ -7,7 +7,7 @@ use std::path::{Path, PathBuf};
 
 /// Mutated inputs altogether.
 const MUTATIONS: usize = 10_000;
-/// Scenes that take a tenth of a second or more to read, whose turn comes once in [`SLOW_TURNS`] rounds.
+/// Scenes that take longest to read (`docs/measurements/build.md`), whose turn comes once in [`SLOW_TURNS`] rounds.
 const SLOW: [&str; 8] =
     ["relief.pbrt", "lens.pbrt", "gallery.pbrt", "fog.pbrt", "room.pbrt", "checkers.pbrt", "fire.pbrt", "window.pbrt"];
 const SLOW_TURNS: usize = 8;
@@ -69,6 +69,7 @@ fn mutated_scenes_never_panic_and_always_say_what_is_wrong() {
     scene_files(&Path::new(env!("CARGO_MANIFEST_DIR")).join("scenes"), &mut files);
     scene_files(&Path::new(env!("CARGO_MANIFEST_DIR")).join("tests/pbrt"), &mut files);
     assert!(files.len() >= 20);
+    assert!(SLOW.iter().all(|name| files.iter().any(|file| file.ends_with(name))), "they are there");
     let folder = tempfile::tempdir().unwrap();
     let mut random = pcg32([1, 0, 0]);
     let (mut accepted, mut refused) = (0, 0);
