@@ -132,6 +132,9 @@ pub fn cryptomattes(
     film: &Film,
     kinds: &[Cryptomatte],
 ) -> Result<Vec<Layer>, ThreadError> {
+    if kinds.is_empty() {
+        return Ok(Vec::new());
+    }
     let pool = thread_pool(settings.threads)?;
     let tiles = film.bounds.tiles(settings.tile_size);
     let camera = CameraSampler::new(job, settings.first_sample);

@@ -9,6 +9,7 @@ mod bit_exact;
 mod color_spaces;
 mod control_variates;
 mod crosscheck;
+mod cryptomatte;
 mod dispersion;
 mod evaluated;
 mod few_samples;
