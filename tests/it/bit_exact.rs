@@ -75,22 +75,25 @@ fn packet_width_does_not_change_a_bit() {
 
 #[test]
 fn what_a_pilot_finds_does_not_depend_on_threads_tiles_or_packets() {
-    for roulette in [RouletteKind::Efficiency, RouletteKind::Adjoint] {
-        for estimator in [EstimatorKind::Mis, EstimatorKind::Ris, EstimatorKind::Ocv] {
-            let job = |packet_width| {
-                let mut job = gallery(estimator, packet_width);
-                job.change(|s| s.integrator.roulette = roulette);
-                job
-            };
-            let reference = film(&job(None), RenderSettings { threads: Some(1), ..RenderSettings::default() });
-            for (threads, tile_size, packet_width) in [(2, 16, 1), (3, 13, 4), (2, 64, 8), (1, 8, 16)] {
-                let settings = RenderSettings { threads: Some(threads), tile_size, ..RenderSettings::default() };
-                let what = format!("{roulette:?}, {estimator:?}, {threads} threads, tiles of {tile_size}");
-                assert_same_bits(&reference, &film(&job(Some(packet_width)), settings), &what);
-            }
-            let plain = film(&gallery(estimator, None), RenderSettings::default());
-            assert_ne!(channels(&plain, &[], None).data, channels(&reference, &[], None).data);
+    for (roulette, estimator) in [
+        (RouletteKind::Efficiency, EstimatorKind::Mis),
+        (RouletteKind::Efficiency, EstimatorKind::Ris),
+        (RouletteKind::Efficiency, EstimatorKind::Ocv),
+        (RouletteKind::Adjoint, EstimatorKind::Mis),
+    ] {
+        let job = |packet_width| {
+            let mut job = gallery(estimator, packet_width);
+            job.change(|s| s.integrator.roulette = roulette);
+            job
+        };
+        let reference = film(&job(None), RenderSettings { threads: Some(1), ..RenderSettings::default() });
+        for (threads, tile_size, packet_width) in [(3, 13, 4), (2, 64, 16)] {
+            let settings = RenderSettings { threads: Some(threads), tile_size, ..RenderSettings::default() };
+            let what = format!("{roulette:?}, {estimator:?}, {threads} threads, tiles of {tile_size}");
+            assert_same_bits(&reference, &film(&job(Some(packet_width)), settings), &what);
         }
+        let plain = film(&gallery(estimator, None), RenderSettings::default());
+        assert_ne!(channels(&plain, &[], None).data, channels(&reference, &[], None).data);
     }
 }
 

@@ -33,6 +33,7 @@ mod photons;
 mod portals;
 mod ptex;
 mod roulette;
+mod same_light;
 mod sample_allocation;
 mod subsurface;
 mod texture_pyramids;

@@ -1,12 +1,15 @@
 //! Truncated and bit-flipped versions of the project's own scenes: a result or a message, never a panic.
 
 use lumiris::import::{LoadOptions, load};
+use lumiris_test_support::power::by_power;
 use lumiris_test_support::random::{Pcg32, RngExt, pcg32};
 use std::panic::{AssertUnwindSafe, catch_unwind};
 use std::path::{Path, PathBuf};
 
 /// Mutated inputs altogether.
-const MUTATIONS: usize = 10_000;
+fn mutations() -> usize {
+    by_power(10_000, 2_000)
+}
 /// Scenes that take longest to read (`docs/measurements/build.md`), whose turn comes once in [`SLOW_TURNS`] rounds.
 const SLOW: [&str; 8] =
     ["relief.pbrt", "lens.pbrt", "gallery.pbrt", "fog.pbrt", "room.pbrt", "checkers.pbrt", "fire.pbrt", "window.pbrt"];
@@ -76,7 +79,7 @@ fn mutated_scenes_never_panic_and_always_say_what_is_wrong() {
     let turns = (0..).flat_map(|round| files.iter().map(move |source| (round, source)));
     let is_turn =
         |(round, source): &(usize, &PathBuf)| round % SLOW_TURNS == 0 || !SLOW.iter().any(|s| source.ends_with(s));
-    for (i, (_, source)) in turns.filter(is_turn).take(MUTATIONS).enumerate() {
+    for (i, (_, source)) in turns.filter(is_turn).take(mutations()).enumerate() {
         let mut bytes = std::fs::read(source).unwrap();
         mutate(&mut bytes, &mut random);
         let path = folder.path().join(source.file_name().unwrap());
@@ -96,5 +99,5 @@ fn mutated_scenes_never_panic_and_always_say_what_is_wrong() {
         }
     }
     // Both happen often: the mutations are neither harmless nor all fatal.
-    assert!(accepted > MUTATIONS / 20 && refused > MUTATIONS / 20, "{accepted} accepted, {refused} refused");
+    assert!(accepted > mutations() / 20 && refused > mutations() / 20, "{accepted} accepted, {refused} refused");
 }

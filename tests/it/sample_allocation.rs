@@ -1,5 +1,7 @@
 //! Camera samples where they are needed: the numbers are independent of the samples that they count, and of threads.
 
+use crate::path_reuse::image_of_seed;
+use crate::same_light::assert_same_light;
 use lumiris::film::{Film, PixelSums};
 use lumiris::import::{LoadOptions, load};
 use lumiris::lights::LightSamplerKind;
@@ -71,6 +73,19 @@ fn adaptive_images_have_the_samples_they_ask_for_and_do_not_depend_on_threads_or
             assert!(bits(&film) == bits(&other), "{threads} threads, tiles of {tile_size}");
         }
     }
+}
+
+/// Numbers of samples, and of rays at the edges of lights, that follow from a pilot for each image, beside equal numbers.
+#[test]
+#[ignore = "of `make test-power` only"]
+fn adaptive_numbers_leave_the_light_of_equal_ones() {
+    let mut adaptive = gallery(|s| s.sampling.allocation = Allocation::Adaptive);
+    let equal = gallery(|s| s.sampling.allocation = Allocation::Uniform);
+    let with = |seed| {
+        adaptive.change(|s| s.sampling.seed = seed);
+        rendered(&mut adaptive, 2, 16).0
+    };
+    assert_same_light("adaptive numbers: gallery, direct, mis", image_of_seed(equal, None, 16), with);
 }
 
 #[test]

@@ -2,6 +2,7 @@
 
 pub mod integrals;
 pub mod nanovdb;
+pub mod power;
 pub mod ptex;
 pub mod random;
 pub mod significance;

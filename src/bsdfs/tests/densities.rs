@@ -1,12 +1,21 @@
-//! χ² tests of every sampling routine against its pdf. 400,000 samples each; family-wise significance 1 % (Šidák), fixed
-//! seeds.
+//! χ² tests of every sampling routine against its pdf; family-wise significance 1 % (Šidák), fixed seeds.
 
 use super::*;
 use lumiris_numbers::estimators::stats::{chi_squared_test, sidak};
+use lumiris_test_support::power::by_power;
 
-const THETAS: usize = 32;
-const PHIS: usize = 64;
-const SAMPLES: usize = 400_000;
+/// Bins of the polar angle; there are twice as many of the azimuth.
+fn thetas() -> usize {
+    by_power(32, 16)
+}
+
+fn phis() -> usize {
+    2 * thetas()
+}
+
+fn samples() -> usize {
+    by_power(1_000_000, 200_000)
+}
 
 /// 3×3 Gauss-Legendre on [a0, a1] × [b0, b1].
 fn gauss(f: &dyn Fn(f64, f64) -> f64, a: [f64; 2], b: [f64; 2]) -> f64 {
@@ -36,15 +45,16 @@ fn integrate(f: &dyn Fn(f64, f64) -> f64, a: [f64; 2], b: [f64; 2], whole: f64, 
 
 /// Probability of each bin over the sphere, then that of no sample or a delta.
 fn expected(pdf: &dyn Fn(Vec3) -> f32) -> Vec<f64> {
+    let (thetas, phis) = (thetas(), phis());
     let f = |theta: f64, phi: f64| {
         let (st, ct) = theta.sin_cos();
         let (sp, cp) = phi.sin_cos();
         st * f64::from(pdf(Vec3::new((st * cp) as f32, (st * sp) as f32, ct as f32)))
     };
-    let (dt, dp) = (std::f64::consts::PI / THETAS as f64, std::f64::consts::TAU / PHIS as f64);
-    let mut bins: Vec<f64> = (0..THETAS * PHIS)
+    let (dt, dp) = (std::f64::consts::PI / thetas as f64, std::f64::consts::TAU / phis as f64);
+    let mut bins: Vec<f64> = (0..thetas * phis)
         .map(|i| {
-            let (t, p) = ((i / PHIS) as f64 * dt, (i % PHIS) as f64 * dp);
+            let (t, p) = ((i / phis) as f64 * dt, (i % phis) as f64 * dp);
             let (a, b) = ([t, t + dt], [p, p + dp]);
             integrate(&f, a, b, gauss(&f, a, b), 0)
         })
@@ -54,17 +64,18 @@ fn expected(pdf: &dyn Fn(Vec3) -> f32) -> Vec<f64> {
 }
 
 fn histogram(sample: &dyn Fn(f32, [f32; 2]) -> Option<BsdfSample>, seed: u32) -> Vec<f64> {
-    let mut counts = vec![0.0; THETAS * PHIS + 1];
+    let (thetas, phis) = (thetas(), phis());
+    let mut counts = vec![0.0; thetas * phis + 1];
     let mut s = pcg32([seed, 11, 22]);
-    for _ in 0..SAMPLES {
+    for _ in 0..samples() {
         let bin = match sample(s.random::<f32>(), s.random::<[f32; 2]>()) {
             Some(x) if !x.lobe.is_specular() => {
                 let theta = f64::from(x.wi.truncate().length()).atan2(f64::from(x.wi.z));
-                let i = (theta / std::f64::consts::PI * THETAS as f64) as usize;
-                let j = (warp::azimuth(x.wi) / TAU * PHIS as f32) as usize;
-                i.min(THETAS - 1) * PHIS + j.min(PHIS - 1)
+                let i = (theta / std::f64::consts::PI * thetas as f64) as usize;
+                let j = (warp::azimuth(x.wi) / TAU * phis as f32) as usize;
+                i.min(thetas - 1) * phis + j.min(phis - 1)
             }
-            _ => THETAS * PHIS,
+            _ => thetas * phis,
         };
         counts[bin] += 1.0;
     }
@@ -81,8 +92,8 @@ fn samples_follow_their_density_by_chi_squared() {
     for (i, (name, b)) in zoo.iter().enumerate() {
         for (j, &wo) in directions.iter().enumerate() {
             let probabilities = expected(&|wi| b.pdf(wo, wi));
-            let total: f64 = probabilities[..THETAS * PHIS].iter().sum();
-            let expected: Vec<f64> = probabilities.iter().map(|p| p * SAMPLES as f64).collect();
+            let total: f64 = probabilities[..thetas() * phis()].iter().sum();
+            let expected: Vec<f64> = probabilities.iter().map(|p| p * samples() as f64).collect();
             let observed = histogram(&|uc, u| b.sample_direction(wo, uc, u), (i * 8 + j) as u32);
             let chi = chi_squared_test(&observed, &expected, significance);
             if chi.rejected || total > 1.0 + 1e-4 {
@@ -98,7 +109,7 @@ fn the_chi_squared_test_finds_a_wrong_density() {
     // A power: the same sampler against a density 3 % narrower in alpha must fail.
     let (a, b) = (Bsdf::Conductor(gold(0.3, 0.3)), Bsdf::Conductor(gold(0.291, 0.291)));
     let wo = warp::direction(0.7, 1.0);
-    let expected: Vec<f64> = expected(&|wi| b.pdf(wo, wi)).iter().map(|p| p * SAMPLES as f64).collect();
+    let expected: Vec<f64> = expected(&|wi| b.pdf(wo, wi)).iter().map(|p| p * samples() as f64).collect();
     assert!(chi_squared_test(&histogram(&|uc, u| a.sample(wo, uc, u), 5), &expected, 1e-6).rejected);
 }
 

@@ -15,6 +15,7 @@ mod rows;
 use lumiris::film::{Film, PixelSums};
 use lumiris::render::{RenderSettings, render};
 use lumiris::settings::IntegratorKind;
+use lumiris_test_support::power::by_power;
 use power::{Effort, MEASURE, Outcome, POWER, level, print_table, render_rows, write_table};
 use rows::{BASE, job};
 use std::io::Write;
@@ -22,7 +23,7 @@ use std::path::{Path, PathBuf};
 use std::sync::atomic::AtomicBool;
 
 /// What `make test` renders.
-const QUICK: Effort = Effort { goal: 3.5, min_images: 32 };
+const QUICK: Effort = Effort { goal: 6.0, min_images: 16 };
 /// What `make test-power` renders.
 const FULL: Effort = Effort { goal: 1.0, min_images: 64 };
 
@@ -154,13 +155,7 @@ fn check(effort: &Effort) {
 
 #[test]
 fn every_row_gives_the_known_answer() {
-    check(&QUICK);
-}
-
-#[test]
-#[ignore = "some fifteen minutes of CPU time: make test-power"]
-fn every_row_gives_the_known_answer_at_full_power() {
-    check(&FULL);
+    check(&by_power(FULL, QUICK));
 }
 
 #[test]
